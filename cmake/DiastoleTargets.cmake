@@ -1,0 +1,40 @@
+# Functions that every folder's CMakeLists.txt uses, so that each target gets the same warnings and include root.
+
+add_library(diastole_options INTERFACE)
+target_include_directories(diastole_options INTERFACE ${CMAKE_SOURCE_DIR})
+target_compile_options(diastole_options INTERFACE
+  -Wall -Wextra -Wconversion -Wdouble-promotion -Wshadow -Wnon-virtual-dtor -Werror)
+
+# diastole_library(NAME SOURCES a.cpp ... [LIBS x ...])
+# A static library; sources are found and included by their path from the root ("protocol/wire/frame.hpp").
+function(diastole_library name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;LIBS" ${ARGN})
+  add_library(${name} STATIC ${ARG_SOURCES})
+  target_link_libraries(${name} PUBLIC diastole_options ${ARG_LIBS})
+endfunction()
+
+# diastole_program(NAME SOURCES a.cpp ... [LIBS x ...])  — lands in build/<preset>/bin
+function(diastole_program name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;LIBS" ${ARGN})
+  add_executable(${name} ${ARG_SOURCES})
+  target_link_libraries(${name} PRIVATE diastole_options ${ARG_LIBS})
+endfunction()
+
+# diastole_test(NAME SOURCES a.cpp ... [LIBS x ...] [LABELS slow ...] [TIMEOUT seconds])
+# A GoogleTest program whose cases are single ctest entries. Label "slow": only in `tools/check --full`.
+function(diastole_test name)
+  cmake_parse_arguments(ARG "" "TIMEOUT" "SOURCES;LIBS;LABELS" ${ARGN})
+  add_executable(${name} ${ARG_SOURCES})
+  target_link_libraries(${name} PRIVATE diastole_options ${ARG_LIBS} GTest::gmock GTest::gtest_main)
+  set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/tests)
+  target_compile_definitions(${name} PRIVATE
+    DIASTOLE_SOURCE_DIR="${CMAKE_SOURCE_DIR}" DIASTOLE_BIN_DIR="${CMAKE_RUNTIME_OUTPUT_DIRECTORY}")
+  if(NOT ARG_TIMEOUT)
+    set(ARG_TIMEOUT 300)
+  endif()
+  set(properties TIMEOUT ${ARG_TIMEOUT})
+  if(ARG_LABELS)
+    list(APPEND properties LABELS "${ARG_LABELS}")
+  endif()
+  gtest_discover_tests(${name} TEST_PREFIX "${name}." PROPERTIES ${properties} DISCOVERY_TIMEOUT 60)
+endfunction()

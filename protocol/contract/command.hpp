@@ -1,0 +1,57 @@
+#pragma once
+// How a subcommand joins the front door. Each folder with commands (host/cli, estimator/cli, tools/...)
+// offers one function `void add_..._commands(CommandLine&)`; each command is one file with a function of the
+// same form:
+//
+//   void add_inspect(CommandLine& line) {
+//     auto options = std::make_shared<InspectOptions>();
+//     CLI::App* command = line.add("inspect", "what is in a run file, and whether it is sound",
+//                                  "  diastole inspect session.run.h5\n  diastole inspect session.run.h5
+//                                  --json");
+//     command->add_option("RUN", options->run, "run file")->required();
+//     line.on_run(command, [options](const CommandOutput& out) { ...; return ExitCode::done; });
+//   }
+//
+// With --json (every command has it) `out.json` is true: print exactly one JSON document on standard output,
+// and everything meant for a person on standard error.
+
+#include <CLI/CLI.hpp>
+#include <functional>
+#include <string>
+
+#include "protocol/contract/exit_code.hpp"
+
+namespace diastole {
+
+struct CommandOutput {
+  bool json = false;
+};
+
+class CommandLine {
+ public:
+  using Action = std::function<ExitCode(const CommandOutput&)>;
+
+  explicit CommandLine(CLI::App& app) : app_(app) {}
+
+  /// Adds a subcommand whose help ends in worked examples, and its --json flag.
+  CLI::App* add(const std::string& name, const std::string& purpose, const std::string& examples) {
+    CLI::App* command = app_.add_subcommand(name, purpose);
+    command->footer("Examples:\n" + examples);
+    command->add_flag("--json", output_.json, "print one JSON document on standard output");
+    return command;
+  }
+
+  /// What the front door runs when `command` was chosen.
+  void on_run(CLI::App* command, Action action) {
+    command->callback([this, action = std::move(action)] { chosen_ = action; });
+  }
+
+  [[nodiscard]] ExitCode run() const { return chosen_ ? chosen_(output_) : ExitCode::bad_input; }
+
+ private:
+  CLI::App& app_;
+  CommandOutput output_;
+  Action chosen_;
+};
+
+}  // namespace diastole
