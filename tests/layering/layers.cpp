@@ -1,0 +1,80 @@
+#include "tests/layering/layers.hpp"
+
+#include <algorithm>
+#include <fstream>
+#include <regex>
+
+namespace diastole::layering {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::string_view source_folders[] = {"protocol", "firmware", "host", "estimator", "tools", "tests"};
+
+bool lies_in(std::string_view path, std::string_view folder) {
+  return path.starts_with(folder) && (path.size() == folder.size() || path[folder.size()] == '/');
+}
+
+bool is_project_path(std::string_view included) {
+  return std::any_of(std::begin(source_folders), std::end(source_folders),
+                     [&](std::string_view folder) { return lies_in(included, folder); });
+}
+
+bool allowed(std::string_view file, std::string_view included) {
+  for (const Rule& rule : rules()) {
+    if (!lies_in(file, rule.folder)) continue;
+    return lies_in(included, rule.folder) ||
+           std::any_of(rule.may_include.begin(), rule.may_include.end(),
+                       [&](std::string_view folder) { return lies_in(included, folder); });
+  }
+  return false;
+}
+
+void check_file(const fs::path& root, const fs::path& path, std::vector<Violation>& found) {
+  static const std::regex include_line(R"re(^\s*#\s*include\s*"([^"]+)")re");
+  const std::string file = fs::relative(path, root).generic_string();
+  std::ifstream stream(path);
+  std::string text;
+  for (int line = 1; std::getline(stream, text); ++line) {
+    std::smatch match;
+    if (!std::regex_search(text, match, include_line)) continue;
+    // A path that does not start at the root would slip past the rules: it counts as a violation too.
+    if (!is_project_path(match[1].str()) || !allowed(file, match[1].str())) {
+      found.push_back({file, line, match[1].str()});
+    }
+  }
+}
+
+}  // namespace
+
+const std::vector<Rule>& rules() {
+  static const std::vector<Rule> list{
+      {"protocol/wire", {}},
+      {"protocol/contract", {}},
+      {"protocol/runfile", {"protocol/contract"}},
+      {"firmware/core", {"protocol/wire"}},
+      {"firmware/boards", {"protocol/wire", "firmware/core"}},
+      {"firmware/boot", {"protocol/wire"}},
+      {"host", {"protocol"}},
+      {"estimator", {"protocol/contract", "protocol/runfile"}},
+      {"tools", {"protocol", "firmware", "host", "estimator"}},
+      {"tests", {"protocol", "firmware", "host", "estimator", "tools"}},
+  };
+  return list;
+}
+
+std::vector<Violation> violations(const fs::path& root) {
+  std::vector<Violation> found;
+  for (const std::string_view folder : source_folders) {
+    if (!fs::exists(root / folder)) continue;
+    for (const auto& entry : fs::recursive_directory_iterator(root / folder)) {
+      const auto extension = entry.path().extension();
+      if (extension == ".hpp" || extension == ".cpp" || extension == ".h" || extension == ".inc") {
+        check_file(root, entry.path(), found);
+      }
+    }
+  }
+  return found;
+}
+
+}  // namespace diastole::layering

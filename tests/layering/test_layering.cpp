@@ -1,0 +1,48 @@
+#include <gtest/gtest.h>
+
+#include <fstream>
+
+#include "tests/layering/layers.hpp"
+
+namespace diastole::layering {
+namespace {
+
+namespace fs = std::filesystem;
+
+TEST(Layering, TheTreeFollowsTheDirectionOfDependence) {
+  for (const Violation& violation : violations(DIASTOLE_SOURCE_DIR)) {
+    ADD_FAILURE() << violation.file << ":" << violation.line << " may not include \"" << violation.included
+                  << "\"";
+  }
+}
+
+class PlantedViolation : public testing::TestWithParam<std::pair<std::string, std::string>> {};
+
+TEST_P(PlantedViolation, IsFound) {
+  const auto& [file, included] = GetParam();
+  const fs::path root = fs::path(testing::TempDir()) / "planted_violation";
+  fs::remove_all(root);
+  fs::create_directories((root / file).parent_path());
+  std::ofstream(root / file) << "#pragma once\n#include \"" << included << "\"\n";
+  const std::vector<Violation> found = violations(root);
+  fs::remove_all(root);
+  ASSERT_EQ(found.size(), 1U);
+  EXPECT_EQ(found[0].file, file);
+  EXPECT_EQ(found[0].line, 2);
+  EXPECT_EQ(found[0].included, included);
+}
+
+INSTANTIATE_TEST_SUITE_P(Rules, PlantedViolation,
+                         testing::Values(std::pair{"host/cli/run.cpp", "estimator/fe/newton.hpp"},
+                                         std::pair{"estimator/fit/fit.cpp", "host/daq/driver.hpp"},
+                                         std::pair{"estimator/fit/fit.cpp", "protocol/wire/frame.hpp"},
+                                         std::pair{"firmware/core/planner.hpp", "firmware/boards/board.hpp"},
+                                         std::pair{"firmware/core/planner.hpp", "protocol/runfile/run.hpp"},
+                                         std::pair{"protocol/wire/frame.hpp", "host/daq/driver.hpp"},
+                                         std::pair{"host/daq/driver.cpp", "tools/sim_daq/server.hpp"},
+                                         std::pair{"tools/sim_rig/plant.cpp", "tests/sim/fake.hpp"},
+                                         std::pair{"estimator/rig/hose.cpp", "tools/sim_rig/plant.hpp"},
+                                         std::pair{"host/daq/driver.cpp", "../../estimator/fe/newton.hpp"}));
+
+}  // namespace
+}  // namespace diastole::layering
