@@ -1,0 +1,138 @@
+#include "estimator/io/number_table.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <charconv>
+#include <cmath>
+#include <fstream>
+#include <iterator>
+#include <system_error>
+
+#include "protocol/contract/input_error.hpp"
+
+namespace diastole {
+namespace {
+
+std::string_view trimmed(std::string_view text) {
+  const auto is_space = [](char c) { return c == ' ' || c == '\t' || c == '\r'; };
+  while (!text.empty() && is_space(text.front()))
+    text.remove_prefix(1);
+  while (!text.empty() && is_space(text.back()))
+    text.remove_suffix(1);
+  return text;
+}
+
+std::string_view take_field(std::string_view& rest) {
+  const size_t comma = rest.find(',');
+  const std::string_view field = trimmed(rest.substr(0, comma));
+  rest.remove_prefix(comma == std::string_view::npos ? rest.size() : comma + 1);
+  return field;
+}
+
+void check_header(std::string_view line, const std::string& file, std::span<const std::string_view> columns) {
+  constexpr std::string_view byte_order_mark = "\xEF\xBB\xBF";
+  if (line.starts_with(byte_order_mark)) line.remove_prefix(byte_order_mark.size());
+  std::string_view rest = line;
+  const std::string remedy = fmt::format("The header must read: {}", fmt::join(columns, ","));
+  for (const std::string_view column : columns) {
+    const std::string_view found = take_field(rest);
+    if (found == column) continue;
+    throw InputError(
+        {file, "line 1", fmt::format("the header has \"{}\" where \"{}\" belongs", found, column), remedy});
+  }
+  if (!rest.empty()) {
+    throw InputError({file, "line 1", fmt::format("the header has a column too many: \"{}\"", rest), remedy});
+  }
+}
+
+}  // namespace
+
+NumberTable NumberTable::from_file(const std::filesystem::path& path,
+                                   std::span<const std::string_view> columns) {
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(path, error)) {
+    throw InputError(
+        {path.string(), "", "there is no such file", "Check the path; paths in a study are relative to it."});
+  }
+  std::ifstream stream(path, std::ios::binary);
+  std::string text(static_cast<size_t>(std::filesystem::file_size(path)), '\0');
+  if (!stream.read(text.data(), static_cast<std::streamsize>(text.size()))) {
+    throw InputError({path.string(), "", "the file cannot be read", "Check its permissions."});
+  }
+  return from_text(text, path.string(), columns);
+}
+
+NumberTable NumberTable::from_text(std::string_view text, std::string file,
+                                   std::span<const std::string_view> columns) {
+  NumberTable table(std::move(file), columns);
+  if (trimmed(text).empty()) {
+    throw InputError(
+        {table.file_, "", "the file is empty",
+         fmt::format("It must hold the header {} and one row or more.", fmt::join(columns, ","))});
+  }
+  size_t line_number = 0;
+  size_t first_blank = 0;
+  while (!text.empty()) {
+    const size_t end = text.find('\n');
+    const std::string_view line = trimmed(text.substr(0, end));
+    text.remove_prefix(end == std::string_view::npos ? text.size() : end + 1);
+    ++line_number;
+    if (line_number == 1) {
+      check_header(line, table.file_, columns);
+    } else if (line.empty()) {
+      if (first_blank == 0) first_blank = line_number;
+    } else if (first_blank != 0) {
+      throw InputError(
+          {table.file_, fmt::format("line {}", first_blank), "a blank line inside the table", "Remove it."});
+    } else {
+      table.parse_row(line, line_number);
+    }
+  }
+  if (table.values_.empty()) {
+    throw InputError({table.file_, "line 2", "there is a header but no row", "Add the measured rows."});
+  }
+  return table;
+}
+
+void NumberTable::parse_row(std::string_view line, size_t line_number) {
+  std::string_view rest = line;
+  for (size_t column = 0; column < columns_.size(); ++column) {
+    if (rest.empty()) {
+      throw InputError({file_, fmt::format("line {}", line_number),
+                        fmt::format("{} columns where {} belong", column, columns_.size()),
+                        fmt::format("Columns are {}.", fmt::join(columns_, ","))});
+    }
+    const std::string_view field = take_field(rest);
+    double value = 0;
+    const auto [end, error] = std::from_chars(field.data(), field.data() + field.size(), value);
+    if (field.empty() || error != std::errc{} || end != field.data() + field.size() ||
+        !std::isfinite(value)) {
+      throw InputError({file_, fmt::format("line {}, column {}", line_number, columns_[column]),
+                        fmt::format("\"{}\" is not a finite number", field),
+                        "Write a decimal number with a point, or leave the row out if it was not measured."});
+    }
+    values_.push_back(value);
+  }
+  if (!rest.empty() || line.ends_with(',')) {
+    throw InputError({file_, fmt::format("line {}", line_number),
+                      fmt::format("more than the {} columns that belong there", columns_.size()),
+                      fmt::format("Columns are {}.", fmt::join(columns_, ","))});
+  }
+}
+
+int NumberTable::index_at(size_t row, size_t column, int at_most) const {
+  const double value = at(row, column);
+  if (value < 0 || value > at_most || value != std::floor(value)) {
+    fail(row, column, fmt::format("{} is not a whole number from 0 to {}", value, at_most),
+         "Frames are counted 0 (undeformed), 1, 2, ...");
+  }
+  return static_cast<int>(value);
+}
+
+void NumberTable::fail(size_t row, size_t column, std::string problem, std::string remedy) const {
+  throw InputError({file_, fmt::format("line {}, column {}", row + 2, columns_[column]), std::move(problem),
+                    std::move(remedy)});
+}
+
+}  // namespace diastole

@@ -1,0 +1,175 @@
+#include "estimator/io/study.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <charconv>
+
+#include "protocol/contract/input_error.hpp"
+#include "protocol/contract/table_reader.hpp"
+
+namespace diastole {
+namespace {
+
+// Beyond these the direct factorisation no longer fits a workstation.
+constexpr std::array<int, 3> max_elements = {64, 64, 16};
+constexpr int min_circumferential = 3;  // fewer elements than this cannot close a circle
+
+AnnulusSpecimen read_annulus(TableReader& table) {
+  AnnulusSpecimen annulus{};
+  annulus.inner_radius_mm = table.number("inner_radius_mm", {.above = 0});
+  annulus.outer_radius_mm = table.number("outer_radius_mm", {.above = annulus.inner_radius_mm});
+  annulus.height_mm = table.number("height_mm", {.above = 0});
+  const std::vector<int64_t> mesh = table.integers("mesh", 3, {.at_least = 1});
+  for (size_t axis = 0; axis < 3; ++axis) {
+    if (mesh[axis] > max_elements[axis]) {
+      table.fail("mesh", fmt::format("{} elements in direction {} are too many", mesh[axis], axis + 1),
+                 fmt::format("Use at most [{}].", fmt::join(max_elements, ", ")));
+    }
+    annulus.mesh[axis] = static_cast<int>(mesh[axis]);
+  }
+  if (annulus.mesh[0] < min_circumferential) {
+    table.fail("mesh", fmt::format("{} circumferential elements cannot close a circle", annulus.mesh[0]),
+               fmt::format("Use at least {}; the usual mesh is [8, 4, 1].", min_circumferential));
+  }
+  annulus.ends = table.choice("ends", {"fixed"});
+  return annulus;
+}
+
+Specimen read_specimen(TableReader& root) {
+  TableReader table = root.table("specimen");
+  const std::string kind = table.choice("kind", {"annulus"});
+  Specimen specimen = read_annulus(table);
+  table.finish();
+  return specimen;
+}
+
+StudyParameter read_parameter(const std::string& name, TableReader& table) {
+  StudyParameter parameter{};
+  parameter.name = name;
+  const std::vector<double> bounds = table.numbers("bounds", 2);
+  parameter.lower = bounds[0];
+  parameter.upper = bounds[1];
+  if (!(parameter.lower < parameter.upper)) {
+    table.fail("bounds", fmt::format("[{}, {}] is not an interval", bounds[0], bounds[1]),
+               "Write [lower, upper] with lower < upper.");
+  }
+  parameter.start = table.number("start", {.at_least = parameter.lower, .at_most = parameter.upper});
+  const bool has_vary = table.has("vary");
+  const std::string vary = has_vary ? table.choice("vary", {"whole", "element"}) : "whole";
+  parameter.vary = vary == "element" ? Variation::element : Variation::whole;
+  table.finish();
+  return parameter;
+}
+
+StudyLaw read_law(TableReader& root) {
+  TableReader table = root.table("law");
+  StudyLaw law;
+  law.name = table.text("name");
+  TableReader parameters = table.table("parameters");
+  for (auto& [name, parameter] : parameters.named_tables()) {
+    law.parameters.push_back(read_parameter(name, parameter));
+  }
+  if (law.parameters.empty()) {
+    table.fail("parameters", "no parameter is given",
+               "Add one table for each parameter of the law, as [law.parameters.C1_kPa].");
+  }
+  parameters.finish();
+  table.finish();
+  return law;
+}
+
+StudyData read_data(TableReader& root, const std::filesystem::path& folder) {
+  StudyData data;
+  TableReader table = root.table("data");
+  for (const std::string& run : table.texts_or("runs", {}))
+    data.runs.push_back(folder / run);
+  const auto path_if = [&](std::string_view key) -> std::optional<std::filesystem::path> {
+    if (!table.has(key)) return std::nullopt;
+    return folder / table.text(key);
+  };
+  data.tags = path_if("tags");
+  data.points = path_if("points");
+  data.frames = path_if("frames");
+  if ((data.tags || data.points) && !data.frames) {
+    table.fail("frames", "missing, although tags or points are given",
+               "Name the file with each frame's pressure: frames = \"NAME.frames.csv\".");
+  }
+  table.finish();
+  return data;
+}
+
+[[noreturn]] void refuse_option(std::string_view option, std::string_view value, std::string problem,
+                                std::string remedy) {
+  throw InputError({.file = "",
+                    .place = fmt::format("{} {}", option, value),
+                    .problem = std::move(problem),
+                    .remedy = std::move(remedy)});
+}
+
+template <typename Number>
+bool parse_whole(std::string_view text, Number& value) {
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  return error == std::errc{} && end == text.data() + text.size();
+}
+
+}  // namespace
+
+Study read_study(const std::filesystem::path& path) {
+  TableReader root = TableReader::from_file(path);
+  root.expect_format("diastole-study", 1);
+  Study study{
+      .file = path, .specimen = read_specimen(root), .law = read_law(root), .data = {}, .effects = {}};
+  study.data = read_data(root, path.parent_path());
+  if (auto model = root.table_if("model")) {
+    study.effects = model->texts_or("effects", {});
+    model->finish();
+  }
+  root.finish();
+  return study;
+}
+
+void set_start(Study& study, std::string_view assignment) {
+  const size_t equals = assignment.find('=');
+  double value = 0;
+  if (equals == std::string_view::npos || !parse_whole(assignment.substr(equals + 1), value)) {
+    refuse_option("--set", assignment, "is not NAME=NUMBER", "Write for example --set C1_kPa=7.5.");
+  }
+  const std::string_view name = assignment.substr(0, equals);
+  std::vector<std::string> known;
+  for (StudyParameter& parameter : study.law.parameters) {
+    known.push_back(parameter.name);
+    if (parameter.name != name) continue;
+    if (!(value >= parameter.lower && value <= parameter.upper)) {
+      refuse_option("--set", assignment,
+                    fmt::format("lies outside the bounds [{}, {}]", parameter.lower, parameter.upper),
+                    "Choose a value inside, or widen `bounds` in the study.");
+    }
+    parameter.start = value;
+    return;
+  }
+  refuse_option("--set", assignment, fmt::format("\"{}\" is not a parameter of the study", name),
+                fmt::format("It has: {}.", fmt::join(known, ", ")));
+}
+
+void set_mesh(Study& study, std::string_view counts) {
+  auto& mesh = std::get<AnnulusSpecimen>(study.specimen).mesh;
+  std::string_view rest = counts;
+  for (size_t axis = 0; axis < 3; ++axis) {
+    const size_t comma = rest.find(',');
+    const bool last = axis == 2;
+    int count = 0;
+    if ((comma == std::string_view::npos) != last || !parse_whole(rest.substr(0, comma), count)) {
+      refuse_option("--mesh", counts, "is not three whole numbers", "Write for example --mesh 8,8,4.");
+    }
+    const int least = axis == 0 ? min_circumferential : 1;
+    if (count < least || count > max_elements[axis]) {
+      refuse_option("--mesh", counts, fmt::format("has {} elements in direction {}", count, axis + 1),
+                    fmt::format("Use {} to {} there.", least, max_elements[axis]));
+    }
+    mesh[axis] = count;
+    if (!last) rest.remove_prefix(comma + 1);
+  }
+}
+
+}  // namespace diastole

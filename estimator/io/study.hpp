@@ -1,0 +1,75 @@
+#pragma once
+// The study file `NAME.study.toml` (format "diastole-study", version 1): the specimen, the law whose
+// parameters are sought with their starts and bounds, and the measurements. Lengths in mm, pressures in kPa,
+// angles in deg.
+
+#include <array>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <variant>
+#include <vector>
+
+namespace diastole {
+
+/// A cylindrical annulus along z, mid-height at z = 0, both end faces bonded to rigid plates, loaded by a
+/// follower pressure on its inner wall.
+struct AnnulusSpecimen {
+  double inner_radius_mm;
+  double outer_radius_mm;
+  double height_mm;
+  std::array<int, 3> mesh;  ///< elements: circumferential, longitudinal, transmural
+  std::string ends;         ///< "fixed"
+};
+
+/// One alternative per `specimen.kind`; a new kind adds its struct here and its reader in study.cpp.
+using Specimen = std::variant<AnnulusSpecimen>;
+
+enum class Variation {
+  whole,    ///< one value for the specimen
+  element,  ///< one value an element
+};
+
+/// A material parameter that is to be estimated. Invariant: lower <= start <= upper, lower < upper.
+struct StudyParameter {
+  std::string name;  ///< with its unit, as "C1_kPa"
+  double start;
+  double lower;
+  double upper;
+  Variation vary;
+};
+
+struct StudyLaw {
+  std::string name;  ///< "neo-hookean"; whether it is known is decided where the model is built
+  std::vector<StudyParameter> parameters;
+};
+
+/// Paths are resolved against the study file's folder; they need not exist until they are read.
+struct StudyData {
+  std::vector<std::filesystem::path> runs;
+  std::optional<std::filesystem::path> tags;
+  std::optional<std::filesystem::path> points;
+  std::optional<std::filesystem::path> frames;
+};
+
+struct Study {
+  std::filesystem::path file;
+  Specimen specimen;
+  StudyLaw law;
+  StudyData data;
+  std::vector<std::string> effects;  ///< effects that the model already includes
+};
+
+/// Throws InputError (file, line, key, value, remedy) for anything that the format does not know, a value out
+/// of its range, a start outside its bounds, or tags/points without frames.
+Study read_study(const std::filesystem::path& path);
+
+/// `--set C1_kPa=7.5`: another start value. Throws InputError if the parameter is unknown or out of its
+/// bounds.
+void set_start(Study& study, std::string_view assignment);
+
+/// `--mesh 8,8,4`: another number of elements. Throws InputError unless three positive integers in range.
+void set_mesh(Study& study, std::string_view counts);
+
+}  // namespace diastole

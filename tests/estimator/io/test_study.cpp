@@ -1,0 +1,116 @@
+#include <gmock/gmock.h>
+
+#include "estimator/io/study.hpp"
+#include "tests/estimator/io/scratch_file.hpp"
+
+namespace diastole {
+namespace {
+
+using test::message_of;
+using testing::AllOf;
+using testing::HasSubstr;
+
+constexpr const char* gel = R"(format = "diastole-study"
+version = 1
+[specimen]
+kind = "annulus"
+inner_radius_mm = 22.5
+outer_radius_mm = 50.0
+height_mm = 85.0
+mesh = [8, 4, 1]
+ends = "fixed"
+[law]
+name = "neo-hookean"
+[law.parameters.C1_kPa]
+start = 6.0
+bounds = [1.0, 15.0]
+vary = "whole"
+[data]
+runs = ["a.run.h5", "b.run.h5"]
+tags = "gel.tags.csv"
+frames = "gel.frames.csv"
+[model]
+effects = []
+)";
+
+class StudyFile : public testing::Test {
+ protected:
+  Study read(const std::string& content) { return read_study(folder_.write("gel.study.toml", content)); }
+
+  /// The message after `old` was replaced in the good study.
+  std::string message_with(std::string_view old, std::string_view replacement) {
+    std::string content = gel;
+    const size_t at = content.find(old);
+    EXPECT_NE(at, std::string::npos) << old;
+    content.replace(at, old.size(), replacement);
+    return message_of([&] { (void)read(content); });
+  }
+
+  test::ScratchFolder folder_;
+};
+
+TEST_F(StudyFile, EveryValueArrives) {
+  const Study study = read(gel);
+  const auto& annulus = std::get<AnnulusSpecimen>(study.specimen);
+  EXPECT_EQ(annulus.inner_radius_mm, 22.5);
+  EXPECT_EQ(annulus.outer_radius_mm, 50.0);
+  EXPECT_EQ(annulus.height_mm, 85.0);
+  EXPECT_THAT(annulus.mesh, testing::ElementsAre(8, 4, 1));
+  EXPECT_EQ(study.law.name, "neo-hookean");
+  ASSERT_EQ(study.law.parameters.size(), 1U);
+  const StudyParameter& c1 = study.law.parameters[0];
+  EXPECT_EQ(c1.name, "C1_kPa");
+  EXPECT_EQ(c1.start, 6.0);
+  EXPECT_EQ(c1.lower, 1.0);
+  EXPECT_EQ(c1.upper, 15.0);
+  EXPECT_EQ(c1.vary, Variation::whole);
+  EXPECT_EQ(study.data.tags, folder_.path() / "gel.tags.csv");
+  EXPECT_EQ(study.data.frames, folder_.path() / "gel.frames.csv");
+  EXPECT_THAT(study.data.runs,
+              testing::ElementsAre(folder_.path() / "a.run.h5", folder_.path() / "b.run.h5"));
+  EXPECT_FALSE(study.data.points);
+}
+
+TEST_F(StudyFile, FaultsNamePlaceValueAndRemedy) {
+  EXPECT_THAT(message_with("kind = \"annulus\"", "kind = \"anulus\""),
+              AllOf(HasSubstr("gel.study.toml"), HasSubstr("line 4"), HasSubstr("specimen.kind"),
+                    HasSubstr("\"anulus\""), HasSubstr("annulus")));
+  EXPECT_THAT(message_with("height_mm", "heigth_mm"), AllOf(HasSubstr("height_mm")));
+  EXPECT_THAT(message_with("outer_radius_mm = 50.0", "outer_radius_mm = 20.0"),
+              AllOf(HasSubstr("outer_radius_mm"), HasSubstr("20"), HasSubstr("greater than 22.5")));
+  EXPECT_THAT(message_with("[8, 4, 1]", "[800, 4, 1]"), AllOf(HasSubstr("mesh"), HasSubstr("800")));
+  EXPECT_THAT(message_with("[8, 4, 1]", "[2, 4, 1]"), HasSubstr("circle"));
+  EXPECT_THAT(message_with("start = 6.0", "start = 16.0"),
+              AllOf(HasSubstr("start"), HasSubstr("at most 15")));
+  EXPECT_THAT(message_with("[1.0, 15.0]", "[15.0, 1.0]"),
+              AllOf(HasSubstr("bounds"), HasSubstr("not an interval")));
+  EXPECT_THAT(message_with("\"whole\"", "\"node\""), AllOf(HasSubstr("vary"), HasSubstr("element")));
+  EXPECT_THAT(message_with("frames = \"gel.frames.csv\"", ""),
+              AllOf(HasSubstr("data.frames"), HasSubstr("missing")));
+  EXPECT_THAT(message_with("effects = []", "efects = []"), AllOf(HasSubstr("efects"), HasSubstr("effects")));
+  EXPECT_THAT(message_with("start = 6.0", "start = nan"), HasSubstr("start"));
+}
+
+TEST_F(StudyFile, StartAndMeshCanBeSetOnTheCommandLine) {
+  Study study = read(gel);
+  set_start(study, "C1_kPa=7.25");
+  EXPECT_EQ(study.law.parameters[0].start, 7.25);
+  set_mesh(study, "8,8,4");
+  EXPECT_THAT(std::get<AnnulusSpecimen>(study.specimen).mesh, testing::ElementsAre(8, 8, 4));
+
+  EXPECT_THAT(message_of([&] { set_start(study, "C1=7"); }), AllOf(HasSubstr("\"C1\""), HasSubstr("C1_kPa")));
+  EXPECT_THAT(message_of([&] { set_start(study, "C1_kPa=70"); }), HasSubstr("bounds [1, 15]"));
+  EXPECT_THAT(message_of([&] { set_start(study, "C1_kPa"); }), HasSubstr("NAME=NUMBER"));
+  for (const char* wrong : {"8,4", "8,4,1,1", "8,4,x", "2,4,1", "8,0,1", "8,4,99"}) {
+    EXPECT_THAT(message_of([&] { set_mesh(study, wrong); }), HasSubstr("--mesh")) << wrong;
+  }
+}
+
+TEST(ExampleStudies, AreRead) {
+  for (const char* name : {"phantom-a.study.toml", "phantom-a-points.study.toml"}) {
+    EXPECT_NO_THROW((void)read_study(std::filesystem::path(DIASTOLE_SOURCE_DIR) / "examples" / name)) << name;
+  }
+}
+
+}  // namespace
+}  // namespace diastole
