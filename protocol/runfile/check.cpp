@@ -1,0 +1,120 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <span>
+
+#include "protocol/contract/input_error.hpp"
+#include "protocol/runfile/layout.hpp"
+#include "protocol/runfile/reader.hpp"
+
+namespace diastole::runfile {
+namespace {
+
+[[noreturn]] void fail_at(const RecordedRun& run, const std::string& dataset, size_t index,
+                          std::string problem, std::string remedy) {
+  throw InputError(
+      {run.file, fmt::format("dataset {}, index {}", dataset, index), std::move(problem), std::move(remedy)});
+}
+
+/// Which rows of dataset "/pressure/cavity_kPa" gaps declare missing: those of stream "pressure", or of a
+/// stream named as the dataset itself, with or without its group.
+std::vector<bool> declared_missing(const RecordedRun& run, std::string_view dataset, size_t rows) {
+  dataset.remove_prefix(1);
+  const std::string_view group = dataset.substr(0, dataset.find('/'));
+  const std::string_view name = dataset.substr(dataset.find('/') + 1);
+  std::vector<bool> missing(rows, false);
+  for (const Gap& gap : run.gaps) {
+    if (gap.stream != group && gap.stream != dataset && gap.stream != name) continue;
+    const auto first = std::min(static_cast<size_t>(gap.first_index), rows);
+    const auto last = first + std::min(static_cast<size_t>(gap.count), rows - first);
+    std::fill(missing.begin() + static_cast<std::ptrdiff_t>(first),
+              missing.begin() + static_cast<std::ptrdiff_t>(last), true);
+  }
+  return missing;
+}
+
+void check_values(const RecordedRun& run, const std::string& dataset, std::span<const double> values) {
+  const std::vector<bool> missing = declared_missing(run, dataset, values.size());
+  for (size_t i = 0; i < values.size(); ++i) {
+    if (std::isfinite(values[i]) || (std::isnan(values[i]) && missing[i])) continue;
+    fail_at(run, dataset, i, fmt::format("is {} although /gaps declares no gap there", values[i]),
+            "A missing sample must be declared in /gaps.");
+  }
+}
+
+void check_times(const RecordedRun& run, const std::string& dataset, std::span<const double> times_s) {
+  check_values(run, dataset, times_s);
+  double last_s = -HUGE_VAL;
+  for (size_t i = 0; i < times_s.size(); ++i) {
+    if (std::isnan(times_s[i])) continue;
+    if (times_s[i] <= last_s) {
+      fail_at(run, dataset, i, fmt::format("is {} s, not later than the {} s before it", times_s[i], last_s),
+              "Times must increase strictly.");
+    }
+    last_s = times_s[i];
+  }
+}
+
+void check_length(const RecordedRun& run, const std::string& dataset, size_t rows, const std::string& of,
+                  size_t expected) {
+  if (rows == expected) return;
+  fail_at(run, dataset, std::min(rows, expected), fmt::format("has {} rows, {} has {}", rows, of, expected),
+          "Datasets of one stream must be equally long.");
+}
+
+void check_segments(const RecordedRun& run) {
+  double last_s = -HUGE_VAL;
+  for (size_t i = 0; i < run.segments.size(); ++i) {
+    const Segment& segment = run.segments[i];
+    const bool finite = std::isfinite(segment.start_s) && std::isfinite(segment.stroke_mL) &&
+                        std::isfinite(segment.period_s) && std::isfinite(segment.offset_mL);
+    if (!finite || segment.period_s <= 0 || segment.cycles < 0) {
+      fail_at(run, protocol_segments, i,
+              fmt::format("has period_s {} and cycles {}", segment.period_s, segment.cycles),
+              "A segment needs finite numbers, a positive period and no negative count of cycles.");
+    }
+    if (segment.start_s < last_s) {
+      fail_at(run, protocol_segments, i, fmt::format("starts at {} s, before the one above", segment.start_s),
+              "Segments must be in the order in which they ran.");
+    }
+    last_s = segment.start_s;
+  }
+}
+
+void check_gaps(const RecordedRun& run) {
+  for (size_t i = 0; i < run.gaps.size(); ++i) {
+    const Gap& gap = run.gaps[i];
+    if (gap.first_index >= 0 && gap.count >= 1) continue;
+    fail_at(run, gaps_table, i,
+            fmt::format("declares first_index {} and count {}", gap.first_index, gap.count),
+            "A gap starts at 0 or later and misses at least one sample.");
+  }
+}
+
+}  // namespace
+
+void check(const RecordedRun& run) {
+  check_gaps(run);
+  check_segments(run);
+  check_times(run, pump_time, run.pump.time_s);
+  check_length(run, pump_commanded, run.pump.commanded_mL.size(), pump_time, run.pump.time_s.size());
+  check_values(run, pump_commanded, run.pump.commanded_mL);
+  check_times(run, pressure_time, run.pressure.time_s);
+  for (const auto& [name, values_kPa] : run.pressure.channels) {
+    const std::string dataset = fmt::format("{}/{}", pressure_group, name);
+    check_length(run, dataset, values_kPa.size(), pressure_time, run.pressure.time_s.size());
+    check_values(run, dataset, values_kPa);
+  }
+  check_times(run, trigger_time, run.trigger_s);
+  for (const auto& [segment, flow] : run.flow) {
+    const std::string group = fmt::format("{}/{}", flow_group, segment);
+    check_times(run, group + "/phase_s", flow.phase_s);
+    check_length(run, group + "/cavity_mL", flow.cavity_mL.size(), group + "/phase_s", flow.phase_s.size());
+    check_length(run, group + "/sigma_mL", flow.sigma_mL.size(), group + "/phase_s", flow.phase_s.size());
+    check_values(run, group + "/cavity_mL", flow.cavity_mL);
+    check_values(run, group + "/sigma_mL", flow.sigma_mL);
+  }
+}
+
+}  // namespace diastole::runfile

@@ -1,0 +1,66 @@
+#pragma once
+// The run file NAME.run.h5: every name in it and the unit that its `units` attribute tells.
+// What the file means to a user is in docs/run-file.md; reader.hpp reads it, host/runfile writes it.
+//
+//   /                      attributes format, format_version, run_id, started_utc, producer
+//   |-- rig                attributes only: bore_mm, screw_rev_per_cm, ...
+//   |-- protocol
+//   |   |-- toml           scalar text: the experiment file as it was run
+//   |   `-- segments       table start_s, waveform, stroke_mL, period_s, offset_mL, cycles
+//   |-- pump               time_s[n], commanded_mL[n]
+//   |-- pressure           time_s[m], cavity_kPa[m], optionally cavity_filtered_kPa[m], pump_kPa[m]
+//   |-- trigger            time_s[k]
+//   |-- mr/flow/<segment>  optional: phase_s[f], cavity_mL[f], sigma_mL[f]; segments count from 0
+//   |-- clock              optional: scalars such as daq_offset_s, daq_drift_ppm
+//   |-- gaps               table stream, first_index, count, reason; empty says that nothing is missing
+//   `-- events             table time_s, level, code, text
+//
+// A missing sample keeps its row, so that row = sample index in every stream: its time is when it was due,
+// its values are NaN, and a row of /gaps declares it. Times are seconds on the controller's clock since the
+// run started.
+
+#include <cstdint>
+#include <string_view>
+
+namespace diastole::runfile {
+
+inline constexpr std::string_view format_name = "diastole-run";
+inline constexpr int64_t format_version = 1;
+
+inline constexpr const char* rig_group = "/rig";
+inline constexpr const char* protocol_group = "/protocol";
+inline constexpr const char* protocol_toml = "/protocol/toml";
+inline constexpr const char* protocol_segments = "/protocol/segments";
+inline constexpr const char* pump_group = "/pump";
+inline constexpr const char* pump_time = "/pump/time_s";
+inline constexpr const char* pump_commanded = "/pump/commanded_mL";
+inline constexpr const char* pressure_group = "/pressure";
+inline constexpr const char* pressure_time = "/pressure/time_s";
+inline constexpr const char* trigger_group = "/trigger";
+inline constexpr const char* trigger_time = "/trigger/time_s";
+inline constexpr const char* flow_group = "/mr/flow";
+inline constexpr const char* clock_group = "/clock";
+inline constexpr const char* gaps_table = "/gaps";
+inline constexpr const char* events_table = "/events";
+
+/// Streams as /gaps names them.
+inline constexpr std::string_view pressure_stream = "pressure";
+inline constexpr std::string_view pump_stream = "pump";
+inline constexpr std::string_view trigger_stream = "trigger";
+
+inline constexpr const char* time_unit = "s";
+inline constexpr const char* volume_unit = "mL";
+inline constexpr const char* pressure_unit = "kPa";
+inline constexpr const char* text_unit = "text";
+inline constexpr const char* segments_units =
+    "start_s: s; waveform: text; stroke_mL: mL; period_s: s; offset_mL: mL; cycles: 1";
+inline constexpr const char* gaps_units = "stream: text; first_index: 1; count: 1; reason: text";
+inline constexpr const char* events_units = "time_s: s; level: text; code: text; text: text";
+
+/// "mL" of "commanded_mL": the unit is what follows the last underscore; "1" if there is none.
+inline constexpr std::string_view unit_of(std::string_view name) {
+  const size_t underscore = name.rfind('_');
+  return underscore == std::string_view::npos ? std::string_view("1") : name.substr(underscore + 1);
+}
+
+}  // namespace diastole::runfile

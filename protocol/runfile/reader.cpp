@@ -1,0 +1,148 @@
+#include "protocol/runfile/reader.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+
+#include "protocol/runfile/h5_source.hpp"
+#include "protocol/runfile/layout.hpp"
+
+namespace diastole::runfile {
+namespace {
+
+std::string root_text(const H5Source& source, const std::map<std::string, Attribute, std::less<>>& root,
+                      const std::string& name) {
+  const auto found = root.find(name);
+  if (found == root.end() || !std::holds_alternative<std::string>(found->second)) {
+    source.fail("root attribute " + name, "is missing or not a text",
+                "Every run file carries it; see docs/run-file.md.");
+  }
+  return std::get<std::string>(found->second);
+}
+
+void expect_format(const H5Source& source, const std::map<std::string, Attribute, std::less<>>& root) {
+  if (const std::string format = root_text(source, root, "format"); format != format_name) {
+    source.fail("root attribute format", fmt::format("is \"{}\", not \"{}\"", format, format_name),
+                "Give a run file of Diastole.");
+  }
+  const auto version = root.find("format_version");
+  if (version == root.end() || std::holds_alternative<std::string>(version->second)) {
+    source.fail("root attribute format_version", "is missing or not a number");
+  }
+  const double found = std::visit(
+      [](const auto& value) {
+        if constexpr (std::is_same_v<std::decay_t<decltype(value)>, std::string>) {
+          return 0.0;
+        } else {
+          return static_cast<double>(value);
+        }
+      },
+      version->second);
+  if (!(found >= 1)) source.fail("root attribute format_version", fmt::format("is {}", found));
+  if (found > static_cast<double>(format_version)) {
+    source.fail("root attribute format_version",
+                fmt::format("is {}, newer than the {} that this program reads", found, format_version),
+                "Update Diastole.");
+  }
+}
+
+std::vector<Segment> read_segments(const H5Source& source) {
+  const std::string table = protocol_segments;
+  const auto start_s = source.column_numbers(table, "start_s");
+  const auto waveform = source.column_texts(table, "waveform");
+  const auto stroke_mL = source.column_numbers(table, "stroke_mL");
+  const auto period_s = source.column_numbers(table, "period_s");
+  const auto offset_mL = source.column_numbers(table, "offset_mL");
+  const auto cycles = source.column_integers(table, "cycles");
+  std::vector<Segment> segments;
+  for (size_t i = 0; i < start_s.size(); ++i) {
+    segments.push_back({start_s[i], waveform[i], stroke_mL[i], period_s[i], offset_mL[i], cycles[i]});
+  }
+  return segments;
+}
+
+std::vector<Gap> read_gaps(const H5Source& source) {
+  const auto stream = source.column_texts(gaps_table, "stream");
+  const auto first = source.column_integers(gaps_table, "first_index");
+  const auto count = source.column_integers(gaps_table, "count");
+  const auto reason = source.column_texts(gaps_table, "reason");
+  std::vector<Gap> gaps;
+  for (size_t i = 0; i < stream.size(); ++i)
+    gaps.push_back({stream[i], first[i], count[i], reason[i]});
+  return gaps;
+}
+
+std::vector<Event> read_events(const H5Source& source) {
+  const auto time_s = source.column_numbers(events_table, "time_s");
+  const auto level = source.column_texts(events_table, "level");
+  const auto code = source.column_texts(events_table, "code");
+  const auto text = source.column_texts(events_table, "text");
+  std::vector<Event> events;
+  for (size_t i = 0; i < time_s.size(); ++i)
+    events.push_back({time_s[i], level[i], code[i], text[i]});
+  return events;
+}
+
+PressureTrace read_pressure(const H5Source& source) {
+  PressureTrace pressure;
+  pressure.time_s = source.numbers(pressure_time);
+  for (const std::string& name : source.children(pressure_group)) {
+    if (unit_of(name) != pressure_unit) continue;
+    pressure.channels[name] = source.numbers(fmt::format("{}/{}", pressure_group, name));
+  }
+  if (!pressure.channels.contains("cavity_kPa")) {
+    source.fail("dataset /pressure/cavity_kPa", "is missing", "The catheter's pressure must be there.");
+  }
+  return pressure;
+}
+
+std::map<size_t, FlowVolume> read_flow(const H5Source& source) {
+  std::map<size_t, FlowVolume> flow;
+  for (const std::string& name : source.children(flow_group)) {
+    const std::string group = fmt::format("{}/{}", flow_group, name);
+    size_t segment = 0;
+    const char* end = name.data() + name.size();
+    if (std::from_chars(name.data(), end, segment).ptr != end) {
+      source.fail("group " + group, "is not named by a segment's number");
+    }
+    flow[segment] = {source.numbers(group + "/phase_s"), source.numbers(group + "/cavity_mL"),
+                     source.numbers(group + "/sigma_mL")};
+  }
+  return flow;
+}
+
+std::map<std::string, double, std::less<>> read_clock(const H5Source& source) {
+  std::map<std::string, double, std::less<>> clock;
+  for (const std::string& name : source.children(clock_group)) {
+    clock[name] = source.scalar(fmt::format("{}/{}", clock_group, name));
+  }
+  return clock;
+}
+
+}  // namespace
+
+RecordedRun read_run(const std::filesystem::path& path) {
+  const H5Source source(path);
+  const auto root = source.attributes("/");
+  expect_format(source, root);
+  RecordedRun run;
+  run.file = source.file();
+  run.run_id = root_text(source, root, "run_id");
+  run.started_utc = root_text(source, root, "started_utc");
+  run.producer = root_text(source, root, "producer");
+  run.rig = source.attributes(rig_group);
+  run.protocol_toml = source.text(protocol_toml);
+  run.segments = read_segments(source);
+  run.pump = {source.numbers(pump_time), source.numbers(pump_commanded)};
+  run.pressure = read_pressure(source);
+  run.trigger_s = source.numbers(trigger_time);
+  run.flow = read_flow(source);
+  run.clock = read_clock(source);
+  run.gaps = read_gaps(source);
+  run.events = read_events(source);
+  check(run);
+  return run;
+}
+
+}  // namespace diastole::runfile

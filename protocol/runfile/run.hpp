@@ -1,0 +1,86 @@
+#pragma once
+// One recorded run in memory, as the run file holds it (layout.hpp). Plain data: reader.hpp fills and checks
+// it, host/runfile writes it, everything else only looks.
+
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <string>
+#include <variant>
+#include <vector>
+
+namespace diastole::runfile {
+
+using Attribute = std::variant<double, int64_t, std::string>;
+
+/// One row of /protocol/segments. A cycle starts at the segment's least volume, offset_mL, at rest.
+struct Segment {
+  double start_s = 0;
+  std::string waveform;
+  double stroke_mL = 0;
+  double period_s = 0;
+  double offset_mL = 0;
+  int64_t cycles = 0;
+
+  [[nodiscard]] double end_s() const { return start_s + period_s * static_cast<double>(cycles); }
+};
+
+/// Rows [first_index, first_index + count) of a stream are known to be missing.
+struct Gap {
+  std::string stream;
+  int64_t first_index = 0;
+  int64_t count = 0;
+  std::string reason;
+};
+
+struct Event {
+  double time_s = 0;
+  std::string level;  ///< "info", "warning", "error"
+  std::string code;
+  std::string text;
+};
+
+struct PumpTrace {
+  std::vector<double> time_s;
+  std::vector<double> commanded_mL;  ///< steps issued x volume per step
+};
+
+struct PressureTrace {
+  std::vector<double> time_s;
+  /// By dataset name, "cavity_kPa" always among them; each as long as time_s, NaN where a gap is declared.
+  std::map<std::string, std::vector<double>, std::less<>> channels;
+};
+
+/// Gated phase-contrast cavity volume of one segment, averaged over its cycles.
+struct FlowVolume {
+  std::vector<double> phase_s;  ///< since the trigger
+  std::vector<double> cavity_mL;
+  std::vector<double> sigma_mL;
+};
+
+struct RecordedRun {
+  std::string file;  ///< where it was read from, for messages
+  std::string run_id;
+  std::string started_utc;  ///< ISO 8601
+  std::string producer;
+  std::map<std::string, Attribute, std::less<>> rig;
+  std::string protocol_toml;
+  std::vector<Segment> segments;
+  PumpTrace pump;
+  PressureTrace pressure;
+  std::vector<double> trigger_s;
+  std::map<size_t, FlowVolume> flow;                 ///< by segment number, from 0
+  std::map<std::string, double, std::less<>> clock;  ///< e.g. "daq_drift_ppm"
+  std::vector<Gap> gaps;
+  std::vector<Event> events;
+
+  /// Rows that /gaps declares missing in a stream ("pressure") or one dataset of it ("pressure/cavity_kPa").
+  [[nodiscard]] int64_t missing(std::string_view stream) const {
+    int64_t total = 0;
+    for (const Gap& gap : gaps)
+      total += gap.stream == stream ? gap.count : 0;
+    return total;
+  }
+};
+
+}  // namespace diastole::runfile
