@@ -131,9 +131,9 @@ std::vector<TagPoint> read_tags(const std::filesystem::path& path, int frame_cou
   return tags;
 }
 
-std::vector<MaterialPoint> read_points(const std::filesystem::path& path, int frame_count) {
+std::vector<ObservedPoint> read_points(const std::filesystem::path& path, int frame_count) {
   const NumberTable table = NumberTable::from_file(path, points_columns);
-  std::vector<MaterialPoint> points;
+  std::vector<ObservedPoint> points;
   points.reserve(table.rows());
   for (size_t row = 0; row < table.rows(); ++row) {
     points.push_back({.frame = frame_at(table, row, frame_count),

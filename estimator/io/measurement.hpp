@@ -30,7 +30,7 @@ struct TagPoint {
 };
 
 /// `NAME.points.csv`: frame,X_mm,Y_mm,Z_mm,x_mm,y_mm,z_mm,sigma_mm. Material at X_mm is seen at x_mm.
-struct MaterialPoint {
+struct ObservedPoint {
   int frame;
   std::array<double, 3> X_mm;
   std::array<double, 3> x_mm;
@@ -40,7 +40,7 @@ struct MaterialPoint {
 struct Measurement {
   std::vector<Frame> frames;
   std::vector<TagPoint> tags;
-  std::vector<MaterialPoint> points;
+  std::vector<ObservedPoint> points;
 };
 
 // Each throws InputError with file, line, column, value and remedy.
@@ -50,7 +50,7 @@ std::vector<Frame> read_frames(const std::filesystem::path& path);
 /// Every row's frame must exist; |normal| must be 1 to 1e-4 (it is then normalised); sigma > 0.
 std::vector<TagPoint> read_tags(const std::filesystem::path& path, int frame_count);
 /// Every row's frame must exist; sigma > 0.
-std::vector<MaterialPoint> read_points(const std::filesystem::path& path, int frame_count);
+std::vector<ObservedPoint> read_points(const std::filesystem::path& path, int frame_count);
 
 /// Everything that the study names, checked against the specimen's size (points in metres, or in the
 /// scanner's axes instead of the specimen's, are refused).
