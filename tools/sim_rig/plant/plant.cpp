@@ -1,0 +1,64 @@
+#include "tools/sim_rig/plant/plant.hpp"
+
+#include <cmath>
+#include <numbers>
+
+namespace diastole::sim_rig {
+namespace {
+
+double loss_factor(const PlantConfig& config) {
+  const double area_m2 = std::numbers::pi / 4 * config.hose.bore_mm * config.hose.bore_mm * 1e-6;
+  constexpr double m3_per_mL = 1e-6;
+  constexpr double kPa_per_Pa = 1e-3;
+  return 0.5 * config.minor_loss_K * config.hose.fluid_density_kg_m3 / (area_m2 * area_m2) * m3_per_mL *
+         m3_per_mL * kPa_per_Pa;
+}
+
+}  // namespace
+
+Plant::Plant(const PlantConfig& config)
+    : hose_(config.hose),
+      gel_(config.C1_kPa),
+      piston_(config.piston_lag_ms, hose_.step_s()),
+      cavity_sensor_(config.cavity, hose_.step_s(), 2 * config.seed),
+      pump_sensor_(config.pump, hose_.step_s(), 2 * config.seed + 1),
+      loss_kPa_s2_per_mL2_(loss_factor(config)) {}
+
+void Plant::advance_to(double time_s) {
+  while (static_cast<double>(step_count_ + 1) * step_s() <= time_s)
+    step();
+  since_step_s_ = time_s - static_cast<double>(step_count_) * step_s();
+}
+
+double Plant::solve_outlet_flow_mL_s() const {
+  const Characteristic line = hose_.outlet();
+  const double half_step_s = 0.5 * step_s();
+  double flow = outlet_flow_mL_s_;
+  // Newton on a strictly increasing residual that is nearly linear (the line's impedance dominates).
+  for (int iteration = 0; iteration < 20; ++iteration) {
+    const double volume_mL = cavity_mL_ + half_step_s * (outlet_flow_mL_s_ + flow);
+    const double residual = gel_.pressure_kPa(volume_mL) + loss_kPa_s2_per_mL2_ * flow * std::abs(flow) +
+                            line.impedance_kPa_s_per_mL * flow - line.pressure_kPa;
+    const double slope = gel_.stiffness_kPa_per_mL(volume_mL) * half_step_s +
+                         2 * loss_kPa_s2_per_mL2_ * std::abs(flow) + line.impedance_kPa_s_per_mL;
+    const double change = residual / slope;
+    flow -= change;
+    if (std::abs(change) < 1e-12) break;
+  }
+  return flow;
+}
+
+void Plant::step() {
+  const double cavity_before_kPa = cavity_kPa();
+  const double pump_before_kPa = pump_end_kPa();
+  piston_.advance();
+  const double flow_mL_s = solve_outlet_flow_mL_s();
+  hose_.advance(piston_.flow_mL_s(), flow_mL_s);
+  cavity_mL_ += 0.5 * step_s() * (outlet_flow_mL_s_ + flow_mL_s);
+  outlet_flow_mL_s_ = flow_mL_s;
+  ++step_count_;
+  cavity_sensor_.advance(0.5 * (cavity_before_kPa + cavity_kPa()));
+  pump_sensor_.advance(0.5 * (pump_before_kPa + pump_end_kPa()));
+}
+
+}  // namespace diastole::sim_rig

@@ -1,0 +1,72 @@
+#pragma once
+// The rig without its electronics: piston, hose, gel phantom, catheter and transducers, as one initial-value
+// problem.
+//
+//   step edges -> Piston -> flow -> Hose -> flow -> cavity (dV/dt = Q, p = gel(V)) -> Sensor "cavity"
+//                                    |-> pressure at the pump's end -----------------> Sensor "pump"
+//
+// It moves in fixed steps (hose segment / wave speed, 0.625 ms by default) whatever the times that are asked
+// for, so the same edges and seed give the same readings. Rest pressure is zero. It shares no code with the
+// estimator.
+
+#include <cstddef>
+#include <cstdint>
+
+#include "tools/sim_rig/plant/gel_annulus.hpp"
+#include "tools/sim_rig/plant/hose.hpp"
+#include "tools/sim_rig/plant/piston.hpp"
+#include "tools/sim_rig/plant/sensor.hpp"
+
+namespace diastole::sim_rig {
+
+struct PlantConfig {
+  HoseConfig hose;
+  double minor_loss_K = 1.5;  ///< at the cannula: K rho u^2 / 2 in the hose's bore
+  double C1_kPa = 8.8;
+  double piston_lag_ms = 2;
+  SensorConfig cavity{};
+  SensorConfig pump{.f0_Hz = 200, .zeta = 0.7, .range_kPa = 100};
+  uint64_t seed = 1;
+};
+
+class Plant {
+ public:
+  explicit Plant(const PlantConfig& config);
+
+  /// The controller has displaced `volume_mL` in all since `time_s` (not before the plant's present).
+  void displace(double time_s, double volume_mL) { piston_.displace(time_s, volume_mL); }
+
+  /// Moves to `time_s`; every edge up to then must have been told.
+  void advance_to(double time_s);
+
+  /// What the transducers show now (at the last advance_to).
+  [[nodiscard]] double cavity_reading_kPa() const { return cavity_sensor_.reading_kPa(since_step_s_); }
+  [[nodiscard]] double pump_reading_kPa() const { return pump_sensor_.reading_kPa(since_step_s_); }
+
+  /// The truth at the last whole step.
+  [[nodiscard]] double cavity_kPa() const { return gel_.pressure_kPa(cavity_mL_); }
+  [[nodiscard]] double cavity_mL() const { return cavity_mL_; }
+  [[nodiscard]] double cavity_flow_mL_s() const { return outlet_flow_mL_s_; }
+  [[nodiscard]] double pump_end_kPa() const { return hose_.pump_end_kPa(); }
+  [[nodiscard]] double pump_flow_mL_s() const { return piston_.flow_mL_s(); }
+  [[nodiscard]] double hose_stored_mL() const { return hose_.stored_mL(); }
+  [[nodiscard]] double step_s() const { return hose_.step_s(); }
+
+ private:
+  void step();
+  /// The flow into the cavity at the step's end, from the hose's characteristic, cannula loss and gel.
+  [[nodiscard]] double solve_outlet_flow_mL_s() const;
+
+  Hose hose_;
+  GelAnnulus gel_;
+  Piston piston_;
+  Sensor cavity_sensor_;
+  Sensor pump_sensor_;
+  double loss_kPa_s2_per_mL2_;
+  long step_count_ = 0;
+  double since_step_s_ = 0;
+  double cavity_mL_ = 0;
+  double outlet_flow_mL_s_ = 0;
+};
+
+}  // namespace diastole::sim_rig

@@ -1,0 +1,40 @@
+#pragma once
+// A pressure transducer behind its fluid line: second-order response, a constant offset, noise correlated
+// over some 10 ms (first-order autoregressive, seeded), and the converter's steps.
+
+#include <cstdint>
+#include <random>
+
+#include "tools/sim_rig/plant/second_order.hpp"
+
+namespace diastole::sim_rig {
+
+struct SensorConfig {
+  double f0_Hz = 60;
+  double zeta = 0.6;
+  double offset_kPa = 0;
+  double noise_kPa = 0;              ///< standard deviation
+  double noise_correlation_ms = 10;  ///< > 0
+  double range_kPa = 20;             ///< the converter spans -range to +range, and clips there
+  int bits = 12;                     ///< 0: no steps
+};
+
+class Sensor {
+ public:
+  Sensor(const SensorConfig& config, double step_s, uint64_t seed);
+
+  void advance(double mean_pressure_kPa);
+
+  /// The reading `since_step_s` after the last step, carried on along the response's own slope.
+  [[nodiscard]] double reading_kPa(double since_step_s) const;
+
+ private:
+  SensorConfig config_;
+  SecondOrder line_;
+  double noise_memory_;
+  double noise_kPa_ = 0;
+  std::mt19937_64 random_;
+  std::normal_distribution<double> normal_;
+};
+
+}  // namespace diastole::sim_rig
