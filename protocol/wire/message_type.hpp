@@ -1,0 +1,39 @@
+#pragma once
+// Message numbers and how each is delivered, from message_list.inc.
+
+#include <cstdint>
+
+namespace diastole::wire {
+
+enum class MessageType : std::uint8_t {
+#define DIASTOLE_MESSAGE(number, name, sender, delivery) name = number,
+#include "protocol/wire/message_list.inc"
+#undef DIASTOLE_MESSAGE
+};
+
+enum class Sender : std::uint8_t { host, controller };
+enum class Delivery : std::uint8_t { datagram, sequenced };
+
+constexpr Delivery delivery_of(MessageType type) {
+  switch (type) {
+#define DIASTOLE_MESSAGE(number, name, sender, delivery) \
+  case MessageType::name:                                \
+    return Delivery::delivery;
+#include "protocol/wire/message_list.inc"
+#undef DIASTOLE_MESSAGE
+  }
+  return Delivery::sequenced;
+}
+
+constexpr Sender sender_of(MessageType type) {
+  switch (type) {
+#define DIASTOLE_MESSAGE(number, name, sender, delivery) \
+  case MessageType::name:                                \
+    return Sender::sender;
+#include "protocol/wire/message_list.inc"
+#undef DIASTOLE_MESSAGE
+  }
+  return Sender::host;
+}
+
+}  // namespace diastole::wire

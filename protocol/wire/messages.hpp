@@ -1,0 +1,109 @@
+#pragma once
+// Bytes ↔ messages, for every message of message_list.inc.
+//
+//   std::array<std::uint8_t, kMaxPayloadBytes> memory;
+//   link.send(Heartbeat::kType, encode(Heartbeat{lease_id}, memory));
+//
+//   visit_message(received.type, received.payload, overloaded{
+//     [&](const Trigger& trigger) { ... },
+//     [&](const auto&) {},                                   // messages that do not concern us
+//     [&](const Undecodable& what) { ... }});                // unknown type, wrong length, value out of
+//     range
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string_view>
+
+#include "protocol/wire/field_codec.hpp"
+#include "protocol/wire/frame.hpp"
+#include "protocol/wire/motion_messages.hpp"
+#include "protocol/wire/program_messages.hpp"
+#include "protocol/wire/result.hpp"
+#include "protocol/wire/session_messages.hpp"
+#include "protocol/wire/status_messages.hpp"
+#include "protocol/wire/telemetry_messages.hpp"
+
+namespace diastole::wire {
+
+/// Writes the message into `out` (at least kMaxPayloadBytes long) and returns the bytes used.
+template <class Message>
+constexpr std::span<const std::uint8_t> encode(const Message& message, std::span<std::uint8_t> out) {
+  FieldWriter writer(out);
+  Message::layout(message, writer);
+  return out.first(writer.size());
+}
+
+/// Reads a payload; refuses any other length than the message's own and any field out of its range.
+template <class Message>
+constexpr Result<Message, DecodeFault> decode(std::span<const std::uint8_t> payload) {
+  Message message;
+  FieldReader reader(payload);
+  Message::layout(message, reader);
+  if (reader.fault().problem != DecodeProblem::none) return reader.fault();
+  return message;
+}
+
+/// Name of a field by its number in DecodeFault.
+template <class Message>
+constexpr std::string_view field_name(std::uint8_t field) {
+  const Message message;
+  FieldNamer namer(field);
+  Message::layout(message, namer);
+  return namer.name();
+}
+
+namespace detail {
+consteval std::uint32_t schema_hash() {
+  SchemaHasher hash;
+#define DIASTOLE_MESSAGE(number_, name, sender, delivery) \
+  hash.number(number_);                                   \
+  hash.text(#name " " #sender " " #delivery);             \
+  {                                                       \
+    const name message;                                   \
+    name::layout(message, hash);                          \
+  }
+#include "protocol/wire/message_list.inc"
+#undef DIASTOLE_MESSAGE
+  return hash.value();
+}
+}  // namespace detail
+
+/// Equal on both sides, or host and firmware do not belong together.
+inline constexpr std::uint32_t kSchemaHash = detail::schema_hash();
+
+/// A payload that is no valid message: `known` tells an unknown type from a bad payload.
+struct Undecodable {
+  std::uint8_t type = 0;
+  bool known = false;
+  DecodeFault fault;
+};
+
+/// Decodes and calls `handler` with the message, or with Undecodable.
+template <class Handler>
+constexpr void visit_message(std::uint8_t type, std::span<const std::uint8_t> payload, Handler&& handler) {
+  switch (static_cast<MessageType>(type)) {
+#define DIASTOLE_MESSAGE(number, name, sender, delivery) \
+  case MessageType::name: {                              \
+    const auto message = decode<name>(payload);          \
+    if (message.ok())                                    \
+      handler(message.value());                          \
+    else                                                 \
+      handler(Undecodable{type, true, message.error()}); \
+    return;                                              \
+  }
+#include "protocol/wire/message_list.inc"
+#undef DIASTOLE_MESSAGE
+  }
+  handler(Undecodable{type, false, {}});
+}
+
+/// Lambdas as one handler for visit_message.
+template <class... Lambdas>
+struct overloaded : Lambdas... {
+  using Lambdas::operator()...;
+};
+template <class... Lambdas>
+overloaded(Lambdas...) -> overloaded<Lambdas...>;
+
+}  // namespace diastole::wire

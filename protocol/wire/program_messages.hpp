@@ -1,0 +1,223 @@
+#pragma once
+// What is to be run and within which limits. The whole program lies on the controller before motion begins.
+
+#include <cstdint>
+
+#include "protocol/wire/message_type.hpp"
+#include "protocol/wire/states.hpp"
+
+namespace diastole::wire {
+
+// Host → controller: geometry and limits; allowed while nothing moves; clears the program. The commanded
+// volume is position times microstep_pL, exactly. Pressure is what accelerates the fluid in the hose,
+// inertance times volume acceleration: 1e-9 inertance_kg_per_m4 acceleration_uL_per_s2, in Pa; friction
+// and the specimen come on top.
+//
+//   offset size field
+//        0    2 request_id                   chosen by the host; the answer repeats it
+//        2    4 microstep_pL                 volume of one microstep
+//        6    4 travel_uL                    largest volume displaced, from the home position
+//       10    4 flow_uL_per_s                limit
+//       14    4 acceleration_uL_per_s2       limit; also the deceleration of a controlled stop
+//       18    4 step_rate_Hz                 limit, in microsteps
+//       22    4 pressure_Pa                  limit
+//       26    4 inertance_kg_per_m4          of the hose; 0 switches the pressure limit off
+//       30    4 lease_us                     last heartbeat to standstill at most
+//       34    4 homing_flow_uL_per_s         speed of homing
+//
+// Example Configure: 02 00 21 E4 76 00 C0 CF 6A 00 A0 61 1C 00 A0 F0 19 00 80 A9 03 00 C4 35 01 00 00 63
+//   9F 02 20 A1 07 00 88 13 00 00
+struct Configure {
+  static constexpr MessageType kType = MessageType::Configure;
+  std::uint16_t request_id = 0;
+  std::uint32_t microstep_pL = 1U;
+  std::uint32_t travel_uL = 1U;
+  std::uint32_t flow_uL_per_s = 1U;
+  std::uint32_t acceleration_uL_per_s2 = 1U;
+  std::uint32_t step_rate_Hz = 1U;
+  std::uint32_t pressure_Pa = 1U;
+  std::uint32_t inertance_kg_per_m4 = 0;
+  std::uint32_t lease_us = 100'000U;
+  std::uint32_t homing_flow_uL_per_s = 1U;
+
+  template <class Self, class Visitor>
+  static constexpr void layout([[maybe_unused]] Self& self, [[maybe_unused]] Visitor& visit) {
+    visit.field("request_id", self.request_id);
+    visit.field("microstep_pL", self.microstep_pL, 1U, 4'000'000'000U);
+    visit.field("travel_uL", self.travel_uL, 1U, 50'000'000U);
+    visit.field("flow_uL_per_s", self.flow_uL_per_s, 1U, 10'000'000U);
+    visit.field("acceleration_uL_per_s2", self.acceleration_uL_per_s2, 1U, 1'000'000'000U);
+    visit.field("step_rate_Hz", self.step_rate_Hz, 1U, 400'000U);
+    visit.field("pressure_Pa", self.pressure_Pa, 1U, 10'000'000U);
+    visit.field("inertance_kg_per_m4", self.inertance_kg_per_m4);
+    visit.field("lease_us", self.lease_us, 100'000U, 5'000'000U);
+    visit.field("homing_flow_uL_per_s", self.homing_flow_uL_per_s, 1U, 10'000'000U);
+  }
+  static constexpr Configure example() {
+    Configure message;
+    message.request_id = 2;
+    message.microstep_pL = 7'791'649;
+    message.travel_uL = 7'000'000;
+    message.flow_uL_per_s = 1'860'000;
+    message.acceleration_uL_per_s2 = 1'700'000;
+    message.step_rate_Hz = 240'000;
+    message.pressure_Pa = 79'300;
+    message.inertance_kg_per_m4 = 44'000'000;
+    message.lease_us = 500'000;
+    message.homing_flow_uL_per_s = 5'000;
+    return message;
+  }
+};
+
+// Host → controller: forgets all segments; armed becomes homed.
+//
+//   offset size field
+//        0    2 request_id                   chosen by the host; the answer repeats it
+//
+// Example ClearProgram: 07 01
+struct ClearProgram {
+  static constexpr MessageType kType = MessageType::ClearProgram;
+  std::uint16_t request_id = 0;
+
+  template <class Self, class Visitor>
+  static constexpr void layout([[maybe_unused]] Self& self, [[maybe_unused]] Visitor& visit) {
+    visit.field("request_id", self.request_id);
+  }
+  static constexpr ClearProgram example() {
+    ClearProgram message;
+    message.request_id = 0x0107;
+    return message;
+  }
+};
+
+// Host → controller: appends one segment. V(t) = offset + stroke times the waveform, repeated `cycles`
+// times; a smooth ramp leads to the offset before it. The experiment file describes the same in mL and s.
+//
+//   offset size field
+//        0    2 request_id                   chosen by the host; the answer repeats it
+//        2    1 waveform                     waveform_list.inc
+//        3    4 cycles
+//        7    4 stroke_nL
+//       11    4 offset_nL                    least volume of the cycle, from home
+//       15    4 period_us
+//
+// Example AddSegment: 03 00 00 0A 00 00 00 00 5A 62 02 00 00 00 00 80 4F 12 00
+struct AddSegment {
+  static constexpr MessageType kType = MessageType::AddSegment;
+  std::uint16_t request_id = 0;
+  Waveform waveform{};
+  std::uint32_t cycles = 1U;
+  std::uint32_t stroke_nL = 0;
+  std::uint32_t offset_nL = 0;
+  std::uint32_t period_us = 1'000U;
+
+  template <class Self, class Visitor>
+  static constexpr void layout([[maybe_unused]] Self& self, [[maybe_unused]] Visitor& visit) {
+    visit.field("request_id", self.request_id);
+    visit.choice("waveform", self.waveform, kLastWaveform);
+    visit.field("cycles", self.cycles, 1U, 10'000'000U);
+    visit.field("stroke_nL", self.stroke_nL);
+    visit.field("offset_nL", self.offset_nL);
+    visit.field("period_us", self.period_us, 1'000U, 600'000'000U);
+  }
+  static constexpr AddSegment example() {
+    AddSegment message;
+    message.request_id = 3;
+    message.waveform = Waveform::parabolic;
+    message.cycles = 10;
+    message.stroke_nL = 40'000'000;
+    message.offset_nL = 0;
+    message.period_us = 1'200'000;
+    return message;
+  }
+};
+
+// Host → controller: checks the whole program against the limits. Accepted: SegmentPlanned for every
+// segment, then Ack and state armed. Refused: Nak with the limit, the value asked and the value allowed.
+//
+//   offset size field
+//        0    2 request_id                   chosen by the host; the answer repeats it
+//        2    2 gate_every                   R-wave at every n-th cycle; the TTL rises at every cycle
+//        4    4 rest_us                      from start of run to the first segment
+//        8    4 ttl_width_us
+//       12    4 position_period_ticks        of the position stream
+//
+// Example Arm: 04 00 01 00 40 42 0F 00 10 27 00 00 C0 45 04 00
+struct Arm {
+  static constexpr MessageType kType = MessageType::Arm;
+  std::uint16_t request_id = 0;
+  std::uint16_t gate_every = 1U;
+  std::uint32_t rest_us = 1'000U;
+  std::uint32_t ttl_width_us = 10U;
+  std::uint32_t position_period_ticks = 1'000U;
+
+  template <class Self, class Visitor>
+  static constexpr void layout([[maybe_unused]] Self& self, [[maybe_unused]] Visitor& visit) {
+    visit.field("request_id", self.request_id);
+    visit.field("gate_every", self.gate_every, 1U, 10'000U);
+    visit.field("rest_us", self.rest_us, 1'000U, 60'000'000U);
+    visit.field("ttl_width_us", self.ttl_width_us, 10U, 1'000'000U);
+    visit.field("position_period_ticks", self.position_period_ticks, 1'000U, 1'000'000'000U);
+  }
+  static constexpr Arm example() {
+    Arm message;
+    message.request_id = 4;
+    message.gate_every = 1;
+    message.rest_us = 1'000'000;
+    message.ttl_width_us = 10'000;
+    message.position_period_ticks = 280'000;
+    return message;
+  }
+};
+
+// Controller → host: what one segment of the armed program asks of the rig.
+//
+//   offset size field
+//        0    2 segment                      index, from 0
+//        2    8 start_us                     its first cycle begins this long after the start of run
+//       10    8 duration_us                  cycles times period
+//       18    4 peak_flow_uL_per_s
+//       22    4 peak_acceleration_uL_per_s2
+//       26    4 peak_step_rate_Hz
+//       30    4 peak_pressure_Pa             see Configure
+//       34    4 cycle_microsteps             stroke in whole microsteps
+//
+// Example SegmentPlanned: 00 00 40 42 0F 00 00 00 00 00 00 1B B7 00 00 00 00 00 D6 08 02 00 1D C8 06 00
+//   D9 42 00 00 64 4C 00 00 0E 14 00 00
+struct SegmentPlanned {
+  static constexpr MessageType kType = MessageType::SegmentPlanned;
+  std::uint16_t segment = 0;
+  std::uint64_t start_us = 0;
+  std::uint64_t duration_us = 0;
+  std::uint32_t peak_flow_uL_per_s = 0;
+  std::uint32_t peak_acceleration_uL_per_s2 = 0;
+  std::uint32_t peak_step_rate_Hz = 0;
+  std::uint32_t peak_pressure_Pa = 0;
+  std::uint32_t cycle_microsteps = 0;
+
+  template <class Self, class Visitor>
+  static constexpr void layout([[maybe_unused]] Self& self, [[maybe_unused]] Visitor& visit) {
+    visit.field("segment", self.segment);
+    visit.field("start_us", self.start_us);
+    visit.field("duration_us", self.duration_us);
+    visit.field("peak_flow_uL_per_s", self.peak_flow_uL_per_s);
+    visit.field("peak_acceleration_uL_per_s2", self.peak_acceleration_uL_per_s2);
+    visit.field("peak_step_rate_Hz", self.peak_step_rate_Hz);
+    visit.field("peak_pressure_Pa", self.peak_pressure_Pa);
+    visit.field("cycle_microsteps", self.cycle_microsteps);
+  }
+  static constexpr SegmentPlanned example() {
+    SegmentPlanned message;
+    message.segment = 0;
+    message.start_us = 1'000'000;
+    message.duration_us = 12'000'000;
+    message.peak_flow_uL_per_s = 133'334;
+    message.peak_acceleration_uL_per_s2 = 444'445;
+    message.peak_step_rate_Hz = 17'113;
+    message.peak_pressure_Pa = 19'556;
+    message.cycle_microsteps = 5'134;
+    return message;
+  }
+};
+
+}  // namespace diastole::wire

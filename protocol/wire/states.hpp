@@ -1,0 +1,39 @@
+#pragma once
+// The controller's states, the waveforms it may be asked for and the ways a run ends, as numbered on the
+// wire.
+//
+//   unhomed ──Home──▶ homing ──switch found──▶ homed ──Arm──▶ armed ──Start──▶ running
+//      ▲                                         ▲ ▲             │                │ Stop…, end of program,
+//      │ ClearFault (position lost)              │ └ClearProgram─┘                ▼ lease lost
+//   faulted ◀── e-stop, limit, underrun, …       └─────────── at rest ─────── stopping
+//      └── ClearFault (position kept: lease_lost) ──▶ homed
+
+#include <cstdint>
+
+namespace diastole::wire {
+
+#define DIASTOLE_STATE(number, name) name = number,
+enum class State : std::uint8_t {
+#include "protocol/wire/state_list.inc"
+};
+#undef DIASTOLE_STATE
+inline constexpr State kLastState = State::faulted;
+
+#define DIASTOLE_WAVEFORM(number, name) name = number,
+enum class Waveform : std::uint8_t {
+#include "protocol/wire/waveform_list.inc"
+};
+#undef DIASTOLE_WAVEFORM
+inline constexpr Waveform kLastWaveform = Waveform::uploaded;
+
+#define DIASTOLE_RUN_END(number, name) name = number,
+enum class RunEnd : std::uint8_t {
+#include "protocol/wire/run_end_list.inc"
+};
+#undef DIASTOLE_RUN_END
+inline constexpr RunEnd kLastRunEnd = RunEnd::faulted;
+
+enum class ResetCause : std::uint8_t { unknown = 0, power_on = 1, reset_pin = 2, software = 3, watchdog = 4 };
+inline constexpr ResetCause kLastResetCause = ResetCause::watchdog;
+
+}  // namespace diastole::wire

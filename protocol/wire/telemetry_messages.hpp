@@ -1,0 +1,234 @@
+#pragma once
+// What happened, in the order in which it happened. All of it is sequenced: none of it may be lost.
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+#include "protocol/wire/faults.hpp"
+#include "protocol/wire/message_type.hpp"
+#include "protocol/wire/states.hpp"
+
+namespace diastole::wire {
+
+// Controller → host.
+//
+//   offset size field
+//        0    1 from
+//        1    1 to
+//        2    8 tick
+//
+// Example StateChanged: 01 02 00 BD 01 05 00 00 00 00
+struct StateChanged {
+  static constexpr MessageType kType = MessageType::StateChanged;
+  State from{};
+  State to{};
+  std::uint64_t tick = 0;
+
+  template <class Self, class Visitor>
+  static constexpr void layout([[maybe_unused]] Self& self, [[maybe_unused]] Visitor& visit) {
+    visit.choice("from", self.from, kLastState);
+    visit.choice("to", self.to, kLastState);
+    visit.field("tick", self.tick);
+  }
+  static constexpr StateChanged example() {
+    StateChanged message;
+    message.from = State::homing;
+    message.to = State::homed;
+    message.tick = 84'000'000;
+    return message;
+  }
+};
+
+// Controller → host: run time zero.
+//
+//   offset size field
+//        0    8 tick                         of the start of run
+//        8    2 segments
+//       10    4 cycles                       of all segments together
+//
+// Example RunStarted: 00 7A 03 0A 00 00 00 00 01 00 0A 00 00 00
+struct RunStarted {
+  static constexpr MessageType kType = MessageType::RunStarted;
+  std::uint64_t tick = 0;
+  std::uint16_t segments = 0;
+  std::uint32_t cycles = 0;
+
+  template <class Self, class Visitor>
+  static constexpr void layout([[maybe_unused]] Self& self, [[maybe_unused]] Visitor& visit) {
+    visit.field("tick", self.tick);
+    visit.field("segments", self.segments);
+    visit.field("cycles", self.cycles);
+  }
+  static constexpr RunStarted example() {
+    RunStarted message;
+    message.tick = 168'000'000;
+    message.segments = 1;
+    message.cycles = 10;
+    return message;
+  }
+};
+
+// Controller → host: the first cycle of a segment begins.
+//
+//   offset size field
+//        0    2 segment                      index, from 0
+//        2    8 tick
+//
+// Example SegmentStarted: 00 00 00 37 05 0F 00 00 00 00
+struct SegmentStarted {
+  static constexpr MessageType kType = MessageType::SegmentStarted;
+  std::uint16_t segment = 0;
+  std::uint64_t tick = 0;
+
+  template <class Self, class Visitor>
+  static constexpr void layout([[maybe_unused]] Self& self, [[maybe_unused]] Visitor& visit) {
+    visit.field("segment", self.segment);
+    visit.field("tick", self.tick);
+  }
+  static constexpr SegmentStarted example() {
+    SegmentStarted message;
+    message.segment = 0;
+    message.tick = 252'000'000;
+    return message;
+  }
+};
+
+// Controller → host: the TTL rose, together with the first step of a cycle.
+//
+//   offset size field
+//        0    4 cycle                        from 0, over the whole run
+//        4    8 tick                         of the rising edge
+//       12    1 r_wave                       1 if the R-wave was played
+//
+// Example Trigger: 00 00 00 00 00 96 0A 0F 00 00 00 00 01
+struct Trigger {
+  static constexpr MessageType kType = MessageType::Trigger;
+  std::uint32_t cycle = 0;
+  std::uint64_t tick = 0;
+  std::uint8_t r_wave = 0U;
+
+  template <class Self, class Visitor>
+  static constexpr void layout([[maybe_unused]] Self& self, [[maybe_unused]] Visitor& visit) {
+    visit.field("cycle", self.cycle);
+    visit.field("tick", self.tick);
+    visit.field("r_wave", self.r_wave, 0U, 1U);
+  }
+  static constexpr Trigger example() {
+    Trigger message;
+    message.cycle = 0;
+    message.tick = 252'352'000;
+    message.r_wave = 1;
+    return message;
+  }
+};
+
+// Controller → host: positions at first_tick + i period_ticks; first_index continues the batch before. A
+// position counts the steps whose edge lies at or before its tick.
+//
+//   offset size field
+//        0    4 first_index                  0 is the start of run
+//        4    8 first_tick
+//       12    4 period_ticks
+//       16    1 count                        0 … 50
+//       17   4n position_microsteps          signed, inflate positive
+//
+// Example PositionBatch: 58 02 00 00 00 F4 06 14 00 00 00 00 C0 45 04 00 03 64 00 00 00 65 00 00 00 FF FF
+//   FF FF
+struct PositionBatch {
+  static constexpr MessageType kType = MessageType::PositionBatch;
+  std::uint32_t first_index = 0;
+  std::uint64_t first_tick = 0;
+  std::uint32_t period_ticks = 0;
+  static constexpr std::size_t kMaxCount = 50;
+  std::uint8_t count = 0;
+  std::array<std::int32_t, kMaxCount> position_microsteps{};
+
+  template <class Self, class Visitor>
+  static constexpr void layout([[maybe_unused]] Self& self, [[maybe_unused]] Visitor& visit) {
+    visit.field("first_index", self.first_index);
+    visit.field("first_tick", self.first_tick);
+    visit.field("period_ticks", self.period_ticks);
+    visit.list("position_microsteps", self.count, self.position_microsteps);
+  }
+  static constexpr PositionBatch example() {
+    PositionBatch message;
+    message.first_index = 600;
+    message.first_tick = 336'000'000;
+    message.period_ticks = 280'000;
+    message.count = 3;
+    message.position_microsteps = {100, 101, -1};
+    return message;
+  }
+};
+
+// Controller → host: the motor is at rest and every position and trigger of the run has been sent.
+//
+//   offset size field
+//        0    1 reason                       run_end_list.inc
+//        1    8 tick                         of standstill
+//        9    4 cycles                       completed
+//       13    4 triggers                     of this run
+//       17    4 r_waves                      of this run
+//       21    4 position_microsteps
+//
+// Example RunEnded: 00 00 D0 1B 50 00 00 00 00 0A 00 00 00 0A 00 00 00 0A 00 00 00 00 00 00 00
+struct RunEnded {
+  static constexpr MessageType kType = MessageType::RunEnded;
+  RunEnd reason{};
+  std::uint64_t tick = 0;
+  std::uint32_t cycles = 0;
+  std::uint32_t triggers = 0;
+  std::uint32_t r_waves = 0;
+  std::int32_t position_microsteps = 0;
+
+  template <class Self, class Visitor>
+  static constexpr void layout([[maybe_unused]] Self& self, [[maybe_unused]] Visitor& visit) {
+    visit.choice("reason", self.reason, kLastRunEnd);
+    visit.field("tick", self.tick);
+    visit.field("cycles", self.cycles);
+    visit.field("triggers", self.triggers);
+    visit.field("r_waves", self.r_waves);
+    visit.field("position_microsteps", self.position_microsteps);
+  }
+  static constexpr RunEnded example() {
+    RunEnded message;
+    message.reason = RunEnd::completed;
+    message.tick = 1'344'000'000;
+    message.cycles = 10;
+    message.triggers = 10;
+    message.r_waves = 10;
+    return message;
+  }
+};
+
+// Controller → host: a fault was latched.
+//
+//   offset size field
+//        0    1 fault                        fault_list.inc
+//        1    8 tick
+//        9    8 argument                     position in microsteps, except event_overflow: events lost
+//
+// Example FaultRaised: 01 00 A3 E1 11 00 00 00 00 2C 03 00 00 00 00 00 00
+struct FaultRaised {
+  static constexpr MessageType kType = MessageType::FaultRaised;
+  Fault fault{};
+  std::uint64_t tick = 0;
+  std::int64_t argument = 0;
+
+  template <class Self, class Visitor>
+  static constexpr void layout([[maybe_unused]] Self& self, [[maybe_unused]] Visitor& visit) {
+    visit.choice("fault", self.fault, kLastFault);
+    visit.field("tick", self.tick);
+    visit.field("argument", self.argument);
+  }
+  static constexpr FaultRaised example() {
+    FaultRaised message;
+    message.fault = Fault::estop;
+    message.tick = 300'000'000;
+    message.argument = 812;
+    return message;
+  }
+};
+
+}  // namespace diastole::wire

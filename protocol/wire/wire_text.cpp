@@ -1,0 +1,65 @@
+#include "protocol/wire/wire_text.hpp"
+
+#include <cstddef>
+
+namespace diastole::wire {
+
+namespace {
+
+struct Words {
+  std::string_view name, explanation, remedy;
+};
+
+constexpr Words kFaults[] = {
+#define DIASTOLE_FAULT(number, name, explanation, remedy) {#name, explanation, remedy},
+#include "protocol/wire/fault_list.inc"
+#undef DIASTOLE_FAULT
+};
+constexpr Words kRefusals[] = {
+#define DIASTOLE_REFUSAL(number, name, explanation) {#name, explanation, {}},
+#include "protocol/wire/refusal_list.inc"
+#undef DIASTOLE_REFUSAL
+};
+constexpr Words kLimits[] = {
+#define DIASTOLE_LIMIT(number, name, unit) {#name, unit, {}},
+#include "protocol/wire/limit_list.inc"
+#undef DIASTOLE_LIMIT
+};
+constexpr Words kStates[] = {
+#define DIASTOLE_STATE(number, name) {#name, {}, {}},
+#include "protocol/wire/state_list.inc"
+#undef DIASTOLE_STATE
+};
+constexpr Words kWaveforms[] = {
+#define DIASTOLE_WAVEFORM(number, name) {#name, {}, {}},
+#include "protocol/wire/waveform_list.inc"
+#undef DIASTOLE_WAVEFORM
+};
+constexpr Words kRunEnds[] = {
+#define DIASTOLE_RUN_END(number, name) {#name, {}, {}},
+#include "protocol/wire/run_end_list.inc"
+#undef DIASTOLE_RUN_END
+};
+
+template <class Enum, std::size_t N>
+const Words& words_of(const Words (&table)[N], Enum number) {
+  static constexpr Words kUnknown{"unknown", "A number that this program does not know.",
+                                  "Update the host programs."};
+  const auto index = static_cast<std::size_t>(number);
+  return index < N ? table[index] : kUnknown;
+}
+
+}  // namespace
+
+std::string_view fault_name(Fault fault) { return words_of(kFaults, fault).name; }
+std::string_view fault_explanation(Fault fault) { return words_of(kFaults, fault).explanation; }
+std::string_view fault_remedy(Fault fault) { return words_of(kFaults, fault).remedy; }
+std::string_view refusal_name(Refusal refusal) { return words_of(kRefusals, refusal).name; }
+std::string_view refusal_explanation(Refusal refusal) { return words_of(kRefusals, refusal).explanation; }
+std::string_view limit_name(Limit limit) { return words_of(kLimits, limit).name; }
+std::string_view limit_unit(Limit limit) { return words_of(kLimits, limit).explanation; }
+std::string_view state_name(State state) { return words_of(kStates, state).name; }
+std::string_view waveform_name(Waveform waveform) { return words_of(kWaveforms, waveform).name; }
+std::string_view run_end_name(RunEnd reason) { return words_of(kRunEnds, reason).name; }
+
+}  // namespace diastole::wire

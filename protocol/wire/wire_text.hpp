@@ -1,0 +1,23 @@
+#pragma once
+// Plain words for what the controller says in numbers. Host programs only: not part of the firmware image.
+
+#include <string_view>
+
+#include "protocol/wire/faults.hpp"
+#include "protocol/wire/states.hpp"
+
+namespace diastole::wire {
+
+std::string_view fault_name(Fault fault);
+std::string_view fault_explanation(Fault fault);
+std::string_view fault_remedy(Fault fault);
+std::string_view refusal_name(Refusal refusal);
+std::string_view refusal_explanation(Refusal refusal);
+std::string_view limit_name(Limit limit);
+/// The unit of Nak's `asked` and `allowed` for this limit.
+std::string_view limit_unit(Limit limit);
+std::string_view state_name(State state);
+std::string_view waveform_name(Waveform waveform);
+std::string_view run_end_name(RunEnd reason);
+
+}  // namespace diastole::wire
