@@ -1,0 +1,106 @@
+#include "estimator/fe/elastic_model.hpp"
+
+#include <algorithm>
+#include <thread>
+#include <utility>
+
+#include "estimator/fe/elastic_system.hpp"
+#include "estimator/fe/load_path.hpp"
+
+namespace diastole {
+namespace {
+
+constexpr double mL_per_mm3 = 1e-3;
+constexpr double mJ_per_uJ = 1e-3;
+
+HeldDofs bonded_ends(const HermiteMesh& mesh) {
+  HeldDofs held = hold_nothing(mesh);
+  hold_face(mesh, mesh.faces().bottom, held);
+  hold_face(mesh, mesh.faces().top, held);
+  return held;
+}
+
+}  // namespace
+
+ParameterGroup whole_parameter(size_t parameter) { return {parameter, {}}; }
+
+std::vector<ParameterGroup> each_element(size_t parameter, size_t element_count) {
+  std::vector<ParameterGroup> groups;
+  for (size_t e = 0; e < element_count; ++e)
+    groups.push_back({parameter, {e}});
+  return groups;
+}
+
+ElasticModel::ElasticModel(HermiteMesh mesh, const Law& law, ElasticOptions options)
+    : solve_options_(std::move(options.solve)) {
+  const HeldDofs held = options.held ? *options.held : bonded_ends(mesh);
+  const size_t threads =
+      options.threads > 0 ? options.threads : std::max(1U, std::thread::hardware_concurrency());
+  system_ = std::make_unique<ElasticSystem>(std::move(mesh), law, std::move(options.parameters),
+                                            options.pressure_space, held, threads);
+}
+
+ElasticModel::~ElasticModel() = default;
+ElasticModel::ElasticModel(ElasticModel&&) noexcept = default;
+ElasticModel& ElasticModel::operator=(ElasticModel&&) noexcept = default;
+
+const HermiteMesh& ElasticModel::mesh() const { return system_->mesh(); }
+const Law& ElasticModel::law() const { return system_->law(); }
+size_t ElasticModel::dofs() const { return system_->equations().unknowns(); }
+size_t ElasticModel::displacement_dofs() const { return system_->equations().displacement_unknowns(); }
+size_t ElasticModel::pressure_dofs() const { return system_->equations().pressure_unknowns(); }
+ElasticSystem& ElasticModel::system() { return *system_; }
+
+void ElasticModel::set_parameter(size_t parameter, double value) {
+  for (size_t e = 0; e < mesh().element_count(); ++e)
+    set_element_parameter(parameter, e, value);
+}
+
+void ElasticModel::set_element_parameter(size_t parameter, size_t element, double value) {
+  system_->parameters(element)[parameter] = value;
+}
+
+double ElasticModel::element_parameter(size_t parameter, size_t element) const {
+  return std::as_const(*system_).parameters(element)[parameter];
+}
+
+ElasticState ElasticModel::rest_state() const { return system_->rest_state(); }
+
+Solution ElasticModel::solve(double pressure_kPa) { return solve(pressure_kPa, rest_state()); }
+
+Solution ElasticModel::solve(double pressure_kPa, const ElasticState& start) {
+  PathResult path = follow_load(*system_, start, pressure_kPa, solve_options_);
+  return {std::move(path.state), std::move(path.report)};
+}
+
+Sensitivities ElasticModel::sensitivities(const ElasticState& state, std::span<const ParameterGroup> groups) {
+  const size_t unknowns = dofs();
+  std::vector<double> right_sides((groups.size() + 1) * unknowns, 0.0);
+  const auto column = [&](size_t number) {
+    return std::span(right_sides).subspan(number * unknowns, unknowns);
+  };
+  const std::vector<double> area = system_->cavity_area(state);
+  std::copy(area.begin(), area.end(), right_sides.begin());
+  for (size_t g = 0; g < groups.size(); ++g) {
+    system_->add_parameter_residual(state, groups[g].parameter, groups[g].elements, column(g + 1));
+    for (double& value : column(g + 1))
+      value = -value;
+  }
+  Sensitivities result;
+  result.negative_pivots = system_->factorise(state).negative_pivots;
+  system_->solve(right_sides, groups.size() + 1);
+  result.pressure = system_->node_field(column(0));
+  for (size_t g = 0; g < groups.size(); ++g)
+    result.parameter.push_back(system_->node_field(column(g + 1)));
+  return result;
+}
+
+double ElasticModel::cavity_volume_mL(const ElasticState& state) const {
+  return mL_per_mm3 * system_->cavity_volume_mm3(state);
+}
+
+double ElasticModel::stored_energy_mJ(const ElasticState& state) const {
+  return mJ_per_uJ * system_->residual(state).energy_uJ;
+}
+
+}  // namespace diastole

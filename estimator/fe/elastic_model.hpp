@@ -1,0 +1,109 @@
+#pragma once
+// The forward model: a meshed specimen of one material law, held at its plates, inflated by a cavity
+// pressure.
+//
+//   ElasticModel model(make_annulus({}), *find_law("neo-hookean"), {.parameters = {8.71}});
+//   Solution solution = model.solve(3.1);                     // from rest
+//   if (!solution.report.converged()) ... solution.report.describe()
+//   Eigen::Vector3d x = model.mesh().value(solution.state.position_mm, {element, xi});
+//   Eigen::Matrix3d F = model.mesh().reference_gradient(solution.state.position_mm, {element, xi});
+//   double taken_mL = model.cavity_volume_mL(solution.state) - model.cavity_volume_mL(model.rest_state());
+//   model.set_parameter(0, 9.0);                              // whole body; set_element_parameter for one
+//   element solution = model.solve(3.1, solution.state);              // warm start Sensitivities by =
+//   model.sensitivities(solution.state, {whole_parameter(0)}); Eigen::Vector3d dx_dC1 =
+//   model.mesh().value(by.parameter[0], {element, xi}); Eigen::Vector3d dx_dP =
+//   model.mesh().value(by.pressure, {element, xi});
+//
+// Equations: element_mechanics.hpp, cavity_load.hpp; Newton's method: newton.hpp; load steps: load_path.hpp.
+// Units: mm, kPa, mL. A model is used by one thread at a time (it works in parallel itself).
+
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "estimator/fe/elastic_state.hpp"
+#include "estimator/fe/pressure_space.hpp"
+#include "estimator/fe/solve_report.hpp"
+#include "estimator/fe/supports.hpp"
+#include "estimator/materials/law.hpp"
+#include "estimator/mesh/hermite_mesh.hpp"
+
+namespace diastole {
+
+class ElasticSystem;
+
+struct ElasticOptions {
+  std::vector<double> parameters;  ///< the law's, in its order; the same in all elements
+  PressureSpace pressure_space = PressureSpace::per_element;
+  std::optional<HeldDofs> held;  ///< default: bottom and top faces bonded
+  SolveOptions solve;
+  size_t threads = 0;  ///< 0: as many as the machine has
+};
+
+/// A direction in parameter space: one parameter of the law, varied by the same amount in some elements.
+struct ParameterGroup {
+  size_t parameter = 0;
+  std::vector<size_t> elements;  ///< empty: all
+};
+
+ParameterGroup whole_parameter(size_t parameter);
+/// One group for each element.
+std::vector<ParameterGroup> each_element(size_t parameter, size_t element_count);
+
+/// Derivatives of the equilibrium at one state. All are node fields like ElasticState::position_mm, in mm per
+/// unit of the parameter (or per kPa of cavity pressure); zero at held dofs.
+struct Sensitivities {
+  std::vector<NodeField> parameter;  ///< one for each group asked for
+  NodeField pressure;                ///< dx/dP
+  size_t negative_pivots = 0;        ///< of the tangent at this state
+};
+
+struct Solution {
+  ElasticState state;  ///< the last converged one when the report says failure
+  SolveReport report;
+};
+
+class ElasticModel {
+ public:
+  /// Precondition: as many parameters as the law has.
+  ElasticModel(HermiteMesh mesh, const Law& law, ElasticOptions options);
+  ~ElasticModel();
+  ElasticModel(ElasticModel&&) noexcept;
+  ElasticModel& operator=(ElasticModel&&) noexcept;
+
+  [[nodiscard]] const HermiteMesh& mesh() const;
+  [[nodiscard]] const Law& law() const;
+  /// Unknowns of the discrete problem: free displacement dofs plus Lagrange pressures.
+  [[nodiscard]] size_t dofs() const;
+  [[nodiscard]] size_t displacement_dofs() const;
+  [[nodiscard]] size_t pressure_dofs() const;
+
+  void set_parameter(size_t parameter, double value);
+  void set_element_parameter(size_t parameter, size_t element, double value);
+  [[nodiscard]] double element_parameter(size_t parameter, size_t element) const;
+
+  /// Undeformed, unloaded; the Lagrange pressure balances the law's stress at rest.
+  [[nodiscard]] ElasticState rest_state() const;
+
+  /// Equilibrium at a cavity pressure, from rest or from an earlier state (of any pressure and parameters).
+  [[nodiscard]] Solution solve(double pressure_kPa);
+  [[nodiscard]] Solution solve(double pressure_kPa, const ElasticState& start);
+
+  /// Exact derivatives at a converged state: one factorisation, one back-substitution a group.
+  [[nodiscard]] Sensitivities sensitivities(const ElasticState& state,
+                                            std::span<const ParameterGroup> groups);
+
+  [[nodiscard]] double cavity_volume_mL(const ElasticState& state) const;
+  /// Integral of W over the body, mJ (kPa mL).
+  [[nodiscard]] double stored_energy_mJ(const ElasticState& state) const;
+
+  /// The discrete equations themselves, for verification.
+  [[nodiscard]] ElasticSystem& system();
+
+ private:
+  std::unique_ptr<ElasticSystem> system_;
+  SolveOptions solve_options_;
+};
+
+}  // namespace diastole

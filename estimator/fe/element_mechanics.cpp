@@ -1,0 +1,184 @@
+#include "estimator/fe/element_mechanics.hpp"
+
+#include <cmath>
+
+namespace diastole {
+namespace {
+
+using Eigen::Index;
+using Eigen::Matrix3d;
+using Basis = Eigen::Vector<double, 64>;
+
+Index at(size_t i) { return static_cast<Index>(i); }
+
+/// dx/dxi at Gauss point q.
+Matrix3d xi_gradient(const ElementField& position, size_t q) {
+  const auto& slope = gauss_tables().slope[q];
+  Matrix3d gradient;
+  for (size_t k = 0; k < 3; ++k) {
+    gradient.col(at(k)).noalias() = position * Eigen::Map<const Basis>(slope[k].data());
+  }
+  return gradient;
+}
+
+/// d(det g)/dg.
+Matrix3d cofactors(const Matrix3d& g) {
+  Matrix3d cofactor;
+  cofactor.col(0) = g.col(1).cross(g.col(2));
+  cofactor.col(1) = g.col(2).cross(g.col(0));
+  cofactor.col(2) = g.col(0).cross(g.col(1));
+  return cofactor;
+}
+
+double pressure_at(const std::array<double, corners>& pressure, size_t q) {
+  double sum = 0.0;
+  for (size_t m = 0; m < corners; ++m)
+    sum += pressure[m] * gauss_tables().trilinear[q][m];
+  return sum;
+}
+
+/// force(i, a) += sum_K p(i, K) dN_a/dxi_K
+void add_force(ElementField& force, const Matrix3d& p, size_t q) {
+  const auto& slope = gauss_tables().slope[q];
+  for (size_t a = 0; a < hermite_functions; ++a) {
+    force.col(at(a)) += p.col(0) * slope[0][a] + p.col(1) * slope[1][a] + p.col(2) * slope[2][a];
+  }
+}
+
+SymmetricTensor<double> right_cauchy_green(const Matrix3d& axes) {
+  return symmetric_part(axes.transpose() * axes);
+}
+
+/// Adds f(i, A) D(AM, BN) f(k, B) over material indices, then turns M, N into xi: the law's part of the
+/// moduli.
+void add_material_moduli(double* moduli_at_point, const Matrix3d& f, const TangentTensor& tangent,
+                         const Matrix3d& t) {
+  // strain(m; iM): derivative of the strain component m with respect to (g T)_iM, off-diagonal ones doubled.
+  Eigen::Matrix<double, 6, 9> strain = Eigen::Matrix<double, 6, 9>::Zero();
+  for (size_t m = 0; m < 6; ++m) {
+    const auto [p, r] = symmetric_entries[m];
+    for (size_t i = 0; i < 3; ++i) {
+      strain(at(m), at(3 * i + p)) += f(at(i), at(r));
+      if (p != r) strain(at(m), at(3 * i + r)) += f(at(i), at(p));
+    }
+  }
+  Eigen::Matrix<double, 6, 9> in_xi;
+  for (Index i = 0; i < 3; ++i)
+    in_xi.middleCols<3>(3 * i) = strain.middleCols<3>(3 * i) * t.transpose();
+  const Eigen::Matrix<double, 9, 9> part = in_xi.transpose() * tangent * in_xi;
+  for (size_t i = 0; i < 3; ++i) {
+    for (size_t dk = 0; dk < 3; ++dk) {
+      for (size_t k = 0; k < 3; ++k) {
+        for (size_t dl = 0; dl < 3; ++dl) {
+          moduli_at_point[modulus_index(i, dk, k, dl)] += part(at(3 * i + dk), at(3 * k + dl));
+        }
+      }
+    }
+  }
+}
+
+/// Initial-stress part delta_ik s(K, L) and pressure part -p d(cof g)_iK/dg_kL; overwrites all moduli.
+void set_geometric_moduli(double* moduli_at_point, const Matrix3d& s, double pressure, const Matrix3d& g) {
+  for (size_t n = 0; n < moduli; ++n)
+    moduli_at_point[n] = 0.0;
+  for (size_t dk = 0; dk < 3; ++dk) {
+    for (size_t dl = 0; dl < 3; ++dl) {
+      for (size_t i = 0; i < 3; ++i)
+        moduli_at_point[modulus_index(i, dk, i, dl)] = s(at(dk), at(dl));
+    }
+  }
+  for (size_t i = 0; i < 3; ++i) {
+    const size_t j = (i + 1) % 3;
+    const size_t k = (i + 2) % 3;
+    for (size_t dk = 0; dk < 3; ++dk) {
+      const size_t dl = (dk + 1) % 3;
+      const size_t dm = (dk + 2) % 3;
+      const double even = pressure * g(at(k), at(dm));
+      const double odd = pressure * g(at(k), at(dl));
+      moduli_at_point[modulus_index(i, dk, j, dl)] -= even;
+      moduli_at_point[modulus_index(j, dl, i, dk)] -= even;
+      moduli_at_point[modulus_index(i, dk, j, dm)] += odd;
+      moduli_at_point[modulus_index(j, dm, i, dk)] += odd;
+    }
+  }
+}
+
+}  // namespace
+
+ReferenceElement make_reference_element(const HermiteMesh& mesh, size_t element) {
+  const ElementField position = mesh.gather(element, mesh.reference());
+  ReferenceElement reference;
+  for (size_t q = 0; q < gauss_points; ++q) {
+    const Matrix3d g = xi_gradient(position, q);
+    reference[q].material_to_xi = g.inverse();
+    reference[q].volume = gauss_tables().weight[q] * g.determinant();
+  }
+  return reference;
+}
+
+ElementResidual element_residual(const ReferenceElement& reference, const ElementState& state, const Law& law,
+                                 std::span<const double> parameters) {
+  const GaussTables& tables = gauss_tables();
+  ElementResidual result;
+  result.force.setZero();
+  result.volume_mm3.fill(0.0);
+  result.least.ratio = std::numeric_limits<double>::infinity();
+  for (size_t q = 0; q < gauss_points; ++q) {
+    const Matrix3d g = xi_gradient(state.position_mm, q);
+    const Matrix3d cofactor = cofactors(g);
+    const double volume = tables.weight[q] * g.col(0).dot(cofactor.col(0));
+    const double ratio = volume / reference[q].volume;
+    if (ratio < result.least.ratio) result.least = {ratio, q};
+    const Matrix3d& t = reference[q].material_to_xi;
+    const Matrix3d f = g * t;
+    const SymmetricTensor<double> c = right_cauchy_green(f);
+    const Matrix3d stress = full_matrix(law.stress(c, parameters));
+    const double pressure = pressure_at(state.pressure_kPa, q);
+    add_force(result.force,
+              reference[q].volume * f * stress * t.transpose() - (pressure * tables.weight[q]) * cofactor, q);
+    result.energy += reference[q].volume * law.energy(c, parameters);
+    for (size_t m = 0; m < corners; ++m) {
+      result.volume_mm3[m] -= (volume - reference[q].volume) * tables.trilinear[q][m];
+    }
+  }
+  return result;
+}
+
+void element_tangent(const ReferenceElement& reference, const ElementState& state, const Law& law,
+                     std::span<const double> parameters, ElementTangent& tangent) {
+  const GaussTables& tables = gauss_tables();
+  for (ElementField& column : tangent.coupling)
+    column.setZero();
+  for (size_t q = 0; q < gauss_points; ++q) {
+    const Matrix3d g = xi_gradient(state.position_mm, q);
+    const Matrix3d& t = reference[q].material_to_xi;
+    const Matrix3d f = g * t;
+    const MaterialResponse response = law.response(right_cauchy_green(f), parameters);
+    const double pressure = pressure_at(state.pressure_kPa, q) * tables.weight[q];
+    const Matrix3d stress = reference[q].volume * t * full_matrix(response.stress) * t.transpose();
+    double* point = tangent.stiffness.moduli_at(q);
+    set_geometric_moduli(point, stress, pressure, g);
+    if (!response.tangent.isZero(0.0))
+      add_material_moduli(point, f, reference[q].volume * response.tangent, t);
+
+    ElementField volume_slope = ElementField::Zero();
+    add_force(volume_slope, -tables.weight[q] * cofactors(g), q);
+    for (size_t m = 0; m < corners; ++m)
+      tangent.coupling[m] += tables.trilinear[q][m] * volume_slope;
+  }
+  tangent.stiffness.contract();
+}
+
+ElementField element_parameter_force(const ReferenceElement& reference, const ElementState& state,
+                                     const Law& law, std::span<const double> parameters, size_t parameter) {
+  ElementField force = ElementField::Zero();
+  for (size_t q = 0; q < gauss_points; ++q) {
+    const Matrix3d& t = reference[q].material_to_xi;
+    const Matrix3d f = xi_gradient(state.position_mm, q) * t;
+    const Matrix3d stress = full_matrix(law.stress_sensitivity(right_cauchy_green(f), parameters, parameter));
+    add_force(force, reference[q].volume * f * stress * t.transpose(), q);
+  }
+  return force;
+}
+
+}  // namespace diastole

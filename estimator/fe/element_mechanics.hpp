@@ -1,0 +1,76 @@
+#pragma once
+// One element's share of the potential
+//
+//   Pi(x, p) = integral of  W(C; parameters) - p (J - 1)  dV  -  P_cavity V_cavity(x)
+//
+// (the last term is in cavity_load.hpp), its gradient (residual) and second derivative (tangent) with respect
+// to the 192 coefficients x(a, i) of the deformed position and the 8 corner values p(m) of the tri-linear
+// Lagrange pressure p, positive in compression: Cauchy stress = 2/J F dW/dC F^T - p I.
+//
+// Everything is worked out in element coordinates: g = dx/dxi, and T = dxi/dX Q with Q's columns the material
+// axes, so that F Q = g T and C in material axes = (g T)^T (g T). With w the Gauss weight, G = dX/dxi:
+//   residual(a, i) = sum_q dN_a/dxi_K [ w det G (g T S T^T)_iK - p w cof(g)_iK ]
+//   residual(m)    = - sum_q w (det g - det G) psi_m
+//
+// Units: mm, kPa; energies in kPa mm^3 = uJ.
+
+#include <Eigen/Dense>
+#include <array>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "estimator/fe/gauss_points.hpp"
+#include "estimator/fe/stiffness_contraction.hpp"
+#include "estimator/materials/law.hpp"
+#include "estimator/mesh/hermite_mesh.hpp"
+
+namespace diastole {
+
+/// What a Gauss point keeps of the reference configuration.
+struct ReferencePoint {
+  Eigen::Matrix3d material_to_xi;  ///< T
+  double volume = 0.0;             ///< w det G, mm^3
+};
+using ReferenceElement = std::array<ReferencePoint, gauss_points>;
+
+/// Material axes (orthonormal columns fibre, sheet, normal) at a Gauss point; identity for isotropic laws.
+using MaterialAxes = Eigen::Matrix3d;
+
+ReferenceElement make_reference_element(const HermiteMesh& mesh, size_t element);
+
+struct ElementState {
+  ElementField position_mm;
+  std::array<double, corners> pressure_kPa;
+};
+
+/// The least volume ratio J over the Gauss points, and where.
+struct LeastVolumeRatio {
+  double ratio = 1.0;
+  size_t point = 0;
+};
+
+struct ElementResidual {
+  ElementField force;                      ///< dPi/dx, kPa mm^2
+  std::array<double, corners> volume_mm3;  ///< dPi/dp
+  double energy = 0.0;                     ///< integral of W
+  LeastVolumeRatio least;
+};
+
+/// Tangent blocks of one element; `stiffness` holds d2Pi/dx dx.
+struct ElementTangent {
+  StiffnessContraction stiffness;
+  std::array<ElementField, corners> coupling;  ///< d2Pi/dx dp: coupling[m](i, a)
+};
+
+ElementResidual element_residual(const ReferenceElement& reference, const ElementState& state, const Law& law,
+                                 std::span<const double> parameters);
+
+void element_tangent(const ReferenceElement& reference, const ElementState& state, const Law& law,
+                     std::span<const double> parameters, ElementTangent& tangent);
+
+/// d(residual force)/d(parameter) at fixed x and p.
+ElementField element_parameter_force(const ReferenceElement& reference, const ElementState& state,
+                                     const Law& law, std::span<const double> parameters, size_t parameter);
+
+}  // namespace diastole

@@ -1,0 +1,85 @@
+#pragma once
+// The sparse symmetric system of free displacement dofs and Lagrange pressures, filled by blocks.
+//
+//        u (node by node)   p
+//     +-------------------+----+
+//   u |  node-pair blocks | .. |     stored: the lower triangle, as coordinate triplets (rows(), columns()
+//   count
+//     +-------------------+----+     from 1 as the factorisation wants them). A block of two different nodes
+//     is
+//   p |  pressure rows    | 0  |     a full rectangle, a node's own block a packed lower triangle, a pressure
+//     +-------------------+----+     unknown has one row piece for each node it meets.
+//
+// The pattern depends on mesh, supports and pressure map only; values are added per element and elements are
+// grouped into colours that share no unknown, so that a parallel sum has one fixed order.
+
+#include <array>
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include "estimator/fe/element_mechanics.hpp"
+#include "estimator/fe/pressure_space.hpp"
+#include "estimator/fe/supports.hpp"
+
+namespace diastole {
+
+class EquationSystem {
+ public:
+  EquationSystem(const HermiteMesh& mesh, const HeldDofs& held, const PressureMap& pressures);
+
+  [[nodiscard]] size_t displacement_unknowns() const { return displacement_unknowns_; }
+  [[nodiscard]] size_t pressure_unknowns() const { return pressure_unknowns_; }
+  [[nodiscard]] size_t unknowns() const { return displacement_unknowns_ + pressure_unknowns_; }
+
+  /// Equation of a nodal dof (numbered as in a NodeField), or `none` when it is held.
+  [[nodiscard]] size_t equation(size_t dof) const { return equation_of_dof_[dof]; }
+  static constexpr size_t none = static_cast<size_t>(-1);
+
+  [[nodiscard]] const std::vector<std::vector<size_t>>& colours() const { return colours_; }
+
+  [[nodiscard]] std::span<const int> rows() const { return rows_; }
+  [[nodiscard]] std::span<const int> columns() const { return columns_; }
+
+  // Adding: `values` has one number for each stored entry. Different elements of one colour may be added at
+  // the same time from several threads.
+  void add_tangent(size_t element, const ElementTangent& tangent, std::span<double> values) const;
+  void add_force(size_t element, const ElementField& force, std::span<double> right_side) const;
+  /// Adds factor * symmetric matrix over the given Hermite functions of one element; row 3 j + i belongs to
+  /// functions[j], component i.
+  void add_face_tangent(size_t element, std::span<const size_t> functions,
+                        const Eigen::Ref<const Eigen::MatrixXd>& matrix, double factor,
+                        std::span<double> values) const;
+
+ private:
+  struct ElementMap {
+    HermiteMesh::Corners nodes;
+    std::array<size_t, corners> free_dofs;                  ///< of each corner's node
+    std::array<size_t, 3 * hermite_functions> equation;     ///< of local dof 3 a + i, or none
+    std::array<size_t, 3 * hermite_functions> within_node;  ///< its place among its node's free dofs
+    std::array<double, hermite_functions> scale;
+    std::array<size_t, corners * corners> node_block;  ///< first entry of the block of two corners
+    std::array<size_t, corners * corners>
+        pressure_piece;  ///< first entry of pressure corner m, node corner c
+  };
+
+  void number_equations(const HermiteMesh& mesh, const HeldDofs& held);
+  void map_elements(const HermiteMesh& mesh, const PressureMap& pressures);
+  void colour_elements(const HermiteMesh& mesh);
+  size_t make_node_block(size_t high_node, size_t low_node);
+  size_t make_pressure_piece(size_t pressure, size_t node);
+  /// Stored entry of the local dofs 3 a + i and 3 b + k; none if either is held.
+  [[nodiscard]] static size_t entry(const ElementMap& map, size_t dof, size_t other_dof);
+
+  size_t displacement_unknowns_ = 0;
+  size_t pressure_unknowns_ = 0;
+  std::vector<size_t> equation_of_dof_;
+  std::vector<size_t> first_equation_;  // of a node
+  std::vector<size_t> free_dofs_;       // of a node
+  std::vector<ElementMap> maps_;
+  std::vector<std::vector<size_t>> colours_;
+  std::vector<int> rows_;
+  std::vector<int> columns_;
+};
+
+}  // namespace diastole

@@ -1,0 +1,29 @@
+#pragma once
+// Newton's method for the equilibrium at one cavity pressure, damped by the natural monotonicity test
+// (P. Deuflhard, Newton Methods for Nonlinear Problems, 2004, section 3.3, error-oriented):
+//
+//   K(x) d = -r(x)                     the tangent is factorised once an iteration
+//   K(x) s = -r(x + f d)               the simplified correction judges the damping f: |s| <= (1 - f/4) |d|
+//
+// The test is in the space of displacements, so that it needs no weights between forces and volumes (the
+// mixed problem is a saddle: neither energy nor residual has to fall). After an undamped step the factor is
+// kept for simplified corrections as long as they shrink fast, which costs a tenth of a new tangent. The size
+// of a vector over the unknowns is  sqrt( mean (dx / extent)^2 + mean (dp / p)^2 ).
+
+#include "estimator/fe/elastic_system.hpp"
+#include "estimator/fe/solve_report.hpp"
+
+namespace diastole {
+
+struct NewtonResult {
+  SolveReason reason = SolveReason::converged;
+  ElasticState state;  ///< converged, or the last iterate
+  std::vector<NewtonIteration> iterations;
+  size_t negative_pivots = 0;
+  std::optional<InvertedPlace> inverted;
+};
+
+/// `guess.pressure_kPa` is the pressure to solve for.
+NewtonResult newton_solve(ElasticSystem& system, const ElasticState& guess, const SolveOptions& options);
+
+}  // namespace diastole

@@ -1,0 +1,46 @@
+#include "estimator/fe/solve_report.hpp"
+
+#include <fmt/format.h>
+
+namespace diastole {
+
+std::string_view describe(SolveReason reason) {
+  switch (reason) {
+    case SolveReason::converged:
+      return "converged";
+    case SolveReason::inverted_element:
+      return "inverted element";
+    case SolveReason::no_convergence:
+      return "no convergence";
+    case SolveReason::singular_tangent:
+      return "singular tangent";
+    case SolveReason::out_of_steps:
+      return "load-step limit reached";
+  }
+  return "unknown";
+}
+
+std::string SolveReport::describe() const {
+  if (converged()) {
+    return fmt::format("converged at {:g} kPa in {} load steps and {} Newton iterations",
+                       reached_pressure_kPa, load_steps, newton_iterations);
+  }
+  std::string text =
+      fmt::format("{} after {:g} kPa was reached ({} load steps, {} Newton iterations)",
+                  diastole::describe(reason), reached_pressure_kPa, load_steps, newton_iterations);
+  if (inverted) {
+    const Eigen::Vector3d& place = inverted->reference_mm;
+    text += fmt::format(
+        "; element {} turns inside out at xi = ({:.3f}, {:.3f}, {:.3f}), X = ({:.2f}, {:.2f}, {:.2f}) mm",
+        inverted->point.element, inverted->point.xi[0], inverted->point.xi[1], inverted->point.xi[2],
+        place[0], place[1], place[2]);
+  }
+  if (!history.empty() && !history.back().iterations.empty()) {
+    text += fmt::format("; the last attempt at {:g} kPa had corrections", history.back().pressure_kPa);
+    for (const NewtonIteration& iteration : history.back().iterations)
+      text += fmt::format(" {:.1e}", iteration.step);
+  }
+  return text;
+}
+
+}  // namespace diastole

@@ -1,0 +1,74 @@
+#pragma once
+// How a forward solution ended, with its history: a value, never an exception.
+
+#include <Eigen/Dense>
+#include <cstddef>
+#include <functional>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "estimator/mesh/hermite_mesh.hpp"
+
+namespace diastole {
+
+enum class SolveReason {
+  converged,
+  inverted_element,  ///< the material turns inside out however small the load step
+  no_convergence,    ///< Newton's method stalls however small the load step
+  singular_tangent,  ///< the factorisation met a zero pivot: a missing support, or a limit point
+  out_of_steps       ///< the load-step limit was reached
+};
+
+/// "converged", "inverted element", ... for reports and JSON.
+std::string_view describe(SolveReason reason);
+
+/// Where an element is turned inside out: the volume ratio J there is not positive.
+struct InvertedPlace {
+  MaterialPoint point;
+  Eigen::Vector3d reference_mm;
+  double volume_ratio = 0.0;
+};
+
+/// One step of Newton's method: a new tangent, then corrections that reuse its factors.
+struct NewtonIteration {
+  double step = 0.0;       ///< size of the correction, relative to the body (newton.hpp)
+  double damping = 1.0;    ///< fraction of the step that was taken
+  size_t corrections = 0;  ///< simplified corrections after it
+};
+
+struct LoadStep {
+  double pressure_kPa = 0.0;  ///< at its end
+  bool accepted = false;
+  std::vector<NewtonIteration> iterations;
+};
+
+struct SolveReport {
+  SolveReason reason = SolveReason::converged;
+  std::vector<LoadStep> history;
+  size_t load_steps = 0;         ///< accepted ones
+  size_t newton_iterations = 0;  ///< tangents assembled and factorised
+  size_t corrections = 0;        ///< back-substitutions with a kept factor
+  size_t negative_pivots = 0;    ///< of the last tangent; equals the pressure unknowns at a stable state
+  size_t pressure_unknowns = 0;
+  double reached_pressure_kPa = 0.0;
+  std::optional<InvertedPlace> inverted;
+  double seconds = 0.0;
+
+  [[nodiscard]] bool converged() const { return reason == SolveReason::converged; }
+  /// A sentence for a person: what happened, where, at which pressure, and what may help.
+  [[nodiscard]] std::string describe() const;
+};
+
+struct SolveOptions {
+  double tolerance = 1e-9;   ///< relative size of the last correction
+  size_t newton_limit = 12;  ///< tangents a load step
+  size_t load_step_limit = 200;
+  double least_load_fraction = 1e-3;  ///< of the pressure change asked for
+  double most_load_fraction = 1.0;
+  /// Called after each load step, for a progress line.
+  std::function<void(const LoadStep&)> on_load_step;
+};
+
+}  // namespace diastole

@@ -1,0 +1,91 @@
+#include "estimator/fe/symmetric_factor.hpp"
+
+#include <dmumps_c.h>
+#include <new>
+#include <stdexcept>
+#include <string>
+
+namespace diastole {
+namespace {
+
+constexpr int initialise = -1;
+constexpr int terminate_instance = -2;
+constexpr int analyse = 1;
+constexpr int factorise_values = 2;
+constexpr int back_substitute = 3;
+
+// MUMPS's manual numbers its controls from 1.
+int& control(DMUMPS_STRUC_C& mumps, int number) { return mumps.icntl[number - 1]; }
+int outcome(const DMUMPS_STRUC_C& mumps, int number) { return mumps.infog[number - 1]; }
+
+}  // namespace
+
+struct SymmetricFactor::Instance {
+  DMUMPS_STRUC_C mumps{};
+  bool analysed = false;
+
+  int run(int job) {
+    mumps.job = job;
+    dmumps_c(&mumps);
+    return outcome(mumps, 1);
+  }
+
+  void check(int status) const {
+    constexpr int allocation_failed = -13;
+    if (status == allocation_failed) throw std::bad_alloc();
+    if (status < 0) {
+      throw std::runtime_error("MUMPS stopped with code " + std::to_string(status) + ", detail " +
+                               std::to_string(outcome(mumps, 2)));
+    }
+  }
+};
+
+SymmetricFactor::SymmetricFactor(size_t size, std::span<const int> rows, std::span<const int> columns)
+    : instance_(std::make_unique<Instance>()) {
+  DMUMPS_STRUC_C& mumps = instance_->mumps;
+  constexpr int use_default_communicator = -987654;
+  constexpr int general_symmetric = 2;
+  mumps.comm_fortran = use_default_communicator;
+  mumps.par = 1;
+  mumps.sym = general_symmetric;
+  instance_->check(instance_->run(initialise));
+  for (const int stream : {1, 2, 3})
+    control(mumps, stream) = -1;
+  control(mumps, 4) = 0;
+  mumps.n = static_cast<int>(size);
+  mumps.nnz = static_cast<MUMPS_INT8>(rows.size());
+  mumps.irn = const_cast<int*>(rows.data());
+  mumps.jcn = const_cast<int*>(columns.data());
+}
+
+SymmetricFactor::~SymmetricFactor() { instance_->run(terminate_instance); }
+
+FactorResult SymmetricFactor::factorise(std::span<double> values) {
+  DMUMPS_STRUC_C& mumps = instance_->mumps;
+  constexpr int singular = -10;
+  constexpr int work_space_too_small = -9;
+  constexpr int work_space_percent = 14;
+  mumps.a = values.data();
+  if (!instance_->analysed) {
+    instance_->check(instance_->run(analyse));
+    instance_->analysed = true;
+  }
+  int status = instance_->run(factorise_values);
+  while (status == work_space_too_small) {
+    control(mumps, work_space_percent) *= 2;
+    status = instance_->run(factorise_values);
+  }
+  if (status == singular) return {.singular = true, .negative_pivots = 0};
+  instance_->check(status);
+  return {.singular = false, .negative_pivots = static_cast<size_t>(outcome(mumps, 12))};
+}
+
+void SymmetricFactor::solve(std::span<double> right_sides, size_t count) {
+  DMUMPS_STRUC_C& mumps = instance_->mumps;
+  mumps.rhs = right_sides.data();
+  mumps.nrhs = static_cast<int>(count);
+  mumps.lrhs = mumps.n;
+  instance_->check(instance_->run(back_substitute));
+}
+
+}  // namespace diastole

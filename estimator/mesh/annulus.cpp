@@ -1,0 +1,89 @@
+#include "estimator/mesh/annulus.hpp"
+
+#include <cmath>
+#include <numbers>
+#include <utility>
+#include <vector>
+
+namespace diastole {
+namespace {
+
+/// A coordinate along one element direction at a node, and its derivative with respect to that xi.
+struct Ordinate {
+  double value;
+  double slope;
+};
+
+Ordinate graded_height(const AnnulusShape& shape, size_t level) {
+  const double count = static_cast<double>(shape.elements[1]);
+  const double s = 2.0 * static_cast<double>(level) / count - 1.0;
+  const double g = shape.plate_grading;
+  const double quarter_turn = std::numbers::pi / 2.0;
+  const double z = (1.0 - g) * s + g * std::sin(quarter_turn * s);
+  const double dz_ds = (1.0 - g) + g * quarter_turn * std::cos(quarter_turn * s);
+  return {0.5 * shape.height_mm * z, 0.5 * shape.height_mm * dz_ds * 2.0 / count};
+}
+
+Ordinate radius(const AnnulusShape& shape, size_t layer) {
+  const double thickness =
+      (shape.outer_radius_mm - shape.inner_radius_mm) / static_cast<double>(shape.elements[2]);
+  return {shape.inner_radius_mm + thickness * static_cast<double>(layer), thickness};
+}
+
+NodeField node_positions(const AnnulusShape& shape) {
+  const auto [around, up, out] = shape.elements;
+  NodeField field(around * (up + 1) * (out + 1) * dofs_per_node, 0.0);
+  const double arc = 2.0 * std::numbers::pi / static_cast<double>(around);
+  const double tangent = 4.0 * std::tan(arc / 4.0);
+  for (size_t i3 = 0; i3 <= out; ++i3) {
+    const Ordinate r = radius(shape, i3);
+    for (size_t i2 = 0; i2 <= up; ++i2) {
+      const Ordinate z = graded_height(shape, i2);
+      for (size_t i1 = 0; i1 < around; ++i1) {
+        const size_t node = i1 + around * (i2 + (up + 1) * i3);
+        const double angle = arc * static_cast<double>(i1);
+        const std::array<double, 2> radial{std::cos(angle), std::sin(angle)};
+        const std::array<double, 2> along{-std::sin(angle), std::cos(angle)};
+        for (size_t i = 0; i < 2; ++i) {
+          field[dof_of(node, 0, i)] = r.value * radial[i];
+          field[dof_of(node, 1, i)] = r.value * tangent * along[i];
+          field[dof_of(node, 4, i)] = r.slope * radial[i];
+          field[dof_of(node, 5, i)] = r.slope * tangent * along[i];
+        }
+        field[dof_of(node, 0, 2)] = z.value;
+        field[dof_of(node, 2, 2)] = z.slope;
+      }
+    }
+  }
+  return field;
+}
+
+}  // namespace
+
+HermiteMesh make_annulus(const AnnulusShape& shape) {
+  const auto [around, up, out] = shape.elements;
+  std::vector<HermiteMesh::Corners> elements;
+  MeshFaces faces;
+  for (size_t i3 = 0; i3 < out; ++i3) {
+    for (size_t i2 = 0; i2 < up; ++i2) {
+      for (size_t i1 = 0; i1 < around; ++i1) {
+        HermiteMesh::Corners nodes;
+        for (size_t c = 0; c < corners; ++c) {
+          const size_t n1 = (i1 + (c & 1)) % around;
+          const size_t n2 = i2 + ((c >> 1) & 1);
+          const size_t n3 = i3 + ((c >> 2) & 1);
+          nodes[c] = n1 + around * (n2 + (up + 1) * n3);
+        }
+        const size_t e = elements.size();
+        elements.push_back(nodes);
+        if (i3 == 0) faces.inner.push_back({e, 2, 0});
+        if (i3 + 1 == out) faces.outer.push_back({e, 2, 1});
+        if (i2 == 0) faces.bottom.push_back({e, 1, 0});
+        if (i2 + 1 == up) faces.top.push_back({e, 1, 1});
+      }
+    }
+  }
+  return HermiteMesh(node_positions(shape), std::move(elements), std::move(faces));
+}
+
+}  // namespace diastole

@@ -1,0 +1,37 @@
+#pragma once
+// The gel phantom: a thick-walled cylinder about the z axis, mid-height at z = 0.
+//
+// Element axes: xi1 circumferential (anticlockwise seen from +z, first node at y = 0, x > 0), xi2 upwards,
+// xi3 outwards. Node number = i1 + n1 (i2 + (n2 + 1) i3): around first, then up, then outwards; element
+// number = i1 + n1 (i2 + n2 i3) likewise.
+//
+//      z ^   +----+----+  top          y ^    __
+//        |   |    |    |                 |  /    \     inner and outer circles: cubic arcs of angle h with
+//   xi2  |   +----+----+                 | | ( )  |    tangents 4 tan(h/4) R per xi, the ones of a Bezier arc
+//        |   |    |    |                 |  \ __ /     (radius right to 4e-6 R at h = 45 deg)
+//        +---+----+----+  bottom         +---------> x
+//          xi3 -> R                        xi1
+//
+// Grading: z(s) = H/2 [(1 - g) s + g sin(pi s / 2)], -1 <= s <= 1, so that elements shrink towards the plates
+// where the stress is singular; g = 0 is uniform. The map is smooth and all scale factors are one.
+
+#include <array>
+#include <cstddef>
+
+#include "estimator/mesh/hermite_mesh.hpp"
+
+namespace diastole {
+
+struct AnnulusShape {
+  double inner_radius_mm = 22.5;
+  double outer_radius_mm = 50.0;
+  double height_mm = 85.0;
+  std::array<size_t, 3> elements{8, 4,
+                                 1};  ///< circumferential (>= 3), longitudinal (>= 1), transmural (>= 1)
+  double plate_grading = 0.0;         ///< g above, 0 <= g < 1
+};
+
+/// Precondition: 0 < inner < outer radius, height > 0, the element counts above.
+HermiteMesh make_annulus(const AnnulusShape& shape);
+
+}  // namespace diastole
