@@ -1,0 +1,55 @@
+#pragma once
+// A controller for tests: plays given pin changes, echoes every byte it receives with its time.
+
+#include <deque>
+#include <vector>
+
+#include "tools/sim_rig/simulated_controller.hpp"
+
+namespace diastole::sim_rig {
+
+class ScriptedController final : public SimulatedController {
+ public:
+  explicit ScriptedController(std::vector<PinEdge> script) : script_(script.begin(), script.end()) {}
+
+  void receive(std::span<const uint8_t> bytes) override {
+    received_.insert(received_.end(), bytes.begin(), bytes.end());
+  }
+  void set_home_switch(bool closed) override { home_switch_closed = closed; }
+  Output advance_to(uint64_t until_ns) override {
+    edges_.clear();
+    while (!script_.empty() && script_.front().time_ns <= until_ns) {
+      edges_.push_back(script_.front());
+      script_.pop_front();
+    }
+    sent_ = std::exchange(received_, {});
+    return {sent_, edges_};
+  }
+
+  bool home_switch_closed = false;
+
+ private:
+  std::deque<PinEdge> script_;
+  std::vector<PinEdge> edges_;
+  std::vector<uint8_t> received_;
+  std::vector<uint8_t> sent_;
+};
+
+/// Steps out of the parked position onto the home switch and off it again, then `microsteps` into the line;
+/// one step every `spacing_ns`.
+inline std::vector<PinEdge> home_and_inflate(int microsteps, uint64_t spacing_ns) {
+  std::vector<PinEdge> script;
+  uint64_t time_ns = spacing_ns;
+  const auto steps = [&](int direction, int count) {
+    script.push_back({time_ns, Pin::dir, direction});
+    for (int i = 0; i < count; ++i, time_ns += spacing_ns) {
+      script.push_back({time_ns, Pin::step, 1});
+      script.push_back({time_ns + spacing_ns / 4, Pin::step, 0});
+    }
+  };
+  steps(0, 201);
+  steps(1, 2 + microsteps);
+  return script;
+}
+
+}  // namespace diastole::sim_rig

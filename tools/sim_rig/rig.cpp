@@ -1,0 +1,48 @@
+#include "tools/sim_rig/rig.hpp"
+
+#include <algorithm>
+
+namespace diastole::sim_rig {
+namespace {
+
+constexpr uint64_t slice_ns = 500'000;
+
+constexpr double seconds(uint64_t time_ns) { return static_cast<double>(time_ns) * 1e-9; }
+
+}  // namespace
+
+Rig::Rig(const RigDescription& description, std::unique_ptr<SimulatedController> controller,
+         Listeners listeners)
+    : description_(description),
+      controller_(std::move(controller)),
+      listeners_(std::move(listeners)),
+      carriage_(description.microstep_mL),
+      plant_(description.plant) {}
+
+void Rig::advance_to(uint64_t until_ns) {
+  while (now_ns_ < until_ns) {
+    now_ns_ = std::min(until_ns, (now_ns_ / slice_ns + 1) * slice_ns);
+    controller_->set_home_switch(carriage_.home_switch_closed());
+    const SimulatedController::Output output = controller_->advance_to(now_ns_);
+    for (const PinEdge& edge : output.edges) {
+      if (const auto displaced_mL = carriage_.take(edge)) {
+        plant_.displace(seconds(edge.time_ns), *displaced_mL);
+      }
+      listeners_.edge(edge);
+    }
+    if (!output.sent.empty()) listeners_.sent(output.sent);
+    plant_.advance_to(seconds(now_ns_));
+  }
+}
+
+double Rig::volts(int64_t input) const {
+  for (const DaqChannel& channel : description_.channels) {
+    if (channel.input != input) continue;
+    const double pressure_kPa =
+        channel.place == DaqChannel::Place::cavity ? plant_.cavity_reading_kPa() : plant_.pump_reading_kPa();
+    return channel.zero_V + pressure_kPa / channel.kPa_per_V;
+  }
+  return 0;
+}
+
+}  // namespace diastole::sim_rig

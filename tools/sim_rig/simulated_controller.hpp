@@ -1,0 +1,57 @@
+#pragma once
+// The pump's controller as the simulated rig sees it: bytes and a switch in, bytes and pin changes out, in
+// its own time. Whatever runs the firmware (built for this machine, or its image in an emulator) stands
+// behind this.
+
+#include <cstdint>
+#include <span>
+#include <string_view>
+
+namespace diastole::sim_rig {
+
+enum class Pin : uint8_t { step, dir, enable, ttl, rwave_uV, fault };
+
+/// The name in a pin trace: "STEP", "RWAVE_uV", ...
+constexpr std::string_view pin_name(Pin pin) {
+  switch (pin) {
+    case Pin::step:
+      return "STEP";
+    case Pin::dir:
+      return "DIR";
+    case Pin::enable:
+      return "ENABLE";
+    case Pin::ttl:
+      return "TTL";
+    case Pin::rwave_uV:
+      return "RWAVE_uV";
+    case Pin::fault:
+      return "FAULT";
+  }
+  return "";
+}
+
+/// One change of one pin; the time is the board's, from its reset.
+struct PinEdge {
+  uint64_t time_ns = 0;
+  Pin pin = Pin::step;
+  int32_t value = 0;
+};
+
+class SimulatedController {
+ public:
+  /// What happened while it ran, in order; valid until the next call of advance_to.
+  struct Output {
+    std::span<const uint8_t> sent;
+    std::span<const PinEdge> edges;
+  };
+
+  virtual ~SimulatedController() = default;
+
+  /// Bytes that have arrived on its serial line.
+  virtual void receive(std::span<const uint8_t> bytes) = 0;
+  virtual void set_home_switch(bool closed) = 0;
+  /// Runs on to until_ns (not before its present).
+  virtual Output advance_to(uint64_t until_ns) = 0;
+};
+
+}  // namespace diastole::sim_rig
