@@ -52,6 +52,14 @@ SymmetricFactor::SymmetricFactor(size_t size, std::span<const int> rows, std::sp
   for (const int stream : {1, 2, 3})
     control(mumps, stream) = -1;
   control(mumps, 4) = 0;
+  // Found by measurement (docs/verification.md): SCOTCH's ordering of the plain graph. Matching large entries
+  // to the diagonal beforehand costs more than all it saves, because pivots stay in range without it.
+  constexpr int scotch = 3;
+  constexpr int plain_graph = 1;
+  constexpr int no_matching = 0;
+  control(mumps, 6) = no_matching;
+  control(mumps, 7) = scotch;
+  control(mumps, 12) = plain_graph;
   mumps.n = static_cast<int>(size);
   mumps.nnz = static_cast<MUMPS_INT8>(rows.size());
   mumps.irn = const_cast<int*>(rows.data());

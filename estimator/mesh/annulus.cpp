@@ -24,10 +24,15 @@ Ordinate graded_height(const AnnulusShape& shape, size_t level) {
   return {0.5 * shape.height_mm * z, 0.5 * shape.height_mm * dz_ds * 2.0 / count};
 }
 
-Ordinate radius(const AnnulusShape& shape, size_t layer) {
-  const double thickness =
-      (shape.outer_radius_mm - shape.inner_radius_mm) / static_cast<double>(shape.elements[2]);
-  return {shape.inner_radius_mm + thickness * static_cast<double>(layer), thickness};
+Ordinate graded_radius(const AnnulusShape& shape, size_t layer) {
+  const double count = static_cast<double>(shape.elements[2]);
+  const double s = static_cast<double>(layer) / count;
+  const double g = shape.wall_grading;
+  const double thickness = shape.outer_radius_mm - shape.inner_radius_mm;
+  const double stretch = std::log(shape.outer_radius_mm / shape.inner_radius_mm);
+  const double logarithmic = shape.inner_radius_mm * std::exp(stretch * s);
+  return {(1.0 - g) * (shape.inner_radius_mm + thickness * s) + g * logarithmic,
+          ((1.0 - g) * thickness + g * stretch * logarithmic) / count};
 }
 
 NodeField node_positions(const AnnulusShape& shape) {
@@ -36,7 +41,7 @@ NodeField node_positions(const AnnulusShape& shape) {
   const double arc = 2.0 * std::numbers::pi / static_cast<double>(around);
   const double tangent = 4.0 * std::tan(arc / 4.0);
   for (size_t i3 = 0; i3 <= out; ++i3) {
-    const Ordinate r = radius(shape, i3);
+    const Ordinate r = graded_radius(shape, i3);
     for (size_t i2 = 0; i2 <= up; ++i2) {
       const Ordinate z = graded_height(shape, i2);
       for (size_t i1 = 0; i1 < around; ++i1) {

@@ -12,8 +12,12 @@
 //        +---+----+----+  bottom         +---------> x
 //          xi3 -> R                        xi1
 //
-// Grading: z(s) = H/2 [(1 - g) s + g sin(pi s / 2)], -1 <= s <= 1, so that elements shrink towards the plates
-// where the stress is singular; g = 0 is uniform. The map is smooth and all scale factors are one.
+// Grading, from s = -1 (bottom) to 1 (top) and from t = 0 (inner) to 1 (outer face):
+//   z(s) = H/2 [(1 - g) s + g sin(pi s / 2)]      elements shrink towards the plates, where the stress is
+//   singular R(t) = (1 - w) [A + (B - A) t] + w A (B/A)^t  elements shrink towards the cavity, where
+//   displacement falls as 1/R
+// Both are smooth, so that all scale factors are one. The defaults are measured:
+// docs/decisions/0010-annulus-grading.md.
 
 #include <array>
 #include <cstddef>
@@ -28,7 +32,8 @@ struct AnnulusShape {
   double height_mm = 85.0;
   std::array<size_t, 3> elements{8, 4,
                                  1};  ///< circumferential (>= 3), longitudinal (>= 1), transmural (>= 1)
-  double plate_grading = 0.0;         ///< g above, 0 <= g < 1
+  double plate_grading = 0.75;        ///< g above, 0 <= g < 1; 0 is uniform
+  double wall_grading = 0.5;          ///< w above, 0 <= w <= 1; 0 is uniform
 };
 
 /// Precondition: 0 < inner < outer radius, height > 0, the element counts above.
