@@ -59,7 +59,6 @@ PathResult follow_load(ElasticSystem& system, const ElasticState& start, double 
     guess.pressure_kPa = next_kPa;
     NewtonResult attempt = newton_solve(system, guess, options);
     record(report, attempt);
-    if (options.on_load_step) options.on_load_step(report.history.back());
     if (attempt.reason == SolveReason::converged) {
       if (reached > 0.0 || path.state.pressure_kPa != next_kPa) before = std::move(path.state);
       path.state = std::move(attempt.state);

@@ -34,6 +34,7 @@ class Newton {
       result_.iterations.push_back({.step = size(step)});
       if (!std::isfinite(result_.iterations.back().step)) return finish(SolveReason::singular_tangent);
       const std::optional<SolveReason> ended = advance(step, residual);
+      if (options_.on_iteration) options_.on_iteration(result_.state.pressure_kPa, result_.iterations.back());
       if (ended) return finish(*ended, residual.inverted);
     }
     return finish(SolveReason::no_convergence);

@@ -67,8 +67,8 @@ struct SolveOptions {
   size_t load_step_limit = 200;
   double least_load_fraction = 1e-3;  ///< of the pressure change asked for
   double most_load_fraction = 1.0;
-  /// Called after each load step, for a progress line.
-  std::function<void(const LoadStep&)> on_load_step;
+  /// Called after each Newton iteration, for a progress line.
+  std::function<void(double pressure_kPa, const NewtonIteration&)> on_iteration;
 };
 
 }  // namespace diastole

@@ -1,0 +1,7 @@
+#include "estimator/cli/commands.hpp"
+
+namespace diastole {
+
+void add_estimator_commands(CommandLine& line) { add_solve(line); }
+
+}  // namespace diastole

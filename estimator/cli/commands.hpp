@@ -1,0 +1,12 @@
+#pragma once
+// The estimator's subcommands.
+
+#include "protocol/contract/command.hpp"
+
+namespace diastole {
+
+void add_solve(CommandLine& line);
+
+void add_estimator_commands(CommandLine& line);
+
+}  // namespace diastole

@@ -1,0 +1,195 @@
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <charconv>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <iostream>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "estimator/cli/commands.hpp"
+#include "estimator/fe/study_model.hpp"
+#include "estimator/io/study.hpp"
+#include "estimator/mesh/point_locator.hpp"
+#include "protocol/contract/input_error.hpp"
+
+namespace diastole {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+struct SolveArguments {
+  std::string study;
+  double pressure_kPa = 0.0;
+  std::vector<std::string> probes;
+  std::vector<std::string> starts;
+  std::string mesh;
+};
+
+struct Probe {
+  Eigen::Vector3d place_mm;
+  MaterialPoint point;
+};
+
+double seconds_since(Clock::time_point begun) {
+  return std::chrono::duration<double>(Clock::now() - begun).count();
+}
+
+[[noreturn]] void refuse_probe(const std::string& text, std::string problem, std::string remedy) {
+  throw InputError(
+      {.file = "", .place = "--probe " + text, .problem = std::move(problem), .remedy = std::move(remedy)});
+}
+
+Eigen::Vector3d parse_place(const std::string& text) {
+  Eigen::Vector3d place;
+  const char* from = text.data();
+  const char* const end = text.data() + text.size();
+  for (Eigen::Index i = 0; i < 3; ++i) {
+    const auto [stopped, error] = std::from_chars(from, end, place[i]);
+    const bool separated = i < 2 ? stopped != end && *stopped == ',' : stopped == end;
+    if (error != std::errc{} || !separated || !std::isfinite(place[i])) {
+      refuse_probe(text, "is not three numbers X,Y,Z",
+                   "Write millimetres without spaces, as --probe 22.5,0,0.");
+    }
+    from = stopped + 1;
+  }
+  return place;
+}
+
+std::vector<Probe> locate_probes(const HermiteMesh& mesh, const std::vector<std::string>& texts) {
+  constexpr double surface_slack_xi = 1e-3;  // a point on a wall may lie a few microns outside the cubic arcs
+  const PointLocator locator(mesh, mesh.reference(), {.outside_xi = surface_slack_xi, .tolerance_mm = 1e-10});
+  std::vector<Probe> probes;
+  for (const std::string& text : texts) {
+    const Eigen::Vector3d place = parse_place(text);
+    const std::optional<LocatedPoint> found = locator.find(place);
+    if (!found) {
+      refuse_probe(text, "lies outside the undeformed specimen",
+                   "Give a material point in mm: the axis is z, mid-height z = 0.");
+    }
+    probes.push_back({place, found->point});
+  }
+  return probes;
+}
+
+/// A line on standard error for each Newton iteration, once the work has lasted longer than people like to
+/// wait.
+SolveOptions with_progress(Clock::time_point begun) {
+  constexpr double patience_s = 2.0;
+  SolveOptions options;
+  options.on_iteration = [begun](double pressure_kPa, const NewtonIteration& iteration) {
+    const double elapsed_s = seconds_since(begun);
+    if (elapsed_s < patience_s) return;
+    fmt::print(stderr, "solve: {:.3g} kPa, correction {:.1e}, {:.0f} s\n", pressure_kPa, iteration.step,
+               elapsed_s);
+  };
+  return options;
+}
+
+nlohmann::ordered_json as_json(const Study& study, const ElasticModel& model, const Solution& solution,
+                               const std::vector<Probe>& probes, double seconds) {
+  const SolveReport& report = solution.report;
+  const double rest_mL = model.cavity_volume_mL(model.rest_state());
+  const double loaded_mL = model.cavity_volume_mL(solution.state);
+  nlohmann::ordered_json json;
+  json["reason"] = describe(report.reason);
+  json["pressure_kPa"] = solution.state.pressure_kPa;
+  json["cavity_volume_mL"] = loaded_mL;
+  json["cavity_volume_change_mL"] = loaded_mL - rest_mL;
+  json["law"] = model.law().name();
+  for (const StudyParameter& parameter : study.law.parameters)
+    json["parameters"][parameter.name] = parameter.start;
+  json["mesh"] = std::get<AnnulusSpecimen>(study.specimen).mesh;
+  json["dofs"] = model.dofs();
+  json["load_steps"] = report.load_steps;
+  json["newton_iterations"] = report.newton_iterations;
+  json["corrections"] = report.corrections;
+  json["negative_pivots"] = report.negative_pivots;
+  json["pressure_unknowns"] = report.pressure_unknowns;
+  json["seconds"] = seconds;
+  json["probes"] = nlohmann::ordered_json::array();
+  for (const Probe& probe : probes) {
+    const Eigen::Vector3d moved = model.mesh().value(solution.state.position_mm, probe.point) -
+                                  model.mesh().value(model.mesh().reference(), probe.point);
+    json["probes"].push_back({{"point_mm", {probe.place_mm[0], probe.place_mm[1], probe.place_mm[2]}},
+                              {"displacement_mm", {moved[0], moved[1], moved[2]}}});
+  }
+  return json;
+}
+
+void print_for_people(const nlohmann::ordered_json& json) {
+  fmt::print("At {:g} kPa the cavity has taken {:.3f} mL and holds {:.3f} mL.\n",
+             json["pressure_kPa"].get<double>(), json["cavity_volume_change_mL"].get<double>(),
+             json["cavity_volume_mL"].get<double>());
+  for (const auto& probe : json["probes"]) {
+    fmt::print("  X = ({:g}) mm moved by ({:.4f}) mm\n",
+               fmt::join(probe["point_mm"].get<std::vector<double>>(), ", "),
+               fmt::join(probe["displacement_mm"].get<std::vector<double>>(), ", "));
+  }
+  fmt::print("  {} elements, {} unknowns, {} load steps, {} Newton iterations, {:.2f} s\n",
+             fmt::join(json["mesh"].get<std::vector<int>>(), " x "), json["dofs"].get<size_t>(),
+             json["load_steps"].get<size_t>(), json["newton_iterations"].get<size_t>(),
+             json["seconds"].get<double>());
+}
+
+ExitCode run_solve(const SolveArguments& arguments, const CommandOutput& out) {
+  const Clock::time_point begun = Clock::now();
+  if (!std::isfinite(arguments.pressure_kPa)) {
+    throw InputError({.file = "",
+                      .place = "--pressure-kPa",
+                      .problem = fmt::format("{} is not a finite pressure", arguments.pressure_kPa),
+                      .remedy = "Give a number, for example 6."});
+  }
+  Study study = read_study(arguments.study);
+  for (const std::string& start : arguments.starts)
+    set_start(study, start);
+  if (!arguments.mesh.empty()) set_mesh(study, arguments.mesh);
+  ElasticModel model = make_model(study, with_progress(begun));
+  const std::vector<Probe> probes = locate_probes(model.mesh(), arguments.probes);
+
+  const Solution solution = model.solve(arguments.pressure_kPa);
+
+  const nlohmann::ordered_json json = as_json(study, model, solution, probes, seconds_since(begun));
+  if (!solution.report.converged()) std::cerr << "diastole solve: " << solution.report.describe() << '\n';
+  if (solution.report.converged() && solution.report.negative_pivots != solution.report.pressure_unknowns) {
+    std::cerr << "diastole solve: this equilibrium is not stable (" << solution.report.negative_pivots
+              << " negative pivots for " << solution.report.pressure_unknowns << " pressure unknowns)\n";
+  }
+  if (out.json) {
+    std::cout << json.dump(1) << '\n';
+  } else if (solution.report.converged()) {
+    print_for_people(json);
+  }
+  return solution.report.converged() ? ExitCode::done : ExitCode::negative;
+}
+
+}  // namespace
+
+void add_solve(CommandLine& line) {
+  auto arguments = std::make_shared<SolveArguments>();
+  CLI::App* command = line.add(
+      "solve", "one forward finite-element solution of a study's specimen at a cavity pressure",
+      "  diastole solve phantom-a.study.toml --pressure-kPa 6 --set C1_kPa=6.5\n"
+      "  diastole solve phantom-a.study.toml --pressure-kPa 3.1 --probe 22.5,0,0 --probe 50,0,0 --json\n"
+      "  diastole solve phantom-a.study.toml --pressure-kPa 6 --mesh 8,8,4\n"
+      "A parameter has its `start` value unless --set gives another.\n"
+      "Exit code 1: no equilibrium was found; the message says where the solver stopped and why.");
+  command->add_option("STUDY", arguments->study, "study file (*.study.toml)")->required();
+  command->add_option("--pressure-kPa", arguments->pressure_kPa, "cavity pressure above the outside")
+      ->required();
+  command
+      ->add_option("--probe", arguments->probes,
+                   "X,Y,Z of a material point in mm, undeformed; may be repeated")
+      ->allow_extra_args(false);
+  command->add_option("--set", arguments->starts, "NAME=VALUE: another parameter value; may be repeated")
+      ->allow_extra_args(false);
+  command->add_option("--mesh", arguments->mesh, "elements around, along, through the wall, as 8,8,4");
+  line.on_run(command, [arguments](const CommandOutput& out) { return run_solve(*arguments, out); });
+}
+
+}  // namespace diastole
