@@ -132,8 +132,8 @@ struct AddSegment {
   }
 };
 
-// Host → controller: checks the whole program against the limits. Accepted: SegmentPlanned for every
-// segment, then Ack and state armed. Refused: Nak with the limit, the value asked and the value allowed.
+// Host → controller: checks the whole program against the limits. Accepted: Ack, state armed, and
+// SegmentPlanned for every segment. Refused: Nak with the limit, the value asked and the value allowed.
 //
 //   offset size field
 //        0    2 request_id                   chosen by the host; the answer repeats it

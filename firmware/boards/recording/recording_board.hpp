@@ -1,0 +1,117 @@
+#pragma once
+// A board of virtual time for the host: its pins are a log, its timer is a number, its serial line two
+// queues. The rig's switches are simulated from the steps made: the home switch is closed where mechanical
+// steps <= 0, the far limit switch from Mechanics::far_limit_steps on.
+//
+// Most users want RecordedController (recorded_controller.hpp), which runs the firmware on it.
+
+#include <cstdint>
+#include <deque>
+#include <optional>
+#include <queue>
+#include <span>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "firmware/core/board.hpp"
+#include "firmware/core/units.hpp"
+
+namespace diastole::firmware {
+
+enum class Signal : std::uint8_t { STEP, DIR, ENABLE, TTL, RWAVE_uV, FAULT };
+std::string_view signal_name(Signal signal);
+
+/// One change of one pin; a pin trace file (contract: `time_ns,signal,value`) is a list of these.
+struct Edge {
+  Ticks tick;
+  Signal signal{};
+  std::int32_t value = 0;
+  bool operator==(const Edge&) const = default;
+};
+
+/// A time as pin traces give it, rounded down.
+constexpr std::int64_t nanoseconds(Ticks ticks) {
+  return ticks.count / kTicksPerMicrosecond * 1000 +
+         ticks.count % kTicksPerMicrosecond * 1000 / kTicksPerMicrosecond;
+}
+
+struct Mechanics {
+  std::int32_t start_steps = 400;  ///< where the piston stands at reset, counted from the home switch
+  std::int32_t far_limit_steps = 2'000'000'000;
+};
+
+class RecordingBoard {
+ public:
+  struct Options {
+    Identity identity{1, 0x0000B007, wire::ResetCause::power_on};
+    Mechanics mechanics;
+    std::uint32_t baud = 460'800;
+    std::size_t serial_buffer_bytes = 2048;
+  };
+  struct InterruptLock {
+    explicit InterruptLock(RecordingBoard&) {}
+  };
+
+  explicit RecordingBoard(Options options)
+      : options_(options), mechanical_steps_(options.mechanics.start_steps) {}
+
+  // What the core sees (concept Board).
+  [[nodiscard]] Ticks now() const { return now_; }
+  void schedule(const PulseOrder& order);
+  void cancel_pulses();
+  void set_motor_enabled(bool enabled) { set_pin(Signal::ENABLE, enabled); }
+  void show_fault(std::uint8_t number) { set_pin(Signal::FAULT, number); }
+  [[nodiscard]] Inputs inputs() const;
+  [[nodiscard]] Identity identity() const { return options_.identity; }
+  std::optional<std::uint8_t> serial_read();
+  [[nodiscard]] std::size_t serial_room() const;
+  void serial_write(std::span<const std::uint8_t> bytes);
+  void feed_watchdog() {}
+
+  // What the world sees.
+  /// The next moment at which a pin changes or an order is carried out.
+  [[nodiscard]] std::optional<Ticks> next_event() const;
+  /// Moves the clock to `tick`, at most the next event, and makes the edges due then; true if an order was
+  /// carried out (compare interrupt). `inputs_changed` becomes true if a switch moved (input interrupt).
+  bool run_to(Ticks tick, bool& inputs_changed);
+  void set_estop(bool pressed) { estop_ = pressed; }
+  void set_far_limit(bool closed) { forced_far_limit_ = closed; }
+  void receive(std::span<const std::uint8_t> bytes) {
+    from_host_.insert(from_host_.end(), bytes.begin(), bytes.end());
+  }
+  /// Bytes whose last bit has left by now.
+  std::vector<std::uint8_t> take_sent();
+  std::vector<Edge> take_edges() { return std::exchange(edges_, {}); }
+  void record_edges(bool on) { recording_ = on; }
+  /// Steps made since reset, from the home switch; a step counts only while the motor is enabled.
+  [[nodiscard]] std::int32_t mechanical_steps() const { return mechanical_steps_; }
+
+ private:
+  struct Later {
+    bool operator()(const Edge& a, const Edge& b) const { return a.tick > b.tick; }
+  };
+  struct SentByte {
+    Ticks tick;
+    std::uint8_t byte;
+  };
+  [[nodiscard]] Ticks byte_time() const { return {kTicksPerSecond * 10 / options_.baud}; }
+  void set_pin(Signal signal, std::int32_t value);
+  void carry_out(const PulseOrder& order);
+
+  Options options_;
+  Ticks now_;
+  std::optional<PulseOrder> order_;
+  std::optional<Ticks> direction_due_;
+  std::priority_queue<Edge, std::vector<Edge>, Later> coming_;  ///< falling edges and R-wave samples
+  std::int32_t pins_[6] = {};
+  std::int32_t mechanical_steps_;
+  bool estop_ = false;
+  bool forced_far_limit_ = false;
+  std::deque<std::uint8_t> from_host_;
+  std::deque<SentByte> to_host_;
+  std::vector<Edge> edges_;
+  bool recording_ = true;
+};
+
+}  // namespace diastole::firmware

@@ -1,0 +1,64 @@
+#pragma once
+// What the core asks of the board it runs on, as a concept: the recording board of the host and the STM32F405
+// each provide it, nothing is virtual on the interrupt path.
+
+#include <concepts>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+
+#include "firmware/core/units.hpp"
+#include "protocol/wire/states.hpp"
+
+namespace diastole::firmware {
+
+/// Edges to be made by the timer's compare unit when the clock reaches `tick`, whatever software does then.
+struct PulseOrder {
+  Ticks tick;
+  bool step = false;     ///< STEP rises, and falls kStepPulse later
+  bool inflate = false;  ///< DIR, set kDirectionSetup before the step when it changes
+  bool ttl = false;      ///< TTL rises, and falls ttl_width later
+  bool r_wave = false;   ///< the R-wave (r_wave.hpp) starts
+  Ticks ttl_width;
+};
+
+inline constexpr Ticks kStepPulse = microseconds(2);
+inline constexpr Ticks kDirectionSetup = microseconds(5);
+
+struct Inputs {
+  bool estop = false;  ///< pressed, or its loop is broken
+  bool home = false;
+  bool far_limit = false;
+};
+
+struct Identity {
+  std::uint16_t board_id = 0;
+  std::uint32_t boot_id = 0;
+  wire::ResetCause reset_cause = wire::ResetCause::unknown;
+};
+
+template <class B>
+concept Board = requires(B& board, const B& fixed, const PulseOrder& order,
+                         std::span<const std::uint8_t> bytes) {
+  { fixed.now() } -> std::same_as<Ticks>;
+  /// One order at a time: the board calls Controller::on_match() when this one has been carried out.
+  {board.schedule(order)};
+  /// No further edge on STEP or TTL from this moment on; the TTL falls. Callable from any interrupt.
+  {board.cancel_pulses()};
+  {board.set_motor_enabled(true)};
+  {board.show_fault(std::uint8_t{})};
+  /// The board calls Controller::on_inputs() when one of them changes.
+  { fixed.inputs() } -> std::same_as<Inputs>;
+  { fixed.identity() } -> std::same_as<Identity>;
+  { board.serial_read() } -> std::same_as<std::optional<std::uint8_t>>;
+  { fixed.serial_room() } -> std::same_as<std::size_t>;
+  /// Precondition: bytes.size() <= serial_room().
+  {board.serial_write(bytes)};
+  {board.feed_watchdog()};
+  /// Interrupts that call the core are held off while one of these lives.
+  typename B::InterruptLock;
+  requires std::constructible_from<typename B::InterruptLock, B&>;
+};
+
+}  // namespace diastole::firmware

@@ -1,0 +1,139 @@
+#pragma once
+// Messages → actions → answers. Every request is answered once, with its request_id: Ack, Nak, Hello or
+// Status.
+
+#include <array>
+
+#include "firmware/core/motion.hpp"
+#include "firmware/core/outbox.hpp"
+#include "firmware/core/version.hpp"
+#include "protocol/wire/messages.hpp"
+#include "protocol/wire/reliable_link.hpp"
+
+namespace diastole::firmware {
+
+template <Board B>
+class Dispatch {
+ public:
+  Dispatch(B& board, Motion<B>& motion, Outbox& outbox, wire::ReliableLink& link)
+      : board_(board), motion_(motion), outbox_(outbox), link_(link) {}
+
+  void receive(const wire::Received& received) {
+    if (link_.generation() != generation_) {
+      generation_ = link_.generation();
+      schema_agreed_ = false;
+    }
+    wire::visit_message(received.type, received.payload,
+                        [this](const auto& message) { handle_or_refuse(message); });
+  }
+
+ private:
+  /// Before the schema hashes are known to agree, only HelloRequest counts.
+  template <class Message>
+  void handle_or_refuse(const Message& message) {
+    if constexpr (std::is_same_v<Message, wire::HelloRequest>) {
+      handle(message);
+    } else if constexpr (std::is_same_v<Message, wire::Undecodable>) {
+      refuse(0, message.type, {message.known ? wire::Refusal::malformed : wire::Refusal::unknown_message});
+    } else if constexpr (wire::sender_of(Message::kType) == wire::Sender::controller) {
+      refuse(0, static_cast<std::uint8_t>(Message::kType), {wire::Refusal::unknown_message});
+    } else if constexpr (wire::delivery_of(Message::kType) == wire::Delivery::datagram) {
+      if (schema_agreed_) handle(message);
+    } else if (schema_agreed_) {
+      handle(message);
+    } else {
+      refuse(message.request_id, static_cast<std::uint8_t>(Message::kType), {wire::Refusal::schema_mismatch});
+    }
+  }
+
+  void handle(const wire::HelloRequest& request) {
+    schema_agreed_ = request.schema_hash == wire::kSchemaHash;
+    const Identity identity = board_.identity();
+    wire::Hello hello;
+    hello.request_id = request.request_id;
+    hello.schema_hash = wire::kSchemaHash;
+    hello.version_major = kVersionMajor;
+    hello.version_minor = kVersionMinor;
+    hello.version_patch = kVersionPatch;
+    hello.board_id = identity.board_id;
+    hello.boot_id = identity.boot_id;
+    hello.tick_rate_Hz = static_cast<std::uint32_t>(kTicksPerSecond);
+    hello.reset_cause = identity.reset_cause;
+    answer(hello);
+  }
+  void handle(const wire::Heartbeat& heartbeat) { motion_.heartbeat(heartbeat.lease_id); }
+  void handle(const wire::TimeSyncRequest& request) {
+    const std::uint64_t received = on_wire(board_.now());
+    std::array<std::uint8_t, wire::kMaxPayloadBytes> payload{};
+    const wire::TimeSync reply{request.token, received, on_wire(board_.now())};
+    (void)link_.send(wire::TimeSync::kType, wire::encode(reply, payload));
+  }
+  void handle(const wire::StatusRequest& request) {
+    const MotionCounters counters = motion_.engine().counters();
+    const Inputs inputs = board_.inputs();
+    const wire::LinkCounters& link = link_.counters();
+    wire::Status status;
+    status.request_id = request.request_id;
+    status.state = motion_.safety().state();
+    status.fault = motion_.safety().fault();
+    status.inputs = static_cast<std::uint8_t>((inputs.estop ? 1 : 0) | (inputs.home ? 2 : 0) |
+                                              (inputs.far_limit ? 4 : 0) | (motion_.motor_enabled() ? 8 : 0));
+    status.tick = on_wire(board_.now());
+    status.position_microsteps = counters.position.count;
+    status.segment = motion_.segment();
+    status.cycle = counters.cycles_begun;
+    status.triggers = counters.triggers;
+    status.r_waves = counters.r_waves;
+    status.steps = counters.steps;
+    status.events_lost = motion_.events_lost();
+    status.frames_received = link.frames_received;
+    status.crc_errors = link.crc_errors;
+    status.framing_errors = link.framing_errors;
+    status.duplicates = link.duplicates;
+    status.out_of_order = link.out_of_order;
+    status.retransmissions = link.retransmissions;
+    answer(status);
+  }
+  void handle(const wire::Configure& request) { conclude(request, motion_.configure(request)); }
+  void handle(const wire::ClearProgram& request) { conclude(request, motion_.clear_program()); }
+  void handle(const wire::AddSegment& request) { conclude(request, motion_.add_segment(request)); }
+  void handle(const wire::Arm& request) {
+    const PlanRefusal refusal = motion_.arm(request);
+    if (refusal.refusal != wire::Refusal::none)
+      refuse(request.request_id, static_cast<std::uint8_t>(request.kType), refusal);
+    else
+      conclude(request, wire::Refusal::none);
+  }
+  void handle(const wire::Home& request) { conclude(request, motion_.home(request.lease_id)); }
+  void handle(const wire::Start& request) { conclude(request, motion_.start(request.lease_id)); }
+  void handle(const wire::StopAtCycleEnd& request) { conclude(request, motion_.stop_at_cycle_end()); }
+  void handle(const wire::StopNow& request) { conclude(request, motion_.stop_now()); }
+  void handle(const wire::Halt& request) { conclude(request, motion_.halt()); }
+  void handle(const wire::ClearFault& request) { conclude(request, motion_.clear_fault()); }
+
+  template <class Request>
+  void conclude(const Request& request, wire::Refusal refusal) {
+    const auto type = static_cast<std::uint8_t>(Request::kType);
+    if (refusal == wire::Refusal::none)
+      answer(wire::Ack{request.request_id, type});
+    else
+      refuse(request.request_id, type, {refusal});
+  }
+  void refuse(std::uint16_t request_id, std::uint8_t type, const PlanRefusal& why) {
+    answer(wire::Nak{request_id, type, why.refusal, why.limit, why.segment, why.asked, why.allowed});
+  }
+  /// A host that sends requests and takes no answers loses the session.
+  template <class Message>
+  void answer(const Message& message) {
+    if (!outbox_.put(message)) link_.close();
+  }
+
+  B& board_;
+  Motion<B>& motion_;
+  Outbox& outbox_;
+  wire::ReliableLink& link_;
+  std::uint32_t generation_ = 0;
+  bool schema_agreed_ = false;
+};
+
+}  // namespace diastole::firmware

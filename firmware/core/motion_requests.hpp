@@ -1,0 +1,124 @@
+#pragma once
+// Motion's requests: checks, then one change of state. Included by motion.hpp.
+
+#include "firmware/core/motion.hpp"
+
+namespace diastole::firmware {
+
+template <Board B>
+wire::Refusal Motion<B>::configure(const wire::Configure& configure) {
+  if (!safety_.at_rest()) return wire::Refusal::wrong_state;
+  settings_ = Settings(configure);
+  configured_ = true;
+  return clear_program();
+}
+
+template <Board B>
+wire::Refusal Motion<B>::clear_program() {
+  if (!safety_.at_rest()) return wire::Refusal::wrong_state;
+  program_.size = 0;
+  if (safety_.state() == wire::State::armed) become(wire::State::homed);
+  return wire::Refusal::none;
+}
+
+template <Board B>
+wire::Refusal Motion<B>::add_segment(const wire::AddSegment& add) {
+  if (!configured_) return wire::Refusal::not_configured;
+  if (!safety_.at_rest() || safety_.state() == wire::State::armed) return wire::Refusal::wrong_state;
+  if (program_.size == Program::kMaxSegments) return wire::Refusal::program_full;
+  program_.segments[program_.size++] = {add.waveform, add.cycles, add.stroke_nL, add.offset_nL,
+                                        add.period_us};
+  return wire::Refusal::none;
+}
+
+template <Board B>
+PlanRefusal Motion<B>::arm(const wire::Arm& arm) {
+  if (!configured_) return {.refusal = wire::Refusal::not_configured};
+  if (safety_.state() != wire::State::homed) return {.refusal = wire::Refusal::wrong_state};
+  program_.gate_every = arm.gate_every;
+  program_.rest_us = arm.rest_us;
+  program_.ttl_width_us = arm.ttl_width_us;
+  program_.position_period_ticks = arm.position_period_ticks;
+  const auto stopping_time = check_program(program_, settings_);
+  if (!stopping_time.ok()) return stopping_time.error();
+  // At rest within the lease: stop that much earlier, and by what has already been handed to the engine.
+  silence_allowed_ = microseconds(settings_.limits().lease_us - 5'000) - *stopping_time - kHorizon;
+  next_planned_ = 0;
+  become(wire::State::armed);
+  return {};
+}
+
+template <Board B>
+wire::Refusal Motion<B>::home(std::uint32_t lease_id) {
+  if (!configured_) return wire::Refusal::not_configured;
+  if (!safety_.at_rest()) return wire::Refusal::wrong_state;
+  if (board_.inputs().estop) return wire::Refusal::estop_pressed;
+  silence_allowed_ = microseconds(settings_.limits().lease_us);
+  if (!lease_.bind(lease_id, board_.now(), silence_allowed_)) return wire::Refusal::no_lease;
+  set_motor_enabled(true);
+  become(wire::State::homing);
+  begin_homing_stage(board_.inputs().home ? HomingStage::leave : HomingStage::seek);
+  return wire::Refusal::none;
+}
+
+template <Board B>
+wire::Refusal Motion<B>::start(std::uint32_t lease_id) {
+  if (safety_.state() != wire::State::armed || run_end_due_) return wire::Refusal::wrong_state;
+  if (board_.inputs().estop) return wire::Refusal::estop_pressed;
+  if (board_.inputs().far_limit) return wire::Refusal::limit_switch_closed;
+  if (!lease_.bind(lease_id, board_.now(), silence_allowed_)) return wire::Refusal::no_lease;
+  const MotionCounters counters = engine_.counters();
+  triggers_before_ = counters.triggers;
+  r_waves_before_ = counters.r_waves;
+  engine_.open();
+  engine_.begin_counting_run();
+  engine_.set_ttl_width(microseconds(program_.ttl_width_us));
+  run_start_ = board_.now() + kStartLead;
+  engine_.begin_sampling(run_start_, Ticks{program_.position_period_ticks});
+  planner_.begin_run(program_, settings_, run_start_, counters.position);
+  end_reason_ = wire::RunEnd::completed;
+  fault_at_rest_ = wire::Fault::none;
+  decelerating_ = false;
+  segment_ = 0;
+  set_motor_enabled(true);
+  watch_ = Watch::run;
+  become(wire::State::running);
+  return wire::Refusal::none;
+}
+
+template <Board B>
+wire::Refusal Motion<B>::stop_at_cycle_end() {
+  if (safety_.state() != wire::State::running) return wire::Refusal::wrong_state;
+  planner_.stop_at_cycle_end();
+  end_reason_ = wire::RunEnd::stopped_at_cycle_end;
+  become(wire::State::stopping);
+  return wire::Refusal::none;
+}
+
+template <Board B>
+wire::Refusal Motion<B>::stop_now() {
+  if (!safety_.in_run()) return wire::Refusal::wrong_state;
+  begin_controlled_stop(wire::RunEnd::stopped_now);
+  return wire::Refusal::none;
+}
+
+template <Board B>
+wire::Refusal Motion<B>::halt() {
+  if (safety_.at_rest() || safety_.state() == wire::State::faulted) return wire::Refusal::wrong_state;
+  engine_.cut();
+  latch(wire::Fault::halted);
+  return wire::Refusal::none;
+}
+
+template <Board B>
+wire::Refusal Motion<B>::clear_fault() {
+  if (safety_.state() != wire::State::faulted) return wire::Refusal::wrong_state;
+  if (board_.inputs().estop) return wire::Refusal::estop_pressed;
+  const wire::State before = safety_.state();
+  safety_.clear();
+  board_.show_fault(static_cast<std::uint8_t>(wire::Fault::none));
+  outbox_.put(wire::StateChanged{before, safety_.state(), on_wire(board_.now())});
+  return wire::Refusal::none;
+}
+
+}  // namespace diastole::firmware

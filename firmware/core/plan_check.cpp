@@ -1,0 +1,89 @@
+#include "firmware/core/plan_check.hpp"
+
+#include <algorithm>
+
+#include "firmware/core/profiles/profile.hpp"
+
+namespace diastole::firmware {
+
+namespace {
+
+constexpr std::uint64_t divide_up(std::uint64_t dividend, std::uint64_t divisor) {
+  return (dividend + divisor - 1) / divisor;
+}
+
+std::uint64_t stopping_us(std::uint64_t flow_uL_per_s, const Settings& settings) {
+  return divide_up(flow_uL_per_s * 1'000'000,
+                   std::max<std::uint64_t>(settings.allowed_acceleration_uL_per_s2(), 1));
+}
+
+}  // namespace
+
+SegmentPeaks segment_peaks(const Segment& segment, const Settings& settings) {
+  const Profile& profile = *find_profile(segment.waveform);
+  const wire::Configure& limits = settings.limits();
+  const std::uint64_t stroke_nL = segment.stroke_nL;
+  const std::uint64_t period_us = segment.period_us;
+  SegmentPeaks peaks;
+  peaks.flow_uL_per_s = divide_up(stroke_nL * profile.peak_speed_millionths, period_us * 1000);
+  peaks.acceleration_uL_per_s2 =
+      divide_up(divide_up(stroke_nL * profile.peak_acceleration_millionths, period_us) * 1000, period_us);
+  peaks.step_rate_Hz = divide_up(peaks.flow_uL_per_s * 1'000'000, limits.microstep_pL);
+  peaks.pressure_Pa =
+      divide_up(divide_up(peaks.acceleration_uL_per_s2 * limits.inertance_kg_per_m4, 1'000'000), 1000);
+  peaks.stopping_us = stopping_us(peaks.flow_uL_per_s, settings);
+  peaks.cycle_steps = settings.steps_of_nL(segment.stroke_nL);
+  return peaks;
+}
+
+namespace {
+
+struct Check {
+  wire::Limit limit;
+  std::uint64_t asked;
+  std::uint64_t allowed;
+};
+
+/// The first limit that one segment exceeds, or Limit::none.
+Check check_segment(const Segment& segment, const Program& program, const Settings& settings) {
+  const wire::Configure& limits = settings.limits();
+  const SegmentPeaks peaks = segment_peaks(segment, settings);
+  const std::uint64_t r_wave_spacing_us = std::uint64_t{segment.period_us} * program.gate_every;
+  const Check at_most[] = {
+      {wire::Limit::travel, divide_up(std::uint64_t{segment.stroke_nL} + segment.offset_nL, 1000),
+       limits.travel_uL},
+      {wire::Limit::flow, peaks.flow_uL_per_s, limits.flow_uL_per_s},
+      {wire::Limit::acceleration, peaks.acceleration_uL_per_s2, limits.acceleration_uL_per_s2},
+      {wire::Limit::step_rate, peaks.step_rate_Hz, limits.step_rate_Hz},
+      {wire::Limit::pressure, peaks.pressure_Pa, limits.pressure_Pa},
+      {wire::Limit::stopping_time, peaks.stopping_us, settings.allowed_stopping_us()},
+      {wire::Limit::ttl_width, program.ttl_width_us, segment.period_us / 2},
+  };
+  for (const Check& check : at_most)
+    if (check.asked > check.allowed) return check;
+  if (peaks.cycle_steps.count == 0)
+    return {wire::Limit::stroke_at_least, segment.stroke_nL, divide_up(limits.microstep_pL, 1000)};
+  if (r_wave_spacing_us <= kRWave_us) return {wire::Limit::r_wave_spacing, r_wave_spacing_us, kRWave_us + 1};
+  return {wire::Limit::none, 0, 0};
+}
+
+}  // namespace
+
+wire::Result<Ticks, PlanRefusal> check_program(const Program& program, const Settings& settings) {
+  if (program.size == 0) return PlanRefusal{.refusal = wire::Refusal::no_program};
+  std::uint64_t slowest_us = divide_up(settings.ramp_steps_per_s() * 1'000'000, settings.stop_steps_per_s2());
+  for (std::size_t i = 0; i < program.size; ++i) {
+    const Segment& segment = program.segments[i];
+    const auto index = static_cast<std::uint16_t>(i);
+    if (find_profile(segment.waveform) == nullptr)
+      return PlanRefusal{.refusal = wire::Refusal::unknown_waveform, .segment = index};
+    const Check check = check_segment(segment, program, settings);
+    if (check.limit != wire::Limit::none)
+      return PlanRefusal{wire::Refusal::limit_exceeded, check.limit, index,
+                         static_cast<std::int64_t>(check.asked), static_cast<std::int64_t>(check.allowed)};
+    slowest_us = std::max(slowest_us, segment_peaks(segment, settings).stopping_us);
+  }
+  return microseconds(static_cast<std::int64_t>(slowest_us));
+}
+
+}  // namespace diastole::firmware

@@ -1,0 +1,45 @@
+#pragma once
+// Every limit is checked before anything moves. For a segment of stroke S and period T with a profile whose
+// normalised peaks are v and a (profile.hpp):
+//
+//   flow = v S/T     acceleration = a S/T²     step rate = flow / microstep
+//   pressure = inertance · acceleration        stopping time = flow / allowed acceleration
+//
+// all rounded up. The ramps between segments are planned within the limits and need no check.
+
+#include <cstdint>
+
+#include "firmware/core/program.hpp"
+#include "protocol/wire/faults.hpp"
+#include "protocol/wire/result.hpp"
+
+namespace diastole::firmware {
+
+struct SegmentPeaks {
+  std::uint64_t flow_uL_per_s = 0;
+  std::uint64_t acceleration_uL_per_s2 = 0;
+  std::uint64_t step_rate_Hz = 0;
+  std::uint64_t pressure_Pa = 0;
+  std::uint64_t stopping_us = 0;
+  Steps cycle_steps;
+};
+
+/// Why a program is refused; asked and allowed are in the limit's unit (limit_list.inc).
+struct PlanRefusal {
+  wire::Refusal refusal = wire::Refusal::none;
+  wire::Limit limit = wire::Limit::none;
+  std::uint16_t segment = 0;
+  std::int64_t asked = 0;
+  std::int64_t allowed = 0;
+};
+
+/// Peaks of one segment. Precondition: the firmware has its waveform.
+SegmentPeaks segment_peaks(const Segment& segment, const Settings& settings);
+
+/// The R-wave's length, and so the least distance of two.
+inline constexpr std::uint32_t kRWave_us = 30'000;
+
+/// The longest stopping time of the program's segments and ramps, or the first limit that it exceeds.
+wire::Result<Ticks, PlanRefusal> check_program(const Program& program, const Settings& settings);
+
+}  // namespace diastole::firmware

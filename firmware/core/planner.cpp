@@ -1,0 +1,216 @@
+#include "firmware/core/planner.hpp"
+
+#include <algorithm>
+
+namespace diastole::firmware {
+
+namespace {
+
+Ticks at_phase(Ticks length, Q64 phase) {
+  return {static_cast<std::int64_t>(scale(static_cast<std::uint64_t>(length.count), phase))};
+}
+
+}  // namespace
+
+void Planner::begin_run(const Program& program, const Settings& settings, Ticks start, Steps position) {
+  program_ = &program;
+  settings_ = settings;
+  origin_ = start;
+  position_ = position;
+  segment_ = 0;
+  cycle_in_run_ = 0;
+  stop_at_cycle_end_ = stepped_ = false;
+  phase_ = Phase::run_start;
+  plan_next();
+}
+
+void Planner::begin_travel(bool inflate, std::uint32_t count, Ticks first, Ticks interval) {
+  origin_ = first;
+  length_ = interval;
+  inflate_ = inflate;
+  count_ = count;
+  index_ = 0;
+  stepped_ = false;
+  phase_ = Phase::travel;
+  plan_next();
+}
+
+void Planner::begin_stop(Ticks earliest, std::uint64_t deceleration_steps_per_s2) {
+  phase_ = Phase::stop;
+  index_ = count_ = 0;
+  origin_ = stepped_ ? last_step_ : earliest;
+  if (stepped_ && last_interval_ > Ticks{0}) {
+    const Ticks interval = std::max(last_interval_, earliest - last_step_);
+    const std::uint64_t speed = static_cast<std::uint64_t>(kTicksPerSecond / interval.count + 1);
+    count_ = static_cast<std::uint32_t>((speed * speed + deceleration_steps_per_s2 - 1) /
+                                        (2 * deceleration_steps_per_s2));
+    inflate_ = last_inflate_;
+    length_ = interval * (2 * std::int64_t{count_} + 1);
+  }
+  if (count_ == 0) origin_ = std::max(origin_, earliest);
+  plan_next();
+}
+
+void Planner::pop() {
+  if (next_->has(MotionEvent::kStep)) {
+    const bool inflate = next_->has(MotionEvent::kInflate);
+    last_interval_ = stepped_ && inflate == last_inflate_ ? next_->tick - last_step_ : Ticks{0};
+    last_step_ = next_->tick;
+    last_inflate_ = inflate;
+    stepped_ = true;
+  }
+  plan_next();
+}
+
+void Planner::begin_ramp(Steps to, Phase then) {
+  const Steps distance = to - position_;
+  after_ramp_ = then;
+  phase_ = Phase::ramp;
+  inflate_ = distance.count > 0;
+  count_ = static_cast<std::uint32_t>(inflate_ ? distance.count : -distance.count);
+  index_ = 0;
+  length_ = count_ > 0 ? settings_.ramp_time(distance) : Ticks{0};
+  position_ = to;
+}
+
+void Planner::end_ramp() {
+  origin_ += length_;
+  phase_ = after_ramp_;
+}
+
+void Planner::end_steps(Ticks duration) {
+  origin_ += duration;
+  phase_ = Phase::end;
+}
+
+void Planner::begin_segment() {
+  const Segment& segment = program_->segments[segment_];
+  profile_ = find_profile(segment.waveform);
+  count_ = static_cast<std::uint32_t>(settings_.steps_of_nL(segment.stroke_nL).count);
+  length_ = microseconds(segment.period_us);
+  cycle_ = index_ = 0;
+  phase_ = Phase::cycles;
+}
+
+MotionEvent Planner::ramp_step() {
+  const Q64 y = ratio(2 * index_ + 1, 2 * count_);
+  ++index_;
+  // The rising half of a parabolic cycle twice as long as the ramp.
+  const Ticks time = at_phase(length_ * 2, parabolic_profile.phase_rising(y));
+  return {origin_ + time,
+          static_cast<std::uint16_t>(MotionEvent::kStep | (inflate_ ? MotionEvent::kInflate : 0))};
+}
+
+MotionEvent Planner::cycle_step() {
+  const bool rising = index_ < count_;
+  const std::uint32_t level = rising ? index_ : 2 * count_ - 1 - index_;
+  const Q64 y = ratio(2 * level + 1, 2 * count_);
+  const Q64 phase = rising ? profile_->phase_rising(y) : profile_->phase_falling(y);
+  MotionEvent event{origin_ + at_phase(length_, phase), MotionEvent::kStep};
+  if (rising) event.flags |= MotionEvent::kInflate;
+  if (index_ == 0) {
+    event.flags |= MotionEvent::kCycleStart;
+    if (cycle_in_run_ % program_->gate_every == 0) event.flags |= MotionEvent::kRWave;
+  }
+  if (++index_ == 2 * count_) {
+    event.flags |= MotionEvent::kCycleEnd;
+    finish_cycle();
+  }
+  return event;
+}
+
+void Planner::finish_cycle() {
+  origin_ += length_;
+  index_ = 0;
+  ++cycle_in_run_;
+  ++cycle_;
+  const bool segment_done = cycle_ == program_->segments[segment_].cycles;
+  if (segment_done) ++segment_;
+  if (stop_at_cycle_end_ || segment_ == program_->size) {
+    begin_ramp(Steps{0}, Phase::end);
+  } else if (segment_done) {
+    begin_ramp(settings_.steps_of_nL(program_->segments[segment_].offset_nL), Phase::segment_start);
+  }
+}
+
+MotionEvent Planner::travel_step() {
+  const Ticks tick = origin_ + length_ * index_++;
+  return {tick, static_cast<std::uint16_t>(MotionEvent::kStep | (inflate_ ? MotionEvent::kInflate : 0))};
+}
+
+MotionEvent Planner::stop_step() {
+  ++index_;
+  const Q64 speed_left = square_root(0 - ratio(2 * index_, 2 * count_ + 1));
+  return {origin_ + at_phase(length_, 0 - speed_left),
+          static_cast<std::uint16_t>(MotionEvent::kStep | (inflate_ ? MotionEvent::kInflate : 0))};
+}
+
+void Planner::plan_next() {
+  next_.reset();
+  while (!next_ && phase_ != Phase::idle)
+    plan_in_phase();
+}
+
+/// Either plans an event or moves on to another phase.
+void Planner::plan_in_phase() {
+  switch (phase_) {
+    case Phase::idle:
+      break;
+    case Phase::run_start:
+      next_ = MotionEvent{origin_, MotionEvent::kRunStart};
+      begin_ramp(Steps{0}, Phase::rest);
+      break;
+    case Phase::rest:
+      origin_ += microseconds(program_->rest_us);
+      begin_ramp(settings_.steps_of_nL(program_->segments[0].offset_nL), Phase::segment_start);
+      break;
+    case Phase::ramp:
+      if (index_ < count_)
+        next_ = ramp_step();
+      else
+        end_ramp();
+      break;
+    case Phase::segment_start:
+      if (stop_at_cycle_end_) {
+        begin_ramp(Steps{0}, Phase::end);
+        break;
+      }
+      next_ = MotionEvent{origin_, MotionEvent::kSegmentStart};
+      begin_segment();
+      break;
+    case Phase::cycles:
+      next_ = cycle_step();
+      break;
+    case Phase::travel:
+      if (index_ < count_)
+        next_ = travel_step();
+      else
+        end_steps(length_ * count_);
+      break;
+    case Phase::stop:
+      if (index_ < count_)
+        next_ = stop_step();
+      else
+        end_steps(count_ > 0 ? length_ : Ticks{0});
+      break;
+    case Phase::end:
+      next_ = MotionEvent{origin_, MotionEvent::kEnd};
+      phase_ = Phase::idle;
+      break;
+  }
+}
+
+Ticks Planner::segment_offset(const Program& program, const Settings& settings, std::size_t segment) {
+  Ticks time = microseconds(program.rest_us);
+  Steps position{0};
+  for (std::size_t i = 0; i <= segment; ++i) {
+    const Segment& next = program.segments[i];
+    const Steps offset = settings.steps_of_nL(next.offset_nL);
+    if (offset != position) time += settings.ramp_time(offset - position);
+    position = offset;
+    if (i < segment) time += microseconds(next.period_us) * std::int64_t{next.cycles};
+  }
+  return time;
+}
+
+}  // namespace diastole::firmware

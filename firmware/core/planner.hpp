@@ -1,0 +1,100 @@
+#pragma once
+// From a program to the times of its steps. The planner is a generator: peek() is the next event, pop() moves
+// on; nothing is stored but the present place in the program.
+//
+//   start ─▶ [ramp to 0] ─▶ rest ─▶ ( [ramp to offset] ─▶ cycles ) for each segment ─▶ [ramp to 0] ─▶ end
+//
+// Cycle c of a segment that starts at s begins at s + c T exactly. Its stroke is N whole microsteps, and the
+// step from level k to k + 1 is made when the ideal motion crosses the level half way between,
+// y = (2k + 1) / 2N, rounded to a tick; so the position is the ideal one rounded to a microstep, and N steps
+// up are followed by N steps down: nothing drifts. Ramps are rising halves of the parabolic profile.
+
+#include <cstdint>
+#include <optional>
+
+#include "firmware/core/profiles/profile.hpp"
+#include "firmware/core/program.hpp"
+#include "firmware/core/units.hpp"
+
+namespace diastole::firmware {
+
+/// Something that happens at a tick; flags combine.
+struct MotionEvent {
+  enum Flag : std::uint16_t {
+    kStep = 1,           ///< an edge on STEP
+    kInflate = 2,        ///< direction of that step
+    kCycleStart = 4,     ///< first step of a cycle: the TTL rises with it
+    kRWave = 8,          ///< … and the R-wave starts
+    kCycleEnd = 16,      ///< last step of a cycle
+    kRunStart = 32,      ///< run time zero; no step
+    kSegmentStart = 64,  ///< first cycle of the next segment begins; no step
+    kEnd = 128,          ///< everything planned has been done; no step
+  };
+  Ticks tick;
+  std::uint16_t flags = 0;
+
+  [[nodiscard]] bool has(Flag flag) const { return (flags & flag) != 0; }
+};
+
+class Planner {
+ public:
+  /// Plans the program from `start`. `program` must outlive the run. Precondition: check_program accepted it.
+  void begin_run(const Program& program, const Settings& settings, Ticks start, Steps position);
+  /// Plans `count` steps at even intervals (homing).
+  void begin_travel(bool inflate, std::uint32_t count, Ticks first, Ticks interval);
+  /// After the cycle being planned: ramp to 0 and end.
+  void stop_at_cycle_end() { stop_at_cycle_end_ = true; }
+  /// Comes to rest from the last popped step at no more than `deceleration_steps_per_s2`; no step before
+  /// `earliest`. With v = 1/Δ the last speed, n = ⌈v²/2a⌉ steps bring rest after (2n + 1)Δ:
+  /// t_k = (2n + 1) Δ (1 - √(1 - 2k/(2n + 1))).
+  void begin_stop(Ticks earliest, std::uint64_t deceleration_steps_per_s2);
+  /// Forgets everything planned.
+  void clear() { next_.reset(); }
+
+  /// The next event, or nullptr when all have been popped. Ticks never decrease.
+  [[nodiscard]] const MotionEvent* peek() const { return next_ ? &*next_ : nullptr; }
+  void pop();
+
+  /// When the first cycle of a segment begins, relative to the start of run, if the run starts at position 0.
+  static Ticks segment_offset(const Program& program, const Settings& settings, std::size_t segment);
+
+ private:
+  enum class Phase : std::uint8_t { idle, run_start, rest, ramp, segment_start, cycles, travel, stop, end };
+
+  void plan_next();
+  void plan_in_phase();
+  void end_ramp();
+  void end_steps(Ticks duration);
+  void begin_segment();
+  void begin_ramp(Steps to, Phase then);
+  MotionEvent ramp_step();
+  MotionEvent cycle_step();
+  MotionEvent travel_step();
+  MotionEvent stop_step();
+  void finish_cycle();
+
+  const Program* program_ = nullptr;
+  Settings settings_;
+  std::optional<MotionEvent> next_;
+  Phase phase_ = Phase::idle;
+  Phase after_ramp_ = Phase::idle;
+  Ticks origin_;             ///< when the present ramp, cycle, travel or stop began
+  Steps position_;           ///< at the beginning of the present phase
+  std::uint32_t index_ = 0;  ///< next step of the present phase
+  std::uint32_t count_ = 0;  ///< steps of the present ramp, half cycle, travel or stop
+  bool inflate_ = false;
+  Ticks length_;  ///< of the ramp, cycle or stop; interval of travel
+  const Profile* profile_ = nullptr;
+  std::size_t segment_ = 0;
+  std::uint32_t cycle_ = 0;  ///< in the segment
+  std::uint64_t cycle_in_run_ = 0;
+  bool stop_at_cycle_end_ = false;
+
+  // The last two steps popped, from which a stop takes its speed.
+  Ticks last_step_;
+  Ticks last_interval_;
+  bool last_inflate_ = false;
+  bool stepped_ = false;
+};
+
+}  // namespace diastole::firmware

@@ -1,0 +1,88 @@
+#pragma once
+// A host in miniature for tests: speaks the real protocol with the firmware on the recording board, over a
+// line that may be cut or corrupted, and keeps everything it hears.
+
+#include <functional>
+#include <random>
+#include <variant>
+#include <vector>
+
+#include "firmware/boards/recording/recorded_controller.hpp"
+#include "protocol/wire/messages.hpp"
+#include "protocol/wire/reliable_link.hpp"
+
+namespace diastole::firmware {
+
+struct Heard {
+  std::vector<wire::Hello> hellos;
+  std::vector<wire::Ack> acks;
+  std::vector<wire::Nak> naks;
+  std::vector<wire::Status> statuses;
+  std::vector<wire::SegmentPlanned> planned;
+  std::vector<wire::StateChanged> states;
+  std::vector<wire::RunStarted> started;
+  std::vector<wire::SegmentStarted> segments;
+  std::vector<wire::Trigger> triggers;
+  std::vector<wire::RunEnded> ended;
+  std::vector<wire::FaultRaised> faults;
+  std::vector<std::int32_t> positions;
+  std::vector<std::uint64_t> position_ticks;
+  bool positions_contiguous = true;
+  std::size_t undecodable = 0;
+};
+
+class Bench {
+ public:
+  static constexpr std::uint32_t kLease = 0x5EA5E;
+
+  explicit Bench(RecordedController::Options options = {}) : rig(options) {}
+
+  /// Opens a session and says hello.
+  void connect();
+  /// connect, configure, home; leaves the controller homed.
+  void prepare(const wire::Configure& configure = wire::Configure::example());
+  /// Queues a request (request_id is filled in).
+  template <class Request>
+  void request(Request message) {
+    if constexpr (requires { message.request_id; }) message.request_id = ++last_request_;
+    std::array<std::uint8_t, wire::kMaxPayloadBytes> payload{};
+    while (!link.send(Request::kType, wire::encode(message, payload)))
+      run_for(microseconds(5'000));
+  }
+  /// request and wait for Ack (true) or Nak (false).
+  template <class Request>
+  bool ask(const Request& message) {
+    const std::size_t acks = heard.acks.size(), naks = heard.naks.size();
+    request(message);
+    run_until([&] { return heard.acks.size() > acks || heard.naks.size() > naks; }, microseconds(3'000'000));
+    return heard.acks.size() > acks;
+  }
+  void add_segment(wire::Waveform waveform, std::uint32_t cycles, std::uint32_t stroke_nL,
+                   std::uint32_t period_us, std::uint32_t offset_nL = 0);
+  /// Arms, starts, and runs until RunEnded or `most`.
+  void run_program(wire::Arm arm = wire::Arm::example(), Ticks most = microseconds(600'000'000));
+
+  void run_for(Ticks time);
+  bool run_until(const std::function<bool()>& done, Ticks most);
+
+  [[nodiscard]] wire::State state() const { return rig.controller().motion().safety().state(); }
+
+  RecordedController rig;
+  wire::ReliableLink link{wire::ReliableLink::Role::host};
+  Heard heard;
+  bool heartbeats = true;
+  bool cable = true;
+  double bit_error = 0;
+  std::mt19937 random{1};
+
+ private:
+  void turn();
+  void hear(const wire::Received& received);
+  std::vector<std::uint8_t> worn(std::span<const std::uint8_t> bytes);
+  [[nodiscard]] std::uint64_t now_us() const { return on_wire(rig.now()) / 84; }
+
+  std::uint16_t last_request_ = 0;
+  Ticks next_heartbeat_;
+};
+
+}  // namespace diastole::firmware
