@@ -6,6 +6,7 @@
 #include <iostream>
 
 #include "estimator/cli/commands.hpp"
+#include "host/cli/host_commands.hpp"
 #include "protocol/contract/command.hpp"
 #include "protocol/contract/exit_code.hpp"
 #include "protocol/contract/input_error.hpp"
@@ -33,6 +34,7 @@ diastole::ExitCode run(int argc, char** argv) {
       "Exit codes: 0 done, 1 it ran but the answer is negative, 2 wrong usage or input, 3 hardware or link "
       "fault.");
   diastole::CommandLine line(app);
+  diastole::add_host_commands(line);
   diastole::add_estimator_commands(line);
   try {
     app.parse(argc, argv);

@@ -1,0 +1,244 @@
+#include "host/acquisition/acquisition.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "protocol/wire/wire_text.hpp"
+
+namespace diastole {
+namespace {
+
+using nlohmann::json;
+
+constexpr double ns_per_s = 1e9;
+constexpr uint64_t block_span_ns = 100'000'000;
+constexpr uint64_t instrument_clock_interval_ns = 500'000'000;
+constexpr double start_patience_s = 2;  // for RunStarted
+constexpr double end_patience_s = 10;   // for RunEnded, beyond the plan
+
+}  // namespace
+
+Acquisition::Acquisition(Clock& clock, Controller& controller, daq::Instrument& instrument,
+                         JournalWriter& journal, AcquisitionSetup setup)
+    : clock_(clock),
+      controller_(controller),
+      instrument_(instrument),
+      journal_(journal),
+      setup_(std::move(setup)),
+      volts_(instrument.channels()) {
+  block_.channels = static_cast<uint32_t>(setup_.channels.size());
+}
+
+RunOutcome Acquisition::run(const Hooks& hooks) {
+  hooks_ = hooks;
+  const uint64_t now_ns = clock_.now_ns();
+  first_due_ns_ = now_ns;
+  next_instrument_clock_ns_ = now_ns;
+  deadline_ns_ = now_ns + static_cast<uint64_t>(start_patience_s * ns_per_s);
+  controller_.start();
+  while (!ended_)
+    turn();
+  close_gap();
+  close_block();
+  write(RecordKind::document, json{{"record", "end"}}.dump());
+  journal_.sync();
+  hooks_.progress(outcome_.counts);
+  return outcome_;
+}
+
+void Acquisition::turn() {
+  obey(hooks_.stop());
+  controller_.service();
+  for (const ControllerEvent& event : controller_.take_events())
+    take(event);
+  poll_instrument();
+  check_deadline();
+  if (ended_) return;
+  clock_.sleep_until_ns(std::min(due_ns(next_index_), controller_.next_due_ns()), controller_.line());
+}
+
+void Acquisition::obey(StopRequest request) {
+  if (request <= obeyed_) return;
+  obeyed_ = request;
+  if (request == StopRequest::at_cycle_end) {
+    controller_.stop_at_cycle_end();
+    remark("info", "stop", "stop at the end of this cycle was asked for");
+  } else {
+    controller_.stop_now();
+    remark("warning", "stop", "controlled stop was asked for");
+  }
+}
+
+uint64_t Acquisition::due_ns(uint64_t index) const {
+  return first_due_ns_ +
+         static_cast<uint64_t>(std::llround(static_cast<double>(index) * ns_per_s / setup_.sample_rate_Hz));
+}
+
+void Acquisition::poll_instrument() {
+  const uint64_t now_ns = clock_.now_ns();
+  if (now_ns < due_ns(next_index_)) return;
+  uint64_t latest = next_index_;
+  while (due_ns(latest + 1) <= now_ns)
+    ++latest;
+  if (latest > next_index_) miss(next_index_, latest - next_index_, "the host was late");
+  next_index_ = latest + 1;
+  take_sample(latest);
+  if (now_ns >= next_instrument_clock_ns_) read_instrument_clock();
+}
+
+void Acquisition::take_sample(uint64_t index) {
+  const uint64_t asked_ns = clock_.now_ns();
+  const daq::Outcome outcome = instrument_.read(volts_);
+  const uint64_t answered_ns = clock_.now_ns();
+  const bool finite = std::all_of(volts_.begin(), volts_.end(), [](double v) { return std::isfinite(v); });
+  if (!outcome.ok || !finite) {
+    return miss(index, 1, outcome.ok ? "the instrument sent no finite number" : outcome.fault);
+  }
+  close_gap();
+  if (block_.host_ns.empty()) block_.first_index = index;
+  block_.host_ns.push_back(asked_ns + (answered_ns - asked_ns) / 2);
+  for (size_t i = 0; i < volts_.size(); ++i) {
+    const ChannelConfig& channel = setup_.channels[i];
+    block_.value_kPa.push_back((volts_[i] - channel.zero_V) * channel.kPa_per_V);
+  }
+  ++outcome_.counts.received;
+  outcome_.counts.last_kPa = block_.value_kPa[block_.value_kPa.size() - volts_.size()];
+  if (block_.host_ns.back() - block_.host_ns.front() >= block_span_ns) close_block();
+}
+
+void Acquisition::miss(uint64_t first, uint64_t count, const std::string& reason) {
+  close_block();
+  if (gap_ && gap_->reason != reason) close_gap();
+  if (!gap_) {
+    gap_ = OpenGap{first, 0, reason};
+    hooks_.remark({"warning", "gap", fmt::format("samples are missing from {} on: {}", first, reason)});
+  }
+  gap_->count += count;
+  outcome_.counts.missing += count;
+}
+
+void Acquisition::close_gap() {
+  if (!gap_) return;
+  write(
+      RecordKind::document,
+      json{{"record", "gap"}, {"first_index", gap_->first}, {"count", gap_->count}, {"reason", gap_->reason}}
+          .dump());
+  gap_.reset();
+}
+
+void Acquisition::close_block() {
+  if (!block_.host_ns.empty()) write(RecordKind::samples, encode(block_));
+  block_.host_ns.clear();
+  block_.value_kPa.clear();
+  hooks_.progress(outcome_.counts);
+}
+
+void Acquisition::read_instrument_clock() {
+  const uint64_t asked_ns = clock_.now_ns();
+  next_instrument_clock_ns_ = asked_ns + instrument_clock_interval_ns;
+  const auto timer = instrument_.read_timer();
+  const uint64_t answered_ns = clock_.now_ns();
+  if (!timer) return;
+  write(RecordKind::document, json{{"record", "daq_clock"},
+                                   {"host_ns", asked_ns + (answered_ns - asked_ns) / 2},
+                                   {"half_round_trip_ns", (answered_ns - asked_ns) / 2},
+                                   {"timer", *timer}}
+                                  .dump());
+}
+
+void Acquisition::take(const ControllerEvent& event) {
+  const auto document = [this](const json& what) { write(RecordKind::document, what.dump()); };
+  std::visit(
+      wire::overloaded{
+          [&](const ClockReading& e) {
+            document({{"record", "clock"},
+                      {"host_ns", e.host_ns},
+                      {"tick", e.tick},
+                      {"half_round_trip_ns", e.half_round_trip_ns}});
+          },
+          [&](const wire::RunStarted& e) {
+            started_ = true;
+            deadline_ns_ = clock_.now_ns() +
+                           static_cast<uint64_t>((setup_.planned_duration_s + end_patience_s) * ns_per_s);
+            document({{"record", "run_started"}, {"tick", e.tick}});
+          },
+          [&](const wire::SegmentStarted& e) {
+            document({{"record", "segment"}, {"segment", e.segment}, {"tick", e.tick}});
+          },
+          [&](const wire::Trigger& e) {
+            ++outcome_.counts.triggers;
+            document({{"record", "trigger"}, {"cycle", e.cycle}, {"tick", e.tick}, {"r_wave", e.r_wave}});
+          },
+          [&](const wire::PositionBatch& e) {
+            PositionBlock block{e.first_index, e.first_tick, e.period_ticks, {}};
+            block.microsteps.assign(e.position_microsteps.begin(), e.position_microsteps.begin() + e.count);
+            write(RecordKind::positions, encode(block));
+          },
+          [&](const wire::RunEnded& e) {
+            outcome_.cycles = e.cycles;
+            document({{"record", "run_ended"},
+                      {"reason", wire::run_end_name(e.reason)},
+                      {"tick", e.tick},
+                      {"cycles", e.cycles},
+                      {"triggers", e.triggers},
+                      {"r_waves", e.r_waves}});
+            if (e.triggers != outcome_.counts.triggers) {
+              remark("error", "triggers",
+                     fmt::format("the controller raised {} triggers, {} were reported", e.triggers,
+                                 outcome_.counts.triggers));
+            }
+            end(std::string(wire::run_end_name(e.reason)));
+          },
+          [&](const wire::FaultRaised& e) {
+            remark("error", std::string(wire::fault_name(e.fault)),
+                   fmt::format("{} {}", wire::fault_explanation(e.fault), wire::fault_remedy(e.fault)),
+                   e.tick);
+          },
+          [&](const wire::Nak& e) {
+            remark("error", "refused", std::string(wire::refusal_explanation(e.refusal)));
+            if (!started_) end("refused");
+          },
+          [&](const wire::StateChanged&) {},
+          [&](const LinkBroken& e) {
+            remark("error", "link_lost", e.reason + "; the pump stops by itself");
+            end("link_lost");
+          },
+      },
+      event);
+}
+
+void Acquisition::remark(const std::string& level, const std::string& code, const std::string& text,
+                         std::optional<uint64_t> tick) {
+  json what{{"record", "event"}, {"level", level}, {"code", code}, {"text", text}};
+  if (tick) {
+    what["tick"] = *tick;
+  } else {
+    what["host_ns"] = clock_.now_ns();
+  }
+  write(RecordKind::document, what.dump());
+  hooks_.remark({level, code, text});
+}
+
+void Acquisition::write(RecordKind kind, const auto& payload) {
+  if (journal_.append(kind, payload) || outcome_.end == "journal_failed") return;
+  hooks_.remark({"error", "journal_failed", journal_.problem()});
+  controller_.stop_now();
+  end("journal_failed");
+}
+
+void Acquisition::end(std::string how) {
+  if (!ended_ || how == "journal_failed") outcome_.end = std::move(how);
+  ended_ = true;
+}
+
+void Acquisition::check_deadline() {
+  if (ended_ || clock_.now_ns() < deadline_ns_) return;
+  remark("error", "overdue", started_ ? "the run did not end when it should have" : "the run did not start");
+  controller_.stop_now();
+  end("overdue");
+}
+
+}  // namespace diastole

@@ -1,0 +1,89 @@
+#pragma once
+// The journal: what a run brought in, appended to one file as it comes, so that a crash loses at most the
+// last second. The run file is made from it at the end (host/runfile/assemble.hpp), or by `diastole recover`.
+//
+// A journal is a chain of records, each written with one write(2):
+//
+//   offset  size  field
+//        0     4  magic     "DJR1"
+//        4     4  length    of the payload, little-endian
+//        8     4  sequence  0, 1, 2, ...
+//       12     4  kind      RecordKind
+//       16     n  payload
+//     16+n     4  crc       CRC-32C (Castagnoli) of bytes 0 ... 15+n
+//
+// Every half second another thread asks the kernel to bring it to the disk (fdatasync). A reader takes every
+// record whose CRC holds. It forgives a torn tail, and after damage in the middle it searches for the next
+// whole record; the sequence then tells how many are lost.
+
+#include <atomic>
+#include <condition_variable>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <mutex>
+#include <span>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "host/transport/descriptor.hpp"
+
+namespace diastole {
+
+/// What a payload holds; journal_records.hpp has the coding.
+enum class RecordKind : uint32_t {
+  document = 1,   ///< JSON text: beginning, events, triggers, clock pairs, end
+  samples = 2,    ///< a block of samples
+  positions = 3,  ///< a block of the controller's position stream
+};
+
+class JournalWriter {
+ public:
+  /// Creates the file; it must not exist. Throws HardwareError if it cannot be created.
+  explicit JournalWriter(const std::filesystem::path& path);
+  ~JournalWriter();
+
+  /// Appends one record. False if the disk did not take it whole (full, failed); `problem()` then tells why,
+  /// what was written before stays readable, and nothing more is written.
+  [[nodiscard]] bool append(RecordKind kind, std::span<const uint8_t> payload);
+  [[nodiscard]] bool append(RecordKind kind, const std::string& text);
+  /// Brings everything to the disk now.
+  void sync();
+
+  [[nodiscard]] const std::string& problem() const { return problem_; }
+  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
+
+ private:
+  void sync_in_time(const std::stop_token& stop);
+
+  std::filesystem::path path_;
+  Descriptor file_;
+  uint32_t sequence_ = 0;
+  std::string problem_;
+  std::vector<uint8_t> record_;
+  std::atomic<bool> unsynced_ = false;
+  std::mutex mutex_;
+  std::condition_variable_any wake_;
+  std::jthread syncer_;  // last: it uses the members above
+};
+
+struct JournalRecord {
+  RecordKind kind = RecordKind::document;
+  uint32_t sequence = 0;
+  std::vector<uint8_t> payload;
+};
+
+struct JournalContents {
+  std::string file;
+  std::vector<JournalRecord> records;
+  size_t damaged_bytes = 0;    ///< skipped between whole records
+  size_t torn_tail_bytes = 0;  ///< behind the last whole record
+  size_t records_lost = 0;     ///< by their sequence, before the last whole one
+};
+
+/// Throws InputError if the file cannot be opened or holds no whole record at all.
+JournalContents read_journal(const std::filesystem::path& path);
+JournalContents parse_journal(std::span<const uint8_t> bytes);
+
+}  // namespace diastole

@@ -1,0 +1,16 @@
+#include "host/cli/host_commands.hpp"
+
+namespace diastole {
+
+void add_host_commands(CommandLine& line) {
+  add_daemon(line);
+  add_home(line);
+  add_run(line);
+  add_status(line);
+  add_stop(line);
+  add_inspect(line);
+  add_bin(line);
+  add_recover(line);
+}
+
+}  // namespace diastole

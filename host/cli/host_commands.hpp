@@ -1,0 +1,20 @@
+#pragma once
+// The commands of the host side, one file each.
+
+#include "protocol/contract/command.hpp"
+
+namespace diastole {
+
+void add_daemon(CommandLine& line);
+void add_run(CommandLine& line);
+void add_status(CommandLine& line);
+void add_stop(CommandLine& line);
+void add_home(CommandLine& line);
+void add_inspect(CommandLine& line);
+void add_bin(CommandLine& line);
+void add_recover(CommandLine& line);
+
+/// All of them, in the order in which a session uses them.
+void add_host_commands(CommandLine& line);
+
+}  // namespace diastole

@@ -1,0 +1,130 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <iostream>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "host/cli/host_commands.hpp"
+#include "protocol/runfile/reader.hpp"
+#include "protocol/runfile/soundness.hpp"
+
+namespace diastole {
+namespace {
+
+using nlohmann::json;
+
+struct Range {
+  double least = HUGE_VAL;
+  double most = -HUGE_VAL;
+};
+
+Range range_of(const std::vector<double>& values) {
+  Range range;
+  for (const double value : values) {
+    if (std::isnan(value)) continue;
+    range.least = std::min(range.least, value);
+    range.most = std::max(range.most, value);
+  }
+  return range;
+}
+
+json stream_json(const runfile::StreamFacts& facts) {
+  return {{"rows", facts.rows},
+          {"samples", facts.rows - static_cast<size_t>(facts.missing)},
+          {"missing", facts.missing},
+          {"rate_Hz", facts.rate_Hz}};
+}
+
+json as_json(const runfile::RecordedRun& run, const runfile::Soundness& soundness) {
+  json document{{"run", run.file},
+                {"run_id", run.run_id},
+                {"started_utc", run.started_utc},
+                {"producer", run.producer},
+                {"duration_s", soundness.duration_s},
+                {"scheduled_cycles", soundness.scheduled_cycles},
+                {"triggers", run.trigger_s.size()},
+                {"samples", soundness.pressure.rows - static_cast<size_t>(soundness.pressure.missing)},
+                {"pressure", stream_json(soundness.pressure)},
+                {"pump", stream_json(soundness.pump)},
+                {"gaps", soundness.pressure.missing + soundness.pump.missing + run.missing("trigger")},
+                {"gap_records", run.gaps.size()},
+                {"events", run.events.size()},
+                {"clock", run.clock},
+                {"problems", soundness.problems},
+                {"sound", soundness.sound()}};
+  document["channels"] = json::object();
+  for (const auto& [name, values_kPa] : run.pressure.channels) {
+    const Range range = range_of(values_kPa);
+    document["channels"][name] = {{"min_kPa", range.least}, {"max_kPa", range.most}};
+  }
+  document["segments"] = json::array();
+  for (const runfile::Segment& segment : run.segments) {
+    document["segments"].push_back({{"start_s", segment.start_s},
+                                    {"waveform", segment.waveform},
+                                    {"stroke_mL", segment.stroke_mL},
+                                    {"period_s", segment.period_s},
+                                    {"offset_mL", segment.offset_mL},
+                                    {"cycles", segment.cycles}});
+  }
+  document["flow_segments"] = json::array();
+  for (const auto& [segment, flow] : run.flow)
+    document["flow_segments"].push_back(segment);
+  return document;
+}
+
+void show(const runfile::RecordedRun& run, const runfile::Soundness& soundness) {
+  fmt::print("{}\n  run {} of {}, by {}\n", run.file, run.run_id, run.started_utc, run.producer);
+  for (size_t i = 0; i < run.segments.size(); ++i) {
+    const runfile::Segment& s = run.segments[i];
+    fmt::print("  segment {}: {} x {} of {:g} mL in {:g} s from {:.3f} s, offset {:g} mL{}\n", i, s.cycles,
+               s.waveform, s.stroke_mL, s.period_s, s.start_s, s.offset_mL,
+               run.flow.contains(i) ? ", with phase-contrast volumes" : "");
+  }
+  const auto stream = [](const char* name, const runfile::StreamFacts& facts) {
+    fmt::print("  {}: {} rows at {:.2f} Hz, {} missing\n", name, facts.rows, facts.rate_Hz, facts.missing);
+  };
+  stream("pressure", soundness.pressure);
+  for (const auto& [name, values_kPa] : run.pressure.channels) {
+    const Range range = range_of(values_kPa);
+    fmt::print("    {}: {:.3f} to {:.3f} kPa\n", name, range.least, range.most);
+  }
+  stream("pump", soundness.pump);
+  fmt::print("  triggers: {} for {} cycles\n", run.trigger_s.size(), soundness.scheduled_cycles);
+  for (const auto& [name, value] : run.clock)
+    fmt::print("  clock {}: {:g}\n", name, value);
+  for (const runfile::Event& event : run.events)
+    fmt::print("  {:.3f} s {} {}: {}\n", event.time_s, event.level, event.code, event.text);
+  if (soundness.sound()) {
+    fmt::print("sound: nothing is missing\n");
+    return;
+  }
+  fmt::print("not sound:\n");
+  for (const std::string& problem : soundness.problems)
+    fmt::print("  {}\n", problem);
+}
+
+}  // namespace
+
+void add_inspect(CommandLine& line) {
+  auto file = std::make_shared<std::string>();
+  CLI::App* command =
+      line.add("inspect", "what is in a run file, and whether it is sound",
+               "  diastole inspect gel.run.h5\n"
+               "  diastole inspect gel.run.h5 --json | jq .sound\n"
+               "Exit code 1: the file is whole, but the run is not sound (gaps, triggers, faults).");
+  command->add_option("RUN", *file, "run file")->required();
+  line.on_run(command, [file](const CommandOutput& out) {
+    const runfile::RecordedRun run = runfile::read_run(*file);
+    const runfile::Soundness soundness = runfile::assess(run);
+    if (out.json) {
+      std::cout << as_json(run, soundness).dump(2) << '\n';
+    } else {
+      show(run, soundness);
+    }
+    return soundness.sound() ? ExitCode::done : ExitCode::negative;
+  });
+}
+
+}  // namespace diastole

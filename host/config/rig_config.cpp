@@ -1,0 +1,140 @@
+#include "host/config/rig_config.hpp"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdlib>
+#include <numbers>
+
+namespace diastole {
+namespace {
+
+constexpr std::array optional_numbers{
+    "hose_wave_speed_m_s", "hose_minor_loss_K", "fluid_viscosity_Pa_s",  "catheter_length_m",
+    "catheter_f0_Hz",      "catheter_zeta",     "atmospheric_kPa",       "specimen_temperature_degC",
+    "cavity_range_kPa",    "pump_range_kPa",    "cavity_resolution_kPa", "pump_resolution_kPa"};
+constexpr std::array optional_texts{"name", "site", "operator", "specimen"};
+
+double disc_area_m2(double diameter_mm) { return std::numbers::pi / 4 * diameter_mm * diameter_mm * 1e-6; }
+
+void read_geometry(TableReader rig, RigConfig& config) {
+  auto& attributes = config.attributes;
+  const double bore_mm = rig.number("bore_mm", {.above = 0});
+  const double screw_rev_per_cm = rig.number("screw_rev_per_cm", {.above = 0});
+  const int64_t steps_per_rev = rig.integer("steps_per_rev", {.at_least = 1});
+  const double hose_length_m = rig.number("hose_length_m", {.above = 0});
+  const double hose_bore_mm = rig.number("hose_bore_mm", {.above = 0});
+  const double density_kg_m3 = rig.number("fluid_density_kg_m3", {.above = 0});
+  attributes = {{"bore_mm", bore_mm},
+                {"screw_rev_per_cm", screw_rev_per_cm},
+                {"steps_per_rev", steps_per_rev},
+                {"microsteps", config.controller.microsteps},
+                {"hose_length_m", hose_length_m},
+                {"hose_bore_mm", hose_bore_mm},
+                {"fluid_density_kg_m3", density_kg_m3}};
+  for (const char* key : optional_numbers) {
+    if (rig.has(key)) attributes[key] = rig.number(key);
+  }
+  for (const char* key : optional_texts) {
+    if (rig.has(key)) attributes[key] = rig.text(key);
+  }
+  rig.finish();
+  const double microsteps_per_m = 100 * screw_rev_per_cm * static_cast<double>(steps_per_rev) *
+                                  static_cast<double>(config.controller.microsteps);
+  config.microstep_mL = 1e6 * disc_area_m2(bore_mm) / microsteps_per_m;
+  config.hose_inertance_kg_m4 = density_kg_m3 * hose_length_m / disc_area_m2(hose_bore_mm);
+  attributes["volume_per_step_mL"] = config.microstep_mL;
+}
+
+MotionLimits read_limits(TableReader table) {
+  MotionLimits limits;
+  limits.travel_mL = table.number_or("travel_mL", limits.travel_mL, {.above = 0, .at_most = 50'000});
+  limits.flow_mL_s = table.number_or("flow_mL_s", limits.flow_mL_s, {.above = 0, .at_most = 10'000});
+  limits.acceleration_mL_s2 =
+      table.number_or("acceleration_mL_s2", limits.acceleration_mL_s2, {.above = 0, .at_most = 1e6});
+  limits.step_rate_Hz =
+      table.number_or("step_rate_Hz", limits.step_rate_Hz, {.at_least = 1, .at_most = 400'000});
+  limits.pressure_kPa = table.number_or("pressure_kPa", limits.pressure_kPa, {.above = 0, .at_most = 10'000});
+  limits.homing_flow_mL_s =
+      table.number_or("homing_flow_mL_s", limits.homing_flow_mL_s, {.above = 0, .at_most = 10'000});
+  table.finish();
+  return limits;
+}
+
+ControllerConfig read_controller(TableReader table) {
+  ControllerConfig controller;
+  controller.port = table.text("port");
+  controller.baud = static_cast<unsigned>(table.integer_or("baud", controller.baud, {.at_least = 9600}));
+  controller.microsteps =
+      table.integer_or("microsteps", controller.microsteps, {.at_least = 1, .at_most = 256});
+  controller.lease_ms = table.integer_or("lease_ms", controller.lease_ms, {.at_least = 100, .at_most = 5000});
+  controller.ttl_width_ms =
+      table.number_or("ttl_width_ms", controller.ttl_width_ms, {.at_least = 0.01, .at_most = 1000});
+  if (auto limits = table.table_if("limits")) controller.limits = read_limits(std::move(*limits));
+  table.finish();
+  return controller;
+}
+
+DaqConfig read_daq(TableReader table) {
+  DaqConfig config;
+  std::vector<std::string> names;
+  for (const daq::Driver& driver : daq::drivers())
+    names.emplace_back(driver.name);
+  config.driver = table.choice("driver", names);
+  std::vector<TableReader> channels = table.tables("channel");
+  if (channels.empty()) table.fail("channel", "is missing", "Add [[daq.channel]] with name = \"cavity\".");
+  for (TableReader& channel : channels) {
+    const ChannelConfig read{channel.text("name"), channel.number("kPa_per_V"),
+                             channel.number_or("zero_V", 0)};
+    const bool named_twice = std::any_of(config.channels.begin(), config.channels.end(),
+                                         [&](const ChannelConfig& each) { return each.name == read.name; });
+    if (named_twice) channel.fail("name", fmt::format("\"{}\" is given twice", read.name), "Rename one.");
+    config.channels.push_back(read);
+  }
+  if (std::none_of(config.channels.begin(), config.channels.end(),
+                   [](const ChannelConfig& each) { return each.name == "cavity"; })) {
+    table.fail("channel", "has no channel named \"cavity\"",
+               "A run file always holds the cavity's pressure.");
+  }
+  const auto driver = std::find(names.begin(), names.end(), config.driver) - names.begin();
+  config.open = daq::drivers()[static_cast<size_t>(driver)].configure(table, channels);
+  for (TableReader& channel : channels)
+    channel.finish();
+  table.finish();
+  return config;
+}
+
+DaemonConfig read_daemon(std::optional<TableReader> table) {
+  DaemonConfig daemon{default_socket(), "journals"};
+  if (!table) return daemon;
+  daemon.socket = table->text_or("socket", daemon.socket);
+  daemon.journal_dir = table->text_or("journal_dir", daemon.journal_dir.string());
+  table->finish();
+  return daemon;
+}
+
+}  // namespace
+
+std::string default_socket() {
+  if (const char* runtime = std::getenv("XDG_RUNTIME_DIR"); runtime != nullptr && *runtime != '\0') {
+    return std::string(runtime) + "/diastole.sock";
+  }
+  return fmt::format("/tmp/diastole-{}.sock", getuid());
+}
+
+RigConfig read_rig(const std::filesystem::path& path) { return read_rig(TableReader::from_file(path)); }
+
+RigConfig read_rig(TableReader root) {
+  root.expect_format("diastole-rig", 1);
+  RigConfig config;
+  config.controller = read_controller(root.table("controller"));
+  read_geometry(root.table("rig"), config);
+  config.daq = read_daq(root.table("daq"));
+  config.daemon = read_daemon(root.table_if("daemon"));
+  root.finish();
+  return config;
+}
+
+}  // namespace diastole

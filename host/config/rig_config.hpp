@@ -1,0 +1,72 @@
+#pragma once
+// The rig file (format "diastole-rig", version 1; example in examples/rig.toml): geometry, controller,
+// instrument, daemon.
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "host/daq/driver.hpp"
+#include "protocol/contract/table_reader.hpp"
+#include "protocol/runfile/run.hpp"
+
+namespace diastole {
+
+/// What the controller must never exceed; it checks a program against them before anything moves.
+struct MotionLimits {
+  double travel_mL = 7000;           ///< largest volume from home
+  double flow_mL_s = 1860;           ///< the motor's 30 kHz in full steps
+  double acceleration_mL_s2 = 1700;  ///< also the deceleration of a controlled stop
+  double step_rate_Hz = 240'000;     ///< in microsteps
+  double pressure_kPa = 79.3;        ///< at the piston, from accelerating the fluid in the hose
+  double homing_flow_mL_s = 5;
+};
+
+struct ControllerConfig {
+  std::string port;
+  unsigned baud = 460800;
+  int64_t microsteps = 8;
+  int64_t lease_ms = 500;  ///< the controller is at rest this long after the host fell silent
+  double ttl_width_ms = 10;
+  MotionLimits limits;
+};
+
+/// Pressure = (volts - zero_V) x kPa_per_V, recorded as /pressure/<name>_kPa.
+struct ChannelConfig {
+  std::string name;
+  double kPa_per_V = 0;
+  double zero_V = 0;
+};
+
+struct DaqConfig {
+  std::string driver;
+  daq::OpenInstrument open;
+  std::vector<ChannelConfig> channels;
+};
+
+struct DaemonConfig {
+  std::string socket;
+  std::filesystem::path journal_dir;
+};
+
+struct RigConfig {
+  std::map<std::string, runfile::Attribute, std::less<>>
+      attributes;  ///< of /rig, volume_per_step_mL included
+  ControllerConfig controller;
+  DaqConfig daq;
+  DaemonConfig daemon;
+  double microstep_mL = 0;          ///< bore area / (screw x steps x microsteps)
+  double hose_inertance_kg_m4 = 0;  ///< density x length / bore area
+};
+
+/// Throws InputError with file, line and key.
+RigConfig read_rig(const std::filesystem::path& path);
+RigConfig read_rig(TableReader root);
+
+/// $XDG_RUNTIME_DIR/diastole.sock, or /tmp/diastole-UID.sock.
+std::string default_socket();
+
+}  // namespace diastole

@@ -1,0 +1,359 @@
+#include "host/controller/controller_client.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <random>
+
+#include "protocol/contract/input_error.hpp"
+#include "protocol/wire/wire_text.hpp"
+
+namespace diastole {
+namespace {
+
+constexpr uint64_t ns_per_ms = 1'000'000;
+constexpr uint64_t ns_per_us = 1'000;
+constexpr uint64_t heartbeat_interval_ns = 80 * ns_per_ms;
+constexpr uint64_t time_question_interval_ns = 250 * ns_per_ms;
+constexpr uint64_t time_answer_patience_ns = 20 * ns_per_ms;
+constexpr uint64_t fine_step_ns = 200 * ns_per_us;  // while an answer is awaited
+constexpr uint64_t answer_patience_ns = 1'000 * ns_per_ms;
+constexpr uint64_t open_patience_ns = 1'500 * ns_per_ms;
+constexpr uint64_t silence_patience_ns = 1'000 * ns_per_ms;
+
+uint32_t whole(double value) { return static_cast<uint32_t>(std::llround(value)); }
+
+struct LimitInWords {
+  double scale;  // wire's unit to the user's
+  const char* unit;
+  const char* remedy;
+};
+
+LimitInWords words_for(wire::Limit limit) {
+  switch (limit) {
+    case wire::Limit::travel:
+      return {1e-3, "mL", "Reduce stroke_mL or offset_mL."};
+    case wire::Limit::flow:
+      return {1e-3, "mL/s", "Reduce stroke_mL or lengthen period_s."};
+    case wire::Limit::acceleration:
+      return {1e-3, "mL/s2", "Reduce stroke_mL or lengthen period_s; a parabolic waveform needs least."};
+    case wire::Limit::step_rate:
+      return {1, "microsteps/s", "Reduce stroke_mL, lengthen period_s, or use fewer microsteps."};
+    case wire::Limit::pressure:
+      return {1e-3, "kPa",
+              "Reduce stroke_mL or lengthen period_s: the fluid in the hose is too hard to move."};
+    case wire::Limit::stroke_at_least:
+      return {1e-6, "mL", "Enlarge stroke_mL to at least one microstep."};
+    case wire::Limit::stopping_time:
+      return {1e-6, "s", "Reduce stroke_mL or lengthen period_s, or raise lease_ms in the rig file."};
+    case wire::Limit::ttl_width:
+      return {1e-3, "ms", "Reduce ttl_width_ms in the rig file or lengthen period_s."};
+    case wire::Limit::r_wave_spacing:
+      return {1e-6, "s", "Lengthen period_s or raise gate_every."};
+    case wire::Limit::none:
+      break;
+  }
+  return {1, "", "Change the program."};
+}
+
+[[noreturn]] void refuse_program(const Experiment& experiment, const wire::Nak& nak) {
+  const std::string place = fmt::format("segment[{}]", nak.segment);
+  if (nak.refusal == wire::Refusal::limit_exceeded) {
+    const LimitInWords words = words_for(nak.limit);
+    throw InputError({experiment.file, place,
+                      fmt::format("the controller refuses it: limit {}, asked {:g} {}, allowed {:g} {}",
+                                  wire::limit_name(nak.limit), words.scale * static_cast<double>(nak.asked),
+                                  words.unit, words.scale * static_cast<double>(nak.allowed), words.unit),
+                      words.remedy});
+  }
+  if (nak.refusal == wire::Refusal::unknown_waveform) {
+    throw InputError({experiment.file, place, "this firmware has no such waveform",
+                      "Use parabolic or sinusoidal, or update the firmware."});
+  }
+  if (nak.refusal == wire::Refusal::program_full) {
+    throw InputError({experiment.file, place, "is more than the controller's program holds",
+                      "Split the experiment into several runs."});
+  }
+  throw InputError({experiment.file, place,
+                    fmt::format("the controller refuses it: {}", wire::refusal_explanation(nak.refusal)),
+                    ""});
+}
+
+std::string remedy_for(wire::Refusal refusal) {
+  switch (refusal) {
+    case wire::Refusal::wrong_state:
+      return "`diastole status` tells the state; an unhomed pump needs `diastole home` first.";
+    case wire::Refusal::estop_pressed:
+      return "Make the rig safe and release the emergency stop.";
+    case wire::Refusal::limit_switch_closed:
+      return "Free the piston from the far limit switch by hand, then `diastole home`.";
+    default:
+      return "`diastole status` tells more; restart the daemon if it persists.";
+  }
+}
+
+}  // namespace
+
+ControllerClient::ControllerClient(Clock& clock, const RigConfig& rig, OpenLine open_line)
+    : clock_(clock), rig_(rig), open_line_(std::move(open_line)) {
+  std::random_device random;
+  session_ = static_cast<uint16_t>(random());
+  lease_id_ = random() | 1U;
+}
+
+void ControllerClient::fail(std::string problem, std::string remedy) const {
+  throw HardwareError("controller at " + rig_.controller.port, std::move(problem), std::move(remedy));
+}
+
+void ControllerClient::connect() {
+  disconnect();
+  line_ = open_line_();
+  clock_.line_opened(*line_);
+  link_.open(++session_, clock_.now_ns() / ns_per_us);
+  const uint64_t end_ns = clock_.now_ns() + open_patience_ns;
+  while (link_.state() != wire::ReliableLink::State::open && !line_->lost() && clock_.now_ns() < end_ns)
+    turn();
+  if (link_.state() != wire::ReliableLink::State::open) {
+    disconnect();
+    fail("does not answer", "Check that it is powered and runs the firmware (diastole flash), and `baud`.");
+  }
+  greet();
+  configure();
+}
+
+void ControllerClient::disconnect() {
+  link_.close();
+  line_.reset();
+  hello_.reset();
+  time_asked_ns_ = 0;
+}
+
+void ControllerClient::greet() {
+  const Answer answer = request(wire::HelloRequest{.schema_hash = wire::kSchemaHash});
+  if (!answer.hello) {
+    disconnect();
+    fail("does not introduce itself", "Flash it again (diastole flash), then restart the daemon.");
+  }
+  if (answer.hello->schema_hash != wire::kSchemaHash) {
+    const wire::Hello hello = *answer.hello;
+    disconnect();
+    fail(fmt::format("its firmware {}.{}.{} speaks protocol {:08x}, this program {:08x}", hello.version_major,
+                     hello.version_minor, hello.version_patch, hello.schema_hash, wire::kSchemaHash),
+         "Flash the firmware that belongs to this program: diastole flash IMAGE --port " +
+             rig_.controller.port);
+  }
+  hello_ = answer.hello;
+  next_time_question_ns_ = clock_.now_ns();
+}
+
+void ControllerClient::configure() {
+  const MotionLimits& limits = rig_.controller.limits;
+  wire::Configure message;
+  microstep_pL_ = whole(1e9 * rig_.microstep_mL);
+  message.microstep_pL = microstep_pL_;
+  message.travel_uL = whole(1e3 * limits.travel_mL);
+  message.flow_uL_per_s = whole(1e3 * limits.flow_mL_s);
+  message.acceleration_uL_per_s2 = whole(1e3 * limits.acceleration_mL_s2);
+  message.step_rate_Hz = whole(limits.step_rate_Hz);
+  message.pressure_Pa = whole(1e3 * limits.pressure_kPa);
+  message.inertance_kg_per_m4 = whole(rig_.hose_inertance_kg_m4);
+  message.lease_us = static_cast<uint32_t>(rig_.controller.lease_ms * 1000);
+  message.homing_flow_uL_per_s = whole(1e3 * limits.homing_flow_mL_s);
+  demand(message);
+}
+
+ProgramPlan ControllerClient::load(const Experiment& experiment) {
+  demand(wire::ClearProgram{});
+  for (const ExperimentSegment& segment : experiment.segments) {
+    wire::AddSegment message;
+    message.waveform = segment.waveform;
+    message.cycles = static_cast<uint32_t>(segment.cycles);
+    message.stroke_nL = whole(1e6 * segment.stroke_mL);
+    message.offset_nL = whole(1e6 * segment.offset_mL);
+    message.period_us = whole(1e6 * segment.period_s);
+    Answer answer = request(message);
+    if (answer.nak) {
+      answer.nak->segment = static_cast<uint16_t>(&segment - experiment.segments.data());
+      refuse_program(experiment, *answer.nak);
+    }
+  }
+  plan_.clear();
+  wire::Arm arm;
+  arm.gate_every = static_cast<uint16_t>(experiment.gate_every);
+  arm.rest_us = whole(1e6 * experiment.rest_s);
+  arm.ttl_width_us = whole(1e3 * rig_.controller.ttl_width_ms);
+  const double ticks = static_cast<double>(hello_->tick_rate_Hz) / std::max(300.0, experiment.sample_rate_Hz);
+  arm.position_period_ticks = std::max(1'000U, static_cast<uint32_t>(ticks));
+  const Answer answer = request(arm);
+  if (answer.nak && (answer.nak->refusal == wire::Refusal::limit_exceeded ||
+                     answer.nak->refusal == wire::Refusal::unknown_waveform)) {
+    refuse_program(experiment, *answer.nak);
+  }
+  if (answer.nak) {
+    fail(std::string(wire::refusal_explanation(answer.nak->refusal)), remedy_for(answer.nak->refusal));
+  }
+  return plan_;
+}
+
+void ControllerClient::home() { demand(wire::Home{.lease_id = lease_id_}); }
+
+void ControllerClient::clear_fault() { demand(wire::ClearFault{}); }
+
+wire::Status ControllerClient::status() {
+  const Answer answer = request(wire::StatusRequest{});
+  if (!answer.status) fail("does not tell its status", "Restart the daemon if it persists.");
+  return *answer.status;
+}
+
+void ControllerClient::start() { post(wire::Start{.lease_id = lease_id_}); }
+void ControllerClient::stop_at_cycle_end() { post(wire::StopAtCycleEnd{}); }
+void ControllerClient::stop_now() { post(wire::StopNow{}); }
+
+std::vector<ControllerEvent> ControllerClient::take_events() { return std::exchange(events_, {}); }
+
+uint64_t ControllerClient::next_due_ns() const {
+  if (line_ == nullptr) return UINT64_MAX;
+  const uint64_t due_ns = std::min(next_heartbeat_ns_, next_time_question_ns_);
+  return time_asked_ns_ != 0 ? std::min(due_ns, clock_.now_ns() + fine_step_ns) : due_ns;
+}
+
+void ControllerClient::service() {
+  if (line_ == nullptr) return;
+  receive();
+  if (link_.state() == wire::ReliableLink::State::lost) return broke("the controller was reset");
+  if (line_->lost()) return broke("the serial line is gone");
+  keep_alive();
+  transmit();
+}
+
+void ControllerClient::turn() {
+  service();
+  if (line_ == nullptr) return;
+  clock_.sleep_until_ns(std::min(clock_.now_ns() + fine_step_ns, next_due_ns()), line_.get());
+  service();
+}
+
+void ControllerClient::receive() {
+  std::array<uint8_t, 512> block{};
+  const uint64_t now_us = clock_.now_ns() / ns_per_us;
+  for (size_t count = line_->read(block); count > 0; count = line_->read(block)) {
+    for (size_t i = 0; i < count; ++i) {
+      const auto message = link_.receive(block[i], now_us);
+      if (!message) continue;
+      wire::visit_message(message->type, message->payload,
+                          wire::overloaded{
+                              [&](const wire::Hello& m) { take_answer(m); },
+                              [&](const wire::Ack& m) { take_answer(m); },
+                              [&](const wire::Nak& m) { take_answer(m); },
+                              [&](const wire::Status& m) { take_answer(m); },
+                              [&](const wire::TimeSync& m) { take(m); },
+                              [&](const wire::SegmentPlanned& m) { plan_.push_back(m); },
+                              [&](const auto& m) {
+                                if constexpr (std::is_constructible_v<ControllerEvent, decltype(m)>) {
+                                  events_.emplace_back(m);
+                                }
+                              },
+                          });
+    }
+  }
+}
+
+template <class Message>
+void ControllerClient::take_answer(const Message& message) {
+  if (awaited_ != message.request_id) {
+    if constexpr (std::is_same_v<Message, wire::Nak>) events_.emplace_back(message);
+    return;
+  }
+  awaited_.reset();
+  if constexpr (std::is_same_v<Message, wire::Hello>) answer_.hello = message;
+  if constexpr (std::is_same_v<Message, wire::Ack>) answer_.ack = message;
+  if constexpr (std::is_same_v<Message, wire::Nak>) answer_.nak = message;
+  if constexpr (std::is_same_v<Message, wire::Status>) answer_.status = message;
+}
+
+void ControllerClient::transmit() {
+  const uint64_t now_us = clock_.now_ns() / ns_per_us;
+  for (auto bytes = link_.transmit(now_us); !bytes.empty(); bytes = link_.transmit(now_us))
+    line_->write(bytes);
+}
+
+void ControllerClient::keep_alive() {
+  const uint64_t now_ns = clock_.now_ns();
+  if (!hello_) return;
+  const uint64_t heard_ns = link_.last_heard_us() * ns_per_us;
+  if (now_ns > heard_ns + silence_patience_ns) return broke("the controller has fallen silent");
+  if (now_ns >= next_heartbeat_ns_) {
+    std::array<uint8_t, wire::kMaxPayloadBytes> memory{};
+    (void)link_.send(wire::Heartbeat::kType, wire::encode(wire::Heartbeat{.lease_id = lease_id_}, memory));
+    next_heartbeat_ns_ = now_ns + heartbeat_interval_ns;
+  }
+  if (time_asked_ns_ != 0 && now_ns > time_asked_ns_ + time_answer_patience_ns) time_asked_ns_ = 0;
+  if (now_ns >= next_time_question_ns_) ask_time();
+}
+
+void ControllerClient::ask_time() {
+  std::array<uint8_t, wire::kMaxPayloadBytes> memory{};
+  time_asked_ns_ = clock_.now_ns();
+  next_time_question_ns_ = time_asked_ns_ + time_question_interval_ns;
+  (void)link_.send(wire::TimeSyncRequest::kType,
+                   wire::encode(wire::TimeSyncRequest{.token = ++time_token_}, memory));
+}
+
+void ControllerClient::take(const wire::TimeSync& sync) {
+  if (sync.token != time_token_ || time_asked_ns_ == 0) return;
+  const uint64_t received_ns = clock_.now_ns();
+  events_.emplace_back(ClockReading{time_asked_ns_ + (received_ns - time_asked_ns_) / 2,
+                                    sync.received_tick + (sync.replied_tick - sync.received_tick) / 2,
+                                    (received_ns - time_asked_ns_) / 2});
+  time_asked_ns_ = 0;
+}
+
+void ControllerClient::broke(std::string reason) {
+  disconnect();
+  awaited_.reset();
+  events_.emplace_back(LinkBroken{std::move(reason)});
+}
+
+template <class Message>
+uint16_t ControllerClient::post(Message message) {
+  if (line_ == nullptr) return 0;
+  std::array<uint8_t, wire::kMaxPayloadBytes> memory{};
+  message.request_id = next_request_id_++;
+  (void)link_.send(Message::kType, wire::encode(message, memory));
+  transmit();
+  return message.request_id;
+}
+
+template <class Message>
+ControllerClient::Answer ControllerClient::request(Message message) {
+  if (line_ == nullptr) fail("is not connected", "Check cable and power; the daemon reconnects by itself.");
+  answer_ = {};
+  awaited_ = post(message);
+  const uint64_t end_ns = clock_.now_ns() + answer_patience_ns;
+  while (awaited_ && line_ != nullptr && clock_.now_ns() < end_ns)
+    turn();
+  if (line_ == nullptr) fail("the line broke", "Check the cable; the daemon reconnects by itself.");
+  if (awaited_) {
+    awaited_.reset();
+    fail("did not answer in time", "Check the cable and the baud rate.");
+  }
+  return answer_;
+}
+
+template <class Message>
+void ControllerClient::demand(Message message) {
+  const Answer answer = request(message);
+  if (answer.nak) {
+    const std::string limit =
+        answer.nak->refusal == wire::Refusal::limit_exceeded
+            ? fmt::format(" (limit {}, asked {}, allowed {})", wire::limit_name(answer.nak->limit),
+                          answer.nak->asked, answer.nak->allowed)
+            : "";
+    fail(fmt::format("refused: {}{}", wire::refusal_explanation(answer.nak->refusal), limit),
+         remedy_for(answer.nak->refusal));
+  }
+}
+
+}  // namespace diastole

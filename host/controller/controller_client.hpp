@@ -1,0 +1,97 @@
+#pragma once
+// The controller over its serial line: opens the port, agrees on the protocol, keeps the lease, compares
+// clocks.
+
+#include <functional>
+#include <memory>
+#include <optional>
+
+#include "host/config/experiment.hpp"
+#include "host/config/rig_config.hpp"
+#include "host/controller/controller.hpp"
+#include "host/transport/clock.hpp"
+#include "protocol/wire/reliable_link.hpp"
+
+namespace diastole {
+
+/// What an armed program will do, as the controller planned it.
+using ProgramPlan = std::vector<wire::SegmentPlanned>;
+
+class ControllerClient final : public Controller {
+ public:
+  using OpenLine = std::function<std::unique_ptr<ByteLine>()>;
+
+  ControllerClient(Clock& clock, const RigConfig& rig, OpenLine open_line);
+
+  /// Opens the line, checks that both sides speak the same protocol and sends geometry and limits.
+  /// Throws HardwareError with the remedy in words.
+  void connect();
+  void disconnect();
+  [[nodiscard]] bool connected() const { return line_ != nullptr && hello_.has_value(); }
+  /// Of the controller that answered; precondition: connected().
+  [[nodiscard]] const wire::Hello& hello() const { return *hello_; }
+  [[nodiscard]] uint32_t microstep_pL() const { return microstep_pL_; }
+
+  /// Loads and checks a whole program; afterwards the controller is armed. A program beyond a limit throws
+  /// InputError naming the experiment's segment, the limit, what was asked and what is allowed.
+  ProgramPlan load(const Experiment& experiment);
+  void home();
+  void clear_fault();
+  wire::Status status();
+
+  void service() override;
+  [[nodiscard]] uint64_t next_due_ns() const override;
+  std::vector<ControllerEvent> take_events() override;
+  void start() override;
+  void stop_at_cycle_end() override;
+  void stop_now() override;
+  ByteLine* line() override { return line_.get(); }
+
+ private:
+  struct Answer {
+    std::optional<wire::Ack> ack;
+    std::optional<wire::Nak> nak;
+    std::optional<wire::Hello> hello;
+    std::optional<wire::Status> status;
+  };
+
+  template <class Message>
+  uint16_t post(Message message);
+  template <class Message>
+  Answer request(Message message);
+  template <class Message>
+  void demand(Message message);
+  void greet();
+  void configure();
+  void turn();
+  void receive();
+  void transmit();
+  void keep_alive();
+  void ask_time();
+  void take(const wire::TimeSync& sync);
+  template <class Message>
+  void take_answer(const Message& message);
+  void broke(std::string reason);
+  [[noreturn]] void fail(std::string problem, std::string remedy) const;
+
+  Clock& clock_;
+  const RigConfig& rig_;
+  OpenLine open_line_;
+  std::unique_ptr<ByteLine> line_;
+  wire::ReliableLink link_{wire::ReliableLink::Role::host};
+  std::optional<wire::Hello> hello_;
+  uint16_t session_ = 0;
+  uint32_t lease_id_ = 0;
+  uint32_t microstep_pL_ = 0;
+  uint16_t next_request_id_ = 1;
+  uint64_t next_heartbeat_ns_ = 0;
+  uint64_t next_time_question_ns_ = 0;
+  uint32_t time_token_ = 0;
+  uint64_t time_asked_ns_ = 0;  // 0: no question open
+  std::optional<uint16_t> awaited_;
+  Answer answer_;
+  ProgramPlan plan_;
+  std::vector<ControllerEvent> events_;
+};
+
+}  // namespace diastole

@@ -1,0 +1,363 @@
+#include "host/daemon/rig_service.hpp"
+
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <chrono>
+#include <ctime>
+
+#include "host/daemon/json_rpc.hpp"
+#include "host/daemon/uuid.hpp"
+#include "host/runfile/assemble.hpp"
+#include "host/runfile/writer.hpp"
+#include "host/transport/conducted_clock.hpp"
+#include "host/transport/serial_port.hpp"
+#include "protocol/contract/input_error.hpp"
+#include "protocol/wire/wire_text.hpp"
+
+namespace diastole {
+namespace {
+
+using nlohmann::json;
+
+constexpr uint64_t idle_step_ns = 20'000'000;
+constexpr uint64_t reconnect_interval_ns = 1'000'000'000;
+constexpr uint64_t homing_patience_ns = 1'800'000'000'000;
+constexpr uint64_t homing_step_ns = 10'000'000;
+constexpr int conducted_timeout_ms = 5000;  // wall time; virtual time stands still meanwhile
+
+std::unique_ptr<Clock> make_clock(const std::string& conductor) {
+  if (conductor.empty()) return std::make_unique<RealClock>();
+  return std::make_unique<ConductedClock>(conductor);
+}
+
+json attributes_as_json(const std::map<std::string, runfile::Attribute, std::less<>>& attributes) {
+  json object = json::object();
+  for (const auto& [name, value] : attributes) {
+    std::visit([&, key = name](const auto& v) { object[key] = v; }, value);
+  }
+  return object;
+}
+
+json planned_segments(const Experiment& experiment, const ProgramPlan& plan) {
+  json segments = json::array();
+  double start_s = experiment.rest_s;
+  for (size_t i = 0; i < experiment.segments.size(); ++i) {
+    const ExperimentSegment& segment = experiment.segments[i];
+    if (i < plan.size()) start_s = 1e-6 * static_cast<double>(plan[i].start_us);
+    segments.push_back({{"start_s", start_s},
+                        {"waveform", segment.waveform_name},
+                        {"stroke_mL", segment.stroke_mL},
+                        {"period_s", segment.period_s},
+                        {"offset_mL", segment.offset_mL},
+                        {"cycles", segment.cycles}});
+    start_s += segment.period_s * static_cast<double>(segment.cycles);
+  }
+  return segments;
+}
+
+double duration_s(const Experiment& experiment, const ProgramPlan& plan) {
+  if (plan.empty()) return experiment.least_duration_s();
+  return 1e-6 * static_cast<double>(plan.back().start_us + plan.back().duration_us);
+}
+
+std::string utc_now() { return fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr))); }
+
+}  // namespace
+
+RigService::RigService(RigConfig rig, const RigServiceOptions& options)
+    : rig_(std::move(rig)), options_(options), clock_(make_clock(options.conductor)) {
+  std::filesystem::create_directories(rig_.daemon.journal_dir);
+  controller_ = std::make_unique<ControllerClient>(*clock_, rig_, [this]() -> std::unique_ptr<ByteLine> {
+    return std::make_unique<SerialPort>(rig_.controller.port, rig_.controller.baud);
+  });
+  controller_->connect();
+  instrument_ = rig_.daq.open({options.daq_address, clock_->stands_still() ? conducted_timeout_ms : 0});
+  spdlog::info("controller at {}, instrument {}", rig_.controller.port, instrument_->describe());
+  thread_ = std::jthread([this](const std::stop_token& stop) { work(stop); });
+}
+
+RigService::~RigService() {
+  stop(StopRequest::now);
+  thread_.request_stop();
+  wake_.notify_all();
+}
+
+void RigService::work(const std::stop_token& stop) {
+  while (!stop.stop_requested()) {
+    try {
+      if (auto order = next_order()) {
+        carry_out(std::move(*order));
+      } else if (clock_->stands_still()) {
+        std::unique_lock lock(mutex_);
+        wake_.wait(lock, stop, [this] { return !orders_.empty(); });
+      } else {
+        idle_turn();
+      }
+    } catch (const std::exception& error) {
+      spdlog::error("{}", error.what());
+    }
+  }
+}
+
+void RigService::idle_turn() {
+  reconnect_if_due();
+  controller_->service();
+  for (const ControllerEvent& event : controller_->take_events()) {
+    if (const auto* broken = std::get_if<LinkBroken>(&event)) spdlog::error("{}", broken->reason);
+    if (const auto* fault = std::get_if<wire::FaultRaised>(&event)) {
+      spdlog::error("{} {}", wire::fault_explanation(fault->fault), wire::fault_remedy(fault->fault));
+    }
+  }
+  clock_->sleep_until_ns(std::min(clock_->now_ns() + idle_step_ns, controller_->next_due_ns()),
+                         controller_->line());
+}
+
+void RigService::reconnect_if_due() {
+  if (controller_->connected() || clock_->now_ns() < next_reconnect_ns_) return;
+  next_reconnect_ns_ = clock_->now_ns() + reconnect_interval_ns;
+  controller_->connect();
+  spdlog::info("controller at {} is back", rig_.controller.port);
+}
+
+void RigService::give(Order order) {
+  const std::lock_guard lock(mutex_);
+  orders_.push_back(std::move(order));
+  wake_.notify_all();
+}
+
+std::optional<RigService::Order> RigService::next_order() {
+  const std::lock_guard lock(mutex_);
+  if (orders_.empty()) return std::nullopt;
+  Order order = std::move(orders_.front());
+  orders_.pop_front();
+  return order;
+}
+
+void RigService::carry_out(Order order) {
+  try {
+    if (!controller_->connected()) controller_->connect();
+    json result = order.act();
+    if (!result.is_discarded()) order.done(nullptr, std::move(result));
+  } catch (...) {
+    order.done(std::current_exception(), nullptr);
+  }
+}
+
+void RigService::start_run(Experiment experiment, Done done) {
+  // do_run answers by itself when the run begins, long before it ends; a discarded result says so.
+  give({[this, experiment = std::move(experiment), done] {
+          do_run(experiment, done);
+          return json(json::value_t::discarded);
+        },
+        done});
+}
+
+void RigService::home(Done done) {
+  give({[this] { return do_home(); }, std::move(done)});
+}
+
+void RigService::clear_fault(Done done) {
+  give({[this] {
+          controller_->clear_fault();
+          return do_status();
+        },
+        std::move(done)});
+}
+
+void RigService::status(Done done) {
+  {
+    const std::lock_guard lock(mutex_);
+    if (run_ && (run_->state == "running" || run_->state == "writing")) {
+      json snapshot = last_status_;
+      snapshot["state"] = run_->state;
+      snapshot["run_id"] = run_->run_id;
+      return done(nullptr, std::move(snapshot));
+    }
+  }
+  give({[this] { return do_status(); }, std::move(done)});
+}
+
+bool RigService::stop(StopRequest how) {
+  const std::lock_guard lock(mutex_);
+  stop_request_ = std::max(stop_request_, how);
+  return run_ && run_->state == "running";
+}
+
+json RigService::run_progress(size_t first_remark) const {
+  const std::lock_guard lock(mutex_);
+  if (!run_) return nullptr;
+  json remarks = json::array();
+  for (size_t i = first_remark; i < run_->remarks.size(); ++i) {
+    const RunRemark& remark = run_->remarks[i];
+    remarks.push_back({{"level", remark.level}, {"code", remark.code}, {"text", remark.text}});
+  }
+  return {{"run_id", run_->run_id},
+          {"state", run_->state},
+          {"planned_s", run_->planned_s},
+          {"planned_cycles", run_->planned_cycles},
+          {"received", run_->progress.received},
+          {"missing", run_->progress.missing},
+          {"triggers", run_->progress.triggers},
+          {"last_kPa", run_->progress.last_kPa},
+          {"remarks", remarks},
+          {"result", run_->result}};
+}
+
+json RigService::do_home() {
+  {
+    const std::lock_guard lock(mutex_);
+    stop_request_ = StopRequest::none;
+  }
+  controller_->home();
+  const uint64_t end_ns = clock_->now_ns() + homing_patience_ns;
+  bool stopping = false;
+  for (wire::Status status = controller_->status(); status.state == wire::State::homing;
+       status = controller_->status()) {
+    const bool asked = [&] {
+      const std::lock_guard lock(mutex_);
+      return stop_request_ != StopRequest::none;
+    }();
+    if ((asked || clock_->now_ns() > end_ns) && !std::exchange(stopping, true)) controller_->stop_now();
+    for (const uint64_t until_ns = clock_->now_ns() + homing_step_ns; clock_->now_ns() < until_ns;) {
+      clock_->sleep_until_ns(std::min(until_ns, controller_->next_due_ns()), controller_->line());
+      controller_->service();
+    }
+  }
+  controller_->take_events();
+  json result = do_status();
+  if (result["state"] != "homed") {
+    throw HardwareError("controller at " + rig_.controller.port,
+                        fmt::format("homing ended in state {}: {}", result["state"].get<std::string>(),
+                                    result["fault_text"].get<std::string>()),
+                        result["remedy"].get<std::string>());
+  }
+  return result;
+}
+
+json RigService::do_status() {
+  const wire::Status status = controller_->status();
+  const wire::Hello& hello = controller_->hello();
+  const double position_mL =
+      1e-9 * static_cast<double>(controller_->microstep_pL()) * status.position_microsteps;
+  json result{
+      {"state", wire::state_name(status.state)},
+      {"fault", status.fault == wire::Fault::none ? json() : json(wire::fault_name(status.fault))},
+      {"fault_text", wire::fault_explanation(status.fault)},
+      {"remedy", wire::fault_remedy(status.fault)},
+      {"firmware", fmt::format("{}.{}.{}", hello.version_major, hello.version_minor, hello.version_patch)},
+      {"board", hello.board_id},
+      {"boot_id", hello.boot_id},
+      {"position_mL", position_mL},
+      {"triggers", status.triggers},
+      {"steps", status.steps},
+      {"link", {{"crc_errors", status.crc_errors}, {"retransmissions", status.retransmissions}}},
+      {"controller", rig_.controller.port},
+      {"instrument", instrument_->describe()}};
+  const std::lock_guard lock(mutex_);
+  last_status_ = result;
+  return result;
+}
+
+void RigService::do_run(const Experiment& experiment, const Done& done) {
+  (void)do_status();
+  const ProgramPlan plan = controller_->load(experiment);
+  RunRecord record;
+  record.run_id = new_uuid();
+  record.planned_s = duration_s(experiment, plan);
+  record.planned_cycles = experiment.cycles();
+  const std::filesystem::path path =
+      std::filesystem::absolute(rig_.daemon.journal_dir) / (record.run_id + ".journal");
+  JournalWriter journal(path);
+  write_beginning(journal, record, experiment, plan);
+  {
+    const std::lock_guard lock(mutex_);
+    stop_request_ = StopRequest::none;
+    run_ = record;
+  }
+  spdlog::info("run {} begins: {} cycles, {:.1f} s", record.run_id, record.planned_cycles, record.planned_s);
+  done(nullptr, {{"run_id", record.run_id}});
+  json result;
+  try {
+    result = finish(path, acquire(journal, experiment, record.planned_s));
+  } catch (const std::exception& error) {
+    result = {{"end", "failed"}, {"problem", error.what()}, {"journal", path.string()}};
+  }
+  spdlog::info("run {} ended: {}", record.run_id, result.dump());
+  const std::lock_guard lock(mutex_);
+  run_->state = result.contains("run_file") ? "done" : "failed";
+  run_->result = std::move(result);
+}
+
+void RigService::write_beginning(JournalWriter& journal, const RunRecord& record,
+                                 const Experiment& experiment, const ProgramPlan& plan) {
+  json channels = json::array();
+  for (const ChannelConfig& channel : rig_.daq.channels)
+    channels.push_back(channel.name);
+  json rig = attributes_as_json(rig_.attributes);
+  rig["daq_rate_Hz"] = experiment.sample_rate_Hz;
+  const json beginning{{"record", "begin"},
+                       {"run_id", record.run_id},
+                       {"started_utc", utc_now()},
+                       {"producer", options_.producer},
+                       {"experiment", experiment.text},
+                       {"experiment_file", experiment.file},
+                       {"sample_rate_Hz", experiment.sample_rate_Hz},
+                       {"channels", channels},
+                       {"rig", rig},
+                       {"instrument", instrument_->describe()},
+                       {"tick_rate_Hz", controller_->hello().tick_rate_Hz},
+                       {"microstep_pL", controller_->microstep_pL()},
+                       {"daq_timer_rate_Hz", std::max(1.0, instrument_->timer_rate_Hz())},
+                       {"segments", planned_segments(experiment, plan)}};
+  if (!journal.append(RecordKind::document, beginning.dump())) {
+    throw HardwareError(journal.path().string(), journal.problem(), "Free some space on that disk.");
+  }
+}
+
+RunOutcome RigService::acquire(JournalWriter& journal, const Experiment& experiment, double planned_s) {
+  Acquisition acquisition(*clock_, *controller_, *instrument_, journal,
+                          {experiment.sample_rate_Hz, rig_.daq.channels, planned_s});
+  return acquisition.run({
+      .stop =
+          [this] {
+            const std::lock_guard lock(mutex_);
+            return stop_request_;
+          },
+      .progress =
+          [this](const RunProgress& progress) {
+            const std::lock_guard lock(mutex_);
+            run_->progress = progress;
+          },
+      .remark =
+          [this](const RunRemark& remark) {
+            spdlog::log(remark.level == "info" ? spdlog::level::info : spdlog::level::warn, "{}",
+                        remark.text);
+            const std::lock_guard lock(mutex_);
+            run_->remarks.push_back(remark);
+          },
+  });
+}
+
+json RigService::finish(const std::filesystem::path& journal, const RunOutcome& outcome) {
+  {
+    const std::lock_guard lock(mutex_);
+    run_->state = "writing";
+  }
+  json result{{"end", outcome.end}, {"regular", outcome.regular()}, {"journal", journal.string()}};
+  const AssembledRun assembled = assemble_run(read_journal(journal));
+  std::filesystem::path run_file = journal;
+  run_file.replace_extension(".run.h5");
+  write_run(run_file, assembled.run);
+  result["run_file"] = run_file.string();
+  result["cycles"] = outcome.cycles;
+  result["triggers"] = assembled.run.trigger_s.size();
+  result["samples"] = assembled.samples_received;
+  result["gaps"] = assembled.samples_missing;
+  result["expected"] = assembled.samples_received + assembled.samples_missing;
+  return result;
+}
+
+}  // namespace diastole

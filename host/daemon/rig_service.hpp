@@ -1,0 +1,100 @@
+#pragma once
+// The rig behind the daemon: one thread owns controller, instrument, clock and journal, and carries out one
+// order at a time; everybody else talks to it through this class.
+
+#include <condition_variable>
+#include <deque>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "host/acquisition/acquisition.hpp"
+#include "host/config/experiment.hpp"
+#include "host/config/rig_config.hpp"
+#include "host/controller/controller_client.hpp"
+#include "host/daq/instrument.hpp"
+#include "host/transport/clock.hpp"
+
+namespace diastole {
+
+struct RigServiceOptions {
+  std::string conductor;                   ///< socket of a simulated rig that conducts time; empty: real time
+  std::optional<std::string> daq_address;  ///< instead of the rig file's
+  std::string producer = "diastole";       ///< program and version, for run files
+};
+
+class RigService {
+ public:
+  /// Called once on the rig's thread: with an error, or with a result.
+  using Done = std::function<void(std::exception_ptr error, nlohmann::json result)>;
+
+  /// Opens controller and instrument. Throws HardwareError if one is not there.
+  RigService(RigConfig rig, const RigServiceOptions& options);
+  /// Ends a run by a controlled stop, writes what it has, and closes everything.
+  ~RigService();
+
+  /// Loads and starts an experiment. `done` is called when the controller has accepted it and the run begins
+  /// ({"run_id"}), or with InputError when it cannot be done.
+  void start_run(Experiment experiment, Done done);
+  void home(Done done);
+  void clear_fault(Done done);
+  /// {"state", "fault", "firmware", "position_mL", ...}
+  void status(Done done);
+  /// Stops a run; without one, `false`.
+  bool stop(StopRequest how);
+  /// The present or last run: {"run_id", "state": running|writing|done|failed, "received", "missing",
+  /// "triggers", "last_kPa", "remarks": those from number `first_remark` on, "result"}. null if there was
+  /// none.
+  [[nodiscard]] nlohmann::json run_progress(size_t first_remark) const;
+
+ private:
+  struct Order {
+    std::function<nlohmann::json()> act;
+    Done done;
+  };
+  struct RunRecord {
+    std::string run_id;
+    std::string state = "running";
+    double planned_s = 0;
+    int64_t planned_cycles = 0;
+    RunProgress progress;
+    std::vector<RunRemark> remarks;
+    nlohmann::json result;
+  };
+
+  void work(const std::stop_token& stop);
+  void idle_turn();
+  void give(Order order);
+  [[nodiscard]] std::optional<Order> next_order();
+  void carry_out(Order order);
+  void reconnect_if_due();
+  nlohmann::json do_home();
+  nlohmann::json do_status();
+  void do_run(const Experiment& experiment, const Done& done);
+  void write_beginning(JournalWriter& journal, const RunRecord& record, const Experiment& experiment,
+                       const ProgramPlan& plan);
+  RunOutcome acquire(JournalWriter& journal, const Experiment& experiment, double planned_s);
+  nlohmann::json finish(const std::filesystem::path& journal, const RunOutcome& outcome);
+
+  RigConfig rig_;
+  RigServiceOptions options_;
+  std::unique_ptr<Clock> clock_;
+  std::unique_ptr<daq::Instrument> instrument_;
+  std::unique_ptr<ControllerClient> controller_;
+  uint64_t next_reconnect_ns_ = 0;
+
+  mutable std::mutex mutex_;
+  std::condition_variable_any wake_;
+  std::deque<Order> orders_;
+  StopRequest stop_request_ = StopRequest::none;
+  std::optional<RunRecord> run_;
+  nlohmann::json last_status_;
+  std::jthread thread_;  // last: it uses the members above
+};
+
+}  // namespace diastole

@@ -1,0 +1,96 @@
+#include "host/daemon/run_session.hpp"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <filesystem>
+#include <thread>
+
+#include "host/config/experiment.hpp"
+#include "protocol/contract/input_error.hpp"
+
+namespace diastole {
+namespace {
+
+using nlohmann::json;
+
+void check_output(const std::filesystem::path& output, bool force) {
+  if (std::filesystem::is_directory(output)) {
+    throw InputError({output.string(), "", "is a directory", "Name a file, for example session.run.h5."});
+  }
+  if (std::filesystem::exists(output) && !force) {
+    throw InputError(
+        {output.string(), "", "exists already", "Choose another name, or --force to replace it."});
+  }
+  const auto directory = output.has_parent_path() ? output.parent_path() : std::filesystem::path(".");
+  if (::access(directory.c_str(), W_OK | X_OK) != 0) {
+    throw InputError({directory.string(), "", "is no directory in which you may write",
+                      "Make it (mkdir), or choose another place for -o."});
+  }
+}
+
+/// The daemon keeps its own copy beside the journal; the user's appears whole or not at all.
+void deliver(const std::filesystem::path& from, const std::filesystem::path& to) {
+  const std::filesystem::path temporary = fmt::format("{}.{}.part", to.string(), ::getpid());
+  try {
+    std::filesystem::copy_file(from, temporary, std::filesystem::copy_options::overwrite_existing);
+    std::filesystem::rename(temporary, to);
+  } catch (const std::filesystem::filesystem_error& error) {
+    std::error_code ignored;
+    std::filesystem::remove(temporary, ignored);
+    throw HardwareError(to.string(), error.what(),
+                        "The run is safe in " + from.string() + "; copy it from there.");
+  }
+}
+
+SessionProgress progress_of(const json& state, size_t& remarks_seen) {
+  SessionProgress progress{state.at("planned_s"),
+                           state.at("planned_cycles"),
+                           state.at("triggers"),
+                           state.at("received"),
+                           state.at("missing"),
+                           state.at("last_kPa"),
+                           {}};
+  for (const json& remark : state.at("remarks")) {
+    progress.new_remarks.push_back(
+        fmt::format("{}: {}", remark.at("level").get<std::string>(), remark.at("text").get<std::string>()));
+    ++remarks_seen;
+  }
+  return progress;
+}
+
+/// Follows the run to its end and returns the daemon's result.
+json follow(DaemonClient& daemon, const SessionOptions& options) {
+  size_t remarks_seen = 0;
+  int stops_sent = 0;
+  while (true) {
+    if (const int asked = std::min(2, options.stops_asked()); asked > stops_sent) {
+      stops_sent = asked;
+      daemon.call("run.stop", {{"how", asked == 1 ? "cycle_end" : "now"}});
+    }
+    const json state = daemon.call("run.progress", {{"first_remark", remarks_seen}});
+    options.progress(progress_of(state, remarks_seen));
+    if (state.at("state") == "done" || state.at("state") == "failed") return state.at("result");
+    std::this_thread::sleep_for(std::chrono::milliseconds(options.poll_ms));
+  }
+}
+
+}  // namespace
+
+SessionResult run_session(DaemonClient& daemon, const SessionOptions& options) {
+  const Experiment experiment = read_experiment(options.experiment);
+  check_output(options.output, options.force);
+  daemon.call("run.start", {{"experiment", experiment.text}, {"file", experiment.file}});
+  const json result = follow(daemon, options);
+  if (!result.contains("run_file")) {
+    throw HardwareError(
+        "run", result.value("problem", "no run file could be made"),
+        "What was recorded is in " + result.value("journal", "the journal") + "; try `diastole recover`.");
+  }
+  deliver(result.at("run_file").get<std::string>(), options.output);
+  return {options.output,        result.at("end"),     result.at("regular"), result.at("cycles"),
+          result.at("triggers"), result.at("samples"), result.at("gaps"),    result.at("expected")};
+}
+
+}  // namespace diastole

@@ -1,0 +1,49 @@
+#pragma once
+// One experiment through the daemon, from file to run file: what `diastole run` and `diastole simulate` do.
+
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "host/daemon/client.hpp"
+
+namespace diastole {
+
+struct SessionProgress {
+  double planned_s = 0;
+  int64_t planned_cycles = 0;
+  int64_t triggers = 0;
+  int64_t samples = 0;
+  int64_t gaps = 0;
+  double last_kPa = 0;
+  std::vector<std::string> new_remarks;  ///< since the last call: faults, gaps, stops, in plain words
+};
+
+struct SessionOptions {
+  std::string experiment;  ///< file
+  std::string output;      ///< run file
+  bool force = false;      ///< replace an existing output
+  int poll_ms = 100;       ///< between questions for progress
+  std::function<void(const SessionProgress&)> progress = [](const SessionProgress&) {};
+  /// How often the user has asked to stop (Ctrl-C): 1 at the cycle's end, 2 or more now.
+  std::function<int()> stops_asked = [] { return 0; };
+};
+
+struct SessionResult {
+  std::string run;       ///< the output file
+  std::string end;       ///< "completed", "stopped_at_cycle_end", "stopped_now", or what went wrong
+  bool regular = false;  ///< it ended as planned or as asked
+  int64_t cycles = 0;
+  int64_t triggers = 0;
+  int64_t samples = 0;
+  int64_t gaps = 0;
+  int64_t expected = 0;
+};
+
+/// Throws InputError before anything moves: unreadable or impossible experiment, output exists or its
+/// directory cannot be written. Throws HardwareError when no run file came out of it; it then names the
+/// journal.
+SessionResult run_session(DaemonClient& daemon, const SessionOptions& options);
+
+}  // namespace diastole

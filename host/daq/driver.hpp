@@ -1,0 +1,45 @@
+#pragma once
+// The drivers of driver_list.inc. A driver is one file with one function, `configure`: it reads what it needs
+// of the rig file at start-up (strictly, with line numbers in its messages) and returns how to open the
+// instrument.
+
+#include <functional>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "host/daq/instrument.hpp"
+#include "protocol/contract/table_reader.hpp"
+
+namespace diastole::daq {
+
+struct OpenOptions {
+  /// Where the instrument is, instead of what the rig file says ("127.0.0.1:1502").
+  std::optional<std::string> address;
+  /// Patience for one answer, at least; a conducted simulation is patient with a loaded machine.
+  int least_timeout_ms = 0;
+};
+
+/// Throws HardwareError when the instrument is not there or is not what it should be.
+using OpenInstrument = std::function<std::unique_ptr<Instrument>(const OpenOptions&)>;
+
+/// `daq` is the table [daq], `channels` its [[daq.channel]] blocks; keys common to all drivers are read
+/// already.
+using Configure = OpenInstrument (*)(TableReader& daq, std::vector<TableReader>& channels);
+
+struct Driver {
+  std::string_view name;
+  Configure configure;
+};
+
+#define DIASTOLE_DAQ_DRIVER(name, configure) \
+  OpenInstrument configure(TableReader& daq, std::vector<TableReader>& channels);
+#include "host/daq/driver_list.inc"
+#undef DIASTOLE_DAQ_DRIVER
+
+std::span<const Driver> drivers();
+
+}  // namespace diastole::daq

@@ -1,0 +1,257 @@
+#include "host/runfile/assemble.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "host/runfile/journal_story.hpp"
+#include "protocol/contract/input_error.hpp"
+#include "protocol/runfile/layout.hpp"
+
+namespace diastole {
+namespace {
+
+using nlohmann::json;
+using runfile::RecordedRun;
+
+constexpr double ns_per_s = 1e9;
+constexpr double mL_per_pL = 1e-9;
+constexpr double missing = std::numeric_limits<double>::quiet_NaN();
+
+/// Controller ticks and host times as seconds since the start of run.
+class TimeAxis {
+ public:
+  TimeAxis(const JournalStory& story, const std::string& file)
+      : tick_rate_Hz_(story.begin.at("tick_rate_Hz")), start_tick_(*story.start_tick) {
+    const auto fitted = fit_clock_map(story.controller_pairs);
+    if (!fitted) {
+      throw InputError({file, "", "holds no comparison of the two clocks, so its samples have no time",
+                        "This journal cannot be recovered."});
+    }
+    map_ = *fitted;
+  }
+
+  [[nodiscard]] double of_tick(uint64_t tick) const {
+    const double ticks = tick >= start_tick_ ? static_cast<double>(tick - start_tick_)
+                                             : -static_cast<double>(start_tick_ - tick);
+    return ticks / tick_rate_Hz_;
+  }
+  [[nodiscard]] double of_host_ns(uint64_t host_ns) const {
+    return map_.to_other_s(static_cast<double>(host_ns) / ns_per_s) - start_s();
+  }
+  [[nodiscard]] double host_at_start_s() const { return map_.to_host_s(start_s()); }
+  [[nodiscard]] const ClockMap& map() const { return map_; }
+
+ private:
+  [[nodiscard]] double start_s() const { return static_cast<double>(start_tick_) / tick_rate_Hz_; }
+
+  double tick_rate_Hz_;
+  uint64_t start_tick_;
+  ClockMap map_;
+};
+
+/// One row of the sample grid before cutting: its index is its place.
+struct Grid {
+  std::vector<double> time_s;  // NaN: missing
+  std::vector<std::vector<double>> channels;
+  std::vector<std::string> reason;  // why it is missing
+};
+
+Grid lay_out(const JournalStory& story, const TimeAxis& axis, size_t channels) {
+  uint64_t rows = 0;
+  for (const SampleBlock& block : story.samples)
+    rows = std::max(rows, block.first_index + block.host_ns.size());
+  for (const DeclaredGap& gap : story.gaps)
+    rows = std::max(rows, gap.first_index + gap.count);
+  Grid grid{std::vector<double>(rows, missing),
+            std::vector<std::vector<double>>(channels, std::vector<double>(rows, missing)),
+            std::vector<std::string>(rows, "its record was lost in the journal")};
+  for (const DeclaredGap& gap : story.gaps) {
+    std::fill_n(grid.reason.begin() + static_cast<std::ptrdiff_t>(gap.first_index), gap.count, gap.reason);
+  }
+  for (const SampleBlock& block : story.samples) {
+    if (block.channels != channels) continue;
+    for (size_t i = 0; i < block.host_ns.size(); ++i) {
+      const size_t row = block.first_index + i;
+      grid.time_s[row] = axis.of_host_ns(block.host_ns[i]);
+      for (size_t c = 0; c < channels; ++c)
+        grid.channels[c][row] = block.value_kPa[i * channels + c];
+    }
+  }
+  return grid;
+}
+
+/// Gives missing rows times evenly between their neighbours, at the sample spacing before the first and after
+/// the last one that was received.
+void fill_times(std::vector<double>& time_s, double spacing_s) {
+  const size_t rows = time_s.size();
+  size_t row = 0;
+  while (row < rows && std::isnan(time_s[row]))
+    ++row;
+  for (size_t i = row; i-- > 0 && row < rows;)
+    time_s[i] = time_s[i + 1] - spacing_s;
+  while (row < rows) {
+    size_t next = row + 1;
+    while (next < rows && std::isnan(time_s[next]))
+      ++next;
+    const double step_s =
+        next < rows ? (time_s[next] - time_s[row]) / static_cast<double>(next - row) : spacing_s;
+    for (size_t i = row + 1; i < next; ++i)
+      time_s[i] = time_s[i - 1] + step_s;
+    row = next;
+  }
+}
+
+void declare(RecordedRun& run, std::string_view stream, int64_t index, const std::string& reason) {
+  if (!run.gaps.empty()) {
+    runfile::Gap& last = run.gaps.back();
+    if (last.stream == stream && last.reason == reason && last.first_index + last.count == index) {
+      ++last.count;
+      return;
+    }
+  }
+  run.gaps.push_back({std::string(stream), index, 1, reason});
+}
+
+void put_pressure(const JournalStory& story, const TimeAxis& axis, double end_s, AssembledRun& assembled) {
+  RecordedRun& run = assembled.run;
+  const std::vector<std::string> names = story.begin.at("channels");
+  const double spacing_s = 1 / story.begin.at("sample_rate_Hz").get<double>();
+  Grid grid = lay_out(story, axis, names.size());
+  std::vector<bool> received;
+  for (const double t : grid.time_s)
+    received.push_back(!std::isnan(t));
+  fill_times(grid.time_s, spacing_s);
+  const auto first = std::lower_bound(grid.time_s.begin(), grid.time_s.end(), 0.0) - grid.time_s.begin();
+  const auto last = std::upper_bound(grid.time_s.begin(), grid.time_s.end(), end_s) - grid.time_s.begin();
+  run.pressure.time_s.assign(grid.time_s.begin() + first, grid.time_s.begin() + last);
+  for (size_t c = 0; c < names.size(); ++c) {
+    run.pressure.channels[names[c] + "_kPa"].assign(grid.channels[c].begin() + first,
+                                                    grid.channels[c].begin() + last);
+  }
+  for (auto row = first; row < last; ++row) {
+    if (received[static_cast<size_t>(row)]) {
+      ++assembled.samples_received;
+    } else {
+      ++assembled.samples_missing;
+      declare(run, runfile::pressure_stream, row - first, grid.reason[static_cast<size_t>(row)]);
+    }
+  }
+}
+
+void put_positions(const JournalStory& story, const TimeAxis& axis, RecordedRun& run) {
+  const double microstep_mL = story.begin.at("microstep_pL").get<double>() * mL_per_pL;
+  for (const PositionBlock& block : story.positions) {
+    if (block.first_index < run.pump.time_s.size()) continue;
+    const double step_s =
+        axis.of_tick(block.first_tick + block.period_ticks) - axis.of_tick(block.first_tick);
+    const double first_s = axis.of_tick(block.first_tick);
+    while (run.pump.time_s.size() < block.first_index) {
+      const size_t row = run.pump.time_s.size();
+      declare(run, runfile::pump_stream, static_cast<int64_t>(row), "its record was lost in the journal");
+      run.pump.time_s.push_back(first_s - step_s * static_cast<double>(block.first_index - row));
+      run.pump.commanded_mL.push_back(missing);
+    }
+    for (size_t i = 0; i < block.microsteps.size(); ++i) {
+      run.pump.time_s.push_back(axis.of_tick(block.first_tick + i * block.period_ticks));
+      run.pump.commanded_mL.push_back(microstep_mL * block.microsteps[i]);
+    }
+  }
+}
+
+void put_triggers(const JournalStory& story, const TimeAxis& axis, RecordedRun& run) {
+  int64_t next_cycle = 0;
+  for (const json& trigger : story.triggers) {
+    const int64_t cycle = trigger.at("cycle");
+    for (; next_cycle < cycle; ++next_cycle)
+      declare(run, runfile::trigger_stream, next_cycle, "its record was lost");
+    run.trigger_s.push_back(axis.of_tick(trigger.at("tick")));
+    next_cycle = cycle + 1;
+  }
+  const int64_t raised = story.run_ended ? story.run_ended->at("triggers").get<int64_t>() : next_cycle;
+  for (; next_cycle < raised; ++next_cycle)
+    declare(run, runfile::trigger_stream, next_cycle, "its record was lost");
+}
+
+void put_segments(const JournalStory& story, const TimeAxis& axis, RecordedRun& run) {
+  for (const json& segment : story.begin.at("segments")) {
+    run.segments.push_back({segment.at("start_s"), segment.at("waveform"), segment.at("stroke_mL"),
+                            segment.at("period_s"), segment.at("offset_mL"), segment.at("cycles")});
+  }
+  for (const json& started : story.segment_starts) {
+    const size_t number = started.at("segment");
+    if (number < run.segments.size()) run.segments[number].start_s = axis.of_tick(started.at("tick"));
+  }
+}
+
+void put_events(const JournalStory& story, const TimeAxis& axis, RecordedRun& run) {
+  for (const json& event : story.events) {
+    const double time_s =
+        event.contains("tick") ? axis.of_tick(event.at("tick")) : axis.of_host_ns(event.at("host_ns"));
+    run.events.push_back({time_s, event.at("level"), event.at("code"), event.at("text")});
+  }
+  std::stable_sort(run.events.begin(), run.events.end(),
+                   [](const auto& a, const auto& b) { return a.time_s < b.time_s; });
+}
+
+/// Offsets are the other clock's reading at the start of run; a positive drift means that it runs fast.
+void put_clocks(const JournalStory& story, const TimeAxis& axis, RecordedRun& run) {
+  const double controller_per_host = axis.map().scale;
+  run.clock = {{"host_offset_s", axis.host_at_start_s()},
+               {"host_drift_ppm", (1 / controller_per_host - 1) * 1e6},
+               {"host_residual_s", axis.map().residual_s}};
+  if (const auto daq = fit_clock_map(story.daq_pairs)) {
+    run.clock["daq_offset_s"] = daq->to_other_s(axis.host_at_start_s());
+    run.clock["daq_drift_ppm"] = (daq->scale / controller_per_host - 1) * 1e6;
+  }
+}
+
+std::map<std::string, runfile::Attribute, std::less<>> rig_attributes(const json& rig) {
+  std::map<std::string, runfile::Attribute, std::less<>> attributes;
+  for (const auto& [name, value] : rig.items()) {
+    if (value.is_string()) {
+      attributes[name] = value.get<std::string>();
+    } else if (value.is_number_integer()) {
+      attributes[name] = value.get<int64_t>();
+    } else {
+      attributes[name] = value.get<double>();
+    }
+  }
+  return attributes;
+}
+
+}  // namespace
+
+AssembledRun assemble_run(const JournalContents& journal) {
+  const JournalStory story = read_story(journal);
+  if (!story.start_tick) {
+    throw InputError({journal.file, "", "ends before the run started", "There is nothing to recover."});
+  }
+  const TimeAxis axis(story, journal.file);
+  AssembledRun assembled;
+  RecordedRun& run = assembled.run;
+  run.file = journal.file;
+  run.run_id = story.begin.at("run_id");
+  run.started_utc = story.begin.at("started_utc");
+  run.producer = story.begin.at("producer");
+  run.rig = rig_attributes(story.begin.at("rig"));
+  run.protocol_toml = story.begin.at("experiment");
+  put_segments(story, axis, run);
+  put_positions(story, axis, run);
+  put_triggers(story, axis, run);
+  put_events(story, axis, run);
+  put_clocks(story, axis, run);
+  const double end_s =
+      story.run_ended ? axis.of_tick(story.run_ended->at("tick")) : std::numeric_limits<double>::infinity();
+  put_pressure(story, axis, end_s, assembled);
+  assembled.ended_in_order = story.closed && story.run_ended.has_value();
+  if (!assembled.ended_in_order) {
+    const double last_s = run.pressure.time_s.empty() ? 0 : run.pressure.time_s.back();
+    run.events.push_back({last_s, "error", "incomplete", "the recording broke off here"});
+  }
+  return assembled;
+}
+
+}  // namespace diastole

@@ -1,0 +1,27 @@
+#pragma once
+// A run from its journal: at the end of every run, and for `diastole recover` after a crash, by the same way.
+//
+// The time axis is the controller's clock, in seconds since the tick of RunStarted. Samples carry host times,
+// which the fitted clock map (clock_map.hpp) brings onto it. What lies before the start of run or after its
+// end is cut off. A missing sample keeps its row: its time lies evenly between its neighbours', its values
+// are NaN, and /gaps declares it; also samples whose record was damaged are declared so.
+
+#include <cstdint>
+
+#include "host/acquisition/journal.hpp"
+#include "protocol/runfile/run.hpp"
+
+namespace diastole {
+
+struct AssembledRun {
+  runfile::RecordedRun run;
+  uint64_t samples_received = 0;  ///< rows of /pressure with values
+  uint64_t samples_missing = 0;   ///< rows declared in /gaps
+  bool ended_in_order = false;    ///< the journal holds the end of the run
+};
+
+/// Throws InputError when the journal has no beginning or the run never started: then there is nothing to
+/// keep.
+AssembledRun assemble_run(const JournalContents& journal);
+
+}  // namespace diastole

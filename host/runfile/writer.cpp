@@ -1,0 +1,117 @@
+#include "host/runfile/writer.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+
+#include "host/runfile/h5_sink.hpp"
+#include "host/transport/descriptor.hpp"
+#include "protocol/contract/input_error.hpp"
+#include "protocol/runfile/layout.hpp"
+#include "protocol/runfile/reader.hpp"
+
+namespace diastole {
+namespace {
+
+template <typename Row>
+auto column(const std::vector<Row>& rows, auto member) {
+  std::vector<std::decay_t<decltype(rows.front().*member)>> values;
+  for (const Row& row : rows)
+    values.push_back(row.*member);
+  return values;
+}
+
+void write_protocol(H5Sink& sink, const runfile::RecordedRun& run) {
+  using runfile::Segment;
+  sink.group(runfile::protocol_group);
+  sink.text(runfile::protocol_toml, run.protocol_toml);
+  sink.table(runfile::protocol_segments,
+             {{"start_s", column(run.segments, &Segment::start_s)},
+              {"waveform", column(run.segments, &Segment::waveform)},
+              {"stroke_mL", column(run.segments, &Segment::stroke_mL)},
+              {"period_s", column(run.segments, &Segment::period_s)},
+              {"offset_mL", column(run.segments, &Segment::offset_mL)},
+              {"cycles", column(run.segments, &Segment::cycles)}},
+             runfile::segments_units);
+}
+
+void write_streams(H5Sink& sink, const runfile::RecordedRun& run) {
+  sink.numbers(runfile::pump_time, run.pump.time_s, runfile::time_unit);
+  sink.numbers(runfile::pump_commanded, run.pump.commanded_mL, runfile::volume_unit);
+  sink.numbers(runfile::pressure_time, run.pressure.time_s, runfile::time_unit);
+  for (const auto& [name, values_kPa] : run.pressure.channels) {
+    sink.numbers(fmt::format("{}/{}", runfile::pressure_group, name), values_kPa, runfile::pressure_unit);
+  }
+  sink.numbers(runfile::trigger_time, run.trigger_s, runfile::time_unit);
+  for (const auto& [segment, flow] : run.flow) {
+    const std::string group = fmt::format("{}/{}", runfile::flow_group, segment);
+    sink.numbers(group + "/phase_s", flow.phase_s, runfile::time_unit);
+    sink.numbers(group + "/cavity_mL", flow.cavity_mL, runfile::volume_unit);
+    sink.numbers(group + "/sigma_mL", flow.sigma_mL, runfile::volume_unit);
+  }
+}
+
+void write_tables(H5Sink& sink, const runfile::RecordedRun& run) {
+  using runfile::Event;
+  using runfile::Gap;
+  sink.table(runfile::gaps_table,
+             {{"stream", column(run.gaps, &Gap::stream)},
+              {"first_index", column(run.gaps, &Gap::first_index)},
+              {"count", column(run.gaps, &Gap::count)},
+              {"reason", column(run.gaps, &Gap::reason)}},
+             runfile::gaps_units);
+  sink.table(runfile::events_table,
+             {{"time_s", column(run.events, &Event::time_s)},
+              {"level", column(run.events, &Event::level)},
+              {"code", column(run.events, &Event::code)},
+              {"text", column(run.events, &Event::text)}},
+             runfile::events_units);
+}
+
+void write_all(const std::filesystem::path& path, const runfile::RecordedRun& run) {
+  H5Sink sink(path);
+  sink.attribute("/", "format", std::string(runfile::format_name));
+  sink.attribute("/", "format_version", runfile::format_version);
+  sink.attribute("/", "run_id", run.run_id);
+  sink.attribute("/", "started_utc", run.started_utc);
+  sink.attribute("/", "producer", run.producer);
+  sink.group(runfile::rig_group);
+  for (const auto& [name, value] : run.rig)
+    sink.attribute(runfile::rig_group, name, value);
+  write_protocol(sink, run);
+  write_streams(sink, run);
+  if (!run.clock.empty()) sink.group(runfile::clock_group);
+  for (const auto& [name, value] : run.clock) {
+    sink.scalar(fmt::format("{}/{}", runfile::clock_group, name), value, std::string(runfile::unit_of(name)));
+  }
+  write_tables(sink, run);
+  sink.close();
+}
+
+void bring_to_disk(const std::filesystem::path& path, int flags) {
+  const Descriptor file(::open(path.c_str(), flags | O_CLOEXEC));
+  if (!file.valid() || ::fsync(file.get()) != 0) {
+    throw HardwareError(path.string(), "cannot be brought to the disk", "Check the disk and its free space.");
+  }
+}
+
+}  // namespace
+
+void write_run(const std::filesystem::path& path, const runfile::RecordedRun& run) {
+  runfile::check(run);
+  const std::filesystem::path temporary = fmt::format("{}.{}.part", path.string(), ::getpid());
+  try {
+    write_all(temporary, run);
+    bring_to_disk(temporary, O_RDONLY);
+    std::filesystem::rename(temporary, path);
+    bring_to_disk(path.has_parent_path() ? path.parent_path() : ".", O_RDONLY | O_DIRECTORY);
+  } catch (const std::filesystem::filesystem_error& error) {
+    std::filesystem::remove(temporary);
+    throw HardwareError(path.string(), error.what(), "Check that you may write there.");
+  } catch (...) {
+    std::error_code ignored;
+    std::filesystem::remove(temporary, ignored);
+    throw;
+  }
+}
+
+}  // namespace diastole

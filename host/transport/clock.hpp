@@ -1,0 +1,32 @@
+#pragma once
+// The time that acquisition lives in. Whoever polls the instrument, times heart-beats or stamps samples asks
+// a Clock, so that a simulated rig can conduct time (protocol/contract/conductor.hpp) and tests can script
+// it.
+
+#include <cstdint>
+
+#include "host/transport/byte_line.hpp"
+
+namespace diastole {
+
+class Clock {
+ public:
+  virtual ~Clock() = default;
+
+  [[nodiscard]] virtual uint64_t now_ns() = 0;
+  /// Returns when now_ns() has reached until_ns; in real time also as soon as `line` (may be null) has input.
+  virtual void sleep_until_ns(uint64_t until_ns, ByteLine* line) = 0;
+  /// Tells the clock that `line` was just opened, before anything is written to it.
+  virtual void line_opened(ByteLine& /*line*/) {}
+  /// True if time moves only inside sleep_until_ns: then it must not be passed idly.
+  [[nodiscard]] virtual bool stands_still() const { return false; }
+};
+
+/// CLOCK_MONOTONIC.
+class RealClock final : public Clock {
+ public:
+  [[nodiscard]] uint64_t now_ns() override;
+  void sleep_until_ns(uint64_t until_ns, ByteLine* line) override;
+};
+
+}  // namespace diastole

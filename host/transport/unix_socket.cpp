@@ -1,0 +1,29 @@
+#include "host/transport/unix_socket.hpp"
+
+#include <fmt/format.h>
+#include <sys/un.h>
+
+#include <cerrno>
+#include <cstring>
+
+#include "protocol/contract/input_error.hpp"
+
+namespace diastole {
+
+Descriptor connect_unix_socket(const std::string& path) {
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  if (path.size() >= sizeof(address.sun_path)) {
+    throw HardwareError(path, "the path is too long for a socket", "Choose a shorter directory.");
+  }
+  std::memcpy(address.sun_path, path.c_str(), path.size() + 1);
+  Descriptor socket(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0));
+  if (::connect(socket.get(), reinterpret_cast<const sockaddr*>(&address), sizeof(address)) != 0) {
+    throw HardwareError(path, fmt::format("nobody answers at this socket ({})", std::strerror(errno)),
+                        "Start the daemon (diastole daemon --config rig.toml), or name its socket with "
+                        "--socket.");
+  }
+  return socket;
+}
+
+}  // namespace diastole

@@ -1,0 +1,96 @@
+#include "protocol/runfile/soundness.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <span>
+
+#include "protocol/runfile/layout.hpp"
+
+namespace diastole::runfile {
+namespace {
+
+constexpr double hole_in_spacings = 1.6;
+constexpr double period_tolerance = 0.01;
+
+StreamFacts facts_of(const RecordedRun& run, std::span<const double> time_s, std::string_view stream) {
+  StreamFacts facts{time_s.size(), 0, 0};
+  for (const Gap& gap : run.gaps) {
+    if (gap.stream.starts_with(stream)) facts.missing += gap.count;
+  }
+  std::vector<double> steps_s;
+  for (size_t i = 1; i < time_s.size(); ++i)
+    steps_s.push_back(time_s[i] - time_s[i - 1]);
+  if (!steps_s.empty()) {
+    const auto middle = steps_s.begin() + static_cast<std::ptrdiff_t>(steps_s.size() / 2);
+    std::nth_element(steps_s.begin(), middle, steps_s.end());
+    facts.rate_Hz = 1 / *middle;
+  }
+  return facts;
+}
+
+void look_for_holes(std::span<const double> time_s, const StreamFacts& facts, std::string_view stream,
+                    std::vector<std::string>& problems) {
+  for (size_t i = 1; i < time_s.size(); ++i) {
+    const double step_s = time_s[i] - time_s[i - 1];
+    if (step_s * facts.rate_Hz <= hole_in_spacings) continue;
+    problems.push_back(fmt::format("{}: {:.1f} ms without a sample before index {}, not declared as a gap",
+                                   stream, 1e3 * step_s, i));
+    return;
+  }
+}
+
+/// Triggers of one segment: as many as cycles, one period apart.
+void check_triggers(const RecordedRun& run, size_t number, std::vector<std::string>& problems) {
+  const Segment& segment = run.segments[number];
+  const double slack_s = 0.5 * period_tolerance * segment.period_s;
+  std::vector<double> found;
+  for (const double t : run.trigger_s) {
+    if (t >= segment.start_s - slack_s && t < segment.end_s() - slack_s) found.push_back(t);
+  }
+  const bool holds = segment.waveform == "hold";
+  if (static_cast<int64_t>(found.size()) != segment.cycles && !(holds && found.empty())) {
+    problems.push_back(
+        fmt::format("segment {}: {} triggers for {} cycles", number, found.size(), segment.cycles));
+  }
+  for (size_t i = 1; i < found.size(); ++i) {
+    if (std::abs(found[i] - found[i - 1] - segment.period_s) <= period_tolerance * segment.period_s) continue;
+    problems.push_back(fmt::format("segment {}: trigger {} comes {:.4f} s after the one before, not {:.4f} s",
+                                   number, i, found[i] - found[i - 1], segment.period_s));
+    return;
+  }
+}
+
+}  // namespace
+
+Soundness assess(const RecordedRun& run) {
+  Soundness soundness;
+  auto& problems = soundness.problems;
+  soundness.pressure = facts_of(run, run.pressure.time_s, pressure_stream);
+  soundness.pump = facts_of(run, run.pump.time_s, pump_stream);
+  if (run.pressure.time_s.empty()) {
+    problems.emplace_back("no pressure was recorded");
+  } else {
+    soundness.duration_s = run.pressure.time_s.back() - run.pressure.time_s.front();
+  }
+  for (const Gap& gap : run.gaps) {
+    problems.push_back(fmt::format("{}: {} missing from index {} on: {}", gap.stream, gap.count,
+                                   gap.first_index, gap.reason));
+  }
+  look_for_holes(run.pressure.time_s, soundness.pressure, pressure_stream, problems);
+  look_for_holes(run.pump.time_s, soundness.pump, pump_stream, problems);
+  for (size_t i = 0; i < run.segments.size(); ++i) {
+    const Segment& segment = run.segments[i];
+    (segment.waveform == "hold" ? soundness.scheduled_holds : soundness.scheduled_cycles) += segment.cycles;
+    check_triggers(run, i, problems);
+  }
+  for (const Event& event : run.events) {
+    if (event.level == "error") {
+      problems.push_back(fmt::format("at {:.3f} s: {}: {}", event.time_s, event.code, event.text));
+    }
+  }
+  return soundness;
+}
+
+}  // namespace diastole::runfile

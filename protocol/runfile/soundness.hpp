@@ -1,0 +1,32 @@
+#pragma once
+// Whether a run can be trusted: nothing missing, every cycle triggered on time, no fault.
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "protocol/runfile/run.hpp"
+
+namespace diastole::runfile {
+
+struct StreamFacts {
+  size_t rows = 0;
+  int64_t missing = 0;  ///< of them, declared in /gaps
+  double rate_Hz = 0;   ///< from the median spacing
+};
+
+struct Soundness {
+  StreamFacts pressure;
+  StreamFacts pump;
+  double duration_s = 0;              ///< of the pressure stream
+  int64_t scheduled_cycles = 0;       ///< of all segments that move
+  int64_t scheduled_holds = 0;        ///< cycles of waveform "hold", which may be triggered or not
+  std::vector<std::string> problems;  ///< in plain words; empty if the run is sound
+
+  [[nodiscard]] bool sound() const { return problems.empty(); }
+};
+
+/// Precondition: the run has passed `check`.
+Soundness assess(const RecordedRun& run);
+
+}  // namespace diastole::runfile
