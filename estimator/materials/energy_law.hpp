@@ -44,6 +44,13 @@ Scalar constant(double value) {
   return ConstantOf<Scalar>::make(value);
 }
 
+/// What a dual number stands at: for branches, and for factors that derivatives up to the second do not need.
+constexpr double plain_value(double value) { return value; }
+template <class Inner, int Count>
+double plain_value(const ceres::Jet<Inner, Count>& dual) {
+  return plain_value(dual.a);
+}
+
 template <class Energy>
 class EnergyLaw final : public Law {
   static constexpr size_t count = Energy::parameters.size();
