@@ -1,11 +1,10 @@
 #pragma once
-// The piston's carriage on its screw: counts the microsteps, closes the home switch, and tells the volume
-// that the line has received.
+// The piston's carriage on its screw: counts the microsteps and tells the volume that the line has received.
 //
-//      home switch closed <= | 0 ... parked ... | far end          position in microsteps
+//      home switch | 0 ... home ... parked ... | far end          position in microsteps from the switch
 //
-// At power-on the carriage is parked clear of the switch and the operator's stopcock vents the line; the line
-// is closed when the carriage leaves the switch at the end of homing, so that home is the unloaded specimen.
+// At power-on the carriage is parked and the operator's stopcock vents the line; it is closed when homing
+// ends, so that home is the unloaded specimen.
 
 #include <cstdint>
 #include <optional>
@@ -16,20 +15,21 @@ namespace diastole::sim_rig {
 
 class Carriage {
  public:
-  explicit Carriage(double microstep_mL, int64_t parked_microsteps = 200)
-      : microstep_mL_(microstep_mL), position_(parked_microsteps) {}
+  Carriage(double microstep_mL, SimulatedController::Places places)
+      : microstep_mL_(microstep_mL),
+        home_(places.home),
+        position_(places.parked),
+        was_on_switch_(places.parked <= 0) {}
 
-  /// Takes a pin change; returns the volume displaced into the line if this one moved it.
+  /// Takes a pin change; returns the volume displaced into the line since home if this one moved it.
   std::optional<double> take(const PinEdge& edge);
-
-  [[nodiscard]] bool home_switch_closed() const { return position_ <= 0; }
-  [[nodiscard]] int64_t position_microsteps() const { return position_; }
 
  private:
   double microstep_mL_;
+  int64_t home_;
   int64_t position_;
+  bool was_on_switch_;
   bool inflate_ = false;
-  bool was_on_switch_ = false;
   bool vented_ = true;
 };
 

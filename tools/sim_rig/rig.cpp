@@ -1,11 +1,7 @@
 #include "tools/sim_rig/rig.hpp"
 
-#include <algorithm>
-
 namespace diastole::sim_rig {
 namespace {
-
-constexpr uint64_t slice_ns = 500'000;
 
 constexpr double seconds(uint64_t time_ns) { return static_cast<double>(time_ns) * 1e-9; }
 
@@ -16,23 +12,21 @@ Rig::Rig(const RigDescription& description, std::unique_ptr<SimulatedController>
     : description_(description),
       controller_(std::move(controller)),
       listeners_(std::move(listeners)),
-      carriage_(description.microstep_mL),
+      carriage_(description.microstep_mL, controller_->places()),
       plant_(description.plant) {}
 
 void Rig::advance_to(uint64_t until_ns) {
-  while (now_ns_ < until_ns) {
-    now_ns_ = std::min(until_ns, (now_ns_ / slice_ns + 1) * slice_ns);
-    controller_->set_home_switch(carriage_.home_switch_closed());
-    const SimulatedController::Output output = controller_->advance_to(now_ns_);
-    for (const PinEdge& edge : output.edges) {
-      if (const auto displaced_mL = carriage_.take(edge)) {
-        plant_.displace(seconds(edge.time_ns), *displaced_mL);
-      }
-      listeners_.edge(edge);
+  if (until_ns <= now_ns_) return;
+  now_ns_ = until_ns;
+  const SimulatedController::Output output = controller_->advance_to(now_ns_);
+  for (const PinEdge& edge : output.edges) {
+    if (const auto displaced_mL = carriage_.take(edge)) {
+      plant_.displace(seconds(edge.time_ns), *displaced_mL);
     }
-    if (!output.sent.empty()) listeners_.sent(output.sent);
-    plant_.advance_to(seconds(now_ns_));
+    listeners_.edge(edge);
   }
+  if (!output.sent.empty()) listeners_.sent(output.sent);
+  plant_.advance_to(seconds(now_ns_));
 }
 
 double Rig::volts(int64_t input) const {

@@ -26,8 +26,7 @@ class Rig {
 
   void receive(std::span<const uint8_t> bytes) { controller_->receive(bytes); }
 
-  /// Carries controller and plant to until_ns, in slices short enough for the home switch. No effect if that
-  /// is past.
+  /// Carries controller and plant to until_ns. No effect if that is past.
   void advance_to(uint64_t until_ns);
 
   [[nodiscard]] uint64_t now_ns() const { return now_ns_; }

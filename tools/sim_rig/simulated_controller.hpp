@@ -45,11 +45,18 @@ class SimulatedController {
     std::span<const PinEdge> edges;
   };
 
+  /// Where the carriage stands at power-on and where homing ends, in microsteps from the home switch.
+  struct Places {
+    int64_t parked = 0;
+    int64_t home = 0;
+  };
+
   virtual ~SimulatedController() = default;
+
+  [[nodiscard]] virtual Places places() const = 0;
 
   /// Bytes that have arrived on its serial line.
   virtual void receive(std::span<const uint8_t> bytes) = 0;
-  virtual void set_home_switch(bool closed) = 0;
   /// Runs on to until_ns (not before its present).
   virtual Output advance_to(uint64_t until_ns) = 0;
 };

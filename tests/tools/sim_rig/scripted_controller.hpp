@@ -12,10 +12,10 @@ class ScriptedController final : public SimulatedController {
  public:
   explicit ScriptedController(std::vector<PinEdge> script) : script_(script.begin(), script.end()) {}
 
+  [[nodiscard]] Places places() const override { return {.parked = 200, .home = 65}; }
   void receive(std::span<const uint8_t> bytes) override {
     received_.insert(received_.end(), bytes.begin(), bytes.end());
   }
-  void set_home_switch(bool closed) override { home_switch_closed = closed; }
   Output advance_to(uint64_t until_ns) override {
     edges_.clear();
     while (!script_.empty() && script_.front().time_ns <= until_ns) {
@@ -25,8 +25,6 @@ class ScriptedController final : public SimulatedController {
     sent_ = std::exchange(received_, {});
     return {sent_, edges_};
   }
-
-  bool home_switch_closed = false;
 
  private:
   std::deque<PinEdge> script_;
@@ -47,8 +45,8 @@ inline std::vector<PinEdge> home_and_inflate(int microsteps, uint64_t spacing_ns
       script.push_back({time_ns + spacing_ns / 4, Pin::step, 0});
     }
   };
-  steps(0, 201);
-  steps(1, 2 + microsteps);
+  steps(0, 200);
+  steps(1, 65 + microsteps);
   return script;
 }
 

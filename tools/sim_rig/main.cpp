@@ -1,0 +1,111 @@
+// sim_rig: the whole rig without hardware. See --help.
+
+#include <fmt/format.h>
+#include <sys/signalfd.h>
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <csignal>
+#include <cstdio>
+#include <iostream>
+
+#include "protocol/contract/exit_code.hpp"
+#include "protocol/contract/input_error.hpp"
+#include "tools/sim_rig/host_built_controller.hpp"
+#include "tools/sim_rig/rig_description.hpp"
+#include "tools/sim_rig/server.hpp"
+
+namespace {
+
+using diastole::ExitCode;
+namespace sim_rig = diastole::sim_rig;
+
+constexpr const char* purpose =
+    R"(The whole rig without hardware: the pump's controller behind a pseudo-terminal, a pressure instrument behind
+Modbus TCP (LabJack T-series registers), and the physics between them: piston, hose, gel phantom, catheter.
+
+It prints one JSON line with its addresses when it is ready, and runs until SIGTERM. `diastole simulate` starts it for
+you; start it yourself to work with the daemon as with a real rig:
+
+  sim_rig --link /tmp/pump --modbus-port 5020 &
+  diastole daemon --config rig.toml &         # with port = "/tmp/pump", host = "127.0.0.1", port = 5020
+  diastole run examples/gel.experiment.toml -o gel.run.h5
+)";
+
+constexpr const char* footer =
+    R"(Time follows the wall clock, or, with --conductor, the daemon that is started with the same --conductor:
+then a session takes as long as the machine needs and is the same every time.
+
+Faults (seconds of the rig's clock): serial-hangup@T  daq-stall@T+D  daq-drop@T+D  daq-delay@T+D/L
+  sim_rig --fault daq-stall@5+0.2 --fault serial-hangup@9)";
+
+struct Arguments {
+  std::string config;
+  uint64_t seed = 1;
+  bool real_time = false;
+  std::vector<std::string> faults;
+  sim_rig::ServerOptions server;
+};
+
+void add_options(CLI::App& app, Arguments& arguments) {
+  app.add_option("--config", arguments.config, "rig.toml: geometry, channels, and the table [simulation]");
+  app.add_option("--link", arguments.server.link, "make this a symbolic link to the pseudo-terminal");
+  app.add_option("--modbus-port", arguments.server.modbus_port,
+                 "TCP port of the instrument, 0 for any free one")
+      ->capture_default_str();
+  auto* conductor = app.add_option("--conductor", arguments.server.conductor,
+                                   "let the daemon conduct time through this socket");
+  app.add_flag("--real-time", arguments.real_time, "follow the wall clock (the default without --conductor)")
+      ->excludes(conductor);
+  app.add_option("--pins", arguments.server.pins, "write every change of a pin: time_ns,signal,value");
+  app.add_option("--seed", arguments.seed, "of the sensors' noise")->capture_default_str();
+  app.add_option("--fault", arguments.faults, "make something go wrong; may be repeated");
+}
+
+/// A descriptor that becomes readable on SIGTERM and SIGINT.
+int stop_descriptor() {
+  sigset_t signals;
+  sigemptyset(&signals);
+  sigaddset(&signals, SIGTERM);
+  sigaddset(&signals, SIGINT);
+  sigprocmask(SIG_BLOCK, &signals, nullptr);
+  return signalfd(-1, &signals, SFD_CLOEXEC);
+}
+
+void serve(Arguments arguments) {
+  using diastole::TableReader;
+  auto description = sim_rig::read_rig_description(
+      arguments.config.empty() ? TableReader::from_text(sim_rig::default_rig_toml(), "the built-in rig file")
+                               : TableReader::from_file(arguments.config));
+  description.plant.seed = arguments.seed;
+  arguments.server.faults = sim_rig::parse_rig_faults(arguments.faults);
+  const int stop = stop_descriptor();
+  sim_rig::Server server(description, sim_rig::make_host_built_controller(), arguments.server);
+  fmt::print("{}\n", server.addresses());
+  std::fflush(stdout);
+  server.run(stop);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app(purpose, "sim_rig");
+  app.footer(footer);
+  Arguments arguments;
+  add_options(app, arguments);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return static_cast<int>(app.exit(error) == 0 ? ExitCode::done : ExitCode::bad_input);
+  }
+  try {
+    serve(arguments);
+    return static_cast<int>(ExitCode::done);
+  } catch (const diastole::InputError& error) {
+    std::cerr << "sim_rig: " << error.what() << '\n';
+    return static_cast<int>(ExitCode::bad_input);
+  } catch (const diastole::HardwareError& error) {
+    std::cerr << "sim_rig: " << error.what() << '\n';
+    return static_cast<int>(ExitCode::hardware_fault);
+  }
+}
