@@ -1,0 +1,120 @@
+#include <gtest/gtest.h>
+
+#include "firmware/core/plan_check.hpp"
+#include "firmware/core/profiles/profile.hpp"
+
+namespace diastole::firmware {
+namespace {
+
+using wire::Limit;
+using wire::Refusal;
+using wire::Waveform;
+
+constexpr Segment kPaper{Waveform::parabolic, 10, 40'000'000, 0, 1'200'000};
+
+Program program_of(Segment segment) {
+  Program program;
+  program.segments[program.size++] = segment;
+  program.ttl_width_us = 10'000;
+  program.rest_us = 1'000'000;
+  return program;
+}
+
+PlanRefusal refusal_of(Segment segment, const wire::Configure& configure = wire::Configure::example()) {
+  const auto checked = check_program(program_of(segment), Settings(configure));
+  return checked.ok() ? PlanRefusal{} : checked.error();
+}
+
+TEST(PlanCheck, PeaksOfThePapersGelRun) {
+  const SegmentPeaks peaks = segment_peaks(kPaper, Settings(wire::Configure::example()));
+  EXPECT_EQ(peaks.flow_uL_per_s, 133'334U);           // 4 S/T
+  EXPECT_EQ(peaks.acceleration_uL_per_s2, 444'445U);  // 16 S/T²
+  EXPECT_EQ(peaks.step_rate_Hz, 17'113U);
+  EXPECT_EQ(peaks.pressure_Pa, 19'556U);  // ± 20 kPa from inertia alone
+  EXPECT_EQ(peaks.cycle_steps.count, 5134);
+  EXPECT_EQ(refusal_of(kPaper).refusal, Refusal::none);
+}
+
+TEST(PlanCheck, TheSineAsksForMoreAccelerationThanTheParabola) {
+  Segment sine = kPaper;
+  sine.waveform = Waveform::sinusoidal;
+  const SegmentPeaks peaks = segment_peaks(sine, Settings(wire::Configure::example()));
+  EXPECT_NEAR(static_cast<double>(peaks.acceleration_uL_per_s2), 19.739 * 40'000 / 1.44, 10);
+}
+
+struct Excess {
+  Limit limit;
+  std::uint32_t wire::Configure::*setting;
+  std::uint32_t allowed;
+  std::int64_t asked;
+};
+class EveryLimit : public testing::TestWithParam<Excess> {};
+
+TEST_P(EveryLimit, IsRefusedWithNameAskedAndAllowed) {
+  const auto [limit, setting, allowed, asked] = GetParam();
+  wire::Configure configure = wire::Configure::example();
+  configure.*setting = allowed;
+  const PlanRefusal refusal = refusal_of(kPaper, configure);
+  EXPECT_EQ(refusal.refusal, Refusal::limit_exceeded);
+  EXPECT_EQ(refusal.limit, limit);
+  EXPECT_EQ(refusal.asked, asked);
+  EXPECT_EQ(refusal.allowed, allowed);
+  EXPECT_EQ(refusal.segment, 0);
+  configure.*setting = static_cast<std::uint32_t>(asked);
+  EXPECT_EQ(refusal_of(kPaper, configure).limit, Limit::none) << "exactly at the limit must pass";
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Limits, EveryLimit,
+    testing::Values(Excess{Limit::travel, &wire::Configure::travel_uL, 39'999, 40'000},
+                    Excess{Limit::flow, &wire::Configure::flow_uL_per_s, 133'000, 133'334},
+                    Excess{Limit::acceleration, &wire::Configure::acceleration_uL_per_s2, 444'000, 444'445},
+                    Excess{Limit::step_rate, &wire::Configure::step_rate_Hz, 17'000, 17'113},
+                    Excess{Limit::pressure, &wire::Configure::pressure_Pa, 19'000, 19'556}));
+
+TEST(PlanCheck, AMotionThatCannotStopWithinTheLeaseIsRefused) {
+  wire::Configure configure = wire::Configure::example();
+  configure.acceleration_uL_per_s2 = 444'445;
+  configure.lease_us = 400'000;
+  const PlanRefusal refusal = refusal_of(kPaper, configure);
+  EXPECT_EQ(refusal.limit, Limit::stopping_time);
+  EXPECT_EQ(refusal.allowed, 250'000);
+  EXPECT_NEAR(static_cast<double>(refusal.asked), 300'000, 100);
+}
+
+TEST(PlanCheck, LessThanAMicrostepIsRefused) {
+  Segment tiny = kPaper;
+  tiny.stroke_nL = 3'000;
+  EXPECT_EQ(refusal_of(tiny).limit, Limit::stroke_at_least);
+  EXPECT_EQ(refusal_of(tiny).allowed, 7'792);
+}
+
+TEST(PlanCheck, TtlAndRWaveMustFitTheCycle) {
+  Segment quick{Waveform::parabolic, 1, 8'000, 0, 25'000};
+  EXPECT_EQ(refusal_of(quick).limit, Limit::r_wave_spacing);
+  Program program = program_of(quick);
+  program.gate_every = 2;
+  EXPECT_TRUE(check_program(program, Settings(wire::Configure::example())).ok());
+  program.ttl_width_us = 13'000;
+  EXPECT_EQ(check_program(program, Settings(wire::Configure::example())).error().limit, Limit::ttl_width);
+}
+
+TEST(PlanCheck, TheOffendingSegmentIsNamed) {
+  Program program = program_of(kPaper);
+  program.segments[program.size++] = {Waveform::parabolic, 1, 40'000'000, 0, 300'000};
+  const auto checked = check_program(program, Settings(wire::Configure::example()));
+  ASSERT_FALSE(checked.ok());
+  EXPECT_EQ(checked.error().segment, 1);
+  EXPECT_EQ(checked.error().limit, Limit::acceleration);
+}
+
+TEST(PlanCheck, EmptyProgramAndUnknownWaveform) {
+  EXPECT_EQ(check_program(Program{}, Settings(wire::Configure::example())).error().refusal,
+            Refusal::no_program);
+  Segment uploaded = kPaper;
+  uploaded.waveform = Waveform::uploaded;
+  EXPECT_EQ(refusal_of(uploaded).refusal, Refusal::unknown_waveform);
+}
+
+}  // namespace
+}  // namespace diastole::firmware

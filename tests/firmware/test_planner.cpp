@@ -1,0 +1,227 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <map>
+#include <numbers>
+#include <vector>
+
+#include "firmware/core/plan_check.hpp"
+#include "firmware/core/planner.hpp"
+
+namespace diastole::firmware {
+namespace {
+
+using wire::Waveform;
+
+std::vector<MotionEvent> plan(const Program& program, const Settings& settings, Steps position = {}) {
+  Planner planner;
+  planner.begin_run(program, settings, Ticks{1'000'000}, position);
+  std::vector<MotionEvent> events;
+  for (; planner.peek() != nullptr; planner.pop())
+    events.push_back(*planner.peek());
+  return events;
+}
+
+Program program_of(std::initializer_list<Segment> segments, std::uint16_t gate_every = 1) {
+  Program program;
+  for (const Segment& segment : segments)
+    program.segments[program.size++] = segment;
+  program.gate_every = gate_every;
+  program.rest_us = 500'000;
+  program.ttl_width_us = 1'000;
+  program.position_period_ticks = 280'000;
+  return program;
+}
+
+const Settings kSettings(wire::Configure::example());
+
+long double analytic_phase(Waveform waveform, long double y) {
+  if (waveform == Waveform::sinusoidal) return std::acos(1 - 2 * y) / (2 * std::numbers::pi_v<long double>);
+  return y <= 0.5L ? std::sqrt(y / 8) : 0.5L - std::sqrt((1 - y) / 8);
+}
+
+struct Motion {
+  Waveform waveform;
+  std::uint32_t stroke_nL;
+  std::uint32_t period_us;
+};
+class StepTimes : public testing::TestWithParam<Motion> {};
+
+TEST_P(StepTimes, AreTheAnalyticCrossingsRoundedToATick) {
+  const auto [waveform, stroke_nL, period_us] = GetParam();
+  const Program program = program_of({{waveform, 2, stroke_nL, 0, period_us}});
+  const auto events = plan(program, kSettings);
+  const std::int32_t count = kSettings.steps_of_nL(stroke_nL).count;
+  const long double period = microseconds(period_us).count;
+  const std::int64_t first_cycle = 1'000'000 + microseconds(500'000).count;
+  std::int64_t step = 0;
+  for (const MotionEvent& event : events) {
+    if (!event.has(MotionEvent::kStep)) continue;
+    const std::int64_t cycle = step / (2 * count), k = step % (2 * count);
+    const bool rising = k < count;
+    const long double y = (2 * (rising ? k : 2 * count - 1 - k) + 1) / (2.0L * count);
+    const long double phase = rising ? analytic_phase(waveform, y) : 1 - analytic_phase(waveform, y);
+    const long double exact =
+        static_cast<long double>(first_cycle) + (static_cast<long double>(cycle) + phase) * period;
+    ASSERT_LE(std::abs(static_cast<long double>(event.tick.count) - exact), 0.51L) << "step " << step;
+    ASSERT_EQ(event.has(MotionEvent::kInflate), rising);
+    ++step;
+  }
+  EXPECT_EQ(step, 4 * count);
+}
+
+INSTANTIATE_TEST_SUITE_P(Motions, StepTimes,
+                         testing::Values(Motion{Waveform::parabolic, 40'000'000, 1'200'000},
+                                         Motion{Waveform::parabolic, 100'000'000, 2'000'000},
+                                         Motion{Waveform::parabolic, 8'000, 300'000},
+                                         Motion{Waveform::parabolic, 16'000'000, 60'000'000},
+                                         Motion{Waveform::sinusoidal, 40'000'000, 1'200'000},
+                                         Motion{Waveform::sinusoidal, 20'000'000, 4'000'000},
+                                         Motion{Waveform::sinusoidal, 16'000'000, 60'000'000}));
+
+TEST(Planner, TimesNeverDecreaseAndEveryCycleEndsWhereItBegan) {
+  const Program program = program_of({{Waveform::parabolic, 50, 40'000'000, 0, 1'200'000},
+                                      {Waveform::sinusoidal, 30, 20'000'000, 10'000'000, 2'000'000},
+                                      {Waveform::sinusoidal, 20, 10'000'000, 5'000'000, 1'000'000}});
+  ASSERT_TRUE(check_program(program, kSettings).ok());
+  std::int32_t position = 0;
+  std::size_t segment = 0, cycles = 0;
+  std::int32_t offset = 0;
+  Ticks before{0};
+  for (const MotionEvent& event : plan(program, kSettings)) {
+    ASSERT_GE(event.tick, before);
+    before = event.tick;
+    if (event.has(MotionEvent::kSegmentStart)) {
+      offset = kSettings.steps_of_nL(program.segments[segment++].offset_nL).count;
+      ASSERT_EQ(position, offset);
+    }
+    if (event.has(MotionEvent::kStep)) position += event.has(MotionEvent::kInflate) ? 1 : -1;
+    if (event.has(MotionEvent::kCycleEnd)) {
+      ASSERT_EQ(position, offset);
+      ++cycles;
+    }
+  }
+  EXPECT_EQ(segment, 3U);
+  EXPECT_EQ(cycles, 100U);
+  EXPECT_EQ(position, 0);
+}
+
+TEST(Planner, NothingDriftsOverTenMillionSteps) {
+  const Program program = program_of({{Waveform::parabolic, 1000, 40'000'000, 0, 1'200'000}});
+  Planner planner;
+  planner.begin_run(program, kSettings, Ticks{0}, Steps{0});
+  std::int64_t position = 0, steps = 0;
+  Ticks last_cycle_start{-1};
+  for (; planner.peek() != nullptr; planner.pop()) {
+    const MotionEvent& event = *planner.peek();
+    if (event.has(MotionEvent::kCycleStart)) {
+      if (last_cycle_start > Ticks{0}) {
+        ASSERT_EQ(event.tick - last_cycle_start, microseconds(1'200'000));
+      }
+      last_cycle_start = event.tick;
+    }
+    if (!event.has(MotionEvent::kStep)) continue;
+    position += event.has(MotionEvent::kInflate) ? 1 : -1;
+    ++steps;
+  }
+  EXPECT_EQ(steps, 2 * 5134 * 1000);
+  EXPECT_EQ(position, 0);
+}
+
+TEST(Planner, RampsAreSmoothAndWithinTheLimits) {
+  const Program program = program_of({{Waveform::sinusoidal, 1, 20'000'000, 500'000'000, 2'000'000}});
+  const wire::Configure limits = wire::Configure::example();
+  double fastest = 0;
+  Ticks last{0};
+  bool cycling = false;
+  for (const MotionEvent& event : plan(program, kSettings)) {
+    if (event.has(MotionEvent::kSegmentStart)) cycling = true;
+    if (event.has(MotionEvent::kCycleEnd)) cycling = false;
+    if (!event.has(MotionEvent::kStep)) continue;
+    if (!cycling) fastest = std::max(fastest, 1e0 / static_cast<double>((event.tick - last).count));
+    last = event.tick;
+  }
+  const double fastest_uL_per_s = fastest * kTicksPerSecond * limits.microstep_pL * 1e-6;
+  EXPECT_LE(fastest_uL_per_s, 0.51 * limits.flow_uL_per_s);
+  EXPECT_GT(fastest_uL_per_s, 0.1 * limits.flow_uL_per_s);
+}
+
+TEST(Planner, RWaveAtEveryNthCycleOfTheRun) {
+  const Program program = program_of(
+      {{Waveform::parabolic, 3, 1'000'000, 0, 500'000}, {Waveform::parabolic, 4, 2'000'000, 0, 500'000}}, 2);
+  std::vector<bool> played;
+  for (const MotionEvent& event : plan(program, kSettings))
+    if (event.has(MotionEvent::kCycleStart)) played.push_back(event.has(MotionEvent::kRWave));
+  EXPECT_EQ(played, (std::vector<bool>{true, false, true, false, true, false, true}));
+}
+
+TEST(Planner, ARunFromElsewhereReturnsToZeroBeforeItsRest) {
+  const Program program = program_of({{Waveform::parabolic, 1, 1'000'000, 0, 500'000}});
+  std::int32_t position = 700;
+  std::int64_t first_up = 0, last_down = 0;
+  for (const MotionEvent& event : plan(program, kSettings, Steps{700})) {
+    if (event.has(MotionEvent::kSegmentStart)) {
+      EXPECT_EQ(position, 0);
+    }
+    if (!event.has(MotionEvent::kStep)) continue;
+    position += event.has(MotionEvent::kInflate) ? 1 : -1;
+    if (first_up == 0 && event.has(MotionEvent::kInflate)) first_up = event.tick.count;
+    if (first_up == 0) last_down = event.tick.count;
+  }
+  EXPECT_EQ(position, 0);
+  EXPECT_GT(first_up - last_down, microseconds(500'000).count);
+}
+
+TEST(Planner, SegmentOffsetsAreWhereTheSegmentsStart) {
+  const Program program = program_of({{Waveform::parabolic, 3, 1'000'000, 0, 500'000},
+                                      {Waveform::sinusoidal, 4, 2'000'000, 30'000'000, 700'000},
+                                      {Waveform::parabolic, 1, 2'000'000, 10'000'000, 900'000}});
+  std::size_t segment = 0;
+  for (const MotionEvent& event : plan(program, kSettings))
+    if (event.has(MotionEvent::kSegmentStart)) {
+      EXPECT_EQ((event.tick - Ticks{1'000'000}).count,
+                Planner::segment_offset(program, kSettings, segment).count);
+      ++segment;
+    }
+  EXPECT_EQ(segment, 3U);
+}
+
+class StopPhase : public testing::TestWithParam<int> {};
+
+TEST_P(StopPhase, DeceleratesWithinTheLimitFromAnyPhase) {
+  const Program program = program_of({{Waveform::parabolic, 2, 40'000'000, 0, 1'200'000}});
+  Planner planner;
+  planner.begin_run(program, kSettings, Ticks{0}, Steps{0});
+  const Ticks stop_at = microseconds(500'000 + 15'000 * GetParam());
+  Ticks last{0}, interval{0};
+  bool inflate = false;
+  for (; planner.peek() != nullptr && planner.peek()->tick < stop_at; planner.pop()) {
+    if (!planner.peek()->has(MotionEvent::kStep)) continue;
+    interval = planner.peek()->tick - last;
+    last = planner.peek()->tick;
+    inflate = planner.peek()->has(MotionEvent::kInflate);
+  }
+  const double limit = static_cast<double>(kSettings.stop_steps_per_s2());
+  planner.begin_stop(stop_at - microseconds(9'000), kSettings.stop_steps_per_s2());
+  double speed = static_cast<double>(kTicksPerSecond) / static_cast<double>(interval.count);
+  const double first_speed = speed;
+  Ticks end{0};
+  for (; planner.peek() != nullptr; planner.pop()) {
+    end = planner.peek()->tick;
+    if (planner.peek()->has(MotionEvent::kEnd)) break;
+    ASSERT_EQ(planner.peek()->has(MotionEvent::kInflate), inflate);
+    const double dt = static_cast<double>((end - last).count) / kTicksPerSecond;
+    ASSERT_LE(1 / dt, speed * 1.001 + 1);
+    // Speed over a step is known to about one part in the number of steps left.
+    ASSERT_LE((speed - 1 / dt) / dt, 3 * limit);
+    speed = 1 / dt;
+    last = end;
+  }
+  const double stopping_s = static_cast<double>((end - stop_at).count) / kTicksPerSecond;
+  EXPECT_LE(stopping_s, first_speed / limit * 1.1 + 0.03);
+}
+
+INSTANTIATE_TEST_SUITE_P(Phases, StopPhase, testing::Range(0, 160, 3));
+
+}  // namespace
+}  // namespace diastole::firmware

@@ -1,0 +1,116 @@
+#include <gtest/gtest.h>
+
+#include <map>
+#include <vector>
+
+#include "firmware/core/r_wave.hpp"
+#include "tests/firmware/bench.hpp"
+
+namespace diastole::firmware {
+namespace {
+
+using wire::Waveform;
+
+std::vector<Edge> edges_of(const std::vector<Edge>& all, Signal signal) {
+  std::vector<Edge> some;
+  for (const Edge& edge : all)
+    if (edge.signal == signal) some.push_back(edge);
+  return some;
+}
+
+TEST(RWave, IsATriangleOf30msAnd20mV) {
+  EXPECT_EQ((kRWaveSamplePeriod * static_cast<std::int64_t>(kRWaveSamples)).count,
+            microseconds(30'000).count);
+  const std::size_t peak = kRWaveSamples / 2 - 1;
+  EXPECT_NEAR(r_wave_uV(kRWaveCodes[peak]), kRWavePeak_uV, 400);
+  EXPECT_EQ(kRWaveCodes.back(), 0);
+  EXPECT_LE(kRWaveCodes[peak], kDacFullScale);
+  for (std::size_t i = 0; i < kRWaveSamples; ++i) {
+    const double height = static_cast<double>(i <= peak ? i + 1 : kRWaveSamples - 1 - i) / 150;
+    EXPECT_NEAR(r_wave_uV(kRWaveCodes[i]), height * kRWavePeak_uV, 0.02 * kRWavePeak_uV) << i;
+  }
+  for (std::size_t i = 1; i <= peak; ++i)
+    EXPECT_EQ(kRWaveCodes[peak - i], kRWaveCodes[peak + i]);
+}
+
+TEST(Trigger, TtlAndRWaveStartWithTheFirstStepOfEachCycle) {
+  Bench bench;
+  bench.prepare();
+  bench.add_segment(Waveform::parabolic, 6, 40'000'000, 1'200'000);
+  bench.add_segment(Waveform::sinusoidal, 5, 16'000'000, 800'000, 4'000'000);
+  (void)bench.rig.take_edges();
+  wire::Arm arm = wire::Arm::example();
+  arm.gate_every = 2;
+  arm.ttl_width_us = 5'000;
+  bench.run_program(arm);
+  const auto edges = bench.rig.take_edges();
+
+  std::vector<Ticks> rises;
+  Ticks rise{0};
+  for (const Edge& edge : edges_of(edges, Signal::TTL)) {
+    if (edge.value == 1)
+      rises.push_back(rise = edge.tick);
+    else
+      EXPECT_EQ((edge.tick - rise).count, microseconds(5'000).count);
+  }
+  ASSERT_EQ(rises.size(), 11U);
+  ASSERT_EQ(bench.heard.triggers.size(), 11U);
+  EXPECT_EQ(bench.heard.ended.at(0).triggers, 11U);
+  EXPECT_EQ(bench.heard.ended.at(0).r_waves, 6U);
+
+  std::map<std::int64_t, bool> step_rises;
+  bool inflating = true;  // homing ends that way
+  for (const Edge& edge : edges) {
+    if (edge.signal == Signal::DIR) inflating = edge.value != 0;
+    if (edge.signal == Signal::STEP && edge.value == 1) step_rises[edge.tick.count] = inflating;
+  }
+  std::vector<Ticks> r_wave_starts;
+  const auto r_wave = edges_of(edges, Signal::RWAVE_uV);
+  for (std::size_t i = 0; i < r_wave.size(); ++i)
+    if (i == 0 || r_wave[i - 1].value == 0) r_wave_starts.push_back(r_wave[i].tick);
+  ASSERT_EQ(r_wave_starts.size(), 6U);
+
+  for (std::size_t cycle = 0; cycle < rises.size(); ++cycle) {
+    const auto step = step_rises.find(rises[cycle].count);
+    ASSERT_NE(step, step_rises.end()) << "TTL of cycle " << cycle << " has no step at its tick";
+    EXPECT_TRUE(step->second);
+    const auto before = step == step_rises.begin() ? step : std::prev(step);
+    if (cycle % 6 != 0) {
+      EXPECT_FALSE(before->second) << "not the first step of the cycle";
+    }
+    EXPECT_EQ(bench.heard.triggers[cycle].tick, on_wire(rises[cycle]));
+    EXPECT_EQ(bench.heard.triggers[cycle].cycle, cycle);
+    EXPECT_EQ(bench.heard.triggers[cycle].r_wave, cycle % 2 == 0 ? 1 : 0);
+    if (cycle % 2 == 0) {
+      EXPECT_EQ(r_wave_starts[cycle / 2], rises[cycle]);
+    }
+  }
+}
+
+TEST(Pins, DirectionIsSetUpBeforeTheStepAndPulsesHaveTheirWidth) {
+  Bench bench;
+  bench.prepare();
+  bench.add_segment(Waveform::sinusoidal, 3, 20'000'000, 600'000);
+  bench.run_program();
+  Ticks direction{-1'000'000}, rise{0}, fall{0};
+  std::size_t steps = 0;
+  for (const Edge& edge : bench.rig.take_edges()) {
+    if (edge.signal == Signal::DIR) {
+      EXPECT_GE(edge.tick, fall);
+      direction = edge.tick;
+    }
+    if (edge.signal != Signal::STEP) continue;
+    if (edge.value == 1) {
+      ASSERT_GE(edge.tick - direction, kDirectionSetup);
+      rise = edge.tick;
+      ++steps;
+    } else {
+      ASSERT_EQ((edge.tick - rise).count, kStepPulse.count);
+      fall = edge.tick;
+    }
+  }
+  EXPECT_GT(steps, 3U * 2 * 2567);
+}
+
+}  // namespace
+}  // namespace diastole::firmware
