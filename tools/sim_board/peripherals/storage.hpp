@@ -1,0 +1,60 @@
+#pragma once
+// Register blocks that a program writes and reads back and that do nothing else here: PWR (its voltage is
+// always ready), RTC backup registers, DBGMCU; and the random number generator.
+
+#include <array>
+#include <cstdint>
+
+#include "tools/sim_board/core/device.hpp"
+
+namespace diastole::board_model {
+
+class Storage final : public Device {
+ public:
+  /// `always_set` bits of the register at `status_offset` read 1; with `kept`, contents survive system
+  /// resets.
+  explicit Storage(uint32_t status_offset = 0, uint32_t always_set = 0, bool kept = false)
+      : status_offset_(status_offset), always_set_(always_set), kept_(kept) {}
+
+  uint32_t read(uint32_t offset) override {
+    return registers_[offset / 4] | (offset == status_offset_ ? always_set_ : 0);
+  }
+  void write(uint32_t offset, uint32_t value, uint32_t mask) override {
+    uint32_t& held = registers_[offset / 4];
+    held = merged(held, value, mask);
+  }
+  void reset() override {
+    if (!kept_) registers_.fill(0);
+  }
+
+ private:
+  uint32_t status_offset_, always_set_;
+  bool kept_;
+  std::array<uint32_t, 256> registers_{};
+};
+
+/// RNG: always ready, the same numbers in every run that starts from the same seed; resets do not rewind it.
+class RandomNumbers final : public Device {
+ public:
+  explicit RandomNumbers(uint32_t seed) : state_(seed != 0 ? seed : 1) {}
+
+  uint32_t read(uint32_t offset) override {
+    if (offset == 0x00) return control_;
+    if (offset == 0x04) return (control_ & 4) != 0 ? 1 : 0;
+    if (offset != 0x08) return 0;
+    state_ ^= state_ << 13;
+    state_ ^= state_ >> 17;
+    state_ ^= state_ << 5;
+    return state_;
+  }
+  void write(uint32_t offset, uint32_t value, uint32_t mask) override {
+    if (offset == 0x00) control_ = merged(control_, value, mask);
+  }
+  void reset() override { control_ = 0; }
+
+ private:
+  uint32_t state_;
+  uint32_t control_ = 0;
+};
+
+}  // namespace diastole::board_model

@@ -1,0 +1,393 @@
+#include "tools/sim_board/peripherals/timer.hpp"
+
+#include <algorithm>
+
+namespace diastole::board_model {
+namespace {
+
+constexpr uint32_t update_flag = 1, trigger_flag = 1 << 6;
+constexpr uint32_t auto_reload_preload = 1 << 7, one_pulse = 1 << 3, update_request_source = 1 << 2,
+                   update_disable = 1 << 1;
+
+uint32_t compare_flag(uint32_t channel) { return 2U << channel; }
+
+enum OutputMode : uint32_t {
+  frozen,
+  active_on_match,
+  inactive_on_match,
+  toggle,
+  force_inactive,
+  force_active,
+  pwm1,
+  pwm2
+};
+enum TriggerMode : uint32_t { on_reset, on_enable, on_update, on_compare_pulse };
+enum SlaveMode : uint32_t { slave_reset = 4, slave_trigger = 6, slave_clock = 7 };
+
+}  // namespace
+
+Timer::Timer(Shape shape, const Clock& clock, Scheduler& scheduler, Nvic& nvic, Notes& notes)
+    : shape_(shape),
+      clock_(clock),
+      scheduler_(scheduler),
+      nvic_(nvic),
+      notes_(notes),
+      slot_(scheduler.add(*this)) {
+  reset();
+}
+
+void Timer::reset() {
+  cr1_ = cr2_ = smcr_ = dier_ = sr_ = ccer_ = bdtr_ = rcr_ = 0;
+  ccmr_.fill(0);
+  prescaler_ = prescaler_preload_ = 0;
+  reload_ = reload_preload_ = width_mask();
+  count_ = 0;
+  count_since_ = clock_.now();
+  for (Channel& channel : channels_) {
+    channel.compare = channel.preload = 0;
+    channel.reference = false;
+  }
+  set_outputs(clock_.now());
+  set_lines();
+  ask();
+}
+
+Cycles Timer::cycles_per_count() const {
+  const ClockTree& tree = clock_.tree();
+  return Cycles{shape_.on_apb2 ? tree.apb2_timer_ratio : tree.apb1_timer_ratio} * (uint64_t{prescaler_} + 1);
+}
+
+uint32_t Timer::output_mode(uint32_t channel) const {
+  const uint32_t half = ccmr_[channel / 2] >> (8 * (channel % 2));
+  return (half & 3) != 0 ? uint32_t{frozen} : half >> 4 & 7;  // CCxS: an input never drives the pin
+}
+
+bool Timer::preloaded(uint32_t channel) const { return (ccmr_[channel / 2] >> (8 * (channel % 2)) & 8) != 0; }
+
+uint64_t Timer::counts_to_update() const {
+  return count_ < top() ? top() - count_ : (uint64_t{width_mask()} + 1 - count_) + top();
+}
+
+uint64_t Timer::counts_to_match(uint32_t channel) const {
+  const uint64_t compare = channels_[channel].compare;
+  if (compare > count_) return compare - count_;
+  return compare < top() ? counts_to_update() + compare : never;
+}
+
+bool Timer::match_observable(uint32_t channel) const {
+  const uint32_t flag = compare_flag(channel);
+  const bool interrupts = (dier_ & flag) != 0 && (sr_ & flag) == 0;
+  const bool drives = (ccer_ >> (4 * channel) & 1) != 0 && output_mode(channel) != frozen;
+  const bool triggers = (trigger_mode() == on_compare_pulse && channel == 0) || trigger_mode() == 4 + channel;
+  return interrupts || drives || triggers;
+}
+
+bool Timer::update_observable() const {
+  if ((cr1_ & update_disable) != 0) return false;
+  const bool interrupts = (dier_ & update_flag) != 0 && (sr_ & update_flag) == 0;
+  bool drives = false;
+  for (uint32_t channel = 0; channel < channel_count; ++channel) {
+    drives |= output_mode(channel) >= pwm1 && (ccer_ >> (4 * channel) & 1) != 0;
+  }
+  const bool triggers = trigger_mode() == on_update || trigger_mode() >= 4;
+  return interrupts || drives || triggers;
+}
+
+void Timer::settle(Cycles to) {
+  if (!counting()) {
+    count_since_ = to;
+    return;
+  }
+  while (counting()) {
+    uint64_t counts = counts_to_update();
+    for (uint32_t channel = 0; channel < channel_count; ++channel) {
+      counts = std::min(counts, counts_to_match(channel));
+    }
+    const Cycles at = count_since_ + counts * cycles_per_count();
+    if (at > to) {
+      const uint64_t passed = (to - count_since_) / cycles_per_count();
+      count_ += static_cast<uint32_t>(passed);
+      count_since_ += passed * cycles_per_count();
+      return;
+    }
+    advance_count(counts, at);
+  }
+  count_since_ = to;
+}
+
+void Timer::advance_count(uint64_t counts, Cycles at) {
+  const bool overflows = counts >= counts_to_update();
+  count_ = overflows ? 0 : count_ + static_cast<uint32_t>(counts);
+  count_since_ = at;
+  if (overflows) update_event(at, true);
+  happen(at);
+}
+
+void Timer::happen(Cycles at) {
+  for (uint32_t channel = 0; channel < channel_count; ++channel) {
+    if (channels_[channel].compare == count_) match(channel, at);
+  }
+}
+
+void Timer::update_event(Cycles at, bool by_overflow) {
+  if ((cr1_ & update_disable) != 0) return;
+  prescaler_ = prescaler_preload_;
+  reload_ = reload_preload_;
+  for (uint32_t channel = 0; channel < channel_count; ++channel) {
+    channels_[channel].compare = channels_[channel].preload;
+    const uint32_t mode = output_mode(channel);
+    if (mode >= pwm1) set_reference(channel, (channels_[channel].compare > 0) == (mode == pwm1), at);
+  }
+  if (by_overflow || (cr1_ & update_request_source) == 0) sr_ |= update_flag;
+  if (by_overflow && (cr1_ & one_pulse) != 0) cr1_ &= ~1U;
+  if (trigger_mode() == on_update && wiring_.trigger_output) wiring_.trigger_output(at);
+  set_lines();
+}
+
+void Timer::match(uint32_t channel, Cycles at) {
+  sr_ |= compare_flag(channel);
+  switch (output_mode(channel)) {
+    case active_on_match:
+      set_reference(channel, true, at);
+      break;
+    case inactive_on_match:
+      set_reference(channel, false, at);
+      break;
+    case toggle:
+      set_reference(channel, !channels_[channel].reference, at);
+      break;
+    case pwm1:
+      set_reference(channel, false, at);
+      break;
+    case pwm2:
+      set_reference(channel, true, at);
+      break;
+    default:
+      break;
+  }
+  if (channel == 0 && trigger_mode() == on_compare_pulse && wiring_.trigger_output)
+    wiring_.trigger_output(at);
+  set_lines();
+}
+
+void Timer::set_reference(uint32_t channel, bool active, Cycles at) {
+  Channel& held = channels_[channel];
+  const bool rises = active && !held.reference;
+  held.reference = active;
+  set_outputs(at);
+  if (rises && trigger_mode() == 4 + channel && wiring_.trigger_output) wiring_.trigger_output(at);
+}
+
+void Timer::set_outputs(Cycles at) {
+  const bool advanced = shape_.number == 1 || shape_.number == 8;
+  const bool main_output = !advanced || (bdtr_ >> 15 & 1) != 0;
+  for (uint32_t index = 0; index < channel_count; ++index) {
+    Channel& channel = channels_[index];
+    const uint32_t enable = ccer_ >> (4 * index);
+    const bool level = main_output && (enable & 1) != 0 && channel.reference != ((enable >> 1 & 1) != 0);
+    if (level == channel.output) continue;
+    channel.output = level;
+    if (wiring_.output) wiring_.output(static_cast<uint8_t>(index + 1), level, at);
+  }
+}
+
+void Timer::apply_forced_modes(Cycles at) {
+  for (uint32_t channel = 0; channel < channel_count; ++channel) {
+    const uint32_t mode = output_mode(channel);
+    if (mode == force_inactive || mode == force_active) set_reference(channel, mode == force_active, at);
+    if (mode >= pwm1) set_reference(channel, (count_ < channels_[channel].compare) == (mode == pwm1), at);
+  }
+}
+
+void Timer::set_lines() {
+  const uint32_t asked = sr_ & dier_ & 0xff;
+  const uint32_t source = shape_.line_source;
+  if (shape_.update_irq == shape_.compare_irq) return nvic_.set_line(shape_.update_irq, asked != 0, source);
+  nvic_.set_line(shape_.update_irq, (asked & update_flag) != 0, source);
+  nvic_.set_line(shape_.compare_irq, (asked & 0x1e) != 0, source);
+}
+
+void Timer::ask() {
+  if (!counting()) return scheduler_.set(slot_, never);
+  uint64_t counts = update_observable() || (cr1_ & one_pulse) != 0 ? counts_to_update() : never;
+  for (uint32_t channel = 0; channel < channel_count; ++channel) {
+    if (match_observable(channel)) counts = std::min(counts, counts_to_match(channel));
+  }
+  scheduler_.set(slot_, counts == never ? never : count_since_ + counts * cycles_per_count());
+}
+
+void Timer::on_event(Cycles at) {
+  settle(at);
+  ask();
+}
+
+void Timer::after_clock_change() { ask(); }
+
+void Timer::internal_trigger(uint32_t input, Cycles at) {
+  const uint32_t mode = smcr_ & 7;
+  if (mode == 0 || (smcr_ >> 4 & 7) != input) return;
+  settle(at);
+  switch (mode) {
+    case slave_reset:
+      generate(update_flag, at);
+      break;
+    case slave_trigger:
+      cr1_ |= 1;
+      break;
+    case slave_clock:
+      if ((cr1_ & 1) != 0) advance_count(1, at);
+      break;
+    default:
+      unmodelled("slave mode");
+      break;
+  }
+  sr_ |= trigger_flag;
+  set_lines();
+  ask();
+}
+
+void Timer::unmodelled(const char* what) {
+  notes_.add("TIM" + std::to_string(shape_.number) + ": " + what + " is not modelled",
+             clock_.ns(clock_.now()));
+}
+
+uint32_t Timer::read(uint32_t offset) {
+  settle(clock_.now());
+  switch (offset) {
+    case 0x00:
+      return cr1_;
+    case 0x04:
+      return cr2_;
+    case 0x08:
+      return smcr_;
+    case 0x0c:
+      return dier_;
+    case 0x10:
+      return sr_;
+    case 0x18:
+      return ccmr_[0];
+    case 0x1c:
+      return ccmr_[1];
+    case 0x20:
+      return ccer_;
+    case 0x24:
+      return count_;
+    case 0x28:
+      return prescaler_preload_;
+    case 0x2c:
+      return reload_preload_;
+    case 0x30:
+      return rcr_;
+    case 0x34:
+    case 0x38:
+    case 0x3c:
+    case 0x40:
+      return channels_[(offset - 0x34) / 4].preload;
+    case 0x44:
+      return bdtr_;
+    default:
+      return 0;
+  }
+}
+
+void Timer::write(uint32_t offset, uint32_t value, uint32_t mask) {
+  const Cycles now = clock_.now();
+  settle(now);
+  switch (offset) {
+    case 0x00:
+      write_control(merged(cr1_, value, mask));
+      break;
+    case 0x04:
+      cr2_ = merged(cr2_, value, mask);
+      break;
+    case 0x08:
+      smcr_ = merged(smcr_, value, mask);
+      break;
+    case 0x0c:
+      dier_ = merged(dier_, value, mask);
+      break;
+    case 0x10:
+      sr_ &= value | ~mask;
+      break;
+    case 0x14:
+      generate(value & mask, now);
+      break;
+    case 0x18:
+    case 0x1c: {
+      uint32_t& held = ccmr_[(offset - 0x18) / 4];
+      held = merged(held, value, mask);
+      apply_forced_modes(now);
+      break;
+    }
+    case 0x20:
+      ccer_ = merged(ccer_, value, mask);
+      break;
+    case 0x24:
+      count_ = merged(count_, value, mask) & width_mask();
+      count_since_ = now;
+      break;
+    case 0x28:
+      prescaler_preload_ = merged(prescaler_preload_, value, mask) & 0xffff;
+      break;
+    case 0x2c:
+      reload_preload_ = merged(reload_preload_, value, mask) & width_mask();
+      if ((cr1_ & auto_reload_preload) == 0) reload_ = reload_preload_;
+      break;
+    case 0x30:
+      rcr_ = merged(rcr_, value, mask);
+      if (rcr_ != 0) unmodelled("the repetition counter");
+      break;
+    case 0x34:
+    case 0x38:
+    case 0x3c:
+    case 0x40:
+      write_compare((offset - 0x34) / 4,
+                    merged(channels_[(offset - 0x34) / 4].preload, value, mask) & width_mask());
+      break;
+    case 0x44:
+      bdtr_ = merged(bdtr_, value, mask);
+      break;
+    default:
+      break;
+  }
+  set_outputs(now);
+  set_lines();
+  ask();
+}
+
+void Timer::write_control(uint32_t value) {
+  if ((value & 0x70) != 0) unmodelled("counting down or centre-aligned");
+  const bool starts = (value & 1) != 0 && (cr1_ & 1) == 0;
+  cr1_ = value;
+  if (starts) count_since_ = clock_.now();
+  if (starts && trigger_mode() == on_enable && wiring_.trigger_output) wiring_.trigger_output(clock_.now());
+}
+
+void Timer::write_compare(uint32_t channel, uint32_t value) {
+  Channel& held = channels_[channel];
+  held.preload = value;
+  if (preloaded(channel)) return;
+  held.compare = value;
+  const uint32_t mode = output_mode(channel);
+  if (mode >= pwm1) return apply_forced_modes(clock_.now());
+  const bool armed = mode == active_on_match || mode == inactive_on_match || mode == toggle;
+  const uint32_t late = (count_ - value) & width_mask();
+  if (armed && counting() && wiring_.missed && (ccer_ >> (4 * channel) & 1) != 0 &&
+      late <= width_mask() / 2) {
+    wiring_.missed(static_cast<uint8_t>(channel + 1), late * cycles_per_count());
+  }
+}
+
+void Timer::generate(uint32_t bits, Cycles at) {
+  if (bits & update_flag) {
+    count_ = 0;
+    count_since_ = at;
+    update_event(at, false);
+    if (trigger_mode() == on_reset && wiring_.trigger_output) wiring_.trigger_output(at);
+  }
+  for (uint32_t channel = 0; channel < channel_count; ++channel) {
+    if (bits & compare_flag(channel)) sr_ |= compare_flag(channel);
+  }
+}
+
+}  // namespace diastole::board_model

@@ -1,0 +1,162 @@
+#include "tools/sim_board/peripherals/usart.hpp"
+
+#include <algorithm>
+
+namespace diastole::board_model {
+namespace {
+
+constexpr uint32_t overrun = 1 << 3, receive_full = 1 << 5, complete = 1 << 6, transmit_empty = 1 << 7;
+constexpr uint32_t enable = 1 << 13, transmitter = 1 << 3, receiver = 1 << 2, oversample_8 = 1 << 15,
+                   nine_bits = 1 << 12;
+
+}  // namespace
+
+Usart::Usart(Shape shape, const Clock& clock, Scheduler& scheduler, Nvic& nvic)
+    : shape_(shape), clock_(clock), scheduler_(scheduler), nvic_(nvic), slot_(scheduler.add(*this)) {
+  reset();
+}
+
+void Usart::reset() {
+  sr_ = transmit_empty | complete;
+  brr_ = cr1_ = cr2_ = cr3_ = gtpr_ = 0;
+  next_waits_ = overrun_pending_clear_ = false;
+  sent_at_ = received_at_ = never;
+  incoming_.clear();
+  set_line();
+  ask();
+}
+
+Cycles Usart::byte_cycles() const {
+  const Cycles ratio = shape_.on_apb2 ? clock_.tree().apb2_ratio : clock_.tree().apb1_ratio;
+  const Cycles bit = (cr1_ & oversample_8) != 0 ? 8 * (brr_ >> 4) + (brr_ & 7) : brr_;
+  const Cycles bits = ((cr1_ & nine_bits) != 0 ? 11 : 10) + ((cr2_ >> 12 & 3) == 2 ? 1 : 0);
+  return std::max<Cycles>(bit, 1) * bits * ratio;
+}
+
+uint32_t Usart::read(uint32_t offset) {
+  switch (offset) {
+    case 0x00:
+      overrun_pending_clear_ = (sr_ & overrun) != 0;
+      return sr_;
+    case 0x04:
+      sr_ &= ~receive_full;
+      if (overrun_pending_clear_) sr_ &= ~overrun;
+      overrun_pending_clear_ = false;
+      set_line();
+      return received_;
+    case 0x08:
+      return brr_;
+    case 0x0c:
+      return cr1_;
+    case 0x10:
+      return cr2_;
+    case 0x14:
+      return cr3_;
+    case 0x18:
+      return gtpr_;
+    default:
+      return 0;
+  }
+}
+
+void Usart::write(uint32_t offset, uint32_t value, uint32_t mask) {
+  switch (offset) {
+    case 0x00:
+      sr_ &= value | ~(mask & (receive_full | complete));
+      break;  // rc_w0
+    case 0x04:
+      start_sending(static_cast<uint8_t>(value), clock_.now());
+      break;
+    case 0x08:
+      brr_ = merged(brr_, value, mask);
+      break;
+    case 0x0c:
+      cr1_ = merged(cr1_, value, mask);
+      start_receiving(clock_.now());
+      break;
+    case 0x10:
+      cr2_ = merged(cr2_, value, mask);
+      break;
+    case 0x14:
+      cr3_ = merged(cr3_, value, mask);
+      break;
+    case 0x18:
+      gtpr_ = merged(gtpr_, value, mask);
+      break;
+    default:
+      return;
+  }
+  set_line();
+  ask();
+}
+
+void Usart::start_sending(uint8_t byte, Cycles at) {
+  if ((cr1_ & (enable | transmitter)) != (enable | transmitter)) return;
+  sr_ &= ~complete;
+  if (sent_at_ == never) {
+    shifting_ = byte;
+    sent_at_ = at + byte_cycles();
+    return;
+  }
+  next_ = byte;
+  next_waits_ = true;
+  sr_ &= ~transmit_empty;
+}
+
+void Usart::receive(uint8_t byte) {
+  incoming_.push_back(byte);
+  start_receiving(clock_.now());
+  ask();
+}
+
+void Usart::start_receiving(Cycles at) {
+  const bool listens = (cr1_ & (enable | receiver)) == (enable | receiver);
+  if (!listens) {
+    incoming_.clear();  // nobody hears it
+    received_at_ = never;
+  } else if (received_at_ == never && !incoming_.empty()) {
+    received_at_ = at + byte_cycles();
+  }
+}
+
+void Usart::on_event(Cycles at) {
+  if (sent_at_ <= at) {
+    const uint8_t done = shifting_;
+    sent_at_ = never;
+    if (next_waits_) {
+      shifting_ = next_;
+      next_waits_ = false;
+      sent_at_ = at + byte_cycles();
+      sr_ |= transmit_empty;
+    } else {
+      sr_ |= complete;
+    }
+    if (sent_) sent_(done, at);
+  }
+  if (received_at_ <= at) {
+    received_at_ = never;
+    if ((sr_ & receive_full) != 0) {
+      sr_ |= overrun;
+      ++overruns_;
+    } else {
+      received_ = incoming_.front();
+      sr_ |= receive_full;
+    }
+    incoming_.pop_front();
+    start_receiving(at);
+  }
+  set_line();
+  ask();
+}
+
+void Usart::after_clock_change() { ask(); }
+
+void Usart::set_line() {
+  const bool asked = ((cr1_ & receive_full) != 0 && (sr_ & (receive_full | overrun)) != 0) ||
+                     (cr1_ & sr_ & (transmit_empty | complete)) != 0;
+  nvic_.set_line(shape_.irq, asked);
+}
+
+void Usart::ask() { scheduler_.set(slot_, std::min(sent_at_, received_at_)); }
+
+}  // namespace diastole::board_model

@@ -1,0 +1,135 @@
+#pragma once
+// An STM32F405 board in software: executes a real image, instruction by instruction, with the chip's
+// peripherals modelled at register level, and shows what a wire on each pin would carry. Virtual time; two
+// runs with the same inputs are equal to the byte.
+//
+//   SimBoard board;
+//   board.load(image, 0x0800'0000);
+//   board.power_on();
+//   board.drive({1, 12}, false, 2'000'000'000);   // PB12 falls after two seconds
+//   board.advance_to(3'000'000'000);
+//   for (const PinEvent& event : board.take_pin_events()) ...
+//
+// What is modelled, how exactly, and what is not: tools/sim_board/README.md.
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "tools/sim_board/core/notes.hpp"
+#include "tools/sim_board/core/pins.hpp"
+
+namespace diastole {
+
+struct SimBoardOptions {
+  uint32_t crystal_Hz = 8'000'000;  ///< Olimex STM32-H405: 8 MHz, Feather F405: 12 MHz
+  uint32_t random_seed = 1;         ///< of the chip's random number generator
+};
+
+/// A byte that left through the board's serial port; the time is the end of its stop bit.
+struct SentByte {
+  uint64_t time_ns = 0;
+  uint8_t value = 0;
+};
+
+/// A compare value reached the timer after the counter had passed it: the edge is lost or a whole turn late.
+struct MissedDeadline {
+  uint64_t time_ns = 0;
+  uint8_t timer = 0, channel = 0;
+  uint64_t late_ns = 0;
+};
+
+struct InterruptStatistics {
+  uint32_t irq = 0;  ///< interrupt number; exceptions of the core count from 0x8000'0000 + exception number
+  uint64_t count = 0;
+  uint64_t worst_instructions = 0;
+  uint64_t worst_latency_cycles = 0;
+};
+
+struct BoardReset {
+  uint64_t time_ns = 0;
+  std::string cause;  ///< "power", "pin", "software", "watchdog"
+};
+
+struct BoardStatistics {
+  uint64_t time_ns = 0;
+  uint64_t cycles = 0;
+  uint64_t instructions = 0;
+  uint32_t core_Hz = 0;
+  uint32_t stack_top = 0;         ///< initial stack pointer
+  uint32_t stack_used_bytes = 0;  ///< deepest word touched below stack_top since power-up
+  uint64_t flash_operations = 0;
+  uint64_t serial_overruns = 0;
+  uint64_t missed_deadlines = 0;
+  std::vector<InterruptStatistics> interrupts;
+  std::vector<BoardReset> resets;
+  std::map<std::string, board_model::Note> notes;
+  std::string last_fault;  ///< in words; empty: none
+  bool locked_up = false;
+};
+
+class SimBoard {
+ public:
+  using Pin = board_model::Pin;
+  using PinEvent = board_model::PinEvent;
+
+  explicit SimBoard(SimBoardOptions options = {});
+  ~SimBoard();
+  SimBoard(SimBoard&&) noexcept;
+  SimBoard& operator=(SimBoard&&) noexcept;
+
+  /// Puts bytes into flash or RAM, as a debugger would. Throws InputError when they do not fit a memory.
+  void load(std::span<const uint8_t> bytes, uint32_t address);
+  /// The whole megabyte, to be kept for another day; load() puts it back.
+  [[nodiscard]] std::span<const uint8_t> flash() const;
+
+  void power_on();
+  void power_off();
+  void power_cycle() {
+    power_off();
+    power_on();
+  }
+  /// The reset button.
+  void reset();
+  [[nodiscard]] bool powered() const;
+
+  /// Executes until `time_ns` after the first power-up; nothing when that has passed. Time passes for a board
+  /// without power too. Ends early, at the moment of it, when power is cut (see
+  /// cut_power_at_flash_operation).
+  void advance_to(uint64_t time_ns);
+  [[nodiscard]] uint64_t now_ns() const;
+
+  /// Bytes for the board's serial port: back to back from now on, at the rate the firmware set; lost while
+  /// the firmware does not listen.
+  void send(std::span<const uint8_t> bytes);
+  /// What left through the serial port since the last call.
+  std::vector<SentByte> take_sent();
+  /// Bytes given to send() that have not reached the receiver yet.
+  [[nodiscard]] std::size_t bytes_on_the_way() const;
+
+  /// Drives a pin from outside from `time_ns` on. Undriven inputs follow their pull-up, else they are low.
+  void drive(Pin pin, bool level, uint64_t time_ns);
+  [[nodiscard]] bool level(Pin pin) const;
+  /// Changes of pins and DAC codes since the last call, in order of time.
+  std::vector<PinEvent> take_pin_events();
+
+  /// Power fails in the middle of flash operation `operation` (1 is the next one); nullopt: never.
+  void cut_power_at_flash_operation(std::optional<uint64_t> operation);
+
+  void on_missed_deadline(std::function<void(const MissedDeadline&)> listener);
+
+  /// A word of memory, nullopt outside it; how tests and reports look at the firmware's variables.
+  [[nodiscard]] std::optional<uint32_t> word(uint32_t address) const;
+  [[nodiscard]] BoardStatistics statistics() const;
+
+ private:
+  struct Board;
+  std::unique_ptr<Board> board_;
+};
+
+}  // namespace diastole
