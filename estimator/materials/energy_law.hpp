@@ -17,7 +17,6 @@
 // d2w/dc_m dc_n.
 
 #include <ceres/jet.h>
-#include <algorithm>
 #include <array>
 #include <concepts>
 
@@ -63,7 +62,8 @@ class EnergyLaw final : public Law {
 
   double energy(const Tensor& c, Values values) const override {
     std::array<double, count> parameter_values;
-    std::copy_n(values.begin(), count, parameter_values.begin());
+    for (size_t i = 0; i < count; ++i)
+      parameter_values[i] = values[i];
     return Energy::template energy<double>(c, parameter_values);
   }
 
