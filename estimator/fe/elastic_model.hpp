@@ -34,10 +34,10 @@ namespace diastole {
 class ElasticSystem;
 
 struct ElasticOptions {
-  std::vector<double> parameters;  ///< the law's, in its order; the same in all elements
+  std::vector<double> parameters{};  ///< the law's, in its order; the same in all elements
   PressureSpace pressure_space = PressureSpace::per_element;
-  std::optional<HeldDofs> held;  ///< default: bottom and top faces bonded
-  SolveOptions solve;
+  std::optional<HeldDofs> held{};  ///< default: bottom and top faces bonded
+  SolveOptions solve{};
   size_t threads = 0;  ///< 0: as many as the machine has
 };
 

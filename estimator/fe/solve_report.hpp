@@ -68,7 +68,7 @@ struct SolveOptions {
   double least_load_fraction = 1e-3;  ///< of the pressure change asked for
   double most_load_fraction = 1.0;
   /// Called after each Newton iteration, for a progress line.
-  std::function<void(double pressure_kPa, const NewtonIteration&)> on_iteration;
+  std::function<void(double pressure_kPa, const NewtonIteration&)> on_iteration{};
 };
 
 }  // namespace diastole

@@ -60,6 +60,11 @@ SymmetricFactor::SymmetricFactor(size_t size, std::span<const int> rows, std::sp
   control(mumps, 6) = no_matching;
   control(mumps, 7) = scotch;
   control(mumps, 12) = plain_graph;
+  // Pivots that are rounding errors (a body that can move freely) are counted instead of divided by.
+  constexpr int detect_null_pivots = 24;
+  constexpr double null_pivot_fraction = 1e-10;
+  control(mumps, detect_null_pivots) = 1;
+  mumps.cntl[3 - 1] = null_pivot_fraction;
   mumps.n = static_cast<int>(size);
   mumps.nnz = static_cast<MUMPS_INT8>(rows.size());
   mumps.irn = const_cast<int*>(rows.data());
@@ -85,6 +90,8 @@ FactorResult SymmetricFactor::factorise(std::span<double> values) {
   }
   if (status == singular) return {.singular = true, .negative_pivots = 0};
   instance_->check(status);
+  constexpr int null_pivots = 28;
+  if (outcome(mumps, null_pivots) > 0) return {.singular = true, .negative_pivots = 0};
   return {.singular = false, .negative_pivots = static_cast<size_t>(outcome(mumps, 12))};
 }
 
