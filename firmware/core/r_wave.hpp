@@ -20,13 +20,12 @@ inline constexpr std::uint32_t kRWavePeak_uV = 20'000;
 
 /// Sample i leaves the DAC i sample periods after the start; before the first and after the last it is 0.
 inline constexpr std::array<std::uint16_t, kRWaveSamples> kRWaveCodes = [] {
-  constexpr std::uint64_t half = kRWaveSamples / 2;
+  constexpr std::size_t half = kRWaveSamples / 2;
   std::array<std::uint16_t, kRWaveSamples> codes{};
-  for (std::uint64_t i = 1; i <= kRWaveSamples; ++i) {
-    const std::uint64_t height = i <= half ? i : kRWaveSamples - i;
+  for (std::size_t i = 0; i < kRWaveSamples; ++i) {
+    const std::uint64_t height = i < half ? i + 1 : kRWaveSamples - 1 - i;
     const std::uint64_t scaled = height * kRWavePeak_uV * kRWaveDivider * kDacFullScale;
-    codes[i - 1] =
-        static_cast<std::uint16_t>((scaled + half * kDacFullScale_uV / 2) / (half * kDacFullScale_uV));
+    codes[i] = static_cast<std::uint16_t>((scaled + half * kDacFullScale_uV / 2) / (half * kDacFullScale_uV));
   }
   return codes;
 }();

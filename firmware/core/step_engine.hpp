@@ -5,9 +5,9 @@
 //
 //   Planner ──push()──▶ queue ──load()──▶ Board::schedule ──edge──▶ on_match(): count, report, load()
 
+#include <atomic>
 #include <cstdint>
 #include <optional>
-#include <utility>
 
 #include "firmware/core/board.hpp"
 #include "firmware/core/planner.hpp"
@@ -36,7 +36,7 @@ class StepEngine {
   static constexpr std::size_t kQueue = 512;
   static constexpr std::size_t kSamples = 512;
   /// An order must reach the timer this long before its tick, or the compare would be missed.
-  static constexpr Ticks kLeastLead = microseconds(1);
+  static constexpr Ticks kLeastLead = microseconds(2);
 
   explicit StepEngine(B& board) : board_(board) {}
 
@@ -106,9 +106,9 @@ class StepEngine {
   void set_ttl_width(Ticks width) { ttl_width_ = width; }
 
   /// An event came too late for the timer since the last call: motion has been cut off.
-  bool take_underrun() { return std::exchange(underrun_, false); }
+  bool take_underrun() { return underrun_.exchange(false); }
   /// Samples or reports that found their ring full since the last call.
-  std::uint32_t take_lost() { return std::exchange(lost_, 0U); }
+  std::uint32_t take_lost() { return lost_.exchange(0); }
 
  private:
   void load() {
@@ -163,8 +163,8 @@ class StepEngine {
   Ticks sample_period_;
   bool sampling_ = false;
   bool closed_ = false;
-  bool underrun_ = false;
-  std::uint32_t lost_ = 0;
+  std::atomic<bool> underrun_{false};
+  std::atomic<std::uint32_t> lost_{0};
 };
 
 }  // namespace diastole::firmware

@@ -1,0 +1,48 @@
+// The application: the controller on the STM32F405.
+
+#include "firmware/boards/stm32f405/pins.hpp"
+#include "firmware/boards/stm32f405/registers.hpp"
+#include "firmware/boards/stm32f405/stm32_board.hpp"
+#include "firmware/core/controller.hpp"
+
+namespace {
+
+// Interrupt handlers take no argument, so what they serve has static storage.
+diastole::stm32::Stm32Board board;
+diastole::firmware::Controller<diastole::stm32::Stm32Board> controller(board);
+
+}  // namespace
+
+extern "C" {
+
+void TIM2_IRQHandler() {
+  if (board.timer_interrupt()) controller.on_match();
+}
+
+void EXTI_IRQHandler() {
+  board.input_interrupt();
+  controller.on_inputs();
+}
+
+void USART3_IRQHandler() { board.serial_interrupt(); }
+
+void DMA1_Stream5_IRQHandler() { board.r_wave_interrupt(); }
+
+void SysTick_Handler() {}
+
+/// A processor fault or an interrupt that nobody enabled: motor off, and the watchdog starts anew.
+void Stray_Handler() {
+  diastole::stm32::gpio_b().BSRR.write(diastole::stm32::kEnablePin << 16);
+  diastole::stm32::tim2().CCER.write(0);
+  for (;;) {
+  }
+}
+
+int main() {
+  board.start();
+  for (;;) {
+    controller.poll();
+    asm volatile("wfi");
+  }
+}
+}

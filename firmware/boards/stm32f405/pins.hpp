@@ -1,0 +1,31 @@
+#pragma once
+// What is wired where (Olimex STM32-H405 header names are the port names).
+//
+//   PA0   STEP      TIM2_CH1 (AF1)      out
+//   PA1   TTL       TIM2_CH2 (AF1)      out, also starts the R-wave through TIM4
+//   PA2   DIR       TIM2_CH3 (AF1)      out, high = inflate
+//   PA4   R-wave    DAC_OUT1            out, divider 1 : 125 to the scanner's ECG input
+//   PB0   ENABLE                        out, high = motor powered
+//   PB1   FAULT                         out, high = a fault is latched
+//   PB10  TX, PB11 RX  USART3 (AF7)
+//   PC0   e-stop                        in, pull-up: open loop (high) = pressed
+//   PC1   home switch                   in, pull-up: open contact (high) = closed on the piston
+//   PC2   far limit switch              in, pull-up: as home
+//
+// Inputs are normally closed to ground, so that a broken wire reads as pressed.
+
+#include <cstdint>
+
+namespace diastole::stm32 {
+
+inline constexpr std::uint32_t kDirPin = 1U << 2;
+inline constexpr std::uint32_t kEnablePin = 1U << 0;
+inline constexpr std::uint32_t kFaultPin = 1U << 1;
+inline constexpr std::uint32_t kEstopPin = 1U << 0;
+inline constexpr std::uint32_t kHomePin = 1U << 1;
+inline constexpr std::uint32_t kFarLimitPin = 1U << 2;
+
+/// Configures all of them, outputs low, and the input interrupts on both edges.
+void configure_pins();
+
+}  // namespace diastole::stm32

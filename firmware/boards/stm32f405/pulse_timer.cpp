@@ -1,0 +1,127 @@
+#include "firmware/boards/stm32f405/pulse_timer.hpp"
+
+#include "firmware/boards/stm32f405/pins.hpp"
+#include "firmware/boards/stm32f405/registers.hpp"
+
+namespace diastole::stm32 {
+
+using firmware::PulseOrder;
+using firmware::Ticks;
+
+namespace {
+
+constexpr std::uint32_t kUpdate = 1U << 0, kCompare1 = 1U << 1, kCompare2 = 1U << 2;
+
+/// Output compare modes, RM0090 18.4.7.
+enum Mode : std::uint32_t { kFrozen = 0, kActiveOnMatch = 1, kInactiveOnMatch = 2, kLow = 4, kHigh = 5 };
+
+void set_step_mode(Mode mode) { tim2().CCMR1.change(7U << 4, mode << 4); }
+void set_ttl_mode(Mode mode) { tim2().CCMR1.change(7U << 12, mode << 12); }
+void set_direction_mode(Mode mode) { tim2().CCMR2.change(7U << 4, mode << 4); }
+
+/// Flags are cleared by writing 0; writing 1 leaves them.
+void clear_flag(std::uint32_t flag) { tim2().SR.write(~flag); }
+
+bool has_passed(std::uint32_t tick) { return static_cast<std::int32_t>(tim2().CNT.read() - tick) >= 0; }
+
+}  // namespace
+
+void PulseTimer::start() {
+  tim2().PSC.write(0);
+  tim2().ARR.write(0xFFFF'FFFFU);
+  tim2().CR2.write(5U << 4);  // TRGO = OC2REF
+  set_step_mode(kLow);
+  set_ttl_mode(kLow);
+  set_direction_mode(kLow);
+  tim2().CCER.write(1U << 0 | 1U << 4 | 1U << 8);
+  tim2().EGR.write(1);
+  clear_flag(kUpdate);
+  tim2().DIER.write(kUpdate);
+  tim2().CR1.write(1);
+  enable_interrupt(kTim2, 1);
+}
+
+Ticks PulseTimer::now() const {
+  while (true) {
+    const std::uint32_t wraps = wraps_.load(std::memory_order_relaxed);
+    const std::uint32_t count = tim2().CNT.read();
+    const bool unserved = (tim2().SR.read() & kUpdate) != 0 && count < 0x8000'0000U;
+    if (wraps == wraps_.load(std::memory_order_relaxed))
+      return {static_cast<std::int64_t>(std::uint64_t{wraps + (unserved ? 1U : 0U)} << 32 | count)};
+  }
+}
+
+void PulseTimer::set_direction(bool inflate, std::uint32_t step_tick) {
+  const std::uint32_t due = step_tick - static_cast<std::uint32_t>(firmware::kDirectionSetup.count);
+  inflate_ = inflate;
+  tim2().CCR3.write(due);
+  set_direction_mode(inflate ? kActiveOnMatch : kInactiveOnMatch);
+  if (has_passed(due)) set_direction_mode(inflate ? kHigh : kLow);
+}
+
+void PulseTimer::schedule(const PulseOrder& order) {
+  const auto tick = static_cast<std::uint32_t>(order.tick.count);
+  tim2().CCR1.write(tick);
+  clear_flag(kCompare1);
+  set_step_mode(order.step ? kActiveOnMatch : kFrozen);
+  phase_ = order.step ? Phase::rising : Phase::marker;
+  tim2().DIER.set(kCompare1);
+  if (order.ttl) {
+    ttl_width_ = static_cast<std::uint32_t>(order.ttl_width.count);
+    ttl_rising_ = true;
+    tim2().CCR2.write(tick);
+    clear_flag(kCompare2);
+    set_ttl_mode(kActiveOnMatch);
+    tim2().DIER.set(kCompare2);
+  }
+  if (order.step && order.inflate != inflate_) set_direction(order.inflate, tick);
+}
+
+void PulseTimer::cancel() {
+  tim2().DIER.clear(kCompare1 | kCompare2);
+  set_step_mode(kLow);
+  set_ttl_mode(kLow);
+  set_direction_mode(kFrozen);
+  inflate_ = (gpio_a().IDR.read() & kDirPin) != 0;
+  clear_flag(kCompare1 | kCompare2);
+  phase_ = Phase::idle;
+}
+
+/// The rise has happened: arm the fall. A fall that latency has already passed is made at once.
+bool PulseTimer::step_interrupt() {
+  if (phase_ == Phase::rising) {
+    const std::uint32_t fall = tim2().CCR1.read() + static_cast<std::uint32_t>(firmware::kStepPulse.count);
+    phase_ = Phase::falling;
+    tim2().CCR1.write(fall);
+    set_step_mode(kInactiveOnMatch);
+    if (!has_passed(fall)) return false;
+    set_step_mode(kLow);
+    clear_flag(kCompare1);
+  }
+  const bool carried_out = phase_ != Phase::idle;
+  phase_ = Phase::idle;
+  tim2().DIER.clear(kCompare1);
+  return carried_out;
+}
+
+void PulseTimer::ttl_interrupt() {
+  if (!ttl_rising_) {
+    tim2().DIER.clear(kCompare2);
+    return;
+  }
+  ttl_rising_ = false;
+  const std::uint32_t fall = tim2().CCR2.read() + ttl_width_;
+  tim2().CCR2.write(fall);
+  set_ttl_mode(kInactiveOnMatch);
+  if (has_passed(fall)) set_ttl_mode(kLow);
+}
+
+bool PulseTimer::interrupt() {
+  const std::uint32_t flags = tim2().SR.read() & tim2().DIER.read();
+  clear_flag(flags);
+  if ((flags & kUpdate) != 0) wraps_.fetch_add(1, std::memory_order_relaxed);
+  if ((flags & kCompare2) != 0) ttl_interrupt();
+  return (flags & kCompare1) != 0 && step_interrupt();
+}
+
+}  // namespace diastole::stm32

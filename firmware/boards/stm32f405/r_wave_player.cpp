@@ -1,0 +1,67 @@
+#include "firmware/boards/stm32f405/r_wave_player.hpp"
+
+#include <array>
+
+#include "firmware/boards/stm32f405/registers.hpp"
+#include "firmware/core/r_wave.hpp"
+
+namespace diastole::stm32 {
+
+using firmware::kRWaveCodes;
+using firmware::kRWaveSamplePeriod;
+using firmware::kRWaveSamples;
+
+namespace {
+
+/// The DAC holds one code in advance, so the transfer that ends the wave brings one 0 more.
+constexpr std::array<std::uint16_t, kRWaveSamples> kFollowing = [] {
+  std::array<std::uint16_t, kRWaveSamples> codes{};
+  for (std::size_t i = 1; i < kRWaveSamples; ++i)
+    codes[i - 1] = kRWaveCodes[i];
+  return codes;
+}();
+
+constexpr std::uint32_t kStreamEnable = 1U << 0;
+constexpr std::uint32_t kTriggerMode = 6U;  // SMS: started by the trigger
+
+}  // namespace
+
+void RWavePlayer::start() {
+  constexpr std::uint32_t kEnable = 1U << 0, kTriggerEnable = 1U << 2, kFromTim4 = 5U << 3,
+                          kDmaEnable = 1U << 12;
+  dac().DHR12R1.write(0);
+  dac().CR.write(kEnable | kTriggerEnable | kFromTim4 | kDmaEnable);
+  tim4().PSC.write(0);
+  tim4().ARR.write(static_cast<std::uint32_t>(kRWaveSamplePeriod.count - 1));
+  tim4().CR2.write(2U << 4);   // TRGO = update
+  tim4().SMCR.write(1U << 4);  // ITR1 = TIM2's TRGO, slave mode off
+  enable_interrupt(kDma1Stream5, 3);
+}
+
+void RWavePlayer::arm() {
+  constexpr std::uint32_t kDacRequest = 7U << 25, kHalfWords = 1U << 11 | 1U << 13, kIncrement = 1U << 10,
+                          kToPeripheral = 1U << 6, kCompleteInterrupt = 1U << 4;
+  DmaStream& stream = dma1().stream[5];
+  stream.CR.write(0);
+  while ((stream.CR.read() & kStreamEnable) != 0) {
+  }
+  dma1().HIFCR.write(0x3FU << 6);
+  stream.PAR.write(reinterpret_cast<std::uintptr_t>(&dac().DHR12R1));
+  stream.M0AR.write(reinterpret_cast<std::uintptr_t>(kFollowing.data()));
+  stream.NDTR.write(kFollowing.size());
+  dac().DHR12R1.write(kRWaveCodes[0]);
+  stream.CR.write(kDacRequest | kHalfWords | kIncrement | kToPeripheral | kCompleteInterrupt | kStreamEnable);
+  // The first update, and with it the first code, comes one tick after the trigger.
+  tim4().CNT.write(static_cast<std::uint32_t>(kRWaveSamplePeriod.count - 1));
+  tim4().SMCR.change(7U, kTriggerMode);
+}
+
+void RWavePlayer::disarm() { tim4().SMCR.change(7U, 0); }
+
+void RWavePlayer::interrupt() {
+  dma1().HIFCR.write(0x3FU << 6);
+  tim4().SMCR.change(7U, 0);
+  tim4().CR1.write(0);
+}
+
+}  // namespace diastole::stm32

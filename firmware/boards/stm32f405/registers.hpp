@@ -1,0 +1,119 @@
+#pragma once
+// The registers of the STM32F405 that the firmware uses, as laid out in RM0090 (STM32F405/415, 407/417, …
+// reference manual) and, for the core's own, in PM0214 (Cortex-M4 programming manual). Offsets are checked
+// below.
+
+#include <cstddef>
+#include <cstdint>
+
+namespace diastole::stm32 {
+
+class Register {
+ public:
+  [[nodiscard]] std::uint32_t read() const { return value_; }
+  void write(std::uint32_t value) { value_ = value; }
+  void set(std::uint32_t bits) { value_ = value_ | bits; }
+  void clear(std::uint32_t bits) { value_ = value_ & ~bits; }
+  void change(std::uint32_t mask, std::uint32_t bits) { value_ = (value_ & ~mask) | bits; }
+
+ private:
+  volatile std::uint32_t value_;
+};
+
+struct Rcc {  // RM0090 7.3
+  Register CR, PLLCFGR, CFGR, CIR, AHB1RSTR, AHB2RSTR, AHB3RSTR, reserved0, APB1RSTR, APB2RSTR, reserved1[2];
+  Register AHB1ENR, AHB2ENR, AHB3ENR, reserved2, APB1ENR, APB2ENR, reserved3[11], CSR;
+};
+static_assert(offsetof(Rcc, AHB1ENR) == 0x30 && offsetof(Rcc, CSR) == 0x74);
+
+struct FlashInterface {  // 3.9
+  Register ACR;
+};
+
+struct Gpio {  // 8.4
+  Register MODER, OTYPER, OSPEEDR, PUPDR, IDR, ODR, BSRR, LCKR, AFR[2];
+};
+static_assert(offsetof(Gpio, AFR) == 0x20);
+
+struct Timer {  // 18.4
+  Register CR1, CR2, SMCR, DIER, SR, EGR, CCMR1, CCMR2, CCER, CNT, PSC, ARR, reserved0, CCR1, CCR2, CCR3,
+      CCR4;
+};
+static_assert(offsetof(Timer, CCR1) == 0x34);
+
+struct Usart {  // 30.6
+  Register SR, DR, BRR, CR1, CR2, CR3, GTPR;
+};
+
+struct Dac {  // 14.5
+  Register CR, SWTRIGR, DHR12R1;
+};
+
+struct DmaStream {
+  Register CR, NDTR, PAR, M0AR, M1AR, FCR;
+};
+struct Dma {  // 10.5
+  Register LISR, HISR, LIFCR, HIFCR;
+  DmaStream stream[8];
+};
+static_assert(offsetof(Dma, stream[5]) == 0x88);
+
+struct Exti {  // 12.3
+  Register IMR, EMR, RTSR, FTSR, SWIER, PR;
+};
+
+struct Syscfg {  // 9.2
+  Register MEMRMP, PMC, EXTICR[4], CMPCR;
+};
+
+struct Iwdg {  // 21.4
+  Register KR, PR, RLR, SR;
+};
+
+struct Rng {  // 24.4
+  Register CR, SR, DR;
+};
+
+struct SysTick {  // PM0214 4.5
+  Register CTRL, LOAD, VAL, CALIB;
+};
+
+struct Nvic {  // PM0214 4.3
+  Register ISER[8], reserved0[24], ICER[8], reserved1[24], ISPR[8], reserved2[24], ICPR[8], reserved3[24];
+  Register IABR[8], reserved4[56];
+  volatile std::uint8_t IPR[240];
+};
+static_assert(offsetof(Nvic, IPR) == 0x300);
+
+template <class Peripheral>
+Peripheral& at(std::uintptr_t address) {
+  return *reinterpret_cast<Peripheral*>(address);
+}
+
+inline Rcc& rcc() { return at<Rcc>(0x4002'3800); }
+inline FlashInterface& flash() { return at<FlashInterface>(0x4002'3C00); }
+inline Gpio& gpio_a() { return at<Gpio>(0x4002'0000); }
+inline Gpio& gpio_b() { return at<Gpio>(0x4002'0400); }
+inline Gpio& gpio_c() { return at<Gpio>(0x4002'0800); }
+inline Timer& tim2() { return at<Timer>(0x4000'0000); }
+inline Timer& tim4() { return at<Timer>(0x4000'0800); }
+inline Usart& usart3() { return at<Usart>(0x4000'4800); }
+inline Dac& dac() { return at<Dac>(0x4000'7400); }
+inline Dma& dma1() { return at<Dma>(0x4002'6000); }
+inline Exti& exti() { return at<Exti>(0x4001'3C00); }
+inline Syscfg& syscfg() { return at<Syscfg>(0x4001'3800); }
+inline Iwdg& iwdg() { return at<Iwdg>(0x4000'3000); }
+inline Rng& rng() { return at<Rng>(0x5006'0800); }
+inline SysTick& systick() { return at<SysTick>(0xE000'E010); }
+inline Nvic& nvic() { return at<Nvic>(0xE000'E100); }
+
+/// Interrupt numbers, RM0090 table 62.
+enum Interrupt : unsigned { kExti0 = 6, kExti1 = 7, kExti2 = 8, kDma1Stream5 = 16, kTim2 = 28, kUsart3 = 39 };
+
+/// Priority 0 (first) … 15; equal priorities do not interrupt each other.
+inline void enable_interrupt(Interrupt number, std::uint8_t priority) {
+  nvic().IPR[number] = static_cast<std::uint8_t>(priority << 4);
+  nvic().ISER[number / 32].write(1U << (number % 32));
+}
+
+}  // namespace diastole::stm32

@@ -1,0 +1,75 @@
+#include "firmware/boards/stm32f405/stm32_board.hpp"
+
+#include <initializer_list>
+
+#include "firmware/boards/stm32f405/boot_identity.hpp"
+#include "firmware/boards/stm32f405/clocks.hpp"
+#include "firmware/boards/stm32f405/pins.hpp"
+#include "firmware/boards/stm32f405/registers.hpp"
+
+namespace diastole::stm32 {
+
+namespace {
+
+void start_watchdog() {
+  iwdg().KR.write(0x5555);
+  iwdg().PR.write(1);      // 32 kHz / 8
+  iwdg().RLR.write(1000);  // 250 ms
+  iwdg().KR.write(0xCCCC);
+}
+
+/// Wakes the main loop every millisecond.
+void start_systick() {
+  systick().LOAD.write(kCore_Hz / 1000 - 1);
+  systick().VAL.write(0);
+  systick().CTRL.write(7);
+}
+
+}  // namespace
+
+void Stm32Board::start() {
+  start_clocks();
+  identity_ = read_identity();
+  configure_pins();
+  timer_.start();
+  r_wave_.start();
+  serial_.start();
+  for (const Interrupt input : {kExti0, kExti1, kExti2})
+    enable_interrupt(input, 1);
+  start_systick();
+  start_watchdog();
+}
+
+void Stm32Board::schedule(const firmware::PulseOrder& order) {
+  if (order.ttl) {
+    if (order.r_wave)
+      r_wave_.arm();
+    else
+      r_wave_.disarm();
+  }
+  timer_.schedule(order);
+}
+
+void Stm32Board::cancel_pulses() {
+  r_wave_.disarm();
+  timer_.cancel();
+}
+
+void Stm32Board::set_motor_enabled(bool enabled) {
+  gpio_b().BSRR.write(enabled ? kEnablePin : kEnablePin << 16);
+}
+
+void Stm32Board::show_fault(std::uint8_t number) {
+  gpio_b().BSRR.write(number != 0 ? kFaultPin : kFaultPin << 16);
+}
+
+firmware::Inputs Stm32Board::inputs() const {
+  const std::uint32_t levels = gpio_c().IDR.read();
+  return {(levels & kEstopPin) != 0, (levels & kHomePin) != 0, (levels & kFarLimitPin) != 0};
+}
+
+void Stm32Board::feed_watchdog() { iwdg().KR.write(0xAAAA); }
+
+void Stm32Board::input_interrupt() { exti().PR.write(kEstopPin | kHomePin | kFarLimitPin); }
+
+}  // namespace diastole::stm32
