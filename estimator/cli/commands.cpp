@@ -2,6 +2,10 @@
 
 namespace diastole {
 
-void add_estimator_commands(CommandLine& line) { add_solve(line); }
+void add_estimator_commands(CommandLine& line) {
+  add_solve(line);
+  add_fit(line);
+  add_report(line);
+}
 
 }  // namespace diastole

@@ -64,6 +64,10 @@ std::vector<double> start_values(const Study& study, const Law& law) {
 
 ElasticModel make_model(const Study& study, SolveOptions options) {
   const Law& law = law_of(study);
+  if (!study.effects.empty()) {
+    refuse(study, "model.effects", fmt::format("the model has no effect \"{}\"", study.effects.front()),
+           "Leave the list empty.");
+  }
   const AnnulusSpecimen& specimen = std::get<AnnulusSpecimen>(study.specimen);
   AnnulusShape shape;
   shape.inner_radius_mm = specimen.inner_radius_mm;

@@ -7,7 +7,8 @@
 namespace diastole {
 
 /// Parameters take their `start`. Throws InputError if the law is unknown, if the study lacks one of its
-/// parameters or has one that it does not know, or if a start lies outside what the law allows.
+/// parameters or has one that it does not know, if a start lies outside what the law allows, or if it names
+/// an effect (the model has none).
 ElasticModel make_model(const Study& study, SolveOptions options = {});
 
 }  // namespace diastole

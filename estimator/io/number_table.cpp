@@ -5,10 +5,8 @@
 
 #include <charconv>
 #include <cmath>
-#include <fstream>
-#include <iterator>
-#include <system_error>
 
+#include "estimator/io/whole_file.hpp"
 #include "protocol/contract/input_error.hpp"
 
 namespace diastole {
@@ -50,17 +48,7 @@ void check_header(std::string_view line, const std::string& file, std::span<cons
 
 NumberTable NumberTable::from_file(const std::filesystem::path& path,
                                    std::span<const std::string_view> columns) {
-  std::error_code error;
-  if (!std::filesystem::is_regular_file(path, error)) {
-    throw InputError(
-        {path.string(), "", "there is no such file", "Check the path; paths in a study are relative to it."});
-  }
-  std::ifstream stream(path, std::ios::binary);
-  std::string text(static_cast<size_t>(std::filesystem::file_size(path)), '\0');
-  if (!stream.read(text.data(), static_cast<std::streamsize>(text.size()))) {
-    throw InputError({path.string(), "", "the file cannot be read", "Check its permissions."});
-  }
-  return from_text(text, path.string(), columns);
+  return from_text(read_whole_file(path), path.string(), columns);
 }
 
 NumberTable NumberTable::from_text(std::string_view text, std::string file,

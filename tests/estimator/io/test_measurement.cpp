@@ -81,7 +81,7 @@ TEST_F(MeasurementFile, HeaderAndEmptinessAreChecked) {
   EXPECT_THAT(message_of([&] { (void)tags("frame,nx,ny,nz,plane_mm,x_mm,y_mm,z_mm,sigma_mm,more\n"); }),
               HasSubstr("a column too many: \"more\""));
   EXPECT_THAT(message_of([&] { (void)read_tags(folder_.path() / "none.csv", 3); }),
-              AllOf(HasSubstr("none.csv"), HasSubstr("no such file")));
+              AllOf(HasSubstr("none.csv"), HasSubstr("cannot be opened")));
 }
 
 TEST_F(MeasurementFile, FramesMustBeContiguousIncreasingAndPlausible) {

@@ -1,0 +1,48 @@
+#include <iostream>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "estimator/cli/commands.hpp"
+#include "estimator/io/whole_file.hpp"
+#include "estimator/report/report.hpp"
+
+namespace diastole {
+namespace {
+
+struct ReportArguments {
+  std::vector<std::filesystem::path> files;
+  std::filesystem::path page;
+  size_t frames = 16;
+};
+
+ExitCode run_report(const ReportArguments& arguments, const CommandOutput& out) {
+  const std::string html = report::make_report(arguments.files, {.frames = arguments.frames});
+  write_whole_file(arguments.page, html);
+  if (out.json) {
+    nlohmann::ordered_json json = {{"page", arguments.page.string()}, {"bytes", html.size()}};
+    for (const auto& file : arguments.files)
+      json["files"].push_back(file.string());
+    std::cout << json.dump(1) << '\n';
+  } else {
+    std::cout << "The report is in " << arguments.page.string() << '\n';
+  }
+  return ExitCode::done;
+}
+
+}  // namespace
+
+void add_report(CommandLine& line) {
+  auto arguments = std::make_shared<ReportArguments>();
+  CLI::App* command = line.add("report", "a self-contained page with plots for runs and fits",
+                               "  diastole report gel.run.h5 -o session.html\n"
+                               "  diastole report gel.run.h5 fit.json -o gel.html");
+  command->add_option("FILE", arguments->files, "run files and fit results, recognised by their content")
+      ->required();
+  command->add_option("-o,--output", arguments->page, "the HTML page to write")->required();
+  command->add_option("--frames", arguments->frames, "image frames of a cycle")
+      ->check(CLI::Range(1, 1000))
+      ->capture_default_str();
+  line.on_run(command, [arguments](const CommandOutput& out) { return run_report(*arguments, out); });
+}
+
+}  // namespace diastole

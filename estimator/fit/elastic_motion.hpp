@@ -1,0 +1,43 @@
+#pragma once
+// The finite-element model as the fit's motion model: values go to the law's parameters of all elements or of
+// one, and every frame starts from its own last equilibrium, moved along the exact sensitivities.
+
+#include <optional>
+#include <vector>
+
+#include "estimator/fe/elastic_model.hpp"
+#include "estimator/fit/motion_model.hpp"
+
+namespace diastole {
+
+class ElasticMotion : public MotionModel {
+ public:
+  /// `groups[i]` says which parameter of which elements value i sets.
+  ElasticMotion(ElasticModel model, std::vector<ParameterGroup> groups)
+      : model_(std::move(model)), groups_(std::move(groups)) {}
+
+  [[nodiscard]] const HermiteMesh& mesh() const override { return model_.mesh(); }
+  [[nodiscard]] size_t value_count() const override { return groups_.size(); }
+  [[nodiscard]] MotionOutcome solve(size_t slot, std::span<const double> values,
+                                    double pressure_kPa) override;
+  [[nodiscard]] MotionDerivatives derivatives(size_t slot) override;
+
+  [[nodiscard]] const ElasticModel& model() const { return model_; }
+
+ private:
+  struct Slot {
+    std::vector<double> values;
+    ElasticState state;
+    std::optional<MotionDerivatives> derivatives;  // at `values` and the state's pressure
+  };
+
+  void set_values(std::span<const double> values);
+  [[nodiscard]] const Slot* nearest(size_t slot, double pressure_kPa) const;
+  [[nodiscard]] Solution solve_from(const Slot* start, std::span<const double> values, double pressure_kPa);
+
+  ElasticModel model_;
+  std::vector<ParameterGroup> groups_;
+  std::vector<std::optional<Slot>> slots_;
+};
+
+}  // namespace diastole

@@ -1,0 +1,72 @@
+#pragma once
+// The fit: material values that make the model's motion agree best with the measured one.
+//
+//   FitOutcome fit = fit_motion(model, {{.start = 6, .lower = 1, .upper = 15}}, measurement, {});
+//   fit.values[0].value, fit.values[0].se, fit.values[0].ci95
+//
+// The estimate is the maximum of the likelihood of tag points, 3-D points and frame pressures under their
+// stated normal errors (joint_problem.hpp). Standard errors are those of the joint problem, (JᵀJ)⁻¹, so that
+// they carry the pressures' errors; they trust the stated sigmas and are not rescaled by chi2/dof. The 95 %
+// interval is symmetric in the coordinate of the value: for a positive one a factor up and down.
+
+#include <Eigen/Dense>
+#include <array>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "estimator/fit/joint_problem.hpp"
+#include "estimator/fit/optimiser.hpp"
+
+namespace diastole {
+
+struct FitOptions {
+  OptimiserOptions optimiser;  ///< its on_step is not used
+  LocatorOptions locator;      ///< how far outside the body a point may lie
+  /// Called at each iteration with values in their own units.
+  std::function<void(const OptimiserStep&)> on_step;
+};
+
+struct EstimatedValue {
+  double value;
+  double se;                   ///< NaN on a bound
+  std::array<double, 2> ci95;  ///< NaN on a bound
+  double se_exact_pressure;    ///< what `se` would be if the frame pressures were exactly known
+  bool at_lower;
+  bool at_upper;
+};
+
+struct EstimatedFrame {
+  int number;
+  Frame load;
+  double pressure_kPa;
+  double se_kPa;  ///< 0 when exactly known
+  size_t usable;
+  size_t tags_left_out;
+  size_t points_left_out;
+  Eigen::VectorXd weighted;  ///< residuals / sigma
+  Eigen::VectorXd unweighted_mm;
+  NodeField position_mm;  ///< the fitted motion
+};
+
+struct FitOutcome {
+  std::vector<EstimatedValue> values;
+  std::vector<EstimatedFrame> frames;
+  Eigen::MatrixXd covariance;  ///< of values and unknown pressures, in their own units
+  double chi2 = 0;             ///< including the pressures' priors
+  Eigen::Index rows = 0;       ///< residuals, pressure priors included
+  Eigen::Index unknowns = 0;   ///< not counting those on a bound
+  bool converged = false;
+  std::string reason;
+  int iterations = 0;
+  int forward_solves = 0;
+  double seconds = 0;
+  std::vector<OptimiserStep> history;  ///< q of each step with values in their own units
+};
+
+/// Never throws for numerical trouble: `converged` and `reason` tell it (values then are the best found).
+/// Precondition: at least one loaded frame has points.
+FitOutcome fit_motion(MotionModel& model, const std::vector<SoughtValue>& sought,
+                      const Measurement& measurement, const FitOptions& options);
+
+}  // namespace diastole

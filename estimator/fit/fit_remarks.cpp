@@ -1,0 +1,109 @@
+#include "estimator/fit/fit_remarks.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+namespace diastole {
+namespace {
+
+constexpr double telling_deviation = 4.0;  // standard deviations of chi2/dof that chance does not explain
+
+/// How far chi2/dof is from 1, in its own standard deviations sqrt(2/dof).
+double deviation(double chi2_per_dof, double dof) { return (chi2_per_dof - 1) / std::sqrt(2 / dof); }
+
+std::string remark_on_misfit(const FitRecord& record) {
+  const double off = deviation(record.chi2_per_dof, static_cast<double>(record.dof));
+  const std::string figure =
+      fmt::format("chi2/dof = {:.3f}, {:.1f} standard deviations from 1", record.chi2_per_dof, off);
+  if (off > telling_deviation) {
+    return fmt::format(
+        "The residuals are larger than the stated noise ({}): the model lacks something, or sigma_mm is "
+        "stated too small. The interval holds only if neither matters.",
+        figure);
+  }
+  if (off < -telling_deviation) {
+    return fmt::format(
+        "The residuals are smaller than the stated noise ({}): sigma_mm is stated too large, or the points' "
+        "errors are not independent.",
+        figure);
+  }
+  return fmt::format("The residuals spread as the stated noise says ({}).", figure);
+}
+
+void add_pressure_share(std::vector<std::string>& remarks, const FitRecord& record, const FitOutcome& fit) {
+  if (record.parameters.size() != 1 || !record.parameters[0].elements.empty()) return;
+  const EstimatedValue& value = fit.values[0];
+  if (!(value.se > 0)) return;
+  const double share = 1 - std::pow(value.se_exact_pressure / value.se, 2);
+  remarks.push_back(
+      fmt::format("{:.0f} % of the variance of {} comes from the error of the measured pressures; with exact "
+                  "pressures its standard error would be {:.3g}.",
+                  100 * share, record.parameters[0].name, value.se_exact_pressure));
+}
+
+void add_bounds(std::vector<std::string>& remarks, const FitRecord& record) {
+  for (const FittedParameter& parameter : record.parameters) {
+    if (parameter.at_bound.empty()) continue;
+    remarks.push_back(
+        fmt::format("{} sits on its {} bound{}: the data ask for a value beyond it, and no error can be "
+                    "given there. Widen the bounds [{}, {}] or question the model.",
+                    parameter.name, parameter.at_bound, parameter.elements.empty() ? "" : " in some elements",
+                    parameter.bounds[0], parameter.bounds[1]));
+  }
+}
+
+void add_regional(std::vector<std::string>& remarks, const FitRecord& record) {
+  for (const FittedParameter& parameter : record.parameters) {
+    if (parameter.elements.empty()) continue;
+    double relative = 0;
+    size_t count = 0;
+    for (const FittedElement& element : parameter.elements) {
+      if (!std::isfinite(element.se)) continue;
+      relative += element.se / element.value;
+      ++count;
+    }
+    if (count == 0) continue;
+    remarks.push_back(fmt::format(
+        "{} varies by element, without any smoothing: each value has a standard error of {:.0f} % on "
+        "average, their mean one of {:.1f} %.",
+        parameter.name, 100 * relative / static_cast<double>(count), 100 * parameter.se / parameter.value));
+  }
+}
+
+void add_undeformed(std::vector<std::string>& remarks, const FitRecord& record) {
+  if (record.undeformed_points == 0) return;
+  const double off =
+      deviation(record.undeformed_chi2_per_residual, static_cast<double>(record.undeformed_residuals));
+  if (off > telling_deviation) {
+    remarks.push_back(fmt::format(
+        "Frame 0 contradicts the data's own frame of reference: its {} points miss their undeformed "
+        "places by more than the noise (chi2/residual = {:.2f}, mean {:+.3f} mm). Check plane_mm, "
+        "the axes, and that frame 0 is unloaded.",
+        record.undeformed_points, record.undeformed_chi2_per_residual, record.undeformed_mean_mm));
+  } else {
+    remarks.push_back(fmt::format(
+        "Frame 0, which is not fitted, confirms the noise: its {} points miss their undeformed places "
+        "with chi2/residual = {:.2f} and a mean of {:+.3f} mm.",
+        record.undeformed_points, record.undeformed_chi2_per_residual, record.undeformed_mean_mm));
+  }
+}
+
+}  // namespace
+
+std::vector<std::string> remarks_on(const FitRecord& record, const FitOutcome& fit) {
+  std::vector<std::string> remarks = {remark_on_misfit(record)};
+  add_pressure_share(remarks, record, fit);
+  add_bounds(remarks, record);
+  add_regional(remarks, record);
+  add_undeformed(remarks, record);
+  if (record.outliers_5sigma > 0) {
+    remarks.push_back(fmt::format(
+        "{} residuals are beyond 5 standard deviations; chance makes one in two million. Look for "
+        "mistracked points.",
+        record.outliers_5sigma));
+  }
+  return remarks;
+}
+
+}  // namespace diastole

@@ -1,0 +1,68 @@
+#pragma once
+// The weighted residuals of one loaded frame, and their exact derivatives.
+//
+//   tag point      s / sigma                          one residual (tag_match.hpp)
+//   3-D point      (x_seen - x(X)) / sigma            three residuals
+//
+// Rows: the usable tags in their order, then the usable points, x y z of each. A point is usable when it was
+// found on the body at the motion given to `find_points`; the choice then stays until the next call, so that
+// the cost is a smooth function of the unknowns.
+
+#include <Eigen/Dense>
+#include <span>
+#include <vector>
+
+#include "estimator/fit/motion_model.hpp"
+#include "estimator/fit/tag_match.hpp"
+#include "estimator/io/measurement.hpp"
+
+namespace diastole {
+
+class FrameResiduals {
+ public:
+  /// `mesh` and `reference` (its undeformed locator) must outlive this object.
+  FrameResiduals(const HermiteMesh& mesh, const PointLocator& reference, std::vector<TagPoint> tags,
+                 std::vector<ObservedPoint> points);
+
+  /// Looks for every point on the body in this motion; returns how many became usable that were not.
+  size_t find_points(std::span<const double> position_mm, const LocatorOptions& options);
+
+  /// The residuals in this motion. False when a usable point cannot be followed there: the motion is too far
+  /// off.
+  [[nodiscard]] bool evaluate(std::span<const double> position_mm);
+
+  /// Of the last successful `evaluate`.
+  [[nodiscard]] const Eigen::VectorXd& weighted() const { return weighted_; }
+  [[nodiscard]] const Eigen::VectorXd& unweighted_mm() const { return unweighted_mm_; }
+  /// d(weighted)/d(unknown), one column for each field of dx/d(unknown).
+  [[nodiscard]] Eigen::MatrixXd derivatives(std::span<const NodeField* const> fields) const;
+
+  [[nodiscard]] Eigen::Index rows() const { return weighted_.size(); }
+  [[nodiscard]] size_t usable() const { return usable_tags_.size() + usable_points_.size(); }
+  [[nodiscard]] size_t tags_left_out() const { return tags_.size() - usable_tags_.size(); }
+  [[nodiscard]] size_t points_left_out() const { return points_.size() - usable_points_.size(); }
+
+ private:
+  struct UsableTag {
+    size_t index;
+    TagMatch match;
+  };
+  struct UsablePoint {
+    size_t index;
+    MaterialPoint point;
+  };
+
+  [[nodiscard]] std::vector<UsableTag> find_tags(std::span<const double> position_mm,
+                                                 const LocatorOptions& options);
+
+  const HermiteMesh& mesh_;
+  const PointLocator& reference_;
+  std::vector<TagPoint> tags_;
+  std::vector<ObservedPoint> points_;
+  std::vector<UsableTag> usable_tags_;
+  std::vector<UsablePoint> usable_points_;
+  Eigen::VectorXd weighted_;
+  Eigen::VectorXd unweighted_mm_;
+};
+
+}  // namespace diastole

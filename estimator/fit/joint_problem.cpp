@@ -1,0 +1,156 @@
+#include "estimator/fit/joint_problem.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <limits>
+
+namespace diastole {
+
+double SoughtValue::coordinate(double value) const { return logarithmic() ? std::log(value) : value; }
+double SoughtValue::value(double coordinate) const {
+  return logarithmic() ? std::exp(coordinate) : coordinate;
+}
+double SoughtValue::slope(double coordinate) const { return logarithmic() ? std::exp(coordinate) : 1.0; }
+
+JointProblem::JointProblem(MotionModel& model, std::vector<SoughtValue> values,
+                           const Measurement& measurement, LocatorOptions locator)
+    : model_(model),
+      values_(std::move(values)),
+      locator_options_(locator),
+      reference_(std::make_unique<PointLocator>(model.mesh(), model.mesh().reference(), locator)) {
+  unknowns_ = static_cast<Eigen::Index>(values_.size());
+  for (size_t number = 1; number < measurement.frames.size(); ++number) {
+    const int frame = static_cast<int>(number);
+    std::vector<TagPoint> tags;
+    for (const TagPoint& tag : measurement.tags) {
+      if (tag.frame == frame) tags.push_back(tag);
+    }
+    std::vector<ObservedPoint> points;
+    for (const ObservedPoint& point : measurement.points) {
+      if (point.frame == frame) points.push_back(point);
+    }
+    if (tags.empty() && points.empty()) continue;
+    const Frame& load = measurement.frames[number];
+    std::optional<Eigen::Index> pressure_unknown;
+    if (load.sigma_kPa > 0) pressure_unknown = unknowns_++;
+    frames_.push_back({frame,
+                       load,
+                       FrameResiduals(model.mesh(), *reference_, std::move(tags), std::move(points)),
+                       pressure_unknown,
+                       {}});
+  }
+}
+
+Eigen::Index JointProblem::rows() const {
+  Eigen::Index rows = unknowns() - values();
+  for (const LoadedFrame& frame : frames_)
+    rows += frame.residuals.rows();
+  return rows;
+}
+
+Eigen::VectorXd JointProblem::start() const {
+  Eigen::VectorXd q(unknowns());
+  for (Eigen::Index i = 0; i < values(); ++i)
+    q[i] = value(i).coordinate(value(i).start);
+  for (const LoadedFrame& frame : frames_) {
+    if (frame.pressure_unknown) q[*frame.pressure_unknown] = frame.load.pressure_kPa;
+  }
+  return q;
+}
+
+double JointProblem::lower(Eigen::Index unknown) const {
+  if (unknown >= values()) return -std::numeric_limits<double>::infinity();
+  return value(unknown).coordinate(value(unknown).lower);
+}
+
+double JointProblem::upper(Eigen::Index unknown) const {
+  if (unknown >= values()) return std::numeric_limits<double>::infinity();
+  return value(unknown).coordinate(value(unknown).upper);
+}
+
+std::vector<double> JointProblem::values_at(const Eigen::VectorXd& q) const {
+  std::vector<double> result;
+  for (Eigen::Index i = 0; i < values(); ++i)
+    result.push_back(value(i).value(q[i]));
+  return result;
+}
+
+double JointProblem::pressure_at(const LoadedFrame& frame, const Eigen::VectorXd& q) const {
+  return frame.pressure_unknown ? q[*frame.pressure_unknown] : frame.load.pressure_kPa;
+}
+
+bool JointProblem::solve_frames(const Eigen::VectorXd& q) {
+  if (solved_at_ && *solved_at_ == q) return true;
+  solved_at_.reset();
+  for (size_t slot = 0; slot < frames_.size(); ++slot) {
+    LoadedFrame& frame = frames_[slot];
+    ++forward_solves_;
+    MotionOutcome outcome = model_.solve(slot, values_at(q), pressure_at(frame, q));
+    if (!outcome.position_mm) {
+      failure_ = fmt::format("frame {} has no equilibrium: {}", frame.number, outcome.reason);
+      return false;
+    }
+    frame.position_mm = std::move(*outcome.position_mm);
+  }
+  solved_at_ = q;
+  return true;
+}
+
+std::optional<size_t> JointProblem::find_points(const Eigen::VectorXd& q) {
+  residuals_at_.reset();
+  if (!solve_frames(q)) return std::nullopt;
+  size_t gained = 0;
+  for (LoadedFrame& frame : frames_)
+    gained += frame.residuals.find_points(frame.position_mm, locator_options_);
+  return gained;
+}
+
+const Eigen::VectorXd* JointProblem::residuals(const Eigen::VectorXd& q) {
+  if (residuals_at_ && *residuals_at_ == q) return &residuals_;
+  residuals_at_.reset();
+  if (!solve_frames(q)) return nullptr;
+  residuals_.resize(rows());
+  Eigen::Index row = 0;
+  for (LoadedFrame& frame : frames_) {
+    if (!frame.residuals.evaluate(frame.position_mm)) {
+      failure_ = fmt::format("frame {}: measured points cannot be followed on the body at these values",
+                             frame.number);
+      return nullptr;
+    }
+    residuals_.segment(row, frame.residuals.rows()) = frame.residuals.weighted();
+    row += frame.residuals.rows();
+  }
+  for (const LoadedFrame& frame : frames_) {
+    if (!frame.pressure_unknown) continue;
+    residuals_[row++] = (q[*frame.pressure_unknown] - frame.load.pressure_kPa) / frame.load.sigma_kPa;
+  }
+  residuals_at_ = q;
+  return &residuals_;
+}
+
+Eigen::MatrixXd JointProblem::jacobian(const Eigen::VectorXd& q) {
+  Eigen::MatrixXd result = Eigen::MatrixXd::Zero(rows(), unknowns());
+  Eigen::Index row = 0;
+  for (size_t slot = 0; slot < frames_.size(); ++slot) {
+    const LoadedFrame& frame = frames_[slot];
+    const MotionDerivatives by = model_.derivatives(slot);
+    std::vector<const NodeField*> fields;
+    for (const NodeField& field : by.by_value)
+      fields.push_back(&field);
+    fields.push_back(&by.by_pressure);
+    const Eigen::MatrixXd block = frame.residuals.derivatives(fields);
+    for (Eigen::Index i = 0; i < values(); ++i) {
+      result.col(i).segment(row, block.rows()) = block.col(i) * value(i).slope(q[i]);
+    }
+    if (frame.pressure_unknown)
+      result.col(*frame.pressure_unknown).segment(row, block.rows()) = block.rightCols<1>();
+    row += block.rows();
+  }
+  for (const LoadedFrame& frame : frames_) {
+    if (frame.pressure_unknown) result(row++, *frame.pressure_unknown) = 1 / frame.load.sigma_kPa;
+  }
+  return result;
+}
+
+}  // namespace diastole

@@ -1,0 +1,100 @@
+#pragma once
+// The joint least-squares problem of material values and frame pressures.
+//
+// A measured frame pressure has an error of its own, which a fit must not mistake for stiffness: each loaded
+// frame's true pressure is an unknown with its measurement as a prior. With q = (values, pressures),
+//
+//   minimise  1/2 sum_frames |r_frame(values, P_frame)|^2  +  1/2 sum_frames ((P_frame - measured) / sigma)^2
+//
+// A frame with sigma_kPa = 0 has an exactly known pressure and no unknown. A value with a positive lower
+// bound enters as its logarithm (its error is closer to a factor than to a term); other values enter as they
+// are.
+//
+// Residual rows: frame after frame (frame_residuals.hpp), then one for each unknown pressure.
+// Frame 0 is not part of the problem: without load there is no information on stiffness.
+
+#include <Eigen/Dense>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "estimator/fit/frame_residuals.hpp"
+#include "estimator/fit/motion_model.hpp"
+#include "estimator/io/measurement.hpp"
+
+namespace diastole {
+
+/// A value to be estimated, in the model's order. Invariant: lower <= start <= upper, lower < upper.
+struct SoughtValue {
+  double start;
+  double lower;
+  double upper;
+
+  [[nodiscard]] bool logarithmic() const { return lower > 0; }
+  /// Between the value and its coordinate in q.
+  [[nodiscard]] double coordinate(double value) const;
+  [[nodiscard]] double value(double coordinate) const;
+  /// d(value)/d(coordinate).
+  [[nodiscard]] double slope(double coordinate) const;
+};
+
+class JointProblem {
+ public:
+  struct LoadedFrame {
+    int number;
+    Frame load;
+    FrameResiduals residuals;
+    std::optional<Eigen::Index>
+        pressure_unknown;   ///< its place in q; none when the pressure is exactly known
+    NodeField position_mm;  ///< of the last successful `evaluate`
+  };
+
+  /// `model` must outlive the problem. Frames without points are left out.
+  JointProblem(MotionModel& model, std::vector<SoughtValue> values, const Measurement& measurement,
+               LocatorOptions locator);
+
+  [[nodiscard]] Eigen::Index unknowns() const { return unknowns_; }
+  [[nodiscard]] Eigen::Index values() const { return static_cast<Eigen::Index>(values_.size()); }
+  [[nodiscard]] Eigen::Index rows() const;
+  [[nodiscard]] Eigen::VectorXd start() const;
+  [[nodiscard]] double lower(Eigen::Index unknown) const;
+  [[nodiscard]] double upper(Eigen::Index unknown) const;
+  [[nodiscard]] const SoughtValue& value(Eigen::Index unknown) const {
+    return values_[static_cast<size_t>(unknown)];
+  }
+  [[nodiscard]] const std::vector<LoadedFrame>& frames() const { return frames_; }
+
+  /// Solves all frames at q and chooses the usable points there; returns how many were gained, or nothing
+  /// (and `failure`) without equilibrium.
+  std::optional<size_t> find_points(const Eigen::VectorXd& q);
+
+  /// Residuals at q; nullptr (and `failure`) if a frame has no equilibrium or a point cannot be followed.
+  [[nodiscard]] const Eigen::VectorXd* residuals(const Eigen::VectorXd& q);
+  /// Derivatives at q, by the model's exact sensitivities. Precondition: `residuals(q)` succeeded just
+  /// before.
+  [[nodiscard]] Eigen::MatrixXd jacobian(const Eigen::VectorXd& q);
+
+  [[nodiscard]] const std::string& failure() const { return failure_; }
+  [[nodiscard]] int forward_solves() const { return forward_solves_; }
+
+ private:
+  [[nodiscard]] std::vector<double> values_at(const Eigen::VectorXd& q) const;
+  [[nodiscard]] double pressure_at(const LoadedFrame& frame, const Eigen::VectorXd& q) const;
+  bool solve_frames(const Eigen::VectorXd& q);
+
+  MotionModel& model_;
+  std::vector<SoughtValue> values_;
+  LocatorOptions locator_options_;
+  std::unique_ptr<PointLocator> reference_;  // at a fixed address: the frames refer to it
+  std::vector<LoadedFrame> frames_;
+  Eigen::Index unknowns_ = 0;
+  Eigen::VectorXd residuals_;
+  std::optional<Eigen::VectorXd> solved_at_;     // where the frames' positions belong
+  std::optional<Eigen::VectorXd> residuals_at_;  // where residuals_ belong
+  std::string failure_;
+  int forward_solves_ = 0;
+};
+
+}  // namespace diastole

@@ -1,0 +1,110 @@
+#include "estimator/fit/optimiser.hpp"
+
+#include <ceres/ceres.h>
+#include <fmt/format.h>
+
+#include <cmath>
+
+namespace diastole {
+namespace {
+
+using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+class JointCost : public ceres::CostFunction {
+ public:
+  explicit JointCost(JointProblem& problem) : problem_(problem) {
+    set_num_residuals(static_cast<int>(problem.rows()));
+    mutable_parameter_block_sizes()->push_back(static_cast<int>(problem.unknowns()));
+  }
+
+  bool Evaluate(double const* const* unknowns, double* residuals, double** jacobians) const override {
+    const Eigen::VectorXd q = Eigen::Map<const Eigen::VectorXd>(unknowns[0], problem_.unknowns());
+    const Eigen::VectorXd* found = problem_.residuals(q);
+    if (found == nullptr) return false;
+    Eigen::Map<Eigen::VectorXd>(residuals, found->size()) = *found;
+    if (jacobians != nullptr && jacobians[0] != nullptr) {
+      Eigen::Map<RowMajor>(jacobians[0], problem_.rows(), problem_.unknowns()) = problem_.jacobian(q);
+    }
+    return true;
+  }
+
+ private:
+  JointProblem& problem_;
+};
+
+class Recorder : public ceres::IterationCallback {
+ public:
+  Recorder(const Eigen::VectorXd& q, const OptimiserOptions& options) : q_(q), options_(options) {}
+
+  ceres::CallbackReturnType operator()(const ceres::IterationSummary& step) override {
+    iterations = step.iteration;
+    if (options_.on_step) options_.on_step({step.iteration, step.cost, step.step_is_successful, q_});
+    return ceres::SOLVER_CONTINUE;
+  }
+
+  int iterations = 0;
+
+ private:
+  const Eigen::VectorXd& q_;
+  const OptimiserOptions& options_;
+};
+
+std::string reason_of(const ceres::Solver::Summary& summary, const JointProblem& problem,
+                      const OptimiserOptions& options) {
+  switch (summary.termination_type) {
+    case ceres::CONVERGENCE:
+      if (summary.message.starts_with("Function")) {
+        return fmt::format("Converged: the last step changed the cost by less than {:g} of it.",
+                           options.cost_tolerance);
+      }
+      if (summary.message.starts_with("Parameter")) {
+        return fmt::format("Converged: the last step changed the unknowns by less than {:g} of them.",
+                           options.step_tolerance);
+      }
+      return "Converged: the cost's gradient vanishes.";
+    case ceres::NO_CONVERGENCE:
+      return fmt::format("Stopped at the limit of {} iterations; the cost was still falling.",
+                         options.iteration_limit);
+    default:
+      return problem.failure().empty() ? "Failed: no step lowers the cost."
+                                       : fmt::format("Failed: {}.", problem.failure());
+  }
+}
+
+}  // namespace
+
+OptimiserResult minimise(JointProblem& problem, const Eigen::VectorXd& start,
+                         const OptimiserOptions& options) {
+  Eigen::VectorXd q = start;
+  JointCost cost(problem);
+  ceres::Problem::Options ownership;
+  ownership.cost_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+  ceres::Problem least_squares(ownership);
+  least_squares.AddResidualBlock(&cost, nullptr, q.data());
+  for (Eigen::Index i = 0; i < q.size(); ++i) {
+    if (std::isfinite(problem.lower(i)))
+      least_squares.SetParameterLowerBound(q.data(), static_cast<int>(i), problem.lower(i));
+    if (std::isfinite(problem.upper(i)))
+      least_squares.SetParameterUpperBound(q.data(), static_cast<int>(i), problem.upper(i));
+  }
+  Recorder recorder(q, options);
+  ceres::Solver::Options settings;
+  settings.linear_solver_type = ceres::DENSE_QR;
+  settings.max_num_iterations = options.iteration_limit;
+  settings.function_tolerance = options.cost_tolerance;
+  settings.parameter_tolerance = options.step_tolerance;
+  settings.gradient_tolerance = 1e-12;
+  // The projected line search would solve the equilibrium again and again at one step; projection is enough.
+  settings.max_num_line_search_step_size_iterations = 0;
+  settings.update_state_every_iteration = true;
+  settings.callbacks = {&recorder};
+  settings.logging_type = ceres::SILENT;
+  ceres::Solver::Summary summary;
+  ceres::Solve(settings, &least_squares, &summary);
+  return {.q = q,
+          .converged = summary.termination_type == ceres::CONVERGENCE,
+          .reason = reason_of(summary, problem, options),
+          .iterations = recorder.iterations};
+}
+
+}  // namespace diastole

@@ -1,0 +1,24 @@
+#pragma once
+// What a study asks a fit to find.
+
+#include <vector>
+
+#include "estimator/fe/elastic_model.hpp"
+#include "estimator/fit/joint_problem.hpp"
+#include "estimator/io/study.hpp"
+
+namespace diastole {
+
+/// Parallel vectors in the study's order: one entry for a whole parameter, one an element for a regional one.
+struct Sought {
+  std::vector<SoughtValue> values;
+  std::vector<ParameterGroup> groups;  ///< which of the model's parameters each value sets
+};
+
+/// Throws InputError when a lower bound is not a value that the law allows.
+Sought sought_of(const Study& study, const ElasticModel& model);
+
+/// How many values a parameter has.
+size_t value_count(const StudyParameter& parameter, size_t elements);
+
+}  // namespace diastole

@@ -1,0 +1,234 @@
+#include "estimator/fit/study_fit.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "estimator/fe/study_model.hpp"
+#include "estimator/fit/elastic_motion.hpp"
+#include "estimator/fit/fit_remarks.hpp"
+#include "estimator/fit/fit_sections.hpp"
+#include "estimator/fit/sought.hpp"
+#include "estimator/fit/uncertainty.hpp"
+#include "protocol/contract/input_error.hpp"
+
+namespace diastole {
+namespace {
+
+constexpr double outside_mm = 5.0;  // farther from the body than this a point is not the specimen's
+constexpr double outlier_sigma = 5.0;
+
+/// Extrapolation beyond an element, as a fraction of it: `outside_mm` through the wall, never more than an
+/// element.
+LocatorOptions locator_for(const AnnulusSpecimen& annulus) {
+  const double element_mm = (annulus.outer_radius_mm - annulus.inner_radius_mm) / annulus.mesh[2];
+  return {.outside_xi = std::clamp(outside_mm / element_mm, 0.25, 1.0)};
+}
+
+bool has_loaded_point(const Measurement& measurement) {
+  const auto loaded = [](const auto& row) { return row.frame > 0; };
+  return std::any_of(measurement.tags.begin(), measurement.tags.end(), loaded) ||
+         std::any_of(measurement.points.begin(), measurement.points.end(), loaded);
+}
+
+double mean_of_values(const Eigen::VectorXd& q, size_t first, size_t count) {
+  return q.segment(static_cast<Eigen::Index>(first), static_cast<Eigen::Index>(count)).mean();
+}
+
+FittedParameter record_of(const StudyParameter& parameter, const FitOutcome& fit, size_t first,
+                          size_t count) {
+  FittedParameter result{.name = parameter.name,
+                         .value = fit.values[first].value,
+                         .se = fit.values[first].se,
+                         .ci95 = fit.values[first].ci95,
+                         .start = parameter.start,
+                         .bounds = {parameter.lower, parameter.upper},
+                         .at_bound = fit.values[first].at_lower   ? "lower"
+                                     : fit.values[first].at_upper ? "upper"
+                                                                  : "",
+                         .elements = {}};
+  if (parameter.vary == Variation::whole) return result;
+  // Regional: the mean with its error from the joint covariance, which is far smaller than any element's own.
+  double sum = 0;
+  result.at_bound = "";
+  for (size_t i = first; i < first + count; ++i) {
+    sum += fit.values[i].value;
+    result.elements.push_back({fit.values[i].value, fit.values[i].se, fit.values[i].ci95});
+    if (fit.values[i].at_lower) result.at_bound = "lower";
+    if (fit.values[i].at_upper) result.at_bound = "upper";
+  }
+  const auto start = static_cast<Eigen::Index>(first), size = static_cast<Eigen::Index>(count);
+  result.value = sum / static_cast<double>(count);
+  result.se = std::sqrt(fit.covariance.block(start, start, size, size).sum()) / static_cast<double>(count);
+  result.ci95 = {result.value - normal_95 * result.se, result.value + normal_95 * result.se};
+  return result;
+}
+
+void record_parameters(FitRecord& record, const Study& study, const FitOutcome& fit, size_t elements) {
+  size_t first = 0;
+  for (const StudyParameter& parameter : study.law.parameters) {
+    const size_t count = value_count(parameter, elements);
+    record.parameters.push_back(record_of(parameter, fit, first, count));
+    for (size_t i = 0; i < count; ++i) {
+      record.correlation.names.push_back(count == 1 ? parameter.name
+                                                    : fmt::format("{}[{}]", parameter.name, i));
+    }
+    first += count;
+  }
+  for (const EstimatedFrame& frame : fit.frames) {
+    if (frame.se_kPa > 0) record.correlation.names.push_back(fmt::format("pressure_kPa[{}]", frame.number));
+  }
+  const Eigen::MatrixXd matrix = correlation(fit.covariance);
+  for (Eigen::Index row = 0; row < matrix.rows(); ++row) {
+    const Eigen::VectorXd values = matrix.row(row);
+    record.correlation.matrix.emplace_back(values.begin(), values.end());
+  }
+}
+
+FitIteration record_of(const OptimiserStep& step, const Study& study, size_t elements) {
+  FitIteration result{step.iteration, step.cost, step.accepted, {}};
+  size_t first = 0;
+  for (const StudyParameter& parameter : study.law.parameters) {
+    const size_t count = value_count(parameter, elements);
+    result.parameters.push_back(mean_of_values(step.q, first, count));
+    first += count;
+  }
+  return result;
+}
+
+void record_frames(FitRecord& record, const FitOutcome& fit) {
+  size_t tags_left_out = 0, points_left_out = 0;
+  double squares_mm2 = 0;
+  for (const EstimatedFrame& frame : fit.frames) {
+    const auto rows = static_cast<double>(frame.weighted.size());
+    record.frames.push_back({.frame = frame.number,
+                             .time_s = frame.load.time_s,
+                             .measured_kPa = frame.load.pressure_kPa,
+                             .sigma_kPa = frame.load.sigma_kPa,
+                             .estimated_kPa = frame.pressure_kPa,
+                             .se_kPa = frame.se_kPa,
+                             .points = frame.usable,
+                             .rms_mm = std::sqrt(frame.unweighted_mm.squaredNorm() / rows),
+                             .chi2_per_point = frame.weighted.squaredNorm() / rows});
+    squares_mm2 += frame.unweighted_mm.squaredNorm();
+    record.residuals_used += static_cast<size_t>(frame.weighted.size());
+    record.outliers_5sigma += static_cast<size_t>((frame.weighted.array().abs() > outlier_sigma).count());
+    tags_left_out += frame.tags_left_out;
+    points_left_out += frame.points_left_out;
+  }
+  record.rms_mm = std::sqrt(squares_mm2 / static_cast<double>(record.residuals_used));
+  if (tags_left_out > 0) {
+    record.excluded.push_back(
+        {fmt::format("tag points farther than about {} mm from the body", outside_mm), tags_left_out});
+  }
+  if (points_left_out > 0) {
+    record.excluded.push_back(
+        {fmt::format("3-D points whose undeformed place is farther than about {} mm from the body",
+                     outside_mm),
+         points_left_out});
+  }
+}
+
+ResidualHistogram histogram_of(const FitOutcome& fit) {
+  constexpr int bins = 40;
+  constexpr double reach = 5.0, width = 2 * reach / bins;
+  ResidualHistogram histogram;
+  for (int i = 0; i <= bins; ++i)
+    histogram.edges.push_back(-reach + i * width);
+  histogram.counts.assign(bins, 0.0);
+  for (const EstimatedFrame& frame : fit.frames) {
+    for (const double residual : frame.weighted) {
+      const double clamped = std::clamp(residual, -reach, reach - width / 2);
+      histogram.counts[static_cast<size_t>((clamped + reach) / width)] += 1;
+    }
+  }
+  return histogram;
+}
+
+// At rest a tag point must lie on its own plane, and a 3-D point at its own place.
+void record_undeformed(FitRecord& record, const Measurement& measurement) {
+  double sum_mm = 0, chi2 = 0;
+  size_t rows = 0;
+  const auto add = [&](double error_mm, double sigma_mm) {
+    sum_mm += error_mm;
+    chi2 += error_mm * error_mm / (sigma_mm * sigma_mm);
+    ++rows;
+  };
+  for (const TagPoint& tag : measurement.tags) {
+    if (tag.frame != 0) continue;
+    ++record.undeformed_points;
+    double along_mm = -tag.plane_mm;
+    for (size_t k = 0; k < 3; ++k)
+      along_mm += tag.normal[k] * tag.x_mm[k];
+    add(along_mm, tag.sigma_mm);
+  }
+  for (const ObservedPoint& point : measurement.points) {
+    if (point.frame != 0) continue;
+    ++record.undeformed_points;
+    for (size_t k = 0; k < 3; ++k)
+      add(point.x_mm[k] - point.X_mm[k], point.sigma_mm);
+  }
+  const double count = static_cast<double>(rows);
+  record.undeformed_residuals = rows;
+  record.undeformed_mean_mm = rows > 0 ? sum_mm / count : std::numeric_limits<double>::quiet_NaN();
+  record.undeformed_chi2_per_residual = rows > 0 ? chi2 / count : std::numeric_limits<double>::quiet_NaN();
+}
+
+std::string data_words(const Measurement& measurement) {
+  if (measurement.points.empty()) return "tags";
+  return measurement.tags.empty() ? "points" : "tags and points";
+}
+
+}  // namespace
+
+FitRecord fit_study(const Study& study, const Measurement& measurement, const StudyFitOptions& options) {
+  if (!has_loaded_point(measurement)) {
+    throw InputError({study.file.string(), "table [data]",
+                      "every measured point is of frame 0, the undeformed state",
+                      "Give points of loaded frames: only they tell about stiffness."});
+  }
+  const auto& annulus = std::get<AnnulusSpecimen>(study.specimen);
+  ElasticModel model = make_model(study);
+  const size_t elements = model.mesh().element_count();
+  FitRecord record{};
+  record.study = study.file.string();
+  record.law = study.law.name;
+  record.specimen = "annulus";
+  record.mesh.assign(annulus.mesh.begin(), annulus.mesh.end());
+  record.unknowns = model.dofs();
+  record.data = data_words(measurement);
+
+  const Sought sought = sought_of(study, model);
+  ElasticMotion motion(std::move(model), sought.groups);
+  FitOptions fit_options;
+  fit_options.locator = locator_for(annulus);
+  fit_options.optimiser.iteration_limit = options.iteration_limit;
+  fit_options.on_step = [&](const OptimiserStep& step) {
+    if (options.on_iteration) options.on_iteration(record_of(step, study, elements));
+  };
+  const FitOutcome fit = fit_motion(motion, sought.values, measurement, fit_options);
+
+  record.converged = fit.converged;
+  record.reason = fit.reason;
+  record.iterations = fit.iterations;
+  record.forward_solves = fit.forward_solves;
+  record.seconds = fit.seconds;
+  for (const OptimiserStep& step : fit.history)
+    record.history.push_back(record_of(step, study, elements));
+  record_undeformed(record, measurement);
+  if (fit.values.empty()) return record;
+  record.chi2 = fit.chi2;
+  record.dof = static_cast<size_t>(std::max<Eigen::Index>(0, fit.rows - fit.unknowns));
+  record.chi2_per_dof = record.chi2 / static_cast<double>(record.dof);
+  record_parameters(record, study, fit, elements);
+  record_frames(record, fit);
+  record.residuals = histogram_of(fit);
+  record.remarks = remarks_on(record, fit);
+  record.section_frame = fit.frames.back().number;
+  record.sections = draw_sections(annulus, motion.mesh(), fit.frames.back(), measurement);
+  return record;
+}
+
+}  // namespace diastole

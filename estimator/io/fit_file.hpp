@@ -1,0 +1,127 @@
+#pragma once
+// The result of a fit, as `diastole fit --json` prints it and `-o FIT.json` keeps it
+// (format "diastole-fit", format_version 1), and as `diastole report` reads it back.
+// Lengths in mm, pressures in kPa, times in s. A number that does not exist (the standard error of a
+// parameter that sits on its bound) is NaN here and null in JSON.
+
+#include <array>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace diastole {
+
+struct FittedElement {
+  double value;
+  double se;
+  std::array<double, 2> ci95;
+};
+
+struct FittedParameter {
+  std::string name;  ///< with its unit
+  double value;      ///< of a regional parameter: the mean over the elements
+  double se;
+  std::array<double, 2> ci95;
+  double start;
+  std::array<double, 2> bounds;
+  std::string at_bound;                 ///< "", "lower" or "upper"
+  std::vector<FittedElement> elements;  ///< empty unless the parameter varies by element
+};
+
+struct FittedFrame {
+  int frame;
+  double time_s;
+  double measured_kPa;
+  double sigma_kPa;      ///< of the measured pressure
+  double estimated_kPa;  ///< from pressure and motion together
+  double se_kPa;
+  size_t points;
+  double rms_mm;
+  double chi2_per_point;
+};
+
+struct FitIteration {
+  int iteration;
+  double cost;  ///< half the weighted sum of squares
+  bool accepted;
+  std::vector<double> parameters;  ///< in the order of `parameters`; regional ones by their mean
+};
+
+/// Points that could not be used, and why.
+struct Exclusion {
+  std::string reason;
+  size_t points;
+};
+
+struct Correlation {
+  std::vector<std::string> names;
+  std::vector<std::vector<double>> matrix;
+};
+
+/// Residuals divided by their standard deviations, counted between edges; the outermost bins hold the rest.
+struct ResidualHistogram {
+  std::vector<double> edges;
+  std::vector<double> counts;
+};
+
+/// A curve or a set of points in a drawing's plane: horizontal and vertical coordinates, equally long.
+struct PlaneCurve {
+  std::vector<double> h_mm;
+  std::vector<double> v_mm;
+};
+
+/// A plane cut through the specimen before and after deformation.
+struct FitSection {
+  std::string title;
+  std::string horizontal;  ///< axis label with unit
+  std::string vertical;
+  std::vector<PlaneCurve> outline_before;
+  std::vector<PlaneCurve> outline_after;
+  std::vector<PlaneCurve> lines_before;  ///< tag planes (tags) or material grid (points)
+  std::vector<PlaneCurve> lines_after;   ///< the same, carried along by the fitted model
+  PlaneCurve observed;                   ///< measured points near the plane
+};
+
+struct FitRecord {
+  std::string study;
+  std::string law;
+  std::string specimen;  ///< kind
+  std::vector<int> mesh;
+  size_t unknowns;
+  std::string data;  ///< "tags", "points" or "tags and points"
+  std::vector<FittedParameter> parameters;
+  Correlation correlation;
+  double rms_mm;  ///< of the unweighted residuals (a tag's along its normal; a point's three components)
+  double chi2;
+  size_t dof;
+  double chi2_per_dof;
+  bool converged;
+  std::string reason;
+  int iterations;
+  int forward_solves;
+  double seconds;
+  std::vector<FitIteration> history;
+  size_t residuals_used;
+  std::vector<Exclusion> excluded;
+  size_t outliers_5sigma;
+  size_t undeformed_points;  ///< of frame 0: a check, not part of the fit
+  size_t undeformed_residuals;
+  double undeformed_chi2_per_residual;  ///< NaN without such points
+  double undeformed_mean_mm;
+  std::vector<FittedFrame> frames;
+  ResidualHistogram residuals;
+  int section_frame;
+  std::vector<FitSection> sections;
+  std::vector<std::string> remarks;  ///< whole sentences for the reader
+};
+
+/// One JSON document, indented, ending in a line feed.
+std::string to_json(const FitRecord& record);
+
+/// Throws InputError if the text is not such a document; `file` stands for it in messages.
+FitRecord fit_record_from_json(std::string_view text, const std::string& file);
+
+/// Writes a file that is complete or absent (temporary name, then rename). Throws InputError if it cannot.
+void write_fit_file(const FitRecord& record, const std::filesystem::path& path);
+
+}  // namespace diastole

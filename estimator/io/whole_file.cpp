@@ -1,0 +1,34 @@
+#include "estimator/io/whole_file.hpp"
+
+#include <fstream>
+#include <iterator>
+#include <system_error>
+
+#include "protocol/contract/input_error.hpp"
+
+namespace diastole {
+
+void write_whole_file(const std::filesystem::path& path, std::string_view content) {
+  const std::filesystem::path unfinished = path.string() + ".part";
+  std::ofstream stream(unfinished, std::ios::binary);
+  stream << content;
+  stream.close();
+  std::error_code error;
+  if (stream) std::filesystem::rename(unfinished, path, error);
+  if (!stream || error) {
+    std::filesystem::remove(unfinished, error);
+    throw InputError({path.string(), "", "cannot be written", "Check that the folder exists and has room."});
+  }
+}
+
+std::string read_whole_file(const std::filesystem::path& path) {
+  std::ifstream stream(path, std::ios::binary);
+  if (!stream || std::filesystem::is_directory(path)) {
+    throw InputError(
+        {path.string(), "", "cannot be opened",
+         "Check the path and that you may read the file; paths in a study are relative to the study."});
+  }
+  return {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
+}
+
+}  // namespace diastole

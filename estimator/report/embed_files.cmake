@@ -1,0 +1,16 @@
+# Writes embedded.cpp: each file of PAIRS ("name=path", separated by |) as a string_view in its namespace.
+#   cmake -DOUTPUT=embedded.cpp -DPAIRS="page_css=page.css|page_js=page.js" -P embed_files.cmake
+set(text "#include \"estimator/report/embedded.hpp\"\n\nnamespace diastole::report::embedded {\n")
+string(REPLACE "|" ";" pairs "${PAIRS}")
+foreach(pair IN LISTS pairs)
+  string(REGEX MATCH "^([^=]+)=(.+)$" _ "${pair}")
+  set(name "${CMAKE_MATCH_1}")
+  file(READ "${CMAKE_MATCH_2}" hex HEX)
+  string(LENGTH "${hex}" digits)
+  math(EXPR bytes "${digits} / 2")
+  string(REGEX REPLACE "(..)" "'\\\\x\\1'," list "${hex}")
+  string(APPEND text "static constexpr char ${name}_bytes[] = {${list}};\n"
+    "const std::string_view ${name}(${name}_bytes, ${bytes});\n")
+endforeach()
+string(APPEND text "}\n")
+file(WRITE "${OUTPUT}" "${text}")

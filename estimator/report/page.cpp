@@ -1,0 +1,171 @@
+#include "estimator/report/page.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+
+#include "estimator/report/embedded.hpp"
+#include "estimator/report/html_text.hpp"
+#include "estimator/report/svg_plot.hpp"
+
+namespace diastole::report {
+namespace {
+
+// What a paper-sized figure can show: more points would only make the file large.
+constexpr size_t static_points = 1500;
+
+/// Of every bucket its least and its greatest sample, so that no peak is lost; short traces stay as they are.
+std::vector<size_t> envelope(const std::vector<double>& y, size_t at_most) {
+  std::vector<size_t> kept;
+  const size_t bucket = std::max<size_t>(1, 2 * y.size() / at_most);
+  for (size_t from = 0; from < y.size(); from += bucket) {
+    const auto begin = y.begin() + static_cast<std::ptrdiff_t>(from);
+    const auto end = y.begin() + static_cast<std::ptrdiff_t>(std::min(from + bucket, y.size()));
+    const auto [low, high] = std::minmax_element(begin, end);
+    const auto first = std::min(low, high), second = std::max(low, high);
+    kept.push_back(static_cast<size_t>(first - y.begin()));
+    if (second != first) kept.push_back(static_cast<size_t>(second - y.begin()));
+  }
+  return kept;
+}
+
+std::string static_svg(const TimeChart& chart) {
+  SvgPlot plot({.x = {.label = "time (s)"}, .y = {.label = chart.y_label}, .width = 1120, .height = 300});
+  plot.marks(chart.marks_s, "muted");
+  for (const TimeChart::Trace& trace : chart.traces) {
+    std::vector<double> x, y;
+    for (const size_t i : envelope(trace.y, static_points)) {
+      x.push_back(chart.time_s[i]);
+      y.push_back(trace.y[i]);
+    }
+    plot.line(x, y, trace.style, trace.name);
+  }
+  return plot.svg();
+}
+
+void append_numbers(std::string& text, const std::vector<double>& values, int decimals) {
+  text += '[';
+  for (const double value : values) {
+    if (text.back() != '[') text += ',';
+    if (std::isfinite(value)) {
+      fmt::format_to(std::back_inserter(text), "{:.{}f}", value, decimals);
+    } else {
+      text += "null";
+    }
+  }
+  text += ']';
+}
+
+std::string quoted(const std::string& text) {
+  std::string result = "\"";
+  for (const char c : text) {
+    if (c == '"' || c == '\\' || c == '<') {
+      result += fmt::format("\\u{:04x}", static_cast<unsigned>(c));
+    } else {
+      result += c;
+    }
+  }
+  return result + '"';
+}
+
+std::string chart_json(const TimeChart& chart) {
+  std::string text = fmt::format("{{\"label\":{},\"traces\":[", quoted(chart.y_label));
+  for (size_t i = 0; i < chart.traces.size(); ++i) {
+    const TimeChart::Trace& trace = chart.traces[i];
+    text += fmt::format("{}{{\"name\":{},\"style\":{}}}", i == 0 ? "" : ",", quoted(trace.name),
+                        quoted(trace.style));
+  }
+  text += "],\"marks\":";
+  append_numbers(text, chart.marks_s, 4);
+  text += ",\"data\":[";
+  append_numbers(text, chart.time_s, 4);
+  for (const TimeChart::Trace& trace : chart.traces) {
+    text += ',';
+    append_numbers(text, trace.y, 4);
+  }
+  return text + "]}";
+}
+
+std::string figure_html(const std::string& body, const std::string& caption) {
+  return fmt::format("<figure>{}<figcaption>{}</figcaption></figure>\n", body, escaped(caption));
+}
+
+}  // namespace
+
+void Page::headline(const std::string& label, const std::string& value, const std::string& note) {
+  headlines_ +=
+      fmt::format("<div class=\"headline\"><span>{}</span><strong>{}</strong><small>{}</small></div>\n",
+                  escaped(label), escaped(value), escaped(note));
+}
+
+void Page::section(const std::string& title, const std::string& lead) {
+  if (in_section_) body_ += "</section>\n";
+  in_section_ = true;
+  body_ += fmt::format("<section>\n<h2>{}</h2>\n<p class=\"lead\">{}</p>\n", escaped(title), escaped(lead));
+}
+
+void Page::paragraph(const std::string& text) { body_ += fmt::format("<p>{}</p>\n", escaped(text)); }
+
+void Page::warning(const std::string& text) {
+  body_ += fmt::format("<p class=\"warning\">{}</p>\n", escaped(text));
+}
+
+void Page::figures(const std::vector<Figure>& row) {
+  body_ += "<div class=\"row\">\n";
+  for (const Figure& figure : row)
+    body_ += figure_html(figure.svg, figure.caption);
+  body_ += "</div>\n";
+}
+
+void Page::time_chart(const TimeChart& chart) {
+  const std::string holder =
+      fmt::format("<div class=\"chart\" data-chart=\"{}\">{}</div>", charts_.size(), static_svg(chart));
+  body_ += figure_html(holder, chart.caption);
+  charts_.push_back(chart_json(chart));
+}
+
+void Page::table(const std::vector<std::string>& header, const std::vector<std::vector<std::string>>& rows,
+                 const std::string& caption) {
+  const auto row_html = [](const std::vector<std::string>& cells, const char* tag) {
+    std::string text = "<tr>";
+    for (const std::string& cell : cells)
+      text += fmt::format("<{0}>{1}</{0}>", tag, escaped(cell));
+    return text + "</tr>\n";
+  };
+  std::string text = "<table><thead>" + row_html(header, "th") + "</thead><tbody>\n";
+  for (const auto& row : rows)
+    text += row_html(row, "td");
+  body_ += figure_html(text + "</tbody></table>", caption);
+}
+
+void Page::listing(const std::string& title, const std::string& text) {
+  body_ +=
+      fmt::format("<details><summary>{}</summary><pre>{}</pre></details>\n", escaped(title), escaped(text));
+}
+
+std::string Page::html() const {
+  std::string text = "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n";
+  text += "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n";
+  text += fmt::format("<title>{}</title>\n<style>\n", escaped(title_));
+  if (!charts_.empty()) text += std::string(embedded::uplot_css) + "\n";
+  text += std::string(embedded::page_css) + "</style>\n</head>\n<body>\n";
+  text += fmt::format(
+      "<header><p class=\"brand\">Diastole</p><h1>{}</h1>\n<div class=\"headlines\">\n{}</div></header>\n",
+      escaped(title_), headlines_);
+  text += "<main>\n" + body_ + (in_section_ ? "</section>\n" : "") + "</main>\n";
+  if (!charts_.empty()) {
+    text += "<script>\nconst charts = [";
+    for (const std::string& chart : charts_)
+      text += chart + ",\n";
+    text += fmt::format("];\n/*\n{}\n*/\n", embedded::uplot_licence);
+    // The script's own first line is a banner with an address; the licence above says the same without one.
+    const std::string_view script = embedded::uplot_js;
+    text += script.substr(script.find('\n') + 1);
+    text += std::string(embedded::page_js) + "</script>\n";
+  }
+  return text + "</body>\n</html>\n";
+}
+
+}  // namespace diastole::report

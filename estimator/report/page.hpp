@@ -1,0 +1,60 @@
+#pragma once
+// A self-contained HTML page: one file, no network, readable without JavaScript and on paper. Sections hold
+// paragraphs, tables, figures (inline SVG) and time charts; a time chart shows its SVG until the embedded
+// uPlot takes its place with a zoomable trace.
+
+#include <string>
+#include <vector>
+
+namespace diastole::report {
+
+struct Figure {
+  std::string svg;
+  std::string caption;  ///< plain words; it is escaped
+};
+
+/// A trace against time. Both the SVG and the chart are drawn from the same numbers.
+struct TimeChart {
+  struct Trace {
+    std::string name;  ///< with its unit
+    std::string style;
+    std::vector<double> y;  ///< as long as `time_s`; NaN leaves a hole
+  };
+  std::vector<double> time_s;
+  std::vector<Trace> traces;
+  std::string y_label;
+  std::vector<double> marks_s;  ///< vertical marks (triggers)
+  std::string caption;
+};
+
+class Page {
+ public:
+  explicit Page(std::string title) : title_(std::move(title)) {}
+
+  /// One of the figures at the head of the page: "C1", "8.57 ± 0.08 kPa", "95 % interval 8.41 to 8.73 kPa".
+  void headline(const std::string& label, const std::string& value, const std::string& note);
+
+  void section(const std::string& title, const std::string& lead);
+  void paragraph(const std::string& text);
+  /// A remark that the reader must not miss.
+  void warning(const std::string& text);
+  /// Figures side by side where the width allows.
+  void figures(const std::vector<Figure>& row);
+  void time_chart(const TimeChart& chart);
+  /// First column left-aligned, the others as numbers.
+  void table(const std::vector<std::string>& header, const std::vector<std::vector<std::string>>& rows,
+             const std::string& caption);
+  /// Preformatted text that unfolds on a click.
+  void listing(const std::string& title, const std::string& text);
+
+  [[nodiscard]] std::string html() const;
+
+ private:
+  std::string title_;
+  std::string headlines_;
+  std::string body_;
+  bool in_section_ = false;
+  std::vector<std::string> charts_;  // JSON for page.js
+};
+
+}  // namespace diastole::report

@@ -1,0 +1,56 @@
+#include "estimator/report/report.hpp"
+
+#include <fmt/format.h>
+
+#include <vector>
+
+#include "estimator/io/fit_file.hpp"
+#include "estimator/io/whole_file.hpp"
+#include "estimator/report/page.hpp"
+#include "estimator/report/sections.hpp"
+#include "protocol/contract/input_error.hpp"
+#include "protocol/runfile/reader.hpp"
+
+namespace diastole::report {
+namespace {
+
+bool is_hdf5(std::string_view content) {
+  return content.starts_with(std::string_view("\x89HDF\r\n\x1a\n", 8));
+}
+
+bool is_json_object(const std::string& content) {
+  const size_t first = content.find_first_not_of(" \t\r\n");
+  return first != std::string::npos && content[first] == '{';
+}
+
+std::string title_of(size_t fits, size_t runs) {
+  if (fits == 0) return runs == 1 ? "A pump session" : "Pump sessions";
+  return runs == 0 ? "Material stiffness" : "From a pump session to a material stiffness";
+}
+
+}  // namespace
+
+std::string make_report(std::span<const std::filesystem::path> files, const ReportOptions& options) {
+  std::vector<FitRecord> fits;
+  std::vector<runfile::RecordedRun> runs;
+  for (const std::filesystem::path& file : files) {
+    const std::string content = read_whole_file(file);
+    if (is_hdf5(content)) {
+      runs.push_back(runfile::read_run(file));
+      continue;
+    }
+    if (!is_json_object(content)) {
+      throw InputError({file.string(), "", "is neither a run file nor a fit result",
+                        "Give files that `diastole run`, `diastole simulate` or `diastole fit -o` wrote."});
+    }
+    fits.push_back(fit_record_from_json(content, file.string()));
+  }
+  Page page(title_of(fits.size(), runs.size()));
+  for (const FitRecord& fit : fits)
+    add_fit(page, fit);
+  for (const runfile::RecordedRun& run : runs)
+    add_run(page, run, options.frames);
+  return page.html();
+}
+
+}  // namespace diastole::report

@@ -1,0 +1,18 @@
+#pragma once
+// What the report tells about each kind of file.
+
+#include "estimator/io/fit_file.hpp"
+#include "estimator/report/page.hpp"
+#include "protocol/runfile/run.hpp"
+
+namespace diastole::report {
+
+/// Pressure trace with triggers, commanded volume, pressure binned into `frames` image frames with its spread
+/// over the cycles, pressure-volume loops, the schedule and what is missing.
+void add_run(Page& page, const runfile::RecordedRun& run, size_t frames);
+
+/// The parameters with their intervals, the specimen before and after, pressures, residuals, how the fit
+/// ended.
+void add_fit(Page& page, const FitRecord& fit);
+
+}  // namespace diastole::report

@@ -1,0 +1,247 @@
+#include "estimator/report/svg_plot.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <limits>
+
+#include "estimator/report/html_text.hpp"
+
+namespace diastole::report {
+namespace {
+
+constexpr double left_margin = 62, right_margin = 14, top_margin = 12, bottom_margin = 46;
+constexpr double legend_height = 24;
+constexpr double letter_width = 6.4;  // mean advance of the legend's 12 px type
+
+std::vector<double> copied(std::span<const double> values) { return {values.begin(), values.end()}; }
+
+struct Interval {
+  double low = std::numeric_limits<double>::infinity();
+  double high = -std::numeric_limits<double>::infinity();
+
+  void cover(std::span<const double> values) {
+    for (const double value : values) {
+      if (!std::isfinite(value)) continue;
+      low = std::min(low, value);
+      high = std::max(high, value);
+    }
+  }
+  /// Never empty and never of zero width.
+  [[nodiscard]] Interval drawable() const {
+    if (!(low <= high)) return {0, 1};
+    if (low < high) return *this;
+    const double slack = low == 0 ? 1 : std::abs(low) * 0.05;
+    return {low - slack, high + slack};
+  }
+};
+
+std::string tick_text(double value, double step) {
+  const int decimals = std::clamp(-static_cast<int>(std::floor(std::log10(step) + 1e-9)), 0, 9);
+  const double shown = std::abs(value) < step * 1e-6 ? 0.0 : value;
+  return fmt::format("{}{:.{}f}", shown < 0 ? "\u2212" : "", std::abs(shown), decimals);
+}
+
+}  // namespace
+
+std::vector<double> ticks_over(double from, double to, int count) {
+  const double raw = (to - from) / std::max(count, 1);
+  const double power = std::pow(10.0, std::floor(std::log10(raw)));
+  const double scaled = raw / power;
+  const double step = power * (scaled < 1.5 ? 1 : scaled < 3.5 ? 2 : scaled < 7.5 ? 5 : 10);
+  std::vector<double> ticks;
+  const auto first = static_cast<long>(std::floor(from / step + 1e-9));
+  const auto last = static_cast<long>(std::ceil(to / step - 1e-9));
+  for (long k = first; k <= last; ++k)
+    ticks.push_back(static_cast<double>(k) * step);
+  return ticks;
+}
+
+struct SvgPlot::Frame {
+  double left, top, width, height;
+  double x0, x1, y0, y1;
+  std::vector<double> x_ticks, y_ticks;
+
+  [[nodiscard]] double px(double x) const { return left + width * (x - x0) / (x1 - x0); }
+  [[nodiscard]] double py(double y) const { return top + height * (y1 - y) / (y1 - y0); }
+};
+
+void SvgPlot::line(std::span<const double> x, std::span<const double> y, std::string style,
+                   std::string name) {
+  series_.push_back({Kind::line, copied(x), copied(y), {}, std::move(style), std::move(name)});
+}
+void SvgPlot::points(std::span<const double> x, std::span<const double> y, std::string style,
+                     std::string name) {
+  series_.push_back({Kind::points, copied(x), copied(y), {}, std::move(style), std::move(name)});
+}
+void SvgPlot::error_bars(std::span<const double> x, std::span<const double> y, std::span<const double> error,
+                         std::string style) {
+  std::vector<double> low, high;
+  for (size_t i = 0; i < x.size(); ++i) {
+    low.push_back(y[i] - error[i]);
+    high.push_back(y[i] + error[i]);
+  }
+  series_.push_back({Kind::error_bars, copied(x), std::move(low), std::move(high), std::move(style), {}});
+}
+void SvgPlot::band(std::span<const double> x, std::span<const double> low, std::span<const double> high,
+                   std::string style, std::string name) {
+  series_.push_back({Kind::band, copied(x), copied(low), copied(high), std::move(style), std::move(name)});
+}
+void SvgPlot::bars(std::span<const double> edges, std::span<const double> heights, std::string style,
+                   std::string name) {
+  series_.push_back({Kind::bars, copied(edges), copied(heights), {0.0}, std::move(style), std::move(name)});
+}
+void SvgPlot::marks(std::span<const double> x, std::string style, std::string name) {
+  series_.push_back({Kind::marks, copied(x), {}, {}, std::move(style), std::move(name)});
+}
+
+SvgPlot::Frame SvgPlot::frame() const {
+  Interval x_range, y_range;
+  bool has_legend = false;
+  for (const Series& series : series_) {
+    x_range.cover(series.x);
+    y_range.cover(series.y);
+    y_range.cover(series.y2);
+    has_legend = has_legend || !series.name.empty();
+  }
+  const Interval x = x_range.drawable(), y = y_range.drawable();
+  Frame frame{};
+  frame.left = left_margin;
+  frame.top = top_margin + (has_legend ? legend_height : 0);
+  frame.width = options_.width - left_margin - right_margin;
+  frame.height = options_.height - frame.top - bottom_margin;
+  frame.x_ticks = ticks_over(options_.x.from.value_or(x.low), options_.x.to.value_or(x.high), 7);
+  frame.y_ticks = ticks_over(options_.y.from.value_or(y.low), options_.y.to.value_or(y.high), 6);
+  frame.x0 = options_.x.from.value_or(frame.x_ticks.front());
+  frame.x1 = options_.x.to.value_or(frame.x_ticks.back());
+  frame.y0 = options_.y.from.value_or(frame.y_ticks.front());
+  frame.y1 = options_.y.to.value_or(frame.y_ticks.back());
+  if (options_.equal_scale) {
+    const double scale = std::min(frame.width / (frame.x1 - frame.x0), frame.height / (frame.y1 - frame.y0));
+    frame.width = scale * (frame.x1 - frame.x0);
+    frame.height = scale * (frame.y1 - frame.y0);
+  }
+  return frame;
+}
+
+std::string SvgPlot::drawn(const Series& series, const Frame& frame) {
+  std::string path;
+  const auto to = [&](char command, double x, double y) {
+    fmt::format_to(std::back_inserter(path), "{}{:.1f} {:.1f}", command, frame.px(x), frame.py(y));
+  };
+  const size_t count = series.x.size();
+  const char* shape = "line";
+  switch (series.kind) {
+    case Kind::line:
+      for (size_t i = 0; i < count; ++i) {
+        if (!std::isfinite(series.y[i])) continue;
+        const bool starts = i == 0 || !std::isfinite(series.y[i - 1]);
+        to(starts ? 'M' : 'L', series.x[i], series.y[i]);
+      }
+      break;
+    case Kind::points:
+      shape = "dots";
+      // A stroke of no length with round caps is a dot.
+      for (size_t i = 0; i < count; ++i) {
+        to('M', series.x[i], series.y[i]);
+        path += "h0";
+      }
+      break;
+    case Kind::error_bars:
+      for (size_t i = 0; i < count; ++i) {
+        to('M', series.x[i], series.y[i]);
+        to('L', series.x[i], series.y2[i]);
+      }
+      break;
+    case Kind::band:
+      shape = "band";
+      for (size_t i = 0; i < count; ++i)
+        to(i == 0 ? 'M' : 'L', series.x[i], series.y[i]);
+      for (size_t i = count; i-- > 0;)
+        to('L', series.x[i], series.y2[i]);
+      break;
+    case Kind::bars:
+      shape = "bars";
+      for (size_t i = 0; i + 1 < count; ++i) {
+        to('M', series.x[i], 0);
+        to('L', series.x[i], series.y[i]);
+        to('L', series.x[i + 1], series.y[i]);
+        to('L', series.x[i + 1], 0);
+      }
+      break;
+    case Kind::marks:
+      shape = "mark";
+      for (const double x : series.x) {
+        to('M', x, frame.y0);
+        to('L', x, frame.y1);
+      }
+      break;
+  }
+  return fmt::format("<path class=\"{} {}\" d=\"{}\"/>", shape, series.style, path);
+}
+
+std::string SvgPlot::axes(const Frame& frame) const {
+  std::string grid, texts;
+  const double bottom = frame.top + frame.height, right = frame.left + frame.width;
+  const auto step_of = [](const std::vector<double>& ticks) {
+    return ticks.size() > 1 ? ticks[1] - ticks[0] : 1.0;
+  };
+  for (const double tick : frame.x_ticks) {
+    if (tick < frame.x0 - 1e-9 || tick > frame.x1 + 1e-9) continue;
+    grid += fmt::format("M{:.1f} {:.1f}V{:.1f}", frame.px(tick), frame.top, bottom);
+    texts += fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"middle\">{}</text>", frame.px(tick),
+                         bottom + 17, tick_text(tick, step_of(frame.x_ticks)));
+  }
+  for (const double tick : frame.y_ticks) {
+    if (tick < frame.y0 - 1e-9 || tick > frame.y1 + 1e-9) continue;
+    grid += fmt::format("M{:.1f} {:.1f}H{:.1f}", frame.left, frame.py(tick), right);
+    texts += fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"end\">{}</text>", frame.left - 7,
+                         frame.py(tick) + 4, tick_text(tick, step_of(frame.y_ticks)));
+  }
+  if (options_.equal_scale) {
+    // A drawing gets a frame only: lines across it would be taken for the specimen's.
+    grid =
+        fmt::format("M{:.1f} {:.1f}H{:.1f}V{:.1f}H{:.1f}Z", frame.left, frame.top, right, bottom, frame.left);
+  }
+  return fmt::format(
+      "<path class=\"grid\" d=\"{}\"/>{}"
+      "<text class=\"label\" x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"middle\">{}</text>"
+      "<text class=\"label\" transform=\"translate(14 {:.1f}) rotate(-90)\" text-anchor=\"middle\">{}</text>",
+      grid, texts, frame.left + frame.width / 2, bottom + 38, escaped(options_.x.label),
+      frame.top + frame.height / 2, escaped(options_.y.label));
+}
+
+std::string SvgPlot::legend(const Frame& frame) const {
+  std::string result;
+  double x = frame.left;
+  const double y = top_margin + 4;
+  for (const Series& series : series_) {
+    if (series.name.empty()) continue;
+    const char* shape = series.kind == Kind::points  ? "dots"
+                        : series.kind == Kind::line  ? "line"
+                        : series.kind == Kind::marks ? "mark"
+                                                     : "swatch";
+    const double start = series.kind == Kind::points ? x + 8 : x;
+    result += fmt::format("<path class=\"{} {}\" d=\"M{:.1f} {:.1f}h{}\"/>", shape, series.style, start, y,
+                          series.kind == Kind::points ? 0 : 16);
+    result += fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\">{}</text>", x + 22, y + 4, escaped(series.name));
+    x += 40 + letter_width * static_cast<double>(series.name.size());
+  }
+  return result;
+}
+
+std::string SvgPlot::svg() const {
+  const Frame placed = frame();
+  std::string body = axes(placed);
+  for (const Series& series : series_)
+    body += drawn(series, placed) + "\n";
+  const double height = placed.top + placed.height + bottom_margin;
+  const double width = placed.left + placed.width + right_margin;
+  return fmt::format(
+      "<svg class=\"plot\" viewBox=\"0 0 {0:.0f} {1:.0f}\" width=\"{0:.0f}\" role=\"img\">{2}{3}</svg>",
+      width, height, body, legend(placed));
+}
+
+}  // namespace diastole::report
