@@ -172,6 +172,13 @@ bool SimBoard::level(Pin pin) const { return board_->chip.pins.level(pin); }
 
 std::vector<SimBoard::PinEvent> SimBoard::take_pin_events() { return board_->chip.pins.take(); }
 
+void SimBoard::on_pin_change(std::function<void(Pin, bool, uint64_t)> listener) {
+  board_model::Chip& chip = board_->chip;
+  chip.pins.on_change([&chip, listener = std::move(listener)](Pin pin, bool level, Cycles at) {
+    listener(pin, level, chip.clock.ns(at));
+  });
+}
+
 void SimBoard::cut_power_at_flash_operation(std::optional<uint64_t> operation) {
   board_->chip.flash.cut_power_at(operation);
 }

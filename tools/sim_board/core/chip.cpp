@@ -110,6 +110,9 @@ void Chip::add_others(uint32_t random_seed) {
   bus.add({"SYSCFG", 0x4001'3800, {apb2, 14}, &syscfg});
   bus.add({"EXTI", 0x4001'3c00, {}, &exti});
   bus.add({"DAC", 0x4000'7400, {apb1, 29}, &dac});
+  bus.add({"DMA1", 0x4002'6000, {ahb1, 21}, &dma1});
+  bus.add({"DMA2", 0x4002'6400, {ahb1, 22}, &dma2});
+  dac.on_dma_request([this](uint32_t channel) { dma1.request(5 + channel, 7); });
   bus.add({"IWDG", 0x4000'3000, {}, &watchdog});
   bus.add({"DWT", 0xe000'1000, {}, &dwt});
   bus.add({"system control", 0xe000'e000, {}, &control}, 4);

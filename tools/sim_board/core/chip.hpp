@@ -9,6 +9,7 @@
 #include "tools/sim_board/core/cpu.hpp"
 #include "tools/sim_board/core/world.hpp"
 #include "tools/sim_board/peripherals/dac.hpp"
+#include "tools/sim_board/peripherals/dma.hpp"
 #include "tools/sim_board/peripherals/exti.hpp"
 #include "tools/sim_board/peripherals/flash.hpp"
 #include "tools/sim_board/peripherals/gpio.hpp"
@@ -54,6 +55,8 @@ class Chip {
   Exti exti{syscfg, pins, nvic};
   Dac dac{clock, pins, notes};
   Watchdog watchdog{clock, scheduler};
+  Dma dma1{1, bus, memory, nvic, clock, notes};
+  Dma dma2{2, bus, memory, nvic, clock, notes};
   World world;
   std::vector<std::unique_ptr<Gpio>> ports;
   std::vector<std::unique_ptr<Timer>> timers;

@@ -5,7 +5,7 @@
 namespace diastole::board_model {
 namespace {
 
-constexpr uint32_t enabled = 1, trigger_enabled = 1 << 2;
+constexpr uint32_t enabled = 1, trigger_enabled = 1 << 2, dma_enabled = 1 << 12;
 constexpr uint32_t software_trigger = 7;
 
 uint32_t trigger_source(uint32_t control) { return control >> 3 & 7; }
@@ -58,7 +58,6 @@ void Dac::write(uint32_t offset, uint32_t value, uint32_t mask) {
         if ((control(channel) & 0xc0) == 0) channels_[channel].triangle = 0;
         if ((control(channel) & 0xc0) == 0x40)
           notes_.add("DAC: noise is not modelled", clock_.ns(clock_.now()));
-        if ((control(channel) & 0x1000) != 0) notes_.add("DAC: DMA is not modelled", clock_.ns(clock_.now()));
       }
       break;
     case 0x04:
@@ -111,7 +110,11 @@ void Dac::convert(uint32_t channel, Cycles at) {
   constexpr uint32_t on = enabled | trigger_enabled;
   if ((control(channel) & on) != on) return;
   Channel& held = channels_[channel];
-  if ((control(channel) >> 6 & 2) == 0) return output(channel, held.holding, at);
+  if ((control(channel) >> 6 & 2) == 0) {
+    output(channel, held.holding, at);
+    if ((control(channel) & dma_enabled) != 0 && dma_request_) dma_request_(channel);
+    return;
+  }
   const uint32_t amplitude = (2U << std::min(control(channel) >> 8 & 0xf, 11U)) - 1;
   output(channel, std::min(held.holding + held.triangle, 0xfffU), at);
   if (held.triangle >= amplitude) held.falls = true;

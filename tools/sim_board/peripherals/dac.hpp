@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 
 #include "tools/sim_board/core/device.hpp"
 #include "tools/sim_board/core/notes.hpp"
@@ -18,6 +19,9 @@ class Dac final : public Device {
   uint32_t read(uint32_t offset) override;
   void write(uint32_t offset, uint32_t value, uint32_t mask) override;
   void reset() override;
+
+  /// Called with the channel (0, 1) when a conversion wants its next code from DMA.
+  void on_dma_request(std::function<void(uint32_t)> request) { dma_request_ = std::move(request); }
 
   /// The trigger output of timer `number` fired.
   void timer_trigger(uint8_t number, Cycles at);
@@ -37,6 +41,7 @@ class Dac final : public Device {
   const Clock& clock_;
   PinLog& log_;
   Notes& notes_;
+  std::function<void(uint32_t)> dma_request_;
   uint32_t cr_ = 0;
   std::array<Channel, 2> channels_{};
 };

@@ -1,0 +1,60 @@
+#include "tools/sim_board/emulated_controller.hpp"
+
+#include "firmware/core/homing.hpp"
+
+namespace diastole {
+
+EmulatedController::EmulatedController(const std::vector<Image>& images, Mechanics mechanics,
+                                       SimBoardOptions options)
+    : mechanics_(mechanics), board_(options), position_(mechanics.parked_microsteps) {
+  for (const Image& image : images) {
+    for (const ImageSegment& segment : image.segments)
+      board_.load(segment.bytes, segment.address);
+  }
+  drive(wiring_.estop, false, 0);
+  drive(wiring_.home, position_ <= 0, 0);
+  drive(wiring_.far_limit, position_ >= mechanics_.far_limit_microsteps, 0);
+  board_.on_pin_change([this](SimBoard::Pin pin, bool level, uint64_t time_ns) {
+    if (pin == wiring_.step.pin && level == wiring_.step.active_high) step(time_ns);
+  });
+  board_.power_on();
+}
+
+EmulatedController::Places EmulatedController::places() const {
+  return {mechanics_.parked_microsteps, 1 + int64_t{firmware::kHomeClearance_steps}};
+}
+
+void EmulatedController::drive(const Wire& wire, bool active, uint64_t time_ns) {
+  board_.drive(wire.pin, active == wire.active_high, time_ns);
+}
+
+void EmulatedController::close(const Wire& wire, uint64_t time_ns) { drive(wire, true, time_ns); }
+
+void EmulatedController::press_estop(uint64_t time_ns, bool pressed) {
+  drive(wiring_.estop, pressed, time_ns);
+}
+
+/// The motor follows a step only while it has current.
+void EmulatedController::step(uint64_t time_ns) {
+  const auto active = [&](const Wire& wire) { return board_.level(wire.pin) == wire.active_high; };
+  if (!active(wiring_.enable)) return;
+  const int64_t before = position_;
+  position_ += active(wiring_.dir) ? 1 : -1;
+  if ((before <= 0) != (position_ <= 0)) drive(wiring_.home, position_ <= 0, time_ns);
+  const int64_t far = mechanics_.far_limit_microsteps;
+  if ((before >= far) != (position_ >= far)) drive(wiring_.far_limit, position_ >= far, time_ns);
+}
+
+EmulatedController::Output EmulatedController::advance_to(uint64_t until_ns) {
+  board_.advance_to(until_ns);
+  sent_.clear();
+  for (const SentByte& byte : board_.take_sent())
+    sent_.push_back(byte.value);
+  edges_.clear();
+  for (const SimBoard::PinEvent& event : board_.take_pin_events()) {
+    if (const auto edge = pin_edge(wiring_, event)) edges_.push_back(*edge);
+  }
+  return {sent_, edges_};
+}
+
+}  // namespace diastole

@@ -1,0 +1,117 @@
+#include "tools/sim_board/report.hpp"
+
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+
+namespace diastole {
+namespace {
+
+constexpr uint32_t core_exception_base = 0x8000'0000;
+
+std::string interrupt_name(uint32_t irq) {
+  if (irq < core_exception_base) return fmt::format("IRQ {}", irq);
+  switch (irq - core_exception_base) {
+    case 3:
+      return "HardFault";
+    case 5:
+      return "BusFault";
+    case 6:
+      return "UsageFault";
+    case 11:
+      return "SVCall";
+    case 14:
+      return "PendSV";
+    case 15:
+      return "SysTick";
+    default:
+      return fmt::format("exception {}", irq - core_exception_base);
+  }
+}
+
+uint64_t flash_bytes(const BoardReport& report) {
+  uint64_t sum = 0;
+  for (const Image& image : report.images)
+    sum += image.flash_bytes;
+  return sum;
+}
+
+double board_s(const BoardReport& report) { return static_cast<double>(report.board.time_ns) * 1e-9; }
+double times_real_time(const BoardReport& report) {
+  return report.wall_s > 0 ? board_s(report) / report.wall_s : 0;
+}
+
+}  // namespace
+
+nlohmann::json to_json(const BoardReport& report) {
+  const BoardStatistics& board = report.board;
+  nlohmann::json document = {{"simulated_seconds", board_s(report)},
+                             {"wall_seconds", report.wall_s},
+                             {"times_real_time", times_real_time(report)},
+                             {"core_Hz", board.core_Hz},
+                             {"cycles", board.cycles},
+                             {"instructions", board.instructions},
+                             {"steps", report.steps},
+                             {"triggers", report.triggers},
+                             {"flash_bytes", flash_bytes(report)},
+                             {"stack_top", board.stack_top},
+                             {"stack_used_bytes", board.stack_used_bytes},
+                             {"flash_operations", board.flash_operations},
+                             {"serial_overruns", board.serial_overruns},
+                             {"missed_deadlines", board.missed_deadlines},
+                             {"fault", board.last_fault},
+                             {"locked_up", board.locked_up}};
+  for (const Image& image : report.images) {
+    nlohmann::json one = {{"file", image.file}, {"flash_bytes", image.flash_bytes}};
+    if (image.static_ram_bytes) one["static_ram_bytes"] = *image.static_ram_bytes;
+    document["images"].push_back(one);
+  }
+  document["interrupts"] = nlohmann::json::array();
+  for (const InterruptStatistics& interrupt : board.interrupts) {
+    document["interrupts"].push_back({{"name", interrupt_name(interrupt.irq)},
+                                      {"count", interrupt.count},
+                                      {"worst_instructions", interrupt.worst_instructions},
+                                      {"worst_latency_cycles", interrupt.worst_latency_cycles}});
+  }
+  document["resets"] = nlohmann::json::array();
+  for (const BoardReset& reset : board.resets) {
+    document["resets"].push_back({{"time_ns", reset.time_ns}, {"cause", reset.cause}});
+  }
+  document["notes"] = nlohmann::json::array();
+  for (const auto& [text, note] : board.notes) {
+    document["notes"].push_back({{"text", text}, {"first_ns", note.first_ns}, {"count", note.count}});
+  }
+  return document;
+}
+
+std::string to_text(const BoardReport& report) {
+  const BoardStatistics& board = report.board;
+  std::string text =
+      fmt::format("{:.3f} s on the board in {:.3f} s ({:.1f} times real time), core at {:.0f} MHz\n",
+                  board_s(report), report.wall_s, times_real_time(report), board.core_Hz * 1e-6) +
+      fmt::format("{} instructions, {} steps, {} triggers, {} flash operations\n", board.instructions,
+                  report.steps, report.triggers, board.flash_operations);
+  for (const Image& image : report.images) {
+    text += fmt::format("{}: {} bytes of flash", image.file, image.flash_bytes);
+    if (image.static_ram_bytes) text += fmt::format(", {} bytes of static RAM", *image.static_ram_bytes);
+    text += '\n';
+  }
+  text += fmt::format("deepest stack {} bytes below 0x{:08x}; serial overruns {}; missed deadlines {}\n",
+                      board.stack_used_bytes, board.stack_top, board.serial_overruns, board.missed_deadlines);
+  for (const InterruptStatistics& interrupt : board.interrupts) {
+    text += fmt::format("{:<12} {:>9} times, at worst {:>5} instructions, {:>5} cycles after it was due\n",
+                        interrupt_name(interrupt.irq), interrupt.count, interrupt.worst_instructions,
+                        interrupt.worst_latency_cycles);
+  }
+  for (const BoardReset& reset : board.resets) {
+    text += fmt::format("reset by {} at {:.6f} s\n", reset.cause, static_cast<double>(reset.time_ns) * 1e-9);
+  }
+  for (const auto& [note, seen] : board.notes) {
+    text += fmt::format("note: {} ({} times, first at {:.6f} s)\n", note, seen.count,
+                        static_cast<double>(seen.first_ns) * 1e-9);
+  }
+  if (board.locked_up) text += "the core has locked up: only a reset helps\n";
+  return text;
+}
+
+}  // namespace diastole

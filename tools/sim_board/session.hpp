@@ -1,0 +1,36 @@
+#pragma once
+// One run of program sim_board: the board behind a pseudo-terminal, a pin trace, injected inputs, a flash
+// that is kept in a file, power cuts.
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tools/sim_board/report.hpp"
+
+namespace diastole {
+
+struct LimitAt {
+  double time_s = 0;
+  bool far = false;
+};
+/// "2.5:home" or "2.5:far"; throws InputError for anything else.
+LimitAt parse_limit(const std::string& text);
+
+struct SessionOptions {
+  std::vector<std::string> images;
+  std::string link, pins, flash;
+  bool real_time = false;
+  std::optional<double> seconds;
+  std::vector<double> estop_at_s;
+  std::vector<std::string> limit_at;
+  std::optional<uint64_t> power_cut;
+  uint32_t crystal_Hz = 8'000'000;
+};
+
+/// Runs until the time is over or `stop` (a descriptor) becomes readable. Prints one JSON line with the
+/// serial port's path when a link was asked for. Throws InputError and HardwareError.
+BoardReport run_session(const SessionOptions& options, int stop);
+
+}  // namespace diastole
