@@ -10,6 +10,7 @@
 #include "protocol/contract/command.hpp"
 #include "protocol/contract/exit_code.hpp"
 #include "protocol/contract/input_error.hpp"
+#include "tools/diastole/simulate/simulate.hpp"
 
 namespace {
 
@@ -35,6 +36,7 @@ diastole::ExitCode run(int argc, char** argv) {
       "fault.");
   diastole::CommandLine line(app);
   diastole::add_host_commands(line);
+  diastole::add_simulate(line);
   diastole::add_estimator_commands(line);
   try {
     app.parse(argc, argv);

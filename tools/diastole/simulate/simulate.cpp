@@ -1,0 +1,161 @@
+#include "tools/diastole/simulate/simulate.hpp"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <csignal>
+#include <filesystem>
+#include <iostream>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "host/cli/session_view.hpp"
+#include "host/config/experiment.hpp"
+#include "host/daemon/run_session.hpp"
+#include "protocol/contract/input_error.hpp"
+#include "tools/diastole/simulate/simulated_rig.hpp"
+
+namespace diastole {
+namespace {
+
+namespace fs = std::filesystem;
+
+volatile std::sig_atomic_t stops = 0;
+
+struct SimulateOptions {
+  SessionOptions session;
+  SimulatedRigOptions rig;
+};
+
+struct SimulatedSession {
+  SessionResult result;
+  double simulated_s = 0;
+  double wall_s = 0;
+};
+
+/// The pin trace appears under its own name only when it is complete.
+class PendingFile {
+ public:
+  PendingFile(std::string name, bool force) : name_(std::move(name)) {
+    if (!name_.empty() && fs::exists(name_) && !force) {
+      throw InputError({name_, "", "exists already", "Choose another name, or --force to replace it."});
+    }
+  }
+  ~PendingFile() {
+    std::error_code ignored;
+    if (!name_.empty()) fs::remove(path(), ignored);
+  }
+  PendingFile(const PendingFile&) = delete;
+  PendingFile& operator=(const PendingFile&) = delete;
+
+  [[nodiscard]] std::string path() const {
+    return name_.empty() ? "" : fmt::format("{}.{}.part", name_, ::getpid());
+  }
+  void complete() const {
+    if (!name_.empty()) fs::rename(path(), name_);
+  }
+
+ private:
+  std::string name_;
+};
+
+/// While it lives, Ctrl-C stops the session at the cycle's end, a second one or SIGTERM stops it now.
+class StopSignals {
+ public:
+  StopSignals() {
+    stops = 0;
+    std::signal(SIGINT, [](int) { stops = stops + 1; });
+    for (const int number : {SIGTERM, SIGHUP})
+      std::signal(number, [](int) { stops = 2; });
+  }
+  ~StopSignals() {
+    for (const int number : {SIGINT, SIGTERM, SIGHUP})
+      std::signal(number, SIG_DFL);
+  }
+  StopSignals(const StopSignals&) = delete;
+  StopSignals& operator=(const StopSignals&) = delete;
+};
+
+/// Homes the pump and runs the session; when no run file can be delivered the journal stays in `directory`.
+SessionResult run_in(PrivateDirectory& directory, const SimulatedRig& rig, const SessionOptions& options) {
+  DaemonClient daemon(rig.socket());
+  daemon.call("rig.home");
+  try {
+    return run_session(daemon, options);
+  } catch (const HardwareError&) {
+    if (fs::exists(directory / "journals") && !fs::is_empty(directory / "journals")) {
+      directory.keep();
+      fmt::print(stderr, "What was recorded stays in {}\n", directory.path().string());
+    }
+    throw;
+  }
+}
+
+SimulatedSession simulate(SimulateOptions options) {
+  const auto started = std::chrono::steady_clock::now();
+  const Experiment experiment = read_experiment(options.session.experiment);
+  const PendingFile pins(options.rig.pins, options.session.force);
+  options.rig.pins = pins.path();
+  const StopSignals signals;
+  SessionView view(isatty(STDERR_FILENO) != 0);
+  options.session.stops_asked = [] { return static_cast<int>(stops); };
+  options.session.progress = [&view](const SessionProgress& progress) { view.show(progress); };
+
+  PrivateDirectory directory;
+  SimulatedRig rig(directory, options.rig);
+  SimulatedSession session{run_in(directory, rig, options.session), 0, 0};
+  view.finish();
+  rig.stop();
+  pins.complete();
+  session.simulated_s = static_cast<double>(session.result.expected) / experiment.sample_rate_Hz;
+  session.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - started).count();
+  return session;
+}
+
+ExitCode report(const SimulatedSession& session, bool json) {
+  const SessionResult& result = session.result;
+  if (!json) {
+    const ExitCode code = report_session(result, false);
+    fmt::print("{:.1f} s simulated in {:.2f} s\n", session.simulated_s, session.wall_s);
+    return code;
+  }
+  const nlohmann::json document{{"run", result.run},
+                                {"end", result.end},
+                                {"cycles", result.cycles},
+                                {"triggers", result.triggers},
+                                {"samples", result.samples},
+                                {"gaps", result.gaps},
+                                {"expected", result.expected},
+                                {"simulated_seconds", session.simulated_s},
+                                {"wall_seconds", session.wall_s}};
+  std::cout << document.dump(2) << '\n';
+  return exit_code_of(result);
+}
+
+}  // namespace
+
+void add_simulate(CommandLine& line) {
+  auto options = std::make_shared<SimulateOptions>();
+  options->session.poll_ms = 20;
+  CLI::App* command = line.add(
+      "simulate", "a whole session without hardware: simulated rig, real daemon, as fast as it goes",
+      "  diastole simulate examples/gel.experiment.toml -o gel.run.h5\n"
+      "      the paper's gel phantom in the built-in rig\n"
+      "  diastole simulate gel.experiment.toml -o gel.run.h5 --pins gel.pins.csv --seed 7\n"
+      "      also every edge of the controller's pins; other sensor noise\n"
+      "  diastole simulate gel.experiment.toml -o soft.run.h5 --config soft.rig.toml\n"
+      "      another rig; its table [simulation] holds the gel's stiffness C1_kPa, noise and more\n"
+      "The same seed gives the same run. Ctrl-C once stops at the end of the cycle, twice at once; what\n"
+      "was recorded is kept. Exit code 1: samples are missing; 3: a fault ended the run.");
+  command->add_option("EXPERIMENT", options->session.experiment, "experiment file (.toml)")->required();
+  command->add_option("-o,--output", options->session.output, "run file to write")->required();
+  command->add_option("--pins", options->rig.pins, "pin trace to write: time_ns,signal,value");
+  command->add_option("--seed", options->rig.seed, "of the sensors' noise")->capture_default_str();
+  command->add_option("--config", options->rig.config, "rig file, instead of the built-in one");
+  command->add_flag("--real-time", options->rig.real_time, "as slow as the real thing");
+  command->add_flag("--force", options->session.force, "replace files that exist");
+  line.on_run(command, [options](const CommandOutput& out) { return report(simulate(*options), out.json); });
+}
+
+}  // namespace diastole
