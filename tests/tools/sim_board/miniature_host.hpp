@@ -1,0 +1,66 @@
+#pragma once
+// A host in miniature: speaks the real protocol with whatever stands behind sim_rig::SimulatedController, in
+// that controller's time, and keeps the pin edges. The same session can so be held with the firmware built
+// for this machine and with its image on the emulated board.
+
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "protocol/wire/messages.hpp"
+#include "protocol/wire/reliable_link.hpp"
+#include "tools/sim_rig/simulated_controller.hpp"
+
+namespace diastole::sim_board_test {
+
+class MiniatureHost {
+ public:
+  static constexpr uint32_t lease = 0x5ea5e;
+
+  explicit MiniatureHost(sim_rig::SimulatedController& controller) : controller_(controller) {}
+
+  /// Opens a session and says hello; false when nobody answers within 5 s.
+  bool connect();
+  /// connect, configure, home; true when homed.
+  bool prepare();
+  /// Sends a request and waits for its Ack (true) or anything else (false).
+  template <class Request>
+  bool ask(Request request) {
+    request.request_id = ++last_request_;
+    acknowledged_.reset();
+    std::array<uint8_t, wire::kMaxPayloadBytes> payload{};
+    if (!link_.send(Request::kType, wire::encode(request, payload))) return false;
+    run_until([&] { return acknowledged_.has_value(); }, 3'000'000'000);
+    return acknowledged_.value_or(false);
+  }
+  /// Arms and starts what was added; true when the run ended by itself within `most_ns`.
+  bool run_program(uint64_t most_ns, wire::Arm arm = wire::Arm::example());
+
+  void run_for(uint64_t time_ns);
+  bool run_until(const std::function<bool()>& done, uint64_t most_ns);
+
+  [[nodiscard]] uint64_t now_ns() const { return now_ns_; }
+
+  std::optional<wire::Hello> hello;
+  wire::State state = wire::State::unhomed;
+  wire::Fault fault = wire::Fault::none;
+  std::optional<wire::RunEnded> ended;
+  std::vector<sim_rig::PinEdge> edges;
+  uint32_t triggers_heard = 0;
+  uint64_t slice_ns = 1'000'000;
+
+ private:
+  void turn();
+  void hear(const wire::Received& received);
+
+  sim_rig::SimulatedController& controller_;
+  wire::ReliableLink link_{wire::ReliableLink::Role::host};
+  std::optional<bool> acknowledged_;
+  uint64_t now_ns_ = 0, next_heartbeat_ns_ = 0;
+  uint16_t last_request_ = 0;
+};
+
+}  // namespace diastole::sim_board_test
