@@ -1,0 +1,151 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "estimator/cli/commands.hpp"
+#include "protocol/contract/input_error.hpp"
+
+namespace diastole {
+namespace {
+
+constexpr const char* gel_study = R"(format = "diastole-study"
+version = 1
+[specimen]
+kind = "annulus"
+inner_radius_mm = 22.5
+outer_radius_mm = 50.0
+height_mm = 85.0
+mesh = [8, 4, 1]
+ends = "fixed"
+[law]
+name = "neo-hookean"
+[law.parameters.C1_kPa]
+start = 6.5
+bounds = [1.0, 15.0]
+vary = "whole"
+[data]
+)";
+
+struct Outcome {
+  ExitCode code;
+  std::string output;
+};
+
+class SolveCommand : public testing::Test {
+ protected:
+  SolveCommand() {
+    const testing::TestInfo* test = testing::UnitTest::GetInstance()->current_test_info();
+    study_ = std::filesystem::temp_directory_path() /
+             (std::string("diastole-") + test->name() + '-' + std::to_string(::getpid()) + ".study.toml");
+    write_study(gel_study);
+  }
+  ~SolveCommand() override { std::filesystem::remove(study_); }
+
+  void write_study(const std::string& text) const { std::ofstream(study_) << text; }
+
+  Outcome run(std::vector<std::string> arguments) const {
+    CLI::App app("test", "diastole");
+    CommandLine line(app);
+    add_solve(line);
+    arguments.insert(arguments.begin(), {"solve", study_.string()});
+    std::reverse(arguments.begin(), arguments.end());
+    app.parse(arguments);
+    testing::internal::CaptureStdout();
+    Outcome outcome{};
+    try {
+      outcome.code = line.run();
+    } catch (...) {
+      testing::internal::GetCapturedStdout();
+      throw;
+    }
+    outcome.output = testing::internal::GetCapturedStdout();
+    return outcome;
+  }
+
+  std::string refusal(const std::vector<std::string>& arguments) const {
+    try {
+      run(arguments);
+    } catch (const InputError& error) {
+      return error.what();
+    }
+    return "no InputError";
+  }
+
+  std::filesystem::path study_;
+};
+
+TEST_F(SolveCommand, JsonHoldsWhatTheContractSays) {
+  const Outcome outcome = run({"--pressure-kPa", "6", "--probe", "22.5,0,0", "--probe", "-50,0,0", "--json"});
+  EXPECT_EQ(outcome.code, ExitCode::done);
+  const nlohmann::json json = nlohmann::json::parse(outcome.output);
+  EXPECT_NEAR(json["cavity_volume_change_mL"].get<double>(), 78.351, 0.5);
+  EXPECT_EQ(json["dofs"], 1792);
+  EXPECT_GE(json["newton_iterations"].get<int>(), 1);
+  EXPECT_GT(json["seconds"].get<double>(), 0.0);
+  EXPECT_EQ(json["reason"], "converged");
+  EXPECT_EQ(json["negative_pivots"], json["pressure_unknowns"]);
+  EXPECT_EQ(json["mesh"], nlohmann::json({8, 4, 1}));
+  ASSERT_EQ(json["probes"].size(), 2U);
+  EXPECT_NEAR(json["probes"][0]["displacement_mm"][0].get<double>(), 8.0557, 0.08);
+  EXPECT_NEAR(json["probes"][1]["displacement_mm"][0].get<double>(), -4.2197, 0.04);
+}
+
+TEST_F(SolveCommand, SetAndMeshReplaceTheStudys) {
+  const nlohmann::json json = nlohmann::json::parse(
+      run({"--pressure-kPa", "3.1", "--set", "C1_kPa=8.8", "--mesh", "6,2,1", "--json"}).output);
+  EXPECT_EQ(json["parameters"]["C1_kPa"], 8.8);
+  EXPECT_EQ(json["mesh"], nlohmann::json({6, 2, 1}));
+  EXPECT_LT(json["cavity_volume_change_mL"].get<double>(), 30.0);
+}
+
+TEST_F(SolveCommand, TellsAPersonInWords) {
+  const Outcome outcome = run({"--pressure-kPa", "2", "--probe", "30,0,0"});
+  EXPECT_EQ(outcome.code, ExitCode::done);
+  EXPECT_THAT(outcome.output, testing::HasSubstr("At 2 kPa the cavity has taken"));
+  EXPECT_THAT(outcome.output, testing::HasSubstr("X = (30, 0, 0) mm moved by ("));
+}
+
+TEST_F(SolveCommand, NoEquilibriumIsANegativeAnswerWithAReason) {
+  testing::internal::CaptureStderr();
+  const Outcome outcome = run({"--pressure-kPa", "100", "--mesh", "6,2,1", "--json"});
+  const std::string message = testing::internal::GetCapturedStderr();
+  EXPECT_EQ(outcome.code, ExitCode::negative);
+  EXPECT_NE(nlohmann::json::parse(outcome.output)["reason"], "converged");
+  EXPECT_THAT(message, testing::HasSubstr("was reached"));
+}
+
+TEST_F(SolveCommand, RefusesBadProbesWithARemedy) {
+  EXPECT_THAT(refusal({"--pressure-kPa", "2", "--probe", "22.5,0"}),
+              testing::HasSubstr("is not three numbers"));
+  EXPECT_THAT(refusal({"--pressure-kPa", "2", "--probe", "1,2,nan"}),
+              testing::HasSubstr("is not three numbers"));
+  EXPECT_THAT(refusal({"--pressure-kPa", "2", "--probe", "1,2,3"}),
+              testing::HasSubstr("outside the undeformed specimen"));
+}
+
+TEST_F(SolveCommand, RefusesBadPressureStartAndMesh) {
+  EXPECT_THAT(refusal({"--pressure-kPa", "nan"}), testing::HasSubstr("not a finite pressure"));
+  EXPECT_THAT(refusal({"--pressure-kPa", "2", "--set", "C2_kPa=1"}), testing::HasSubstr("C2_kPa"));
+  EXPECT_THAT(refusal({"--pressure-kPa", "2", "--mesh", "2,1,1"}), testing::HasSubstr("--mesh"));
+}
+
+TEST_F(SolveCommand, RefusesUnknownLawsAndParametersWithTheNearestName) {
+  std::string text = gel_study;
+  text.replace(text.find("neo-hookean"), 11, "neo-hookian");
+  write_study(text);
+  EXPECT_THAT(refusal({"--pressure-kPa", "2"}), testing::HasSubstr("Did you mean \"neo-hookean\"?"));
+  text = gel_study;
+  text.replace(text.find("C1_kPa"), 6, "C2_kPa");
+  write_study(text);
+  EXPECT_THAT(refusal({"--pressure-kPa", "2"}), testing::HasSubstr("Did you mean C1_kPa?"));
+}
+
+}  // namespace
+}  // namespace diastole
