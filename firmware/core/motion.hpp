@@ -68,6 +68,8 @@ class Motion {
   /// What the input interrupt has to watch for.
   enum class Watch : std::uint8_t { rest, run, seek_home, leave_home, clearance };
 
+  /// An interrupt has cut the motion off and the main loop has not latched the fault yet.
+  [[nodiscard]] bool fault_pending() const { return tripped_ != wire::Fault::none; }
   void become(wire::State to);
   void latch(wire::Fault fault);
   void trip(wire::Fault fault);
