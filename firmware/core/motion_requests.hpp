@@ -63,7 +63,8 @@ wire::Refusal Motion<B>::home(std::uint32_t lease_id) {
 
 template <Board B>
 wire::Refusal Motion<B>::start(std::uint32_t lease_id) {
-  if (safety_.state() != wire::State::armed || fault_pending()) return wire::Refusal::wrong_state;
+  if (safety_.state() != wire::State::armed || fault_pending() || run_end_due_)
+    return wire::Refusal::wrong_state;
   if (board_.inputs().estop) return wire::Refusal::estop_pressed;
   if (board_.inputs().far_limit) return wire::Refusal::limit_switch_closed;
   if (!lease_.bind(lease_id, board_.now(), silence_allowed_)) return wire::Refusal::no_lease;
