@@ -180,13 +180,12 @@ void add_correlation(Page& page, const FitRecord& fit) {
 void add_fit(Page& page, const FitRecord& fit) {
   for (const FittedParameter& parameter : fit.parameters) {
     const auto [name, unit] = name_and_unit(parameter.name);
-    page.headline(fmt::format("{} of the specimen ({})", name, fit.law),
+    page.headline(fmt::format("{}, {} law", name, fit.law),
                   fmt::format("{} {}", with_error(parameter.value, parameter.se), unit),
                   interval_words(parameter));
   }
-  page.headline(
-      "Fit", fmt::format("{} mm RMS", number(fit.rms_mm, 3)),
-      fmt::format("{} {}, chi²/dof {}", fit.residuals_used, "residuals", number(fit.chi2_per_dof, 3)));
+  page.headline("Residual motion", fmt::format("{} mm RMS", number(fit.rms_mm, 3)),
+                fmt::format("{} residuals; chi²/dof {}", fit.residuals_used, number(fit.chi2_per_dof, 3)));
 
   page.section("The stiffness",
                fmt::format("Study {}: {} law, fitted to {} in {} loaded frames on a mesh of {} elements.",
