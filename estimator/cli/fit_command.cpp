@@ -96,7 +96,8 @@ void add_fit(CommandLine& line) {
                "  diastole fit examples/phantom-a.study.toml -o fit.json\n"
                "  diastole fit examples/phantom-a.study.toml --set C1_kPa=12 --mesh 8,8,2 --json");
   command->add_option("STUDY", arguments->study, "study file")->required();
-  command->add_option("--set", arguments->starts, "another start value, NAME=NUMBER (may be repeated)");
+  command->add_option("--set", arguments->starts, "another start value, NAME=NUMBER (may be repeated)")
+      ->allow_extra_args(false);
   command->add_option("--mesh", arguments->mesh,
                       "other element counts: circumferential,longitudinal,transmural");
   command->add_option("-o,--output", arguments->output,

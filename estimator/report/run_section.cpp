@@ -224,11 +224,11 @@ void add_run(Page& page, const RecordedRun& run, size_t frames) {
   for (const double value : cavity)
     peak_kPa = std::fmax(peak_kPa, value);
 
-  page.headline("Session", fmt::format("{} triggers", run.trigger_s.size()),
-                fmt::format("over {} s", number(duration_s, 3)));
+  page.headline(
+      "Session", fmt::format("{} triggers", run.trigger_s.size()),
+      fmt::format("over {} s; cavity pressure up to {} kPa", number(duration_s, 3), number(peak_kPa, 3)));
   page.headline("Samples", missing == 0 ? "none missing" : fmt::format("{} missing", missing),
                 fmt::format("of {}, {} a second", run.pressure.time_s.size(), number(rate_Hz, 3)));
-  page.headline("Peak cavity pressure", fmt::format("{} kPa", number(peak_kPa, 3)), "largest single sample");
 
   page.section("The session", fmt::format("Recorded {} by {}; run {} in {}.", run.started_utc, run.producer,
                                           run.run_id, std::filesystem::path(run.file).filename().string()));
