@@ -29,6 +29,7 @@ void configure_pins() {
   set_mode(gpio_a(), 4, kAnalog);
   set_alternate(gpio_b(), 10, 7);
   set_alternate(gpio_b(), 11, 7);
+  gpio_b().PUPDR.change(3U << 22, 1U << 22);  // RX idles high without a cable
   for (const unsigned pin : {0U, 1U, 2U}) {
     gpio_c().PUPDR.change(3U << (2 * pin), 1U << (2 * pin));
     set_mode(gpio_c(), pin, kInput);

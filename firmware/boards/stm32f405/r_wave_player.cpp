@@ -22,7 +22,8 @@ constexpr std::array<std::uint16_t, kRWaveSamples> kFollowing = [] {
 }();
 
 constexpr std::uint32_t kStreamEnable = 1U << 0;
-constexpr std::uint32_t kTriggerMode = 6U;  // SMS: started by the trigger
+constexpr std::uint32_t kStream5Flags = 0x3DU << 6;  // in HIFCR
+constexpr std::uint32_t kTriggerMode = 6U;           // SMS: started by the trigger
 
 }  // namespace
 
@@ -30,7 +31,7 @@ void RWavePlayer::start() {
   constexpr std::uint32_t kEnable = 1U << 0, kTriggerEnable = 1U << 2, kFromTim4 = 5U << 3,
                           kDmaEnable = 1U << 12;
   dac().DHR12R1.write(0);
-  dac().CR.write(kEnable | kTriggerEnable | kFromTim4 | kDmaEnable);
+  dac().CR.write(kEnable | kBufferOff | kTriggerEnable | kFromTim4 | kDmaEnable);
   tim4().PSC.write(0);
   tim4().ARR.write(static_cast<std::uint32_t>(kRWaveSamplePeriod.count - 1));
   tim4().CR2.write(2U << 4);   // TRGO = update
@@ -45,7 +46,7 @@ void RWavePlayer::arm() {
   stream.CR.write(0);
   while ((stream.CR.read() & kStreamEnable) != 0) {
   }
-  dma1().HIFCR.write(0x3FU << 6);
+  dma1().HIFCR.write(kStream5Flags);
   stream.PAR.write(reinterpret_cast<std::uintptr_t>(&dac().DHR12R1));
   stream.M0AR.write(reinterpret_cast<std::uintptr_t>(kFollowing.data()));
   stream.NDTR.write(kFollowing.size());
@@ -59,7 +60,7 @@ void RWavePlayer::arm() {
 void RWavePlayer::disarm() { tim4().SMCR.change(7U, 0); }
 
 void RWavePlayer::interrupt() {
-  dma1().HIFCR.write(0x3FU << 6);
+  dma1().HIFCR.write(kStream5Flags);
   tim4().SMCR.change(7U, 0);
   tim4().CR1.write(0);
 }
