@@ -17,7 +17,8 @@ constexpr double ns_per_s = 1e9;
 constexpr uint64_t block_span_ns = 100'000'000;
 constexpr uint64_t instrument_clock_interval_ns = 500'000'000;
 constexpr double start_patience_s = 2;  // for RunStarted
-constexpr double end_patience_s = 10;   // for RunEnded, beyond the plan
+constexpr uint64_t tail_ns = 250'000'000;
+constexpr double end_patience_s = 10;  // for RunEnded, beyond the plan
 
 }  // namespace
 
@@ -190,7 +191,7 @@ void Acquisition::take(const ControllerEvent& event) {
                      fmt::format("the controller raised {} triggers, {} were reported", e.triggers,
                                  outcome_.counts.triggers));
             }
-            end(std::string(wire::run_end_name(e.reason)));
+            end_after_tail(std::string(wire::run_end_name(e.reason)));
           },
           [&](const wire::FaultRaised& e) {
             remark("error", std::string(wire::fault_name(e.fault)),
@@ -230,11 +231,20 @@ void Acquisition::write(RecordKind kind, const auto& payload) {
 }
 
 void Acquisition::end(std::string how) {
-  if (!ended_ || how == "journal_failed") outcome_.end = std::move(how);
+  if (outcome_.end.empty() || how == "journal_failed") outcome_.end = std::move(how);
   ended_ = true;
 }
 
+void Acquisition::end_after_tail(std::string how) {
+  outcome_.end = std::move(how);
+  tail_until_ns_ = clock_.now_ns() + tail_ns;
+}
+
 void Acquisition::check_deadline() {
+  if (tail_until_ns_) {
+    ended_ = ended_ || clock_.now_ns() >= *tail_until_ns_;
+    return;
+  }
   if (ended_ || clock_.now_ns() < deadline_ns_) return;
   remark("error", "overdue", started_ ? "the run did not end when it should have" : "the run did not start");
   controller_.stop_now();

@@ -1,6 +1,7 @@
 #pragma once
 // One run: polls the instrument at the sample rate, takes in the controller's events, and writes both to the
-// journal, until the controller says that the run has ended.
+// journal, until the controller says that the run has ended, and a quarter of a second more: the last cycle,
+// which counts from its trigger, ends a little after the last step.
 //
 // Samples lie on a grid: sample k is due at first_due + k / rate. Each index is either received or declared
 // missing, and the declaration tells why:
@@ -83,6 +84,7 @@ class Acquisition {
               std::optional<uint64_t> tick = {});
   void write(RecordKind kind, const auto& payload);
   void end(std::string how);
+  void end_after_tail(std::string how);
   void check_deadline();
   [[nodiscard]] uint64_t due_ns(uint64_t index) const;
 
@@ -108,6 +110,7 @@ class Acquisition {
   StopRequest obeyed_ = StopRequest::none;
   bool started_ = false;
   bool ended_ = false;
+  std::optional<uint64_t> tail_until_ns_;
   RunOutcome outcome_;
 };
 

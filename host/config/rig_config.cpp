@@ -133,6 +133,7 @@ RigConfig read_rig(TableReader root) {
   read_geometry(root.table("rig"), config);
   config.daq = read_daq(root.table("daq"));
   config.daemon = read_daemon(root.table_if("daemon"));
+  (void)root.has("simulation");  // concerns the simulated rig only, which checks it
   root.finish();
   return config;
 }

@@ -194,6 +194,9 @@ ProgramPlan ControllerClient::load(const Experiment& experiment) {
   if (answer.nak) {
     fail(std::string(wire::refusal_explanation(answer.nak->refusal)), remedy_for(answer.nak->refusal));
   }
+  const uint64_t end_ns = clock_.now_ns() + answer_patience_ns;
+  while (plan_.size() < experiment.segments.size() && line_ != nullptr && clock_.now_ns() < end_ns)
+    turn();
   return plan_;
 }
 
@@ -214,7 +217,7 @@ void ControllerClient::stop_now() { post(wire::StopNow{}); }
 std::vector<ControllerEvent> ControllerClient::take_events() { return std::exchange(events_, {}); }
 
 uint64_t ControllerClient::next_due_ns() const {
-  if (line_ == nullptr) return UINT64_MAX;
+  if (!connected()) return UINT64_MAX;
   const uint64_t due_ns = std::min(next_heartbeat_ns_, next_time_question_ns_);
   return time_asked_ns_ != 0 ? std::min(due_ns, clock_.now_ns() + fine_step_ns) : due_ns;
 }
@@ -231,7 +234,7 @@ void ControllerClient::service() {
 void ControllerClient::turn() {
   service();
   if (line_ == nullptr) return;
-  clock_.sleep_until_ns(std::min(clock_.now_ns() + fine_step_ns, next_due_ns()), line_.get());
+  clock_.sleep_until_ns(clock_.now_ns() + fine_step_ns, line_.get());
   service();
 }
 

@@ -23,6 +23,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cerrno>
 #include <charconv>
 
@@ -74,7 +75,7 @@ uint32_t pair_at(const uint16_t* registers) {
 double volts_of(const Input& input, const uint16_t* registers) {
   switch (input.coding) {
     case Coding::float32:
-      return static_cast<double>(modbus_get_float_abcd(registers));
+      return static_cast<double>(std::bit_cast<float>(pair_at(registers)));
     case Coding::uint16:
       return input.V_per_count * registers[0];
     case Coding::int16:

@@ -115,7 +115,7 @@ void declare(RecordedRun& run, std::string_view stream, int64_t index, const std
   run.gaps.push_back({std::string(stream), index, 1, reason});
 }
 
-void put_pressure(const JournalStory& story, const TimeAxis& axis, double end_s, AssembledRun& assembled) {
+void put_pressure(const JournalStory& story, const TimeAxis& axis, AssembledRun& assembled) {
   RecordedRun& run = assembled.run;
   const std::vector<std::string> names = story.begin.at("channels");
   const double spacing_s = 1 / story.begin.at("sample_rate_Hz").get<double>();
@@ -125,7 +125,7 @@ void put_pressure(const JournalStory& story, const TimeAxis& axis, double end_s,
     received.push_back(!std::isnan(t));
   fill_times(grid.time_s, spacing_s);
   const auto first = std::lower_bound(grid.time_s.begin(), grid.time_s.end(), 0.0) - grid.time_s.begin();
-  const auto last = std::upper_bound(grid.time_s.begin(), grid.time_s.end(), end_s) - grid.time_s.begin();
+  const auto last = std::ssize(grid.time_s);
   run.pressure.time_s.assign(grid.time_s.begin() + first, grid.time_s.begin() + last);
   for (size_t c = 0; c < names.size(); ++c) {
     run.pressure.channels[names[c] + "_kPa"].assign(grid.channels[c].begin() + first,
@@ -243,9 +243,7 @@ AssembledRun assemble_run(const JournalContents& journal) {
   put_triggers(story, axis, run);
   put_events(story, axis, run);
   put_clocks(story, axis, run);
-  const double end_s =
-      story.run_ended ? axis.of_tick(story.run_ended->at("tick")) : std::numeric_limits<double>::infinity();
-  put_pressure(story, axis, end_s, assembled);
+  put_pressure(story, axis, assembled);
   assembled.ended_in_order = story.closed && story.run_ended.has_value();
   if (!assembled.ended_in_order) {
     const double last_s = run.pressure.time_s.empty() ? 0 : run.pressure.time_s.back();

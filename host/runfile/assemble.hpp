@@ -2,8 +2,8 @@
 // A run from its journal: at the end of every run, and for `diastole recover` after a crash, by the same way.
 //
 // The time axis is the controller's clock, in seconds since the tick of RunStarted. Samples carry host times,
-// which the fitted clock map (clock_map.hpp) brings onto it. What lies before the start of run or after its
-// end is cut off. A missing sample keeps its row: its time lies evenly between its neighbours', its values
+// which the fitted clock map (clock_map.hpp) brings onto it. What was sampled before the start of run
+// is cut off. A missing sample keeps its row: its time lies evenly between its neighbours', its values
 // are NaN, and /gaps declares it; also samples whose record was damaged are declared so.
 
 #include <cstdint>

@@ -1,0 +1,169 @@
+#include "host/acquisition/acquisition.hpp"
+
+#include <gmock/gmock.h>
+
+#include <cmath>
+
+#include "protocol/runfile/frame_bins.hpp"
+#include "protocol/runfile/reader.hpp"
+#include "protocol/runfile/soundness.hpp"
+#include "tests/host/acquisition/session_on_desk.hpp"
+
+namespace diastole {
+namespace {
+
+using runfile::RecordedRun;
+
+/// What holds for every run, whatever went wrong: rows = received + missing, and each missing row is
+/// declared.
+void expect_books_balance(const AssembledRun& assembled) {
+  const RecordedRun& run = assembled.run;
+  EXPECT_NO_THROW(runfile::check(run));
+  EXPECT_EQ(run.pressure.time_s.size(), assembled.samples_received + assembled.samples_missing);
+  EXPECT_EQ(run.missing("pressure"), static_cast<int64_t>(assembled.samples_missing));
+  const auto& cavity = run.pressure.channels.at("cavity_kPa");
+  const auto nans = std::count_if(cavity.begin(), cavity.end(), [](double p) { return std::isnan(p); });
+  EXPECT_EQ(nans, static_cast<int64_t>(assembled.samples_missing));
+}
+
+TEST(Acquisition, ASoundSessionMissesNothing) {
+  SessionOnDesk session(short_session);
+  session.run();
+  EXPECT_EQ(session.outcome.end, "completed");
+  EXPECT_EQ(session.outcome.cycles, 2U);
+  const AssembledRun assembled = session.assemble();
+  expect_books_balance(assembled);
+  EXPECT_TRUE(assembled.ended_in_order);
+  EXPECT_EQ(assembled.samples_missing, 0U);
+  const RecordedRun& run = assembled.run;
+  const runfile::Soundness soundness = runfile::assess(run);
+  EXPECT_THAT(soundness.problems, testing::IsEmpty());
+  // 0.1 s of rest, two cycles of 0.8 s and 0.25 s after the last step, at 300 Hz.
+  EXPECT_NEAR(static_cast<double>(run.pressure.time_s.size()), 585, 5);
+  ASSERT_EQ(run.trigger_s.size(), 2U);
+  // The trigger rises with the first step, which a parabola from rest makes 5.6 ms into the cycle.
+  EXPECT_NEAR(run.trigger_s[0], 0.1056, 1e-4);
+  EXPECT_NEAR(run.trigger_s[1] - run.trigger_s[0], 0.8, 1e-6);
+  EXPECT_NEAR(run.segments[0].start_s, 0.1, 1e-4);
+  EXPECT_THAT(runfile::bin_frames(run, {.frames = 8}).excluded, testing::IsEmpty());
+  EXPECT_GE(soundness.pump.rate_Hz, 299.9);
+  EXPECT_NEAR(*std::max_element(run.pump.commanded_mL.begin(), run.pump.commanded_mL.end()), 10, 0.02);
+  EXPECT_NEAR(run.pump.commanded_mL.back(), 0, 0.02);
+}
+
+TEST(Acquisition, PressureTimesAreOnTheControllersClock) {
+  SessionOnDesk session(short_session);
+  session.instrument.clock_error_ppm = 120;
+  session.run();
+  const RecordedRun run = session.assemble().run;
+  // The instrument reads 0.5 V + 0.1 V/s of desk time; kPa_per_V is 4: the pressure tells the true time.
+  const auto& cavity = run.pressure.channels.at("cavity_kPa");
+  const auto desk_s = [&](size_t row) { return (cavity[row] / 4 - 0.5) / 0.1; };
+  for (size_t row = 0; row < cavity.size(); row += 50) {
+    EXPECT_NEAR(run.pressure.time_s[row] - run.pressure.time_s[0], desk_s(row) - desk_s(0), 1e-4);
+  }
+  EXPECT_NEAR(run.clock.at("host_drift_ppm"), 0, 200);  // 1.7 s of pairs to 0.1 ms
+  EXPECT_NEAR(run.clock.at("daq_drift_ppm") - run.clock.at("host_drift_ppm"), 120, 5);
+}
+
+TEST(Acquisition, FailedReadingsAreCountedExactlyAndNeverInterpolated) {
+  SessionOnDesk session(short_session);
+  session.instrument.fault = [](uint64_t reading) {
+    return reading >= 100 && reading < 107 ? daq::Outcome{false, "no answer"} : daq::Outcome{};
+  };
+  session.run();
+  const AssembledRun assembled = session.assemble();
+  expect_books_balance(assembled);
+  EXPECT_EQ(assembled.samples_missing, 7U);
+  EXPECT_EQ(session.outcome.counts.missing, 7U);
+  ASSERT_EQ(assembled.run.gaps.size(), 1U);
+  EXPECT_EQ(assembled.run.gaps[0].count, 7);
+  EXPECT_EQ(assembled.run.gaps[0].reason, "no answer");
+  EXPECT_FALSE(runfile::assess(assembled.run).sound());
+}
+
+class Stall : public testing::TestWithParam<int> {};
+
+TEST_P(Stall, AnInstrumentThatStallsCostsThoseSamplesAndNoOthers) {
+  SessionOnDesk session(short_session);
+  const auto stall_ns = static_cast<uint64_t>(GetParam()) * 1'000'000;
+  session.instrument.delay_ns = [stall_ns](uint64_t reading) {
+    return reading == 200 ? stall_ns : uint64_t{0};
+  };
+  session.instrument.fault = [](uint64_t reading) {
+    return reading == 200 ? daq::Outcome{false, "no answer within 20 ms"} : daq::Outcome{};
+  };
+  session.run();
+  const AssembledRun assembled = session.assemble();
+  expect_books_balance(assembled);
+  // The reading itself, and every sample that came due while it hung.
+  const double due = 0.3 * GetParam();
+  EXPECT_NEAR(static_cast<double>(session.outcome.counts.missing), due, 1.01);
+  EXPECT_EQ(assembled.run.trigger_s.size(), 2U);
+}
+
+INSTANTIATE_TEST_SUITE_P(Acquisition, Stall, testing::Values(10, 57, 200, 450));
+
+TEST(Acquisition, StopAtCycleEndEndsWithAWholeCycle) {
+  SessionOnDesk session(short_session);
+  const uint64_t asked_at = 300;
+  session.run([&] {
+    return session.instrument.readings > asked_at - 200 ? StopRequest::at_cycle_end : StopRequest::none;
+  });
+  EXPECT_EQ(session.outcome.end, "stopped_at_cycle_end");
+  EXPECT_EQ(session.outcome.cycles, 1U);
+  const AssembledRun assembled = session.assemble();
+  expect_books_balance(assembled);
+  EXPECT_EQ(assembled.run.trigger_s.size(), 1U);
+  EXPECT_NEAR(assembled.run.pump.commanded_mL.back(), 0, 0.02);
+}
+
+TEST(Acquisition, StopNowKeepsWhatWasRecorded) {
+  SessionOnDesk session(short_session);
+  session.run([&] { return session.instrument.readings > 100 ? StopRequest::now : StopRequest::none; });
+  EXPECT_EQ(session.outcome.end, "stopped_now");
+  const AssembledRun assembled = session.assemble();
+  expect_books_balance(assembled);
+  EXPECT_GT(assembled.samples_received, 100U);
+}
+
+TEST(Acquisition, AnUnpluggedLineEndsTheRunAndSaysSo) {
+  SessionOnDesk session(short_session);
+  session.clock.each_turn = [&] {
+    if (session.instrument.readings > 200) session.desk.plugged = false;
+  };
+  session.run();
+  EXPECT_EQ(session.outcome.end, "link_lost");
+  EXPECT_FALSE(session.outcome.regular());
+  const AssembledRun assembled = session.assemble();
+  expect_books_balance(assembled);
+  EXPECT_FALSE(assembled.ended_in_order);
+  EXPECT_FALSE(runfile::assess(assembled.run).sound());
+}
+
+TEST(Acquisition, AnEmergencyStopIsToldInPlainWords) {
+  SessionOnDesk session(short_session);
+  session.clock.each_turn = [&] {
+    if (session.instrument.readings == 250) session.desk.controller->set_estop(true);
+  };
+  session.run();
+  EXPECT_EQ(session.outcome.end, "faulted");
+  ASSERT_FALSE(session.remarks.empty());
+  EXPECT_THAT(session.remarks[0].text, testing::HasSubstr("emergency stop"));
+  expect_books_balance(session.assemble());
+}
+
+TEST(Acquisition, TwoEqualSessionsWriteEqualJournals) {
+  const auto bytes = [] {
+    SessionOnDesk session(short_session);
+    session.run();
+    return session.assemble().run.pressure;
+  };
+  const runfile::PressureTrace first = bytes();
+  const runfile::PressureTrace second = bytes();
+  EXPECT_EQ(first.time_s, second.time_s);
+  EXPECT_EQ(first.channels, second.channels);
+}
+
+}  // namespace
+}  // namespace diastole

@@ -1,0 +1,80 @@
+#include <gmock/gmock.h>
+
+#include <fstream>
+#include <sstream>
+
+#include "host/config/experiment.hpp"
+#include "host/config/rig_config.hpp"
+#include "protocol/contract/input_error.hpp"
+#include "tests/host/bench/scratch.hpp"
+
+namespace diastole {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+
+std::string example(const std::string& name) {
+  std::ifstream stream(std::string(DIASTOLE_SOURCE_DIR) + "/examples/" + name);
+  std::stringstream text;
+  text << stream.rdbuf();
+  return text.str();
+}
+
+std::string changed(std::string text, const std::string& from, const std::string& to) {
+  const size_t at = text.find(from);
+  EXPECT_NE(at, std::string::npos) << from;
+  return text.replace(at, from.size(), to);
+}
+
+RigConfig rig_from(const std::string& text) { return read_rig(TableReader::from_text(text, "rig.toml")); }
+
+TEST(RigConfig, TheExampleGivesThePapersPump) {
+  const RigConfig rig = rig_from(example("rig.toml"));
+  EXPECT_NEAR(rig.microstep_mL, 7.7916e-3, 1e-6);
+  EXPECT_NEAR(rig.hose_inertance_kg_m4, 4.44e7, 1e5);
+  EXPECT_EQ(rig.daq.channels.at(0).name, "cavity");
+  EXPECT_EQ(std::get<int64_t>(rig.attributes.at("microsteps")), 8);
+}
+
+TEST(RigConfig, MistakesAreNamedWithTheirPlace) {
+  const std::string good = example("rig.toml");
+  const auto refusal = [](const std::string& text) {
+    return message_of<InputError>([&] { rig_from(text); });
+  };
+  EXPECT_THAT(refusal(changed(good, "hose_bore_mm", "hose_bor_mm")), HasSubstr("rig.hose_bore_mm"));
+  EXPECT_THAT(refusal(changed(good, "catheter_zeta", "catheter_zita")), HasSubstr("\"catheter_zeta\""));
+  EXPECT_THAT(refusal(changed(good, "\"modbus-tcp\"", "\"modbus-tpc\"")), HasSubstr("\"modbus-tcp\""));
+  EXPECT_THAT(refusal(changed(good, "\"cavity\"", "\"cavty\"")), HasSubstr("cavity"));
+  EXPECT_THAT(refusal(changed(good, "port = 502", "port = 70000")),
+              AllOf(HasSubstr("line"), HasSubstr("70000")));
+}
+
+TEST(Experiment, TheExampleIsThePapersSession) {
+  const Experiment gel = parse_experiment(example("gel.experiment.toml"), "gel.experiment.toml");
+  ASSERT_EQ(gel.segments.size(), 1U);
+  EXPECT_EQ(gel.segments[0].waveform, wire::Waveform::parabolic);
+  EXPECT_DOUBLE_EQ(gel.segments[0].stroke_mL, 40);
+  EXPECT_EQ(gel.cycles(), 10);
+  EXPECT_DOUBLE_EQ(gel.least_duration_s(), 13);
+}
+
+TEST(Experiment, WaveformsAreSpelledWithDashes) {
+  const std::string text = changed(example("gel.experiment.toml"), "\"parabolic\"", "\"reversed-sawtooth\"");
+  EXPECT_EQ(parse_experiment(text, "x").segments[0].waveform, wire::Waveform::reversed_sawtooth);
+}
+
+TEST(Experiment, MistakesAreNamedWithTheirPlace) {
+  const std::string good = example("gel.experiment.toml");
+  const auto refusal = [](const std::string& text) {
+    return message_of<InputError>([&] { parse_experiment(text, "gel.experiment.toml"); });
+  };
+  EXPECT_THAT(refusal(changed(good, "period_s = 1.2", "period_s = nan")),
+              AllOf(HasSubstr("segment[0].period_s"), HasSubstr("nan")));
+  EXPECT_THAT(refusal(changed(good, "cycles = 10", "cycles = 0")), HasSubstr("segment[0].cycles"));
+  EXPECT_THAT(refusal(changed(good, "stroke_mL", "stroke_ml")), HasSubstr("stroke_mL"));
+  EXPECT_THAT(refusal("format = \"diastole-experiment\"\nversion = 1\n"), HasSubstr("segment"));
+}
+
+}  // namespace
+}  // namespace diastole

@@ -1,0 +1,135 @@
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+
+#include <cmath>
+
+#include "host/daq/driver.hpp"
+#include "protocol/contract/input_error.hpp"
+#include "tests/host/bench/scratch.hpp"
+#include "tests/host/daq/modbus_server.hpp"
+
+namespace diastole::daq {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+
+OpenInstrument configured(const std::string& daq, const std::string& channels) {
+  TableReader root = TableReader::from_text("[daq]\n" + daq + channels, "rig.toml");
+  TableReader table = root.table("daq");
+  std::vector<TableReader> blocks = table.tables("channel");
+  OpenInstrument open = configure_modbus_tcp(table, blocks);
+  for (TableReader& block : blocks)
+    block.finish();
+  table.finish();
+  return open;
+}
+
+constexpr const char* two_inputs = "[[daq.channel]]\ninput = 0\n[[daq.channel]]\ninput = 3\n";
+
+std::string labjack(int port, int timeout_ms = 60) {
+  return fmt::format("host = \"127.0.0.1\"\nport = {}\npreset = \"labjack-t\"\ntimeout_ms = {}\n", port,
+                     timeout_ms);
+}
+
+TEST(ModbusTcp, ReadsAllChannelsInOneRequestAndTheTimer) {
+  const ModbusServer server;
+  const auto instrument = configured(labjack(server.port()), two_inputs)({});
+  ASSERT_EQ(instrument->channels(), 2U);
+  std::vector<double> volts(2);
+  ASSERT_TRUE(instrument->read(volts).ok);
+  EXPECT_NEAR(volts[0], 1, 1e-6);  // request 0 was the identity
+  EXPECT_NEAR(volts[1], 1.3, 1e-6);
+  EXPECT_EQ(instrument->read_timer(), 0x00010002U);
+  EXPECT_DOUBLE_EQ(instrument->timer_rate_Hz(), 40e6);
+}
+
+TEST(ModbusTcp, ADescribedRegisterMapIsScaled) {
+  const ModbusServer server;
+  const auto instrument =
+      configured(fmt::format("host = \"127.0.0.1\"\nport = {}\n", server.port()),
+                 "[[daq.channel]]\nregister = 100\ntype = \"uint16\"\nV_per_count = 0.001\n"
+                 "[[daq.channel]]\nregister = 101\ntype = \"int16\"\nV_per_count = 0.001\n")({});
+  std::vector<double> volts(2);
+  ASSERT_TRUE(instrument->read(volts).ok);
+  EXPECT_NEAR(volts[0], 1, 1e-9);
+  EXPECT_NEAR(volts[1], -1, 1e-9);
+  EXPECT_FALSE(instrument->read_timer());
+}
+
+TEST(ModbusTcp, ALateAnswerIsNeverTakenForTheNext) {
+  // Request 3 is answered after 150 ms, when the driver (60 ms of patience) has long given up.
+  const ModbusServer server([](int request) { return request == 3 ? 150 : 0; });
+  const auto instrument = configured(labjack(server.port()), two_inputs)({});
+  std::vector<double> volts(2);
+  int failed = 0;
+  double last = -1;
+  for (int i = 0; i < 12; ++i) {
+    const Outcome outcome = instrument->read(volts);
+    if (!outcome.ok) {
+      ++failed;
+      EXPECT_THAT(outcome.fault, HasSubstr("60 ms"));
+      continue;
+    }
+    EXPECT_GT(volts[0], last) << "an answer came twice or out of turn";
+    EXPECT_NE(volts[0], 3) << "the late answer was taken for a new one";
+    last = volts[0];
+  }
+  EXPECT_GE(failed, 1);
+  EXPECT_GT(last, 3);
+  EXPECT_GE(server.connections(), 2);
+}
+
+TEST(ModbusTcp, AStallAndAHangUpAreToldAndOvercome) {
+  using Mishap = ModbusServer::Mishap;
+  const ModbusServer server(
+      [](int) { return 0; },
+      [](int request) {
+        return request == 2 ? Mishap::stall : request == 4 ? Mishap::hang_up : Mishap::none;
+      });
+  const auto instrument = configured(labjack(server.port()), two_inputs)({});
+  std::vector<double> volts(2);
+  std::vector<bool> ok;
+  for (int i = 0; i < 5; ++i)
+    ok.push_back(instrument->read(volts).ok);
+  EXPECT_THAT(ok, testing::ElementsAre(true, false, true, false, true));
+}
+
+TEST(ModbusTcp, NobodyThereOrAnotherInstrumentIsAHardwareError) {
+  int dead_port = 0;
+  {
+    const ModbusServer server;
+    dead_port = server.port();
+  }
+  EXPECT_THAT(message_of<HardwareError>([&] { configured(labjack(dead_port), two_inputs)({}); }),
+              AllOf(HasSubstr(std::to_string(dead_port)), HasSubstr("does not connect")));
+}
+
+TEST(ModbusTcp, AnAddressGivenAtStartReplacesTheFiles) {
+  const ModbusServer server;
+  const auto open = configured(labjack(1), two_inputs);
+  const auto instrument = open({.address = fmt::format("127.0.0.1:{}", server.port())});
+  EXPECT_THAT(instrument->describe(), HasSubstr(std::to_string(server.port())));
+  EXPECT_THROW(open({.address = "nonsense"}), InputError);
+}
+
+/// Every driver of the list must refuse a [daq] table without a channel's own keys, by name.
+class EveryDriver : public testing::TestWithParam<Driver> {};
+
+TEST_P(EveryDriver, RefusesAnEmptyChannelWithPlaceAndRemedy) {
+  TableReader root = TableReader::from_text("[daq]\nhost = \"h\"\n[[daq.channel]]\n", "rig.toml");
+  TableReader table = root.table("daq");
+  std::vector<TableReader> blocks = table.tables("channel");
+  EXPECT_THAT(message_of<InputError>([&] { GetParam().configure(table, blocks); }),
+              AllOf(HasSubstr("rig.toml"), HasSubstr("is missing")));
+}
+
+TEST_P(EveryDriver, IsNamedInLowerCaseWithDashes) {
+  for (const char letter : GetParam().name)
+    EXPECT_TRUE(letter == '-' || (letter >= 'a' && letter <= 'z') || (letter >= '0' && letter <= '9'));
+}
+
+INSTANTIATE_TEST_SUITE_P(Daq, EveryDriver, testing::ValuesIn(drivers().begin(), drivers().end()));
+
+}  // namespace
+}  // namespace diastole::daq

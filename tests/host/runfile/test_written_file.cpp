@@ -1,0 +1,125 @@
+// What the writer leaves on the disk, read by ourselves, by h5py and by h5dump.
+
+#include <gmock/gmock.h>
+
+#include <cstdio>
+#include <fstream>
+
+#include "host/runfile/writer.hpp"
+#include "protocol/contract/input_error.hpp"
+#include "protocol/runfile/reader.hpp"
+#include "tests/host/acquisition/session_on_desk.hpp"
+
+namespace diastole {
+namespace {
+
+struct Output {
+  int status = 0;
+  std::string text;
+};
+
+Output output_of(const std::string& command) {
+  Output output;
+  FILE* pipe = ::popen((command + " 2>&1").c_str(), "r");
+  std::array<char, 4096> block{};
+  for (size_t count = 0; (count = std::fread(block.data(), 1, block.size(), pipe)) > 0;)
+    output.text.append(block.data(), count);
+  output.status = ::pclose(pipe);
+  return output;
+}
+
+/// One desk session with a gap of three samples, recorded once for all tests here.
+class WrittenFile : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    session_ = new SessionOnDesk(short_session);
+    session_->instrument.fault = [](uint64_t reading) {
+      return reading >= 100 && reading < 103 ? daq::Outcome{false, "no answer"} : daq::Outcome{};
+    };
+    session_->run();
+    write_run(file(), session_->assemble().run);
+  }
+  static void TearDownTestSuite() { delete std::exchange(session_, nullptr); }
+  static std::filesystem::path file() { return session_->scratch / "written.run.h5"; }
+  static inline SessionOnDesk* session_ = nullptr;
+};
+
+TEST_F(WrittenFile, ReadsBackAsItWasAssembled) {
+  const runfile::RecordedRun before = session_->assemble().run;
+  const runfile::RecordedRun after = runfile::read_run(file());
+  EXPECT_EQ(after.run_id, before.run_id);
+  EXPECT_EQ(after.rig, before.rig);
+  EXPECT_EQ(after.protocol_toml, session_->experiment.text);
+  EXPECT_EQ(after.pressure.time_s, before.pressure.time_s);
+  EXPECT_EQ(after.pump.commanded_mL, before.pump.commanded_mL);
+  EXPECT_EQ(after.trigger_s, before.trigger_s);
+  EXPECT_EQ(after.clock, before.clock);
+  EXPECT_EQ(after.missing("pressure"), 3);
+  EXPECT_EQ(after.events.size(), before.events.size());
+}
+
+TEST_F(WrittenFile, H5pyFindsTheContract) {
+  const std::string script = std::string(DIASTOLE_SOURCE_DIR) + "/tests/host/runfile/check_contract.py";
+  const Output output = output_of("/usr/bin/python3 " + script + " " + file().string());
+  if (output.text.find("No module named 'h5py'") != std::string::npos)
+    GTEST_SKIP() << "python3-h5py is absent";
+  EXPECT_EQ(output.status, 0) << output.text;
+}
+
+TEST_F(WrittenFile, H5dumpReadsIt) {
+  const Output output = output_of("h5dump -d /gaps " + file().string());
+  if (output.status != 0 && output.text.find("not found") != std::string::npos) GTEST_SKIP() << "no h5dump";
+  EXPECT_EQ(output.status, 0);
+  EXPECT_THAT(output.text, testing::HasSubstr("no answer"));
+}
+
+TEST_F(WrittenFile, AnUnsoundRunOrAnImpossiblePlaceLeavesNothingBehind) {
+  runfile::RecordedRun broken = session_->assemble().run;
+  broken.pressure.time_s[5] = broken.pressure.time_s[4];
+  EXPECT_THROW(write_run(session_->scratch / "broken.run.h5", broken), InputError);
+  EXPECT_THROW(write_run(session_->scratch / "no/such/dir.run.h5", session_->assemble().run), HardwareError);
+  for (const auto& entry : std::filesystem::directory_iterator(session_->scratch.path()))
+    EXPECT_THAT(entry.path().string(), testing::Not(testing::HasSubstr("part")));
+  EXPECT_FALSE(std::filesystem::exists(session_->scratch / "broken.run.h5"));
+}
+
+TEST_F(WrittenFile, AJournalCutAnywhereGivesASoundPrefixOrARefusal) {
+  std::ifstream stream(session_->journal, std::ios::binary);
+  const std::vector<char> chars{std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
+  const std::vector<uint8_t> bytes(chars.begin(), chars.end());
+  const size_t whole_rows = session_->assemble().run.pressure.time_s.size();
+  size_t recovered = 0;
+  size_t most_rows = 0;
+  for (size_t length = 0; length < bytes.size(); length += 61) {
+    try {
+      const AssembledRun assembled = assemble_run(parse_journal(std::span(bytes).first(length)));
+      EXPECT_NO_THROW(runfile::check(assembled.run)) << "cut at " << length;
+      EXPECT_FALSE(assembled.ended_in_order);
+      most_rows = std::max(most_rows, assembled.run.pressure.time_s.size());
+      ++recovered;
+    } catch (const InputError&) {
+      EXPECT_EQ(recovered, 0U) << "a longer journal gave less, at " << length;
+    }
+  }
+  EXPECT_GT(recovered, 50U);
+  EXPECT_GE(most_rows + 31, whole_rows);  // a block of samples spans 0.1 s
+}
+
+TEST_F(WrittenFile, ADamagedRecordBecomesAGapNeverAWrongRow) {
+  const JournalContents whole = read_journal(session_->journal);
+  JournalContents damaged = whole;
+  size_t lost_samples = 0;
+  for (auto record = damaged.records.begin(); record != damaged.records.end(); ++record) {
+    if (record->kind != RecordKind::samples || record->sequence < 60) continue;
+    lost_samples = decode_samples(record->payload)->host_ns.size();
+    damaged.records.erase(record);
+    break;
+  }
+  ASSERT_GT(lost_samples, 0U);
+  const AssembledRun assembled = assemble_run(damaged);
+  EXPECT_NO_THROW(runfile::check(assembled.run));
+  EXPECT_EQ(assembled.samples_missing, 3 + lost_samples);
+}
+
+}  // namespace
+}  // namespace diastole
