@@ -1,0 +1,95 @@
+#include <gmock/gmock.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "estimator/cli/commands.hpp"
+#include "tests/estimator/io/scratch_file.hpp"
+
+namespace diastole {
+namespace {
+
+using testing::HasSubstr;
+
+struct Outcome {
+  ExitCode code;
+  std::string output;
+};
+
+class FitAndReport : public testing::Test {
+ protected:
+  Outcome run(std::vector<std::string> arguments) const {
+    CLI::App app("test", "diastole");
+    CommandLine line(app);
+    add_estimator_commands(line);
+    std::reverse(arguments.begin(), arguments.end());
+    app.parse(arguments);
+    testing::internal::CaptureStdout();
+    Outcome outcome{};
+    try {
+      outcome.code = line.run();
+    } catch (...) {
+      testing::internal::GetCapturedStdout();
+      throw;
+    }
+    outcome.output = testing::internal::GetCapturedStdout();
+    return outcome;
+  }
+
+  std::string file(const char* name) const { return (folder_.path() / name).string(); }
+
+  // A coarse mesh: quick, and 1.3 % off.
+  std::vector<std::string> quick_fit(std::vector<std::string> more) const {
+    std::vector<std::string> arguments = {"fit", DIASTOLE_SOURCE_DIR "/examples/phantom-a.study.toml",
+                                          "--mesh", "4,2,1"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return arguments;
+  }
+
+  test::ScratchFolder folder_;
+};
+
+TEST_F(FitAndReport, JsonHoldsWhatTheContractSays) {
+  const Outcome outcome = run(quick_fit({"--json"}));
+  EXPECT_EQ(outcome.code, ExitCode::done);
+  const auto json = nlohmann::json::parse(outcome.output);
+  const auto& C1 = json.at("parameters").at("C1_kPa");
+  EXPECT_NEAR(C1.at("value").get<double>(), 8.6, 0.2);
+  EXPECT_GT(C1.at("se").get<double>(), 0.05);
+  EXPECT_LT(C1.at("ci95").at(0).get<double>(), C1.at("value").get<double>());
+  EXPECT_GT(C1.at("ci95").at(1).get<double>(), C1.at("value").get<double>());
+  EXPECT_EQ(json.at("correlation").at("matrix").size(), 6U);  // C1 and five pressures
+  EXPECT_NEAR(json.at("rms_mm").get<double>(), 0.8, 0.02);
+  EXPECT_GT(json.at("iterations").get<int>(), 0);
+  EXPECT_THAT(json.at("reason").get<std::string>(), HasSubstr("Converged"));
+  EXPECT_GT(json.at("seconds").get<double>(), 0.0);
+}
+
+TEST_F(FitAndReport, AFitIsKeptAndReported) {
+  const Outcome fit = run(quick_fit({"--set", "C1_kPa=9", "-o", file("fit.json")}));
+  EXPECT_EQ(fit.code, ExitCode::done);
+  EXPECT_THAT(fit.output, testing::StartsWith("C1 = 8."));
+  EXPECT_THAT(fit.output, HasSubstr("95 % interval"));
+  const std::vector<std::string> request = {
+      "report",          DIASTOLE_SOURCE_DIR "/examples/recorded-baseline.run.h5",
+      file("fit.json"),  "-o",
+      file("page.html"), "--json"};
+  const Outcome report = run(request);
+  EXPECT_EQ(report.code, ExitCode::done);
+  const auto json = nlohmann::json::parse(report.output);
+  EXPECT_EQ(json.at("bytes").get<size_t>(), std::filesystem::file_size(file("page.html")));
+}
+
+TEST_F(FitAndReport, AFitThatDoesNotConvergeIsANegativeAnswer) {
+  EXPECT_EQ(run(quick_fit({"--iterations", "1", "--json"})).code, ExitCode::negative);
+}
+
+TEST_F(FitAndReport, NothingIsLeftWhenThePageCannotBeMade) {
+  const std::vector<std::string> request = {"report", folder_.write("junk.txt", "junk").string(), "-o",
+                                            file("page.html")};
+  EXPECT_THROW((void)run(request), InputError);
+  EXPECT_FALSE(std::filesystem::exists(file("page.html")));
+}
+
+}  // namespace
+}  // namespace diastole
