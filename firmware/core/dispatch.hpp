@@ -24,7 +24,7 @@ class Dispatch {
       schema_agreed_ = false;
     }
     wire::visit_message(received.type, received.payload,
-                        [this](const auto& message) { handle_or_refuse(message); });
+                        [this](const auto& message) { this->handle_or_refuse(message); });
   }
 
  private:

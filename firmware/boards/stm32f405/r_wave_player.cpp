@@ -28,8 +28,9 @@ constexpr std::uint32_t kTriggerMode = 6U;           // SMS: started by the trig
 }  // namespace
 
 void RWavePlayer::start() {
-  constexpr std::uint32_t kEnable = 1U << 0, kTriggerEnable = 1U << 2, kFromTim4 = 5U << 3,
-                          kDmaEnable = 1U << 12;
+  // The output buffer does not reach below 0.2 V; the triangle starts at 0.
+  constexpr std::uint32_t kEnable = 1U << 0, kBufferOff = 1U << 1, kTriggerEnable = 1U << 2,
+                          kFromTim4 = 5U << 3, kDmaEnable = 1U << 12;
   dac().DHR12R1.write(0);
   dac().CR.write(kEnable | kBufferOff | kTriggerEnable | kFromTim4 | kDmaEnable);
   tim4().PSC.write(0);
