@@ -1,0 +1,212 @@
+// Bad input to whole programs: the message says where, what and what to do; the exit code is 2 or 3; nothing
+// is left.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <csignal>
+#include <functional>
+#include <ostream>
+#include <set>
+
+#include "tests/flow/programs.hpp"
+
+namespace diastole::flow {
+namespace {
+
+using testing::HasSubstr;
+
+struct BadInput {
+  std::string name;
+  std::function<std::vector<std::string>(const Workplace&)> arguments;  ///< may write files first
+  int exit_code;
+  std::vector<std::string> message;  ///< what it must contain: file, place, value, remedy
+};
+
+void PrintTo(const BadInput& input, std::ostream* out) { *out << input.name; }
+
+std::string gel() { return source_text("examples/gel.experiment.toml"); }
+
+std::vector<std::string> simulate(const Workplace& place, const std::string& experiment) {
+  place.write("bad.toml", experiment);
+  return {"diastole", "simulate", "bad.toml", "-o", "out.run.h5", "--pins", "pins.csv"};
+}
+
+std::vector<std::string> simulate_in(const Workplace& place, const std::string& rig) {
+  place.write("bad.rig.toml", rig);
+  auto arguments = simulate(place, gel());
+  arguments.insert(arguments.end(), {"--config", "bad.rig.toml"});
+  return arguments;
+}
+
+std::vector<BadInput> table() {
+  using Place = const Workplace&;
+  return {
+      {"MissingFile",
+       [](Place) -> std::vector<std::string> {
+         return {"diastole", "simulate", "no.toml", "-o", "out.run.h5"};
+       },
+       2,
+       {"no.toml", "cannot be opened", "Check the path"}},
+      {"NotToml",
+       [](Place place) { return simulate(place, "format = diastole"); },
+       2,
+       {"bad.toml", "line 1", "not TOML", "Correct the syntax"}},
+      {"WrongFormat",
+       [](Place place) { return simulate(place, with(gel(), "diastole-experiment", "diastole-study")); },
+       2,
+       {"bad.toml", "line 2", "format", "diastole-study", "Give the right kind of file"}},
+      {"NewerVersion",
+       [](Place place) { return simulate(place, with(gel(), "version = 1", "version = 9")); },
+       2,
+       {"bad.toml", "version", "9", "Update Diastole"}},
+      {"UnknownKey",
+       [](Place place) { return simulate(place, with(gel(), "stroke_mL", "stroke_ml")); },
+       2,
+       {"bad.toml", "stroke_mL"}},
+      {"NotANumber",
+       [](Place place) { return simulate(place, with(gel(), "stroke_mL = 40.0", "stroke_mL = nan")); },
+       2,
+       {"bad.toml", "line", "stroke_mL", "nan"}},
+      {"NegativePeriod",
+       [](Place place) { return simulate(place, with(gel(), "period_s = 1.2", "period_s = -1.2")); },
+       2,
+       {"bad.toml", "period_s", "-1.2", "at least"}},
+      {"UnknownWaveform",
+       [](Place place) { return simulate(place, with(gel(), "\"parabolic\"", "\"parabolik\"")); },
+       2,
+       {"bad.toml", "waveform", "parabolik", "parabolic"}},
+      {"TooFastForTheRig",
+       [](Place place) { return simulate(place, with(gel(), "period_s = 1.2", "period_s = 0.2")); },
+       2,
+       {"bad.toml", "segment", "acceleration", "16000", "1700"}},
+      {"OffsetOutOfRange",
+       [](Place place) { return simulate(place, with(gel(), "offset_mL = 0.0", "offset_mL = 8000.0")); },
+       2,
+       {"bad.toml", "line 13", "offset_mL", "8000", "at most"}},
+      {"BeyondTheTravel",
+       [](Place place) {
+         return simulate_in(place, with(source_text("examples/rig.toml"), "microsteps = 8\n",
+                                        "microsteps = 8\n[controller.limits]\ntravel_mL = 30.0\n"));
+       },
+       2,
+       {"bad.toml", "segment", "travel", "40", "30"}},
+      {"ExistingOutput",
+       [](Place place) {
+         place.write("out.run.h5", "precious");
+         return simulate(place, gel());
+       },
+       2,
+       {"out.run.h5", "exists already", "--force"}},
+      {"ExistingPins",
+       [](Place place) {
+         place.write("pins.csv", "precious");
+         return simulate(place, gel());
+       },
+       2,
+       {"pins.csv", "exists already", "--force"}},
+      {"NoSuchDirectory",
+       [](Place place) -> std::vector<std::string> {
+         return {"diastole", "simulate", place.write("gel.toml", gel()), "-o", "nowhere/out.run.h5"};
+       },
+       2,
+       {"nowhere", "-o"}},
+      {"RigWithUnknownKey",
+       [](Place place) {
+         return simulate_in(place, with(source_text("examples/rig.toml"), "hose_bore_mm", "hose_bor_mm"));
+       },
+       2,
+       {"bad.rig.toml", "hose_bore_mm"}},
+      {"RigWithUnknownSimulationKey",
+       [](Place place) {
+         return simulate_in(place, source_text("examples/rig.toml") + "\n[simulation]\nC1 = 8.8\n");
+       },
+       2,
+       {"bad.rig.toml", "simulation", "C1_kPa"}},
+      {"NoDaemon",
+       [](Place place) -> std::vector<std::string> {
+         return {"diastole", "run",      place.write("gel.toml", gel()), "-o", "out.run.h5",
+                 "--socket", "no.socket"};
+       },
+       3,
+       {"no.socket", "diastole daemon"}},
+      {"NoSerialPort",
+       [](Place place) -> std::vector<std::string> {
+         return {"diastole", "daemon", "--config",
+                 place.write("rig.toml",
+                             with(source_text("examples/rig.toml"), "/dev/ttyACM0", "/dev/no-such-port"))};
+       },
+       3,
+       {"/dev/no-such-port", "no such serial port", "`port`"}},
+      {"NotARunFile",
+       [](Place place) -> std::vector<std::string> {
+         return {"diastole", "inspect", place.write("text.run.h5", "not HDF5")};
+       },
+       2,
+       {"text.run.h5"}},
+      {"NoCommand", [](Place) -> std::vector<std::string> { return {"diastole"}; }, 2, {"--help"}},
+  };
+}
+
+std::set<std::string> files_in(const Workplace& place) {
+  std::set<std::string> names;
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(place.path())) {
+    const std::string name = std::filesystem::relative(entry.path(), place.path());
+    if (!name.starts_with("out-") && !name.starts_with("err-")) names.insert(name);
+  }
+  return names;
+}
+
+class BadInputTest : public testing::TestWithParam<BadInput> {};
+
+TEST_P(BadInputTest, IsToldWithPlaceValueAndRemedyAndLeavesNothing) {
+  const Workplace place;
+  const std::vector<std::string> arguments = GetParam().arguments(place);
+  const std::set<std::string> before = files_in(place);
+  const Ended ended = run(place, arguments);
+  EXPECT_EQ(ended.exit_code, GetParam().exit_code) << ended.err;
+  for (const std::string& part : GetParam().message)
+    EXPECT_THAT(ended.err, HasSubstr(part));
+  EXPECT_THAT(ended.out, testing::IsEmpty());
+  std::set<std::string> after = files_in(place);
+  after.erase("journals");  // a daemon's, empty
+  EXPECT_EQ(after, before);
+}
+
+INSTANTIATE_TEST_SUITE_P(Table, BadInputTest, testing::ValuesIn(table()),
+                         [](const auto& each) { return each.param.name; });
+
+TEST(BusyPort, ASecondDaemonAndASecondInstrumentSayWhoIsInTheWay) {
+  const Workplace place;
+  Program rig(place, {"sim_rig", "--link", "pump"});
+  ASSERT_TRUE(rig.wait_for_text("modbus_port")) << rig.err();
+  const std::string port = std::to_string(nlohmann::json::parse(rig.out())["modbus_port"].get<int>());
+  place.write("rig.toml", source_text("examples/rig.toml"));
+  const std::vector<std::string> daemon{"diastole", "daemon",           "--config",
+                                        "rig.toml", "--port",           (place / "pump").string(),
+                                        "--daq",    "127.0.0.1:" + port};
+  auto first_arguments = daemon;
+  first_arguments.insert(first_arguments.end(), {"--socket", (place / "first.socket").string()});
+  Program first(place, first_arguments);
+  ASSERT_TRUE(first.wait_for_text("ready")) << first.err();
+
+  auto second_arguments = daemon;
+  second_arguments.insert(second_arguments.end(), {"--socket", (place / "second.socket").string()});
+  const Ended second = run(place, second_arguments);
+  EXPECT_EQ(second.exit_code, 3);
+  EXPECT_THAT(second.err, testing::AllOf(HasSubstr("pump"), HasSubstr("in use")));
+
+  const Ended instrument = run(place, {"sim_rig", "--modbus-port", port});
+  EXPECT_EQ(instrument.exit_code, 3);
+  EXPECT_THAT(instrument.err, testing::AllOf(HasSubstr(port), HasSubstr("another port")));
+
+  first.signal(SIGTERM);
+  EXPECT_EQ(first.wait().exit_code, 0);
+  rig.signal(SIGTERM);
+  EXPECT_EQ(rig.wait().exit_code, 0);
+  EXPECT_FALSE(std::filesystem::is_symlink(place / "pump"));
+}
+
+}  // namespace
+}  // namespace diastole::flow
