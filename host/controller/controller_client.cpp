@@ -113,7 +113,7 @@ void ControllerClient::connect() {
   clock_.line_opened(*line_);
   link_.open(++session_, clock_.now_ns() / ns_per_us);
   const uint64_t end_ns = clock_.now_ns() + open_patience_ns;
-  while (link_.state() != wire::ReliableLink::State::open && !line_->lost() && clock_.now_ns() < end_ns)
+  while (link_.state() != wire::ReliableLink::State::open && line_ != nullptr && clock_.now_ns() < end_ns)
     turn();
   if (link_.state() != wire::ReliableLink::State::open) {
     disconnect();

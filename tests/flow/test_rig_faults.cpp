@@ -77,6 +77,20 @@ TEST(RigFaults, AnUnpluggedControllerEndsTheRunWithExitCode3AndKeepsTheData) {
   EXPECT_EQ(rig.inspect()["sound"], false);
 }
 
+TEST(RigFaults, AControllerUnpluggedWhileTheDaemonStartsIsToldWithExitCode3) {
+  const Workplace place;
+  const std::string line = place / "pump";
+  const std::string conductor = place / "time";
+  Program rig(place,
+              {"sim_rig", "--link", line, "--conductor", conductor, "--fault", "serial-hangup@0.0001"});
+  ASSERT_TRUE(rig.wait_for_text("modbus_port")) << rig.err();
+  place.write("rig.toml", source_text("examples/rig.toml"));
+  const Ended daemon =
+      run(place, {"diastole", "daemon", "--config", "rig.toml", "--port", line, "--conductor", conductor});
+  EXPECT_EQ(daemon.exit_code, 3) << daemon.err;
+  EXPECT_THAT(daemon.err, testing::AllOf(testing::HasSubstr(line), testing::HasSubstr("does not answer")));
+}
+
 TEST(RigFaults, ADroppedInstrumentBecomesGapsOfExactlyItsLength) {
   FaultyRig rig("daq-drop@5+0.2", FaultyRig::Time::conducted);
   const Ended ended = rig.acquire("10");
