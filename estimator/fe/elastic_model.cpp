@@ -33,11 +33,15 @@ std::vector<ParameterGroup> each_element(size_t parameter, size_t element_count)
 
 ElasticModel::ElasticModel(HermiteMesh mesh, const Law& law, ElasticOptions options)
     : solve_options_(std::move(options.solve)) {
-  const HeldDofs held = options.held ? *options.held : bonded_ends(mesh);
-  const size_t threads =
-      options.threads > 0 ? options.threads : std::max(1U, std::thread::hardware_concurrency());
-  system_ = std::make_unique<ElasticSystem>(std::move(mesh), law, std::move(options.parameters),
-                                            options.pressure_space, held, threads);
+  SystemOptions system;
+  system.parameters = std::move(options.parameters);
+  system.pressure_space = options.pressure_space;
+  system.held = options.held ? *options.held : bonded_ends(mesh);
+  system.loaded = options.loaded ? *options.loaded : mesh.faces().inner;
+  system.material_axes = std::move(options.material_axes);
+  system.volume_stiffness_kPa = options.volume_stiffness_kPa;
+  system.threads = options.threads > 0 ? options.threads : std::max(1U, std::thread::hardware_concurrency());
+  system_ = std::make_unique<ElasticSystem>(std::move(mesh), law, system);
 }
 
 ElasticModel::~ElasticModel() = default;
@@ -69,7 +73,11 @@ ElasticState ElasticModel::rest_state() const { return system_->rest_state(); }
 Solution ElasticModel::solve(double pressure_kPa) { return solve(pressure_kPa, rest_state()); }
 
 Solution ElasticModel::solve(double pressure_kPa, const ElasticState& start) {
-  PathResult path = follow_load(*system_, start, pressure_kPa, solve_options_);
+  return solve(Load{pressure_kPa, start.fibre_tension_kPa}, start);
+}
+
+Solution ElasticModel::solve(const Load& load, const ElasticState& start) {
+  PathResult path = follow_load(*system_, start, load, solve_options_);
   return {std::move(path.state), std::move(path.report)};
 }
 

@@ -23,6 +23,7 @@
 #include <vector>
 
 #include "estimator/fe/elastic_state.hpp"
+#include "estimator/fe/element_mechanics.hpp"
 #include "estimator/fe/pressure_space.hpp"
 #include "estimator/fe/solve_report.hpp"
 #include "estimator/fe/supports.hpp"
@@ -36,7 +37,10 @@ class ElasticSystem;
 struct ElasticOptions {
   std::vector<double> parameters{};  ///< the law's, in its order; the same in all elements
   PressureSpace pressure_space = PressureSpace::per_element;
-  std::optional<HeldDofs> held{};  ///< default: bottom and top faces bonded
+  std::optional<HeldDofs> held{};                    ///< default: bottom and top faces bonded
+  std::optional<std::vector<ElementFace>> loaded{};  ///< default: the inner faces
+  MaterialAxesField material_axes{};                 ///< default: the coordinate axes
+  double volume_stiffness_kPa = 0.0;                 ///< kappa of element_mechanics.hpp
   SolveOptions solve{};
   size_t threads = 0;  ///< 0: as many as the machine has
 };
@@ -89,6 +93,8 @@ class ElasticModel {
   /// Equilibrium at a cavity pressure, from rest or from an earlier state (of any pressure and parameters).
   [[nodiscard]] Solution solve(double pressure_kPa);
   [[nodiscard]] Solution solve(double pressure_kPa, const ElasticState& start);
+  /// The same with active tension; pressure and tension grow in proportion on the way.
+  [[nodiscard]] Solution solve(const Load& load, const ElasticState& start);
 
   /// Exact derivatives at a converged state: one factorisation, one back-substitution a group.
   [[nodiscard]] Sensitivities sensitivities(const ElasticState& state,

@@ -7,24 +7,27 @@
 
 namespace diastole {
 
-ElasticSystem::ElasticSystem(HermiteMesh mesh, const Law& law, std::vector<double> parameters,
-                             PressureSpace pressure_space, const HeldDofs& held, size_t threads)
+ElasticSystem::ElasticSystem(HermiteMesh mesh, const Law& law, const SystemOptions& options)
     : mesh_(std::move(mesh)),
       law_(&law),
       count_(law.parameters().size()),
-      pressures_(make_pressure_map(mesh_, pressure_space)),
-      equations_(mesh_, held, pressures_),
-      threads_(threads),
+      pressures_(make_pressure_map(mesh_, options.pressure_space)),
+      equations_(mesh_, options.held, pressures_),
+      loaded_(options.loaded),
+      volume_stiffness_kPa_(options.volume_stiffness_kPa),
+      threads_(options.threads),
       factor_(equations_.unknowns(), equations_.rows(), equations_.columns()) {
   for (size_t e = 0; e < mesh_.element_count(); ++e) {
-    parameters_.insert(parameters_.end(), parameters.begin(), parameters.end());
-    reference_.push_back(make_reference_element(mesh_, e));
+    parameters_.insert(parameters_.end(), options.parameters.begin(), options.parameters.end());
+    reference_.push_back(make_reference_element(mesh_, e, options.material_axes));
   }
 }
 
 ElementState ElasticSystem::element_state(const ElasticState& state, size_t element) const {
   ElementState local;
   local.position_mm = mesh_.gather(element, state.position_mm);
+  local.fibre_tension_kPa = state.fibre_tension_kPa;
+  local.volume_stiffness_kPa = volume_stiffness_kPa_;
   for (size_t m = 0; m < corners; ++m) {
     local.pressure_kPa[m] = state.lagrange_pressure_kPa[pressures_.unknown[element][m]];
   }
@@ -59,7 +62,7 @@ double ElasticSystem::cavity_volume_mm3(const ElasticState& state) const {
 
 std::vector<double> ElasticSystem::cavity_area(const ElasticState& state) const {
   std::vector<double> area(equations_.unknowns(), 0.0);
-  for (const ElementFace& face : mesh_.faces().inner) {
+  for (const ElementFace& face : loaded_) {
     const FaceField on_face = face_area_mm2(face, mesh_.gather(face.element, state.position_mm));
     const std::array<size_t, face_functions> functions = face_hermite_functions(face);
     ElementField force = ElementField::Zero();
@@ -112,7 +115,7 @@ std::vector<double> ElasticSystem::tangent(const ElasticState& state) const {
       equations_.add_tangent(e, local, values);
     });
   }
-  for (const ElementFace& face : mesh_.faces().inner) {
+  for (const ElementFace& face : loaded_) {
     const FaceTangent on_face = face_tangent_mm(face, mesh_.gather(face.element, state.position_mm));
     equations_.add_face_tangent(face.element, face_hermite_functions(face), on_face, -state.pressure_kPa,
                                 values);

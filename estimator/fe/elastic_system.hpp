@@ -24,10 +24,19 @@ struct SystemResidual {
   std::optional<InvertedPlace> inverted;
 };
 
+struct SystemOptions {
+  std::vector<double> parameters;  ///< the law's, in its order; the same in all elements
+  PressureSpace pressure_space = PressureSpace::per_element;
+  HeldDofs held;
+  std::vector<ElementFace> loaded;    ///< faces that the cavity pressure pushes on
+  MaterialAxesField material_axes;    ///< empty: the coordinate axes
+  double volume_stiffness_kPa = 0.0;  ///< kappa of element_mechanics.hpp
+  size_t threads = 1;
+};
+
 class ElasticSystem {
  public:
-  ElasticSystem(HermiteMesh mesh, const Law& law, std::vector<double> parameters,
-                PressureSpace pressure_space, const HeldDofs& held, size_t threads);
+  ElasticSystem(HermiteMesh mesh, const Law& law, const SystemOptions& options);
 
   [[nodiscard]] const HermiteMesh& mesh() const { return mesh_; }
   [[nodiscard]] const Law& law() const { return *law_; }
@@ -45,7 +54,8 @@ class ElasticSystem {
   [[nodiscard]] SystemResidual residual(const ElasticState& state) const;
   /// Values of the stored entries of equations(), at a state.
   [[nodiscard]] std::vector<double> tangent(const ElasticState& state) const;
-  /// dV_cavity/d(unknown), mm^2: minus the derivative of the residual with respect to the cavity pressure.
+  /// The loaded faces' area vectors, mm^2: minus the derivative of the residual with respect to the cavity
+  /// pressure, and dV_cavity/d(unknown) if the cavity's wall is what is loaded.
   [[nodiscard]] std::vector<double> cavity_area(const ElasticState& state) const;
   /// d(residual)/d(parameter) summed over the elements of a group (empty: all), added to `target`.
   void add_parameter_residual(const ElasticState& state, size_t parameter, std::span<const size_t> elements,
@@ -70,6 +80,8 @@ class ElasticSystem {
   std::vector<double> parameters_;
   PressureMap pressures_;
   EquationSystem equations_;
+  std::vector<ElementFace> loaded_;
+  double volume_stiffness_kPa_;
   size_t threads_;
   std::vector<ReferenceElement> reference_;
   SymmetricFactor factor_;

@@ -103,14 +103,35 @@ void set_geometric_moduli(double* moduli_at_point, const Matrix3d& s, double pre
   }
 }
 
+/// p - kappa (J - 1): the pressure that cof(g) sees.
+double effective_pressure(const ElementState& state, size_t q, double volume_ratio) {
+  return pressure_at(state.pressure_kPa, q) - state.volume_stiffness_kPa * (volume_ratio - 1.0);
+}
+
+/// kappa w^2 / dV cof(g) x cof(g): the volume stiffness's part of the moduli.
+void add_volume_moduli(double* moduli_at_point, double factor, const Matrix3d& cofactor) {
+  for (size_t i = 0; i < 3; ++i) {
+    for (size_t dk = 0; dk < 3; ++dk) {
+      for (size_t k = 0; k < 3; ++k) {
+        for (size_t dl = 0; dl < 3; ++dl) {
+          moduli_at_point[modulus_index(i, dk, k, dl)] +=
+              factor * cofactor(at(i), at(dk)) * cofactor(at(k), at(dl));
+        }
+      }
+    }
+  }
+}
+
 }  // namespace
 
-ReferenceElement make_reference_element(const HermiteMesh& mesh, size_t element) {
+ReferenceElement make_reference_element(const HermiteMesh& mesh, size_t element,
+                                        const MaterialAxesField& axes) {
   const ElementField position = mesh.gather(element, mesh.reference());
   ReferenceElement reference;
   for (size_t q = 0; q < gauss_points; ++q) {
     const Matrix3d g = xi_gradient(position, q);
     reference[q].material_to_xi = g.inverse();
+    if (axes) reference[q].material_to_xi *= axes(mesh, {element, gauss_tables().xi[q]});
     reference[q].volume = gauss_tables().weight[q] * g.determinant();
   }
   return reference;
@@ -132,8 +153,10 @@ ElementResidual element_residual(const ReferenceElement& reference, const Elemen
     const Matrix3d& t = reference[q].material_to_xi;
     const Matrix3d f = g * t;
     const SymmetricTensor<double> c = right_cauchy_green(f);
-    const Matrix3d stress = full_matrix(law.stress(c, parameters));
-    const double pressure = pressure_at(state.pressure_kPa, q);
+    SymmetricTensor<double> material_stress = law.stress(c, parameters);
+    material_stress[0] += state.fibre_tension_kPa;
+    const Matrix3d stress = full_matrix(material_stress);
+    const double pressure = effective_pressure(state, q, ratio);
     add_force(result.force,
               reference[q].volume * f * stress * t.transpose() - (pressure * tables.weight[q]) * cofactor, q);
     result.energy += reference[q].volume * law.energy(c, parameters);
@@ -153,16 +176,23 @@ void element_tangent(const ReferenceElement& reference, const ElementState& stat
     const Matrix3d g = xi_gradient(state.position_mm, q);
     const Matrix3d& t = reference[q].material_to_xi;
     const Matrix3d f = g * t;
-    const MaterialResponse response = law.response(right_cauchy_green(f), parameters);
-    const double pressure = pressure_at(state.pressure_kPa, q) * tables.weight[q];
+    const Matrix3d cofactor = cofactors(g);
+    const double weight = tables.weight[q];
+    const double ratio = weight * g.col(0).dot(cofactor.col(0)) / reference[q].volume;
+    MaterialResponse response = law.response(right_cauchy_green(f), parameters);
+    response.stress[0] += state.fibre_tension_kPa;
+    const double pressure = effective_pressure(state, q, ratio) * weight;
     const Matrix3d stress = reference[q].volume * t * full_matrix(response.stress) * t.transpose();
     double* point = tangent.stiffness.moduli_at(q);
     set_geometric_moduli(point, stress, pressure, g);
     if (!response.tangent.isZero(0.0))
       add_material_moduli(point, f, reference[q].volume * response.tangent, t);
+    if (state.volume_stiffness_kPa > 0.0) {
+      add_volume_moduli(point, state.volume_stiffness_kPa * weight * weight / reference[q].volume, cofactor);
+    }
 
     ElementField volume_slope = ElementField::Zero();
-    add_force(volume_slope, -tables.weight[q] * cofactors(g), q);
+    add_force(volume_slope, -weight * cofactor, q);
     for (size_t m = 0; m < corners; ++m)
       tangent.coupling[m] += tables.trilinear[q][m] * volume_slope;
   }

@@ -1,21 +1,27 @@
 #pragma once
 // One element's share of the potential
 //
-//   Pi(x, p) = integral of  W(C; parameters) - p (J - 1)  dV  -  P_cavity V_cavity(x)
+//   Pi(x, p) = integral of  W(C; parameters) + T Eff - p (J - 1) + kappa/2 (J - 1)^2  dV
+//              - P_cavity V_cavity(x)
 //
-// (the last term is in cavity_load.hpp), its gradient (residual) and second derivative (tangent) with respect
-// to the 192 coefficients x(a, i) of the deformed position and the 8 corner values p(m) of the tri-linear
-// Lagrange pressure p, positive in compression: Cauchy stress = 2/J F dW/dC F^T - p I.
+// (the last term is in cavity_load.hpp), with T an active tension along the fibre (second Piola-Kirchhoff
+// stress T f x f) and kappa a volume stiffness *beside* the Lagrange pressure: the exact solution, J = 1,
+// does not know it, but Newton's method converges from farther away. Given here are its gradient (residual)
+// and second derivative (tangent) with respect to the 192 coefficients x(a, i) of the deformed position and
+// the 8 corner values p(m) of the tri-linear Lagrange pressure p, positive in compression: Cauchy stress =
+// 2/J F (dW/dC + T/2 f x f) F^T
+// - (p - kappa (J - 1)) I.
 //
 // Everything is worked out in element coordinates: g = dx/dxi, and T = dxi/dX Q with Q's columns the material
 // axes, so that F Q = g T and C in material axes = (g T)^T (g T). With w the Gauss weight, G = dX/dxi:
-//   residual(a, i) = sum_q dN_a/dxi_K [ w det G (g T S T^T)_iK - p w cof(g)_iK ]
+//   residual(a, i) = sum_q dN_a/dxi_K [ w det G (g T S T^T)_iK - p w cof(g)_iK ],   p - kappa (J - 1) for p
 //   residual(m)    = - sum_q w (det g - det G) psi_m
 //
 // Units: mm, kPa; energies in kPa mm^3 = uJ.
 
 #include <Eigen/Dense>
 #include <array>
+#include <functional>
 #include <memory>
 #include <span>
 #include <vector>
@@ -36,12 +42,17 @@ using ReferenceElement = std::array<ReferencePoint, gauss_points>;
 
 /// Material axes (orthonormal columns fibre, sheet, normal) at a Gauss point; identity for isotropic laws.
 using MaterialAxes = Eigen::Matrix3d;
+/// Empty: the coordinate axes everywhere.
+using MaterialAxesField = std::function<MaterialAxes(const HermiteMesh&, const MaterialPoint&)>;
 
-ReferenceElement make_reference_element(const HermiteMesh& mesh, size_t element);
+ReferenceElement make_reference_element(const HermiteMesh& mesh, size_t element,
+                                        const MaterialAxesField& axes = {});
 
 struct ElementState {
   ElementField position_mm;
   std::array<double, corners> pressure_kPa;
+  double fibre_tension_kPa = 0.0;     ///< T above
+  double volume_stiffness_kPa = 0.0;  ///< kappa above
 };
 
 /// The least volume ratio J over the Gauss points, and where.
@@ -53,7 +64,7 @@ struct LeastVolumeRatio {
 struct ElementResidual {
   ElementField force;                      ///< dPi/dx, kPa mm^2
   std::array<double, corners> volume_mm3;  ///< dPi/dp
-  double energy = 0.0;                     ///< integral of W
+  double energy = 0.0;                     ///< integral of W, the law's alone
   LeastVolumeRatio least;
 };
 

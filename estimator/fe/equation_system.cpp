@@ -17,17 +17,29 @@ EquationSystem::EquationSystem(const HermiteMesh& mesh, const HeldDofs& held, co
     : pressure_unknowns_(pressures.count) {
   number_equations(mesh, held);
   map_elements(mesh, pressures);
-  colour_elements(mesh);
+  colour_elements();
 }
 
 void EquationSystem::number_equations(const HermiteMesh& mesh, const HeldDofs& held) {
   equation_of_dof_.assign(held.size(), none);
+  host_of_dof_.resize(held.size());
+  std::vector<unsigned char> has_own(held.size());
+  for (size_t dof = 0; dof < held.size(); ++dof) {
+    host_of_dof_[dof] = dof / dofs_per_node;
+    has_own[dof] = held[dof] == 0;
+  }
+  for (const auto& [dof, other] : mesh.ties().same)
+    has_own[dof] = 0;
   for (size_t node = 0; node < mesh.node_count(); ++node) {
     first_equation_.push_back(displacement_unknowns_);
     for (size_t dof = node * dofs_per_node; dof < (node + 1) * dofs_per_node; ++dof) {
-      if (held[dof] == 0) equation_of_dof_[dof] = displacement_unknowns_++;
+      if (has_own[dof] != 0) equation_of_dof_[dof] = displacement_unknowns_++;
     }
     free_dofs_.push_back(displacement_unknowns_ - first_equation_.back());
+  }
+  for (const auto& [dof, other] : mesh.ties().same) {
+    equation_of_dof_[dof] = equation_of_dof_[other];
+    host_of_dof_[dof] = other / dofs_per_node;
   }
 }
 
@@ -52,52 +64,66 @@ size_t EquationSystem::make_pressure_piece(size_t pressure, size_t node) {
   return start;
 }
 
+EquationSystem::ElementMap EquationSystem::map_dofs(const HermiteMesh& mesh, size_t element) const {
+  ElementMap map;
+  const HermiteMesh::Corners& nodes = mesh.element(element);
+  std::copy(nodes.begin(), nodes.end(), map.nodes.begin());
+  for (size_t a = 0; a < hermite_functions; ++a) {
+    map.scale[a] = mesh.scale(element, a);
+    for (size_t i = 0; i < 3; ++i) {
+      const size_t dof = dof_of(nodes[hermite_corner(a)], hermite_derivative(a), i);
+      const size_t host_node = host_of_dof_[dof];
+      const auto known = map.nodes.begin() + static_cast<std::ptrdiff_t>(map.hosts);
+      const auto host = std::find(map.nodes.begin(), known, host_node);
+      if (host == known) map.nodes[map.hosts++] = host_node;
+      const size_t found = equation_of_dof_[dof];
+      map.host[3 * a + i] = static_cast<size_t>(host - map.nodes.begin());
+      map.equation[3 * a + i] = found;
+      map.within_node[3 * a + i] = found == none ? none : found - first_equation_[host_node];
+    }
+  }
+  for (size_t h = 0; h < map.hosts; ++h)
+    map.free_dofs[h] = free_dofs_[map.nodes[h]];
+  return map;
+}
+
 void EquationSystem::map_elements(const HermiteMesh& mesh, const PressureMap& pressures) {
   std::map<std::pair<size_t, size_t>, size_t> node_blocks;
   std::map<std::pair<size_t, size_t>, size_t> pressure_pieces;
   for (size_t e = 0; e < mesh.element_count(); ++e) {
-    const HermiteMesh::Corners& nodes = mesh.element(e);
-    ElementMap map;
-    map.nodes = nodes;
-    for (size_t a = 0; a < hermite_functions; ++a) {
-      map.scale[a] = mesh.scale(e, a);
-      const size_t node = nodes[hermite_corner(a)];
-      for (size_t i = 0; i < 3; ++i) {
-        const size_t found = equation_of_dof_[dof_of(node, hermite_derivative(a), i)];
-        map.equation[3 * a + i] = found;
-        map.within_node[3 * a + i] = found == none ? none : found - first_equation_[node];
-      }
-    }
-    for (size_t c = 0; c < corners; ++c) {
-      map.free_dofs[c] = free_dofs_[nodes[c]];
-      for (size_t d = 0; d < corners; ++d) {
-        const std::pair pair{std::max(nodes[c], nodes[d]), std::min(nodes[c], nodes[d])};
+    ElementMap map = map_dofs(mesh, e);
+    for (size_t g = 0; g < map.hosts; ++g) {
+      for (size_t h = 0; h < map.hosts; ++h) {
+        const std::pair pair{std::max(map.nodes[g], map.nodes[h]), std::min(map.nodes[g], map.nodes[h])};
         const auto [block, is_new] = node_blocks.try_emplace(pair, 0);
         if (is_new) block->second = make_node_block(pair.first, pair.second);
-        map.node_block[c * corners + d] = block->second;
-        const auto [piece, is_new_piece] =
-            pressure_pieces.try_emplace({pressures.unknown[e][c], nodes[d]}, 0);
-        if (is_new_piece) piece->second = make_pressure_piece(pressures.unknown[e][c], nodes[d]);
-        map.pressure_piece[c * corners + d] = piece->second;
+        map.node_block[g * most_hosts + h] = block->second;
+      }
+      for (size_t m = 0; m < corners; ++m) {
+        const size_t unknown = pressures.unknown[e][m];
+        const auto [piece, is_new] = pressure_pieces.try_emplace({unknown, map.nodes[g]}, 0);
+        if (is_new) piece->second = make_pressure_piece(unknown, map.nodes[g]);
+        map.pressure_piece[m * most_hosts + g] = piece->second;
       }
     }
     maps_.push_back(map);
   }
 }
 
-void EquationSystem::colour_elements(const HermiteMesh& mesh) {
-  std::vector<std::vector<size_t>> colours_of_node(mesh.node_count());
-  for (size_t e = 0; e < mesh.element_count(); ++e) {
+void EquationSystem::colour_elements() {
+  std::vector<std::vector<size_t>> colours_of_node(first_equation_.size());
+  for (size_t e = 0; e < maps_.size(); ++e) {
+    const std::span nodes(maps_[e].nodes.data(), maps_[e].hosts);
     size_t colour = 0;
     const auto taken = [&](size_t candidate) {
-      return std::any_of(mesh.element(e).begin(), mesh.element(e).end(), [&](size_t node) {
+      return std::any_of(nodes.begin(), nodes.end(), [&](size_t node) {
         return std::find(colours_of_node[node].begin(), colours_of_node[node].end(), candidate) !=
                colours_of_node[node].end();
       });
     };
     while (taken(colour))
       ++colour;
-    for (const size_t node : mesh.element(e))
+    for (const size_t node : nodes)
       colours_of_node[node].push_back(colour);
     if (colour == colours_.size()) colours_.emplace_back();
     colours_[colour].push_back(e);
@@ -108,12 +134,12 @@ size_t EquationSystem::entry(const ElementMap& map, size_t dof, size_t other_dof
   size_t high = map.within_node[dof];
   size_t low = map.within_node[other_dof];
   if (high == none || low == none) return none;
-  const size_t corner = hermite_corner(dof / 3);
-  const size_t other_corner = hermite_corner(other_dof / 3);
-  const size_t start = map.node_block[corner * corners + other_corner];
-  if (corner == other_corner) return start + triangle(std::max(high, low)) + std::min(high, low);
-  if (map.nodes[corner] > map.nodes[other_corner]) return start + high * map.free_dofs[other_corner] + low;
-  return start + low * map.free_dofs[corner] + high;
+  const size_t host = map.host[dof];
+  const size_t other_host = map.host[other_dof];
+  const size_t start = map.node_block[host * most_hosts + other_host];
+  if (host == other_host) return start + triangle(std::max(high, low)) + std::min(high, low);
+  if (map.nodes[host] > map.nodes[other_host]) return start + high * map.free_dofs[other_host] + low;
+  return start + low * map.free_dofs[host] + high;
 }
 
 void EquationSystem::add_tangent(size_t element, const ElementTangent& tangent,
@@ -125,18 +151,19 @@ void EquationSystem::add_tangent(size_t element, const ElementTangent& tangent,
       for (size_t i = 0; i < 3; ++i) {
         for (size_t k = a == b ? i : 0; k < 3; ++k) {
           const size_t place = entry(map, 3 * a + i, 3 * b + k);
-          if (place != none) values[place] += scale * tangent.stiffness.entry(a, i, b, k);
+          if (place == none) continue;
+          values[place] +=
+              multiplicity(map, 3 * a + i, 3 * b + k) * scale * tangent.stiffness.entry(a, i, b, k);
         }
       }
     }
   }
   for (size_t m = 0; m < corners; ++m) {
     for (size_t a = 0; a < hermite_functions; ++a) {
-      const size_t start = map.pressure_piece[m * corners + hermite_corner(a)];
       for (size_t i = 0; i < 3; ++i) {
         const size_t place = map.within_node[3 * a + i];
         if (place == none) continue;
-        values[start + place] +=
+        values[map.pressure_piece[m * most_hosts + map.host[3 * a + i]] + place] +=
             map.scale[a] * tangent.coupling[m](static_cast<Index>(i), static_cast<Index>(a));
       }
     }
@@ -166,8 +193,8 @@ void EquationSystem::add_face_tangent(size_t element, std::span<const size_t> fu
       const size_t b = functions[c / 3];
       const size_t place = entry(map, 3 * a + r % 3, 3 * b + c % 3);
       if (place == none) continue;
-      values[place] +=
-          factor * map.scale[a] * map.scale[b] * matrix(static_cast<Index>(r), static_cast<Index>(c));
+      values[place] += multiplicity(map, 3 * a + r % 3, 3 * b + c % 3) * factor * map.scale[a] *
+                       map.scale[b] * matrix(static_cast<Index>(r), static_cast<Index>(c));
     }
   }
 }

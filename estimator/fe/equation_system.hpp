@@ -10,6 +10,9 @@
 //   p |  pressure rows    | 0  |     a full rectangle, a node's own block a packed lower triangle, a pressure
 //     +-------------------+----+     unknown has one row piece for each node it meets.
 //
+// A dof that is tied to another node's (HermiteMesh::ties) has that one's equation, and belongs to the blocks
+// of that node, its host.
+//
 // The pattern depends on mesh, supports and pressure map only; values are added per element and elements are
 // grouped into colours that share no unknown, so that a parallel sum has one fixed order.
 
@@ -52,28 +55,39 @@ class EquationSystem {
                         std::span<double> values) const;
 
  private:
+  /// The corners' nodes, and those that their dofs are tied to: one more for each layer of a collapsed edge.
+  static constexpr size_t most_hosts = corners + 2;
+
   struct ElementMap {
-    HermiteMesh::Corners nodes;
-    std::array<size_t, corners> free_dofs;                  ///< of each corner's node
+    std::array<size_t, most_hosts> nodes;  ///< the hosts; the corners' nodes come first
+    size_t hosts = corners;
+    std::array<size_t, most_hosts> free_dofs;               ///< of each host
+    std::array<size_t, 3 * hermite_functions> host;         ///< of local dof 3 a + i: place in `nodes`
     std::array<size_t, 3 * hermite_functions> equation;     ///< of local dof 3 a + i, or none
-    std::array<size_t, 3 * hermite_functions> within_node;  ///< its place among its node's free dofs
+    std::array<size_t, 3 * hermite_functions> within_node;  ///< its place among its host's free dofs
     std::array<double, hermite_functions> scale;
-    std::array<size_t, corners * corners> node_block;  ///< first entry of the block of two corners
-    std::array<size_t, corners * corners>
-        pressure_piece;  ///< first entry of pressure corner m, node corner c
+    std::array<size_t, most_hosts * most_hosts> node_block;   ///< first entry of the block of two hosts
+    std::array<size_t, corners * most_hosts> pressure_piece;  ///< first entry of pressure corner m, host h
   };
 
   void number_equations(const HermiteMesh& mesh, const HeldDofs& held);
   void map_elements(const HermiteMesh& mesh, const PressureMap& pressures);
-  void colour_elements(const HermiteMesh& mesh);
+  [[nodiscard]] ElementMap map_dofs(const HermiteMesh& mesh, size_t element) const;
+  void colour_elements();
   size_t make_node_block(size_t high_node, size_t low_node);
   size_t make_pressure_piece(size_t pressure, size_t node);
   /// Stored entry of the local dofs 3 a + i and 3 b + k; none if either is held.
   [[nodiscard]] static size_t entry(const ElementMap& map, size_t dof, size_t other_dof);
+  /// How often a pair of local dofs, met once, counts in its entry: two different dofs of one equation stand
+  /// for both off-diagonal numbers of their symmetric matrix.
+  [[nodiscard]] static double multiplicity(const ElementMap& map, size_t dof, size_t other_dof) {
+    return dof != other_dof && map.equation[dof] == map.equation[other_dof] ? 2.0 : 1.0;
+  }
 
   size_t displacement_unknowns_ = 0;
   size_t pressure_unknowns_ = 0;
   std::vector<size_t> equation_of_dof_;
+  std::vector<size_t> host_of_dof_;
   std::vector<size_t> first_equation_;  // of a node
   std::vector<size_t> free_dofs_;       // of a node
   std::vector<ElementMap> maps_;

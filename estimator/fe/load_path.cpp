@@ -10,9 +10,17 @@
 namespace diastole {
 namespace {
 
-/// The state at `pressure_kPa` on the line from `before` through `last`.
-ElasticState extrapolated(const ElasticState& before, const ElasticState& last, double pressure_kPa) {
-  const double reach = (pressure_kPa - last.pressure_kPa) / (last.pressure_kPa - before.pressure_kPa);
+/// An equilibrium, and how far along the path it is (0 start, 1 end).
+struct Waypoint {
+  ElasticState state;
+  double reached;
+};
+
+/// The state at `next` on the line from `before` through `last`.
+ElasticState extrapolated(const Waypoint& before_point, const Waypoint& last_point, double next) {
+  const double reach = (next - last_point.reached) / (last_point.reached - before_point.reached);
+  const ElasticState& before = before_point.state;
+  const ElasticState& last = last_point.state;
   ElasticState state = last;
   for (size_t i = 0; i < state.position_mm.size(); ++i) {
     state.position_mm[i] += reach * (last.position_mm[i] - before.position_mm[i]);
@@ -39,31 +47,29 @@ void record(SolveReport& report, const NewtonResult& attempt) {
 
 }  // namespace
 
-PathResult follow_load(ElasticSystem& system, const ElasticState& start, double pressure_kPa,
+PathResult follow_load(ElasticSystem& system, const ElasticState& start, const Load& load,
                        const SolveOptions& options) {
   constexpr size_t easy_iterations = 4;
   const auto begun = std::chrono::steady_clock::now();
-  PathResult path{start, {}};
-  SolveReport& report = path.report;
+  SolveReport report;
   report.pressure_unknowns = system.equations().pressure_unknowns();
   report.reached_pressure_kPa = start.pressure_kPa;
-  const double whole = pressure_kPa - start.pressure_kPa;
+  const bool stays =
+      load.pressure_kPa == start.pressure_kPa && load.fibre_tension_kPa == start.fibre_tension_kPa;
   double fraction = options.most_load_fraction;
-  double reached = 0.0;
-  std::optional<ElasticState> before;
+  Waypoint last{start, 0.0};
+  std::optional<Waypoint> before;
   report.reason = SolveReason::out_of_steps;
   while (report.history.size() < options.load_step_limit) {
-    const double next = std::min(1.0, reached + fraction);
-    const double next_kPa = next == 1.0 ? pressure_kPa : start.pressure_kPa + next * whole;
-    ElasticState guess = before ? extrapolated(*before, path.state, next_kPa) : path.state;
-    guess.pressure_kPa = next_kPa;
+    const double next = std::min(1.0, last.reached + fraction);
+    ElasticState guess = before ? extrapolated(*before, last, next) : last.state;
+    guess.pressure_kPa = std::lerp(start.pressure_kPa, load.pressure_kPa, next);
+    guess.fibre_tension_kPa = std::lerp(start.fibre_tension_kPa, load.fibre_tension_kPa, next);
     NewtonResult attempt = newton_solve(system, guess, options);
     record(report, attempt);
     if (attempt.reason == SolveReason::converged) {
-      if (reached > 0.0 || path.state.pressure_kPa != next_kPa) before = std::move(path.state);
-      path.state = std::move(attempt.state);
-      reached = next;
-      if (reached == 1.0) {
+      before = std::exchange(last, {std::move(attempt.state), next});
+      if (next == 1.0) {
         report.reason = SolveReason::converged;
         break;
       }
@@ -72,7 +78,7 @@ PathResult follow_load(ElasticSystem& system, const ElasticState& start, double 
     } else {
       fraction *= 0.5;
       report.inverted = attempt.inverted;
-      if (whole == 0.0 || fraction < options.least_load_fraction) {
+      if (stays || fraction < options.least_load_fraction) {
         report.reason = attempt.reason;
         break;
       }
@@ -80,7 +86,7 @@ PathResult follow_load(ElasticSystem& system, const ElasticState& start, double 
   }
   if (report.converged()) report.inverted.reset();
   report.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
-  return path;
+  return {std::move(last.state), std::move(report)};
 }
 
 }  // namespace diastole

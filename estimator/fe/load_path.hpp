@@ -1,7 +1,7 @@
 #pragma once
-// From one equilibrium to another cavity pressure in adaptive load steps: the whole way at once if Newton's
-// method takes it, else by halves; steps grow again after easy ones, and start from the line through the last
-// two equilibria.
+// From one equilibrium to that of another load (cavity pressure, fibre tension) in adaptive load steps: the
+// whole way at once if Newton's method takes it, else by halves; steps grow again after easy ones, and start
+// from the line through the last two equilibria.
 
 #include "estimator/fe/elastic_system.hpp"
 #include "estimator/fe/solve_report.hpp"
@@ -14,8 +14,8 @@ struct PathResult {
 };
 
 /// `start` need not be an equilibrium (parameters may have changed since): it is brought into one first when
-/// the pressure stays. Precondition: start is of this system and not inverted.
-PathResult follow_load(ElasticSystem& system, const ElasticState& start, double pressure_kPa,
+/// the load stays. Precondition: start is of this system and not inverted.
+PathResult follow_load(ElasticSystem& system, const ElasticState& start, const Load& load,
                        const SolveOptions& options);
 
 }  // namespace diastole

@@ -1,6 +1,7 @@
 #pragma once
 // The tri-linear Lagrange pressure: eight values an element, either its own (discontinuous) or shared at the
-// nodes. docs/decisions/ has the comparison; the solver's default is the discontinuous one.
+// nodes. Corners that coincide on a collapsed edge share one value either way, so that the pressure is single
+// there. docs/decisions/ has the comparison; the solver's default is the discontinuous one.
 
 #include <array>
 #include <cstddef>

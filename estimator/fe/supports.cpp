@@ -2,7 +2,12 @@
 
 namespace diastole {
 
-HeldDofs hold_nothing(const HermiteMesh& mesh) { return HeldDofs(mesh.node_count() * dofs_per_node, 0); }
+HeldDofs hold_nothing(const HermiteMesh& mesh) {
+  HeldDofs held(mesh.node_count() * dofs_per_node, 0);
+  for (const size_t dof : mesh.ties().zero)
+    held[dof] = 1;
+  return held;
+}
 
 void hold_face_component(const HermiteMesh& mesh, const std::vector<ElementFace>& faces, size_t component,
                          HeldDofs& held) {

@@ -10,6 +10,7 @@ namespace diastole {
 /// One flag a degree of freedom, numbered as in a NodeField; 1 = held.
 using HeldDofs = std::vector<unsigned char>;
 
+/// Nothing but the derivatives that vanish at collapsed edges (HermiteMesh::ties), which are always held.
 HeldDofs hold_nothing(const HermiteMesh& mesh);
 
 /// A face bonded to a rigid plate: positions and all in-plane derivatives are held in the three components,

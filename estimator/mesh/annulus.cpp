@@ -5,6 +5,8 @@
 #include <utility>
 #include <vector>
 
+#include "estimator/mesh/structured.hpp"
+
 namespace diastole {
 namespace {
 
@@ -66,29 +68,8 @@ NodeField node_positions(const AnnulusShape& shape) {
 }  // namespace
 
 HermiteMesh make_annulus(const AnnulusShape& shape) {
-  const auto [around, up, out] = shape.elements;
-  std::vector<HermiteMesh::Corners> elements;
-  MeshFaces faces;
-  for (size_t i3 = 0; i3 < out; ++i3) {
-    for (size_t i2 = 0; i2 < up; ++i2) {
-      for (size_t i1 = 0; i1 < around; ++i1) {
-        HermiteMesh::Corners nodes;
-        for (size_t c = 0; c < corners; ++c) {
-          const size_t n1 = (i1 + (c & 1)) % around;
-          const size_t n2 = i2 + ((c >> 1) & 1);
-          const size_t n3 = i3 + ((c >> 2) & 1);
-          nodes[c] = n1 + around * (n2 + (up + 1) * n3);
-        }
-        const size_t e = elements.size();
-        elements.push_back(nodes);
-        if (i3 == 0) faces.inner.push_back({e, 2, 0});
-        if (i3 + 1 == out) faces.outer.push_back({e, 2, 1});
-        if (i2 == 0) faces.bottom.push_back({e, 1, 0});
-        if (i2 + 1 == up) faces.top.push_back({e, 1, 1});
-      }
-    }
-  }
-  return HermiteMesh(node_positions(shape), std::move(elements), std::move(faces));
+  const ElementGrid grid{shape.elements, true};
+  return HermiteMesh(node_positions(shape), grid_elements(grid), grid_faces(grid));
 }
 
 }  // namespace diastole

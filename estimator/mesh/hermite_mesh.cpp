@@ -2,16 +2,23 @@
 
 #include <algorithm>
 #include <limits>
+#include <numeric>
 #include <utility>
 
 namespace diastole {
 
 HermiteMesh::HermiteMesh(NodeField reference, std::vector<Corners> elements, MeshFaces faces,
-                         std::vector<Scales> scales)
+                         std::vector<Scales> scales, DofTies ties)
     : reference_(std::move(reference)),
       elements_(std::move(elements)),
       faces_(std::move(faces)),
-      scales_(std::move(scales)) {
+      scales_(std::move(scales)),
+      ties_(std::move(ties)),
+      places_(node_count()) {
+  std::iota(places_.begin(), places_.end(), size_t{0});
+  for (const auto& [dof, other] : ties_.same) {
+    if (dof % dofs_per_node == 0) places_[dof / dofs_per_node] = other / dofs_per_node;
+  }
   for (size_t component = 0; component < 3; ++component) {
     double least = std::numeric_limits<double>::infinity();
     double most = -least;

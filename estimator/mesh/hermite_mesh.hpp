@@ -25,6 +25,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "estimator/mesh/hermite_basis.hpp"
@@ -60,6 +61,15 @@ struct MeshFaces {
   std::vector<ElementFace> outer;
   std::vector<ElementFace> bottom;
   std::vector<ElementFace> top;
+  std::vector<ElementFace> left;  ///< the ends of xi1, where it does not close on itself
+  std::vector<ElementFace> right;
+};
+
+/// Where an edge of elements is collapsed to a point (the apex of a ventricle), its coincident nodes share
+/// some nodal values, and derivatives along the edge vanish. Every field over the mesh keeps to this.
+struct DofTies {
+  std::vector<std::pair<size_t, size_t>> same;  ///< dof, and the (untied) dof of another node that it equals
+  std::vector<size_t> zero;
 };
 
 class HermiteMesh {
@@ -69,7 +79,7 @@ class HermiteMesh {
 
   /// `elements[e][corner]` are node numbers; `scales` is empty when all scale factors are one.
   HermiteMesh(NodeField reference, std::vector<Corners> elements, MeshFaces faces,
-              std::vector<Scales> scales = {});
+              std::vector<Scales> scales = {}, DofTies ties = {});
 
   [[nodiscard]] size_t node_count() const { return reference_.size() / dofs_per_node; }
   [[nodiscard]] size_t element_count() const { return elements_.size(); }
@@ -77,6 +87,9 @@ class HermiteMesh {
   [[nodiscard]] const Corners& element(size_t e) const { return elements_[e]; }
   [[nodiscard]] const MeshFaces& faces() const { return faces_; }
   [[nodiscard]] double scale(size_t e, size_t a) const { return scales_.empty() ? 1.0 : scales_[e][a]; }
+  [[nodiscard]] const DofTies& ties() const { return ties_; }
+  /// The node that stands for all nodes at the same place: `node` itself unless its value is tied.
+  [[nodiscard]] size_t place_of(size_t node) const { return places_[node]; }
   /// Largest extent of the reference body along x, y or z.
   [[nodiscard]] double extent_mm() const { return extent_mm_; }
 
@@ -95,6 +108,8 @@ class HermiteMesh {
   std::vector<Corners> elements_;
   MeshFaces faces_;
   std::vector<Scales> scales_;
+  DofTies ties_;
+  std::vector<size_t> places_;
   double extent_mm_ = 0.0;
 };
 

@@ -1,0 +1,46 @@
+#include "estimator/mesh/fibre_field.hpp"
+
+#include <Eigen/Geometry>
+#include <numbers>
+#include <utility>
+
+namespace diastole {
+namespace {
+
+constexpr double rad_per_deg = std::numbers::pi / 180.0;
+
+double interpolate(const HermiteMesh& mesh, const std::vector<double>& nodal, const MaterialPoint& point) {
+  const std::array<double, corners> basis = trilinear_basis(point.xi);
+  double sum = 0.0;
+  for (size_t c = 0; c < corners; ++c)
+    sum += basis[c] * nodal[mesh.element(point.element)[c]];
+  return sum;
+}
+
+}  // namespace
+
+Eigen::Matrix3d wall_axes(const HermiteMesh& mesh, const MaterialPoint& point) {
+  const Eigen::Matrix3d tangents = mesh.xi_gradient(mesh.reference(), point);
+  Eigen::Matrix3d axes;
+  axes.col(0) = tangents.col(0).normalized();
+  axes.col(2) = tangents.col(0).cross(tangents.col(1)).normalized();
+  axes.col(1) = axes.col(2).cross(axes.col(0));
+  return axes;
+}
+
+FibreField::FibreField(std::vector<double> fibre_deg, std::vector<double> sheet_deg)
+    : fibre_deg_(std::move(fibre_deg)), sheet_deg_(std::move(sheet_deg)) {}
+
+double FibreField::fibre_deg(const HermiteMesh& mesh, const MaterialPoint& point) const {
+  return interpolate(mesh, fibre_deg_, point);
+}
+
+Eigen::Matrix3d FibreField::material_axes(const HermiteMesh& mesh, const MaterialPoint& point) const {
+  using Eigen::AngleAxisd;
+  using Eigen::Vector3d;
+  const double sheet_deg = sheet_deg_.empty() ? 0.0 : interpolate(mesh, sheet_deg_, point);
+  return wall_axes(mesh, point) * AngleAxisd(rad_per_deg * fibre_deg(mesh, point), Vector3d::UnitZ()) *
+         AngleAxisd(rad_per_deg * sheet_deg, Vector3d::UnitX());
+}
+
+}  // namespace diastole
