@@ -104,7 +104,7 @@ nlohmann::ordered_json as_json(const Study& study, const ElasticModel& model, co
   json["law"] = model.law().name();
   for (const StudyParameter& parameter : study.law.parameters)
     json["parameters"][parameter.name] = parameter.start;
-  json["mesh"] = std::get<AnnulusSpecimen>(study.specimen).mesh;
+  json["mesh"] = mesh_of(study.specimen);
   json["dofs"] = model.dofs();
   json["load_steps"] = report.load_steps;
   json["newton_iterations"] = report.newton_iterations;

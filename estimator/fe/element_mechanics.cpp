@@ -1,6 +1,7 @@
 #include "estimator/fe/element_mechanics.hpp"
 
 #include <cmath>
+#include <utility>
 
 namespace diastole {
 namespace {
@@ -123,6 +124,12 @@ void add_volume_moduli(double* moduli_at_point, double factor, const Matrix3d& c
 }
 
 }  // namespace
+
+MaterialAxesField material_axes_of(FibreField fibres) {
+  return [fibres = std::move(fibres)](const HermiteMesh& mesh, const MaterialPoint& point) {
+    return fibres.material_axes(mesh, point);
+  };
+}
 
 ReferenceElement make_reference_element(const HermiteMesh& mesh, size_t element,
                                         const MaterialAxesField& axes) {

@@ -29,6 +29,7 @@
 #include "estimator/fe/gauss_points.hpp"
 #include "estimator/fe/stiffness_contraction.hpp"
 #include "estimator/materials/law.hpp"
+#include "estimator/mesh/fibre_field.hpp"
 #include "estimator/mesh/hermite_mesh.hpp"
 
 namespace diastole {
@@ -44,6 +45,7 @@ using ReferenceElement = std::array<ReferencePoint, gauss_points>;
 using MaterialAxes = Eigen::Matrix3d;
 /// Empty: the coordinate axes everywhere.
 using MaterialAxesField = std::function<MaterialAxes(const HermiteMesh&, const MaterialPoint&)>;
+MaterialAxesField material_axes_of(FibreField fibres);
 
 ReferenceElement make_reference_element(const HermiteMesh& mesh, size_t element,
                                         const MaterialAxesField& axes = {});

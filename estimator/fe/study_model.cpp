@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "estimator/mesh/annulus.hpp"
+#include "estimator/mesh/ellipsoid.hpp"
 #include "protocol/contract/input_error.hpp"
 #include "protocol/contract/table_reader.hpp"
 
@@ -60,6 +61,32 @@ std::vector<double> start_values(const Study& study, const Law& law) {
   return values;
 }
 
+template <class Shape, class Kind>
+void take_elements(const Kind& specimen, Shape& shape) {
+  for (size_t i = 0; i < 3; ++i)
+    shape.elements[i] = static_cast<size_t>(specimen.mesh[i]);
+}
+
+HermiteMesh make_mesh(const AnnulusSpecimen& specimen, ElasticOptions&) {
+  AnnulusShape shape;
+  shape.inner_radius_mm = specimen.inner_radius_mm;
+  shape.outer_radius_mm = specimen.outer_radius_mm;
+  shape.height_mm = specimen.height_mm;
+  take_elements(specimen, shape);
+  return make_annulus(shape);
+}
+
+HermiteMesh make_mesh(const EllipsoidSpecimen& specimen, ElasticOptions& options) {
+  EllipsoidShape shape;
+  shape.inner_axes_mm = specimen.inner_axes_mm;
+  shape.outer_axes_mm = specimen.outer_axes_mm;
+  shape.base_z_mm = specimen.base_z_mm;
+  take_elements(specimen, shape);
+  options.material_axes =
+      material_axes_of(ellipsoid_fibres(shape, specimen.fibre_endo_deg, specimen.fibre_epi_deg));
+  return make_ellipsoid(shape);
+}
+
 }  // namespace
 
 ElasticModel make_model(const Study& study, SolveOptions options) {
@@ -68,17 +95,12 @@ ElasticModel make_model(const Study& study, SolveOptions options) {
     refuse(study, "model.effects", fmt::format("the model has no effect \"{}\"", study.effects.front()),
            "Leave the list empty.");
   }
-  const AnnulusSpecimen& specimen = std::get<AnnulusSpecimen>(study.specimen);
-  AnnulusShape shape;
-  shape.inner_radius_mm = specimen.inner_radius_mm;
-  shape.outer_radius_mm = specimen.outer_radius_mm;
-  shape.height_mm = specimen.height_mm;
-  for (size_t i = 0; i < 3; ++i)
-    shape.elements[i] = static_cast<size_t>(specimen.mesh[i]);
   ElasticOptions elastic;
   elastic.parameters = start_values(study, law);
   elastic.solve = std::move(options);
-  return ElasticModel(make_annulus(shape), law, std::move(elastic));
+  HermiteMesh mesh =
+      std::visit([&](const auto& specimen) { return make_mesh(specimen, elastic); }, study.specimen);
+  return ElasticModel(std::move(mesh), law, std::move(elastic));
 }
 
 }  // namespace diastole

@@ -46,19 +46,34 @@ double sigma_at(const NumberTable& table, size_t row, size_t column) {
   return sigma_mm;
 }
 
+/// The cylinder about z that holds a specimen.
+struct Extent {
+  double radius_mm;
+  double low_mm;
+  double high_mm;
+};
+
+Extent extent_of(const AnnulusSpecimen& annulus) {
+  return {annulus.outer_radius_mm, -0.5 * annulus.height_mm, 0.5 * annulus.height_mm};
+}
+Extent extent_of(const EllipsoidSpecimen& ellipsoid) {
+  return {ellipsoid.outer_axes_mm[0], -ellipsoid.outer_axes_mm[1], ellipsoid.base_z_mm};
+}
+
 // Refuses coordinates that cannot belong to the specimen: the first sign of wrong units or axes.
 template <typename Row>
 void check_extent(const std::vector<Row>& rows, const Specimen& specimen, const std::filesystem::path& path) {
-  const auto& annulus = std::get<AnnulusSpecimen>(specimen);
-  const double reach_mm = std::hypot(annulus.outer_radius_mm, annulus.height_mm / 2);
+  const Extent extent = std::visit([](const auto& kind) { return extent_of(kind); }, specimen);
+  const double reach_mm =
+      std::hypot(extent.radius_mm, std::max(std::abs(extent.low_mm), std::abs(extent.high_mm)));
+  const double slack_mm = 0.25 * (extent.high_mm - extent.low_mm);
   double largest_mm = 0;
   size_t outside = 0;
   for (const Row& row : rows) {
     largest_mm = std::max(largest_mm, norm(row.x_mm));
-    // The slack of a half lets the specimen bulge far; the axis must be z and the middle the origin all the
-    // same.
-    if (std::hypot(row.x_mm[0], row.x_mm[1]) > 1.5 * annulus.outer_radius_mm ||
-        std::abs(row.x_mm[2]) > 0.75 * annulus.height_mm) {
+    // The slack of a half lets the specimen bulge far; the axis must be z and the origin right all the same.
+    if (std::hypot(row.x_mm[0], row.x_mm[1]) > 1.5 * extent.radius_mm ||
+        row.x_mm[2] < extent.low_mm - slack_mm || row.x_mm[2] > extent.high_mm + slack_mm) {
       ++outside;
     }
   }
@@ -72,9 +87,9 @@ void check_extent(const std::vector<Row>& rows, const Specimen& specimen, const 
   if (2 * outside > rows.size()) {
     throw InputError(
         {path.string(), "columns x_mm, y_mm, z_mm",
-         fmt::format("{} of {} points lie far outside the specimen (radius {} mm, half height {} mm)",
-                     outside, rows.size(), annulus.outer_radius_mm, annulus.height_mm / 2),
-         "Give coordinates in mm with the annulus axis along z and its mid-height at z = 0."});
+         fmt::format("{} of {} points lie far outside the specimen (radius {} mm, z from {} to {} mm)",
+                     outside, rows.size(), extent.radius_mm, extent.low_mm, extent.high_mm),
+         "Give coordinates in mm with the specimen's axis along z and its origin where the study has it."});
   }
 }
 

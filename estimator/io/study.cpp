@@ -15,31 +15,66 @@ namespace {
 constexpr std::array<int, 3> max_elements = {64, 64, 16};
 constexpr int min_circumferential = 3;  // fewer elements than this cannot close a circle
 
-AnnulusSpecimen read_annulus(TableReader& table) {
-  AnnulusSpecimen annulus{};
-  annulus.inner_radius_mm = table.number("inner_radius_mm", {.above = 0});
-  annulus.outer_radius_mm = table.number("outer_radius_mm", {.above = annulus.inner_radius_mm});
-  annulus.height_mm = table.number("height_mm", {.above = 0});
+std::array<int, 3> read_mesh(TableReader& table) {
+  std::array<int, 3> counts{};
   const std::vector<int64_t> mesh = table.integers("mesh", 3, {.at_least = 1});
   for (size_t axis = 0; axis < 3; ++axis) {
     if (mesh[axis] > max_elements[axis]) {
       table.fail("mesh", fmt::format("{} elements in direction {} are too many", mesh[axis], axis + 1),
                  fmt::format("Use at most [{}].", fmt::join(max_elements, ", ")));
     }
-    annulus.mesh[axis] = static_cast<int>(mesh[axis]);
+    counts[axis] = static_cast<int>(mesh[axis]);
   }
-  if (annulus.mesh[0] < min_circumferential) {
-    table.fail("mesh", fmt::format("{} circumferential elements cannot close a circle", annulus.mesh[0]),
+  if (counts[0] < min_circumferential) {
+    table.fail("mesh", fmt::format("{} circumferential elements cannot close a circle", counts[0]),
                fmt::format("Use at least {}; the usual mesh is [8, 4, 1].", min_circumferential));
   }
+  return counts;
+}
+
+AnnulusSpecimen read_annulus(TableReader& table) {
+  AnnulusSpecimen annulus{};
+  annulus.inner_radius_mm = table.number("inner_radius_mm", {.above = 0});
+  annulus.outer_radius_mm = table.number("outer_radius_mm", {.above = annulus.inner_radius_mm});
+  annulus.height_mm = table.number("height_mm", {.above = 0});
+  annulus.mesh = read_mesh(table);
   annulus.ends = table.choice("ends", {"fixed"});
   return annulus;
 }
 
+EllipsoidSpecimen read_ellipsoid(TableReader& table) {
+  EllipsoidSpecimen ellipsoid{};
+  const std::vector<double> inner = table.numbers("inner_axes_mm", 2, {.above = 0});
+  const std::vector<double> outer = table.numbers("outer_axes_mm", 2, {.above = 0});
+  for (size_t axis = 0; axis < 2; ++axis) {
+    ellipsoid.inner_axes_mm[axis] = inner[axis];
+    ellipsoid.outer_axes_mm[axis] = outer[axis];
+    if (!(inner[axis] < outer[axis])) {
+      table.fail("outer_axes_mm", fmt::format("{} is not beyond the inner {}", outer[axis], inner[axis]),
+                 "Give [across z, along z] of the outer wall, each larger than the inner wall's.");
+    }
+  }
+  ellipsoid.base_z_mm = table.number("base_z_mm", {.above = -inner[1]});
+  if (!(ellipsoid.base_z_mm < inner[1])) {
+    table.fail("base_z_mm", fmt::format("{} does not cut the inner wall", ellipsoid.base_z_mm),
+               fmt::format("Choose it between -{0} and {0}, the inner semi-axis along z.", inner[1]));
+  }
+  ellipsoid.fibre_endo_deg = table.number("fibre_endo_deg", {.at_least = -180, .at_most = 180});
+  ellipsoid.fibre_epi_deg = table.number("fibre_epi_deg", {.at_least = -180, .at_most = 180});
+  ellipsoid.mesh = read_mesh(table);
+  ellipsoid.ends = table.choice("ends", {"fixed"});
+  return ellipsoid;
+}
+
 Specimen read_specimen(TableReader& root) {
   TableReader table = root.table("specimen");
-  const std::string kind = table.choice("kind", {"annulus"});
-  Specimen specimen = read_annulus(table);
+  const std::string kind = table.choice("kind", {"annulus", "ellipsoid"});
+  Specimen specimen;
+  if (kind == "ellipsoid") {
+    specimen = read_ellipsoid(table);
+  } else {
+    specimen = read_annulus(table);
+  }
   table.finish();
   return specimen;
 }
@@ -152,8 +187,13 @@ void set_start(Study& study, std::string_view assignment) {
                 fmt::format("It has: {}.", fmt::join(known, ", ")));
 }
 
+const std::array<int, 3>& mesh_of(const Specimen& specimen) {
+  return std::visit([](const auto& kind) -> const std::array<int, 3>& { return kind.mesh; }, specimen);
+}
+
 void set_mesh(Study& study, std::string_view counts) {
-  auto& mesh = std::get<AnnulusSpecimen>(study.specimen).mesh;
+  std::array<int, 3>& mesh =
+      std::visit([](auto& kind) -> std::array<int, 3>& { return kind.mesh; }, study.specimen);
   std::string_view rest = counts;
   for (size_t axis = 0; axis < 3; ++axis) {
     const size_t comma = rest.find(',');

@@ -23,8 +23,24 @@ struct AnnulusSpecimen {
   std::string ends;         ///< "fixed"
 };
 
+/// A left ventricle: a thick ellipsoid of revolution about z, apex down, cut at z = base_z_mm where it is
+/// held, loaded by a follower pressure on its inner wall. Fibre angles are measured from the circumference
+/// towards the base and go linearly through the wall (estimator/mesh/ellipsoid.hpp).
+struct EllipsoidSpecimen {
+  std::array<double, 2> inner_axes_mm;  ///< semi-axes across z and along z
+  std::array<double, 2> outer_axes_mm;
+  double base_z_mm;
+  double fibre_endo_deg;
+  double fibre_epi_deg;
+  std::array<int, 3> mesh;  ///< elements: circumferential, longitudinal, transmural
+  std::string ends;         ///< "fixed"
+};
+
 /// One alternative per `specimen.kind`; a new kind adds its struct here and its reader in study.cpp.
-using Specimen = std::variant<AnnulusSpecimen>;
+using Specimen = std::variant<AnnulusSpecimen, EllipsoidSpecimen>;
+
+/// Elements in the three directions, whatever the kind.
+const std::array<int, 3>& mesh_of(const Specimen& specimen);
 
 enum class Variation {
   whole,    ///< one value for the specimen

@@ -24,20 +24,25 @@ struct MeridianNode {
 MeridianNode meridian_node(const EllipsoidShape& shape, size_t i2, size_t i3) {
   const double n2 = static_cast<double>(shape.elements[1]);
   const double n3 = static_cast<double>(shape.elements[2]);
-  const double s = static_cast<double>(i2) / n2;
   const double t = static_cast<double>(i3) / n3;
   // Semi-axes and their derivatives with respect to t.
   const double da = shape.outer_axes_mm[0] - shape.inner_axes_mm[0];
   const double dc = shape.outer_axes_mm[1] - shape.inner_axes_mm[1];
   const double a = shape.inner_axes_mm[0] + t * da;
   const double c = shape.inner_axes_mm[1] + t * dc;
-  // The meridian angle of the base, and the tangent factor 4 tan(h/4) of an element's angle h = base/n2.
+  // The meridian angle of the base, its fraction at this node, and the tangent factor 4 tan(h/4) of the angle
+  // h that an element spans here.
   const double cosine = -shape.base_z_mm / c;
   const double base = std::acos(cosine);
   const double dbase = -shape.base_z_mm * dc / (c * c * std::sqrt(1.0 - cosine * cosine));
-  const double quarter = base / (4.0 * n2);
+  const double g = shape.base_grading;
+  const double quarter_turn = 0.5 * std::numbers::pi;
+  const double uniform = static_cast<double>(i2) / n2;
+  const double s = (1.0 - g) * uniform + g * std::sin(quarter_turn * uniform);
+  const double slope = (1.0 - g) + g * quarter_turn * std::cos(quarter_turn * uniform);
+  const double quarter = base * slope / (4.0 * n2);
   const double factor = 4.0 * std::tan(quarter);
-  const double dfactor = dbase / n2 / (std::cos(quarter) * std::cos(quarter));
+  const double dfactor = dbase * slope / n2 / (std::cos(quarter) * std::cos(quarter));
 
   const double psi = s * base;
   const Meridian along(a * std::cos(psi), c * std::sin(psi));       // d/dpsi

@@ -2,23 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include "tests/estimator/fe/derivative_check.hpp"
 #include "tests/estimator/fe/gel.hpp"
 
 namespace diastole {
 namespace {
-
-std::vector<double> tangent_times(const ElasticSystem& system, const ElasticState& state,
-                                  const std::vector<double>& x) {
-  const std::vector<double> values = system.tangent(state);
-  std::vector<double> product(x.size(), 0.0);
-  for (size_t n = 0; n < values.size(); ++n) {
-    const size_t row = static_cast<size_t>(system.equations().rows()[n] - 1);
-    const size_t column = static_cast<size_t>(system.equations().columns()[n] - 1);
-    product[row] += values[n] * x[column];
-    if (row != column) product[column] += values[n] * x[row];
-  }
-  return product;
-}
 
 /// Pi of element_mechanics.hpp; the Lagrange term follows from the residual's pressure rows, which are
 /// dPi/dp.
@@ -30,15 +18,6 @@ double potential(const ElasticSystem& system, const ElasticState& state) {
         state.lagrange_pressure_kPa[i] * residual.values[system.equations().displacement_unknowns() + i];
   }
   return residual.energy_uJ + lagrange - state.pressure_kPa * system.cavity_volume_mm3(state);
-}
-
-std::vector<double> random_step(size_t count, unsigned seed) {
-  std::mt19937 random(seed);
-  std::uniform_real_distribution<double> unit(-1.0, 1.0);
-  std::vector<double> step(count);
-  for (double& value : step)
-    value = unit(random);
-  return step;
 }
 
 class Equations : public testing::TestWithParam<const Law*> {
