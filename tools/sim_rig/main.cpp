@@ -11,6 +11,7 @@
 
 #include "protocol/contract/exit_code.hpp"
 #include "protocol/contract/input_error.hpp"
+#include "tools/sim_board/emulated_controller.hpp"
 #include "tools/sim_rig/host_built_controller.hpp"
 #include "tools/sim_rig/rig_description.hpp"
 #include "tools/sim_rig/server.hpp"
@@ -41,6 +42,7 @@ Faults (seconds of the rig's clock): serial-hangup@T  daq-stall@T+D  daq-drop@T+
 
 struct Arguments {
   std::string config;
+  std::string image;
   uint64_t seed = 1;
   bool real_time = false;
   std::vector<std::string> faults;
@@ -49,6 +51,8 @@ struct Arguments {
 
 void add_options(CLI::App& app, Arguments& arguments) {
   app.add_option("--config", arguments.config, "rig.toml: geometry, channels, and the table [simulation]");
+  app.add_option("--image", arguments.image,
+                 "run this image of the firmware (.elf or .bin) on the emulated board, not the host build");
   app.add_option("--link", arguments.server.link, "make this a symbolic link to the pseudo-terminal");
   app.add_option("--modbus-port", arguments.server.modbus_port,
                  "TCP port of the instrument, 0 for any free one")
@@ -60,6 +64,11 @@ void add_options(CLI::App& app, Arguments& arguments) {
   app.add_option("--pins", arguments.server.pins, "write every change of a pin: time_ns,signal,value");
   app.add_option("--seed", arguments.seed, "of the sensors' noise")->capture_default_str();
   app.add_option("--fault", arguments.faults, "make something go wrong; may be repeated");
+}
+
+std::unique_ptr<sim_rig::SimulatedController> make_controller(const std::string& image) {
+  if (image.empty()) return sim_rig::make_host_built_controller();
+  return std::make_unique<diastole::EmulatedController>(std::vector{diastole::read_image(image)});
 }
 
 /// A descriptor that becomes readable on SIGTERM and SIGINT.
@@ -80,7 +89,7 @@ void serve(Arguments arguments) {
   description.plant.seed = arguments.seed;
   arguments.server.faults = sim_rig::parse_rig_faults(arguments.faults);
   const int stop = stop_descriptor();
-  sim_rig::Server server(description, sim_rig::make_host_built_controller(), arguments.server);
+  sim_rig::Server server(description, make_controller(arguments.image), arguments.server);
   fmt::print("{}\n", server.addresses());
   std::fflush(stdout);
   server.run(stop);
