@@ -150,6 +150,10 @@ void add_simulate(CommandLine& line) {
       "was recorded is kept. Exit code 1: samples are missing; 3: a fault ended the run.");
   command->add_option("EXPERIMENT", options->session.experiment, "experiment file (.toml)")->required();
   command->add_option("-o,--output", options->session.output, "run file to write")->required();
+  command
+      ->add_option("--image", options->rig.image,
+                   "run this image of the firmware (.elf or .bin) on the emulated board")
+      ->check(CLI::ExistingFile);
   command->add_option("--pins", options->rig.pins, "pin trace to write: time_ns,signal,value");
   command->add_option("--seed", options->rig.seed, "of the sensors' noise")->capture_default_str();
   command->add_option("--config", options->rig.config, "rig file, instead of the built-in one");

@@ -56,6 +56,7 @@ SimulatedRig::SimulatedRig(const PrivateDirectory& directory, const SimulatedRig
   const std::string conductor = directory / "time";
   std::vector<std::string> rig{program_beside("sim_rig"),   "--config", config, "--link", line, "--seed",
                                fmt::to_string(options.seed)};
+  if (!options.image.empty()) rig.insert(rig.end(), {"--image", options.image});
   if (!options.pins.empty()) rig.insert(rig.end(), {"--pins", options.pins});
   if (!options.real_time) rig.insert(rig.end(), {"--conductor", conductor});
   rig_ = std::make_unique<ChildProcess>(rig, directory / "sim_rig.log");

@@ -30,6 +30,7 @@ class PrivateDirectory {
 
 struct SimulatedRigOptions {
   std::string config;  ///< rig file; empty: the built-in one
+  std::string image;   ///< firmware image for the emulated board; empty: the firmware built for this machine
   std::string pins;    ///< pin trace to write; empty: none
   uint64_t seed = 1;
   bool real_time = false;
