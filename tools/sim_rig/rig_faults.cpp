@@ -2,16 +2,49 @@
 
 #include <fmt/format.h>
 
+#include <charconv>
 #include <cmath>
-#include <regex>
+#include <optional>
+#include <string_view>
+#include <utility>
 
 #include "protocol/contract/input_error.hpp"
 
 namespace diastole::sim_rig {
 namespace {
 
-uint64_t ns_of(const std::string& seconds) {
-  return static_cast<uint64_t>(std::llround(std::stod(seconds) * 1e9));
+struct FaultText {
+  std::string kind;
+  uint64_t from_ns = 0;
+  std::optional<uint64_t> length_ns;
+  std::optional<uint64_t> delay_ns;
+};
+
+/// Takes a non-negative number of seconds off the front of `text`; none if there is no number.
+std::optional<uint64_t> take_seconds(std::string_view& text) {
+  double seconds = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), seconds);
+  if (error != std::errc() || !(seconds >= 0 && seconds < 1e9)) return std::nullopt;
+  text.remove_prefix(static_cast<size_t>(end - text.data()));
+  return static_cast<uint64_t>(std::llround(seconds * 1e9));
+}
+
+/// Splits KIND@T[+D][/L]; none if it has another form.
+std::optional<FaultText> split(std::string_view text) {
+  const size_t at = text.find('@');
+  if (at == std::string_view::npos) return std::nullopt;
+  FaultText fault{std::string(text.substr(0, at)), 0, {}, {}};
+  text.remove_prefix(at + 1);
+  const auto from_ns = take_seconds(text);
+  if (!from_ns) return std::nullopt;
+  fault.from_ns = *from_ns;
+  for (auto [sign, value] : {std::pair{'+', &fault.length_ns}, std::pair{'/', &fault.delay_ns}}) {
+    if (!text.starts_with(sign)) continue;
+    text.remove_prefix(1);
+    *value = take_seconds(text);
+    if (!*value) return std::nullopt;
+  }
+  return text.empty() ? std::optional(fault) : std::nullopt;
 }
 
 [[noreturn]] void fail(const std::string& text) {
@@ -23,25 +56,22 @@ uint64_t ns_of(const std::string& seconds) {
 }  // namespace
 
 RigFaults parse_rig_faults(const std::vector<std::string>& texts) {
-  static const std::regex form(R"(([a-z-]+)@(\d+\.?\d*)(?:\+(\d+\.?\d*))?(?:/(\d+\.?\d*))?)");
   RigFaults faults;
   for (const std::string& text : texts) {
-    std::smatch part;
-    if (!std::regex_match(text, part, form)) fail(text);
-    const std::string kind = part[1];
-    const bool has_length = part[3].matched;
-    const bool has_delay = part[4].matched;
-    const uint64_t from_ns = ns_of(part[2]);
-    const uint64_t until_ns = from_ns + (has_length ? ns_of(part[3]) : 0);
-    if (kind == "serial-hangup" && !has_length && !has_delay) {
-      faults.serial_hangup_ns = from_ns;
-    } else if (kind == "daq-stall" && has_length && !has_delay) {
-      faults.daq.stall = {from_ns, until_ns};
-    } else if (kind == "daq-drop" && has_length && !has_delay) {
-      faults.daq.drop = {from_ns, until_ns};
-    } else if (kind == "daq-delay" && has_length && has_delay) {
-      faults.daq.delay = {from_ns, until_ns};
-      faults.daq.delay_ns = ns_of(part[4]);
+    const auto fault = split(text);
+    if (!fault) fail(text);
+    const sim_daq::FaultWindow window{fault->from_ns, fault->from_ns + fault->length_ns.value_or(0)};
+    const bool only_a_time = !fault->length_ns && !fault->delay_ns;
+    const bool only_a_window = fault->length_ns && !fault->delay_ns;
+    if (fault->kind == "serial-hangup" && only_a_time) {
+      faults.serial_hangup_ns = fault->from_ns;
+    } else if (fault->kind == "daq-stall" && only_a_window) {
+      faults.daq.stall = window;
+    } else if (fault->kind == "daq-drop" && only_a_window) {
+      faults.daq.drop = window;
+    } else if (fault->kind == "daq-delay" && fault->length_ns && fault->delay_ns) {
+      faults.daq.delay = window;
+      faults.daq.delay_ns = *fault->delay_ns;
     } else {
       fail(text);
     }

@@ -29,7 +29,7 @@ class ChildProcessTest : public testing::Test {
 };
 
 TEST_F(ChildProcessTest, GivesItsFirstLineAndItsExitCode) {
-  ChildProcess child(shell("echo ready; trap 'exit 7' TERM; while :; do sleep 0.01; done"), log_);
+  ChildProcess child(shell("trap 'exit 7' TERM; echo ready; while :; do sleep 0.01; done"), log_);
   EXPECT_EQ(child.first_line(5s), "ready");
   EXPECT_TRUE(child.running());
   EXPECT_EQ(child.stop(5s), 7);
