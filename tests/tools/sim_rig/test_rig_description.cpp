@@ -44,7 +44,8 @@ TEST(RigFaults, AreReadFromTheCommandLine) {
 }
 
 TEST(RigFaults, AnythingElseIsRefusedWithTheForms) {
-  for (const char* text : {"serial-hangup", "daq-stall@2", "serial-hangup@3+1", "fire@3", "daq-drop@x+1", "daq-stall@2+-1", "daq-stall@2+1s"}) {
+  for (const char* text : {"serial-hangup", "daq-stall@2", "serial-hangup@3+1", "fire@3", "daq-drop@x+1",
+                           "daq-stall@2+-1", "daq-stall@2+1s"}) {
     try {
       parse_rig_faults({text});
       FAIL() << text;
