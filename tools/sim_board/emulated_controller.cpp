@@ -16,6 +16,7 @@ EmulatedController::EmulatedController(const std::vector<Image>& images, Mechani
   drive(wiring_.far_limit, position_ >= mechanics_.far_limit_microsteps, 0);
   board_.on_pin_change([this](SimBoard::Pin pin, bool level, uint64_t time_ns) {
     if (pin == wiring_.step.pin && level == wiring_.step.active_high) step(time_ns);
+    if (pin == wiring_.fault.pin && level == wiring_.fault.active_high) note_fault();
   });
   board_.power_on();
 }
@@ -45,6 +46,11 @@ void EmulatedController::step(uint64_t time_ns) {
   if ((before >= far) != (position_ >= far)) drive(wiring_.far_limit, position_ >= far, time_ns);
 }
 
+/// The firmware writes the number before it raises the pin.
+void EmulatedController::note_fault() {
+  fault_numbers_.push_back(static_cast<int32_t>(board_.word(wiring_.fault_number).value_or(0) & 0xff));
+}
+
 EmulatedController::Output EmulatedController::advance_to(uint64_t until_ns) {
   board_.advance_to(until_ns);
   sent_.clear();
@@ -52,7 +58,13 @@ EmulatedController::Output EmulatedController::advance_to(uint64_t until_ns) {
     sent_.push_back(byte.value);
   edges_.clear();
   for (const SimBoard::PinEvent& event : board_.take_pin_events()) {
-    if (const auto edge = pin_edge(wiring_, event)) edges_.push_back(*edge);
+    auto edge = pin_edge(wiring_, event);
+    if (!edge) continue;
+    if (edge->pin == sim_rig::Pin::fault && edge->value != 0 && !fault_numbers_.empty()) {
+      edge->value = fault_numbers_.front();
+      fault_numbers_.pop_front();
+    }
+    edges_.push_back(*edge);
   }
   return {sent_, edges_};
 }

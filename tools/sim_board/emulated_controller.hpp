@@ -6,7 +6,7 @@
 // limit from Mechanics::far_limit_microsteps on, as on firmware/boards/recording.
 
 #include <cstdint>
-#include <functional>
+#include <deque>
 #include <vector>
 
 #include "tools/sim_board/image_file.hpp"
@@ -42,11 +42,13 @@ class EmulatedController final : public sim_rig::SimulatedController {
   void close(const Wire& wire, uint64_t time_ns);
   void drive(const Wire& wire, bool active, uint64_t time_ns);
   void step(uint64_t time_ns);
+  void note_fault();
 
   const Wiring& wiring_ = diastole_wiring();
   Mechanics mechanics_;
   SimBoard board_;
   int64_t position_;
+  std::deque<int32_t> fault_numbers_;  ///< of rises of FAULT that advance_to() has not handed over
   std::vector<uint8_t> sent_;
   std::vector<sim_rig::PinEdge> edges_;
 };

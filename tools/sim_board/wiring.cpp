@@ -20,7 +20,8 @@ const Wiring& diastole_wiring() {
                                  .estop = {pin('C', 0)},
                                  .home = {pin('C', 1)},
                                  .far_limit = {pin('C', 2)},
-                                 .rwave_dac = 1};
+                                 .rwave_dac = 1,
+                                 .fault_number = 0x2000'0000};
   return wiring;
 }
 

@@ -21,6 +21,7 @@ struct Wiring {
   Wire step, dir, enable, ttl, fault;  ///< outputs; DIR active is "inflate"
   Wire estop, home, far_limit;         ///< inputs; active is "pressed", "closed"
   uint8_t rwave_dac = 1;               ///< DAC channel
+  uint32_t fault_number = 0;           ///< address of the byte that holds the number behind the FAULT pin
 };
 
 /// The board as firmware/boards/stm32f405/pins.hpp draws it.

@@ -11,6 +11,9 @@ namespace diastole::stm32 {
 
 namespace {
 
+/// The number behind the FAULT pin, at 0x20000000 (stm32f405.ld) for whoever looks from outside.
+[[gnu::section(".shown"), gnu::used]] volatile std::uint8_t shown_fault;
+
 void start_watchdog() {
   iwdg().KR.write(0x5555);
   iwdg().PR.write(1);      // 32 kHz / 8
@@ -30,6 +33,7 @@ void start_systick() {
 void Stm32Board::start() {
   start_clocks();
   identity_ = read_identity();
+  shown_fault = 0;
   configure_pins();
   timer_.start();
   r_wave_.start();
@@ -60,6 +64,7 @@ void Stm32Board::set_motor_enabled(bool enabled) {
 }
 
 void Stm32Board::show_fault(std::uint8_t number) {
+  shown_fault = number;
   gpio_b().BSRR.write(number != 0 ? kFaultPin : kFaultPin << 16);
 }
 

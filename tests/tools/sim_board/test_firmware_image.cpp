@@ -134,6 +134,25 @@ TEST(FirmwareImage, EstopCutsTheMotionWithinAStepPeriod) {
   EXPECT_LT(last_step_ns, press_ns + 10'000) << "an interrupt's latency";
 }
 
+TEST(FirmwareImage, FaultsShowTheirNumberInThePinTrace) {
+  NEEDS_FIRMWARE();
+  auto board = emulated();
+  MiniatureHost host(*board);
+  ASSERT_TRUE(host.prepare());
+  ASSERT_TRUE(host.ask(segment(wire::Waveform::parabolic, 2, 40'000'000, 1'200'000)));
+  wire::Start start{};
+  start.lease_id = MiniatureHost::lease;
+  ASSERT_TRUE(host.ask(wire::Arm::example()));
+  ASSERT_TRUE(host.ask(start));
+  host.edges.clear();
+  board->close_far_limit(host.now_ns() + 3 * s / 2);
+  host.run_for(2 * s);
+  ASSERT_EQ(host.fault, wire::Fault::limit_switch);
+  const auto shown = std::ranges::find_if(host.edges, [](const PinEdge& e) { return e.pin == Pin::fault; });
+  ASSERT_NE(shown, host.edges.end());
+  EXPECT_EQ(shown->value, static_cast<int32_t>(wire::Fault::limit_switch));
+}
+
 TEST(FirmwareImage, RerunsAreEqual) {
   NEEDS_FIRMWARE();
   const std::vector program{segment(wire::Waveform::parabolic, 1, 20'000'000, 800'000)};
