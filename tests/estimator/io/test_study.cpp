@@ -112,5 +112,51 @@ TEST(ExampleStudies, AreRead) {
   }
 }
 
+constexpr const char* ventricle = R"(format = "diastole-study"
+version = 1
+[specimen]
+kind = "ellipsoid"
+inner_axes_mm = [21.0, 51.0]
+outer_axes_mm = [30.0, 60.0]
+base_z_mm = 15.0
+fibre_endo_deg = 60.0
+fibre_epi_deg = -60.0
+mesh = [8, 4, 2]
+ends = "fixed"
+[law]
+name = "guccione"
+[law.parameters.C_kPa]
+start = 1.2
+bounds = [0.2, 12.0]
+[data]
+)";
+
+TEST_F(StudyFile, AnEllipsoidArrives) {
+  Study study = read(ventricle);
+  const auto& ellipsoid = std::get<EllipsoidSpecimen>(study.specimen);
+  EXPECT_THAT(ellipsoid.inner_axes_mm, testing::ElementsAre(21.0, 51.0));
+  EXPECT_THAT(ellipsoid.outer_axes_mm, testing::ElementsAre(30.0, 60.0));
+  EXPECT_EQ(ellipsoid.base_z_mm, 15.0);
+  EXPECT_EQ(ellipsoid.fibre_endo_deg, 60.0);
+  EXPECT_EQ(ellipsoid.fibre_epi_deg, -60.0);
+  EXPECT_EQ(ellipsoid.ends, "fixed");
+  set_mesh(study, "8,6,3");
+  EXPECT_THAT(mesh_of(study.specimen), testing::ElementsAre(8, 6, 3));
+}
+
+TEST_F(StudyFile, AnEllipsoidThatCannotBeIsRefused) {
+  const auto message_when = [&](std::string_view old, std::string_view replacement) {
+    std::string content = ventricle;
+    content.replace(content.find(old), old.size(), replacement);
+    return message_of([&] { (void)read(content); });
+  };
+  EXPECT_THAT(message_when("[30.0, 60.0]", "[20.0, 60.0]"),
+              AllOf(HasSubstr("outer_axes_mm"), HasSubstr("20 is not beyond the inner 21")));
+  EXPECT_THAT(message_when("base_z_mm = 15.0", "base_z_mm = 51.0"),
+              AllOf(HasSubstr("base_z_mm"), HasSubstr("does not cut")));
+  EXPECT_THAT(message_when("fibre_epi_deg", "fiber_epi_deg"), HasSubstr("fibre_epi_deg"));
+  EXPECT_THAT(message_when("ellipsoid", "elipsoid"), HasSubstr("ellipsoid"));
+}
+
 }  // namespace
 }  // namespace diastole
