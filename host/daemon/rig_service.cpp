@@ -3,6 +3,7 @@
 #include <fmt/chrono.h>
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <chrono>
@@ -63,18 +64,27 @@ double duration_s(const Experiment& experiment, const ProgramPlan& plan) {
   return 1e-6 * static_cast<double>(plan.back().start_us + plan.back().duration_us);
 }
 
+void make_journal_dir(const std::filesystem::path& directory) {
+  std::error_code error;
+  std::filesystem::create_directories(directory, error);
+  if (error || ::access(directory.c_str(), W_OK) != 0) {
+    throw InputError({directory.string(), "", "is no directory in which journals can be written",
+                      "Make it writable, or name another (journal_dir in the rig file, or --journal-dir)."});
+  }
+}
+
 std::string utc_now() { return fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr))); }
 
 }  // namespace
 
 RigService::RigService(RigConfig rig, const RigServiceOptions& options)
     : rig_(std::move(rig)), options_(options), clock_(make_clock(options.conductor)) {
-  std::filesystem::create_directories(rig_.daemon.journal_dir);
   controller_ = std::make_unique<ControllerClient>(*clock_, rig_, [this]() -> std::unique_ptr<ByteLine> {
     return std::make_unique<SerialPort>(rig_.controller.port, rig_.controller.baud);
   });
   controller_->connect();
   instrument_ = rig_.daq.open({options.daq_address, clock_->stands_still() ? conducted_timeout_ms : 0});
+  make_journal_dir(rig_.daemon.journal_dir);
   spdlog::info("controller at {}, instrument {}", rig_.controller.port, instrument_->describe());
   thread_ = std::jthread([this](const std::stop_token& stop) { work(stop); });
 }

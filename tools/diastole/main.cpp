@@ -1,15 +1,20 @@
 // The front door: one program, `diastole`, whose subcommands come from host/cli, estimator/cli and tools/.
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cstdio>
 #include <exception>
 #include <iostream>
+#include <string>
+#include <string_view>
+#include <vector>
 
 #include "estimator/cli/commands.hpp"
 #include "host/cli/host_commands.hpp"
 #include "protocol/contract/command.hpp"
 #include "protocol/contract/exit_code.hpp"
 #include "protocol/contract/input_error.hpp"
+#include "protocol/contract/table_reader.hpp"
 #include "tools/diastole/simulate/simulate.hpp"
 
 namespace {
@@ -25,6 +30,18 @@ A first session, in simulated hardware:
   diastole fit examples/phantom-a.study.toml
 )";
 
+std::vector<std::string> commands_of(const CLI::App& app) {
+  std::vector<std::string> names;
+  for (const CLI::App* command : app.get_subcommands({}))
+    names.push_back(command->get_name());
+  return names;
+}
+
+bool is_command(const CLI::App& app, std::string_view name) {
+  const std::vector<std::string> names = commands_of(app);
+  return std::find(names.begin(), names.end(), name) != names.end();
+}
+
 diastole::ExitCode run(int argc, char** argv) {
   using diastole::ExitCode;
   CLI::App app(overview, "diastole");
@@ -38,6 +55,15 @@ diastole::ExitCode run(int argc, char** argv) {
   diastole::add_host_commands(line);
   diastole::add_simulate(line);
   diastole::add_estimator_commands(line);
+  if (argc < 2) {
+    std::cerr << app.help();
+    return ExitCode::bad_input;
+  }
+  if (const std::string_view first = argv[1]; !first.starts_with('-') && !is_command(app, first)) {
+    std::cerr << "diastole: there is no command \"" << first << "\"\n  The nearest is \""
+              << diastole::nearest_word(first, commands_of(app)) << "\"; `diastole --help` lists them all.\n";
+    return ExitCode::bad_input;
+  }
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
