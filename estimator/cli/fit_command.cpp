@@ -7,6 +7,7 @@
 
 #include "estimator/cli/commands.hpp"
 #include "estimator/fit/study_fit.hpp"
+#include "estimator/io/whole_file.hpp"
 
 namespace diastole {
 namespace {
@@ -41,7 +42,7 @@ void print_parameter(const FittedParameter& parameter) {
 void print_record(const FitRecord& record) {
   for (const FittedParameter& parameter : record.parameters)
     print_parameter(parameter);
-  fmt::print("\nResiduals {:.3f} mm RMS over {} of {}; chi2/dof {:.3f}\n\n", record.rms_mm,
+  fmt::print("\nResiduals {:.3f} mm RMS over {} residuals of the {}; chi2/dof {:.3f}\n\n", record.rms_mm,
              record.residuals_used, record.data, record.chi2_per_dof);
   fmt::print("  frame  measured (kPa)  estimated (kPa)    points  RMS (mm)\n");
   for (const FittedFrame& frame : record.frames) {
@@ -61,8 +62,11 @@ ExitCode run_fit(const FitArguments& arguments, const CommandOutput& out) {
   for (const std::string& start : arguments.starts)
     set_start(study, start);
   const Measurement measurement = read_measurement(study);
-  fmt::print(stderr, "Fitting {} tag points and {} 3-D points in {} frames.\n", measurement.tags.size(),
-             measurement.points.size(), measurement.frames.size());
+  if (arguments.output) require_writable(*arguments.output);
+  fmt::print(stderr, "Fitting {} in {} frames.\n",
+             measurement.tags.empty() ? fmt::format("{} 3-D points", measurement.points.size())
+                                      : fmt::format("{} tag points", measurement.tags.size()),
+             measurement.frames.size());
   StudyFitOptions options;
   options.iteration_limit = arguments.iteration_limit;
   options.on_iteration = [&](const FitIteration& step) {

@@ -1,5 +1,7 @@
 #include "estimator/io/whole_file.hpp"
 
+#include <unistd.h>
+
 #include <fstream>
 #include <iterator>
 #include <system_error>
@@ -7,6 +9,14 @@
 #include "protocol/contract/input_error.hpp"
 
 namespace diastole {
+namespace {
+
+[[noreturn]] void cannot_be_written(const std::filesystem::path& path) {
+  throw InputError({path.string(), "", "cannot be written",
+                    "Check that the folder exists, that you may write there, and that it has room."});
+}
+
+}  // namespace
 
 void write_whole_file(const std::filesystem::path& path, std::string_view content) {
   const std::filesystem::path unfinished = path.string() + ".part";
@@ -17,8 +27,13 @@ void write_whole_file(const std::filesystem::path& path, std::string_view conten
   if (stream) std::filesystem::rename(unfinished, path, error);
   if (!stream || error) {
     std::filesystem::remove(unfinished, error);
-    throw InputError({path.string(), "", "cannot be written", "Check that the folder exists and has room."});
+    cannot_be_written(path);
   }
+}
+
+void require_writable(const std::filesystem::path& path) {
+  const std::filesystem::path folder = std::filesystem::absolute(path).parent_path();
+  if (std::filesystem::is_directory(path) || ::access(folder.c_str(), W_OK) != 0) cannot_be_written(path);
 }
 
 std::string read_whole_file(const std::filesystem::path& path) {

@@ -11,6 +11,9 @@ namespace diastole {
 /// then.
 void write_whole_file(const std::filesystem::path& path, std::string_view content);
 
+/// Throws InputError if `path` cannot become a file: before long work, so that its result is not lost.
+void require_writable(const std::filesystem::path& path);
+
 /// Throws InputError if the file is missing, a folder or unreadable.
 std::string read_whole_file(const std::filesystem::path& path);
 

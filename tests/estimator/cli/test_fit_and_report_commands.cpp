@@ -84,6 +84,12 @@ TEST_F(FitAndReport, AFitThatDoesNotConvergeIsANegativeAnswer) {
   EXPECT_EQ(run(quick_fit({"--iterations", "1", "--json"})).code, ExitCode::negative);
 }
 
+TEST_F(FitAndReport, AnOutputThatCannotBeWrittenIsRefusedBeforeTheFit) {
+  testing::internal::CaptureStderr();
+  EXPECT_THROW((void)run(quick_fit({"-o", file("no/such/folder/fit.json")})), InputError);
+  EXPECT_THAT(testing::internal::GetCapturedStderr(), testing::Not(HasSubstr("iteration")));
+}
+
 TEST_F(FitAndReport, NothingIsLeftWhenThePageCannotBeMade) {
   const std::vector<std::string> request = {"report", folder_.write("junk.txt", "junk").string(), "-o",
                                             file("page.html")};
