@@ -53,6 +53,7 @@ json as_json(const runfile::RecordedRun& run, const runfile::Soundness& soundnes
                 {"events", run.events.size()},
                 {"clock", run.clock},
                 {"problems", soundness.problems},
+                {"stopped_on_request", soundness.stopped_on_request},
                 {"sound", soundness.sound()}};
   document["channels"] = json::object();
   for (const auto& [name, values_kPa] : run.pressure.channels) {
@@ -97,7 +98,8 @@ void show(const runfile::RecordedRun& run, const runfile::Soundness& soundness) 
   for (const runfile::Event& event : run.events)
     fmt::print("  {:.3f} s {} {}: {}\n", event.time_s, event.level, event.code, event.text);
   if (soundness.sound()) {
-    fmt::print("sound: nothing is missing\n");
+    fmt::print("sound: nothing is missing{}\n",
+               soundness.stopped_on_request ? "; the run was stopped on request" : "");
     return;
   }
   fmt::print("not sound:\n");

@@ -9,6 +9,7 @@
 #include "host/runfile/journal_story.hpp"
 #include "protocol/contract/input_error.hpp"
 #include "protocol/runfile/layout.hpp"
+#include "protocol/runfile/soundness.hpp"
 
 namespace diastole {
 namespace {
@@ -191,6 +192,14 @@ void put_events(const JournalStory& story, const TimeAxis& axis, RecordedRun& ru
     const double time_s =
         event.contains("tick") ? axis.of_tick(event.at("tick")) : axis.of_host_ns(event.at("host_ns"));
     run.events.push_back({time_s, event.at("level"), event.at("code"), event.at("text")});
+  }
+  if (story.run_ended) {
+    const std::string reason = story.run_ended->at("reason");
+    if (runfile::is_stop_on_request(reason)) {
+      run.events.push_back(
+          {axis.of_tick(story.run_ended->at("tick")), "info", reason,
+           fmt::format("stopped on request after {} cycles", story.run_ended->at("cycles").get<int64_t>())});
+    }
   }
   std::stable_sort(run.events.begin(), run.events.end(),
                    [](const auto& a, const auto& b) { return a.time_s < b.time_s; });

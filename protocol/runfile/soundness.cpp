@@ -41,8 +41,8 @@ void look_for_holes(std::span<const double> time_s, const StreamFacts& facts, st
   }
 }
 
-/// Triggers of one segment: as many as cycles, one period apart.
-void check_triggers(const RecordedRun& run, size_t number, std::vector<std::string>& problems) {
+/// Triggers of one segment: as many as cycles (or fewer, if the run was stopped on request), one period apart.
+void check_triggers(const RecordedRun& run, size_t number, bool stopped, std::vector<std::string>& problems) {
   const Segment& segment = run.segments[number];
   const double slack_s = 0.5 * period_tolerance * segment.period_s;
   std::vector<double> found;
@@ -50,9 +50,11 @@ void check_triggers(const RecordedRun& run, size_t number, std::vector<std::stri
     if (t >= segment.start_s - slack_s && t < segment.end_s() - slack_s) found.push_back(t);
   }
   const bool holds = segment.waveform == "hold";
-  if (static_cast<int64_t>(found.size()) != segment.cycles && !(holds && found.empty())) {
+  const auto triggers = static_cast<int64_t>(found.size());
+  const bool fits = triggers == segment.cycles || (stopped && triggers < segment.cycles);
+  if (!fits && !(holds && found.empty())) {
     problems.push_back(
-        fmt::format("segment {}: {} triggers for {} cycles", number, found.size(), segment.cycles));
+        fmt::format("segment {}: {} triggers for {} cycles", number, triggers, segment.cycles));
   }
   for (size_t i = 1; i < found.size(); ++i) {
     if (std::abs(found[i] - found[i - 1] - segment.period_s) <= period_tolerance * segment.period_s) continue;
@@ -63,6 +65,10 @@ void check_triggers(const RecordedRun& run, size_t number, std::vector<std::stri
 }
 
 }  // namespace
+
+bool is_stop_on_request(std::string_view code) {
+  return code == "stopped_at_cycle_end" || code == "stopped_now";
+}
 
 Soundness assess(const RecordedRun& run) {
   Soundness soundness;
@@ -78,12 +84,14 @@ Soundness assess(const RecordedRun& run) {
     problems.push_back(fmt::format("{}: {} missing from index {} on: {}", gap.stream, gap.count,
                                    gap.first_index, gap.reason));
   }
+  soundness.stopped_on_request = std::any_of(run.events.begin(), run.events.end(),
+                                             [](const Event& e) { return is_stop_on_request(e.code); });
   look_for_holes(run.pressure.time_s, soundness.pressure, pressure_stream, problems);
   look_for_holes(run.pump.time_s, soundness.pump, pump_stream, problems);
   for (size_t i = 0; i < run.segments.size(); ++i) {
     const Segment& segment = run.segments[i];
     (segment.waveform == "hold" ? soundness.scheduled_holds : soundness.scheduled_cycles) += segment.cycles;
-    check_triggers(run, i, problems);
+    check_triggers(run, i, soundness.stopped_on_request, problems);
   }
   for (const Event& event : run.events) {
     if (event.level == "error") {

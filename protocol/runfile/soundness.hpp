@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "protocol/runfile/run.hpp"
@@ -21,10 +22,14 @@ struct Soundness {
   double duration_s = 0;              ///< of the pressure stream
   int64_t scheduled_cycles = 0;       ///< of all segments that move
   int64_t scheduled_holds = 0;        ///< cycles of waveform "hold", which may be triggered or not
+  bool stopped_on_request = false;    ///< somebody ended it early, in order: fewer triggers are no fault
   std::vector<std::string> problems;  ///< in plain words; empty if the run is sound
 
   [[nodiscard]] bool sound() const { return problems.empty(); }
 };
+
+/// Whether an event's code says that a run was ended early and in order.
+bool is_stop_on_request(std::string_view code);
 
 /// Precondition: the run has passed `check`.
 Soundness assess(const RecordedRun& run);
