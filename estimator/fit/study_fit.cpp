@@ -20,10 +20,16 @@ namespace {
 constexpr double outside_mm = 5.0;  // farther from the body than this a point is not the specimen's
 constexpr double outlier_sigma = 5.0;
 
+double wall_mm(const AnnulusSpecimen& annulus) { return annulus.outer_radius_mm - annulus.inner_radius_mm; }
+double wall_mm(const EllipsoidSpecimen& ellipsoid) {
+  return ellipsoid.outer_axes_mm[0] - ellipsoid.inner_axes_mm[0];
+}
+
 /// Extrapolation beyond an element, as a fraction of it: `outside_mm` through the wall, never more than an
 /// element.
-LocatorOptions locator_for(const AnnulusSpecimen& annulus) {
-  const double element_mm = (annulus.outer_radius_mm - annulus.inner_radius_mm) / annulus.mesh[2];
+LocatorOptions locator_for(const Specimen& specimen) {
+  const double element_mm =
+      std::visit([](const auto& kind) { return wall_mm(kind) / kind.mesh[2]; }, specimen);
   return {.outside_xi = std::clamp(outside_mm / element_mm, 0.25, 1.0)};
 }
 
@@ -189,21 +195,21 @@ FitRecord fit_study(const Study& study, const Measurement& measurement, const St
                       "every measured point is of frame 0, the undeformed state",
                       "Give points of loaded frames: only they tell about stiffness."});
   }
-  const auto& annulus = std::get<AnnulusSpecimen>(study.specimen);
+  const auto* annulus = std::get_if<AnnulusSpecimen>(&study.specimen);
   ElasticModel model = make_model(study);
   const size_t elements = model.mesh().element_count();
   FitRecord record{};
   record.study = study.file.string();
   record.law = study.law.name;
-  record.specimen = "annulus";
-  record.mesh.assign(annulus.mesh.begin(), annulus.mesh.end());
+  record.specimen = annulus != nullptr ? "annulus" : "ellipsoid";
+  record.mesh.assign(mesh_of(study.specimen).begin(), mesh_of(study.specimen).end());
   record.unknowns = model.dofs();
   record.data = data_words(measurement);
 
   const Sought sought = sought_of(study, model);
   ElasticMotion motion(std::move(model), sought.groups);
   FitOptions fit_options;
-  fit_options.locator = locator_for(annulus);
+  fit_options.locator = locator_for(study.specimen);
   fit_options.optimiser.iteration_limit = options.iteration_limit;
   fit_options.on_step = [&](const OptimiserStep& step) {
     if (options.on_iteration) options.on_iteration(record_of(step, study, elements));
@@ -227,7 +233,9 @@ FitRecord fit_study(const Study& study, const Measurement& measurement, const St
   record.residuals = histogram_of(fit);
   record.remarks = remarks_on(record, fit);
   record.section_frame = fit.frames.back().number;
-  record.sections = draw_sections(annulus, motion.mesh(), fit.frames.back(), measurement);
+  if (annulus != nullptr) {
+    record.sections = draw_sections(*annulus, motion.mesh(), fit.frames.back(), measurement);
+  }
   return record;
 }
 
