@@ -20,6 +20,7 @@ void Planner::begin_run(const Program& program, const Settings& settings, Ticks 
   segment_ = 0;
   cycle_in_run_ = 0;
   stop_at_cycle_end_ = stepped_ = false;
+  last_interval_ = Ticks{0};
   phase_ = Phase::run_start;
   plan_next();
 }
@@ -36,29 +37,33 @@ void Planner::begin_travel(bool inflate, std::uint32_t count, Ticks first, Ticks
 }
 
 void Planner::begin_stop(Ticks earliest, std::uint64_t deceleration_steps_per_s2) {
+  if (!next_) return;
   phase_ = Phase::stop;
   index_ = count_ = 0;
-  origin_ = stepped_ ? last_step_ : earliest;
-  if (stepped_ && last_interval_ > Ticks{0}) {
-    const Ticks interval = std::max(last_interval_, earliest - last_step_);
+  if (next_->has(MotionEvent::kRunStart)) {
+    origin_ = next_->tick + kRestBeforeEnd;
+    return;
+  }
+  if (last_interval_ > Ticks{0}) {
+    const Ticks interval = std::max(last_interval_, earliest - last_event_);
     const std::uint64_t speed = static_cast<std::uint64_t>(kTicksPerSecond / interval.count + 1);
     count_ = static_cast<std::uint32_t>((speed * speed + deceleration_steps_per_s2 - 1) /
                                         (2 * deceleration_steps_per_s2));
     inflate_ = last_inflate_;
     length_ = interval * (2 * std::int64_t{count_} + 1);
   }
-  if (count_ == 0) origin_ = std::max(origin_, earliest);
+  origin_ = count_ > 0 ? last_event_ : std::max(earliest, last_event_ + kRestBeforeEnd);
   plan_next();
 }
 
 void Planner::pop() {
-  if (next_->has(MotionEvent::kStep)) {
-    const bool inflate = next_->has(MotionEvent::kInflate);
-    last_interval_ = stepped_ && inflate == last_inflate_ ? next_->tick - last_step_ : Ticks{0};
-    last_step_ = next_->tick;
-    last_inflate_ = inflate;
-    stepped_ = true;
-  }
+  const bool step = next_->has(MotionEvent::kStep);
+  const bool inflate = next_->has(MotionEvent::kInflate);
+  const bool goes_on = step && stepped_ && inflate == last_inflate_;
+  last_interval_ = goes_on ? next_->tick - last_event_ : Ticks{0};
+  last_event_ = next_->tick;
+  last_inflate_ = inflate;
+  stepped_ = step;
   plan_next();
 }
 

@@ -38,20 +38,26 @@ struct MotionEvent {
 
 class Planner {
  public:
+  /// From the last event to the end of a stop that needs no step: two events cannot share a tick of the timer.
+  static constexpr Ticks kRestBeforeEnd = microseconds(1'000);
+
   /// Plans the program from `start`. `program` must outlive the run. Precondition: check_program accepted it.
   void begin_run(const Program& program, const Settings& settings, Ticks start, Steps position);
   /// Plans `count` steps at even intervals (homing).
   void begin_travel(bool inflate, std::uint32_t count, Ticks first, Ticks interval);
   /// After the cycle being planned: ramp to 0 and end.
   void stop_at_cycle_end() { stop_at_cycle_end_ = true; }
-  /// Comes to rest from the last popped step at no more than `deceleration_steps_per_s2`; no step before
-  /// `earliest`. With v = 1/Δ the last speed, n = ⌈v²/2a⌉ steps bring rest after (2n + 1)Δ:
-  /// t_k = (2n + 1) Δ (1 - √(1 - 2k/(2n + 1))).
+  /// Comes to rest from the last popped event at no more than `deceleration_steps_per_s2`: what has been popped
+  /// will happen, so everything planned from here lies after it as well as at or after `earliest`. With v = 1/Δ
+  /// the speed between the last two steps, n = ⌈v²/2a - 1/2⌉ more steps bring rest after (2n + 1)Δ:
+  /// t_k = (2n + 1) Δ (1 - √(1 - 2k/(2n + 1))). Where the program itself is at rest (n = 0) the end comes
+  /// kRestBeforeEnd after the last event. Near a turning point the Δ of the past overstates the speed, so the
+  /// stop may go one step beyond it. A run not begun still begins; one whose end has been popped ends as planned.
   void begin_stop(Ticks earliest, std::uint64_t deceleration_steps_per_s2);
   /// Forgets everything planned.
   void clear() { next_.reset(); }
 
-  /// The next event, or nullptr when all have been popped. Ticks never decrease.
+  /// The next event, or nullptr when all have been popped. Ticks increase.
   [[nodiscard]] const MotionEvent* peek() const { return next_ ? &*next_ : nullptr; }
   void pop();
 
@@ -90,11 +96,11 @@ class Planner {
   std::uint64_t cycle_in_run_ = 0;
   bool stop_at_cycle_end_ = false;
 
-  // The last two steps popped, from which a stop takes its speed.
-  Ticks last_step_;
-  Ticks last_interval_;
+  // The last event popped, from which a stop takes its place and its speed.
+  Ticks last_event_;
+  Ticks last_interval_;  ///< to the step before it in the same direction; 0 without one: at rest or turning
   bool last_inflate_ = false;
-  bool stepped_ = false;
+  bool stepped_ = false;  ///< the last event was a step
 };
 
 }  // namespace diastole::firmware

@@ -132,8 +132,9 @@ struct AddSegment {
   }
 };
 
-// Host → controller: checks the whole program against the limits. Accepted: Ack, state armed, and
-// SegmentPlanned for every segment. Refused: Nak with the limit, the value asked and the value allowed.
+// Host → controller: checks the whole program against the limits. Accepted: StateChanged (armed), Ack, and
+// behind the Ack one SegmentPlanned for every segment, in order; the plan is complete when as many have come
+// as segments were added. Refused: Nak with the limit, the value asked and the value allowed.
 //
 //   offset size field
 //        0    2 request_id                   chosen by the host; the answer repeats it
@@ -170,7 +171,7 @@ struct Arm {
   }
 };
 
-// Controller → host: what one segment of the armed program asks of the rig.
+// Controller → host: what one segment of the armed program asks of the rig. Follows Arm's Ack.
 //
 //   offset size field
 //        0    2 segment                      index, from 0

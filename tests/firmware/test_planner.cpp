@@ -79,7 +79,7 @@ INSTANTIATE_TEST_SUITE_P(Motions, StepTimes,
                                          Motion{Waveform::sinusoidal, 20'000'000, 4'000'000},
                                          Motion{Waveform::sinusoidal, 16'000'000, 60'000'000}));
 
-TEST(Planner, TimesNeverDecreaseAndEveryCycleEndsWhereItBegan) {
+TEST(Planner, TimesIncreaseAndEveryCycleEndsWhereItBegan) {
   const Program program = program_of({{Waveform::parabolic, 50, 40'000'000, 0, 1'200'000},
                                       {Waveform::sinusoidal, 30, 20'000'000, 10'000'000, 2'000'000},
                                       {Waveform::sinusoidal, 20, 10'000'000, 5'000'000, 1'000'000}});
@@ -89,7 +89,7 @@ TEST(Planner, TimesNeverDecreaseAndEveryCycleEndsWhereItBegan) {
   std::int32_t offset = 0;
   Ticks before{0};
   for (const MotionEvent& event : plan(program, kSettings)) {
-    ASSERT_GE(event.tick, before);
+    ASSERT_GT(event.tick, before);
     before = event.tick;
     if (event.has(MotionEvent::kSegmentStart)) {
       offset = kSettings.steps_of_nL(program.segments[segment++].offset_nL).count;
@@ -222,6 +222,44 @@ TEST_P(StopPhase, DeceleratesWithinTheLimitFromAnyPhase) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Phases, StopPhase, testing::Range(0, 160, 3));
+
+/// The timer needs some time between two events, and only one event can be the end.
+void expect_orderly_end(Planner planner, Ticks after) {
+  bool ended = false;
+  for (; planner.peek() != nullptr; planner.pop()) {
+    ASSERT_FALSE(ended);
+    ASSERT_GE((planner.peek()->tick - after).count, microseconds(100).count);
+    after = planner.peek()->tick;
+    ended = planner.peek()->has(MotionEvent::kEnd);
+  }
+  ASSERT_TRUE(ended);
+}
+
+class StopBehind : public testing::TestWithParam<Waveform> {};
+
+TEST_P(StopBehind, EveryEventLiesLaterThanWhatIsQueued) {
+  const Program program =
+      program_of({{GetParam(), 2, 1'000'000, 0, 800'000}, {GetParam(), 1, 800'000, 500'000, 700'000}});
+  Planner planner;
+  planner.begin_run(program, kSettings, Ticks{1'000'000}, Steps{30});
+  Ticks last{0};
+  std::size_t stops = 0;
+  for (; planner.peek() != nullptr; planner.pop(), ++stops) {
+    for (const std::int64_t lead_us : {-9'000, 0, 1'000}) {
+      Planner stopped = planner;
+      const Ticks earliest = std::min(last + microseconds(lead_us), planner.peek()->tick);
+      stopped.begin_stop(earliest, kSettings.stop_steps_per_s2());
+      SCOPED_TRACE(stops);
+      ASSERT_NO_FATAL_FAILURE(expect_orderly_end(stopped, last));
+    }
+    last = planner.peek()->tick;
+  }
+  EXPECT_GT(stops, 700U);
+  planner.begin_stop(last + microseconds(1'000), kSettings.stop_steps_per_s2());
+  EXPECT_EQ(planner.peek(), nullptr) << "a second end";
+}
+
+INSTANTIATE_TEST_SUITE_P(Profiles, StopBehind, testing::Values(Waveform::parabolic, Waveform::sinusoidal));
 
 }  // namespace
 }  // namespace diastole::firmware

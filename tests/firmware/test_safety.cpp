@@ -102,6 +102,7 @@ TEST(Safety, AcceptedProgramsReportTheirSegments) {
   for (int i = 0; i < 40; ++i)
     bench.add_segment(Waveform::parabolic, 2, 20'000'000, 1'000'000);
   ASSERT_TRUE(bench.ask(wire::Arm::example()));
+  EXPECT_TRUE(bench.heard.planned.empty()) << "the Ack comes first";
   bench.run_for(microseconds(500'000));
   ASSERT_EQ(bench.heard.planned.size(), 40U);
   EXPECT_EQ(bench.heard.planned[39].segment, 39);
