@@ -7,6 +7,10 @@
 // normal is along z). 5x5 Gauss points integrate all of it exactly (the integrand is of degree 8 along each
 // xi).
 //
+// A loaded face whose rim is free (a beam pushed from one side) has an unsymmetric tangent. Its symmetric part
+// is used: the forces, and so the solution, are exact, but Newton's method converges linearly, and may stall
+// when such a face is pulled hard.
+//
 // Units: mm, mm^2, mm^3; times kPa by the caller.
 
 #include <Eigen/Dense>

@@ -37,10 +37,11 @@ class ElasticSystem;
 struct ElasticOptions {
   std::vector<double> parameters{};  ///< the law's, in its order; the same in all elements
   PressureSpace pressure_space = PressureSpace::per_element;
-  std::optional<HeldDofs> held{};                    ///< default: bottom and top faces bonded
-  std::optional<std::vector<ElementFace>> loaded{};  ///< default: the inner faces
-  MaterialAxesField material_axes{};                 ///< default: the coordinate axes
-  double volume_stiffness_kPa = 0.0;                 ///< kappa of element_mechanics.hpp
+  std::optional<HeldDofs> held{};  ///< default: bottom and top faces bonded
+  std::optional<std::vector<ElementFace>>
+      loaded{};                       ///< default: the inner faces; see cavity_load.hpp on free rims
+  MaterialAxesField material_axes{};  ///< default: the coordinate axes
+  double volume_stiffness_kPa = 0.0;  ///< kappa of element_mechanics.hpp
   SolveOptions solve{};
   size_t threads = 0;  ///< 0: as many as the machine has
 };
