@@ -80,7 +80,8 @@ TEST(Documents, ALinkedSymbolStandsInTheLinkedFile) {
 }
 
 TEST(Documents, EveryBareSourcePathExists) {
-  static const std::regex path(R"(`((protocol|firmware|host|estimator|tools|tests|docs|examples|cmake)/[\w./-]+)`)");
+  static const std::regex path(
+      R"(`((protocol|firmware|host|estimator|tools|tests|docs|examples|cmake)/[\w./-]+)`)");
   for (const fs::path& document : documents()) {
     const std::string text = text_of(document);
     for (std::sregex_iterator match(text.begin(), text.end(), path), end; match != end; ++match) {
