@@ -19,14 +19,45 @@ constexpr std::array optional_texts{"name", "site", "operator", "specimen"};
 
 double disc_area_m2(double diameter_mm) { return std::numbers::pi / 4 * diameter_mm * diameter_mm * 1e-6; }
 
+/// The controller counts microsteps with a sign in 32 bits, their volume in whole picolitres, and the hose's
+/// inertance in whole kg/m4; what does not fit would switch a limit off.
+void check_geometry(const TableReader& rig, const RigConfig& config) {
+  constexpr double least_microstep_pL = 1000;  // so that whole picolitres are exact to 0.05 %
+  constexpr double most_microstep_pL = 4e9;
+  constexpr double most_inertance_kg_m4 = UINT32_MAX;
+  const double microstep_pL = 1e9 * config.microstep_mL;
+  if (microstep_pL < least_microstep_pL || microstep_pL > most_microstep_pL) {
+    rig.fail("bore_mm",
+             fmt::format(
+                 "gives with screw, steps and microsteps {:g} pL a microstep; {:g} to {:g} pL are possible",
+                 microstep_pL, least_microstep_pL, most_microstep_pL),
+             "Correct bore_mm, screw_rev_per_cm, steps_per_rev or microsteps.");
+  }
+  const double inertance_kg_m4 = config.hose_inertance_kg_m4;
+  if (inertance_kg_m4 < 1 || inertance_kg_m4 > most_inertance_kg_m4) {
+    rig.fail(
+        "hose_bore_mm",
+        fmt::format("gives with length and density an inertance of {:g} kg/m4; 1 to {:g} kg/m4 are possible",
+                    inertance_kg_m4, most_inertance_kg_m4),
+        "Correct hose_bore_mm, hose_length_m or fluid_density_kg_m3.");
+  }
+  const double travel_microsteps = config.controller.limits.travel_mL / config.microstep_mL;
+  if (travel_microsteps > INT32_MAX) {
+    rig.fail("bore_mm",
+             fmt::format("makes travel_mL = {:g} in [controller.limits] {:g} microsteps; {} can be counted",
+                         config.controller.limits.travel_mL, travel_microsteps, INT32_MAX),
+             "Lower travel_mL to what the pump has, or use fewer microsteps.");
+  }
+}
+
 void read_geometry(TableReader rig, RigConfig& config) {
   auto& attributes = config.attributes;
-  const double bore_mm = rig.number("bore_mm", {.above = 0});
-  const double screw_rev_per_cm = rig.number("screw_rev_per_cm", {.above = 0});
-  const int64_t steps_per_rev = rig.integer("steps_per_rev", {.at_least = 1});
-  const double hose_length_m = rig.number("hose_length_m", {.above = 0});
-  const double hose_bore_mm = rig.number("hose_bore_mm", {.above = 0});
-  const double density_kg_m3 = rig.number("fluid_density_kg_m3", {.above = 0});
+  const double bore_mm = rig.number("bore_mm", {.at_least = 1, .at_most = 1000});
+  const double screw_rev_per_cm = rig.number("screw_rev_per_cm", {.at_least = 0.01, .at_most = 1000});
+  const int64_t steps_per_rev = rig.integer("steps_per_rev", {.at_least = 1, .at_most = 100'000});
+  const double hose_length_m = rig.number("hose_length_m", {.at_least = 0.001, .at_most = 1000});
+  const double hose_bore_mm = rig.number("hose_bore_mm", {.at_least = 0.1, .at_most = 1000});
+  const double density_kg_m3 = rig.number("fluid_density_kg_m3", {.at_least = 1, .at_most = 30'000});
   attributes = {{"bore_mm", bore_mm},
                 {"screw_rev_per_cm", screw_rev_per_cm},
                 {"steps_per_rev", steps_per_rev},
@@ -46,6 +77,7 @@ void read_geometry(TableReader rig, RigConfig& config) {
   config.microstep_mL = 1e6 * disc_area_m2(bore_mm) / microsteps_per_m;
   config.hose_inertance_kg_m4 = density_kg_m3 * hose_length_m / disc_area_m2(hose_bore_mm);
   attributes["volume_per_step_mL"] = config.microstep_mL;
+  check_geometry(rig, config);
 }
 
 MotionLimits read_limits(TableReader table) {
@@ -129,6 +161,7 @@ RigConfig read_rig(const std::filesystem::path& path) { return read_rig(TableRea
 RigConfig read_rig(TableReader root) {
   root.expect_format("diastole-rig", 1);
   RigConfig config;
+  config.file = root.file();
   config.controller = read_controller(root.table("controller"));
   read_geometry(root.table("rig"), config);
   config.daq = read_daq(root.table("daq"));

@@ -53,6 +53,7 @@ struct DaemonConfig {
 };
 
 struct RigConfig {
+  std::string file;  ///< for messages
   std::map<std::string, runfile::Attribute, std::less<>>
       attributes;  ///< of /rig, volume_per_step_mL included
   ControllerConfig controller;
@@ -62,7 +63,8 @@ struct RigConfig {
   double hose_inertance_kg_m4 = 0;  ///< density x length / bore area
 };
 
-/// Throws InputError with file, line and key.
+/// Throws InputError with file, line and key; also when a microstep or the hose's inertance, as they follow
+/// from the geometry, are beyond what the controller can count with.
 RigConfig read_rig(const std::filesystem::path& path);
 RigConfig read_rig(TableReader root);
 

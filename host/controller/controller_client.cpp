@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <random>
 
 #include "protocol/contract/input_error.hpp"
@@ -15,7 +16,7 @@ namespace {
 
 constexpr uint64_t ns_per_ms = 1'000'000;
 constexpr uint64_t ns_per_us = 1'000;
-constexpr uint64_t heartbeat_interval_ns = 80 * ns_per_ms;
+constexpr uint64_t heartbeat_interval_ns = 50 * ns_per_ms;
 constexpr uint64_t time_question_interval_ns = 250 * ns_per_ms;
 constexpr uint64_t time_answer_patience_ns = 20 * ns_per_ms;
 constexpr uint64_t fine_step_ns = 200 * ns_per_us;  // while an answer is awaited
@@ -23,7 +24,57 @@ constexpr uint64_t answer_patience_ns = 1'000 * ns_per_ms;
 constexpr uint64_t open_patience_ns = 1'500 * ns_per_ms;
 constexpr uint64_t silence_patience_ns = 1'000 * ns_per_ms;
 
-uint32_t whole(double value) { return static_cast<uint32_t>(std::llround(value)); }
+/// A quantity of a file on its way into a message: `value` in the wire's unit, and what the wire can carry.
+struct Quantity {
+  const std::string& file;
+  std::string place;
+  double value;
+  const char* unit;
+  uint32_t least = 0;
+  uint32_t most = UINT32_MAX;
+};
+
+/// The nearest whole number. Throws InputError if it lies outside the range.
+uint32_t whole(const Quantity& quantity) {
+  const double nearest = std::round(quantity.value);
+  if (nearest >= quantity.least && nearest <= quantity.most) return static_cast<uint32_t>(nearest);
+  throw InputError({quantity.file, quantity.place,
+                    fmt::format("comes to {:g} {}, and the controller takes {} to {} {}", quantity.value,
+                                quantity.unit, quantity.least, quantity.most, quantity.unit),
+                    "Change it so that it lies in this range."});
+}
+
+/// Bytes per second on the line, with everything that comes beside the positions.
+double line_load_B_s(double position_rate_Hz, const Experiment& experiment) {
+  constexpr double frame_B = 12;  // header, CRC, COBS
+  constexpr double batch_head_B = 17;
+  constexpr double positions_a_batch = 30;          // at least, while a run is on
+  constexpr double trigger_B = 2 * (frame_B + 16);  // a cycle may also begin a segment
+  constexpr double background_B_s = 500;            // time answers, acknowledgements, states
+  double shortest_period_s = std::numeric_limits<double>::infinity();
+  for (const ExperimentSegment& segment : experiment.segments)
+    shortest_period_s = std::min(shortest_period_s, segment.period_s);
+  return position_rate_Hz * (sizeof(int32_t) + (frame_B + batch_head_B) / positions_a_batch) +
+         trigger_B / shortest_period_s + background_B_s;
+}
+
+/// Positions follow the samples, between the 300 Hz that a run file promises and what any use of them needs.
+double position_rate_Hz(const Experiment& experiment, const ControllerConfig& controller) {
+  constexpr double least_Hz = 300;
+  constexpr double most_Hz = 1000;
+  constexpr double bits_a_byte = 10;
+  constexpr double usable = 0.8;  // the rest is for repetitions
+  const double rate_Hz = std::clamp(experiment.sample_rate_Hz, least_Hz, most_Hz);
+  const double load_baud = bits_a_byte / usable * line_load_B_s(rate_Hz, experiment);
+  if (load_baud <= controller.baud) return rate_Hz;
+  throw InputError(
+      {experiment.file, "sample_rate_Hz",
+       fmt::format("with {:g} positions/s and these periods the line to the controller needs {:.0f} "
+                   "baud, and it has {}",
+                   rate_Hz, load_baud, controller.baud),
+       fmt::format("Raise baud in the rig file{}, or lengthen the shortest period_s.",
+                   rate_Hz > least_Hz ? ", lower sample_rate_Hz (to 300 at the least)" : "")});
+}
 
 struct LimitInWords {
   double scale;  // wire's unit to the user's
@@ -87,6 +138,10 @@ std::string remedy_for(wire::Refusal refusal) {
       return "`diastole status` tells the state; an unhomed pump needs `diastole home` first.";
     case wire::Refusal::estop_pressed:
       return "Make the rig safe and release the emergency stop.";
+    case wire::Refusal::malformed:
+      return "A number in the rig or experiment file is beyond what this firmware takes; restart the daemon "
+             "after "
+             "a change of the rig file.";
     case wire::Refusal::limit_switch_closed:
       return "Free the piston from the far limit switch by hand, then `diastole home`.";
     default:
@@ -150,42 +205,53 @@ void ControllerClient::greet() {
 
 void ControllerClient::configure() {
   const MotionLimits& limits = rig_.controller.limits;
+  const auto limit = [&](const char* key, double value, const char* unit, uint32_t most) {
+    return whole({rig_.file, std::string("controller.limits.") + key, value, unit, 1, most});
+  };
   wire::Configure message;
-  microstep_pL_ = whole(1e9 * rig_.microstep_mL);
+  microstep_pL_ =
+      whole({rig_.file, "rig, volume of one microstep", 1e9 * rig_.microstep_mL, "pL", 1, 4'000'000'000});
   message.microstep_pL = microstep_pL_;
-  message.travel_uL = whole(1e3 * limits.travel_mL);
-  message.flow_uL_per_s = whole(1e3 * limits.flow_mL_s);
-  message.acceleration_uL_per_s2 = whole(1e3 * limits.acceleration_mL_s2);
-  message.step_rate_Hz = whole(limits.step_rate_Hz);
-  message.pressure_Pa = whole(1e3 * limits.pressure_kPa);
-  message.inertance_kg_per_m4 = whole(rig_.hose_inertance_kg_m4);
+  message.travel_uL = limit("travel_mL", 1e3 * limits.travel_mL, "uL", 50'000'000);
+  message.flow_uL_per_s = limit("flow_mL_s", 1e3 * limits.flow_mL_s, "uL/s", 10'000'000);
+  message.acceleration_uL_per_s2 =
+      limit("acceleration_mL_s2", 1e3 * limits.acceleration_mL_s2, "uL/s2", 1'000'000'000);
+  message.step_rate_Hz = limit("step_rate_Hz", limits.step_rate_Hz, "microsteps/s", 400'000);
+  message.pressure_Pa = limit("pressure_kPa", 1e3 * limits.pressure_kPa, "Pa", 10'000'000);
+  message.inertance_kg_per_m4 =
+      whole({rig_.file, "rig, inertance of the hose", rig_.hose_inertance_kg_m4, "kg/m4", 1});
   message.lease_us = static_cast<uint32_t>(rig_.controller.lease_ms * 1000);
-  message.homing_flow_uL_per_s = whole(1e3 * limits.homing_flow_mL_s);
+  message.homing_flow_uL_per_s = limit("homing_flow_mL_s", 1e3 * limits.homing_flow_mL_s, "uL/s", 10'000'000);
   demand(message);
 }
 
 ProgramPlan ControllerClient::load(const Experiment& experiment) {
+  const double positions_Hz = position_rate_Hz(experiment, rig_.controller);
   demand(wire::ClearProgram{});
   for (const ExperimentSegment& segment : experiment.segments) {
+    const auto index = static_cast<uint16_t>(&segment - experiment.segments.data());
+    const auto quantity = [&](const char* key, double value, const char* unit) {
+      return whole({experiment.file, fmt::format("segment[{}].{}", index, key), value, unit});
+    };
     wire::AddSegment message;
     message.waveform = segment.waveform;
     message.cycles = static_cast<uint32_t>(segment.cycles);
-    message.stroke_nL = whole(1e6 * segment.stroke_mL);
-    message.offset_nL = whole(1e6 * segment.offset_mL);
-    message.period_us = whole(1e6 * segment.period_s);
+    message.stroke_nL = quantity("stroke_mL", 1e6 * segment.stroke_mL, "nL");
+    message.offset_nL = quantity("offset_mL", 1e6 * segment.offset_mL, "nL");
+    message.period_us = quantity("period_s", 1e6 * segment.period_s, "us");
     Answer answer = request(message);
     if (answer.nak) {
-      answer.nak->segment = static_cast<uint16_t>(&segment - experiment.segments.data());
+      answer.nak->segment = index;
       refuse_program(experiment, *answer.nak);
     }
   }
   plan_.clear();
   wire::Arm arm;
   arm.gate_every = static_cast<uint16_t>(experiment.gate_every);
-  arm.rest_us = whole(1e6 * experiment.rest_s);
-  arm.ttl_width_us = whole(1e3 * rig_.controller.ttl_width_ms);
-  const double ticks = static_cast<double>(hello_->tick_rate_Hz) / std::max(300.0, experiment.sample_rate_Hz);
-  arm.position_period_ticks = std::max(1'000U, static_cast<uint32_t>(ticks));
+  arm.rest_us = whole({experiment.file, "rest_s", 1e6 * experiment.rest_s, "us"});
+  arm.ttl_width_us =
+      whole({rig_.file, "controller.ttl_width_ms", 1e3 * rig_.controller.ttl_width_ms, "us", 1});
+  arm.position_period_ticks = static_cast<uint32_t>(hello_->tick_rate_Hz / positions_Hz);
   const Answer answer = request(arm);
   if (answer.nak && (answer.nak->refusal == wire::Refusal::limit_exceeded ||
                      answer.nak->refusal == wire::Refusal::unknown_waveform)) {
@@ -199,6 +265,8 @@ ProgramPlan ControllerClient::load(const Experiment& experiment) {
     turn();
   return plan_;
 }
+
+void ControllerClient::unload() { demand(wire::ClearProgram{}); }
 
 void ControllerClient::home() { demand(wire::Home{.lease_id = lease_id_}); }
 
@@ -255,7 +323,7 @@ void ControllerClient::receive() {
                               [&](const wire::SegmentPlanned& m) { plan_.push_back(m); },
                               [&](const auto& m) {
                                 if constexpr (std::is_constructible_v<ControllerEvent, decltype(m)>) {
-                                  events_.emplace_back(m);
+                                  bring_forward(events_.emplace_back(m));
                                 }
                               },
                           });
@@ -265,15 +333,29 @@ void ControllerClient::receive() {
 
 template <class Message>
 void ControllerClient::take_answer(const Message& message) {
-  if (awaited_ != message.request_id) {
-    if constexpr (std::is_same_v<Message, wire::Nak>) events_.emplace_back(message);
-    return;
+  bool mine = awaited_ == message.request_id;
+  if constexpr (std::is_same_v<Message, wire::Nak>) {
+    // A request that cannot be decoded is refused without its number.
+    mine = mine || (awaited_ && message.refusal == wire::Refusal::malformed && message.request_id == 0 &&
+                    message.request_type == awaited_type_);
+    if (!mine) events_.emplace_back(message);
   }
+  if (!mine) return;
   awaited_.reset();
   if constexpr (std::is_same_v<Message, wire::Hello>) answer_.hello = message;
   if constexpr (std::is_same_v<Message, wire::Ack>) answer_.ack = message;
   if constexpr (std::is_same_v<Message, wire::Nak>) answer_.nak = message;
-  if constexpr (std::is_same_v<Message, wire::Status>) answer_.status = message;
+  if constexpr (std::is_same_v<Message, wire::Status>) answer_.status = last_known_ = message;
+}
+
+void ControllerClient::bring_forward(const ControllerEvent& event) {
+  if (const auto* change = std::get_if<wire::StateChanged>(&event)) last_known_.state = change->to;
+  if (const auto* raised = std::get_if<wire::FaultRaised>(&event)) last_known_.fault = raised->fault;
+  if (std::holds_alternative<wire::Trigger>(event)) ++last_known_.triggers;
+  if (const auto* batch = std::get_if<wire::PositionBatch>(&event); batch != nullptr && batch->count > 0)
+    last_known_.position_microsteps = batch->position_microsteps[batch->count - 1U];
+  if (const auto* ended = std::get_if<wire::RunEnded>(&event))
+    last_known_.position_microsteps = ended->position_microsteps;
 }
 
 void ControllerClient::transmit() {
@@ -333,6 +415,7 @@ template <class Message>
 ControllerClient::Answer ControllerClient::request(Message message) {
   if (line_ == nullptr) fail("is not connected", "Check cable and power; the daemon reconnects by itself.");
   answer_ = {};
+  awaited_type_ = static_cast<uint8_t>(Message::kType);
   awaited_ = post(message);
   const uint64_t end_ns = clock_.now_ns() + answer_patience_ns;
   while (awaited_ && line_ != nullptr && clock_.now_ns() < end_ns)

@@ -24,7 +24,8 @@ class ControllerClient final : public Controller {
   ControllerClient(Clock& clock, const RigConfig& rig, OpenLine open_line);
 
   /// Opens the line, checks that both sides speak the same protocol and sends geometry and limits.
-  /// Throws HardwareError with the remedy in words.
+  /// Throws HardwareError with the remedy in words, InputError if a number of the rig file is beyond what the
+  /// protocol can carry.
   void connect();
   void disconnect();
   [[nodiscard]] bool connected() const { return line_ != nullptr && hello_.has_value(); }
@@ -32,12 +33,19 @@ class ControllerClient final : public Controller {
   [[nodiscard]] const wire::Hello& hello() const { return *hello_; }
   [[nodiscard]] uint32_t microstep_pL() const { return microstep_pL_; }
 
-  /// Loads and checks a whole program; afterwards the controller is armed. A program beyond a limit throws
-  /// InputError naming the experiment's segment, the limit, what was asked and what is allowed.
+  /// Loads and checks a whole program; afterwards the controller is armed, and will report positions at the
+  /// sample rate, but no slower than 300 Hz and no faster than 1000 Hz. A program beyond a limit throws
+  /// InputError naming the experiment's segment, the limit, what was asked and what is allowed; so does one
+  /// whose reports are more than the line's baud rate carries.
   ProgramPlan load(const Experiment& experiment);
+  /// Forgets the program; an armed controller is then homed.
+  void unload();
   void home();
   void clear_fault();
   wire::Status status();
+  /// The last status, brought forward by the events since: state, fault, position and triggers are of now, or
+  /// a batch of positions old.
+  [[nodiscard]] const wire::Status& last_known() const { return last_known_; }
 
   void service() override;
   [[nodiscard]] uint64_t next_due_ns() const override;
@@ -71,6 +79,7 @@ class ControllerClient final : public Controller {
   void take(const wire::TimeSync& sync);
   template <class Message>
   void take_answer(const Message& message);
+  void bring_forward(const ControllerEvent& event);
   void broke(std::string reason);
   [[noreturn]] void fail(std::string problem, std::string remedy) const;
 
@@ -89,7 +98,9 @@ class ControllerClient final : public Controller {
   uint32_t time_token_ = 0;
   uint64_t time_asked_ns_ = 0;  // 0: no question open
   std::optional<uint16_t> awaited_;
+  uint8_t awaited_type_ = 0;
   Answer answer_;
+  wire::Status last_known_;
   ProgramPlan plan_;
   std::vector<ControllerEvent> events_;
 };

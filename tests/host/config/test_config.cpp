@@ -50,6 +50,20 @@ TEST(RigConfig, MistakesAreNamedWithTheirPlace) {
               AllOf(HasSubstr("line"), HasSubstr("70000")));
 }
 
+TEST(RigConfig, GeometryThatTheControllerCannotCountWithIsRefused) {
+  const std::string good = example("rig.toml");
+  const auto refusal = [](const std::string& text) {
+    return message_of<InputError>([&] { rig_from(text); });
+  };
+  EXPECT_THAT(refusal(changed(good, "hose_bore_mm = 12.0", "hose_bore_mm = 1.2")),
+              AllOf(HasSubstr("line"), HasSubstr("rig.hose_bore_mm"), HasSubstr("inertance")));
+  EXPECT_THAT(refusal(changed(good, "bore_mm = 100.0", "bore_mm = 0.001")), HasSubstr("rig.bore_mm"));
+  EXPECT_THAT(refusal(changed(good, "bore_mm = 100.0", "bore_mm = 2.0")),
+              AllOf(HasSubstr("rig.bore_mm"), HasSubstr("travel_mL")));
+  const std::string narrow = changed(good, "bore_mm = 100.0", "bore_mm = 1.0");
+  EXPECT_THAT(refusal(narrow), AllOf(HasSubstr("rig.bore_mm"), HasSubstr("pL")));
+}
+
 TEST(Experiment, TheExampleIsThePapersSession) {
   const Experiment gel = parse_experiment(example("gel.experiment.toml"), "gel.experiment.toml");
   ASSERT_EQ(gel.segments.size(), 1U);

@@ -80,6 +80,64 @@ TEST_F(ClientOnDesk, AnUnhomedPumpDoesNotRunAndTheRemedyIsNamed) {
   EXPECT_THAT(message, HasSubstr("diastole home"));
 }
 
+TEST_F(ClientOnDesk, ANumberThatTheWireCannotCarryIsRefusedByNameInsteadOfWrapping) {
+  rig.hose_inertance_kg_m4 = 4.5e9;
+  EXPECT_THAT(message_of<InputError>([&] { client.connect(); }),
+              AllOf(HasSubstr("inertance"), HasSubstr("4.5e+09"), HasSubstr("4294967295")));
+  rig = example_rig();
+  rig.microstep_mL = 1e-10;
+  EXPECT_THAT(message_of<InputError>([&] { client.connect(); }),
+              AllOf(HasSubstr("microstep"), HasSubstr("pL")));
+}
+
+TEST_F(ClientOnDesk, ARequestThatTheControllerCannotReadIsToldAsRefused) {
+  rig.controller.lease_ms = 50;  // the protocol begins at 100
+  EXPECT_THAT(message_of<HardwareError>([&] { client.connect(); }),
+              AllOf(HasSubstr("refused"), HasSubstr("out of range")));
+}
+
+TEST_F(ClientOnDesk, PositionsFollowTheSampleRateWithinBounds) {
+  client.connect();
+  home();
+  for (const auto& [sample_rate_Hz, positions_Hz] :
+       {std::pair{20'000.0, 1000.0}, {700.0, 700.0}, {50.0, 300.0}}) {
+    Experiment experiment = parse_experiment(gel, "gel.experiment.toml");
+    experiment.sample_rate_Hz = sample_rate_Hz;
+    client.load(experiment);
+    client.take_events();
+    client.start();
+    pass(3);
+    size_t batches = 0;
+    bool completed = false;
+    for (const ControllerEvent& event : client.take_events()) {
+      EXPECT_FALSE(std::holds_alternative<wire::FaultRaised>(event));
+      if (const auto* ended = std::get_if<wire::RunEnded>(&event))
+        completed = ended->reason == wire::RunEnd::completed;
+      const auto* batch = std::get_if<wire::PositionBatch>(&event);
+      if (batch == nullptr) continue;
+      ++batches;
+      EXPECT_EQ(batch->period_ticks, static_cast<uint32_t>(client.hello().tick_rate_Hz / positions_Hz));
+    }
+    EXPECT_GT(batches, 5U);
+    EXPECT_TRUE(completed) << sample_rate_Hz;
+  }
+}
+
+TEST_F(ClientOnDesk, AProgramThatTheLineCannotReportIsRefusedBeforeMotion) {
+  rig.controller.baud = 38'400;
+  client.connect();
+  home();
+  Experiment experiment = parse_experiment(gel, "gel.experiment.toml");
+  EXPECT_EQ(client.load(experiment).size(), 1U);
+  experiment.sample_rate_Hz = 1000;
+  EXPECT_THAT(message_of<InputError>([&] { client.load(experiment); }),
+              AllOf(HasSubstr("gel.experiment.toml"), HasSubstr("sample_rate_Hz"), HasSubstr("38400"),
+                    HasSubstr("baud")));
+  rig.controller.baud = 9600;
+  experiment.sample_rate_Hz = 300;
+  EXPECT_THAT(message_of<InputError>([&] { client.load(experiment); }), HasSubstr("9600"));
+}
+
 TEST_F(ClientOnDesk, ClocksAreCompared) {
   client.connect();
   client.take_events();
