@@ -16,6 +16,7 @@ using nlohmann::json;
 constexpr double ns_per_s = 1e9;
 constexpr uint64_t block_span_ns = 100'000'000;
 constexpr uint64_t instrument_clock_interval_ns = 500'000'000;
+constexpr const char* slow_instrument = "the instrument answered slowly";
 constexpr double start_patience_s = 2;  // for RunStarted
 constexpr uint64_t tail_ns = 250'000'000;
 constexpr double end_patience_s = 10;  // for RunEnded, beyond the plan
@@ -39,10 +40,11 @@ RunOutcome Acquisition::run(const Hooks& hooks) {
   first_due_ns_ = now_ns;
   next_instrument_clock_ns_ = now_ns;
   deadline_ns_ = now_ns + static_cast<uint64_t>(start_patience_s * ns_per_s);
-  controller_.start();
+  write(RecordKind::document, json{{"record", "grid"}, {"first_due_ns", first_due_ns_}}.dump());
+  if (!ended_) controller_.start();
   while (!ended_)
     turn();
-  close_gap();
+  end_missing();
   close_block();
   write(RecordKind::document, json{{"record", "end"}}.dump());
   journal_.sync();
@@ -84,21 +86,32 @@ void Acquisition::poll_instrument() {
   uint64_t latest = next_index_;
   while (due_ns(latest + 1) <= now_ns)
     ++latest;
-  if (latest > next_index_) miss(next_index_, latest - next_index_, "the host was late");
+  miss_until(latest);
   next_index_ = latest + 1;
-  take_sample(latest);
-  if (now_ns >= next_instrument_clock_ns_) read_instrument_clock();
+  const bool received = take_sample(latest);
+  if (received && now_ns >= next_instrument_clock_ns_) read_instrument_clock();
 }
 
-void Acquisition::take_sample(uint64_t index) {
+void Acquisition::miss_until(uint64_t index) {
+  uint64_t blocked = next_index_;
+  while (blocked < index && due_ns(blocked) <= last_request_.until_ns)
+    ++blocked;
+  if (blocked > next_index_) miss(next_index_, blocked - next_index_, last_request_.reason);
+  if (index > blocked) miss(blocked, index - blocked, "the host was late");
+}
+
+bool Acquisition::take_sample(uint64_t index) {
   const uint64_t asked_ns = clock_.now_ns();
   const daq::Outcome outcome = instrument_.read(volts_);
   const uint64_t answered_ns = clock_.now_ns();
   const bool finite = std::all_of(volts_.begin(), volts_.end(), [](double v) { return std::isfinite(v); });
   if (!outcome.ok || !finite) {
-    return miss(index, 1, outcome.ok ? "the instrument sent no finite number" : outcome.fault);
+    last_request_ = {answered_ns, outcome.ok ? "the instrument sent no finite number" : outcome.fault};
+    miss(index, 1, last_request_.reason);
+    return false;
   }
-  close_gap();
+  last_request_ = {answered_ns, slow_instrument};
+  end_missing();
   if (block_.host_ns.empty()) block_.first_index = index;
   block_.host_ns.push_back(asked_ns + (answered_ns - asked_ns) / 2);
   for (size_t i = 0; i < volts_.size(); ++i) {
@@ -108,17 +121,26 @@ void Acquisition::take_sample(uint64_t index) {
   ++outcome_.counts.received;
   outcome_.counts.last_kPa = block_.value_kPa[block_.value_kPa.size() - volts_.size()];
   if (block_.host_ns.back() - block_.host_ns.front() >= block_span_ns) close_block();
+  return true;
 }
 
 void Acquisition::miss(uint64_t first, uint64_t count, const std::string& reason) {
   close_block();
   if (gap_ && gap_->reason != reason) close_gap();
-  if (!gap_) {
-    gap_ = OpenGap{first, 0, reason};
+  if (!gap_) gap_ = OpenGap{first, 0, reason};
+  gap_->count += count;
+  if (missing_in_a_row_ == 0) {
     hooks_.remark({"warning", "gap", fmt::format("samples are missing from {} on: {}", first, reason)});
   }
-  gap_->count += count;
+  missing_in_a_row_ += count;
   outcome_.counts.missing += count;
+}
+
+void Acquisition::end_missing() {
+  close_gap();
+  if (missing_in_a_row_ == 0) return;
+  hooks_.remark({"warning", "gap_end", fmt::format("{} samples in a row were missing", missing_in_a_row_)});
+  missing_in_a_row_ = 0;
 }
 
 void Acquisition::close_gap() {
@@ -142,6 +164,7 @@ void Acquisition::read_instrument_clock() {
   next_instrument_clock_ns_ = asked_ns + instrument_clock_interval_ns;
   const auto timer = instrument_.read_timer();
   const uint64_t answered_ns = clock_.now_ns();
+  last_request_ = {answered_ns, slow_instrument};
   if (!timer) return;
   write(RecordKind::document, json{{"record", "daq_clock"},
                                    {"host_ns", asked_ns + (answered_ns - asked_ns) / 2},

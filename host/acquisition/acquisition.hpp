@@ -5,8 +5,8 @@
 //
 // Samples lie on a grid: sample k is due at first_due + k / rate. Each index is either received or declared
 // missing, and the declaration tells why:
-//   - the instrument failed to answer;
-//   - the loop came so late that sample k+1 was already due (an overrun).
+//   - the instrument failed to answer, or kept the loop waiting while the sample came due;
+//   - the loop came so late, for another reason, that sample k+1 was already due (an overrun).
 // So received + missing = expected by construction; `RunOutcome` counts them.
 //
 // The loop is single-threaded in time: it reads and waits for time through one Clock only.
@@ -74,8 +74,12 @@ class Acquisition {
   void turn();
   void obey(StopRequest request);
   void poll_instrument();
-  void take_sample(uint64_t index);
+  /// Declares the indices from next_index_ up to `index` missing.
+  void miss_until(uint64_t index);
+  /// Whether it was received.
+  bool take_sample(uint64_t index);
   void miss(uint64_t first, uint64_t count, const std::string& reason);
+  void end_missing();
   void close_gap();
   void close_block();
   void read_instrument_clock();
@@ -105,6 +109,12 @@ class Acquisition {
     std::string reason;
   };
   std::optional<OpenGap> gap_;
+  uint64_t missing_in_a_row_ = 0;  ///< over all reasons
+  struct Request {
+    uint64_t until_ns = 0;
+    std::string reason;  ///< why what came due before until_ns could not be sampled
+  };
+  Request last_request_;  ///< to the instrument
   uint64_t next_instrument_clock_ns_ = 0;
   uint64_t deadline_ns_ = 0;
   StopRequest obeyed_ = StopRequest::none;

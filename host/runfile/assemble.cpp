@@ -84,23 +84,34 @@ Grid lay_out(const JournalStory& story, const TimeAxis& axis, size_t channels) {
   return grid;
 }
 
-/// Gives missing rows times evenly between their neighbours, at the sample spacing before the first and after
-/// the last one that was received.
-void fill_times(std::vector<double>& time_s, double spacing_s) {
+/// When row 0 was due: as the journal tells; else as its first sample tells; else the start of run, before
+/// which the grid begins by some milliseconds.
+double grid_start_s(const JournalStory& story, const TimeAxis& axis, const std::vector<double>& time_s,
+                    double spacing_s) {
+  if (story.first_due_ns) return axis.of_host_ns(*story.first_due_ns);
+  const auto first = std::find_if(time_s.begin(), time_s.end(), [](double t) { return !std::isnan(t); });
+  if (first == time_s.end()) return 0;
+  return *first - spacing_s * static_cast<double>(first - time_s.begin());
+}
+
+/// Gives missing rows times evenly between their neighbours; before the first and after the last sample that
+/// was received, the times at which they were due. As the last one may have come later than the next was due,
+/// a row lies at least a tenth of the spacing after the one before.
+void fill_times(std::vector<double>& time_s, double start_s, double spacing_s) {
   const size_t rows = time_s.size();
+  const auto due_s = [&](size_t row) { return start_s + spacing_s * static_cast<double>(row); };
   size_t row = 0;
-  while (row < rows && std::isnan(time_s[row]))
-    ++row;
-  for (size_t i = row; i-- > 0 && row < rows;)
-    time_s[i] = time_s[i + 1] - spacing_s;
+  for (; row < rows && std::isnan(time_s[row]); ++row)
+    time_s[row] = due_s(row);
   while (row < rows) {
     size_t next = row + 1;
     while (next < rows && std::isnan(time_s[next]))
       ++next;
-    const double step_s =
-        next < rows ? (time_s[next] - time_s[row]) / static_cast<double>(next - row) : spacing_s;
-    for (size_t i = row + 1; i < next; ++i)
-      time_s[i] = time_s[i - 1] + step_s;
+    for (size_t i = row + 1; i < next; ++i) {
+      time_s[i] = next < rows
+                      ? time_s[i - 1] + (time_s[next] - time_s[i - 1]) / static_cast<double>(next - i + 1)
+                      : std::max(due_s(i), time_s[i - 1] + 0.1 * spacing_s);
+    }
     row = next;
   }
 }
@@ -119,12 +130,12 @@ void declare(RecordedRun& run, std::string_view stream, int64_t index, const std
 void put_pressure(const JournalStory& story, const TimeAxis& axis, AssembledRun& assembled) {
   RecordedRun& run = assembled.run;
   const std::vector<std::string> names = story.begin.at("channels");
-  const double spacing_s = 1 / story.begin.at("sample_rate_Hz").get<double>();
+  const double spacing_s = axis.map().scale / story.begin.at("sample_rate_Hz").get<double>();
   Grid grid = lay_out(story, axis, names.size());
   std::vector<bool> received;
   for (const double t : grid.time_s)
     received.push_back(!std::isnan(t));
-  fill_times(grid.time_s, spacing_s);
+  fill_times(grid.time_s, grid_start_s(story, axis, grid.time_s, spacing_s), spacing_s);
   const auto first = std::lower_bound(grid.time_s.begin(), grid.time_s.end(), 0.0) - grid.time_s.begin();
   const auto last = std::ssize(grid.time_s);
   run.pressure.time_s.assign(grid.time_s.begin() + first, grid.time_s.begin() + last);

@@ -3,8 +3,9 @@
 //
 // The time axis is the controller's clock, in seconds since the tick of RunStarted. Samples carry host times,
 // which the fitted clock map (clock_map.hpp) brings onto it. What was sampled before the start of run
-// is cut off. A missing sample keeps its row: its time lies evenly between its neighbours', its values
-// are NaN, and /gaps declares it; also samples whose record was damaged are declared so.
+// is cut off. A missing sample keeps its row: its time lies evenly between its neighbours', or is the one at
+// which it was due if there is no sample before or none after it; its values are NaN, and /gaps declares it.
+// Samples whose record was damaged are declared so, too.
 
 #include <cstdint>
 

@@ -29,6 +29,8 @@ class StoryTeller {
       story_.controller_pairs.push_back(pair_of(record, record.at("tick").get<double>() / tick_rate_Hz_));
     } else if (what == "daq_clock") {
       take_timer(record);
+    } else if (what == "grid") {
+      story_.first_due_ns = record.at("first_due_ns").get<uint64_t>();
     } else if (what == "gap") {
       story_.gaps.push_back({record.at("first_index"), record.at("count"), record.at("reason")});
     } else if (what == "run_started") {

@@ -19,7 +19,8 @@ struct DeclaredGap {
 
 struct JournalStory {
   nlohmann::json begin;
-  std::vector<SampleBlock> samples;  ///< in order of their index, whole and without overlap
+  std::optional<uint64_t> first_due_ns;  ///< host time of sample 0, if its record is there
+  std::vector<SampleBlock> samples;      ///< in order of their index, whole and without overlap
   std::vector<DeclaredGap> gaps;
   std::vector<PositionBlock> positions;
   std::vector<ClockPair> controller_pairs;  ///< other = controller ticks / tick rate

@@ -104,6 +104,74 @@ TEST_P(Stall, AnInstrumentThatStallsCostsThoseSamplesAndNoOthers) {
 
 INSTANTIATE_TEST_SUITE_P(Acquisition, Stall, testing::Values(10, 57, 200, 450));
 
+TEST(Acquisition, AStallOfManyReadingsIsOneGapAndTwoRemarks) {
+  SessionOnDesk session(short_session);
+  const auto stalls = [](uint64_t reading) { return reading >= 200 && reading < 230; };
+  session.instrument.delay_ns = [&](uint64_t reading) {
+    return stalls(reading) ? uint64_t{20'000'000} : uint64_t{0};
+  };
+  session.instrument.fault = [&](uint64_t reading) {
+    return stalls(reading) ? daq::Outcome{false, "no answer within 20 ms"} : daq::Outcome{};
+  };
+  session.run();
+  const AssembledRun assembled = session.assemble();
+  expect_books_balance(assembled);
+  ASSERT_EQ(assembled.run.gaps.size(), 1U);
+  EXPECT_EQ(assembled.run.gaps[0].reason, "no answer within 20 ms");
+  EXPECT_NEAR(static_cast<double>(assembled.run.gaps[0].count), 180, 5);
+  ASSERT_EQ(session.remarks.size(), 2U);
+  EXPECT_THAT(session.remarks[0].text, testing::HasSubstr("no answer within 20 ms"));
+  EXPECT_THAT(session.remarks[1].text,
+              testing::HasSubstr(std::to_string(assembled.run.gaps[0].count) + " samples"));
+}
+
+TEST(Acquisition, ASlowAnswerIsNotBlamedOnTheHost) {
+  SessionOnDesk session(short_session);
+  session.instrument.delay_ns = [](uint64_t reading) {
+    return reading == 200 ? uint64_t{15'000'000} : uint64_t{0};
+  };
+  session.run();
+  const AssembledRun assembled = session.assemble();
+  expect_books_balance(assembled);
+  ASSERT_EQ(assembled.run.gaps.size(), 1U);
+  EXPECT_THAT(assembled.run.gaps[0].reason, testing::HasSubstr("the instrument"));
+}
+
+TEST(Acquisition, ARunWithoutASingleSampleHasItsTimesAndItsGap) {
+  SessionOnDesk session(short_session);
+  session.instrument.fault = [](uint64_t) { return daq::Outcome{false, "no answer"}; };
+  session.run();
+  EXPECT_EQ(session.outcome.end, "completed");
+  const AssembledRun assembled = session.assemble();
+  expect_books_balance(assembled);
+  EXPECT_EQ(assembled.samples_received, 0U);
+  const RecordedRun& run = assembled.run;
+  EXPECT_EQ(run.missing("pressure"), static_cast<int64_t>(run.pressure.time_s.size()));
+  EXPECT_NEAR(static_cast<double>(run.pressure.time_s.size()), 585, 5);
+  ASSERT_FALSE(run.pressure.time_s.empty());
+  EXPECT_NEAR(run.pressure.time_s.front(), 0, 0.01);
+  EXPECT_NEAR(run.pressure.time_s.back(), 1.95, 0.02);
+  const runfile::Soundness soundness = runfile::assess(run);
+  EXPECT_NEAR(soundness.pressure.rate_Hz, 300, 0.1);
+  EXPECT_THAT(soundness.problems, testing::Contains(testing::HasSubstr("no pressure was recorded")));
+}
+
+TEST(Acquisition, RowsMissingAtTheEdgesLieOnTheGrid) {
+  SessionOnDesk session(short_session);
+  session.instrument.fault = [](uint64_t reading) {
+    return reading < 50 || reading > 400 ? daq::Outcome{false, "no answer"} : daq::Outcome{};
+  };
+  session.run();
+  const RecordedRun run = session.assemble().run;
+  EXPECT_NO_THROW(runfile::check(run));
+  SessionOnDesk sound(short_session);
+  sound.run();
+  const RecordedRun whole = sound.assemble().run;
+  ASSERT_EQ(run.pressure.time_s.size(), whole.pressure.time_s.size());
+  for (size_t row = 0; row < whole.pressure.time_s.size(); row += 20)
+    EXPECT_NEAR(run.pressure.time_s[row], whole.pressure.time_s[row], 2e-4) << row;
+}
+
 TEST(Acquisition, StopAtCycleEndEndsWithAWholeCycle) {
   SessionOnDesk session(short_session);
   const uint64_t asked_at = 300;
