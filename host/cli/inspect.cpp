@@ -18,6 +18,7 @@ using nlohmann::json;
 struct Range {
   double least = HUGE_VAL;
   double most = -HUGE_VAL;
+  [[nodiscard]] bool any() const { return least <= most; }
 };
 
 Range range_of(const std::vector<double>& values) {
@@ -34,7 +35,9 @@ json stream_json(const runfile::StreamFacts& facts) {
   return {{"rows", facts.rows},
           {"samples", facts.rows - static_cast<size_t>(facts.missing)},
           {"missing", facts.missing},
-          {"rate_Hz", facts.rate_Hz}};
+          {"rate_Hz", facts.rate_Hz},
+          {"irregular_steps", facts.irregularity.steps},
+          {"longest_step_ms", facts.irregularity.longest_ms}};
 }
 
 json as_json(const runfile::RecordedRun& run, const runfile::Soundness& soundness) {
@@ -58,7 +61,8 @@ json as_json(const runfile::RecordedRun& run, const runfile::Soundness& soundnes
   document["channels"] = json::object();
   for (const auto& [name, values_kPa] : run.pressure.channels) {
     const Range range = range_of(values_kPa);
-    document["channels"][name] = {{"min_kPa", range.least}, {"max_kPa", range.most}};
+    document["channels"][name] = {{"min_kPa", range.any() ? json(range.least) : json()},
+                                  {"max_kPa", range.any() ? json(range.most) : json()}};
   }
   document["segments"] = json::array();
   for (const runfile::Segment& segment : run.segments) {
@@ -75,6 +79,19 @@ json as_json(const runfile::RecordedRun& run, const runfile::Soundness& soundnes
   return document;
 }
 
+std::string in_words(const runfile::StreamFacts& facts) {
+  if (facts.rows == 0) return "no sample";
+  std::string words =
+      facts.rows == 1 ? "1 row" : fmt::format("{} rows at {:.2f} Hz", facts.rows, facts.rate_Hz);
+  words += facts.any() ? fmt::format(", {} missing", facts.missing) : ", no sample: all are missing";
+  if (facts.irregularity.steps > 0) {
+    words += fmt::format("; irregular: {} steps longer than {:g} spacings, the longest {:.1f} ms{}",
+                         facts.irregularity.steps, runfile::irregular_spacings, facts.irregularity.longest_ms,
+                         facts.missing == 0 ? ", nothing missing" : "");
+  }
+  return words;
+}
+
 void show(const runfile::RecordedRun& run, const runfile::Soundness& soundness) {
   fmt::print("{}\n  run {} of {}, by {}\n", run.file, run.run_id, run.started_utc, run.producer);
   for (size_t i = 0; i < run.segments.size(); ++i) {
@@ -83,15 +100,13 @@ void show(const runfile::RecordedRun& run, const runfile::Soundness& soundness) 
                s.waveform, s.stroke_mL, s.period_s, s.start_s, s.offset_mL,
                run.flow.contains(i) ? ", with phase-contrast volumes" : "");
   }
-  const auto stream = [](const char* name, const runfile::StreamFacts& facts) {
-    fmt::print("  {}: {} rows at {:.2f} Hz, {} missing\n", name, facts.rows, facts.rate_Hz, facts.missing);
-  };
-  stream("pressure", soundness.pressure);
+  fmt::print("  pressure: {}\n", in_words(soundness.pressure));
   for (const auto& [name, values_kPa] : run.pressure.channels) {
     const Range range = range_of(values_kPa);
-    fmt::print("    {}: {:.3f} to {:.3f} kPa\n", name, range.least, range.most);
+    fmt::print("    {}: {}\n", name,
+               range.any() ? fmt::format("{:.3f} to {:.3f} kPa", range.least, range.most) : "no sample");
   }
-  stream("pump", soundness.pump);
+  fmt::print("  pump: {}\n", in_words(soundness.pump));
   fmt::print("  triggers: {} for {} cycles\n", run.trigger_s.size(), soundness.scheduled_cycles);
   for (const auto& [name, value] : run.clock)
     fmt::print("  clock {}: {:g}\n", name, value);

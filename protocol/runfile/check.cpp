@@ -44,10 +44,12 @@ void check_values(const RecordedRun& run, const std::string& dataset, std::span<
 }
 
 void check_times(const RecordedRun& run, const std::string& dataset, std::span<const double> times_s) {
-  check_values(run, dataset, times_s);
   double last_s = -HUGE_VAL;
   for (size_t i = 0; i < times_s.size(); ++i) {
-    if (std::isnan(times_s[i])) continue;
+    if (!std::isfinite(times_s[i])) {
+      fail_at(run, dataset, i, fmt::format("is {}", times_s[i]),
+              "Every row has a time; also a missing sample has the one at which it was due.");
+    }
     if (times_s[i] <= last_s) {
       fail_at(run, dataset, i, fmt::format("is {} s, not later than the {} s before it", times_s[i], last_s),
               "Times must increase strictly.");

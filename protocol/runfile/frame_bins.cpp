@@ -8,24 +8,26 @@
 #include <span>
 
 #include "protocol/contract/input_error.hpp"
+#include "protocol/runfile/spacing.hpp"
 
 namespace diastole::runfile {
 namespace {
 
-constexpr double time_tolerance_s = 1e-6;        // a sample on a window's edge belongs to the window it opens
-constexpr double period_tolerance = 0.01;        // of the period, between triggers
-constexpr double hole_in_sample_spacings = 1.6;  // a wider step between samples means that one is not there
+constexpr double time_tolerance_s = 1e-6;  // a sample on a window's edge belongs to the window it opens
+constexpr double period_tolerance = 0.01;  // of the period, between triggers
 
 struct Samples {
   std::span<const double> time_s;
   std::span<const double> value_kPa;
   double spacing_s = 0;  // median
+  std::vector<size_t> holes_before;
 };
 
 /// The mean pressures of one cycle, frame by frame, or why it cannot be used.
 struct CycleMeans {
   std::vector<double> mean_kPa;
   std::string exclusion;
+  bool frame_without_sample = false;
 };
 
 [[noreturn]] void fail(const RecordedRun& run, const std::string& place, std::string problem,
@@ -39,16 +41,6 @@ std::pair<size_t, size_t> rows_within(const Samples& samples, double from_s, dou
   const auto first = std::lower_bound(time_s.begin(), time_s.end(), from_s - time_tolerance_s);
   const auto last = std::lower_bound(first, time_s.end(), to_s - time_tolerance_s);
   return {static_cast<size_t>(first - time_s.begin()), static_cast<size_t>(last - time_s.begin())};
-}
-
-double median_spacing_s(std::span<const double> time_s) {
-  std::vector<double> steps_s;
-  for (size_t i = 1; i < time_s.size(); ++i)
-    steps_s.push_back(time_s[i] - time_s[i - 1]);
-  if (steps_s.empty()) return 0;
-  const auto middle = steps_s.begin() + static_cast<std::ptrdiff_t>(steps_s.size() / 2);
-  std::nth_element(steps_s.begin(), middle, steps_s.end());
-  return *middle;
 }
 
 std::vector<double> triggers_of(const RecordedRun& run, const Segment& segment) {
@@ -95,16 +87,20 @@ void check_windows(const RecordedRun& run, const std::vector<FrameWindow>& windo
 /// Why the cycle from trigger_s to end_s is not whole; empty if it is.
 std::string why_not_whole(const Samples& samples, double trigger_s, double end_s) {
   const auto [first, last] = rows_within(samples, trigger_s, end_s);
-  const double reach_s = hole_in_sample_spacings * samples.spacing_s;
+  const double reach_s = reach_spacings * samples.spacing_s;
   if (first == last) return "no pressure was recorded in it";
-  if (samples.time_s[first] - trigger_s > reach_s) return "the recording starts within it";
-  if (end_s - samples.time_s[last - 1] > reach_s) return "the recording ends within it";
+  if (first == 0 && samples.time_s[first] - trigger_s > reach_s) return "the recording starts within it";
+  if (last == samples.time_s.size() && end_s - samples.time_s[last - 1] > reach_s) {
+    return "the recording ends within it";
+  }
   for (size_t i = first; i < last; ++i) {
     if (std::isnan(samples.value_kPa[i])) return fmt::format("sample {} is missing", i);
-    if (i > first && samples.time_s[i] - samples.time_s[i - 1] > reach_s) {
-      return fmt::format("{:.1f} ms without a sample before sample {}",
-                         1e3 * (samples.time_s[i] - samples.time_s[i - 1]), i);
-    }
+  }
+  for (const size_t hole : samples.holes_before) {
+    const double before_s = samples.time_s[hole - 1];
+    const double after_s = samples.time_s[hole];
+    if (before_s + samples.spacing_s >= end_s || after_s - samples.spacing_s < trigger_s) continue;
+    return fmt::format("{:.1f} ms without a sample before sample {}", 1e3 * (after_s - before_s), hole);
   }
   return {};
 }
@@ -118,6 +114,7 @@ CycleMeans means_of_cycle(const Samples& samples, const std::vector<FrameWindow>
         rows_within(samples, trigger_s + windows[k].from_s, trigger_s + windows[k].to_s);
     if (first == last) {
       cycle.exclusion = fmt::format("no sample falls into frame {}", k);
+      cycle.frame_without_sample = true;
       return cycle;
     }
     const auto values = samples.value_kPa.subspan(first, last - first);
@@ -200,23 +197,28 @@ FrameBins bin_frames(const RecordedRun& run, const FrameBinOptions& options) {
       options.windows.empty() ? equal_windows(options.frames, bins.period_s) : options.windows;
   check_windows(run, windows, bins.period_s);
 
-  const Samples samples{run.pressure.time_s, channel->second, median_spacing_s(run.pressure.time_s)};
+  const double spacing_s = median_spacing_s(run.pressure.time_s);
+  const Samples samples{run.pressure.time_s, channel->second, spacing_s,
+                        holes_before(run.pressure.time_s, spacing_s)};
   const std::vector<double> triggers_s = triggers_of(run, segment);
   bins.triggers = triggers_s.size();
   std::vector<UsedCycle> used;
+  bool frames_too_short = false;
   for (size_t i = 0; i < triggers_s.size(); ++i) {
     CycleMeans cycle = means_of_cycle(samples, windows, triggers_s[i], bins.period_s);
     if (cycle.exclusion.empty()) cycle.exclusion = irregular_trigger(triggers_s, i, bins.period_s);
     if (cycle.exclusion.empty()) {
       used.push_back({static_cast<double>(i), triggers_s[i], std::move(cycle.mean_kPa)});
     } else {
+      frames_too_short = frames_too_short || cycle.frame_without_sample;
       bins.excluded.push_back({i, triggers_s[i], std::move(cycle.exclusion)});
     }
   }
   if (used.empty()) {
     fail(run, fmt::format("segment {}", bins.segment),
          fmt::format("has no whole cycle; the first: {}", bins.excluded.front().reason),
-         "Record again, or choose another segment.");
+         frames_too_short ? fmt::format("Ask for fewer frames: samples are {:.2f} ms apart.", 1e3 * spacing_s)
+                          : "Record again, or choose another segment.");
   }
   for (size_t k = 0; k < windows.size(); ++k) {
     bins.frames.push_back(summarise(samples, windows[k], k, used));

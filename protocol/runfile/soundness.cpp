@@ -11,34 +11,28 @@
 namespace diastole::runfile {
 namespace {
 
-constexpr double hole_in_spacings = 1.6;
 constexpr double period_tolerance = 0.01;
 
 StreamFacts facts_of(const RecordedRun& run, std::span<const double> time_s, std::string_view stream) {
-  StreamFacts facts{time_s.size(), 0, 0};
+  StreamFacts facts{.rows = time_s.size()};
   for (const Gap& gap : run.gaps) {
     if (gap.stream.starts_with(stream)) facts.missing += gap.count;
   }
-  std::vector<double> steps_s;
-  for (size_t i = 1; i < time_s.size(); ++i)
-    steps_s.push_back(time_s[i] - time_s[i - 1]);
-  if (!steps_s.empty()) {
-    const auto middle = steps_s.begin() + static_cast<std::ptrdiff_t>(steps_s.size() / 2);
-    std::nth_element(steps_s.begin(), middle, steps_s.end());
-    facts.rate_Hz = 1 / *middle;
-  }
+  const double spacing_s = median_spacing_s(time_s);
+  if (spacing_s > 0) facts.rate_Hz = 1 / spacing_s;
+  facts.irregularity = irregularity_of(time_s, spacing_s);
   return facts;
 }
 
-void look_for_holes(std::span<const double> time_s, const StreamFacts& facts, std::string_view stream,
+void look_for_holes(std::span<const double> time_s, std::string_view stream,
                     std::vector<std::string>& problems) {
-  for (size_t i = 1; i < time_s.size(); ++i) {
-    const double step_s = time_s[i] - time_s[i - 1];
-    if (step_s * facts.rate_Hz <= hole_in_spacings) continue;
-    problems.push_back(fmt::format("{}: {:.1f} ms without a sample before index {}, not declared as a gap",
-                                   stream, 1e3 * step_s, i));
-    return;
-  }
+  const std::vector<size_t> holes = holes_before(time_s, median_spacing_s(time_s));
+  if (holes.empty()) return;
+  const size_t first = holes.front();
+  problems.push_back(fmt::format(
+      "{}: {:.1f} ms without a sample before index {}, not declared as a gap{}", stream,
+      1e3 * (time_s[first] - time_s[first - 1]), first,
+      holes.size() > 1 ? fmt::format(", and {} more such holes", holes.size() - 1) : std::string()));
 }
 
 /// Triggers of one segment: as many as cycles (or fewer, if the run was stopped on request), one period apart.
@@ -75,9 +69,8 @@ Soundness assess(const RecordedRun& run) {
   auto& problems = soundness.problems;
   soundness.pressure = facts_of(run, run.pressure.time_s, pressure_stream);
   soundness.pump = facts_of(run, run.pump.time_s, pump_stream);
-  if (run.pressure.time_s.empty()) {
-    problems.emplace_back("no pressure was recorded");
-  } else {
+  if (!soundness.pressure.any()) problems.emplace_back("no pressure was recorded");
+  if (!run.pressure.time_s.empty()) {
     soundness.duration_s = run.pressure.time_s.back() - run.pressure.time_s.front();
   }
   for (const Gap& gap : run.gaps) {
@@ -86,8 +79,8 @@ Soundness assess(const RecordedRun& run) {
   }
   soundness.stopped_on_request = std::any_of(run.events.begin(), run.events.end(),
                                              [](const Event& e) { return is_stop_on_request(e.code); });
-  look_for_holes(run.pressure.time_s, soundness.pressure, pressure_stream, problems);
-  look_for_holes(run.pump.time_s, soundness.pump, pump_stream, problems);
+  look_for_holes(run.pressure.time_s, pressure_stream, problems);
+  look_for_holes(run.pump.time_s, pump_stream, problems);
   for (size_t i = 0; i < run.segments.size(); ++i) {
     const Segment& segment = run.segments[i];
     (segment.waveform == "hold" ? soundness.scheduled_holds : soundness.scheduled_cycles) += segment.cycles;

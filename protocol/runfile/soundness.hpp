@@ -7,13 +7,17 @@
 #include <vector>
 
 #include "protocol/runfile/run.hpp"
+#include "protocol/runfile/spacing.hpp"
 
 namespace diastole::runfile {
 
 struct StreamFacts {
   size_t rows = 0;
-  int64_t missing = 0;  ///< of them, declared in /gaps
-  double rate_Hz = 0;   ///< from the median spacing
+  int64_t missing = 0;          ///< of them, declared in /gaps
+  double rate_Hz = 0;           ///< from the median spacing; 0 for fewer than two rows
+  Irregularity irregularity{};  ///< no fault as long as nothing is missing (spacing.hpp)
+
+  [[nodiscard]] bool any() const { return missing < static_cast<int64_t>(rows); }
 };
 
 struct Soundness {

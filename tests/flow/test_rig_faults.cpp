@@ -102,6 +102,21 @@ TEST(RigFaults, ADroppedInstrumentBecomesGapsOfExactlyItsLength) {
   EXPECT_LE(session["gaps"], 62);
 }
 
+TEST(RigFaults, ARunWithoutASingleSampleIsToldInWords) {
+  FaultyRig rig("daq-drop@0.5+600", FaultyRig::Time::conducted);
+  const Ended ended = rig.acquire("1");
+  EXPECT_EQ(ended.exit_code, 1) << ended.err;
+  const json session = ended.json();
+  EXPECT_EQ(session["samples"], 0);
+  EXPECT_EQ(session["gaps"], session["expected"]);
+  const Ended inspected = run(rig.place, {"diastole", "inspect", "gel.run.h5"});
+  EXPECT_EQ(inspected.exit_code, 1);
+  EXPECT_THAT(inspected.out, testing::AllOf(testing::HasSubstr("cavity_kPa: no sample"),
+                                            testing::HasSubstr("no pressure was recorded"),
+                                            testing::Not(testing::HasSubstr("nan")),
+                                            testing::Not(testing::HasSubstr("inf "))));
+}
+
 TEST(RigFaults, AStalledInstrumentBecomesGapsAndExitCode1) {
   FaultyRig rig("daq-stall@4+0.3", FaultyRig::Time::real);
   const Ended ended = rig.acquire("3");

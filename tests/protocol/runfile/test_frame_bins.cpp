@@ -105,6 +105,14 @@ TEST(FrameBins, ImpossibleRequestsAreRefusedInWords) {
   EXPECT_THAT(refusal(staircase(), {.windows = {{0.5, 1.2}}}), HasSubstr("outside the cycle"));
   EXPECT_THAT(refusal(staircase(), {.frames = 0}), HasSubstr("at least one frame"));
   EXPECT_THAT(refusal(staircase(), {.frames = 40}), HasSubstr("no sample falls into frame"));
+  EXPECT_THAT(refusal(staircase(), {.frames = 40}), HasSubstr("Ask for fewer frames"));
+}
+
+TEST(FrameBins, ALateSampleIsNoHole) {
+  RecordedRun run = staircase();
+  run.pressure.time_s[12] += 0.08;
+  run.pressure.time_s[13] += 0.02;
+  EXPECT_TRUE(bin_frames(run, {.frames = 2}).excluded.empty());
 }
 
 }  // namespace

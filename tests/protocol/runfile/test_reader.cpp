@@ -86,6 +86,12 @@ const std::vector<Rejection> rejections{
      },
      {"/pressure/cavity_kPa, index 1", "inf"}},
     {"NanTime", [](RunSketch& s) { s.pressure_time_s[3] = NAN; }, {"/pressure/time_s, index 3"}},
+    {"NanTimeInAGap",
+     [](RunSketch& s) {
+       s.pressure_time_s[3] = s.cavity_kPa[3] = NAN;
+       s.gaps = {{"pressure", 3, 1}};
+     },
+     {"/pressure/time_s, index 3", "nan"}},
     {"NegativeGap",
      [](RunSketch& s) {
        s.gaps = {{"pressure", -1, 1}};
