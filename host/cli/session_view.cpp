@@ -51,7 +51,10 @@ void SessionView::finish() {
 
 ExitCode exit_code_of(const SessionResult& result) {
   if (!result.regular) return ExitCode::hardware_fault;
-  return result.gaps > 0 || result.triggers != result.cycles ? ExitCode::negative : ExitCode::done;
+  // A stop at once may break a cycle whose trigger is already out; `cycles` counts the whole ones.
+  const int64_t broken_cycles = result.triggers - result.cycles;
+  const bool triggers_fit = broken_cycles == 0 || (result.end == "stopped_now" && broken_cycles == 1);
+  return result.gaps > 0 || !triggers_fit ? ExitCode::negative : ExitCode::done;
 }
 
 ExitCode report_session(const SessionResult& result, bool json) {
