@@ -47,7 +47,7 @@ RunOutcome Acquisition::run(const Hooks& hooks) {
   end_missing();
   close_block();
   write(RecordKind::document, json{{"record", "end"}}.dump());
-  journal_.sync();
+  if (!journal_.sync()) fail_journal();
   hooks_.progress(outcome_.counts);
   return outcome_;
 }
@@ -247,9 +247,13 @@ void Acquisition::remark(const std::string& level, const std::string& code, cons
 }
 
 void Acquisition::write(RecordKind kind, const auto& payload) {
-  if (journal_.append(kind, payload) || outcome_.end == "journal_failed") return;
+  if (!journal_.append(kind, payload)) fail_journal();
+}
+
+void Acquisition::fail_journal() {
+  if (outcome_.end == "journal_failed") return;
   hooks_.remark({"error", "journal_failed", journal_.problem()});
-  controller_.stop_now();
+  if (!ended_) controller_.stop_now();
   end("journal_failed");
 }
 

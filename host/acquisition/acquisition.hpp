@@ -87,6 +87,7 @@ class Acquisition {
   void remark(const std::string& level, const std::string& code, const std::string& text,
               std::optional<uint64_t> tick = {});
   void write(RecordKind kind, const auto& payload);
+  void fail_journal();
   void end(std::string how);
   void end_after_tail(std::string how);
   void check_deadline();

@@ -67,8 +67,10 @@ void sync_directory(const std::filesystem::path& file) {
 
 }  // namespace
 
-JournalWriter::JournalWriter(const std::filesystem::path& path)
-    : path_(path), file_(::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_APPEND | O_CLOEXEC, 0644)) {
+JournalWriter::JournalWriter(const std::filesystem::path& path, Flush flush)
+    : path_(path),
+      flush_(std::move(flush)),
+      file_(::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_APPEND | O_CLOEXEC, 0644)) {
   if (!file_.valid()) {
     throw HardwareError(path.string(), fmt::format("the journal cannot be created: {}", std::strerror(errno)),
                         "Check journal_dir in the rig file, its permissions and the space on its disk.");
@@ -80,11 +82,11 @@ JournalWriter::JournalWriter(const std::filesystem::path& path)
 JournalWriter::~JournalWriter() {
   syncer_.request_stop();
   syncer_.join();
-  sync();
+  (void)sync();
 }
 
 bool JournalWriter::append(RecordKind kind, std::span<const uint8_t> payload) {
-  if (!problem_.empty()) return false;
+  if (!problem().empty()) return false;
   record_.assign(magic.begin(), magic.end());
   put_u32(record_, static_cast<uint32_t>(payload.size()));
   put_u32(record_, sequence_);
@@ -96,8 +98,7 @@ bool JournalWriter::append(RecordKind kind, std::span<const uint8_t> payload) {
     written = ::write(file_.get(), record_.data(), record_.size());
   } while (written < 0 && errno == EINTR);
   if (written != static_cast<ssize_t>(record_.size())) {
-    problem_ = fmt::format("{}: the journal cannot be written: {}", path_.string(),
-                           std::strerror(written < 0 ? errno : ENOSPC));
+    fail("written", written < 0 ? errno : ENOSPC);
     return false;
   }
   ++sequence_;
@@ -109,15 +110,28 @@ bool JournalWriter::append(RecordKind kind, const std::string& text) {
   return append(kind, {reinterpret_cast<const uint8_t*>(text.data()), text.size()});
 }
 
-void JournalWriter::sync() {
-  if (unsynced_.exchange(false)) ::fdatasync(file_.get());
+bool JournalWriter::sync() {
+  const std::lock_guard flushing(flush_mutex_);
+  if (unsynced_.exchange(false) && flush_(file_.get()) != 0) fail("brought to the disk", errno);
+  return problem().empty();
+}
+
+std::string JournalWriter::problem() const {
+  const std::lock_guard lock(problem_mutex_);
+  return problem_;
+}
+
+void JournalWriter::fail(const std::string& what, int error) {
+  const std::lock_guard lock(problem_mutex_);
+  if (!problem_.empty()) return;
+  problem_ = fmt::format("{}: the journal cannot be {}: {}", path_.string(), what, std::strerror(error));
 }
 
 void JournalWriter::sync_in_time(const std::stop_token& stop) {
   std::unique_lock lock(mutex_);
   while (!stop.stop_requested()) {
     wake_.wait_for(lock, stop, sync_interval, [] { return false; });
-    sync();
+    (void)sync();
   }
 }
 

@@ -12,15 +12,20 @@
 //       16     n  payload
 //     16+n     4  crc       CRC-32C (Castagnoli) of bytes 0 ... 15+n
 //
-// Every half second another thread asks the kernel to bring it to the disk (fdatasync). A reader takes every
+// Every half second another thread asks the kernel to bring it to the disk (fdatasync). Once the disk has
+// refused a write or a flush, what is in the file can no longer be trusted to last: the problem stays, and
+// nothing more is written. A reader takes every
 // record whose CRC holds. It forgives a torn tail, and after damage in the middle it searches for the next
 // whole record; the sequence then tells how many are lost.
+
+#include <unistd.h>
 
 #include <atomic>
 #include <condition_variable>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <mutex>
 #include <span>
 #include <string>
@@ -40,28 +45,37 @@ enum class RecordKind : uint32_t {
 
 class JournalWriter {
  public:
+  /// As fdatasync(2): 0, or -1 and errno.
+  using Flush = std::function<int(int descriptor)>;
+
   /// Creates the file; it must not exist. Throws HardwareError if it cannot be created.
-  explicit JournalWriter(const std::filesystem::path& path);
+  explicit JournalWriter(const std::filesystem::path& path, Flush flush = ::fdatasync);
   ~JournalWriter();
 
-  /// Appends one record. False if the disk did not take it whole (full, failed); `problem()` then tells why,
-  /// what was written before stays readable, and nothing more is written.
+  /// Appends one record. False if the disk did not take it whole (full, failed), or failed to flush what came
+  /// before; `problem()` then tells why, what was written before stays readable, and nothing more is written.
   [[nodiscard]] bool append(RecordKind kind, std::span<const uint8_t> payload);
   [[nodiscard]] bool append(RecordKind kind, const std::string& text);
-  /// Brings everything to the disk now.
-  void sync();
+  /// Returns when everything is on the disk; false if it is not, now or before (`problem()`).
+  [[nodiscard]] bool sync();
 
-  [[nodiscard]] const std::string& problem() const { return problem_; }
+  /// Empty: none so far. Of any thread.
+  [[nodiscard]] std::string problem() const;
   [[nodiscard]] const std::filesystem::path& path() const { return path_; }
 
  private:
   void sync_in_time(const std::stop_token& stop);
+  /// Keeps the first problem.
+  void fail(const std::string& what, int error);
 
   std::filesystem::path path_;
+  Flush flush_;
   Descriptor file_;
   uint32_t sequence_ = 0;
-  std::string problem_;
   std::vector<uint8_t> record_;
+  mutable std::mutex problem_mutex_;  // held for moments only
+  std::string problem_;
+  std::mutex flush_mutex_;  // held during a flush
   std::atomic<bool> unsynced_ = false;
   std::mutex mutex_;
   std::condition_variable_any wake_;

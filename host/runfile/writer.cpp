@@ -105,7 +105,8 @@ void write_run(const std::filesystem::path& path, const runfile::RecordedRun& ru
     std::filesystem::rename(temporary, path);
     bring_to_disk(path.has_parent_path() ? path.parent_path() : ".", O_RDONLY | O_DIRECTORY);
   } catch (const std::filesystem::filesystem_error& error) {
-    std::filesystem::remove(temporary);
+    std::error_code ignored;
+    std::filesystem::remove(temporary, ignored);
     throw HardwareError(path.string(), error.what(), "Check that you may write there.");
   } catch (...) {
     std::error_code ignored;

@@ -22,6 +22,7 @@ struct SessionOnDesk {
   ControllerClient client{clock, rig, [this] { return std::make_unique<DeskLine>(desk); }};
   Experiment experiment;
   std::filesystem::path journal = scratch / "run.journal";
+  JournalWriter::Flush flush = ::fdatasync;  ///< the journal's
   std::vector<RunRemark> remarks;
   RunOutcome outcome;
 

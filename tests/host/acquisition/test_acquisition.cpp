@@ -209,6 +209,20 @@ TEST(Acquisition, AnUnpluggedLineEndsTheRunAndSaysSo) {
   EXPECT_FALSE(runfile::assess(assembled.run).sound());
 }
 
+TEST(Acquisition, ADiskThatFailsToFlushEndsTheRunAsJournalFailed) {
+  SessionOnDesk session(short_session);
+  session.flush = [](int) {
+    errno = EIO;
+    return -1;
+  };
+  session.run();
+  EXPECT_EQ(session.outcome.end, "journal_failed");
+  EXPECT_FALSE(session.outcome.regular());
+  ASSERT_FALSE(session.remarks.empty());
+  EXPECT_EQ(session.remarks.back().code, "journal_failed");
+  EXPECT_THAT(session.remarks.back().text, testing::HasSubstr("cannot be brought to the disk"));
+}
+
 TEST(Acquisition, AnEmergencyStopIsToldInPlainWords) {
   SessionOnDesk session(short_session);
   session.clock.each_turn = [&] {

@@ -3,9 +3,12 @@
 #include <gmock/gmock.h>
 #include <sys/resource.h>
 
+#include <atomic>
+#include <cerrno>
 #include <csignal>
 #include <fstream>
 #include <random>
+#include <thread>
 
 #include "host/acquisition/journal_records.hpp"
 #include "protocol/contract/input_error.hpp"
@@ -99,6 +102,41 @@ TEST(Journal, AFullDiskIsToldOnceAndWhatWasWrittenStaysReadable) {
   std::signal(SIGXFSZ, handler);
   EXPECT_EQ(read_journal(path).records.size(), written);
   EXPECT_EQ(written, 9U);
+}
+
+TEST(Journal, AFlushThatFailsInTheBackgroundIsKeptAndEndsTheWriting) {
+  const Scratch scratch("eio");
+  std::atomic<int> flushes = 0;
+  JournalWriter writer(scratch / "eio.journal", [&](int) {
+    ++flushes;
+    flushes.notify_all();
+    errno = EIO;
+    return -1;
+  });
+  EXPECT_TRUE(writer.append(RecordKind::document, std::string("kept")));
+  flushes.wait(0);
+  EXPECT_FALSE(writer.sync()) << "an earlier failure must not be forgotten";
+  EXPECT_THAT(writer.problem(), testing::HasSubstr("cannot be brought to the disk"));
+  EXPECT_FALSE(writer.append(RecordKind::document, std::string("more")));
+  EXPECT_EQ(read_journal(scratch / "eio.journal").records.size(), 1U);
+}
+
+TEST(Journal, SyncWaitsForTheFlushThatIsUnderWay) {
+  const Scratch scratch("sync");
+  std::atomic<bool> begun = false;
+  std::atomic<bool> flushing = false;
+  JournalWriter writer(scratch / "sync.journal", [&](int) {
+    flushing = true;
+    begun = true;
+    begun.notify_all();
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
+    flushing = false;
+    return 0;
+  });
+  EXPECT_TRUE(writer.append(RecordKind::document, std::string("hello")));
+  begun.wait(false);
+  EXPECT_TRUE(writer.sync());
+  EXPECT_FALSE(flushing);
 }
 
 TEST(Journal, AnExistingJournalIsNeverOverwritten) {
