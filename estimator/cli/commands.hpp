@@ -7,6 +7,7 @@ namespace diastole {
 
 void add_solve(CommandLine& line);
 void add_fit(CommandLine& line);
+void add_shear(CommandLine& line);
 void add_report(CommandLine& line);
 
 void add_estimator_commands(CommandLine& line);

@@ -36,7 +36,9 @@ void add_report(CommandLine& line) {
   CLI::App* command = line.add("report", "a self-contained page with plots for runs and fits",
                                "  diastole report gel.run.h5 -o session.html\n"
                                "  diastole report gel.run.h5 fit.json -o gel.html");
-  command->add_option("FILE", arguments->files, "run files and fit results, recognised by their content")
+  command
+      ->add_option("FILE", arguments->files,
+                   "run files, fit results and shear tests, recognised by their content")
       ->required();
   command->add_option("-o,--output", arguments->page, "the HTML page to write")->required();
   command->add_option("--frames", arguments->frames, "image frames of a cycle")

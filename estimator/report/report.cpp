@@ -8,6 +8,7 @@
 #include "estimator/io/whole_file.hpp"
 #include "estimator/report/page.hpp"
 #include "estimator/report/sections.hpp"
+#include "estimator/shear/shear_fit.hpp"
 #include "protocol/contract/input_error.hpp"
 #include "protocol/runfile/reader.hpp"
 
@@ -23,8 +24,8 @@ bool is_json_object(const std::string& content) {
   return first != std::string::npos && content[first] == '{';
 }
 
-std::string title_of(size_t fits, size_t runs) {
-  if (fits == 0) return runs == 1 ? "A pump session" : "Pump sessions";
+std::string title_of(size_t estimates, size_t runs) {
+  if (estimates == 0) return runs == 1 ? "A pump session" : "Pump sessions";
   return runs == 0 ? "Material stiffness" : "From a pump session to a material stiffness";
 }
 
@@ -32,6 +33,7 @@ std::string title_of(size_t fits, size_t runs) {
 
 std::string make_report(std::span<const std::filesystem::path> files, const ReportOptions& options) {
   std::vector<FitRecord> fits;
+  std::vector<ShearTest> shear_tests;
   std::vector<runfile::RecordedRun> runs;
   for (const std::filesystem::path& file : files) {
     const std::string content = read_whole_file(file);
@@ -39,15 +41,23 @@ std::string make_report(std::span<const std::filesystem::path> files, const Repo
       runs.push_back(runfile::read_run(file));
       continue;
     }
+    if (is_shear_test(content)) {
+      shear_tests.push_back(shear_test_from_text(content, file.string()));
+      continue;
+    }
     if (!is_json_object(content)) {
-      throw InputError({file.string(), "", "is neither a run file nor a fit result",
-                        "Give files that `diastole run`, `diastole simulate` or `diastole fit -o` wrote."});
+      throw InputError(
+          {file.string(), "", "is neither a run file nor a fit result nor a shear test",
+           "Give files that `diastole run`, `diastole simulate` or `diastole fit -o` wrote, or the "
+           "CSV that `diastole shear` reads."});
     }
     fits.push_back(fit_record_from_json(content, file.string()));
   }
-  Page page(title_of(fits.size(), runs.size()));
+  Page page(title_of(fits.size() + shear_tests.size(), runs.size()));
   for (const FitRecord& fit : fits)
     add_fit(page, fit);
+  for (const ShearTest& test : shear_tests)
+    add_shear(page, test, fit_shear(test));
   for (const runfile::RecordedRun& run : runs)
     add_run(page, run, options.frames);
   return page.html();

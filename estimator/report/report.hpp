@@ -1,5 +1,5 @@
 #pragma once
-// The report: one self-contained page about any number of run files and fit results.
+// The report: one self-contained page about any number of run files, fit results and shear tests.
 
 #include <cstddef>
 #include <filesystem>
@@ -12,8 +12,8 @@ struct ReportOptions {
   size_t frames = 16;  ///< image frames of a cycle
 };
 
-/// The page's HTML. Files are recognised by their content; fits come first, runs after them, each in the
-/// given order. Throws InputError for a file that is missing, unreadable or of no kind that the report knows.
+/// The page's HTML. Files are recognised by their content; fits come first, then shear tests,
+/// then runs, each in the given order. Throws InputError for a file that is missing, unreadable or of no kind that the report knows.
 std::string make_report(std::span<const std::filesystem::path> files, const ReportOptions& options);
 
 }  // namespace diastole::report

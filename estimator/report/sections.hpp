@@ -3,6 +3,7 @@
 
 #include "estimator/io/fit_file.hpp"
 #include "estimator/report/page.hpp"
+#include "estimator/shear/shear_fit.hpp"
 #include "protocol/runfile/run.hpp"
 
 namespace diastole::report {
@@ -14,5 +15,8 @@ void add_run(Page& page, const runfile::RecordedRun& run, size_t frames);
 /// The parameters with their intervals, the specimen before and after, pressures, residuals, how the fit
 /// ended.
 void add_fit(Page& page, const FitRecord& fit);
+
+/// C1 of a rotational shear test, Eq. 1's two sides with the line, the residuals, each load by itself.
+void add_shear(Page& page, const ShearTest& test, const ShearFit& fit);
 
 }  // namespace diastole::report

@@ -137,6 +137,15 @@ TEST_F(ReportPage, ARunShowsItsTracesFramesAndSoundness) {
   expect_shown(html, "Permission is hereby granted");
 }
 
+TEST_F(ReportPage, AShearTestStandsBesideTheFit) {
+  const std::string html = page({example("shear-test.csv"), fit_file()});
+  expect_self_contained(html);
+  for (const char* shown :
+       {"C1, rotational shear", "8.730 ± 0.042 kPa", "force_per_string_N", "C1 by itself"})
+    expect_shown(html, shown);
+  EXPECT_LT(html.find("<h2>The stiffness"), html.find("<h2>The rotational shear test"));
+}
+
 TEST_F(ReportPage, SeveralFilesShareOnePage) {
   const std::string html =
       page({example("recorded-baseline.run.h5"), fit_file(), example("recorded-preload.run.h5")});
