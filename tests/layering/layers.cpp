@@ -57,6 +57,7 @@ const std::vector<Rule>& rules() {
       {"firmware/boot", {"protocol/wire"}},
       {"host", {"protocol"}},
       {"estimator", {"protocol/contract", "protocol/runfile"}},
+      {"tools/sim_rig", {"protocol", "firmware", "host", "tools/sim_board", "tools/sim_daq"}},
       {"tools", {"protocol", "firmware", "host", "estimator"}},
       {"tests", {"protocol", "firmware", "host", "estimator", "tools"}},
   };

@@ -42,6 +42,9 @@ INSTANTIATE_TEST_SUITE_P(Rules, PlantedViolation,
                                          std::pair{"host/daq/driver.cpp", "tools/sim_daq/server.hpp"},
                                          std::pair{"tools/sim_rig/plant.cpp", "tests/sim/fake.hpp"},
                                          std::pair{"estimator/rig/hose.cpp", "tools/sim_rig/plant.hpp"},
+                                         std::pair{"tools/sim_rig/plant/gel.cpp", "estimator/fe/newton.hpp"},
+                                         std::pair{"tools/sim_rig/plant/gel.cpp",
+                                                   "tools/figures/line_chart.hpp"},
                                          std::pair{"host/daq/driver.cpp", "../../estimator/fe/newton.hpp"}));
 
 }  // namespace
