@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <fstream>
 #include <numeric>
@@ -27,6 +28,30 @@ size_t edit_distance(std::string_view a, std::string_view b) {
     }
   }
   return row[b.size()];
+}
+
+std::string in_small_letters(std::string_view word) {
+  std::string small(word);
+  for (char& letter : small)
+    letter = static_cast<char>(std::tolower(static_cast<unsigned char>(letter)));
+  return small;
+}
+
+/// The key that was probably meant to be `wanted`: one that nobody asked for and that differs by its case and
+/// a letter or two (one in a short word). Three would take outer_radius_mm for inner_radius_mm.
+const toml::key* misspelt(std::string_view wanted, const toml::table& table,
+                          const std::set<std::string, std::less<>>& asked) {
+  constexpr size_t short_word = 5;
+  const toml::key* nearest = nullptr;
+  size_t limit = wanted.size() <= short_word ? 1 : 2;
+  for (const auto& [key, node] : table) {
+    if (asked.contains(key.str())) continue;
+    const size_t distance = edit_distance(in_small_letters(wanted), in_small_letters(key.str()));
+    if (distance > limit || (nearest != nullptr && distance == limit)) continue;
+    limit = distance;
+    nearest = &key;
+  }
+  return nearest;
 }
 
 /// "greater than 0 and at most 15", for messages.
@@ -230,8 +255,13 @@ const toml::node* TableReader::find(std::string_view key) {
 
 const toml::node& TableReader::need(std::string_view key, std::string_view what) {
   const toml::node* node = find(key);
-  if (node == nullptr) fail(key, "is missing", fmt::format("Add {} = {}.", key, what));
-  return *node;
+  if (node != nullptr) return *node;
+  if (const toml::key* meant = misspelt(key, *table_, asked_)) {
+    fail(key, "is missing",
+         fmt::format("There is \"{}\" on line {}: did you mean {}?", meant->str(), meant->source().begin.line,
+                     key));
+  }
+  fail(key, "is missing", fmt::format("Add {} = {}.", key, what));
 }
 
 double TableReader::checked_number(std::string_view key, const toml::node& node,

@@ -53,6 +53,23 @@ TEST(TableReader, ReadsEveryKindOfValue) {
   EXPECT_NO_THROW(root.finish());
 }
 
+TEST(TableReader, AMisspeltKeyIsNamedWhereTheRequiredOneIsMissing) {
+  TableReader root = reader("perod_s = 1\nstroke_ml = 40\nouter_radius_mm = 50\n");
+  EXPECT_THAT(message_of([&] { (void)root.number("stroke_mL"); }),
+              AllOf(HasSubstr("key stroke_mL: is missing"),
+                    HasSubstr("There is \"stroke_ml\" on line 2: did you mean stroke_mL?")));
+  EXPECT_THAT(message_of([&] { (void)root.number("period_s"); }),
+              HasSubstr("\"perod_s\" on line 1: did you mean period_s?"));
+}
+
+TEST(TableReader, AnotherKnownKeyIsNotTakenForAMisspelling) {
+  TableReader root = reader("outer_radius_mm = 50\nC2_kPa = 1\n");
+  EXPECT_THAT(message_of([&] { (void)root.number("inner_radius_mm"); }),
+              AllOf(HasSubstr("Add inner_radius_mm"), testing::Not(HasSubstr("outer_radius_mm"))));
+  (void)root.number("C2_kPa");
+  EXPECT_THAT(message_of([&] { (void)root.number("C1_kPa"); }), HasSubstr("Add C1_kPa"));
+}
+
 TEST(TableReader, AnUnknownKeyNamesItselfItsLineAndTheNearestKnownKey) {
   TableReader root = reader("stroke_mL = 40\nperiod = 1.2\n");
   (void)root.number("stroke_mL");
