@@ -108,7 +108,7 @@ nlohmann::ordered_json as_json(const Study& study, const ElasticModel& model, co
   json["dofs"] = model.dofs();
   json["load_steps"] = report.load_steps;
   json["newton_iterations"] = report.newton_iterations;
-  json["corrections"] = report.corrections;
+  json["factorisations"] = report.factorisations;
   json["negative_pivots"] = report.negative_pivots;
   json["pressure_unknowns"] = report.pressure_unknowns;
   json["seconds"] = seconds;
@@ -131,10 +131,11 @@ void print_for_people(const nlohmann::ordered_json& json) {
                fmt::join(probe["point_mm"].get<std::vector<double>>(), ", "),
                fmt::join(probe["displacement_mm"].get<std::vector<double>>(), ", "));
   }
-  fmt::print("  {} elements, {} unknowns, {} load steps, {} Newton iterations, {:.2f} s\n",
-             fmt::join(json["mesh"].get<std::vector<int>>(), " x "), json["dofs"].get<size_t>(),
-             json["load_steps"].get<size_t>(), json["newton_iterations"].get<size_t>(),
-             json["seconds"].get<double>());
+  fmt::print(
+      "  {} elements, {} unknowns, {} load steps, {} Newton iterations with {} factorisations, {:.2f} s\n",
+      fmt::join(json["mesh"].get<std::vector<int>>(), " x "), json["dofs"].get<size_t>(),
+      json["load_steps"].get<size_t>(), json["newton_iterations"].get<size_t>(),
+      json["factorisations"].get<size_t>(), json["seconds"].get<double>());
 }
 
 ExitCode run_solve(const SolveArguments& arguments, const CommandOutput& out) {

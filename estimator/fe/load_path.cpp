@@ -35,9 +35,9 @@ ElasticState extrapolated(const Waypoint& before_point, const Waypoint& last_poi
 void record(SolveReport& report, const NewtonResult& attempt) {
   const bool accepted = attempt.reason == SolveReason::converged;
   report.history.push_back({attempt.state.pressure_kPa, accepted, attempt.iterations});
-  report.newton_iterations += attempt.iterations.size();
+  report.factorisations += attempt.iterations.size();
   for (const NewtonIteration& iteration : attempt.iterations)
-    report.corrections += iteration.corrections;
+    report.newton_iterations += 1 + iteration.corrections;
   if (accepted) {
     ++report.load_steps;
     report.reached_pressure_kPa = attempt.state.pressure_kPa;

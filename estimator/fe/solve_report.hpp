@@ -48,8 +48,8 @@ struct SolveReport {
   SolveReason reason = SolveReason::converged;
   std::vector<LoadStep> history;
   size_t load_steps = 0;         ///< accepted ones
-  size_t newton_iterations = 0;  ///< tangents assembled and factorised
-  size_t corrections = 0;        ///< back-substitutions with a kept factor
+  size_t newton_iterations = 0;  ///< updates of the state: with a new tangent or with kept factors
+  size_t factorisations = 0;     ///< tangents assembled and factorised
   size_t negative_pivots = 0;    ///< of the last tangent; equals the pressure unknowns at a stable state
   size_t pressure_unknowns = 0;
   double reached_pressure_kPa = 0.0;

@@ -73,7 +73,8 @@ ChartSeries solve_and_print(const Mesh& mesh) {
     }
     const double taken = model.cavity_volume_mL(solution.state) - model.cavity_volume_mL(model.rest_state());
     fmt::print(" {:+.3f} | {} + {} | {:.2f} |\n", 100.0 * (taken / load.volume_change_mL - 1.0),
-               solution.report.newton_iterations, solution.report.corrections, processor_s);
+               solution.report.factorisations,
+               solution.report.newton_iterations - solution.report.factorisations, processor_s);
     std::fflush(stdout);
     if (&load == &loads.front()) {
       constexpr int samples = 55;
