@@ -17,6 +17,7 @@ struct FitArguments {
   std::vector<std::string> starts;
   std::string mesh;
   std::optional<std::filesystem::path> output;
+  bool force = false;
   int iteration_limit = 50;
 };
 
@@ -56,13 +57,24 @@ void print_record(const FitRecord& record) {
     fmt::print("{} not used: {}.\n", exclusion.points, exclusion.reason);
 }
 
+std::vector<std::filesystem::path> inputs_of(const Study& study) {
+  std::vector<std::filesystem::path> inputs = study.data.runs;
+  inputs.push_back(study.file);
+  for (const auto& data : {study.data.tags, study.data.points, study.data.frames}) {
+    if (data) inputs.push_back(*data);
+  }
+  return inputs;
+}
+
 ExitCode run_fit(const FitArguments& arguments, const CommandOutput& out) {
   Study study = read_study(arguments.study);
   if (!arguments.mesh.empty()) set_mesh(study, arguments.mesh);
   for (const std::string& start : arguments.starts)
     set_start(study, start);
+  if (arguments.output) {
+    require_output({*arguments.output, inputs_of(study), fit_file_mark, arguments.force});
+  }
   const Measurement measurement = read_measurement(study);
-  if (arguments.output) require_writable(*arguments.output);
   fmt::print(stderr, "Fitting {} in {} frames.\n",
              measurement.tags.empty() ? fmt::format("{} 3-D points", measurement.points.size())
                                       : fmt::format("{} tag points", measurement.tags.size()),
@@ -106,6 +118,7 @@ void add_fit(CommandLine& line) {
                       "other element counts: circumferential,longitudinal,transmural");
   command->add_option("-o,--output", arguments->output,
                       "keep the result in this file, for `diastole report`");
+  command->add_flag("--force", arguments->force, "replace an output file that is no fit result");
   command->add_option("--iterations", arguments->iteration_limit, "stop after so many steps")
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();

@@ -4,6 +4,7 @@
 
 #include "estimator/cli/commands.hpp"
 #include "estimator/io/whole_file.hpp"
+#include "estimator/report/page.hpp"
 #include "estimator/report/report.hpp"
 
 namespace diastole {
@@ -13,9 +14,11 @@ struct ReportArguments {
   std::vector<std::filesystem::path> files;
   std::filesystem::path page;
   size_t frames = 16;
+  bool force = false;
 };
 
 ExitCode run_report(const ReportArguments& arguments, const CommandOutput& out) {
+  require_output({arguments.page, arguments.files, report::page_mark, arguments.force});
   const std::string html = report::make_report(arguments.files, {.frames = arguments.frames});
   write_whole_file(arguments.page, html);
   if (out.json) {
@@ -41,6 +44,7 @@ void add_report(CommandLine& line) {
                    "run files, fit results and shear tests, recognised by their content")
       ->required();
   command->add_option("-o,--output", arguments->page, "the HTML page to write")->required();
+  command->add_flag("--force", arguments->force, "replace an output file that is no report");
   command->add_option("--frames", arguments->frames, "image frames of a cycle")
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();

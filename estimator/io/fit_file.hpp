@@ -7,6 +7,7 @@
 #include <array>
 #include <filesystem>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace diastole {
@@ -114,6 +115,9 @@ struct FitRecord {
   std::vector<FitSection> sections;
   std::vector<std::string> remarks;  ///< whole sentences for the reader
 };
+
+/// Near the start of each such document.
+inline constexpr std::string_view fit_file_mark = "\"format\": \"diastole-fit\"";
 
 /// One JSON document, indented, ending in a line feed.
 std::string to_json(const FitRecord& record);

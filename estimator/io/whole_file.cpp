@@ -11,34 +11,56 @@
 namespace diastole {
 namespace {
 
-[[noreturn]] void cannot_be_written(const std::filesystem::path& path) {
+namespace fs = std::filesystem;
+
+[[noreturn]] void cannot_be_written(const fs::path& path) {
   throw InputError({path.string(), "", "cannot be written",
                     "Check that the folder exists, that you may write there, and that it has room."});
 }
 
+bool starts_with_mark(const fs::path& path, std::string_view mark) {
+  std::string start(256, '\0');
+  std::ifstream(path, std::ios::binary).read(start.data(), static_cast<std::streamsize>(start.size()));
+  return start.find(mark) != std::string::npos;
+}
+
 }  // namespace
 
-void write_whole_file(const std::filesystem::path& path, std::string_view content) {
-  const std::filesystem::path unfinished = path.string() + ".part";
+void write_whole_file(const fs::path& path, std::string_view content) {
+  const fs::path unfinished = path.string() + "." + std::to_string(::getpid()) + ".part";
   std::ofstream stream(unfinished, std::ios::binary);
   stream << content;
   stream.close();
   std::error_code error;
-  if (stream) std::filesystem::rename(unfinished, path, error);
+  if (stream) fs::rename(unfinished, path, error);
   if (!stream || error) {
-    std::filesystem::remove(unfinished, error);
+    fs::remove(unfinished, error);
     cannot_be_written(path);
   }
 }
 
-void require_writable(const std::filesystem::path& path) {
-  const std::filesystem::path folder = std::filesystem::absolute(path).parent_path();
-  if (std::filesystem::is_directory(path) || ::access(folder.c_str(), W_OK) != 0) cannot_be_written(path);
+void require_output(const OutputFile& output) {
+  const fs::path folder = fs::absolute(output.path).parent_path();
+  if (::access(folder.c_str(), W_OK | X_OK) != 0) cannot_be_written(output.path);
+  if (!fs::exists(output.path)) return;
+  // A rename would put an ordinary file in the place of a device.
+  if (!fs::is_regular_file(output.path)) cannot_be_written(output.path);
+  for (const fs::path& input : output.inputs) {
+    std::error_code missing;
+    if (fs::equivalent(input, output.path, missing)) {
+      throw InputError({output.path.string(), "", "is read by this command and cannot be its output too",
+                        "Give -o another name."});
+    }
+  }
+  if (!output.force && !fs::is_empty(output.path) && !starts_with_mark(output.path, output.mark)) {
+    throw InputError({output.path.string(), "", "exists already and is no earlier result of this command",
+                      "Choose another name, or --force to replace it."});
+  }
 }
 
-std::string read_whole_file(const std::filesystem::path& path) {
+std::string read_whole_file(const fs::path& path) {
   std::ifstream stream(path, std::ios::binary);
-  if (!stream || std::filesystem::is_directory(path)) {
+  if (!stream || fs::is_directory(path)) {
     throw InputError(
         {path.string(), "", "cannot be opened",
          "Check the path and that you may read the file; paths in a study are relative to the study."});

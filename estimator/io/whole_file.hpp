@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace diastole {
 
@@ -11,8 +12,16 @@ namespace diastole {
 /// then.
 void write_whole_file(const std::filesystem::path& path, std::string_view content);
 
-/// Throws InputError if `path` cannot become a file: before long work, so that its result is not lost.
-void require_writable(const std::filesystem::path& path);
+struct OutputFile {
+  std::filesystem::path path;
+  std::vector<std::filesystem::path> inputs;  ///< what the command reads: never replaced
+  std::string_view mark;  ///< text near the start of an earlier result, which is replaced without being asked
+  bool force = false;     ///< replaces any other ordinary file
+};
+
+/// Before long work, so that neither its result nor an input is lost. Throws InputError if the path cannot
+/// become a file, is one of the inputs under whatever name, or holds something else and there is no `force`.
+void require_output(const OutputFile& output);
 
 /// Throws InputError if the file is missing, a folder or unreadable.
 std::string read_whole_file(const std::filesystem::path& path);

@@ -147,6 +147,7 @@ void Page::listing(const std::string& title, const std::string& text) {
 
 std::string Page::html() const {
   std::string text = "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n";
+  text += fmt::format("<meta name=\"generator\" {}>\n", page_mark);
   text += "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n";
   text += fmt::format("<title>{}</title>\n<style>\n", escaped(title_));
   if (!charts_.empty()) text += std::string(embedded::uplot_css) + "\n";

@@ -4,9 +4,13 @@
 // uPlot takes its place with a zoomable trace.
 
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace diastole::report {
+
+/// Near the start of each page.
+inline constexpr std::string_view page_mark = "content=\"diastole report\"";
 
 struct Figure {
   std::string svg;

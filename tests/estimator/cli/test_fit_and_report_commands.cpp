@@ -1,14 +1,19 @@
 #include <gmock/gmock.h>
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
 #include "estimator/cli/commands.hpp"
+#include "estimator/io/whole_file.hpp"
 #include "tests/estimator/io/scratch_file.hpp"
 
 namespace diastole {
 namespace {
 
+using test::message_of;
+using testing::AllOf;
 using testing::HasSubstr;
 
 struct Outcome {
@@ -44,6 +49,20 @@ class FitAndReport : public testing::Test {
                                           "--mesh", "4,2,1"};
     arguments.insert(arguments.end(), more.begin(), more.end());
     return arguments;
+  }
+
+  // The example with data of its own, so that a mistake destroys a copy.
+  std::string small_study() const {
+    const std::string examples = DIASTOLE_SOURCE_DIR "/examples/";
+    std::string text = read_whole_file(examples + "phantom-a.study.toml");
+    for (const char* kind : {"tags", "frames"}) {
+      const std::string name = fmt::format("phantom-a.{}.csv", kind);
+      const std::string copy = fmt::format("gel.{}.csv", kind);
+      std::filesystem::copy_file(examples + name, file(copy.c_str()),
+                                 std::filesystem::copy_options::overwrite_existing);
+      text.replace(text.find(name), name.size(), copy);
+    }
+    return folder_.write("study.toml", text).string();
   }
 
   test::ScratchFolder folder_;
@@ -88,6 +107,60 @@ TEST_F(FitAndReport, AnOutputThatCannotBeWrittenIsRefusedBeforeTheFit) {
   testing::internal::CaptureStderr();
   EXPECT_THROW((void)run(quick_fit({"-o", file("no/such/folder/fit.json")})), InputError);
   EXPECT_THAT(testing::internal::GetCapturedStderr(), testing::Not(HasSubstr("iteration")));
+}
+
+// A link is another name of the same file.
+TEST_F(FitAndReport, AFitDoesNotReplaceWhatItReads) {
+  for (const char* name : {"study.toml", "gel.tags.csv", "gel.frames.csv"}) {
+    const std::string study = small_study();
+    std::filesystem::remove(file("link"));
+    std::filesystem::create_hard_link(file(name), file("link"));
+    for (const std::string& output : {file(name), file("link")}) {
+      const std::string before = read_whole_file(output);
+      EXPECT_THAT(message_of([&] {
+                    (void)run({"fit", study, "--force", "-o", output});
+                  }),
+                  AllOf(HasSubstr(output), HasSubstr("is read by this command"), HasSubstr("another name")));
+      EXPECT_EQ(read_whole_file(output), before);
+    }
+  }
+}
+
+TEST_F(FitAndReport, AReportDoesNotReplaceWhatItReads) {
+  const std::string run_file = file("gel.run.h5");
+  std::filesystem::copy_file(DIASTOLE_SOURCE_DIR "/examples/recorded-baseline.run.h5", run_file);
+  const std::string before = read_whole_file(run_file);
+  EXPECT_THAT(message_of([&] {
+                (void)run({"report", run_file, "--force", "-o", run_file});
+              }),
+              AllOf(HasSubstr(run_file), HasSubstr("is read by this command")));
+  EXPECT_EQ(read_whole_file(run_file), before);
+}
+
+TEST_F(FitAndReport, OnlyAnEarlierResultIsReplacedWithoutForce) {
+  const std::string run_file = DIASTOLE_SOURCE_DIR "/examples/recorded-baseline.run.h5";
+  const std::string notes = folder_.write("notes.html", "<!DOCTYPE html>\nmine").string();
+  const std::vector<std::string> report = {"report", run_file, "-o", notes};
+  EXPECT_THAT(message_of([&] { (void)run(report); }),
+              AllOf(HasSubstr(notes), HasSubstr("exists already"), HasSubstr("--force")));
+  EXPECT_EQ(read_whole_file(notes), "<!DOCTYPE html>\nmine");
+  EXPECT_EQ(run({"report", run_file, "--force", "-o", notes}).code, ExitCode::done);
+  EXPECT_EQ(run(report).code, ExitCode::done);
+
+  const std::string fit = folder_.write("fit.json", "{\"mine\": 1}").string();
+  EXPECT_THAT(message_of([&] { (void)run(quick_fit({"-o", fit})); }), HasSubstr("--force"));
+  EXPECT_EQ(run(quick_fit({"--force", "-o", fit})).code, ExitCode::done);
+  EXPECT_EQ(run(quick_fit({"-o", fit})).code, ExitCode::done);
+}
+
+TEST_F(FitAndReport, ADeviceIsNotReplacedByAFile) {
+  const std::string run_file = DIASTOLE_SOURCE_DIR "/examples/recorded-baseline.run.h5";
+  std::filesystem::create_symlink("/dev/null", file("sink"));
+  EXPECT_THAT(message_of([&] {
+                (void)run({"report", run_file, "-o", file("sink")});
+              }),
+              HasSubstr("cannot be written"));
+  EXPECT_TRUE(std::filesystem::is_symlink(file("sink")));
 }
 
 TEST_F(FitAndReport, NothingIsLeftWhenThePageCannotBeMade) {
