@@ -34,6 +34,38 @@ struct SimulatedSession {
   double wall_s = 0;
 };
 
+void require_writable_folder(const fs::path& file, const char* option) {
+  const fs::path folder = file.has_parent_path() ? file.parent_path() : ".";
+  if (fs::is_directory(file)) {
+    throw InputError({file.string(), "", "is a directory", fmt::format("Name a file for {}.", option)});
+  }
+  if (::access(folder.c_str(), W_OK | X_OK) != 0) {
+    throw InputError({folder.string(), "", "is no directory in which you may write",
+                      fmt::format("Make it (mkdir), or choose another place for {}.", option)});
+  }
+}
+
+/// Before a session of perhaps an hour: both outputs can be written, are two files, and are not what is read.
+void check_outputs(const SimulateOptions& options) {
+  const fs::path run = options.session.output, pins = options.rig.pins;
+  require_writable_folder(run, "-o");
+  for (const fs::path& output : {run, pins}) {
+    for (const fs::path input : {options.session.experiment, options.rig.config, options.rig.image}) {
+      std::error_code missing;
+      if (!output.empty() && !input.empty() && fs::equivalent(input, output, missing)) {
+        throw InputError({output.string(), "", "is read by this command and cannot be its output too",
+                          "Give the output another name."});
+      }
+    }
+  }
+  if (pins.empty()) return;
+  require_writable_folder(pins, "--pins");
+  if (fs::weakly_canonical(fs::absolute(run)) == fs::weakly_canonical(fs::absolute(pins))) {
+    throw InputError({pins.string(), "", "is named for both the run file and the pin trace",
+                      "Give -o and --pins two names."});
+  }
+}
+
 /// The pin trace appears under its own name only when it is complete.
 class PendingFile {
  public:
@@ -95,6 +127,7 @@ SessionResult run_in(PrivateDirectory& directory, const SimulatedRig& rig, const
 SimulatedSession simulate(SimulateOptions options) {
   const auto started = std::chrono::steady_clock::now();
   const Experiment experiment = read_experiment(options.session.experiment);
+  check_outputs(options);
   const PendingFile pins(options.rig.pins, options.session.force);
   options.rig.pins = pins.path();
   const StopSignals signals;
