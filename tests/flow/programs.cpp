@@ -116,6 +116,10 @@ Ended run(const Workplace& workplace, const std::vector<std::string>& arguments)
   return Program(workplace, arguments).wait();
 }
 
+Ended run_line(const Workplace& workplace, const std::string& line) {
+  return run(workplace, {"/bin/bash", "-c", "PATH=" DIASTOLE_BIN_DIR ":$PATH; " + line});
+}
+
 std::string source_text(const std::string& path) { return text_of(fs::path(DIASTOLE_SOURCE_DIR) / path); }
 
 std::string with(std::string text, const std::string& from, const std::string& to) {

@@ -64,6 +64,9 @@ class Program {
 
 Ended run(const Workplace& workplace, const std::vector<std::string>& arguments);
 
+/// Runs a line of bash, which finds the programs by their names.
+Ended run_line(const Workplace& workplace, const std::string& line);
+
 /// The text of a file of the source tree.
 std::string source_text(const std::string& path);
 /// `text` with the only occurrence of `from` replaced; a failed expectation if there is none or another.

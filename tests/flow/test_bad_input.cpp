@@ -64,7 +64,7 @@ std::vector<BadInput> table() {
       {"UnknownKey",
        [](Place place) { return simulate(place, with(gel(), "stroke_mL", "stroke_ml")); },
        2,
-       {"bad.toml", "stroke_mL"}},
+       {"bad.toml", "segment[0].stroke_mL", "\"stroke_ml\" on line 10", "did you mean stroke_mL?"}},
       {"NotANumber",
        [](Place place) { return simulate(place, with(gel(), "stroke_mL = 40.0", "stroke_mL = nan")); },
        2,
@@ -112,12 +112,39 @@ std::vector<BadInput> table() {
        },
        2,
        {"nowhere", "-o"}},
+      {"NoDirectoryForThePins",
+       [](Place place) -> std::vector<std::string> {
+         return {"diastole", "simulate",        place.write("gel.toml", gel()), "-o", "out.run.h5",
+                 "--pins",   "nowhere/pins.csv"};
+       },
+       2,
+       {"nowhere", "--pins"}},
+      {"OneNameForTwoOutputs",
+       [](Place place) -> std::vector<std::string> {
+         return {"diastole", "simulate",    place.write("gel.toml", gel()), "-o", "out.run.h5",
+                 "--pins",   "./out.run.h5"};
+       },
+       2,
+       {"out.run.h5", "both", "-o", "--pins"}},
+      {"TheExperimentAsOutput",
+       [](Place place) -> std::vector<std::string> {
+         return {"diastole", "simulate", place.write("gel.toml", gel()), "-o", "gel.toml", "--force"};
+       },
+       2,
+       {"gel.toml", "is read by this command", "another name"}},
+      {"UnknownOption",
+       [](Place place) -> std::vector<std::string> {
+         return {"diastole", "simulate",   place.write("gel.toml", gel()),
+                 "-o",       "out.run.h5", "--no-such-option"};
+       },
+       2,
+       {"diastole: ", "--no-such-option", "--help"}},
       {"RigWithUnknownKey",
        [](Place place) {
          return simulate_in(place, with(source_text("examples/rig.toml"), "hose_bore_mm", "hose_bor_mm"));
        },
        2,
-       {"bad.rig.toml", "hose_bore_mm"}},
+       {"bad.rig.toml", "rig.hose_bore_mm", "\"hose_bor_mm\" on line", "did you mean hose_bore_mm?"}},
       {"RigWithUnknownSimulationKey",
        [](Place place) {
          return simulate_in(place, source_text("examples/rig.toml") + "\n[simulation]\nC1 = 8.8\n");

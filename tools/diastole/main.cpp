@@ -1,12 +1,18 @@
 // The front door: one program, `diastole`, whose subcommands come from host/cli, estimator/cli and tools/.
 
+#include <poll.h>
+#include <unistd.h>
 #include <CLI/CLI.hpp>
+
 #include <algorithm>
+#include <csignal>
 #include <cstdio>
 #include <exception>
 #include <iostream>
+#include <sstream>
 #include <string>
 #include <string_view>
+#include <system_error>
 #include <vector>
 
 #include "estimator/cli/commands.hpp"
@@ -50,7 +56,10 @@ diastole::ExitCode run(int argc, char** argv) {
   app.footer(
       "`diastole COMMAND --help` explains a command with examples.\n"
       "Exit codes: 0 done, 1 it ran but the answer is negative, 2 wrong usage or input, 3 hardware or link "
-      "fault.");
+      "fault.\n"
+      "With --json, standard output holds one JSON document; after exit code 2 or 3 it may be empty: the "
+      "exit "
+      "code\nand the text on standard error tell the error.");
   diastole::CommandLine line(app);
   diastole::add_host_commands(line);
   diastole::add_simulate(line);
@@ -67,7 +76,10 @@ diastole::ExitCode run(int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? ExitCode::done : ExitCode::bad_input;
+    std::ostringstream refusal;
+    if (app.exit(error, std::cout, refusal) == 0) return ExitCode::done;
+    std::cerr << "diastole: " << refusal.str();
+    return ExitCode::bad_input;
   }
   try {
     return line.run();
@@ -80,11 +92,65 @@ diastole::ExitCode run(int argc, char** argv) {
   }
 }
 
+/// Progress that nobody reads any more, as in `diastole simulate ... 2>&1 | head -1`, must not end the work:
+/// what cannot be written to standard error is dropped.
+void let_standard_error_drop() {
+  static constexpr cookie_io_functions_t functions{.read = nullptr,
+                                                   .write =
+                                                       [](void*, const char* text, size_t size) {
+                                                         size_t written = 0;
+                                                         while (written < size) {
+                                                           const ssize_t count = ::write(
+                                                               STDERR_FILENO, text + written, size - written);
+                                                           if (count <= 0) break;
+                                                           written += static_cast<size_t>(count);
+                                                         }
+                                                         return static_cast<ssize_t>(size);
+                                                       },
+                                                   .seek = nullptr,
+                                                   .close = nullptr};
+  std::FILE* dropping = ::fopencookie(nullptr, "w", functions);
+  if (dropping == nullptr) return;
+  std::setvbuf(dropping, nullptr, _IONBF, 0);
+  stderr = dropping;
+}
+
+bool reader_has_gone() {
+  pollfd output{STDOUT_FILENO, POLLOUT, 0};
+  return ::poll(&output, 1, 0) == 1 && (output.revents & POLLERR) != 0;
+}
+
+/// Standard output did not take what was printed. A reader that has gone (`diastole inspect x | head -1`) ends
+/// a program quietly, by the signal that it expects.
+diastole::ExitCode not_delivered() {
+  if (reader_has_gone()) {
+    std::signal(SIGPIPE, SIG_DFL);
+    std::raise(SIGPIPE);
+  }
+  std::fputs("diastole: standard output cannot be written\n  Make room, or send it elsewhere.\n", stderr);
+  return diastole::ExitCode::bad_input;
+}
+
+diastole::ExitCode run_and_deliver(int argc, char** argv) {
+  try {
+    const diastole::ExitCode code = run(argc, argv);
+    return std::cout.flush().good() && std::fflush(stdout) == 0 && std::ferror(stdout) == 0 ? code
+                                                                                            : not_delivered();
+  } catch (const std::system_error&) {
+    if (std::ferror(stdout) != 0) return not_delivered();
+    throw;
+  }
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
+  // A closed pipe or a file grown too large is an error of that write, not the end of a session.
+  std::signal(SIGPIPE, SIG_IGN);
+  std::signal(SIGXFSZ, SIG_IGN);
+  let_standard_error_drop();
   try {
-    return static_cast<int>(run(argc, argv));
+    return static_cast<int>(run_and_deliver(argc, argv));
   } catch (const std::exception& error) {
     std::fprintf(stderr, "diastole: internal error: %s\n  Please report it with the command that you gave.\n",
                  error.what());
