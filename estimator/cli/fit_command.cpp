@@ -36,7 +36,9 @@ void print_parameter(const FittedParameter& parameter) {
   if (parameter.elements.empty()) return;
   fmt::print("  element   value{}   standard error\n", unit);
   for (size_t i = 0; i < parameter.elements.size(); ++i) {
-    fmt::print("  {:>7}  {:9.3f}  {:15.3f}\n", i, parameter.elements[i].value, parameter.elements[i].se);
+    const FittedElement& element = parameter.elements[i];
+    fmt::print("  {:>7}  {:9.3f}  {:>15}\n", i, element.value,
+               std::isnan(element.se) ? "on its bound" : fmt::format("{:.3f}", element.se));
   }
 }
 

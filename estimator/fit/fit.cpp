@@ -14,11 +14,8 @@ constexpr int most_searches = 3;  // the choice of usable points settles in one 
 
 std::vector<bool> free_unknowns(const JointProblem& problem, const Eigen::VectorXd& q) {
   std::vector<bool> is_free;
-  for (Eigen::Index i = 0; i < q.size(); ++i) {
-    const double slack = 1e-7 * (problem.upper(i) - problem.lower(i));
-    is_free.push_back(!std::isfinite(slack) ||
-                      (q[i] > problem.lower(i) + slack && q[i] < problem.upper(i) - slack));
-  }
+  for (Eigen::Index i = 0; i < q.size(); ++i)
+    is_free.push_back(problem.bound_under(q, i) == BoundSide::none);
   return is_free;
 }
 
@@ -29,15 +26,15 @@ Eigen::VectorXd variances_at_exact_pressure(const Eigen::MatrixXd& jacobian, con
   return covariance(jacobian.leftCols(values), free_values).diagonal();
 }
 
-EstimatedValue estimated(const SoughtValue& sought, double q, bool is_free, double variance,
-                         double exact_variance, bool near_lower) {
-  EstimatedValue result{sought.value(q), not_a_number, {not_a_number, not_a_number},
-                        not_a_number,    false,        false};
-  if (!is_free) {
-    result.at_lower = near_lower;
-    result.at_upper = !near_lower;
-    return result;
-  }
+EstimatedValue estimated(const SoughtValue& sought, double q, BoundSide bound, double variance,
+                         double exact_variance) {
+  EstimatedValue result{sought.value(q),
+                        not_a_number,
+                        {not_a_number, not_a_number},
+                        not_a_number,
+                        bound == BoundSide::lower,
+                        bound == BoundSide::upper};
+  if (bound != BoundSide::none) return result;
   const double sd = std::sqrt(variance);
   result.se = sought.slope(q) * sd;
   result.se_exact_pressure = sought.slope(q) * std::sqrt(exact_variance);
@@ -75,9 +72,8 @@ void tell_uncertainty(FitOutcome& outcome, JointProblem& problem, const Eigen::V
   outcome.covariance = covariance(jacobian, is_free);
   const Eigen::VectorXd exact = variances_at_exact_pressure(jacobian, is_free, problem.values());
   for (Eigen::Index i = 0; i < problem.values(); ++i) {
-    const bool near_lower = q[i] - problem.lower(i) < problem.upper(i) - q[i];
-    outcome.values.push_back(estimated(problem.value(i), q[i], is_free[static_cast<size_t>(i)],
-                                       outcome.covariance(i, i), exact[i], near_lower));
+    outcome.values.push_back(
+        estimated(problem.value(i), q[i], problem.bound_under(q, i), outcome.covariance(i, i), exact[i]));
     const double slope = problem.value(i).slope(q[i]);
     outcome.covariance.row(i) *= slope;
     outcome.covariance.col(i) *= slope;

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 namespace diastole {
@@ -53,6 +54,18 @@ void add_bounds(std::vector<std::string>& remarks, const FitRecord& record) {
   }
 }
 
+void add_conditional_mean(std::vector<std::string>& remarks, const FitRecord& record) {
+  for (const FittedParameter& parameter : record.parameters) {
+    const auto held = std::count_if(parameter.elements.begin(), parameter.elements.end(),
+                                    [](const FittedElement& element) { return std::isnan(element.se); });
+    if (held == 0) continue;
+    remarks.push_back(fmt::format(
+        "The mean {} and its interval are conditional on the bound: {} of {} elements rest on it and "
+        "count as exactly known there, so that the interval is narrower than the data's own.",
+        parameter.name, held, parameter.elements.size()));
+  }
+}
+
 void add_regional(std::vector<std::string>& remarks, const FitRecord& record) {
   for (const FittedParameter& parameter : record.parameters) {
     if (parameter.elements.empty()) continue;
@@ -95,6 +108,7 @@ std::vector<std::string> remarks_on(const FitRecord& record, const FitOutcome& f
   std::vector<std::string> remarks = {remark_on_misfit(record)};
   add_pressure_share(remarks, record, fit);
   add_bounds(remarks, record);
+  add_conditional_mean(remarks, record);
   add_regional(remarks, record);
   add_undeformed(remarks, record);
   if (record.outliers_5sigma > 0) {

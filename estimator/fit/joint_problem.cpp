@@ -69,6 +69,13 @@ double JointProblem::upper(Eigen::Index unknown) const {
   return value(unknown).coordinate(value(unknown).upper);
 }
 
+BoundSide JointProblem::bound_under(const Eigen::VectorXd& q, Eigen::Index unknown) const {
+  const double slack = 1e-7 * (upper(unknown) - lower(unknown));
+  if (!std::isfinite(slack)) return BoundSide::none;
+  if (q[unknown] <= lower(unknown) + slack) return BoundSide::lower;
+  return q[unknown] >= upper(unknown) - slack ? BoundSide::upper : BoundSide::none;
+}
+
 std::vector<double> JointProblem::values_at(const Eigen::VectorXd& q) const {
   std::vector<double> result;
   for (Eigen::Index i = 0; i < values(); ++i)

@@ -40,6 +40,8 @@ struct SoughtValue {
   [[nodiscard]] double slope(double coordinate) const;
 };
 
+enum class BoundSide { none, lower, upper };
+
 class JointProblem {
  public:
   struct LoadedFrame {
@@ -61,6 +63,8 @@ class JointProblem {
   [[nodiscard]] Eigen::VectorXd start() const;
   [[nodiscard]] double lower(Eigen::Index unknown) const;
   [[nodiscard]] double upper(Eigen::Index unknown) const;
+  /// The bound on which an unknown rests, within 1e-7 of its range.
+  [[nodiscard]] BoundSide bound_under(const Eigen::VectorXd& q, Eigen::Index unknown) const;
   [[nodiscard]] const SoughtValue& value(Eigen::Index unknown) const {
     return values_[static_cast<size_t>(unknown)];
   }

@@ -23,12 +23,24 @@ class JointCost : public ceres::CostFunction {
     if (found == nullptr) return false;
     Eigen::Map<Eigen::VectorXd>(residuals, found->size()) = *found;
     if (jacobians != nullptr && jacobians[0] != nullptr) {
-      Eigen::Map<RowMajor>(jacobians[0], problem_.rows(), problem_.unknowns()) = problem_.jacobian(q);
+      Eigen::Map<RowMajor> jacobian(jacobians[0], problem_.rows(), problem_.unknowns());
+      jacobian = problem_.jacobian(q);
+      const Eigen::VectorXd gradient = jacobian.transpose() * *found;
+      for (Eigen::Index i = 0; i < q.size(); ++i) {
+        if (is_held(q, gradient, i)) jacobian.col(i).setZero();
+      }
     }
     return true;
   }
 
  private:
+  /// Whether an unknown rests on its bound and the cost falls only beyond it.
+  [[nodiscard]] bool is_held(const Eigen::VectorXd& q, const Eigen::VectorXd& gradient,
+                             Eigen::Index i) const {
+    const BoundSide side = problem_.bound_under(q, i);
+    return (side == BoundSide::lower && gradient[i] > 0) || (side == BoundSide::upper && gradient[i] < 0);
+  }
+
   JointProblem& problem_;
 };
 

@@ -2,6 +2,11 @@
 // Levenberg-Marquardt with bounds (Ceres Solver's trust-region minimiser) on a joint problem, with the exact
 // Jacobian. A trial point without equilibrium counts as a failed step: the trust region shrinks and the
 // search goes on.
+//
+// An unknown that rests on its bound while the cost falls only beyond it is held there for the next step: its
+// column of the Jacobian is zero, so that the step is the others' own best one and not one that is spoilt when
+// the bound cuts it off. Each accepted point decides anew by the sign of the gradient, the bound's multiplier
+// (active set: D. P. Bertsekas, SIAM J. Control Optim. 20 (1982) 221).
 
 #include <functional>
 #include <string>

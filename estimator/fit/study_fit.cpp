@@ -68,6 +68,8 @@ FittedParameter record_of(const StudyParameter& parameter, const FitOutcome& fit
   const auto start = static_cast<Eigen::Index>(first), size = static_cast<Eigen::Index>(count);
   result.value = sum / static_cast<double>(count);
   result.se = std::sqrt(fit.covariance.block(start, start, size, size).sum()) / static_cast<double>(count);
+  // The elements on a bound have no error of their own: the mean's is that of the others.
+  if (!(result.se > 0)) result.se = std::numeric_limits<double>::quiet_NaN();
   result.ci95 = {result.value - normal_95 * result.se, result.value + normal_95 * result.se};
   return result;
 }

@@ -1,3 +1,4 @@
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 
 #include <cmath>
@@ -126,6 +127,39 @@ TEST_F(CoarseStudy, ABoundIsSaid) {
   const FitRecord record = fit();
   EXPECT_EQ(record.parameters[0].at_bound, "upper");
   EXPECT_THAT(record.remarks, Contains(AllOf(HasSubstr("upper bound"), HasSubstr("[1, 7]"))));
+}
+
+// Three of the eight values that fit best without bounds are above 9: with them held, the others' search must
+// not slow down.
+TEST_F(CoarseStudy, AnElementOnItsBoundIsHeldAndTheMeanSaysSo) {
+  study_.law.parameters[0] = {"C1_kPa", 6.0, 1.0, 9.0, Variation::element};
+  const FitRecord record = fit();
+  EXPECT_TRUE(record.converged) << record.reason;
+  EXPECT_LE(record.iterations, 7);
+  for (const FitIteration& step : record.history)
+    EXPECT_TRUE(step.accepted) << "iteration " << step.iteration;
+  const FittedParameter& C1 = record.parameters[0];
+  EXPECT_EQ(C1.at_bound, "upper");
+  size_t held = 0;
+  for (const FittedElement& element : C1.elements) {
+    EXPECT_EQ(std::isnan(element.se), element.value > 9.0 - 1e-6) << element.value;
+    EXPECT_EQ(std::isnan(element.ci95[0]), std::isnan(element.se));
+    held += std::isnan(element.se) ? 1 : 0;
+  }
+  EXPECT_GT(held, 0U);
+  EXPECT_LT(held, C1.elements.size());
+  EXPECT_THAT(record.remarks, Contains(AllOf(HasSubstr("conditional on the bound"),
+                                             HasSubstr(fmt::format("{} of 8 elements", held)))));
+}
+
+TEST_F(CoarseStudy, AStartOnABoundIsLeftWhenTheCostFallsInside) {
+  study_.law.parameters[0] = {"C1_kPa", 6.0, 1.0, 15.0, Variation::element};
+  const FitRecord inside = fit();
+  study_.law.parameters[0].start = 15.0;
+  const FitRecord from_bound = fit();
+  EXPECT_TRUE(from_bound.converged) << from_bound.reason;
+  EXPECT_NEAR(from_bound.chi2, inside.chi2, 1e-6 * inside.chi2);
+  EXPECT_EQ(from_bound.parameters[0].at_bound, "");
 }
 
 TEST_F(CoarseStudy, WhatCannotBeFittedIsRefused) {
