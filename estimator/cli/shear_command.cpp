@@ -18,6 +18,7 @@ struct ShearArguments {
   std::filesystem::path data;
   std::optional<std::filesystem::path> page;
   ShearForm form = ShearForm::normalised;
+  bool force = false;
 };
 
 std::string to_json(const ShearTest& test, const ShearFit& fit, ShearForm form) {
@@ -75,7 +76,7 @@ void print_fit(const ShearTest& test, const ShearFit& fit) {
 }
 
 ExitCode run_shear(const ShearArguments& arguments, const CommandOutput& out) {
-  if (arguments.page) require_writable(*arguments.page);
+  if (arguments.page) require_output({*arguments.page, {arguments.data}, report::page_mark, arguments.force});
   const ShearTest test = read_shear_test(arguments.data);
   const ShearFit fit = fit_shear(test, arguments.form);
   if (arguments.page) {
@@ -107,6 +108,7 @@ void add_shear(CommandLine& line) {
       "more.");
   command->add_option("DATA", arguments->data, "rotations of the markers")->required();
   command->add_option("-o,--output", arguments->page, "a page with the plots, to write");
+  command->add_flag("--force", arguments->force, "replace an output file that is no report");
   const std::map<std::string, ShearForm> forms = {{"normalised", ShearForm::normalised},
                                                   {"rotation", ShearForm::rotation}};
   command

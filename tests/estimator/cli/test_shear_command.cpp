@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "estimator/cli/commands.hpp"
+#include "estimator/io/whole_file.hpp"
 #include "tests/estimator/io/scratch_file.hpp"
 
 namespace diastole {
@@ -62,6 +63,22 @@ TEST(ShearCommand, WritesItsPage) {
   EXPECT_GT(std::filesystem::file_size(page), 5000U);
   EXPECT_THROW((void)run({"shear", example, "-o", (folder.path() / "no/such/page.html").string()}),
                InputError);
+}
+
+TEST(ShearCommand, DoesNotReplaceItsDataOrAnythingElse) {
+  const test::ScratchFolder folder;
+  const std::string data = (folder.path() / "data.csv").string();
+  std::filesystem::copy_file(example, data);
+  const std::string before = read_whole_file(data);
+  EXPECT_THAT(test::message_of([&] {
+                (void)run({"shear", data, "--force", "-o", data});
+              }),
+              HasSubstr("is read by this command"));
+  EXPECT_EQ(read_whole_file(data), before);
+  const std::string notes = folder.write("notes.html", "mine").string();
+  EXPECT_THAT(test::message_of([&] { (void)run({"shear", data, "-o", notes}); }), HasSubstr("--force"));
+  EXPECT_EQ(run({"shear", data, "--force", "-o", notes}).code, ExitCode::done);
+  EXPECT_EQ(run({"shear", data, "-o", notes}).code, ExitCode::done);
 }
 
 TEST(ShearCommand, WhatTheDataDoNotDetermineIsANegativeAnswer) {
