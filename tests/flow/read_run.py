@@ -23,6 +23,10 @@ def check(run):
     segments = run["protocol/segments"]
     for field in ("start_s", "waveform", "stroke_mL", "period_s", "offset_mL", "cycles"):
         assert field in segments.dtype.names, field
+    without_units = []
+    run.visititems(lambda path, item: without_units.append(path)
+                   if isinstance(item, h5py.Dataset) and not item.attrs.get("units") else None)
+    assert not without_units, without_units
     columns = {}
     for path, unit in (("pump/time_s", "s"), ("pump/commanded_mL", "mL"), ("pressure/time_s", "s"),
                        ("pressure/cavity_kPa", "kPa"), ("trigger/time_s", "s")):

@@ -118,13 +118,14 @@ TEST(RigFaults, ARunWithoutASingleSampleIsToldInWords) {
 }
 
 TEST(RigFaults, AStalledInstrumentBecomesGapsAndExitCode1) {
-  FaultyRig rig("daq-stall@4+0.3", FaultyRig::Time::real);
+  FaultyRig rig("daq-stall@ttl+1+0.3", FaultyRig::Time::real);
   const Ended ended = rig.acquire("3");
   EXPECT_EQ(ended.exit_code, 1) << ended.err;
   const json session = ended.json();
   EXPECT_EQ(session["triggers"], 3);
   EXPECT_EQ(session["samples"].get<int64_t>() + session["gaps"].get<int64_t>(), session["expected"]);
   EXPECT_GE(session["gaps"], 80);
+  EXPECT_THAT(ended.err, testing::HasSubstr("no answer within 20 ms"));
   EXPECT_EQ(rig.inspect()["sound"], false);
 }
 

@@ -11,6 +11,8 @@ struct FaultWindow {
   uint64_t from_ns = std::numeric_limits<uint64_t>::max();
   uint64_t until_ns = std::numeric_limits<uint64_t>::max();
   [[nodiscard]] bool holds(uint64_t now_ns) const { return now_ns >= from_ns && now_ns < until_ns; }
+  [[nodiscard]] bool empty() const { return from_ns >= until_ns; }
+  [[nodiscard]] FaultWindow later_by(uint64_t ns) const { return {from_ns + ns, until_ns + ns}; }
 };
 
 struct DaqFaults {

@@ -77,6 +77,15 @@ ModbusInstrument::~ModbusInstrument() {
   ::close(listener_);
 }
 
+void ModbusInstrument::plan(const DaqFaults& faults, uint64_t from_ns) {
+  DaqFaults& planned = config_.faults;
+  if (!faults.stall.empty()) planned.stall = faults.stall.later_by(from_ns);
+  if (!faults.drop.empty()) planned.drop = faults.drop.later_by(from_ns);
+  if (faults.delay.empty()) return;
+  planned.delay = faults.delay.later_by(from_ns);
+  planned.delay_ns = faults.delay_ns;
+}
+
 std::vector<int> ModbusInstrument::descriptors() const {
   std::vector<int> list{listener_};
   list.insert(list.end(), clients_.begin(), clients_.end());

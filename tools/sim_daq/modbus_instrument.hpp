@@ -50,6 +50,8 @@ class ModbusInstrument {
   ModbusInstrument& operator=(const ModbusInstrument&) = delete;
 
   [[nodiscard]] uint16_t port() const { return port_; }
+  /// Adds faults that lie `from_ns` later than they say; each replaces what was planned of its kind.
+  void plan(const DaqFaults& faults, uint64_t from_ns);
 
   /// The listening socket and the clients', to wait for.
   [[nodiscard]] std::vector<int> descriptors() const;

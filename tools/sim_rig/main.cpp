@@ -38,7 +38,8 @@ constexpr const char* footer =
 then a session takes as long as the machine needs and is the same every time.
 
 Faults (seconds of the rig's clock): serial-hangup@T  daq-stall@T+D  daq-drop@T+D  daq-delay@T+D/L
-  sim_rig --fault daq-stall@5+0.2 --fault serial-hangup@9)";
+With ttl+T in place of T an instrument's fault counts from the first trigger.
+  sim_rig --fault daq-stall@ttl+5+0.2 --fault serial-hangup@9)";
 
 struct Arguments {
   std::string config;

@@ -6,6 +6,9 @@
 //   daq-stall@T+D          the instrument answers nothing for D seconds
 //   daq-drop@T+D           the instrument closes its connections, and takes none for D seconds
 //   daq-delay@T+D/L        for D seconds the instrument's answers come L seconds late
+//
+// With "ttl+T" in place of T, an instrument's fault counts from the first rising edge of the TTL, however long
+// starting and homing took: daq-stall@ttl+1+0.3.
 
 #include <cstdint>
 #include <limits>
@@ -19,6 +22,7 @@ namespace diastole::sim_rig {
 struct RigFaults {
   uint64_t serial_hangup_ns = std::numeric_limits<uint64_t>::max();
   sim_daq::DaqFaults daq{};
+  sim_daq::DaqFaults daq_from_ttl{};  ///< times since the first rising edge
 };
 
 /// Throws InputError that names the text and the form expected.

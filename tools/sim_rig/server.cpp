@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <chrono>
 #include <nlohmann/json.hpp>
+#include <utility>
 #include <vector>
 
 namespace diastole::sim_rig {
@@ -35,6 +36,7 @@ Server::Server(const RigDescription& description, std::unique_ptr<SimulatedContr
             .edge =
                 [this](const PinEdge& edge) {
                   if (pins_) pins_->write(edge);
+                  if (edge.pin == Pin::ttl && edge.value != 0) take_trigger(edge.time_ns);
                 }}),
       instrument_(instrument_config(description, options),
                   {.now_ns = [this] { return rig_.now_ns(); },
@@ -79,6 +81,10 @@ void Server::advance_to(uint64_t until_ns) {
     line_.hang_up();
   }
   rig_.advance_to(until_ns);
+}
+
+void Server::take_trigger(uint64_t time_ns) {
+  if (!std::exchange(triggered_, true)) instrument_.plan(options_.faults.daq_from_ttl, time_ns);
 }
 
 void Server::take_serial() {

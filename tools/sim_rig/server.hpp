@@ -39,12 +39,14 @@ class Server {
 
  private:
   void advance_to(uint64_t until_ns);
+  void take_trigger(uint64_t time_ns);
   void take_serial();
   void conduct(const conductor::Advance& question);
 
   ServerOptions options_;
   PtyLine line_;
   std::optional<PinTrace> pins_;
+  bool triggered_ = false;
   Rig rig_;
   sim_daq::ModbusInstrument instrument_;
   std::optional<ConductorServer> conductor_;

@@ -2,10 +2,11 @@
 
 #include <gtest/gtest.h>
 #include <hdf5.h>
-#include <unistd.h>
 
 #include <array>
 #include <cstring>
+
+#include "tests/host/bench/scratch.hpp"
 
 namespace diastole::runfile {
 namespace {
@@ -168,9 +169,7 @@ void write_sketch(const std::filesystem::path& path, const RunSketch& sketch) {
 }
 
 std::filesystem::path scratch_file(const std::string& name) {
-  const auto directory =
-      std::filesystem::temp_directory_path() / ("diastole-test-runfile-" + std::to_string(getpid()));
-  std::filesystem::create_directories(directory);
+  static const Scratch directory("test-runfile");
   return directory / name;
 }
 

@@ -29,7 +29,7 @@ struct RunSketch {
 /// Writes the sketch; overwrites.
 void write_sketch(const std::filesystem::path& path, const RunSketch& sketch);
 
-/// A file name in a directory of this test run.
+/// A file name in a directory of this test run, which is gone when it ends.
 std::filesystem::path scratch_file(const std::string& name);
 
 }  // namespace diastole::runfile

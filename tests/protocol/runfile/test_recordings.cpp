@@ -1,4 +1,4 @@
-// Recordings that an independent program made must open and bin without complaint: two small ones in
+// Recordings that an independent program made must open and bin without complaint: three small ones in
 // examples/, and the whole set beside the source tree where it is there.
 
 #include <gmock/gmock.h>
@@ -8,6 +8,7 @@
 
 #include "protocol/runfile/frame_bins.hpp"
 #include "protocol/runfile/reader.hpp"
+#include "protocol/runfile/soundness.hpp"
 
 namespace diastole::runfile {
 namespace {
@@ -46,10 +47,18 @@ TEST(Recordings, TheExamplePreloadHasASegmentWithAnOffset) {
   EXPECT_EQ(bins.frames[0].cycles, 10U);
 }
 
+TEST(Recordings, TheExampleWithoutAnEffectBinsWhole) {
+  const RecordedRun run = read_run(source_dir / "examples/recorded-no-effect.run.h5");
+  const FrameBins bins = bin_frames(run, {.frames = 16});
+  EXPECT_EQ(bins.frames[0].cycles, 30U);
+  EXPECT_TRUE(bins.excluded.empty());
+  EXPECT_TRUE(assess(run).sound());
+}
+
 TEST(Recordings, EverySessionBesideTheSourceTreeOpensAndBins) {
   const auto folder = source_dir.parent_path() / "shared/data/rig";
   if (!std::filesystem::exists(folder)) {
-    GTEST_SKIP() << "the recorded sessions are not at " << folder << "; the two in examples/ were tested";
+    GTEST_SKIP() << "the recorded sessions are not at " << folder << "; those in examples/ were tested";
   }
   size_t runs = 0;
   for (const auto& entry : std::filesystem::recursive_directory_iterator(folder)) {
@@ -59,6 +68,7 @@ TEST(Recordings, EverySessionBesideTheSourceTreeOpensAndBins) {
     const FrameBins bins = bin_frames(run, {.frames = 16});
     EXPECT_EQ(static_cast<int64_t>(bins.triggers), bins.scheduled_cycles);
     EXPECT_TRUE(bins.excluded.empty());
+    EXPECT_TRUE(assess(run).sound());
     ++runs;
   }
   EXPECT_GT(runs, 54U);

@@ -43,9 +43,16 @@ TEST(RigFaults, AreReadFromTheCommandLine) {
   EXPECT_FALSE(faults.daq.drop.holds(0));
 }
 
+TEST(RigFaults, OfTheInstrumentMayCountFromTheFirstTrigger) {
+  const RigFaults faults = parse_rig_faults({"daq-stall@ttl+1.5+0.25"});
+  EXPECT_EQ(faults.daq_from_ttl.stall.from_ns, 1'500'000'000U);
+  EXPECT_EQ(faults.daq_from_ttl.stall.until_ns, 1'750'000'000U);
+  EXPECT_TRUE(faults.daq.stall.empty());
+}
+
 TEST(RigFaults, AnythingElseIsRefusedWithTheForms) {
   for (const char* text : {"serial-hangup", "daq-stall@2", "serial-hangup@3+1", "fire@3", "daq-drop@x+1",
-                           "daq-stall@2+-1", "daq-stall@2+1s"}) {
+                           "daq-stall@2+-1", "daq-stall@2+1s", "daq-stall@ttl+2", "serial-hangup@ttl+2"}) {
     try {
       parse_rig_faults({text});
       FAIL() << text;
