@@ -16,16 +16,19 @@
 // register 2n, CORE_TIMER counts 40 MHz at 61520, register pair 55100 reads 0x00112233.
 //
 // After a time-out a late answer may still arrive and would be taken for the next one. So every failure
-// closes the connection, and the next reading opens a new one.
+// closes the connection, and the next reading opens a new one. A reading takes no longer than timeout_ms, with
+// its reconnecting; the host's name is looked up once, at the start.
 
 #include <fmt/format.h>
 #include <modbus/modbus.h>
+#include <netdb.h>
 
 #include <algorithm>
 #include <array>
 #include <bit>
 #include <cerrno>
 #include <charconv>
+#include <chrono>
 
 #include "host/daq/driver.hpp"
 #include "protocol/contract/input_error.hpp"
@@ -68,6 +71,27 @@ struct FreeModbus {
   }
 };
 
+/// The numeric addresses of a host. Throws HardwareError if it has none.
+std::vector<std::string> addresses_of(const std::string& host) {
+  addrinfo hints{};
+  hints.ai_socktype = SOCK_STREAM;
+  addrinfo* found = nullptr;
+  std::vector<std::string> addresses;
+  if (getaddrinfo(host.c_str(), nullptr, &hints, &found) == 0) {
+    const std::unique_ptr<addrinfo, decltype(&freeaddrinfo)> list(found, &freeaddrinfo);
+    for (const addrinfo* each = list.get(); each != nullptr; each = each->ai_next) {
+      std::array<char, NI_MAXHOST> numeric{};
+      if (getnameinfo(each->ai_addr, each->ai_addrlen, numeric.data(), numeric.size(), nullptr, 0,
+                      NI_NUMERICHOST) == 0) {
+        addresses.emplace_back(numeric.data());
+      }
+    }
+  }
+  if (!addresses.empty()) return addresses;
+  throw HardwareError("modbus-tcp at " + host, "is no host that can be found",
+                      "Check host in [daq], or give the address in numbers.");
+}
+
 uint32_t pair_at(const uint16_t* registers) {
   return static_cast<uint32_t>(registers[0]) << 16U | registers[1];
 }
@@ -93,10 +117,7 @@ class ModbusTcp final : public Instrument {
     for (const Input& input : map_.inputs)
       end = std::max(end, input.first_register + input.width());
     registers_.resize(static_cast<size_t>(end - first_));
-    if (const std::string fault = connect(); !fault.empty()) {
-      throw HardwareError(describe(), fault,
-                          "Check that the instrument is powered and connected, and host and port in [daq].");
-    }
+    find();
     if (map_.labjack) check_identity();
   }
 
@@ -117,18 +138,45 @@ class ModbusTcp final : public Instrument {
 
   std::optional<uint32_t> read_timer() override {
     std::array<uint16_t, 2> pair{};
+    if (context_ == nullptr) return std::nullopt;  // the next reading connects
     if (!map_.timer_register || !ask(*map_.timer_register, pair).empty()) return std::nullopt;
     return pair_at(pair.data());
   }
 
  private:
+  using Moment = std::chrono::steady_clock::time_point;
+
+  [[nodiscard]] Moment end_of_patience() const {
+    return std::chrono::steady_clock::now() + std::chrono::milliseconds(map_.timeout_ms);
+  }
+
+  /// Connects to the first of the host's addresses that answers, and keeps to it.
+  void find() {
+    std::string fault;
+    for (const std::string& address : addresses_of(map_.host)) {
+      address_ = address;
+      fault = connect(end_of_patience());
+      if (fault.empty()) return;
+    }
+    throw HardwareError(describe(), fault,
+                        "Check that the instrument is powered and connected, and host and port in [daq].");
+  }
+
+  /// The patience for whatever is asked next: until `give_up`, and a millisecond at least.
+  void be_patient_until(Moment give_up) {
+    const auto left =
+        std::chrono::duration_cast<std::chrono::microseconds>(give_up - std::chrono::steady_clock::now());
+    const auto left_us = static_cast<uint32_t>(std::max<int64_t>(left.count(), 1000));
+    modbus_set_response_timeout(context_.get(), left_us / 1'000'000, left_us % 1'000'000);
+  }
+
   /// Empty, or why there is no connection.
-  std::string connect() {
-    context_.reset(modbus_new_tcp_pi(map_.host.c_str(), std::to_string(map_.port).c_str()));
+  std::string connect(Moment give_up) {
+    context_.reset(modbus_new_tcp_pi(address_.c_str(), std::to_string(map_.port).c_str()));
     if (context_ == nullptr) return "is not an address";
-    const auto timeout_us = static_cast<uint32_t>(map_.timeout_ms) * 1000;
-    modbus_set_response_timeout(context_.get(), timeout_us / 1'000'000, timeout_us % 1'000'000);
+    modbus_set_byte_timeout(context_.get(), 0, 0);  // the response's time-out is for all of its bytes
     modbus_set_slave(context_.get(), map_.unit);
+    be_patient_until(give_up);
     if (modbus_connect(context_.get()) == 0) return {};
     const std::string reason = modbus_strerror(errno);
     context_.reset();
@@ -137,9 +185,11 @@ class ModbusTcp final : public Instrument {
 
   /// Empty, or why the registers were not read; then the connection is closed.
   std::string ask(int first, std::span<uint16_t> out) {
+    const Moment give_up = end_of_patience();
     if (context_ == nullptr) {
-      if (std::string fault = connect(); !fault.empty()) return fault;
+      if (std::string fault = connect(give_up); !fault.empty()) return fault;
     }
+    be_patient_until(give_up);
     const auto read = map_.input_function ? modbus_read_input_registers : modbus_read_registers;
     const int count = static_cast<int>(out.size());
     if (read(context_.get(), first, count, out.data()) == count) return {};
@@ -162,6 +212,7 @@ class ModbusTcp final : public Instrument {
   }
 
   ModbusMap map_;
+  std::string address_;
   std::unique_ptr<modbus_t, FreeModbus> context_;
   int first_ = 0;
   std::vector<uint16_t> registers_;
@@ -209,8 +260,8 @@ OpenInstrument configure_modbus_tcp(TableReader& daq, std::vector<TableReader>& 
   map.host = daq.text("host");
   map.port = static_cast<int>(daq.integer_or("port", map.port, {.at_least = 1, .at_most = 65535}));
   map.unit = static_cast<int>(daq.integer_or("unit", map.unit, {.at_least = 0, .at_most = 255}));
-  map.timeout_ms =
-      static_cast<int>(daq.integer_or("timeout_ms", map.timeout_ms, {.at_least = 1, .at_most = 10'000}));
+  map.timeout_ms = static_cast<int>(
+      daq.integer_or("timeout_ms", map.timeout_ms, {.at_least = 1, .at_most = most_timeout_ms}));
   map.labjack = daq.has("preset") && daq.choice("preset", {"labjack-t"}) == "labjack-t";
   if (map.labjack) {
     map.timer_register = core_timer_register;

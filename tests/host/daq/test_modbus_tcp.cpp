@@ -27,14 +27,16 @@ OpenInstrument configured(const std::string& daq, const std::string& channels) {
 
 constexpr const char* two_inputs = "[[daq.channel]]\ninput = 0\n[[daq.channel]]\ninput = 3\n";
 
-std::string labjack(int port, int timeout_ms = 60) {
-  return fmt::format("host = \"127.0.0.1\"\nport = {}\npreset = \"labjack-t\"\ntimeout_ms = {}\n", port,
-                     timeout_ms);
+std::string labjack(int port) {
+  return fmt::format("host = \"127.0.0.1\"\nport = {}\npreset = \"labjack-t\"\n", port);
 }
+
+/// Patience for a loaded machine.
+const OpenOptions patient{.address = {}, .least_timeout_ms = 60};
 
 TEST(ModbusTcp, ReadsAllChannelsInOneRequestAndTheTimer) {
   const ModbusServer server;
-  const auto instrument = configured(labjack(server.port()), two_inputs)({});
+  const auto instrument = configured(labjack(server.port()), two_inputs)(patient);
   ASSERT_EQ(instrument->channels(), 2U);
   std::vector<double> volts(2);
   ASSERT_TRUE(instrument->read(volts).ok);
@@ -49,7 +51,7 @@ TEST(ModbusTcp, ADescribedRegisterMapIsScaled) {
   const auto instrument =
       configured(fmt::format("host = \"127.0.0.1\"\nport = {}\n", server.port()),
                  "[[daq.channel]]\nregister = 100\ntype = \"uint16\"\nV_per_count = 0.001\n"
-                 "[[daq.channel]]\nregister = 101\ntype = \"int16\"\nV_per_count = 0.001\n")({});
+                 "[[daq.channel]]\nregister = 101\ntype = \"int16\"\nV_per_count = 0.001\n")(patient);
   std::vector<double> volts(2);
   ASSERT_TRUE(instrument->read(volts).ok);
   EXPECT_NEAR(volts[0], 1, 1e-9);
@@ -60,7 +62,7 @@ TEST(ModbusTcp, ADescribedRegisterMapIsScaled) {
 TEST(ModbusTcp, ALateAnswerIsNeverTakenForTheNext) {
   // Request 3 is answered after 150 ms, when the driver (60 ms of patience) has long given up.
   const ModbusServer server([](int request) { return request == 3 ? 150 : 0; });
-  const auto instrument = configured(labjack(server.port()), two_inputs)({});
+  const auto instrument = configured(labjack(server.port()), two_inputs)(patient);
   std::vector<double> volts(2);
   int failed = 0;
   double last = -1;
@@ -87,7 +89,7 @@ TEST(ModbusTcp, AStallAndAHangUpAreToldAndOvercome) {
       [](int request) {
         return request == 2 ? Mishap::stall : request == 4 ? Mishap::hang_up : Mishap::none;
       });
-  const auto instrument = configured(labjack(server.port()), two_inputs)({});
+  const auto instrument = configured(labjack(server.port()), two_inputs)(patient);
   std::vector<double> volts(2);
   std::vector<bool> ok;
   for (int i = 0; i < 5; ++i)
@@ -103,6 +105,41 @@ TEST(ModbusTcp, NobodyThereOrAnotherInstrumentIsAHardwareError) {
   }
   EXPECT_THAT(message_of<HardwareError>([&] { configured(labjack(dead_port), two_inputs)({}); }),
               AllOf(HasSubstr(std::to_string(dead_port)), HasSubstr("does not connect")));
+}
+
+TEST(ModbusTcp, PatienceThatWouldCostTheLeaseIsRefusedWithWhatIsAllowed) {
+  const auto with_timeout = [](int timeout_ms) {
+    return configured(fmt::format("host = \"h\"\npreset = \"labjack-t\"\ntimeout_ms = {}\n", timeout_ms),
+                      two_inputs);
+  };
+  EXPECT_NO_THROW(with_timeout(most_timeout_ms));
+  EXPECT_THAT(message_of<InputError>([&] { with_timeout(200); }),
+              AllOf(HasSubstr("daq.timeout_ms"), HasSubstr("200"), HasSubstr("at most 30")));
+}
+
+TEST(ModbusTcp, ANameIsLookedUpAtTheStart) {
+  const ModbusServer server;
+  const auto by_name = [&](const std::string& host) {
+    return configured(fmt::format("host = \"{}\"\nport = {}\n", host, server.port()),
+                      "[[daq.channel]]\nregister = 0\ntype = \"float32\"\n")(patient);
+  };
+  std::vector<double> volts(1);
+  EXPECT_TRUE(by_name("localhost")->read(volts).ok);
+  EXPECT_THAT(message_of<HardwareError>([&] { by_name("no host"); }),
+              AllOf(HasSubstr("no host"), HasSubstr("can be found")));
+}
+
+TEST(ModbusTcp, ALostInstrumentsClockIsNotAskedFor) {
+  const ModbusServer server(
+      [](int) { return 0; },
+      [](int request) { return request == 1 ? ModbusServer::Mishap::hang_up : ModbusServer::Mishap::none; });
+  const auto instrument = configured(labjack(server.port()), two_inputs)(patient);
+  std::vector<double> volts(2);
+  EXPECT_FALSE(instrument->read(volts).ok);
+  EXPECT_FALSE(instrument->read_timer()) << "it would have to connect, a second time in one turn of the loop";
+  EXPECT_EQ(server.connections(), 1);
+  EXPECT_TRUE(instrument->read(volts).ok);
+  EXPECT_TRUE(instrument->read_timer());
 }
 
 TEST(ModbusTcp, AnAddressGivenAtStartReplacesTheFiles) {
