@@ -32,7 +32,7 @@ SegmentPeaks segment_peaks(const Segment& segment, const Settings& settings) {
   peaks.pressure_Pa =
       divide_up(divide_up(peaks.acceleration_uL_per_s2 * limits.inertance_kg_per_m4, 1'000'000), 1000);
   peaks.stopping_us = stopping_us(peaks.flow_uL_per_s, settings);
-  peaks.cycle_steps = settings.steps_of_nL(segment.stroke_nL);
+  if (profile.moves()) peaks.cycle_steps = settings.steps_of_nL(segment.stroke_nL);
   return peaks;
 }
 
@@ -61,7 +61,7 @@ Check check_segment(const Segment& segment, const Program& program, const Settin
   };
   for (const Check& check : at_most)
     if (check.asked > check.allowed) return check;
-  if (peaks.cycle_steps.count == 0)
+  if (find_profile(segment.waveform)->moves() && peaks.cycle_steps.count == 0)
     return {wire::Limit::stroke_at_least, segment.stroke_nL, divide_up(limits.microstep_pL, 1000)};
   if (r_wave_spacing_us <= kRWave_us) return {wire::Limit::r_wave_spacing, r_wave_spacing_us, kRWave_us + 1};
   return {wire::Limit::none, 0, 0};

@@ -5,7 +5,7 @@
 //   flow = v S/T     acceleration = a S/T²     step rate = flow / microstep
 //   pressure = inertance · acceleration        stopping time = flow / allowed acceleration
 //
-// all rounded up. The ramps between segments are planned within the limits and need no check.
+// all rounded up. A hold has no peaks and may have any stroke. The ramps between segments are planned within the limits and need no check.
 
 #include <cstdint>
 

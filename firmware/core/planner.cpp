@@ -10,6 +10,12 @@ Ticks at_phase(Ticks length, Q64 phase) {
   return {static_cast<std::int64_t>(scale(static_cast<std::uint64_t>(length.count), phase))};
 }
 
+/// Where the cycles of a segment begin: at its least volume.
+Steps beginning_of(const Segment& segment, const Settings& settings) {
+  const std::uint32_t above_nL = find_profile(segment.waveform)->moves() ? 0 : segment.stroke_nL;
+  return settings.steps_of_nL(std::uint64_t{segment.offset_nL} + above_nL);
+}
+
 }  // namespace
 
 void Planner::begin_run(const Program& program, const Settings& settings, Ticks start, Steps position) {
@@ -91,7 +97,7 @@ void Planner::end_steps(Ticks duration) {
 void Planner::begin_segment() {
   const Segment& segment = program_->segments[segment_];
   profile_ = find_profile(segment.waveform);
-  count_ = static_cast<std::uint32_t>(settings_.steps_of_nL(segment.stroke_nL).count);
+  count_ = profile_->moves() ? static_cast<std::uint32_t>(settings_.steps_of_nL(segment.stroke_nL).count) : 0;
   length_ = microseconds(segment.period_us);
   cycle_ = index_ = 0;
   phase_ = Phase::cycles;
@@ -106,6 +112,19 @@ MotionEvent Planner::ramp_step() {
           static_cast<std::uint16_t>(MotionEvent::kStep | (inflate_ ? MotionEvent::kInflate : 0))};
 }
 
+std::uint16_t Planner::cycle_start_flags() const {
+  const bool r_wave = cycle_in_run_ % program_->gate_every == 0;
+  return static_cast<std::uint16_t>(MotionEvent::kCycleStart | (r_wave ? MotionEvent::kRWave : 0));
+}
+
+/// A cycle without steps: its start, then its end.
+MotionEvent Planner::still_cycle_mark() {
+  if (index_++ == 0) return {origin_, cycle_start_flags()};
+  const Ticks end = origin_ + length_ - std::min(kRestBeforeEnd, Ticks{length_.count / 2});
+  finish_cycle();
+  return {end, MotionEvent::kCycleEnd};
+}
+
 MotionEvent Planner::cycle_step() {
   const bool rising = index_ < count_;
   const std::uint32_t level = rising ? index_ : 2 * count_ - 1 - index_;
@@ -113,10 +132,7 @@ MotionEvent Planner::cycle_step() {
   const Q64 phase = rising ? profile_->phase_rising(y) : profile_->phase_falling(y);
   MotionEvent event{origin_ + at_phase(length_, phase), MotionEvent::kStep};
   if (rising) event.flags |= MotionEvent::kInflate;
-  if (index_ == 0) {
-    event.flags |= MotionEvent::kCycleStart;
-    if (cycle_in_run_ % program_->gate_every == 0) event.flags |= MotionEvent::kRWave;
-  }
+  if (index_ == 0) event.flags |= cycle_start_flags();
   if (++index_ == 2 * count_) {
     event.flags |= MotionEvent::kCycleEnd;
     finish_cycle();
@@ -134,7 +150,7 @@ void Planner::finish_cycle() {
   if (stop_at_cycle_end_ || segment_ == program_->size) {
     begin_ramp(Steps{0}, Phase::end);
   } else if (segment_done) {
-    begin_ramp(settings_.steps_of_nL(program_->segments[segment_].offset_nL), Phase::segment_start);
+    begin_ramp(beginning_of(program_->segments[segment_], settings_), Phase::segment_start);
   }
 }
 
@@ -167,7 +183,7 @@ void Planner::plan_in_phase() {
       break;
     case Phase::rest:
       origin_ += microseconds(program_->rest_us);
-      begin_ramp(settings_.steps_of_nL(program_->segments[0].offset_nL), Phase::segment_start);
+      begin_ramp(beginning_of(program_->segments[0], settings_), Phase::segment_start);
       break;
     case Phase::ramp:
       if (index_ < count_)
@@ -182,9 +198,15 @@ void Planner::plan_in_phase() {
       }
       next_ = MotionEvent{origin_, MotionEvent::kSegmentStart};
       begin_segment();
+      if (count_ == 0) next_->flags |= still_cycle_mark().flags;
       break;
     case Phase::cycles:
-      next_ = cycle_step();
+      if (count_ > 0)
+        next_ = cycle_step();
+      else if (stop_at_cycle_end_ && index_ == 0)
+        begin_ramp(Steps{0}, Phase::end);
+      else
+        next_ = still_cycle_mark();
       break;
     case Phase::travel:
       if (index_ < count_)
@@ -210,9 +232,9 @@ Ticks Planner::segment_offset(const Program& program, const Settings& settings, 
   Steps position{0};
   for (std::size_t i = 0; i <= segment; ++i) {
     const Segment& next = program.segments[i];
-    const Steps offset = settings.steps_of_nL(next.offset_nL);
-    if (offset != position) time += settings.ramp_time(offset - position);
-    position = offset;
+    const Steps beginning = beginning_of(next, settings);
+    if (beginning != position) time += settings.ramp_time(beginning - position);
+    position = beginning;
     if (i < segment) time += microseconds(next.period_us) * std::int64_t{next.cycles};
   }
   return time;

@@ -7,7 +7,8 @@
 // Cycle c of a segment that starts at s begins at s + c T exactly. Its stroke is N whole microsteps, and the
 // step from level k to k + 1 is made when the ideal motion crosses the level half way between,
 // y = (2k + 1) / 2N, rounded to a tick; so the position is the ideal one rounded to a microstep, and N steps
-// up are followed by N steps down: nothing drifts. Ramps are rising halves of the parabolic profile.
+// up are followed by N steps down: nothing drifts. Ramps are rising halves of the parabolic profile. A segment
+// that holds is approached by a ramp to offset + stroke; its cycles have no steps, but begin and trigger.
 
 #include <cstdint>
 #include <optional>
@@ -23,9 +24,9 @@ struct MotionEvent {
   enum Flag : std::uint16_t {
     kStep = 1,           ///< an edge on STEP
     kInflate = 2,        ///< direction of that step
-    kCycleStart = 4,     ///< first step of a cycle: the TTL rises with it
+    kCycleStart = 4,     ///< first step of a cycle, or the beginning of one without: the TTL rises
     kRWave = 8,          ///< … and the R-wave starts
-    kCycleEnd = 16,      ///< last step of a cycle
+    kCycleEnd = 16,      ///< last step of a cycle, or just before the end of one without
     kRunStart = 32,      ///< run time zero; no step
     kSegmentStart = 64,  ///< first cycle of the next segment begins; no step
     kEnd = 128,          ///< everything planned has been done; no step
@@ -75,6 +76,8 @@ class Planner {
   void begin_ramp(Steps to, Phase then);
   MotionEvent ramp_step();
   MotionEvent cycle_step();
+  MotionEvent still_cycle_mark();
+  [[nodiscard]] std::uint16_t cycle_start_flags() const;
   MotionEvent travel_step();
   MotionEvent stop_step();
   void finish_cycle();

@@ -39,8 +39,8 @@ class Settings {
 
   [[nodiscard]] const wire::Configure& limits() const { return configure_; }
   /// Volume in whole microsteps, rounded to the nearest.
-  [[nodiscard]] Steps steps_of_nL(std::uint32_t volume_nL) const {
-    const std::uint64_t volume_pL = std::uint64_t{volume_nL} * 1000;
+  [[nodiscard]] Steps steps_of_nL(std::uint64_t volume_nL) const {
+    const std::uint64_t volume_pL = volume_nL * 1000;
     return {static_cast<std::int32_t>((volume_pL + configure_.microstep_pL / 2) / configure_.microstep_pL)};
   }
   [[nodiscard]] std::uint64_t steps_per_s(std::uint64_t flow_uL_per_s) const {

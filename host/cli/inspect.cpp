@@ -107,7 +107,9 @@ void show(const runfile::RecordedRun& run, const runfile::Soundness& soundness) 
                range.any() ? fmt::format("{:.3f} to {:.3f} kPa", range.least, range.most) : "no sample");
   }
   fmt::print("  pump: {}\n", in_words(soundness.pump));
-  fmt::print("  triggers: {} for {} cycles\n", run.trigger_s.size(), soundness.scheduled_cycles);
+  const std::string holds =
+      soundness.scheduled_holds > 0 ? fmt::format(" and {} of hold", soundness.scheduled_holds) : "";
+  fmt::print("  triggers: {} for {} cycles{}\n", run.trigger_s.size(), soundness.scheduled_cycles, holds);
   for (const auto& [name, value] : run.clock)
     fmt::print("  clock {}: {:g}\n", name, value);
   for (const runfile::Event& event : run.events)

@@ -121,7 +121,7 @@ LimitInWords words_for(wire::Limit limit) {
   }
   if (nak.refusal == wire::Refusal::unknown_waveform) {
     throw InputError({experiment.file, place, "this firmware has no such waveform",
-                      "Use parabolic or sinusoidal, or update the firmware."});
+                      "Use parabolic or sinusoidal, which every firmware has, or update the firmware."});
   }
   if (nak.refusal == wire::Refusal::program_full) {
     throw InputError({experiment.file, place, "is more than the controller's program holds",

@@ -98,7 +98,7 @@ struct ClearProgram {
 //        2    1 waveform                     waveform_list.inc
 //        3    4 cycles
 //        7    4 stroke_nL
-//       11    4 offset_nL                    least volume of the cycle, from home
+//       11    4 offset_nL                    least volume of the cycle, from home (a hold: plus stroke)
 //       15    4 period_us
 //
 // Example AddSegment: 03 00 00 0A 00 00 00 00 5A 62 02 00 00 00 00 80 4F 12 00

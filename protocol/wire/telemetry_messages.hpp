@@ -94,7 +94,7 @@ struct SegmentStarted {
   }
 };
 
-// Controller → host: the TTL rose, together with the first step of a cycle.
+// Controller → host: the TTL rose, with the first step of a cycle or, in a hold, at the cycle's time.
 //
 //   offset size field
 //        0    4 cycle                        from 0, over the whole run

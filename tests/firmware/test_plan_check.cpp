@@ -1,7 +1,7 @@
 #include <gtest/gtest.h>
 
 #include "firmware/core/plan_check.hpp"
-#include "firmware/core/profiles/profile.hpp"
+#include "tests/firmware/every_profile.hpp"
 
 namespace diastole::firmware {
 namespace {
@@ -80,6 +80,35 @@ TEST(PlanCheck, AMotionThatCannotStopWithinTheLeaseIsRefused) {
   EXPECT_EQ(refusal.limit, Limit::stopping_time);
   EXPECT_EQ(refusal.allowed, 250'000);
   EXPECT_NEAR(static_cast<double>(refusal.asked), 300'000, 100);
+}
+
+TEST(PlanCheck, AHoldMayHaveAnyStrokeWithinTheTravel) {
+  Segment hold{Waveform::hold, 1, 0, 0, 300'000};
+  EXPECT_EQ(refusal_of(hold).refusal, Refusal::none);
+  hold.stroke_nL = 30'000'000;
+  hold.offset_nL = 20'000'000;
+  EXPECT_EQ(segment_peaks(hold, Settings(wire::Configure::example())).flow_uL_per_s, 0U);
+  wire::Configure configure = wire::Configure::example();
+  configure.travel_uL = 50'000;
+  EXPECT_EQ(refusal_of(hold, configure).refusal, Refusal::none);
+  configure.travel_uL = 49'999;
+  EXPECT_EQ(refusal_of(hold, configure).limit, Limit::travel);
+}
+
+TEST(PlanCheck, EveryProfileIsHeldToItsOwnPeaks) {
+  for (const NamedProfile& named : every_moving_profile()) {
+    SCOPED_TRACE(named.name);
+    const Segment segment{named.waveform, 10, 20'000'000, 0, 1'200'000};
+    wire::Configure configure = wire::Configure::example();
+    const SegmentPeaks peaks = segment_peaks(segment, Settings(configure));
+    EXPECT_NEAR(static_cast<double>(peaks.acceleration_uL_per_s2),
+                1e-6 * named.profile->peak_acceleration_millionths * 20'000 / 1.44, 2);
+    configure.acceleration_uL_per_s2 = static_cast<std::uint32_t>(peaks.acceleration_uL_per_s2 - 1);
+    EXPECT_EQ(refusal_of(segment, configure).limit, Limit::acceleration);
+    configure = wire::Configure::example();
+    configure.flow_uL_per_s = static_cast<std::uint32_t>(peaks.flow_uL_per_s - 1);
+    EXPECT_EQ(refusal_of(segment, configure).limit, Limit::flow);
+  }
 }
 
 TEST(PlanCheck, LessThanAMicrostepIsRefused) {

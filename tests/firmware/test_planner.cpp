@@ -1,12 +1,12 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <map>
-#include <numbers>
 #include <vector>
 
 #include "firmware/core/plan_check.hpp"
 #include "firmware/core/planner.hpp"
+#include "tests/firmware/analytic_profiles.hpp"
+#include "tests/firmware/every_profile.hpp"
 
 namespace diastole::firmware {
 namespace {
@@ -35,54 +35,102 @@ Program program_of(std::initializer_list<Segment> segments, std::uint16_t gate_e
 
 const Settings kSettings(wire::Configure::example());
 
-long double analytic_phase(Waveform waveform, long double y) {
-  if (waveform == Waveform::sinusoidal) return std::acos(1 - 2 * y) / (2 * std::numbers::pi_v<long double>);
-  return y <= 0.5L ? std::sqrt(y / 8) : 0.5L - std::sqrt((1 - y) / 8);
+class EveryMotion : public testing::TestWithParam<NamedProfile> {};
+INSTANTIATE_TEST_SUITE_P(Profiles, EveryMotion, testing::ValuesIn(every_moving_profile()),
+                         [](const auto& tested) { return tested.param.name; });
+
+/// The analytic waveform, or the profile itself where none is written down.
+AnalyticProfile reference(const NamedProfile& named) {
+  const auto known = analytic_profiles().find(named.name);
+  if (known != analytic_profiles().end()) return known->second;
+  const auto crossing = [](Q64 (*phase)(Q64)) {
+    return [phase](Real y) { return std::ldexp(Real{1} * phase(static_cast<Q64>(std::ldexp(y, 64))), -64); };
+  };
+  return {{}, crossing(named.profile->phase_rising), crossing(named.profile->phase_falling)};
 }
 
-struct Motion {
-  Waveform waveform;
-  std::uint32_t stroke_nL;
-  std::uint32_t period_us;
-};
-class StepTimes : public testing::TestWithParam<Motion> {};
-
-TEST_P(StepTimes, AreTheAnalyticCrossingsRoundedToATick) {
-  const auto [waveform, stroke_nL, period_us] = GetParam();
-  const Program program = program_of({{waveform, 2, stroke_nL, 0, period_us}});
-  const auto events = plan(program, kSettings);
+void expect_analytic_steps(const NamedProfile& named, std::uint32_t stroke_nL, std::uint32_t period_us) {
+  const AnalyticProfile analytic = reference(named);
+  const Program program = program_of({{named.waveform, 2, stroke_nL, 0, period_us}});
   const std::int32_t count = kSettings.steps_of_nL(stroke_nL).count;
-  const long double period = microseconds(period_us).count;
+  const Real period = microseconds(period_us).count;
   const std::int64_t first_cycle = 1'000'000 + microseconds(500'000).count;
   std::int64_t step = 0;
-  for (const MotionEvent& event : events) {
+  for (const MotionEvent& event : plan(program, kSettings)) {
     if (!event.has(MotionEvent::kStep)) continue;
     const std::int64_t cycle = step / (2 * count), k = step % (2 * count);
     const bool rising = k < count;
-    const long double y = (2 * (rising ? k : 2 * count - 1 - k) + 1) / (2.0L * count);
-    const long double phase = rising ? analytic_phase(waveform, y) : 1 - analytic_phase(waveform, y);
-    const long double exact =
-        static_cast<long double>(first_cycle) + (static_cast<long double>(cycle) + phase) * period;
-    ASSERT_LE(std::abs(static_cast<long double>(event.tick.count) - exact), 0.51L) << "step " << step;
+    const Real y = (2 * (rising ? k : 2 * count - 1 - k) + 1) / (2.0L * count);
+    const Real phase = rising ? analytic.phase_rising(y) : analytic.phase_falling(y);
+    const Real exact = static_cast<Real>(first_cycle) + (static_cast<Real>(cycle) + phase) * period;
+    ASSERT_LE(std::abs(static_cast<Real>(event.tick.count) - exact), 0.51L) << "step " << step;
     ASSERT_EQ(event.has(MotionEvent::kInflate), rising);
+    ASSERT_EQ(event.has(MotionEvent::kCycleStart), k == 0);
     ++step;
   }
   EXPECT_EQ(step, 4 * count);
 }
 
-INSTANTIATE_TEST_SUITE_P(Motions, StepTimes,
-                         testing::Values(Motion{Waveform::parabolic, 40'000'000, 1'200'000},
-                                         Motion{Waveform::parabolic, 100'000'000, 2'000'000},
-                                         Motion{Waveform::parabolic, 8'000, 300'000},
-                                         Motion{Waveform::parabolic, 16'000'000, 60'000'000},
-                                         Motion{Waveform::sinusoidal, 40'000'000, 1'200'000},
-                                         Motion{Waveform::sinusoidal, 20'000'000, 4'000'000},
-                                         Motion{Waveform::sinusoidal, 16'000'000, 60'000'000}));
+TEST_P(EveryMotion, StepsAreTheAnalyticCrossingsRoundedToATick) {
+  expect_analytic_steps(GetParam(), 40'000'000, 1'200'000);
+  expect_analytic_steps(GetParam(), 20'000'000, 4'000'000);
+  expect_analytic_steps(GetParam(), 8'000, 300'000);
+  expect_analytic_steps(GetParam(), 16'000'000, 60'000'000);
+}
 
-TEST(Planner, TimesIncreaseAndEveryCycleEndsWhereItBegan) {
-  const Program program = program_of({{Waveform::parabolic, 50, 40'000'000, 0, 1'200'000},
-                                      {Waveform::sinusoidal, 30, 20'000'000, 10'000'000, 2'000'000},
-                                      {Waveform::sinusoidal, 20, 10'000'000, 5'000'000, 1'000'000}});
+TEST(Planner, AHoldStaysAtOffsetAndStrokeAndTriggersEachCycle) {
+  const Program program = program_of({{Waveform::hold, 3, 30'000'000, 5'000'000, 200'000},
+                                      {Waveform::parabolic, 1, 1'000'000, 0, 500'000},
+                                      {Waveform::hold, 1, 0, 0, 300'000}},
+                                     2);
+  ASSERT_TRUE(check_program(program, kSettings).ok());
+  const Ticks start{1'000'000};
+  std::vector<Ticks> expected, cycle_starts;
+  for (int i = 0; i < 3; ++i)
+    expected.push_back(start + Planner::segment_offset(program, kSettings, 0) + microseconds(200'000) * i);
+  std::int32_t position = 0, ends = 0, r_waves = 0;
+  Ticks before{0};
+  for (const MotionEvent& event : plan(program, kSettings)) {
+    ASSERT_GE((event.tick - before).count, microseconds(100).count);
+    before = event.tick;
+    if (event.has(MotionEvent::kStep)) position += event.has(MotionEvent::kInflate) ? 1 : -1;
+    if (event.has(MotionEvent::kRWave)) ++r_waves;
+    if (event.has(MotionEvent::kCycleEnd)) ++ends;
+    if (!event.has(MotionEvent::kCycleStart)) continue;
+    cycle_starts.push_back(event.tick);
+    if (cycle_starts.size() <= 3) {
+      EXPECT_EQ(position, kSettings.steps_of_nL(35'000'000).count);
+      EXPECT_EQ(event.has(MotionEvent::kSegmentStart), cycle_starts.size() == 1);
+    }
+  }
+  EXPECT_EQ(position, 0);
+  EXPECT_EQ(ends, 5);
+  EXPECT_EQ(r_waves, 3);
+  ASSERT_EQ(cycle_starts.size(), 5U);
+  EXPECT_EQ(std::vector<Ticks>(cycle_starts.begin(), cycle_starts.begin() + 3), expected);
+  EXPECT_EQ(cycle_starts[4], start + Planner::segment_offset(program, kSettings, 2));
+}
+
+TEST(Planner, AStopAtCycleEndIsHeardDuringAHold) {
+  const Program program = program_of({{Waveform::hold, 100, 30'000'000, 0, 2'000'000}});
+  Planner planner;
+  planner.begin_run(program, kSettings, Ticks{0}, Steps{0});
+  int cycles = 0;
+  for (; planner.peek() != nullptr; planner.pop()) {
+    if (!planner.peek()->has(MotionEvent::kCycleStart)) continue;
+    if (++cycles == 2) {
+      planner.pop();
+      planner.stop_at_cycle_end();
+    }
+  }
+  EXPECT_EQ(cycles, 2);
+}
+
+TEST_P(EveryMotion, TimesIncreaseAndEveryCycleEndsWhereItBegan) {
+  const Waveform waveform = GetParam().waveform;
+  const Program program = program_of({{waveform, 50, 20'000'000, 0, 1'200'000},
+                                      {waveform, 30, 20'000'000, 10'000'000, 2'000'000},
+                                      {waveform, 20, 10'000'000, 5'000'000, 1'000'000}});
   ASSERT_TRUE(check_program(program, kSettings).ok());
   std::int32_t position = 0;
   std::size_t segment = 0, cycles = 0;
@@ -106,8 +154,8 @@ TEST(Planner, TimesIncreaseAndEveryCycleEndsWhereItBegan) {
   EXPECT_EQ(position, 0);
 }
 
-TEST(Planner, NothingDriftsOverTenMillionSteps) {
-  const Program program = program_of({{Waveform::parabolic, 1000, 40'000'000, 0, 1'200'000}});
+TEST_P(EveryMotion, NothingDriftsOverTenMillionSteps) {
+  const Program program = program_of({{GetParam().waveform, 1000, 40'000'000, 0, 1'200'000}});
   Planner planner;
   planner.begin_run(program, kSettings, Ticks{0}, Steps{0});
   std::int64_t position = 0, steps = 0;
@@ -235,11 +283,11 @@ void expect_orderly_end(Planner planner, Ticks after) {
   ASSERT_TRUE(ended);
 }
 
-class StopBehind : public testing::TestWithParam<Waveform> {};
+class StopBehind : public testing::TestWithParam<NamedProfile> {};
 
 TEST_P(StopBehind, EveryEventLiesLaterThanWhatIsQueued) {
-  const Program program =
-      program_of({{GetParam(), 2, 1'000'000, 0, 800'000}, {GetParam(), 1, 800'000, 500'000, 700'000}});
+  const Program program = program_of(
+      {{GetParam().waveform, 2, 1'000'000, 0, 800'000}, {GetParam().waveform, 1, 800'000, 500'000, 700'000}});
   Planner planner;
   planner.begin_run(program, kSettings, Ticks{1'000'000}, Steps{30});
   Ticks last{0};
@@ -254,12 +302,13 @@ TEST_P(StopBehind, EveryEventLiesLaterThanWhatIsQueued) {
     }
     last = planner.peek()->tick;
   }
-  EXPECT_GT(stops, 700U);
+  EXPECT_GT(stops, GetParam().profile->moves() ? 700U : 300U);
   planner.begin_stop(last + microseconds(1'000), kSettings.stop_steps_per_s2());
   EXPECT_EQ(planner.peek(), nullptr) << "a second end";
 }
 
-INSTANTIATE_TEST_SUITE_P(Profiles, StopBehind, testing::Values(Waveform::parabolic, Waveform::sinusoidal));
+INSTANTIATE_TEST_SUITE_P(Profiles, StopBehind, testing::ValuesIn(every_profile()),
+                         [](const auto& tested) { return tested.param.name; });
 
 }  // namespace
 }  // namespace diastole::firmware

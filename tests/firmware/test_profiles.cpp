@@ -1,49 +1,30 @@
-// Properties of every profile in profile_list.inc, and the analytic waveforms of the experiment file.
+// Properties of every profile in profile_list.inc, and agreement with the analytic waveforms.
 
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <map>
-#include <numbers>
 #include <string>
 
-#include "firmware/core/profiles/profile.hpp"
+#include "tests/firmware/analytic_profiles.hpp"
+#include "tests/firmware/every_profile.hpp"
 
 namespace diastole::firmware {
 namespace {
 
-constexpr long double kOne = 18446744073709551616.0L;
+constexpr Real kOne = 18446744073709551616.0L;
 
-long double parabolic(long double phase) {
-  if (phase > 0.5L) phase = 1 - phase;
-  return phase < 0.25L ? 8 * phase * phase : 1 - 8 * (0.5L - phase) * (0.5L - phase);
-}
+class EveryProfile : public testing::TestWithParam<NamedProfile> {};
+class EveryMovingProfile : public EveryProfile {};
 
-long double sinusoidal(long double phase) {
-  return (1 - std::cos(2 * std::numbers::pi_v<long double> * phase)) / 2;
-}
-
-struct Named {
-  std::string name;
-  const Profile* profile;
-};
-void PrintTo(const Named& named, std::ostream* out) { *out << named.name; }
-
-class EveryProfile : public testing::TestWithParam<Named> {};
-
-const Named kProfiles[] = {
-#define DIASTOLE_PROFILE(name) {#name, &name##_profile},
-#include "firmware/core/profiles/profile_list.inc"
-#undef DIASTOLE_PROFILE
-};
-INSTANTIATE_TEST_SUITE_P(Profiles, EveryProfile, testing::ValuesIn(kProfiles),
-                         [](const auto& tested) { return tested.param.name; });
+const auto name_of = [](const auto& tested) { return tested.param.name; };
+INSTANTIATE_TEST_SUITE_P(Profiles, EveryProfile, testing::ValuesIn(every_profile()), name_of);
+INSTANTIATE_TEST_SUITE_P(Profiles, EveryMovingProfile, testing::ValuesIn(every_moving_profile()), name_of);
 
 constexpr std::uint32_t kLevels = 20'000;
 
 Q64 level(std::uint32_t k) { return ratio(2 * k + 1, 2 * kLevels); }
 
-TEST_P(EveryProfile, RisesThenFallsWithoutTurningBack) {
+TEST_P(EveryMovingProfile, RisesThenFallsWithoutTurningBack) {
   const Profile& profile = *GetParam().profile;
   for (std::uint32_t k = 1; k < kLevels; ++k) {
     ASSERT_LT(profile.phase_rising(level(k - 1)), profile.phase_rising(level(k)));
@@ -52,42 +33,58 @@ TEST_P(EveryProfile, RisesThenFallsWithoutTurningBack) {
   EXPECT_LT(profile.phase_rising(level(kLevels - 1)), profile.phase_falling(level(kLevels - 1)));
 }
 
-TEST_P(EveryProfile, BeginsAndEndsAtTheLeastVolume) {
+TEST_P(EveryMovingProfile, BeginsAndEndsAtTheLeastVolume) {
   const Profile& profile = *GetParam().profile;
-  EXPECT_LT(profile.phase_rising(ratio(1, 2'000'000'000)), kHalf >> 12);
-  EXPECT_GT(profile.phase_falling(ratio(1, 2'000'000'000)), 0 - (kHalf >> 12));
+  const Q64 tiny = ratio(1, 2'000'000'000);
+  EXPECT_LT(profile.phase_rising(tiny), kHalf >> 12);
+  const auto analytic = analytic_profiles().find(GetParam().name);
+  if (analytic == analytic_profiles().end()) return;
+  EXPECT_EQ(analytic->second.volume(0), 0);
+  EXPECT_LT(std::abs(analytic->second.volume(1)), 1e-18L);
+  const Real at_rest = static_cast<Real>(profile.phase_falling(tiny) + (kHalf >> 12)) / kOne;
+  EXPECT_LT(std::abs(analytic->second.volume(at_rest < 0.5L ? 1 : at_rest)), 1e-18L);
 }
 
-TEST_P(EveryProfile, DeclaredPeaksAreThePeaks) {
+TEST_P(EveryMovingProfile, DeclaredPeaksAreThePeaks) {
   const Profile& profile = *GetParam().profile;
-  long double fastest = 0, hardest = 0, before = 0;
-  for (std::uint32_t k = 1; k < kLevels; ++k) {
-    const long double interval =
-        static_cast<long double>(profile.phase_rising(level(k)) - profile.phase_rising(level(k - 1))) / kOne;
-    const long double speed = 1 / (kLevels * interval);
-    fastest = std::max(fastest, speed);
-    // dv/dt = v dv/dy; not at the very ends, where one step is a large part of the speed.
-    if (k > 20 && k < kLevels - 20)
-      hardest = std::max(hardest, std::abs(speed * speed - before * before) / 2 * kLevels);
-    before = speed;
+  Real fastest = 0, hardest = 0;
+  for (const auto phase : {profile.phase_rising, profile.phase_falling}) {
+    Real before = 0;
+    for (std::uint32_t k = 1; k < kLevels; ++k) {
+      const Q64 lower = phase(level(k - 1)), upper = phase(level(k));
+      const Real interval = static_cast<Real>(lower < upper ? upper - lower : lower - upper) / kOne;
+      const Real speed = 1 / (kLevels * interval);
+      fastest = std::max(fastest, speed);
+      // dv/dt = v dv/dy; not at the very ends, where one step is a large part of the speed.
+      if (k > 20 && k < kLevels - 20)
+        hardest = std::max(hardest, std::abs(speed * speed - before * before) / 2 * kLevels);
+      before = speed;
+    }
   }
+  const double acceleration = profile.peak_acceleration_millionths * 1e-6;
   EXPECT_NEAR(static_cast<double>(fastest), profile.peak_speed_millionths * 1e-6, 1e-3);
-  EXPECT_NEAR(static_cast<double>(hardest), profile.peak_acceleration_millionths * 1e-6, 0.05);
+  EXPECT_NEAR(static_cast<double>(hardest), acceleration, 0.003 * acceleration);
 }
 
-TEST_P(EveryProfile, CrossesEachLevelWhereTheAnalyticWaveformDoes) {
-  static const std::map<std::string, long double (*)(long double)> kAnalytic{{"parabolic", parabolic},
-                                                                             {"sinusoidal", sinusoidal}};
-  const auto analytic = kAnalytic.find(GetParam().name);
-  if (analytic == kAnalytic.end())
-    GTEST_SKIP() << "no analytic waveform is written down for " << GetParam().name;
+TEST_P(EveryMovingProfile, CrossesEachLevelWhereTheAnalyticWaveformDoes) {
+  const auto analytic = analytic_profiles().find(GetParam().name);
+  if (analytic == analytic_profiles().end())
+    GTEST_SKIP() << "analytic_profiles.hpp does not define " << GetParam().name;
   for (std::uint32_t k = 0; k < kLevels; ++k) {
     for (const Q64 phase :
          {GetParam().profile->phase_rising(level(k)), GetParam().profile->phase_falling(level(k))}) {
-      const long double y = analytic->second(static_cast<long double>(phase) / kOne);
-      ASSERT_NEAR(static_cast<double>(y - static_cast<long double>(level(k)) / kOne), 0, 2e-12) << k;
+      const Real y = analytic->second.volume(static_cast<Real>(phase) / kOne);
+      ASSERT_NEAR(static_cast<double>(y - static_cast<Real>(level(k)) / kOne), 0, 2e-12) << k;
     }
   }
+}
+
+TEST_P(EveryProfile, MovesOrHasNeitherCrossingsNorPeaks) {
+  const Profile& profile = *GetParam().profile;
+  EXPECT_EQ(profile.moves(), profile.phase_falling != nullptr);
+  EXPECT_EQ(profile.moves(), profile.peak_speed_millionths > 0);
+  EXPECT_EQ(profile.moves(), profile.peak_acceleration_millionths > 0);
+  EXPECT_EQ(profile.moves(), GetParam().waveform != wire::Waveform::hold);
 }
 
 TEST_P(EveryProfile, IsFoundUnderItsWaveformName) {

@@ -5,6 +5,7 @@
 
 #include "firmware/core/r_wave.hpp"
 #include "tests/firmware/bench.hpp"
+#include "tests/firmware/every_profile.hpp"
 
 namespace diastole::firmware {
 namespace {
@@ -83,6 +84,54 @@ TEST(Trigger, TtlAndRWaveStartWithTheFirstStepOfEachCycle) {
     EXPECT_EQ(bench.heard.triggers[cycle].r_wave, cycle % 2 == 0 ? 1 : 0);
     if (cycle % 2 == 0) {
       EXPECT_EQ(r_wave_starts[cycle / 2], rises[cycle]);
+    }
+  }
+}
+
+TEST(Trigger, AHoldTriggersAtTheBeginningOfEachCycle) {
+  Bench bench;
+  bench.prepare();
+  bench.add_segment(Waveform::hold, 3, 5'000'000, 400'000, 1'000'000);
+  (void)bench.rig.take_edges();
+  bench.run_program();
+  const auto edges = bench.rig.take_edges();
+  const Settings settings(wire::Configure::example());
+  Program program;
+  program.size = 1;
+  program.segments[0] = {Waveform::hold, 3, 5'000'000, 1'000'000, 400'000};
+  program.rest_us = wire::Arm::example().rest_us;
+  const Ticks first = Ticks{static_cast<std::int64_t>(bench.heard.started.at(0).tick)} +
+                      Planner::segment_offset(program, settings, 0);
+  std::vector<Ticks> rises;
+  for (const Edge& edge : edges_of(edges, Signal::TTL))
+    if (edge.value == 1) rises.push_back(edge.tick);
+  EXPECT_EQ(rises, (std::vector<Ticks>{first, first + microseconds(400'000), first + microseconds(800'000)}));
+  for (const Edge& edge : edges_of(edges, Signal::STEP)) {
+    EXPECT_TRUE(edge.tick < first || edge.tick > first + microseconds(1'200'000));
+  }
+  EXPECT_EQ(bench.heard.triggers.size(), 3U);
+  EXPECT_EQ(bench.heard.ended.at(0).cycles, 3U);
+  EXPECT_EQ(bench.heard.ended.at(0).position_microsteps, 0);
+}
+
+TEST(Trigger, EveryProfileTriggersOncePerPeriodWithItsFirstStep) {
+  for (const NamedProfile& named : every_moving_profile()) {
+    SCOPED_TRACE(named.name);
+    Bench bench;
+    bench.prepare();
+    bench.add_segment(named.waveform, 4, 8'000'000, 800'000);
+    (void)bench.rig.take_edges();
+    bench.run_program();
+    std::vector<std::int64_t> steps, rises;
+    for (const Edge& edge : bench.rig.take_edges()) {
+      if (edge.signal == Signal::STEP && edge.value == 1) steps.push_back(edge.tick.count);
+      if (edge.signal == Signal::TTL && edge.value == 1) rises.push_back(edge.tick.count);
+    }
+    ASSERT_EQ(rises.size(), 4U);
+    ASSERT_EQ(steps.size() % 4, 0U);
+    for (std::size_t i = 0; i < 4; ++i) {
+      EXPECT_EQ(rises[i], steps[i * steps.size() / 4]);
+      EXPECT_EQ(rises[i], rises[0] + static_cast<std::int64_t>(i) * microseconds(800'000).count);
     }
   }
 }

@@ -51,8 +51,8 @@ std::vector<PinRow> read_pins(const std::filesystem::path& path) {
 }
 
 /// Steps count from the first trigger on: before it lies homing. Every trigger must rise together with a
-/// step.
-PinCounts count_pins(const std::filesystem::path& path) {
+/// step, but for `without_step` of them.
+PinCounts count_pins(const std::filesystem::path& path, int64_t without_step = 0) {
   const std::vector<PinRow> rows = read_pins(path);
   std::set<int64_t> trigger_ns, step_ns;
   for (const PinRow& row : rows) {
@@ -60,7 +60,7 @@ PinCounts count_pins(const std::filesystem::path& path) {
     if (row.signal == "TTL") trigger_ns.insert(row.time_ns);
     if (row.signal == "STEP") step_ns.insert(row.time_ns);
   }
-  EXPECT_TRUE(std::includes(step_ns.begin(), step_ns.end(), trigger_ns.begin(), trigger_ns.end()));
+  EXPECT_EQ(std::ranges::count_if(trigger_ns, [&](int64_t t) { return !step_ns.contains(t); }), without_step);
   PinCounts counts;
   counts.ttl = std::ssize(trigger_ns);
   bool inflate = false;
@@ -206,6 +206,59 @@ offset_mL = 10.0
   EXPECT_NEAR(seen["peak_commanded_mL"], 30, 0.01);
   EXPECT_GT(seen["peak_kPa"], 1.4);  // half the built-in gel's stiffness
   EXPECT_LT(seen["peak_kPa"], 2.4);
+}
+
+TEST(SimulatedSession, EveryWaveformIsCarriedOut) {
+  const Workplace place;
+  place.write("all.experiment.toml", R"(format = "diastole-experiment"
+version = 1
+rest_s = 0.2
+[[segment]]
+waveform = "hold"
+period_s = 0.5
+[[segment]]
+waveform = "trapezoidal"
+stroke_mL = 8.0
+period_s = 0.8
+cycles = 2
+[[segment]]
+waveform = "sawtooth"
+stroke_mL = 8.0
+period_s = 0.8
+cycles = 2
+[[segment]]
+waveform = "reversed-sawtooth"
+stroke_mL = 8.0
+period_s = 0.8
+cycles = 2
+[[segment]]
+waveform = "hold"
+stroke_mL = 12.0
+period_s = 1.0
+cycles = 2
+)");
+  const Ended simulated = run(place, {"diastole", "simulate", "all.experiment.toml", "-o", "all.run.h5",
+                                      "--pins", "pins.csv", "--json"});
+  ASSERT_EQ(simulated.exit_code, 0) << simulated.err;
+  EXPECT_EQ(simulated.json()["cycles"], 9);
+  EXPECT_EQ(simulated.json()["triggers"], 9);
+  EXPECT_EQ(count_pins(place / "pins.csv", 3).ttl, 9);
+  const json seen = read_with_h5py(place, "all.run.h5");
+  ASSERT_FALSE(seen.is_null());
+  EXPECT_NEAR(seen["peak_commanded_mL"], 12, 0.01);
+  const Ended inspected = run(place, {"diastole", "inspect", "all.run.h5", "--json"});
+  EXPECT_EQ(inspected.exit_code, 0) << inspected.err;
+  EXPECT_EQ(inspected.json()["sound"], true);
+}
+
+TEST(SimulatedSession, AnUnreachableAccelerationIsRefusedWithItsRemedy) {
+  const Workplace place;
+  place.write("quick.experiment.toml",
+              with(source_text("examples/gel.experiment.toml"), "\"parabolic\"", "\"sawtooth\""));
+  const Ended refused = run(place, {"diastole", "simulate", "quick.experiment.toml", "-o", "quick.run.h5"});
+  EXPECT_EQ(refused.exit_code, 2);
+  EXPECT_THAT(refused.err, testing::HasSubstr("limit acceleration"));
+  EXPECT_THAT(refused.err, testing::HasSubstr("a parabolic waveform needs least"));
 }
 
 TEST(SimulatedSession, InRealTimeEverySampleIsReceivedOrDeclaredMissing) {

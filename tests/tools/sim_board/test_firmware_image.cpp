@@ -86,7 +86,11 @@ TEST(FirmwareImage, SaysHelloOverItsSerialPort) {
 TEST(FirmwareImage, ShortSessionGivesTheEdgesOfTheHostBuild) {
   NEEDS_FIRMWARE();
   const std::vector program{segment(wire::Waveform::parabolic, 2, 40'000'000, 1'200'000),
-                            segment(wire::Waveform::sinusoidal, 2, 16'000'000, 800'000, 4'000'000)};
+                            segment(wire::Waveform::sinusoidal, 2, 16'000'000, 800'000, 4'000'000),
+                            segment(wire::Waveform::trapezoidal, 1, 8'000'000, 800'000),
+                            segment(wire::Waveform::sawtooth, 1, 8'000'000, 800'000),
+                            segment(wire::Waveform::reversed_sawtooth, 1, 8'000'000, 800'000),
+                            segment(wire::Waveform::hold, 2, 2'000'000, 300'000, 1'000'000)};
   auto built = sim_rig::make_host_built_controller();
   auto board = emulated();
   const auto expected = run_session(*built, program), found = run_session(*board, program);
