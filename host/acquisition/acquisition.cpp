@@ -130,7 +130,7 @@ void Acquisition::miss(uint64_t first, uint64_t count, const std::string& reason
   if (!gap_) gap_ = OpenGap{first, 0, reason};
   gap_->count += count;
   if (missing_in_a_row_ == 0) {
-    hooks_.remark({"warning", "gap", fmt::format("samples are missing from {} on: {}", first, reason)});
+    hooks_.remark({"warning", "gap", "samples are missing: " + reason});
   }
   missing_in_a_row_ += count;
   outcome_.counts.missing += count;
@@ -139,7 +139,9 @@ void Acquisition::miss(uint64_t first, uint64_t count, const std::string& reason
 void Acquisition::end_missing() {
   close_gap();
   if (missing_in_a_row_ == 0) return;
-  hooks_.remark({"warning", "gap_end", fmt::format("{} samples in a row were missing", missing_in_a_row_)});
+  hooks_.remark(
+      {"warning", "gap_end",
+       fmt::format("the gap cost {} sample{}", missing_in_a_row_, missing_in_a_row_ == 1 ? "" : "s")});
   missing_in_a_row_ = 0;
 }
 

@@ -273,6 +273,8 @@ TEST(SimulatedSession, InRealTimeEverySampleIsReceivedOrDeclaredMissing) {
   EXPECT_EQ(session["triggers"], 2);
   EXPECT_EQ(session["samples"].get<int64_t>() + session["gaps"].get<int64_t>(), session["expected"]);
   EXPECT_EQ(simulated.exit_code, session["gaps"] == 0 ? 0 : 1);
+  const Ended inspected = run(place, {"diastole", "inspect", "short.run.h5"});
+  EXPECT_EQ(inspected.exit_code, simulated.exit_code) << inspected.out;
   const json seen = read_with_h5py(place, "short.run.h5");
   ASSERT_FALSE(seen.is_null());
   EXPECT_EQ(seen["missing"], session["gaps"]);

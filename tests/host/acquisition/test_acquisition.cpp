@@ -122,7 +122,7 @@ TEST(Acquisition, AStallOfManyReadingsIsOneGapAndTwoRemarks) {
   ASSERT_EQ(session.remarks.size(), 2U);
   EXPECT_THAT(session.remarks[0].text, testing::HasSubstr("no answer within 20 ms"));
   EXPECT_THAT(session.remarks[1].text,
-              testing::HasSubstr(std::to_string(assembled.run.gaps[0].count) + " samples"));
+              testing::HasSubstr("cost " + std::to_string(assembled.run.gaps[0].count) + " samples"));
 }
 
 TEST(Acquisition, ASlowAnswerIsNotBlamedOnTheHost) {
