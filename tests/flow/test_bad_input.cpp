@@ -204,6 +204,13 @@ TEST_P(BadInputTest, IsToldWithPlaceValueAndRemedyAndLeavesNothing) {
 INSTANTIATE_TEST_SUITE_P(Table, BadInputTest, testing::ValuesIn(table()),
                          [](const auto& each) { return each.param.name; });
 
+TEST(Help, SaysWhatStandardOutputHoldsAfterAnError) {
+  const Workplace place;
+  const Ended help = run(place, {"diastole", "--help"});
+  EXPECT_EQ(help.exit_code, 0);
+  EXPECT_THAT(help.out, testing::AllOf(HasSubstr("--json"), HasSubstr("may be empty")));
+}
+
 TEST(BusyPort, ASecondDaemonAndASecondInstrumentSayWhoIsInTheWay) {
   const Workplace place;
   Program rig(place, {"sim_rig", "--link", "pump"});

@@ -92,23 +92,20 @@ diastole::ExitCode run(int argc, char** argv) {
   }
 }
 
+ssize_t write_or_drop(void*, const char* text, size_t size) {
+  for (size_t written = 0; written < size;) {
+    const ssize_t count = ::write(STDERR_FILENO, text + written, size - written);
+    if (count <= 0) break;
+    written += static_cast<size_t>(count);
+  }
+  return static_cast<ssize_t>(size);
+}
+
 /// Progress that nobody reads any more, as in `diastole simulate ... 2>&1 | head -1`, must not end the work:
 /// what cannot be written to standard error is dropped.
 void let_standard_error_drop() {
-  static constexpr cookie_io_functions_t functions{.read = nullptr,
-                                                   .write =
-                                                       [](void*, const char* text, size_t size) {
-                                                         size_t written = 0;
-                                                         while (written < size) {
-                                                           const ssize_t count = ::write(
-                                                               STDERR_FILENO, text + written, size - written);
-                                                           if (count <= 0) break;
-                                                           written += static_cast<size_t>(count);
-                                                         }
-                                                         return static_cast<ssize_t>(size);
-                                                       },
-                                                   .seek = nullptr,
-                                                   .close = nullptr};
+  const cookie_io_functions_t functions{
+      .read = nullptr, .write = write_or_drop, .seek = nullptr, .close = nullptr};
   std::FILE* dropping = ::fopencookie(nullptr, "w", functions);
   if (dropping == nullptr) return;
   std::setvbuf(dropping, nullptr, _IONBF, 0);
