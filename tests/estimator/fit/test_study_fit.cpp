@@ -129,7 +129,7 @@ TEST_F(CoarseStudy, ABoundIsSaid) {
   EXPECT_THAT(record.remarks, Contains(AllOf(HasSubstr("upper bound"), HasSubstr("[1, 7]"))));
 }
 
-// Three of the eight values that fit best without bounds are above 9: with them held, the others' search must
+// Five of the eight values end on the bound of 9: with them held, the others' search must
 // not slow down.
 TEST_F(CoarseStudy, AnElementOnItsBoundIsHeldAndTheMeanSaysSo) {
   study_.law.parameters[0] = {"C1_kPa", 6.0, 1.0, 9.0, Variation::element};
