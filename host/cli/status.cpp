@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <cstdio>
 #include <iostream>
 #include <memory>
 
@@ -72,8 +73,15 @@ void add_stop(CommandLine& line) {
   options->daemon.add_to(*command);
   line.on_run(command, [options](const CommandOutput& out) {
     DaemonClient client(options->daemon.resolve());
-    client.call("run.stop", {{"how", options->cycle_end ? "cycle_end" : "now"}});
-    show_status(client.call("rig.status"), out.json);
+    const bool stopping =
+        client.call("run.stop", {{"how", options->cycle_end ? "cycle_end" : "now"}}).at("stopping");
+    if (!out.json) {
+      fmt::print("{}\n", stopping ? "stop      asked for and accepted" : "stop      nothing was going on");
+      std::fflush(stdout);
+    }
+    nlohmann::json status = client.call("rig.status");
+    status["stopping"] = stopping;
+    show_status(status, out.json);
     return ExitCode::done;
   });
 }

@@ -270,6 +270,8 @@ void ControllerClient::unload() { demand(wire::ClearProgram{}); }
 
 void ControllerClient::home() { demand(wire::Home{.lease_id = lease_id_}); }
 
+void ControllerClient::halt() { post(wire::Halt{}); }
+
 void ControllerClient::clear_fault() { demand(wire::ClearFault{}); }
 
 wire::Status ControllerClient::status() {

@@ -41,6 +41,8 @@ class ControllerClient final : public Controller {
   /// Forgets the program; an armed controller is then homed.
   void unload();
   void home();
+  /// Ends motion at once, homing too, which no controlled stop ends; leaves the fault `halted`.
+  void halt();
   void clear_fault();
   wire::Status status();
   /// The last status, brought forward by the events since: state, fault, position and triggers are of now, or

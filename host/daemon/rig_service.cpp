@@ -73,6 +73,10 @@ void make_journal_dir(const std::filesystem::path& directory) {
   }
 }
 
+std::filesystem::path run_file_beside(std::filesystem::path journal) {
+  return journal.replace_extension(".run.h5");
+}
+
 std::string utc_now() { return fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr))); }
 
 }  // namespace
@@ -86,11 +90,12 @@ RigService::RigService(RigConfig rig, const RigServiceOptions& options)
   instrument_ = rig_.daq.open({options.daq_address, clock_->stands_still() ? conducted_timeout_ms : 0});
   make_journal_dir(rig_.daemon.journal_dir);
   spdlog::info("controller at {}, instrument {}", rig_.controller.port, instrument_->describe());
+  (void)do_status();
   thread_ = std::jthread([this](const std::stop_token& stop) { work(stop); });
 }
 
 RigService::~RigService() {
-  stop(StopRequest::now);
+  end();
   thread_.request_stop();
   wake_.notify_all();
 }
@@ -134,6 +139,15 @@ void RigService::reconnect_if_due() {
 
 void RigService::give(Order order) {
   const std::lock_guard lock(mutex_);
+  if (ending_) throw HardwareError("daemon", "is ending", "Start it again.");
+  if (!order.activity.empty()) {
+    if (!activity_.empty()) {
+      throw rpc::Error(rpc::Code::busy,
+                       fmt::format("the rig is {}; wait, or stop it first (diastole stop)", activity_));
+    }
+    activity_ = order.activity;
+    stop_request_ = StopRequest::none;
+  }
   orders_.push_back(std::move(order));
   wake_.notify_all();
 }
@@ -147,18 +161,37 @@ std::optional<RigService::Order> RigService::next_order() {
 }
 
 void RigService::carry_out(Order order) {
+  json result;
+  std::exception_ptr error;
   try {
+    if (!order.activity.empty() && asked_to_stop()) refuse_to_start();
     if (!controller_->connected()) controller_->connect();
-    json result = order.act();
-    if (!result.is_discarded()) order.done(nullptr, std::move(result));
+    result = order.act();
+    if (result.is_discarded()) return;
   } catch (...) {
-    order.done(std::current_exception(), nullptr);
+    error = std::current_exception();
   }
+  if (!order.activity.empty()) {
+    const std::lock_guard lock(mutex_);
+    activity_.clear();
+  }
+  order.done(error, std::move(result));
+}
+
+bool RigService::asked_to_stop() const {
+  const std::lock_guard lock(mutex_);
+  return stop_request_ != StopRequest::none;
+}
+
+void RigService::refuse_to_start() const {
+  throw HardwareError("rig", "stopped before the start",
+                      "Nothing moved. Give the order again when you want it.");
 }
 
 void RigService::start_run(Experiment experiment, Done done) {
   // do_run answers by itself when the run begins, long before it ends; a discarded result says so.
-  give({[this, experiment = std::move(experiment), done] {
+  give({"loading",
+        [this, experiment = std::move(experiment), done] {
           do_run(experiment, done);
           return json(json::value_t::discarded);
         },
@@ -166,11 +199,12 @@ void RigService::start_run(Experiment experiment, Done done) {
 }
 
 void RigService::home(Done done) {
-  give({[this] { return do_home(); }, std::move(done)});
+  give({"homing", [this] { return do_home(); }, std::move(done)});
 }
 
 void RigService::clear_fault(Done done) {
-  give({[this] {
+  give({"clearing_fault",
+        [this] {
           controller_->clear_fault();
           return do_status();
         },
@@ -178,22 +212,34 @@ void RigService::clear_fault(Done done) {
 }
 
 void RigService::status(Done done) {
+  json snapshot;
   {
     const std::lock_guard lock(mutex_);
-    if (run_ && (run_->state == "running" || run_->state == "writing")) {
-      json snapshot = last_status_;
-      snapshot["state"] = run_->state;
-      snapshot["run_id"] = run_->run_id;
-      return done(nullptr, std::move(snapshot));
+    if (!activity_.empty()) {
+      snapshot = last_status_;
+      snapshot["state"] = activity_;
+      if (run_ && (activity_ == "running" || activity_ == "writing")) snapshot["run_id"] = run_->run_id;
     }
   }
-  give({[this] { return do_status(); }, std::move(done)});
+  if (!snapshot.is_null()) return done(nullptr, std::move(snapshot));
+  give({"", [this] { return do_status(); }, std::move(done)});
 }
 
 bool RigService::stop(StopRequest how) {
   const std::lock_guard lock(mutex_);
   stop_request_ = std::max(stop_request_, how);
-  return run_ && run_->state == "running";
+  return !activity_.empty() && activity_ != "writing";
+}
+
+void RigService::end() {
+  const std::lock_guard lock(mutex_);
+  ending_ = true;
+  stop_request_ = StopRequest::now;
+}
+
+bool RigService::idle() const {
+  const std::lock_guard lock(mutex_);
+  return activity_.empty() && orders_.empty();
 }
 
 json RigService::run_progress(size_t first_remark) const {
@@ -217,20 +263,13 @@ json RigService::run_progress(size_t first_remark) const {
 }
 
 json RigService::do_home() {
-  {
-    const std::lock_guard lock(mutex_);
-    stop_request_ = StopRequest::none;
-  }
   controller_->home();
   const uint64_t end_ns = clock_->now_ns() + homing_patience_ns;
   bool stopping = false;
   for (wire::Status status = controller_->status(); status.state == wire::State::homing;
        status = controller_->status()) {
-    const bool asked = [&] {
-      const std::lock_guard lock(mutex_);
-      return stop_request_ != StopRequest::none;
-    }();
-    if ((asked || clock_->now_ns() > end_ns) && !std::exchange(stopping, true)) controller_->stop_now();
+    (void)remember(status);
+    if ((asked_to_stop() || clock_->now_ns() > end_ns) && !std::exchange(stopping, true)) controller_->halt();
     for (const uint64_t until_ns = clock_->now_ns() + homing_step_ns; clock_->now_ns() < until_ns;) {
       clock_->sleep_until_ns(std::min(until_ns, controller_->next_due_ns()), controller_->line());
       controller_->service();
@@ -238,6 +277,11 @@ json RigService::do_home() {
   }
   controller_->take_events();
   json result = do_status();
+  if (stopping && result["fault"] == wire::fault_name(wire::Fault::halted)) {
+    controller_->clear_fault();
+    throw HardwareError("rig", "homing was stopped",
+                        "The pump does not know its place: `diastole home` again.");
+  }
   if (result["state"] != "homed") {
     throw HardwareError("controller at " + rig_.controller.port,
                         fmt::format("homing ended in state {}: {}", result["state"].get<std::string>(),
@@ -247,8 +291,9 @@ json RigService::do_home() {
   return result;
 }
 
-json RigService::do_status() {
-  const wire::Status status = controller_->status();
+json RigService::do_status() { return remember(controller_->status()); }
+
+json RigService::remember(const wire::Status& status) {
   const wire::Hello& hello = controller_->hello();
   const double position_mL =
       1e-9 * static_cast<double>(controller_->microstep_pL()) * status.position_microsteps;
@@ -282,13 +327,14 @@ void RigService::do_run(const Experiment& experiment, const Done& done) {
       std::filesystem::absolute(rig_.daemon.journal_dir) / (record.run_id + ".journal");
   JournalWriter journal(path);
   write_beginning(journal, record, experiment, plan);
-  {
-    const std::lock_guard lock(mutex_);
-    stop_request_ = StopRequest::none;
-    run_ = record;
+  if (!begin(record)) {
+    std::filesystem::remove(path);
+    controller_->unload();
+    refuse_to_start();
   }
   spdlog::info("run {} begins: {} cycles, {:.1f} s", record.run_id, record.planned_cycles, record.planned_s);
-  done(nullptr, {{"run_id", record.run_id}});
+  done(nullptr,
+       {{"run_id", record.run_id}, {"journal", path.string()}, {"run_file", run_file_beside(path).string()}});
   json result;
   try {
     result = finish(path, acquire(journal, experiment, record.planned_s));
@@ -299,6 +345,15 @@ void RigService::do_run(const Experiment& experiment, const Done& done) {
   const std::lock_guard lock(mutex_);
   run_->state = result.contains("run_file") ? "done" : "failed";
   run_->result = std::move(result);
+  activity_.clear();
+}
+
+bool RigService::begin(const RunRecord& record) {
+  const std::lock_guard lock(mutex_);
+  if (stop_request_ != StopRequest::none) return false;
+  run_ = record;
+  activity_ = "running";
+  return true;
 }
 
 void RigService::write_beginning(JournalWriter& journal, const RunRecord& record,
@@ -338,6 +393,7 @@ RunOutcome RigService::acquire(JournalWriter& journal, const Experiment& experim
           },
       .progress =
           [this](const RunProgress& progress) {
+            if (controller_->connected()) (void)remember(controller_->last_known());
             const std::lock_guard lock(mutex_);
             run_->progress = progress;
           },
@@ -355,11 +411,11 @@ json RigService::finish(const std::filesystem::path& journal, const RunOutcome& 
   {
     const std::lock_guard lock(mutex_);
     run_->state = "writing";
+    activity_ = "writing";
   }
   json result{{"end", outcome.end}, {"regular", outcome.regular()}, {"journal", journal.string()}};
   const AssembledRun assembled = assemble_run(read_journal(journal));
-  std::filesystem::path run_file = journal;
-  run_file.replace_extension(".run.h5");
+  const std::filesystem::path run_file = run_file_beside(journal);
   write_run(run_file, assembled.run);
   result["run_file"] = run_file.string();
   result["cycles"] = outcome.cycles;

@@ -1,6 +1,11 @@
 #pragma once
 // The rig behind the daemon: one thread owns controller, instrument, clock and journal, and carries out one
 // order at a time; everybody else talks to it through this class.
+//
+// start_run, home and clear_fault occupy the rig from the moment they are accepted (activity: loading,
+// running, writing, homing, clearing_fault) and are refused with rpc::Error busy while another does. A stop
+// that is asked for after an order was accepted is obeyed by it, at whatever moment: before the start, the
+// order is refused.
 
 #include <condition_variable>
 #include <deque>
@@ -39,14 +44,20 @@ class RigService {
   ~RigService();
 
   /// Loads and starts an experiment. `done` is called when the controller has accepted it and the run begins
-  /// ({"run_id"}), or with InputError when it cannot be done.
+  /// ({"run_id", "journal", "run_file"}: where it is being written, and what is made of it at the end), or with
+  /// InputError when it cannot be done, HardwareError when it was stopped before the start.
   void start_run(Experiment experiment, Done done);
   void home(Done done);
   void clear_fault(Done done);
-  /// {"state", "fault", "firmware", "position_mL", ...}
+  /// {"state", "fault", "firmware", "position_mL", ...}. While the rig is occupied `state` is the activity, and
+  /// the answer comes at once, from what the controller last told.
   void status(Done done);
-  /// Stops a run; without one, `false`.
+  /// Stops what moves or is about to; without anything, `false`.
   bool stop(StopRequest how);
+  /// Stops now and takes no more orders; what is going on comes to its end. See idle().
+  void end();
+  /// True when nothing is going on or waiting.
+  [[nodiscard]] bool idle() const;
   /// The present or last run: {"run_id", "state": running|writing|done|failed, "received", "missing",
   /// "triggers", "last_kPa", "remarks": those from number `first_remark` on, "result"}. null if there was
   /// none.
@@ -54,6 +65,7 @@ class RigService {
 
  private:
   struct Order {
+    std::string activity;  ///< empty: does not occupy the rig
     std::function<nlohmann::json()> act;
     Done done;
   };
@@ -75,6 +87,10 @@ class RigService {
   void reconnect_if_due();
   nlohmann::json do_home();
   nlohmann::json do_status();
+  nlohmann::json remember(const wire::Status& status);
+  [[nodiscard]] bool asked_to_stop() const;
+  [[noreturn]] void refuse_to_start() const;
+  bool begin(const RunRecord& record);
   void do_run(const Experiment& experiment, const Done& done);
   void write_beginning(JournalWriter& journal, const RunRecord& record, const Experiment& experiment,
                        const ProgramPlan& plan);
@@ -91,6 +107,8 @@ class RigService {
   mutable std::mutex mutex_;
   std::condition_variable_any wake_;
   std::deque<Order> orders_;
+  std::string activity_;  // empty: none
+  bool ending_ = false;
   StopRequest stop_request_ = StopRequest::none;
   std::optional<RunRecord> run_;
   nlohmann::json last_status_;

@@ -61,7 +61,7 @@ SessionProgress progress_of(const json& state, size_t& remarks_seen) {
 }
 
 /// Follows the run to its end and returns the daemon's result.
-json follow(DaemonClient& daemon, const SessionOptions& options) {
+json follow_to_end(DaemonClient& daemon, const SessionOptions& options) {
   size_t remarks_seen = 0;
   int stops_sent = 0;
   while (true) {
@@ -76,13 +76,26 @@ json follow(DaemonClient& daemon, const SessionOptions& options) {
   }
 }
 
+/// The same; when the daemon is lost on the way, says where the run is: `begun` is its answer to run.start.
+json follow(DaemonClient& daemon, const SessionOptions& options, const json& begun) {
+  try {
+    return follow_to_end(daemon, options);
+  } catch (const HardwareError& error) {
+    throw HardwareError(
+        "run", fmt::format("lost sight of the daemon: {}", error.what()),
+        fmt::format("If the daemon could end the run, it is in {}; otherwise make it of the journal: "
+                    "`diastole recover {}`.",
+                    begun.at("run_file").get<std::string>(), begun.at("journal").get<std::string>()));
+  }
+}
+
 }  // namespace
 
 SessionResult run_session(DaemonClient& daemon, const SessionOptions& options) {
   const Experiment experiment = read_experiment(options.experiment);
   check_output(options.output, options.force);
-  daemon.call("run.start", {{"experiment", experiment.text}, {"file", experiment.file}});
-  const json result = follow(daemon, options);
+  const json begun = daemon.call("run.start", {{"experiment", experiment.text}, {"file", experiment.file}});
+  const json result = follow(daemon, options, begun);
   if (!result.contains("run_file")) {
     throw HardwareError(
         "run", result.value("problem", "no run file could be made"),

@@ -8,6 +8,7 @@
 #include <boost/asio.hpp>
 #include <deque>
 #include <filesystem>
+#include <functional>
 
 #include "host/daemon/json_rpc.hpp"
 #include "host/transport/unix_socket.hpp"
@@ -141,21 +142,19 @@ class RpcServer::Listener::Connection : public std::enable_shared_from_this<Conn
         throw rpc::Error(rpc::Code::invalid_params, "the experiment is too long");
       }
       Experiment experiment = parse_experiment(text, request.params.value("file", "experiment"));
-      take_control();
-      return rig.start_run(std::move(experiment), reply_to(request.id));
+      return control([&] { rig.start_run(std::move(experiment), reply_to(request.id)); });
     }
     if (request.method == "rig.home") {
-      take_control();
-      return rig.home(reply_to(request.id));
+      return control([&] { rig.home(reply_to(request.id)); });
     }
     if (request.method == "rig.clear_fault") {
-      take_control();
-      return rig.clear_fault(reply_to(request.id));
+      return control([&] { rig.clear_fault(reply_to(request.id)); });
     }
     throw rpc::Error(rpc::Code::method_not_found, "there is no method " + request.method);
   }
 
-  void take_control() {
+  /// Gives an order; who may and whose order was accepted holds the control from then on.
+  void control(const std::function<void()>& order) {
     if (peer_.uid != 0 && peer_.uid != getuid()) {
       throw rpc::Error(rpc::Code::not_allowed,
                        fmt::format("user {} may observe and stop, but not control this rig", peer_.uid));
@@ -166,10 +165,7 @@ class RpcServer::Listener::Connection : public std::enable_shared_from_this<Conn
                        fmt::format("the rig is controlled by process {}", holder->peer_.pid),
                        {{"holder", holder->peer_.pid}});
     }
-    const json run = listener_->rig_.run_progress(0);
-    if (!run.is_null() && (run["state"] == "running" || run["state"] == "writing")) {
-      throw rpc::Error(rpc::Code::busy, "a run is going on; stop it first (diastole stop)");
-    }
+    order();
     listener_->controlling_ = weak_from_this();
   }
 

@@ -5,7 +5,7 @@
 //   rig.status                                      anybody       RigService::status
 //   run.progress    {first_remark}                  anybody       RigService::run_progress
 //   run.stop        {how: "cycle_end" | "now"}      anybody       {stopping}
-//   run.start       {experiment, file}              controller    {run_id}
+//   run.start       {experiment, file}              controller    {run_id, journal, run_file}
 //   rig.home                                        controller    status
 //   rig.clear_fault                                 controller    status
 //   control.release                                 anybody       {}
