@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 
 #include "host/runfile/journal_story.hpp"
 #include "protocol/contract/input_error.hpp"
@@ -187,14 +188,20 @@ void put_triggers(const JournalStory& story, const TimeAxis& axis, RecordedRun& 
     declare(run, runfile::trigger_stream, next_cycle, "its record was lost");
 }
 
+/// A segment starts when the controller said so; one that did not begin stands as far behind the last that did
+/// as it was planned.
 void put_segments(const JournalStory& story, const TimeAxis& axis, RecordedRun& run) {
+  std::map<size_t, double> begun_s;
+  for (const json& started : story.segment_starts)
+    begun_s[started.at("segment")] = axis.of_tick(started.at("tick"));
+  double late_s = 0;
   for (const json& segment : story.begin.at("segments")) {
-    run.segments.push_back({segment.at("start_s"), segment.at("waveform"), segment.at("stroke_mL"),
+    const double planned_s = segment.at("start_s");
+    if (const auto begun = begun_s.find(run.segments.size()); begun != begun_s.end()) {
+      late_s = begun->second - planned_s;
+    }
+    run.segments.push_back({planned_s + late_s, segment.at("waveform"), segment.at("stroke_mL"),
                             segment.at("period_s"), segment.at("offset_mL"), segment.at("cycles")});
-  }
-  for (const json& started : story.segment_starts) {
-    const size_t number = started.at("segment");
-    if (number < run.segments.size()) run.segments[number].start_s = axis.of_tick(started.at("tick"));
   }
 }
 

@@ -4,6 +4,7 @@
 
 #include <cstdio>
 #include <fstream>
+#include <nlohmann/json.hpp>
 
 #include "host/runfile/writer.hpp"
 #include "protocol/contract/input_error.hpp"
@@ -103,6 +104,27 @@ TEST_F(WrittenFile, AJournalCutAnywhereGivesASoundPrefixOrARefusal) {
   }
   EXPECT_GT(recovered, 50U);
   EXPECT_GE(most_rows + 31, whole_rows);  // a block of samples spans 0.1 s
+}
+
+TEST_F(WrittenFile, SegmentsThatDidNotBeginKeepTheirPlannedDistance) {
+  JournalContents journal = read_journal(session_->journal);
+  const double begun_s = session_->assemble().run.segments.at(0).start_s;
+  for (JournalRecord& record : journal.records) {
+    if (record.kind != RecordKind::document) continue;
+    auto document = nlohmann::json::parse(record.payload);
+    if (document.at("record") != "begin") continue;
+    auto& segments = document.at("segments");
+    segments.at(0)["start_s"] = 0.1;  // planned much earlier than it began
+    segments.push_back(segments.at(0));
+    segments.at(1)["start_s"] = 0.5;
+    const std::string text = document.dump();
+    record.payload.assign(text.begin(), text.end());
+  }
+  const runfile::RecordedRun run = assemble_run(journal).run;
+  EXPECT_NO_THROW(runfile::check(run));
+  ASSERT_EQ(run.segments.size(), 2U);
+  EXPECT_DOUBLE_EQ(run.segments[0].start_s, begun_s);
+  EXPECT_NEAR(run.segments[1].start_s, begun_s + 0.4, 1e-9);
 }
 
 TEST_F(WrittenFile, ADamagedRecordBecomesAGapNeverAWrongRow) {
