@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
-#include "estimator/cli/commands.hpp"
 #include "estimator/io/whole_file.hpp"
+#include "tests/estimator/cli/run_command.hpp"
 #include "tests/estimator/io/scratch_file.hpp"
 
 namespace diastole {
@@ -16,30 +16,11 @@ using test::message_of;
 using testing::AllOf;
 using testing::HasSubstr;
 
-struct Outcome {
-  ExitCode code;
-  std::string output;
-};
+using test::Outcome;
 
 class FitAndReport : public testing::Test {
  protected:
-  Outcome run(std::vector<std::string> arguments) const {
-    CLI::App app("test", "diastole");
-    CommandLine line(app);
-    add_estimator_commands(line);
-    std::reverse(arguments.begin(), arguments.end());
-    app.parse(arguments);
-    testing::internal::CaptureStdout();
-    Outcome outcome{};
-    try {
-      outcome.code = line.run();
-    } catch (...) {
-      testing::internal::GetCapturedStdout();
-      throw;
-    }
-    outcome.output = testing::internal::GetCapturedStdout();
-    return outcome;
-  }
+  Outcome run(const std::vector<std::string>& arguments) const { return test::run_command(arguments); }
 
   std::string file(const char* name) const { return (folder_.path() / name).string(); }
 

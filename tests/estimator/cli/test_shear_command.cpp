@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
-#include "estimator/cli/commands.hpp"
 #include "estimator/io/whole_file.hpp"
+#include "tests/estimator/cli/run_command.hpp"
 #include "tests/estimator/io/scratch_file.hpp"
 
 namespace diastole {
@@ -14,28 +14,9 @@ using testing::HasSubstr;
 
 constexpr const char* example = DIASTOLE_SOURCE_DIR "/examples/shear-test.csv";
 
-struct Outcome {
-  ExitCode code;
-  std::string output;
-};
+using test::Outcome;
 
-Outcome run(std::vector<std::string> arguments) {
-  CLI::App app("test", "diastole");
-  CommandLine line(app);
-  add_shear(line);
-  std::reverse(arguments.begin(), arguments.end());
-  app.parse(arguments);
-  testing::internal::CaptureStdout();
-  Outcome outcome{};
-  try {
-    outcome.code = line.run();
-  } catch (...) {
-    testing::internal::GetCapturedStdout();
-    throw;
-  }
-  outcome.output = testing::internal::GetCapturedStdout();
-  return outcome;
-}
+Outcome run(const std::vector<std::string>& arguments) { return test::run_command(arguments); }
 
 TEST(ShearCommand, JsonHoldsWhatTheContractSays) {
   const Outcome outcome = run({"shear", example, "--json"});

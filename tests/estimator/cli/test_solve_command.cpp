@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
-#include "estimator/cli/commands.hpp"
 #include "protocol/contract/input_error.hpp"
+#include "tests/estimator/cli/run_command.hpp"
 
 namespace diastole {
 namespace {
@@ -33,10 +33,7 @@ vary = "whole"
 [data]
 )";
 
-struct Outcome {
-  ExitCode code;
-  std::string output;
-};
+using test::Outcome;
 
 class SolveCommand : public testing::Test {
  protected:
@@ -51,22 +48,8 @@ class SolveCommand : public testing::Test {
   void write_study(const std::string& text) const { std::ofstream(study_) << text; }
 
   Outcome run(std::vector<std::string> arguments) const {
-    CLI::App app("test", "diastole");
-    CommandLine line(app);
-    add_solve(line);
     arguments.insert(arguments.begin(), {"solve", study_.string()});
-    std::reverse(arguments.begin(), arguments.end());
-    app.parse(arguments);
-    testing::internal::CaptureStdout();
-    Outcome outcome{};
-    try {
-      outcome.code = line.run();
-    } catch (...) {
-      testing::internal::GetCapturedStdout();
-      throw;
-    }
-    outcome.output = testing::internal::GetCapturedStdout();
-    return outcome;
+    return test::run_command(std::move(arguments));
   }
 
   std::string refusal(const std::vector<std::string>& arguments) const {
