@@ -27,8 +27,9 @@ struct Rcc {  // RM0090 7.3
 static_assert(offsetof(Rcc, AHB1ENR) == 0x30 && offsetof(Rcc, CSR) == 0x74);
 
 struct FlashInterface {  // 3.9
-  Register ACR;
+  Register ACR, KEYR, OPTKEYR, SR, CR;
 };
+static_assert(offsetof(FlashInterface, CR) == 0x10);
 
 struct Gpio {  // 8.4
   Register MODER, OTYPER, OSPEEDR, PUPDR, IDR, ODR, BSRR, LCKR, AFR[2];
