@@ -35,16 +35,19 @@ constexpr std::uint64_t scale(std::uint64_t whole, Q64 fraction) {
 }
 
 /// Square root with a relative error below 2^-44: a seed from the 24 leading bits, then one Newton step on
-/// the exact remainder. Precondition: fraction <= 1 - 2^-32.
+/// the exact remainder, √n = r + (n - r²) / 2r. Of the step, at most 2^9 of r's last places, 20 bits suffice: single precision.
+/// Precondition: fraction <= 1 - 2^-32.
 inline Q64 square_root(Q64 fraction) {
   if (fraction == 0) return 0;
   const int shift = std::countl_zero(fraction) & ~1;
   const Q64 normal = fraction << shift;
   const float seed = __builtin_sqrtf(static_cast<float>(static_cast<std::uint32_t>(normal >> 40)));
-  const std::uint64_t root = static_cast<std::uint32_t>(seed * 1048576.0F);
-  const auto remainder = static_cast<std::int64_t>(normal - root * root);
-  const std::int64_t correction = remainder * (1 << 20) / static_cast<std::int64_t>(root);
-  const Q64 refined = (root << 32) + static_cast<std::uint64_t>(correction * (1 << 11));
+  const auto root = static_cast<std::uint32_t>(seed * 0x1p20F);
+  const auto remainder = static_cast<std::int64_t>(normal - std::uint64_t{root} * root);
+  const float step =
+      static_cast<float>(static_cast<std::int32_t>(remainder >> 12)) / static_cast<float>(root);
+  const auto correction = static_cast<std::int32_t>(step * 0x1p31F);
+  const Q64 refined = (Q64{root} << 32) + (static_cast<Q64>(std::int64_t{correction}) << 12);
   return refined >> (shift / 2);
 }
 

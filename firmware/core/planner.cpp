@@ -57,6 +57,7 @@ void Planner::begin_stop(Ticks earliest, std::uint64_t deceleration_steps_per_s2
                                         (2 * deceleration_steps_per_s2));
     inflate_ = last_inflate_;
     length_ = interval * (2 * std::int64_t{count_} + 1);
+    if (count_ > 0) level_ = SteppedFraction(2 * count_ - 1, 2 * count_ + 1);
   }
   origin_ = count_ > 0 ? last_event_ : std::max(earliest, last_event_ + kRestBeforeEnd);
   plan_next();
@@ -81,6 +82,7 @@ void Planner::begin_ramp(Steps to, Phase then) {
   count_ = static_cast<std::uint32_t>(inflate_ ? distance.count : -distance.count);
   index_ = 0;
   length_ = count_ > 0 ? settings_.ramp_time(distance) : Ticks{0};
+  if (count_ > 0) level_ = SteppedFraction(1, 2 * count_);
   position_ = to;
 }
 
@@ -99,15 +101,16 @@ void Planner::begin_segment() {
   profile_ = find_profile(segment.waveform);
   count_ = profile_->moves() ? static_cast<std::uint32_t>(settings_.steps_of_nL(segment.stroke_nL).count) : 0;
   length_ = microseconds(segment.period_us);
+  if (count_ > 0) level_ = SteppedFraction(1, 2 * count_);
   cycle_ = index_ = 0;
   phase_ = Phase::cycles;
 }
 
 MotionEvent Planner::ramp_step() {
-  const Q64 y = ratio(2 * index_ + 1, 2 * count_);
-  ++index_;
   // The rising half of a parabolic cycle twice as long as the ramp.
-  const Ticks time = at_phase(length_ * 2, parabolic_profile.phase_rising(y));
+  const Ticks time = at_phase(length_ * 2, parabolic_profile.phase_rising(level_.value()));
+  level_.up();
+  ++index_;
   return {origin_ + time,
           static_cast<std::uint16_t>(MotionEvent::kStep | (inflate_ ? MotionEvent::kInflate : 0))};
 }
@@ -127,13 +130,17 @@ MotionEvent Planner::still_cycle_mark() {
 
 MotionEvent Planner::cycle_step() {
   const bool rising = index_ < count_;
-  const std::uint32_t level = rising ? index_ : 2 * count_ - 1 - index_;
-  const Q64 y = ratio(2 * level + 1, 2 * count_);
+  const Q64 y = level_.value();
   const Q64 phase = rising ? profile_->phase_rising(y) : profile_->phase_falling(y);
   MotionEvent event{origin_ + at_phase(length_, phase), MotionEvent::kStep};
   if (rising) event.flags |= MotionEvent::kInflate;
   if (index_ == 0) event.flags |= cycle_start_flags();
-  if (++index_ == 2 * count_) {
+  // The highest level is crossed twice running, up and down; so is the lowest, down and up.
+  if (++index_ < count_)
+    level_.up();
+  else if (index_ > count_ && index_ < 2 * count_)
+    level_.down();
+  if (index_ == 2 * count_) {
     event.flags |= MotionEvent::kCycleEnd;
     finish_cycle();
   }
@@ -161,7 +168,8 @@ MotionEvent Planner::travel_step() {
 
 MotionEvent Planner::stop_step() {
   ++index_;
-  const Q64 speed_left = square_root(0 - ratio(2 * index_, 2 * count_ + 1));
+  const Q64 speed_left = square_root(level_.value());
+  level_.down();
   return {origin_ + at_phase(length_, 0 - speed_left),
           static_cast<std::uint16_t>(MotionEvent::kStep | (inflate_ ? MotionEvent::kInflate : 0))};
 }

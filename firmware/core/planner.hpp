@@ -15,6 +15,7 @@
 
 #include "firmware/core/profiles/profile.hpp"
 #include "firmware/core/program.hpp"
+#include "firmware/core/stepped_fraction.hpp"
 #include "firmware/core/units.hpp"
 
 namespace diastole::firmware {
@@ -91,6 +92,7 @@ class Planner {
   Steps position_;           ///< at the beginning of the present phase
   std::uint32_t index_ = 0;  ///< next step of the present phase
   std::uint32_t count_ = 0;  ///< steps of the present ramp, half cycle, travel or stop
+  SteppedFraction level_;    ///< y of the next step of the present ramp, cycle or stop
   bool inflate_ = false;
   Ticks length_;  ///< of the ramp, cycle or stop; interval of travel
   const Profile* profile_ = nullptr;

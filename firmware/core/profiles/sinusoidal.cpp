@@ -11,24 +11,38 @@ namespace diastole::firmware {
 
 namespace {
 
-constexpr std::array<Q64, 14> kSeriesOverPi = [] {
-  std::array<Q64, 14> terms{};
+constexpr std::size_t kTerms = 14;
+/// z^4 is below 2^-11: from there on 32 bits leave as little as 64 bits do before.
+constexpr std::size_t kLongTerms = 4;
+
+template <class Integer>
+constexpr double kOne = sizeof(Integer) == 8 ? 18446744073709551616.0 : 4294967296.0;
+
+template <class Integer, std::size_t first, std::size_t count>
+constexpr std::array<Integer, count> series_over_pi() {
+  std::array<Integer, count> terms{};
   double term = 0.31830988618379067154;
-  for (std::size_t n = 0; n < terms.size(); ++n) {
-    terms[n] = static_cast<Q64>(term * 18446744073709551616.0);
+  for (std::size_t n = 0; n < first + count; ++n) {
+    if (n >= first) terms[n - first] = static_cast<Integer>(term * kOne<Integer>);
     const auto even = static_cast<double>(2 * n);
     term *= (even + 1) * (even + 1) / ((even + 2) * (even + 3));
   }
   return terms;
-}();
+}
+constexpr auto kLong = series_over_pi<Q64, 0, kLongTerms>();
+constexpr auto kShort = series_over_pi<std::uint32_t, kLongTerms, kTerms - kLongTerms>();
 
 constexpr Q64 kSineSquaredOfEighth = 0x257D'8666'0000'0000U;  // sin²(π/8) = 0.14645
 
 /// asin(√z) / π for z up to sin²(π/8).
 Q64 series(Q64 z) {
-  Q64 sum = 0;
-  for (std::size_t n = kSeriesOverPi.size(); n-- > 0;)
-    sum = multiply_high(sum, z) + kSeriesOverPi[n];
+  const std::uint64_t short_z = z >> 32;
+  std::uint32_t short_sum = 0;
+  for (std::size_t n = kShort.size(); n-- > 0;)
+    short_sum = static_cast<std::uint32_t>(short_sum * short_z >> 32) + kShort[n];
+  Q64 sum = Q64{short_sum} << 32;
+  for (std::size_t n = kLong.size(); n-- > 0;)
+    sum = multiply_high(sum, z) + kLong[n];
   return multiply_high(sum, square_root(z));
 }
 
