@@ -2,22 +2,25 @@
 
 namespace diastole::firmware {
 
-std::vector<std::uint8_t> Bench::worn(std::span<const std::uint8_t> bytes) {
-  std::vector<std::uint8_t> line(bytes.begin(), bytes.end());
-  if (bit_error <= 0) return line;
-  std::geometric_distribution<std::size_t> gap(bit_error);
-  for (std::size_t bit = gap(random); bit < line.size() * 8; bit += 1 + gap(random))
-    line[bit / 8] = static_cast<std::uint8_t>(line[bit / 8] ^ (1U << (bit % 8)));
-  return line;
-}
-
 void Bench::hear(const wire::Received& received) {
   wire::visit_message(received.type, received.payload,
                       wire::overloaded{
-                          [&](const wire::Hello& message) { heard.hellos.push_back(message); },
-                          [&](const wire::Ack& message) { heard.acks.push_back(message); },
-                          [&](const wire::Nak& message) { heard.naks.push_back(message); },
-                          [&](const wire::Status& message) { heard.statuses.push_back(message); },
+                          [&](const wire::Hello& message) {
+                            heard.hellos.push_back(message);
+                            heard.answers.push_back({message.request_id, wire::Refusal::none});
+                          },
+                          [&](const wire::Ack& message) {
+                            heard.acks.push_back(message);
+                            heard.answers.push_back({message.request_id, wire::Refusal::none});
+                          },
+                          [&](const wire::Nak& message) {
+                            heard.naks.push_back(message);
+                            heard.answers.push_back({message.request_id, message.refusal});
+                          },
+                          [&](const wire::Status& message) {
+                            heard.statuses.push_back(message);
+                            heard.answers.push_back({message.request_id, wire::Refusal::none});
+                          },
                           [&](const wire::SegmentPlanned& message) { heard.planned.push_back(message); },
                           [&](const wire::StateChanged& message) { heard.states.push_back(message); },
                           [&](const wire::RunStarted& message) { heard.started.push_back(message); },
@@ -45,11 +48,14 @@ void Bench::turn() {
     next_heartbeat_ = rig.now() + microseconds(50'000);
   }
   for (auto bytes = link.transmit(now_us()); !bytes.empty(); bytes = link.transmit(now_us()))
-    if (cable) rig.feed(worn(bytes));
+    to_controller.push(bytes, now_us());
+  const std::vector<std::uint8_t> arrived = to_controller.take(now_us());
+  if (cable) rig.feed(arrived);
   rig.advance_to(rig.now() + microseconds(1'000));
-  const std::vector<std::uint8_t> sent = rig.take_output();
+  to_host.push(rig.take_output(), now_us());
+  const std::vector<std::uint8_t> sent = to_host.take(now_us());
   if (!cable) return;
-  for (const std::uint8_t byte : worn(sent))
+  for (const std::uint8_t byte : sent)
     if (const auto received = link.receive(byte, now_us())) hear(*received);
 }
 

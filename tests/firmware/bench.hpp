@@ -10,10 +10,19 @@
 #include "firmware/boards/recording/recorded_controller.hpp"
 #include "protocol/wire/messages.hpp"
 #include "protocol/wire/reliable_link.hpp"
+#include "tools/link_faults/line_faults.hpp"
 
 namespace diastole::firmware {
 
+/// An answer to a request: Ack, Hello and Status refuse nothing.
+struct Answer {
+  std::uint16_t request_id = 0;
+  wire::Refusal refusal = wire::Refusal::none;
+  bool operator==(const Answer&) const = default;
+};
+
 struct Heard {
+  std::vector<Answer> answers;  ///< in order
   std::vector<wire::Hello> hellos;
   std::vector<wire::Ack> acks;
   std::vector<wire::Nak> naks;
@@ -65,6 +74,8 @@ class Bench {
   void run_for(Ticks time);
   bool run_until(const std::function<bool()>& done, Ticks most);
 
+  /// The request_id of the last request.
+  [[nodiscard]] std::uint16_t last_request() const { return last_request_; }
   [[nodiscard]] wire::State state() const { return rig.controller().motion().safety().state(); }
 
   RecordedController rig;
@@ -72,13 +83,12 @@ class Bench {
   Heard heard;
   bool heartbeats = true;
   bool cable = true;
-  double bit_error = 0;
+  link_faults::LineFaults to_controller{{}, 1}, to_host{{}, 2};
   std::mt19937 random{1};
 
  private:
   void turn();
   void hear(const wire::Received& received);
-  std::vector<std::uint8_t> worn(std::span<const std::uint8_t> bytes);
   [[nodiscard]] std::uint64_t now_us() const { return on_wire(rig.now()) / 84; }
 
   std::uint16_t last_request_ = 0;

@@ -1,0 +1,11 @@
+#include <gtest/gtest.h>
+
+#include "tests/tools/link_faults/every_rate.hpp"
+
+namespace diastole::link_faults {
+namespace {
+
+TEST(CampaignAtLength, NoWrongCommandInTwentyMillionFrames) { expect_no_wrong_command(3'000'000); }
+
+}  // namespace
+}  // namespace diastole::link_faults
