@@ -56,6 +56,8 @@ concept Board = requires(B& board, const B& fixed, const PulseOrder& order,
   /// Precondition: bytes.size() <= serial_room().
   {board.serial_write(bytes)};
   {board.feed_watchdog()};
+  /// Where settings are kept (settings_store.hpp); writing there may hold everything up for a second.
+  { board.settings_flash() } -> std::same_as<typename B::SettingsFlash&>;
   /// Interrupts that call the core are held off while one of these lives.
   typename B::InterruptLock;
   requires std::constructible_from<typename B::InterruptLock, B&>;

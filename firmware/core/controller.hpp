@@ -10,6 +10,7 @@
 #include "firmware/core/dispatch.hpp"
 #include "firmware/core/motion.hpp"
 #include "firmware/core/outbox.hpp"
+#include "firmware/core/settings_store.hpp"
 #include "firmware/core/telemetry.hpp"
 #include "protocol/wire/reliable_link.hpp"
 
@@ -20,9 +21,12 @@ class Controller {
  public:
   explicit Controller(B& board)
       : board_(board),
+        settings_(board.settings_flash()),
         motion_(board, outbox_),
-        dispatch_(board, motion_, outbox_, link_),
-        telemetry_(motion_, outbox_) {}
+        dispatch_(board, motion_, settings_, outbox_, link_),
+        telemetry_(motion_, outbox_) {
+    motion_.use(settings_.settings(), settings_.records_written() > 0);
+  }
 
   /// One turn of the main loop.
   void poll() {
@@ -64,6 +68,7 @@ class Controller {
   B& board_;
   wire::ReliableLink link_{wire::ReliableLink::Role::controller};
   Outbox outbox_;
+  SettingsStore<typename B::SettingsFlash> settings_;
   Motion<B> motion_;
   Dispatch<B> dispatch_;
   Telemetry<B> telemetry_;

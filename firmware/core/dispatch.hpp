@@ -6,6 +6,7 @@
 
 #include "firmware/core/motion.hpp"
 #include "firmware/core/outbox.hpp"
+#include "firmware/core/settings_store.hpp"
 #include "firmware/core/version.hpp"
 #include "protocol/wire/messages.hpp"
 #include "protocol/wire/reliable_link.hpp"
@@ -15,8 +16,10 @@ namespace diastole::firmware {
 template <Board B>
 class Dispatch {
  public:
-  Dispatch(B& board, Motion<B>& motion, Outbox& outbox, wire::ReliableLink& link)
-      : board_(board), motion_(motion), outbox_(outbox), link_(link) {}
+  using Store = SettingsStore<typename B::SettingsFlash>;
+
+  Dispatch(B& board, Motion<B>& motion, Store& store, Outbox& outbox, wire::ReliableLink& link)
+      : board_(board), motion_(motion), store_(store), outbox_(outbox), link_(link) {}
 
   void receive(const wire::Received& received) {
     if (link_.generation() != generation_) {
@@ -94,16 +97,35 @@ class Dispatch {
     status.retransmissions = link.retransmissions;
     answer(status);
   }
+  void handle(const wire::ReadSettings& request) {
+    wire::SettingsReport report;
+    report.request_id = request.request_id;
+    report.records_written = store_.records_written();
+    report.settings = store_.settings();
+    report.microstep_pL = wire::microstep_pL(report.settings);
+    report.backlash_microsteps = wire::backlash_microsteps(report.settings);
+    answer(report);
+  }
+  /// Only at rest: the flash holds the core up while it is written.
+  void handle(const wire::WriteSettings& request) {
+    const wire::SettingOutOfRange outside = wire::out_of_range(request.settings);
+    if (outside.found) {
+      conclude(request,
+               PlanRefusal{wire::Refusal::setting_out_of_range, wire::Limit::none,
+                           static_cast<std::uint16_t>(outside.setting), outside.asked, outside.allowed});
+    } else if (!motion_.safety().at_rest()) {
+      conclude(request, wire::Refusal::wrong_state);
+    } else if (!store_.write(request.settings)) {
+      conclude(request, wire::Refusal::flash_failed);
+    } else {
+      motion_.use(store_.settings(), true);
+      conclude(request, wire::Refusal::none);
+    }
+  }
   void handle(const wire::Configure& request) { conclude(request, motion_.configure(request)); }
   void handle(const wire::ClearProgram& request) { conclude(request, motion_.clear_program()); }
   void handle(const wire::AddSegment& request) { conclude(request, motion_.add_segment(request)); }
-  void handle(const wire::Arm& request) {
-    const PlanRefusal refusal = motion_.arm(request);
-    if (refusal.refusal != wire::Refusal::none)
-      refuse(request.request_id, static_cast<std::uint8_t>(request.kType), refusal);
-    else
-      conclude(request, wire::Refusal::none);
-  }
+  void handle(const wire::Arm& request) { conclude(request, motion_.arm(request)); }
   void handle(const wire::Home& request) { conclude(request, motion_.home(request.lease_id)); }
   void handle(const wire::Start& request) { conclude(request, motion_.start(request.lease_id)); }
   void handle(const wire::StopAtCycleEnd& request) { conclude(request, motion_.stop_at_cycle_end()); }
@@ -112,12 +134,16 @@ class Dispatch {
   void handle(const wire::ClearFault& request) { conclude(request, motion_.clear_fault()); }
 
   template <class Request>
-  void conclude(const Request& request, wire::Refusal refusal) {
+  void conclude(const Request& request, const PlanRefusal& why) {
     const auto type = static_cast<std::uint8_t>(Request::kType);
-    if (refusal == wire::Refusal::none)
+    if (why.refusal == wire::Refusal::none)
       answer(wire::Ack{request.request_id, type});
     else
-      refuse(request.request_id, type, {refusal});
+      refuse(request.request_id, type, why);
+  }
+  template <class Request>
+  void conclude(const Request& request, wire::Refusal refusal) {
+    conclude(request, PlanRefusal{.refusal = refusal});
   }
   void refuse(std::uint16_t request_id, std::uint8_t type, const PlanRefusal& why) {
     answer(wire::Nak{request_id, type, why.refusal, why.limit, why.segment, why.asked, why.allowed});
@@ -130,6 +156,7 @@ class Dispatch {
 
   B& board_;
   Motion<B>& motion_;
+  Store& store_;
   Outbox& outbox_;
   wire::ReliableLink& link_;
   std::uint32_t generation_ = 0;

@@ -30,7 +30,11 @@ class Motion {
   Motion(B& board, Outbox& outbox) : board_(board), outbox_(outbox), engine_(board) {}
 
   // Requests (main loop).
-  wire::Refusal configure(const wire::Configure& configure);
+  /// Geometry and limits; refused where they disagree with machine settings that were ever written.
+  PlanRefusal configure(const wire::Configure& configure);
+  /// Settings from flash; `written` unless they are the initial ones. What was configured is forgotten, and so
+  /// is the position: its unit may have changed.
+  void use(const wire::MachineSettings& machine, bool written);
   wire::Refusal clear_program();
   wire::Refusal add_segment(const wire::AddSegment& add);
   /// Checks the program; its segments are reported in the following turns; PlanRefusal{none} if it is
@@ -91,6 +95,8 @@ class Motion {
   StepEngine<B> engine_;
   Planner planner_;
   Program program_;
+  wire::MachineSettings machine_;
+  bool machine_written_ = false;
   Settings settings_;
   bool configured_ = false;
   Safety safety_;

@@ -6,11 +6,24 @@
 namespace diastole::firmware {
 
 template <Board B>
-wire::Refusal Motion<B>::configure(const wire::Configure& configure) {
-  if (!safety_.at_rest()) return wire::Refusal::wrong_state;
+PlanRefusal Motion<B>::configure(const wire::Configure& configure) {
+  if (!safety_.at_rest()) return {.refusal = wire::Refusal::wrong_state};
+  if (machine_written_) {
+    const PlanRefusal refusal = check_configuration(configure, machine_);
+    if (refusal.refusal != wire::Refusal::none) return refusal;
+  }
   settings_ = Settings(configure);
   configured_ = true;
-  return clear_program();
+  return {.refusal = clear_program()};
+}
+
+template <Board B>
+void Motion<B>::use(const wire::MachineSettings& machine, bool written) {
+  machine_ = machine;
+  machine_written_ = written;
+  configured_ = false;
+  program_.size = 0;
+  if (safety_.at_rest()) become(wire::State::unhomed);
 }
 
 template <Board B>

@@ -19,6 +19,26 @@ std::uint64_t stopping_us(std::uint64_t flow_uL_per_s, const Settings& settings)
 
 }  // namespace
 
+PlanRefusal check_configuration(const wire::Configure& configure, const wire::MachineSettings& machine) {
+  const auto refused = [](wire::Refusal refusal, wire::Limit limit, std::uint64_t asked,
+                          std::uint64_t allowed) {
+    return PlanRefusal{refusal, limit, 0, static_cast<std::int64_t>(asked),
+                       static_cast<std::int64_t>(allowed)};
+  };
+  const std::uint64_t asked_pL = configure.microstep_pL, own_pL = wire::microstep_pL(machine);
+  const std::uint64_t apart_pL = asked_pL > own_pL ? asked_pL - own_pL : own_pL - asked_pL;
+  if (apart_pL * 50'000 > own_pL)
+    return refused(wire::Refusal::settings_mismatch, wire::Limit::microstep, asked_pL, own_pL);
+  if (configure.travel_uL > wire::travel_uL(machine))
+    return refused(wire::Refusal::limit_exceeded, wire::Limit::travel, configure.travel_uL,
+                   wire::travel_uL(machine));
+  const std::uint64_t rate_Hz =
+      static_cast<std::uint64_t>(machine.full_step_rate_Hz) * static_cast<std::uint64_t>(machine.microsteps);
+  if (configure.step_rate_Hz > rate_Hz)
+    return refused(wire::Refusal::limit_exceeded, wire::Limit::step_rate, configure.step_rate_Hz, rate_Hz);
+  return {};
+}
+
 SegmentPeaks segment_peaks(const Segment& segment, const Settings& settings) {
   const Profile& profile = *find_profile(segment.waveform);
   const wire::Configure& limits = settings.limits();

@@ -11,6 +11,7 @@
 
 #include "firmware/core/program.hpp"
 #include "protocol/wire/faults.hpp"
+#include "protocol/wire/machine_settings.hpp"
 #include "protocol/wire/result.hpp"
 
 namespace diastole::firmware {
@@ -32,6 +33,10 @@ struct PlanRefusal {
   std::int64_t asked = 0;
   std::int64_t allowed = 0;
 };
+
+/// Whether geometry and limits are those of this machine: the same volume a microstep, to 20 parts in a million,
+/// and neither more travel nor more steps a second than it has.
+PlanRefusal check_configuration(const wire::Configure& configure, const wire::MachineSettings& machine);
 
 /// Peaks of one segment. Precondition: the firmware has its waveform.
 SegmentPeaks segment_peaks(const Segment& segment, const Settings& settings);

@@ -14,7 +14,7 @@ constexpr bool may_follow(wire::State from, wire::State to) {
   using enum wire::State;
   switch (to) {
     case unhomed:
-      return from == faulted;
+      return from == faulted || from == homed || from == armed;
     case homing:
       return from == unhomed || from == homed || from == armed;
     case homed:
@@ -51,7 +51,7 @@ class Safety {
   /// Changes the state if that is allowed; false leaves it.
   bool become(wire::State to) {
     if (!may_follow(state_, to)) return false;
-    if (to == wire::State::homing) position_known_ = false;
+    if (to == wire::State::homing || to == wire::State::unhomed) position_known_ = false;
     if (to == wire::State::homed && state_ == wire::State::homing) position_known_ = true;
     state_ = to;
     return true;

@@ -17,13 +17,13 @@ enum class Refusal : std::uint8_t {
 #include "protocol/wire/refusal_list.inc"
 };
 #undef DIASTOLE_REFUSAL
-inline constexpr Refusal kLastRefusal = Refusal::limit_switch_closed;
+inline constexpr Refusal kLastRefusal = Refusal::home_switch_closed;
 
 #define DIASTOLE_LIMIT(number, name, unit) name = number,
 enum class Limit : std::uint8_t {
 #include "protocol/wire/limit_list.inc"
 };
 #undef DIASTOLE_LIMIT
-inline constexpr Limit kLastLimit = Limit::r_wave_spacing;
+inline constexpr Limit kLastLimit = Limit::microstep;
 
 }  // namespace diastole::wire

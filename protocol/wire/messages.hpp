@@ -21,6 +21,7 @@
 #include "protocol/wire/program_messages.hpp"
 #include "protocol/wire/result.hpp"
 #include "protocol/wire/session_messages.hpp"
+#include "protocol/wire/settings_messages.hpp"
 #include "protocol/wire/status_messages.hpp"
 #include "protocol/wire/telemetry_messages.hpp"
 

@@ -62,7 +62,7 @@ struct Ack {
 //        2    1 request_type                 MessageType of the request
 //        3    1 refusal                      refusal_list.inc
 //        4    1 limit                        limit_list.inc; none unless refusal is limit_exceeded
-//        5    2 segment                      the segment concerned
+//        5    2 segment                      the segment concerned, or the setting (setting_list.inc)
 //        7    8 asked                        in the limit's unit
 //       15    8 allowed                      in the limit's unit
 //

@@ -7,6 +7,7 @@
 
 #include <cstdint>
 #include <deque>
+#include <memory>
 #include <optional>
 #include <queue>
 #include <span>
@@ -14,6 +15,7 @@
 #include <utility>
 #include <vector>
 
+#include "firmware/boards/recording/memory_flash.hpp"
 #include "firmware/core/board.hpp"
 #include "firmware/core/units.hpp"
 
@@ -43,11 +45,17 @@ struct Mechanics {
 
 class RecordingBoard {
  public:
+  using SettingsFlash = MemoryFlash;
+  /// What outlives a reset: hand it to the next board.
+  struct Memory {
+    MemoryFlash flash;
+  };
   struct Options {
     Identity identity{1, 0x0000B007, wire::ResetCause::power_on};
     Mechanics mechanics;
     std::uint32_t baud = 460'800;
     std::size_t serial_buffer_bytes = 2048;
+    std::shared_ptr<Memory> memory = std::make_shared<Memory>();
   };
   struct InterruptLock {
     explicit InterruptLock(RecordingBoard&) {}
@@ -68,6 +76,7 @@ class RecordingBoard {
   [[nodiscard]] std::size_t serial_room() const;
   void serial_write(std::span<const std::uint8_t> bytes);
   void feed_watchdog() {}
+  MemoryFlash& settings_flash() { return options_.memory->flash; }
 
   // What the world sees.
   /// The next moment at which a pin changes or an order is carried out.

@@ -6,6 +6,7 @@
 #include "firmware/boards/stm32f405/clocks.hpp"
 #include "firmware/boards/stm32f405/pins.hpp"
 #include "firmware/boards/stm32f405/registers.hpp"
+#include "firmware/boards/stm32f405/watchdog.hpp"
 
 namespace diastole::stm32 {
 
@@ -13,13 +14,6 @@ namespace {
 
 /// The number behind the FAULT pin, at 0x20000000 (stm32f405.ld) for whoever looks from outside.
 [[gnu::section(".shown"), gnu::used]] volatile std::uint8_t shown_fault;
-
-void start_watchdog() {
-  iwdg().KR.write(0x5555);
-  iwdg().PR.write(1);      // 32 kHz / 8
-  iwdg().RLR.write(1000);  // 250 ms
-  iwdg().KR.write(0xCCCC);
-}
 
 /// Wakes the main loop every millisecond.
 void start_systick() {

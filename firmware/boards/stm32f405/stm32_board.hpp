@@ -11,12 +11,15 @@
 #include "firmware/boards/stm32f405/pulse_timer.hpp"
 #include "firmware/boards/stm32f405/r_wave_player.hpp"
 #include "firmware/boards/stm32f405/serial_port.hpp"
+#include "firmware/boards/stm32f405/settings_flash.hpp"
 #include "firmware/core/board.hpp"
 
 namespace diastole::stm32 {
 
 class Stm32Board {
  public:
+  using SettingsFlash = stm32::SettingsFlash;
+
   class InterruptLock {
    public:
     explicit InterruptLock(const Stm32Board&) {
@@ -44,6 +47,7 @@ class Stm32Board {
   [[nodiscard]] std::size_t serial_room() const { return serial_.room(); }
   void serial_write(std::span<const std::uint8_t> bytes) { serial_.write(bytes); }
   void feed_watchdog();
+  SettingsFlash& settings_flash() { return settings_flash_; }
 
   // Interrupt handlers.
   bool timer_interrupt() { return timer_.interrupt(); }
@@ -55,6 +59,7 @@ class Stm32Board {
   PulseTimer timer_;
   RWavePlayer r_wave_;
   SerialPort serial_;
+  SettingsFlash settings_flash_;
   firmware::Identity identity_;
 };
 
