@@ -7,6 +7,7 @@
 #include <limits>
 #include <map>
 
+#include "host/runfile/filtered_channel.hpp"
 #include "host/runfile/journal_story.hpp"
 #include "protocol/contract/input_error.hpp"
 #include "protocol/runfile/layout.hpp"
@@ -271,6 +272,7 @@ AssembledRun assemble_run(const JournalContents& journal) {
   put_events(story, axis, run);
   put_clocks(story, axis, run);
   put_pressure(story, axis, assembled);
+  add_filtered_channel(run.pressure);
   assembled.ended_in_order = story.closed && story.run_ended.has_value();
   if (!assembled.ended_in_order) {
     const double last_s = run.pressure.time_s.empty() ? 0 : run.pressure.time_s.back();

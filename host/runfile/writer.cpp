@@ -41,6 +41,10 @@ void write_streams(H5Sink& sink, const runfile::RecordedRun& run) {
   for (const auto& [name, values_kPa] : run.pressure.channels) {
     sink.numbers(fmt::format("{}/{}", runfile::pressure_group, name), values_kPa, runfile::pressure_unit);
   }
+  for (const auto& [name, notes] : run.pressure.notes) {
+    for (const auto& [note, value] : notes)
+      sink.attribute(fmt::format("{}/{}", runfile::pressure_group, name), note, value);
+  }
   sink.numbers(runfile::trigger_time, run.trigger_s, runfile::time_unit);
   for (const auto& [segment, flow] : run.flow) {
     const std::string group = fmt::format("{}/{}", runfile::flow_group, segment);

@@ -89,7 +89,11 @@ PressureTrace read_pressure(const H5Source& source) {
   pressure.time_s = source.numbers(pressure_time);
   for (const std::string& name : source.children(pressure_group)) {
     if (unit_of(name) != pressure_unit) continue;
-    pressure.channels[name] = source.numbers(fmt::format("{}/{}", pressure_group, name));
+    const std::string dataset = fmt::format("{}/{}", pressure_group, name);
+    pressure.channels[name] = source.numbers(dataset);
+    auto notes = source.attributes(dataset);
+    notes.erase("units");
+    if (!notes.empty()) pressure.notes[name] = std::move(notes);
   }
   if (!pressure.channels.contains("cavity_kPa")) {
     source.fail("dataset /pressure/cavity_kPa", "is missing", "The catheter's pressure must be there.");

@@ -49,6 +49,8 @@ struct PressureTrace {
   std::vector<double> time_s;
   /// By dataset name, "cavity_kPa" always among them; each as long as time_s, NaN where a gap is declared.
   std::map<std::string, std::vector<double>, std::less<>> channels;
+  /// What a channel's dataset tells about itself besides its unit, by channel: how it was filtered, say.
+  std::map<std::string, std::map<std::string, Attribute, std::less<>>, std::less<>> notes;
 };
 
 /// Gated phase-contrast cavity volume of one segment, averaged over its cycles.

@@ -24,6 +24,7 @@ check(file["gaps"].dtype.names == ("stream", "first_index", "count", "reason"), 
 check(file["events"].dtype.names == ("time_s", "level", "code", "text"), "columns of events")
 
 units = {"pump/time_s": "s", "pump/commanded_mL": "mL", "pressure/time_s": "s", "pressure/cavity_kPa": "kPa",
+         "pressure/cavity_filtered_kPa": "kPa",
          "trigger/time_s": "s"}
 for path, unit in units.items():
     check(file[path].dtype == np.float64, f"{path} is float64")
@@ -46,4 +47,7 @@ declared = np.zeros(len(pressure), bool)
 for gap in file["gaps"][:]:
     if gap["stream"].decode() == "pressure":
         declared[gap["first_index"]:gap["first_index"] + gap["count"]] = True
+filtered = file["pressure/cavity_filtered_kPa"]
+check(filtered.attrs["cutoff_Hz"] == 30.0 and filtered.attrs["delay_s"] == 0.0, "notes of the filtered pressure")
+check(np.array_equal(np.isnan(filtered[:]), declared), "the filtered pressure has the same gaps")
 check(np.array_equal(np.isnan(pressure), declared), "NaN exactly where a gap is declared")

@@ -2,10 +2,12 @@
 
 #include <gmock/gmock.h>
 
+#include <cmath>
 #include <cstdio>
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "host/runfile/filtered_channel.hpp"
 #include "host/runfile/writer.hpp"
 #include "protocol/contract/input_error.hpp"
 #include "protocol/runfile/reader.hpp"
@@ -57,6 +59,35 @@ TEST_F(WrittenFile, ReadsBackAsItWasAssembled) {
   EXPECT_EQ(after.clock, before.clock);
   EXPECT_EQ(after.missing("pressure"), 3);
   EXPECT_EQ(after.events.size(), before.events.size());
+}
+
+TEST_F(WrittenFile, HoldsTheLowPassedPressureBesideTheRawOne) {
+  const runfile::RecordedRun run = runfile::read_run(file());
+  const auto& raw_kPa = run.pressure.channels.at("cavity_kPa");
+  const auto& filtered_kPa = run.pressure.channels.at("cavity_filtered_kPa");
+  ASSERT_EQ(filtered_kPa.size(), raw_kPa.size());
+  size_t missing = 0;
+  for (size_t i = 0; i < raw_kPa.size(); ++i) {
+    missing += std::isnan(raw_kPa[i]) ? 1 : 0;
+    EXPECT_EQ(std::isnan(filtered_kPa[i]), std::isnan(raw_kPa[i])) << "row " << i;
+  }
+  EXPECT_EQ(missing, 3U);
+  const auto& notes = run.pressure.notes.at("cavity_filtered_kPa");
+  EXPECT_DOUBLE_EQ(std::get<double>(notes.at("cutoff_Hz")), 30);
+  EXPECT_EQ(std::get<int64_t>(notes.at("passes")), 2);
+  EXPECT_DOUBLE_EQ(std::get<double>(notes.at("delay_s")), 0);
+  EXPECT_FALSE(run.pressure.notes.contains("cavity_kPa"));
+}
+
+TEST(FilteredChannel, IsLeftOutWhereSamplesAreTooSlowForIt) {
+  runfile::PressureTrace pressure;
+  add_filtered_channel(pressure);
+  for (int i = 0; i < 100; ++i) {
+    pressure.time_s.push_back(i / 60.0);
+    pressure.channels["cavity_kPa"].push_back(1);
+  }
+  add_filtered_channel(pressure);
+  EXPECT_EQ(pressure.channels.size(), 1U);
 }
 
 TEST_F(WrittenFile, H5pyFindsTheContract) {
