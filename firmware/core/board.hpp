@@ -15,11 +15,11 @@ namespace diastole::firmware {
 
 /// Edges to be made by the timer's compare unit when the clock reaches `tick`, whatever software does then.
 struct PulseOrder {
-  Ticks tick;
-  bool step = false;     ///< STEP rises, and falls kStepPulse later
-  bool inflate = false;  ///< DIR, set kDirectionSetup before the step when it changes
-  bool ttl = false;      ///< TTL rises, and falls ttl_width later
-  bool r_wave = false;   ///< the R-wave (r_wave.hpp) starts
+  std::uint32_t tick = 0;  ///< lower half of the clock; less than 25 s ahead
+  bool step = false;       ///< STEP rises, and falls kStepPulse later
+  bool inflate = false;    ///< DIR, set kDirectionSetup before the step when it changes
+  bool ttl = false;        ///< TTL rises, and falls ttl_width later
+  bool r_wave = false;     ///< the R-wave (r_wave.hpp) starts
   Ticks ttl_width;
 };
 
@@ -42,9 +42,14 @@ template <class B>
 concept Board = requires(B& board, const B& fixed, const PulseOrder& order,
                          std::span<const std::uint8_t> bytes) {
   { fixed.now() } -> std::same_as<Ticks>;
+  /// From now to the lower half of a time within 25 s; negative if that has passed.
+  { fixed.ticks_until(std::uint32_t{}) } -> std::same_as<std::int32_t>;
   /// One order at a time: the board calls Controller::on_match() when this one has been carried out.
   {board.schedule(order)};
-  /// No further edge on STEP or TTL from this moment on; the TTL falls. Callable from any interrupt.
+  /// No order follows the one carried out: no edge until the next schedule().
+  {board.rest()};
+  /// STEP and TTL do not rise from this moment on; a STEP that is high falls in time, the TTL at once. Callable
+  /// from any interrupt.
   {board.cancel_pulses()};
   {board.set_motor_enabled(true)};
   {board.show_fault(std::uint8_t{})};

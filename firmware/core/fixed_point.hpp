@@ -35,8 +35,8 @@ constexpr std::uint64_t scale(std::uint64_t whole, Q64 fraction) {
 }
 
 /// Square root with a relative error below 2^-44: a seed from the 24 leading bits, then one Newton step on
-/// the exact remainder, √n = r + (n - r²) / 2r. Of the step, at most 2^9 of r's last places, 20 bits suffice: single precision.
-/// Precondition: fraction <= 1 - 2^-32.
+/// the exact remainder, √n = r + (n - r²) / 2r. The step is below 2^9 last places of r, so single precision has
+/// digits enough for it. Precondition: fraction <= 1 - 2^-32.
 inline Q64 square_root(Q64 fraction) {
   if (fraction == 0) return 0;
   const int shift = std::countl_zero(fraction) & ~1;

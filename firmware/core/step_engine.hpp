@@ -1,13 +1,12 @@
 #pragma once
 // The interrupt path: takes planned events from the queue, gives them to the timer one by one, and counts
 // what the timer has done. push() and the telemetry belong to the main loop, on_match() to the compare
-// interrupt.
+// interrupt. Times are the lower halves of ticks here: the queue spans milliseconds.
 //
-//   Planner ──push()──▶ queue ──load()──▶ Board::schedule ──edge──▶ on_match(): count, report, load()
+//   Planner ──push()──▶ queue ──load()──▶ Board::schedule ──edge──▶ on_match(): load(), sample, count
 
 #include <atomic>
 #include <cstdint>
-#include <optional>
 
 #include "firmware/core/board.hpp"
 #include "firmware/core/planner.hpp"
@@ -30,34 +29,50 @@ struct MotionCounters {
   std::uint32_t cycles_done = 0;
 };
 
+/// Shared with the interrupts of the same core, which needs no barrier.
+class Flag {
+ public:
+  Flag& operator=(bool value) {
+    value_.store(value, std::memory_order_relaxed);
+    return *this;
+  }
+  operator bool() const { return value_.load(std::memory_order_relaxed); }
+
+ private:
+  std::atomic<bool> value_{false};
+};
+
 template <Board B>
 class StepEngine {
  public:
-  static constexpr std::size_t kQueue = 512;
+  static constexpr std::size_t kQueue = 1024;
   static constexpr std::size_t kSamples = 512;
   /// An order must reach the timer this long before its tick, or the compare would be missed.
-  static constexpr Ticks kLeastLead = microseconds(2);
+  static constexpr Ticks kLeastLead{42};
 
   explicit StepEngine(B& board) : board_(board) {}
 
   /// Accepts events again after cut().
-  void open() { closed_ = false; }
+  void open() {
+    typename B::InterruptLock lock(board_);
+    queue_.clear();
+    closed_ = false;
+  }
   [[nodiscard]] bool full() const { return queue_.full(); }
   void push(const MotionEvent& event) {
-    typename B::InterruptLock lock(board_);
     if (closed_) return;
-    queue_.push(event);
-    if (!loaded_) load();
+    queue_.push({lower_half(event.tick), event.flags});
+    std::atomic_signal_fence(std::memory_order_seq_cst);
+    if (!loaded_) load_first();
   }
 
-  /// Compare interrupt: the loaded event has just happened on the pins.
+  /// Compare interrupt: the loaded event is happening on the pins. The next comes first, the counting can wait.
   void on_match() {
     if (!loaded_) return;
-    const MotionEvent event = *loaded_;
-    loaded_.reset();
+    const Queued event = event_;
+    load();
     sample_until(event.tick);
     count(event);
-    load();
   }
 
   /// Cuts off everything that has not happened yet, and drops what is pushed until open(). Any context.
@@ -65,7 +80,7 @@ class StepEngine {
     typename B::InterruptLock lock(board_);
     closed_ = true;
     board_.cancel_pulses();
-    loaded_.reset();
+    loaded_ = false;
     queue_.clear();
   }
 
@@ -73,20 +88,20 @@ class StepEngine {
   void begin_sampling(Ticks first, Ticks period) {
     typename B::InterruptLock lock(board_);
     samples_.clear();
-    next_sample_ = first;
-    sample_period_ = period;
+    next_sample_ = lower_half(first);
+    sample_period_ = lower_half(period);
     sampling_ = true;
   }
   void stop_sampling(Ticks last) {
     typename B::InterruptLock lock(board_);
-    sample_until(last + Ticks{1});
+    sample_until(lower_half(last + Ticks{1}));
     sampling_ = false;
   }
   /// Main loop: samples whose time has come although no step did.
   void sample_to_now() {
     typename B::InterruptLock lock(board_);
-    const Ticks now = board_.now();
-    sample_until(loaded_ && loaded_->tick < now ? loaded_->tick : now);
+    const std::uint32_t now = lower_half(board_.now());
+    sample_until(loaded_ && ticks_between(event_.tick, now) > 0 ? event_.tick : now);
   }
   Ring<std::int32_t, kSamples>& samples() { return samples_; }
   Ring<MotionReport, 64>& reports() { return reports_; }
@@ -111,29 +126,49 @@ class StepEngine {
   std::uint32_t take_lost() { return lost_.exchange(0); }
 
  private:
+  /// A MotionEvent in the queue.
+  struct Queued {
+    std::uint32_t tick = 0;
+    std::uint16_t flags = 0;
+
+    [[nodiscard]] bool has(MotionEvent::Flag flag) const { return (flags & flag) != 0; }
+  };
+  static constexpr std::uint16_t kStepOnly = MotionEvent::kStep | MotionEvent::kInflate;
+
+  void load_first() {
+    typename B::InterruptLock lock(board_);
+    if (!loaded_ && !closed_) load();
+  }
+
+  /// Hands the next event to the timer. With the interrupts locked, or in them.
   void load() {
-    const MotionEvent* next = queue_.front();
-    if (next == nullptr) return;
-    if (next->tick < board_.now() + kLeastLead) {
+    const Queued* next = queue_.front();
+    loaded_ = next != nullptr;
+    if (next == nullptr) return board_.rest();
+    if (board_.ticks_until(next->tick) < kLeastLead.count) {
       underrun_ = true;
-      cut();
-      return;
+      return cut();
     }
-    loaded_ = *next;
+    event_ = *next;
     queue_.pop();
-    board_.schedule(PulseOrder{.tick = loaded_->tick,
-                               .step = loaded_->has(MotionEvent::kStep),
-                               .inflate = loaded_->has(MotionEvent::kInflate),
-                               .ttl = loaded_->has(MotionEvent::kCycleStart),
-                               .r_wave = loaded_->has(MotionEvent::kRWave),
+    board_.schedule(PulseOrder{.tick = event_.tick,
+                               .step = event_.has(MotionEvent::kStep),
+                               .inflate = event_.has(MotionEvent::kInflate),
+                               .ttl = event_.has(MotionEvent::kCycleStart),
+                               .r_wave = event_.has(MotionEvent::kRWave),
                                .ttl_width = ttl_width_});
   }
 
-  void count(const MotionEvent& event) {
+  void count(const Queued& event) {
     if (event.has(MotionEvent::kStep)) {
       counters_.position += Steps{event.has(MotionEvent::kInflate) ? 1 : -1};
       ++counters_.steps;
     }
+    if ((event.flags & ~kStepOnly) != 0) mark(event);
+  }
+
+  /// Beginnings and ends: a few in a cycle.
+  void mark(const Queued& event) {
     if (event.has(MotionEvent::kCycleStart)) {
       ++counters_.cycles_begun;
       ++counters_.triggers;
@@ -142,27 +177,29 @@ class StepEngine {
     if (event.has(MotionEvent::kCycleEnd)) ++counters_.cycles_done;
     constexpr std::uint16_t kReported =
         MotionEvent::kCycleStart | MotionEvent::kRunStart | MotionEvent::kSegmentStart | MotionEvent::kEnd;
-    if ((event.flags & kReported) != 0 && !reports_.push({event.tick, event.flags})) ++lost_;
+    if ((event.flags & kReported) == 0) return;
+    if (!reports_.push({whole_time(event.tick, board_.now()), event.flags})) ++lost_;
   }
 
   /// Records the present position for every sample time before `tick`.
-  void sample_until(Ticks tick) {
+  void sample_until(std::uint32_t tick) {
     if (!sampling_) return;
-    for (; next_sample_ < tick; next_sample_ += sample_period_)
+    for (; ticks_between(next_sample_, tick) > 0; next_sample_ += sample_period_)
       if (!samples_.push(counters_.position.count)) ++lost_;
   }
 
   B& board_;
-  Ring<MotionEvent, kQueue> queue_;
-  std::optional<MotionEvent> loaded_;
+  Ring<Queued, kQueue> queue_;
+  Queued event_;  ///< what the timer will do next, while loaded_
   Ring<MotionReport, 64> reports_;
   Ring<std::int32_t, kSamples> samples_;
   MotionCounters counters_;
   Ticks ttl_width_;
-  Ticks next_sample_;
-  Ticks sample_period_;
+  std::uint32_t next_sample_ = 0;
+  std::uint32_t sample_period_ = 0;
   bool sampling_ = false;
-  bool closed_ = false;
+  Flag loaded_;
+  Flag closed_;
   std::atomic<bool> underrun_{false};
   std::atomic<std::uint32_t> lost_{0};
 };

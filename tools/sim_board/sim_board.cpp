@@ -196,6 +196,7 @@ BoardStatistics SimBoard::statistics() const {
   found.time_ns = now_ns();
   found.cycles = chip.clock.now();
   found.instructions = chip.cpu.instructions();
+  found.asleep_cycles = chip.cpu.asleep_cycles();
   found.core_Hz = chip.clock.tree().core_Hz;
   found.stack_top = chip.memory.word(0).value_or(0);
   found.stack_used_bytes = board.stack_used();

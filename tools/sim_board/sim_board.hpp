@@ -60,6 +60,7 @@ struct BoardStatistics {
   uint64_t time_ns = 0;
   uint64_t cycles = 0;
   uint64_t instructions = 0;
+  uint64_t asleep_cycles = 0;  ///< in WFI, waiting for an interrupt
   uint32_t core_Hz = 0;
   uint32_t stack_top = 0;         ///< initial stack pointer
   uint32_t stack_used_bytes = 0;  ///< deepest word touched below stack_top since power-up

@@ -12,7 +12,7 @@ constexpr board_model::Pin pin(char port, uint8_t number) {
 }  // namespace
 
 const Wiring& diastole_wiring() {
-  static constexpr Wiring wiring{.step = {pin('A', 0)},
+  static constexpr Wiring wiring{.step = {pin('A', 6)},
                                  .dir = {pin('A', 2)},
                                  .enable = {pin('B', 0)},
                                  .ttl = {pin('A', 1)},

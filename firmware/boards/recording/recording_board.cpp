@@ -20,9 +20,10 @@ void RecordingBoard::set_pin(Signal signal, std::int32_t value) {
 
 void RecordingBoard::schedule(const PulseOrder& order) {
   order_ = order;
+  order_due_ = whole_time(order.tick, now_);
   const bool inflating = pins_[static_cast<std::size_t>(Signal::DIR)] != 0;
   direction_due_.reset();
-  if (order.step && order.inflate != inflating) direction_due_ = std::max(now_, order.tick - kDirectionSetup);
+  if (order.step && order.inflate != inflating) direction_due_ = std::max(now_, order_due_ - kDirectionSetup);
 }
 
 void RecordingBoard::cancel_pulses() {
@@ -69,7 +70,7 @@ std::optional<Ticks> RecordingBoard::next_event() const {
   const auto consider = [&next](Ticks tick) {
     if (!next || tick < *next) next = tick;
   };
-  if (order_) consider(order_->tick);
+  if (order_) consider(order_due_);
   if (direction_due_) consider(*direction_due_);
   if (!coming_.empty()) consider(coming_.top().tick);
   return next;
@@ -98,7 +99,7 @@ bool RecordingBoard::run_to(Ticks tick, bool& inputs_changed) {
     direction_due_.reset();
     set_pin(Signal::DIR, order_->inflate);
   }
-  const bool matched = order_ && order_->tick <= now_;
+  const bool matched = order_ && order_due_ <= now_;
   if (matched) {
     const Inputs before = inputs();
     carry_out(*std::exchange(order_, {}));

@@ -66,7 +66,11 @@ class RecordingBoard {
 
   // What the core sees (concept Board).
   [[nodiscard]] Ticks now() const { return now_; }
+  [[nodiscard]] std::int32_t ticks_until(std::uint32_t tick) const {
+    return ticks_between(lower_half(now_), tick);
+  }
   void schedule(const PulseOrder& order);
+  void rest() {}
   void cancel_pulses();
   void set_motor_enabled(bool enabled) { set_pin(Signal::ENABLE, enabled); }
   void show_fault(std::uint8_t number) { set_pin(Signal::FAULT, number); }
@@ -111,6 +115,7 @@ class RecordingBoard {
   Options options_;
   Ticks now_;
   std::optional<PulseOrder> order_;
+  Ticks order_due_;
   std::optional<Ticks> direction_due_;
   std::priority_queue<Edge, std::vector<Edge>, Later> coming_;  ///< falling edges and R-wave samples
   std::int32_t pins_[6] = {};

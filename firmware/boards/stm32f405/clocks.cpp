@@ -20,10 +20,10 @@ void start_clocks() {
   rcc().CFGR.write(5U << 10 | 4U << 13 | 2U);
   while ((rcc().CFGR.read() & 0xCU) != 0x8U) {
   }
-  rcc().AHB1ENR.set(1U << 0 | 1U << 1 | 1U << 2 | 1U << 21);   // GPIOA, GPIOB, GPIOC, DMA1
-  rcc().AHB2ENR.set(1U << 6);                                  // RNG
-  rcc().APB1ENR.set(1U << 0 | 1U << 2 | 1U << 18 | 1U << 29);  // TIM2, TIM4, USART3, DAC
-  rcc().APB2ENR.set(1U << 14);                                 // SYSCFG
+  rcc().AHB1ENR.set(1U << 0 | 1U << 1 | 1U << 2 | 1U << 21);  // GPIOA, GPIOB, GPIOC, DMA1
+  rcc().AHB2ENR.set(1U << 6);                                 // RNG
+  rcc().APB1ENR.set(0xFU | 1U << 18 | 1U << 29);              // TIM2 … TIM5, USART3, DAC
+  rcc().APB2ENR.set(1U << 14);                                // SYSCFG
 }
 
 }  // namespace diastole::stm32

@@ -15,9 +15,10 @@ diastole::firmware::Controller<diastole::stm32::Stm32Board> controller(board);
 
 extern "C" {
 
-void TIM2_IRQHandler() {
-  if (board.timer_interrupt()) controller.on_match();
-}
+/// A step: the compare event has started its pulse.
+void TIM5_IRQHandler() { controller.on_match(); }
+
+void TIM2_IRQHandler() { board.timer_interrupt(); }
 
 void EXTI_IRQHandler() {
   board.input_interrupt();
@@ -28,12 +29,13 @@ void USART3_IRQHandler() { board.serial_interrupt(); }
 
 void DMA1_Stream5_IRQHandler() { board.r_wave_interrupt(); }
 
-void SysTick_Handler() {}
+void SysTick_Handler() { board.millisecond_interrupt(); }
 
 /// A processor fault or an interrupt that nobody enabled: motor off, and the watchdog starts anew.
 void Stray_Handler() {
   diastole::stm32::gpio_b().BSRR.write(diastole::stm32::kEnablePin << 16);
   diastole::stm32::tim2().CCER.write(0);
+  diastole::stm32::tim3().CCER.write(0);
   for (;;) {
   }
 }
@@ -42,7 +44,7 @@ int main() {
   board.start();
   for (;;) {
     controller.poll();
-    asm volatile("wfi");
+    board.sleep();
   }
 }
 }

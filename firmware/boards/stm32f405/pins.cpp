@@ -24,8 +24,9 @@ void configure_pins() {
   gpio_b().BSRR.write((kEnablePin | kFaultPin) << 16);
   set_mode(gpio_b(), 0, kOutput);
   set_mode(gpio_b(), 1, kOutput);
-  for (const unsigned pin : {0U, 1U, 2U})
+  for (const unsigned pin : {1U, 2U})
     set_alternate(gpio_a(), pin, 1);
+  set_alternate(gpio_a(), 6, 2);
   set_mode(gpio_a(), 4, kAnalog);
   set_alternate(gpio_b(), 10, 7);
   set_alternate(gpio_b(), 11, 7);

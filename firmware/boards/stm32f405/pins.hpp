@@ -1,11 +1,11 @@
 #pragma once
 // What is wired where (Olimex STM32-H405 header names are the port names).
 //
-//   PA0   STEP      TIM2_CH1 (AF1)      out
 //   PA1   TTL       TIM2_CH2 (AF1)      out, also starts the R-wave through TIM4
 //   PA2   DIR       TIM2_CH3 (AF1)      out, high = inflate
 //   PA4   R-wave    DAC_OUT1            out, 15 kOhm: through a follower and a divider of 1 : 125 to the
 //                                       scanner's ECG input
+//   PA6   STEP      TIM3_CH1 (AF2)      out
 //   PB0   ENABLE                        out, high = motor powered
 //   PB1   FAULT                         out, high = a fault is latched
 //   PB10  TX, PB11 RX  USART3 (AF7)

@@ -10,12 +10,11 @@ using firmware::Ticks;
 
 namespace {
 
-constexpr std::uint32_t kUpdate = 1U << 0, kCompare1 = 1U << 1, kCompare2 = 1U << 2;
+constexpr std::uint32_t kUpdate = 1U << 0, kCompare2 = 1U << 2;
 
 /// Output compare modes, RM0090 18.4.7.
 enum Mode : std::uint32_t { kFrozen = 0, kActiveOnMatch = 1, kInactiveOnMatch = 2, kLow = 4, kHigh = 5 };
 
-void set_step_mode(Mode mode) { tim2().CCMR1.change(7U << 4, mode << 4); }
 void set_ttl_mode(Mode mode) { tim2().CCMR1.change(7U << 12, mode << 12); }
 void set_direction_mode(Mode mode) { tim2().CCMR2.change(7U << 4, mode << 4); }
 
@@ -29,15 +28,17 @@ bool has_passed(std::uint32_t tick) { return static_cast<std::int32_t>(tim2().CN
 void PulseTimer::start() {
   tim2().PSC.write(0);
   tim2().ARR.write(0xFFFF'FFFFU);
-  tim2().CR2.write(5U << 4);  // TRGO = OC2REF
-  set_step_mode(kLow);
   set_ttl_mode(kLow);
   set_direction_mode(kLow);
-  tim2().CCER.write(1U << 0 | 1U << 4 | 1U << 8);
+  tim2().CCER.write(1U << 4 | 1U << 8);
   tim2().EGR.write(1);
   clear_flag(kUpdate);
   tim2().DIER.write(kUpdate);
+  steps_.start();
+  tim2().CR2.write(1U << 4);  // TRGO = the counter's start, which TIM5 follows
   tim2().CR1.write(1);
+  steps_.let_go();
+  tim2().CR2.write(5U << 4);  // TRGO = OC2REF, which the R-wave follows
   enable_interrupt(kTim2, 1);
 }
 
@@ -59,49 +60,22 @@ void PulseTimer::set_direction(bool inflate, std::uint32_t step_tick) {
   if (has_passed(due)) set_direction_mode(inflate ? kHigh : kLow);
 }
 
-void PulseTimer::schedule(const PulseOrder& order) {
-  const auto tick = static_cast<std::uint32_t>(order.tick.count);
-  tim2().CCR1.write(tick);
-  clear_flag(kCompare1);
-  set_step_mode(order.step ? kActiveOnMatch : kFrozen);
-  phase_ = order.step ? Phase::rising : Phase::marker;
-  tim2().DIER.set(kCompare1);
-  if (order.ttl) {
-    ttl_width_ = static_cast<std::uint32_t>(order.ttl_width.count);
-    ttl_rising_ = true;
-    tim2().CCR2.write(tick);
-    clear_flag(kCompare2);
-    set_ttl_mode(kActiveOnMatch);
-    tim2().DIER.set(kCompare2);
-  }
-  if (order.step && order.inflate != inflate_) set_direction(order.inflate, tick);
+void PulseTimer::raise_ttl(const PulseOrder& order) {
+  ttl_width_ = firmware::lower_half(order.ttl_width);
+  ttl_rising_ = true;
+  tim2().CCR2.write(order.tick);
+  clear_flag(kCompare2);
+  set_ttl_mode(kActiveOnMatch);
+  tim2().DIER.set(kCompare2);
 }
 
 void PulseTimer::cancel() {
-  tim2().DIER.clear(kCompare1 | kCompare2);
-  set_step_mode(kLow);
+  steps_.rest();
+  tim2().DIER.clear(kCompare2);
   set_ttl_mode(kLow);
   set_direction_mode(kFrozen);
   inflate_ = (gpio_a().IDR.read() & kDirPin) != 0;
-  clear_flag(kCompare1 | kCompare2);
-  phase_ = Phase::idle;
-}
-
-/// The rise has happened: arm the fall. A fall that latency has already passed is made at once.
-bool PulseTimer::step_interrupt() {
-  if (phase_ == Phase::rising) {
-    const std::uint32_t fall = tim2().CCR1.read() + static_cast<std::uint32_t>(firmware::kStepPulse.count);
-    phase_ = Phase::falling;
-    tim2().CCR1.write(fall);
-    set_step_mode(kInactiveOnMatch);
-    if (!has_passed(fall)) return false;
-    set_step_mode(kLow);
-    clear_flag(kCompare1);
-  }
-  const bool carried_out = phase_ != Phase::idle;
-  phase_ = Phase::idle;
-  tim2().DIER.clear(kCompare1);
-  return carried_out;
+  clear_flag(kCompare2);
 }
 
 void PulseTimer::ttl_interrupt() {
@@ -116,12 +90,11 @@ void PulseTimer::ttl_interrupt() {
   if (has_passed(fall)) set_ttl_mode(kLow);
 }
 
-bool PulseTimer::interrupt() {
+void PulseTimer::interrupt() {
   const std::uint32_t flags = tim2().SR.read() & tim2().DIER.read();
   clear_flag(flags);
   if ((flags & kUpdate) != 0) wraps_.fetch_add(1, std::memory_order_relaxed);
   if ((flags & kCompare2) != 0) ttl_interrupt();
-  return (flags & kCompare1) != 0 && step_interrupt();
 }
 
 }  // namespace diastole::stm32

@@ -1,17 +1,18 @@
 #pragma once
-// TIM2: the clock and the edges. The 32-bit counter at 84 MHz wraps every 51 s; its overflow interrupt makes
-// 64 bits. Channel 1 makes STEP, 2 the TTL, 3 DIR: the compare unit moves the pin when the counter gets
-// there, so interrupt latency never shows on an edge.
+// The clock and the edges. TIM2 is the clock: its 32-bit counter at 84 MHz wraps every 51 s; the overflow
+// interrupt makes 64 bits. Its channel 2 makes the TTL, channel 3 DIR, and TIM5 with TIM3 make STEP
+// (step_timer.hpp): the compare unit moves the pin when the counter gets there, so interrupt latency never shows
+// on an edge.
 //
-//   STEP  ___|‾‾|_________|‾‾|___      rise: CCR1 = tick, "active on match"
-//            ^  ^                      its interrupt sets CCR1 = tick + 2 µs, "inactive on match";
-//            |  order carried out      that one's interrupt asks for the next order
-//   TTL   ___|‾‾‾‾‾‾‾‾‾‾‾‾‾|_____      same with CCR2; its rise is TIM2's TRGO and starts the R-wave
+//   STEP  ___|‾‾|_________|‾‾|___      step_timer.hpp
+//   TTL   ___|‾‾‾‾‾‾‾‾‾‾‾‾‾|_____      rise: CCR2 = tick, "active on match"; its interrupt sets CCR2 = tick + width,
+//                                      "inactive on match". The rise is TIM2's TRGO and starts the R-wave
 //   DIR   ‾‾‾‾‾‾‾‾|______________      CCR3 = tick of the next step - 5 µs, only when it changes
 
 #include <atomic>
 #include <cstdint>
 
+#include "firmware/boards/stm32f405/step_timer.hpp"
 #include "firmware/core/board.hpp"
 
 namespace diastole::stm32 {
@@ -20,20 +21,27 @@ class PulseTimer {
  public:
   void start();
   [[nodiscard]] firmware::Ticks now() const;
-  void schedule(const firmware::PulseOrder& order);
+  [[nodiscard]] std::int32_t ticks_until(std::uint32_t tick) const {
+    return firmware::ticks_between(tim2().CNT.read(), tick);
+  }
+  /// TIM5's interrupt tells when the order has been carried out.
+  void schedule(const firmware::PulseOrder& order) {
+    steps_.schedule(order.tick, order.step);
+    if (order.ttl) raise_ttl(order);
+    if (order.step && order.inflate != inflate_) set_direction(order.inflate, order.tick);
+  }
+  void rest() { steps_.rest(); }
   void cancel();
-  /// TIM2's interrupt; true if the order has been carried out.
-  bool interrupt();
+  /// TIM2's interrupt: the counter has wrapped, or the TTL is to fall.
+  void interrupt();
 
  private:
-  enum class Phase : std::uint8_t { idle, rising, falling, marker };
-
+  void raise_ttl(const firmware::PulseOrder& order);
   void set_direction(bool inflate, std::uint32_t step_tick);
-  bool step_interrupt();
   void ttl_interrupt();
 
+  StepTimer steps_;
   std::atomic<std::uint32_t> wraps_{0};
-  Phase phase_ = Phase::idle;
   bool ttl_rising_ = false;
   bool inflate_ = false;
   std::uint32_t ttl_width_ = 0;

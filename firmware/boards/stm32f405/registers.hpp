@@ -97,7 +97,9 @@ inline Gpio& gpio_a() { return at<Gpio>(0x4002'0000); }
 inline Gpio& gpio_b() { return at<Gpio>(0x4002'0400); }
 inline Gpio& gpio_c() { return at<Gpio>(0x4002'0800); }
 inline Timer& tim2() { return at<Timer>(0x4000'0000); }
+inline Timer& tim3() { return at<Timer>(0x4000'0400); }
 inline Timer& tim4() { return at<Timer>(0x4000'0800); }
+inline Timer& tim5() { return at<Timer>(0x4000'0C00); }
 inline Usart& usart3() { return at<Usart>(0x4000'4800); }
 inline Dac& dac() { return at<Dac>(0x4000'7400); }
 inline Dma& dma1() { return at<Dma>(0x4002'6000); }
@@ -109,7 +111,15 @@ inline SysTick& systick() { return at<SysTick>(0xE000'E010); }
 inline Nvic& nvic() { return at<Nvic>(0xE000'E100); }
 
 /// Interrupt numbers, RM0090 table 62.
-enum Interrupt : unsigned { kExti0 = 6, kExti1 = 7, kExti2 = 8, kDma1Stream5 = 16, kTim2 = 28, kUsart3 = 39 };
+enum Interrupt : unsigned {
+  kExti0 = 6,
+  kExti1 = 7,
+  kExti2 = 8,
+  kDma1Stream5 = 16,
+  kTim2 = 28,
+  kUsart3 = 39,
+  kTim5 = 50
+};
 
 /// Priority 0 (first) … 15; equal priorities do not interrupt each other.
 inline void enable_interrupt(Interrupt number, std::uint8_t priority) {

@@ -7,6 +7,7 @@ namespace diastole::stm32 {
 
 namespace {
 constexpr std::uint32_t kOverrun = 1U << 3, kReceived = 1U << 5, kTransmitEmpty = 1U << 7;
+constexpr std::uint8_t kFrameEnd = 0;  ///< protocol/wire/frame.hpp
 constexpr std::uint32_t kReceiveInterrupt = 1U << 5, kTransmitInterrupt = 1U << 7;
 }  // namespace
 
@@ -31,13 +32,19 @@ void SerialPort::write(std::span<const std::uint8_t> bytes) {
   usart3().CR1.set(kTransmitInterrupt);
 }
 
-void SerialPort::interrupt() {
+bool SerialPort::interrupt() {
   const std::uint32_t status = usart3().SR.read();
+  bool frame_ends = false;
   if ((status & (kReceived | kOverrun)) != 0) {
-    const std::uint32_t data = usart3().DR.read();
-    if ((status & kReceived) != 0) received_.push(static_cast<std::uint8_t>(data));
+    const auto byte = static_cast<std::uint8_t>(usart3().DR.read());
+    if ((status & kReceived) != 0) received_.push(byte);
+    frame_ends = byte == kFrameEnd;
   }
-  if ((status & kTransmitEmpty) == 0) return;
+  if ((status & kTransmitEmpty) != 0) send_next();
+  return frame_ends;
+}
+
+void SerialPort::send_next() {
   if (const std::uint8_t* byte = sending_.front()) {
     usart3().DR.write(*byte);
     sending_.pop();

@@ -10,6 +10,7 @@ extern void (*const __init_array_end[])();
 
 int main();
 void TIM2_IRQHandler();
+void TIM5_IRQHandler();
 void USART3_IRQHandler();
 void DMA1_Stream5_IRQHandler();
 void EXTI_IRQHandler();
@@ -74,6 +75,7 @@ constexpr VectorTable make_vectors() {
   table.handlers[of_interrupt(16)] = DMA1_Stream5_IRQHandler;
   table.handlers[of_interrupt(28)] = TIM2_IRQHandler;
   table.handlers[of_interrupt(39)] = USART3_IRQHandler;
+  table.handlers[of_interrupt(50)] = TIM5_IRQHandler;
   return table;
 }
 

@@ -15,7 +15,7 @@ namespace {
 /// The number behind the FAULT pin, at 0x20000000 (stm32f405.ld) for whoever looks from outside.
 [[gnu::section(".shown"), gnu::used]] volatile std::uint8_t shown_fault;
 
-/// Wakes the main loop every millisecond.
+/// A turn of the main loop is due every millisecond.
 void start_systick() {
   systick().LOAD.write(kCore_Hz / 1000 - 1);
   systick().VAL.write(0);
@@ -38,14 +38,11 @@ void Stm32Board::start() {
   start_watchdog();
 }
 
-void Stm32Board::schedule(const firmware::PulseOrder& order) {
-  if (order.ttl) {
-    if (order.r_wave)
-      r_wave_.arm();
-    else
-      r_wave_.disarm();
-  }
-  timer_.schedule(order);
+void Stm32Board::prepare_r_wave(bool play) {
+  if (play)
+    r_wave_.arm();
+  else
+    r_wave_.disarm();
 }
 
 void Stm32Board::cancel_pulses() {
@@ -69,6 +66,17 @@ firmware::Inputs Stm32Board::inputs() const {
 
 void Stm32Board::feed_watchdog() { iwdg().KR.write(0xAAAA); }
 
-void Stm32Board::input_interrupt() { exti().PR.write(kEstopPin | kHomePin | kFarLimitPin); }
+/// An interrupt that comes between the question and the sleep ends the sleep, although it is served after it.
+void Stm32Board::sleep() {
+  while (!turn_due_.exchange(false, std::memory_order_relaxed)) {
+    const InterruptLock lock(*this);
+    if (!turn_due_.load(std::memory_order_relaxed)) asm volatile("wfi" ::: "memory");
+  }
+}
+
+void Stm32Board::input_interrupt() {
+  exti().PR.write(kEstopPin | kHomePin | kFarLimitPin);
+  turn_due_ = true;
+}
 
 }  // namespace diastole::stm32

@@ -1,9 +1,13 @@
 #pragma once
 // The STM32F405 as the core's Board (firmware/core/board.hpp).
 //
-// Interrupts: the timer and the inputs share priority 1 and so never interrupt each other; the serial port
+// Interrupts: the timers and the inputs share priority 1 and so never interrupt each other; the serial port
 // has 2, the R-wave's end 3. InterruptLock masks all of them.
+//
+// The main loop sleeps between two turns. A turn is due every millisecond, when a frame has come in, and when an
+// input has changed; a step alone does not cost one.
 
+#include <atomic>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -37,7 +41,12 @@ class Stm32Board {
   void start();
 
   [[nodiscard]] firmware::Ticks now() const { return timer_.now(); }
-  void schedule(const firmware::PulseOrder& order);
+  [[nodiscard]] std::int32_t ticks_until(std::uint32_t tick) const { return timer_.ticks_until(tick); }
+  void schedule(const firmware::PulseOrder& order) {
+    if (order.ttl) prepare_r_wave(order.r_wave);
+    timer_.schedule(order);
+  }
+  void rest() { timer_.rest(); }
   void cancel_pulses();
   void set_motor_enabled(bool enabled);
   void show_fault(std::uint8_t number);
@@ -49,18 +58,27 @@ class Stm32Board {
   void feed_watchdog();
   SettingsFlash& settings_flash() { return settings_flash_; }
 
+  /// Main loop: until a turn is due.
+  void sleep();
+
   // Interrupt handlers.
-  bool timer_interrupt() { return timer_.interrupt(); }
-  void serial_interrupt() { serial_.interrupt(); }
+  void timer_interrupt() { timer_.interrupt(); }
+  void serial_interrupt() {
+    if (serial_.interrupt()) turn_due_ = true;
+  }
   void r_wave_interrupt() { r_wave_.interrupt(); }
   void input_interrupt();
+  void millisecond_interrupt() { turn_due_ = true; }
 
  private:
+  void prepare_r_wave(bool play);
+
   PulseTimer timer_;
   RWavePlayer r_wave_;
   SerialPort serial_;
   SettingsFlash settings_flash_;
   firmware::Identity identity_;
+  std::atomic<bool> turn_due_{false};
 };
 
 }  // namespace diastole::stm32

@@ -102,7 +102,7 @@ TEST(Core, StackUseAndInterruptCostsAreMeasured) {
   EXPECT_GE(found.stack_used_bytes, 32U);
   EXPECT_LT(found.stack_used_bytes, 200U);
   ASSERT_EQ(found.interrupts.size(), 1U);
-  EXPECT_EQ(found.interrupts[0].irq, 28U);
+  EXPECT_EQ(found.interrupts[0].irq, 29U);
   EXPECT_GT(found.interrupts[0].count, 1000U);
   EXPECT_GE(found.interrupts[0].worst_instructions, 8U);
   EXPECT_LT(found.interrupts[0].worst_instructions, 20U);

@@ -15,7 +15,7 @@ using ::testing::ElementsAre;
 using ::testing::IsEmpty;
 using ::testing::Pair;
 
-constexpr SimBoard::Pin pa0{0, 0}, pa1{0, 1}, pb0{1, 0};
+constexpr SimBoard::Pin pa6{0, 6}, pa1{0, 1}, pb0{1, 0};
 
 TEST(Peripherals, PllLocksAndTheClockTreeIsTrue) {
   BOARD_WITH(board, "pll");
@@ -33,7 +33,7 @@ TEST(Peripherals, PllLocksAndTheClockTreeIsTrue) {
 
 void expect_exact_steps(SimBoard& board, uint64_t until_ns) {
   board.advance_to(until_ns);
-  const auto edges = of_pin(board.take_pin_events(), pa0);
+  const auto edges = of_pin(board.take_pin_events(), pa6);
   ASSERT_GT(edges.size(), 1000U);
   for (std::size_t i = 1; i < edges.size(); ++i) {
     ASSERT_EQ(edges[i].cycle - edges[i - 1].cycle, 2U * 84'000'000 / 60'000) << "edge " << i;

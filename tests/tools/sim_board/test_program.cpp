@@ -61,8 +61,8 @@ TEST_F(Program, WritesThePinTraceAndTheReport) {
   ASSERT_EQ(outcome.code, 0) << outcome.err;
   const auto report = nlohmann::json::parse(outcome.out);
   EXPECT_NEAR(report.at("simulated_seconds").get<double>(), 0.1, 1e-5);
-  EXPECT_NEAR(report.at("steps").get<double>(), 2951, 2);
-  EXPECT_EQ(report.at("interrupts").at(0).at("name"), "IRQ 28");
+  EXPECT_NEAR(report.at("steps").get<double>(), 2970, 2);
+  EXPECT_EQ(report.at("interrupts").at(0).at("name"), "IRQ 29");
   EXPECT_EQ(report.at("images").at(0).at("static_ram_bytes"), 256);
 
   std::istringstream trace(contents(file("pins.csv")));

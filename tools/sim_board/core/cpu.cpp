@@ -252,7 +252,9 @@ void Cpu::idle(Cycles limit) {
       asleep_ = false;
       return;
     }
-    clock.set_now(std::max(clock.now(), std::min(limit, parts_.scheduler.next())));
+    const Cycles until = std::max(clock.now(), std::min(limit, parts_.scheduler.next()));
+    if (asleep_) asleep_cycles_ += until - clock.now();
+    clock.set_now(until);
     parts_.scheduler.run_until(clock.now());
   }
 }

@@ -370,10 +370,11 @@ void Timer::write_compare(uint32_t channel, uint32_t value) {
   held.compare = value;
   const uint32_t mode = output_mode(channel);
   if (mode >= pwm1) return apply_forced_modes(clock_.now());
-  const bool armed = mode == active_on_match || mode == inactive_on_match || mode == toggle;
+  const bool moves_pin = (mode == active_on_match || mode == inactive_on_match || mode == toggle) &&
+                         (ccer_ >> (4 * channel) & 1) != 0;
+  const bool triggers = channel == 0 && trigger_mode() == on_compare_pulse;
   const uint32_t late = (count_ - value) & width_mask();
-  if (armed && counting() && wiring_.missed && (ccer_ >> (4 * channel) & 1) != 0 &&
-      late <= width_mask() / 2) {
+  if ((moves_pin || triggers) && counting() && wiring_.missed && late <= width_mask() / 2) {
     wiring_.missed(static_cast<uint8_t>(channel + 1), late * cycles_per_count());
   }
 }

@@ -19,7 +19,7 @@ extern struct Port {
 } gpioa, gpiob;
 extern struct Tim {
   volatile uint32_t cr1, cr2, smcr, dier, sr, egr, ccmr1, ccmr2, ccer, cnt, psc, arr, rcr, ccr[4];
-} tim2, tim6;
+} tim2, tim3, tim6;
 extern struct Usart { volatile uint32_t sr, dr, brr, cr1; } usart1;
 extern struct Dac { volatile uint32_t cr, swtrigr, dhr12r1; } dac;
 extern struct Iwdg { volatile uint32_t kr, pr, rlr; } iwdg;

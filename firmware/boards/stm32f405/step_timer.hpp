@@ -1,0 +1,48 @@
+#pragma once
+// STEP: one interrupt a step, no software in the pulse. TIM5 counts in step with TIM2, the clock. Its compare
+// event triggers TIM3 (internal trigger ITR2), which makes one pulse and stops: RM0090 18.3.10 (one-pulse mode),
+// 18.3.15 (timer synchronization), table 97.
+//
+//   TIM5  ------ CCR1 ----------------------- CCR1 --     its interrupt asks for the next order at once:
+//                  |'-> interrupt               |         the pulse needs nobody
+//   TIM3         ..0 1 ... 168 0              ..0 1 ...   starts at the trigger, stops at its reload
+//   STEP  _________|‾‾‾‾‾‾‾‾‾‾|_________________|‾‾‾‾     PWM mode 2: high from count 1 on
+//
+// TIM3 is high one tick after the compare event, hence CCR1 = tick - 1. The chip's synchronisers may add one or two
+// ticks, always the same, to every edge of STEP.
+
+#include <cstdint>
+
+#include "firmware/boards/stm32f405/registers.hpp"
+#include "firmware/core/board.hpp"
+
+namespace diastole::stm32 {
+
+class StepTimer {
+ public:
+  /// TIM5 begins to count when TIM2 does: call before TIM2 is started.
+  void start();
+  /// TIM2 counts: from here on TIM5 needs it no more.
+  void let_go() { tim5().SMCR.write(0); }
+
+  /// Compare event at `tick`, with a pulse on STEP or without.
+  void schedule(std::uint32_t tick, bool step) {
+    tim5().SR.write(~kCompare);
+    tim5().CCR1.write(tick - kPulseDelay);
+    tim3().SMCR.write(step ? kStartedByTim5 : 0);
+    tim5().DIER.write(kCompare);
+  }
+  /// No compare event has a consequence; a pulse that has begun ends in time.
+  void rest() {
+    tim3().SMCR.write(0);
+    tim5().DIER.write(0);
+    tim5().SR.write(~kCompare);
+  }
+
+ private:
+  static constexpr std::uint32_t kPulseDelay = 1;
+  static constexpr std::uint32_t kCompare = 1U << 1;
+  static constexpr std::uint32_t kStartedByTim5 = 2U << 4 | 6U;  ///< TS = ITR2, SMS = trigger mode
+};
+
+}  // namespace diastole::stm32
