@@ -125,6 +125,8 @@ class Dispatch {
   void handle(const wire::Configure& request) { conclude(request, motion_.configure(request)); }
   void handle(const wire::ClearProgram& request) { conclude(request, motion_.clear_program()); }
   void handle(const wire::AddSegment& request) { conclude(request, motion_.add_segment(request)); }
+  void handle(const wire::UploadWaveform& request) { conclude(request, motion_.upload(request)); }
+  void handle(const wire::WaveformPoints& request) { conclude(request, motion_.upload(request)); }
   void handle(const wire::Arm& request) { conclude(request, motion_.arm(request)); }
   void handle(const wire::Home& request) { conclude(request, motion_.home(request.lease_id)); }
   void handle(const wire::Start& request) { conclude(request, motion_.start(request.lease_id)); }

@@ -37,6 +37,8 @@ class Motion {
   void use(const wire::MachineSettings& machine, bool written);
   wire::Refusal clear_program();
   wire::Refusal add_segment(const wire::AddSegment& add);
+  wire::Refusal upload(const wire::UploadWaveform& upload);
+  wire::Refusal upload(const wire::WaveformPoints& points);
   /// Checks the program; its segments are reported in the following turns; PlanRefusal{none} if it is
   /// accepted.
   PlanRefusal arm(const wire::Arm& arm);
@@ -74,6 +76,7 @@ class Motion {
 
   /// An interrupt has cut the motion off and the main loop has not latched the fault yet.
   [[nodiscard]] bool fault_pending() const { return tripped_ != wire::Fault::none; }
+  [[nodiscard]] wire::Refusal program_open() const;
   void become(wire::State to);
   void latch(wire::Fault fault);
   void trip(wire::Fault fault);
@@ -94,6 +97,7 @@ class Motion {
   Outbox& outbox_;
   StepEngine<B> engine_;
   Planner planner_;
+  WaveformStore waveforms_;
   Program program_;
   wire::MachineSettings machine_;
   bool machine_written_ = false;

@@ -30,18 +30,43 @@ template <Board B>
 wire::Refusal Motion<B>::clear_program() {
   if (!safety_.at_rest()) return wire::Refusal::wrong_state;
   program_.size = 0;
+  waveforms_.clear();
   if (safety_.state() == wire::State::armed) become(wire::State::homed);
+  return wire::Refusal::none;
+}
+
+/// Whether the program may be added to.
+template <Board B>
+wire::Refusal Motion<B>::program_open() const {
+  if (!configured_) return wire::Refusal::not_configured;
+  if (!safety_.at_rest() || safety_.state() == wire::State::armed) return wire::Refusal::wrong_state;
   return wire::Refusal::none;
 }
 
 template <Board B>
 wire::Refusal Motion<B>::add_segment(const wire::AddSegment& add) {
-  if (!configured_) return wire::Refusal::not_configured;
-  if (!safety_.at_rest() || safety_.state() == wire::State::armed) return wire::Refusal::wrong_state;
+  if (const wire::Refusal closed = program_open(); closed != wire::Refusal::none) return closed;
   if (program_.size == Program::kMaxSegments) return wire::Refusal::program_full;
-  program_.segments[program_.size++] = {add.waveform, add.cycles, add.stroke_nL, add.offset_nL,
-                                        add.period_us};
+  const UploadedWaveform* uploaded = nullptr;
+  if (add.waveform == wire::Waveform::uploaded) {
+    uploaded = waveforms_.find(add.upload);
+    if (uploaded == nullptr) return wire::Refusal::waveform_missing;
+  }
+  program_.segments[program_.size++] = {add.waveform,  add.cycles,    add.stroke_nL,
+                                        add.offset_nL, add.period_us, uploaded};
   return wire::Refusal::none;
+}
+
+template <Board B>
+wire::Refusal Motion<B>::upload(const wire::UploadWaveform& upload) {
+  if (const wire::Refusal closed = program_open(); closed != wire::Refusal::none) return closed;
+  return waveforms_.begin(upload.waveform, upload.points, upload.crc);
+}
+
+template <Board B>
+wire::Refusal Motion<B>::upload(const wire::WaveformPoints& points) {
+  if (const wire::Refusal closed = program_open(); closed != wire::Refusal::none) return closed;
+  return waveforms_.append(points.first, std::span(points.rise).first(points.count));
 }
 
 template <Board B>

@@ -17,6 +17,18 @@ std::uint64_t stopping_us(std::uint64_t flow_uL_per_s, const Settings& settings)
                    std::max<std::uint64_t>(settings.allowed_acceleration_uL_per_s2(), 1));
 }
 
+struct NormalisedPeaks {
+  std::uint32_t speed_millionths;
+  std::uint32_t acceleration_millionths;
+};
+
+NormalisedPeaks normalised_peaks(const Segment& segment) {
+  if (segment.uploaded != nullptr)
+    return {segment.uploaded->peak_speed_millionths, segment.uploaded->peak_acceleration_millionths};
+  const Profile& profile = *find_profile(segment.waveform);
+  return {profile.peak_speed_millionths, profile.peak_acceleration_millionths};
+}
+
 }  // namespace
 
 PlanRefusal check_configuration(const wire::Configure& configure, const wire::MachineSettings& machine) {
@@ -40,19 +52,19 @@ PlanRefusal check_configuration(const wire::Configure& configure, const wire::Ma
 }
 
 SegmentPeaks segment_peaks(const Segment& segment, const Settings& settings) {
-  const Profile& profile = *find_profile(segment.waveform);
+  const auto [peak_speed_millionths, peak_acceleration_millionths] = normalised_peaks(segment);
   const wire::Configure& limits = settings.limits();
   const std::uint64_t stroke_nL = segment.stroke_nL;
   const std::uint64_t period_us = segment.period_us;
   SegmentPeaks peaks;
-  peaks.flow_uL_per_s = divide_up(stroke_nL * profile.peak_speed_millionths, period_us * 1000);
+  peaks.flow_uL_per_s = divide_up(stroke_nL * peak_speed_millionths, period_us * 1000);
   peaks.acceleration_uL_per_s2 =
-      divide_up(divide_up(stroke_nL * profile.peak_acceleration_millionths, period_us) * 1000, period_us);
+      divide_up(divide_up(stroke_nL * peak_acceleration_millionths, period_us) * 1000, period_us);
   peaks.step_rate_Hz = divide_up(peaks.flow_uL_per_s * 1'000'000, limits.microstep_pL);
   peaks.pressure_Pa =
       divide_up(divide_up(peaks.acceleration_uL_per_s2 * limits.inertance_kg_per_m4, 1'000'000), 1000);
   peaks.stopping_us = stopping_us(peaks.flow_uL_per_s, settings);
-  if (profile.moves()) peaks.cycle_steps = settings.steps_of_nL(segment.stroke_nL);
+  if (segment.moves()) peaks.cycle_steps = settings.steps_of_nL(segment.stroke_nL);
   return peaks;
 }
 
@@ -81,7 +93,7 @@ Check check_segment(const Segment& segment, const Program& program, const Settin
   };
   for (const Check& check : at_most)
     if (check.asked > check.allowed) return check;
-  if (find_profile(segment.waveform)->moves() && peaks.cycle_steps.count == 0)
+  if (segment.moves() && peaks.cycle_steps.count == 0)
     return {wire::Limit::stroke_at_least, segment.stroke_nL, divide_up(limits.microstep_pL, 1000)};
   if (r_wave_spacing_us <= kRWave_us) return {wire::Limit::r_wave_spacing, r_wave_spacing_us, kRWave_us + 1};
   return {wire::Limit::none, 0, 0};
@@ -95,8 +107,11 @@ wire::Result<Ticks, PlanRefusal> check_program(const Program& program, const Set
   for (std::size_t i = 0; i < program.size; ++i) {
     const Segment& segment = program.segments[i];
     const auto index = static_cast<std::uint16_t>(i);
-    if (find_profile(segment.waveform) == nullptr)
-      return PlanRefusal{.refusal = wire::Refusal::unknown_waveform, .segment = index};
+    if (segment.uploaded == nullptr && find_profile(segment.waveform) == nullptr)
+      return PlanRefusal{.refusal = segment.waveform == wire::Waveform::uploaded
+                                        ? wire::Refusal::waveform_missing
+                                        : wire::Refusal::unknown_waveform,
+                         .segment = index};
     const Check check = check_segment(segment, program, settings);
     if (check.limit != wire::Limit::none)
       return PlanRefusal{wire::Refusal::limit_exceeded, check.limit, index,

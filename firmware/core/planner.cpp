@@ -12,7 +12,7 @@ Ticks at_phase(Ticks length, Q64 phase) {
 
 /// Where the cycles of a segment begin: at its least volume.
 Steps beginning_of(const Segment& segment, const Settings& settings) {
-  const std::uint32_t above_nL = find_profile(segment.waveform)->moves() ? 0 : segment.stroke_nL;
+  const std::uint32_t above_nL = segment.moves() ? 0 : segment.stroke_nL;
   return settings.steps_of_nL(std::uint64_t{segment.offset_nL} + above_nL);
 }
 
@@ -99,9 +99,12 @@ void Planner::end_steps(Ticks duration) {
 void Planner::begin_segment() {
   const Segment& segment = program_->segments[segment_];
   profile_ = find_profile(segment.waveform);
-  count_ = profile_->moves() ? static_cast<std::uint32_t>(settings_.steps_of_nL(segment.stroke_nL).count) : 0;
+  count_ = segment.moves() ? static_cast<std::uint32_t>(settings_.steps_of_nL(segment.stroke_nL).count) : 0;
   length_ = microseconds(segment.period_us);
-  if (count_ > 0) level_ = SteppedFraction(1, 2 * count_);
+  if (segment.uploaded != nullptr)
+    crossings_ = UploadedCrossings(*segment.uploaded, count_);
+  else if (count_ > 0)
+    level_ = SteppedFraction(1, 2 * count_);
   cycle_ = index_ = 0;
   phase_ = Phase::cycles;
 }
@@ -142,6 +145,19 @@ MotionEvent Planner::cycle_step() {
     level_.down();
   if (index_ == 2 * count_) {
     event.flags |= MotionEvent::kCycleEnd;
+    finish_cycle();
+  }
+  return event;
+}
+
+MotionEvent Planner::uploaded_step() {
+  const UploadedCrossings::Crossing crossing = crossings_.take();
+  MotionEvent event{origin_ + at_phase(length_, crossing.phase), MotionEvent::kStep};
+  if (crossing.rising) event.flags |= MotionEvent::kInflate;
+  if (index_++ == 0) event.flags |= cycle_start_flags();
+  if (crossings_.at_end()) {
+    event.flags |= MotionEvent::kCycleEnd;
+    crossings_.restart();
     finish_cycle();
   }
   return event;
@@ -210,7 +226,7 @@ void Planner::plan_in_phase() {
       break;
     case Phase::cycles:
       if (count_ > 0)
-        next_ = cycle_step();
+        next_ = profile_ != nullptr ? cycle_step() : uploaded_step();
       else if (stop_at_cycle_end_ && index_ == 0)
         begin_ramp(Steps{0}, Phase::end);
       else

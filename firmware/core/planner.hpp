@@ -7,7 +7,8 @@
 // Cycle c of a segment that starts at s begins at s + c T exactly. Its stroke is N whole microsteps, and the
 // step from level k to k + 1 is made when the ideal motion crosses the level half way between,
 // y = (2k + 1) / 2N, rounded to a tick; so the position is the ideal one rounded to a microstep, and N steps
-// up are followed by N steps down: nothing drifts. Ramps are rising halves of the parabolic profile. A segment
+// up are followed by N steps down: nothing drifts. An uploaded waveform may turn more often; what it crosses and
+// when is for UploadedCrossings to say. Ramps are rising halves of the parabolic profile. A segment
 // that holds is approached by a ramp to offset + stroke; its cycles have no steps, but begin and trigger.
 
 #include <cstdint>
@@ -17,6 +18,7 @@
 #include "firmware/core/program.hpp"
 #include "firmware/core/stepped_fraction.hpp"
 #include "firmware/core/units.hpp"
+#include "firmware/core/uploaded/crossings.hpp"
 
 namespace diastole::firmware {
 
@@ -77,6 +79,7 @@ class Planner {
   void begin_ramp(Steps to, Phase then);
   MotionEvent ramp_step();
   MotionEvent cycle_step();
+  MotionEvent uploaded_step();
   MotionEvent still_cycle_mark();
   [[nodiscard]] std::uint16_t cycle_start_flags() const;
   MotionEvent travel_step();
@@ -94,8 +97,9 @@ class Planner {
   std::uint32_t count_ = 0;  ///< steps of the present ramp, half cycle, travel or stop
   SteppedFraction level_;    ///< y of the next step of the present ramp, cycle or stop
   bool inflate_ = false;
-  Ticks length_;  ///< of the ramp, cycle or stop; interval of travel
-  const Profile* profile_ = nullptr;
+  Ticks length_;                      ///< of the ramp, cycle or stop; interval of travel
+  const Profile* profile_ = nullptr;  ///< null: the segment's waveform was uploaded
+  UploadedCrossings crossings_;       ///< of that one
   std::size_t segment_ = 0;
   std::uint32_t cycle_ = 0;  ///< in the segment
   std::uint64_t cycle_in_run_ = 0;

@@ -5,7 +5,9 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "firmware/core/profiles/profile.hpp"
 #include "firmware/core/units.hpp"
+#include "firmware/core/uploaded/waveform_store.hpp"
 #include "protocol/wire/program_messages.hpp"
 
 namespace diastole::firmware {
@@ -16,6 +18,10 @@ struct Segment {
   std::uint32_t stroke_nL = 0;
   std::uint32_t offset_nL = 0;
   std::uint32_t period_us = 0;
+  const UploadedWaveform* uploaded = nullptr;  ///< of Waveform::uploaded
+
+  /// Precondition: check_program accepted it.
+  [[nodiscard]] bool moves() const { return uploaded != nullptr || find_profile(waveform)->moves(); }
 };
 
 struct Program {

@@ -17,7 +17,7 @@ enum class Refusal : std::uint8_t {
 #include "protocol/wire/refusal_list.inc"
 };
 #undef DIASTOLE_REFUSAL
-inline constexpr Refusal kLastRefusal = Refusal::home_switch_closed;
+inline constexpr Refusal kLastRefusal = Refusal::waveforms_full;
 
 #define DIASTOLE_LIMIT(number, name, unit) name = number,
 enum class Limit : std::uint8_t {

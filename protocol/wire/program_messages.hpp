@@ -1,6 +1,8 @@
 #pragma once
 // What is to be run and within which limits. The whole program lies on the controller before motion begins.
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
 
 #include "protocol/wire/message_type.hpp"
@@ -69,7 +71,7 @@ struct Configure {
   }
 };
 
-// Host → controller: forgets all segments; armed becomes homed.
+// Host → controller: forgets all segments and uploaded waveforms; armed becomes homed.
 //
 //   offset size field
 //        0    2 request_id                   chosen by the host; the answer repeats it
@@ -100,8 +102,9 @@ struct ClearProgram {
 //        7    4 stroke_nL
 //       11    4 offset_nL                    least volume of the cycle, from home (a hold: plus stroke)
 //       15    4 period_us
+//       19    1 upload                       number of the UploadWaveform, if waveform is uploaded
 //
-// Example AddSegment: 03 00 00 0A 00 00 00 00 5A 62 02 00 00 00 00 80 4F 12 00
+// Example AddSegment: 03 00 00 0A 00 00 00 00 5A 62 02 00 00 00 00 80 4F 12 00 00
 struct AddSegment {
   static constexpr MessageType kType = MessageType::AddSegment;
   std::uint16_t request_id = 0;
@@ -110,6 +113,7 @@ struct AddSegment {
   std::uint32_t stroke_nL = 0;
   std::uint32_t offset_nL = 0;
   std::uint32_t period_us = 1'000U;
+  std::uint8_t upload = 0U;
 
   template <class Self, class Visitor>
   static constexpr void layout([[maybe_unused]] Self& self, [[maybe_unused]] Visitor& visit) {
@@ -119,6 +123,7 @@ struct AddSegment {
     visit.field("stroke_nL", self.stroke_nL);
     visit.field("offset_nL", self.offset_nL);
     visit.field("period_us", self.period_us, 1'000U, 600'000'000U);
+    visit.field("upload", self.upload);
   }
   static constexpr AddSegment example() {
     AddSegment message;
@@ -128,6 +133,79 @@ struct AddSegment {
     message.stroke_nL = 40'000'000;
     message.offset_nL = 0;
     message.period_us = 1'200'000;
+    return message;
+  }
+};
+
+// Host → controller: a waveform of the host's own follows in lots of WaveformPoints. It has `points` points at
+// even phases, the first at phase 0, and is carried by the rises from each point to the next, the last one back
+// to the first. Waveforms are numbered from 0 in the order of their upload; ClearProgram forgets them.
+//
+//   offset size field
+//        0    2 request_id                   chosen by the host; the answer repeats it
+//        2    1 waveform                     number: as many as have been uploaded before
+//        3    2 points                       a cycle
+//        5    4 crc                          CRC-32 of all rises, as they stand in WaveformPoints
+//
+// Example UploadWaveform: 08 00 00 04 00 1E 1D EB 54
+struct UploadWaveform {
+  static constexpr MessageType kType = MessageType::UploadWaveform;
+  std::uint16_t request_id = 0;
+  std::uint8_t waveform = 0U;
+  std::uint16_t points = 2U;
+  std::uint32_t crc = 0;
+
+  template <class Self, class Visitor>
+  static constexpr void layout([[maybe_unused]] Self& self, [[maybe_unused]] Visitor& visit) {
+    visit.field("request_id", self.request_id);
+    visit.field("waveform", self.waveform);
+    visit.field("points", self.points, std::uint16_t{2}, std::uint16_t{4096});
+    visit.field("crc", self.crc);
+  }
+  static constexpr UploadWaveform example() {
+    UploadWaveform message;
+    message.request_id = 8;
+    message.waveform = 0;
+    message.points = 4;
+    message.crc = 0x54EB1D1E;
+    return message;
+  }
+};
+
+// Host → controller: rises of the waveform that is being uploaded, in units of which the stroke has as many as
+// the greatest sum of rises. With the last lot the whole is checked: the checksum, that it begins at its least
+// volume and closes. A refusal drops the waveform.
+//
+//   offset size field
+//        0    2 request_id                   chosen by the host; the answer repeats it
+//        2    2 first                        number of the first of them, from 0
+//        4    1 count
+//        5   2n rise                         signed
+//
+// Example WaveformPoints: 09 00 00 00 04 00 40 FF 3F 01 C0 00 C0
+struct WaveformPoints {
+  static constexpr MessageType kType = MessageType::WaveformPoints;
+  static constexpr std::size_t kMaxCount = 100;
+  std::uint16_t request_id = 0;
+  std::uint16_t first = 0;
+  std::uint8_t count = 0U;
+  std::array<std::int16_t, kMaxCount> rise{};
+
+  template <class Self, class Visitor>
+  static constexpr void layout([[maybe_unused]] Self& self, [[maybe_unused]] Visitor& visit) {
+    visit.field("request_id", self.request_id);
+    visit.field("first", self.first);
+    visit.list("rise", self.count, self.rise);
+  }
+  static constexpr WaveformPoints example() {
+    WaveformPoints message;
+    message.request_id = 9;
+    message.first = 0;
+    message.count = 4;
+    message.rise[0] = 16'384;
+    message.rise[1] = 16'383;
+    message.rise[2] = -16'383;
+    message.rise[3] = -16'384;
     return message;
   }
 };

@@ -8,6 +8,8 @@
 #include <numbers>
 #include <string>
 
+#include "tests/firmware/uploaded_waveform.hpp"
+
 namespace diastole::firmware {
 
 using Real = long double;
@@ -47,6 +49,13 @@ inline AnalyticProfile even_flanks(Real up_length, Real down_length, Real down, 
           [=](Real y) { return bisect(volume, down, down - down_length, y); }};
 }
 
+/// Its greatest volume is that of point 29.
+inline AnalyticProfile uploaded_heart() {
+  const auto volume = [](Real phase) { return uploaded_volume(kHeartRises, phase); };
+  return {volume, [=](Real y) { return bisect(volume, 0, 29.0L / 48, y); },
+          [=](Real y) { return bisect(volume, 1, 29.0L / 48, y); }};
+}
+
 inline const std::map<std::string, AnalyticProfile>& analytic_profiles() {
   static const std::map<std::string, AnalyticProfile> kProfiles = [] {
     const auto parabolic = [](Real y) {
@@ -64,6 +73,7 @@ inline const std::map<std::string, AnalyticProfile>& analytic_profiles() {
         {"trapezoidal", even_flanks(0.25L, 0.25L, 0.75L, 0.05L)},
         {"sawtooth", even_flanks(0.75L, 0.25L, 1, 0.04L)},
         {"reversed_sawtooth", even_flanks(0.25L, 0.75L, 1, 0.04L)},
+        {"uploaded", uploaded_heart()},
     };
   }();
   return kProfiles;

@@ -1,5 +1,7 @@
 #include "tests/firmware/bench.hpp"
 
+#include "tests/firmware/uploads.hpp"
+
 namespace diastole::firmware {
 
 void Bench::hear(const wire::Received& received) {
@@ -95,8 +97,15 @@ void Bench::prepare(const wire::Configure& configure) {
 }
 
 void Bench::add_segment(wire::Waveform waveform, std::uint32_t cycles, std::uint32_t stroke_nL,
-                        std::uint32_t period_us, std::uint32_t offset_nL) {
-  ask(wire::AddSegment{0, waveform, cycles, stroke_nL, offset_nL, period_us});
+                        std::uint32_t period_us, std::uint32_t offset_nL, std::uint8_t upload) {
+  ask(wire::AddSegment{0, waveform, cycles, stroke_nL, offset_nL, period_us, upload});
+}
+
+bool Bench::upload(std::uint8_t number, std::span<const std::int16_t> rises) {
+  if (!ask(upload_of(number, rises))) return false;
+  for (std::size_t first = 0; first < rises.size(); first += wire::WaveformPoints::kMaxCount)
+    if (!ask(lot_of(rises, first))) return false;
+  return true;
 }
 
 void Bench::run_program(wire::Arm arm, Ticks most) {

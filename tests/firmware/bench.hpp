@@ -68,7 +68,9 @@ class Bench {
     return heard.acks.size() > acks;
   }
   void add_segment(wire::Waveform waveform, std::uint32_t cycles, std::uint32_t stroke_nL,
-                   std::uint32_t period_us, std::uint32_t offset_nL = 0);
+                   std::uint32_t period_us, std::uint32_t offset_nL = 0, std::uint8_t upload = 0);
+  /// Uploads a waveform in lots; true if every one was accepted.
+  bool upload(std::uint8_t number, std::span<const std::int16_t> rises);
   /// Arms, starts, and runs until RunEnded or `most`.
   void run_program(wire::Arm arm = wire::Arm::example(), Ticks most = microseconds(600'000'000));
 

@@ -98,11 +98,11 @@ TEST(PlanCheck, AHoldMayHaveAnyStrokeWithinTheTravel) {
 TEST(PlanCheck, EveryProfileIsHeldToItsOwnPeaks) {
   for (const NamedProfile& named : every_moving_profile()) {
     SCOPED_TRACE(named.name);
-    const Segment segment{named.waveform, 10, 20'000'000, 0, 1'200'000};
+    const Segment segment = named.segment(10, 20'000'000, 0, 1'200'000);
     wire::Configure configure = wire::Configure::example();
     const SegmentPeaks peaks = segment_peaks(segment, Settings(configure));
-    EXPECT_NEAR(static_cast<double>(peaks.acceleration_uL_per_s2),
-                1e-6 * named.profile->peak_acceleration_millionths * 20'000 / 1.44, 2);
+    EXPECT_NEAR(static_cast<double>(peaks.acceleration_uL_per_s2), named.peak_acceleration() * 20'000 / 1.44,
+                2);
     configure.acceleration_uL_per_s2 = static_cast<std::uint32_t>(peaks.acceleration_uL_per_s2 - 1);
     EXPECT_EQ(refusal_of(segment, configure).limit, Limit::acceleration);
     configure = wire::Configure::example();
@@ -137,12 +137,12 @@ TEST(PlanCheck, TheOffendingSegmentIsNamed) {
   EXPECT_EQ(checked.error().limit, Limit::acceleration);
 }
 
-TEST(PlanCheck, EmptyProgramAndUnknownWaveform) {
+TEST(PlanCheck, EmptyProgramAndMissingWaveform) {
   EXPECT_EQ(check_program(Program{}, Settings(wire::Configure::example())).error().refusal,
             Refusal::no_program);
   Segment uploaded = kPaper;
   uploaded.waveform = Waveform::uploaded;
-  EXPECT_EQ(refusal_of(uploaded).refusal, Refusal::unknown_waveform);
+  EXPECT_EQ(refusal_of(uploaded).refusal, Refusal::waveform_missing);
 }
 
 }  // namespace

@@ -51,7 +51,7 @@ AnalyticProfile reference(const NamedProfile& named) {
 
 void expect_analytic_steps(const NamedProfile& named, std::uint32_t stroke_nL, std::uint32_t period_us) {
   const AnalyticProfile analytic = reference(named);
-  const Program program = program_of({{named.waveform, 2, stroke_nL, 0, period_us}});
+  const Program program = program_of({named.segment(2, stroke_nL, 0, period_us)});
   const std::int32_t count = kSettings.steps_of_nL(stroke_nL).count;
   const Real period = microseconds(period_us).count;
   const std::int64_t first_cycle = 1'000'000 + microseconds(500'000).count;
@@ -127,10 +127,10 @@ TEST(Planner, AStopAtCycleEndIsHeardDuringAHold) {
 }
 
 TEST_P(EveryMotion, TimesIncreaseAndEveryCycleEndsWhereItBegan) {
-  const Waveform waveform = GetParam().waveform;
-  const Program program = program_of({{waveform, 50, 20'000'000, 0, 1'200'000},
-                                      {waveform, 30, 20'000'000, 10'000'000, 2'000'000},
-                                      {waveform, 20, 10'000'000, 5'000'000, 1'000'000}});
+  const NamedProfile& named = GetParam();
+  const Program program = program_of({named.segment(50, 20'000'000, 0, 1'200'000),
+                                      named.segment(30, 20'000'000, 10'000'000, 2'000'000),
+                                      named.segment(20, 10'000'000, 5'000'000, 1'000'000)});
   ASSERT_TRUE(check_program(program, kSettings).ok());
   std::int32_t position = 0;
   std::size_t segment = 0, cycles = 0;
@@ -155,7 +155,7 @@ TEST_P(EveryMotion, TimesIncreaseAndEveryCycleEndsWhereItBegan) {
 }
 
 TEST_P(EveryMotion, NothingDriftsOverTenMillionSteps) {
-  const Program program = program_of({{GetParam().waveform, 1000, 40'000'000, 0, 1'200'000}});
+  const Program program = program_of({GetParam().segment(1000, 40'000'000, 0, 1'200'000)});
   Planner planner;
   planner.begin_run(program, kSettings, Ticks{0}, Steps{0});
   std::int64_t position = 0, steps = 0;
@@ -287,7 +287,7 @@ class StopBehind : public testing::TestWithParam<NamedProfile> {};
 
 TEST_P(StopBehind, EveryEventLiesLaterThanWhatIsQueued) {
   const Program program = program_of(
-      {{GetParam().waveform, 2, 1'000'000, 0, 800'000}, {GetParam().waveform, 1, 800'000, 500'000, 700'000}});
+      {GetParam().segment(2, 1'000'000, 0, 800'000), GetParam().segment(1, 800'000, 500'000, 700'000)});
   Planner planner;
   planner.begin_run(program, kSettings, Ticks{1'000'000}, Steps{30});
   Ticks last{0};
@@ -302,7 +302,7 @@ TEST_P(StopBehind, EveryEventLiesLaterThanWhatIsQueued) {
     }
     last = planner.peek()->tick;
   }
-  EXPECT_GT(stops, GetParam().profile->moves() ? 700U : 300U);
+  EXPECT_GT(stops, GetParam().moves() ? 700U : 300U);
   planner.begin_stop(last + microseconds(1'000), kSettings.stop_steps_per_s2());
   EXPECT_EQ(planner.peek(), nullptr) << "a second end";
 }

@@ -21,16 +21,16 @@ using wire::Waveform;
 enum class Stop { now, at_cycle_end, lease_loss };
 
 struct Case {
-  Waveform waveform;
+  NamedProfile named;
   Stop stop;
   bool tight;  ///< the allowed acceleration is the motion's own
 };
 
 /// Rest, two cycles from 0, a ramp, a cycle from an offset, a ramp back.
-Program program_of(Waveform waveform) {
+Program program_of(const NamedProfile& named) {
   Program program;
-  program.segments[program.size++] = {waveform, 2, 8'000'000, 0, 800'000};
-  program.segments[program.size++] = {waveform, 1, 6'000'000, 3'000'000, 700'000};
+  program.segments[program.size++] = named.segment(2, 8'000'000, 0, 800'000);
+  program.segments[program.size++] = named.segment(1, 6'000'000, 3'000'000, 700'000);
   program.gate_every = 1;
   program.rest_us = 500'000;
   program.ttl_width_us = 1'000;
@@ -40,7 +40,7 @@ Program program_of(Waveform waveform) {
 
 wire::Configure limits_of(const Case& asked) {
   wire::Configure configure = wire::Configure::example();
-  const Program program = program_of(asked.waveform);
+  const Program program = program_of(asked.named);
   if (asked.tight)
     configure.acceleration_uL_per_s2 = static_cast<std::uint32_t>(
         segment_peaks(program.segments[0], Settings(configure)).acceleration_uL_per_s2);
@@ -56,6 +56,7 @@ class StopAnywhere : public testing::TestWithParam<Case> {
  public:
   void SetUp() override {
     bench.prepare(limits);
+    if (GetParam().named.uploaded != nullptr) bench.upload(0, GetParam().named.uploaded->rises);
     for (std::size_t i = 0; i < program.size; ++i) {
       const Segment& segment = program.segments[i];
       bench.add_segment(segment.waveform, segment.cycles, segment.stroke_nL, segment.period_us,
@@ -73,8 +74,7 @@ class StopAnywhere : public testing::TestWithParam<Case> {
   /// Where the cycles of the second segment begin.
   [[nodiscard]] Steps offset() const {
     const Segment& segment = program.segments[1];
-    const bool moves = find_profile(segment.waveform)->moves();
-    return settings.steps_of_nL(segment.offset_nL + (moves ? 0 : segment.stroke_nL));
+    return settings.steps_of_nL(segment.offset_nL + (segment.moves() ? 0 : segment.stroke_nL));
   }
 
   /// Starts the program; it first returns to 0, then rests.
@@ -185,7 +185,7 @@ class StopAnywhere : public testing::TestWithParam<Case> {
   }
 
   Bench bench;
-  Program program = program_of(GetParam().waveform);
+  Program program = program_of(GetParam().named);
   wire::Configure limits = limits_of(GetParam());
   Settings settings{limits};
   Ticks silence;     ///< from the last heartbeat to the stop
@@ -230,7 +230,7 @@ TEST_P(StopAtStart, EndsInOrder) {
 
 std::string name_of(const testing::TestParamInfo<Case>& info) {
   static constexpr const char* kStops[] = {"StopNow", "StopAtCycleEnd", "LeaseLoss"};
-  return std::string(wire::waveform_name(info.param.waveform)) + kStops[static_cast<int>(info.param.stop)] +
+  return std::string(info.param.named.name) + kStops[static_cast<int>(info.param.stop)] +
          (info.param.tight ? "AtTheAccelerationLimit" : "");
 }
 
@@ -239,7 +239,7 @@ std::vector<Case> cases(std::initializer_list<Stop> stops) {
   for (const NamedProfile& named : every_profile())
     for (const Stop stop : stops)
       for (const bool tight : {false, true})
-        if (!tight || named.profile->moves()) all.push_back({named.waveform, stop, tight});
+        if (!tight || named.moves()) all.push_back({named, stop, tight});
   return all;
 }
 

@@ -119,6 +119,7 @@ TEST(Trigger, EveryProfileTriggersOncePerPeriodWithItsFirstStep) {
     SCOPED_TRACE(named.name);
     Bench bench;
     bench.prepare();
+    if (named.uploaded != nullptr) bench.upload(0, named.uploaded->rises);
     bench.add_segment(named.waveform, 4, 8'000'000, 800'000);
     (void)bench.rig.take_edges();
     bench.run_program();

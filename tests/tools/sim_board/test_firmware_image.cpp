@@ -8,6 +8,8 @@
 #include <fstream>
 #include <memory>
 
+#include "tests/firmware/uploaded_waveform.hpp"
+#include "tests/firmware/uploads.hpp"
 #include "tests/tools/sim_board/miniature_host.hpp"
 #include "tools/sim_board/emulated_controller.hpp"
 #include "tools/sim_rig/host_built_controller.hpp"
@@ -53,11 +55,17 @@ std::vector<TimedEdge> in_ticks(const std::vector<PinEdge>& edges, bool r_wave) 
   return found;
 }
 
-/// Homes, then runs a short program; the edges of the run alone.
+bool upload_heart(MiniatureHost& host) {
+  return host.ask(diastole::firmware::upload_of(0, diastole::firmware::kHeartRises)) &&
+         host.ask(diastole::firmware::lot_of(diastole::firmware::kHeartRises, 0));
+}
+
+/// Homes, then runs a short program, whose waveform 0 is the heart's; the edges of the run alone.
 std::vector<PinEdge> run_session(sim_rig::SimulatedController& controller,
                                  const std::vector<wire::AddSegment>& program) {
   MiniatureHost host(controller);
   EXPECT_TRUE(host.prepare());
+  EXPECT_TRUE(upload_heart(host));
   for (const wire::AddSegment& segment : program)
     EXPECT_TRUE(host.ask(segment));
   host.edges.clear();
@@ -68,7 +76,7 @@ std::vector<PinEdge> run_session(sim_rig::SimulatedController& controller,
 
 wire::AddSegment segment(wire::Waveform waveform, uint32_t cycles, uint32_t stroke_nL, uint32_t period_us,
                          uint32_t offset_nL = 0) {
-  return {0, waveform, cycles, stroke_nL, offset_nL, period_us};
+  return {0, waveform, cycles, stroke_nL, offset_nL, period_us, 0};
 }
 
 TEST(FirmwareImage, SaysHelloOverItsSerialPort) {
@@ -90,14 +98,15 @@ TEST(FirmwareImage, ShortSessionGivesTheEdgesOfTheHostBuild) {
                             segment(wire::Waveform::trapezoidal, 1, 8'000'000, 800'000),
                             segment(wire::Waveform::sawtooth, 1, 8'000'000, 800'000),
                             segment(wire::Waveform::reversed_sawtooth, 1, 8'000'000, 800'000),
-                            segment(wire::Waveform::hold, 2, 2'000'000, 300'000, 1'000'000)};
+                            segment(wire::Waveform::hold, 2, 2'000'000, 300'000, 1'000'000),
+                            segment(wire::Waveform::uploaded, 2, 20'000'000, 1'200'000, 1'000'000)};
   auto built = sim_rig::make_host_built_controller();
   auto board = emulated();
   const auto expected = run_session(*built, program), found = run_session(*board, program);
 
   const auto expected_edges = in_ticks(expected, false), edges = in_ticks(found, false);
   ASSERT_EQ(edges.size(), expected_edges.size());
-  ASSERT_GT(edges.size(), 20'000U);
+  ASSERT_GT(edges.size(), 30'000U);
   for (std::size_t i = 0; i < edges.size(); ++i)
     ASSERT_EQ(edges[i], expected_edges[i]) << "edge " << i;
 
