@@ -29,8 +29,6 @@ void EmulatedController::drive(const Wire& wire, bool active, uint64_t time_ns) 
   board_.drive(wire.pin, active == wire.active_high, time_ns);
 }
 
-void EmulatedController::close(const Wire& wire, uint64_t time_ns) { drive(wire, true, time_ns); }
-
 void EmulatedController::press_estop(uint64_t time_ns, bool pressed) {
   drive(wiring_.estop, pressed, time_ns);
 }

@@ -32,14 +32,13 @@ class EmulatedController final : public sim_rig::SimulatedController {
   Output advance_to(uint64_t until_ns) override;
 
   void press_estop(uint64_t time_ns, bool pressed = true);
-  void close_home(uint64_t time_ns) { close(wiring_.home, time_ns); }
-  void close_far_limit(uint64_t time_ns) { close(wiring_.far_limit, time_ns); }
+  void close_home(uint64_t time_ns, bool closed = true) { drive(wiring_.home, closed, time_ns); }
+  void close_far_limit(uint64_t time_ns, bool closed = true) { drive(wiring_.far_limit, closed, time_ns); }
 
   [[nodiscard]] SimBoard& board() { return board_; }
   [[nodiscard]] int64_t position_microsteps() const { return position_; }
 
  private:
-  void close(const Wire& wire, uint64_t time_ns);
   void drive(const Wire& wire, bool active, uint64_t time_ns);
   void step(uint64_t time_ns);
   void note_fault();

@@ -6,8 +6,15 @@ void MiniatureHost::hear(const wire::Received& received) {
   wire::visit_message(received.type, received.payload,
                       wire::overloaded{
                           [&](const wire::Hello& message) { hello = message; },
-                          [&](const wire::Ack&) { acknowledged_ = true; },
-                          [&](const wire::Nak&) { acknowledged_ = false; },
+                          [&](const wire::Ack& message) {
+                            acknowledged_ = true;
+                            acknowledged.push_back(message.request_id);
+                          },
+                          [&](const wire::Nak& message) {
+                            acknowledged_ = false;
+                            refused.push_back(message.request_id);
+                          },
+                          [&](const wire::SegmentPlanned& message) { planned.push_back(message); },
                           [&](const wire::StateChanged& message) { state = message.to; },
                           [&](const wire::FaultRaised& message) { fault = message.fault; },
                           [&](const wire::Trigger&) { ++triggers_heard; },
@@ -16,20 +23,30 @@ void MiniatureHost::hear(const wire::Received& received) {
                       });
 }
 
+bool MiniatureHost::heartbeat_due() {
+  if (last_heartbeat_ns && last_heartbeat_sent_) return false;
+  const bool last = last_heartbeat_ns && now_ns_ >= *last_heartbeat_ns;
+  if (!last && now_ns_ < next_heartbeat_ns_) return false;
+  last_heartbeat_sent_ = last;
+  next_heartbeat_ns_ = now_ns_ + 50'000'000;
+  return true;
+}
+
 void MiniatureHost::turn() {
   const uint64_t now_us = now_ns_ / 1000;
-  if (now_ns_ >= next_heartbeat_ns_ && link_.state() == wire::ReliableLink::State::open) {
+  if (link_.state() == wire::ReliableLink::State::open && heartbeat_due()) {
     std::array<uint8_t, wire::kMaxPayloadBytes> payload{};
     (void)link_.send(wire::Heartbeat::kType, wire::encode(wire::Heartbeat{lease}, payload));
-    next_heartbeat_ns_ = now_ns_ + 50'000'000;
   }
   for (auto bytes = link_.transmit(now_us); !bytes.empty(); bytes = link_.transmit(now_us)) {
-    controller_.receive(bytes);
+    to_controller.push(bytes, now_us);
   }
+  controller_.receive(to_controller.take(now_us));
   now_ns_ += slice_ns;
   const auto output = controller_.advance_to(now_ns_);
   edges.insert(edges.end(), output.edges.begin(), output.edges.end());
-  for (const uint8_t byte : output.sent) {
+  to_host.push(output.sent, now_ns_ / 1000);
+  for (const uint8_t byte : to_host.take(now_ns_ / 1000)) {
     if (const auto received = link_.receive(byte, now_ns_ / 1000)) hear(*received);
   }
 }

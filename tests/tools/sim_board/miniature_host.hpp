@@ -12,6 +12,7 @@
 
 #include "protocol/wire/messages.hpp"
 #include "protocol/wire/reliable_link.hpp"
+#include "tools/link_faults/line_faults.hpp"
 #include "tools/sim_rig/simulated_controller.hpp"
 
 namespace diastole::sim_board_test {
@@ -29,12 +30,18 @@ class MiniatureHost {
   /// Sends a request and waits for its Ack (true) or anything else (false).
   template <class Request>
   bool ask(Request request) {
-    request.request_id = ++last_request_;
     acknowledged_.reset();
-    std::array<uint8_t, wire::kMaxPayloadBytes> payload{};
-    if (!link_.send(Request::kType, wire::encode(request, payload))) return false;
+    if (!post(request)) return false;
     run_until([&] { return acknowledged_.has_value(); }, 3'000'000'000);
     return acknowledged_.value_or(false);
+  }
+  /// Sends a request and waits for nothing; its number, or nullopt if the link has no room for it.
+  template <class Request>
+  std::optional<uint16_t> post(Request request) {
+    std::array<uint8_t, wire::kMaxPayloadBytes> payload{};
+    request.request_id = static_cast<uint16_t>(last_request_ + 1);
+    if (!link_.send(Request::kType, wire::encode(request, payload))) return std::nullopt;
+    return ++last_request_;
   }
   /// Arms and starts what was added; true when the run ended by itself within `most_ns`.
   bool run_program(uint64_t most_ns, wire::Arm arm = wire::Arm::example());
@@ -42,6 +49,7 @@ class MiniatureHost {
   void run_for(uint64_t time_ns);
   bool run_until(const std::function<bool()>& done, uint64_t most_ns);
 
+  [[nodiscard]] const wire::ReliableLink& link() const { return link_; }
   [[nodiscard]] uint64_t now_ns() const { return now_ns_; }
 
   std::optional<wire::Hello> hello;
@@ -50,16 +58,23 @@ class MiniatureHost {
   std::optional<wire::RunEnded> ended;
   std::vector<sim_rig::PinEdge> edges;
   uint32_t triggers_heard = 0;
+  std::vector<uint16_t> acknowledged, refused;  ///< requests, in the order of their answers
+  std::vector<wire::SegmentPlanned> planned;
+  link_faults::LineFaults to_controller{{}, 1}, to_host{{}, 2};
   uint64_t slice_ns = 1'000'000;
+  /// A last heartbeat is sent then, and none after it until this is reset.
+  std::optional<uint64_t> last_heartbeat_ns;
 
  private:
   void turn();
+  [[nodiscard]] bool heartbeat_due();
   void hear(const wire::Received& received);
 
   sim_rig::SimulatedController& controller_;
   wire::ReliableLink link_{wire::ReliableLink::Role::host};
-  std::optional<bool> acknowledged_;
+  std::optional<bool> acknowledged_;  ///< the last answer
   uint64_t now_ns_ = 0, next_heartbeat_ns_ = 0;
+  bool last_heartbeat_sent_ = false;
   uint16_t last_request_ = 0;
 };
 

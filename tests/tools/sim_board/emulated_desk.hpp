@@ -1,0 +1,56 @@
+#pragma once
+// The daemon's own controller client before the real image: its clock is the board's, its line the board's serial
+// port. No threads, no devices.
+
+#include <algorithm>
+#include <deque>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "host/config/rig_config.hpp"
+#include "host/controller/controller_client.hpp"
+#include "tools/sim_board/emulated_controller.hpp"
+
+namespace diastole::sim_board_test {
+
+class EmulatedDesk final : public Clock {
+ public:
+  explicit EmulatedDesk(const std::string& image) : controller({read_image(image)}) {}
+
+  [[nodiscard]] uint64_t now_ns() override { return controller.board().now_ns(); }
+  [[nodiscard]] bool stands_still() const override { return true; }
+  void sleep_until_ns(uint64_t until_ns, ByteLine*) override {
+    const auto output = controller.advance_to(until_ns);
+    to_host.insert(to_host.end(), output.sent.begin(), output.sent.end());
+    edges.insert(edges.end(), output.edges.begin(), output.edges.end());
+  }
+
+  EmulatedController controller;
+  std::deque<uint8_t> to_host;
+  std::vector<sim_rig::PinEdge> edges;
+};
+
+class EmulatedLine final : public ByteLine {
+ public:
+  explicit EmulatedLine(EmulatedDesk& desk) : desk_(desk) { desk_.to_host.clear(); }
+  void write(std::span<const uint8_t> bytes) override { desk_.controller.receive(bytes); }
+  size_t read(std::span<uint8_t> out) override {
+    const size_t count = std::min(out.size(), desk_.to_host.size());
+    const auto end = desk_.to_host.begin() + static_cast<std::ptrdiff_t>(count);
+    std::copy(desk_.to_host.begin(), end, out.begin());
+    desk_.to_host.erase(desk_.to_host.begin(), end);
+    return count;
+  }
+  void flush(int) override {}
+  void wait_received(uint64_t, int) override {}
+  [[nodiscard]] bool lost() const override { return false; }
+  [[nodiscard]] uint64_t written_total() const override { return 0; }
+  [[nodiscard]] uint64_t received_total() const override { return 0; }
+  [[nodiscard]] int descriptor() const override { return -1; }
+
+ private:
+  EmulatedDesk& desk_;
+};
+
+}  // namespace diastole::sim_board_test

@@ -1,0 +1,66 @@
+#include "tests/tools/sim_board/scenario.hpp"
+
+namespace diastole::sim_board_test {
+namespace {
+
+using wire::Waveform;
+
+wire::AddSegment segment(Waveform waveform, uint32_t cycles, uint32_t stroke_nL, uint32_t period_us,
+                         uint32_t offset_nL = 0) {
+  return {0, waveform, cycles, stroke_nL, offset_nL, period_us};
+}
+
+wire::AddSegment paper() { return segment(Waveform::parabolic, 2, 40'000'000, 1'200'000); }
+
+void home(MiniatureHost& host) {
+  wire::Home request{};
+  request.lease_id = MiniatureHost::lease;
+  (void)host.ask(request);
+  host.run_until([&] { return host.state == wire::State::homed; }, 60'000'000'000);
+}
+
+}  // namespace
+
+const std::vector<Scenario>& scenarios() {
+  static const std::vector<Scenario> list{
+      // Undisturbed: equal to the last edge.
+      {.name = "parabolic", .program = {segment(Waveform::parabolic, 2, 40'000'000, 1'200'000)}},
+      {.name = "sinusoidal", .program = {segment(Waveform::sinusoidal, 2, 16'000'000, 800'000)}},
+      {.name = "trapezoidal", .program = {segment(Waveform::trapezoidal, 2, 8'000'000, 800'000)}},
+      {.name = "sawtooth", .program = {segment(Waveform::sawtooth, 2, 8'000'000, 800'000)}},
+      {.name = "reversed_sawtooth", .program = {segment(Waveform::reversed_sawtooth, 2, 8'000'000, 800'000)}},
+      {.name = "hold", .program = {segment(Waveform::hold, 3, 2'000'000, 300'000)}},
+      {.name = "offset", .program = {segment(Waveform::parabolic, 1, 10'000'000, 1'000'000, 5'000'000)}},
+      {.name = "segments_in_sequence",
+       .program = {segment(Waveform::parabolic, 2, 40'000'000, 1'200'000),
+                   segment(Waveform::sinusoidal, 2, 16'000'000, 800'000, 4'000'000),
+                   segment(Waveform::trapezoidal, 1, 8'000'000, 800'000),
+                   segment(Waveform::hold, 2, 2'000'000, 300'000, 1'000'000),
+                   segment(Waveform::sawtooth, 1, 8'000'000, 800'000)}},
+      {.name = "every_second_cycle_gated",
+       .program = {segment(Waveform::parabolic, 5, 10'000'000, 600'000)},
+       .gate_every = 2},
+      {.name = "paper_rate_30kHz", .program = {segment(Waveform::parabolic, 1, 70'000'000, 1'200'000)}},
+      {.name = "homing", .program = {paper()}, .motion = home},
+      {.name = "stop_at_cycle_end",
+       .program = {paper()},
+       .act = Act::stop_at_cycle_end,
+       .act_after_ms = 1'700},
+      // Stopped or cut off in their first or second cycle (each 1.2 s).
+      {.name = "stop_now_on_the_rise", .program = {paper()}, .act = Act::stop_now, .act_after_ms = 1'500},
+      {.name = "stop_now_on_the_fall", .program = {paper()}, .act = Act::stop_now, .act_after_ms = 2'100},
+      {.name = "halt", .program = {paper()}, .act = Act::halt, .act_after_ms = 1'530},
+      {.name = "estop_on_the_rise", .program = {paper()}, .act = Act::estop, .act_after_ms = 1'490},
+      {.name = "estop_on_the_fall", .program = {paper()}, .act = Act::estop, .act_after_ms = 2'033},
+      {.name = "estop_in_the_r_wave", .program = {paper()}, .act = Act::estop, .act_after_ms = 1'205},
+      {.name = "estop_on_the_ramp",
+       .program = {segment(Waveform::parabolic, 2, 10'000'000, 1'000'000, 10'000'000)},
+       .act = Act::estop,
+       .act_after_ms = 333},
+      {.name = "far_limit", .program = {paper()}, .act = Act::far_limit, .act_after_ms = 1'611},
+      {.name = "lease_lost", .program = {paper()}, .act = Act::silence, .act_after_ms = 1'400},
+  };
+  return list;
+}
+
+}  // namespace diastole::sim_board_test
