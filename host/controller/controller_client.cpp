@@ -103,6 +103,8 @@ LimitInWords words_for(wire::Limit limit) {
       return {1e-3, "ms", "Reduce ttl_width_ms in the rig file or lengthen period_s."};
     case wire::Limit::r_wave_spacing:
       return {1e-6, "s", "Lengthen period_s or raise gate_every."};
+    case wire::Limit::microstep:
+      return {1, "pL", "Make bore, screw and steps in the rig file agree with the controller's settings."};
     case wire::Limit::none:
       break;
   }
