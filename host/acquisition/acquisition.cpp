@@ -54,6 +54,8 @@ RunOutcome Acquisition::run(const Hooks& hooks) {
 
 void Acquisition::turn() {
   obey(hooks_.stop());
+  for (const RunRemark& note : hooks_.notes())
+    remark(note.level, note.code, note.text);
   controller_.service();
   for (const ControllerEvent& event : controller_.take_events())
     take(event);

@@ -63,6 +63,8 @@ class Acquisition {
 
   struct Hooks {
     std::function<StopRequest()> stop = [] { return StopRequest::none; };  ///< asked once a turn
+    /// What others want in the run's events; asked once a turn.
+    std::function<std::vector<RunRemark>()> notes = [] { return std::vector<RunRemark>(); };
     std::function<void(const RunProgress&)> progress = [](const RunProgress&) {};
     std::function<void(const RunRemark&)> remark = [](const RunRemark&) {};
   };

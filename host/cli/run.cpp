@@ -23,7 +23,7 @@ struct RunOptions {
 };
 
 ExitCode run(RunOptions options, const CommandOutput& out) {
-  DaemonClient daemon(options.daemon.resolve());
+  DaemonClient daemon = options.daemon.connect();
   SessionView view(isatty(STDERR_FILENO) != 0);
   interrupts = 0;
   std::signal(SIGINT, [](int) { interrupts = interrupts + 1; });
@@ -50,6 +50,7 @@ void add_run(CommandLine& line) {
   command->add_option("-o,--output", options->session.output, "run file to write")->required();
   command->add_flag("--force", options->session.force, "replace the run file if it exists");
   options->daemon.add_to(*command);
+  options->daemon.add_take_over_to(*command);
   line.on_run(command, [options](const CommandOutput& out) { return run(*options, out); });
 }
 

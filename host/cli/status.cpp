@@ -24,6 +24,10 @@ void show_status(const nlohmann::json& status, bool as_json) {
                status.at("fault_text").get<std::string>(), status.at("remedy").get<std::string>());
   }
   fmt::print("position  {:.3f} mL\n", status.at("position_mL").get<double>());
+  if (const nlohmann::json control = status.value("control", nlohmann::json()); !control.is_null()) {
+    fmt::print("control   {} (process {})\n", control.at("user").get<std::string>(),
+               control.at("pid").get<int64_t>());
+  }
   fmt::print("firmware  {} at {}\n", status.at("firmware").get<std::string>(),
              status.at("controller").get<std::string>());
   fmt::print("pressure  {}\n", status.at("instrument").get<std::string>());
@@ -35,8 +39,9 @@ void add_question(CommandLine& line, const std::string& name, const std::string&
   auto daemon = std::make_shared<DaemonAddress>();
   CLI::App* command = line.add(name, purpose, examples);
   daemon->add_to(*command);
+  if (method != "rig.status") daemon->add_take_over_to(*command);
   line.on_run(command, [daemon, method, patience](const CommandOutput& out) {
-    DaemonClient client(daemon->resolve());
+    DaemonClient client = daemon->connect();
     show_status(client.call(method, nlohmann::json::object(), patience), out.json);
     return ExitCode::done;
   });

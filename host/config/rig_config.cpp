@@ -139,10 +139,11 @@ DaqConfig read_daq(TableReader table) {
 }
 
 DaemonConfig read_daemon(std::optional<TableReader> table) {
-  DaemonConfig daemon{default_socket(), "journals"};
+  DaemonConfig daemon{default_socket(), "journals", ""};
   if (!table) return daemon;
   daemon.socket = table->text_or("socket", daemon.socket);
   daemon.journal_dir = table->text_or("journal_dir", daemon.journal_dir.string());
+  daemon.control_group = table->text_or("control_group", daemon.control_group);
   table->finish();
   return daemon;
 }

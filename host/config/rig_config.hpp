@@ -50,6 +50,7 @@ struct DaqConfig {
 struct DaemonConfig {
   std::string socket;
   std::filesystem::path journal_dir;
+  std::string control_group;  ///< whose members may control the rig beside root and the daemon's user
 };
 
 struct RigConfig {

@@ -72,9 +72,10 @@ void run_daemon(const DaemonOptions& options) {
   boost::asio::io_context context;
   boost::asio::signal_set signals(context, SIGINT, SIGTERM);
   const RigConfig config = configured(options);
+  const ControlPolicy policy(config.daemon.control_group, config.file);
   RigService rig(config, {options.conductor, options.daq_address, options.producer});
   Ending ending(context, rig, signals);
-  const RpcServer server(context, rig, config.daemon.socket);
+  const RpcServer server(context, rig, config.daemon.socket, policy);
   std::cout << nlohmann::json{{"ready", true}, {"socket", config.daemon.socket}}.dump() << std::endl;
   context.run();
 }

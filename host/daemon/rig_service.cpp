@@ -222,7 +222,43 @@ void RigService::status(Done done) {
     }
   }
   if (!snapshot.is_null()) return done(nullptr, std::move(snapshot));
-  give({"", [this] { return do_status(); }, std::move(done)});
+  bool first = false;
+  {
+    const std::lock_guard lock(mutex_);
+    first = status_askers_.empty();
+    status_askers_.push_back(std::move(done));
+  }
+  if (first) answer_status();
+}
+
+void RigService::answer_status() {
+  const auto answer_all = [this](const std::exception_ptr& error, const json& result) {
+    std::vector<Done> askers;
+    {
+      const std::lock_guard lock(mutex_);
+      askers.swap(status_askers_);
+    }
+    for (const Done& asker : askers)
+      asker(error, result);
+  };
+  try {
+    give({"", [this] { return do_status(); }, answer_all});
+  } catch (...) {
+    answer_all(std::current_exception(), nullptr);
+  }
+}
+
+void RigService::note(const RunRemark& what) {
+  {
+    const std::lock_guard lock(mutex_);
+    if (activity_ == "running") return notes_.push_back(what);  // the run's remarks are logged as they come
+  }
+  spdlog::log(what.level == "info" ? spdlog::level::info : spdlog::level::warn, "{}", what.text);
+}
+
+void RigService::keep(const RunRemark& remark) {
+  const std::lock_guard lock(mutex_);
+  if (run_->remarks.size() < most_remarks) run_->remarks.push_back(remark);
 }
 
 bool RigService::stop(StopRequest how) {
@@ -246,7 +282,8 @@ json RigService::run_progress(size_t first_remark) const {
   const std::lock_guard lock(mutex_);
   if (!run_) return nullptr;
   json remarks = json::array();
-  for (size_t i = first_remark; i < run_->remarks.size(); ++i) {
+  const size_t first = std::min(first_remark, run_->remarks.size());
+  for (size_t i = first; i < std::min(run_->remarks.size(), first + remarks_at_once); ++i) {
     const RunRemark& remark = run_->remarks[i];
     remarks.push_back({{"level", remark.level}, {"code", remark.code}, {"text", remark.text}});
   }
@@ -352,6 +389,7 @@ bool RigService::begin(const RunRecord& record) {
   const std::lock_guard lock(mutex_);
   if (stop_request_ != StopRequest::none) return false;
   run_ = record;
+  notes_.clear();
   activity_ = "running";
   return true;
 }
@@ -391,6 +429,11 @@ RunOutcome RigService::acquire(JournalWriter& journal, const Experiment& experim
             const std::lock_guard lock(mutex_);
             return stop_request_;
           },
+      .notes =
+          [this] {
+            const std::lock_guard lock(mutex_);
+            return std::exchange(notes_, {});
+          },
       .progress =
           [this](const RunProgress& progress) {
             if (controller_->connected()) (void)remember(controller_->last_known());
@@ -401,8 +444,7 @@ RunOutcome RigService::acquire(JournalWriter& journal, const Experiment& experim
           [this](const RunRemark& remark) {
             spdlog::log(remark.level == "info" ? spdlog::level::info : spdlog::level::warn, "{}",
                         remark.text);
-            const std::lock_guard lock(mutex_);
-            run_->remarks.push_back(remark);
+            keep(remark);
           },
   });
 }

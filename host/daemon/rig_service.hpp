@@ -38,6 +38,9 @@ class RigService {
   /// Called once on the rig's thread: with an error, or with a result.
   using Done = std::function<void(std::exception_ptr error, nlohmann::json result)>;
 
+  static constexpr size_t most_remarks = 10'000;
+  static constexpr size_t remarks_at_once = 200;
+
   /// Opens controller and instrument. Throws HardwareError if one is not there.
   RigService(RigConfig rig, const RigServiceOptions& options);
   /// Ends a run by a controlled stop, writes what it has, and closes everything.
@@ -58,9 +61,11 @@ class RigService {
   void end();
   /// True when nothing is going on or waiting.
   [[nodiscard]] bool idle() const;
+  /// Tells the log, and while a run is on its events and whoever follows it.
+  void note(const RunRemark& what);
   /// The present or last run: {"run_id", "state": running|writing|done|failed, "received", "missing",
-  /// "triggers", "last_kPa", "remarks": those from number `first_remark` on, "result"}. null if there was
-  /// none.
+  /// "triggers", "last_kPa", "remarks": at most remarks_at_once from number `first_remark` on, "result"}. null
+  /// if there was none. Of a run's remarks the first most_remarks are kept here; its file has all.
   [[nodiscard]] nlohmann::json run_progress(size_t first_remark) const;
 
  private:
@@ -82,6 +87,8 @@ class RigService {
   void work(const std::stop_token& stop);
   void idle_turn();
   void give(Order order);
+  void answer_status();
+  void keep(const RunRemark& remark);
   [[nodiscard]] std::optional<Order> next_order();
   void carry_out(Order order);
   void reconnect_if_due();
@@ -107,7 +114,9 @@ class RigService {
   mutable std::mutex mutex_;
   std::condition_variable_any wake_;
   std::deque<Order> orders_;
-  std::string activity_;  // empty: none
+  std::vector<Done> status_askers_;  // one order answers them all
+  std::vector<RunRemark> notes_;     // for the run that is on
+  std::string activity_;             // empty: none
   bool ending_ = false;
   StopRequest stop_request_ = StopRequest::none;
   std::optional<RunRecord> run_;

@@ -71,7 +71,9 @@ json follow_to_end(DaemonClient& daemon, const SessionOptions& options) {
     }
     const json state = daemon.call("run.progress", {{"first_remark", remarks_seen}});
     options.progress(progress_of(state, remarks_seen));
-    if (state.at("state") == "done" || state.at("state") == "failed") return state.at("result");
+    const bool all_told = state.at("remarks").empty();
+    if (all_told && (state.at("state") == "done" || state.at("state") == "failed")) return state.at("result");
+    if (!all_told) continue;
     std::this_thread::sleep_for(std::chrono::milliseconds(options.poll_ms));
   }
 }

@@ -2,31 +2,41 @@
 // The daemon's socket: JSON-RPC 2.0, one JSON object a line (json_rpc.hpp).
 //
 //   method          params                          who           result
-//   rig.status                                      anybody       RigService::status
+//   rig.status                                      anybody       RigService::status, and who controls the rig
 //   run.progress    {first_remark}                  anybody       RigService::run_progress
 //   run.stop        {how: "cycle_end" | "now"}      anybody       {stopping}
 //   run.start       {experiment, file}              controller    {run_id, journal, run_file}
 //   rig.home                                        controller    status
 //   rig.clear_fault                                 controller    status
+//   control.take    {take_over: who holds it}       controller    {user, uid, pid}
 //   control.release                                 anybody       {}
 //
-// Who may control: the user that runs the daemon, and root (SO_PEERCRED); all others observe and may stop.
-// The first connection that gives an order holds the control until it releases it or closes. A line longer
-// than rpc::most_line_bytes, or a reader that leaves that much unread, ends its connection.
+// Who may control: root, the user that runs the daemon, and the members of [daemon] control_group
+// (SO_PEERCRED, SO_PEERGROUPS); all others observe and may stop. The first connection that gives an order
+// holds the control until it releases it or closes, or until another takes it over by naming the holder
+// (control_lease.hpp); a takeover is an event of the log and of the run.
+//
+// No client costs the rig anything (connection.hpp): a line is bounded, and so are the answers that a client
+// leaves unread, its requests a second and the time for a line; beyond most_connections the one that has said
+// nothing for longest gives way.
 
 #include <boost/asio/io_context.hpp>
 #include <memory>
 #include <string>
 
+#include "host/daemon/peer.hpp"
 #include "host/daemon/rig_service.hpp"
 
 namespace diastole {
 
 class RpcServer {
  public:
+  static constexpr size_t most_connections = 128;
+
   /// Listens at `socket`; a socket left behind by a dead daemon is replaced. Throws HardwareError if another
   /// daemon listens there or the path cannot be used.
-  RpcServer(boost::asio::io_context& context, RigService& rig, const std::string& socket);
+  RpcServer(boost::asio::io_context& context, RigService& rig, const std::string& socket,
+            const ControlPolicy& policy);
   ~RpcServer();
 
  private:

@@ -5,14 +5,10 @@
 #include <gtest/gtest.h>
 
 #include <csignal>
-#include <memory>
 #include <thread>
 
-#include "host/daemon/client.hpp"
-#include "host/daemon/json_rpc.hpp"
-#include "host/transport/unix_socket.hpp"
 #include "protocol/contract/input_error.hpp"
-#include "tests/flow/programs.hpp"
+#include "tests/flow/rig_with_daemon.hpp"
 
 namespace diastole::flow {
 namespace {
@@ -20,92 +16,6 @@ namespace {
 using namespace std::chrono_literals;
 using nlohmann::json;
 using testing::HasSubstr;
-
-/// A simulated rig, and a daemon that can be started at it more than once.
-class RigWithDaemon {
- public:
-  enum class Time { conducted, real };
-
-  explicit RigWithDaemon(Time time, const std::string& rig_file = source_text("examples/rig.toml"))
-      : time_(time) {
-    place.write("rig.toml", rig_file);
-    std::vector<std::string> rig{"sim_rig", "--link", path("pump"), "--config", path("rig.toml")};
-    if (time == Time::conducted) rig.insert(rig.end(), {"--conductor", path("time")});
-    rig_ = std::make_unique<Program>(place, rig);
-    EXPECT_TRUE(rig_->wait_for_text("modbus_port")) << rig_->err();
-    modbus_port_ = json::parse(rig_->out())["modbus_port"];
-  }
-  ~RigWithDaemon() {
-    for (const auto* program : {&daemon, &rig_}) {
-      if (*program == nullptr) continue;
-      (*program)->signal(SIGTERM);
-      EXPECT_EQ((*program)->wait().exit_code, 0);
-    }
-  }
-  RigWithDaemon(const RigWithDaemon&) = delete;
-  RigWithDaemon& operator=(const RigWithDaemon&) = delete;
-
-  void start_daemon() {
-    std::vector<std::string> arguments{
-        "diastole", "daemon",       "--config",      "rig.toml",
-        "--port",   path("pump"),   "--daq",         "127.0.0.1:" + std::to_string(modbus_port_),
-        "--socket", path("socket"), "--journal-dir", "journals"};
-    if (time_ == Time::conducted) arguments.insert(arguments.end(), {"--conductor", path("time")});
-    daemon = std::make_unique<Program>(place, arguments);
-    ASSERT_TRUE(daemon->wait_for_text("ready")) << daemon->err();
-  }
-  [[nodiscard]] DaemonClient client() const { return DaemonClient(path("socket")); }
-  [[nodiscard]] std::string path(const std::string& name) const { return (place / name).string(); }
-
-  Workplace place;
-  std::unique_ptr<Program> daemon;
-
- private:
-  Time time_;
-  std::unique_ptr<Program> rig_;
-  int modbus_port_ = 0;
-};
-
-/// 60 segments, which take a while to load, and 18 s to run.
-json many_segments() {
-  std::string text = "format = \"diastole-experiment\"\nversion = 1\nrest_s = 0.2\n";
-  for (int i = 0; i < 60; ++i)
-    text += "[[segment]]\nwaveform = \"parabolic\"\nstroke_mL = 2.0\nperiod_s = 0.3\n";
-  return {{"experiment", text}, {"file", "many.experiment.toml"}};
-}
-
-/// Asks until the state is (or is no longer) `state`, half a minute at most; returns the last status.
-json status_when(DaemonClient& client, const std::string& state, bool is) {
-  json status;
-  for (const auto end = std::chrono::steady_clock::now() + 30s; std::chrono::steady_clock::now() < end;) {
-    status = client.call("rig.status");
-    if ((status["state"] == state) == is) return status;
-    std::this_thread::sleep_for(1ms);
-  }
-  ADD_FAILURE() << "still " << status.dump();
-  return status;
-}
-
-/// Homes the pump and leaves the control to others.
-json home(DaemonClient& client) {
-  const json status = client.call("rig.home");
-  client.call("control.release");
-  return status;
-}
-
-/// A client that gives an order and does not wait for the answer.
-class Hasty {
- public:
-  Hasty(const std::string& socket, const std::string& method, const json& params)
-      : socket_(connect_unix_socket(socket)) {
-    const std::string line = rpc::request_line(1, method, params);
-    EXPECT_EQ(::send(socket_.get(), line.data(), line.size(), MSG_NOSIGNAL),
-              static_cast<ssize_t>(line.size()));
-  }
-
- private:
-  Descriptor socket_;
-};
 
 TEST(Daemon, AStopAtAnyMomentOfTheLoadIsObeyed) {
   RigWithDaemon rig(RigWithDaemon::Time::conducted);

@@ -1,0 +1,58 @@
+#include "host/daemon/methods.hpp"
+
+#include <algorithm>
+#include <array>
+
+#include "host/daemon/json_rpc.hpp"
+
+namespace diastole {
+namespace {
+
+using nlohmann::json;
+using Done = RigService::Done;
+
+constexpr size_t most_experiment_bytes = 256U << 10;
+
+void rig_status(RigService& rig, const json&, Done done) { rig.status(std::move(done)); }
+void rig_home(RigService& rig, const json&, Done done) { rig.home(std::move(done)); }
+void rig_clear_fault(RigService& rig, const json&, Done done) { rig.clear_fault(std::move(done)); }
+
+void run_start(RigService& rig, const json& params, Done done) {
+  const std::string text = params.at("experiment");
+  if (text.size() > most_experiment_bytes) {
+    throw rpc::Error(rpc::Code::invalid_params, "the experiment is too long");
+  }
+  rig.start_run(parse_experiment(text, params.value("file", "experiment")), std::move(done));
+}
+
+void run_progress(RigService& rig, const json& params, const Done& done) {
+  done(nullptr, rig.run_progress(params.value("first_remark", size_t{0})));
+}
+
+void run_stop(RigService& rig, const json& params, const Done& done) {
+  const std::string how = params.value("how", "now");
+  if (how != "now" && how != "cycle_end") {
+    throw rpc::Error(rpc::Code::invalid_params, "how must be \"now\" or \"cycle_end\"");
+  }
+  done(nullptr, {{"stopping", rig.stop(how == "now" ? StopRequest::now : StopRequest::at_cycle_end)}});
+}
+
+constexpr std::array all_methods{
+#define DIASTOLE_METHOD(name, access, function) \
+  Method{name, Access::access,                  \
+         [](RigService& rig, const json& params, Done done) { function(rig, params, std::move(done)); }},
+#include "host/daemon/method_list.inc"
+#undef DIASTOLE_METHOD
+};
+
+}  // namespace
+
+std::span<const Method> methods() { return all_methods; }
+
+const Method* find_method(std::string_view name) {
+  const auto* found = std::find_if(all_methods.begin(), all_methods.end(),
+                                   [&](const Method& each) { return each.name == name; });
+  return found == all_methods.end() ? nullptr : found;
+}
+
+}  // namespace diastole
