@@ -1,19 +1,21 @@
 #pragma once
-// What is wired where (Olimex STM32-H405 header names are the port names).
+// What is wired where on the Olimex STM32-H405. docs/wiring.md draws it and repeats this table; a test compares them.
 //
-//   PA1   TTL       TIM2_CH2 (AF1)      out, also starts the R-wave through TIM4
-//   PA2   DIR       TIM2_CH3 (AF1)      out, high = inflate
-//   PA4   R-wave    DAC_OUT1            out, 15 kOhm: through a follower and a divider of 1 : 125 to the
-//                                       scanner's ECG input
-//   PA6   STEP      TIM3_CH1 (AF2)      out
-//   PB0   ENABLE                        out, high = motor powered
-//   PB1   FAULT                         out, high = a fault is latched
-//   PB10  TX, PB11 RX  USART3 (AF7)
-//   PC0   e-stop                        in, pull-up: open loop (high) = pressed
-//   PC1   home switch                   in, pull-up: open contact (high) = closed on the piston
-//   PC2   far limit switch              in, pull-up: as home
+//   pin   signal     function           direction
+//   PA1   TTL        TIM2_CH2 (AF1)     out     also starts the R-wave through TIM4
+//   PA2   DIR        TIM2_CH3 (AF1)     out     high = inflate
+//   PA4   R-wave     DAC_OUT1           out     15 kOhm: through a follower and a divider of 1 : 125 to the
+//                                               scanner's ECG input
+//   PA6   STEP       TIM3_CH1 (AF2)     out
+//   PB0   ENABLE     GPIO               out     high = motor powered
+//   PB1   FAULT      GPIO               out     high = a fault is latched
+//   PB10  TX         USART3_TX (AF7)    out
+//   PB11  RX         USART3_RX (AF7)    in      pull-up: idles high without a cable
+//   PC0   e-stop     EXTI0              in      pull-up: open loop (high) = pressed
+//   PC1   home       EXTI1              in      pull-up: open contact (high) = closed on the piston
+//   PC2   far limit  EXTI2              in      pull-up: as home
 //
-// Inputs are normally closed to ground, so that a broken wire reads as pressed.
+// Switches are normally closed to ground, so that a broken wire reads as pressed.
 
 #include <cstdint>
 
