@@ -1,7 +1,7 @@
 // What a hand-written fast path gains over dual numbers: time of one stress-and-tangent evaluation and of one
 // stress evaluation for every law, on this machine.
 //
-//   build/release/bin/bench_laws
+//   tools/bench laws
 
 #include <fmt/format.h>
 
