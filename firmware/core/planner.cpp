@@ -25,8 +25,8 @@ void Planner::begin_run(const Program& program, const Settings& settings, Ticks 
   position_ = position;
   segment_ = 0;
   cycle_in_run_ = 0;
-  stop_at_cycle_end_ = stepped_ = false;
-  last_interval_ = Ticks{0};
+  stop_at_cycle_end_ = false;
+  last_ = before_last_ = {};
   phase_ = Phase::run_start;
   plan_next();
 }
@@ -37,41 +37,37 @@ void Planner::begin_travel(bool inflate, std::uint32_t count, Ticks first, Ticks
   inflate_ = inflate;
   count_ = count;
   index_ = 0;
-  stepped_ = false;
+  last_ = before_last_ = {};
   phase_ = Phase::travel;
   plan_next();
 }
 
 void Planner::begin_stop(Ticks earliest, std::uint64_t deceleration_steps_per_s2) {
-  if (!next_) return;
+  if (next_.flags == 0) return;
   phase_ = Phase::stop;
   index_ = count_ = 0;
-  if (next_->has(MotionEvent::kRunStart)) {
-    origin_ = next_->tick + kRestBeforeEnd;
+  if (next_.has(MotionEvent::kRunStart)) {
+    origin_ = next_.tick + kRestBeforeEnd;
     return;
   }
-  if (last_interval_ > Ticks{0}) {
-    const Ticks interval = std::max(last_interval_, earliest - last_event_);
+  if (last_interval() > Ticks{0}) {
+    const Ticks interval = std::max(last_interval(), earliest - last_.tick);
     const std::uint64_t speed = static_cast<std::uint64_t>(kTicksPerSecond / interval.count + 1);
     count_ = static_cast<std::uint32_t>((speed * speed + deceleration_steps_per_s2 - 1) /
                                         (2 * deceleration_steps_per_s2));
-    inflate_ = last_inflate_;
+    inflate_ = last_.has(MotionEvent::kInflate);
     length_ = interval * (2 * std::int64_t{count_} + 1);
     if (count_ > 0) level_ = SteppedFraction(2 * count_ - 1, 2 * count_ + 1);
   }
-  origin_ = count_ > 0 ? last_event_ : std::max(earliest, last_event_ + kRestBeforeEnd);
+  origin_ = count_ > 0 ? last_.tick : std::max(earliest, last_.tick + kRestBeforeEnd);
   plan_next();
 }
 
-void Planner::pop() {
-  const bool step = next_->has(MotionEvent::kStep);
-  const bool inflate = next_->has(MotionEvent::kInflate);
-  const bool goes_on = step && stepped_ && inflate == last_inflate_;
-  last_interval_ = goes_on ? next_->tick - last_event_ : Ticks{0};
-  last_event_ = next_->tick;
-  last_inflate_ = inflate;
-  stepped_ = step;
-  plan_next();
+/// Between the last two steps if they went the same way; 0 at rest and at a turning point.
+Ticks Planner::last_interval() const {
+  constexpr std::uint16_t kWay = MotionEvent::kStep | MotionEvent::kInflate;
+  const bool goes_on = last_.has(MotionEvent::kStep) && ((last_.flags ^ before_last_.flags) & kWay) == 0;
+  return goes_on ? last_.tick - before_last_.tick : Ticks{0};
 }
 
 void Planner::begin_ramp(Steps to, Phase then) {
@@ -191,8 +187,8 @@ MotionEvent Planner::stop_step() {
 }
 
 void Planner::plan_next() {
-  next_.reset();
-  while (!next_ && phase_ != Phase::idle)
+  next_ = {};
+  while (next_.flags == 0 && phase_ != Phase::idle)
     plan_in_phase();
 }
 
@@ -222,7 +218,7 @@ void Planner::plan_in_phase() {
       }
       next_ = MotionEvent{origin_, MotionEvent::kSegmentStart};
       begin_segment();
-      if (count_ == 0) next_->flags |= still_cycle_mark().flags;
+      if (count_ == 0) next_.flags |= still_cycle_mark().flags;
       break;
     case Phase::cycles:
       if (count_ > 0)

@@ -12,7 +12,6 @@
 // that holds is approached by a ramp to offset + stroke; its cycles have no steps, but begin and trigger.
 
 #include <cstdint>
-#include <optional>
 
 #include "firmware/core/profiles/profile.hpp"
 #include "firmware/core/program.hpp"
@@ -35,7 +34,7 @@ struct MotionEvent {
     kEnd = 128,          ///< everything planned has been done; no step
   };
   Ticks tick;
-  std::uint16_t flags = 0;
+  std::uint16_t flags = 0;  ///< 0: no event
 
   [[nodiscard]] bool has(Flag flag) const { return (flags & flag) != 0; }
 };
@@ -59,11 +58,15 @@ class Planner {
   /// stop may go one step beyond it. A run not begun still begins; one whose end has been popped ends as planned.
   void begin_stop(Ticks earliest, std::uint64_t deceleration_steps_per_s2);
   /// Forgets everything planned.
-  void clear() { next_.reset(); }
+  void clear() { next_ = {}; }
 
   /// The next event, or nullptr when all have been popped. Ticks increase.
-  [[nodiscard]] const MotionEvent* peek() const { return next_ ? &*next_ : nullptr; }
-  void pop();
+  [[nodiscard]] const MotionEvent* peek() const { return next_.flags != 0 ? &next_ : nullptr; }
+  void pop() {
+    before_last_ = last_;
+    last_ = next_;
+    plan_next();
+  }
 
   /// When the first cycle of a segment begins, relative to the start of run, if the run starts at position 0.
   static Ticks segment_offset(const Program& program, const Settings& settings, std::size_t segment);
@@ -72,6 +75,7 @@ class Planner {
   enum class Phase : std::uint8_t { idle, run_start, rest, ramp, segment_start, cycles, travel, stop, end };
 
   void plan_next();
+  [[nodiscard]] Ticks last_interval() const;
   void plan_in_phase();
   void end_ramp();
   void end_steps(Ticks duration);
@@ -88,7 +92,7 @@ class Planner {
 
   const Program* program_ = nullptr;
   Settings settings_;
-  std::optional<MotionEvent> next_;
+  MotionEvent next_;
   Phase phase_ = Phase::idle;
   Phase after_ramp_ = Phase::idle;
   Ticks origin_;             ///< when the present ramp, cycle, travel or stop began
@@ -105,11 +109,9 @@ class Planner {
   std::uint64_t cycle_in_run_ = 0;
   bool stop_at_cycle_end_ = false;
 
-  // The last event popped, from which a stop takes its place and its speed.
-  Ticks last_event_;
-  Ticks last_interval_;  ///< to the step before it in the same direction; 0 without one: at rest or turning
-  bool last_inflate_ = false;
-  bool stepped_ = false;  ///< the last event was a step
+  // The last two events popped, from which a stop takes its place and its speed.
+  MotionEvent last_;
+  MotionEvent before_last_;
 };
 
 }  // namespace diastole::firmware

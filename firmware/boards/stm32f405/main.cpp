@@ -2,6 +2,7 @@
 
 #include "firmware/boards/stm32f405/pins.hpp"
 #include "firmware/boards/stm32f405/registers.hpp"
+#include "firmware/boards/stm32f405/step_path.hpp"
 #include "firmware/boards/stm32f405/stm32_board.hpp"
 #include "firmware/core/controller.hpp"
 

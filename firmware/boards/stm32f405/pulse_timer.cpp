@@ -5,7 +5,6 @@
 
 namespace diastole::stm32 {
 
-using firmware::PulseOrder;
 using firmware::Ticks;
 
 namespace {
@@ -60,10 +59,10 @@ void PulseTimer::set_direction(bool inflate, std::uint32_t step_tick) {
   if (has_passed(due)) set_direction_mode(inflate ? kHigh : kLow);
 }
 
-void PulseTimer::raise_ttl(const PulseOrder& order) {
-  ttl_width_ = firmware::lower_half(order.ttl_width);
+void PulseTimer::raise_ttl(std::uint32_t tick, Ticks width) {
+  ttl_width_ = firmware::lower_half(width);
   ttl_rising_ = true;
-  tim2().CCR2.write(order.tick);
+  tim2().CCR2.write(tick);
   clear_flag(kCompare2);
   set_ttl_mode(kActiveOnMatch);
   tim2().DIER.set(kCompare2);

@@ -27,7 +27,7 @@ class PulseTimer {
   /// TIM5's interrupt tells when the order has been carried out.
   void schedule(const firmware::PulseOrder& order) {
     steps_.schedule(order.tick, order.step);
-    if (order.ttl) raise_ttl(order);
+    if (order.ttl) raise_ttl(order.tick, order.ttl_width);
     if (order.step && order.inflate != inflate_) set_direction(order.inflate, order.tick);
   }
   void rest() { steps_.rest(); }
@@ -36,7 +36,7 @@ class PulseTimer {
   void interrupt();
 
  private:
-  void raise_ttl(const firmware::PulseOrder& order);
+  void raise_ttl(std::uint32_t tick, firmware::Ticks width);
   void set_direction(bool inflate, std::uint32_t step_tick);
   void ttl_interrupt();
 

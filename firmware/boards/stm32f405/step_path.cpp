@@ -1,0 +1,8 @@
+#include "firmware/boards/stm32f405/step_path.hpp"
+
+namespace diastole::firmware {
+
+template class StepEngine<stm32::Stm32Board>;
+template void Motion<stm32::Stm32Board>::refill();
+
+}  // namespace diastole::firmware
