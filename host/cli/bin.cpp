@@ -1,25 +1,37 @@
 #include <fmt/format.h>
 
+#include <cstdlib>
 #include <iostream>
 #include <memory>
-#include <nlohmann/json.hpp>
 
+#include "host/cli/bin_output.hpp"
 #include "host/cli/host_commands.hpp"
+#include "host/cli/text_file.hpp"
 #include "protocol/contract/input_error.hpp"
-#include "protocol/runfile/frame_bins.hpp"
 #include "protocol/runfile/reader.hpp"
+#include "protocol/runfile/signal_delay.hpp"
 
 namespace diastole {
 namespace {
 
-using nlohmann::json;
+constexpr double s_per_ms = 1e-3;
+constexpr size_t default_frames = 16;
 
 struct BinOptions {
   std::string run;
-  size_t frames = 16;
-  std::optional<size_t> segment;
-  std::string channel = "cavity_kPa";
+  std::optional<size_t> frames;
   std::vector<std::string> windows;
+  std::string frame_times;
+  std::optional<double> first_ms, tr_ms, width_ms;
+  int64_t gate_every = 1;
+  std::string delay_ms;
+  std::optional<size_t> segment, slice;
+  std::string channel = "cavity_kPa";
+  std::string frames_csv;
+  bool relative = false;
+  bool force = false;
+
+  [[nodiscard]] bool real_windows() const { return !frame_times.empty() || tr_ms || !windows.empty(); }
 };
 
 runfile::FrameWindow parse_window(const std::string& text) {
@@ -32,55 +44,69 @@ runfile::FrameWindow parse_window(const std::string& text) {
   return window;
 }
 
-json as_json(const std::string& run, const runfile::FrameBins& bins) {
-  json frames = json::array();
-  for (size_t k = 0; k < bins.frames.size(); ++k) {
-    const runfile::FrameBin& bin = bins.frames[k];
-    frames.push_back({{"frame", k},
-                      {"from_s", bin.window.from_s},
-                      {"to_s", bin.window.to_s},
-                      {"mean_kPa", bin.mean_kPa},
-                      {"sd_kPa", bin.sd_kPa},
-                      {"sample_sd_kPa", bin.sample_sd_kPa},
-                      {"drift_kPa_per_cycle", bin.drift_kPa_per_cycle},
-                      {"cycles", bin.cycles},
-                      {"samples", bin.samples}});
+/// Empty: equal frames.
+std::vector<runfile::FrameWindow> windows_asked(const BinOptions& options, double interval_s) {
+  std::vector<runfile::FrameWindow> windows;
+  for (const std::string& window : options.windows)
+    windows.push_back(parse_window(window));
+  std::vector<runfile::FrameStart> starts;
+  if (!options.frame_times.empty()) starts = runfile::read_frame_times(options.frame_times);
+  if (options.tr_ms) {
+    starts = runfile::repeated_starts(options.frames.value_or(default_frames),
+                                      s_per_ms * options.first_ms.value_or(0), s_per_ms * *options.tr_ms);
   }
-  json excluded = json::array();
-  for (const runfile::ExcludedCycle& cycle : bins.excluded)
-    excluded.push_back({{"cycle", cycle.cycle}, {"trigger_s", cycle.trigger_s}, {"reason", cycle.reason}});
-  return {{"run", run},
-          {"segment", bins.segment},
-          {"period_s", bins.period_s},
-          {"scheduled_cycles", bins.scheduled_cycles},
-          {"triggers", bins.triggers},
-          {"frames", frames},
-          {"excluded", excluded}};
+  if (starts.empty()) return windows;
+  std::optional<double> width_s;
+  if (options.width_ms) width_s = s_per_ms * *options.width_ms;
+  return runfile::windows_of(starts, width_s, interval_s);
 }
 
-void show(const runfile::FrameBins& bins) {
-  fmt::print("segment {}, period {:g} s, {} of {} cycles used\n", bins.segment, bins.period_s,
-             bins.frames.front().cycles, bins.scheduled_cycles);
-  fmt::print("frame    from_s      to_s  mean_kPa    sd_kPa  cycles\n");
-  for (size_t k = 0; k < bins.frames.size(); ++k) {
-    const runfile::FrameBin& bin = bins.frames[k];
-    fmt::print("{:5} {:9.4f} {:9.4f} {:9.4f} {:9.4f} {:7}\n", k, bin.window.from_s, bin.window.to_s,
-               bin.mean_kPa, bin.sd_kPa, bin.cycles);
+RemovedDelay delay_asked(const BinOptions& options, const runfile::RecordedRun& run) {
+  const bool from_run = options.delay_ms == "run" || (options.delay_ms.empty() && options.real_windows());
+  if (from_run) {
+    const runfile::SignalDelay delay = runfile::signal_delay(run, options.channel);
+    return {delay.total_s(), fmt::format("the run: catheter {:.2f} ms, filter {:.2f} ms",
+                                         1e3 * delay.catheter_s, 1e3 * delay.filter_s)};
   }
+  if (options.delay_ms.empty()) return {0, "none asked for"};
+  char* end = nullptr;
+  const double delay_ms = std::strtod(options.delay_ms.c_str(), &end);
+  if (*end != '\0' || !(std::abs(delay_ms) <= 1000)) {
+    throw InputError({"", "--delay-ms " + options.delay_ms, "is neither a number of milliseconds nor \"run\"",
+                      "For example --delay-ms 3.2, or --delay-ms run for what the run file tells."});
+  }
+  return {s_per_ms * delay_ms, "given"};
+}
+
+double resolution_kPa(const runfile::RecordedRun& run) {
+  const auto found = run.rig.find("cavity_resolution_kPa");
+  const auto* value = found == run.rig.end() ? nullptr : std::get_if<double>(&found->second);
+  return value == nullptr ? 0 : *value;
 }
 
 ExitCode bin(const BinOptions& options, const CommandOutput& out) {
-  runfile::FrameBinOptions how{
-      .frames = options.frames, .windows = {}, .segment = options.segment, .channel = options.channel};
-  for (const std::string& window : options.windows)
-    how.windows.push_back(parse_window(window));
-  const runfile::FrameBins bins = runfile::bin_frames(runfile::read_run(options.run), how);
+  if (!options.frames_csv.empty()) require_new_file(options.frames_csv, options.force);
+  const runfile::RecordedRun run = runfile::read_run(options.run);
+  runfile::FrameBinOptions how{.frames = options.frames.value_or(default_frames),
+                               .segment = options.segment,
+                               .slice = options.slice,
+                               .channel = options.channel,
+                               .gate_every = options.gate_every};
+  const RemovedDelay delay = delay_asked(options, run);
+  how.delay_s = delay.delay_s;
+  if (options.real_windows()) {
+    how.windows = windows_asked(options, runfile::binned_interval_s(run, how));
+  }
+  const runfile::FrameBins bins = runfile::bin_frames(run, how);
   for (const runfile::ExcludedCycle& cycle : bins.excluded)
     fmt::print(stderr, "cycle {} at {:.3f} s is left out: {}\n", cycle.cycle, cycle.trigger_s, cycle.reason);
+  if (!options.frames_csv.empty()) {
+    write_text_file(options.frames_csv, frames_csv(bins, resolution_kPa(run), options.relative));
+  }
   if (out.json) {
-    std::cout << as_json(options.run, bins).dump(2) << '\n';
+    std::cout << bins_as_json(options.run, bins, delay).dump(2) << '\n';
   } else {
-    show(bins);
+    show_bins(bins, delay);
   }
   return ExitCode::done;
 }
@@ -89,19 +115,47 @@ ExitCode bin(const BinOptions& options, const CommandOutput& out) {
 
 void add_bin(CommandLine& line) {
   auto options = std::make_shared<BinOptions>();
-  CLI::App* command =
-      line.add("bin", "pressure averaged into the image frames of a cycle",
-               "  diastole bin gel.run.h5 --frames 16\n"
-               "      16 equal frames from each trigger on; sd_kPa is over the cycles\n"
-               "  diastole bin gel.run.h5 --segment 2 --json\n"
-               "  diastole bin gel.run.h5 --window 0.00:0.06 --window 0.10:0.16\n"
-               "      the windows in which the scanner really took its lines, in seconds from the trigger");
+  CLI::App* command = line.add(
+      "bin", "pressure averaged into the image frames of a cycle",
+      "  diastole bin gel.run.h5 --frames 16\n"
+      "      16 equal frames from each trigger on; sd_kPa is over the cycles\n"
+      "  diastole bin gel.run.h5 --frame-times gel.times.csv --frames-csv gel.frames.csv\n"
+      "      the frames' times as the images tell them (TriggerTime), in a table with the columns\n"
+      "      trigger_time_ms and, if known, width_ms; the pressures as a study's frames file\n"
+      "  diastole bin gel.run.h5 --first-ms 12 --tr-ms 70 --frames 16 --json\n"
+      "  diastole bin flow.run.h5 --first-ms 8 --tr-ms 36 --frames 64 --gate-every 2\n"
+      "      phase contrast: the scanner takes every second R-wave and images two cycles\n"
+      "  diastole bin gel.run.h5 --window 0.00:0.06 --window 0.10:0.16\n"
+      "The delay of catheter and filter is removed from real windows, as far as the run tells it; equal\n"
+      "frames are counted from the trigger as they are, unless --delay-ms is given. A cycle with a missing\n"
+      "sample, or whose triggers are not in time, is left out and told; dummy cycles never count.");
   command->add_option("RUN", options->run, "run file")->required();
-  command->add_option("--frames", options->frames, "equal frames in a cycle")->check(CLI::Range(1, 10000));
+  command->add_option("--frames", options->frames, "frames in a cycle; default: 16")
+      ->check(CLI::Range(1, 10000));
+  auto* times = command->add_option("--frame-times", options->frame_times,
+                                    "CSV with trigger_time_ms and perhaps width_ms, one row a frame");
+  auto* tr = command->add_option("--tr-ms", options->tr_ms, "frames begin this far apart")
+                 ->check(CLI::Range(0.001, 1e6));
+  command->add_option("--first-ms", options->first_ms, "the first frame begins this long after the trigger")
+      ->needs(tr);
+  auto* window =
+      command->add_option("--window", options->windows, "FROM:TO of one frame in seconds; may be repeated");
+  times->excludes(tr)->excludes(window);
+  tr->excludes(window);
+  command->add_option("--width-ms", options->width_ms, "a frame's length, instead of to the next frame")
+      ->check(CLI::Range(0.001, 1e6));
+  command->add_option("--gate-every", options->gate_every, "the scanner takes every n-th R-wave")
+      ->check(CLI::Range(1, 10000));
+  command->add_option("--delay-ms", options->delay_ms,
+                      "delay of the signal to remove, or \"run\": what the run file tells");
   command->add_option("--segment", options->segment,
                       "segment number, from 0; default: the first with triggers");
+  command->add_option("--slice", options->slice, "slice number, from 0; default: all slices of the segment");
   command->add_option("--channel", options->channel, "pressure channel");
-  command->add_option("--window", options->windows, "FROM:TO of one frame, instead of equal frames");
+  auto* csv = command->add_option("--frames-csv", options->frames_csv,
+                                  "also write frame,time_s,pressure_kPa,sigma_kPa for a study");
+  command->add_flag("--relative", options->relative, "in that file, pressures above frame 0's")->needs(csv);
+  command->add_flag("--force", options->force, "replace that file if it exists");
   line.on_run(command, [options](const CommandOutput& out) { return bin(*options, out); });
 }
 

@@ -40,6 +40,26 @@ json stream_json(const runfile::StreamFacts& facts) {
           {"longest_step_ms", facts.irregularity.longest_ms}};
 }
 
+json attributes_json(const std::map<std::string, runfile::Attribute, std::less<>>& attributes) {
+  json object = json::object();
+  for (const auto& [name, value] : attributes)
+    std::visit([&, key = name](const auto& v) { object[key] = v; }, value);
+  return object;
+}
+
+json slices_json(const runfile::RecordedRun& run) {
+  json slices = json::array();
+  for (const runfile::Slice& slice : run.slices) {
+    slices.push_back({{"block", slice.block},
+                      {"slice", slice.number},
+                      {"first_trigger", slice.first_trigger},
+                      {"triggers", slice.triggers},
+                      {"cycles", slice.cycles},
+                      {"dummy_cycles", slice.dummy_cycles}});
+  }
+  return slices;
+}
+
 json as_json(const runfile::RecordedRun& run, const runfile::Soundness& soundness) {
   json document{{"run", run.file},
                 {"run_id", run.run_id},
@@ -48,6 +68,11 @@ json as_json(const runfile::RecordedRun& run, const runfile::Soundness& soundnes
                 {"duration_s", soundness.duration_s},
                 {"scheduled_cycles", soundness.scheduled_cycles},
                 {"triggers", run.trigger_s.size()},
+                {"trigger_faults",
+                 {{"missing", soundness.triggers.missing},
+                  {"extra", soundness.triggers.extra},
+                  {"non_periodic", soundness.triggers.non_periodic}}},
+                {"slices", slices_json(run)},
                 {"samples", soundness.pressure.rows - static_cast<size_t>(soundness.pressure.missing)},
                 {"pressure", stream_json(soundness.pressure)},
                 {"pump", stream_json(soundness.pump)},
@@ -63,6 +88,8 @@ json as_json(const runfile::RecordedRun& run, const runfile::Soundness& soundnes
     const Range range = range_of(values_kPa);
     document["channels"][name] = {{"min_kPa", range.any() ? json(range.least) : json()},
                                   {"max_kPa", range.any() ? json(range.most) : json()}};
+    if (const auto notes = run.pressure.notes.find(name); notes != run.pressure.notes.end())
+      document["channels"][name]["notes"] = attributes_json(notes->second);
   }
   document["segments"] = json::array();
   for (const runfile::Segment& segment : run.segments) {
@@ -92,6 +119,34 @@ std::string in_words(const runfile::StreamFacts& facts) {
   return words;
 }
 
+void show_channels(const runfile::RecordedRun& run) {
+  for (const auto& [name, values_kPa] : run.pressure.channels) {
+    const Range range = range_of(values_kPa);
+    fmt::print("    {}: {}\n", name,
+               range.any() ? fmt::format("{:.3f} to {:.3f} kPa", range.least, range.most) : "no sample");
+    const auto notes = run.pressure.notes.find(name);
+    if (notes == run.pressure.notes.end()) continue;
+    for (const auto& [note, value] : notes->second)
+      std::visit([&, key = note](const auto& v) { fmt::print("      {}: {}\n", key, v); }, value);
+  }
+}
+
+void show_slices(const runfile::RecordedRun& run) {
+  for (size_t i = 0; i < run.slices.size(); ++i) {
+    const runfile::Slice& slice = run.slices[i];
+    fmt::print("  slice {} ({} {}): {} of {} cycles, triggers {} to {}\n", i, slice.block, slice.number,
+               slice.triggers, slice.cycles, slice.first_trigger, slice.first_trigger + slice.triggers - 1);
+  }
+}
+
+void show_triggers(const runfile::RecordedRun& run, const runfile::Soundness& soundness) {
+  const std::string holds =
+      soundness.scheduled_holds > 0 ? fmt::format(" and {} of hold", soundness.scheduled_holds) : "";
+  const runfile::TriggerCounts& counts = soundness.triggers;
+  fmt::print("  triggers: {} for {} cycles{}; {} missing, {} extra, {} not periodic\n", run.trigger_s.size(),
+             soundness.scheduled_cycles, holds, counts.missing, counts.extra, counts.non_periodic);
+}
+
 void show(const runfile::RecordedRun& run, const runfile::Soundness& soundness) {
   fmt::print("{}\n  run {} of {}, by {}\n", run.file, run.run_id, run.started_utc, run.producer);
   for (size_t i = 0; i < run.segments.size(); ++i) {
@@ -101,15 +156,10 @@ void show(const runfile::RecordedRun& run, const runfile::Soundness& soundness) 
                run.flow.contains(i) ? ", with phase-contrast volumes" : "");
   }
   fmt::print("  pressure: {}\n", in_words(soundness.pressure));
-  for (const auto& [name, values_kPa] : run.pressure.channels) {
-    const Range range = range_of(values_kPa);
-    fmt::print("    {}: {}\n", name,
-               range.any() ? fmt::format("{:.3f} to {:.3f} kPa", range.least, range.most) : "no sample");
-  }
+  show_channels(run);
   fmt::print("  pump: {}\n", in_words(soundness.pump));
-  const std::string holds =
-      soundness.scheduled_holds > 0 ? fmt::format(" and {} of hold", soundness.scheduled_holds) : "";
-  fmt::print("  triggers: {} for {} cycles{}\n", run.trigger_s.size(), soundness.scheduled_cycles, holds);
+  show_triggers(run, soundness);
+  show_slices(run);
   for (const auto& [name, value] : run.clock)
     fmt::print("  clock {}: {:g}\n", name, value);
   for (const runfile::Event& event : run.events)

@@ -32,6 +32,16 @@ void write_protocol(H5Sink& sink, const runfile::RecordedRun& run) {
               {"offset_mL", column(run.segments, &Segment::offset_mL)},
               {"cycles", column(run.segments, &Segment::cycles)}},
              runfile::segments_units);
+  if (run.slices.empty()) return;
+  using runfile::Slice;
+  sink.table(runfile::protocol_slices,
+             {{"block", column(run.slices, &Slice::block)},
+              {"slice", column(run.slices, &Slice::number)},
+              {"first_trigger", column(run.slices, &Slice::first_trigger)},
+              {"triggers", column(run.slices, &Slice::triggers)},
+              {"cycles", column(run.slices, &Slice::cycles)},
+              {"dummy_cycles", column(run.slices, &Slice::dummy_cycles)}},
+             runfile::slices_units);
 }
 
 void write_streams(H5Sink& sink, const runfile::RecordedRun& run) {

@@ -94,6 +94,22 @@ void check_gaps(const RecordedRun& run) {
   }
 }
 
+void check_slices(const RecordedRun& run) {
+  int64_t next_trigger = 0;
+  for (size_t i = 0; i < run.slices.size(); ++i) {
+    const Slice& slice = run.slices[i];
+    const auto rows = std::ssize(run.trigger_s);
+    const bool in_order = slice.first_trigger >= next_trigger && slice.first_trigger <= rows;
+    if (!in_order || slice.triggers < 0 || slice.triggers > rows - slice.first_trigger) {
+      fail_at(
+          run, protocol_slices, i,
+          fmt::format("has triggers {} of the {} from row {} on", slice.triggers, rows, slice.first_trigger),
+          "Slices follow one another, and each lies within the recorded triggers.");
+    }
+    next_trigger = slice.first_trigger + slice.triggers;
+  }
+}
+
 }  // namespace
 
 void check(const RecordedRun& run) {
@@ -109,6 +125,7 @@ void check(const RecordedRun& run) {
     check_values(run, dataset, values_kPa);
   }
   check_times(run, trigger_time, run.trigger_s);
+  check_slices(run);
   for (const auto& [segment, flow] : run.flow) {
     const std::string group = fmt::format("{}/{}", flow_group, segment);
     check_times(run, group + "/phase_s", flow.phase_s);

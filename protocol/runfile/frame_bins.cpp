@@ -8,13 +8,13 @@
 #include <span>
 
 #include "protocol/contract/input_error.hpp"
+#include "protocol/runfile/cycles.hpp"
 #include "protocol/runfile/spacing.hpp"
 
 namespace diastole::runfile {
 namespace {
 
 constexpr double time_tolerance_s = 1e-6;  // a sample on a window's edge belongs to the window it opens
-constexpr double period_tolerance = 0.01;  // of the period, between triggers
 
 struct Samples {
   std::span<const double> time_s;
@@ -43,44 +43,59 @@ std::pair<size_t, size_t> rows_within(const Samples& samples, double from_s, dou
   return {static_cast<size_t>(first - time_s.begin()), static_cast<size_t>(last - time_s.begin())};
 }
 
-std::vector<double> triggers_of(const RecordedRun& run, const Segment& segment) {
-  const double slack_s = 0.5 * period_tolerance * segment.period_s;
-  std::vector<double> triggers_s;
-  for (const double t : run.trigger_s) {
-    if (t >= segment.start_s - slack_s && t < segment.end_s() - slack_s) triggers_s.push_back(t);
+bool in_slices(const RecordedRun& run, std::optional<size_t> only, size_t row) {
+  for (size_t i = 0; i < run.slices.size(); ++i) {
+    const Slice& slice = run.slices[i];
+    const auto behind = static_cast<int64_t>(row) - slice.first_trigger;
+    if ((!only || *only == i) && behind >= 0 && behind < slice.triggers) return true;
   }
-  return triggers_s;
+  return false;
+}
+
+/// The triggers whose cycles may enter: those of the slices, if there are slices.
+SegmentTriggers imaged_triggers(const RecordedRun& run, size_t segment, std::optional<size_t> slice) {
+  SegmentTriggers imaged = triggers_of(run, segment);
+  if (run.slices.empty()) return imaged;
+  std::erase_if(imaged.triggers,
+                [&](const CycleTrigger& trigger) { return !in_slices(run, slice, trigger.row); });
+  return imaged;
 }
 
 size_t choose_segment(const RecordedRun& run, const FrameBinOptions& options) {
+  if (options.slice && *options.slice >= run.slices.size()) {
+    fail(run, fmt::format("slice {}", *options.slice),
+         fmt::format("does not exist; the run has {}", run.slices.size()), "Slices count from 0.");
+  }
   if (options.segment) {
     if (*options.segment >= run.segments.size()) {
       fail(run, fmt::format("segment {}", *options.segment),
            fmt::format("does not exist; the run has {}", run.segments.size()), "Segments count from 0.");
     }
-    if (triggers_of(run, run.segments[*options.segment]).empty()) {
+    if (imaged_triggers(run, *options.segment, options.slice).triggers.empty()) {
       fail(run, fmt::format("segment {}", *options.segment), "has no trigger",
            "Choose a segment with motion; `diastole inspect` lists them.");
     }
     return *options.segment;
   }
   for (size_t i = 0; i < run.segments.size(); ++i) {
-    if (!triggers_of(run, run.segments[i]).empty()) return i;
+    if (!imaged_triggers(run, i, options.slice).triggers.empty()) return i;
   }
   fail(run, "dataset /trigger/time_s", "holds no trigger within a segment",
        "Only a run with triggered cycles can be binned.");
 }
 
-void check_windows(const RecordedRun& run, const std::vector<FrameWindow>& windows, double period_s) {
+void check_windows(const RecordedRun& run, const std::vector<FrameWindow>& windows, double interval_s) {
   if (windows.empty()) fail(run, "", "no frame is asked for", "Ask for at least one frame.");
   for (size_t k = 0; k < windows.size(); ++k) {
     const FrameWindow& window = windows[k];
-    if (window.from_s >= 0 && window.to_s > window.from_s && window.to_s <= period_s + time_tolerance_s) {
+    if (window.from_s >= 0 && window.to_s > window.from_s && window.to_s <= interval_s + time_tolerance_s) {
       continue;
     }
     fail(run, fmt::format("frame {}", k),
-         fmt::format("spans {} to {} s, outside the cycle of {} s", window.from_s, window.to_s, period_s),
-         "A frame must lie within one cycle.");
+         fmt::format("spans {:g} to {:g} s, outside the cycle of {:g} s", window.from_s, window.to_s,
+                     interval_s),
+         "A schedule longer than the cycle runs into the next: take the frames' times from the images "
+         "(TriggerTime), or if the scanner takes every n-th R-wave, say so (gate every n).");
   }
 }
 
@@ -105,13 +120,13 @@ std::string why_not_whole(const Samples& samples, double trigger_s, double end_s
   return {};
 }
 
-CycleMeans means_of_cycle(const Samples& samples, const std::vector<FrameWindow>& windows, double trigger_s,
-                          double period_s) {
-  CycleMeans cycle{{}, why_not_whole(samples, trigger_s, trigger_s + period_s)};
+/// `windows` and `interval_s` count from `from_s`: the trigger, and the signal's delay behind it.
+CycleMeans means_of_cycle(const Samples& samples, const std::vector<FrameWindow>& windows, double from_s,
+                          double interval_s) {
+  CycleMeans cycle{{}, why_not_whole(samples, from_s, from_s + interval_s)};
   if (!cycle.exclusion.empty()) return cycle;
   for (size_t k = 0; k < windows.size(); ++k) {
-    const auto [first, last] =
-        rows_within(samples, trigger_s + windows[k].from_s, trigger_s + windows[k].to_s);
+    const auto [first, last] = rows_within(samples, from_s + windows[k].from_s, from_s + windows[k].to_s);
     if (first == last) {
       cycle.exclusion = fmt::format("no sample falls into frame {}", k);
       cycle.frame_without_sample = true;
@@ -124,17 +139,19 @@ CycleMeans means_of_cycle(const Samples& samples, const std::vector<FrameWindow>
   return cycle;
 }
 
-/// "the next trigger came after 1.31 s" when it is not one period later; empty for the last of a segment.
-std::string irregular_trigger(std::span<const double> triggers_s, size_t i, double period_s) {
-  if (i + 1 == triggers_s.size()) return {};
-  const double interval_s = triggers_s[i + 1] - triggers_s[i];
-  if (std::abs(interval_s - period_s) <= period_tolerance * period_s) return {};
-  return fmt::format("the next trigger came after {:.4f} s, not after {:.4f} s", interval_s, period_s);
+/// Why the interval that triggers[i] begins is out of tolerance: any of its cycles is, or ends with the segment.
+std::string irregular_interval(const SegmentTriggers& segment, size_t i, int64_t gate_every) {
+  const auto& triggers = segment.triggers;
+  if (triggers[i].cycle + gate_every > segment.scheduled) return "the segment ends within its interval";
+  for (size_t j = i; j < triggers.size() && triggers[j].cycle < triggers[i].cycle + gate_every; ++j) {
+    if (!triggers[j].fault.empty()) return triggers[j].fault;
+  }
+  return {};
 }
 
 struct UsedCycle {
   double number;  // within the segment
-  double trigger_s;
+  double from_s;  // the trigger, and the signal's delay behind it
   std::vector<double> mean_kPa;
 };
 
@@ -153,8 +170,7 @@ FrameBin summarise(const Samples& samples, const FrameWindow& window, size_t k,
     squares += deviation * deviation;
     products += (cycle.number - number_mean) * deviation;
     numbers += (cycle.number - number_mean) * (cycle.number - number_mean);
-    const auto [first, last] =
-        rows_within(samples, cycle.trigger_s + window.from_s, cycle.trigger_s + window.to_s);
+    const auto [first, last] = rows_within(samples, cycle.from_s + window.from_s, cycle.from_s + window.to_s);
     for (size_t i = first; i < last; ++i) {
       const double from_mean = samples.value_kPa[i] - bin.mean_kPa;
       sample_sum += from_mean;
@@ -165,21 +181,39 @@ FrameBin summarise(const Samples& samples, const FrameWindow& window, size_t k,
   const auto count = static_cast<double>(bin.samples);
   bin.sd_kPa = n > 1 ? std::sqrt(squares / (n - 1)) : 0;
   bin.drift_kPa_per_cycle = numbers > 0 ? products / numbers : 0;
+  if (n > 2) {
+    const double left = std::max(0.0, squares - bin.drift_kPa_per_cycle * products);
+    bin.drift_se_kPa_per_cycle = std::sqrt(left / (n - 2) / numbers);
+  }
   bin.sample_sd_kPa =
       count > 1 ? std::sqrt(std::max(0.0, sample_squares - sample_sum * sample_sum / count) / (count - 1))
                 : 0;
   return bin;
 }
 
+int64_t scheduled_cycles(const RecordedRun& run, const FrameBinOptions& options,
+                         const SegmentTriggers& segment) {
+  if (run.slices.empty()) return segment.scheduled;
+  int64_t cycles = 0;
+  for (size_t i = 0; i < run.slices.size(); ++i)
+    cycles += !options.slice || *options.slice == i ? run.slices[i].cycles : 0;
+  return cycles;
+}
+
+/// The controller counts cycles through the whole run when it gates.
+int64_t cycles_before_segment(const RecordedRun& run, size_t segment) {
+  int64_t cycles = 0;
+  for (size_t i = 0; i < segment; ++i) {
+    const bool untriggered = run.segments[i].waveform == "hold" && triggers_of(run, i).triggers.empty();
+    cycles += untriggered ? 0 : run.segments[i].cycles;
+  }
+  return cycles;
+}
+
 }  // namespace
 
-std::vector<FrameWindow> equal_windows(size_t frames, double period_s) {
-  std::vector<FrameWindow> windows;
-  const double length_s = period_s / static_cast<double>(frames);
-  for (size_t k = 0; k < frames; ++k) {
-    windows.push_back({static_cast<double>(k) * length_s, static_cast<double>(k + 1) * length_s});
-  }
-  return windows;
+double binned_interval_s(const RecordedRun& run, const FrameBinOptions& options) {
+  return run.segments[choose_segment(run, options)].period_s * static_cast<double>(options.gate_every);
 }
 
 FrameBins bin_frames(const RecordedRun& run, const FrameBinOptions& options) {
@@ -190,33 +224,39 @@ FrameBins bin_frames(const RecordedRun& run, const FrameBinOptions& options) {
   }
   FrameBins bins;
   bins.segment = choose_segment(run, options);
-  const Segment& segment = run.segments[bins.segment];
-  bins.period_s = segment.period_s;
-  bins.scheduled_cycles = segment.cycles;
+  const SegmentTriggers segment = imaged_triggers(run, bins.segment, options.slice);
+  bins.period_s = run.segments[bins.segment].period_s;
+  bins.interval_s = binned_interval_s(run, options);
+  bins.scheduled_cycles = scheduled_cycles(run, options, segment);
+  bins.triggers = segment.triggers.size();
   const auto windows =
-      options.windows.empty() ? equal_windows(options.frames, bins.period_s) : options.windows;
-  check_windows(run, windows, bins.period_s);
+      options.windows.empty() ? equal_windows(options.frames, bins.interval_s) : options.windows;
+  check_windows(run, windows, bins.interval_s);
 
   const double spacing_s = median_spacing_s(run.pressure.time_s);
   const Samples samples{run.pressure.time_s, channel->second, spacing_s,
                         holes_before(run.pressure.time_s, spacing_s)};
-  const std::vector<double> triggers_s = triggers_of(run, segment);
-  bins.triggers = triggers_s.size();
+  const int64_t cycles_before = cycles_before_segment(run, bins.segment);
   std::vector<UsedCycle> used;
   bool frames_too_short = false;
-  for (size_t i = 0; i < triggers_s.size(); ++i) {
-    CycleMeans cycle = means_of_cycle(samples, windows, triggers_s[i], bins.period_s);
-    if (cycle.exclusion.empty()) cycle.exclusion = irregular_trigger(triggers_s, i, bins.period_s);
+  for (size_t i = 0; i < segment.triggers.size(); ++i) {
+    const CycleTrigger& trigger = segment.triggers[i];
+    if ((cycles_before + trigger.cycle) % options.gate_every != 0) continue;
+    const double from_s = trigger.time_s + options.delay_s;
+    CycleMeans cycle = means_of_cycle(samples, windows, from_s, bins.interval_s);
+    if (cycle.exclusion.empty()) cycle.exclusion = irregular_interval(segment, i, options.gate_every);
     if (cycle.exclusion.empty()) {
-      used.push_back({static_cast<double>(i), triggers_s[i], std::move(cycle.mean_kPa)});
+      used.push_back({static_cast<double>(trigger.cycle), from_s, std::move(cycle.mean_kPa)});
     } else {
       frames_too_short = frames_too_short || cycle.frame_without_sample;
-      bins.excluded.push_back({i, triggers_s[i], std::move(cycle.exclusion)});
+      bins.excluded.push_back({i, trigger.time_s, std::move(cycle.exclusion)});
     }
   }
   if (used.empty()) {
     fail(run, fmt::format("segment {}", bins.segment),
-         fmt::format("has no whole cycle; the first: {}", bins.excluded.front().reason),
+         bins.excluded.empty()
+             ? "has no gated cycle"
+             : fmt::format("has no whole cycle; the first: {}", bins.excluded.front().reason),
          frames_too_short ? fmt::format("Ask for fewer frames: samples are {:.2f} ms apart.", 1e3 * spacing_s)
                           : "Record again, or choose another segment.");
   }

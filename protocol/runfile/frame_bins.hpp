@@ -12,32 +12,34 @@
 //   mean_kPa   mean of p_ik over the cycles i
 //   sd_kPa     standard deviation of p_ik over the cycles (n-1); 0 if there is only one
 //   drift      slope of p_ik against the cycle's number, least squares, kPa a cycle
-// A cycle enters only if it is whole: a cycle that is not is left out of all frames, and told with its
-// reason.
+// A cycle enters only if it is whole and its triggers are in time (cycles.hpp): one that is not is left out of all
+// frames, and told with its reason. Where a run has slices, only their cycles are imaged: dummy cycles and
+// those between slices do not count at all.
+//
+// What delays the signal (catheter, filter) by d shows at t + d what the pressure was at t. With
+// `delay_s` = d, the samples from from_s + d to to_s + d make the frame.
+//
+// A scanner that takes every n-th R-wave only (`gate_every` n) has n periods for its frames: windows then count from
+// every n-th trigger of the run.
 
 #include <cstddef>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "protocol/runfile/frame_times.hpp"
 #include "protocol/runfile/run.hpp"
 
 namespace diastole::runfile {
 
-/// A frame's time after the trigger.
-struct FrameWindow {
-  double from_s = 0;
-  double to_s = 0;
-};
-
-/// `frames` windows of equal length that fill one period.
-std::vector<FrameWindow> equal_windows(size_t frames, double period_s);
-
 struct FrameBinOptions {
-  size_t frames = 16;                     ///< equal windows of the period, unless `windows` is given
-  std::vector<FrameWindow> windows = {};  ///< explicit windows; each must lie within the period
-  std::optional<size_t> segment = {};     ///< default: the first segment with triggers
+  size_t frames = 16;                     ///< equal windows of the interval, unless `windows` is given
+  std::vector<FrameWindow> windows = {};  ///< explicit windows; each must lie within the interval
+  std::optional<size_t> segment = {};     ///< default: the slice's, or the first segment with triggers
+  std::optional<size_t> slice = {};       ///< row of /protocol/slices; default: all
   std::string channel = "cavity_kPa";
+  int64_t gate_every = 1;  ///< the interval is this many periods
+  double delay_s = 0;      ///< of the signal behind the pressure
 };
 
 struct FrameBin {
@@ -47,12 +49,13 @@ struct FrameBin {
   double sample_sd_kPa =
       0;  ///< over all samples in the window: the pressure's change within it, and its noise
   double drift_kPa_per_cycle = 0;
-  size_t cycles = 0;   ///< how many cycles' means went in
-  size_t samples = 0;  ///< how many samples, over all cycles
+  double drift_se_kPa_per_cycle = 0;  ///< standard error of the slope; 0 for fewer than three cycles
+  size_t cycles = 0;                  ///< how many cycles' means went in
+  size_t samples = 0;                 ///< how many samples, over all cycles
 };
 
 struct ExcludedCycle {
-  size_t cycle = 0;  ///< from 0 within the segment
+  size_t cycle = 0;  ///< number of its trigger in the segment, from 0
   double trigger_s = 0;
   std::string reason;
 };
@@ -60,14 +63,18 @@ struct ExcludedCycle {
 struct FrameBins {
   size_t segment = 0;
   double period_s = 0;
-  int64_t scheduled_cycles = 0;
-  size_t triggers = 0;  ///< found in the segment
+  double interval_s = 0;         ///< gate_every periods
+  int64_t scheduled_cycles = 0;  ///< of the segment, or of the slices
+  size_t triggers = 0;           ///< found in the segment, or in the slices
   std::vector<FrameBin> frames;
   std::vector<ExcludedCycle> excluded;
 };
 
-/// Throws InputError when the run has no such segment or channel, the segment has no trigger, a window leaves
-/// the cycle, or no whole cycle is left (the message tells why the first was excluded).
+/// gate_every periods of the segment that `options` choose. Throws InputError as bin_frames does.
+double binned_interval_s(const RecordedRun& run, const FrameBinOptions& options);
+
+/// Throws InputError when the run has no such segment, slice or channel, the segment has no trigger, a window leaves
+/// the interval, or no whole cycle is left (the message tells why the first was excluded).
 FrameBins bin_frames(const RecordedRun& run, const FrameBinOptions& options);
 
 }  // namespace diastole::runfile

@@ -6,7 +6,8 @@
 //   |-- rig                attributes only: bore_mm, screw_rev_per_cm, ...
 //   |-- protocol
 //   |   |-- toml           scalar text: the experiment file as it was run
-//   |   `-- segments       table start_s, waveform, stroke_mL, period_s, offset_mL, cycles
+//   |   |-- segments       table start_s, waveform, stroke_mL, period_s, offset_mL, cycles
+//   |   `-- slices         optional table block, slice, first_trigger, triggers, cycles, dummy_cycles
 //   |-- pump               time_s[n], commanded_mL[n]
 //   |-- pressure           time_s[m], cavity_kPa[m], optionally cavity_filtered_kPa[m], pump_kPa[m]
 //   |-- trigger            time_s[k]
@@ -31,6 +32,7 @@ inline constexpr const char* rig_group = "/rig";
 inline constexpr const char* protocol_group = "/protocol";
 inline constexpr const char* protocol_toml = "/protocol/toml";
 inline constexpr const char* protocol_segments = "/protocol/segments";
+inline constexpr const char* protocol_slices = "/protocol/slices";
 inline constexpr const char* pump_group = "/pump";
 inline constexpr const char* pump_time = "/pump/time_s";
 inline constexpr const char* pump_commanded = "/pump/commanded_mL";
@@ -56,6 +58,8 @@ inline constexpr const char* pressure_unit = "kPa";
 inline constexpr const char* text_unit = "text";
 inline constexpr const char* segments_units =
     "start_s: s; waveform: text; stroke_mL: mL; period_s: s; offset_mL: mL; cycles: 1";
+inline constexpr const char* slices_units =
+    "block: text; slice: 1; first_trigger: 1; triggers: 1; cycles: 1; dummy_cycles: 1";
 inline constexpr const char* gaps_units = "stream: text; first_index: 1; count: 1; reason: text";
 inline constexpr const char* events_units = "time_s: s; level: text; code: text; text: text";
 

@@ -62,6 +62,20 @@ std::vector<Segment> read_segments(const H5Source& source) {
   return segments;
 }
 
+std::vector<Slice> read_slices(const H5Source& source) {
+  if (!source.has(protocol_slices)) return {};
+  const auto block = source.column_texts(protocol_slices, "block");
+  const auto number = source.column_integers(protocol_slices, "slice");
+  const auto first_trigger = source.column_integers(protocol_slices, "first_trigger");
+  const auto triggers = source.column_integers(protocol_slices, "triggers");
+  const auto cycles = source.column_integers(protocol_slices, "cycles");
+  const auto dummy_cycles = source.column_integers(protocol_slices, "dummy_cycles");
+  std::vector<Slice> slices;
+  for (size_t i = 0; i < block.size(); ++i)
+    slices.push_back({block[i], number[i], first_trigger[i], triggers[i], cycles[i], dummy_cycles[i]});
+  return slices;
+}
+
 std::vector<Gap> read_gaps(const H5Source& source) {
   const auto stream = source.column_texts(gaps_table, "stream");
   const auto first = source.column_integers(gaps_table, "first_index");
@@ -143,6 +157,7 @@ RecordedRun read_run(const std::filesystem::path& path) {
   run.trigger_s = source.numbers(trigger_time);
   run.flow = read_flow(source);
   run.clock = read_clock(source);
+  run.slices = read_slices(source);
   run.gaps = read_gaps(source);
   run.events = read_events(source);
   check(run);

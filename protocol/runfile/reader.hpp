@@ -12,7 +12,7 @@ namespace diastole::runfile {
 RecordedRun read_run(const std::filesystem::path& path);
 
 /// The rules that every run obeys: times finite and strictly increasing, datasets of a stream equally long,
-/// no NaN outside a declared gap, no infinity, segments in order with a positive period.
+/// no NaN outside a declared gap, no infinity, segments in order with a positive period, slices in order within the triggers.
 /// Throws InputError with run.file as the file.
 void check(const RecordedRun& run);
 

@@ -25,6 +25,17 @@ struct Segment {
   [[nodiscard]] double end_s() const { return start_s + period_s * static_cast<double>(cycles); }
 };
 
+/// The cycles of one image slice: rows [first_trigger, first_trigger + triggers) of /trigger/time_s. The dummy
+/// cycles before them are not imaged and belong to no slice.
+struct Slice {
+  std::string block;          ///< what was imaged: "tagged"
+  int64_t number = 0;         ///< of the block, from 0
+  int64_t first_trigger = 0;  ///< row
+  int64_t triggers = 0;       ///< rows; fewer than `cycles` if the run ended within the slice
+  int64_t cycles = 0;         ///< scheduled
+  int64_t dummy_cycles = 0;   ///< scheduled before them
+};
+
 /// Rows [first_index, first_index + count) of a stream are known to be missing.
 struct Gap {
   std::string stream;
@@ -75,6 +86,7 @@ struct RecordedRun {
   std::map<std::string, double, std::less<>> clock;  ///< e.g. "daq_drift_ppm"
   std::vector<Gap> gaps;
   std::vector<Event> events;
+  std::vector<Slice> slices;  ///< empty: the experiment had no schedule of slices
 
   /// Rows that /gaps declares missing in a stream ("pressure") or one dataset of it ("pressure/cavity_kPa").
   [[nodiscard]] int64_t missing(std::string_view stream) const {

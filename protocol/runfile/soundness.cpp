@@ -6,12 +6,13 @@
 #include <cmath>
 #include <span>
 
+#include "protocol/runfile/cycles.hpp"
 #include "protocol/runfile/layout.hpp"
 
 namespace diastole::runfile {
 namespace {
 
-constexpr double period_tolerance = 0.01;
+constexpr size_t most_remarks = 5;  // told one by one, for each segment
 
 StreamFacts facts_of(const RecordedRun& run, std::span<const double> time_s, std::string_view stream) {
   StreamFacts facts{.rows = time_s.size()};
@@ -35,26 +36,56 @@ void look_for_holes(std::span<const double> time_s, std::string_view stream,
       holes.size() > 1 ? fmt::format(", and {} more such holes", holes.size() - 1) : std::string()));
 }
 
-/// Triggers of one segment: as many as cycles (or fewer, if the run was stopped on request), one period apart.
-void check_triggers(const RecordedRun& run, size_t number, bool stopped, std::vector<std::string>& problems) {
-  const Segment& segment = run.segments[number];
-  const double slack_s = 0.5 * period_tolerance * segment.period_s;
-  std::vector<double> found;
-  for (const double t : run.trigger_s) {
-    if (t >= segment.start_s - slack_s && t < segment.end_s() - slack_s) found.push_back(t);
+/// The triggers of each segment against its cycles; a hold may have been triggered or not.
+void check_triggers(const RecordedRun& run, size_t number, Soundness& soundness) {
+  const SegmentTriggers found = triggers_of(run, number);
+  const bool untriggered_hold = run.segments[number].waveform == "hold" && found.triggers.empty();
+  if (untriggered_hold) return;
+  TriggerCounts& counts = soundness.triggers;
+  counts.scheduled += found.scheduled;
+  counts.missing += found.count(TriggerFault::missing);
+  counts.extra += found.count(TriggerFault::extra);
+  counts.non_periodic += found.count(TriggerFault::non_periodic);
+  if (found.remarks.empty()) return;
+  soundness.problems.push_back(
+      fmt::format("segment {}: {} triggers for {} cycles: {} missing, {} extra, {} not periodic", number,
+                  found.triggers.size(), found.scheduled, found.count(TriggerFault::missing),
+                  found.count(TriggerFault::extra), found.count(TriggerFault::non_periodic)));
+  for (size_t i = 0; i < std::min(most_remarks, found.remarks.size()); ++i)
+    soundness.problems.push_back(fmt::format("segment {}: {}", number, found.remarks[i].text));
+  if (found.remarks.size() > most_remarks) {
+    soundness.problems.push_back(
+        fmt::format("segment {}: and {} more such triggers", number, found.remarks.size() - most_remarks));
   }
-  const bool holds = segment.waveform == "hold";
-  const auto triggers = static_cast<int64_t>(found.size());
-  const bool fits = triggers == segment.cycles || (stopped && triggers < segment.cycles);
-  if (!fits && !(holds && found.empty())) {
-    problems.push_back(
-        fmt::format("segment {}: {} triggers for {} cycles", number, triggers, segment.cycles));
+}
+
+void check_triggers_outside(const RecordedRun& run, Soundness& soundness) {
+  const std::vector<size_t> rows = triggers_outside(run);
+  soundness.triggers.extra += std::ssize(rows);
+  for (size_t i = 0; i < std::min(most_remarks, rows.size()); ++i) {
+    soundness.problems.push_back(
+        fmt::format("trigger {}: at {:.3f} s, outside every segment", rows[i], run.trigger_s[rows[i]]));
   }
-  for (size_t i = 1; i < found.size(); ++i) {
-    if (std::abs(found[i] - found[i - 1] - segment.period_s) <= period_tolerance * segment.period_s) continue;
-    problems.push_back(fmt::format("segment {}: trigger {} comes {:.4f} s after the one before, not {:.4f} s",
-                                   number, i, found[i] - found[i - 1], segment.period_s));
-    return;
+  if (rows.size() > most_remarks) {
+    soundness.problems.push_back(
+        fmt::format("trigger {} and others: outside every segment", rows[most_remarks]));
+  }
+}
+
+void check_slices(const RecordedRun& run, Soundness& soundness) {
+  for (const Slice& slice : run.slices) {
+    if (slice.triggers == slice.cycles || soundness.stopped_on_request) continue;
+    soundness.problems.push_back(fmt::format("slice {} of {}: {} of its {} cycles were triggered",
+                                             slice.number, slice.block, slice.triggers, slice.cycles));
+  }
+}
+
+void check_clocks(const RecordedRun& run, Soundness& soundness) {
+  for (const auto& [name, value] : run.clock) {
+    if (!name.ends_with("_drift_ppm") || std::abs(value) <= plausible_drift_ppm) continue;
+    soundness.problems.push_back(
+        fmt::format("clock: {} is {:.0f}; clocks differ by tens of ppm, so the samples' times are in doubt",
+                    name, value));
   }
 }
 
@@ -62,6 +93,10 @@ void check_triggers(const RecordedRun& run, size_t number, bool stopped, std::ve
 
 bool is_stop_on_request(std::string_view code) {
   return code == "stopped_at_cycle_end" || code == "stopped_now";
+}
+
+bool was_stopped_on_request(const RecordedRun& run) {
+  return std::ranges::any_of(run.events, [](const Event& event) { return is_stop_on_request(event.code); });
 }
 
 Soundness assess(const RecordedRun& run) {
@@ -77,15 +112,17 @@ Soundness assess(const RecordedRun& run) {
     problems.push_back(fmt::format("{}: {} missing from index {} on: {}", gap.stream, gap.count,
                                    gap.first_index, gap.reason));
   }
-  soundness.stopped_on_request = std::any_of(run.events.begin(), run.events.end(),
-                                             [](const Event& e) { return is_stop_on_request(e.code); });
+  soundness.stopped_on_request = was_stopped_on_request(run);
   look_for_holes(run.pressure.time_s, pressure_stream, problems);
   look_for_holes(run.pump.time_s, pump_stream, problems);
   for (size_t i = 0; i < run.segments.size(); ++i) {
     const Segment& segment = run.segments[i];
     (segment.waveform == "hold" ? soundness.scheduled_holds : soundness.scheduled_cycles) += segment.cycles;
-    check_triggers(run, i, soundness.stopped_on_request, problems);
+    check_triggers(run, i, soundness);
   }
+  check_triggers_outside(run, soundness);
+  check_slices(run, soundness);
+  check_clocks(run, soundness);
   for (const Event& event : run.events) {
     if (event.level == "error") {
       problems.push_back(fmt::format("at {:.3f} s: {}: {}", event.time_s, event.code, event.text));

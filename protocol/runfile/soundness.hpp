@@ -1,5 +1,7 @@
 #pragma once
-// Whether a run can be trusted: nothing missing, every cycle triggered on time, no fault.
+// Whether a run can be trusted, and if not why not, each reason with its place: samples that are missing, declared or
+// not, triggers that are missing, extra or out of time (cycles.hpp), slices that are not complete, clocks that cannot
+// be, faults.
 
 #include <cstdint>
 #include <string>
@@ -20,20 +22,33 @@ struct StreamFacts {
   [[nodiscard]] bool any() const { return missing < static_cast<int64_t>(rows); }
 };
 
+/// Triggers of all segments against their schedule.
+struct TriggerCounts {
+  int64_t scheduled = 0;  ///< those of holds only if they were triggered
+  int64_t missing = 0;
+  int64_t extra = 0;  ///< within and outside the segments
+  int64_t non_periodic = 0;
+};
+
+/// A clock that runs further from the controller's than this has not been mapped rightly: crystals differ by tens
+/// of ppm.
+inline constexpr double plausible_drift_ppm = 1000;
 struct Soundness {
   StreamFacts pressure;
   StreamFacts pump;
-  double duration_s = 0;              ///< of the pressure stream
-  int64_t scheduled_cycles = 0;       ///< of all segments that move
-  int64_t scheduled_holds = 0;        ///< cycles of waveform "hold", which may be triggered or not
-  bool stopped_on_request = false;    ///< somebody ended it early, in order: fewer triggers are no fault
-  std::vector<std::string> problems;  ///< in plain words; empty if the run is sound
+  double duration_s = 0;            ///< of the pressure stream
+  int64_t scheduled_cycles = 0;     ///< of all segments that move
+  int64_t scheduled_holds = 0;      ///< cycles of waveform "hold", which may be triggered or not
+  bool stopped_on_request = false;  ///< somebody ended it early, in order: fewer triggers are no fault
+  TriggerCounts triggers{};
+  std::vector<std::string> problems;  ///< "place: what is wrong there"; empty if the run is sound
 
   [[nodiscard]] bool sound() const { return problems.empty(); }
 };
 
 /// Whether an event's code says that a run was ended early and in order.
 bool is_stop_on_request(std::string_view code);
+bool was_stopped_on_request(const RecordedRun& run);
 
 /// Precondition: the run has passed `check`.
 Soundness assess(const RecordedRun& run);
