@@ -15,35 +15,29 @@ using nlohmann::json;
 
 constexpr double ns_per_s = 1e9;
 constexpr uint64_t block_span_ns = 100'000'000;
-constexpr uint64_t instrument_clock_interval_ns = 500'000'000;
-constexpr const char* slow_instrument = "the instrument answered slowly";
 constexpr double start_patience_s = 2;  // for RunStarted
 constexpr uint64_t tail_ns = 250'000'000;
 constexpr double end_patience_s = 10;  // for RunEnded, beyond the plan
 
 }  // namespace
 
-Acquisition::Acquisition(Clock& clock, Controller& controller, daq::Instrument& instrument,
-                         JournalWriter& journal, AcquisitionSetup setup)
-    : clock_(clock),
-      controller_(controller),
-      instrument_(instrument),
-      journal_(journal),
-      setup_(std::move(setup)),
-      volts_(instrument.channels()) {
+Acquisition::Acquisition(Clock& clock, Controller& controller, SampleSource& samples, JournalWriter& journal,
+                         AcquisitionSetup setup)
+    : clock_(clock), controller_(controller), samples_(samples), journal_(journal), setup_(std::move(setup)) {
   block_.channels = static_cast<uint32_t>(setup_.channels.size());
 }
 
 RunOutcome Acquisition::run(const Hooks& hooks) {
   hooks_ = hooks;
-  const uint64_t now_ns = clock_.now_ns();
-  first_due_ns_ = now_ns;
-  next_instrument_clock_ns_ = now_ns;
-  deadline_ns_ = now_ns + static_cast<uint64_t>(start_patience_s * ns_per_s);
-  write(RecordKind::document, json{{"record", "grid"}, {"first_due_ns", first_due_ns_}}.dump());
+  const SampleGrid grid = samples_.start(setup_.sample_rate_Hz);
+  deadline_ns_ = clock_.now_ns() + static_cast<uint64_t>(start_patience_s * ns_per_s);
+  write(RecordKind::document, json{{"record", "grid"}, {"first_due_ns", grid.first_due_ns}}.dump());
+  for (const std::string& warning : setup_.warnings)
+    remark("warning", "instrument", warning);
   if (!ended_) controller_.start();
   while (!ended_)
     turn();
+  take_samples(samples_.finish(tail_until_ns_.value_or(clock_.now_ns())));
   end_missing();
   close_block();
   write(RecordKind::document, json{{"record", "end"}}.dump());
@@ -59,10 +53,10 @@ void Acquisition::turn() {
   controller_.service();
   for (const ControllerEvent& event : controller_.take_events())
     take(event);
-  poll_instrument();
+  take_samples(samples_.take());
   check_deadline();
   if (ended_) return;
-  clock_.sleep_until_ns(std::min(due_ns(next_index_), controller_.next_due_ns()), controller_.line());
+  clock_.sleep_until_ns(std::min(samples_.next_due_ns(), controller_.next_due_ns()), controller_.line());
 }
 
 void Acquisition::obey(StopRequest request) {
@@ -77,66 +71,46 @@ void Acquisition::obey(StopRequest request) {
   }
 }
 
-uint64_t Acquisition::due_ns(uint64_t index) const {
-  return first_due_ns_ +
-         static_cast<uint64_t>(std::llround(static_cast<double>(index) * ns_per_s / setup_.sample_rate_Hz));
+void Acquisition::take_samples(std::vector<SourceItem> items) {
+  for (const SourceItem& item : items)
+    std::visit([this](const auto& what) { take(what); }, item);
 }
 
-void Acquisition::poll_instrument() {
-  const uint64_t now_ns = clock_.now_ns();
-  if (now_ns < due_ns(next_index_)) return;
-  uint64_t latest = next_index_;
-  while (due_ns(latest + 1) <= now_ns)
-    ++latest;
-  miss_until(latest);
-  next_index_ = latest + 1;
-  const bool received = take_sample(latest);
-  if (received && now_ns >= next_instrument_clock_ns_) read_instrument_clock();
-}
-
-void Acquisition::miss_until(uint64_t index) {
-  uint64_t blocked = next_index_;
-  while (blocked < index && due_ns(blocked) <= last_request_.until_ns)
-    ++blocked;
-  if (blocked > next_index_) miss(next_index_, blocked - next_index_, last_request_.reason);
-  if (index > blocked) miss(blocked, index - blocked, "the host was late");
-}
-
-bool Acquisition::take_sample(uint64_t index) {
-  const uint64_t asked_ns = clock_.now_ns();
-  const daq::Outcome outcome = instrument_.read(volts_);
-  const uint64_t answered_ns = clock_.now_ns();
-  const bool finite = std::all_of(volts_.begin(), volts_.end(), [](double v) { return std::isfinite(v); });
-  if (!outcome.ok || !finite) {
-    last_request_ = {answered_ns, outcome.ok ? "the instrument sent no finite number" : outcome.fault};
-    miss(index, 1, last_request_.reason);
-    return false;
-  }
-  last_request_ = {answered_ns, slow_instrument};
+void Acquisition::take(const Received& received) {
   end_missing();
-  if (block_.host_ns.empty()) block_.first_index = index;
-  block_.host_ns.push_back(asked_ns + (answered_ns - asked_ns) / 2);
-  for (size_t i = 0; i < volts_.size(); ++i) {
-    const ChannelConfig& channel = setup_.channels[i];
-    block_.value_kPa.push_back((volts_[i] - channel.zero_V) * channel.kPa_per_V);
+  const size_t channels = setup_.channels.size();
+  if (block_.host_ns.empty()) block_.first_index = received.first_index;
+  block_.host_ns.insert(block_.host_ns.end(), received.host_ns.begin(), received.host_ns.end());
+  for (size_t i = 0; i < received.volts.size(); ++i) {
+    const ChannelConfig& channel = setup_.channels[i % channels];
+    block_.value_kPa.push_back((received.volts[i] - channel.zero_V) * channel.kPa_per_V);
   }
-  ++outcome_.counts.received;
-  outcome_.counts.last_kPa = block_.value_kPa[block_.value_kPa.size() - volts_.size()];
+  outcome_.counts.received += received.host_ns.size();
+  outcome_.counts.last_kPa = block_.value_kPa[block_.value_kPa.size() - channels];
   if (block_.host_ns.back() - block_.host_ns.front() >= block_span_ns) close_block();
-  return true;
 }
 
-void Acquisition::miss(uint64_t first, uint64_t count, const std::string& reason) {
+void Acquisition::take(const Missing& missing) {
   close_block();
-  if (gap_ && gap_->reason != reason) close_gap();
-  if (!gap_) gap_ = OpenGap{first, 0, reason};
-  gap_->count += count;
+  if (gap_ && gap_->reason != missing.reason) close_gap();
+  if (!gap_) gap_ = OpenGap{missing.first_index, 0, missing.reason};
+  gap_->count += missing.count;
   if (missing_in_a_row_ == 0) {
-    hooks_.remark({"warning", "gap", "samples are missing: " + reason});
+    hooks_.remark({"warning", "gap", "samples are missing: " + missing.reason});
   }
-  missing_in_a_row_ += count;
-  outcome_.counts.missing += count;
+  missing_in_a_row_ += missing.count;
+  outcome_.counts.missing += missing.count;
 }
+
+void Acquisition::take(const InstrumentTime& time) {
+  write(RecordKind::document, json{{"record", "daq_clock"},
+                                   {"host_ns", time.host_ns},
+                                   {"half_round_trip_ns", time.half_round_trip_ns},
+                                   {"timer", time.timer}}
+                                  .dump());
+}
+
+void Acquisition::take(const Trouble& trouble) { remark("warning", "instrument", trouble.text); }
 
 void Acquisition::end_missing() {
   close_gap();
@@ -161,20 +135,6 @@ void Acquisition::close_block() {
   block_.host_ns.clear();
   block_.value_kPa.clear();
   hooks_.progress(outcome_.counts);
-}
-
-void Acquisition::read_instrument_clock() {
-  const uint64_t asked_ns = clock_.now_ns();
-  next_instrument_clock_ns_ = asked_ns + instrument_clock_interval_ns;
-  const auto timer = instrument_.read_timer();
-  const uint64_t answered_ns = clock_.now_ns();
-  last_request_ = {answered_ns, slow_instrument};
-  if (!timer) return;
-  write(RecordKind::document, json{{"record", "daq_clock"},
-                                   {"host_ns", asked_ns + (answered_ns - asked_ns) / 2},
-                                   {"half_round_trip_ns", (answered_ns - asked_ns) / 2},
-                                   {"timer", *timer}}
-                                  .dump());
 }
 
 void Acquisition::take(const ControllerEvent& event) {
@@ -273,7 +233,7 @@ void Acquisition::end_after_tail(std::string how) {
 
 void Acquisition::check_deadline() {
   if (tail_until_ns_) {
-    ended_ = ended_ || clock_.now_ns() >= *tail_until_ns_;
+    ended_ = ended_ || (clock_.now_ns() >= *tail_until_ns_ && samples_.complete(*tail_until_ns_));
     return;
   }
   if (ended_ || clock_.now_ns() < deadline_ns_) return;

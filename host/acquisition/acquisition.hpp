@@ -1,13 +1,10 @@
 #pragma once
-// One run: polls the instrument at the sample rate, takes in the controller's events, and writes both to the
-// journal, until the controller says that the run has ended, and a quarter of a second more: the last cycle,
-// which counts from its trigger, ends a little after the last step.
+// One run: takes in the samples of a SampleSource and the controller's events, and writes both to the journal,
+// until the controller says that the run has ended, and a quarter of a second more: the last cycle, which
+// counts from its trigger, ends a little after the last step.
 //
-// Samples lie on a grid: sample k is due at first_due + k / rate. Each index is either received or declared
-// missing, and the declaration tells why:
-//   - the instrument failed to answer, or kept the loop waiting while the sample came due;
-//   - the loop came so late, for another reason, that sample k+1 was already due (an overrun).
-// So received + missing = expected by construction; `RunOutcome` counts them.
+// A source gives every index as received or as missing (sample_source.hpp), so received + missing = expected by
+// construction; `RunOutcome` counts them.
 //
 // The loop is single-threaded in time: it reads and waits for time through one Clock only.
 
@@ -18,9 +15,9 @@
 
 #include "host/acquisition/journal.hpp"
 #include "host/acquisition/journal_records.hpp"
+#include "host/acquisition/sample_source.hpp"
 #include "host/config/rig_config.hpp"
 #include "host/controller/controller.hpp"
-#include "host/daq/instrument.hpp"
 #include "host/transport/clock.hpp"
 
 namespace diastole {
@@ -51,14 +48,15 @@ struct RunOutcome {
 };
 
 struct AcquisitionSetup {
-  double sample_rate_Hz = 300;
+  double sample_rate_Hz = 300;  ///< that the instrument keeps (Instrument::plan_rate)
   std::vector<ChannelConfig> channels;
-  double planned_duration_s = 0;  ///< a run that has not ended well after this is broken off
+  std::vector<std::string> warnings;  ///< to remark at the start
+  double planned_duration_s = 0;      ///< a run that has not ended well after this is broken off
 };
 
 class Acquisition {
  public:
-  Acquisition(Clock& clock, Controller& controller, daq::Instrument& instrument, JournalWriter& journal,
+  Acquisition(Clock& clock, Controller& controller, SampleSource& samples, JournalWriter& journal,
               AcquisitionSetup setup);
 
   struct Hooks {
@@ -75,16 +73,14 @@ class Acquisition {
  private:
   void turn();
   void obey(StopRequest request);
-  void poll_instrument();
-  /// Declares the indices from next_index_ up to `index` missing.
-  void miss_until(uint64_t index);
-  /// Whether it was received.
-  bool take_sample(uint64_t index);
-  void miss(uint64_t first, uint64_t count, const std::string& reason);
+  void take_samples(std::vector<SourceItem> items);
+  void take(const Received& received);
+  void take(const Missing& missing);
+  void take(const InstrumentTime& time);
+  void take(const Trouble& trouble);
   void end_missing();
   void close_gap();
   void close_block();
-  void read_instrument_clock();
   void take(const ControllerEvent& event);
   void remark(const std::string& level, const std::string& code, const std::string& text,
               std::optional<uint64_t> tick = {});
@@ -93,19 +89,15 @@ class Acquisition {
   void end(std::string how);
   void end_after_tail(std::string how);
   void check_deadline();
-  [[nodiscard]] uint64_t due_ns(uint64_t index) const;
 
   Clock& clock_;
   Controller& controller_;
-  daq::Instrument& instrument_;
+  SampleSource& samples_;
   JournalWriter& journal_;
   AcquisitionSetup setup_;
   Hooks hooks_;
 
-  uint64_t first_due_ns_ = 0;
-  uint64_t next_index_ = 0;
   SampleBlock block_;
-  std::vector<double> volts_;
   struct OpenGap {
     uint64_t first = 0;
     uint64_t count = 0;
@@ -113,12 +105,6 @@ class Acquisition {
   };
   std::optional<OpenGap> gap_;
   uint64_t missing_in_a_row_ = 0;  ///< over all reasons
-  struct Request {
-    uint64_t until_ns = 0;
-    std::string reason;  ///< why what came due before until_ns could not be sampled
-  };
-  Request last_request_;  ///< to the instrument
-  uint64_t next_instrument_clock_ns_ = 0;
   uint64_t deadline_ns_ = 0;
   StopRequest obeyed_ = StopRequest::none;
   bool started_ = false;

@@ -4,11 +4,13 @@
 // document: one JSON object; "record" names what it is:
 //   begin     {run_id, started_utc, producer, experiment, experiment_file, sample_rate_Hz, channels, rig,
 //   instrument,
-//              tick_rate_Hz, microstep_pL, daq_timer_rate_Hz, segments[{start_s, waveform, ...}]}
+//              tick_rate_Hz, microstep_pL, daq_timer_rate_Hz, daq_timer_counts_samples,
+//              segments[{start_s, waveform, ...}]}
 //   grid      {first_due_ns}                             host time at which sample 0 is due
 //   gap       {first_index, count, reason}               of the sample stream
 //   clock     {host_ns, tick, half_round_trip_ns}        controller against host
-//   daq_clock {host_ns, timer, half_round_trip_ns}       instrument's timer against host
+//   daq_clock {host_ns, timer, half_round_trip_ns}       instrument's timer against host; a timer that counts
+//                                                        samples read k when sample k was taken
 //   run_started {tick}   segment {segment, tick}   trigger {cycle, tick, r_wave}
 //   run_ended {reason, tick, cycles, triggers, r_waves}
 //   event     {host_ns or tick, level, code, text}

@@ -355,6 +355,7 @@ json RigService::remember(const wire::Status& status) {
 
 void RigService::do_run(const Experiment& experiment, const Done& done) {
   (void)do_status();
+  const daq::RatePlan rate = instrument_->plan_rate(experiment.sample_rate_Hz);
   const ProgramPlan plan = controller_->load(experiment);
   RunRecord record;
   record.run_id = new_uuid();
@@ -363,7 +364,7 @@ void RigService::do_run(const Experiment& experiment, const Done& done) {
   const std::filesystem::path path =
       std::filesystem::absolute(rig_.daemon.journal_dir) / (record.run_id + ".journal");
   JournalWriter journal(path);
-  write_beginning(journal, record, experiment, plan);
+  write_beginning(journal, record, experiment, plan, rate.rate_Hz);
   if (!begin(record)) {
     std::filesystem::remove(path);
     controller_->unload();
@@ -374,7 +375,7 @@ void RigService::do_run(const Experiment& experiment, const Done& done) {
        {{"run_id", record.run_id}, {"journal", path.string()}, {"run_file", run_file_beside(path).string()}});
   json result;
   try {
-    result = finish(path, acquire(journal, experiment, record.planned_s));
+    result = finish(path, acquire(journal, rate, record.planned_s));
   } catch (const std::exception& error) {
     result = {{"end", "failed"}, {"problem", error.what()}, {"journal", path.string()}};
   }
@@ -395,34 +396,40 @@ bool RigService::begin(const RunRecord& record) {
 }
 
 void RigService::write_beginning(JournalWriter& journal, const RunRecord& record,
-                                 const Experiment& experiment, const ProgramPlan& plan) {
+                                 const Experiment& experiment, const ProgramPlan& plan,
+                                 double sample_rate_Hz) {
   json channels = json::array();
   for (const ChannelConfig& channel : rig_.daq.channels)
     channels.push_back(channel.name);
   json rig = attributes_as_json(rig_.attributes);
-  rig["daq_rate_Hz"] = experiment.sample_rate_Hz;
+  rig["daq_rate_Hz"] = sample_rate_Hz;
+  const TimerFacts timer = make_source(*clock_, *instrument_)->timer(sample_rate_Hz);
   const json beginning{{"record", "begin"},
                        {"run_id", record.run_id},
                        {"started_utc", utc_now()},
                        {"producer", options_.producer},
                        {"experiment", experiment.text},
                        {"experiment_file", experiment.file},
-                       {"sample_rate_Hz", experiment.sample_rate_Hz},
+                       {"sample_rate_Hz", sample_rate_Hz},
                        {"channels", channels},
                        {"rig", rig},
                        {"instrument", instrument_->describe()},
                        {"tick_rate_Hz", controller_->hello().tick_rate_Hz},
                        {"microstep_pL", controller_->microstep_pL()},
-                       {"daq_timer_rate_Hz", std::max(1.0, instrument_->timer_rate_Hz())},
+                       {"daq_timer_rate_Hz", std::max(1.0, timer.rate_Hz)},
+                       {"daq_timer_counts_samples", timer.counts_samples},
                        {"segments", planned_segments(experiment, plan)}};
   if (!journal.append(RecordKind::document, beginning.dump())) {
     throw HardwareError(journal.path().string(), journal.problem(), "Free some space on that disk.");
   }
 }
 
-RunOutcome RigService::acquire(JournalWriter& journal, const Experiment& experiment, double planned_s) {
-  Acquisition acquisition(*clock_, *controller_, *instrument_, journal,
-                          {experiment.sample_rate_Hz, rig_.daq.channels, planned_s});
+RunOutcome RigService::acquire(JournalWriter& journal, const daq::RatePlan& rate, double planned_s) {
+  std::vector<std::string> warnings;
+  if (!rate.warning.empty()) warnings.push_back(rate.warning);
+  const auto samples = make_source(*clock_, *instrument_);
+  Acquisition acquisition(*clock_, *controller_, *samples, journal,
+                          {rate.rate_Hz, rig_.daq.channels, std::move(warnings), planned_s});
   return acquisition.run({
       .stop =
           [this] {

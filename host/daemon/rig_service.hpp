@@ -100,8 +100,8 @@ class RigService {
   bool begin(const RunRecord& record);
   void do_run(const Experiment& experiment, const Done& done);
   void write_beginning(JournalWriter& journal, const RunRecord& record, const Experiment& experiment,
-                       const ProgramPlan& plan);
-  RunOutcome acquire(JournalWriter& journal, const Experiment& experiment, double planned_s);
+                       const ProgramPlan& plan, double sample_rate_Hz);
+  RunOutcome acquire(JournalWriter& journal, const daq::RatePlan& rate, double planned_s);
   nlohmann::json finish(const std::filesystem::path& journal, const RunOutcome& outcome);
 
   RigConfig rig_;

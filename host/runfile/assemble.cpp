@@ -42,8 +42,9 @@ class TimeAxis {
     return ticks / tick_rate_Hz_;
   }
   [[nodiscard]] double of_host_ns(uint64_t host_ns) const {
-    return map_.to_other_s(static_cast<double>(host_ns) / ns_per_s) - start_s();
+    return of_host_s(static_cast<double>(host_ns) / ns_per_s);
   }
+  [[nodiscard]] double of_host_s(double host_s) const { return map_.to_other_s(host_s) - start_s(); }
   [[nodiscard]] double host_at_start_s() const { return map_.to_host_s(start_s()); }
   [[nodiscard]] const ClockMap& map() const { return map_; }
 
@@ -62,7 +63,29 @@ struct Grid {
   std::vector<std::string> reason;  // why it is missing
 };
 
+/// When sample k was taken: as the host noted; if the instrument's timer counts its samples, as that timer's line
+/// against the host's clock tells, which knows nothing of blocks and how late they came.
+class SampleTimes {
+ public:
+  SampleTimes(const JournalStory& story, const TimeAxis& axis) : axis_(axis) {
+    if (!story.begin.value("daq_timer_counts_samples", false)) return;
+    rate_Hz_ = story.begin.at("sample_rate_Hz");
+    map_ = fit_clock_map(story.daq_pairs);
+  }
+
+  [[nodiscard]] double of(uint64_t index, uint64_t host_ns) const {
+    if (!map_) return axis_.of_host_ns(host_ns);
+    return axis_.of_host_s(map_->to_host_s(static_cast<double>(index) / rate_Hz_));
+  }
+
+ private:
+  const TimeAxis& axis_;
+  double rate_Hz_ = 1;
+  std::optional<ClockMap> map_;
+};
+
 Grid lay_out(const JournalStory& story, const TimeAxis& axis, size_t channels) {
+  const SampleTimes times(story, axis);
   uint64_t rows = 0;
   for (const SampleBlock& block : story.samples)
     rows = std::max(rows, block.first_index + block.host_ns.size());
@@ -78,7 +101,7 @@ Grid lay_out(const JournalStory& story, const TimeAxis& axis, size_t channels) {
     if (block.channels != channels) continue;
     for (size_t i = 0; i < block.host_ns.size(); ++i) {
       const size_t row = block.first_index + i;
-      grid.time_s[row] = axis.of_host_ns(block.host_ns[i]);
+      grid.time_s[row] = times.of(row, block.host_ns[i]);
       for (size_t c = 0; c < channels; ++c)
         grid.channels[c][row] = block.value_kPa[i * channels + c];
     }

@@ -45,8 +45,9 @@ void SessionOnDesk::run(const std::function<StopRequest()>& stop) {
                                     {"offset_mL", experiment.segments[0].offset_mL},
                                     {"cycles", experiment.segments[0].cycles}}}}};
   (void)writer.append(RecordKind::document, beginning.dump());
-  Acquisition acquisition(clock, client, instrument, writer,
-                          {experiment.sample_rate_Hz, rig.daq.channels, experiment.least_duration_s()});
+  const auto samples = make_source(clock, instrument);
+  Acquisition acquisition(clock, client, *samples, writer,
+                          {experiment.sample_rate_Hz, rig.daq.channels, {}, experiment.least_duration_s()});
   outcome = acquisition.run({.stop = stop,
                              .progress = [](const RunProgress&) {},
                              .remark = [this](const RunRemark& remark) { remarks.push_back(remark); }});

@@ -62,7 +62,7 @@ class DeskClock final : public Clock {
 };
 
 /// Reads 0.5 V + 0.1 V a second of desk time; fails and takes its time as it is told.
-class DeskInstrument final : public daq::Instrument {
+class DeskInstrument final : public daq::PolledInstrument {
  public:
   explicit DeskInstrument(Desk& desk) : desk_(desk) {}
   [[nodiscard]] std::string describe() const override { return "desk instrument"; }
