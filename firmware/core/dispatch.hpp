@@ -129,6 +129,7 @@ class Dispatch {
   void handle(const wire::WaveformPoints& request) { conclude(request, motion_.upload(request)); }
   void handle(const wire::Arm& request) { conclude(request, motion_.arm(request)); }
   void handle(const wire::Home& request) { conclude(request, motion_.home(request.lease_id)); }
+  void handle(const wire::Jog& request) { conclude(request, motion_.jog(request)); }
   void handle(const wire::Start& request) { conclude(request, motion_.start(request.lease_id)); }
   void handle(const wire::StopAtCycleEnd& request) { conclude(request, motion_.stop_at_cycle_end()); }
   void handle(const wire::StopNow& request) { conclude(request, motion_.stop_now()); }

@@ -1,49 +1,68 @@
 #pragma once
-// Finding position 0: withdraw until the home switch closes, leave it slowly until it opens, go on by a
-// fixed clearance, and call that 0. A rig that already stands on the switch begins with leaving it.
+// Finding position 0, in five stages from rest to rest, so that every homing ends with the same slow movements
+// whatever came before:
+//
+//   seek       withdraw fast until the home switch closes, come to rest
+//   back_off   inflate fast until it opens again, come to rest
+//   approach   withdraw slowly until it closes
+//   leave      inflate slowly until it opens: the reference
+//   clearance  go on by a fixed distance, and call that 0
 //
 //     far limit                        position 0   switch opens
 //        |·································|<-- 64 -->|####### home switch closed
 //   inflate ◀──                                        ──▶ withdraw
+//
+// A rig that already stands on the switch begins with back_off. The reference is found while inflating, so the play
+// of screw and nut is on the side from which every cycle begins, and the switch's hysteresis does not matter. Slow is
+// slow enough to stop within a step: the switch's interrupt ends approach and leave; from the fast stages the motor
+// comes to rest under control and may go v · 10 ms + v²/2a beyond the switch.
 
 #include <algorithm>
 #include <cstdint>
 
+#include "firmware/core/glide.hpp"
 #include "firmware/core/program.hpp"
 #include "firmware/core/units.hpp"
 
 namespace diastole::firmware {
 
-enum class HomingStage : std::uint8_t { seek, leave, clearance, done };
+enum class HomingStage : std::uint8_t { seek, back_off, approach, leave, clearance, stopped, done };
 
 inline constexpr std::uint32_t kHomeClearance_steps = 64;
 /// At rest between two stages.
 inline constexpr Ticks kHomingPause = microseconds(100'000);
 
-struct HomingTravel {
+struct HomingMove {
   bool inflate = false;
-  std::uint32_t most_steps = 0;  ///< the switch must have changed by then
-  Ticks interval;
+  Glide glide;  ///< as far as the switch may be away
 };
 
-/// Seeking goes at the configured speed over a tenth more than the travel, the rest at a quarter of that
-/// speed.
-inline HomingTravel homing_travel(HomingStage stage, const Settings& settings) {
+/// Fast is the configured speed as far as hand_steps_per_s allows, slow a quarter of it or what stops within a step. The switch must be found within a
+/// tenth more than the travel, and open within a twentieth of it.
+inline HomingMove homing_move(HomingStage stage, const Settings& settings) {
   const wire::Configure& limits = settings.limits();
   const std::uint64_t travel = std::uint64_t{limits.travel_uL} * 1'000'000 / limits.microstep_pL + 1;
-  const std::uint64_t speed = std::clamp<std::uint64_t>(settings.steps_per_s(limits.homing_flow_uL_per_s), 1,
-                                                        settings.allowed_steps_per_s());
-  const Ticks fast{static_cast<std::int64_t>(static_cast<std::uint64_t>(kTicksPerSecond) / speed)};
-  const auto steps = [](std::uint64_t count) {
-    return static_cast<std::uint32_t>(std::min<std::uint64_t>(count, 2'000'000'000));
+  const std::uint64_t acceleration = settings.stop_steps_per_s2();
+  const std::uint64_t fast = std::clamp<std::uint64_t>(settings.steps_per_s(limits.homing_flow_uL_per_s), 1,
+                                                       settings.hand_steps_per_s());
+  const std::uint64_t slow = std::max<std::uint64_t>(std::min(fast / 4, whole_root(acceleration)), 1);
+  const auto move = [&](bool inflate, std::uint64_t steps, std::uint64_t speed) {
+    return HomingMove{
+        inflate,
+        {static_cast<std::uint32_t>(std::min<std::uint64_t>(steps, 2'000'000'000)), speed, acceleration}};
   };
+  const std::uint64_t near = travel / 20 + 1000;
   switch (stage) {
     case HomingStage::seek:
-      return {false, steps(travel + travel / 10), fast};
+      return move(false, travel + travel / 10, fast);
+    case HomingStage::back_off:
+      return move(true, near, fast);
+    case HomingStage::approach:
+      return move(false, near, slow);
     case HomingStage::leave:
-      return {true, steps(travel / 20 + 1000), fast * 4};
+      return move(true, near, slow);
     default:
-      return {true, kHomeClearance_steps, fast * 4};
+      return move(true, kHomeClearance_steps, slow);
   }
 }
 

@@ -6,9 +6,11 @@
 
 #include <atomic>
 #include <optional>
+#include <utility>
 
 #include "firmware/core/board.hpp"
 #include "firmware/core/homing.hpp"
+#include "firmware/core/jog.hpp"
 #include "firmware/core/lease.hpp"
 #include "firmware/core/outbox.hpp"
 #include "firmware/core/plan_check.hpp"
@@ -43,6 +45,8 @@ class Motion {
   /// accepted.
   PlanRefusal arm(const wire::Arm& arm);
   wire::Refusal home(std::uint32_t lease_id);
+  /// Unhomed or homed; the first limit that it would exceed is told.
+  PlanRefusal jog(const wire::Jog& jog);
   wire::Refusal start(std::uint32_t lease_id);
   wire::Refusal stop_at_cycle_end();
   wire::Refusal stop_now();
@@ -72,7 +76,7 @@ class Motion {
 
  private:
   /// What the input interrupt has to watch for.
-  enum class Watch : std::uint8_t { rest, run, seek_home, leave_home, clearance };
+  enum class Watch : std::uint8_t { rest, run, approach_home, leave_home, inflating, withdrawing };
 
   /// An interrupt has cut the motion off and the main loop has not latched the fault yet.
   [[nodiscard]] bool fault_pending() const { return tripped_ != wire::Fault::none; }
@@ -84,8 +88,15 @@ class Motion {
   void set_motor_enabled(bool enabled);
   void watch_lease();
   void begin_controlled_stop(wire::RunEnd reason);
+  [[nodiscard]] bool homing_or_jogging() const;
+  /// At rest within the lease at up to Settings::hand_steps_per_s.
+  [[nodiscard]] Ticks hand_silence() const {
+    return microseconds(settings_.limits().lease_us / 4 * 3 - 5'000) - kHorizon;
+  }
   void run_homing();
   void begin_homing_stage(HomingStage stage);
+  void end_homing_stage();
+  void come_to_rest(wire::State state);
   void report_plan();
   void take_reports();
   void take_report(const MotionReport& report);

@@ -91,12 +91,40 @@ wire::Refusal Motion<B>::home(std::uint32_t lease_id) {
   if (!configured_) return wire::Refusal::not_configured;
   if (!safety_.at_rest() || fault_pending()) return wire::Refusal::wrong_state;
   if (board_.inputs().estop) return wire::Refusal::estop_pressed;
-  silence_allowed_ = microseconds(settings_.limits().lease_us);
+  silence_allowed_ = hand_silence();
   if (!lease_.bind(lease_id, board_.now(), silence_allowed_)) return wire::Refusal::no_lease;
+  fault_at_rest_ = wire::Fault::none;
+  decelerating_ = false;
   set_motor_enabled(true);
   become(wire::State::homing);
-  begin_homing_stage(board_.inputs().home ? HomingStage::leave : HomingStage::seek);
+  begin_homing_stage(board_.inputs().home ? HomingStage::back_off : HomingStage::seek);
   return wire::Refusal::none;
+}
+
+template <Board B>
+PlanRefusal Motion<B>::jog(const wire::Jog& jog) {
+  const wire::State state = safety_.state();
+  if (!configured_) return {.refusal = wire::Refusal::not_configured};
+  if ((state != wire::State::unhomed && state != wire::State::homed) || fault_pending() || run_end_due_)
+    return {.refusal = wire::Refusal::wrong_state};
+  const bool inflate = jog.distance_nL > 0;
+  const Inputs inputs = board_.inputs();
+  if (inputs.estop) return {.refusal = wire::Refusal::estop_pressed};
+  if (inflate && inputs.far_limit) return {.refusal = wire::Refusal::limit_switch_closed};
+  if (!inflate && inputs.home) return {.refusal = wire::Refusal::home_switch_closed};
+  const PlanRefusal excess = check_jog(jog, settings_, safety_.position_known(), engine_.counters().position);
+  if (excess.refusal != wire::Refusal::none) return excess;
+  const Glide glide = jog_glide(jog, settings_);
+  silence_allowed_ = hand_silence();
+  if (!lease_.bind(jog.lease_id, board_.now(), silence_allowed_)) return {.refusal = wire::Refusal::no_lease};
+  fault_at_rest_ = wire::Fault::none;
+  decelerating_ = false;
+  set_motor_enabled(true);
+  watch_ = inflate ? Watch::inflating : Watch::withdrawing;
+  become(wire::State::jogging);
+  engine_.open();
+  planner_.begin_glide(inflate, glide, board_.now() + kStartLead);
+  return {};
 }
 
 template <Board B>
@@ -136,7 +164,7 @@ wire::Refusal Motion<B>::stop_at_cycle_end() {
 
 template <Board B>
 wire::Refusal Motion<B>::stop_now() {
-  if (!safety_.in_run()) return wire::Refusal::wrong_state;
+  if (!safety_.in_run() && !homing_or_jogging()) return wire::Refusal::wrong_state;
   begin_controlled_stop(wire::RunEnd::stopped_now);
   return wire::Refusal::none;
 }

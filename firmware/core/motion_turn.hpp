@@ -31,10 +31,12 @@ void Motion<B>::on_inputs() {
     trip(wire::Fault::limit_switch);
   } else if (watch == Watch::run && inputs.home) {
     trip(wire::Fault::home_switch);
-  } else if ((watch == Watch::seek_home && inputs.home) || (watch == Watch::leave_home && !inputs.home)) {
+  } else if ((watch == Watch::approach_home && inputs.home) || (watch == Watch::leave_home && !inputs.home)) {
     engine_.cut();
-  } else if ((watch == Watch::leave_home || watch == Watch::clearance) && inputs.far_limit) {
+  } else if ((watch == Watch::leave_home || watch == Watch::inflating) && inputs.far_limit) {
     trip(wire::Fault::limit_switch);
+  } else if (watch == Watch::withdrawing && inputs.home) {
+    trip(wire::Fault::home_switch);
   }
 }
 
@@ -99,10 +101,7 @@ void Motion<B>::set_motor_enabled(bool enabled) {
 template <Board B>
 void Motion<B>::watch_lease() {
   if (!lease_.lost(board_.now(), silence_allowed_)) return;
-  if (safety_.state() == wire::State::homing) {
-    engine_.cut();
-    latch(wire::Fault::lease_lost);
-  } else if (safety_.in_run() && fault_at_rest_ == wire::Fault::none) {
+  if ((safety_.in_run() || homing_or_jogging()) && fault_at_rest_ == wire::Fault::none) {
     fault_at_rest_ = wire::Fault::lease_lost;
     begin_controlled_stop(wire::RunEnd::lease_lost);
   }
@@ -112,31 +111,78 @@ template <Board B>
 void Motion<B>::begin_controlled_stop(wire::RunEnd reason) {
   end_reason_ = reason;
   if (safety_.state() == wire::State::running) become(wire::State::stopping);
+  if (safety_.state() == wire::State::homing) {
+    homing_ = HomingStage::stopped;
+    // The switch may just have cut a stage off, and must not cut the stop off.
+    if (watch_ == Watch::approach_home) watch_ = Watch::rest;
+    if (watch_ == Watch::leave_home) watch_ = Watch::inflating;
+    if (engine_.closed()) engine_.open();
+  }
   if (decelerating_) return;
   decelerating_ = true;
   planner_.begin_stop(board_.now() + microseconds(1'000), settings_.stop_steps_per_s2());
 }
 
 template <Board B>
-void Motion<B>::begin_homing_stage(HomingStage stage) {
-  homing_ = stage;
-  watch_ = stage == HomingStage::seek    ? Watch::seek_home
-           : stage == HomingStage::leave ? Watch::leave_home
-                                         : Watch::clearance;
-  const HomingTravel travel = homing_travel(stage, settings_);
-  engine_.open();
-  planner_.begin_travel(travel.inflate, travel.most_steps, board_.now() + kHomingPause, travel.interval);
+bool Motion<B>::homing_or_jogging() const {
+  return safety_.state() == wire::State::homing || safety_.state() == wire::State::jogging;
 }
 
-/// The switch has changed: the interrupt has cut the stage off, go on with the next.
+template <Board B>
+void Motion<B>::begin_homing_stage(HomingStage stage) {
+  homing_ = stage;
+  decelerating_ = false;
+  watch_ = stage == HomingStage::seek       ? Watch::rest
+           : stage == HomingStage::approach ? Watch::approach_home
+           : stage == HomingStage::leave    ? Watch::leave_home
+                                            : Watch::inflating;
+  const HomingMove move = homing_move(stage, settings_);
+  engine_.open();
+  planner_.begin_glide(move.inflate, move.glide, board_.now() + kHomingPause);
+}
+
+/// Where the switch has changed: from the fast stages to rest (take_end goes on); the slow ones are cut off already.
 template <Board B>
 void Motion<B>::run_homing() {
   if (safety_.state() != wire::State::homing) return;
-  const bool home_closed = board_.inputs().home;
-  if (homing_ == HomingStage::seek && home_closed)
+  const bool closed = board_.inputs().home;
+  if (homing_ == HomingStage::seek ? closed : homing_ == HomingStage::back_off && !closed) {
+    if (!std::exchange(decelerating_, true))
+      planner_.begin_stop(board_.now() + microseconds(1'000), settings_.stop_steps_per_s2());
+  } else if (homing_ == HomingStage::approach && closed) {
     begin_homing_stage(HomingStage::leave);
-  else if (homing_ == HomingStage::leave && !home_closed)
+  } else if (homing_ == HomingStage::leave && !closed) {
     begin_homing_stage(HomingStage::clearance);
+  }
+}
+
+/// A stage of homing has come to its end.
+template <Board B>
+void Motion<B>::end_homing_stage() {
+  switch (homing_) {
+    case HomingStage::seek:
+      return decelerating_ ? begin_homing_stage(HomingStage::back_off) : latch(wire::Fault::homing_failed);
+    case HomingStage::back_off:
+      return decelerating_ ? begin_homing_stage(HomingStage::approach)
+                           : latch(wire::Fault::home_switch_stuck);
+    case HomingStage::approach:
+      return latch(wire::Fault::homing_failed);
+    case HomingStage::leave:
+      return latch(wire::Fault::home_switch_stuck);
+    case HomingStage::clearance:
+      engine_.set_position(Steps{0});
+      return come_to_rest(wire::State::homed);
+    default:
+      return come_to_rest(wire::State::unhomed);
+  }
+}
+
+template <Board B>
+void Motion<B>::come_to_rest(wire::State state) {
+  homing_ = HomingStage::done;
+  watch_ = Watch::rest;
+  lease_.release();
+  become(state);
 }
 
 template <Board B>
@@ -210,22 +256,14 @@ void Motion<B>::take_report(const MotionReport& report) {
 /// Everything planned has been done.
 template <Board B>
 void Motion<B>::take_end(Ticks tick) {
-  if (safety_.state() == wire::State::homing) {
-    if (homing_ != HomingStage::clearance) {
-      latch(wire::Fault::homing_failed);
-      return;
-    }
-    homing_ = HomingStage::done;
-    engine_.set_position(Steps{0});
-    watch_ = Watch::rest;
-    lease_.release();
-    become(wire::State::homed);
+  if (fault_at_rest_ != wire::Fault::none && (safety_.in_run() || homing_or_jogging())) {
+    latch(fault_at_rest_);
   } else if (safety_.in_run()) {
-    if (fault_at_rest_ != wire::Fault::none) {
-      latch(fault_at_rest_);
-      return;
-    }
     end_motion(tick);
+  } else if (safety_.state() == wire::State::homing) {
+    end_homing_stage();
+  } else if (safety_.state() == wire::State::jogging) {
+    come_to_rest(safety_.position_known() ? wire::State::homed : wire::State::unhomed);
   }
 }
 

@@ -31,14 +31,15 @@ void Planner::begin_run(const Program& program, const Settings& settings, Ticks 
   plan_next();
 }
 
-void Planner::begin_travel(bool inflate, std::uint32_t count, Ticks first, Ticks interval) {
-  origin_ = first;
-  length_ = interval;
+void Planner::begin_glide(bool inflate, const Glide& glide, Ticks start) {
+  origin_ = start;
+  glide_ = glide;
+  length_ = glide.duration();
   inflate_ = inflate;
-  count_ = count;
+  count_ = glide.count();
   index_ = 0;
   last_ = before_last_ = {};
-  phase_ = Phase::travel;
+  phase_ = Phase::glide;
   plan_next();
 }
 
@@ -173,9 +174,9 @@ void Planner::finish_cycle() {
   }
 }
 
-MotionEvent Planner::travel_step() {
-  const Ticks tick = origin_ + length_ * index_++;
-  return {tick, static_cast<std::uint16_t>(MotionEvent::kStep | (inflate_ ? MotionEvent::kInflate : 0))};
+MotionEvent Planner::glide_step() {
+  return {origin_ + glide_.time_of(index_++),
+          static_cast<std::uint16_t>(MotionEvent::kStep | (inflate_ ? MotionEvent::kInflate : 0))};
 }
 
 MotionEvent Planner::stop_step() {
@@ -228,11 +229,11 @@ void Planner::plan_in_phase() {
       else
         next_ = still_cycle_mark();
       break;
-    case Phase::travel:
+    case Phase::glide:
       if (index_ < count_)
-        next_ = travel_step();
+        next_ = glide_step();
       else
-        end_steps(length_ * count_);
+        end_steps(length_);
       break;
     case Phase::stop:
       if (index_ < count_)

@@ -13,6 +13,7 @@
 
 #include <cstdint>
 
+#include "firmware/core/glide.hpp"
 #include "firmware/core/profiles/profile.hpp"
 #include "firmware/core/program.hpp"
 #include "firmware/core/stepped_fraction.hpp"
@@ -46,8 +47,8 @@ class Planner {
 
   /// Plans the program from `start`. `program` must outlive the run. Precondition: check_program accepted it.
   void begin_run(const Program& program, const Settings& settings, Ticks start, Steps position);
-  /// Plans `count` steps at even intervals (homing).
-  void begin_travel(bool inflate, std::uint32_t count, Ticks first, Ticks interval);
+  /// Plans one motion from rest to rest (homing, jog).
+  void begin_glide(bool inflate, const Glide& glide, Ticks start);
   /// After the cycle being planned: ramp to 0 and end.
   void stop_at_cycle_end() { stop_at_cycle_end_ = true; }
   /// Comes to rest from the last popped event at no more than `deceleration_steps_per_s2`: what has been popped
@@ -72,7 +73,7 @@ class Planner {
   static Ticks segment_offset(const Program& program, const Settings& settings, std::size_t segment);
 
  private:
-  enum class Phase : std::uint8_t { idle, run_start, rest, ramp, segment_start, cycles, travel, stop, end };
+  enum class Phase : std::uint8_t { idle, run_start, rest, ramp, segment_start, cycles, glide, stop, end };
 
   void plan_next();
   [[nodiscard]] Ticks last_interval() const;
@@ -86,7 +87,7 @@ class Planner {
   MotionEvent uploaded_step();
   MotionEvent still_cycle_mark();
   [[nodiscard]] std::uint16_t cycle_start_flags() const;
-  MotionEvent travel_step();
+  MotionEvent glide_step();
   MotionEvent stop_step();
   void finish_cycle();
 
@@ -95,15 +96,16 @@ class Planner {
   MotionEvent next_;
   Phase phase_ = Phase::idle;
   Phase after_ramp_ = Phase::idle;
-  Ticks origin_;             ///< when the present ramp, cycle, travel or stop began
+  Ticks origin_;             ///< when the present ramp, cycle, glide or stop began
   Steps position_;           ///< at the beginning of the present phase
   std::uint32_t index_ = 0;  ///< next step of the present phase
-  std::uint32_t count_ = 0;  ///< steps of the present ramp, half cycle, travel or stop
+  std::uint32_t count_ = 0;  ///< steps of the present ramp, half cycle, glide or stop
   SteppedFraction level_;    ///< y of the next step of the present ramp, cycle or stop
   bool inflate_ = false;
-  Ticks length_;                      ///< of the ramp, cycle or stop; interval of travel
+  Ticks length_;                      ///< of the ramp, cycle, glide or stop
   const Profile* profile_ = nullptr;  ///< null: the segment's waveform was uploaded
   UploadedCrossings crossings_;       ///< of that one
+  Glide glide_;
   std::size_t segment_ = 0;
   std::uint32_t cycle_ = 0;  ///< in the segment
   std::uint64_t cycle_in_run_ = 0;

@@ -83,6 +83,13 @@ class Settings {
     const std::uint64_t least = half < stoppable ? half : stoppable;
     return least > 0 ? least : 1;
   }
+  /// Largest speed of homing and jogging: half of what is allowed, and stopped in a quarter of the lease.
+  [[nodiscard]] std::uint64_t hand_steps_per_s() const {
+    const std::uint64_t stoppable = stop_steps_per_s2() * configure_.lease_us / 4'000'000;
+    const std::uint64_t half = allowed_steps_per_s() / 2;
+    const std::uint64_t least = half < stoppable ? half : stoppable;
+    return least > 0 ? least : 1;
+  }
   /// Time of a smooth ramp over a distance: at least 1 s, within ramp_steps_per_s and a quarter of the
   /// allowed acceleration (parabolic: speed 2 D/t, acceleration 4 D/t²).
   [[nodiscard]] Ticks ramp_time(Steps distance) const;

@@ -14,17 +14,20 @@ constexpr bool may_follow(wire::State from, wire::State to) {
   using enum wire::State;
   switch (to) {
     case unhomed:
-      return from == faulted || from == homed || from == armed;
+      return from == faulted || from == homed || from == armed || from == homing || from == jogging;
     case homing:
       return from == unhomed || from == homed || from == armed;
     case homed:
-      return from == homing || from == armed || from == running || from == stopping || from == faulted;
+      return from == homing || from == armed || from == running || from == stopping || from == faulted ||
+             from == jogging;
     case armed:
       return from == homed;
     case running:
       return from == armed;
     case stopping:
       return from == running;
+    case jogging:
+      return from == unhomed || from == homed;
     case faulted:
       return from != faulted;
   }
@@ -47,6 +50,8 @@ class Safety {
   [[nodiscard]] bool in_run() const {
     return state_ == wire::State::running || state_ == wire::State::stopping;
   }
+
+  [[nodiscard]] bool position_known() const { return position_known_; }
 
   /// Changes the state if that is allowed; false leaves it.
   bool become(wire::State to) {

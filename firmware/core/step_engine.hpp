@@ -58,6 +58,7 @@ class StepEngine {
     queue_.clear();
     closed_ = false;
   }
+  [[nodiscard]] bool closed() const { return closed_; }
   [[nodiscard]] bool full() const { return queue_.full(); }
   void push(const MotionEvent& event) {
     if (closed_) return;

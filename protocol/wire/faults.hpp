@@ -10,7 +10,7 @@ enum class Fault : std::uint8_t {
 #include "protocol/wire/fault_list.inc"
 };
 #undef DIASTOLE_FAULT
-inline constexpr Fault kLastFault = Fault::event_overflow;
+inline constexpr Fault kLastFault = Fault::home_switch_stuck;
 
 #define DIASTOLE_REFUSAL(number, name, explanation) name = number,
 enum class Refusal : std::uint8_t {
@@ -24,6 +24,6 @@ enum class Limit : std::uint8_t {
 #include "protocol/wire/limit_list.inc"
 };
 #undef DIASTOLE_LIMIT
-inline constexpr Limit kLastLimit = Limit::microstep;
+inline constexpr Limit kLastLimit = Limit::home;
 
 }  // namespace diastole::wire

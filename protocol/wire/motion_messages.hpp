@@ -7,7 +7,7 @@
 
 namespace diastole::wire {
 
-// Host → controller: finds the home switch by withdrawing slowly, leaves it, and calls that position 0.
+// Host → controller: finds the home switch (firmware/core/homing.hpp) and calls a place beside it position 0.
 //
 //   offset size field
 //        0    2 request_id                   chosen by the host; the answer repeats it
@@ -28,6 +28,41 @@ struct Home {
     Home message;
     message.request_id = 5;
     message.lease_id = 0x11223344;
+    return message;
+  }
+};
+
+// Host → controller: moves the piston by a distance, from rest to rest, at a quarter of the allowed acceleration.
+// StateChanged (jogging), Ack, and StateChanged when it is at rest. Unhomed it goes at most at the speed of homing; a
+// switch that closes in the direction of motion is a fault. Away from a closed switch it may always go.
+//
+//   offset size field
+//        0    2 request_id                   chosen by the host; the answer repeats it
+//        2    4 lease_id                     the lease whose heartbeats keep the motor going
+//        6    8 distance_nL                  signed, inflate positive
+//       14    4 flow_uL_per_s                speed
+//
+// Example Jog: 0A 00 44 33 22 11 C0 B4 B3 FF FF FF FF FF 88 13 00 00
+struct Jog {
+  static constexpr MessageType kType = MessageType::Jog;
+  std::uint16_t request_id = 0;
+  std::uint32_t lease_id = 0;
+  std::int64_t distance_nL = 0;
+  std::uint32_t flow_uL_per_s = 1U;
+
+  template <class Self, class Visitor>
+  static constexpr void layout([[maybe_unused]] Self& self, [[maybe_unused]] Visitor& visit) {
+    visit.field("request_id", self.request_id);
+    visit.field("lease_id", self.lease_id);
+    visit.field("distance_nL", self.distance_nL, -50'000'000'000, 50'000'000'000);
+    visit.field("flow_uL_per_s", self.flow_uL_per_s, 1U, 10'000'000U);
+  }
+  static constexpr Jog example() {
+    Jog message;
+    message.request_id = 10;
+    message.lease_id = 0x11223344;
+    message.distance_nL = -5'000'000;
+    message.flow_uL_per_s = 5'000;
     return message;
   }
 };
@@ -78,7 +113,7 @@ struct StopAtCycleEnd {
   }
 };
 
-// Host → controller: decelerate to rest now, at Configure.acceleration_uL_per_s2.
+// Host → controller: decelerate to rest now, at Configure.acceleration_uL_per_s2: a run, homing, a jog.
 //
 //   offset size field
 //        0    2 request_id                   chosen by the host; the answer repeats it

@@ -17,7 +17,7 @@ enum class State : std::uint8_t {
 #include "protocol/wire/state_list.inc"
 };
 #undef DIASTOLE_STATE
-inline constexpr State kLastState = State::faulted;
+inline constexpr State kLastState = State::jogging;
 
 #define DIASTOLE_WAVEFORM(number, name) name = number,
 enum class Waveform : std::uint8_t {

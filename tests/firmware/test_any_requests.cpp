@@ -14,7 +14,8 @@ namespace {
 using wire::State;
 
 bool moves(State state) {
-  return state == State::homing || state == State::running || state == State::stopping;
+  return state == State::homing || state == State::running || state == State::stopping ||
+         state == State::jogging;
 }
 
 /// Every step lies in a state that moves, and none is faster than allowed.
@@ -47,7 +48,7 @@ class Monkey {
   /// Half of the time what brings the rig nearer to a run, otherwise anything.
   void act() {
     if (draw(2) == 0) return help();
-    switch (draw(16)) {
+    switch (draw(18)) {
       case 0:
       case 1:
       case 2:
@@ -72,6 +73,11 @@ class Monkey {
         return bench_.rig.set_estop(draw(3) == 0);
       case 14:
         return bench_.rig.set_far_limit(draw(3) == 0);
+      case 15:
+      case 16:
+        return bench_.request(
+            wire::Jog{0, Bench::kLease, static_cast<std::int64_t>(draw(20'000'000)) - 10'000'000,
+                      1 + static_cast<std::uint32_t>(draw(draw(2) == 0 ? 5'000 : 200'000))});
       default:
         return bench_.request(wire::ClearFault{});
     }
@@ -121,6 +127,7 @@ class AnyRequests : public testing::TestWithParam<unsigned> {};
 TEST_P(AnyRequests, NeverLeaveTheTravelNorMoveAtRestNorLoseATrigger) {
   RecordedController::Options options;
   options.board.mechanics.start_steps = 100;
+  options.board.mechanics.far_limit_steps = 7'800;  // travel and clearance end before it
   Bench bench(options);
   wire::Configure configure = wire::Configure::example();
   configure.travel_uL = 60'000;
@@ -129,12 +136,22 @@ TEST_P(AnyRequests, NeverLeaveTheTravelNorMoveAtRestNorLoseATrigger) {
   bench.prepare(configure);
   Monkey monkey(bench, GetParam());
   const std::int32_t travel = settings.steps_of_nL(60'000'000).count;
+  // Seeking home comes to rest beyond the switch: what is in the queue, a turn, and the braking distance.
+  const std::uint64_t speed = settings.steps_per_s(configure.homing_flow_uL_per_s);
+  ASSERT_LT(speed, settings.hand_steps_per_s());
+  const auto overrun =
+      static_cast<std::int32_t>(speed / 80 + speed * speed / 2 / settings.stop_steps_per_s2() + 1);
   for (int action = 0; action < 150; ++action) {
     monkey.act();
     bench.run_for(monkey.pause());
     const std::int32_t position = bench.rig.mechanical_microsteps();
-    ASSERT_GE(position, 0);
-    ASSERT_LE(position, travel + static_cast<std::int32_t>(kHomeClearance_steps) + 1) << "action " << action;
+    ASSERT_GE(position, -overrun);
+    ASSERT_LE(position, 7'801) << "action " << action;
+    if (bench.rig.controller().motion().safety().in_run()) {
+      ASSERT_GE(position, 1);
+      ASSERT_LE(position, travel + static_cast<std::int32_t>(kHomeClearance_steps) + 1)
+          << "action " << action;
+    }
   }
   bench.rig.set_estop(false);
   bench.run_for(microseconds(20'000'000));

@@ -35,7 +35,9 @@ TEST(States, OnlyTheDrawnTransitionsExist) {
       {State::homing, State::homed},   {State::armed, State::homed},      {State::running, State::homed},
       {State::stopping, State::homed}, {State::faulted, State::homed},    {State::homed, State::armed},
       {State::armed, State::running},  {State::running, State::stopping}, {State::faulted, State::unhomed},
-      {State::homed, State::unhomed},  {State::armed, State::unhomed}};
+      {State::homed, State::unhomed},  {State::armed, State::unhomed},    {State::homing, State::unhomed},
+      {State::homed, State::jogging},  {State::unhomed, State::jogging},  {State::jogging, State::homed},
+      {State::jogging, State::unhomed}};
   for (int from = 0; from <= static_cast<int>(wire::kLastState); ++from)
     for (int to = 0; to <= static_cast<int>(wire::kLastState); ++to) {
       const std::pair pair{static_cast<State>(from), static_cast<State>(to)};

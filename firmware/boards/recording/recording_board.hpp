@@ -1,7 +1,7 @@
 #pragma once
 // A board of virtual time for the host: its pins are a log, its timer is a number, its serial line two
-// queues. The rig's switches are simulated from the steps made: the home switch is closed where mechanical
-// steps <= 0, the far limit switch from Mechanics::far_limit_steps on.
+// queues. The rig's switches are simulated from the steps made: the home switch closes where mechanical steps
+// <= 0 (and opens beyond its hysteresis), the far limit switch from Mechanics::far_limit_steps on.
 //
 // Most users want RecordedController (recorded_controller.hpp), which runs the firmware on it.
 
@@ -41,6 +41,8 @@ constexpr std::int64_t nanoseconds(Ticks ticks) {
 struct Mechanics {
   std::int32_t start_steps = 400;  ///< where the piston stands at reset, counted from the home switch
   std::int32_t far_limit_steps = 2'000'000'000;
+  std::int32_t home_hysteresis_steps = 0;  ///< the home switch opens that much further out than it closes
+  bool home_stuck = false;                 ///< closed for ever once it has closed
 };
 
 class RecordingBoard {
@@ -62,7 +64,9 @@ class RecordingBoard {
   };
 
   explicit RecordingBoard(Options options)
-      : options_(options), mechanical_steps_(options.mechanics.start_steps) {}
+      : options_(options), mechanical_steps_(options.mechanics.start_steps) {
+    move_home_switch();
+  }
 
   // What the core sees (concept Board).
   [[nodiscard]] Ticks now() const { return now_; }
@@ -111,6 +115,7 @@ class RecordingBoard {
   [[nodiscard]] Ticks byte_time() const { return {kTicksPerSecond * 10 / options_.baud}; }
   void set_pin(Signal signal, std::int32_t value);
   void carry_out(const PulseOrder& order);
+  void move_home_switch();
 
   Options options_;
   Ticks now_;
@@ -120,6 +125,7 @@ class RecordingBoard {
   std::priority_queue<Edge, std::vector<Edge>, Later> coming_;  ///< falling edges and R-wave samples
   std::int32_t pins_[6] = {};
   std::int32_t mechanical_steps_;
+  bool home_closed_ = false;
   bool estop_ = false;
   bool forced_far_limit_ = false;
   std::deque<std::uint8_t> from_host_;
