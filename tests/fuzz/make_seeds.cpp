@@ -1,0 +1,101 @@
+// Writes the seed corpora: the worked example of every message, as each target reads it, and whole sessions.
+//   make_seeds DIRECTORY     (makes fuzz_wire/, fuzz_controller/ and fuzz_client/ in it)
+
+#include <filesystem>
+#include <fstream>
+#include <string>
+
+#include "protocol/wire/messages.hpp"
+#include "tests/fuzz/script.hpp"
+
+namespace {
+
+using namespace diastole;
+using Bytes = std::vector<std::uint8_t>;
+
+template <class Message>
+Bytes encoded(const Message& message) {
+  std::array<std::uint8_t, wire::kMaxPayloadBytes> memory{};
+  const auto bytes = wire::encode(message, memory);
+  return {bytes.begin(), bytes.end()};
+}
+
+template <class Message>
+void add(fuzz::ScriptWriter& script, const Message& message) {
+  script.message(Message::kType, encoded(message));
+}
+
+void write(const std::filesystem::path& file, const Bytes& bytes) {
+  std::filesystem::create_directories(file.parent_path());
+  std::ofstream stream(file, std::ios::binary);
+  stream.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+}
+
+template <class Message>
+void write_example(const std::filesystem::path& directory, const std::string& name) {
+  Bytes typed = encoded(Message::example());
+  typed.insert(typed.begin(), static_cast<std::uint8_t>(Message::kType));
+  write(directory / "fuzz_wire" / name, typed);
+  fuzz::ScriptWriter script;
+  add(script, Message::example());
+  const bool from_host = wire::sender_of(Message::kType) == wire::Sender::host;
+  write(directory / (from_host ? "fuzz_controller" : "fuzz_client") / name, script.bytes());
+}
+
+/// Homed, loaded, started, and ended in each way.
+void write_sessions(const std::filesystem::path& directory) {
+  constexpr std::uint32_t lease = 0x5EA5E;  // Bench::kLease
+  fuzz::ScriptWriter session;
+  wire::Configure configure = wire::Configure::example();
+  configure.homing_flow_uL_per_s = 50'000;
+  add(session, configure);
+  add(session, wire::Home{1, lease});
+  session.time(150);
+  wire::AddSegment segment = wire::AddSegment::example();
+  segment.stroke_nL = 2'000'000;
+  segment.period_us = 300'000;
+  add(session, segment);
+  wire::Arm arm = wire::Arm::example();
+  arm.rest_us = 1'000;
+  add(session, arm);
+  session.time(10);
+  add(session, wire::Start{2, lease});
+  session.time(60);
+  const std::filesystem::path home = directory / "fuzz_controller";
+  write(home / "session", session.bytes());
+  const auto ended = [&](const char* name, auto end) {
+    fuzz::ScriptWriter whole = session;
+    end(whole);
+    whole.time(100);
+    add(whole, wire::ClearFault{9});
+    write(home / name, whole.bytes());
+  };
+  ended("session_stop_now", [](fuzz::ScriptWriter& script) { add(script, wire::StopNow{3}); });
+  ended("session_stop_at_cycle_end",
+        [](fuzz::ScriptWriter& script) { add(script, wire::StopAtCycleEnd{3}); });
+  ended("session_halt", [](fuzz::ScriptWriter& script) { add(script, wire::Halt{3}); });
+  ended("session_estop", [](fuzz::ScriptWriter& script) { script.other(1).time(1).other(0); });
+  ended("session_limit", [](fuzz::ScriptWriter& script) { script.other(2).time(1).other(0); });
+  ended("session_silence", [](fuzz::ScriptWriter& script) { script.other(4).time(150).other(0); });
+  fuzz::ScriptWriter client;
+  client.other(1).other(2).other(3);
+  add(client, wire::RunStarted::example());
+  add(client, wire::PositionBatch::example());
+  add(client, wire::Trigger::example());
+  client.time(10).other(4);
+  add(client, wire::RunEnded::example());
+  client.other(7).other(5);
+  write(directory / "fuzz_client" / "session", client.bytes());
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc != 2) return 2;
+  const std::filesystem::path directory = argv[1];
+#define DIASTOLE_MESSAGE(number, name, sender, delivery) write_example<wire::name>(directory, #name);
+#include "protocol/wire/message_list.inc"
+#undef DIASTOLE_MESSAGE
+  write_sessions(directory);
+  return 0;
+}
