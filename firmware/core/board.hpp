@@ -9,7 +9,9 @@
 #include <span>
 
 #include "firmware/core/units.hpp"
+#include "protocol/wire/image_header.hpp"
 #include "protocol/wire/states.hpp"
+#include "protocol/wire/update.hpp"
 
 namespace diastole::firmware {
 
@@ -38,6 +40,16 @@ struct Identity {
   wire::ResetCause reset_cause = wire::ResetCause::unknown;
 };
 
+/// The image that the board runs, among those in its slots.
+struct RunningImage {
+  wire::ImageSlot slot = wire::ImageSlot::a;
+  wire::Standing standing = wire::Standing::unrecorded;
+  wire::FirmwareVersion version;
+  std::uint64_t build_id = 0;
+  std::uint32_t code_bytes = 0;
+  std::uint32_t link_address = 0;
+};
+
 template <class B>
 concept Board = requires(B& board, const B& fixed, const PulseOrder& order,
                          std::span<const std::uint8_t> bytes) {
@@ -63,6 +75,11 @@ concept Board = requires(B& board, const B& fixed, const PulseOrder& order,
   {board.feed_watchdog()};
   /// Where settings are kept (settings_store.hpp); writing there may hold everything up for a second.
   { board.settings_flash() } -> std::same_as<typename B::SettingsFlash&>;
+  { fixed.running_image() } -> std::same_as<RunningImage>;
+  /// Makes the running image the one to start from now on; at rest only. False: the flash did not take it.
+  { board.confirm_image() } -> std::same_as<bool>;
+  /// Resets, into the bootloader if asked. Outputs must be safe.
+  {board.restart(true)};
   /// Interrupts that call the core are held off while one of these lives.
   typename B::InterruptLock;
   requires std::constructible_from<typename B::InterruptLock, B&>;

@@ -8,6 +8,7 @@
 // come round within Motion::kHorizon.
 
 #include "firmware/core/dispatch.hpp"
+#include "firmware/core/image_trial.hpp"
 #include "firmware/core/motion.hpp"
 #include "firmware/core/outbox.hpp"
 #include "firmware/core/settings_store.hpp"
@@ -23,7 +24,8 @@ class Controller {
       : board_(board),
         settings_(board.settings_flash()),
         motion_(board, outbox_),
-        dispatch_(board, motion_, settings_, outbox_, link_),
+        trial_(board, motion_),
+        dispatch_(board, motion_, settings_, trial_, outbox_, link_),
         telemetry_(motion_, outbox_) {
     motion_.use(settings_.settings(), settings_.records_written() > 0);
   }
@@ -33,6 +35,7 @@ class Controller {
     board_.feed_watchdog();
     receive();
     motion_.poll();
+    trial_.poll();
     telemetry_.pump(link_);
     transmit();
   }
@@ -70,6 +73,7 @@ class Controller {
   Outbox outbox_;
   SettingsStore<typename B::SettingsFlash> settings_;
   Motion<B> motion_;
+  ImageTrial<B> trial_;
   Dispatch<B> dispatch_;
   Telemetry<B> telemetry_;
 };

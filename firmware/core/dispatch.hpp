@@ -1,9 +1,10 @@
 #pragma once
-// Messages → actions → answers. Every request is answered once, with its request_id: Ack, Nak, Hello or
-// Status.
+// Messages → actions → answers. Every request is answered once, with its request_id: Ack, Nak, Hello, Status,
+// or what its header says.
 
 #include <array>
 
+#include "firmware/core/image_trial.hpp"
 #include "firmware/core/motion.hpp"
 #include "firmware/core/outbox.hpp"
 #include "firmware/core/settings_store.hpp"
@@ -18,8 +19,9 @@ class Dispatch {
  public:
   using Store = SettingsStore<typename B::SettingsFlash>;
 
-  Dispatch(B& board, Motion<B>& motion, Store& store, Outbox& outbox, wire::ReliableLink& link)
-      : board_(board), motion_(motion), store_(store), outbox_(outbox), link_(link) {}
+  Dispatch(B& board, Motion<B>& motion, Store& store, ImageTrial<B>& trial, Outbox& outbox,
+           wire::ReliableLink& link)
+      : board_(board), motion_(motion), store_(store), trial_(trial), outbox_(outbox), link_(link) {}
 
   void receive(const wire::Received& received) {
     if (link_.generation() != generation_) {
@@ -31,7 +33,7 @@ class Dispatch {
   }
 
  private:
-  /// Before the schema hashes are known to agree, only HelloRequest counts.
+  /// Before the schema hashes are known to agree, only HelloRequest and what belongs to an update counts.
   template <class Message>
   void handle_or_refuse(const Message& message) {
     if constexpr (std::is_same_v<Message, wire::HelloRequest>) {
@@ -40,6 +42,8 @@ class Dispatch {
       refuse(0, message.type, {message.known ? wire::Refusal::malformed : wire::Refusal::unknown_message});
     } else if constexpr (wire::sender_of(Message::kType) == wire::Sender::controller) {
       refuse(0, static_cast<std::uint8_t>(Message::kType), {wire::Refusal::unknown_message});
+    } else if constexpr (wire::is_update(Message::kType)) {
+      handle_update(message);
     } else if constexpr (wire::delivery_of(Message::kType) == wire::Delivery::datagram) {
       if (schema_agreed_) handle(message);
     } else if (schema_agreed_) {
@@ -122,6 +126,30 @@ class Dispatch {
       conclude(request, wire::Refusal::none);
     }
   }
+  void handle_update(const wire::EnterBootloader& request) { conclude(request, trial_.enter_bootloader()); }
+  void handle_update(const wire::ConfirmImage& request) {
+    conclude(request, trial_.confirm(request.build_id));
+  }
+  void handle_update(const wire::ImageQuery& query) {
+    const RunningImage image = board_.running_image();
+    wire::ImageReport report;
+    report.request_id = query.request_id;
+    report.slot = image.slot;
+    report.standing = image.standing;
+    report.version_major = image.version.major;
+    report.version_minor = image.version.minor;
+    report.version_patch = image.version.patch;
+    report.build_id = image.build_id;
+    report.code_bytes = report.held_bytes = image.code_bytes;
+    report.link_address = image.link_address;
+    report.free_slot = image.slot == wire::ImageSlot::a ? wire::ImageSlot::b : wire::ImageSlot::a;
+    answer(report);
+  }
+  void handle_update(const wire::StayInBootloader&) {}
+  template <class Request>
+  void handle_update(const Request& request) {
+    conclude(request, wire::UpdateOutcome::not_in_bootloader);
+  }
   void handle(const wire::Configure& request) { conclude(request, motion_.configure(request)); }
   void handle(const wire::ClearProgram& request) { conclude(request, motion_.clear_program()); }
   void handle(const wire::AddSegment& request) { conclude(request, motion_.add_segment(request)); }
@@ -145,6 +173,10 @@ class Dispatch {
       refuse(request.request_id, type, why);
   }
   template <class Request>
+  void conclude(const Request& request, wire::UpdateOutcome outcome) {
+    answer(wire::UpdateAnswer{request.request_id, static_cast<std::uint8_t>(Request::kType), outcome, 0, 0});
+  }
+  template <class Request>
   void conclude(const Request& request, wire::Refusal refusal) {
     conclude(request, PlanRefusal{.refusal = refusal});
   }
@@ -160,6 +192,7 @@ class Dispatch {
   B& board_;
   Motion<B>& motion_;
   Store& store_;
+  ImageTrial<B>& trial_;
   Outbox& outbox_;
   wire::ReliableLink& link_;
   std::uint32_t generation_ = 0;

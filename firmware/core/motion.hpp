@@ -52,6 +52,8 @@ class Motion {
   wire::Refusal stop_now();
   wire::Refusal halt();
   wire::Refusal clear_fault();
+  /// Takes the motor's current away; the position is then unknown. Precondition: at rest.
+  void let_go();
   void heartbeat(std::uint32_t lease_id) { lease_.heartbeat(lease_id, board_.now()); }
 
   /// One turn of the main loop: faults, lease, homing, refilling the queue, reports.

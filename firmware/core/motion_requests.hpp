@@ -188,4 +188,10 @@ wire::Refusal Motion<B>::clear_fault() {
   return wire::Refusal::none;
 }
 
+template <Board B>
+void Motion<B>::let_go() {
+  safety_.forget_position();
+  set_motor_enabled(false);
+}
+
 }  // namespace diastole::firmware

@@ -24,20 +24,25 @@ namespace diastole::wire {
 template <class T>
 using Bound = std::type_identity_t<T>;
 
+/// Readers and writers drop the fields' names: no image carries them.
+struct Nameless {
+  constexpr Nameless(const char*) {}
+};
+
 class FieldWriter {
  public:
   explicit constexpr FieldWriter(std::span<std::uint8_t> out) : out_(out) {}
 
   template <class T>
-  constexpr void field(std::string_view, const T& value, Bound<T> = {}, Bound<T> = {}) {
+  constexpr void field(Nameless, const T& value, Bound<T> = {}, Bound<T> = {}) {
     put(value);
   }
   template <class Enum>
-  constexpr void choice(std::string_view, const Enum& value, Bound<Enum>) {
+  constexpr void choice(Nameless, const Enum& value, Bound<Enum>) {
     put(static_cast<std::uint8_t>(value));
   }
   template <class T, std::size_t N>
-  constexpr void list(std::string_view, const std::uint8_t& count, const std::array<T, N>& values) {
+  constexpr void list(Nameless, const std::uint8_t& count, const std::array<T, N>& values) {
     put(count);
     for (std::size_t i = 0; i < count && i < N; ++i)
       put(values[i]);
@@ -71,18 +76,18 @@ class FieldReader {
   explicit constexpr FieldReader(std::span<const std::uint8_t> in) : in_(in) {}
 
   template <class T>
-  constexpr void field(std::string_view, T& value, Bound<T> least = std::numeric_limits<T>::min(),
+  constexpr void field(Nameless, T& value, Bound<T> least = std::numeric_limits<T>::min(),
                        Bound<T> most = std::numeric_limits<T>::max()) {
     value = take<T>();
     check(value >= least && value <= most);
   }
   template <class Enum>
-  constexpr void choice(std::string_view, Enum& value, Bound<Enum> last) {
+  constexpr void choice(Nameless, Enum& value, Bound<Enum> last) {
     const auto number = take<std::uint8_t>();
     if (check(number <= static_cast<std::uint8_t>(last))) value = static_cast<Enum>(number);
   }
   template <class T, std::size_t N>
-  constexpr void list(std::string_view, std::uint8_t& count, std::array<T, N>& values) {
+  constexpr void list(Nameless, std::uint8_t& count, std::array<T, N>& values) {
     count = take<std::uint8_t>();
     if (!check(count <= N)) return;
     for (std::size_t i = 0; i < count; ++i)

@@ -25,6 +25,9 @@ constexpr Delivery delivery_of(MessageType type) {
   return Delivery::sequenced;
 }
 
+/// Requests of an update (update_messages.hpp).
+constexpr bool is_update(MessageType type) { return (static_cast<std::uint8_t>(type) & 0xF0U) == 0x30; }
+
 constexpr Sender sender_of(MessageType type) {
   switch (type) {
 #define DIASTOLE_MESSAGE(number, name, sender, delivery) \

@@ -24,6 +24,7 @@
 #include "protocol/wire/settings_messages.hpp"
 #include "protocol/wire/status_messages.hpp"
 #include "protocol/wire/telemetry_messages.hpp"
+#include "protocol/wire/update_messages.hpp"
 
 namespace diastole::wire {
 

@@ -9,6 +9,10 @@
 
 namespace diastole::wire {
 
+/// The schema hash by which a bootloader introduces itself: it speaks the messages of update_messages.hpp
+/// only.
+inline constexpr std::uint32_t kBootloaderSchema = 0xB007'10AD;
+
 // Host → controller: the first message of a session.
 //
 //   offset size field

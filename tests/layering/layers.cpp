@@ -54,7 +54,7 @@ const std::vector<Rule>& rules() {
       {"protocol/signal", {"protocol/contract"}},
       {"protocol/runfile", {"protocol/contract", "protocol/signal"}},
       {"firmware/core", {"protocol/wire"}},
-      {"firmware/boards", {"protocol/wire", "firmware/core"}},
+      {"firmware/boards", {"protocol/wire", "firmware/core", "firmware/boot"}},
       {"firmware/boot", {"protocol/wire"}},
       {"host", {"protocol"}},
       {"estimator", {"protocol/contract", "protocol/runfile", "protocol/signal"}},

@@ -55,6 +55,7 @@ class RecordingBoard {
   struct Options {
     Identity identity{1, 0x0000B007, wire::ResetCause::power_on};
     Mechanics mechanics;
+    RunningImage image;
     std::uint32_t baud = 460'800;
     std::size_t serial_buffer_bytes = 2048;
     std::shared_ptr<Memory> memory = std::make_shared<Memory>();
@@ -85,8 +86,19 @@ class RecordingBoard {
   void serial_write(std::span<const std::uint8_t> bytes);
   void feed_watchdog() {}
   MemoryFlash& settings_flash() { return options_.memory->flash; }
+  [[nodiscard]] RunningImage running_image() const { return options_.image; }
+  bool confirm_image() {
+    options_.image.standing = wire::Standing::confirmed;
+    return true;
+  }
+  void restart(bool into_bootloader) {
+    restart_ = into_bootloader ? Restart::into_bootloader : Restart::plain;
+  }
 
   // What the world sees.
+  /// The firmware has asked for a reset; what then runs is not modelled here.
+  enum class Restart : std::uint8_t { none, plain, into_bootloader };
+  [[nodiscard]] Restart restart_asked() const { return restart_; }
   /// The next moment at which a pin changes or an order is carried out.
   [[nodiscard]] std::optional<Ticks> next_event() const;
   /// Moves the clock to `tick`, at most the next event, and makes the edges due then; true if an order was
@@ -132,6 +144,7 @@ class RecordingBoard {
   std::deque<SentByte> to_host_;
   std::vector<Edge> edges_;
   bool recording_ = true;
+  Restart restart_ = Restart::none;
 };
 
 }  // namespace diastole::firmware

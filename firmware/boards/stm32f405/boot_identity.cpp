@@ -1,16 +1,11 @@
 #include "firmware/boards/stm32f405/boot_identity.hpp"
 
+#include "firmware/boards/stm32f405/hand_over.hpp"
 #include "firmware/boards/stm32f405/registers.hpp"
 
 namespace diastole::stm32 {
 
 namespace {
-
-constexpr std::uint16_t kBoardId = 2;
-
-/// Survives a reset, is arbitrary after power-on: tells starts apart even if the random generator does not
-/// run.
-[[gnu::section(".noinit")]] std::uint32_t starts;
 
 std::uint32_t random_number() {
   constexpr std::uint32_t kEnable = 1U << 2, kReady = 1U << 0;
@@ -20,7 +15,9 @@ std::uint32_t random_number() {
   return 0;
 }
 
-wire::ResetCause reset_cause() {
+}  // namespace
+
+wire::ResetCause take_reset_cause() {
   const std::uint32_t flags = rcc().CSR.read();
   rcc().CSR.set(1U << 24);
   if ((flags & (1U << 29 | 1U << 30)) != 0) return wire::ResetCause::watchdog;
@@ -30,11 +27,11 @@ wire::ResetCause reset_cause() {
   return wire::ResetCause::unknown;
 }
 
-}  // namespace
+std::uint32_t make_boot_id(std::uint32_t starts) { return random_number() ^ starts * 0x9E37'79B9U; }
 
 firmware::Identity read_identity() {
-  starts = starts + 0x9E37'79B9U;
-  return {kBoardId, random_number() ^ starts, reset_cause()};
+  const HandOver hand_over = read_hand_over().value_or(HandOver{});
+  return {kBoardId, make_boot_id(hand_over.starts), hand_over.reset_cause};
 }
 
 }  // namespace diastole::stm32

@@ -26,4 +26,10 @@ void start_clocks() {
   rcc().APB2ENR.set(1U << 14);                                // SYSCFG
 }
 
+void start_systick() {
+  systick().LOAD.write(kCore_Hz / 1000 - 1);
+  systick().VAL.write(0);
+  systick().CTRL.write(7);
+}
+
 }  // namespace diastole::stm32

@@ -13,4 +13,7 @@ inline constexpr unsigned kApb1_Hz = 42'000'000;
 /// not start leaves the controller waiting here with all outputs off.
 void start_clocks();
 
+/// A turn of the main loop is due every millisecond: SysTick_Handler.
+void start_systick();
+
 }  // namespace diastole::stm32

@@ -86,6 +86,10 @@ struct Nvic {  // PM0214 4.3
 };
 static_assert(offsetof(Nvic, IPR) == 0x300);
 
+struct SystemControl {  // PM0214 4.4
+  Register CPUID, ICSR, VTOR, AIRCR;
+};
+
 template <class Peripheral>
 Peripheral& at(std::uintptr_t address) {
   return *reinterpret_cast<Peripheral*>(address);
@@ -108,6 +112,7 @@ inline Syscfg& syscfg() { return at<Syscfg>(0x4001'3800); }
 inline Iwdg& iwdg() { return at<Iwdg>(0x4000'3000); }
 inline Rng& rng() { return at<Rng>(0x5006'0800); }
 inline SysTick& systick() { return at<SysTick>(0xE000'E010); }
+inline SystemControl& system_control() { return at<SystemControl>(0xE000'ED00); }
 inline Nvic& nvic() { return at<Nvic>(0xE000'E100); }
 
 /// Interrupt numbers, RM0090 table 62.

@@ -9,15 +9,17 @@ extern void (*const __init_array_start[])();
 extern void (*const __init_array_end[])();
 
 int main();
-void TIM2_IRQHandler();
-void TIM5_IRQHandler();
-void USART3_IRQHandler();
-void DMA1_Stream5_IRQHandler();
-void EXTI_IRQHandler();
-void SysTick_Handler();
 void Stray_Handler();
 [[noreturn]] void Reset_Handler();
 [[noreturn]] void start();
+
+// A program defines the handlers of the interrupts that it enables.
+[[gnu::weak]] void TIM2_IRQHandler() { Stray_Handler(); }
+[[gnu::weak]] void TIM5_IRQHandler() { Stray_Handler(); }
+[[gnu::weak]] void USART3_IRQHandler() { Stray_Handler(); }
+[[gnu::weak]] void DMA1_Stream5_IRQHandler() { Stray_Handler(); }
+[[gnu::weak]] void EXTI_IRQHandler() { Stray_Handler(); }
+[[gnu::weak]] void SysTick_Handler() { Stray_Handler(); }
 
 /// Nothing may use a floating-point register before the unit is on, not even a prologue; hence no C++ here.
 /// CPACR (0xE000ED88): full access to coprocessors 10 and 11.

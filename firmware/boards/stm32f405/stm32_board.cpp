@@ -15,13 +15,6 @@ namespace {
 /// The number behind the FAULT pin, at 0x20000000 (stm32f405.ld) for whoever looks from outside.
 [[gnu::section(".shown"), gnu::used]] volatile std::uint8_t shown_fault;
 
-/// A turn of the main loop is due every millisecond.
-void start_systick() {
-  systick().LOAD.write(kCore_Hz / 1000 - 1);
-  systick().VAL.write(0);
-  systick().CTRL.write(7);
-}
-
 }  // namespace
 
 void Stm32Board::start() {
@@ -35,7 +28,7 @@ void Stm32Board::start() {
   for (const Interrupt input : {kExti0, kExti1, kExti2})
     enable_interrupt(input, 1);
   start_systick();
-  start_watchdog();
+  start_watchdog(WatchdogPeriod::strict);
 }
 
 void Stm32Board::prepare_r_wave(bool play) {
@@ -64,7 +57,7 @@ firmware::Inputs Stm32Board::inputs() const {
   return {(levels & kEstopPin) != 0, (levels & kHomePin) != 0, (levels & kFarLimitPin) != 0};
 }
 
-void Stm32Board::feed_watchdog() { iwdg().KR.write(0xAAAA); }
+void Stm32Board::feed_watchdog() { stm32::feed_watchdog(); }
 
 /// An interrupt that comes between the question and the sleep ends the sleep, although it is served after it.
 void Stm32Board::sleep() {

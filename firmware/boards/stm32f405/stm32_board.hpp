@@ -14,6 +14,7 @@
 
 #include "firmware/boards/stm32f405/pulse_timer.hpp"
 #include "firmware/boards/stm32f405/r_wave_player.hpp"
+#include "firmware/boards/stm32f405/running_image.hpp"
 #include "firmware/boards/stm32f405/serial_port.hpp"
 #include "firmware/boards/stm32f405/settings_flash.hpp"
 #include "firmware/core/board.hpp"
@@ -57,6 +58,9 @@ class Stm32Board {
   void serial_write(std::span<const std::uint8_t> bytes) { serial_.write(bytes); }
   void feed_watchdog();
   SettingsFlash& settings_flash() { return settings_flash_; }
+  [[nodiscard]] firmware::RunningImage running_image() const { return stm32::running_image(); }
+  bool confirm_image() { return confirm_running_image(); }
+  void restart(bool into_bootloader) { stm32::restart(into_bootloader); }
 
   /// Main loop: until a turn is due.
   void sleep();

@@ -7,28 +7,29 @@
 namespace diastole::stm32 {
 
 enum class WatchdogPeriod {
-  strict,   ///< 250 ms: the main loop's
-  patient,  ///< 4 s: while flash is erased
+  strict,    ///< 250 ms: the main loop's
+  starting,  ///< 1 s: from the bootloader's leave to the main loop's first turn
+  patient,   ///< 4 s: while flash is erased
 };
+
+inline void feed_watchdog() { iwdg().KR.write(0xAAAA); }
 
 /// Sets the period and feeds it.
 inline void set_watchdog(WatchdogPeriod period) {
   while (iwdg().SR.read() != 0) {  // the last change has not reached its clock yet: at most 0.2 ms
   }
   iwdg().KR.write(0x5555);
-  iwdg().PR.write(period == WatchdogPeriod::strict ? 1 : 5);  // 32 kHz / 8 or / 128
+  // 32 kHz / 8, / 32 or / 128
+  iwdg().PR.write(period == WatchdogPeriod::strict ? 1 : period == WatchdogPeriod::starting ? 3 : 5);
   iwdg().RLR.write(1000);
   while (iwdg().SR.read() != 0) {
   }
-  iwdg().KR.write(0xAAAA);
+  feed_watchdog();
 }
 
-/// Precondition: not started before since reset.
-inline void start_watchdog() {
-  iwdg().KR.write(0x5555);
-  iwdg().PR.write(1);
-  iwdg().RLR.write(1000);
+inline void start_watchdog(WatchdogPeriod period) {
   iwdg().KR.write(0xCCCC);
+  set_watchdog(period);
 }
 
 }  // namespace diastole::stm32

@@ -1,0 +1,69 @@
+#include "firmware/boot/boot_decision.hpp"
+
+#include <cstddef>
+
+namespace diastole::boot {
+
+namespace {
+
+using wire::ImageSlot;
+using wire::Standing;
+
+struct LastEvent {
+  BootEvent event = BootEvent::none;
+  int age = 0;  ///< number of the record: the greater, the younger
+};
+
+Standing standing_of(const SlotFacts& slot, BootEvent last) {
+  if (!slot.has_header) return Standing::empty;
+  if (!slot.verified) return Standing::incomplete;
+  switch (last) {
+    case BootEvent::installed:
+      return Standing::installed;
+    case BootEvent::tried:
+      return Standing::failed;
+    case BootEvent::confirmed:
+      return Standing::confirmed;
+    case BootEvent::none:
+      break;
+  }
+  return Standing::unrecorded;
+}
+
+ImageSlot slot_of(std::size_t index) { return static_cast<ImageSlot>(index); }
+
+}  // namespace
+
+BootDecision decide(std::span<const std::uint8_t> records, const std::array<SlotFacts, 2>& slots) {
+  std::array<LastEvent, 2> last{};
+  int age = 0;
+  for_each_record(records, [&](const BootRecord& record) {
+    const auto index = static_cast<std::size_t>(record.slot);
+    if (slots[index].has_header && slots[index].tag == record.tag) last[index] = {record.event, ++age};
+  });
+
+  BootDecision decision;
+  for (std::size_t i = 0; i < slots.size(); ++i)
+    decision.standing[i] = standing_of(slots[i], last[i].event);
+  const auto youngest = [&](Standing wanted) {
+    ImageSlot found = ImageSlot::none;
+    int found_age = -1;
+    for (std::size_t i = 0; i < slots.size(); ++i) {
+      if (decision.standing[i] != wanted || last[i].age <= found_age) continue;
+      found = slot_of(i);
+      found_age = last[i].age;
+    }
+    return found;
+  };
+
+  for (const Standing standing : {Standing::confirmed, Standing::unrecorded, Standing::failed})
+    if (decision.keep == ImageSlot::none) decision.keep = youngest(standing);
+  const ImageSlot installed = youngest(Standing::installed);
+  const ImageSlot kept = decision.keep != ImageSlot::none ? decision.keep : installed;
+  decision.trial = installed != ImageSlot::none && records_left(records) > 0;
+  decision.start = decision.trial ? installed : kept;
+  decision.free = kept == ImageSlot::a ? ImageSlot::b : ImageSlot::a;
+  return decision;
+}
+
+}  // namespace diastole::boot

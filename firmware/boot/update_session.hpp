@@ -1,0 +1,134 @@
+#pragma once
+// An update as the bootloader carries it out: begin, data in order, finish. Whatever interrupts it, the slot
+// tells how far it came: the header says of which image, the last written word how much.
+
+#include <optional>
+
+#include "firmware/boot/slot_store.hpp"
+#include "protocol/wire/update_messages.hpp"
+
+namespace diastole::boot {
+
+/// How a request ended; `value` is what the outcome speaks of (update_outcome_list.inc).
+struct UpdateReply {
+  wire::UpdateOutcome outcome = wire::UpdateOutcome::done;
+  std::uint32_t value = 0;
+};
+
+template <SlotStore S>
+class UpdateSession {
+ public:
+  explicit UpdateSession(S& store) : store_(store) {}
+
+  /// Keeps what the free slot holds of this image, or erases it and writes the header.
+  UpdateReply begin(const wire::BeginUpdate& request);
+  UpdateReply add(const wire::UpdateData& data);
+  /// Reads the image back; if it verifies, it is recorded as installed: the next start tries it.
+  UpdateReply finish();
+
+  [[nodiscard]] std::uint32_t held_bytes() const { return held_; }
+
+ private:
+  /// Fewer free records than this, and the sector is erased while nothing depends on it.
+  static constexpr std::size_t kRecordsNeeded = 16;
+
+  UpdateReply refuse(wire::UpdateOutcome outcome, std::uint32_t value = 0) {
+    image_.reset();
+    return {outcome, value};
+  }
+  [[nodiscard]] UpdateReply judge(const wire::ImageHeader& header, bool allow_older) const;
+  bool make_room(const wire::ImageHeader& header);
+  bool compact_records(const BootDecision& decision);
+
+  S& store_;
+  wire::ImageSlot slot_ = wire::ImageSlot::none;
+  std::optional<wire::ImageHeader> image_;  ///< between begin and finish
+  std::uint32_t held_ = 0;
+};
+
+template <SlotStore S>
+UpdateReply UpdateSession<S>::judge(const wire::ImageHeader& header, bool allow_older) const {
+  using enum wire::UpdateOutcome;
+  const std::size_t slot_bytes = store_.slot(slot_).size();
+  const wire::UpdateOutcome problem = fits(header, store_.board_id(), store_.slot_address(slot_), slot_bytes);
+  if (problem == wrong_board) return {problem, store_.board_id()};
+  if (problem == wrong_slot) return {problem, store_.slot_address(slot_)};
+  if (problem == too_long) return {problem, static_cast<std::uint32_t>(slot_bytes - wire::kImageHeaderArea)};
+  if (problem != done) return {problem, 0};
+  const wire::ImageSlot other = slot_ == wire::ImageSlot::a ? wire::ImageSlot::b : wire::ImageSlot::a;
+  const auto present = header_in(store_.slot(other));
+  if (!allow_older && present && inspect(store_, other).verified && header.version < present->version)
+    return {older_version, wire::packed(present->version)};
+  return {};
+}
+
+template <SlotStore S>
+UpdateReply UpdateSession<S>::begin(const wire::BeginUpdate& request) {
+  using enum wire::UpdateOutcome;
+  held_ = 0;
+  if (request.header_bytes != wire::kImageHeaderBytes) return refuse(malformed);
+  const auto header = wire::decode_image_header(request.header);
+  if (!header) return refuse(bad_header);
+  slot_ = decide(store_).free;
+  const UpdateReply judged = judge(*header, request.allow_older != 0);
+  if (judged.outcome != done) return refuse(judged.outcome, judged.value);
+  if (header_in(store_.slot(slot_)) == header) {
+    held_ = held_code(store_.slot(slot_), header->code_bytes);
+  } else if (!make_room(*header)) {
+    return refuse(flash_failed, 0);
+  }
+  image_ = header;
+  return {};
+}
+
+template <SlotStore S>
+bool UpdateSession<S>::make_room(const wire::ImageHeader& header) {
+  if (!is_erased(store_.slot(slot_)) && !store_.erase_slot(slot_)) return false;
+  if (records_left(store_.records()) < kRecordsNeeded && !compact_records(decide(store_))) return false;
+  return store_.write_slot(slot_, 0, wire::encode(header));
+}
+
+/// Precondition: the free slot is erased. Then only one image is left to start, whatever the records say: they
+/// may be lost in the middle of this.
+template <SlotStore S>
+bool UpdateSession<S>::compact_records(const BootDecision& decision) {
+  if (!store_.erase_records()) return false;
+  if (decision.keep == wire::ImageSlot::none) return true;
+  if (decision.standing[static_cast<std::size_t>(decision.keep)] != wire::Standing::confirmed) return true;
+  const auto header = header_in(store_.slot(decision.keep));
+  return append(store_, {BootEvent::confirmed, decision.keep, tag_of(*header)});
+}
+
+template <SlotStore S>
+UpdateReply UpdateSession<S>::add(const wire::UpdateData& data) {
+  using enum wire::UpdateOutcome;
+  if (!image_) return {not_begun, 0};
+  if (data.count == 0 || data.count % 4 != 0) return {malformed, 0};
+  if (data.offset != held_ || data.count > image_->code_bytes - held_) return {wrong_offset, held_};
+  if (!store_.write_slot(slot_, wire::kImageHeaderArea + held_, std::span(data.data).first(data.count))) {
+    (void)store_.write_slot(slot_, 0, std::array<std::uint8_t, 4>{});
+    return refuse(flash_failed, held_);
+  }
+  held_ += data.count;
+  return {};
+}
+
+template <SlotStore S>
+UpdateReply UpdateSession<S>::finish() {
+  using enum wire::UpdateOutcome;
+  if (!image_) return {not_begun, 0};
+  if (held_ != image_->code_bytes) return {wrong_offset, held_};
+  const SlotFacts facts = inspect(store_, slot_);
+  if (!facts.verified) {
+    // Without its header the next update of this image begins anew.
+    (void)store_.write_slot(slot_, 0, std::array<std::uint8_t, 4>{});
+    held_ = 0;
+    return refuse(not_verified);
+  }
+  const BootDecision decision = decide(store_);
+  if (decision.standing[static_cast<std::size_t>(slot_)] == wire::Standing::installed) return {};
+  if (!append(store_, {BootEvent::installed, slot_, facts.tag})) return refuse(flash_failed, 0);
+  return {};
+}
+
+}  // namespace diastole::boot

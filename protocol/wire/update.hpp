@@ -1,0 +1,35 @@
+#pragma once
+// Slots, and how requests of an update end, as numbered on the wire. The numbers are for ever: a bootloader
+// is not replaced by an update.
+
+#include <cstdint>
+
+namespace diastole::wire {
+
+enum class ImageSlot : std::uint8_t { a = 0, b = 1, none = 2 };
+inline constexpr ImageSlot kLastImageSlot = ImageSlot::none;
+
+/// What a slot's image is worth.
+//
+//   empty ──BeginUpdate──▶ incomplete ──FinishUpdate──▶ installed ──next start──▶ on_trial ──Confirm──▶ confirmed
+//                              ▲                                                     │ any reset
+//                              └──────────────── BeginUpdate ─────────── failed ◀────┘
+enum class Standing : std::uint8_t {
+  empty = 0,       ///< erased, or remains without a header
+  incomplete = 1,  ///< a header, but the code does not match it (yet); never started
+  installed = 2,   ///< verified; the next start tries it once
+  on_trial = 3,    ///< started and not yet confirmed: a reset now returns to the confirmed one
+  confirmed = 4,   ///< a host has seen it work
+  failed = 5,      ///< was on trial and not confirmed
+  unrecorded = 6,  ///< verified, but nobody knows whether it works: written past the bootloader
+};
+inline constexpr Standing kLastStanding = Standing::unrecorded;
+
+#define DIASTOLE_UPDATE_OUTCOME(number, name, explanation, remedy) name = number,
+enum class UpdateOutcome : std::uint8_t {
+#include "protocol/wire/update_outcome_list.inc"
+};
+#undef DIASTOLE_UPDATE_OUTCOME
+inline constexpr UpdateOutcome kLastUpdateOutcome = UpdateOutcome::nothing_to_start;
+
+}  // namespace diastole::wire

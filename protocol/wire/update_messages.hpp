@@ -1,0 +1,337 @@
+#pragma once
+// Replacing the firmware over the line: who runs, into the bootloader, the image in pieces, trial and
+// confirmation. The layout of these messages never changes and none of them waits for the schema hashes to
+// agree, so that any host can replace any firmware.
+//
+//   host                                   controller
+//   ImageQuery (none)                 →                             application
+//                                     ←    ImageReport
+//   EnterBootloader                   →
+//                                     ←    UpdateAnswer             resets
+//   open, ImageQuery (a), (b)         →                             bootloader
+//                                     ←    ImageReport, ImageReport
+//   BeginUpdate                       →
+//                                     ←    UpdateAnswer (held)      erases if need be
+//   UpdateData (from held on) …       →
+//                                     ←    UpdateAnswer (held) …
+//   FinishUpdate                      →
+//                                     ←    UpdateAnswer             reads back, verifies
+//   StartImage                        →
+//                                     ←    UpdateAnswer             resets, tries the new one
+//   open, HelloRequest, ImageQuery    →                             new application
+//                                     ←    Hello, ImageReport
+//   ConfirmImage                      →
+//                                     ←    UpdateAnswer
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+#include "protocol/wire/image_header.hpp"
+#include "protocol/wire/message_type.hpp"
+#include "protocol/wire/update.hpp"
+
+namespace diastole::wire {
+
+// Host → application: reset into the bootloader. Refused unless at rest and disarmed;
+// the motor is switched off.
+//
+//   offset size field
+//        0    2 request_id                   chosen by the host; the answer repeats it
+//
+// Example EnterBootloader: 09 00
+struct EnterBootloader {
+  static constexpr MessageType kType = MessageType::EnterBootloader;
+  std::uint16_t request_id = 0;
+
+  template <class Self, class Visitor>
+  static constexpr void layout([[maybe_unused]] Self& self, [[maybe_unused]] Visitor& visit) {
+    visit.field("request_id", self.request_id);
+  }
+  static constexpr EnterBootloader example() {
+    EnterBootloader message;
+    message.request_id = 9;
+    return message;
+  }
+};
+
+// Host → application or bootloader: what is in a slot? Answered with ImageReport.
+//
+//   offset size field
+//        0    2 request_id                   chosen by the host; the answer repeats it
+//        2    1 slot                         none: the one that runs
+//
+// Example ImageQuery: 09 00 01
+struct ImageQuery {
+  static constexpr MessageType kType = MessageType::ImageQuery;
+  std::uint16_t request_id = 0;
+  ImageSlot slot{};
+
+  template <class Self, class Visitor>
+  static constexpr void layout([[maybe_unused]] Self& self, [[maybe_unused]] Visitor& visit) {
+    visit.field("request_id", self.request_id);
+    visit.choice("slot", self.slot, kLastImageSlot);
+  }
+  static constexpr ImageQuery example() {
+    ImageQuery message;
+    message.request_id = 9;
+    message.slot = ImageSlot::b;
+    return message;
+  }
+};
+
+// Host → application on trial: you work; from now on you are the one to start.
+// Repeated, it changes nothing.
+//
+//   offset size field
+//        0    2 request_id                   chosen by the host; the answer repeats it
+//        2    8 build_id                     of the image that the host means
+//
+// Example ConfirmImage: 09 00 88 77 66 55 44 33 22 11
+struct ConfirmImage {
+  static constexpr MessageType kType = MessageType::ConfirmImage;
+  std::uint16_t request_id = 0;
+  std::uint64_t build_id = 0;
+
+  template <class Self, class Visitor>
+  static constexpr void layout([[maybe_unused]] Self& self, [[maybe_unused]] Visitor& visit) {
+    visit.field("request_id", self.request_id);
+    visit.field("build_id", self.build_id);
+  }
+  static constexpr ConfirmImage example() {
+    ConfirmImage message;
+    message.request_id = 9;
+    message.build_id = 0x1122334455667788;
+    return message;
+  }
+};
+
+// Host → bootloader: an image for the free slot. If the slot holds the beginning of this very image, it is kept
+// and the answer says how many bytes of code are there; otherwise the sector is erased, which takes 1 to 2 s.
+//
+//   offset size field
+//        0    2 request_id                   chosen by the host; the answer repeats it
+//        2    1 allow_older                  1: also one older than the confirmed one
+//        3    1 header_bytes                 64
+//        4   64 header                       image_header.hpp
+//
+// Example BeginUpdate: 09 00 00 40 44 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00
+// 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00
+// 00 00 00 00 00 00 00 00 8F
+struct BeginUpdate {
+  static constexpr MessageType kType = MessageType::BeginUpdate;
+  std::uint16_t request_id = 0;
+  std::uint8_t allow_older = 0;
+  std::uint8_t header_bytes = kImageHeaderBytes;
+  ImageHeaderBytes header{};
+
+  template <class Self, class Visitor>
+  static constexpr void layout([[maybe_unused]] Self& self, [[maybe_unused]] Visitor& visit) {
+    visit.field("request_id", self.request_id);
+    visit.field("allow_older", self.allow_older, 0, 1);
+    visit.list("header", self.header_bytes, self.header);
+  }
+  static constexpr BeginUpdate example() {
+    BeginUpdate message;
+    message.request_id = 9;
+    message.header[0] = 0x44;
+    message.header[63] = 0x8F;
+    return message;
+  }
+};
+
+// Host → bootloader: the next bytes of code.
+//
+//   offset size field
+//        0    2 request_id                   chosen by the host; the answer repeats it
+//        2    4 offset                       from the first byte of code; at most what is held
+//        6    1 count                        of bytes; a multiple of 4
+//        7    n data
+//
+// Example UpdateData: 09 00 00 01 00 00 04 01 00 00 20
+struct UpdateData {
+  static constexpr MessageType kType = MessageType::UpdateData;
+  static constexpr std::size_t kMaxCount = 232;
+  std::uint16_t request_id = 0;
+  std::uint32_t offset = 0;
+  std::uint8_t count = 0;
+  std::array<std::uint8_t, kMaxCount> data{};
+
+  template <class Self, class Visitor>
+  static constexpr void layout([[maybe_unused]] Self& self, [[maybe_unused]] Visitor& visit) {
+    visit.field("request_id", self.request_id);
+    visit.field("offset", self.offset);
+    visit.list("data", self.count, self.data);
+  }
+  static constexpr UpdateData example() {
+    UpdateData message;
+    message.request_id = 9;
+    message.offset = 256;
+    message.count = 4;
+    message.data[0] = 1;
+    message.data[3] = 0x20;
+    return message;
+  }
+};
+
+// Host → bootloader: that was all. The image is read back and hashed; if it verifies it is the one to be tried.
+//
+//   offset size field
+//        0    2 request_id                   chosen by the host; the answer repeats it
+//
+// Example FinishUpdate: 09 00
+struct FinishUpdate {
+  static constexpr MessageType kType = MessageType::FinishUpdate;
+  std::uint16_t request_id = 0;
+
+  template <class Self, class Visitor>
+  static constexpr void layout([[maybe_unused]] Self& self, [[maybe_unused]] Visitor& visit) {
+    visit.field("request_id", self.request_id);
+  }
+  static constexpr FinishUpdate example() {
+    FinishUpdate message;
+    message.request_id = 9;
+    return message;
+  }
+};
+
+// Host → bootloader: reset and start what is to be started.
+//
+//   offset size field
+//        0    2 request_id                   chosen by the host; the answer repeats it
+//
+// Example StartImage: 09 00
+struct StartImage {
+  static constexpr MessageType kType = MessageType::StartImage;
+  std::uint16_t request_id = 0;
+
+  template <class Self, class Visitor>
+  static constexpr void layout([[maybe_unused]] Self& self, [[maybe_unused]] Visitor& visit) {
+    visit.field("request_id", self.request_id);
+  }
+  static constexpr StartImage example() {
+    StartImage message;
+    message.request_id = 9;
+    return message;
+  }
+};
+
+// Host → bootloader, repeated without pause while the controller is reset by hand: a bootloader that sees one
+// within 30 ms of its start stays, whatever the slots hold. Needs no open session.
+//
+//   offset size field
+//        0    4 word                         "STAY"
+//
+// Example StayInBootloader: 53 54 41 59
+struct StayInBootloader {
+  static constexpr MessageType kType = MessageType::StayInBootloader;
+  static constexpr std::uint32_t kWord = 0x59415453;
+  std::uint32_t word = kWord;
+
+  template <class Self, class Visitor>
+  static constexpr void layout([[maybe_unused]] Self& self, [[maybe_unused]] Visitor& visit) {
+    visit.field("word", self.word, kWord, kWord);
+  }
+  static constexpr StayInBootloader example() {
+    StayInBootloader message;
+    return message;
+  }
+};
+
+// Application or bootloader → host. The application knows its own slot only.
+//
+//   offset size field
+//        0    2 request_id                   chosen by the host; the answer repeats it
+//        2    1 slot                         none: the bootloader answers for itself
+//        3    1 standing                     update.hpp
+//        4    1 version_major                of the image; 0 if there is no header
+//        5    1 version_minor
+//        6    1 version_patch
+//        7    8 build_id
+//       15    4 code_bytes
+//       19    4 held_bytes                   of code that are there
+//       23    4 link_address                 of the slot
+//       27    1 free_slot                    where an update goes
+//
+// Example ImageReport: 09 00 01 01 00 01 00 88 77 66 55 44 33 22 11 30 75 00 00 00 04 00 00 00 00 04
+// 08 01
+struct ImageReport {
+  static constexpr MessageType kType = MessageType::ImageReport;
+  std::uint16_t request_id = 0;
+  ImageSlot slot{};
+  Standing standing{};
+  std::uint8_t version_major = 0;
+  std::uint8_t version_minor = 0;
+  std::uint8_t version_patch = 0;
+  std::uint64_t build_id = 0;
+  std::uint32_t code_bytes = 0;
+  std::uint32_t held_bytes = 0;
+  std::uint32_t link_address = 0;
+  ImageSlot free_slot{};
+
+  template <class Self, class Visitor>
+  static constexpr void layout([[maybe_unused]] Self& self, [[maybe_unused]] Visitor& visit) {
+    visit.field("request_id", self.request_id);
+    visit.choice("slot", self.slot, kLastImageSlot);
+    visit.choice("standing", self.standing, kLastStanding);
+    visit.field("version_major", self.version_major);
+    visit.field("version_minor", self.version_minor);
+    visit.field("version_patch", self.version_patch);
+    visit.field("build_id", self.build_id);
+    visit.field("code_bytes", self.code_bytes);
+    visit.field("held_bytes", self.held_bytes);
+    visit.field("link_address", self.link_address);
+    visit.choice("free_slot", self.free_slot, kLastImageSlot);
+  }
+  static constexpr ImageReport example() {
+    ImageReport message;
+    message.request_id = 9;
+    message.slot = ImageSlot::b;
+    message.standing = Standing::incomplete;
+    message.version_minor = 1;
+    message.build_id = 0x1122334455667788;
+    message.code_bytes = 30'000;
+    message.held_bytes = 1024;
+    message.link_address = 0x0804'0000;
+    message.free_slot = ImageSlot::b;
+    return message;
+  }
+};
+
+// Application or bootloader → host: the answer to every request of an update but ImageQuery.
+//
+//   offset size field
+//        0    2 request_id                   chosen by the host; the answer repeats it
+//        2    1 request_type                 MessageType of the request
+//        3    1 outcome                      update_outcome_list.inc
+//        4    4 held_bytes                   of code that are there
+//        8    4 value                        what the outcome speaks of
+//
+// Example UpdateAnswer: 09 00 33 05 00 00 00 00 02 00 00 00
+struct UpdateAnswer {
+  static constexpr MessageType kType = MessageType::UpdateAnswer;
+  std::uint16_t request_id = 0;
+  std::uint8_t request_type = 0;
+  UpdateOutcome outcome{};
+  std::uint32_t held_bytes = 0;
+  std::uint32_t value = 0;
+
+  template <class Self, class Visitor>
+  static constexpr void layout([[maybe_unused]] Self& self, [[maybe_unused]] Visitor& visit) {
+    visit.field("request_id", self.request_id);
+    visit.field("request_type", self.request_type);
+    visit.choice("outcome", self.outcome, kLastUpdateOutcome);
+    visit.field("held_bytes", self.held_bytes);
+    visit.field("value", self.value);
+  }
+  static constexpr UpdateAnswer example() {
+    UpdateAnswer message;
+    message.request_id = 9;
+    message.request_type = 0x33;
+    message.outcome = UpdateOutcome::wrong_board;
+    message.value = 2;
+    return message;
+  }
+};
+
+}  // namespace diastole::wire
