@@ -1,6 +1,5 @@
 #include "host/daemon/daemon.hpp"
 
-#include <spdlog/sinks/stdout_sinks.h>
 #include <spdlog/spdlog.h>
 
 #include <boost/asio/io_context.hpp>
@@ -12,8 +11,10 @@
 #include <utility>
 
 #include "host/config/rig_config.hpp"
+#include "host/daemon/daemon_log.hpp"
 #include "host/daemon/rig_service.hpp"
 #include "host/daemon/server.hpp"
+#include "host/daemon/service_manager.hpp"
 
 namespace diastole {
 namespace {
@@ -30,8 +31,9 @@ RigConfig configured(const DaemonOptions& options) {
 /// signal asks for the stop again.
 class Ending {
  public:
-  Ending(boost::asio::io_context& context, RigService& rig, boost::asio::signal_set& signals)
-      : context_(context), rig_(rig), signals_(signals), timer_(context) {
+  Ending(boost::asio::io_context& context, RigService& rig, boost::asio::signal_set& signals,
+         ServiceManager& manager)
+      : context_(context), rig_(rig), signals_(signals), manager_(manager), timer_(context) {
     await_signal();
   }
 
@@ -40,6 +42,7 @@ class Ending {
     signals_.async_wait([this](const boost::system::error_code& error, int number) {
       if (error) return;
       spdlog::info("signal {}: stopping", number);
+      manager_.stopping();
       const bool idle = rig_.idle();
       rig_.end();
       if (!std::exchange(begun_, true)) idle ? context_.stop() : await_rest();
@@ -60,23 +63,48 @@ class Ending {
   boost::asio::io_context& context_;
   RigService& rig_;
   boost::asio::signal_set& signals_;
+  ServiceManager& manager_;
   boost::asio::steady_timer timer_;
   bool begun_ = false;
+};
+
+/// Says again and again that the server's thread is alive.
+class ServerPulse {
+ public:
+  ServerPulse(boost::asio::io_context& context, ServiceManager& manager)
+      : manager_(manager), timer_(context) {
+    beat();
+  }
+
+ private:
+  void beat() {
+    manager_.server_lives();
+    timer_.expires_after(manager_.server_interval());
+    timer_.async_wait([this](const boost::system::error_code& error) {
+      if (!error) beat();
+    });
+  }
+
+  ServiceManager& manager_;
+  boost::asio::steady_timer timer_;
 };
 
 }  // namespace
 
 void run_daemon(const DaemonOptions& options) {
-  spdlog::set_default_logger(spdlog::stderr_logger_mt("diastole"));
+  set_up_daemon_log();
   std::signal(SIGPIPE, SIG_IGN);
   boost::asio::io_context context;
   boost::asio::signal_set signals(context, SIGINT, SIGTERM);
   const RigConfig config = configured(options);
   const ControlPolicy policy(config.daemon.control_group, config.file);
-  RigService rig(config, {options.conductor, options.daq_address, options.producer});
-  Ending ending(context, rig, signals);
+  ServiceManager manager;
+  RigService rig(config, {options.conductor, options.daq_address, options.producer, &manager});
+  Ending ending(context, rig, signals, manager);
+  const ServerPulse pulse(context, manager);
   const RpcServer server(context, rig, config.daemon.socket, policy);
   std::cout << nlohmann::json{{"ready", true}, {"socket", config.daemon.socket}}.dump() << std::endl;
+  manager.ready();
   context.run();
 }
 

@@ -17,8 +17,9 @@ struct DaemonOptions {
 };
 
 /// Serves until SIGINT or SIGTERM, then stops motion under control and closes. When it is ready to serve, one
-/// line appears on standard output: {"ready":true,"socket":"..."}; the log goes to standard error. Throws
-/// InputError or HardwareError when it cannot start.
+/// line appears on standard output: {"ready":true,"socket":"..."}, and a supervisor is told
+/// (service_manager.hpp); the log goes to standard error. Throws InputError or HardwareError when it cannot
+/// start.
 void run_daemon(const DaemonOptions& options);
 
 }  // namespace diastole

@@ -39,7 +39,8 @@ std::vector<gid_t> supplementary_groups(int socket) {
 Peer peer_of(int socket) {
   ucred credentials{};
   socklen_t size = sizeof(credentials);
-  if (::getsockopt(socket, SOL_SOCKET, SO_PEERCRED, &credentials, &size) != 0) return {static_cast<uid_t>(-1), 0, {}, "unknown"};
+  if (::getsockopt(socket, SOL_SOCKET, SO_PEERCRED, &credentials, &size) != 0)
+    return {static_cast<uid_t>(-1), 0, {}, "unknown"};
   Peer peer{credentials.uid, credentials.pid, supplementary_groups(socket), user_name(credentials.uid)};
   peer.groups.push_back(credentials.gid);
   return peer;

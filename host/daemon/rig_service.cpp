@@ -15,6 +15,7 @@
 #include "host/runfile/writer.hpp"
 #include "host/transport/conducted_clock.hpp"
 #include "host/transport/serial_port.hpp"
+#include "host/transport/watched_clock.hpp"
 #include "protocol/contract/input_error.hpp"
 #include "protocol/wire/wire_text.hpp"
 
@@ -24,15 +25,39 @@ namespace {
 using nlohmann::json;
 
 constexpr uint64_t idle_step_ns = 20'000'000;
+constexpr std::chrono::milliseconds waiting_step{50};  // while time stands still
 constexpr uint64_t reconnect_interval_ns = 1'000'000'000;
 constexpr uint64_t homing_patience_ns = 1'800'000'000'000;
 constexpr uint64_t homing_step_ns = 10'000'000;
 constexpr int conducted_timeout_ms = 5000;  // wall time; virtual time stands still meanwhile
 
-std::unique_ptr<Clock> make_clock(const std::string& conductor) {
-  if (conductor.empty()) return std::make_unique<RealClock>();
-  return std::make_unique<ConductedClock>(conductor);
+std::unique_ptr<Clock> make_clock(const std::string& conductor, ServiceManager* manager) {
+  std::unique_ptr<Clock> clock;
+  if (conductor.empty()) {
+    clock = std::make_unique<RealClock>();
+  } else {
+    clock = std::make_unique<ConductedClock>(conductor);
+  }
+  if (manager == nullptr) return clock;
+  return std::make_unique<WatchedClock>(std::move(clock), [manager] { manager->beat(); });
 }
+
+/// For as long as it lives, the supervisor waits for work that does not sleep.
+class LongWork {
+ public:
+  explicit LongWork(ServiceManager* manager) : manager_(manager) {
+    if (manager_ != nullptr) manager_->allow(long_work_patience);
+  }
+  ~LongWork() {
+    if (manager_ != nullptr) manager_->allow_no_more();
+  }
+  LongWork(const LongWork&) = delete;
+  LongWork& operator=(const LongWork&) = delete;
+
+ private:
+  static constexpr std::chrono::minutes long_work_patience{10};
+  ServiceManager* manager_;
+};
 
 json attributes_as_json(const std::map<std::string, runfile::Attribute, std::less<>>& attributes) {
   json object = json::object();
@@ -82,7 +107,7 @@ std::string utc_now() { return fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(
 }  // namespace
 
 RigService::RigService(RigConfig rig, const RigServiceOptions& options)
-    : rig_(std::move(rig)), options_(options), clock_(make_clock(options.conductor)) {
+    : rig_(std::move(rig)), options_(options), clock_(make_clock(options.conductor, options.manager)) {
   controller_ = std::make_unique<ControllerClient>(*clock_, rig_, [this]() -> std::unique_ptr<ByteLine> {
     return std::make_unique<SerialPort>(rig_.controller.port, rig_.controller.baud);
   });
@@ -106,13 +131,14 @@ void RigService::work(const std::stop_token& stop) {
       if (auto order = next_order()) {
         carry_out(std::move(*order));
       } else if (clock_->stands_still()) {
+        if (options_.manager != nullptr) options_.manager->beat();
         std::unique_lock lock(mutex_);
-        wake_.wait(lock, stop, [this] { return !orders_.empty(); });
+        wake_.wait_for(lock, stop, waiting_step, [this] { return !orders_.empty(); });
       } else {
         idle_turn();
       }
     } catch (const std::exception& error) {
-      spdlog::error("{}", error.what());
+      if (std::exchange(last_problem_, error.what()) != error.what()) spdlog::error("{}", error.what());
     }
   }
 }
@@ -134,6 +160,7 @@ void RigService::reconnect_if_due() {
   if (controller_->connected() || clock_->now_ns() < next_reconnect_ns_) return;
   next_reconnect_ns_ = clock_->now_ns() + reconnect_interval_ns;
   controller_->connect();
+  last_problem_.clear();
   spdlog::info("controller at {} is back", rig_.controller.port);
 }
 
@@ -462,6 +489,7 @@ json RigService::finish(const std::filesystem::path& journal, const RunOutcome& 
     run_->state = "writing";
     activity_ = "writing";
   }
+  const LongWork writing(options_.manager);
   json result{{"end", outcome.end}, {"regular", outcome.regular()}, {"journal", journal.string()}};
   const AssembledRun assembled = assemble_run(read_journal(journal));
   const std::filesystem::path run_file = run_file_beside(journal);

@@ -22,6 +22,7 @@
 #include "host/config/experiment.hpp"
 #include "host/config/rig_config.hpp"
 #include "host/controller/controller_client.hpp"
+#include "host/daemon/service_manager.hpp"
 #include "host/daq/instrument.hpp"
 #include "host/transport/clock.hpp"
 
@@ -31,6 +32,7 @@ struct RigServiceOptions {
   std::string conductor;                   ///< socket of a simulated rig that conducts time; empty: real time
   std::optional<std::string> daq_address;  ///< instead of the rig file's
   std::string producer = "diastole";       ///< program and version, for run files
+  ServiceManager* manager = nullptr;       ///< told that the rig's thread is alive; outlives the service
 };
 
 class RigService {
@@ -110,6 +112,7 @@ class RigService {
   std::unique_ptr<daq::Instrument> instrument_;
   std::unique_ptr<ControllerClient> controller_;
   uint64_t next_reconnect_ns_ = 0;
+  std::string last_problem_;  ///< of the rig's thread between orders: told once, not once a second
 
   mutable std::mutex mutex_;
   std::condition_variable_any wake_;

@@ -25,6 +25,8 @@ class RigWithDaemon {
   /// Returns when it serves. `before` goes before the command: {"/usr/bin/env", "NAME=VALUE"}.
   void start_daemon(const std::vector<std::string>& before = {});
   [[nodiscard]] DaemonClient client() const { return DaemonClient(path("socket")); }
+  /// The simulated rig's program.
+  [[nodiscard]] const Program& rig() const { return *rig_; }
   [[nodiscard]] std::string path(const std::string& name) const { return (place / name).string(); }
 
   Workplace place;
