@@ -1,8 +1,9 @@
 #pragma once
-// Where a command finds the daemon: --socket, or the socket that a rig file names, or the default; and how it
-// gets the control.
+// Where a command finds the daemon: --socket, or the socket that a rig file names, or the user's own daemon, or
+// the system's service; and how it gets the control.
 
 #include <CLI/CLI.hpp>
+#include <filesystem>
 #include <memory>
 #include <string>
 
@@ -33,7 +34,10 @@ struct DaemonAddress {
   }
   [[nodiscard]] std::string resolve() const {
     if (!socket.empty()) return socket;
-    return config.empty() ? default_socket() : read_rig(config).daemon.socket;
+    if (!config.empty()) return read_rig(config).daemon.socket;
+    std::error_code ignored;
+    const bool own = std::filesystem::exists(default_socket(), ignored);
+    return !own && std::filesystem::exists(service_socket, ignored) ? service_socket : default_socket();
   }
 };
 

@@ -71,5 +71,7 @@ RigConfig read_rig(TableReader root);
 
 /// $XDG_RUNTIME_DIR/diastole.sock, or /tmp/diastole-UID.sock.
 std::string default_socket();
+/// Where the daemon serves that runs as a service of the system (packaging/).
+inline constexpr const char* service_socket = "/run/diastole/daemon.sock";
 
 }  // namespace diastole

@@ -1,0 +1,65 @@
+#!/usr/bin/env bash
+# Makes the Debian package, unpacks it as a root of its own, and holds what lies there against what a machine
+# needs: package.sh SOURCE_DIR BUILD_DIR
+set -euo pipefail
+source_dir=$1 build_dir=$2
+place=$(mktemp -d)
+trap 'rm -rf "$place"' EXIT
+fail() { echo "FAILED: $*" >&2; exit 1; }
+
+(cd "$place" && cpack --config "$build_dir/CPackConfig.cmake" -B "$place" >cpack.log 2>&1) ||
+  { cat "$place/cpack.log"; fail "cpack"; }
+package=$(ls "$place"/diastole_*.deb)
+dpkg-deb -x "$package" "$place/root"
+dpkg-deb -e "$package" "$place/control"
+
+for file in usr/bin/diastole usr/bin/sim_rig etc/diastole/rig.toml usr/lib/systemd/system/diastole-daemon.service \
+  usr/lib/udev/rules.d/60-diastole.rules usr/lib/sysusers.d/diastole.conf usr/share/man/man1/diastole.1.gz \
+  usr/share/doc/diastole/README.md usr/share/doc/diastole/copyright usr/share/doc/diastole/docs/run-file.md \
+  usr/share/doc/diastole/examples/gel.experiment.toml; do
+  [[ -s $place/root/$file ]] || fail "the package lacks /$file"
+done
+if ls "$source_dir"/build/firmware/bin/*.bin >/dev/null 2>&1; then
+  cmp "$source_dir/build/firmware/bin/diastole-stm32f405.bin" \
+    "$place/root/usr/share/diastole/firmware/diastole-stm32f405.bin" || fail "the firmware image is not the one built"
+else
+  echo "no firmware image was built: the package carries none (cmake --build --preset firmware)"
+fi
+grep -qx /etc/diastole/rig.toml "$place/control/conffiles" || fail "the rig file is no conffile"
+
+# The installed program, on the installed files.
+diastole=$place/root/usr/bin/diastole
+"$diastole" --help >/dev/null
+"$diastole" simulate "$place/root/usr/share/doc/diastole/examples/gel.experiment.toml" -o "$place/gel.run.h5" --json \
+  >"$place/gel.json" 2>"$place/gel.log" || { cat "$place/gel.log"; fail "the installed program cannot simulate"; }
+said=$("$diastole" daemon --config "$place/root/etc/diastole/rig.toml" --journal-dir "$place/journals" 2>&1) && code=0 || code=$?
+if getent group diastole >/dev/null; then expected=3; else expected=2; fi # no controller; or first: no such group
+[[ $code == "$expected" ]] || fail "with the installed rig file the daemon ended with $code: $said"
+
+# The unit, as systemd reads it.
+if command -v systemd-analyze >/dev/null; then
+  mkdir -p "$place/root/etc" && printf 'root:x:0:0::/:/bin/sh\ndiastole:x:999:999::/:/bin/false\n' >"$place/root/etc/passwd"
+  printf 'root:x:0:\ndiastole:x:999:\ndialout:x:20:\n' >"$place/root/etc/group"
+  for unit in sysinit.target basic.target network.target shutdown.target multi-user.target system.slice; do
+    printf '[Unit]\nDescription=stand-in\n' >"$place/root/usr/lib/systemd/system/$unit"
+  done
+  verdict=$(systemd-analyze verify --man=no --root="$place/root" diastole-daemon.service 2>&1 || true)
+  ! grep -q 'diastole-daemon.service' <<<"$verdict" || fail "systemd-analyze verify: $verdict"
+  systemd-analyze security --offline=true --threshold=30 --no-pager \
+    --root="$place/root" diastole-daemon.service >"$place/security.log" 2>&1 ||
+    { cat "$place/security.log"; fail "the service is more exposed than 3.0"; }
+  grep -a 'Overall exposure' "$place/security.log" || true
+else
+  echo "without systemd-analyze the unit was not checked"
+fi
+# Each rule has what it matches and what it gives.
+grep -vE '^(#|$)' "$place/root/usr/lib/udev/rules.d/60-diastole.rules" |
+  grep -vE '^SUBSYSTEM=="[a-z]+", ([A-Z]+(\{[A-Za-z]+\})?=="[^"]+", )+GROUP="diastole", MODE="0660"$' &&
+  fail "a udev rule has another form"
+
+if command -v lintian >/dev/null; then
+  lintian --allow-root --fail-on error "$package" || fail "lintian"
+else
+  echo "lintian is not installed and was not run"
+fi
+echo "$(basename "$package"): $(stat -c %s "$package") bytes, $(dpkg-deb -c "$package" | wc -l) entries"
