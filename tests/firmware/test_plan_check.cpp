@@ -42,36 +42,6 @@ TEST(PlanCheck, TheSineAsksForMoreAccelerationThanTheParabola) {
   EXPECT_NEAR(static_cast<double>(peaks.acceleration_uL_per_s2), 19.739 * 40'000 / 1.44, 10);
 }
 
-struct Excess {
-  Limit limit;
-  std::uint32_t wire::Configure::*setting;
-  std::uint32_t allowed;
-  std::int64_t asked;
-};
-class EveryLimit : public testing::TestWithParam<Excess> {};
-
-TEST_P(EveryLimit, IsRefusedWithNameAskedAndAllowed) {
-  const auto [limit, setting, allowed, asked] = GetParam();
-  wire::Configure configure = wire::Configure::example();
-  configure.*setting = allowed;
-  const PlanRefusal refusal = refusal_of(kPaper, configure);
-  EXPECT_EQ(refusal.refusal, Refusal::limit_exceeded);
-  EXPECT_EQ(refusal.limit, limit);
-  EXPECT_EQ(refusal.asked, asked);
-  EXPECT_EQ(refusal.allowed, allowed);
-  EXPECT_EQ(refusal.segment, 0);
-  configure.*setting = static_cast<std::uint32_t>(asked);
-  EXPECT_EQ(refusal_of(kPaper, configure).limit, Limit::none) << "exactly at the limit must pass";
-}
-
-INSTANTIATE_TEST_SUITE_P(
-    Limits, EveryLimit,
-    testing::Values(Excess{Limit::travel, &wire::Configure::travel_uL, 39'999, 40'000},
-                    Excess{Limit::flow, &wire::Configure::flow_uL_per_s, 133'000, 133'334},
-                    Excess{Limit::acceleration, &wire::Configure::acceleration_uL_per_s2, 444'000, 444'445},
-                    Excess{Limit::step_rate, &wire::Configure::step_rate_Hz, 17'000, 17'113},
-                    Excess{Limit::pressure, &wire::Configure::pressure_Pa, 19'000, 19'556}));
-
 TEST(PlanCheck, AMotionThatCannotStopWithinTheLeaseIsRefused) {
   wire::Configure configure = wire::Configure::example();
   configure.acceleration_uL_per_s2 = 444'445;

@@ -88,6 +88,37 @@ TEST(Trigger, TtlAndRWaveStartWithTheFirstStepOfEachCycle) {
   }
 }
 
+/// In pieces, so that the edges of six minutes need not be kept.
+TEST(Trigger, TtlAndRWaveStartWithTheFirstStepOverTenThousandCycles) {
+  constexpr std::uint32_t kCycles = 10'000;
+  constexpr std::int64_t kCycleSteps = 2 * 13;
+  Bench bench;
+  bench.prepare();
+  bench.add_segment(Waveform::parabolic, kCycles, 101'292, 35'000);
+  (void)bench.rig.take_edges();
+  ASSERT_TRUE(bench.ask(wire::Arm::example()));
+  ASSERT_TRUE(bench.ask(wire::Start{0, Bench::kLease}));
+  std::vector<Ticks> triggers, first_steps, waves;
+  std::int64_t steps = 0;
+  std::int32_t wave_uV = 0;
+  while (bench.heard.ended.empty()) {
+    bench.run_for(microseconds(1'000'000));
+    for (const Edge& edge : bench.rig.take_edges()) {
+      if (edge.signal == Signal::TTL && edge.value == 1) triggers.push_back(edge.tick);
+      if (edge.signal == Signal::STEP && edge.value == 1 && steps++ % kCycleSteps == 0)
+        first_steps.push_back(edge.tick);
+      if (edge.signal != Signal::RWAVE_uV) continue;
+      if (wave_uV == 0) waves.push_back(edge.tick);
+      wave_uV = edge.value;
+    }
+  }
+  EXPECT_EQ(bench.heard.ended[0].triggers, kCycles);
+  EXPECT_EQ(bench.heard.ended[0].r_waves, kCycles);
+  EXPECT_EQ(steps, kCycles * kCycleSteps);
+  EXPECT_EQ(triggers, first_steps);
+  EXPECT_EQ(waves, first_steps);
+}
+
 TEST(Trigger, AHoldTriggersAtTheBeginningOfEachCycle) {
   Bench bench;
   bench.prepare();

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <ostream>
 
 #include "firmware/core/profiles/profile.hpp"
 #include "protocol/wire/wire_text.hpp"
@@ -46,6 +47,10 @@ std::string problem_of(EmulatedSession& session, const StepRateTrial& trial, uin
 }
 
 }  // namespace
+
+std::ostream& operator<<(std::ostream& out, const StepRateTrial& trial) {
+  return out << wire::waveform_name(trial.waveform) << " at " << trial.peak_rate_Hz << " steps/s";
+}
 
 uint64_t StepRateFigures::worst_instructions(uint32_t irq) const {
   const InterruptStatistics* found = interrupt(board, irq);

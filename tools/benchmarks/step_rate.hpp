@@ -2,6 +2,7 @@
 // What a step costs the controller, measured on the emulated board while it makes steps at a given rate.
 
 #include <cstdint>
+#include <iosfwd>
 #include <string>
 
 #include "protocol/wire/messages.hpp"
@@ -18,6 +19,8 @@ struct StepRateTrial {
   /// The part of each cycle that is measured, in phases: around the peak rate.
   double from = 0.05, to = 0.2;
 };
+
+std::ostream& operator<<(std::ostream& out, const StepRateTrial& trial);
 
 struct StepRateFigures {
   std::string problem;      ///< empty: every step was made, no fault, no missed deadline

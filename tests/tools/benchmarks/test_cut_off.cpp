@@ -1,0 +1,17 @@
+#include "tests/tools/benchmarks/image.hpp"
+#include "tests/tools/benchmarks/random_cuts.hpp"
+
+namespace diastole::step_path_test {
+namespace {
+
+/// 5 µs are one step period at 200,000 steps/s, the shortest tried.
+TEST(CutOff, LeavesAtMostOneStepWithinAStepPeriodAtRandomMoments) {
+  NEEDS_IMAGE();
+  const CutFigures figures = cut_at_random(24, 1);
+  EXPECT_EQ(figures.cuts, 24);
+  EXPECT_LE(figures.most_steps_over, 1);
+  EXPECT_LE(figures.worst_ns, 5'000U);
+}
+
+}  // namespace
+}  // namespace diastole::step_path_test
