@@ -105,6 +105,8 @@ LimitInWords words_for(wire::Limit limit) {
       return {1e-6, "s", "Lengthen period_s or raise gate_every."};
     case wire::Limit::microstep:
       return {1, "pL", "Make bore, screw and steps in the rig file agree with the controller's settings."};
+    case wire::Limit::home:
+      return {1e-3, "mL", "Withdraw less: the home position ends the way."};
     case wire::Limit::none:
       break;
   }
