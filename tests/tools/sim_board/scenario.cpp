@@ -56,9 +56,9 @@ class Holder {
   Session hold() {
     Session session;
     host_.prepare();
+    scenario_.before(host_);
     for (const wire::AddSegment& segment : scenario_.program)
       host_.ask(segment);
-    scenario_.before(host_);
     if (scenario_.motion) {
       session.motion = watch([this] { scenario_.motion(host_); }, true);
     } else {

@@ -31,7 +31,7 @@ struct Scenario {
   uint16_t gate_every = 1;
   Act act = Act::none;
   uint64_t act_after_ms = 0;  ///< of the motion's first edge
-  /// Further requests before Arm, such as the upload of a waveform.
+  /// Further requests before the program, such as the upload of a waveform.
   std::function<void(MiniatureHost&)> before = [](MiniatureHost&) {};
   /// Begins another motion than the program's run and waits for its end; stages between which the motor rests are
   /// each timed from their own first edge.

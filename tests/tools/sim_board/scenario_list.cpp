@@ -1,3 +1,5 @@
+#include "tests/firmware/uploaded_waveform.hpp"
+#include "tests/firmware/uploads.hpp"
 #include "tests/tools/sim_board/scenario.hpp"
 
 namespace diastole::sim_board_test {
@@ -19,6 +21,24 @@ void home(MiniatureHost& host) {
   host.run_until([&] { return host.state == wire::State::homed; }, 60'000'000'000);
 }
 
+void upload_heart(MiniatureHost& host) {
+  (void)host.ask(firmware::upload_of(0, firmware::kHeartRises));
+  (void)host.ask(firmware::lot_of(firmware::kHeartRises, 0));
+}
+
+/// There, and half the way back.
+void jog(MiniatureHost& host) {
+  for (const int64_t distance_nL : {6'000'000, -3'000'000}) {
+    wire::Jog request{};
+    request.lease_id = MiniatureHost::lease;
+    request.distance_nL = distance_nL;
+    request.flow_uL_per_s = 5'000;
+    (void)host.ask(request);
+    host.run_until([&] { return host.state == wire::State::homed; }, 10'000'000'000);
+    host.run_for(100'000'000);
+  }
+}
+
 }  // namespace
 
 const std::vector<Scenario>& scenarios() {
@@ -30,6 +50,9 @@ const std::vector<Scenario>& scenarios() {
       {.name = "sawtooth", .program = {segment(Waveform::sawtooth, 2, 8'000'000, 800'000)}},
       {.name = "reversed_sawtooth", .program = {segment(Waveform::reversed_sawtooth, 2, 8'000'000, 800'000)}},
       {.name = "hold", .program = {segment(Waveform::hold, 3, 2'000'000, 300'000)}},
+      {.name = "uploaded",
+       .program = {segment(Waveform::uploaded, 2, 20'000'000, 1'200'000)},
+       .before = upload_heart},
       {.name = "offset", .program = {segment(Waveform::parabolic, 1, 10'000'000, 1'000'000, 5'000'000)}},
       {.name = "segments_in_sequence",
        .program = {segment(Waveform::parabolic, 2, 40'000'000, 1'200'000),
@@ -42,6 +65,7 @@ const std::vector<Scenario>& scenarios() {
        .gate_every = 2},
       {.name = "paper_rate_30kHz", .program = {segment(Waveform::parabolic, 1, 70'000'000, 1'200'000)}},
       {.name = "homing", .program = {paper()}, .motion = home},
+      {.name = "jog_there_and_back", .program = {paper()}, .motion = jog},
       {.name = "stop_at_cycle_end",
        .program = {paper()},
        .act = Act::stop_at_cycle_end,

@@ -11,6 +11,7 @@
 #include "protocol/contract/input_error.hpp"
 #include "protocol/wire/wire_text.hpp"
 #include "tests/tools/sim_board/emulated_desk.hpp"
+#include "tests/tools/sim_board/miniature_host.hpp"
 
 namespace diastole::sim_board_test {
 namespace {
@@ -138,13 +139,40 @@ std::vector<Case> cases() {
   std::vector<Case> all;
   for (int state = 0; state <= static_cast<int>(wire::kLastState); ++state)
     for (const bool power : {false, true})
-      all.push_back({static_cast<State>(state), power});
+      if (static_cast<State>(state) != State::jogging) all.push_back({static_cast<State>(state), power});
   return all;
 }
 
 INSTANTIATE_TEST_SUITE_P(EveryState, ResetIn, testing::ValuesIn(cases()), [](const auto& each) {
   return std::string(wire::state_name(each.param.state)) + (each.param.power ? "_power" : "_button");
 });
+
+TEST(ResetWhileJogging, StopsTheMotorAndForgetsThePosition) {
+  if (!std::filesystem::exists(firmware))
+    GTEST_SKIP() << "no " << firmware << ": build the preset `firmware` first";
+  EmulatedController controller({read_image(firmware)});
+  MiniatureHost host(controller);
+  ASSERT_TRUE(host.prepare());
+  wire::Jog jog{};
+  jog.lease_id = MiniatureHost::lease;
+  jog.distance_nL = 20'000'000;
+  jog.flow_uL_per_s = 5'000;
+  ASSERT_TRUE(host.ask(jog));
+  host.run_for(500 * ms);
+  ASSERT_EQ(host.state, State::jogging);
+  const uint32_t boot_id = host.hello->boot_id;
+  const int64_t position = controller.position_microsteps();
+  host.edges.clear();
+  controller.board().reset();
+  EXPECT_FALSE(controller.board().level(diastole_wiring().enable.pin));
+  host.hello.reset();
+  ASSERT_TRUE(host.connect());
+  EXPECT_NE(host.hello->boot_id, boot_id);
+  EXPECT_EQ(controller.position_microsteps(), position);
+  EXPECT_TRUE(std::ranges::none_of(host.edges, [](const auto& edge) { return edge.pin == Pin::step; }));
+  ASSERT_TRUE(host.ask(wire::Configure::example()));
+  EXPECT_FALSE(host.ask(wire::Arm::example())) << "unhomed";
+}
 
 }  // namespace
 }  // namespace diastole::sim_board_test
