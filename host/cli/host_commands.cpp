@@ -11,6 +11,7 @@ void add_host_commands(CommandLine& line) {
   add_inspect(line);
   add_bin(line);
   add_recover(line);
+  add_export(line);
 }
 
 }  // namespace diastole

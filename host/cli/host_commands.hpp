@@ -13,6 +13,7 @@ void add_home(CommandLine& line);
 void add_inspect(CommandLine& line);
 void add_bin(CommandLine& line);
 void add_recover(CommandLine& line);
+void add_export(CommandLine& line);
 
 /// All of them, in the order in which a session uses them.
 void add_host_commands(CommandLine& line);

@@ -21,6 +21,7 @@
 #include "protocol/contract/exit_code.hpp"
 #include "protocol/contract/input_error.hpp"
 #include "protocol/contract/table_reader.hpp"
+#include "tools/diastole/catheter/catheter.hpp"
 #include "tools/diastole/simulate/simulate.hpp"
 
 namespace {
@@ -62,6 +63,7 @@ diastole::ExitCode run(int argc, char** argv) {
       "code\nand the text on standard error tell the error.");
   diastole::CommandLine line(app);
   diastole::add_host_commands(line);
+  diastole::add_catheter(line);
   diastole::add_simulate(line);
   diastole::add_estimator_commands(line);
   if (argc < 2) {

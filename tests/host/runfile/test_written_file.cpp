@@ -3,7 +3,6 @@
 #include <gmock/gmock.h>
 
 #include <cmath>
-#include <cstdio>
 #include <fstream>
 #include <nlohmann/json.hpp>
 
@@ -12,24 +11,10 @@
 #include "protocol/contract/input_error.hpp"
 #include "protocol/runfile/reader.hpp"
 #include "tests/host/acquisition/session_on_desk.hpp"
+#include "tests/host/runfile/output_of.hpp"
 
 namespace diastole {
 namespace {
-
-struct Output {
-  int status = 0;
-  std::string text;
-};
-
-Output output_of(const std::string& command) {
-  Output output;
-  FILE* pipe = ::popen((command + " 2>&1").c_str(), "r");
-  std::array<char, 4096> block{};
-  for (size_t count = 0; (count = std::fread(block.data(), 1, block.size(), pipe)) > 0;)
-    output.text.append(block.data(), count);
-  output.status = ::pclose(pipe);
-  return output;
-}
 
 /// One desk session with a gap of three samples, recorded once for all tests here.
 class WrittenFile : public testing::Test {
