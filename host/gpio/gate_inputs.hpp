@@ -1,0 +1,52 @@
+#pragma once
+// What the host's own digital inputs see of the rig, apart from what the controller says: the gating line (the TTL
+// that the scanner gets) and the emergency stop. Times are the kernel's, on the clock of RealClock.
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace diastole {
+
+struct GpioConfig {
+  std::string chip;  ///< "gpiochip0", its label or its path
+  std::optional<unsigned> gate_line{};
+  std::optional<unsigned> estop_line{};
+  bool gate_active_low = false;
+  bool estop_active_low = false;
+};
+
+struct EstopChange {
+  uint64_t host_ns = 0;
+  bool pressed = false;
+  bool edge_seen = true;  ///< false: only the level tells it; the edge was lost
+};
+
+/// Since the last one was taken.
+struct GateReading {
+  std::vector<uint64_t> pulse_ns;  ///< one a rising edge of the gating line, in order
+  bool may_have_lost = false;      ///< the kernel's buffer was found full: more pulses may have come
+  std::vector<EstopChange> estop_changes;
+  std::string problem;  ///< the lines can no longer be read
+};
+
+class GateInputs {
+ public:
+  virtual ~GateInputs() = default;
+  [[nodiscard]] virtual std::string describe() const = 0;
+  [[nodiscard]] virtual bool counts_pulses() const = 0;
+  [[nodiscard]] virtual bool sees_estop() const = 0;
+  /// Never waits.
+  virtual GateReading take() = 0;
+  /// The emergency stop's present level; false without that line.
+  [[nodiscard]] virtual bool estop_pressed() const = 0;
+};
+
+/// Through libgpiod. A thread of its own reads the edges as they come, as the kernel keeps no more than 16 a line and
+/// drops what follows without a sign, and looks at the emergency stop's level 50 times a second. Throws
+/// HardwareError when chip or line is absent, forbidden or in use.
+std::unique_ptr<GateInputs> open_gpio(const GpioConfig& config);
+
+}  // namespace diastole

@@ -1,0 +1,109 @@
+#include "host/gpio/gate_check.hpp"
+
+#include <gmock/gmock.h>
+
+namespace diastole {
+namespace {
+
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::SizeIs;
+
+constexpr uint64_t ms = 1'000'000;
+
+class Inputs final : public GateInputs {
+ public:
+  [[nodiscard]] std::string describe() const override { return "inputs"; }
+  [[nodiscard]] bool counts_pulses() const override { return gate; }
+  [[nodiscard]] bool sees_estop() const override { return true; }
+  [[nodiscard]] bool estop_pressed() const override { return pressed; }
+  GateReading take() override { return std::exchange(next, {}); }
+  void pulse(int count) { next.pulse_ns.insert(next.pulse_ns.end(), static_cast<size_t>(count), 1); }
+
+  GateReading next;
+  bool gate = true;
+  bool pressed = false;
+};
+
+TEST(GateCheck, EqualCountsAreSaidAtTheEnd) {
+  Inputs inputs;
+  inputs.pulse(7);  // before the run
+  GateCheck check(inputs);
+  for (uint64_t cycle = 1; cycle <= 5; ++cycle) {
+    inputs.pulse(1);
+    EXPECT_THAT(check.look(cycle * 1000 * ms, {cycle, false}), IsEmpty());
+  }
+  const auto remarks = check.close(6000 * ms, {5, false}, 5);
+  ASSERT_THAT(remarks, SizeIs(1));
+  EXPECT_EQ(remarks[0].level, "info");
+  EXPECT_THAT(remarks[0].text, HasSubstr("5 pulses"));
+}
+
+TEST(GateCheck, AReportMayTakeAWhileButNotForever) {
+  Inputs inputs;
+  GateCheck check(inputs);
+  inputs.pulse(1);
+  EXPECT_THAT(check.look(1000 * ms, {0, false}), IsEmpty());
+  EXPECT_THAT(check.look(1400 * ms, {0, false}), IsEmpty());
+  EXPECT_THAT(check.look(1450 * ms, {1, false}), IsEmpty());
+  inputs.pulse(2);  // one more than the controller knows of
+  EXPECT_THAT(check.look(2000 * ms, {2, false}), IsEmpty());
+  const auto remarks = check.look(2501 * ms, {2, false});
+  ASSERT_THAT(remarks, SizeIs(1));
+  EXPECT_EQ(remarks[0].level, "error");
+  EXPECT_THAT(remarks[0].text, testing::AllOf(HasSubstr("3 pulses"), HasSubstr("2 triggers")));
+  EXPECT_THAT(check.look(9000 * ms, {2, false}), IsEmpty()) << "said once";
+}
+
+TEST(GateCheck, AMissingPulseIsAnErrorAtTheEnd) {
+  Inputs inputs;
+  GateCheck check(inputs);
+  inputs.pulse(4);
+  inputs.next.may_have_lost = true;
+  const auto remarks = check.close(1000 * ms, {5, false}, 5);
+  ASSERT_THAT(remarks, SizeIs(1));
+  EXPECT_EQ(remarks[0].level, "error");
+  EXPECT_THAT(remarks[0].text,
+              testing::AllOf(HasSubstr("4 pulses"), HasSubstr("5 triggers"), HasSubstr("faster")));
+}
+
+TEST(GateCheck, WithoutAGatingLineNothingIsCompared) {
+  Inputs inputs;
+  inputs.gate = false;
+  GateCheck check(inputs);
+  EXPECT_THAT(check.look(9000 * ms, {3, false}), IsEmpty());
+  EXPECT_THAT(check.close(9000 * ms, {3, false}, 3), IsEmpty());
+}
+
+TEST(GateCheck, AnEmergencyStopThatTheControllerDoesNotSeeIsAnError) {
+  Inputs inputs;
+  GateCheck check(inputs);
+  inputs.next.estop_changes = {{1000 * ms, true, true}};
+  auto remarks = check.look(1001 * ms, {});
+  ASSERT_THAT(remarks, SizeIs(1));
+  EXPECT_EQ(remarks[0].level, "warning");
+  EXPECT_EQ(remarks[0].host_ns, 1000 * ms) << "the kernel's time";
+  remarks = check.look(1600 * ms, {});
+  ASSERT_THAT(remarks, SizeIs(1));
+  EXPECT_EQ(remarks[0].code, "estop_unseen");
+}
+
+TEST(GateCheck, AnEmergencyStopThatTheControllerReportsIsNoDisagreement) {
+  Inputs inputs;
+  GateCheck check(inputs);
+  inputs.next.estop_changes = {{1000 * ms, true, false}};
+  EXPECT_THAT(check.look(1001 * ms, {0, true}), SizeIs(1));
+  EXPECT_THAT(check.look(3000 * ms, {0, true}), IsEmpty());
+}
+
+TEST(GateCheck, LinesThatFailAreTold) {
+  Inputs inputs;
+  GateCheck check(inputs);
+  inputs.next.problem = "gone";
+  const auto remarks = check.look(1 * ms, {});
+  ASSERT_THAT(remarks, SizeIs(1));
+  EXPECT_EQ(remarks[0].level, "error");
+}
+
+}  // namespace
+}  // namespace diastole
