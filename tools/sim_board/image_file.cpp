@@ -26,7 +26,8 @@ std::vector<uint8_t> read_bytes(const std::string& file) {
   std::vector<uint8_t> bytes{std::istreambuf_iterator<char>(stream), {}};
   if (bytes.empty()) {
     refuse(file, "cannot be read or is empty",
-           "Give an image, such as build/firmware/bin/controller.bin (cmake --preset firmware builds it).");
+           "Give an image, such as build/firmware/bin/diastole-stm32f405.bin (cmake --preset firmware builds "
+           "it).");
   }
   return bytes;
 }

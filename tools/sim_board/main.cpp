@@ -22,10 +22,10 @@ constexpr const char* purpose =
 and registers of the peripherals, with every change of a pin logged. Time is the board's own: the same run gives the
 same trace, to the byte, however fast this machine is.
 
-  sim_board build/firmware/bin/controller.bin --seconds 2 --report
+  sim_board build/firmware/bin/diastole-stm32f405.bin --seconds 2 --report
       two seconds of board time as fast as it goes, then sizes, stack, interrupt costs
 
-  sim_board build/firmware/bin/controller.elf --link /tmp/pump --real-time --pins trace.csv
+  sim_board build/firmware/bin/diastole-stm32f405.elf --link /tmp/pump --real-time --pins trace.csv
       a board behind the serial port /tmp/pump until Ctrl-C; `diastole daemon` or `diastole flash` can talk to it
 
   sim_board bootloader.bin --flash board.flash --link /tmp/pump --real-time --power-cut 17
@@ -50,10 +50,11 @@ void add_options(CLI::App& app, diastole::SessionOptions& options, bool& report,
                "follow the wall clock; without it, as fast as the machine goes");
   app.add_option("--seconds", options.seconds, "end after this much board time (default: run until Ctrl-C)")
       ->check(CLI::PositiveNumber);
-  app.add_option("--estop-at", options.estop_at_s,
-                 "press the e-stop at this time in seconds; may be repeated")
-      ->check(CLI::NonNegativeNumber);
-  app.add_option("--limit-at", options.limit_at, "close a limit switch: SECONDS:home or SECONDS:far");
+  app.add_option(
+      "--estop-at", options.estop_at,
+      "press the e-stop at this time in seconds, or from one to another: 2.5 or 2.5..4; may be repeated");
+  app.add_option("--limit-at", options.limit_at,
+                 "close a limit switch: 2.5:home, 2.5:far or 2.5..4:far; may be repeated");
   app.add_option("--power-cut", options.power_cut,
                  "cut the power in the middle of flash operation N (1 is the first)")
       ->check(CLI::PositiveNumber);

@@ -8,6 +8,7 @@ namespace diastole {
 namespace {
 
 constexpr uint32_t core_exception_base = 0x8000'0000;
+constexpr uint32_t flash_size = 1024 * 1024, ram_size = 128 * 1024;  // of the STM32F405RG; 64 KB CCM apart
 
 std::string interrupt_name(uint32_t irq) {
   if (irq < core_exception_base) return fmt::format("IRQ {}", irq);
@@ -92,8 +93,9 @@ std::string to_text(const BoardReport& report) {
       fmt::format("{} instructions, {} steps, {} triggers, {} flash operations\n", board.instructions,
                   report.steps, report.triggers, board.flash_operations);
   for (const Image& image : report.images) {
-    text += fmt::format("{}: {} bytes of flash", image.file, image.flash_bytes);
-    if (image.static_ram_bytes) text += fmt::format(", {} bytes of static RAM", *image.static_ram_bytes);
+    text += fmt::format("{}: {} of {} bytes of flash", image.file, image.flash_bytes, flash_size);
+    if (image.static_ram_bytes)
+      text += fmt::format(", {} of {} bytes of RAM, static", *image.static_ram_bytes, ram_size);
     text += '\n';
   }
   text += fmt::format("deepest stack {} bytes below 0x{:08x}; serial overruns {}; missed deadlines {}\n",

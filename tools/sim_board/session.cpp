@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
@@ -71,18 +72,14 @@ class Session {
       restore_flash(controller_.board(), options.flash);
       controller_.board().power_cycle();
     }
-    for (const double time_s : options.estop_at_s)
-      controller_.press_estop(nanoseconds(time_s));
-    for (const std::string& text : options.limit_at) {
-      const LimitAt limit = parse_limit(text);
-      limit.far ? controller_.close_far_limit(nanoseconds(limit.time_s))
-                : controller_.close_home(nanoseconds(limit.time_s));
-    }
+    move_switches();
     controller_.board().cut_power_at_flash_operation(options.power_cut);
   }
 
   BoardReport run(int stop) {
     if (line_) {
+      if (!options_.real_time)
+        fmt::print(stderr, "without --real-time the board's time runs ahead of whoever opens the port\n");
       fmt::print("{}\n", nlohmann::json{{"port", line_->path()}}.dump());
       std::fflush(stdout);
     }
@@ -101,6 +98,23 @@ class Session {
   }
 
  private:
+  void move_switches() {
+    for (const std::string& text : options_.estop_at) {
+      const Span span = parse_span(text, "--estop-at");
+      controller_.press_estop(nanoseconds(span.from_s));
+      if (span.to_s) controller_.press_estop(nanoseconds(*span.to_s), false);
+    }
+    for (const std::string& text : options_.limit_at) {
+      const auto [span, far] = parse_limit(text);
+      const auto close = [this, is_far = far](double time_s, bool closed) {
+        is_far ? controller_.close_far_limit(nanoseconds(time_s), closed)
+               : controller_.close_home(nanoseconds(time_s), closed);
+      };
+      close(span.from_s, true);
+      if (span.to_s) close(*span.to_s, false);
+    }
+  }
+
   void advance(uint64_t until_ns) {
     if (line_) {
       line_->refresh();
@@ -140,18 +154,40 @@ class Session {
 
 }  // namespace
 
-LimitAt parse_limit(const std::string& text) {
-  const auto colon = text.find(':');
-  const std::string which = colon == std::string::npos ? "" : text.substr(colon + 1);
+namespace {
+
+std::optional<double> parse_time(const std::string& text) {
   try {
     std::size_t used = 0;
     const double time_s = std::stod(text, &used);
-    if (used == colon && time_s >= 0 && (which == "home" || which == "far")) return {time_s, which == "far"};
+    if (used == text.size() && std::isfinite(time_s) && time_s >= 0) return time_s;
   } catch (const std::exception&) {
-    // The message below covers it.
+    return std::nullopt;
   }
+  return std::nullopt;
+}
+
+}  // namespace
+
+Span parse_span(const std::string& text, const std::string& option) {
+  const auto dots = text.find("..");
+  const auto from_s = parse_time(text.substr(0, dots));
+  if (dots == std::string::npos) {
+    if (from_s) return {*from_s, std::nullopt};
+  } else if (const auto to_s = parse_time(text.substr(dots + 2)); from_s && to_s && *to_s > *from_s) {
+    return {*from_s, *to_s};
+  }
+  throw InputError({"", option, fmt::format("'{}' is no time, nor one time and a later one", text),
+                    "Write seconds, such as 2.5 or 2.5..4."});
+}
+
+LimitAt parse_limit(const std::string& text) {
+  const auto colon = text.find(':');
+  const std::string which = colon == std::string::npos ? "" : text.substr(colon + 1);
+  if (which == "home" || which == "far")
+    return {parse_span(text.substr(0, colon), "--limit-at"), which == "far"};
   throw InputError(
-      {"", "--limit-at", fmt::format("'{}' is no time and switch", text), "Write 2.5:home or 2.5:far."});
+      {"", "--limit-at", fmt::format("'{}' is no time and switch", text), "Write 2.5:home or 2.5..4:far."});
 }
 
 BoardReport run_session(const SessionOptions& options, int stop) {

@@ -11,11 +11,19 @@
 
 namespace diastole {
 
+/// When a button is pressed or a switch is closed from outside, and when it is let go.
+struct Span {
+  double from_s = 0;
+  std::optional<double> to_s;
+};
+/// "2.5" or "2.5..4"; throws InputError, naming `option`, for anything else.
+Span parse_span(const std::string& text, const std::string& option);
+
 struct LimitAt {
-  double time_s = 0;
+  Span span;
   bool far = false;
 };
-/// "2.5:home" or "2.5:far"; throws InputError for anything else.
+/// "2.5:home", "2.5..4:far"; throws InputError for anything else.
 LimitAt parse_limit(const std::string& text);
 
 struct SessionOptions {
@@ -23,8 +31,7 @@ struct SessionOptions {
   std::string link, pins, flash;
   bool real_time = false;
   std::optional<double> seconds;
-  std::vector<double> estop_at_s;
-  std::vector<std::string> limit_at;
+  std::vector<std::string> estop_at, limit_at;
   std::optional<uint64_t> power_cut;
   uint32_t crystal_Hz = 8'000'000;
 };

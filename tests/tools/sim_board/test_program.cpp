@@ -101,7 +101,30 @@ TEST_F(Program, RefusesBadInputWithPlaceAndRemedy) {
   const Outcome limit = call(image("steps.bin") + " --seconds 1 --limit-at 2:left");
   EXPECT_EQ(limit.code, 2);
   EXPECT_THAT(limit.err, HasSubstr("2.5:home"));
+  for (const char* span : {"4..2.5", "2..", "x", "-1", "2.5..4s", "nan"}) {
+    const Outcome estop = call(image("steps.bin") + " --seconds 1 --estop-at=" + span);
+    EXPECT_EQ(estop.code, 2) << span;
+    EXPECT_THAT(estop.err, HasSubstr("2.5..4")) << span;
+  }
   EXPECT_EQ(call("--help").code, 0);
+}
+
+TEST_F(Program, TheReportTellsWhatIsUsedOfHowMuch) {
+  const Outcome outcome = call(image("steps.elf") + " --seconds 0.01 --report");
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_THAT(outcome.out, HasSubstr("of 1048576 bytes of flash, 256 of 131072 bytes of RAM"));
+}
+
+TEST_F(Program, InputsActAtTheirTimes) {
+  const std::string firmware = DIASTOLE_SOURCE_DIR "/build/firmware/bin/diastole-stm32f405.elf";
+  if (!std::filesystem::exists(firmware))
+    GTEST_SKIP() << "no " << firmware << ": build the preset `firmware` first";
+  const Outcome outcome = call(
+      firmware + " --seconds 0.3 --estop-at 0.2..0.25 --limit-at 0.1..0.15:far --pins " + file("pins.csv"));
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_THAT(contents(file("pins.csv")),
+              testing::MatchesRegex("time_ns,signal,value\n20000[0-9]+,FAULT,1\n"))
+      << "a limit at rest is no fault, the e-stop always is";
 }
 
 TEST_F(Program, ALockedUpCoreIsANegativeAnswer) {
