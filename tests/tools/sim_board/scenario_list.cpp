@@ -43,13 +43,12 @@ void jog(MiniatureHost& host) {
 
 const std::vector<Scenario>& scenarios() {
   static const std::vector<Scenario> list{
-      // Undisturbed: equal to the last edge.
-      {.name = "parabolic", .program = {segment(Waveform::parabolic, 2, 40'000'000, 1'200'000)}},
-      {.name = "sinusoidal", .program = {segment(Waveform::sinusoidal, 2, 16'000'000, 800'000)}},
-      {.name = "trapezoidal", .program = {segment(Waveform::trapezoidal, 2, 8'000'000, 800'000)}},
-      {.name = "sawtooth", .program = {segment(Waveform::sawtooth, 2, 8'000'000, 800'000)}},
-      {.name = "reversed_sawtooth", .program = {segment(Waveform::reversed_sawtooth, 2, 8'000'000, 800'000)}},
-      {.name = "hold", .program = {segment(Waveform::hold, 3, 2'000'000, 300'000)}},
+  // Undisturbed: equal to the last edge.
+#define DIASTOLE_PROFILE(profile) \
+  {.name = #profile, .program = {segment(Waveform::profile, 2, 8'000'000, 800'000)}},
+#include "firmware/core/profiles/profile_list.inc"
+#undef DIASTOLE_PROFILE
+      {.name = "the_papers_cycle", .program = {paper()}},
       {.name = "uploaded",
        .program = {segment(Waveform::uploaded, 2, 20'000'000, 1'200'000)},
        .before = upload_heart},
@@ -66,10 +65,7 @@ const std::vector<Scenario>& scenarios() {
       {.name = "paper_rate_30kHz", .program = {segment(Waveform::parabolic, 1, 70'000'000, 1'200'000)}},
       {.name = "homing", .program = {paper()}, .motion = home},
       {.name = "jog_there_and_back", .program = {paper()}, .motion = jog},
-      {.name = "stop_at_cycle_end",
-       .program = {paper()},
-       .act = Act::stop_at_cycle_end,
-       .act_after_ms = 1'700},
+      {.name = "stop_at_cycle_end", .program = {paper()}, .act = Act::stop_at_cycle_end, .act_after_ms = 500},
       // Stopped or cut off in their first or second cycle (each 1.2 s).
       {.name = "stop_now_on_the_rise", .program = {paper()}, .act = Act::stop_now, .act_after_ms = 1'500},
       {.name = "stop_now_on_the_fall", .program = {paper()}, .act = Act::stop_now, .act_after_ms = 2'100},
