@@ -76,7 +76,9 @@ Program::~Program() {
   }
 }
 
-void Program::signal(int number) const { ::kill(pid_, number); }
+void Program::signal(int number) const {
+  if (pid_ > 0) ::kill(pid_, number);  // kill(-1, ...) would reach every process of the machine
+}
 
 bool Program::ended() {
   if (pid_ < 0) return true;
