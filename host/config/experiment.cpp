@@ -1,11 +1,15 @@
 #include "host/config/experiment.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <filesystem>
 #include <fstream>
 #include <sstream>
 
 #include "protocol/contract/input_error.hpp"
 #include "protocol/contract/table_reader.hpp"
+#include "protocol/wire/program_messages.hpp"
 
 namespace diastole {
 namespace {
@@ -24,21 +28,97 @@ std::vector<std::string> spelled_waveforms() {
   return names;
 }
 
-ExperimentSegment read_segment(TableReader table) {
-  const std::vector<std::string> waveforms = spelled_waveforms();
-  ExperimentSegment segment;
-  segment.waveform_name = table.choice("waveform", waveforms);
-  const auto number =
-      std::find(waveforms.begin(), waveforms.end(), segment.waveform_name) - waveforms.begin();
-  segment.waveform = static_cast<wire::Waveform>(number);
-  constexpr NumberRange volume{.at_least = 0, .at_most = 4000};
-  segment.stroke_mL = segment.waveform == wire::Waveform::hold ? table.number_or("stroke_mL", 0, volume)
-                                                               : table.number("stroke_mL", volume);
-  segment.offset_mL = table.number_or("offset_mL", 0, volume);
-  segment.period_s = table.number("period_s", {.at_least = 0.001, .at_most = 600});
-  segment.cycles = table.integer_or("cycles", 1, {.at_least = 1, .at_most = 10'000'000});
-  table.finish();
-  return segment;
+/// Reads the segments of one experiment and gathers the waveforms that they name.
+class SegmentReader {
+ public:
+  SegmentReader(Experiment& experiment, const ReadPoints& read_points)
+      : experiment_(experiment), read_points_(read_points) {}
+
+  void read(TableReader table) {
+    const std::vector<std::string> waveforms = spelled_waveforms();
+    ExperimentSegment segment;
+    segment.waveform_name = table.choice("waveform", waveforms);
+    const auto number =
+        std::find(waveforms.begin(), waveforms.end(), segment.waveform_name) - waveforms.begin();
+    segment.waveform = static_cast<wire::Waveform>(number);
+    constexpr NumberRange volume{.at_least = 0, .at_most = 4000};
+    constexpr NumberRange period{.at_least = 0.001, .at_most = 600};
+    if (segment.waveform == wire::Waveform::uploaded) segment.upload = waveform_of(table);
+    const std::optional<double> range_mL = of_points(segment, &PointsFile::range_mL);
+    const std::optional<double> cycle_s = of_points(segment, &PointsFile::cycle_s);
+    const bool holds = segment.waveform == wire::Waveform::hold;
+    segment.stroke_mL = holds || range_mL ? table.number_or("stroke_mL", range_mL.value_or(0), volume)
+                                          : table.number("stroke_mL", volume);
+    segment.offset_mL = table.number_or("offset_mL", 0, volume);
+    segment.period_s =
+        cycle_s ? table.number_or("period_s", *cycle_s, period) : table.number("period_s", period);
+    segment.cycles = table.integer_or("cycles", 1, {.at_least = 1, .at_most = 10'000'000});
+    table.finish();
+    tables_.push_back(std::move(table));
+    experiment_.segments.push_back(segment);
+  }
+
+  /// Shares the controller's memory out: evenly spaced points take what they need, the others the rest alike.
+  void put_on_even_phases() {
+    size_t room = wire::kMaxWaveformPoints, uneven = 0;
+    for (const ExperimentWaveform& waveform : experiment_.waveforms) {
+      const size_t points = even_points(waveform.points);
+      if (points > room)
+        fail(waveform, fmt::format("with it the waveforms have {} points too many", points - room),
+             fmt::format("The controller holds {} points of all waveforms together: thin them out, "
+                         "or split the experiment into several runs.",
+                         wire::kMaxWaveformPoints));
+      room -= points;
+      uneven += points == 0 ? 1 : 0;
+    }
+    constexpr size_t least_grid = 64;
+    for (ExperimentWaveform& waveform : experiment_.waveforms) {
+      if (even_points(waveform.points) == 0 && room / uneven < least_grid)
+        fail(waveform, "leaves no room for its unevenly spaced points beside the other waveforms",
+             "Thin the others out, or split the experiment into several runs.");
+      waveform.even = on_even_phases(waveform.points, uneven > 0 ? room / uneven : room);
+    }
+  }
+
+ private:
+  size_t waveform_of(TableReader& table) {
+    const std::string name = table.text("points");
+    std::vector<ExperimentWaveform>& known = experiment_.waveforms;
+    const auto found = std::ranges::find(known, name, &ExperimentWaveform::name);
+    if (found != known.end()) return static_cast<size_t>(found - known.begin());
+    if (known.size() == wire::kMaxWaveforms)
+      table.fail("points", fmt::format("is the waveform number {} of this experiment", known.size() + 1),
+                 fmt::format("The controller holds {} at a time: split the experiment into several runs.",
+                             wire::kMaxWaveforms));
+    if (!read_points_) table.fail("points", "cannot be read here", "Run the experiment from its file.");
+    known.push_back({name, parse_points(read_points_(name), name), {}});
+    return known.size() - 1;
+  }
+  [[nodiscard]] std::optional<double> of_points(const ExperimentSegment& segment,
+                                                std::optional<double> PointsFile::*what) const {
+    return segment.upload ? experiment_.waveforms[*segment.upload].points.*what : std::nullopt;
+  }
+  [[noreturn]] void fail(const ExperimentWaveform& waveform, const std::string& problem,
+                         const std::string& remedy) const {
+    const auto number = static_cast<size_t>(&waveform - experiment_.waveforms.data());
+    const auto segment =
+        std::ranges::find(experiment_.segments, std::optional(number), &ExperimentSegment::upload);
+    tables_[static_cast<size_t>(segment - experiment_.segments.begin())].fail("points", problem, remedy);
+  }
+
+  Experiment& experiment_;
+  const ReadPoints& read_points_;
+  std::vector<TableReader> tables_;
+};
+
+std::string text_of(const std::filesystem::path& file) {
+  std::ifstream stream(file);
+  std::stringstream text;
+  if (!stream || !(text << stream.rdbuf())) {
+    throw InputError(
+        {file.string(), "", "cannot be opened", "Check the path and that you may read the file."});
+  }
+  return text.str();
 }
 
 }  // namespace
@@ -57,7 +137,7 @@ double Experiment::least_duration_s() const {
   return total_s;
 }
 
-Experiment parse_experiment(std::string_view text, const std::string& file) {
+Experiment parse_experiment(std::string_view text, const std::string& file, const ReadPoints& read_points) {
   TableReader root = TableReader::from_text(text, file);
   root.expect_format("diastole-experiment", 1);
   Experiment experiment;
@@ -67,20 +147,19 @@ Experiment parse_experiment(std::string_view text, const std::string& file) {
   experiment.sample_rate_Hz = root.number_or("sample_rate_Hz", 300, {.at_least = 1, .at_most = 20'000});
   experiment.gate_every = root.integer_or("gate_every", 1, {.at_least = 1, .at_most = 10'000});
   experiment.rest_s = root.number_or("rest_s", 1.0, {.at_least = 0.001, .at_most = 60});
+  SegmentReader segments(experiment, read_points);
   for (TableReader& table : root.tables("segment"))
-    experiment.segments.push_back(read_segment(std::move(table)));
+    segments.read(std::move(table));
   if (experiment.segments.empty()) root.fail("segment", "is missing", "Add at least one [[segment]].");
   root.finish();
+  segments.put_on_even_phases();
   return experiment;
 }
 
 Experiment read_experiment(const std::string& file) {
-  std::ifstream stream(file);
-  std::stringstream text;
-  if (!stream || !(text << stream.rdbuf())) {
-    throw InputError({file, "", "cannot be opened", "Check the path and that you may read the file."});
-  }
-  return parse_experiment(text.str(), file);
+  const std::filesystem::path folder = std::filesystem::path(file).parent_path();
+  return parse_experiment(text_of(file), file,
+                          [&](const std::string& name) { return text_of(folder / name); });
 }
 
 }  // namespace diastole

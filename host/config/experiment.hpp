@@ -3,10 +3,14 @@
 // is checked; whether the rig can do it, the controller decides when it plans the program.
 
 #include <cstdint>
+#include <functional>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "host/config/even_waveform.hpp"
+#include "host/config/points_file.hpp"
 #include "protocol/wire/states.hpp"
 
 namespace diastole {
@@ -18,6 +22,14 @@ struct ExperimentSegment {
   double offset_mL = 0;
   double period_s = 0;
   int64_t cycles = 1;
+  std::optional<size_t> upload;  ///< which of the experiment's waveforms, if it is an uploaded one
+};
+
+/// A points file that segments name.
+struct ExperimentWaveform {
+  std::string name;  ///< as `points` spells it
+  PointsFile points;
+  EvenWaveform even;
 };
 
 struct Experiment {
@@ -27,14 +39,20 @@ struct Experiment {
   int64_t gate_every = 1;
   double rest_s = 1.0;  ///< stillness between the start of run and the first segment
   std::vector<ExperimentSegment> segments;
+  std::vector<ExperimentWaveform> waveforms;  ///< each once, in the order in which they are first named
 
   [[nodiscard]] int64_t cycles() const;
   /// Rest and cycles; ramps between offsets come on top.
   [[nodiscard]] double least_duration_s() const;
 };
 
-/// Throws InputError with file, line and key.
-Experiment parse_experiment(std::string_view text, const std::string& file);
+/// The text of a points file, by its name in the experiment. Throws InputError if there is none.
+using ReadPoints = std::function<std::string(const std::string& name)>;
+
+/// Throws InputError with file, line and key. Without `read_points` no segment can be uploaded.
+Experiment parse_experiment(std::string_view text, const std::string& file,
+                            const ReadPoints& read_points = {});
+/// Points files are looked for beside the experiment.
 Experiment read_experiment(const std::string& file);
 
 }  // namespace diastole

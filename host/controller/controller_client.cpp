@@ -9,6 +9,7 @@
 #include <random>
 
 #include "protocol/contract/input_error.hpp"
+#include "protocol/wire/crc32.hpp"
 #include "protocol/wire/wire_text.hpp"
 
 namespace diastole {
@@ -131,6 +132,12 @@ LimitInWords words_for(wire::Limit limit) {
     throw InputError({experiment.file, place, "is more than the controller's program holds",
                       "Split the experiment into several runs."});
   }
+  if (nak.refusal == wire::Refusal::waveform_unfit) {
+    throw InputError(
+        {experiment.file, place + ".points",
+         "the controller refuses its waveform: it is steeper than 4294 strokes a period (squared)",
+         "Smooth its points, or put them further apart."});
+  }
   throw InputError({experiment.file, place,
                     fmt::format("the controller refuses it: {}", wire::refusal_explanation(nak.refusal)),
                     ""});
@@ -229,9 +236,39 @@ void ControllerClient::configure() {
   demand(message);
 }
 
+/// Precondition: the program is empty.
+void ControllerClient::upload(const Experiment& experiment) {
+  for (size_t number = 0; number < experiment.waveforms.size(); ++number) {
+    const std::vector<int16_t>& rises = experiment.waveforms[number].even.rises;
+    const auto put = [&](const auto& message) {
+      Answer answer = request(message);
+      if (!answer.nak) return;
+      const auto segment =
+          std::ranges::find(experiment.segments, std::optional(number), &ExperimentSegment::upload);
+      answer.nak->segment = static_cast<uint16_t>(segment - experiment.segments.begin());
+      refuse_program(experiment, *answer.nak);
+    };
+    wire::Crc32 crc;
+    for (const int16_t rise : rises) {
+      crc.add(static_cast<uint8_t>(rise & 0xFF));
+      crc.add(static_cast<uint8_t>((rise >> 8) & 0xFF));
+    }
+    put(wire::UploadWaveform{0, static_cast<uint8_t>(number), static_cast<uint16_t>(rises.size()),
+                             crc.value()});
+    for (size_t first = 0; first < rises.size(); first += wire::WaveformPoints::kMaxCount) {
+      wire::WaveformPoints lot;
+      lot.first = static_cast<uint16_t>(first);
+      lot.count = static_cast<uint8_t>(std::min(wire::WaveformPoints::kMaxCount, rises.size() - first));
+      std::copy_n(rises.begin() + static_cast<std::ptrdiff_t>(first), lot.count, lot.rise.begin());
+      put(lot);
+    }
+  }
+}
+
 ProgramPlan ControllerClient::load(const Experiment& experiment) {
   const double positions_Hz = position_rate_Hz(experiment, rig_.controller);
   demand(wire::ClearProgram{});
+  upload(experiment);
   for (const ExperimentSegment& segment : experiment.segments) {
     const auto index = static_cast<uint16_t>(&segment - experiment.segments.data());
     const auto quantity = [&](const char* key, double value, const char* unit) {
@@ -243,6 +280,7 @@ ProgramPlan ControllerClient::load(const Experiment& experiment) {
     message.stroke_nL = quantity("stroke_mL", 1e6 * segment.stroke_mL, "nL");
     message.offset_nL = quantity("offset_mL", 1e6 * segment.offset_mL, "nL");
     message.period_us = quantity("period_s", 1e6 * segment.period_s, "us");
+    message.upload = static_cast<uint8_t>(segment.upload.value_or(0));
     Answer answer = request(message);
     if (answer.nak) {
       answer.nak->segment = index;

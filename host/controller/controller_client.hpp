@@ -73,6 +73,7 @@ class ControllerClient final : public Controller {
   void demand(Message message);
   void greet();
   void configure();
+  void upload(const Experiment& experiment);
   void turn();
   void receive();
   void transmit();

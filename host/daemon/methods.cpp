@@ -4,6 +4,7 @@
 #include <array>
 
 #include "host/daemon/json_rpc.hpp"
+#include "protocol/contract/input_error.hpp"
 
 namespace diastole {
 namespace {
@@ -22,7 +23,12 @@ void run_start(RigService& rig, const json& params, Done done) {
   if (text.size() > most_experiment_bytes) {
     throw rpc::Error(rpc::Code::invalid_params, "the experiment is too long");
   }
-  rig.start_run(parse_experiment(text, params.value("file", "experiment")), std::move(done));
+  const json points = params.value("points", json::object());
+  const auto read_points = [&](const std::string& name) -> std::string {
+    if (const auto found = points.find(name); found != points.end()) return *found;
+    throw InputError({name, "", "was not sent with the experiment", "Send its text in `points`."});
+  };
+  rig.start_run(parse_experiment(text, params.value("file", "experiment"), read_points), std::move(done));
 }
 
 void run_progress(RigService& rig, const json& params, const Done& done) {

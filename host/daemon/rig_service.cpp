@@ -84,6 +84,18 @@ json planned_segments(const Experiment& experiment, const ProgramPlan& plan) {
   return segments;
 }
 
+/// What uploaded segments follow, by segment.
+json played_waveforms(const Experiment& experiment) {
+  json waveforms = json::array();
+  for (size_t i = 0; i < experiment.segments.size(); ++i) {
+    if (!experiment.segments[i].upload) continue;
+    const ExperimentWaveform& waveform = experiment.waveforms[*experiment.segments[i].upload];
+    waveforms.push_back(
+        {{"segment", i}, {"points", waveform.points.text}, {"fraction", waveform.even.fractions()}});
+  }
+  return waveforms;
+}
+
 double duration_s(const Experiment& experiment, const ProgramPlan& plan) {
   if (plan.empty()) return experiment.least_duration_s();
   return 1e-6 * static_cast<double>(plan.back().start_us + plan.back().duration_us);
@@ -445,7 +457,8 @@ void RigService::write_beginning(JournalWriter& journal, const RunRecord& record
                        {"microstep_pL", controller_->microstep_pL()},
                        {"daq_timer_rate_Hz", std::max(1.0, timer.rate_Hz)},
                        {"daq_timer_counts_samples", timer.counts_samples},
-                       {"segments", planned_segments(experiment, plan)}};
+                       {"segments", planned_segments(experiment, plan)},
+                       {"waveforms", played_waveforms(experiment)}};
   if (!journal.append(RecordKind::document, beginning.dump())) {
     throw HardwareError(journal.path().string(), journal.problem(), "Free some space on that disk.");
   }

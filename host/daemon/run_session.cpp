@@ -96,7 +96,11 @@ json follow(DaemonClient& daemon, const SessionOptions& options, const json& beg
 SessionResult run_session(DaemonClient& daemon, const SessionOptions& options) {
   const Experiment experiment = read_experiment(options.experiment);
   check_output(options.output, options.force);
-  const json begun = daemon.call("run.start", {{"experiment", experiment.text}, {"file", experiment.file}});
+  json points = json::object();
+  for (const ExperimentWaveform& waveform : experiment.waveforms)
+    points[waveform.name] = waveform.points.text;
+  const json begun = daemon.call(
+      "run.start", {{"experiment", experiment.text}, {"file", experiment.file}, {"points", points}});
   const json result = follow(daemon, options, begun);
   if (!result.contains("run_file")) {
     throw HardwareError(

@@ -5,7 +5,7 @@
 //   rig.status                                      anybody       RigService::status, and who controls the rig
 //   run.progress    {first_remark}                  anybody       RigService::run_progress
 //   run.stop        {how: "cycle_end" | "now"}      anybody       {stopping}
-//   run.start       {experiment, file}              controller    {run_id, journal, run_file}
+//   run.start       {experiment, file, points}      controller    {run_id, journal, run_file}
 //   rig.home                                        controller    status
 //   rig.clear_fault                                 controller    status
 //   control.take    {take_over: who holds it}       controller    {user, uid, pid}
@@ -15,6 +15,8 @@
 // (SO_PEERCRED, SO_PEERGROUPS); all others observe and may stop. The first connection that gives an order
 // holds the control until it releases it or closes, or until another takes it over by naming the holder
 // (control_lease.hpp); a takeover is an event of the log and of the run.
+//
+// `points` holds the text of each points file that the experiment names: {name: text}.
 //
 // No client costs the rig anything (connection.hpp): a line is bounded, and so are the answers that a client
 // leaves unread, its requests a second and the time for a line; beyond most_connections the one that has said

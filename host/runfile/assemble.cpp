@@ -229,6 +229,17 @@ void put_segments(const JournalStory& story, const TimeAxis& axis, RecordedRun& 
   }
 }
 
+void put_waveforms(const JournalStory& story, RecordedRun& run) {
+  for (const json& played : story.begin.value("waveforms", json::array())) {
+    runfile::PlayedWaveform& waveform = run.waveforms[played.at("segment").get<size_t>()];
+    waveform.points = played.at("points");
+    waveform.fraction = played.at("fraction").get<std::vector<double>>();
+    const double intervals = static_cast<double>(waveform.fraction.size()) - 1;
+    for (size_t i = 0; i < waveform.fraction.size(); ++i)
+      waveform.phase.push_back(static_cast<double>(i) / intervals);
+  }
+}
+
 void put_events(const JournalStory& story, const TimeAxis& axis, RecordedRun& run) {
   for (const json& event : story.events) {
     const double time_s =
@@ -290,6 +301,7 @@ AssembledRun assemble_run(const JournalContents& journal) {
   run.rig = rig_attributes(story.begin.at("rig"));
   run.protocol_toml = story.begin.at("experiment");
   put_segments(story, axis, run);
+  put_waveforms(story, run);
   put_positions(story, axis, run);
   put_triggers(story, axis, run);
   put_events(story, axis, run);

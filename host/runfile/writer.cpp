@@ -32,6 +32,12 @@ void write_protocol(H5Sink& sink, const runfile::RecordedRun& run) {
               {"offset_mL", column(run.segments, &Segment::offset_mL)},
               {"cycles", column(run.segments, &Segment::cycles)}},
              runfile::segments_units);
+  for (const auto& [segment, waveform] : run.waveforms) {
+    const std::string group = fmt::format("{}/{}", runfile::waveforms_group, segment);
+    sink.text(group + "/points", waveform.points);
+    sink.numbers(group + "/phase", waveform.phase, "1");
+    sink.numbers(group + "/fraction", waveform.fraction, "1");
+  }
   if (run.slices.empty()) return;
   using runfile::Slice;
   sink.table(runfile::protocol_slices,

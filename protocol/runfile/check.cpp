@@ -115,6 +115,12 @@ void check_slices(const RecordedRun& run) {
 void check(const RecordedRun& run) {
   check_gaps(run);
   check_segments(run);
+  for (const auto& [segment, waveform] : run.waveforms) {
+    const std::string group = fmt::format("{}/{}", waveforms_group, segment);
+    check_times(run, group + "/phase", waveform.phase);
+    check_length(run, group + "/fraction", waveform.fraction.size(), group + "/phase", waveform.phase.size());
+    check_values(run, group + "/fraction", waveform.fraction);
+  }
   check_times(run, pump_time, run.pump.time_s);
   check_length(run, pump_commanded, run.pump.commanded_mL.size(), pump_time, run.pump.time_s.size());
   check_values(run, pump_commanded, run.pump.commanded_mL);

@@ -7,7 +7,8 @@
 //   |-- protocol
 //   |   |-- toml           scalar text: the experiment file as it was run
 //   |   |-- segments       table start_s, waveform, stroke_mL, period_s, offset_mL, cycles
-//   |   `-- slices         optional table block, slice, first_trigger, triggers, cycles, dummy_cycles
+//   |   |-- slices         optional table block, slice, first_trigger, triggers, cycles, dummy_cycles
+//   |   `-- waveforms/<segment>   of uploaded segments: points (text), phase[w], fraction[w]
 //   |-- pump               time_s[n], commanded_mL[n]
 //   |-- pressure           time_s[m], cavity_kPa[m], optionally cavity_filtered_kPa[m], pump_kPa[m]
 //   |-- trigger            time_s[k]
@@ -33,6 +34,7 @@ inline constexpr const char* protocol_group = "/protocol";
 inline constexpr const char* protocol_toml = "/protocol/toml";
 inline constexpr const char* protocol_segments = "/protocol/segments";
 inline constexpr const char* protocol_slices = "/protocol/slices";
+inline constexpr const char* waveforms_group = "/protocol/waveforms";
 inline constexpr const char* pump_group = "/pump";
 inline constexpr const char* pump_time = "/pump/time_s";
 inline constexpr const char* pump_commanded = "/pump/commanded_mL";

@@ -115,17 +115,34 @@ PressureTrace read_pressure(const H5Source& source) {
   return pressure;
 }
 
+/// The number that a group of a segment is named by.
+size_t segment_of(const H5Source& source, const std::string& group, const std::string& name) {
+  size_t segment = 0;
+  const char* end = name.data() + name.size();
+  if (std::from_chars(name.data(), end, segment).ptr != end) {
+    source.fail(fmt::format("group {}/{}", group, name), "is not named by a segment's number");
+  }
+  return segment;
+}
+
+std::map<size_t, PlayedWaveform> read_waveforms(const H5Source& source) {
+  std::map<size_t, PlayedWaveform> waveforms;
+  for (const std::string& name : source.children(waveforms_group)) {
+    const std::string group = fmt::format("{}/{}", waveforms_group, name);
+    waveforms[segment_of(source, waveforms_group, name)] = {source.text(group + "/points"),
+                                                            source.numbers(group + "/phase"),
+                                                            source.numbers(group + "/fraction")};
+  }
+  return waveforms;
+}
+
 std::map<size_t, FlowVolume> read_flow(const H5Source& source) {
   std::map<size_t, FlowVolume> flow;
   for (const std::string& name : source.children(flow_group)) {
     const std::string group = fmt::format("{}/{}", flow_group, name);
-    size_t segment = 0;
-    const char* end = name.data() + name.size();
-    if (std::from_chars(name.data(), end, segment).ptr != end) {
-      source.fail("group " + group, "is not named by a segment's number");
-    }
-    flow[segment] = {source.numbers(group + "/phase_s"), source.numbers(group + "/cavity_mL"),
-                     source.numbers(group + "/sigma_mL")};
+    flow[segment_of(source, flow_group, name)] = {source.numbers(group + "/phase_s"),
+                                                  source.numbers(group + "/cavity_mL"),
+                                                  source.numbers(group + "/sigma_mL")};
   }
   return flow;
 }
@@ -152,6 +169,7 @@ RecordedRun read_run(const std::filesystem::path& path) {
   run.rig = source.attributes(rig_group);
   run.protocol_toml = source.text(protocol_toml);
   run.segments = read_segments(source);
+  run.waveforms = read_waveforms(source);
   run.pump = {source.numbers(pump_time), source.numbers(pump_commanded)};
   run.pressure = read_pressure(source);
   run.trigger_s = source.numbers(trigger_time);

@@ -71,6 +71,13 @@ struct FlowVolume {
   std::vector<double> sigma_mL;
 };
 
+/// What the controller followed in an uploaded segment: volumes at even phases, 0 and 1 included.
+struct PlayedWaveform {
+  std::string points;  ///< the points file as it was given
+  std::vector<double> phase;
+  std::vector<double> fraction;  ///< of the stroke
+};
+
 struct RecordedRun {
   std::string file;  ///< where it was read from, for messages
   std::string run_id;
@@ -79,6 +86,7 @@ struct RecordedRun {
   std::map<std::string, Attribute, std::less<>> rig;
   std::string protocol_toml;
   std::vector<Segment> segments;
+  std::map<size_t, PlayedWaveform> waveforms;  ///< of uploaded segments, by number
   PumpTrace pump;
   PressureTrace pressure;
   std::vector<double> trigger_s;

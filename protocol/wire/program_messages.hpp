@@ -137,6 +137,10 @@ struct AddSegment {
   }
 };
 
+/// What a controller holds of uploaded waveforms, all of them together.
+inline constexpr std::uint16_t kMaxWaveformPoints = 4096;
+inline constexpr std::uint8_t kMaxWaveforms = 8;
+
 // Host → controller: a waveform of the host's own follows in lots of WaveformPoints. It has `points` points at
 // even phases, the first at phase 0, and is carried by the rises from each point to the next, the last one back
 // to the first. Waveforms are numbered from 0 in the order of their upload; ClearProgram forgets them.
@@ -159,7 +163,7 @@ struct UploadWaveform {
   static constexpr void layout([[maybe_unused]] Self& self, [[maybe_unused]] Visitor& visit) {
     visit.field("request_id", self.request_id);
     visit.field("waveform", self.waveform);
-    visit.field("points", self.points, std::uint16_t{2}, std::uint16_t{4096});
+    visit.field("points", self.points, 2U, kMaxWaveformPoints);
     visit.field("crc", self.crc);
   }
   static constexpr UploadWaveform example() {

@@ -42,6 +42,11 @@ def check(run):
         assert field in run["gaps"].dtype.names, field
     for field in ("time_s", "level", "code", "text"):
         assert field in run["events"].dtype.names, field
+    waveforms = {}
+    for segment, group in run.get("protocol/waveforms", {}).items():
+        points = group["points"][()]
+        waveforms[segment] = {"points": points.decode() if isinstance(points, bytes) else points,
+                              "phase": group["phase"][:].tolist(), "fraction": group["fraction"][:].tolist()}
     pressure_time_s = columns["pressure/time_s"]
     return {
         "samples": len(pressure_time_s),
@@ -54,6 +59,10 @@ def check(run):
         "gap_counts": [int(row["count"]) for row in run["gaps"][:]],
         "peak_commanded_mL": float(columns["pump/commanded_mL"].max()),
         "pump_interval_s": float(np.max(np.diff(columns["pump/time_s"]))),
+        "waveforms": waveforms,
+        "segment_start_s": segments["start_s"].tolist(),
+        "pump_time_s": columns["pump/time_s"].tolist(),
+        "commanded_mL": columns["pump/commanded_mL"].tolist(),
         "events": [row["code"].decode() if isinstance(row["code"], bytes) else row["code"]
                    for row in run["events"][:]],
     }

@@ -49,6 +49,24 @@ std::vector<BadInput> table() {
        },
        2,
        {"no.toml", "cannot be opened", "Check the path"}},
+      {"WaveformFileMissing",
+       [](Place place) { return simulate(place, source_text("examples/heart.experiment.toml")); },
+       2,
+       {"heart.csv", "cannot be opened", "Check the path"}},
+      {"WaveformNotClosed",
+       [](Place place) {
+         place.write("heart.csv", "phase,fraction\n0,0\n0.4,1\n1,0.2\n");
+         return simulate(place, source_text("examples/heart.experiment.toml"));
+       },
+       2,
+       {"heart.csv", "line 4", "0.2", "closes the cycle"}},
+      {"WaveformTooHard",
+       [](Place place) {
+         place.write("heart.csv", "phase,fraction\n0,0\n0.3,0.01\n0.4,1\n0.7,1\n1,0\n");
+         return simulate(place, source_text("examples/heart.experiment.toml"));
+       },
+       2,
+       {"bad.toml", "segment[0]", "limit", "asked", "acceleration", "allowed", "Reduce stroke_mL"}},
       {"NotToml",
        [](Place place) { return simulate(place, "format = diastole"); },
        2,

@@ -145,6 +145,37 @@ TEST(SimulatedSession, TheGelSessionIsWholeSoundAndReadableByOthers) {
   }
 }
 
+TEST(SimulatedSession, AnUploadedWaveformIsFollowedAndKept) {
+  const Workplace place;
+  place.write("heart.experiment.toml",
+              with(source_text("examples/heart.experiment.toml"), "cycles = 8", "cycles = 2"));
+  place.write("heart.csv", source_text("examples/heart.csv"));
+  const Ended simulated = run(place, {"diastole", "simulate", "heart.experiment.toml", "-o", "heart.run.h5",
+                                      "--pins", "pins.csv", "--json"});
+  ASSERT_EQ(simulated.exit_code, 0) << simulated.err;
+  EXPECT_EQ(simulated.json()["triggers"], 2);
+  const PinCounts pins = count_pins(place / "pins.csv");
+  EXPECT_EQ(pins.inflating_steps, 2 * std::lround(16 / microstep_mL));
+  EXPECT_EQ(pins.deflating_steps, pins.inflating_steps);
+  const Ended inspected = run(place, {"diastole", "inspect", "heart.run.h5", "--json"});
+  EXPECT_EQ(inspected.json()["sound"], true) << inspected.out;
+
+  const json seen = read_with_h5py(place, "heart.run.h5");
+  ASSERT_FALSE(seen.is_null());
+  const json waveform = seen["waveforms"]["0"];
+  EXPECT_EQ(waveform["points"], source_text("examples/heart.csv"));
+  ASSERT_EQ(waveform["phase"].size(), 49U);
+  ASSERT_EQ(waveform["fraction"].size(), 49U);
+  // The commanded volume is the waveform's at its points, to half a microstep.
+  const double start_s = seen["segment_start_s"][0];
+  for (size_t i = 0; i < seen["pump_time_s"].size(); ++i) {
+    const double point = (seen["pump_time_s"][i].get<double>() - start_s) / 1.5 * 48;
+    if (point < 0 || point > 96 || std::abs(point - std::round(point)) > 0.01) continue;
+    const double fraction = waveform["fraction"][static_cast<size_t>(std::lround(point)) % 48];
+    EXPECT_NEAR(seen["commanded_mL"][i].get<double>(), 16 * fraction, microstep_mL) << point;
+  }
+}
+
 TEST(SimulatedSession, TheSameSeedGivesTheSameRun) {
   const Workplace place;
   const std::string experiment = place.write(

@@ -11,6 +11,7 @@
 #include <span>
 
 #include "protocol/wire/faults.hpp"
+#include "protocol/wire/program_messages.hpp"
 #include "protocol/wire/result.hpp"
 
 namespace diastole::firmware {
@@ -37,8 +38,8 @@ wire::Result<UploadedWaveform, wire::Refusal> make_waveform(std::span<const std:
 
 class WaveformStore {
  public:
-  static constexpr std::size_t kPoints = 4096;
-  static constexpr std::size_t kWaveforms = 8;
+  static constexpr std::size_t kPoints = wire::kMaxWaveformPoints;
+  static constexpr std::size_t kWaveforms = wire::kMaxWaveforms;
 
   /// Forgets all waveforms.
   void clear() { waveforms_ = used_ = expected_ = 0; }
