@@ -20,6 +20,8 @@ concept BootHardware = SlotStore<H> &&
   /// Precondition: bytes.size() <= serial_room().
   {hardware.serial_write(bytes)};
   {hardware.feed_watchdog()};
+  /// Waits for the next interrupt, at most a millisecond.
+  {hardware.idle()};
   { fixed.boot_id() } -> std::same_as<std::uint32_t>;
   { fixed.reset_cause() } -> std::same_as<wire::ResetCause>;
 };
@@ -94,7 +96,10 @@ bool Bootloader<H>::told_to_stay(std::uint64_t until_us) {
   wire::FrameDecoder decoder;
   while (hardware_.now_us() < until_us) {
     const auto byte = hardware_.serial_read();
-    if (!byte) continue;
+    if (!byte) {
+      hardware_.idle();
+      continue;
+    }
     const auto outcome = decoder.push(*byte);
     if (!outcome || !outcome->ok()) continue;
     const wire::Frame& frame = outcome->value();
@@ -120,6 +125,7 @@ bool Bootloader<H>::serve_turn() {
     if (bytes.empty()) break;
     hardware_.serial_write(bytes);
   }
+  hardware_.idle();
   const std::uint64_t now_us = hardware_.now_us();
   if (leave_at_us_) return now_us < *leave_at_us_ && !link_.idle();
   if (now_us - heard_us_ < kPatience_us) return true;

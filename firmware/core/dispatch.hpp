@@ -28,7 +28,7 @@ class Dispatch {
       generation_ = link_.generation();
       schema_agreed_ = false;
     }
-    wire::visit_message(received.type, received.payload,
+    wire::visit_request(received.type, received.payload,
                         [this](const auto& message) { this->handle_or_refuse(message); });
   }
 
@@ -39,9 +39,10 @@ class Dispatch {
     if constexpr (std::is_same_v<Message, wire::HelloRequest>) {
       handle(message);
     } else if constexpr (std::is_same_v<Message, wire::Undecodable>) {
-      refuse(0, message.type, {message.known ? wire::Refusal::malformed : wire::Refusal::unknown_message});
-    } else if constexpr (wire::sender_of(Message::kType) == wire::Sender::controller) {
-      refuse(0, static_cast<std::uint8_t>(Message::kType), {wire::Refusal::unknown_message});
+      if (!message.known && wire::is_update(static_cast<wire::MessageType>(message.type)))
+        answer(wire::UpdateAnswer{0, message.type, wire::UpdateOutcome::not_in_bootloader, 0, 0});
+      else
+        refuse(0, message.type, {message.known ? wire::Refusal::malformed : wire::Refusal::unknown_message});
     } else if constexpr (wire::is_update(Message::kType)) {
       handle_update(message);
     } else if constexpr (wire::delivery_of(Message::kType) == wire::Delivery::datagram) {
@@ -144,11 +145,6 @@ class Dispatch {
     report.link_address = image.link_address;
     report.free_slot = image.slot == wire::ImageSlot::a ? wire::ImageSlot::b : wire::ImageSlot::a;
     answer(report);
-  }
-  void handle_update(const wire::StayInBootloader&) {}
-  template <class Request>
-  void handle_update(const Request& request) {
-    conclude(request, wire::UpdateOutcome::not_in_bootloader);
   }
   void handle(const wire::Configure& request) { conclude(request, motion_.configure(request)); }
   void handle(const wire::ClearProgram& request) { conclude(request, motion_.clear_program()); }

@@ -3,6 +3,7 @@
 namespace diastole {
 
 void add_host_commands(CommandLine& line) {
+  add_flash(line);
   add_daemon(line);
   add_home(line);
   add_run(line);

@@ -5,6 +5,7 @@
 
 namespace diastole {
 
+void add_flash(CommandLine& line);
 void add_daemon(CommandLine& line);
 void add_run(CommandLine& line);
 void add_status(CommandLine& line);

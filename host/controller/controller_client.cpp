@@ -202,12 +202,17 @@ void ControllerClient::greet() {
     disconnect();
     fail("does not introduce itself", "Flash it again (diastole flash), then restart the daemon.");
   }
+  if (answer.hello->schema_hash == wire::kBootloaderSchema) {
+    disconnect();
+    fail("waits in its bootloader and runs no firmware",
+         "Stop the daemon and flash one: diastole flash IMAGE --port " + rig_.controller.port);
+  }
   if (answer.hello->schema_hash != wire::kSchemaHash) {
     const wire::Hello hello = *answer.hello;
     disconnect();
     fail(fmt::format("its firmware {}.{}.{} speaks protocol {:08x}, this program {:08x}", hello.version_major,
                      hello.version_minor, hello.version_patch, hello.schema_hash, wire::kSchemaHash),
-         "Flash the firmware that belongs to this program: diastole flash IMAGE --port " +
+         "Stop the daemon and flash the firmware that belongs to this program: diastole flash IMAGE --port " +
              rig_.controller.port);
   }
   hello_ = answer.hello;

@@ -28,6 +28,11 @@ constexpr Delivery delivery_of(MessageType type) {
 /// Requests of an update (update_messages.hpp).
 constexpr bool is_update(MessageType type) { return (static_cast<std::uint8_t>(type) & 0xF0U) == 0x30; }
 
+/// Those of them that only a bootloader carries out.
+constexpr bool for_bootloader(MessageType type) {
+  return is_update(type) && type >= MessageType::BeginUpdate;
+}
+
 constexpr Sender sender_of(MessageType type) {
   switch (type) {
 #define DIASTOLE_MESSAGE(number, name, sender, delivery) \

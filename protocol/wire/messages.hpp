@@ -100,6 +100,28 @@ constexpr void visit_message(std::uint8_t type, std::span<const std::uint8_t> pa
   handler(Undecodable{type, false, {}});
 }
 
+/// As visit_message, for a controller's application: only what a host asks of it is decoded, anything else is an
+/// unknown Undecodable. An image carries no more than it needs.
+template <class Handler>
+constexpr void visit_request(std::uint8_t type, std::span<const std::uint8_t> payload, Handler&& handler) {
+  switch (static_cast<MessageType>(type)) {
+#define DIASTOLE_MESSAGE(number, name, sender, delivery)                                  \
+  case MessageType::name:                                                                 \
+    if constexpr (Sender::sender == Sender::host && !for_bootloader(MessageType::name)) { \
+      const auto message = decode<name>(payload);                                         \
+      if (message.ok())                                                                   \
+        handler(message.value());                                                         \
+      else                                                                                \
+        handler(Undecodable{type, true, message.error()});                                \
+      return;                                                                             \
+    }                                                                                     \
+    break;
+#include "protocol/wire/message_list.inc"
+#undef DIASTOLE_MESSAGE
+  }
+  handler(Undecodable{type, false, {}});
+}
+
 /// Lambdas as one handler for visit_message.
 template <class... Lambdas>
 struct overloaded : Lambdas... {

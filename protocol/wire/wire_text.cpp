@@ -41,6 +41,12 @@ constexpr Words kRunEnds[] = {
 #undef DIASTOLE_RUN_END
 };
 
+constexpr Words kUpdateOutcomes[] = {
+#define DIASTOLE_UPDATE_OUTCOME(number, name, explanation, remedy) {#name, explanation, remedy},
+#include "protocol/wire/update_outcome_list.inc"
+#undef DIASTOLE_UPDATE_OUTCOME
+};
+
 template <class Enum, std::size_t N>
 const Words& words_of(const Words (&table)[N], Enum number) {
   static constexpr Words kUnknown{"unknown", "A number that this program does not know.",
@@ -61,5 +67,11 @@ std::string_view limit_unit(Limit limit) { return words_of(kLimits, limit).expla
 std::string_view state_name(State state) { return words_of(kStates, state).name; }
 std::string_view waveform_name(Waveform waveform) { return words_of(kWaveforms, waveform).name; }
 std::string_view run_end_name(RunEnd reason) { return words_of(kRunEnds, reason).name; }
+std::string_view update_outcome_explanation(UpdateOutcome outcome) {
+  return words_of(kUpdateOutcomes, outcome).explanation;
+}
+std::string_view update_outcome_remedy(UpdateOutcome outcome) {
+  return words_of(kUpdateOutcomes, outcome).remedy;
+}
 
 }  // namespace diastole::wire

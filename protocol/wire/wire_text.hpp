@@ -5,6 +5,7 @@
 
 #include "protocol/wire/faults.hpp"
 #include "protocol/wire/states.hpp"
+#include "protocol/wire/update.hpp"
 
 namespace diastole::wire {
 
@@ -19,5 +20,8 @@ std::string_view limit_unit(Limit limit);
 std::string_view state_name(State state);
 std::string_view waveform_name(Waveform waveform);
 std::string_view run_end_name(RunEnd reason);
+/// "{}" in it stands for UpdateAnswer.value.
+std::string_view update_outcome_explanation(UpdateOutcome outcome);
+std::string_view update_outcome_remedy(UpdateOutcome outcome);
 
 }  // namespace diastole::wire

@@ -26,12 +26,15 @@ firmware::RunningImage running_image() {
   image.version = header->version;
   image.build_id = header->build_id;
   image.code_bytes = header->code_bytes;
-  image.standing = wire::Standing::unrecorded;
-  if (read_hand_over().value_or(HandOver{}).trial != 0) image.standing = wire::Standing::on_trial;
+  boot::BootEvent last = boot::BootEvent::none;
   boot::for_each_record(slots.records(), [&](const boot::BootRecord& record) {
-    if (record == boot::BootRecord{boot::BootEvent::confirmed, image.slot, boot::tag_of(*header)})
-      image.standing = wire::Standing::confirmed;
+    if (record.slot == image.slot && record.tag == boot::tag_of(*header)) last = record.event;
   });
+  const bool trial = read_hand_over().value_or(HandOver{}).trial != 0;
+  image.standing = last == boot::BootEvent::confirmed ? wire::Standing::confirmed
+                   : trial                            ? wire::Standing::on_trial
+                   : last == boot::BootEvent::tried   ? wire::Standing::failed
+                                                      : wire::Standing::unrecorded;
   return image;
 }
 

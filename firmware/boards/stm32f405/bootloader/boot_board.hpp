@@ -18,6 +18,7 @@ class BootBoard : public FlashSlots {
   void serial_write(std::span<const std::uint8_t> bytes) { serial_.write(bytes); }
   /// Starts the watchdog at the first call.
   void feed_watchdog();
+  void idle() { asm volatile("wfi" ::: "memory"); }
   [[nodiscard]] std::uint32_t boot_id() const { return boot_id_; }
   [[nodiscard]] wire::ResetCause reset_cause() const { return reset_cause_; }
 

@@ -1,0 +1,144 @@
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <csignal>
+#include <cstdio>
+#include <iostream>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "host/cli/host_commands.hpp"
+#include "host/flash/updater.hpp"
+#include "host/transport/serial_port.hpp"
+
+namespace diastole {
+namespace {
+
+volatile std::sig_atomic_t interrupted = 0;
+
+struct FlashOptions {
+  std::string image;
+  std::string port;
+  unsigned baud = 460'800;
+  UpdateOptions update;
+};
+
+/// A bar that renews itself on a terminal, a line each quarter otherwise. On standard error.
+class ProgressBar {
+ public:
+  void show(uint32_t held, uint32_t total) {
+    constexpr uint32_t width = 40;
+    const uint32_t percent = total == 0 ? 100 : static_cast<uint32_t>(uint64_t{held} * 100 / total);
+    if (terminal_) {
+      const std::string done(percent * width / 100, '#');
+      fmt::print(stderr, "\r[{:<{}}] {:>3} %  {} of {} bytes", done, width, percent, held, total);
+      if (held == total) fmt::print(stderr, "\n");
+      std::fflush(stderr);
+    } else if (percent / 25 > quarter_) {
+      quarter_ = percent / 25;
+      fmt::print(stderr, "{} of {} bytes\n", held, total);
+    }
+  }
+  void say(const std::string& words) const { fmt::print(stderr, "{}\n", words); }
+
+ private:
+  bool terminal_ = isatty(STDERR_FILENO) != 0;
+  uint32_t quarter_ = 0;
+};
+
+std::string told(const UpdateResult& result, const UpdateFile& file) {
+  switch (result.end) {
+    case UpdateEnd::confirmed:
+      return fmt::format("version {} runs and is confirmed", in_words(file.version));
+    case UpdateEnd::already_there:
+      return fmt::format("nothing to do: the controller runs this very build of {} (--force sends it again)",
+                         in_words(file.version));
+    case UpdateEnd::dry_run:
+      return fmt::format("would install version {}; nothing was changed", in_words(file.version));
+    case UpdateEnd::stopped:
+      return fmt::format(
+          "stopped at {} of {} bytes, which stay there; the controller keeps its firmware. The same "
+          "command goes on from here.",
+          result.held_bytes, result.image_bytes);
+  }
+  return {};
+}
+
+const char* name_of(UpdateEnd end) {
+  switch (end) {
+    case UpdateEnd::confirmed:
+      return "confirmed";
+    case UpdateEnd::already_there:
+      return "already_there";
+    case UpdateEnd::dry_run:
+      return "dry_run";
+    case UpdateEnd::stopped:
+      return "stopped";
+  }
+  return "";
+}
+
+ExitCode flash(FlashOptions options, const CommandOutput& out) {
+  const auto began = std::chrono::steady_clock::now();
+  const UpdateFile file = read_update_file(options.image);
+  SerialPort line(options.port, options.baud);
+  RealClock clock;
+  ProgressBar bar;
+  interrupted = 0;
+  std::signal(SIGINT, [](int) { interrupted = 1; });
+  std::signal(SIGTERM, [](int) { interrupted = 1; });
+  options.update.stop_asked = [] { return interrupted != 0; };
+  options.update.progress = [&bar](uint32_t held, uint32_t total) { bar.show(held, total); };
+  options.update.say = [&bar](const std::string& words) { bar.say(words); };
+  const UpdateResult result = Updater(clock, line, options.port).flash(file, options.update);
+  std::signal(SIGINT, SIG_DFL);
+  std::signal(SIGTERM, SIG_DFL);
+  const double wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
+  if (out.json) {
+    nlohmann::json document{{"image", file.file},
+                            {"version", in_words(file.version)},
+                            {"build", fmt::format("{:016x}", file.build_id)},
+                            {"result", name_of(result.end)},
+                            {"bytes", result.image_bytes},
+                            {"sent_bytes", result.sent_bytes},
+                            {"verified", result.verified},
+                            {"seconds", wall_s}};
+    document["version_before"] = result.before ? nlohmann::json(in_words(*result.before)) : nlohmann::json();
+    std::cout << document.dump(2) << '\n';
+  } else {
+    fmt::print("{} ({:.1f} s)\n", told(result, file), wall_s);
+  }
+  return result.end == UpdateEnd::stopped ? ExitCode::negative : ExitCode::done;
+}
+
+}  // namespace
+
+void add_flash(CommandLine& line) {
+  auto options = std::make_shared<FlashOptions>();
+  CLI::App* command = line.add(
+      "flash", "program the controller over its serial line, verify, start and confirm it",
+      "  diastole flash build/firmware/bin/diastole-stm32f405.image --port /dev/ttyUSB0\n"
+      "      sends the image to the slot that is free, has the controller verify it, starts it on\n"
+      "      trial and confirms it; whatever goes wrong, the controller keeps what it ran\n"
+      "  diastole flash diastole-stm32f405.image --port /dev/ttyUSB0 --dry-run\n"
+      "      compares versions and changes nothing\n"
+      "Stop the daemon first: it has the port. Interrupted (Ctrl-C, cable, power), the same command goes\n"
+      "on where it stopped. A controller that does not answer is caught in its bootloader while you reset\n"
+      "it. Exit code 1: stopped by Ctrl-C; 2: the file is not for this controller; 3: it does not answer,\n"
+      "or came back with its former firmware.");
+  command->add_option("IMAGE", options->image, "update file (.image)")->required();
+  command->add_option("--port", options->port, "the controller's serial port")->required();
+  command->add_option("--baud", options->baud, "its rate")->capture_default_str();
+  command->add_flag("--allow-older", options->update.allow_older,
+                    "also an older version than the one that runs");
+  command->add_flag("--force", options->update.force, "also what it already runs, or an older version");
+  command->add_flag("--dry-run", options->update.dry_run, "say what would be done");
+  line.on_run(command, [options](const CommandOutput& out) {
+    options->update.allow_older = options->update.allow_older || options->update.force;
+    return flash(*options, out);
+  });
+}
+
+}  // namespace diastole

@@ -1,0 +1,106 @@
+#include "host/flash/update_file.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <fstream>
+#include <iterator>
+#include <span>
+
+#include "protocol/contract/input_error.hpp"
+#include "protocol/wire/update_file.hpp"
+
+namespace diastole {
+namespace {
+
+using Bytes = std::span<const uint8_t>;
+
+[[noreturn]] void refuse(
+    const std::string& file, std::string place, std::string problem,
+    std::string remedy = "Build it again (cmake --build --preset firmware), or fetch it again.") {
+  throw InputError({file, std::move(place), std::move(problem), std::move(remedy)});
+}
+
+void check_frame(const std::string& file, Bytes bytes) {
+  using wire::detail::get_little;
+  if (bytes.size() < wire::kUpdateFileHeadBytes ||
+      !std::equal(wire::kUpdateFileMagic.begin(), wire::kUpdateFileMagic.end(), bytes.begin())) {
+    refuse(file, "offset 0", "is no update file: it does not begin with \"DIASTOLE\"",
+           "Give build/firmware/bin/diastole-stm32f405.image; .bin, .hex and .elf are for SWD tools.");
+  }
+  if (const auto version = get_little<uint16_t>(bytes.subspan(8)); version != wire::kUpdateFileVersion) {
+    refuse(file, "offset 8",
+           fmt::format("is an update file of version {}, and this program knows {}", version,
+                       wire::kUpdateFileVersion),
+           "Update the host programs.");
+  }
+  const auto size = get_little<uint32_t>(bytes.subspan(12));
+  if (size != bytes.size() || size < wire::kUpdateFileHeadBytes + sizeof(wire::Digest)) {
+    refuse(file, "offset 12", fmt::format("should have {} bytes and has {}", size, bytes.size()));
+  }
+  const Bytes before = bytes.first(bytes.size() - sizeof(wire::Digest));
+  if (!std::ranges::equal(wire::sha256(before), bytes.last(sizeof(wire::Digest)))) {
+    refuse(file, fmt::format("offset {}", before.size()), "is damaged: its SHA-256 does not match");
+  }
+}
+
+/// Takes one image off the front of `rest`.
+SlotImage take_image(const std::string& file, Bytes& rest, size_t index) {
+  const std::string place = fmt::format("image {}", index);
+  if (rest.size() < wire::kImageHeaderBytes) refuse(file, place, "is missing");
+  const auto header = wire::decode_image_header(rest.first<wire::kImageHeaderBytes>());
+  if (!header) refuse(file, place, "has a damaged header");
+  rest = rest.subspan(wire::kImageHeaderBytes);
+  if (rest.size() < header->code_bytes) {
+    refuse(file, place,
+           fmt::format("should have {} bytes of code and has {}", header->code_bytes, rest.size()));
+  }
+  const Bytes code = rest.first(header->code_bytes);
+  rest = rest.subspan(header->code_bytes);
+  if (wire::digest_of(*header, code) != header->sha256) {
+    refuse(file, place, "is damaged: its SHA-256 does not match");
+  }
+  return {*header, {code.begin(), code.end()}};
+}
+
+}  // namespace
+
+UpdateFile parse_update_file(const std::string& file, const std::vector<uint8_t>& bytes) {
+  check_frame(file, bytes);
+  UpdateFile update{file, {}, 0, 0, {}};
+  const auto count = wire::detail::get_little<uint16_t>(std::span(bytes).subspan(10));
+  Bytes rest = Bytes(bytes).subspan(wire::kUpdateFileHeadBytes);
+  rest = rest.first(rest.size() - sizeof(wire::Digest));
+  for (size_t i = 0; i < count; ++i)
+    update.images.push_back(take_image(file, rest, i));
+  if (update.images.empty() || !rest.empty())
+    refuse(file, "offset 10", "does not hold the images it tells of");
+  const wire::ImageHeader& first = update.images.front().header;
+  update.version = first.version;
+  update.board_id = first.board_id;
+  update.build_id = first.build_id;
+  for (const SlotImage& image : update.images) {
+    if (image.header.version != update.version || image.header.board_id != update.board_id ||
+        image.header.build_id != update.build_id) {
+      refuse(file, "images", "are not of one build");
+    }
+  }
+  return update;
+}
+
+UpdateFile read_update_file(const std::string& file) {
+  std::ifstream stream(file, std::ios::binary);
+  if (!stream) {
+    refuse(
+        file, "", "cannot be read",
+        "Give the update file, such as build/firmware/bin/diastole-stm32f405.image (cmake --preset firmware "
+        "and cmake --build --preset firmware make it).");
+  }
+  return parse_update_file(file, {std::istreambuf_iterator<char>(stream), {}});
+}
+
+std::string in_words(wire::FirmwareVersion version) {
+  return fmt::format("{}.{}.{}", version.major, version.minor, version.patch);
+}
+
+}  // namespace diastole

@@ -1,0 +1,75 @@
+#pragma once
+// Replacing the controller's firmware, from the first question to the confirmation:
+//
+//   Updater updater(clock, line, "/dev/ttyUSB0");
+//   UpdateResult result = updater.flash(read_update_file("diastole-stm32f405.image"), options);
+//
+// Throws InputError if the file is not for this controller, HardwareError if the controller does not answer or does
+// not do what it should; either way it still has a firmware that starts. What was sent stays: the same call again
+// goes on from there.
+
+#include <functional>
+#include <optional>
+#include <string>
+
+#include "host/flash/update_file.hpp"
+#include "host/flash/update_link.hpp"
+
+namespace diastole {
+
+struct UpdateOptions {
+  bool allow_older = false;
+  bool force = false;  ///< also what it already runs
+  bool dry_run = false;
+  /// Bytes in the slot, and bytes in all; called as they grow.
+  std::function<void(uint32_t held, uint32_t total)> progress = [](uint32_t, uint32_t) {};
+  /// What is happening, for a person.
+  std::function<void(const std::string&)> say = [](const std::string&) {};
+  /// True ends the upload at the next chance.
+  std::function<bool()> stop_asked = [] { return false; };
+};
+
+enum class UpdateEnd { confirmed, already_there, dry_run, stopped };
+
+struct UpdateResult {
+  UpdateEnd end = UpdateEnd::confirmed;
+  std::optional<wire::FirmwareVersion> before;  ///< what ran; nothing if only the bootloader did
+  uint32_t image_bytes = 0;                     ///< code of the image
+  uint32_t sent_bytes = 0;                      ///< less than image_bytes if it was resumed
+  uint32_t held_bytes = 0;                      ///< in the slot when it ended
+  bool verified = false;                        ///< read back by the controller, hash equal
+};
+
+class Updater {
+ public:
+  /// `port` is for messages.
+  Updater(Clock& clock, ByteLine& line, std::string port) : link_(clock, line), port_(std::move(port)) {}
+
+  UpdateResult flash(const UpdateFile& file, const UpdateOptions& options);
+
+ private:
+  struct Greeting {
+    wire::Hello hello;
+    bool bootloader = false;
+  };
+
+  Greeting find_controller(const UpdateOptions& options);
+  std::optional<Greeting> greet(uint64_t patience_ns);
+  bool wanted(const UpdateFile& file, const Greeting& found, const UpdateOptions& options,
+              UpdateResult& result);
+  void enter_bootloader();
+  const SlotImage& image_for_free_slot(const UpdateFile& file);
+  bool upload(const SlotImage& image, const UpdateFile& file, const UpdateOptions& options,
+              UpdateResult& result);
+  wire::UpdateOutcome send_image(const SlotImage& image, const UpdateFile& file, const UpdateOptions& options,
+                                 UpdateResult& result, bool& stopped);
+  void confirm(const UpdateFile& file);
+  wire::UpdateAnswer need(std::optional<wire::UpdateAnswer> answer, const char* action) const;
+  [[noreturn]] void refused(const UpdateFile& file, const wire::UpdateAnswer& answer) const;
+  [[noreturn]] void fail(std::string problem, std::string remedy) const;
+
+  UpdateLink link_;
+  std::string port_;
+};
+
+}  // namespace diastole
