@@ -3,7 +3,6 @@
 // bit on host and target: integer arithmetic, and the single-precision square root, which IEEE 754 rounds
 // correctly everywhere (VSQRT.F32 on the Cortex-M4F).
 
-#include <bit>
 #include <cstdint>
 
 namespace diastole::firmware {
@@ -37,18 +36,6 @@ constexpr std::uint64_t scale(std::uint64_t whole, Q64 fraction) {
 /// Square root with a relative error below 2^-44: a seed from the 24 leading bits, then one Newton step on
 /// the exact remainder, √n = r + (n - r²) / 2r. The step is below 2^9 last places of r, so single precision has
 /// digits enough for it. Precondition: fraction <= 1 - 2^-32.
-inline Q64 square_root(Q64 fraction) {
-  if (fraction == 0) return 0;
-  const int shift = std::countl_zero(fraction) & ~1;
-  const Q64 normal = fraction << shift;
-  const float seed = __builtin_sqrtf(static_cast<float>(static_cast<std::uint32_t>(normal >> 40)));
-  const auto root = static_cast<std::uint32_t>(seed * 0x1p20F);
-  const auto remainder = static_cast<std::int64_t>(normal - std::uint64_t{root} * root);
-  const float step =
-      static_cast<float>(static_cast<std::int32_t>(remainder >> 12)) / static_cast<float>(root);
-  const auto correction = static_cast<std::int32_t>(step * 0x1p31F);
-  const Q64 refined = (Q64{root} << 32) + (static_cast<Q64>(std::int64_t{correction}) << 12);
-  return refined >> (shift / 2);
-}
+Q64 square_root(Q64 fraction);
 
 }  // namespace diastole::firmware

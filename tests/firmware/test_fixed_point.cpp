@@ -50,6 +50,18 @@ TEST(FixedPoint, SquareRootIsGoodTo44Bits) {
   EXPECT_EQ(square_root(kHalf >> 1), kHalf);
 }
 
+TEST(FixedPoint, SquareRootJustBelowEveryPowerOfFourDoesNotOverflow) {
+  for (int places = 0; places < 60; places += 2) {
+    const Q64 power = places == 0 ? 0 : Q64{1} << (64 - places);
+    for (Q64 distance = places == 0 ? Q64{1} << 32 : 1; distance < (~Q64{0} >> places) / 4; distance *= 2) {
+      const Q64 fraction = power - distance;
+      const long double exact = std::sqrt(static_cast<long double>(fraction) / kOne);
+      const long double root = static_cast<long double>(square_root(fraction)) / kOne;
+      ASSERT_LE(std::abs(root - exact), exact * 0x1p-44L + 1 / kOne) << fraction;
+    }
+  }
+}
+
 TEST(FixedPoint, SquareRootNearOneDoesNotOverflow) {
   for (std::uint64_t distance = 1ULL << 32; distance < 1ULL << 60; distance *= 3) {
     const long double exact = std::sqrt(1 - static_cast<long double>(distance) / kOne);

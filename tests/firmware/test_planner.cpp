@@ -78,6 +78,12 @@ TEST_P(EveryMotion, StepsAreTheAnalyticCrossingsRoundedToATick) {
   expect_analytic_steps(GetParam(), 16'000'000, 60'000'000);
 }
 
+/// Among these are levels whose crossing is a short binary fraction of the period.
+TEST_P(EveryMotion, StepsOfEveryStrokeAreTheAnalyticCrossings) {
+  for (std::uint32_t steps = 1; steps <= 256; steps += steps < 40 ? 1 : 12)
+    ASSERT_NO_FATAL_FAILURE(expect_analytic_steps(GetParam(), steps * 7'792, 4'000'000)) << steps << " steps";
+}
+
 TEST(Planner, AHoldStaysAtOffsetAndStrokeAndTriggersEachCycle) {
   const Program program = program_of({{Waveform::hold, 3, 30'000'000, 5'000'000, 200'000},
                                       {Waveform::parabolic, 1, 1'000'000, 0, 500'000},

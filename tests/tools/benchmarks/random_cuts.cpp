@@ -53,8 +53,9 @@ class RandomCuts {
     EXPECT_TRUE(session_.prepare(quick_to_stop_and_home()));
     session_.flood = true;
     for (int trial = 0; trial < trials && !testing::Test::HasFailure(); ++trial) {
-      SCOPED_TRACE(testing::Message() << "trial " << trial);
-      cut(random_motion(), static_cast<Input>(below(3)));
+      const StepRateTrial motion = random_motion();
+      SCOPED_TRACE(testing::Message() << "trial " << trial << ", " << motion);
+      cut(motion, static_cast<Input>(below(3)));
       recover();
     }
     return figures_;

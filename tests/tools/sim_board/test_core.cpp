@@ -44,6 +44,14 @@ TEST(Core, FloatRegistersSurviveInterrupts) {
   EXPECT_EQ(seen(board, 3) & 4, 4U) << "CONTROL.FPCA";
 }
 
+TEST(Core, FlagsSurviveInterrupts) {
+  BOARD_WITH(board, "carries");
+  board.advance_to(200 * ms);
+  ASSERT_EQ(seen(board, 2), 1U);
+  EXPECT_GT(seen(board, 0), 1'000U) << "interrupts";
+  EXPECT_EQ(seen(board, 1), 0U) << "carries lost";
+}
+
 TEST(Core, FloatBeforeTheFpuIsEnabledFaults) {
   BOARD_WITH(board, "early_float");
   board.advance_to(ms);
