@@ -31,6 +31,13 @@ void show_status(const nlohmann::json& status, bool as_json) {
   fmt::print("firmware  {} at {}\n", status.at("firmware").get<std::string>(),
              status.at("controller").get<std::string>());
   fmt::print("pressure  {}\n", status.at("instrument").get<std::string>());
+  std::string inputs;
+  for (const nlohmann::json& input : status.at("inputs"))
+    inputs += (inputs.empty() ? "" : ", ") + input.get<std::string>();
+  fmt::print("inputs    {}; motor {}; {} triggers since reset\n",
+             inputs.empty() ? "none active" : inputs + " active",
+             status.at("motor_powered").get<bool>() ? "powered" : "off",
+             status.at("triggers").get<uint32_t>());
 }
 
 /// A command that asks the daemon one question and shows the rig's state.

@@ -4,8 +4,10 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 #include <unistd.h>
+#include <array>
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <ctime>
 
@@ -65,6 +67,15 @@ json attributes_as_json(const std::map<std::string, runfile::Attribute, std::les
     std::visit([&, key = name](const auto& v) { object[key] = v; }, value);
   }
   return object;
+}
+
+/// Names of the bits that are set in wire::Status::inputs; an input is active when pressed, closed or unplugged.
+json active_inputs(uint8_t bits) {
+  constexpr std::array names{"estop", "home", "far_limit"};
+  json active = json::array();
+  for (size_t i = 0; i < names.size(); ++i)
+    if ((bits >> i & 1U) != 0) active.push_back(names[i]);
+  return active;
 }
 
 json planned_segments(const Experiment& experiment, const ProgramPlan& plan) {
@@ -382,6 +393,8 @@ json RigService::remember(const wire::Status& status) {
       {"board", hello.board_id},
       {"boot_id", hello.boot_id},
       {"position_mL", position_mL},
+      {"inputs", active_inputs(status.inputs)},
+      {"motor_powered", (status.inputs & 8U) != 0},
       {"triggers", status.triggers},
       {"steps", status.steps},
       {"link", {{"crc_errors", status.crc_errors}, {"retransmissions", status.retransmissions}}},

@@ -79,6 +79,16 @@ TEST(Daemon, AnOrderWhileAnotherIsBeingLoadedIsRefusedAndNotQueued) {
   other.call("run.stop", {{"how", "now"}});
 }
 
+TEST(Daemon, StatusTellsInputsAndMotor) {
+  RigWithDaemon rig(RigWithDaemon::Time::conducted);
+  rig.start_daemon();
+  const auto ask = [&] { return run(rig.place, {"diastole", "status", "--socket", rig.path("socket")}); };
+  EXPECT_THAT(ask().out, HasSubstr("inputs    none active; motor off; 0 triggers"));
+  auto client = rig.client();
+  home(client);
+  EXPECT_THAT(ask().out, HasSubstr("inputs    none active; motor powered; 0 triggers"));
+}
+
 TEST(Daemon, AHomingPumpTellsWhereItIsAndStopsWhenAsked) {
   const std::string slow = with(source_text("examples/rig.toml"), "microsteps = 8\n",
                                 "microsteps = 8\n[controller.limits]\nhoming_flow_mL_s = 0.2\n");
