@@ -18,6 +18,8 @@ constexpr uint64_t block_span_ns = 100'000'000;
 constexpr double start_patience_s = 2;  // for RunStarted
 constexpr uint64_t tail_ns = 250'000'000;
 constexpr double end_patience_s = 10;  // for RunEnded, beyond the plan
+constexpr double stop_patience_s = 5;  // for RunEnded, after the journal failed
+constexpr const char* journal_failed = "journal_failed";
 
 }  // namespace
 
@@ -34,13 +36,18 @@ RunOutcome Acquisition::run(const Hooks& hooks) {
   write(RecordKind::document, json{{"record", "grid"}, {"first_due_ns", grid.first_due_ns}}.dump());
   for (const std::string& warning : setup_.warnings)
     remark("warning", "instrument", warning);
-  if (!ended_) controller_.start();
+  if (outcome_.end.empty()) {
+    controller_.start();
+  } else {
+    ended_ = true;
+  }
   while (!ended_)
     turn();
   take_samples(samples_.finish(tail_until_ns_.value_or(clock_.now_ns())));
   end_missing();
   close_block();
   write(RecordKind::document, json{{"record", "end"}}.dump());
+  ended_ = true;
   if (!journal_.sync()) fail_journal();
   hooks_.progress(outcome_.counts);
   return outcome_;
@@ -215,18 +222,22 @@ void Acquisition::write(RecordKind kind, const auto& payload) {
 }
 
 void Acquisition::fail_journal() {
-  if (outcome_.end == "journal_failed") return;
-  hooks_.remark({"error", "journal_failed", journal_.problem()});
-  if (!ended_) controller_.stop_now();
-  end("journal_failed");
+  if (outcome_.end == journal_failed) return;
+  outcome_.end = journal_failed;
+  hooks_.remark({"error", journal_failed, journal_.problem() + "; the pump is being stopped"});
+  if (ended_) return;
+  controller_.stop_now();
+  deadline_ns_ = clock_.now_ns() + static_cast<uint64_t>(stop_patience_s * ns_per_s);
+  tail_until_ns_.reset();
 }
 
 void Acquisition::end(std::string how) {
-  if (outcome_.end.empty() || how == "journal_failed") outcome_.end = std::move(how);
+  if (outcome_.end.empty()) outcome_.end = std::move(how);
   ended_ = true;
 }
 
 void Acquisition::end_after_tail(std::string how) {
+  if (outcome_.end == journal_failed) return end(std::move(how));
   outcome_.end = std::move(how);
   tail_until_ns_ = clock_.now_ns() + tail_ns;
 }

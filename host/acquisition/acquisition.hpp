@@ -67,7 +67,8 @@ class Acquisition {
     std::function<void(const RunRemark&)> remark = [](const RunRemark&) {};
   };
 
-  /// Starts the armed program and returns when it has ended, one way or another.
+  /// Starts the armed program and returns when it has ended, one way or another. When the disk takes no more
+  /// ("journal_failed"), it has the pump stopped under control and waits for that.
   RunOutcome run(const Hooks& hooks);
 
  private:

@@ -67,9 +67,10 @@ void sync_directory(const std::filesystem::path& file) {
 
 }  // namespace
 
-JournalWriter::JournalWriter(const std::filesystem::path& path, Flush flush)
+JournalWriter::JournalWriter(const std::filesystem::path& path, Flush flush, Write write)
     : path_(path),
       flush_(std::move(flush)),
+      write_(std::move(write)),
       file_(::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_APPEND | O_CLOEXEC, 0644)) {
   if (!file_.valid()) {
     throw HardwareError(path.string(), fmt::format("the journal cannot be created: {}", std::strerror(errno)),
@@ -95,7 +96,7 @@ bool JournalWriter::append(RecordKind kind, std::span<const uint8_t> payload) {
   put_u32(record_, crc32c(record_));
   ssize_t written = -1;
   do {
-    written = ::write(file_.get(), record_.data(), record_.size());
+    written = write_(file_.get(), record_.data(), record_.size());
   } while (written < 0 && errno == EINTR);
   if (written != static_cast<ssize_t>(record_.size())) {
     fail("written", written < 0 ? errno : ENOSPC);

@@ -47,9 +47,11 @@ class JournalWriter {
  public:
   /// As fdatasync(2): 0, or -1 and errno.
   using Flush = std::function<int(int descriptor)>;
+  /// As write(2): the number of bytes taken, or -1 and errno.
+  using Write = std::function<ssize_t(int descriptor, const void* bytes, size_t size)>;
 
   /// Creates the file; it must not exist. Throws HardwareError if it cannot be created.
-  explicit JournalWriter(const std::filesystem::path& path, Flush flush = ::fdatasync);
+  explicit JournalWriter(const std::filesystem::path& path, Flush flush = ::fdatasync, Write write = ::write);
   ~JournalWriter();
 
   /// Appends one record. False if the disk did not take it whole (full, failed), or failed to flush what came
@@ -70,6 +72,7 @@ class JournalWriter {
 
   std::filesystem::path path_;
   Flush flush_;
+  Write write_;
   Descriptor file_;
   uint32_t sequence_ = 0;
   std::vector<uint8_t> record_;

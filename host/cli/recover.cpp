@@ -5,8 +5,11 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "host/acquisition/journal_store.hpp"
 #include "host/cli/host_commands.hpp"
 #include "host/runfile/assemble.hpp"
+#include "host/runfile/journal_story.hpp"
+#include "host/runfile/output_guard.hpp"
 #include "host/runfile/writer.hpp"
 #include "protocol/contract/input_error.hpp"
 
@@ -17,13 +20,61 @@ struct RecoverOptions {
   std::string journal;
   std::string output;
   bool force = false;
+  bool list = false;
 };
 
-ExitCode recover(const RecoverOptions& options, const CommandOutput& out) {
-  if (std::filesystem::exists(options.output) && !options.force) {
-    throw InputError(
-        {options.output, "", "exists already", "Choose another name, or --force to replace it."});
+/// What `diastole recover --list` tells of one journal.
+nlohmann::json describe(const StoredJournal& stored) {
+  nlohmann::json told{{"journal", stored.file.string()},
+                      {"bytes", stored.bytes},
+                      {"run_file", nullptr},
+                      {"started_utc", nullptr},
+                      {"complete", false}};
+  if (stored.has_run_file) told["run_file"] = run_file_beside(stored.file).string();
+  try {
+    const JournalStory story = read_story(read_journal(stored.file));
+    told["started_utc"] = story.begin.value("started_utc", "");
+    told["experiment"] = story.begin.value("experiment_file", "");
+    told["complete"] = story.closed;
+  } catch (const InputError& error) {
+    told["problem"] = error.fault().problem;
   }
+  return told;
+}
+
+ExitCode list(const std::string& directory, const CommandOutput& out) {
+  if (!std::filesystem::is_directory(directory)) {
+    throw InputError(
+        {directory, "", "is no directory", "Name the daemon's journal_dir; `diastole status` tells it."});
+  }
+  nlohmann::json journals = nlohmann::json::array();
+  for (const StoredJournal& stored : stored_journals(directory))
+    journals.push_back(describe(stored));
+  if (out.json) {
+    std::cout << nlohmann::json{{"directory", directory}, {"journals", journals}}.dump(2) << '\n';
+    return ExitCode::done;
+  }
+  for (const nlohmann::json& journal : journals) {
+    fmt::print(
+        "{}\n  {}, {}, {:.1f} MB\n  {}\n", journal["journal"].get<std::string>(),
+        journal["started_utc"].is_null() ? journal.value("problem", "")
+                                         : journal["started_utc"].get<std::string>(),
+        journal["complete"] == true ? "closed in order" : "broke off", 1e-6 * journal["bytes"].get<double>(),
+        journal["run_file"].is_null()
+            ? "no run file: diastole recover " + journal["journal"].get<std::string>() + " -o NAME.run.h5"
+            : journal["run_file"].get<std::string>());
+  }
+  if (journals.empty()) fmt::print("{} holds no journal\n", directory);
+  return ExitCode::done;
+}
+
+ExitCode recover(const RecoverOptions& options, const CommandOutput& out) {
+  if (options.list) return list(options.journal.empty() ? "journals" : options.journal, out);
+  if (options.journal.empty() || options.output.empty()) {
+    throw InputError({"", options.journal.empty() ? "JOURNAL" : "-o", "is missing",
+                      "For example: diastole recover JOURNAL -o NAME.run.h5; --list shows the journals."});
+  }
+  check_output(options.output, options.force, {options.journal});
   const JournalContents journal = read_journal(options.journal);
   const AssembledRun assembled = assemble_run(journal);
   write_run(options.output, assembled.run);
@@ -51,9 +102,12 @@ void add_recover(CommandLine& line) {
   auto options = std::make_shared<RecoverOptions>();
   CLI::App* command = line.add("recover", "rebuild a run file from its journal after a crash",
                                "  diastole recover journals/5e0c....journal -o gel.run.h5\n"
+                               "  diastole recover --list /var/lib/diastole/journals\n"
+                               "      the daemon's journals, whether each is whole and has its run file\n"
                                "Exit code 1: the run file is sound in itself, but something is lost.");
-  command->add_option("JOURNAL", options->journal, "journal of the daemon")->required();
-  command->add_option("-o,--output", options->output, "run file to write")->required();
+  command->add_option("JOURNAL", options->journal, "journal of the daemon; with --list their directory");
+  command->add_option("-o,--output", options->output, "run file to write");
+  command->add_flag("--list", options->list, "tell what journals there are");
   command->add_flag("--force", options->force, "replace the run file if it exists");
   line.on_run(command, [options](const CommandOutput& out) { return recover(*options, out); });
 }

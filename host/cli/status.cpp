@@ -13,6 +13,18 @@ namespace {
 
 constexpr std::chrono::seconds homing_patience{3600};
 
+void show_journals(const nlohmann::json& journals) {
+  const auto days = journals.at("keep_days").get<int64_t>();
+  fmt::print(
+      "journals  {}, {:.1f} MB in {}; {}\n", journals.at("count").get<int64_t>(),
+      1e-6 * journals.at("bytes").get<double>(), journals.at("directory").get<std::string>(),
+      days == 0 ? "kept for ever" : fmt::format("kept for {} days after their run file was written", days));
+  if (const auto open = journals.at("without_run_file").get<int64_t>(); open > 0) {
+    fmt::print("          {} without a run file: diastole recover --list {}\n", open,
+               journals.at("directory").get<std::string>());
+  }
+}
+
 void show_status(const nlohmann::json& status, bool as_json) {
   if (as_json) {
     std::cout << status.dump(2) << '\n';
@@ -38,6 +50,9 @@ void show_status(const nlohmann::json& status, bool as_json) {
              inputs.empty() ? "none active" : inputs + " active",
              status.at("motor_powered").get<bool>() ? "powered" : "off",
              status.at("triggers").get<uint32_t>());
+  if (const nlohmann::json journals = status.value("journals", nlohmann::json()); !journals.is_null()) {
+    show_journals(journals);
+  }
 }
 
 /// A command that asks the daemon one question and shows the rig's state.

@@ -139,10 +139,11 @@ DaqConfig read_daq(TableReader table) {
 }
 
 DaemonConfig read_daemon(std::optional<TableReader> table) {
-  DaemonConfig daemon{default_socket(), "journals", ""};
+  DaemonConfig daemon{.socket = default_socket(), .journal_dir = "journals", .control_group = ""};
   if (!table) return daemon;
   daemon.socket = table->text_or("socket", daemon.socket);
   daemon.journal_dir = table->text_or("journal_dir", daemon.journal_dir.string());
+  daemon.keep_days = table->integer_or("keep_days", daemon.keep_days, {.at_least = 0, .at_most = 36'500});
   daemon.control_group = table->text_or("control_group", daemon.control_group);
   table->finish();
   return daemon;

@@ -60,7 +60,7 @@ double line_load_B_s(double position_rate_Hz, const Experiment& experiment) {
 }
 
 /// Positions follow the samples, between the 300 Hz that a run file promises and what any use of them needs.
-double position_rate_Hz(const Experiment& experiment, const ControllerConfig& controller) {
+double reported_rate_Hz(const Experiment& experiment, const ControllerConfig& controller) {
   constexpr double least_Hz = 300;
   constexpr double most_Hz = 1000;
   constexpr double bits_a_byte = 10;
@@ -271,7 +271,7 @@ void ControllerClient::upload(const Experiment& experiment) {
 }
 
 ProgramPlan ControllerClient::load(const Experiment& experiment) {
-  const double positions_Hz = position_rate_Hz(experiment, rig_.controller);
+  position_rate_Hz_ = reported_rate_Hz(experiment, rig_.controller);
   demand(wire::ClearProgram{});
   upload(experiment);
   for (const ExperimentSegment& segment : experiment.segments) {
@@ -298,7 +298,7 @@ ProgramPlan ControllerClient::load(const Experiment& experiment) {
   arm.rest_us = whole({experiment.file, "rest_s", 1e6 * experiment.rest_s, "us"});
   arm.ttl_width_us =
       whole({rig_.file, "controller.ttl_width_ms", 1e3 * rig_.controller.ttl_width_ms, "us", 1});
-  arm.position_period_ticks = static_cast<uint32_t>(hello_->tick_rate_Hz / positions_Hz);
+  arm.position_period_ticks = static_cast<uint32_t>(hello_->tick_rate_Hz / position_rate_Hz_);
   const Answer answer = request(arm);
   if (answer.nak && (answer.nak->refusal == wire::Refusal::limit_exceeded ||
                      answer.nak->refusal == wire::Refusal::unknown_waveform)) {

@@ -32,6 +32,8 @@ class ControllerClient final : public Controller {
   /// Of the controller that answered; precondition: connected().
   [[nodiscard]] const wire::Hello& hello() const { return *hello_; }
   [[nodiscard]] uint32_t microstep_pL() const { return microstep_pL_; }
+  /// Of the program that was loaded last.
+  [[nodiscard]] double position_rate_Hz() const { return position_rate_Hz_; }
 
   /// Loads and checks a whole program; afterwards the controller is armed, and will report positions at the
   /// sample rate, but no slower than 300 Hz and no faster than 1000 Hz. A program beyond a limit throws
@@ -95,6 +97,7 @@ class ControllerClient final : public Controller {
   uint16_t session_ = 0;
   uint32_t lease_id_ = 0;
   uint32_t microstep_pL_ = 0;
+  double position_rate_Hz_ = 0;
   uint16_t next_request_id_ = 1;
   uint64_t next_heartbeat_ns_ = 0;
   uint64_t next_time_question_ns_ = 0;

@@ -11,6 +11,8 @@
 #include <chrono>
 #include <ctime>
 
+#include "host/acquisition/disk_room.hpp"
+#include "host/acquisition/journal_store.hpp"
 #include "host/daemon/json_rpc.hpp"
 #include "host/daemon/uuid.hpp"
 #include "host/runfile/assemble.hpp"
@@ -121,10 +123,6 @@ void make_journal_dir(const std::filesystem::path& directory) {
   }
 }
 
-std::filesystem::path run_file_beside(std::filesystem::path journal) {
-  return journal.replace_extension(".run.h5");
-}
-
 std::string utc_now() { return fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr))); }
 
 }  // namespace
@@ -137,6 +135,7 @@ RigService::RigService(RigConfig rig, const RigServiceOptions& options)
   controller_->connect();
   instrument_ = rig_.daq.open({options.daq_address, clock_->stands_still() ? conducted_timeout_ms : 0});
   make_journal_dir(rig_.daemon.journal_dir);
+  tidy_journals();
   spdlog::info("controller at {}, instrument {}", rig_.controller.port, instrument_->describe());
   (void)do_status();
   thread_ = std::jthread([this](const std::stop_token& stop) { work(stop); });
@@ -401,6 +400,7 @@ json RigService::remember(const wire::Status& status) {
       {"controller", rig_.controller.port},
       {"instrument", instrument_->describe()}};
   const std::lock_guard lock(mutex_);
+  result["journals"] = journals_;
   last_status_ = result;
   return result;
 }
@@ -413,6 +413,7 @@ void RigService::do_run(const Experiment& experiment, const Done& done) {
   record.run_id = new_uuid();
   record.planned_s = duration_s(experiment, plan);
   record.planned_cycles = experiment.cycles();
+  check_disk(record, rate.rate_Hz);
   const std::filesystem::path path =
       std::filesystem::absolute(rig_.daemon.journal_dir) / (record.run_id + ".journal");
   JournalWriter journal(path);
@@ -432,10 +433,45 @@ void RigService::do_run(const Experiment& experiment, const Done& done) {
     result = {{"end", "failed"}, {"problem", error.what()}, {"journal", path.string()}};
   }
   spdlog::info("run {} ended: {}", record.run_id, result.dump());
+  tidy_journals();
   const std::lock_guard lock(mutex_);
   run_->state = result.contains("run_file") ? "done" : "failed";
   run_->result = std::move(result);
   activity_.clear();
+}
+
+void RigService::check_disk(const RunRecord& record, double sample_rate_Hz) {
+  try {
+    check_room(rig_.daemon.journal_dir,
+               {record.planned_s, sample_rate_Hz, controller_->position_rate_Hz(), rig_.daq.channels.size(),
+                static_cast<uint64_t>(record.planned_cycles)});
+  } catch (const InputError&) {
+    controller_->unload();
+    throw;
+  }
+}
+
+void RigService::tidy_journals() {
+  const auto& [directory, keep_days] = std::pair(rig_.daemon.journal_dir, rig_.daemon.keep_days);
+  if (keep_days > 0) {
+    const auto before = std::filesystem::file_time_type::clock::now() - std::chrono::hours(24 * keep_days);
+    for (const auto& removed : prune_journals(directory, before)) {
+      spdlog::info("{} was removed: its run file is older than {} days", removed.string(), keep_days);
+    }
+  }
+  uint64_t bytes = 0;
+  int64_t without_run_file = 0;
+  const auto journals = stored_journals(directory);
+  for (const StoredJournal& journal : journals) {
+    bytes += journal.bytes;
+    without_run_file += journal.has_run_file ? 0 : 1;
+  }
+  const std::lock_guard lock(mutex_);
+  journals_ = {{"directory", std::filesystem::absolute(directory).string()},
+               {"count", journals.size()},
+               {"bytes", bytes},
+               {"without_run_file", without_run_file},
+               {"keep_days", keep_days}};
 }
 
 bool RigService::begin(const RunRecord& record) {

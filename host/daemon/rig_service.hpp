@@ -100,6 +100,10 @@ class RigService {
   [[nodiscard]] bool asked_to_stop() const;
   [[noreturn]] void refuse_to_start() const;
   bool begin(const RunRecord& record);
+  /// Throws InputError, the program unloaded, if the journals' disk cannot hold the run.
+  void check_disk(const RunRecord& record, double sample_rate_Hz);
+  /// Removes what need not be kept (journal_store.hpp) and counts the rest.
+  void tidy_journals();
   void do_run(const Experiment& experiment, const Done& done);
   void write_beginning(JournalWriter& journal, const RunRecord& record, const Experiment& experiment,
                        const ProgramPlan& plan, double sample_rate_Hz);
@@ -124,6 +128,7 @@ class RigService {
   StopRequest stop_request_ = StopRequest::none;
   std::optional<RunRecord> run_;
   nlohmann::json last_status_;
+  nlohmann::json journals_;
   std::jthread thread_;  // last: it uses the members above
 };
 

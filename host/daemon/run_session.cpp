@@ -8,27 +8,13 @@
 #include <thread>
 
 #include "host/config/experiment.hpp"
+#include "host/runfile/output_guard.hpp"
 #include "protocol/contract/input_error.hpp"
 
 namespace diastole {
 namespace {
 
 using nlohmann::json;
-
-void check_output(const std::filesystem::path& output, bool force) {
-  if (std::filesystem::is_directory(output)) {
-    throw InputError({output.string(), "", "is a directory", "Name a file, for example session.run.h5."});
-  }
-  if (std::filesystem::exists(output) && !force) {
-    throw InputError(
-        {output.string(), "", "exists already", "Choose another name, or --force to replace it."});
-  }
-  const auto directory = output.has_parent_path() ? output.parent_path() : std::filesystem::path(".");
-  if (::access(directory.c_str(), W_OK | X_OK) != 0) {
-    throw InputError({directory.string(), "", "is no directory in which you may write",
-                      "Make it (mkdir), or choose another place for -o."});
-  }
-}
 
 /// The daemon keeps its own copy beside the journal; the user's appears whole or not at all.
 void deliver(const std::filesystem::path& from, const std::filesystem::path& to) {
@@ -95,7 +81,7 @@ json follow(DaemonClient& daemon, const SessionOptions& options, const json& beg
 
 SessionResult run_session(DaemonClient& daemon, const SessionOptions& options) {
   const Experiment experiment = read_experiment(options.experiment);
-  check_output(options.output, options.force);
+  check_output(options.output, options.force, {options.experiment});
   json points = json::object();
   for (const ExperimentWaveform& waveform : experiment.waveforms)
     points[waveform.name] = waveform.points.text;

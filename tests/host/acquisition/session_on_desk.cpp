@@ -23,7 +23,7 @@ void SessionOnDesk::run(const std::function<StopRequest()>& stop) {
   while (client.status().state == wire::State::homing)
     desk.advance_to(desk.now_ns + 20'000'000);
   const ProgramPlan plan = client.load(experiment);
-  JournalWriter writer(journal, flush);
+  JournalWriter writer(journal, flush, write);
   const nlohmann::json beginning{{"record", "begin"},
                                  {"run_id", "11111111-2222-3333-4444-555555555555"},
                                  {"started_utc", "2026-01-02T03:04:05Z"},

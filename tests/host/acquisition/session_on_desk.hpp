@@ -23,6 +23,7 @@ struct SessionOnDesk {
   Experiment experiment;
   std::filesystem::path journal = scratch / "run.journal";
   JournalWriter::Flush flush = ::fdatasync;  ///< the journal's
+  JournalWriter::Write write = ::write;      ///< likewise
   std::vector<RunRemark> remarks;
   RunOutcome outcome;
 
