@@ -34,11 +34,9 @@ void print_waveforms(const std::string& image) {
     Waveform waveform;
     double from, to;
   };
-  constexpr Part parts[] = {{Waveform::parabolic, 0.2, 0.3},
-                            {Waveform::sinusoidal, 0.2, 0.3},
-                            {Waveform::trapezoidal, 0.05, 0.2},
-                            {Waveform::sawtooth, 0.8, 0.95},
-                            {Waveform::reversed_sawtooth, 0.05, 0.2}};
+  constexpr Part parts[] = {{Waveform::parabolic, 0.2, 0.3},          {Waveform::sinusoidal, 0.2, 0.3},
+                            {Waveform::trapezoidal, 0.05, 0.2},       {Waveform::sawtooth, 0.8, 0.95},
+                            {Waveform::reversed_sawtooth, 0.05, 0.2}, {Waveform::uploaded, 0.2, 0.3}};
   fmt::print("{:<30}{:>9}{:>14}{:>12}\n", "waveform at its peak", "steps/s", "instructions", "asleep");
   for (const Part& part : parts) {
     const StepRateTrial trial{.waveform = part.waveform, .period_s = 1.0, .from = part.from, .to = part.to};
@@ -58,8 +56,7 @@ void print_rates(const std::string& image) {
 }
 
 void print_interrupts(const std::string& image) {
-  const StepRateTrial trial{.period_s = 0.5, .cycles = 3, .flood = true};
-  const StepRateFigures figures = measure(image, trial);
+  const StepRateFigures figures = diastole::measure_interrupts(image);
   fmt::print("\n{:<30}{:>14}{:>22}\n", "interrupt at worst", "instructions", "latency, cycles");
   const auto line = [&](const char* name, uint32_t irq) {
     fmt::print("{:<30}{:>14}{:>22}\n", name, figures.worst_instructions(irq),

@@ -4,9 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <ostream>
 
 #include "firmware/core/profiles/profile.hpp"
+#include "protocol/wire/crc32.hpp"
 #include "protocol/wire/wire_text.hpp"
 #include "tools/benchmarks/emulated_session.hpp"
 
@@ -18,6 +20,38 @@ uint64_t nanoseconds(double time_s) { return static_cast<uint64_t>(time_s * 1e9)
 const InterruptStatistics* interrupt(const BoardStatistics& board, uint32_t irq) {
   const auto found = std::ranges::find(board.interrupts, irq, &InterruptStatistics::irq);
   return found == board.interrupts.end() ? nullptr : &*found;
+}
+
+constexpr uint16_t points = 96;
+
+/// A sine as a host may upload it: the rise from each of 96 points to the next.
+const wire::WaveformPoints& uploaded_sine() {
+  static const wire::WaveformPoints lot = [] {
+    wire::WaveformPoints sine{};
+    sine.count = points;
+    for (uint32_t i = 0; i < points / 2; ++i) {
+      sine.rise[i] =
+          static_cast<int16_t>(std::lround(32'000 * std::sin((i + 0.5) * 2 * std::numbers::pi / points)));
+      sine.rise[points - 1 - i] = static_cast<int16_t>(-sine.rise[i]);
+    }
+    return sine;
+  }();
+  return lot;
+}
+
+bool upload_sine(EmulatedSession& session) {
+  wire::Crc32 crc;
+  for (uint32_t i = 0; i < points; ++i) {
+    crc.add(static_cast<uint8_t>(uploaded_sine().rise[i] & 0xff));
+    crc.add(static_cast<uint8_t>(uploaded_sine().rise[i] >> 8 & 0xff));
+  }
+  return session.ask(wire::UploadWaveform{0, 0, points, crc.value()}) && session.ask(uploaded_sine());
+}
+
+/// Largest speed of a waveform, stroke and period being 1.
+double peak_speed(wire::Waveform waveform) {
+  if (waveform == wire::Waveform::uploaded) return std::numbers::pi * 1.001;
+  return firmware::find_profile(waveform)->peak_speed_millionths * 1e-6;
 }
 
 /// Adds what happens in the measured part of one cycle that begins now.
@@ -75,11 +109,11 @@ wire::Configure fine_stepping() {
 }
 
 wire::AddSegment segment_of(const StepRateTrial& trial) {
-  const double speed = firmware::find_profile(trial.waveform)->peak_speed_millionths * 1e-6;
   wire::AddSegment segment{};
   segment.waveform = trial.waveform;
   segment.cycles = trial.cycles;
-  segment.stroke_nL = static_cast<uint32_t>(std::floor(trial.peak_rate_Hz * trial.period_s / speed));
+  segment.stroke_nL =
+      static_cast<uint32_t>(std::floor(trial.peak_rate_Hz * trial.period_s / peak_speed(trial.waveform)));
   segment.period_us = static_cast<uint32_t>(trial.period_s * 1e6);
   return segment;
 }
@@ -92,7 +126,8 @@ StepRateFigures measure(const std::string& image, const StepRateTrial& trial) {
     return figures;
   }
   const uint64_t steps_before = session.steps;
-  if (!session.ask(segment_of(trial)) || !session.ask(wire::Arm::example()) || !session.start()) {
+  const bool ready = trial.waveform != wire::Waveform::uploaded || upload_sine(session);
+  if (!ready || !session.ask(segment_of(trial)) || !session.ask(wire::Arm::example()) || !session.start()) {
     figures.problem = "refused";
     if (session.refused)
       figures.problem = fmt::format("refused: {} {}", wire::refusal_name(session.refused->refusal),
@@ -117,6 +152,23 @@ StepRateFigures measure(const std::string& image, const StepRateTrial& trial) {
   figures.instructions = static_cast<double>(spent.instructions) / steps;
   figures.headroom = static_cast<double>(spent.asleep_cycles) / cycles;
   figures.rate_Hz = steps * figures.board.core_Hz / cycles;
+  return figures;
+}
+
+StepRateFigures measure_interrupts(const std::string& image) {
+  StepRateFigures figures;
+  EmulatedSession session(image);
+  if (!session.prepare(fine_stepping()) || !session.ask(segment_of({.period_s = 0.5, .cycles = 4})) ||
+      !session.ask(wire::Arm::example()) || !session.start()) {
+    figures.problem = "not started";
+    return figures;
+  }
+  session.flood = true;
+  session.run_until([&] { return session.triggers == 4; }, 10'000'000'000);
+  session.controller().press_estop(session.now_ns() + 60'000'000);
+  session.run_for(100'000'000);
+  if (session.fault != wire::Fault::estop) figures.problem = "the e-stop was not told";
+  figures.board = session.statistics();
   return figures;
 }
 

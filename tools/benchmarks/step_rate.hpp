@@ -44,4 +44,8 @@ wire::AddSegment segment_of(const StepRateTrial& trial);
 /// Throws InputError when the image cannot be read.
 StepRateFigures measure(const std::string& image, const StepRateTrial& trial);
 
+/// Interrupts at their worst: homing, cycles at 200,000 steps/s with TTL, R-wave and position stream, the line
+/// flooded, and an e-stop on the rise of the fourth. Only `problem` and `board` are told.
+StepRateFigures measure_interrupts(const std::string& image);
+
 }  // namespace diastole

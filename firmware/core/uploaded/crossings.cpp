@@ -38,11 +38,20 @@ std::int64_t quotient(std::int64_t dividend, std::int64_t divisor) {
   return shift > -32 ? bits >> -shift : 0;
 }
 
-/// Where linear u + square u² + cube u³ = target, from `below` on. Precondition: the cubic rises from 0 to beyond target.
-std::int64_t solve(const KnotCubic& curve, std::int64_t target, std::int64_t below) {
+/// After a Newton step of this size at most half a place is missing: it leaves |f''/2f'| step².
+bool step_suffices(std::int64_t step, std::int64_t half_second, std::int64_t slope) {
+  if (step >= std::int64_t{1} << 20) return false;
+  const auto size = static_cast<std::uint64_t>(half_second < 0 ? -half_second : half_second);
+  return multiply_high(static_cast<std::uint64_t>(step * step), size) < static_cast<std::uint64_t>(slope) >>
+         (64 - kPlaces + 1);
+}
+
+/// Where linear u + square u² + cube u³ = target, from `below` on and probably `pace` beyond it (0: nobody knows).
+/// Precondition: the cubic rises from 0 to beyond target.
+std::int64_t solve(const KnotCubic& curve, std::int64_t target, std::int64_t below, std::int64_t pace) {
   std::int64_t above = kWhole;
   const std::int64_t end = std::int64_t{curve.linear} + curve.square + curve.cube;
-  std::int64_t u = quotient(target > 0 ? target : 1, end << kPlaces);
+  std::int64_t u = pace > 0 ? below + pace : quotient(target > 0 ? target : 1, end << kPlaces);
   if (u <= below || u >= above) u = below + (above - below) / 2;
   while (above - below > 1) {
     const std::int64_t outer = curve.cube * u + (std::int64_t{curve.square} << kPlaces);
@@ -54,7 +63,10 @@ std::int64_t solve(const KnotCubic& curve, std::int64_t target, std::int64_t bel
     const std::int64_t step = slope > 0 ? quotient(excess < 0 ? -excess : excess, slope) : kWhole;
     if (step <= 1) return u;
     u = excess < 0 ? u + step : u - step;
-    if (u <= below || u >= above) u = below + (above - below) / 2;
+    if (u <= below || u >= above)
+      u = below + (above - below) / 2;
+    else if (step_suffices(step, outer + 2 * curve.cube * u, slope))
+      return u;
   }
   return below;
 }
@@ -158,8 +170,11 @@ UploadedCrossings::Crossing UploadedCrossings::take() {
     curve_ =
         KnotCubic::between(waveform_->rise(knot_ - 1), waveform_->rise(knot_), waveform_->rise(knot_ + 1));
     curved_ = knot_;
+    pace_ = 0;
   }
-  from_ = solve(curve_, next_above_knot(), from_);
+  const std::int64_t before = from_;
+  from_ = solve(curve_, next_above_knot(), from_, pace_);
+  pace_ = from_ - before;
   const Q64 within = multiply_high(static_cast<Q64>(from_) << (64 - kPlaces), interval_fraction_);
   const Crossing crossing{static_cast<std::uint32_t>(knot_) * interval_fraction_ + within, rising_};
   rising_ ? raise_next() : lower_next();

@@ -68,6 +68,7 @@ class UploadedCrossings {
   bool rising_ = true;
   Level next_;                ///< the next level on this flank, twice
   std::int64_t from_ = 0;     ///< of the interval, 2^-42: the last crossing in it
+  std::int64_t pace_ = 0;     ///< from the crossing before it to that one; 0: none yet in this interval
   std::int32_t curved_ = -1;  ///< the interval that curve_ is of
   KnotCubic curve_;
 };

@@ -41,7 +41,7 @@ TEST_P(EveryWaveform, IsPlannedInTimeAt200kHz) {
 }
 
 std::vector<Waveform> moving_waveforms() {
-  std::vector<Waveform> moving;
+  std::vector<Waveform> moving{Waveform::uploaded};
 #define DIASTOLE_PROFILE(name) \
   if (firmware::name##_profile.moves()) moving.push_back(Waveform::name);
 #include "firmware/core/profiles/profile_list.inc"
@@ -67,26 +67,10 @@ TEST(StepRate, ARateAboveTheLimitIsRefusedByName) {
 constexpr uint32_t estop_irq = 6, home_irq = 7, r_wave_irq = 16, clock_irq = 28, serial_irq = 39,
                    step_irq = 50;
 
-/// Homing, three cycles at 200,000 steps/s with TTL, R-wave and position stream, the line flooded, an e-stop.
-StepRateFigures worst_cases() {
-  EmulatedSession session(image);
-  StepRateFigures figures;
-  if (!session.prepare(fine_stepping())) return figures;
-  (void)session.ask(segment_of({.period_s = 0.5, .cycles = 4}));
-  (void)session.ask(wire::Arm::example());
-  (void)session.start();
-  session.flood = true;
-  session.run_until([&] { return session.triggers == 4; }, 10'000'000'000);
-  session.controller().press_estop(session.now_ns() + 60'000'000);
-  session.run_for(100'000'000);
-  EXPECT_EQ(session.fault, wire::Fault::estop);
-  figures.board = session.statistics();
-  return figures;
-}
-
 TEST(Interrupts, TheirWorstCasesAreBounded) {
   NEEDS_IMAGE();
-  const StepRateFigures figures = worst_cases();
+  const StepRateFigures figures = measure_interrupts(image);
+  ASSERT_EQ(figures.problem, "");
   EXPECT_GT(figures.worst_instructions(step_irq), 50U);
   EXPECT_LE(figures.worst_instructions(step_irq), 200U) << "a cycle's first step: TTL, R-wave, report";
   EXPECT_LE(figures.worst_instructions(clock_irq), 50U);
