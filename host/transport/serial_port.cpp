@@ -48,7 +48,7 @@ constexpr size_t most_kept_bytes = 1U << 20;  // beyond this the other end is no
     case EBUSY:
     case EWOULDBLOCK:
       throw HardwareError(path, "the serial port is in use by another program",
-                          "Stop the other one (another daemon, a terminal program): fuser " + path);
+                          "Stop the other one (a running daemon, a terminal program): fuser " + path);
     default:
       throw HardwareError(path, fmt::format("cannot be opened: {}", std::strerror(error)),
                           "Check the port and its cable.");

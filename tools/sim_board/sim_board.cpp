@@ -46,6 +46,9 @@ struct SimBoard::Board {
              [this] {
                power_fails = true;
                chip.cpu.interrupt();
+             },
+             [this](uint32_t offset, uint32_t bytes) {
+               if (flash_listener) flash_listener(offset, bytes);
              }}) {}
 
   void note_missed(uint8_t timer, uint8_t channel, Cycles late_by) {
@@ -84,6 +87,7 @@ struct SimBoard::Board {
   std::vector<SentByte> sent;
   std::vector<BoardReset> resets;
   std::function<void(const MissedDeadline&)> missed_listener;
+  std::function<void(uint32_t, uint32_t)> flash_listener;
   uint64_t missed = 0;
   std::optional<ResetCause> requested;
   bool powered = false, power_fails = false;
@@ -181,6 +185,10 @@ void SimBoard::on_pin_change(std::function<void(Pin, bool, uint64_t)> listener) 
 
 void SimBoard::cut_power_at_flash_operation(std::optional<uint64_t> operation) {
   board_->chip.flash.cut_power_at(operation);
+}
+
+void SimBoard::on_flash_change(std::function<void(uint32_t, uint32_t)> listener) {
+  board_->flash_listener = std::move(listener);
 }
 
 void SimBoard::on_missed_deadline(std::function<void(const MissedDeadline&)> listener) {

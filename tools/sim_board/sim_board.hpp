@@ -126,6 +126,9 @@ class SimBoard {
   /// Power fails in the middle of flash operation `operation` (1 is the next one); nullopt: never.
   void cut_power_at_flash_operation(std::optional<uint64_t> operation);
 
+  /// Called after each operation on the flash with the bytes that it changed, counted from the start of flash.
+  void on_flash_change(std::function<void(uint32_t offset, uint32_t bytes)> listener);
+
   void on_missed_deadline(std::function<void(const MissedDeadline&)> listener);
 
   /// A word of memory, nullopt outside it; how tests and reports look at the firmware's variables.

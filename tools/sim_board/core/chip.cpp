@@ -59,7 +59,10 @@ Chip::Chip(uint32_t crystal_Hz, uint32_t random_seed, Listeners listeners)
   add_timers();
   add_usarts();
   add_others(random_seed);
-  flash.listen({[this](uint32_t offset, uint32_t bytes) { cpu.forget_code(offset, bytes); },
+  flash.listen({[this](uint32_t offset, uint32_t bytes) {
+                  cpu.forget_code(offset, bytes);
+                  listeners_.flash_changed(offset, bytes);
+                },
                 [this] { listeners_.power_cut(); }});
   watchdog.on_bite([this] { listeners_.reset_request(ResetCause::independent_watchdog); });
   control.on_reset_request([this] { listeners_.reset_request(ResetCause::software); });

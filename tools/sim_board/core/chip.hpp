@@ -28,6 +28,7 @@ class Chip {
     std::function<void(uint8_t timer, uint8_t channel, Cycles late_by)> missed;
     std::function<void(ResetCause)> reset_request;
     std::function<void()> power_cut;
+    std::function<void(uint32_t offset, uint32_t bytes)> flash_changed;
   };
 
   Chip(uint32_t crystal_Hz, uint32_t random_seed, Listeners listeners);

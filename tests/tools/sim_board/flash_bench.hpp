@@ -1,0 +1,66 @@
+#pragma once
+// An emulated board that left the factory, and `diastole flash` in its virtual time.
+
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include "host/flash/updater.hpp"
+#include "protocol/contract/input_error.hpp"
+#include "tests/tools/sim_board/emulated_desk.hpp"
+
+namespace diastole::sim_board_test {
+
+const std::string built = DIASTOLE_SOURCE_DIR "/build/firmware/";
+const std::string factory_image = built + "bin/diastole-stm32f405.bin";
+const std::string first_update = built + "bin/diastole-stm32f405.image";
+const std::string newer_update = built + "tests/newer.image";
+const std::string hanging_update = built + "tests/hanging.image";
+
+#define NEEDS_UPDATE_IMAGES()                                                                 \
+  for (const std::string& file : {factory_image, first_update, newer_update, hanging_update}) \
+    if (!std::filesystem::exists(file)) GTEST_SKIP() << "no " << file << ": build the preset `firmware` first"
+
+inline constexpr uint64_t ms = 1'000'000;  // ns
+
+class FlashBench {
+ public:
+  explicit FlashBench(const std::string& image = factory_image) : desk(image), line_(desk) {}
+
+  UpdateResult flash(const std::string& file, const UpdateOptions& options = {}) {
+    return Updater(desk, line_, "the emulated board").flash(read_update_file(file), options);
+  }
+  /// What answers on the line: an application's report of itself, or a bootloader's (slot none).
+  std::optional<wire::ImageReport> running() {
+    UpdateLink link(desk, line_);
+    link.pause(35 * ms);  // a bootloader listens for one word only
+    for (int attempt = 0; attempt < 5; ++attempt) {
+      if (!link.open(60 * ms)) continue;
+      const auto report =
+          link.ask<wire::ImageReport>(wire::ImageQuery{.slot = wire::ImageSlot::none}, 100 * ms);
+      if (report) return report;
+    }
+    return {};
+  }
+  /// "0.1.0 confirmed", or "bootloader", or "silence".
+  std::string runs() {
+    const auto report = running();
+    if (!report) return "silence";
+    if (report->slot == wire::ImageSlot::none) return "bootloader";
+    const std::string version =
+        in_words({report->version_major, report->version_minor, report->version_patch});
+    return version + (report->standing == wire::Standing::confirmed ? " confirmed" : " unconfirmed");
+  }
+  [[nodiscard]] SimBoard& board() { return desk.controller.board(); }
+  void power_cycle() {
+    board().power_cycle();
+    desk.to_host.clear();
+  }
+
+  EmulatedDesk desk;
+
+ private:
+  EmulatedLine line_;
+};
+
+}  // namespace diastole::sim_board_test

@@ -1,0 +1,118 @@
+// Power fails in the middle of a flash operation of an update on the emulated board: whatever the operation, a
+// verified image starts afterwards and the update can be brought to its end. Quick: a sample. With
+// DIASTOLE_EVERY_POWER_CUT: every operation.
+
+#include <gmock/gmock.h>
+
+#include <random>
+#include <set>
+
+#include "tests/tools/sim_board/flash_bench.hpp"
+#include "tests/tools/sim_board/flash_history.hpp"
+
+namespace diastole::sim_board_test {
+namespace {
+
+#ifdef DIASTOLE_EVERY_POWER_CUT
+constexpr bool every = true;
+constexpr size_t recoveries = 60, second_cuts = 60;
+#else
+constexpr bool every = false;
+constexpr size_t recoveries = 4, second_cuts = 3;
+#endif
+
+/// True if the host's own reading of the slot finds an image that verifies.
+bool verifies(std::span<const uint8_t> flash, wire::ImageSlot slot) {
+  const auto bytes = flash.subspan(slot == wire::ImageSlot::a ? 0x2'0000 : 0x4'0000, 0x2'0000);
+  const auto header = wire::decode_image_header(bytes.first<wire::kImageHeaderBytes>());
+  if (!header || header->code_bytes > bytes.size() - wire::kImageHeaderArea) return false;
+  return wire::digest_of(*header, bytes.subspan(wire::kImageHeaderArea, header->code_bytes)) ==
+         header->sha256;
+}
+
+struct Score {
+  size_t tried = 0, lost = 0;
+};
+
+/// Powers the board with this flash and looks what starts.
+void start(FlashBench& bench, const std::vector<uint8_t>& flash, size_t cut, Score& score) {
+  bench.board().power_off();
+  put_flash(bench.board(), flash);
+  bench.power_cycle();
+  ++score.tried;
+  const auto running = bench.running();
+  const bool sound =
+      running && running->slot != wire::ImageSlot::none && verifies(bench.board().flash(), running->slot);
+  if (!sound) ++score.lost;
+  EXPECT_TRUE(sound) << "cut at operation " << cut << ": "
+                     << (!running                                 ? "silence"
+                         : running->slot == wire::ImageSlot::none ? "unbootable"
+                                                                  : "unverified");
+}
+
+/// The first and last operations, and a seeded sample of those between; or all.
+std::set<size_t> chosen(size_t operations) {
+  std::set<size_t> cuts;
+  for (size_t cut = 1; cut <= operations; ++cut)
+    if (every || cut <= 8 || cut + 16 > operations) cuts.insert(cut);
+  std::mt19937 random(2026);
+  for (int i = 0; i < 16; ++i)
+    cuts.insert(1 + random() % operations);
+  return cuts;
+}
+
+TEST(FlashPowerCuts, LeaveABoardThatStartsAndCanBeUpdated) {
+  NEEDS_UPDATE_IMAGES();
+  FlashBench bench;
+  ASSERT_EQ(bench.runs(), "0.1.0 confirmed");
+  const FlashHistory history(bench.board());
+  ASSERT_EQ(bench.flash(newer_update).end, UpdateEnd::confirmed);
+  bench.board().on_flash_change({});
+  const size_t operations = history.operations();
+  ASSERT_GT(operations, 5'000U);
+
+  Score score;
+  const std::set<size_t> cuts = chosen(operations);
+  for (const size_t cut : cuts)
+    start(bench, history.cut_at(cut), cut, score);
+
+  // Recovery, and a power cut during the recovery.
+  std::mt19937 random(405);
+  Score second;
+  for (size_t i = 0; i < recoveries; ++i) {
+    const size_t cut = i == 0 ? 1 : i == 1 ? operations : 1 + random() % operations;
+    start(bench, history.cut_at(cut), cut, score);
+    if (i < second_cuts) {
+      bench.board().cut_power_at_flash_operation(1 + random() % (i == 1 ? 12 : 200));
+      EXPECT_THROW((void)bench.flash(newer_update), HardwareError) << cut;
+      bench.board().cut_power_at_flash_operation({});
+      const std::vector<uint8_t> left(bench.board().flash().begin(), bench.board().flash().end());
+      start(bench, left, cut, second);
+    }
+    EXPECT_TRUE(bench.flash(newer_update).verified) << cut;
+    EXPECT_EQ(bench.runs(), "0.1.1 confirmed") << cut;
+  }
+  std::printf(
+      "%zu operations; %zu cuts tried, %zu survived, %zu lost; cut again during recovery: %zu, %zu lost\n",
+      operations, score.tried, score.tried - score.lost, score.lost, second.tried, second.lost);
+}
+
+// The reconstruction of a cut is the emulator's own.
+TEST(FlashPowerCuts, AreReconstructedToTheByte) {
+  NEEDS_UPDATE_IMAGES();
+  FlashBench whole;
+  (void)whole.runs();
+  const FlashHistory history(whole.board());
+  (void)whole.flash(newer_update);
+  whole.board().on_flash_change({});
+  for (const size_t cut : {size_t{1}, size_t{40}, size_t{1'000}}) {
+    FlashBench bench;
+    (void)bench.runs();
+    bench.board().cut_power_at_flash_operation(cut);
+    EXPECT_THROW((void)bench.flash(newer_update), HardwareError);
+    EXPECT_TRUE(std::ranges::equal(bench.board().flash(), history.cut_at(cut))) << cut;
+  }
+}
+
+}  // namespace
+}  // namespace diastole::sim_board_test
