@@ -8,6 +8,7 @@
 #include <optional>
 #include <span>
 
+#include "firmware/core/black_box.hpp"
 #include "firmware/core/units.hpp"
 #include "protocol/wire/image_header.hpp"
 #include "protocol/wire/states.hpp"
@@ -73,6 +74,8 @@ concept Board = requires(B& board, const B& fixed, const PulseOrder& order,
   /// Precondition: bytes.size() <= serial_room().
   {board.serial_write(bytes)};
   {board.feed_watchdog()};
+  /// Memory that outlives a reset, though not a loss of power; arbitrary then.
+  { board.retained() } -> std::same_as<BlackBox::Memory&>;
   /// Where settings are kept (settings_store.hpp); writing there may hold everything up for a second.
   { board.settings_flash() } -> std::same_as<typename B::SettingsFlash&>;
   { fixed.running_image() } -> std::same_as<RunningImage>;

@@ -23,9 +23,10 @@ class Controller {
   explicit Controller(B& board)
       : board_(board),
         settings_(board.settings_flash()),
-        motion_(board, outbox_),
+        black_box_(board.retained()),
+        motion_(board, outbox_, black_box_),
         trial_(board, motion_),
-        dispatch_(board, motion_, settings_, trial_, outbox_, link_),
+        dispatch_(board, motion_, settings_, black_box_, trial_, outbox_, link_),
         telemetry_(motion_, outbox_) {
     motion_.use(settings_.settings(), settings_.records_written() > 0);
   }
@@ -33,7 +34,9 @@ class Controller {
   /// One turn of the main loop.
   void poll() {
     board_.feed_watchdog();
+    if (!begun_) begin();
     receive();
+    note_link();
     motion_.poll();
     trial_.poll();
     telemetry_.pump(link_);
@@ -49,6 +52,23 @@ class Controller {
  private:
   /// Bytes taken in one turn: a flooded line must not keep the queue from being refilled.
   static constexpr int kBytesPerTurn = 256;
+
+  /// A host that has said nothing for so long is noted as lost.
+  static constexpr std::uint64_t kLinkSilence_us = 1'000'000;
+
+  void begin() {
+    begun_ = true;
+    const Identity identity = board_.identity();
+    black_box_.begin(identity.reset_cause, identity.boot_id, board_.now());
+  }
+  void note_link() {
+    const bool open = link_.state() == wire::ReliableLink::State::open &&
+                      now_us() - link_.last_heard_us() < kLinkSilence_us;
+    if (open == link_open_ && link_.session() == session_) return;
+    link_open_ = open;
+    session_ = link_.session();
+    black_box_.note(wire::Noted::link, open ? 1 : 0, session_, board_.now());
+  }
 
   [[nodiscard]] std::uint64_t now_us() const { return on_wire(board_.now()) / kTicksPerMicrosecond; }
 
@@ -72,6 +92,10 @@ class Controller {
   wire::ReliableLink link_{wire::ReliableLink::Role::controller};
   Outbox outbox_;
   SettingsStore<typename B::SettingsFlash> settings_;
+  BlackBox black_box_;
+  bool begun_ = false;
+  bool link_open_ = false;
+  std::uint16_t session_ = 0;
   Motion<B> motion_;
   ImageTrial<B> trial_;
   Dispatch<B> dispatch_;

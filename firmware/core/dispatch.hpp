@@ -19,9 +19,15 @@ class Dispatch {
  public:
   using Store = SettingsStore<typename B::SettingsFlash>;
 
-  Dispatch(B& board, Motion<B>& motion, Store& store, ImageTrial<B>& trial, Outbox& outbox,
+  Dispatch(B& board, Motion<B>& motion, Store& store, BlackBox& black_box, ImageTrial<B>& trial, Outbox& outbox,
            wire::ReliableLink& link)
-      : board_(board), motion_(motion), store_(store), trial_(trial), outbox_(outbox), link_(link) {}
+      : board_(board),
+        motion_(motion),
+        store_(store),
+        black_box_(black_box),
+        trial_(trial),
+        outbox_(outbox),
+        link_(link) {}
 
   void receive(const wire::Received& received) {
     if (link_.generation() != generation_) {
@@ -111,6 +117,10 @@ class Dispatch {
     report.backlash_microsteps = wire::backlash_microsteps(report.settings);
     answer(report);
   }
+  void handle(const wire::ReadBlackBox& request) {
+    answer(
+        wire::BlackBoxReport{request.request_id, black_box_.newest(), black_box_.first_from(request.from)});
+  }
   /// Only at rest: the flash holds the core up while it is written.
   void handle(const wire::WriteSettings& request) {
     const wire::SettingOutOfRange outside = wire::out_of_range(request.settings);
@@ -124,6 +134,7 @@ class Dispatch {
       conclude(request, wire::Refusal::flash_failed);
     } else {
       motion_.use(store_.settings(), true);
+      note(wire::Noted::settings, 0, static_cast<std::int32_t>(store_.records_written()));
       conclude(request, wire::Refusal::none);
     }
   }
@@ -176,7 +187,11 @@ class Dispatch {
   void conclude(const Request& request, wire::Refusal refusal) {
     conclude(request, PlanRefusal{.refusal = refusal});
   }
+  void note(wire::Noted kind, std::uint8_t detail, std::int32_t argument) {
+    black_box_.note(kind, detail, argument, board_.now());
+  }
   void refuse(std::uint16_t request_id, std::uint8_t type, const PlanRefusal& why) {
+    note(wire::Noted::refusal, static_cast<std::uint8_t>(why.refusal), type);
     answer(wire::Nak{request_id, type, why.refusal, why.limit, why.segment, why.asked, why.allowed});
   }
   /// A host that sends requests and takes no answers loses the session.
@@ -188,6 +203,7 @@ class Dispatch {
   B& board_;
   Motion<B>& motion_;
   Store& store_;
+  BlackBox& black_box_;
   ImageTrial<B>& trial_;
   Outbox& outbox_;
   wire::ReliableLink& link_;

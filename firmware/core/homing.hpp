@@ -6,7 +6,7 @@
 //   back_off   inflate fast until it opens again, come to rest
 //   approach   withdraw slowly until it closes
 //   leave      inflate slowly until it opens: the reference
-//   clearance  go on by a fixed distance, and call that 0
+//   clearance  go on by a fixed distance, in any case more than the play, and call that 0
 //
 //     far limit                        position 0   switch opens
 //        |·································|<-- 64 -->|####### home switch closed
@@ -39,7 +39,7 @@ struct HomingMove {
 
 /// Fast is the configured speed as far as hand_steps_per_s allows, slow a quarter of it or what stops within a step. The switch must be found within a
 /// tenth more than the travel, and open within a twentieth of it.
-inline HomingMove homing_move(HomingStage stage, const Settings& settings) {
+inline HomingMove homing_move(HomingStage stage, const Settings& settings, std::uint32_t backlash_steps) {
   const wire::Configure& limits = settings.limits();
   const std::uint64_t travel = std::uint64_t{limits.travel_uL} * 1'000'000 / limits.microstep_pL + 1;
   const std::uint64_t acceleration = settings.stop_steps_per_s2();
@@ -62,7 +62,7 @@ inline HomingMove homing_move(HomingStage stage, const Settings& settings) {
     case HomingStage::leave:
       return move(true, near, slow);
     default:
-      return move(true, kHomeClearance_steps, slow);
+      return move(true, std::max(kHomeClearance_steps, backlash_steps + 16), slow);
   }
 }
 

@@ -8,6 +8,7 @@
 #include <optional>
 #include <utility>
 
+#include "firmware/core/black_box.hpp"
 #include "firmware/core/board.hpp"
 #include "firmware/core/homing.hpp"
 #include "firmware/core/jog.hpp"
@@ -17,6 +18,7 @@
 #include "firmware/core/planner.hpp"
 #include "firmware/core/safety.hpp"
 #include "firmware/core/step_engine.hpp"
+#include "firmware/core/take_up.hpp"
 
 namespace diastole::firmware {
 
@@ -29,7 +31,8 @@ class Motion {
   /// From the order to move to the first event.
   static constexpr Ticks kStartLead = microseconds(20'000);
 
-  Motion(B& board, Outbox& outbox) : board_(board), outbox_(outbox), engine_(board) {}
+  Motion(B& board, Outbox& outbox, BlackBox& black_box)
+      : board_(board), outbox_(outbox), black_box_(black_box), engine_(board) {}
 
   // Requests (main loop).
   /// Geometry and limits; refused where they disagree with machine settings that were ever written.
@@ -84,9 +87,11 @@ class Motion {
   [[nodiscard]] bool fault_pending() const { return tripped_ != wire::Fault::none; }
   [[nodiscard]] wire::Refusal program_open() const;
   void become(wire::State to);
+  void tell_state(wire::State from, wire::State to);
   void latch(wire::Fault fault);
   void trip(wire::Fault fault);
   void take_tripped_fault();
+  void note_estop();
   void set_motor_enabled(bool enabled);
   void watch_lease();
   void begin_controlled_stop(wire::RunEnd reason);
@@ -105,15 +110,22 @@ class Motion {
   void take_end(Ticks tick);
   void end_motion(Ticks tick);
   void refill();
+  void refill_taking_up(Ticks until);
+  void begin_taking_up(Ticks window, Ticks start);
 
   B& board_;
   Outbox& outbox_;
+  BlackBox& black_box_;
   StepEngine<B> engine_;
   Planner planner_;
   WaveformStore waveforms_;
   Program program_;
   wire::MachineSettings machine_;
   bool machine_written_ = false;
+  std::uint32_t backlash_steps_ = 0;
+  TakeUp take_up_;
+  Ticks take_up_window_;    ///< of the armed program
+  bool taking_up_ = false;  ///< the present motion takes up play
   Settings settings_;
   bool configured_ = false;
   Safety safety_;
@@ -123,6 +135,7 @@ class Motion {
   std::atomic<Watch> watch_{Watch::rest};
   std::atomic<wire::Fault> tripped_{wire::Fault::none};
   bool motor_enabled_ = false;
+  bool estop_seen_ = false;
   bool decelerating_ = false;
   wire::RunEnd end_reason_ = wire::RunEnd::completed;
   std::optional<wire::RunEnded> run_end_due_;

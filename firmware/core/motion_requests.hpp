@@ -21,6 +21,7 @@ template <Board B>
 void Motion<B>::use(const wire::MachineSettings& machine, bool written) {
   machine_ = machine;
   machine_written_ = written;
+  backlash_steps_ = written ? wire::backlash_microsteps(machine) : 0;
   configured_ = false;
   program_.size = 0;
   if (safety_.at_rest()) become(wire::State::unhomed);
@@ -79,8 +80,12 @@ PlanRefusal Motion<B>::arm(const wire::Arm& arm) {
   program_.position_period_ticks = arm.position_period_ticks;
   const auto stopping_time = check_program(program_, settings_);
   if (!stopping_time.ok()) return stopping_time.error();
+  const auto window_us = check_take_up(program_, settings_, backlash_steps_);
+  if (!window_us.ok()) return window_us.error();
+  take_up_window_ = microseconds(*window_us);
   // At rest within the lease: stop that much earlier, and by what has already been handed to the engine.
-  silence_allowed_ = microseconds(settings_.limits().lease_us - 5'000) - *stopping_time - kHorizon;
+  silence_allowed_ =
+      microseconds(settings_.limits().lease_us - 5'000) - *stopping_time - kHorizon - take_up_window_;
   next_planned_ = 0;
   become(wire::State::armed);
   return {};
@@ -95,6 +100,7 @@ wire::Refusal Motion<B>::home(std::uint32_t lease_id) {
   if (!lease_.bind(lease_id, board_.now(), silence_allowed_)) return wire::Refusal::no_lease;
   fault_at_rest_ = wire::Fault::none;
   decelerating_ = false;
+  taking_up_ = false;
   set_motor_enabled(true);
   become(wire::State::homing);
   begin_homing_stage(board_.inputs().home ? HomingStage::back_off : HomingStage::seek);
@@ -123,7 +129,12 @@ PlanRefusal Motion<B>::jog(const wire::Jog& jog) {
   watch_ = inflate ? Watch::inflating : Watch::withdrawing;
   become(wire::State::jogging);
   engine_.open();
-  planner_.begin_glide(inflate, glide, board_.now() + kStartLead);
+  const Ticks start = board_.now() + kStartLead;
+  planner_.begin_glide(inflate, glide, start);
+  const std::uint32_t window_us =
+      take_up_window_us(backlash_steps_, settings_.stop_steps_per_s2() / 4, settings_);
+  begin_taking_up(microseconds(window_us), start);
+  taking_up_ = taking_up_ && safety_.position_known();
   return {};
 }
 
@@ -143,6 +154,7 @@ wire::Refusal Motion<B>::start(std::uint32_t lease_id) {
   run_start_ = board_.now() + kStartLead;
   engine_.begin_sampling(run_start_, Ticks{program_.position_period_ticks});
   planner_.begin_run(program_, settings_, run_start_, counters.position);
+  begin_taking_up(take_up_window_, run_start_);
   end_reason_ = wire::RunEnd::completed;
   fault_at_rest_ = wire::Fault::none;
   decelerating_ = false;
@@ -184,7 +196,7 @@ wire::Refusal Motion<B>::clear_fault() {
   const wire::State before = safety_.state();
   safety_.clear();
   board_.show_fault(static_cast<std::uint8_t>(wire::Fault::none));
-  outbox_.put(wire::StateChanged{before, safety_.state(), on_wire(board_.now())});
+  tell_state(before, safety_.state());
   return wire::Refusal::none;
 }
 

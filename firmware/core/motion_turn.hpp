@@ -12,6 +12,7 @@ void Motion<B>::poll() {
     on_inputs();
   }
   if (engine_.take_underrun()) trip(wire::Fault::step_underrun);
+  note_estop();
   take_tripped_fault();
   watch_lease();
   run_homing();
@@ -66,7 +67,22 @@ void Motion<B>::take_tripped_fault() {
 template <Board B>
 void Motion<B>::become(wire::State to) {
   const wire::State from = safety_.state();
-  if (safety_.become(to)) outbox_.put(wire::StateChanged{from, to, on_wire(board_.now())});
+  if (safety_.become(to)) tell_state(from, to);
+}
+
+template <Board B>
+void Motion<B>::tell_state(wire::State from, wire::State to) {
+  const Ticks now = board_.now();
+  outbox_.put(wire::StateChanged{from, to, on_wire(now)});
+  black_box_.note(wire::Noted::state, static_cast<std::uint8_t>(to), static_cast<std::int32_t>(from), now);
+}
+
+template <Board B>
+void Motion<B>::note_estop() {
+  const bool pressed = board_.inputs().estop;
+  if (pressed == estop_seen_) return;
+  estop_seen_ = pressed;
+  black_box_.note(wire::Noted::estop, pressed ? 1 : 0, 0, board_.now());
 }
 
 /// Latches a fault with the motor already at rest or cut off.
@@ -77,12 +93,15 @@ void Motion<B>::latch(wire::Fault fault) {
   if (!safety_.latch(fault)) return;
   const Ticks now = board_.now();
   planner_.clear();
+  taking_up_ = false;
   homing_ = HomingStage::done;
   board_.show_fault(static_cast<std::uint8_t>(fault));
   const std::int64_t argument =
       fault == wire::Fault::event_overflow ? events_lost_ : engine_.counters().position.count;
   outbox_.put(wire::FaultRaised{fault, on_wire(now), argument});
-  outbox_.put(wire::StateChanged{from, wire::State::faulted, on_wire(now)});
+  black_box_.note(wire::Noted::fault, static_cast<std::uint8_t>(fault), static_cast<std::int32_t>(argument),
+                  now);
+  tell_state(from, wire::State::faulted);
   if (!in_run) {
     watch_ = Watch::rest;
     lease_.release();
@@ -120,7 +139,8 @@ void Motion<B>::begin_controlled_stop(wire::RunEnd reason) {
   }
   if (decelerating_) return;
   decelerating_ = true;
-  planner_.begin_stop(board_.now() + microseconds(1'000), settings_.stop_steps_per_s2());
+  planner_.begin_stop(board_.now() + microseconds(1'000), settings_.stop_steps_per_s2(),
+                      taking_up_ && take_up_.turning());
 }
 
 template <Board B>
@@ -136,7 +156,7 @@ void Motion<B>::begin_homing_stage(HomingStage stage) {
            : stage == HomingStage::approach ? Watch::approach_home
            : stage == HomingStage::leave    ? Watch::leave_home
                                             : Watch::inflating;
-  const HomingMove move = homing_move(stage, settings_);
+  const HomingMove move = homing_move(stage, settings_, backlash_steps_);
   engine_.open();
   planner_.begin_glide(move.inflate, move.glide, board_.now() + kHomingPause);
 }
@@ -171,6 +191,7 @@ void Motion<B>::end_homing_stage() {
       return latch(wire::Fault::home_switch_stuck);
     case HomingStage::clearance:
       engine_.set_position(Steps{0});
+      take_up_.home();
       return come_to_rest(wire::State::homed);
     default:
       return come_to_rest(wire::State::unhomed);
@@ -188,11 +209,29 @@ void Motion<B>::come_to_rest(wire::State state) {
 template <Board B>
 void Motion<B>::refill() {
   const Ticks until = board_.now() + kHorizon;
+  if (taking_up_) return refill_taking_up(until);
   for (const MotionEvent* next = planner_.peek(); next != nullptr; next = planner_.peek()) {
     if (next->tick > until || engine_.full()) return;
     engine_.push(*next);
     planner_.pop();
   }
+}
+
+template <Board B>
+void Motion<B>::refill_taking_up(Ticks until) {
+  while (!engine_.full()) {
+    const MotionEvent* next = take_up_.merge(planner_.peek());
+    if (next == nullptr || next->tick > until) return;
+    engine_.push(*next);
+    if (take_up_.pop()) planner_.pop();
+  }
+}
+
+template <Board B>
+void Motion<B>::begin_taking_up(Ticks window, Ticks start) {
+  taking_up_ = backlash_steps_ > 0;
+  const std::uint32_t rate_Hz = settings_.limits().step_rate_Hz;
+  take_up_.begin(backlash_steps_, window, Ticks{(kTicksPerSecond + rate_Hz - 1) / rate_Hz}, start);
 }
 
 /// One segment a turn, so that a long program does not hold the turn up.

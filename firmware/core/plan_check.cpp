@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "firmware/core/profiles/profile.hpp"
+#include "firmware/core/take_up.hpp"
 
 namespace diastole::firmware {
 
@@ -119,6 +120,37 @@ wire::Result<Ticks, PlanRefusal> check_program(const Program& program, const Set
     slowest_us = std::max(slowest_us, segment_peaks(segment, settings).stopping_us);
   }
   return microseconds(static_cast<std::int64_t>(slowest_us));
+}
+
+wire::Result<std::uint32_t, PlanRefusal> check_take_up(const Program& program, const Settings& settings,
+                                                       std::uint32_t backlash_steps) {
+  if (backlash_steps == 0) return std::uint32_t{0};
+  constexpr std::uint64_t kMost_us = 250'000;
+  // Ramps accelerate at a quarter of what is allowed.
+  std::uint64_t peak_steps_per_s2 = settings.stop_steps_per_s2() / 4;
+  for (std::size_t i = 0; i < program.size; ++i)
+    peak_steps_per_s2 =
+        std::max(peak_steps_per_s2,
+                 settings.steps_per_s(segment_peaks(program.segments[i], settings).acceleration_uL_per_s2));
+  const std::uint64_t window_us = take_up_window_us(backlash_steps, peak_steps_per_s2, settings);
+  for (std::size_t i = 0; i < program.size; ++i) {
+    const Segment& segment = program.segments[i];
+    const auto index = static_cast<std::uint16_t>(i);
+    const std::uint64_t allowed_us = std::min<std::uint64_t>(segment.period_us / 8, kMost_us);
+    if (window_us > allowed_us)
+      return PlanRefusal{wire::Refusal::limit_exceeded, wire::Limit::take_up, index,
+                         static_cast<std::int64_t>(window_us), static_cast<std::int64_t>(allowed_us)};
+    // Twice the sum of both speeds, so that between two steps of the profile there is always room for one more.
+    const std::uint64_t profile_Hz =
+        std::min(segment_peaks(segment, settings).step_rate_Hz, peak_steps_per_s2 * window_us / 1'000'000);
+    const std::uint64_t rate_Hz =
+        2 * (profile_Hz + divide_up(std::uint64_t{2'000'000} * backlash_steps, window_us));
+    if (rate_Hz > settings.limits().step_rate_Hz)
+      return PlanRefusal{wire::Refusal::limit_exceeded, wire::Limit::step_rate, index,
+                         static_cast<std::int64_t>(rate_Hz),
+                         static_cast<std::int64_t>(settings.limits().step_rate_Hz)};
+  }
+  return static_cast<std::uint32_t>(window_us);
 }
 
 }  // namespace diastole::firmware

@@ -43,7 +43,7 @@ void Planner::begin_glide(bool inflate, const Glide& glide, Ticks start) {
   plan_next();
 }
 
-void Planner::begin_stop(Ticks earliest, std::uint64_t deceleration_steps_per_s2) {
+void Planner::begin_stop(Ticks earliest, std::uint64_t deceleration_steps_per_s2, bool turning) {
   if (next_.flags == 0) return;
   phase_ = Phase::stop;
   index_ = count_ = 0;
@@ -51,7 +51,7 @@ void Planner::begin_stop(Ticks earliest, std::uint64_t deceleration_steps_per_s2
     origin_ = next_.tick + kRestBeforeEnd;
     return;
   }
-  if (last_interval() > Ticks{0}) {
+  if (last_interval() > Ticks{0} && !turning) {
     const Ticks interval = std::max(last_interval(), earliest - last_.tick);
     const std::uint64_t speed = static_cast<std::uint64_t>(kTicksPerSecond / interval.count + 1);
     count_ = static_cast<std::uint32_t>((speed * speed + deceleration_steps_per_s2 - 1) /

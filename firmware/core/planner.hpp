@@ -33,6 +33,7 @@ struct MotionEvent {
     kRunStart = 32,      ///< run time zero; no step
     kSegmentStart = 64,  ///< first cycle of the next segment begins; no step
     kEnd = 128,          ///< everything planned has been done; no step
+    kTakeUp = 256,       ///< a step that takes up play: the motor moves, the load does not (take_up.hpp)
   };
   Ticks tick;
   std::uint16_t flags = 0;  ///< 0: no event
@@ -57,7 +58,8 @@ class Planner {
   /// t_k = (2n + 1) Δ (1 - √(1 - 2k/(2n + 1))). Where the program itself is at rest (n = 0) the end comes
   /// kRestBeforeEnd after the last event. Near a turning point the Δ of the past overstates the speed, so the
   /// stop may go one step beyond it. A run not begun still begins; one whose end has been popped ends as planned.
-  void begin_stop(Ticks earliest, std::uint64_t deceleration_steps_per_s2);
+  /// `turning`: the motion is known to be at a turning point, n = 0.
+  void begin_stop(Ticks earliest, std::uint64_t deceleration_steps_per_s2, bool turning = false);
   /// Forgets everything planned.
   void clear() { next_ = {}; }
 

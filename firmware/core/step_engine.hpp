@@ -21,7 +21,8 @@ struct MotionReport {
 };
 
 struct MotionCounters {
-  Steps position;
+  Steps position;           ///< of the load, as commanded
+  Steps motor_beside_load;  ///< the motor stands at the sum: less by the play while withdrawing
   std::uint64_t steps = 0;
   std::uint32_t triggers = 0;  ///< since reset
   std::uint32_t r_waves = 0;
@@ -118,6 +119,7 @@ class StepEngine {
   void set_position(Steps position) {
     typename B::InterruptLock lock(board_);
     counters_.position = position;
+    counters_.motor_beside_load = Steps{0};
   }
   void set_ttl_width(Ticks width) { ttl_width_ = width; }
 
@@ -170,6 +172,12 @@ class StepEngine {
 
   /// Beginnings and ends: a few in a cycle.
   void mark(const Queued& event) {
+    if (event.has(MotionEvent::kTakeUp)) {  // count() has taken it for a step of the load
+      const Steps way{event.has(MotionEvent::kInflate) ? 1 : -1};
+      counters_.position -= way;
+      counters_.motor_beside_load += way;
+      return;
+    }
     if (event.has(MotionEvent::kCycleStart)) {
       ++counters_.cycles_begun;
       ++counters_.triggers;

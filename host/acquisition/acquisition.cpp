@@ -72,6 +72,9 @@ void Acquisition::obey(StopRequest request) {
   if (request == StopRequest::at_cycle_end) {
     controller_.stop_at_cycle_end();
     remark("info", "stop", "stop at the end of this cycle was asked for");
+  } else if (request == StopRequest::halt) {
+    controller_.halt();
+    remark("warning", "stop", "a halt was asked for: the motion is cut off at once");
   } else {
     controller_.stop_now();
     remark("warning", "stop", "controlled stop was asked for");

@@ -22,7 +22,7 @@
 
 namespace diastole {
 
-enum class StopRequest { none, at_cycle_end, now };
+enum class StopRequest { none, at_cycle_end, now, halt };  // the later wins
 
 /// A remark for the person in front: what the run file's /events will hold.
 struct RunRemark {

@@ -9,6 +9,10 @@ void add_host_commands(CommandLine& line) {
   add_run(line);
   add_status(line);
   add_stop(line);
+  add_jog(line);
+  add_clear_fault(line);
+  add_settings(line);
+  add_black_box(line);
   add_inspect(line);
   add_bin(line);
   add_recover(line);

@@ -32,10 +32,15 @@ void show_status(const nlohmann::json& status, bool as_json) {
   }
   fmt::print("state     {}\n", status.at("state").get<std::string>());
   if (!status.at("fault").is_null()) {
-    fmt::print("fault     {}: {}\n          {}\n", status.at("fault").get<std::string>(),
-               status.at("fault_text").get<std::string>(), status.at("remedy").get<std::string>());
+    fmt::print("fault     {} {}: {}\n          {}\n", status.at("fault_number").get<int>(),
+               status.at("fault").get<std::string>(), status.at("fault_text").get<std::string>(),
+               status.at("remedy").get<std::string>());
   }
-  fmt::print("position  {:.3f} mL\n", status.at("position_mL").get<double>());
+  const bool known = status.at("state") != "unhomed";
+  fmt::print("position  {:.3f} mL{}\n", status.at("position_mL").get<double>(),
+             known ? "" : ", counted from where it was switched on or lost its place");
+  if (const nlohmann::json problem = status.value("settings_problem", nlohmann::json()); !problem.is_null())
+    fmt::print("settings  {}\n", problem.get<std::string>());
   if (const nlohmann::json control = status.value("control", nlohmann::json()); !control.is_null()) {
     fmt::print("control   {} (process {})\n", control.at("user").get<std::string>(),
                control.at("pid").get<int64_t>());
@@ -86,22 +91,67 @@ void add_home(CommandLine& line) {
                "rig.home", homing_patience);
 }
 
+void add_clear_fault(CommandLine& line) {
+  add_question(line, "clear-fault", "leave a latched fault, once its cause is gone",
+               "  diastole status\n"
+               "      tells the fault's number, what happened and what to do about it\n"
+               "  diastole clear-fault\n"
+               "      homed again if the position is still known, else unhomed: diastole home is next",
+               "rig.clear_fault", std::chrono::seconds(30));
+}
+
+void add_jog(CommandLine& line) {
+  struct JogOptions {
+    DaemonAddress daemon;
+    double distance_mL = 0;
+    double rate_mL_s = 5;
+  };
+  auto options = std::make_shared<JogOptions>();
+  CLI::App* command =
+      line.add("jog", "move the piston by hand: so many mL from where it stands",
+               "  diastole jog --mL 5 --rate-mL-s 10\n"
+               "      inflates 5 mL from rest to rest; diastole stop ends it earlier\n"
+               "  diastole jog --mL=-2\n"
+               "      withdraws; unhomed too, at homing speed at most, to free a piston from a switch");
+  command->add_option("--mL", options->distance_mL, "distance, inflate positive")->required();
+  command->add_option("--rate-mL-s", options->rate_mL_s, "speed")->capture_default_str();
+  options->daemon.add_to(*command);
+  options->daemon.add_take_over_to(*command);
+  line.on_run(command, [options](const CommandOutput& out) {
+    DaemonClient client = options->daemon.connect();
+    const nlohmann::json status = client.call(
+        "rig.jog", {{"mL", options->distance_mL}, {"rate_mL_s", options->rate_mL_s}}, homing_patience);
+    if (!out.json) {
+      fmt::print("jogged    {:+.3f} mL{}\n", status.at("jogged_mL").get<double>(),
+                 status.at("stopped").get<bool>() ? ", stopped on request" : "");
+    }
+    show_status(status, out.json);
+    return status.at("stopped").get<bool>() ? ExitCode::negative : ExitCode::done;
+  });
+}
+
 void add_stop(CommandLine& line) {
   struct StopOptions {
     DaemonAddress daemon;
     bool cycle_end = false;
+    bool halt = false;
   };
   auto options = std::make_shared<StopOptions>();
-  CLI::App* command = line.add("stop", "stop the motion under control; anybody may",
-                               "  diastole stop\n"
-                               "      decelerates to rest now; the run keeps what was recorded\n"
-                               "  diastole stop --cycle-end");
-  command->add_flag("--cycle-end", options->cycle_end, "finish the present cycle first");
+  CLI::App* command =
+      line.add("stop", "stop the motion under control; anybody may",
+               "  diastole stop\n"
+               "      decelerates to rest now, a run, homing or a jog; the run keeps what was recorded\n"
+               "  diastole stop --cycle-end\n"
+               "  diastole stop --halt\n"
+               "      cuts the pulses off at once: the position is lost, fault 6 is latched;\n"
+               "      diastole clear-fault and diastole home afterwards");
+  auto* cycle_end = command->add_flag("--cycle-end", options->cycle_end, "finish the present cycle first");
+  command->add_flag("--halt", options->halt, "no deceleration: cut off at once")->excludes(cycle_end);
   options->daemon.add_to(*command);
   line.on_run(command, [options](const CommandOutput& out) {
     DaemonClient client(options->daemon.resolve());
-    const bool stopping =
-        client.call("run.stop", {{"how", options->cycle_end ? "cycle_end" : "now"}}).at("stopping");
+    const char* how = options->halt ? "halt" : options->cycle_end ? "cycle_end" : "now";
+    const bool stopping = client.call("run.stop", {{"how", how}}).at("stopping");
     if (!out.json) {
       fmt::print("{}\n", stopping ? "stop      asked for and accepted" : "stop      nothing was going on");
       std::fflush(stdout);

@@ -45,6 +45,8 @@ class Controller {
   virtual void start() = 0;
   virtual void stop_at_cycle_end() = 0;
   virtual void stop_now() = 0;
+  /// Cuts the motion off at once; leaves the fault `halted`, and the position is lost.
+  virtual void halt() = 0;
 
   /// For sleeping on input; null while there is none.
   virtual ByteLine* line() = 0;

@@ -8,6 +8,7 @@
 #include <limits>
 #include <random>
 
+#include "host/controller/settings_values.hpp"
 #include "protocol/contract/input_error.hpp"
 #include "protocol/wire/crc32.hpp"
 #include "protocol/wire/wire_text.hpp"
@@ -108,6 +109,11 @@ LimitInWords words_for(wire::Limit limit) {
       return {1, "pL", "Make bore, screw and steps in the rig file agree with the controller's settings."};
     case wire::Limit::home:
       return {1e-3, "mL", "Withdraw less: the home position ends the way."};
+    case wire::Limit::take_up:
+      return {
+          1e-3, "ms",
+          "Reduce stroke_mL or lengthen period_s: at each reversal the motor needs this time to take up the "
+          "backlash (diastole settings)."};
     case wire::Limit::none:
       break;
   }
@@ -143,6 +149,29 @@ LimitInWords words_for(wire::Limit limit) {
                     ""});
 }
 
+[[noreturn]] void refuse_jog(const wire::Nak& nak) {
+  const auto asked = static_cast<double>(nak.asked), allowed = static_cast<double>(nak.allowed);
+  switch (nak.limit) {
+    case wire::Limit::flow:
+      throw InputError({"", "--rate-mL-s",
+                        fmt::format("is {:g}, and {:g} mL/s are allowed here", 1e-3 * asked, 1e-3 * allowed),
+                        "Go slower; unhomed, the pump goes no faster than homing_flow_mL_s."});
+    case wire::Limit::travel:
+      throw InputError(
+          {"", "--mL",
+           fmt::format("would reach {:g} mL, and the travel is {:g} mL", 1e-3 * asked, 1e-3 * allowed),
+           "Go less far."});
+    case wire::Limit::home:
+      throw InputError({"", "--mL",
+                        fmt::format("would withdraw {:g} mL, and the piston stands at {:g} mL", 1e-3 * asked,
+                                    1e-3 * allowed),
+                        "Go less far; `diastole home` finds position 0."});
+    default:
+      throw InputError({"", "--mL", fmt::format("is {:g}, less than one microstep", 1e-6 * asked),
+                        fmt::format("A microstep is {:g} mL.", 1e-6 * allowed)});
+  }
+}
+
 std::string remedy_for(wire::Refusal refusal) {
   switch (refusal) {
     case wire::Refusal::wrong_state:
@@ -153,8 +182,15 @@ std::string remedy_for(wire::Refusal refusal) {
       return "A number in the rig or experiment file is beyond what this firmware takes; restart the daemon "
              "after "
              "a change of the rig file.";
+    case wire::Refusal::home_switch_closed:
+      return "The piston stands on the home switch: jog the other way (a positive distance), or `diastole "
+             "home`.";
+    case wire::Refusal::settings_mismatch:
+      return "Compare the rig file with `diastole settings`.";
+    case wire::Refusal::flash_failed:
+      return "Try again; if it persists the chip's flash is worn out: replace the board.";
     case wire::Refusal::limit_switch_closed:
-      return "Free the piston from the far limit switch by hand, then `diastole home`.";
+      return "Jog away from the far limit switch (a negative distance), then `diastole home`.";
     default:
       return "`diastole status` tells more; restart the daemon if it persists.";
   }
@@ -186,7 +222,8 @@ void ControllerClient::connect() {
     fail("does not answer", "Check that it is powered and runs the firmware (diastole flash), and `baud`.");
   }
   greet();
-  configure();
+  read_settings();
+  if (!settings_problem_) configure();
 }
 
 void ControllerClient::disconnect() {
@@ -219,14 +256,43 @@ void ControllerClient::greet() {
   next_time_question_ns_ = clock_.now_ns();
 }
 
+void ControllerClient::read_settings() {
+  const Answer answer = request(wire::ReadSettings{});
+  if (!answer.settings) fail("does not tell its settings", "Restart the daemon if it persists.");
+  settings_ = *answer.settings;
+  const bool written = settings_.records_written > 0;
+  settings_problem_ = written ? disagreement(rig_, settings_.settings) : std::nullopt;
+  microstep_pL_ = written ? settings_.microstep_pL
+                          : whole({rig_.file, "rig, volume of one microstep", 1e9 * rig_.microstep_mL, "pL",
+                                   1, 4'000'000'000});
+}
+
+void ControllerClient::require_agreement() const {
+  if (settings_problem_) throw InputError(*settings_problem_);
+}
+
+void ControllerClient::write_settings(const wire::MachineSettings& settings) {
+  demand(wire::WriteSettings{.settings = settings});
+  read_settings();
+  if (!settings_problem_) configure();
+}
+
+std::vector<wire::BlackBoxEntry> ControllerClient::black_box() {
+  std::vector<wire::BlackBoxEntry> entries;
+  for (uint32_t from = 0;; from = entries.back().number + 1) {
+    const Answer answer = request(wire::ReadBlackBox{.from = from});
+    if (!answer.black_box) fail("does not tell its black box", "Restart the daemon if it persists.");
+    if (answer.black_box->entry.number < std::max(from, 1U)) return entries;
+    entries.push_back(answer.black_box->entry);
+  }
+}
+
 void ControllerClient::configure() {
   const MotionLimits& limits = rig_.controller.limits;
   const auto limit = [&](const char* key, double value, const char* unit, uint32_t most) {
     return whole({rig_.file, std::string("controller.limits.") + key, value, unit, 1, most});
   };
   wire::Configure message;
-  microstep_pL_ =
-      whole({rig_.file, "rig, volume of one microstep", 1e9 * rig_.microstep_mL, "pL", 1, 4'000'000'000});
   message.microstep_pL = microstep_pL_;
   message.travel_uL = limit("travel_mL", 1e3 * limits.travel_mL, "uL", 50'000'000);
   message.flow_uL_per_s = limit("flow_mL_s", 1e3 * limits.flow_mL_s, "uL/s", 10'000'000);
@@ -271,6 +337,7 @@ void ControllerClient::upload(const Experiment& experiment) {
 }
 
 ProgramPlan ControllerClient::load(const Experiment& experiment) {
+  require_agreement();
   position_rate_Hz_ = reported_rate_Hz(experiment, rig_.controller);
   demand(wire::ClearProgram{});
   upload(experiment);
@@ -315,7 +382,26 @@ ProgramPlan ControllerClient::load(const Experiment& experiment) {
 
 void ControllerClient::unload() { demand(wire::ClearProgram{}); }
 
-void ControllerClient::home() { demand(wire::Home{.lease_id = lease_id_}); }
+void ControllerClient::home() {
+  require_agreement();
+  demand(wire::Home{.lease_id = lease_id_});
+}
+
+void ControllerClient::jog(double distance_mL, double rate_mL_s) {
+  require_agreement();
+  constexpr double most_mL = 50'000;
+  if (!(std::abs(distance_mL) <= most_mL))
+    throw InputError({"", "--mL", fmt::format("is {:g}", distance_mL), "Give a distance that the pump has."});
+  wire::Jog message;
+  message.lease_id = lease_id_;
+  message.distance_nL = std::llround(1e6 * distance_mL);
+  message.flow_uL_per_s = whole({"", "--rate-mL-s", 1e3 * rate_mL_s, "uL/s", 1, 10'000'000});
+  const Answer answer = request(message);
+  if (!answer.nak) return;
+  if (answer.nak->refusal == wire::Refusal::limit_exceeded) refuse_jog(*answer.nak);
+  fail(fmt::format("the jog is refused: {}", wire::refusal_explanation(answer.nak->refusal)),
+       remedy_for(answer.nak->refusal));
+}
 
 void ControllerClient::halt() { post(wire::Halt{}); }
 
@@ -368,6 +454,8 @@ void ControllerClient::receive() {
                               [&](const wire::Ack& m) { take_answer(m); },
                               [&](const wire::Nak& m) { take_answer(m); },
                               [&](const wire::Status& m) { take_answer(m); },
+                              [&](const wire::SettingsReport& m) { take_answer(m); },
+                              [&](const wire::BlackBoxReport& m) { take_answer(m); },
                               [&](const wire::TimeSync& m) { take(m); },
                               [&](const wire::SegmentPlanned& m) { plan_.push_back(m); },
                               [&](const auto& m) {
@@ -394,6 +482,8 @@ void ControllerClient::take_answer(const Message& message) {
   if constexpr (std::is_same_v<Message, wire::Hello>) answer_.hello = message;
   if constexpr (std::is_same_v<Message, wire::Ack>) answer_.ack = message;
   if constexpr (std::is_same_v<Message, wire::Nak>) answer_.nak = message;
+  if constexpr (std::is_same_v<Message, wire::SettingsReport>) answer_.settings = message;
+  if constexpr (std::is_same_v<Message, wire::BlackBoxReport>) answer_.black_box = message;
   if constexpr (std::is_same_v<Message, wire::Status>) answer_.status = last_known_ = message;
 }
 

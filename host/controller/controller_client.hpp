@@ -10,6 +10,7 @@
 #include "host/config/rig_config.hpp"
 #include "host/controller/controller.hpp"
 #include "host/transport/clock.hpp"
+#include "protocol/contract/input_error.hpp"
 #include "protocol/wire/reliable_link.hpp"
 
 namespace diastole {
@@ -23,7 +24,8 @@ class ControllerClient final : public Controller {
 
   ControllerClient(Clock& clock, const RigConfig& rig, OpenLine open_line);
 
-  /// Opens the line, checks that both sides speak the same protocol and sends geometry and limits.
+  /// Opens the line, checks that both sides speak the same protocol, reads the controller's settings, and sends
+  /// geometry and limits if they agree with the rig file; if not, orders to move throw what settings_problem() tells.
   /// Throws HardwareError with the remedy in words, InputError if a number of the rig file is beyond what the
   /// protocol can carry.
   void connect();
@@ -31,9 +33,18 @@ class ControllerClient final : public Controller {
   [[nodiscard]] bool connected() const { return line_ != nullptr && hello_.has_value(); }
   /// Of the controller that answered; precondition: connected().
   [[nodiscard]] const wire::Hello& hello() const { return *hello_; }
+  /// Calibrated if the controller's settings were ever written.
   [[nodiscard]] uint32_t microstep_pL() const { return microstep_pL_; }
   /// Of the program that was loaded last.
   [[nodiscard]] double position_rate_Hz() const { return position_rate_Hz_; }
+  /// What the controller keeps in its flash.
+  [[nodiscard]] const wire::SettingsReport& settings() const { return settings_; }
+  /// Where rig file and settings disagree.
+  [[nodiscard]] const std::optional<InputFault>& settings_problem() const { return settings_problem_; }
+  /// Replaces them; only at rest, and the pump is unhomed afterwards. Throws InputError, HardwareError.
+  void write_settings(const wire::MachineSettings& settings);
+  /// The last events, oldest first, over resets.
+  std::vector<wire::BlackBoxEntry> black_box();
 
   /// Loads and checks a whole program; afterwards the controller is armed, and will report positions at the
   /// sample rate, but no slower than 300 Hz and no faster than 1000 Hz. A program beyond a limit throws
@@ -43,8 +54,8 @@ class ControllerClient final : public Controller {
   /// Forgets the program; an armed controller is then homed.
   void unload();
   void home();
-  /// Ends motion at once, homing too, which no controlled stop ends; leaves the fault `halted`.
-  void halt();
+  /// Moves by `distance_mL`, inflate positive. Throws InputError with the limit that it would exceed.
+  void jog(double distance_mL, double rate_mL_s);
   void clear_fault();
   wire::Status status();
   /// The last status, brought forward by the events since: state, fault, position and triggers are of now, or
@@ -57,6 +68,7 @@ class ControllerClient final : public Controller {
   void start() override;
   void stop_at_cycle_end() override;
   void stop_now() override;
+  void halt() override;
   ByteLine* line() override { return line_.get(); }
 
  private:
@@ -65,6 +77,8 @@ class ControllerClient final : public Controller {
     std::optional<wire::Nak> nak;
     std::optional<wire::Hello> hello;
     std::optional<wire::Status> status;
+    std::optional<wire::SettingsReport> settings;
+    std::optional<wire::BlackBoxReport> black_box;
   };
 
   template <class Message>
@@ -74,8 +88,10 @@ class ControllerClient final : public Controller {
   template <class Message>
   void demand(Message message);
   void greet();
+  void read_settings();
   void configure();
   void upload(const Experiment& experiment);
+  void require_agreement() const;
   void turn();
   void receive();
   void transmit();
@@ -98,6 +114,8 @@ class ControllerClient final : public Controller {
   uint32_t lease_id_ = 0;
   uint32_t microstep_pL_ = 0;
   double position_rate_Hz_ = 0;
+  wire::SettingsReport settings_;
+  std::optional<InputFault> settings_problem_;
   uint16_t next_request_id_ = 1;
   uint64_t next_heartbeat_ns_ = 0;
   uint64_t next_time_question_ns_ = 0;

@@ -18,6 +18,15 @@ void rig_status(RigService& rig, const json&, Done done) { rig.status(std::move(
 void rig_home(RigService& rig, const json&, Done done) { rig.home(std::move(done)); }
 void rig_clear_fault(RigService& rig, const json&, Done done) { rig.clear_fault(std::move(done)); }
 
+void rig_jog(RigService& rig, const json& params, Done done) {
+  rig.jog(params.at("mL"), params.at("rate_mL_s"), std::move(done));
+}
+void rig_settings(RigService& rig, const json&, Done done) { rig.settings(std::move(done)); }
+void rig_write_settings(RigService& rig, const json& params, Done done) {
+  rig.write_settings({params.value("defaults", false), params.value("set", json::object())}, std::move(done));
+}
+void rig_black_box(RigService& rig, const json&, Done done) { rig.black_box(std::move(done)); }
+
 void run_start(RigService& rig, const json& params, Done done) {
   const std::string text = params.at("experiment");
   if (text.size() > most_experiment_bytes) {
@@ -37,10 +46,13 @@ void run_progress(RigService& rig, const json& params, const Done& done) {
 
 void run_stop(RigService& rig, const json& params, const Done& done) {
   const std::string how = params.value("how", "now");
-  if (how != "now" && how != "cycle_end") {
-    throw rpc::Error(rpc::Code::invalid_params, "how must be \"now\" or \"cycle_end\"");
+  if (how != "now" && how != "cycle_end" && how != "halt") {
+    throw rpc::Error(rpc::Code::invalid_params, "how must be \"cycle_end\", \"now\" or \"halt\"");
   }
-  done(nullptr, {{"stopping", rig.stop(how == "now" ? StopRequest::now : StopRequest::at_cycle_end)}});
+  const StopRequest request = how == "halt"  ? StopRequest::halt
+                              : how == "now" ? StopRequest::now
+                                             : StopRequest::at_cycle_end;
+  done(nullptr, {{"stopping", rig.stop(request)}});
 }
 
 constexpr std::array all_methods{

@@ -13,6 +13,8 @@
 
 #include "host/acquisition/disk_room.hpp"
 #include "host/acquisition/journal_store.hpp"
+#include "host/controller/black_box_text.hpp"
+#include "host/controller/settings_values.hpp"
 #include "host/daemon/json_rpc.hpp"
 #include "host/daemon/uuid.hpp"
 #include "host/runfile/assemble.hpp"
@@ -123,6 +125,16 @@ void make_journal_dir(const std::filesystem::path& directory) {
   }
 }
 
+/// What the controller's own settings say of the rig; the volume of a step is the calibrated one.
+void add_settings(json& rig, const ControllerClient& controller) {
+  const wire::SettingsReport& report = controller.settings();
+  const json own = settings_as_json(report.settings);
+  for (const char* name : {"calibration_ppm", "backlash_um", "travel_mm", "full_step_rate_Hz", "board_name"})
+    rig[name] = own.at(name);
+  rig["settings_record"] = report.records_written;
+  rig["volume_per_step_mL"] = 1e-9 * controller.microstep_pL();
+}
+
 std::string utc_now() { return fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr))); }
 
 }  // namespace
@@ -137,7 +149,10 @@ RigService::RigService(RigConfig rig, const RigServiceOptions& options)
   make_journal_dir(rig_.daemon.journal_dir);
   tidy_journals();
   spdlog::info("controller at {}, instrument {}", rig_.controller.port, instrument_->describe());
+  if (controller_->settings_problem())
+    spdlog::warn("{}", InputError(*controller_->settings_problem()).what());
   (void)do_status();
+  (void)remember_settings();
   thread_ = std::jthread([this](const std::stop_token& stop) { work(stop); });
 }
 
@@ -260,6 +275,39 @@ void RigService::clear_fault(Done done) {
         std::move(done)});
 }
 
+void RigService::jog(double distance_mL, double rate_mL_s, Done done) {
+  give({"jogging", [this, distance_mL, rate_mL_s] { return do_jog(distance_mL, rate_mL_s); },
+        std::move(done)});
+}
+
+void RigService::settings(Done done) {
+  json snapshot;
+  {
+    const std::lock_guard lock(mutex_);
+    if (!activity_.empty()) snapshot = last_settings_;
+  }
+  if (!snapshot.is_null()) return done(nullptr, std::move(snapshot));
+  give({"", [this] { return remember_settings(); }, std::move(done)});
+}
+
+void RigService::write_settings(SettingsChange change, Done done) {
+  give({"writing_settings",
+        [this, change = std::move(change)] {
+          wire::MachineSettings settings =
+              change.defaults ? wire::MachineSettings{} : controller_->settings().settings;
+          change_settings(settings, change.set);
+          controller_->write_settings(settings);
+          spdlog::info("settings written: {}", settings_as_json(settings).dump());
+          (void)do_status();
+          return remember_settings();
+        },
+        std::move(done)});
+}
+
+void RigService::black_box(Done done) {
+  give({"reading_black_box", [this] { return do_black_box(); }, std::move(done)});
+}
+
 void RigService::status(Done done) {
   json snapshot;
   {
@@ -348,23 +396,32 @@ json RigService::run_progress(size_t first_remark) const {
           {"result", run_->result}};
 }
 
-json RigService::do_home() {
-  controller_->home();
+bool RigService::await_end_of(wire::State moving) {
   const uint64_t end_ns = clock_->now_ns() + homing_patience_ns;
-  bool stopping = false;
-  for (wire::Status status = controller_->status(); status.state == wire::State::homing;
-       status = controller_->status()) {
+  StopRequest obeyed = StopRequest::none;
+  for (wire::Status status = controller_->status(); status.state == moving; status = controller_->status()) {
     (void)remember(status);
-    if ((asked_to_stop() || clock_->now_ns() > end_ns) && !std::exchange(stopping, true)) controller_->halt();
+    StopRequest asked = clock_->now_ns() > end_ns ? StopRequest::halt : StopRequest::none;
+    {
+      const std::lock_guard lock(mutex_);
+      asked = std::max(asked, stop_request_);
+    }
+    if (asked > obeyed) asked == StopRequest::halt ? controller_->halt() : controller_->stop_now();
+    obeyed = std::max(asked, obeyed);
     for (const uint64_t until_ns = clock_->now_ns() + homing_step_ns; clock_->now_ns() < until_ns;) {
       clock_->sleep_until_ns(std::min(until_ns, controller_->next_due_ns()), controller_->line());
       controller_->service();
     }
   }
   controller_->take_events();
+  return obeyed != StopRequest::none;
+}
+
+json RigService::do_home() {
+  controller_->home();
+  const bool stopped = await_end_of(wire::State::homing);
   json result = do_status();
-  if (stopping && result["fault"] == wire::fault_name(wire::Fault::halted)) {
-    controller_->clear_fault();
+  if (stopped && result["state"] == "unhomed") {
     throw HardwareError("rig", "homing was stopped",
                         "The pump does not know its place: `diastole home` again.");
   }
@@ -377,15 +434,60 @@ json RigService::do_home() {
   return result;
 }
 
+json RigService::do_jog(double distance_mL, double rate_mL_s) {
+  const int32_t before = controller_->status().position_microsteps;
+  controller_->jog(distance_mL, rate_mL_s);
+  const bool stopped = await_end_of(wire::State::jogging);
+  const int32_t after = controller_->status().position_microsteps;
+  json result = do_status();
+  if (!result["fault"].is_null()) {
+    throw HardwareError("controller at " + rig_.controller.port,
+                        "the jog ended with a fault: " + result["fault_text"].get<std::string>(),
+                        result["remedy"].get<std::string>());
+  }
+  result["jogged_mL"] = 1e-9 * controller_->microstep_pL() * (after - before);
+  result["stopped"] = stopped;
+  return result;
+}
+
+json RigService::remember_settings() {
+  const wire::SettingsReport& report = controller_->settings();
+  const auto& problem = controller_->settings_problem();
+  json result{{"record", report.records_written},
+              {"settings", settings_as_json(report.settings)},
+              {"microstep_uL", 1e-6 * controller_->microstep_pL()},
+              {"backlash_microsteps", report.backlash_microsteps},
+              {"problem", problem ? json(InputError(*problem).what()) : json()}};
+  const std::lock_guard lock(mutex_);
+  last_settings_ = result;
+  return result;
+}
+
+json RigService::do_black_box() {
+  const double tick_rate_Hz = controller_->hello().tick_rate_Hz;
+  json entries = json::array();
+  for (const wire::BlackBoxEntry& entry : controller_->black_box()) {
+    entries.push_back({{"number", entry.number},
+                       {"boot", entry.boot},
+                       {"time_s", static_cast<double>(entry.tick) / tick_rate_Hz},
+                       {"kind", wire::noted_name(entry.kind)},
+                       {"text", in_words(entry)}});
+  }
+  const bool since_power_on = !entries.empty() && entries.front()["number"] == 1;
+  return {{"entries", entries}, {"since_power_on", since_power_on}};
+}
+
 json RigService::do_status() { return remember(controller_->status()); }
 
 json RigService::remember(const wire::Status& status) {
   const wire::Hello& hello = controller_->hello();
+  const auto& problem = controller_->settings_problem();
   const double position_mL =
       1e-9 * static_cast<double>(controller_->microstep_pL()) * status.position_microsteps;
   json result{
       {"state", wire::state_name(status.state)},
       {"fault", status.fault == wire::Fault::none ? json() : json(wire::fault_name(status.fault))},
+      {"fault_number", static_cast<int>(status.fault)},
       {"fault_text", wire::fault_explanation(status.fault)},
       {"remedy", wire::fault_remedy(status.fault)},
       {"firmware", fmt::format("{}.{}.{}", hello.version_major, hello.version_minor, hello.version_patch)},
@@ -397,6 +499,7 @@ json RigService::remember(const wire::Status& status) {
       {"triggers", status.triggers},
       {"steps", status.steps},
       {"link", {{"crc_errors", status.crc_errors}, {"retransmissions", status.retransmissions}}},
+      {"settings_problem", problem ? json(InputError(*problem).what()) : json()},
       {"controller", rig_.controller.port},
       {"instrument", instrument_->describe()}};
   const std::lock_guard lock(mutex_);
@@ -491,6 +594,7 @@ void RigService::write_beginning(JournalWriter& journal, const RunRecord& record
     channels.push_back(channel.name);
   json rig = attributes_as_json(rig_.attributes);
   rig["daq_rate_Hz"] = sample_rate_Hz;
+  add_settings(rig, *controller_);
   const TimerFacts timer = make_source(*clock_, *instrument_)->timer(sample_rate_Hz);
   const json beginning{{"record", "begin"},
                        {"run_id", record.run_id},

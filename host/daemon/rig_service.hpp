@@ -2,7 +2,7 @@
 // The rig behind the daemon: one thread owns controller, instrument, clock and journal, and carries out one
 // order at a time; everybody else talks to it through this class.
 //
-// start_run, home and clear_fault occupy the rig from the moment they are accepted (activity: loading,
+// start_run, home, jog, clear_fault and the like occupy the rig from the moment they are accepted (activity: loading,
 // running, writing, homing, clearing_fault) and are refused with rpc::Error busy while another does. A stop
 // that is asked for after an order was accepted is obeyed by it, at whatever moment: before the start, the
 // order is refused.
@@ -54,6 +54,19 @@ class RigService {
   void start_run(Experiment experiment, Done done);
   void home(Done done);
   void clear_fault(Done done);
+  /// Relative, inflate positive; `done` when it is at rest again.
+  void jog(double distance_mL, double rate_mL_s, Done done);
+  /// {"record": 0 if never written, "settings": {name: value}, "microstep_uL", "backlash_microsteps", "problem":
+  /// where the rig file disagrees, or null}. While the rig is occupied, as they were last read.
+  void settings(Done done);
+  struct SettingsChange {
+    bool defaults = false;  ///< begin with the initial ones
+    nlohmann::json set;     ///< {name: value}
+  };
+  /// `done` with what settings() then tells. The pump is unhomed afterwards.
+  void write_settings(SettingsChange change, Done done);
+  /// {"entries": [{"number", "boot", "time_s", "kind", "text"}], oldest first, "since_power_on"}.
+  void black_box(Done done);
   /// {"state", "fault", "firmware", "position_mL", ...}. While the rig is occupied `state` is the activity, and
   /// the answer comes at once, from what the controller last told.
   void status(Done done);
@@ -95,6 +108,11 @@ class RigService {
   void carry_out(Order order);
   void reconnect_if_due();
   nlohmann::json do_home();
+  nlohmann::json do_jog(double distance_mL, double rate_mL_s);
+  /// Waits while the controller is in this state, passing on a stop; true if one was asked for.
+  bool await_end_of(wire::State moving);
+  nlohmann::json remember_settings();
+  nlohmann::json do_black_box();
   nlohmann::json do_status();
   nlohmann::json remember(const wire::Status& status);
   [[nodiscard]] bool asked_to_stop() const;
@@ -129,6 +147,7 @@ class RigService {
   std::optional<RunRecord> run_;
   nlohmann::json last_status_;
   nlohmann::json journals_;
+  nlohmann::json last_settings_;
   std::jthread thread_;  // last: it uses the members above
 };
 

@@ -4,10 +4,14 @@
 //   method          params                          who           result
 //   rig.status                                      anybody       RigService::status, and who controls the rig
 //   run.progress    {first_remark}                  anybody       RigService::run_progress
-//   run.stop        {how: "cycle_end" | "now"}      anybody       {stopping}
+//   run.stop        {how: "cycle_end"|"now"|"halt"} anybody       {stopping}
 //   run.start       {experiment, file, points}      controller    {run_id, journal, run_file}
 //   rig.home                                        controller    status
 //   rig.clear_fault                                 controller    status
+//   rig.jog         {mL, rate_mL_s}                 controller    status, and jogged_mL
+//   rig.settings                                    anybody       RigService::settings
+//   rig.write_settings {set: {name: value}, defaults} controller  RigService::settings
+//   rig.black_box                                   anybody       RigService::black_box
 //   control.take    {take_over: who holds it}       controller    {user, uid, pid}
 //   control.release                                 anybody       {}
 //

@@ -90,7 +90,7 @@ class FieldReader {
   constexpr void list(Nameless, std::uint8_t& count, std::array<T, N>& values) {
     count = take<std::uint8_t>();
     if (!check(count <= N)) return;
-    for (std::size_t i = 0; i < count; ++i)
+    for (std::size_t i = 0; i < N && i < count; ++i)
       values[i] = take<T>();
   }
   /// The first fault met, if any; also bytes left over are a wrong length.

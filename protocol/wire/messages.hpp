@@ -15,6 +15,7 @@
 #include <span>
 #include <string_view>
 
+#include "protocol/wire/black_box_messages.hpp"
 #include "protocol/wire/field_codec.hpp"
 #include "protocol/wire/frame.hpp"
 #include "protocol/wire/motion_messages.hpp"

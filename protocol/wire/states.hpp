@@ -7,6 +7,9 @@
 //      │ ClearFault (position lost)              │ └ClearProgram─┘                ▼ lease lost
 //   faulted ◀── e-stop, limit, underrun, …       └─────────── at rest ─────── stopping
 //      └── ClearFault (position kept: lease_lost) ──▶ homed
+//
+//   unhomed, homed ──Jog──▶ jogging ──at rest──▶ as before        homing ──StopNow──▶ unhomed
+//   homed, armed ──settings written──▶ unhomed
 
 #include <cstdint>
 

@@ -46,6 +46,11 @@ constexpr Words kUpdateOutcomes[] = {
 #include "protocol/wire/update_outcome_list.inc"
 #undef DIASTOLE_UPDATE_OUTCOME
 };
+constexpr Words kNoted[] = {
+#define DIASTOLE_BLACK_BOX(number, name) {#name, {}, {}},
+#include "protocol/wire/black_box_list.inc"
+#undef DIASTOLE_BLACK_BOX
+};
 
 template <class Enum, std::size_t N>
 const Words& words_of(const Words (&table)[N], Enum number) {
@@ -66,6 +71,7 @@ std::string_view limit_name(Limit limit) { return words_of(kLimits, limit).name;
 std::string_view limit_unit(Limit limit) { return words_of(kLimits, limit).explanation; }
 std::string_view state_name(State state) { return words_of(kStates, state).name; }
 std::string_view waveform_name(Waveform waveform) { return words_of(kWaveforms, waveform).name; }
+std::string_view noted_name(Noted kind) { return words_of(kNoted, kind).name; }
 std::string_view run_end_name(RunEnd reason) { return words_of(kRunEnds, reason).name; }
 std::string_view update_outcome_explanation(UpdateOutcome outcome) {
   return words_of(kUpdateOutcomes, outcome).explanation;

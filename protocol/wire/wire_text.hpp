@@ -3,6 +3,7 @@
 
 #include <string_view>
 
+#include "protocol/wire/black_box_messages.hpp"
 #include "protocol/wire/faults.hpp"
 #include "protocol/wire/states.hpp"
 #include "protocol/wire/update.hpp"
@@ -20,6 +21,7 @@ std::string_view limit_unit(Limit limit);
 std::string_view state_name(State state);
 std::string_view waveform_name(Waveform waveform);
 std::string_view run_end_name(RunEnd reason);
+std::string_view noted_name(Noted kind);
 /// "{}" in it stands for UpdateAnswer.value.
 std::string_view update_outcome_explanation(UpdateOutcome outcome);
 std::string_view update_outcome_remedy(UpdateOutcome outcome);

@@ -27,6 +27,10 @@ void Bench::hear(const wire::Received& received) {
                             heard.settings.push_back(message);
                             heard.answers.push_back({message.request_id, wire::Refusal::none});
                           },
+                          [&](const wire::BlackBoxReport& message) {
+                            heard.black_box.push_back(message);
+                            heard.answers.push_back({message.request_id, wire::Refusal::none});
+                          },
                           [&](const wire::SegmentPlanned& message) { heard.planned.push_back(message); },
                           [&](const wire::StateChanged& message) { heard.states.push_back(message); },
                           [&](const wire::RunStarted& message) { heard.started.push_back(message); },

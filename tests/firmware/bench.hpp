@@ -28,6 +28,7 @@ struct Heard {
   std::vector<wire::Nak> naks;
   std::vector<wire::Status> statuses;
   std::vector<wire::SettingsReport> settings;
+  std::vector<wire::BlackBoxReport> black_box;
   std::vector<wire::SegmentPlanned> planned;
   std::vector<wire::StateChanged> states;
   std::vector<wire::RunStarted> started;

@@ -22,6 +22,7 @@ struct Plan {
   Segment segment{Waveform::parabolic, 10, 40'000'000, 0, 1'200'000};
   std::uint32_t ttl_width_us = 10'000;
   wire::Configure configure = wire::Configure::example();
+  std::uint32_t backlash_steps = 0;
   std::optional<wire::Jog> jog;  ///< from 100 microsteps above home, instead of the segment
 
   /// As the controller judges it: first Configure, then Arm or Jog.
@@ -34,7 +35,9 @@ struct Plan {
     program.ttl_width_us = ttl_width_us;
     program.rest_us = 1'000'000;
     const auto checked = check_program(program, Settings(configure));
-    return checked.ok() ? PlanRefusal{} : checked.error();
+    if (!checked.ok()) return checked.error();
+    const auto window_us = check_take_up(program, Settings(configure), backlash_steps);
+    return window_us.ok() ? PlanRefusal{} : window_us.error();
   }
 };
 
@@ -92,6 +95,14 @@ Excess microstep() {
   return excess;
 }
 
+/// An eighth of 1.2 s; see take_up.hpp for the window.
+Excess take_up() {
+  Excess excess{{}, 150'049, 150'000, {}};
+  excess.beyond.backlash_steps = 907;
+  excess.within.backlash_steps = 906;
+  return excess;
+}
+
 /// 100 microsteps are 779 uL and a bit.
 Excess home() {
   Excess excess{{}, 786, 779, {}};
@@ -130,6 +141,8 @@ Excess excess_of(Limit limit) {
       return microstep();
     case Limit::home:
       return home();
+    case Limit::take_up:
+      return take_up();
   }
   return {};
 }

@@ -49,6 +49,9 @@ class RecordedController {
   /// Microsteps from the home switch: never jumps, whatever the firmware believes.
   [[nodiscard]] std::int32_t mechanical_microsteps() const { return board_.mechanical_steps(); }
 
+  /// The load driven with Mechanics::play_steps.
+  [[nodiscard]] std::int32_t load_microsteps() const { return board_.load_steps(); }
+
   void set_estop(bool pressed);
   void set_far_limit(bool closed);
   /// The main loop does not come round until then (interrupts do).

@@ -33,7 +33,7 @@ void RecordingBoard::cancel_pulses() {
 }
 
 Inputs RecordingBoard::inputs() const {
-  return {estop_, home_closed_, forced_far_limit_ || mechanical_steps_ >= options_.mechanics.far_limit_steps};
+  return {estop_, home_closed_, forced_far_limit_ || load_steps_ >= options_.mechanics.far_limit_steps};
 }
 
 std::optional<std::uint8_t> RecordingBoard::serial_read() {
@@ -81,7 +81,7 @@ void RecordingBoard::carry_out(const PulseOrder& order) {
     coming_.push({now_ + kStepPulse, Signal::STEP, 0});
     const bool inflating = pins_[static_cast<std::size_t>(Signal::DIR)] != 0;
     if (pins_[static_cast<std::size_t>(Signal::ENABLE)] != 0) mechanical_steps_ += inflating ? 1 : -1;
-    move_home_switch();
+    move_load();
   }
   if (order.ttl) {
     set_pin(Signal::TTL, 1);
@@ -93,9 +93,11 @@ void RecordingBoard::carry_out(const PulseOrder& order) {
                   static_cast<std::int32_t>(r_wave_uV(kRWaveCodes[i]))});
 }
 
-void RecordingBoard::move_home_switch() {
-  if (mechanical_steps_ <= 0) home_closed_ = true;
-  if (mechanical_steps_ > options_.mechanics.home_hysteresis_steps && !options_.mechanics.home_stuck)
+/// Inflating the motor pushes it along; withdrawing, it comes along once the play is taken up.
+void RecordingBoard::move_load() {
+  load_steps_ = std::clamp(load_steps_, mechanical_steps_, mechanical_steps_ + options_.mechanics.play_steps);
+  if (load_steps_ <= 0) home_closed_ = true;
+  if (load_steps_ > options_.mechanics.home_hysteresis_steps && !options_.mechanics.home_stuck)
     home_closed_ = false;
 }
 

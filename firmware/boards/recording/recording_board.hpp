@@ -42,6 +42,7 @@ struct Mechanics {
   std::int32_t start_steps = 400;  ///< where the piston stands at reset, counted from the home switch
   std::int32_t far_limit_steps = 2'000'000'000;
   std::int32_t home_hysteresis_steps = 0;  ///< the home switch opens that much further out than it closes
+  std::int32_t play_steps = 0;             ///< what the motor must turn back before the load comes along
   bool home_stuck = false;                 ///< closed for ever once it has closed
 };
 
@@ -51,6 +52,7 @@ class RecordingBoard {
   /// What outlives a reset: hand it to the next board.
   struct Memory {
     MemoryFlash flash;
+    BlackBox::Memory retained{};
   };
   struct Options {
     Identity identity{1, 0x0000B007, wire::ResetCause::power_on};
@@ -65,8 +67,10 @@ class RecordingBoard {
   };
 
   explicit RecordingBoard(Options options)
-      : options_(options), mechanical_steps_(options.mechanics.start_steps) {
-    move_home_switch();
+      : options_(options),
+        mechanical_steps_(options.mechanics.start_steps),
+        load_steps_(options.mechanics.start_steps) {
+    move_load();
   }
 
   // What the core sees (concept Board).
@@ -85,6 +89,7 @@ class RecordingBoard {
   [[nodiscard]] std::size_t serial_room() const;
   void serial_write(std::span<const std::uint8_t> bytes);
   void feed_watchdog() {}
+  BlackBox::Memory& retained() { return options_.memory->retained; }
   MemoryFlash& settings_flash() { return options_.memory->flash; }
   [[nodiscard]] RunningImage running_image() const { return options_.image; }
   bool confirm_image() {
@@ -113,6 +118,8 @@ class RecordingBoard {
   std::vector<std::uint8_t> take_sent();
   std::vector<Edge> take_edges() { return std::exchange(edges_, {}); }
   void record_edges(bool on) { recording_ = on; }
+  /// Where the load is that the motor drives with play, in the same count; it is what closes the switches.
+  [[nodiscard]] std::int32_t load_steps() const { return load_steps_; }
   /// Steps made since reset, from the home switch; a step counts only while the motor is enabled.
   [[nodiscard]] std::int32_t mechanical_steps() const { return mechanical_steps_; }
 
@@ -127,7 +134,7 @@ class RecordingBoard {
   [[nodiscard]] Ticks byte_time() const { return {kTicksPerSecond * 10 / options_.baud}; }
   void set_pin(Signal signal, std::int32_t value);
   void carry_out(const PulseOrder& order);
-  void move_home_switch();
+  void move_load();
 
   Options options_;
   Ticks now_;
@@ -137,6 +144,7 @@ class RecordingBoard {
   std::priority_queue<Edge, std::vector<Edge>, Later> coming_;  ///< falling edges and R-wave samples
   std::int32_t pins_[6] = {};
   std::int32_t mechanical_steps_;
+  std::int32_t load_steps_;
   bool home_closed_ = false;
   bool estop_ = false;
   bool forced_far_limit_ = false;

@@ -15,6 +15,9 @@ namespace {
 /// The number behind the FAULT pin, at 0x20000000 (stm32f405.ld) for whoever looks from outside.
 [[gnu::section(".shown"), gnu::used]] volatile std::uint8_t shown_fault;
 
+/// Not written at start-up: what it holds outlives a reset.
+[[gnu::section(".retained")]] firmware::BlackBox::Memory retained_memory;
+
 }  // namespace
 
 void Stm32Board::start() {
@@ -56,6 +59,8 @@ firmware::Inputs Stm32Board::inputs() const {
   const std::uint32_t levels = gpio_c().IDR.read();
   return {(levels & kEstopPin) != 0, (levels & kHomePin) != 0, (levels & kFarLimitPin) != 0};
 }
+
+firmware::BlackBox::Memory& Stm32Board::retained() { return retained_memory; }
 
 void Stm32Board::feed_watchdog() { stm32::feed_watchdog(); }
 

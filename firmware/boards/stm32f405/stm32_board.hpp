@@ -57,6 +57,7 @@ class Stm32Board {
   [[nodiscard]] std::size_t serial_room() const { return serial_.room(); }
   void serial_write(std::span<const std::uint8_t> bytes) { serial_.write(bytes); }
   void feed_watchdog();
+  firmware::BlackBox::Memory& retained();
   SettingsFlash& settings_flash() { return settings_flash_; }
   [[nodiscard]] firmware::RunningImage running_image() const { return stm32::running_image(); }
   bool confirm_image() { return confirm_running_image(); }
