@@ -50,6 +50,8 @@ class StepEngine {
   static constexpr std::size_t kSamples = 512;
   /// An order must reach the timer this long before its tick, or the compare would be missed.
   static constexpr Ticks kLeastLead{42};
+  /// … and one that starts a cycle, for which the board prepares TTL and R-wave first.
+  static constexpr Ticks kTriggerLead = microseconds(2);
 
   explicit StepEngine(B& board) : board_(board) {}
 
@@ -148,7 +150,8 @@ class StepEngine {
     const Queued* next = queue_.front();
     loaded_ = next != nullptr;
     if (next == nullptr) return board_.rest();
-    if (board_.ticks_until(next->tick) < kLeastLead.count) {
+    const Ticks lead = next->has(MotionEvent::kCycleStart) ? kTriggerLead : kLeastLead;
+    if (board_.ticks_until(next->tick) < lead.count) {
       underrun_ = true;
       return cut();
     }
