@@ -19,8 +19,8 @@ class Dispatch {
  public:
   using Store = SettingsStore<typename B::SettingsFlash>;
 
-  Dispatch(B& board, Motion<B>& motion, Store& store, BlackBox& black_box, ImageTrial<B>& trial, Outbox& outbox,
-           wire::ReliableLink& link)
+  Dispatch(B& board, Motion<B>& motion, Store& store, BlackBox& black_box, ImageTrial<B>& trial,
+           Outbox& outbox, wire::ReliableLink& link)
       : board_(board),
         motion_(motion),
         store_(store),
