@@ -116,7 +116,7 @@ std::unique_ptr<BlockInstrument> open_usb1208ls(Usb1208lsSetup setup, OpenHid op
   return std::make_unique<Usb1208ls>(std::move(setup), std::move(open));
 }
 
-OpenInstrument configure_usb1208ls(TableReader& daq, std::vector<TableReader>& channels) {
+Usb1208lsSetup read_usb1208ls(TableReader& daq, std::vector<TableReader>& channels) {
   Usb1208lsSetup setup;
   setup.address.serial = daq.text_or("serial", "");
   for (TableReader& channel : channels)
@@ -125,6 +125,11 @@ OpenInstrument configure_usb1208ls(TableReader& daq, std::vector<TableReader>& c
     daq.fail("channel", fmt::format("is given {} times", setup.queue.size()),
              "A USB-1208LS has four differential inputs.");
   }
+  return setup;
+}
+
+OpenInstrument configure_usb1208ls(TableReader& daq, std::vector<TableReader>& channels) {
+  const Usb1208lsSetup setup = read_usb1208ls(daq, channels);
   return [setup](const OpenOptions& options) -> std::unique_ptr<Instrument> {
     Usb1208lsSetup opened = setup;
     if (options.address) opened.address.serial = *options.address;
