@@ -39,7 +39,7 @@ install(FILES ${packaging}/60-diastole.rules DESTINATION lib/udev/rules.d)
 install(FILES ${packaging}/sysusers.conf DESTINATION lib/sysusers.d RENAME diastole.conf)
 install(FILES ${staged}/rig.toml DESTINATION /etc/diastole)
 install(DIRECTORY ${DIASTOLE_FIRMWARE_IMAGES}/ DESTINATION share/diastole/firmware OPTIONAL
-        FILES_MATCHING PATTERN "*.bin" PATTERN "*.hex" PATTERN "*.img")
+        FILES_MATCHING PATTERN "*.bin" PATTERN "*.hex" PATTERN "*.image")
 install(FILES README.md ${staged}/copyright DESTINATION share/doc/diastole)
 install(DIRECTORY docs/ DESTINATION share/doc/diastole/docs FILES_MATCHING PATTERN "*.md" PATTERN "*.svg" PATTERN "*.png")
 install(DIRECTORY examples DESTINATION share/doc/diastole)

@@ -31,6 +31,8 @@ void Bench::hear(const wire::Received& received) {
                             heard.black_box.push_back(message);
                             heard.answers.push_back({message.request_id, wire::Refusal::none});
                           },
+                          [&](const wire::UpdateAnswer& message) { heard.updates.push_back(message); },
+                          [&](const wire::ImageReport& message) { heard.images.push_back(message); },
                           [&](const wire::SegmentPlanned& message) { heard.planned.push_back(message); },
                           [&](const wire::StateChanged& message) { heard.states.push_back(message); },
                           [&](const wire::RunStarted& message) { heard.started.push_back(message); },

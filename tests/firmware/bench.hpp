@@ -29,6 +29,8 @@ struct Heard {
   std::vector<wire::Status> statuses;
   std::vector<wire::SettingsReport> settings;
   std::vector<wire::BlackBoxReport> black_box;
+  std::vector<wire::UpdateAnswer> updates;
+  std::vector<wire::ImageReport> images;
   std::vector<wire::SegmentPlanned> planned;
   std::vector<wire::StateChanged> states;
   std::vector<wire::RunStarted> started;

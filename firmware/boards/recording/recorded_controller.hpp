@@ -52,6 +52,9 @@ class RecordedController {
   /// The load driven with Mechanics::play_steps.
   [[nodiscard]] std::int32_t load_microsteps() const { return board_.load_steps(); }
 
+  /// Whether the firmware has asked for a reset; it is not carried out.
+  [[nodiscard]] RecordingBoard::Restart restart_asked() const { return board_.restart_asked(); }
+
   void set_estop(bool pressed);
   void set_far_limit(bool closed);
   /// The main loop does not come round until then (interrupts do).
