@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <nlohmann/json.hpp>
 
 #include "protocol/wire/wire_text.hpp"
@@ -27,6 +28,10 @@ Acquisition::Acquisition(Clock& clock, Controller& controller, SampleSource& sam
                          AcquisitionSetup setup)
     : clock_(clock), controller_(controller), samples_(samples), journal_(journal), setup_(std::move(setup)) {
   block_.channels = static_cast<uint32_t>(setup_.channels.size());
+  const signal::LowPassDesign design{.rate_Hz = setup_.sample_rate_Hz};
+  if (design.rate_Hz >= signal::least_rate_over_cutoff * design.cutoff_Hz) live_filter_.emplace(design);
+  if (!setup_.slices.empty()) schedule_.emplace(setup_.slices);
+  tell_schedule();
 }
 
 RunOutcome Acquisition::run(const Hooks& hooks) {
@@ -57,6 +62,7 @@ void Acquisition::turn() {
   obey(hooks_.stop());
   for (const RunRemark& note : hooks_.notes())
     remark(note.level, note.code, note.text);
+  follow_schedule();
   controller_.service();
   for (const ControllerEvent& event : controller_.take_events())
     take(event);
@@ -81,6 +87,53 @@ void Acquisition::obey(StopRequest request) {
   }
 }
 
+void Acquisition::follow_schedule() {
+  if (!schedule_ || schedule_->phase() != SliceTracker::Phase::waiting) return;
+  if (!std::exchange(prompted_, true)) {
+    remark("info", "prompt", schedule_->planned().prompt);
+    tell_schedule();
+  }
+  const std::optional<size_t> ready = hooks_.go_on();
+  if (!ready) return;
+  schedule_->go_on(*ready);
+  prompted_ = schedule_->phase() == SliceTracker::Phase::waiting;
+  tell_schedule();
+}
+
+void Acquisition::take_cycle(uint32_t cycle) {
+  if (!schedule_ || schedule_stops_) return;
+  const SliceTracker::Turn turn = schedule_->on_trigger();
+  if (turn.slice_begins) {
+    const PlannedSlice& slice = schedule_->planned();
+    write(RecordKind::document, json{{"record", "slice"},
+                                     {"block", slice.block},
+                                     {"slice", slice.number},
+                                     {"cycle", cycle},
+                                     {"cycles", slice.cycles},
+                                     {"dummy_cycles", slice.dummy_cycles}}
+                                    .dump());
+    remark("info", "slice",
+           fmt::format("slice {} of {}: {} cycles of {}", schedule_->slice() + 1, schedule_->slices(),
+                       slice.cycles, slice.block));
+  }
+  if (turn.last_cycle) {
+    schedule_stops_ = true;
+    controller_.stop_at_cycle_end();
+  }
+  tell_schedule();
+}
+
+void Acquisition::tell_schedule() {
+  if (!schedule_) return;
+  outcome_.counts.schedule = {schedule_->planned().block,
+                              static_cast<int64_t>(schedule_->slice()),
+                              static_cast<int64_t>(schedule_->slices()),
+                              phase_name(schedule_->phase()),
+                              schedule_->cycles_left(),
+                              prompted_ ? schedule_->planned().prompt : ""};
+  hooks_.progress(outcome_.counts);
+}
+
 void Acquisition::take_samples(std::vector<SourceItem> items) {
   for (const SourceItem& item : items)
     std::visit([this](const auto& what) { take(what); }, item);
@@ -94,6 +147,8 @@ void Acquisition::take(const Received& received) {
   for (size_t i = 0; i < received.volts.size(); ++i) {
     const ChannelConfig& channel = setup_.channels[i % channels];
     block_.value_kPa.push_back((received.volts[i] - channel.zero_V) * channel.kPa_per_V);
+    if (i % channels == 0 && live_filter_)
+      outcome_.counts.filtered_kPa = live_filter_->push(block_.value_kPa.back());
   }
   outcome_.counts.received += received.host_ns.size();
   outcome_.counts.last_kPa = block_.value_kPa[block_.value_kPa.size() - channels];
@@ -102,6 +157,7 @@ void Acquisition::take(const Received& received) {
 
 void Acquisition::take(const Missing& missing) {
   close_block();
+  if (live_filter_) (void)live_filter_->push(std::numeric_limits<double>::quiet_NaN());
   if (gap_ && gap_->reason != missing.reason) close_gap();
   if (!gap_) gap_ = OpenGap{missing.first_index, 0, missing.reason};
   gap_->count += missing.count;
@@ -169,6 +225,7 @@ void Acquisition::take(const ControllerEvent& event) {
           [&](const wire::Trigger& e) {
             ++outcome_.counts.triggers;
             document({{"record", "trigger"}, {"cycle", e.cycle}, {"tick", e.tick}, {"r_wave", e.r_wave}});
+            take_cycle(e.cycle);
           },
           [&](const wire::PositionBatch& e) {
             PositionBlock block{e.first_index, e.first_tick, e.period_ticks, {}};
@@ -177,8 +234,13 @@ void Acquisition::take(const ControllerEvent& event) {
           },
           [&](const wire::RunEnded& e) {
             outcome_.cycles = e.cycles;
+            const bool schedule_done = schedule_stops_ && obeyed_ == StopRequest::none &&
+                                       wire::run_end_name(e.reason) == "stopped_at_cycle_end";
+            const std::string reason =
+                schedule_done ? "completed" : std::string(wire::run_end_name(e.reason));
             document({{"record", "run_ended"},
-                      {"reason", wire::run_end_name(e.reason)},
+                      {"reason", reason},
+                      {"schedule_done", schedule_done},
                       {"tick", e.tick},
                       {"cycles", e.cycles},
                       {"triggers", e.triggers},
@@ -188,7 +250,14 @@ void Acquisition::take(const ControllerEvent& event) {
                      fmt::format("the controller raised {} triggers, {} were reported", e.triggers,
                                  outcome_.counts.triggers));
             }
-            end_after_tail(std::string(wire::run_end_name(e.reason)));
+            if (schedule_ && !schedule_stops_ && reason == "completed") {
+              remark("error", "schedule",
+                     fmt::format("the pump has made all its cycles, but slice {} of {} was not imaged: "
+                                 "waiting took more "
+                                 "than wait_cycles_at_most",
+                                 schedule_->slice() + 1, schedule_->slices()));
+            }
+            end_after_tail(reason);
           },
           [&](const wire::FaultRaised& e) {
             remark("error", std::string(wire::fault_name(e.fault)),

@@ -16,9 +16,11 @@
 #include "host/acquisition/journal.hpp"
 #include "host/acquisition/journal_records.hpp"
 #include "host/acquisition/sample_source.hpp"
+#include "host/acquisition/slice_tracker.hpp"
 #include "host/config/rig_config.hpp"
 #include "host/controller/controller.hpp"
 #include "host/transport/clock.hpp"
+#include "protocol/signal/low_pass.hpp"
 
 namespace diastole {
 
@@ -31,11 +33,23 @@ struct RunRemark {
   std::string text;
 };
 
+/// Where a run with a schedule is.
+struct ScheduleProgress {
+  std::string block;
+  int64_t slice = 0;  ///< of all slices
+  int64_t slices = 0;
+  std::string phase;  ///< "waiting", "dummy", "imaging", "pause", "done"
+  int64_t cycles_left = 0;
+  std::string prompt;  ///< what is waited for
+};
+
 struct RunProgress {
   uint64_t received = 0;  ///< samples
   uint64_t missing = 0;
   uint64_t triggers = 0;
-  double last_kPa = 0;  ///< of the first channel
+  double last_kPa = 0;      ///< of the first channel
+  double filtered_kPa = 0;  ///< the same, low-passed forward, some 13 ms late (low_pass.hpp)
+  std::optional<ScheduleProgress> schedule;
 };
 
 struct RunOutcome {
@@ -50,8 +64,9 @@ struct RunOutcome {
 struct AcquisitionSetup {
   double sample_rate_Hz = 300;  ///< that the instrument keeps (Instrument::plan_rate)
   std::vector<ChannelConfig> channels;
-  std::vector<std::string> warnings;  ///< to remark at the start
-  double planned_duration_s = 0;      ///< a run that has not ended well after this is broken off
+  std::vector<std::string> warnings;      ///< to remark at the start
+  double planned_duration_s = 0;          ///< a run that has not ended well after this is broken off
+  std::vector<PlannedSlice> slices = {};  ///< empty: no schedule
 };
 
 class Acquisition {
@@ -61,6 +76,8 @@ class Acquisition {
 
   struct Hooks {
     std::function<StopRequest()> stop = [] { return StopRequest::none; };  ///< asked once a turn
+    /// The slice for which the operator has said that the scanner is ready, once; asked while one is waited for.
+    std::function<std::optional<size_t>()> go_on = [] { return std::optional<size_t>(); };
     /// What others want in the run's events; asked once a turn.
     std::function<std::vector<RunRemark>()> notes = [] { return std::vector<RunRemark>(); };
     std::function<void(const RunProgress&)> progress = [](const RunProgress&) {};
@@ -74,6 +91,9 @@ class Acquisition {
  private:
   void turn();
   void obey(StopRequest request);
+  void follow_schedule();
+  void take_cycle(uint32_t cycle);
+  void tell_schedule();
   void take_samples(std::vector<SourceItem> items);
   void take(const Received& received);
   void take(const Missing& missing);
@@ -112,6 +132,10 @@ class Acquisition {
   bool ended_ = false;
   std::optional<uint64_t> tail_until_ns_;
   RunOutcome outcome_;
+  std::optional<signal::LowPass> live_filter_;  // of the first channel
+  std::optional<SliceTracker> schedule_;
+  bool prompted_ = false;
+  bool schedule_stops_ = false;  // the last slice is being imaged, and the stop behind it was sent
 };
 
 }  // namespace diastole

@@ -12,7 +12,8 @@
 //   daq_clock {host_ns, timer, half_round_trip_ns}       instrument's timer against host; a timer that counts
 //                                                        samples read k when sample k was taken
 //   run_started {tick}   segment {segment, tick}   trigger {cycle, tick, r_wave}
-//   run_ended {reason, tick, cycles, triggers, r_waves}
+//   slice     {block, slice, cycle, cycles, dummy_cycles} the slice's first cycle begins
+//   run_ended {reason, schedule_done, tick, cycles, triggers, r_waves}
 //   event     {host_ns or tick, level, code, text}
 //   end       {}                                         the run was closed in order
 //

@@ -7,6 +7,7 @@ void add_host_commands(CommandLine& line) {
   add_daemon(line);
   add_home(line);
   add_run(line);
+  add_continue(line);
   add_status(line);
   add_stop(line);
   add_jog(line);

@@ -9,6 +9,7 @@ void add_flash(CommandLine& line);
 void add_daemon(CommandLine& line);
 void add_run(CommandLine& line);
 void add_status(CommandLine& line);
+void add_continue(CommandLine& line);
 void add_stop(CommandLine& line);
 void add_home(CommandLine& line);
 void add_jog(CommandLine& line);

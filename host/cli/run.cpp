@@ -1,6 +1,9 @@
 #include <fmt/format.h>
+#include <poll.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <array>
 #include <chrono>
 #include <csignal>
 #include <cstdio>
@@ -9,8 +12,11 @@
 
 #include "host/cli/daemon_address.hpp"
 #include "host/cli/host_commands.hpp"
+#include "host/cli/schedule_text.hpp"
 #include "host/cli/session_view.hpp"
+#include "host/config/experiment.hpp"
 #include "host/daemon/run_session.hpp"
+#include "protocol/contract/input_error.hpp"
 
 namespace diastole {
 namespace {
@@ -20,11 +26,40 @@ volatile std::sig_atomic_t interrupts = 0;
 struct RunOptions {
   SessionOptions session;
   DaemonAddress daemon;
+  bool dry_run = false;
 };
 
+/// Whether a line was entered since the last question; never waits.
+bool line_entered() {
+  bool entered = false;
+  for (pollfd input{STDIN_FILENO, POLLIN, 0}; ::poll(&input, 1, 0) == 1 && (input.revents & POLLIN) != 0;) {
+    std::array<char, 256> text{};
+    const ssize_t count = ::read(STDIN_FILENO, text.data(), text.size());
+    if (count <= 0) break;
+    entered = entered || std::find(text.begin(), text.begin() + count, '\n') != text.begin() + count;
+  }
+  return entered;
+}
+
+ExitCode show_plan(const Experiment& experiment, bool json) {
+  if (json) {
+    std::cout << plan_json(experiment).dump(2) << '\n';
+  } else {
+    fmt::print("{}", plan_words(experiment));
+  }
+  return ExitCode::done;
+}
+
 ExitCode run(RunOptions options, const CommandOutput& out) {
+  const Experiment experiment = read_experiment(options.session.experiment);
+  if (options.dry_run) return show_plan(experiment, out.json);
+  if (options.session.output.empty()) {
+    throw InputError({"", "-o", "is missing", "Name the run file to write, for example -o session.run.h5."});
+  }
   DaemonClient daemon = options.daemon.connect();
+  fmt::print(stderr, "{}", plan_words(experiment));
   SessionView view(isatty(STDERR_FILENO) != 0);
+  if (isatty(STDIN_FILENO) != 0) options.session.ready = line_entered;
   interrupts = 0;
   std::signal(SIGINT, [](int) { interrupts = interrupts + 1; });
   options.session.stops_asked = [] { return static_cast<int>(interrupts); };
@@ -39,15 +74,19 @@ ExitCode run(RunOptions options, const CommandOutput& out) {
 
 void add_run(CommandLine& line) {
   auto options = std::make_shared<RunOptions>();
-  CLI::App* command =
-      line.add("run", "acquire a session through the daemon",
-               "  diastole run gel.experiment.toml -o gel.run.h5\n"
-               "      shows progress, trigger count and faults; Ctrl-C once stops at the end of the\n"
-               "      cycle, twice at once under control; what was recorded is kept either way\n"
-               "  diastole run gel.experiment.toml -o gel.run.h5 --json > gel.json\n"
-               "Exit code 1: samples are missing; 3: a fault or a broken link ended the run.");
+  CLI::App* command = line.add(
+      "run", "acquire a session through the daemon",
+      "  diastole run gel.experiment.toml -o gel.run.h5\n"
+      "      shows progress, trigger count and faults; Ctrl-C once stops at the end of the\n"
+      "      cycle, twice at once under control; what was recorded is kept either way\n"
+      "  diastole run gel.experiment.toml -o gel.run.h5 --json > gel.json\n"
+      "  diastole run study.experiment.toml --dry-run\n"
+      "      what it will do and how long it takes; nothing moves, and no daemon is needed\n"
+      "A study with prompts goes on when you press Enter, or with `diastole continue` from anywhere.\n"
+      "Exit code 1: samples are missing; 3: a fault or a broken link ended the run.");
   command->add_option("EXPERIMENT", options->session.experiment, "experiment file (.toml)")->required();
-  command->add_option("-o,--output", options->session.output, "run file to write")->required();
+  command->add_option("-o,--output", options->session.output, "run file to write");
+  command->add_flag("--dry-run", options->dry_run, "only tell what would be done");
   command->add_flag("--force", options->session.force, "replace the run file if it exists");
   options->daemon.add_to(*command);
   options->daemon.add_take_over_to(*command);

@@ -2,14 +2,21 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <array>
+#include <cmath>
 #include <cstdio>
 #include <iostream>
+
+#include "host/cli/schedule_text.hpp"
 
 namespace diastole {
 namespace {
 
 constexpr std::chrono::seconds line_interval{2};
 constexpr int64_t bar_cells = 24;
+constexpr size_t trace_cells = 48;
+constexpr double least_span_kPa = 0.1;  // noise at rest shall not look like a cycle
 
 std::string bar(int64_t done, int64_t of) {
   const int64_t filled = of > 0 ? std::min(bar_cells, bar_cells * done / of) : 0;
@@ -17,27 +24,75 @@ std::string bar(int64_t done, int64_t of) {
          std::string(static_cast<size_t>(bar_cells - filled), '.');
 }
 
+double left_s(const SessionProgress& progress) {
+  if (progress.planned_cycles == 0) return 0;
+  const int64_t left =
+      progress.schedule ? progress.schedule->cycles_left : progress.planned_cycles - progress.triggers;
+  return progress.planned_s / static_cast<double>(progress.planned_cycles) * static_cast<double>(left);
+}
+
+int64_t cycles_done(const SessionProgress& progress) {
+  return progress.schedule ? progress.planned_cycles - progress.schedule->cycles_left : progress.triggers;
+}
+
+std::string slice_words(const SessionSchedule& schedule) {
+  return fmt::format("slice {} of {} ({}): {}", schedule.slice + 1, schedule.slices, schedule.block,
+                     schedule.phase);
+}
+
 std::string in_words(const SessionProgress& progress) {
-  const double per_cycle_s =
-      progress.planned_cycles > 0 ? progress.planned_s / static_cast<double>(progress.planned_cycles) : 0;
-  const double left_s = per_cycle_s * static_cast<double>(progress.planned_cycles - progress.triggers);
-  return fmt::format("cycle {} of {}, {:.0f} s left, {:.2f} kPa, {} samples, {} missing", progress.triggers,
-                     progress.planned_cycles, left_s, progress.last_kPa, progress.samples, progress.gaps);
+  return fmt::format("cycle {} of {}, {} left, {}{:.2f} kPa, {} triggers, {} samples, {} missing",
+                     cycles_done(progress), progress.planned_cycles, duration_words(left_s(progress)),
+                     progress.schedule ? slice_words(*progress.schedule) + ", " : "", progress.filtered_kPa,
+                     progress.triggers, progress.samples, progress.gaps);
+}
+
+std::string sparkline(const std::deque<double>& trace_kPa) {
+  static constexpr std::array<const char*, 8> heights{"▁", "▂", "▃", "▄", "▅", "▆", "▇", "█"};
+  std::string line;
+  if (trace_kPa.empty()) return line;
+  const auto [least, most] = std::ranges::minmax(trace_kPa);
+  const double span_kPa = std::max(most - least, least_span_kPa);
+  for (const double value_kPa : trace_kPa) {
+    const double height = (value_kPa - least) / span_kPa * static_cast<double>(heights.size() - 1);
+    line += heights[static_cast<size_t>(std::lround(height))];
+  }
+  return line;
 }
 
 }  // namespace
+
+std::vector<std::string> view_lines(const SessionProgress& progress, const std::deque<double>& trace_kPa) {
+  std::vector<std::string> lines{fmt::format(
+      "[{}] cycle {} of {}, {} left, {} triggers", bar(cycles_done(progress), progress.planned_cycles),
+      cycles_done(progress), progress.planned_cycles, duration_words(left_s(progress)), progress.triggers)};
+  if (progress.schedule) lines.push_back(slice_words(*progress.schedule));
+  if (progress.schedule && !progress.schedule->prompt.empty()) {
+    lines.push_back(progress.schedule->prompt + "  [Enter, or `diastole continue`]");
+  }
+  lines.push_back(fmt::format("{}  {:.2f} kPa   {} samples, {} missing", sparkline(trace_kPa),
+                              progress.filtered_kPa, progress.samples, progress.gaps));
+  return lines;
+}
+
+void SessionView::redraw(const SessionProgress& progress) {
+  trace_kPa_.push_back(std::isfinite(progress.filtered_kPa) ? progress.filtered_kPa : progress.last_kPa);
+  if (trace_kPa_.size() > trace_cells) trace_kPa_.pop_front();
+  const std::vector<std::string> lines = view_lines(progress, trace_kPa_);
+  std::string text = lines_open_ > 1 ? fmt::format("\033[{}A", lines_open_ - 1) : "";
+  text += "\r\033[J";  // to the screen's end
+  for (size_t i = 0; i < lines.size(); ++i)
+    text += (i > 0 ? "\n" : "") + lines[i];
+  fmt::print(stderr, "{}", text);
+  lines_open_ = static_cast<int>(lines.size());
+}
 
 void SessionView::show(const SessionProgress& progress) {
   for (const std::string& remark : progress.new_remarks) {
     finish();
     fmt::print(stderr, "{}\n", remark);
   }
-  if (terminal_) {
-    fmt::print(stderr, "\r\033[K[{}] {}", bar(progress.triggers, progress.planned_cycles),
-               in_words(progress));
-    line_open_ = true;
-    return;
-  }
+  if (terminal_) return redraw(progress);
   const auto now = std::chrono::steady_clock::now();
   if (progress.triggers == last_triggers_ || now < next_line_) return;
   last_triggers_ = progress.triggers;
@@ -46,7 +101,7 @@ void SessionView::show(const SessionProgress& progress) {
 }
 
 void SessionView::finish() {
-  if (std::exchange(line_open_, false)) fmt::print(stderr, "\n");
+  if (std::exchange(lines_open_, 0) > 0) fmt::print(stderr, "\n");
 }
 
 ExitCode exit_code_of(const SessionResult& result) {

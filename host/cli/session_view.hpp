@@ -2,6 +2,7 @@
 // How a running session and its result are shown to a person; also for `diastole simulate`.
 
 #include <chrono>
+#include <deque>
 #include <string>
 
 #include "host/daemon/run_session.hpp"
@@ -9,21 +10,33 @@
 
 namespace diastole {
 
-/// Progress on standard error: one line that renews itself on a terminal, a plain line every few seconds
-/// otherwise.
+/// Progress on standard error. On a terminal a few lines that renew themselves,
+///
+///   [########................] cycle 412 of 1276, 17 min 17 s left
+///   slice 11 of 25 (tagged): imaging
+///   ▁▂▃▅▇█▇▅▃▂▁▁▂▃▅▇   3.12 kPa   123600 samples, 0 missing
+///
+/// the pressure over the last seconds, low-passed, between its least and largest. Otherwise a plain line every few
+/// seconds, and one for every prompt. Remarks (faults, gaps, slices) stay above as plain lines.
 class SessionView {
  public:
   explicit SessionView(bool terminal) : terminal_(terminal) {}
   void show(const SessionProgress& progress);
-  /// Ends the renewed line, if there is one.
+  /// Ends the renewed lines, if there are any.
   void finish();
 
  private:
+  void redraw(const SessionProgress& progress);
+
   bool terminal_;
-  bool line_open_ = false;
+  int lines_open_ = 0;
+  std::deque<double> trace_kPa_;
   int64_t last_triggers_ = -1;
   std::chrono::steady_clock::time_point next_line_{};
 };
+
+/// The present lines of the view, one string each, without control characters.
+std::vector<std::string> view_lines(const SessionProgress& progress, const std::deque<double>& trace_kPa);
 
 /// The result in words, or as one JSON document with `run`, `end`, `cycles`, `triggers`, `samples`, `gaps`,
 /// `expected`. Returns the exit code that goes with it.

@@ -121,6 +121,18 @@ std::string text_of(const std::filesystem::path& file) {
   return text.str();
 }
 
+/// The schedule tells how many cycles its one segment has.
+void put_schedule(const TableReader& root, TableReader table, Experiment& experiment) {
+  ExperimentSegment& segment = experiment.segments.front();
+  if (experiment.segments.size() > 1 || segment.cycles != 1 || segment.waveform == wire::Waveform::hold) {
+    root.fail("schedule", "needs one [[segment]] that moves, without cycles",
+              "The schedule itself tells how many cycles there are; run other motions as experiments of "
+              "their own.");
+  }
+  experiment.schedule = read_schedule(std::move(table), segment.period_s);
+  segment.cycles = experiment.schedule->cycles_at_most();
+}
+
 }  // namespace
 
 int64_t Experiment::cycles() const {
@@ -128,6 +140,13 @@ int64_t Experiment::cycles() const {
   for (const ExperimentSegment& segment : segments)
     total += segment.cycles;
   return total;
+}
+
+int64_t Experiment::planned_cycles() const { return schedule ? schedule->cycles() : cycles(); }
+
+double Experiment::estimate_s() const {
+  if (!schedule) return least_duration_s();
+  return rest_s + segments.front().period_s * static_cast<double>(planned_cycles());
 }
 
 double Experiment::least_duration_s() const {
@@ -151,6 +170,7 @@ Experiment parse_experiment(std::string_view text, const std::string& file, cons
   for (TableReader& table : root.tables("segment"))
     segments.read(std::move(table));
   if (experiment.segments.empty()) root.fail("segment", "is missing", "Add at least one [[segment]].");
+  if (auto schedule = root.table_if("schedule")) put_schedule(root, std::move(*schedule), experiment);
   root.finish();
   segments.put_on_even_phases();
   return experiment;

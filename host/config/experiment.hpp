@@ -11,6 +11,7 @@
 
 #include "host/config/even_waveform.hpp"
 #include "host/config/points_file.hpp"
+#include "host/config/schedule.hpp"
 #include "protocol/wire/states.hpp"
 
 namespace diastole {
@@ -41,7 +42,14 @@ struct Experiment {
   std::vector<ExperimentSegment> segments;
   std::vector<ExperimentWaveform> waveforms;  ///< each once, in the order in which they are first named
 
+  /// Of an imaging study, whose one segment then has as many cycles as the schedule may take.
+  std::optional<Schedule> schedule = {};
+
   [[nodiscard]] int64_t cycles() const;
+  /// The same, but without the cycles that a schedule allows for waiting.
+  [[nodiscard]] int64_t planned_cycles() const;
+  /// Rest and planned cycles.
+  [[nodiscard]] double estimate_s() const;
   /// Rest and cycles; ramps between offsets come on top.
   [[nodiscard]] double least_duration_s() const;
 };

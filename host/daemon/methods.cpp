@@ -55,6 +55,13 @@ void run_stop(RigService& rig, const json& params, const Done& done) {
   done(nullptr, {{"stopping", rig.stop(request)}});
 }
 
+/// Anybody's: it moves nothing, it only tells which cycles are imaged, and the operator may sit at another terminal.
+void run_continue(RigService& rig, const json& params, const Done& done) {
+  std::optional<size_t> slice;
+  if (params.contains("slice")) slice = params.at("slice").get<size_t>();
+  done(nullptr, rig.continue_run(slice));
+}
+
 constexpr std::array all_methods{
 #define DIASTOLE_METHOD(name, access, function) \
   Method{name, Access::access,                  \

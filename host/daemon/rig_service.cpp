@@ -135,6 +135,16 @@ void add_settings(json& rig, const ControllerClient& controller) {
   rig["volume_per_step_mL"] = 1e-9 * controller.microstep_pL();
 }
 
+json schedule_as_json(const std::optional<ScheduleProgress>& schedule) {
+  if (!schedule) return nullptr;
+  return {{"block", schedule->block},
+          {"slice", schedule->slice},
+          {"slices", schedule->slices},
+          {"phase", schedule->phase},
+          {"cycles_left", schedule->cycles_left},
+          {"prompt", schedule->prompt}};
+}
+
 std::string utc_now() { return fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr))); }
 
 }  // namespace
@@ -364,6 +374,17 @@ bool RigService::stop(StopRequest how) {
   return !activity_.empty() && activity_ != "writing";
 }
 
+json RigService::continue_run(std::optional<size_t> slice) {
+  const std::lock_guard lock(mutex_);
+  const auto* schedule =
+      run_ && run_->state == "running" && run_->progress.schedule ? &*run_->progress.schedule : nullptr;
+  if (schedule == nullptr || schedule->phase != "waiting") return {{"continued", false}};
+  const auto waited_for = static_cast<size_t>(schedule->slice);
+  if (slice && *slice != waited_for) return {{"continued", false}};
+  go_on_ = waited_for;
+  return {{"continued", true}, {"slice", waited_for}, {"prompt", schedule->prompt}};
+}
+
 void RigService::end() {
   const std::lock_guard lock(mutex_);
   ending_ = true;
@@ -386,12 +407,14 @@ json RigService::run_progress(size_t first_remark) const {
   }
   return {{"run_id", run_->run_id},
           {"state", run_->state},
-          {"planned_s", run_->planned_s},
+          {"planned_s", run_->estimate_s},
           {"planned_cycles", run_->planned_cycles},
           {"received", run_->progress.received},
           {"missing", run_->progress.missing},
           {"triggers", run_->progress.triggers},
           {"last_kPa", run_->progress.last_kPa},
+          {"filtered_kPa", run_->progress.filtered_kPa},
+          {"schedule", schedule_as_json(run_->progress.schedule)},
           {"remarks", remarks},
           {"result", run_->result}};
 }
@@ -515,7 +538,8 @@ void RigService::do_run(const Experiment& experiment, const Done& done) {
   RunRecord record;
   record.run_id = new_uuid();
   record.planned_s = duration_s(experiment, plan);
-  record.planned_cycles = experiment.cycles();
+  record.estimate_s = experiment.schedule ? experiment.estimate_s() : record.planned_s;
+  record.planned_cycles = experiment.planned_cycles();
   check_disk(record, rate.rate_Hz);
   const std::filesystem::path path =
       std::filesystem::absolute(rig_.daemon.journal_dir) / (record.run_id + ".journal");
@@ -531,7 +555,7 @@ void RigService::do_run(const Experiment& experiment, const Done& done) {
        {{"run_id", record.run_id}, {"journal", path.string()}, {"run_file", run_file_beside(path).string()}});
   json result;
   try {
-    result = finish(path, acquire(journal, rate, record.planned_s));
+    result = finish(path, acquire(journal, experiment, rate, record.planned_s));
   } catch (const std::exception& error) {
     result = {{"end", "failed"}, {"problem", error.what()}, {"journal", path.string()}};
   }
@@ -582,6 +606,7 @@ bool RigService::begin(const RunRecord& record) {
   if (stop_request_ != StopRequest::none) return false;
   run_ = record;
   notes_.clear();
+  go_on_.reset();
   activity_ = "running";
   return true;
 }
@@ -617,17 +642,26 @@ void RigService::write_beginning(JournalWriter& journal, const RunRecord& record
   }
 }
 
-RunOutcome RigService::acquire(JournalWriter& journal, const daq::RatePlan& rate, double planned_s) {
+RunOutcome RigService::acquire(JournalWriter& journal, const Experiment& experiment,
+                               const daq::RatePlan& rate, double planned_s) {
+  std::vector<PlannedSlice> slices;
+  if (experiment.schedule) slices = planned_slices(*experiment.schedule);
   std::vector<std::string> warnings;
   if (!rate.warning.empty()) warnings.push_back(rate.warning);
   const auto samples = make_source(*clock_, *instrument_);
-  Acquisition acquisition(*clock_, *controller_, *samples, journal,
-                          {rate.rate_Hz, rig_.daq.channels, std::move(warnings), planned_s});
+  Acquisition acquisition(
+      *clock_, *controller_, *samples, journal,
+      {rate.rate_Hz, rig_.daq.channels, std::move(warnings), planned_s, std::move(slices)});
   return acquisition.run({
       .stop =
           [this] {
             const std::lock_guard lock(mutex_);
             return stop_request_;
+          },
+      .go_on =
+          [this] {
+            const std::lock_guard lock(mutex_);
+            return std::exchange(go_on_, std::nullopt);
           },
       .notes =
           [this] {

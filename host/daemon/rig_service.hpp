@@ -72,6 +72,9 @@ class RigService {
   void status(Done done);
   /// Stops what moves or is about to; without anything, `false`.
   bool stop(StopRequest how);
+  /// The operator is ready for the slice that the run waits for, or for slice number `slice` if it is that one.
+  /// {"continued", "slice", "prompt"}: whether one was waited for.
+  nlohmann::json continue_run(std::optional<size_t> slice);
   /// Stops now and takes no more orders; what is going on comes to its end. See idle().
   void end();
   /// True when nothing is going on or waiting.
@@ -79,7 +82,7 @@ class RigService {
   /// Tells the log, and while a run is on its events and whoever follows it.
   void note(const RunRemark& what);
   /// The present or last run: {"run_id", "state": running|writing|done|failed, "received", "missing",
-  /// "triggers", "last_kPa", "remarks": at most remarks_at_once from number `first_remark` on, "result"}. null
+  /// "triggers", "last_kPa", "filtered_kPa", "schedule" (null without one), "remarks": at most remarks_at_once from number `first_remark` on, "result"}. null
   /// if there was none. Of a run's remarks the first most_remarks are kept here; its file has all.
   [[nodiscard]] nlohmann::json run_progress(size_t first_remark) const;
 
@@ -92,7 +95,8 @@ class RigService {
   struct RunRecord {
     std::string run_id;
     std::string state = "running";
-    double planned_s = 0;
+    double planned_s = 0;   ///< the controller's program, with what a schedule allows for waiting
+    double estimate_s = 0;  ///< without that
     int64_t planned_cycles = 0;
     RunProgress progress;
     std::vector<RunRemark> remarks;
@@ -125,7 +129,8 @@ class RigService {
   void do_run(const Experiment& experiment, const Done& done);
   void write_beginning(JournalWriter& journal, const RunRecord& record, const Experiment& experiment,
                        const ProgramPlan& plan, double sample_rate_Hz);
-  RunOutcome acquire(JournalWriter& journal, const daq::RatePlan& rate, double planned_s);
+  RunOutcome acquire(JournalWriter& journal, const Experiment& experiment, const daq::RatePlan& rate,
+                     double planned_s);
   nlohmann::json finish(const std::filesystem::path& journal, const RunOutcome& outcome);
 
   RigConfig rig_;
@@ -144,6 +149,7 @@ class RigService {
   std::string activity_;             // empty: none
   bool ending_ = false;
   StopRequest stop_request_ = StopRequest::none;
+  std::optional<size_t> go_on_;  // the slice that the operator is ready for
   std::optional<RunRecord> run_;
   nlohmann::json last_status_;
   nlohmann::json journals_;

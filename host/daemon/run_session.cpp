@@ -31,13 +31,19 @@ void deliver(const std::filesystem::path& from, const std::filesystem::path& to)
 }
 
 SessionProgress progress_of(const json& state, size_t& remarks_seen) {
-  SessionProgress progress{state.at("planned_s"),
-                           state.at("planned_cycles"),
-                           state.at("triggers"),
-                           state.at("received"),
-                           state.at("missing"),
-                           state.at("last_kPa"),
-                           {}};
+  SessionProgress progress{.planned_s = state.at("planned_s"),
+                           .planned_cycles = state.at("planned_cycles"),
+                           .triggers = state.at("triggers"),
+                           .samples = state.at("received"),
+                           .gaps = state.at("missing"),
+                           .last_kPa = state.at("last_kPa"),
+                           .filtered_kPa = state.at("filtered_kPa"),
+                           .schedule = {},
+                           .new_remarks = {}};
+  if (const json& schedule = state.at("schedule"); !schedule.is_null()) {
+    progress.schedule = {schedule.at("block"), schedule.at("slice"),       schedule.at("slices"),
+                         schedule.at("phase"), schedule.at("cycles_left"), schedule.at("prompt")};
+  }
   for (const json& remark : state.at("remarks")) {
     progress.new_remarks.push_back(
         fmt::format("{}: {}", remark.at("level").get<std::string>(), remark.at("text").get<std::string>()));
@@ -56,7 +62,11 @@ json follow_to_end(DaemonClient& daemon, const SessionOptions& options) {
       daemon.call("run.stop", {{"how", asked == 1 ? "cycle_end" : "now"}});
     }
     const json state = daemon.call("run.progress", {{"first_remark", remarks_seen}});
-    options.progress(progress_of(state, remarks_seen));
+    const SessionProgress progress = progress_of(state, remarks_seen);
+    options.progress(progress);
+    if (progress.schedule && !progress.schedule->prompt.empty() && options.ready()) {
+      daemon.call("run.continue", {{"slice", progress.schedule->slice}});
+    }
     const bool all_told = state.at("remarks").empty();
     if (all_told && (state.at("state") == "done" || state.at("state") == "failed")) return state.at("result");
     if (!all_told) continue;

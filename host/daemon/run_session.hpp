@@ -3,12 +3,23 @@
 
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "host/daemon/client.hpp"
 
 namespace diastole {
+
+/// Where a session with a schedule of slices is.
+struct SessionSchedule {
+  std::string block;
+  int64_t slice = 0;
+  int64_t slices = 0;
+  std::string phase;
+  int64_t cycles_left = 0;
+  std::string prompt;  ///< what the operator is waited for; empty: nothing
+};
 
 struct SessionProgress {
   double planned_s = 0;
@@ -17,6 +28,8 @@ struct SessionProgress {
   int64_t samples = 0;
   int64_t gaps = 0;
   double last_kPa = 0;
+  double filtered_kPa = 0;
+  std::optional<SessionSchedule> schedule;
   std::vector<std::string> new_remarks;  ///< since the last call: faults, gaps, stops, in plain words
 };
 
@@ -26,6 +39,8 @@ struct SessionOptions {
   bool force = false;      ///< replace an existing output
   int poll_ms = 100;       ///< between questions for progress
   std::function<void(const SessionProgress&)> progress = [](const SessionProgress&) {};
+  /// Whether the operator is ready; asked as long as the schedule waits.
+  std::function<bool()> ready = [] { return false; };
   /// How often the user has asked to stop (Ctrl-C): 1 at the cycle's end, 2 or more now.
   std::function<int()> stops_asked = [] { return 0; };
 };

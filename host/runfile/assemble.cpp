@@ -227,6 +227,25 @@ void put_segments(const JournalStory& story, const TimeAxis& axis, RecordedRun& 
     run.segments.push_back({planned_s + late_s, segment.at("waveform"), segment.at("stroke_mL"),
                             segment.at("period_s"), segment.at("offset_mL"), segment.at("cycles")});
   }
+  // A schedule ends its one segment when the last slice is done; until then the segment had more cycles in reserve.
+  if (story.run_ended && story.run_ended->value("schedule_done", false)) {
+    run.segments.back().cycles = story.run_ended->at("cycles");
+  }
+}
+
+/// Rows of the triggers whose cycles belong to a slice.
+void put_slices(const JournalStory& story, RecordedRun& run) {
+  const auto row_of = [&](int64_t cycle) {
+    const auto at = std::find_if(story.triggers.begin(), story.triggers.end(), [&](const json& trigger) {
+      return trigger.at("cycle").get<int64_t>() >= cycle;
+    });
+    return at - story.triggers.begin();
+  };
+  for (const json& slice : story.slices) {
+    const int64_t first = slice.at("cycle"), cycles = slice.at("cycles");
+    run.slices.push_back({slice.at("block"), slice.at("slice"), row_of(first),
+                          row_of(first + cycles) - row_of(first), cycles, slice.at("dummy_cycles")});
+  }
 }
 
 void put_waveforms(const JournalStory& story, RecordedRun& run) {
@@ -304,6 +323,7 @@ AssembledRun assemble_run(const JournalContents& journal) {
   put_waveforms(story, run);
   put_positions(story, axis, run);
   put_triggers(story, axis, run);
+  put_slices(story, run);
   put_events(story, axis, run);
   put_clocks(story, axis, run);
   put_pressure(story, axis, assembled);

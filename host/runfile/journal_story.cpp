@@ -39,6 +39,8 @@ class StoryTeller {
       story_.segment_starts.push_back(record);
     } else if (what == "trigger") {
       story_.triggers.push_back(record);
+    } else if (what == "slice") {
+      story_.slices.push_back(record);
     } else if (what == "run_ended") {
       story_.run_ended = record;
     } else if (what == "event") {

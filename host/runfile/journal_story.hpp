@@ -28,6 +28,7 @@ struct JournalStory {
   std::optional<uint64_t> start_tick;
   std::vector<nlohmann::json> segment_starts;
   std::vector<nlohmann::json> triggers;
+  std::vector<nlohmann::json> slices;
   std::vector<nlohmann::json> events;
   std::optional<nlohmann::json> run_ended;
   bool closed = false;  ///< the last record says that the run was closed in order

@@ -45,10 +45,14 @@ void SessionOnDesk::run(const std::function<StopRequest()>& stop) {
                                     {"offset_mL", experiment.segments[0].offset_mL},
                                     {"cycles", experiment.segments[0].cycles}}}}};
   (void)writer.append(RecordKind::document, beginning.dump());
+  std::vector<PlannedSlice> slices;
+  if (experiment.schedule) slices = planned_slices(*experiment.schedule);
   const auto samples = make_source(clock, instrument);
-  Acquisition acquisition(clock, client, *samples, writer,
-                          {experiment.sample_rate_Hz, rig.daq.channels, {}, experiment.least_duration_s()});
+  Acquisition acquisition(
+      clock, client, *samples, writer,
+      {experiment.sample_rate_Hz, rig.daq.channels, {}, experiment.least_duration_s(), slices});
   outcome = acquisition.run({.stop = stop,
+                             .go_on = go_on,
                              .progress = [](const RunProgress&) {},
                              .remark = [this](const RunRemark& remark) { remarks.push_back(remark); }});
 }

@@ -24,6 +24,7 @@ struct SessionOnDesk {
   std::filesystem::path journal = scratch / "run.journal";
   JournalWriter::Flush flush = ::fdatasync;  ///< the journal's
   JournalWriter::Write write = ::write;      ///< likewise
+  std::function<std::optional<size_t>()> go_on = [] { return std::optional<size_t>(); };
   std::vector<RunRemark> remarks;
   RunOutcome outcome;
 

@@ -37,5 +37,38 @@ TEST(SessionExitCode, WhatIsMissingIsTold) {
   EXPECT_EQ(exit_code_of(session("faulted", 3, 4)), ExitCode::hardware_fault);
 }
 
+SessionProgress study_progress() {
+  return {.planned_s = 1531,
+          .planned_cycles = 1276,
+          .triggers = 420,
+          .samples = 1000,
+          .gaps = 2,
+          .last_kPa = 3,
+          .filtered_kPa = 3.12,
+          .schedule = SessionSchedule{"tagged", 10, 25, "imaging", 864, ""},
+          .new_remarks = {}};
+}
+
+TEST(SessionView, ShowsCyclesSliceTimeLeftTraceAndTriggers) {
+  const std::vector<std::string> lines = view_lines(study_progress(), {0, 1, 2, 4, 2, 1, 0});
+  ASSERT_EQ(lines.size(), 3U);
+  EXPECT_EQ(lines[0], "[#######.................] cycle 412 of 1276, 17 min 17 s left, 420 triggers");
+  EXPECT_EQ(lines[1], "slice 11 of 25 (tagged): imaging");
+  EXPECT_EQ(lines[2], "▁▃▅█▅▃▁  3.12 kPa   1000 samples, 2 missing");
+}
+
+TEST(SessionView, ShowsWhatTheOperatorIsWaitedFor) {
+  SessionProgress progress = study_progress();
+  progress.schedule->phase = "waiting";
+  progress.schedule->prompt = "Set the next slice.";
+  EXPECT_EQ(view_lines(progress, {}).at(2), "Set the next slice.  [Enter, or `diastole continue`]");
+}
+
+TEST(SessionView, RestIsAFlatLine) {
+  SessionProgress progress = study_progress();
+  progress.schedule.reset();
+  EXPECT_TRUE(view_lines(progress, {0.001, 0.003, -0.002}).at(1).starts_with("▁▁▁  "));
+}
+
 }  // namespace
 }  // namespace diastole

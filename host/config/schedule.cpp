@@ -1,0 +1,101 @@
+#include "host/config/schedule.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+namespace diastole {
+namespace {
+
+constexpr NumberRange count{.at_least = 1, .at_most = 1'000'000};
+constexpr NumberRange count_or_none{.at_least = 0, .at_most = 1'000'000};
+
+int64_t read_cycles_per_slice(TableReader& table) {
+  if (!table.has("lines")) return table.integer("cycles_per_slice", count);
+  if (table.has("cycles_per_slice")) {
+    table.fail("cycles_per_slice", "is given beside lines, which tells it", "Keep one of them.");
+  }
+  const int64_t lines = table.integer("lines", count);
+  const int64_t lines_per_segment = table.integer("lines_per_segment", count);
+  return (lines + lines_per_segment - 1) / lines_per_segment * table.integer_or("averages", 1, count);
+}
+
+/// The scanner's frames must lie within the cycles between two gates.
+void check_frames(TableReader& table, double period_s) {
+  const int64_t gate_every = table.integer_or("gate_every", 1, count);
+  if (!table.has("frames")) return;
+  const auto frames = static_cast<double>(table.integer("frames", {.at_least = 1, .at_most = 10'000}));
+  const double first_ms = table.number_or("first_ms", 0, {.at_least = 0, .at_most = 1e6});
+  const double tr_ms = table.number("tr_ms", {.above = 0, .at_most = 1e6});
+  const double interval_s = period_s * static_cast<double>(gate_every);
+  const double end_s = 1e-3 * (first_ms + frames * tr_ms);
+  if (end_s <= interval_s + 1e-9) return;
+  table.fail(
+      "frames",
+      fmt::format(
+          "{:g} frames of {:g} ms end {:g} s after the trigger, but the scanner is triggered every {:g} s",
+          frames, tr_ms, end_s, interval_s),
+      "Take fewer or shorter frames, lengthen period_s, or let the scanner take every n-th R-wave "
+      "(gate_every).");
+}
+
+ScheduleBlock read_block(TableReader table, double period_s) {
+  ScheduleBlock block;
+  block.name = table.text("name");
+  block.slices = table.integer_or("slices", 1, count);
+  block.cycles_per_slice = read_cycles_per_slice(table);
+  block.prompt = table.text_or("prompt", "");
+  check_frames(table, period_s);
+  table.finish();
+  return block;
+}
+
+}  // namespace
+
+bool Schedule::waits() const {
+  return std::ranges::any_of(blocks, [](const ScheduleBlock& block) { return !block.prompt.empty(); });
+}
+
+int64_t Schedule::slices() const {
+  int64_t total = 0;
+  for (const ScheduleBlock& block : blocks)
+    total += block.slices;
+  return total;
+}
+
+int64_t Schedule::cycles() const {
+  int64_t total = (slices() - 1) * pause_cycles;
+  for (const ScheduleBlock& block : blocks)
+    total += block.slices * (dummy_cycles + block.cycles_per_slice);
+  return total;
+}
+
+std::vector<PlannedSlice> planned_slices(const Schedule& schedule) {
+  std::vector<PlannedSlice> slices;
+  for (const ScheduleBlock& block : schedule.blocks) {
+    for (int64_t number = 0; number < block.slices; ++number) {
+      slices.push_back({block.name, number, schedule.dummy_cycles, block.cycles_per_slice,
+                        schedule.pause_cycles, block.prompt});
+    }
+  }
+  slices.back().pause_cycles = 0;
+  return slices;
+}
+
+Schedule read_schedule(TableReader table, double period_s) {
+  Schedule schedule;
+  schedule.dummy_cycles = table.integer_or("dummy_cycles", 0, count_or_none);
+  schedule.pause_cycles = table.integer_or("pause_cycles", 0, count_or_none);
+  schedule.wait_cycles_at_most = table.integer_or("wait_cycles_at_most", 3000, count);
+  for (TableReader& block : table.tables("block"))
+    schedule.blocks.push_back(read_block(std::move(block), period_s));
+  if (schedule.blocks.empty()) table.fail("block", "is missing", "Add at least one [[schedule.block]].");
+  if (schedule.cycles_at_most() > 10'000'000) {
+    table.fail("block", fmt::format("blocks ask for {} cycles in all", schedule.cycles_at_most()),
+               "The controller counts 10000000 in a segment: split the study.");
+  }
+  table.finish();
+  return schedule;
+}
+
+}  // namespace diastole
