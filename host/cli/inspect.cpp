@@ -47,6 +47,37 @@ json attributes_json(const std::map<std::string, runfile::Attribute, std::less<>
   return object;
 }
 
+/// What /rig tells about a channel's calibration: cavity_calibrated_utc of cavity_kPa, and so on.
+std::map<std::string, runfile::Attribute, std::less<>> calibration_of(const runfile::RecordedRun& run,
+                                                                      const std::string& channel) {
+  const std::string prefix = channel.substr(0, channel.rfind('_') + 1);
+  std::map<std::string, runfile::Attribute, std::less<>> calibration;
+  for (const char* fact :
+       {"kPa_per_V", "zero_V", "calibrated_utc", "calibrated_by", "zeroed_utc", "zeroed_by"}) {
+    if (const auto found = run.rig.find(prefix + fact); found != run.rig.end())
+      calibration[fact] = found->second;
+  }
+  return calibration;
+}
+
+/// Empty for a run that tells nothing of it.
+std::string calibration_words(const std::map<std::string, runfile::Attribute, std::less<>>& calibration) {
+  if (calibration.empty()) return {};
+  const auto text = [&](const char* fact) {
+    const auto found = calibration.find(fact);
+    const auto* value = found == calibration.end() ? nullptr : std::get_if<std::string>(&found->second);
+    return value == nullptr ? std::string() : *value;
+  };
+  const auto when = [&](const std::string& what) {
+    const std::string by = text((what + "_by").c_str());
+    return fmt::format("{} {}{}", what, text((what + "_utc").c_str()), by.empty() ? "" : " by " + by);
+  };
+  std::string words =
+      text("calibrated_utc").empty() ? "not calibrated: the rig file's nominal scale" : when("calibrated");
+  if (!text("zeroed_utc").empty()) words += ", " + when("zeroed");
+  return words;
+}
+
 json slices_json(const runfile::RecordedRun& run) {
   json slices = json::array();
   for (const runfile::Slice& slice : run.slices) {
@@ -90,6 +121,8 @@ json as_json(const runfile::RecordedRun& run, const runfile::Soundness& soundnes
                                   {"max_kPa", range.any() ? json(range.most) : json()}};
     if (const auto notes = run.pressure.notes.find(name); notes != run.pressure.notes.end())
       document["channels"][name]["notes"] = attributes_json(notes->second);
+    if (const auto calibration = calibration_of(run, name); !calibration.empty())
+      document["channels"][name]["calibration"] = attributes_json(calibration);
   }
   document["segments"] = json::array();
   for (const runfile::Segment& segment : run.segments) {
@@ -124,6 +157,8 @@ void show_channels(const runfile::RecordedRun& run) {
     const Range range = range_of(values_kPa);
     fmt::print("    {}: {}\n", name,
                range.any() ? fmt::format("{:.3f} to {:.3f} kPa", range.least, range.most) : "no sample");
+    if (const std::string words = calibration_words(calibration_of(run, name)); !words.empty())
+      fmt::print("      {}\n", words);
     const auto notes = run.pressure.notes.find(name);
     if (notes == run.pressure.notes.end()) continue;
     for (const auto& [note, value] : notes->second)

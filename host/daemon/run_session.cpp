@@ -64,7 +64,8 @@ json follow_to_end(DaemonClient& daemon, const SessionOptions& options) {
     const json state = daemon.call("run.progress", {{"first_remark", remarks_seen}});
     const SessionProgress progress = progress_of(state, remarks_seen);
     options.progress(progress);
-    if (progress.schedule && !progress.schedule->prompt.empty() && options.ready()) {
+    const bool ready = options.ready();  // also without a prompt: what was entered before it does not count
+    if (ready && progress.schedule && !progress.schedule->prompt.empty()) {
       daemon.call("run.continue", {{"slice", progress.schedule->slice}});
     }
     const bool all_told = state.at("remarks").empty();

@@ -39,7 +39,7 @@ struct SessionOptions {
   bool force = false;      ///< replace an existing output
   int poll_ms = 100;       ///< between questions for progress
   std::function<void(const SessionProgress&)> progress = [](const SessionProgress&) {};
-  /// Whether the operator is ready; asked as long as the schedule waits.
+  /// Whether the operator has said since the last question that he is ready; asked with every question for progress.
   std::function<bool()> ready = [] { return false; };
   /// How often the user has asked to stop (Ctrl-C): 1 at the cycle's end, 2 or more now.
   std::function<int()> stops_asked = [] { return 0; };
