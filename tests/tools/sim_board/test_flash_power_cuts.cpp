@@ -65,7 +65,7 @@ TEST(FlashPowerCuts, LeaveABoardThatStartsAndCanBeUpdated) {
   NEEDS_UPDATE_IMAGES();
   FlashBench bench;
   ASSERT_EQ(bench.runs(), "0.1.0 confirmed");
-  const FlashHistory history(bench.board());
+  FlashHistory history(bench.board());
   ASSERT_EQ(bench.flash(newer_update).end, UpdateEnd::confirmed);
   bench.board().on_flash_change({});
   const size_t operations = history.operations();
@@ -102,7 +102,7 @@ TEST(FlashPowerCuts, AreReconstructedToTheByte) {
   NEEDS_UPDATE_IMAGES();
   FlashBench whole;
   (void)whole.runs();
-  const FlashHistory history(whole.board());
+  FlashHistory history(whole.board());
   (void)whole.flash(newer_update);
   whole.board().on_flash_change({});
   for (const size_t cut : {size_t{1}, size_t{40}, size_t{1'000}}) {
