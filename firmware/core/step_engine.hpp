@@ -46,7 +46,7 @@ class Flag {
 template <Board B>
 class StepEngine {
  public:
-  static constexpr std::size_t kQueue = 1024;
+  static constexpr std::size_t kQueue = 512;
   static constexpr std::size_t kSamples = 512;
   /// An order must reach the timer this long before its tick, or the compare would be missed.
   static constexpr Ticks kLeastLead{42};
