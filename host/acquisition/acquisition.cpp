@@ -297,10 +297,10 @@ void Acquisition::fail_journal() {
   if (outcome_.end == journal_failed) return;
   outcome_.end = journal_failed;
   hooks_.remark({"error", journal_failed, journal_.problem() + "; the pump is being stopped"});
+  if (tail_until_ns_) ended_ = true;  // the pump is at rest already
   if (ended_) return;
   controller_.stop_now();
   deadline_ns_ = clock_.now_ns() + static_cast<uint64_t>(stop_patience_s * ns_per_s);
-  tail_until_ns_.reset();
 }
 
 void Acquisition::end(std::string how) {

@@ -48,6 +48,7 @@ class Program {
   Program& operator=(const Program&) = delete;
 
   void signal(int number) const;
+  [[nodiscard]] pid_t pid() const { return pid_; }  ///< -1 when it has ended
   /// Waits until its standard output or error holds `text`; false when it ends or a minute passes before.
   bool wait_for_text(const std::string& text);
   [[nodiscard]] std::string out() const;

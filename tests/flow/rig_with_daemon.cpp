@@ -33,6 +33,12 @@ RigWithDaemon::~RigWithDaemon() {
   }
 }
 
+void RigWithDaemon::end_rig() {
+  rig_->signal(SIGTERM);
+  EXPECT_EQ(rig_->wait().exit_code, 0) << rig_->err();
+  rig_.reset();
+}
+
 void RigWithDaemon::start_daemon(const std::vector<std::string>& before) {
   std::vector<std::string> arguments = before;
   arguments.push_back(before.empty() ? "diastole" : DIASTOLE_BIN_DIR "/diastole");

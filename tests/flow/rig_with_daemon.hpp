@@ -27,6 +27,8 @@ class RigWithDaemon {
   [[nodiscard]] DaemonClient client() const { return DaemonClient(path("socket")); }
   /// The simulated rig's program.
   [[nodiscard]] const Program& rig() const { return *rig_; }
+  /// Ends it before its time, after the daemon; its pin trace is whole then.
+  void end_rig();
   [[nodiscard]] std::string path(const std::string& name) const { return (place / name).string(); }
 
   Workplace place;

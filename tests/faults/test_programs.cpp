@@ -1,0 +1,188 @@
+// Faults of the programs' surroundings: the daemon killed, its line pulled out, its wall clock moved, its socket
+// attacked.
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <csignal>
+#include <filesystem>
+#include <fstream>
+
+#include "protocol/contract/input_error.hpp"
+#include "protocol/runfile/reader.hpp"
+#include "tests/faults/fault_table.hpp"
+#include "tests/faults/hostile_clients.hpp"
+#include "tests/flow/rig_with_daemon.hpp"
+
+namespace diastole::faults {
+namespace {
+
+using namespace std::chrono_literals;
+using flow::Ended;
+using flow::RigWithDaemon;
+using nlohmann::json;
+using Time = RigWithDaemon::Time;
+
+struct LastEdge {
+  double first_ttl_s = -1;
+  double last_s = -1;
+};
+
+/// From the rig's pin trace: when the first TTL rose, and when anything last moved.
+LastEdge last_edge(const std::filesystem::path& pins) {
+  LastEdge edge;
+  std::ifstream file(pins);
+  for (std::string line; std::getline(file, line);) {
+    if (line.empty() || std::isdigit(static_cast<unsigned char>(line[0])) == 0) continue;
+    edge.last_s = 1e-9 * std::stod(line);
+    if (edge.first_ttl_s < 0 && line.ends_with(",TTL,1")) edge.first_ttl_s = edge.last_s;
+  }
+  return edge;
+}
+
+std::filesystem::path only_journal(const RigWithDaemon& rig) {
+  std::filesystem::path found;
+  for (const auto& entry : std::filesystem::directory_iterator(rig.place / "journals"))
+    if (entry.path().extension() == ".journal") found = entry.path();
+  return found;
+}
+
+TEST(Faults, DaemonKilled) {
+  double most_lost_s = 0;
+  int during_the_run = 0;
+  const int tried = trials(8, 500);
+  const int survived = survivors(tried, [&](int, std::mt19937& random) {
+    auto rig = std::make_unique<RigWithDaemon>(Time::conducted, flow::source_text("examples/rig.toml"),
+                                               std::vector<std::string>{"--pins", "pins.csv"});
+    rig->start_daemon();
+    auto client = rig->client();
+    client.call("rig.home");
+    client.call("run.start", flow::many_segments());
+    std::this_thread::sleep_for(std::chrono::duration<double>(between(random, 0, 0.35)));
+    rig->daemon->signal(SIGKILL);
+    rig->daemon->wait();
+    rig->daemon.reset();
+    const Ended recovered = flow::run(
+        rig->place, {"diastole", "recover", only_journal(*rig).string(), "-o", "saved.run.h5", "--json"});
+    if (recovered.exit_code == 2 && recovered.err.find("never started") != std::string::npos) return true;
+    if (recovered.exit_code != 0 && recovered.exit_code != 1) {
+      ADD_FAILURE() << recovered.exit_code << recovered.err;
+      return false;
+    }
+    const auto run = runfile::read_run(rig->place / "saved.run.h5");
+    rig->end_rig();
+    const LastEdge edge = last_edge(rig->place / "pins.csv");
+    if (run.trigger_s.empty() || edge.first_ttl_s < 0 || run.pressure.time_s.empty()) return true;
+    ++during_the_run;
+    const double recorded_s = run.pressure.time_s.back() - run.trigger_s.front();
+    most_lost_s = std::max(most_lost_s, edge.last_s - edge.first_ttl_s - recorded_s);
+    return edge.last_s - edge.first_ttl_s - recorded_s <= 1.0;
+  });
+  add_to_table(
+      {"kill -9 of the daemon", "random moments of a session", tried, survived,
+       fmt::format("{:.0f} ms at most, 0 corrupt rows ({} in mid-run)", 1e3 * most_lost_s, during_the_run)});
+}
+
+TEST(Faults, LinePulledOut) {
+  const int tried = trials(3, 200);
+  const int survived = survivors(tried, [&](int, std::mt19937& random) {
+    RigWithDaemon rig(Time::conducted, flow::source_text("examples/rig.toml"),
+                      {"--fault", fmt::format("serial-hangup@{:.4f}", between(random, 4, 12))});
+    rig.start_daemon();
+    const Ended homed = flow::run(rig.place, {"diastole", "home", "--socket", rig.path("socket")});
+    rig.place.write("gel.experiment.toml", flow::source_text("examples/gel.experiment.toml"));
+    const Ended ended = flow::run(rig.place, {"diastole", "run", "gel.experiment.toml", "-o", "gel.run.h5",
+                                              "--socket", rig.path("socket"), "--json"});
+    const json session = ended.json();
+    return homed.exit_code == 0 && ended.exit_code == 3 && session["end"] == "link_lost" &&
+           session["samples"].get<int64_t>() + session["gaps"].get<int64_t>() == session["expected"];
+  });
+  add_to_table({"pty hang-up", "the line pulled out of the daemon", tried, survived,
+                "told with exit code 3; every sample kept or declared"});
+}
+
+TEST(Faults, WallClockJumps) {
+  constexpr const char* library = "/usr/lib/x86_64-linux-gnu/faketime/libfaketime.so.1";
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+  GTEST_SKIP() << "libfaketime and sanitizers do not go together";
+#endif
+  if (!std::filesystem::exists(library)) GTEST_SKIP() << "libfaketime is not installed (package faketime)";
+  const int tried = trials(2, 10);
+  double largest_step_s = 0;
+  const int survived = survivors(tried, [&](int k, std::mt19937&) {
+    RigWithDaemon rig(Time::real);
+    const auto set = [&](const char* offset) { std::ofstream(rig.path("offset")) << offset << '\n'; };
+    set("+0");
+    rig.start_daemon({"/usr/bin/env", std::string("LD_PRELOAD=") + library,
+                      "FAKETIME_TIMESTAMP_FILE=" + rig.path("offset"), "FAKETIME_NO_CACHE=1",
+                      "FAKETIME_DONT_FAKE_MONOTONIC=1"});
+    auto client = rig.client();
+    client.call("rig.home");
+    const json begun = client.call("run.start", flow::many_segments());
+    std::this_thread::sleep_for(1s);
+    set(k % 2 == 0 ? "+3600" : "-3600");
+    std::this_thread::sleep_for(1s);
+    client.call("run.stop");
+    const json status = flow::status_when(client, "homed", true);
+    const auto run = runfile::read_run(begun["run_file"].get<std::string>());
+    for (size_t i = 1; i < run.pressure.time_s.size(); ++i)
+      largest_step_s = std::max(largest_step_s, run.pressure.time_s[i] - run.pressure.time_s[i - 1]);
+    // Neither the axis nor its length knows of the hour.
+    return status["fault"].is_null() && run.pressure.time_s.size() > 300 && run.pressure.time_s.back() < 60;
+  });
+  EXPECT_LT(largest_step_s, 60);
+  add_to_table({"wall clock jumps", "one hour forth and back, in mid-run", tried, survived,
+                "the run's time axis knows nothing of it"});
+}
+
+/// Resident memory of a process.
+double resident_MB(pid_t process) {
+  std::ifstream file(fmt::format("/proc/{}/statm", process));
+  double pages = 0;
+  file >> pages >> pages;
+  return pages * static_cast<double>(::sysconf(_SC_PAGESIZE)) / 1e6;
+}
+
+TEST(Faults, HostileClients) {
+  uint64_t sent = 0;
+  double growth_MB = 0;
+  int64_t missing = 0;
+  const int tried = trials(1, 5);
+  const int survived = survivors(tried, [&](int, std::mt19937&) {
+    RigWithDaemon rig(Time::conducted);
+    rig.start_daemon();
+    auto holder = rig.client();
+    holder.call("rig.home");
+    double before_MB = 0;
+    json progress;
+    uint64_t granted = 0;
+    {
+      HostileClients clients(rig.path("socket"), 50, 10'000);
+      std::this_thread::sleep_for(1s);
+      before_MB = resident_MB(rig.daemon->pid());
+      const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(trials(2, 60));
+      do {
+        holder.call("run.start", flow::many_segments());
+        do {
+          progress = holder.call("run.progress");
+          std::this_thread::sleep_for(20ms);
+        } while (progress["state"] == "running" || progress["state"] == "writing");
+        missing += progress["missing"].get<int64_t>();
+        flow::status_when(holder, "homed", true);
+        if (progress["state"] != "done" || progress["triggers"] != 60) return false;
+      } while (std::chrono::steady_clock::now() < end);
+      sent += clients.sent();
+      granted = clients.granted();
+    }
+    growth_MB = std::max(growth_MB, resident_MB(rig.daemon->pid()) - before_MB);
+    return granted == 0 && missing == 0;
+  });
+  EXPECT_LT(growth_MB, 40);
+  add_to_table(
+      {"hostile clients", "50 of them, 10000 messages/s wanted", tried, survived,
+       fmt::format("{} messages: one lease, {} samples missing, {:+.1f} MB", sent, missing, growth_MB)});
+}
+
+}  // namespace
+}  // namespace diastole::faults
