@@ -59,7 +59,7 @@ void Motion<B>::take_tripped_fault() {
   }
   const wire::Fault fault = tripped_;
   if (fault == wire::Fault::none) return;
-  motor_enabled_ = false;
+  set_motor_enabled(false);  // the request that was interrupted may have switched it on again
   latch(fault);
   tripped_ = wire::Fault::none;
 }
