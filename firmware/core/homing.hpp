@@ -12,7 +12,8 @@
 //        |·································|<-- 64 -->|####### home switch closed
 //   inflate ◀──                                        ──▶ withdraw
 //
-// A rig that already stands on the switch begins with back_off. The reference is found while inflating, so the play
+// A rig that already stands on the switch begins with back_off. A far limit switch that closes on the way cuts the motor
+// off: it turns the wrong way. The reference is found while inflating, so the play
 // of screw and nut is on the side from which every cycle begins, and the switch's hysteresis does not matter. Slow is
 // slow enough to stop within a step: the switch's interrupt ends approach and leave; from the fast stages the motor
 // comes to rest under control and may go v · 10 ms + v²/2a beyond the switch.

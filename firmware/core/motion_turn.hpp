@@ -152,7 +152,8 @@ template <Board B>
 void Motion<B>::begin_homing_stage(HomingStage stage) {
   homing_ = stage;
   decelerating_ = false;
-  watch_ = stage == HomingStage::seek       ? Watch::rest
+  const bool withdraws_from_far = stage == HomingStage::seek && board_.inputs().far_limit;
+  watch_ = withdraws_from_far               ? Watch::rest
            : stage == HomingStage::approach ? Watch::approach_home
            : stage == HomingStage::leave    ? Watch::leave_home
                                             : Watch::inflating;

@@ -129,6 +129,29 @@ TEST(Homing, ASwitchThatStaysClosedIsNamed) {
   EXPECT_EQ(bench.heard.faults[0].fault, Fault::home_switch_stuck);
 }
 
+TEST(Homing, AMotorThatTurnsTheWrongWayIsCutOffAtTheFarLimit) {
+  Bench bench(standing_at(20'000));
+  bench.connect();
+  ASSERT_TRUE(bench.ask(wire::Configure::example()));
+  ASSERT_TRUE(bench.ask(wire::Home{0, Bench::kLease}));
+  bench.run_for(microseconds(1'000'000));
+  ASSERT_EQ(bench.state(), State::homing);
+  const std::int32_t there = bench.rig.mechanical_microsteps();
+  bench.rig.set_far_limit(true);
+  bench.run_for(microseconds(100'000));
+  EXPECT_EQ(bench.state(), State::faulted);
+  EXPECT_EQ(bench.rig.controller().motion().safety().fault(), Fault::limit_switch);
+  EXPECT_EQ(bench.rig.mechanical_microsteps(), there);
+}
+
+TEST(Homing, FromTheFarLimitItWithdraws) {
+  RecordedController::Options options = standing_at(3000);
+  options.board.mechanics.far_limit_steps = 2990;
+  Bench bench(options);
+  bench.prepare();
+  EXPECT_EQ(bench.state(), State::homed);
+}
+
 TEST(Jog, MovesByTheDistanceAndKeepsThePosition) {
   Bench bench;
   bench.prepare();
