@@ -59,6 +59,9 @@ concept Board = requires(B& board, const B& fixed, const PulseOrder& order,
   { fixed.ticks_until(std::uint32_t{}) } -> std::same_as<std::int32_t>;
   /// One order at a time: the board calls Controller::on_match() when this one has been carried out.
   {board.schedule(order)};
+  /// TTL rises at a tick less than 25 s ahead, without an order, and falls a width later; with or without the R-wave.
+  /// Precondition: the TTL before has fallen, its R-wave is over, and the next order is none with a TTL.
+  {board.schedule_trigger(std::uint32_t{}, Ticks{}, true)};
   /// No order follows the one carried out: no edge until the next schedule().
   {board.rest()};
   /// STEP and TTL do not rise from this moment on; a STEP that is high falls in time, the TTL at once. Callable

@@ -77,6 +77,7 @@ PlanRefusal Motion<B>::arm(const wire::Arm& arm) {
   program_.gate_every = arm.gate_every;
   program_.rest_us = arm.rest_us;
   program_.ttl_width_us = arm.ttl_width_us;
+  program_.trigger_delay_us = arm.trigger_delay_us;
   program_.position_period_ticks = arm.position_period_ticks;
   const auto stopping_time = check_program(program_, settings_);
   if (!stopping_time.ok()) return stopping_time.error();
@@ -150,7 +151,7 @@ wire::Refusal Motion<B>::start(std::uint32_t lease_id) {
   r_waves_before_ = counters.r_waves;
   engine_.open();
   engine_.begin_counting_run();
-  engine_.set_ttl_width(microseconds(program_.ttl_width_us));
+  engine_.set_trigger(microseconds(program_.ttl_width_us), microseconds(program_.trigger_delay_us));
   run_start_ = board_.now() + kStartLead;
   engine_.begin_sampling(run_start_, Ticks{program_.position_period_ticks});
   planner_.begin_run(program_, settings_, run_start_, counters.position);

@@ -257,6 +257,7 @@ void Motion<B>::report_plan() {
 
 template <Board B>
 void Motion<B>::take_reports() {
+  engine_.settle_trigger();
   auto& reports = engine_.reports();
   while (const MotionReport* report = reports.front()) {
     if (outbox_.room() < Outbox::kSlots / 2) break;
@@ -311,6 +312,7 @@ template <Board B>
 void Motion<B>::end_motion(Ticks tick) {
   watch_ = Watch::rest;
   lease_.release();
+  engine_.drop_trigger();
   engine_.stop_sampling(tick);
   const MotionCounters counters = engine_.counters();
   run_end_due_ = wire::RunEnded{end_reason_,

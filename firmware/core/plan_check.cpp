@@ -4,6 +4,7 @@
 
 #include "firmware/core/profiles/profile.hpp"
 #include "firmware/core/take_up.hpp"
+#include "firmware/core/uploaded/crossings.hpp"
 
 namespace diastole::firmware {
 
@@ -69,6 +70,15 @@ SegmentPeaks segment_peaks(const Segment& segment, const Settings& settings) {
   return peaks;
 }
 
+std::uint64_t first_step_us(const Segment& segment, const Settings& settings) {
+  if (!segment.moves()) return 0;
+  const auto count = static_cast<std::uint32_t>(settings.steps_of_nL(segment.stroke_nL).count);
+  const Q64 phase = segment.uploaded != nullptr
+                        ? UploadedCrossings(*segment.uploaded, count).take().phase
+                        : find_profile(segment.waveform)->phase_rising(ratio(1, 2 * count));
+  return multiply_high(segment.period_us, phase) + 1;
+}
+
 namespace {
 
 struct Check {
@@ -97,6 +107,15 @@ Check check_segment(const Segment& segment, const Program& program, const Settin
   if (segment.moves() && peaks.cycle_steps.count == 0)
     return {wire::Limit::stroke_at_least, segment.stroke_nL, divide_up(limits.microstep_pL, 1000)};
   if (r_wave_spacing_us <= kRWave_us) return {wire::Limit::r_wave_spacing, r_wave_spacing_us, kRWave_us + 1};
+  if (program.trigger_delay_us > 0) {
+    const std::uint64_t taken_us =
+        std::max(program.ttl_width_us, kRWave_us) + first_step_us(segment, settings);
+    const std::uint64_t most_us = segment.period_us > taken_us ? segment.period_us - taken_us : 0;
+    const bool possible =
+        program.trigger_delay_us >= kLeastTriggerDelay_us && most_us >= kLeastTriggerDelay_us;
+    if (!possible || program.trigger_delay_us > most_us)
+      return {wire::Limit::trigger_delay, program.trigger_delay_us, possible ? most_us : 0};
+  }
   return {wire::Limit::none, 0, 0};
 }
 

@@ -5,7 +5,8 @@
 //   flow = v S/T     acceleration = a S/T²     step rate = flow / microstep
 //   pressure = inertance · acceleration        stopping time = flow / allowed acceleration
 //
-// all rounded up. A hold has no peaks and may have any stroke. The ramps between segments are planned within the limits and need no check.
+// all rounded up. A delayed trigger must be over, TTL and R-wave, one period after the cycle's beginning: then it
+// belongs to its cycle, and a run ends behind its last trigger. A hold has no peaks and may have any stroke. The ramps between segments are planned within the limits and need no check.
 
 #include <cstdint>
 
@@ -45,6 +46,12 @@ wire::Result<std::uint32_t, PlanRefusal> check_take_up(const Program& program, c
 
 /// Peaks of one segment. Precondition: the firmware has its waveform.
 SegmentPeaks segment_peaks(const Segment& segment, const Settings& settings);
+
+/// A delayed trigger is ordered when the cycle's first step has been made.
+inline constexpr std::uint32_t kLeastTriggerDelay_us = 100;
+
+/// From the beginning of a cycle to its first step, rounded up. Precondition: the stroke is a microstep at least.
+std::uint64_t first_step_us(const Segment& segment, const Settings& settings);
 
 /// The R-wave's length, and so the least distance of two.
 inline constexpr std::uint32_t kRWave_us = 30'000;

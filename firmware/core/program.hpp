@@ -31,6 +31,7 @@ struct Program {
   std::uint16_t gate_every = 1;
   std::uint32_t rest_us = 0;
   std::uint32_t ttl_width_us = 0;
+  std::uint32_t trigger_delay_us = 0;
   std::uint32_t position_period_ticks = 0;
 };
 

@@ -83,6 +83,8 @@ class StepEngine {
   void cut() {
     typename B::InterruptLock lock(board_);
     closed_ = true;
+    settle_trigger(lower_half(board_.now()));
+    trigger_ = {};
     board_.cancel_pulses();
     loaded_ = false;
     queue_.clear();
@@ -123,7 +125,25 @@ class StepEngine {
     counters_.position = position;
     counters_.motor_beside_load = Steps{0};
   }
-  void set_ttl_width(Ticks width) { ttl_width_ = width; }
+  /// How the TTL follows the first step of a cycle. Precondition: delay is 0 or at least kLeastTriggerDelay_us.
+  void set_trigger(Ticks width, Ticks delay) {
+    typename B::InterruptLock lock(board_);
+    ttl_width_ = width;
+    trigger_delay_ = lower_half(delay);
+    trigger_ = {};
+  }
+  /// Main loop: counts and reports a delayed TTL that has risen by now.
+  void settle_trigger() {
+    typename B::InterruptLock lock(board_);
+    settle_trigger(lower_half(board_.now()));
+  }
+  /// A delayed TTL that has not risen yet does not. Precondition: nothing moves.
+  void drop_trigger() {
+    typename B::InterruptLock lock(board_);
+    settle_trigger(lower_half(board_.now()));
+    if (trigger_.flags != 0) board_.cancel_pulses();
+    trigger_ = {};
+  }
 
   /// An event came too late for the timer since the last call: motion has been cut off.
   bool take_underrun() { return underrun_.exchange(false); }
@@ -138,6 +158,7 @@ class StepEngine {
 
     [[nodiscard]] bool has(MotionEvent::Flag flag) const { return (flags & flag) != 0; }
   };
+  static constexpr std::uint16_t kTrigger = MotionEvent::kCycleStart | MotionEvent::kRWave;
   static constexpr std::uint16_t kStepOnly = MotionEvent::kStep | MotionEvent::kInflate;
 
   void load_first() {
@@ -160,8 +181,8 @@ class StepEngine {
     board_.schedule(PulseOrder{.tick = event_.tick,
                                .step = event_.has(MotionEvent::kStep),
                                .inflate = event_.has(MotionEvent::kInflate),
-                               .ttl = event_.has(MotionEvent::kCycleStart),
-                               .r_wave = event_.has(MotionEvent::kRWave),
+                               .ttl = event_.has(MotionEvent::kCycleStart) && trigger_delay_ == 0,
+                               .r_wave = event_.has(MotionEvent::kRWave) && trigger_delay_ == 0,
                                .ttl_width = ttl_width_});
   }
 
@@ -181,12 +202,32 @@ class StepEngine {
       counters_.motor_beside_load += way;
       return;
     }
-    if (event.has(MotionEvent::kCycleStart)) {
-      ++counters_.cycles_begun;
-      ++counters_.triggers;
-    }
-    if (event.has(MotionEvent::kRWave)) ++counters_.r_waves;
+    settle_trigger(event.tick);
+    if (event.has(MotionEvent::kCycleStart)) ++counters_.cycles_begun;
     if (event.has(MotionEvent::kCycleEnd)) ++counters_.cycles_done;
+    if (event.has(MotionEvent::kCycleStart) && trigger_delay_ != 0) {
+      trigger_ = {event.tick + trigger_delay_, static_cast<std::uint16_t>(event.flags & kTrigger)};
+      board_.schedule_trigger(trigger_.tick, ttl_width_, trigger_.has(MotionEvent::kRWave));
+      return report({event.tick, static_cast<std::uint16_t>(event.flags & ~kTrigger)});
+    }
+    count_trigger(event);
+    report(event);
+  }
+
+  void count_trigger(const Queued& event) {
+    if (event.has(MotionEvent::kCycleStart)) ++counters_.triggers;
+    if (event.has(MotionEvent::kRWave)) ++counters_.r_waves;
+  }
+
+  /// The delayed trigger counts and is told once it has risen.
+  void settle_trigger(std::uint32_t now) {
+    if (trigger_.flags == 0 || ticks_between(trigger_.tick, now) < 0) return;
+    count_trigger(trigger_);
+    report(trigger_);
+    trigger_ = {};
+  }
+
+  void report(const Queued& event) {
     constexpr std::uint16_t kReported =
         MotionEvent::kCycleStart | MotionEvent::kRunStart | MotionEvent::kSegmentStart | MotionEvent::kEnd;
     if ((event.flags & kReported) == 0) return;
@@ -207,6 +248,8 @@ class StepEngine {
   Ring<std::int32_t, kSamples> samples_;
   MotionCounters counters_;
   Ticks ttl_width_;
+  std::uint32_t trigger_delay_ = 0;  ///< 0: the TTL rises with the cycle's first step
+  Queued trigger_;                   ///< a delayed one that has not risen; no flags: there is none
   std::uint32_t next_sample_ = 0;
   std::uint32_t sample_period_ = 0;
   bool sampling_ = false;

@@ -5,7 +5,8 @@
 //   begin     {run_id, started_utc, producer, experiment, experiment_file, sample_rate_Hz, channels, rig,
 //   instrument,
 //              tick_rate_Hz, microstep_pL, daq_timer_rate_Hz, daq_timer_counts_samples,
-//              segments[{start_s, waveform, ...}], waveforms[{segment, points, fraction}]}
+//              segments[{start_s, waveform, ...}], waveforms[{segment, points, fraction}],
+//              trigger_delay_s}
 //   grid      {first_due_ns}                             host time at which sample 0 is due
 //   gap       {first_index, count, reason}               of the sample stream
 //   clock     {host_ns, tick, half_round_trip_ns}        controller against host

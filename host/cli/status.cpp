@@ -39,6 +39,10 @@ void show_status(const nlohmann::json& status, bool as_json) {
   const bool known = status.at("state") != "unhomed";
   fmt::print("position  {:.3f} mL{}\n", status.at("position_mL").get<double>(),
              known ? "" : ", counted from where it was switched on or lost its place");
+  fmt::print(
+      "counted   {} cycles of this run; {} triggers, {} R-waves, {} steps since the controller's reset\n",
+      status.at("cycles").get<int64_t>(), status.at("triggers").get<int64_t>(),
+      status.at("r_waves").get<int64_t>(), status.at("steps").get<int64_t>());
   if (const nlohmann::json problem = status.value("settings_problem", nlohmann::json()); !problem.is_null())
     fmt::print("settings  {}\n", problem.get<std::string>());
   if (const nlohmann::json control = status.value("control", nlohmann::json()); !control.is_null()) {
@@ -51,10 +55,8 @@ void show_status(const nlohmann::json& status, bool as_json) {
   std::string inputs;
   for (const nlohmann::json& input : status.at("inputs"))
     inputs += (inputs.empty() ? "" : ", ") + input.get<std::string>();
-  fmt::print("inputs    {}; motor {}; {} triggers since reset\n",
-             inputs.empty() ? "none active" : inputs + " active",
-             status.at("motor_powered").get<bool>() ? "powered" : "off",
-             status.at("triggers").get<uint32_t>());
+  fmt::print("inputs    {}; motor {}\n", inputs.empty() ? "none active" : inputs + " active",
+             status.at("motor_powered").get<bool>() ? "powered" : "off");
   if (const nlohmann::json journals = status.value("journals", nlohmann::json()); !journals.is_null()) {
     show_journals(journals);
   }

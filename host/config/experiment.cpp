@@ -165,6 +165,11 @@ Experiment parse_experiment(std::string_view text, const std::string& file, cons
   (void)root.text_or("name", "");
   experiment.sample_rate_Hz = root.number_or("sample_rate_Hz", 300, {.at_least = 1, .at_most = 20'000});
   experiment.gate_every = root.integer_or("gate_every", 1, {.at_least = 1, .at_most = 10'000});
+  experiment.trigger_delay_ms = root.number_or("trigger_delay_ms", 0, {.at_least = 0, .at_most = 10'000});
+  constexpr double least_delay_ms = 0.1;
+  if (experiment.trigger_delay_ms > 0 && experiment.trigger_delay_ms < least_delay_ms)
+    root.fail("trigger_delay_ms", fmt::format("is {:g}", experiment.trigger_delay_ms),
+              "Give 0, or 0.1 and more.");
   experiment.rest_s = root.number_or("rest_s", 1.0, {.at_least = 0.001, .at_most = 60});
   SegmentReader segments(experiment, read_points);
   for (TableReader& table : root.tables("segment"))

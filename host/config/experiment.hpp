@@ -38,7 +38,8 @@ struct Experiment {
   std::string text;  ///< the whole file, as it goes into the run file
   double sample_rate_Hz = 300;
   int64_t gate_every = 1;
-  double rest_s = 1.0;  ///< stillness between the start of run and the first segment
+  double trigger_delay_ms = 0;  ///< TTL and R-wave come that long after the cycle's first step
+  double rest_s = 1.0;          ///< stillness between the start of run and the first segment
   std::vector<ExperimentSegment> segments;
   std::vector<ExperimentWaveform> waveforms;  ///< each once, in the order in which they are first named
 

@@ -114,6 +114,8 @@ LimitInWords words_for(wire::Limit limit) {
           1e-3, "ms",
           "Reduce stroke_mL or lengthen period_s: at each reversal the motor needs this time to take up the "
           "backlash (diastole settings)."};
+    case wire::Limit::trigger_delay:
+      return {1e-3, "ms", "Reduce trigger_delay_ms: the TTL and the R-wave of 30 ms end within the period."};
     case wire::Limit::none:
       break;
   }
@@ -365,6 +367,8 @@ ProgramPlan ControllerClient::load(const Experiment& experiment) {
   arm.rest_us = whole({experiment.file, "rest_s", 1e6 * experiment.rest_s, "us"});
   arm.ttl_width_us =
       whole({rig_.file, "controller.ttl_width_ms", 1e3 * rig_.controller.ttl_width_ms, "us", 1});
+  arm.trigger_delay_us =
+      whole({experiment.file, "trigger_delay_ms", 1e3 * experiment.trigger_delay_ms, "us", 0, 10'000'000});
   arm.position_period_ticks = static_cast<uint32_t>(hello_->tick_rate_Hz / position_rate_Hz_);
   const Answer answer = request(arm);
   if (answer.nak && (answer.nak->refusal == wire::Refusal::limit_exceeded ||
@@ -477,6 +481,7 @@ void ControllerClient::take_answer(const Message& message) {
                     message.request_type == awaited_type_);
     if (!mine) events_.emplace_back(message);
   }
+  if constexpr (std::is_same_v<Message, wire::Status>) last_known_ = message;
   if (!mine) return;
   awaited_.reset();
   if constexpr (std::is_same_v<Message, wire::Hello>) answer_.hello = message;
@@ -484,13 +489,18 @@ void ControllerClient::take_answer(const Message& message) {
   if constexpr (std::is_same_v<Message, wire::Nak>) answer_.nak = message;
   if constexpr (std::is_same_v<Message, wire::SettingsReport>) answer_.settings = message;
   if constexpr (std::is_same_v<Message, wire::BlackBoxReport>) answer_.black_box = message;
-  if constexpr (std::is_same_v<Message, wire::Status>) answer_.status = last_known_ = message;
+  if constexpr (std::is_same_v<Message, wire::Status>) answer_.status = message;
 }
 
 void ControllerClient::bring_forward(const ControllerEvent& event) {
   if (const auto* change = std::get_if<wire::StateChanged>(&event)) last_known_.state = change->to;
   if (const auto* raised = std::get_if<wire::FaultRaised>(&event)) last_known_.fault = raised->fault;
-  if (std::holds_alternative<wire::Trigger>(event)) ++last_known_.triggers;
+  if (const auto* started = std::get_if<wire::SegmentStarted>(&event)) last_known_.segment = started->segment;
+  if (const auto* trigger = std::get_if<wire::Trigger>(&event)) {
+    ++last_known_.triggers;
+    last_known_.r_waves += trigger->r_wave;
+    last_known_.cycle = trigger->cycle + 1;
+  }
   if (const auto* batch = std::get_if<wire::PositionBatch>(&event); batch != nullptr && batch->count > 0)
     last_known_.position_microsteps = batch->position_microsteps[batch->count - 1U];
   if (const auto* ended = std::get_if<wire::RunEnded>(&event))

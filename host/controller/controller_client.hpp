@@ -58,8 +58,8 @@ class ControllerClient final : public Controller {
   void jog(double distance_mL, double rate_mL_s);
   void clear_fault();
   wire::Status status();
-  /// The last status, brought forward by the events since: state, fault, position and triggers are of now, or
-  /// a batch of positions old.
+  /// The last status, brought forward by the events since: state, fault, position, segment, cycle, triggers and
+  /// R-waves are of now, or a batch of positions old.
   [[nodiscard]] const wire::Status& last_known() const { return last_known_; }
 
   void service() override;

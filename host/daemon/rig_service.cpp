@@ -519,7 +519,10 @@ json RigService::remember(const wire::Status& status) {
       {"position_mL", position_mL},
       {"inputs", active_inputs(status.inputs)},
       {"motor_powered", (status.inputs & 8U) != 0},
+      {"segment", status.segment},
+      {"cycles", status.cycle},
       {"triggers", status.triggers},
+      {"r_waves", status.r_waves},
       {"steps", status.steps},
       {"link", {{"crc_errors", status.crc_errors}, {"retransmissions", status.retransmissions}}},
       {"settings_problem", problem ? json(InputError(*problem).what()) : json()},
@@ -636,6 +639,7 @@ void RigService::write_beginning(JournalWriter& journal, const RunRecord& record
                        {"daq_timer_rate_Hz", std::max(1.0, timer.rate_Hz)},
                        {"daq_timer_counts_samples", timer.counts_samples},
                        {"segments", planned_segments(experiment, plan)},
+                       {"trigger_delay_s", 1e-3 * experiment.trigger_delay_ms},
                        {"waveforms", played_waveforms(experiment)}};
   if (!journal.append(RecordKind::document, beginning.dump())) {
     throw HardwareError(journal.path().string(), journal.problem(), "Free some space on that disk.");

@@ -199,6 +199,7 @@ void put_positions(const JournalStory& story, const TimeAxis& axis, RecordedRun&
 }
 
 void put_triggers(const JournalStory& story, const TimeAxis& axis, RecordedRun& run) {
+  run.trigger_delay_s = story.begin.value("trigger_delay_s", 0.0);
   int64_t next_cycle = 0;
   for (const json& trigger : story.triggers) {
     const int64_t cycle = trigger.at("cycle");

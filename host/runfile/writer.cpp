@@ -62,6 +62,7 @@ void write_streams(H5Sink& sink, const runfile::RecordedRun& run) {
       sink.attribute(fmt::format("{}/{}", runfile::pressure_group, name), note, value);
   }
   sink.numbers(runfile::trigger_time, run.trigger_s, runfile::time_unit);
+  if (run.trigger_delay_s > 0) sink.scalar(runfile::trigger_delay, run.trigger_delay_s, runfile::time_unit);
   for (const auto& [segment, flow] : run.flow) {
     const std::string group = fmt::format("{}/{}", runfile::flow_group, segment);
     sink.numbers(group + "/phase_s", flow.phase_s, runfile::time_unit);

@@ -10,7 +10,9 @@
 namespace diastole::runfile {
 namespace {
 
-bool lies_in(double time_s, const Segment& segment) {
+/// A delayed trigger belongs to the segment in which its cycle begins.
+bool lies_in(double trigger_s, double delay_s, const Segment& segment) {
+  const double time_s = trigger_s - delay_s;
   const double slack_s = 0.5 * period_tolerance * segment.period_s;
   return time_s >= segment.start_s - slack_s && time_s < segment.end_s() - slack_s;
 }
@@ -26,8 +28,8 @@ int64_t periods_between(double from_s, double to_s, double period_s) {
 
 class Comparison {
  public:
-  Comparison(const Segment& segment, SegmentTriggers& result)
-      : segment_(segment), triggers_(result.triggers), remarks_(result.remarks) {}
+  Comparison(const Segment& segment, double delay_s, SegmentTriggers& result)
+      : segment_(segment), delay_s_(delay_s), triggers_(result.triggers), remarks_(result.remarks) {}
 
   void compare(bool stopped) {
     if (triggers_.empty()) {
@@ -44,7 +46,8 @@ class Comparison {
  private:
   void begin() {
     CycleTrigger& first = triggers_.front();
-    first.cycle = std::max<int64_t>(0, std::llround((first.time_s - segment_.start_s) / segment_.period_s));
+    first.cycle =
+        std::max<int64_t>(0, std::llround((first.time_s - delay_s_ - segment_.start_s) / segment_.period_s));
     if (first.cycle > 0) miss(segment_.start_s, first.cycle, "at the segment's start");
   }
 
@@ -96,6 +99,7 @@ class Comparison {
   }
 
   const Segment& segment_;
+  double delay_s_;
   std::vector<CycleTrigger>& triggers_;
   std::vector<TriggerRemark>& remarks_;
   size_t good_ = 0;  // the last good one
@@ -104,20 +108,24 @@ class Comparison {
 }  // namespace
 
 SegmentTriggers triggers_of(const RecordedRun& run, size_t segment) {
-  SegmentTriggers result{.scheduled = run.segments[segment].cycles, .triggers = {}, .remarks = {}};
+  SegmentTriggers result{.scheduled = run.segments[segment].cycles,
+                         .delayed = run.trigger_delay_s > 0,
+                         .triggers = {},
+                         .remarks = {}};
   for (size_t row = 0; row < run.trigger_s.size(); ++row) {
-    if (lies_in(run.trigger_s[row], run.segments[segment]))
+    if (lies_in(run.trigger_s[row], run.trigger_delay_s, run.segments[segment]))
       result.triggers.push_back({run.trigger_s[row], row, 0, {}});
   }
-  Comparison(run.segments[segment], result).compare(was_stopped_on_request(run));
+  Comparison(run.segments[segment], run.trigger_delay_s, result).compare(was_stopped_on_request(run));
   return result;
 }
 
 std::vector<size_t> triggers_outside(const RecordedRun& run) {
   std::vector<size_t> rows;
   for (size_t row = 0; row < run.trigger_s.size(); ++row) {
-    const bool inside = std::ranges::any_of(
-        run.segments, [&](const Segment& segment) { return lies_in(run.trigger_s[row], segment); });
+    const bool inside = std::ranges::any_of(run.segments, [&](const Segment& segment) {
+      return lies_in(run.trigger_s[row], run.trigger_delay_s, segment);
+    });
     if (!inside) rows.push_back(row);
   }
   return rows;

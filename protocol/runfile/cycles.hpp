@@ -41,6 +41,7 @@ struct TriggerRemark {
 
 struct SegmentTriggers {
   int64_t scheduled = 0;
+  bool delayed = false;                ///< the last interval reaches beyond the segment
   std::vector<CycleTrigger> triggers;  ///< as recorded, in order
   std::vector<TriggerRemark> remarks;
 

@@ -142,7 +142,8 @@ CycleMeans means_of_cycle(const Samples& samples, const std::vector<FrameWindow>
 /// Why the interval that triggers[i] begins is out of tolerance: any of its cycles is, or ends with the segment.
 std::string irregular_interval(const SegmentTriggers& segment, size_t i, int64_t gate_every) {
   const auto& triggers = segment.triggers;
-  if (triggers[i].cycle + gate_every > segment.scheduled) return "the segment ends within its interval";
+  if (triggers[i].cycle + gate_every + (segment.delayed ? 1 : 0) > segment.scheduled)
+    return "the segment ends within its interval";
   for (size_t j = i; j < triggers.size() && triggers[j].cycle < triggers[i].cycle + gate_every; ++j) {
     if (!triggers[j].fault.empty()) return triggers[j].fault;
   }

@@ -11,7 +11,7 @@
 //   |   `-- waveforms/<segment>   of uploaded segments: points (text), phase[w], fraction[w]
 //   |-- pump               time_s[n], commanded_mL[n]
 //   |-- pressure           time_s[m], cavity_kPa[m], optionally cavity_filtered_kPa[m], pump_kPa[m]
-//   |-- trigger            time_s[k]
+//   |-- trigger            time_s[k], optionally delay_s (scalar)
 //   |-- mr/flow/<segment>  optional: phase_s[f], cavity_mL[f], sigma_mL[f]; segments count from 0
 //   |-- clock              optional: scalars such as daq_offset_s, daq_drift_ppm
 //   |-- gaps               table stream, first_index, count, reason; empty says that nothing is missing
@@ -44,6 +44,7 @@ inline constexpr const char* cavity_channel = "cavity_kPa";
 inline constexpr const char* cavity_filtered_channel = "cavity_filtered_kPa";
 inline constexpr const char* trigger_group = "/trigger";
 inline constexpr const char* trigger_time = "/trigger/time_s";
+inline constexpr const char* trigger_delay = "/trigger/delay_s";
 inline constexpr const char* flow_group = "/mr/flow";
 inline constexpr const char* clock_group = "/clock";
 inline constexpr const char* gaps_table = "/gaps";

@@ -173,6 +173,7 @@ RecordedRun read_run(const std::filesystem::path& path) {
   run.pump = {source.numbers(pump_time), source.numbers(pump_commanded)};
   run.pressure = read_pressure(source);
   run.trigger_s = source.numbers(trigger_time);
+  if (source.has(trigger_delay)) run.trigger_delay_s = source.scalar(trigger_delay);
   run.flow = read_flow(source);
   run.clock = read_clock(source);
   run.slices = read_slices(source);

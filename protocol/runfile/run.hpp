@@ -90,7 +90,8 @@ struct RecordedRun {
   PumpTrace pump;
   PressureTrace pressure;
   std::vector<double> trigger_s;
-  std::map<size_t, FlowVolume> flow;                 ///< by segment number, from 0
+  double trigger_delay_s = 0;         ///< from a cycle's first step to its trigger, as asked for
+  std::map<size_t, FlowVolume> flow;  ///< by segment number, from 0
   std::map<std::string, double, std::less<>> clock;  ///< e.g. "daq_drift_ppm"
   std::vector<Gap> gaps;
   std::vector<Event> events;

@@ -24,6 +24,6 @@ enum class Limit : std::uint8_t {
 #include "protocol/wire/limit_list.inc"
 };
 #undef DIASTOLE_LIMIT
-inline constexpr Limit kLastLimit = Limit::take_up;
+inline constexpr Limit kLastLimit = Limit::trigger_delay;
 
 }  // namespace diastole::wire

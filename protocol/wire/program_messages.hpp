@@ -224,8 +224,9 @@ struct WaveformPoints {
 //        4    4 rest_us                      from start of run to the first segment
 //        8    4 ttl_width_us
 //       12    4 position_period_ticks        of the position stream
+//       16    4 trigger_delay_us             TTL and R-wave that long after the cycle's first step; 0 or from 100
 //
-// Example Arm: 04 00 01 00 40 42 0F 00 10 27 00 00 C0 45 04 00
+// Example Arm: 04 00 01 00 40 42 0F 00 10 27 00 00 C0 45 04 00 00 00 00 00
 struct Arm {
   static constexpr MessageType kType = MessageType::Arm;
   std::uint16_t request_id = 0;
@@ -233,6 +234,7 @@ struct Arm {
   std::uint32_t rest_us = 1'000U;
   std::uint32_t ttl_width_us = 10U;
   std::uint32_t position_period_ticks = 1'000U;
+  std::uint32_t trigger_delay_us = 0U;
 
   template <class Self, class Visitor>
   static constexpr void layout([[maybe_unused]] Self& self, [[maybe_unused]] Visitor& visit) {
@@ -241,6 +243,7 @@ struct Arm {
     visit.field("rest_us", self.rest_us, 1'000U, 60'000'000U);
     visit.field("ttl_width_us", self.ttl_width_us, 10U, 1'000'000U);
     visit.field("position_period_ticks", self.position_period_ticks, 1'000U, 1'000'000'000U);
+    visit.field("trigger_delay_us", self.trigger_delay_us, 0U, 10'000'000U);
   }
   static constexpr Arm example() {
     Arm message;
@@ -249,6 +252,7 @@ struct Arm {
     message.rest_us = 1'000'000;
     message.ttl_width_us = 10'000;
     message.position_period_ticks = 280'000;
+    message.trigger_delay_us = 0;
     return message;
   }
 };

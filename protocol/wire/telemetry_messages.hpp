@@ -94,7 +94,8 @@ struct SegmentStarted {
   }
 };
 
-// Controller → host: the TTL rose, with the first step of a cycle or, in a hold, at the cycle's time.
+// Controller → host: the TTL rose, with the first step of a cycle or, in a hold, at the cycle's time, or
+// Arm.trigger_delay_us after that.
 //
 //   offset size field
 //        0    4 cycle                        from 0, over the whole run

@@ -21,6 +21,7 @@ using wire::Waveform;
 struct Plan {
   Segment segment{Waveform::parabolic, 10, 40'000'000, 0, 1'200'000};
   std::uint32_t ttl_width_us = 10'000;
+  std::uint32_t trigger_delay_us = 0;
   wire::Configure configure = wire::Configure::example();
   std::uint32_t backlash_steps = 0;
   std::optional<wire::Jog> jog;  ///< from 100 microsteps above home, instead of the segment
@@ -33,6 +34,7 @@ struct Plan {
     Program program;
     program.segments[program.size++] = segment;
     program.ttl_width_us = ttl_width_us;
+    program.trigger_delay_us = trigger_delay_us;
     program.rest_us = 1'000'000;
     const auto checked = check_program(program, Settings(configure));
     if (!checked.ok()) return checked.error();
@@ -115,6 +117,14 @@ Excess home() {
   return excess;
 }
 
+/// The R-wave of 30 ms behind the delay ends with the period of 1.2 s, which begins 4.187 ms before the first step.
+Excess trigger_delay() {
+  Excess excess{{}, 1'165'814, 1'165'813, {}};
+  excess.beyond.trigger_delay_us = 1'165'814;
+  excess.within.trigger_delay_us = 1'165'813;
+  return excess;
+}
+
 Excess excess_of(Limit limit) {
   switch (limit) {
     case Limit::none:
@@ -143,6 +153,8 @@ Excess excess_of(Limit limit) {
       return home();
     case Limit::take_up:
       return take_up();
+    case Limit::trigger_delay:
+      return trigger_delay();
   }
   return {};
 }

@@ -98,6 +98,29 @@ TEST(PlanCheck, TtlAndRWaveMustFitTheCycle) {
   EXPECT_EQ(check_program(program, Settings(wire::Configure::example())).error().limit, Limit::ttl_width);
 }
 
+TEST(PlanCheck, ADelayedTriggerIsOverWithinThePeriod) {
+  const Settings settings(wire::Configure::example());
+  for (const NamedProfile& named : every_profile()) {
+    SCOPED_TRACE(named.name);
+    const Segment segment = named.segment(1, 20'000'000, 0, 1'200'000);
+    Program program = program_of(segment);
+    const auto most_us = static_cast<std::uint32_t>(1'200'000 - 30'000 - first_step_us(segment, settings));
+    program.trigger_delay_us = most_us;
+    EXPECT_TRUE(check_program(program, settings).ok());
+    program.trigger_delay_us = most_us + 1;
+    const auto refused = check_program(program, settings);
+    ASSERT_FALSE(refused.ok());
+    EXPECT_EQ(refused.error().limit, Limit::trigger_delay);
+    EXPECT_EQ(refused.error().asked, most_us + 1);
+    EXPECT_EQ(refused.error().allowed, most_us);
+    program.trigger_delay_us = 99;
+    EXPECT_EQ(check_program(program, settings).error().limit, Limit::trigger_delay);
+  }
+  EXPECT_EQ(first_step_us({Waveform::hold, 1, 20'000'000, 0, 1'200'000}, settings), 0U);
+  // The first of 2567 parabolic microsteps: √(1/(8 · 5134)) of the period.
+  EXPECT_EQ(first_step_us({Waveform::parabolic, 1, 20'000'000, 0, 1'200'000}, settings), 5'922U);
+}
+
 TEST(PlanCheck, TheOffendingSegmentIsNamed) {
   Program program = program_of(kPaper);
   program.segments[program.size++] = {Waveform::parabolic, 1, 40'000'000, 0, 300'000};

@@ -168,6 +168,92 @@ TEST(Trigger, EveryProfileTriggersOncePerPeriodWithItsFirstStep) {
   }
 }
 
+std::vector<Ticks> rises_of(const std::vector<Edge>& edges, Signal signal) {
+  std::vector<Ticks> rises;
+  std::int32_t before = 0;
+  for (const Edge& edge : edges_of(edges, signal)) {
+    if (before == 0) rises.push_back(edge.tick);
+    before = edge.value;
+  }
+  return rises;
+}
+
+/// Every waveform twice over, and a hold between.
+void add_every_profile(Bench& bench) {
+  for (const NamedProfile& named : every_profile()) {
+    if (named.uploaded != nullptr) bench.upload(0, named.uploaded->rises);
+    bench.add_segment(named.waveform, 2, 8'000'000, 800'000, 1'000'000);
+  }
+}
+
+TEST(Trigger, MayComeADelayAfterTheFirstStepOfEachCycle) {
+  std::vector<Ticks> at_once;
+  for (const std::uint32_t delay_us : {0U, 100U, 350'000U, 700'001U}) {
+    SCOPED_TRACE(delay_us);
+    Bench bench;
+    bench.prepare();
+    add_every_profile(bench);
+    (void)bench.rig.take_edges();
+    wire::Arm arm = wire::Arm::example();
+    arm.gate_every = 3;
+    arm.ttl_width_us = 3'000;
+    arm.trigger_delay_us = delay_us;
+    bench.run_program(arm);
+    const auto edges = bench.rig.take_edges();
+    const Ticks start{static_cast<std::int64_t>(bench.heard.started.at(0).tick)};
+    std::vector<Ticks> rises = rises_of(edges, Signal::TTL), waves = rises_of(edges, Signal::RWAVE_uV);
+    const std::size_t cycles = 2 * every_profile().size();
+    ASSERT_EQ(rises.size(), cycles);
+    ASSERT_EQ(waves.size(), (cycles + 2) / 3);
+    for (std::size_t i = 0; i < waves.size(); ++i)
+      EXPECT_EQ(waves[i], rises[3 * i]);
+    ASSERT_EQ(bench.heard.triggers.size(), cycles);
+    for (std::size_t i = 0; i < cycles; ++i) {
+      EXPECT_EQ(bench.heard.triggers[i].tick, on_wire(rises[i]));
+      EXPECT_EQ(bench.heard.triggers[i].cycle, i);
+      EXPECT_EQ(bench.heard.triggers[i].r_wave, i % 3 == 0 ? 1 : 0);
+      rises[i] = rises[i] - start;
+    }
+    EXPECT_EQ(bench.heard.ended.at(0).triggers, cycles);
+    EXPECT_EQ(bench.heard.ended.at(0).r_waves, waves.size());
+    EXPECT_EQ(bench.heard.ended.at(0).cycles, cycles);
+    if (delay_us == 0) at_once = rises;
+    for (std::size_t i = 0; i < cycles; ++i)
+      EXPECT_EQ(rises[i] - at_once[i], microseconds(delay_us)) << i;
+  }
+}
+
+TEST(Trigger, ADelayedOneIsCountedOnlyIfItRose) {
+  Bench bench;
+  bench.prepare();
+  bench.add_segment(Waveform::sinusoidal, 3, 8'000'000, 800'000);
+  wire::Arm arm = wire::Arm::example();
+  arm.rest_us = 100'000;
+  arm.trigger_delay_us = 400'000;
+  std::size_t fewest = 100, most = 0;
+  for (int i = 0; i < 60; ++i) {
+    SCOPED_TRACE(i);
+    (void)bench.rig.take_edges();
+    bench.heard = {};
+    ASSERT_TRUE(bench.ask(arm));
+    ASSERT_TRUE(bench.ask(wire::Start{0, Bench::kLease}));
+    bench.run_for(microseconds(150'000 + 37'000 * i));
+    ASSERT_TRUE(bench.ask(wire::StopNow{}));
+    ASSERT_TRUE(bench.run_until([&] { return !bench.heard.ended.empty(); }, microseconds(3'000'000)));
+    bench.run_for(microseconds(900'000));
+    const auto rises = rises_of(bench.rig.take_edges(), Signal::TTL);
+    EXPECT_EQ(bench.heard.ended[0].triggers, rises.size());
+    EXPECT_EQ(bench.heard.ended[0].r_waves, rises.size());
+    ASSERT_EQ(bench.heard.triggers.size(), rises.size());
+    for (const Ticks rise : rises)
+      EXPECT_LE(on_wire(rise), bench.heard.ended[0].tick);
+    fewest = std::min(fewest, rises.size());
+    most = std::max(most, rises.size());
+  }
+  EXPECT_EQ(fewest, 0U);
+  EXPECT_GE(most, 2U);
+}
+
 TEST(Pins, DirectionIsSetUpBeforeTheStepAndPulsesHaveTheirWidth) {
   Bench bench;
   bench.prepare();

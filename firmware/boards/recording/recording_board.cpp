@@ -26,8 +26,13 @@ void RecordingBoard::schedule(const PulseOrder& order) {
   if (order.step && order.inflate != inflating) direction_due_ = std::max(now_, order_due_ - kDirectionSetup);
 }
 
+void RecordingBoard::schedule_trigger(std::uint32_t tick, Ticks width, bool r_wave) {
+  trigger_ = Trigger{whole_time(tick, now_), width, r_wave};
+}
+
 void RecordingBoard::cancel_pulses() {
   order_.reset();
+  trigger_.reset();
   direction_due_.reset();
   set_pin(Signal::TTL, 0);
 }
@@ -71,6 +76,7 @@ std::optional<Ticks> RecordingBoard::next_event() const {
   };
   if (order_) consider(order_due_);
   if (direction_due_) consider(*direction_due_);
+  if (trigger_) consider(trigger_->due);
   if (!coming_.empty()) consider(coming_.top().tick);
   return next;
 }
@@ -83,11 +89,13 @@ void RecordingBoard::carry_out(const PulseOrder& order) {
     if (pins_[static_cast<std::size_t>(Signal::ENABLE)] != 0) mechanical_steps_ += inflating ? 1 : -1;
     move_load();
   }
-  if (order.ttl) {
-    set_pin(Signal::TTL, 1);
-    coming_.push({now_ + order.ttl_width, Signal::TTL, 0});
-  }
-  if (!order.r_wave) return;
+  if (order.ttl) raise_trigger(order.ttl_width, order.r_wave);
+}
+
+void RecordingBoard::raise_trigger(Ticks width, bool r_wave) {
+  set_pin(Signal::TTL, 1);
+  coming_.push({now_ + width, Signal::TTL, 0});
+  if (!r_wave) return;
   for (std::size_t i = 0; i < kRWaveSamples; ++i)
     coming_.push({now_ + kRWaveSamplePeriod * static_cast<std::int64_t>(i), Signal::RWAVE_uV,
                   static_cast<std::int32_t>(r_wave_uV(kRWaveCodes[i]))});
@@ -113,6 +121,10 @@ bool RecordingBoard::run_to(Ticks tick, bool& inputs_changed) {
     carry_out(*std::exchange(order_, {}));
     const Inputs after = inputs();
     inputs_changed = before.home != after.home || before.far_limit != after.far_limit;
+  }
+  if (trigger_ && trigger_->due <= now_) {
+    raise_trigger(trigger_->width, trigger_->r_wave);
+    trigger_.reset();
   }
   while (!coming_.empty() && coming_.top().tick <= now_) {
     set_pin(coming_.top().signal, coming_.top().value);

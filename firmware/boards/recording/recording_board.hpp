@@ -79,6 +79,7 @@ class RecordingBoard {
     return ticks_between(lower_half(now_), tick);
   }
   void schedule(const PulseOrder& order);
+  void schedule_trigger(std::uint32_t tick, Ticks width, bool r_wave);
   void rest() {}
   void cancel_pulses();
   void set_motor_enabled(bool enabled) { set_pin(Signal::ENABLE, enabled); }
@@ -134,6 +135,7 @@ class RecordingBoard {
   [[nodiscard]] Ticks byte_time() const { return {kTicksPerSecond * 10 / options_.baud}; }
   void set_pin(Signal signal, std::int32_t value);
   void carry_out(const PulseOrder& order);
+  void raise_trigger(Ticks width, bool r_wave);
   void move_load();
 
   Options options_;
@@ -141,6 +143,12 @@ class RecordingBoard {
   std::optional<PulseOrder> order_;
   Ticks order_due_;
   std::optional<Ticks> direction_due_;
+  struct Trigger {
+    Ticks due;
+    Ticks width;
+    bool r_wave;
+  };
+  std::optional<Trigger> trigger_;                              ///< without an order
   std::priority_queue<Edge, std::vector<Edge>, Later> coming_;  ///< falling edges and R-wave samples
   std::int32_t pins_[6] = {};
   std::int32_t mechanical_steps_;

@@ -30,13 +30,14 @@ class PulseTimer {
     if (order.ttl) raise_ttl(order.tick, order.ttl_width);
     if (order.step && order.inflate != inflate_) set_direction(order.inflate, order.tick);
   }
+  /// Precondition: the TTL before has fallen.
+  void raise_ttl(std::uint32_t tick, firmware::Ticks width);
   void rest() { steps_.rest(); }
   void cancel();
   /// TIM2's interrupt: the counter has wrapped, or the TTL is to fall.
   void interrupt();
 
  private:
-  void raise_ttl(std::uint32_t tick, firmware::Ticks width);
   void set_direction(bool inflate, std::uint32_t step_tick);
   void ttl_interrupt();
 

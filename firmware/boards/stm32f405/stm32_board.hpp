@@ -47,6 +47,10 @@ class Stm32Board {
     if (order.ttl) prepare_r_wave(order.r_wave);
     timer_.schedule(order);
   }
+  void schedule_trigger(std::uint32_t tick, firmware::Ticks width, bool r_wave) {
+    prepare_r_wave(r_wave);
+    timer_.raise_ttl(tick, width);
+  }
   void rest() { timer_.rest(); }
   void cancel_pulses();
   void set_motor_enabled(bool enabled);

@@ -41,6 +41,21 @@ Counts counts_of(const RecordedRun& run) {
           found.count(TriggerFault::non_periodic)};
 }
 
+TEST(Cycles, DelayedTriggersBelongToTheCyclesThatBeganBeforeThem) {
+  RecordedRun run = ten_cycles();
+  run.trigger_delay_s = 0.9;
+  for (double& trigger_s : run.trigger_s)
+    trigger_s += run.trigger_delay_s;
+  EXPECT_EQ(counts_of(run), (Counts{0, 0, 0}));
+  const SegmentTriggers found = triggers_of(run, 0);
+  ASSERT_EQ(found.triggers.size(), 10U);
+  for (size_t i = 0; i < 10; ++i)
+    EXPECT_EQ(found.triggers[i].cycle, static_cast<int64_t>(i));
+  EXPECT_TRUE(assess(run).sound());
+  run.trigger_delay_s = 0;
+  EXPECT_FALSE(assess(run).sound()) << "the delay must be known";
+}
+
 TEST(Cycles, OnTimeHaveNoFaultAndAreNumbered) {
   const SegmentTriggers found = triggers_of(ten_cycles(), 0);
   ASSERT_EQ(found.triggers.size(), 10U);
