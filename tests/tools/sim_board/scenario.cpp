@@ -86,6 +86,7 @@ class Holder {
   void run(Act act) {
     wire::Arm arm = wire::Arm::example();
     arm.gate_every = scenario_.gate_every;
+    arm.trigger_delay_us = scenario_.trigger_delay_us;
     arm.rest_us = 100'000;
     wire::Start start{};
     start.lease_id = MiniatureHost::lease;

@@ -29,6 +29,7 @@ struct Scenario {
   std::string name;
   std::vector<wire::AddSegment> program;
   uint16_t gate_every = 1;
+  uint32_t trigger_delay_us = 0;
   Act act = Act::none;
   uint64_t act_after_ms = 0;  ///< of the motion's first edge
   /// Further requests before the program, such as the upload of a waveform.
