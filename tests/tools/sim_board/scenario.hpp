@@ -37,6 +37,8 @@ struct Scenario {
   /// Begins another motion than the program's run and waits for its end; stages between which the motor rests are
   /// each timed from their own first edge.
   std::function<void(MiniatureHost&)> motion = {};
+  bool to_a_switch =
+      false;  ///< stages end where a switch closes: how far beyond hangs on the main loop's turn
 };
 std::ostream& operator<<(std::ostream& out, const Scenario& scenario);
 

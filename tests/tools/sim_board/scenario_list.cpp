@@ -73,7 +73,7 @@ const std::vector<Scenario>& scenarios() {
        .act = Act::estop,
        .act_after_ms = 300},
       {.name = "paper_rate_30kHz", .program = {segment(Waveform::parabolic, 1, 70'000'000, 1'200'000)}},
-      {.name = "homing", .program = {paper()}, .motion = home},
+      {.name = "homing", .program = {paper()}, .motion = home, .to_a_switch = true},
       {.name = "jog_there_and_back", .program = {paper()}, .motion = jog},
       {.name = "stop_at_cycle_end", .program = {paper()}, .act = Act::stop_at_cycle_end, .act_after_ms = 500},
       // Stopped or cut off in their first or second cycle (each 1.2 s).
