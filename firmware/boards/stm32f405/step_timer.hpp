@@ -22,27 +22,33 @@ class StepTimer {
  public:
   /// TIM5 begins to count when TIM2 does: call before TIM2 is started.
   void start();
-  /// TIM2 counts: from here on TIM5 needs it no more.
-  void let_go() { tim5().SMCR.write(0); }
+  /// TIM2 has been started: once TIM5 counts it needs TIM2 no more.
+  void let_go() {
+    while ((tim5().CR1.read() & kCounting) == 0) {
+    }
+    tim5().SMCR.write(0);
+  }
 
   /// Compare event at `tick`, with a pulse on STEP or without.
   void schedule(std::uint32_t tick, bool step) {
     tim5().SR.write(~kCompare);
     tim5().CCR1.write(tick - kPulseDelay);
-    tim3().SMCR.write(step ? kStartedByTim5 : 0);
+    tim3().SMCR.write(step ? kStartedByTim5 : kFromTim5);
     tim5().DIER.write(kCompare);
   }
   /// No compare event has a consequence; a pulse that has begun ends in time.
   void rest() {
-    tim3().SMCR.write(0);
+    tim3().SMCR.write(kFromTim5);
     tim5().DIER.write(0);
     tim5().SR.write(~kCompare);
   }
 
  private:
   static constexpr std::uint32_t kPulseDelay = 1;
-  static constexpr std::uint32_t kCompare = 1U << 1;
-  static constexpr std::uint32_t kStartedByTim5 = 2U << 4 | 6U;  ///< TS = ITR2, SMS = trigger mode
+  static constexpr std::uint32_t kCompare = 1U << 1, kCounting = 1U << 0;
+  /// TS = ITR2, and so for ever: it may not change while SMS is on, or an edge is seen that is none (18.4.3).
+  static constexpr std::uint32_t kFromTim5 = 2U << 4;
+  static constexpr std::uint32_t kStartedByTim5 = kFromTim5 | 6U;  ///< SMS: trigger mode
 };
 
 }  // namespace diastole::stm32

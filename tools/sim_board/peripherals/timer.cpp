@@ -301,7 +301,7 @@ void Timer::write(uint32_t offset, uint32_t value, uint32_t mask) {
       cr2_ = merged(cr2_, value, mask);
       break;
     case 0x08:
-      smcr_ = merged(smcr_, value, mask);
+      write_slave_mode(merged(smcr_, value, mask));
       break;
     case 0x0c:
       dier_ = merged(dier_, value, mask);
@@ -361,6 +361,14 @@ void Timer::write_control(uint32_t value) {
   cr1_ = value;
   if (starts) count_since_ = clock_.now();
   if (starts && trigger_mode() == on_enable && wiring_.trigger_output) wiring_.trigger_output(clock_.now());
+}
+
+void Timer::write_slave_mode(uint32_t value) {
+  const bool other_trigger = ((value ^ smcr_) & 0x70) != 0;
+  if (other_trigger && ((value | smcr_) & 7) != 0)
+    notes_.add("TIM" + std::to_string(shape_.number) + ": SMCR.TS changed with the slave mode on",
+               clock_.ns(clock_.now()));
+  smcr_ = value;
 }
 
 void Timer::write_compare(uint32_t channel, uint32_t value) {

@@ -86,6 +86,7 @@ class Timer final : public Device {
   void set_outputs(Cycles at);
   void apply_forced_modes(Cycles at);
   void write_compare(uint32_t channel, uint32_t value);
+  void write_slave_mode(uint32_t value);
   void write_control(uint32_t value);
   void generate(uint32_t bits, Cycles at);
   void set_lines();
