@@ -1,6 +1,6 @@
 #pragma once
 // The two settings sectors as SettingsStore sees them (firmware/core/settings_store.hpp). Each call holds the core up
-// (flash.hpp): up to 0.5 s for an erase, for which the watchdog is given 4 s.
+// (flash.hpp): up to 0.5 s for an erase, for which the watchdog is given 8 s.
 
 #include <cstdint>
 #include <span>

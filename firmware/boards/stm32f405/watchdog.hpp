@@ -1,6 +1,7 @@
 #pragma once
 // The independent watchdog, RM0090 21: resets the chip unless it is fed in time. Once started it cannot be
-// stopped, but its period may change.
+// stopped, but its period may change. Its clock is no crystal: 17 to 47 kHz for 32, so every period is 0.7 to 1.9 times
+// what is said here. The patient one must still hold the slowest erase of a slot and of the records, 2.5 s.
 
 #include "firmware/boards/stm32f405/registers.hpp"
 
@@ -9,7 +10,7 @@ namespace diastole::stm32 {
 enum class WatchdogPeriod {
   strict,    ///< 250 ms: the main loop's
   starting,  ///< 1 s: from the bootloader's leave to the main loop's first turn
-  patient,   ///< 4 s: while flash is erased
+  patient,   ///< 8 s: while flash is erased
 };
 
 inline void feed_watchdog() { iwdg().KR.write(0xAAAA); }
@@ -19,8 +20,8 @@ inline void set_watchdog(WatchdogPeriod period) {
   while (iwdg().SR.read() != 0) {  // the last change has not reached its clock yet: at most 0.2 ms
   }
   iwdg().KR.write(0x5555);
-  // 32 kHz / 8, / 32 or / 128
-  iwdg().PR.write(period == WatchdogPeriod::strict ? 1 : period == WatchdogPeriod::starting ? 3 : 5);
+  // 32 kHz / 8, / 32 or / 256
+  iwdg().PR.write(period == WatchdogPeriod::strict ? 1 : period == WatchdogPeriod::starting ? 3 : 6);
   iwdg().RLR.write(1000);
   while (iwdg().SR.read() != 0) {
   }
