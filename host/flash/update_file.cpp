@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <span>
@@ -90,7 +91,7 @@ UpdateFile parse_update_file(const std::string& file, const std::vector<uint8_t>
 
 UpdateFile read_update_file(const std::string& file) {
   std::ifstream stream(file, std::ios::binary);
-  if (!stream) {
+  if (!stream || std::filesystem::is_directory(file)) {
     refuse(
         file, "", "cannot be read",
         "Give the update file, such as build/firmware/bin/diastole-stm32f405.image (cmake --preset firmware "

@@ -48,6 +48,7 @@ TEST(UpdateFile, EveryCorruptedByteIsRefused) {
 TEST(UpdateFile, OtherFilesAreNamedAsSuch) {
   EXPECT_THAT(problem_of({0x7f, 'E', 'L', 'F', 1, 1, 1, 0}), HasSubstr(".elf are for SWD tools"));
   EXPECT_THROW((void)read_update_file("/no/such.image"), InputError);
+  EXPECT_THROW((void)read_update_file("/"), InputError) << "a directory";
 }
 
 }  // namespace
