@@ -28,6 +28,8 @@ class PointsReader {
       fail(1, fmt::format("has {} bytes, and at most {} are taken", text.size(), most_bytes),
            "Give fewer points: the controller holds 4096.");
     }
+    constexpr std::string_view byte_order_mark = "\xef\xbb\xbf";  // spreadsheets put it before UTF-8
+    if (text.starts_with(byte_order_mark)) text.remove_prefix(byte_order_mark.size());
     size_t line = 0;
     while (!text.empty()) {
       const size_t end = std::min(text.find('\n'), text.size());

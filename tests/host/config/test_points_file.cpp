@@ -35,6 +35,11 @@ TEST(PointsFile, TimesAndVolumesTellPeriodAndStroke) {
   EXPECT_DOUBLE_EQ(points.range_mL.value_or(0), 40);
 }
 
+TEST(PointsFile, ASpreadsheetsByteOrderMarkIsNoPartOfTheFirstName) {
+  const PointsFile points = parse_points("\xef\xbb\xbfphase,fraction\r\n0,0\r\n0.5,1\r\n1,0\r\n", "x");
+  EXPECT_EQ(points.phase, (std::vector<double>{0, 0.5, 1}));
+}
+
 TEST(PointsFile, MistakesAreNamedWithTheirLine) {
   const auto refusal = [](const std::string& text) {
     return message_of<InputError>([&] { parse_points(text, "heart.csv"); });
