@@ -177,7 +177,8 @@ LimitInWords words_for(wire::Limit limit) {
 std::string remedy_for(wire::Refusal refusal) {
   switch (refusal) {
     case wire::Refusal::wrong_state:
-      return "`diastole status` tells the state; an unhomed pump needs `diastole home` first.";
+      return "A latched fault needs `diastole clear-fault` first, an unhomed pump `diastole home`; `diastole "
+             "status` tells the state.";
     case wire::Refusal::estop_pressed:
       return "Make the rig safe and release the emergency stop.";
     case wire::Refusal::malformed:

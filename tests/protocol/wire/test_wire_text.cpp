@@ -47,6 +47,8 @@ TEST(WireText, EveryFaultIsExplainedWithARemedy) {
     const auto fault = static_cast<Fault>(number);
     EXPECT_GT(fault_explanation(fault).size(), 5U);
     EXPECT_GT(fault_remedy(fault).size(), 5U);
+    const bool clears = fault_remedy(fault).find("`diastole clear-fault`") != std::string_view::npos;
+    EXPECT_EQ(clears, fault != Fault::none) << fault_name(fault);
     explanations.emplace(fault_explanation(fault));
   }
   EXPECT_EQ(explanations.size(), static_cast<std::size_t>(kLastFault) + 1);
