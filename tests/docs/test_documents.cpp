@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <fstream>
+#include <map>
 #include <regex>
 #include <sstream>
 #include <string>
@@ -89,6 +90,25 @@ TEST(Documents, EveryBareSourcePathExists) {
           << fs::relative(document, root) << " names " << (*match)[1] << ", which does not exist";
     }
   }
+}
+
+TEST(Documents, EveryDecisionHasItsOwnNumber) {
+  static const std::regex name(R"((\d{4})-[a-z0-9-]+\.md)");
+  std::map<std::string, std::string> by_number;
+  for (const auto& entry : fs::directory_iterator(root / "docs/decisions")) {
+    const std::string file = entry.path().filename();
+    std::smatch match;
+    ASSERT_TRUE(std::regex_match(file, match, name)) << file << " is not called NNNN-title.md";
+    const auto [other, first] = by_number.emplace(match[1], file);
+    EXPECT_TRUE(first) << file << " and " << other->second << " have the same number";
+    std::smatch heading;
+    const std::string text = text_of(entry.path());
+    static const std::regex numbered(R"(^# (\d{4}))");
+    if (std::regex_search(text, heading, numbered)) {
+      EXPECT_EQ(heading[1], match[1]) << file;
+    }
+  }
+  EXPECT_FALSE(by_number.empty());
 }
 
 }  // namespace
