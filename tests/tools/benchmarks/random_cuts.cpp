@@ -45,7 +45,11 @@ class RandomCuts {
  public:
   explicit RandomCuts(uint32_t seed) : random_(seed), session_(image) {
     session_.on_edge = [this](const sim_rig::PinEdge& edge) {
-      if (edge.pin == Pin::step && edge.value == 1) steps_ns_.push_back(edge.time_ns);
+      if (edge.pin != Pin::step) return;
+      if (edge.value == 1)
+        steps_ns_.push_back(rose_ns_ = edge.time_ns);
+      else
+        figures_.shortest_pulse_ns = std::min(figures_.shortest_pulse_ns, edge.time_ns - rose_ns_);
     };
   }
 
@@ -115,6 +119,7 @@ class RandomCuts {
   std::mt19937 random_;
   EmulatedSession session_;
   std::vector<uint64_t> steps_ns_;
+  uint64_t rose_ns_ = 0;
   CutFigures figures_;
 };
 

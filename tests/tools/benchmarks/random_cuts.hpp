@@ -11,6 +11,7 @@ struct CutFigures {
   uint64_t worst_ns = 0;    ///< from the input's change to the last rising edge of STEP
   uint64_t steps_over = 0;  ///< rising edges after the change, in all
   int most_steps_over = 0;  ///< … in one trial
+  uint64_t shortest_pulse_ns = UINT64_MAX;
 };
 
 /// Every waveform, every input, peak rates from 1,000 to 30,000 steps/s and 200,000. Records a test failure when a

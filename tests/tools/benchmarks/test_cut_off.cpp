@@ -11,6 +11,7 @@ TEST(CutOff, LeavesAtMostOneStepWithinAStepPeriodAtRandomMoments) {
   EXPECT_EQ(figures.cuts, 24);
   EXPECT_LE(figures.most_steps_over, 1);
   EXPECT_LE(figures.worst_ns, 5'000U);
+  EXPECT_GE(figures.shortest_pulse_ns, 1'999U) << "a pulse of 2 us was cut short";
 }
 
 }  // namespace
