@@ -120,6 +120,8 @@ TEST(FirmwareImage, ShortSessionGivesTheEdgesOfTheHostBuild) {
   const BoardStatistics statistics = board->board().statistics();
   EXPECT_THAT(statistics.notes, IsEmpty());
   EXPECT_EQ(statistics.serial_overruns, 0U);
+  EXPECT_GT(statistics.stack_used_bytes, 500U);
+  EXPECT_LE(statistics.stack_used_bytes, 4096U) << "the linker keeps 8 KB";
   EXPECT_EQ(statistics.missed_deadlines, 0U);
 }
 
