@@ -81,7 +81,15 @@ class Motion {
 
  private:
   /// What the input interrupt has to watch for.
-  enum class Watch : std::uint8_t { rest, run, approach_home, leave_home, inflating, withdrawing };
+  enum class Watch : std::uint8_t {
+    rest,
+    run,
+    approach_home,
+    leave_home,
+    inflating,
+    withdrawing,
+    withdrawing_from_far
+  };
 
   /// An interrupt has cut the motion off and the main loop has not latched the fault yet.
   [[nodiscard]] bool fault_pending() const { return tripped_ != wire::Fault::none; }

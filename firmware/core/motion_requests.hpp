@@ -127,7 +127,7 @@ PlanRefusal Motion<B>::jog(const wire::Jog& jog) {
   fault_at_rest_ = wire::Fault::none;
   decelerating_ = false;
   set_motor_enabled(true);
-  watch_ = inflate ? Watch::inflating : Watch::withdrawing;
+  watch_ = inflate ? Watch::inflating : inputs.far_limit ? Watch::withdrawing_from_far : Watch::withdrawing;
   become(wire::State::jogging);
   engine_.open();
   const Ticks start = board_.now() + kStartLead;

@@ -34,9 +34,10 @@ void Motion<B>::on_inputs() {
     trip(wire::Fault::home_switch);
   } else if ((watch == Watch::approach_home && inputs.home) || (watch == Watch::leave_home && !inputs.home)) {
     engine_.cut();
-  } else if ((watch == Watch::leave_home || watch == Watch::inflating) && inputs.far_limit) {
+  } else if ((watch == Watch::leave_home || watch == Watch::inflating || watch == Watch::withdrawing) &&
+             inputs.far_limit) {
     trip(wire::Fault::limit_switch);
-  } else if (watch == Watch::withdrawing && inputs.home) {
+  } else if ((watch == Watch::withdrawing || watch == Watch::withdrawing_from_far) && inputs.home) {
     trip(wire::Fault::home_switch);
   }
 }

@@ -201,6 +201,27 @@ TEST(Jog, UnhomedItCreepsAwayFromAClosedSwitchButNotTowardsIt) {
   EXPECT_EQ(bench.rig.mechanical_microsteps(), 0) << "cut off at the switch";
 }
 
+TEST(Jog, AMotorThatTurnsTheWrongWayIsCutOffAtTheFarLimit) {
+  Bench bench;
+  bench.prepare();
+  ASSERT_TRUE(bench.ask(wire::Jog{0, Bench::kLease, 20'000'000, 20'000}));
+  ASSERT_TRUE(bench.run_until([&] { return bench.state() == State::homed; }, microseconds(5'000'000)));
+  ASSERT_TRUE(bench.ask(wire::Jog{0, Bench::kLease, -10'000'000, 20'000}));
+  bench.run_for(microseconds(200'000));
+  ASSERT_EQ(bench.state(), State::jogging);
+  const std::int32_t there = bench.rig.mechanical_microsteps();
+  bench.rig.set_far_limit(true);
+  bench.run_for(microseconds(50'000));
+  EXPECT_EQ(bench.rig.controller().motion().safety().fault(), Fault::limit_switch);
+  EXPECT_EQ(bench.rig.mechanical_microsteps(), there);
+  // From the switch it withdraws.
+  ASSERT_TRUE(bench.ask(wire::ClearFault{}));
+  ASSERT_TRUE(bench.ask(wire::Jog{0, Bench::kLease, -1'000'000, 5'000}));
+  bench.run_until([&] { return bench.state() == State::unhomed; }, microseconds(5'000'000));
+  EXPECT_EQ(bench.state(), State::unhomed);
+  EXPECT_EQ(there - bench.rig.mechanical_microsteps(), 128);
+}
+
 TEST(Jog, StopsUnderControlForAStopAndForASilentHost) {
   Bench bench;
   bench.prepare();
