@@ -83,10 +83,10 @@ TEST(Daemon, StatusTellsInputsAndMotor) {
   RigWithDaemon rig(RigWithDaemon::Time::conducted);
   rig.start_daemon();
   const auto ask = [&] { return run(rig.place, {"diastole", "status", "--socket", rig.path("socket")}); };
-  EXPECT_THAT(ask().out, HasSubstr("inputs    none active; motor off; 0 triggers"));
+  EXPECT_THAT(ask().out, HasSubstr("inputs    none active; motor off"));
   auto client = rig.client();
   home(client);
-  EXPECT_THAT(ask().out, HasSubstr("inputs    none active; motor powered; 0 triggers"));
+  EXPECT_THAT(ask().out, HasSubstr("inputs    none active; motor powered"));
 }
 
 TEST(Daemon, AHomingPumpTellsWhereItIsAndStopsWhenAsked) {
