@@ -61,6 +61,8 @@ TEST(Journals, ADiskThatFillsStopsThePumpAndKeepsWhatWasRecorded) {
   auto client = rig.client();
   home(client);
   client.call("run.start", many_segments());
+  while (client.call("run.progress").at("received") < 300) {
+  }
   // Somebody else takes the room.
   (void)run_line(rig.place, "head -c 4M /dev/zero > journals/somebody-elses");
   const json status = status_when(client, "homed", true);
