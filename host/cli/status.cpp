@@ -36,6 +36,8 @@ void show_status(const nlohmann::json& status, bool as_json) {
                status.at("fault").get<std::string>(), status.at("fault_text").get<std::string>(),
                status.at("remedy").get<std::string>());
   }
+  if (const nlohmann::json notice = status.value("notice", nlohmann::json()); !notice.is_null())
+    fmt::print("notice    {}\n", notice.get<std::string>());
   const bool known = status.at("state") != "unhomed";
   fmt::print("position  {:.3f} mL{}\n", status.at("position_mL").get<double>(),
              known ? "" : ", counted from where it was switched on or lost its place");

@@ -20,6 +20,8 @@ constexpr uint64_t ns_per_ms = 1'000'000;
 constexpr uint64_t ns_per_us = 1'000;
 constexpr uint64_t heartbeat_interval_ns = 50 * ns_per_ms;
 constexpr uint64_t time_question_interval_ns = 250 * ns_per_ms;
+constexpr uint64_t status_question_interval_ns = 500 * ns_per_ms;
+constexpr uint64_t rest_patience_ns = 5'000 * ns_per_ms;
 constexpr uint64_t time_answer_patience_ns = 20 * ns_per_ms;
 constexpr uint64_t fine_step_ns = 200 * ns_per_us;  // while an answer is awaited
 constexpr uint64_t answer_patience_ns = 1'000 * ns_per_ms;
@@ -52,7 +54,7 @@ double line_load_B_s(double position_rate_Hz, const Experiment& experiment) {
   constexpr double batch_head_B = 17;
   constexpr double positions_a_batch = 30;          // at least, while a run is on
   constexpr double trigger_B = 2 * (frame_B + 16);  // a cycle may also begin a segment
-  constexpr double background_B_s = 500;            // time answers, acknowledgements, states
+  constexpr double background_B_s = 700;            // time answers, acknowledgements, states, status
   double shortest_period_s = std::numeric_limits<double>::infinity();
   for (const ExperimentSegment& segment : experiment.segments)
     shortest_period_s = std::min(shortest_period_s, segment.period_s);
@@ -174,6 +176,11 @@ LimitInWords words_for(wire::Limit limit) {
   }
 }
 
+bool moves(wire::State state) {
+  return state == wire::State::running || state == wire::State::stopping || state == wire::State::homing ||
+         state == wire::State::jogging;
+}
+
 std::string remedy_for(wire::Refusal refusal) {
   switch (refusal) {
     case wire::Refusal::wrong_state:
@@ -224,9 +231,34 @@ void ControllerClient::connect() {
     disconnect();
     fail("does not answer", "Check that it is powered and runs the firmware (diastole flash), and `baud`.");
   }
-  greet();
-  read_settings();
-  if (!settings_problem_) configure();
+  try {
+    greet();
+    stop_what_moves();
+    read_settings();
+    configure_if_possible();
+  } catch (...) {
+    disconnect();
+    throw;
+  }
+}
+
+void ControllerClient::stop_what_moves() {
+  found_moving_.reset();
+  const wire::State found = status().state;
+  if (!moves(found)) return;
+  found_moving_ = found;
+  stop_now();
+  const uint64_t end_ns = clock_.now_ns() + rest_patience_ns;
+  while (moves(status().state)) {
+    if (clock_.now_ns() > end_ns) fail("moves and does not obey a stop", "Press the emergency stop.");
+    turn();
+  }
+  next_heartbeat_ns_ = clock_.now_ns();  // none counted while the motion held another host's lease
+}
+
+void ControllerClient::configure_if_possible() {
+  configured_ = false;
+  if (!settings_problem_ && last_known_.state != wire::State::faulted) configure();
 }
 
 void ControllerClient::disconnect() {
@@ -270,12 +302,16 @@ void ControllerClient::read_settings() {
                                    1, 4'000'000'000});
 }
 
-void ControllerClient::require_agreement() const {
+void ControllerClient::require_configuration() const {
   if (settings_problem_) throw InputError(*settings_problem_);
+  if (configured_) return;
+  fail(fmt::format("has a fault latched: {}", wire::fault_explanation(last_known_.fault)),
+       std::string(wire::fault_remedy(last_known_.fault)));
 }
 
 void ControllerClient::write_settings(const wire::MachineSettings& settings) {
   demand(wire::WriteSettings{.settings = settings});
+  configured_ = false;
   read_settings();
   if (!settings_problem_) configure();
 }
@@ -308,6 +344,7 @@ void ControllerClient::configure() {
   message.lease_us = static_cast<uint32_t>(rig_.controller.lease_ms * 1000);
   message.homing_flow_uL_per_s = limit("homing_flow_mL_s", 1e3 * limits.homing_flow_mL_s, "uL/s", 10'000'000);
   demand(message);
+  configured_ = true;
 }
 
 /// Precondition: the program is empty.
@@ -340,7 +377,7 @@ void ControllerClient::upload(const Experiment& experiment) {
 }
 
 ProgramPlan ControllerClient::load(const Experiment& experiment) {
-  require_agreement();
+  require_configuration();
   position_rate_Hz_ = reported_rate_Hz(experiment, rig_.controller);
   demand(wire::ClearProgram{});
   upload(experiment);
@@ -388,12 +425,12 @@ ProgramPlan ControllerClient::load(const Experiment& experiment) {
 void ControllerClient::unload() { demand(wire::ClearProgram{}); }
 
 void ControllerClient::home() {
-  require_agreement();
+  require_configuration();
   demand(wire::Home{.lease_id = lease_id_});
 }
 
 void ControllerClient::jog(double distance_mL, double rate_mL_s) {
-  require_agreement();
+  require_configuration();
   constexpr double most_mL = 50'000;
   if (!(std::abs(distance_mL) <= most_mL))
     throw InputError({"", "--mL", fmt::format("is {:g}", distance_mL), "Give a distance that the pump has."});
@@ -410,7 +447,12 @@ void ControllerClient::jog(double distance_mL, double rate_mL_s) {
 
 void ControllerClient::halt() { post(wire::Halt{}); }
 
-void ControllerClient::clear_fault() { demand(wire::ClearFault{}); }
+void ControllerClient::clear_fault() {
+  demand(wire::ClearFault{});
+  if (configured_) return;
+  (void)status();
+  configure_if_possible();
+}
 
 wire::Status ControllerClient::status() {
   const Answer answer = request(wire::StatusRequest{});
@@ -497,12 +539,17 @@ void ControllerClient::bring_forward(const ControllerEvent& event) {
   if (const auto* change = std::get_if<wire::StateChanged>(&event)) last_known_.state = change->to;
   if (const auto* raised = std::get_if<wire::FaultRaised>(&event)) last_known_.fault = raised->fault;
   if (const auto* started = std::get_if<wire::SegmentStarted>(&event)) last_known_.segment = started->segment;
-  if (const auto* trigger = std::get_if<wire::Trigger>(&event)) {
+  // A status is ahead of the events that waited for the line when it was asked for.
+  const auto is_news = [&](uint64_t tick) { return tick > last_known_.tick; };
+  if (const auto* trigger = std::get_if<wire::Trigger>(&event);
+      trigger != nullptr && is_news(trigger->tick)) {
     ++last_known_.triggers;
     last_known_.r_waves += trigger->r_wave;
     last_known_.cycle = trigger->cycle + 1;
   }
-  if (const auto* batch = std::get_if<wire::PositionBatch>(&event); batch != nullptr && batch->count > 0)
+  if (const auto* batch = std::get_if<wire::PositionBatch>(&event);
+      batch != nullptr && batch->count > 0 &&
+      is_news(batch->first_tick + uint64_t{batch->period_ticks} * (batch->count - 1U)))
     last_known_.position_microsteps = batch->position_microsteps[batch->count - 1U];
   if (const auto* ended = std::get_if<wire::RunEnded>(&event))
     last_known_.position_microsteps = ended->position_microsteps;
@@ -526,6 +573,15 @@ void ControllerClient::keep_alive() {
   }
   if (time_asked_ns_ != 0 && now_ns > time_asked_ns_ + time_answer_patience_ns) time_asked_ns_ = 0;
   if (now_ns >= next_time_question_ns_) ask_time();
+  ask_status_if_due();
+}
+
+/// While an answer is awaited there is somebody who waits for the line.
+void ControllerClient::ask_status_if_due() {
+  const bool in_run = last_known_.state == wire::State::running || last_known_.state == wire::State::stopping;
+  if (!in_run || awaited_ || clock_.now_ns() < next_status_question_ns_) return;
+  next_status_question_ns_ = clock_.now_ns() + status_question_interval_ns;
+  post(wire::StatusRequest{});
 }
 
 void ControllerClient::ask_time() {

@@ -24,13 +24,19 @@ class ControllerClient final : public Controller {
 
   ControllerClient(Clock& clock, const RigConfig& rig, OpenLine open_line);
 
-  /// Opens the line, checks that both sides speak the same protocol, reads the controller's settings, and sends
-  /// geometry and limits if they agree with the rig file; if not, orders to move throw what settings_problem() tells.
-  /// Throws HardwareError with the remedy in words, InputError if a number of the rig file is beyond what the
-  /// protocol can carry.
+  /// Opens the line, checks that both sides speak the same protocol, stops a motion that goes on (found_moving()),
+  /// reads the controller's settings, and sends geometry and limits if they agree with the rig file; if not, orders
+  /// to move throw what settings_problem() tells. A faulted controller takes none before clear_fault(). Throws
+  /// HardwareError with the remedy in words, InputError if a number of the rig file is beyond what the protocol can
+  /// carry; it is not connected then, and no heartbeat of this client prolongs a motion.
   void connect();
   void disconnect();
   [[nodiscard]] bool connected() const { return line_ != nullptr && hello_.has_value(); }
+  /// What the controller was doing when connect() found it moving by nobody's order in this connection, and stopped
+  /// it under control; none if it was at rest.
+  [[nodiscard]] const std::optional<wire::State>& found_moving() const { return found_moving_; }
+  /// Whether the controller has geometry and limits; not while it is faulted since before connect().
+  [[nodiscard]] bool configured() const { return configured_; }
   /// Of the controller that answered; precondition: connected().
   [[nodiscard]] const wire::Hello& hello() const { return *hello_; }
   /// Calibrated if the controller's settings were ever written.
@@ -56,10 +62,12 @@ class ControllerClient final : public Controller {
   void home();
   /// Moves by `distance_mL`, inflate positive. Throws InputError with the limit that it would exceed.
   void jog(double distance_mL, double rate_mL_s);
+  /// Sends geometry and limits too if connect() could not.
   void clear_fault();
   wire::Status status();
   /// The last status, brought forward by the events since: state, fault, position, segment, cycle, triggers and
-  /// R-waves are of now, or a batch of positions old.
+  /// R-waves are of now, or a batch of positions old. In a run service() asks for it twice a second: the rest is no
+  /// older than that.
   [[nodiscard]] const wire::Status& last_known() const { return last_known_; }
 
   void service() override;
@@ -89,14 +97,18 @@ class ControllerClient final : public Controller {
   void demand(Message message);
   void greet();
   void read_settings();
+  void stop_what_moves();
+  void configure_if_possible();
   void configure();
   void upload(const Experiment& experiment);
-  void require_agreement() const;
+  /// Throws unless the controller has settings that agree with the rig file, and the file's limits.
+  void require_configuration() const;
   void turn();
   void receive();
   void transmit();
   void keep_alive();
   void ask_time();
+  void ask_status_if_due();
   void take(const wire::TimeSync& sync);
   template <class Message>
   void take_answer(const Message& message);
@@ -116,9 +128,12 @@ class ControllerClient final : public Controller {
   double position_rate_Hz_ = 0;
   wire::SettingsReport settings_;
   std::optional<InputFault> settings_problem_;
+  std::optional<wire::State> found_moving_;
+  bool configured_ = false;
   uint16_t next_request_id_ = 1;
   uint64_t next_heartbeat_ns_ = 0;
   uint64_t next_time_question_ns_ = 0;
+  uint64_t next_status_question_ns_ = 0;
   uint32_t time_token_ = 0;
   uint64_t time_asked_ns_ = 0;  // 0: no question open
   std::optional<uint16_t> awaited_;

@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 #include <unistd.h>
-#include <array>
 
 #include <algorithm>
 #include <array>
@@ -154,7 +153,7 @@ RigService::RigService(RigConfig rig, const RigServiceOptions& options)
   controller_ = std::make_unique<ControllerClient>(*clock_, rig_, [this]() -> std::unique_ptr<ByteLine> {
     return std::make_unique<SerialPort>(rig_.controller.port, rig_.controller.baud);
   });
-  controller_->connect();
+  connect();
   instrument_ = rig_.daq.open({options.daq_address, clock_->stands_still() ? conducted_timeout_ms : 0});
   make_journal_dir(rig_.daemon.journal_dir);
   tidy_journals();
@@ -193,12 +192,7 @@ void RigService::work(const std::stop_token& stop) {
 void RigService::idle_turn() {
   reconnect_if_due();
   controller_->service();
-  for (const ControllerEvent& event : controller_->take_events()) {
-    if (const auto* broken = std::get_if<LinkBroken>(&event)) spdlog::error("{}", broken->reason);
-    if (const auto* fault = std::get_if<wire::FaultRaised>(&event)) {
-      spdlog::error("{} {}", wire::fault_explanation(fault->fault), wire::fault_remedy(fault->fault));
-    }
-  }
+  tell_events();
   clock_->sleep_until_ns(std::min(clock_->now_ns() + idle_step_ns, controller_->next_due_ns()),
                          controller_->line());
 }
@@ -206,9 +200,37 @@ void RigService::idle_turn() {
 void RigService::reconnect_if_due() {
   if (controller_->connected() || clock_->now_ns() < next_reconnect_ns_) return;
   next_reconnect_ns_ = clock_->now_ns() + reconnect_interval_ns;
-  controller_->connect();
+  connect();
   last_problem_.clear();
   spdlog::info("controller at {} is back", rig_.controller.port);
+}
+
+void RigService::connect() {
+  controller_->connect();
+  tell_events();
+  if (const auto& found = controller_->found_moving()) {
+    const std::string text = fmt::format(
+        "the pump was found {} although nobody had ordered it since the connection was made, and was "
+        "stopped; "
+        "nothing of that motion was recorded",
+        wire::state_name(*found));
+    note({"warning", "found_moving", text});
+    const std::lock_guard lock(mutex_);
+    notice_ = text;
+  }
+  if (const wire::Status& status = controller_->last_known(); status.state == wire::State::faulted) {
+    spdlog::warn("fault {} is latched: {} {}", static_cast<int>(status.fault),
+                 wire::fault_explanation(status.fault), wire::fault_remedy(status.fault));
+  }
+}
+
+void RigService::tell_events() {
+  for (const ControllerEvent& event : controller_->take_events()) {
+    if (const auto* broken = std::get_if<LinkBroken>(&event)) spdlog::error("{}", broken->reason);
+    if (const auto* fault = std::get_if<wire::FaultRaised>(&event)) {
+      spdlog::error("{} {}", wire::fault_explanation(fault->fault), wire::fault_remedy(fault->fault));
+    }
+  }
 }
 
 void RigService::give(Order order) {
@@ -239,7 +261,14 @@ void RigService::carry_out(Order order) {
   std::exception_ptr error;
   try {
     if (!order.activity.empty() && asked_to_stop()) refuse_to_start();
-    if (!controller_->connected()) controller_->connect();
+    if (!controller_->connected()) {
+      connect();
+      if (!order.activity.empty() && controller_->found_moving()) refuse_after_motion();
+    }
+    if (!order.activity.empty()) {
+      const std::lock_guard lock(mutex_);
+      notice_ = nullptr;
+    }
     result = order.act();
     if (result.is_discarded()) return;
   } catch (...) {
@@ -260,6 +289,11 @@ bool RigService::asked_to_stop() const {
 void RigService::refuse_to_start() const {
   throw HardwareError("rig", "stopped before the start",
                       "Nothing moved. Give the order again when you want it.");
+}
+
+void RigService::refuse_after_motion() const {
+  throw HardwareError("rig", "the pump was found moving and was stopped (diastole status)",
+                      "See that nothing is amiss, then give the order again.");
 }
 
 void RigService::start_run(Experiment experiment, Done done) {
@@ -530,6 +564,7 @@ json RigService::remember(const wire::Status& status) {
       {"instrument", instrument_->describe()}};
   const std::lock_guard lock(mutex_);
   result["journals"] = journals_;
+  result["notice"] = notice_;
   last_status_ = result;
   return result;
 }

@@ -43,7 +43,8 @@ class RigService {
   static constexpr size_t most_remarks = 10'000;
   static constexpr size_t remarks_at_once = 200;
 
-  /// Opens controller and instrument. Throws HardwareError if one is not there.
+  /// Opens controller and instrument. Throws HardwareError if one is not there; a controller with a latched fault is:
+  /// status tells it, and clear_fault leaves it.
   RigService(RigConfig rig, const RigServiceOptions& options);
   /// Ends a run by a controlled stop, writes what it has, and closes everything.
   ~RigService();
@@ -67,7 +68,8 @@ class RigService {
   void write_settings(SettingsChange change, Done done);
   /// {"entries": [{"number", "boot", "time_s", "kind", "text"}], oldest first, "since_power_on"}.
   void black_box(Done done);
-  /// {"state", "fault", "firmware", "position_mL", ...}. While the rig is occupied `state` is the activity, and
+  /// {"state", "fault", "firmware", "position_mL", "notice": that the pump was found moving and was stopped, until the
+  /// next order, else null, ...}. While the rig is occupied `state` is the activity, and
   /// the answer comes at once, from what the controller last told.
   void status(Done done);
   /// Stops what moves or is about to; without anything, `false`.
@@ -111,6 +113,9 @@ class RigService {
   [[nodiscard]] std::optional<Order> next_order();
   void carry_out(Order order);
   void reconnect_if_due();
+  /// Connects, and tells what was found: a motion that nobody ordered and that was stopped, a latched fault.
+  void connect();
+  void tell_events();
   nlohmann::json do_home();
   nlohmann::json do_jog(double distance_mL, double rate_mL_s);
   /// Waits while the controller is in this state, passing on a stop; true if one was asked for.
@@ -121,6 +126,7 @@ class RigService {
   nlohmann::json remember(const wire::Status& status);
   [[nodiscard]] bool asked_to_stop() const;
   [[noreturn]] void refuse_to_start() const;
+  [[noreturn]] void refuse_after_motion() const;
   bool begin(const RunRecord& record);
   /// Throws InputError, the program unloaded, if the journals' disk cannot hold the run.
   void check_disk(const RunRecord& record, double sample_rate_Hz);
@@ -152,6 +158,7 @@ class RigService {
   std::optional<size_t> go_on_;  // the slice that the operator is ready for
   std::optional<RunRecord> run_;
   nlohmann::json last_status_;
+  nlohmann::json notice_;  ///< as in status
   nlohmann::json journals_;
   nlohmann::json last_settings_;
   std::jthread thread_;  // last: it uses the members above

@@ -53,7 +53,7 @@ bool stays_at_rest(SessionOnDesk& session) {
          after.state == before.state;
 }
 
-/// As the daemon does: again and again ; a controller with a latched fault refuses its settings and is connected all the same.
+/// As the daemon does: again and again.
 void come_back(SessionOnDesk& session) {
   for (int attempt = 0; attempt < 20 && !session.client.connected(); ++attempt) {
     try {
@@ -95,6 +95,30 @@ TEST(Faults, CableUnplugged) {
   add_to_table({"cable unplugged", "random phases of a run", tried, survived,
                 fmt::format("at rest in the lease; told in {:.0f} ms, back in {:.0f} ms", slowest_flag_ms,
                             slowest_return_ms)});
+}
+
+TEST(Faults, CableBackBeforeTheLeaseEnds) {
+  double slowest_rest_ms = 0;
+  int found_running = 0;
+  const int tried = trials(50, 500);
+  const int survived = survivors(tried, [&](int, std::mt19937& random) {
+    SessionOnDesk session(short_session);
+    once_at(session, between(random, 0.05, 1.2), [&] { session.desk.plugged = false; });
+    session.run();
+    if (session.outcome.end != "link_lost") return false;
+    session.desk.advance_to(session.desk.now_ns + static_cast<uint64_t>(between(random, 0, 0.4e9)));
+    session.desk.plugged = true;
+    const uint64_t plugged_ns = session.desk.now_ns;
+    come_back(session);
+    slowest_rest_ms =
+        std::max(slowest_rest_ms, ms_per_ns * static_cast<double>(session.desk.now_ns - plugged_ns));
+    found_running += session.client.found_moving() ? 1 : 0;
+    return session.client.connected() && stays_at_rest(session) && books_balance(session.assemble());
+  });
+  EXPECT_GT(found_running, tried / 2);
+  add_to_table(
+      {"cable back at once", "0 to 400 ms unplugged in a run", tried, survived,
+       fmt::format("{} found moving; at rest {:.0f} ms after the return", found_running, slowest_rest_ms)});
 }
 
 TEST(Faults, ControllerReset) {

@@ -94,7 +94,7 @@ TEST_F(ByHand, AHaltCutsARunOffAndTheFaultIsClearedByACommand) {
   EXPECT_EQ(diastole({"stop", "--halt"}).exit_code, 0);
   status_when(client, "faulted", true);
   const Ended status = diastole({"status"});
-  EXPECT_THAT(status.out, AllOf(HasSubstr("fault     6 halted"), HasSubstr("Home again")));
+  EXPECT_THAT(status.out, AllOf(HasSubstr("fault     6 halted"), HasSubstr("diastole clear-fault")));
   const Ended cleared = diastole({"clear-fault"});
   EXPECT_EQ(cleared.exit_code, 0) << cleared.err;
   EXPECT_THAT(cleared.out, AllOf(HasSubstr("unhomed"), Not(HasSubstr("fault"))));
@@ -102,6 +102,47 @@ TEST_F(ByHand, AHaltCutsARunOffAndTheFaultIsClearedByACommand) {
   EXPECT_THAT(box.out, AllOf(HasSubstr("started at power-on"), HasSubstr("homing -> homed"),
                              HasSubstr("fault 6 (halted)"), HasSubstr("faulted -> unhomed"),
                              HasSubstr("all since power-on")));
+}
+
+TEST_F(ByHand, ADaemonStartsAtAFaultedControllerAndClearsIt) {
+  EXPECT_EQ(diastole({"home"}).exit_code, 0);
+  auto client = rig.client();
+  client.call("run.start", many_segments());
+  client.call("control.release");
+  EXPECT_EQ(diastole({"stop", "--halt"}).exit_code, 0);
+  status_when(client, "faulted", true);
+  rig.daemon->signal(SIGTERM);
+  rig.daemon->wait();
+  rig.start_daemon();
+  EXPECT_THAT(diastole({"status"}).out,
+              AllOf(HasSubstr("fault     6 halted"), HasSubstr("diastole clear-fault")));
+  const Ended home = diastole({"home"});
+  EXPECT_EQ(home.exit_code, 3);
+  EXPECT_THAT(home.err, AllOf(HasSubstr("halted"), HasSubstr("clear-fault")));
+  EXPECT_EQ(diastole({"clear-fault"}).exit_code, 0);
+  EXPECT_EQ(diastole({"home"}).exit_code, 0);
+}
+
+TEST_F(ByHand, ADaemonThatFindsThePumpRunningStopsItAndSaysSo) {
+  const json homed = diastole({"home", "--json"}).json();
+  {
+    auto client = rig.client();
+    client.call("run.start", many_segments());
+    status_when(client, "running", true);
+    while (client.call("run.progress", {{"first_remark", 0}}).at("triggers") < 3) {
+    }
+    EXPECT_GT(client.call("rig.status").at("steps"), homed.at("steps")) << "counted as the run goes on";
+  }
+  rig.daemon->signal(SIGKILL);
+  rig.daemon->wait();
+  rig.start_daemon();
+  const Ended status = diastole({"status"});
+  EXPECT_THAT(status.out,
+              AllOf(HasSubstr("state     homed"), HasSubstr("found running"), HasSubstr("was stopped")));
+  EXPECT_EQ(diastole({"status", "--json"}).json()["steps"], diastole({"status", "--json"}).json()["steps"]);
+  const Ended jog = diastole({"jog", "--mL", "1"});
+  EXPECT_EQ(jog.exit_code, 0) << jog.err;
+  EXPECT_THAT(diastole({"status"}).out, Not(HasSubstr("found running")));
 }
 
 TEST_F(ByHand, SettingsInForceGoIntoTheRunFile) {

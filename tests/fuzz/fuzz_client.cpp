@@ -39,6 +39,16 @@ class Stage {
                                              hello.schema_hash = wire::kSchemaHash;
                                              say(hello);
                                            },
+                                           [&](const wire::ReadSettings& request) {
+                                             wire::SettingsReport report;
+                                             report.request_id = request.request_id;
+                                             say(report);
+                                           },
+                                           [&](const wire::StatusRequest& request) {
+                                             wire::Status status;
+                                             status.request_id = request.request_id;
+                                             say(status);
+                                           },
                                            [&](const auto& request) {
                                              if constexpr (requires { request.request_id; })
                                                if (acknowledges)

@@ -2,6 +2,9 @@
 
 #include <gmock/gmock.h>
 
+#include <array>
+#include <functional>
+
 #include "protocol/contract/input_error.hpp"
 #include "tests/host/bench/desk.hpp"
 #include "tests/host/bench/scratch.hpp"
@@ -94,6 +97,7 @@ TEST_F(ClientOnDesk, ARequestThatTheControllerCannotReadIsToldAsRefused) {
   rig.controller.lease_ms = 50;  // the protocol begins at 100
   EXPECT_THAT(message_of<HardwareError>([&] { client.connect(); }),
               AllOf(HasSubstr("refused"), HasSubstr("out of range")));
+  EXPECT_FALSE(client.connected()) << "its heartbeats would prolong a motion";
 }
 
 TEST_F(ClientOnDesk, PositionsFollowTheSampleRateWithinBounds) {
@@ -170,6 +174,109 @@ TEST_F(ClientOnDesk, AResetIsSeenAndReconnectingWorks) {
   EXPECT_TRUE(broken);
   client.connect();
   EXPECT_TRUE(client.connected());
+}
+
+struct Motion {
+  wire::State state;
+  wire::State after;  ///< its controlled stop
+  std::function<void(ClientOnDesk&)> begin;
+};
+
+TEST_F(ClientOnDesk, AMotionFoundOnConnectingIsStoppedAndNothingRestarts) {
+  const std::array<Motion, 3> motions{{
+      {wire::State::homing, wire::State::unhomed, [](ClientOnDesk& test) { test.client.home(); }},
+      {wire::State::jogging, wire::State::homed,
+       [](ClientOnDesk& test) {
+         test.home();
+         test.client.jog(20, 10);
+       }},
+      {wire::State::running, wire::State::homed,
+       [](ClientOnDesk& test) {
+         test.client.load(parse_experiment(gel, "gel.experiment.toml"));
+         test.client.start();
+       }},
+  }};
+  client.connect();
+  EXPECT_FALSE(client.found_moving());
+  for (const Motion& motion : motions) {
+    motion.begin(*this);
+    pass(0.6);
+    ASSERT_EQ(client.status().state, motion.state);
+    desk.plugged = false;
+    pass(0.1);
+    ASSERT_FALSE(client.connected());
+    desk.plugged = true;
+    client.connect();
+    EXPECT_EQ(client.found_moving(), motion.state);
+    const wire::Status stopped = client.status();
+    EXPECT_EQ(stopped.state, motion.after);
+    EXPECT_EQ(stopped.fault, wire::Fault::none);
+    pass(3);
+    EXPECT_EQ(client.status().steps, stopped.steps);
+    EXPECT_EQ(client.status().state, motion.after);
+    client.connect();
+    EXPECT_FALSE(client.found_moving());
+    if (motion.after == wire::State::unhomed) home();
+  }
+}
+
+TEST_F(ClientOnDesk, AnotherHostsMotionIsStoppedAndOrdersAreTakenAtOnce) {
+  client.connect();
+  home();
+  client.jog(20, 10);
+  pass(0.3);
+  ControllerClient next(clock, rig, [this] { return std::make_unique<DeskLine>(desk); });
+  next.connect();
+  EXPECT_EQ(next.found_moving(), wire::State::jogging);
+  next.jog(1, 5);
+  EXPECT_EQ(next.status().state, wire::State::jogging);
+}
+
+TEST_F(ClientOnDesk, AFaultedControllerIsConnectedAndConfiguredOnceItIsCleared) {
+  const auto press = [&](bool pressed) {
+    desk.controller->set_estop(pressed);
+    desk.advance_to(desk.now_ns + 100'000'000);
+  };
+  press(true);
+  client.connect();
+  EXPECT_EQ(client.last_known().fault, wire::Fault::estop);
+  EXPECT_FALSE(client.configured());
+  EXPECT_THAT(message_of<HardwareError>([&] { client.home(); }),
+              AllOf(HasSubstr("emergency stop"), HasSubstr("release"), HasSubstr("clear-fault")));
+  EXPECT_THAT(message_of<HardwareError>([&] { client.clear_fault(); }), HasSubstr("release"));
+  EXPECT_FALSE(client.configured());
+  press(false);
+  client.clear_fault();
+  EXPECT_TRUE(client.configured());
+  home();
+  EXPECT_EQ(client.status().state, wire::State::homed);
+}
+
+TEST_F(ClientOnDesk, CountersFollowARunWithoutBeingAskedFor) {
+  client.connect();
+  home();
+  Experiment experiment = parse_experiment(gel, "gel.experiment.toml");
+  experiment.segments[0].cycles = 5;
+  client.load(experiment);
+  const wire::Status before = client.status();
+  client.start();
+  wire::Status last = before;
+  uint64_t changes = 0;
+  for (int i = 0; i < 1000 && (last.cycle < 5 || last.state == wire::State::running); ++i) {
+    pass(0.0137);
+    const wire::Status& now = client.last_known();
+    EXPECT_GE(now.triggers, last.triggers);
+    EXPECT_GE(now.r_waves, last.r_waves);
+    EXPECT_GE(now.steps, last.steps);
+    changes += now.steps != last.steps ? 1 : 0;
+    last = now;
+  }
+  EXPECT_GE(changes, 8U);
+  const wire::Status after = client.status();
+  EXPECT_EQ(last.triggers, after.triggers);
+  EXPECT_EQ(last.r_waves, after.r_waves);
+  EXPECT_EQ(last.cycle, after.cycle);
+  EXPECT_EQ(after.triggers, before.triggers + 5);
 }
 
 /// A controller of another version: answers every frame by the book, but with another schema.
