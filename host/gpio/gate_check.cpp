@@ -49,7 +49,7 @@ std::vector<GateRemark> GateCheck::look(uint64_t now_ns, const ControllerWitness
     counts_differ_since_ns_.reset();
   }
   if (estop_since_ns_ && !controller.stopped_by_estop && !estop_told_ &&
-      now_ns - *estop_since_ns_ > report_patience_ns) {
+      now_ns > *estop_since_ns_ + report_patience_ns) {
     estop_told_ = true;
     out.push_back({"error", "estop_unseen",
                    "the emergency stop line shows pressed, but the controller reports no emergency stop",

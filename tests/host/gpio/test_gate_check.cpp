@@ -96,6 +96,13 @@ TEST(GateCheck, AnEmergencyStopThatTheControllerReportsIsNoDisagreement) {
   EXPECT_THAT(check.look(3000 * ms, {0, true}), IsEmpty());
 }
 
+TEST(GateCheck, AnEdgeThatComesDuringTheLookIsNotLate) {
+  Inputs inputs;
+  GateCheck check(inputs);
+  inputs.next.estop_changes = {{1001 * ms, true, true}};
+  EXPECT_THAT(check.look(1000 * ms, {}), SizeIs(1)) << "pressed, and nothing else";
+}
+
 TEST(GateCheck, LinesThatFailAreTold) {
   Inputs inputs;
   GateCheck check(inputs);
