@@ -41,6 +41,7 @@ RunOutcome Acquisition::run(const Hooks& hooks) {
   write(RecordKind::document, json{{"record", "grid"}, {"first_due_ns", grid.first_due_ns}}.dump());
   for (const std::string& warning : setup_.warnings)
     remark("warning", "instrument", warning);
+  if (setup_.gate != nullptr) gate_.emplace(*setup_.gate);
   if (outcome_.end.empty()) {
     controller_.start();
   } else {
@@ -51,6 +52,7 @@ RunOutcome Acquisition::run(const Hooks& hooks) {
   take_samples(samples_.finish(tail_until_ns_.value_or(clock_.now_ns())));
   end_missing();
   close_block();
+  close_gate();
   write(RecordKind::document, json{{"record", "end"}}.dump());
   ended_ = true;
   if (!journal_.sync()) fail_journal();
@@ -67,6 +69,7 @@ void Acquisition::turn() {
   for (const ControllerEvent& event : controller_.take_events())
     take(event);
   take_samples(samples_.take());
+  watch_gate();
   check_deadline();
   if (ended_) return;
   clock_.sleep_until_ns(std::min(samples_.next_due_ns(), controller_.next_due_ns()), controller_.line());
@@ -178,6 +181,28 @@ void Acquisition::take(const InstrumentTime& time) {
 
 void Acquisition::take(const Trouble& trouble) { remark("warning", "instrument", trouble.text); }
 
+void Acquisition::watch_gate() {
+  if (!gate_) return;
+  note(gate_->look(clock_.now_ns(), {outcome_.counts.triggers, stopped_by_estop_}));
+}
+
+void Acquisition::close_gate() {
+  if (!gate_) return;
+  note(gate_->close(clock_.now_ns(), {outcome_.counts.triggers, stopped_by_estop_}, triggers_raised_));
+}
+
+void Acquisition::note(const std::vector<GateRemark>& remarks) {
+  for (const GateRemark& each : remarks) {
+    write(RecordKind::document, json{{"record", "event"},
+                                     {"host_ns", each.host_ns},
+                                     {"level", each.level},
+                                     {"code", each.code},
+                                     {"text", each.text}}
+                                    .dump());
+    hooks_.remark({each.level, each.code, each.text});
+  }
+}
+
 void Acquisition::end_missing() {
   close_gap();
   if (missing_in_a_row_ == 0) return;
@@ -234,6 +259,7 @@ void Acquisition::take(const ControllerEvent& event) {
           },
           [&](const wire::RunEnded& e) {
             outcome_.cycles = e.cycles;
+            triggers_raised_ = e.triggers;
             const bool schedule_done = schedule_stops_ && obeyed_ == StopRequest::none &&
                                        wire::run_end_name(e.reason) == "stopped_at_cycle_end";
             const std::string reason =
@@ -260,6 +286,7 @@ void Acquisition::take(const ControllerEvent& event) {
             end_after_tail(reason);
           },
           [&](const wire::FaultRaised& e) {
+            stopped_by_estop_ = stopped_by_estop_ || e.fault == wire::Fault::estop;
             remark("error", std::string(wire::fault_name(e.fault)),
                    fmt::format("{} {}", wire::fault_explanation(e.fault), wire::fault_remedy(e.fault)),
                    e.tick);

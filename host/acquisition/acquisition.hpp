@@ -19,6 +19,7 @@
 #include "host/acquisition/slice_tracker.hpp"
 #include "host/config/rig_config.hpp"
 #include "host/controller/controller.hpp"
+#include "host/gpio/gate_check.hpp"
 #include "host/transport/clock.hpp"
 #include "protocol/signal/low_pass.hpp"
 
@@ -65,6 +66,7 @@ struct AcquisitionSetup {
   double sample_rate_Hz = 300;  ///< that the instrument keeps (Instrument::plan_rate)
   std::vector<ChannelConfig> channels;
   std::vector<std::string> warnings;      ///< to remark at the start
+  GateInputs* gate = nullptr;             ///< what the host sees of gating line and emergency stop, or null
   double planned_duration_s = 0;          ///< a run that has not ended well after this is broken off
   std::vector<PlannedSlice> slices = {};  ///< empty: no schedule
 };
@@ -99,6 +101,9 @@ class Acquisition {
   void take(const Missing& missing);
   void take(const InstrumentTime& time);
   void take(const Trouble& trouble);
+  void watch_gate();
+  void close_gate();
+  void note(const std::vector<GateRemark>& remarks);
   void end_missing();
   void close_gap();
   void close_block();
@@ -128,6 +133,9 @@ class Acquisition {
   uint64_t missing_in_a_row_ = 0;  ///< over all reasons
   uint64_t deadline_ns_ = 0;
   StopRequest obeyed_ = StopRequest::none;
+  std::optional<GateCheck> gate_;
+  bool stopped_by_estop_ = false;
+  std::optional<uint64_t> triggers_raised_;  ///< as the controller counted, at its end
   bool started_ = false;
   bool ended_ = false;
   std::optional<uint64_t> tail_until_ns_;

@@ -5,6 +5,8 @@ namespace diastole {
 void add_host_commands(CommandLine& line) {
   add_flash(line);
   add_daemon(line);
+  add_zero(line);
+  add_calibrate(line);
   add_home(line);
   add_run(line);
   add_continue(line);

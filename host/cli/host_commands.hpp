@@ -6,7 +6,9 @@
 namespace diastole {
 
 void add_flash(CommandLine& line);
+void add_calibrate(CommandLine& line);
 void add_daemon(CommandLine& line);
+void add_zero(CommandLine& line);
 void add_run(CommandLine& line);
 void add_status(CommandLine& line);
 void add_continue(CommandLine& line);

@@ -109,15 +109,15 @@ ExitCode exit_code_of(const SessionResult& result) {
   // A stop at once may break a cycle whose trigger is already out; `cycles` counts the whole ones.
   const int64_t broken_cycles = result.triggers - result.cycles;
   const bool triggers_fit = broken_cycles == 0 || (result.end == "stopped_now" && broken_cycles == 1);
-  return result.gaps > 0 || !triggers_fit ? ExitCode::negative : ExitCode::done;
+  return result.gaps > 0 || result.errors > 0 || !triggers_fit ? ExitCode::negative : ExitCode::done;
 }
 
 ExitCode report_session(const SessionResult& result, bool json) {
   if (json) {
-    const nlohmann::json document{{"run", result.run},          {"end", result.end},
-                                  {"cycles", result.cycles},    {"triggers", result.triggers},
-                                  {"samples", result.samples},  {"gaps", result.gaps},
-                                  {"expected", result.expected}};
+    const nlohmann::json document{{"run", result.run},           {"end", result.end},
+                                  {"cycles", result.cycles},     {"triggers", result.triggers},
+                                  {"samples", result.samples},   {"gaps", result.gaps},
+                                  {"expected", result.expected}, {"errors", result.errors}};
     std::cout << document.dump(2) << '\n';
     return exit_code_of(result);
   }
@@ -126,6 +126,9 @@ ExitCode report_session(const SessionResult& result, bool json) {
   if (result.end != "completed") fmt::print("the run ended early: {}\n", result.end);
   if (result.gaps > 0)
     fmt::print("{} samples are missing; `diastole inspect` tells where and why\n", result.gaps);
+  if (result.errors > 0) {
+    fmt::print("{} errors were noted; `diastole inspect` tells them\n", result.errors);
+  }
   return exit_code_of(result);
 }
 

@@ -138,6 +138,23 @@ DaqConfig read_daq(TableReader table) {
   return config;
 }
 
+GpioConfig read_gpio(TableReader table) {
+  GpioConfig gpio{.chip = table.text("chip")};
+  const auto line = [&table](const char* key) -> std::optional<unsigned> {
+    if (!table.has(key)) return std::nullopt;
+    return static_cast<unsigned>(table.integer(key, {.at_least = 0, .at_most = 1023}));
+  };
+  gpio.gate_line = line("gate_line");
+  gpio.estop_line = line("estop_line");
+  gpio.gate_active_low = table.flag_or("gate_active_low", false);
+  gpio.estop_active_low = table.flag_or("estop_active_low", false);
+  if (!gpio.gate_line && !gpio.estop_line) {
+    table.fail("gate_line", "is missing, and estop_line too", "Give one of them, or remove [gpio].");
+  }
+  table.finish();
+  return gpio;
+}
+
 DaemonConfig read_daemon(std::optional<TableReader> table) {
   DaemonConfig daemon{.socket = default_socket(), .journal_dir = "journals", .control_group = ""};
   if (!table) return daemon;
@@ -167,6 +184,7 @@ RigConfig read_rig(TableReader root) {
   config.controller = read_controller(root.table("controller"));
   read_geometry(root.table("rig"), config);
   config.daq = read_daq(root.table("daq"));
+  if (auto gpio = root.table_if("gpio")) config.gpio = read_gpio(std::move(*gpio));
   config.daemon = read_daemon(root.table_if("daemon"));
   (void)root.has("simulation");  // concerns the simulated rig only, which checks it
   root.finish();

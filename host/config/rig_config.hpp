@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "host/daq/driver.hpp"
+#include "host/gpio/gate_inputs.hpp"
 #include "protocol/contract/table_reader.hpp"
 #include "protocol/runfile/run.hpp"
 
@@ -60,6 +61,7 @@ struct RigConfig {
       attributes;  ///< of /rig, volume_per_step_mL included
   ControllerConfig controller;
   DaqConfig daq;
+  std::optional<GpioConfig> gpio;
   DaemonConfig daemon;
   double microstep_mL = 0;          ///< bore area / (screw x steps x microsteps)
   double hose_inertance_kg_m4 = 0;  ///< density x length / bore area

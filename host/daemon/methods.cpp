@@ -27,6 +27,29 @@ void rig_write_settings(RigService& rig, const json& params, Done done) {
 }
 void rig_black_box(RigService& rig, const json&, Done done) { rig.black_box(std::move(done)); }
 
+CalibrationOrder measurement_in(const json& params) {
+  CalibrationOrder order;
+  order.channels = params.value("channels", std::vector<std::string>{});
+  order.seconds = params.value("seconds", order.seconds);
+  order.operator_name = params.value("operator", "");
+  if (!(order.seconds >= 1 && order.seconds <= 600)) {
+    throw rpc::Error(rpc::Code::invalid_params, "seconds must be 1 to 600");
+  }
+  return order;
+}
+
+void rig_zero(RigService& rig, const json& params, Done done) {
+  rig.calibrate(measurement_in(params), std::move(done));
+}
+
+void rig_calibrate(RigService& rig, const json& params, Done done) {
+  CalibrationOrder order = measurement_in(params);
+  order.kPa = params.at("kPa").get<double>();
+  if (order.channels.size() != 1)
+    throw rpc::Error(rpc::Code::invalid_params, "channels must name one channel");
+  rig.calibrate(std::move(order), std::move(done));
+}
+
 void run_start(RigService& rig, const json& params, Done done) {
   const std::string text = params.at("experiment");
   if (text.size() > most_experiment_bytes) {

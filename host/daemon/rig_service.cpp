@@ -1,6 +1,5 @@
 #include "host/daemon/rig_service.hpp"
 
-#include <fmt/chrono.h>
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 #include <unistd.h>
@@ -8,13 +7,13 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
-#include <ctime>
 
 #include "host/acquisition/disk_room.hpp"
 #include "host/acquisition/journal_store.hpp"
 #include "host/controller/black_box_text.hpp"
 #include "host/controller/settings_values.hpp"
 #include "host/daemon/json_rpc.hpp"
+#include "host/daemon/utc.hpp"
 #include "host/daemon/uuid.hpp"
 #include "host/runfile/assemble.hpp"
 #include "host/runfile/writer.hpp"
@@ -144,17 +143,25 @@ json schedule_as_json(const std::optional<ScheduleProgress>& schedule) {
           {"prompt", schedule->prompt}};
 }
 
-std::string utc_now() { return fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr))); }
+/// A simulated rig's instrument reads as the rig file says, whatever the real one's calibration.
+CalibrationBook book_for(const RigConfig& rig, bool simulated) {
+  return {simulated ? std::filesystem::path() : std::filesystem::path(rig.file), rig.daq.channels};
+}
 
 }  // namespace
 
 RigService::RigService(RigConfig rig, const RigServiceOptions& options)
-    : rig_(std::move(rig)), options_(options), clock_(make_clock(options.conductor, options.manager)) {
+    : rig_(std::move(rig)),
+      options_(options),
+      book_(book_for(rig_, !options.conductor.empty())),
+      clock_(make_clock(options.conductor, options.manager)) {
+  rig_.daq.channels = book_.channels();
   controller_ = std::make_unique<ControllerClient>(*clock_, rig_, [this]() -> std::unique_ptr<ByteLine> {
     return std::make_unique<SerialPort>(rig_.controller.port, rig_.controller.baud);
   });
   connect();
   instrument_ = rig_.daq.open({options.daq_address, clock_->stands_still() ? conducted_timeout_ms : 0});
+  if (rig_.gpio && !clock_->stands_still()) gate_ = open_gpio(*rig_.gpio);
   make_journal_dir(rig_.daemon.journal_dir);
   tidy_journals();
   spdlog::info("controller at {}, instrument {}", rig_.controller.port, instrument_->describe());
@@ -656,6 +663,7 @@ void RigService::write_beginning(JournalWriter& journal, const RunRecord& record
   for (const ChannelConfig& channel : rig_.daq.channels)
     channels.push_back(channel.name);
   json rig = attributes_as_json(rig_.attributes);
+  rig.update(attributes_as_json(book_.attributes()));
   rig["daq_rate_Hz"] = sample_rate_Hz;
   add_settings(rig, *controller_);
   const TimerFacts timer = make_source(*clock_, *instrument_)->timer(sample_rate_Hz);
@@ -690,7 +698,7 @@ RunOutcome RigService::acquire(JournalWriter& journal, const Experiment& experim
   const auto samples = make_source(*clock_, *instrument_);
   Acquisition acquisition(
       *clock_, *controller_, *samples, journal,
-      {rate.rate_Hz, rig_.daq.channels, std::move(warnings), planned_s, std::move(slices)});
+      {rate.rate_Hz, rig_.daq.channels, std::move(warnings), gate_.get(), planned_s, std::move(slices)});
   return acquisition.run({
       .stop =
           [this] {
@@ -738,6 +746,8 @@ json RigService::finish(const std::filesystem::path& journal, const RunOutcome& 
   result["triggers"] = assembled.run.trigger_s.size();
   result["samples"] = assembled.samples_received;
   result["gaps"] = assembled.samples_missing;
+  result["errors"] = std::count_if(assembled.run.events.begin(), assembled.run.events.end(),
+                                   [](const runfile::Event& event) { return event.level == "error"; });
   result["expected"] = assembled.samples_received + assembled.samples_missing;
   return result;
 }

@@ -19,6 +19,7 @@
 #include <vector>
 
 #include "host/acquisition/acquisition.hpp"
+#include "host/calibration/calibration.hpp"
 #include "host/config/experiment.hpp"
 #include "host/config/rig_config.hpp"
 #include "host/controller/controller_client.hpp"
@@ -33,6 +34,14 @@ struct RigServiceOptions {
   std::optional<std::string> daq_address;  ///< instead of the rig file's
   std::string producer = "diastole";       ///< program and version, for run files
   ServiceManager* manager = nullptr;       ///< told that the rig's thread is alive; outlives the service
+};
+
+/// Average the channels at rest and keep the result in the calibration file.
+struct CalibrationOrder {
+  std::vector<std::string> channels;  ///< empty: all
+  std::optional<double> kPa;          ///< the pressure that is applied; none: call this zero
+  double seconds = 5;
+  std::string operator_name;
 };
 
 class RigService {
@@ -68,6 +77,9 @@ class RigService {
   void write_settings(SettingsChange change, Done done);
   /// {"entries": [{"number", "boot", "time_s", "kind", "text"}], oldest first, "since_power_on"}.
   void black_box(Done done);
+  /// {"file", "channels": [{"name", "samples", "mean_V", "noise_kPa", "drift_kPa", "points", "kPa_per_V", "zero_V"}]}.
+  /// HardwareError, and nothing changed, when samples are missing, or noise or drift is too high for rest.
+  void calibrate(CalibrationOrder order, Done done);
   /// {"state", "fault", "firmware", "position_mL", "notice": that the pump was found moving and was stopped, until the
   /// next order, else null, ...}. While the rig is occupied `state` is the activity, and
   /// the answer comes at once, from what the controller last told.
@@ -122,6 +134,7 @@ class RigService {
   bool await_end_of(wire::State moving);
   nlohmann::json remember_settings();
   nlohmann::json do_black_box();
+  nlohmann::json do_calibrate(const CalibrationOrder& order);
   nlohmann::json do_status();
   nlohmann::json remember(const wire::Status& status);
   [[nodiscard]] bool asked_to_stop() const;
@@ -141,8 +154,10 @@ class RigService {
 
   RigConfig rig_;
   RigServiceOptions options_;
+  CalibrationBook book_;  // of the rig's thread
   std::unique_ptr<Clock> clock_;
   std::unique_ptr<daq::Instrument> instrument_;
+  std::unique_ptr<GateInputs> gate_;  // null: the rig file has no [gpio], or the rig is simulated
   std::unique_ptr<ControllerClient> controller_;
   uint64_t next_reconnect_ns_ = 0;
   std::string last_problem_;  ///< of the rig's thread between orders: told once, not once a second

@@ -105,8 +105,9 @@ SessionResult run_session(DaemonClient& daemon, const SessionOptions& options) {
         "What was recorded is in " + result.value("journal", "the journal") + "; try `diastole recover`.");
   }
   deliver(result.at("run_file").get<std::string>(), options.output);
-  return {options.output,        result.at("end"),     result.at("regular"), result.at("cycles"),
-          result.at("triggers"), result.at("samples"), result.at("gaps"),    result.at("expected")};
+  return {options.output,      result.at("end"),      result.at("regular"),
+          result.at("cycles"), result.at("triggers"), result.at("samples"),
+          result.at("gaps"),   result.at("expected"), result.at("errors")};
 }
 
 }  // namespace diastole

@@ -54,6 +54,7 @@ struct SessionResult {
   int64_t samples = 0;
   int64_t gaps = 0;
   int64_t expected = 0;
+  int64_t errors = 0;  ///< events of level "error" in the run file, such as witnesses that disagree
 };
 
 /// Throws InputError before anything moves: unreadable or impossible experiment, output exists or its

@@ -7,6 +7,9 @@
 //   run.stop        {how: "cycle_end"|"now"|"halt"} anybody       {stopping}
 //   run.start       {experiment, file, points}      controller    {run_id, journal, run_file}
 //   rig.home                                        controller    status
+//   rig.zero        {channels, seconds, operator}   controller    RigService::calibrate; no channels: all
+//   rig.calibrate   {channels: [one], kPa, seconds, operator}
+//                                                   controller    the same
 //   rig.clear_fault                                 controller    status
 //   rig.jog         {mL, rate_mL_s}                 controller    status, and jogged_mL
 //   rig.settings                                    anybody       RigService::settings

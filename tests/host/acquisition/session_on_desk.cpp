@@ -50,7 +50,7 @@ void SessionOnDesk::run(const std::function<StopRequest()>& stop) {
   const auto samples = make_source(clock, instrument);
   Acquisition acquisition(
       clock, client, *samples, writer,
-      {experiment.sample_rate_Hz, rig.daq.channels, {}, experiment.least_duration_s(), slices});
+      {experiment.sample_rate_Hz, rig.daq.channels, {}, gate, experiment.least_duration_s(), slices});
   outcome = acquisition.run({.stop = stop,
                              .go_on = go_on,
                              .progress = [](const RunProgress&) {},

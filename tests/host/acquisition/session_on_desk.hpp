@@ -25,6 +25,7 @@ struct SessionOnDesk {
   JournalWriter::Flush flush = ::fdatasync;  ///< the journal's
   JournalWriter::Write write = ::write;      ///< likewise
   std::function<std::optional<size_t>()> go_on = [] { return std::optional<size_t>(); };
+  GateInputs* gate = nullptr;
   std::vector<RunRemark> remarks;
   RunOutcome outcome;
 

@@ -247,5 +247,47 @@ TEST(Acquisition, TwoEqualSessionsWriteEqualJournals) {
   EXPECT_EQ(first.channels, second.channels);
 }
 
+/// Sees the two TTLs of the short session, or as many more or fewer as it is told.
+class DeskGate final : public GateInputs {
+ public:
+  DeskGate(SessionOnDesk& session, int error) : session_(session), error_(error) {}
+  [[nodiscard]] std::string describe() const override { return "desk gate"; }
+  [[nodiscard]] bool counts_pulses() const override { return true; }
+  [[nodiscard]] bool sees_estop() const override { return true; }
+  [[nodiscard]] bool estop_pressed() const override { return false; }
+  GateReading take() override {
+    GateReading reading;
+    const int cycles = session_.instrument.readings > 300 ? 2 + error_ : 0;
+    for (; seen_ < cycles; ++seen_)
+      reading.pulse_ns.push_back(session_.desk.now_ns);
+    return reading;
+  }
+
+ private:
+  SessionOnDesk& session_;
+  int error_;
+  int seen_ = 0;
+};
+
+class GateAgainstController : public testing::TestWithParam<int> {};
+
+TEST_P(GateAgainstController, ADisagreementAtTheEndIsAnErrorInTheRunFile) {
+  SessionOnDesk session(short_session);
+  DeskGate gate(session, GetParam());
+  session.gate = &gate;
+  session.run();
+  EXPECT_EQ(session.outcome.end, "completed");
+  const RecordedRun run = session.assemble().run;
+  const auto told = [&run](const std::string& level) {
+    return std::count_if(run.events.begin(), run.events.end(), [&](const runfile::Event& event) {
+      return event.level == level && event.code == "gate_count" && event.time_s > 1.8;
+    });
+  };
+  EXPECT_EQ(told("error"), GetParam() == 0 ? 0 : 1);
+  EXPECT_EQ(told("info"), GetParam() == 0 ? 1 : 0);
+}
+
+INSTANTIATE_TEST_SUITE_P(Acquisition, GateAgainstController, testing::Values(-1, 0, 1));
+
 }  // namespace
 }  // namespace diastole

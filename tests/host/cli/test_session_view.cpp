@@ -16,6 +16,12 @@ SessionResult session(const std::string& end, int64_t cycles, int64_t triggers, 
           .expected = 1000 + gaps};
 }
 
+TEST(SessionExitCode, WitnessesThatDisagreeMakeTheAnswerNegative) {
+  SessionResult result = session("completed", 10, 10);
+  result.errors = 1;
+  EXPECT_EQ(exit_code_of(result), ExitCode::negative);
+}
+
 TEST(SessionExitCode, AWholeSessionIsDone) {
   EXPECT_EQ(exit_code_of(session("completed", 10, 10)), ExitCode::done);
   EXPECT_EQ(exit_code_of(session("stopped_at_cycle_end", 4, 4)), ExitCode::done);
