@@ -36,11 +36,13 @@ class ImageTrial {
     return wire::UpdateOutcome::done;
   }
 
-  /// One turn of the main loop. A reset that is due waits until the motor is at rest.
+  /// One turn of the main loop. A reset that is due on trial waits until the motor is at rest; a motion asked for
+  /// after the order to enter the bootloader takes that order back.
   void poll() {
     const Ticks now = board_.now();
     if (!begun_ && board_.running_image().standing == wire::Standing::on_trial) trial_ends_ = now + kTrial;
     begun_ = true;
+    if (!at_rest_and_disarmed()) farewell_ends_.reset();
     const bool farewell = farewell_ends_ && *farewell_ends_ <= now;
     const bool failed = trial_ends_ && *trial_ends_ <= now;
     if ((!farewell && !failed) || !at_rest_and_disarmed()) return;

@@ -184,6 +184,7 @@ wire::Refusal Motion<B>::stop_now() {
 
 template <Board B>
 wire::Refusal Motion<B>::halt() {
+  take_tripped_fault();  // what cut the motor off before this halt is the fault to be told
   if (safety_.at_rest() || safety_.state() == wire::State::faulted) return wire::Refusal::wrong_state;
   engine_.cut();
   latch(wire::Fault::halted);

@@ -48,8 +48,8 @@ class StepEngine {
  public:
   static constexpr std::size_t kQueue = 512;
   static constexpr std::size_t kSamples = 512;
-  /// An order must reach the timer this long before its tick, or the compare would be missed.
-  static constexpr Ticks kLeastLead{42};
+  /// An order must reach the timer this long before its tick, or the compare would be missed: 1 µs, 168 core cycles.
+  static constexpr Ticks kLeastLead{84};
   /// … and one that starts a cycle, for which the board prepares TTL and R-wave first.
   static constexpr Ticks kTriggerLead = microseconds(2);
 

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <deque>
 
 #include "protocol/contract/input_error.hpp"
 #include "protocol/wire/wire_text.hpp"
@@ -14,10 +13,10 @@ namespace {
 constexpr uint64_t ms = 1'000'000;  // ns
 constexpr uint64_t answer_patience = 1'500 * ms;
 constexpr uint64_t erase_patience = 8'000 * ms;
+constexpr uint64_t write_patience = 8'000 * ms;
 constexpr uint64_t reset_patience = 4'000 * ms;
 constexpr uint64_t rescue_patience = 15'000 * ms;
 constexpr uint64_t while_it_resets = 60 * ms;
-constexpr size_t most_unanswered = 4;  // as many pieces as the controller's receive buffer holds
 
 wire::FirmwareVersion version_of(const wire::Hello& hello) {
   return {hello.version_major, hello.version_minor, hello.version_patch};
@@ -161,28 +160,19 @@ wire::UpdateOutcome Updater::send_image(const SlotImage& image, const UpdateFile
   if (begun.outcome != done) refused(file, begun);
   if (begun.held_bytes > 0) options.say(fmt::format("{} bytes are there already", begun.held_bytes));
   const auto total = static_cast<uint32_t>(image.code.size());
-  uint32_t next = begun.held_bytes;
-  std::deque<uint16_t> unanswered;
-  result.held_bytes = next;
+  result.held_bytes = begun.held_bytes;
+  // One piece at a time: while the controller writes it (up to 5 ms), it hears nothing.
   while (result.held_bytes < total) {
     if (options.stop_asked()) {
       stopped = true;
       return done;
     }
-    while (next < total && unanswered.size() < most_unanswered) {
-      wire::UpdateData data;
-      data.offset = next;
-      data.count = static_cast<uint8_t>(std::min<size_t>(wire::UpdateData::kMaxCount, total - next));
-      std::copy_n(image.code.begin() + next, data.count, data.data.begin());
-      const auto number = link_.post(data);
-      if (!number) need({}, "take the image");
-      unanswered.push_back(*number);
-      next += data.count;
-      result.sent_bytes += data.count;
-    }
-    const auto answer =
-        need(link_.await<wire::UpdateAnswer>(unanswered.front(), answer_patience), "take the image");
-    unanswered.pop_front();
+    wire::UpdateData data;
+    data.offset = result.held_bytes;
+    data.count = static_cast<uint8_t>(std::min<size_t>(wire::UpdateData::kMaxCount, total - data.offset));
+    std::copy_n(image.code.begin() + data.offset, data.count, data.data.begin());
+    result.sent_bytes += data.count;
+    const auto answer = need(link_.ask<wire::UpdateAnswer>(data, write_patience), "take the image");
     if (answer.outcome == flash_failed) return flash_failed;
     if (answer.outcome != done) refused(file, answer);
     result.held_bytes = answer.held_bytes;

@@ -44,6 +44,16 @@ TEST(ImageTrial, EntersTheBootloaderOnlyAtRestAndDisarmedWithTheMotorOff) {
   EXPECT_EQ(bench.rig.restart_asked(), Restart::into_bootloader);
 }
 
+TEST(ImageTrial, AMotionAskedForAfterwardsTakesTheOrderBack) {
+  Bench bench;
+  bench.prepare();
+  EXPECT_EQ(asked(bench, wire::EnterBootloader{}), UpdateOutcome::done);
+  ASSERT_TRUE(bench.ask(wire::Home{0, Bench::kLease}));
+  ASSERT_TRUE(bench.run_until([&] { return bench.state() == wire::State::homed; }, microseconds(60'000'000)));
+  bench.run_for(microseconds(1'000'000));
+  EXPECT_EQ(bench.rig.restart_asked(), Restart::none);
+}
+
 TEST(ImageTrial, AnswersAHostOfAnotherProtocolVersion) {
   Bench bench(running(wire::Standing::on_trial));
   bench.link.open(9, 0);

@@ -22,6 +22,7 @@ constexpr std::array<std::uint16_t, kRWaveSamples> kFollowing = [] {
 }();
 
 constexpr std::uint32_t kStreamEnable = 1U << 0;
+constexpr std::uint32_t kDacDma = 1U << 12, kDacUnderrun = 1U << 13;
 constexpr std::uint32_t kStream5Flags = 0x3DU << 6;  // in HIFCR
 constexpr std::uint32_t kTriggerMode = 6U;           // SMS: started by the trigger
 
@@ -30,9 +31,9 @@ constexpr std::uint32_t kTriggerMode = 6U;           // SMS: started by the trig
 void RWavePlayer::start() {
   // The output buffer does not reach below 0.2 V; the triangle starts at 0.
   constexpr std::uint32_t kEnable = 1U << 0, kBufferOff = 1U << 1, kTriggerEnable = 1U << 2,
-                          kFromTim4 = 5U << 3, kDmaEnable = 1U << 12;
+                          kFromTim4 = 5U << 3;
   dac().DHR12R1.write(0);
-  dac().CR.write(kEnable | kBufferOff | kTriggerEnable | kFromTim4 | kDmaEnable);
+  dac().CR.write(kEnable | kBufferOff | kTriggerEnable | kFromTim4 | kDacDma);
   tim4().PSC.write(0);
   tim4().ARR.write(static_cast<std::uint32_t>(kRWaveSamplePeriod.count - 1));
   tim4().CR2.write(2U << 4);   // TRGO = update
@@ -48,6 +49,10 @@ void RWavePlayer::arm() {
   while ((stream.CR.read() & kStreamEnable) != 0) {
   }
   dma1().HIFCR.write(kStream5Flags);
+  // If the end of the last wave was served late, TIM4 asked for codes that nobody brought (RM0090 14.3.7).
+  dac().CR.clear(kDacDma);
+  dac().SR.write(kDacUnderrun);
+  dac().CR.set(kDacDma);
   stream.PAR.write(reinterpret_cast<std::uintptr_t>(&dac().DHR12R1));
   stream.M0AR.write(reinterpret_cast<std::uintptr_t>(kFollowing.data()));
   stream.NDTR.write(kFollowing.size());

@@ -47,8 +47,9 @@ struct Usart {  // 30.6
 };
 
 struct Dac {  // 14.5
-  Register CR, SWTRIGR, DHR12R1;
+  Register CR, SWTRIGR, DHR12R1, reserved[10], SR;
 };
+static_assert(offsetof(Dac, SR) == 0x34);
 
 struct DmaStream {
   Register CR, NDTR, PAR, M0AR, M1AR, FCR;
