@@ -11,6 +11,16 @@ std::string line_of(const json& message) {
   return message.dump(-1, ' ', false, json::error_handler_t::replace) + "\n";
 }
 
+/// Discarded if it is no JSON. Deeper values are refused while they are read: copying one recurses, and would take
+/// more stack than there is.
+json parsed(std::string_view line) {
+  const auto bounded = [](int depth, json::parse_event_t, json&) {
+    if (depth > most_depth) throw Error(Code::parse_error, "this line is nested too deeply");
+    return true;
+  };
+  return json::parse(line, bounded, false);
+}
+
 json error_object(Code code, const std::string& message, const json& data) {
   json error{{"code", static_cast<int>(code)}, {"message", message}};
   if (!data.is_null()) error["data"] = data;
@@ -44,8 +54,13 @@ HardwareError hardware_error_from(const std::string& text) {
   return {text.substr(0, colon), text.substr(colon + 2, remedy - colon - 2), text.substr(remedy + 3)};
 }
 
+Code code_of(const json& error) {
+  const json code = error.value("code", json());
+  return code.is_number_integer() ? static_cast<Code>(code.get<int>()) : Code::internal_error;
+}
+
 [[noreturn]] void raise(const json& error) {
-  const auto code = static_cast<Code>(error.value("code", static_cast<int>(Code::internal_error)));
+  const Code code = code_of(error);
   const std::string message = error.value("message", "");
   const json data = error.value("data", json());
   if (code == Code::input_fault && data.is_object()) {
@@ -59,7 +74,7 @@ HardwareError hardware_error_from(const std::string& text) {
 }  // namespace
 
 Request parse_request(std::string_view line, json& id) {
-  const json message = json::parse(line, nullptr, false);
+  const json message = parsed(line);
   if (message.is_discarded()) throw Error(Code::parse_error, "this line is not JSON");
   if (!message.is_object()) throw Error(Code::invalid_request, "a request is one JSON object");
   if (message.contains("id") && (message["id"].is_string() || message["id"].is_number_integer())) {
@@ -92,9 +107,15 @@ std::string request_line(int64_t id, const std::string& method, const json& para
 }
 
 json parse_answer(std::string_view line, int64_t id) {
-  const json message = json::parse(line, nullptr, false);
+  const json message = parsed(line);
   if (!message.is_object()) throw Error(Code::parse_error, "the daemon's answer is not a JSON object");
-  if (message.contains("error") && message["error"].is_object()) raise(message["error"]);
+  if (message.contains("error") && message["error"].is_object()) {
+    try {
+      raise(message["error"]);
+    } catch (const json::exception&) {
+      throw Error(Code::invalid_request, "the daemon's answer is an error of unknown form");
+    }
+  }
   if (message.value("id", json()) != json(id) || !message.contains("result")) {
     throw Error(Code::invalid_request, "the daemon's answer does not belong to the request");
   }

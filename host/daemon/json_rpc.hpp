@@ -1,7 +1,7 @@
 #pragma once
 // JSON-RPC 2.0 (jsonrpc.org/specification) on lines: each message is one line of UTF-8 JSON, ended by '\n',
-// at most most_line_bytes long. Only single requests with an id are answered; batches and notifications are
-// refused.
+// at most most_line_bytes long and most_depth levels deep. Only single requests with an id are answered; batches and
+// notifications are refused.
 
 #include <exception>
 #include <nlohmann/json.hpp>
@@ -11,6 +11,7 @@
 namespace diastole::rpc {
 
 inline constexpr size_t most_line_bytes = 1U << 20;
+inline constexpr int most_depth = 32;
 
 /// Error codes: those of the specification, then ours.
 enum class Code : int {

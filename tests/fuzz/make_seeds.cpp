@@ -1,5 +1,5 @@
 // Writes the seed corpora: the worked example of every message, as each target reads it, and whole sessions.
-//   make_seeds DIRECTORY     (makes fuzz_wire/, fuzz_controller/ and fuzz_client/ in it)
+//   make_seeds DIRECTORY     (makes fuzz_wire/, fuzz_controller/, fuzz_client/ and fuzz_rpc/ in it)
 
 #include <filesystem>
 #include <fstream>
@@ -88,6 +88,19 @@ void write_sessions(const std::filesystem::path& directory) {
   write(directory / "fuzz_client" / "session", client.bytes());
 }
 
+/// One line of each kind on the daemon's socket.
+void write_rpc_lines(const std::filesystem::path& directory) {
+  const auto line = [&directory](const char* name, const std::string& text) {
+    write(directory / "fuzz_rpc" / name, {text.begin(), text.end()});
+  };
+  line("request", R"({"jsonrpc":"2.0","id":1,"method":"rig.jog","params":{"mL":5.0,"rate_mL_s":1.0}})");
+  line("result", R"({"jsonrpc":"2.0","id":1,"result":{"state":"idle"}})");
+  line("input_fault", R"({"jsonrpc":"2.0","id":1,"error":{"code":-32001,"message":"m",)"
+                      R"("data":{"file":"f","place":"p","problem":"b","remedy":"r"}}})");
+  line("hardware_fault",
+       R"({"jsonrpc":"2.0","id":1,"error":{"code":-32002,"message":"rig: is away\n  Find it."}})");
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -97,5 +110,6 @@ int main(int argc, char** argv) {
 #include "protocol/wire/message_list.inc"
 #undef DIASTOLE_MESSAGE
   write_sessions(directory);
+  write_rpc_lines(directory);
   return 0;
 }

@@ -67,5 +67,25 @@ TEST(JsonRpc, ErrorsCrossTheSocketUnchanged) {
   EXPECT_THROW((void)parse_answer(result_line(5, 1), 6), Error);
 }
 
+TEST(JsonRpc, AnErrorOfUnknownFormIsAnErrorOfOurs) {
+  for (const char* error :
+       {R"({"code":"x"})", R"({"code":-4e22})", R"({"message":1})", R"({"code":-32001,"data":{"file":1}})"}) {
+    const std::string line = std::string(R"({"jsonrpc":"2.0","id":1,"error":)") + error + "}";
+    EXPECT_THROW((void)parse_answer(line, 1), Error) << line;
+  }
+}
+
+TEST(JsonRpc, ALineThatIsNestedTooDeeplyIsRefused) {
+  const auto nested = [](size_t depth) {
+    return R"({"jsonrpc":"2.0","id":1,"method":"m","params":{"a":)" + std::string(depth, '[') +
+           std::string(depth, ']') + "}}";
+  };
+  json id;
+  EXPECT_NO_THROW((void)parse_request(nested(20), id));
+  EXPECT_THROW((void)parse_request(nested(most_depth), id), Error);
+  EXPECT_THROW((void)parse_request(nested(most_line_bytes / 2 - 100), id), Error);
+  EXPECT_THROW((void)parse_answer(nested(most_line_bytes / 2 - 100), 1), Error);
+}
+
 }  // namespace
 }  // namespace diastole::rpc
