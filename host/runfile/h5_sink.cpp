@@ -20,6 +20,7 @@ using runfile::TypeHandle;
 
 constexpr hsize_t chunk_rows = 4096;
 constexpr unsigned deflate_level = 4;
+constexpr size_t memory_increment_bytes = 1U << 20;
 
 TypeHandle text_type(size_t size) {
   TypeHandle type(H5Tcopy(H5T_C_S1));
@@ -59,16 +60,17 @@ void put_cell(const TableColumn& column, size_t row, char* target) {
 
 }  // namespace
 
-H5Sink::H5Sink(const std::filesystem::path& path) : name_(path.string()) {
+H5Sink::H5Sink(std::string name) : name_(std::move(name)) {
   H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
-  file_ = FileHandle(H5Fcreate(name_.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT));
+  const PropertyHandle in_memory(H5Pcreate(H5P_FILE_ACCESS));
+  H5Pset_fapl_core(in_memory.get(), memory_increment_bytes, /*backing_store=*/0);
+  file_ = FileHandle(H5Fcreate(name_.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, in_memory.get()));
   must(file_.valid(), "the file");
 }
 
 void H5Sink::must(bool done, const std::string& object) const {
   if (done) return;
-  throw HardwareError(name_, object + " cannot be written",
-                      "Check the space on the disk and that you may write there.");
+  throw HardwareError(name_, object + " cannot be written", "Free some memory: the file takes shape there.");
 }
 
 void H5Sink::attribute(const std::string& object, const std::string& name, const runfile::Attribute& value) {
@@ -166,9 +168,13 @@ void H5Sink::table(const std::string& path, const std::vector<TableColumn>& colu
        "dataset " + path);
 }
 
-void H5Sink::close() {
+std::vector<std::byte> H5Sink::image() const {
   must(H5Fflush(file_.get(), H5F_SCOPE_GLOBAL) >= 0, "the file");
-  file_ = FileHandle();
+  const ssize_t size = H5Fget_file_image(file_.get(), nullptr, 0);
+  must(size > 0, "the file");
+  std::vector<std::byte> bytes(static_cast<size_t>(size));
+  must(H5Fget_file_image(file_.get(), bytes.data(), bytes.size()) == size, "the file");
+  return bytes;
 }
 
 }  // namespace diastole

@@ -1,9 +1,13 @@
 #pragma once
 // Typed writing into a new HDF5 file; the counterpart of protocol/runfile/h5_source.hpp.
+//
+// The file takes shape in memory: the HDF5 library neither closes nor forgets a file whose disk is full, and would
+// complain of it when the program ends. Its bytes then reach the disk by the caller's own writing.
 
-#include <filesystem>
+#include <cstddef>
 #include <span>
 #include <string>
+#include <variant>
 #include <vector>
 
 #include "protocol/runfile/h5_handle.hpp"
@@ -18,10 +22,11 @@ struct TableColumn {
 };
 
 /// Groups on the way to an object are made as needed; every dataset gets its `units`.
-/// Errors: every member throws HardwareError when the disk does not take it.
+/// Errors: every member throws HardwareError when the library does not take it (no memory left).
 class H5Sink {
  public:
-  explicit H5Sink(const std::filesystem::path& path);
+  /// `name` is the file's in messages.
+  explicit H5Sink(std::string name);
 
   void attribute(const std::string& object, const std::string& name, const runfile::Attribute& value);
   void group(const std::string& path);
@@ -29,8 +34,8 @@ class H5Sink {
   void scalar(const std::string& path, double value, const std::string& units);
   void text(const std::string& path, const std::string& value);
   void table(const std::string& path, const std::vector<TableColumn>& columns, const std::string& units);
-  /// Flushes and closes; the object is of no use afterwards.
-  void close();
+  /// The whole file as it shall stand on the disk.
+  [[nodiscard]] std::vector<std::byte> image() const;
 
  private:
   runfile::DatasetHandle create(const std::string& path, hid_t type, const runfile::SpaceHandle& space,

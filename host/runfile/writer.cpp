@@ -2,6 +2,11 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <span>
 
 #include "host/runfile/h5_sink.hpp"
 #include "host/transport/descriptor.hpp"
@@ -88,8 +93,8 @@ void write_tables(H5Sink& sink, const runfile::RecordedRun& run) {
              runfile::events_units);
 }
 
-void write_all(const std::filesystem::path& path, const runfile::RecordedRun& run) {
-  H5Sink sink(path);
+std::vector<std::byte> image_of(const std::filesystem::path& path, const runfile::RecordedRun& run) {
+  H5Sink sink(path.string());
   sink.attribute("/", "format", std::string(runfile::format_name));
   sink.attribute("/", "format_version", runfile::format_version);
   sink.attribute("/", "run_id", run.run_id);
@@ -105,14 +110,30 @@ void write_all(const std::filesystem::path& path, const runfile::RecordedRun& ru
     sink.scalar(fmt::format("{}/{}", runfile::clock_group, name), value, std::string(runfile::unit_of(name)));
   }
   write_tables(sink, run);
-  sink.close();
+  return sink.image();
 }
 
-void bring_to_disk(const std::filesystem::path& path, int flags) {
-  const Descriptor file(::open(path.c_str(), flags | O_CLOEXEC));
-  if (!file.valid() || ::fsync(file.get()) != 0) {
-    throw HardwareError(path.string(), "cannot be brought to the disk", "Check the disk and its free space.");
+void must(bool done, const std::filesystem::path& path, const char* what) {
+  if (done) return;
+  throw HardwareError(path.string(), fmt::format("{}: {}", what, std::strerror(errno)),
+                      "Check the space on the disk and that you may write there.");
+}
+
+void write_bytes(const std::filesystem::path& path, std::span<const std::byte> bytes) {
+  const Descriptor file(::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644));
+  must(file.valid(), path, "cannot be made");
+  while (!bytes.empty()) {
+    const ssize_t written = ::write(file.get(), bytes.data(), bytes.size());
+    if (written < 0 && errno == EINTR) continue;
+    must(written > 0, path, "cannot be written");
+    bytes = bytes.subspan(static_cast<size_t>(written));
   }
+  must(::fsync(file.get()) == 0, path, "cannot be brought to the disk");
+}
+
+void bring_to_disk(const std::filesystem::path& directory) {
+  const Descriptor file(::open(directory.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  must(file.valid() && ::fsync(file.get()) == 0, directory, "cannot be brought to the disk");
 }
 
 }  // namespace
@@ -121,10 +142,9 @@ void write_run(const std::filesystem::path& path, const runfile::RecordedRun& ru
   runfile::check(run);
   const std::filesystem::path temporary = fmt::format("{}.{}.part", path.string(), ::getpid());
   try {
-    write_all(temporary, run);
-    bring_to_disk(temporary, O_RDONLY);
+    write_bytes(temporary, image_of(path, run));
     std::filesystem::rename(temporary, path);
-    bring_to_disk(path.has_parent_path() ? path.parent_path() : ".", O_RDONLY | O_DIRECTORY);
+    bring_to_disk(path.has_parent_path() ? path.parent_path() : ".");
   } catch (const std::filesystem::filesystem_error& error) {
     std::error_code ignored;
     std::filesystem::remove(temporary, ignored);

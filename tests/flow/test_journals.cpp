@@ -68,6 +68,7 @@ TEST(Journals, ADiskThatFillsStopsThePumpAndKeepsWhatWasRecorded) {
   const json status = status_when(client, "homed", true);
   const json progress = client.call("run.progress");
   EXPECT_EQ(progress["state"], "failed") << progress.dump();
+  EXPECT_THAT(progress.dump(), HasSubstr("No space left on device"));
   const std::string journal = progress["result"]["journal"];
   const Ended recovered = run(rig.place, {"diastole", "recover", journal, "-o", "saved.run.h5", "--json"});
   EXPECT_EQ(recovered.exit_code, 1) << recovered.err;
