@@ -59,15 +59,6 @@ void print_record(const FitRecord& record) {
     fmt::print("{} not used: {}.\n", exclusion.points, exclusion.reason);
 }
 
-std::vector<std::filesystem::path> inputs_of(const Study& study) {
-  std::vector<std::filesystem::path> inputs = study.data.runs;
-  inputs.push_back(study.file);
-  for (const auto& data : {study.data.tags, study.data.points, study.data.frames}) {
-    if (data) inputs.push_back(*data);
-  }
-  return inputs;
-}
-
 ExitCode run_fit(const FitArguments& arguments, const CommandOutput& out) {
   Study study = read_study(arguments.study);
   if (!arguments.mesh.empty()) set_mesh(study, arguments.mesh);

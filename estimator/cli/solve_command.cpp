@@ -13,7 +13,11 @@
 #include <vector>
 
 #include "estimator/cli/commands.hpp"
+#include "estimator/cli/solution_outputs.hpp"
+#include "estimator/fe/elastic_system.hpp"
+#include "estimator/fe/point_fields.hpp"
 #include "estimator/fe/study_model.hpp"
+#include "estimator/io/measurement.hpp"
 #include "estimator/io/study.hpp"
 #include "estimator/mesh/point_locator.hpp"
 #include "protocol/contract/input_error.hpp"
@@ -25,10 +29,12 @@ using Clock = std::chrono::steady_clock;
 
 struct SolveArguments {
   std::string study;
-  double pressure_kPa = 0.0;
+  std::optional<double> pressure_kPa;
+  bool frames = false;
   std::vector<std::string> probes;
   std::vector<std::string> starts;
   std::string mesh;
+  SolutionOutputs outputs;
 };
 
 struct Probe {
@@ -91,6 +97,21 @@ SolveOptions with_progress(Clock::time_point begun) {
   return options;
 }
 
+/// Strain and stress at a place by name; null where there is no direction of the wall (a collapsed edge).
+nlohmann::ordered_json fields_json(const ElasticModel& model, const ElasticState& state,
+                                   const MaterialPoint& point) {
+  constexpr double least_relative_volume = 1e-9;
+  const Eigen::Matrix3d tangents = model.mesh().xi_gradient(model.mesh().reference(), point);
+  if (!(tangents.determinant() > least_relative_volume * std::pow(tangents.norm(), 3))) return nullptr;
+  const PointFields fields = point_fields(model.system(), state, point);
+  const std::vector<std::string> names = scalar_field_names(fields.fibre.has_value());
+  const std::vector<double> values = scalar_fields(fields);
+  nlohmann::ordered_json json;
+  for (size_t i = 0; i < names.size(); ++i)
+    json[names[i]] = values[i];
+  return json;
+}
+
 nlohmann::ordered_json as_json(const Study& study, const ElasticModel& model, const Solution& solution,
                                const std::vector<Probe>& probes, double seconds) {
   const SolveReport& report = solution.report;
@@ -117,7 +138,19 @@ nlohmann::ordered_json as_json(const Study& study, const ElasticModel& model, co
     const Eigen::Vector3d moved = model.mesh().value(solution.state.position_mm, probe.point) -
                                   model.mesh().value(model.mesh().reference(), probe.point);
     json["probes"].push_back({{"point_mm", {probe.place_mm[0], probe.place_mm[1], probe.place_mm[2]}},
-                              {"displacement_mm", {moved[0], moved[1], moved[2]}}});
+                              {"displacement_mm", {moved[0], moved[1], moved[2]}},
+                              {"fields", fields_json(model, solution.state, probe.point)}});
+  }
+  return json;
+}
+
+nlohmann::ordered_json frames_json(const ElasticModel& model, const std::vector<SolvedFrame>& solved) {
+  nlohmann::ordered_json json = nlohmann::ordered_json::array();
+  const double rest_mL = model.cavity_volume_mL(model.rest_state());
+  for (const SolvedFrame& frame : solved) {
+    json.push_back({{"time_s", frame.time_s},
+                    {"pressure_kPa", frame.state.pressure_kPa},
+                    {"cavity_volume_change_mL", model.cavity_volume_mL(frame.state) - rest_mL}});
   }
   return json;
 }
@@ -136,26 +169,67 @@ void print_for_people(const nlohmann::ordered_json& json) {
       fmt::join(json["mesh"].get<std::vector<int>>(), " x "), json["dofs"].get<size_t>(),
       json["load_steps"].get<size_t>(), json["newton_iterations"].get<size_t>(),
       json["factorisations"].get<size_t>(), json["seconds"].get<double>());
+  if (json.contains("files"))
+    fmt::print("Written: {}\n", fmt::join(json["files"].get<std::vector<std::string>>(), ", "));
+}
+
+void require_one_load(const SolveArguments& arguments) {
+  if (arguments.pressure_kPa.has_value() == arguments.frames) {
+    throw InputError({.file = "",
+                      .place = "--pressure-kPa",
+                      .problem = arguments.frames ? "is given beside --frames" : "is missing",
+                      .remedy = "Give a pressure, for example --pressure-kPa 6, or --frames for all of the "
+                                "study's frames."});
+  }
+  if (arguments.pressure_kPa && !std::isfinite(*arguments.pressure_kPa)) {
+    throw InputError({.file = "",
+                      .place = "--pressure-kPa",
+                      .problem = fmt::format("{} is not a finite pressure", *arguments.pressure_kPa),
+                      .remedy = "Give a number, for example 6."});
+  }
+}
+
+/// The loads to solve for: the one of the command line, or the study's frames.
+std::vector<Frame> loads_of(const SolveArguments& arguments, const Study& study) {
+  if (!arguments.frames) return {{.time_s = 0.0, .pressure_kPa = *arguments.pressure_kPa, .sigma_kPa = 0.0}};
+  if (study.data.frames) return read_frames(*study.data.frames);
+  throw InputError({.file = study.file.string(),
+                    .place = "key data.frames",
+                    .problem = "missing, although --frames asks for the frames' pressures",
+                    .remedy = "Name the file with each frame's pressure: frames = \"NAME.frames.csv\"."});
+}
+
+/// Each load from the state of the one before; ends at the first that has no equilibrium.
+Solution solve_all(ElasticModel& model, const std::vector<Frame>& loads, std::vector<SolvedFrame>& solved) {
+  Solution solution{model.rest_state(), {}};
+  for (const Frame& load : loads) {
+    solution = model.solve(load.pressure_kPa, solution.state);
+    if (!solution.report.converged()) break;
+    solved.push_back({load.time_s, solution.state});
+  }
+  return solution;
 }
 
 ExitCode run_solve(const SolveArguments& arguments, const CommandOutput& out) {
   const Clock::time_point begun = Clock::now();
-  if (!std::isfinite(arguments.pressure_kPa)) {
-    throw InputError({.file = "",
-                      .place = "--pressure-kPa",
-                      .problem = fmt::format("{} is not a finite pressure", arguments.pressure_kPa),
-                      .remedy = "Give a number, for example 6."});
-  }
+  require_one_load(arguments);
   Study study = read_study(arguments.study);
   for (const std::string& start : arguments.starts)
     set_start(study, start);
   if (!arguments.mesh.empty()) set_mesh(study, arguments.mesh);
+  require_outputs(arguments.outputs, study);
+  const std::vector<Frame> loads = loads_of(arguments, study);
   ElasticModel model = make_model(study, with_progress(begun));
   const std::vector<Probe> probes = locate_probes(model.mesh(), arguments.probes);
 
-  const Solution solution = model.solve(arguments.pressure_kPa);
+  std::vector<SolvedFrame> solved;
+  const Solution solution = solve_all(model, loads, solved);
+  if (solution.report.converged()) write_outputs(arguments.outputs, model, solved);
 
-  const nlohmann::ordered_json json = as_json(study, model, solution, probes, seconds_since(begun));
+  nlohmann::ordered_json json = as_json(study, model, solution, probes, seconds_since(begun));
+  for (const std::filesystem::path& file : arguments.outputs.files)
+    json["files"].push_back(file.string());
+  if (arguments.frames) json["frames"] = frames_json(model, solved);
   if (!solution.report.converged()) std::cerr << "diastole solve: " << solution.report.describe() << '\n';
   if (solution.report.converged() && solution.report.negative_pivots != solution.report.pressure_unknowns) {
     std::cerr << "diastole solve: this equilibrium is not stable (" << solution.report.negative_pivots
@@ -177,12 +251,14 @@ void add_solve(CommandLine& line) {
       "solve", "one forward finite-element solution of a study's specimen at a cavity pressure",
       "  diastole solve phantom-a.study.toml --pressure-kPa 6 --set C1_kPa=6.5\n"
       "  diastole solve phantom-a.study.toml --pressure-kPa 3.1 --probe 22.5,0,0 --probe 50,0,0 --json\n"
-      "  diastole solve phantom-a.study.toml --pressure-kPa 6 --mesh 8,8,4\n"
+      "  diastole solve phantom-a.study.toml --pressure-kPa 6 --mesh 8,8,4 -o gel.vtkhdf -o gel.csv\n"
+      "  diastole solve phantom-a.study.toml --frames -o gel.vtkhdf\n"
       "A parameter has its `start` value unless --set gives another.\n"
       "Exit code 1: no equilibrium was found; the message says where the solver stopped and why.");
   command->add_option("STUDY", arguments->study, "study file (*.study.toml)")->required();
-  command->add_option("--pressure-kPa", arguments->pressure_kPa, "cavity pressure above the outside")
-      ->required();
+  command->add_option("--pressure-kPa", arguments->pressure_kPa, "cavity pressure above the outside");
+  command->add_flag("--frames", arguments->frames,
+                    "solve for all frames of the study instead, one after the other");
   command
       ->add_option("--probe", arguments->probes,
                    "X,Y,Z of a material point in mm, undeformed; may be repeated")
@@ -190,6 +266,7 @@ void add_solve(CommandLine& line) {
   command->add_option("--set", arguments->starts, "NAME=VALUE: another parameter value; may be repeated")
       ->allow_extra_args(false);
   command->add_option("--mesh", arguments->mesh, "elements around, along, through the wall, as 8,8,4");
+  add_output_options(*command, arguments->outputs);
   line.on_run(command, [arguments](const CommandOutput& out) { return run_solve(*arguments, out); });
 }
 

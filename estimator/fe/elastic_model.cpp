@@ -54,6 +54,7 @@ size_t ElasticModel::dofs() const { return system_->equations().unknowns(); }
 size_t ElasticModel::displacement_dofs() const { return system_->equations().displacement_unknowns(); }
 size_t ElasticModel::pressure_dofs() const { return system_->equations().pressure_unknowns(); }
 ElasticSystem& ElasticModel::system() { return *system_; }
+const ElasticSystem& ElasticModel::system() const { return *system_; }
 
 void ElasticModel::set_parameter(size_t parameter, double value) {
   for (size_t e = 0; e < mesh().element_count(); ++e)

@@ -105,8 +105,9 @@ class ElasticModel {
   /// Integral of W over the body, mJ (kPa mL).
   [[nodiscard]] double stored_energy_mJ(const ElasticState& state) const;
 
-  /// The discrete equations themselves, for verification.
+  /// The discrete equations themselves, for verification and for what is derived from a solution.
   [[nodiscard]] ElasticSystem& system();
+  [[nodiscard]] const ElasticSystem& system() const;
 
  private:
   std::unique_ptr<ElasticSystem> system_;

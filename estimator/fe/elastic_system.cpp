@@ -14,6 +14,7 @@ ElasticSystem::ElasticSystem(HermiteMesh mesh, const Law& law, const SystemOptio
       pressures_(make_pressure_map(mesh_, options.pressure_space)),
       equations_(mesh_, options.held, pressures_),
       loaded_(options.loaded),
+      material_axes_(options.material_axes),
       volume_stiffness_kPa_(options.volume_stiffness_kPa),
       threads_(options.threads),
       factor_(equations_.unknowns(), equations_.rows(), equations_.columns()) {

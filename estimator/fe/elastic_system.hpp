@@ -41,6 +41,9 @@ class ElasticSystem {
   [[nodiscard]] const HermiteMesh& mesh() const { return mesh_; }
   [[nodiscard]] const Law& law() const { return *law_; }
   [[nodiscard]] const EquationSystem& equations() const { return equations_; }
+  [[nodiscard]] const PressureMap& pressures() const { return pressures_; }
+  [[nodiscard]] const MaterialAxesField& material_axes() const { return material_axes_; }
+  [[nodiscard]] double volume_stiffness_kPa() const { return volume_stiffness_kPa_; }
   [[nodiscard]] std::span<double> parameters(size_t element) {
     return {&parameters_[element * count_], count_};
   }
@@ -81,6 +84,7 @@ class ElasticSystem {
   PressureMap pressures_;
   EquationSystem equations_;
   std::vector<ElementFace> loaded_;
+  MaterialAxesField material_axes_;
   double volume_stiffness_kPa_;
   size_t threads_;
   std::vector<ReferenceElement> reference_;

@@ -164,6 +164,15 @@ Study read_study(const std::filesystem::path& path) {
   return study;
 }
 
+std::vector<std::filesystem::path> inputs_of(const Study& study) {
+  std::vector<std::filesystem::path> inputs = study.data.runs;
+  inputs.push_back(study.file);
+  for (const auto& data : {study.data.tags, study.data.points, study.data.frames}) {
+    if (data) inputs.push_back(*data);
+  }
+  return inputs;
+}
+
 void set_start(Study& study, std::string_view assignment) {
   const size_t equals = assignment.find('=');
   double value = 0;

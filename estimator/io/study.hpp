@@ -81,6 +81,9 @@ struct Study {
 /// of its range, a start outside its bounds, or tags/points without frames.
 Study read_study(const std::filesystem::path& path);
 
+/// The study file and every file that it names: what a command must not overwrite.
+std::vector<std::filesystem::path> inputs_of(const Study& study);
+
 /// `--set C1_kPa=7.5`: another start value. Throws InputError if the parameter is unknown or out of its
 /// bounds.
 void set_start(Study& study, std::string_view assignment);

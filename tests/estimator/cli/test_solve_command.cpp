@@ -11,6 +11,7 @@
 
 #include "protocol/contract/input_error.hpp"
 #include "tests/estimator/cli/run_command.hpp"
+#include "tests/estimator/io/scratch_file.hpp"
 
 namespace diastole {
 namespace {
@@ -94,6 +95,55 @@ TEST_F(SolveCommand, TellsAPersonInWords) {
   EXPECT_EQ(outcome.code, ExitCode::done);
   EXPECT_THAT(outcome.output, testing::HasSubstr("At 2 kPa the cavity has taken"));
   EXPECT_THAT(outcome.output, testing::HasSubstr("X = (30, 0, 0) mm moved by ("));
+}
+
+TEST_F(SolveCommand, TellsStrainAndStressAtAProbe) {
+  const auto json =
+      nlohmann::json::parse(run({"--pressure-kPa", "6", "--probe", "22.5,0,0", "--json"}).output);
+  const auto& fields = json["probes"][0]["fields"];
+  EXPECT_NEAR(fields["stress_rr_kPa"].get<double>(), -6.0, 0.2);
+  EXPECT_NEAR(fields["stress_cc_kPa"].get<double>(), 9.6, 0.2);
+  const double u_mm = json["probes"][0]["displacement_mm"][0];
+  const double stretch = 1.0 + u_mm / 22.5;
+  EXPECT_NEAR(fields["strain_cc"].get<double>(), 0.5 * (stretch * stretch - 1.0), 1e-3);
+  EXPECT_FALSE(fields.contains("stress_ff_kPa")) << "the gel has no fibres";
+}
+
+TEST_F(SolveCommand, WritesTheFilesThatAreAskedFor) {
+  const test::ScratchFolder folder;
+  const std::string grid = (folder.path() / "gel.vtkhdf").string();
+  const std::string table = (folder.path() / "gel.csv").string();
+  const std::vector<std::string> arguments{"--pressure-kPa", "2", "--mesh", "4,1,1", "-o", grid, "-o", table};
+  EXPECT_THAT(run(arguments).output, testing::HasSubstr("Written: " + grid));
+  EXPECT_GT(std::filesystem::file_size(grid), 0);
+  EXPECT_GT(std::filesystem::file_size(table), 0);
+  EXPECT_EQ(run(arguments).code, ExitCode::done) << "earlier results are replaced";
+  EXPECT_THAT(refusal({"--pressure-kPa", "2", "-o", "gel.vtu"}),
+              testing::HasSubstr(".vtkhdf (for ParaView)"));
+  std::ofstream(table) << "a table of mine";
+  EXPECT_THAT(refusal(arguments), testing::HasSubstr("gel.csv"));
+}
+
+TEST_F(SolveCommand, FollowsTheStudysFrames) {
+  const test::ScratchFolder folder;
+  write_study(std::string(gel_study) + "frames = \"" +
+              folder
+                  .write("gel.frames.csv",
+                         "frame,time_s,pressure_kPa,sigma_kPa\n0,0,0,0\n1,0.2,1,0.1\n2,0.4,2.5,0.1\n")
+                  .string() +
+              "\"\n");
+  const std::string grid = (folder.path() / "gel.vtkhdf").string();
+  const auto json = nlohmann::json::parse(run({"--frames", "--mesh", "4,1,1", "-o", grid, "--json"}).output);
+  ASSERT_EQ(json["frames"].size(), 3U);
+  EXPECT_NEAR(json["frames"][0]["cavity_volume_change_mL"].get<double>(), 0.0, 1e-9);
+  EXPECT_EQ(json["frames"][2]["time_s"], 0.4);
+  EXPECT_EQ(json["frames"][2]["cavity_volume_change_mL"], json["cavity_volume_change_mL"]);
+  EXPECT_EQ(json["pressure_kPa"], 2.5);
+  EXPECT_EQ(json["files"][0], grid);
+  EXPECT_THAT(refusal({"--frames", "--pressure-kPa", "2"}), testing::HasSubstr("beside --frames"));
+  EXPECT_THAT(refusal({}), testing::HasSubstr("--pressure-kPa"));
+  write_study(gel_study);
+  EXPECT_THAT(refusal({"--frames"}), testing::HasSubstr("data.frames"));
 }
 
 TEST_F(SolveCommand, NoEquilibriumIsANegativeAnswerWithAReason) {

@@ -1,0 +1,96 @@
+#include "estimator/solution/solution_grid.hpp"
+
+#include <string>
+#include <utility>
+
+#include "estimator/fe/elastic_system.hpp"
+#include "estimator/fe/gauss_points.hpp"
+#include "estimator/fe/point_fields.hpp"
+#include "estimator/mesh/bezier.hpp"
+
+namespace diastole {
+namespace {
+
+/// Adds an element's control values, row = control point, to an array in VTK's order.
+void append(const Eigen::MatrixXd& control, std::vector<double>& values) {
+  const auto width = static_cast<size_t>(control.cols());
+  const size_t start = values.size();
+  values.resize(start + bezier_points * width);
+  for (size_t i = 0; i < bezier_points; ++i) {
+    const size_t row = start + width * vtk_place_of(i & 3, (i >> 2) & 3, i >> 4);
+    for (size_t j = 0; j < width; ++j)
+      values[row + j] = control(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j));
+  }
+}
+
+/// What is sampled at a Gauss point, one array after the other.
+Eigen::VectorXd sampled(const PointFields& fields) {
+  std::vector<double> values;
+  for (const Eigen::Matrix3d& tensor : {fields.stress_kPa, fields.green_strain}) {
+    const SymmetricTensor<double> entries = symmetric_part(tensor);
+    values.insert(values.end(), entries.begin(), entries.end());
+  }
+  if (fields.fibre) {
+    const Eigen::Vector3d fibre = fields.fibre->reference.col(0);
+    values.insert(values.end(), fibre.begin(), fibre.end());
+  }
+  const std::vector<double> scalars = scalar_fields(fields);
+  values.insert(values.end(), scalars.begin(), scalars.end());
+  return Eigen::Map<const Eigen::VectorXd>(values.data(), static_cast<Eigen::Index>(values.size()));
+}
+
+std::vector<GridArray> sampled_arrays(bool fibres) {
+  std::vector<GridArray> arrays{{"cauchy_stress_kPa", 6, {}}, {"green_strain", 6, {}}};
+  if (fibres) arrays.push_back({"fibre_direction", 3, {}});
+  for (std::string& name : scalar_field_names(fibres))
+    arrays.push_back({std::move(name), 1, {}});
+  return arrays;
+}
+
+GridStep step_of(const ElasticModel& model, const SolvedFrame& frame) {
+  const HermiteMesh& mesh = model.mesh();
+  const ElasticSystem& system = model.system();
+  GridArray displacement{"displacement_mm", 3, {}};
+  std::vector<GridArray> arrays = sampled_arrays(static_cast<bool>(system.material_axes()));
+  const std::array<double, 4> places = line_rule_4().place;
+  for (size_t e = 0; e < mesh.element_count(); ++e) {
+    const ElementField moved = mesh.gather(e, frame.state.position_mm) - mesh.gather(e, mesh.reference());
+    append(bezier_of(moved).transpose(), displacement.values);
+    Eigen::MatrixXd samples;
+    for (size_t q = 0; q < gauss_points; ++q) {
+      const Eigen::VectorXd row = sampled(point_fields(system, frame.state, {e, gauss_tables().xi[q]}));
+      if (q == 0) samples.resize(gauss_points, row.size());
+      samples.row(static_cast<Eigen::Index>(q)) = row;
+    }
+    const Eigen::MatrixXd control = bezier_through(places, samples);
+    Eigen::Index column = 0;
+    for (GridArray& array : arrays) {
+      const auto width = static_cast<Eigen::Index>(array.components);
+      append(control.middleCols(column, width), array.values);
+      column += width;
+    }
+  }
+  arrays.insert(arrays.begin(), std::move(displacement));
+  return {frame.time_s, std::move(arrays), {{"pressure_kPa", 1, {frame.state.pressure_kPa}}}};
+}
+
+}  // namespace
+
+BezierGrid solution_grid(const ElasticModel& model, std::span<const SolvedFrame> frames) {
+  const HermiteMesh& mesh = model.mesh();
+  BezierGrid grid;
+  grid.cell_data.push_back({"element", 1, {}});
+  for (const LawParameter& parameter : model.law().parameters())
+    grid.cell_data.push_back({std::string(parameter.name), 1, {}});
+  for (size_t e = 0; e < mesh.element_count(); ++e) {
+    append(bezier_of(mesh.gather(e, mesh.reference())).transpose(), grid.points_mm);
+    grid.cell_data[0].values.push_back(static_cast<double>(e));
+    for (size_t i = 0; i < model.law().parameters().size(); ++i)
+      grid.cell_data[i + 1].values.push_back(model.element_parameter(i, e));
+  }
+  for (const SolvedFrame& frame : frames)
+    grid.steps.push_back(step_of(model, frame));
+  return grid;
+}
+
+}  // namespace diastole
