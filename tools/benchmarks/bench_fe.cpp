@@ -1,0 +1,163 @@
+// The forward solution of the gel annulus at 6 kPa against other programs, at equal accuracy, in one run.
+//
+//   tools/bench fe [--rounds N]      peers come from tools/setup --peers; an absent one is skipped visibly
+//
+// Each program climbs its ladder of meshes. Its mesh is the coarsest one from which on all finer ones keep the
+// accuracy, so that an error that happens to change its sign does not count. Then all solve in turn, N times
+// over; medians are told.
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <exception>
+#include <filesystem>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "protocol/contract/exit_code.hpp"
+#include "tools/benchmarks/annulus_solver.hpp"
+
+namespace diastole {
+namespace {
+
+struct Accuracy {
+  const char* what;
+  std::function<double(const AnnulusAnswer&)> error;
+};
+
+constexpr double demanded = 1e-3;
+
+std::string name_of(const AnnulusElements& elements) {
+  return fmt::format("{}×{}×{}", elements[0], elements[1], elements[2]);
+}
+
+std::vector<AnnulusAnswer> climb(const AnnulusSolver& solver, const AnnulusWorkplace& place) {
+  fmt::print("\n{}: {}\n", solver.name, solver.discretisation);
+  std::vector<AnnulusAnswer> answers;
+  for (const AnnulusElements& elements : solver.ladder) {
+    const AnnulusAnswer& answer = answers.emplace_back(solve_annulus(solver, elements, place));
+    fmt::print("  {:<8} {:>7} unknowns   inner wall {:+.3f} %   worst of five radii {:+.3f} %\n",
+               name_of(elements), answer.unknowns, 100 * answer.inner_error(), 100 * answer.worst_error());
+    std::fflush(stdout);
+  }
+  return answers;
+}
+
+/// The coarsest mesh that keeps the accuracy together with all finer ones.
+std::optional<AnnulusElements> coarsest(const std::vector<AnnulusAnswer>& answers, const Accuracy& accuracy) {
+  std::optional<AnnulusElements> found;
+  for (auto answer = answers.rbegin(); answer != answers.rend(); ++answer) {
+    if (std::abs(accuracy.error(*answer)) > demanded) break;
+    found = answer->elements;
+  }
+  return found;
+}
+
+double median(std::vector<double> values) {
+  std::sort(values.begin(), values.end());
+  return values[values.size() / 2];
+}
+
+struct Racer {
+  const AnnulusSolver* solver;
+  AnnulusElements elements;
+  bool accurate;
+  std::vector<AnnulusAnswer> runs{};
+
+  [[nodiscard]] double middle(const std::function<double(const AnnulusAnswer&)>& figure) const {
+    std::vector<double> values;
+    for (const AnnulusAnswer& run : runs)
+      values.push_back(figure(run));
+    return median(values);
+  }
+};
+
+void print_race(const std::vector<Racer>& racers, const Accuracy& accuracy) {
+  fmt::print("\n{} within 0.1 % (medians of {})\n", accuracy.what, racers.front().runs.size());
+  fmt::print("{:<10}{:<10}{:>9}{:>9}{:>10}{:>10}{:>10}{:>10}{:>9}  {}\n", "", "mesh", "unknowns", "error %",
+             "solve s", "(cpu)", "whole s", "(cpu)", "peak MB", "Newton steps");
+  for (const Racer& racer : racers) {
+    const AnnulusAnswer& first = racer.runs.front();
+    fmt::print("{:<10}{:<10}{:>9}{:>+9.3f}{:>10.3f}{:>10.3f}{:>10.3f}{:>10.3f}{:>9.0f}  {}\n",
+               racer.solver->name, name_of(racer.elements), first.unknowns, 100 * accuracy.error(first),
+               racer.middle([](const auto& run) { return run.solve_wall_s; }),
+               racer.middle([](const auto& run) { return run.solve_processor_s; }),
+               racer.middle([](const auto& run) { return run.process.wall_s; }),
+               racer.middle([](const auto& run) { return run.process.processor_s; }),
+               racer.middle([](const auto& run) { return run.process.peak_MB; }), first.newton);
+  }
+  const Racer& own = racers.front();
+  for (size_t i = 1; i < racers.size(); ++i) {
+    const auto ratio = [&](const std::function<double(const AnnulusAnswer&)>& figure) {
+      return racers[i].middle(figure) / own.middle(figure);
+    };
+    fmt::print(
+        "Diastole is faster than {} by: solve {:.1f} (cpu {:.1f}), whole process {:.1f} (cpu {:.1f}){}\n",
+        racers[i].solver->name, ratio([](const auto& run) { return run.solve_wall_s; }),
+        ratio([](const auto& run) { return run.solve_processor_s; }),
+        ratio([](const auto& run) { return run.process.wall_s; }),
+        ratio([](const auto& run) { return run.process.processor_s; }),
+        racers[i].accurate ? "" : ", at least: it does not reach the accuracy on its finest mesh");
+  }
+}
+
+void race(const std::vector<const AnnulusSolver*>& solvers,
+          const std::vector<std::vector<AnnulusAnswer>>& answers, const Accuracy& accuracy, int rounds,
+          const AnnulusWorkplace& place) {
+  std::vector<Racer> racers;
+  for (size_t i = 0; i < solvers.size(); ++i) {
+    const std::optional<AnnulusElements> found = coarsest(answers[i], accuracy);
+    racers.push_back({solvers[i], found.value_or(solvers[i]->ladder.back()), found.has_value()});
+  }
+  for (int round = 0; round < rounds; ++round) {
+    for (Racer& racer : racers)
+      racer.runs.push_back(solve_annulus(*racer.solver, racer.elements, place));
+  }
+  print_race(racers, accuracy);
+}
+
+void compare(int rounds, const AnnulusWorkplace& place) {
+  const std::vector<AnnulusSolver> all = annulus_solvers(std::filesystem::read_symlink("/proc/self/exe"));
+  std::vector<const AnnulusSolver*> installed;
+  std::vector<std::vector<AnnulusAnswer>> answers;
+  fmt::print("Gel annulus, 6 kPa, C1 6.5 kPa, whole circumference, one thread each, meshes graded alike\n");
+  for (const AnnulusSolver& solver : all) {
+    if (!is_installed(solver, place)) {
+      fmt::print("\n{}: skipped, it is not installed (tools/setup --peers)\n", solver.name);
+      continue;
+    }
+    installed.push_back(&solver);
+    answers.push_back(climb(solver, place));
+  }
+  race(installed, answers, {"inner wall at the equator", &AnnulusAnswer::inner_error}, rounds, place);
+  race(installed, answers, {"all five radii", &AnnulusAnswer::worst_error}, rounds, place);
+}
+
+}  // namespace
+}  // namespace diastole
+
+int main(int argc, char** argv) {
+  CLI::App app("Times the forward solution of the gel annulus against other programs.");
+  int rounds = 3;
+  std::vector<std::string> one;
+  app.add_option("--rounds", rounds, "how often each program solves, in turn")->check(CLI::PositiveNumber);
+  app.add_option("--solve", one, "solve once on AROUND UP THROUGH elements and write RESULT.json")
+      ->expected(4);
+  CLI11_PARSE(app, argc, argv);
+  try {
+    if (!one.empty()) {
+      diastole::solve_annulus_here({std::stoul(one[0]), std::stoul(one[1]), std::stoul(one[2])}, one[3]);
+    } else {
+      diastole::compare(rounds, {std::filesystem::absolute("build/bench-fe"),
+                                 std::filesystem::absolute("tools/benchmarks/peers")});
+    }
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "bench_fe: {}\n", error.what());
+    return static_cast<int>(diastole::ExitCode::negative);
+  }
+}
