@@ -224,7 +224,7 @@ ExitCode run_solve(const SolveArguments& arguments, const CommandOutput& out) {
 
   std::vector<SolvedFrame> solved;
   const Solution solution = solve_all(model, loads, solved);
-  if (solution.report.converged()) write_outputs(arguments.outputs, model, solved);
+  if (solution.report.converged()) write_outputs(arguments.outputs, study, model, solved);
 
   nlohmann::ordered_json json = as_json(study, model, solution, probes, seconds_since(begun));
   for (const std::filesystem::path& file : arguments.outputs.files)

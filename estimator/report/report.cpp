@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "estimator/io/fit_file.hpp"
+#include "estimator/io/solution_file.hpp"
 #include "estimator/io/whole_file.hpp"
 #include "estimator/report/page.hpp"
 #include "estimator/report/sections.hpp"
@@ -33,6 +34,7 @@ std::string title_of(size_t estimates, size_t runs) {
 
 std::string make_report(std::span<const std::filesystem::path> files, const ReportOptions& options) {
   std::vector<FitRecord> fits;
+  std::vector<SolutionRecord> solutions;
   std::vector<ShearTest> shear_tests;
   std::vector<runfile::RecordedRun> runs;
   for (const std::filesystem::path& file : files) {
@@ -46,16 +48,25 @@ std::string make_report(std::span<const std::filesystem::path> files, const Repo
       continue;
     }
     if (!is_json_object(content)) {
-      throw InputError(
-          {file.string(), "", "is neither a run file nor a fit result nor a shear test",
-           "Give files that `diastole run`, `diastole simulate` or `diastole fit -o` wrote, or the "
-           "CSV that `diastole shear` reads."});
+      throw InputError({file.string(), "",
+                        "is neither a run file nor a fit result, a solution or a shear test",
+                        "Give files that `diastole run`, `diastole simulate`, `diastole fit -o` or `diastole "
+                        "solve -o NAME.json` "
+                        "wrote, or the CSV that `diastole shear` reads."});
+    }
+    if (is_solution(content)) {
+      solutions.push_back(solution_record_from_json(content, file.string()));
+      continue;
     }
     fits.push_back(fit_record_from_json(content, file.string()));
   }
-  Page page(title_of(fits.size() + shear_tests.size(), runs.size()));
+  const bool only_solutions = fits.empty() && shear_tests.empty() && runs.empty();
+  Page page(only_solutions ? "Strain and stress under load"
+                           : title_of(fits.size() + shear_tests.size(), runs.size()));
   for (const FitRecord& fit : fits)
     add_fit(page, fit);
+  for (const SolutionRecord& solution : solutions)
+    add_solution(page, solution);
   for (const ShearTest& test : shear_tests)
     add_shear(page, test, fit_shear(test));
   for (const runfile::RecordedRun& run : runs)

@@ -1,5 +1,5 @@
 #pragma once
-// The report: one self-contained page about any number of run files, fit results and shear tests.
+// The report: one self-contained page about any number of run files, fit results, solutions and shear tests.
 
 #include <cstddef>
 #include <filesystem>

@@ -2,6 +2,7 @@
 // What the report tells about each kind of file.
 
 #include "estimator/io/fit_file.hpp"
+#include "estimator/io/solution_file.hpp"
 #include "estimator/report/page.hpp"
 #include "estimator/shear/shear_fit.hpp"
 #include "protocol/runfile/run.hpp"
@@ -15,6 +16,9 @@ void add_run(Page& page, const runfile::RecordedRun& run, size_t frames);
 /// The parameters with their intervals, the specimen before and after, pressures, residuals, how the fit
 /// ended.
 void add_fit(Page& page, const FitRecord& fit);
+
+/// Sections coloured by strain and stress, undeformed and under load, and profiles through the wall.
+void add_solution(Page& page, const SolutionRecord& record);
 
 /// C1 of a rotational shear test, Eq. 1's two sides with the line, the residuals, each load by itself.
 void add_shear(Page& page, const ShearTest& test, const ShearFit& fit);

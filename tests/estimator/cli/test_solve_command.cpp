@@ -113,10 +113,13 @@ TEST_F(SolveCommand, WritesTheFilesThatAreAskedFor) {
   const test::ScratchFolder folder;
   const std::string grid = (folder.path() / "gel.vtkhdf").string();
   const std::string table = (folder.path() / "gel.csv").string();
-  const std::vector<std::string> arguments{"--pressure-kPa", "2", "--mesh", "4,1,1", "-o", grid, "-o", table};
+  const std::string record = (folder.path() / "gel.json").string();
+  const std::vector<std::string> arguments{
+      "--pressure-kPa", "2", "--mesh", "4,1,1", "-o", grid, "-o", table, "-o", record};
   EXPECT_THAT(run(arguments).output, testing::HasSubstr("Written: " + grid));
   EXPECT_GT(std::filesystem::file_size(grid), 0);
   EXPECT_GT(std::filesystem::file_size(table), 0);
+  EXPECT_EQ(nlohmann::json::parse(std::ifstream(record))["parameters"]["C1_kPa"], 6.5);
   EXPECT_EQ(run(arguments).code, ExitCode::done) << "earlier results are replaced";
   EXPECT_THAT(refusal({"--pressure-kPa", "2", "-o", "gel.vtu"}),
               testing::HasSubstr(".vtkhdf (for ParaView)"));

@@ -1,0 +1,173 @@
+#include "estimator/io/solution_file.hpp"
+
+#include <fmt/format.h>
+
+#include <charconv>
+#include <cmath>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+
+#include "protocol/contract/input_error.hpp"
+
+namespace diastole {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr int newest_version = 1;
+constexpr int drawn_digits = 6;  // significant ones; drawings need no more
+
+// JSON has no NaN: it is written as null, and null is read as NaN.
+Json from_numbers(const std::vector<double>& values) {
+  Json json = Json::array();
+  for (const double value : values) {
+    double rounded = value;
+    if (std::isfinite(value) && value != 0.0) {
+      const double power = std::pow(10.0, drawn_digits - 1 - std::floor(std::log10(std::abs(value))));
+      rounded = std::abs(value) < 1e-9 ? 0.0 : std::round(value * power) / power;
+    }
+    json.push_back(std::isfinite(value) ? Json(rounded) : Json(nullptr));
+  }
+  return json;
+}
+std::vector<double> to_numbers(const Json& json) {
+  std::vector<double> values;
+  for (const Json& value : json)
+    values.push_back(value.is_null() ? std::numeric_limits<double>::quiet_NaN() : value.get<double>());
+  return values;
+}
+
+Json from_fields(const std::vector<NamedField>& fields) {
+  Json json = Json::object();
+  for (const NamedField& field : fields)
+    json[field.name] = from_numbers(field.values);
+  return json;
+}
+std::vector<NamedField> to_fields(const Json& json, size_t count) {
+  std::vector<NamedField> fields;
+  for (const auto& [name, values] : json.items()) {
+    fields.push_back({name, to_numbers(values)});
+    if (fields.back().values.size() != count) throw std::invalid_argument(name + " has another length");
+  }
+  return fields;
+}
+
+Json from_cells(const std::vector<FlatPoints>& cells) {
+  Json json = Json::array();
+  for (const FlatPoints& cell : cells)
+    json.push_back(from_numbers(cell));
+  return json;
+}
+std::vector<FlatPoints> to_cells(const Json& json) {
+  std::vector<FlatPoints> cells;
+  for (const Json& cell : json)
+    cells.push_back(to_numbers(cell));
+  return cells;
+}
+
+Json from_section(const SolutionSection& section) {
+  return {{"title", section.title},
+          {"horizontal", section.horizontal},
+          {"vertical", section.vertical},
+          {"cells_before", from_cells(section.cells_before)},
+          {"cells_after", from_cells(section.cells_after)},
+          {"outline_before", from_numbers(section.outline_before)},
+          {"outline_after", from_numbers(section.outline_after)},
+          {"elements_before", from_numbers(section.elements_before)},
+          {"elements_after", from_numbers(section.elements_after)},
+          {"fields", from_fields(section.fields)}};
+}
+SolutionSection to_section(const Json& json) {
+  SolutionSection section{.title = json.at("title"),
+                          .horizontal = json.at("horizontal"),
+                          .vertical = json.at("vertical"),
+                          .cells_before = to_cells(json.at("cells_before")),
+                          .cells_after = to_cells(json.at("cells_after")),
+                          .outline_before = to_numbers(json.at("outline_before")),
+                          .outline_after = to_numbers(json.at("outline_after")),
+                          .elements_before = to_numbers(json.at("elements_before")),
+                          .elements_after = to_numbers(json.at("elements_after")),
+                          .fields = {}};
+  if (section.cells_before.size() != section.cells_after.size())
+    throw std::invalid_argument("cells_before and cells_after differ in number");
+  section.fields = to_fields(json.at("fields"), section.cells_before.size());
+  return section;
+}
+
+SolutionRecord to_record(const Json& json) {
+  SolutionRecord record;
+  record.study = json.at("study");
+  record.law = json.at("law");
+  for (const auto& [name, value] : json.at("parameters").items())
+    record.parameters.emplace_back(name, value.get<double>());
+  record.mesh = json.at("mesh").get<std::vector<int>>();
+  record.unknowns = json.at("unknowns");
+  record.pressure_kPa = json.at("pressure_kPa");
+  record.cavity_volume_mL = json.at("cavity_volume_mL");
+  record.cavity_volume_change_mL = json.at("cavity_volume_change_mL");
+  record.fibres = json.at("fibres");
+  for (const Json& section : json.at("sections"))
+    record.sections.push_back(to_section(section));
+  for (const Json& profile : json.at("profiles")) {
+    std::vector<double> depth_mm = to_numbers(profile.at("depth_mm"));
+    std::vector<NamedField> fields = to_fields(profile.at("fields"), depth_mm.size());
+    record.profiles.push_back({profile.at("title"), std::move(depth_mm), std::move(fields)});
+  }
+  return record;
+}
+
+}  // namespace
+
+std::string to_json(const SolutionRecord& record) {
+  Json json = {{"format", solution_file_mark}, {"format_version", newest_version}};
+  json["study"] = record.study;
+  json["law"] = record.law;
+  json["parameters"] = Json::object();
+  for (const auto& [name, value] : record.parameters)
+    json["parameters"][name] = value;
+  json["mesh"] = record.mesh;
+  json["unknowns"] = record.unknowns;
+  json["pressure_kPa"] = record.pressure_kPa;
+  json["cavity_volume_mL"] = record.cavity_volume_mL;
+  json["cavity_volume_change_mL"] = record.cavity_volume_change_mL;
+  json["fibres"] = record.fibres;
+  json["sections"] = Json::array();
+  for (const SolutionSection& section : record.sections)
+    json["sections"].push_back(from_section(section));
+  json["profiles"] = Json::array();
+  for (const SolutionProfile& profile : record.profiles) {
+    json["profiles"].push_back({{"title", profile.title},
+                                {"depth_mm", from_numbers(profile.depth_mm)},
+                                {"fields", from_fields(profile.fields)}});
+  }
+  return json.dump() + "\n";
+}
+
+bool is_solution(std::string_view text) {
+  constexpr size_t head = 200;
+  return text.substr(0, head).find(solution_file_mark) != std::string_view::npos;
+}
+
+SolutionRecord solution_record_from_json(std::string_view text, const std::string& file) {
+  const std::string remedy = "Give a file that `diastole solve STUDY -o NAME.json` wrote.";
+  try {
+    const Json json = Json::parse(text);
+    if (!json.is_object() || json.value("format", "") != solution_file_mark)
+      throw InputError({file, "key format", fmt::format("is not \"{}\"", solution_file_mark), remedy});
+    const int version = json.at("format_version");
+    if (version > newest_version) {
+      throw InputError(
+          {file, "key format_version",
+           fmt::format("version {} is newer than this program knows ({})", version, newest_version),
+           "Update the program."});
+    }
+    return to_record(json);
+  } catch (const nlohmann::json::exception& error) {
+    throw InputError({file, "", fmt::format("is not a solution: {}", error.what()), remedy});
+  } catch (const std::invalid_argument& error) {
+    throw InputError({file, "", fmt::format("is not a solution: {}", error.what()), remedy});
+  }
+}
+
+}  // namespace diastole

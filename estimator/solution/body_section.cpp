@@ -1,0 +1,197 @@
+#include "estimator/solution/body_section.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numbers>
+#include <optional>
+#include <utility>
+
+namespace diastole {
+namespace {
+
+constexpr double most_bricks = 32;  // of an element along one direction
+
+/// So many along each direction, however thin an element is: a wall of one element is not of one colour.
+double least_bricks(const HermiteMesh& mesh) {
+  constexpr double coarse_mesh = 6.0;
+  constexpr double bricks_in_all = 40000.0;
+  return std::clamp(std::floor(std::cbrt(bricks_in_all / static_cast<double>(mesh.element_count()))), 1.0,
+                    coarse_mesh);
+}
+
+/// Each face of an element: how many elements meet there. Coincident nodes count as one.
+class FaceCount {
+ public:
+  explicit FaceCount(const HermiteMesh& mesh) : mesh_(mesh) {
+    for (size_t e = 0; e < mesh.element_count(); ++e) {
+      for (size_t k = 0; k < 3; ++k) {
+        for (size_t side = 0; side < 2; ++side)
+          ++count_[places_of({e, k, side})];
+      }
+    }
+  }
+  [[nodiscard]] bool outside(const ElementFace& face) const { return count_.at(places_of(face)) == 1; }
+
+ private:
+  [[nodiscard]] std::array<size_t, 4> places_of(const ElementFace& face) const {
+    std::array<size_t, 4> places = face_corners(face);
+    for (size_t& place : places)
+      place = mesh_.place_of(mesh_.element(face.element)[place]);
+    std::sort(places.begin(), places.end());
+    return places;
+  }
+
+  const HermiteMesh& mesh_;
+  std::map<std::array<size_t, 4>, int> count_;
+};
+
+std::array<size_t, 3> bricks_of(const HermiteMesh& mesh, size_t element, double cell_mm) {
+  std::array<double, 3> length_mm{};
+  for (size_t sample = 0; sample < 27; ++sample) {
+    const auto place = [](size_t digit) { return 0.5 * static_cast<double>(digit); };
+    const Eigen::Matrix3d tangents = mesh.xi_gradient(
+        mesh.reference(), {element, {place(sample % 3), place(sample / 3 % 3), place(sample / 9)}});
+    for (size_t k = 0; k < 3; ++k)
+      length_mm[k] = std::max(length_mm[k], tangents.col(static_cast<Eigen::Index>(k)).norm());
+  }
+  std::array<size_t, 3> bricks{};
+  for (size_t k = 0; k < 3; ++k)
+    bricks[k] =
+        static_cast<size_t>(std::clamp(std::ceil(length_mm[k] / cell_mm), least_bricks(mesh), most_bricks));
+  return bricks;
+}
+
+/// One element's grid of bricks with the signed distances of its corners from the plane.
+class BrickGrid {
+ public:
+  BrickGrid(const HermiteMesh& mesh, const SectionPlane& plane, size_t element, double cell_mm)
+      : mesh_(mesh), plane_(plane), element_(element), bricks_(bricks_of(mesh, element, cell_mm)) {
+    const Eigen::Vector3d normal = plane.horizontal.cross(plane.vertical);
+    for (size_t i3 = 0; i3 <= bricks_[2]; ++i3) {
+      for (size_t i2 = 0; i2 <= bricks_[1]; ++i2) {
+        for (size_t i1 = 0; i1 <= bricks_[0]; ++i1) {
+          const Eigen::Vector3d place_mm = mesh.value(mesh.reference(), {element, xi_at({i1, i2, i3})});
+          distance_mm_.push_back(normal.dot(place_mm - plane.origin_mm));
+        }
+      }
+    }
+  }
+
+  [[nodiscard]] const std::array<size_t, 3>& bricks() const { return bricks_; }
+
+  /// The polygon in which the plane cuts a brick; empty if it does not.
+  [[nodiscard]] std::vector<Xi> cut(const std::array<size_t, 3>& brick) const {
+    std::vector<Xi> corners_xi;
+    for (size_t corner = 0; corner < 8; ++corner) {
+      for (size_t k = 0; k < 3; ++k) {
+        const size_t other = corner | (size_t{1} << k);
+        if (other == corner) continue;
+        if (const std::optional<Xi> xi = crossing(at(brick, corner), at(brick, other)))
+          corners_xi.push_back(*xi);
+      }
+    }
+    if (corners_xi.size() < 3) return {};
+    sort_around(corners_xi);
+    return corners_xi;
+  }
+
+ private:
+  static std::array<size_t, 3> at(std::array<size_t, 3> brick, size_t corner) {
+    for (size_t k = 0; k < 3; ++k)
+      brick[k] += (corner >> k) & 1;
+    return brick;
+  }
+  [[nodiscard]] Xi xi_at(const std::array<size_t, 3>& i) const {
+    Xi xi{};
+    for (size_t k = 0; k < 3; ++k)
+      xi[k] = static_cast<double>(i[k]) / static_cast<double>(bricks_[k]);
+    return xi;
+  }
+  [[nodiscard]] double distance_at(const std::array<size_t, 3>& i) const {
+    return distance_mm_[i[0] + (bricks_[0] + 1) * (i[1] + (bricks_[1] + 1) * i[2])];
+  }
+  [[nodiscard]] std::optional<Xi> crossing(const std::array<size_t, 3>& from,
+                                           const std::array<size_t, 3>& to) const {
+    const double low = distance_at(from);
+    const double high = distance_at(to);
+    if ((low < 0.0) == (high < 0.0)) return {};
+    const double fraction = low / (low - high);
+    const Xi start = xi_at(from);
+    const Xi end = xi_at(to);
+    Xi xi{};
+    for (size_t k = 0; k < 3;
+         ++k)  // exact where start and end agree: whether xi lies on a face is asked later
+      xi[k] = start[k] == end[k] ? start[k] : std::lerp(start[k], end[k], fraction);
+    return xi;
+  }
+  void sort_around(std::vector<Xi>& corners_xi) const {
+    std::vector<std::pair<double, Xi>> around;
+    std::vector<Eigen::Vector2d> flat;
+    Eigen::Vector2d centre = Eigen::Vector2d::Zero();
+    for (const Xi& xi : corners_xi) {
+      const Eigen::Vector3d place_mm = mesh_.value(mesh_.reference(), {element_, xi}) - plane_.origin_mm;
+      flat.emplace_back(plane_.horizontal.dot(place_mm), plane_.vertical.dot(place_mm));
+      centre += flat.back() / static_cast<double>(corners_xi.size());
+    }
+    for (size_t i = 0; i < flat.size(); ++i)
+      around.emplace_back(std::atan2(flat[i][1] - centre[1], flat[i][0] - centre[0]), corners_xi[i]);
+    std::sort(around.begin(), around.end());
+    for (size_t i = 0; i < flat.size(); ++i)
+      corners_xi[i] = around[i].second;
+  }
+
+  const HermiteMesh& mesh_;
+  const SectionPlane& plane_;
+  size_t element_;
+  std::array<size_t, 3> bricks_;
+  std::vector<double> distance_mm_;
+};
+
+/// The cell's edges that lie on faces of its element join the outline or the lines between elements.
+void add_lines(const SectionCell& cell, const FaceCount& faces, BodySection& section) {
+  for (size_t i = 0; i < cell.corners.size(); ++i) {
+    const Xi& from = cell.corners[i];
+    const Xi& to = cell.corners[(i + 1) % cell.corners.size()];
+    for (size_t k = 0; k < 3; ++k) {
+      for (size_t side = 0; side < 2; ++side) {
+        const double end = static_cast<double>(side);
+        if (from[k] != end || to[k] != end) continue;
+        const MaterialLine line{{{cell.element, from}, {cell.element, to}}};
+        (faces.outside({cell.element, k, side}) ? section.outline : section.elements).push_back(line);
+      }
+    }
+  }
+}
+
+}  // namespace
+
+MaterialPoint SectionCell::centre() const {
+  Xi mean{};
+  for (const Xi& corner : corners) {
+    for (size_t k = 0; k < 3; ++k)
+      mean[k] += corner[k] / static_cast<double>(corners.size());
+  }
+  return {element, mean};
+}
+
+BodySection cut_body(const HermiteMesh& mesh, const SectionPlane& plane, double cell_mm) {
+  // Off any face that lies in the plane up to rounding, so that one side's elements are cut as a whole.
+  SectionPlane shifted = plane;
+  shifted.origin_mm -= 1e-6 * mesh.extent_mm() * plane.horizontal.cross(plane.vertical);
+  const FaceCount faces(mesh);
+  BodySection section;
+  for (size_t e = 0; e < mesh.element_count(); ++e) {
+    const BrickGrid grid(mesh, shifted, e, cell_mm);
+    const auto [n1, n2, n3] = grid.bricks();
+    for (size_t brick = 0; brick < n1 * n2 * n3; ++brick) {
+      SectionCell cell{e, grid.cut({brick % n1, brick / n1 % n2, brick / (n1 * n2)})};
+      if (cell.corners.empty()) continue;
+      add_lines(cell, faces, section);
+      section.cells.push_back(std::move(cell));
+    }
+  }
+  return section;
+}
+
+}  // namespace diastole
