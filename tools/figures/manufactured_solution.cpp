@@ -6,6 +6,7 @@
 
 #include "estimator/fe/elastic_system.hpp"
 #include "estimator/mesh/block.hpp"
+#include "tools/figures/mixed_derivatives.hpp"
 
 namespace diastole {
 namespace {
@@ -14,59 +15,16 @@ using Eigen::Index;
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-/// A number with its mixed derivatives: part[d1 + 2 d2 + 4 d3] = d^(d1+d2+d3) / dX^d1 dY^d2 dZ^d3, d_k = 0 or 1.
-struct Mixed {
-  std::array<double, 8> part{};
-
-  static Mixed variable(double value, size_t direction) {
-    Mixed x;
-    x.part[0] = value;
-    x.part[size_t{1} << direction] = 1.0;
-    return x;
-  }
-};
-
-Mixed operator+(Mixed a, const Mixed& b) {
-  for (size_t m = 0; m < 8; ++m)
-    a.part[m] += b.part[m];
-  return a;
-}
-
-Mixed operator*(double factor, Mixed a) {
-  for (double& part : a.part)
-    part *= factor;
-  return a;
-}
-
-Mixed operator*(const Mixed& a, const Mixed& b) {
-  Mixed product;
-  for (size_t m = 0; m < 8; ++m) {
-    for (size_t n = 0; n < 8; ++n) {
-      if ((m & n) == 0) product.part[m | n] += a.part[m] * b.part[n];
-    }
-  }
-  return product;
-}
-
-Mixed sin(const Mixed& a) {
-  Mixed rest = a;
-  rest.part[0] = 0.0;
-  const Mixed square = rest * rest;
-  const double s = std::sin(a.part[0]);
-  const double c = std::cos(a.part[0]);
-  Mixed result = c * rest + (-0.5 * s) * square + (-c / 6.0) * (square * rest);
-  result.part[0] = s;
-  return result;
-}
-
-std::array<Mixed, 3> deformed(const Vector3d& reference) {
-  const Mixed big_x = Mixed::variable(reference[0], 0);
-  const Mixed big_y = Mixed::variable(reference[1], 1);
-  const Mixed big_z = Mixed::variable(reference[2], 2);
+std::array<Mixed, 3> deformed(const std::array<Mixed, 3>& reference) {
+  const auto& [big_x, big_y, big_z] = reference;
   const Mixed x = big_x + 0.12 * sin(2.0 * big_y + big_z);
   const Mixed y = big_y + 0.1 * sin(2.0 * x + -1.0 * big_z);
   const Mixed z = big_z + 0.1 * sin(x + 2.0 * y);
   return {x, y, z};
+}
+
+std::array<Mixed, 3> deformed(const Vector3d& at) {
+  return deformed({Mixed::variable(at[0], 0), Mixed::variable(at[1], 1), Mixed::variable(at[2], 2)});
 }
 
 Matrix3d deformation_gradient(const Vector3d& reference) {
@@ -100,23 +58,6 @@ Matrix3d exact_stress_kPa(const ManufacturedCase& made_up, const Vector3d& at) {
       full_matrix(made_up.law->stress(symmetric_part(in_axes.transpose() * in_axes), made_up.parameters));
   return f * axes * s * axes.transpose() -
          exact_pressure_kPa(made_up, at) * f.determinant() * f.inverse().transpose();
-}
-
-/// Values and mixed derivatives at the nodes of an ungraded block.
-NodeField exact_positions(const HermiteMesh& mesh) {
-  NodeField field(mesh.reference().size());
-  for (size_t node = 0; node < mesh.node_count(); ++node) {
-    const std::array<Mixed, 3> x = deformed(Vector3d(&mesh.reference()[dof_of(node, 0, 0)]));
-    for (size_t d = 0; d < nodal_derivatives; ++d) {
-      double chain = 1.0;
-      for (size_t k = 0; k < 3; ++k) {
-        if ((d >> k & 1) != 0) chain *= mesh.reference()[dof_of(node, size_t{1} << k, k)];
-      }
-      for (size_t i = 0; i < 3; ++i)
-        field[dof_of(node, d, i)] = chain * x[i].part[d];
-    }
-  }
-  return field;
 }
 
 /// Visits the 5x5x5 Gauss points of every element: visit(point, reference place, volume weight).
@@ -241,7 +182,8 @@ ManufacturedErrors solve_manufactured(const ManufacturedCase& made_up, size_t n)
   };
   ElasticSystem system(std::move(mesh), *made_up.law, options);
   ElasticState state = system.rest_state();
-  state.position_mm = exact_positions(system.mesh());
+  state.position_mm =
+      mapped(system.mesh(), [](const std::array<Mixed, 3>& reference) { return deformed(reference); });
   ManufacturedErrors errors;
   errors.unknowns = system.equations().unknowns();
   errors.pressure_unknowns = system.equations().pressure_unknowns();

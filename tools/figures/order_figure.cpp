@@ -21,14 +21,15 @@ constexpr std::array<size_t, 5> meshes{2, 3, 4, 6, 8};
 
 struct Measure {
   const char* name;
+  const char* label;
   double ManufacturedErrors::*error;
 };
 
 constexpr std::array<Measure, 4> measures{
-    {{"u in L2, mm", &ManufacturedErrors::displacement_L2_mm},
-     {"u in H1", &ManufacturedErrors::displacement_H1},
-     {"p in L2, kPa", &ManufacturedErrors::pressure_L2_kPa},
-     {"p averaged, kPa", &ManufacturedErrors::averaged_pressure_L2_kPa}}};
+    {{"u in L2, mm", "u, L2", &ManufacturedErrors::displacement_L2_mm},
+     {"u in H1", "u, H1", &ManufacturedErrors::displacement_H1},
+     {"p in L2, kPa", "p", &ManufacturedErrors::pressure_L2_kPa},
+     {"p averaged, kPa", "mean p", &ManufacturedErrors::averaged_pressure_L2_kPa}}};
 
 std::vector<ManufacturedErrors> solve_and_print(const ManufacturedCase& made_up) {
   std::vector<ManufacturedErrors> errors;
