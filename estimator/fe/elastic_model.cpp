@@ -36,10 +36,15 @@ ElasticModel::ElasticModel(HermiteMesh mesh, const Law& law, ElasticOptions opti
   SystemOptions system;
   system.parameters = std::move(options.parameters);
   system.pressure_space = options.pressure_space;
-  system.held = options.held ? *options.held : bonded_ends(mesh);
+  system.held = options.held             ? *options.held
+                : options.bonded.empty() ? bonded_ends(mesh)
+                                         : hold_nothing(mesh);
+  system.bonded = std::move(options.bonded);
+  system.chamber = options.chamber;
   system.loaded = options.loaded ? *options.loaded : mesh.faces().inner;
   system.material_axes = std::move(options.material_axes);
   system.volume_stiffness_kPa = options.volume_stiffness_kPa;
+  system.compressibility_per_kPa = options.bulk_modulus_kPa ? 1.0 / *options.bulk_modulus_kPa : 0.0;
   system.threads = options.threads > 0 ? options.threads : std::max(1U, std::thread::hardware_concurrency());
   system_ = std::make_unique<ElasticSystem>(std::move(mesh), law, system);
 }
@@ -82,7 +87,9 @@ Solution ElasticModel::solve(const Load& load, const ElasticState& start) {
   return {std::move(path.state), std::move(path.report)};
 }
 
-Sensitivities ElasticModel::sensitivities(const ElasticState& state, std::span<const ParameterGroup> groups) {
+Sensitivities ElasticModel::sensitivities(const ElasticState& at, std::span<const ParameterGroup> groups) {
+  ElasticState state = at;
+  state.held_volume_mm3.reset();
   const size_t unknowns = dofs();
   std::vector<double> right_sides((groups.size() + 1) * unknowns, 0.0);
   const auto column = [&](size_t number) {
@@ -96,7 +103,9 @@ Sensitivities ElasticModel::sensitivities(const ElasticState& state, std::span<c
       value = -value;
   }
   Sensitivities result;
-  result.negative_pivots = system_->factorise(state).negative_pivots;
+  if (!system_->rim_skew().empty()) result.negative_pivots = system_->negative_pivots(state);
+  const FactorResult factor = system_->factorise(state);
+  if (system_->rim_skew().empty()) result.negative_pivots = factor.negative_pivots;
   system_->solve(right_sides, groups.size() + 1);
   result.pressure = system_->node_field(column(0));
   for (size_t g = 0; g < groups.size(); ++g)
@@ -109,7 +118,18 @@ double ElasticModel::cavity_volume_mL(const ElasticState& state) const {
 }
 
 double ElasticModel::stored_energy_mJ(const ElasticState& state) const {
-  return mJ_per_uJ * system_->residual(state).energy_uJ;
+  const SystemResidual residual = system_->residual(state);
+  return mJ_per_uJ * (residual.energy_uJ + residual.bond_energy_uJ);
+}
+
+double ElasticModel::cavity_stiffness_kPa_per_mL(const ElasticState& at) {
+  ElasticState state = at;
+  state.held_volume_mm3 = system_->cavity_volume_mm3(at);
+  std::vector<double> change(system_->equations().unknowns(true), 0.0);
+  change.back() = -1.0;  // minus the derivative of the volume's equation with respect to the volume
+  system_->factorise(state);
+  system_->solve(change);
+  return change.back() / mL_per_mm3;
 }
 
 }  // namespace diastole

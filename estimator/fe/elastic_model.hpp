@@ -22,10 +22,12 @@
 #include <span>
 #include <vector>
 
+#include "estimator/fe/chamber.hpp"
 #include "estimator/fe/elastic_state.hpp"
 #include "estimator/fe/element_mechanics.hpp"
 #include "estimator/fe/pressure_space.hpp"
 #include "estimator/fe/solve_report.hpp"
+#include "estimator/fe/spring_bond.hpp"
 #include "estimator/fe/supports.hpp"
 #include "estimator/materials/law.hpp"
 #include "estimator/mesh/hermite_mesh.hpp"
@@ -37,11 +39,14 @@ class ElasticSystem;
 struct ElasticOptions {
   std::vector<double> parameters{};  ///< the law's, in its order; the same in all elements
   PressureSpace pressure_space = PressureSpace::per_element;
-  std::optional<HeldDofs> held{};  ///< default: bottom and top faces bonded
+  std::optional<HeldDofs> held{};  ///< default: bottom and top faces held, or nothing if some are on springs
+  std::vector<BondedFaces> bonded{};  ///< faces on springs (spring_bond.hpp)
+  std::optional<Chamber> chamber{};   ///< around the outer faces (chamber.hpp)
   std::optional<std::vector<ElementFace>>
-      loaded{};                       ///< default: the inner faces; see cavity_load.hpp on free rims
-  MaterialAxesField material_axes{};  ///< default: the coordinate axes
-  double volume_stiffness_kPa = 0.0;  ///< kappa of element_mechanics.hpp
+      loaded{};                              ///< default: the inner faces; see fluid_surface.hpp on free rims
+  MaterialAxesField material_axes{};         ///< default: the coordinate axes
+  double volume_stiffness_kPa = 0.0;         ///< kappa of element_mechanics.hpp
+  std::optional<double> bulk_modulus_kPa{};  ///< K of element_mechanics.hpp; default: incompressible
   SolveOptions solve{};
   size_t threads = 0;  ///< 0: as many as the machine has
 };
@@ -94,15 +99,18 @@ class ElasticModel {
   /// Equilibrium at a cavity pressure, from rest or from an earlier state (of any pressure and parameters).
   [[nodiscard]] Solution solve(double pressure_kPa);
   [[nodiscard]] Solution solve(double pressure_kPa, const ElasticState& start);
-  /// The same with active tension; pressure and tension grow in proportion on the way.
+  /// The same for any load; pressure (or volume) and tension go from the start's to the load's in proportion.
+  /// Precondition: a volume is asked only of a closed cavity (ElasticSystem::cavity_closed).
   [[nodiscard]] Solution solve(const Load& load, const ElasticState& start);
 
-  /// Exact derivatives at a converged state: one factorisation, one back-substitution a group.
+  /// Exact derivatives at a converged state, at constant cavity pressure: one factorisation, one back-substitution a group.
   [[nodiscard]] Sensitivities sensitivities(const ElasticState& state,
                                             std::span<const ParameterGroup> groups);
 
   [[nodiscard]] double cavity_volume_mL(const ElasticState& state) const;
-  /// Integral of W over the body, mJ (kPa mL).
+  /// dP/dV of the closed cavity at an equilibrium; negative beyond a pressure maximum.
+  [[nodiscard]] double cavity_stiffness_kPa_per_mL(const ElasticState& state);
+  /// In the material (integral of W) and in springs, mJ (kPa mL).
   [[nodiscard]] double stored_energy_mJ(const ElasticState& state) const;
 
   /// The discrete equations themselves, for verification and for what is derived from a solution.

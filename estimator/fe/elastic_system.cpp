@@ -7,20 +7,62 @@
 
 namespace diastole {
 
+namespace {
+
+constexpr double mm3_per_mL = 1e3;
+
+EquationOptions equation_options(const HermiteMesh& mesh, const SystemOptions& options) {
+  EquationOptions equations;
+  equations.compressible = options.compressibility_per_kPa > 0.0;
+  if (options.chamber && options.chamber->sealed()) equations.fluids.push_back(mesh.faces().outer);
+  equations.fluids.push_back(options.loaded);
+  return equations;
+}
+
+std::vector<ElementFace> plates_of(const SystemOptions& options) {
+  std::vector<ElementFace> plates;
+  for (const BondedFaces& bonded : options.bonded)
+    plates.insert(plates.end(), bonded.faces.begin(), bonded.faces.end());
+  return plates;
+}
+
+/// Area vectors of a face's functions, as a field over its element.
+ElementField over_element(const ElementFace& face, const FaceField& on_face) {
+  const std::array<size_t, face_functions> functions = face_hermite_functions(face);
+  ElementField field = ElementField::Zero();
+  for (size_t a = 0; a < face_functions; ++a)
+    field.col(static_cast<Eigen::Index>(functions[a])) = on_face.col(static_cast<Eigen::Index>(a));
+  return field;
+}
+
+}  // namespace
+
 ElasticSystem::ElasticSystem(HermiteMesh mesh, const Law& law, const SystemOptions& options)
     : mesh_(std::move(mesh)),
       law_(&law),
       count_(law.parameters().size()),
       pressures_(make_pressure_map(mesh_, options.pressure_space)),
-      equations_(mesh_, options.held, pressures_),
-      loaded_(options.loaded),
+      held_(options.held),
+      cavity_(mesh_, options.loaded, options.held, plates_of(options)),
+      chamber_(options.chamber),
       material_axes_(options.material_axes),
       volume_stiffness_kPa_(options.volume_stiffness_kPa),
+      compressibility_per_kPa_(options.compressibility_per_kPa),
       threads_(options.threads),
-      factor_(equations_.unknowns(), equations_.rows(), equations_.columns()) {
+      equations_(mesh_, options.held, pressures_, equation_options(mesh_, options)),
+      skew_(equations_, cavity_.free_rim()),
+      factor_(equations_, skew_) {
   for (size_t e = 0; e < mesh_.element_count(); ++e) {
     parameters_.insert(parameters_.end(), options.parameters.begin(), options.parameters.end());
     reference_.push_back(make_reference_element(mesh_, e, options.material_axes));
+  }
+  if (chamber_) {
+    chamber_wall_ = FluidSurface(mesh_, mesh_.faces().outer, options.held, plates_of(options));
+    undeformed_chamber_mm3_ = chamber_wall_.volume_mm3(mesh_, mesh_.reference());
+  }
+  for (const BondedFaces& bonded : options.bonded) {
+    for (const ElementFace& face : bonded.faces)
+      springs_.push_back({face, bond_stiffness(mesh_, face, bonded.bond)});
   }
 }
 
@@ -29,10 +71,24 @@ ElementState ElasticSystem::element_state(const ElasticState& state, size_t elem
   local.position_mm = mesh_.gather(element, state.position_mm);
   local.fibre_tension_kPa = state.fibre_tension_kPa;
   local.volume_stiffness_kPa = volume_stiffness_kPa_;
+  local.compressibility_per_kPa = compressibility_per_kPa_;
+  local.rest_pressure_kPa = compressibility_per_kPa_ > 0.0 ? rest_pressure_kPa(element) : 0.0;
   for (size_t m = 0; m < corners; ++m) {
     local.pressure_kPa[m] = state.lagrange_pressure_kPa[pressures_.unknown[element][m]];
   }
   return local;
+}
+
+bool ElasticSystem::on_springs(const ElementFace& face) const {
+  return std::any_of(springs_.begin(), springs_.end(), [&](const SpringFace& spring) {
+    return spring.face.element == face.element && spring.face.direction == face.direction &&
+           spring.face.side == face.side;
+  });
+}
+
+double ElasticSystem::rest_pressure_kPa(size_t element) const {
+  constexpr SymmetricTensor<double> undeformed{1.0, 1.0, 1.0, 0.0, 0.0, 0.0};
+  return trace(law_->stress(undeformed, parameters(element))) / 3.0;
 }
 
 ElasticState ElasticSystem::rest_state() const {
@@ -40,9 +96,8 @@ ElasticState ElasticSystem::rest_state() const {
   state.position_mm = mesh_.reference();
   state.lagrange_pressure_kPa.assign(pressures_.count, 0.0);
   std::vector<double> sharers(pressures_.count, 0.0);
-  constexpr SymmetricTensor<double> undeformed{1.0, 1.0, 1.0, 0.0, 0.0, 0.0};
   for (size_t e = 0; e < mesh_.element_count(); ++e) {
-    const double mean_stress = trace(law_->stress(undeformed, parameters(e))) / 3.0;
+    const double mean_stress = rest_pressure_kPa(e);
     for (const size_t unknown : pressures_.unknown[e]) {
       state.lagrange_pressure_kPa[unknown] += mean_stress;
       sharers[unknown] += 1.0;
@@ -54,32 +109,33 @@ ElasticState ElasticSystem::rest_state() const {
 }
 
 double ElasticSystem::cavity_volume_mm3(const ElasticState& state) const {
-  double volume = 0.0;
-  for (const ElementFace& face : mesh_.faces().inner) {
-    volume += face_volume_mm3(face, mesh_.gather(face.element, state.position_mm));
+  return cavity_.closed() ? cavity_.volume_mm3(mesh_, state.position_mm) : 0.0;
+}
+
+double ElasticSystem::chamber_intake_mm3(const ElasticState& state) const {
+  return chamber_ ? undeformed_chamber_mm3_ - chamber_wall_.volume_mm3(mesh_, state.position_mm) : 0.0;
+}
+
+void ElasticSystem::add_area(const FluidSurface& surface, const NodeField& position_mm, double factor,
+                             std::span<double> target) const {
+  for (const FluidFace& face : surface.faces()) {
+    const size_t element = face.face.element;
+    const FaceField on_face = face.area_mm2(mesh_.gather(element, position_mm));
+    equations_.add_force(element, over_element(face.face, factor * on_face), target);
   }
-  return volume;
 }
 
 std::vector<double> ElasticSystem::cavity_area(const ElasticState& state) const {
-  std::vector<double> area(equations_.unknowns(), 0.0);
-  for (const ElementFace& face : loaded_) {
-    const FaceField on_face = face_area_mm2(face, mesh_.gather(face.element, state.position_mm));
-    const std::array<size_t, face_functions> functions = face_hermite_functions(face);
-    ElementField force = ElementField::Zero();
-    for (size_t a = 0; a < face_functions; ++a) {
-      force.col(static_cast<Eigen::Index>(functions[a])) = on_face.col(static_cast<Eigen::Index>(a));
-    }
-    equations_.add_force(face.element, force, area);
-  }
+  std::vector<double> area(equations_.unknowns(state.held_volume_mm3.has_value()), 0.0);
+  add_area(cavity_, state.position_mm, 1.0, area);
   return area;
 }
 
 SystemResidual ElasticSystem::residual(const ElasticState& state) const {
   SystemResidual total;
-  total.values = cavity_area(state);
-  for (double& value : total.values)
-    value *= -state.pressure_kPa;
+  total.values.assign(equations_.unknowns(state.held_volume_mm3.has_value()), 0.0);
+  add_fluids(state, total.values);
+  add_springs(state, total);
   const std::span<double> pressure_rows = std::span(total.values).subspan(equations_.displacement_unknowns());
   std::vector<double> energies(mesh_.element_count());
   std::vector<LeastVolumeRatio> least(mesh_.element_count());
@@ -106,22 +162,114 @@ SystemResidual ElasticSystem::residual(const ElasticState& state) const {
   return total;
 }
 
+void ElasticSystem::add_fluids(const ElasticState& state, std::span<double> residual) const {
+  add_area(cavity_, state.position_mm, -state.pressure_kPa, residual);
+  if (state.held_volume_mm3)
+    residual[equations_.fluid_rows().back().unknown] = *state.held_volume_mm3 - cavity_volume_mm3(state);
+  if (!chamber_) return;
+  add_area(chamber_wall_, state.position_mm, -state.chamber_pressure_kPa, residual);
+  if (chamber_->sealed()) {
+    residual[equations_.fluid_rows().front().unknown] =
+        chamber_intake_mm3(state) - mm3_per_mL * chamber_->compliance_mL_per_kPa *
+                                        (state.chamber_pressure_kPa - state.sealing_pressure_kPa);
+  }
+}
+
+ElementField ElasticSystem::spring_force(const SpringFace& spring, const NodeField& position_mm) const {
+  const size_t element = spring.face.element;
+  const ElementField displacement =
+      mesh_.gather(element, position_mm) - mesh_.gather(element, mesh_.reference());
+  const std::array<size_t, face_functions> functions = face_hermite_functions(spring.face);
+  FaceField on_face;
+  for (size_t a = 0; a < face_functions; ++a)
+    on_face.col(static_cast<Eigen::Index>(a)) = displacement.col(static_cast<Eigen::Index>(functions[a]));
+  FaceField force;
+  force.reshaped() = spring.stiffness * on_face.reshaped();
+  return over_element(spring.face, force);
+}
+
+void ElasticSystem::add_springs(const ElasticState& state, SystemResidual& total) const {
+  for (const SpringFace& spring : springs_) {
+    const size_t element = spring.face.element;
+    const ElementField force = spring_force(spring, state.position_mm);
+    equations_.add_force(element, force, total.values);
+    const ElementField displacement =
+        mesh_.gather(element, state.position_mm) - mesh_.gather(element, mesh_.reference());
+    total.bond_energy_uJ += 0.5 * force.cwiseProduct(displacement).sum();
+  }
+}
+
+void ElasticSystem::add_fluid_rows(const ElasticState& state, std::span<double> values) const {
+  const auto fill = [&](const FluidRow& row, const FluidSurface& surface, double compliance_mm3_per_kPa) {
+    std::vector<double> area(equations_.displacement_unknowns(), 0.0);
+    add_area(surface, state.position_mm, 1.0, area);
+    for (size_t n = 0; n < row.columns.size(); ++n)
+      values[row.entry + n] = -area[row.columns[n]];
+    values[row.diagonal()] = -compliance_mm3_per_kPa;
+  };
+  if (chamber_ && chamber_->sealed())
+    fill(equations_.fluid_rows().front(), chamber_wall_, mm3_per_mL * chamber_->compliance_mL_per_kPa);
+  if (state.held_volume_mm3) fill(equations_.fluid_rows().back(), cavity_, 0.0);
+}
+
 std::vector<double> ElasticSystem::tangent(const ElasticState& state) const {
-  std::vector<double> values(equations_.rows().size(), 0.0);
+  std::vector<double> values(equations_.entries(state.held_volume_mm3.has_value()), 0.0);
   for (const std::vector<size_t>& colour : equations_.colours()) {
     parallel_for(colour.size(), threads_, [&](size_t i) {
       thread_local ElementTangent local;
       const size_t e = colour[i];
       element_tangent(reference_[e], element_state(state, e), *law_, parameters(e), local);
       equations_.add_tangent(e, local, values);
+      if (compressibility_per_kPa_ > 0.0) equations_.add_compliance(e, local.compliance, values);
     });
   }
-  for (const ElementFace& face : loaded_) {
-    const FaceTangent on_face = face_tangent_mm(face, mesh_.gather(face.element, state.position_mm));
-    equations_.add_face_tangent(face.element, face_hermite_functions(face), on_face, -state.pressure_kPa,
-                                values);
-  }
+  const auto add_faces = [&](const FluidSurface& surface, double pressure_kPa) {
+    for (const FluidFace& face : surface.faces()) {
+      const size_t element = face.face.element;
+      equations_.add_face_tangent(element, face_hermite_functions(face.face),
+                                  face.tangent_mm(mesh_.gather(element, state.position_mm)), -pressure_kPa,
+                                  values);
+    }
+  };
+  add_faces(cavity_, state.pressure_kPa);
+  add_faces(chamber_wall_, state.chamber_pressure_kPa);
+  for (const SpringFace& spring : springs_)
+    equations_.add_face_tangent(spring.face.element, face_hermite_functions(spring.face), spring.stiffness,
+                                1.0, values);
+  add_fluid_rows(state, values);
   return values;
+}
+
+std::vector<double> ElasticSystem::skew_tangent(const ElasticState& state) const {
+  return skew_.values(mesh_, state.position_mm, -state.pressure_kPa);
+}
+
+ElasticSystem::NodalForces ElasticSystem::nodal_forces(const ElasticState& state) const {
+  const NodeField none(mesh_.node_count() * dofs_per_node, 0.0);
+  NodalForces forces{none, none, none};
+  const auto add = [&](size_t element, const ElementField& force, NodeField& target) {
+    for (size_t a = 0; a < hermite_functions; ++a) {
+      const size_t node = mesh_.element(element)[hermite_corner(a)];
+      for (size_t i = 0; i < 3; ++i) {
+        target[dof_of(node, hermite_derivative(a), i)] +=
+            mesh_.scale(element, a) * force(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(a));
+      }
+    }
+  };
+  const auto add_pressure = [&](const FluidSurface& surface, double pressure_kPa, NodeField& target) {
+    for (const FluidFace& face : surface.faces()) {
+      const FaceField area = face.area_mm2(mesh_.gather(face.face.element, state.position_mm));
+      add(face.face.element, over_element(face.face, pressure_kPa * area), target);
+    }
+  };
+  add_pressure(cavity_, state.pressure_kPa, forces.cavity);
+  add_pressure(chamber_wall_, state.chamber_pressure_kPa, forces.chamber);
+  for (size_t e = 0; e < mesh_.element_count(); ++e)
+    add(e, element_residual(reference_[e], element_state(state, e), *law_, parameters(e)).force,
+        forces.supports);
+  for (size_t dof = 0; dof < none.size(); ++dof)
+    forces.supports[dof] -= forces.cavity[dof] + forces.chamber[dof];
+  return forces;
 }
 
 void ElasticSystem::add_parameter_residual(const ElasticState& state, size_t parameter,
@@ -130,6 +278,14 @@ void ElasticSystem::add_parameter_residual(const ElasticState& state, size_t par
     equations_.add_force(
         e, element_parameter_force(reference_[e], element_state(state, e), *law_, parameters(e), parameter),
         target);
+    if (compressibility_per_kPa_ == 0.0) return;
+    constexpr SymmetricTensor<double> undeformed{1.0, 1.0, 1.0, 0.0, 0.0, 0.0};
+    const double rest_rise = trace(law_->stress_sensitivity(undeformed, parameters(e), parameter)) / 3.0;
+    const std::array<double, corners> volume_mm3 = pressure_volume_mm3(reference_[e]);
+    for (size_t m = 0; m < corners; ++m) {
+      target[equations_.displacement_unknowns() + pressures_.unknown[e][m]] +=
+          compressibility_per_kPa_ * rest_rise * volume_mm3[m];
+    }
   };
   for (const size_t e : elements)
     add(e);
@@ -141,7 +297,13 @@ void ElasticSystem::add_parameter_residual(const ElasticState& state, size_t par
 
 FactorResult ElasticSystem::factorise(const ElasticState& state) {
   std::vector<double> values = tangent(state);
-  return factor_.factorise(values);
+  if (!skew_.empty()) return factor_.factorise_general(values, skew_tangent(state));
+  return factor_.factorise_symmetric(values, state.held_volume_mm3.has_value());
+}
+
+size_t ElasticSystem::negative_pivots(const ElasticState& state) {
+  std::vector<double> values = tangent(state);
+  return factor_.factorise_symmetric(values, state.held_volume_mm3.has_value()).negative_pivots;
 }
 
 ElasticState ElasticSystem::moved(const ElasticState& state, std::span<const double> step,
@@ -154,6 +316,9 @@ ElasticState ElasticSystem::moved(const ElasticState& state, std::span<const dou
   for (size_t i = 0; i < pressures_.count; ++i) {
     next.lagrange_pressure_kPa[i] += fraction * step[equations_.displacement_unknowns() + i];
   }
+  if (chamber_ && chamber_->sealed())
+    next.chamber_pressure_kPa += fraction * step[equations_.fluid_rows().front().unknown];
+  if (state.held_volume_mm3) next.pressure_kPa += fraction * step[equations_.fluid_rows().back().unknown];
   return next;
 }
 

@@ -2,25 +2,33 @@
 // The discrete equations of an elastic body: residual, tangent and its factor, parameter derivatives.
 // Elements are worked on in parallel, and summed colour by colour, so that the result does not depend on the
 // number of threads.
+//
+// Unknowns: free displacement dofs, Lagrange pressures, the pressure in a sealed chamber, and last the cavity's
+// pressure in states that hold its volume. The equations of the latter two are  - (V(x) - V_held) = 0  and, for a
+// chamber's fluid,  - (V(x) - V(X)) - C (q - p0) = 0  (chamber.hpp).
 
 #include <optional>
 #include <span>
 #include <vector>
 
-#include "estimator/fe/cavity_load.hpp"
+#include "estimator/fe/chamber.hpp"
 #include "estimator/fe/elastic_state.hpp"
 #include "estimator/fe/element_mechanics.hpp"
 #include "estimator/fe/equation_system.hpp"
+#include "estimator/fe/fluid_surface.hpp"
+#include "estimator/fe/rim_skew.hpp"
 #include "estimator/fe/solve_report.hpp"
-#include "estimator/fe/symmetric_factor.hpp"
+#include "estimator/fe/spring_bond.hpp"
+#include "estimator/fe/tangent_factor.hpp"
 #include "estimator/materials/law.hpp"
 #include "estimator/mesh/hermite_mesh.hpp"
 
 namespace diastole {
 
 struct SystemResidual {
-  std::vector<double> values;  ///< dPi/d(unknown): kPa mm^2 for displacements, mm^3 for pressures
-  double energy_uJ = 0.0;      ///< integral of W
+  std::vector<double> values;   ///< dPi/d(unknown): kPa mm^2 for displacements, mm^3 for pressures
+  double energy_uJ = 0.0;       ///< stored in the material
+  double bond_energy_uJ = 0.0;  ///< stored in springs
   std::optional<InvertedPlace> inverted;
 };
 
@@ -28,9 +36,12 @@ struct SystemOptions {
   std::vector<double> parameters;  ///< the law's, in its order; the same in all elements
   PressureSpace pressure_space = PressureSpace::per_element;
   HeldDofs held;
-  std::vector<ElementFace> loaded;    ///< faces that the cavity pressure pushes on
-  MaterialAxesField material_axes;    ///< empty: the coordinate axes
-  double volume_stiffness_kPa = 0.0;  ///< kappa of element_mechanics.hpp
+  std::vector<ElementFace> loaded;       ///< faces that the cavity pressure pushes on: the cavity's wall
+  std::optional<Chamber> chamber{};      ///< around the outer faces
+  std::vector<BondedFaces> bonded{};     ///< faces on springs, at plates z = const
+  MaterialAxesField material_axes;       ///< empty: the coordinate axes
+  double volume_stiffness_kPa = 0.0;     ///< kappa of element_mechanics.hpp
+  double compressibility_per_kPa = 0.0;  ///< 1/K of element_mechanics.hpp
   size_t threads = 1;
 };
 
@@ -51,15 +62,38 @@ class ElasticSystem {
     return {&parameters_[element * count_], count_};
   }
 
+  [[nodiscard]] const HeldDofs& held() const { return held_; }
+  [[nodiscard]] bool on_springs(const ElementFace& face) const;
+
   [[nodiscard]] ElasticState rest_state() const;
+  /// Whether the cavity has a volume: its wall's rim is held or at plates.
+  [[nodiscard]] bool cavity_closed() const { return cavity_.closed(); }
+  /// 0 for a wall with a free rim.
   [[nodiscard]] double cavity_volume_mm3(const ElasticState& state) const;
+  [[nodiscard]] const std::optional<Chamber>& chamber() const { return chamber_; }
+  /// Volume that the specimen has taken from the fluid around it.
+  [[nodiscard]] double chamber_intake_mm3(const ElasticState& state) const;
+  /// Unknowns that have a negative pivot each at a stable equilibrium.
+  [[nodiscard]] size_t pressure_unknowns(const ElasticState& state) const {
+    return equations_.unknowns(state.held_volume_mm3.has_value()) - equations_.displacement_unknowns();
+  }
 
   [[nodiscard]] SystemResidual residual(const ElasticState& state) const;
-  /// Values of the stored entries of equations(), at a state.
+  /// Values of the stored entries of equations(), at a state: the symmetric part of the tangent.
   [[nodiscard]] std::vector<double> tangent(const ElasticState& state) const;
-  /// The loaded faces' area vectors, mm^2: minus the derivative of the residual with respect to the cavity
-  /// pressure, and dV_cavity/d(unknown) if the cavity's wall is what is loaded.
+  /// The rest of it, where the cavity's wall has a free rim.
+  [[nodiscard]] const RimSkew& rim_skew() const { return skew_; }
+  [[nodiscard]] std::vector<double> skew_tangent(const ElasticState& state) const;
+  /// The cavity wall's area vectors, mm^2: minus the derivative of the residual with respect to the cavity
+  /// pressure, and dV_cavity/d(unknown) if the cavity is closed.
   [[nodiscard]] std::vector<double> cavity_area(const ElasticState& state) const;
+  /// The forces of equilibrium on all nodal dofs, held ones too, kPa mm^2.
+  struct NodalForces {
+    NodeField supports;  ///< what held dofs and springs exert on the body; zero at free dofs in equilibrium
+    NodeField cavity;    ///< of the cavity's pressure
+    NodeField chamber;   ///< of the chamber's pressure
+  };
+  [[nodiscard]] NodalForces nodal_forces(const ElasticState& state) const;
   /// d(residual)/d(parameter) summed over the elements of a group (empty: all), added to `target`.
   void add_parameter_residual(const ElasticState& state, size_t parameter, std::span<const size_t> elements,
                               std::span<double> target) const;
@@ -67,6 +101,8 @@ class ElasticSystem {
   /// Assembles and factorises the tangent; solve() uses it until the next call.
   FactorResult factorise(const ElasticState& state);
   void solve(std::span<double> right_sides, size_t count = 1) { factor_.solve(right_sides, count); }
+  /// Negative pivots of the tangent's symmetric part; spoils the factor.
+  size_t negative_pivots(const ElasticState& state);
 
   /// state + fraction * step over the unknowns.
   [[nodiscard]] ElasticState moved(const ElasticState& state, std::span<const double> step,
@@ -76,19 +112,40 @@ class ElasticSystem {
 
  private:
   [[nodiscard]] ElementState element_state(const ElasticState& state, size_t element) const;
+  [[nodiscard]] double rest_pressure_kPa(size_t element) const;
+  /// Adds factor * area vectors of a fluid's surface.
+  void add_area(const FluidSurface& surface, const NodeField& position_mm, double factor,
+                std::span<double> target) const;
+  void add_fluids(const ElasticState& state, std::span<double> residual) const;
+  void add_fluid_rows(const ElasticState& state, std::span<double> values) const;
+  void add_springs(const ElasticState& state, SystemResidual& total) const;
+
+  /// A face on springs: force = stiffness times displacement over the face's coefficients.
+  struct SpringFace {
+    ElementFace face;
+    FaceTangent stiffness;
+  };
+  [[nodiscard]] ElementField spring_force(const SpringFace& spring, const NodeField& position_mm) const;
 
   HermiteMesh mesh_;
   const Law* law_;
   size_t count_;  // parameters of the law
   std::vector<double> parameters_;
   PressureMap pressures_;
-  EquationSystem equations_;
-  std::vector<ElementFace> loaded_;
+  HeldDofs held_;
+  FluidSurface cavity_;
+  FluidSurface chamber_wall_;
+  std::optional<Chamber> chamber_;
+  double undeformed_chamber_mm3_ = 0.0;
+  std::vector<SpringFace> springs_;
   MaterialAxesField material_axes_;
   double volume_stiffness_kPa_;
+  double compressibility_per_kPa_;
   size_t threads_;
+  EquationSystem equations_;
+  RimSkew skew_;
   std::vector<ReferenceElement> reference_;
-  SymmetricFactor factor_;
+  TangentFactor factor_;
 };
 
 }  // namespace diastole

@@ -167,9 +167,15 @@ ElementResidual element_residual(const ReferenceElement& reference, const Elemen
     add_force(result.force,
               reference[q].volume * f * stress * t.transpose() - (pressure * tables.weight[q]) * cofactor, q);
     result.energy += reference[q].volume * law.energy(c, parameters);
-    for (size_t m = 0; m < corners; ++m) {
-      result.volume_mm3[m] -= (volume - reference[q].volume) * tables.trilinear[q][m];
+    double growth = volume - reference[q].volume;
+    if (state.compressibility_per_kPa > 0.0) {
+      const double above_rest = pressure_at(state.pressure_kPa, q) - state.rest_pressure_kPa;
+      const double shrinkage = reference[q].volume * state.compressibility_per_kPa * above_rest;
+      result.energy += 0.5 * shrinkage * above_rest - state.rest_pressure_kPa * growth;
+      growth += shrinkage;
     }
+    for (size_t m = 0; m < corners; ++m)
+      result.volume_mm3[m] -= growth * tables.trilinear[q][m];
   }
   return result;
 }
@@ -179,6 +185,7 @@ void element_tangent(const ReferenceElement& reference, const ElementState& stat
   const GaussTables& tables = gauss_tables();
   for (ElementField& column : tangent.coupling)
     column.setZero();
+  tangent.compliance.setZero();
   for (size_t q = 0; q < gauss_points; ++q) {
     const Matrix3d g = xi_gradient(state.position_mm, q);
     const Matrix3d& t = reference[q].material_to_xi;
@@ -202,8 +209,21 @@ void element_tangent(const ReferenceElement& reference, const ElementState& stat
     add_force(volume_slope, -weight * cofactor, q);
     for (size_t m = 0; m < corners; ++m)
       tangent.coupling[m] += tables.trilinear[q][m] * volume_slope;
+    if (state.compressibility_per_kPa > 0.0) {
+      const Eigen::Map<const Eigen::Vector<double, corners>> psi(tables.trilinear[q].data());
+      tangent.compliance -= state.compressibility_per_kPa * reference[q].volume * psi * psi.transpose();
+    }
   }
   tangent.stiffness.contract();
+}
+
+std::array<double, corners> pressure_volume_mm3(const ReferenceElement& reference) {
+  std::array<double, corners> volume{};
+  for (size_t q = 0; q < gauss_points; ++q) {
+    for (size_t m = 0; m < corners; ++m)
+      volume[m] += reference[q].volume * gauss_tables().trilinear[q][m];
+  }
+  return volume;
 }
 
 ElementField element_parameter_force(const ReferenceElement& reference, const ElementState& state,

@@ -6,7 +6,13 @@
 //
 // (the last term is in cavity_load.hpp), with T an active tension along the fibre (second Piola-Kirchhoff
 // stress T f x f) and kappa a volume stiffness *beside* the Lagrange pressure: the exact solution, J = 1,
-// does not know it, but Newton's method converges from farther away. Given here are its gradient (residual)
+// does not know it, but Newton's method converges from farther away.
+//
+// Compressible material adds  - (p - p0)^2 / (2 K) dV  with K the bulk modulus and p0 the pressure that balances the
+// law's stress at rest: p = p0 - K (J - 1) in the weak sense (a perturbed Lagrangian), so that the material's energy is
+// W - p0 (J - 1) + K/2 (J - 1)^2, and the incompressible one is its limit 1/K = 0.
+//
+// Given here are its gradient (residual)
 // and second derivative (tangent) with respect to the 192 coefficients x(a, i) of the deformed position and
 // the 8 corner values p(m) of the tri-linear Lagrange pressure p, positive in compression: Cauchy stress =
 // 2/J F (dW/dC + T/2 f x f) F^T
@@ -15,7 +21,7 @@
 // Everything is worked out in element coordinates: g = dx/dxi, and T = dxi/dX Q with Q's columns the material
 // axes, so that F Q = g T and C in material axes = (g T)^T (g T). With w the Gauss weight, G = dX/dxi:
 //   residual(a, i) = sum_q dN_a/dxi_K [ w det G (g T S T^T)_iK - p w cof(g)_iK ],   p - kappa (J - 1) for p
-//   residual(m)    = - sum_q w (det g - det G) psi_m
+//   residual(m)    = - sum_q w [ det g - det G + det G (p - p0) / K ] psi_m
 //
 // Units: mm, kPa; energies in kPa mm^3 = uJ.
 
@@ -53,8 +59,10 @@ ReferenceElement make_reference_element(const HermiteMesh& mesh, size_t element,
 struct ElementState {
   ElementField position_mm;
   std::array<double, corners> pressure_kPa;
-  double fibre_tension_kPa = 0.0;     ///< T above
-  double volume_stiffness_kPa = 0.0;  ///< kappa above
+  double fibre_tension_kPa = 0.0;        ///< T above
+  double volume_stiffness_kPa = 0.0;     ///< kappa above
+  double compressibility_per_kPa = 0.0;  ///< 1/K above
+  double rest_pressure_kPa = 0.0;        ///< p0 above; of no account when incompressible
 };
 
 /// The least volume ratio J over the Gauss points, and where.
@@ -66,7 +74,7 @@ struct LeastVolumeRatio {
 struct ElementResidual {
   ElementField force;                      ///< dPi/dx, kPa mm^2
   std::array<double, corners> volume_mm3;  ///< dPi/dp
-  double energy = 0.0;                     ///< integral of W, the law's alone
+  double energy = 0.0;                     ///< integral of W, and of - p0 (J - 1) + (p - p0)^2 / (2 K)
   LeastVolumeRatio least;
 };
 
@@ -74,6 +82,8 @@ struct ElementResidual {
 struct ElementTangent {
   StiffnessContraction stiffness;
   std::array<ElementField, corners> coupling;  ///< d2Pi/dx dp: coupling[m](i, a)
+  /// d2Pi/dp dp, only set for compressible material.
+  Eigen::Matrix<double, corners, corners> compliance;
 };
 
 ElementResidual element_residual(const ReferenceElement& reference, const ElementState& state, const Law& law,
@@ -81,6 +91,9 @@ ElementResidual element_residual(const ReferenceElement& reference, const Elemen
 
 void element_tangent(const ReferenceElement& reference, const ElementState& state, const Law& law,
                      std::span<const double> parameters, ElementTangent& tangent);
+
+/// Undeformed volume that each corner's pressure stands for, mm^3: integral of psi_m dV.
+std::array<double, corners> pressure_volume_mm3(const ReferenceElement& reference);
 
 /// d(residual force)/d(parameter) at fixed x and p.
 ElementField element_parameter_force(const ReferenceElement& reference, const ElementState& state,

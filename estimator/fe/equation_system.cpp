@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <map>
+#include <set>
 #include <utility>
 
 namespace diastole {
@@ -13,11 +14,16 @@ constexpr size_t triangle(size_t row) { return row * (row + 1) / 2; }
 
 }  // namespace
 
-EquationSystem::EquationSystem(const HermiteMesh& mesh, const HeldDofs& held, const PressureMap& pressures)
+EquationSystem::EquationSystem(const HermiteMesh& mesh, const HeldDofs& held, const PressureMap& pressures,
+                               const EquationOptions& options)
     : pressure_unknowns_(pressures.count) {
   number_equations(mesh, held);
   map_elements(mesh, pressures);
   colour_elements();
+  if (options.compressible) map_compliance(pressures);
+  all_unknowns_ = displacement_unknowns_ + pressure_unknowns_;
+  for (const std::vector<ElementFace>& surface : options.fluids)
+    add_fluid_row(surface);
 }
 
 void EquationSystem::number_equations(const HermiteMesh& mesh, const HeldDofs& held) {
@@ -130,6 +136,42 @@ void EquationSystem::colour_elements() {
   }
 }
 
+void EquationSystem::map_compliance(const PressureMap& pressures) {
+  std::map<std::pair<size_t, size_t>, size_t> known;
+  for (size_t e = 0; e < maps_.size(); ++e) {
+    for (size_t m = 0; m < corners; ++m) {
+      for (size_t n = 0; n <= m; ++n) {
+        const auto [low, high] = std::minmax({pressures.unknown[e][m], pressures.unknown[e][n]});
+        const auto [place, is_new] = known.try_emplace({high, low}, rows_.size());
+        if (is_new) {
+          rows_.push_back(static_cast<int>(displacement_unknowns_ + high + 1));
+          columns_.push_back(static_cast<int>(displacement_unknowns_ + low + 1));
+        }
+        maps_[e].compliance[triangle(m) + n] = place->second;
+      }
+    }
+  }
+}
+
+void EquationSystem::add_fluid_row(const std::vector<ElementFace>& surface) {
+  std::set<size_t> met;
+  for (const ElementFace& face : surface) {
+    for (const size_t a : face_hermite_functions(face)) {
+      for (size_t i = 0; i < 3; ++i)
+        met.insert(equation(face.element, a, i));
+    }
+  }
+  met.erase(none);
+  const FluidRow& row =
+      fluid_rows_.emplace_back(FluidRow{all_unknowns_++, rows_.size(), {met.begin(), met.end()}});
+  for (const size_t column : row.columns) {
+    rows_.push_back(static_cast<int>(row.unknown + 1));
+    columns_.push_back(static_cast<int>(column + 1));
+  }
+  rows_.push_back(static_cast<int>(row.unknown + 1));
+  columns_.push_back(static_cast<int>(row.unknown + 1));
+}
+
 size_t EquationSystem::entry(const ElementMap& map, size_t dof, size_t other_dof) {
   size_t high = map.within_node[dof];
   size_t low = map.within_node[other_dof];
@@ -178,6 +220,19 @@ void EquationSystem::add_force(size_t element, const ElementField& force,
       const size_t equation = map.equation[3 * a + i];
       if (equation == none) continue;
       right_side[equation] += map.scale[a] * force(static_cast<Index>(i), static_cast<Index>(a));
+    }
+  }
+}
+
+void EquationSystem::add_compliance(size_t element, const Eigen::Matrix<double, corners, corners>& matrix,
+                                    std::span<double> values) const {
+  const ElementMap& map = maps_[element];
+  for (size_t m = 0; m < corners; ++m) {
+    for (size_t n = 0; n <= m; ++n) {
+      // Two corners of one element that share a pressure (a collapsed edge) meet twice in its diagonal.
+      const size_t place = map.compliance[triangle(m) + n];
+      const bool shared = m != n && rows_[place] == columns_[place];
+      values[place] += (shared ? 2.0 : 1.0) * matrix(static_cast<Index>(m), static_cast<Index>(n));
     }
   }
 }

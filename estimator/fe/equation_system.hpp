@@ -1,14 +1,16 @@
 #pragma once
 // The sparse symmetric system of free displacement dofs and Lagrange pressures, filled by blocks.
 //
-//        u (node by node)   p
-//     +-------------------+----+
-//   u |  node-pair blocks | .. |     stored: the lower triangle, as coordinate triplets (rows(), columns()
-//   count
-//     +-------------------+----+     from 1 as the factorisation wants them). A block of two different nodes
-//     is
-//   p |  pressure rows    | 0  |     a full rectangle, a node's own block a packed lower triangle, a pressure
-//     +-------------------+----+     unknown has one row piece for each node it meets.
+//        u (node by node)   p    f
+//     +-------------------+----+---+   stored: the lower triangle, as coordinate triplets (rows(), columns()
+//   u |  node-pair blocks | .. |...|   count from 1 as the factorisation wants them). A block of two different
+//     +-------------------+----+---+   nodes is a full rectangle, a node's own block a packed lower triangle,
+//   p |  pressure rows    | d  |   |   a pressure unknown has one row piece for each node it meets. d is empty
+//     +-------------------+----+---+   for incompressible material, else one packed triangle an element.
+//   f |  one row a fluid  |    | c |   f: pressures of fluids whose volume matters, numbered from `unknowns`;
+//     +-------------------+----+---+   a row has all unknowns of the fluid's surface, then its diagonal c.
+//
+// The last fluid is the cavity. With the cavity's pressure given, its row and unknown are left off the end.
 //
 // A dof that is tied to another node's (HermiteMesh::ties) has that one's equation, and belongs to the blocks
 // of that node, its host.
@@ -22,18 +24,37 @@
 #include <vector>
 
 #include "estimator/fe/element_mechanics.hpp"
+#include "estimator/fe/face_points.hpp"
 #include "estimator/fe/pressure_space.hpp"
 #include "estimator/fe/supports.hpp"
 
 namespace diastole {
 
+/// One fluid's row: pressure unknown `unknown`, entries entry ... over `columns` (from 0), then the diagonal's.
+struct FluidRow {
+  size_t unknown = 0;
+  size_t entry = 0;
+  std::vector<size_t> columns;
+
+  [[nodiscard]] size_t diagonal() const { return entry + columns.size(); }
+};
+
+struct EquationOptions {
+  bool compressible = false;                     ///< the block d is stored
+  std::vector<std::vector<ElementFace>> fluids;  ///< surfaces; the cavity's last
+};
+
 class EquationSystem {
  public:
-  EquationSystem(const HermiteMesh& mesh, const HeldDofs& held, const PressureMap& pressures);
+  EquationSystem(const HermiteMesh& mesh, const HeldDofs& held, const PressureMap& pressures,
+                 const EquationOptions& options = {});
 
   [[nodiscard]] size_t displacement_unknowns() const { return displacement_unknowns_; }
   [[nodiscard]] size_t pressure_unknowns() const { return pressure_unknowns_; }
-  [[nodiscard]] size_t unknowns() const { return displacement_unknowns_ + pressure_unknowns_; }
+  /// Without the cavity's pressure, and with it if the cavity's volume is given instead.
+  [[nodiscard]] size_t unknowns(bool cavity_held = false) const {
+    return cavity_held ? all_unknowns_ : all_unknowns_ - (fluid_rows_.empty() ? 0 : 1);
+  }
 
   /// Equation of a nodal dof (numbered as in a NodeField), or `none` when it is held.
   [[nodiscard]] size_t equation(size_t dof) const { return equation_of_dof_[dof]; }
@@ -41,13 +62,25 @@ class EquationSystem {
 
   [[nodiscard]] const std::vector<std::vector<size_t>>& colours() const { return colours_; }
 
+  /// Stored entries, counted like unknowns().
+  [[nodiscard]] size_t entries(bool cavity_held = false) const {
+    return cavity_held || fluid_rows_.empty() ? rows_.size() : fluid_rows_.back().entry;
+  }
   [[nodiscard]] std::span<const int> rows() const { return rows_; }
   [[nodiscard]] std::span<const int> columns() const { return columns_; }
+  [[nodiscard]] const std::vector<FluidRow>& fluid_rows() const { return fluid_rows_; }
+  /// Equation of component i of an element's function a, or `none`.
+  [[nodiscard]] size_t equation(size_t element, size_t a, size_t i) const {
+    return maps_[element].equation[3 * a + i];
+  }
 
   // Adding: `values` has one number for each stored entry. Different elements of one colour may be added at
   // the same time from several threads.
   void add_tangent(size_t element, const ElementTangent& tangent, std::span<double> values) const;
   void add_force(size_t element, const ElementField& force, std::span<double> right_side) const;
+  /// Adds a symmetric matrix over the element's eight Lagrange pressures. Precondition: compressible.
+  void add_compliance(size_t element, const Eigen::Matrix<double, corners, corners>& matrix,
+                      std::span<double> values) const;
   /// Adds factor * symmetric matrix over the given Hermite functions of one element; row 3 j + i belongs to
   /// functions[j], component i.
   void add_face_tangent(size_t element, std::span<const size_t> functions,
@@ -66,14 +99,17 @@ class EquationSystem {
     std::array<size_t, 3 * hermite_functions> equation;     ///< of local dof 3 a + i, or none
     std::array<size_t, 3 * hermite_functions> within_node;  ///< its place among its host's free dofs
     std::array<double, hermite_functions> scale;
-    std::array<size_t, most_hosts * most_hosts> node_block;   ///< first entry of the block of two hosts
-    std::array<size_t, corners * most_hosts> pressure_piece;  ///< first entry of pressure corner m, host h
+    std::array<size_t, most_hosts * most_hosts> node_block;    ///< first entry of the block of two hosts
+    std::array<size_t, corners * most_hosts> pressure_piece;   ///< first entry of pressure corner m, host h
+    std::array<size_t, corners*(corners + 1) / 2> compliance;  ///< entry of pressure corners m >= n
   };
 
   void number_equations(const HermiteMesh& mesh, const HeldDofs& held);
   void map_elements(const HermiteMesh& mesh, const PressureMap& pressures);
   [[nodiscard]] ElementMap map_dofs(const HermiteMesh& mesh, size_t element) const;
   void colour_elements();
+  void map_compliance(const PressureMap& pressures);
+  void add_fluid_row(const std::vector<ElementFace>& surface);
   size_t make_node_block(size_t high_node, size_t low_node);
   size_t make_pressure_piece(size_t pressure, size_t node);
   /// Stored entry of the local dofs 3 a + i and 3 b + k; none if either is held.
@@ -86,6 +122,7 @@ class EquationSystem {
 
   size_t displacement_unknowns_ = 0;
   size_t pressure_unknowns_ = 0;
+  size_t all_unknowns_ = 0;
   std::vector<size_t> equation_of_dof_;
   std::vector<size_t> host_of_dof_;
   std::vector<size_t> first_equation_;  // of a node
@@ -94,6 +131,7 @@ class EquationSystem {
   std::vector<std::vector<size_t>> colours_;
   std::vector<int> rows_;
   std::vector<int> columns_;
+  std::vector<FluidRow> fluid_rows_;
 };
 
 }  // namespace diastole

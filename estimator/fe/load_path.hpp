@@ -1,5 +1,6 @@
 #pragma once
-// From one equilibrium to that of another load (cavity pressure, fibre tension) in adaptive load steps: the
+// From one equilibrium to that of another load (cavity pressure or volume, fibre tension, the pressure that the
+// chamber around the specimen was sealed at) in adaptive load steps: the
 // whole way at once if Newton's method takes it, else by halves; steps grow again after easy ones, and start
 // from the line through the last two equilibria.
 

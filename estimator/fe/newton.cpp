@@ -19,8 +19,9 @@ class Newton {
     for (const double p : guess.lagrange_pressure_kPa)
       sum += p * p;
     constexpr double least_scale_kPa = 1e-3;
-    pressure_scale_kPa_ = std::max({std::sqrt(sum / static_cast<double>(guess.lagrange_pressure_kPa.size())),
-                                    least_scale_kPa, std::abs(guess.pressure_kPa)});
+    pressure_scale_kPa_ =
+        std::max({std::sqrt(sum / static_cast<double>(guess.lagrange_pressure_kPa.size())), least_scale_kPa,
+                  std::abs(guess.pressure_kPa), std::abs(guess.chamber_pressure_kPa)});
   }
 
   NewtonResult run() {
@@ -44,6 +45,8 @@ class Newton {
   NewtonResult finish(SolveReason reason, std::optional<InvertedPlace> inverted = {}) {
     result_.reason = reason;
     if (reason == SolveReason::inverted_element) result_.inverted = inverted;
+    if (reason == SolveReason::converged && !system_.rim_skew().empty())
+      result_.negative_pivots = system_.negative_pivots(result_.state);
     return std::move(result_);
   }
 

@@ -1,5 +1,5 @@
 #pragma once
-// Newton's method for the equilibrium at one cavity pressure, damped by the natural monotonicity test
+// Newton's method for the equilibrium at one cavity pressure, or at one cavity volume, damped by the natural monotonicity test
 // (P. Deuflhard, Newton Methods for Nonlinear Problems, 2004, section 3.3, error-oriented):
 //
 //   K(x) d = -r(x)                     the tangent is factorised once an iteration
@@ -23,7 +23,7 @@ struct NewtonResult {
   std::optional<InvertedPlace> inverted;
 };
 
-/// `guess.pressure_kPa` is the pressure to solve for.
+/// `guess` holds the load to solve for: pressure or held volume, tension, the chamber's sealing pressure.
 NewtonResult newton_solve(ElasticSystem& system, const ElasticState& guess, const SolveOptions& options);
 
 }  // namespace diastole

@@ -51,7 +51,7 @@ struct SolveReport {
   size_t newton_iterations = 0;  ///< updates of the state: with a new tangent or with kept factors
   size_t factorisations = 0;     ///< tangents assembled and factorised
   size_t negative_pivots = 0;    ///< of the last tangent; equals the pressure unknowns at a stable state
-  size_t pressure_unknowns = 0;
+  size_t pressure_unknowns = 0;  ///< Lagrange pressures, and those of fluids that are unknown
   double reached_pressure_kPa = 0.0;
   std::optional<InvertedPlace> inverted;
   double seconds = 0.0;

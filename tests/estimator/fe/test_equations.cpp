@@ -152,12 +152,12 @@ TEST(CavityLoad, VolumeOfTheUndeformedCavityIsACylinders) {
   EXPECT_NEAR(model.cavity_volume_mL(model.rest_state()), 3.14159265 * 22.5 * 22.5 * 85.0 * 1e-3, 1e-3);
 }
 
-TEST(SymmetricFactor, SolvesAndCountsNegativePivots) {
+TEST(SparseFactor, SolvesAndCountsNegativePivots) {
   // [2 1 0; 1 -3 1; 0 1 0]: eigenvalues of both signs and a zero on the diagonal.
   const std::vector<int> rows{1, 2, 2, 3};
   const std::vector<int> columns{1, 1, 2, 2};
   std::vector<double> values{2.0, 1.0, -3.0, 1.0};
-  SymmetricFactor factor(3, rows, columns);
+  SparseFactor factor(3, rows, columns);
   const FactorResult result = factor.factorise(values);
   EXPECT_FALSE(result.singular);
   EXPECT_EQ(result.negative_pivots, 1U);
@@ -168,11 +168,11 @@ TEST(SymmetricFactor, SolvesAndCountsNegativePivots) {
     EXPECT_NEAR(right[i], expected[i], 1e-14);
 }
 
-TEST(SymmetricFactor, ReportsASingularMatrix) {
+TEST(SparseFactor, ReportsASingularMatrix) {
   const std::vector<int> rows{1, 2, 2};
   const std::vector<int> columns{1, 1, 2};
   std::vector<double> values{1.0, 1.0, 1.0};
-  SymmetricFactor factor(2, rows, columns);
+  SparseFactor factor(2, rows, columns);
   EXPECT_TRUE(factor.factorise(values).singular);
 }
 

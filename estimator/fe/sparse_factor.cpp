@@ -1,4 +1,4 @@
-#include "estimator/fe/symmetric_factor.hpp"
+#include "estimator/fe/sparse_factor.hpp"
 
 #include <dmumps_c.h>
 #include <new>
@@ -20,7 +20,7 @@ int outcome(const DMUMPS_STRUC_C& mumps, int number) { return mumps.infog[number
 
 }  // namespace
 
-struct SymmetricFactor::Instance {
+struct SparseFactor::Instance {
   DMUMPS_STRUC_C mumps{};
   bool analysed = false;
 
@@ -40,14 +40,16 @@ struct SymmetricFactor::Instance {
   }
 };
 
-SymmetricFactor::SymmetricFactor(size_t size, std::span<const int> rows, std::span<const int> columns)
+SparseFactor::SparseFactor(size_t size, std::span<const int> rows, std::span<const int> columns,
+                           MatrixKind kind)
     : instance_(std::make_unique<Instance>()) {
   DMUMPS_STRUC_C& mumps = instance_->mumps;
   constexpr int use_default_communicator = -987654;
+  constexpr int unsymmetric = 0;
   constexpr int general_symmetric = 2;
   mumps.comm_fortran = use_default_communicator;
   mumps.par = 1;
-  mumps.sym = general_symmetric;
+  mumps.sym = kind == MatrixKind::symmetric ? general_symmetric : unsymmetric;
   instance_->check(instance_->run(initialise));
   for (const int stream : {1, 2, 3})
     control(mumps, stream) = -1;
@@ -71,9 +73,9 @@ SymmetricFactor::SymmetricFactor(size_t size, std::span<const int> rows, std::sp
   mumps.jcn = const_cast<int*>(columns.data());
 }
 
-SymmetricFactor::~SymmetricFactor() { instance_->run(terminate_instance); }
+SparseFactor::~SparseFactor() { instance_->run(terminate_instance); }
 
-FactorResult SymmetricFactor::factorise(std::span<double> values) {
+FactorResult SparseFactor::factorise(std::span<double> values) {
   DMUMPS_STRUC_C& mumps = instance_->mumps;
   constexpr int singular = -10;
   constexpr int work_space_too_small = -9;
@@ -95,7 +97,7 @@ FactorResult SymmetricFactor::factorise(std::span<double> values) {
   return {.singular = false, .negative_pivots = static_cast<size_t>(outcome(mumps, 12))};
 }
 
-void SymmetricFactor::solve(std::span<double> right_sides, size_t count) {
+void SparseFactor::solve(std::span<double> right_sides, size_t count) {
   DMUMPS_STRUC_C& mumps = instance_->mumps;
   mumps.rhs = right_sides.data();
   mumps.nrhs = static_cast<int>(count);

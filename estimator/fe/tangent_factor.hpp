@@ -1,0 +1,48 @@
+#pragma once
+// The factor of an elastic system's tangent, in whichever form the problem at hand needs:
+//
+//   symmetric              cavity pressure given
+//   symmetric, one larger  cavity volume given: the cavity's row and column added
+//   general                a fluid's surface has a free rim, and the tangent a skew part there
+//
+// Each form's ordering is found when it is first used.
+
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "estimator/fe/equation_system.hpp"
+#include "estimator/fe/rim_skew.hpp"
+#include "estimator/fe/sparse_factor.hpp"
+
+namespace diastole {
+
+class TangentFactor {
+ public:
+  /// Both must outlive the factor, at the same address.
+  TangentFactor(const EquationSystem& equations, const RimSkew& skew)
+      : equations_(&equations), skew_(&skew) {}
+
+  /// `values`: one for each of equations.entries(cavity_held). solve() uses this factor until the next call.
+  FactorResult factorise_symmetric(std::span<double> values, bool cavity_held);
+  /// The same with the rim's skew part, `skew` having one number for each of its triplets. Negative pivots are not
+  /// counted.
+  FactorResult factorise_general(std::span<const double> values, std::span<const double> skew);
+
+  void solve(std::span<double> right_sides, size_t count) { current_->solve(right_sides, count); }
+
+ private:
+  void prepare_general();
+
+  const EquationSystem* equations_;
+  const RimSkew* skew_;
+  std::unique_ptr<SparseFactor> pressure_given_;
+  std::unique_ptr<SparseFactor> volume_given_;
+  std::unique_ptr<SparseFactor> general_;
+  std::vector<int> general_rows_;
+  std::vector<int> general_columns_;
+  std::vector<double> general_values_;
+  SparseFactor* current_ = nullptr;
+};
+
+}  // namespace diastole
