@@ -13,7 +13,9 @@
 #include <vector>
 
 #include "estimator/cli/commands.hpp"
+#include "estimator/cli/solution_json.hpp"
 #include "estimator/cli/solution_outputs.hpp"
+#include "estimator/cli/study_options.hpp"
 #include "estimator/fe/elastic_system.hpp"
 #include "estimator/fe/point_fields.hpp"
 #include "estimator/fe/study_model.hpp"
@@ -28,12 +30,11 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 struct SolveArguments {
-  std::string study;
+  StudyOptions study;
   std::optional<double> pressure_kPa;
+  std::optional<double> volume_change_mL;
   bool frames = false;
   std::vector<std::string> probes;
-  std::vector<std::string> starts;
-  std::string mesh;
   SolutionOutputs outputs;
 };
 
@@ -83,20 +84,6 @@ std::vector<Probe> locate_probes(const HermiteMesh& mesh, const std::vector<std:
   return probes;
 }
 
-/// A line on standard error for each Newton iteration, once the work has lasted longer than people like to
-/// wait.
-SolveOptions with_progress(Clock::time_point begun) {
-  constexpr double patience_s = 2.0;
-  SolveOptions options;
-  options.on_iteration = [begun](double pressure_kPa, const NewtonIteration& iteration) {
-    const double elapsed_s = seconds_since(begun);
-    if (elapsed_s < patience_s) return;
-    fmt::print(stderr, "solve: {:.3g} kPa, correction {:.1e}, {:.0f} s\n", pressure_kPa, iteration.step,
-               elapsed_s);
-  };
-  return options;
-}
-
 /// Strain and stress at a place by name; null where there is no direction of the wall (a collapsed edge).
 nlohmann::ordered_json fields_json(const ElasticModel& model, const ElasticState& state,
                                    const MaterialPoint& point) {
@@ -112,16 +99,12 @@ nlohmann::ordered_json fields_json(const ElasticModel& model, const ElasticState
   return json;
 }
 
-nlohmann::ordered_json as_json(const Study& study, const ElasticModel& model, const Solution& solution,
+nlohmann::ordered_json as_json(const Study& study, ElasticModel& model, const Solution& solution,
                                const std::vector<Probe>& probes, double seconds) {
   const SolveReport& report = solution.report;
-  const double rest_mL = model.cavity_volume_mL(model.rest_state());
-  const double loaded_mL = model.cavity_volume_mL(solution.state);
   nlohmann::ordered_json json;
   json["reason"] = describe(report.reason);
-  json["pressure_kPa"] = solution.state.pressure_kPa;
-  json["cavity_volume_mL"] = loaded_mL;
-  json["cavity_volume_change_mL"] = loaded_mL - rest_mL;
+  add_equilibrium(json, model, solution.state);
   json["law"] = model.law().name();
   for (const StudyParameter& parameter : study.law.parameters)
     json["parameters"][parameter.name] = parameter.start;
@@ -174,25 +157,47 @@ void print_for_people(const nlohmann::ordered_json& json) {
 }
 
 void require_one_load(const SolveArguments& arguments) {
-  if (arguments.pressure_kPa.has_value() == arguments.frames) {
-    throw InputError({.file = "",
-                      .place = "--pressure-kPa",
-                      .problem = arguments.frames ? "is given beside --frames" : "is missing",
-                      .remedy = "Give a pressure, for example --pressure-kPa 6, or --frames for all of the "
-                                "study's frames."});
-  }
-  if (arguments.pressure_kPa && !std::isfinite(*arguments.pressure_kPa)) {
-    throw InputError({.file = "",
-                      .place = "--pressure-kPa",
-                      .problem = fmt::format("{} is not a finite pressure", *arguments.pressure_kPa),
-                      .remedy = "Give a number, for example 6."});
-  }
+  const auto refuse = [](std::string place, std::string problem) {
+    throw InputError(
+        {.file = "",
+         .place = std::move(place),
+         .problem = std::move(problem),
+         .remedy = "Give a pressure, for example --pressure-kPa 6, or the volume that the cavity takes, "
+                   "--volume-change-mL 24, or --frames for all of the study's frames."});
+  };
+  const bool pressure = arguments.pressure_kPa.has_value();
+  const bool volume = arguments.volume_change_mL.has_value();
+  if (!pressure && !volume && !arguments.frames) refuse("--pressure-kPa", "is missing");
+  if (pressure && volume) refuse("--pressure-kPa", "is given beside --volume-change-mL");
+  if (pressure && arguments.frames) refuse("--pressure-kPa", "is given beside --frames");
+  if (volume && arguments.frames) refuse("--volume-change-mL", "is given beside --frames");
+  if (pressure && !std::isfinite(*arguments.pressure_kPa))
+    refuse("--pressure-kPa", fmt::format("{} is not a finite pressure", *arguments.pressure_kPa));
+  if (volume && !std::isfinite(*arguments.volume_change_mL))
+    refuse("--volume-change-mL", fmt::format("{} is not a finite volume", *arguments.volume_change_mL));
 }
 
+struct TimedLoad {
+  double time_s;
+  Load load;
+};
+
 /// The loads to solve for: the one of the command line, or the study's frames.
-std::vector<Frame> loads_of(const SolveArguments& arguments, const Study& study) {
-  if (!arguments.frames) return {{.time_s = 0.0, .pressure_kPa = *arguments.pressure_kPa, .sigma_kPa = 0.0}};
-  if (study.data.frames) return read_frames(*study.data.frames);
+std::vector<TimedLoad> loads_of(const SolveArguments& arguments, const Study& study,
+                                const ElasticModel& model) {
+  if (arguments.pressure_kPa) return {{0.0, {.pressure_kPa = *arguments.pressure_kPa}}};
+  if (arguments.volume_change_mL) {
+    const double rest_mL = model.cavity_volume_mL(model.rest_state());
+    return {{0.0, {.cavity_volume_mL = rest_mL + *arguments.volume_change_mL}}};
+  }
+  std::vector<TimedLoad> loads;
+  for (const Frame& frame : read_frames(*study.data.frames))
+    loads.push_back({frame.time_s, {.pressure_kPa = frame.pressure_kPa}});
+  return loads;
+}
+
+void require_frames(const SolveArguments& arguments, const Study& study) {
+  if (!arguments.frames || study.data.frames) return;
   throw InputError({.file = study.file.string(),
                     .place = "key data.frames",
                     .problem = "missing, although --frames asks for the frames' pressures",
@@ -200,12 +205,13 @@ std::vector<Frame> loads_of(const SolveArguments& arguments, const Study& study)
 }
 
 /// Each load from the state of the one before; ends at the first that has no equilibrium.
-Solution solve_all(ElasticModel& model, const std::vector<Frame>& loads, std::vector<SolvedFrame>& solved) {
+Solution solve_all(ElasticModel& model, const std::vector<TimedLoad>& loads,
+                   std::vector<SolvedFrame>& solved) {
   Solution solution{model.rest_state(), {}};
-  for (const Frame& load : loads) {
-    solution = model.solve(load.pressure_kPa, solution.state);
+  for (const TimedLoad& timed : loads) {
+    solution = model.solve(timed.load, solution.state);
     if (!solution.report.converged()) break;
-    solved.push_back({load.time_s, solution.state});
+    solved.push_back({timed.time_s, solution.state});
   }
   return solution;
 }
@@ -213,13 +219,11 @@ Solution solve_all(ElasticModel& model, const std::vector<Frame>& loads, std::ve
 ExitCode run_solve(const SolveArguments& arguments, const CommandOutput& out) {
   const Clock::time_point begun = Clock::now();
   require_one_load(arguments);
-  Study study = read_study(arguments.study);
-  for (const std::string& start : arguments.starts)
-    set_start(study, start);
-  if (!arguments.mesh.empty()) set_mesh(study, arguments.mesh);
+  const Study study = read_study(arguments.study);
+  require_frames(arguments, study);
   require_outputs(arguments.outputs, study);
-  const std::vector<Frame> loads = loads_of(arguments, study);
-  ElasticModel model = make_model(study, with_progress(begun));
+  ElasticModel model = make_model(study, with_progress("solve"));
+  const std::vector<TimedLoad> loads = loads_of(arguments, study, model);
   const std::vector<Probe> probes = locate_probes(model.mesh(), arguments.probes);
 
   std::vector<SolvedFrame> solved;
@@ -248,24 +252,24 @@ ExitCode run_solve(const SolveArguments& arguments, const CommandOutput& out) {
 void add_solve(CommandLine& line) {
   auto arguments = std::make_shared<SolveArguments>();
   CLI::App* command = line.add(
-      "solve", "one forward finite-element solution of a study's specimen at a cavity pressure",
+      "solve", "one forward finite-element solution of a study's specimen at a cavity pressure or volume",
       "  diastole solve phantom-a.study.toml --pressure-kPa 6 --set C1_kPa=6.5\n"
       "  diastole solve phantom-a.study.toml --pressure-kPa 3.1 --probe 22.5,0,0 --probe 50,0,0 --json\n"
       "  diastole solve phantom-a.study.toml --pressure-kPa 6 --mesh 8,8,4 -o gel.vtkhdf -o gel.csv\n"
+      "  diastole solve phantom-a.study.toml --volume-change-mL 24\n"
       "  diastole solve phantom-a.study.toml --frames -o gel.vtkhdf\n"
       "A parameter has its `start` value unless --set gives another.\n"
       "Exit code 1: no equilibrium was found; the message says where the solver stopped and why.");
-  command->add_option("STUDY", arguments->study, "study file (*.study.toml)")->required();
+  add_study_options(*command, arguments->study);
   command->add_option("--pressure-kPa", arguments->pressure_kPa, "cavity pressure above the outside");
+  command->add_option("--volume-change-mL", arguments->volume_change_mL,
+                      "volume that the cavity takes, instead of its pressure");
   command->add_flag("--frames", arguments->frames,
                     "solve for all frames of the study instead, one after the other");
   command
       ->add_option("--probe", arguments->probes,
                    "X,Y,Z of a material point in mm, undeformed; may be repeated")
       ->allow_extra_args(false);
-  command->add_option("--set", arguments->starts, "NAME=VALUE: another parameter value; may be repeated")
-      ->allow_extra_args(false);
-  command->add_option("--mesh", arguments->mesh, "elements around, along, through the wall, as 8,8,4");
   add_output_options(*command, arguments->outputs);
   line.on_run(command, [arguments](const CommandOutput& out) { return run_solve(*arguments, out); });
 }

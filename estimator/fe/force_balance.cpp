@@ -43,13 +43,13 @@ ForceBalance force_balance(const ElasticSystem& system, const ElasticState& stat
     SupportForce support{name, Eigen::Vector3d::Zero()};
     bool supported = false;
     for (const ElementFace& face : *listed) {
-      const auto corners = face_corners(face);
+      const std::array<size_t, 4> at = face_corners(face);
       const auto node = [&](size_t corner) { return mesh.element(face.element)[corner]; };
       if (!system.on_springs(face) &&
-          !std::all_of(corners.begin(), corners.end(), [&](size_t corner) { return held(node(corner)); }))
+          !std::all_of(at.begin(), at.end(), [&](size_t corner) { return held(node(corner)); }))
         continue;
       supported = true;
-      for (const size_t corner : corners)
+      for (const size_t corner : at)
         take(support, node(corner));
     }
     if (supported) balance.supports.push_back(support);

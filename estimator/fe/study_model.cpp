@@ -87,6 +87,25 @@ HermiteMesh make_mesh(const EllipsoidSpecimen& specimen, ElasticOptions& options
   return make_ellipsoid(shape);
 }
 
+/// End faces on springs, if the study's are.
+std::vector<BondedFaces> bonded_ends(const Study& study, const HermiteMesh& mesh) {
+  const std::optional<EndSprings> springs =
+      std::visit([](const auto& specimen) { return specimen.end_springs; }, study.specimen);
+  if (!springs) return {};
+  const SpringBond bond{springs->normal_kPa_per_mm, springs->tangential_kPa_per_mm};
+  std::vector<BondedFaces> bonded;
+  for (const std::vector<ElementFace>* faces : {&mesh.faces().bottom, &mesh.faces().top}) {
+    if (!faces->empty()) bonded.push_back({*faces, bond});
+  }
+  return bonded;
+}
+
+Chamber chamber_of(const StudyChamber& given) {
+  Chamber chamber{.sealing_pressure_kPa = given.sealing_pressure_kPa};
+  if (given.compliance_mL_per_kPa) chamber.compliance_mL_per_kPa = *given.compliance_mL_per_kPa;
+  return chamber;
+}
+
 }  // namespace
 
 ElasticModel make_model(const Study& study, SolveOptions options) {
@@ -100,6 +119,10 @@ ElasticModel make_model(const Study& study, SolveOptions options) {
   elastic.solve = std::move(options);
   HermiteMesh mesh =
       std::visit([&](const auto& specimen) { return make_mesh(specimen, elastic); }, study.specimen);
+  elastic.bonded = bonded_ends(study, mesh);
+  if (study.chamber) elastic.chamber = chamber_of(*study.chamber);
+  elastic.bulk_modulus_kPa = study.compression.bulk_modulus_kPa;
+  elastic.volume_stiffness_kPa = study.compression.volume_stiffness_kPa;
   return ElasticModel(std::move(mesh), law, std::move(elastic));
 }
 

@@ -32,13 +32,21 @@ std::array<int, 3> read_mesh(TableReader& table) {
   return counts;
 }
 
+template <class Kind>
+void read_ends(TableReader& table, Kind& specimen) {
+  specimen.ends = table.choice("ends", {"fixed", "sprung"});
+  if (specimen.ends == "fixed") return;
+  specimen.end_springs = EndSprings{table.number("bond_normal_kPa_per_mm", {.at_least = 0}),
+                                    table.number("bond_tangential_kPa_per_mm", {.at_least = 0})};
+}
+
 AnnulusSpecimen read_annulus(TableReader& table) {
   AnnulusSpecimen annulus{};
   annulus.inner_radius_mm = table.number("inner_radius_mm", {.above = 0});
   annulus.outer_radius_mm = table.number("outer_radius_mm", {.above = annulus.inner_radius_mm});
   annulus.height_mm = table.number("height_mm", {.above = 0});
   annulus.mesh = read_mesh(table);
-  annulus.ends = table.choice("ends", {"fixed"});
+  read_ends(table, annulus);
   return annulus;
 }
 
@@ -62,7 +70,7 @@ EllipsoidSpecimen read_ellipsoid(TableReader& table) {
   ellipsoid.fibre_endo_deg = table.number("fibre_endo_deg", {.at_least = -180, .at_most = 180});
   ellipsoid.fibre_epi_deg = table.number("fibre_epi_deg", {.at_least = -180, .at_most = 180});
   ellipsoid.mesh = read_mesh(table);
-  ellipsoid.ends = table.choice("ends", {"fixed"});
+  read_ends(table, ellipsoid);
   return ellipsoid;
 }
 
@@ -114,6 +122,29 @@ StudyLaw read_law(TableReader& root) {
   return law;
 }
 
+std::optional<StudyChamber> read_chamber(TableReader& root) {
+  std::optional<TableReader> table = root.table_if("chamber");
+  if (!table) return {};
+  StudyChamber chamber;
+  chamber.sealing_pressure_kPa = table->number_or("sealing_pressure_kPa", 0.0);
+  if (table->has("compliance_mL_per_kPa"))
+    chamber.compliance_mL_per_kPa = table->number("compliance_mL_per_kPa", {.above = 0});
+  table->finish();
+  return chamber;
+}
+
+StudyCompression read_compression(TableReader& model) {
+  StudyCompression compression;
+  if (model.has("bulk_modulus_kPa"))
+    compression.bulk_modulus_kPa = model.number("bulk_modulus_kPa", {.above = 0});
+  compression.volume_stiffness_kPa = model.number_or("volume_stiffness_kPa", 0.0, {.at_least = 0});
+  if (compression.bulk_modulus_kPa && compression.volume_stiffness_kPa > 0) {
+    model.fail("volume_stiffness_kPa", "would add to the bulk modulus",
+               "It is for incompressible material; leave one of the two out.");
+  }
+  return compression;
+}
+
 StudyData read_data(TableReader& root, const std::filesystem::path& folder) {
   StudyData data;
   TableReader table = root.table("data");
@@ -156,8 +187,10 @@ Study read_study(const std::filesystem::path& path) {
   Study study{
       .file = path, .specimen = read_specimen(root), .law = read_law(root), .data = {}, .effects = {}};
   study.data = read_data(root, path.parent_path());
+  study.chamber = read_chamber(root);
   if (auto model = root.table_if("model")) {
     study.effects = model->texts_or("effects", {});
+    study.compression = read_compression(*model);
     model->finish();
   }
   root.finish();

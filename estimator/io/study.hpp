@@ -13,14 +13,21 @@
 
 namespace diastole {
 
+/// Glue of finite stiffness between an end face and its plate (estimator/fe/spring_bond.hpp).
+struct EndSprings {
+  double normal_kPa_per_mm;      ///< >= 0
+  double tangential_kPa_per_mm;  ///< >= 0
+};
+
 /// A cylindrical annulus along z, mid-height at z = 0, both end faces bonded to rigid plates, loaded by a
 /// follower pressure on its inner wall.
 struct AnnulusSpecimen {
   double inner_radius_mm;
   double outer_radius_mm;
   double height_mm;
-  std::array<int, 3> mesh;  ///< elements: circumferential, longitudinal, transmural
-  std::string ends;         ///< "fixed"
+  std::array<int, 3> mesh;                  ///< elements: circumferential, longitudinal, transmural
+  std::string ends;                         ///< "fixed", or "sprung"
+  std::optional<EndSprings> end_springs{};  ///< given if the ends are sprung
 };
 
 /// A left ventricle: a thick ellipsoid of revolution about z, apex down, cut at z = base_z_mm where it is
@@ -32,8 +39,9 @@ struct EllipsoidSpecimen {
   double base_z_mm;
   double fibre_endo_deg;
   double fibre_epi_deg;
-  std::array<int, 3> mesh;  ///< elements: circumferential, longitudinal, transmural
-  std::string ends;         ///< "fixed"
+  std::array<int, 3> mesh;                  ///< elements: circumferential, longitudinal, transmural
+  std::string ends;                         ///< "fixed", or "sprung"
+  std::optional<EndSprings> end_springs{};  ///< given if the ends are sprung
 };
 
 /// One alternative per `specimen.kind`; a new kind adds its struct here and its reader in study.cpp.
@@ -69,12 +77,26 @@ struct StudyData {
   std::optional<std::filesystem::path> frames;
 };
 
+/// A chamber filled with fluid around the specimen (estimator/fe/chamber.hpp).
+struct StudyChamber {
+  double sealing_pressure_kPa = 0.0;                 ///< in it at the specimen's undeformed shape
+  std::optional<double> compliance_mL_per_kPa = {};  ///< absent: open, of constant pressure
+};
+
+/// How the material answers to a change of volume (estimator/fe/element_mechanics.hpp).
+struct StudyCompression {
+  std::optional<double> bulk_modulus_kPa = {};  ///< absent: incompressible
+  double volume_stiffness_kPa = 0.0;            ///< helps an incompressible solution to converge
+};
+
 struct Study {
   std::filesystem::path file;
   Specimen specimen;
   StudyLaw law;
   StudyData data;
   std::vector<std::string> effects;  ///< effects that the model already includes
+  std::optional<StudyChamber> chamber = {};
+  StudyCompression compression = {};
 };
 
 /// Throws InputError (file, line, key, value, remedy) for anything that the format does not know, a value out

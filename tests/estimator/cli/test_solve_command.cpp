@@ -158,6 +158,34 @@ TEST_F(SolveCommand, NoEquilibriumIsANegativeAnswerWithAReason) {
   EXPECT_THAT(message, testing::HasSubstr("was reached"));
 }
 
+TEST_F(SolveCommand, TellsTheForcesThatHoldTheSpecimen) {
+  const nlohmann::json json =
+      nlohmann::json::parse(run({"--pressure-kPa", "3", "--mesh", "6,2,1", "--json"}).output);
+  const auto& forces = json["forces"];
+  EXPECT_LT(forces["unbalanced_N"].get<double>(), 1e-6);
+  EXPECT_NEAR(forces["supports_N"]["bottom"][2].get<double>(), -forces["supports_N"]["top"][2].get<double>(),
+              1e-6);
+  EXPECT_GT(json["stored_energy_mJ"].get<double>(), 0.0);
+  EXPECT_FALSE(json.contains("chamber_pressure_kPa"));
+}
+
+TEST_F(SolveCommand, FindsThePressureOfAVolumeInASealedChamberOnSprings) {
+  std::string text = gel_study;
+  text.replace(text.find("ends = \"fixed\""), 14,
+               "ends = \"sprung\"\nbond_normal_kPa_per_mm = 40.0\nbond_tangential_kPa_per_mm = 12.5");
+  write_study(text + "[chamber]\ncompliance_mL_per_kPa = 30.0\n[model]\nbulk_modulus_kPa = 2000.0\n");
+  const Outcome outcome = run({"--volume-change-mL", "15", "--mesh", "6,2,1", "--json"});
+  EXPECT_EQ(outcome.code, ExitCode::done);
+  const nlohmann::json json = nlohmann::json::parse(outcome.output);
+  EXPECT_NEAR(json["cavity_volume_change_mL"].get<double>(), 15.0, 1e-9);
+  EXPECT_GT(json["pressure_kPa"].get<double>(), 1.0);
+  EXPECT_NEAR(json["chamber_pressure_kPa"].get<double>(), json["chamber_intake_mL"].get<double>() / 30.0,
+              1e-9);
+  EXPECT_LT(json["chamber_intake_mL"].get<double>(), 15.0);
+  EXPECT_LT(json["forces"]["unbalanced_N"].get<double>(), 1e-6);
+  EXPECT_EQ(json["negative_pivots"], json["pressure_unknowns"]);
+}
+
 TEST_F(SolveCommand, RefusesBadProbesWithARemedy) {
   EXPECT_THAT(refusal({"--pressure-kPa", "2", "--probe", "22.5,0"}),
               testing::HasSubstr("is not three numbers"));
@@ -169,6 +197,9 @@ TEST_F(SolveCommand, RefusesBadProbesWithARemedy) {
 
 TEST_F(SolveCommand, RefusesBadPressureStartAndMesh) {
   EXPECT_THAT(refusal({"--pressure-kPa", "nan"}), testing::HasSubstr("not a finite pressure"));
+  EXPECT_THAT(refusal({"--volume-change-mL", "inf"}), testing::HasSubstr("not a finite volume"));
+  EXPECT_THAT(refusal({"--volume-change-mL", "3", "--pressure-kPa", "3"}),
+              testing::HasSubstr("is given beside --volume-change-mL"));
   EXPECT_THAT(refusal({"--pressure-kPa", "2", "--set", "C2_kPa=1"}), testing::HasSubstr("C2_kPa"));
   EXPECT_THAT(refusal({"--pressure-kPa", "2", "--mesh", "2,1,1"}), testing::HasSubstr("--mesh"));
 }

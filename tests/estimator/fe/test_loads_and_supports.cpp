@@ -52,6 +52,33 @@ TEST(LoadsAndSupports, TangentOfAFreeRimHasItsSkewPart) {
   EXPECT_LT(tangent_fault(system, state), 1e-6);
 }
 
+/// Land's beam, shortened: one side pushed, all its rims free but the clamped one.
+ElasticModel pushed_beam() {
+  HermiteMesh mesh = make_block({{6.0, 1.0, 1.0}, {6, 1, 1}, 0.8});
+  HeldDofs held = hold_nothing(mesh);
+  hold_face(mesh, mesh.faces().left, held);
+  return ElasticModel(std::move(mesh), *find_law("guccione"),
+                      {.parameters = {2.0, 8.0, 2.0, 4.0}, .held = held});
+}
+
+// The first guess of a bending beam is far off: steps are damped. With the skew part the last ones converge
+// quadratically, and sensitivities are exact.
+TEST(FreeRim, IsSolvedByDampedThenQuadraticSteps) {
+  ElasticModel model = pushed_beam();
+  const Solution solution = model.solve(0.01);
+  ASSERT_TRUE(solution.report.converged()) << solution.report.describe();
+  EXPECT_EQ(solution.report.negative_pivots, solution.report.pressure_unknowns);
+  EXPECT_LT(solution.report.history.front().iterations.front().damping, 1.0);
+  EXPECT_LE(model.solve(0.0101, solution.state).report.factorisations, 2U);
+  const Sensitivities exact = model.sensitivities(solution.state, {});
+  const NodeField high = model.solve(0.01001, solution.state).state.position_mm;
+  const NodeField low = model.solve(0.00999, solution.state).state.position_mm;
+  NodeField slope(high.size());
+  for (size_t i = 0; i < slope.size(); ++i)
+    slope[i] = (high[i] - low[i]) / 2e-5;
+  EXPECT_LT(largest_difference(exact.pressure, slope), 1e-5 * largest(slope));
+}
+
 TEST(LoadsAndSupports, ParameterDerivativeOfCompressibleMaterialIsThatOfTheResidual) {
   ElasticModel model = gel(6.5, {5, 3, 1}, {.bulk_modulus_kPa = 80.0});
   const ElasticState state = shaken(model.system(), model.rest_state(), 0.4, 5);

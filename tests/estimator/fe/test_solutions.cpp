@@ -1,9 +1,11 @@
 // Equilibria: against closed forms, conservation laws, symmetry, and finite differences of the solutions
 // themselves.
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <string>
 
 #include "estimator/mesh/point_locator.hpp"
 #include "tests/estimator/fe/gel.hpp"
@@ -170,6 +172,8 @@ TEST(Solve, IsTheSameForAnyNumberOfThreads) {
   }
   EXPECT_LT(largest_difference(positions[0], positions[1]), 1e-10);
   EXPECT_LT(largest_difference(positions[0], positions[2]), 1e-10);
+  ElasticModel again = gel(6.5, {8, 4, 1}, {.threads = 4});
+  EXPECT_EQ(again.solve(6.0).state.position_mm, positions[2]);
 }
 
 TEST(Solve, AnisotropicLawWithFullTangentConverges) {
@@ -204,6 +208,12 @@ TEST(Failure, InvertedElementIsReportedWithItsPlace) {
   EXPECT_EQ(solution.report.reason, SolveReason::inverted_element);
   ASSERT_TRUE(solution.report.inverted);
   EXPECT_LE(solution.report.inverted->volume_ratio, 0.0);
+  const MaterialPoint& place = solution.report.inverted->point;
+  EXPECT_THAT(place.element, testing::AnyOf(8U, 15U, 16U, 23U));  // those around the node
+  EXPECT_TRUE(
+      model.mesh().value(model.mesh().reference(), place).isApprox(solution.report.inverted->reference_mm));
+  EXPECT_THAT(solution.report.describe(),
+              testing::HasSubstr("element " + std::to_string(place.element) + " turns inside out at xi = ("));
   EXPECT_GT(solution.report.inverted->reference_mm[0], 20.0);
   EXPECT_LT(std::abs(solution.report.inverted->reference_mm[2]), 25.0);
   EXPECT_NE(solution.report.describe().find("turns inside out"), std::string::npos);
@@ -218,6 +228,29 @@ TEST(Failure, ALoadBeyondTheLimitEndsWithTheLastEquilibriumAndTheHistory) {
   EXPECT_GT(solution.report.history.size(), 1U);
   EXPECT_FALSE(solution.report.history.back().accepted);
   EXPECT_NE(solution.report.describe().find("was reached"), std::string::npos);
+}
+
+TEST(Failure, NoConvergenceIsReportedWithItsHistory) {
+  ElasticModel model = gel(6.5, {6, 2, 1}, {.solve = {.newton_limit = 1, .least_load_fraction = 0.6}});
+  const Solution solution = model.solve(20.0);
+  EXPECT_EQ(solution.report.reason, SolveReason::no_convergence);
+  ASSERT_EQ(solution.report.history.size(), 1U);
+  EXPECT_FALSE(solution.report.history[0].accepted);
+  EXPECT_EQ(solution.report.history[0].pressure_kPa, 20.0);
+  ASSERT_EQ(solution.report.history[0].iterations.size(), 1U);
+  EXPECT_GT(solution.report.history[0].iterations[0].step, 1e-3);
+  EXPECT_EQ(solution.state.position_mm, model.rest_state().position_mm);
+  EXPECT_THAT(solution.report.describe(),
+              testing::AllOf(testing::HasSubstr("no convergence"),
+                             testing::HasSubstr("the last attempt at 20 kPa had corrections")));
+}
+
+TEST(Failure, TheLoadStepLimitIsAReasonOfItsOwn) {
+  ElasticModel model = gel(6.5, {6, 2, 1}, {.solve = {.load_step_limit = 2, .most_load_fraction = 0.25}});
+  const Solution solution = model.solve(4.0);
+  EXPECT_EQ(solution.report.reason, SolveReason::out_of_steps);
+  EXPECT_EQ(solution.report.load_steps, 2U);
+  EXPECT_NEAR(solution.state.pressure_kPa, 2.0, 1e-12);
 }
 
 TEST(Failure, MissingSupportsAreASingularTangent) {

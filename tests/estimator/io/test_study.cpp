@@ -112,6 +112,40 @@ TEST(ExampleStudies, AreRead) {
   }
 }
 
+TEST_F(StudyFile, SprungEndsChamberAndCompressionArrive) {
+  std::string content = gel;
+  content.replace(content.find("ends = \"fixed\""), 14,
+                  "ends = \"sprung\"\nbond_normal_kPa_per_mm = 40.0\nbond_tangential_kPa_per_mm = 12.5");
+  content +=
+      "bulk_modulus_kPa = 2000.0\n[chamber]\nsealing_pressure_kPa = 0.5\ncompliance_mL_per_kPa = 30.0\n";
+  const Study study = read(content);
+  const auto& annulus = std::get<AnnulusSpecimen>(study.specimen);
+  ASSERT_TRUE(annulus.end_springs);
+  EXPECT_EQ(annulus.end_springs->normal_kPa_per_mm, 40.0);
+  EXPECT_EQ(annulus.end_springs->tangential_kPa_per_mm, 12.5);
+  ASSERT_TRUE(study.chamber);
+  EXPECT_EQ(study.chamber->sealing_pressure_kPa, 0.5);
+  EXPECT_EQ(study.chamber->compliance_mL_per_kPa, 30.0);
+  EXPECT_EQ(study.compression.bulk_modulus_kPa, 2000.0);
+  const Study plain = read(gel);
+  EXPECT_FALSE(std::get<AnnulusSpecimen>(plain.specimen).end_springs);
+  EXPECT_FALSE(plain.chamber);
+  EXPECT_FALSE(plain.compression.bulk_modulus_kPa);
+}
+
+TEST_F(StudyFile, LoadsAndSupportsThatCannotBeAreRefused) {
+  EXPECT_THAT(message_with("\"fixed\"", "\"sprung\""), HasSubstr("bond_normal_kPa_per_mm"));
+  EXPECT_THAT(message_with("\"fixed\"", "\"sprung\"\nbond_normal_kPa_per_mm = -1.0"),
+              HasSubstr("bond_normal_kPa_per_mm"));
+  EXPECT_THAT(message_with("\"fixed\"", "\"fixed\"\nbond_normal_kPa_per_mm = 1.0"),
+              HasSubstr("bond_normal_kPa_per_mm"));
+  EXPECT_THAT(message_with("effects = []", "[chamber]\ncompliance_mL_per_kPa = 0.0"),
+              HasSubstr("compliance_mL_per_kPa"));
+  EXPECT_THAT(message_with("effects = []", "bulk_modulus_kPa = 0.0"), HasSubstr("bulk_modulus_kPa"));
+  EXPECT_THAT(message_with("effects = []", "bulk_modulus_kPa = 100.0\nvolume_stiffness_kPa = 20.0"),
+              HasSubstr("would add to the bulk modulus"));
+}
+
 constexpr const char* ventricle = R"(format = "diastole-study"
 version = 1
 [specimen]

@@ -1,0 +1,14 @@
+#pragma once
+// What one equilibrium is told as in --json documents.
+
+#include <nlohmann/json.hpp>
+
+#include "estimator/fe/elastic_model.hpp"
+
+namespace diastole {
+
+/// Adds to `json`: cavity and chamber (pressures in kPa, volumes in mL), stored energies, and the forces of supports
+/// and fluids in N, which add up to `unbalanced_N`.
+void add_equilibrium(nlohmann::ordered_json& json, ElasticModel& model, const ElasticState& state);
+
+}  // namespace diastole

@@ -1,0 +1,38 @@
+#include "estimator/cli/study_options.hpp"
+
+#include <fmt/format.h>
+
+#include <cstdio>
+
+namespace diastole {
+
+void add_study_options(CLI::App& command, StudyOptions& options) {
+  command.add_option("STUDY", options.study, "study file (*.study.toml)")->required();
+  command.add_option("--set", options.starts, "NAME=VALUE: another parameter value; may be repeated")
+      ->allow_extra_args(false);
+  command.add_option("--mesh", options.mesh, "elements around, along, through the wall, as 8,8,4");
+}
+
+Study read_study(const StudyOptions& options) {
+  Study study = read_study(std::filesystem::path(options.study));
+  for (const std::string& start : options.starts)
+    set_start(study, start);
+  if (!options.mesh.empty()) set_mesh(study, options.mesh);
+  return study;
+}
+
+SolveOptions with_progress(std::string_view command) {
+  constexpr double patience_s = 2.0;
+  using Clock = std::chrono::steady_clock;
+  SolveOptions options;
+  options.on_iteration = [begun = Clock::now(), command](double pressure_kPa,
+                                                         const NewtonIteration& iteration) {
+    const double elapsed_s = std::chrono::duration<double>(Clock::now() - begun).count();
+    if (elapsed_s < patience_s) return;
+    fmt::print(stderr, "{}: {:.3g} kPa, correction {:.1e}, {:.0f} s\n", command, pressure_kPa, iteration.step,
+               elapsed_s);
+  };
+  return options;
+}
+
+}  // namespace diastole

@@ -1,0 +1,32 @@
+#pragma once
+// The options that every command on a study's forward model has: other parameter values, another mesh, progress.
+
+#include <CLI/CLI.hpp>
+#include <chrono>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "estimator/fe/elastic_model.hpp"
+#include "estimator/io/study.hpp"
+
+namespace diastole {
+
+struct StudyOptions {
+  std::string study;
+  std::vector<std::string> starts;
+  std::string mesh;
+};
+
+/// Adds STUDY, --set and --mesh. `options` must live until the command has run.
+void add_study_options(CLI::App& command, StudyOptions& options);
+
+/// The study with its replaced values. Throws InputError.
+Study read_study(const StudyOptions& options);
+
+/// A line on standard error for each Newton iteration, once the work has lasted longer than people like to
+/// wait. `command` begins the line.
+SolveOptions with_progress(std::string_view command);
+
+}  // namespace diastole
