@@ -1,6 +1,11 @@
 #include "estimator/fe/sparse_factor.hpp"
 
 #include <dmumps_c.h>
+
+#include <cstdio>
+// after cstdio: it names FILE
+#include <scotch/scotch.h>
+
 #include <new>
 #include <stdexcept>
 #include <string>
@@ -82,6 +87,7 @@ FactorResult SparseFactor::factorise(std::span<double> values) {
   constexpr int work_space_percent = 14;
   mumps.a = values.data();
   if (!instance_->analysed) {
+    SCOTCH_randomReset();  // else the ordering, and the last bits of solutions, depend on what was solved before
     instance_->check(instance_->run(analyse));
     instance_->analysed = true;
   }
