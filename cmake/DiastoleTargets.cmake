@@ -20,6 +20,23 @@ function(diastole_program name)
   target_link_libraries(${name} PRIVATE diastole_options ${ARG_LIBS})
 endfunction()
 
+# diastole_embed(VARIABLE HEADER h.hpp NAMESPACE n FILES name=path ...)
+# Puts files into the program as string_views that the header declares; VARIABLE becomes the source that defines them.
+function(diastole_embed variable)
+  cmake_parse_arguments(ARG "" "HEADER;NAMESPACE" "FILES" ${ARGN})
+  set(script ${CMAKE_SOURCE_DIR}/cmake/embed_files.cmake)
+  set(output ${CMAKE_CURRENT_BINARY_DIR}/embedded.cpp)
+  string(REPLACE ";" "|" pairs "${ARG_FILES}")
+  list(TRANSFORM ARG_FILES REPLACE "^[^=]+=" "" OUTPUT_VARIABLE paths)
+  add_custom_command(
+    OUTPUT ${output}
+    COMMAND ${CMAKE_COMMAND} -DOUTPUT=${output} -DHEADER=${ARG_HEADER} -DNAMESPACE=${ARG_NAMESPACE}
+            "-DPAIRS=${pairs}" -P ${script}
+    DEPENDS ${script} ${paths}
+    VERBATIM)
+  set(${variable} ${output} PARENT_SCOPE)
+endfunction()
+
 # diastole_test(NAME SOURCES a.cpp ... [LIBS x ...] [LABELS slow ...] [TIMEOUT seconds])
 # A GoogleTest program whose cases are single ctest entries. Label "slow": only in `tools/check --full`.
 function(diastole_test name)

@@ -150,16 +150,23 @@ void Acquisition::take(const Received& received) {
   for (size_t i = 0; i < received.volts.size(); ++i) {
     const ChannelConfig& channel = setup_.channels[i % channels];
     block_.value_kPa.push_back((received.volts[i] - channel.zero_V) * channel.kPa_per_V);
-    if (i % channels == 0 && live_filter_)
-      outcome_.counts.filtered_kPa = live_filter_->push(block_.value_kPa.back());
+    if (i % channels == 0) show(received.host_ns[i / channels], block_.value_kPa.back());
   }
   outcome_.counts.received += received.host_ns.size();
   outcome_.counts.last_kPa = block_.value_kPa[block_.value_kPa.size() - channels];
   if (block_.host_ns.back() - block_.host_ns.front() >= block_span_ns) close_block();
 }
 
+void Acquisition::show(uint64_t host_ns, double kPa) {
+  if (live_filter_) outcome_.counts.filtered_kPa = live_filter_->push(kPa);
+  if (setup_.live == nullptr) return;
+  setup_.live->sample(host_ns, kPa,
+                      live_filter_ ? outcome_.counts.filtered_kPa : std::numeric_limits<double>::quiet_NaN());
+}
+
 void Acquisition::take(const Missing& missing) {
   close_block();
+  if (setup_.live != nullptr) setup_.live->gap();
   if (live_filter_) (void)live_filter_->push(std::numeric_limits<double>::quiet_NaN());
   if (gap_ && gap_->reason != missing.reason) close_gap();
   if (!gap_) gap_ = OpenGap{missing.first_index, 0, missing.reason};
@@ -184,6 +191,7 @@ void Acquisition::take(const Trouble& trouble) { remark("warning", "instrument",
 void Acquisition::watch_gate() {
   if (!gate_) return;
   note(gate_->look(clock_.now_ns(), {outcome_.counts.triggers, stopped_by_estop_}));
+  outcome_.counts.gate_pulses = gate_->pulses();
 }
 
 void Acquisition::close_gate() {
@@ -233,6 +241,7 @@ void Acquisition::take(const ControllerEvent& event) {
   std::visit(
       wire::overloaded{
           [&](const ClockReading& e) {
+            if (setup_.live != nullptr) setup_.live->clock(e);
             document({{"record", "clock"},
                       {"host_ns", e.host_ns},
                       {"tick", e.tick},
@@ -240,6 +249,7 @@ void Acquisition::take(const ControllerEvent& event) {
           },
           [&](const wire::RunStarted& e) {
             started_ = true;
+            if (setup_.live != nullptr) setup_.live->run_started(e.tick);
             deadline_ns_ = clock_.now_ns() +
                            static_cast<uint64_t>((setup_.planned_duration_s + end_patience_s) * ns_per_s);
             document({{"record", "run_started"}, {"tick", e.tick}});
@@ -249,6 +259,7 @@ void Acquisition::take(const ControllerEvent& event) {
           },
           [&](const wire::Trigger& e) {
             ++outcome_.counts.triggers;
+            if (setup_.live != nullptr) setup_.live->trigger(e.tick);
             document({{"record", "trigger"}, {"cycle", e.cycle}, {"tick", e.tick}, {"r_wave", e.r_wave}});
             take_cycle(e.cycle);
           },

@@ -15,6 +15,7 @@
 
 #include "host/acquisition/journal.hpp"
 #include "host/acquisition/journal_records.hpp"
+#include "host/acquisition/live_trace.hpp"
 #include "host/acquisition/sample_source.hpp"
 #include "host/acquisition/slice_tracker.hpp"
 #include "host/config/rig_config.hpp"
@@ -48,8 +49,9 @@ struct RunProgress {
   uint64_t received = 0;  ///< samples
   uint64_t missing = 0;
   uint64_t triggers = 0;
-  double last_kPa = 0;      ///< of the first channel
-  double filtered_kPa = 0;  ///< the same, low-passed forward, some 13 ms late (low_pass.hpp)
+  std::optional<uint64_t> gate_pulses;  ///< that the host itself counted on the gating line
+  double last_kPa = 0;                  ///< of the first channel
+  double filtered_kPa = 0;              ///< the same, low-passed forward, some 13 ms late (low_pass.hpp)
   std::optional<ScheduleProgress> schedule;
 };
 
@@ -69,6 +71,7 @@ struct AcquisitionSetup {
   GateInputs* gate = nullptr;             ///< what the host sees of gating line and emergency stop, or null
   double planned_duration_s = 0;          ///< a run that has not ended well after this is broken off
   std::vector<PlannedSlice> slices = {};  ///< empty: no schedule
+  LiveTrace* live = nullptr;              ///< shown to whoever looks on, or null
 };
 
 class Acquisition {
@@ -98,6 +101,7 @@ class Acquisition {
   void tell_schedule();
   void take_samples(std::vector<SourceItem> items);
   void take(const Received& received);
+  void show(uint64_t host_ns, double kPa);
   void take(const Missing& missing);
   void take(const InstrumentTime& time);
   void take(const Trouble& trouble);

@@ -5,6 +5,7 @@ namespace diastole {
 void add_host_commands(CommandLine& line) {
   add_flash(line);
   add_daemon(line);
+  add_console(line);
   add_zero(line);
   add_calibrate(line);
   add_home(line);

@@ -8,6 +8,7 @@ namespace diastole {
 void add_flash(CommandLine& line);
 void add_calibrate(CommandLine& line);
 void add_daemon(CommandLine& line);
+void add_console(CommandLine& line);
 void add_zero(CommandLine& line);
 void add_run(CommandLine& line);
 void add_status(CommandLine& line);

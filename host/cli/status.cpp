@@ -48,8 +48,9 @@ void show_status(const nlohmann::json& status, bool as_json) {
   if (const nlohmann::json problem = status.value("settings_problem", nlohmann::json()); !problem.is_null())
     fmt::print("settings  {}\n", problem.get<std::string>());
   if (const nlohmann::json control = status.value("control", nlohmann::json()); !control.is_null()) {
-    fmt::print("control   {} (process {})\n", control.at("user").get<std::string>(),
-               control.at("pid").get<int64_t>());
+    fmt::print("control   {} ({})\n", control.at("user").get<std::string>(),
+               control.contains("console") ? "console at " + control.at("console").get<std::string>()
+                                           : fmt::format("process {}", control.at("pid").get<int64_t>()));
   }
   fmt::print("firmware  {} at {}\n", status.at("firmware").get<std::string>(),
              status.at("controller").get<std::string>());

@@ -156,11 +156,13 @@ GpioConfig read_gpio(TableReader table) {
 }
 
 DaemonConfig read_daemon(std::optional<TableReader> table) {
-  DaemonConfig daemon{.socket = default_socket(), .journal_dir = "journals", .control_group = ""};
+  DaemonConfig daemon{
+      .socket = default_socket(), .journal_dir = "journals", .console = {}, .control_group = ""};
   if (!table) return daemon;
   daemon.socket = table->text_or("socket", daemon.socket);
   daemon.journal_dir = table->text_or("journal_dir", daemon.journal_dir.string());
   daemon.keep_days = table->integer_or("keep_days", daemon.keep_days, {.at_least = 0, .at_most = 36'500});
+  if (table->has("console")) daemon.console = table->text("console");
   daemon.control_group = table->text_or("control_group", daemon.control_group);
   table->finish();
   return daemon;

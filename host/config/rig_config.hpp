@@ -51,7 +51,8 @@ struct DaqConfig {
 struct DaemonConfig {
   std::string socket;
   std::filesystem::path journal_dir;
-  int64_t keep_days = 30;     ///< a journal, after its run file was written; 0: for ever
+  int64_t keep_days = 30;              ///< a journal, after its run file was written; 0: for ever
+  std::optional<std::string> console;  ///< [ADDRESS:]PORT of the web console; none: there is none
   std::string control_group;  ///< whose members may control the rig beside root and the daemon's user
 };
 

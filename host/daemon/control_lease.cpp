@@ -12,7 +12,11 @@ namespace {
       rpc::Code::control_held,
       fmt::format("the rig is controlled by {0}; if that is agreed, take it over: --take-over {1}",
                   in_words(holder), holder.user),
-      {{"user", holder.user}, {"uid", holder.uid}, {"pid", holder.pid}});
+      as_json(holder));
+}
+
+bool means(const std::string& named, const Peer& holder) {
+  return named == holder.user || (holder.console.empty() && named == fmt::to_string(holder.pid));
 }
 
 }  // namespace
@@ -25,9 +29,7 @@ void ControlLease::claim(uint64_t connection, const Peer& peer) {
 std::optional<Peer> ControlLease::take_over(uint64_t connection, const Peer& peer, const std::string& named) {
   const std::optional<Holder> before = holder_;
   const bool from_another = before && before->connection != connection;
-  if (from_another && named != before->peer.user && named != fmt::to_string(before->peer.pid)) {
-    refuse(before->peer);
-  }
+  if (from_another && !means(named, before->peer)) refuse(before->peer);
   holder_ = Holder{connection, peer};
   return from_another ? std::optional(before->peer) : std::nullopt;
 }

@@ -13,8 +13,10 @@
 #include "host/config/rig_config.hpp"
 #include "host/daemon/daemon_log.hpp"
 #include "host/daemon/rig_service.hpp"
+#include "host/daemon/rpc_session.hpp"
 #include "host/daemon/server.hpp"
 #include "host/daemon/service_manager.hpp"
+#include "host/web/console.hpp"
 
 namespace diastole {
 namespace {
@@ -23,6 +25,7 @@ RigConfig configured(const DaemonOptions& options) {
   RigConfig rig = read_rig(options.config);
   if (options.port) rig.controller.port = *options.port;
   if (options.socket) rig.daemon.socket = *options.socket;
+  if (options.console) rig.daemon.console = *options.console;
   if (options.journal_dir) rig.daemon.journal_dir = *options.journal_dir;
   return rig;
 }
@@ -68,6 +71,16 @@ class Ending {
   bool begun_ = false;
 };
 
+/// If one is wanted; `by_option`: on the command line.
+std::optional<web::ConsoleServer> open_console(const RigConfig& config, bool by_option,
+                                               const std::shared_ptr<Reception>& reception) {
+  if (!config.daemon.console) return std::nullopt;
+  const web::ConsoleAddress address =
+      by_option ? web::parse_console_address(*config.daemon.console, "--console", "")
+                : web::parse_console_address(*config.daemon.console, config.file, "daemon.console");
+  return std::optional<web::ConsoleServer>(std::in_place, reception, address);
+}
+
 /// Says again and again that the server's thread is alive.
 class ServerPulse {
  public:
@@ -102,8 +115,12 @@ void run_daemon(const DaemonOptions& options) {
   RigService rig(config, {options.conductor, options.daq_address, options.producer, &manager});
   Ending ending(context, rig, signals, manager);
   const ServerPulse pulse(context, manager);
-  const RpcServer server(context, rig, config.daemon.socket, policy);
-  std::cout << nlohmann::json{{"ready", true}, {"socket", config.daemon.socket}}.dump() << std::endl;
+  const auto reception = std::make_shared<Reception>(Reception{context, rig, policy});
+  const RpcServer server(reception, config.daemon.socket);
+  const auto console = open_console(config, options.console.has_value(), reception);
+  nlohmann::json ready{{"ready", true}, {"socket", config.daemon.socket}};
+  if (console) ready["console"] = reception->console;
+  std::cout << ready.dump() << std::endl;
   manager.ready();
   context.run();
 }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 #include "host/daemon/json_rpc.hpp"
 #include "protocol/contract/input_error.hpp"
@@ -65,6 +66,33 @@ void run_start(RigService& rig, const json& params, Done done) {
 
 void run_progress(RigService& rig, const json& params, const Done& done) {
   done(nullptr, rig.run_progress(params.value("first_remark", size_t{0})));
+}
+
+/// To a tenth of a millisecond and of a pascal; null for NaN.
+json rounded(double value) {
+  if (std::isnan(value)) return nullptr;
+  return std::round(1e4 * value) / 1e4;
+}
+
+void run_trace(RigService& rig, const json& params, const Done& done) {
+  const LiveTrace::Excerpt excerpt =
+      rig.live().since(params.value("run_id", ""), params.value("first_row", uint64_t{0}),
+                       params.value("first_trigger", uint64_t{0}));
+  json time_s = json::array(), kPa = json::array(), filtered_kPa = json::array(), trigger_s = json::array();
+  for (const LiveTrace::Row& each : excerpt.rows) {
+    time_s.push_back(rounded(each.time_s));
+    kPa.push_back(rounded(each.kPa));
+    filtered_kPa.push_back(rounded(each.filtered_kPa));
+  }
+  for (const double each : excerpt.trigger_s)
+    trigger_s.push_back(rounded(each));
+  done(nullptr, {{"run_id", excerpt.run_id},
+                 {"first_row", excerpt.first_row},
+                 {"time_s", time_s},
+                 {"kPa", kPa},
+                 {"filtered_kPa", filtered_kPa},
+                 {"first_trigger", excerpt.first_trigger},
+                 {"trigger_s", trigger_s}});
 }
 
 void run_stop(RigService& rig, const json& params, const Done& done) {

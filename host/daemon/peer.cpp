@@ -46,7 +46,15 @@ Peer peer_of(int socket) {
   return peer;
 }
 
-std::string in_words(const Peer& peer) { return fmt::format("{} (process {})", peer.user, peer.pid); }
+std::string in_words(const Peer& peer) {
+  if (peer.console.empty()) return fmt::format("{} (process {})", peer.user, peer.pid);
+  return fmt::format("{} (console at {})", peer.user.empty() ? "somebody" : peer.user, peer.console);
+}
+
+nlohmann::json as_json(const Peer& peer) {
+  if (peer.console.empty()) return {{"user", peer.user}, {"uid", peer.uid}, {"pid", peer.pid}};
+  return {{"user", peer.user}, {"console", peer.console}};
+}
 
 ControlPolicy::ControlPolicy(const std::string& group, const std::string& file) : own_(::geteuid()) {
   if (group.empty()) return;
@@ -61,6 +69,7 @@ ControlPolicy::ControlPolicy(const std::string& group, const std::string& file) 
 }
 
 bool ControlPolicy::may_control(const Peer& peer) const {
+  if (!peer.console.empty()) return peer.role == ConsoleRole::control;
   if (peer.uid == 0 || peer.uid == own_) return true;
   return group_ && std::find(peer.groups.begin(), peer.groups.end(), *group_) != peer.groups.end();
 }

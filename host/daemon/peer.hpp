@@ -1,29 +1,39 @@
 #pragma once
-// Who is at the other end of a unix socket, as the kernel vouches for it (SO_PEERCRED, SO_PEERGROUPS).
+// Who is at the other end: of a unix socket, as the kernel vouches for it (SO_PEERCRED, SO_PEERGROUPS); of the web
+// console, as the token says and as the operator calls himself.
 
 #include <sys/types.h>
 
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 #include <vector>
 
 namespace diastole {
 
+/// Whom a browser is let in as.
+enum class ConsoleRole { control, watch };
+
 struct Peer {
   uid_t uid = static_cast<uid_t>(-1);  ///< -1: unknown
   pid_t pid = 0;
   std::vector<gid_t> groups;  ///< primary and supplementary
-  std::string user;           ///< name, or the number if it has none
+  std::string user;           ///< name, or the number if it has none; at a console: what was typed, or empty
+  std::string console = {};   ///< the browser's address; empty: at the unix socket
+  ConsoleRole role = ConsoleRole::watch;  ///< at a console
 };
 
 /// Of a connected socket. Never throws: what cannot be found out stays unknown, and may do nothing.
 Peer peer_of(int socket);
 
-/// "anna (process 1234)".
+/// "anna (process 1234)", "anna (console at 127.0.0.1)".
 std::string in_words(const Peer& peer);
 
-/// Who may give orders: root, the user that runs the daemon, and the members of one group, if it is named;
-/// all others observe and may stop.
+/// For clients: {"user", "uid", "pid"}, or {"user", "console"}.
+nlohmann::json as_json(const Peer& peer);
+
+/// Who may give orders: root, the user that runs the daemon, the members of one group, if it is named, and
+/// whoever came to the console with the token for it; all others observe and may stop.
 class ControlPolicy {
  public:
   /// `group` empty: none. Throws InputError naming `file` if there is no such group.

@@ -406,7 +406,9 @@ void RigService::note(const RunRemark& what) {
 
 void RigService::keep(const RunRemark& remark) {
   const std::lock_guard lock(mutex_);
-  if (run_->remarks.size() < most_remarks) run_->remarks.push_back(remark);
+  if (run_->remarks.size() >= most_remarks) return;
+  run_->remarks.push_back(
+      {{"utc", utc_now()}, {"level", remark.level}, {"code", remark.code}, {"text", remark.text}});
 }
 
 bool RigService::stop(StopRequest how) {
@@ -443,8 +445,7 @@ json RigService::run_progress(size_t first_remark) const {
   json remarks = json::array();
   const size_t first = std::min(first_remark, run_->remarks.size());
   for (size_t i = first; i < std::min(run_->remarks.size(), first + remarks_at_once); ++i) {
-    const RunRemark& remark = run_->remarks[i];
-    remarks.push_back({{"level", remark.level}, {"code", remark.code}, {"text", remark.text}});
+    remarks.push_back(run_->remarks[i]);
   }
   return {{"run_id", run_->run_id},
           {"state", run_->state},
@@ -453,6 +454,7 @@ json RigService::run_progress(size_t first_remark) const {
           {"received", run_->progress.received},
           {"missing", run_->progress.missing},
           {"triggers", run_->progress.triggers},
+          {"gate_pulses", run_->progress.gate_pulses ? json(*run_->progress.gate_pulses) : json()},
           {"last_kPa", run_->progress.last_kPa},
           {"filtered_kPa", run_->progress.filtered_kPa},
           {"schedule", schedule_as_json(run_->progress.schedule)},
@@ -590,6 +592,7 @@ void RigService::do_run(const Experiment& experiment, const Done& done) {
       std::filesystem::absolute(rig_.daemon.journal_dir) / (record.run_id + ".journal");
   JournalWriter journal(path);
   write_beginning(journal, record, experiment, plan, rate.rate_Hz);
+  live_.begin(record.run_id, rate.rate_Hz, controller_->hello().tick_rate_Hz);
   if (!begin(record)) {
     std::filesystem::remove(path);
     controller_->unload();
@@ -696,9 +699,9 @@ RunOutcome RigService::acquire(JournalWriter& journal, const Experiment& experim
   std::vector<std::string> warnings;
   if (!rate.warning.empty()) warnings.push_back(rate.warning);
   const auto samples = make_source(*clock_, *instrument_);
-  Acquisition acquisition(
-      *clock_, *controller_, *samples, journal,
-      {rate.rate_Hz, rig_.daq.channels, std::move(warnings), gate_.get(), planned_s, std::move(slices)});
+  Acquisition acquisition(*clock_, *controller_, *samples, journal,
+                          {rate.rate_Hz, rig_.daq.channels, std::move(warnings), gate_.get(), planned_s,
+                           std::move(slices), &live_});
   return acquisition.run({
       .stop =
           [this] {

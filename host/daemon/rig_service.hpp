@@ -19,6 +19,7 @@
 #include <vector>
 
 #include "host/acquisition/acquisition.hpp"
+#include "host/acquisition/live_trace.hpp"
 #include "host/calibration/calibration.hpp"
 #include "host/config/experiment.hpp"
 #include "host/config/rig_config.hpp"
@@ -96,9 +97,11 @@ class RigService {
   /// Tells the log, and while a run is on its events and whoever follows it.
   void note(const RunRemark& what);
   /// The present or last run: {"run_id", "state": running|writing|done|failed, "received", "missing",
-  /// "triggers", "last_kPa", "filtered_kPa", "schedule" (null without one), "remarks": at most remarks_at_once from number `first_remark` on, "result"}. null
+  /// "triggers", "gate_pulses" (null if not counted), "last_kPa", "filtered_kPa", "schedule" (null without one), "remarks": at most remarks_at_once from number `first_remark` on, "result"}. null
   /// if there was none. Of a run's remarks the first most_remarks are kept here; its file has all.
   [[nodiscard]] nlohmann::json run_progress(size_t first_remark) const;
+  /// The newest pressure of the present or last run.
+  [[nodiscard]] const LiveTrace& live() const { return live_; }
 
  private:
   struct Order {
@@ -113,7 +116,7 @@ class RigService {
     double estimate_s = 0;  ///< without that
     int64_t planned_cycles = 0;
     RunProgress progress;
-    std::vector<RunRemark> remarks;
+    nlohmann::json remarks = nlohmann::json::array();  ///< {"utc", "level", "code", "text"}
     nlohmann::json result;
   };
 
@@ -172,6 +175,7 @@ class RigService {
   StopRequest stop_request_ = StopRequest::none;
   std::optional<size_t> go_on_;  // the slice that the operator is ready for
   std::optional<RunRecord> run_;
+  LiveTrace live_;
   nlohmann::json last_status_;
   nlohmann::json notice_;  ///< as in status
   nlohmann::json journals_;

@@ -33,12 +33,12 @@ bool somebody_listens(const std::string& socket) {
 
 class RpcServer::Listener : public std::enable_shared_from_this<Listener> {
  public:
-  Listener(asio::io_context& context, RigService& rig, std::string path, const ControlPolicy& policy)
-      : reception_(std::make_shared<Reception>(Reception{context, rig, policy})),
+  Listener(std::shared_ptr<Reception> reception, std::string path)
+      : reception_(std::move(reception)),
         path_(std::move(path)),
-        acceptor_(context),
-        pause_(context),
-        sweep_(context) {
+        acceptor_(reception_->context),
+        pause_(reception_->context),
+        sweep_(reception_->context) {
     if (std::filesystem::exists(path_) && somebody_listens(path_)) {
       throw HardwareError(path_, "another daemon listens at this socket",
                           "Stop it, or choose another `socket` in [daemon].");
@@ -68,7 +68,7 @@ class RpcServer::Listener : public std::enable_shared_from_this<Listener> {
     pause_.cancel();
     sweep_.cancel();
     ::unlink(path_.c_str());
-    for (const auto& [number, connection] : std::exchange(reception_->connections, {}))
+    for (const auto& [number, connection] : std::exchange(*connections_, {}))
       connection->close();
   }
 
@@ -78,9 +78,9 @@ class RpcServer::Listener : public std::enable_shared_from_this<Listener> {
       if (error == asio::error::operation_aborted || !self->acceptor_.is_open()) return;
       if (error) return self->accept_later(error);
       self->make_room();
-      const uint64_t number = ++self->last_number_;
-      const auto connection = std::make_shared<Connection>(number, self->reception_, std::move(socket));
-      self->reception_->connections[number] = connection;
+      const auto connection =
+          std::make_shared<Connection>(self->reception_, self->connections_, std::move(socket));
+      self->connections_->emplace(connection->number(), connection);
       connection->read();
       self->accept();
     });
@@ -96,10 +96,10 @@ class RpcServer::Listener : public std::enable_shared_from_this<Listener> {
   }
 
   void make_room() {
-    const auto& all = reception_->connections;
+    const auto& all = *connections_;
     if (all.size() < most_connections) return;
     const auto rank = [](const auto& entry) {
-      return std::pair(entry.second->controls(), entry.second->last_line());
+      return std::pair(entry.second->controls(), entry.second->last_request());
     };
     const auto idlest = std::min_element(all.begin(), all.end(),
                                          [&](const auto& a, const auto& b) { return rank(a) < rank(b); });
@@ -112,7 +112,7 @@ class RpcServer::Listener : public std::enable_shared_from_this<Listener> {
     sweep_.async_wait([self = shared_from_this()](error_code cancelled) {
       if (cancelled) return;
       std::vector<std::shared_ptr<Connection>> all;
-      for (const auto& [number, connection] : self->reception_->connections)
+      for (const auto& [number, connection] : *self->connections_)
         all.push_back(connection);
       for (const auto& connection : all)
         connection->check(std::chrono::steady_clock::now());
@@ -121,16 +121,15 @@ class RpcServer::Listener : public std::enable_shared_from_this<Listener> {
   }
 
   std::shared_ptr<Reception> reception_;
+  std::shared_ptr<Connections> connections_ = std::make_shared<Connections>();
   std::string path_;
   stream_protocol::acceptor acceptor_;
   asio::steady_timer pause_;
   asio::steady_timer sweep_;
-  uint64_t last_number_ = 0;
 };
 
-RpcServer::RpcServer(asio::io_context& context, RigService& rig, const std::string& socket,
-                     const ControlPolicy& policy)
-    : listener_(std::make_shared<Listener>(context, rig, socket, policy)) {
+RpcServer::RpcServer(std::shared_ptr<Reception> reception, const std::string& socket)
+    : listener_(std::make_shared<Listener>(std::move(reception), socket)) {
   listener_->begin();
 }
 

@@ -15,8 +15,17 @@
 //   rig.settings                                    anybody       RigService::settings
 //   rig.write_settings {set: {name: value}, defaults} controller  RigService::settings
 //   rig.black_box                                   anybody       RigService::black_box
-//   control.take    {take_over: who holds it}       controller    {user, uid, pid}
+//   run.trace       {run_id, first_row, first_trigger}
+//                                                   anybody       {run_id, first_row, time_s, kPa, filtered_kPa,
+//                                                                  first_trigger, trigger_s}: columns, as
+//                                                                  LiveTrace::since; null: a sample is missing
+//   control.take    {take_over: who holds it}       controller    {user, uid, pid, own}, or {user, console, own}
 //   control.release                                 anybody       {}
+//   console.sign_in {name}                          consoles      {user, console}
+//   console.address                                 who may control, at the socket
+//                                                                 {control, watch}: addresses with tokens; or null
+//
+// The web console speaks the same in text messages of a WebSocket (host/web/console.hpp); these rules hold for both.
 //
 // Who may control: root, the user that runs the daemon, and the members of [daemon] control_group
 // (SO_PEERCRED, SO_PEERGROUPS); all others observe and may stop. The first connection that gives an order
@@ -29,14 +38,12 @@
 // leaves unread, its requests a second and the time for a line; beyond most_connections the one that has said
 // nothing for longest gives way.
 
-#include <boost/asio/io_context.hpp>
 #include <memory>
 #include <string>
 
-#include "host/daemon/peer.hpp"
-#include "host/daemon/rig_service.hpp"
-
 namespace diastole {
+
+struct Reception;
 
 class RpcServer {
  public:
@@ -44,8 +51,7 @@ class RpcServer {
 
   /// Listens at `socket`; a socket left behind by a dead daemon is replaced. Throws HardwareError if another
   /// daemon listens there or the path cannot be used.
-  RpcServer(boost::asio::io_context& context, RigService& rig, const std::string& socket,
-            const ControlPolicy& policy);
+  RpcServer(std::shared_ptr<Reception> reception, const std::string& socket);
   ~RpcServer();
 
  private:

@@ -38,6 +38,11 @@ class GateCheck {
   [[nodiscard]] std::vector<GateRemark> close(uint64_t now_ns, const ControllerWitness& controller,
                                               std::optional<uint64_t> triggers_raised);
 
+  /// Pulses counted on the gating line; none if it is not wired to the host.
+  [[nodiscard]] std::optional<uint64_t> pulses() const {
+    return inputs_.counts_pulses() ? std::optional(pulses_) : std::nullopt;
+  }
+
  private:
   void take(std::vector<GateRemark>& out, uint64_t now_ns);
 

@@ -66,7 +66,7 @@ void HostileClients::attack(unsigned seed, double messages_a_second) {
         ++sent_;
         const ssize_t got = reads ? ::recv(connection.get(), answers.data(), answers.size(), 0) : 0;
         const std::string_view told(answers.data(), static_cast<size_t>(got > 0 ? got : 0));
-        if (told.find("\"result\":{\"pid\"") != std::string_view::npos) ++granted_;
+        if (told.find("\"result\":{\"own\":true") != std::string_view::npos) ++granted_;
         std::this_thread::sleep_until(
             begun + std::chrono::duration_cast<Clock::duration>(
                         std::chrono::duration<double>(static_cast<double>(++own) / messages_a_second)));

@@ -46,6 +46,7 @@ void RigWithDaemon::start_daemon(const std::vector<std::string>& before) {
                                      "127.0.0.1:" + std::to_string(modbus_port_), "--socket", path("socket"),
                                      "--journal-dir", "journals"});
   if (time_ == Time::conducted) arguments.insert(arguments.end(), {"--conductor", path("time")});
+  arguments.insert(arguments.end(), daemon_options.begin(), daemon_options.end());
   daemon = std::make_unique<Program>(place, arguments);
   ASSERT_TRUE(daemon->wait_for_text("ready")) << daemon->err();
 }

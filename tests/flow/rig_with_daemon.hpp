@@ -32,6 +32,7 @@ class RigWithDaemon {
   [[nodiscard]] std::string path(const std::string& name) const { return (place / name).string(); }
 
   Workplace place;
+  std::vector<std::string> daemon_options;  ///< more of them
   std::unique_ptr<Program> daemon;
 
  private:

@@ -47,10 +47,11 @@ void SessionOnDesk::run(const std::function<StopRequest()>& stop) {
   (void)writer.append(RecordKind::document, beginning.dump());
   std::vector<PlannedSlice> slices;
   if (experiment.schedule) slices = planned_slices(*experiment.schedule);
+  if (live != nullptr) live->begin("desk", experiment.sample_rate_Hz, client.hello().tick_rate_Hz);
   const auto samples = make_source(clock, instrument);
   Acquisition acquisition(
       clock, client, *samples, writer,
-      {experiment.sample_rate_Hz, rig.daq.channels, {}, gate, experiment.least_duration_s(), slices});
+      {experiment.sample_rate_Hz, rig.daq.channels, {}, gate, experiment.least_duration_s(), slices, live});
   outcome = acquisition.run({.stop = stop,
                              .go_on = go_on,
                              .progress = [](const RunProgress&) {},

@@ -26,6 +26,7 @@ struct SessionOnDesk {
   JournalWriter::Write write = ::write;      ///< likewise
   std::function<std::optional<size_t>()> go_on = [] { return std::optional<size_t>(); };
   GateInputs* gate = nullptr;
+  LiveTrace* live = nullptr;  ///< of run "desk"
   std::vector<RunRemark> remarks;
   RunOutcome outcome;
 

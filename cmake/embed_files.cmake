@@ -1,6 +1,7 @@
-# Writes embedded.cpp: each file of PAIRS ("name=path", separated by |) as a string_view in its namespace.
-#   cmake -DOUTPUT=embedded.cpp -DPAIRS="page_css=page.css|page_js=page.js" -P embed_files.cmake
-set(text "#include \"estimator/report/embedded.hpp\"\n\nnamespace diastole::report::embedded {\n")
+# Writes a C++ file that holds each file of PAIRS ("name=path", separated by |) as a string_view of its namespace.
+#   cmake -DOUTPUT=embedded.cpp -DHEADER=host/web/embedded.hpp -DNAMESPACE=diastole::web::embedded
+#         -DPAIRS="page_css=page.css|page_js=page.js" -P embed_files.cmake
+set(text "#include \"${HEADER}\"\n\nnamespace ${NAMESPACE} {\n")
 string(REPLACE "|" ";" pairs "${PAIRS}")
 foreach(pair IN LISTS pairs)
   string(REGEX MATCH "^([^=]+)=(.+)$" _ "${pair}")

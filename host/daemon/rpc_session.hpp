@@ -1,0 +1,97 @@
+#pragma once
+// One client of the daemon, whichever door it came in by: the unix socket (connection.hpp) or the web console
+// (host/web). Here stand the rules that hold for all: who may give orders, the one control lease, how many requests
+// a second are taken and how many may wait for the rig. A door only carries messages to and fro.
+
+#include <utility>  // before Asio, which uses std::exchange without it
+
+#include <boost/asio.hpp>
+#include <chrono>
+#include <map>
+#include <memory>
+#include <string>
+#include <string_view>
+
+#include "host/daemon/control_lease.hpp"
+#include "host/daemon/json_rpc.hpp"
+#include "host/daemon/peer.hpp"
+#include "host/daemon/quiet_log.hpp"
+#include "host/daemon/rig_service.hpp"
+
+namespace diastole {
+
+/// What all clients share; used on the server's thread only.
+struct Reception {
+  boost::asio::io_context& context;
+  RigService& rig;
+  ControlPolicy policy;
+  ControlLease lease{};
+  QuietLog log{};
+  uint64_t last_number = 0;
+  nlohmann::json console = nullptr;  ///< the answer to console.address
+};
+
+/// Bounds of one client.
+struct SessionBounds {
+  static constexpr size_t most_unread_bytes = 256U << 10;  ///< answers that the client has not read
+  static constexpr int most_pending = 8;                   ///< requests that wait for the rig
+  static constexpr int requests_in_window = 50;            ///< beyond it reading pauses until the next window
+  static constexpr std::chrono::milliseconds window{100};
+  static constexpr std::chrono::seconds write_patience{10};  ///< for a client that does not read
+};
+
+class RpcSession : public std::enable_shared_from_this<RpcSession> {
+ public:
+  using Time = std::chrono::steady_clock::time_point;
+
+  virtual ~RpcSession() = default;
+  RpcSession(const RpcSession&) = delete;
+  RpcSession& operator=(const RpcSession&) = delete;
+
+  [[nodiscard]] uint64_t number() const { return number_; }
+  [[nodiscard]] const Peer& peer() const { return peer_; }
+  [[nodiscard]] Time last_request() const { return last_request_; }
+  [[nodiscard]] bool controls() const;
+
+ protected:
+  RpcSession(std::shared_ptr<Reception> reception, Peer peer);
+
+  /// Whether a request may be taken now; if not, take_more() is called when one may.
+  [[nodiscard]] bool may_take();
+  /// Carries out one request; the answer comes through send(), now or later.
+  void answer(std::string_view request);
+  /// The client is gone: it controls nothing any more.
+  void leave();
+  [[nodiscard]] int pending() const { return pending_; }
+  [[nodiscard]] Reception& reception() const { return *reception_; }
+  /// Whether answers of so many bytes in so many messages may wait for the client to read them.
+  [[nodiscard]] static bool too_much_unread(size_t messages, size_t bytes);
+
+  virtual void send(std::string message) = 0;
+  virtual void take_more() = 0;
+
+ private:
+  void dispatch(const rpc::Request& request);
+  /// Requests about the client itself; false if it is none.
+  bool dispatch_own(const rpc::Request& request);
+  void take_control(const rpc::Request& request);
+  void sign_in(const rpc::Request& request);
+  void require_permission() const;
+  nlohmann::json control() const;
+  /// Brings an answer from the rig's thread to the server's.
+  RigService::Done reply_to(const nlohmann::json& id, bool with_control);
+  void deliver(const nlohmann::json& id, bool with_control, const std::exception_ptr& error,
+               nlohmann::json result);
+
+  uint64_t number_;
+  std::shared_ptr<Reception> reception_;
+  Peer peer_;
+  boost::asio::steady_timer resume_;
+  Time window_began_{};
+  int requests_left_ = SessionBounds::requests_in_window;
+  int pending_ = 0;
+  bool waiting_ = false;  // reading pauses until the rig has answered
+  Time last_request_;
+};
+
+}  // namespace diastole

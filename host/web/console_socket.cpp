@@ -1,0 +1,132 @@
+#include "host/web/console_socket.hpp"
+
+#include <fmt/format.h>
+
+#include <boost/beast/core.hpp>
+#include <boost/beast/websocket.hpp>
+#include <chrono>
+#include <deque>
+
+namespace diastole::web {
+namespace {
+
+namespace asio = boost::asio;
+namespace beast = boost::beast;
+namespace http = beast::http;
+namespace websocket = beast::websocket;
+using asio::ip::tcp;
+using beast::error_code;
+
+constexpr std::chrono::seconds handshake_patience{10};
+constexpr std::chrono::seconds silence_patience{10};  // a ping goes out at half of it
+constexpr const char* subprotocol = "diastole";
+
+Peer browser_at(std::string address, ConsoleRole role) {
+  Peer peer;
+  peer.console = std::move(address);
+  peer.role = role;
+  return peer;
+}
+
+class ConsoleSocket : public RpcSession, public Guest {
+ public:
+  ConsoleSocket(std::shared_ptr<Hall> hall, tcp::socket socket, ConsoleRole role)
+      : RpcSession(hall->reception, browser_at(address_of(socket), role)),
+        hall_(std::move(hall)),
+        stream_(std::move(socket)) {
+    stream_.read_message_max(rpc::most_line_bytes);
+    stream_.auto_fragment(false);
+    stream_.set_option(websocket::stream_base::timeout{handshake_patience, silence_patience, true});
+  }
+
+  void begin(const http::request<http::empty_body>& upgrade) {
+    hall_->consoles[number()] = self();
+    const beast::string_view offered = upgrade[http::field::sec_websocket_protocol];
+    if (http::token_list(offered).exists(subprotocol)) {
+      stream_.set_option(websocket::stream_base::decorator([](websocket::response_type& response) {
+        response.set(http::field::sec_websocket_protocol, subprotocol);
+      }));
+    }
+    stream_.async_accept(upgrade, [self = self()](error_code error) {
+      if (error) return self->close();
+      self->stream_.text(true);
+      self->read();
+    });
+  }
+
+  void close() override {
+    if (closed_) return;
+    closed_ = true;
+    leave();
+    beast::get_lowest_layer(stream_).close();
+    hall_->consoles.erase(number());
+  }
+
+ private:
+  std::shared_ptr<ConsoleSocket> self() {
+    return std::static_pointer_cast<ConsoleSocket>(shared_from_this());
+  }
+
+  void read() {
+    stream_.async_read(inbox_, [self = self()](error_code error, size_t) {
+      if (error == websocket::error::message_too_big) {
+        return self->drop(fmt::format("sent a message longer than {} bytes", rpc::most_line_bytes));
+      }
+      if (error) return self->close();
+      self->held_ = beast::buffers_to_string(self->inbox_.data());
+      self->inbox_.clear();
+      self->take_more();
+    });
+  }
+
+  void take_more() override {
+    if (closed_ || !held_ || !may_take()) return;
+    answer(*std::exchange(held_, std::nullopt));
+    if (!closed_) read();
+  }
+
+  void send(std::string message) override {
+    if (closed_) return;
+    outbox_bytes_ += message.size();
+    if (too_much_unread(outbox_.size(), outbox_bytes_)) return drop("does not read its answers");
+    outbox_.push_back(std::move(message));
+    if (outbox_.size() == 1) write();
+  }
+
+  void write() {
+    stream_.async_write(asio::buffer(outbox_.front()), [self = self()](error_code error, size_t) {
+      if (error) return self->close();
+      self->outbox_bytes_ -= self->outbox_.front().size();
+      self->outbox_.pop_front();
+      if (!self->outbox_.empty()) self->write();
+    });
+  }
+
+  void drop(const std::string& why) {
+    reception().log.warn(fmt::format("{} {}: connection closed", in_words(peer()), why));
+    close();
+  }
+
+  std::shared_ptr<Hall> hall_;
+  websocket::stream<beast::tcp_stream> stream_;
+  beast::flat_buffer inbox_;
+  std::optional<std::string> held_;  // read, and not yet taken
+  std::deque<std::string> outbox_;
+  size_t outbox_bytes_ = 0;
+  bool closed_ = false;
+};
+
+}  // namespace
+
+void open_console(const std::shared_ptr<Hall>& hall, tcp::socket socket,
+                  http::request<http::empty_body> upgrade, ConsoleRole role) {
+  std::make_shared<ConsoleSocket>(hall, std::move(socket), role)->begin(upgrade);
+}
+
+std::string address_of(const tcp::socket& socket) {
+  error_code error;
+  const auto endpoint = socket.remote_endpoint(error);
+  return error ? "an unknown address" : endpoint.address().to_string();
+}
+
+}  // namespace diastole::web

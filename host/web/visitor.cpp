@@ -1,0 +1,159 @@
+// One TCP connection as long as it speaks HTTP: GET of the page's files, of /role, and the upgrade to /rpc.
+
+#include <fmt/format.h>
+
+#include <boost/beast/core.hpp>
+#include <boost/beast/http.hpp>
+#include <boost/beast/websocket/rfc6455.hpp>
+#include <chrono>
+
+#include "host/web/console_socket.hpp"
+#include "host/web/hall.hpp"
+#include "host/web/page_files.hpp"
+
+namespace diastole::web {
+namespace {
+
+namespace beast = boost::beast;
+namespace http = beast::http;
+using boost::asio::ip::tcp;
+using boost::beast::error_code;
+
+constexpr std::chrono::seconds request_patience{10};
+constexpr uint32_t most_header_bytes = 8192;
+constexpr int most_requests = 100;  // of one connection
+
+using Response = http::response<http::string_body>;
+
+class Visitor : public Guest, public std::enable_shared_from_this<Visitor> {
+ public:
+  Visitor(std::shared_ptr<Hall> hall, tcp::socket socket)
+      : hall_(std::move(hall)), stream_(std::move(socket)), number_(++hall_->reception->last_number) {}
+
+  void begin() {
+    hall_->visitors[number_] = shared_from_this();
+    read();
+  }
+
+  void close() override {
+    hall_->visitors.erase(number_);
+    stream_.close();
+  }
+
+ private:
+  void read() {
+    parser_.emplace();
+    parser_->header_limit(most_header_bytes);
+    parser_->body_limit(uint64_t{0});
+    stream_.expires_after(request_patience);
+    http::async_read(stream_, buffer_, *parser_,
+                     [self = shared_from_this()](error_code error, size_t) { self->take(error); });
+  }
+
+  void take(error_code error) {
+    if (error.category() == make_error_code(http::error::end_of_stream).category() &&
+        error != http::error::end_of_stream) {
+      return refuse({400, "This is not a request that the console understands: " + error.message() + "."});
+    }
+    if (error) return close();
+    request_ = parser_->release();
+    const auto origin = request_.find(http::field::origin);
+    const auto refusal = hall_->door.check_place(
+        text(http::field::host),
+        origin == request_.end() ? std::nullopt : std::optional(view(origin->value())));
+    if (refusal) return refuse(*refusal);
+    if (request_.method() != http::verb::get) return refuse({405, "Only GET is understood here."});
+    answer();
+  }
+
+  void answer() {
+    const std::string_view all = view(request_.target());
+    const std::string_view target = all.substr(0, all.find('?'));
+    if (target == "/rpc") return open_socket();
+    if (target == "/role") {
+      const auto role = shown_role();
+      if (!role) return refuse_token();
+      return reply(200, "application/json",
+                   *role == ConsoleRole::control ? R"({"role":"control"})" : R"({"role":"watch"})");
+    }
+    const PageFile* file = find_page_file(target);
+    if (file == nullptr) return refuse({404, "There is no such page here. The console is at /."});
+    reply(200, file->type, std::string(file->text));
+  }
+
+  void open_socket() {
+    if (!beast::websocket::is_upgrade(request_)) return refuse({426, "At /rpc a WebSocket is spoken."});
+    const auto role = shown_role();
+    if (!role) return refuse_token();
+    if (hall_->consoles.size() >= Hall::most_consoles) {
+      return refuse({503, fmt::format("{} consoles are open already; close one.", Hall::most_consoles)});
+    }
+    hall_->visitors.erase(number_);
+    open_console(hall_, stream_.release_socket(), std::move(request_), *role);
+  }
+
+  [[nodiscard]] std::optional<ConsoleRole> shown_role() const {
+    return hall_->door.role_of(
+        token_in(text(http::field::authorization), text(http::field::sec_websocket_protocol)));
+  }
+
+  void refuse_token() {
+    hall_->reception->log.warn(fmt::format("a browser at {} came to the console without a valid token",
+                                           address_of(stream_.socket())));
+    refuse(Door::wrong_token());
+  }
+
+  void refuse(const Refusal& refusal) {
+    last_ = true;
+    reply(refusal.status, "text/plain; charset=utf-8", refusal.sentence + "\n");
+  }
+
+  void reply(int status, std::string_view type, std::string body) {
+    last_ = last_ || !request_.keep_alive() || ++answered_ >= most_requests;
+    response_ = Response(static_cast<http::status>(status), 11);
+    response_.set(http::field::content_type, beast::string_view(type.data(), type.size()));
+    response_.set(http::field::cache_control, "no-store");
+    response_.set("X-Content-Type-Options", "nosniff");
+    response_.set("Referrer-Policy", "no-referrer");
+    response_.set("Cross-Origin-Resource-Policy", "same-origin");
+    response_.set("Content-Security-Policy",
+                  "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; img-src "
+                  "'self'; font-src 'self'; "
+                  "base-uri 'none'; form-action 'none'; frame-ancestors 'none'");
+    response_.keep_alive(!last_);
+    response_.body() = std::move(body);
+    response_.prepare_payload();
+    stream_.expires_after(request_patience);
+    http::async_write(stream_, response_, [self = shared_from_this()](error_code error, size_t) {
+      if (error || self->last_) return self->close();
+      self->read();
+    });
+  }
+
+  [[nodiscard]] std::string_view text(http::field field) const { return view(request_[field]); }
+  static std::string_view view(beast::string_view text) { return {text.data(), text.size()}; }
+
+  std::shared_ptr<Hall> hall_;
+  beast::tcp_stream stream_;
+  uint64_t number_;
+  beast::flat_buffer buffer_{2 * most_header_bytes};
+  std::optional<http::request_parser<http::empty_body>> parser_;
+  http::request<http::empty_body> request_;
+  Response response_;
+  int answered_ = 0;
+  bool last_ = false;
+};
+
+}  // namespace
+
+void receive_visitor(std::shared_ptr<Hall> hall, tcp::socket socket) {
+  if (hall->visitors.size() >= Hall::most_visitors) {
+    const auto oldest = hall->visitors.begin()->second;
+    oldest->close();
+  }
+  error_code ignored;
+  socket.set_option(boost::asio::socket_base::send_buffer_size(Hall::kernel_bytes), ignored);
+  std::make_shared<Visitor>(std::move(hall), std::move(socket))->begin();
+}
+
+}  // namespace diastole::web
