@@ -137,11 +137,14 @@ nlohmann::ordered_json to_json(const Study& study, ElasticModel& model, const Pr
   return json;
 }
 
+/// Rounding errors of a zero are shown as one.
+double shown(double value) { return std::abs(value) < 1e-9 ? 0.0 : value; }
+
 void print_for_people(const PressureVolumeCurve& curve) {
   fmt::print("  volume (mL)  pressure (kPa)  dP/dV (kPa/mL)  stored (mJ)\n");
   for (const PressureVolumePoint& point : curve.points) {
-    fmt::print("{:>13.3f}{:>16.4f}{:>16.5f}{:>13.2f}{}\n", point.volume_change_mL, point.pressure_kPa,
-               point.stiffness_kPa_per_mL, point.stored_energy_mJ,
+    fmt::print("{:>13.3f}{:>16.4f}{:>16.5f}{:>13.2f}{}\n", point.volume_change_mL, shown(point.pressure_kPa),
+               point.stiffness_kPa_per_mL, shown(point.stored_energy_mJ),
                !point.stable_at_volume      ? "  not stable"
                : !stable_at_pressure(point) ? "  stable only at held volume"
                                             : "");
