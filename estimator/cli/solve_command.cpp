@@ -235,6 +235,10 @@ ExitCode run_solve(const SolveArguments& arguments, const CommandOutput& out) {
     json["files"].push_back(file.string());
   if (arguments.frames) json["frames"] = frames_json(model, solved);
   if (!solution.report.converged()) std::cerr << "diastole solve: " << solution.report.describe() << '\n';
+  if (arguments.pressure_kPa && (solution.report.reason == SolveReason::no_convergence ||
+                                 solution.report.reason == SolveReason::singular_tangent)) {
+    std::cerr << "  If the pressure has a maximum on the way, `diastole pv` finds it and goes on beyond.\n";
+  }
   if (solution.report.converged() && solution.report.negative_pivots != solution.report.pressure_unknowns) {
     std::cerr << "diastole solve: this equilibrium is not stable (" << solution.report.negative_pivots
               << " negative pivots for " << solution.report.pressure_unknowns << " pressure unknowns)\n";
