@@ -354,7 +354,10 @@ void Acquisition::end_after_tail(std::string how) {
 
 void Acquisition::check_deadline() {
   if (tail_until_ns_) {
-    ended_ = ended_ || (clock_.now_ns() >= *tail_until_ns_ && samples_.complete(*tail_until_ns_));
+    const uint64_t now_ns = clock_.now_ns();
+    const bool estop_undecided =
+        gate_ && gate_->awaits_estop(now_ns, {outcome_.counts.triggers, stopped_by_estop_});
+    ended_ = ended_ || (now_ns >= *tail_until_ns_ && samples_.complete(*tail_until_ns_) && !estop_undecided);
     return;
   }
   if (ended_ || clock_.now_ns() < deadline_ns_) return;

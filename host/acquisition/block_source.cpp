@@ -10,6 +10,7 @@ namespace {
 
 constexpr double ns_per_s = 1e9;
 constexpr uint64_t patience_ns = 250'000'000;          // for a block, beyond the time that it takes
+constexpr uint64_t clock_interval_ns = 200'000'000;    // between looks at the instrument's clock
 constexpr uint64_t restart_interval_ns = 500'000'000;  // between attempts to start the scan
 
 }  // namespace
@@ -87,6 +88,8 @@ void BlockSource::deliver(daq::Batch batch, std::vector<SourceItem>& out) {
     received.host_ns.push_back(grid_.due_ns(first + row));
   next_index_ = first + rows;
   out.push_back(std::move(received));
+  if (heard_ns_ < next_clock_ns_) return;
+  next_clock_ns_ = heard_ns_ + clock_interval_ns;
   out.push_back(InstrumentTime{heard_ns_, 0, static_cast<uint32_t>(next_index_)});
 }
 

@@ -15,8 +15,8 @@ class BlockSource final : public SampleSource {
   [[nodiscard]] TimerFacts timer(double rate_Hz) const override { return {rate_Hz, true}; }
   /// An instrument that does not start is tried again by take().
   SampleGrid start(double rate_Hz) override;
-  /// One block, and its end on the instrument's clock (the number of its last sample + 1) with the host time of
-  /// its arrival.
+  /// One block, and five times a second at most its end on the instrument's clock (the number of its last sample + 1)
+  /// with the host time of its arrival.
   std::vector<SourceItem> take() override;
   [[nodiscard]] uint64_t next_due_ns() const override { return next_look_ns_; }
   /// A block's span and a quarter of a second after `until_ns` nothing more is waited for.
@@ -38,7 +38,8 @@ class BlockSource final : public SampleSource {
   uint64_t scan_base_ = 0;  ///< index of the present scan's sample 0
   uint64_t next_look_ns_ = 0;
   uint64_t heard_ns_ = 0;  ///< of the instrument, last
-  std::string trouble_;    ///< since the last block; empty: none
+  uint64_t next_clock_ns_ = 0;
+  std::string trouble_;  ///< since the last block; empty: none
 };
 
 }  // namespace diastole

@@ -68,6 +68,19 @@ ExitCode list(const std::string& directory, const CommandOutput& out) {
   return ExitCode::done;
 }
 
+ExitCode tell_nothing(const NothingRecorded& nothing, const CommandOutput& out) {
+  fmt::print(stderr, "{}\n", nothing.what());
+  if (out.json) {
+    std::cout << nlohmann::json{{"run", nullptr},
+                                {"recovered_samples", 0},
+                                {"lost_samples", 0},
+                                {"complete", false}}
+                     .dump(2)
+              << '\n';
+  }
+  return ExitCode::negative;
+}
+
 ExitCode recover(const RecoverOptions& options, const CommandOutput& out) {
   if (options.list) return list(options.journal.empty() ? "journals" : options.journal, out);
   if (options.journal.empty() || options.output.empty()) {
@@ -76,7 +89,12 @@ ExitCode recover(const RecoverOptions& options, const CommandOutput& out) {
   }
   check_output(options.output, options.force, {options.journal});
   const JournalContents journal = read_journal(options.journal);
-  const AssembledRun assembled = assemble_run(journal);
+  AssembledRun assembled;
+  try {
+    assembled = assemble_run(journal);
+  } catch (const NothingRecorded& nothing) {
+    return tell_nothing(nothing, out);
+  }
   write_run(options.output, assembled.run);
   const bool whole = assembled.ended_in_order && assembled.samples_missing == 0 && journal.records_lost == 0;
   if (out.json) {
@@ -100,11 +118,13 @@ ExitCode recover(const RecoverOptions& options, const CommandOutput& out) {
 
 void add_recover(CommandLine& line) {
   auto options = std::make_shared<RecoverOptions>();
-  CLI::App* command = line.add("recover", "rebuild a run file from its journal after a crash",
-                               "  diastole recover journals/5e0c....journal -o gel.run.h5\n"
-                               "  diastole recover --list /var/lib/diastole/journals\n"
-                               "      the daemon's journals, whether each is whole and has its run file\n"
-                               "Exit code 1: the run file is sound in itself, but something is lost.");
+  CLI::App* command = line.add(
+      "recover", "rebuild a run file from its journal after a crash",
+      "  diastole recover journals/5e0c....journal -o gel.run.h5\n"
+      "  diastole recover --list /var/lib/diastole/journals\n"
+      "      the daemon's journals, whether each is whole and has its run file\n"
+      "Exit code 1: the run file is sound in itself, but something is lost; or the daemon had ended before\n"
+      "the run began, and there is nothing to write.");
   command->add_option("JOURNAL", options->journal, "journal of the daemon; with --list their directory");
   command->add_option("-o,--output", options->output, "run file to write");
   command->add_flag("--list", options->list, "tell what journals there are");

@@ -9,6 +9,7 @@
 #include <random>
 
 #include "host/controller/settings_values.hpp"
+#include "host/controller/version_match.hpp"
 #include "protocol/contract/input_error.hpp"
 #include "protocol/wire/crc32.hpp"
 #include "protocol/wire/wire_text.hpp"
@@ -269,7 +270,10 @@ void ControllerClient::disconnect() {
 }
 
 void ControllerClient::greet() {
-  const Answer answer = request(wire::HelloRequest{.schema_hash = wire::kSchemaHash});
+  const Answer answer = request(wire::HelloRequest{.schema_hash = wire::kSchemaHash,
+                                                   .version_major = own_version[0],
+                                                   .version_minor = own_version[1],
+                                                   .version_patch = own_version[2]});
   if (!answer.hello) {
     disconnect();
     fail("does not introduce itself", "Flash it again (diastole flash), then restart the daemon.");
@@ -279,13 +283,10 @@ void ControllerClient::greet() {
     fail("waits in its bootloader and runs no firmware",
          "Stop the daemon and flash one: diastole flash IMAGE --port " + rig_.controller.port);
   }
-  if (answer.hello->schema_hash != wire::kSchemaHash) {
-    const wire::Hello hello = *answer.hello;
+  if (const auto mismatch =
+          compare_versions(*answer.hello, own_version, wire::kSchemaHash, rig_.controller.port)) {
     disconnect();
-    fail(fmt::format("its firmware {}.{}.{} speaks protocol {:08x}, this program {:08x}", hello.version_major,
-                     hello.version_minor, hello.version_patch, hello.schema_hash, wire::kSchemaHash),
-         "Stop the daemon and flash the firmware that belongs to this program: diastole flash IMAGE --port " +
-             rig_.controller.port);
+    fail(mismatch->problem, mismatch->remedy);
   }
   hello_ = answer.hello;
   next_time_question_ns_ = clock_.now_ns();

@@ -1,6 +1,7 @@
 #include "host/daemon/rig_service.hpp"
 
 #include <fmt/format.h>
+#include <malloc.h>
 #include <spdlog/spdlog.h>
 #include <unistd.h>
 
@@ -160,7 +161,12 @@ RigService::RigService(RigConfig rig, const RigServiceOptions& options)
     return std::make_unique<SerialPort>(rig_.controller.port, rig_.controller.baud);
   });
   connect();
-  instrument_ = rig_.daq.open({options.daq_address, clock_->stands_still() ? conducted_timeout_ms : 0});
+  daq::OpenOptions opening{.address = options.daq_address};
+  if (clock_->stands_still()) {
+    opening.least_timeout_ms = conducted_timeout_ms;
+    opening.now_ns = [this] { return clock_->now_ns(); };
+  }
+  instrument_ = rig_.daq.open(opening);
   if (rig_.gpio && !clock_->stands_still()) gate_ = open_gpio(*rig_.gpio);
   make_journal_dir(rig_.daemon.journal_dir);
   tidy_journals();
@@ -587,7 +593,7 @@ void RigService::do_run(const Experiment& experiment, const Done& done) {
   record.planned_s = duration_s(experiment, plan);
   record.estimate_s = experiment.schedule ? experiment.estimate_s() : record.planned_s;
   record.planned_cycles = experiment.planned_cycles();
-  check_disk(record, rate.rate_Hz);
+  check_disk(record, rate.rate_Hz, experiment.cycles());
   const std::filesystem::path path =
       std::filesystem::absolute(rig_.daemon.journal_dir) / (record.run_id + ".journal");
   JournalWriter journal(path);
@@ -607,6 +613,7 @@ void RigService::do_run(const Experiment& experiment, const Done& done) {
   } catch (const std::exception& error) {
     result = {{"end", "failed"}, {"problem", error.what()}, {"journal", path.string()}};
   }
+  ::malloc_trim(0);  // what the run file was made in is no more needed
   spdlog::info("run {} ended: {}", record.run_id, result.dump());
   tidy_journals();
   const std::lock_guard lock(mutex_);
@@ -615,11 +622,10 @@ void RigService::do_run(const Experiment& experiment, const Done& done) {
   activity_.clear();
 }
 
-void RigService::check_disk(const RunRecord& record, double sample_rate_Hz) {
+void RigService::check_disk(const RunRecord& record, double sample_rate_Hz, int64_t most_cycles) {
   try {
-    check_room(rig_.daemon.journal_dir,
-               {record.planned_s, sample_rate_Hz, controller_->position_rate_Hz(), rig_.daq.channels.size(),
-                static_cast<uint64_t>(record.planned_cycles)});
+    check_room(rig_.daemon.journal_dir, {record.planned_s, sample_rate_Hz, controller_->position_rate_Hz(),
+                                         rig_.daq.channels.size(), static_cast<uint64_t>(most_cycles)});
   } catch (const InputError&) {
     controller_->unload();
     throw;

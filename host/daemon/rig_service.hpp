@@ -145,7 +145,7 @@ class RigService {
   [[noreturn]] void refuse_after_motion() const;
   bool begin(const RunRecord& record);
   /// Throws InputError, the program unloaded, if the journals' disk cannot hold the run.
-  void check_disk(const RunRecord& record, double sample_rate_Hz);
+  void check_disk(const RunRecord& record, double sample_rate_Hz, int64_t most_cycles);
   /// Removes what need not be kept (journal_store.hpp) and counts the rest.
   void tidy_journals();
   void do_run(const Experiment& experiment, const Done& done);

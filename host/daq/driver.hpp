@@ -3,6 +3,7 @@
 // of the rig file at start-up (strictly, with line numbers in its messages) and returns how to open the
 // instrument.
 
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -18,9 +19,11 @@ namespace diastole::daq {
 
 struct OpenOptions {
   /// Where the instrument is, instead of what the rig file says ("127.0.0.1:1502").
-  std::optional<std::string> address;
+  std::optional<std::string> address = {};
   /// Patience for one answer, at least; a conducted simulation is patient with a loaded machine.
   int least_timeout_ms = 0;
+  /// The time by which an instrument that is not there samples; empty: CLOCK_MONOTONIC.
+  std::function<uint64_t()> now_ns = {};
 };
 
 /// Patience that a rig file may give an instrument for one answer: the samples that come due meanwhile are lost,

@@ -19,8 +19,10 @@ void GateCheck::take(std::vector<GateRemark>& out, uint64_t now_ns) {
   pulses_ += reading.pulse_ns.size();
   may_have_lost_ = may_have_lost_ || reading.may_have_lost;
   for (const EstopChange& change : reading.estop_changes) {
-    estop_since_ns_ = change.pressed ? std::optional(change.host_ns) : std::nullopt;
-    estop_told_ = false;
+    if (change.pressed) {  // also one that is released again is to be reported
+      estop_since_ns_ = change.host_ns;
+      estop_told_ = false;
+    }
     out.push_back({"warning", "estop_line",
                    fmt::format("the emergency stop line shows: {}{}", change.pressed ? "pressed" : "released",
                                change.edge_seen ? "" : " (by its level; the edge itself was not seen)"),
@@ -48,14 +50,17 @@ std::vector<GateRemark> GateCheck::look(uint64_t now_ns, const ControllerWitness
   } else {
     counts_differ_since_ns_.reset();
   }
-  if (estop_since_ns_ && !controller.stopped_by_estop && !estop_told_ &&
-      now_ns > *estop_since_ns_ + report_patience_ns) {
+  if (estop_since_ns_ && !controller.stopped_by_estop && !estop_told_ && !awaits_estop(now_ns, controller)) {
     estop_told_ = true;
     out.push_back({"error", "estop_unseen",
-                   "the emergency stop line shows pressed, but the controller reports no emergency stop",
+                   "the emergency stop line showed pressed, but the controller reports no emergency stop",
                    now_ns});
   }
   return out;
+}
+
+bool GateCheck::awaits_estop(uint64_t now_ns, const ControllerWitness& controller) const {
+  return estop_since_ns_ && !controller.stopped_by_estop && now_ns <= *estop_since_ns_ + report_patience_ns;
 }
 
 std::vector<GateRemark> GateCheck::close(uint64_t now_ns, const ControllerWitness& controller,

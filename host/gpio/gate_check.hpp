@@ -34,6 +34,9 @@ class GateCheck {
   explicit GateCheck(GateInputs& inputs);
 
   [[nodiscard]] std::vector<GateRemark> look(uint64_t now_ns, const ControllerWitness& controller);
+  /// Whether the controller still has time to report a pressed emergency stop: the run's end waits for that, half a
+  /// second at most.
+  [[nodiscard]] bool awaits_estop(uint64_t now_ns, const ControllerWitness& controller) const;
   /// At the end; `triggers_raised` is the controller's own count, if it told.
   [[nodiscard]] std::vector<GateRemark> close(uint64_t now_ns, const ControllerWitness& controller,
                                               std::optional<uint64_t> triggers_raised);
@@ -52,7 +55,7 @@ class GateCheck {
   bool failed_ = false;
   std::optional<uint64_t> counts_differ_since_ns_;
   bool counts_told_ = false;
-  std::optional<uint64_t> estop_since_ns_;
+  std::optional<uint64_t> estop_since_ns_;  ///< pressed last
   bool estop_told_ = false;
 };
 

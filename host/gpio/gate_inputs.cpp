@@ -93,9 +93,15 @@ class GpioInputs final : public GateInputs {
       }
       if ((states[0].revents & POLLIN) != 0 && !take_pulses()) return;
       if ((states[1].revents & POLLIN) != 0 && !take_estop_edges()) return;
+      if (is_broken(states[0].revents) || is_broken(states[1].revents)) {
+        return fail("the kernel has taken the line away");
+      }
       if (estop_ != nullptr) look_at_estop();
     }
   }
+
+  /// As when the chip is unplugged: poll would return at once for ever.
+  static bool is_broken(short events) { return (events & (POLLERR | POLLHUP | POLLNVAL)) != 0; }
 
   static int descriptor(gpiod_line* line) { return line == nullptr ? -1 : gpiod_line_event_get_fd(line); }
 

@@ -30,8 +30,9 @@ class TimeAxis {
       : tick_rate_Hz_(story.begin.at("tick_rate_Hz")), start_tick_(*story.start_tick) {
     const auto fitted = fit_clock_map(story.controller_pairs);
     if (!fitted) {
-      throw InputError({file, "", "holds no comparison of the two clocks, so its samples have no time",
-                        "This journal cannot be recovered."});
+      throw NothingRecorded({file, "",
+                             "ends before the two clocks were compared, so its samples have no time",
+                             "There is nothing to recover."});
     }
     map_ = *fitted;
   }
@@ -60,7 +61,8 @@ class TimeAxis {
 struct Grid {
   std::vector<double> time_s;  // NaN: missing
   std::vector<std::vector<double>> channels;
-  std::vector<std::string> reason;  // why it is missing
+  std::vector<uint32_t> reason;  // why it is missing: its place in `reasons`
+  std::vector<std::string> reasons;
 };
 
 /// When sample k was taken: as the host noted; if the instrument's timer counts its samples, as that timer's line
@@ -93,9 +95,12 @@ Grid lay_out(const JournalStory& story, const TimeAxis& axis, size_t channels) {
     rows = std::max(rows, gap.first_index + gap.count);
   Grid grid{std::vector<double>(rows, missing),
             std::vector<std::vector<double>>(channels, std::vector<double>(rows, missing)),
-            std::vector<std::string>(rows, "its record was lost in the journal")};
+            std::vector<uint32_t>(rows, 0),
+            {"its record was lost in the journal"}};
   for (const DeclaredGap& gap : story.gaps) {
-    std::fill_n(grid.reason.begin() + static_cast<std::ptrdiff_t>(gap.first_index), gap.count, gap.reason);
+    std::fill_n(grid.reason.begin() + static_cast<std::ptrdiff_t>(gap.first_index), gap.count,
+                static_cast<uint32_t>(grid.reasons.size()));
+    grid.reasons.push_back(gap.reason);
   }
   for (const SampleBlock& block : story.samples) {
     if (block.channels != channels) continue;
@@ -163,17 +168,20 @@ void put_pressure(const JournalStory& story, const TimeAxis& axis, AssembledRun&
   fill_times(grid.time_s, grid_start_s(story, axis, grid.time_s, spacing_s), spacing_s);
   const auto first = std::lower_bound(grid.time_s.begin(), grid.time_s.end(), 0.0) - grid.time_s.begin();
   const auto last = std::ssize(grid.time_s);
-  run.pressure.time_s.assign(grid.time_s.begin() + first, grid.time_s.begin() + last);
-  for (size_t c = 0; c < names.size(); ++c) {
-    run.pressure.channels[names[c] + "_kPa"].assign(grid.channels[c].begin() + first,
-                                                    grid.channels[c].begin() + last);
-  }
+  const auto keep = [first](std::vector<double>& values) {
+    values.erase(values.begin(), values.begin() + first);
+    return std::move(values);
+  };
+  run.pressure.time_s = keep(grid.time_s);
+  for (size_t c = 0; c < names.size(); ++c)
+    run.pressure.channels[names[c] + "_kPa"] = keep(grid.channels[c]);
   for (auto row = first; row < last; ++row) {
     if (received[static_cast<size_t>(row)]) {
       ++assembled.samples_received;
     } else {
       ++assembled.samples_missing;
-      declare(run, runfile::pressure_stream, row - first, grid.reason[static_cast<size_t>(row)]);
+      declare(run, runfile::pressure_stream, row - first,
+              grid.reasons[grid.reason[static_cast<size_t>(row)]]);
     }
   }
 }
@@ -309,7 +317,7 @@ std::map<std::string, runfile::Attribute, std::less<>> rig_attributes(const json
 AssembledRun assemble_run(const JournalContents& journal) {
   const JournalStory story = read_story(journal);
   if (!story.start_tick) {
-    throw InputError({journal.file, "", "ends before the run started", "There is nothing to recover."});
+    throw NothingRecorded({journal.file, "", "ends before the run started", "There is nothing to recover."});
   }
   const TimeAxis axis(story, journal.file);
   AssembledRun assembled;

@@ -10,6 +10,7 @@
 #include <cstdint>
 
 #include "host/acquisition/journal.hpp"
+#include "protocol/contract/input_error.hpp"
 #include "protocol/runfile/run.hpp"
 
 namespace diastole {
@@ -21,8 +22,13 @@ struct AssembledRun {
   bool ended_in_order = false;    ///< the journal holds the end of the run
 };
 
-/// Throws InputError when the journal has no beginning or the run never started: then there is nothing to
-/// keep.
+/// The journal broke off before the run started, or before the first comparison of the clocks, some 250 ms after that:
+/// there is nothing to keep.
+class NothingRecorded : public InputError {
+  using InputError::InputError;
+};
+
+/// Throws NothingRecorded, or InputError when the journal has lost its beginning.
 AssembledRun assemble_run(const JournalContents& journal);
 
 }  // namespace diastole

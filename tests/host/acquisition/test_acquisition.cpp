@@ -289,5 +289,37 @@ TEST_P(GateAgainstController, ADisagreementAtTheEndIsAnErrorInTheRunFile) {
 
 INSTANTIATE_TEST_SUITE_P(Acquisition, GateAgainstController, testing::Values(-1, 0, 1));
 
+/// Sees the emergency stop pressed, which the controller does not, some moments before the end of the run.
+class LateEstop final : public GateInputs {
+ public:
+  explicit LateEstop(SessionOnDesk& session) : session_(session) {}
+  [[nodiscard]] std::string describe() const override { return "desk inputs"; }
+  [[nodiscard]] bool counts_pulses() const override { return false; }
+  [[nodiscard]] bool sees_estop() const override { return true; }
+  [[nodiscard]] bool estop_pressed() const override { return false; }
+  GateReading take() override {
+    GateReading reading;
+    if (session_.instrument.readings > 570 && !std::exchange(pressed_, true))
+      reading.estop_changes = {{session_.desk.now_ns, true, true}};
+    return reading;
+  }
+
+ private:
+  SessionOnDesk& session_;
+  bool pressed_ = false;
+};
+
+TEST(Acquisition, AnEmergencyStopJustBeforeTheEndIsStillHeldAgainstTheController) {
+  SessionOnDesk session(short_session);
+  LateEstop inputs(session);
+  session.gate = &inputs;
+  session.run();
+  EXPECT_EQ(session.outcome.end, "completed");
+  const RecordedRun run = session.assemble().run;
+  EXPECT_TRUE(std::ranges::any_of(run.events, [](const runfile::Event& event) {
+    return event.level == "error" && event.code == "estop_unseen";
+  }));
+}
+
 }  // namespace
 }  // namespace diastole

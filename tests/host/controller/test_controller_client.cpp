@@ -5,6 +5,7 @@
 #include <array>
 #include <functional>
 
+#include "host/controller/version_match.hpp"
 #include "protocol/contract/input_error.hpp"
 #include "tests/host/bench/desk.hpp"
 #include "tests/host/bench/scratch.hpp"
@@ -14,6 +15,7 @@ namespace {
 
 using testing::AllOf;
 using testing::HasSubstr;
+using testing::Not;
 
 constexpr const char* gel = R"(
 format = "diastole-experiment"
@@ -282,6 +284,7 @@ TEST_F(ClientOnDesk, CountersFollowARunWithoutBeingAskedFor) {
 /// A controller of another version: answers every frame by the book, but with another schema.
 class ForeignLine final : public ByteLine {
  public:
+  explicit ForeignLine(uint8_t version_minor) : version_minor_(version_minor) {}
   void write(std::span<const uint8_t> bytes) override {
     for (const uint8_t byte : bytes) {
       const auto message = link_.receive(byte, 0);
@@ -291,7 +294,7 @@ class ForeignLine final : public ByteLine {
       wire::Hello hello;
       hello.request_id = request->request_id;
       hello.schema_hash = wire::kSchemaHash ^ 1U;
-      hello.version_minor = 9;
+      hello.version_minor = version_minor_;
       std::array<uint8_t, wire::kMaxPayloadBytes> memory{};
       (void)link_.send(wire::Hello::kType, wire::encode(hello, memory));
     }
@@ -309,13 +312,30 @@ class ForeignLine final : public ByteLine {
   [[nodiscard]] int descriptor() const override { return -1; }
 
  private:
+  uint8_t version_minor_;
   wire::ReliableLink link_{wire::ReliableLink::Role::controller};
 };
 
-TEST_F(ClientOnDesk, AnotherProtocolVersionTellsWhatToFlash) {
-  ControllerClient foreign(clock, rig, [] { return std::make_unique<ForeignLine>(); });
+TEST_F(ClientOnDesk, NewerFirmwareTellsToUpdateTheProgram) {
+  ControllerClient foreign(clock, rig, [] { return std::make_unique<ForeignLine>(9); });
   EXPECT_THAT(message_of<HardwareError>([&] { foreign.connect(); }),
-              AllOf(HasSubstr("0.9.0"), HasSubstr("diastole flash")));
+              AllOf(HasSubstr("firmware 0.9.0"), HasSubstr("this program 0.1.0"),
+                    HasSubstr("apt install ./diastole_0.9.0"), Not(HasSubstr("diastole flash"))));
+}
+
+TEST_F(ClientOnDesk, OlderFirmwareTellsWhatToFlash) {
+  ControllerClient foreign(clock, rig, [] { return std::make_unique<ForeignLine>(0); });
+  EXPECT_THAT(message_of<HardwareError>([&] { foreign.connect(); }),
+              AllOf(HasSubstr("firmware 0.0.0"), HasSubstr("the older one"),
+                    HasSubstr("diastole-stm32f405.image --port " + rig.controller.port)));
+}
+
+TEST(VersionMatch, EqualVersionsOfAnotherProtocolAreCuredByFlashing) {
+  wire::Hello hello;
+  hello.schema_hash = 5;
+  hello.version_minor = 1;
+  EXPECT_FALSE(compare_versions(hello, {0, 1, 0}, 5, "/dev/x").has_value());
+  EXPECT_THAT(compare_versions(hello, {0, 1, 0}, 6, "/dev/x")->remedy, HasSubstr("another build"));
 }
 
 }  // namespace

@@ -96,6 +96,19 @@ TEST(GateCheck, AnEmergencyStopThatTheControllerReportsIsNoDisagreement) {
   EXPECT_THAT(check.look(3000 * ms, {0, true}), IsEmpty());
 }
 
+TEST(GateCheck, APressThatIsReleasedAtOnceIsStillToBeReported) {
+  Inputs inputs;
+  GateCheck check(inputs);
+  inputs.next.estop_changes = {{1000 * ms, true, true}, {1020 * ms, false, true}};
+  EXPECT_THAT(check.look(1030 * ms, {}), SizeIs(2));
+  EXPECT_TRUE(check.awaits_estop(1400 * ms, {}));
+  EXPECT_FALSE(check.awaits_estop(1400 * ms, {0, true}));
+  const auto remarks = check.look(1501 * ms, {});
+  ASSERT_THAT(remarks, SizeIs(1));
+  EXPECT_EQ(remarks[0].code, "estop_unseen");
+  EXPECT_FALSE(check.awaits_estop(1502 * ms, {}));
+}
+
 TEST(GateCheck, AnEdgeThatComesDuringTheLookIsNotLate) {
   Inputs inputs;
   GateCheck check(inputs);

@@ -26,6 +26,7 @@ class ChildProcess {
   std::string first_line(std::chrono::milliseconds patience);
 
   [[nodiscard]] bool running();
+  [[nodiscard]] pid_t pid() const { return pid_; }
   /// Asks it to end (SIGTERM) and waits; after `patience` ends it (SIGKILL). Returns its exit code, or 128
   /// plus the signal that ended it.
   int stop(std::chrono::milliseconds patience);
