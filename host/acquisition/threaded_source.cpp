@@ -1,24 +1,16 @@
 #include "host/acquisition/threaded_source.hpp"
 
-#include <pthread.h>
-#include <sched.h>
-
 #include <algorithm>
 #include <iterator>
 #include <utility>
+
+#include "host/transport/real_time.hpp"
 
 namespace diastole {
 namespace {
 
 constexpr uint64_t most_sleep_ns = 50'000'000;     // so that the thread ends soon when it shall
 constexpr uint64_t look_interval_ns = 10'000'000;  // of those who take what is ready
-constexpr int real_time_priority = 50;
-
-/// So that other programs do not make it late, where the system allows that (CAP_SYS_NICE, or RLIMIT_RTPRIO).
-void ask_for_real_time() {
-  const sched_param parameter{real_time_priority};
-  (void)pthread_setschedparam(pthread_self(), SCHED_FIFO, &parameter);
-}
 
 void append(std::vector<SourceItem>& to, std::vector<SourceItem> from) {
   to.insert(to.end(), std::make_move_iterator(from.begin()), std::make_move_iterator(from.end()));
@@ -36,16 +28,20 @@ SampleGrid ThreadedSource::start(double rate_Hz) {
 }
 
 void ThreadedSource::work(const std::stop_token& stop) {
-  ask_for_real_time();
+  ask_for_real_time(instrument_priority);
   while (!stop.stop_requested()) {
-    std::vector<SourceItem> items = source_->take();
-    {
-      const std::lock_guard lock(mutex_);
-      append(ready_, std::move(items));
-      if (source_->complete(asked_until_ns_)) completed_until_ns_ = asked_until_ns_;
-    }
+    append(taken_, source_->take());
+    hand_over();
     clock_->sleep_until_ns(std::min(source_->next_due_ns(), clock_->now_ns() + most_sleep_ns), nullptr);
   }
+}
+
+/// Waits for nobody: who holds the mutex may itself wait for the processor.
+void ThreadedSource::hand_over() {
+  const std::unique_lock lock(mutex_, std::try_to_lock);
+  if (!lock) return;
+  append(ready_, std::exchange(taken_, {}));
+  if (source_->complete(asked_until_ns_)) completed_until_ns_ = asked_until_ns_;
 }
 
 std::vector<SourceItem> ThreadedSource::take() {
@@ -65,6 +61,7 @@ std::vector<SourceItem> ThreadedSource::finish(uint64_t until_ns) {
   thread_.request_stop();
   if (thread_.joinable()) thread_.join();
   std::vector<SourceItem> items = take();
+  append(items, std::exchange(taken_, {}));
   append(items, source_->finish(until_ns));
   return items;
 }

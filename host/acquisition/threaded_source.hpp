@@ -25,9 +25,11 @@ class ThreadedSource final : public SampleSource {
 
  private:
   void work(const std::stop_token& stop);
+  void hand_over();
 
   std::unique_ptr<Clock> clock_;
   std::unique_ptr<SampleSource> source_;  // of the thread while it runs
+  std::vector<SourceItem> taken_;         // likewise: not yet handed over
   mutable std::mutex mutex_;
   std::vector<SourceItem> ready_;
   mutable uint64_t asked_until_ns_ = 0;  ///< by complete(); the thread answers in completed_until_ns_

@@ -1,12 +1,15 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cstdlib>
 #include <iostream>
 #include <memory>
+#include <set>
 
 #include "host/cli/bin_output.hpp"
 #include "host/cli/host_commands.hpp"
 #include "host/cli/text_file.hpp"
+#include "host/config/schedule.hpp"
 #include "protocol/contract/input_error.hpp"
 #include "protocol/runfile/reader.hpp"
 #include "protocol/runfile/signal_delay.hpp"
@@ -23,7 +26,7 @@ struct BinOptions {
   std::vector<std::string> windows;
   std::string frame_times;
   std::optional<double> first_ms, tr_ms, width_ms;
-  int64_t gate_every = 1;
+  std::optional<int64_t> gate_every;
   std::string delay_ms;
   std::optional<size_t> segment, slice;
   std::string channel = "cavity_kPa";
@@ -31,6 +34,7 @@ struct BinOptions {
   bool relative = false;
   bool force = false;
 
+  [[nodiscard]] bool frames_given() const { return frames || real_windows(); }
   [[nodiscard]] bool real_windows() const { return !frame_times.empty() || tr_ms || !windows.empty(); }
 };
 
@@ -61,6 +65,32 @@ std::vector<runfile::FrameWindow> windows_asked(const BinOptions& options, doubl
   return runfile::windows_of(starts, width_s, interval_s);
 }
 
+/// What the run's schedule says of the frames, if all slices that are binned belong to one block.
+std::optional<ScheduleBlock> scheduled_block(const BinOptions& options, const runfile::RecordedRun& run) {
+  std::set<std::string> names;
+  for (size_t i = 0; i < run.slices.size(); ++i)
+    if (!options.slice || *options.slice == i) names.insert(run.slices[i].block);
+  if (names.size() != 1) return std::nullopt;
+  const auto schedule = schedule_of(run.protocol_toml, run.file);
+  if (!schedule) return std::nullopt;
+  const auto block = std::ranges::find(schedule->blocks, *names.begin(), &ScheduleBlock::name);
+  if (block == schedule->blocks.end() || !block->frames) return std::nullopt;
+  return *block;
+}
+
+/// Where no frames are asked for, those of the schedule are.
+void take_from_schedule(BinOptions& options, const runfile::RecordedRun& run) {
+  if (options.frames_given()) return;
+  const auto block = scheduled_block(options, run);
+  if (!block) return;
+  options.frames = static_cast<size_t>(block->frames->frames);
+  options.first_ms = block->frames->first_ms;
+  options.tr_ms = block->frames->tr_ms;
+  if (!options.gate_every) options.gate_every = block->gate_every;
+  fmt::print(stderr, "frames as scheduled for {}: {} from {:g} ms on, {:g} ms apart\n", block->name,
+             *options.frames, *options.first_ms, *options.tr_ms);
+}
+
 RemovedDelay delay_asked(const BinOptions& options, const runfile::RecordedRun& run) {
   const bool from_run = options.delay_ms == "run" || (options.delay_ms.empty() && options.real_windows());
   if (from_run) {
@@ -84,14 +114,15 @@ double resolution_kPa(const runfile::RecordedRun& run) {
   return value == nullptr ? 0 : *value;
 }
 
-ExitCode bin(const BinOptions& options, const CommandOutput& out) {
+ExitCode bin(BinOptions options, const CommandOutput& out) {
   if (!options.frames_csv.empty()) require_new_file(options.frames_csv, options.force);
   const runfile::RecordedRun run = runfile::read_run(options.run);
+  take_from_schedule(options, run);
   runfile::FrameBinOptions how{.frames = options.frames.value_or(default_frames),
                                .segment = options.segment,
                                .slice = options.slice,
                                .channel = options.channel,
-                               .gate_every = options.gate_every};
+                               .gate_every = options.gate_every.value_or(1)};
   const RemovedDelay delay = delay_asked(options, run);
   how.delay_s = delay.delay_s;
   if (options.real_windows()) {
@@ -125,12 +156,16 @@ void add_bin(CommandLine& line) {
       "  diastole bin gel.run.h5 --first-ms 12 --tr-ms 70 --frames 16 --json\n"
       "  diastole bin flow.run.h5 --first-ms 8 --tr-ms 36 --frames 64 --gate-every 2\n"
       "      phase contrast: the scanner takes every second R-wave and images two cycles\n"
+      "  diastole bin study.run.h5 --slice 3 --frames-csv slice3.frames.csv\n"
+      "      the frames that the run's own schedule plans for that slice\n"
       "  diastole bin gel.run.h5 --window 0.00:0.06 --window 0.10:0.16\n"
       "The delay of catheter and filter is removed from real windows, as far as the run tells it; equal\n"
       "frames are counted from the trigger as they are, unless --delay-ms is given. A cycle with a missing\n"
       "sample, or whose triggers are not in time, is left out and told; dummy cycles never count.");
   command->add_option("RUN", options->run, "run file")->required();
-  command->add_option("--frames", options->frames, "frames in a cycle; default: 16")
+  command
+      ->add_option("--frames", options->frames,
+                   "frames in a cycle; default: as the run's schedule plans, else 16")
       ->check(CLI::Range(1, 10000));
   auto* times = command->add_option("--frame-times", options->frame_times,
                                     "CSV with trigger_time_ms and perhaps width_ms, one row a frame");

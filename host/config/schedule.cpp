@@ -21,20 +21,19 @@ int64_t read_cycles_per_slice(TableReader& table) {
 }
 
 /// The scanner's frames must lie within the cycles between two gates.
-void check_frames(TableReader& table, double period_s) {
-  const int64_t gate_every = table.integer_or("gate_every", 1, count);
-  if (!table.has("frames")) return;
-  const auto frames = static_cast<double>(table.integer("frames", {.at_least = 1, .at_most = 10'000}));
-  const double first_ms = table.number_or("first_ms", 0, {.at_least = 0, .at_most = 1e6});
-  const double tr_ms = table.number("tr_ms", {.above = 0, .at_most = 1e6});
-  const double interval_s = period_s * static_cast<double>(gate_every);
-  const double end_s = 1e-3 * (first_ms + frames * tr_ms);
-  if (end_s <= interval_s + 1e-9) return;
+std::optional<PlannedFrames> read_frames(TableReader& table, double interval_s) {
+  if (!table.has("frames")) return std::nullopt;
+  const PlannedFrames planned{.frames = table.integer("frames", {.at_least = 1, .at_most = 10'000}),
+                              .first_ms = table.number_or("first_ms", 0, {.at_least = 0, .at_most = 1e6}),
+                              .tr_ms = table.number("tr_ms", {.above = 0, .at_most = 1e6})};
+  const auto frames = static_cast<double>(planned.frames);
+  const double end_s = 1e-3 * (planned.first_ms + frames * planned.tr_ms);
+  if (end_s <= interval_s + 1e-9) return planned;
   table.fail(
       "frames",
       fmt::format(
           "{:g} frames of {:g} ms end {:g} s after the trigger, but the scanner is triggered every {:g} s",
-          frames, tr_ms, end_s, interval_s),
+          frames, planned.tr_ms, end_s, interval_s),
       "Take fewer or shorter frames, lengthen period_s, or let the scanner take every n-th R-wave "
       "(gate_every).");
 }
@@ -45,7 +44,8 @@ ScheduleBlock read_block(TableReader table, double period_s) {
   block.slices = table.integer_or("slices", 1, count);
   block.cycles_per_slice = read_cycles_per_slice(table);
   block.prompt = table.text_or("prompt", "");
-  check_frames(table, period_s);
+  block.gate_every = table.integer_or("gate_every", 1, count);
+  block.frames = read_frames(table, period_s * static_cast<double>(block.gate_every));
   table.finish();
   return block;
 }
@@ -96,6 +96,14 @@ Schedule read_schedule(TableReader table, double period_s) {
   }
   table.finish();
   return schedule;
+}
+
+std::optional<Schedule> schedule_of(std::string_view experiment, const std::string& file) {
+  TableReader root = TableReader::from_text(experiment, file);
+  auto table = root.table_if("schedule");
+  std::vector<TableReader> segments = root.tables("segment");
+  if (!table || segments.empty()) return std::nullopt;
+  return read_schedule(std::move(*table), segments.front().number("period_s"));
 }
 
 }  // namespace diastole

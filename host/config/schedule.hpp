@@ -9,18 +9,29 @@
 // meanwhile, up to wait_cycles_at_most cycles in all. At the end of the last slice the run ends by itself.
 
 #include <cstdint>
+#include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "protocol/contract/table_reader.hpp"
 
 namespace diastole {
 
+/// What the scanner takes of each interval of gate_every cycles.
+struct PlannedFrames {
+  int64_t frames = 0;
+  double first_ms = 0;
+  double tr_ms = 0;
+};
+
 struct ScheduleBlock {
   std::string name;  ///< "tagged"
   int64_t slices = 1;
   int64_t cycles_per_slice = 1;
-  std::string prompt;  ///< empty: goes on by itself
+  std::string prompt = {};  ///< empty: goes on by itself
+  int64_t gate_every = 1;   ///< the scanner takes every n-th R-wave
+  std::optional<PlannedFrames> frames = {};
 };
 
 struct Schedule {
@@ -54,5 +65,8 @@ std::vector<PlannedSlice> planned_slices(const Schedule& schedule);
 /// and may give the frames that the scanner takes (frames, first_ms, tr_ms, gate_every): they must end within
 /// gate_every cycles. Throws InputError with file, line and key.
 Schedule read_schedule(TableReader table, double period_s);
+
+/// The schedule of an experiment file's text, if it has one. Throws InputError where that is not to be read.
+std::optional<Schedule> schedule_of(std::string_view experiment, const std::string& file);
 
 }  // namespace diastole

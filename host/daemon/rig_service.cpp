@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
+#include <future>
 
 #include "host/acquisition/disk_room.hpp"
 #include "host/acquisition/journal_store.hpp"
@@ -19,6 +20,7 @@
 #include "host/runfile/assemble.hpp"
 #include "host/runfile/writer.hpp"
 #include "host/transport/conducted_clock.hpp"
+#include "host/transport/real_time.hpp"
 #include "host/transport/serial_port.hpp"
 #include "host/transport/watched_clock.hpp"
 #include "protocol/contract/input_error.hpp"
@@ -185,6 +187,7 @@ RigService::~RigService() {
 }
 
 void RigService::work(const std::stop_token& stop) {
+  if (!clock_->stands_still()) ask_for_real_time(rig_priority);
   while (!stop.stop_requested()) {
     try {
       if (auto order = next_order()) {
@@ -197,9 +200,13 @@ void RigService::work(const std::stop_token& stop) {
         idle_turn();
       }
     } catch (const std::exception& error) {
-      if (std::exchange(last_problem_, error.what()) != error.what()) spdlog::error("{}", error.what());
+      tell_problem(error);
     }
   }
+}
+
+void RigService::tell_problem(const std::exception& error) {
+  if (std::exchange(last_problem_, error.what()) != error.what()) spdlog::error("{}", error.what());
 }
 
 void RigService::idle_turn() {
@@ -739,6 +746,18 @@ RunOutcome RigService::acquire(JournalWriter& journal, const Experiment& experim
   });
 }
 
+void RigService::beside_the_line(const std::function<void()>& work) {
+  auto done = std::async(std::launch::async, work);
+  while (!clock_->stands_still() && done.wait_for(std::chrono::seconds(0)) != std::future_status::ready) {
+    try {
+      idle_turn();
+    } catch (const std::exception& error) {
+      tell_problem(error);
+    }
+  }
+  done.get();
+}
+
 json RigService::finish(const std::filesystem::path& journal, const RunOutcome& outcome) {
   {
     const std::lock_guard lock(mutex_);
@@ -747,9 +766,12 @@ json RigService::finish(const std::filesystem::path& journal, const RunOutcome& 
   }
   const LongWork writing(options_.manager);
   json result{{"end", outcome.end}, {"regular", outcome.regular()}, {"journal", journal.string()}};
-  const AssembledRun assembled = assemble_run(read_journal(journal));
   const std::filesystem::path run_file = run_file_beside(journal);
-  write_run(run_file, assembled.run);
+  AssembledRun assembled;
+  beside_the_line([&] {
+    assembled = assemble_run(read_journal(journal));
+    write_run(run_file, assembled.run);
+  });
   result["run_file"] = run_file.string();
   result["cycles"] = outcome.cycles;
   result["triggers"] = assembled.run.trigger_s.size();

@@ -122,6 +122,10 @@ class RigService {
 
   void work(const std::stop_token& stop);
   void idle_turn();
+  /// Once, not once a second.
+  void tell_problem(const std::exception& error);
+  /// Runs `work` on a thread of no priority; the line to the controller stays alive meanwhile.
+  void beside_the_line(const std::function<void()>& work);
   void give(Order order);
   void answer_status();
   void keep(const RunRemark& remark);

@@ -28,10 +28,10 @@ class PrintsTheTable final : public testing::Environment {
 
  private:
   static constexpr const char* elsewhere =
-      "Tried elsewhere: power cut at every flash operation (ctest -R boot), emergency stop and limit "
-      "switches\n"
-      "at 1000 phases and the link flooded (ctest -R firmware), a million frames on a bad line "
-      "(test_link_campaign).";
+      "Tried elsewhere: a reset in every state of the image (test_sim_board_reset), a power cut at each "
+      "single "
+      "flash\n"
+      "operation (test_sim_board_every_power_cut), damaged frames of every message (fuzz_wire).";
 };
 
 const testing::Environment* const registered = testing::AddGlobalTestEnvironment(new PrintsTheTable);

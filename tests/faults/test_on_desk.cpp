@@ -216,7 +216,7 @@ TEST(Faults, BadLine) {
   const int tried = static_cast<int>(lines.size());
   const int survived = survivors(tried, [&](int k, std::mt19937&) {
     const auto report = link_faults::run_campaign({.rates = lines.at(static_cast<size_t>(k)),
-                                                   .frames = static_cast<uint64_t>(trials(3000, 50'000)),
+                                                   .frames = static_cast<uint64_t>(trials(3000, 170'000)),
                                                    .seed = static_cast<uint64_t>(k) + 1});
     frames += report.line.frames;
     wrong += report.wrong;

@@ -81,6 +81,16 @@ TEST(Study, BecomesSlicesFramesAndABidsRecording) {
                 .exit_code,
             2);
 
+  const json scheduled = run(workplace, {"diastole", "bin", "study.run.h5", "--slice", "2", "--json"}).json();
+  ASSERT_EQ(scheduled.at("frames").size(), 32U) << "as the block flow says";
+  EXPECT_NEAR(scheduled.at("frames")[1].at("from_s").get<double>(), 0.075, 1e-9);
+  EXPECT_EQ(run(workplace, {"diastole", "bin", "study.run.h5", "--slice", "0", "--json"})
+                .json()
+                .at("frames")
+                .size(),
+            16U)
+      << "the block tagged says nothing";
+
   const Ended too_long =
       run(workplace, {"diastole", "bin", "study.run.h5", "--tr-ms", "188", "--frames", "16"});
   EXPECT_EQ(too_long.exit_code, 2);

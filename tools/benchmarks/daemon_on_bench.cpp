@@ -17,6 +17,8 @@ using namespace std::chrono_literals;
 using nlohmann::json;
 
 constexpr double period_s = 2;
+constexpr double rest_s = 0.2;
+constexpr double tail_s = 0.25;  // host/acquisition/acquisition.hpp
 
 fs::path make_directory(const fs::path& below) {
   std::string pattern = (below / "diastole-bench-XXXXXX").string();
@@ -75,12 +77,14 @@ DaemonOnBench::~DaemonOnBench() {
   fs::remove_all(directory_, ignored);
 }
 
-json DaemonOnBench::start_run(DaemonClient& client, double seconds) const {
+double DaemonOnBench::start_run(DaemonClient& client, double seconds) const {
+  const long cycles = std::max(1L, std::lround(seconds / period_s));
   const std::string text = fmt::format(
-      "format = \"diastole-experiment\"\nversion = 1\nrest_s = 0.2\nsample_rate_Hz = {}\n"
+      "format = \"diastole-experiment\"\nversion = 1\nrest_s = {}\nsample_rate_Hz = {}\n"
       "[[segment]]\nwaveform = \"parabolic\"\nstroke_mL = 10.0\nperiod_s = {:.1f}\ncycles = {}\n",
-      load_.rate_Hz, period_s, std::max(1L, std::lround(seconds / period_s)));
-  return client.call("run.start", {{"experiment", text}, {"file", "bench.experiment.toml"}});
+      rest_s, load_.rate_Hz, period_s, cycles);
+  client.call("run.start", {{"experiment", text}, {"file", "bench.experiment.toml"}});
+  return rest_s + period_s * static_cast<double>(cycles) + tail_s;
 }
 
 json DaemonOnBench::await_end(DaemonClient& client) {

@@ -31,8 +31,9 @@ class DaemonOnBench {
   [[nodiscard]] ProcessFigures figures() const { return figures_of(daemon_->pid()); }
   [[nodiscard]] LineTap& tap() { return *tap_; }
 
-  /// Starts a run of the pump's slow cycles that lasts `seconds`.
-  nlohmann::json start_run(DaemonClient& client, double seconds) const;
+  /// Starts a run of the pump's slow cycles that lasts some `seconds`. Returns how long it records, in seconds: rest,
+  /// cycles, and the quarter of a second after them.
+  double start_run(DaemonClient& client, double seconds) const;
   /// Waits for the run's end and its file; returns run.progress. Removes journal and run file.
   static nlohmann::json await_end(DaemonClient& client);
 

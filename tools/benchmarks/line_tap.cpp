@@ -5,6 +5,7 @@
 #include <array>
 #include <utility>
 
+#include "host/transport/real_time.hpp"
 #include "protocol/wire/message_type.hpp"
 
 namespace diastole {
@@ -12,6 +13,7 @@ namespace {
 
 constexpr unsigned baud = 460800;  // a pseudo-terminal has none
 constexpr int look_interval_ms = 50;
+constexpr int wire_priority = 60;  // a wire is not made late by other programs
 
 }  // namespace
 
@@ -26,6 +28,7 @@ std::optional<LineTap::Instant> LineTap::take_stop() {
 }
 
 void LineTap::carry(const std::stop_token& stop) {
+  ask_for_real_time(wire_priority);
   std::array<uint8_t, 4096> block{};
   while (!stop.stop_requested()) {
     daemon_.refresh();

@@ -23,6 +23,15 @@ const std::string hanging_update = built + "tests/hanging.image";
 
 inline constexpr uint64_t ms = 1'000'000;  // ns
 
+/// True if the host's own reading of the slot finds an image that verifies.
+inline bool verifies(std::span<const uint8_t> flash, wire::ImageSlot slot) {
+  const auto bytes = flash.subspan(slot == wire::ImageSlot::a ? 0x2'0000 : 0x4'0000, 0x2'0000);
+  const auto header = wire::decode_image_header(bytes.first<wire::kImageHeaderBytes>());
+  if (!header || header->code_bytes > bytes.size() - wire::kImageHeaderArea) return false;
+  return wire::digest_of(*header, bytes.subspan(wire::kImageHeaderArea, header->code_bytes)) ==
+         header->sha256;
+}
+
 class FlashBench {
  public:
   explicit FlashBench(const std::string& image = factory_image) : desk(image), line_(desk) {}

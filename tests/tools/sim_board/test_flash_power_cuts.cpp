@@ -21,15 +21,6 @@ constexpr bool every = false;
 constexpr size_t recoveries = 4, second_cuts = 3;
 #endif
 
-/// True if the host's own reading of the slot finds an image that verifies.
-bool verifies(std::span<const uint8_t> flash, wire::ImageSlot slot) {
-  const auto bytes = flash.subspan(slot == wire::ImageSlot::a ? 0x2'0000 : 0x4'0000, 0x2'0000);
-  const auto header = wire::decode_image_header(bytes.first<wire::kImageHeaderBytes>());
-  if (!header || header->code_bytes > bytes.size() - wire::kImageHeaderArea) return false;
-  return wire::digest_of(*header, bytes.subspan(wire::kImageHeaderArea, header->code_bytes)) ==
-         header->sha256;
-}
-
 struct Score {
   size_t tried = 0, lost = 0;
 };
