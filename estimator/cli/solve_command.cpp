@@ -109,6 +109,7 @@ nlohmann::ordered_json as_json(const Study& study, ElasticModel& model, const So
   for (const StudyParameter& parameter : study.law.parameters)
     json["parameters"][parameter.name] = parameter.start;
   json["mesh"] = mesh_of(study.specimen);
+  json["elements"] = model.mesh().element_count();
   json["dofs"] = model.dofs();
   json["load_steps"] = report.load_steps;
   json["newton_iterations"] = report.newton_iterations;
@@ -148,9 +149,10 @@ void print_for_people(const nlohmann::ordered_json& json) {
                fmt::join(probe["displacement_mm"].get<std::vector<double>>(), ", "));
   }
   fmt::print(
-      "  {} elements, {} unknowns, {} load steps, {} Newton iterations with {} factorisations, {:.2f} s\n",
-      fmt::join(json["mesh"].get<std::vector<int>>(), " x "), json["dofs"].get<size_t>(),
-      json["load_steps"].get<size_t>(), json["newton_iterations"].get<size_t>(),
+      "  {} elements ({} in all), {} unknowns, {} load steps, {} Newton iterations with {} factorisations, "
+      "{:.2f} s\n",
+      fmt::join(json["mesh"].get<std::vector<int>>(), " x "), json["elements"].get<size_t>(),
+      json["dofs"].get<size_t>(), json["load_steps"].get<size_t>(), json["newton_iterations"].get<size_t>(),
       json["factorisations"].get<size_t>(), json["seconds"].get<double>());
   if (json.contains("files"))
     fmt::print("Written: {}\n", fmt::join(json["files"].get<std::vector<std::string>>(), ", "));

@@ -11,6 +11,8 @@ void add_study_options(CLI::App& command, StudyOptions& options) {
   command.add_option("--set", options.starts, "NAME=VALUE: another parameter value; may be repeated")
       ->allow_extra_args(false);
   command.add_option("--mesh", options.mesh, "elements around, along, through the wall, as 8,8,4");
+  command.add_option("--refine", options.refine,
+                     "how often to halve them around, along, through, keeping the body exactly, as 0,1,1");
 }
 
 Study read_study(const StudyOptions& options) {
@@ -18,6 +20,7 @@ Study read_study(const StudyOptions& options) {
   for (const std::string& start : options.starts)
     set_start(study, start);
   if (!options.mesh.empty()) set_mesh(study, options.mesh);
+  if (!options.refine.empty()) set_refinement(study, options.refine);
   return study;
 }
 

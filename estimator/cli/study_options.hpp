@@ -17,9 +17,10 @@ struct StudyOptions {
   std::string study;
   std::vector<std::string> starts;
   std::string mesh;
+  std::string refine;
 };
 
-/// Adds STUDY, --set and --mesh. `options` must live until the command has run.
+/// Adds STUDY, --set, --mesh and --refine. `options` must live until the command has run.
 void add_study_options(CLI::App& command, StudyOptions& options);
 
 /// The study with its replaced values. Throws InputError.

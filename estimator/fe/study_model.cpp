@@ -4,12 +4,14 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "estimator/mesh/annulus.hpp"
 #include "estimator/mesh/ellipsoid.hpp"
+#include "estimator/mesh/refinement.hpp"
 #include "protocol/contract/input_error.hpp"
 #include "protocol/contract/table_reader.hpp"
 
@@ -67,24 +69,39 @@ void take_elements(const Kind& specimen, Shape& shape) {
     shape.elements[i] = static_cast<size_t>(specimen.mesh[i]);
 }
 
-HermiteMesh make_mesh(const AnnulusSpecimen& specimen, ElasticOptions&) {
+struct Body {
+  HermiteMesh mesh;
+  std::optional<FibreField> fibres;
+};
+
+Body make_body(const AnnulusSpecimen& specimen) {
   AnnulusShape shape;
   shape.inner_radius_mm = specimen.inner_radius_mm;
   shape.outer_radius_mm = specimen.outer_radius_mm;
   shape.height_mm = specimen.height_mm;
   take_elements(specimen, shape);
-  return make_annulus(shape);
+  return {make_annulus(shape), {}};
 }
 
-HermiteMesh make_mesh(const EllipsoidSpecimen& specimen, ElasticOptions& options) {
+Body make_body(const EllipsoidSpecimen& specimen) {
   EllipsoidShape shape;
   shape.inner_axes_mm = specimen.inner_axes_mm;
   shape.outer_axes_mm = specimen.outer_axes_mm;
   shape.base_z_mm = specimen.base_z_mm;
   take_elements(specimen, shape);
-  options.material_axes =
-      material_axes_of(ellipsoid_fibres(shape, specimen.fibre_endo_deg, specimen.fibre_epi_deg));
-  return make_ellipsoid(shape);
+  return {make_ellipsoid(shape), ellipsoid_fibres(shape, specimen.fibre_endo_deg, specimen.fibre_epi_deg)};
+}
+
+/// The same body in elements that are halved so many times along each direction.
+Body refined(Body body, const std::array<int, 3>& halvings) {
+  for (size_t direction = 0; direction < 3; ++direction) {
+    for (int i = 0; i < halvings[direction]; ++i) {
+      const Refinement finer(body.mesh, direction);
+      if (body.fibres) body.fibres = body.fibres->prolonged(finer);
+      body.mesh = finer.mesh();
+    }
+  }
+  return body;
 }
 
 /// End faces on springs, if the study's are.
@@ -117,13 +134,14 @@ ElasticModel make_model(const Study& study, SolveOptions options) {
   ElasticOptions elastic;
   elastic.parameters = start_values(study, law);
   elastic.solve = std::move(options);
-  HermiteMesh mesh =
-      std::visit([&](const auto& specimen) { return make_mesh(specimen, elastic); }, study.specimen);
-  elastic.bonded = bonded_ends(study, mesh);
+  Body body = refined(std::visit([](const auto& specimen) { return make_body(specimen); }, study.specimen),
+                      study.refine);
+  if (body.fibres) elastic.material_axes = material_axes_of(*std::move(body.fibres));
+  elastic.bonded = bonded_ends(study, body.mesh);
   if (study.chamber) elastic.chamber = chamber_of(*study.chamber);
   elastic.bulk_modulus_kPa = study.compression.bulk_modulus_kPa;
   elastic.volume_stiffness_kPa = study.compression.volume_stiffness_kPa;
-  return ElasticModel(std::move(mesh), law, std::move(elastic));
+  return ElasticModel(std::move(body.mesh), law, std::move(elastic));
 }
 
 }  // namespace diastole

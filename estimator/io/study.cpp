@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <charconv>
 
 #include "protocol/contract/input_error.hpp"
@@ -13,6 +14,7 @@ namespace {
 
 // Beyond these the direct factorisation no longer fits a workstation.
 constexpr std::array<int, 3> max_elements = {64, 64, 16};
+constexpr int most_halvings = 4;
 constexpr int min_circumferential = 3;  // fewer elements than this cannot close a circle
 
 std::array<int, 3> read_mesh(TableReader& table) {
@@ -184,13 +186,23 @@ bool parse_whole(std::string_view text, Number& value) {
 Study read_study(const std::filesystem::path& path) {
   TableReader root = TableReader::from_file(path);
   root.expect_format("diastole-study", 1);
-  Study study{
-      .file = path, .specimen = read_specimen(root), .law = read_law(root), .data = {}, .effects = {}};
+  Study study{.file = path,
+              .specimen = read_specimen(root),
+              .law = read_law(root),
+              .data = {},
+              .effects = {},
+              .refine = {}};
   study.data = read_data(root, path.parent_path());
   study.chamber = read_chamber(root);
   if (auto model = root.table_if("model")) {
     study.effects = model->texts_or("effects", {});
     study.compression = read_compression(*model);
+    if (model->has("refine")) {
+      const std::vector<int64_t> halvings =
+          model->integers("refine", 3, {.at_least = 0, .at_most = most_halvings});
+      std::transform(halvings.begin(), halvings.end(), study.refine.begin(),
+                     [](int64_t count) { return static_cast<int>(count); });
+    }
     model->finish();
   }
   root.finish();
@@ -233,25 +245,46 @@ const std::array<int, 3>& mesh_of(const Specimen& specimen) {
   return std::visit([](const auto& kind) -> const std::array<int, 3>& { return kind.mesh; }, specimen);
 }
 
-void set_mesh(Study& study, std::string_view counts) {
-  std::array<int, 3>& mesh =
-      std::visit([](auto& kind) -> std::array<int, 3>& { return kind.mesh; }, study.specimen);
-  std::string_view rest = counts;
+namespace {
+
+/// "8,8,4" as three whole numbers.
+std::array<int, 3> three_counts(std::string_view option, std::string_view text, std::string_view example) {
+  std::array<int, 3> counts{};
+  std::string_view rest = text;
   for (size_t axis = 0; axis < 3; ++axis) {
     const size_t comma = rest.find(',');
     const bool last = axis == 2;
-    int count = 0;
-    if ((comma == std::string_view::npos) != last || !parse_whole(rest.substr(0, comma), count)) {
-      refuse_option("--mesh", counts, "is not three whole numbers", "Write for example --mesh 8,8,4.");
+    if ((comma == std::string_view::npos) != last || !parse_whole(rest.substr(0, comma), counts[axis])) {
+      refuse_option(option, text, "is not three whole numbers",
+                    fmt::format("Write for example {} {}.", option, example));
     }
-    const int least = axis == 0 ? min_circumferential : 1;
-    if (count < least || count > max_elements[axis]) {
-      refuse_option("--mesh", counts, fmt::format("has {} elements in direction {}", count, axis + 1),
-                    fmt::format("Use {} to {} there.", least, max_elements[axis]));
-    }
-    mesh[axis] = count;
     if (!last) rest.remove_prefix(comma + 1);
   }
+  return counts;
+}
+
+}  // namespace
+
+void set_refinement(Study& study, std::string_view halvings) {
+  study.refine = three_counts("--refine", halvings, "0,1,1");
+  for (const int count : study.refine) {
+    if (count < 0 || count > most_halvings) {
+      refuse_option("--refine", halvings, fmt::format("halves elements {} times", count),
+                    fmt::format("Halve 0 to {} times along each direction.", most_halvings));
+    }
+  }
+}
+
+void set_mesh(Study& study, std::string_view counts) {
+  const std::array<int, 3> mesh = three_counts("--mesh", counts, "8,8,4");
+  for (size_t axis = 0; axis < 3; ++axis) {
+    const int least = axis == 0 ? min_circumferential : 1;
+    if (mesh[axis] < least || mesh[axis] > max_elements[axis]) {
+      refuse_option("--mesh", counts, fmt::format("has {} elements in direction {}", mesh[axis], axis + 1),
+                    fmt::format("Use {} to {} there.", least, max_elements[axis]));
+    }
+  }
+  std::visit([&](auto& kind) { kind.mesh = mesh; }, study.specimen);
 }
 
 }  // namespace diastole

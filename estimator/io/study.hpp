@@ -97,6 +97,9 @@ struct Study {
   std::vector<std::string> effects;  ///< effects that the model already includes
   std::optional<StudyChamber> chamber = {};
   StudyCompression compression = {};
+  /// How often the specimen's elements are halved along each direction: a finer mesh of the very same body
+  /// (estimator/mesh/refinement.hpp), while another number of elements approximates the specimen anew.
+  std::array<int, 3> refine = {};
 };
 
 /// Throws InputError (file, line, key, value, remedy) for anything that the format does not know, a value out
@@ -109,6 +112,9 @@ std::vector<std::filesystem::path> inputs_of(const Study& study);
 /// `--set C1_kPa=7.5`: another start value. Throws InputError if the parameter is unknown or out of its
 /// bounds.
 void set_start(Study& study, std::string_view assignment);
+
+/// `--refine 0,1,1`: further halvings. Throws InputError unless three whole numbers from 0 to 4.
+void set_refinement(Study& study, std::string_view halvings);
 
 /// `--mesh 8,8,4`: another number of elements. Throws InputError unless three positive integers in range.
 void set_mesh(Study& study, std::string_view counts);

@@ -31,6 +31,11 @@ Eigen::Matrix3d wall_axes(const HermiteMesh& mesh, const MaterialPoint& point) {
 FibreField::FibreField(std::vector<double> fibre_deg, std::vector<double> sheet_deg)
     : fibre_deg_(std::move(fibre_deg)), sheet_deg_(std::move(sheet_deg)) {}
 
+FibreField FibreField::prolonged(const Refinement& refinement) const {
+  return FibreField(refinement.prolonged_corners(fibre_deg_),
+                    sheet_deg_.empty() ? sheet_deg_ : refinement.prolonged_corners(sheet_deg_));
+}
+
 double FibreField::fibre_deg(const HermiteMesh& mesh, const MaterialPoint& point) const {
   return interpolate(mesh, fibre_deg_, point);
 }

@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "estimator/mesh/hermite_mesh.hpp"
+#include "estimator/mesh/refinement.hpp"
 
 namespace diastole {
 
@@ -27,7 +28,12 @@ class FibreField {
   /// One angle a node of the mesh that it will be used with; `sheet_deg` may be empty (0 everywhere).
   explicit FibreField(std::vector<double> fibre_deg, std::vector<double> sheet_deg = {});
 
+  [[nodiscard]] const std::vector<double>& nodal_fibre_deg() const { return fibre_deg_; }
+  /// Empty if it is 0 everywhere.
+  [[nodiscard]] const std::vector<double>& nodal_sheet_deg() const { return sheet_deg_; }
   [[nodiscard]] double fibre_deg(const HermiteMesh& mesh, const MaterialPoint& point) const;
+  /// The same directions over the finer mesh.
+  [[nodiscard]] FibreField prolonged(const Refinement& refinement) const;
   /// Columns: the law's axes, fibre first.
   [[nodiscard]] Eigen::Matrix3d material_axes(const HermiteMesh& mesh, const MaterialPoint& point) const;
 

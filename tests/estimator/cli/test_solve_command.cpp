@@ -127,6 +127,23 @@ TEST_F(SolveCommand, WritesTheFilesThatAreAskedFor) {
   EXPECT_THAT(refusal(arguments), testing::HasSubstr("gel.csv"));
 }
 
+TEST_F(SolveCommand, HalvesElementsOfTheSameBody) {
+  const auto solved = [&](const std::vector<std::string>& more) {
+    std::vector<std::string> arguments{"--pressure-kPa", "0", "--mesh", "4,2,1", "--json"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return nlohmann::json::parse(run(arguments).output);
+  };
+  const auto coarse = solved({});
+  const auto fine = solved({"--refine", "1,0,1"});
+  EXPECT_EQ(coarse["elements"], 8);
+  EXPECT_EQ(fine["elements"], 32);
+  EXPECT_NEAR(fine["cavity_volume_mL"].get<double>(), coarse["cavity_volume_mL"].get<double>(), 1e-9);
+  EXPECT_THAT(refusal({"--pressure-kPa", "2", "--refine", "1,1"}), testing::HasSubstr("three whole numbers"));
+  EXPECT_THAT(refusal({"--pressure-kPa", "2", "--refine", "0,5,0"}), testing::HasSubstr("0 to 4"));
+  write_study(std::string(gel_study) + "[model]\nrefine = [0, 1, 0]\n");
+  EXPECT_EQ(solved({})["elements"], 16);
+}
+
 TEST_F(SolveCommand, FollowsTheStudysFrames) {
   const test::ScratchFolder folder;
   write_study(std::string(gel_study) + "frames = \"" +
