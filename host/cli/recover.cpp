@@ -33,8 +33,8 @@ nlohmann::json describe(const StoredJournal& stored) {
   if (stored.has_run_file) told["run_file"] = run_file_beside(stored.file).string();
   try {
     const JournalStory story = read_story(read_journal(stored.file));
-    told["started_utc"] = story.begin.value("started_utc", "");
-    told["experiment"] = story.begin.value("experiment_file", "");
+    told["started_utc"] = story.begin.started_utc;
+    told["experiment"] = story.begin.experiment_file;
     told["complete"] = story.closed;
   } catch (const InputError& error) {
     told["problem"] = error.fault().problem;

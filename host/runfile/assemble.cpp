@@ -16,18 +16,18 @@
 namespace diastole {
 namespace {
 
-using nlohmann::json;
 using runfile::RecordedRun;
 
 constexpr double ns_per_s = 1e9;
 constexpr double mL_per_pL = 1e-9;
 constexpr double missing = std::numeric_limits<double>::quiet_NaN();
+const std::string lost_in_the_journal = "its record was lost in the journal";
 
 /// Controller ticks and host times as seconds since the start of run.
 class TimeAxis {
  public:
   TimeAxis(const JournalStory& story, const std::string& file)
-      : tick_rate_Hz_(story.begin.at("tick_rate_Hz")), start_tick_(*story.start_tick) {
+      : tick_rate_Hz_(story.begin.tick_rate_Hz), start_tick_(*story.start_tick) {
     const auto fitted = fit_clock_map(story.controller_pairs);
     if (!fitted) {
       throw NothingRecorded({file, "",
@@ -70,8 +70,8 @@ struct Grid {
 class SampleTimes {
  public:
   SampleTimes(const JournalStory& story, const TimeAxis& axis) : axis_(axis) {
-    if (!story.begin.value("daq_timer_counts_samples", false)) return;
-    rate_Hz_ = story.begin.at("sample_rate_Hz");
+    if (!story.begin.daq_timer_counts_samples) return;
+    rate_Hz_ = story.begin.sample_rate_Hz;
     map_ = fit_clock_map(story.daq_pairs);
   }
 
@@ -88,15 +88,11 @@ class SampleTimes {
 
 Grid lay_out(const JournalStory& story, const TimeAxis& axis, size_t channels) {
   const SampleTimes times(story, axis);
-  uint64_t rows = 0;
-  for (const SampleBlock& block : story.samples)
-    rows = std::max(rows, block.first_index + block.host_ns.size());
-  for (const DeclaredGap& gap : story.gaps)
-    rows = std::max(rows, gap.first_index + gap.count);
+  const uint64_t rows = story.sample_rows();
   Grid grid{std::vector<double>(rows, missing),
             std::vector<std::vector<double>>(channels, std::vector<double>(rows, missing)),
             std::vector<uint32_t>(rows, 0),
-            {"its record was lost in the journal"}};
+            {lost_in_the_journal}};
   for (const DeclaredGap& gap : story.gaps) {
     std::fill_n(grid.reason.begin() + static_cast<std::ptrdiff_t>(gap.first_index), gap.count,
                 static_cast<uint32_t>(grid.reasons.size()));
@@ -146,21 +142,23 @@ void fill_times(std::vector<double>& time_s, double start_s, double spacing_s) {
   }
 }
 
-void declare(RecordedRun& run, std::string_view stream, int64_t index, const std::string& reason) {
+void declare(RecordedRun& run, std::string_view stream, int64_t first, int64_t count,
+             const std::string& reason) {
+  if (count <= 0) return;
   if (!run.gaps.empty()) {
     runfile::Gap& last = run.gaps.back();
-    if (last.stream == stream && last.reason == reason && last.first_index + last.count == index) {
-      ++last.count;
+    if (last.stream == stream && last.reason == reason && last.first_index + last.count == first) {
+      last.count += count;
       return;
     }
   }
-  run.gaps.push_back({std::string(stream), index, 1, reason});
+  run.gaps.push_back({std::string(stream), first, count, reason});
 }
 
 void put_pressure(const JournalStory& story, const TimeAxis& axis, AssembledRun& assembled) {
   RecordedRun& run = assembled.run;
-  const std::vector<std::string> names = story.begin.at("channels");
-  const double spacing_s = axis.map().scale / story.begin.at("sample_rate_Hz").get<double>();
+  const std::vector<std::string>& names = story.begin.channels;
+  const double spacing_s = axis.map().scale / story.begin.sample_rate_Hz;
   Grid grid = lay_out(story, axis, names.size());
   std::vector<bool> received;
   for (const double t : grid.time_s)
@@ -180,14 +178,14 @@ void put_pressure(const JournalStory& story, const TimeAxis& axis, AssembledRun&
       ++assembled.samples_received;
     } else {
       ++assembled.samples_missing;
-      declare(run, runfile::pressure_stream, row - first,
+      declare(run, runfile::pressure_stream, row - first, 1,
               grid.reasons[grid.reason[static_cast<size_t>(row)]]);
     }
   }
 }
 
 void put_positions(const JournalStory& story, const TimeAxis& axis, RecordedRun& run) {
-  const double microstep_mL = story.begin.at("microstep_pL").get<double>() * mL_per_pL;
+  const double microstep_mL = story.begin.microstep_pL * mL_per_pL;
   for (const PositionBlock& block : story.positions) {
     if (block.first_index < run.pump.time_s.size()) continue;
     const double step_s =
@@ -195,7 +193,7 @@ void put_positions(const JournalStory& story, const TimeAxis& axis, RecordedRun&
     const double first_s = axis.of_tick(block.first_tick);
     while (run.pump.time_s.size() < block.first_index) {
       const size_t row = run.pump.time_s.size();
-      declare(run, runfile::pump_stream, static_cast<int64_t>(row), "its record was lost in the journal");
+      declare(run, runfile::pump_stream, static_cast<int64_t>(row), 1, lost_in_the_journal);
       run.pump.time_s.push_back(first_s - step_s * static_cast<double>(block.first_index - row));
       run.pump.commanded_mL.push_back(missing);
     }
@@ -207,61 +205,57 @@ void put_positions(const JournalStory& story, const TimeAxis& axis, RecordedRun&
 }
 
 void put_triggers(const JournalStory& story, const TimeAxis& axis, RecordedRun& run) {
-  run.trigger_delay_s = story.begin.value("trigger_delay_s", 0.0);
+  run.trigger_delay_s = story.begin.trigger_delay_s;
   int64_t next_cycle = 0;
-  for (const json& trigger : story.triggers) {
-    const int64_t cycle = trigger.at("cycle");
-    for (; next_cycle < cycle; ++next_cycle)
-      declare(run, runfile::trigger_stream, next_cycle, "its record was lost");
-    run.trigger_s.push_back(axis.of_tick(trigger.at("tick")));
-    next_cycle = cycle + 1;
+  const auto declare_until = [&](int64_t cycle) {
+    declare(run, runfile::trigger_stream, next_cycle, cycle - next_cycle, "its record was lost");
+  };
+  for (const RaisedTrigger& trigger : story.triggers) {
+    declare_until(trigger.cycle);
+    run.trigger_s.push_back(axis.of_tick(trigger.tick));
+    next_cycle = trigger.cycle + 1;
   }
-  const int64_t raised = story.run_ended ? story.run_ended->at("triggers").get<int64_t>() : next_cycle;
-  for (; next_cycle < raised; ++next_cycle)
-    declare(run, runfile::trigger_stream, next_cycle, "its record was lost");
+  if (story.run_ended) declare_until(story.run_ended->triggers);
 }
 
 /// A segment starts when the controller said so; one that did not begin stands as far behind the last that did
 /// as it was planned.
 void put_segments(const JournalStory& story, const TimeAxis& axis, RecordedRun& run) {
   std::map<size_t, double> begun_s;
-  for (const json& started : story.segment_starts)
-    begun_s[started.at("segment")] = axis.of_tick(started.at("tick"));
+  for (const SegmentStart& started : story.segment_starts)
+    begun_s[started.segment] = axis.of_tick(started.tick);
   double late_s = 0;
-  for (const json& segment : story.begin.at("segments")) {
-    const double planned_s = segment.at("start_s");
+  for (const runfile::Segment& planned : story.begin.segments) {
     if (const auto begun = begun_s.find(run.segments.size()); begun != begun_s.end()) {
-      late_s = begun->second - planned_s;
+      late_s = begun->second - planned.start_s;
     }
-    run.segments.push_back({planned_s + late_s, segment.at("waveform"), segment.at("stroke_mL"),
-                            segment.at("period_s"), segment.at("offset_mL"), segment.at("cycles")});
+    run.segments.push_back(planned);
+    run.segments.back().start_s += late_s;
   }
   // A schedule ends its one segment when the last slice is done; until then the segment had more cycles in reserve.
-  if (story.run_ended && story.run_ended->value("schedule_done", false)) {
-    run.segments.back().cycles = story.run_ended->at("cycles");
+  if (story.run_ended && story.run_ended->schedule_done && !run.segments.empty()) {
+    run.segments.back().cycles = story.run_ended->cycles;
   }
 }
 
 /// Rows of the triggers whose cycles belong to a slice.
 void put_slices(const JournalStory& story, RecordedRun& run) {
   const auto row_of = [&](int64_t cycle) {
-    const auto at = std::find_if(story.triggers.begin(), story.triggers.end(), [&](const json& trigger) {
-      return trigger.at("cycle").get<int64_t>() >= cycle;
-    });
+    const auto at = std::find_if(story.triggers.begin(), story.triggers.end(),
+                                 [&](const RaisedTrigger& trigger) { return trigger.cycle >= cycle; });
     return at - story.triggers.begin();
   };
-  for (const json& slice : story.slices) {
-    const int64_t first = slice.at("cycle"), cycles = slice.at("cycles");
-    run.slices.push_back({slice.at("block"), slice.at("slice"), row_of(first),
-                          row_of(first + cycles) - row_of(first), cycles, slice.at("dummy_cycles")});
+  for (const BegunSlice& slice : story.slices) {
+    const auto first = row_of(slice.cycle);
+    run.slices.push_back({slice.block, slice.slice, first, row_of(slice.cycle + slice.cycles) - first,
+                          slice.cycles, slice.dummy_cycles});
   }
 }
 
 void put_waveforms(const JournalStory& story, RecordedRun& run) {
-  for (const json& played : story.begin.value("waveforms", json::array())) {
-    runfile::PlayedWaveform& waveform = run.waveforms[played.at("segment").get<size_t>()];
-    waveform.points = played.at("points");
-    waveform.fraction = played.at("fraction").get<std::vector<double>>();
+  for (const PlayedSegment& played : story.begin.waveforms) {
+    runfile::PlayedWaveform& waveform = run.waveforms[played.segment];
+    waveform = {played.points, {}, played.fraction};
     const double intervals = static_cast<double>(waveform.fraction.size()) - 1;
     for (size_t i = 0; i < waveform.fraction.size(); ++i)
       waveform.phase.push_back(static_cast<double>(i) / intervals);
@@ -269,18 +263,13 @@ void put_waveforms(const JournalStory& story, RecordedRun& run) {
 }
 
 void put_events(const JournalStory& story, const TimeAxis& axis, RecordedRun& run) {
-  for (const json& event : story.events) {
-    const double time_s =
-        event.contains("tick") ? axis.of_tick(event.at("tick")) : axis.of_host_ns(event.at("host_ns"));
-    run.events.push_back({time_s, event.at("level"), event.at("code"), event.at("text")});
+  for (const NotedEvent& event : story.events) {
+    const double time_s = event.tick ? axis.of_tick(*event.tick) : axis.of_host_ns(event.host_ns);
+    run.events.push_back({time_s, event.level, event.code, event.text});
   }
-  if (story.run_ended) {
-    const std::string reason = story.run_ended->at("reason");
-    if (runfile::is_stop_on_request(reason)) {
-      run.events.push_back(
-          {axis.of_tick(story.run_ended->at("tick")), "info", reason,
-           fmt::format("stopped on request after {} cycles", story.run_ended->at("cycles").get<int64_t>())});
-    }
+  if (story.run_ended && runfile::is_stop_on_request(story.run_ended->reason)) {
+    run.events.push_back({axis.of_tick(story.run_ended->tick), "info", story.run_ended->reason,
+                          fmt::format("stopped on request after {} cycles", story.run_ended->cycles)});
   }
   std::stable_sort(run.events.begin(), run.events.end(),
                    [](const auto& a, const auto& b) { return a.time_s < b.time_s; });
@@ -298,20 +287,6 @@ void put_clocks(const JournalStory& story, const TimeAxis& axis, RecordedRun& ru
   }
 }
 
-std::map<std::string, runfile::Attribute, std::less<>> rig_attributes(const json& rig) {
-  std::map<std::string, runfile::Attribute, std::less<>> attributes;
-  for (const auto& [name, value] : rig.items()) {
-    if (value.is_string()) {
-      attributes[name] = value.get<std::string>();
-    } else if (value.is_number_integer()) {
-      attributes[name] = value.get<int64_t>();
-    } else {
-      attributes[name] = value.get<double>();
-    }
-  }
-  return attributes;
-}
-
 }  // namespace
 
 AssembledRun assemble_run(const JournalContents& journal) {
@@ -323,11 +298,11 @@ AssembledRun assemble_run(const JournalContents& journal) {
   AssembledRun assembled;
   RecordedRun& run = assembled.run;
   run.file = journal.file;
-  run.run_id = story.begin.at("run_id");
-  run.started_utc = story.begin.at("started_utc");
-  run.producer = story.begin.at("producer");
-  run.rig = rig_attributes(story.begin.at("rig"));
-  run.protocol_toml = story.begin.at("experiment");
+  run.run_id = story.begin.run_id;
+  run.started_utc = story.begin.started_utc;
+  run.producer = story.begin.producer;
+  run.rig = story.begin.rig;
+  run.protocol_toml = story.begin.experiment;
   put_segments(story, axis, run);
   put_waveforms(story, run);
   put_positions(story, axis, run);

@@ -1,5 +1,10 @@
 #include "host/runfile/journal_story.hpp"
 
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+
 #include "protocol/contract/input_error.hpp"
 
 namespace diastole {
@@ -9,42 +14,121 @@ using nlohmann::json;
 
 constexpr double ns_per_s = 1e9;
 constexpr double timer_span = 4294967296.0;  // the instrument's timer wraps at 32 bits
+constexpr uint64_t most_ticks = uint64_t{1} << 62;
+constexpr uint64_t most_counts = uint64_t{1} << 40;
+constexpr double highest_rate_Hz = 1e12;
+
+/// A whole number from 0 to `most`; JSON's other numbers would be rounded or wrapped.
+uint64_t whole(const json& record, const char* name, uint64_t most) {
+  const json& value = record.at(name);
+  if (!value.is_number_unsigned() || value.get<uint64_t>() > most) {
+    throw std::out_of_range(name);
+  }
+  return value.get<uint64_t>();
+}
+
+uint64_t ticks(const json& record, const char* name) { return whole(record, name, most_ticks); }
+
+int64_t count(const json& record, const char* name) {
+  return static_cast<int64_t>(whole(record, name, most_counts));
+}
+
+double rate_Hz(const json& record, const char* name) {
+  const double value = record.at(name);
+  if (!(value >= 1e-3 && value <= highest_rate_Hz)) throw std::out_of_range(name);
+  return value;
+}
 
 ClockPair pair_of(const json& record, double other_s) {
-  return {record.at("host_ns").get<double>() / ns_per_s, other_s,
-          record.at("half_round_trip_ns").get<double>() / ns_per_s};
+  return {static_cast<double>(ticks(record, "host_ns")) / ns_per_s, other_s,
+          static_cast<double>(ticks(record, "half_round_trip_ns")) / ns_per_s};
+}
+
+/// What is neither a number nor a text is left out; so is a number that was none when it was written.
+std::map<std::string, runfile::Attribute, std::less<>> rig_attributes(const json& rig) {
+  std::map<std::string, runfile::Attribute, std::less<>> attributes;
+  for (const auto& [name, value] : rig.items()) {
+    if (value.is_string()) {
+      attributes[name] = value.get<std::string>();
+    } else if (value.is_number_integer()) {
+      attributes[name] = value.get<int64_t>();
+    } else if (value.is_number()) {
+      attributes[name] = value.get<double>();
+    }
+  }
+  return attributes;
+}
+
+Beginning beginning_of(const json& record) {
+  Beginning begin;
+  begin.run_id = record.at("run_id");
+  begin.started_utc = record.at("started_utc");
+  begin.producer = record.at("producer");
+  begin.experiment = record.at("experiment");
+  begin.experiment_file = record.value("experiment_file", "");
+  begin.sample_rate_Hz = rate_Hz(record, "sample_rate_Hz");
+  begin.tick_rate_Hz = rate_Hz(record, "tick_rate_Hz");
+  begin.daq_timer_rate_Hz = rate_Hz(record, "daq_timer_rate_Hz");
+  begin.daq_timer_counts_samples = record.value("daq_timer_counts_samples", false);
+  begin.microstep_pL = record.at("microstep_pL");
+  begin.trigger_delay_s = record.value("trigger_delay_s", 0.0);
+  begin.channels = record.at("channels").get<std::vector<std::string>>();
+  begin.rig = rig_attributes(record.at("rig"));
+  for (const json& segment : record.at("segments")) {
+    begin.segments.push_back({segment.at("start_s"), segment.at("waveform"), segment.at("stroke_mL"),
+                              segment.at("period_s"), segment.at("offset_mL"), count(segment, "cycles")});
+  }
+  for (const json& played : record.value("waveforms", json::array())) {
+    begin.waveforms.push_back({static_cast<size_t>(count(played, "segment")), played.at("points"),
+                               played.at("fraction").get<std::vector<double>>()});
+  }
+  return begin;
+}
+
+NotedEvent event_of(const json& record) {
+  NotedEvent event{.level = record.at("level"), .code = record.at("code"), .text = record.at("text")};
+  if (record.contains("tick")) {
+    event.tick = ticks(record, "tick");
+  } else {
+    event.host_ns = ticks(record, "host_ns");
+  }
+  return event;
 }
 
 class StoryTeller {
  public:
   explicit StoryTeller(JournalStory& story) : story_(story) {}
 
+  /// Throws what std::exception covers if the record is not of its form; then nothing of it is taken.
   void take_document(const json& record) {
     const std::string what = record.at("record");
     if (what == "begin") {
-      story_.begin = record;
-      tick_rate_Hz_ = record.at("tick_rate_Hz");
-      timer_rate_Hz_ = record.at("daq_timer_rate_Hz");
+      story_.begin = beginning_of(record);
+      begun_ = true;
     } else if (what == "clock") {
-      story_.controller_pairs.push_back(pair_of(record, record.at("tick").get<double>() / tick_rate_Hz_));
+      story_.controller_pairs.push_back(
+          pair_of(record, static_cast<double>(ticks(record, "tick")) / story_.begin.tick_rate_Hz));
     } else if (what == "daq_clock") {
       take_timer(record);
     } else if (what == "grid") {
-      story_.first_due_ns = record.at("first_due_ns").get<uint64_t>();
+      story_.first_due_ns = ticks(record, "first_due_ns");
     } else if (what == "gap") {
-      story_.gaps.push_back({record.at("first_index"), record.at("count"), record.at("reason")});
+      take_gap(
+          {whole(record, "first_index", most_rows), whole(record, "count", most_rows), record.at("reason")});
     } else if (what == "run_started") {
-      story_.start_tick = record.at("tick").get<uint64_t>();
+      story_.start_tick = ticks(record, "tick");
     } else if (what == "segment") {
-      story_.segment_starts.push_back(record);
+      story_.segment_starts.push_back({static_cast<size_t>(count(record, "segment")), ticks(record, "tick")});
     } else if (what == "trigger") {
-      story_.triggers.push_back(record);
+      story_.triggers.push_back({count(record, "cycle"), ticks(record, "tick")});
     } else if (what == "slice") {
-      story_.slices.push_back(record);
+      story_.slices.push_back({record.at("block"), count(record, "slice"), count(record, "cycle"),
+                               count(record, "cycles"), count(record, "dummy_cycles")});
     } else if (what == "run_ended") {
-      story_.run_ended = record;
+      story_.run_ended = EndOfRun{record.at("reason"), record.value("schedule_done", false),
+                                  ticks(record, "tick"), count(record, "cycles"), count(record, "triggers")};
     } else if (what == "event") {
-      story_.events.push_back(record);
+      story_.events.push_back(event_of(record));
     } else if (what == "end") {
       story_.closed = true;
     }
@@ -52,27 +136,49 @@ class StoryTeller {
 
   void take_samples(SampleBlock block) {
     if (block.first_index < next_sample_ || block.host_ns.empty()) return;
+    if (block.first_index + block.host_ns.size() > most_rows || block.first_index > most_rows) return;
     next_sample_ = block.first_index + block.host_ns.size();
     story_.samples.push_back(std::move(block));
   }
 
+  void take_positions(PositionBlock block) {
+    if (uint64_t{block.first_index} + block.microsteps.size() > most_rows) return;
+    story_.positions.push_back(std::move(block));
+  }
+
+  [[nodiscard]] bool begun() const { return begun_; }
+
  private:
+  void take_gap(DeclaredGap gap) {
+    if (gap.first_index + gap.count <= most_rows) story_.gaps.push_back(std::move(gap));
+  }
+
   void take_timer(const json& record) {
-    const double timer = record.at("timer");
-    if (timer < last_timer_) timer_turns_ += 1;
+    const auto timer = static_cast<double>(ticks(record, "timer"));
+    const double turns = timer_turns_ + (timer < last_timer_ ? 1 : 0);
+    story_.daq_pairs.push_back(
+        pair_of(record, (timer + turns * timer_span) / story_.begin.daq_timer_rate_Hz));
     last_timer_ = timer;
-    story_.daq_pairs.push_back(pair_of(record, (timer + timer_turns_ * timer_span) / timer_rate_Hz_));
+    timer_turns_ = turns;
   }
 
   JournalStory& story_;
-  double tick_rate_Hz_ = 1;
-  double timer_rate_Hz_ = 1;
+  bool begun_ = false;
   double last_timer_ = 0;
   double timer_turns_ = 0;
   uint64_t next_sample_ = 0;
 };
 
 }  // namespace
+
+uint64_t JournalStory::sample_rows() const {
+  uint64_t rows = 0;
+  for (const SampleBlock& block : samples)
+    rows = std::max(rows, block.first_index + block.host_ns.size());
+  for (const DeclaredGap& gap : gaps)
+    rows = std::max(rows, gap.first_index + gap.count);
+  return rows;
+}
 
 JournalStory read_story(const JournalContents& journal) {
   JournalStory story;
@@ -81,17 +187,19 @@ JournalStory read_story(const JournalContents& journal) {
     if (record.kind == RecordKind::samples) {
       if (auto block = decode_samples(record.payload)) teller.take_samples(std::move(*block));
     } else if (record.kind == RecordKind::positions) {
-      if (auto block = decode_positions(record.payload)) story.positions.push_back(std::move(*block));
+      if (auto block = decode_positions(record.payload)) teller.take_positions(std::move(*block));
     } else if (record.kind == RecordKind::document) {
       const json document = json::parse(record.payload.begin(), record.payload.end(), nullptr, false);
       try {
         if (document.is_object()) teller.take_document(document);
       } catch (const json::exception&) {
         continue;  // whole by its CRC but not of this version's form: told as missing by what it leaves out
+      } catch (const std::out_of_range&) {
+        continue;
       }
     }
   }
-  if (story.begin.is_null()) {
+  if (!teller.begun()) {
     throw InputError({journal.file, "", "has lost its first record, without which the rest has no meaning",
                       "This journal cannot be recovered."});
   }

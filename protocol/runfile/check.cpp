@@ -11,6 +11,10 @@
 namespace diastole::runfile {
 namespace {
 
+bool countable(int64_t count) { return count >= 0 && count <= most_counted; }
+
+bool on_the_axis(double time_s) { return std::abs(time_s) <= longest_time_s; }  // false for NaN
+
 [[noreturn]] void fail_at(const RecordedRun& run, const std::string& dataset, size_t index,
                           std::string problem, std::string remedy) {
   throw InputError(
@@ -46,9 +50,10 @@ void check_values(const RecordedRun& run, const std::string& dataset, std::span<
 void check_times(const RecordedRun& run, const std::string& dataset, std::span<const double> times_s) {
   double last_s = -HUGE_VAL;
   for (size_t i = 0; i < times_s.size(); ++i) {
-    if (!std::isfinite(times_s[i])) {
+    if (!on_the_axis(times_s[i])) {
       fail_at(run, dataset, i, fmt::format("is {}", times_s[i]),
-              "Every row has a time; also a missing sample has the one at which it was due.");
+              "Every row has a time since the start of run; also a missing sample has the one at which it "
+              "was due.");
     }
     if (times_s[i] <= last_s) {
       fail_at(run, dataset, i, fmt::format("is {} s, not later than the {} s before it", times_s[i], last_s),
@@ -69,11 +74,12 @@ void check_segments(const RecordedRun& run) {
   double last_s = -HUGE_VAL;
   for (size_t i = 0; i < run.segments.size(); ++i) {
     const Segment& segment = run.segments[i];
-    const bool finite = std::isfinite(segment.start_s) && std::isfinite(segment.stroke_mL) &&
-                        std::isfinite(segment.period_s) && std::isfinite(segment.offset_mL);
-    if (!finite || segment.period_s <= 0 || segment.cycles < 0) {
+    const bool finite = on_the_axis(segment.start_s) && std::isfinite(segment.stroke_mL) &&
+                        on_the_axis(segment.period_s) && std::isfinite(segment.offset_mL);
+    if (!finite || segment.period_s < shortest_period_s || !countable(segment.cycles)) {
       fail_at(run, protocol_segments, i,
-              fmt::format("has period_s {} and cycles {}", segment.period_s, segment.cycles),
+              fmt::format("has start_s {}, period_s {} and cycles {}", segment.start_s, segment.period_s,
+                          segment.cycles),
               "A segment needs finite numbers, a positive period and no negative count of cycles.");
     }
     if (segment.start_s < last_s) {
@@ -87,7 +93,7 @@ void check_segments(const RecordedRun& run) {
 void check_gaps(const RecordedRun& run) {
   for (size_t i = 0; i < run.gaps.size(); ++i) {
     const Gap& gap = run.gaps[i];
-    if (gap.first_index >= 0 && gap.count >= 1) continue;
+    if (countable(gap.first_index) && countable(gap.count) && gap.count >= 1) continue;
     fail_at(run, gaps_table, i,
             fmt::format("declares first_index {} and count {}", gap.first_index, gap.count),
             "A gap starts at 0 or later and misses at least one sample.");
@@ -100,6 +106,11 @@ void check_slices(const RecordedRun& run) {
     const Slice& slice = run.slices[i];
     const auto rows = std::ssize(run.trigger_s);
     const bool in_order = slice.first_trigger >= next_trigger && slice.first_trigger <= rows;
+    if (!countable(slice.cycles) || !countable(slice.dummy_cycles)) {
+      fail_at(run, protocol_slices, i,
+              fmt::format("has cycles {} and dummy_cycles {}", slice.cycles, slice.dummy_cycles),
+              "Cycles are counted from 0.");
+    }
     if (!in_order || slice.triggers < 0 || slice.triggers > rows - slice.first_trigger) {
       fail_at(
           run, protocol_slices, i,
@@ -131,6 +142,9 @@ void check(const RecordedRun& run) {
     check_values(run, dataset, values_kPa);
   }
   check_times(run, trigger_time, run.trigger_s);
+  if (!on_the_axis(run.trigger_delay_s)) {
+    fail_at(run, trigger_delay, 0, fmt::format("is {}", run.trigger_delay_s), "It is a time in seconds.");
+  }
   check_slices(run);
   for (const auto& [segment, flow] : run.flow) {
     const std::string group = fmt::format("{}/{}", flow_group, segment);

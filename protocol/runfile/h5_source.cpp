@@ -11,7 +11,9 @@
 namespace diastole::runfile {
 namespace {
 
-constexpr hsize_t most_elements = 1'000'000'000;  // a larger claim is a damaged header, not a recording
+// Larger claims are a damaged header, not a recording.
+constexpr hsize_t most_elements = hsize_t{1} << 27;
+constexpr size_t most_text_bytes = size_t{1} << 28;
 
 using ReadInto = std::function<bool(hid_t memory_type, void* target)>;
 
@@ -41,6 +43,7 @@ std::optional<std::vector<std::string>> read_texts(const TypeHandle& stored, con
     return texts;
   }
   const size_t size = H5Tget_size(stored.get());
+  if (size == 0 || count > most_text_bytes / size) return std::nullopt;
   H5Tset_size(memory.get(), size);
   H5Tset_strpad(memory.get(), H5Tget_strpad(stored.get()));
   std::vector<char> bytes(count * size);

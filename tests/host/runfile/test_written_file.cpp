@@ -159,5 +159,51 @@ TEST_F(WrittenFile, ADamagedRecordBecomesAGapNeverAWrongRow) {
   EXPECT_EQ(assembled.samples_missing, 3 + lost_samples);
 }
 
+/// Whole by its CRC, and no record that we write.
+const std::vector<std::string> nonsense{
+    R"({"record":"gap","first_index":3,"count":1152921504606846976,"reason":"no answer"})",
+    R"({"record":"gap","first_index":-1,"count":1,"reason":"no answer"})",
+    R"({"record":"trigger","cycle":4611686018427387904,"tick":100})",
+    R"({"record":"trigger","cycle":1,"tick":1e300})",
+    R"({"record":"trigger","cycle":"one","tick":100})",
+    R"({"record":"slice","block":7,"slice":0,"cycle":0,"cycles":2,"dummy_cycles":0})",
+    R"({"record":"event","level":"info","code":"x"})",
+    R"({"record":"clock","host_ns":-1,"tick":1,"half_round_trip_ns":1})",
+    R"({"record":"run_ended","reason":"completed","tick":1,"cycles":2.5,"triggers":2})",
+    R"({"record":"begin","run_id":1})",
+    R"({"record":["begin"]})",
+    std::string(100'000, '[')};
+
+TEST_F(WrittenFile, ARecordThatSaysWhatNoneOfOursSaysIsLeftOut) {
+  const JournalContents whole = read_journal(session_->journal);
+  const AssembledRun before = assemble_run(whole);
+  for (const std::string& text : nonsense) {
+    JournalContents journal = whole;
+    journal.records.push_back({RecordKind::document, 0, {text.begin(), text.end()}});
+    journal.records.push_back(
+        {RecordKind::samples, 0, encode(SampleBlock{uint64_t{1} << 60U, 1, {5}, {1.0}})});
+    journal.records.push_back({RecordKind::positions, 0, encode(PositionBlock{~0U, 1, 1, {1}})});
+    const AssembledRun after = assemble_run(journal);
+    EXPECT_NO_THROW(runfile::check(after.run)) << text;
+    EXPECT_EQ(after.run.pressure.time_s, before.run.pressure.time_s) << text;
+    EXPECT_EQ(after.run.trigger_s, before.run.trigger_s) << text;
+    EXPECT_EQ(after.run.gaps.size(), before.run.gaps.size()) << text;
+    EXPECT_TRUE(after.ended_in_order) << text;
+  }
+}
+
+TEST_F(WrittenFile, ABeginningWithoutAFieldIsRefused) {
+  for (const char* field : {"channels", "tick_rate_Hz", "segments", "rig"}) {
+    JournalContents journal = read_journal(session_->journal);
+    auto begin = nlohmann::json::parse(journal.records.front().payload);
+    begin.erase(field);
+    const std::string text = begin.dump();
+    journal.records.front().payload.assign(text.begin(), text.end());
+    EXPECT_THAT(message_of<InputError>([&] { (void)assemble_run(journal); }),
+                testing::HasSubstr("lost its first record"))
+        << field;
+  }
+}
+
 }  // namespace
 }  // namespace diastole

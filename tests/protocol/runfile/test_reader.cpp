@@ -66,16 +66,24 @@ const std::vector<Rejection> rejections{
      [](RunSketch& s) { s.cavity_kPa.pop_back(); },
      {"/pressure/cavity_kPa, index 3", "3 rows", "4"}},
     {"LongVolume", [](RunSketch& s) { s.commanded_mL.push_back(0); }, {"/pump/commanded_mL, index 4"}},
-    {"UndeclaredNan", [](RunSketch& s) { s.cavity_kPa[1] = NAN; }, {"/pressure/cavity_kPa, index 1", "nan"}},
+    {"TimeBeyondAnyRun", [](RunSketch& s) { s.trigger_s = {1e300}; }, {"/trigger/time_s, index 0", "1e+300"}},
+    {"GapBeyondAnyRun",
+     [](RunSketch& s) {
+       s.gaps = {{"pressure", 1, 1LL << 62}};
+     },
+     {"/gaps, index 0", "4611686018427387904"}},
+    {"UndeclaredNan",
+     [](RunSketch& s) { s.cavity_kPa[1] = std::nan(""); },
+     {"/pressure/cavity_kPa, index 1", "nan"}},
     {"NanBesideAGap",
      [](RunSketch& s) {
-       s.cavity_kPa[1] = s.cavity_kPa[2] = NAN;
+       s.cavity_kPa[1] = s.cavity_kPa[2] = std::nan("");
        s.gaps = {{"pressure", 1, 1}};
      },
      {"/pressure/cavity_kPa, index 2"}},
     {"GapOfAnotherStream",
      [](RunSketch& s) {
-       s.cavity_kPa[1] = NAN;
+       s.cavity_kPa[1] = std::nan("");
        s.gaps = {{"pump", 1, 1}};
      },
      {"/pressure/cavity_kPa, index 1"}},
@@ -85,10 +93,10 @@ const std::vector<Rejection> rejections{
        s.gaps = {{"pressure", 1, 1}};
      },
      {"/pressure/cavity_kPa, index 1", "inf"}},
-    {"NanTime", [](RunSketch& s) { s.pressure_time_s[3] = NAN; }, {"/pressure/time_s, index 3"}},
+    {"NanTime", [](RunSketch& s) { s.pressure_time_s[3] = std::nan(""); }, {"/pressure/time_s, index 3"}},
     {"NanTimeInAGap",
      [](RunSketch& s) {
-       s.pressure_time_s[3] = s.cavity_kPa[3] = NAN;
+       s.pressure_time_s[3] = s.cavity_kPa[3] = std::nan("");
        s.gaps = {{"pressure", 3, 1}};
      },
      {"/pressure/time_s, index 3", "nan"}},
@@ -110,7 +118,7 @@ class EitherText : public testing::TestWithParam<bool> {};
 TEST_P(EitherText, FixedAndVariableLengthReadAlike) {
   RunSketch sketch;
   sketch.variable_length_texts = GetParam();
-  sketch.cavity_kPa[2] = NAN;
+  sketch.cavity_kPa[2] = std::nan("");
   sketch.gaps = {{"pressure", 2, 1}};
   const auto path = scratch_file("sound.run.h5");
   write_sketch(path, sketch);
