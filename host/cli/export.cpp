@@ -39,8 +39,8 @@ std::string label(const std::string& option, const std::string& text) {
 
 std::string task_of(const fs::path& run) {
   std::string task;
-  for (const unsigned char c : run.stem().stem().string())
-    if (std::isalnum(c) != 0) task += static_cast<char>(c);
+  for (const char c : run.stem().stem().string())
+    if (std::isalnum(static_cast<unsigned char>(c)) != 0) task += c;
   return task.empty() ? "run" : task;
 }
 

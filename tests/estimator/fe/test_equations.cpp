@@ -93,7 +93,7 @@ TEST_P(Equations, SumsAreTheSameForAnyNumberOfThreads) {
     values.push_back(parameter.typical);
   std::vector<std::vector<double>> residuals;
   std::vector<std::vector<double>> tangents;
-  for (const size_t threads : {1, 2, 5}) {
+  for (const size_t threads : {1U, 2U, 5U}) {
     ElasticModel model(make_annulus(gel_shape({5, 3, 2})), *GetParam(),
                        ElasticOptions{.parameters = values, .threads = threads});
     residuals.push_back(model.system().residual(state_).values);

@@ -58,7 +58,7 @@ TEST(PlaneStrainCylinder, MatchesTheClosedFormAndConvergesWithLayers) {
   constexpr double wall_mm = 6.0;
   constexpr double c1_kPa = 6.5;
   std::vector<double> errors;
-  for (const size_t layers : {1, 2, 4}) {
+  for (const size_t layers : {1U, 2U, 4U}) {
     ElasticModel model = plane_strain_slice(c1_kPa, layers);
     const Solution solution = model.solve(cylinder_pressure_kPa(wall_mm, c1_kPa));
     ASSERT_TRUE(solution.report.converged()) << solution.report.describe();
@@ -166,7 +166,7 @@ TEST(Solve, WarmStartReachesTheSameState) {
 
 TEST(Solve, IsTheSameForAnyNumberOfThreads) {
   std::vector<NodeField> positions;
-  for (const size_t threads : {1, 2, 4}) {
+  for (const size_t threads : {1U, 2U, 4U}) {
     ElasticModel model = gel(6.5, {8, 4, 1}, {.threads = threads});
     positions.push_back(model.solve(6.0).state.position_mm);
   }

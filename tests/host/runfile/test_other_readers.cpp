@@ -28,7 +28,7 @@ runfile::RecordedRun recording_with_a_gap() {
   runfile::RecordedRun run = runfile::read_run(source_dir / "examples/recorded-baseline.run.h5");
   for (size_t i = 4000; i < 4003; ++i)
     for (auto& [name, values] : run.pressure.channels)
-      values[i] = NAN;
+      values[i] = std::nan("");
   run.gaps = {{"pressure", 4000, 3, "no answer"}};
   add_filtered_channel(run.pressure);
   return run;

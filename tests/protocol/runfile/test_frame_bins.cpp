@@ -60,7 +60,7 @@ TEST(FrameBins, WindowsCountFromTheTrueTrigger) {
 
 TEST(FrameBins, ACycleWithAMissingSampleIsExcludedAndTold) {
   RecordedRun run = staircase();
-  run.pressure.channels["cavity_kPa"][13] = NAN;
+  run.pressure.channels["cavity_kPa"][13] = std::nan("");
   run.gaps = {{"pressure", 13, 1, "stall"}};
   const FrameBins bins = bin_frames(run, {.frames = 2});
   ASSERT_EQ(bins.excluded.size(), 1U);

@@ -79,7 +79,7 @@ TEST(Soundness, TwoHolesCloseToEachOtherAreTwo) {
 TEST(Soundness, ARunOfDeclaredGapsAloneSaysThatNoPressureWasRecorded) {
   RecordedRun run = regular_run();
   for (double& value_kPa : run.pressure.channels["cavity_kPa"])
-    value_kPa = NAN;
+    value_kPa = std::nan("");
   run.gaps = {{"pressure", 0, 400, "no answer"}};
   EXPECT_THAT(assess(run).problems, testing::Contains(HasSubstr("no pressure was recorded")));
 }
