@@ -27,6 +27,7 @@
 #include "host/daemon/service_manager.hpp"
 #include "host/daq/instrument.hpp"
 #include "host/transport/clock.hpp"
+#include "host/transport/real_time.hpp"
 
 namespace diastole {
 
@@ -169,7 +170,7 @@ class RigService {
   uint64_t next_reconnect_ns_ = 0;
   std::string last_problem_;  ///< of the rig's thread between orders: told once, not once a second
 
-  mutable std::mutex mutex_;
+  mutable InheritingMutex mutex_;  // the server's thread, which has no priority, holds it too
   std::condition_variable_any wake_;
   std::deque<Order> orders_;
   std::vector<Done> status_askers_;  // one order answers them all

@@ -1,6 +1,8 @@
 #pragma once
 // Priority over other programs.
 
+#include <pthread.h>
+
 namespace diastole {
 
 inline constexpr int instrument_priority = 50;  ///< asks nobody, and loses a sample when late
@@ -9,5 +11,22 @@ inline constexpr int rig_priority = 40;         ///< owes the controller a heart
 /// Asks for SCHED_FIFO at this priority for the calling thread, where the system allows it (CAP_SYS_NICE, or
 /// RLIMIT_RTPRIO); without effect elsewhere. Threads that it starts have none of it.
 void ask_for_real_time(int priority);
+
+/// A mutex whose holder has the priority of who waits for it, as long as that lasts: it is not kept from the processor by
+/// other programs meanwhile. A Lockable.
+class InheritingMutex {
+ public:
+  InheritingMutex();
+  ~InheritingMutex() { ::pthread_mutex_destroy(&mutex_); }
+  InheritingMutex(const InheritingMutex&) = delete;
+  InheritingMutex& operator=(const InheritingMutex&) = delete;
+
+  void lock() { ::pthread_mutex_lock(&mutex_); }
+  bool try_lock() { return ::pthread_mutex_trylock(&mutex_) == 0; }
+  void unlock() { ::pthread_mutex_unlock(&mutex_); }
+
+ private:
+  pthread_mutex_t mutex_{};
+};
 
 }  // namespace diastole

@@ -64,7 +64,7 @@ TEST(Faults, DaemonKilled) {
                                                std::vector<std::string>{"--pins", "pins.csv"});
     rig->start_daemon();
     auto client = rig->client();
-    client.call("rig.home");
+    client.call("rig.home", json::object(), 300s);
     client.call("run.start", flow::many_segments());
     const auto samples = static_cast<uint64_t>(between(random, 0, 5500));  // of 18 s
     for (json progress;
