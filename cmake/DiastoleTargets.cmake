@@ -38,7 +38,8 @@ function(diastole_embed variable)
 endfunction()
 
 # diastole_test(NAME SOURCES a.cpp ... [LIBS x ...] [LABELS slow ...] [TIMEOUT seconds])
-# A GoogleTest program whose cases are single ctest entries. Label "slow": only in `tools/check --full`.
+# A GoogleTest program whose cases are single ctest entries. Label "slow": only in `tools/check --full`, and never
+# with sanitizers.
 function(diastole_test name)
   cmake_parse_arguments(ARG "" "TIMEOUT" "SOURCES;LIBS;LABELS" ${ARGN})
   add_executable(${name} ${ARG_SOURCES})
@@ -46,6 +47,10 @@ function(diastole_test name)
   set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/tests)
   target_compile_definitions(${name} PRIVATE
     DIASTOLE_SOURCE_DIR="${CMAKE_SOURCE_DIR}" DIASTOLE_BIN_DIR="${CMAKE_RUNTIME_OUTPUT_DIRECTORY}")
+  if(CMAKE_BUILD_TYPE STREQUAL "Sanitize" AND "slow" IN_LIST ARG_LABELS)
+    set_target_properties(${name} PROPERTIES EXCLUDE_FROM_ALL TRUE)
+    return()
+  endif()
   if(NOT ARG_TIMEOUT)
     set(ARG_TIMEOUT 300)
   endif()

@@ -9,21 +9,6 @@
 
 namespace diastole::faults {
 
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-#define DIASTOLE_SANITIZED 1
-#elif defined(__has_feature)
-#if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer)
-#define DIASTOLE_SANITIZED 1
-#endif
-#endif
-
-/// Whether a sanitizer is compiled in; it keeps freed memory for a while, and bears no preloaded library.
-#ifdef DIASTOLE_SANITIZED
-constexpr bool sanitized = true;
-#else
-constexpr bool sanitized = false;
-#endif
-
 struct FaultRow {
   std::string fault;
   std::string tried_how;

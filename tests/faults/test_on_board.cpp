@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "tests/faults/fault_table.hpp"
+#include "tests/sanitized.hpp"
 #include "tests/tools/benchmarks/image.hpp"
 #include "tests/tools/benchmarks/random_cuts.hpp"
 #include "tests/tools/sim_board/flash_bench.hpp"

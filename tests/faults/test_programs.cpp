@@ -14,6 +14,7 @@
 #include "tests/faults/fault_table.hpp"
 #include "tests/faults/hostile_clients.hpp"
 #include "tests/flow/rig_with_daemon.hpp"
+#include "tests/sanitized.hpp"
 
 namespace diastole::faults {
 namespace {
