@@ -10,7 +10,7 @@
 
 namespace diastole {
 
-Descriptor connect_unix_socket(const std::string& path) {
+Descriptor connect_unix_socket(const std::string& path, const std::string& remedy) {
   sockaddr_un address{};
   address.sun_family = AF_UNIX;
   if (path.size() >= sizeof(address.sun_path)) {
@@ -20,8 +20,7 @@ Descriptor connect_unix_socket(const std::string& path) {
   Descriptor socket(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0));
   if (::connect(socket.get(), reinterpret_cast<const sockaddr*>(&address), sizeof(address)) != 0) {
     throw HardwareError(path, fmt::format("nobody answers at this socket ({})", std::strerror(errno)),
-                        "Start the daemon (diastole daemon --config rig.toml), or name its socket with "
-                        "--socket.");
+                        remedy);
   }
   return socket;
 }

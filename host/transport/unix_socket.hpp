@@ -9,7 +9,10 @@
 
 namespace diastole {
 
-/// Connects. Throws HardwareError when nobody listens there or the path is too long for a socket.
-Descriptor connect_unix_socket(const std::string& path);
+/// Connects. Throws HardwareError, with `remedy` when nobody listens there, or when the path is too long for a socket.
+Descriptor connect_unix_socket(const std::string& path,
+                               const std::string& remedy =
+                                   "Start the daemon (diastole daemon --config rig.toml), or "
+                                   "name its socket with --socket.");
 
 }  // namespace diastole

@@ -33,6 +33,32 @@ void EmulatedController::press_estop(uint64_t time_ns, bool pressed) {
   drive(wiring_.estop, pressed, time_ns);
 }
 
+void EmulatedController::hold_switch(sim_rig::Switch which, bool active) {
+  const uint64_t now_ns = board_.now_ns();
+  switch (which) {
+    case sim_rig::Switch::estop:
+      return press_estop(now_ns, active);
+    case sim_rig::Switch::home:
+      return close_home(now_ns, active || position_ <= 0);
+    case sim_rig::Switch::far_limit:
+      return close_far_limit(now_ns, active || position_ >= mechanics_.far_limit_microsteps);
+  }
+}
+
+void EmulatedController::set_power(bool on) {
+  if (on == board_.powered()) return;
+  if (on) powered_ns_ = board_.now_ns();
+  on ? board_.power_on() : board_.power_off();
+}
+
+/// The firmware's clock is TIM2, which it starts some time after power-on.
+uint64_t EmulatedController::tick_zero_ns() const {
+  constexpr uint64_t ticks_per_us = firmware::kTicksPerMicrosecond;
+  const uint64_t ticks_since_power = (board_.now_ns() - powered_ns_) * ticks_per_us / 1000;
+  const auto started_ticks = static_cast<uint32_t>(ticks_since_power - board_.timer_count(2));
+  return powered_ns_ + uint64_t{started_ticks} * 1000 / ticks_per_us;
+}
+
 /// The motor follows a step only while it has current.
 void EmulatedController::step(uint64_t time_ns) {
   const auto active = [&](const Wire& wire) { return board_.level(wire.pin) == wire.active_high; };

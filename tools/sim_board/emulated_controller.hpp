@@ -28,8 +28,11 @@ class EmulatedController final : public sim_rig::SimulatedController {
                               SimBoardOptions options = {});
 
   [[nodiscard]] Places places() const override;
+  [[nodiscard]] uint64_t tick_zero_ns() const override;
   void receive(std::span<const uint8_t> bytes) override { board_.send(bytes); }
   Output advance_to(uint64_t until_ns) override;
+  void hold_switch(sim_rig::Switch which, bool active) override;
+  void set_power(bool on) override;
 
   void press_estop(uint64_t time_ns, bool pressed = true);
   void close_home(uint64_t time_ns, bool closed = true) { drive(wiring_.home, closed, time_ns); }
@@ -47,6 +50,7 @@ class EmulatedController final : public sim_rig::SimulatedController {
   Mechanics mechanics_;
   SimBoard board_;
   int64_t position_;
+  uint64_t powered_ns_ = 0;
   std::deque<int32_t> fault_numbers_;  ///< of rises of FAULT that advance_to() has not handed over
   std::vector<uint8_t> sent_;
   std::vector<sim_rig::PinEdge> edges_;

@@ -197,6 +197,14 @@ void SimBoard::on_missed_deadline(std::function<void(const MissedDeadline&)> lis
 
 std::optional<uint32_t> SimBoard::word(uint32_t address) const { return board_->chip.memory.word(address); }
 
+uint32_t SimBoard::timer_count(uint8_t number) const {
+  constexpr uint32_t counter = 0x24;
+  const auto& timers = board_->chip.timers;
+  const auto timer =
+      std::ranges::find_if(timers, [number](const auto& each) { return each->shape().number == number; });
+  return (*timer)->read(counter);
+}
+
 BoardStatistics SimBoard::statistics() const {
   Board& board = *board_;
   board_model::Chip& chip = board.chip;

@@ -133,6 +133,8 @@ class SimBoard {
 
   /// A word of memory, nullopt outside it; how tests and reports look at the firmware's variables.
   [[nodiscard]] std::optional<uint32_t> word(uint32_t address) const;
+  /// The counter of timer TIMn now. Precondition: the chip has it.
+  [[nodiscard]] uint32_t timer_count(uint8_t number) const;
   [[nodiscard]] BoardStatistics statistics() const;
 
  private:

@@ -77,15 +77,6 @@ ModbusInstrument::~ModbusInstrument() {
   ::close(listener_);
 }
 
-void ModbusInstrument::plan(const DaqFaults& faults, uint64_t from_ns) {
-  DaqFaults& planned = config_.faults;
-  if (!faults.stall.empty()) planned.stall = faults.stall.later_by(from_ns);
-  if (!faults.drop.empty()) planned.drop = faults.drop.later_by(from_ns);
-  if (faults.delay.empty()) return;
-  planned.delay = faults.delay.later_by(from_ns);
-  planned.delay_ns = faults.delay_ns;
-}
-
 std::vector<int> ModbusInstrument::descriptors() const {
   std::vector<int> list{listener_};
   list.insert(list.end(), clients_.begin(), clients_.end());
@@ -111,7 +102,7 @@ void ModbusInstrument::service() {
   while (!delayed_.empty() && delayed_.front().due_ns <= now_ns) {
     const Delayed reply = std::move(delayed_.front());
     delayed_.pop_front();
-    answer(reply.client, reply.request);
+    if (!answer(reply.client, reply.request)) drop(reply.client);
   }
 }
 
@@ -138,11 +129,8 @@ bool ModbusInstrument::receive_from(int client) {
   request.resize(static_cast<size_t>(length));
   const uint64_t now_ns = inputs_.now_ns();
   if (config_.faults.stall.holds(now_ns)) return true;
-  if (config_.faults.delay.holds(now_ns)) {
-    delayed_.push_back({client, now_ns + config_.faults.delay_ns, std::move(request)});
-  } else {
-    answer(client, request);
-  }
+  if (!config_.faults.delay.holds(now_ns)) return answer(client, request);
+  delayed_.push_back({client, now_ns + config_.faults.delay_ns, std::move(request)});
   return true;
 }
 
@@ -160,23 +148,35 @@ modbus_mapping_t* ModbusInstrument::registers_at(int address) {
   if (is_in(test_)) return test_.get();
   if (is_in(timer_)) {
     const double rate_Hz = 40e6 * (1 + config_.clock_error_ppm * 1e-6);
-    const double ticks = std::floor(static_cast<double>(inputs_.now_ns()) * 1e-9 * rate_Hz);
+    const double time_s = static_cast<double>(inputs_.now_ns()) * 1e-9 + config_.faults.timer_ahead_s;
+    const double ticks = std::floor(time_s * rate_Hz);
     put_u32(*timer_, 0, static_cast<uint32_t>(static_cast<uint64_t>(ticks)));
     return timer_.get();
   }
-  for (int channel = 0; channel < config_.channels; ++channel) {
+  for (int channel = 0; channel < config_.channels && !config_.faults.stuck; ++channel) {
     put_float(*analog_, 2 * channel, static_cast<float>(inputs_.volts(channel)));
   }
   return analog_.get();
 }
 
-void ModbusInstrument::answer(int client, const Request& request) {
+bool ModbusInstrument::answer(int client, const Request& request) {
   const auto at =
       static_cast<size_t>(modbus_get_header_length(context_.get())) + 1;  // after the function code
-  if (request.size() < at + 2) return;
+  if (request.size() < at + 2) return true;
   modbus_set_socket(context_.get(), client);
-  modbus_reply(context_.get(), request.data(), static_cast<int>(request.size()),
-               registers_at(request[at] << 8 | request[at + 1]));
+  if (config_.faults.cut_short) {
+    const Request half(request.begin(), request.begin() + static_cast<std::ptrdiff_t>(at));
+    (void)::send(client, half.data(), half.size(), MSG_NOSIGNAL);
+    return false;
+  }
+  const int address = request[at] << 8 | request[at + 1];
+  const bool inputs_asked = address < analog_->start_registers + analog_->nb_registers;
+  if (config_.faults.refuse || (inputs_asked && inputs_.reading_fails())) {
+    modbus_reply_exception(context_.get(), request.data(), MODBUS_EXCEPTION_GATEWAY_TARGET);
+    return true;
+  }
+  modbus_reply(context_.get(), request.data(), static_cast<int>(request.size()), registers_at(address));
+  return true;
 }
 
 }  // namespace diastole::sim_daq

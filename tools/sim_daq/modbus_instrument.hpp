@@ -3,9 +3,9 @@
 // device:
 //
 //   address        type      holds
-//   2 n            FLOAT32   AIN#n in volts, two registers, most significant first      n = 0 ... channels -
-//   1 55100          UINT32    TEST, always 0x00112233 61520          UINT32    CORE_TIMER, counts at 40 MHz
-//   (times 1 + clock_error_ppm * 1e-6), wraps
+//   2 n            FLOAT32   AIN#n in volts, two registers, most significant first; n = 0 ... channels - 1
+//   55100          UINT32    TEST, always 0x00112233
+//   61520          UINT32    CORE_TIMER, counts at 40 MHz (times 1 + clock_error_ppm * 1e-6), wraps
 //
 // All are read as holding (function 3) or as input registers (function 4); any other address is answered with
 // exception 2 (illegal data address). One request is answered from one instant.
@@ -39,6 +39,8 @@ struct InstrumentConfig {
 struct InstrumentInputs {
   std::function<uint64_t()> now_ns;
   std::function<double(int channel)> volts;  ///< at now_ns()
+  /// Asked once before the inputs are read: whether this reading fails, with exception 11.
+  std::function<bool()> reading_fails = [] { return false; };
 };
 
 class ModbusInstrument {
@@ -50,8 +52,8 @@ class ModbusInstrument {
   ModbusInstrument& operator=(const ModbusInstrument&) = delete;
 
   [[nodiscard]] uint16_t port() const { return port_; }
-  /// Adds faults that lie `from_ns` later than they say; each replaces what was planned of its kind.
-  void plan(const DaqFaults& faults, uint64_t from_ns);
+  /// What is wrong with it; may be changed at any time.
+  [[nodiscard]] DaqFaults& faults() { return config_.faults; }
 
   /// The listening socket and the clients', to wait for.
   [[nodiscard]] std::vector<int> descriptors() const;
@@ -77,7 +79,8 @@ class ModbusInstrument {
   /// False when the client has gone.
   bool receive_from(int client);
   void drop(int client);
-  void answer(int client, const Request& request);
+  /// False when the client is to be dropped.
+  bool answer(int client, const Request& request);
   modbus_mapping_t* registers_at(int address);
 
   InstrumentConfig config_;

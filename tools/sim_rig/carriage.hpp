@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <optional>
 
+#include "tools/sim_rig/plant/slip.hpp"
 #include "tools/sim_rig/simulated_controller.hpp"
 
 namespace diastole::sim_rig {
@@ -22,7 +23,11 @@ class Carriage {
         was_on_switch_(places.parked <= 0) {}
 
   /// Takes a pin change; returns the volume displaced into the line since home if this one moved it.
-  std::optional<double> take(const PinEdge& edge);
+  /// `piston_kPa` is the load on it, under which a coupling may slip.
+  std::optional<double> take(const PinEdge& edge, double piston_kPa);
+
+  /// What lies between the controller's steps and the piston.
+  [[nodiscard]] Slip& slip() { return slip_; }
 
  private:
   double microstep_mL_;
@@ -31,6 +36,7 @@ class Carriage {
   bool was_on_switch_;
   bool inflate_ = false;
   bool vented_ = true;
+  Slip slip_;
 };
 
 }  // namespace diastole::sim_rig

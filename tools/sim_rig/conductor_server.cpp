@@ -1,35 +1,16 @@
 #include "tools/sim_rig/conductor_server.hpp"
 
-#include <fmt/format.h>
 #include <sys/socket.h>
-#include <sys/un.h>
 #include <unistd.h>
 
 #include <cerrno>
-#include <cstring>
 
-#include "protocol/contract/input_error.hpp"
+#include "tools/sim_rig/listening_socket.hpp"
 
 namespace diastole::sim_rig {
 
-ConductorServer::ConductorServer(std::filesystem::path path) : path_(std::move(path)) {
-  sockaddr_un address{};
-  address.sun_family = AF_UNIX;
-  if (path_.native().size() >= sizeof address.sun_path) {
-    throw HardwareError(path_.string(), "the path is too long for a socket",
-                        fmt::format("Use at most {} characters.", sizeof address.sun_path - 1));
-  }
-  std::memcpy(address.sun_path, path_.c_str(), path_.native().size() + 1);
-  if (std::filesystem::is_socket(path_)) std::filesystem::remove(path_);
-  listener_ = ::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
-  if (::bind(listener_, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0 ||
-      ::listen(listener_, 1) != 0) {
-    const int error = errno;
-    ::close(listener_);
-    throw HardwareError(path_.string(), fmt::format("cannot listen here: {}", std::strerror(error)),
-                        "Choose a directory in which you may write for --conductor.");
-  }
-}
+ConductorServer::ConductorServer(std::filesystem::path path)
+    : path_(std::move(path)), listener_(listen_at(path_, "--conductor")) {}
 
 ConductorServer::~ConductorServer() {
   disconnect();

@@ -1,5 +1,7 @@
 #include "tools/sim_rig/host_built_controller.hpp"
 
+#include <array>
+#include <optional>
 #include <vector>
 
 #include "firmware/boards/recording/recorded_controller.hpp"
@@ -36,24 +38,75 @@ Pin pin_of(firmware::Signal signal) {
 class HostBuiltController final : public SimulatedController {
  public:
   [[nodiscard]] Places places() const override {
-    return {controller_.mechanical_microsteps(), 1 + int64_t{firmware::kHomeClearance_steps}};
+    return {options_.board.mechanics.start_steps, 1 + int64_t{firmware::kHomeClearance_steps}};
   }
 
-  void receive(std::span<const uint8_t> bytes) override { controller_.feed(bytes); }
+  [[nodiscard]] uint64_t tick_zero_ns() const override { return powered_ns_; }
+
+  void receive(std::span<const uint8_t> bytes) override {
+    if (controller_) controller_->feed(bytes);
+  }
 
   Output advance_to(uint64_t until_ns) override {
-    controller_.advance_to(ticks_at(until_ns));
-    sent_ = controller_.take_output();
-    edges_.clear();
-    for (const firmware::Edge& edge : controller_.take_edges()) {
-      edges_.push_back(
-          {static_cast<uint64_t>(firmware::nanoseconds(edge.tick)), pin_of(edge.signal), edge.value});
+    now_ns_ = until_ns;
+    sent_.clear();
+    edges_.swap(fallen_);
+    fallen_.clear();
+    if (!controller_) return {sent_, edges_};
+    controller_->advance_to(ticks_at(until_ns - powered_ns_));
+    sent_ = controller_->take_output();
+    for (const firmware::Edge& edge : controller_->take_edges()) {
+      note({powered_ns_ + static_cast<uint64_t>(firmware::nanoseconds(edge.tick)), pin_of(edge.signal),
+            edge.value},
+           edges_);
     }
     return {sent_, edges_};
   }
 
+  void hold_switch(Switch which, bool active) override {
+    held_[static_cast<size_t>(which)] = active;
+    apply_switches();
+  }
+
+  void set_power(bool on) override {
+    if (on == controller_.has_value()) return;
+    if (!on) return cut_power();
+    powered_ns_ = now_ns_;
+    ++options_.board.identity.boot_id;
+    controller_.emplace(options_);
+    apply_switches();
+  }
+
  private:
-  firmware::RecordedController controller_;
+  void note(const PinEdge& edge, std::vector<PinEdge>& edges) {
+    levels_[static_cast<size_t>(edge.pin)] = edge.value;
+    edges.push_back(edge);
+  }
+
+  void apply_switches() {
+    if (!controller_) return;
+    controller_->set_estop(held_[static_cast<size_t>(Switch::estop)]);
+    controller_->set_home(held_[static_cast<size_t>(Switch::home)]);
+    controller_->set_far_limit(held_[static_cast<size_t>(Switch::far_limit)]);
+  }
+
+  /// The pins fall, the carriage stays, what was in RAM is gone.
+  void cut_power() {
+    options_.board.mechanics.start_steps = controller_->mechanical_microsteps();
+    options_.board.memory->retained = {};
+    controller_.reset();
+    for (size_t pin = 0; pin < levels_.size(); ++pin) {
+      if (levels_[pin] != 0) note({now_ns_, static_cast<Pin>(pin), 0}, fallen_);
+    }
+  }
+
+  firmware::RecordedController::Options options_;
+  std::optional<firmware::RecordedController> controller_{std::in_place, options_};
+  uint64_t now_ns_ = 0;
+  uint64_t powered_ns_ = 0;  ///< since when
+  std::array<bool, 3> held_{};
+  std::array<int32_t, 6> levels_{};
+  std::vector<PinEdge> fallen_;  ///< when power was cut
   std::vector<uint8_t> sent_;
   std::vector<PinEdge> edges_;
 };

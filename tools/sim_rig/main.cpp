@@ -12,6 +12,9 @@
 #include "protocol/contract/exit_code.hpp"
 #include "protocol/contract/input_error.hpp"
 #include "tools/sim_board/emulated_controller.hpp"
+#include "tools/sim_rig/control_client.hpp"
+#include "tools/sim_rig/faults/fault_kind.hpp"
+#include "tools/sim_rig/faults/fault_schedule.hpp"
 #include "tools/sim_rig/host_built_controller.hpp"
 #include "tools/sim_rig/rig_description.hpp"
 #include "tools/sim_rig/server.hpp"
@@ -37,9 +40,14 @@ constexpr const char* footer =
     R"(Time follows the wall clock, or, with --conductor, the daemon that is started with the same --conductor:
 then a session takes as long as the machine needs and is the same every time.
 
-Faults (seconds of the rig's clock): serial-hangup@T  daq-stall@T+D  daq-drop@T+D  daq-delay@T+D/L
-With ttl+T in place of T an instrument's fault counts from the first trigger.
-  sim_rig --fault daq-stall@ttl+5+0.2 --fault serial-hangup@9)";
+Faults are switched by name, at a given time or by hand while it runs; `sim_rig faults` lists them:
+  sim_rig --fault leak@12.5s:off@20s --fault estop@run+3.2     ttl+T: after the first trigger; run+T: the start of run
+  sim_rig --fault daq-drop@ttl+5+0.2 --fault sensor-offset@9/1.5              +LENGTH, and /VALUE where it takes one
+  sim_rig --control /tmp/rig --link /tmp/pump --modbus-port 5020 &
+  sim_rig ctl --at /tmp/rig fault on air-bubble 50
+  sim_rig ctl --at /tmp/rig fault off air-bubble
+
+With --play the instrument shows a recorded run's pressure, sample by sample; `diastole replay` uses it.)";
 
 struct Arguments {
   std::string config;
@@ -48,6 +56,8 @@ struct Arguments {
   bool real_time = false;
   std::vector<std::string> faults;
   sim_rig::ServerOptions server;
+  std::string control;             ///< of the rig to which `ctl` speaks
+  std::vector<std::string> order;  ///< its words
 };
 
 void add_options(CLI::App& app, Arguments& arguments) {
@@ -63,8 +73,22 @@ void add_options(CLI::App& app, Arguments& arguments) {
   app.add_flag("--real-time", arguments.real_time, "follow the wall clock (the default without --conductor)")
       ->excludes(conductor);
   app.add_option("--pins", arguments.server.pins, "write every change of a pin: time_ns,signal,value");
+  app.add_option("--control", arguments.server.control, "take orders (sim_rig ctl) at this socket");
+  app.add_option("--play", arguments.server.play, "let the instrument show this recorded run's pressure");
+  app.add_option("--host-drift-ppm", arguments.server.host_drift_ppm,
+                 "with --conductor: let the daemon's clock run this much fast")
+      ->check(CLI::Range(-1000.0, 1000.0));
   app.add_option("--seed", arguments.seed, "of the sensors' noise")->capture_default_str();
-  app.add_option("--fault", arguments.faults, "make something go wrong; may be repeated");
+  app.add_option("--fault", arguments.faults, "make something go wrong, NAME@T; may be repeated");
+}
+
+void add_commands(CLI::App& app, Arguments& arguments) {
+  app.add_subcommand("faults", "list the faults: name, usual value, what each looks like");
+  CLI::App* ctl = app.add_subcommand("ctl", "give a running rig an order");
+  ctl->add_option("--at", arguments.control, "its --control socket")->required();
+  ctl->add_option("ORDER", arguments.order, "fault on NAME [VALUE] | fault off NAME | state")->required();
+  ctl->footer(
+      "Examples:\n  sim_rig ctl --at /tmp/rig fault on leak 3\n  sim_rig ctl --at /tmp/rig fault off leak");
 }
 
 std::unique_ptr<sim_rig::SimulatedController> make_controller(const std::string& image) {
@@ -88,12 +112,24 @@ void serve(Arguments arguments) {
       arguments.config.empty() ? TableReader::from_text(sim_rig::default_rig_toml(), "the built-in rig file")
                                : TableReader::from_file(arguments.config));
   description.plant.seed = arguments.seed;
-  arguments.server.faults = sim_rig::parse_rig_faults(arguments.faults);
+  arguments.server.faults = sim_rig::parse_faults(arguments.faults);
   const int stop = stop_descriptor();
   sim_rig::Server server(description, make_controller(arguments.image), arguments.server);
   fmt::print("{}\n", server.addresses());
   std::fflush(stdout);
   server.run(stop);
+}
+
+void carry_out(const CLI::App& app, const Arguments& arguments) {
+  if (app.got_subcommand("faults")) {
+    fmt::print("{}", sim_rig::told_faults());
+  } else if (app.got_subcommand("ctl")) {
+    fmt::print(
+        "{}\n",
+        sim_rig::ControlClient(arguments.control).order(fmt::format("{}", fmt::join(arguments.order, " "))));
+  } else {
+    serve(arguments);
+  }
 }
 
 }  // namespace
@@ -103,13 +139,14 @@ int main(int argc, char** argv) {
   app.footer(footer);
   Arguments arguments;
   add_options(app, arguments);
+  add_commands(app, arguments);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     return static_cast<int>(app.exit(error) == 0 ? ExitCode::done : ExitCode::bad_input);
   }
   try {
-    serve(arguments);
+    carry_out(app, arguments);
     return static_cast<int>(ExitCode::done);
   } catch (const diastole::InputError& error) {
     std::cerr << "sim_rig: " << error.what() << '\n';

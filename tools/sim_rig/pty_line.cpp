@@ -59,13 +59,18 @@ void make_link(const std::filesystem::path& link, const std::string& device) {
 
 }  // namespace
 
-PtyLine::PtyLine(std::filesystem::path link)
-    : link_(std::move(link)), master_(open_master()), device_(device_of(master_)) {
+PtyLine::PtyLine(std::filesystem::path link) : link_(std::move(link)) { plug_in(); }
+
+void PtyLine::plug_in() {
+  if (master_ >= 0) return;
+  master_ = open_master();
+  device_ = device_of(master_);
   make_raw(device_);
   try {
     if (!link_.empty()) make_link(link_, device_);
   } catch (...) {
     ::close(master_);
+    master_ = -1;
     throw;
   }
 }

@@ -34,8 +34,12 @@ class PtyLine {
   void write(std::span<const uint8_t> bytes);
   void send_queued();
 
-  /// Pulls the plug: whoever has the port open sees a hang-up; nobody can open it again.
+  /// Pulls the plug: whoever has the port open sees a hang-up; nobody can open it until it is plugged in again,
+  /// as another device behind the same link.
   void hang_up();
+  /// No effect unless it is unplugged. Throws as the constructor does.
+  void plug_in();
+  [[nodiscard]] bool plugged_in() const { return master_ >= 0; }
 
   /// Bytes since the port was opened.
   [[nodiscard]] uint64_t received_total() const { return received_total_; }

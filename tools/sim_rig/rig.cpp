@@ -20,7 +20,8 @@ void Rig::advance_to(uint64_t until_ns) {
   now_ns_ = until_ns;
   const SimulatedController::Output output = controller_->advance_to(now_ns_);
   for (const PinEdge& edge : output.edges) {
-    if (const auto displaced_mL = carriage_.take(edge)) {
+    plant_.advance_to(seconds(edge.time_ns));  // the load under which this step is made
+    if (const auto displaced_mL = carriage_.take(edge, plant_.pump_end_kPa())) {
       plant_.displace(seconds(edge.time_ns), *displaced_mL);
     }
     listeners_.edge(edge);
@@ -31,7 +32,7 @@ void Rig::advance_to(uint64_t until_ns) {
 
 double Rig::volts(int64_t input) const {
   for (const DaqChannel& channel : description_.channels) {
-    if (channel.input != input) continue;
+    if (channel.input != input || channel.place == DaqChannel::Place::none) continue;
     const double pressure_kPa =
         channel.place == DaqChannel::Place::cavity ? plant_.cavity_reading_kPa() : plant_.pump_reading_kPa();
     return channel.zero_V + pressure_kPa / channel.kPa_per_V;

@@ -34,6 +34,11 @@ class Rig {
   [[nodiscard]] double volts(int64_t input) const;
   [[nodiscard]] const Plant& plant() const { return plant_; }
 
+  // What can be made to go wrong from now on.
+  [[nodiscard]] SimulatedController& controller() { return *controller_; }
+  [[nodiscard]] Carriage& carriage() { return carriage_; }
+  [[nodiscard]] Plant& plant() { return plant_; }
+
  private:
   RigDescription description_;
   std::unique_ptr<SimulatedController> controller_;

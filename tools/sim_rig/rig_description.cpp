@@ -34,16 +34,16 @@ void read_geometry(TableReader& rig, int64_t microsteps, RigDescription& descrip
 void read_channels(TableReader& daq, RigDescription& description) {
   int64_t next_input = 0;
   for (TableReader& table : daq.tables("channel")) {
-    const std::string name = table.text("name");
     DaqChannel channel;
+    channel.name = table.text("name");
     channel.input = table.integer_or("input", next_input, {.at_least = 0, .at_most = 13});
     channel.kPa_per_V = table.number("kPa_per_V", positive);
     channel.zero_V = table.number_or("zero_V", 0);
     next_input = channel.input + 1;
-    if (name == "cavity" || name == "pump") {
-      channel.place = name == "cavity" ? DaqChannel::Place::cavity : DaqChannel::Place::pump;
-      description.channels.push_back(channel);
-    }
+    channel.place = channel.name == "cavity" ? DaqChannel::Place::cavity
+                    : channel.name == "pump" ? DaqChannel::Place::pump
+                                             : DaqChannel::Place::none;
+    description.channels.push_back(channel);
   }
 }
 

@@ -22,7 +22,8 @@ namespace diastole::sim_rig {
 
 /// A transducer on the instrument's input: volts = zero_V + pressure / kPa_per_V.
 struct DaqChannel {
-  enum class Place { cavity, pump } place = Place::cavity;
+  enum class Place { cavity, pump, none } place = Place::cavity;
+  std::string name;
   int64_t input = 0;
   double kPa_per_V = 1;
   double zero_V = 0;

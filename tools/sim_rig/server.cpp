@@ -1,12 +1,17 @@
 #include "tools/sim_rig/server.hpp"
 
+#include <fmt/format.h>
 #include <poll.h>
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <nlohmann/json.hpp>
+#include <sstream>
 #include <utility>
 #include <vector>
+
+#include "protocol/contract/input_error.hpp"
 
 namespace diastole::sim_rig {
 namespace {
@@ -16,13 +21,18 @@ using WallClock = std::chrono::steady_clock;
 
 constexpr auto longest_serial_wait = 1s;
 constexpr int wall_clock_tick_ms = 1;
+constexpr uint64_t origin_step_ns = 1'000'000;
 
 sim_daq::InstrumentConfig instrument_config(const RigDescription& description, const ServerOptions& options) {
   sim_daq::InstrumentConfig config;
   config.port = options.modbus_port;
   config.clock_error_ppm = description.daq_clock_error_ppm;
-  config.faults = options.faults.daq;
   return config;
+}
+
+/// What a clock that runs `ppm` fast gains until `time_ns`, to the nearest ns.
+int64_t gained_ns(uint64_t time_ns, double ppm) {
+  return std::llround(static_cast<long double>(time_ns) * static_cast<long double>(ppm) * 1e-6L);
 }
 
 }  // namespace
@@ -30,45 +40,62 @@ sim_daq::InstrumentConfig instrument_config(const RigDescription& description, c
 Server::Server(const RigDescription& description, std::unique_ptr<SimulatedController> controller,
                const ServerOptions& options)
     : options_(options),
-      line_(options.link),
+      cables_(options.link),
       rig_(description, std::move(controller),
-           {.sent = [this](std::span<const uint8_t> bytes) { line_.write(bytes); },
-            .edge =
-                [this](const PinEdge& edge) {
-                  if (pins_) pins_->write(edge);
-                  if (edge.pin == Pin::ttl && edge.value != 0) take_trigger(edge.time_ns);
-                }}),
-      instrument_(instrument_config(description, options),
-                  {.now_ns = [this] { return rig_.now_ns(); },
-                   .volts = [this](int input) { return rig_.volts(input); }}) {
+           {.sent = [this](std::span<const uint8_t> bytes) { take_sent(bytes); },
+            .edge = [this](const PinEdge& edge) { take_edge(edge); }}),
+      instrument_(
+          instrument_config(description, options),
+          {.now_ns = [this] { return rig_.now_ns(); },
+           .volts = [this](int input) { return playback_ ? playback_->volts(input) : rig_.volts(input); },
+           .reading_fails =
+               [this] {
+                 if (!playback_) return false;
+                 playback_->sample(rig_.now_ns(), run_clock_.run_start_ns());
+                 return playback_->missing();
+               }}) {
+  timeline_.plan(options.faults);
+  if (!options.play.empty()) playback_.emplace(options.play, description.channels);
   if (!options.pins.empty()) pins_.emplace(options.pins);
   if (!options.conductor.empty()) conductor_.emplace(options.conductor);
+  if (!options.control.empty()) control_.emplace(options.control);
 }
 
 std::string Server::addresses() const {
   nlohmann::json document{
-      {"pty", line_.path()}, {"modbus_host", "127.0.0.1"}, {"modbus_port", instrument_.port()}};
+      {"pty", cables_.line.path()}, {"modbus_host", "127.0.0.1"}, {"modbus_port", instrument_.port()}};
   document["conductor"] = conductor_ ? nlohmann::json(options_.conductor.string()) : nlohmann::json();
+  document["control"] = control_ ? nlohmann::json(options_.control.string()) : nlohmann::json();
   return document.dump();
 }
 
 void Server::run(int stop_descriptor) {
   const auto start = WallClock::now();
   while (true) {
-    line_.refresh();
+    cables_.line.refresh();
     std::vector<pollfd> waiting{{stop_descriptor, POLLIN, 0},
-                                {conductor_ ? conductor_->descriptor() : -1, POLLIN, 0},
-                                {line_.descriptor(), POLLIN, 0}};
+                                {conductor_ && !held_ ? conductor_->descriptor() : -1, POLLIN, 0},
+                                {cables_.line.descriptor(), POLLIN, 0}};
     for (const int fd : instrument_.descriptors())
       waiting.push_back({fd, POLLIN, 0});
+    if (control_) {
+      for (const int fd : control_->descriptors())
+        waiting.push_back({fd, POLLIN, 0});
+    }
     ::poll(waiting.data(), waiting.size(), conductor_ ? -1 : wall_clock_tick_ms);
     if (waiting[0].revents != 0) break;
     if (!conductor_) {
       advance_to(static_cast<uint64_t>(std::chrono::nanoseconds(WallClock::now() - start).count()));
+      while (const auto hold = timeline_.take_hold(run_clock_, rig_.now_ns()))
+        control_->tell(hold->client, "held " + hold->moment);
     }
     take_serial();
     if (waiting[1].revents != 0) {
       if (const auto question = conductor_->receive()) conduct(*question);
+    }
+    if (control_) {
+      control_->service([this](int client, const std::string& order) { return obey(client, order); });
+      if (held_ && !control_->connected(held_->by)) hold_or_answer(std::exchange(held_, {})->answer);
     }
     instrument_.service();
   }
@@ -76,35 +103,114 @@ void Server::run(int stop_descriptor) {
 }
 
 void Server::advance_to(uint64_t until_ns) {
-  if (until_ns >= options_.faults.serial_hangup_ns) {
-    rig_.advance_to(options_.faults.serial_hangup_ns);
-    line_.hang_up();
+  while (true) {
+    // Step by step as long as the moment of a switch may become known on the way.
+    const uint64_t next_ns =
+        timeline_.awaits_origin(run_clock_) ? std::min(until_ns, rig_.now_ns() + origin_step_ns) : until_ns;
+    while (const auto due = timeline_.take_switch(run_clock_, next_ns)) {
+      rig_.advance_to(due->time_ns);
+      set(*due->what.kind, due->what.value);
+    }
+    rig_.advance_to(next_ns);
+    if (next_ns >= until_ns) return;
   }
-  rig_.advance_to(until_ns);
 }
 
-void Server::take_trigger(uint64_t time_ns) {
-  if (!std::exchange(triggered_, true)) instrument_.plan(options_.faults.daq_from_ttl, time_ns);
+void Server::set(const FaultKind& kind, std::optional<double> value) {
+  RigInTrouble rig{rig_, instrument_, cables_};
+  kind.set(rig, value);
+  faults_on_.erase(kind.name);
+  if (value) faults_on_[kind.name] = *value;
+}
+
+void Server::take_sent(std::span<const uint8_t> bytes) {
+  run_clock_.overhear(bytes, rig_.controller().tick_zero_ns());
+  if (cables_.to_host) cables_.line.write(bytes);
+}
+
+void Server::take_edge(const PinEdge& edge) {
+  if (edge.pin == Pin::ttl && edge.value != 0) run_clock_.trigger(edge.time_ns);
+  const bool to_scanner = edge.pin == Pin::ttl || edge.pin == Pin::rwave_uV;
+  if (pins_ && (cables_.to_scanner || !to_scanner)) pins_->write(edge);
 }
 
 void Server::take_serial() {
-  line_.refresh();
-  rig_.receive(line_.read());
-  line_.send_queued();
+  cables_.line.refresh();
+  const std::vector<uint8_t> bytes = cables_.line.read();
+  if (cables_.from_host) rig_.receive(bytes);
+  cables_.line.send_queued();
 }
 
 void Server::conduct(const conductor::Advance& question) {
   take_serial();
-  if (question == conductor::Advance{}) line_.restart_counts();
+  if (question == conductor::Advance{}) cables_.line.restart_counts();
   const auto give_up = WallClock::now() + longest_serial_wait;
-  while (line_.received_total() < question.serial_bytes_written_total && line_.descriptor() >= 0 &&
-         WallClock::now() < give_up) {
-    pollfd serial{line_.descriptor(), POLLIN, 0};
+  while (cables_.line.received_total() < question.serial_bytes_written_total &&
+         cables_.line.descriptor() >= 0 && WallClock::now() < give_up) {
+    pollfd serial{cables_.line.descriptor(), POLLIN, 0};
     ::poll(&serial, 1, 10);
     take_serial();
   }
-  advance_to(question.until_ns);
-  conductor_->answer({rig_.now_ns(), line_.sent_total()});
+  const int64_t gained = gained_ns(question.until_ns, options_.host_drift_ppm);
+  advance_to(question.until_ns - static_cast<uint64_t>(gained));
+  const uint64_t host_ns =
+      rig_.now_ns() + static_cast<uint64_t>(gained_ns(rig_.now_ns(), options_.host_drift_ppm));
+  hold_or_answer({std::max(host_ns, question.until_ns), cables_.line.sent_total()});
+}
+
+void Server::hold_or_answer(const conductor::Advanced& answer) {
+  if (const auto hold = timeline_.take_hold(run_clock_, rig_.now_ns()); hold && control_) {
+    held_ = HeldAnswer{answer, hold->client};
+    control_->tell(hold->client, "held " + hold->moment);
+  } else {
+    conductor_->answer(answer);
+  }
+}
+
+std::string Server::obey(ControlServer::ClientId client, const std::string& order) {
+  try {
+    if (order.starts_with("fault ")) return obey_fault(order);
+    if (order == "state") return "ok " + state();
+    if (order.starts_with("hold ")) {
+      const std::string moment = order.substr(5);
+      timeline_.plan({client, moment}, parse_moment(moment));
+      return "ok";
+    }
+    if (order == "go") {
+      if (held_ && held_->by == client) hold_or_answer(std::exchange(held_, {})->answer);
+      return "ok";
+    }
+    return "error orders are: fault on NAME [VALUE], fault off NAME, hold WHEN, go, state";
+  } catch (const InputError& error) {
+    return fmt::format("error {}: {} {}", error.fault().place, error.fault().problem, error.fault().remedy);
+  }
+}
+
+std::string Server::obey_fault(const std::string& order) {
+  std::istringstream words(order);
+  std::string fault, how, name, rest;
+  words >> fault >> how >> name;
+  const FaultKind& kind = fault_named(name);
+  std::optional<double> value;
+  if (double given = 0; words >> given) value = given;
+  words.clear();
+  if ((how != "on" && how != "off") || words >> rest || (how == "off" && value)) {
+    return "error write fault on NAME [VALUE], or fault off NAME";
+  }
+  set(kind, how == "on" ? std::optional(kind.value(value)) : std::nullopt);
+  return fmt::format("ok {} {} at {:.6f} s", name, how, static_cast<double>(rig_.now_ns()) * 1e-9);
+}
+
+std::string Server::state() const {
+  nlohmann::json on = nlohmann::json::object();
+  for (const auto& [name, value] : faults_on_)
+    on[std::string(name)] = value;
+  nlohmann::json document{{"now_s", static_cast<double>(rig_.now_ns()) * 1e-9}, {"faults", on}};
+  const auto start_ns = run_clock_.run_start_ns();
+  document["run_s"] = nullptr;
+  if (start_ns)
+    document["run_s"] = static_cast<double>(static_cast<int64_t>(rig_.now_ns() - *start_ns)) * 1e-9;
+  return document.dump();
 }
 
 }  // namespace diastole::sim_rig

@@ -37,6 +37,9 @@ struct PinEdge {
   int32_t value = 0;
 };
 
+/// The switches that it watches.
+enum class Switch : uint8_t { estop, home, far_limit };
+
 class SimulatedController {
  public:
   /// What happened while it ran, in order; valid until the next call of advance_to.
@@ -55,10 +58,19 @@ class SimulatedController {
 
   [[nodiscard]] virtual Places places() const = 0;
 
+  /// When its own clock, which its messages tell, read 0.
+  [[nodiscard]] virtual uint64_t tick_zero_ns() const { return 0; }
+
   /// Bytes that have arrived on its serial line.
   virtual void receive(std::span<const uint8_t> bytes) = 0;
   /// Runs on to until_ns (not before its present).
   virtual Output advance_to(uint64_t until_ns) = 0;
+
+  /// From now on a switch is held active by hand; or follows the carriage again (the e-stop is released). Without
+  /// effect on one that has no such switch.
+  virtual void hold_switch(Switch, bool /*active*/) {}
+  /// Takes its supply away, or gives it back; the settings in its flash remain. Time passes without supply too.
+  virtual void set_power(bool /*on*/) {}
 };
 
 }  // namespace diastole::sim_rig

@@ -32,4 +32,9 @@ void RecordedController::set_far_limit(bool closed) {
   controller_.on_inputs();
 }
 
+void RecordedController::set_home(bool closed) {
+  board_.set_home(closed);
+  controller_.on_inputs();
+}
+
 }  // namespace diastole::firmware

@@ -57,6 +57,7 @@ class RecordedController {
 
   void set_estop(bool pressed);
   void set_far_limit(bool closed);
+  void set_home(bool closed);
   /// The main loop does not come round until then (interrupts do).
   void stall_until(Ticks tick) { next_turn_ = tick; }
 

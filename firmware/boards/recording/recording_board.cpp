@@ -38,7 +38,8 @@ void RecordingBoard::cancel_pulses() {
 }
 
 Inputs RecordingBoard::inputs() const {
-  return {estop_, home_closed_, forced_far_limit_ || load_steps_ >= options_.mechanics.far_limit_steps};
+  return {estop_, forced_home_ || home_closed_,
+          forced_far_limit_ || load_steps_ >= options_.mechanics.far_limit_steps};
 }
 
 std::optional<std::uint8_t> RecordingBoard::serial_read() {

@@ -112,6 +112,7 @@ class RecordingBoard {
   bool run_to(Ticks tick, bool& inputs_changed);
   void set_estop(bool pressed) { estop_ = pressed; }
   void set_far_limit(bool closed) { forced_far_limit_ = closed; }
+  void set_home(bool closed) { forced_home_ = closed; }
   void receive(std::span<const std::uint8_t> bytes) {
     from_host_.insert(from_host_.end(), bytes.begin(), bytes.end());
   }
@@ -156,6 +157,7 @@ class RecordingBoard {
   bool home_closed_ = false;
   bool estop_ = false;
   bool forced_far_limit_ = false;
+  bool forced_home_ = false;
   std::deque<std::uint8_t> from_host_;
   std::deque<SentByte> to_host_;
   std::vector<Edge> edges_;

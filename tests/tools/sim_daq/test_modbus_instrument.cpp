@@ -19,8 +19,8 @@ namespace {
 class Served {
  public:
   explicit Served(const InstrumentConfig& config = {})
-      : instrument_(config,
-                    {[this] { return now_ns.load(); }, [this](int channel) { return volts(channel); }}),
+      : instrument_(config, {[this] { return now_ns.load(); }, [this](int channel) { return volts(channel); },
+                             [this] { return fails.load(); }}),
         client_(modbus_new_tcp("127.0.0.1", instrument_.port()), modbus_free),
         thread_([this] { serve(); }) {
     modbus_set_response_timeout(client_.get(), 0, 100'000);
@@ -40,6 +40,7 @@ class Served {
   [[nodiscard]] modbus_t* client() const { return client_.get(); }
 
   std::atomic<uint64_t> now_ns{0};
+  std::atomic<bool> fails{false};
 
  private:
   void serve() {
@@ -151,6 +152,38 @@ TEST(ModbusInstrument, ABusyPortIsAHardwareErrorWithARemedy) {
     EXPECT_NE(std::string(error.what()).find(std::to_string(first.port())), std::string::npos);
     EXPECT_NE(std::string(error.what()).find("another port"), std::string::npos);
   }
+}
+
+TEST(ModbusInstrument, ARefusedReadingIsAnExceptionAndTheNextOneIsWell) {
+  Served served;
+  Two registers{};
+  served.fails = true;
+  EXPECT_EQ(modbus_read_registers(served.client(), 0, 2, registers.data()), -1);
+  EXPECT_EQ(errno, EMBXGTAR);
+  EXPECT_EQ(modbus_read_registers(served.client(), 55100, 2, registers.data()), 2) << "only the inputs fail";
+  served.fails = false;
+  EXPECT_EQ(modbus_read_registers(served.client(), 0, 2, registers.data()), 2);
+}
+
+TEST(ModbusInstrument, AnAnswerThatBreaksOffIsAnError) {
+  InstrumentConfig config;
+  config.faults.cut_short = true;
+  Served served(config);
+  Two registers{};
+  EXPECT_EQ(modbus_read_registers(served.client(), 0, 2, registers.data()), -1);
+}
+
+TEST(ModbusInstrument, AStuckReadingStaysAndATimerMayJump) {
+  InstrumentConfig config;
+  config.faults.stuck = true;
+  config.faults.timer_ahead_s = 0.5;
+  Served served(config);
+  served.now_ns = 1'000'000'000;
+  Two registers{};
+  ASSERT_EQ(modbus_read_registers(served.client(), 2, 2, registers.data()), 2);
+  EXPECT_EQ(as_float(registers[0], registers[1]), 0.0F);
+  ASSERT_EQ(modbus_read_registers(served.client(), 61520, 2, registers.data()), 2);
+  EXPECT_EQ(as_u32(registers), 60'000'000U);
 }
 
 }  // namespace

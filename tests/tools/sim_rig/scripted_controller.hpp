@@ -2,6 +2,7 @@
 // A controller for tests: plays given pin changes, echoes every byte it receives with its time.
 
 #include <deque>
+#include <set>
 #include <vector>
 
 #include "tools/sim_rig/simulated_controller.hpp"
@@ -16,6 +17,10 @@ class ScriptedController final : public SimulatedController {
   void receive(std::span<const uint8_t> bytes) override {
     received_.insert(received_.end(), bytes.begin(), bytes.end());
   }
+  void hold_switch(Switch which, bool active) override {
+    active ? void(held.insert(which)) : void(held.erase(which));
+  }
+  void set_power(bool on) override { powered = on; }
   Output advance_to(uint64_t until_ns) override {
     edges_.clear();
     while (!script_.empty() && script_.front().time_ns <= until_ns) {
@@ -25,6 +30,9 @@ class ScriptedController final : public SimulatedController {
     sent_ = std::exchange(received_, {});
     return {sent_, edges_};
   }
+
+  std::set<Switch> held;
+  bool powered = true;
 
  private:
   std::deque<PinEdge> script_;

@@ -12,7 +12,7 @@ TEST(Carriage, VentsTheLineUntilHomingEnds) {
   Carriage carriage(0.01, ScriptedController({}).places());
   std::vector<double> told_mL;
   for (const PinEdge& edge : home_and_inflate(100, 1000)) {
-    if (const auto displaced_mL = carriage.take(edge)) told_mL.push_back(*displaced_mL);
+    if (const auto displaced_mL = carriage.take(edge, 0)) told_mL.push_back(*displaced_mL);
   }
   ASSERT_EQ(told_mL.size(), 101U);
   EXPECT_DOUBLE_EQ(told_mL.front(), 0);
@@ -21,10 +21,10 @@ TEST(Carriage, VentsTheLineUntilHomingEnds) {
 
 TEST(Carriage, OnlyRisingStepEdgesMoveIt) {
   Carriage carriage(0.01, {.parked = 0, .home = 0});
-  carriage.take({0, Pin::dir, 1});
-  EXPECT_FALSE(carriage.take({1, Pin::step, 0}));
-  EXPECT_FALSE(carriage.take({2, Pin::ttl, 1}));
-  EXPECT_TRUE(carriage.take({3, Pin::step, 1}));
+  carriage.take({0, Pin::dir, 1}, 0);
+  EXPECT_FALSE(carriage.take({1, Pin::step, 0}, 0));
+  EXPECT_FALSE(carriage.take({2, Pin::ttl, 1}, 0));
+  EXPECT_TRUE(carriage.take({3, Pin::step, 1}, 0));
 }
 
 }  // namespace

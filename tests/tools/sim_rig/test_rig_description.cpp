@@ -3,7 +3,6 @@
 
 #include "protocol/contract/input_error.hpp"
 #include "tools/sim_rig/rig_description.hpp"
-#include "tools/sim_rig/rig_faults.hpp"
 
 namespace diastole::sim_rig {
 namespace {
@@ -32,34 +31,6 @@ TEST(RigDescription, TheSimulationTableIsStrict) {
     EXPECT_THAT(error.what(), HasSubstr("C1_kPa"));
   }
   EXPECT_THROW(described("\n[simulation]\nC1_kPa = nan\n"), InputError);
-}
-
-TEST(RigFaults, AreReadFromTheCommandLine) {
-  const RigFaults faults = parse_rig_faults({"serial-hangup@3.5", "daq-stall@2+0.05", "daq-delay@1+2/0.5"});
-  EXPECT_EQ(faults.serial_hangup_ns, 3'500'000'000U);
-  EXPECT_EQ(faults.daq.stall.from_ns, 2'000'000'000U);
-  EXPECT_EQ(faults.daq.stall.until_ns, 2'050'000'000U);
-  EXPECT_EQ(faults.daq.delay_ns, 500'000'000U);
-  EXPECT_FALSE(faults.daq.drop.holds(0));
-}
-
-TEST(RigFaults, OfTheInstrumentMayCountFromTheFirstTrigger) {
-  const RigFaults faults = parse_rig_faults({"daq-stall@ttl+1.5+0.25"});
-  EXPECT_EQ(faults.daq_from_ttl.stall.from_ns, 1'500'000'000U);
-  EXPECT_EQ(faults.daq_from_ttl.stall.until_ns, 1'750'000'000U);
-  EXPECT_TRUE(faults.daq.stall.empty());
-}
-
-TEST(RigFaults, AnythingElseIsRefusedWithTheForms) {
-  for (const char* text : {"serial-hangup", "daq-stall@2", "serial-hangup@3+1", "fire@3", "daq-drop@x+1",
-                           "daq-stall@2+-1", "daq-stall@2+1s", "daq-stall@ttl+2", "serial-hangup@ttl+2"}) {
-    try {
-      parse_rig_faults({text});
-      FAIL() << text;
-    } catch (const InputError& error) {
-      EXPECT_THAT(error.what(), testing::AllOf(HasSubstr(text), HasSubstr("daq-stall@T+D")));
-    }
-  }
 }
 
 }  // namespace

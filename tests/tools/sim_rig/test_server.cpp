@@ -1,4 +1,5 @@
 #include <fcntl.h>
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <poll.h>
 #include <sys/socket.h>
@@ -16,6 +17,7 @@
 #include "protocol/contract/conductor.hpp"
 #include "protocol/contract/input_error.hpp"
 #include "tests/tools/sim_rig/scripted_controller.hpp"
+#include "tools/sim_rig/control_client.hpp"
 #include "tools/sim_rig/server.hpp"
 
 namespace diastole::sim_rig {
@@ -41,12 +43,15 @@ class TemporaryDirectory {
 /// A conducted server in a thread, with a client's ends of line and conductor.
 class Conducted {
  public:
-  explicit Conducted(std::vector<PinEdge> script, const std::vector<std::string>& faults = {}) {
+  explicit Conducted(std::vector<PinEdge> script, const std::vector<std::string>& faults = {},
+                     double host_drift_ppm = 0) {
     ServerOptions options;
     options.link = directory_ / "pump";
     options.conductor = directory_ / "time";
     options.pins = directory_ / "pins.csv";
-    options.faults = parse_rig_faults(faults);
+    options.control = directory_ / "control";
+    options.host_drift_ppm = host_drift_ppm;
+    options.faults = parse_faults(faults);
     const auto description =
         read_rig_description(TableReader::from_text(default_rig_toml(), "the built-in rig file"));
     server_ = std::make_unique<Server>(description, std::make_unique<ScriptedController>(std::move(script)),
@@ -85,6 +90,8 @@ class Conducted {
     std::ifstream file(directory_ / "pins.csv");
     return {std::istreambuf_iterator<char>(file), {}};
   }
+
+  [[nodiscard]] std::string control() const { return directory_ / "control"; }
 
   int line = -1;
 
@@ -148,6 +155,81 @@ TEST(Server, AHangUpIsSeenAtTheLine) {
   EXPECT_EQ(rig.ask(3'000'000, 0).now_ns, 3'000'000U);
   ASSERT_EQ(::poll(&state, 1, 1000), 1);
   EXPECT_NE(state.revents & POLLHUP, 0);
+}
+
+TEST(Server, ACableToTheScannerThatIsCutShowsInThePinTrace) {
+  Conducted rig({{1'000'000, Pin::ttl, 1},
+                 {2'000'000, Pin::ttl, 0},
+                 {3'000'000, Pin::ttl, 1},
+                 {3'000'000, Pin::rwave_uV, 9},
+                 {4'000'000, Pin::step, 1},
+                 {6'000'000, Pin::ttl, 0}},
+                {"gate-lost@ttl+0.0015s:off@0.005"});
+  rig.ask(7'000'000, 0);
+  rig.stop();
+  EXPECT_EQ(rig.pins(),
+            "time_ns,signal,value\n1000000,TTL,1\n2000000,TTL,0\n4000000,STEP,1\n6000000,TTL,0\n");
+}
+
+TEST(Server, ALinePluggedInAgainIsThereUnderTheSameName) {
+  Conducted rig({}, {"serial-hangup@0.002:off@0.004"});
+  rig.ask(3'000'000, 0);
+  ::close(rig.line);
+  rig.ask(5'000'000, 0);
+  rig.open_line();
+  ASSERT_GE(rig.line, 0);
+  EXPECT_EQ(rig.ask(0, 0).serial_bytes_sent_total, 0U);
+  ASSERT_EQ(::write(rig.line, "ab", 2), 2);
+  EXPECT_EQ(rig.ask(6'000'000, 2).serial_bytes_sent_total, 2U);
+}
+
+TEST(Server, ASilentLineSwallowsWhatIsSent) {
+  Conducted rig({}, {"serial-silence@0.002"});
+  ASSERT_EQ(::write(rig.line, "ab", 2), 2);
+  EXPECT_EQ(rig.ask(1'000'000, 2).serial_bytes_sent_total, 2U);
+  rig.ask(3'000'000, 2);
+  ASSERT_EQ(::write(rig.line, "cd", 2), 2);
+  EXPECT_EQ(rig.ask(5'000'000, 4).serial_bytes_sent_total, 2U);
+}
+
+TEST(Server, OrdersSwitchFaultsAndHoldTheTime) {
+  Conducted rig({{1'000'000, Pin::ttl, 1}});
+  ControlClient control(rig.control());
+  EXPECT_EQ(nlohmann::json::parse(control.order("state"))["faults"], nlohmann::json::object());
+  EXPECT_THAT(control.order("fault on leak 3"), testing::HasSubstr("leak on"));
+  EXPECT_EQ(nlohmann::json::parse(control.order("state"))["faults"]["leak"], 3);
+  control.order("fault off leak");
+  EXPECT_EQ(nlohmann::json::parse(control.order("state"))["faults"], nlohmann::json::object());
+  for (const char* order : {"fault on laek", "fault on estop 3", "fault on leak much", "fault", "dance",
+                            "hold ttl", "fault on step-loss 2", "fault off leak 3"}) {
+    EXPECT_THROW(control.order(order), InputError) << order;
+  }
+  control.order("hold ttl+0.5");
+  EXPECT_FALSE(control.held());
+  std::thread conducting([&] { EXPECT_EQ(rig.ask(600'000'000, 0).now_ns, 600'000'000U); });
+  while (!control.held())
+    std::this_thread::yield();
+  EXPECT_NEAR(nlohmann::json::parse(control.order("state"))["now_s"].get<double>(), 0.6, 1e-12);
+  control.order("go");
+  conducting.join();
+}
+
+TEST(Server, TimeGoesOnWhenItsHolderIsGone) {
+  Conducted rig({});
+  auto control = std::make_unique<ControlClient>(rig.control());
+  control->order("hold 0.5");
+  std::thread conducting([&] { EXPECT_EQ(rig.ask(600'000'000, 0).now_ns, 600'000'000U); });
+  while (!control->held())
+    std::this_thread::yield();
+  control.reset();
+  conducting.join();
+}
+
+TEST(Server, AHostWhoseClockRunsFastIsToldItsOwnTime) {
+  Conducted rig({}, {}, 100);
+  EXPECT_EQ(rig.ask(1'000'000'000, 0).now_ns, 1'000'000'000U);
+  ControlClient control(rig.control());
+  EXPECT_NEAR(nlohmann::json::parse(control.order("state"))["now_s"].get<double>(), 1 / 1.0001, 2e-8);
 }
 
 TEST(Rig, PistonMotionAppearsAsVolts) {

@@ -10,14 +10,14 @@ double loss_factor(const PlantConfig& config) {
   const double area_m2 = std::numbers::pi / 4 * config.hose.bore_mm * config.hose.bore_mm * 1e-6;
   constexpr double m3_per_mL = 1e-6;
   constexpr double kPa_per_Pa = 1e-3;
-  return 0.5 * config.minor_loss_K * config.hose.fluid_density_kg_m3 / (area_m2 * area_m2) * m3_per_mL *
-         m3_per_mL * kPa_per_Pa;
+  return 0.5 * config.hose.fluid_density_kg_m3 / (area_m2 * area_m2) * m3_per_mL * m3_per_mL * kPa_per_Pa;
 }
 
 }  // namespace
 
 Plant::Plant(const PlantConfig& config)
-    : hose_(config.hose),
+    : minor_loss_K_(config.minor_loss_K),
+      hose_(config.hose),
       gel_(config.C1_kPa),
       piston_(config.piston_lag_ms, hose_.step_s()),
       cavity_sensor_(config.cavity, hose_.step_s(), 2 * config.seed),
@@ -30,17 +30,28 @@ void Plant::advance_to(double time_s) {
   since_step_s_ = time_s - static_cast<double>(step_count_) * step_s();
 }
 
+/// The leak's flow and the bubble's share are those of the step's beginning: both change little in half a millisecond.
+void Plant::take_disturbances() {
+  leaked_mL_ = leak_.flow_mL_s(cavity_kPa()) * step_s();
+  gel_share_ = 1 / (1 + bubble_.compliance_mL_per_kPa(cavity_kPa()) * gel_.stiffness_kPa_per_mL(cavity_mL_));
+}
+
+double Plant::gel_inflow_mL(double flow_mL_s) const {
+  return gel_share_ * (0.5 * step_s() * (outlet_flow_mL_s_ + flow_mL_s) - leaked_mL_);
+}
+
 double Plant::solve_outlet_flow_mL_s() const {
   const Characteristic line = hose_.outlet();
-  const double half_step_s = 0.5 * step_s();
+  const double loss_kPa_s2_per_mL2 = loss_kPa_s2_per_mL2_ * (minor_loss_K_ + blockage_.loss_K());
   double flow = outlet_flow_mL_s_;
+  const double half_step_s = 0.5 * step_s() * gel_share_;
   // Newton on a strictly increasing residual that is nearly linear (the line's impedance dominates).
   for (int iteration = 0; iteration < 20; ++iteration) {
-    const double volume_mL = cavity_mL_ + half_step_s * (outlet_flow_mL_s_ + flow);
-    const double residual = gel_.pressure_kPa(volume_mL) + loss_kPa_s2_per_mL2_ * flow * std::abs(flow) +
+    const double volume_mL = cavity_mL_ + gel_inflow_mL(flow);
+    const double residual = gel_.pressure_kPa(volume_mL) + loss_kPa_s2_per_mL2 * flow * std::abs(flow) +
                             line.impedance_kPa_s_per_mL * flow - line.pressure_kPa;
     const double slope = gel_.stiffness_kPa_per_mL(volume_mL) * half_step_s +
-                         2 * loss_kPa_s2_per_mL2_ * std::abs(flow) + line.impedance_kPa_s_per_mL;
+                         2 * loss_kPa_s2_per_mL2 * std::abs(flow) + line.impedance_kPa_s_per_mL;
     const double change = residual / slope;
     flow -= change;
     if (std::abs(change) < 1e-12) break;
@@ -52,9 +63,10 @@ void Plant::step() {
   const double cavity_before_kPa = cavity_kPa();
   const double pump_before_kPa = pump_end_kPa();
   piston_.advance();
+  take_disturbances();
   const double flow_mL_s = solve_outlet_flow_mL_s();
   hose_.advance(piston_.flow_mL_s(), flow_mL_s);
-  cavity_mL_ += 0.5 * step_s() * (outlet_flow_mL_s_ + flow_mL_s);
+  cavity_mL_ += gel_inflow_mL(flow_mL_s);
   outlet_flow_mL_s_ = flow_mL_s;
   ++step_count_;
   cavity_sensor_.advance(0.5 * (cavity_before_kPa + cavity_kPa()));

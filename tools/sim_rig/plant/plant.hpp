@@ -12,8 +12,11 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "tools/sim_rig/plant/air_bubble.hpp"
+#include "tools/sim_rig/plant/blockage.hpp"
 #include "tools/sim_rig/plant/gel_annulus.hpp"
 #include "tools/sim_rig/plant/hose.hpp"
+#include "tools/sim_rig/plant/leak.hpp"
 #include "tools/sim_rig/plant/piston.hpp"
 #include "tools/sim_rig/plant/sensor.hpp"
 
@@ -43,6 +46,13 @@ class Plant {
   [[nodiscard]] double cavity_reading_kPa() const { return cavity_sensor_.reading_kPa(since_step_s_); }
   [[nodiscard]] double pump_reading_kPa() const { return pump_sensor_.reading_kPa(since_step_s_); }
 
+  /// What goes wrong from the next step on; neutral values make it whole again.
+  void leak(const Leak& leak) { leak_ = leak; }
+  void block(const Blockage& blockage) { blockage_ = blockage; }
+  /// It comes in, or goes, at the pressure of the moment, and moves only with what follows.
+  void admit(const AirBubble& bubble) { bubble_ = bubble; }
+  [[nodiscard]] Sensor& cavity_sensor() { return cavity_sensor_; }
+
   /// The truth at the last whole step.
   [[nodiscard]] double cavity_kPa() const { return gel_.pressure_kPa(cavity_mL_); }
   [[nodiscard]] double cavity_mL() const { return cavity_mL_; }
@@ -57,15 +67,25 @@ class Plant {
   /// The flow into the cavity at the step's end, from the hose's characteristic, cannula loss and gel.
   [[nodiscard]] double solve_outlet_flow_mL_s() const;
 
+  void take_disturbances();
+  /// Volume that enters the gel in a step with this flow at its end, beside bubble and leak.
+  [[nodiscard]] double gel_inflow_mL(double flow_mL_s) const;
+
+  double minor_loss_K_;
   Hose hose_;
   GelAnnulus gel_;
   Piston piston_;
   Sensor cavity_sensor_;
   Sensor pump_sensor_;
-  double loss_kPa_s2_per_mL2_;
+  double loss_kPa_s2_per_mL2_;  // for K = 1
   long step_count_ = 0;
   double since_step_s_ = 0;
-  double cavity_mL_ = 0;
+  Leak leak_;
+  Blockage blockage_;
+  AirBubble bubble_;
+  double leaked_mL_ = 0;  // in this step
+  double gel_share_ = 1;  // of a change of the cavity's volume; the bubble gives way for the rest
+  double cavity_mL_ = 0;  // of the gel; the bubble's share is not in it
   double outlet_flow_mL_s_ = 0;
 };
 

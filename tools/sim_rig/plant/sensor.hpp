@@ -25,11 +25,17 @@ class Sensor {
 
   void advance(double mean_pressure_kPa);
 
+  /// From now on the reading is off by `offset_kPa`, and by another `drift_kPa_per_s` every second; 0, 0: true again.
+  void falsify(double offset_kPa, double drift_kPa_per_s);
+
   /// The reading `since_step_s` after the last step, carried on along the response's own slope.
   [[nodiscard]] double reading_kPa(double since_step_s) const;
 
  private:
   SensorConfig config_;
+  double step_s_;
+  double error_kPa_ = 0;
+  double drift_kPa_per_s_ = 0;
   SecondOrder line_;
   double noise_memory_;
   double noise_kPa_ = 0;

@@ -1,0 +1,66 @@
+#include "tools/sim_rig/control_client.hpp"
+
+#include <poll.h>
+#include <sys/socket.h>
+
+#include <array>
+
+#include "host/transport/unix_socket.hpp"
+#include "protocol/contract/input_error.hpp"
+
+namespace diastole::sim_rig {
+namespace {
+
+constexpr std::chrono::milliseconds answer_patience{10'000};
+
+}  // namespace
+
+ControlClient::ControlClient(const std::string& socket)
+    : path_(socket),
+      socket_(connect_unix_socket(socket, "Start one with sim_rig --control " + socket + ".")) {}
+
+std::string ControlClient::order(const std::string& text) {
+  const std::string sent = text + '\n';
+  if (::send(socket_.get(), sent.data(), sent.size(), MSG_NOSIGNAL) != static_cast<ssize_t>(sent.size())) {
+    throw HardwareError(path_, "the simulated rig has gone", "Start it again.");
+  }
+  while (const auto answer = line(answer_patience)) {
+    if (answer->starts_with("held ")) {
+      held_ = answer->substr(5);
+    } else if (answer->starts_with("ok")) {
+      return answer->size() > 3 ? answer->substr(3) : "";
+    } else {
+      throw InputError({path_, "", answer->starts_with("error ") ? answer->substr(6) : *answer, ""});
+    }
+  }
+  throw HardwareError(path_, "the simulated rig does not answer", "Start it again.");
+}
+
+std::optional<std::string> ControlClient::held() {
+  if (!held_) {
+    if (const auto told = line(std::chrono::milliseconds(0)); told && told->starts_with("held "))
+      held_ = told->substr(5);
+  }
+  return std::exchange(held_, std::nullopt);
+}
+
+std::optional<std::string> ControlClient::line(std::chrono::milliseconds patience) {
+  const auto give_up = std::chrono::steady_clock::now() + patience;
+  while (true) {
+    if (const size_t end = inbox_.find('\n'); end != std::string::npos) {
+      std::string found = inbox_.substr(0, end);
+      inbox_.erase(0, end + 1);
+      return found;
+    }
+    const auto left =
+        std::chrono::duration_cast<std::chrono::milliseconds>(give_up - std::chrono::steady_clock::now());
+    pollfd readable{socket_.get(), POLLIN, 0};
+    if (::poll(&readable, 1, std::max(0, static_cast<int>(left.count()))) <= 0) return std::nullopt;
+    std::array<char, 1024> block{};
+    const ssize_t got = ::recv(socket_.get(), block.data(), block.size(), 0);
+    if (got <= 0) return std::nullopt;
+    inbox_.append(block.data(), static_cast<size_t>(got));
+  }
+}
+
+}  // namespace diastole::sim_rig
