@@ -290,6 +290,7 @@ void ControllerClient::greet() {
   }
   hello_ = answer.hello;
   next_time_question_ns_ = clock_.now_ns();
+  next_heartbeat_ns_ = clock_.now_ns();  // the first order may follow at once
 }
 
 void ControllerClient::read_settings() {

@@ -136,6 +136,17 @@ void add_settings(json& rig, const ControllerClient& controller) {
   rig["volume_per_step_mL"] = 1e-9 * controller.microstep_pL();
 }
 
+/// What the controller was held to.
+void add_limits(json& rig, const ControllerConfig& controller) {
+  const MotionLimits& limits = controller.limits;
+  rig["limit_travel_mL"] = limits.travel_mL;
+  rig["limit_flow_mL_s"] = limits.flow_mL_s;
+  rig["limit_acceleration_mL_s2"] = limits.acceleration_mL_s2;
+  rig["limit_step_rate_Hz"] = limits.step_rate_Hz;
+  rig["limit_pressure_kPa"] = limits.pressure_kPa;
+  rig["lease_ms"] = controller.lease_ms;
+}
+
 json schedule_as_json(const std::optional<ScheduleProgress>& schedule) {
   if (!schedule) return nullptr;
   return {{"block", schedule->block},
@@ -682,6 +693,7 @@ void RigService::write_beginning(JournalWriter& journal, const RunRecord& record
   rig.update(attributes_as_json(book_.attributes()));
   rig["daq_rate_Hz"] = sample_rate_Hz;
   add_settings(rig, *controller_);
+  add_limits(rig, rig_.controller);
   const TimerFacts timer = make_source(*clock_, *instrument_)->timer(sample_rate_Hz);
   const json beginning{{"record", "begin"},
                        {"run_id", record.run_id},

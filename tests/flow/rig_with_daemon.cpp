@@ -17,7 +17,8 @@ RigWithDaemon::RigWithDaemon(Time time, const std::string& rig_file,
                              const std::vector<std::string>& rig_options)
     : time_(time) {
   place.write("rig.toml", rig_file);
-  std::vector<std::string> rig{"sim_rig", "--link", path("pump"), "--config", path("rig.toml")};
+  std::vector<std::string> rig{"sim_rig",        "--link",    path("pump"),   "--config",
+                               path("rig.toml"), "--control", path("control")};
   if (time == Time::conducted) rig.insert(rig.end(), {"--conductor", path("time")});
   rig.insert(rig.end(), rig_options.begin(), rig_options.end());
   rig_ = std::make_unique<Program>(place, rig);

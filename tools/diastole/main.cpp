@@ -22,6 +22,7 @@
 #include "protocol/contract/input_error.hpp"
 #include "protocol/contract/table_reader.hpp"
 #include "tools/diastole/catheter/catheter.hpp"
+#include "tools/diastole/replay/replay.hpp"
 #include "tools/diastole/simulate/simulate.hpp"
 
 namespace {
@@ -65,6 +66,7 @@ diastole::ExitCode run(int argc, char** argv) {
   diastole::add_host_commands(line);
   diastole::add_catheter(line);
   diastole::add_simulate(line);
+  diastole::add_replay(line);
   diastole::add_estimator_commands(line);
   if (argc < 2) {
     std::cerr << app.help();

@@ -4,7 +4,6 @@
 #include <unistd.h>
 
 #include <chrono>
-#include <csignal>
 #include <filesystem>
 #include <iostream>
 #include <memory>
@@ -15,17 +14,17 @@
 #include "host/daemon/run_session.hpp"
 #include "protocol/contract/input_error.hpp"
 #include "tools/diastole/simulate/simulated_rig.hpp"
+#include "tools/diastole/simulate/stop_signals.hpp"
 
 namespace diastole {
 namespace {
 
 namespace fs = std::filesystem;
 
-volatile std::sig_atomic_t stops = 0;
-
 struct SimulateOptions {
   SessionOptions session;
   SimulatedRigOptions rig;
+  std::vector<std::string> faults;
 };
 
 struct SimulatedSession {
@@ -92,23 +91,6 @@ class PendingFile {
   std::string name_;
 };
 
-/// While it lives, Ctrl-C stops the session at the cycle's end, a second one or SIGTERM stops it now.
-class StopSignals {
- public:
-  StopSignals() {
-    stops = 0;
-    std::signal(SIGINT, [](int) { stops = stops + 1; });
-    for (const int number : {SIGTERM, SIGHUP})
-      std::signal(number, [](int) { stops = 2; });
-  }
-  ~StopSignals() {
-    for (const int number : {SIGINT, SIGTERM, SIGHUP})
-      std::signal(number, SIG_DFL);
-  }
-  StopSignals(const StopSignals&) = delete;
-  StopSignals& operator=(const StopSignals&) = delete;
-};
-
 /// Homes the pump and runs the session; when no run file can be delivered the journal stays in `directory`.
 SessionResult run_in(PrivateDirectory& directory, const SimulatedRig& rig, const SessionOptions& options) {
   DaemonClient daemon(rig.socket());
@@ -130,9 +112,11 @@ SimulatedSession simulate(SimulateOptions options) {
   check_outputs(options);
   const PendingFile pins(options.rig.pins, options.session.force);
   options.rig.pins = pins.path();
+  for (const std::string& fault : options.faults)
+    options.rig.more.insert(options.rig.more.end(), {"--fault", fault});
   const StopSignals signals;
   SessionView view(isatty(STDERR_FILENO) != 0);
-  options.session.stops_asked = [] { return static_cast<int>(stops); };
+  options.session.stops_asked = [&signals] { return signals.asked(); };
   options.session.ready = [] { return true; };  // nobody is waited for in a simulation
   options.session.progress = [&view](const SessionProgress& progress) { view.show(progress); };
 
@@ -180,6 +164,8 @@ void add_simulate(CommandLine& line) {
       "      also every edge of the controller's pins; other sensor noise\n"
       "  diastole simulate gel.experiment.toml -o soft.run.h5 --config soft.rig.toml\n"
       "      another rig; its table [simulation] holds the gel's stiffness C1_kPa, noise and more\n"
+      "  diastole simulate gel.experiment.toml -o stopped.run.h5 --fault estop@run+3.2 --fault leak@run+1\n"
+      "      with faults of the rig, by name; `sim_rig faults` lists them\n"
       "The same seed gives the same run. Ctrl-C once stops at the end of the cycle, twice at once; what\n"
       "was recorded is kept. Exit code 1: samples are missing; 3: a fault ended the run.");
   command->add_option("EXPERIMENT", options->session.experiment, "experiment file (.toml)")->required();
@@ -191,6 +177,8 @@ void add_simulate(CommandLine& line) {
   command->add_option("--pins", options->rig.pins, "pin trace to write: time_ns,signal,value");
   command->add_option("--seed", options->rig.seed, "of the sensors' noise")->capture_default_str();
   command->add_option("--config", options->rig.config, "rig file, instead of the built-in one");
+  command->add_option("--fault", options->faults,
+                      "make something go wrong, NAME@run+SECONDS (sim_rig faults, sim_rig --help)");
   command->add_flag("--real-time", options->rig.real_time, "as slow as the real thing");
   command->add_flag("--force", options->session.force, "replace files that exist");
   line.on_run(command, [options](const CommandOutput& out) { return report(simulate(*options), out.json); });

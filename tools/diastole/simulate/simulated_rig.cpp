@@ -59,6 +59,7 @@ SimulatedRig::SimulatedRig(const PrivateDirectory& directory, const SimulatedRig
   if (!options.image.empty()) rig.insert(rig.end(), {"--image", options.image});
   if (!options.pins.empty()) rig.insert(rig.end(), {"--pins", options.pins});
   if (!options.real_time) rig.insert(rig.end(), {"--conductor", conductor});
+  rig.insert(rig.end(), options.more.begin(), options.more.end());
   rig_ = std::make_unique<ChildProcess>(rig, directory / "sim_rig.log");
   const auto addresses = nlohmann::json::parse(rig_->first_line(start_patience));
 

@@ -34,6 +34,7 @@ struct SimulatedRigOptions {
   std::string pins;    ///< pin trace to write; empty: none
   uint64_t seed = 1;
   bool real_time = false;
+  std::vector<std::string> more = {};  ///< arguments for sim_rig
 };
 
 class SimulatedRig {

@@ -1,0 +1,51 @@
+#include "tools/diastole/replay/operator.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "host/daemon/client.hpp"
+
+namespace diastole::replay {
+namespace {
+
+/// Clocks are mapped to some nanoseconds, and the daemon looks for orders once in a few milliseconds: a moment earlier
+/// is the same turn of its loop.
+constexpr double earlier_s = 20e-6;
+
+}  // namespace
+
+Operator::Operator(const std::string& control_socket, const std::string& daemon_socket,
+                   const std::vector<Order>& orders)
+    : rig_(control_socket), daemon_socket_(daemon_socket), orders_(orders.begin(), orders.end()) {
+  for (const Order& order : orders)
+    rig_.order(fmt::format("hold run+{:.9f}s", std::max(order.time_s - earlier_s, 0.0)));
+}
+
+void Operator::attend() {
+  while (!orders_.empty() && rig_.held()) {
+    give(orders_.front());
+    orders_.pop_front();
+    rig_.order("go");
+  }
+}
+
+void Operator::give(const Order& order) const {
+  DaemonClient daemon(daemon_socket_);
+  switch (order.kind) {
+    case Order::Kind::go_on:
+      daemon.call("run.continue", {{"slice", order.slice}});
+      break;
+    case Order::Kind::stop_at_cycle_end:
+      daemon.call("run.stop", {{"how", "cycle_end"}});
+      break;
+    case Order::Kind::stop_now:
+      daemon.call("run.stop", {{"how", "now"}});
+      break;
+    case Order::Kind::halt:
+      daemon.call("run.stop", {{"how", "halt"}});
+      break;
+  }
+}
+
+}  // namespace diastole::replay

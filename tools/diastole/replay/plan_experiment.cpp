@@ -1,0 +1,132 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "protocol/contract/input_error.hpp"
+#include "protocol/contract/table_reader.hpp"
+#include "tools/diastole/replay/replay_plan.hpp"
+
+namespace diastole::replay {
+namespace {
+
+using runfile::RecordedRun;
+using runfile::Segment;
+
+[[noreturn]] void lacks(const RecordedRun& run, const std::string& place, const std::string& what,
+                        const std::string& remedy) {
+  throw InputError({run.file, place, "cannot be replayed: " + what, remedy});
+}
+
+/// The experiment's own text, if it is one that this program's daemon has run.
+bool has_experiment(const RecordedRun& run) {
+  try {
+    TableReader root = TableReader::from_text(run.protocol_toml, "/protocol/toml");
+    return root.has("format") && root.text("format") == "diastole-experiment";
+  } catch (const InputError&) {
+    return false;
+  }
+}
+
+void replace_all(std::string& text, const std::string& from, const std::string& to) {
+  for (size_t at = 0; (at = text.find(from, at)) != std::string::npos; at += to.size())
+    text.replace(at, from.size(), to);
+}
+
+/// The points files that the experiment names lie in the run file, by segment; here they get names of their own.
+void take_points(const RecordedRun& run, ReplayPlan& plan) {
+  TableReader root = TableReader::from_text(run.protocol_toml, "/protocol/toml");
+  std::vector<TableReader> segments = root.tables("segment");
+  std::map<std::string, std::string> renamed;
+  for (size_t i = 0; i < segments.size(); ++i) {
+    if (!segments[i].has("points")) continue;
+    const std::string name = segments[i].text("points");
+    if (renamed.contains(name)) continue;
+    const auto played = run.waveforms.find(i);
+    if (played == run.waveforms.end()) {
+      lacks(run, fmt::format("/protocol/waveforms/{}", i),
+            fmt::format("the points of {} are not in the file", name), "Replay a run that holds them.");
+    }
+    renamed[name] = fmt::format("waveform-{}.csv", i);
+    plan.points[renamed[name]] = played->second.points;
+  }
+  for (const auto& [name, own_name] : renamed) {
+    for (const char* quote : {"\"", "'"})
+      replace_all(plan.experiment_toml, quote + name + quote, fmt::format("\"{}\"", own_name));
+  }
+}
+
+bool raises_triggers(const RecordedRun& run, const Segment& segment) {
+  constexpr double slack_s = 1e-6;
+  return std::ranges::any_of(run.trigger_s, [&](double time_s) {
+    return time_s >= segment.start_s - slack_s && time_s < segment.end_s() - slack_s;
+  });
+}
+
+/// Commanded volume at a time, of the nearest row.
+double commanded_mL(const RecordedRun& run, double time_s) {
+  if (run.pump.time_s.empty()) return 0;
+  const auto after = std::ranges::lower_bound(run.pump.time_s, time_s);
+  const auto row = std::min(after - run.pump.time_s.begin(), std::ssize(run.pump.time_s) - 1);
+  return run.pump.commanded_mL[static_cast<size_t>(row)];
+}
+
+/// Stillness, or a way from one volume to another that is no cycle: the controller makes such ways by itself before
+/// the next segment.
+bool is_between_cycles(const RecordedRun& run, const Segment& segment) {
+  constexpr double closes_mL = 0.5;
+  if (segment.waveform == "hold") return !raises_triggers(run, segment);
+  if (segment.waveform != "uploaded") return false;
+  return std::abs(commanded_mL(run, segment.end_s()) - commanded_mL(run, segment.start_s)) > closes_mL;
+}
+
+/// For recordings of other programs: what the table of segments tells.
+void write_experiment(const RecordedRun& run, ReplayPlan& plan) {
+  const auto& time_s = run.pressure.time_s;
+  if (run.segments.empty()) {
+    lacks(run, "/protocol",
+          "it holds neither an experiment file (/protocol/toml) nor a segment (/protocol/segments)",
+          "Replay a run that tells what was done.");
+  }
+  if (time_s.size() < 2) lacks(run, "/pressure/time_s", "it holds no samples", "Replay another run.");
+  const double rate_Hz = static_cast<double>(time_s.size() - 1) / (time_s.back() - time_s.front());
+  double rest_s = 0;
+  std::string segments;
+  for (size_t i = 0; i < run.segments.size(); ++i) {
+    const Segment& segment = run.segments[i];
+    if (is_between_cycles(run, segment)) {
+      if (segments.empty()) rest_s += segment.end_s() - segment.start_s;
+      plan.remarks.push_back(
+          fmt::format("segment {} ({}, {:g} s) raises no trigger or is no cycle: {}", i, segment.waveform,
+                      segment.period_s * static_cast<double>(segment.cycles),
+                      segments.empty() ? "its time is rest before the first cycle" : "it is left out"));
+      continue;
+    }
+    if (segment.waveform == "uploaded") {
+      lacks(run, fmt::format("/protocol/waveforms/{}", i),
+            "the uploaded waveform's points are not in the file", "Replay a run that holds them.");
+    }
+    segments += fmt::format(
+        "[[segment]]\nwaveform = \"{}\"\nstroke_mL = {}\nperiod_s = {}\noffset_mL = {}\ncycles = {}\n",
+        segment.waveform, segment.stroke_mL, segment.period_s, segment.offset_mL, segment.cycles);
+  }
+  if (segments.empty()) lacks(run, "/protocol/segments", "none of its segments moves", "Replay another run.");
+  plan.experiment_toml = fmt::format(
+      "format = \"diastole-experiment\"\nversion = 1\nsample_rate_Hz = {:.9g}\nrest_s = {:.9g}\n{}", rate_Hz,
+      rest_s, segments);
+  plan.remarks.push_back(
+      "/protocol/toml is no experiment file of this program: the experiment was made of /protocol/segments; "
+      "the "
+      "controller's own acceleration, and triggers that rise with a cycle's first step, may differ from what "
+      "was "
+      "recorded");
+}
+
+}  // namespace
+
+void plan_experiment(const RecordedRun& run, ReplayPlan& plan) {
+  if (!has_experiment(run)) return write_experiment(run, plan);
+  plan.experiment_toml = run.protocol_toml;
+  take_points(run, plan);
+}
+
+}  // namespace diastole::replay

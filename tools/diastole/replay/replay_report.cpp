@@ -1,0 +1,100 @@
+#include "tools/diastole/replay/replay_report.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+namespace diastole::replay {
+namespace {
+
+const char* name_of(Verdict verdict) {
+  switch (verdict) {
+    case Verdict::equal:
+      return "equal";
+    case Verdict::differs:
+      return "DIFFERS";
+    case Verdict::told:
+      break;
+  }
+  return "-";
+}
+
+std::string place_of(const Difference& difference) {
+  return difference.cycle < 0 ? "before the first cycle" : fmt::format("cycle {}", difference.cycle);
+}
+
+}  // namespace
+
+std::string as_table(const ReplayReport& report) {
+  std::string text = fmt::format("{} replayed by {}: {:.1f} s in {:.1f} s\n\n", report.recorded,
+                                 report.firmware, report.simulated_s, report.wall_s);
+  const Line head{"", "recorded", "replayed", "difference", Verdict::told};
+  std::vector<const Line*> lines{&head};
+  for (const Line& line : report.comparison.lines)
+    lines.push_back(&line);
+  const auto width = [&](std::string Line::*column) {
+    size_t most = 0;
+    for (const Line* line : lines)
+      most = std::max(most, (line->*column).size());
+    return most;
+  };
+  const size_t what = width(&Line::what), recorded = width(&Line::recorded),
+               replayed = width(&Line::replayed), difference = width(&Line::difference);
+  for (const Line* line : lines) {
+    text += fmt::format("  {:<{}}  {:<{}}  {:<{}}  {:<{}}  {}\n", line->what, what, line->recorded, recorded,
+                        line->replayed, replayed, line->difference, difference,
+                        line == &head ? "verdict" : name_of(line->verdict));
+  }
+  text += '\n';
+  for (const std::string& remark : report.plan.remarks)
+    text += fmt::format("note: {}\n", remark);
+  if (report.comparison.first) {
+    const Difference& first = *report.comparison.first;
+    text += fmt::format("The runs part at {:.6f} s, {}: {}\n", first.time_s, place_of(first), first.text);
+  } else {
+    text += report.comparison.equal() ? "The replay is the recording.\n" : "The runs differ.\n";
+  }
+  return text;
+}
+
+nlohmann::json as_json(const ReplayReport& report) {
+  using nlohmann::json;
+  const Comparison& found = report.comparison;
+  json lines = json::array();
+  for (const Line& line : found.lines) {
+    lines.push_back({{"what", line.what},
+                     {"recorded", line.recorded},
+                     {"replayed", line.replayed},
+                     {"difference", line.difference},
+                     {"verdict", line.verdict == Verdict::told    ? "told"
+                                 : line.verdict == Verdict::equal ? "equal"
+                                                                  : "differs"}});
+  }
+  json first;
+  if (found.first) {
+    first = {{"time_s", found.first->time_s}, {"cycle", found.first->cycle}, {"text", found.first->text}};
+  }
+  return {{"run", report.recorded},
+          {"replayed", report.replayed.empty() ? json() : json(report.replayed)},
+          {"firmware", report.firmware},
+          {"equal", found.equal()},
+          {"triggers_equal", found.triggers_equal},
+          {"steps_equal", found.steps_equal},
+          {"samples_equal", found.samples_equal},
+          {"missing_equal", found.missing_equal},
+          {"pressure_equal", found.pressure_equal},
+          {"events_equal", found.events_equal},
+          {"max_trigger_diff_s", found.max_trigger_diff_s},
+          {"max_steps_diff", found.max_steps_diff},
+          {"max_abs_diff_kPa", found.max_abs_diff_kPa},
+          {"tolerance_kPa", found.tolerance_kPa},
+          {"start_phase_s", found.start_phase_s},
+          {"host_drift_ppm", report.plan.host_drift_ppm},
+          {"first_difference", first},
+          {"lines", lines},
+          {"remarks", report.plan.remarks},
+          {"simulated_seconds", report.simulated_s},
+          {"wall_seconds", report.wall_s}};
+}
+
+}  // namespace diastole::replay
