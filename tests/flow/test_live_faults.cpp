@@ -63,16 +63,22 @@ TEST(LiveFaults, AreTakenAsTheRealOnesAndLeaveTheRigUsable) {
   rig.start_daemon();
   DaemonClient daemon = rig.client();
   Bystander bystander(rig.path("control"));
-  const std::string experiment =
-      with(with(source_text("examples/gel.experiment.toml"), "cycles = 10", "cycles = 2"), "rest_s = 1.0",
-           "rest_s = 0.1");
+  const std::string experiment = R"(format = "diastole-experiment"
+version = 1
+rest_s = 0.1
+[[segment]]
+waveform = "parabolic"
+stroke_mL = 1.0   # homing goes 5 mL/s
+period_s = 1.2
+cycles = 2
+)";
   for (const LiveFault& fault : live_faults) {
     SCOPED_TRACE(fault.name);
     const json status = daemon.call("rig.status");
     if (!status["fault"].is_null()) daemon.call("rig.clear_fault");
     daemon.call("rig.home");
-    daemon.call("run.start", {{"experiment", experiment}, {"file", "gel.experiment.toml"}});
     bystander.expect_at("run+0.5");
+    daemon.call("run.start", {{"experiment", experiment}, {"file", "gel.experiment.toml"}});
     ASSERT_TRUE(bystander.wait(daemon));
     bystander.order(std::string("fault on ") + fault.name);
     // A controller without supply boots; one that hears nothing tells its end when it is heard again.

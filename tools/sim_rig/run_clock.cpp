@@ -30,13 +30,17 @@ void RunClock::overhear(std::span<const uint8_t> bytes, uint64_t tick_zero_ns) {
 }
 
 void RunClock::take(const wire::Frame& frame, uint64_t tick_zero_ns) {
+  if (frame.header.kind == wire::FrameKind::closed) over_ = true;  // it was reset
   if (frame.header.kind != wire::FrameKind::sequenced) return;
   if (frame.header.type == static_cast<uint8_t>(wire::StateChanged::kType)) {
     const auto message = wire::decode<wire::StateChanged>(frame.payload);
-    if (message.ok() && message->to == wire::State::running) {
+    if (!message.ok()) return;
+    if (message->to == wire::State::running) {
       start_ = {message->tick + start_lead_ticks, tick_zero_ns};
       first_trigger_ns_.reset();
+      ++runs_;
     }
+    over_ = message->to != wire::State::running && message->to != wire::State::stopping;
   }
   if (frame.header.type == static_cast<uint8_t>(wire::RunStarted::kType)) {
     const auto message = wire::decode<wire::RunStarted>(frame.payload);
@@ -49,6 +53,9 @@ void RunClock::trigger(uint64_t time_ns) {
 }
 
 std::optional<uint64_t> RunClock::at_ns(const Moment& moment) const {
+  const bool has_to_come = moment.run > runs_, is_past = moment.run != 0 && moment.run < runs_;
+  if (moment.origin != Origin::rig && has_to_come) return std::nullopt;
+  if (moment.origin != Origin::rig && is_past) return 0;
   switch (moment.origin) {
     case Origin::rig:
       return moment.after_ns;

@@ -21,6 +21,8 @@ class RunClock {
   /// A moment on the rig's clock, as soon as it is known. After the start of run, times are whole ticks of the
   /// controller, the first ns in each.
   [[nodiscard]] std::optional<uint64_t> at_ns(const Moment& moment) const;
+  /// The run that is on, or else the one that comes next; counted from 1.
+  [[nodiscard]] uint32_t present_or_next_run() const { return over_ ? runs_ + 1 : runs_; }
   /// The start of run in ns; none before a run.
   [[nodiscard]] std::optional<uint64_t> run_start_ns() const { return at_ns({Origin::run, 0}); }
 
@@ -33,6 +35,8 @@ class RunClock {
     uint64_t tick_zero_ns = 0;
   };
   std::optional<Start> start_;
+  uint32_t runs_ = 0;  ///< begun so far
+  bool over_ = true;   ///< the latest of them
   std::optional<uint64_t> first_trigger_ns_;
 };
 

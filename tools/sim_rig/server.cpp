@@ -173,7 +173,9 @@ std::string Server::obey(ControlServer::ClientId client, const std::string& orde
     if (order == "state") return "ok " + state();
     if (order.starts_with("hold ")) {
       const std::string moment = order.substr(5);
-      timeline_.plan({client, moment}, parse_moment(moment));
+      Moment when = parse_moment(moment);
+      when.run = run_clock_.present_or_next_run();
+      timeline_.plan({client, moment}, when);
       return "ok";
     }
     if (order == "go") {

@@ -5,8 +5,9 @@
 // Orders at the control socket, one a line:
 //
 //   fault on NAME [VALUE]     from now on          fault off NAME
-//   hold WHEN                 answered "ok" at once, and "held WHEN" when conducted time has come there (fault_schedule.hpp
-//                             tells how WHEN is written); time then stands still until
+//   hold WHEN                 answered "ok" at once, and "held WHEN" when conducted time has come there; WHEN as
+//                             fault_schedule.hpp tells, of the run that is on or of the next; time then stands still
+//                             until
 //   go                        or until that client is gone. With the wall clock "held" is told, but time goes on.
 //   state                     JSON: now_s, run_s (since the start of run, or null), faults (those that are on)
 

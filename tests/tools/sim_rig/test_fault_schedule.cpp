@@ -65,9 +65,20 @@ TEST(RunClock, KnowsTheStartOfRunAheadAndThenToTheTick) {
   EXPECT_EQ(clock.run_start_ns(), 1'020'005'012U) << "the first ns within the tick";
   EXPECT_EQ(clock.at_ns({Origin::run, 24}), 1'020'005'036U) << "three ticks later";
   EXPECT_FALSE(clock.at_ns({Origin::ttl, 0}));
+  EXPECT_EQ(clock.present_or_next_run(), 1U);
+  EXPECT_FALSE(clock.at_ns({Origin::run, 24, 2}));
   clock.trigger(2'000'000'000);
   clock.trigger(3'000'000'000);
   EXPECT_EQ(clock.at_ns({Origin::ttl, 5}), 2'000'000'005U);
+  changed.to = wire::State::homed;
+  clock.overhear(told(changed), 5'000);
+  EXPECT_EQ(clock.run_start_ns(), 1'020'005'012U) << "of the latest run";
+  EXPECT_EQ(clock.present_or_next_run(), 2U);
+  changed.to = wire::State::running;
+  changed.tick *= 2;
+  clock.overhear(told(changed), 5'000);
+  EXPECT_EQ(clock.at_ns({Origin::run, 0, 2}), 2'020'005'000U);
+  EXPECT_EQ(clock.at_ns({Origin::run, 0, 1}), 0U) << "long past";
 }
 
 TEST(Timeline, GivesWhatIsDueInOrder) {

@@ -204,7 +204,7 @@ TEST(Server, OrdersSwitchFaultsAndHoldTheTime) {
                             "hold ttl", "fault on step-loss 2", "fault off leak 3"}) {
     EXPECT_THROW(control.order(order), InputError) << order;
   }
-  control.order("hold ttl+0.5");
+  control.order("hold 0.5");
   EXPECT_FALSE(control.held());
   std::thread conducting([&] { EXPECT_EQ(rig.ask(600'000'000, 0).now_ns, 600'000'000U); });
   while (!control.held())

@@ -21,6 +21,7 @@ enum class Origin : uint8_t { rig, ttl, run };
 struct Moment {
   Origin origin = Origin::rig;
   uint64_t after_ns = 0;
+  uint32_t run = 0;  ///< of ttl and run: in which of the rig's runs, from 1; 0: in the latest
 };
 
 struct FaultSwitch {
