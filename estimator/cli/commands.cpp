@@ -8,6 +8,7 @@ void add_estimator_commands(CommandLine& line) {
   add_fit(line);
   add_shear(line);
   add_report(line);
+  add_mesh(line);
 }
 
 }  // namespace diastole

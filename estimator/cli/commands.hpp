@@ -10,6 +10,7 @@ void add_pressure_volume(CommandLine& line);
 void add_fit(CommandLine& line);
 void add_shear(CommandLine& line);
 void add_report(CommandLine& line);
+void add_mesh(CommandLine& line);
 
 void add_estimator_commands(CommandLine& line);
 

@@ -28,8 +28,7 @@ SolutionRecord record_of(const Study& study, const ElasticModel& model, const El
   record.study = study.file.string();
   for (const StudyParameter& parameter : study.law.parameters)
     record.parameters.emplace_back(parameter.name, parameter.start);
-  const std::array<int, 3>& mesh = mesh_of(study.specimen);
-  record.mesh.assign(mesh.begin(), mesh.end());
+  record.mesh = mesh_of(study.specimen);
   return record;
 }
 

@@ -148,10 +148,11 @@ void print_for_people(const nlohmann::ordered_json& json) {
                fmt::join(probe["point_mm"].get<std::vector<double>>(), ", "),
                fmt::join(probe["displacement_mm"].get<std::vector<double>>(), ", "));
   }
+  const std::vector<int> mesh = json["mesh"].get<std::vector<int>>();
   fmt::print(
-      "  {} elements ({} in all), {} unknowns, {} load steps, {} Newton iterations with {} factorisations, "
+      "  {}{} elements, {} unknowns, {} load steps, {} Newton iterations with {} factorisations, "
       "{:.2f} s\n",
-      fmt::join(json["mesh"].get<std::vector<int>>(), " x "), json["elements"].get<size_t>(),
+      mesh.empty() ? "" : fmt::format("{} = ", fmt::join(mesh, " x ")), json["elements"].get<size_t>(),
       json["dofs"].get<size_t>(), json["load_steps"].get<size_t>(), json["newton_iterations"].get<size_t>(),
       json["factorisations"].get<size_t>(), json["seconds"].get<double>());
   if (json.contains("files"))

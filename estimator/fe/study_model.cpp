@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <optional>
+#include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
@@ -69,12 +70,9 @@ void take_elements(const Kind& specimen, Shape& shape) {
     shape.elements[i] = static_cast<size_t>(specimen.mesh[i]);
 }
 
-struct Body {
-  HermiteMesh mesh;
-  std::optional<FibreField> fibres;
-};
+MeshBody make_body(const MeshSpecimen& specimen) { return read_mesh_file(specimen.file); }
 
-Body make_body(const AnnulusSpecimen& specimen) {
+MeshBody make_body(const AnnulusSpecimen& specimen) {
   AnnulusShape shape;
   shape.inner_radius_mm = specimen.inner_radius_mm;
   shape.outer_radius_mm = specimen.outer_radius_mm;
@@ -83,7 +81,7 @@ Body make_body(const AnnulusSpecimen& specimen) {
   return {make_annulus(shape), {}};
 }
 
-Body make_body(const EllipsoidSpecimen& specimen) {
+MeshBody make_body(const EllipsoidSpecimen& specimen) {
   EllipsoidShape shape;
   shape.inner_axes_mm = specimen.inner_axes_mm;
   shape.outer_axes_mm = specimen.outer_axes_mm;
@@ -93,7 +91,7 @@ Body make_body(const EllipsoidSpecimen& specimen) {
 }
 
 /// The same body in elements that are halved so many times along each direction.
-Body refined(Body body, const std::array<int, 3>& halvings) {
+MeshBody refined(MeshBody body, const std::array<int, 3>& halvings) {
   for (size_t direction = 0; direction < 3; ++direction) {
     for (int i = 0; i < halvings[direction]; ++i) {
       const Refinement finer(body.mesh, direction);
@@ -125,6 +123,15 @@ Chamber chamber_of(const StudyChamber& given) {
 
 }  // namespace
 
+MeshBody study_body(const Study& study) {
+  MeshBody body = std::visit([](const auto& specimen) { return make_body(specimen); }, study.specimen);
+  try {
+    return refined(std::move(body), study.refine);
+  } catch (const std::invalid_argument& error) {
+    refuse(study, "model.refine", error.what(), "Leave the mesh as the file has it.");
+  }
+}
+
 ElasticModel make_model(const Study& study, SolveOptions options) {
   const Law& law = law_of(study);
   if (!study.effects.empty()) {
@@ -134,8 +141,7 @@ ElasticModel make_model(const Study& study, SolveOptions options) {
   ElasticOptions elastic;
   elastic.parameters = start_values(study, law);
   elastic.solve = std::move(options);
-  Body body = refined(std::visit([](const auto& specimen) { return make_body(specimen); }, study.specimen),
-                      study.refine);
+  MeshBody body = study_body(study);
   if (body.fibres) elastic.material_axes = material_axes_of(*std::move(body.fibres));
   elastic.bonded = bonded_ends(study, body.mesh);
   if (study.chamber) elastic.chamber = chamber_of(*study.chamber);

@@ -3,8 +3,13 @@
 
 #include "estimator/fe/elastic_model.hpp"
 #include "estimator/io/study.hpp"
+#include "estimator/mesh/mesh_file.hpp"
 
 namespace diastole {
+
+/// The specimen's mesh, refined as the study says, and its fibres. Throws InputError if a mesh file is wrong or
+/// cannot be refined.
+MeshBody study_body(const Study& study);
 
 /// Parameters take their `start`. Throws InputError if the law is unknown, if the study lacks one of its
 /// parameters or has one that it does not know, if a start lies outside what the law allows, or if it names

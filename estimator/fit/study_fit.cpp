@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -25,12 +26,20 @@ double wall_mm(const EllipsoidSpecimen& ellipsoid) {
   return ellipsoid.outer_axes_mm[0] - ellipsoid.inner_axes_mm[0];
 }
 
+double element_mm(const AnnulusSpecimen& annulus) { return wall_mm(annulus) / annulus.mesh[2]; }
+double element_mm(const EllipsoidSpecimen& ellipsoid) { return wall_mm(ellipsoid) / ellipsoid.mesh[2]; }
+double element_mm(const MeshSpecimen&) { return 4.0 * outside_mm; }  // not known: the least extrapolation
+
 /// Extrapolation beyond an element, as a fraction of it: `outside_mm` through the wall, never more than an
 /// element.
 LocatorOptions locator_for(const Specimen& specimen) {
-  const double element_mm =
-      std::visit([](const auto& kind) { return wall_mm(kind) / kind.mesh[2]; }, specimen);
-  return {.outside_xi = std::clamp(outside_mm / element_mm, 0.25, 1.0)};
+  const double size_mm = std::visit([](const auto& kind) { return element_mm(kind); }, specimen);
+  return {.outside_xi = std::clamp(outside_mm / size_mm, 0.25, 1.0)};
+}
+
+const char* kind_of(const Specimen& specimen) {
+  constexpr std::array<const char*, 3> kinds{"annulus", "ellipsoid", "mesh"};
+  return kinds[specimen.index()];
 }
 
 bool has_loaded_point(const Measurement& measurement) {
@@ -203,8 +212,8 @@ FitRecord fit_study(const Study& study, const Measurement& measurement, const St
   FitRecord record{};
   record.study = study.file.string();
   record.law = study.law.name;
-  record.specimen = annulus != nullptr ? "annulus" : "ellipsoid";
-  record.mesh.assign(mesh_of(study.specimen).begin(), mesh_of(study.specimen).end());
+  record.specimen = kind_of(study.specimen);
+  record.mesh = mesh_of(study.specimen);
   record.unknowns = model.dofs();
   record.data = data_words(measurement);
 

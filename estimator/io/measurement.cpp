@@ -60,10 +60,15 @@ Extent extent_of(const EllipsoidSpecimen& ellipsoid) {
   return {ellipsoid.outer_axes_mm[0], -ellipsoid.outer_axes_mm[1], ellipsoid.base_z_mm};
 }
 
+std::optional<Extent> extent_of(const MeshSpecimen&) { return {}; }  // any shape, in any axes
+
 // Refuses coordinates that cannot belong to the specimen: the first sign of wrong units or axes.
 template <typename Row>
 void check_extent(const std::vector<Row>& rows, const Specimen& specimen, const std::filesystem::path& path) {
-  const Extent extent = std::visit([](const auto& kind) { return extent_of(kind); }, specimen);
+  const auto known =
+      std::visit([](const auto& kind) -> std::optional<Extent> { return extent_of(kind); }, specimen);
+  if (!known) return;
+  const Extent extent = *known;
   const double reach_mm =
       std::hypot(extent.radius_mm, std::max(std::abs(extent.low_mm), std::abs(extent.high_mm)));
   const double slack_mm = 0.25 * (extent.high_mm - extent.low_mm);

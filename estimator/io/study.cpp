@@ -76,11 +76,20 @@ EllipsoidSpecimen read_ellipsoid(TableReader& table) {
   return ellipsoid;
 }
 
-Specimen read_specimen(TableReader& root) {
+MeshSpecimen read_mesh_specimen(TableReader& table, const std::filesystem::path& folder) {
+  MeshSpecimen mesh{};
+  mesh.file = folder / table.text("file");
+  read_ends(table, mesh);
+  return mesh;
+}
+
+Specimen read_specimen(TableReader& root, const std::filesystem::path& folder) {
   TableReader table = root.table("specimen");
-  const std::string kind = table.choice("kind", {"annulus", "ellipsoid"});
+  const std::string kind = table.choice("kind", {"annulus", "ellipsoid", "mesh"});
   Specimen specimen;
-  if (kind == "ellipsoid") {
+  if (kind == "mesh") {
+    specimen = read_mesh_specimen(table, folder);
+  } else if (kind == "ellipsoid") {
     specimen = read_ellipsoid(table);
   } else {
     specimen = read_annulus(table);
@@ -187,7 +196,7 @@ Study read_study(const std::filesystem::path& path) {
   TableReader root = TableReader::from_file(path);
   root.expect_format("diastole-study", 1);
   Study study{.file = path,
-              .specimen = read_specimen(root),
+              .specimen = read_specimen(root, path.parent_path()),
               .law = read_law(root),
               .data = {},
               .effects = {},
@@ -212,6 +221,7 @@ Study read_study(const std::filesystem::path& path) {
 std::vector<std::filesystem::path> inputs_of(const Study& study) {
   std::vector<std::filesystem::path> inputs = study.data.runs;
   inputs.push_back(study.file);
+  if (const auto* mesh = std::get_if<MeshSpecimen>(&study.specimen)) inputs.push_back(mesh->file);
   for (const auto& data : {study.data.tags, study.data.points, study.data.frames}) {
     if (data) inputs.push_back(*data);
   }
@@ -241,8 +251,16 @@ void set_start(Study& study, std::string_view assignment) {
                 fmt::format("It has: {}.", fmt::join(known, ", ")));
 }
 
-const std::array<int, 3>& mesh_of(const Specimen& specimen) {
-  return std::visit([](const auto& kind) -> const std::array<int, 3>& { return kind.mesh; }, specimen);
+std::vector<int> mesh_of(const Specimen& specimen) {
+  return std::visit(
+      [](const auto& kind) -> std::vector<int> {
+        if constexpr (requires { kind.mesh; }) {
+          return {kind.mesh.begin(), kind.mesh.end()};
+        } else {
+          return {};
+        }
+      },
+      specimen);
 }
 
 namespace {
@@ -284,7 +302,16 @@ void set_mesh(Study& study, std::string_view counts) {
                     fmt::format("Use {} to {} there.", least, max_elements[axis]));
     }
   }
-  std::visit([&](auto& kind) { kind.mesh = mesh; }, study.specimen);
+  std::visit(
+      [&](auto& kind) {
+        if constexpr (requires { kind.mesh; }) {
+          kind.mesh = mesh;
+        } else {
+          refuse_option("--mesh", counts, "does not go with a mesh file",
+                        "Halve its elements with --refine 1,1,1.");
+        }
+      },
+      study.specimen);
 }
 
 }  // namespace diastole

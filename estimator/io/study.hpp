@@ -44,11 +44,18 @@ struct EllipsoidSpecimen {
   std::optional<EndSprings> end_springs{};  ///< given if the ends are sprung
 };
 
-/// One alternative per `specimen.kind`; a new kind adds its struct here and its reader in study.cpp.
-using Specimen = std::variant<AnnulusSpecimen, EllipsoidSpecimen>;
+/// Any body: a mesh file (docs/mesh-file.md) that names its faces.
+struct MeshSpecimen {
+  std::filesystem::path file;
+  std::string ends;                         ///< of the faces bottom and top: "fixed", or "sprung"
+  std::optional<EndSprings> end_springs{};  ///< given if the ends are sprung
+};
 
-/// Elements in the three directions, whatever the kind.
-const std::array<int, 3>& mesh_of(const Specimen& specimen);
+/// One alternative per `specimen.kind`; a new kind adds its struct here and its reader in study.cpp.
+using Specimen = std::variant<AnnulusSpecimen, EllipsoidSpecimen, MeshSpecimen>;
+
+/// Elements in the three directions; empty for a mesh file.
+std::vector<int> mesh_of(const Specimen& specimen);
 
 enum class Variation {
   whole,    ///< one value for the specimen
@@ -116,7 +123,8 @@ void set_start(Study& study, std::string_view assignment);
 /// `--refine 0,1,1`: further halvings. Throws InputError unless three whole numbers from 0 to 4.
 void set_refinement(Study& study, std::string_view halvings);
 
-/// `--mesh 8,8,4`: another number of elements. Throws InputError unless three positive integers in range.
+/// `--mesh 8,8,4`: another number of elements. Throws InputError unless three positive integers in range,
+/// or if the mesh comes from a file.
 void set_mesh(Study& study, std::string_view counts);
 
 }  // namespace diastole

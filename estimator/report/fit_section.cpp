@@ -187,10 +187,12 @@ void add_fit(Page& page, const FitRecord& fit) {
   page.headline("Residual motion", fmt::format("{} mm RMS", number(fit.rms_mm, 3)),
                 fmt::format("{} residuals; chi²/dof {}", fit.residuals_used, number(fit.chi2_per_dof, 3)));
 
-  page.section("The stiffness",
-               fmt::format("Study {}: {} law, fitted to {} in {} loaded frames on a mesh of {} elements.",
-                           std::filesystem::path(fit.study).filename().string(), fit.law, fit.data,
-                           fit.frames.size(), fmt::join(fit.mesh, " × ")));
+  page.section(
+      "The stiffness",
+      fmt::format("Study {}: {} law, fitted to {} in {} loaded frames on {}.",
+                  std::filesystem::path(fit.study).filename().string(), fit.law, fit.data, fit.frames.size(),
+                  fit.mesh.empty() ? "a mesh of its own"
+                                   : fmt::format("a mesh of {} elements", fmt::join(fit.mesh, " × "))));
   if (!fit.converged) page.warning("The fit did not converge: " + fit.reason);
   add_parameters(page, fit);
   for (const std::string& remark : fit.remarks)

@@ -113,9 +113,11 @@ void add_solution(Page& page, const SolutionRecord& record) {
   for (const auto& [name, value] : record.parameters)
     parameters.push_back(fmt::format("{} {}", name, chosen(value)));
   page.section("Strain and stress inside",
-               fmt::format("Study {}: {} law with {}, {}, on {} elements ({} unknowns).",
+               fmt::format("Study {}: {} law with {}, {}, on {} ({} unknowns).",
                            std::filesystem::path(record.study).filename().string(), record.law,
-                           fmt::join(parameters, ", "), pressure_words(record), fmt::join(record.mesh, " × "),
+                           fmt::join(parameters, ", "), pressure_words(record),
+                           record.mesh.empty() ? "a mesh of its own"
+                                               : fmt::format("{} elements", fmt::join(record.mesh, " × ")),
                            record.unknowns));
   page.paragraph(
       "Sections show the material that lay in a plane, undeformed on the left and as it lies under load on "

@@ -1,0 +1,98 @@
+#include <fmt/format.h>
+
+#include <iostream>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "estimator/cli/commands.hpp"
+#include "estimator/fe/study_model.hpp"
+#include "estimator/io/whole_file.hpp"
+#include "estimator/mesh/exfile_import.hpp"
+#include "estimator/mesh/mesh_file.hpp"
+#include "protocol/contract/input_error.hpp"
+
+namespace diastole {
+namespace {
+
+struct MeshArguments {
+  std::vector<std::filesystem::path> inputs;  // of import: exnode, exelem; of export: the study
+  std::filesystem::path output;
+  std::string unit = "mm";
+  bool force = false;
+};
+
+double mm_per_unit(const std::string& unit) { return unit == "m" ? 1000.0 : unit == "cm" ? 10.0 : 1.0; }
+
+ExitCode tell(const MeshArguments& arguments, const MeshBody& body, const std::vector<std::string>& remarks,
+              const CommandOutput& out) {
+  write_whole_file(arguments.output, mesh_file_text(body));
+  if (out.json) {
+    const nlohmann::ordered_json json = {{"mesh", arguments.output.string()},
+                                         {"elements", body.mesh.element_count()},
+                                         {"nodes", body.mesh.node_count()},
+                                         {"fibres", body.fibres.has_value()},
+                                         {"remarks", remarks}};
+    std::cout << json.dump(1) << '\n';
+    return ExitCode::done;
+  }
+  for (const std::string& remark : remarks)
+    fmt::print("{}\n", remark);
+  fmt::print("The mesh is in {}\n", arguments.output.string());
+  return ExitCode::done;
+}
+
+ExitCode run_import(const MeshArguments& arguments, const CommandOutput& out) {
+  require_output({arguments.output, arguments.inputs, mesh_file_mark, arguments.force});
+  const std::string exnode = read_whole_file(arguments.inputs[0]);
+  const std::string exelem = read_whole_file(arguments.inputs[1]);
+  const ImportedMesh imported =
+      import_exfiles({exnode, arguments.inputs[0].string()}, {exelem, arguments.inputs[1].string()},
+                     mm_per_unit(arguments.unit));
+  return tell(arguments, imported.body, imported.remarks, out);
+}
+
+ExitCode run_export(const MeshArguments& arguments, const CommandOutput& out) {
+  const Study study = read_study(arguments.inputs[0]);
+  require_output({arguments.output, inputs_of(study), mesh_file_mark, arguments.force});
+  const MeshBody body = study_body(study);
+  return tell(arguments, body,
+              {fmt::format("{} elements, {} nodes.", body.mesh.element_count(), body.mesh.node_count())},
+              out);
+}
+
+void add_output(CLI::App& command, MeshArguments& arguments) {
+  command.add_option("-o,--output", arguments.output, "the mesh file to write (*.mesh.toml)")->required();
+  command.add_flag("--force", arguments.force, "replace an output file that is no mesh");
+  command.fallthrough();
+}
+
+}  // namespace
+
+void add_mesh(CommandLine& line) {
+  CLI::App* command = line.add("mesh", "mesh files: from exnode and exelem files, or of a study's specimen",
+                               "  diastole mesh import heart.exnode heart.exelem -o heart.mesh.toml\n"
+                               "  diastole mesh export phantom-a.study.toml -o gel.mesh.toml\n"
+                               "A study uses one with kind = \"mesh\" and file = \"heart.mesh.toml\".");
+  command->require_subcommand(1);
+
+  auto import = std::make_shared<MeshArguments>();
+  CLI::App* from_ex =
+      command->add_subcommand("import", "a mesh of exnode and exelem files (CMISS, cmgui, OpenCMISS)");
+  from_ex->add_option("EXNODE EXELEM", import->inputs, "the nodes and the elements")->required()->expected(2);
+  from_ex->add_option("--unit", import->unit, "length of their coordinates")
+      ->check(CLI::IsMember({"mm", "cm", "m"}))
+      ->capture_default_str();
+  add_output(*from_ex, *import);
+  line.on_run(from_ex, [import](const CommandOutput& out) { return run_import(*import, out); });
+
+  auto written = std::make_shared<MeshArguments>();
+  CLI::App* from_study =
+      command->add_subcommand("export", "the mesh of a study's specimen, refined as the study says");
+  from_study->add_option("STUDY", written->inputs, "study file (*.study.toml)")->required()->expected(1);
+  add_output(*from_study, *written);
+  line.on_run(from_study, [written](const CommandOutput& out) { return run_export(*written, out); });
+}
+
+}  // namespace diastole
