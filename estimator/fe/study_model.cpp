@@ -32,8 +32,7 @@ const Law& law_of(const Study& study) {
   for (const Law* law : all_laws())
     known.emplace_back(law->name());
   refuse(study, "law.name", fmt::format("no law is called \"{}\"", study.law.name),
-         fmt::format("Did you mean \"{}\"? Known: {}.", nearest_word(study.law.name, known),
-                     fmt::join(known, ", ")));
+         fmt::format("{}Known: {}.", did_you_mean(study.law.name, known), fmt::join(known, ", ")));
 }
 
 std::vector<double> start_values(const Study& study, const Law& law) {
@@ -44,7 +43,7 @@ std::vector<double> start_values(const Study& study, const Law& law) {
     if (law.parameter_index(given.name) == law.parameters().size()) {
       refuse(study, "law.parameters." + given.name,
              fmt::format("the law {} has no such parameter", law.name()),
-             fmt::format("Did you mean {}?", nearest_word(given.name, known)));
+             fmt::format("{}It has {}.", did_you_mean(given.name, known), fmt::join(known, ", ")));
     }
   }
   std::vector<double> values;

@@ -29,14 +29,14 @@ struct RunOptions {
   bool dry_run = false;
 };
 
-/// Whether a line was entered since the last question; never waits.
-bool line_entered() {
-  bool entered = false;
+/// How many lines were entered since the last question; never waits.
+int lines_entered() {
+  int entered = 0;
   for (pollfd input{STDIN_FILENO, POLLIN, 0}; ::poll(&input, 1, 0) == 1 && (input.revents & POLLIN) != 0;) {
     std::array<char, 256> text{};
     const ssize_t count = ::read(STDIN_FILENO, text.data(), text.size());
     if (count <= 0) break;
-    entered = entered || std::find(text.begin(), text.begin() + count, '\n') != text.begin() + count;
+    entered += static_cast<int>(std::count(text.begin(), text.begin() + count, '\n'));
   }
   return entered;
 }
@@ -59,7 +59,13 @@ ExitCode run(RunOptions options, const CommandOutput& out) {
   DaemonClient daemon = options.daemon.connect();
   fmt::print(stderr, "{}", plan_words(experiment));
   SessionView view(isatty(STDERR_FILENO) != 0);
-  if (isatty(STDIN_FILENO) != 0) options.session.ready = line_entered;
+  if (isatty(STDIN_FILENO) != 0) {
+    options.session.ready = [&view] {
+      const int lines = lines_entered();
+      view.entered(lines);
+      return lines > 0;
+    };
+  }
   interrupts = 0;
   std::signal(SIGINT, [](int) { interrupts = interrupts + 1; });
   options.session.stops_asked = [] { return static_cast<int>(interrupts); };

@@ -1,6 +1,9 @@
 #include "host/cli/session_view.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <sys/ioctl.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <array>
@@ -35,16 +38,41 @@ int64_t cycles_done(const SessionProgress& progress) {
   return progress.schedule ? progress.planned_cycles - progress.schedule->cycles_left : progress.triggers;
 }
 
-std::string slice_words(const SessionSchedule& schedule) {
+std::string slice_words(const SessionProgress& progress) {
+  const SessionSchedule& schedule = *progress.schedule;
+  const bool before_first_cycle = progress.triggers == 0 && schedule.phase != "waiting";
   return fmt::format("slice {} of {} ({}): {}", schedule.slice + 1, schedule.slices, schedule.block,
-                     schedule.phase);
+                     before_first_cycle ? "at rest before the first cycle" : schedule.phase);
+}
+
+/// Two decimals, and no minus before a zero.
+std::string pressure_words(double pressure_kPa) {
+  const double shown_kPa = std::round(100 * pressure_kPa) / 100;
+  return fmt::format("{:.2f} kPa", shown_kPa == 0 ? 0.0 : shown_kPa);
+}
+
+/// The first `columns` characters of UTF-8 text, each one column wide.
+std::string clipped(const std::string& text, size_t columns) {
+  const auto begins = [](char byte) { return (static_cast<unsigned char>(byte) & 0xC0U) != 0x80U; };
+  size_t end = 0;
+  for (size_t characters = 0; end < text.size(); ++end) {
+    if (begins(text[end]) && characters++ == columns) break;
+  }
+  return text.substr(0, end);
+}
+
+size_t terminal_columns() {
+  constexpr size_t usual = 80;
+  winsize size{};
+  return ::ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 0 ? size.ws_col : usual;
 }
 
 std::string in_words(const SessionProgress& progress) {
-  return fmt::format("cycle {} of {}, {} left, {}{:.2f} kPa, {} triggers, {} samples, {} missing",
+  return fmt::format("cycle {} of {}, {} left, {}{}, {} triggers, {} samples, {} missing",
                      cycles_done(progress), progress.planned_cycles, duration_words(left_s(progress)),
-                     progress.schedule ? slice_words(*progress.schedule) + ", " : "", progress.filtered_kPa,
-                     progress.triggers, progress.samples, progress.gaps);
+                     progress.schedule ? slice_words(progress) + ", " : "",
+                     pressure_words(progress.filtered_kPa), progress.triggers, progress.samples,
+                     progress.gaps);
 }
 
 std::string sparkline(const std::deque<double>& trace_kPa) {
@@ -62,36 +90,41 @@ std::string sparkline(const std::deque<double>& trace_kPa) {
 
 }  // namespace
 
-std::vector<std::string> view_lines(const SessionProgress& progress, const std::deque<double>& trace_kPa) {
+std::vector<std::string> view_lines(const SessionProgress& progress, const std::deque<double>& trace_kPa,
+                                    size_t columns) {
   std::vector<std::string> lines{fmt::format(
       "[{}] cycle {} of {}, {} left, {} triggers", bar(cycles_done(progress), progress.planned_cycles),
       cycles_done(progress), progress.planned_cycles, duration_words(left_s(progress)), progress.triggers)};
-  if (progress.schedule) lines.push_back(slice_words(*progress.schedule));
+  if (progress.schedule) lines.push_back(slice_words(progress));
   if (progress.schedule && !progress.schedule->prompt.empty()) {
     lines.push_back(progress.schedule->prompt + "  [Enter, or `diastole continue`]");
   }
-  lines.push_back(fmt::format("{}  {:.2f} kPa   {} samples, {} missing", sparkline(trace_kPa),
-                              progress.filtered_kPa, progress.samples, progress.gaps));
+  lines.push_back(fmt::format("{}  {}   {} samples, {} missing", sparkline(trace_kPa),
+                              pressure_words(progress.filtered_kPa), progress.samples, progress.gaps));
+  for (std::string& line : lines)
+    line = clipped(line, columns);
   return lines;
 }
 
 void SessionView::redraw(const SessionProgress& progress) {
   trace_kPa_.push_back(std::isfinite(progress.filtered_kPa) ? progress.filtered_kPa : progress.last_kPa);
   if (trace_kPa_.size() > trace_cells) trace_kPa_.pop_front();
-  const std::vector<std::string> lines = view_lines(progress, trace_kPa_);
-  std::string text = lines_open_ > 1 ? fmt::format("\033[{}A", lines_open_ - 1) : "";
-  text += "\r\033[J";  // to the screen's end
-  for (size_t i = 0; i < lines.size(); ++i)
-    text += (i > 0 ? "\n" : "") + lines[i];
-  fmt::print(stderr, "{}", text);
+  wipe();
+  const std::vector<std::string> lines = view_lines(progress, trace_kPa_, terminal_columns());
+  fmt::print(stderr, "{}", fmt::join(lines, "\n"));
   lines_open_ = static_cast<int>(lines.size());
 }
 
+void SessionView::wipe() {
+  const int up = std::max(0, std::exchange(lines_open_, 0) - 1) + std::exchange(lines_entered_, 0);
+  if (up > 0) fmt::print(stderr, "\033[{}A", up);
+  fmt::print(stderr, "\r\033[J");  // to the screen's end
+}
+
 void SessionView::show(const SessionProgress& progress) {
-  for (const std::string& remark : progress.new_remarks) {
-    finish();
+  if (terminal_ && !progress.new_remarks.empty()) wipe();
+  for (const std::string& remark : progress.new_remarks)
     fmt::print(stderr, "{}\n", remark);
-  }
   if (terminal_) return redraw(progress);
   const auto now = std::chrono::steady_clock::now();
   if (progress.triggers == last_triggers_ || now < next_line_) return;

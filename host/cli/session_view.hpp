@@ -22,21 +22,27 @@ class SessionView {
  public:
   explicit SessionView(bool terminal) : terminal_(terminal) {}
   void show(const SessionProgress& progress);
+  /// Tells that the operator's own key presses have moved the cursor down by so many lines.
+  void entered(int lines) { lines_entered_ += lines; }
   /// Ends the renewed lines, if there are any.
   void finish();
 
  private:
   void redraw(const SessionProgress& progress);
+  /// Takes the renewed lines off the screen.
+  void wipe();
 
   bool terminal_;
   int lines_open_ = 0;
+  int lines_entered_ = 0;
   std::deque<double> trace_kPa_;
   int64_t last_triggers_ = -1;
   std::chrono::steady_clock::time_point next_line_{};
 };
 
-/// The present lines of the view, one string each, without control characters.
-std::vector<std::string> view_lines(const SessionProgress& progress, const std::deque<double>& trace_kPa);
+/// The present lines of the view, one string each, without control characters, at most `columns` wide.
+std::vector<std::string> view_lines(const SessionProgress& progress, const std::deque<double>& trace_kPa,
+                                    size_t columns = 200);
 
 /// The result in words, or as one JSON document with `run`, `end`, `cycles`, `triggers`, `samples`, `gaps`,
 /// `expected`. Returns the exit code that goes with it.

@@ -1,17 +1,22 @@
 #include <fmt/format.h>
 
+#include <cmath>
 #include <cstdio>
 #include <iostream>
 #include <memory>
+#include <thread>
 
 #include "host/cli/daemon_address.hpp"
 #include "host/cli/host_commands.hpp"
 #include "host/daemon/client.hpp"
+#include "protocol/contract/input_error.hpp"
 
 namespace diastole {
 namespace {
 
 constexpr std::chrono::seconds homing_patience{3600};
+constexpr int halts_asked = 20;  // until the halt's fault shows in the state
+constexpr std::chrono::milliseconds halt_interval{50};
 
 void show_journals(const nlohmann::json& journals) {
   const auto days = journals.at("keep_days").get<int64_t>();
@@ -97,12 +102,24 @@ void add_home(CommandLine& line) {
 }
 
 void add_clear_fault(CommandLine& line) {
-  add_question(line, "clear-fault", "leave a latched fault, once its cause is gone",
+  auto daemon = std::make_shared<DaemonAddress>();
+  CLI::App* command =
+      line.add("clear-fault", "leave a latched fault, once its cause is gone",
                "  diastole status\n"
                "      tells the fault's number, what happened and what to do about it\n"
                "  diastole clear-fault\n"
-               "      homed again if the position is still known, else unhomed: diastole home is next",
-               "rig.clear_fault", std::chrono::seconds(30));
+               "      homed again if the position is still known, else unhomed: diastole home is next");
+  daemon->add_to(*command);
+  daemon->add_take_over_to(*command);
+  line.on_run(command, [daemon](const CommandOutput& out) {
+    DaemonClient client = daemon->connect();
+    nlohmann::json status = client.call("rig.status");
+    const bool faulted = !status.at("fault").is_null();
+    if (faulted) status = client.call("rig.clear_fault");
+    if (!faulted && !out.json) fmt::print("fault     none is latched: nothing to clear\n");
+    show_status(status, out.json);
+    return ExitCode::done;
+  });
 }
 
 void add_jog(CommandLine& line) {
@@ -123,6 +140,11 @@ void add_jog(CommandLine& line) {
   options->daemon.add_to(*command);
   options->daemon.add_take_over_to(*command);
   line.on_run(command, [options](const CommandOutput& out) {
+    if (!std::isfinite(options->distance_mL) || !std::isfinite(options->rate_mL_s)) {
+      throw InputError({"", std::isfinite(options->distance_mL) ? "--rate-mL-s" : "--mL",
+                        "is no finite number",
+                        "Give a distance in mL and a speed in mL/s, for example --mL 5 --rate-mL-s 10."});
+    }
     DaemonClient client = options->daemon.connect();
     const nlohmann::json status = client.call(
         "rig.jog", {{"mL", options->distance_mL}, {"rate_mL_s", options->rate_mL_s}}, homing_patience);
@@ -162,6 +184,11 @@ void add_stop(CommandLine& line) {
       std::fflush(stdout);
     }
     nlohmann::json status = client.call("rig.status");
+    for (int asked = 1; options->halt && stopping && status.at("fault").is_null() && asked < halts_asked;
+         ++asked) {
+      std::this_thread::sleep_for(halt_interval);
+      status = client.call("rig.status");
+    }
     status["stopping"] = stopping;
     show_status(status, out.json);
     return ExitCode::done;

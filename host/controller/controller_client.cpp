@@ -435,7 +435,8 @@ void ControllerClient::jog(double distance_mL, double rate_mL_s) {
   require_configuration();
   constexpr double most_mL = 50'000;
   if (!(std::abs(distance_mL) <= most_mL))
-    throw InputError({"", "--mL", fmt::format("is {:g}", distance_mL), "Give a distance that the pump has."});
+    throw InputError({"", "--mL", fmt::format("is {:g}", distance_mL),
+                      "Give a distance within the pump's travel (`diastole settings` tells it)."});
   wire::Jog message;
   message.lease_id = lease_id_;
   message.distance_nL = std::llround(1e6 * distance_mL);

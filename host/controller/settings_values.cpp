@@ -117,9 +117,8 @@ void change_settings(MachineSettings& settings, const json& changes) {
       std::vector<std::string> known{"board_name"};
       for (const Entry& entry : entries())
         known.push_back(entry.words.name);
-      refuse(
-          name, "there is no such setting",
-          fmt::format("Did you mean {}? There are {}.", nearest_word(name, known), fmt::join(known, ", ")));
+      refuse(name, "there is no such setting",
+             fmt::format("{}There are {}.", did_you_mean(name, known), fmt::join(known, ", ")));
     }
     set_number(settings, *found, value);
   }

@@ -58,7 +58,8 @@ constexpr size_t most_kept_bytes = 1U << 20;  // beyond this the other end is no
 void make_raw(int port, const std::string& path, speed_t speed) {
   termios settings{};
   if (tcgetattr(port, &settings) != 0) {
-    throw HardwareError(path, "is not a serial port", "Check `port` in the rig file.");
+    throw HardwareError(path, "is not a serial port",
+                        "Name the controller's line: `port` in the rig file, or --port.");
   }
   cfmakeraw(&settings);
   settings.c_cflag |= CLOCAL | CREAD;

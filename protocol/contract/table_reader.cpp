@@ -71,11 +71,16 @@ bool within(double value, const NumberRange& range) {
 
 }  // namespace
 
-std::string nearest_word(std::string_view word, const std::vector<std::string>& known) {
-  const auto nearest = std::min_element(known.begin(), known.end(), [&](const auto& a, const auto& b) {
-    return edit_distance(word, a) < edit_distance(word, b);
-  });
-  return nearest == known.end() ? std::string{} : *nearest;
+std::string did_you_mean(std::string_view word, const std::vector<std::string>& known) {
+  const std::string* nearest = nullptr;
+  size_t least = word.size() / 2 + 1;
+  for (const std::string& candidate : known) {
+    const size_t distance = edit_distance(word, candidate);
+    if (distance >= least) continue;
+    least = distance;
+    nearest = &candidate;
+  }
+  return nearest == nullptr ? std::string{} : fmt::format("Did you mean \"{}\"? ", *nearest);
 }
 
 TableReader::TableReader(std::shared_ptr<const toml::table> document, const toml::table* table,
@@ -151,8 +156,7 @@ std::string TableReader::choice(std::string_view key, const std::vector<std::str
   const std::string value = text(key);
   if (std::find(allowed.begin(), allowed.end(), value) == allowed.end()) {
     fail(key, fmt::format("is \"{}\", which is not known here", value),
-         fmt::format("Did you mean \"{}\"? Known: {}.", nearest_word(value, allowed),
-                     fmt::join(allowed, ", ")));
+         fmt::format("{}Known: {}.", did_you_mean(value, allowed), fmt::join(allowed, ", ")));
   }
   return value;
 }
@@ -234,9 +238,8 @@ void TableReader::finish() {
   for (const auto& [key, node] : *table_) {
     const std::string_view name = key.str();
     if (asked_.contains(name)) continue;
-    const std::string nearest = nearest_word(name, {asked_.begin(), asked_.end()});
     fail(name, "is not a key that is known here",
-         nearest.empty() ? "Remove it." : fmt::format("The nearest known key is \"{}\".", nearest));
+         did_you_mean(name, {asked_.begin(), asked_.end()}) + "Correct or remove it.");
   }
 }
 

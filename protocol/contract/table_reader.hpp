@@ -93,7 +93,7 @@ class TableReader {
   std::set<std::string, std::less<>> asked_;
 };
 
-/// The entry of `known` with the least edit distance to `word`; empty if `known` is empty.
-std::string nearest_word(std::string_view word, const std::vector<std::string>& known);
+/// `Did you mean "x"? ` with the entry of `known` that is nearest to `word`; empty if less than half of `word` fits.
+std::string did_you_mean(std::string_view word, const std::vector<std::string>& known);
 
 }  // namespace diastole

@@ -45,7 +45,7 @@ TEST_F(ByHand, SettingsAreShownChangedRefusedAndReset) {
   EXPECT_THAT(wild.err, AllOf(HasSubstr("backlash_um"), HasSubstr("4000"), HasSubstr("0 to 1000")));
   const Ended misspelt = diastole({"settings", "--set", "backlash=4"});
   EXPECT_EQ(misspelt.exit_code, 2);
-  EXPECT_THAT(misspelt.err, HasSubstr("Did you mean backlash_um?"));
+  EXPECT_THAT(misspelt.err, HasSubstr("Did you mean \"backlash_um\"?"));
   const Ended calibrated = diastole({"settings", "--calibrate", "50", "49.5", "--json"});
   EXPECT_EQ(calibrated.json()["settings"]["calibration_ppm"], -10000);
   EXPECT_NEAR(calibrated.json()["microstep_uL"].get<double>(), 7.791649 * 0.99, 1e-5);

@@ -73,8 +73,8 @@ diastole::ExitCode run(int argc, char** argv) {
     return ExitCode::bad_input;
   }
   if (const std::string_view first = argv[1]; !first.starts_with('-') && !is_command(app, first)) {
-    std::cerr << "diastole: there is no command \"" << first << "\"\n  The nearest is \""
-              << diastole::nearest_word(first, commands_of(app)) << "\"; `diastole --help` lists them all.\n";
+    std::cerr << "diastole: there is no command \"" << first << "\"\n  "
+              << diastole::did_you_mean(first, commands_of(app)) << "`diastole --help` lists them all.\n";
     return ExitCode::bad_input;
   }
   try {

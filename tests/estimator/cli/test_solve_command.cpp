@@ -229,7 +229,7 @@ TEST_F(SolveCommand, RefusesUnknownLawsAndParametersWithTheNearestName) {
   text = gel_study;
   text.replace(text.find("C1_kPa"), 6, "C2_kPa");
   write_study(text);
-  EXPECT_THAT(refusal({"--pressure-kPa", "2"}), testing::HasSubstr("Did you mean C1_kPa?"));
+  EXPECT_THAT(refusal({"--pressure-kPa", "2"}), testing::HasSubstr("Did you mean \"C1_kPa\"?"));
 }
 
 }  // namespace

@@ -70,6 +70,22 @@ TEST(SessionView, ShowsWhatTheOperatorIsWaitedFor) {
   EXPECT_EQ(view_lines(progress, {}).at(2), "Set the next slice.  [Enter, or `diastole continue`]");
 }
 
+TEST(SessionView, FitsTheTerminal) {
+  const std::vector<std::string> lines = view_lines(study_progress(), {0, 1, 2, 4, 2, 1, 0}, 10);
+  EXPECT_EQ(lines.at(0), "[#######..");
+  EXPECT_EQ(lines.at(2), "▁▃▅█▅▃▁  3");
+}
+
+TEST(SessionView, BeforeTheFirstCycleItSaysSo) {
+  SessionProgress progress = study_progress();
+  progress.triggers = 0;
+  progress.schedule->phase = "dummy";
+  progress.filtered_kPa = -0.004;
+  const std::vector<std::string> lines = view_lines(progress, {});
+  EXPECT_EQ(lines.at(1), "slice 11 of 25 (tagged): at rest before the first cycle");
+  EXPECT_EQ(lines.at(2), "  0.00 kPa   1000 samples, 2 missing");
+}
+
 TEST(SessionView, RestIsAFlatLine) {
   SessionProgress progress = study_progress();
   progress.schedule.reset();
