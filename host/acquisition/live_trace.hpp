@@ -24,7 +24,7 @@ class LiveTrace {
   static constexpr double most_rows_a_second = 300;
   static constexpr size_t most_rows = 18'000;     ///< kept: a minute at least
   static constexpr size_t most_triggers = 1'000;  ///< kept
-  static constexpr size_t rows_at_once = 3'000;
+  static constexpr size_t rows_at_once = 1'000;
 
   struct Row {
     double time_s = 0;

@@ -15,7 +15,7 @@ constexpr size_t kept_inbox_bytes = 64U << 10;
 
 Connection::Connection(std::shared_ptr<Reception> reception, std::shared_ptr<Connections> all,
                        asio::local::stream_protocol::socket socket)
-    : RpcSession(std::move(reception), peer_of(socket.native_handle())),
+    : RpcSession(std::move(reception), peer_of(socket.native_handle()), SessionBounds::socket_requests),
       all_(std::move(all)),
       socket_(std::move(socket)) {}
 

@@ -28,11 +28,13 @@ void check_name(const std::string& name) {
 
 }  // namespace
 
-RpcSession::RpcSession(std::shared_ptr<Reception> reception, Peer peer)
+RpcSession::RpcSession(std::shared_ptr<Reception> reception, Peer peer, int requests_in_window)
     : number_(++reception->last_number),
       reception_(std::move(reception)),
       peer_(std::move(peer)),
       resume_(reception_->context),
+      requests_in_window_(requests_in_window),
+      requests_left_(requests_in_window),
       last_request_(steady_clock::now()) {}
 
 bool RpcSession::controls() const {
@@ -54,7 +56,7 @@ bool RpcSession::may_take() {
   const auto now = steady_clock::now();
   if (now - window_began_ >= SessionBounds::window) {
     window_began_ = now;
-    requests_left_ = SessionBounds::requests_in_window;
+    requests_left_ = requests_in_window_;
   }
   if (pending_ >= SessionBounds::most_pending) {
     waiting_ = true;

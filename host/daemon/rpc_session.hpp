@@ -35,7 +35,8 @@ struct Reception {
 struct SessionBounds {
   static constexpr size_t most_unread_bytes = 256U << 10;  ///< answers that the client has not read
   static constexpr int most_pending = 8;                   ///< requests that wait for the rig
-  static constexpr int requests_in_window = 50;            ///< beyond it reading pauses until the next window
+  static constexpr int socket_requests = 50;   ///< in a window; beyond it reading pauses until the next
+  static constexpr int console_requests = 10;  ///< likewise; a page asks for a quarter of that
   static constexpr std::chrono::milliseconds window{100};
   static constexpr std::chrono::seconds write_patience{10};  ///< for a client that does not read
 };
@@ -54,7 +55,8 @@ class RpcSession : public std::enable_shared_from_this<RpcSession> {
   [[nodiscard]] bool controls() const;
 
  protected:
-  RpcSession(std::shared_ptr<Reception> reception, Peer peer);
+  /// `requests_in_window`: of SessionBounds.
+  RpcSession(std::shared_ptr<Reception> reception, Peer peer, int requests_in_window);
 
   /// Whether a request may be taken now; if not, take_more() is called when one may.
   [[nodiscard]] bool may_take();
@@ -88,7 +90,8 @@ class RpcSession : public std::enable_shared_from_this<RpcSession> {
   Peer peer_;
   boost::asio::steady_timer resume_;
   Time window_began_{};
-  int requests_left_ = SessionBounds::requests_in_window;
+  int requests_in_window_;
+  int requests_left_;
   int pending_ = 0;
   bool waiting_ = false;  // reading pauses until the rig has answered
   Time last_request_;

@@ -31,7 +31,7 @@ Peer browser_at(std::string address, ConsoleRole role) {
 class ConsoleSocket : public RpcSession, public Guest {
  public:
   ConsoleSocket(std::shared_ptr<Hall> hall, tcp::socket socket, ConsoleRole role)
-      : RpcSession(hall->reception, browser_at(address_of(socket), role)),
+      : RpcSession(hall->reception, browser_at(address_of(socket), role), SessionBounds::console_requests),
         hall_(std::move(hall)),
         stream_(std::move(socket)) {
     stream_.read_message_max(rpc::most_line_bytes);

@@ -62,7 +62,7 @@ std::string from_base64(const std::string& text) {
 }  // namespace
 
 std::string Browser::program() {
-  for (const char* path : {"/usr/bin/chromium", "/usr/bin/chromium-browser", "/usr/bin/google-chrome"})
+  for (const char* path : {"/usr/bin/chromium-headless-shell", "/usr/bin/chromium", "/usr/bin/google-chrome"})
     if (std::filesystem::exists(path)) return path;
   return {};
 }

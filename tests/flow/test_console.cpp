@@ -205,13 +205,16 @@ TEST(Console, MalformedMessagesAreAnsweredAndBrokenFramesEndTheConnection) {
 
 TEST(Console, WhoDoesNotReadIsDroppedAndTheLogTells) {
   RigWithConsole rig;
+  auto socket = rig.client();
+  home(socket);
+  socket.call("run.start", many_segments());
+  status_when(socket, "homed", true);
   WebClient lazy(rig.port, true);
   EXPECT_EQ(lazy.upgrade(rig.control).status, 101);
-  while (lazy.send_text(R"({"jsonrpc":"2.0","id":1,"method":"rig.settings"})")) {
+  while (lazy.send_text(R"({"jsonrpc":"2.0","id":1,"method":"run.trace"})")) {
   }
   EXPECT_TRUE(rig.daemon->wait_for_text("does not read its answers")) << rig.daemon->err();
-  auto other = rig.client();
-  EXPECT_EQ(home(other)["state"], "homed");
+  EXPECT_EQ(socket.call("rig.home")["state"], "homed");
 }
 
 TEST(Console, ManyIdleBrowsersPushNoConsoleOut) {

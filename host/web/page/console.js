@@ -9,6 +9,7 @@ const keptTheme = "diastole-theme";
 const staleAfter_ms = 1500;
 const lostAfter_ms = 6000;
 const mostEvents = 500;
+const rowsAtOnce = 1000;  // that the daemon sends in one answer
 
 const stateWords = {
   unhomed: ["Not homed", "The pump does not know its place: home it before a run."],
@@ -31,7 +32,7 @@ const phaseWords = { waiting: "waiting for the scanner", dummy: "dummy cycles", 
 const trace = new Trace(by("chart"));
 const choice = new ExperimentChoice();
 let name = sessionStorage.getItem(keptName) ?? "";
-let status = null, progress = null, heardAt_ms = -Infinity, problem = "", nextRemark = 0, shownRun = "";
+let status = null, progress = null, heardAt_ms = -Infinity, problem = "", nextRemark = 0, shownRun = "", behind = false;
 const daemon = new Daemon(takeToken(), { heard, changed });
 
 const text = (id, words) => { if (by(id).textContent !== words) by(id).textContent = words; };
@@ -86,6 +87,7 @@ async function askRun() {
   const [newTrace, newProgress] = await Promise.all([
     daemon.call("run.trace", trace.wanted), daemon.call("run.progress", { first_remark: nextRemark })]);
   progress = newProgress;
+  behind = newTrace.time_s.length >= rowsAtOnce;
   const fresh = trace.add(newTrace);
   showEvents();
   if (status) showAll();
@@ -307,4 +309,4 @@ setTheme(localStorage.getItem(keptTheme) ?? (matchMedia("(prefers-color-scheme: 
 setInterval(showFreshness, 250);
 daemon.connect();
 repeat(() => 200, askStatus);
-repeat(() => (status && moving.has(status.state) ? 100 : 300), askRun);
+repeat(() => (behind ? 20 : status && moving.has(status.state) ? 100 : 300), askRun);
