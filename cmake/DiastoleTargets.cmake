@@ -39,7 +39,7 @@ endfunction()
 
 # diastole_test(NAME SOURCES a.cpp ... [LIBS x ...] [LABELS slow ...] [TIMEOUT seconds])
 # A GoogleTest program whose cases are single ctest entries. Label "slow": only in `tools/check --full`, and never
-# with sanitizers.
+# with sanitizers. Label "threads": also with ThreadSanitizer (preset `tsan`).
 function(diastole_test name)
   cmake_parse_arguments(ARG "" "TIMEOUT" "SOURCES;LIBS;LABELS" ${ARGN})
   add_executable(${name} ${ARG_SOURCES})
@@ -47,6 +47,9 @@ function(diastole_test name)
   set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/tests)
   target_compile_definitions(${name} PRIVATE
     DIASTOLE_SOURCE_DIR="${CMAKE_SOURCE_DIR}" DIASTOLE_BIN_DIR="${CMAKE_RUNTIME_OUTPUT_DIRECTORY}")
+  if("threads" IN_LIST ARG_LABELS)
+    add_dependencies(threaded_tests ${name})
+  endif()
   if(CMAKE_BUILD_TYPE STREQUAL "Sanitize" AND "slow" IN_LIST ARG_LABELS)
     set_target_properties(${name} PROPERTIES EXCLUDE_FROM_ALL TRUE)
     return()

@@ -1,5 +1,5 @@
 // Writes the seed corpora: the worked example of every message, as each target reads it, and whole sessions.
-//   make_seeds DIRECTORY     (makes fuzz_wire/, fuzz_controller/, fuzz_client/ and fuzz_rpc/ in it)
+//   make_seeds DIRECTORY     (makes a folder for each target in it)
 
 #include <filesystem>
 #include <fstream>
@@ -7,6 +7,7 @@
 
 #include "protocol/wire/messages.hpp"
 #include "tests/fuzz/script.hpp"
+#include "tests/host/acquisition/session_on_desk.hpp"
 
 namespace {
 
@@ -101,6 +102,56 @@ void write_rpc_lines(const std::filesystem::path& directory) {
        R"({"jsonrpc":"2.0","id":1,"error":{"code":-32002,"message":"rig: is away\n  Find it."}})");
 }
 
+void add(Bytes& records, RecordKind kind, std::span<const std::uint8_t> payload) {
+  records.push_back(static_cast<std::uint8_t>(kind));
+  records.push_back(static_cast<std::uint8_t>(payload.size()));
+  records.push_back(static_cast<std::uint8_t>(payload.size() >> 8U));
+  records.insert(records.end(), payload.begin(), payload.end());
+}
+
+/// The journal of a session on the desk: as it is, its records as fuzz_journal reads them, and each kind by itself.
+void write_journals(const std::filesystem::path& directory) {
+  const std::filesystem::path home = directory / "fuzz_journal";
+  SessionOnDesk session(short_session);
+  session.run();
+  std::ifstream stream(session.journal, std::ios::binary);
+  Bytes whole{0};
+  whole.insert(whole.end(), std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>());
+  write(home / "whole", whole);
+  Bytes records;
+  const auto write_one = [&](const std::string& name, RecordKind kind,
+                             std::span<const std::uint8_t> payload) {
+    Bytes alone;
+    add(alone, kind, payload);
+    write(home / name, alone);
+  };
+  for (const JournalRecord& record : read_journal(session.journal).records) {
+    add(records, record.kind, record.payload);
+    const std::string name = record.kind == RecordKind::document
+                                 ? nlohmann::json::parse(record.payload).at("record").get<std::string>()
+                                 : std::to_string(static_cast<unsigned>(record.kind));
+    write_one(name, record.kind, record.payload);
+  }
+  write(home / "records", records);
+  for (const std::string text :
+       {R"({"record":"gap","first_index":3,"count":2,"reason":"no answer"})",
+        R"({"record":"slice","block":"tagged","slice":0,"cycle":0,"cycles":2,"dummy_cycles":0})"}) {
+    write_one(nlohmann::json::parse(text).at("record"), RecordKind::document,
+              {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()});
+  }
+}
+
+/// The sound file, and each object once in another way.
+void write_runfile_scripts(const std::filesystem::path& directory) {
+  constexpr std::size_t most_objects = 64;
+  write(directory / "fuzz_runfile" / "sound", {});
+  for (std::size_t object = 0; object < most_objects; ++object) {
+    Bytes script(object + 1, 0);
+    script.back() = static_cast<std::uint8_t>(1 + object % 7);
+    write(directory / "fuzz_runfile" / std::to_string(object), script);
+  }
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -111,5 +162,7 @@ int main(int argc, char** argv) {
 #undef DIASTOLE_MESSAGE
   write_sessions(directory);
   write_rpc_lines(directory);
+  write_journals(directory);
+  write_runfile_scripts(directory);
   return 0;
 }
