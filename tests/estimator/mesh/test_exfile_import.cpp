@@ -145,9 +145,9 @@ TEST(ExfileImport, MakesVersionsNodesOfTheirOwnAtOnePlace) {
 TEST(ExfileImport, KeepsScaleFactorsThatNeighboursDoNotShare) {
   ExText text = ex_files(ring(), 1);
   const size_t start = text.elements.find("Scale factors:\n") + 15;
-  std::string block = text.elements.substr(start, text.elements.find('\n', start) - start);
+  const std::string block = text.elements.substr(start, text.elements.find('\n', start) - start);
   const size_t second = block.find_first_not_of(' ', block.find(' ', 3));
-  text.elements.replace(start + second, 1, "9");
+  text.elements.at(start + second) = '9';
   const ImportedMesh found = imported(text);
   EXPECT_THAT(found.remarks, testing::Contains(HasSubstr("are kept")));
   EXPECT_NE(found.body.mesh.scale(0, hermite_function(0, 1)), 1.0);
