@@ -24,7 +24,7 @@ Playback::Playback(const std::filesystem::path& run_file, const std::vector<DaqC
       throw InputError({run_file.string(), fmt::format("/pressure/{}_kPa", channel.name), "is missing",
                         "Leave that [[daq.channel]] out of the rig file."});
     }
-    Input& input = inputs_.emplace_back(channel.input);
+    Input& input = inputs_.emplace_back(Input{channel.input, {}});
     double last_kPa = 0;
     for (size_t row = 0; row < time_s.size(); ++row) {
       const double recorded_kPa = recorded->second[row];

@@ -250,7 +250,7 @@ void Comparer::compare_channel(const std::string& name, const std::vector<double
     return add(name, "recorded", "-", "not replayed", false);
   }
   const size_t rows = std::min(values.size(), found->second.size());
-  double largest_kPa = 0, least_kPa = INFINITY, most_kPa = -INFINITY, worst_kPa = 0;
+  double largest_kPa = 0, least_kPa = HUGE_VAL, most_kPa = -HUGE_VAL, worst_kPa = 0;
   for (size_t i = 0; i < rows; ++i) {
     if (std::isnan(values[i])) continue;
     largest_kPa = std::max(largest_kPa, std::abs(values[i]));
@@ -259,7 +259,7 @@ void Comparer::compare_channel(const std::string& name, const std::vector<double
   }
   const double tolerance_kPa = resolution_kPa(name, largest_kPa);
   bool equal = true;
-  double least_now_kPa = INFINITY, most_now_kPa = -INFINITY;
+  double least_now_kPa = HUGE_VAL, most_now_kPa = -HUGE_VAL;
   for (size_t i = 0; i < rows; ++i) {
     const double now_kPa = found->second[i];
     if (std::isnan(now_kPa)) continue;

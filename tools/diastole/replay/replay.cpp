@@ -139,7 +139,7 @@ RecordedRun replay_closest(const ReplayOptions& options, const Recording& record
                            const PrivateDirectory& directory, replay::ReplayReport& report) {
   replay::PlanOptions plan_options{.limits = limits_in(options.config)};
   std::optional<RecordedRun> closest;
-  double least_late_s = INFINITY;
+  double least_late_s = HUGE_VAL;
   for (int attempt = 0; attempt < most_attempts; ++attempt) {
     replay::ReplayPlan plan = replay::plan_replay(recording.run, plan_options);
     RecordedRun replayed = replay_once(options, plan, recording, directory, report.firmware);
