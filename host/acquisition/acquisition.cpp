@@ -323,7 +323,7 @@ void Acquisition::remark(const std::string& level, const std::string& code, cons
   } else {
     what["host_ns"] = clock_.now_ns();
   }
-  write(RecordKind::document, what.dump());
+  write(RecordKind::document, what.dump(-1, ' ', false, json::error_handler_t::replace));
   hooks_.remark({level, code, text});
 }
 

@@ -33,6 +33,7 @@
 #include <vector>
 
 #include "host/transport/descriptor.hpp"
+#include "host/transport/real_time.hpp"
 
 namespace diastole {
 
@@ -76,7 +77,7 @@ class JournalWriter {
   Descriptor file_;
   uint32_t sequence_ = 0;
   std::vector<uint8_t> record_;
-  mutable std::mutex problem_mutex_;  // held for moments only
+  mutable InheritingMutex problem_mutex_;  // held for moments only
   std::string problem_;
   std::mutex flush_mutex_;  // held during a flush
   std::atomic<bool> unsynced_ = false;

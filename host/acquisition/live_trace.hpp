@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "host/controller/controller.hpp"
+#include "host/transport/real_time.hpp"
 
 namespace diastole {
 
@@ -64,7 +65,7 @@ class LiveTrace {
   void close_bucket();
   [[nodiscard]] double seconds_of(const Sample& sample) const;
 
-  mutable std::mutex mutex_;
+  mutable InheritingMutex mutex_;  // the server's thread, which has no priority, holds it too
   std::string run_id_;
   double tick_rate_Hz_ = 1;
   size_t bucket_size_ = 1;

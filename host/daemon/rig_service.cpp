@@ -629,6 +629,7 @@ void RigService::do_run(const Experiment& experiment, const Done& done) {
   try {
     result = finish(path, acquire(journal, experiment, rate, record.planned_s));
   } catch (const std::exception& error) {
+    if (controller_->connected()) controller_->stop_now();  // nothing moves unrecorded
     result = {{"end", "failed"}, {"problem", error.what()}, {"journal", path.string()}};
   }
   ::malloc_trim(0);  // what the run file was made in is no more needed

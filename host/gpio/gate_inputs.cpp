@@ -13,6 +13,7 @@
 #include <thread>
 #include <utility>
 
+#include "host/transport/real_time.hpp"
 #include "protocol/contract/input_error.hpp"
 
 namespace diastole {
@@ -152,7 +153,7 @@ class GpioInputs final : public GateInputs {
   gpiod_line* gate_ = nullptr;   // of chip_
   gpiod_line* estop_ = nullptr;  // of chip_
   std::atomic<bool> pressed_ = false;
-  std::mutex mutex_;
+  InheritingMutex mutex_;
   GateReading seen_;
   std::jthread thread_;  // last: it uses the members above
 };

@@ -75,7 +75,8 @@ std::string did_you_mean(std::string_view word, const std::vector<std::string>& 
   const std::string* nearest = nullptr;
   size_t least = word.size() / 2 + 1;
   for (const std::string& candidate : known) {
-    const size_t distance = edit_distance(word, candidate);
+    const bool begun = !word.empty() && candidate.starts_with(word);
+    const size_t distance = begun ? 0 : edit_distance(word, candidate);
     if (distance >= least) continue;
     least = distance;
     nearest = &candidate;

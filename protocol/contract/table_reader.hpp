@@ -93,7 +93,8 @@ class TableReader {
   std::set<std::string, std::less<>> asked_;
 };
 
-/// `Did you mean "x"? ` with the entry of `known` that is nearest to `word`; empty if less than half of `word` fits.
+/// `Did you mean "x"? ` with the entry of `known` that is nearest to `word` or begins with it;
+/// empty if less than half of `word` fits.
 std::string did_you_mean(std::string_view word, const std::vector<std::string>& known);
 
 }  // namespace diastole

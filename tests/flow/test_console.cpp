@@ -136,7 +136,11 @@ TEST(Console, AWatchTokenObservesAndStopsAndDoesNothingElse) {
   RigWithConsole rig;
   const auto anna = rig.console("anna");
   anna->call("rig.home");
-  EXPECT_TRUE(anna->call("run.start", many_segments()).contains("result"));
+  const std::string hours =
+      "format = \"diastole-experiment\"\nversion = 1\nrest_s = 0.2\n"
+      "[[segment]]\nwaveform = \"parabolic\"\nstroke_mL = 2.0\nperiod_s = 0.3\ncycles = 50000\n";
+  EXPECT_TRUE(
+      anna->call("run.start", {{"experiment", hours}, {"file", "hours.experiment.toml"}}).contains("result"));
   const auto onlooker = rig.console("otto", rig.watch);
   EXPECT_EQ(onlooker->call("rig.status")["result"]["control"]["user"], "anna");
   EXPECT_EQ(code_in(onlooker->call("control.take", {{"take_over", "anna"}})), -32005);

@@ -287,7 +287,7 @@ function goOn() {
 addEventListener("keydown", (event) => {
   if (event.key === "Escape" && !event.repeat && (!status || moving.has(status.state))) stop("now");
   const elsewhere = document.querySelector("dialog[open]") || event.target.closest("button, input, textarea");
-  if (event.key === "Enter" && !elsewhere && !by("prompt").hidden) goOn();
+  if (event.key === "Enter" && !event.repeat && !elsewhere && !by("prompt").hidden) goOn();
 }, true);
 
 for (const button of document.querySelectorAll("[data-window]")) {

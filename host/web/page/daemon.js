@@ -42,6 +42,7 @@ export class Daemon {
         return this.open();
       }
       problem = await answer.text();
+      if (answer.status === 401) return this.lost(problem, false); // another daemon has begun: its address is new
     } catch { /* it is not there: said below */ }
     this.lost(problem);
   }
@@ -61,11 +62,11 @@ export class Daemon {
     this.lost(problem);
   }
 
-  lost(problem) {
+  lost(problem, again = true) {
     for (const { reject } of this.waiting.values()) reject(new Error(problem));
     this.waiting.clear();
     this.changed(false, problem);
-    setTimeout(() => this.connect(), 1000);
+    if (again) setTimeout(() => this.connect(), 1000);
   }
 
   take(message) {

@@ -76,7 +76,7 @@ class Homogeneous : public testing::TestWithParam<LawAndFibre> {
   Homogeneous() {
     for (const LawParameter& parameter : law.parameters()) {
       values.push_back(parameter.typical);
-      typed_values.push_back(parameter.typical);
+      typed_values.push_back(static_cast<Real>(parameter.typical));
     }
     for (Eigen::Index axis = 0; axis < 3; ++axis)
       axes((GetParam().fibre + axis) % 3, axis) = 1.0;
@@ -199,7 +199,7 @@ TEST_P(Homogeneous, SimpleShear) {
           at(row, column) = changed;
           return energy(at);
         },
-        f(row, column)));
+        static_cast<Real>(f(row, column))));
   };
   const double sideways_kPa = f(1, 1) * slope_by_entry(1, 1);
   const double shear_kPa = f(2, 2) * slope_by_entry(0, 2);

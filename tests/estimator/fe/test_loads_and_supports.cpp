@@ -117,7 +117,7 @@ TEST(LoadsAndSupports, SensitivitiesEqualFiniteDifferencesOfNewSolutions) {
 
 TEST(LoadsAndSupports, SolutionsAreTheSameForAnyNumberOfThreads) {
   std::vector<ElasticState> states;
-  for (const size_t threads : {1, 2, 4, 2}) {
+  for (const size_t threads : {1U, 2U, 4U, 2U}) {
     ElasticModel model = sprung_gel(6.5, {3.0, 2.0}, {.chamber = Chamber{0.5, 20.0}, .threads = threads});
     const double rest_mL = model.cavity_volume_mL(model.rest_state());
     states.push_back(model.solve({.cavity_volume_mL = rest_mL + 20.0}, model.rest_state()).state);
