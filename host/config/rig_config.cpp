@@ -120,6 +120,7 @@ DaqConfig read_daq(TableReader table) {
   for (TableReader& channel : channels) {
     const ChannelConfig read{channel.text("name"), channel.number("kPa_per_V"),
                              channel.number_or("zero_V", 0)};
+    if (read.kPa_per_V == 0) channel.fail("kPa_per_V", "is 0", "Give the transducer's; below 0 if inverted.");
     const bool named_twice = std::any_of(config.channels.begin(), config.channels.end(),
                                          [&](const ChannelConfig& each) { return each.name == read.name; });
     if (named_twice) channel.fail("name", fmt::format("\"{}\" is given twice", read.name), "Rename one.");

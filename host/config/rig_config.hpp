@@ -38,7 +38,7 @@ struct ControllerConfig {
 /// Pressure = (volts - zero_V) x kPa_per_V, recorded as /pressure/<name>_kPa.
 struct ChannelConfig {
   std::string name;
-  double kPa_per_V = 0;
+  double kPa_per_V = 0;  ///< never 0 in a rig file; below 0: an inverted transducer
   double zero_V = 0;
 };
 

@@ -37,7 +37,9 @@ void read_channels(TableReader& daq, RigDescription& description) {
     DaqChannel channel;
     channel.name = table.text("name");
     channel.input = table.integer_or("input", next_input, {.at_least = 0, .at_most = 13});
-    channel.kPa_per_V = table.number("kPa_per_V", positive);
+    channel.kPa_per_V = table.number("kPa_per_V");
+    if (channel.kPa_per_V == 0)
+      table.fail("kPa_per_V", "is 0", "Give the transducer's; below 0 if inverted.");
     channel.zero_V = table.number_or("zero_V", 0);
     next_input = channel.input + 1;
     channel.place = channel.name == "cavity" ? DaqChannel::Place::cavity

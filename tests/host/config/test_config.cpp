@@ -48,6 +48,8 @@ TEST(RigConfig, MistakesAreNamedWithTheirPlace) {
   EXPECT_THAT(refusal(changed(good, "\"cavity\"", "\"cavty\"")), HasSubstr("cavity"));
   EXPECT_THAT(refusal(changed(good, "port = 502", "port = 70000")),
               AllOf(HasSubstr("line"), HasSubstr("70000")));
+  EXPECT_THAT(refusal(changed(good, "kPa_per_V = 4.0", "kPa_per_V = 0.0")),
+              AllOf(HasSubstr("kPa_per_V"), HasSubstr("is 0")));
 }
 
 TEST(RigConfig, GeometryThatTheControllerCannotCountWithIsRefused) {

@@ -22,6 +22,17 @@ TEST(RigDescription, TheBuiltInRigIsThePapers) {
   EXPECT_EQ(rig.channels[0].place, DaqChannel::Place::cavity);
 }
 
+TEST(RigDescription, ATransducerMayBeInvertedButNotBlind) {
+  const auto with_factor = [](const std::string& kPa_per_V) {
+    std::string text = default_rig_toml();
+    const size_t value = text.find("kPa_per_V = ") + 12;
+    text.replace(value, text.find_first_of(" \n", value) - value, kPa_per_V);
+    return read_rig_description(TableReader::from_text(text, "rig.toml")).channels[0].kPa_per_V;
+  };
+  EXPECT_DOUBLE_EQ(with_factor("-4.0"), -4);
+  EXPECT_THROW(with_factor("0.0"), InputError);
+}
+
 TEST(RigDescription, TheSimulationTableIsStrict) {
   EXPECT_DOUBLE_EQ(described("\n[simulation]\nC1_kPa = 6.5\n").plant.C1_kPa, 6.5);
   try {
