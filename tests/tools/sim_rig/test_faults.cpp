@@ -6,6 +6,7 @@
 #include <functional>
 #include <map>
 
+#include "protocol/contract/input_error.hpp"
 #include "tests/tools/sim_rig/scripted_controller.hpp"
 #include "tools/sim_rig/faults/fault_kind.hpp"
 
@@ -189,6 +190,16 @@ TEST(RigFaults, EveryFaultIsTold) {
     EXPECT_NE(told.find(line), std::string::npos) << kind.name;
     EXPECT_GE(kind.usual, kind.least) << kind.name;
     EXPECT_LE(kind.usual, kind.most) << kind.name;
+  }
+}
+
+TEST(RigFaults, AMistypedNameIsToldTheNearest) {
+  try {
+    fault_named("serial-hangupp");
+    FAIL() << "an unknown fault was taken";
+  } catch (const InputError& error) {
+    EXPECT_NE(std::string(error.what()).find("Did you mean \"serial-hangup\"?"), std::string::npos)
+        << error.what();
   }
 }
 

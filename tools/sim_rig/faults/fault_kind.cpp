@@ -4,8 +4,11 @@
 
 #include <algorithm>
 #include <array>
+#include <string>
+#include <vector>
 
 #include "protocol/contract/input_error.hpp"
+#include "protocol/contract/table_reader.hpp"
 
 namespace diastole::sim_rig {
 namespace {
@@ -35,8 +38,11 @@ std::span<const FaultKind> fault_kinds() { return kinds; }
 const FaultKind& fault_named(std::string_view name) {
   const auto* found = std::ranges::find(kinds, name, &FaultKind::name);
   if (found != kinds.end()) return *found;
+  std::vector<std::string> known;
+  for (const FaultKind& kind : kinds)
+    known.emplace_back(kind.name);
   throw InputError({"", "fault", fmt::format("\"{}\" is not a fault", name),
-                    "`sim_rig faults` lists those that there are."});
+                    did_you_mean(name, known) + "`sim_rig faults` lists those that there are."});
 }
 
 std::string told_faults() {
