@@ -114,6 +114,18 @@ TEST(Faults, LinePulledOut) {
                 "told with exit code 3; every sample kept or declared"});
 }
 
+/// Waits until the run has so many samples; false if it ends before.
+bool received(DaemonClient& client, uint64_t samples) {
+  for (;;) {
+    const json progress = client.call("run.progress");
+    if (progress.is_object()) {
+      if (progress["received"] >= samples) return true;
+      if (progress["state"] != "running") return false;
+    }
+    std::this_thread::sleep_for(10ms);
+  }
+}
+
 TEST(Faults, WallClockJumps) {
   constexpr const char* library = "/usr/lib/x86_64-linux-gnu/faketime/libfaketime.so.1";
   if (sanitized) GTEST_SKIP() << "libfaketime and sanitizers do not go together";
@@ -130,9 +142,9 @@ TEST(Faults, WallClockJumps) {
     auto client = rig.client();
     client.call("rig.home");
     const json begun = client.call("run.start", flow::many_segments());
-    std::this_thread::sleep_for(1s);
+    EXPECT_TRUE(received(client, 200));
     set(k % 2 == 0 ? "+3600" : "-3600");
-    std::this_thread::sleep_for(1s);
+    EXPECT_TRUE(received(client, 400));
     client.call("run.stop");
     const json status = flow::status_when(client, "homed", true);
     const auto run = runfile::read_run(begun["run_file"].get<std::string>());

@@ -132,4 +132,8 @@ std::string with(std::string text, const std::string& from, const std::string& t
   return text.replace(at, from.size(), to);
 }
 
+std::string with_longest_lease(const std::string& rig_file) {
+  return with(rig_file, "baud = 460800\n", "baud = 460800\nlease_ms = 5000\n");
+}
+
 }  // namespace diastole::flow

@@ -72,5 +72,8 @@ Ended run_line(const Workplace& workplace, const std::string& line);
 std::string source_text(const std::string& path);
 /// `text` with the only occurrence of `from` replaced; a failed expectation if there is none or another.
 std::string with(std::string text, const std::string& from, const std::string& to);
+/// A rig file like the example's with the longest lease: for real time, where a machine that is busy with other tests
+/// must not cost the controller its lease.
+std::string with_longest_lease(const std::string& rig_file);
 
 }  // namespace diastole::flow

@@ -16,7 +16,7 @@ using nlohmann::json;
 RigWithDaemon::RigWithDaemon(Time time, const std::string& rig_file,
                              const std::vector<std::string>& rig_options)
     : time_(time) {
-  place.write("rig.toml", rig_file);
+  place.write("rig.toml", time == Time::real ? with_longest_lease(rig_file) : rig_file);
   std::vector<std::string> rig{"sim_rig",        "--link",    path("pump"),   "--config",
                                path("rig.toml"), "--control", path("control")};
   if (time == Time::conducted) rig.insert(rig.end(), {"--conductor", path("time")});

@@ -15,6 +15,7 @@ class RigWithDaemon {
  public:
   enum class Time { conducted, real };
 
+  /// In real time the rig file gets the longest lease.
   explicit RigWithDaemon(Time time, const std::string& rig_file = source_text("examples/rig.toml"),
                          const std::vector<std::string>& rig_options = {});
   /// Ends both, which must go well.

@@ -34,10 +34,7 @@ class ConsolePage : public testing::Test {
   }
   /// A rig in real time whose instrument falls silent for a while, and a page that has come to the console.
   void begin() {
-    // A machine that is busy with other tests must not cost the controller its lease.
-    const std::string patient =
-        with(source_text("examples/rig.toml"), "baud = 460800\n", "baud = 460800\nlease_ms = 5000\n");
-    rig = std::make_unique<RigWithDaemon>(RigWithDaemon::Time::real, patient,
+    rig = std::make_unique<RigWithDaemon>(RigWithDaemon::Time::real, source_text("examples/rig.toml"),
                                           std::vector<std::string>{"--fault", "daq-stall@ttl+2+0.3"});
     rig->daemon_options = {"--console", "127.0.0.1:0"};
     rig->start_daemon();

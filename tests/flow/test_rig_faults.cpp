@@ -25,7 +25,8 @@ class FaultyRig {
     rig_ = std::make_unique<Program>(place, rig);
     EXPECT_TRUE(rig_->wait_for_text("modbus_port")) << rig_->err();
     const auto addresses = json::parse(rig_->out());
-    place.write("rig.toml", source_text("examples/rig.toml"));
+    const std::string rig_file = source_text("examples/rig.toml");
+    place.write("rig.toml", time == Time::real ? with_longest_lease(rig_file) : rig_file);
     std::vector<std::string> daemon{
         "diastole",      "daemon",
         "--config",      "rig.toml",

@@ -297,8 +297,9 @@ TEST(SimulatedSession, InRealTimeEverySampleIsReceivedOrDeclaredMissing) {
   const std::string experiment =
       place.write("short.experiment.toml",
                   with(source_text("examples/gel.experiment.toml"), "cycles = 10", "cycles = 2"));
-  const Ended simulated =
-      run(place, {"diastole", "simulate", experiment, "-o", "short.run.h5", "--real-time", "--json"});
+  place.write("patient.rig.toml", with_longest_lease(source_text("examples/rig.toml")));
+  const Ended simulated = run(place, {"diastole", "simulate", experiment, "-o", "short.run.h5", "--real-time",
+                                      "--config", "patient.rig.toml", "--json"});
   ASSERT_THAT(simulated.exit_code, testing::AnyOf(0, 1)) << simulated.err;
   const json session = simulated.json();
   EXPECT_EQ(session["triggers"], 2);
