@@ -54,7 +54,7 @@ class RtuInstrument {
   void answer(int question) {
     const Mishap mishap = mishap_(question);
     if (mishap == Mishap::silent) return;
-    if (mishap == Mishap::late) std::this_thread::sleep_for(90ms);
+    if (mishap == Mishap::late) std::this_thread::sleep_for(450ms);
     const auto bits = std::bit_cast<uint32_t>(static_cast<float>(question));
     std::vector<uint8_t> reply{1, 3, 4};
     for (const unsigned shift : {24U, 16U, 8U, 0U})
@@ -73,7 +73,7 @@ class RtuInstrument {
   std::jthread thread_;
 };
 
-OpenPolled rtu(const std::string& port, const std::string& more = "parity = \"none\"\ntimeout_ms = 60\n") {
+OpenPolled rtu(const std::string& port, const std::string& more = "parity = \"none\"\ntimeout_ms = 1000\n") {
   return configured(configure_modbus_rtu, fmt::format("port = \"{}\"\n", port) + more,
                     "[[daq.channel]]\nregister = 0\ntype = \"float32\"\n");
 }
@@ -98,11 +98,11 @@ class RtuMishap : public testing::TestWithParam<RtuInstrument::Mishap> {};
 TEST_P(RtuMishap, NeverShiftsALaterAnswer) {
   const RtuInstrument instrument(
       [](int question) { return question == 3 ? GetParam() : RtuInstrument::Mishap::none; });
-  const auto opened = rtu(instrument.port())({});
+  const auto opened = rtu(instrument.port(), "parity = \"none\"\ntimeout_ms = 300\n")({});
   std::vector<double> volts(1);
   int failed = 0;
   double last = 0;
-  for (const auto end = std::chrono::steady_clock::now() + 5s;
+  for (const auto end = std::chrono::steady_clock::now() + 20s;
        last < 8 && std::chrono::steady_clock::now() < end;) {
     const int asked = instrument.questions();
     const Outcome outcome = opened->read(volts);
@@ -147,7 +147,7 @@ TEST(ModbusRtu, AnAbsentPortOrASilentInstrumentIsAHardwareError) {
   EXPECT_THAT(message_of<HardwareError>([] { rtu("/dev/no-such-port")({}); }),
               AllOf(HasSubstr("/dev/no-such-port"), HasSubstr("cannot be opened")));
   const PseudoTerminal nobody;
-  EXPECT_THAT(message_of<HardwareError>([&] { rtu(nobody.path())({}); }),
+  EXPECT_THAT(message_of<HardwareError>([&] { rtu(nobody.path(), "timeout_ms = 60\n")({}); }),
               AllOf(HasSubstr(nobody.path()), HasSubstr("no answer within 60 ms"), HasSubstr("parity")));
 }
 
