@@ -7,6 +7,7 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
+#include <utility>
 
 #include "protocol/contract/input_error.hpp"
 
@@ -95,14 +96,23 @@ SolutionSection to_section(const Json& json) {
   return section;
 }
 
+/// A whole number from 0; of others the conversion to an integer is not defined.
+template <typename Whole>
+Whole to_whole(const Json& json) {
+  if (!json.is_number_unsigned() || !std::in_range<Whole>(json.get<uint64_t>()))
+    throw std::invalid_argument(json.dump() + " is no whole number in range");
+  return static_cast<Whole>(json.get<uint64_t>());
+}
+
 SolutionRecord to_record(const Json& json) {
   SolutionRecord record;
   record.study = json.at("study");
   record.law = json.at("law");
   for (const auto& [name, value] : json.at("parameters").items())
     record.parameters.emplace_back(name, value.get<double>());
-  record.mesh = json.at("mesh").get<std::vector<int>>();
-  record.unknowns = json.at("unknowns");
+  for (const Json& count : json.at("mesh"))
+    record.mesh.push_back(to_whole<int>(count));
+  record.unknowns = to_whole<size_t>(json.at("unknowns"));
   record.pressure_kPa = json.at("pressure_kPa");
   record.cavity_volume_mL = json.at("cavity_volume_mL");
   record.cavity_volume_change_mL = json.at("cavity_volume_change_mL");
@@ -155,7 +165,7 @@ SolutionRecord solution_record_from_json(std::string_view text, const std::strin
     const Json json = Json::parse(text);
     if (!json.is_object() || json.value("format", "") != solution_file_mark)
       throw InputError({file, "key format", fmt::format("is not \"{}\"", solution_file_mark), remedy});
-    const int version = json.at("format_version");
+    const int version = to_whole<int>(json.at("format_version"));
     if (version > newest_version) {
       throw InputError(
           {file, "key format_version",

@@ -1,5 +1,7 @@
 #include "host/daemon/methods.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -15,12 +17,30 @@ using Done = RigService::Done;
 
 constexpr size_t most_experiment_bytes = 256U << 10;
 
+/// A count in `params`, 0 without it. Of others the conversion to an unsigned integer is not defined.
+uint64_t whole_in(const json& params, const char* name) {
+  const auto found = params.find(name);
+  if (found == params.end()) return 0;
+  if (!found->is_number_unsigned()) {
+    throw rpc::Error(rpc::Code::invalid_params, fmt::format("{} must be a whole number from 0", name));
+  }
+  return found->get<uint64_t>();
+}
+
+double number_in(const json& params, const char* name) {
+  const auto found = params.find(name);
+  if (found == params.end() || !found->is_number() || !std::isfinite(found->get<double>())) {
+    throw rpc::Error(rpc::Code::invalid_params, fmt::format("{} must be a number", name));
+  }
+  return found->get<double>();
+}
+
 void rig_status(RigService& rig, const json&, Done done) { rig.status(std::move(done)); }
 void rig_home(RigService& rig, const json&, Done done) { rig.home(std::move(done)); }
 void rig_clear_fault(RigService& rig, const json&, Done done) { rig.clear_fault(std::move(done)); }
 
 void rig_jog(RigService& rig, const json& params, Done done) {
-  rig.jog(params.at("mL"), params.at("rate_mL_s"), std::move(done));
+  rig.jog(number_in(params, "mL"), number_in(params, "rate_mL_s"), std::move(done));
 }
 void rig_settings(RigService& rig, const json&, Done done) { rig.settings(std::move(done)); }
 void rig_write_settings(RigService& rig, const json& params, Done done) {
@@ -31,7 +51,7 @@ void rig_black_box(RigService& rig, const json&, Done done) { rig.black_box(std:
 CalibrationOrder measurement_in(const json& params) {
   CalibrationOrder order;
   order.channels = params.value("channels", std::vector<std::string>{});
-  order.seconds = params.value("seconds", order.seconds);
+  if (params.contains("seconds")) order.seconds = number_in(params, "seconds");
   order.operator_name = params.value("operator", "");
   if (!(order.seconds >= 1 && order.seconds <= 600)) {
     throw rpc::Error(rpc::Code::invalid_params, "seconds must be 1 to 600");
@@ -45,7 +65,7 @@ void rig_zero(RigService& rig, const json& params, Done done) {
 
 void rig_calibrate(RigService& rig, const json& params, Done done) {
   CalibrationOrder order = measurement_in(params);
-  order.kPa = params.at("kPa").get<double>();
+  order.kPa = number_in(params, "kPa");
   if (order.channels.size() != 1)
     throw rpc::Error(rpc::Code::invalid_params, "channels must name one channel");
   rig.calibrate(std::move(order), std::move(done));
@@ -65,7 +85,7 @@ void run_start(RigService& rig, const json& params, Done done) {
 }
 
 void run_progress(RigService& rig, const json& params, const Done& done) {
-  done(nullptr, rig.run_progress(params.value("first_remark", size_t{0})));
+  done(nullptr, rig.run_progress(whole_in(params, "first_remark")));
 }
 
 /// To a tenth of a millisecond and of a pascal; null for NaN.
@@ -75,9 +95,8 @@ json rounded(double value) {
 }
 
 void run_trace(RigService& rig, const json& params, const Done& done) {
-  const LiveTrace::Excerpt excerpt =
-      rig.live().since(params.value("run_id", ""), params.value("first_row", uint64_t{0}),
-                       params.value("first_trigger", uint64_t{0}));
+  const LiveTrace::Excerpt excerpt = rig.live().since(
+      params.value("run_id", ""), whole_in(params, "first_row"), whole_in(params, "first_trigger"));
   json time_s = json::array(), kPa = json::array(), filtered_kPa = json::array(), trigger_s = json::array();
   for (const LiveTrace::Row& each : excerpt.rows) {
     time_s.push_back(rounded(each.time_s));
@@ -109,7 +128,7 @@ void run_stop(RigService& rig, const json& params, const Done& done) {
 /// Anybody's: it moves nothing, it only tells which cycles are imaged, and the operator may sit at another terminal.
 void run_continue(RigService& rig, const json& params, const Done& done) {
   std::optional<size_t> slice;
-  if (params.contains("slice")) slice = params.at("slice").get<size_t>();
+  if (params.contains("slice")) slice = whole_in(params, "slice");
   done(nullptr, rig.continue_run(slice));
 }
 

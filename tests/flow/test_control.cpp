@@ -1,5 +1,6 @@
 // Who controls the rig: one lease, told by user and process, taken over by name only, and never silently.
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <pwd.h>
@@ -126,6 +127,18 @@ TEST(Control, MalformedAndHugeMessagesAreAnsweredAndHalfOnesCostNothing) {
   EXPECT_EQ(code_of(R"({"jsonrpc":"2.0","id":1,"method":"run.stop","params":{"how":7}})"), -32602);
   EXPECT_EQ(code_of(R"({"jsonrpc":"2.0","id":1,"method":"run.progress","params":{"first_remark":"x"}})"),
             -32602);
+  const auto code_of_number = [&](const char* method, const char* name, const char* number) {
+    return code_of(fmt::format(R"({{"jsonrpc":"2.0","id":1,"method":"{}","params":{{"{}":{}}}}})", method,
+                               name, number));
+  };
+  for (const char* number : {"-1", "-1.0", "1.5", "1e300", "null"}) {
+    EXPECT_EQ(code_of_number("run.progress", "first_remark", number), -32602) << number;
+    EXPECT_EQ(code_of_number("run.trace", "first_row", number), -32602) << number;
+    EXPECT_EQ(code_of_number("run.trace", "first_trigger", number), -32602) << number;
+    EXPECT_EQ(code_of_number("run.continue", "slice", number), -32602) << number;
+  }
+  EXPECT_EQ(code_of_number("rig.jog", "rate_mL_s\":1,\"mL", "null"), -32602);
+  EXPECT_EQ(code_of_number("rig.jog", "mL\":1,\"rate_mL_s", "null"), -32602);
   EXPECT_EQ(code_of(std::string(900'000, '[')), -32700);
   EXPECT_THAT(answer_to(socket, std::string(1'100'000, 'x')), HasSubstr("a line has at most"));
   const Descriptor half = connect_unix_socket(socket);

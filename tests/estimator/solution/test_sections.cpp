@@ -130,6 +130,13 @@ TEST(SolutionRecord, RefusesWhatIsNoSolution) {
   EXPECT_THAT(refusal("{\"format\": \"diastole-fit\"}"), testing::HasSubstr("diastole-solution"));
   EXPECT_THAT(refusal("{\"format\": \"diastole-solution\", \"format_version\": 9}"),
               testing::HasSubstr("newer than this program"));
+  for (const char* number : {"-1", "-1.0", "1.5", "1e300", "null"}) {
+    const std::string head = R"({"format": "diastole-solution", "format_version": )";
+    EXPECT_THAT(refusal(head + number + "}"), testing::HasSubstr("no whole number")) << number;
+  }
+  std::string negative = to_json(inflated_gel());
+  negative.insert(negative.find("\"unknowns\":") + 11, "-");
+  EXPECT_THAT(refusal(negative), testing::HasSubstr("no whole number"));
   std::string short_field = to_json(inflated_gel());
   const size_t start = short_field.find("\"strain_cc\":[") + 13;
   short_field.erase(start, short_field.find(',', start) + 1 - start);
