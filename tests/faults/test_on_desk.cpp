@@ -67,7 +67,7 @@ void come_back(SessionOnDesk& session) {
 TEST(Faults, CableUnplugged) {
   double slowest_flag_ms = 0;
   double slowest_return_ms = 0;
-  const int tried = trials(200, 200);
+  const int tried = trials(20, 200);
   const int survived = survivors(tried, [&](int, std::mt19937& random) {
     SessionOnDesk session(short_session);
     uint64_t unplugged_ns = 0;

@@ -48,13 +48,13 @@ TEST(Daemon, ASignalAtAnyMomentOfTheLoadEndsTheDaemonWithThePumpAtRest) {
     auto first = rig.client();
     home(first);
   }
-  for (int offset_ms = 0; offset_ms < 40; offset_ms += 2) {
+  for (int offset_ms = 0; offset_ms < 40; offset_ms += 7) {
     {
       const Hasty hasty(rig.path("socket"), "run.start", many_segments());
       auto watch = rig.client();
       status_when(watch, "homed", false);
       std::this_thread::sleep_for(std::chrono::milliseconds(offset_ms));
-      rig.daemon->signal(offset_ms % 4 == 0 ? SIGTERM : SIGINT);
+      rig.daemon->signal(offset_ms % 2 == 0 ? SIGTERM : SIGINT);
     }
     const Ended ended = rig.daemon->wait();
     EXPECT_EQ(ended.exit_code, 0) << ended.err;
