@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <csignal>
 #include <filesystem>
 #include <fstream>
 
@@ -153,6 +154,17 @@ TEST(Replay, AnOrderToStopIsGivenAgainAndAJournalThatBreaksOffIsPlayedAsFarAsItG
   found = replay(rig.place, stopped.journal, 0);
   expect_the_recording(found);
   EXPECT_EQ(line(found, "end")["recorded"], "broken off");
+}
+
+TEST(Replay, OneThatIsBrokenOffComparesNothingAndEndsWithExitCode1) {
+  const Workplace place;
+  Program replaying(place, {"diastole", "replay", record(place, "8", {}), "--real-time"});
+  ASSERT_TRUE(replaying.wait_for_text("cycle "));
+  replaying.signal(SIGINT);
+  const Ended ended = replaying.wait();
+  EXPECT_EQ(ended.exit_code, 1);
+  EXPECT_EQ(ended.out, "");
+  EXPECT_THAT(ended.err, HasSubstr("gel.run.h5: the replay was broken off; nothing was compared"));
 }
 
 TEST(Replay, WhatCannotBeReplayedIsRefusedWithWhatItLacks) {

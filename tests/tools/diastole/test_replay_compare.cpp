@@ -117,6 +117,19 @@ TEST(ReplayCompare, FaultsAndTheEndMustBeTheSame) {
   EXPECT_THAT(found.lines.back().recorded, "faulted: estop");
 }
 
+TEST(ReplayCompare, ALostLeaseMayComeAHeartbeatOff) {
+  RecordedRun run = run_of_three_cycles();
+  run.events.push_back({2.0, "error", "lease_lost", ""});
+  const auto off_by = [&](double shift_s) {
+    RecordedRun other = run;
+    other.events[0].time_s += shift_s;
+    return compare(run, other).events_equal;
+  };
+  EXPECT_TRUE(off_by(0.05));
+  EXPECT_TRUE(off_by(-0.05));
+  EXPECT_FALSE(off_by(0.051));
+}
+
 TEST(ReplayCompare, OfABrokenOffRecordingOnlyWhatThereIsCounts) {
   const RecordedRun whole = run_of_three_cycles();
   RecordedRun broken = whole;

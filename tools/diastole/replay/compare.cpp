@@ -18,6 +18,7 @@ constexpr double tick_s = 1.0 / 84e6;
 constexpr double trigger_tolerance_s = tick_s + 1e-9;  // a run file's times are rounded
 constexpr size_t most_positions_on_the_line = 30;      // of one message
 constexpr double fault_tolerance_s = 250e-6 + tick_s;
+constexpr double lease_tolerance_s = 50e-3 + tick_s;  // a heartbeat, whose phase is not in the file
 
 /// Pump and trigger rows of each cycle: [from trigger k, to trigger k + 1), the last to the end.
 struct CycleSteps {
@@ -310,8 +311,10 @@ void Comparer::compare_events() {
     if (was == nullptr && broke_off_) break;
     const double host_tolerance_s =
         sample_s + std::abs(out_.start_phase_s);  // its turns lie on the samples' grid
-    const double tolerance_s =
-        was != nullptr && is_controller_fault(was->code) ? fault_tolerance_s : host_tolerance_s;
+    const double tolerance_s = was == nullptr                   ? 0
+                               : was->code == "lease_lost"      ? lease_tolerance_s
+                               : is_controller_fault(was->code) ? fault_tolerance_s
+                                                                : host_tolerance_s;
     const double diff_s = was != nullptr && is != nullptr ? is->time_s - was->time_s : 0;
     const bool equal =
         was != nullptr && is != nullptr && was->code == is->code && std::abs(diff_s) <= tolerance_s;

@@ -8,8 +8,8 @@
 //   samples      number, to one at the end if the start phase differs; the same ones missing
 //   pressure     every sample to the resolution of the register that carries it (a float32: 2^-23 of the volts)
 //   events       faults of the controller, stops, the end: the same, in the same order; faults to 250 us (the turn of
-//                the controller's main loop that notes them), what the host noted to one sample
-//                and the start phase
+//                the controller's main loop that notes them), but lease_lost to a heartbeat (50 ms), whose phase is
+//                not in the file; what the host noted to one sample and the start phase
 // What may differ, and is told: where within the sampling interval the run began (the start phase).
 //
 // Of a recording that broke off, only as much as there is.

@@ -89,10 +89,10 @@ std::string prepare(DaemonClient& daemon, const replay::ReplayPlan& plan) {
   return daemon.call("rig.status").at("firmware");
 }
 
-/// The replay as it was recorded in its turn. Throws InputError when the user has broken it off.
-RecordedRun replay_once(const ReplayOptions& options, const replay::ReplayPlan& plan,
-                        const Recording& recording, const PrivateDirectory& directory,
-                        std::string& firmware) {
+/// The replay as it was recorded in its turn; none when the user has broken it off.
+std::optional<RecordedRun> replay_once(const ReplayOptions& options, const replay::ReplayPlan& plan,
+                                       const Recording& recording, const PrivateDirectory& directory,
+                                       std::string& firmware) {
   const StopSignals signals;
   SimulatedRig rig(directory, rig_options(options, plan, recording, directory));
   DaemonClient daemon(rig.socket());
@@ -117,9 +117,7 @@ RecordedRun replay_once(const ReplayOptions& options, const replay::ReplayPlan& 
   };
   run_session(daemon, session);
   view.finish();
-  if (signals.asked() > 0) {
-    throw InputError({options.run, "", "the replay was broken off", "Nothing was compared."});
-  }
+  if (signals.asked() > 0) return std::nullopt;
   return runfile::read_run(session.output);
 }
 
@@ -128,35 +126,43 @@ std::optional<MotionLimits> limits_in(const std::string& config) {
   return read_rig(config).controller.limits;
 }
 
-/// By how much the sign of something that began unseen came too late; 0 if there is none to compare.
-double lateness_s(const RecordedRun& recorded, const RecordedRun& replayed) {
+/// By how much the sign of something that began unseen came too late; 0 if neither run has one, none if the sign of one
+/// is missing in the other.
+std::optional<double> lateness_s(const RecordedRun& recorded, const RecordedRun& replayed) {
   const auto sign = replay::late_sign(recorded), now = replay::late_sign(replayed);
-  return sign && now && sign->code == now->code ? now->time_s - sign->time_s : 0;
+  if (!sign && !now) return 0;
+  if (!sign || !now || sign->code != now->code) return std::nullopt;
+  return now->time_s - sign->time_s;
 }
 
-/// Replays, as often as shifting what began unseen brings its sign closer; keeps the closest.
-RecordedRun replay_closest(const ReplayOptions& options, const Recording& recording,
-                           const PrivateDirectory& directory, replay::ReplayReport& report) {
+/// Replays, as often as shifting what began unseen brings its sign closer; keeps the closest. None when the user has
+/// broken it off.
+std::optional<RecordedRun> replay_closest(const ReplayOptions& options, const Recording& recording,
+                                          const PrivateDirectory& directory, replay::ReplayReport& report) {
   replay::PlanOptions plan_options{.limits = limits_in(options.config)};
   std::optional<RecordedRun> closest;
   double least_late_s = HUGE_VAL;
   for (int attempt = 0; attempt < most_attempts; ++attempt) {
     replay::ReplayPlan plan = replay::plan_replay(recording.run, plan_options);
-    RecordedRun replayed = replay_once(options, plan, recording, directory, report.firmware);
-    const double late_s = lateness_s(recording.run, replayed);
-    if (std::abs(late_s) < least_late_s) {
-      least_late_s = std::abs(late_s);
-      report.comparison = replay::compare(recording.run, replayed);
+    std::optional<RecordedRun> replayed = replay_once(options, plan, recording, directory, report.firmware);
+    if (!replayed) return std::nullopt;
+    const std::optional<double> late_s = lateness_s(recording.run, *replayed);
+    const double off_s = late_s ? std::abs(*late_s) : HUGE_VAL;
+    if (!closest || off_s < least_late_s) {
+      least_late_s = off_s;
+      report.comparison = replay::compare(recording.run, *replayed);
       report.plan = std::move(plan);
       closest = std::move(replayed);
     }
-    if (late_s == 0 || report.comparison.equal()) break;
-    plan_options.onset_shift_s -= late_s;
+    // What did not recur tells no better moment.
+    if (!late_s || *late_s == 0 || report.comparison.equal()) break;
+    plan_options.onset_shift_s -= *late_s;
   }
-  return std::move(*closest);
+  return closest;
 }
 
-replay::ReplayReport replay_run(const ReplayOptions& options) {
+/// None when the user has broken it off.
+std::optional<replay::ReplayReport> replay_run(const ReplayOptions& options) {
   const auto started = std::chrono::steady_clock::now();
   if (!options.output.empty()) check_output(options.output, options.force, {options.run});
   const PrivateDirectory directory;
@@ -164,11 +170,12 @@ replay::ReplayReport replay_run(const ReplayOptions& options) {
   replay::ReplayReport report;
   report.recorded = options.run;
   report.replayed = options.output;
-  const RecordedRun replayed = replay_closest(options, recording, directory, report);
+  const std::optional<RecordedRun> replayed = replay_closest(options, recording, directory, report);
+  if (!replayed) return std::nullopt;
   report.firmware = fmt::format("{} {}", options.image.empty() ? "the firmware's host build" : options.image,
                                 report.firmware);
-  if (!options.output.empty()) write_run(options.output, replayed);
-  if (!replayed.pressure.time_s.empty()) report.simulated_s = replayed.pressure.time_s.back();
+  if (!options.output.empty()) write_run(options.output, *replayed);
+  if (!replayed->pressure.time_s.empty()) report.simulated_s = replayed->pressure.time_s.back();
   report.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - started).count();
   return report;
 }
@@ -187,7 +194,8 @@ void add_replay(CommandLine& line) {
       "      a run that broke off; keep what the replay recorded\n"
       "Recorded gaps, stops, emergency stops, limit switches and losses of the line happen again at their\n"
       "time. Exit code 0: the replay is the recording; 1: it differs, and the first difference is told with\n"
-      "time and cycle; 2: the file lacks what a replay needs; 3: a program or link failed.");
+      "time and cycle, or it was broken off; 2: the file lacks what a replay needs; 3: a program or link "
+      "failed.");
   command->add_option("RUN", options->run, "run file, or a journal of the daemon")->required();
   command->add_option("-o,--output", options->output, "keep the replay's own run file");
   command
@@ -199,13 +207,18 @@ void add_replay(CommandLine& line) {
   command->add_flag("--real-time", options->real_time, "as slow as the real thing");
   command->add_flag("--force", options->force, "replace the output if it exists");
   line.on_run(command, [options](const CommandOutput& out) {
-    const replay::ReplayReport report = replay_run(*options);
-    if (out.json) {
-      std::cout << replay::as_json(report).dump(2) << '\n';
-    } else {
-      fmt::print("{}", replay::as_table(report));
+    const std::optional<replay::ReplayReport> report = replay_run(*options);
+    if (!report) {
+      std::cerr << options->run << ": the replay was broken off; nothing was compared\n";
+      if (out.json) std::cout << json{{"broken_off", true}}.dump(2) << '\n';
+      return ExitCode::negative;
     }
-    return report.comparison.equal() ? ExitCode::done : ExitCode::negative;
+    if (out.json) {
+      std::cout << replay::as_json(*report).dump(2) << '\n';
+    } else {
+      fmt::print("{}", replay::as_table(*report));
+    }
+    return report->comparison.equal() ? ExitCode::done : ExitCode::negative;
   });
 }
 
