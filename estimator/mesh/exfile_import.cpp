@@ -48,14 +48,14 @@ bool begins_field(const ExLine& line) {
                      [](char c) { return c >= '0' && c <= '9'; });
 }
 void require_cartesian(const ExLines& lines, const ExLine& field) {
-  if (has(field, "rectangular cartesian") && has(field, "#Components=3")) return;
+  if (has(field, "rectangular cartesian") && lines.number_after(field, "#Components=") == 3) return;
   lines.fail(field, "is not a field of three rectangular Cartesian components",
              "Export the coordinates as rectangular cartesian x, y, z.");
 }
 
 NodeComponent node_component(const ExLines& lines, const ExLine& line) {
   NodeComponent component;
-  component.start = lines.number_after(line, "Value index=") - 1;
+  component.start = lines.number_after(line, "Value index=", 1) - 1;
   const size_t count = lines.number_after(line, "#Derivatives=");
   component.derivatives = {0};
   const size_t open = line.text.find('(');
@@ -76,7 +76,7 @@ NodeComponent node_component(const ExLines& lines, const ExLine& line) {
     lines.fail(line, fmt::format("names {} derivatives but says {}", component.derivatives.size() - 1, count),
                "Name each derivative once in the brackets.");
   }
-  if (has(line, "#Versions=")) component.versions = lines.number_after(line, "#Versions=");
+  if (has(line, "#Versions=")) component.versions = lines.number_after(line, "#Versions=", 1);
   return component;
 }
 
@@ -149,18 +149,14 @@ struct ExElement {
 std::array<size_t, nodal_derivatives> eight_indices(const ExLines& lines, const ExLine& line,
                                                     std::string_view mark) {
   const size_t start = line.text.find(mark);
-  const std::vector<double> numbers =
-      start == std::string::npos ? std::vector<double>{} : numbers_in(line.text.substr(start + mark.size()));
+  const std::vector<size_t> numbers = start == std::string::npos
+                                          ? std::vector<size_t>{}
+                                          : whole_numbers_in(line.text.substr(start + mark.size()));
   if (numbers.size() != nodal_derivatives)
     lines.fail(line, fmt::format("\"{}\" is not eight {}", line.text, mark),
-               "A tri-cubic corner has eight values.");
+               "A tri-cubic corner has eight whole numbers there, none of them negative.");
   std::array<size_t, nodal_derivatives> indices{};
-  for (size_t i = 0; i < nodal_derivatives; ++i) {
-    if (numbers[i] < 0)
-      lines.fail(line, fmt::format("index {} is negative", numbers[i]),
-                 "Export the mesh without such a mapping.");
-    indices[i] = static_cast<size_t>(numbers[i]);
-  }
+  std::copy(numbers.begin(), numbers.end(), indices.begin());
   return indices;
 }
 
@@ -177,9 +173,9 @@ ComponentMap read_component(ExLines& lines) {
   ComponentMap map{};
   for (CornerMap& corner : map) {
     const ExLine head = lines.take();
-    const std::vector<double> node = numbers_in(head.text.substr(0, head.text.find('.')));
+    const std::vector<size_t> node = whole_numbers_in(head.text.substr(0, head.text.find('.')));
     if (node.size() != 1 || node[0] < 1) lines.fail(head, "is no corner", "Write \"1.  #Values=8\".");
-    corner.node = static_cast<size_t>(node[0]) - 1;
+    corner.node = node[0] - 1;
     corner.value = eight_indices(lines, lines.take(), "Value indices:");
     corner.scale = eight_indices(lines, lines.take(), "Scale factor indices:");
   }
@@ -208,11 +204,8 @@ ElementHeader read_element_header(ExLines& lines, const ExLine& sets) {
 
 std::vector<size_t> take_node_numbers(ExLines& lines, const ExLine& line, size_t count) {
   const std::string rest = line.text.substr(std::string_view("Nodes:").size());
-  std::vector<double> numbers = numbers_in(rest);
-  if (numbers.empty()) numbers = lines.take_numbers(count, "nodes of the element");
-  std::vector<size_t> nodes;
-  for (const double number : numbers)
-    nodes.push_back(static_cast<size_t>(number));
+  std::vector<size_t> nodes = whole_numbers_in(rest);
+  if (nodes.empty()) nodes = lines.take_whole_numbers(count, "nodes of the element");
   if (nodes.size() != count)
     lines.fail(line, fmt::format("{} nodes, not {}", nodes.size(), count), "See the header.");
   return nodes;
@@ -293,6 +286,9 @@ class MeshBuilder {
                                                  &header.coordinates[2][c]};
       if (maps[0]->node >= element.nodes.size())
         lines_.fail(element.line, "a corner's node is beyond #Nodes", "Check the element's header.");
+      if (maps[1]->node != maps[0]->node || maps[2]->node != maps[0]->node)
+        lines_.fail(element.line, fmt::format("x, y and z of corner {} are of different nodes", c + 1),
+                    "Give each corner one node for all three components.");
       if (maps[1]->scale != maps[0]->scale || maps[2]->scale != maps[0]->scale)
         lines_.fail(element.line, "x, y and z have scale factors of their own", "Use one set for all three.");
       if (!numbers.insert(element.nodes[maps[0]->node]).second)
@@ -304,7 +300,11 @@ class MeshBuilder {
         const size_t index = maps[0]->scale[d];
         if (index > element.scale_factors.size())
           lines_.fail(element.line, fmt::format("has no scale factor {}", index), "Give all Scale factors:.");
-        scales[hermite_function(c, d)] = index == 0 ? 1.0 : element.scale_factors[index - 1];
+        const double scale = index == 0 ? 1.0 : element.scale_factors[index - 1];
+        if (!(scale > 0.0))
+          lines_.fail(element.line, fmt::format("scale factor {} is {}", index, scale),
+                      "Scale factors are above zero: turn xi around instead of a derivative's sign.");
+        scales[hermite_function(c, d)] = scale;
       }
     }
   }

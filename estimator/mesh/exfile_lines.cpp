@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <charconv>
+#include <cmath>
 #include <utility>
 
 #include "protocol/contract/input_error.hpp"
@@ -16,6 +17,27 @@ std::string_view trimmed(std::string_view text) {
   const size_t first = text.find_first_not_of(blanks);
   if (first == std::string_view::npos) return {};
   return text.substr(first, text.find_last_not_of(blanks) + 1 - first);
+}
+
+bool is_allowed(double value) { return std::isfinite(value); }
+bool is_allowed(size_t value) { return value <= largest_whole_number; }
+
+/// The text's numbers of one kind; empty if it holds anything else.
+template <class Number>
+std::vector<Number> list_in(std::string_view text) {
+  std::vector<Number> numbers;
+  while (!(text = trimmed(text)).empty()) {
+    if (text.front() == '+') text.remove_prefix(1);
+    Number value{};
+    const auto [stopped, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+    const auto used = static_cast<size_t>(stopped - text.data());
+    if (error != std::errc{} || !is_allowed(value) ||
+        (used < text.size() && blanks.find(text[used]) == std::string_view::npos))
+      return {};
+    numbers.push_back(value);
+    text.remove_prefix(used);
+  }
+  return numbers;
 }
 
 }  // namespace
@@ -42,11 +64,12 @@ const ExLine& ExLines::take() {
   return lines_[next_++];
 }
 
-std::vector<double> ExLines::take_numbers(size_t count, std::string_view what) {
-  std::vector<double> numbers;
+template <class Read>
+auto ExLines::take_list(size_t count, std::string_view what, const Read& read) {
+  decltype(read(std::string_view())) numbers;
   while (numbers.size() < count) {
     const ExLine& line = take();
-    const std::vector<double> more = numbers_in(line.text);
+    const auto more = read(line.text);
     if (more.empty() || numbers.size() + more.size() > count) {
       fail(line, fmt::format("{} of {} {} have come, then \"{}\"", numbers.size(), count, what, line.text),
            "Give as many numbers as the header says.");
@@ -56,16 +79,30 @@ std::vector<double> ExLines::take_numbers(size_t count, std::string_view what) {
   return numbers;
 }
 
+std::vector<double> ExLines::take_numbers(size_t count, std::string_view what) {
+  return take_list(count, what, numbers_in);
+}
+
+std::vector<size_t> ExLines::take_whole_numbers(size_t count, std::string_view what) {
+  return take_list(count, what, whole_numbers_in);
+}
+
 void ExLines::fail(const ExLine& line, std::string problem, std::string remedy) const {
   throw InputError({file_, fmt::format("line {}", line.number), std::move(problem), std::move(remedy)});
 }
 
-size_t ExLines::number_after(const ExLine& line, std::string_view mark) const {
+size_t ExLines::number_after(const ExLine& line, std::string_view mark, size_t least) const {
   const size_t start = line.text.find(mark);
   size_t value = 0;
   if (start != std::string::npos) {
     const std::string_view rest = trimmed(std::string_view(line.text).substr(start + mark.size()));
-    if (std::from_chars(rest.data(), rest.data() + rest.size(), value).ec == std::errc{}) return value;
+    if (std::from_chars(rest.data(), rest.data() + rest.size(), value).ec == std::errc{}) {
+      if (value >= least && value <= largest_whole_number) return value;
+      fail(line,
+           fmt::format("has {} behind \"{}\", which is not {} to {}", value, mark, least,
+                       largest_whole_number),
+           fmt::format("It is a whole number from {} on; export the file anew.", least));
+    }
   }
   fail(line, fmt::format("has no whole number behind \"{}\"", mark),
        "See docs/mesh-file.md for what is read.");
@@ -73,19 +110,8 @@ size_t ExLines::number_after(const ExLine& line, std::string_view mark) const {
 
 bool has(const ExLine& line, std::string_view part) { return line.text.find(part) != std::string::npos; }
 
-std::vector<double> numbers_in(std::string_view text) {
-  std::vector<double> numbers;
-  while (!(text = trimmed(text)).empty()) {
-    if (text.front() == '+') text.remove_prefix(1);
-    double value = 0.0;
-    const auto [stopped, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-    const auto used = static_cast<size_t>(stopped - text.data());
-    if (error != std::errc{} || (used < text.size() && blanks.find(text[used]) == std::string_view::npos))
-      return {};
-    numbers.push_back(value);
-    text.remove_prefix(used);
-  }
-  return numbers;
-}
+std::vector<double> numbers_in(std::string_view text) { return list_in<double>(text); }
+
+std::vector<size_t> whole_numbers_in(std::string_view text) { return list_in<size_t>(text); }
 
 }  // namespace diastole

@@ -181,5 +181,45 @@ TEST(ExfileImport, RefusesWithLineAndReason) {
   EXPECT_THAT(refusal(false, " Group name: ring", "EX Version: 2"), HasSubstr("version 2"));
 }
 
+TEST(ExfileImport, RefusesIndicesThatAreNone) {
+  const auto in_nodes = [](const std::string& what) {
+    return testing::AllOf(HasSubstr("ring.exnode: line"), HasSubstr(what));
+  };
+  EXPECT_THAT(refusal(false, "Value index= 1,", "Value index= 0,"),
+              in_nodes("has 0 behind \"Value index=\""));
+  EXPECT_THAT(refusal(false, "Value index= 1,", "Value index= 18446744073709551615,"),
+              in_nodes("Value index="));
+  EXPECT_THAT(refusal(false, "#Versions= 1", "#Versions= 0"), in_nodes("has 0 behind \"#Versions=\""));
+  EXPECT_THAT(refusal(false, "#Versions= 1", "#Versions= 2305843009213693952"), in_nodes("#Versions="));
+  EXPECT_THAT(refusal(false, "  0.5\n", "  nan\n"), in_nodes("nan"));
+  EXPECT_THAT(refusal(false, "  0.5\n", "  inf\n"), in_nodes("inf"));
+
+  const auto in_elements = [](const std::string& what) {
+    return testing::AllOf(HasSubstr("ring.exelem: line"), HasSubstr(what));
+  };
+  for (const char* index : {"nan", "inf", "1e30", "-1", "1.5", "99999999999"}) {
+    SCOPED_TRACE(index);
+    EXPECT_THAT(refusal(true, "Value indices:  1", std::string("Value indices:  ") + index),
+                in_elements("is not eight Value indices:"));
+    EXPECT_THAT(refusal(true, "Scale factor indices:  1", std::string("Scale factor indices:  ") + index),
+                in_elements("is not eight Scale factor indices:"));
+    EXPECT_THAT(refusal(true, " 101 102", std::string(" 101 ") + index), in_elements("nodes of the element"));
+  }
+  EXPECT_THAT(refusal(true, "Value indices:  1", "Value indices:  0"), in_elements("takes number 0"));
+  EXPECT_THAT(refusal(true, "      1.  #Values=8", "      nan.  #Values=8"), in_elements("is no corner"));
+  EXPECT_THAT(refusal(true, "      1.  #Values=8", "      1e30.  #Values=8"), in_elements("is no corner"));
+  EXPECT_THAT(refusal(true, "      1.  #Values=8", "      0.  #Values=8"), in_elements("is no corner"));
+  EXPECT_THAT(refusal(true, "      1.  #Values=8", "      2.  #Values=8"), in_elements("different nodes"));
+}
+
+TEST(ExfileImport, RefusesScaleFactorsThatAreNotAboveZero) {
+  for (const char* factor : {"0.0", "-1.0", "nan", "inf"}) {
+    SCOPED_TRACE(factor);
+    EXPECT_THAT(refusal(true, "Scale factors:\n  1.00000000000000000e+00",
+                        std::string("Scale factors:\n  ") + factor),
+                testing::AllOf(HasSubstr("ring.exelem: line"), HasSubstr("scale factor")));
+  }
+}
+
 }  // namespace
 }  // namespace diastole
