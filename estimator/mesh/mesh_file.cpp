@@ -8,6 +8,8 @@
 #include <charconv>
 #include <cmath>
 #include <iterator>
+#include <map>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -129,6 +131,7 @@ class MeshReader {
                      std::move(ties_));
     require_ties_kept(mesh);
     require_right_side_out(mesh);
+    require_outer_faces(mesh);
     finish();
     return {std::move(mesh), std::move(fibres)};
   }
@@ -216,8 +219,15 @@ class MeshReader {
         table.fail("faces", fmt::format("\"{}\" is no face", text),
                    "Write a name (inner, outer, bottom, top, left, right) and a side, as \"inner xi3=0\".");
       }
-      (faces.*label->list)
-          .push_back({element, static_cast<size_t>(place[0] - '1'), static_cast<size_t>(place[2] - '0')});
+      const ElementFace face{element, static_cast<size_t>(place[0] - '1'),
+                             static_cast<size_t>(place[2] - '0')};
+      for (const auto& [known, words] : named_faces_) {
+        if (known.element == element && known.direction == face.direction && known.side == face.side)
+          table.fail("faces", fmt::format("\"{}\" and \"{}\" are one side of the element", words, text),
+                     "Name each side once.");
+      }
+      named_faces_.emplace_back(face, text);
+      (faces.*label->list).push_back(face);
     }
   }
 
@@ -298,6 +308,41 @@ class MeshReader {
     }
   }
 
+  /// Loads and supports are on the body's surface: no second element has a named face.
+  void require_outer_faces(const HermiteMesh& mesh) {
+    const auto places_of = [&](const ElementFace& face) {
+      std::array<size_t, 4> places = face_corners(face);
+      for (size_t& place : places)
+        place = mesh.place_of(mesh.element(face.element)[place]);
+      std::sort(places.begin(), places.end());
+      return places;
+    };
+    // Two elements that close a ring have the corners of their inner faces in common, but not the middles.
+    const auto middle_mm = [&](const ElementFace& face) {
+      Xi xi{0.5, 0.5, 0.5};
+      xi[face.direction] = static_cast<double>(face.side);
+      return mesh.value(mesh.reference(), {face.element, xi});
+    };
+    std::map<std::array<size_t, 4>, std::vector<ElementFace>> meeting;
+    for (size_t element = 0; element < mesh.element_count(); ++element) {
+      for (size_t side = 0; side < 6; ++side) {
+        const ElementFace face{element, side / 2, side % 2};
+        meeting[places_of(face)].push_back(face);
+      }
+    }
+    const double slack_mm = tie_slack * mesh.extent_mm();
+    for (const auto& [named, words] : named_faces_) {
+      for (const ElementFace& other : meeting.at(places_of(named))) {
+        if (other.element == named.element || (middle_mm(other) - middle_mm(named)).norm() > slack_mm)
+          continue;
+        elements_[named.element].fail(
+            "faces",
+            fmt::format("\"{}\" lies inside the body: element {} has it too", words, other.element + 1),
+            "Name outer faces only.");
+      }
+    }
+  }
+
   void finish() {
     for (TableReader& table : nodes_)
       table.finish();
@@ -311,6 +356,7 @@ class MeshReader {
   std::vector<TableReader> elements_;
   NodeField reference_;
   DofTies ties_;
+  std::vector<std::pair<ElementFace, std::string>> named_faces_;
 };
 
 }  // namespace

@@ -54,6 +54,13 @@ TEST(MeshFile, ComesBackToTheLastBit) {
   }
 }
 
+TEST(MeshFile, TakesARingOfTwoElements) {
+  AnnulusShape shape;
+  shape.elements = {2, 1, 1};
+  const MeshBody ring{make_annulus(shape), {}};
+  EXPECT_EQ(mesh_from_text(mesh_file_text(ring), "ring.mesh.toml").mesh.faces().inner.size(), 2U);
+}
+
 /// The heart's file with the first `from` replaced.
 std::string refusal(const std::string& from, const std::string& to) {
   std::string text = mesh_file_text(heart());
@@ -77,6 +84,13 @@ TEST(MeshFile, RefusesWhatIsWrongWithItsPlace) {
   EXPECT_THAT(refusal("nodes = [1, 2,", "nodes = [1, 999,"), HasSubstr("999"));
   EXPECT_THAT(refusal("\"inner xi3=0\"", "\"inside xi3=0\""), HasSubstr("is no face"));
   EXPECT_THAT(refusal("\"inner xi3=0\"", "\"inner xi4=0\""), HasSubstr("is no face"));
+  EXPECT_THAT(refusal("\"inner xi3=0\"", "\"inner xi3=0\", \"inner xi3=0\""),
+              testing::AllOf(HasSubstr("heart.mesh.toml"), HasSubstr("one side of the element")));
+  EXPECT_THAT(refusal("\"outer xi3=1\"", "\"outer xi3=0\""),
+              HasSubstr("\"inner xi3=0\" and \"outer xi3=0\" are one side"));
+  EXPECT_THAT(refusal("\"inner xi3=0\"", "\"inner xi3=0\", \"left xi1=0\""),
+              testing::AllOf(HasSubstr("heart.mesh.toml"), HasSubstr("faces"),
+                             HasSubstr("\"left xi1=0\" lies inside the body: element 4 has it too")));
   EXPECT_THAT(refusal("[[element]]",
                       "[[node]]\nx_mm = [0,0,0,0,0,0,0,0]\ny_mm = [0,0,0,0,0,0,0,0]\n"
                       "z_mm = [0,0,0,0,0,0,0,0]\nfibre_deg = 1.0\n[[element]]"),
