@@ -2,6 +2,7 @@
 
 #include <string>
 
+#include "estimator/fe/elastic_system.hpp"
 #include "estimator/fe/force_balance.hpp"
 
 namespace diastole {
@@ -24,11 +25,14 @@ nlohmann::ordered_json forces_of(const ElasticModel& model, const ElasticState& 
 
 void add_equilibrium(nlohmann::ordered_json& json, ElasticModel& model, const ElasticState& state) {
   constexpr double mL_per_mm3 = 1e-3;
-  const double rest_mL = model.cavity_volume_mL(model.rest_state());
-  const double loaded_mL = model.cavity_volume_mL(state);
   json["pressure_kPa"] = state.pressure_kPa;
-  json["cavity_volume_mL"] = loaded_mL;
-  json["cavity_volume_change_mL"] = loaded_mL - rest_mL;
+  json["cavity_volume_mL"] = nullptr;
+  json["cavity_volume_change_mL"] = nullptr;
+  if (model.system().cavity_closed()) {
+    const double loaded_mL = model.cavity_volume_mL(state);
+    json["cavity_volume_mL"] = loaded_mL;
+    json["cavity_volume_change_mL"] = loaded_mL - model.cavity_volume_mL(model.rest_state());
+  }
   if (model.system().chamber()) {
     json["chamber_pressure_kPa"] = state.chamber_pressure_kPa;
     json["chamber_intake_mL"] = mL_per_mm3 * model.system().chamber_intake_mm3(state);

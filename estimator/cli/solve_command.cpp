@@ -132,17 +132,23 @@ nlohmann::ordered_json frames_json(const ElasticModel& model, const std::vector<
   nlohmann::ordered_json json = nlohmann::ordered_json::array();
   const double rest_mL = model.cavity_volume_mL(model.rest_state());
   for (const SolvedFrame& frame : solved) {
+    nlohmann::ordered_json change_mL;
+    if (model.system().cavity_closed()) change_mL = model.cavity_volume_mL(frame.state) - rest_mL;
     json.push_back({{"time_s", frame.time_s},
                     {"pressure_kPa", frame.state.pressure_kPa},
-                    {"cavity_volume_change_mL", model.cavity_volume_mL(frame.state) - rest_mL}});
+                    {"cavity_volume_change_mL", std::move(change_mL)}});
   }
   return json;
 }
 
 void print_for_people(const nlohmann::ordered_json& json) {
-  fmt::print("At {:g} kPa the cavity has taken {:.3f} mL and holds {:.3f} mL.\n",
-             json["pressure_kPa"].get<double>(), json["cavity_volume_change_mL"].get<double>(),
-             json["cavity_volume_mL"].get<double>());
+  const double pressure_kPa = json["pressure_kPa"];
+  if (json["cavity_volume_mL"].is_null()) {
+    fmt::print("At {:g} kPa. The cavity is open: it has no volume.\n", pressure_kPa);
+  } else {
+    fmt::print("At {:g} kPa the cavity has taken {:.3f} mL and holds {:.3f} mL.\n", pressure_kPa,
+               json["cavity_volume_change_mL"].get<double>(), json["cavity_volume_mL"].get<double>());
+  }
   for (const auto& probe : json["probes"]) {
     fmt::print("  X = ({:g}) mm moved by ({:.4f}) mm\n",
                fmt::join(probe["point_mm"].get<std::vector<double>>(), ", "),
@@ -188,11 +194,13 @@ struct TimedLoad {
 /// The loads to solve for: the one of the command line, or the study's frames.
 std::vector<TimedLoad> loads_of(const SolveArguments& arguments, const Study& study,
                                 const ElasticModel& model) {
-  if (arguments.pressure_kPa) return {{0.0, {.pressure_kPa = *arguments.pressure_kPa}}};
   if (arguments.volume_change_mL) {
+    require_closed_cavity(study, model);
     const double rest_mL = model.cavity_volume_mL(model.rest_state());
     return {{0.0, {.cavity_volume_mL = rest_mL + *arguments.volume_change_mL}}};
   }
+  if (arguments.pressure_kPa != 0.0) require_cavity(study, model);
+  if (arguments.pressure_kPa) return {{0.0, {.pressure_kPa = *arguments.pressure_kPa}}};
   std::vector<TimedLoad> loads;
   for (const Frame& frame : read_frames(*study.data.frames))
     loads.push_back({frame.time_s, {.pressure_kPa = frame.pressure_kPa}});

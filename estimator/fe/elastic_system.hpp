@@ -71,6 +71,8 @@ class ElasticSystem {
   /// 0 for a wall with a free rim.
   [[nodiscard]] double cavity_volume_mm3(const ElasticState& state) const;
   [[nodiscard]] const std::optional<Chamber>& chamber() const { return chamber_; }
+  /// Whether the chamber's fluid has a volume: the outer wall's rim is held or at plates.
+  [[nodiscard]] bool chamber_closed() const { return chamber_wall_.closed(); }
   /// Volume that the specimen has taken from the fluid around it.
   [[nodiscard]] double chamber_intake_mm3(const ElasticState& state) const;
   /// Unknowns that have a negative pivot each at a stable equilibrium.

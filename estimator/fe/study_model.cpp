@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "estimator/fe/elastic_system.hpp"
 #include "estimator/mesh/annulus.hpp"
 #include "estimator/mesh/ellipsoid.hpp"
 #include "estimator/mesh/refinement.hpp"
@@ -120,6 +121,23 @@ Chamber chamber_of(const StudyChamber& given) {
   return chamber;
 }
 
+/// What a mesh file must have, told of the study's key for it.
+void require_of_mesh(const Study& study, bool fulfilled, std::string problem, std::string remedy) {
+  if (!fulfilled) refuse(study, "specimen.file", std::move(problem), std::move(remedy));
+}
+
+void require_chamber_wall(const Study& study, const ElasticModel& model) {
+  if (!study.chamber) return;
+  require_of_mesh(study, !model.mesh().faces().outer.empty(),
+                  "the mesh names no face outer, which the fluid in the [chamber] would push on",
+                  "Name the outer wall in the mesh file, as faces = [\"outer xi3=1\"], or remove [chamber].");
+  require_of_mesh(
+      study, !model.system().chamber()->sealed() || model.system().chamber_closed(),
+      "the outer faces have a free rim, so that a sealed [chamber] has no volume",
+      "Name all of the outer wall outer and the ends that its rim lies on bottom and top, or leave "
+      "out chamber.compliance_mL_per_kPa for constant pressure around the specimen.");
+}
+
 }  // namespace
 
 MeshBody study_body(const Study& study) {
@@ -146,7 +164,23 @@ ElasticModel make_model(const Study& study, SolveOptions options) {
   if (study.chamber) elastic.chamber = chamber_of(*study.chamber);
   elastic.bulk_modulus_kPa = study.compression.bulk_modulus_kPa;
   elastic.volume_stiffness_kPa = study.compression.volume_stiffness_kPa;
-  return ElasticModel(std::move(body.mesh), law, std::move(elastic));
+  ElasticModel model(std::move(body.mesh), law, std::move(elastic));
+  require_chamber_wall(study, model);
+  return model;
+}
+
+void require_cavity(const Study& study, const ElasticModel& model) {
+  require_of_mesh(study, !model.mesh().faces().inner.empty(),
+                  "the mesh names no face inner, which a cavity pressure would push on",
+                  "Name the cavity's wall in the mesh file, as faces = [\"inner xi3=0\"].");
+}
+
+void require_closed_cavity(const Study& study, const ElasticModel& model) {
+  require_cavity(study, model);
+  require_of_mesh(study, model.system().cavity_closed(),
+                  "the inner faces have a free rim, so that the cavity has no volume to be led to",
+                  "Name all of the cavity's wall inner and the ends that its rim lies on bottom and top, or "
+                  "solve for a pressure: `diastole solve STUDY --pressure-kPa 1`.");
 }
 
 }  // namespace diastole

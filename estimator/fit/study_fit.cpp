@@ -208,6 +208,7 @@ FitRecord fit_study(const Study& study, const Measurement& measurement, const St
   }
   const auto* annulus = std::get_if<AnnulusSpecimen>(&study.specimen);
   ElasticModel model = make_model(study);
+  require_cavity(study, model);
   const size_t elements = model.mesh().element_count();
   FitRecord record{};
   record.study = study.file.string();

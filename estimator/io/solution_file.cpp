@@ -104,6 +104,11 @@ Whole to_whole(const Json& json) {
   return static_cast<Whole>(json.get<uint64_t>());
 }
 
+Json from_optional(const std::optional<double>& value) { return value ? Json(*value) : Json(); }
+std::optional<double> to_optional(const Json& json) {
+  return json.is_null() ? std::nullopt : std::optional<double>(json.get<double>());
+}
+
 SolutionRecord to_record(const Json& json) {
   SolutionRecord record;
   record.study = json.at("study");
@@ -114,8 +119,8 @@ SolutionRecord to_record(const Json& json) {
     record.mesh.push_back(to_whole<int>(count));
   record.unknowns = to_whole<size_t>(json.at("unknowns"));
   record.pressure_kPa = json.at("pressure_kPa");
-  record.cavity_volume_mL = json.at("cavity_volume_mL");
-  record.cavity_volume_change_mL = json.at("cavity_volume_change_mL");
+  record.cavity_volume_mL = to_optional(json.at("cavity_volume_mL"));
+  record.cavity_volume_change_mL = to_optional(json.at("cavity_volume_change_mL"));
   record.fibres = json.at("fibres");
   for (const Json& section : json.at("sections"))
     record.sections.push_back(to_section(section));
@@ -139,8 +144,8 @@ std::string to_json(const SolutionRecord& record) {
   json["mesh"] = record.mesh;
   json["unknowns"] = record.unknowns;
   json["pressure_kPa"] = record.pressure_kPa;
-  json["cavity_volume_mL"] = record.cavity_volume_mL;
-  json["cavity_volume_change_mL"] = record.cavity_volume_change_mL;
+  json["cavity_volume_mL"] = from_optional(record.cavity_volume_mL);
+  json["cavity_volume_change_mL"] = from_optional(record.cavity_volume_change_mL);
   json["fibres"] = record.fibres;
   json["sections"] = Json::array();
   for (const SolutionSection& section : record.sections)

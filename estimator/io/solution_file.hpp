@@ -4,6 +4,7 @@
 // profiles through the wall, each with the scalar fields of docs/solutions.md. Lengths in mm, kPa.
 
 #include <array>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -48,8 +49,8 @@ struct SolutionRecord {
   std::vector<int> mesh;
   size_t unknowns = 0;
   double pressure_kPa = 0.0;
-  double cavity_volume_mL = 0.0;
-  double cavity_volume_change_mL = 0.0;
+  std::optional<double> cavity_volume_mL;  ///< none of an open cavity
+  std::optional<double> cavity_volume_change_mL;
   bool fibres = false;  ///< whether there are fields along f, s, n
   std::vector<SolutionSection> sections;
   std::vector<SolutionProfile> profiles;

@@ -105,9 +105,11 @@ void add_traction(Page& page, const SolutionRecord& record) {
 }  // namespace
 
 void add_solution(Page& page, const SolutionRecord& record) {
-  page.headline("Cavity", fmt::format("{} mL", number(record.cavity_volume_mL, 4)),
-                fmt::format("{} mL more than at rest, {}", number(record.cavity_volume_change_mL, 4),
-                            pressure_words(record)));
+  if (record.cavity_volume_mL && record.cavity_volume_change_mL) {
+    page.headline("Cavity", fmt::format("{} mL", number(*record.cavity_volume_mL, 4)),
+                  fmt::format("{} mL more than at rest, {}", number(*record.cavity_volume_change_mL, 4),
+                              pressure_words(record)));
+  }
   add_traction(page, record);
   std::vector<std::string> parameters;
   for (const auto& [name, value] : record.parameters)

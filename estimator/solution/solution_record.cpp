@@ -100,8 +100,11 @@ SolutionRecord solution_record(const ElasticModel& model, const ElasticState& st
   record.law = std::string(model.law().name());
   record.unknowns = model.dofs();
   record.pressure_kPa = state.pressure_kPa;
-  record.cavity_volume_mL = model.cavity_volume_mL(state);
-  record.cavity_volume_change_mL = record.cavity_volume_mL - model.cavity_volume_mL(model.rest_state());
+  if (model.system().cavity_closed()) {
+    const double volume_mL = model.cavity_volume_mL(state);
+    record.cavity_volume_mL = volume_mL;
+    record.cavity_volume_change_mL = volume_mL - model.cavity_volume_mL(model.rest_state());
+  }
   record.fibres = static_cast<bool>(model.system().material_axes());
 
   const double height_mm = middle_height_mm(model.mesh());

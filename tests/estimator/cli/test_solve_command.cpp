@@ -9,6 +9,8 @@
 #include <string>
 #include <vector>
 
+#include "estimator/mesh/annulus.hpp"
+#include "estimator/mesh/mesh_file.hpp"
 #include "protocol/contract/input_error.hpp"
 #include "tests/estimator/cli/run_command.hpp"
 #include "tests/estimator/io/scratch_file.hpp"
@@ -53,9 +55,14 @@ class SolveCommand : public testing::Test {
     return test::run_command(std::move(arguments));
   }
 
-  std::string refusal(const std::vector<std::string>& arguments) const {
+  std::string refusal(std::vector<std::string> arguments) const {
+    arguments.insert(arguments.begin(), {"solve", study_.string()});
+    return refusal_of(arguments);
+  }
+
+  static std::string refusal_of(const std::vector<std::string>& arguments) {
     try {
-      run(arguments);
+      test::run_command(arguments);
     } catch (const InputError& error) {
       return error.what();
     }
@@ -201,6 +208,81 @@ TEST_F(SolveCommand, FindsThePressureOfAVolumeInASealedChamberOnSprings) {
   EXPECT_LT(json["chamber_intake_mL"].get<double>(), 15.0);
   EXPECT_LT(json["forces"]["unbalanced_N"].get<double>(), 1e-6);
   EXPECT_EQ(json["negative_pivots"], json["pressure_unknowns"]);
+}
+
+/// A study of a ring's mesh file, from which some face names are taken.
+class SolveOfAMeshFile : public SolveCommand {
+ protected:
+  void leave_out(const std::vector<std::string>& names, const std::string& more = "") const {
+    AnnulusShape shape;
+    shape.elements = {4, 1, 1};
+    HermiteMesh ring = make_annulus(shape);
+    MeshFaces faces = ring.faces();
+    for (const std::string& name : names) {
+      if (name == "inner") faces.inner.clear();
+      if (name == "outer") faces.outer.clear();
+      if (name == "top") faces.top.clear();
+    }
+    std::vector<HermiteMesh::Corners> elements;
+    for (size_t e = 0; e < ring.element_count(); ++e)
+      elements.push_back(ring.element(e));
+    const std::filesystem::path mesh =
+        folder_.write("ring.mesh.toml", mesh_file_text({HermiteMesh(ring.reference(), elements, faces), {}}));
+    const std::string text = gel_study;
+    write_study(text.substr(0, text.find("kind =")) + "kind = \"mesh\"\nfile = \"" + mesh.string() +
+                "\"\nends = \"fixed\"\n" + text.substr(text.find("[law]")) + more);
+  }
+
+  const std::string sealed_ = "[chamber]\ncompliance_mL_per_kPa = 30.0\n";
+
+ private:
+  test::ScratchFolder folder_;
+};
+
+TEST_F(SolveOfAMeshFile, RefusesALoadThatTheFacesCannotTake) {
+  const auto refused_for = [](const std::string& what) {
+    return testing::AllOf(testing::HasSubstr(".study.toml"), testing::HasSubstr("specimen.file"),
+                          testing::HasSubstr(what), testing::HasSubstr("Name "));
+  };
+  leave_out({"inner"});
+  EXPECT_THAT(refusal({"--pressure-kPa", "1"}), refused_for("names no face inner"));
+  EXPECT_THAT(refusal({"--volume-change-mL", "1"}), refused_for("names no face inner"));
+  leave_out({"top"});
+  EXPECT_THAT(refusal({"--volume-change-mL", "1"}), refused_for("cavity has no volume"));
+  EXPECT_THAT(refusal_of({"pv", study_.string(), "--volume-change-mL", "1"}),
+              refused_for("cavity has no volume"));
+  leave_out({"top"}, sealed_);
+  EXPECT_THAT(refusal({"--pressure-kPa", "1"}), refused_for("sealed [chamber] has no volume"));
+  leave_out({"outer"}, sealed_);
+  EXPECT_THAT(refusal({"--pressure-kPa", "1"}), refused_for("names no face outer"));
+  leave_out({"outer"}, "[chamber]\nsealing_pressure_kPa = 1.0\n");
+  EXPECT_THAT(refusal({"--pressure-kPa", "1"}), refused_for("names no face outer"));
+}
+
+TEST_F(SolveOfAMeshFile, TellsNoVolumeOfAnOpenCavity) {
+  leave_out({"top"});
+  const test::ScratchFolder results;
+  const std::string record = (results.path() / "ring.json").string();
+  const nlohmann::json json =
+      nlohmann::json::parse(run({"--pressure-kPa", "0.5", "-o", record, "--json"}).output);
+  EXPECT_EQ(json["reason"], "converged");
+  EXPECT_TRUE(json.at("cavity_volume_mL").is_null());
+  EXPECT_TRUE(json.at("cavity_volume_change_mL").is_null());
+  EXPECT_TRUE(nlohmann::json::parse(std::ifstream(record)).at("cavity_volume_mL").is_null());
+  EXPECT_EQ(test::run_command({"report", record, "-o", (results.path() / "ring.html").string()}).code,
+            ExitCode::done);
+  EXPECT_THAT(run({"--pressure-kPa", "0.5"}).output,
+              testing::AllOf(testing::HasSubstr("At 0.5 kPa"), testing::HasSubstr("open"),
+                             testing::Not(testing::HasSubstr("has taken"))));
+}
+
+TEST_F(SolveOfAMeshFile, ClosedFacesTakePressureVolumeAndSealedChamber) {
+  leave_out({}, sealed_);
+  const nlohmann::json json = nlohmann::json::parse(run({"--volume-change-mL", "2", "--json"}).output);
+  EXPECT_EQ(json["reason"], "converged");
+  EXPECT_NEAR(json["cavity_volume_change_mL"].get<double>(), 2.0, 1e-9);
+  leave_out({"inner"});
+  EXPECT_EQ(run({"--pressure-kPa", "0"}).code, ExitCode::done) << "no pressure needs no wall";
 }
 
 TEST_F(SolveCommand, RefusesBadProbesWithARemedy) {
