@@ -239,11 +239,12 @@ ExitCode run_solve(const SolveArguments& arguments, const CommandOutput& out) {
 
   std::vector<SolvedFrame> solved;
   const Solution solution = solve_all(model, loads, solved);
-  if (solution.report.converged()) write_outputs(arguments.outputs, study, model, solved);
-
   nlohmann::ordered_json json = as_json(study, model, solution, probes, seconds_since(begun));
-  for (const std::filesystem::path& file : arguments.outputs.files)
-    json["files"].push_back(file.string());
+  if (solution.report.converged()) {
+    write_outputs(arguments.outputs, study, model, solved);
+    for (const std::filesystem::path& file : arguments.outputs.files)
+      json["files"].push_back(file.string());
+  }
   if (arguments.frames) json["frames"] = frames_json(model, solved);
   if (!solution.report.converged()) std::cerr << "diastole solve: " << solution.report.describe() << '\n';
   if (arguments.pressure_kPa && (solution.report.reason == SolveReason::no_convergence ||

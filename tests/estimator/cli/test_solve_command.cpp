@@ -174,11 +174,16 @@ TEST_F(SolveCommand, FollowsTheStudysFrames) {
 }
 
 TEST_F(SolveCommand, NoEquilibriumIsANegativeAnswerWithAReason) {
+  const test::ScratchFolder folder;
+  const std::filesystem::path table = folder.path() / "gel.csv";
   testing::internal::CaptureStderr();
-  const Outcome outcome = run({"--pressure-kPa", "100", "--mesh", "6,2,1", "--json"});
+  const Outcome outcome = run({"--pressure-kPa", "100", "--mesh", "6,2,1", "-o", table.string(), "--json"});
   const std::string message = testing::internal::GetCapturedStderr();
   EXPECT_EQ(outcome.code, ExitCode::negative);
-  EXPECT_NE(nlohmann::json::parse(outcome.output)["reason"], "converged");
+  const nlohmann::json json = nlohmann::json::parse(outcome.output);
+  EXPECT_NE(json["reason"], "converged");
+  EXPECT_FALSE(json.contains("files")) << "none was written";
+  EXPECT_FALSE(std::filesystem::exists(table));
   EXPECT_THAT(message, testing::HasSubstr("was reached"));
 }
 
