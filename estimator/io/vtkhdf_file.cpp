@@ -26,12 +26,14 @@ constexpr uint8_t bezier_hexahedron = 79;
 constexpr hsize_t compressed_from = 4096;  // rows; shorter datasets are stored as they are
 constexpr unsigned deflate_level = 4;
 
-/// Typed writing below /VTKHDF. Every failure is one of the disk.
+/// Typed writing below /VTKHDF. Every failure is one of the disk, told of the file that is asked for, not of the
+/// temporary one.
 class Sink {
  public:
-  explicit Sink(const std::filesystem::path& path) : name_(path.string()) {
+  Sink(const std::filesystem::path& temporary, const std::filesystem::path& asked_for)
+      : name_(asked_for.string()) {
     H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
-    file_ = FileHandle(H5Fcreate(name_.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT));
+    file_ = FileHandle(H5Fcreate(temporary.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT));
     must(file_.valid());
   }
 
@@ -151,10 +153,11 @@ void write_steps(Sink& sink, const BezierGrid& grid) {
   sink.whole_numbers("/VTKHDF/Steps/CellDataOffsets/HigherOrderDegrees", zeros);
 }
 
-void write_all(const std::filesystem::path& path, const BezierGrid& grid) {
+void write_all(const std::filesystem::path& temporary, const std::filesystem::path& path,
+               const BezierGrid& grid) {
   const size_t points = grid.points_mm.size() / 3;
   const bool temporal = grid.steps.size() > 1;
-  Sink sink(path);
+  Sink sink(temporary, path);
   sink.numbers("/VTKHDF/Points", grid.points_mm, 3);
   sink.whole_attribute("/VTKHDF", "Version", {temporal ? 2 : 1, 0});
   sink.text_attribute("/VTKHDF", "Type", "UnstructuredGrid");
@@ -176,7 +179,7 @@ void write_vtkhdf(const std::filesystem::path& path, const BezierGrid& grid) {
   const std::filesystem::path temporary = fmt::format("{}.{}.part", path.string(), ::getpid());
   std::error_code failed;
   try {
-    write_all(temporary, grid);
+    write_all(temporary, path, grid);
     std::filesystem::rename(temporary, path, failed);
     if (failed) throw InputError({path.string(), "", failed.message(), "Choose another path for the file."});
   } catch (...) {
