@@ -59,8 +59,9 @@ SparseFactor::SparseFactor(size_t size, std::span<const int> rows, std::span<con
   for (const int stream : {1, 2, 3})
     control(mumps, stream) = -1;
   control(mumps, 4) = 0;
-  // Found by measurement (docs/verification.md): SCOTCH's ordering of the plain graph. Matching large entries
-  // to the diagonal beforehand costs more than all it saves, because pivots stay in range without it.
+  // Found by measurement (docs/decisions/0012-newton-and-factorisation.md): SCOTCH's ordering of the plain graph.
+  // Matching large entries to the diagonal beforehand costs more than all it saves, because pivots stay in range
+  // without it.
   constexpr int scotch = 3;
   constexpr int plain_graph = 1;
   constexpr int no_matching = 0;
