@@ -10,16 +10,6 @@ namespace {
 
 Eigen::Vector3d vector_of(const std::array<double, 3>& v) { return {v[0], v[1], v[2]}; }
 
-/// Where to start the search for a tag point: its seen place, or places on its line of error when noise has
-/// put it where the mesh cannot be extrapolated to.
-std::optional<MaterialPoint> first_guess(const PointLocator& deformed, const TagPoint& tag) {
-  for (const double sigmas : {0.0, 1.0, -1.0, 2.0, -2.0, 4.0, -4.0}) {
-    const auto found = deformed.find(vector_of(tag.x_mm) + sigmas * tag.sigma_mm * vector_of(tag.normal));
-    if (found) return found->point;
-  }
-  return {};
-}
-
 size_t machine_threads() { return std::max(1U, std::thread::hardware_concurrency()); }
 
 }  // namespace
@@ -38,7 +28,7 @@ std::vector<FrameResiduals::UsableTag> FrameResiduals::find_tags(std::span<const
   const PointLocator deformed(mesh_, position_mm, options);
   std::vector<std::optional<TagMatch>> matches(tags_.size());
   parallel_for(tags_.size(), machine_threads(), [&](size_t i) {
-    const auto guess = first_guess(deformed, tags_[i]);
+    const auto guess = find_tag(deformed, tags_[i]);
     if (guess) matches[i] = match_tag(mesh_, reference_, position_mm, tags_[i], *guess);
   });
   std::vector<UsableTag> found;

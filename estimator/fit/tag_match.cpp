@@ -19,6 +19,14 @@ bool inside(const Xi& xi) {
 
 }  // namespace
 
+std::optional<MaterialPoint> find_tag(const PointLocator& deformed, const TagPoint& tag) {
+  for (const double sigmas : {0.0, 1.0, -1.0, 2.0, -2.0, 4.0, -4.0}) {
+    const auto found = deformed.find(vector_of(tag.x_mm) + sigmas * tag.sigma_mm * vector_of(tag.normal));
+    if (found) return found->point;
+  }
+  return {};
+}
+
 std::optional<TagMatch> match_tag(const HermiteMesh& mesh, const PointLocator& reference,
                                   std::span<const double> position_mm, const TagPoint& tag,
                                   const MaterialPoint& guess) {

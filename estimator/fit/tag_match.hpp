@@ -30,6 +30,10 @@ struct TagMatch {
   Eigen::Vector3d by_motion;  ///< ds/dx at the point: ds = by_motion · du
 };
 
+/// Where to start the search for a tag point: its seen place in the motion that `deformed` locates, or places on its
+/// line of error when noise has put it where the mesh cannot be extrapolated to. Empty when all are outside.
+std::optional<MaterialPoint> find_tag(const PointLocator& deformed, const TagPoint& tag);
+
 /// `reference` locates points of the undeformed mesh. `guess` is where the point was for a similar motion.
 /// Empty when the search leaves the body, or when the plane is so sheared that n·F⁻¹n < 0.1.
 std::optional<TagMatch> match_tag(const HermiteMesh& mesh, const PointLocator& reference,

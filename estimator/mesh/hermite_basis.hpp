@@ -33,6 +33,11 @@ constexpr std::array<double, 4> hermite_slopes(double xi) {
   return {6.0 * xi * (xi - 1.0), (1.0 - xi) * (1.0 - 3.0 * xi), 6.0 * xi * (1.0 - xi), xi * (3.0 * xi - 2.0)};
 }
 
+/// d2h_0/dxi2 .. d2h_3/dxi2 at xi.
+constexpr std::array<double, 4> hermite_curvatures(double xi) {
+  return {12.0 * xi - 6.0, 6.0 * xi - 4.0, 6.0 - 12.0 * xi, 6.0 * xi - 2.0};
+}
+
 /// Corner b1 + 2 b2 + 4 b3 of function a, b = 0 or 1 along each xi.
 constexpr size_t hermite_corner(size_t a) { return ((a >> 1) & 1) | ((a >> 2) & 2) | ((a >> 3) & 4); }
 
