@@ -1,0 +1,39 @@
+#pragma once
+// The smoothing weight λ by generalised cross-validation (Golub, Heath, Wahba 1979):
+//
+//   V(λ) = N RSS(λ) / (N − tr K(λ))²          K = G H⁻¹ Gᵀ, the matrix that makes fitted values of measured ones
+//
+// tr K, the field's effective degrees of freedom, is estimated with random signs z (Hutchinson 1990):
+// E[zᵀ K z] = tr K. The same signs serve every λ, so that V is smooth; with 24 of them tr K is off by some units,
+// which N − tr K (thousands) does not feel. `exact_trace` is the sum over all rows, for small problems and tests.
+
+#include <vector>
+
+#include "estimator/reconstruction/smoothed_system.hpp"
+
+namespace diastole {
+
+struct CrossValidationPoint {
+  double lambda;
+  double score;               ///< V, dimensionless: near 1 where sigma is right
+  double degrees_of_freedom;  ///< tr K
+};
+
+struct CrossValidation {
+  double lambda = 0.0;
+  bool at_edge = false;                     ///< the least score lies at an end of the range searched
+  std::vector<CrossValidationPoint> curve;  ///< in order of λ
+};
+
+/// Random signs, one column a probe; the same for the same size.
+Eigen::MatrixXd random_signs(Eigen::Index rows, Eigen::Index probes = 24);
+
+/// Of the system's present factorisation.
+double stochastic_trace(const SmoothedSystem& system, const Eigen::MatrixXd& signs);
+double exact_trace(const SmoothedSystem& system);
+
+/// Searches λ from 10^-3 to 10^9, by decades and then by golden section to a tenth of a decade. Leaves the system
+/// factorised at the λ found.
+CrossValidation choose_lambda(SmoothedSystem& system);
+
+}  // namespace diastole

@@ -1,0 +1,238 @@
+#include "estimator/reconstruction/frame_field.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "estimator/fit/tag_match.hpp"
+
+namespace diastole {
+namespace {
+
+constexpr double first_lambda = 1e3;
+constexpr int huber_rounds = 4, least_rounds = 3, most_rounds = 12;
+constexpr double huber_bend = 1.345, tukey_reach = 4.685;
+constexpr double settled_mm = 1e-3;
+constexpr double least_scale = 0.5;  // data better than they say of themselves are not sifted ever finer
+
+Eigen::Vector3d vector_of(const std::array<double, 3>& v) { return {v[0], v[1], v[2]}; }
+
+double huber_weight(double residual) {
+  return std::min(1.0, huber_bend / std::max(std::abs(residual), 1e-12));
+}
+
+double tukey_weight(double residual) {
+  const double inside = 1.0 - residual * residual / (tukey_reach * tukey_reach);
+  return inside > 0.0 ? inside * inside : 0.0;
+}
+
+/// One frame's data, looked up on the moving body again and again.
+class FrameData {
+ public:
+  FrameData(const HermiteMesh& mesh, const Measurement& measurement, int frame, const LocatorOptions& options)
+      : mesh_(mesh),
+        measurement_(measurement),
+        options_(options),
+        reference_(mesh, mesh.reference(), options) {
+    for (size_t i = 0; i < measurement.tags.size(); ++i) {
+      if (measurement.tags[i].frame == frame) tags_.push_back(i);
+    }
+    for (size_t i = 0; i < measurement.points.size(); ++i) {
+      if (measurement.points[i].frame != frame) continue;
+      if (const auto found = reference_.find(vector_of(measurement.points[i].X_mm))) {
+        points_.emplace_back(i, found->point);
+      } else {
+        points_not_found_.push_back(i);
+      }
+    }
+  }
+
+  /// Observations linearised about the field's motion, and the field's rows with residuals there.
+  std::vector<ObservationRow> linearise(FrameField& field) const {
+    std::vector<ObservationRow> observations;
+    field.rows.clear();
+    field.tags_not_found.clear();
+    field.points_not_found = points_not_found_;
+    const PointLocator deformed(mesh_, field.position_mm, options_);
+    for (const size_t i : tags_) {
+      const TagPoint& tag = measurement_.tags[i];
+      const auto guess = find_tag(deformed, tag);
+      const auto match =
+          guess ? match_tag(mesh_, reference_, field.position_mm, tag, *guess) : std::optional<TagMatch>{};
+      if (!match) {
+        field.tags_not_found.push_back(i);
+        continue;
+      }
+      const Eigen::Vector3d direction = -match->by_motion;
+      const double known_mm =
+          match->error_mm + direction.dot(mesh_.value(field.displacement_mm, match->point));
+      observations.push_back(
+          {displacement_along(mesh_, match->point, direction), known_mm, tag.sigma_mm, 1.0});
+      field.rows.push_back({true, i, 0, match->point, match->error_mm / tag.sigma_mm, false});
+    }
+    for (const auto& [i, point] : points_) {
+      const ObservedPoint& seen = measurement_.points[i];
+      const Eigen::Vector3d X_mm = mesh_.value(mesh_.reference(), point);
+      const Eigen::Vector3d moved_mm = mesh_.value(field.displacement_mm, point);
+      for (int k = 0; k < 3; ++k) {
+        const double known_mm = seen.x_mm[static_cast<size_t>(k)] - X_mm[k];
+        observations.push_back(
+            {displacement_along(mesh_, point, Eigen::Vector3d::Unit(k)), known_mm, seen.sigma_mm, 1.0});
+        field.rows.push_back({false, i, k, point, (known_mm - moved_mm[k]) / seen.sigma_mm, false});
+      }
+    }
+    return observations;
+  }
+
+ private:
+  const HermiteMesh& mesh_;
+  const Measurement& measurement_;
+  LocatorOptions options_;
+  PointLocator reference_;
+  std::vector<size_t> tags_;
+  std::vector<std::pair<size_t, MaterialPoint>> points_;
+  std::vector<size_t> points_not_found_;
+};
+
+double spread_of(const FrameField& field) {
+  std::vector<double> residuals;
+  residuals.reserve(field.rows.size());
+  for (const FieldRow& row : field.rows)
+    residuals.push_back(row.residual);
+  const auto count = static_cast<double>(residuals.size());
+  // A field of many freedoms takes part of the noise with it.
+  const double left = std::max(0.05, 1.0 - field.degrees_of_freedom / std::max(count, 1.0));
+  return robust_spread(std::move(residuals)) / std::sqrt(left);
+}
+
+/// Residuals of the linear problem at solution q, in units of sigma, whatever the rows' weights.
+std::vector<double> linear_residuals(const FieldSpace& space, const std::vector<ObservationRow>& rows,
+                                     const Eigen::VectorXd& q) {
+  std::vector<double> residuals;
+  residuals.reserve(rows.size());
+  for (const ObservationRow& row : rows) {
+    double fitted = 0.0;
+    const auto& unknowns = space.element_unknowns(row.functional.element);
+    for (size_t l = 0; l < element_coefficients; ++l) {
+      if (unknowns[l] >= 0)
+        fitted += row.functional.coefficients[static_cast<Eigen::Index>(l)] * q[unknowns[l]];
+    }
+    residuals.push_back((row.target - fitted) / row.sigma);
+  }
+  return residuals;
+}
+
+/// The first field: from rest, with Huber's weights, so that wild points do not tear it.
+Eigen::VectorXd first_solution(SmoothedSystem& system, std::vector<ObservationRow>& rows, bool robust) {
+  Eigen::VectorXd q;
+  for (int round = 0; round < (robust ? huber_rounds : 1); ++round) {
+    if (round > 0) {
+      const std::vector<double> residuals = linear_residuals(system.forms().space, rows, q);
+      const double spread = std::max(robust_spread(residuals), least_scale);
+      for (size_t i = 0; i < rows.size(); ++i)
+        rows[i].weight = huber_weight(residuals[i] / spread);
+    }
+    system.set_rows(rows);
+    system.factorise(first_lambda);
+    q = system.solution();
+  }
+  return q;
+}
+
+/// Tukey's weights in the second round, all or nothing from the third on.
+void weigh(std::vector<ObservationRow>& rows, FrameField& field, int round, double reject_sigma) {
+  field.scale = spread_of(field);
+  for (size_t i = 0; i < rows.size(); ++i) {
+    const double residual = field.rows[i].residual / std::max(field.scale, least_scale);
+    field.rows[i].rejected = round >= 2 && std::abs(residual) > reject_sigma;
+    rows[i].weight = round < 2 ? tukey_weight(residual) : field.rows[i].rejected ? 0.0 : 1.0;
+  }
+}
+
+void move_to(FrameField& field, const FieldSpace& space, const Eigen::VectorXd& q) {
+  field.displacement_mm = space.field_of(q);
+  field.position_mm = space.mesh().reference();
+  for (size_t dof = 0; dof < field.position_mm.size(); ++dof)
+    field.position_mm[dof] += field.displacement_mm[dof];
+}
+
+}  // namespace
+
+size_t FrameField::used() const {
+  return static_cast<size_t>(
+      std::count_if(rows.begin(), rows.end(), [](const FieldRow& row) { return !row.rejected; }));
+}
+
+double FrameField::chi2() const {
+  double sum = 0.0;
+  for (const FieldRow& row : rows)
+    sum += row.rejected ? 0.0 : row.residual * row.residual;
+  return sum;
+}
+
+double robust_spread(std::vector<double> values) {
+  if (values.empty()) return 0.0;
+  for (double& value : values)
+    value = std::abs(value);
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle / 0.6745;
+}
+
+FrameField reconstruct_frame(const FieldForms& forms, const Measurement& measurement, int frame,
+                             const FrameOptions& options) {
+  const FieldSpace& space = forms.space;
+  const FrameData data(space.mesh(), measurement, frame, options.locator);
+  FrameField field;
+  field.number = frame;
+  field.load = measurement.frames[static_cast<size_t>(frame)];
+  field.system = std::make_unique<SmoothedSystem>(forms);
+  SmoothedSystem& system = *field.system;
+  Eigen::VectorXd q = Eigen::VectorXd::Zero(space.unknowns());
+  move_to(field, space, q);
+  double lambda = options.lambda.value_or(first_lambda);
+  for (; field.rounds < most_rounds && !field.converged; ++field.rounds) {
+    std::vector<ObservationRow> rows = data.linearise(field);
+    Eigen::VectorXd moved;
+    if (field.rounds == 0) {
+      moved = first_solution(system, rows, options.robust);
+    } else {
+      if (options.robust) weigh(rows, field, field.rounds, options.reject_sigma);
+      system.set_rows(rows);
+      if (field.rounds == 1 && !options.lambda) {
+        field.smoothing = choose_lambda(system);
+        lambda = field.smoothing.lambda;
+      }
+      system.factorise(lambda);
+      moved = system.solution();
+      field.degrees_of_freedom = stochastic_trace(system, random_signs(system.weighted_rows().rows()));
+    }
+    const double change_mm = std::sqrt(forms.quadratic.apply(forms.sobolev.mean_square, moved - q));
+    field.converged = field.rounds >= least_rounds && change_mm < settled_mm;
+    q = moved;
+    move_to(field, space, q);
+  }
+  field.smoothing.lambda = lambda;
+  // Residuals where the field has come to rest; which rows count is the last round's choice.
+  std::vector<bool> rejected_tags(measurement.tags.size(), false),
+      rejected_points(3 * measurement.points.size());
+  for (const FieldRow& row : field.rows) {
+    if (row.of_tag) {
+      rejected_tags[row.source] = row.rejected;
+    } else {
+      rejected_points[3 * row.source + static_cast<size_t>(row.component)] = row.rejected;
+    }
+  }
+  std::vector<ObservationRow> rows = data.linearise(field);
+  for (size_t i = 0; i < rows.size(); ++i) {
+    FieldRow& row = field.rows[i];
+    row.rejected = row.of_tag ? rejected_tags[row.source]
+                              : rejected_points[3 * row.source + static_cast<size_t>(row.component)];
+    rows[i].weight = row.rejected ? 0.0 : 1.0;
+  }
+  system.set_rows(rows);
+  system.factorise(lambda);
+  field.scale = spread_of(field);
+  return field;
+}
+
+}  // namespace diastole

@@ -1,0 +1,73 @@
+#pragma once
+// The displacement field of one frame, from its tag points (and 3-D points): Eq. 2 of the paper.
+//
+//   FieldForms forms(mesh, weights);
+//   FrameField field = reconstruct_frame(forms, measurement, 5, options);
+//   forms.space.mesh().value(field.displacement_mm, point)            mm, at a material point
+//
+// The unknown is u(X) on the undeformed mesh, x = X + u. A tag point gives one residual, its error s along the tag's
+// normal (estimator/fit/tag_match.hpp); a 3-D point gives three. To first order in the change of u
+//
+//   s(u) = s(u0) − d · (u − u0)(X),        d = F⁻ᵀn / (n·F⁻¹n),
+//
+// so each round is a linear penalised problem (smoothed_system.hpp), and three or four rounds suffice. λ is chosen by
+// cross-validation in the second round, where the linearisation is already good.
+//
+// Wild points: rounds begin with Huber's weights and go on with Tukey's (iteratively re-weighted, scale from the
+// median absolute residual, so that a wrong sigma does not make every point wild). What then lies beyond
+// `reject_sigma` is left out and all else counts fully: the statistics are those of ordinary least squares again.
+
+#include <functional>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "estimator/io/measurement.hpp"
+#include "estimator/mesh/point_locator.hpp"
+#include "estimator/reconstruction/cross_validation.hpp"
+
+namespace diastole {
+
+struct FrameOptions {
+  std::optional<double> lambda;  ///< instead of cross-validation
+  bool robust = true;            ///< leave wild points out
+  double reject_sigma = 5.0;     ///< in units of the residuals' own spread
+  LocatorOptions locator{};      ///< how far outside the body a point may lie
+};
+
+struct FieldRow {
+  bool of_tag;
+  size_t source;        ///< index among the measurement's tags or points
+  int component;        ///< of a 3-D point; 0 for a tag
+  MaterialPoint point;  ///< X
+  double residual;      ///< s / sigma
+  bool rejected;
+};
+
+struct FrameField {
+  int number = 0;
+  Frame load{};
+  NodeField displacement_mm;
+  NodeField position_mm;
+  CrossValidation smoothing;
+  double degrees_of_freedom = 0.0;  ///< tr K, exact to its random signs
+  double scale = 0.0;               ///< spread of the residuals / sigma: 1 where sigma is right
+  std::vector<FieldRow> rows;
+  std::vector<size_t> tags_not_found;  ///< sources that lie nowhere on the moved body
+  std::vector<size_t> points_not_found;
+  int rounds = 0;
+  bool converged = false;                  ///< the last round moved the body by less than a micrometre RMS
+  std::unique_ptr<SmoothedSystem> system;  ///< of the last round: covariances
+
+  [[nodiscard]] size_t used() const;
+  [[nodiscard]] double chi2() const;  ///< of the rows that were used
+};
+
+/// Precondition: the frame has a point. `forms` must outlive the result.
+FrameField reconstruct_frame(const FieldForms& forms, const Measurement& measurement, int frame,
+                             const FrameOptions& options);
+
+/// Median absolute value / 0.6745: the standard deviation of normal numbers, blind to a few wild ones.
+double robust_spread(std::vector<double> values);
+
+}  // namespace diastole

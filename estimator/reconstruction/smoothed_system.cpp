@@ -1,0 +1,99 @@
+#include "estimator/reconstruction/smoothed_system.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace diastole {
+namespace {
+
+constexpr double unbounded_mm = 1000.0;  // U of the header
+constexpr size_t solved_at_once = 128;
+
+}  // namespace
+
+SmoothedSystem::SmoothedSystem(const FieldForms& forms) : forms_(forms), data_(forms.quadratic.zero()) {}
+
+void SmoothedSystem::set_rows(std::span<const ObservationRow> rows) {
+  data_ = forms_.quadratic.zero();
+  measured_ = static_cast<size_t>(
+      std::count_if(rows.begin(), rows.end(), [](const ObservationRow& row) { return row.weight > 0; }));
+  std::vector<std::vector<size_t>> of_element(forms_.space.mesh().element_count());
+  for (size_t i = 0; i < rows.size(); ++i)
+    of_element[rows[i].functional.element].push_back(i);
+  std::vector<Eigen::Triplet<double>> entries;
+  entries.reserve(rows.size() * element_coefficients);
+  targets_.setZero(static_cast<Eigen::Index>(rows.size()));
+  for (size_t e = 0; e < of_element.size(); ++e) {
+    if (of_element[e].empty()) continue;
+    const auto& unknowns = forms_.space.element_unknowns(e);
+    Eigen::MatrixXd block(element_coefficients, of_element[e].size());
+    for (size_t j = 0; j < of_element[e].size(); ++j) {
+      const size_t i = of_element[e][j];
+      const double factor = std::sqrt(rows[i].weight) / rows[i].sigma;
+      targets_[static_cast<Eigen::Index>(i)] = factor * rows[i].target;
+      block.col(static_cast<Eigen::Index>(j)) = factor * rows[i].functional.coefficients;
+      for (size_t l = 0; l < element_coefficients; ++l) {
+        if (unknowns[l] < 0) continue;
+        entries.emplace_back(static_cast<int>(i), unknowns[l],
+                             block(static_cast<Eigen::Index>(l), static_cast<Eigen::Index>(j)));
+      }
+    }
+    ElementMatrix matrix = ElementMatrix::Zero(element_coefficients, element_coefficients);
+    matrix.selfadjointView<Eigen::Lower>().rankUpdate(block);
+    forms_.quadratic.add(data_, e, matrix);
+  }
+  rows_.resize(static_cast<Eigen::Index>(rows.size()), forms_.space.unknowns());
+  rows_.setFromTriplets(entries.begin(), entries.end());
+}
+
+void SmoothedSystem::factorise_values(QuadraticForms::Values values) {
+  const Eigen::SparseMatrix<double> matrix = forms_.quadratic.matrix(values);
+  if (!analysed_) factor_.analyzePattern(matrix);
+  analysed_ = true;
+  factor_.factorize(matrix);
+}
+
+void SmoothedSystem::factorise(double lambda) {
+  lambda_ = lambda;
+  QuadraticForms::Values values = data_;
+  for (size_t i = 0; i < values.size(); ++i) {
+    values[i] +=
+        lambda * forms_.sobolev.smoothness[i] + forms_.sobolev.mean_square[i] / (unbounded_mm * unbounded_mm);
+  }
+  factorise_values(std::move(values));
+}
+
+void SmoothedSystem::factorise_without_smoothness(double amplitude_mm) {
+  lambda_ = 0.0;
+  QuadraticForms::Values values = data_;
+  for (size_t i = 0; i < values.size(); ++i)
+    values[i] += forms_.sobolev.mean_square[i] / (amplitude_mm * amplitude_mm);
+  factorise_values(std::move(values));
+}
+
+Eigen::VectorXd SmoothedSystem::solution() const {
+  const Eigen::VectorXd right_side = rows_.transpose() * targets_;
+  return solve(right_side);
+}
+
+Eigen::MatrixXd SmoothedSystem::solve(const Eigen::MatrixXd& right_sides) const {
+  return factor_.solve(right_sides);
+}
+
+std::vector<double> SmoothedSystem::variances(std::span<const Functional> functionals) const {
+  std::vector<double> result;
+  result.reserve(functionals.size());
+  for (size_t first = 0; first < functionals.size(); first += solved_at_once) {
+    const size_t count = std::min(solved_at_once, functionals.size() - first);
+    Eigen::MatrixXd columns =
+        Eigen::MatrixXd::Zero(forms_.space.unknowns(), static_cast<Eigen::Index>(count));
+    for (size_t j = 0; j < count; ++j)
+      forms_.space.add_to(columns.col(static_cast<Eigen::Index>(j)), functionals[first + j]);
+    const Eigen::MatrixXd solved = solve(columns);
+    for (Eigen::Index j = 0; j < static_cast<Eigen::Index>(count); ++j)
+      result.push_back(columns.col(j).dot(solved.col(j)));
+  }
+  return result;
+}
+
+}  // namespace diastole

@@ -1,0 +1,78 @@
+#pragma once
+// Penalised weighted least squares for a displacement field:
+//
+//   E(q) = Σ wᵢ (gᵢ·q − yᵢ)² / σᵢ²  +  λ S(q)  +  |u|²/U²          H = A + λ S + M/U²,  A = Σ wᵢ gᵢgᵢᵀ/σᵢ²
+//
+// The last term, U = 1000 mm RMS, is felt by nothing that data or smoothness feel; it only makes H definite when
+// no tag knows a rigid motion. H is factorised by CHOLMOD (supernodal Cholesky), its ordering found once.
+//
+// H⁻¹ is the covariance of q if the field were drawn from the prior that λ stands for (Wahba 1983, J. R. Stat.
+// Soc. B 45:133): its standard errors hold the mean square of smoothing's own bias as well as the noise.
+// One instance is used by one thread at a time; different ones may run at once.
+
+#include <Eigen/CholmodSupport>
+#include <span>
+#include <vector>
+
+#include "estimator/reconstruction/sobolev.hpp"
+
+namespace diastole {
+
+/// One measured number: g·q = target with standard deviation sigma.
+struct ObservationRow {
+  Functional functional;
+  double target = 0.0;
+  double sigma = 1.0;
+  double weight = 1.0;  ///< w: 0 leaves the row out
+};
+
+/// What a mesh needs once for all frames.
+struct FieldForms {
+  FieldForms(const HermiteMesh& mesh, const SobolevWeights& weights)
+      : space(mesh), quadratic(space), sobolev(sobolev_forms(space, quadratic, weights)) {}
+  FieldForms(const FieldForms&) = delete;
+  FieldForms& operator=(const FieldForms&) = delete;
+
+  FieldSpace space;
+  QuadraticForms quadratic;
+  SobolevForms sobolev;
+};
+
+class SmoothedSystem {
+ public:
+  /// `forms` must outlive this object.
+  explicit SmoothedSystem(const FieldForms& forms);
+
+  void set_rows(std::span<const ObservationRow> rows);
+  void factorise(double lambda);
+  /// H = A + M/u², without smoothness: what the data alone tell (coverage.hpp).
+  void factorise_without_smoothness(double amplitude_mm);
+
+  // All below belong to the last rows and the last factorisation.
+  [[nodiscard]] Eigen::VectorXd solution() const;
+  [[nodiscard]] Eigen::MatrixXd solve(const Eigen::MatrixXd& right_sides) const;
+  /// Variances of functionals: diagonal of C H⁻¹ Cᵀ, solved in blocks.
+  [[nodiscard]] std::vector<double> variances(std::span<const Functional> functionals) const;
+
+  /// Rows √w g/σ, and √w y/σ.
+  [[nodiscard]] const Eigen::SparseMatrix<double, Eigen::RowMajor>& weighted_rows() const { return rows_; }
+  [[nodiscard]] const Eigen::VectorXd& weighted_targets() const { return targets_; }
+  /// How many rows have a weight.
+  [[nodiscard]] size_t measured() const { return measured_; }
+  [[nodiscard]] const FieldForms& forms() const { return forms_; }
+  [[nodiscard]] double lambda() const { return lambda_; }
+
+ private:
+  void factorise_values(QuadraticForms::Values values);
+
+  const FieldForms& forms_;
+  QuadraticForms::Values data_;
+  Eigen::SparseMatrix<double, Eigen::RowMajor> rows_;
+  Eigen::VectorXd targets_;
+  size_t measured_ = 0;
+  double lambda_ = 0.0;
+  mutable Eigen::CholmodSupernodalLLT<Eigen::SparseMatrix<double>, Eigen::Lower> factor_;
+  bool analysed_ = false;
+};
+
+}  // namespace diastole
