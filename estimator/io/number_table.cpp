@@ -48,7 +48,9 @@ void check_header(std::string_view line, const std::string& file, std::span<cons
 
 NumberTable NumberTable::from_file(const std::filesystem::path& path,
                                    std::span<const std::string_view> columns) {
-  return from_text(read_whole_file(path), path.string(), columns);
+  constexpr const char* remedy =
+      "Check the path and that you may read the file; paths in a study are relative to the study.";
+  return from_text(read_whole_file(path, remedy), path.string(), columns);
 }
 
 NumberTable NumberTable::from_text(std::string_view text, std::string file,

@@ -58,12 +58,10 @@ void require_output(const OutputFile& output) {
   }
 }
 
-std::string read_whole_file(const fs::path& path) {
+std::string read_whole_file(const fs::path& path, const std::string& remedy) {
   std::ifstream stream(path, std::ios::binary);
   if (!stream || fs::is_directory(path)) {
-    throw InputError(
-        {path.string(), "", "cannot be opened",
-         "Check the path and that you may read the file; paths in a study are relative to the study."});
+    throw InputError({path.string(), "", "cannot be opened", remedy});
   }
   return {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
 }

@@ -23,7 +23,8 @@ struct OutputFile {
 /// become a file, is one of the inputs under whatever name, or holds something else and there is no `force`.
 void require_output(const OutputFile& output);
 
-/// Throws InputError if the file is missing, a folder or unreadable.
-std::string read_whole_file(const std::filesystem::path& path);
+/// Throws InputError, with this remedy, if the file is missing, a folder or unreadable.
+std::string read_whole_file(const std::filesystem::path& path,
+                            const std::string& remedy = "Check the path and that you may read the file.");
 
 }  // namespace diastole

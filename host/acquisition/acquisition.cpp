@@ -96,7 +96,7 @@ void Acquisition::follow_schedule() {
     remark("info", "prompt", schedule_->planned().prompt);
     tell_schedule();
   }
-  const std::optional<size_t> ready = hooks_.go_on();
+  const std::optional<size_t> ready = setup_.prompts_answered ? schedule_->slice() : hooks_.go_on();
   if (!ready) return;
   schedule_->go_on(*ready);
   prompted_ = schedule_->phase() == SliceTracker::Phase::waiting;

@@ -72,6 +72,7 @@ struct AcquisitionSetup {
   double planned_duration_s = 0;          ///< a run that has not ended well after this is broken off
   std::vector<PlannedSlice> slices = {};  ///< empty: no schedule
   LiveTrace* live = nullptr;              ///< shown to whoever looks on, or null
+  bool prompts_answered = false;  ///< the operator is waited for nowhere: each prompt is answered at once
 };
 
 class Acquisition {

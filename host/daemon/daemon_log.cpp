@@ -2,13 +2,14 @@
 
 #include <fmt/format.h>
 #include <spdlog/pattern_formatter.h>
-#include <spdlog/sinks/stdout_sinks.h>
 #include <spdlog/spdlog.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
 #include <cstdlib>
 #include <memory>
+
+#include "host/daemon/queued_sink.hpp"
 
 namespace diastole {
 namespace {
@@ -38,7 +39,7 @@ class JournalPriority final : public spdlog::custom_flag_formatter {
 }  // namespace
 
 void set_up_daemon_log() {
-  const auto log = spdlog::stderr_logger_mt("diastole");
+  const auto log = std::make_shared<spdlog::logger>("diastole", std::make_shared<QueuedSink>(STDERR_FILENO));
   if (journal_reads_standard_error()) {
     auto formatter = std::make_unique<spdlog::pattern_formatter>();
     formatter->add_flag<JournalPriority>('*').set_pattern("%*%v");

@@ -81,7 +81,9 @@ void run_start(RigService& rig, const json& params, Done done) {
     if (const auto found = points.find(name); found != points.end()) return *found;
     throw InputError({name, "", "was not sent with the experiment", "Send its text in `points`."});
   };
-  rig.start_run(parse_experiment(text, params.value("file", "experiment"), read_points), std::move(done));
+  rig.start_run({parse_experiment(text, params.value("file", "experiment"), read_points),
+                 params.value("prompts_answered", false)},
+                std::move(done));
 }
 
 void run_progress(RigService& rig, const json& params, const Done& done) {

@@ -1,7 +1,6 @@
 #include "host/daemon/rig_service.hpp"
 
 #include <fmt/format.h>
-#include <malloc.h>
 #include <spdlog/spdlog.h>
 #include <unistd.h>
 
@@ -10,15 +9,11 @@
 #include <chrono>
 #include <future>
 
-#include "host/acquisition/disk_room.hpp"
 #include "host/acquisition/journal_store.hpp"
 #include "host/controller/black_box_text.hpp"
 #include "host/controller/settings_values.hpp"
 #include "host/daemon/json_rpc.hpp"
 #include "host/daemon/utc.hpp"
-#include "host/daemon/uuid.hpp"
-#include "host/runfile/assemble.hpp"
-#include "host/runfile/writer.hpp"
 #include "host/transport/conducted_clock.hpp"
 #include "host/transport/real_time.hpp"
 #include "host/transport/serial_port.hpp"
@@ -49,31 +44,6 @@ std::unique_ptr<Clock> make_clock(const std::string& conductor, ServiceManager* 
   return std::make_unique<WatchedClock>(std::move(clock), [manager] { manager->beat(); });
 }
 
-/// For as long as it lives, the supervisor waits for work that does not sleep.
-class LongWork {
- public:
-  explicit LongWork(ServiceManager* manager) : manager_(manager) {
-    if (manager_ != nullptr) manager_->allow(long_work_patience);
-  }
-  ~LongWork() {
-    if (manager_ != nullptr) manager_->allow_no_more();
-  }
-  LongWork(const LongWork&) = delete;
-  LongWork& operator=(const LongWork&) = delete;
-
- private:
-  static constexpr std::chrono::minutes long_work_patience{10};
-  ServiceManager* manager_;
-};
-
-json attributes_as_json(const std::map<std::string, runfile::Attribute, std::less<>>& attributes) {
-  json object = json::object();
-  for (const auto& [name, value] : attributes) {
-    std::visit([&, key = name](const auto& v) { object[key] = v; }, value);
-  }
-  return object;
-}
-
 /// Names of the bits that are set in wire::Status::inputs; an input is active when pressed, closed or unplugged.
 json active_inputs(uint8_t bits) {
   constexpr std::array names{"estop", "home", "far_limit"};
@@ -81,40 +51,6 @@ json active_inputs(uint8_t bits) {
   for (size_t i = 0; i < names.size(); ++i)
     if ((bits >> i & 1U) != 0) active.push_back(names[i]);
   return active;
-}
-
-json planned_segments(const Experiment& experiment, const ProgramPlan& plan) {
-  json segments = json::array();
-  double start_s = experiment.rest_s;
-  for (size_t i = 0; i < experiment.segments.size(); ++i) {
-    const ExperimentSegment& segment = experiment.segments[i];
-    if (i < plan.size()) start_s = 1e-6 * static_cast<double>(plan[i].start_us);
-    segments.push_back({{"start_s", start_s},
-                        {"waveform", segment.waveform_name},
-                        {"stroke_mL", segment.stroke_mL},
-                        {"period_s", segment.period_s},
-                        {"offset_mL", segment.offset_mL},
-                        {"cycles", segment.cycles}});
-    start_s += segment.period_s * static_cast<double>(segment.cycles);
-  }
-  return segments;
-}
-
-/// What uploaded segments follow, by segment.
-json played_waveforms(const Experiment& experiment) {
-  json waveforms = json::array();
-  for (size_t i = 0; i < experiment.segments.size(); ++i) {
-    if (!experiment.segments[i].upload) continue;
-    const ExperimentWaveform& waveform = experiment.waveforms[*experiment.segments[i].upload];
-    waveforms.push_back(
-        {{"segment", i}, {"points", waveform.points.text}, {"fraction", waveform.even.fractions()}});
-  }
-  return waveforms;
-}
-
-double duration_s(const Experiment& experiment, const ProgramPlan& plan) {
-  if (plan.empty()) return experiment.least_duration_s();
-  return 1e-6 * static_cast<double>(plan.back().start_us + plan.back().duration_us);
 }
 
 void make_journal_dir(const std::filesystem::path& directory) {
@@ -126,27 +62,6 @@ void make_journal_dir(const std::filesystem::path& directory) {
   }
 }
 
-/// What the controller's own settings say of the rig; the volume of a step is the calibrated one.
-void add_settings(json& rig, const ControllerClient& controller) {
-  const wire::SettingsReport& report = controller.settings();
-  const json own = settings_as_json(report.settings);
-  for (const char* name : {"calibration_ppm", "backlash_um", "travel_mm", "full_step_rate_Hz", "board_name"})
-    rig[name] = own.at(name);
-  rig["settings_record"] = report.records_written;
-  rig["volume_per_step_mL"] = 1e-9 * controller.microstep_pL();
-}
-
-/// What the controller was held to.
-void add_limits(json& rig, const ControllerConfig& controller) {
-  const MotionLimits& limits = controller.limits;
-  rig["limit_travel_mL"] = limits.travel_mL;
-  rig["limit_flow_mL_s"] = limits.flow_mL_s;
-  rig["limit_acceleration_mL_s2"] = limits.acceleration_mL_s2;
-  rig["limit_step_rate_Hz"] = limits.step_rate_Hz;
-  rig["limit_pressure_kPa"] = limits.pressure_kPa;
-  rig["lease_ms"] = controller.lease_ms;
-}
-
 json schedule_as_json(const std::optional<ScheduleProgress>& schedule) {
   if (!schedule) return nullptr;
   return {{"block", schedule->block},
@@ -155,6 +70,11 @@ json schedule_as_json(const std::optional<ScheduleProgress>& schedule) {
           {"phase", schedule->phase},
           {"cycles_left", schedule->cycles_left},
           {"prompt", schedule->prompt}};
+}
+
+[[noreturn]] void refuse_while(const std::string& activity) {
+  throw rpc::Error(rpc::Code::busy,
+                   fmt::format("the rig is {}; wait, or stop it first (diastole stop)", activity));
 }
 
 /// A simulated rig's instrument reads as the rig file says, whatever the real one's calibration.
@@ -268,10 +188,7 @@ void RigService::give(Order order) {
   const std::lock_guard lock(mutex_);
   if (ending_) throw HardwareError("daemon", "is ending", "Start it again.");
   if (!order.activity.empty()) {
-    if (!activity_.empty()) {
-      throw rpc::Error(rpc::Code::busy,
-                       fmt::format("the rig is {}; wait, or stop it first (diastole stop)", activity_));
-    }
+    if (!activity_.empty()) refuse_while(activity_);
     activity_ = order.activity;
     stop_request_ = StopRequest::none;
   }
@@ -327,11 +244,11 @@ void RigService::refuse_after_motion() const {
                       "See that nothing is amiss, then give the order again.");
 }
 
-void RigService::start_run(Experiment experiment, Done done) {
+void RigService::start_run(RunOrder order, Done done) {
   // do_run answers by itself when the run begins, long before it ends; a discarded result says so.
   give({"loading",
-        [this, experiment = std::move(experiment), done] {
-          do_run(experiment, done);
+        [this, order = std::move(order), done] {
+          do_run(order, done);
           return json(json::value_t::discarded);
         },
         done});
@@ -380,7 +297,11 @@ void RigService::write_settings(SettingsChange change, Done done) {
 }
 
 void RigService::black_box(Done done) {
-  give({"reading_black_box", [this] { return do_black_box(); }, std::move(done)});
+  {
+    const std::lock_guard lock(mutex_);
+    if (!activity_.empty()) refuse_while(activity_);
+  }
+  ask(black_box_askers_, &RigService::do_black_box, std::move(done));
 }
 
 void RigService::status(Done done) {
@@ -394,27 +315,28 @@ void RigService::status(Done done) {
     }
   }
   if (!snapshot.is_null()) return done(nullptr, std::move(snapshot));
+  ask(status_askers_, &RigService::do_status, std::move(done));
+}
+
+void RigService::ask(std::vector<Done>& askers, json (RigService::*answer)(), Done done) {
   bool first = false;
   {
     const std::lock_guard lock(mutex_);
-    first = status_askers_.empty();
-    status_askers_.push_back(std::move(done));
+    first = askers.empty();
+    askers.push_back(std::move(done));
   }
-  if (first) answer_status();
-}
-
-void RigService::answer_status() {
-  const auto answer_all = [this](const std::exception_ptr& error, const json& result) {
-    std::vector<Done> askers;
+  if (!first) return;
+  const auto answer_all = [this, &askers](const std::exception_ptr& error, const json& result) {
+    std::vector<Done> all;
     {
       const std::lock_guard lock(mutex_);
-      askers.swap(status_askers_);
+      all.swap(askers);
     }
-    for (const Done& asker : askers)
+    for (const Done& asker : all)
       asker(error, result);
   };
   try {
-    give({"", [this] { return do_status(); }, answer_all});
+    give({"", [this, answer] { return (this->*answer)(); }, answer_all});
   } catch (...) {
     answer_all(std::current_exception(), nullptr);
   }
@@ -602,163 +524,6 @@ json RigService::remember(const wire::Status& status) {
   return result;
 }
 
-void RigService::do_run(const Experiment& experiment, const Done& done) {
-  (void)do_status();
-  const daq::RatePlan rate = instrument_->plan_rate(experiment.sample_rate_Hz);
-  const ProgramPlan plan = controller_->load(experiment);
-  RunRecord record;
-  record.run_id = new_uuid();
-  record.planned_s = duration_s(experiment, plan);
-  record.estimate_s = experiment.schedule ? experiment.estimate_s() : record.planned_s;
-  record.planned_cycles = experiment.planned_cycles();
-  check_disk(record, rate.rate_Hz, experiment.cycles());
-  const std::filesystem::path path =
-      std::filesystem::absolute(rig_.daemon.journal_dir) / (record.run_id + ".journal");
-  JournalWriter journal(path);
-  write_beginning(journal, record, experiment, plan, rate.rate_Hz);
-  live_.begin(record.run_id, rate.rate_Hz, controller_->hello().tick_rate_Hz);
-  if (!begin(record)) {
-    std::filesystem::remove(path);
-    controller_->unload();
-    refuse_to_start();
-  }
-  spdlog::info("run {} begins: {} cycles, {:.1f} s", record.run_id, record.planned_cycles, record.planned_s);
-  done(nullptr,
-       {{"run_id", record.run_id}, {"journal", path.string()}, {"run_file", run_file_beside(path).string()}});
-  json result;
-  try {
-    result = finish(path, acquire(journal, experiment, rate, record.planned_s));
-  } catch (const std::exception& error) {
-    if (controller_->connected()) controller_->stop_now();  // nothing moves unrecorded
-    result = {{"end", "failed"}, {"problem", error.what()}, {"journal", path.string()}};
-  }
-  ::malloc_trim(0);  // what the run file was made in is no more needed
-  spdlog::info("run {} ended: {}", record.run_id, result.dump());
-  tidy_journals();
-  const std::lock_guard lock(mutex_);
-  run_->state = result.contains("run_file") ? "done" : "failed";
-  run_->result = std::move(result);
-  activity_.clear();
-}
-
-void RigService::check_disk(const RunRecord& record, double sample_rate_Hz, int64_t most_cycles) {
-  try {
-    check_room(rig_.daemon.journal_dir, {record.planned_s, sample_rate_Hz, controller_->position_rate_Hz(),
-                                         rig_.daq.channels.size(), static_cast<uint64_t>(most_cycles)});
-  } catch (const InputError&) {
-    controller_->unload();
-    throw;
-  }
-}
-
-void RigService::tidy_journals() {
-  const auto& [directory, keep_days] = std::pair(rig_.daemon.journal_dir, rig_.daemon.keep_days);
-  if (keep_days > 0) {
-    const auto before = std::filesystem::file_time_type::clock::now() - std::chrono::hours(24 * keep_days);
-    for (const auto& removed : prune_journals(directory, before)) {
-      spdlog::info("{} was removed: its run file is older than {} days", removed.string(), keep_days);
-    }
-  }
-  uint64_t bytes = 0;
-  int64_t without_run_file = 0;
-  const auto journals = stored_journals(directory);
-  for (const StoredJournal& journal : journals) {
-    bytes += journal.bytes;
-    without_run_file += journal.has_run_file ? 0 : 1;
-  }
-  const std::lock_guard lock(mutex_);
-  journals_ = {{"directory", std::filesystem::absolute(directory).string()},
-               {"count", journals.size()},
-               {"bytes", bytes},
-               {"without_run_file", without_run_file},
-               {"keep_days", keep_days}};
-}
-
-bool RigService::begin(const RunRecord& record) {
-  const std::lock_guard lock(mutex_);
-  if (stop_request_ != StopRequest::none) return false;
-  run_ = record;
-  notes_.clear();
-  go_on_.reset();
-  activity_ = "running";
-  return true;
-}
-
-void RigService::write_beginning(JournalWriter& journal, const RunRecord& record,
-                                 const Experiment& experiment, const ProgramPlan& plan,
-                                 double sample_rate_Hz) {
-  json channels = json::array();
-  for (const ChannelConfig& channel : rig_.daq.channels)
-    channels.push_back(channel.name);
-  json rig = attributes_as_json(rig_.attributes);
-  rig.update(attributes_as_json(book_.attributes()));
-  rig["daq_rate_Hz"] = sample_rate_Hz;
-  add_settings(rig, *controller_);
-  add_limits(rig, rig_.controller);
-  const TimerFacts timer = make_source(*clock_, *instrument_)->timer(sample_rate_Hz);
-  const json beginning{{"record", "begin"},
-                       {"run_id", record.run_id},
-                       {"started_utc", utc_now()},
-                       {"producer", options_.producer},
-                       {"experiment", experiment.text},
-                       {"experiment_file", experiment.file},
-                       {"sample_rate_Hz", sample_rate_Hz},
-                       {"channels", channels},
-                       {"rig", rig},
-                       {"instrument", instrument_->describe()},
-                       {"tick_rate_Hz", controller_->hello().tick_rate_Hz},
-                       {"microstep_pL", controller_->microstep_pL()},
-                       {"daq_timer_rate_Hz", std::max(1.0, timer.rate_Hz)},
-                       {"daq_timer_counts_samples", timer.counts_samples},
-                       {"segments", planned_segments(experiment, plan)},
-                       {"trigger_delay_s", 1e-3 * experiment.trigger_delay_ms},
-                       {"waveforms", played_waveforms(experiment)}};
-  if (!journal.append(RecordKind::document, beginning.dump())) {
-    throw HardwareError(journal.path().string(), journal.problem(), "Free some space on that disk.");
-  }
-}
-
-RunOutcome RigService::acquire(JournalWriter& journal, const Experiment& experiment,
-                               const daq::RatePlan& rate, double planned_s) {
-  std::vector<PlannedSlice> slices;
-  if (experiment.schedule) slices = planned_slices(*experiment.schedule);
-  std::vector<std::string> warnings;
-  if (!rate.warning.empty()) warnings.push_back(rate.warning);
-  const auto samples = make_source(*clock_, *instrument_);
-  Acquisition acquisition(*clock_, *controller_, *samples, journal,
-                          {rate.rate_Hz, rig_.daq.channels, std::move(warnings), gate_.get(), planned_s,
-                           std::move(slices), &live_});
-  return acquisition.run({
-      .stop =
-          [this] {
-            const std::lock_guard lock(mutex_);
-            return stop_request_;
-          },
-      .go_on =
-          [this] {
-            const std::lock_guard lock(mutex_);
-            return std::exchange(go_on_, std::nullopt);
-          },
-      .notes =
-          [this] {
-            const std::lock_guard lock(mutex_);
-            return std::exchange(notes_, {});
-          },
-      .progress =
-          [this](const RunProgress& progress) {
-            if (controller_->connected()) (void)remember(controller_->last_known());
-            const std::lock_guard lock(mutex_);
-            run_->progress = progress;
-          },
-      .remark =
-          [this](const RunRemark& remark) {
-            spdlog::log(remark.level == "info" ? spdlog::level::info : spdlog::level::warn, "{}",
-                        remark.text);
-            keep(remark);
-          },
-  });
-}
-
 void RigService::beside_the_line(const std::function<void()>& work) {
   auto done = std::async(std::launch::async, work);
   while (!clock_->stands_still() && done.wait_for(std::chrono::seconds(0)) != std::future_status::ready) {
@@ -769,31 +534,6 @@ void RigService::beside_the_line(const std::function<void()>& work) {
     }
   }
   done.get();
-}
-
-json RigService::finish(const std::filesystem::path& journal, const RunOutcome& outcome) {
-  {
-    const std::lock_guard lock(mutex_);
-    run_->state = "writing";
-    activity_ = "writing";
-  }
-  const LongWork writing(options_.manager);
-  json result{{"end", outcome.end}, {"regular", outcome.regular()}, {"journal", journal.string()}};
-  const std::filesystem::path run_file = run_file_beside(journal);
-  AssembledRun assembled;
-  beside_the_line([&] {
-    assembled = assemble_run(read_journal(journal));
-    write_run(run_file, assembled.run);
-  });
-  result["run_file"] = run_file.string();
-  result["cycles"] = outcome.cycles;
-  result["triggers"] = assembled.run.trigger_s.size();
-  result["samples"] = assembled.samples_received;
-  result["gaps"] = assembled.samples_missing;
-  result["errors"] = std::count_if(assembled.run.events.begin(), assembled.run.events.end(),
-                                   [](const runfile::Event& event) { return event.level == "error"; });
-  result["expected"] = assembled.samples_received + assembled.samples_missing;
-  return result;
 }
 
 }  // namespace diastole

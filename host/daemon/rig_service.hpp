@@ -46,6 +46,11 @@ struct CalibrationOrder {
   std::string operator_name;
 };
 
+struct RunOrder {
+  Experiment experiment;
+  bool prompts_answered = false;  ///< AcquisitionSetup::prompts_answered
+};
+
 class RigService {
  public:
   /// Called once on the rig's thread: with an error, or with a result.
@@ -63,7 +68,7 @@ class RigService {
   /// Loads and starts an experiment. `done` is called when the controller has accepted it and the run begins
   /// ({"run_id", "journal", "run_file"}: where it is being written, and what is made of it at the end), or with
   /// InputError when it cannot be done, HardwareError when it was stopped before the start.
-  void start_run(Experiment experiment, Done done);
+  void start_run(RunOrder order, Done done);
   void home(Done done);
   void clear_fault(Done done);
   /// Relative, inflate positive; `done` when it is at rest again.
@@ -77,7 +82,8 @@ class RigService {
   };
   /// `done` with what settings() then tells. The pump is unhomed afterwards.
   void write_settings(SettingsChange change, Done done);
-  /// {"entries": [{"number", "boot", "time_s", "kind", "text"}], oldest first, "since_power_on"}.
+  /// {"entries": [{"number", "boot", "time_s", "kind", "text"}], oldest first, "since_power_on"}. Throws rpc::Error busy
+  /// while the rig is occupied; does not occupy it.
   void black_box(Done done);
   /// {"file", "channels": [{"name", "samples", "mean_V", "noise_kPa", "drift_kPa", "points", "kPa_per_V", "zero_V"}]}.
   /// HardwareError, and nothing changed, when samples are missing, or noise or drift is too high for rest.
@@ -128,7 +134,8 @@ class RigService {
   /// Runs `work` on a thread of no priority; the line to the controller stays alive meanwhile.
   void beside_the_line(const std::function<void()>& work);
   void give(Order order);
-  void answer_status();
+  /// One order answers all who ask until it is carried out.
+  void ask(std::vector<Done>& askers, nlohmann::json (RigService::*answer)(), Done done);
   void keep(const RunRemark& remark);
   [[nodiscard]] std::optional<Order> next_order();
   void carry_out(Order order);
@@ -149,14 +156,14 @@ class RigService {
   [[noreturn]] void refuse_to_start() const;
   [[noreturn]] void refuse_after_motion() const;
   bool begin(const RunRecord& record);
-  /// Throws InputError, the program unloaded, if the journals' disk cannot hold the run.
+  /// Throws InputError if the journals' disk cannot hold the run.
   void check_disk(const RunRecord& record, double sample_rate_Hz, int64_t most_cycles);
   /// Removes what need not be kept (journal_store.hpp) and counts the rest.
   void tidy_journals();
-  void do_run(const Experiment& experiment, const Done& done);
+  void do_run(const RunOrder& order, const Done& done);
   void write_beginning(JournalWriter& journal, const RunRecord& record, const Experiment& experiment,
                        const ProgramPlan& plan, double sample_rate_Hz);
-  RunOutcome acquire(JournalWriter& journal, const Experiment& experiment, const daq::RatePlan& rate,
+  RunOutcome acquire(JournalWriter& journal, const RunOrder& order, const daq::RatePlan& rate,
                      double planned_s);
   nlohmann::json finish(const std::filesystem::path& journal, const RunOutcome& outcome);
 
@@ -173,9 +180,9 @@ class RigService {
   mutable InheritingMutex mutex_;  // the server's thread, which has no priority, holds it too
   std::condition_variable_any wake_;
   std::deque<Order> orders_;
-  std::vector<Done> status_askers_;  // one order answers them all
-  std::vector<RunRemark> notes_;     // for the run that is on
-  std::string activity_;             // empty: none
+  std::vector<Done> status_askers_, black_box_askers_;
+  std::vector<RunRemark> notes_;  // for the run that is on
+  std::string activity_;          // empty: none
   bool ending_ = false;
   StopRequest stop_request_ = StopRequest::none;
   std::optional<size_t> go_on_;  // the slice that the operator is ready for

@@ -96,8 +96,10 @@ SessionResult run_session(DaemonClient& daemon, const SessionOptions& options) {
   json points = json::object();
   for (const ExperimentWaveform& waveform : experiment.waveforms)
     points[waveform.name] = waveform.points.text;
-  const json begun = daemon.call(
-      "run.start", {{"experiment", experiment.text}, {"file", experiment.file}, {"points", points}});
+  const json begun = daemon.call("run.start", {{"experiment", experiment.text},
+                                               {"file", experiment.file},
+                                               {"points", points},
+                                               {"prompts_answered", options.prompts_answered}});
   const json result = follow(daemon, options, begun);
   if (!result.contains("run_file")) {
     throw HardwareError(

@@ -41,6 +41,7 @@ struct SessionOptions {
   std::function<void(const SessionProgress&)> progress = [](const SessionProgress&) {};
   /// Whether the operator has said since the last question that he is ready; asked with every question for progress.
   std::function<bool()> ready = [] { return false; };
+  bool prompts_answered = false;  ///< nobody is waited for: the daemon goes on at each prompt by itself
   /// How often the user has asked to stop (Ctrl-C): 1 at the cycle's end, 2 or more now.
   std::function<int()> stops_asked = [] { return 0; };
 };

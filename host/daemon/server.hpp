@@ -5,7 +5,8 @@
 //   rig.status                                      anybody       RigService::status, and who controls the rig
 //   run.progress    {first_remark}                  anybody       RigService::run_progress
 //   run.stop        {how: "cycle_end"|"now"|"halt"} anybody       {stopping}
-//   run.start       {experiment, file, points}      controller    {run_id, journal, run_file}
+//   run.start       {experiment, file, points, prompts_answered}
+//                                                   controller    {run_id, journal, run_file}
 //   rig.home                                        controller    status
 //   rig.zero        {channels, seconds, operator}   controller    RigService::calibrate; no channels: all
 //   rig.calibrate   {channels: [one], kPa, seconds, operator}
@@ -32,7 +33,8 @@
 // holds the control until it releases it or closes, or until another takes it over by naming the holder
 // (control_lease.hpp); a takeover is an event of the log and of the run.
 //
-// `points` holds the text of each points file that the experiment names: {name: text}.
+// `points` holds the text of each points file that the experiment names: {name: text}. With `prompts_answered` the
+// operator is waited for nowhere.
 //
 // No client costs the rig anything (connection.hpp): a line is bounded, and so are the answers that a client
 // leaves unread, its requests a second and the time for a line; beyond most_connections the one that has said

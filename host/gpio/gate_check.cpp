@@ -16,7 +16,7 @@ GateCheck::GateCheck(GateInputs& inputs) : inputs_(inputs) {
 
 void GateCheck::take(std::vector<GateRemark>& out, uint64_t now_ns) {
   const GateReading reading = inputs_.take();
-  pulses_ += reading.pulse_ns.size();
+  pulses_ += reading.pulses;
   may_have_lost_ = may_have_lost_ || reading.may_have_lost;
   for (const EstopChange& change : reading.estop_changes) {
     if (change.pressed) {  // also one that is released again is to be reported

@@ -112,7 +112,7 @@ class GpioInputs final : public GateInputs {
     if (count < 0) return fail(std::strerror(errno)), false;
     const std::lock_guard lock(mutex_);
     for (int i = 0; i < count; ++i)
-      seen_.pulse_ns.push_back(ns_of(events[static_cast<size_t>(i)].ts));
+      seen_.note_pulse(ns_of(events[static_cast<size_t>(i)].ts));
     if (count == kernel_buffer_events) seen_.may_have_lost = true;
     return true;
   }
@@ -140,7 +140,7 @@ class GpioInputs final : public GateInputs {
   void note_estop(const EstopChange& change) {
     const std::lock_guard lock(mutex_);
     pressed_ = change.pressed;
-    seen_.estop_changes.push_back(change);
+    seen_.note_estop(change);
   }
 
   void fail(const std::string& problem) {
@@ -159,6 +159,16 @@ class GpioInputs final : public GateInputs {
 };
 
 }  // namespace
+
+void GateReading::note_pulse(uint64_t host_ns) {
+  ++pulses;
+  if (pulse_ns.size() < most_kept) pulse_ns.push_back(host_ns);
+}
+
+void GateReading::note_estop(const EstopChange& change) {
+  if (estop_changes.size() == most_kept) estop_changes.pop_back();
+  estop_changes.push_back(change);
+}
 
 std::unique_ptr<GateInputs> open_gpio(const GpioConfig& config) {
   return std::make_unique<GpioInputs>(config);

@@ -24,12 +24,18 @@ struct EstopChange {
   bool edge_seen = true;  ///< false: only the level tells it; the edge was lost
 };
 
-/// Since the last one was taken.
+/// Since the last one was taken, however long ago: a noisy line at rest fills no memory.
 struct GateReading {
-  std::vector<uint64_t> pulse_ns;  ///< one a rising edge of the gating line, in order
-  bool may_have_lost = false;      ///< the kernel's buffer was found full: more pulses may have come
-  std::vector<EstopChange> estop_changes;
-  std::string problem;  ///< the lines can no longer be read
+  static constexpr size_t most_kept = 4096;
+
+  uint64_t pulses = 0;                     ///< rising edges of the gating line
+  std::vector<uint64_t> pulse_ns;          ///< when the first `most_kept` of them came, in order
+  bool may_have_lost = false;              ///< the kernel's buffer was found full: more pulses may have come
+  std::vector<EstopChange> estop_changes;  ///< the first most_kept - 1 and the last
+  std::string problem;                     ///< the lines can no longer be read
+
+  void note_pulse(uint64_t host_ns);
+  void note_estop(const EstopChange& change);
 };
 
 class GateInputs {

@@ -74,7 +74,7 @@ bool Door::is_own(std::string_view name) const {
   if (own == "localhost") return true;
   if (const auto address = address_of(own)) return reaches_beyond_this_machine() || address->is_loopback();
   if (!reaches_beyond_this_machine() || machine_.empty()) return false;
-  return own == machine_ || own.starts_with(machine_ + ".");
+  return own == machine_ || own == machine_.substr(0, machine_.find('.'));
 }
 
 std::optional<Refusal> Door::check_place(std::string_view host,
@@ -82,8 +82,8 @@ std::optional<Refusal> Door::check_place(std::string_view host,
   if (!is_own(split(host).name)) {
     return Refusal{
         403,
-        "This console answers to an address (http://127.0.0.1:8600) only, not to whatever name points "
-        "to it. Open the address that the daemon printed."};
+        "This console answers to an address (http://127.0.0.1:8600) or this machine's own name only, not to "
+        "whatever name points to it. Open the address that the daemon printed."};
   }
   const std::string own = lower(host);
   if (origin && lower(*origin) != "http://" + own && lower(*origin) != "https://" + own) {

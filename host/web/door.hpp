@@ -35,7 +35,8 @@ struct Refusal {
 
 class Door {
  public:
-  /// New tokens; `machine`: the machine's own name.
+  /// New tokens; `machine`: the machine's own name, as gethostname tells it. Beyond loopback it is taken as it is and
+  /// up to its first dot, and no other: whoever owns a domain can make MACHINE.his.domain point here.
   Door(const ConsoleAddress& address, std::string machine);
 
   /// `origin`: none when the header is absent, as with clients that are no browsers.

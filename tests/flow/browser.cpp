@@ -3,6 +3,7 @@
 #include <fcntl.h>
 #include <gtest/gtest.h>
 #include <poll.h>
+#include <sys/socket.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -69,7 +70,9 @@ std::string Browser::program() {
 
 Browser::Browser(const Workplace& place, int width, int height) {
   std::array<int, 2> to{}, from{};
-  if (::pipe2(to.data(), O_CLOEXEC) != 0 || ::pipe2(from.data(), O_CLOEXEC) != 0)
+  // Commands go through a socket: writing to a browser that has ended is an error then, and no signal.
+  if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, to.data()) != 0 ||
+      ::pipe2(from.data(), O_CLOEXEC) != 0)
     throw std::runtime_error("no pipe");
   const std::string profile = (place / "browser").string(), log = (place / "browser-log").string();
   std::filesystem::create_directory(profile);
@@ -97,6 +100,12 @@ Browser::ProcessGroup::~ProcessGroup() {
 void Browser::resize(int width, int height) {
   command("Emulation.setDeviceMetricsOverride",
           {{"width", width}, {"height", height}, {"deviceScaleFactor", 1}, {"mobile", false}});
+}
+
+void Browser::close() {
+  ::kill(-processes_.leader, SIGKILL);
+  siginfo_t ended{};
+  ::waitid(P_PID, static_cast<id_t>(processes_.leader), &ended, WEXITED | WNOWAIT);
 }
 
 json Browser::next_message() {
@@ -130,7 +139,7 @@ json Browser::command(const std::string& method, const json& params) {
   json message{{"id", id}, {"method", method}, {"params", params}};
   if (!session_.empty()) message["sessionId"] = session_;
   const std::string text = message.dump() + '\0';
-  if (::write(commands_.get(), text.data(), text.size()) != static_cast<ssize_t>(text.size())) {
+  if (::send(commands_.get(), text.data(), text.size(), MSG_NOSIGNAL) != static_cast<ssize_t>(text.size())) {
     throw std::runtime_error("the browser has ended");
   }
   while (true) {

@@ -19,6 +19,8 @@ class Browser {
   Browser(const Workplace& place, int width, int height);
   void open(const std::string& url);
   void resize(int width, int height);
+  /// Ends it; whatever is asked of it afterwards throws std::runtime_error.
+  void close();
   /// The value of a JavaScript expression; a failed expectation and null if it throws.
   nlohmann::json value(const std::string& expression);
   /// Waits until the expression is true; a failed expectation after a minute.

@@ -222,6 +222,28 @@ TEST_P(BadInputTest, IsToldWithPlaceValueAndRemedyAndLeavesNothing) {
 INSTANTIATE_TEST_SUITE_P(Table, BadInputTest, testing::ValuesIn(table()),
                          [](const auto& each) { return each.param.name; });
 
+TEST(BadOption, IsToldWithItsNameItsValueAndWhatIsExpected) {
+  const Workplace place;
+  const auto told = [&](const std::vector<std::string>& words) {
+    const Ended ended = run(place, words);
+    EXPECT_EQ(ended.exit_code, 2);
+    return ended.err;
+  };
+  EXPECT_THAT(told({"diastole", "simulate", "e.toml", "-o", "e.run.h5", "--seed", "many"}),
+              testing::AllOf(HasSubstr("--seed: \"many\" is not a whole number"),
+                             HasSubstr("`diastole simulate --help` explains it")));
+  EXPECT_THAT(told({"diastole", "jog", "--mL", "5mL"}), HasSubstr("--mL: \"5mL\" is not a number"));
+}
+
+TEST(BadMeshFile, IsToldWithoutTalkOfStudies) {
+  const Workplace place;
+  const Ended ended =
+      run(place, {"diastole", "mesh", "import", "no.exnode", "no.exelem", "-o", "m.mesh.toml"});
+  EXPECT_EQ(ended.exit_code, 2);
+  EXPECT_THAT(ended.err, testing::AllOf(HasSubstr("no.exnode"), HasSubstr("cannot be opened"),
+                                        testing::Not(HasSubstr("study"))));
+}
+
 TEST(Help, SaysWhatStandardOutputHoldsAfterAnError) {
   const Workplace place;
   const Ended help = run(place, {"diastole", "--help"});

@@ -140,9 +140,21 @@ TEST_F(ByHand, ADaemonThatFindsThePumpRunningStopsItAndSaysSo) {
   EXPECT_THAT(status.out,
               AllOf(HasSubstr("state     homed"), HasSubstr("found running"), HasSubstr("was stopped")));
   EXPECT_EQ(diastole({"status", "--json"}).json()["steps"], diastole({"status", "--json"}).json()["steps"]);
+  EXPECT_EQ(diastole({"blackbox"}).exit_code, 0);
+  EXPECT_THAT(diastole({"status"}).out, HasSubstr("found running")) << "whoever only reads changes nothing";
   const Ended jog = diastole({"jog", "--mL", "1"});
   EXPECT_EQ(jog.exit_code, 0) << jog.err;
   EXPECT_THAT(diastole({"status"}).out, Not(HasSubstr("found running")));
+}
+
+TEST_F(ByHand, WhoReadsTheBlackBoxKeepsNobodyFromTheRig) {
+  auto client = rig.client();
+  client.call("rig.home");
+  for (int i = 0; i < 20; ++i) {
+    const Hasty reader(rig.path("socket"), "rig.black_box", json::object());
+    const Hasty another(rig.path("socket"), "rig.black_box", json::object());
+    EXPECT_NO_THROW(client.call("rig.jog", {{"mL", i % 2 == 0 ? 1 : -1}, {"rate_mL_s", 5}}));
+  }
 }
 
 TEST_F(ByHand, SettingsInForceGoIntoTheRunFile) {

@@ -134,5 +134,64 @@ TEST_F(ConsolePage, WithoutTheDaemonWhatIsShownIsStaleAtOnceAndAWrongTokenIsTold
   wait_for("lost-text", "diastole console");
 }
 
+TEST_F(ConsolePage, AStopThatNobodyConfirmsSaysSoAtOnceWhateverIsShown) {
+  begin();
+  wait_for("state", "Not homed");
+  ::kill(rig->daemon->pid(), SIGSTOP);
+  browser->wait_until("document.body.classList.contains('stale')");
+  browser->press("Escape");
+  wait_for("problem-title", "The daemon has not confirmed the stop: press the emergency stop");
+  EXPECT_EQ(browser->value("document.getElementById('problem-dialog').open"), true);
+  ::kill(rig->daemon->pid(), SIGCONT);
+}
+
+TEST_F(ConsolePage, APageThatTheBrowserLetsSleepKeepsItsConnectionAndItsControl) {
+  begin();
+  wait_for("state", "Not homed");
+  click("take");
+  fill_in("name", "anna");
+  click("name-now");
+  wait_for("control-text", "control: you");
+  // Its timers come a minute late, at a moment when an answer is still on its way.
+  ::kill(rig->daemon->pid(), SIGSTOP);
+  browser->value("{ const now = performance.now.bind(performance); performance.now = () => now() + 60000; }");
+  browser->wait_until("document.body.classList.contains('stale')");
+  ::kill(rig->daemon->pid(), SIGCONT);
+  browser->wait_until("!document.body.classList.contains('stale')");
+  wait_for("control-text", "control: you");
+  size_t connections = 0;
+  for (const std::string& each : browser->requested_urls())
+    connections += each.starts_with("ws://") ? 1 : 0;
+  EXPECT_EQ(connections, 1U);
+}
+
+TEST_F(ConsolePage, WhatTheDaemonCannotTellIsShownAsUnknown) {
+  begin();
+  wait_for("control-text", "control: free");
+  ::kill(rig->rig().pid(), SIGSTOP);
+  wait_for("state", "Not there");
+  wait_for("control-text", "control: unknown");
+  ::kill(rig->rig().pid(), SIGCONT);
+  wait_for("control-text", "control: free");
+}
+
+TEST_F(ConsolePage, AnArmedControllerTakesOrders) {
+  begin();
+  wait_for("state", "Not homed");
+  EXPECT_EQ(browser->value("document.getElementById('start').disabled"), true);
+  browser->value(
+      "{ const parse = JSON.parse; JSON.parse = (text) => "
+      "parse(text.replace('\"state\":\"unhomed\"', '\"state\":\"armed\"')); }");
+  wait_for("state", "Armed");
+  for (const char* id : {"start", "home"})
+    EXPECT_EQ(browser->value(std::string("document.getElementById('") + id + "').disabled"), false) << id;
+}
+
+TEST_F(ConsolePage, ABrowserThatHasEndedIsToldAndEndsNobodyElse) {
+  begin();
+  browser->close();
+  EXPECT_THROW(browser->value("1"), std::runtime_error);
+}
+
 }  // namespace
 }  // namespace diastole::flow

@@ -77,6 +77,21 @@ TEST(Journals, ADiskThatFillsStopsThePumpAndKeepsWhatWasRecorded) {
   EXPECT_EQ(run(rig.place, {"diastole", "inspect", "saved.run.h5"}).exit_code, 1);
 }
 
+TEST(Journals, AStartThatFailsAfterTheLoadLeavesNothingArmedAndNoJournal) {
+  RigWithDaemon rig(RigWithDaemon::Time::conducted);
+  rig.start_daemon();
+  auto client = rig.client();
+  home(client);
+  std::filesystem::remove_all(rig.place / "journals");
+  EXPECT_THAT(message_of<HardwareError>([&] { client.call("run.start", many_segments()); }),
+              HasSubstr("the journal cannot be created"));
+  EXPECT_EQ(client.call("rig.status")["state"], "homed");
+  std::filesystem::create_directory(rig.place / "journals");
+  client.call("run.start", many_segments());
+  client.call("run.stop");
+  EXPECT_EQ(status_when(client, "homed", true)["journals"]["count"], 1);
+}
+
 TEST(Journals, StatusAndListTellWhatIsKept) {
   RigWithDaemon rig(RigWithDaemon::Time::conducted);
   rig.start_daemon();

@@ -58,6 +58,12 @@ TEST(Study, BecomesSlicesFramesAndABidsRecording) {
       run(workplace, {"diastole", "simulate", "study.experiment.toml", "-o", "study.run.h5", "--json"});
   ASSERT_EQ(simulated.exit_code, 0) << simulated.err;
   EXPECT_EQ(simulated.json().at("end"), "completed");
+  // Each prompt is answered at the same moment of simulated time, however fast the machine is.
+  const json again =
+      run(workplace, {"diastole", "simulate", "study.experiment.toml", "-o", "again.run.h5", "--json"})
+          .json();
+  EXPECT_EQ(again.at("triggers"), 21) << "one cycle passes at the prompt between the slices";
+  EXPECT_EQ(simulated.json().at("triggers"), 21);
 
   const Ended inspected = run(workplace, {"diastole", "inspect", "study.run.h5", "--json"});
   EXPECT_EQ(inspected.exit_code, 0) << inspected.out;

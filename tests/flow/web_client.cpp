@@ -10,7 +10,7 @@
 namespace diastole::flow {
 
 WebClient::WebClient(int port, bool small_window)
-    : port_(port), socket_(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
+    : port_(port), small_window_(small_window), socket_(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
   const int bytes = 4096;
   if (small_window) ::setsockopt(socket_.get(), SOL_SOCKET, SO_RCVBUF, &bytes, sizeof(bytes));
   const timeval patience{60, 0};
@@ -22,7 +22,13 @@ WebClient::WebClient(int port, bool small_window)
   EXPECT_EQ(::connect(socket_.get(), reinterpret_cast<sockaddr*>(&address), sizeof(address)), 0);
 }
 
+WebClient::~WebClient() {
+  ::shutdown(socket_.get(), SHUT_RDWR);
+  if (listener_.joinable()) listener_.join();
+}
+
 bool WebClient::send(std::string_view bytes) {
+  const std::lock_guard lock(sending_);
   return ::send(socket_.get(), bytes.data(), bytes.size(), MSG_NOSIGNAL) ==
          static_cast<ssize_t>(bytes.size());
 }
@@ -68,7 +74,9 @@ WebAnswer WebClient::upgrade(const std::string& token, const std::vector<std::st
       "Connection: Upgrade", "Upgrade: websocket", "Sec-WebSocket-Version: 13",
       "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==", "Sec-WebSocket-Protocol: diastole, token." + token};
   all.insert(all.end(), headers.begin(), headers.end());
-  return get("/rpc", all);
+  WebAnswer answer = get("/rpc", all);
+  if (answer.status == 101 && !small_window_) listener_ = std::thread([this] { listen(); });
+  return answer;
 }
 
 bool WebClient::send_frame(int opcode, std::string_view payload, bool last) {
@@ -86,7 +94,28 @@ bool WebClient::send_frame(int opcode, std::string_view payload, bool last) {
   return send(frame.append(payload));
 }
 
+void WebClient::listen() {
+  for (bool open = true; open;) {
+    std::string message = read_message();
+    const std::lock_guard lock(mutex_);
+    open = !message.empty();
+    closed_ = !open;
+    if (open) messages_.push_back(std::move(message));
+    heard_.notify_all();
+  }
+}
+
 std::string WebClient::receive() {
+  if (small_window_) return read_message();
+  std::unique_lock lock(mutex_);
+  heard_.wait(lock, [this] { return closed_ || !messages_.empty(); });
+  if (messages_.empty()) return {};
+  std::string message = std::move(messages_.front());
+  messages_.pop_front();
+  return message;
+}
+
+std::string WebClient::read_message() {
   for (std::string message;;) {
     const std::string head = take(2);
     if (head.empty()) return {};

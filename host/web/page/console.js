@@ -8,6 +8,8 @@ const keptName = "diastole-name";
 const keptTheme = "diastole-theme";
 const staleAfter_ms = 1500;
 const lostAfter_ms = 6000;
+const sleptAfter_ms = 2000;  // a look that comes so late: the browser let the page sleep
+const stopPatience_ms = 700;
 const mostEvents = 500;
 const rowsAtOnce = 1000;  // that the daemon sends in one answer
 
@@ -33,12 +35,18 @@ const trace = new Trace(by("chart"));
 const choice = new ExperimentChoice();
 let name = sessionStorage.getItem(keptName) ?? "";
 let status = null, progress = null, heardAt_ms = -Infinity, problem = "", nextRemark = 0, shownRun = "", behind = false;
+let lookedAt_ms = performance.now(), wokeAt_ms = 0;
 const daemon = new Daemon(takeToken(), { heard, changed });
 
 const text = (id, words) => { if (by(id).textContent !== words) by(id).textContent = words; };
 const grouped = (number) => String(number).replace(/\B(?=(\d{3})+$)/g, "\u2009");
 const plural = (count, word) => `${grouped(count)} ${word}${count === 1 ? "" : "s"}`;
-const sleep = (ms) => new Promise((done) => setTimeout(done, ms));
+const sleepers = new Set();
+const sleep = (ms) => new Promise((done) => {
+  const end = () => { sleepers.delete(end); done(); };
+  sleepers.add(end);
+  setTimeout(end, ms);
+});
 
 function duration(seconds) {
   const whole = Math.max(0, Math.round(seconds));
@@ -57,9 +65,14 @@ async function changed(open, why) {
   showFreshness();
 }
 
+/// A page behind others looks and asks once a minute only, and is answered at once: that it has heard nothing for long
+/// says nothing. A question that finds no answer while the page is awake does.
 function showFreshness() {
-  const age_ms = performance.now() - heardAt_ms;
-  if (daemon.isOpen && age_ms > lostAfter_ms) daemon.giveUp("The daemon is silent.");
+  const now_ms = performance.now(), age_ms = now_ms - heardAt_ms;
+  if (now_ms - lookedAt_ms > sleptAfter_ms) wokeAt_ms = now_ms;
+  lookedAt_ms = now_ms;
+  const silent_ms = now_ms - Math.max(wokeAt_ms, heardAt_ms, daemon.unansweredSince_ms);
+  if (daemon.isOpen && silent_ms > lostAfter_ms) daemon.giveUp("The daemon is silent.");
   const stale = !daemon.isOpen || age_ms > staleAfter_ms;
   document.body.classList.toggle("stale", stale);
   by("lost").hidden = !stale || (heardAt_ms < 0 && !problem);
@@ -102,8 +115,8 @@ function showAll() {
   showControl();
   by("chart-empty").hidden = trace.length > 0;
   document.body.dataset.state = status.state ?? "away";
-  by("start").disabled = daemon.role === "watch" || status.state !== "homed";
-  by("home").disabled = daemon.role === "watch" || !["homed", "unhomed"].includes(status.state);
+  by("start").disabled = daemon.role === "watch" || !["homed", "armed"].includes(status.state);
+  by("home").disabled = daemon.role === "watch" || !["homed", "unhomed", "armed"].includes(status.state);
   by("clear").hidden = status.problem !== undefined;
   by("clear").disabled = daemon.role === "watch" || moving.has(status.state);
 }
@@ -185,7 +198,7 @@ function showCounters() {
 
 function showControl() {
   const control = status.control;
-  const holder = !control ? "" : control.own ? "you" : `${control.user} (${control.console ? "console at " + control.console : "process " + control.pid})`;
+  const holder = !control ? (status.problem ? "unknown" : "") : control.own ? "you" : `${control.user} (${control.console ? "console at " + control.console : "process " + control.pid})`;
   text("control-text", daemon.role === "watch" ? `watching and stopping only${holder ? " · control: " + holder : ""}`
     : `${name ? name + " · " : ""}control: ${holder || "free"}`);
   by("take").hidden = daemon.role === "watch" || Boolean(control?.own);
@@ -242,13 +255,21 @@ function order(button, title, method) {
   by(button).addEventListener("click", () => withControl(method).catch((error) => showProblem(title, error)));
 }
 
+/// Says at once when nobody confirms it: who wants a stop is not to wait for a time-out.
 async function stop(how) {
+  const title = daemon.isOpen ? "The daemon has not confirmed the stop: press the emergency stop"
+    : "The stop did not reach the daemon: press the emergency stop";
+  let told = false;
+  const tellProblem = (error) => { told = true; showProblem(title, error); };
+  const late = setTimeout(() => tellProblem(new Error("It was sent, and nothing came back.")), stopPatience_ms);
   try {
     const { stopping } = await daemon.call("run.stop", { how });
+    if (told) by("problem-dialog").close();
     flash(stopping ? "Stopping …" : "Nothing was moving");
   } catch (error) {
-    showProblem("The stop did not reach the daemon: press the emergency stop", error);
+    tellProblem(error);
   }
+  clearTimeout(late);
 }
 
 function flash(words) {
@@ -283,9 +304,9 @@ function goOn() {
   if (slice !== undefined) daemon.call("run.continue", { slice }).catch((error) => showProblem("The run did not go on", error));
 }
 
-// Escape stops what moves, whatever is open; Enter is the scanner's "ready".
+// Escape stops whatever is open and shown: what is shown may be old. Enter is the scanner's "ready".
 addEventListener("keydown", (event) => {
-  if (event.key === "Escape" && !event.repeat && (!status || moving.has(status.state))) stop("now");
+  if (event.key === "Escape" && !event.repeat) stop("now");
   const elsewhere = document.querySelector("dialog[open]") || event.target.closest("button, input, textarea");
   if (event.key === "Enter" && !event.repeat && !elsewhere && !by("prompt").hidden) goOn();
 }, true);
@@ -307,6 +328,10 @@ by("theme").addEventListener("click", () => setTheme(document.documentElement.da
 setTheme(localStorage.getItem(keptTheme) ?? (matchMedia("(prefers-color-scheme: light)").matches ? "light" : "dark"));
 
 setInterval(showFreshness, 250);
+addEventListener("visibilitychange", () => {
+  showFreshness();
+  for (const end of sleepers) end();
+});
 daemon.connect();
 repeat(() => 200, askStatus);
 repeat(() => (behind ? 20 : status && moving.has(status.state) ? 100 : 300), askRun);

@@ -23,7 +23,8 @@ export class Refused extends Error {
 export const codes = { inputFault: -32001, controlHeld: -32003, notAllowed: -32005 };
 
 export class Daemon {
-  /// `heard()` after every answer, `changed(open, problem)` when the connection opens or is lost.
+  /// `heard()` after every answer, `changed(open, problem)` when the connection opens or is lost. `waiting`: the requests
+  /// that have no answer yet, with their `asked_ms`, the oldest first.
   constructor(token, { heard, changed }) {
     this.token = token;
     this.heard = heard;
@@ -78,12 +79,18 @@ export class Daemon {
     else asked.resolve(message.result);
   }
 
+  /// When the oldest request was made that has no answer yet; Infinity if there is none.
+  get unansweredSince_ms() {
+    const [oldest] = this.waiting.values();
+    return oldest?.asked_ms ?? Infinity;
+  }
+
   get isOpen() { return this.socket?.readyState === WebSocket.OPEN; }
 
   call(method, params = {}) {
     if (!this.isOpen) return Promise.reject(new Error("There is no connection to the daemon."));
     const id = ++this.lastId;
     this.socket.send(JSON.stringify({ jsonrpc: "2.0", id, method, params }));
-    return new Promise((resolve, reject) => this.waiting.set(id, { resolve, reject }));
+    return new Promise((resolve, reject) => this.waiting.set(id, { resolve, reject, asked_ms: performance.now() }));
   }
 }

@@ -259,7 +259,7 @@ class DeskGate final : public GateInputs {
     GateReading reading;
     const int cycles = session_.instrument.readings > 300 ? 2 + error_ : 0;
     for (; seen_ < cycles; ++seen_)
-      reading.pulse_ns.push_back(session_.desk.now_ns);
+      reading.note_pulse(session_.desk.now_ns);
     return reading;
   }
 

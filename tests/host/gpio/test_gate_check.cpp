@@ -18,12 +18,25 @@ class Inputs final : public GateInputs {
   [[nodiscard]] bool sees_estop() const override { return true; }
   [[nodiscard]] bool estop_pressed() const override { return pressed; }
   GateReading take() override { return std::exchange(next, {}); }
-  void pulse(int count) { next.pulse_ns.insert(next.pulse_ns.end(), static_cast<size_t>(count), 1); }
+  void pulse(int count) { next.pulses += static_cast<uint64_t>(count); }
 
   GateReading next;
   bool gate = true;
   bool pressed = false;
 };
+
+TEST(GateReading, ALineThatChattersForDaysIsCountedAndFillsNoMemory) {
+  GateReading reading;
+  for (uint64_t i = 0; i < 100'000; ++i) {
+    reading.note_pulse(i);
+    reading.note_estop({i, i % 2 == 0, true});
+  }
+  EXPECT_EQ(reading.pulses, 100'000U);
+  EXPECT_THAT(reading.pulse_ns, SizeIs(GateReading::most_kept));
+  EXPECT_EQ(reading.pulse_ns.back(), GateReading::most_kept - 1);
+  EXPECT_THAT(reading.estop_changes, SizeIs(GateReading::most_kept));
+  EXPECT_EQ(reading.estop_changes.back().host_ns, 99'999U) << "what the line shows now";
+}
 
 TEST(GateCheck, EqualCountsAreSaidAtTheEnd) {
   Inputs inputs;

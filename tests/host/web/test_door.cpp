@@ -48,10 +48,16 @@ TEST(ConsoleDoor, ANameThatPointsHereIsNotOurs) {
 TEST(ConsoleDoor, BeyondThisMachineItsAddressesAndItsOwnNameAreOurs) {
   const Door door(at("0.0.0.0:8600"), "RigPC");
   EXPECT_TRUE(door.reaches_beyond_this_machine());
-  for (const char* own : {"10.0.0.1:8600", "rigpc:8600", "rigpc.lab.example:8600", "localhost:8600"})
+  for (const char* own : {"10.0.0.1:8600", "rigpc:8600", "RIGPC", "localhost:8600"})
     EXPECT_TRUE(comes_in(door, own)) << own;
-  for (const char* strange : {"evil.example:8600", "rigpcevil.example:8600"})
+  for (const char* strange :
+       {"evil.example:8600", "rigpcevil.example:8600", "rigpc.evil.example:8600", "rigpc.", "rig"})
     EXPECT_FALSE(comes_in(door, strange)) << strange;
+  const Door qualified(at("0.0.0.0:8600"), "rigpc.lab.example");
+  EXPECT_TRUE(comes_in(qualified, "rigpc.lab.example:8600"));
+  EXPECT_TRUE(comes_in(qualified, "rigpc:8600"));
+  for (const char* strange : {"rigpc.lab:8600", "rigpc.evil.example:8600", "lab.example:8600"})
+    EXPECT_FALSE(comes_in(qualified, strange)) << strange;
   EXPECT_THAT(door.url(ConsoleRole::control, 8600), testing::StartsWith("http://rigpc:8600/#token="));
 }
 

@@ -117,7 +117,7 @@ SimulatedSession simulate(SimulateOptions options) {
   const StopSignals signals;
   SessionView view(isatty(STDERR_FILENO) != 0);
   options.session.stops_asked = [&signals] { return signals.asked(); };
-  options.session.ready = [] { return true; };  // nobody is waited for in a simulation
+  options.session.prompts_answered = true;  // nobody is waited for in a simulation
   options.session.progress = [&view](const SessionProgress& progress) { view.show(progress); };
 
   PrivateDirectory directory;

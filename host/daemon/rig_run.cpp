@@ -1,0 +1,315 @@
+// A run: loading, recording, and making its file (rig_service.hpp).
+
+#include <fmt/format.h>
+#include <malloc.h>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <chrono>
+
+#include "host/acquisition/disk_room.hpp"
+#include "host/acquisition/journal_store.hpp"
+#include "host/controller/settings_values.hpp"
+#include "host/daemon/rig_service.hpp"
+#include "host/daemon/utc.hpp"
+#include "host/daemon/uuid.hpp"
+#include "host/runfile/assemble.hpp"
+#include "host/runfile/writer.hpp"
+#include "protocol/contract/input_error.hpp"
+
+namespace diastole {
+namespace {
+
+using nlohmann::json;
+
+/// For as long as it lives, the supervisor waits for work that does not sleep.
+class LongWork {
+ public:
+  explicit LongWork(ServiceManager* manager) : manager_(manager) {
+    if (manager_ != nullptr) manager_->allow(long_work_patience);
+  }
+  ~LongWork() {
+    if (manager_ != nullptr) manager_->allow_no_more();
+  }
+  LongWork(const LongWork&) = delete;
+  LongWork& operator=(const LongWork&) = delete;
+
+ private:
+  static constexpr std::chrono::minutes long_work_patience{10};
+  ServiceManager* manager_;
+};
+
+json attributes_as_json(const std::map<std::string, runfile::Attribute, std::less<>>& attributes) {
+  json object = json::object();
+  for (const auto& [name, value] : attributes) {
+    std::visit([&, key = name](const auto& v) { object[key] = v; }, value);
+  }
+  return object;
+}
+
+json planned_segments(const Experiment& experiment, const ProgramPlan& plan) {
+  json segments = json::array();
+  double start_s = experiment.rest_s;
+  for (size_t i = 0; i < experiment.segments.size(); ++i) {
+    const ExperimentSegment& segment = experiment.segments[i];
+    if (i < plan.size()) start_s = 1e-6 * static_cast<double>(plan[i].start_us);
+    segments.push_back({{"start_s", start_s},
+                        {"waveform", segment.waveform_name},
+                        {"stroke_mL", segment.stroke_mL},
+                        {"period_s", segment.period_s},
+                        {"offset_mL", segment.offset_mL},
+                        {"cycles", segment.cycles}});
+    start_s += segment.period_s * static_cast<double>(segment.cycles);
+  }
+  return segments;
+}
+
+/// What uploaded segments follow, by segment.
+json played_waveforms(const Experiment& experiment) {
+  json waveforms = json::array();
+  for (size_t i = 0; i < experiment.segments.size(); ++i) {
+    if (!experiment.segments[i].upload) continue;
+    const ExperimentWaveform& waveform = experiment.waveforms[*experiment.segments[i].upload];
+    waveforms.push_back(
+        {{"segment", i}, {"points", waveform.points.text}, {"fraction", waveform.even.fractions()}});
+  }
+  return waveforms;
+}
+
+double duration_s(const Experiment& experiment, const ProgramPlan& plan) {
+  if (plan.empty()) return experiment.least_duration_s();
+  return 1e-6 * static_cast<double>(plan.back().start_us + plan.back().duration_us);
+}
+
+/// What the controller's own settings say of the rig; the volume of a step is the calibrated one.
+void add_settings(json& rig, const ControllerClient& controller) {
+  const wire::SettingsReport& report = controller.settings();
+  const json own = settings_as_json(report.settings);
+  for (const char* name : {"calibration_ppm", "backlash_um", "travel_mm", "full_step_rate_Hz", "board_name"})
+    rig[name] = own.at(name);
+  rig["settings_record"] = report.records_written;
+  rig["volume_per_step_mL"] = 1e-9 * controller.microstep_pL();
+}
+
+/// What the controller was held to.
+void add_limits(json& rig, const ControllerConfig& controller) {
+  const MotionLimits& limits = controller.limits;
+  rig["limit_travel_mL"] = limits.travel_mL;
+  rig["limit_flow_mL_s"] = limits.flow_mL_s;
+  rig["limit_acceleration_mL_s2"] = limits.acceleration_mL_s2;
+  rig["limit_step_rate_Hz"] = limits.step_rate_Hz;
+  rig["limit_pressure_kPa"] = limits.pressure_kPa;
+  rig["lease_ms"] = controller.lease_ms;
+}
+
+/// Takes a program that will not be started out of the controller: it would wait armed.
+void disarm(ControllerClient& controller) {
+  if (!controller.connected() || controller.last_known().state == wire::State::faulted) return;
+  try {
+    controller.unload();
+  } catch (const std::exception& error) {
+    spdlog::warn("the program that is not run stays loaded: {}", error.what());
+  }
+}
+
+/// What is prepared for a run: a program in the controller, a journal. Undone unless the run begins.
+class Preparation {
+ public:
+  Preparation(ControllerClient& controller, std::filesystem::path journal)
+      : controller_(controller), journal_(std::move(journal)) {}
+  ~Preparation() {
+    if (begun_) return;
+    std::error_code ignored;
+    std::filesystem::remove(journal_, ignored);
+    disarm(controller_);
+  }
+  Preparation(const Preparation&) = delete;
+  Preparation& operator=(const Preparation&) = delete;
+  void begun() { begun_ = true; }
+
+ private:
+  ControllerClient& controller_;
+  std::filesystem::path journal_;
+  bool begun_ = false;
+};
+
+}  // namespace
+
+void RigService::do_run(const RunOrder& order, const Done& done) {
+  const Experiment& experiment = order.experiment;
+  (void)do_status();
+  const daq::RatePlan rate = instrument_->plan_rate(experiment.sample_rate_Hz);
+  RunRecord record;
+  record.run_id = new_uuid();
+  const std::filesystem::path path =
+      std::filesystem::absolute(rig_.daemon.journal_dir) / (record.run_id + ".journal");
+  Preparation preparation(*controller_, path);
+  const ProgramPlan plan = controller_->load(experiment);
+  record.planned_s = duration_s(experiment, plan);
+  record.estimate_s = experiment.schedule ? experiment.estimate_s() : record.planned_s;
+  record.planned_cycles = experiment.planned_cycles();
+  check_disk(record, rate.rate_Hz, experiment.cycles());
+  JournalWriter journal(path);
+  write_beginning(journal, record, experiment, plan, rate.rate_Hz);
+  live_.begin(record.run_id, rate.rate_Hz, controller_->hello().tick_rate_Hz);
+  if (!begin(record)) refuse_to_start();
+  preparation.begun();
+  spdlog::info("run {} begins: {} cycles, {:.1f} s", record.run_id, record.planned_cycles, record.planned_s);
+  done(nullptr,
+       {{"run_id", record.run_id}, {"journal", path.string()}, {"run_file", run_file_beside(path).string()}});
+  json result;
+  try {
+    result = finish(path, acquire(journal, order, rate, record.planned_s));
+  } catch (const std::exception& error) {
+    if (controller_->connected()) controller_->stop_now();  // nothing moves unrecorded
+    result = {{"end", "failed"}, {"problem", error.what()}, {"journal", path.string()}};
+  }
+  if (controller_->last_known().state == wire::State::armed) disarm(*controller_);
+  ::malloc_trim(0);  // what the run file was made in is no more needed
+  spdlog::info("run {} ended: {}", record.run_id, result.dump());
+  tidy_journals();
+  const std::lock_guard lock(mutex_);
+  run_->state = result.contains("run_file") ? "done" : "failed";
+  run_->result = std::move(result);
+  activity_.clear();
+}
+
+void RigService::check_disk(const RunRecord& record, double sample_rate_Hz, int64_t most_cycles) {
+  check_room(rig_.daemon.journal_dir, {record.planned_s, sample_rate_Hz, controller_->position_rate_Hz(),
+                                       rig_.daq.channels.size(), static_cast<uint64_t>(most_cycles)});
+}
+
+void RigService::tidy_journals() {
+  const auto& [directory, keep_days] = std::pair(rig_.daemon.journal_dir, rig_.daemon.keep_days);
+  if (keep_days > 0) {
+    const auto before = std::filesystem::file_time_type::clock::now() - std::chrono::hours(24 * keep_days);
+    for (const auto& removed : prune_journals(directory, before)) {
+      spdlog::info("{} was removed: its run file is older than {} days", removed.string(), keep_days);
+    }
+  }
+  uint64_t bytes = 0;
+  int64_t without_run_file = 0;
+  const auto journals = stored_journals(directory);
+  for (const StoredJournal& journal : journals) {
+    bytes += journal.bytes;
+    without_run_file += journal.has_run_file ? 0 : 1;
+  }
+  const std::lock_guard lock(mutex_);
+  journals_ = {{"directory", std::filesystem::absolute(directory).string()},
+               {"count", journals.size()},
+               {"bytes", bytes},
+               {"without_run_file", without_run_file},
+               {"keep_days", keep_days}};
+}
+
+bool RigService::begin(const RunRecord& record) {
+  const std::lock_guard lock(mutex_);
+  if (stop_request_ != StopRequest::none) return false;
+  run_ = record;
+  notes_.clear();
+  go_on_.reset();
+  activity_ = "running";
+  return true;
+}
+
+void RigService::write_beginning(JournalWriter& journal, const RunRecord& record,
+                                 const Experiment& experiment, const ProgramPlan& plan,
+                                 double sample_rate_Hz) {
+  json channels = json::array();
+  for (const ChannelConfig& channel : rig_.daq.channels)
+    channels.push_back(channel.name);
+  json rig = attributes_as_json(rig_.attributes);
+  rig.update(attributes_as_json(book_.attributes()));
+  rig["daq_rate_Hz"] = sample_rate_Hz;
+  add_settings(rig, *controller_);
+  add_limits(rig, rig_.controller);
+  const TimerFacts timer = make_source(*clock_, *instrument_)->timer(sample_rate_Hz);
+  const json beginning{{"record", "begin"},
+                       {"run_id", record.run_id},
+                       {"started_utc", utc_now()},
+                       {"producer", options_.producer},
+                       {"experiment", experiment.text},
+                       {"experiment_file", experiment.file},
+                       {"sample_rate_Hz", sample_rate_Hz},
+                       {"channels", channels},
+                       {"rig", rig},
+                       {"instrument", instrument_->describe()},
+                       {"tick_rate_Hz", controller_->hello().tick_rate_Hz},
+                       {"microstep_pL", controller_->microstep_pL()},
+                       {"daq_timer_rate_Hz", std::max(1.0, timer.rate_Hz)},
+                       {"daq_timer_counts_samples", timer.counts_samples},
+                       {"segments", planned_segments(experiment, plan)},
+                       {"trigger_delay_s", 1e-3 * experiment.trigger_delay_ms},
+                       {"waveforms", played_waveforms(experiment)}};
+  if (!journal.append(RecordKind::document, beginning.dump())) {
+    throw HardwareError(journal.path().string(), journal.problem(), "Free some space on that disk.");
+  }
+}
+
+RunOutcome RigService::acquire(JournalWriter& journal, const RunOrder& order, const daq::RatePlan& rate,
+                               double planned_s) {
+  std::vector<PlannedSlice> slices;
+  if (order.experiment.schedule) slices = planned_slices(*order.experiment.schedule);
+  std::vector<std::string> warnings;
+  if (!rate.warning.empty()) warnings.push_back(rate.warning);
+  const auto samples = make_source(*clock_, *instrument_);
+  Acquisition acquisition(*clock_, *controller_, *samples, journal,
+                          {rate.rate_Hz, rig_.daq.channels, std::move(warnings), gate_.get(), planned_s,
+                           std::move(slices), &live_, order.prompts_answered});
+  return acquisition.run({
+      .stop =
+          [this] {
+            const std::lock_guard lock(mutex_);
+            return stop_request_;
+          },
+      .go_on =
+          [this] {
+            const std::lock_guard lock(mutex_);
+            return std::exchange(go_on_, std::nullopt);
+          },
+      .notes =
+          [this] {
+            const std::lock_guard lock(mutex_);
+            return std::exchange(notes_, {});
+          },
+      .progress =
+          [this](const RunProgress& progress) {
+            if (controller_->connected()) (void)remember(controller_->last_known());
+            const std::lock_guard lock(mutex_);
+            run_->progress = progress;
+          },
+      .remark =
+          [this](const RunRemark& remark) {
+            spdlog::log(remark.level == "info" ? spdlog::level::info : spdlog::level::warn, "{}",
+                        remark.text);
+            keep(remark);
+          },
+  });
+}
+
+json RigService::finish(const std::filesystem::path& journal, const RunOutcome& outcome) {
+  {
+    const std::lock_guard lock(mutex_);
+    run_->state = "writing";
+    activity_ = "writing";
+  }
+  const LongWork writing(options_.manager);
+  json result{{"end", outcome.end}, {"regular", outcome.regular()}, {"journal", journal.string()}};
+  const std::filesystem::path run_file = run_file_beside(journal);
+  AssembledRun assembled;
+  beside_the_line([&] {
+    assembled = assemble_run(read_journal(journal));
+    write_run(run_file, assembled.run);
+  });
+  result["run_file"] = run_file.string();
+  result["cycles"] = outcome.cycles;
+  result["triggers"] = assembled.run.trigger_s.size();
+  result["samples"] = assembled.samples_received;
+  result["gaps"] = assembled.samples_missing;
+  result["errors"] = std::count_if(assembled.run.events.begin(), assembled.run.events.end(),
+                                   [](const runfile::Event& event) { return event.level == "error"; });
+  result["expected"] = assembled.samples_received + assembled.samples_missing;
+  return result;
+}
+
+}  // namespace diastole
