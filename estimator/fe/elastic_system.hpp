@@ -105,6 +105,8 @@ class ElasticSystem {
   void solve(std::span<double> right_sides, size_t count = 1) { factor_.solve(right_sides, count); }
   /// Negative pivots of the tangent's symmetric part; spoils the factor.
   size_t negative_pivots(const ElasticState& state);
+  /// Numbers stored in the last factor: its fill.
+  [[nodiscard]] size_t factor_entries() const { return factor_.entries(); }
 
   /// state + fraction * step over the unknowns.
   [[nodiscard]] ElasticState moved(const ElasticState& state, std::span<const double> step,

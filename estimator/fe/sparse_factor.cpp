@@ -104,6 +104,13 @@ FactorResult SparseFactor::factorise(std::span<double> values) {
   return {.singular = false, .negative_pivots = static_cast<size_t>(outcome(mumps, 12))};
 }
 
+size_t SparseFactor::entries() const {
+  constexpr int factor_entries = 29;
+  const int count = outcome(instance_->mumps, factor_entries);
+  constexpr size_t million = 1'000'000;  // MUMPS counts beyond 2^31 in millions, with a minus sign
+  return count >= 0 ? static_cast<size_t>(count) : static_cast<size_t>(-count) * million;
+}
+
 void SparseFactor::solve(std::span<double> right_sides, size_t count) {
   DMUMPS_STRUC_C& mumps = instance_->mumps;
   mumps.rhs = right_sides.data();

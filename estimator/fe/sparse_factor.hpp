@@ -36,6 +36,9 @@ class SparseFactor {
   /// Throws std::bad_alloc if memory is exhausted; a singular matrix is a result.
   FactorResult factorise(std::span<double> values);
 
+  /// Numbers stored in the last factors: their fill. 0 before the first factorise().
+  [[nodiscard]] size_t entries() const;
+
   /// Replaces right-hand sides by solutions: `count` columns of `size` numbers, one after the other.
   /// Precondition: the last factorise() was not singular.
   void solve(std::span<double> right_sides, size_t count = 1);

@@ -30,6 +30,8 @@ class TangentFactor {
   FactorResult factorise_general(std::span<const double> values, std::span<const double> skew);
 
   void solve(std::span<double> right_sides, size_t count) { current_->solve(right_sides, count); }
+  /// Numbers stored in the last factor; 0 before there is one.
+  [[nodiscard]] size_t entries() const { return current_ == nullptr ? 0 : current_->entries(); }
 
  private:
   void prepare_general();

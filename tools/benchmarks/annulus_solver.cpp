@@ -10,6 +10,7 @@
 #include <stdexcept>
 
 #include "estimator/fe/elastic_model.hpp"
+#include "estimator/fe/elastic_system.hpp"
 #include "estimator/mesh/annulus.hpp"
 #include "estimator/mesh/point_locator.hpp"
 
@@ -100,6 +101,7 @@ AnnulusAnswer solve_annulus(const AnnulusSolver& solver, const AnnulusElements& 
   if (!result.at("converged").get<bool>()) throw std::runtime_error(solver.name + " did not converge");
   answer.unknowns = result.at("unknowns");
   answer.newton = result.at("newton");
+  answer.factor_entries = result.value("factor_entries", size_t{0});
   answer.radial_mm = result.at("radial_mm");
   answer.solve_wall_s = result.value("solve_s", answer.process.wall_s);
   answer.solve_processor_s = result.value("solve_processor_s", answer.process.processor_s);
@@ -124,6 +126,7 @@ void solve_annulus_here(const AnnulusElements& elements, const std::filesystem::
   std::ofstream(result) << nlohmann::json{
       {"converged", report.converged()},
       {"unknowns", model.dofs()},
+      {"factor_entries", model.system().factor_entries()},
       {"newton", fmt::format("{} + {} with kept factors", report.factorisations,
                              report.newton_iterations - report.factorisations)},
       {"solve_s", report.seconds},

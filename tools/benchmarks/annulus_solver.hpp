@@ -25,6 +25,7 @@ struct AnnulusAnswer {
   std::string newton;  ///< steps of Newton's method, in words
   std::array<double, 5> radial_mm{};
   ProcessFigures process;
+  size_t factor_entries = 0;  ///< numbers in the factorised tangent; 0 if the program does not tell
   double solve_wall_s =
       0.0;  ///< from the undeformed state to the answer; the whole process if not told apart
   double solve_processor_s = 0.0;

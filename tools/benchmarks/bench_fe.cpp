@@ -1,6 +1,7 @@
 // The forward solution of the gel annulus at 6 kPa against other programs, at equal accuracy, in one run.
 //
 //   tools/bench fe [--rounds N]      peers come from tools/setup --peers; an absent one is skipped visibly
+//   tools/bench fe --growth [--most ELEMENTS] [--figure FILE.svg]     our cost from 32 to 4000 elements
 //
 // Each program climbs its ladder of meshes. Its mesh is the coarsest one from which on all finer ones keep the
 // accuracy, so that an error that happens to change its sign does not count. Then all solve in turn, N times
@@ -20,6 +21,7 @@
 #include <vector>
 
 #include "protocol/contract/exit_code.hpp"
+#include "tools/benchmarks/annulus_growth.hpp"
 #include "tools/benchmarks/annulus_solver.hpp"
 
 namespace diastole {
@@ -121,8 +123,7 @@ void race(const std::vector<const AnnulusSolver*>& solvers,
   print_race(racers, accuracy);
 }
 
-void compare(int rounds, const AnnulusWorkplace& place) {
-  const std::vector<AnnulusSolver> all = annulus_solvers(std::filesystem::read_symlink("/proc/self/exe"));
+void compare(const std::vector<AnnulusSolver>& all, int rounds, const AnnulusWorkplace& place) {
   std::vector<const AnnulusSolver*> installed;
   std::vector<std::vector<AnnulusAnswer>> answers;
   fmt::print("Gel annulus, 6 kPa, C1 6.5 kPa, whole circumference, one thread each, meshes graded alike\n");
@@ -144,17 +145,30 @@ void compare(int rounds, const AnnulusWorkplace& place) {
 int main(int argc, char** argv) {
   CLI::App app("Times the forward solution of the gel annulus against other programs.");
   int rounds = 3;
+  bool growth = false;
+  size_t most_elements = 4000;
+  std::string figure;
   std::vector<std::string> one;
   app.add_option("--rounds", rounds, "how often each program solves, in turn")->check(CLI::PositiveNumber);
+  app.add_flag("--growth", growth, "this project's cost over the size of the mesh, instead");
+  app.add_option("--most", most_elements, "with --growth: the largest mesh, in elements");
+  app.add_option("--figure", figure, "with --growth: draw it into FILE.svg");
   app.add_option("--solve", one, "solve once on AROUND UP THROUGH elements and write RESULT.json")
       ->expected(4);
   CLI11_PARSE(app, argc, argv);
   try {
     if (!one.empty()) {
       diastole::solve_annulus_here({std::stoul(one[0]), std::stoul(one[1]), std::stoul(one[2])}, one[3]);
+      return static_cast<int>(diastole::ExitCode::done);
+    }
+    const std::vector<diastole::AnnulusSolver> solvers =
+        diastole::annulus_solvers(std::filesystem::read_symlink("/proc/self/exe"));
+    const diastole::AnnulusWorkplace place{std::filesystem::absolute("build/bench-fe"),
+                                           std::filesystem::absolute("tools/benchmarks/peers")};
+    if (growth) {
+      diastole::measure_growth(solvers.front(), most_elements, figure, place);
     } else {
-      diastole::compare(rounds, {std::filesystem::absolute("build/bench-fe"),
-                                 std::filesystem::absolute("tools/benchmarks/peers")});
+      diastole::compare(solvers, rounds, place);
     }
   } catch (const std::exception& error) {
     fmt::print(stderr, "bench_fe: {}\n", error.what());

@@ -1,0 +1,15 @@
+#pragma once
+// How this project's cost grows with the mesh: the 6 kPa gel annulus on ever more elements.
+
+#include <filesystem>
+
+#include "tools/benchmarks/annulus_solver.hpp"
+
+namespace diastole {
+
+/// Prints a Markdown table and fitted exponents over meshes of at most `most_elements`; draws time, memory and fill into
+/// `figure` unless that is empty.
+void measure_growth(const AnnulusSolver& own, size_t most_elements, const std::filesystem::path& figure,
+                    const AnnulusWorkplace& place);
+
+}  // namespace diastole
