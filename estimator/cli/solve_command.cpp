@@ -233,7 +233,9 @@ ExitCode run_solve(const SolveArguments& arguments, const CommandOutput& out) {
   const Study study = read_study(arguments.study);
   require_frames(arguments, study);
   require_outputs(arguments.outputs, study);
-  ElasticModel model = make_model(study, with_progress("solve"));
+  SolveOptions options = with_progress("solve");
+  options.check_stability = true;
+  ElasticModel model = make_model(study, std::move(options));
   const std::vector<TimedLoad> loads = loads_of(arguments, study, model);
   const std::vector<Probe> probes = locate_probes(model.mesh(), arguments.probes);
 

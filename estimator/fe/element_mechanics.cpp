@@ -3,24 +3,15 @@
 #include <cmath>
 #include <utility>
 
+#include "estimator/fe/gauss_contraction.hpp"
+
 namespace diastole {
 namespace {
 
 using Eigen::Index;
 using Eigen::Matrix3d;
-using Basis = Eigen::Vector<double, 64>;
 
 Index at(size_t i) { return static_cast<Index>(i); }
-
-/// dx/dxi at Gauss point q.
-Matrix3d xi_gradient(const ElementField& position, size_t q) {
-  const auto& slope = gauss_tables().slope[q];
-  Matrix3d gradient;
-  for (size_t k = 0; k < 3; ++k) {
-    gradient.col(at(k)).noalias() = position * Eigen::Map<const Basis>(slope[k].data());
-  }
-  return gradient;
-}
 
 /// d(det g)/dg.
 Matrix3d cofactors(const Matrix3d& g) {
@@ -38,12 +29,15 @@ double pressure_at(const std::array<double, corners>& pressure, size_t q) {
   return sum;
 }
 
-/// force(i, a) += sum_K p(i, K) dN_a/dxi_K
-void add_force(ElementField& force, const Matrix3d& p, size_t q) {
-  const auto& slope = gauss_tables().slope[q];
-  for (size_t a = 0; a < hermite_functions; ++a) {
-    force.col(at(a)) += p.col(0) * slope[0][a] + p.col(1) * slope[1][a] + p.col(2) * slope[2][a];
+/// The matrices times the tri-linear function of a corner.
+GaussMatrices share_of_corner(GaussMatrices matrices, size_t corner) {
+  for (auto& column : matrices.numbers) {
+    for (size_t q = 0; q < gauss_points; ++q) {
+      for (size_t i = 0; i < 3; ++i)
+        column[3 * q + i] *= gauss_tables().trilinear[q][corner];
+    }
   }
+  return matrices;
 }
 
 SymmetricTensor<double> right_cauchy_green(const Matrix3d& axes) {
@@ -133,10 +127,10 @@ MaterialAxesField material_axes_of(FibreField fibres) {
 
 ReferenceElement make_reference_element(const HermiteMesh& mesh, size_t element,
                                         const MaterialAxesField& axes) {
-  const ElementField position = mesh.gather(element, mesh.reference());
+  const GaussMatrices gradients = gradients_at_points(mesh.gather(element, mesh.reference()));
   ReferenceElement reference;
   for (size_t q = 0; q < gauss_points; ++q) {
-    const Matrix3d g = xi_gradient(position, q);
+    const Matrix3d g = gradients.at(q);
     reference[q].material_to_xi = g.inverse();
     if (axes) reference[q].material_to_xi *= axes(mesh, {element, gauss_tables().xi[q]});
     reference[q].volume = gauss_tables().weight[q] * g.determinant();
@@ -147,12 +141,13 @@ ReferenceElement make_reference_element(const HermiteMesh& mesh, size_t element,
 ElementResidual element_residual(const ReferenceElement& reference, const ElementState& state, const Law& law,
                                  std::span<const double> parameters) {
   const GaussTables& tables = gauss_tables();
+  const GaussMatrices gradients = gradients_at_points(state.position_mm);
+  GaussMatrices piola;
   ElementResidual result;
-  result.force.setZero();
   result.volume_mm3.fill(0.0);
   result.least.ratio = std::numeric_limits<double>::infinity();
   for (size_t q = 0; q < gauss_points; ++q) {
-    const Matrix3d g = xi_gradient(state.position_mm, q);
+    const Matrix3d g = gradients.at(q);
     const Matrix3d cofactor = cofactors(g);
     const double volume = tables.weight[q] * g.col(0).dot(cofactor.col(0));
     const double ratio = volume / reference[q].volume;
@@ -164,8 +159,7 @@ ElementResidual element_residual(const ReferenceElement& reference, const Elemen
     material_stress[0] += state.fibre_tension_kPa;
     const Matrix3d stress = full_matrix(material_stress);
     const double pressure = effective_pressure(state, q, ratio);
-    add_force(result.force,
-              reference[q].volume * f * stress * t.transpose() - (pressure * tables.weight[q]) * cofactor, q);
+    piola.set(q, reference[q].volume * f * stress * t.transpose() - (pressure * tables.weight[q]) * cofactor);
     result.energy += reference[q].volume * law.energy(c, parameters);
     double growth = volume - reference[q].volume;
     if (state.compressibility_per_kPa > 0.0) {
@@ -177,17 +171,18 @@ ElementResidual element_residual(const ReferenceElement& reference, const Elemen
     for (size_t m = 0; m < corners; ++m)
       result.volume_mm3[m] -= growth * tables.trilinear[q][m];
   }
+  result.force = force_of(piola);
   return result;
 }
 
 void element_tangent(const ReferenceElement& reference, const ElementState& state, const Law& law,
                      std::span<const double> parameters, ElementTangent& tangent) {
   const GaussTables& tables = gauss_tables();
-  for (ElementField& column : tangent.coupling)
-    column.setZero();
+  const GaussMatrices gradients = gradients_at_points(state.position_mm);
+  GaussMatrices volume_slopes;
   tangent.compliance.setZero();
   for (size_t q = 0; q < gauss_points; ++q) {
-    const Matrix3d g = xi_gradient(state.position_mm, q);
+    const Matrix3d g = gradients.at(q);
     const Matrix3d& t = reference[q].material_to_xi;
     const Matrix3d f = g * t;
     const Matrix3d cofactor = cofactors(g);
@@ -204,16 +199,14 @@ void element_tangent(const ReferenceElement& reference, const ElementState& stat
     if (state.volume_stiffness_kPa > 0.0) {
       add_volume_moduli(point, state.volume_stiffness_kPa * weight * weight / reference[q].volume, cofactor);
     }
-
-    ElementField volume_slope = ElementField::Zero();
-    add_force(volume_slope, -weight * cofactor, q);
-    for (size_t m = 0; m < corners; ++m)
-      tangent.coupling[m] += tables.trilinear[q][m] * volume_slope;
+    volume_slopes.set(q, -weight * cofactor);
     if (state.compressibility_per_kPa > 0.0) {
       const Eigen::Map<const Eigen::Vector<double, corners>> psi(tables.trilinear[q].data());
       tangent.compliance -= state.compressibility_per_kPa * reference[q].volume * psi * psi.transpose();
     }
   }
+  for (size_t m = 0; m < corners; ++m)
+    tangent.coupling[m] = force_of(share_of_corner(volume_slopes, m));
   tangent.stiffness.contract();
 }
 
@@ -228,14 +221,15 @@ std::array<double, corners> pressure_volume_mm3(const ReferenceElement& referenc
 
 ElementField element_parameter_force(const ReferenceElement& reference, const ElementState& state,
                                      const Law& law, std::span<const double> parameters, size_t parameter) {
-  ElementField force = ElementField::Zero();
+  const GaussMatrices gradients = gradients_at_points(state.position_mm);
+  GaussMatrices piola;
   for (size_t q = 0; q < gauss_points; ++q) {
     const Matrix3d& t = reference[q].material_to_xi;
-    const Matrix3d f = xi_gradient(state.position_mm, q) * t;
+    const Matrix3d f = gradients.at(q) * t;
     const Matrix3d stress = full_matrix(law.stress_sensitivity(right_cauchy_green(f), parameters, parameter));
-    add_force(force, reference[q].volume * f * stress * t.transpose(), q);
+    piola.set(q, reference[q].volume * f * stress * t.transpose());
   }
-  return force;
+  return force_of(piola);
 }
 
 }  // namespace diastole

@@ -128,7 +128,11 @@ PathResult follow_load(ElasticSystem& system, const ElasticState& start, const L
       }
     }
   }
-  if (report.converged()) report.inverted.reset();
+  if (report.converged()) {
+    report.inverted.reset();
+    if (options.check_stability || !system.rim_skew().empty())
+      report.negative_pivots = system.negative_pivots(last.state);
+  }
   report.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
   return {std::move(last.state), std::move(report)};
 }

@@ -4,11 +4,14 @@
 #include <cmath>
 #include <utility>
 
+#include "estimator/fe/kept_factor.hpp"
+
 namespace diastole {
 namespace {
 
 constexpr double least_damping = 0.02;
-constexpr double keep_factor_contraction = 0.2;
+/// With a kept factor the error is not much smaller than the last correction, as it is with a new tangent.
+constexpr double remaining_error = 0.1;
 
 class Newton {
  public:
@@ -45,8 +48,6 @@ class Newton {
   NewtonResult finish(SolveReason reason, std::optional<InvertedPlace> inverted = {}) {
     result_.reason = reason;
     if (reason == SolveReason::inverted_element) result_.inverted = inverted;
-    if (reason == SolveReason::converged && !system_.rim_skew().empty())
-      result_.negative_pivots = system_.negative_pivots(result_.state);
     return std::move(result_);
   }
 
@@ -58,18 +59,20 @@ class Newton {
     return step;
   }
 
-  [[nodiscard]] double size(std::span<const double> step) const {
+  [[nodiscard]] double product(std::span<const double> a, std::span<const double> b) const {
     const size_t displacements = system_.equations().displacement_unknowns();
-    const auto mean_square = [](std::span<const double> part) {
+    const auto mean = [&](size_t from, size_t to) {
       double sum = 0.0;
-      for (const double value : part)
-        sum += value * value;
-      return part.empty() ? 0.0 : sum / static_cast<double>(part.size());
+      for (size_t n = from; n < to; ++n)
+        sum += a[n] * b[n];
+      return from == to ? 0.0 : sum / static_cast<double>(to - from);
     };
     const double extent = system_.mesh().extent_mm();
-    return std::sqrt(mean_square(step.first(displacements)) / (extent * extent) +
-                     mean_square(step.subspan(displacements)) / (pressure_scale_kPa_ * pressure_scale_kPa_));
+    return mean(0, displacements) / (extent * extent) +
+           mean(displacements, a.size()) / (pressure_scale_kPa_ * pressure_scale_kPa_);
   }
+
+  [[nodiscard]] double size(std::span<const double> step) const { return std::sqrt(product(step, step)); }
 
   /// Damps `step` until the simplified correction after it is smaller, takes it, and then corrects with the
   /// same factor while that pays. Leaves the new residual; returns a reason when the iteration is over.
@@ -89,7 +92,7 @@ class Newton {
           result_.state = trial;
           residual = kept;
           if (damping < 1.0) return {};
-          return correct_with_kept_factor(next, iteration.step, residual);
+          return correct_with_kept_factor(step, next, residual);
         }
         allowed = std::min(allowed, suggested_damping(step, next, damping, iteration.step));
       }
@@ -110,22 +113,26 @@ class Newton {
     return 0.5 * step_size * damping * damping / size(bend);
   }
 
-  std::optional<SolveReason> correct_with_kept_factor(std::vector<double> next, double previous,
+  /// `simplified`: the correction that follows `step`.
+  std::optional<SolveReason> correct_with_kept_factor(const std::vector<double>& step,
+                                                      std::vector<double> simplified,
                                                       SystemResidual& residual) {
     NewtonIteration& iteration = result_.iterations.back();
+    KeptFactor factor([this](auto a, auto b) { return product(a, b); }, step);
     while (true) {
-      const double current = size(next);
-      const bool good_enough = current <= options_.tolerance;
-      if (!good_enough && current > keep_factor_contraction * previous) return {};
-      const ElasticState corrected = system_.moved(result_.state, next, 1.0);
+      const bool good_enough = size(simplified) <= options_.tolerance;
+      std::optional<std::vector<double>> next = factor.next_step(simplified);
+      const bool at_rounding = !next && good_enough;
+      if (at_rounding) next = std::move(simplified);
+      if (!next) return {};
+      const ElasticState corrected = system_.moved(result_.state, *next, 1.0);
       SystemResidual after = system_.residual(corrected);
       if (after.inverted) return {};
       result_.state = corrected;
       ++iteration.corrections;
-      if (good_enough) return SolveReason::converged;
+      if (at_rounding || size(*next) <= remaining_error * options_.tolerance) return SolveReason::converged;
       residual = after;
-      previous = current;
-      next = correction(after);
+      simplified = correction(after);
     }
   }
 

@@ -7,8 +7,9 @@
 //
 // The test is in the space of displacements, so that it needs no weights between forces and volumes (the
 // mixed problem is a saddle: neither energy nor residual has to fall). After an undamped step the factor is
-// kept for simplified corrections as long as they shrink fast, which costs a tenth of a new tangent. The size
-// of a vector over the unknowns is  sqrt( mean (dx / extent)^2 + mean (dp / p)^2 ).
+// kept, and brought up to date by Broyden's updates (kept_factor.hpp), as long as the corrections shrink: each costs
+// a twentieth of a new tangent. The size of a vector over the unknowns is
+// sqrt( mean (dx / extent)^2 + mean (dp / p)^2 ).
 
 #include "estimator/fe/elastic_system.hpp"
 #include "estimator/fe/solve_report.hpp"
@@ -19,7 +20,7 @@ struct NewtonResult {
   SolveReason reason = SolveReason::converged;
   ElasticState state;  ///< converged, or the last iterate
   std::vector<NewtonIteration> iterations;
-  size_t negative_pivots = 0;
+  size_t negative_pivots = 0;  ///< of the last tangent; not counted where the cavity's wall has a free rim
   std::optional<InvertedPlace> inverted;
 };
 

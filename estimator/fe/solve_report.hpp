@@ -49,8 +49,10 @@ struct SolveReport {
   std::vector<LoadStep> history;
   size_t load_steps = 0;         ///< accepted ones
   size_t newton_iterations = 0;  ///< updates of the state: with a new tangent or with kept factors
-  size_t factorisations = 0;     ///< tangents assembled and factorised
-  size_t negative_pivots = 0;    ///< of the last tangent; equals the pressure unknowns at a stable state
+  size_t factorisations = 0;     ///< tangents assembled and factorised on the way
+  /// Equals the pressure unknowns at a stable state. Of the solution's tangent if SolveOptions::check_stability asks
+  /// for it or the cavity's wall has a free rim, else of the last one on the way.
+  size_t negative_pivots = 0;
   size_t pressure_unknowns = 0;  ///< Lagrange pressures, and those of fluids that are unknown
   double reached_pressure_kPa = 0.0;
   std::optional<InvertedPlace> inverted;
@@ -67,6 +69,7 @@ struct SolveOptions {
   size_t load_step_limit = 200;
   double least_load_fraction = 1e-3;  ///< of the pressure change asked for
   double most_load_fraction = 1.0;
+  bool check_stability = false;  ///< count negative pivots at the solution: one more factorisation
   /// Called after each Newton iteration, for a progress line.
   std::function<void(double pressure_kPa, const NewtonIteration&)> on_iteration{};
 };

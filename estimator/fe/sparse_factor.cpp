@@ -59,14 +59,16 @@ SparseFactor::SparseFactor(size_t size, std::span<const int> rows, std::span<con
   for (const int stream : {1, 2, 3})
     control(mumps, stream) = -1;
   control(mumps, 4) = 0;
-  // Found by measurement (docs/decisions/0012-newton-and-factorisation.md): SCOTCH's ordering of the plain graph.
-  // Matching large entries to the diagonal beforehand costs more than all it saves, because pivots stay in range
-  // without it.
+  // Found by measurement (docs/decisions/0012-newton-and-factorisation.md): minimum fill for small matrices, SCOTCH's
+  // dissection for large ones, of the plain graph. Matching large entries to the diagonal beforehand costs more than
+  // all it saves, because pivots stay in range without it.
+  constexpr int approximate_minimum_fill = 2;
   constexpr int scotch = 3;
+  constexpr size_t small = 4000;
   constexpr int plain_graph = 1;
   constexpr int no_matching = 0;
   control(mumps, 6) = no_matching;
-  control(mumps, 7) = scotch;
+  control(mumps, 7) = size < small ? approximate_minimum_fill : scotch;
   control(mumps, 12) = plain_graph;
   // Pivots that are rounding errors (a body that can move freely) are counted instead of divided by.
   constexpr int detect_null_pivots = 24;

@@ -78,8 +78,8 @@ TEST_F(SolveCommand, JsonHoldsWhatTheContractSays) {
   const nlohmann::json json = nlohmann::json::parse(outcome.output);
   EXPECT_NEAR(json["cavity_volume_change_mL"].get<double>(), 78.351, 0.5);
   EXPECT_EQ(json["dofs"], 1792);
-  EXPECT_EQ(json["factorisations"], 2);
-  EXPECT_EQ(json["newton_iterations"], 7);  // the two tangents' own steps and five with kept factors
+  EXPECT_EQ(json["factorisations"], 1);
+  EXPECT_LE(json["newton_iterations"], 16);  // the tangent's own step and those with its kept factor
   EXPECT_GT(json["seconds"].get<double>(), 0.0);
   EXPECT_EQ(json["reason"], "converged");
   EXPECT_EQ(json["negative_pivots"], json["pressure_unknowns"]);

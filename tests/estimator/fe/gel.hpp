@@ -22,6 +22,7 @@ inline AnnulusShape gel_shape(std::array<size_t, 3> elements) {
 inline ElasticModel gel(double c1_kPa, std::array<size_t, 3> elements = {8, 4, 1},
                         ElasticOptions options = {}) {
   options.parameters = {c1_kPa};
+  options.solve.check_stability = true;
   return ElasticModel(make_annulus(gel_shape(elements)), *find_law("neo-hookean"), std::move(options));
 }
 

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <random>
 
+#include "estimator/fe/gauss_contraction.hpp"
 #include "estimator/fe/gauss_points.hpp"
 #include "estimator/fe/stiffness_contraction.hpp"
 
@@ -24,6 +25,22 @@ TEST(GaussPoints, IntegratePolynomialsOfTheirDegreeExactly) {
   for (int power = 0; power <= 9; ++power)
     EXPECT_NEAR(integral_of_power(line_rule_5(), power), 1.0 / (power + 1), 1e-15);
   EXPECT_GT(std::abs(integral_of_power(line_rule_5(), 10) - 1.0 / 11.0), 1e-9);
+}
+
+TEST(GaussContraction, EqualsTheDirectSums) {
+  const ElementField field = ElementField::Random();
+  const GaussMatrices gradients = gradients_at_points(field);
+  ElementField force = ElementField::Zero();
+  for (size_t q = 0; q < gauss_points; ++q) {
+    Eigen::Matrix3d direct;
+    for (size_t k = 0; k < 3; ++k) {
+      const Eigen::Map<const Eigen::Vector<double, 64>> slope(gauss_tables().slope[q][k].data());
+      direct.col(static_cast<Eigen::Index>(k)) = field * slope;
+      force += gradients.at(q).col(static_cast<Eigen::Index>(k)) * slope.transpose();
+    }
+    EXPECT_LT((gradients.at(q) - direct).norm(), 1e-13 * direct.norm());
+  }
+  EXPECT_LT((force_of(gradients) - force).norm(), 1e-13 * force.norm());
 }
 
 TEST(StiffnessContraction, EqualsTheDirectSumOverGaussPoints) {

@@ -20,6 +20,7 @@ std::vector<BondedFaces> sprung_ends(const HermiteMesh& mesh, const SpringBond& 
 ElasticModel sprung_gel(double c1_kPa, const SpringBond& bond, ElasticOptions options = {}) {
   HermiteMesh mesh = make_annulus(gel_shape({5, 3, 1}));
   options.parameters = {c1_kPa};
+  options.solve.check_stability = true;
   options.bonded = sprung_ends(mesh, bond);
   return ElasticModel(std::move(mesh), *find_law("neo-hookean"), std::move(options));
 }

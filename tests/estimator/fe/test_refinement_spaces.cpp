@@ -12,7 +12,8 @@ namespace diastole {
 namespace {
 
 ElasticModel gel_on(HermiteMesh mesh, double c1_kPa) {
-  return ElasticModel(std::move(mesh), *find_law("neo-hookean"), {.parameters = {c1_kPa}});
+  return ElasticModel(std::move(mesh), *find_law("neo-hookean"),
+                      {.parameters = {c1_kPa}, .solve = {.check_stability = true}});
 }
 
 HermiteMesh refined(const HermiteMesh& mesh, const std::array<size_t, 3>& halvings) {
@@ -91,7 +92,7 @@ TEST(RefinedModel, IsAHeartThatStaysStableAtItsApex) {
   const FibreField fibres = ellipsoid_fibres(shape, 60.0, -60.0);
   for (size_t direction = 0; direction < 3; ++direction) {
     const Refinement finer(coarse, direction);
-    ElasticOptions options{.parameters = {2.0, 8.0, 2.0, 4.0}};
+    ElasticOptions options{.parameters = {2.0, 8.0, 2.0, 4.0}, .solve = {.check_stability = true}};
     options.material_axes = material_axes_of(fibres.prolonged(finer));
     ElasticModel model(finer.mesh(), *find_law("guccione"), std::move(options));
     const Solution solution = model.solve(0.5);

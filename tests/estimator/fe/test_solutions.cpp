@@ -51,7 +51,8 @@ ElasticModel plane_strain_slice(double c1_kPa, size_t layers) {
   hold_face_component(mesh, mesh.faces().bottom, 2, held);
   hold_face_component(mesh, mesh.faces().top, 2, held);
   held[dof_of(0, 0, 1)] = held[dof_of(4, 0, 1)] = held[dof_of(2, 0, 0)] = 1;
-  return ElasticModel(std::move(mesh), *find_law("neo-hookean"), {.parameters = {c1_kPa}, .held = held});
+  return ElasticModel(std::move(mesh), *find_law("neo-hookean"),
+                      {.parameters = {c1_kPa}, .held = held, .solve = {.check_stability = true}});
 }
 
 TEST(PlaneStrainCylinder, MatchesTheClosedFormAndConvergesWithLayers) {
@@ -152,7 +153,7 @@ TEST(Sensitivities, ElementsAddUpToTheWhole) {
     for (size_t i = 0; i < sum.size(); ++i)
       sum[i] += by.parameter[e][i];
   }
-  EXPECT_LT(largest_difference(sum, by.parameter.back()), 1e-10 * largest(sum));
+  EXPECT_LT(largest_difference(sum, by.parameter.back()), 1e-9 * largest(sum));
 }
 
 TEST(Solve, WarmStartReachesTheSameState) {
@@ -162,6 +163,14 @@ TEST(Solve, WarmStartReachesTheSameState) {
   ASSERT_TRUE(cold.report.converged() && warm.report.converged());
   EXPECT_LT(largest_difference(cold.state.position_mm, warm.state.position_mm), 1e-7);
   EXPECT_EQ(model.solve(6.0, cold.state).report.factorisations, 1U);
+}
+
+// The tangent at rest, kept and updated, leads to an inner wall that is a third farther out.
+TEST(Solve, NeedsOneTangentForTheGelsWholeLoad) {
+  ElasticModel model = gel(6.5);
+  const SolveReport report = model.solve(6.0).report;
+  EXPECT_EQ(report.factorisations, 1U);
+  EXPECT_LE(report.newton_iterations, 16U);
 }
 
 TEST(Solve, IsTheSameForAnyNumberOfThreads) {
@@ -177,7 +186,8 @@ TEST(Solve, IsTheSameForAnyNumberOfThreads) {
 }
 
 TEST(Solve, AnisotropicLawWithFullTangentConverges) {
-  ElasticModel model(make_annulus(gel_shape({8, 4, 1})), fibre_exponential(), {.parameters = {10.0, 2.0}});
+  ElasticModel model(make_annulus(gel_shape({8, 4, 1})), fibre_exponential(),
+                     {.parameters = {10.0, 2.0}, .solve = {.check_stability = true}});
   const Solution solution = model.solve(3.0);
   ASSERT_TRUE(solution.report.converged()) << solution.report.describe();
   EXPECT_EQ(solution.report.negative_pivots, solution.report.pressure_unknowns);
