@@ -16,6 +16,7 @@
 #include "estimator/cli/solution_json.hpp"
 #include "estimator/cli/solution_outputs.hpp"
 #include "estimator/cli/study_options.hpp"
+#include "estimator/fe/averaged_pressure.hpp"
 #include "estimator/fe/elastic_system.hpp"
 #include "estimator/fe/point_fields.hpp"
 #include "estimator/fe/study_model.hpp"
@@ -117,13 +118,14 @@ nlohmann::ordered_json as_json(const Study& study, ElasticModel& model, const So
   json["negative_pivots"] = report.negative_pivots;
   json["pressure_unknowns"] = report.pressure_unknowns;
   json["seconds"] = seconds;
+  const ElasticState shown = with_averaged_pressure(model.system(), solution.state);
   json["probes"] = nlohmann::ordered_json::array();
   for (const Probe& probe : probes) {
     const Eigen::Vector3d moved = model.mesh().value(solution.state.position_mm, probe.point) -
                                   model.mesh().value(model.mesh().reference(), probe.point);
     json["probes"].push_back({{"point_mm", {probe.place_mm[0], probe.place_mm[1], probe.place_mm[2]}},
                               {"displacement_mm", {moved[0], moved[1], moved[2]}},
-                              {"fields", fields_json(model, solution.state, probe.point)}});
+                              {"fields", fields_json(model, shown, probe.point)}});
   }
   return json;
 }
@@ -222,7 +224,7 @@ Solution solve_all(ElasticModel& model, const std::vector<TimedLoad>& loads,
   for (const TimedLoad& timed : loads) {
     solution = model.solve(timed.load, solution.state);
     if (!solution.report.converged()) break;
-    solved.push_back({timed.time_s, solution.state});
+    solved.push_back({timed.time_s, with_averaged_pressure(model.system(), solution.state)});
   }
   return solution;
 }

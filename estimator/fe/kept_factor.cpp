@@ -5,7 +5,7 @@
 namespace diastole {
 namespace {
 
-constexpr double most_contraction = 0.75;
+constexpr double most_contraction = 0.9;
 constexpr size_t most_steps = 20;
 
 }  // namespace

@@ -6,8 +6,9 @@
 //   v = s + sum_{i < k}  (v . d_i / |d_i|^2) d_{i+1}         one after the other
 //   d_{k+1} = v / (1 - v . d_k / |d_k|^2)
 //
-// so that K learns from each step how the tangent has changed since, without being factorised again. Such steps
-// converge superlinearly while |v| <= |d_k| / 2; beyond, a new tangent is due.
+// so that K learns from each step how the tangent has changed since, without being factorised again. A step that
+// shrinks by less than a tenth, or the twentieth, asks for a new tangent (Deuflhard asks when one does not halve; but a
+// step here costs a twentieth of a tangent, and after one slow step in the beginning the next ones are fast).
 
 #include <functional>
 #include <optional>

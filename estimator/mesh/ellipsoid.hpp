@@ -31,7 +31,7 @@ struct EllipsoidShape {
   std::array<double, 2> inner_axes_mm{21.0, 51.0};  ///< across z, along z
   std::array<double, 2> outer_axes_mm{30.0, 60.0};
   double base_z_mm = 15.0;
-  double base_grading = 0.8;                ///< g above, 0 <= g < 1
+  double base_grading = 0.8;                ///< g above, -1 <= g < 1; below 0: towards the apex
   std::array<size_t, 3> elements{8, 4, 2};  ///< circumferential (>= 3), longitudinal, transmural (>= 1)
 };
 

@@ -1,6 +1,6 @@
 #pragma once
 // A solution as a grid of Bezier hexahedra: undeformed geometry and displacement exactly (so that warping by
-// displacement_mm shows the deformed body exactly), the Lagrange pressure exactly, strain and stress as the
+// displacement_mm shows the deformed body exactly), the state's Lagrange pressure exactly, strain and stress as the
 // cubic through their values at the 4x4x4 Gauss points of each element.
 //
 // Point data: displacement_mm, cauchy_stress_kPa and green_strain (xx, yy, zz, xy, yz, xz), fibre_direction
@@ -16,7 +16,7 @@ namespace diastole {
 
 struct SolvedFrame {
   double time_s = 0.0;
-  ElasticState state;
+  ElasticState state;  ///< stresses are best drawn from with_averaged_pressure()
 };
 
 /// Precondition: at least one frame; states are this model's.

@@ -4,7 +4,9 @@
 #include <cmath>
 #include <utility>
 
+#include "estimator/fe/averaged_pressure.hpp"
 #include "estimator/fe/elastic_system.hpp"
+#include "estimator/fe/point_fields.hpp"
 #include "estimator/mesh/block.hpp"
 #include "tools/figures/mixed_derivatives.hpp"
 
@@ -117,26 +119,10 @@ bool solve(ElasticSystem& system, const std::vector<double>& load, ElasticState&
   return false;
 }
 
-/// Corner values, each replaced by the mean over the elements that meet there.
-std::vector<double> averaged_at_nodes(const HermiteMesh& mesh, const std::vector<double>& corner_values) {
-  std::vector<double> sum(mesh.node_count(), 0.0);
-  std::vector<double> sharers(mesh.node_count(), 0.0);
-  for (size_t i = 0; i < corner_values.size(); ++i) {
-    const size_t node = mesh.element(i / corners)[i % corners];
-    sum[node] += corner_values[i];
-    sharers[node] += 1.0;
-  }
-  std::vector<double> averaged(corner_values.size());
-  for (size_t i = 0; i < averaged.size(); ++i) {
-    const size_t node = mesh.element(i / corners)[i % corners];
-    averaged[i] = sum[node] / sharers[node];
-  }
-  return averaged;
-}
-
-void measure(const ManufacturedCase& made_up, const HermiteMesh& mesh, const ElasticState& state,
+void measure(const ManufacturedCase& made_up, const ElasticSystem& system, const ElasticState& state,
              ManufacturedErrors& errors) {
-  const std::vector<double> averaged = averaged_at_nodes(mesh, state.lagrange_pressure_kPa);
+  const HermiteMesh& mesh = system.mesh();
+  const ElasticState averaged = with_averaged_pressure(system, state);
   for_each_point(mesh, [&](const MaterialPoint& point, const Vector3d& at, double weight) {
     const std::array<Mixed, 3> exact = deformed(at);
     const Vector3d x(exact[0].part[0], exact[1].part[0], exact[2].part[0]);
@@ -151,10 +137,14 @@ void measure(const ManufacturedCase& made_up, const HermiteMesh& mesh, const Ela
       return error;
     };
     errors.pressure_L2_kPa += weight * std::pow(pressure_error_kPa(state.lagrange_pressure_kPa), 2);
-    errors.averaged_pressure_L2_kPa += weight * std::pow(pressure_error_kPa(averaged), 2);
+    errors.averaged_pressure_L2_kPa +=
+        weight * std::pow(pressure_error_kPa(averaged.lagrange_pressure_kPa), 2);
+    const Matrix3d stress_kPa = exact_stress_kPa(made_up, at) * deformation_gradient(at).transpose();
+    errors.stress_L2_kPa +=
+        weight * (point_fields(system, averaged, point).stress_kPa - stress_kPa).squaredNorm();
   });
   for (double* error : {&errors.displacement_L2_mm, &errors.displacement_H1, &errors.pressure_L2_kPa,
-                        &errors.averaged_pressure_L2_kPa})
+                        &errors.averaged_pressure_L2_kPa, &errors.stress_L2_kPa})
     *error = std::sqrt(*error);
 }
 
@@ -188,7 +178,7 @@ ManufacturedErrors solve_manufactured(const ManufacturedCase& made_up, size_t n)
   errors.unknowns = system.equations().unknowns();
   errors.pressure_unknowns = system.equations().pressure_unknowns();
   errors.converged = solve(system, loads(made_up, system), state, errors.negative_pivots);
-  measure(made_up, system.mesh(), state, errors);
+  measure(made_up, system, state, errors);
   return errors;
 }
 

@@ -11,7 +11,7 @@
 // the divergence theorem is body force and tractions together.
 //
 // Errors are those of the discrete solution against the made-up one: displacement in L2 (mm) and in H1 (its gradient),
-// pressure in L2 (kPa), each divided by the cube's volume's root.
+// pressure and stress in L2 (kPa), each divided by the cube's volume's root.
 
 #include <cstddef>
 #include <string>
@@ -40,8 +40,8 @@ struct ManufacturedErrors {
   double displacement_L2_mm = 0.0;
   double displacement_H1 = 0.0;
   double pressure_L2_kPa = 0.0;
-  double averaged_pressure_L2_kPa =
-      0.0;  ///< of the corner values' means over the elements that meet at a node
+  double averaged_pressure_L2_kPa = 0.0;  ///< averaged_pressure.hpp
+  double stress_L2_kPa = 0.0;             ///< Cauchy stress with that pressure
 };
 
 /// Solves a case on n x n x n elements.

@@ -5,7 +5,7 @@
 // exact pressure. A curved pressure is met to order 2 by tri-linear functions and takes the displacement along: 3 and
 // 2. The discontinuous pressure itself carries a weakly controlled sawtooth (one linear function in all elements, of
 // which the divergence of a C1 displacement sees only the body's ends) and converges slower; averaged at the nodes,
-// where a sawtooth cancels, it has its order 2.
+// where a sawtooth cancels, it has its order 2, and so has the stress that is shown.
 
 #include <gtest/gtest.h>
 
@@ -29,6 +29,7 @@ inline void expect_orders(const ManufacturedCase& made_up, size_t coarse_n, size
   EXPECT_GT(order(&ManufacturedErrors::displacement_L2_mm), pressure_order + 1.0 - slack);
   EXPECT_GT(order(&ManufacturedErrors::displacement_H1), pressure_order - slack);
   EXPECT_GT(order(&ManufacturedErrors::averaged_pressure_L2_kPa), pressure_order - slack);
+  EXPECT_GT(order(&ManufacturedErrors::stress_L2_kPa), pressure_order - slack);
   EXPECT_GT(order(&ManufacturedErrors::pressure_L2_kPa), 0.9);
 }
 

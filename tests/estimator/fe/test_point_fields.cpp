@@ -5,6 +5,7 @@
 
 #include <cmath>
 
+#include "estimator/fe/averaged_pressure.hpp"
 #include "estimator/fe/point_fields.hpp"
 #include "estimator/mesh/ellipsoid.hpp"
 #include "tests/estimator/fe/gel.hpp"
@@ -100,6 +101,40 @@ TEST(PointFields, CarryThePressureToTheWallsAsTraction) {
   }
   EXPECT_LT(misses_kPa[0], 0.06 * pressure_kPa);
   EXPECT_LT(misses_kPa[1], 0.5 * misses_kPa[0]);
+}
+
+TEST(AveragedPressure, IsOneAtANodeAndBringsTheTractionCloserToTheLoad) {
+  constexpr double pressure_kPa = 6.0;
+  ElasticModel model = gel(c1_kPa, {8, 8, 2});
+  const Solution solution = model.solve(pressure_kPa);
+  ASSERT_TRUE(solution.report.converged());
+  const ElasticState averaged = with_averaged_pressure(model.system(), solution.state);
+  constexpr size_t at_equator = 32;
+  const auto miss_kPa = [&](const ElasticState& state) {
+    double most = 0.0;
+    for (const double xi2 : {0.0, 0.3, 0.6}) {
+      const PointFields fields = point_fields(model.system(), state, {at_equator, {0.3, xi2, 0.0}});
+      most = std::max(most, std::abs(along(fields.wall.deformed, fields.stress_kPa)[2] + pressure_kPa));
+    }
+    return most;
+  };
+  EXPECT_LT(miss_kPa(averaged), 0.7 * miss_kPa(solution.state));
+  const auto pressure = [&](const MaterialPoint& point) {
+    return point_fields(model.system(), averaged, point).lagrange_pressure_kPa;
+  };
+  EXPECT_NEAR(pressure({at_equator, {0.0, 0.0, 1.0}}), pressure({at_equator + 64 - 8, {0.0, 1.0, 0.0}}),
+              1e-12);
+}
+
+// At rest each element's pressure is its own 2 C1, which no neighbour of another C1 may change.
+TEST(AveragedPressure, KeepsItsJumpWhereTheMaterialChanges) {
+  ElasticModel model = gel(c1_kPa, {6, 2, 2});
+  for (size_t e = 0; e < 12; ++e)
+    model.set_element_parameter(0, e, 2.0 * c1_kPa);
+  ElasticState state = model.solve(0.0).state;
+  const std::vector<double> own = state.lagrange_pressure_kPa;
+  state = with_averaged_pressure(model.system(), state);
+  EXPECT_LT(largest_difference(state.lagrange_pressure_kPa, own), 1e-9);
 }
 
 /// Force across the surface xi2 = 0 of a ring of elements along z: integral of P N dA of the undeformed cut.
