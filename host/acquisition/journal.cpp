@@ -3,13 +3,12 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <boost/crc.hpp>
 #include <cerrno>
 #include <chrono>
 #include <cstring>
-#include <fstream>
-#include <iterator>
 #include <optional>
 
 #include "protocol/contract/input_error.hpp"
@@ -22,6 +21,7 @@ constexpr size_t header_bytes = 16;
 constexpr size_t crc_bytes = 4;
 constexpr uint32_t most_payload_bytes = 16U << 20;
 constexpr std::chrono::milliseconds sync_interval{500};
+constexpr size_t scan_bytes = 1U << 20;
 
 uint32_t crc32c(std::span<const uint8_t> bytes) {
   boost::crc_optimal<32, 0x1EDC6F41, 0xFFFFFFFF, 0xFFFFFFFF, true, true> crc;
@@ -41,22 +41,88 @@ uint32_t get_u32(std::span<const uint8_t> bytes, size_t at) {
   return value;
 }
 
-/// The whole record at `at`, or none.
-std::optional<JournalRecord> record_at(std::span<const uint8_t> bytes, size_t at) {
-  if (bytes.size() - at < header_bytes + crc_bytes) return std::nullopt;
-  if (!std::equal(magic.begin(), magic.end(), bytes.begin() + static_cast<std::ptrdiff_t>(at))) {
-    return std::nullopt;
+/// Finds whole records in bytes that come piece by piece.
+class RecordFinder {
+ public:
+  /// Returns how many of the bytes are done with; the others, with more behind them, belong into the next call.
+  /// `all`: there are none behind these.
+  size_t take(std::span<const uint8_t> bytes, bool all, const JournalRecords::Take& found) {
+    size_t at = 0;
+    while (at < bytes.size()) {
+      const auto rest = bytes.subspan(at);
+      const auto length = payload_bytes(rest);
+      if (!all &&
+          (rest.size() < header_bytes || (length && rest.size() < header_bytes + *length + crc_bytes))) {
+        break;
+      }
+      if (length && is_whole(rest, *length) && get_u32(rest, 8) >= expected_) {
+        tell(rest, *length, found);
+        at += header_bytes + *length + crc_bytes;
+      } else {
+        ++at;
+        ++damage_.torn_tail_bytes;
+      }
+    }
+    return at;
   }
-  const uint32_t length = get_u32(bytes, at + 4);
-  if (length > most_payload_bytes || bytes.size() - at - header_bytes - crc_bytes < length)
-    return std::nullopt;
-  if (crc32c(bytes.subspan(at, header_bytes + length)) != get_u32(bytes, at + header_bytes + length)) {
-    return std::nullopt;
+  [[nodiscard]] const JournalDamage& damage() const { return damage_; }
+  [[nodiscard]] bool found_any() const { return found_any_; }
+
+ private:
+  /// None if no record begins here.
+  static std::optional<size_t> payload_bytes(std::span<const uint8_t> bytes) {
+    if (bytes.size() < header_bytes || !std::equal(magic.begin(), magic.end(), bytes.begin()))
+      return std::nullopt;
+    const size_t length = get_u32(bytes, 4);
+    return length <= most_payload_bytes ? std::optional(length) : std::nullopt;
   }
-  const auto payload = bytes.subspan(at + header_bytes, length);
-  return JournalRecord{static_cast<RecordKind>(get_u32(bytes, at + 12)),
-                       get_u32(bytes, at + 8),
-                       {payload.begin(), payload.end()}};
+  static bool is_whole(std::span<const uint8_t> bytes, size_t length) {
+    return bytes.size() >= header_bytes + length + crc_bytes &&
+           crc32c(bytes.first(header_bytes + length)) == get_u32(bytes, header_bytes + length);
+  }
+  void tell(std::span<const uint8_t> bytes, size_t length, const JournalRecords::Take& found) {
+    found_any_ = true;
+    damage_.damaged_bytes += std::exchange(damage_.torn_tail_bytes, 0);
+    record_.sequence = get_u32(bytes, 8);
+    damage_.records_lost += record_.sequence - expected_;
+    expected_ = record_.sequence + 1;
+    record_.kind = static_cast<RecordKind>(get_u32(bytes, 12));
+    const auto payload = bytes.subspan(header_bytes, length);
+    record_.payload.assign(payload.begin(), payload.end());
+    found(record_);
+  }
+
+  JournalRecord record_;
+  JournalDamage damage_;
+  uint32_t expected_ = 0;
+  bool found_any_ = false;
+};
+
+[[noreturn]] void refuse(const std::string& file, std::string problem, std::string remedy) {
+  throw InputError({file, "", std::move(problem), std::move(remedy)});
+}
+
+JournalDamage scan(const std::filesystem::path& path, const JournalRecords::Take& found) {
+  const Descriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
+  if (!file.valid() || std::filesystem::is_directory(path))
+    refuse(path.string(), "cannot be opened", "Check the path and that you may read the file.");
+  RecordFinder finder;
+  std::vector<uint8_t> window;
+  for (bool all = false; !all;) {
+    const size_t held = window.size();
+    window.resize(held + scan_bytes);
+    const ssize_t got = ::read(file.get(), window.data() + held, scan_bytes);
+    if (got < 0 && errno != EINTR)
+      refuse(path.string(), fmt::format("cannot be read: {}", std::strerror(errno)), "Check the disk.");
+    window.resize(held + static_cast<size_t>(std::max<ssize_t>(got, 0)));
+    all = got == 0;
+    const size_t done = finder.take(window, all, found);
+    window.erase(window.begin(), window.begin() + static_cast<std::ptrdiff_t>(done));
+  }
+  if (!finder.found_any())
+    refuse(path.string(), "holds no whole record of a journal",
+           "Give a journal of the daemon (NAME.journal in its journal_dir).");
+  return finder.damage();
 }
 
 void sync_directory(const std::filesystem::path& file) {
@@ -136,40 +202,29 @@ void JournalWriter::sync_in_time(const std::stop_token& stop) {
   }
 }
 
+JournalRecords::JournalRecords(const JournalContents& contents)
+    : file_(contents.file), contents_(&contents) {}
+
+JournalDamage JournalRecords::each(const Take& take) const {
+  if (contents_ == nullptr) return scan(path_, take);
+  for (const JournalRecord& record : contents_->records)
+    take(record);
+  return *contents_;
+}
+
 JournalContents parse_journal(std::span<const uint8_t> bytes) {
   JournalContents contents;
-  uint32_t expected = 0;
-  size_t skipped = 0;
-  for (size_t at = 0; at < bytes.size();) {
-    auto record = record_at(bytes, at);
-    if (!record || record->sequence < expected) {
-      ++at;
-      ++skipped;
-      continue;
-    }
-    at += header_bytes + record->payload.size() + crc_bytes;
-    contents.damaged_bytes += std::exchange(skipped, 0);
-    contents.records_lost += record->sequence - expected;
-    expected = record->sequence + 1;
-    contents.records.push_back(std::move(*record));
-  }
-  contents.torn_tail_bytes = skipped;
+  RecordFinder finder;
+  (void)finder.take(bytes, true, [&](const JournalRecord& record) { contents.records.push_back(record); });
+  static_cast<JournalDamage&>(contents) = finder.damage();
   return contents;
 }
 
 JournalContents read_journal(const std::filesystem::path& path) {
-  std::ifstream stream(path, std::ios::binary);
-  if (!stream || std::filesystem::is_directory(path)) {
-    throw InputError(
-        {path.string(), "", "cannot be opened", "Check the path and that you may read the file."});
-  }
-  const std::vector<char> bytes{std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
-  JournalContents contents = parse_journal({reinterpret_cast<const uint8_t*>(bytes.data()), bytes.size()});
+  JournalContents contents;
+  static_cast<JournalDamage&>(contents) =
+      scan(path, [&](const JournalRecord& record) { contents.records.push_back(record); });
   contents.file = path.string();
-  if (contents.records.empty()) {
-    throw InputError({path.string(), "", "holds no whole record of a journal",
-                      "Give a journal of the daemon (NAME.journal in its journal_dir)."});
-  }
   return contents;
 }
 

@@ -92,15 +92,39 @@ struct JournalRecord {
   std::vector<uint8_t> payload;
 };
 
-struct JournalContents {
-  std::string file;
-  std::vector<JournalRecord> records;
+/// What lies between and behind the whole records.
+struct JournalDamage {
   size_t damaged_bytes = 0;    ///< skipped between whole records
   size_t torn_tail_bytes = 0;  ///< behind the last whole record
   size_t records_lost = 0;     ///< by their sequence, before the last whole one
 };
 
-/// Throws InputError if the file cannot be opened or holds no whole record at all.
+struct JournalContents : JournalDamage {
+  std::string file;
+  std::vector<JournalRecord> records;
+};
+
+/// Goes through a journal's file, or through what was read of one, as often as one likes. Of a file no more than one
+/// record is held in memory at a time.
+class JournalRecords {
+ public:
+  using Take = std::function<void(const JournalRecord&)>;
+
+  explicit JournalRecords(std::filesystem::path path) : file_(path.string()), path_(std::move(path)) {}
+  /// `contents` outlives this.
+  explicit JournalRecords(const JournalContents& contents);
+
+  /// Every whole record in order. Throws InputError if the file cannot be read or holds no whole record at all.
+  JournalDamage each(const Take& take) const;
+  [[nodiscard]] const std::string& file() const { return file_; }
+
+ private:
+  std::string file_;
+  std::filesystem::path path_;
+  const JournalContents* contents_ = nullptr;
+};
+
+/// All of it at once. Throws as JournalRecords::each.
 JournalContents read_journal(const std::filesystem::path& path);
 JournalContents parse_journal(std::span<const uint8_t> bytes);
 

@@ -32,7 +32,7 @@ nlohmann::json describe(const StoredJournal& stored) {
                       {"complete", false}};
   if (stored.has_run_file) told["run_file"] = run_file_beside(stored.file).string();
   try {
-    const JournalStory story = read_story(read_journal(stored.file));
+    const JournalStory story = read_story(JournalRecords(stored.file));
     told["started_utc"] = story.begin.started_utc;
     told["experiment"] = story.begin.experiment_file;
     told["complete"] = story.closed;
@@ -88,22 +88,24 @@ ExitCode recover(const RecoverOptions& options, const CommandOutput& out) {
                       "For example: diastole recover JOURNAL -o NAME.run.h5; --list shows the journals."});
   }
   check_output(options.output, options.force, {options.journal});
-  const JournalContents journal = read_journal(options.journal);
   AssembledRun assembled;
   try {
-    assembled = assemble_run(journal);
+    const StreamedRun run = stream_run(JournalRecords(options.journal));
+    const std::string remark = write_run(options.output, run);
+    if (!remark.empty()) fmt::print(stderr, "{}\n", remark);
+    assembled = run.told;
   } catch (const NothingRecorded& nothing) {
     return tell_nothing(nothing, out);
   }
-  write_run(options.output, assembled.run);
-  const bool whole = assembled.ended_in_order && assembled.samples_missing == 0 && journal.records_lost == 0;
+  const JournalDamage& damage = assembled.damage;
+  const bool whole = assembled.ended_in_order && assembled.samples_missing == 0 && damage.records_lost == 0;
   if (out.json) {
     const nlohmann::json document{{"run", options.output},
                                   {"recovered_samples", assembled.samples_received},
                                   {"lost_samples", assembled.samples_missing},
-                                  {"lost_records", journal.records_lost},
-                                  {"torn_tail_bytes", journal.torn_tail_bytes},
-                                  {"damaged_bytes", journal.damaged_bytes},
+                                  {"lost_records", damage.records_lost},
+                                  {"torn_tail_bytes", damage.torn_tail_bytes},
+                                  {"damaged_bytes", damage.damaged_bytes},
                                   {"complete", assembled.ended_in_order}};
     std::cout << document.dump(2) << '\n';
   } else {

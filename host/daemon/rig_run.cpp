@@ -1,7 +1,6 @@
 // A run: loading, recording, and making its file (rig_service.hpp).
 
 #include <fmt/format.h>
-#include <malloc.h>
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
@@ -165,7 +164,6 @@ void RigService::do_run(const RunOrder& order, const Done& done) {
     result = {{"end", "failed"}, {"problem", error.what()}, {"journal", path.string()}};
   }
   if (controller_->last_known().state == wire::State::armed) disarm(*controller_);
-  ::malloc_trim(0);  // what the run file was made in is no more needed
   spdlog::info("run {} ended: {}", record.run_id, result.dump());
   tidy_journals();
   const std::lock_guard lock(mutex_);
@@ -297,10 +295,16 @@ json RigService::finish(const std::filesystem::path& journal, const RunOutcome& 
   json result{{"end", outcome.end}, {"regular", outcome.regular()}, {"journal", journal.string()}};
   const std::filesystem::path run_file = run_file_beside(journal);
   AssembledRun assembled;
+  std::string remark;
   beside_the_line([&] {
-    assembled = assemble_run(read_journal(journal));
-    write_run(run_file, assembled.run);
+    const StreamedRun run = stream_run(JournalRecords(journal));
+    remark = write_run(run_file, run);
+    assembled = run.told;
   });
+  if (!remark.empty()) {
+    spdlog::warn("{}", remark);
+    keep({"warning", "name_unconfirmed", remark});
+  }
   result["run_file"] = run_file.string();
   result["cycles"] = outcome.cycles;
   result["triggers"] = assembled.run.trigger_s.size();

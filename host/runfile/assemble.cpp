@@ -6,209 +6,81 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <memory>
 
 #include "host/runfile/filtered_channel.hpp"
 #include "host/runfile/journal_story.hpp"
+#include "host/runfile/pressure_rows.hpp"
+#include "host/runfile/time_axis.hpp"
 #include "protocol/contract/input_error.hpp"
 #include "protocol/runfile/layout.hpp"
+#include "protocol/runfile/reader.hpp"
 #include "protocol/runfile/soundness.hpp"
+#include "protocol/signal/zero_phase.hpp"
 
 namespace diastole {
 namespace {
 
 using runfile::RecordedRun;
 
-constexpr double ns_per_s = 1e9;
 constexpr double mL_per_pL = 1e-9;
 constexpr double missing = std::numeric_limits<double>::quiet_NaN();
 const std::string lost_in_the_journal = "its record was lost in the journal";
 
-/// Controller ticks and host times as seconds since the start of run.
-class TimeAxis {
- public:
-  TimeAxis(const JournalStory& story, const std::string& file)
-      : tick_rate_Hz_(story.begin.tick_rate_Hz), start_tick_(*story.start_tick) {
-    const auto fitted = fit_clock_map(story.controller_pairs);
-    if (!fitted) {
-      throw NothingRecorded({file, "",
-                             "ends before the two clocks were compared, so its samples have no time",
-                             "There is nothing to recover."});
-    }
-    map_ = *fitted;
+TimeAxis axis_of(const JournalStory& story, const std::string& file) {
+  if (!story.start_tick)
+    throw NothingRecorded({file, "", "ends before the run started", "There is nothing to recover."});
+  const auto fitted = fit_clock_map(story.controller_pairs);
+  if (!fitted) {
+    throw NothingRecorded({file, "", "ends before the two clocks were compared, so its samples have no time",
+                           "There is nothing to recover."});
   }
-
-  [[nodiscard]] double of_tick(uint64_t tick) const {
-    const double ticks = tick >= start_tick_ ? static_cast<double>(tick - start_tick_)
-                                             : -static_cast<double>(start_tick_ - tick);
-    return ticks / tick_rate_Hz_;
-  }
-  [[nodiscard]] double of_host_ns(uint64_t host_ns) const {
-    return of_host_s(static_cast<double>(host_ns) / ns_per_s);
-  }
-  [[nodiscard]] double of_host_s(double host_s) const { return map_.to_other_s(host_s) - start_s(); }
-  [[nodiscard]] double host_at_start_s() const { return map_.to_host_s(start_s()); }
-  [[nodiscard]] const ClockMap& map() const { return map_; }
-
- private:
-  [[nodiscard]] double start_s() const { return static_cast<double>(start_tick_) / tick_rate_Hz_; }
-
-  double tick_rate_Hz_;
-  uint64_t start_tick_;
-  ClockMap map_;
-};
-
-/// One row of the sample grid before cutting: its index is its place.
-struct Grid {
-  std::vector<double> time_s;  // NaN: missing
-  std::vector<std::vector<double>> channels;
-  std::vector<uint32_t> reason;  // why it is missing: its place in `reasons`
-  std::vector<std::string> reasons;
-};
-
-/// When sample k was taken: as the host noted; if the instrument's timer counts its samples, as that timer's line
-/// against the host's clock tells, which knows nothing of blocks and how late they came.
-class SampleTimes {
- public:
-  SampleTimes(const JournalStory& story, const TimeAxis& axis) : axis_(axis) {
-    if (!story.begin.daq_timer_counts_samples) return;
-    rate_Hz_ = story.begin.sample_rate_Hz;
-    map_ = fit_clock_map(story.daq_pairs);
-  }
-
-  [[nodiscard]] double of(uint64_t index, uint64_t host_ns) const {
-    if (!map_) return axis_.of_host_ns(host_ns);
-    return axis_.of_host_s(map_->to_host_s(static_cast<double>(index) / rate_Hz_));
-  }
-
- private:
-  const TimeAxis& axis_;
-  double rate_Hz_ = 1;
-  std::optional<ClockMap> map_;
-};
-
-Grid lay_out(const JournalStory& story, const TimeAxis& axis, size_t channels) {
-  const SampleTimes times(story, axis);
-  const uint64_t rows = story.sample_rows();
-  Grid grid{std::vector<double>(rows, missing),
-            std::vector<std::vector<double>>(channels, std::vector<double>(rows, missing)),
-            std::vector<uint32_t>(rows, 0),
-            {lost_in_the_journal}};
-  for (const DeclaredGap& gap : story.gaps) {
-    std::fill_n(grid.reason.begin() + static_cast<std::ptrdiff_t>(gap.first_index), gap.count,
-                static_cast<uint32_t>(grid.reasons.size()));
-    grid.reasons.push_back(gap.reason);
-  }
-  for (const SampleBlock& block : story.samples) {
-    if (block.channels != channels) continue;
-    for (size_t i = 0; i < block.host_ns.size(); ++i) {
-      const size_t row = block.first_index + i;
-      grid.time_s[row] = times.of(row, block.host_ns[i]);
-      for (size_t c = 0; c < channels; ++c)
-        grid.channels[c][row] = block.value_kPa[i * channels + c];
-    }
-  }
-  return grid;
+  return {story, *fitted};
 }
 
-/// When row 0 was due: as the journal tells; else as its first sample tells; else the start of run, before
-/// which the grid begins by some milliseconds.
-double grid_start_s(const JournalStory& story, const TimeAxis& axis, const std::vector<double>& time_s,
-                    double spacing_s) {
-  if (story.first_due_ns) return axis.of_host_ns(*story.first_due_ns);
-  const auto first = std::find_if(time_s.begin(), time_s.end(), [](double t) { return !std::isnan(t); });
-  if (first == time_s.end()) return 0;
-  return *first - spacing_s * static_cast<double>(first - time_s.begin());
-}
-
-/// Gives missing rows times evenly between their neighbours; before the first and after the last sample that
-/// was received, the times at which they were due. As the last one may have come later than the next was due,
-/// a row lies at least a tenth of the spacing after the one before.
-void fill_times(std::vector<double>& time_s, double start_s, double spacing_s) {
-  const size_t rows = time_s.size();
-  const auto due_s = [&](size_t row) { return start_s + spacing_s * static_cast<double>(row); };
-  size_t row = 0;
-  for (; row < rows && std::isnan(time_s[row]); ++row)
-    time_s[row] = due_s(row);
-  while (row < rows) {
-    size_t next = row + 1;
-    while (next < rows && std::isnan(time_s[next]))
-      ++next;
-    for (size_t i = row + 1; i < next; ++i) {
-      time_s[i] = next < rows
-                      ? time_s[i - 1] + (time_s[next] - time_s[i - 1]) / static_cast<double>(next - i + 1)
-                      : std::max(due_s(i), time_s[i - 1] + 0.1 * spacing_s);
-    }
-    row = next;
-  }
-}
-
-void declare(RecordedRun& run, std::string_view stream, int64_t first, int64_t count,
+void declare(std::vector<runfile::Gap>& gaps, std::string_view stream, int64_t first, int64_t count,
              const std::string& reason) {
   if (count <= 0) return;
-  if (!run.gaps.empty()) {
-    runfile::Gap& last = run.gaps.back();
+  if (!gaps.empty()) {
+    runfile::Gap& last = gaps.back();
     if (last.stream == stream && last.reason == reason && last.first_index + last.count == first) {
       last.count += count;
       return;
     }
   }
-  run.gaps.push_back({std::string(stream), first, count, reason});
+  gaps.push_back({std::string(stream), first, count, reason});
 }
 
-void put_pressure(const JournalStory& story, const TimeAxis& axis, AssembledRun& assembled) {
-  RecordedRun& run = assembled.run;
-  const std::vector<std::string>& names = story.begin.channels;
-  const double spacing_s = axis.map().scale / story.begin.sample_rate_Hz;
-  Grid grid = lay_out(story, axis, names.size());
-  std::vector<bool> received;
-  for (const double t : grid.time_s)
-    received.push_back(!std::isnan(t));
-  fill_times(grid.time_s, grid_start_s(story, axis, grid.time_s, spacing_s), spacing_s);
-  const auto first = std::lower_bound(grid.time_s.begin(), grid.time_s.end(), 0.0) - grid.time_s.begin();
-  const auto last = std::ssize(grid.time_s);
-  const auto keep = [first](std::vector<double>& values) {
-    values.erase(values.begin(), values.begin() + first);
-    return std::move(values);
-  };
-  run.pressure.time_s = keep(grid.time_s);
-  for (size_t c = 0; c < names.size(); ++c)
-    run.pressure.channels[names[c] + "_kPa"] = keep(grid.channels[c]);
-  for (auto row = first; row < last; ++row) {
-    if (received[static_cast<size_t>(row)]) {
-      ++assembled.samples_received;
-    } else {
-      ++assembled.samples_missing;
-      declare(run, runfile::pressure_stream, row - first, 1,
-              grid.reasons[grid.reason[static_cast<size_t>(row)]]);
-    }
-  }
-}
+/// The rows of /pump, in order; `missing`: no position is there.
+class PumpRows {
+ public:
+  using Take = std::function<void(double time_s, double commanded_mL)>;
 
-void put_positions(const JournalStory& story, const TimeAxis& axis, RecordedRun& run) {
-  const double microstep_mL = story.begin.microstep_pL * mL_per_pL;
-  for (const PositionBlock& block : story.positions) {
-    if (block.first_index < run.pump.time_s.size()) continue;
-    const double step_s =
-        axis.of_tick(block.first_tick + block.period_ticks) - axis.of_tick(block.first_tick);
-    const double first_s = axis.of_tick(block.first_tick);
-    while (run.pump.time_s.size() < block.first_index) {
-      const size_t row = run.pump.time_s.size();
-      declare(run, runfile::pump_stream, static_cast<int64_t>(row), 1, lost_in_the_journal);
-      run.pump.time_s.push_back(first_s - step_s * static_cast<double>(block.first_index - row));
-      run.pump.commanded_mL.push_back(missing);
-    }
-    for (size_t i = 0; i < block.microsteps.size(); ++i) {
-      run.pump.time_s.push_back(axis.of_tick(block.first_tick + i * block.period_ticks));
-      run.pump.commanded_mL.push_back(microstep_mL * block.microsteps[i]);
-    }
+  PumpRows(const JournalStory& story, const TimeAxis& axis, Take take)
+      : axis_(axis), take_(std::move(take)), microstep_mL_(story.begin.microstep_pL * mL_per_pL) {}
+
+  void add(const PositionBlock& block) {
+    if (block.first_index < rows_) return;
+    const double first_s = axis_.of_tick(block.first_tick);
+    const double step_s = axis_.of_tick(block.first_tick + block.period_ticks) - first_s;
+    for (; rows_ < block.first_index; ++rows_)
+      take_(first_s - step_s * static_cast<double>(block.first_index - rows_), missing);
+    for (size_t i = 0; i < block.microsteps.size(); ++i, ++rows_)
+      take_(axis_.of_tick(block.first_tick + i * block.period_ticks), microstep_mL_ * block.microsteps[i]);
   }
-}
+
+ private:
+  const TimeAxis& axis_;
+  Take take_;
+  double microstep_mL_;
+  uint64_t rows_ = 0;
+};
 
 void put_triggers(const JournalStory& story, const TimeAxis& axis, RecordedRun& run) {
   run.trigger_delay_s = story.begin.trigger_delay_s;
   int64_t next_cycle = 0;
   const auto declare_until = [&](int64_t cycle) {
-    declare(run, runfile::trigger_stream, next_cycle, cycle - next_cycle, "its record was lost");
+    declare(run.gaps, runfile::trigger_stream, next_cycle, cycle - next_cycle, "its record was lost");
   };
   for (const RaisedTrigger& trigger : story.triggers) {
     declare_until(trigger.cycle);
@@ -287,17 +159,140 @@ void put_clocks(const JournalStory& story, const TimeAxis& axis, RecordedRun& ru
   }
 }
 
-}  // namespace
+/// What is known of the rows when all were seen once.
+struct Rows {
+  uint64_t pump = 0, pressure = 0;
+  uint64_t samples_received = 0;
+  std::vector<runfile::Gap> pump_gaps, pressure_gaps;
+  double first_s = 0, last_s = 0;  ///< of /pressure
 
-AssembledRun assemble_run(const JournalContents& journal) {
-  const JournalStory story = read_story(journal);
-  if (!story.start_tick) {
-    throw NothingRecorded({journal.file, "", "ends before the run started", "There is nothing to recover."});
+  /// Mean distance of the rows of /pressure; 0 for fewer than two.
+  [[nodiscard]] double spacing_s() const {
+    return pressure < 2 ? 0 : (last_s - first_s) / static_cast<double>(pressure - 1);
   }
-  const TimeAxis axis(story, journal.file);
-  AssembledRun assembled;
+};
+
+/// Throws InputError if they break a rule of runfile::check.
+Rows look_through(const JournalRecords& journal, const JournalStory& story, const TimeAxis& axis) {
+  Rows rows;
+  runfile::StreamCheck pump_check(journal.file(), runfile::pump_group);
+  runfile::StreamCheck pressure_check(journal.file(), runfile::pressure_group);
+  PumpRows pump(story, axis, [&](double time_s, double commanded_mL) {
+    pump_check.time(time_s);
+    if (std::isnan(commanded_mL))
+      declare(rows.pump_gaps, runfile::pump_stream, static_cast<int64_t>(rows.pump), 1, lost_in_the_journal);
+    ++rows.pump;
+  });
+  PressureRows pressure(story, axis, [&](const PressureRow& row) {
+    pressure_check.time(row.time_s);
+    if (row.missing != nullptr) {
+      declare(rows.pressure_gaps, runfile::pressure_stream, static_cast<int64_t>(rows.pressure), 1,
+              *row.missing);
+    } else {
+      for (size_t c = 0; c < row.value_kPa.size(); ++c)
+        pressure_check.value(story.begin.channels[c] + "_kPa", row.value_kPa[c]);
+      ++rows.samples_received;
+    }
+    if (rows.pressure++ == 0) rows.first_s = row.time_s;
+    rows.last_s = row.time_s;
+  });
+  read_blocks(journal, {[&](const SampleBlock& block) { pressure.add(block); },
+                        [&](const PositionBlock& block) { pump.add(block); }});
+  pressure.finish();
+  return rows;
+}
+
+/// What the streams need as long as they live.
+struct Source {
+  JournalRecords journal;
+  JournalStory story;
+  TimeAxis axis;
+};
+
+/// Hands over each column's values some thousand at a time.
+class Columns {
+ public:
+  Columns(size_t count, const RowStream::Take& take) : take_(take), values_(count) {}
+  void put(size_t column, double value) {
+    values_[column].push_back(value);
+    if (values_[column].size() == block_rows) give(column);
+  }
+  void finish() {
+    for (size_t column = 0; column < values_.size(); ++column)
+      give(column);
+  }
+
+ private:
+  static constexpr size_t block_rows = 4096;
+  void give(size_t column) {
+    take_(column, values_[column]);
+    values_[column].clear();
+  }
+
+  const RowStream::Take& take_;
+  std::vector<std::vector<double>> values_;
+};
+
+RowStream pump_of(const std::shared_ptr<const Source>& source, const Rows& rows) {
+  RowStream stream{
+      rows.pump,
+      {{runfile::pump_time, runfile::time_unit}, {runfile::pump_commanded, runfile::volume_unit}},
+      {}};
+  stream.each = [source](const RowStream::Take& take) {
+    Columns columns(2, take);
+    PumpRows pump(source->story, source->axis, [&](double time_s, double commanded_mL) {
+      columns.put(0, time_s);
+      columns.put(1, commanded_mL);
+    });
+    read_blocks(source->journal, {.positions = [&](const PositionBlock& block) { pump.add(block); }});
+    columns.finish();
+  };
+  return stream;
+}
+
+RowStream pressure_of(const std::shared_ptr<const Source>& source, const Rows& rows) {
+  const std::vector<std::string>& channels = source->story.begin.channels;
+  RowStream stream{rows.pressure, {{runfile::pressure_time, runfile::time_unit}}, {}};
+  for (const std::string& channel : channels)
+    stream.columns.push_back(
+        {fmt::format("{}/{}_kPa", runfile::pressure_group, channel), runfile::pressure_unit});
+  const auto cavity = std::ranges::find(channels, runfile::cavity_channel,
+                                        [](const std::string& name) { return name + "_kPa"; });
+  const auto design = cavity == channels.end() ? std::nullopt : filter_of(rows.spacing_s());
+  if (design) {
+    stream.columns.push_back({fmt::format("{}/{}", runfile::pressure_group, runfile::cavity_filtered_channel),
+                              runfile::pressure_unit, notes_of(*design)});
+  }
+  const auto filtered_column = static_cast<size_t>(cavity - channels.begin());
+  stream.each = [source, design, filtered_column,
+                 count = stream.columns.size()](const RowStream::Take& take) {
+    Columns columns(count, take);
+    std::optional<signal::ZeroPhaseFilter> filter;
+    if (design) filter.emplace(*design, [&](double value_kPa) { columns.put(count - 1, value_kPa); });
+    PressureRows pressure(source->story, source->axis, [&](const PressureRow& row) {
+      columns.put(0, row.time_s);
+      for (size_t c = 0; c < row.value_kPa.size(); ++c)
+        columns.put(1 + c, row.value_kPa[c]);
+      if (filter) filter->push(row.value_kPa[filtered_column]);
+    });
+    read_blocks(source->journal, {.samples = [&](const SampleBlock& block) { pressure.add(block); }});
+    pressure.finish();
+    if (filter) filter->end_stretch();
+    columns.finish();
+  };
+  return stream;
+}
+
+/// Everything but the rows.
+AssembledRun tell(const JournalRecords& journal, const JournalStory& story, const TimeAxis& axis,
+                  const Rows& rows) {
+  AssembledRun assembled{.run = {},
+                         .damage = story.damage,
+                         .samples_received = rows.samples_received,
+                         .samples_missing = rows.pressure - rows.samples_received,
+                         .ended_in_order = story.closed && story.run_ended.has_value()};
   RecordedRun& run = assembled.run;
-  run.file = journal.file;
+  run.file = journal.file();
   run.run_id = story.begin.run_id;
   run.started_utc = story.begin.started_utc;
   run.producer = story.begin.producer;
@@ -305,19 +300,46 @@ AssembledRun assemble_run(const JournalContents& journal) {
   run.protocol_toml = story.begin.experiment;
   put_segments(story, axis, run);
   put_waveforms(story, run);
-  put_positions(story, axis, run);
+  run.gaps = rows.pump_gaps;
   put_triggers(story, axis, run);
+  run.gaps.insert(run.gaps.end(), rows.pressure_gaps.begin(), rows.pressure_gaps.end());
   put_slices(story, run);
   put_events(story, axis, run);
   put_clocks(story, axis, run);
-  put_pressure(story, axis, assembled);
-  add_filtered_channel(run.pressure);
-  assembled.ended_in_order = story.closed && story.run_ended.has_value();
-  if (!assembled.ended_in_order) {
-    const double last_s = run.pressure.time_s.empty() ? 0 : run.pressure.time_s.back();
-    run.events.push_back({last_s, "error", "incomplete", "the recording broke off here"});
-  }
+  if (!assembled.ended_in_order)
+    run.events.push_back({rows.last_s, "error", "incomplete", "the recording broke off here"});
   return assembled;
 }
+
+}  // namespace
+
+StreamedRun stream_run(const JournalRecords& journal) {
+  JournalStory story = read_story(journal);
+  const TimeAxis axis = axis_of(story, journal.file());
+  const auto source = std::make_shared<const Source>(Source{journal, std::move(story), axis});
+  const Rows rows = look_through(journal, source->story, source->axis);
+  return {tell(journal, source->story, source->axis, rows), pump_of(source, rows), pressure_of(source, rows)};
+}
+
+AssembledRun assemble_run(const JournalRecords& journal) {
+  StreamedRun streamed = stream_run(journal);
+  RecordedRun& run = streamed.told.run;
+  streamed.pump.each([&](size_t column, std::span<const double> values) {
+    std::vector<double>& target = column == 0 ? run.pump.time_s : run.pump.commanded_mL;
+    target.insert(target.end(), values.begin(), values.end());
+  });
+  std::vector<std::vector<double>*> targets;
+  for (const RowColumn& column : streamed.pressure.columns) {
+    const std::string name = column.path.substr(column.path.rfind('/') + 1);
+    targets.push_back(targets.empty() ? &run.pressure.time_s : &run.pressure.channels[name]);
+    if (!column.notes.empty()) run.pressure.notes[name] = column.notes;
+  }
+  streamed.pressure.each([&](size_t column, std::span<const double> values) {
+    targets[column]->insert(targets[column]->end(), values.begin(), values.end());
+  });
+  return std::move(streamed.told);
+}
+
+AssembledRun assemble_run(const JournalContents& journal) { return assemble_run(JournalRecords(journal)); }
 
 }  // namespace diastole

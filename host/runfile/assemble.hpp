@@ -10,6 +10,7 @@
 #include <cstdint>
 
 #include "host/acquisition/journal.hpp"
+#include "host/runfile/row_stream.hpp"
 #include "protocol/contract/input_error.hpp"
 #include "protocol/runfile/run.hpp"
 
@@ -17,6 +18,7 @@ namespace diastole {
 
 struct AssembledRun {
   runfile::RecordedRun run;
+  JournalDamage damage;
   uint64_t samples_received = 0;  ///< rows of /pressure with values
   uint64_t samples_missing = 0;   ///< rows declared in /gaps
   bool ended_in_order = false;    ///< the journal holds the end of the run
@@ -28,7 +30,19 @@ class NothingRecorded : public InputError {
   using InputError::InputError;
 };
 
-/// Throws NothingRecorded, or InputError when the journal has lost its beginning.
+/// A run whose rows stay in its journal until they are written, however many they are.
+struct StreamedRun {
+  AssembledRun told;  ///< run.pump and run.pressure are empty
+  RowStream pump;
+  RowStream pressure;
+};
+
+/// Throws NothingRecorded; InputError when the journal has lost its beginning or breaks a rule of runfile::check. The
+/// journal's file must stay as it is until the streams were read.
+StreamedRun stream_run(const JournalRecords& journal);
+
+/// The same in memory.
+AssembledRun assemble_run(const JournalRecords& journal);
 AssembledRun assemble_run(const JournalContents& journal);
 
 }  // namespace diastole

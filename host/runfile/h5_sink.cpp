@@ -1,5 +1,7 @@
 #include "host/runfile/h5_sink.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cstring>
 
@@ -20,7 +22,6 @@ using runfile::TypeHandle;
 
 constexpr hsize_t chunk_rows = 4096;
 constexpr unsigned deflate_level = 4;
-constexpr size_t memory_increment_bytes = 1U << 20;
 
 TypeHandle text_type(size_t size) {
   TypeHandle type(H5Tcopy(H5T_C_S1));
@@ -60,17 +61,18 @@ void put_cell(const TableColumn& column, size_t row, char* target) {
 
 }  // namespace
 
-H5Sink::H5Sink(std::string name) : name_(std::move(name)) {
+H5Sink::H5Sink(std::string name, H5Disk& disk) : name_(std::move(name)), disk_(disk) {
   H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
-  const PropertyHandle in_memory(H5Pcreate(H5P_FILE_ACCESS));
-  H5Pset_fapl_core(in_memory.get(), memory_increment_bytes, /*backing_store=*/0);
-  file_ = FileHandle(H5Fcreate(name_.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, in_memory.get()));
+  file_ = FileHandle(H5Fcreate(name_.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, disk_.access().get()));
   must(file_.valid(), "the file");
 }
 
 void H5Sink::must(bool done, const std::string& object) const {
-  if (done) return;
-  throw HardwareError(name_, object + " cannot be written", "Free some memory: the file takes shape there.");
+  if (disk_.error() != 0) {
+    throw HardwareError(name_, fmt::format("cannot be written: {}", std::strerror(disk_.error())),
+                        "Check the space on the disk and that you may write there.");
+  }
+  if (!done) throw HardwareError(name_, object + " cannot be written", "Free some memory.");
 }
 
 void H5Sink::attribute(const std::string& object, const std::string& name, const runfile::Attribute& value) {
@@ -168,13 +170,34 @@ void H5Sink::table(const std::string& path, const std::vector<TableColumn>& colu
        "dataset " + path);
 }
 
-std::vector<std::byte> H5Sink::image() const {
+void H5Sink::rows(const RowStream& stream) {
+  const hsize_t rows = stream.rows;
+  const SpaceHandle space(H5Screate_simple(1, &rows, nullptr));
+  std::vector<DatasetHandle> datasets;
+  std::vector<hsize_t> written(stream.columns.size(), 0);
+  for (const RowColumn& column : stream.columns) {
+    datasets.push_back(create(column.path, H5T_IEEE_F64LE, space, rows >= chunk_rows, column.unit));
+    for (const auto& [note, value] : column.notes)
+      attribute_on(datasets.back().get(), note, value);
+  }
+  stream.each([&](size_t column, std::span<const double> values) {
+    const hsize_t count = values.size();
+    if (count == 0) return;
+    const SpaceHandle memory(H5Screate_simple(1, &count, nullptr));
+    must(H5Sselect_hyperslab(space.get(), H5S_SELECT_SET, &written[column], nullptr, &count, nullptr) >= 0 &&
+             H5Dwrite(datasets[column].get(), H5T_NATIVE_DOUBLE, memory.get(), space.get(), H5P_DEFAULT,
+                      values.data()) >= 0,
+         "dataset " + stream.columns[column].path);
+    written[column] += count;
+  });
+  for (size_t i = 0; i < written.size(); ++i)
+    must(written[i] == rows, "dataset " + stream.columns[i].path);
+}
+
+void H5Sink::finish() {
   must(H5Fflush(file_.get(), H5F_SCOPE_GLOBAL) >= 0, "the file");
-  const ssize_t size = H5Fget_file_image(file_.get(), nullptr, 0);
-  must(size > 0, "the file");
-  std::vector<std::byte> bytes(static_cast<size_t>(size));
-  must(H5Fget_file_image(file_.get(), bytes.data(), bytes.size()) == size, "the file");
-  return bytes;
+  file_ = FileHandle();
+  must(true, "the file");
 }
 
 }  // namespace diastole

@@ -1,8 +1,7 @@
 #pragma once
 // Typed writing into a new HDF5 file; the counterpart of protocol/runfile/h5_source.hpp.
 //
-// The file takes shape in memory: the HDF5 library neither closes nor forgets a file whose disk is full, and would
-// complain of it when the program ends. Its bytes then reach the disk by the caller's own writing.
+// What is written goes to the disk as it comes (h5_disk.hpp); nothing that grows with the run is held in memory.
 
 #include <cstddef>
 #include <span>
@@ -10,6 +9,8 @@
 #include <variant>
 #include <vector>
 
+#include "host/runfile/h5_disk.hpp"
+#include "host/runfile/row_stream.hpp"
 #include "protocol/runfile/h5_handle.hpp"
 #include "protocol/runfile/run.hpp"
 
@@ -22,11 +23,12 @@ struct TableColumn {
 };
 
 /// Groups on the way to an object are made as needed; every dataset gets its `units`.
-/// Errors: every member throws HardwareError when the library does not take it (no memory left).
+/// Errors: every member throws HardwareError when the disk refuses, or when the library does not take it (no memory
+/// left).
 class H5Sink {
  public:
-  /// `name` is the file's in messages.
-  explicit H5Sink(std::string name);
+  /// `name` is the file's in messages; `disk` outlives this.
+  H5Sink(std::string name, H5Disk& disk);
 
   void attribute(const std::string& object, const std::string& name, const runfile::Attribute& value);
   void group(const std::string& path);
@@ -34,8 +36,10 @@ class H5Sink {
   void scalar(const std::string& path, double value, const std::string& units);
   void text(const std::string& path, const std::string& value);
   void table(const std::string& path, const std::vector<TableColumn>& columns, const std::string& units);
-  /// The whole file as it shall stand on the disk.
-  [[nodiscard]] std::vector<std::byte> image() const;
+  /// All columns of a stream, block by block.
+  void rows(const RowStream& stream);
+  /// Closes the file: it is whole, though not yet brought to the disk. The last call.
+  void finish();
 
  private:
   runfile::DatasetHandle create(const std::string& path, hid_t type, const runfile::SpaceHandle& space,
@@ -44,6 +48,7 @@ class H5Sink {
   void must(bool done, const std::string& object) const;
 
   std::string name_;
+  H5Disk& disk_;
   runfile::FileHandle file_;
 };
 

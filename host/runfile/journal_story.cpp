@@ -134,23 +134,13 @@ class StoryTeller {
     }
   }
 
-  void take_samples(SampleBlock block) {
-    if (block.first_index < next_sample_ || block.host_ns.empty()) return;
-    if (block.first_index + block.host_ns.size() > most_rows || block.first_index > most_rows) return;
-    next_sample_ = block.first_index + block.host_ns.size();
-    story_.samples.push_back(std::move(block));
-  }
-
-  void take_positions(PositionBlock block) {
-    if (uint64_t{block.first_index} + block.microsteps.size() > most_rows) return;
-    story_.positions.push_back(std::move(block));
-  }
-
   [[nodiscard]] bool begun() const { return begun_; }
 
  private:
   void take_gap(DeclaredGap gap) {
-    if (gap.first_index + gap.count <= most_rows) story_.gaps.push_back(std::move(gap));
+    if (gap.first_index + gap.count > most_rows) return;
+    story_.sample_rows = std::max(story_.sample_rows, gap.first_index + gap.count);
+    story_.gaps.push_back(std::move(gap));
   }
 
   void take_timer(const json& record) {
@@ -166,44 +156,62 @@ class StoryTeller {
   bool begun_ = false;
   double last_timer_ = 0;
   double timer_turns_ = 0;
+};
+
+class BlockReader {
+ public:
+  explicit BlockReader(BlockTakers take) : take_(std::move(take)) {}
+
+  void take(const JournalRecord& record) {
+    if (record.kind == RecordKind::samples) {
+      if (const auto block = decode_samples(record.payload)) take_samples(*block);
+    } else if (record.kind == RecordKind::positions) {
+      const auto block = decode_positions(record.payload);
+      if (block && uint64_t{block->first_index} + block->microsteps.size() <= most_rows)
+        take_.positions(*block);
+    }
+  }
+
+ private:
+  void take_samples(const SampleBlock& block) {
+    if (block.first_index < next_sample_ || block.host_ns.empty()) return;
+    if (block.first_index + block.host_ns.size() > most_rows || block.first_index > most_rows) return;
+    next_sample_ = block.first_index + block.host_ns.size();
+    take_.samples(block);
+  }
+
+  BlockTakers take_;
   uint64_t next_sample_ = 0;
 };
 
 }  // namespace
 
-uint64_t JournalStory::sample_rows() const {
-  uint64_t rows = 0;
-  for (const SampleBlock& block : samples)
-    rows = std::max(rows, block.first_index + block.host_ns.size());
-  for (const DeclaredGap& gap : gaps)
-    rows = std::max(rows, gap.first_index + gap.count);
-  return rows;
-}
-
-JournalStory read_story(const JournalContents& journal) {
+JournalStory read_story(const JournalRecords& journal) {
   JournalStory story;
   StoryTeller teller(story);
-  for (const JournalRecord& record : journal.records) {
-    if (record.kind == RecordKind::samples) {
-      if (auto block = decode_samples(record.payload)) teller.take_samples(std::move(*block));
-    } else if (record.kind == RecordKind::positions) {
-      if (auto block = decode_positions(record.payload)) teller.take_positions(std::move(*block));
-    } else if (record.kind == RecordKind::document) {
-      const json document = json::parse(record.payload.begin(), record.payload.end(), nullptr, false);
-      try {
-        if (document.is_object()) teller.take_document(document);
-      } catch (const json::exception&) {
-        continue;  // whole by its CRC but not of this version's form: told as missing by what it leaves out
-      } catch (const std::out_of_range&) {
-        continue;
-      }
+  BlockReader blocks({.samples = [&](const SampleBlock& block) {
+    story.sample_rows = std::max(story.sample_rows, block.first_index + block.host_ns.size());
+  }});
+  story.damage = journal.each([&](const JournalRecord& record) {
+    if (record.kind != RecordKind::document) return blocks.take(record);
+    const json document = json::parse(record.payload.begin(), record.payload.end(), nullptr, false);
+    try {
+      if (document.is_object()) teller.take_document(document);
+    } catch (const json::exception&) {
+      // whole by its CRC but not of this version's form: told as missing by what it leaves out
+    } catch (const std::out_of_range&) {
     }
-  }
+  });
   if (!teller.begun()) {
-    throw InputError({journal.file, "", "has lost its first record, without which the rest has no meaning",
+    throw InputError({journal.file(), "", "has lost its first record, without which the rest has no meaning",
                       "This journal cannot be recovered."});
   }
   return story;
+}
+
+void read_blocks(const JournalRecords& journal, const BlockTakers& take) {
+  BlockReader blocks(take);
+  journal.each([&](const JournalRecord& record) { blocks.take(record); });
 }
 
 }  // namespace diastole

@@ -1,11 +1,13 @@
 #pragma once
-// A journal's records, sorted by what they tell; the step between bytes and a run.
+// A journal's records, sorted by what they tell; the step between bytes and a run. What grows with the run's length,
+// samples and positions, is read in blocks.
 //
 // A record that is whole by its CRC may still say anything. Whole numbers in it are counts, ticks or nanoseconds
 // within the bounds below, rates are positive; a record that is not of its form (journal_records.hpp) is left out, as
 // if it had been damaged, so that what a run is made of needs no further doubt than `runfile::check`.
 
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -89,9 +91,7 @@ struct EndOfRun {
 struct JournalStory {
   Beginning begin;
   std::optional<uint64_t> first_due_ns;  ///< host time of sample 0, if its record is there
-  std::vector<SampleBlock> samples;      ///< in order of their index, whole and without overlap
   std::vector<DeclaredGap> gaps;
-  std::vector<PositionBlock> positions;
   std::vector<ClockPair> controller_pairs;  ///< other = controller ticks / tick rate
   std::vector<ClockPair> daq_pairs;         ///< other = instrument timer / its rate, unwrapped
   std::optional<uint64_t> start_tick;
@@ -102,11 +102,19 @@ struct JournalStory {
   std::optional<EndOfRun> run_ended;
   bool closed = false;  ///< the last record says that the run was closed in order
 
-  /// Rows of the sample stream, missing ones included; at most `most_rows`.
-  [[nodiscard]] uint64_t sample_rows() const;
+  uint64_t sample_rows = 0;  ///< of the sample stream, missing ones included; at most `most_rows`
+  JournalDamage damage;
 };
 
-/// Throws InputError when the journal has no beginning.
-JournalStory read_story(const JournalContents& journal);
+/// Throws InputError when the journal has no beginning, and as JournalRecords::each.
+JournalStory read_story(const JournalRecords& journal);
+
+/// The blocks of both streams, which a story does not hold. Those of samples come in order of their index, without
+/// overlap, and may skip some; those of positions come as they stand. All lie within `most_rows`.
+struct BlockTakers {
+  std::function<void(const SampleBlock&)> samples = [](const SampleBlock&) {};
+  std::function<void(const PositionBlock&)> positions = [](const PositionBlock&) {};
+};
+void read_blocks(const JournalRecords& journal, const BlockTakers& take);
 
 }  // namespace diastole

@@ -55,17 +55,35 @@ void write_protocol(H5Sink& sink, const runfile::RecordedRun& run) {
              runfile::slices_units);
 }
 
-void write_streams(H5Sink& sink, const runfile::RecordedRun& run) {
-  sink.numbers(runfile::pump_time, run.pump.time_s, runfile::time_unit);
-  sink.numbers(runfile::pump_commanded, run.pump.commanded_mL, runfile::volume_unit);
-  sink.numbers(runfile::pressure_time, run.pressure.time_s, runfile::time_unit);
-  for (const auto& [name, values_kPa] : run.pressure.channels) {
-    sink.numbers(fmt::format("{}/{}", runfile::pressure_group, name), values_kPa, runfile::pressure_unit);
+/// Columns that are in memory, all at once.
+RowStream stream_of(std::vector<RowColumn> columns, std::vector<std::span<const double>> values) {
+  RowStream stream{values.front().size(), std::move(columns), {}};
+  stream.each = [values = std::move(values)](const RowStream::Take& take) {
+    for (size_t column = 0; column < values.size(); ++column)
+      take(column, values[column]);
+  };
+  return stream;
+}
+
+RowStream stream_of(const runfile::PumpTrace& pump) {
+  return stream_of(
+      {{runfile::pump_time, runfile::time_unit}, {runfile::pump_commanded, runfile::volume_unit}},
+      {pump.time_s, pump.commanded_mL});
+}
+
+RowStream stream_of(const runfile::PressureTrace& pressure) {
+  std::vector<RowColumn> columns{{runfile::pressure_time, runfile::time_unit}};
+  std::vector<std::span<const double>> values{pressure.time_s};
+  for (const auto& [name, values_kPa] : pressure.channels) {
+    columns.push_back({fmt::format("{}/{}", runfile::pressure_group, name), runfile::pressure_unit});
+    if (const auto notes = pressure.notes.find(name); notes != pressure.notes.end())
+      columns.back().notes = notes->second;
+    values.emplace_back(values_kPa);
   }
-  for (const auto& [name, notes] : run.pressure.notes) {
-    for (const auto& [note, value] : notes)
-      sink.attribute(fmt::format("{}/{}", runfile::pressure_group, name), note, value);
-  }
+  return stream_of(std::move(columns), std::move(values));
+}
+
+void write_triggers(H5Sink& sink, const runfile::RecordedRun& run) {
   sink.numbers(runfile::trigger_time, run.trigger_s, runfile::time_unit);
   if (run.trigger_delay_s > 0) sink.scalar(runfile::trigger_delay, run.trigger_delay_s, runfile::time_unit);
   for (const auto& [segment, flow] : run.flow) {
@@ -93,8 +111,15 @@ void write_tables(H5Sink& sink, const runfile::RecordedRun& run) {
              runfile::events_units);
 }
 
-std::vector<std::byte> image_of(const std::filesystem::path& path, const runfile::RecordedRun& run) {
-  H5Sink sink(path.string());
+/// What a file holds: `run` without its rows, and these.
+struct Content {
+  const runfile::RecordedRun& run;
+  const RowStream& pump;
+  const RowStream& pressure;
+};
+
+void write_content(H5Sink& sink, const Content& content) {
+  const runfile::RecordedRun& run = content.run;
   sink.attribute("/", "format", std::string(runfile::format_name));
   sink.attribute("/", "format_version", runfile::format_version);
   sink.attribute("/", "run_id", run.run_id);
@@ -104,13 +129,14 @@ std::vector<std::byte> image_of(const std::filesystem::path& path, const runfile
   for (const auto& [name, value] : run.rig)
     sink.attribute(runfile::rig_group, name, value);
   write_protocol(sink, run);
-  write_streams(sink, run);
+  sink.rows(content.pump);
+  sink.rows(content.pressure);
+  write_triggers(sink, run);
   if (!run.clock.empty()) sink.group(runfile::clock_group);
   for (const auto& [name, value] : run.clock) {
     sink.scalar(fmt::format("{}/{}", runfile::clock_group, name), value, std::string(runfile::unit_of(name)));
   }
   write_tables(sink, run);
-  return sink.image();
 }
 
 void must(bool done, const std::filesystem::path& path, const char* what) {
@@ -119,32 +145,33 @@ void must(bool done, const std::filesystem::path& path, const char* what) {
                       "Check the space on the disk and that you may write there.");
 }
 
-void write_bytes(const std::filesystem::path& path, std::span<const std::byte> bytes) {
-  const Descriptor file(::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644));
-  must(file.valid(), path, "cannot be made");
-  while (!bytes.empty()) {
-    const ssize_t written = ::write(file.get(), bytes.data(), bytes.size());
-    if (written < 0 && errno == EINTR) continue;
-    must(written > 0, path, "cannot be written");
-    bytes = bytes.subspan(static_cast<size_t>(written));
-  }
-  must(::fsync(file.get()) == 0, path, "cannot be brought to the disk");
+void write_file(const std::filesystem::path& file, const std::filesystem::path& path,
+                const Content& content) {
+  const Descriptor opened(::open(file.c_str(), O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC, 0644));
+  must(opened.valid(), path, "cannot be made");
+  H5Disk disk(opened.get());
+  H5Sink sink(path.string(), disk);
+  write_content(sink, content);
+  sink.finish();
+  must(::fsync(opened.get()) == 0, path, "cannot be brought to the disk");
 }
 
-void bring_to_disk(const std::filesystem::path& directory) {
-  const Descriptor file(::open(directory.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
-  must(file.valid() && ::fsync(file.get()) == 0, directory, "cannot be brought to the disk");
+/// What is to be told when the disk does not confirm the file's name.
+std::string confirm_name(const std::filesystem::path& path, const FlushDirectory& flush_directory) {
+  const std::filesystem::path parent = path.has_parent_path() ? path.parent_path() : ".";
+  const Descriptor directory(::open(parent.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  if (directory.valid() && flush_directory(directory.get()) == 0) return {};
+  return fmt::format(
+      "{} is whole, but the disk has not confirmed its name ({}): after a power cut it may be missing there",
+      path.string(), std::strerror(errno));
 }
 
-}  // namespace
-
-void write_run(const std::filesystem::path& path, const runfile::RecordedRun& run) {
-  runfile::check(run);
+std::string write_content(const std::filesystem::path& path, const Content& content,
+                          const FlushDirectory& flush_directory) {
   const std::filesystem::path temporary = fmt::format("{}.{}.part", path.string(), ::getpid());
   try {
-    write_bytes(temporary, image_of(path, run));
+    write_file(temporary, path, content);
     std::filesystem::rename(temporary, path);
-    bring_to_disk(path.has_parent_path() ? path.parent_path() : ".");
   } catch (const std::filesystem::filesystem_error& error) {
     std::error_code ignored;
     std::filesystem::remove(temporary, ignored);
@@ -154,6 +181,21 @@ void write_run(const std::filesystem::path& path, const runfile::RecordedRun& ru
     std::filesystem::remove(temporary, ignored);
     throw;
   }
+  return confirm_name(path, flush_directory);
+}
+
+}  // namespace
+
+std::string write_run(const std::filesystem::path& path, const runfile::RecordedRun& run,
+                      const FlushDirectory& flush_directory) {
+  runfile::check(run);
+  return write_content(path, {run, stream_of(run.pump), stream_of(run.pressure)}, flush_directory);
+}
+
+std::string write_run(const std::filesystem::path& path, const StreamedRun& run,
+                      const FlushDirectory& flush_directory) {
+  runfile::check(run.told.run);
+  return write_content(path, {run.told.run, run.pump, run.pressure}, flush_directory);
 }
 
 }  // namespace diastole

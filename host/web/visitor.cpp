@@ -4,12 +4,11 @@
 
 #include <boost/beast/core.hpp>
 #include <boost/beast/http.hpp>
-#include <boost/beast/websocket/rfc6455.hpp>
 #include <chrono>
 
 #include "host/web/console_socket.hpp"
 #include "host/web/hall.hpp"
-#include "host/web/page_files.hpp"
+#include "host/web/request.hpp"
 
 namespace diastole::web {
 namespace {
@@ -20,7 +19,6 @@ using boost::asio::ip::tcp;
 using boost::beast::error_code;
 
 constexpr std::chrono::seconds request_patience{10};
-constexpr uint32_t most_header_bytes = 8192;
 constexpr int most_requests = 100;  // of one connection
 
 using Response = http::response<http::string_body>;
@@ -43,8 +41,7 @@ class Visitor : public Guest, public std::enable_shared_from_this<Visitor> {
  private:
   void read() {
     parser_.emplace();
-    parser_->header_limit(most_header_bytes);
-    parser_->body_limit(uint64_t{0});
+    set_bounds(*parser_);
     stream_.expires_after(request_patience);
     http::async_read(stream_, buffer_, *parser_,
                      [self = shared_from_this()](error_code error, size_t) { self->take(error); });
@@ -53,57 +50,28 @@ class Visitor : public Guest, public std::enable_shared_from_this<Visitor> {
   void take(error_code error) {
     if (error.category() == make_error_code(http::error::end_of_stream).category() &&
         error != http::error::end_of_stream) {
-      return refuse({400, "This is not a request that the console understands: " + error.message() + "."});
+      return refuse(no_request(error));
     }
     if (error) return close();
     request_ = parser_->release();
-    const auto origin = request_.find(http::field::origin);
-    const auto refusal = hall_->door.check_place(
-        text(http::field::host),
-        origin == request_.end() ? std::nullopt : std::optional(view(origin->value())));
-    if (refusal) return refuse(*refusal);
-    if (request_.method() != http::verb::get) return refuse({405, "Only GET is understood here."});
-    answer();
+    const Verdict verdict = judge(hall_->door, request_, hall_->consoles.size(), Hall::most_consoles);
+    if (verdict.refusal) return refuse(*verdict.refusal);
+    if (verdict.let_in_as) return open_socket(*verdict.let_in_as);
+    if (verdict.page != nullptr) return reply(200, verdict.page->type, std::string(verdict.page->text));
+    reply(200, "application/json",
+          *verdict.told_role == ConsoleRole::control ? R"({"role":"control"})" : R"({"role":"watch"})");
   }
 
-  void answer() {
-    const std::string_view all = view(request_.target());
-    const std::string_view target = all.substr(0, all.find('?'));
-    if (target == "/rpc") return open_socket();
-    if (target == "/role") {
-      const auto role = shown_role();
-      if (!role) return refuse_token();
-      return reply(200, "application/json",
-                   *role == ConsoleRole::control ? R"({"role":"control"})" : R"({"role":"watch"})");
-    }
-    const PageFile* file = find_page_file(target);
-    if (file == nullptr) return refuse({404, "There is no such page here. The console is at /."});
-    reply(200, file->type, std::string(file->text));
-  }
-
-  void open_socket() {
-    if (!beast::websocket::is_upgrade(request_)) return refuse({426, "At /rpc a WebSocket is spoken."});
-    const auto role = shown_role();
-    if (!role) return refuse_token();
-    if (hall_->consoles.size() >= Hall::most_consoles) {
-      return refuse({503, fmt::format("{} consoles are open already; close one.", Hall::most_consoles)});
-    }
+  void open_socket(ConsoleRole role) {
     hall_->visitors.erase(number_);
-    open_console(hall_, stream_.release_socket(), std::move(request_), *role);
-  }
-
-  [[nodiscard]] std::optional<ConsoleRole> shown_role() const {
-    return hall_->door.role_of(
-        token_in(text(http::field::authorization), text(http::field::sec_websocket_protocol)));
-  }
-
-  void refuse_token() {
-    hall_->reception->log.warn(fmt::format("a browser at {} came to the console without a valid token",
-                                           address_of(stream_.socket())));
-    refuse(Door::wrong_token());
+    open_console(hall_, stream_.release_socket(), std::move(request_), role);
   }
 
   void refuse(const Refusal& refusal) {
+    if (refusal.status == 401) {
+      hall_->reception->log.warn(fmt::format("a browser at {} came to the console without a valid token",
+                                             address_of(stream_.socket())));
+    }
     last_ = true;
     reply(refusal.status, "text/plain; charset=utf-8", refusal.sentence + "\n");
   }
@@ -130,15 +98,12 @@ class Visitor : public Guest, public std::enable_shared_from_this<Visitor> {
     });
   }
 
-  [[nodiscard]] std::string_view text(http::field field) const { return view(request_[field]); }
-  static std::string_view view(beast::string_view text) { return {text.data(), text.size()}; }
-
   std::shared_ptr<Hall> hall_;
   beast::tcp_stream stream_;
   uint64_t number_;
   beast::flat_buffer buffer_{2 * most_header_bytes};
-  std::optional<http::request_parser<http::empty_body>> parser_;
-  http::request<http::empty_body> request_;
+  std::optional<RequestParser> parser_;
+  Request request_;
   Response response_;
   int answered_ = 0;
   bool last_ = false;

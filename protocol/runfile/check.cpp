@@ -15,10 +15,35 @@ bool countable(int64_t count) { return count >= 0 && count <= most_counted; }
 
 bool on_the_axis(double time_s) { return std::abs(time_s) <= longest_time_s; }  // false for NaN
 
-[[noreturn]] void fail_at(const RecordedRun& run, const std::string& dataset, size_t index,
+[[noreturn]] void fail_at(const std::string& file, const std::string& dataset, size_t index,
                           std::string problem, std::string remedy) {
   throw InputError(
-      {run.file, fmt::format("dataset {}, index {}", dataset, index), std::move(problem), std::move(remedy)});
+      {file, fmt::format("dataset {}, index {}", dataset, index), std::move(problem), std::move(remedy)});
+}
+
+[[noreturn]] void fail_at(const RecordedRun& run, const std::string& dataset, size_t index,
+                          std::string problem, std::string remedy) {
+  fail_at(run.file, dataset, index, std::move(problem), std::move(remedy));
+}
+
+/// `last_s`: of the row before; of row 0 nothing.
+void check_time(const std::string& file, const std::string& dataset, size_t row, double time_s,
+                double last_s) {
+  if (!on_the_axis(time_s)) {
+    fail_at(file, dataset, row, fmt::format("is {}", time_s),
+            "Every row has a time since the start of run; also a missing sample has the one at which it "
+            "was due.");
+  }
+  if (row > 0 && time_s <= last_s) {
+    fail_at(file, dataset, row, fmt::format("is {} s, not later than the {} s before it", time_s, last_s),
+            "Times must increase strictly.");
+  }
+}
+
+[[noreturn]] void fail_undeclared(const std::string& file, const std::string& dataset, size_t row,
+                                  double value) {
+  fail_at(file, dataset, row, fmt::format("is {} although /gaps declares no gap there", value),
+          "A missing sample must be declared in /gaps.");
 }
 
 /// Which rows of dataset "/pressure/cavity_kPa" gaps declare missing: those of stream "pressure", or of a
@@ -42,25 +67,13 @@ void check_values(const RecordedRun& run, const std::string& dataset, std::span<
   const std::vector<bool> missing = declared_missing(run, dataset, values.size());
   for (size_t i = 0; i < values.size(); ++i) {
     if (std::isfinite(values[i]) || (std::isnan(values[i]) && missing[i])) continue;
-    fail_at(run, dataset, i, fmt::format("is {} although /gaps declares no gap there", values[i]),
-            "A missing sample must be declared in /gaps.");
+    fail_undeclared(run.file, dataset, i, values[i]);
   }
 }
 
 void check_times(const RecordedRun& run, const std::string& dataset, std::span<const double> times_s) {
-  double last_s = -HUGE_VAL;
-  for (size_t i = 0; i < times_s.size(); ++i) {
-    if (!on_the_axis(times_s[i])) {
-      fail_at(run, dataset, i, fmt::format("is {}", times_s[i]),
-              "Every row has a time since the start of run; also a missing sample has the one at which it "
-              "was due.");
-    }
-    if (times_s[i] <= last_s) {
-      fail_at(run, dataset, i, fmt::format("is {} s, not later than the {} s before it", times_s[i], last_s),
-              "Times must increase strictly.");
-    }
-    last_s = times_s[i];
-  }
+  for (size_t i = 0; i < times_s.size(); ++i)
+    check_time(run.file, dataset, i, times_s[i], i == 0 ? 0 : times_s[i - 1]);
 }
 
 void check_length(const RecordedRun& run, const std::string& dataset, size_t rows, const std::string& of,
@@ -122,6 +135,16 @@ void check_slices(const RecordedRun& run) {
 }
 
 }  // namespace
+
+void StreamCheck::time(double time_s) {
+  check_time(file_, group_ + "/time_s", rows_, time_s, last_s_);
+  last_s_ = time_s;
+  ++rows_;
+}
+
+void StreamCheck::value(const std::string& dataset, double value) const {
+  if (!std::isfinite(value)) fail_undeclared(file_, fmt::format("{}/{}", group_, dataset), rows_ - 1, value);
+}
 
 void check(const RecordedRun& run) {
   check_gaps(run);

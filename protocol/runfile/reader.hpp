@@ -2,6 +2,8 @@
 // Reads and checks a run file.
 
 #include <filesystem>
+#include <string>
+#include <utility>
 
 #include "protocol/runfile/run.hpp"
 
@@ -21,5 +23,22 @@ inline constexpr int64_t most_counted = 1'000'000'000'000;
 /// slices in order within the triggers, no negative counts and none beyond most_counted.
 /// Throws InputError with run.file as the file.
 void check(const RecordedRun& run);
+
+/// The rules of `check` for a stream that is not in memory as a whole, row by row; the row must have a value. Throws as
+/// `check` does.
+class StreamCheck {
+ public:
+  /// `group`: "/pressure", whose time is "/pressure/time_s".
+  StreamCheck(std::string file, std::string group) : file_(std::move(file)), group_(std::move(group)) {}
+  void time(double time_s);
+  /// Of the row whose time was told last.
+  void value(const std::string& dataset, double value) const;
+
+ private:
+  std::string file_;
+  std::string group_;
+  size_t rows_ = 0;
+  double last_s_ = 0;
+};
 
 }  // namespace diastole::runfile

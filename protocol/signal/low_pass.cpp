@@ -1,6 +1,5 @@
 #include "protocol/signal/low_pass.hpp"
 
-#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -14,24 +13,6 @@ double warped_cutoff(const LowPassDesign& design) {
   const double K = std::tan(pi * design.cutoff_Hz / design.rate_Hz);
   if (design.passes == Passes::forward) return K;
   return K / std::pow(std::numbers::sqrt2 - 1, 0.5 / design.order);
-}
-
-/// As filter_zero_phase, for one stretch without NaN.
-void filter_stretch(std::span<double> values, const LowPassDesign& design) {
-  const size_t pad = std::min(3 * static_cast<size_t>(design.order + 1), values.size() - 1);
-  std::vector<double> extended;
-  for (size_t i = pad; i > 0; --i)
-    extended.push_back(2 * values.front() - values[i]);
-  extended.insert(extended.end(), values.begin(), values.end());
-  for (size_t i = 1; i <= pad; ++i)
-    extended.push_back(2 * values.back() - values[values.size() - 1 - i]);
-  for (int pass = 0; pass < 2; ++pass) {
-    LowPass filter(design);
-    for (double& value : extended)
-      value = filter.push(value);
-    std::ranges::reverse(extended);
-  }
-  std::copy_n(extended.begin() + static_cast<std::ptrdiff_t>(pad), values.size(), values.begin());
 }
 
 }  // namespace
@@ -86,27 +67,6 @@ double LowPass::push(double value) {
     value = filtered;
   }
   return value;
-}
-
-std::vector<double> filter_zero_phase(std::span<const double> values, std::span<const size_t> breaks,
-                                      const LowPassDesign& design) {
-  std::vector<double> filtered(values.begin(), values.end());
-  size_t first = 0;
-  while (first < filtered.size()) {
-    if (std::isnan(filtered[first])) {
-      ++first;
-      continue;
-    }
-    const auto next_break = std::ranges::upper_bound(breaks, first);
-    const size_t bound =
-        next_break == breaks.end() ? filtered.size() : std::min(*next_break, filtered.size());
-    size_t last = first;
-    while (last < bound && !std::isnan(filtered[last]))
-      ++last;
-    filter_stretch(std::span(filtered).subspan(first, last - first), design);
-    first = last;
-  }
-  return filtered;
 }
 
 }  // namespace diastole::signal

@@ -13,7 +13,6 @@
 // The live view filters forward only and so lags; its lag at low frequency is LowPass::delay_s.
 
 #include <cstddef>
-#include <span>
 #include <vector>
 
 namespace diastole::signal {
@@ -65,12 +64,5 @@ class LowPass {
   double delay_s_ = 0;
   bool settled_ = false;
 };
-
-/// Filters forward and backward, each stretch of samples by itself: a stretch ends at NaN, which stays NaN, and
-/// before each row of `breaks` (ascending). A stretch is continued at both ends by its odd reflection, over
-/// three times the order and three samples more, as far as it has them.
-/// The design's `passes` must be forward_and_backward.
-std::vector<double> filter_zero_phase(std::span<const double> values, std::span<const size_t> breaks,
-                                      const LowPassDesign& design);
 
 }  // namespace diastole::signal

@@ -124,6 +124,72 @@ TEST(Replay, ALostLineIsLostAgain) {
   EXPECT_EQ(line(found, "end")["replayed"], "link_lost");
 }
 
+TEST(Replay, SwitchesAndAResetComeAgain) {
+  struct Happening {
+    const char* fault;
+    const char* end;
+  };
+  for (const auto& [fault, end] : {Happening{"far-limit@run+1.1", "faulted: limit_switch"},
+                                   Happening{"home-limit@run+1.1", "faulted: home_switch"},
+                                   Happening{"power-cut@run+1.0:off@run+1.1", "link_lost"}}) {
+    SCOPED_TRACE(fault);
+    const Workplace place;
+    const json found = replay(place, record(place, "3", {fault}), 0);
+    expect_the_recording(found);
+    EXPECT_EQ(line(found, "end")["recorded"], end);
+    EXPECT_EQ(line(found, "end")["replayed"], end);
+  }
+}
+
+TEST(Replay, ALostLeaseComesAgainToAHeartbeatAndParts) {
+  const Workplace place;
+  const std::string file = record(place, "3", {"serial-deaf@run+0.7:off@run+1.6"});
+  const Ended ended = run(place, {"diastole", "replay", file, "--json"});
+  const json found = ended.json();
+  EXPECT_EQ(line(found, "end")["recorded"], "faulted: lease_lost");
+  EXPECT_EQ(line(found, "end")["replayed"], "faulted: lease_lost");
+  EXPECT_EQ(line(found, "event")["verdict"], "equal") << "to a heartbeat";
+  EXPECT_EQ(found["triggers_equal"], true);
+  EXPECT_EQ(found["pressure_equal"], true);
+  // The stop begins by as much earlier or later: the positions from there on differ, and no others.
+  if (found["steps_equal"] == true) return;
+  EXPECT_EQ(ended.exit_code, 1);
+  EXPECT_GT(found["first_difference"]["time_s"], 0.7) << "the host was heard until then";
+}
+
+TEST(Replay, ARunOfAnInstrumentThatKeepsARateOfItsOwnHasThatRateAgain) {
+  const Workplace place;
+  place.write("usb.experiment.toml",
+              "sample_rate_Hz = 300.48\n" + with(gel_experiment("2"), "sample_rate_Hz = 300\n", ""));
+  const Ended recorded = run(place, {"diastole", "simulate", "usb.experiment.toml", "-o", "even.run.h5"});
+  ASSERT_EQ(recorded.exit_code, 0) << recorded.err;
+  // The USB-1208LS makes 300.48 Hz of the 300 Hz that the experiment asks for.
+  runfile::RecordedRun usb = runfile::read_run(place / "even.run.h5");
+  EXPECT_EQ(std::get<double>(usb.rig.at("daq_rate_Hz")), 300.48);
+  usb.protocol_toml = gel_experiment("2");
+  write_run(place / "usb.run.h5", usb);
+  const json found = replay(place, "usb.run.h5", 0);
+  expect_the_recording(found);
+  EXPECT_EQ(line(found, "samples")["recorded"], line(found, "samples")["replayed"]);
+}
+
+TEST(Replay, InRealTimeItMovesAsTheRecordingDid) {
+  const Workplace place;
+  place.write("gel.experiment.toml", gel_experiment("1"));
+  place.write("patient.rig.toml", with_longest_lease(two_channel_rig()));
+  ASSERT_EQ(run(place, {"diastole", "simulate", "gel.experiment.toml", "-o", "gel.run.h5", "--config",
+                        "patient.rig.toml"})
+                .exit_code,
+            0);
+  const Ended ended = run(place, {"diastole", "replay", "gel.run.h5", "--real-time", "--json"});
+  const json found =
+      ended.json();  // on a busy machine samples may be missing: then it says so, with exit code 1
+  EXPECT_EQ(ended.exit_code, found["equal"] == true ? 0 : 1) << ended.err;
+  EXPECT_EQ(found["triggers_equal"], true) << ended.out;
+  EXPECT_EQ(found["steps_equal"], true);
+  EXPECT_EQ(line(found, "end")["replayed"], "completed");
+}
+
 /// A run that is stopped at the end of its cycle at 1.5 s; its run file and journal.
 struct StoppedRun {
   std::string run_file, journal;

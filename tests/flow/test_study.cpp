@@ -7,6 +7,9 @@
 #include "host/runfile/writer.hpp"
 #include "protocol/signal/step_response.hpp"
 #include "tests/flow/programs.hpp"
+#include "tests/sanitized.hpp"
+#include "tools/benchmarks/long_journal.hpp"
+#include "tools/benchmarks/timed_process.hpp"
 
 namespace diastole::flow {
 namespace {
@@ -108,6 +111,22 @@ TEST(Study, BecomesSlicesFramesAndABidsRecording) {
   EXPECT_TRUE(std::filesystem::exists(workplace / "bids/sub-03_task-study_physio.tsv.gz"));
   EXPECT_EQ(run_line(workplace, "gzip -cd bids/*.tsv.gz | wc -l").out,
             std::to_string(exported.json().at("rows").get<int>()) + "\n");
+}
+
+TEST(RunFile, OfALongJournalTakesNoMoreMemoryThanThatOfAShortOne) {
+  if (sanitized) GTEST_SKIP() << "sanitizers keep freed memory";
+  const Workplace place;
+  const auto memory_MB = [&](int seconds) {
+    std::filesystem::remove(place / "long.journal");
+    write_long_journal(place / "long.journal", {.channels = 10, .rate_Hz = 10'000, .seconds = seconds});
+    const ProcessFigures figures = run_timed({DIASTOLE_BIN_DIR "/diastole", "recover", place / "long.journal",
+                                              "-o", place / "long.run.h5", "--force"},
+                                             place.path(), place / "log");
+    EXPECT_EQ(figures.exit_code, 0);
+    return figures.peak_MB;
+  };
+  const double of_short_MB = memory_MB(2);
+  EXPECT_LT(memory_MB(20), of_short_MB + 8) << "16 MB more of samples";
 }
 
 TEST(Catheter, IsFoundInAPopTestAndDrawn) {

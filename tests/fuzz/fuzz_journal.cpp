@@ -38,10 +38,11 @@ void add(JournalContents& journal, std::string_view document) {
 
 void assemble(const JournalContents& journal) {
   try {
-    const JournalStory story = read_story(journal);
-    uint64_t rows = story.sample_rows();
-    for (const PositionBlock& block : story.positions)
-      rows = std::max<uint64_t>(rows, block.first_index);
+    const JournalRecords records(journal);
+    uint64_t rows = read_story(records).sample_rows;
+    read_blocks(records, {.positions = [&](const PositionBlock& block) {
+                  rows = std::max<uint64_t>(rows, block.first_index);
+                }});
     if (rows > rows_worth_a_try) return;
     runfile::check(assemble_run(journal).run);
   } catch (const InputError&) {

@@ -8,14 +8,16 @@
 //          and what that takes: sizes and values, each as its first byte says
 //   An input that ends early, and so the empty one, leaves the rest as it should be.
 
+#include <fcntl.h>
+
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
-#include <fstream>
 #include <limits>
 
 #include "host/runfile/h5_sink.hpp"
+#include "host/transport/descriptor.hpp"
 #include "protocol/contract/input_error.hpp"
 #include "protocol/runfile/frame_bins.hpp"
 #include "protocol/runfile/layout.hpp"
@@ -111,7 +113,8 @@ class Teller {
 
 class Author {
  public:
-  explicit Author(std::span<const uint8_t> bytes) : tell_(bytes), sink_("fuzz") {}
+  Author(std::span<const uint8_t> bytes, int descriptor)
+      : tell_(bytes), disk_(descriptor), sink_("fuzz", disk_) {}
 
   void attribute(const char* object, const std::string& name, const runfile::Attribute& usual) {
     switch (tell_.way()) {
@@ -174,7 +177,7 @@ class Author {
       if (!written.empty()) sink_.table(path, written, "1");
     });
   }
-  [[nodiscard]] std::vector<std::byte> image() const { return sink_.image(); }
+  void finish() { sink_.finish(); }
 
  private:
   void rewrite(TableColumn& column, size_t rows, std::vector<TableColumn>& written) {
@@ -197,6 +200,7 @@ class Author {
   }
 
   Teller tell_;
+  H5Disk disk_;
   H5Sink sink_;
 };
 
@@ -208,8 +212,8 @@ Numbers even(size_t rows, double step_s) {
 }
 
 /// Two segments of two cycles, of which the second was played from points.
-std::vector<std::byte> written(std::span<const uint8_t> bytes) {
-  Author author(bytes);
+void write(std::span<const uint8_t> bytes, int descriptor) {
+  Author author(bytes, descriptor);
   author.attribute("/", "format", std::string(runfile::format_name));
   author.attribute("/", "format_version", runfile::format_version);
   for (const char* name : {"run_id", "started_utc", "producer"})
@@ -248,7 +252,7 @@ std::vector<std::byte> written(std::span<const uint8_t> bytes) {
   author.numbers("/protocol/waveforms/1/phase", {0, 0.5, 1});
   author.numbers("/protocol/waveforms/1/fraction", {0, 1, 0});
   author.text(runfile::protocol_toml, "x");
-  return author.image();
+  author.finish();
 }
 
 void use(const runfile::RecordedRun& run) {
@@ -264,16 +268,14 @@ void use(const runfile::RecordedRun& run) {
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
-  std::vector<std::byte> image;
+  static const Scratch scratch("fuzz");
+  const std::filesystem::path file = scratch / "fuzzed.run.h5";
   try {
-    image = written({data, size});
+    const Descriptor opened(::open(file.c_str(), O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC, 0600));
+    write({data, size}, opened.get());
   } catch (const HardwareError&) {
     return 0;  // a dataset where a group is needed, say
   }
-  static const Scratch scratch("fuzz");
-  const std::filesystem::path file = scratch / "fuzzed.run.h5";
-  std::ofstream(file, std::ios::binary)
-      .write(reinterpret_cast<const char*>(image.data()), static_cast<std::streamsize>(image.size()));
   try {
     use(runfile::read_run(file));
   } catch (const InputError& error) {

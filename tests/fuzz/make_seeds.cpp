@@ -102,6 +102,29 @@ void write_rpc_lines(const std::filesystem::path& directory) {
        R"({"jsonrpc":"2.0","id":1,"error":{"code":-32002,"message":"rig: is away\n  Find it."}})");
 }
 
+/// Requests as fuzz_console reads them, and a message behind the one that is let in.
+void write_http_requests(const std::filesystem::path& directory) {
+  const std::string host = "Host: 127.0.0.1:8600\r\n";
+  const std::string upgrade =
+      "Connection: Upgrade\r\nUpgrade: websocket\r\nSec-WebSocket-Version: 13\r\n"
+      "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n";
+  const auto request = [&directory](const char* name, const std::string& text) {
+    write(directory / "fuzz_console" / name, {text.begin(), text.end()});
+  };
+  request("page", "GET / HTTP/1.1\r\n" + host + "\r\n");
+  request("script", "GET /console.js?x HTTP/1.1\r\nHost: LOCALHOST\r\n\r\n");
+  request("role", "GET /role HTTP/1.1\r\nHost: [::1]:8600\r\nAuthorization: Bearer \x01\r\n\r\n");
+  request("watch", "GET /role HTTP/1.1\r\n" + host + "Authorization: Bearer \x02\r\n\r\n");
+  request("wrong_token", "GET /role HTTP/1.1\r\n" + host + "Authorization: Bearer 0\r\n\r\n");
+  request("rebound", "GET / HTTP/1.1\r\nHost: evil.example\r\n\r\n");
+  request("post", "POST / HTTP/1.1\r\n" + host + "Content-Length: 2\r\n\r\n{}");
+  request("console", "GET /rpc HTTP/1.1\r\n" + host + "Origin: http://127.0.0.1:8600\r\n" + upgrade +
+                         "Sec-WebSocket-Protocol: diastole, token.\x01\r\n\r\n" +
+                         R"({"jsonrpc":"2.0","id":1,"method":"run.stop","params":{"how":"now"}})");
+  request("other_site", "GET /rpc HTTP/1.1\r\n" + host + "Origin: http://evil.example\r\n" + upgrade +
+                            "Sec-WebSocket-Protocol: diastole, token.\x01\r\n\r\n");
+}
+
 void add(Bytes& records, RecordKind kind, std::span<const std::uint8_t> payload) {
   records.push_back(static_cast<std::uint8_t>(kind));
   records.push_back(static_cast<std::uint8_t>(payload.size()));
@@ -162,6 +185,7 @@ int main(int argc, char** argv) {
 #undef DIASTOLE_MESSAGE
   write_sessions(directory);
   write_rpc_lines(directory);
+  write_http_requests(directory);
   write_journals(directory);
   write_runfile_scripts(directory);
   return 0;

@@ -18,6 +18,7 @@
 #include "host/daq/driver.hpp"
 #include "protocol/contract/exit_code.hpp"
 #include "protocol/contract/input_error.hpp"
+#include "tools/benchmarks/consoles_on_bench.hpp"
 #include "tools/benchmarks/daemon_on_bench.hpp"
 
 namespace {
@@ -48,7 +49,7 @@ double share(const std::vector<double>& sorted, double part) {
 }
 
 void line(const char* what, const std::string& figures) {
-  fmt::print("{:<38}{}\n", what, figures);
+  fmt::print("{:<52}{}\n", what, figures);
   std::fflush(stdout);
 }
 
@@ -104,15 +105,22 @@ class Followers {
   std::vector<std::jthread> threads_;
 };
 
-bool sustained(DaemonOnBench& bench, const BenchLoad& load, const Options& options, int followers,
-               double bare_cpu) {
+/// Who looks on during a run.
+struct Onlookers {
+  int followers = 0;
+  int consoles = 0;
+};
+
+bool sustained(DaemonOnBench& bench, const BenchLoad& load, const Options& options,
+               const Onlookers& onlookers, double bare_cpu) {
   auto client = bench.client();
   bench.start_run(client, options.seconds);
   std::this_thread::sleep_for(1s);
   double cpu = 0;
   double resident_MB = 0;
   {
-    const Followers others(bench, followers);
+    const Followers others(bench, onlookers.followers);
+    const ConsolesOnBench consoles(bench.console(), onlookers.consoles);
     const ProcessFigures before = bench.figures();
     const auto begun = SteadyClock::now();
     std::this_thread::sleep_for(std::chrono::duration<double>(options.seconds - 2));
@@ -123,7 +131,8 @@ bool sustained(DaemonOnBench& bench, const BenchLoad& load, const Options& optio
   const json progress = DaemonOnBench::await_end(client);
   const ProcessFigures end = bench.figures();
   const auto missing = progress["missing"].get<int64_t>();
-  line(fmt::format("{} channels x {:g} kHz, {} followers", load.channels, 1e-3 * load.rate_Hz, followers)
+  line(fmt::format("{} channels x {:g} kHz, {} followers, {} consoles", load.channels, 1e-3 * load.rate_Hz,
+                   onlookers.followers, onlookers.consoles)
            .c_str(),
        fmt::format("CPU {:.1f} % ({:.1f} x the bare loop), {} samples, {} lost; RSS {:.1f} MB in the run, "
                    "{:.1f} MB at most while its file is written, {:.1f} MB after it",
@@ -198,13 +207,13 @@ ExitCode bench(const Options& options) {
   {
     DaemonOnBench daemon(load, options.directory);
     idle(daemon);
-    for (const int followers : {0, 10, 50})
-      whole = sustained(daemon, load, options, followers, bare_cpu) && whole;
+    for (const Onlookers onlookers : {Onlookers{}, {.followers = 10}, {.followers = 50}, {.consoles = 8}})
+      whole = sustained(daemon, load, options, onlookers, bare_cpu) && whole;
     stop_latency(daemon, options);
   }
   const BenchLoad usual{.channels = 2, .rate_Hz = 300};
   DaemonOnBench daemon(usual, options.directory);
-  whole = sustained(daemon, usual, options, 1, bare_loop(usual, 5)) && whole;
+  whole = sustained(daemon, usual, options, {.followers = 1}, bare_loop(usual, 5)) && whole;
   return whole ? ExitCode::done : ExitCode::negative;
 }
 

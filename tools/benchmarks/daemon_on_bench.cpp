@@ -62,9 +62,10 @@ DaemonOnBench::DaemonOnBench(const BenchLoad& load, const fs::path& below)
   tap_ = std::make_unique<LineTap>(at("controller"), at("pump"));
   daemon_ = std::make_unique<ChildProcess>(
       std::vector<std::string>{program("diastole"), "daemon", "--config", at("rig.toml"), "--port",
-                               at("pump"), "--socket", at("socket"), "--journal-dir", at("journals")},
+                               at("pump"), "--socket", at("socket"), "--journal-dir", at("journals"),
+                               "--console", "127.0.0.1:0"},
       at("daemon.log"));
-  (void)daemon_->first_line(30s);
+  console_ = json::parse(daemon_->first_line(30s)).at("console").at("control");
   keep_prompt(rig_->pid());
   client().call("rig.home", json::object(), 120s);
 }

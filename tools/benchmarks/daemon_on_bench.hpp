@@ -28,6 +28,8 @@ class DaemonOnBench {
   DaemonOnBench& operator=(const DaemonOnBench&) = delete;
 
   [[nodiscard]] DaemonClient client() const { return DaemonClient(directory_ / "socket"); }
+  /// The console's address, with the token for control.
+  [[nodiscard]] const std::string& console() const { return console_; }
   [[nodiscard]] ProcessFigures figures() const { return figures_of(daemon_->pid()); }
   [[nodiscard]] LineTap& tap() { return *tap_; }
 
@@ -40,6 +42,7 @@ class DaemonOnBench {
  private:
   BenchLoad load_;
   std::filesystem::path directory_;
+  std::string console_;
   std::unique_ptr<ChildProcess> rig_;
   std::unique_ptr<LineTap> tap_;
   std::unique_ptr<ChildProcess> daemon_;  // ends first

@@ -10,7 +10,9 @@
 #include "host/runfile/bids_export.hpp"
 #include "host/runfile/filtered_channel.hpp"
 #include "host/runfile/writer.hpp"
+#include "protocol/runfile/layout.hpp"
 #include "protocol/runfile/reader.hpp"
+#include "protocol/signal/zero_phase.hpp"
 #include "tests/host/bench/scratch.hpp"
 #include "tests/host/runfile/output_of.hpp"
 
@@ -30,7 +32,10 @@ runfile::RecordedRun recording_with_a_gap() {
     for (auto& [name, values] : run.pressure.channels)
       values[i] = std::nan("");
   run.gaps = {{"pressure", 4000, 3, "no answer"}};
-  add_filtered_channel(run.pressure);
+  const auto design = filter_of(1.0 / 300);
+  run.pressure.channels[runfile::cavity_filtered_channel] =
+      signal::filter_zero_phase(run.pressure.channels.at(runfile::cavity_channel), {}, *design);
+  run.pressure.notes[runfile::cavity_filtered_channel] = notes_of(*design);
   return run;
 }
 

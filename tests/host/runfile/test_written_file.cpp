@@ -65,14 +65,35 @@ TEST_F(WrittenFile, HoldsTheLowPassedPressureBesideTheRawOne) {
 }
 
 TEST(FilteredChannel, IsLeftOutWhereSamplesAreTooSlowForIt) {
-  runfile::PressureTrace pressure;
-  add_filtered_channel(pressure);
-  for (int i = 0; i < 100; ++i) {
-    pressure.time_s.push_back(i / 60.0);
-    pressure.channels["cavity_kPa"].push_back(1);
-  }
-  add_filtered_channel(pressure);
-  EXPECT_EQ(pressure.channels.size(), 1U);
+  EXPECT_FALSE(filter_of(0));
+  EXPECT_FALSE(filter_of(1 / 60.0));
+  EXPECT_TRUE(filter_of(1 / 100.0));
+}
+
+TEST_F(WrittenFile, FromTheJournalsRowsIsTheSameAsFromMemory) {
+  const std::filesystem::path streamed = session_->scratch / "streamed.run.h5";
+  const StreamedRun run = stream_run(JournalRecords(session_->journal));
+  EXPECT_TRUE(run.told.run.pressure.time_s.empty());
+  EXPECT_EQ(write_run(streamed, run), "");
+  const runfile::RecordedRun a = runfile::read_run(file()), b = runfile::read_run(streamed);
+  EXPECT_EQ(a.pressure.time_s, b.pressure.time_s);
+  EXPECT_EQ(a.pump.commanded_mL, b.pump.commanded_mL);
+  EXPECT_EQ(a.pressure.channels.size(), b.pressure.channels.size());
+  EXPECT_EQ(a.pressure.notes, b.pressure.notes);
+  EXPECT_EQ(a.gaps.size(), b.gaps.size());
+  EXPECT_EQ(a.trigger_s, b.trigger_s);
+}
+
+TEST_F(WrittenFile, ADirectoryThatIsNotFlushedIsToldAndTheFileIsWhole) {
+  const std::filesystem::path path = session_->scratch / "unconfirmed.run.h5";
+  const auto refuses = [](int) {
+    errno = EIO;
+    return -1;
+  };
+  const std::string remark = write_run(path, session_->assemble().run, refuses);
+  EXPECT_THAT(remark, testing::AllOf(testing::HasSubstr("unconfirmed.run.h5 is whole"),
+                                     testing::HasSubstr("Input/output error")));
+  EXPECT_NO_THROW((void)runfile::read_run(path));
 }
 
 TEST_F(WrittenFile, H5pyFindsTheContract) {

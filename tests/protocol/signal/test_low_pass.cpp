@@ -2,8 +2,11 @@
 
 #include "protocol/signal/low_pass.hpp"
 
+#include "protocol/signal/zero_phase.hpp"
+
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -112,6 +115,46 @@ TEST(LowPass, KeepsStretchesTooShortToFilterAndEmptyOnes) {
   const std::vector<double> filtered = filter_zero_phase(lone, {}, zero_phase);
   EXPECT_NEAR(filtered[1], 3, 1e-12);
   EXPECT_TRUE(std::isnan(filtered[0]) && std::isnan(filtered[2]));
+}
+
+/// Forward and backward over the whole signal at once, continued at both ends as zero_phase.hpp says.
+std::vector<double> in_one_pass(const std::vector<double>& values) {
+  constexpr size_t pad = 15;
+  std::vector<double> extended;
+  for (size_t i = pad; i > 0; --i)
+    extended.push_back(2 * values.front() - values[i]);
+  extended.insert(extended.end(), values.begin(), values.end());
+  for (size_t i = 1; i <= pad; ++i)
+    extended.push_back(2 * values.back() - values[values.size() - 1 - i]);
+  for (int pass = 0; pass < 2; ++pass) {
+    LowPass filter(zero_phase);
+    for (double& value : extended)
+      value = filter.push(value);
+    std::ranges::reverse(extended);
+  }
+  return {extended.begin() + pad, extended.end() - pad};
+}
+
+TEST(LowPass, GivesOutALongSignalInPartsAsItWouldFilterTheWhole) {
+  for (const size_t length : {16U, 399U, 400U, 401U, 600U, 5000U}) {
+    std::vector<double> values;
+    for (size_t i = 0; i < length; ++i)
+      values.push_back(std::sin(0.02 * static_cast<double>(i)) +
+                       1e-3 * static_cast<double>(i * 2654435761U % 1000) + static_cast<double>(i / 700));
+    const std::vector<double> expected = in_one_pass(values);
+    size_t given = 0, pushed = 0, most_held = 0;
+    ZeroPhaseFilter filter(zero_phase, [&](double value) {
+      EXPECT_NEAR(value, expected[given], 1e-12) << "value " << given << " of " << length;
+      ++given;
+    });
+    for (const double value : values) {
+      filter.push(value);
+      most_held = std::max(most_held, ++pushed - given);
+    }
+    filter.end_stretch();
+    EXPECT_EQ(given, length);
+    EXPECT_LE(most_held, 400U) << "two look-aheads of 20 cycles of the cutoff";
+  }
 }
 
 TEST(LowPass, BeginsAnewInTheSteadyStateAfterAMissingSample) {

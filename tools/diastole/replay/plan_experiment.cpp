@@ -1,6 +1,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
+#include <regex>
 
 #include "protocol/contract/input_error.hpp"
 #include "protocol/contract/table_reader.hpp"
@@ -121,11 +123,38 @@ void write_experiment(const RecordedRun& run, ReplayPlan& plan) {
       "recorded");
 }
 
+/// Rows of /pressure a second, on the clock of the host that polls the replay's instrument.
+std::optional<double> kept_rate_Hz(const RecordedRun& run) {
+  const auto& time_s = run.pressure.time_s;
+  if (time_s.size() < 2) return std::nullopt;
+  const auto drift = run.clock.find("host_drift_ppm");
+  const double host_ppm = drift == run.clock.end() ? 0 : drift->second;
+  return static_cast<double>(time_s.size() - 1) / (time_s.back() - time_s.front()) / (1 + 1e-6 * host_ppm);
+}
+
+/// An instrument that takes its samples by its own clock does not keep the rate that it was asked for: the replay's is
+/// asked for the one that was kept.
+void take_rate(const RecordedRun& run, ReplayPlan& plan) {
+  constexpr double as_it_says = 1e-6;  // of the rate: no drift, only the fit's noise
+  TableReader root = TableReader::from_text(run.protocol_toml, "/protocol/toml");
+  const auto planned_Hz = rig_number(run, "daq_rate_Hz");
+  const auto kept_Hz = kept_rate_Hz(run);
+  if (!planned_Hz || !kept_Hz || *planned_Hz == root.number_or("sample_rate_Hz", 300)) return;
+  const double rate_Hz = std::abs(*kept_Hz / *planned_Hz - 1) < as_it_says ? *planned_Hz : *kept_Hz;
+  static const std::regex asked("(^|\n)[ \t]*sample_rate_Hz[ \t]*=[^\n]*");
+  plan.experiment_toml = fmt::format("sample_rate_Hz = {:.12g}\n{}", rate_Hz,
+                                     std::regex_replace(plan.experiment_toml, asked, "$1"));
+  plan.remarks.push_back(
+      fmt::format("the instrument kept {:.6g} Hz of the {:g} Hz asked for: the replay asks for that", rate_Hz,
+                  root.number_or("sample_rate_Hz", 300)));
+}
+
 }  // namespace
 
 void plan_experiment(const RecordedRun& run, ReplayPlan& plan) {
   if (!has_experiment(run)) return write_experiment(run, plan);
   plan.experiment_toml = run.protocol_toml;
+  take_rate(run, plan);
   take_points(run, plan);
 }
 

@@ -53,7 +53,7 @@ struct Recording {
 
 Recording read_recording(const ReplayOptions& options, const PrivateDirectory& directory) {
   if (!options.run.ends_with(".journal")) return {runfile::read_run(options.run), options.run};
-  Recording recording{assemble_run(read_journal(options.run)).run, directory / "recovered.run.h5"};
+  Recording recording{assemble_run(JournalRecords(options.run)).run, directory / "recovered.run.h5"};
   write_run(recording.file, recording.run);
   return recording;
 }

@@ -1,0 +1,63 @@
+#include "host/runfile/pressure_rows.hpp"
+
+#include <algorithm>
+#include <limits>
+
+namespace diastole {
+namespace {
+
+const std::string lost_in_the_journal = "its record was lost in the journal";
+
+}  // namespace
+
+PressureRows::PressureRows(const JournalStory& story, const TimeAxis& axis, Take take)
+    : story_(story),
+      axis_(axis),
+      take_(std::move(take)),
+      spacing_s_(axis.map().scale / story.begin.sample_rate_Hz),
+      nothing_(story.begin.channels.size(), std::numeric_limits<double>::quiet_NaN()),
+      gaps_(story.gaps) {
+  std::ranges::stable_sort(gaps_, {}, &DeclaredGap::first_index);
+  if (story.first_due_ns) grid_start_s_ = axis.of_host_ns(*story.first_due_ns);
+}
+
+void PressureRows::add(const SampleBlock& block) {
+  const size_t channels = nothing_.size();
+  if (block.channels != channels) return;
+  const std::span<const double> values(block.value_kPa);
+  for (size_t i = 0; i < block.host_ns.size(); ++i) {
+    const uint64_t row = block.first_index + i;
+    const double time_s = axis_.of_sample(row, block.host_ns[i]);
+    if (!grid_start_s_) grid_start_s_ = time_s - spacing_s_ * static_cast<double>(row);
+    for (; next_row_ < row; ++next_row_)
+      give_missing(last_s_ ? *last_s_ + (time_s - *last_s_) / static_cast<double>(row - next_row_ + 1)
+                           : due_s(next_row_));
+    give({time_s, values.subspan(i * channels, channels), nullptr});
+    last_s_ = time_s;
+    next_row_ = row + 1;
+  }
+}
+
+void PressureRows::finish() {
+  for (; next_row_ < story_.sample_rows; ++next_row_)
+    give_missing(last_s_ ? std::max(due_s(next_row_), *last_s_ + 0.1 * spacing_s_) : due_s(next_row_));
+}
+
+void PressureRows::give_missing(double time_s) {
+  if (last_s_) last_s_ = time_s;
+  while (gap_ < gaps_.size() && gaps_[gap_].first_index + gaps_[gap_].count <= next_row_)
+    ++gap_;
+  const bool declared = gap_ < gaps_.size() && gaps_[gap_].first_index <= next_row_;
+  give({time_s, nothing_, declared ? &gaps_[gap_].reason : &lost_in_the_journal});
+}
+
+void PressureRows::give(const PressureRow& row) {
+  started_ = started_ || row.time_s >= 0;
+  if (started_) take_(row);
+}
+
+double PressureRows::due_s(uint64_t row) const {
+  return grid_start_s_.value_or(0) + spacing_s_ * static_cast<double>(row);
+}
+
+}  // namespace diastole

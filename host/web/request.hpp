@@ -1,0 +1,38 @@
+#pragma once
+// What becomes of an HTTP request at the console: the page's files, the role of a token, the way to the WebSocket, or a
+// refusal. A request in, a verdict out; no input or output.
+
+#include <boost/beast/http/empty_body.hpp>
+#include <boost/beast/http/message.hpp>
+#include <boost/beast/http/parser.hpp>
+#include <optional>
+#include <string_view>
+
+#include "host/web/door.hpp"
+#include "host/web/page_files.hpp"
+
+namespace diastole::web {
+
+using Request = boost::beast::http::request<boost::beast::http::empty_body>;
+using RequestParser = boost::beast::http::request_parser<boost::beast::http::empty_body>;
+
+inline constexpr uint32_t most_header_bytes = 8192;
+
+/// Sets the bounds of a request: most_header_bytes, no body.
+void set_bounds(RequestParser& parser);
+
+/// What cannot be parsed.
+Refusal no_request(const boost::beast::error_code& error);
+
+/// One of these.
+struct Verdict {
+  std::optional<Refusal> refusal{};        ///< 401: the token is not valid
+  const PageFile* page = nullptr;          ///< to be sent
+  std::optional<ConsoleRole> told_role{};  ///< to be told to who asked for /role
+  std::optional<ConsoleRole> let_in_as{};  ///< the WebSocket is to be opened
+};
+
+/// `consoles_open`: of at most `most_consoles`.
+Verdict judge(const Door& door, const Request& request, size_t consoles_open, size_t most_consoles);
+
+}  // namespace diastole::web

@@ -1,0 +1,71 @@
+// What making a run file of a journal costs, by the journal's length: time and memory of `diastole recover`, which goes
+// the daemon's way.
+//
+//   tools/bench runfile [--seconds N ...] [--channels N] [--rate-hz R] [--program DIASTOLE] [--directory DIR]
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <filesystem>
+#include <vector>
+
+#include "protocol/contract/exit_code.hpp"
+#include "protocol/contract/input_error.hpp"
+#include "tools/benchmarks/long_journal.hpp"
+#include "tools/benchmarks/timed_process.hpp"
+
+namespace {
+
+using namespace diastole;
+namespace fs = std::filesystem;
+
+double megabytes(const fs::path& file) { return 1e-6 * static_cast<double>(fs::file_size(file)); }
+
+bool measure(const fs::path& directory, const JournalLoad& load, const std::string& program) {
+  const fs::path journal = directory / "long.journal", run = directory / "long.run.h5";
+  write_long_journal(journal, load);
+  const ProcessFigures figures = run_timed({program, "recover", journal.string(), "-o", run.string()},
+                                           directory, directory / "recover.log");
+  fmt::print("{:>8} {:>12.1f} {:>12.1f} {:>10.2f} {:>12.1f}\n", load.seconds, megabytes(journal),
+             figures.exit_code == 0 ? megabytes(run) : 0, figures.processor_s, figures.peak_MB);
+  std::fflush(stdout);
+  fs::remove(journal);
+  fs::remove(run);
+  return figures.exit_code == 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app("What making a run file of a journal costs.", "bench_runfile");
+  JournalLoad load;
+  std::vector<int> seconds{5, 20, 80};
+  std::string program = fs::read_symlink("/proc/self/exe").parent_path() / "diastole";
+  fs::path directory = ".";
+  app.add_option("--seconds", seconds, "how long the runs are")->capture_default_str();
+  app.add_option("--channels", load.channels)->capture_default_str();
+  app.add_option("--rate-hz", load.rate_Hz)->capture_default_str();
+  app.add_option("--program", program, "the diastole to measure");
+  app.add_option("--directory", directory, "where the files are written")->capture_default_str();
+  CLI11_PARSE(app, argc, argv);
+  try {
+    std::string pattern = fs::absolute(directory) / "bench-runfile-XXXXXX";
+    if (::mkdtemp(pattern.data()) == nullptr)
+      throw InputError({pattern, "", "no directory can be made there", "Name another with --directory."});
+    fmt::print("{} channels at {:g} Hz\n{:>8} {:>12} {:>12} {:>10} {:>12}\n", load.channels, load.rate_Hz,
+               "run, s", "journal, MB", "run file, MB", "CPU, s", "memory, MB");
+    bool whole = true;
+    for (const int each : seconds) {
+      load.seconds = each;
+      whole = measure(pattern, load, program) && whole;
+    }
+    fs::remove_all(pattern);
+    return static_cast<int>(whole ? ExitCode::done : ExitCode::negative);
+  } catch (const InputError& error) {
+    fmt::print(stderr, "bench_runfile: {}\n", error.what());
+    return static_cast<int>(ExitCode::bad_input);
+  } catch (const HardwareError& error) {
+    fmt::print(stderr, "bench_runfile: {}\n", error.what());
+    return static_cast<int>(ExitCode::hardware_fault);
+  }
+}
