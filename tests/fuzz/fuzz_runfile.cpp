@@ -270,8 +270,10 @@ void use(const runfile::RecordedRun& run) {
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   static const Scratch scratch("fuzz");
   const std::filesystem::path file = scratch / "fuzzed.run.h5";
+  std::filesystem::remove(
+      file);  // a new one each time: some file systems bring one that is truncated to the disk
   try {
-    const Descriptor opened(::open(file.c_str(), O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC, 0600));
+    const Descriptor opened(::open(file.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0600));
     write({data, size}, opened.get());
   } catch (const HardwareError&) {
     return 0;  // a dataset where a group is needed, say

@@ -30,7 +30,7 @@ void write_all(H5Sink& sink) {
       std::vector<double> values;
       for (size_t i = 0; i < 100; ++i)
         values.push_back(std::sin(static_cast<double>((row + i) * (row + i))));
-      for (const size_t column : {0, 1})
+      for (const size_t column : {size_t{0}, size_t{1}})
         take(column, values);
     }
   };
