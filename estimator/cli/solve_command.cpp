@@ -117,6 +117,7 @@ nlohmann::ordered_json as_json(const Study& study, ElasticModel& model, const So
   json["factorisations"] = report.factorisations;
   json["negative_pivots"] = report.negative_pivots;
   json["pressure_unknowns"] = report.pressure_unknowns;
+  json["unstable_motions"] = report.unstable_motions;
   json["seconds"] = seconds;
   const ElasticState shown = with_averaged_pressure(model.system(), solution.state);
   json["probes"] = nlohmann::ordered_json::array();
@@ -255,9 +256,11 @@ ExitCode run_solve(const SolveArguments& arguments, const CommandOutput& out) {
                                  solution.report.reason == SolveReason::singular_tangent)) {
     std::cerr << "  If the pressure has a maximum on the way, `diastole pv` finds it and goes on beyond.\n";
   }
-  if (solution.report.converged() && solution.report.negative_pivots != solution.report.pressure_unknowns) {
-    std::cerr << "diastole solve: this equilibrium is not stable (" << solution.report.negative_pivots
-              << " negative pivots for " << solution.report.pressure_unknowns << " pressure unknowns)\n";
+  if (solution.report.converged() && solution.report.unstable_motions > 0) {
+    fmt::print(
+        stderr,
+        "diastole solve: this equilibrium is not stable: in {} independent motions it leaves by itself\n",
+        solution.report.unstable_motions);
   }
   if (out.json) {
     std::cout << json.dump(1) << '\n';

@@ -103,7 +103,7 @@ Sensitivities ElasticModel::sensitivities(const ElasticState& at, std::span<cons
       value = -value;
   }
   Sensitivities result;
-  if (!system_->rim_skew().empty()) result.negative_pivots = system_->negative_pivots(state);
+  if (!system_->rim_skew().empty()) result.negative_pivots = system_->stability(state).negative_pivots;
   const FactorResult factor = system_->factorise(state);
   if (system_->rim_skew().empty()) result.negative_pivots = factor.negative_pivots;
   system_->solve(right_sides, groups.size() + 1);

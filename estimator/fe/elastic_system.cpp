@@ -1,6 +1,7 @@
 #include "estimator/fe/elastic_system.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "estimator/fe/parallel_for.hpp"
@@ -155,6 +156,9 @@ SystemResidual ElasticSystem::residual(const ElasticState& state) const {
     total.energy_uJ += energy;
   const auto worst = std::min_element(least.begin(), least.end(),
                                       [](const auto& a, const auto& b) { return a.ratio < b.ratio; });
+  const auto no_stress =
+      std::find_if_not(energies.begin(), energies.end(), [](double energy) { return std::isfinite(energy); });
+  if (no_stress != energies.end()) total.beyond_law = static_cast<size_t>(no_stress - energies.begin());
   if (worst->ratio <= 0.0) {
     const MaterialPoint point{static_cast<size_t>(worst - least.begin()), gauss_tables().xi[worst->point]};
     total.inverted = InvertedPlace{point, mesh_.value(mesh_.reference(), point), worst->ratio};
@@ -212,13 +216,15 @@ void ElasticSystem::add_fluid_rows(const ElasticState& state, std::span<double> 
   if (state.held_volume_mm3) fill(equations_.fluid_rows().back(), cavity_, 0.0);
 }
 
-std::vector<double> ElasticSystem::tangent(const ElasticState& state) const {
+std::vector<double> ElasticSystem::tangent(const ElasticState& state, double probing_stiffness_kPa) const {
   std::vector<double> values(equations_.entries(state.held_volume_mm3.has_value()), 0.0);
   for (const std::vector<size_t>& colour : equations_.colours()) {
     parallel_for(colour.size(), threads_, [&](size_t i) {
       thread_local ElementTangent local;
       const size_t e = colour[i];
-      element_tangent(reference_[e], element_state(state, e), *law_, parameters(e), local);
+      ElementState element = element_state(state, e);
+      element.probing_stiffness_kPa = probing_stiffness_kPa;
+      element_tangent(reference_[e], element, *law_, parameters(e), local);
       equations_.add_tangent(e, local, values);
       if (compressibility_per_kPa_ > 0.0) equations_.add_compliance(e, local.compliance, values);
     });
@@ -301,9 +307,29 @@ FactorResult ElasticSystem::factorise(const ElasticState& state) {
   return factor_.factorise_symmetric(values, state.held_volume_mm3.has_value());
 }
 
-size_t ElasticSystem::negative_pivots(const ElasticState& state) {
-  std::vector<double> values = tangent(state);
+size_t ElasticSystem::negative_pivots(const ElasticState& state, double probing_stiffness_kPa) {
+  std::vector<double> values = tangent(state, probing_stiffness_kPa);
   return factor_.factorise_symmetric(values, state.held_volume_mm3.has_value()).negative_pivots;
+}
+
+double ElasticSystem::material_stiffness_kPa() const {
+  constexpr SymmetricTensor<double> undeformed{1.0, 1.0, 1.0, 0.0, 0.0, 0.0};
+  double most = 0.0;
+  for (size_t e = 0; e < mesh_.element_count(); ++e) {
+    const TangentTensor tangent = law_->response(undeformed, parameters(e)).tangent;
+    most = std::max(most, std::abs(rest_pressure_kPa(e)) + tangent.diagonal().head<3>().maxCoeff());
+  }
+  return most;
+}
+
+Stability ElasticSystem::stability(const ElasticState& state) {
+  const size_t needed = pressure_unknowns(state);
+  Stability found{.negative_pivots = negative_pivots(state, 0.0)};
+  if (found.negative_pivots > needed) {
+    const size_t left = negative_pivots(state, material_stiffness_kPa());
+    found.unstable_motions = left - std::min(left, needed);
+  }
+  return found;
 }
 
 ElasticState ElasticSystem::moved(const ElasticState& state, std::span<const double> step,

@@ -30,6 +30,7 @@ struct SystemResidual {
   double energy_uJ = 0.0;       ///< stored in the material
   double bond_energy_uJ = 0.0;  ///< stored in springs
   std::optional<InvertedPlace> inverted;
+  std::optional<size_t> beyond_law;  ///< an element where the law has no energy
 };
 
 struct SystemOptions {
@@ -43,6 +44,14 @@ struct SystemOptions {
   double volume_stiffness_kPa = 0.0;     ///< kappa of element_mechanics.hpp
   double compressibility_per_kPa = 0.0;  ///< 1/K of element_mechanics.hpp
   size_t threads = 1;
+};
+
+struct Stability {
+  size_t negative_pivots =
+      0;  ///< one for each pressure unknown, and for each motion that lowers the potential
+  /// Motions that lower it and keep the volume of the material. Others are spurious: eight pressures an element do not
+  /// see all changes of volume, whose energy may be negative; as stiff as the material, they are gone.
+  size_t unstable_motions = 0;
 };
 
 class ElasticSystem {
@@ -81,8 +90,10 @@ class ElasticSystem {
   }
 
   [[nodiscard]] SystemResidual residual(const ElasticState& state) const;
-  /// Values of the stored entries of equations(), at a state: the symmetric part of the tangent.
-  [[nodiscard]] std::vector<double> tangent(const ElasticState& state) const;
+  /// Values of the stored entries of equations(), at a state: the symmetric part of the tangent. A probing stiffness
+  /// (element_mechanics.hpp) resists changes of volume that the Lagrange pressures do not see.
+  [[nodiscard]] std::vector<double> tangent(const ElasticState& state,
+                                            double probing_stiffness_kPa = 0.0) const;
   /// The rest of it, where the cavity's wall has a free rim.
   [[nodiscard]] const RimSkew& rim_skew() const { return skew_; }
   [[nodiscard]] std::vector<double> skew_tangent(const ElasticState& state) const;
@@ -103,8 +114,8 @@ class ElasticSystem {
   /// Assembles and factorises the tangent; solve() uses it until the next call.
   FactorResult factorise(const ElasticState& state);
   void solve(std::span<double> right_sides, size_t count = 1) { factor_.solve(right_sides, count); }
-  /// Negative pivots of the tangent's symmetric part; spoils the factor.
-  size_t negative_pivots(const ElasticState& state);
+  /// Whether an equilibrium is stable, by the tangent's symmetric part; spoils the factor.
+  Stability stability(const ElasticState& state);
   /// Numbers stored in the last factor: its fill.
   [[nodiscard]] size_t factor_entries() const { return factor_.entries(); }
 
@@ -117,6 +128,9 @@ class ElasticSystem {
  private:
   [[nodiscard]] ElementState element_state(const ElasticState& state, size_t element) const;
   [[nodiscard]] double rest_pressure_kPa(size_t element) const;
+  /// The largest over the elements: pressure at rest and stiffness against stretch there.
+  [[nodiscard]] double material_stiffness_kPa() const;
+  size_t negative_pivots(const ElasticState& state, double probing_stiffness_kPa);
   /// Adds factor * area vectors of a fluid's surface.
   void add_area(const FluidSurface& surface, const NodeField& position_mm, double factor,
                 std::span<double> target) const;

@@ -196,9 +196,9 @@ void element_tangent(const ReferenceElement& reference, const ElementState& stat
     set_geometric_moduli(point, stress, pressure, g);
     if (!response.tangent.isZero(0.0))
       add_material_moduli(point, f, reference[q].volume * response.tangent, t);
-    if (state.volume_stiffness_kPa > 0.0) {
-      add_volume_moduli(point, state.volume_stiffness_kPa * weight * weight / reference[q].volume, cofactor);
-    }
+    const double volume_stiffness_kPa = state.volume_stiffness_kPa + state.probing_stiffness_kPa;
+    if (volume_stiffness_kPa > 0.0)
+      add_volume_moduli(point, volume_stiffness_kPa * weight * weight / reference[q].volume, cofactor);
     volume_slopes.set(q, -weight * cofactor);
     if (state.compressibility_per_kPa > 0.0) {
       const Eigen::Map<const Eigen::Vector<double, corners>> psi(tables.trilinear[q].data());

@@ -61,6 +61,7 @@ struct ElementState {
   std::array<double, corners> pressure_kPa;
   double fibre_tension_kPa = 0.0;        ///< T above
   double volume_stiffness_kPa = 0.0;     ///< kappa above
+  double probing_stiffness_kPa = 0.0;    ///< added to kappa in the tangent's  kappa dJ x dJ  alone
   double compressibility_per_kPa = 0.0;  ///< 1/K above
   double rest_pressure_kPa = 0.0;        ///< p0 above; of no account when incompressible
 };

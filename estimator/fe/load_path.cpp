@@ -122,6 +122,7 @@ PathResult follow_load(ElasticSystem& system, const ElasticState& start, const L
     } else {
       fraction *= 0.5;
       report.inverted = attempt.inverted;
+      report.beyond_law = attempt.beyond_law;
       if (line.stays() || fraction < options.least_load_fraction) {
         report.reason = attempt.reason;
         break;
@@ -130,8 +131,12 @@ PathResult follow_load(ElasticSystem& system, const ElasticState& start, const L
   }
   if (report.converged()) {
     report.inverted.reset();
-    if (options.check_stability || !system.rim_skew().empty())
-      report.negative_pivots = system.negative_pivots(last.state);
+    report.beyond_law.reset();
+  }
+  if (report.load_steps > 0 && (options.check_stability || !system.rim_skew().empty())) {
+    const Stability stability = system.stability(last.state);
+    report.negative_pivots = stability.negative_pivots;
+    report.unstable_motions = stability.unstable_motions;
   }
   report.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
   return {std::move(last.state), std::move(report)};

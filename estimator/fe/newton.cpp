@@ -29,7 +29,7 @@ class Newton {
 
   NewtonResult run() {
     SystemResidual residual = system_.residual(result_.state);
-    if (residual.inverted) return finish(SolveReason::inverted_element, residual.inverted);
+    if (const auto impossible = reason_against(residual)) return finish(*impossible, residual);
     while (result_.iterations.size() < options_.newton_limit) {
       const FactorResult factor = system_.factorise(result_.state);
       if (factor.singular) return finish(SolveReason::singular_tangent);
@@ -39,16 +39,24 @@ class Newton {
       if (!std::isfinite(result_.iterations.back().step)) return finish(SolveReason::singular_tangent);
       const std::optional<SolveReason> ended = advance(step, residual);
       if (options_.on_iteration) options_.on_iteration(result_.state.pressure_kPa, result_.iterations.back());
-      if (ended) return finish(*ended, residual.inverted);
+      if (ended) return finish(*ended, residual);
     }
     return finish(SolveReason::no_convergence);
   }
 
  private:
-  NewtonResult finish(SolveReason reason, std::optional<InvertedPlace> inverted = {}) {
+  NewtonResult finish(SolveReason reason, const SystemResidual& residual = {}) {
     result_.reason = reason;
-    if (reason == SolveReason::inverted_element) result_.inverted = inverted;
+    if (reason == SolveReason::inverted_element) result_.inverted = residual.inverted;
+    if (reason == SolveReason::beyond_law) result_.beyond_law = residual.beyond_law;
     return std::move(result_);
+  }
+
+  /// Why a state is none that the material can be in.
+  static std::optional<SolveReason> reason_against(const SystemResidual& residual) {
+    if (residual.inverted) return SolveReason::inverted_element;
+    if (residual.beyond_law) return SolveReason::beyond_law;
+    return {};
   }
 
   std::vector<double> correction(SystemResidual& residual) {
@@ -83,7 +91,8 @@ class Newton {
       const ElasticState trial = system_.moved(result_.state, step, damping);
       SystemResidual after = system_.residual(trial);
       double allowed = 0.5 * damping;
-      if (!after.inverted) {
+      const std::optional<SolveReason> impossible = reason_against(after);
+      if (!impossible) {
         const SystemResidual kept = after;
         const std::vector<double> next = correction(after);
         const double shrunk = size(next);
@@ -99,7 +108,8 @@ class Newton {
       damping = std::max(allowed, 0.1 * damping);
       if (damping < least_damping) {
         residual.inverted = after.inverted;
-        return after.inverted ? SolveReason::inverted_element : SolveReason::no_convergence;
+        residual.beyond_law = after.beyond_law;
+        return impossible.value_or(SolveReason::no_convergence);
       }
     }
   }
@@ -127,7 +137,7 @@ class Newton {
       if (!next) return {};
       const ElasticState corrected = system_.moved(result_.state, *next, 1.0);
       SystemResidual after = system_.residual(corrected);
-      if (after.inverted) return {};
+      if (reason_against(after)) return {};
       result_.state = corrected;
       ++iteration.corrections;
       if (at_rounding || size(*next) <= remaining_error * options_.tolerance) return SolveReason::converged;

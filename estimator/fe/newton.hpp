@@ -22,6 +22,7 @@ struct NewtonResult {
   std::vector<NewtonIteration> iterations;
   size_t negative_pivots = 0;  ///< of the last tangent; not counted where the cavity's wall has a free rim
   std::optional<InvertedPlace> inverted;
+  std::optional<size_t> beyond_law;  ///< an element
 };
 
 /// `guess` holds the load to solve for: pressure or held volume, tension, the chamber's sealing pressure.

@@ -60,7 +60,7 @@ PressureVolumeCurve pressure_volume_curve(ElasticModel& model, const PressureVol
     PressureVolumePoint point{.volume_change_mL = change_mL, .pressure_kPa = curve.state.pressure_kPa};
     point.stiffness_kPa_per_mL = model.cavity_stiffness_kPa_per_mL(curve.state);
     point.stored_energy_mJ = model.stored_energy_mJ(curve.state);
-    point.stable_at_volume = model.system().negative_pivots(curve.state) == curve.last.pressure_unknowns;
+    point.stable_at_volume = model.system().stability(curve.state).unstable_motions == 0;
     point.newton_iterations = curve.last.newton_iterations;
     if (!curve.points.empty()) {
       if (const auto limit = limit_between(curve.points.back(), point)) curve.limits.push_back(*limit);

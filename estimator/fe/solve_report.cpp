@@ -10,6 +10,8 @@ std::string_view describe(SolveReason reason) {
       return "converged";
     case SolveReason::inverted_element:
       return "inverted element";
+    case SolveReason::beyond_law:
+      return "strain beyond the law's limits";
     case SolveReason::no_convergence:
       return "no convergence";
     case SolveReason::singular_tangent:
@@ -35,6 +37,8 @@ std::string SolveReport::describe() const {
         inverted->point.element, inverted->point.xi[0], inverted->point.xi[1], inverted->point.xi[2],
         place[0], place[1], place[2]);
   }
+  if (unstable_motions > 0) text += "; the last equilibrium is not stable";
+  if (beyond_law) text += fmt::format("; the law has no stress at the strain of element {}", *beyond_law);
   if (!history.empty() && !history.back().iterations.empty()) {
     text += fmt::format("; the last attempt at {:g} kPa had corrections", history.back().pressure_kPa);
     for (const NewtonIteration& iteration : history.back().iterations)

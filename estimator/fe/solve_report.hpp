@@ -16,6 +16,7 @@ namespace diastole {
 enum class SolveReason {
   converged,
   inverted_element,  ///< the material turns inside out however small the load step
+  beyond_law,        ///< a strain at which the law has no stress, such as a pole, however small the load step
   no_convergence,    ///< Newton's method stalls however small the load step
   singular_tangent,  ///< the factorisation met a zero pivot: a missing support, or a limit point
   out_of_steps       ///< the load-step limit was reached
@@ -50,12 +51,14 @@ struct SolveReport {
   size_t load_steps = 0;         ///< accepted ones
   size_t newton_iterations = 0;  ///< updates of the state: with a new tangent or with kept factors
   size_t factorisations = 0;     ///< tangents assembled and factorised on the way
-  /// Equals the pressure unknowns at a stable state. Of the solution's tangent if SolveOptions::check_stability asks
+  /// One a pressure unknown, and more if the state is unstable or, spuriously, on a coarse mesh. Of the solution's tangent if SolveOptions::check_stability asks
   /// for it or the cavity's wall has a free rim, else of the last one on the way.
   size_t negative_pivots = 0;
+  size_t unstable_motions = 0;   ///< with check_stability: elastic_system.hpp
   size_t pressure_unknowns = 0;  ///< Lagrange pressures, and those of fluids that are unknown
   double reached_pressure_kPa = 0.0;
   std::optional<InvertedPlace> inverted;
+  std::optional<size_t> beyond_law;  ///< the element
   double seconds = 0.0;
 
   [[nodiscard]] bool converged() const { return reason == SolveReason::converged; }
@@ -69,7 +72,7 @@ struct SolveOptions {
   size_t load_step_limit = 200;
   double least_load_fraction = 1e-3;  ///< of the pressure change asked for
   double most_load_fraction = 1.0;
-  bool check_stability = false;  ///< count negative pivots at the solution: one more factorisation
+  bool check_stability = false;  ///< count negative pivots at the solution: one more factorisation or two
   /// Called after each Newton iteration, for a progress line.
   std::function<void(double pressure_kPa, const NewtonIteration&)> on_iteration{};
 };

@@ -209,6 +209,21 @@ TEST(Inertia, ContinuousPressureHasSpuriousNegativePivotsOnTheUniformMesh) {
   EXPECT_GT(model.sensitivities(model.rest_state(), {}).negative_pivots, model.pressure_dofs());
 }
 
+TEST(Failure, StrainBeyondALawsPoleIsReportedWithItsElement) {
+  std::vector<double> values;
+  for (const LawParameter& parameter : find_law("pole-zero")->parameters())
+    values.push_back(parameter.typical);
+  ElasticModel model(make_annulus(gel_shape({6, 2, 1})), *find_law("pole-zero"), {.parameters = values});
+  ElasticState beyond = model.rest_state();
+  for (size_t start = 0; start < beyond.position_mm.size(); start += 3)
+    beyond.position_mm[start + 2] *= 2.0;  // a strain of 1.5, where the largest limit is 0.943
+  const SolveReport report = model.solve(0.0, beyond).report;
+  EXPECT_EQ(report.reason, SolveReason::beyond_law);
+  ASSERT_TRUE(report.beyond_law.has_value());
+  EXPECT_NE(report.describe().find("the law has no stress at the strain of element 0"), std::string::npos);
+  EXPECT_TRUE(model.solve(1.0).report.converged());  // from rest, steps that would cross a pole are cut back
+}
+
 TEST(Failure, InvertedElementIsReportedWithItsPlace) {
   ElasticModel model = gel(6.5);
   ElasticState crossed = model.rest_state();
