@@ -5,7 +5,9 @@
 namespace diastole {
 namespace {
 
-constexpr double most_contraction = 0.9;
+constexpr double most_contraction_near = 0.9;
+constexpr double most_contraction_far = 0.2;
+constexpr double far_step = 1.0;
 constexpr size_t most_steps = 20;
 
 }  // namespace
@@ -23,7 +25,8 @@ std::optional<std::vector<double>> KeptFactor::next_step(std::vector<double> sim
       simplified[n] += share * steps_[i + 1][n];
   }
   const double square = product_(simplified, simplified);
-  if (!(square <= most_contraction * most_contraction * squares_.back())) return {};
+  const double most = squares_.front() > far_step * far_step ? most_contraction_far : most_contraction_near;
+  if (!(square <= most * most * squares_.back())) return {};
   const double grown = 1.0 / (1.0 - product_(simplified, steps_.back()) / squares_.back());
   for (double& value : simplified)
     value *= grown;

@@ -8,7 +8,8 @@
 //
 // so that K learns from each step how the tangent has changed since, without being factorised again. A step that
 // shrinks by less than a tenth, or the twentieth, asks for a new tangent (Deuflhard asks when one does not halve; but a
-// step here costs a twentieth of a tangent, and after one slow step in the beginning the next ones are fast).
+// step here costs a twentieth of a tangent, and after one slow step in the beginning the next ones are fast). After
+// a first step as large as the whole body (size 1) the solution is far, and each must shrink fivefold.
 
 #include <functional>
 #include <optional>
@@ -19,7 +20,7 @@ namespace diastole {
 
 class KeptFactor {
  public:
-  /// The inner product of two vectors over the unknowns, without units.
+  /// The inner product of two vectors over the unknowns, without units: 1 is as large as the body and its pressures.
   using Product = std::function<double(std::span<const double>, std::span<const double>)>;
 
   KeptFactor(Product product, std::vector<double> first_step);

@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <cmath>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -102,12 +103,40 @@ MeshBody refined(MeshBody body, const std::array<int, 3>& halvings) {
   return body;
 }
 
+/// The springs' plates are rigid, plane and across z, and the gaps along a wall's rim are counted from them.
+void require_plane(const Study& study, const HermiteMesh& mesh, const char* name,
+                   const std::vector<ElementFace>& faces) {
+  const double allowed_mm = 1e-6 * mesh.extent_mm();
+  std::optional<double> plate_z_mm;
+  for (const ElementFace& face : faces) {
+    for (size_t sample = 0; sample < 9; ++sample) {
+      MaterialPoint point{face.element, {}};
+      point.xi[face.direction] = static_cast<double>(face.side);
+      point.xi[(face.direction + 1) % 3] = 0.5 * static_cast<double>(sample % 3);
+      point.xi[(face.direction + 2) % 3] = 0.5 * static_cast<double>(sample / 3);
+      const double z_mm = mesh.value(mesh.reference(), point)[2];
+      if (!plate_z_mm) plate_z_mm = z_mm;
+      if (std::abs(z_mm - *plate_z_mm) <= allowed_mm) continue;
+      refuse(
+          study, "specimen.ends",
+          fmt::format(
+              "the faces {} are not in one plane across z, as the plates are that \"sprung\" ends are "
+              "glued to: element {} is at z = {:g} mm, element {} at {:g} mm",
+              name, faces.front().element, *plate_z_mm, face.element, z_mm),
+          "Turn the mesh so that its ends lie across z, name only such faces bottom and top, or hold them: "
+          "ends = \"fixed\".");
+    }
+  }
+}
+
 /// End faces on springs, if the study's are.
 std::vector<BondedFaces> bonded_ends(const Study& study, const HermiteMesh& mesh) {
   const std::optional<EndSprings> springs =
       std::visit([](const auto& specimen) { return specimen.end_springs; }, study.specimen);
   if (!springs) return {};
   const SpringBond bond{springs->normal_kPa_per_mm, springs->tangential_kPa_per_mm};
+  require_plane(study, mesh, "bottom", mesh.faces().bottom);
+  require_plane(study, mesh, "top", mesh.faces().top);
   std::vector<BondedFaces> bonded;
   for (const std::vector<ElementFace>* faces : {&mesh.faces().bottom, &mesh.faces().top}) {
     if (!faces->empty()) bonded.push_back({*faces, bond});

@@ -228,14 +228,30 @@ class SolveOfAMeshFile : public SolveCommand {
       if (name == "outer") faces.outer.clear();
       if (name == "top") faces.top.clear();
     }
+    write_ring(ring, ring.reference(), faces, "ends = \"fixed\"\n", more);
+  }
+
+  /// On springs, its top pushed up by so much at one node.
+  void dent(double height_mm) const {
+    AnnulusShape shape;
+    shape.elements = {4, 1, 1};
+    const HermiteMesh ring = make_annulus(shape);
+    NodeField reference = ring.reference();
+    reference[dof_of(4, 0, 2)] += height_mm;
+    write_ring(ring, reference, ring.faces(),
+               "ends = \"sprung\"\nbond_normal_kPa_per_mm = 3.0\nbond_tangential_kPa_per_mm = 2.0\n", "");
+  }
+
+  void write_ring(const HermiteMesh& ring, const NodeField& reference, const MeshFaces& faces,
+                  const std::string& ends, const std::string& more) const {
     std::vector<HermiteMesh::Corners> elements;
     for (size_t e = 0; e < ring.element_count(); ++e)
       elements.push_back(ring.element(e));
     const std::filesystem::path mesh =
-        folder_.write("ring.mesh.toml", mesh_file_text({HermiteMesh(ring.reference(), elements, faces), {}}));
+        folder_.write("ring.mesh.toml", mesh_file_text({HermiteMesh(reference, elements, faces), {}}));
     const std::string text = gel_study;
-    write_study(text.substr(0, text.find("kind =")) + "kind = \"mesh\"\nfile = \"" + mesh.string() +
-                "\"\nends = \"fixed\"\n" + text.substr(text.find("[law]")) + more);
+    write_study(text.substr(0, text.find("kind =")) + "kind = \"mesh\"\nfile = \"" + mesh.string() + "\"\n" +
+                ends + text.substr(text.find("[law]")) + more);
   }
 
   const std::string sealed_ = "[chamber]\ncompliance_mL_per_kPa = 30.0\n";
@@ -262,6 +278,16 @@ TEST_F(SolveOfAMeshFile, RefusesALoadThatTheFacesCannotTake) {
   EXPECT_THAT(refusal({"--pressure-kPa", "1"}), refused_for("names no face outer"));
   leave_out({"outer"}, "[chamber]\nsealing_pressure_kPa = 1.0\n");
   EXPECT_THAT(refusal({"--pressure-kPa", "1"}), refused_for("names no face outer"));
+}
+
+TEST_F(SolveOfAMeshFile, RefusesSpringsAtEndsThatAreNotPlane) {
+  dent(0.0);
+  EXPECT_EQ(run({"--pressure-kPa", "0.5"}).code, ExitCode::done);
+  dent(0.4);
+  EXPECT_THAT(refusal({"--pressure-kPa", "0.5"}),
+              testing::AllOf(testing::HasSubstr("specimen.ends"),
+                             testing::HasSubstr("the faces top are not in one plane across z"),
+                             testing::HasSubstr("42.9 mm"), testing::HasSubstr("ends = \"fixed\"")));
 }
 
 TEST_F(SolveOfAMeshFile, TellsNoVolumeOfAnOpenCavity) {

@@ -30,13 +30,19 @@ int steps_to_root(const Residual& residual) {
   }
 }
 
+std::array<double, 2> linear(const std::array<double, 2>& x, double size) {
+  return {1.4 * x[0] + 0.3 * x[1] - size, 0.7 * x[1] + 0.2 * x[0] + 0.5 * size};
+}
+
 // Broyden's method ends after at most twice as many steps as there are unknowns, then one to see that it has.
 TEST(KeptFactor, LearnsALinearTangent) {
-  const int count = steps_to_root([](const auto& x) {
-    return std::array{1.4 * x[0] + 0.3 * x[1] - 1.0, 0.7 * x[1] + 0.2 * x[0] + 0.5};
-  });
+  const int count = steps_to_root([](const auto& x) { return linear(x, 0.1); });
   EXPECT_GT(count, 0);
   EXPECT_LE(count, 5);
+}
+
+TEST(KeptFactor, IsNotTrustedWithSlowStepsWhereTheSolutionIsFar) {
+  EXPECT_EQ(steps_to_root([](const auto& x) { return linear(x, 10.0); }), 0);
 }
 
 TEST(KeptFactor, ConvergesFasterThanTheFactorAlone) {
