@@ -9,6 +9,7 @@ void add_estimator_commands(CommandLine& line) {
   add_shear(line);
   add_report(line);
   add_mesh(line);
+  add_effects(line);
 }
 
 }  // namespace diastole

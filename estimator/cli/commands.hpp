@@ -11,6 +11,7 @@ void add_fit(CommandLine& line);
 void add_shear(CommandLine& line);
 void add_report(CommandLine& line);
 void add_mesh(CommandLine& line);
+void add_effects(CommandLine& line);
 
 void add_estimator_commands(CommandLine& line);
 

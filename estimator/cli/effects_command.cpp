@@ -1,0 +1,102 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <iostream>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "estimator/cli/commands.hpp"
+#include "estimator/effects/effect.hpp"
+#include "protocol/contract/input_error.hpp"
+
+namespace diastole {
+namespace {
+
+nlohmann::ordered_json to_json(const Effect& effect) {
+  const EffectText& text = effect.text();
+  nlohmann::ordered_json json = {{"id", text.id},
+                                 {"title", text.title},
+                                 {"port", name_of(text.port)},
+                                 {"equations", text.equations},
+                                 {"source", text.source},
+                                 {"looks_like", text.looks_like},
+                                 {"revealed_by", text.revealed_by},
+                                 {"conflicts", text.conflicts},
+                                 {"synergies", text.synergies},
+                                 {"parameters", nlohmann::ordered_json::array()}};
+  for (const EffectParameter& parameter : effect.parameters()) {
+    json["parameters"].push_back({{"name", parameter.name},
+                                  {"unit", parameter.unit},
+                                  {"meaning", parameter.meaning},
+                                  {"neutral", parameter.neutral},
+                                  {"bounds", {parameter.lower, parameter.upper}}});
+  }
+  return json;
+}
+
+std::string joined(const std::vector<std::string_view>& ids) {
+  return fmt::format("{}", fmt::join(ids, ", "));
+}
+
+void print_for_people(const Effect& effect) {
+  const EffectText& text = effect.text();
+  fmt::print("{}: {} (port: {})\n\n", text.id, text.title, name_of(text.port));
+  fmt::print("  Equations    {}\n  Source       {}\n  Looks like   {}\n  Revealed by  {}\n", text.equations,
+             text.source, text.looks_like, text.revealed_by);
+  if (!text.conflicts.empty()) fmt::print("  Looks alike  {}\n", joined(text.conflicts));
+  if (!text.synergies.empty()) fmt::print("  Shows with   {}\n", joined(text.synergies));
+  fmt::print("\n  Parameters\n");
+  for (const EffectParameter& parameter : effect.parameters()) {
+    fmt::print("    {:<28} {}; neutral {:g}, from {:g} to {:g}\n", parameter.name, parameter.meaning,
+               parameter.neutral, parameter.lower, parameter.upper);
+  }
+}
+
+const Effect& known(const std::string& id) {
+  if (const Effect* effect = find_effect(id)) return *effect;
+  const auto letters_in_common = [&](const Effect* effect) {
+    const std::string_view other = effect->text().id;
+    return std::count_if(id.begin(), id.end(), [&](char letter) { return other.find(letter) != other.npos; });
+  };
+  const auto& all = all_effects();
+  const Effect* nearest = *std::max_element(all.begin(), all.end(), [&](const Effect* a, const Effect* b) {
+    return letters_in_common(a) < letters_in_common(b);
+  });
+  throw InputError(
+      {.file = "",
+       .place = "ID",
+       .problem = fmt::format("there is no effect \"{}\"", id),
+       .remedy = fmt::format("`diastole effects` lists them; did you mean {}?", nearest->text().id)});
+}
+
+ExitCode run_effects(const std::string& id, const CommandOutput& out) {
+  std::vector<const Effect*> chosen = all_effects();
+  if (!id.empty()) chosen = {&known(id)};
+  if (out.json) {
+    nlohmann::ordered_json json;
+    for (const Effect* effect : chosen)
+      json["effects"].push_back(to_json(*effect));
+    std::cout << json.dump(1) << '\n';
+  } else if (!id.empty()) {
+    print_for_people(*chosen.front());
+  } else {
+    for (const Effect* effect : chosen)
+      fmt::print("{:<24}{:<10}{}\n", effect->text().id, name_of(effect->text().port), effect->text().title);
+  }
+  return ExitCode::done;
+}
+
+}  // namespace
+
+void add_effects(CommandLine& line) {
+  auto id = std::make_shared<std::string>();
+  CLI::App* command = line.add(
+      "effects", "what a real rig may have that the model has not: the effects that are known",
+      "  diastole effects\n  diastole effects hose-compliance\n  diastole effects --json\n"
+      "Without ID all are listed; with it, equations, parameters, what it looks like and which experiment "
+      "reveals it.");
+  command->add_option("ID", *id, "an effect, for example hose-compliance");
+  line.on_run(command, [id](const CommandOutput& out) { return run_effects(*id, out); });
+}
+
+}  // namespace diastole

@@ -1,0 +1,93 @@
+#pragma once
+// An effect: something physical that the base rig does not hold and a real one may. Simulation and estimation use the
+// same: an effect's parameters at their neutral values are the base model exactly, and its text is what `diastole
+// effects` shows.
+//
+// To add one: a file NAME.cpp in this folder that defines `const Effect& NAME_effect()`, and a line in
+// effect_list.inc. The tests over the list then check that it is neutral, differentiable, found again in its own
+// simulated data, and silent without cause.
+
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "estimator/rig/rig_model.hpp"
+#include "estimator/rig/specimen_family.hpp"
+
+namespace diastole {
+
+/// Where in the chain an effect enters.
+enum class Port { drive, specimen, sensor, clock, field };
+std::string_view name_of(Port port);
+
+/// In which coordinate a parameter is searched: where the rig's answer is nearest to linear in it.
+enum class SearchScale { linear, logarithmic, inverse_square };
+
+struct EffectParameter {
+  std::string_view name;     ///< with its unit, as in the explanation: "wave_speed_m_s"
+  std::string_view unit;     ///< for people: "m/s"
+  std::string_view meaning;  ///< one line
+  double neutral;            ///< gives the base model, for the paper's rig (Effect::neutral for any)
+  double lower;              ///< bounds of what is physical
+  double upper;
+  double typical;  ///< a size worth finding: where searches start and tests simulate
+  SearchScale scale = SearchScale::linear;
+};
+
+/// What effects tell about themselves; every text is shown to users.
+struct EffectText {
+  std::string_view id;     ///< "hose-compliance": kept for ever (docs/effects.md)
+  std::string_view title;  ///< a few words
+  Port port;
+  std::string_view equations;                    ///< what changes, in the model's symbols
+  std::string_view source;                       ///< where the equations are from
+  std::string_view looks_like;                   ///< in the recordings
+  std::string_view revealed_by;                  ///< the experiment that separates it from others
+  std::vector<std::string_view> conflicts = {};  ///< ids that look alike in some data
+  std::vector<std::string_view> synergies = {};  ///< ids that only show together
+};
+
+/// Something that happened at a moment of one run: a step of the sensor, steps lost.
+struct Occasion {
+  std::string run;
+  double time_s = 0.0;     ///< of the run
+  double session_s = 0.0;  ///< the same since the session's first run began
+};
+
+/// How many occasions an effect has; they are searched, not differentiated.
+enum class Occasions { none, one, several };
+
+/// Whether the fluid's motion changes, or only what the instruments show of it.
+enum class Stage { plant, sensors };
+
+class Effect {
+ public:
+  virtual ~Effect() = default;
+
+  [[nodiscard]] virtual const EffectText& text() const = 0;
+  [[nodiscard]] virtual std::span<const EffectParameter> parameters() const = 0;
+  [[nodiscard]] virtual Stage stage() const { return Stage::plant; }
+  [[nodiscard]] virtual Occasions occasions() const { return Occasions::none; }
+  /// Whether the specimen can have it.
+  [[nodiscard]] virtual bool fits(const rig::SpecimenFamily&) const { return true; }
+  /// The values that leave `base` as it is.
+  [[nodiscard]] virtual std::vector<double> neutral(const rig::RigModel& base) const;
+
+  /// What apply needs besides the model.
+  struct Context {
+    const rig::SpecimenFamily& family;
+    std::span<const Occasion> occasions = {};
+  };
+  /// Adds itself to the model. `values`: one a parameter. The model's curve and modulus must be set.
+  virtual void apply(std::span<const double> values, const Context& context, rig::RigModel& model) const = 0;
+};
+
+/// The effects of effect_list.inc, in its order. They live as long as the program.
+const std::vector<const Effect*>& all_effects();
+
+/// nullptr when no effect has that id.
+const Effect* find_effect(std::string_view id);
+
+}  // namespace diastole

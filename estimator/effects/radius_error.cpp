@@ -1,0 +1,50 @@
+// The cavity's true radius is another than the study's.
+
+#include <array>
+
+#include "estimator/effects/effect.hpp"
+
+namespace diastole {
+namespace {
+
+class RadiusError final : public Effect {
+ public:
+  [[nodiscard]] const EffectText& text() const override {
+    static const EffectText text{
+        .id = "radius-error",
+        .title = "error of the inner radius",
+        .port = Port::specimen,
+        .equations = "R_inner (1 + fraction) in the specimen's mesh.",
+        .source = "Geometry; curves by finite elements (specimen_family.hpp).",
+        .looks_like =
+            "Curvature of the pressure-volume curve, and a modulus that differs from an independent "
+            "test's.",
+        .revealed_by = "Gated volumes and strokes of different size; the field.",
+        .conflicts = {"stroke-gain", "end-bond-slip", "strain-stiffening", "chamber-back-pressure"},
+        .synergies = {},
+    };
+    return text;
+  }
+  [[nodiscard]] std::span<const EffectParameter> parameters() const override {
+    static constexpr std::array<EffectParameter, 1> list{
+        {{"fraction", "", "part by which the inner radius is larger", 0.0, -0.1, 0.1, 0.04}}};
+    return list;
+  }
+  [[nodiscard]] bool fits(const rig::SpecimenFamily& family) const override {
+    return family.has_neighbours();
+  }
+  void apply(std::span<const double> values, const Context& context, rig::RigModel& model) const override {
+    if (values[0] == 0.0) return;
+    model.curve = model.curve.plus(context.family.with_inner_radius(values[0]), 1.0, 1.0)
+                      .plus(context.family.plain(), 1.0, -1.0);
+  }
+};
+
+}  // namespace
+
+const Effect& radius_error_effect() {
+  static const RadiusError effect;
+  return effect;
+}
+
+}  // namespace diastole

@@ -1,0 +1,50 @@
+// Fluid passes the piston's seal.
+
+#include <array>
+
+#include "estimator/effects/effect.hpp"
+
+namespace diastole {
+namespace {
+
+class SealLeakPump final : public Effect {
+ public:
+  [[nodiscard]] const EffectText& text() const override {
+    static const EffectText text{
+        .id = "seal-leak-pump",
+        .title = "leak past the piston's seal",
+        .port = Port::drive,
+        .equations = "q_hose = q_piston - G p_pump, both directions alike.",
+        .source = "Laminar gap flow: proportional to pressure.",
+        .looks_like =
+            "The cavity loses volume while the pump's pressure is high and gains it while it is low; "
+            "the mean level wanders, steps relax.",
+        .revealed_by =
+            "A hold at volume: the pressure falls to zero; faster motions of the same stroke, whose "
+            "inertia pressure leaks too.",
+        .conflicts = {"cannula-leak-cavity", "viscoelasticity"},
+        .synergies = {},
+    };
+    return text;
+  }
+  [[nodiscard]] std::span<const EffectParameter> parameters() const override {
+    static constexpr std::array<EffectParameter, 1> list{
+        {{"leak_mL_s_kPa", "mL/(s kPa)", "conductance of the gap", 0.0, 0.0, 1.0, 0.05}}};
+    return list;
+  }
+  void apply(std::span<const double> values, const Context&, rig::RigModel& model) const override {
+    const double conductance = values[0];
+    if (conductance == 0.0) return;
+    model.pump_leaks.emplace_back(
+        [conductance](double pressure_kPa, double) { return conductance * pressure_kPa; });
+  }
+};
+
+}  // namespace
+
+const Effect& seal_leak_pump_effect() {
+  static const SealLeakPump effect;
+  return effect;
+}
+
+}  // namespace diastole

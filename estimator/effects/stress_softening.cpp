@@ -1,0 +1,90 @@
+// The specimen is stiffer until it has been stretched a few times (Mullins).
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <memory>
+
+#include "estimator/effects/effect.hpp"
+
+namespace diastole {
+namespace {
+
+class Softening final : public rig::SpecimenMemory {
+ public:
+  Softening(double delta, double cycles, double scale_mL, const rig::RunPlace& place)
+      : delta_(delta),
+        cycles_(cycles),
+        scale_mL_(scale_mL),
+        place_(place),
+        largest_mL_(place.largest_before_mL) {}
+  [[nodiscard]] double look(double elastic_kPa, double volume_mL, double time_s) const override {
+    const double lost =
+        -std::expm1(-done(time_s) / cycles_) * -std::expm1(-std::max(largest_mL_, volume_mL) / scale_mL_);
+    return elastic_kPa * (1.0 - delta_ * lost);
+  }
+  void pass(double, double volume_mL, double) override { largest_mL_ = std::max(largest_mL_, volume_mL); }
+
+ private:
+  /// Cycles begun, with the running one in part.
+  [[nodiscard]] double done(double time_s) const {
+    const auto& starts = place_.trigger_s;
+    const auto after = std::upper_bound(starts.begin(), starts.end(), time_s);
+    const auto count = place_.cycles_before + static_cast<double>(after - starts.begin());
+    if (after == starts.begin() || after == starts.end()) return count;
+    return count - 1.0 + (time_s - *(after - 1)) / (*after - *(after - 1));
+  }
+  double delta_, cycles_, scale_mL_;
+  rig::RunPlace place_;
+  double largest_mL_;
+};
+
+class StressSoftening final : public Effect {
+ public:
+  [[nodiscard]] const EffectText& text() const override {
+    static const EffectText text{
+        .id = "stress-softening",
+        .title = "stress softening",
+        .port = Port::specimen,
+        .equations =
+            "p = p_e(V) (1 - delta D), D = (1 - exp(-n / cycles)) (1 - exp(-V_max / V0)): n cycles "
+            "done, V_max the largest volume so far; it stays for the session's later runs.",
+        .source =
+            "L. Mullins, Rubber Chem. Technol. 42 (1969) 339; the softening of a cyclic test in two "
+            "exponentials.",
+        .looks_like =
+            "The first cycles of the session's first run have higher pressures; after them nothing "
+            "changes any more.",
+        .revealed_by = "A session that begins with many equal strokes; rests do not bring it back.",
+        .conflicts = {"temperature-drift", "viscoelasticity"},
+        .synergies = {},
+    };
+    return text;
+  }
+  [[nodiscard]] std::span<const EffectParameter> parameters() const override {
+    static constexpr std::array<EffectParameter, 3> list{
+        {{"delta", "", "final part of the stiffness that is lost", 0.0, 0.0, 0.6, 0.1},
+         {"cycles", "", "in which it is lost", 2.0, 0.3, 20.0, 2.0, SearchScale::logarithmic},
+         {"V0_mL", "mL", "volume at which most of it is lost", 12.0, 1.0, 60.0, 12.0,
+          SearchScale::logarithmic}}};
+    return list;
+  }
+  void apply(std::span<const double> values, const Context&, rig::RigModel& model) const override {
+    const double delta = values[0];
+    const double cycles = values[1];
+    const double scale_mL = values[2];
+    if (delta == 0.0) return;
+    model.memories.emplace_back([=](const rig::RunPlace& place) {
+      return std::make_unique<Softening>(delta, cycles, scale_mL, place);
+    });
+  }
+};
+
+}  // namespace
+
+const Effect& stress_softening_effect() {
+  static const StressSoftening effect;
+  return effect;
+}
+
+}  // namespace diastole

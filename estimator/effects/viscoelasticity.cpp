@@ -1,0 +1,93 @@
+// The specimen relaxes.
+
+#include <array>
+#include <cmath>
+#include <memory>
+
+#include "estimator/effects/effect.hpp"
+
+namespace diastole {
+namespace {
+
+class Relaxation final : public rig::SpecimenMemory {
+ public:
+  Relaxation(const std::array<double, 3>& parts, const std::array<double, 3>& times)
+      : parts_(parts), times_(times) {}
+  [[nodiscard]] double look(double elastic_kPa, double, double time_s) const override {
+    double pressure = elastic_kPa;
+    for (size_t i = 0; i < 3; ++i)
+      pressure -= parts_[i] * (elastic_kPa - history(i, elastic_kPa, time_s));
+    return pressure;
+  }
+  void pass(double elastic_kPa, double, double time_s) override {
+    for (size_t i = 0; i < 3; ++i)
+      history_[i] = history(i, elastic_kPa, time_s);
+    elastic_kPa_ = elastic_kPa;
+    time_s_ = time_s;
+    begun_ = true;
+  }
+
+ private:
+  /// h_i after a change that is linear in time.
+  [[nodiscard]] double history(size_t i, double elastic_kPa, double time_s) const {
+    if (!begun_) return elastic_kPa;
+    const double x = (time_s - time_s_) / times_[i];
+    if (x <= 0.0) return history_[i];
+    if (x != decay_at_[i]) {
+      decay_at_[i] = x;
+      decay_[i] = std::exp(-x);
+    }
+    return decay_[i] * history_[i] + (elastic_kPa - elastic_kPa_) * (1.0 - decay_[i]) / x;
+  }
+  std::array<double, 3> parts_, times_;
+  std::array<double, 3> history_{};
+  mutable std::array<double, 3> decay_at_{}, decay_{};
+  double elastic_kPa_ = 0.0, time_s_ = 0.0;
+  bool begun_ = false;
+};
+
+class Viscoelasticity final : public Effect {
+ public:
+  [[nodiscard]] const EffectText& text() const override {
+    static const EffectText text{
+        .id = "viscoelasticity",
+        .title = "viscoelastic specimen",
+        .port = Port::specimen,
+        .equations =
+            "p = p_e - sum g_i (p_e - h_i), h_i the history of p_e fading with tau_i: dh_i/dt = "
+            "dp_e/dt - h_i / tau_i. C1 is the instantaneous modulus.",
+        .source = "Y. C. Fung, Biomechanics (1993): quasi-linear viscoelasticity with three exponentials.",
+        .looks_like = "Pressures lead volumes; after a ramp they relax; stiffness grows with rate.",
+        .revealed_by = "A hold after a quick ramp and the same stroke at several rates.",
+        .conflicts = {"cannula-leak-cavity", "seal-leak-pump"},
+        .synergies = {},
+    };
+    return text;
+  }
+  [[nodiscard]] std::span<const EffectParameter> parameters() const override {
+    static constexpr std::array<EffectParameter, 6> list{
+        {{"g_fast", "", "part that relaxes within tau_fast", 0.0, 0.0, 0.6, 0.08},
+         {"g_middle", "", "within tau_middle", 0.0, 0.0, 0.6, 0.03},
+         {"g_slow", "", "within tau_slow", 0.0, 0.0, 0.6, 0.04},
+         {"tau_fast_s", "s", "", 0.1, 0.02, 0.4, 0.1, SearchScale::logarithmic},
+         {"tau_middle_s", "s", "", 1.0, 0.4, 2.5, 1.0, SearchScale::logarithmic},
+         {"tau_slow_s", "s", "", 6.0, 2.5, 60.0, 6.0, SearchScale::logarithmic}}};
+    return list;
+  }
+  void apply(std::span<const double> values, const Context&, rig::RigModel& model) const override {
+    std::array<double, 3> parts{values[0], values[1], values[2]};
+    std::array<double, 3> times{values[3], values[4], values[5]};
+    if (parts == std::array<double, 3>{}) return;
+    model.memories.emplace_back(
+        [=](const rig::RunPlace&) { return std::make_unique<Relaxation>(parts, times); });
+  }
+};
+
+}  // namespace
+
+const Effect& viscoelasticity_effect() {
+  static const Viscoelasticity effect;
+  return effect;
+}
+
+}  // namespace diastole

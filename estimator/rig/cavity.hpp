@@ -1,0 +1,35 @@
+#pragma once
+// The cavity at the hose's far end: specimen, leaks to outside, gas beside it.
+
+#include <memory>
+#include <vector>
+
+#include "estimator/rig/gas.hpp"
+#include "estimator/rig/rig_model.hpp"
+
+namespace diastole::rig {
+
+class Cavity {
+ public:
+  Cavity(const RigModel& model, const RunPlace& place);
+
+  /// The pressure when this volume has come out of the hose by now; what was lost before is taken off.
+  double look(double arrived_mL, double time_s);
+  /// Goes on to this time: memories and leaks follow the pressure just looked at.
+  void pass(double arrived_mL, double time_s);
+  [[nodiscard]] double specimen_mL() const { return specimen_mL_; }
+
+ private:
+  [[nodiscard]] double pressure_kPa(double specimen_mL, double time_s) const;
+
+  const RigModel& model_;
+  GasPocket gas_;
+  std::vector<std::unique_ptr<SpecimenMemory>> memories_;
+  double specimen_mL_ = 0.0;
+  double lost_mL_ = 0.0;
+  double leak_mL_per_s_ = 0.0;
+  double passed_s_ = 0.0;
+  bool begun_ = false;
+};
+
+}  // namespace diastole::rig

@@ -1,0 +1,295 @@
+#include <Eigen/Dense>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdlib>
+#include <limits>
+
+#include "estimator/rig/motion.hpp"
+
+namespace diastole::rig {
+namespace {
+
+using runfile::PumpTrace;
+using runfile::RecordedRun;
+using runfile::Segment;
+
+constexpr double longest_spread_s = 0.1;
+constexpr double spread_step_s = 0.005;
+constexpr double quick_flank_round = 0.04;  ///< of the period: sawtooth waveforms
+constexpr double coarse_s = 0.025;          ///< spacing of what nothing explains
+
+/// The samples [first, last) of the pump trace with their quantum.
+struct Counted {
+  const PumpTrace& pump;
+  double step_mL;
+  size_t first;
+  size_t last;
+
+  [[nodiscard]] double time_s(size_t k) const { return pump.time_s[k]; }
+  [[nodiscard]] double volume_mL(size_t k) const { return pump.commanded_mL[k]; }
+};
+
+size_t index_at(const PumpTrace& pump, double time_s) {
+  return static_cast<size_t>(std::lower_bound(pump.time_s.begin(), pump.time_s.end(), time_s) -
+                             pump.time_s.begin());
+}
+
+double quantum_mL(const RecordedRun& run) {
+  const auto found = run.rig.find("volume_per_step_mL");
+  if (found != run.rig.end() && std::holds_alternative<double>(found->second))
+    return std::get<double>(found->second);
+  double least = std::numeric_limits<double>::infinity();
+  for (size_t k = 1; k < run.pump.commanded_mL.size(); ++k) {
+    const double change = std::abs(run.pump.commanded_mL[k] - run.pump.commanded_mL[k - 1]);
+    if (change > 1e-6) least = std::min(least, change);
+  }
+  return std::isfinite(least) ? least : 1e-3;
+}
+
+double worst_mL(const Motion& motion, const Counted& counted) {
+  double worst = 0.0;
+  for (size_t k = counted.first; k < counted.last; ++k)
+    worst = std::max(worst, std::abs(motion.at(counted.time_s(k)).volume_mL - counted.volume_mL(k)));
+  return worst;
+}
+
+/// The strokes of one cycle of a waveform that the contract names; none for the others.
+std::vector<Stroke> named_cycle(const Segment& segment, double start_s) {
+  const double low = segment.offset_mL;
+  const double high = low + segment.stroke_mL;
+  const double period = segment.period_s;
+  const auto two = [&](double turn, double up_round, double down_round, bool cosine) {
+    const double turn_s = start_s + turn * period;
+    return std::vector<Stroke>{{start_s, turn_s, low, high, up_round, cosine},
+                               {turn_s, start_s + period, high, low, down_round, cosine}};
+  };
+  if (segment.waveform == "parabolic") return two(0.5, 0.5, 0.5, false);
+  if (segment.waveform == "sinusoidal") return two(0.5, 0.5, 0.5, true);
+  if (segment.waveform == "sawtooth")
+    return two(0.75, quick_flank_round / 0.75, quick_flank_round / 0.25, false);
+  if (segment.waveform == "reversed-sawtooth")
+    return two(0.25, quick_flank_round / 0.25, quick_flank_round / 0.75, false);
+  return {};
+}
+
+std::vector<Stroke> named_strokes(const Segment& segment) {
+  std::vector<Stroke> strokes;
+  for (int64_t cycle = 0; cycle < segment.cycles; ++cycle) {
+    const auto one = named_cycle(segment, segment.start_s + static_cast<double>(cycle) * segment.period_s);
+    strokes.insert(strokes.end(), one.begin(), one.end());
+  }
+  return strokes;
+}
+
+/// Monotone pieces between rests and turns, as strokes with rough times.
+std::vector<Stroke> rough_strokes(const Counted& counted) {
+  constexpr double rest_s = 0.15;
+  std::vector<Stroke> strokes;
+  size_t from = counted.first;
+  double direction = 0.0;
+  size_t moved = from;
+  const auto close = [&](size_t at) {
+    if (direction != 0.0 && at > from)
+      strokes.push_back(
+          {counted.time_s(from), counted.time_s(at), counted.volume_mL(from), counted.volume_mL(at)});
+    direction = 0.0;
+  };
+  for (size_t k = counted.first + 1; k < counted.last; ++k) {
+    const double change = counted.volume_mL(k) - counted.volume_mL(moved);
+    if (std::abs(change) < 0.5 * counted.step_mL) {
+      if (direction != 0.0 && counted.time_s(k) - counted.time_s(moved) > rest_s) close(moved);
+      if (direction == 0.0) from = k;
+      continue;
+    }
+    if (direction != 0.0 && change * direction < 0.0) {
+      const size_t turn = (moved + k) / 2;
+      close(turn);
+      from = turn;
+    }
+    direction = change;
+    moved = k;
+  }
+  close(moved);
+  return strokes;
+}
+
+double square_error(const Stroke& stroke, double spread_s, const Counted& counted) {
+  const Motion motion({stroke}, stroke.from_mL, spread_s);
+  double sum = 0.0;
+  for (size_t k = counted.first; k < counted.last; ++k) {
+    const double error = motion.at(counted.time_s(k)).volume_mL - counted.volume_mL(k);
+    sum += error * error;
+  }
+  return sum;
+}
+
+/// Times and rounding of one stroke by Gauss-Newton on the counts; the cosine is tried too.
+Stroke fitted(const Stroke& rough, double spread_s, const Counted& whole) {
+  const double around = 0.6 * spread_s + 0.01;
+  const Counted counted{whole.pump, whole.step_mL,
+                        std::max(whole.first, index_at(whole.pump, rough.start_s - around)),
+                        std::min(whole.last, index_at(whole.pump, rough.end_s + around))};
+  Stroke best = rough;
+  double best_error = std::numeric_limits<double>::infinity();
+  for (const bool cosine : {false, true}) {
+    Stroke stroke = rough;
+    stroke.cosine = cosine;
+    stroke.round = 0.2;
+    stroke.start_s += 0.5 * spread_s;
+    stroke.end_s -= 0.5 * spread_s;
+    const auto moved = [&](const Eigen::Vector3d& by) {
+      Stroke other = stroke;
+      other.start_s += by[0];
+      other.end_s = std::max(other.end_s + by[1], other.start_s + 1e-3);
+      other.round = std::clamp(other.round + by[2], 0.01, 0.5);
+      return other;
+    };
+    double error = square_error(stroke, spread_s, counted);
+    for (int iteration = 0; iteration < 30; ++iteration) {
+      const std::array<double, 3> nudge{1e-4, 1e-4, 1e-3};
+      std::array<Motion, 4> motions;
+      motions[0] = Motion({stroke}, stroke.from_mL, spread_s);
+      for (Eigen::Index j = 0; j < 3; ++j) {
+        motions[static_cast<size_t>(j) + 1] = Motion(
+            {moved(nudge[static_cast<size_t>(j)] * Eigen::Vector3d::Unit(j))}, stroke.from_mL, spread_s);
+      }
+      Eigen::Matrix3d normal = 1e-12 * Eigen::Matrix3d::Identity();
+      Eigen::Vector3d gradient = Eigen::Vector3d::Zero();
+      for (size_t k = counted.first; k < counted.last; ++k) {
+        const double value = motions[0].at(counted.time_s(k)).volume_mL;
+        Eigen::Vector3d row;
+        for (size_t j = 0; j < 3; ++j) {
+          row[static_cast<Eigen::Index>(j)] =
+              (motions[j + 1].at(counted.time_s(k)).volume_mL - value) / nudge[j];
+        }
+        normal += row * row.transpose();
+        gradient += row * (counted.volume_mL(k) - value);
+      }
+      const Eigen::Vector3d step = normal.ldlt().solve(gradient);
+      double part = 1.0;
+      Stroke next = moved(step);
+      double next_error = square_error(next, spread_s, counted);
+      while (next_error > error && part > 0.01) {
+        part *= 0.5;
+        next = moved(part * step);
+        next_error = square_error(next, spread_s, counted);
+      }
+      if (next_error >= error * (1.0 - 1e-9)) break;
+      stroke = next;
+      error = next_error;
+    }
+    if (error < best_error) {
+      best_error = error;
+      best = stroke;
+    }
+  }
+  return best;
+}
+
+/// Volumes that the table names, where the counts are within a step of them: a step's rounding is not the motion's.
+void snap(std::vector<Stroke>& strokes, const Segment& segment, double step_mL) {
+  for (Stroke& stroke : strokes) {
+    for (double* volume : {&stroke.from_mL, &stroke.to_mL}) {
+      for (const double named : {segment.offset_mL, segment.offset_mL + segment.stroke_mL})
+        if (std::abs(*volume - named) < step_mL) *volume = named;
+    }
+  }
+}
+
+std::vector<Stroke> fitted_strokes(const Segment& segment, double spread_s, const Counted& counted) {
+  std::vector<Stroke> strokes = rough_strokes(counted);
+  snap(strokes, segment, counted.step_mL);
+  for (Stroke& stroke : strokes)
+    stroke = fitted(stroke, spread_s, counted);
+  return strokes;
+}
+
+std::vector<Stroke> coarse_strokes(const Counted& counted) {
+  std::vector<Stroke> strokes;
+  size_t before = counted.first;
+  for (size_t k = counted.first + 1; k < counted.last; ++k) {
+    if (counted.time_s(k) - counted.time_s(before) < coarse_s) continue;
+    strokes.push_back(
+        {counted.time_s(before), counted.time_s(k), counted.volume_mL(before), counted.volume_mL(k), 1e-6});
+    before = k;
+  }
+  return strokes;
+}
+
+/// A stretch of time of which one segment of the table tells.
+struct Stretch {
+  Segment segment;
+  bool named = false;  ///< its waveform's cycle is known; else what lies between such segments
+  Counted counted;
+};
+
+std::vector<Stretch> stretches_of(const RecordedRun& run, double step_mL) {
+  std::vector<Stretch> stretches;
+  size_t from = 0;
+  // A named segment's motion spreads over its borders: what lies there is not the neighbours'.
+  const auto between = [&](double end_s, const Segment& next) {
+    const size_t to = index_at(run.pump, end_s);
+    if (to > from) stretches.push_back({next, false, {run.pump, step_mL, from, to}});
+  };
+  for (const Segment& segment : run.segments) {
+    if (segment.waveform == "hold" || named_cycle(segment, 0.0).empty()) continue;
+    const size_t first = index_at(run.pump, segment.start_s - 1e-9);
+    const size_t last = index_at(run.pump, segment.end_s() - 1e-9);
+    between(segment.start_s - 0.5 * longest_spread_s, segment);
+    stretches.push_back({segment, true, {run.pump, step_mL, first, last}});
+    from = index_at(run.pump, segment.end_s() + 0.5 * longest_spread_s);
+  }
+  Segment rest;
+  for (const Segment& segment : run.segments)
+    if (segment.waveform != "hold" && named_cycle(segment, 0.0).empty()) rest = segment;
+  between(run.pump.time_s.back() + 1.0, rest);
+  for (size_t k = 0; k + 1 < stretches.size(); ++k) {
+    // Between two named segments an unnamed one may lie, and its volumes are the better ones to snap to.
+    for (const Segment& segment : run.segments) {
+      const bool inside = !stretches[k].named && segment.waveform != "hold" &&
+                          index_at(run.pump, segment.start_s - 1e-9) >= stretches[k].counted.first &&
+                          index_at(run.pump, segment.start_s - 1e-9) < stretches[k].counted.last;
+      if (inside) stretches[k].segment = segment;
+    }
+  }
+  return stretches;
+}
+
+std::vector<Stroke> strokes_with(const std::vector<Stretch>& stretches, double spread_s) {
+  std::vector<Stroke> strokes;
+  for (const Stretch& stretch : stretches) {
+    const auto more = stretch.named ? named_strokes(stretch.segment)
+                                    : fitted_strokes(stretch.segment, spread_s, stretch.counted);
+    strokes.insert(strokes.end(), more.begin(), more.end());
+  }
+  return strokes;
+}
+
+}  // namespace
+
+FoundMotion find_motion(const RecordedRun& run) {
+  const double step_mL = quantum_mL(run);
+  const Counted all{run.pump, step_mL, 0, run.pump.time_s.size()};
+  const double rest_mL = run.pump.commanded_mL.front();
+  const std::vector<Stretch> stretches = stretches_of(run, step_mL);
+  FoundMotion best;
+  best.step_mL = step_mL;
+  best.worst_mL = std::numeric_limits<double>::infinity();
+  for (double spread_s = 0.0; spread_s <= longest_spread_s + 1e-9; spread_s += spread_step_s) {
+    const Motion motion(strokes_with(stretches, spread_s), rest_mL, spread_s);
+    const double worst = worst_mL(motion, all);
+    if (worst < best.worst_mL) {
+      best.motion = motion;
+      best.worst_mL = worst;
+    }
+  }
+  best.explained = best.worst_mL <= 1.01 * step_mL;
+  if (!best.explained) {
+    best.motion = Motion(coarse_strokes(all), rest_mL, 2.0 * coarse_s);
+    best.worst_mL = worst_mL(best.motion, all);
+  }
+  return best;
+}
+
+}  // namespace diastole::rig

@@ -1,0 +1,95 @@
+#pragma once
+// The rig as a model: commanded steps -> piston -> hose -> specimen -> catheter and sensors -> samples.
+//
+//   drive      volume the piston displaces, of the motion behind the commanded steps
+//   pump       what the fluid meets before the hose: a leak past the seal, gas
+//   hose       distributed line (hose_line.hpp)
+//   specimen   pressure by volume, with memory if an effect gives it one; leaks and gas at the cavity
+//   sensors    catheter of second order and gains, offsets, clocks
+//
+// RigModel is the base rig: what a run's /rig describes and nothing else. An effect (estimator/effects) changes it
+// through the members below, each of which has a neutral state that is the base model exactly.
+//
+// Units as the names say; volumes mL, pressures kPa above atmosphere, times s on the controller's clock.
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "estimator/rig/hose.hpp"
+#include "estimator/rig/specimen_curve.hpp"
+
+namespace diastole::rig {
+
+/// A run's samples of the moving piston, evenly spaced; effects of the drive rewrite them.
+struct DriveTrace {
+  double start_s = 0.0;
+  double step_s = 0.0;
+  std::vector<double> volume_mL;
+  std::vector<double> flow_mL_per_s;
+  std::vector<double> acceleration_mL_per_s2;
+
+  [[nodiscard]] double time_s(size_t k) const { return start_s + step_s * static_cast<double>(k); }
+  /// Flow and acceleration by differences of the volume, for effects that only know the volume.
+  void differentiate();
+};
+
+/// Which run of a session, for what depends on it.
+struct RunPlace {
+  std::string name;                ///< "baseline"
+  double started_s = 0.0;          ///< since the session's first run began
+  double cycles_before = 0.0;      ///< in the session's earlier runs
+  double largest_before_mL = 0.0;  ///< commanded in them
+  std::vector<double> trigger_s;   ///< the cycles' starts
+  double atmosphere_kPa = 101.325;
+};
+
+/// A branch from which volume flows away at a node's pressure: leaks. mL/s by kPa and time.
+using LeakLaw = std::function<double(double pressure_kPa, double time_s)>;
+
+/// Pressure of the specimen by its elastic pressure and volume; may keep a state, so that one lives for one run.
+/// `look` must not change the state; `pass` goes on to `time_s` and does.
+class SpecimenMemory {
+ public:
+  virtual ~SpecimenMemory() = default;
+  /// The pressure if the elastic one is `elastic_kPa` at `volume_mL` at this time.
+  [[nodiscard]] virtual double look(double elastic_kPa, double volume_mL, double time_s) const = 0;
+  virtual void pass(double elastic_kPa, double volume_mL, double time_s) = 0;
+};
+using MemoryMaker = std::function<std::unique_ptr<SpecimenMemory>(const RunPlace&)>;
+
+/// Second order: p_out'' + 2 zeta w p_out' + w^2 p_out = w^2 p_in, w = 2 pi f0.
+struct Catheter {
+  double resonance_Hz = 60.0;
+  double damping = 0.6;
+};
+
+/// A change of a measured pressure by time: kPa read if kPa are there.
+using SensorMap = std::function<double(double pressure_kPa, double time_s, const RunPlace&)>;
+
+struct RigModel {
+  Hose hose;
+  SpecimenCurve curve;  ///< at a modulus of 1 kPa
+  double modulus_kPa = 6.0;
+  Catheter catheter;
+
+  // Nuisances of the sensors, per run set by the fit.
+  double cavity_offset_kPa = 0.0;
+  double pump_offset_kPa = 0.0;
+
+  // Hooks of effects, in the order in which they were added.
+  std::vector<std::function<void(DriveTrace&, const RunPlace&)>> drive;
+  double pump_gas_mL = 0.0;    ///< at rest; between piston and hose
+  double cavity_gas_mL = 0.0;  ///< at rest; beside the specimen
+  double gas_exponent =
+      1.2;  ///< of p V^n: bubbles at about a hertz are between isothermal (1) and adiabatic (1.4)
+  std::vector<LeakLaw> pump_leaks;
+  std::vector<LeakLaw> cavity_leaks;
+  std::vector<MemoryMaker> memories;
+  std::vector<SensorMap> cavity_sensor;
+  double sample_delay_s = 0.0;  ///< samples show what was there this much earlier
+  double sample_skew = 0.0;     ///< and the DAQ's clock runs fast by this part: counts more seconds
+};
+
+}  // namespace diastole::rig

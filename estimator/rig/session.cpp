@@ -1,0 +1,152 @@
+#include "estimator/rig/session.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <limits>
+#include <sstream>
+
+#include "protocol/contract/input_error.hpp"
+#include "protocol/runfile/reader.hpp"
+
+namespace diastole::rig {
+namespace {
+
+using runfile::RecordedRun;
+
+double attribute(const RecordedRun& run, std::string_view name, double otherwise) {
+  const auto found = run.rig.find(name);
+  if (found == run.rig.end()) return otherwise;
+  if (const auto* number = std::get_if<double>(&found->second)) return *number;
+  if (const auto* whole = std::get_if<int64_t>(&found->second)) return static_cast<double>(*whole);
+  return otherwise;
+}
+
+/// Seconds of an ISO 8601 time, from any fixed origin; NaN if it is none.
+double seconds_of(const std::string& utc) {
+  int year = 0;
+  unsigned month = 0;
+  unsigned day = 0;
+  int hour = 0;
+  int minute = 0;
+  double second = 0.0;
+  char mark = 0;
+  std::istringstream text(utc);
+  char dash = 0;
+  text >> year >> dash >> month >> dash >> day >> mark >> hour >> dash >> minute >> dash >> second;
+  if (text.fail()) return std::numeric_limits<double>::quiet_NaN();
+  const std::chrono::sys_days days =
+      std::chrono::year(year) / std::chrono::month(month) / std::chrono::day(day);
+  return static_cast<double>(days.time_since_epoch().count()) * 86400.0 + hour * 3600.0 + minute * 60.0 +
+         second;
+}
+
+std::string short_name(const std::filesystem::path& file) {
+  const std::string name = file.filename().string();
+  return name.substr(0, name.find(".run.h5"));
+}
+
+std::vector<GatedVolume> volumes_of(const RecordedRun& run) {
+  std::vector<GatedVolume> volumes;
+  for (const auto& [number, flow] : run.flow) {
+    if (number >= run.segments.size()) continue;
+    const runfile::Segment& segment = run.segments[number];
+    GatedVolume volume{{}, flow};
+    for (const double trigger : run.trigger_s) {
+      const double start = trigger - run.trigger_delay_s;
+      if (start > segment.start_s - 0.5 * segment.period_s &&
+          start < segment.end_s() - 0.5 * segment.period_s)
+        volume.trigger_s.push_back(trigger);
+    }
+    if (!volume.trigger_s.empty()) volumes.push_back(std::move(volume));
+  }
+  return volumes;
+}
+
+SessionRun take(RecordedRun&& run, const std::string& name) {
+  SessionRun taken;
+  const FoundMotion found = find_motion(run);
+  taken.motion_explained = found.explained;
+  taken.drive.motion = found.motion;
+  taken.drive.start_s = run.pressure.time_s.front();
+  taken.drive.end_s = run.pressure.time_s.back();
+  taken.drive.place.name = name;
+  taken.drive.place.started_s = seconds_of(run.started_utc);
+  taken.drive.place.trigger_s = run.trigger_s;
+  taken.drive.place.atmosphere_kPa = attribute(run, "atmospheric_kPa", 101.325);
+  taken.volumes = volumes_of(run);
+  taken.segments = run.segments;
+  for (const Channel channel : {Channel::cavity, Channel::pump}) {
+    const auto samples = run.pressure.channels.find(name_of(channel));
+    if (samples != run.pressure.channels.end()) taken.pressure_kPa[channel] = samples->second;
+  }
+  taken.sample_s = std::move(run.pressure.time_s);
+  return taken;
+}
+
+/// What earlier runs of the session did to the specimen.
+void set_history(Session& session) {
+  for (SessionRun& run : session.runs) {
+    RunPlace& place = run.drive.place;
+    for (const SessionRun& other : session.runs) {
+      if (other.drive.place.started_s >= place.started_s) continue;
+      place.cycles_before += static_cast<double>(other.drive.place.trigger_s.size());
+      for (const Stroke& stroke : other.drive.motion.strokes())
+        place.largest_before_mL = std::max(place.largest_before_mL, stroke.to_mL);
+    }
+  }
+}
+
+}  // namespace
+
+std::string_view name_of(Channel channel) { return channel == Channel::cavity ? "cavity_kPa" : "pump_kPa"; }
+
+RigModel base_model(const RecordedRun& run) {
+  RigModel model;
+  Hose& hose = model.hose;
+  hose.length_m = attribute(run, "hose_length_m", hose.length_m);
+  hose.bore_mm = attribute(run, "hose_bore_mm", hose.bore_mm);
+  hose.density_kg_m3 = attribute(run, "fluid_density_kg_m3", hose.density_kg_m3);
+  hose.viscosity_Pa_s = attribute(run, "fluid_viscosity_Pa_s", hose.viscosity_Pa_s);
+  hose.wave_speed_m_s = attribute(run, "hose_wave_speed_m_s", hose.wave_speed_m_s);
+  hose.loss_coefficient = attribute(run, "hose_minor_loss_K", hose.loss_coefficient);
+  hose.creep_fraction = attribute(run, "hose_creep_fraction", hose.creep_fraction);
+  hose.creep_time_s = attribute(run, "hose_creep_time_s", hose.creep_time_s);
+  model.catheter.resonance_Hz = attribute(run, "catheter_f0_Hz", model.catheter.resonance_Hz);
+  model.catheter.damping = attribute(run, "catheter_zeta", model.catheter.damping);
+  return model;
+}
+
+Session read_session(const Study& study) {
+  if (study.data.runs.empty()) {
+    throw InputError(
+        {.file = study.file.string(),
+         .place = "data.runs",
+         .problem = "names no run files",
+         .remedy = "List the runs to compare with the rig's model: runs = [\"baseline.run.h5\"]."});
+  }
+  Session session;
+  for (const std::filesystem::path& file : study.data.runs) {
+    RecordedRun run = runfile::read_run(file);
+    if (run.pump.time_s.size() < 2 || run.pressure.time_s.size() < 2) {
+      throw InputError({.file = file.string(),
+                        .place = "dataset /pump/commanded_mL",
+                        .problem = "the run holds no motion or no pressures",
+                        .remedy = "Take the run off the study's list."});
+    }
+    if (session.runs.empty()) session.base = base_model(run);
+    session.runs.push_back(take(std::move(run), short_name(file)));
+  }
+  double first_s = std::numeric_limits<double>::infinity();
+  for (const SessionRun& run : session.runs)
+    first_s = std::min(first_s, run.drive.place.started_s);
+  for (SessionRun& run : session.runs) {
+    const double since = run.drive.place.started_s - first_s;
+    run.drive.place.started_s = since >= 0.0 ? since : 0.0;  // NaN too
+  }
+  set_history(session);
+  return session;
+}
+
+}  // namespace diastole::rig

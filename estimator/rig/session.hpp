@@ -1,0 +1,44 @@
+#pragma once
+// The runs that a study names, read for the rig's model: the motion behind the steps, the samples of each channel, the
+// gated volumes, and where in the session each run lies.
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "estimator/io/study.hpp"
+#include "estimator/rig/simulation.hpp"
+#include "protocol/runfile/run.hpp"
+
+namespace diastole::rig {
+
+enum class Channel { cavity, pump };
+std::string_view name_of(Channel channel);  ///< "cavity_kPa", "pump_kPa"
+
+/// Gated volumes of one segment with the triggers over which they were averaged.
+struct GatedVolume {
+  std::vector<double> trigger_s;
+  runfile::FlowVolume measured;
+};
+
+struct SessionRun {
+  RunDrive drive;  ///< place.name is the file's name before ".run.h5"
+  bool motion_explained = true;
+  std::vector<runfile::Segment> segments;
+  std::vector<double> sample_s;
+  std::map<Channel, std::vector<double>> pressure_kPa;  ///< NaN where a gap is declared
+  std::vector<GatedVolume> volumes;
+};
+
+struct Session {
+  std::vector<SessionRun> runs;  ///< in the study's order
+  RigModel base;                 ///< of the first run's /rig; its curve is not yet set
+};
+
+/// Throws InputError if the study names no runs, a run cannot be read, or runs are of different rigs.
+Session read_session(const Study& study);
+
+/// The base rig that a run describes; what it does not tell is the paper's.
+RigModel base_model(const runfile::RecordedRun& run);
+
+}  // namespace diastole::rig

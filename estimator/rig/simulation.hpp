@@ -1,0 +1,46 @@
+#pragma once
+// Runs the rig's model along a run's motion.
+
+#include <span>
+#include <vector>
+
+#include "estimator/rig/motion.hpp"
+#include "estimator/rig/rig_model.hpp"
+
+namespace diastole::rig {
+
+struct SimulationOptions {
+  double step_s = 1.0 / 600.0;
+  size_t components = 4;  ///< of the hose line (hose_line.hpp)
+};
+
+/// What happens in the fluid, evenly spaced in time.
+struct PlantTrace {
+  double start_s = 0.0;
+  double step_s = 0.0;
+  std::vector<double> pump_kPa;
+  std::vector<double> cavity_kPa;
+  std::vector<double> cavity_mL;  ///< taken by the specimen since rest
+};
+
+/// What the instruments show at the samples' times.
+struct Prediction {
+  std::vector<double> cavity_kPa;
+  std::vector<double> pump_kPa;
+};
+
+/// What a run asks of the simulation.
+struct RunDrive {
+  Motion motion;
+  RunPlace place;
+  double start_s = 0.0;
+  double end_s = 0.0;
+};
+
+PlantTrace simulate_plant(const RigModel& model, const RunDrive& run, const SimulationOptions& options = {});
+
+/// Catheter, gains, offsets and clocks on a plant's trace, at the samples' times.
+Prediction observe(const RigModel& model, const PlantTrace& plant, const RunPlace& place,
+                   std::span<const double> sample_s);
+
+}  // namespace diastole::rig

@@ -1,0 +1,42 @@
+#include "estimator/rig/specimen_curve.hpp"
+
+#include <algorithm>
+#include <utility>
+
+namespace diastole::rig {
+
+SpecimenCurve::SpecimenCurve(std::vector<Point> points)
+    : points_(std::move(points)), spacing_mL_(points_[1].volume_mL - points_[0].volume_mL) {}
+
+SpecimenCurve::Value SpecimenCurve::at(double volume_mL) const {
+  const double place = (volume_mL - points_.front().volume_mL) / spacing_mL_;
+  const double last = static_cast<double>(points_.size() - 2);
+  const Point& left = points_[static_cast<size_t>(std::clamp(place, 0.0, last))];
+  const Point& right = *(&left + 1);
+  const double s = (volume_mL - left.volume_mL) / spacing_mL_;
+  if (s < 0.0)
+    return {left.pressure_kPa + s * spacing_mL_ * left.stiffness_kPa_per_mL, left.stiffness_kPa_per_mL};
+  if (s > 1.0) {
+    return {right.pressure_kPa + (s - 1.0) * spacing_mL_ * right.stiffness_kPa_per_mL,
+            right.stiffness_kPa_per_mL};
+  }
+  const double rise = right.pressure_kPa - left.pressure_kPa;
+  const double m0 = left.stiffness_kPa_per_mL * spacing_mL_;
+  const double m1 = right.stiffness_kPa_per_mL * spacing_mL_;
+  const double c2 = 3.0 * rise - 2.0 * m0 - m1;
+  const double c3 = m0 + m1 - 2.0 * rise;
+  return {left.pressure_kPa + s * (m0 + s * (c2 + s * c3)),
+          (m0 + s * (2.0 * c2 + 3.0 * s * c3)) / spacing_mL_};
+}
+
+SpecimenCurve SpecimenCurve::plus(const SpecimenCurve& other, double factor, double other_factor) const {
+  std::vector<Point> points = points_;
+  for (size_t k = 0; k < points.size(); ++k) {
+    points[k].pressure_kPa = factor * points[k].pressure_kPa + other_factor * other.points_[k].pressure_kPa;
+    points[k].stiffness_kPa_per_mL =
+        factor * points[k].stiffness_kPa_per_mL + other_factor * other.points_[k].stiffness_kPa_per_mL;
+  }
+  return SpecimenCurve(std::move(points));
+}
+
+}  // namespace diastole::rig

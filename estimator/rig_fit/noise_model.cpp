@@ -1,0 +1,229 @@
+#include "estimator/rig_fit/noise_model.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace diastole::rig {
+namespace {
+
+constexpr size_t order = 6;
+constexpr double shortest_rest_s = 1.0;
+
+size_t row_at(const SessionRun& run, double time_s) {
+  return static_cast<size_t>(std::lower_bound(run.sample_s.begin(), run.sample_s.end(), time_s - 1e-6) -
+                             run.sample_s.begin());
+}
+
+/// Sums of products at each lag with their counts, NaN left out.
+struct Autocovariance {
+  std::array<double, order + 1> sum{};
+  std::array<double, order + 1> count{};
+
+  void add(const std::vector<double>& values, double scale) {
+    for (size_t lag = 0; lag <= order; ++lag) {
+      for (size_t k = lag; k < values.size(); ++k) {
+        const double product = values[k] * values[k - lag];
+        if (!std::isfinite(product)) continue;
+        sum[lag] += scale * product;
+        count[lag] += 1.0;
+      }
+    }
+  }
+  [[nodiscard]] double at(size_t lag) const { return count[lag] > 0.0 ? sum[lag] / count[lag] : 0.0; }
+};
+
+/// The rest before the first motion, its mean taken off.
+std::vector<double> rest_of(const SessionRun& run, const std::vector<double>& values) {
+  const auto& strokes = run.drive.motion.strokes();
+  const double end_s =
+      strokes.empty() ? run.sample_s.back() : strokes.front().start_s - run.drive.motion.spread_s();
+  const size_t last = row_at(run, end_s);
+  if (last == 0 || run.sample_s[last - 1] - run.sample_s.front() < shortest_rest_s) return {};
+  std::vector<double> rest(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(last));
+  double mean = 0.0;
+  double count = 0.0;
+  for (const double value : rest) {
+    if (!std::isfinite(value)) continue;
+    mean += value;
+    count += 1.0;
+  }
+  for (double& value : rest)
+    value -= mean / std::max(count, 1.0);
+  return rest;
+}
+
+/// Pairs of successive cycles with equally many samples and equal motion.
+struct CyclePair {
+  CycleRows before, after;
+};
+std::vector<CyclePair> equal_pairs(const SessionRun& run) {
+  std::vector<CyclePair> pairs;
+  const std::vector<CycleRows> cycles = cycles_of(run);
+  for (size_t k = 1; k + 1 < cycles.size(); ++k) {
+    const CyclePair pair{cycles[k], cycles[k + 1]};
+    if (pair.before.last - pair.before.first != pair.after.last - pair.after.first) continue;
+    bool equal = true;
+    for (const double part : {0.1, 0.3, 0.55, 0.8}) {
+      const auto step = static_cast<size_t>(part * static_cast<double>(pair.before.last - pair.before.first));
+      const double a = run.drive.motion.at(run.sample_s[pair.before.first + step]).volume_mL;
+      const double b = run.drive.motion.at(run.sample_s[pair.after.first + step]).volume_mL;
+      equal = equal && std::abs(a - b) < 0.02;
+    }
+    if (equal) pairs.push_back(pair);
+  }
+  return pairs;
+}
+
+/// The later cycle over the earlier one, less one, by least squares; their difference without that goes to `rest`.
+double relative_change(const std::vector<double>& values, const CyclePair& pair, double zero,
+                       std::vector<double>& rest) {
+  double product = 0.0;
+  double square = 0.0;
+  const size_t count = pair.before.last - pair.before.first;
+  for (size_t k = 0; k < count; ++k) {
+    const double mean = 0.5 * (values[pair.before.first + k] + values[pair.after.first + k]) - zero;
+    const double change = values[pair.after.first + k] - values[pair.before.first + k];
+    if (!std::isfinite(mean) || !std::isfinite(change)) continue;
+    product += mean * change;
+    square += mean * mean;
+  }
+  const double gain = square > 0.0 ? product / square : 0.0;
+  rest.clear();
+  for (size_t k = 0; k < count; ++k) {
+    const double mean = 0.5 * (values[pair.before.first + k] + values[pair.after.first + k]) - zero;
+    rest.push_back(values[pair.after.first + k] - values[pair.before.first + k] - gain * mean);
+  }
+  return gain;
+}
+
+double zero_of(const SessionRun& run, const std::vector<double>& values) {
+  double sum = 0.0;
+  double count = 0.0;
+  for (size_t k = 0; k < values.size() && run.sample_s[k] < run.sample_s.front() + shortest_rest_s; ++k) {
+    if (!std::isfinite(values[k])) continue;
+    sum += values[k];
+    count += 1.0;
+  }
+  return count > 0.0 ? sum / count : 0.0;
+}
+
+/// Levinson's recursion.
+ChannelNoise autoregression_of(const Autocovariance& covariance) {
+  ChannelNoise noise;
+  std::vector<double> a;
+  double error = covariance.at(0);
+  for (size_t k = 1; k <= order && error > 0.0; ++k) {
+    double reflection = covariance.at(k);
+    for (size_t j = 1; j < k; ++j)
+      reflection -= a[j - 1] * covariance.at(k - j);
+    reflection = std::clamp(reflection / error, -0.98, 0.98);
+    std::vector<double> next(a);
+    for (size_t j = 1; j < k; ++j)
+      next[j - 1] -= reflection * a[k - j - 1];
+    next.push_back(reflection);
+    a = next;
+    error *= 1.0 - reflection * reflection;
+  }
+  noise.sd_kPa = std::sqrt(covariance.at(0));
+  noise.innovation_kPa = std::sqrt(error);
+  noise.autoregression = a;
+  return noise;
+}
+
+double median(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+ChannelNoise channel_noise(const Session& session, Channel channel) {
+  Autocovariance covariance;
+  Autocovariance rough;
+  std::vector<double> rest;
+  for (const SessionRun& run : session.runs) {
+    const auto found = run.pressure_kPa.find(channel);
+    if (found == run.pressure_kPa.end()) continue;
+    covariance.add(rest_of(run, found->second), 1.0);
+    for (const CyclePair& pair : equal_pairs(run)) {
+      relative_change(found->second, pair, zero_of(run, found->second), rest);
+      if (channel == Channel::cavity) covariance.add(rest, 0.5);
+    }
+    rest.clear();
+    for (size_t k = 2; k < found->second.size(); ++k)
+      rest.push_back(found->second[k] - 2.0 * found->second[k - 1] + found->second[k - 2]);
+    rough.add(rest, 1.0 / 6.0);
+  }
+  if (covariance.count[0] > 100.0) return autoregression_of(covariance);
+  return {std::sqrt(rough.at(0)), std::sqrt(rough.at(0)), {}};
+}
+
+/// From successive cycles' gains: twice the variance, less what noise makes of it.
+double beat_sd(const Session& session, const NoiseModel& noise) {
+  std::vector<double> changes;
+  double noise_part = 0.0;
+  std::vector<double> rest;
+  for (const SessionRun& run : session.runs) {
+    const auto& values = run.pressure_kPa.at(Channel::cavity);
+    const double zero = zero_of(run, values);
+    for (const CyclePair& pair : equal_pairs(run)) {
+      const double gain = relative_change(values, pair, zero, rest);
+      double square = 0.0;
+      for (size_t k = pair.before.first; k < pair.before.last; ++k)
+        if (std::isfinite(values[k])) square += (values[k] - zero) * (values[k] - zero);
+      const ChannelNoise& channel = noise.channels.at(Channel::cavity);
+      double correlation = 1.0;  // of a mean over many samples, to that of independent ones
+      for (const double a : channel.autoregression)
+        correlation -= a;
+      const double level = channel.innovation_kPa / std::max(correlation, 0.05);
+      changes.push_back(std::abs(gain));
+      noise_part += 2.0 * level * level / square;
+    }
+  }
+  if (changes.size() < 4) return 0.003;  // none repeat: the middle of what pumps do
+  const double sd = median(changes) / 0.6745;
+  return std::sqrt(std::max(0.5 * (sd * sd - noise_part / static_cast<double>(changes.size())), 1e-8));
+}
+
+}  // namespace
+
+std::vector<CycleRows> cycles_of(const SessionRun& run) {
+  std::vector<CycleRows> cycles;
+  const auto& triggers = run.drive.place.trigger_s;
+  for (size_t k = 0; k < triggers.size(); ++k) {
+    double end_s = run.sample_s.back() + 1.0;
+    if (k + 1 < triggers.size()) end_s = triggers[k + 1];
+    for (const runfile::Segment& segment : run.segments)
+      if (triggers[k] < segment.end_s() - 1e-6 && triggers[k] >= segment.start_s - 1e-6)
+        end_s = std::min(end_s, triggers[k] + segment.period_s);
+    const CycleRows rows{row_at(run, triggers[k]), row_at(run, end_s)};
+    if (rows.last > rows.first) cycles.push_back(rows);
+  }
+  return cycles;
+}
+
+std::vector<double> whitened(const ChannelNoise& noise, const std::vector<double>& values) {
+  const size_t depth = noise.autoregression.size();
+  std::vector<double> white(values.size(), 0.0);
+  for (size_t k = depth; k < values.size(); ++k) {
+    double innovation = values[k];
+    for (size_t j = 1; j <= depth; ++j)
+      innovation -= noise.autoregression[j - 1] * values[k - j];
+    if (std::isfinite(innovation)) white[k] = innovation / noise.innovation_kPa;
+  }
+  return white;
+}
+
+NoiseModel estimate_noise(const Session& session) {
+  NoiseModel noise;
+  for (const Channel channel : {Channel::cavity, Channel::pump}) {
+    bool present = true;
+    for (const SessionRun& run : session.runs)
+      present = present && run.pressure_kPa.contains(channel);
+    if (present) noise.channels[channel] = channel_noise(session, channel);
+  }
+  noise.beat_sd = beat_sd(session, noise);
+  return noise;
+}
+
+}  // namespace diastole::rig

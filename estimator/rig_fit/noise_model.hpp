@@ -1,0 +1,47 @@
+#pragma once
+// What a session's recordings scatter by themselves: the floor against which misfits are measured.
+//
+// Three parts, all from the data and without the rig's model:
+//   - each channel's noise, correlated over some samples: an autoregression (order 6) of the autocovariance at rest and
+//     of successive cycles' differences, pooled over the runs;
+//   - the beat's variation: each cycle's pressures are larger or smaller by a random factor, the same in both
+//     channels; its sd from successive cycles' differences, so that slow changes do not count;
+//   - the gated volumes' own sigmas.
+//
+// Whitening makes residuals independent with unit variance: the autoregression's innovations, and of each cycle the
+// component along its own shape shrunk (1 / sqrt(1 + s^2 |w|^2), w the whitened shape and s the beats' sd).
+
+#include <Eigen/Dense>
+#include <map>
+#include <vector>
+
+#include "estimator/rig/session.hpp"
+
+namespace diastole::rig {
+
+struct ChannelNoise {
+  double sd_kPa = 0.0;                 ///< of a sample
+  double innovation_kPa = 0.0;         ///< what is new in each sample
+  std::vector<double> autoregression;  ///< y_k = sum a_j y_(k-j) + innovation
+};
+
+struct NoiseModel {
+  std::map<Channel, ChannelNoise> channels;
+  double beat_sd = 0.0;  ///< relative
+};
+
+/// Precondition: at least one run with more than a second of rest or two equal cycles; else a channel's noise is the
+/// scatter of its second differences.
+NoiseModel estimate_noise(const Session& session);
+
+/// Innovations over their sd; zero where they would need a missing sample or one before the first.
+std::vector<double> whitened(const ChannelNoise& noise, const std::vector<double>& values);
+
+/// Rows [first, last) of a run's samples that belong to one cycle.
+struct CycleRows {
+  size_t first = 0;
+  size_t last = 0;
+};
+std::vector<CycleRows> cycles_of(const SessionRun& run);
+
+}  // namespace diastole::rig

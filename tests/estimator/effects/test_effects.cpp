@@ -1,0 +1,149 @@
+// What every effect of the list must keep.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <fstream>
+#include <iterator>
+#include <set>
+#include <string>
+
+#include "estimator/rig_fit/search_scale.hpp"
+#include "tests/estimator/rig_fit/simulated_session.hpp"
+
+namespace diastole {
+namespace {
+
+using rig::RigModel;
+
+std::vector<Occasion> occasions_of(const Effect& effect) {
+  if (effect.occasions() == Occasions::none) return {};
+  return {{"baseline", 3.1, 63.1}};
+}
+
+std::vector<double> typical(const Effect& effect) {
+  std::vector<double> values;
+  for (const EffectParameter& parameter : effect.parameters())
+    values.push_back(parameter.typical);
+  return values;
+}
+
+class EveryEffect : public testing::TestWithParam<const Effect*> {
+ protected:
+  [[nodiscard]] rig::Prediction shown(const std::vector<double>* values) const {
+    RigModel model;
+    model.curve = family_.plain();
+    model.modulus_kPa = 8.0;
+    if (values != nullptr) GetParam()->apply(*values, {family_, occasions_}, model);
+    return rig::observe(model, rig::simulate_plant(model, run_.drive), run_.drive.place, run_.sample_s);
+  }
+
+  rig::SpecimenFamily family_ = rig::gel_family();
+  rig::SessionRun run_ = rig::empty_run("baseline", {0.0, "parabolic", 40.0, 1.2, 0.0, 2}, 60.0);
+  std::vector<Occasion> occasions_ = occasions_of(*GetParam());
+};
+
+TEST_P(EveryEffect, TellsEverything) {
+  const EffectText& text = GetParam()->text();
+  for (const std::string_view part :
+       {text.id, text.title, text.equations, text.source, text.looks_like, text.revealed_by})
+    EXPECT_FALSE(part.empty());
+  for (const auto& others : {text.conflicts, text.synergies})
+    for (const std::string_view other : others)
+      EXPECT_NE(find_effect(other), nullptr) << other;
+  for (const EffectParameter& parameter : GetParam()->parameters()) {
+    EXPECT_LE(parameter.lower, parameter.neutral) << parameter.name;
+    EXPECT_LE(parameter.neutral, parameter.upper) << parameter.name;
+    EXPECT_LT(parameter.lower, parameter.typical) << parameter.name;
+    EXPECT_LT(parameter.typical, parameter.upper) << parameter.name;
+  }
+}
+
+TEST_P(EveryEffect, IsTheBaseModelExactlyWhereNeutral) {
+  const rig::Prediction base = shown(nullptr);
+  const std::vector<double> neutral = GetParam()->neutral(RigModel{});
+  const rig::Prediction same = shown(&neutral);
+  EXPECT_EQ(same.cavity_kPa, base.cavity_kPa);
+  EXPECT_EQ(same.pump_kPa, base.pump_kPa);
+}
+
+TEST_P(EveryEffect, ShowsWhereItIsTypical) {
+  const rig::Prediction base = shown(nullptr);
+  const std::vector<double> values = typical(*GetParam());
+  const rig::Prediction other = shown(&values);
+  double largest_kPa = 0.0;
+  for (size_t k = 0; k < base.cavity_kPa.size(); ++k) {
+    largest_kPa = std::max({largest_kPa, std::abs(other.cavity_kPa[k] - base.cavity_kPa[k]),
+                            std::abs(other.pump_kPa[k] - base.pump_kPa[k])});
+    ASSERT_TRUE(std::isfinite(other.cavity_kPa[k]) && std::isfinite(other.pump_kPa[k])) << k;
+  }
+  EXPECT_GT(largest_kPa, 0.005);
+}
+
+/// The fit's forward difference against a central one of ten times its step.
+TEST_P(EveryEffect, HasTheGradientThatTheFitTakes) {
+  const std::vector<rig::Ingredient> ingredients{{GetParam(), occasions_}};
+  std::vector<rig::Unknown> unknowns(3, {"", 1.0, 10.0});
+  for (const EffectParameter& parameter : GetParam()->parameters())
+    unknowns.push_back({std::string(parameter.name), parameter.lower, parameter.upper});
+  const auto coordinates = rig::search_coordinates(ingredients, unknowns);
+  const std::vector<double> at = typical(*GetParam());
+  const rig::Prediction here = shown(&at);
+  for (size_t j = 0; j < at.size(); ++j) {
+    const rig::SearchCoordinate& coordinate = coordinates[3 + j];
+    const auto moved = [&](double by) {
+      std::vector<double> values = at;
+      values[j] = rig::from_search(coordinate.scale, rig::to_search(coordinate.scale, at[j]) + by);
+      return shown(&values);
+    };
+    const rig::Prediction forward = moved(coordinate.nudge);
+    const rig::Prediction up = moved(10.0 * coordinate.nudge);
+    const rig::Prediction down = moved(-10.0 * coordinate.nudge);
+    double difference = 0.0;
+    double size = 0.0;
+    for (size_t k = 0; k < here.cavity_kPa.size(); ++k) {
+      for (const auto channel : {&rig::Prediction::cavity_kPa, &rig::Prediction::pump_kPa}) {
+        const double slope = ((forward.*channel)[k] - (here.*channel)[k]) / coordinate.nudge;
+        const double central = ((up.*channel)[k] - (down.*channel)[k]) / (20.0 * coordinate.nudge);
+        difference += (slope - central) * (slope - central);
+        size += central * central;
+      }
+    }
+    // Play has corners in time, whose place moves with the parameter.
+    const double part = GetParam()->text().id == "backlash" ? 0.6 : 0.05;
+    EXPECT_LE(std::sqrt(difference), part * std::sqrt(size) + 1e-12) << GetParam()->parameters()[j].name;
+  }
+}
+
+std::string test_name(const testing::TestParamInfo<const Effect*>& info) {
+  std::string name(info.param->text().id);
+  std::erase(name, '-');
+  return name;
+}
+
+INSTANTIATE_TEST_SUITE_P(List, EveryEffect, testing::ValuesIn(all_effects()), test_name);
+
+/// docs/effects.md says of every effect what `diastole effects ID` says.
+TEST(Effects, StandInTheDocuments) {
+  std::ifstream file(DIASTOLE_SOURCE_DIR "/docs/effects.md");
+  const std::string page((std::istreambuf_iterator<char>(file)), {});
+  for (const Effect* effect : all_effects()) {
+    const EffectText& text = effect->text();
+    EXPECT_NE(page.find(std::string("## `").append(text.id).append("`")), page.npos) << text.id;
+    for (const std::string_view part :
+         {text.title, text.equations, text.source, text.looks_like, text.revealed_by})
+      EXPECT_NE(page.find(part), page.npos) << part;
+    for (const EffectParameter& parameter : effect->parameters())
+      EXPECT_NE(page.find(std::string("`").append(parameter.name).append("`")), page.npos) << parameter.name;
+  }
+}
+
+TEST(Effects, HaveEachTheirId) {
+  std::set<std::string_view> ids;
+  for (const Effect* effect : all_effects())
+    EXPECT_TRUE(ids.insert(effect->text().id).second) << effect->text().id;
+  EXPECT_EQ(find_effect("no-such-effect"), nullptr);
+}
+
+}  // namespace
+}  // namespace diastole

@@ -1,0 +1,145 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <complex>
+#include <numbers>
+
+#include "estimator/rig/hose_line.hpp"
+
+namespace diastole::rig {
+namespace {
+
+constexpr double pi = std::numbers::pi;
+
+Hose lossless() {
+  Hose hose;
+  hose.viscosity_Pa_s = 1e-12;
+  hose.creep_fraction = 0.0;
+  hose.unsteady_friction = false;
+  return hose;
+}
+
+/// Drives the pump end with a flow, keeps the far end at zero pressure; `see(time, line)` after each settled step.
+template <class Flow, class See>
+void drive(HoseLine& line, double step_s, double end_s, const Flow& flow, const See& see) {
+  line.rest_at(0.0);
+  for (double t = 0.0; t < end_s; t += step_s) {
+    EndLoads loads;
+    loads.entering_acceleration = (flow(t + step_s) - flow(t)) / step_s;
+    line.settle(loads);
+    see(t, line);
+    line.begin_step(loads, flow(t + step_s));
+    line.end_step(loads);
+  }
+}
+
+TEST(HoseLine, AStepOfFlowMakesJoukowskysPressure) {
+  const Hose hose = lossless();
+  const double step_s = 5e-5;
+  HoseLine line(hose, {.step_s = step_s, .components = 60});
+  const double flow_mL_per_s = 10.0;
+  const double hammer_kPa =
+      hose.density_kg_m3 * hose.wave_speed_m_s * flow_mL_per_s / hose.area_mm2() * 1e-3;  // rho c v
+  double first = 0.0;
+  double second = 0.0;
+  const double there_and_back_s = 2.0 * hose.length_m / hose.wave_speed_m_s;
+  drive(
+      line, step_s, 2.0 * there_and_back_s, [&](double t) { return flow_mL_per_s * std::min(t / 2e-3, 1.0); },
+      [&](double t, const HoseLine& at) {
+        const double phase = t / there_and_back_s;
+        if (phase > 0.2 && phase < 0.9) first += at.pump_kPa() * step_s / (0.7 * there_and_back_s);
+        if (phase > 1.2 && phase < 1.9) second += at.pump_kPa() * step_s / (0.7 * there_and_back_s);
+      });
+  EXPECT_NEAR(first, hammer_kPa, 0.01 * hammer_kPa);
+  EXPECT_NEAR(second, -hammer_kPa, 0.01 * hammer_kPa);
+}
+
+TEST(HoseLine, RingsAtAQuarterWave) {
+  const Hose hose = lossless();
+  HoseLine line(hose, {.step_s = 1.0 / 600.0, .components = 4});
+  int crossings = 0;
+  double before = 0.0;
+  drive(
+      line, 1.0 / 600.0, 10.0, [](double t) { return 10.0 * std::min(t / 2e-3, 1.0); },
+      [&](double, const HoseLine& at) {
+        if (before < 0.0 && at.kept_mL() >= 0.0) ++crossings;
+        before = at.kept_mL();
+      });
+  EXPECT_NEAR(crossings / 10.0, hose.wave_speed_m_s / (4.0 * hose.length_m), 0.2);
+}
+
+TEST(HoseLine, KeepsEnergyButForDragAndCreep) {
+  const Hose hose;
+  const double step_s = 1.0 / 4800.0;
+  HoseLine line(hose, {.step_s = step_s, .components = 4});
+  double worked = 0.0;
+  double lost = 0.0;
+  double largest = 0.0;
+  double balance = 0.0;
+  const auto flow = [](double t) { return 100.0 * std::pow(std::sin(pi * t / 0.6), 3); };
+  drive(line, step_s, 1.2, flow, [&](double t, const HoseLine& at) {
+    worked += at.pump_kPa() * flow(t) * step_s;  // the far end is at zero pressure
+    lost += at.loss_mW() * step_s;
+    largest = std::max(largest, at.energy_mJ());
+    balance = worked - lost - at.energy_mJ();
+  });
+  EXPECT_GT(lost, 10.0);
+  EXPECT_NEAR(balance, 0.0, 2e-3 * largest);
+}
+
+TEST(HoseLine, SlowViscousFlowHasWomersleysResistance) {
+  Hose hose;
+  hose.viscosity_Pa_s = 1.0;
+  hose.unsteady_friction = false;
+  const double frequency_Hz = 0.5;
+  const double omega = 2.0 * pi * frequency_Hz;
+  const double radius_m = 0.5e-3 * hose.bore_mm;
+  // Z = i omega rho L / A / (1 - 2 J1(x) / (x J0(x))), x = i^(3/2) alpha, by the series for small x.
+  const double alpha = radius_m * std::sqrt(omega * hose.density_kg_m3 / hose.viscosity_Pa_s);
+  ASSERT_LT(alpha, 0.5);
+  const std::complex<double> x2 = std::pow(std::complex<double>(0.0, 1.0), 3) * alpha * alpha;
+  const std::complex<double> j0 = 1.0 - x2 / 4.0 + x2 * x2 / 64.0 - x2 * x2 * x2 / 2304.0;
+  const std::complex<double> j1_over_x = 0.5 - x2 / 16.0 + x2 * x2 / 768.0 - x2 * x2 * x2 / 36864.0;
+  const std::complex<double> inertia(0.0, omega * hose.inertance());
+  const std::complex<double> impedance = inertia / (1.0 - 2.0 * j1_over_x / j0);
+
+  HoseLine line(hose, {.step_s = 1.0 / 600.0, .components = 4});
+  double in_phase = 0.0;
+  const double periods = 2.0;
+  drive(
+      line, 1.0 / 600.0, (periods + 2.0) / frequency_Hz, [&](double t) { return std::sin(omega * t); },
+      [&](double t, const HoseLine& at) {
+        if (t >= 2.0 / frequency_Hz)
+          in_phase += 2.0 * at.pump_kPa() * std::sin(omega * t) / (600.0 * periods / frequency_Hz);
+      });
+  EXPECT_NEAR(in_phase, impedance.real(), 0.01 * impedance.real());
+}
+
+TEST(HoseLine, SwingsAgainstAGasAsInertanceAndCompliance) {
+  Hose hose = lossless();
+  hose.wave_speed_m_s = 3000.0;
+  const double stiffness_kPa_per_mL = 20.0;
+  HoseLine line(hose, {.step_s = 1.0 / 600.0, .components = 4, .pump_stiffness = stiffness_kPa_per_mL});
+  line.rest_at(0.0);
+  int crossings = 0;
+  double before = 0.0;
+  const double squeezed_mL = 1.0;  // the piston is put here at once
+  for (int k = 0; k < 6000; ++k) {
+    const auto loads = [&] {
+      EndLoads now;
+      now.pump_kPa = stiffness_kPa_per_mL * (squeezed_mL - line.entered_mL());
+      return now;
+    };
+    const EndLoads now = loads();
+    line.settle(now);
+    line.begin_step(now, 0.0);
+    line.end_step(loads());
+    if (before < squeezed_mL && line.entered_mL() >= squeezed_mL) ++crossings;
+    before = line.entered_mL();
+  }
+  const double natural_Hz = std::sqrt(stiffness_kPa_per_mL / hose.inertance()) / (2.0 * pi);
+  EXPECT_NEAR(crossings / 10.0, natural_Hz, 0.1 + 0.01 * natural_Hz);
+}
+
+}  // namespace
+}  // namespace diastole::rig

@@ -1,0 +1,117 @@
+#include "estimator/rig/simulation.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace diastole::rig {
+namespace {
+
+constexpr double stiffness_kPa_per_mL = 0.1;
+
+RigModel straight_model() {
+  RigModel model;
+  model.modulus_kPa = 1.0;
+  model.curve = SpecimenCurve({{-10.0, -10.0 * stiffness_kPa_per_mL, stiffness_kPa_per_mL},
+                               {50.0, 50.0 * stiffness_kPa_per_mL, stiffness_kPa_per_mL}});
+  return model;
+}
+
+RunDrive cycles(int count) {
+  std::vector<Stroke> strokes;
+  RunDrive run;
+  for (int cycle = 0; cycle < count; ++cycle) {
+    const double start = 0.5 + 1.2 * cycle;
+    strokes.push_back({start, start + 0.6, 0.0, 40.0});
+    strokes.push_back({start + 0.6, start + 1.2, 40.0, 0.0});
+    run.place.trigger_s.push_back(start);
+  }
+  run.motion = Motion(strokes, 0.0, 0.05);
+  run.end_s = 0.5 + 1.2 * count + 2.0;
+  return run;
+}
+
+RunDrive ramp(double to_mL, double end_s) {
+  RunDrive run;
+  run.motion = Motion({{0.5, 1.5, 0.0, to_mL, 0.2}}, 0.0, 0.05);
+  run.end_s = end_s;
+  return run;
+}
+
+TEST(Simulation, KeepsVolume) {
+  const RigModel model = straight_model();
+  const PlantTrace trace = simulate_plant(model, ramp(30.0, 20.0));
+  const double pressure = trace.cavity_kPa.back();
+  const double kept_mL = model.hose.compliance_mL_per_kPa() * (1.0 + model.hose.creep_fraction) * pressure;
+  EXPECT_NEAR(trace.cavity_mL.back() + kept_mL, 30.0, 1e-5);
+  EXPECT_NEAR(trace.pump_kPa.back(), pressure, 1e-4);
+  EXPECT_NEAR(pressure, stiffness_kPa_per_mL * trace.cavity_mL.back(), 1e-9);
+}
+
+TEST(Simulation, ConvergesInStepAndComponents) {
+  const RigModel model = straight_model();
+  const RunDrive run = cycles(2);
+  const PlantTrace coarse = simulate_plant(model, run);
+  const PlantTrace fine = simulate_plant(model, run, {.step_s = 1.0 / 2400.0, .components = 6});
+  double pump = 0.0;
+  double cavity = 0.0;
+  for (size_t k = 0; k + 2 < coarse.pump_kPa.size(); ++k) {
+    pump += std::pow(coarse.pump_kPa[k] - fine.pump_kPa[4 * k], 2);
+    cavity = std::max(cavity, std::abs(coarse.cavity_kPa[k] - fine.cavity_kPa[4 * k]));
+  }
+  EXPECT_LT(std::sqrt(pump / static_cast<double>(coarse.pump_kPa.size())), 0.015);  // of +-30 kPa
+  EXPECT_LT(cavity, 0.002);
+}
+
+TEST(Simulation, ALeakEmptiesTheCavityAsResistanceAndCompliance) {
+  RigModel model = straight_model();
+  const double conductance = 1.0;  // mL/(s kPa)
+  model.cavity_leaks.emplace_back([=](double pressure_kPa, double) { return conductance * pressure_kPa; });
+  const PlantTrace trace = simulate_plant(model, ramp(30.0, 15.0));
+  const size_t early = static_cast<size_t>(4.0 / trace.step_s);
+  const size_t late = static_cast<size_t>(12.0 / trace.step_s);
+  const double time_s = 1.0 / (stiffness_kPa_per_mL * conductance);
+  EXPECT_NEAR(trace.cavity_kPa[late] / trace.cavity_kPa[early], std::exp(-8.0 / time_s), 2e-3);
+}
+
+TEST(Simulation, GasConvergesInStep) {
+  RigModel model = straight_model();
+  model.pump_gas_mL = 1.0;
+  model.cavity_gas_mL = 5.0;
+  const RunDrive run = cycles(1);
+  const PlantTrace coarse = simulate_plant(model, run);
+  const PlantTrace fine = simulate_plant(model, run, {.step_s = 1.0 / 2400.0});
+  double square = 0.0;
+  for (size_t k = 0; k + 1 < coarse.cavity_kPa.size(); ++k) {
+    EXPECT_NEAR(coarse.cavity_kPa[k], fine.cavity_kPa[4 * k], 0.003);
+    square += std::pow(coarse.pump_kPa[k] - fine.pump_kPa[4 * k], 2);
+  }
+  EXPECT_LT(std::sqrt(square / static_cast<double>(coarse.pump_kPa.size())), 0.05);  // of +-50 kPa
+}
+
+TEST(Simulation, GasInTheCavityTakesItsShareOfTheVolume) {
+  RigModel model = straight_model();
+  model.cavity_gas_mL = 10.0;
+  const PlantTrace trace = simulate_plant(model, ramp(30.0, 20.0));
+  const double pressure = trace.cavity_kPa.back();
+  const double squeezed = 10.0 * (1.0 - std::pow(1.0 + pressure / 101.325, -1.0 / model.gas_exponent));
+  const double kept_mL = model.hose.compliance_mL_per_kPa() * (1.0 + model.hose.creep_fraction) * pressure;
+  EXPECT_NEAR(trace.cavity_mL.back() + squeezed + kept_mL, 30.0, 1e-5);
+}
+
+TEST(Simulation, TheCatheterLagsByTwiceItsDampingOverItsFrequency) {
+  const RigModel model = straight_model();
+  PlantTrace rising;
+  rising.step_s = 1.0 / 600.0;
+  for (int k = 0; k < 1200; ++k)
+    rising.cavity_kPa.push_back(0.001 * k);
+  rising.pump_kPa = rising.cavity_kPa;
+  const double lag_s = 2.0 * model.catheter.damping / (2.0 * std::acos(-1.0) * model.catheter.resonance_Hz);
+  const std::vector<double> times{1.5};
+  const Prediction seen = observe(model, rising, {}, times);
+  EXPECT_NEAR(seen.cavity_kPa[0], 0.6 * (1.5 - lag_s), 1e-6);
+  EXPECT_NEAR(seen.pump_kPa[0], 0.6 * 1.5, 1e-9);
+}
+
+}  // namespace
+}  // namespace diastole::rig
