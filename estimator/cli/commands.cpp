@@ -5,6 +5,7 @@ namespace diastole {
 void add_estimator_commands(CommandLine& line) {
   add_solve(line);
   add_pressure_volume(line);
+  add_reconstruct(line);
   add_fit(line);
   add_shear(line);
   add_report(line);

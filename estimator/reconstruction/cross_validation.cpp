@@ -7,7 +7,7 @@
 namespace diastole {
 namespace {
 
-constexpr double lowest_exponent = -3, highest_exponent = 9;
+constexpr double lowest_exponent = 0, highest_exponent = 8;
 constexpr double fine_enough = 0.1;  // decades
 constexpr double golden = 0.6180339887498949;
 
@@ -38,6 +38,12 @@ double exact_trace(const SmoothedSystem& system) {
     trace += right_sides.cwiseProduct(system.solve(right_sides)).sum();
   }
   return trace;
+}
+
+Eigen::VectorXd residual_shares(const SmoothedSystem& system, const Eigen::MatrixXd& signs) {
+  const Eigen::MatrixXd right_sides = system.weighted_rows().transpose() * signs;
+  const Eigen::MatrixXd left = signs - system.weighted_rows() * system.solve(right_sides);
+  return left.rowwise().squaredNorm() / static_cast<double>(signs.cols());
 }
 
 CrossValidation choose_lambda(SmoothedSystem& system) {

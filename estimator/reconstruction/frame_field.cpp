@@ -9,10 +9,11 @@ namespace diastole {
 namespace {
 
 constexpr double first_lambda = 1e3;
-constexpr int huber_rounds = 4, least_rounds = 3, most_rounds = 12;
+constexpr int huber_rounds = 4, most_rounds = 12;
+constexpr int tukey_round = 1, validation_round = 2, last_validation_round = 3;
 constexpr double huber_bend = 1.345, tukey_reach = 4.685;
 constexpr double settled_mm = 1e-3;
-constexpr double least_scale = 0.5;  // data better than they say of themselves are not sifted ever finer
+constexpr double least_scale = 1.0;  // nothing is wild within its own sigmas, however good the others are
 
 Eigen::Vector3d vector_of(const std::array<double, 3>& v) { return {v[0], v[1], v[2]}; }
 
@@ -67,7 +68,8 @@ class FrameData {
           match->error_mm + direction.dot(mesh_.value(field.displacement_mm, match->point));
       observations.push_back(
           {displacement_along(mesh_, match->point, direction), known_mm, tag.sigma_mm, 1.0});
-      field.rows.push_back({true, i, 0, match->point, match->error_mm / tag.sigma_mm, false});
+      field.rows.push_back({true, i, 0, match->point, vector_of(tag.normal), tag.sigma_mm,
+                            match->error_mm / tag.sigma_mm, false});
     }
     for (const auto& [i, point] : points_) {
       const ObservedPoint& seen = measurement_.points[i];
@@ -77,7 +79,8 @@ class FrameData {
         const double known_mm = seen.x_mm[static_cast<size_t>(k)] - X_mm[k];
         observations.push_back(
             {displacement_along(mesh_, point, Eigen::Vector3d::Unit(k)), known_mm, seen.sigma_mm, 1.0});
-        field.rows.push_back({false, i, k, point, (known_mm - moved_mm[k]) / seen.sigma_mm, false});
+        field.rows.push_back({false, i, k, point, Eigen::Vector3d::Unit(k), seen.sigma_mm,
+                              (known_mm - moved_mm[k]) / seen.sigma_mm, false});
       }
     }
     return observations;
@@ -98,9 +101,10 @@ double spread_of(const FrameField& field) {
   residuals.reserve(field.rows.size());
   for (const FieldRow& row : field.rows)
     residuals.push_back(row.residual);
-  const auto count = static_cast<double>(residuals.size());
   // A field of many freedoms takes part of the noise with it.
-  const double left = std::max(0.05, 1.0 - field.degrees_of_freedom / std::max(count, 1.0));
+  const double left = field.residual_freedom > 0
+                          ? std::max(0.05, field.residual_freedom / static_cast<double>(field.used()))
+                          : 1.0;
   return robust_spread(std::move(residuals)) / std::sqrt(left);
 }
 
@@ -138,14 +142,30 @@ Eigen::VectorXd first_solution(SmoothedSystem& system, std::vector<ObservationRo
   return q;
 }
 
-/// Tukey's weights in the second round, all or nothing from the third on.
-void weigh(std::vector<ObservationRow>& rows, FrameField& field, int round, double reject_sigma) {
+/// Tukey's weights in their round, all or nothing after it. Returns how many rows are left out.
+size_t weigh(std::vector<ObservationRow>& rows, FrameField& field, double reject_sigma) {
   field.scale = spread_of(field);
+  size_t rejected = 0;
   for (size_t i = 0; i < rows.size(); ++i) {
     const double residual = field.rows[i].residual / std::max(field.scale, least_scale);
-    field.rows[i].rejected = round >= 2 && std::abs(residual) > reject_sigma;
-    rows[i].weight = round < 2 ? tukey_weight(residual) : field.rows[i].rejected ? 0.0 : 1.0;
+    field.rows[i].rejected = field.rounds > tukey_round && std::abs(residual) > reject_sigma;
+    rows[i].weight = field.rounds == tukey_round ? tukey_weight(residual)
+                     : field.rows[i].rejected    ? 0.0
+                                                 : 1.0;
+    rejected += field.rows[i].rejected ? 1 : 0;
   }
+  return rejected;
+}
+
+/// What the system's present factorisation takes from the data, and what it leaves to the residuals.
+void take_freedoms(FrameField& field) {
+  const Eigen::MatrixXd signs = random_signs(field.system->weighted_rows().rows());
+  field.degrees_of_freedom = stochastic_trace(*field.system, signs);
+  field.residual_shares = residual_shares(*field.system, signs);
+  for (size_t i = 0; i < field.rows.size(); ++i) {
+    if (field.rows[i].rejected) field.residual_shares[static_cast<Eigen::Index>(i)] = 0.0;
+  }
+  field.residual_freedom = field.residual_shares.sum();
 }
 
 void move_to(FrameField& field, const FieldSpace& space, const Eigen::VectorXd& q) {
@@ -190,15 +210,20 @@ FrameField reconstruct_frame(const FieldForms& forms, const Measurement& measure
   Eigen::VectorXd q = Eigen::VectorXd::Zero(space.unknowns());
   move_to(field, space, q);
   double lambda = options.lambda.value_or(first_lambda);
+  size_t rejected = 0;
   for (; field.rounds < most_rounds && !field.converged; ++field.rounds) {
     std::vector<ObservationRow> rows = data.linearise(field);
     Eigen::VectorXd moved;
     if (field.rounds == 0) {
       moved = first_solution(system, rows, options.robust);
     } else {
-      if (options.robust) weigh(rows, field, field.rounds, options.reject_sigma);
+      const size_t before = rejected;
+      if (options.robust) rejected = weigh(rows, field, options.reject_sigma);
       system.set_rows(rows);
-      if (field.rounds == 1 && !options.lambda) {
+      // Again if the better field has changed its mind about wild points.
+      const bool validate =
+          field.rounds == validation_round || (field.rounds == last_validation_round && rejected != before);
+      if (validate && !options.lambda) {
         field.smoothing = choose_lambda(system);
         lambda = field.smoothing.lambda;
       }
@@ -207,7 +232,7 @@ FrameField reconstruct_frame(const FieldForms& forms, const Measurement& measure
       field.degrees_of_freedom = stochastic_trace(system, random_signs(system.weighted_rows().rows()));
     }
     const double change_mm = std::sqrt(forms.quadratic.apply(forms.sobolev.mean_square, moved - q));
-    field.converged = field.rounds >= least_rounds && change_mm < settled_mm;
+    field.converged = field.rounds >= last_validation_round && change_mm < settled_mm;
     q = moved;
     move_to(field, space, q);
   }
@@ -231,6 +256,7 @@ FrameField reconstruct_frame(const FieldForms& forms, const Measurement& measure
   }
   system.set_rows(rows);
   system.factorise(lambda);
+  take_freedoms(field);
   field.scale = spread_of(field);
   return field;
 }

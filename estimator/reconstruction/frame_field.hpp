@@ -10,8 +10,9 @@
 //
 //   s(u) = s(u0) − d · (u − u0)(X),        d = F⁻ᵀn / (n·F⁻¹n),
 //
-// so each round is a linear penalised problem (smoothed_system.hpp), and three or four rounds suffice. λ is chosen by
-// cross-validation in the second round, where the linearisation is already good.
+// so each round is a linear penalised problem (smoothed_system.hpp), and four or five rounds suffice. λ is chosen by
+// cross-validation in the third round, where the linearisation is already good; before it is small, so that what a
+// stiff field would miss is not taken for wild.
 //
 // Wild points: rounds begin with Huber's weights and go on with Tukey's (iteratively re-weighted, scale from the
 // median absolute residual, so that a wrong sigma does not make every point wild). What then lies beyond
@@ -31,16 +32,18 @@ namespace diastole {
 struct FrameOptions {
   std::optional<double> lambda;  ///< instead of cross-validation
   bool robust = true;            ///< leave wild points out
-  double reject_sigma = 5.0;     ///< in units of the residuals' own spread
+  double reject_sigma = 5.0;     ///< in units of the residuals' own spread, or of sigma if that is more
   LocatorOptions locator{};      ///< how far outside the body a point may lie
 };
 
 struct FieldRow {
   bool of_tag;
-  size_t source;        ///< index among the measurement's tags or points
-  int component;        ///< of a 3-D point; 0 for a tag
-  MaterialPoint point;  ///< X
-  double residual;      ///< s / sigma
+  size_t source;           ///< index among the measurement's tags or points
+  int component;           ///< of a 3-D point; 0 for a tag
+  MaterialPoint point;     ///< X
+  Eigen::Vector3d normal;  ///< the direction of motion that the row knows
+  double sigma_mm;
+  double residual;  ///< s / sigma
   bool rejected;
 };
 
@@ -51,6 +54,8 @@ struct FrameField {
   NodeField position_mm;
   CrossValidation smoothing;
   double degrees_of_freedom = 0.0;  ///< tr K, exact to its random signs
+  double residual_freedom = 0.0;    ///< tr[(1 - K)²] over the rows used: what chi2() should be
+  Eigen::VectorXd residual_shares;  ///< of each row (cross_validation.hpp); 0 of the rejected
   double scale = 0.0;               ///< spread of the residuals / sigma: 1 where sigma is right
   std::vector<FieldRow> rows;
   std::vector<size_t> tags_not_found;  ///< sources that lie nowhere on the moved body

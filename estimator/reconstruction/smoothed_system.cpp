@@ -11,7 +11,9 @@ constexpr size_t solved_at_once = 128;
 
 }  // namespace
 
-SmoothedSystem::SmoothedSystem(const FieldForms& forms) : forms_(forms), data_(forms.quadratic.zero()) {}
+SmoothedSystem::SmoothedSystem(const FieldForms& forms) : forms_(forms), data_(forms.quadratic.zero()) {
+  factor_.cholmod().print = 0;
+}
 
 void SmoothedSystem::set_rows(std::span<const ObservationRow> rows) {
   data_ = forms_.quadratic.zero();
@@ -47,10 +49,16 @@ void SmoothedSystem::set_rows(std::span<const ObservationRow> rows) {
 }
 
 void SmoothedSystem::factorise_values(QuadraticForms::Values values) {
-  const Eigen::SparseMatrix<double> matrix = forms_.quadratic.matrix(values);
+  Eigen::SparseMatrix<double> matrix = forms_.quadratic.matrix(values);
   if (!analysed_) factor_.analyzePattern(matrix);
   analysed_ = true;
   factor_.factorize(matrix);
+  // What neither data nor smoothness hold firmly may be lost to rounding: raise the diagonal by as much, then by more.
+  for (double relative = 1e-14; factor_.info() != Eigen::Success && relative < 1e-3; relative *= 100.0) {
+    for (Eigen::Index i = 0; i < matrix.rows(); ++i)
+      matrix.coeffRef(i, i) *= 1.0 + relative;
+    factor_.factorize(matrix);
+  }
 }
 
 void SmoothedSystem::factorise(double lambda) {

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "estimator/io/fit_file.hpp"
+#include "estimator/io/reconstruction_file.hpp"
 #include "estimator/io/solution_file.hpp"
 #include "estimator/io/whole_file.hpp"
 #include "estimator/report/page.hpp"
@@ -35,6 +36,7 @@ std::string title_of(size_t estimates, size_t runs) {
 std::string make_report(std::span<const std::filesystem::path> files, const ReportOptions& options) {
   std::vector<FitRecord> fits;
   std::vector<SolutionRecord> solutions;
+  std::vector<ReconstructionRecord> reconstructions;
   std::vector<ShearTest> shear_tests;
   std::vector<runfile::RecordedRun> runs;
   for (const std::filesystem::path& file : files) {
@@ -48,23 +50,31 @@ std::string make_report(std::span<const std::filesystem::path> files, const Repo
       continue;
     }
     if (!is_json_object(content)) {
-      throw InputError({file.string(), "",
-                        "is neither a run file nor a fit result, a solution or a shear test",
-                        "Give files that `diastole run`, `diastole simulate`, `diastole fit -o` or `diastole "
-                        "solve -o NAME.json` "
-                        "wrote, or the CSV that `diastole shear` reads."});
+      throw InputError(
+          {file.string(), "",
+           "is neither a run file nor a fit result, a reconstruction, a solution or a shear test",
+           "Give files that `diastole run`, `diastole simulate`, `diastole fit -o`, "
+           "`diastole reconstruct -o NAME.json` or `diastole solve -o NAME.json` wrote, or the CSV that "
+           "`diastole shear` reads."});
     }
     if (is_solution(content)) {
       solutions.push_back(solution_record_from_json(content, file.string()));
       continue;
     }
+    if (is_reconstruction(content)) {
+      reconstructions.push_back(reconstruction_record_from_json(content, file.string()));
+      continue;
+    }
     fits.push_back(fit_record_from_json(content, file.string()));
   }
-  const bool only_solutions = fits.empty() && shear_tests.empty() && runs.empty();
-  Page page(only_solutions ? "Strain and stress under load"
-                           : title_of(fits.size() + shear_tests.size(), runs.size()));
+  const bool no_estimate = fits.empty() && shear_tests.empty() && runs.empty();
+  Page page(no_estimate ? (solutions.empty() && !reconstructions.empty() ? "Displacement from tagged images"
+                                                                         : "Strain and stress under load")
+                        : title_of(fits.size() + shear_tests.size(), runs.size()));
   for (const FitRecord& fit : fits)
     add_fit(page, fit);
+  for (const ReconstructionRecord& reconstruction : reconstructions)
+    add_reconstruction(page, reconstruction);
   for (const SolutionRecord& solution : solutions)
     add_solution(page, solution);
   for (const ShearTest& test : shear_tests)

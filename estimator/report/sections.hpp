@@ -2,6 +2,7 @@
 // What the report tells about each kind of file.
 
 #include "estimator/io/fit_file.hpp"
+#include "estimator/io/reconstruction_file.hpp"
 #include "estimator/io/solution_file.hpp"
 #include "estimator/report/page.hpp"
 #include "estimator/shear/shear_fit.hpp"
@@ -19,6 +20,10 @@ void add_fit(Page& page, const FitRecord& fit);
 
 /// Sections coloured by strain and stress, undeformed and under load, and profiles through the wall.
 void add_solution(Page& page, const SolutionRecord& record);
+
+/// What is wrong with the data, the field's frames, maps of residuals, errors, coverage and volume, cross-validation, tag
+/// directions, slices and the worst-covered elements.
+void add_reconstruction(Page& page, const ReconstructionRecord& record);
 
 /// C1 of a rotational shear test, Eq. 1's two sides with the line, the residuals, each load by itself.
 void add_shear(Page& page, const ShearTest& test, const ShearFit& fit);

@@ -1,0 +1,179 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <iostream>
+#include <memory>
+#include <optional>
+
+#include "estimator/cli/commands.hpp"
+#include "estimator/cli/study_options.hpp"
+#include "estimator/io/measurement.hpp"
+#include "estimator/io/whole_file.hpp"
+#include "estimator/reconstruction/reconstruction_record.hpp"
+#include "protocol/contract/input_error.hpp"
+
+namespace diastole {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr std::string_view hdf5_mark = "HDF\r\n";
+constexpr std::string_view points_mark = "frame,X_mm,Y_mm,Z_mm,x_mm,y_mm,z_mm,sigma_mm";
+constexpr double patience_s = 2.0;
+
+struct ReconstructArguments {
+  std::filesystem::path study;
+  std::string mesh;
+  std::vector<std::filesystem::path> outputs;
+  bool force = false;
+  std::optional<double> lambda;
+  std::vector<double> smoothing;
+  std::optional<size_t> points;
+  bool plain = false;
+  bool skip_stiffness = false;
+};
+
+std::string_view mark_of(const std::filesystem::path& file) {
+  if (file.extension() == ".vtkhdf") return hdf5_mark;
+  if (file.extension() == ".csv") return points_mark;
+  if (file.extension() == ".json") return reconstruction_file_mark;
+  throw InputError({file.string(), "", "is no kind of file that a reconstruction is written to",
+                    "End it in .csv (points for `diastole fit`), .vtkhdf (for ParaView) or .json (for "
+                    "`diastole report`)."});
+}
+
+ReconstructionOptions options_of(const ReconstructArguments& arguments) {
+  ReconstructionOptions options;
+  options.lambda = arguments.lambda;
+  options.robust = !arguments.plain;
+  options.points_a_frame = arguments.points;
+  options.check_stiffness = !arguments.skip_stiffness;
+  if (!arguments.smoothing.empty()) {
+    options.smoothing.first = arguments.smoothing[0];
+    options.smoothing.second = arguments.smoothing[1];
+    if (options.smoothing.first + options.smoothing.second <= 0) {
+      throw InputError(
+          {"", "--smoothing", "both weights are 0", "Give at least one weight above 0, as 0.02,1."});
+    }
+  }
+  options.on_frame = [begun = Clock::now()](size_t done, size_t of) {
+    const double elapsed_s = std::chrono::duration<double>(Clock::now() - begun).count();
+    if (elapsed_s > patience_s)
+      fmt::print(stderr, "reconstruct: {} of {} frames, {:.0f} s\n", done, of, elapsed_s);
+  };
+  return options;
+}
+
+void write_outputs(const std::vector<std::filesystem::path>& files, const StudyReconstruction& reconstruction,
+                   const ReconstructionRecord& record) {
+  for (const std::filesystem::path& file : files) {
+    if (file.extension() == ".csv") write_whole_file(file, points_csv(reconstruction.samples));
+    if (file.extension() == ".vtkhdf") write_vtkhdf(file, reconstruction_grid(reconstruction));
+    if (file.extension() == ".json") write_whole_file(file, to_json(record));
+  }
+}
+
+void print_findings(const std::vector<Finding>& findings, std::FILE* stream) {
+  for (const Finding& finding : findings) {
+    fmt::print(stream, "{}: {} [{}]\n  {}\n", describe(finding.severity), finding.what, finding.where,
+               finding.remedy);
+  }
+}
+
+void print_record(const ReconstructionRecord& record) {
+  fmt::print(
+      "  frame  pressure (kPa)   numbers   left out  chi2/dof  freedoms  largest (mm)  error (mm)   volume "
+      "(%)\n");
+  for (const ReconstructedFrame& frame : record.frames) {
+    fmt::print(
+        "  {:>5}  {:14.3f}  {:>8}  {:>9}  {:8.3f}  {:8.0f}  {:12.3f}  {:10.3f}   {:+.2f} \u00b1 {:.2f}\n",
+        frame.frame, frame.pressure_kPa, frame.rows, frame.wild + frame.not_found, frame.chi2_per_dof,
+        frame.degrees_of_freedom, frame.largest_displacement_mm, frame.mean_se_mm,
+        100 * (frame.volume_ratio - 1), 100 * frame.volume_ratio_se);
+  }
+  const auto worst = std::max_element(record.elements.begin(), record.elements.end(),
+                                      [](const auto& a, const auto& b) { return a.se_mm < b.se_mm; });
+  fmt::print("\nThe {} alone see {:.0f} of the field's {} modes; smoothness fills in the others.\n",
+             record.data, record.modes_seen, record.unknowns);
+  fmt::print("Least is known of element {}: {} numbers, \u00b1 {:.3f} mm.\n\n", worst->element, worst->rows,
+             worst->se_mm);
+  if (record.findings.empty()) fmt::print("Nothing is wrong with the data.\n");
+}
+
+ExitCode run_reconstruct(const ReconstructArguments& arguments, const CommandOutput& out) {
+  Study study = read_study(arguments.study);
+  if (!arguments.mesh.empty()) set_mesh(study, arguments.mesh);
+  for (const std::filesystem::path& file : arguments.outputs)
+    require_output({file, inputs_of(study), mark_of(file), arguments.force});
+  const ReconstructionOptions options = options_of(arguments);
+  const Measurement measurement = read_measurement(study);
+  const StudyReconstruction reconstruction = reconstruct_study(study, measurement, options);
+  const ReconstructionRecord record = reconstruction_record(study, measurement, options, reconstruction);
+  const bool sound = !has_error(record.findings);
+  if (!reconstruction.fields.empty()) write_outputs(arguments.outputs, reconstruction, record);
+  if (out.json) {
+    print_findings(record.findings, stderr);
+    std::cout << to_json(record, false);
+  } else {
+    if (!record.frames.empty()) print_record(record);
+    print_findings(record.findings, stdout);
+    if (record.frames.empty()) {
+      fmt::print("Nothing was reconstructed: the data cannot be what they say.\n");
+    } else {
+      for (const std::filesystem::path& file : arguments.outputs)
+        fmt::print("Written: {}\n", file.string());
+    }
+  }
+  return sound ? ExitCode::done : ExitCode::negative;
+}
+
+}  // namespace
+
+void add_reconstruct(CommandLine& line) {
+  auto arguments = std::make_shared<ReconstructArguments>();
+  CLI::App* command = line.add(
+      "reconstruct",
+      "the displacement field that tag points show, its errors, and what is wrong with the data",
+      "  diastole reconstruct examples/phantom-a.study.toml\n"
+      "  diastole reconstruct examples/phantom-a.study.toml -o gel.points.csv -o gel.vtkhdf -o gel.json\n"
+      "  diastole report gel.json -o quality.html\n"
+      "Each tag point counts along the one direction that it knows, by its sigma_mm (Eq. 2 of the paper). "
+      "How smooth the\n"
+      "field must be is found by generalised cross-validation; points beyond five times the spread of the "
+      "others are left\n"
+      "out. The .csv is what `diastole fit` reads as `points`: the paper's way. docs/reconstruction.md says "
+      "what the numbers\n"
+      "mean and lists what is looked for in the data.\n"
+      "Exit code 1: the data cannot be what they say (another unit, frames that disagree); the message says "
+      "which.");
+  command->add_option("STUDY", arguments->study, "study file")->required();
+  command
+      ->add_option(
+          "-o,--output", arguments->outputs,
+          "a .csv of points for `diastole fit`, a .vtkhdf for ParaView, or a .json for the report; may be "
+          "repeated")
+      ->allow_extra_args(false);
+  command->add_flag("--force", arguments->force, "replace an output file that is no earlier result");
+  command->add_option("--mesh", arguments->mesh,
+                      "other element counts: circumferential,longitudinal,transmural");
+  command
+      ->add_option("--points", arguments->points,
+                   "points a frame in the .csv [as many as the field has freedoms / 3]")
+      ->check(CLI::Range(1, 1'000'000));
+  command->add_option("--lambda", arguments->lambda, "smoothing weight, instead of cross-validation")
+      ->check(CLI::Range(1e-6, 1e12));
+  command
+      ->add_option("--smoothing", arguments->smoothing,
+                   "weights of first and second derivatives in the smoothness, as 0.02,1")
+      ->delimiter(',')
+      ->expected(2)
+      ->check(CLI::Range(0.0, 1e6));
+  command->add_flag("--keep-wild", arguments->plain, "plain least squares: leave no wild point out");
+  command->add_flag("--no-stiffness", arguments->skip_stiffness,
+                    "skip the forward model that tests the pressures' unit");
+  line.on_run(command, [arguments](const CommandOutput& out) { return run_reconstruct(*arguments, out); });
+}
+
+}  // namespace diastole

@@ -1,0 +1,99 @@
+#include "estimator/reconstruction/slice_offsets.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace diastole {
+namespace {
+
+struct Information {
+  Eigen::MatrixXd S;
+  Eigen::VectorXd t;
+};
+
+Information information_of(const FrameField& field, const std::vector<int>& slice_of_tag,
+                           Eigen::Index slices) {
+  const auto rows = static_cast<Eigen::Index>(field.rows.size());
+  Eigen::MatrixXd C = Eigen::MatrixXd::Zero(rows, slices);
+  Eigen::VectorXd residual = Eigen::VectorXd::Zero(rows);
+  const double scale = std::max(field.scale, 1.0);
+  for (Eigen::Index i = 0; i < rows; ++i) {
+    const FieldRow& row = field.rows[static_cast<size_t>(i)];
+    if (row.rejected) continue;
+    residual[i] = row.residual / scale;
+    const int slice = row.of_tag ? slice_of_tag[row.source] : -1;
+    if (slice >= 0) C(i, slice) = 1.0 / (row.sigma_mm * scale);
+  }
+  // K is made of the rows as the system has them, weighted by 1/sigma without the scale; both scales cancel in K.
+  const Eigen::MatrixXd seen = field.system->weighted_rows().transpose() * C;
+  return {C.transpose() * C - seen.transpose() * field.system->solve(seen), C.transpose() * residual};
+}
+
+}  // namespace
+
+std::vector<SliceOffset> slice_offsets(const std::vector<FrameField>& fields, const TagGroups& groups,
+                                       std::span<const TagPoint> tags, const SliceOffsetOptions& options) {
+  const auto slices = static_cast<Eigen::Index>(groups.slices.size());
+  std::vector<int> slice_of_tag(tags.size(), -1);
+  std::vector<SliceOffset> result;
+  std::vector<double> least_mm;
+  for (size_t s = 0; s < groups.slices.size(); ++s) {
+    double sigma_mm = 0.0;
+    for (const size_t i : groups.slices[s].tags) {
+      slice_of_tag[i] = static_cast<int>(s);
+      sigma_mm += tags[i].sigma_mm / static_cast<double>(groups.slices[s].tags.size());
+    }
+    least_mm.push_back(std::max(options.least_mm, options.least_sigmas * sigma_mm));
+    result.push_back({s, 0.0, std::numeric_limits<double>::infinity(), false});
+  }
+  if (slices == 0) return result;
+  Information all{Eigen::MatrixXd::Zero(slices, slices), Eigen::VectorXd::Zero(slices)};
+  for (const FrameField& field : fields) {
+    const Information one = information_of(field, slice_of_tag, slices);
+    all.S += one.S;
+    all.t += one.t;
+  }
+  const double least_information = 1e-9 * std::max(all.S.diagonal().maxCoeff(), 1e-300);
+  std::vector<Eigen::Index> taken;
+  for (;;) {
+    // What is left of each slice beside those taken.
+    const Eigen::MatrixXd chosen = all.S(taken, taken);
+    const Eigen::MatrixXd between = all.S(taken, Eigen::all);
+    const Eigen::LDLT<Eigen::MatrixXd> factor(chosen);
+    const Eigen::VectorXd offsets =
+        taken.empty() ? Eigen::VectorXd() : Eigen::VectorXd(factor.solve(all.t(taken)));
+    const Eigen::MatrixXd inverse =
+        taken.empty()
+            ? Eigen::MatrixXd()
+            : Eigen::MatrixXd(factor.solve(Eigen::MatrixXd::Identity(chosen.rows(), chosen.cols())));
+    Eigen::Index best = -1;
+    double most = options.significant;
+    for (Eigen::Index s = 0; s < slices; ++s) {
+      SliceOffset& offset = result[static_cast<size_t>(s)];
+      const auto found = std::find(taken.begin(), taken.end(), s);
+      if (found != taken.end()) {
+        const Eigen::Index at = found - taken.begin();
+        offset = {static_cast<size_t>(s), offsets[at], std::sqrt(inverse(at, at)), true};
+        continue;
+      }
+      double information = all.S(s, s), pull = all.t[s];
+      if (!taken.empty()) {
+        const Eigen::VectorXd column = between.col(s);
+        information -= column.dot(factor.solve(column));
+        pull -= column.dot(offsets);
+      }
+      if (!(information > least_information)) continue;
+      offset = {static_cast<size_t>(s), pull / information, 1.0 / std::sqrt(information), false};
+      const double significance = std::abs(offset.offset_mm) / offset.se_mm;
+      if (significance > most && std::abs(offset.offset_mm) > least_mm[static_cast<size_t>(s)]) {
+        most = significance;
+        best = s;
+      }
+    }
+    if (best < 0) return result;
+    taken.push_back(best);
+  }
+}
+
+}  // namespace diastole

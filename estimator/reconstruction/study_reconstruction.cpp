@@ -1,0 +1,128 @@
+#include "estimator/reconstruction/study_reconstruction.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <mutex>
+#include <set>
+#include <thread>
+
+#include "estimator/fe/parallel_for.hpp"
+#include "estimator/fe/study_model.hpp"
+#include "estimator/reconstruction/measurement_findings.hpp"
+#include "estimator/reconstruction/stiffness_check.hpp"
+#include "protocol/contract/input_error.hpp"
+
+namespace diastole {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr double outside_mm = 5.0;  // farther from the body than this a point is not the specimen's
+
+/// Extrapolation beyond an element as a fraction of the thinnest one: `outside_mm`, never more than an element.
+LocatorOptions locator_for(const HermiteMesh& mesh) {
+  double thinnest_mm = mesh.extent_mm();
+  for (size_t e = 0; e < mesh.element_count(); ++e) {
+    for (size_t k = 0; k < 3; ++k) {
+      Xi low{0.5, 0.5, 0.5}, high = low;
+      low[k] = 0.0;
+      high[k] = 1.0;
+      const double size_mm =
+          (mesh.value(mesh.reference(), {e, high}) - mesh.value(mesh.reference(), {e, low})).norm();
+      thinnest_mm = std::min(thinnest_mm, size_mm);
+    }
+  }
+  return {.outside_xi = std::clamp(outside_mm / std::max(thinnest_mm, 1e-3), 0.25, 1.0)};
+}
+
+std::vector<int> loaded_frames(const Study& study, const Measurement& measurement) {
+  std::set<int> frames;
+  for (const TagPoint& tag : measurement.tags)
+    frames.insert(tag.frame);
+  for (const ObservedPoint& point : measurement.points)
+    frames.insert(point.frame);
+  frames.erase(0);
+  if (frames.empty()) {
+    throw InputError({study.file.string(), "table [data]",
+                      "every measured point is of frame 0, the undeformed state",
+                      "Give points of loaded frames: only they have moved."});
+  }
+  return {frames.begin(), frames.end()};
+}
+
+void reconstruct_frames(StudyReconstruction& result, const Measurement& measurement,
+                        const std::vector<int>& frames, const ReconstructionOptions& options) {
+  const FrameOptions frame_options{.lambda = options.lambda,
+                                   .robust = options.robust,
+                                   .reject_sigma = 5.0,
+                                   .locator = locator_for(result.body->mesh)};
+  const size_t threads =
+      options.threads > 0 ? options.threads : std::max(1U, std::thread::hardware_concurrency());
+  result.fields.resize(frames.size());
+  std::mutex telling;
+  size_t done = 0;
+  parallel_for(frames.size(), threads, [&](size_t i) {
+    result.fields[i] = reconstruct_frame(*result.forms, measurement, frames[i], frame_options);
+    const std::lock_guard lock(telling);
+    ++done;
+    if (options.on_frame) options.on_frame(done, frames.size());
+  });
+}
+
+void sample_fields(StudyReconstruction& result, const ReconstructionOptions& options) {
+  double freedoms = 0.0;
+  for (const FrameField& field : result.fields)
+    freedoms = std::max(freedoms, field.degrees_of_freedom);
+  const size_t count = options.points_a_frame.value_or(static_cast<size_t>(std::ceil(freedoms / 3.0)));
+  const std::vector<MaterialPoint> points = spread_points(*result.forms, count);
+  for (const FrameField& field : result.fields)
+    result.samples.push_back(sample_field(field, points));
+}
+
+void judge(StudyReconstruction& result, const Study& study, const Measurement& measurement,
+           bool check_stiffness) {
+  const FieldForms& forms = *result.forms;
+  result.groups = group_tags(measurement.tags);
+  result.amplitudes = motion_amplitudes(forms, result.fields);
+  result.families = family_fits(result.fields, result.groups, measurement.tags.size());
+  result.slices = slice_offsets(result.fields, result.groups, measurement.tags);
+  for (const FrameField& field : result.fields)
+    result.volumes.push_back(check_volume(forms, field));
+  result.coverage = coverage_of(forms, result.fields.back());
+  const std::vector<Finding> found =
+      motion_findings({forms, result.fields, result.groups, result.amplitudes, result.families, result.slices,
+                       result.volumes, result.coverage});
+  result.findings.insert(result.findings.end(), found.begin(), found.end());
+  if (!check_stiffness || has_error(result.findings)) return;
+  if (const auto apparent = apparent_stiffness(study, forms, result.fields.back())) {
+    if (const auto finding = pressure_unit_finding(study, *apparent)) result.findings.push_back(*finding);
+  }
+}
+
+}  // namespace
+
+StudyReconstruction reconstruct_study(const Study& study, const Measurement& measurement,
+                                      const ReconstructionOptions& options) {
+  const Clock::time_point begun = Clock::now();
+  const std::vector<int> frames = loaded_frames(study, measurement);
+  StudyReconstruction result;
+  result.body = std::make_unique<const MeshBody>(study_body(study));
+  result.findings = measurement_findings(measurement, result.body->mesh);
+  if (!has_error(result.findings)) {
+    result.forms = std::make_unique<const FieldForms>(result.body->mesh, options.smoothing);
+    reconstruct_frames(result, measurement, frames, options);
+    sample_fields(result, options);
+    judge(result, study, measurement, options.check_stiffness);
+  }
+  std::stable_sort(result.findings.begin(), result.findings.end(),
+                   [](const Finding& a, const Finding& b) { return a.severity > b.severity; });
+  result.seconds = std::chrono::duration<double>(Clock::now() - begun).count();
+  return result;
+}
+
+std::vector<Finding> examine_measurement(const Study& study, const Measurement& measurement) {
+  return reconstruct_study(study, measurement, {}).findings;
+}
+
+}  // namespace diastole
