@@ -19,7 +19,20 @@ double radical_inverse(size_t i, size_t base) {
   return value;
 }
 
+/// The field of the residuals, by which smoothing twice differs from smoothing once.
+NodeField second_helping(const FrameField& field) {
+  Eigen::VectorXd residuals(static_cast<Eigen::Index>(field.rows.size()));
+  for (size_t i = 0; i < field.rows.size(); ++i)
+    residuals[static_cast<Eigen::Index>(i)] = field.rows[i].rejected ? 0.0 : field.rows[i].residual;
+  const Eigen::VectorXd right_side = field.system->weighted_rows().transpose() * residuals;
+  return field.system->forms().space.field_of(field.system->solve(right_side));
+}
+
 }  // namespace
+
+double sampled_freedoms(const FrameField& field) {
+  return std::max(1.0, static_cast<double>(field.used()) - field.residual_freedom);
+}
 
 std::vector<MaterialPoint> spread_points(const FieldForms& forms, size_t count) {
   std::vector<MaterialPoint> points;
@@ -44,9 +57,10 @@ SampledFrame sample_field(const FrameField& field, std::span<const MaterialPoint
       functionals.push_back(displacement_along(mesh, point, Eigen::Vector3d::Unit(k)));
   }
   const std::vector<double> variances = field.system->variances(functionals);
+  const NodeField more_mm = second_helping(field);
   SampledFrame sampled;
-  sampled.sigma_factor = std::sqrt(
-      std::max(1.0, static_cast<double>(functionals.size()) / std::max(field.degrees_of_freedom, 1.0)));
+  sampled.sigma_factor =
+      std::sqrt(std::max(1.0, static_cast<double>(functionals.size()) / sampled_freedoms(field)));
   // A sigma that the residuals do not bear out is corrected.
   const double scale = std::max(field.scale, 1e-6);
   double squares = 0.0;
@@ -55,7 +69,7 @@ SampledFrame sample_field(const FrameField& field, std::span<const MaterialPoint
         scale * std::sqrt((variances[3 * i] + variances[3 * i + 1] + variances[3 * i + 2]) / 3.0);
     squares += se_mm * se_mm;
     const Eigen::Vector3d X = mesh.value(mesh.reference(), points[i]);
-    const Eigen::Vector3d x = mesh.value(field.position_mm, points[i]);
+    const Eigen::Vector3d x = mesh.value(field.position_mm, points[i]) + mesh.value(more_mm, points[i]);
     sampled.points.push_back(
         {field.number, {X[0], X[1], X[2]}, {x[0], x[1], x[2]}, sampled.sigma_factor * se_mm});
   }

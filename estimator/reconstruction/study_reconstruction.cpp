@@ -73,7 +73,7 @@ void reconstruct_frames(StudyReconstruction& result, const Measurement& measurem
 void sample_fields(StudyReconstruction& result, const ReconstructionOptions& options) {
   double freedoms = 0.0;
   for (const FrameField& field : result.fields)
-    freedoms = std::max(freedoms, field.degrees_of_freedom);
+    freedoms = std::max(freedoms, sampled_freedoms(field));
   const size_t count = options.points_a_frame.value_or(static_cast<size_t>(std::ceil(freedoms / 3.0)));
   const std::vector<MaterialPoint> points = spread_points(*result.forms, count);
   for (const FrameField& field : result.fields)

@@ -103,7 +103,7 @@ TEST_F(Findings, ASigmaThatIsNotTheScatter) {
     EXPECT_NEAR(at_rest.number, 1.0 / factor, 0.15 / factor);
     // Without the undeformed frame the motion tells it.
     std::erase_if(spoilt.tags, [](const TagPoint& tag) { return tag.frame == 0; });
-    const Finding moving = named(in_motion(spoilt), "sigma");
+    const Finding moving = named(in_motion(spoilt, false, {}), "sigma");
     EXPECT_NEAR(moving.number, 1.0 / factor, 0.25 / factor);
   }
 }
