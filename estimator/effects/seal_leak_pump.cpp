@@ -29,7 +29,7 @@ class SealLeakPump final : public Effect {
   }
   [[nodiscard]] std::span<const EffectParameter> parameters() const override {
     static constexpr std::array<EffectParameter, 1> list{
-        {{"leak_mL_s_kPa", "mL/(s kPa)", "conductance of the gap", 0.0, 0.0, 1.0, 0.05}}};
+        {{"leak_mL_s_kPa", "mL/(s kPa)", "conductance of the gap", 0.0, 0.0, 0.25, 0.05}}};
     return list;
   }
   void apply(std::span<const double> values, const Context&, rig::RigModel& model) const override {

@@ -15,6 +15,9 @@ namespace {
 /// A leak follows the pressure that drives it within some steps, since that pressure holds the leak's own acceleration.
 constexpr double leak_following = 0.5;
 
+/// mL/(s kPa) of a leak at the pump that a step of 1/600 s bears: the leak lags by about a step.
+constexpr double leak_per_step = 0.016;
+
 /// A gas at the pump is stiff and not linear: its steps are this many times shorter.
 constexpr double gas_steps = 4.0;
 
@@ -137,6 +140,10 @@ PlantTrace Plant::run() {
 PlantTrace simulate_plant(const RigModel& model, const RunDrive& run, const SimulationOptions& options) {
   SimulationOptions chosen = options;
   if (model.pump_gas_mL > 0.0) chosen.step_s /= gas_steps;
+  if (!model.pump_leaks.empty()) {
+    const double conductance = through(model.pump_leaks, 1.0, 0.0);
+    chosen.step_s /= std::clamp(std::ceil(conductance / leak_per_step), 4.0, 16.0);
+  }
   return Plant(model, run, chosen).run();
 }
 

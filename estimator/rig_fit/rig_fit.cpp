@@ -5,6 +5,7 @@
 #include <atomic>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "estimator/fe/parallel_for.hpp"
 #include "estimator/rig/sampled_signal.hpp"
@@ -274,11 +275,11 @@ Eigen::VectorXd RigProblem::residuals(const std::vector<Ingredient>& ingredients
 }
 
 RigFit RigProblem::fit(const std::vector<Ingredient>& ingredients) const {
-  std::vector<double> best;
-  double least = std::numeric_limits<double>::infinity();
-  for (const double size : {0.1, 0.4, 1.0, 2.0, 4.0, -0.3, -1.0}) {
+  constexpr size_t tried = 2;
+  constexpr double far_off = 4.0;  // coarse squares a row, when even the best start is not near
+  std::vector<std::pair<double, std::vector<double>>> starts;
+  const auto add_start = [&](double size) {
     std::vector<double> values = base_.values;
-    bool allowed = true;
     for (const Ingredient& ingredient : ingredients) {
       const std::vector<double> neutral = ingredient.effect->neutral(session_.base);
       for (size_t j = 0; j < neutral.size(); ++j) {
@@ -287,21 +288,32 @@ RigFit RigProblem::fit(const std::vector<Ingredient>& ingredients) const {
         const double towards = to_search(parameter.scale, parameter.typical);
         const double sought =
             j == 0 ? from_search(parameter.scale, from + size * (towards - from)) : parameter.typical;
-        allowed = allowed && sought >= parameter.lower && sought <= parameter.upper;
+        if (!(sought >= parameter.lower && sought <= parameter.upper)) return;
         values.push_back(sought);
       }
     }
-    if (!allowed) continue;
-    const double square = residuals(ingredients, values, Look::coarse).squaredNorm();
-    if (square < least) {
-      least = square;
-      best = values;
-    }
+    starts.emplace_back(residuals(ingredients, values, Look::coarse).squaredNorm(), values);
+  };
+  for (const double size : {0.1, 0.3, 0.6, 1.0, 1.5, 2.5, 4.0, -0.3, -1.0})
+    add_start(size);
+  if (starts.empty() ||
+      std::min_element(starts.begin(), starts.end())->first > far_off * static_cast<double>(rows_)) {
+    for (const double size :
+         {0.14, 0.2, 0.25, 0.36, 0.43, 0.51, 0.7, 0.8, 0.9, 1.12, 1.25, 1.37, 1.75, 2.1, 3.0, 3.5})
+      add_start(size);
   }
-  const RigFit rough = fit_from(ingredients, best, Look::coarse);
+  size_t simulations = starts.size();
+  std::sort(starts.begin(), starts.end());
+  starts.resize(std::min(starts.size(), tried));
+  RigFit rough;
+  for (const auto& [square, values] : starts) {
+    RigFit from_here = fit_from(ingredients, values, Look::coarse);
+    simulations += from_here.simulations;
+    if (rough.values.empty() || from_here.chi_square < rough.chi_square) rough = std::move(from_here);
+  }
   RigFit fine = fit_from(ingredients, rough.values, Look::fine);
   fine.iterations += rough.iterations;
-  fine.simulations += rough.simulations;
+  fine.simulations += simulations;
   return fine;
 }
 

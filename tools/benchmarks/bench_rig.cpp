@@ -42,7 +42,7 @@ std::string by_channel(const rig::RigProblem& problem, const rig::RigFit& fit) {
   return text;
 }
 
-/// The labelled effects that have no occasions; empty if one is not in the library.
+/// The labelled effects with their moments; empty if one is not in the library.
 std::vector<rig::Ingredient> labelled(const nlohmann::json& label, const rig::Session& session) {
   const auto occasion = [&](const std::string& run, double time_s) {
     double started_s = 0.0;
@@ -58,7 +58,7 @@ std::vector<rig::Ingredient> labelled(const nlohmann::json& label, const rig::Se
     const auto& parameters = truth["parameters"];
     if (parameters.contains("time_s"))
       ingredient.occasions.push_back(
-          {parameters["run"].get<std::string>(), parameters["time_s"].get<double>()});
+          occasion(parameters["run"].get<std::string>(), parameters["time_s"].get<double>()));
     if (parameters.contains("events_s")) {
       for (const auto& [run, times] : parameters["events_s"].items())
         for (const double time_s : times)

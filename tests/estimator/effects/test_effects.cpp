@@ -109,9 +109,7 @@ TEST_P(EveryEffect, HasTheGradientThatTheFitTakes) {
         size += central * central;
       }
     }
-    // Play has corners in time, whose place moves with the parameter.
-    const double part = GetParam()->text().id == "backlash" ? 0.6 : 0.05;
-    EXPECT_LE(std::sqrt(difference), part * std::sqrt(size) + 1e-12) << GetParam()->parameters()[j].name;
+    EXPECT_LE(std::sqrt(difference), 0.05 * std::sqrt(size) + 1e-12) << GetParam()->parameters()[j].name;
   }
 }
 
