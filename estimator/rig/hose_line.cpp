@@ -28,8 +28,6 @@ HoseLine::HoseLine(const Hose& hose, const LineOptions& options)
       compliance_(hose.compliance_mL_per_kPa()),
       creep_(hose.creep_fraction),
       creep_time_(hose.creep_time_s),
-      step_s_(options.step_s),
-      length_m_(hose.length_m),
       to_speed_(1.0 / hose.area_mm2()),
       pump_stiffness_(options.pump_stiffness.value_or(0.0)),
       friction_(hose) {

@@ -93,7 +93,7 @@ class HoseLine {
   Eigen::Index first_;  ///< index of u
   Eigen::Index count_;  ///< degrees of freedom
   Eigen::Index modes_;
-  double inertance_, compliance_, creep_, creep_time_, step_s_, length_m_, to_speed_, pump_stiffness_;
+  double inertance_, compliance_, creep_, creep_time_, to_speed_, pump_stiffness_;
   WallFriction friction_;
 
   Eigen::MatrixXd mass_, inverse_mass_, stiffness_, creep_coupling_;
