@@ -16,6 +16,7 @@ struct FitArguments {
   std::filesystem::path study;
   std::vector<std::string> starts;
   std::string mesh;
+  std::string smooth;
   std::optional<std::filesystem::path> output;
   bool force = false;
   int iteration_limit = 50;
@@ -62,6 +63,7 @@ void print_record(const FitRecord& record) {
 ExitCode run_fit(const FitArguments& arguments, const CommandOutput& out) {
   Study study = read_study(arguments.study);
   if (!arguments.mesh.empty()) set_mesh(study, arguments.mesh);
+  if (!arguments.smooth.empty()) set_smoothness(study, arguments.smooth);
   for (const std::string& start : arguments.starts)
     set_start(study, start);
   if (arguments.output) {
@@ -109,6 +111,9 @@ void add_fit(CommandLine& line) {
       ->allow_extra_args(false);
   command->add_option("--mesh", arguments->mesh,
                       "other element counts: circumferential,longitudinal,transmural");
+  command->add_option("--smooth", arguments->smooth,
+                      "how alike neighbouring elements are, for values that vary by element: evidence (the data say "
+                      "it; default), none, or the usual relative difference, as 0.05");
   command->add_option("-o,--output", arguments->output,
                       "keep the result in this file, for `diastole report`");
   command->add_flag("--force", arguments->force, "replace an output file that is no fit result");

@@ -7,11 +7,14 @@
 // The estimate is the maximum of the likelihood of tag points, 3-D points and frame pressures under their
 // stated normal errors (joint_problem.hpp). Standard errors are those of the joint problem, (JᵀJ)⁻¹, so that
 // they carry the pressures' errors; they trust the stated sigmas and are not rescaled by chi2/dof. The 95 %
-// interval is symmetric in the coordinate of the value: for a positive one a factor up and down.
+// interval is symmetric in the coordinate of the value: for a positive one a factor up and down. Smooth regional
+// values have the posterior's standard deviation instead: data and smoothness together, the smoothness' own
+// uncertainty included.
 
 #include <Eigen/Dense>
 #include <array>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -20,9 +23,16 @@
 
 namespace diastole {
 
+/// A parameter that varies by element: its values are smooth from element to element (smoothness.hpp).
+struct SmoothRegion {
+  size_t first_value;          ///< of as many as the mesh has elements
+  std::optional<double> step;  ///< how strongly; default: by evidence
+};
+
 struct FitOptions {
   OptimiserOptions optimiser;  ///< its on_step is not used
   LocatorOptions locator;      ///< how far outside the body a point may lie
+  std::vector<SmoothRegion> smooth;
   /// Called at each iteration with values in their own units.
   std::function<void(const OptimiserStep&)> on_step;
 };
@@ -49,13 +59,23 @@ struct EstimatedFrame {
   NodeField position_mm;  ///< the fitted motion
 };
 
+struct SmoothOutcome {
+  size_t first_value;
+  double step;
+  bool by_evidence;
+  bool none_seen;                ///< the evidence asks for no difference between elements
+  std::array<double, 2> step90;  ///< where the step lies with 90 % probability; `step` twice if it was given
+  double effective_values;       ///< how many independent values the data see: 1 to the number of elements
+};
+
 struct FitOutcome {
   std::vector<EstimatedValue> values;
   std::vector<EstimatedFrame> frames;
   Eigen::MatrixXd covariance;  ///< of values and unknown pressures, in their own units
   double chi2 = 0;             ///< including the pressures' priors
   Eigen::Index rows = 0;       ///< residuals, pressure priors included
-  Eigen::Index unknowns = 0;   ///< not counting those on a bound
+  double unknowns = 0;         ///< not counting those on a bound; smooth values as many as the data see
+  std::vector<SmoothOutcome> smoothness;
   bool converged = false;
   std::string reason;
   int iterations = 0;

@@ -66,6 +66,25 @@ void add_conditional_mean(std::vector<std::string>& remarks, const FitRecord& re
   }
 }
 
+std::string smoothing_words(const FittedParameter& parameter) {
+  if (!parameter.smoothness) return "without any smoothing";
+  const FittedSmoothness& smoothness = *parameter.smoothness;
+  const std::string counts = fmt::format("the data determine {:.1f} of its {} values by themselves",
+                                         smoothness.effective_values, parameter.elements.size());
+  if (!smoothness.by_evidence) {
+    return fmt::format("neighbours being held alike within {:.2g} %, as you asked ({})", 100 * smoothness.step,
+                       counts);
+  }
+  if (smoothness.none_seen) {
+    return fmt::format("but the data show no difference between elements (neighbours alike within {:.2g} % with "
+                       "95 % probability)",
+                       100 * smoothness.step90[1]);
+  }
+  return fmt::format("neighbours differing by {:.2g} % as the data themselves say ({:.2g} to {:.2g} % with 90 % "
+                     "probability; {})",
+                     100 * smoothness.step, 100 * smoothness.step90[0], 100 * smoothness.step90[1], counts);
+}
+
 void add_regional(std::vector<std::string>& remarks, const FitRecord& record) {
   for (const FittedParameter& parameter : record.parameters) {
     if (parameter.elements.empty()) continue;
@@ -78,9 +97,10 @@ void add_regional(std::vector<std::string>& remarks, const FitRecord& record) {
     }
     if (count == 0) continue;
     remarks.push_back(fmt::format(
-        "{} varies by element, without any smoothing: each value has a standard error of {:.0f} % on "
-        "average, their mean one of {:.1f} %.",
-        parameter.name, 100 * relative / static_cast<double>(count), 100 * parameter.se / parameter.value));
+        "{} varies by element, {}: each value has a standard error of {:.2g} % on "
+        "average, their mean one of {:.2g} %.",
+        parameter.name, smoothing_words(parameter), 100 * relative / static_cast<double>(count),
+        100 * parameter.se / parameter.value));
   }
 }
 

@@ -81,27 +81,46 @@ bool FrameResiduals::evaluate(std::span<const double> position_mm) {
   return true;
 }
 
+namespace {
+
+/// All fields on one element: a row a field, its coefficients as ElementField holds them.
+Eigen::MatrixXd gathered(const HermiteMesh& mesh, size_t element, std::span<const NodeField* const> fields) {
+  Eigen::MatrixXd rows(static_cast<Eigen::Index>(fields.size()), 3 * hermite_functions);
+  for (size_t i = 0; i < fields.size(); ++i) {
+    const ElementField field = mesh.gather(element, *fields[i]);
+    rows.row(static_cast<Eigen::Index>(i)) = Eigen::Map<const Eigen::RowVectorXd>(field.data(), field.size());
+  }
+  return rows;
+}
+
+/// direction · field(point) of every field.
+Eigen::VectorXd along(const Eigen::MatrixXd& gathered_fields, const Eigen::Vector3d& direction, const Xi& xi) {
+  const HermiteBasis basis = hermite_basis(xi);
+  ElementField weights;
+  for (size_t a = 0; a < hermite_functions; ++a)
+    weights.col(static_cast<Eigen::Index>(a)) = basis.value[a] * direction;
+  return gathered_fields * Eigen::Map<const Eigen::VectorXd>(weights.data(), weights.size());
+}
+
+}  // namespace
+
 Eigen::MatrixXd FrameResiduals::derivatives(std::span<const NodeField* const> fields) const {
-  const auto columns = static_cast<Eigen::Index>(fields.size());
-  const auto column_field = [&](Eigen::Index column) -> const NodeField& {
-    return *fields[static_cast<size_t>(column)];
-  };
-  Eigen::MatrixXd jacobian(rows(), columns);
+  Eigen::MatrixXd jacobian(rows(), static_cast<Eigen::Index>(fields.size()));
+  std::vector<Eigen::MatrixXd> by_element(mesh_.element_count());
+  parallel_for(by_element.size(), machine_threads(),
+               [&](size_t element) { by_element[element] = gathered(mesh_, element, fields); });
   parallel_for(usable_tags_.size(), machine_threads(), [&](size_t i) {
-    const UsableTag& tag = usable_tags_[i];
-    const Eigen::Vector3d weight = tag.match.by_motion / tags_[tag.index].sigma_mm;
-    for (Eigen::Index column = 0; column < columns; ++column) {
-      jacobian(static_cast<Eigen::Index>(i), column) =
-          weight.dot(mesh_.value(column_field(column), tag.match.point));
-    }
+    const TagMatch& match = usable_tags_[i].match;
+    jacobian.row(static_cast<Eigen::Index>(i)) =
+        along(by_element[match.point.element], match.by_motion, match.point.xi) /
+        tags_[usable_tags_[i].index].sigma_mm;
   });
   const auto first = static_cast<Eigen::Index>(usable_tags_.size());
   parallel_for(usable_points_.size(), machine_threads(), [&](size_t i) {
-    const UsablePoint& usable = usable_points_[i];
-    const double sigma_mm = points_[usable.index].sigma_mm;
-    for (Eigen::Index column = 0; column < columns; ++column) {
-      jacobian.block<3, 1>(first + 3 * static_cast<Eigen::Index>(i), column) =
-          -mesh_.value(column_field(column), usable.point) / sigma_mm;
+    const auto& [index, point] = usable_points_[i];
+    for (Eigen::Index axis = 0; axis < 3; ++axis) {
+      jacobian.row(first + 3 * static_cast<Eigen::Index>(i) + axis) =
+          along(by_element[point.element], -Eigen::Vector3d::Unit(axis), point.xi) / points_[index].sigma_mm;
     }
   });
   return jacobian;

@@ -42,7 +42,19 @@ JointProblem::JointProblem(MotionModel& model, std::vector<SoughtValue> values,
   }
 }
 
-Eigen::Index JointProblem::rows() const {
+void JointProblem::set_smoothness(std::vector<SmoothBlock> blocks) {
+  smooth_ = std::move(blocks);
+  residuals_at_.reset();
+}
+
+Eigen::Index JointProblem::smooth_rows() const {
+  Eigen::Index rows = 0;
+  for (const SmoothBlock& block : smooth_)
+    rows += block.differences.rows();
+  return rows;
+}
+
+Eigen::Index JointProblem::data_rows() const {
   Eigen::Index rows = unknowns() - values();
   for (const LoadedFrame& frame : frames_)
     rows += frame.residuals.rows();
@@ -132,6 +144,11 @@ const Eigen::VectorXd* JointProblem::residuals(const Eigen::VectorXd& q) {
     if (!frame.pressure_unknown) continue;
     residuals_[row++] = (q[*frame.pressure_unknown] - frame.load.pressure_kPa) / frame.load.sigma_kPa;
   }
+  for (const SmoothBlock& block : smooth_) {
+    const Eigen::Index size = block.differences.rows();
+    residuals_.segment(row, size) = block.differences * q.segment(block.first, block.differences.cols()) / block.step;
+    row += size;
+  }
   residuals_at_ = q;
   return &residuals_;
 }
@@ -156,6 +173,11 @@ Eigen::MatrixXd JointProblem::jacobian(const Eigen::VectorXd& q) {
   }
   for (const LoadedFrame& frame : frames_) {
     if (frame.pressure_unknown) result(row++, *frame.pressure_unknown) = 1 / frame.load.sigma_kPa;
+  }
+  for (const SmoothBlock& block : smooth_) {
+    const Eigen::Index size = block.differences.rows();
+    result.block(row, block.first, size, block.differences.cols()) = block.differences / block.step;
+    row += size;
   }
   return result;
 }

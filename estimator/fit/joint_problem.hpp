@@ -10,7 +10,10 @@
 // bound enters as its logarithm (its error is closer to a factor than to a term); other values enter as they
 // are.
 //
-// Residual rows: frame after frame (frame_residuals.hpp), then one for each unknown pressure.
+// Parameters that vary by element may carry a smoothness prior (smoothness.hpp).
+//
+// Residual rows: frame after frame (frame_residuals.hpp), then one for each unknown pressure, then those of the
+// smoothness priors.
 // Frame 0 is not part of the problem: without load there is no information on stiffness.
 
 #include <Eigen/Dense>
@@ -22,6 +25,7 @@
 
 #include "estimator/fit/frame_residuals.hpp"
 #include "estimator/fit/motion_model.hpp"
+#include "estimator/fit/smoothness.hpp"
 #include "estimator/io/measurement.hpp"
 
 namespace diastole {
@@ -59,7 +63,9 @@ class JointProblem {
 
   [[nodiscard]] Eigen::Index unknowns() const { return unknowns_; }
   [[nodiscard]] Eigen::Index values() const { return static_cast<Eigen::Index>(values_.size()); }
-  [[nodiscard]] Eigen::Index rows() const;
+  /// Residuals: those of the data (pressures' priors included) come first.
+  [[nodiscard]] Eigen::Index rows() const { return data_rows() + smooth_rows(); }
+  [[nodiscard]] Eigen::Index data_rows() const;
   [[nodiscard]] Eigen::VectorXd start() const;
   [[nodiscard]] double lower(Eigen::Index unknown) const;
   [[nodiscard]] double upper(Eigen::Index unknown) const;
@@ -69,6 +75,10 @@ class JointProblem {
     return values_[static_cast<size_t>(unknown)];
   }
   [[nodiscard]] const std::vector<LoadedFrame>& frames() const { return frames_; }
+
+  /// The priors of smooth blocks of values; none at first. Changes `rows`.
+  void set_smoothness(std::vector<SmoothBlock> blocks);
+  [[nodiscard]] const std::vector<SmoothBlock>& smoothness() const { return smooth_; }
 
   /// Solves all frames at q and chooses the usable points there; returns how many were gained, or nothing
   /// (and `failure`) without equilibrium.
@@ -86,6 +96,7 @@ class JointProblem {
  private:
   [[nodiscard]] std::vector<double> values_at(const Eigen::VectorXd& q) const;
   [[nodiscard]] double pressure_at(const LoadedFrame& frame, const Eigen::VectorXd& q) const;
+  [[nodiscard]] Eigen::Index smooth_rows() const;
   bool solve_frames(const Eigen::VectorXd& q);
 
   MotionModel& model_;
@@ -93,6 +104,7 @@ class JointProblem {
   LocatorOptions locator_options_;
   std::unique_ptr<PointLocator> reference_;  // at a fixed address: the frames refer to it
   std::vector<LoadedFrame> frames_;
+  std::vector<SmoothBlock> smooth_;
   Eigen::Index unknowns_ = 0;
   Eigen::VectorXd residuals_;
   std::optional<Eigen::VectorXd> solved_at_;     // where the frames' positions belong

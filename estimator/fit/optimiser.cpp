@@ -3,6 +3,7 @@
 #include <ceres/ceres.h>
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 namespace diastole {
@@ -102,7 +103,7 @@ OptimiserResult minimise(JointProblem& problem, const Eigen::VectorXd& start,
   Recorder recorder(q, options);
   ceres::Solver::Options settings;
   settings.linear_solver_type = ceres::DENSE_QR;
-  settings.max_num_iterations = options.iteration_limit;
+  settings.max_num_iterations = std::max(0, options.iteration_limit - options.iterations_before);
   settings.function_tolerance = options.cost_tolerance;
   settings.parameter_tolerance = options.step_tolerance;
   settings.gradient_tolerance = 1e-12;

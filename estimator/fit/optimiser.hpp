@@ -24,6 +24,7 @@ struct OptimiserStep {
 
 struct OptimiserOptions {
   int iteration_limit = 50;
+  int iterations_before = 0;  ///< of earlier searches: they count towards the limit
   /// The search ends when the cost changes by less than this fraction in a step.
   double cost_tolerance = 1e-9;
   /// ... or when the unknowns do.

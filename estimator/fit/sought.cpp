@@ -23,6 +23,11 @@ Sought sought_of(const Study& study, const ElasticModel& model) {
     const std::vector<ParameterGroup> groups = parameter.vary == Variation::whole
                                                    ? std::vector{whole_parameter(index)}
                                                    : each_element(index, model.mesh().element_count());
+    const Smoothness& smoothness = parameter.smoothness;
+    if (parameter.vary == Variation::element && smoothness.kind != Smoothness::Kind::none) {
+      const bool given = smoothness.kind == Smoothness::Kind::given;
+      sought.smooth.push_back({sought.values.size(), given ? std::optional(smoothness.step) : std::nullopt});
+    }
     for (const ParameterGroup& group : groups) {
       sought.groups.push_back(group);
       sought.values.push_back({parameter.start, parameter.lower, parameter.upper});

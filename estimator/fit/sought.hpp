@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "estimator/fe/elastic_model.hpp"
-#include "estimator/fit/joint_problem.hpp"
+#include "estimator/fit/fit.hpp"
 #include "estimator/io/study.hpp"
 
 namespace diastole {
@@ -13,6 +13,7 @@ namespace diastole {
 struct Sought {
   std::vector<SoughtValue> values;
   std::vector<ParameterGroup> groups;  ///< which of the model's parameters each value sets
+  std::vector<SmoothRegion> smooth;    ///< the regional parameters that are smooth
 };
 
 /// Throws InputError when a lower bound is not a value that the law allows.

@@ -63,7 +63,14 @@ FittedParameter record_of(const StudyParameter& parameter, const FitOutcome& fit
                          .at_bound = fit.values[first].at_lower   ? "lower"
                                      : fit.values[first].at_upper ? "upper"
                                                                   : "",
-                         .elements = {}};
+                         .elements = {},
+                         .smoothness = {}};
+  for (const SmoothOutcome& told : fit.smoothness) {
+    if (told.first_value == first) {
+      result.smoothness = FittedSmoothness{told.step, told.by_evidence, told.none_seen, told.step90,
+                                           told.effective_values};
+    }
+  }
   if (parameter.vary == Variation::whole) return result;
   // Regional: the mean with its error from the joint covariance, which is far smaller than any element's own.
   double sum = 0;
@@ -222,6 +229,7 @@ FitRecord fit_study(const Study& study, const Measurement& measurement, const St
   ElasticMotion motion(std::move(model), sought.groups);
   FitOptions fit_options;
   fit_options.locator = locator_for(study.specimen);
+  fit_options.smooth = sought.smooth;
   fit_options.optimiser.iteration_limit = options.iteration_limit;
   fit_options.on_step = [&](const OptimiserStep& step) {
     if (options.on_iteration) options.on_iteration(record_of(step, study, elements));
@@ -238,7 +246,7 @@ FitRecord fit_study(const Study& study, const Measurement& measurement, const St
   record_undeformed(record, measurement);
   if (fit.values.empty()) return record;
   record.chi2 = fit.chi2;
-  record.dof = static_cast<size_t>(std::max<Eigen::Index>(0, fit.rows - fit.unknowns));
+  record.dof = static_cast<size_t>(std::max(0.0, std::round(static_cast<double>(fit.rows) - fit.unknowns)));
   record.chi2_per_dof = record.chi2 / static_cast<double>(record.dof);
   record_parameters(record, study, fit, elements);
   record_frames(record, fit);

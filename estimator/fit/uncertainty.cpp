@@ -36,6 +36,15 @@ Eigen::MatrixXd covariance(const Eigen::MatrixXd& jacobian, const std::vector<bo
   return result;
 }
 
+double effective_count(const Eigen::MatrixXd& covariance, const Eigen::MatrixXd& data_jacobian) {
+  double count = 0;
+  const Eigen::MatrixXd information = data_jacobian.transpose() * data_jacobian;
+  for (Eigen::Index i = 0; i < covariance.rows(); ++i) {
+    if (std::isfinite(covariance(i, i))) count += covariance.row(i).dot(information.col(i));
+  }
+  return count;
+}
+
 Eigen::MatrixXd correlation(const Eigen::MatrixXd& covariance) {
   Eigen::MatrixXd result = Eigen::MatrixXd::Identity(covariance.rows(), covariance.cols());
   const Eigen::VectorXd sd = covariance.diagonal().cwiseSqrt();

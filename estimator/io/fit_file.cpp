@@ -75,6 +75,13 @@ Json from_parameter(const FittedParameter& parameter) {
     }
     json["elements"] = std::move(elements);
   }
+  if (const auto& smoothness = parameter.smoothness) {
+    json["smoothness"] = {{"step", smoothness->step},
+                          {"by_evidence", smoothness->by_evidence},
+                          {"none_seen", smoothness->none_seen},
+                          {"step90", from_interval(smoothness->step90)},
+                          {"effective_values", from_number(smoothness->effective_values)}};
+  }
   return json;
 }
 FittedParameter to_parameter(const std::string& name, const Json& json) {
@@ -85,12 +92,19 @@ FittedParameter to_parameter(const std::string& name, const Json& json) {
                             .start = to_number(json.at("start")),
                             .bounds = to_interval(json.at("bounds")),
                             .at_bound = json.at("at_bound"),
-                            .elements = {}};
+                            .elements = {},
+                            .smoothness = {}};
   if (json.contains("elements")) {
     for (const Json& element : json.at("elements")) {
       parameter.elements.push_back(
           {to_number(element.at("value")), to_number(element.at("se")), to_interval(element.at("ci95"))});
     }
+  }
+  if (json.contains("smoothness")) {
+    const Json& told = json.at("smoothness");
+    parameter.smoothness =
+        FittedSmoothness{told.at("step"), told.at("by_evidence"), told.at("none_seen"),
+                         to_interval(told.at("step90")), to_number(told.at("effective_values"))};
   }
   return parameter;
 }

@@ -6,6 +6,7 @@
 
 #include <array>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -18,6 +19,15 @@ struct FittedElement {
   std::array<double, 2> ci95;
 };
 
+/// How alike a regional parameter's neighbouring elements were taken to be (estimator/fit/smoothness.hpp).
+struct FittedSmoothness {
+  double step;                    ///< the usual relative difference between neighbours
+  bool by_evidence;               ///< or else given
+  bool none_seen;                 ///< the evidence asks for no difference between elements
+  std::array<double, 2> step90;   ///< 90 % interval of the step
+  double effective_values;        ///< how many independent values the data determine
+};
+
 struct FittedParameter {
   std::string name;  ///< with its unit
   double value;      ///< of a regional parameter: the mean over the elements
@@ -27,6 +37,7 @@ struct FittedParameter {
   std::array<double, 2> bounds;
   std::string at_bound;                 ///< "", "lower" or "upper"
   std::vector<FittedElement> elements;  ///< empty unless the parameter varies by element
+  std::optional<FittedSmoothness> smoothness = {};
 };
 
 struct FittedFrame {

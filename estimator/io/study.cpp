@@ -112,6 +112,19 @@ StudyParameter read_parameter(const std::string& name, TableReader& table) {
   const bool has_vary = table.has("vary");
   const std::string vary = has_vary ? table.choice("vary", {"whole", "element"}) : "whole";
   parameter.vary = vary == "element" ? Variation::element : Variation::whole;
+  if (table.has("smooth") &&
+      table.choice("smooth", {"evidence", "none"}) == "none") {
+    parameter.smoothness.kind = Smoothness::Kind::none;
+  }
+  if (table.has("smooth_step")) {
+    if (table.has("smooth"))
+      table.fail("smooth_step", "is given beside \"smooth\"", "Give one of the two.");
+    parameter.smoothness = {Smoothness::Kind::given, table.number("smooth_step", {.above = 0})};
+  }
+  if (parameter.vary == Variation::whole && (table.has("smooth") || table.has("smooth_step"))) {
+    table.fail(table.has("smooth") ? "smooth" : "smooth_step", "says how values of elements differ, but there is only one",
+               "Write vary = \"element\", or leave it out.");
+  }
   table.finish();
   return parameter;
 }
@@ -249,6 +262,21 @@ void set_start(Study& study, std::string_view assignment) {
   }
   refuse_option("--set", assignment, fmt::format("\"{}\" is not a parameter of the study", name),
                 fmt::format("It has: {}.", fmt::join(known, ", ")));
+}
+
+void set_smoothness(Study& study, std::string_view choice) {
+  Smoothness smoothness;
+  if (choice == "none") {
+    smoothness.kind = Smoothness::Kind::none;
+  } else if (choice != "evidence") {
+    smoothness.kind = Smoothness::Kind::given;
+    if (!parse_whole(choice, smoothness.step) || !(smoothness.step > 0)) {
+      refuse_option("--smooth", choice, "is neither evidence, none nor a positive number",
+                    "Give the usual relative difference between neighbouring elements, as --smooth 0.05.");
+    }
+  }
+  for (StudyParameter& parameter : study.law.parameters)
+    parameter.smoothness = smoothness;
 }
 
 std::vector<int> mesh_of(const Specimen& specimen) {

@@ -62,6 +62,13 @@ enum class Variation {
   element,  ///< one value an element
 };
 
+/// How alike neighbouring elements' values are taken to be (estimator/fit/smoothness.hpp).
+struct Smoothness {
+  enum class Kind { evidence, given, none };
+  Kind kind = Kind::evidence;
+  double step = 0;  ///< if given: the usual relative difference between neighbours, > 0
+};
+
 /// A material parameter that is to be estimated. Invariant: lower <= start <= upper, lower < upper.
 struct StudyParameter {
   std::string name;  ///< with its unit, as "C1_kPa"
@@ -69,6 +76,7 @@ struct StudyParameter {
   double lower;
   double upper;
   Variation vary;
+  Smoothness smoothness = {};  ///< of a parameter that varies by element
 };
 
 struct StudyLaw {
@@ -119,6 +127,10 @@ std::vector<std::filesystem::path> inputs_of(const Study& study);
 /// `--set C1_kPa=7.5`: another start value. Throws InputError if the parameter is unknown or out of its
 /// bounds.
 void set_start(Study& study, std::string_view assignment);
+
+/// `--smooth evidence`, `none` or the usual relative difference between neighbouring elements, as 0.05, for every
+/// parameter. Throws InputError for anything else.
+void set_smoothness(Study& study, std::string_view choice);
 
 /// `--refine 0,1,1`: further halvings. Throws InputError unless three whole numbers from 0 to 4.
 void set_refinement(Study& study, std::string_view halvings);
