@@ -7,6 +7,8 @@ void add_estimator_commands(CommandLine& line) {
   add_pressure_volume(line);
   add_reconstruct(line);
   add_fit(line);
+  add_montecarlo(line);
+  add_design(line);
   add_shear(line);
   add_report(line);
   add_mesh(line);

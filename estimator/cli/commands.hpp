@@ -9,6 +9,8 @@ void add_solve(CommandLine& line);
 void add_pressure_volume(CommandLine& line);
 void add_fit(CommandLine& line);
 void add_reconstruct(CommandLine& line);
+void add_montecarlo(CommandLine& line);
+void add_design(CommandLine& line);
 void add_shear(CommandLine& line);
 void add_report(CommandLine& line);
 void add_mesh(CommandLine& line);

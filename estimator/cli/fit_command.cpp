@@ -1,6 +1,8 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
+#include <csignal>
 #include <iostream>
 #include <memory>
 #include <optional>
@@ -8,6 +10,7 @@
 #include "estimator/cli/commands.hpp"
 #include "estimator/fit/study_fit.hpp"
 #include "estimator/io/whole_file.hpp"
+#include "protocol/contract/input_error.hpp"
 
 namespace diastole {
 namespace {
@@ -17,6 +20,14 @@ struct FitArguments {
   std::vector<std::string> starts;
   std::string mesh;
   std::string smooth;
+  std::string robust = "auto";
+  double pressure_offset_kPa = 0;
+  bool profile = false;
+  int posterior_draws = 0;
+  bool paper_mode = false;
+  std::filesystem::path start;
+  std::optional<std::filesystem::path> checkpoint;
+  bool resume = false;
   std::optional<std::filesystem::path> output;
   bool force = false;
   int iteration_limit = 50;
@@ -43,9 +54,23 @@ void print_parameter(const FittedParameter& parameter) {
   }
 }
 
+void print_shapes(const FitRecord& record) {
+  for (const FittedParameter& parameter : record.parameters) {
+    if (const auto& profile = parameter.profile) {
+      fmt::print("{}: profile interval {:.4g} to {:.4g} (95 %){}\n", parameter.name, profile->ci95[0],
+                 profile->ci95[1], profile->at_bound[0] || profile->at_bound[1] ? ", ended by a bound" : "");
+    }
+    if (const auto& posterior = parameter.posterior) {
+      fmt::print("{}: posterior {:.4g} ± {:.2g}, 95 % within {:.4g} to {:.4g}\n", parameter.name,
+                 posterior->mean, posterior->sd, posterior->ci95[0], posterior->ci95[1]);
+    }
+  }
+}
+
 void print_record(const FitRecord& record) {
   for (const FittedParameter& parameter : record.parameters)
     print_parameter(parameter);
+  print_shapes(record);
   fmt::print("\nResiduals {:.3f} mm RMS over {} residuals of the {}; chi2/dof {:.3f}\n\n", record.rms_mm,
              record.residuals_used, record.data, record.chi2_per_dof);
   fmt::print("  frame  measured (kPa)  estimated (kPa)    points  RMS (mm)\n");
@@ -58,6 +83,42 @@ void print_record(const FitRecord& record) {
     fmt::print("{}\n", remark);
   for (const Exclusion& exclusion : record.excluded)
     fmt::print("{} not used: {}.\n", exclusion.points, exclusion.reason);
+}
+
+volatile std::sig_atomic_t interrupts = 0;
+
+/// Ctrl-C ends the search after its step; a second one ends the program at once.
+class Interruption {
+ public:
+  Interruption() {
+    interrupts = 0;
+    std::signal(SIGINT, [](int) {
+      interrupts = interrupts + 1;
+      std::signal(SIGINT, SIG_DFL);
+    });
+  }
+  ~Interruption() { std::signal(SIGINT, SIG_DFL); }
+  Interruption(const Interruption&) = delete;
+  Interruption& operator=(const Interruption&) = delete;
+};
+
+std::optional<FitRecord> start_of(const FitArguments& arguments) {
+  std::filesystem::path file = arguments.start;
+  if (arguments.resume) {
+    if (!arguments.checkpoint) {
+      throw InputError({"", "--resume", "needs the checkpoint to go on from", "Give --checkpoint FILE too."});
+    }
+    if (!std::filesystem::exists(*arguments.checkpoint)) {
+      fmt::print(stderr, "There is no {} yet: starting from the study's values.\n",
+                 arguments.checkpoint->string());
+      return {};
+    }
+    file = *arguments.checkpoint;
+  }
+  if (file.empty()) return {};
+  FitRecord record = fit_record_from_json(read_whole_file(file), file.string());
+  fmt::print(stderr, "Starting from {}.\n", file.string());
+  return record;
 }
 
 ExitCode run_fit(const FitArguments& arguments, const CommandOutput& out) {
@@ -76,6 +137,9 @@ ExitCode run_fit(const FitArguments& arguments, const CommandOutput& out) {
              measurement.frames.size());
   StudyFitOptions options;
   options.iteration_limit = arguments.iteration_limit;
+  options.robustness = arguments.robust == "yes"  ? Robustness::always
+                       : arguments.robust == "no" ? Robustness::never
+                                                  : Robustness::if_needed;
   options.on_iteration = [&](const FitIteration& step) {
     std::string values;
     for (size_t i = 0; i < step.parameters.size(); ++i) {
@@ -84,10 +148,36 @@ ExitCode run_fit(const FitArguments& arguments, const CommandOutput& out) {
     fmt::print(stderr, "  iteration {:>2}  cost {:.4f}{}{}\n", step.iteration, step.cost, values,
                step.accepted ? "" : "  (step refused)");
   };
+  options.start = start_of(arguments);
+  options.profile = arguments.profile;
+  options.paper_mode = arguments.paper_mode;
+  if (arguments.pressure_offset_kPa > 0) options.pressure_offset_sigma_kPa = arguments.pressure_offset_kPa;
+  if (arguments.posterior_draws > 0) {
+    options.posterior.emplace();
+    options.posterior->steps =
+        (arguments.posterior_draws + options.posterior->chains - 1) / options.posterior->chains;
+    options.posterior->warm_up = std::clamp(options.posterior->steps / 4, 10, 60);
+    options.posterior->on_step = [](int done, int all) {
+      if (done % 50 == 0 || done == all) fmt::print(stderr, "  posterior: {} of {} steps\n", done, all);
+    };
+  }
+  if (arguments.checkpoint) {
+    require_output({*arguments.checkpoint, inputs_of(study), fit_file_mark, arguments.force});
+    options.on_checkpoint = [&](const FitRecord& reached) { write_fit_file(reached, *arguments.checkpoint); };
+  }
+  const Interruption interruption;
+  options.interrupted = [] { return interrupts > 0; };
   const FitRecord record = fit_study(study, measurement, options);
   fmt::print(stderr, "{} {} iterations, {} equilibrium solutions, {:.1f} s.\n", record.reason,
              record.iterations, record.forward_solves, record.seconds);
   if (arguments.output) write_fit_file(record, *arguments.output);
+  if (interrupts > 0 && !record.converged) {
+    const bool kept = arguments.checkpoint && std::filesystem::exists(*arguments.checkpoint);
+    fmt::print(stderr, "{}\n",
+               kept ? fmt::format("Go on with the same command and --resume: {} holds what was reached.",
+                                  arguments.checkpoint->string())
+                    : "With --checkpoint FILE a search can go on from where it was ended.");
+  }
   if (out.json) {
     std::cout << to_json(record);
   } else {
@@ -111,9 +201,33 @@ void add_fit(CommandLine& line) {
       ->allow_extra_args(false);
   command->add_option("--mesh", arguments->mesh,
                       "other element counts: circumferential,longitudinal,transmural");
-  command->add_option("--smooth", arguments->smooth,
-                      "how alike neighbouring elements are, for values that vary by element: evidence (the data say "
-                      "it; default), none, or the usual relative difference, as 0.05");
+  command->add_option(
+      "--smooth", arguments->smooth,
+      "how alike neighbouring elements are, for values that vary by element: evidence (the data say "
+      "it; default), none, or the usual relative difference, as 0.05");
+  command
+      ->add_option(
+          "--robust", arguments->robust,
+          "give wild points no weight (Student's t): yes, no, or auto, when there are more than chance "
+          "explains")
+      ->check(CLI::IsMember({"yes", "no", "auto"}))
+      ->capture_default_str();
+  command
+      ->add_option(
+          "--pressure-offset", arguments->pressure_offset_kPa,
+          "seek a common offset of all frame pressures too, about zero with this standard deviation, kPa")
+      ->check(CLI::PositiveNumber);
+  command->add_flag("--profile", arguments->profile, "95 % intervals from the likelihood's true shape too");
+  command
+      ->add_option("--posterior", arguments->posterior_draws,
+                   "draw the posterior so often, from the full model: some seconds to minutes a hundred")
+      ->check(CLI::Range(40, 1000000));
+  command->add_flag("--paper-mode", arguments->paper_mode,
+                    "search as the paper did: sequential quadratic programming with finite differences");
+  command->add_option("--start", arguments->start, "start from an earlier result or checkpoint");
+  command->add_option("--checkpoint", arguments->checkpoint, "keep what each step reached in this file");
+  command->add_flag("--resume", arguments->resume, "go on from the checkpoint, if there is one")
+      ->excludes("--start");
   command->add_option("-o,--output", arguments->output,
                       "keep the result in this file, for `diastole report`");
   command->add_flag("--force", arguments->force, "replace an output file that is no fit result");

@@ -1,64 +1,23 @@
 #include "estimator/fit/fit.hpp"
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <limits>
 
-#include "estimator/fit/uncertainty.hpp"
+#include "estimator/fit/fit_errors.hpp"
+#include "estimator/fit/paper_search.hpp"
+#include "estimator/fit/profile.hpp"
 
 namespace diastole {
 namespace {
 
-constexpr double not_a_number = std::numeric_limits<double>::quiet_NaN();
-// The choice of usable points settles in one or two searches, that of the smoothness in two or three.
-constexpr int most_searches = 6;
+// The choice of usable points settles in one or two searches, those of smoothness and loss in two or three.
+constexpr int most_searches = 8;
+constexpr double least_wild = 3.0;        // residuals; chance makes one in two million
+constexpr double wild_share = 0.001;      // of all residuals
+constexpr double scale_tolerance = 0.02;  // of the robust loss' scale
 constexpr double first_step = 0.1;        // of smooth values, until the data say better
 constexpr double rough_tolerance = 1e-3;  // of the cost, in the search that only prepares the smoothness
-
-std::vector<bool> free_unknowns(const JointProblem& problem, const Eigen::VectorXd& q) {
-  std::vector<bool> is_free;
-  for (Eigen::Index i = 0; i < q.size(); ++i)
-    is_free.push_back(problem.bound_under(q, i) == BoundSide::none);
-  return is_free;
-}
-
-/// Variances of the values alone, pressures held at their estimates.
-Eigen::VectorXd variances_at_exact_pressure(const Eigen::MatrixXd& jacobian, const std::vector<bool>& is_free,
-                                            Eigen::Index values) {
-  const std::vector<bool> free_values(is_free.begin(), is_free.begin() + values);
-  return covariance(jacobian.leftCols(values), free_values).diagonal();
-}
-
-EstimatedValue estimated(const SoughtValue& sought, double q, BoundSide bound, double variance,
-                         double exact_variance) {
-  EstimatedValue result{sought.value(q),
-                        not_a_number,
-                        {not_a_number, not_a_number},
-                        not_a_number,
-                        bound == BoundSide::lower,
-                        bound == BoundSide::upper};
-  if (bound != BoundSide::none) return result;
-  const double sd = std::sqrt(variance);
-  result.se = sought.slope(q) * sd;
-  result.se_exact_pressure = sought.slope(q) * std::sqrt(exact_variance);
-  result.ci95 = {sought.value(q - normal_95 * sd), sought.value(q + normal_95 * sd)};
-  return result;
-}
-
-EstimatedFrame estimated(const JointProblem::LoadedFrame& frame, const Eigen::VectorXd& q,
-                         const Eigen::MatrixXd& covariance) {
-  const auto unknown = frame.pressure_unknown;
-  return {.number = frame.number,
-          .load = frame.load,
-          .pressure_kPa = unknown ? q[*unknown] : frame.load.pressure_kPa,
-          .se_kPa = unknown ? std::sqrt(covariance(*unknown, *unknown)) : 0.0,
-          .usable = frame.residuals.usable(),
-          .tags_left_out = frame.residuals.tags_left_out(),
-          .points_left_out = frame.residuals.points_left_out(),
-          .weighted = frame.residuals.weighted(),
-          .unweighted_mm = frame.residuals.unweighted_mm(),
-          .position_mm = frame.position_mm};
-}
 
 std::vector<SmoothBlock> smooth_blocks(const MotionModel& model, const FitOptions& options) {
   std::vector<SmoothBlock> blocks;
@@ -72,13 +31,6 @@ std::vector<SmoothBlock> smooth_blocks(const MotionModel& model, const FitOption
 bool any_by_evidence(const FitOptions& options) {
   return std::any_of(options.smooth.begin(), options.smooth.end(),
                      [](const SmoothRegion& region) { return !region.step; });
-}
-
-/// Of the data alone, at q. Precondition: `residuals(q)` succeeded just before.
-QuadraticModel quadratic_model(JointProblem& problem, const Eigen::VectorXd& q) {
-  const Eigen::VectorXd residuals = problem.residuals(q)->head(problem.data_rows());
-  const Eigen::MatrixXd jacobian = problem.jacobian(q).topRows(problem.data_rows());
-  return {q, jacobian.transpose() * residuals, jacobian.transpose() * jacobian};
 }
 
 /// Gives each block the step of greatest evidence; whether one changed.
@@ -97,69 +49,21 @@ bool choose_smoothness(JointProblem& problem, const Eigen::VectorXd& q, const Fi
   return changed;
 }
 
-/// Smallest step below which the given share of the posterior lies.
-double step_at(const EvidenceOfStep& evidence, double share) {
-  double sum = 0;
-  for (size_t i = 0; i < evidence.steps.size(); ++i) {
-    sum += evidence.weights[i];
-    if (sum >= share) return evidence.steps[i];
-  }
-  return evidence.steps.back();
-}
-
-/// What the smoothness' own uncertainty adds to the covariance at the chosen steps.
-void tell_smoothness(FitOutcome& outcome, JointProblem& problem, const Eigen::VectorXd& q,
-                     const FitOptions& options, const std::vector<bool>& is_free) {
-  if (options.smooth.empty()) return;
-  const QuadraticModel model = quadratic_model(problem, q);
-  const Eigen::MatrixXd at_chosen = outcome.covariance;
-  const Eigen::MatrixXd seen = at_chosen * model.hessian;
-  for (size_t i = 0; i < options.smooth.size(); ++i) {
-    const SmoothBlock& block = problem.smoothness()[i];
-    SmoothOutcome told{options.smooth[i].first_value, block.step, !options.smooth[i].step, false,
-                       {block.step, block.step},
-                       seen.diagonal().segment(block.first, block.differences.cols()).sum()};
-    if (told.by_evidence) {
-      const EvidenceOfStep evidence = evidence_of_step(model, problem.smoothness(), i, is_free);
-      told.none_seen = evidence.none_seen;
-      told.step90 = {step_at(evidence, 0.05), step_at(evidence, 0.95)};
-      for (size_t k = 0; k < evidence.steps.size(); ++k) {
-        const Eigen::VectorXd apart = evidence.q[k] - q;
-        outcome.covariance +=
-            evidence.weights[k] * (evidence.covariance[k] + apart * apart.transpose() - at_chosen);
-      }
+/// Whether a better loss was chosen: robust where wild points ask for it, with the scale that the residuals have.
+bool choose_loss(JointProblem& problem, const FitOptions& options) {
+  const Eigen::VectorXd residuals = problem.motion_residuals();
+  if (!problem.robust()) {
+    const double wild = static_cast<double>(wild_count(residuals));
+    if (options.robustness != Robustness::if_needed ||
+        wild <= std::max(least_wild, wild_share * static_cast<double>(residuals.size()))) {
+      return false;
     }
-    outcome.smoothness.push_back(told);
   }
-}
-
-void tell_uncertainty(FitOutcome& outcome, JointProblem& problem, const Eigen::VectorXd& q,
-                      const FitOptions& options) {
-  const Eigen::VectorXd* residuals = problem.residuals(q);
-  if (residuals == nullptr) {
-    outcome.converged = false;
-    outcome.reason = "Failed: " + problem.failure() + ".";
-    return;
-  }
-  const Eigen::MatrixXd jacobian = problem.jacobian(q);
-  const std::vector<bool> is_free = free_unknowns(problem, q);
-  outcome.rows = problem.data_rows();
-  outcome.chi2 = residuals->head(outcome.rows).squaredNorm();
-  outcome.covariance = covariance(jacobian, is_free);
-  const Eigen::MatrixXd data_jacobian = jacobian.topRows(outcome.rows);
-  outcome.unknowns = effective_count(outcome.covariance, data_jacobian);
-  tell_smoothness(outcome, problem, q, options, is_free);
-  const Eigen::VectorXd exact = variances_at_exact_pressure(jacobian, is_free, problem.values());
-  for (Eigen::Index i = 0; i < problem.values(); ++i) {
-    outcome.values.push_back(
-        estimated(problem.value(i), q[i], problem.bound_under(q, i), outcome.covariance(i, i), exact[i]));
-    const double slope = problem.value(i).slope(q[i]);
-    outcome.covariance.row(i) *= slope;
-    outcome.covariance.col(i) *= slope;
-  }
-  for (const JointProblem::LoadedFrame& frame : problem.frames()) {
-    outcome.frames.push_back(estimated(frame, q, outcome.covariance));
-  }
+  const double before = problem.robust() ? problem.robust()->scale : 0.0;
+  const RobustLoss loss = RobustLoss::for_deviation(core_deviation(residuals));
+  if (std::abs(loss.scale - before) < scale_tolerance * before) return false;
+  problem.set_robust(loss);
+  return true;
 }
 
 /// The step with its values in their own units.
@@ -181,7 +85,70 @@ OptimiserResult search_from(JointProblem& problem, const Eigen::VectorXd& q, Fit
     outcome.history.back().iteration = static_cast<int>(outcome.history.size()) - 1;
     if (options.on_step) options.on_step(outcome.history.back());
   };
-  return minimise(problem, q, settings);
+  return options.paper_mode ? paper_search(problem, q, settings) : minimise(problem, q, settings);
+}
+
+void tell_profiles(FitOutcome& outcome, JointProblem& problem, const Eigen::VectorXd& q,
+                   const Eigen::MatrixXd& covariance, const FitOptions& options) {
+  const Eigen::VectorXd* residuals = problem.residuals(q);
+  if (residuals == nullptr) return;
+  const double cost = residuals->squaredNorm() / 2;
+  for (const size_t place : options.profiled) {
+    const auto which = static_cast<Eigen::Index>(place);
+    if (problem.bound_under(q, which) != BoundSide::none || !std::isfinite(covariance(which, which)))
+      continue;
+    const std::array<ProfileEnd, 2> ends = profile_interval({problem, q, covariance, cost}, which);
+    ProfileInterval interval{place, {}, {}, ends[0].found && ends[1].found};
+    for (size_t side = 0; side < 2; ++side) {
+      interval.ci95[side] = problem.value(which).value(ends[side].coordinate);
+      interval.at_bound[side] = ends[side].at_bound;
+    }
+    outcome.profiles.push_back(interval);
+  }
+}
+
+PosteriorOfValue told(const std::vector<Eigen::MatrixXd>& chains, Eigen::Index unknown,
+                      const SoughtValue& sought) {
+  std::vector<Eigen::VectorXd> draws;
+  std::vector<double> sorted;
+  for (const Eigen::MatrixXd& chain : chains) {
+    Eigen::VectorXd& values = draws.emplace_back(chain.col(unknown));
+    for (double& value : values)
+      value = sought.value(value);
+    sorted.insert(sorted.end(), values.begin(), values.end());
+  }
+  std::sort(sorted.begin(), sorted.end());
+  const auto quantile = [&](double share) {
+    return sorted[static_cast<size_t>(share * static_cast<double>(sorted.size() - 1) + 0.5)];
+  };
+  const Eigen::Map<const Eigen::ArrayXd> all(sorted.data(), static_cast<Eigen::Index>(sorted.size()));
+  return {all.mean(),
+          std::sqrt((all - all.mean()).square().sum() / static_cast<double>(all.size() - 1)),
+          {quantile(0.025), quantile(0.975)},
+          split_r_hat(draws),
+          effective_sample_size(draws)};
+}
+
+void tell_posterior(FitOutcome& outcome, JointProblem& problem, const Eigen::VectorXd& q,
+                    const Eigen::MatrixXd& covariance, const FitOptions& options) {
+  if (!options.posterior || problem.residuals(q) == nullptr) return;
+  const auto begun = std::chrono::steady_clock::now();
+  const PosteriorSample sample = sample_posterior(problem, q, covariance, *options.posterior);
+  PosteriorOutcome result;
+  result.draws = options.posterior->chains * options.posterior->steps;
+  result.accepted = sample.accepted;
+  result.solutions = sample.solutions;
+  for (Eigen::Index i = 0; i < problem.values(); ++i)
+    result.values.push_back(told(sample.chains, i, problem.value(i)));
+  result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
+  outcome.posterior = std::move(result);
+}
+
+/// The paper takes the measured pressures as exact.
+Measurement with_exact_pressures(Measurement measurement) {
+  for (Frame& frame : measurement.frames)
+    frame.sigma_kPa = 0;
+  return measurement;
 }
 
 }  // namespace
@@ -190,9 +157,11 @@ FitOutcome fit_motion(MotionModel& model, const std::vector<SoughtValue>& sought
                       const Measurement& measurement, const FitOptions& options) {
   const auto begun = std::chrono::steady_clock::now();
   FitOutcome outcome;
-  JointProblem problem(model, sought, measurement, options.locator);
+  JointProblem problem(model, sought, options.paper_mode ? with_exact_pressures(measurement) : measurement,
+                       options.locator, options.pressure_offset_sigma_kPa);
   Eigen::VectorXd q = problem.start();
   problem.set_smoothness(smooth_blocks(model, options));
+  if (options.robustness == Robustness::always) problem.set_robust(RobustLoss::for_deviation(1));
   // Which points lie on the body depends on the motion, and how smooth the values are depends on the data: search
   // again while a better motion finds more points or another smoothness.
   for (int search = 0; search < most_searches; ++search) {
@@ -204,7 +173,8 @@ FitOutcome fit_motion(MotionModel& model, const std::vector<SoughtValue>& sought
     const bool roughly = search == 0 && any_by_evidence(options);
     const bool prepared = search == 1 && any_by_evidence(options);
     const bool other_smoothness = search > 0 && choose_smoothness(problem, q, options);
-    if (*gained == 0 && !other_smoothness && !prepared && search > 0) break;
+    const bool other_loss = search > 0 && problem.residuals(q) != nullptr && choose_loss(problem, options);
+    if (*gained == 0 && !other_smoothness && !other_loss && !prepared && search > 0) break;
     OptimiserResult found = search_from(problem, q, outcome, options, roughly);
     q = found.q;
     outcome.converged = found.converged;
@@ -212,7 +182,13 @@ FitOutcome fit_motion(MotionModel& model, const std::vector<SoughtValue>& sought
     outcome.iterations += found.iterations;
     if (!found.converged) break;
   }
-  if (!outcome.history.empty()) tell_uncertainty(outcome, problem, q, options);
+  if (!outcome.history.empty()) {
+    const Eigen::MatrixXd covariance = tell_uncertainty(outcome, problem, q, options);
+    if (outcome.converged) {
+      tell_profiles(outcome, problem, q, covariance, options);
+      tell_posterior(outcome, problem, q, covariance, options);
+    }
+  }
   outcome.forward_solves = problem.forward_solves();
   outcome.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
   return outcome;

@@ -6,7 +6,8 @@
 //
 // The estimate is the maximum of the likelihood of tag points, 3-D points and frame pressures under their
 // stated normal errors (joint_problem.hpp). Standard errors are those of the joint problem, (JᵀJ)⁻¹, so that
-// they carry the pressures' errors; they trust the stated sigmas and are not rescaled by chi2/dof. The 95 %
+// they carry the pressures' errors; they trust the stated sigmas and are not rescaled by chi2/dof.
+// A robust fit's errors are those of an M-estimator: they come from the residuals' own spread. The 95 %
 // interval is symmetric in the coordinate of the value: for a positive one a factor up and down. Smooth regional
 // values have the posterior's standard deviation instead: data and smoothness together, the smoothness' own
 // uncertainty included.
@@ -20,6 +21,7 @@
 
 #include "estimator/fit/joint_problem.hpp"
 #include "estimator/fit/optimiser.hpp"
+#include "estimator/fit/posterior.hpp"
 
 namespace diastole {
 
@@ -29,10 +31,22 @@ struct SmoothRegion {
   std::optional<double> step;  ///< how strongly; default: by evidence
 };
 
+enum class Robustness {
+  if_needed,  ///< Student's t once more points are wild than chance explains
+  always,
+  never
+};
+
 struct FitOptions {
   OptimiserOptions optimiser;  ///< its on_step is not used
   LocatorOptions locator;      ///< how far outside the body a point may lie
   std::vector<SmoothRegion> smooth;
+  Robustness robustness = Robustness::if_needed;
+  /// All frame pressures may be off by one and the same unknown amount, 0 with this standard deviation.
+  std::optional<double> pressure_offset_sigma_kPa;
+  std::vector<size_t> profiled;  ///< values whose profile interval is wanted (profile.hpp)
+  std::optional<PosteriorOptions> posterior;
+  bool paper_mode = false;  ///< the paper's search (paper_search.hpp); no smoothness, no robust loss then
   /// Called at each iteration with values in their own units.
   std::function<void(const OptimiserStep&)> on_step;
 };
@@ -68,14 +82,51 @@ struct SmoothOutcome {
   double effective_values;       ///< how many independent values the data see: 1 to the number of elements
 };
 
+struct RobustOutcome {
+  RobustLoss loss;
+  Eigen::Index wild;  ///< residuals beyond five standard deviations of the core
+};
+
+struct PressureOffset {
+  double value_kPa;  ///< measured less true
+  double se_kPa;
+};
+
+struct ProfileInterval {
+  size_t value;
+  std::array<double, 2> ci95;
+  std::array<bool, 2> at_bound;  ///< the interval ends there because the bound does
+  bool found;
+};
+
+struct PosteriorOfValue {
+  double mean;
+  double sd;
+  std::array<double, 2> ci95;  ///< 2.5 and 97.5 % quantiles
+  double r_hat;
+  double effective_draws;
+};
+
+struct PosteriorOutcome {
+  int draws = 0;
+  double accepted = 0;
+  long solutions = 0;  ///< equilibria
+  double seconds = 0;
+  std::vector<PosteriorOfValue> values;
+};
+
 struct FitOutcome {
   std::vector<EstimatedValue> values;
   std::vector<EstimatedFrame> frames;
-  Eigen::MatrixXd covariance;  ///< of values and unknown pressures, in their own units
-  double chi2 = 0;             ///< including the pressures' priors
-  Eigen::Index rows = 0;       ///< residuals, pressure priors included
-  double unknowns = 0;         ///< not counting those on a bound; smooth values as many as the data see
+  Eigen::MatrixXd covariance;  ///< of values, unknown pressures and offset, in their own units
+  std::optional<PressureOffset> pressure_offset;
+  std::vector<ProfileInterval> profiles;
+  std::optional<PosteriorOutcome> posterior;
+  double chi2 = 0;        ///< including the pressures' priors
+  Eigen::Index rows = 0;  ///< residuals, pressure priors included
+  double unknowns = 0;    ///< not counting those on a bound; smooth values as many as the data see
   std::vector<SmoothOutcome> smoothness;
+  std::optional<RobustOutcome> robust;  ///< if the loss was not the normal's
   bool converged = false;
   std::string reason;
   int iterations = 0;

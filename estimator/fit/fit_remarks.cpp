@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "estimator/fit/identifiability.hpp"
+
 namespace diastole {
 namespace {
 
@@ -72,17 +74,19 @@ std::string smoothing_words(const FittedParameter& parameter) {
   const std::string counts = fmt::format("the data determine {:.1f} of its {} values by themselves",
                                          smoothness.effective_values, parameter.elements.size());
   if (!smoothness.by_evidence) {
-    return fmt::format("neighbours being held alike within {:.2g} %, as you asked ({})", 100 * smoothness.step,
-                       counts);
+    return fmt::format("neighbours being held alike within {:.2g} %, as you asked ({})",
+                       100 * smoothness.step, counts);
   }
   if (smoothness.none_seen) {
-    return fmt::format("but the data show no difference between elements (neighbours alike within {:.2g} % with "
-                       "95 % probability)",
-                       100 * smoothness.step90[1]);
+    return fmt::format(
+        "but the data show no difference between elements (neighbours alike within {:.2g} % with "
+        "95 % probability)",
+        100 * smoothness.step90[1]);
   }
-  return fmt::format("neighbours differing by {:.2g} % as the data themselves say ({:.2g} to {:.2g} % with 90 % "
-                     "probability; {})",
-                     100 * smoothness.step, 100 * smoothness.step90[0], 100 * smoothness.step90[1], counts);
+  return fmt::format(
+      "neighbours differing by {:.2g} % as the data themselves say ({:.2g} to {:.2g} % with 90 % "
+      "probability; {})",
+      100 * smoothness.step, 100 * smoothness.step90[0], 100 * smoothness.step90[1], counts);
 }
 
 void add_regional(std::vector<std::string>& remarks, const FitRecord& record) {
@@ -96,12 +100,31 @@ void add_regional(std::vector<std::string>& remarks, const FitRecord& record) {
       ++count;
     }
     if (count == 0) continue;
-    remarks.push_back(fmt::format(
-        "{} varies by element, {}: each value has a standard error of {:.2g} % on "
-        "average, their mean one of {:.2g} %.",
-        parameter.name, smoothing_words(parameter), 100 * relative / static_cast<double>(count),
-        100 * parameter.se / parameter.value));
+    remarks.push_back(
+        fmt::format("{} varies by element, {}: each value has a standard error of {:.2g} % on "
+                    "average, their mean one of {:.2g} %.",
+                    parameter.name, smoothing_words(parameter), 100 * relative / static_cast<double>(count),
+                    100 * parameter.se / parameter.value));
   }
+}
+
+void add_posterior(std::vector<std::string>& remarks, const FitRecord& record) {
+  constexpr double agreed = 1.05, enough = 100;
+  double worst = 1, fewest = record.posterior->draws;
+  for (const FittedParameter& parameter : record.parameters) {
+    if (!parameter.posterior) continue;
+    worst = std::max(worst, parameter.posterior->r_hat);
+    fewest = std::min(fewest, parameter.posterior->effective_draws);
+  }
+  remarks.push_back(fmt::format(
+      "Posterior: {} draws from the likelihood itself, equilibria of all frames solved for each ({} "
+      "equilibria, {:.0f} "
+      "s), {:.0f} % of the steps accepted, R-hat at most {:.3f}, worth at least {:.0f} independent draws.{}",
+      record.posterior->draws, record.posterior->equilibria, record.posterior->seconds,
+      100 * record.posterior->accepted, worst, fewest,
+      worst > agreed || fewest < enough
+          ? " That is too few to trust its tails: ask for more with --posterior."
+          : ""));
 }
 
 void add_undeformed(std::vector<std::string>& remarks, const FitRecord& record) {
@@ -131,7 +154,22 @@ std::vector<std::string> remarks_on(const FitRecord& record, const FitOutcome& f
   add_conditional_mean(remarks, record);
   add_regional(remarks, record);
   add_undeformed(remarks, record);
-  if (record.outliers_5sigma > 0) {
+  for (std::string& remark : identifiability_remarks(record))
+    remarks.push_back(std::move(remark));
+  if (record.posterior) add_posterior(remarks, record);
+  if (record.search == "finite differences") {
+    remarks.push_back(
+        "Searched as the paper did: sums of squares in mm, pressures taken as exact, derivatives by finite "
+        "differences, "
+        "tolerance 0.001. Errors are those of this estimate at exact pressures.");
+  }
+  if (record.robust) {
+    remarks.push_back(
+        fmt::format("Fitted with Student's t instead of the normal distribution, because of {} wild "
+                    "residuals: they hardly count, "
+                    "and errors come from the residuals' own spread. Look for mistracked points.",
+                    record.robust->wild));
+  } else if (record.outliers_5sigma > 0) {
     remarks.push_back(fmt::format(
         "{} residuals are beyond 5 standard deviations; chance makes one in two million. Look for "
         "mistracked points.",

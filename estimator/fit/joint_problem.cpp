@@ -14,7 +14,8 @@ double SoughtValue::value(double coordinate) const {
 double SoughtValue::slope(double coordinate) const { return logarithmic() ? std::exp(coordinate) : 1.0; }
 
 JointProblem::JointProblem(MotionModel& model, std::vector<SoughtValue> values,
-                           const Measurement& measurement, LocatorOptions locator)
+                           const Measurement& measurement, LocatorOptions locator,
+                           std::optional<double> offset_sigma_kPa)
     : model_(model),
       values_(std::move(values)),
       locator_options_(locator),
@@ -40,11 +41,33 @@ JointProblem::JointProblem(MotionModel& model, std::vector<SoughtValue> values,
                        pressure_unknown,
                        {}});
   }
+  if (offset_sigma_kPa) {
+    offset_sigma_kPa_ = *offset_sigma_kPa;
+    offset_unknown_ = unknowns_++;
+  }
 }
 
 void JointProblem::set_smoothness(std::vector<SmoothBlock> blocks) {
   smooth_ = std::move(blocks);
   residuals_at_.reset();
+}
+
+void JointProblem::set_robust(std::optional<RobustLoss> loss) {
+  robust_ = loss;
+  residuals_at_.reset();
+}
+
+Eigen::VectorXd JointProblem::motion_residuals() const {
+  Eigen::Index rows = 0;
+  for (const LoadedFrame& frame : frames_)
+    rows += frame.residuals.rows();
+  Eigen::VectorXd result(rows);
+  rows = 0;
+  for (const LoadedFrame& frame : frames_) {
+    result.segment(rows, frame.residuals.rows()) = frame.residuals.weighted();
+    rows += frame.residuals.rows();
+  }
+  return result;
 }
 
 Eigen::Index JointProblem::smooth_rows() const {
@@ -68,6 +91,7 @@ Eigen::VectorXd JointProblem::start() const {
   for (const LoadedFrame& frame : frames_) {
     if (frame.pressure_unknown) q[*frame.pressure_unknown] = frame.load.pressure_kPa;
   }
+  if (offset_unknown_) q[*offset_unknown_] = 0;
   return q;
 }
 
@@ -95,8 +119,13 @@ std::vector<double> JointProblem::values_at(const Eigen::VectorXd& q) const {
   return result;
 }
 
+double JointProblem::offset_at(const Eigen::VectorXd& q) const {
+  return offset_unknown_ ? q[*offset_unknown_] : 0.0;
+}
+
 double JointProblem::pressure_at(const LoadedFrame& frame, const Eigen::VectorXd& q) const {
-  return frame.pressure_unknown ? q[*frame.pressure_unknown] : frame.load.pressure_kPa;
+  if (frame.pressure_unknown) return q[*frame.pressure_unknown];
+  return frame.load.pressure_kPa - offset_at(q);
 }
 
 bool JointProblem::solve_frames(const Eigen::VectorXd& q) {
@@ -140,13 +169,20 @@ const Eigen::VectorXd* JointProblem::residuals(const Eigen::VectorXd& q) {
     residuals_.segment(row, frame.residuals.rows()) = frame.residuals.weighted();
     row += frame.residuals.rows();
   }
+  if (robust_) {
+    for (Eigen::Index i = 0; i < row; ++i)
+      residuals_[i] = robust_->residual(residuals_[i]);
+  }
   for (const LoadedFrame& frame : frames_) {
     if (!frame.pressure_unknown) continue;
-    residuals_[row++] = (q[*frame.pressure_unknown] - frame.load.pressure_kPa) / frame.load.sigma_kPa;
+    residuals_[row++] =
+        (q[*frame.pressure_unknown] + offset_at(q) - frame.load.pressure_kPa) / frame.load.sigma_kPa;
   }
+  if (offset_unknown_) residuals_[row++] = q[*offset_unknown_] / offset_sigma_kPa_;
   for (const SmoothBlock& block : smooth_) {
     const Eigen::Index size = block.differences.rows();
-    residuals_.segment(row, size) = block.differences * q.segment(block.first, block.differences.cols()) / block.step;
+    residuals_.segment(row, size) =
+        block.differences * q.segment(block.first, block.differences.cols()) / block.step;
     row += size;
   }
   residuals_at_ = q;
@@ -154,6 +190,15 @@ const Eigen::VectorXd* JointProblem::residuals(const Eigen::VectorXd& q) {
 }
 
 Eigen::MatrixXd JointProblem::jacobian(const Eigen::VectorXd& q) {
+  Eigen::MatrixXd result = plain_jacobian(q);
+  if (!robust_) return result;
+  const Eigen::VectorXd residuals = motion_residuals();
+  for (Eigen::Index i = 0; i < residuals.size(); ++i)
+    result.row(i) *= robust_->slope(residuals[i]);
+  return result;
+}
+
+Eigen::MatrixXd JointProblem::plain_jacobian(const Eigen::VectorXd& q) {
   Eigen::MatrixXd result = Eigen::MatrixXd::Zero(rows(), unknowns());
   Eigen::Index row = 0;
   for (size_t slot = 0; slot < frames_.size(); ++slot) {
@@ -167,13 +212,19 @@ Eigen::MatrixXd JointProblem::jacobian(const Eigen::VectorXd& q) {
     for (Eigen::Index i = 0; i < values(); ++i) {
       result.col(i).segment(row, block.rows()) = block.col(i) * value(i).slope(q[i]);
     }
-    if (frame.pressure_unknown)
+    if (frame.pressure_unknown) {
       result.col(*frame.pressure_unknown).segment(row, block.rows()) = block.rightCols<1>();
+    } else if (offset_unknown_) {
+      result.col(*offset_unknown_).segment(row, block.rows()) = -block.rightCols<1>();
+    }
     row += block.rows();
   }
   for (const LoadedFrame& frame : frames_) {
-    if (frame.pressure_unknown) result(row++, *frame.pressure_unknown) = 1 / frame.load.sigma_kPa;
+    if (!frame.pressure_unknown) continue;
+    if (offset_unknown_) result(row, *offset_unknown_) = 1 / frame.load.sigma_kPa;
+    result(row++, *frame.pressure_unknown) = 1 / frame.load.sigma_kPa;
   }
+  if (offset_unknown_) result(row++, *offset_unknown_) = 1 / offset_sigma_kPa_;
   for (const SmoothBlock& block : smooth_) {
     const Eigen::Index size = block.differences.rows();
     result.block(row, block.first, size, block.differences.cols()) = block.differences / block.step;

@@ -6,10 +6,12 @@
 //
 //   minimise  1/2 sum_frames |r_frame(values, P_frame)|^2  +  1/2 sum_frames ((P_frame - measured) / sigma)^2
 //
-// A frame with sigma_kPa = 0 has an exactly known pressure and no unknown. A value with a positive lower
+// All measurements may be off by a common offset, one more unknown with a prior about zero.
+// A frame with sigma_kPa = 0 has an exactly known pressure (but for the offset) and no unknown. A value with a positive lower
 // bound enters as its logarithm (its error is closer to a factor than to a term); other values enter as they
 // are.
 //
+// With a robust loss (robust_loss.hpp) the motion's residuals enter as u(r), and the cost changes with them.
 // Parameters that vary by element may carry a smoothness prior (smoothness.hpp).
 //
 // Residual rows: frame after frame (frame_residuals.hpp), then one for each unknown pressure, then those of the
@@ -25,6 +27,7 @@
 
 #include "estimator/fit/frame_residuals.hpp"
 #include "estimator/fit/motion_model.hpp"
+#include "estimator/fit/robust_loss.hpp"
 #include "estimator/fit/smoothness.hpp"
 #include "estimator/io/measurement.hpp"
 
@@ -57,9 +60,9 @@ class JointProblem {
     NodeField position_mm;  ///< of the last successful `evaluate`
   };
 
-  /// `model` must outlive the problem. Frames without points are left out.
+  /// `model` must outlive the problem. Frames without points are left out. `offset_sigma_kPa`: see above.
   JointProblem(MotionModel& model, std::vector<SoughtValue> values, const Measurement& measurement,
-               LocatorOptions locator);
+               LocatorOptions locator, std::optional<double> offset_sigma_kPa = {});
 
   [[nodiscard]] Eigen::Index unknowns() const { return unknowns_; }
   [[nodiscard]] Eigen::Index values() const { return static_cast<Eigen::Index>(values_.size()); }
@@ -75,10 +78,19 @@ class JointProblem {
     return values_[static_cast<size_t>(unknown)];
   }
   [[nodiscard]] const std::vector<LoadedFrame>& frames() const { return frames_; }
+  /// Place in q of the pressures' common offset (measured less true), if there is one.
+  [[nodiscard]] std::optional<Eigen::Index> offset_unknown() const { return offset_unknown_; }
 
   /// The priors of smooth blocks of values; none at first. Changes `rows`.
   void set_smoothness(std::vector<SmoothBlock> blocks);
   [[nodiscard]] const std::vector<SmoothBlock>& smoothness() const { return smooth_; }
+
+  /// The loss of the motion's residuals; the normal's at first.
+  void set_robust(std::optional<RobustLoss> loss);
+  [[nodiscard]] const std::optional<RobustLoss>& robust() const { return robust_; }
+  /// The motion's residuals in their stated standard deviations, of the last successful `residuals`, frame after
+  /// frame.
+  [[nodiscard]] Eigen::VectorXd motion_residuals() const;
 
   /// Solves all frames at q and chooses the usable points there; returns how many were gained, or nothing
   /// (and `failure`) without equilibrium.
@@ -89,12 +101,15 @@ class JointProblem {
   /// Derivatives at q, by the model's exact sensitivities. Precondition: `residuals(q)` succeeded just
   /// before.
   [[nodiscard]] Eigen::MatrixXd jacobian(const Eigen::VectorXd& q);
+  /// The same with the motion's residuals r instead of u(r).
+  [[nodiscard]] Eigen::MatrixXd plain_jacobian(const Eigen::VectorXd& q);
 
   [[nodiscard]] const std::string& failure() const { return failure_; }
   [[nodiscard]] int forward_solves() const { return forward_solves_; }
 
  private:
   [[nodiscard]] std::vector<double> values_at(const Eigen::VectorXd& q) const;
+  [[nodiscard]] double offset_at(const Eigen::VectorXd& q) const;
   [[nodiscard]] double pressure_at(const LoadedFrame& frame, const Eigen::VectorXd& q) const;
   [[nodiscard]] Eigen::Index smooth_rows() const;
   bool solve_frames(const Eigen::VectorXd& q);
@@ -104,7 +119,10 @@ class JointProblem {
   LocatorOptions locator_options_;
   std::unique_ptr<PointLocator> reference_;  // at a fixed address: the frames refer to it
   std::vector<LoadedFrame> frames_;
+  std::optional<Eigen::Index> offset_unknown_;
+  double offset_sigma_kPa_ = 0;
   std::vector<SmoothBlock> smooth_;
+  std::optional<RobustLoss> robust_;
   Eigen::Index unknowns_ = 0;
   Eigen::VectorXd residuals_;
   std::optional<Eigen::VectorXd> solved_at_;     // where the frames' positions belong

@@ -13,7 +13,7 @@ using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::Ro
 
 class JointCost : public ceres::CostFunction {
  public:
-  explicit JointCost(JointProblem& problem) : problem_(problem) {
+  JointCost(JointProblem& problem, std::optional<Eigen::Index> held) : problem_(problem), held_(held) {
     set_num_residuals(static_cast<int>(problem.rows()));
     mutable_parameter_block_sizes()->push_back(static_cast<int>(problem.unknowns()));
   }
@@ -35,14 +35,16 @@ class JointCost : public ceres::CostFunction {
   }
 
  private:
-  /// Whether an unknown rests on its bound and the cost falls only beyond it.
+  /// Whether an unknown is to keep its value, or rests on its bound and the cost falls only beyond it.
   [[nodiscard]] bool is_held(const Eigen::VectorXd& q, const Eigen::VectorXd& gradient,
                              Eigen::Index i) const {
+    if (held_ == i) return true;
     const BoundSide side = problem_.bound_under(q, i);
     return (side == BoundSide::lower && gradient[i] > 0) || (side == BoundSide::upper && gradient[i] < 0);
   }
 
   JointProblem& problem_;
+  std::optional<Eigen::Index> held_;
 };
 
 class Recorder : public ceres::IterationCallback {
@@ -52,10 +54,12 @@ class Recorder : public ceres::IterationCallback {
   ceres::CallbackReturnType operator()(const ceres::IterationSummary& step) override {
     iterations = step.iteration;
     if (options_.on_step) options_.on_step({step.iteration, step.cost, step.step_is_successful, q_});
-    return ceres::SOLVER_CONTINUE;
+    interrupted = options_.interrupted && options_.interrupted();
+    return interrupted ? ceres::SOLVER_TERMINATE_SUCCESSFULLY : ceres::SOLVER_CONTINUE;
   }
 
   int iterations = 0;
+  bool interrupted = false;
 
  private:
   const Eigen::VectorXd& q_;
@@ -89,7 +93,7 @@ std::string reason_of(const ceres::Solver::Summary& summary, const JointProblem&
 OptimiserResult minimise(JointProblem& problem, const Eigen::VectorXd& start,
                          const OptimiserOptions& options) {
   Eigen::VectorXd q = start;
-  JointCost cost(problem);
+  JointCost cost(problem, options.held);
   ceres::Problem::Options ownership;
   ownership.cost_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
   ceres::Problem least_squares(ownership);
@@ -116,7 +120,10 @@ OptimiserResult minimise(JointProblem& problem, const Eigen::VectorXd& start,
   ceres::Solve(settings, &least_squares, &summary);
   return {.q = q,
           .converged = summary.termination_type == ceres::CONVERGENCE,
-          .reason = reason_of(summary, problem, options),
+          .reason = recorder.interrupted
+                        ? fmt::format("Stopped on request after {} iterations; the cost was still falling.",
+                                      options.iterations_before + recorder.iterations)
+                        : reason_of(summary, problem, options),
           .iterations = recorder.iterations};
 }
 

@@ -9,6 +9,7 @@
 // (active set: D. P. Bertsekas, SIAM J. Control Optim. 20 (1982) 221).
 
 #include <functional>
+#include <optional>
 #include <string>
 
 #include "estimator/fit/joint_problem.hpp"
@@ -29,7 +30,9 @@ struct OptimiserOptions {
   double cost_tolerance = 1e-9;
   /// ... or when the unknowns do.
   double step_tolerance = 1e-8;
+  std::optional<Eigen::Index> held;  ///< an unknown that keeps its start value
   std::function<void(const OptimiserStep&)> on_step;
+  std::function<bool()> interrupted;  ///< asked after each step: true ends the search with the best so far
 };
 
 struct OptimiserResult {

@@ -11,6 +11,7 @@
 #include "estimator/fit/elastic_motion.hpp"
 #include "estimator/fit/fit_remarks.hpp"
 #include "estimator/fit/fit_sections.hpp"
+#include "estimator/fit/identifiability.hpp"
 #include "estimator/fit/sought.hpp"
 #include "estimator/fit/uncertainty.hpp"
 #include "protocol/contract/input_error.hpp"
@@ -29,13 +30,6 @@ double wall_mm(const EllipsoidSpecimen& ellipsoid) {
 double element_mm(const AnnulusSpecimen& annulus) { return wall_mm(annulus) / annulus.mesh[2]; }
 double element_mm(const EllipsoidSpecimen& ellipsoid) { return wall_mm(ellipsoid) / ellipsoid.mesh[2]; }
 double element_mm(const MeshSpecimen&) { return 4.0 * outside_mm; }  // not known: the least extrapolation
-
-/// Extrapolation beyond an element, as a fraction of it: `outside_mm` through the wall, never more than an
-/// element.
-LocatorOptions locator_for(const Specimen& specimen) {
-  const double size_mm = std::visit([](const auto& kind) { return element_mm(kind); }, specimen);
-  return {.outside_xi = std::clamp(outside_mm / size_mm, 0.25, 1.0)};
-}
 
 const char* kind_of(const Specimen& specimen) {
   constexpr std::array<const char*, 3> kinds{"annulus", "ellipsoid", "mesh"};
@@ -67,8 +61,8 @@ FittedParameter record_of(const StudyParameter& parameter, const FitOutcome& fit
                          .smoothness = {}};
   for (const SmoothOutcome& told : fit.smoothness) {
     if (told.first_value == first) {
-      result.smoothness = FittedSmoothness{told.step, told.by_evidence, told.none_seen, told.step90,
-                                           told.effective_values};
+      result.smoothness =
+          FittedSmoothness{told.step, told.by_evidence, told.none_seen, told.step90, told.effective_values};
     }
   }
   if (parameter.vary == Variation::whole) return result;
@@ -90,10 +84,25 @@ FittedParameter record_of(const StudyParameter& parameter, const FitOutcome& fit
   return result;
 }
 
+/// Profile and posterior of a whole parameter.
+void record_shape(FittedParameter& parameter, const FitOutcome& fit, size_t place) {
+  if (!parameter.elements.empty()) return;
+  for (const ProfileInterval& profile : fit.profiles) {
+    if (profile.value == place && profile.found)
+      parameter.profile = FittedProfile{profile.ci95, profile.at_bound};
+  }
+  if (fit.posterior) {
+    const PosteriorOfValue& told = fit.posterior->values[place];
+    parameter.posterior = FittedPosterior{told.mean, told.sd, told.ci95, told.r_hat, told.effective_draws};
+  }
+}
+
 void record_parameters(FitRecord& record, const Study& study, const FitOutcome& fit, size_t elements) {
   size_t first = 0;
+  std::vector<size_t> places;
   for (const StudyParameter& parameter : study.law.parameters) {
     const size_t count = value_count(parameter, elements);
+    places.push_back(first);
     record.parameters.push_back(record_of(parameter, fit, first, count));
     for (size_t i = 0; i < count; ++i) {
       record.correlation.names.push_back(count == 1 ? parameter.name
@@ -109,6 +118,22 @@ void record_parameters(FitRecord& record, const Study& study, const FitOutcome& 
     const Eigen::VectorXd values = matrix.row(row);
     record.correlation.matrix.emplace_back(values.begin(), values.end());
   }
+  record.directions = directions_of(record, fit, places);
+  if (const auto& offset = fit.pressure_offset) {
+    record.pressure_offset_kPa = {offset->value_kPa, offset->se_kPa};
+    record.remarks.push_back(fmt::format(
+        "The pressures read {:+.4f} ± {:.4f} kPa too high, as far as these data tell; the parameters' errors "
+        "hold this.",
+        offset->value_kPa, offset->se_kPa));
+  }
+  for (size_t i = 0; i < record.parameters.size(); ++i)
+    record_shape(record.parameters[i], fit, places[i]);
+  if (const auto& posterior = fit.posterior) {
+    record.posterior =
+        PosteriorDrawing{posterior->draws, posterior->accepted, posterior->solutions, posterior->seconds};
+  }
+  if (const auto& robust = fit.robust)
+    record.robust = FittedRobust{robust->loss.degrees, robust->loss.scale, static_cast<size_t>(robust->wild)};
 }
 
 FitIteration record_of(const OptimiserStep& step, const Study& study, size_t elements) {
@@ -120,6 +145,63 @@ FitIteration record_of(const OptimiserStep& step, const Study& study, size_t ele
     first += count;
   }
   return result;
+}
+
+/// Where each whole parameter stands among the values.
+std::vector<size_t> whole_values(const Study& study, size_t elements) {
+  std::vector<size_t> places;
+  size_t first = 0;
+  for (const StudyParameter& parameter : study.law.parameters) {
+    if (parameter.vary == Variation::whole) places.push_back(first);
+    first += value_count(parameter, elements);
+  }
+  return places;
+}
+
+void take_start(Sought& sought, const FitRecord& start, const Study& study, size_t elements) {
+  size_t first = 0;
+  for (const StudyParameter& parameter : study.law.parameters) {
+    const auto found =
+        std::find_if(start.parameters.begin(), start.parameters.end(),
+                     [&](const FittedParameter& fitted) { return fitted.name == parameter.name; });
+    const size_t count = value_count(parameter, elements);
+    if (found == start.parameters.end() ||
+        (found->elements.size() > 1 && count > 1 && found->elements.size() != count)) {
+      throw InputError({study.file.string(), fmt::format("parameter {}", parameter.name),
+                        "is not in the result to start from, or has another number of elements there",
+                        "Start from a result of the same law and mesh."});
+    }
+    for (size_t i = 0; i < count; ++i) {
+      const double value = count > 1 && !found->elements.empty() ? found->elements[i].value : found->value;
+      SoughtValue& sought_value = sought.values[first + i];
+      sought_value.start = std::clamp(value, sought_value.lower, sought_value.upper);
+    }
+    first += count;
+  }
+}
+
+/// A result that has only got so far: values without errors.
+FitRecord checkpoint_of(FitRecord record, const OptimiserStep& step, const Study& study, size_t elements) {
+  constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
+  record.reason = fmt::format("Checkpoint after iteration {}.", step.iteration);
+  record.iterations = step.iteration;
+  record.rms_mm = record.chi2 = record.chi2_per_dof = unknown;
+  record.undeformed_chi2_per_residual = record.undeformed_mean_mm = unknown;
+  size_t first = 0;
+  for (const StudyParameter& parameter : study.law.parameters) {
+    const size_t count = value_count(parameter, elements);
+    FittedParameter& reached = record.parameters.emplace_back();
+    reached.name = parameter.name;
+    reached.value = mean_of_values(step.q, first, count);
+    reached.se = unknown;
+    reached.ci95 = {unknown, unknown};
+    reached.start = parameter.start;
+    reached.bounds = {parameter.lower, parameter.upper};
+    for (size_t i = 0; parameter.vary == Variation::element && i < count; ++i)
+      reached.elements.push_back({step.q[static_cast<Eigen::Index>(first + i)], unknown, {unknown, unknown}});
+    first += count;
+  }
+  return record;
 }
 
 void record_frames(FitRecord& record, const FitOutcome& fit) {
@@ -207,6 +289,13 @@ std::string data_words(const Measurement& measurement) {
 
 }  // namespace
 
+// Extrapolation beyond an element, as a fraction of it: `outside_mm` through the wall, never more than an
+// element.
+LocatorOptions locator_for(const Specimen& specimen) {
+  const double size_mm = std::visit([](const auto& kind) { return element_mm(kind); }, specimen);
+  return {.outside_xi = std::clamp(outside_mm / size_mm, 0.25, 1.0)};
+}
+
 FitRecord fit_study(const Study& study, const Measurement& measurement, const StudyFitOptions& options) {
   if (!has_loaded_point(measurement)) {
     throw InputError({study.file.string(), "table [data]",
@@ -225,14 +314,27 @@ FitRecord fit_study(const Study& study, const Measurement& measurement, const St
   record.unknowns = model.dofs();
   record.data = data_words(measurement);
 
-  const Sought sought = sought_of(study, model);
+  Sought sought = sought_of(study, model);
+  if (options.start) take_start(sought, *options.start, study, elements);
   ElasticMotion motion(std::move(model), sought.groups);
   FitOptions fit_options;
   fit_options.locator = locator_for(study.specimen);
   fit_options.smooth = sought.smooth;
+  fit_options.robustness = options.paper_mode ? Robustness::never : options.robustness;
+  fit_options.pressure_offset_sigma_kPa = options.pressure_offset_sigma_kPa;
+  fit_options.posterior = options.posterior;
+  fit_options.paper_mode = options.paper_mode;
+  fit_options.optimiser.interrupted = options.interrupted;
+  if (options.paper_mode) {
+    fit_options.smooth.clear();
+    record.search = "finite differences";
+  }
+  if (options.profile) fit_options.profiled = whole_values(study, elements);
   fit_options.optimiser.iteration_limit = options.iteration_limit;
   fit_options.on_step = [&](const OptimiserStep& step) {
     if (options.on_iteration) options.on_iteration(record_of(step, study, elements));
+    if (options.on_checkpoint && step.accepted)
+      options.on_checkpoint(checkpoint_of(record, step, study, elements));
   };
   const FitOutcome fit = fit_motion(motion, sought.values, measurement, fit_options);
 
@@ -251,7 +353,8 @@ FitRecord fit_study(const Study& study, const Measurement& measurement, const St
   record_parameters(record, study, fit, elements);
   record_frames(record, fit);
   record.residuals = histogram_of(fit);
-  record.remarks = remarks_on(record, fit);
+  for (std::string& remark : remarks_on(record, fit))
+    record.remarks.push_back(std::move(remark));
   record.section_frame = fit.frames.back().number;
   if (annulus != nullptr) {
     record.sections = draw_sections(*annulus, motion.mesh(), fit.frames.back(), measurement);

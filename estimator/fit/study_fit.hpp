@@ -12,10 +12,22 @@ namespace diastole {
 
 struct StudyFitOptions {
   int iteration_limit = 50;
+  Robustness robustness = Robustness::if_needed;
+  std::optional<double> pressure_offset_sigma_kPa = {};  ///< seek a common offset of the pressures
+  bool profile = false;                                  ///< profile intervals of whole parameters
+  std::optional<PosteriorOptions> posterior = {};
+  bool paper_mode = false;
+  std::optional<FitRecord> start = {};  ///< an earlier result or a checkpoint to start from
+  /// Called at each accepted step with a record that `start` can take up.
+  std::function<void(const FitRecord&)> on_checkpoint = {};
+  std::function<bool()> interrupted = {};  ///< asked after each step: true ends the search
   std::function<void(const FitIteration&)> on_iteration;
 };
 
-/// Throws InputError for studies that cannot be modelled (study_model.hpp) or hold no loaded point.
+/// How far outside the specimen a point may lie and still be its own.
+LocatorOptions locator_for(const Specimen& specimen);
+
+/// Throws InputError for a start whose parameters are not the study's, for studies that cannot be modelled (study_model.hpp) or hold no loaded point.
 /// Numerical trouble is told by `converged` and `reason` of the record.
 FitRecord fit_study(const Study& study, const Measurement& measurement, const StudyFitOptions& options);
 

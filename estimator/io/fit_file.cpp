@@ -82,6 +82,15 @@ Json from_parameter(const FittedParameter& parameter) {
                           {"step90", from_interval(smoothness->step90)},
                           {"effective_values", from_number(smoothness->effective_values)}};
   }
+  if (const auto& profile = parameter.profile)
+    json["profile"] = {{"ci95", from_interval(profile->ci95)}, {"at_bound", profile->at_bound}};
+  if (const auto& posterior = parameter.posterior) {
+    json["posterior"] = {{"mean", posterior->mean},
+                         {"sd", posterior->sd},
+                         {"ci95", posterior->ci95},
+                         {"r_hat", from_number(posterior->r_hat)},
+                         {"effective_draws", from_number(posterior->effective_draws)}};
+  }
   return json;
 }
 FittedParameter to_parameter(const std::string& name, const Json& json) {
@@ -99,6 +108,15 @@ FittedParameter to_parameter(const std::string& name, const Json& json) {
       parameter.elements.push_back(
           {to_number(element.at("value")), to_number(element.at("se")), to_interval(element.at("ci95"))});
     }
+  }
+  if (json.contains("profile")) {
+    parameter.profile =
+        FittedProfile{to_interval(json.at("profile").at("ci95")), json.at("profile").at("at_bound")};
+  }
+  if (json.contains("posterior")) {
+    const Json& told = json.at("posterior");
+    parameter.posterior = FittedPosterior{told.at("mean"), told.at("sd"), to_interval(told.at("ci95")),
+                                          to_number(told.at("r_hat")), to_number(told.at("effective_draws"))};
   }
   if (json.contains("smoothness")) {
     const Json& told = json.at("smoothness");
@@ -200,6 +218,25 @@ Json from_record(const FitRecord& record) {
   for (const FittedFrame& frame : record.frames)
     json["frames"].push_back(from_frame(frame));
   json["correlation"] = {{"names", record.correlation.names}, {"matrix", record.correlation.matrix}};
+  json["directions"] = Json::array();
+  for (const FittedDirection& direction : record.directions) {
+    Json change = Json::object();
+    for (size_t i = 0; i < direction.names.size(); ++i)
+      change[direction.names[i]] = direction.change[i];
+    json["directions"].push_back({{"relative_sd", from_number(direction.relative_sd)}, {"change", change}});
+  }
+  if (const auto& robust = record.robust) {
+    json["robust"] = {{"degrees", robust->degrees}, {"scale", robust->scale}, {"wild", robust->wild}};
+  }
+  if (const auto& posterior = record.posterior) {
+    json["posterior"] = {{"draws", posterior->draws},
+                         {"accepted", posterior->accepted},
+                         {"equilibria", posterior->equilibria},
+                         {"seconds", posterior->seconds}};
+  }
+  if (const auto& offset = record.pressure_offset_kPa)
+    json["pressure_offset_kPa"] = {{"value", (*offset)[0]}, {"se", from_number((*offset)[1])}};
+  json["search"] = record.search;
   json["history"] = from_history(record.history);
   json["residuals"] = {{"edges", record.residuals.edges}, {"counts", record.residuals.counts}};
   json["section_frame"] = record.section_frame;
@@ -244,6 +281,30 @@ FitRecord to_record(const Json& json) {
   record.correlation.names = json.at("correlation").at("names").get<std::vector<std::string>>();
   for (const Json& row : json.at("correlation").at("matrix")) {
     record.correlation.matrix.push_back(to_lengths(row));
+  }
+  if (json.contains("directions")) {
+    for (const Json& told : json.at("directions")) {
+      FittedDirection direction{to_number(told.at("relative_sd")), {}, {}};
+      for (const auto& [name, change] : told.at("change").items()) {
+        direction.names.push_back(name);
+        direction.change.push_back(change);
+      }
+      record.directions.push_back(std::move(direction));
+    }
+  }
+  if (json.contains("posterior")) {
+    const Json& told = json.at("posterior");
+    record.posterior =
+        PosteriorDrawing{told.at("draws"), told.at("accepted"), told.at("equilibria"), told.at("seconds")};
+  }
+  if (json.contains("pressure_offset_kPa")) {
+    const Json& offset = json.at("pressure_offset_kPa");
+    record.pressure_offset_kPa = {offset.at("value").get<double>(), to_number(offset.at("se"))};
+  }
+  record.search = json.value("search", record.search);
+  if (json.contains("robust")) {
+    const Json& robust = json.at("robust");
+    record.robust = FittedRobust{robust.at("degrees"), robust.at("scale"), robust.at("wild")};
   }
   for (const Json& step : json.at("history")) {
     record.history.push_back({step.at("iteration"), to_number(step.at("cost")), step.at("accepted"),

@@ -21,11 +21,34 @@ struct FittedElement {
 
 /// How alike a regional parameter's neighbouring elements were taken to be (estimator/fit/smoothness.hpp).
 struct FittedSmoothness {
-  double step;                    ///< the usual relative difference between neighbours
-  bool by_evidence;               ///< or else given
-  bool none_seen;                 ///< the evidence asks for no difference between elements
-  std::array<double, 2> step90;   ///< 90 % interval of the step
-  double effective_values;        ///< how many independent values the data determine
+  double step;                   ///< the usual relative difference between neighbours
+  bool by_evidence;              ///< or else given
+  bool none_seen;                ///< the evidence asks for no difference between elements
+  std::array<double, 2> step90;  ///< 90 % interval of the step
+  double effective_values;       ///< how many independent values the data determine
+};
+
+/// From the likelihood's true shape (estimator/fit/profile.hpp).
+struct FittedProfile {
+  std::array<double, 2> ci95;
+  std::array<bool, 2> at_bound;  ///< the bound ends the interval, not the data
+};
+
+/// From draws of the posterior (estimator/fit/posterior.hpp).
+struct FittedPosterior {
+  double mean;
+  double sd;
+  std::array<double, 2> ci95;
+  double r_hat;
+  double effective_draws;
+};
+
+/// How the posterior was drawn.
+struct PosteriorDrawing {
+  int draws;
+  double accepted;
+  long equilibria;
+  double seconds;
 };
 
 struct FittedParameter {
@@ -38,6 +61,8 @@ struct FittedParameter {
   std::string at_bound;                 ///< "", "lower" or "upper"
   std::vector<FittedElement> elements;  ///< empty unless the parameter varies by element
   std::optional<FittedSmoothness> smoothness = {};
+  std::optional<FittedProfile> profile = {};      ///< of a whole parameter, if asked for
+  std::optional<FittedPosterior> posterior = {};  ///< the same
 };
 
 struct FittedFrame {
@@ -57,6 +82,20 @@ struct FitIteration {
   double cost;  ///< half the weighted sum of squares
   bool accepted;
   std::vector<double> parameters;  ///< in the order of `parameters`; regional ones by their mean
+};
+
+/// A combination of parameters, one relative change each, in the order of `parameters` (whole, positive ones only).
+struct FittedDirection {
+  double relative_sd;  ///< how far the data let the combination go, as a standard deviation
+  std::vector<std::string> names;
+  std::vector<double> change;  ///< of length 1, the largest positive
+};
+
+/// Of a fit whose loss is not the normal's (estimator/fit/robust_loss.hpp).
+struct FittedRobust {
+  double degrees;  ///< of Student's t
+  double scale;    ///< in stated standard deviations
+  size_t wild;     ///< residuals beyond five standard deviations
 };
 
 /// Points that could not be used, and why.
@@ -103,6 +142,13 @@ struct FitRecord {
   std::string data;  ///< "tags", "points" or "tags and points"
   std::vector<FittedParameter> parameters;
   Correlation correlation;
+  std::vector<FittedDirection> directions =
+      {};  ///< from the one that the data see worst; empty for one parameter
+  std::optional<FittedRobust> robust = {};
+  std::optional<PosteriorDrawing> posterior = {};
+  /// Of all frame pressures, measured less true, with its standard error; if it was sought.
+  std::optional<std::array<double, 2>> pressure_offset_kPa = {};
+  std::string search = "exact sensitivities";  ///< or "finite differences": the paper's
   double rms_mm;  ///< of the unweighted residuals (a tag's along its normal; a point's three components)
   double chi2;
   size_t dof;

@@ -26,6 +26,25 @@ std::string interval_words(const FittedParameter& parameter) {
                      unit);
 }
 
+void add_shapes(Page& page, const FitRecord& fit) {
+  std::vector<std::vector<std::string>> rows;
+  for (const FittedParameter& parameter : fit.parameters) {
+    if (!parameter.profile && !parameter.posterior) continue;
+    const auto interval = [](const std::array<double, 2>& ends) {
+      return fmt::format("{} to {}", number(ends[0], 4), number(ends[1], 4));
+    };
+    rows.push_back({parameter.name, interval(parameter.ci95),
+                    parameter.profile ? interval(parameter.profile->ci95) : "–",
+                    parameter.posterior ? interval(parameter.posterior->ci95) : "–",
+                    parameter.posterior ? number(parameter.posterior->r_hat, 4) : "–",
+                    parameter.posterior ? number(parameter.posterior->effective_draws, 3) : "–"});
+  }
+  if (rows.empty()) return;
+  page.table(
+      {"parameter", "95 % interval", "profile", "posterior", "R-hat", "effective draws"}, rows,
+      "Intervals from the likelihood's curvature, from its true shape, and from draws of the posterior.");
+}
+
 void add_parameters(Page& page, const FitRecord& fit) {
   std::vector<std::vector<std::string>> rows;
   for (const FittedParameter& parameter : fit.parameters) {
@@ -38,6 +57,7 @@ void add_parameters(Page& page, const FitRecord& fit) {
   page.table({"parameter", "value ± standard error", "95 % interval", "start", "bounds", "on a bound"}, rows,
              "The material's parameters. Errors carry the noise of the imaged motion and of the measured "
              "pressures.");
+  add_shapes(page, fit);
   for (const FittedParameter& parameter : fit.parameters) {
     if (parameter.elements.empty()) continue;
     SvgPlot plot({.x = {.label = "element"}, .y = {.label = parameter.name}});

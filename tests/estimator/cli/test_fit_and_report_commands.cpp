@@ -134,6 +134,56 @@ TEST_F(FitAndReport, OnlyAnEarlierResultIsReplacedWithoutForce) {
   EXPECT_EQ(run(quick_fit({"-o", fit})).code, ExitCode::done);
 }
 
+TEST_F(FitAndReport, ACheckpointHoldsWhatWasReachedAndIsTakenUp) {
+  const std::string checkpoint = file("gel.checkpoint.json");
+  const Outcome cut = run(quick_fit({"--json", "--checkpoint", checkpoint, "--iterations", "1"}));
+  EXPECT_EQ(cut.code, ExitCode::negative);
+  const auto reached = nlohmann::json::parse(read_whole_file(checkpoint));
+  EXPECT_THAT(reached.at("reason").get<std::string>(), HasSubstr("Checkpoint after iteration 1"));
+  EXPECT_FALSE(reached.at("converged").get<bool>());
+  const auto whole = nlohmann::json::parse(run(quick_fit({"--json"})).output);
+  const Outcome resumed = run(quick_fit({"--json", "--checkpoint", checkpoint, "--resume"}));
+  EXPECT_EQ(resumed.code, ExitCode::done);
+  const auto json = nlohmann::json::parse(resumed.output);
+  const double expected = whole.at("parameters").at("C1_kPa").at("value");
+  EXPECT_NEAR(json.at("parameters").at("C1_kPa").at("value").get<double>(), expected, 1e-4);
+  EXPECT_LT(json.at("iterations").get<int>(), whole.at("iterations").get<int>());
+  EXPECT_EQ(run({"report", checkpoint, "-o", file("checkpoint.html")}).code, ExitCode::done);
+}
+
+TEST_F(FitAndReport, AResultOfOtherParametersIsNoStart) {
+  const std::string result = file("gel.fit.json");
+  ASSERT_EQ(run(quick_fit({"-o", result})).code, ExitCode::done);
+  std::string text = read_whole_file(result);
+  for (size_t at = text.find("C1_kPa"); at != std::string::npos; at = text.find("C1_kPa"))
+    text.replace(at, 6, "c9_kPa");
+  const std::string other = folder_.write("other.fit.json", text).string();
+  EXPECT_THAT(message_of([&] {
+                run(quick_fit({"--start", other}));
+              }),
+              AllOf(HasSubstr("C1_kPa"), HasSubstr("same law and mesh")));
+  EXPECT_THAT(message_of([&] { run(quick_fit({"--resume"})); }), HasSubstr("--checkpoint"));
+}
+
+TEST_F(FitAndReport, ProfilePosteriorAndThePapersSearchComeIntoResultAndReport) {
+  const std::string result = file("gel.fit.json");
+  ASSERT_EQ(
+      run(quick_fit({"--profile", "--posterior", "40", "--pressure-offset", "0.05", "-o", result})).code,
+      ExitCode::done);
+  const auto json = nlohmann::json::parse(read_whole_file(result));
+  const auto& C1 = json.at("parameters").at("C1_kPa");
+  EXPECT_LT(C1.at("profile").at("ci95").at(0).get<double>(), C1.at("value").get<double>());
+  EXPECT_GT(C1.at("posterior").at("r_hat").get<double>(), 0.9);
+  EXPECT_GE(json.at("posterior").at("equilibria").get<int>(), 40);
+  EXPECT_GT(json.at("pressure_offset_kPa").at("se").get<double>(), 0.0);
+  ASSERT_EQ(run({"report", result, "-o", file("gel.html")}).code, ExitCode::done);
+  EXPECT_THAT(read_whole_file(file("gel.html")), AllOf(HasSubstr("R-hat"), HasSubstr("profile")));
+  const auto paper = nlohmann::json::parse(run(quick_fit({"--paper-mode", "--json"})).output);
+  EXPECT_EQ(paper.at("search"), "finite differences");
+  EXPECT_NEAR(paper.at("parameters").at("C1_kPa").at("value").get<double>(), C1.at("value").get<double>(),
+              0.2);
+}
+
 TEST_F(FitAndReport, ADeviceIsNotReplacedByAFile) {
   const std::string run_file = DIASTOLE_SOURCE_DIR "/examples/recorded-baseline.run.h5";
   std::filesystem::create_symlink("/dev/null", file("sink"));

@@ -106,7 +106,7 @@ TEST(Fit, EstimatesScatterAsTheirErrorsSay) {
     const FitOutcome fit = fit_C1(measured({.seed = seed}));
     ASSERT_TRUE(fit.converged) << fit.reason;
     squares += std::pow((fit.values[0].value - truth_kPa) / fit.values[0].se, 2);
-    chi2_per_dof += fit.chi2 / static_cast<double>(fit.rows - fit.unknowns) / repeats;
+    chi2_per_dof += fit.chi2 / (static_cast<double>(fit.rows) - fit.unknowns) / repeats;
   }
   // 0.1 % tails of chi-square with 8 degrees of freedom.
   EXPECT_GT(squares, 0.86);

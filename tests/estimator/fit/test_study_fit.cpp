@@ -119,7 +119,7 @@ TEST_F(CoarseStudy, RegionalValuesComeWithTheirMean) {
   EXPECT_LT(C1.se, least_se);
   EXPECT_NEAR(C1.value, 8.71, 4 * C1.se);
   EXPECT_EQ(record.correlation.names.size(), 8U + 2U);
-  EXPECT_THAT(record.remarks, Contains(HasSubstr("without any smoothing")));
+  EXPECT_THAT(record.remarks, Contains(HasSubstr("as the data themselves say")));
 }
 
 TEST_F(CoarseStudy, ABoundIsSaid) {
@@ -132,7 +132,7 @@ TEST_F(CoarseStudy, ABoundIsSaid) {
 // Five of the eight values end on the bound of 9: with them held, the others' search must
 // not slow down.
 TEST_F(CoarseStudy, AnElementOnItsBoundIsHeldAndTheMeanSaysSo) {
-  study_.law.parameters[0] = {"C1_kPa", 6.0, 1.0, 9.0, Variation::element};
+  study_.law.parameters[0] = {"C1_kPa", 6.0, 1.0, 9.0, Variation::element, {Smoothness::Kind::none}};
   const FitRecord record = fit();
   EXPECT_TRUE(record.converged) << record.reason;
   EXPECT_LE(record.iterations, 7);
@@ -153,7 +153,7 @@ TEST_F(CoarseStudy, AnElementOnItsBoundIsHeldAndTheMeanSaysSo) {
 }
 
 TEST_F(CoarseStudy, AStartOnABoundIsLeftWhenTheCostFallsInside) {
-  study_.law.parameters[0] = {"C1_kPa", 6.0, 1.0, 15.0, Variation::element};
+  study_.law.parameters[0] = {"C1_kPa", 6.0, 1.0, 15.0, Variation::element, {Smoothness::Kind::none}};
   const FitRecord inside = fit();
   study_.law.parameters[0].start = 15.0;
   const FitRecord from_bound = fit();

@@ -91,6 +91,34 @@ TEST_F(StudyFile, FaultsNamePlaceValueAndRemedy) {
   EXPECT_THAT(message_with("start = 6.0", "start = nan"), HasSubstr("start"));
 }
 
+TEST_F(StudyFile, SmoothnessArrivesAndCanBeSetOnTheCommandLine) {
+  const auto with = [](std::string_view keys) {
+    std::string content = gel;
+    content.replace(content.find("vary = \"whole\""), 14, keys);
+    return content;
+  };
+  const auto smoothness = [&](std::string_view keys) {
+    return read(with(keys)).law.parameters[0].smoothness;
+  };
+  EXPECT_EQ(smoothness("vary = \"element\"").kind, Smoothness::Kind::evidence);
+  EXPECT_EQ(smoothness("vary = \"element\"\nsmooth = \"none\"").kind, Smoothness::Kind::none);
+  EXPECT_EQ(smoothness("vary = \"element\"\nsmooth_step = 0.05").step, 0.05);
+  const auto fault = [&](std::string_view keys) { return message_of([&] { (void)read(with(keys)); }); };
+  EXPECT_THAT(fault("vary = \"element\"\nsmooth = \"a lot\""),
+              AllOf(HasSubstr("smooth"), HasSubstr("evidence")));
+  EXPECT_THAT(fault("vary = \"element\"\nsmooth_step = 0.0"), HasSubstr("smooth_step"));
+  EXPECT_THAT(fault("vary = \"element\"\nsmooth = \"none\"\nsmooth_step = 0.1"), HasSubstr("one of the two"));
+  EXPECT_THAT(fault("vary = \"whole\"\nsmooth = \"none\""), HasSubstr("only one"));
+
+  Study study = read(with("vary = \"element\""));
+  set_smoothness(study, "0.2");
+  EXPECT_EQ(study.law.parameters[0].smoothness.step, 0.2);
+  set_smoothness(study, "none");
+  EXPECT_EQ(study.law.parameters[0].smoothness.kind, Smoothness::Kind::none);
+  for (const char* wrong : {"", "much", "-1", "0", "0.1x"})
+    EXPECT_THAT(message_of([&] { set_smoothness(study, wrong); }), HasSubstr("--smooth")) << wrong;
+}
+
 TEST_F(StudyFile, StartAndMeshCanBeSetOnTheCommandLine) {
   Study study = read(gel);
   set_start(study, "C1_kPa=7.25");

@@ -27,6 +27,14 @@ FitRecord gel_fit() {
   fit.unknowns = 1792;
   fit.data = "tags";
   fit.parameters = {{"C1_kPa", 8.5692, 0.0877, {8.3989, 8.7428}, 6.0, {1.0, 15.0}, "", {}}};
+  fit.parameters[0].smoothness = FittedSmoothness{0.1, true, false, {0.08, 0.15}, 13.4};
+  fit.parameters[0].profile = FittedProfile{{8.4, 15.0}, {false, true}};
+  fit.parameters[0].posterior = FittedPosterior{8.57, 0.09, {8.4, 8.75}, 1.01, 180};
+  fit.posterior = PosteriorDrawing{200, 0.97, 1300, 12.5};
+  fit.directions = {{0.05, {"b1", "b2"}, {0.8, -0.6}}, {0.01, {"b1", "b2"}, {0.6, 0.8}}};
+  fit.robust = FittedRobust{4, 0.8, 700};
+  fit.pressure_offset_kPa = {0.02, 0.01};
+  fit.search = "finite differences";
   fit.correlation = {{"C1_kPa", "pressure_kPa[1]"}, {{1.0, 0.32}, {0.32, 1.0}}};
   fit.rms_mm = 0.79436;
   fit.chi2 = 12816.3;
@@ -64,6 +72,12 @@ TEST(FitFile, ComesBackAsItWasWritten) {
   EXPECT_EQ(back.parameters[0].name, "C1_kPa");
   EXPECT_EQ(back.parameters[0].value, 8.5692);
   EXPECT_EQ(back.correlation.matrix[0][1], 0.32);
+  EXPECT_EQ(back.parameters[0].smoothness->step90[1], 0.15);
+  EXPECT_TRUE(back.parameters[0].profile->at_bound[1]);
+  EXPECT_EQ(back.parameters[0].posterior->effective_draws, 180);
+  EXPECT_EQ(back.directions[0].change[1], -0.6);
+  EXPECT_EQ(back.robust->wild, 700U);
+  EXPECT_EQ((*back.pressure_offset_kPa)[0], 0.02);
   EXPECT_TRUE(std::isnan(back.undeformed_mean_mm));
 }
 

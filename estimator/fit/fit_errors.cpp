@@ -1,0 +1,179 @@
+#include "estimator/fit/fit_errors.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "estimator/fit/uncertainty.hpp"
+
+namespace diastole {
+namespace {
+
+constexpr double not_a_number = std::numeric_limits<double>::quiet_NaN();
+
+/// Variances of the values alone, pressures held at their estimates.
+Eigen::VectorXd variances_at_exact_pressure(const Eigen::MatrixXd& jacobian, const std::vector<bool>& is_free,
+                                            Eigen::Index values) {
+  const std::vector<bool> free_values(is_free.begin(), is_free.begin() + values);
+  return covariance(jacobian.leftCols(values), free_values).diagonal();
+}
+
+EstimatedValue estimated(const SoughtValue& sought, double q, BoundSide bound, double variance,
+                         double exact_variance) {
+  EstimatedValue result{sought.value(q),
+                        not_a_number,
+                        {not_a_number, not_a_number},
+                        not_a_number,
+                        bound == BoundSide::lower,
+                        bound == BoundSide::upper};
+  if (bound != BoundSide::none) return result;
+  const double sd = std::sqrt(variance);
+  result.se = sought.slope(q) * sd;
+  result.se_exact_pressure = sought.slope(q) * std::sqrt(exact_variance);
+  result.ci95 = {sought.value(q - normal_95 * sd), sought.value(q + normal_95 * sd)};
+  return result;
+}
+
+EstimatedFrame estimated(const JointProblem::LoadedFrame& frame, const Eigen::VectorXd& q,
+                         const Eigen::MatrixXd& covariance) {
+  const auto unknown = frame.pressure_unknown;
+  return {.number = frame.number,
+          .load = frame.load,
+          .pressure_kPa = unknown ? q[*unknown] : frame.load.pressure_kPa,
+          .se_kPa = unknown ? std::sqrt(covariance(*unknown, *unknown)) : 0.0,
+          .usable = frame.residuals.usable(),
+          .tags_left_out = frame.residuals.tags_left_out(),
+          .points_left_out = frame.residuals.points_left_out(),
+          .weighted = frame.residuals.weighted(),
+          .unweighted_mm = frame.residuals.unweighted_mm(),
+          .position_mm = frame.position_mm};
+}
+
+/// Smallest step below which the given share of the posterior lies.
+double step_at(const EvidenceOfStep& evidence, double share) {
+  double sum = 0;
+  for (size_t i = 0; i < evidence.steps.size(); ++i) {
+    sum += evidence.weights[i];
+    if (sum >= share) return evidence.steps[i];
+  }
+  return evidence.steps.back();
+}
+
+/// (a J'J + P)^-1 (b J'J + P) (a J'J + P)^-1 with J of the motion, P of the priors, a and b the means of the
+/// influence's slope and square: the covariance of an M-estimator (Huber, Robust Statistics, 1981, 7.6).
+struct RobustErrors {
+  Eigen::MatrixXd covariance;
+  Eigen::MatrixXd jacobian;      ///< whose J'J is a J'J + P
+  double exact_variance_factor;  ///< b / a
+};
+
+RobustErrors robust_errors(JointProblem& problem, const Eigen::VectorXd& q,
+                           const std::vector<bool>& is_free) {
+  const Eigen::VectorXd residuals = problem.motion_residuals();
+  const RobustLoss& loss = *problem.robust();
+  double slope = 0, square = 0;
+  for (const double r : residuals) {
+    slope += loss.influence_slope(r) / static_cast<double>(residuals.size());
+    square += loss.influence(r) * loss.influence(r) / static_cast<double>(residuals.size());
+  }
+  RobustErrors errors;
+  errors.jacobian = problem.plain_jacobian(q);
+  const Eigen::MatrixXd motion = errors.jacobian.topRows(residuals.size());
+  errors.jacobian.topRows(residuals.size()) *= std::sqrt(slope);
+  const Eigen::MatrixXd inverse = covariance(errors.jacobian, is_free);
+  const Eigen::MatrixXd spread =
+      errors.jacobian.transpose() * errors.jacobian + (square - slope) * motion.transpose() * motion;
+  errors.covariance = inverse * spread * inverse;
+  errors.exact_variance_factor = square / slope;
+  return errors;
+}
+
+/// What the smoothness' own uncertainty adds to the covariance at the chosen steps.
+void tell_smoothness(FitOutcome& outcome, JointProblem& problem, const Eigen::VectorXd& q,
+                     const FitOptions& options, const std::vector<bool>& is_free) {
+  if (options.smooth.empty()) return;
+  const QuadraticModel model = quadratic_model(problem, q);
+  const Eigen::MatrixXd at_chosen = outcome.covariance;
+  const Eigen::MatrixXd seen = at_chosen * model.hessian;
+  for (size_t i = 0; i < options.smooth.size(); ++i) {
+    const SmoothBlock& block = problem.smoothness()[i];
+    SmoothOutcome told{
+        options.smooth[i].first_value, block.step,
+        !options.smooth[i].step,       false,
+        {block.step, block.step},      seen.diagonal().segment(block.first, block.differences.cols()).sum()};
+    if (told.by_evidence) {
+      const EvidenceOfStep evidence = evidence_of_step(model, problem.smoothness(), i, is_free);
+      told.none_seen = evidence.none_seen;
+      told.step90 = {step_at(evidence, 0.05), step_at(evidence, 0.95)};
+      for (size_t k = 0; k < evidence.steps.size(); ++k) {
+        const Eigen::VectorXd apart = evidence.q[k] - q;
+        outcome.covariance +=
+            evidence.weights[k] * (evidence.covariance[k] + apart * apart.transpose() - at_chosen);
+      }
+    }
+    outcome.smoothness.push_back(told);
+  }
+}
+
+}  // namespace
+
+std::vector<bool> free_unknowns(const JointProblem& problem, const Eigen::VectorXd& q) {
+  std::vector<bool> is_free;
+  for (Eigen::Index i = 0; i < q.size(); ++i)
+    is_free.push_back(problem.bound_under(q, i) == BoundSide::none);
+  return is_free;
+}
+
+QuadraticModel quadratic_model(JointProblem& problem, const Eigen::VectorXd& q) {
+  const Eigen::VectorXd residuals = problem.residuals(q)->head(problem.data_rows());
+  const Eigen::MatrixXd jacobian = problem.jacobian(q).topRows(problem.data_rows());
+  return {q, jacobian.transpose() * residuals, jacobian.transpose() * jacobian};
+}
+
+Eigen::MatrixXd tell_uncertainty(FitOutcome& outcome, JointProblem& problem, const Eigen::VectorXd& q,
+                                 const FitOptions& options) {
+  const Eigen::VectorXd* residuals = problem.residuals(q);
+  if (residuals == nullptr) {
+    outcome.converged = false;
+    outcome.reason = "Failed: " + problem.failure() + ".";
+    return {};
+  }
+  Eigen::MatrixXd jacobian = problem.jacobian(q);
+  const std::vector<bool> is_free = free_unknowns(problem, q);
+  outcome.rows = problem.data_rows();
+  const Eigen::VectorXd motion = problem.motion_residuals();
+  outcome.chi2 =
+      motion.squaredNorm() + residuals->segment(motion.size(), outcome.rows - motion.size()).squaredNorm();
+  outcome.covariance = covariance(jacobian, is_free);
+  double exact_factor = 1;
+  if (problem.robust()) {
+    RobustErrors errors = robust_errors(problem, q, is_free);
+    outcome.covariance = std::move(errors.covariance);
+    jacobian = std::move(errors.jacobian);
+    exact_factor = errors.exact_variance_factor;
+    outcome.robust = RobustOutcome{*problem.robust(), wild_count(motion)};
+  }
+  const Eigen::MatrixXd data_jacobian = jacobian.topRows(outcome.rows);
+  outcome.unknowns = effective_count(outcome.covariance, data_jacobian);
+  tell_smoothness(outcome, problem, q, options, is_free);
+  Eigen::MatrixXd in_coordinates = outcome.covariance;
+  const Eigen::VectorXd exact =
+      exact_factor * variances_at_exact_pressure(jacobian, is_free, problem.values());
+  for (Eigen::Index i = 0; i < problem.values(); ++i) {
+    outcome.values.push_back(
+        estimated(problem.value(i), q[i], problem.bound_under(q, i), outcome.covariance(i, i), exact[i]));
+    const double slope = problem.value(i).slope(q[i]);
+    outcome.covariance.row(i) *= slope;
+    outcome.covariance.col(i) *= slope;
+  }
+  if (const auto offset = problem.offset_unknown())
+    outcome.pressure_offset = PressureOffset{q[*offset], std::sqrt(outcome.covariance(*offset, *offset))};
+  for (const JointProblem::LoadedFrame& frame : problem.frames()) {
+    outcome.frames.push_back(estimated(frame, q, outcome.covariance));
+    if (outcome.pressure_offset && !frame.pressure_unknown)
+      outcome.frames.back().pressure_kPa -= outcome.pressure_offset->value_kPa;
+  }
+  return in_coordinates;
+}
+
+}  // namespace diastole

@@ -1,0 +1,19 @@
+#pragma once
+// What a finished search says of its unknowns: values, errors, the motion of each frame.
+
+#include "estimator/fit/fit.hpp"
+
+namespace diastole {
+
+/// Which unknowns do not rest on a bound.
+std::vector<bool> free_unknowns(const JointProblem& problem, const Eigen::VectorXd& q);
+
+/// Of the data alone, at q. Precondition: `residuals(q)` succeeds.
+QuadraticModel quadratic_model(JointProblem& problem, const Eigen::VectorXd& q);
+
+/// Fills values, frames, covariance, chi2 and what goes with them, at the optimum q. Returns the covariance in the
+/// unknowns' own coordinates; empty (and the outcome not converged) if the model fails there.
+Eigen::MatrixXd tell_uncertainty(FitOutcome& outcome, JointProblem& problem, const Eigen::VectorXd& q,
+                                 const FitOptions& options);
+
+}  // namespace diastole

@@ -1,0 +1,109 @@
+#include "estimator/fit/paper_search.hpp"
+
+#include <fmt/format.h>
+#include <nlopt.h>
+
+#include <cmath>
+#include <memory>
+#include <vector>
+
+namespace diastole {
+namespace {
+
+constexpr double difference = 1e-4;  // of a parameter's value: well above the equilibria's own error
+
+struct Search {
+  JointProblem& problem;
+  const OptimiserOptions& options;
+  int iterations = 0;
+  double worst_cost = 0;  ///< what a point without equilibrium is said to cost
+  double best_cost = 0;
+  Eigen::VectorXd best_q{};
+
+  [[nodiscard]] Eigen::VectorXd coordinates(const double* values) const {
+    Eigen::VectorXd q(problem.values());
+    for (Eigen::Index i = 0; i < q.size(); ++i)
+      q[i] = problem.value(i).coordinate(values[i]);
+    return q;
+  }
+
+  [[nodiscard]] double cost(const Eigen::VectorXd& q) {
+    if (problem.residuals(q) == nullptr) return worst_cost;
+    double squares_mm2 = 0;
+    for (const JointProblem::LoadedFrame& frame : problem.frames())
+      squares_mm2 += frame.residuals.unweighted_mm().squaredNorm();
+    return squares_mm2 / 2;
+  }
+};
+
+double evaluate(unsigned count, const double* values, double* gradient, void* data) {
+  Search& search = *static_cast<Search*>(data);
+  const Eigen::VectorXd q = search.coordinates(values);
+  const double here = search.cost(q);
+  if (search.worst_cost == 0) search.worst_cost = 1e3 * (1 + here);
+  const bool better = search.best_q.size() == 0 || here < search.best_cost;
+  if (better) {
+    search.best_q = q;
+    search.best_cost = here;
+  }
+  if (gradient == nullptr) return here;
+  if (search.options.on_step) search.options.on_step({search.iterations, here, better, search.best_q});
+  ++search.iterations;
+  std::vector<double> moved(values, values + count);
+  for (unsigned i = 0; i < count; ++i) {
+    const double step = difference * std::max(std::abs(values[i]), 1e-3);
+    moved[i] = values[i] + step;
+    gradient[i] = (search.cost(search.coordinates(moved.data())) - here) / step;
+    moved[i] = values[i];
+  }
+  return here;
+}
+
+std::string reason_of(nlopt_result result, const Search& search) {
+  switch (result) {
+    case NLOPT_XTOL_REACHED:
+      return fmt::format("Converged: the last step changed the parameters by less than {:g} of their norm.",
+                         paper_tolerance);
+    case NLOPT_SUCCESS:
+    case NLOPT_FTOL_REACHED:
+      return "Converged: the cost's gradient vanishes.";
+    case NLOPT_ROUNDOFF_LIMITED:
+      return "Failed: the differences' own error hides the direction in which the cost falls.";
+    case NLOPT_MAXEVAL_REACHED:
+      return fmt::format("Stopped at the limit of {} iterations; the cost was still falling.",
+                         search.options.iteration_limit);
+    default:
+      return "Failed: sequential quadratic programming found no step.";
+  }
+}
+
+}  // namespace
+
+OptimiserResult paper_search(JointProblem& problem, const Eigen::VectorXd& start,
+                             const OptimiserOptions& options) {
+  const auto count = static_cast<unsigned>(problem.values());
+  Search search{problem, options};
+  std::vector<double> values, lower, upper;
+  for (Eigen::Index i = 0; i < problem.values(); ++i) {
+    values.push_back(problem.value(i).value(start[i]));
+    lower.push_back(problem.value(i).lower);
+    upper.push_back(problem.value(i).upper);
+  }
+  const std::unique_ptr<std::remove_pointer_t<nlopt_opt>, decltype(&nlopt_destroy)> optimiser(
+      nlopt_create(NLOPT_LD_SLSQP, count), nlopt_destroy);
+  nlopt_set_lower_bounds(optimiser.get(), lower.data());
+  nlopt_set_upper_bounds(optimiser.get(), upper.data());
+  nlopt_set_min_objective(optimiser.get(), evaluate, &search);
+  nlopt_set_xtol_rel(optimiser.get(), paper_tolerance);
+  nlopt_set_maxeval(optimiser.get(), options.iteration_limit);
+  double cost = 0;
+  const nlopt_result result = nlopt_optimize(optimiser.get(), values.data(), &cost);
+  return {
+      .q = search.best_q.size() > 0 ? search.best_q : start,
+      .converged = result == NLOPT_SUCCESS || result == NLOPT_XTOL_REACHED || result == NLOPT_FTOL_REACHED,
+      .reason = search.best_q.size() == 0 ? fmt::format("Failed: {}.", problem.failure())
+                                          : reason_of(result, search),
+      .iterations = search.iterations};
+}
+
+}  // namespace diastole

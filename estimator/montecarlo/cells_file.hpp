@@ -1,0 +1,42 @@
+#pragma once
+// The rows of a Monte Carlo table as they come (`NAME.cells.csv`): one line of what was asked, one header, one row a
+// cell. Rows are appended whole, so that an interrupted table goes on where it stopped.
+//
+//   # diastole-cells 1 STUDY seed=1 exact_pressures=0 C_kPa=3 b1=11.09
+//   noise_mm,frames,repeat,converged,iterations,seconds,C_kPa,C_kPa_se,b1,b1_se
+
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include "estimator/montecarlo/montecarlo.hpp"
+
+namespace diastole {
+
+inline constexpr std::string_view cells_file_mark = "# diastole-cells 1 ";
+
+/// One row without its line feed, and back. `row_of` of a failed cell has empty values.
+std::string row_of(const CellResult& result, size_t parameters);
+/// Throws std::invalid_argument.
+CellResult result_of(const std::string& row, size_t parameters);
+
+class CellsFile {
+ public:
+  /// Opens or begins the file. Throws InputError if it belongs to another study, seed or truth, or holds a row that
+  /// is none; a last row that was cut off in its middle is dropped.
+  CellsFile(const std::filesystem::path& path, const Study& study, const MonteCarloPlan& plan);
+
+  [[nodiscard]] const std::vector<CellResult>& results() const { return results_; }
+  [[nodiscard]] bool has(const Cell& cell) const;
+  /// Throws InputError if the disk refuses.
+  void append(const CellResult& result);
+
+ private:
+  std::filesystem::path path_;
+  std::ofstream file_;
+  size_t parameters_;
+  std::vector<CellResult> results_;
+};
+
+}  // namespace diastole

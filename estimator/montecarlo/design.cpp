@@ -1,0 +1,187 @@
+#include "estimator/montecarlo/design.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "estimator/fe/study_model.hpp"
+#include "estimator/fit/elastic_motion.hpp"
+#include "estimator/fit/sought.hpp"
+#include "estimator/fit/study_fit.hpp"
+#include "estimator/montecarlo/synthetic_data.hpp"
+#include "protocol/contract/input_error.hpp"
+
+namespace diastole {
+namespace {
+
+constexpr double new_frames[] = {0.25, 0.5, 0.75, 1.0, 1.25, 1.5};  // of the highest pressure so far
+
+/// What one frame tells, its pressure not yet eliminated.
+struct FrameInformation {
+  int number;
+  double pressure_kPa;
+  double sigma_kPa;
+  Eigen::MatrixXd by_values;
+  Eigen::VectorXd by_both;
+  double by_pressure;
+
+  /// Of the values alone, with `points` times the points and the pressure's error `error` times as large.
+  [[nodiscard]] Eigen::MatrixXd marginal(double points = 1, double error = 1) const {
+    const double sigma = error * sigma_kPa;
+    if (!(sigma > 0)) return points * by_values;
+    const double of_pressure = points * by_pressure + 1 / (sigma * sigma);
+    return points * by_values - points * points * by_both * by_both.transpose() / of_pressure;
+  }
+};
+
+class Explorer {
+ public:
+  Explorer(const Study& study, Measurement measurement)
+      : study_(study), measurement_(std::move(measurement)), model_(make_model(study)) {
+    require_cavity(study_, model_);
+    sought_ = sought_of(study_, model_);
+    elements_ = model_.mesh().element_count();
+    // Every frame's derivative by its pressure is wanted, known exactly or not.
+    for (const Frame& frame : measurement_.frames)
+      stated_sigma_kPa_.push_back(frame.sigma_kPa);
+    motion_.emplace(std::move(model_), sought_.groups);
+  }
+
+  [[nodiscard]] std::vector<FrameInformation> present() {
+    return information_of(measurement_, stated_sigma_kPa_);
+  }
+
+  /// Of frames with the points of the highest one at other pressures; those without equilibrium are left out.
+  [[nodiscard]] std::vector<FrameInformation> at_new_pressures(const FrameInformation& highest) {
+    Measurement design;
+    design.frames = {measurement_.frames.front()};
+    std::vector<NodeField> motions(1);
+    std::vector<double> values;
+    for (const SoughtValue& value : sought_.values)
+      values.push_back(value.start);
+    for (const double share : new_frames) {
+      const double pressure_kPa = share * highest.pressure_kPa;
+      MotionOutcome outcome = motion_->solve(0, values, pressure_kPa);
+      if (!outcome.position_mm) continue;
+      const int frame = static_cast<int>(design.frames.size());
+      design.frames.push_back({0.1 * frame, pressure_kPa, highest.sigma_kPa});
+      motions.push_back(std::move(*outcome.position_mm));
+      for (TagPoint tag : measurement_.tags) {
+        if (tag.frame != highest.number) continue;
+        tag.frame = frame;
+        design.tags.push_back(tag);
+      }
+      for (ObservedPoint point : measurement_.points) {
+        if (point.frame != highest.number) continue;
+        point.frame = frame;
+        design.points.push_back(point);
+      }
+    }
+    const Measurement exact =
+        exact_measurement(motion_->mesh(), design, motions, locator_for(study_.specimen));
+    return information_of(exact, std::vector<double>(design.frames.size(), highest.sigma_kPa));
+  }
+
+  /// Relative standard errors of the study's parameters, in %.
+  [[nodiscard]] std::vector<double> se_percent(const Eigen::MatrixXd& information) const {
+    const Eigen::MatrixXd covariance =
+        information.ldlt().solve(Eigen::MatrixXd::Identity(information.rows(), information.cols()));
+    std::vector<double> result;
+    Eigen::Index first = 0;
+    for (const StudyParameter& parameter : study_.law.parameters) {
+      const auto count = static_cast<Eigen::Index>(value_count(parameter, elements_));
+      const double variance = covariance.block(first, first, count, count).sum();
+      const bool logarithmic = parameter.lower > 0;
+      const double relative = std::sqrt(variance) / static_cast<double>(count);
+      result.push_back(100 * (logarithmic ? relative : relative / std::abs(parameter.start)));
+      first += count;
+    }
+    return result;
+  }
+
+ private:
+  [[nodiscard]] std::vector<FrameInformation> information_of(Measurement measurement,
+                                                             const std::vector<double>& sigma_kPa) {
+    for (Frame& frame : measurement.frames)
+      frame.sigma_kPa = 1;  // an unknown of its own; its prior is put in by `marginal`
+    JointProblem problem(*motion_, sought_.values, measurement, locator_for(study_.specimen));
+    const Eigen::VectorXd q = problem.start();
+    if (!problem.find_points(q) || problem.residuals(q) == nullptr) {
+      throw InputError({study_.file.string(), "", fmt::format("cannot be solved: {}", problem.failure()),
+                        "Give other values with --set."});
+    }
+    const Eigen::MatrixXd jacobian = problem.jacobian(q);
+    std::vector<FrameInformation> frames;
+    Eigen::Index row = 0;
+    for (const JointProblem::LoadedFrame& frame : problem.frames()) {
+      const Eigen::MatrixXd rows = jacobian.middleRows(row, frame.residuals.rows());
+      row += frame.residuals.rows();
+      const Eigen::MatrixXd by_values = rows.leftCols(problem.values());
+      const Eigen::VectorXd by_pressure = rows.col(*frame.pressure_unknown);
+      frames.push_back({frame.number, frame.load.pressure_kPa, sigma_kPa[static_cast<size_t>(frame.number)],
+                        by_values.transpose() * by_values, by_values.transpose() * by_pressure,
+                        by_pressure.squaredNorm()});
+    }
+    return frames;
+  }
+
+  const Study& study_;
+  Measurement measurement_;
+  ElasticModel model_;
+  Sought sought_;
+  size_t elements_ = 0;
+  std::vector<double> stated_sigma_kPa_;
+  std::optional<ElasticMotion> motion_;
+};
+
+Eigen::MatrixXd total(const std::vector<FrameInformation>& frames, double points = 1, double error = 1) {
+  Eigen::MatrixXd sum =
+      Eigen::MatrixXd::Zero(frames.front().by_values.rows(), frames.front().by_values.cols());
+  for (const FrameInformation& frame : frames)
+    sum += frame.marginal(points, error);
+  return sum;
+}
+
+double log_determinant(const Eigen::MatrixXd& information) {
+  return information.ldlt().vectorD().array().abs().max(1e-300).log().sum();
+}
+
+}  // namespace
+
+DesignStudy explore_design(const Study& study, const Measurement& measurement) {
+  Explorer explorer(study, measurement);
+  const std::vector<FrameInformation> frames = explorer.present();
+  const Eigen::MatrixXd now = total(frames);
+  DesignStudy result;
+  for (const StudyParameter& parameter : study.law.parameters) {
+    result.parameters.push_back(parameter.name);
+    result.values.push_back(parameter.start);
+  }
+  result.se_percent = explorer.se_percent(now);
+  const auto add = [&](std::string change, const Eigen::MatrixXd& information) {
+    result.options.push_back({std::move(change), explorer.se_percent(information),
+                              std::exp(0.5 * (log_determinant(now) - log_determinant(information)))});
+  };
+  add("half the tag spacing (twice the points in every frame)", total(frames, 2));
+  add("half the points' noise", total(frames, 4));
+  add("pressures measured twice as exactly", total(frames, 1, 0.5));
+  add("pressures known exactly", total(frames, 1, 0));
+  for (const FrameInformation& frame : frames) {
+    add(fmt::format("frame {} ({:.3g} kPa) imaged twice", frame.number, frame.pressure_kPa),
+        now - frame.marginal() + frame.marginal(2));
+    if (frames.size() > 1)
+      add(fmt::format("without frame {} ({:.3g} kPa)", frame.number, frame.pressure_kPa),
+          now - frame.marginal());
+  }
+  const auto highest = std::max_element(frames.begin(), frames.end(), [](const auto& a, const auto& b) {
+    return a.pressure_kPa < b.pressure_kPa;
+  });
+  for (const FrameInformation& frame : explorer.at_new_pressures(*highest))
+    add(fmt::format("one more frame at {:.3g} kPa", frame.pressure_kPa), now + frame.marginal());
+  std::stable_sort(result.options.begin(), result.options.end(),
+                   [](const DesignOption& a, const DesignOption& b) { return a.volume < b.volume; });
+  return result;
+}
+
+}  // namespace diastole

@@ -1,0 +1,168 @@
+#include "estimator/montecarlo/montecarlo.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "estimator/fe/study_model.hpp"
+#include "estimator/fit/elastic_motion.hpp"
+#include "estimator/fit/fit.hpp"
+#include "estimator/fit/sought.hpp"
+#include "estimator/fit/study_fit.hpp"
+#include "estimator/fit/uncertainty.hpp"
+#include "estimator/montecarlo/synthetic_data.hpp"
+#include "protocol/contract/input_error.hpp"
+
+namespace diastole {
+namespace {
+
+std::vector<NodeField> true_motions(const Study& study, ElasticMotion& motion, const Sought& sought,
+                                    const Measurement& design) {
+  std::vector<double> values;
+  for (const SoughtValue& value : sought.values)
+    values.push_back(value.start);
+  std::vector<NodeField> motions(design.frames.size());
+  for (size_t number = 1; number < design.frames.size(); ++number) {
+    const double pressure_kPa = design.frames[number].pressure_kPa;
+    MotionOutcome outcome = motion.solve(number - 1, values, pressure_kPa);
+    if (!outcome.position_mm) {
+      throw InputError({study.file.string(), fmt::format("frame {}", number),
+                        fmt::format("has no equilibrium at the values to simulate: {}", outcome.reason),
+                        "Give other values with --set, or refine the mesh."});
+    }
+    motions[number] = std::move(*outcome.position_mm);
+  }
+  return motions;
+}
+
+/// A seed of its own for every cell, whatever the plan around it.
+std::mt19937_64 generator_of(const Cell& cell, unsigned seed) {
+  std::seed_seq sequence{seed, static_cast<unsigned>(std::lround(cell.noise_mm * 1e6)),
+                         static_cast<unsigned>(cell.frames), static_cast<unsigned>(cell.repeat)};
+  return std::mt19937_64(sequence);
+}
+
+double mean(const std::vector<double>& values) {
+  double sum = 0;
+  for (const double value : values)
+    sum += value;
+  return sum / static_cast<double>(values.size());
+}
+
+bool holds(const StudyParameter& parameter, double value, double se) {
+  if (!(parameter.lower > 0)) return std::abs(value - parameter.start) <= normal_95 * se;
+  return std::abs(std::log(parameter.start / value)) <= normal_95 * se / value;
+}
+
+ParameterSpread spread_of(const StudyParameter& parameter, const std::vector<double>& values,
+                          const std::vector<double>& errors) {
+  ParameterSpread spread{parameter.name, parameter.start, mean(values), 0, 0, {}, mean(errors), 0};
+  for (size_t i = 0; i < values.size(); ++i) {
+    spread.sd += std::pow(values[i] - spread.mean, 2);
+    spread.coverage +=
+        holds(parameter, values[i], errors[i]) ? 1.0 / static_cast<double>(values.size()) : 0.0;
+  }
+  spread.sd = std::sqrt(spread.sd / static_cast<double>(values.size() - 1));
+  spread.sd_percent = 100 * spread.sd / spread.mean;
+  spread.ci95 = {spread.mean - normal_95 * spread.sd, spread.mean + normal_95 * spread.sd};
+  return spread;
+}
+
+}  // namespace
+
+std::vector<Cell> cells_of(const MonteCarloPlan& plan) {
+  std::vector<Cell> cells;
+  for (int repeat = 1; repeat <= plan.repeats; ++repeat) {
+    for (const double noise_mm : plan.noise_mm) {
+      for (const int frames : plan.frames)
+        cells.push_back({noise_mm, frames, repeat});
+    }
+  }
+  return cells;
+}
+
+struct CellFitter::Impl {
+  Study study;
+  MonteCarloPlan plan;
+  Sought sought;
+  ElasticMotion motion;
+  FitOptions options;
+  Measurement exact;
+};
+
+CellFitter::CellFitter(const Study& study, const Measurement& design, const MonteCarloPlan& plan) {
+  for (const int frames : plan.frames)
+    (void)spread_frames(design, frames);
+  ElasticModel model = make_model(study);
+  require_cavity(study, model);
+  Sought sought = sought_of(study, model);
+  ElasticMotion motion(std::move(model), sought.groups);
+  const LocatorOptions locator = locator_for(study.specimen);
+  Measurement exact =
+      exact_measurement(motion.mesh(), design, true_motions(study, motion, sought, design), locator);
+  FitOptions options;
+  options.locator = locator;
+  options.smooth = sought.smooth;
+  options.robustness = Robustness::never;
+  impl_ = std::make_unique<Impl>(
+      Impl{study, plan, std::move(sought), std::move(motion), std::move(options), std::move(exact)});
+}
+
+CellFitter::~CellFitter() = default;
+
+size_t CellFitter::points() const { return impl_->exact.tags.size() + impl_->exact.points.size(); }
+
+CellResult CellFitter::fit(const Cell& cell) {
+  std::mt19937_64 generator = generator_of(cell, impl_->plan.seed);
+  const std::vector<int> frames = spread_frames(impl_->exact, cell.frames);
+  const Measurement measurement =
+      with_noise(impl_->exact, frames, {cell.noise_mm, impl_->plan.exact_pressures}, generator);
+  const FitOutcome outcome = fit_motion(impl_->motion, impl_->sought.values, measurement, impl_->options);
+  CellResult result{
+      cell, outcome.converged && !outcome.values.empty(), outcome.iterations, outcome.seconds, {}, {}};
+  size_t first = 0;
+  const size_t elements = impl_->motion.mesh().element_count();
+  for (const StudyParameter& parameter : impl_->study.law.parameters) {
+    const size_t count = value_count(parameter, elements);
+    if (result.converged) {
+      const auto start = static_cast<Eigen::Index>(first), size = static_cast<Eigen::Index>(count);
+      double sum = 0;
+      for (size_t i = first; i < first + count; ++i)
+        sum += outcome.values[i].value;
+      result.value.push_back(sum / static_cast<double>(count));
+      const double variance = outcome.covariance.block(start, start, size, size).sum();
+      result.se.push_back(std::sqrt(variance) / static_cast<double>(count));
+    }
+    first += count;
+  }
+  return result;
+}
+
+std::vector<TableEntry> table_of(const MonteCarloPlan& plan, const Study& study,
+                                 const std::vector<CellResult>& results) {
+  std::vector<TableEntry> table;
+  for (const double noise_mm : plan.noise_mm) {
+    for (const int frames : plan.frames) {
+      TableEntry entry{noise_mm, frames, 0, 0, {}};
+      std::vector<std::vector<double>> values(study.law.parameters.size()), errors = values;
+      for (const CellResult& result : results) {
+        if (result.cell.noise_mm != noise_mm || result.cell.frames != frames ||
+            result.cell.repeat > plan.repeats)
+          continue;
+        ++(result.converged ? entry.refits : entry.failed);
+        for (size_t i = 0; result.converged && i < values.size(); ++i) {
+          values[i].push_back(result.value[i]);
+          errors[i].push_back(result.se[i]);
+        }
+      }
+      if (entry.refits > 1) {
+        for (size_t i = 0; i < values.size(); ++i)
+          entry.parameters.push_back(spread_of(study.law.parameters[i], values[i], errors[i]));
+      }
+      table.push_back(std::move(entry));
+    }
+  }
+  return table;
+}
+
+}  // namespace diastole

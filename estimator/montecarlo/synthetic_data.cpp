@@ -1,0 +1,107 @@
+#include "estimator/montecarlo/synthetic_data.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "estimator/fit/tag_match.hpp"
+#include "protocol/contract/input_error.hpp"
+
+namespace diastole {
+namespace {
+
+Eigen::Vector3d vector_of(const std::array<double, 3>& v) { return {v[0], v[1], v[2]}; }
+std::array<double, 3> array_of(const Eigen::Vector3d& v) { return {v[0], v[1], v[2]}; }
+
+}  // namespace
+
+Measurement exact_measurement(const HermiteMesh& mesh, const Measurement& design,
+                              const std::vector<NodeField>& position_mm, const LocatorOptions& locator) {
+  Measurement exact;
+  exact.frames = design.frames;
+  const PointLocator reference(mesh, mesh.reference(), locator);
+  for (size_t number = 1; number < position_mm.size(); ++number) {
+    if (position_mm[number].empty()) continue;
+    const int frame = static_cast<int>(number);
+    const PointLocator deformed(mesh, position_mm[number], locator);
+    for (const TagPoint& tag : design.tags) {
+      if (tag.frame != frame) continue;
+      const auto guess = find_tag(deformed, tag);
+      if (!guess) continue;
+      const auto match = match_tag(mesh, reference, position_mm[number], tag, *guess);
+      if (!match) continue;
+      TagPoint& placed = exact.tags.emplace_back(tag);
+      placed.x_mm = array_of(vector_of(tag.x_mm) - match->error_mm * vector_of(tag.normal));
+    }
+    for (const ObservedPoint& point : design.points) {
+      if (point.frame != frame) continue;
+      const auto found = reference.find(vector_of(point.X_mm));
+      if (!found) continue;
+      exact.points.emplace_back(point).x_mm = array_of(mesh.value(position_mm[number], found->point));
+    }
+  }
+  return exact;
+}
+
+Measurement with_noise(const Measurement& exact, std::span<const int> frames, const NoiseOptions& options,
+                       std::mt19937_64& generator) {
+  std::normal_distribution<double> normal;
+  Measurement noisy;
+  noisy.frames = exact.frames;
+  for (Frame& frame : noisy.frames) {
+    const double error_kPa = frame.sigma_kPa * normal(generator);
+    if (options.exact_pressures) {
+      frame.sigma_kPa = 0;
+    } else {
+      frame.pressure_kPa += error_kPa;
+    }
+  }
+  const auto wanted = [&](int frame) {
+    return std::find(frames.begin(), frames.end(), frame) != frames.end();
+  };
+  for (TagPoint tag : exact.tags) {
+    if (!wanted(tag.frame)) continue;
+    if (options.noise_mm > 0) tag.sigma_mm = options.noise_mm;
+    const double error_mm = tag.sigma_mm * normal(generator);
+    for (size_t k = 0; k < 3; ++k)
+      tag.x_mm[k] += error_mm * tag.normal[k];
+    noisy.tags.push_back(tag);
+  }
+  for (ObservedPoint point : exact.points) {
+    if (!wanted(point.frame)) continue;
+    if (options.noise_mm > 0) point.sigma_mm = options.noise_mm;
+    for (double& x_mm : point.x_mm)
+      x_mm += point.sigma_mm * normal(generator);
+    noisy.points.push_back(point);
+  }
+  return noisy;
+}
+
+std::vector<int> spread_frames(const Measurement& measurement, int count) {
+  std::set<int> with_points;
+  for (const TagPoint& tag : measurement.tags)
+    with_points.insert(tag.frame);
+  for (const ObservedPoint& point : measurement.points)
+    with_points.insert(point.frame);
+  with_points.erase(0);
+  std::vector<int> frames(with_points.begin(), with_points.end());
+  const int available = static_cast<int>(frames.size());
+  if (count < 1 || count > available) {
+    throw InputError({"", fmt::format("--frames {}", count),
+                      fmt::format("the measurement has points in {} loaded frames", available),
+                      fmt::format("Give counts from 1 to {}.", available)});
+  }
+  const auto pressure = [&](int frame) {
+    return measurement.frames[static_cast<size_t>(frame)].pressure_kPa;
+  };
+  std::stable_sort(frames.begin(), frames.end(), [&](int a, int b) { return pressure(a) < pressure(b); });
+  std::vector<int> chosen;
+  for (int i = 1; i <= count; ++i)
+    chosen.push_back(frames[static_cast<size_t>((i * available + count - 1) / count - 1)]);
+  std::sort(chosen.begin(), chosen.end());
+  return chosen;
+}
+
+}  // namespace diastole

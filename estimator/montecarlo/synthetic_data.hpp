@@ -1,0 +1,35 @@
+#pragma once
+// Measurements that a model itself would give: the points of a real measurement, placed where the model says, with
+// normal noise of any size.
+
+#include <random>
+#include <span>
+#include <vector>
+
+#include "estimator/io/measurement.hpp"
+#include "estimator/mesh/hermite_mesh.hpp"
+#include "estimator/mesh/point_locator.hpp"
+
+namespace diastole {
+
+/// The loaded points of `design` as they would be seen without error. `position_mm[f]` is the motion of frame f; frames
+/// with an empty one, and frame 0, are left out. A tag point stays on its line of error and on its tag plane; points
+/// that the body does not hold are dropped.
+Measurement exact_measurement(const HermiteMesh& mesh, const Measurement& design,
+                              const std::vector<NodeField>& position_mm, const LocatorOptions& locator);
+
+struct NoiseOptions {
+  double noise_mm =
+      0;  ///< standard deviation of a tag along its normal, of a 3-D point's components; 0: as stated
+  bool exact_pressures = false;  ///< or else frame pressures err by their stated sigma
+};
+
+/// The points of some frames with noise, its size stated with them; the other frames keep their pressures.
+Measurement with_noise(const Measurement& exact, std::span<const int> frames, const NoiseOptions& options,
+                       std::mt19937_64& generator);
+
+/// `count` of the loaded frames that have points, evenly through them by pressure, the highest always among them.
+/// Throws InputError if there are fewer.
+std::vector<int> spread_frames(const Measurement& measurement, int count);
+
+}  // namespace diastole

@@ -1,0 +1,105 @@
+#include "estimator/fit/robust_loss.hpp"
+
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <random>
+
+#include "estimator/fit/elastic_motion.hpp"
+#include "tests/estimator/fit/synthetic.hpp"
+
+namespace diastole {
+namespace {
+
+TEST(RobustLoss, ItsDerivativesAreThoseOfItsFormula) {
+  const RobustLoss loss{0.8};
+  for (const double r : {-30.0, -2.0, -1e-3, 0.5, 1.0, 7.0}) {
+    const double h = 1e-5 * std::max(1.0, std::abs(r));
+    EXPECT_NEAR(loss.slope(r), (loss.residual(r + h) - loss.residual(r - h)) / (2 * h), 1e-7);
+    EXPECT_NEAR(loss.influence(r), loss.residual(r) * loss.slope(r), 1e-12);
+    EXPECT_NEAR(loss.influence_slope(r), (loss.influence(r + h) - loss.influence(r - h)) / (2 * h), 1e-7);
+  }
+  EXPECT_DOUBLE_EQ(loss.residual(0), 0);
+  EXPECT_NEAR(loss.slope(0), loss.slope(1e-8), 1e-6);
+}
+
+TEST(RobustLoss, TheScaleIsThatOfTheCore) {
+  std::mt19937 generator(1);
+  std::normal_distribution<double> normal;
+  Eigen::VectorXd clean(4000);
+  for (double& r : clean)
+    r = 2 * normal(generator);
+  Eigen::VectorXd wild = clean;
+  for (Eigen::Index i = 0; i < wild.size(); i += 20)
+    wild[i] = 100 * normal(generator);
+  EXPECT_NEAR(core_deviation(clean), 2, 0.1);
+  EXPECT_NEAR(core_deviation(wild), 2, 0.2);
+  // The greatest likelihood of t on normal residuals: the mean of psi r is 1 there.
+  const RobustLoss loss = RobustLoss::for_deviation(2);
+  double sum = 0;
+  for (const double r : clean)
+    sum += loss.influence(r) * r / 4000;
+  EXPECT_NEAR(sum, 1, 0.03);
+  EXPECT_EQ(wild_count(clean), 0);
+  EXPECT_NEAR(static_cast<double>(wild_count(wild)), 185, 15);
+}
+
+class WildPoints : public testing::Test {
+ protected:
+  /// Every `nth` tag point is thrown along its normal by up to 15 mm.
+  static Measurement measured(size_t nth, unsigned seed) {
+    ElasticModel truth = test::coarse_gel(8.71);
+    Measurement measurement = test::synthetic(truth, {.tags_a_frame = 300, .seed = seed});
+    std::mt19937 generator(seed);
+    std::uniform_real_distribution<double> throw_mm(0, 15);  // to one side: normal loss is biased by it
+    for (size_t i = 0; nth > 0 && i < measurement.tags.size(); i += nth) {
+      TagPoint& tag = measurement.tags[i];
+      const double sign = tag.x_mm[0] * tag.normal[0] + tag.x_mm[1] * tag.normal[1] > 0 ? 1 : -1;
+      const double mm = sign * throw_mm(generator);
+      for (size_t k = 0; k < 3; ++k)
+        tag.x_mm[k] += mm * tag.normal[k];
+    }
+    return measurement;
+  }
+  static FitOutcome fit(const Measurement& measurement, Robustness robustness) {
+    ElasticMotion motion(test::coarse_gel(6), {whole_parameter(0)});
+    FitOptions options;
+    options.robustness = robustness;
+    return fit_motion(motion, {{6.0, 1.0, 15.0}}, measurement, options);
+  }
+};
+
+TEST_F(WildPoints, FivePerCentOfThemDoNotMoveTheStiffness) {
+  for (const unsigned seed : {1U, 2U}) {
+    const double clean = fit(measured(0, seed), Robustness::never).values[0].value;
+    const FitOutcome found = fit(measured(20, seed), Robustness::if_needed);
+    ASSERT_TRUE(found.converged) << found.reason;
+    ASSERT_TRUE(found.robust);
+    EXPECT_NEAR(found.values[0].value / clean, 1, 0.02);
+    EXPECT_NEAR(found.values[0].value, 8.71, 3 * found.values[0].se);
+    EXPECT_GT(std::abs(fit(measured(20, seed), Robustness::never).values[0].value / clean - 1), 0.05);
+  }
+}
+
+TEST_F(WildPoints, CleanDataCostLittleAndAreLeftToTheNormalLoss) {
+  const Measurement measurement = measured(0, 1);
+  const FitOutcome normal = fit(measurement, Robustness::if_needed),
+                   robust = fit(measurement, Robustness::always);
+  EXPECT_FALSE(normal.robust);
+  ASSERT_TRUE(robust.robust);
+  EXPECT_EQ(robust.robust->wild, 0);
+  EXPECT_NEAR(robust.values[0].value, normal.values[0].value, normal.values[0].se);
+  EXPECT_NEAR(robust.values[0].se / normal.values[0].se, 1.04, 0.06);
+}
+
+TEST_F(WildPoints, ASigmaStatedTooSmallIsMended) {
+  Measurement measurement = measured(0, 1);
+  for (TagPoint& tag : measurement.tags)
+    tag.sigma_mm /= 10;
+  const FitOutcome robust = fit(measurement, Robustness::always);
+  const double honest = fit(measured(0, 1), Robustness::never).values[0].se;
+  EXPECT_NEAR(robust.values[0].se / honest, 1.04, 0.1);
+}
+
+}  // namespace
+}  // namespace diastole

@@ -1,0 +1,123 @@
+#include "estimator/montecarlo/montecarlo.hpp"
+
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <set>
+
+#include "estimator/montecarlo/synthetic_data.hpp"
+#include "tests/estimator/io/scratch_file.hpp"
+
+namespace diastole {
+namespace {
+
+using testing::ElementsAre;
+
+class CoarseGel : public testing::Test {
+ protected:
+  CoarseGel() {
+    study_.file = "gel.study.toml";
+    study_.specimen = AnnulusSpecimen{22.5, 50, 85, {4, 2, 1}, "fixed"};
+    study_.law = {"neo-hookean", {{"C1_kPa", 8.71, 1.0, 15.0, Variation::whole}}};
+    for (int frame = 0; frame <= 5; ++frame)
+      design_.frames.push_back({0.1 * frame, 0.6 * frame, frame == 0 ? 0.0 : 0.02});
+    for (int frame = 0; frame <= 5; ++frame) {
+      for (int i = 0; i < 60; ++i) {
+        const double angle = 0.7 * i, radius_mm = 25 + i % 20, z_mm = -35 + 1.2 * i;
+        const std::array<double, 3> X{radius_mm * std::cos(angle), radius_mm * std::sin(angle), z_mm};
+        const bool across = i % 2 == 0;
+        const std::array<double, 3> n{across ? 1.0 : 0.0, across ? 0.0 : 1.0, 0.0};
+        design_.tags.push_back({frame, n, across ? X[0] : X[1], X, 0.4});
+        design_.points.push_back({frame, X, X, 0.5});
+      }
+    }
+  }
+  Study study_;
+  Measurement design_;
+};
+
+TEST_F(CoarseGel, FramesAreSpreadUpToTheHighestPressure) {
+  EXPECT_THAT(spread_frames(design_, 1), ElementsAre(5));
+  EXPECT_THAT(spread_frames(design_, 3), ElementsAre(2, 4, 5));
+  EXPECT_THAT(spread_frames(design_, 5), ElementsAre(1, 2, 3, 4, 5));
+  design_.frames[2].pressure_kPa = 9;
+  EXPECT_THAT(spread_frames(design_, 1), ElementsAre(2));
+  EXPECT_THAT(test::message_of([&] { (void)spread_frames(design_, 6); }),
+              testing::HasSubstr("5 loaded frames"));
+}
+
+TEST_F(CoarseGel, NoiseHasTheSizeAskedForAndIsStated) {
+  std::mt19937_64 generator(1);
+  const std::vector<int> frames{3, 5};
+  const Measurement noisy = with_noise(design_, frames, {0.7, false}, generator);
+  EXPECT_EQ(noisy.tags.size(), 120U);
+  double tags = 0, points = 0;
+  for (size_t i = 0; i < noisy.tags.size(); ++i) {
+    const TagPoint& tag = noisy.tags[i];
+    EXPECT_EQ(tag.sigma_mm, 0.7);
+    const TagPoint& original = design_.tags[static_cast<size_t>(tag.frame) * 60 + i % 60];
+    for (size_t k = 0; k < 3; ++k) {
+      const double moved_mm = tag.x_mm[k] - original.x_mm[k];
+      EXPECT_TRUE(tag.normal[k] != 0 || moved_mm == 0);  // only along the normal
+      tags += moved_mm * moved_mm / 120;
+      points += std::pow(noisy.points[i].x_mm[k] - original.x_mm[k], 2) / 360;
+    }
+  }
+  EXPECT_NEAR(std::sqrt(tags), 0.7, 0.15);
+  EXPECT_NEAR(std::sqrt(points), 0.7, 0.09);
+  EXPECT_NE(noisy.frames[3].pressure_kPa, design_.frames[3].pressure_kPa);
+  const Measurement stated = with_noise(design_, frames, {0, true}, generator);
+  EXPECT_EQ(stated.tags[0].sigma_mm, 0.4);
+  EXPECT_EQ(stated.frames[3].pressure_kPa, design_.frames[3].pressure_kPa);
+  EXPECT_EQ(stated.frames[3].sigma_kPa, 0);
+}
+
+TEST_F(CoarseGel, CellsAreTheSameInWhateverPlanTheyStand) {
+  MonteCarloPlan plan{.noise_mm = {0.4}, .frames = {2}, .repeats = 2};
+  CellFitter one(study_, design_, plan);
+  const CellResult alone = one.fit({0.4, 2, 2});
+  plan.noise_mm = {0.8, 0.4};
+  plan.frames = {1, 2};
+  CellFitter other(study_, design_, plan);
+  (void)other.fit({0.8, 1, 1});
+  const CellResult among = other.fit({0.4, 2, 2});
+  ASSERT_TRUE(alone.converged);
+  EXPECT_NEAR(alone.value[0], among.value[0], 1e-6);
+  EXPECT_NE(alone.value[0], one.fit({0.4, 2, 1}).value[0]);
+  EXPECT_EQ(cells_of(plan).size(), 8U);
+}
+
+TEST_F(CoarseGel, TheSpreadIsWhatTheStandardErrorsSay) {
+  const MonteCarloPlan plan{.noise_mm = {1.6}, .frames = {2}, .repeats = 20};
+  CellFitter fitter(study_, design_, plan);
+  std::vector<CellResult> results;
+  for (const Cell& cell : cells_of(plan))
+    results.push_back(fitter.fit(cell));
+  const std::vector<TableEntry> table = table_of(plan, study_, results);
+  ASSERT_EQ(table.size(), 1U);
+  for (const TableEntry& entry : table) {
+    EXPECT_EQ(entry.refits, 20);
+    EXPECT_EQ(entry.failed, 0);
+    const ParameterSpread& C1 = entry.parameters.at(0);
+    EXPECT_NEAR(C1.sd / C1.mean_se, 1, 0.5);  // 0.1 % tails of 20 repeats
+    EXPECT_NEAR(C1.mean, 8.71, 3.3 * C1.mean_se / std::sqrt(20));
+    EXPECT_GE(C1.coverage, 0.75);
+    EXPECT_DOUBLE_EQ(C1.sd_percent, 100 * C1.sd / C1.mean);
+  }
+}
+
+TEST_F(CoarseGel, FailedRefitsAreCounted) {
+  const MonteCarloPlan plan{.noise_mm = {0.8}, .frames = {1}, .repeats = 3};
+  const std::vector<CellResult> results{{{0.8, 1, 1}, true, 3, 1, {8.0}, {1.0}},
+                                        {{0.8, 1, 2}, false, 3, 1, {}, {}},
+                                        {{0.8, 1, 3}, true, 3, 1, {10.0}, {1.0}},
+                                        {{0.8, 2, 3}, true, 3, 1, {99.0}, {1.0}}};
+  const TableEntry entry = table_of(plan, study_, results).at(0);
+  EXPECT_EQ(entry.refits, 2);
+  EXPECT_EQ(entry.failed, 1);
+  EXPECT_DOUBLE_EQ(entry.parameters[0].mean, 9);
+  EXPECT_NEAR(entry.parameters[0].sd, std::sqrt(2.0), 1e-12);
+}
+
+}  // namespace
+}  // namespace diastole

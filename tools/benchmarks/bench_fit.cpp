@@ -1,0 +1,154 @@
+// Estimation: the paper's 32-parameter gel (seven iterations, 2 h on eight Power4 processors), exact sensitivities
+// against finite differences on the same problem, and the whole of its Table 1.
+//
+//   tools/bench fit                          gel estimate and sensitivities, on examples/phantom-a
+//   tools/bench fit --table LV.study.toml    also Table 1: 4 noise levels x 3 numbers of frames x 10 refits
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <chrono>
+#include <cstdio>
+#include <ctime>
+#include <exception>
+#include <filesystem>
+#include <thread>
+
+#include "estimator/fe/study_model.hpp"
+#include "estimator/fit/elastic_motion.hpp"
+#include "estimator/fit/sought.hpp"
+#include "estimator/fit/study_fit.hpp"
+#include "estimator/montecarlo/cells_file.hpp"
+#include "estimator/montecarlo/montecarlo.hpp"
+#include "estimator/montecarlo/worker_pool.hpp"
+#include "protocol/contract/exit_code.hpp"
+
+namespace diastole {
+namespace {
+
+struct Stopwatch {
+  std::chrono::steady_clock::time_point begun = std::chrono::steady_clock::now();
+  std::clock_t cpu_begun = std::clock();
+
+  [[nodiscard]] double wall_s() const {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
+  }
+  [[nodiscard]] double cpu_s() const {
+    return static_cast<double>(std::clock() - cpu_begun) / static_cast<double>(CLOCKS_PER_SEC);
+  }
+};
+
+Study regional_gel() {
+  Study study = read_study(std::filesystem::path(DIASTOLE_SOURCE_DIR) / "examples/phantom-a.study.toml");
+  study.law.parameters[0].vary = Variation::element;
+  return study;
+}
+
+void bench_estimate(const Study& study, const Measurement& measurement) {
+  for (const auto kind : {Smoothness::Kind::evidence, Smoothness::Kind::none}) {
+    Study smooth = study;
+    smooth.law.parameters[0].smoothness.kind = kind;
+    const Stopwatch watch;
+    const FitRecord record = fit_study(smooth, measurement, {});
+    fmt::print(
+        "  {:<22} {:>2} iterations, {} equilibria, {:.1f} s wall, {:.1f} s processor; mean C1 {:.3f} ± "
+        "{:.3f} kPa; "
+        "{}\n",
+        kind == Smoothness::Kind::evidence ? "smooth by evidence:" : "without smoothness:", record.iterations,
+        record.forward_solves, watch.wall_s(), watch.cpu_s(), record.parameters[0].value,
+        record.parameters[0].se, record.reason);
+    std::fflush(stdout);
+  }
+}
+
+void bench_sensitivities(const Study& study, const Measurement& measurement) {
+  ElasticModel model = make_model(study);
+  const Sought sought = sought_of(study, model);
+  ElasticMotion motion(std::move(model), sought.groups);
+  JointProblem problem(motion, sought.values, measurement, locator_for(study.specimen));
+  Eigen::VectorXd q = problem.start();
+  if (!problem.find_points(q) || problem.residuals(q) == nullptr) return;
+  const Stopwatch exact_watch;
+  const Eigen::MatrixXd exact = problem.jacobian(q);
+  const double exact_s = exact_watch.cpu_s();
+  const Eigen::VectorXd here = *problem.residuals(q);
+  Eigen::MatrixXd differences(exact.rows(), exact.cols());
+  const Stopwatch difference_watch;
+  constexpr double step = 1e-4;
+  for (Eigen::Index i = 0; i < q.size(); ++i) {
+    Eigen::VectorXd moved = q;
+    moved[i] += step;
+    const Eigen::VectorXd* there = problem.residuals(moved);
+    if (there == nullptr) return;
+    differences.col(i) = (*there - here) / step;
+  }
+  const double difference_s = difference_watch.cpu_s();
+  fmt::print(
+      "  {} residuals by {} unknowns: exact {:.2f} s, forward differences {:.2f} s of processor: {:.0f} "
+      "times "
+      "faster; largest difference {:.1e} of the largest entry\n",
+      exact.rows(), exact.cols(), exact_s, difference_s, difference_s / exact_s,
+      (exact - differences).cwiseAbs().maxCoeff() / exact.cwiseAbs().maxCoeff());
+}
+
+void bench_table(const std::filesystem::path& file) {
+  const Study study = read_study(file);
+  MonteCarloPlan plan{
+      .noise_mm = {0.4, 0.8, 1.6, 3.2}, .frames = {1, 3, 5}, .repeats = 10, .exact_pressures = true};
+  const Stopwatch watch;
+  CellFitter fitter(study, read_measurement(study), plan);
+  const std::vector<Cell> cells = cells_of(plan);
+  const size_t parameters = study.law.parameters.size();
+  std::vector<size_t> jobs;
+  for (size_t job = 0; job < cells.size(); ++job)
+    jobs.push_back(job);
+  std::vector<CellResult> results;
+  double cell_s = 0;
+  run_forked(
+      jobs, std::max(1U, std::thread::hardware_concurrency()),
+      [&](size_t job) { return row_of(fitter.fit(cells[job]), parameters); },
+      [&](size_t, const std::string& row) {
+        results.push_back(result_of(row, parameters));
+        cell_s += results.back().seconds;
+      });
+  fmt::print("  {} refits in {:.0f} s wall ({:.1f} s each)\n", results.size(), watch.wall_s(),
+             cell_s / static_cast<double>(results.size()));
+  for (const TableEntry& entry : table_of(plan, study, results)) {
+    fmt::print("  {:>4} mm  {} frames ", entry.noise_mm, entry.frames);
+    for (const ParameterSpread& spread : entry.parameters)
+      fmt::print("  {} {:5.2f} %", spread.name, spread.sd_percent);
+    fmt::print("\n");
+  }
+}
+
+int run(int argc, char** argv) {
+  CLI::App app("Estimation: iterations and seconds", "bench_fit");
+  std::filesystem::path table;
+  app.add_option("--table", table, "a ventricle's study: make the paper's Table 1 of it");
+  CLI11_PARSE(app, argc, argv);
+  const Study study = regional_gel();
+  const Measurement measurement = read_measurement(study);
+  fmt::print(
+      "32 values of C1 from the tags of examples/phantom-a (paper: 7 iterations, 2 h on 8 Power4 "
+      "processors)\n");
+  bench_estimate(study, measurement);
+  fmt::print("Sensitivities of the same problem\n");
+  bench_sensitivities(study, measurement);
+  if (!table.empty()) {
+    fmt::print("Table 1 of {}\n", table.string());
+    bench_table(table);
+  }
+  return 0;
+}
+
+}  // namespace
+}  // namespace diastole
+
+int main(int argc, char** argv) {
+  try {
+    return diastole::run(argc, argv);
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "bench_fit: %s\n", error.what());
+    return static_cast<int>(diastole::ExitCode::bad_input);
+  }
+}
