@@ -94,7 +94,8 @@ Eigen::MatrixXd gathered(const HermiteMesh& mesh, size_t element, std::span<cons
 }
 
 /// direction · field(point) of every field.
-Eigen::VectorXd along(const Eigen::MatrixXd& gathered_fields, const Eigen::Vector3d& direction, const Xi& xi) {
+Eigen::VectorXd along(const Eigen::MatrixXd& gathered_fields, const Eigen::Vector3d& direction,
+                      const Xi& xi) {
   const HermiteBasis basis = hermite_basis(xi);
   ElementField weights;
   for (size_t a = 0; a < hermite_functions; ++a)

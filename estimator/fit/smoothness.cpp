@@ -107,8 +107,8 @@ Eigen::MatrixXd prior_precision(const std::vector<SmoothBlock>& blocks, Eigen::I
   return precision;
 }
 
-EvidenceOfStep evidence_of_step(const QuadraticModel& model, const std::vector<SmoothBlock>& blocks, size_t which,
-                                const std::vector<bool>& is_free) {
+EvidenceOfStep evidence_of_step(const QuadraticModel& model, const std::vector<SmoothBlock>& blocks,
+                                size_t which, const std::vector<bool>& is_free) {
   std::vector<SmoothBlock> trial = blocks;
   const auto rank = static_cast<double>(rank_of(blocks[which].differences));
   EvidenceOfStep result{};
@@ -127,8 +127,7 @@ EvidenceOfStep evidence_of_step(const QuadraticModel& model, const std::vector<S
     log_evidence.push_back(-cost - rank * std::log(step) - 0.5 * log_determinant(factor));
     result.steps.push_back(step);
     result.q.push_back(model.q + change);
-    Eigen::MatrixXd covariance =
-        factor.solve(Eigen::MatrixXd::Identity(hessian.rows(), hessian.cols()));
+    Eigen::MatrixXd covariance = factor.solve(Eigen::MatrixXd::Identity(hessian.rows(), hessian.cols()));
     for (Eigen::Index k = 0; k < covariance.rows(); ++k) {
       if (!is_free[static_cast<size_t>(k)]) covariance(k, k) = 0;
     }

@@ -40,10 +40,10 @@ struct QuadraticModel {
 };
 
 struct EvidenceOfStep {
-  double step;                   ///< of greatest evidence
-  bool none_seen;                ///< the evidence only falls with the step: no difference between elements is seen
-  std::vector<double> steps;     ///< a grid ...
-  std::vector<double> weights;   ///< ... and the step's posterior on it; they add up to 1
+  double step;     ///< of greatest evidence
+  bool none_seen;  ///< the evidence only falls with the step: no difference between elements is seen
+  std::vector<double> steps;       ///< a grid ...
+  std::vector<double> weights;     ///< ... and the step's posterior on it; they add up to 1
   std::vector<Eigen::VectorXd> q;  ///< the unknowns that each step on the grid gives
   std::vector<Eigen::MatrixXd> covariance;
 };
@@ -52,8 +52,8 @@ inline constexpr double least_step = 0.002;
 inline constexpr double greatest_step = 2.0;
 
 /// Evidence of the step of `blocks[which]`, the other blocks at theirs. Unknowns that are not free stay at q.
-EvidenceOfStep evidence_of_step(const QuadraticModel& model, const std::vector<SmoothBlock>& blocks, size_t which,
-                                const std::vector<bool>& is_free);
+EvidenceOfStep evidence_of_step(const QuadraticModel& model, const std::vector<SmoothBlock>& blocks,
+                                size_t which, const std::vector<bool>& is_free);
 
 /// Precision that the blocks' priors add to the unknowns.
 Eigen::MatrixXd prior_precision(const std::vector<SmoothBlock>& blocks, Eigen::Index unknowns);

@@ -112,17 +112,16 @@ StudyParameter read_parameter(const std::string& name, TableReader& table) {
   const bool has_vary = table.has("vary");
   const std::string vary = has_vary ? table.choice("vary", {"whole", "element"}) : "whole";
   parameter.vary = vary == "element" ? Variation::element : Variation::whole;
-  if (table.has("smooth") &&
-      table.choice("smooth", {"evidence", "none"}) == "none") {
+  if (table.has("smooth") && table.choice("smooth", {"evidence", "none"}) == "none") {
     parameter.smoothness.kind = Smoothness::Kind::none;
   }
   if (table.has("smooth_step")) {
-    if (table.has("smooth"))
-      table.fail("smooth_step", "is given beside \"smooth\"", "Give one of the two.");
+    if (table.has("smooth")) table.fail("smooth_step", "is given beside \"smooth\"", "Give one of the two.");
     parameter.smoothness = {Smoothness::Kind::given, table.number("smooth_step", {.above = 0})};
   }
   if (parameter.vary == Variation::whole && (table.has("smooth") || table.has("smooth_step"))) {
-    table.fail(table.has("smooth") ? "smooth" : "smooth_step", "says how values of elements differ, but there is only one",
+    table.fail(table.has("smooth") ? "smooth" : "smooth_step",
+               "says how values of elements differ, but there is only one",
                "Write vary = \"element\", or leave it out.");
   }
   table.finish();
