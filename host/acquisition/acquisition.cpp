@@ -16,6 +16,7 @@ using nlohmann::json;
 
 constexpr double ns_per_s = 1e9;
 constexpr uint64_t block_span_ns = 100'000'000;
+constexpr uint64_t gap_interval_ns = 250'000'000;
 constexpr double start_patience_s = 2;  // for RunStarted
 constexpr uint64_t tail_ns = 250'000'000;
 constexpr double end_patience_s = 10;  // for RunEnded, beyond the plan
@@ -49,11 +50,13 @@ RunOutcome Acquisition::run(const Hooks& hooks) {
   }
   while (!ended_)
     turn();
-  take_samples(samples_.finish(tail_until_ns_.value_or(clock_.now_ns())));
+  const uint64_t until_ns = tail_until_ns_.value_or(clock_.now_ns());
+  take_samples(samples_.finish(until_ns));
   end_missing();
   close_block();
   close_gate();
-  write(RecordKind::document, json{{"record", "end"}}.dump());
+  check_count(grid.due_by(until_ns));
+  write(RecordKind::document, json{{"record", "end"}, {"until_ns", until_ns}}.dump());
   ended_ = true;
   if (!journal_.sync()) fail_journal();
   hooks_.progress(outcome_.counts);
@@ -176,6 +179,15 @@ void Acquisition::take(const Missing& missing) {
   }
   missing_in_a_row_ += missing.count;
   outcome_.counts.missing += missing.count;
+  tell_gap_in_time();
+}
+
+/// A gap that lasts goes to the journal in parts, so that a crash within it leaves its record.
+void Acquisition::tell_gap_in_time() {
+  const uint64_t now_ns = clock_.now_ns();
+  if (now_ns < gap_told_ns_ + gap_interval_ns) return;
+  gap_told_ns_ = now_ns;
+  close_gap();
 }
 
 void Acquisition::take(const InstrumentTime& time) {
@@ -218,6 +230,14 @@ void Acquisition::end_missing() {
       {"warning", "gap_end",
        fmt::format("the gap cost {} sample{}", missing_in_a_row_, missing_in_a_row_ == 1 ? "" : "s")});
   missing_in_a_row_ = 0;
+}
+
+/// What the source accounted for against what the clock says.
+void Acquisition::check_count(uint64_t due) {
+  const uint64_t told = outcome_.counts.received + outcome_.counts.missing;
+  if (told >= due) return;
+  remark("error", "samples",
+         fmt::format("{} samples were due, the instrument's driver accounted for {} only", due, told));
 }
 
 void Acquisition::close_gap() {

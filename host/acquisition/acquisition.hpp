@@ -3,8 +3,8 @@
 // until the controller says that the run has ended, and a quarter of a second more: the last cycle, which
 // counts from its trigger, ends a little after the last step.
 //
-// A source gives every index as received or as missing (sample_source.hpp), so received + missing = expected by
-// construction; `RunOutcome` counts them.
+// A source gives every index as received or as missing (sample_source.hpp); `RunOutcome` counts them. At the end the
+// count is held against the clock: how many were due from the first to the last moment.
 //
 // The loop is single-threaded in time: it reads and waits for time through one Clock only.
 
@@ -111,6 +111,8 @@ class Acquisition {
   void note(const std::vector<GateRemark>& remarks);
   void end_missing();
   void close_gap();
+  void tell_gap_in_time();
+  void check_count(uint64_t due);
   void close_block();
   void take(const ControllerEvent& event);
   void remark(const std::string& level, const std::string& code, const std::string& text,
@@ -135,6 +137,7 @@ class Acquisition {
     std::string reason;
   };
   std::optional<OpenGap> gap_;
+  uint64_t gap_told_ns_ = 0;       ///< when part of a gap last went to the journal
   uint64_t missing_in_a_row_ = 0;  ///< over all reasons
   uint64_t deadline_ns_ = 0;
   StopRequest obeyed_ = StopRequest::none;

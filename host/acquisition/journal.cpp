@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <sys/stat.h>
 
 #include <algorithm>
 #include <array>
@@ -11,6 +12,7 @@
 #include <cstring>
 #include <optional>
 
+#include "host/acquisition/part_file.hpp"
 #include "protocol/contract/input_error.hpp"
 
 namespace diastole {
@@ -180,6 +182,7 @@ bool JournalWriter::append(RecordKind kind, const std::string& text) {
 bool JournalWriter::sync() {
   const std::lock_guard flushing(flush_mutex_);
   if (unsynced_.exchange(false) && flush_(file_.get()) != 0) fail("brought to the disk", errno);
+  watch_name();
   return problem().empty();
 }
 
@@ -189,9 +192,32 @@ std::string JournalWriter::problem() const {
 }
 
 void JournalWriter::fail(const std::string& what, int error) {
+  keep(fmt::format("{}: the journal cannot be {}: {}", path_.string(), what, std::strerror(error)));
+}
+
+void JournalWriter::keep(std::string problem) {
   const std::lock_guard lock(problem_mutex_);
-  if (!problem_.empty()) return;
-  problem_ = fmt::format("{}: the journal cannot be {}: {}", path_.string(), what, std::strerror(error));
+  if (problem_.empty()) problem_ = std::move(problem);
+}
+
+void JournalWriter::watch_name() {
+  struct stat opened {
+  }, named{};
+  if (!problem().empty() || ::fstat(file_.get(), &opened) != 0) return;
+  const bool found = ::stat(path_.c_str(), &named) == 0;
+  if (found && named.st_ino == opened.st_ino && named.st_dev == opened.st_dev) return;
+  const std::string what = fmt::format("{}: the journal was ", path_.string());
+  if (opened.st_nlink > 0 || found) {
+    return keep(what + (opened.st_nlink > 0 ? "moved away; what was recorded is where it was moved to"
+                                            : "replaced by another file; what was recorded is lost"));
+  }
+  try {
+    copy_durably(fmt::format("/proc/self/fd/{}", file_.get()), path_);
+    keep(what + "removed; what was recorded until then was put back");
+  } catch (const std::filesystem::filesystem_error& error) {
+    keep(what +
+         fmt::format("removed and what was recorded is lost, for it cannot be put back: {}", error.what()));
+  }
 }
 
 void JournalWriter::sync_in_time(const std::stop_token& stop) {

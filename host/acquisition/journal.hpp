@@ -14,7 +14,8 @@
 //
 // Every half second another thread asks the kernel to bring it to the disk (fdatasync). Once the disk has
 // refused a write or a flush, what is in the file can no longer be trusted to last: the problem stays, and
-// nothing more is written. A reader takes every
+// nothing more is written. The same holds when the file is no longer found under its name; if it was removed, what it
+// held is put back there first. A reader takes every
 // record whose CRC holds. It forgives a torn tail, and after damage in the middle it searches for the next
 // whole record; the sequence then tells how many are lost.
 
@@ -70,6 +71,9 @@ class JournalWriter {
   void sync_in_time(const std::stop_token& stop);
   /// Keeps the first problem.
   void fail(const std::string& what, int error);
+  void keep(std::string problem);
+  /// Sees that the file is still there under its name.
+  void watch_name();
 
   std::filesystem::path path_;
   Flush flush_;

@@ -16,7 +16,8 @@
 //   slice     {block, slice, cycle, cycles, dummy_cycles} the slice's first cycle begins
 //   run_ended {reason, schedule_done, tick, cycles, triggers, r_waves}
 //   event     {host_ns or tick, level, code, text}
-//   end       {}                                         the run was closed in order
+//   end       {until_ns}                                 the run was closed in order; samples that were due at or
+//                                                        before that host time belong to it
 //
 // samples (little-endian):                     positions:
 //   u64 first_index                               u32 first_index

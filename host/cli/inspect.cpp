@@ -35,6 +35,7 @@ json stream_json(const runfile::StreamFacts& facts) {
   return {{"rows", facts.rows},
           {"samples", facts.rows - static_cast<size_t>(facts.missing)},
           {"missing", facts.missing},
+          {"expected", facts.expected ? json(*facts.expected) : json()},
           {"rate_Hz", facts.rate_Hz},
           {"irregular_steps", facts.irregularity.steps},
           {"longest_step_ms", facts.irregularity.longest_ms}};

@@ -109,6 +109,26 @@ ControllerConfig read_controller(TableReader table) {
   return controller;
 }
 
+/// A channel's name becomes a dataset's, NAME_kPa, beside those that the daemon makes itself.
+std::string channel_name(TableReader& channel) {
+  constexpr std::string_view made_by_us = "_filtered";
+  std::string name = channel.text("name");
+  const auto lower = [](char c) { return c >= 'a' && c <= 'z'; };
+  const bool spelled = !name.empty() && lower(name.front()) && std::ranges::all_of(name, [&](char c) {
+    return lower(c) || (c >= '0' && c <= '9') || c == '_';
+  });
+  if (!spelled) {
+    channel.fail("name", fmt::format("\"{}\" cannot name a dataset of the run file", name),
+                 "Begin with a small letter and go on with small letters, digits and _: \"pump_end\".");
+  }
+  if (name.ends_with(made_by_us)) {
+    channel.fail(
+        "name", fmt::format("\"{}\" would be taken for a filtered signal", name),
+        "Choose a name that does not end with _filtered: such datasets are made from other channels.");
+  }
+  return name;
+}
+
 DaqConfig read_daq(TableReader table) {
   DaqConfig config;
   std::vector<std::string> names;
@@ -118,7 +138,7 @@ DaqConfig read_daq(TableReader table) {
   std::vector<TableReader> channels = table.tables("channel");
   if (channels.empty()) table.fail("channel", "is missing", "Add [[daq.channel]] with name = \"cavity\".");
   for (TableReader& channel : channels) {
-    const ChannelConfig read{channel.text("name"), channel.number("kPa_per_V"),
+    const ChannelConfig read{channel_name(channel), channel.number("kPa_per_V"),
                              channel.number_or("zero_V", 0)};
     if (read.kPa_per_V == 0) channel.fail("kPa_per_V", "is 0", "Give the transducer's; below 0 if inverted.");
     const bool named_twice = std::any_of(config.channels.begin(), config.channels.end(),

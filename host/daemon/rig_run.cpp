@@ -8,6 +8,7 @@
 
 #include "host/acquisition/disk_room.hpp"
 #include "host/acquisition/journal_store.hpp"
+#include "host/acquisition/part_file.hpp"
 #include "host/controller/settings_values.hpp"
 #include "host/daemon/rig_service.hpp"
 #include "host/daemon/utc.hpp"
@@ -185,6 +186,7 @@ void RigService::tidy_journals() {
       spdlog::info("{} was removed: its run file is older than {} days", removed.string(), keep_days);
     }
   }
+  remove_leftovers(directory);
   uint64_t bytes = 0;
   int64_t without_run_file = 0;
   const auto journals = stored_journals(directory);
@@ -312,7 +314,8 @@ json RigService::finish(const std::filesystem::path& journal, const RunOutcome& 
   result["gaps"] = assembled.samples_missing;
   result["errors"] = std::count_if(assembled.run.events.begin(), assembled.run.events.end(),
                                    [](const runfile::Event& event) { return event.level == "error"; });
-  result["expected"] = assembled.samples_received + assembled.samples_missing;
+  const auto& grid = assembled.run.pressure.grid;
+  result["expected"] = grid ? grid->rows() : 0;
   return result;
 }
 

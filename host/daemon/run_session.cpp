@@ -1,12 +1,11 @@
 #include "host/daemon/run_session.hpp"
 
 #include <fmt/format.h>
-#include <unistd.h>
-
 #include <chrono>
 #include <filesystem>
 #include <thread>
 
+#include "host/acquisition/part_file.hpp"
 #include "host/config/experiment.hpp"
 #include "host/runfile/output_guard.hpp"
 #include "protocol/contract/input_error.hpp"
@@ -18,16 +17,19 @@ using nlohmann::json;
 
 /// The daemon keeps its own copy beside the journal; the user's appears whole or not at all.
 void deliver(const std::filesystem::path& from, const std::filesystem::path& to) {
-  const std::filesystem::path temporary = fmt::format("{}.{}.part", to.string(), ::getpid());
+  remove_leftovers(to);
   try {
-    std::filesystem::copy_file(from, temporary, std::filesystem::copy_options::overwrite_existing);
-    std::filesystem::rename(temporary, to);
+    copy_durably(from, to);
   } catch (const std::filesystem::filesystem_error& error) {
-    std::error_code ignored;
-    std::filesystem::remove(temporary, ignored);
     throw HardwareError(to.string(), error.what(),
                         "The run is safe in " + from.string() + "; copy it from there.");
   }
+}
+
+/// The command that makes the run file that was wanted.
+std::string recovery(const std::string& journal, const SessionOptions& options) {
+  return fmt::format("`diastole recover {} -o {}{}`", journal, options.output,
+                     options.force ? " --force" : "");
 }
 
 SessionProgress progress_of(const json& state, size_t& remarks_seen) {
@@ -83,8 +85,9 @@ json follow(DaemonClient& daemon, const SessionOptions& options, const json& beg
     throw HardwareError(
         "run", fmt::format("lost sight of the daemon: {}", error.what()),
         fmt::format("If the daemon could end the run, it is in {}; otherwise make it of the journal: "
-                    "`diastole recover {}`.",
-                    begun.at("run_file").get<std::string>(), begun.at("journal").get<std::string>()));
+                    "{}.",
+                    begun.at("run_file").get<std::string>(),
+                    recovery(begun.at("journal").get<std::string>(), options)));
   }
 }
 
@@ -104,7 +107,7 @@ SessionResult run_session(DaemonClient& daemon, const SessionOptions& options) {
   if (!result.contains("run_file")) {
     throw HardwareError(
         "run", result.value("problem", "no run file could be made"),
-        "What was recorded is in " + result.value("journal", "the journal") + "; try `diastole recover`.");
+        fmt::format("What was recorded is in its journal: {}.", recovery(result.at("journal"), options)));
   }
   deliver(result.at("run_file").get<std::string>(), options.output);
   return {options.output,      result.at("end"),      result.at("regular"),

@@ -11,6 +11,7 @@
 #include "host/runfile/filtered_channel.hpp"
 #include "host/runfile/journal_story.hpp"
 #include "host/runfile/pressure_rows.hpp"
+#include "host/runfile/rows_due.hpp"
 #include "host/runfile/time_axis.hpp"
 #include "protocol/contract/input_error.hpp"
 #include "protocol/runfile/layout.hpp"
@@ -26,6 +27,7 @@ using runfile::RecordedRun;
 constexpr double mL_per_pL = 1e-9;
 constexpr double missing = std::numeric_limits<double>::quiet_NaN();
 const std::string lost_in_the_journal = "its record was lost in the journal";
+const std::string not_recorded = "not recorded";
 
 TimeAxis axis_of(const JournalStory& story, const std::string& file) {
   if (!story.start_tick)
@@ -57,7 +59,10 @@ class PumpRows {
   using Take = std::function<void(double time_s, double commanded_mL)>;
 
   PumpRows(const JournalStory& story, const TimeAxis& axis, Take take)
-      : axis_(axis), take_(std::move(take)), microstep_mL_(story.begin.microstep_pL * mL_per_pL) {}
+      : axis_(axis),
+        take_(std::move(take)),
+        microstep_mL_(story.begin.microstep_pL * mL_per_pL),
+        grid_(position_grid(story, axis)) {}
 
   void add(const PositionBlock& block) {
     if (block.first_index < rows_) return;
@@ -68,11 +73,19 @@ class PumpRows {
     for (size_t i = 0; i < block.microsteps.size(); ++i, ++rows_)
       take_(axis_.of_tick(block.first_tick + i * block.period_ticks), microstep_mL_ * block.microsteps[i]);
   }
+  /// The rows that were due but not recorded.
+  void finish() {
+    if (!grid_) return;
+    for (const auto due = static_cast<uint64_t>(grid_->rows()); rows_ < due; ++rows_)
+      take_(grid_->start_s + static_cast<double>(rows_) / grid_->rate_Hz, missing);
+  }
+  [[nodiscard]] const std::optional<runfile::StreamGrid>& grid() const { return grid_; }
 
  private:
   const TimeAxis& axis_;
   Take take_;
   double microstep_mL_;
+  std::optional<runfile::StreamGrid> grid_;
   uint64_t rows_ = 0;
 };
 
@@ -165,6 +178,7 @@ struct Rows {
   uint64_t samples_received = 0;
   std::vector<runfile::Gap> pump_gaps, pressure_gaps;
   double first_s = 0, last_s = 0;  ///< of /pressure
+  std::optional<runfile::StreamGrid> pump_grid, pressure_grid;
 
   /// Mean distance of the rows of /pressure; 0 for fewer than two.
   [[nodiscard]] double spacing_s() const {
@@ -177,10 +191,11 @@ Rows look_through(const JournalRecords& journal, const JournalStory& story, cons
   Rows rows;
   runfile::StreamCheck pump_check(journal.file(), runfile::pump_group);
   runfile::StreamCheck pressure_check(journal.file(), runfile::pressure_group);
+  const std::string* lost = &lost_in_the_journal;
   PumpRows pump(story, axis, [&](double time_s, double commanded_mL) {
     pump_check.time(time_s);
     if (std::isnan(commanded_mL))
-      declare(rows.pump_gaps, runfile::pump_stream, static_cast<int64_t>(rows.pump), 1, lost_in_the_journal);
+      declare(rows.pump_gaps, runfile::pump_stream, static_cast<int64_t>(rows.pump), 1, *lost);
     ++rows.pump;
   });
   PressureRows pressure(story, axis, [&](const PressureRow& row) {
@@ -198,7 +213,11 @@ Rows look_through(const JournalRecords& journal, const JournalStory& story, cons
   });
   read_blocks(journal, {[&](const SampleBlock& block) { pressure.add(block); },
                         [&](const PositionBlock& block) { pump.add(block); }});
+  lost = &not_recorded;
+  pump.finish();
   pressure.finish();
+  rows.pump_grid = pump.grid();
+  rows.pressure_grid = pressure.grid();
   return rows;
 }
 
@@ -245,6 +264,7 @@ RowStream pump_of(const std::shared_ptr<const Source>& source, const Rows& rows)
       columns.put(1, commanded_mL);
     });
     read_blocks(source->journal, {.positions = [&](const PositionBlock& block) { pump.add(block); }});
+    pump.finish();
     columns.finish();
   };
   return stream;
@@ -298,6 +318,8 @@ AssembledRun tell(const JournalRecords& journal, const JournalStory& story, cons
   run.producer = story.begin.producer;
   run.rig = story.begin.rig;
   run.protocol_toml = story.begin.experiment;
+  run.pump.grid = rows.pump_grid;
+  run.pressure.grid = rows.pressure_grid;
   put_segments(story, axis, run);
   put_waveforms(story, run);
   run.gaps = rows.pump_gaps;
@@ -306,8 +328,10 @@ AssembledRun tell(const JournalRecords& journal, const JournalStory& story, cons
   put_slices(story, run);
   put_events(story, axis, run);
   put_clocks(story, axis, run);
-  if (!assembled.ended_in_order)
-    run.events.push_back({rows.last_s, "error", "incomplete", "the recording broke off here"});
+  if (!assembled.ended_in_order) {
+    const double last_s = story.closed ? rows.last_s : std::max(rows.last_s, last_known_s(story, axis));
+    run.events.push_back({last_s, "error", "incomplete", "the recording broke off here"});
+  }
   return assembled;
 }
 

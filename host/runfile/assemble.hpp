@@ -5,7 +5,8 @@
 // which the fitted clock map (clock_map.hpp) brings onto it. What was sampled before the start of run
 // is cut off. A missing sample keeps its row: its time lies evenly between its neighbours', or is the one at
 // which it was due if there is no sample before or none after it; its values are NaN, and /gaps declares it.
-// Samples whose record was damaged are declared so, too.
+// Samples whose record was damaged are declared so, too; so is what a journal that broke off does not hold although the
+// run went on (rows_due.hpp): "not recorded".
 
 #include <cstdint>
 

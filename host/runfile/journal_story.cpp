@@ -130,6 +130,7 @@ class StoryTeller {
     } else if (what == "event") {
       story_.events.push_back(event_of(record));
     } else if (what == "end") {
+      if (record.contains("until_ns")) story_.until_ns = ticks(record, "until_ns");
       story_.closed = true;
     }
   }
@@ -157,6 +158,13 @@ class StoryTeller {
   double last_timer_ = 0;
   double timer_turns_ = 0;
 };
+
+void follow(const PositionBlock& block, std::optional<PositionFacts>& facts) {
+  if (block.microsteps.empty() || block.first_tick > most_ticks) return;
+  if (!facts) facts = {block.first_index, block.first_tick, block.period_ticks, 0};
+  const uint64_t behind = block.microsteps.size() - 1;
+  facts->last_tick = std::max(facts->last_tick, block.first_tick + behind * block.period_ticks);
+}
 
 class BlockReader {
  public:
@@ -189,9 +197,13 @@ class BlockReader {
 JournalStory read_story(const JournalRecords& journal) {
   JournalStory story;
   StoryTeller teller(story);
-  BlockReader blocks({.samples = [&](const SampleBlock& block) {
-    story.sample_rows = std::max(story.sample_rows, block.first_index + block.host_ns.size());
-  }});
+  BlockReader blocks({.samples =
+                          [&](const SampleBlock& block) {
+                            story.sample_rows =
+                                std::max(story.sample_rows, block.first_index + block.host_ns.size());
+                            story.last_sample_ns = std::max(story.last_sample_ns, block.host_ns.back());
+                          },
+                      .positions = [&](const PositionBlock& block) { follow(block, story.positions); }});
   story.damage = journal.each([&](const JournalRecord& record) {
     if (record.kind != RecordKind::document) return blocks.take(record);
     const json document = json::parse(record.payload.begin(), record.payload.end(), nullptr, false);

@@ -88,6 +88,14 @@ struct EndOfRun {
   int64_t triggers = 0;
 };
 
+/// Of the position stream: its first record, and the newest position.
+struct PositionFacts {
+  uint32_t first_index = 0;
+  uint64_t first_tick = 0;
+  uint32_t period_ticks = 0;
+  uint64_t last_tick = 0;
+};
+
 struct JournalStory {
   Beginning begin;
   std::optional<uint64_t> first_due_ns;  ///< host time of sample 0, if its record is there
@@ -100,7 +108,10 @@ struct JournalStory {
   std::vector<BegunSlice> slices;
   std::vector<NotedEvent> events;
   std::optional<EndOfRun> run_ended;
-  bool closed = false;  ///< the last record says that the run was closed in order
+  bool closed = false;               ///< the last record says that the run was closed in order
+  std::optional<uint64_t> until_ns;  ///< host time up to which samples were due; told by that record
+  std::optional<PositionFacts> positions;
+  uint64_t last_sample_ns = 0;  ///< host time
 
   uint64_t sample_rows = 0;  ///< of the sample stream, missing ones included; at most `most_rows`
   JournalDamage damage;

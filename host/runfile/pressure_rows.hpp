@@ -3,7 +3,8 @@
 //
 // A missing row lies evenly between its neighbours in time; before the first and after the last sample that was received
 // it lies where it was due. As the last one may have come later than the next was due, a row lies at least a tenth of
-// the spacing after the one before.
+// the spacing after the one before. How many there are is told by rows_due.hpp; an instrument that counts its samples by
+// a clock of its own may have had more.
 
 #include <cstdint>
 #include <functional>
@@ -33,6 +34,8 @@ class PressureRows {
   void add(const SampleBlock& block);
   /// All rows that are still missing.
   void finish();
+  /// From when to when rows were due; none were: none. Precondition: finished.
+  [[nodiscard]] std::optional<runfile::StreamGrid> grid() const;
 
  private:
   /// Row `next_row_`.
@@ -48,6 +51,9 @@ class PressureRows {
   std::vector<DeclaredGap> gaps_;  // in order
   size_t gap_ = 0;                 // the first that ends behind the row
   std::optional<double> grid_start_s_;
+  std::optional<uint64_t> samples_due_;  // closed in order: until its end
+  uint64_t limit_ = most_rows;           // no row from here on
+  uint64_t first_row_ = 0;               // that was given
   uint64_t next_row_ = 0;
   std::optional<double> last_s_;  // of the newest row, from the first sample on
   bool started_ = false;          // the start of run has passed

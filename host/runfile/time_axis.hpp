@@ -20,6 +20,7 @@ class TimeAxis {
   /// When sample k was taken: as the host noted; if the instrument's timer counts its samples, as that timer's line
   /// against the host's clock tells, which knows nothing of blocks and how late they came.
   [[nodiscard]] double of_sample(uint64_t index, uint64_t host_ns) const;
+  [[nodiscard]] bool instrument_counts() const { return timer_.has_value(); }
   [[nodiscard]] double host_at_start_s() const { return map_.to_host_s(start_s()); }
   [[nodiscard]] const ClockMap& map() const { return map_; }
 

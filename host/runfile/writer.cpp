@@ -8,6 +8,7 @@
 #include <cstring>
 #include <span>
 
+#include "host/acquisition/part_file.hpp"
 #include "host/runfile/h5_sink.hpp"
 #include "host/transport/descriptor.hpp"
 #include "protocol/contract/input_error.hpp"
@@ -111,6 +112,13 @@ void write_tables(H5Sink& sink, const runfile::RecordedRun& run) {
              runfile::events_units);
 }
 
+void write_grid(H5Sink& sink, const char* group, const std::optional<runfile::StreamGrid>& grid) {
+  if (!grid) return;
+  sink.attribute(group, runfile::grid_start, grid->start_s);
+  sink.attribute(group, runfile::grid_end, grid->end_s);
+  sink.attribute(group, runfile::grid_rate, grid->rate_Hz);
+}
+
 /// What a file holds: `run` without its rows, and these.
 struct Content {
   const runfile::RecordedRun& run;
@@ -131,6 +139,8 @@ void write_content(H5Sink& sink, const Content& content) {
   write_protocol(sink, run);
   sink.rows(content.pump);
   sink.rows(content.pressure);
+  write_grid(sink, runfile::pump_group, run.pump.grid);
+  write_grid(sink, runfile::pressure_group, run.pressure.grid);
   write_triggers(sink, run);
   if (!run.clock.empty()) sink.group(runfile::clock_group);
   for (const auto& [name, value] : run.clock) {
@@ -168,7 +178,8 @@ std::string confirm_name(const std::filesystem::path& path, const FlushDirectory
 
 std::string write_content(const std::filesystem::path& path, const Content& content,
                           const FlushDirectory& flush_directory) {
-  const std::filesystem::path temporary = fmt::format("{}.{}.part", path.string(), ::getpid());
+  remove_leftovers(path);
+  const std::filesystem::path temporary = part_file_of(path);
   try {
     write_file(temporary, path, content);
     std::filesystem::rename(temporary, path);

@@ -83,6 +83,20 @@ void check_length(const RecordedRun& run, const std::string& dataset, size_t row
           "Datasets of one stream must be equally long.");
 }
 
+void check_grid(const RecordedRun& run, const std::string& group, const std::optional<StreamGrid>& grid) {
+  if (!grid) return;
+  const bool ordered = on_the_axis(grid->start_s) && on_the_axis(grid->end_s) && grid->start_s <= grid->end_s;
+  const double most_rate_Hz = static_cast<double>(most_counted);
+  if (ordered && grid->rate_Hz > 0 && grid->rate_Hz <= most_rate_Hz &&
+      (grid->end_s - grid->start_s) * grid->rate_Hz < most_rate_Hz) {
+    return;
+  }
+  throw InputError({run.file, "attributes of group " + group,
+                    fmt::format("have {} {}, {} {} and {} {}", grid_start, grid->start_s, grid_end,
+                                grid->end_s, grid_rate, grid->rate_Hz),
+                    "They tell from when to when and how often a row was due."});
+}
+
 void check_segments(const RecordedRun& run) {
   double last_s = -HUGE_VAL;
   for (size_t i = 0; i < run.segments.size(); ++i) {
@@ -155,6 +169,8 @@ void check(const RecordedRun& run) {
     check_length(run, group + "/fraction", waveform.fraction.size(), group + "/phase", waveform.phase.size());
     check_values(run, group + "/fraction", waveform.fraction);
   }
+  check_grid(run, pump_group, run.pump.grid);
+  check_grid(run, pressure_group, run.pressure.grid);
   check_times(run, pump_time, run.pump.time_s);
   check_length(run, pump_commanded, run.pump.commanded_mL.size(), pump_time, run.pump.time_s.size());
   check_values(run, pump_commanded, run.pump.commanded_mL);

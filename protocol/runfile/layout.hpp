@@ -11,6 +11,7 @@
 //   |   `-- waveforms/<segment>   of uploaded segments: points (text), phase[w], fraction[w]
 //   |-- pump               time_s[n], commanded_mL[n]
 //   |-- pressure           time_s[m], cavity_kPa[m], optionally cavity_filtered_kPa[m], pump_kPa[m]
+//   |                      both groups optionally with attributes grid_start_s, grid_end_s, grid_rate_Hz
 //   |-- trigger            time_s[k], optionally delay_s (scalar)
 //   |-- mr/flow/<segment>  optional: phase_s[f], cavity_mL[f], sigma_mL[f]; segments count from 0
 //   |-- clock              optional: scalars such as daq_offset_s, daq_drift_ppm
@@ -42,6 +43,10 @@ inline constexpr const char* pressure_group = "/pressure";
 inline constexpr const char* pressure_time = "/pressure/time_s";
 inline constexpr const char* cavity_channel = "cavity_kPa";
 inline constexpr const char* cavity_filtered_channel = "cavity_filtered_kPa";
+/// Attributes of the groups pressure and pump: StreamGrid (run.hpp).
+inline constexpr const char* grid_start = "grid_start_s";
+inline constexpr const char* grid_end = "grid_end_s";
+inline constexpr const char* grid_rate = "grid_rate_Hz";
 inline constexpr const char* trigger_group = "/trigger";
 inline constexpr const char* trigger_time = "/trigger/time_s";
 inline constexpr const char* trigger_delay = "/trigger/delay_s";

@@ -98,8 +98,24 @@ std::vector<Event> read_events(const H5Source& source) {
   return events;
 }
 
+/// None unless all of it is told.
+std::optional<StreamGrid> read_grid(const H5Source& source, const std::string& group) {
+  const auto attributes = source.attributes(group);
+  const auto number = [&](const char* name) -> std::optional<double> {
+    const auto found = attributes.find(name);
+    if (found == attributes.end()) return std::nullopt;
+    if (const auto* value = std::get_if<double>(&found->second)) return *value;
+    if (const auto* value = std::get_if<int64_t>(&found->second)) return static_cast<double>(*value);
+    return std::nullopt;
+  };
+  const auto start_s = number(grid_start), end_s = number(grid_end), rate_Hz = number(grid_rate);
+  if (!start_s || !end_s || !rate_Hz) return std::nullopt;
+  return StreamGrid{*start_s, *end_s, *rate_Hz};
+}
+
 PressureTrace read_pressure(const H5Source& source) {
   PressureTrace pressure;
+  pressure.grid = read_grid(source, pressure_group);
   pressure.time_s = source.numbers(pressure_time);
   for (const std::string& name : source.children(pressure_group)) {
     if (unit_of(name) != pressure_unit) continue;
@@ -170,7 +186,7 @@ RecordedRun read_run(const std::filesystem::path& path) {
   run.protocol_toml = source.text(protocol_toml);
   run.segments = read_segments(source);
   run.waveforms = read_waveforms(source);
-  run.pump = {source.numbers(pump_time), source.numbers(pump_commanded)};
+  run.pump = {read_grid(source, pump_group), source.numbers(pump_time), source.numbers(pump_commanded)};
   run.pressure = read_pressure(source);
   run.trigger_s = source.numbers(trigger_time);
   if (source.has(trigger_delay)) run.trigger_delay_s = source.scalar(trigger_delay);

@@ -2,9 +2,11 @@
 // One recorded run in memory, as the run file holds it (layout.hpp). Plain data: reader.hpp fills and checks
 // it, host/runfile writes it, everything else only looks.
 
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <string>
 #include <variant>
 #include <vector>
@@ -51,12 +53,24 @@ struct Event {
   std::string text;
 };
 
+/// Where the rows of a stream were due, as the clocks tell and not as rows were counted: row k at start_s + k / rate_Hz,
+/// from the start of run to the end of the recording.
+struct StreamGrid {
+  double start_s = 0;
+  double end_s = 0;  ///< of the last row that was due
+  double rate_Hz = 0;
+
+  [[nodiscard]] int64_t rows() const { return 1 + std::llround((end_s - start_s) * rate_Hz); }
+};
+
 struct PumpTrace {
+  std::optional<StreamGrid> grid;  ///< none: the file does not tell
   std::vector<double> time_s;
   std::vector<double> commanded_mL;  ///< steps issued x volume per step
 };
 
 struct PressureTrace {
+  std::optional<StreamGrid> grid;  ///< none: the file does not tell
   std::vector<double> time_s;
   /// By dataset name, "cavity_kPa" always among them; each as long as time_s, NaN where a gap is declared.
   std::map<std::string, std::vector<double>, std::less<>> channels;

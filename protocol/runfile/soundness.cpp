@@ -14,8 +14,11 @@ namespace {
 
 constexpr size_t most_remarks = 5;  // told one by one, for each segment
 
-StreamFacts facts_of(const RecordedRun& run, std::span<const double> time_s, std::string_view stream) {
-  StreamFacts facts{.rows = time_s.size()};
+StreamFacts facts_of(const RecordedRun& run, const auto& trace, std::string_view stream) {
+  const std::span<const double> time_s = trace.time_s;
+  StreamFacts facts;
+  facts.rows = time_s.size();
+  if (trace.grid) facts.expected = trace.grid->rows();
   for (const Gap& gap : run.gaps) {
     if (gap.stream.starts_with(stream)) facts.missing += gap.count;
   }
@@ -34,6 +37,26 @@ void look_for_holes(std::span<const double> time_s, std::string_view stream,
       "{}: {:.1f} ms without a sample before index {}, not declared as a gap{}", stream,
       1e3 * (time_s[first] - time_s[first - 1]), first,
       holes.size() > 1 ? fmt::format(", and {} more such holes", holes.size() - 1) : std::string()));
+}
+
+/// A stream must reach from the start of run to its end, and have the rows that were due.
+void look_at_ends(const StreamFacts& facts, std::span<const double> time_s, std::string_view stream,
+                  double end_s, std::vector<std::string>& problems) {
+  if (facts.expected && *facts.expected != std::ssize(time_s)) {
+    problems.push_back(
+        fmt::format("{}: {} rows, but {} were due by the clocks", stream, time_s.size(), *facts.expected));
+  }
+  if (time_s.empty() || facts.rate_Hz <= 0) return;
+  const double reach_s = reach_spacings / facts.rate_Hz;
+  if (time_s.front() > reach_s) {
+    problems.push_back(fmt::format("{}: {:.3f} s without a sample before index 0, not declared as a gap",
+                                   stream, time_s.front()));
+  }
+  if (time_s.back() < end_s - reach_s) {
+    problems.push_back(
+        fmt::format("{}: ends at {:.3f} s, the run at {:.3f} s; what is between is not declared as a gap",
+                    stream, time_s.back(), end_s));
+  }
 }
 
 /// The triggers of each segment against its cycles; a hold may have been triggered or not.
@@ -99,12 +122,23 @@ bool was_stopped_on_request(const RecordedRun& run) {
   return std::ranges::any_of(run.events, [](const Event& event) { return is_stop_on_request(event.code); });
 }
 
+double end_of_motion_s(const RecordedRun& run) {
+  double end_s = 0;
+  for (const Segment& segment : run.segments)
+    end_s = std::max(end_s, segment.end_s());
+  for (const Event& event : run.events) {
+    if (event.level == "error" || is_stop_on_request(event.code)) end_s = std::min(end_s, event.time_s);
+  }
+  return end_s;
+}
+
 Soundness assess(const RecordedRun& run) {
   Soundness soundness;
   auto& problems = soundness.problems;
-  soundness.pressure = facts_of(run, run.pressure.time_s, pressure_stream);
-  soundness.pump = facts_of(run, run.pump.time_s, pump_stream);
+  soundness.pressure = facts_of(run, run.pressure, pressure_stream);
+  soundness.pump = facts_of(run, run.pump, pump_stream);
   if (!soundness.pressure.any()) problems.emplace_back("no pressure was recorded");
+  if (run.pump.time_s.empty()) problems.emplace_back("no position of the pump was recorded");
   if (!run.pressure.time_s.empty()) {
     soundness.duration_s = run.pressure.time_s.back() - run.pressure.time_s.front();
   }
@@ -115,6 +149,10 @@ Soundness assess(const RecordedRun& run) {
   soundness.stopped_on_request = was_stopped_on_request(run);
   look_for_holes(run.pressure.time_s, pressure_stream, problems);
   look_for_holes(run.pump.time_s, pump_stream, problems);
+  const double end_s = end_of_motion_s(run);
+  const double period_s = run.segments.empty() ? 0 : run.segments.back().period_s;
+  look_at_ends(soundness.pressure, run.pressure.time_s, pressure_stream, end_s, problems);
+  look_at_ends(soundness.pump, run.pump.time_s, pump_stream, end_s - last_step_periods * period_s, problems);
   for (size_t i = 0; i < run.segments.size(); ++i) {
     const Segment& segment = run.segments[i];
     (segment.waveform == "hold" ? soundness.scheduled_holds : soundness.scheduled_cycles) += segment.cycles;

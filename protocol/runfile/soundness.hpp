@@ -1,9 +1,10 @@
 #pragma once
 // Whether a run can be trusted, and if not why not, each reason with its place: samples that are missing, declared or
-// not, triggers that are missing, extra or out of time (cycles.hpp), slices that are not complete, clocks that cannot
+// not, streams that do not reach from the start of run to its end, or have not as many rows as were due, triggers that are missing, extra or out of time (cycles.hpp), slices that are not complete, clocks that cannot
 // be, faults.
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -15,8 +16,10 @@ namespace diastole::runfile {
 
 struct StreamFacts {
   size_t rows = 0;
-  int64_t missing = 0;          ///< of them, declared in /gaps
-  double rate_Hz = 0;           ///< from the median spacing; 0 for fewer than two rows
+  int64_t missing = 0;  ///< of them, declared in /gaps
+  std::optional<int64_t>
+      expected;        ///< rows that were due by the clocks (StreamGrid); none: the file does not tell
+  double rate_Hz = 0;  ///< from the median spacing; 0 for fewer than two rows
   Irregularity irregularity{};  ///< no fault as long as nothing is missing (spacing.hpp)
 
   [[nodiscard]] bool any() const { return missing < static_cast<int64_t>(rows); }
@@ -33,6 +36,10 @@ struct TriggerCounts {
 /// A clock that runs further from the controller's than this has not been mapped rightly: crystals differ by tens
 /// of ppm.
 inline constexpr double plausible_drift_ppm = 1000;
+/// The pump's rows may end before the run by this part of a period: they end with its last step, and a cycle that comes
+/// to rest makes that some time before its end.
+inline constexpr double last_step_periods = 0.05;
+
 struct Soundness {
   StreamFacts pressure;
   StreamFacts pump;
@@ -49,6 +56,9 @@ struct Soundness {
 /// Whether an event's code says that a run was ended early and in order.
 bool is_stop_on_request(std::string_view code);
 bool was_stopped_on_request(const RecordedRun& run);
+
+/// When the motion ended that the segments plan, or when it was broken off, as an event tells; 0 without segments.
+double end_of_motion_s(const RecordedRun& run);
 
 /// Precondition: the run has passed `check`.
 Soundness assess(const RecordedRun& run);

@@ -8,6 +8,7 @@
 #include <csignal>
 #include <filesystem>
 #include <fstream>
+#include <optional>
 
 #include "protocol/contract/input_error.hpp"
 #include "protocol/runfile/reader.hpp"
@@ -49,11 +50,46 @@ std::filesystem::path only_journal(const RigWithDaemon& rig) {
   return found;
 }
 
+struct Recovered {
+  double recorded_s = 0;   ///< from the first trigger to the last position
+  bool accounted = false;  ///< every sample until then is there or declared missing
+};
+
 /// Reads it, which refuses a run file with a corrupt row.
-double recorded_after_first_trigger_s(const std::filesystem::path& file) {
+Recovered recovered_from(const std::filesystem::path& file) {
   const auto run = runfile::read_run(file);
-  if (run.trigger_s.empty() || run.pressure.time_s.empty()) return 0;
-  return run.pressure.time_s.back() - run.trigger_s.front();
+  if (run.trigger_s.empty() || run.pressure.time_s.empty() || run.pump.time_s.empty()) return {0, true};
+  const auto& samples = run.pressure;
+  const bool whole = samples.grid && samples.grid->rows() == std::ssize(samples.time_s);
+  const bool reaches = samples.time_s.back() > std::max(run.pump.time_s.back(), run.trigger_s.back()) - 0.01;
+  return {run.pump.time_s.back() - run.trigger_s.front(), whole && reaches};
+}
+
+/// Has the daemon killed when it has `samples` of its run, received or missing, and a little later.
+void kill_in_the_run(RigWithDaemon& rig, uint64_t samples, double later_s) {
+  rig.start_daemon();
+  auto client = rig.client();
+  client.call("rig.home", json::object(), 300s);
+  client.call("run.start", flow::many_segments());
+  for (json progress; progress.is_null() ||
+                      (progress["state"] == "running" &&
+                       progress["received"].get<uint64_t>() + progress["missing"].get<uint64_t>() < samples);)
+    progress = client.call("run.progress");
+  std::this_thread::sleep_for(std::chrono::duration<double>(later_s));
+  rig.daemon->signal(SIGKILL);
+  rig.daemon->wait();
+  rig.daemon.reset();
+}
+
+std::optional<Recovered> recover(const RigWithDaemon& rig) {
+  const Ended recovered = flow::run(
+      rig.place, {"diastole", "recover", only_journal(rig).string(), "-o", "saved.run.h5", "--json"});
+  if (recovered.exit_code != 0 && recovered.exit_code != 1) {
+    ADD_FAILURE() << recovered.exit_code << recovered.err;
+    return std::nullopt;
+  }
+  if (recovered.json()["run"].is_null()) return Recovered{0, true};
+  return recovered_from(rig.place / "saved.run.h5");
 }
 
 TEST(Faults, DaemonKilled) {
@@ -63,26 +99,11 @@ TEST(Faults, DaemonKilled) {
   const int survived = survivors(tried, [&](int, std::mt19937& random) {
     auto rig = std::make_unique<RigWithDaemon>(Time::conducted, flow::source_text("examples/rig.toml"),
                                                std::vector<std::string>{"--pins", "pins.csv"});
-    rig->start_daemon();
-    auto client = rig->client();
-    client.call("rig.home", json::object(), 300s);
-    client.call("run.start", flow::many_segments());
-    const auto samples = static_cast<uint64_t>(between(random, 0, 5500));  // of 18 s
-    for (json progress;
-         progress.is_null() || (progress["state"] == "running" && progress["received"] < samples);)
-      progress = client.call("run.progress");
-    std::this_thread::sleep_for(std::chrono::duration<double>(between(random, 0, 0.002)));
-    rig->daemon->signal(SIGKILL);
-    rig->daemon->wait();
-    rig->daemon.reset();
-    const Ended recovered = flow::run(
-        rig->place, {"diastole", "recover", only_journal(*rig).string(), "-o", "saved.run.h5", "--json"});
-    if (recovered.exit_code != 0 && recovered.exit_code != 1) {
-      ADD_FAILURE() << recovered.exit_code << recovered.err;
-      return false;
-    }
-    const double recorded_s =
-        recovered.json()["run"].is_null() ? 0 : recorded_after_first_trigger_s(rig->place / "saved.run.h5");
+    kill_in_the_run(*rig, static_cast<uint64_t>(between(random, 0, 5500)),
+                    between(random, 0, 0.002));  // of 18 s
+    const auto recovered = recover(*rig);
+    if (!recovered || !recovered->accounted) return false;
+    const double recorded_s = recovered->recorded_s;
     rig->end_rig();
     const LastEdge edge = last_edge(rig->place / "pins.csv");
     if (edge.first_ttl_s < 0) return true;
@@ -94,6 +115,26 @@ TEST(Faults, DaemonKilled) {
   add_to_table(
       {"kill -9 of the daemon", "random moments of a session", tried, survived,
        fmt::format("{:.0f} ms at most, 0 corrupt rows ({} in mid-run)", 1e3 * most_lost_s, during_the_run)});
+}
+
+TEST(Faults, DaemonKilledInAStall) {
+  int64_t most_missing = 0;
+  const int tried = trials(2, 100);
+  const int survived = survivors(tried, [&](int, std::mt19937& random) {
+    RigWithDaemon rig(Time::conducted, flow::source_text("examples/rig.toml"),
+                      {"--fault", fmt::format("daq-drop@ttl+{}+60", 1 + random() % 3)});
+    kill_in_the_run(rig, static_cast<uint64_t>(between(random, 1200, 5300)), between(random, 0, 0.002));
+    const auto recovered = recover(rig);
+    if (!recovered || !recovered->accounted) return false;
+    const auto run = runfile::read_run(rig.place / "saved.run.h5");
+    const int64_t missing = run.missing("pressure");
+    most_missing = std::max(most_missing, missing);
+    const bool told = !run.events.empty() && run.events.back().code == "incomplete" &&
+                      run.events.back().time_s >= run.pump.time_s.back();
+    return missing > 0 && told;
+  });
+  add_to_table({"kill -9 in a stall", "the instrument silent for up to 15 s", tried, survived,
+                fmt::format("every sample there or declared, up to {} of them missing", most_missing)});
 }
 
 TEST(Faults, LinePulledOut) {

@@ -59,9 +59,16 @@ TEST(Hour, LosesNothingUntoldAndKeepsItsMemory) {
   EXPECT_EQ(result["end"], "completed");
 
   const auto run = runfile::read_run(result["run_file"].get<std::string>());
-  const double expected = rate_Hz * (rest_s + cycles * period_s + tail_s);
-  EXPECT_NEAR(static_cast<double>(run.pressure.time_s.size()), expected, 2);
-  EXPECT_EQ(result["samples"].get<size_t>() + result["gaps"].get<size_t>(), run.pressure.time_s.size());
+  // By the clocks, and not by counting samples: from the start of run until tail_s after the controller's end.
+  ASSERT_TRUE(run.pressure.grid && run.pump.grid);
+  EXPECT_LT(run.pressure.grid->start_s, 1 / rate_Hz);
+  EXPECT_NEAR(run.pressure.grid->rate_Hz, rate_Hz, 1e-3 * rate_Hz);
+  EXPECT_NEAR(run.pressure.grid->end_s, rest_s + cycles * period_s + tail_s, 0.02);
+  const int64_t expected = run.pressure.grid->rows();
+  EXPECT_EQ(result["samples"].get<int64_t>() + result["gaps"].get<int64_t>(), expected);
+  EXPECT_EQ(result["expected"], expected);
+  EXPECT_EQ(std::ssize(run.pressure.time_s), expected);
+  EXPECT_EQ(std::ssize(run.pump.time_s), run.pump.grid->rows());
   EXPECT_EQ(static_cast<int64_t>(result["gaps"]), run.missing("pressure"));
   EXPECT_GE(result["gaps"], 200) << "0.7 s without the instrument";
   EXPECT_LE(result["gaps"], 600);

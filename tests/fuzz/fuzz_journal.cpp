@@ -39,9 +39,15 @@ void add(JournalContents& journal, std::string_view document) {
 void assemble(const JournalContents& journal) {
   try {
     const JournalRecords records(journal);
-    uint64_t rows = read_story(records).sample_rows;
+    const JournalStory story = read_story(records);
+    uint64_t rows = story.sample_rows;
+    double planned_s = 0;  // a journal that breaks off may have rows declared until then
+    for (const runfile::Segment& segment : story.begin.segments)
+      planned_s = std::max(planned_s, segment.end_s());
+    if (!(planned_s < 60 && story.begin.sample_rate_Hz <= 500)) return;
     read_blocks(records, {.positions = [&](const PositionBlock& block) {
                   rows = std::max<uint64_t>(rows, block.first_index);
+                  if (500.0 * block.period_ticks < story.begin.tick_rate_Hz) rows = rows_worth_a_try + 1;
                 }});
     if (rows > rows_worth_a_try) return;
     runfile::check(assemble_run(journal).run);

@@ -82,6 +82,74 @@ TEST(Acquisition, FailedReadingsAreCountedExactlyAndNeverInterpolated) {
   EXPECT_FALSE(runfile::assess(assembled.run).sound());
 }
 
+/// A journal that ends before its record number `records`, as that of a daemon that was killed.
+AssembledRun killed_after(const SessionOnDesk& session, size_t records) {
+  JournalContents journal = read_journal(session.journal);
+  journal.records.resize(std::min(records, journal.records.size()));
+  return assemble_run(journal);
+}
+
+TEST(Acquisition, AKillWithinAStallLeavesNoSampleUndeclared) {
+  SessionOnDesk session(short_session);
+  session.instrument.fault = [](uint64_t reading) {
+    return reading >= 150 ? daq::Outcome{false, "no answer"} : daq::Outcome{};
+  };
+  session.run();
+  const size_t records = read_journal(session.journal).records.size();
+  size_t gaps_before_the_end = 0;
+  for (size_t kept = records / 2; kept < records; ++kept) {
+    SCOPED_TRACE(kept);
+    const AssembledRun assembled = killed_after(session, kept);
+    expect_books_balance(assembled);
+    EXPECT_FALSE(assembled.ended_in_order);
+    const RecordedRun& run = assembled.run;
+    const double last_s = std::max(run.pump.time_s.back(), run.trigger_s.back());
+    EXPECT_GT(run.pressure.time_s.back(), last_s - 1.5 / 300);
+    EXPECT_EQ(run.pressure.grid->rows(), std::ssize(run.pressure.time_s));
+    EXPECT_EQ(run.events.back().code, "incomplete");
+    EXPECT_GE(run.events.back().time_s, last_s);
+    gaps_before_the_end = run.gaps.empty() ? 0 : std::max(gaps_before_the_end, run.gaps.size());
+    // The growing gap reached the journal: what is only inferred is young.
+    EXPECT_LT(run.gaps.back().reason == "not recorded" ? run.gaps.back().count : 0, 0.5 * 300);
+  }
+  EXPECT_LE(gaps_before_the_end, 4U) << "parts of one gap are one gap, those of the pump beside it";
+}
+
+TEST(Acquisition, RowsThatWereDueAreDeclaredWhenTheJournalEndsBehindAHungReading) {
+  SessionOnDesk session(short_session);
+  session.instrument.delay_ns = [](uint64_t reading) {
+    return reading == 200 ? uint64_t{900'000'000} : uint64_t{0};
+  };
+  session.run();
+  JournalContents journal = read_journal(session.journal);
+  std::erase_if(journal.records, [](const JournalRecord& record) {
+    const std::string text(record.payload.begin(), record.payload.end());
+    return record.kind == RecordKind::document &&
+           (text.find("\"gap\"") != std::string::npos || text.find("\"end\"") != std::string::npos);
+  });
+  const AssembledRun assembled = assemble_run(journal);
+  expect_books_balance(assembled);
+  EXPECT_GT(assembled.samples_missing, 250U);
+  EXPECT_FALSE(assembled.ended_in_order);
+}
+
+TEST(Acquisition, TheFileTellsFromTheClocksHowManyRowsThereMustBe) {
+  SessionOnDesk session(short_session);
+  session.instrument.fault = [](uint64_t reading) {
+    return reading % 50 == 7 ? daq::Outcome{false, "no answer"} : daq::Outcome{};
+  };
+  session.run();
+  const RecordedRun run = session.assemble().run;
+  ASSERT_TRUE(run.pressure.grid && run.pump.grid);
+  EXPECT_EQ(run.pressure.grid->rows(), std::ssize(run.pressure.time_s));
+  EXPECT_EQ(run.pump.grid->rows(), std::ssize(run.pump.time_s));
+  EXPECT_NEAR(run.pump.grid->end_s, run.pump.time_s.back(), 1e-9);
+  EXPECT_NEAR(run.pressure.grid->rate_Hz, 300, 0.1);
+  EXPECT_NEAR(run.pressure.grid->end_s, run.pressure.time_s.back(), 1e-3);
+  // A quarter of a second behind the last step.
+  EXPECT_NEAR(run.pressure.grid->end_s - run.pump.grid->end_s, 0.25, 0.02);
+}
+
 class Stall : public testing::TestWithParam<int> {};
 
 TEST_P(Stall, AnInstrumentThatStallsCostsThoseSamplesAndNoOthers) {

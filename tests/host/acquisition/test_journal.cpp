@@ -2,6 +2,8 @@
 
 #include <gmock/gmock.h>
 #include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include <atomic>
 #include <cerrno>
@@ -11,6 +13,7 @@
 #include <thread>
 
 #include "host/acquisition/journal_records.hpp"
+#include "host/acquisition/part_file.hpp"
 #include "protocol/contract/input_error.hpp"
 #include "tests/host/bench/scratch.hpp"
 
@@ -119,6 +122,66 @@ TEST(Journal, AFlushThatFailsInTheBackgroundIsKeptAndEndsTheWriting) {
   EXPECT_THAT(writer.problem(), testing::HasSubstr("cannot be brought to the disk"));
   EXPECT_FALSE(writer.append(RecordKind::document, std::string("more")));
   EXPECT_EQ(read_journal(scratch / "eio.journal").records.size(), 1U);
+}
+
+/// Waits for the writer's own thread; no sync is asked for.
+std::string problem_in_time(const JournalWriter& writer) {
+  for (int i = 0; i < 500 && writer.problem().empty(); ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  return writer.problem();
+}
+
+TEST(Journal, RemovedWhileItIsWrittenIsToldAtOnceAndPutBack) {
+  const Scratch scratch("removed");
+  const auto path = scratch / "run.journal";
+  JournalWriter writer(path);
+  EXPECT_TRUE(writer.append(RecordKind::document, std::string("hello")));
+  EXPECT_TRUE(writer.append(RecordKind::samples, std::vector<uint8_t>(300'000, 7)));
+  std::filesystem::remove(path);
+  EXPECT_THAT(problem_in_time(writer),
+              testing::AllOf(testing::HasSubstr(path.string()), testing::HasSubstr("removed"),
+                             testing::HasSubstr("put back")));
+  EXPECT_FALSE(writer.append(RecordKind::document, std::string("more")));
+  EXPECT_EQ(read_journal(path).records.size(), 2U);
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(scratch.path()), {}), 1);
+}
+
+TEST(Journal, MovedOrReplacedWhileItIsWrittenIsToldAndNothingIsTouched) {
+  const Scratch scratch("moved");
+  const auto path = scratch / "run.journal";
+  JournalWriter writer(path);
+  EXPECT_TRUE(writer.append(RecordKind::document, std::string("hello")));
+  std::filesystem::rename(path, scratch / "elsewhere");
+  std::ofstream(path) << "another's";
+  EXPECT_FALSE(writer.sync());
+  EXPECT_THAT(writer.problem(), testing::HasSubstr("moved away"));
+  EXPECT_EQ(std::filesystem::file_size(path), 9U);
+  EXPECT_EQ(read_journal(scratch / "elsewhere").records.size(), 1U);
+}
+
+TEST(PartFile, OnlyWhatADeadProcessLeftIsTidied) {
+  const Scratch scratch("leftovers");
+  const pid_t child = ::fork();
+  if (child == 0) ::_exit(0);
+  ::waitpid(child, nullptr, 0);
+  const std::string dead = std::to_string(child), alive = std::to_string(::getpid());
+  const auto old = std::filesystem::file_time_type::clock::now() - std::chrono::hours(1);
+  const auto make = [&](const std::string& name, bool is_old = true) {
+    std::ofstream(scratch / name) << "x";
+    if (is_old) std::filesystem::last_write_time(scratch / name, old);
+  };
+  for (const char* kept : {"gel.run.h5", "gel.run.h5.part", "gel.run.h5.x1.part", "gel.txt.0.part"})
+    make(kept);
+  make("gel.run.h5." + alive + ".part");
+  make("gel.run.h5." + dead + ".part");
+  make("egg.run.h5." + dead + ".part");
+  remove_leftovers(scratch / "gel.run.h5");
+  EXPECT_FALSE(std::filesystem::exists(scratch / ("gel.run.h5." + dead + ".part")));
+  EXPECT_TRUE(std::filesystem::exists(scratch / ("egg.run.h5." + dead + ".part")));
+  make("gel.run.h5." + dead + ".part", false);
+  remove_leftovers(scratch.path());
+  EXPECT_FALSE(std::filesystem::exists(scratch / ("egg.run.h5." + dead + ".part")));
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(scratch.path()), {}), 6);
 }
 
 TEST(Journal, SyncWaitsForTheFlushThatIsUnderWay) {

@@ -1,3 +1,4 @@
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 
 #include <fstream>
@@ -64,6 +65,29 @@ TEST(RigConfig, GeometryThatTheControllerCannotCountWithIsRefused) {
               AllOf(HasSubstr("rig.bore_mm"), HasSubstr("travel_mL")));
   const std::string narrow = changed(good, "bore_mm = 100.0", "bore_mm = 1.0");
   EXPECT_THAT(refusal(narrow), AllOf(HasSubstr("rig.bore_mm"), HasSubstr("pL")));
+}
+
+class ChannelName : public testing::TestWithParam<const char*> {};
+
+TEST_P(ChannelName, ThatCannotNameADatasetOfItsOwnIsRefusedWithItsLine) {
+  const std::string good = example("rig.toml");
+  const std::string second = fmt::format(
+      "[[daq.channel]]\nname = \"{}\"\ninput = 1\nkPa_per_V = 4.0\n\n[[daq.channel]]\n", GetParam());
+  const std::string text = changed(good, "[[daq.channel]]\n", second);
+  EXPECT_THAT(message_of<InputError>([&] { rig_from(text); }),
+              AllOf(HasSubstr("rig.toml"), HasSubstr("line"), HasSubstr("name"),
+                    HasSubstr(fmt::format("\"{}\"", GetParam()))));
+}
+
+INSTANTIATE_TEST_SUITE_P(RigConfig, ChannelName,
+                         testing::Values("", "a/b", "cavity_filtered", "Pump", "1st", "_pump", "pump end",
+                                         "pump.end", "caf\u00e9", "cavity"));
+
+TEST(RigConfig, ChannelNamesOfSmallLettersDigitsAndUnderscoresAreTaken) {
+  const std::string text = changed(example("rig.toml"), "[[daq.channel]]\n",
+                                   "[[daq.channel]]\nname = \"pump_end2\"\ninput = 1\nkPa_per_V = 4.0\n\n"
+                                   "[[daq.channel]]\n");
+  EXPECT_EQ(rig_from(text).daq.channels.at(0).name, "pump_end2");
 }
 
 TEST(Experiment, TheExampleIsThePapersSession) {

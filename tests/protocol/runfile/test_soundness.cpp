@@ -5,6 +5,10 @@
 #include <cmath>
 #include <random>
 
+#include "protocol/runfile/layout.hpp"
+#include "protocol/runfile/reader.hpp"
+#include "tests/protocol/runfile/broken_runs.hpp"
+
 namespace diastole::runfile {
 namespace {
 
@@ -74,6 +78,106 @@ TEST(Soundness, TwoHolesCloseToEachOtherAreTwo) {
   ASSERT_EQ(soundness.problems.size(), 1U);
   EXPECT_THAT(soundness.problems[0], HasSubstr("before index 200"));
   EXPECT_THAT(soundness.problems[0], HasSubstr("and 1 more"));
+}
+
+void drop_rows(std::vector<double>& values, size_t first, size_t last) {
+  values.erase(values.begin() + static_cast<std::ptrdiff_t>(first),
+               values.begin() + static_cast<std::ptrdiff_t>(last));
+}
+
+/// Rows [first, last) of a stream that nothing declares missing.
+struct Cut {
+  const char* stream;
+  size_t first, last;
+  const char* told;
+};
+
+class StreamCut : public testing::TestWithParam<Cut> {};
+
+TEST_P(StreamCut, IsAFaultWithAndWithoutAGrid) {
+  const Cut& cut = GetParam();
+  for (const bool with_grid : {false, true}) {
+    RecordedRun run = regular_run();
+    if (with_grid) run.pressure.grid = run.pump.grid = {0, 3.99, 100};
+    ASSERT_THAT(assess(run).problems, IsEmpty());
+    if (cut.stream == pressure_stream) {
+      drop_rows(run.pressure.time_s, cut.first, cut.last);
+      drop_rows(run.pressure.channels["cavity_kPa"], cut.first, cut.last);
+    } else {
+      drop_rows(run.pump.time_s, cut.first, cut.last);
+      drop_rows(run.pump.commanded_mL, cut.first, cut.last);
+    }
+    const Soundness soundness = assess(run);
+    EXPECT_THAT(soundness.problems,
+                testing::Contains(testing::AllOf(testing::StartsWith(cut.stream), HasSubstr(cut.told))));
+    if (!with_grid) continue;
+    EXPECT_THAT(soundness.problems, testing::Contains(HasSubstr("but 400 were due")));
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Soundness, StreamCut,
+                         testing::Values(Cut{"pressure", 240, 400, "ends at 2.390 s, the run at 2.500 s"},
+                                         Cut{"pressure", 0, 200, "2.000 s without a sample before index 0"},
+                                         Cut{"pump", 150, 400, "ends at 1.490 s"},
+                                         Cut{"pump", 0, 3, "0.030 s without"}));
+
+/// A sound run file of another program, 3 s at 300 Hz, and the same without some rows.
+TEST(Soundness, AFileThatWasCutAtEitherEndIsNotSound) {
+  RunSketch whole;
+  for (auto* values : {&whole.pressure_time_s, &whole.cavity_kPa, &whole.pump_time_s, &whole.commanded_mL})
+    values->clear();
+  for (int i = 0; i < 900; ++i) {
+    whole.pressure_time_s.push_back(i / 300.0);
+    whole.pump_time_s.push_back(i / 300.0);
+    whole.cavity_kPa.push_back(1);
+    whole.commanded_mL.push_back(0);
+  }
+  const auto problems = [](const RunSketch& sketch) {
+    const auto file = scratch_file("cut.run.h5");
+    write_sketch(file, sketch);
+    return assess(read_run(file)).problems;
+  };
+  EXPECT_THAT(problems(whole), IsEmpty());
+  RunSketch last = whole, first = whole, pump = whole;
+  for (auto* values : {&last.pressure_time_s, &last.cavity_kPa})
+    drop_rows(*values, 555, 900);
+  for (auto* values : {&first.pressure_time_s, &first.cavity_kPa})
+    drop_rows(*values, 0, 460);
+  for (auto* values : {&pump.pump_time_s, &pump.commanded_mL})
+    drop_rows(*values, 345, 900);
+  EXPECT_THAT(problems(last),
+              testing::ElementsAre(HasSubstr("pressure: ends at 1.847 s, the run at 2.500 s")));
+  EXPECT_THAT(problems(first),
+              testing::ElementsAre(HasSubstr("pressure: 1.533 s without a sample before index 0")));
+  EXPECT_THAT(problems(pump), testing::ElementsAre(HasSubstr("pump: ends at 1.147 s")));
+}
+
+TEST(Soundness, OneRowFewerThanWereDueIsAFaultAtEitherEnd) {
+  for (const size_t row : {size_t{0}, size_t{399}}) {
+    RecordedRun run = regular_run();
+    run.pressure.grid = {0, 3.99, 100};
+    drop_rows(run.pressure.time_s, row, row + 1);
+    drop_rows(run.pressure.channels["cavity_kPa"], row, row + 1);
+    EXPECT_THAT(assess(run).problems,
+                testing::ElementsAre("pressure: 399 rows, but 400 were due by the clocks"));
+  }
+}
+
+TEST(Soundness, AStreamMayEndWhereTheRunWasBrokenOff) {
+  RecordedRun run = regular_run();
+  for (auto* values :
+       {&run.pressure.time_s, &run.pressure.channels["cavity_kPa"], &run.pump.time_s, &run.pump.commanded_mL})
+    values->resize(150);
+  run.events = {{1.5, "info", "stopped_now", "stopped on request"}};
+  EXPECT_THAT(assess(run).problems, IsEmpty());
+  run.events.clear();
+  EXPECT_EQ(assess(run).problems.size(), 2U);
+}
+
+TEST(Soundness, ARunWithoutAPositionOfThePumpIsNotSound) {
+  RecordedRun run = regular_run();
+  run.pump = {};
+  EXPECT_THAT(assess(run).problems, testing::ElementsAre(HasSubstr("no position of the pump")));
 }
 
 TEST(Soundness, ARunOfDeclaredGapsAloneSaysThatNoPressureWasRecorded) {
