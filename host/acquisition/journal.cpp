@@ -200,17 +200,16 @@ void JournalWriter::keep(std::string problem) {
   if (problem_.empty()) problem_ = std::move(problem);
 }
 
+/// By the count of names and by the name alone: not every file system keeps the numbers of its files.
 void JournalWriter::watch_name() {
-  struct stat opened {
-  }, named{};
+  struct stat opened = {};
+  struct stat named = {};
   if (!problem().empty() || ::fstat(file_.get(), &opened) != 0) return;
-  const bool found = ::stat(path_.c_str(), &named) == 0;
-  if (found && named.st_ino == opened.st_ino && named.st_dev == opened.st_dev) return;
+  const bool found = ::stat(path_.c_str(), &named) == 0 || errno != ENOENT;
+  if (found && opened.st_nlink > 0) return;
   const std::string what = fmt::format("{}: the journal was ", path_.string());
-  if (opened.st_nlink > 0 || found) {
-    return keep(what + (opened.st_nlink > 0 ? "moved away; what was recorded is where it was moved to"
-                                            : "replaced by another file; what was recorded is lost"));
-  }
+  if (opened.st_nlink > 0) return keep(what + "moved away; what was recorded is where it was moved to");
+  if (found) return keep(what + "replaced by another file; what was recorded is lost");
   try {
     copy_durably(fmt::format("/proc/self/fd/{}", file_.get()), path_);
     keep(what + "removed; what was recorded until then was put back");

@@ -149,14 +149,20 @@ TEST(Journal, RemovedWhileItIsWrittenIsToldAtOnceAndPutBack) {
 TEST(Journal, MovedOrReplacedWhileItIsWrittenIsToldAndNothingIsTouched) {
   const Scratch scratch("moved");
   const auto path = scratch / "run.journal";
-  JournalWriter writer(path);
-  EXPECT_TRUE(writer.append(RecordKind::document, std::string("hello")));
+  JournalWriter moved(path);
+  EXPECT_TRUE(moved.append(RecordKind::document, std::string("hello")));
   std::filesystem::rename(path, scratch / "elsewhere");
-  std::ofstream(path) << "another's";
-  EXPECT_FALSE(writer.sync());
-  EXPECT_THAT(writer.problem(), testing::HasSubstr("moved away"));
-  EXPECT_EQ(std::filesystem::file_size(path), 9U);
+  EXPECT_FALSE(moved.sync());
+  EXPECT_THAT(moved.problem(), testing::HasSubstr("moved away"));
   EXPECT_EQ(read_journal(scratch / "elsewhere").records.size(), 1U);
+  EXPECT_FALSE(std::filesystem::exists(path));
+
+  JournalWriter replaced(path);
+  std::ofstream(scratch / "other") << "another's";
+  std::filesystem::rename(scratch / "other", path);
+  EXPECT_FALSE(replaced.sync());
+  EXPECT_THAT(replaced.problem(), testing::HasSubstr("replaced"));
+  EXPECT_EQ(std::filesystem::file_size(path), 9U);
 }
 
 TEST(PartFile, OnlyWhatADeadProcessLeftIsTidied) {
