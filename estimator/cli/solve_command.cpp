@@ -252,8 +252,9 @@ ExitCode run_solve(const SolveArguments& arguments, const CommandOutput& out) {
   }
   if (arguments.frames) json["frames"] = frames_json(model, solved);
   if (!solution.report.converged()) std::cerr << "diastole solve: " << solution.report.describe() << '\n';
-  if (arguments.pressure_kPa && (solution.report.reason == SolveReason::no_convergence ||
-                                 solution.report.reason == SolveReason::singular_tangent)) {
+  if (arguments.pressure_kPa && solution.report.load_steps > 0 &&
+      (solution.report.reason == SolveReason::no_convergence ||
+       solution.report.reason == SolveReason::singular_tangent)) {
     std::cerr << "  If the pressure has a maximum on the way, `diastole pv` finds it and goes on beyond.\n";
   }
   if (solution.report.converged() && solution.report.unstable_motions > 0) {

@@ -37,6 +37,9 @@ std::string SolveReport::describe() const {
         inverted->point.element, inverted->point.xi[0], inverted->point.xi[1], inverted->point.xi[2],
         place[0], place[1], place[2]);
   }
+  if (reason == SolveReason::singular_tangent && load_steps == 0)
+    text +=
+        "; the body can move without resistance: its supports or springs do not hold it in every direction";
   if (unstable_motions > 0) text += "; the last equilibrium is not stable";
   if (beyond_law) text += fmt::format("; the law has no stress at the strain of element {}", *beyond_law);
   if (!history.empty() && !history.back().iterations.empty()) {

@@ -144,6 +144,25 @@ std::vector<BondedFaces> bonded_ends(const Study& study, const HermiteMesh& mesh
   return bonded;
 }
 
+/// Without them an anisotropic law would have its fibres along x, which nobody asked for.
+void require_axes(const Study& study, const Law& law, const MeshBody& body) {
+  if (!law.needs_axes() || body.fibres) return;
+  std::vector<std::string_view> isotropic;
+  for (const Law* other : all_laws()) {
+    if (!other->needs_axes()) isotropic.push_back(other->name());
+  }
+  const bool from_file = std::holds_alternative<MeshSpecimen>(study.specimen);
+  refuse(study, "law.name",
+         fmt::format("the law {} needs to know where the fibres run, and {}", law.name(),
+                     from_file ? "the mesh file has no fibre_deg" : "this kind of specimen has no fibres"),
+         fmt::format("{} (docs/mesh-file.md), or choose a law without fibres: {}.",
+                     from_file
+                         ? "Give all nodes of the mesh file a fibre_deg"
+                         : "Export the body by `diastole mesh export STUDY -o BODY.mesh.toml`, give all its "
+                           "nodes a fibre_deg and name it in the study",
+                     fmt::join(isotropic, ", ")));
+}
+
 Chamber chamber_of(const StudyChamber& given) {
   Chamber chamber{.sealing_pressure_kPa = given.sealing_pressure_kPa};
   if (given.compliance_mL_per_kPa) chamber.compliance_mL_per_kPa = *given.compliance_mL_per_kPa;
@@ -153,6 +172,13 @@ Chamber chamber_of(const StudyChamber& given) {
 /// What a mesh file must have, told of the study's key for it.
 void require_of_mesh(const Study& study, bool fulfilled, std::string problem, std::string remedy) {
   if (!fulfilled) refuse(study, "specimen.file", std::move(problem), std::move(remedy));
+}
+
+void require_ends(const Study& study, const HermiteMesh& mesh) {
+  require_of_mesh(study, !mesh.faces().bottom.empty() || !mesh.faces().top.empty(),
+                  "the mesh names no face bottom or top, so that nothing holds the body",
+                  "Name the faces that specimen.ends is to hold in the mesh file, as "
+                  "faces = [\"bottom xi2=0\"].");
 }
 
 void require_chamber_wall(const Study& study, const ElasticModel& model) {
@@ -188,6 +214,8 @@ ElasticModel make_model(const Study& study, SolveOptions options) {
   elastic.parameters = start_values(study, law);
   elastic.solve = std::move(options);
   MeshBody body = study_body(study);
+  require_axes(study, law, body);
+  require_ends(study, body.mesh);
   if (body.fibres) elastic.material_axes = material_axes_of(*std::move(body.fibres));
   elastic.bonded = bonded_ends(study, body.mesh);
   if (study.chamber) elastic.chamber = chamber_of(*study.chamber);

@@ -13,8 +13,8 @@ MeshBody study_body(const Study& study);
 
 /// Parameters take their `start`. Throws InputError if the law is unknown, if the study lacks one of its
 /// parameters or has one that it does not know, if a start lies outside what the law allows, or if it names
-/// an effect (the model has none), or if the mesh file names no outer wall for the chamber, or one with a free rim
-/// for a sealed one.
+/// an effect (the model has none), if the law needs axes and the body has no fibres, if the mesh file names no face
+/// to hold, or if it names no outer wall for the chamber, or one with a free rim for a sealed one.
 ElasticModel make_model(const Study& study, SolveOptions options = {});
 
 /// Throws InputError if the model has no wall for a cavity pressure to push on (a mesh file without `inner`).

@@ -3,6 +3,7 @@
 //
 //   struct NeoHookean {
 //     static constexpr std::string_view name = "neo-hookean";
+//     static constexpr bool needs_axes = false;
 //     static constexpr std::array<LawParameter, 1> parameters{...};
 //     template <class Scalar>
 //     static Scalar energy(const SymmetricTensor<Scalar>& c, const std::array<Scalar, 1>& values);
@@ -58,6 +59,7 @@ class EnergyLaw final : public Law {
 
  public:
   std::string_view name() const override { return Energy::name; }
+  bool needs_axes() const override { return Energy::needs_axes; }
   std::span<const LawParameter> parameters() const override { return Energy::parameters; }
 
   double energy(const Tensor& c, Values values) const override {

@@ -42,6 +42,7 @@ struct FungState {
 
 struct Guccione {
   static constexpr std::string_view name = "guccione";
+  static constexpr bool needs_axes = true;
   static constexpr std::array<LawParameter, 4> parameters{
       {{"C_kPa", "stress scale: W = C/2 (exp Q - 1)", 0.0, 1.2},
        {"b1", "stiffness along the fibre (Land's bf)", 0.0, 26.7},

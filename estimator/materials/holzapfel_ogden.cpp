@@ -19,6 +19,7 @@ namespace {
 
 struct HolzapfelOgden {
   static constexpr std::string_view name = "holzapfel-ogden";
+  static constexpr bool needs_axes = true;
   static constexpr std::array<LawParameter, 8> parameters{{{"a_kPa", "matrix", 0.0, 0.059},
                                                            {"b", "stiffening of the matrix", 0.0, 8.023},
                                                            {"af_kPa", "fibres", 0.0, 18.472},

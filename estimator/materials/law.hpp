@@ -38,6 +38,8 @@ class Law {
   virtual ~Law() = default;
 
   [[nodiscard]] virtual std::string_view name() const = 0;
+  /// Whether directions of the material matter: the energy of a body turned within its axes is another.
+  [[nodiscard]] virtual bool needs_axes() const = 0;
   [[nodiscard]] virtual std::span<const LawParameter> parameters() const = 0;
 
   // `c` is the right Cauchy-Green tensor; `values` holds one number for each of parameters(), in that order.

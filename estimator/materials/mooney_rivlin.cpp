@@ -14,6 +14,7 @@ namespace {
 
 struct MooneyRivlin {
   static constexpr std::string_view name = "mooney-rivlin";
+  static constexpr bool needs_axes = false;
   static constexpr std::array<LawParameter, 2> parameters{
       {{"C1_kPa", "multiplies I1 - 3", 0.0, 170.0}, {"C2_kPa", "multiplies I2 - 3", 0.0, 20.0}}};
 

@@ -11,6 +11,7 @@ namespace {
 
 struct NeoHookean {
   static constexpr std::string_view name = "neo-hookean";
+  static constexpr bool needs_axes = false;
   static constexpr std::array<LawParameter, 1> parameters{
       {{"C1_kPa", "half the shear modulus: W = C1 (I1 - 3)", 0.0, 8.71}}};
 

@@ -51,6 +51,7 @@ SymmetricTensor<Scalar> turned(const SymmetricTensor<Scalar>& c, const Eigen::Ma
 
 struct Ogden {
   static constexpr std::string_view name = "ogden";
+  static constexpr bool needs_axes = false;
   static constexpr double any = -1e300;
   static constexpr std::array<LawParameter, 6> parameters{
       {{"mu1_kPa", "first modulus", any, 630.0},

@@ -23,6 +23,7 @@ namespace {
 
 struct PoleZero {
   static constexpr std::string_view name = "pole-zero";
+  static constexpr bool needs_axes = true;
   // One row for each strain component, in the order of symmetric_tensor.hpp.
   static constexpr std::array<LawParameter, 18> parameters{
       {{"kff_kPa", "fibre stiffness", 0.0, 2.0},

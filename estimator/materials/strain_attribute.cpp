@@ -29,6 +29,7 @@ namespace {
 
 struct StrainAttribute {
   static constexpr std::string_view name = "strain-attribute";
+  static constexpr bool needs_axes = true;
   static constexpr std::array<LawParameter, 6> parameters{
       {{"k2_kPa", "Young's modulus along the fibre at rest", 0.0, 33.2},
        {"m2", "stiffening with fibre stretch", 0.0, 27.7},

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -49,6 +50,17 @@ class SolveCommand : public testing::Test {
   ~SolveCommand() override { std::filesystem::remove(study_); }
 
   void write_study(const std::string& text) const { std::ofstream(study_) << text; }
+
+  void make_anisotropic() const {
+    std::ostringstream text;
+    text << std::ifstream(study_).rdbuf();
+    std::string study = text.str();
+    const size_t law = study.find("name = \"neo-hookean\"");
+    std::string guccione = "name = \"guccione\"\n";
+    for (const char* parameter : {"C_kPa", "b1", "b2", "b3"})
+      guccione += std::string("[law.parameters.") + parameter + "]\nstart = 5.0\nbounds = [1.0, 15.0]\n";
+    write_study(study.replace(law, study.find("[data]") - law, guccione));
+  }
 
   Outcome run(std::vector<std::string> arguments) const {
     arguments.insert(arguments.begin(), {"solve", study_.string()});
@@ -227,6 +239,7 @@ class SolveOfAMeshFile : public SolveCommand {
       if (name == "inner") faces.inner.clear();
       if (name == "outer") faces.outer.clear();
       if (name == "top") faces.top.clear();
+      if (name == "bottom") faces.bottom.clear();
     }
     write_ring(ring, ring.reference(), faces, "ends = \"fixed\"\n", more);
   }
@@ -278,6 +291,21 @@ TEST_F(SolveOfAMeshFile, RefusesALoadThatTheFacesCannotTake) {
   EXPECT_THAT(refusal({"--pressure-kPa", "1"}), refused_for("names no face outer"));
   leave_out({"outer"}, "[chamber]\nsealing_pressure_kPa = 1.0\n");
   EXPECT_THAT(refusal({"--pressure-kPa", "1"}), refused_for("names no face outer"));
+}
+
+TEST_F(SolveOfAMeshFile, RefusesABodyThatNothingHolds) {
+  leave_out({"bottom", "top"});
+  EXPECT_THAT(refusal({"--pressure-kPa", "1"}), testing::AllOf(testing::HasSubstr("specimen.file"),
+                                                               testing::HasSubstr("nothing holds the body"),
+                                                               testing::HasSubstr("bottom xi2=0")));
+}
+
+TEST_F(SolveOfAMeshFile, RefusesALawThatNeedsFibres) {
+  leave_out({});
+  make_anisotropic();
+  EXPECT_THAT(refusal({"--pressure-kPa", "1"}),
+              testing::AllOf(testing::HasSubstr("law.name"), testing::HasSubstr("no fibre_deg"),
+                             testing::HasSubstr("neo-hookean")));
 }
 
 TEST_F(SolveOfAMeshFile, RefusesSpringsAtEndsThatAreNotPlane) {
@@ -332,6 +360,14 @@ TEST_F(SolveCommand, RefusesBadPressureStartAndMesh) {
               testing::HasSubstr("is given beside --volume-change-mL"));
   EXPECT_THAT(refusal({"--pressure-kPa", "2", "--set", "C2_kPa=1"}), testing::HasSubstr("C2_kPa"));
   EXPECT_THAT(refusal({"--pressure-kPa", "2", "--mesh", "2,1,1"}), testing::HasSubstr("--mesh"));
+}
+
+TEST_F(SolveCommand, RefusesALawThatNeedsFibresInABodyWithoutAny) {
+  make_anisotropic();
+  EXPECT_THAT(
+      refusal({"--pressure-kPa", "1"}),
+      testing::AllOf(testing::HasSubstr("law.name"), testing::HasSubstr("needs to know where the fibres run"),
+                     testing::HasSubstr("diastole mesh export")));
 }
 
 TEST_F(SolveCommand, RefusesUnknownLawsAndParametersWithTheNearestName) {

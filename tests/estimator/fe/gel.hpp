@@ -29,6 +29,7 @@ inline ElasticModel gel(double c1_kPa, std::array<size_t, 3> elements = {8, 4, 1
 /// A law with fibres, stiffening and a full tangent, for the paths that the neo-Hookean law does not take.
 struct FibreExponential {
   static constexpr std::string_view name = "test-fibre-exponential";
+  static constexpr bool needs_axes = true;
   static constexpr std::array<LawParameter, 2> parameters{
       {{"C_kPa", "scale", 0.0, 3.0}, {"b", "exponent", 0.0, 2.0}}};
   template <class Scalar>

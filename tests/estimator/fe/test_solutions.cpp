@@ -282,7 +282,9 @@ TEST(Failure, MissingSupportsAreASingularTangent) {
   HermiteMesh mesh = make_annulus(gel_shape({4, 1, 1}));
   const HeldDofs held = hold_nothing(mesh);
   ElasticModel model(std::move(mesh), *find_law("neo-hookean"), {.parameters = {6.5}, .held = held});
-  EXPECT_EQ(model.solve(0.0).report.reason, SolveReason::singular_tangent);
+  const SolveReport report = model.solve(0.0).report;
+  EXPECT_EQ(report.reason, SolveReason::singular_tangent);
+  EXPECT_THAT(report.describe(), testing::HasSubstr("its supports or springs do not hold it"));
 }
 
 }  // namespace

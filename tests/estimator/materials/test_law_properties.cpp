@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
 #include <string>
 
@@ -86,6 +87,20 @@ TEST_P(EveryLaw, TangentIsTheStresssDerivativeAndSymmetric) {
       }
     }
   }
+}
+
+TEST_P(EveryLaw, NeedsAxesIfTurningTheMaterialChangesTheEnergy) {
+  double change = 0.0;
+  double most = 0.0;
+  for (const Eigen::Matrix3d& f : deformations()) {
+    const double energy = law.energy(right_cauchy_green(f), values);
+    most = std::max(most, std::abs(energy));
+    for (int axis = 0; axis < 3; ++axis) {
+      const Eigen::Matrix3d turn = Eigen::AngleAxisd(0.7, Eigen::Vector3d::Unit(axis)).toRotationMatrix();
+      change = std::max(change, std::abs(law.energy(right_cauchy_green(f * turn), values) - energy));
+    }
+  }
+  EXPECT_EQ(law.needs_axes(), change > 1e-6 * most) << change << " of " << most << " kPa";
 }
 
 TEST_P(EveryLaw, FastPathAgreesWithTheDualNumbers) {
