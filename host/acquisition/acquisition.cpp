@@ -27,7 +27,14 @@ constexpr const char* journal_failed = "journal_failed";
 
 Acquisition::Acquisition(Clock& clock, Controller& controller, SampleSource& samples, JournalWriter& journal,
                          AcquisitionSetup setup)
-    : clock_(clock), controller_(controller), samples_(samples), journal_(journal), setup_(std::move(setup)) {
+    : clock_(clock),
+      controller_(controller),
+      samples_(samples),
+      journal_(journal),
+      setup_(std::move(setup)),
+      gap_remarks_([this](const std::string& code, const std::string& text) {
+        hooks_.remark({"warning", code, text});
+      }) {
   block_.channels = static_cast<uint32_t>(setup_.channels.size());
   const signal::LowPassDesign design{.rate_Hz = setup_.sample_rate_Hz};
   if (design.rate_Hz >= signal::least_rate_over_cutoff * design.cutoff_Hz) live_filter_.emplace(design);
@@ -53,6 +60,7 @@ RunOutcome Acquisition::run(const Hooks& hooks) {
   const uint64_t until_ns = tail_until_ns_.value_or(clock_.now_ns());
   take_samples(samples_.finish(until_ns));
   end_missing();
+  gap_remarks_.close(clock_.now_ns());
   close_block();
   close_gate();
   check_count(grid.due_by(until_ns));
@@ -72,6 +80,7 @@ void Acquisition::turn() {
   for (const ControllerEvent& event : controller_.take_events())
     take(event);
   take_samples(samples_.take());
+  gap_remarks_.look(clock_.now_ns());
   watch_gate();
   check_deadline();
   if (ended_) return;
@@ -82,15 +91,21 @@ void Acquisition::obey(StopRequest request) {
   if (request <= obeyed_) return;
   obeyed_ = request;
   if (request == StopRequest::at_cycle_end) {
-    controller_.stop_at_cycle_end();
     remark("info", "stop", "stop at the end of this cycle was asked for");
   } else if (request == StopRequest::halt) {
-    controller_.halt();
     remark("warning", "stop", "a halt was asked for: the motion is cut off at once");
   } else {
-    controller_.stop_now();
     remark("warning", "stop", "controlled stop was asked for");
   }
+  send_stop(request);
+}
+
+/// Everything but what would find the pump at rest, or about to stop at this very cycle's end.
+void Acquisition::send_stop(StopRequest request) {
+  if (tail_until_ns_) return;
+  if (request == StopRequest::halt) return controller_.halt();
+  if (request == StopRequest::now) return controller_.stop_now();
+  if (!schedule_stops_) controller_.stop_at_cycle_end();
 }
 
 void Acquisition::follow_schedule() {
@@ -124,7 +139,7 @@ void Acquisition::take_cycle(uint32_t cycle) {
   }
   if (turn.last_cycle) {
     schedule_stops_ = true;
-    controller_.stop_at_cycle_end();
+    if (obeyed_ == StopRequest::none) controller_.stop_at_cycle_end();  // otherwise a stop is under way
   }
   tell_schedule();
 }
@@ -174,10 +189,7 @@ void Acquisition::take(const Missing& missing) {
   if (gap_ && gap_->reason != missing.reason) close_gap();
   if (!gap_) gap_ = OpenGap{missing.first_index, 0, missing.reason};
   gap_->count += missing.count;
-  if (missing_in_a_row_ == 0) {
-    hooks_.remark({"warning", "gap", "samples are missing: " + missing.reason});
-  }
-  missing_in_a_row_ += missing.count;
+  gap_remarks_.missing(clock_.now_ns(), missing.count, missing.reason);
   outcome_.counts.missing += missing.count;
   tell_gap_in_time();
 }
@@ -225,11 +237,7 @@ void Acquisition::note(const std::vector<GateRemark>& remarks) {
 
 void Acquisition::end_missing() {
   close_gap();
-  if (missing_in_a_row_ == 0) return;
-  hooks_.remark(
-      {"warning", "gap_end",
-       fmt::format("the gap cost {} sample{}", missing_in_a_row_, missing_in_a_row_ == 1 ? "" : "s")});
-  missing_in_a_row_ = 0;
+  gap_remarks_.received(clock_.now_ns());
 }
 
 /// What the source accounted for against what the clock says.
@@ -291,8 +299,8 @@ void Acquisition::take(const ControllerEvent& event) {
           [&](const wire::RunEnded& e) {
             outcome_.cycles = e.cycles;
             triggers_raised_ = e.triggers;
-            const bool schedule_done = schedule_stops_ && obeyed_ == StopRequest::none &&
-                                       wire::run_end_name(e.reason) == "stopped_at_cycle_end";
+            const bool schedule_done =
+                schedule_stops_ && wire::run_end_name(e.reason) == "stopped_at_cycle_end";
             const std::string reason =
                 schedule_done ? "completed" : std::string(wire::run_end_name(e.reason));
             document({{"record", "run_ended"},
@@ -322,10 +330,7 @@ void Acquisition::take(const ControllerEvent& event) {
                    fmt::format("{} {}", wire::fault_explanation(e.fault), wire::fault_remedy(e.fault)),
                    e.tick);
           },
-          [&](const wire::Nak& e) {
-            remark("error", "refused", std::string(wire::refusal_explanation(e.refusal)));
-            if (!started_) end("refused");
-          },
+          [&](const wire::Nak& e) { take(e); },
           [&](const wire::StateChanged&) {},
           [&](const LinkBroken& e) {
             remark("error", "link_lost", e.reason + "; the pump stops by itself");
@@ -333,6 +338,19 @@ void Acquisition::take(const ControllerEvent& event) {
           },
       },
       event);
+}
+
+/// Our own stop that crossed the end of the motion found what it wanted.
+void Acquisition::take(const wire::Nak& refusal) {
+  const auto type = static_cast<wire::MessageType>(refusal.request_type);
+  const bool of_a_stop = type == wire::MessageType::StopAtCycleEnd || type == wire::MessageType::StopNow ||
+                         type == wire::MessageType::Halt;
+  if (started_ && of_a_stop && refusal.refusal == wire::Refusal::wrong_state) {
+    remark("info", "stop", "the stop that was asked for found the motion ended, or about to end");
+    return;
+  }
+  remark("error", "refused", std::string(wire::refusal_explanation(refusal.refusal)));
+  if (!started_) end("refused");
 }
 
 void Acquisition::remark(const std::string& level, const std::string& code, const std::string& text,

@@ -13,6 +13,7 @@
 #include <string>
 #include <vector>
 
+#include "host/acquisition/gap_remarks.hpp"
 #include "host/acquisition/journal.hpp"
 #include "host/acquisition/journal_records.hpp"
 #include "host/acquisition/live_trace.hpp"
@@ -97,6 +98,7 @@ class Acquisition {
  private:
   void turn();
   void obey(StopRequest request);
+  void send_stop(StopRequest request);
   void follow_schedule();
   void take_cycle(uint32_t cycle);
   void tell_schedule();
@@ -115,6 +117,7 @@ class Acquisition {
   void check_count(uint64_t due);
   void close_block();
   void take(const ControllerEvent& event);
+  void take(const wire::Nak& refusal);
   void remark(const std::string& level, const std::string& code, const std::string& text,
               std::optional<uint64_t> tick = {});
   void write(RecordKind kind, const auto& payload);
@@ -137,8 +140,8 @@ class Acquisition {
     std::string reason;
   };
   std::optional<OpenGap> gap_;
-  uint64_t gap_told_ns_ = 0;       ///< when part of a gap last went to the journal
-  uint64_t missing_in_a_row_ = 0;  ///< over all reasons
+  uint64_t gap_told_ns_ = 0;  ///< when part of a gap last went to the journal
+  GapRemarks gap_remarks_;
   uint64_t deadline_ns_ = 0;
   StopRequest obeyed_ = StopRequest::none;
   std::optional<GateCheck> gate_;
@@ -151,7 +154,7 @@ class Acquisition {
   std::optional<signal::LowPass> live_filter_;  // of the first channel
   std::optional<SliceTracker> schedule_;
   bool prompted_ = false;
-  bool schedule_stops_ = false;  // the last slice is being imaged, and the stop behind it was sent
+  bool schedule_stops_ = false;  // the last slice is being imaged, and a stop behind it is under way
 };
 
 }  // namespace diastole

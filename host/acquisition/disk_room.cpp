@@ -17,16 +17,20 @@ double journal_bytes_s(const RunSize& run) {
   constexpr double block_bytes = 16;         // header
   constexpr double batch_positions = 30;     // at least, see the controller's telemetry
   constexpr double batch_bytes = 20;         // header
+  constexpr double gap_bytes = 120;          // its reason in words
   constexpr double documents_bytes_s = 800;  // clock pairs of controller and instrument
   return run.sample_rate_Hz * number_bytes * (1 + static_cast<double>(run.channels)) +
          blocks_s * (record_bytes + block_bytes) +
          run.position_rate_Hz * (sizeof(int32_t) + (record_bytes + batch_bytes) / batch_positions) +
+         run.gaps_Hz *
+             (record_bytes + gap_bytes + record_bytes + block_bytes) +  // and the block that it ends
          documents_bytes_s;
 }
 
 double run_file_bytes_s(const RunSize& run) {
   const double columns = 2 + static_cast<double>(run.channels);  // time, channels, filtered
-  return number_bytes * (run.sample_rate_Hz * columns + run.position_rate_Hz * 2);
+  constexpr double gap_bytes = 160;                              // two numbers, two texts
+  return number_bytes * (run.sample_rate_Hz * columns + run.position_rate_Hz * 2) + gap_bytes * run.gaps_Hz;
 }
 
 std::string megabytes(uint64_t bytes) { return fmt::format("{:.1f} MB", 1e-6 * static_cast<double>(bytes)); }

@@ -12,6 +12,8 @@ struct RunSize {
   double position_rate_Hz = 0;
   uint64_t channels = 1;
   uint64_t cycles = 0;
+  double gaps_Hz =
+      10;  ///< to be reckoned with; an instrument that cannot keep the rate makes up to half the rate
 };
 
 struct DiskRoom {

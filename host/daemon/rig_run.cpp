@@ -9,6 +9,7 @@
 #include "host/acquisition/disk_room.hpp"
 #include "host/acquisition/journal_store.hpp"
 #include "host/acquisition/part_file.hpp"
+#include "host/config/experiment_doubts.hpp"
 #include "host/controller/settings_values.hpp"
 #include "host/daemon/rig_service.hpp"
 #include "host/daemon/utc.hpp"
@@ -148,12 +149,14 @@ void RigService::do_run(const RunOrder& order, const Done& done) {
   record.planned_s = duration_s(experiment, plan);
   record.estimate_s = experiment.schedule ? experiment.estimate_s() : record.planned_s;
   record.planned_cycles = experiment.planned_cycles();
-  check_disk(record, rate.rate_Hz, experiment.cycles());
+  check_disk(record, rate, experiment.cycles());
   JournalWriter journal(path);
   write_beginning(journal, record, experiment, plan, rate.rate_Hz);
   live_.begin(record.run_id, rate.rate_Hz, controller_->hello().tick_rate_Hz);
   if (!begin(record)) refuse_to_start();
   preparation.begun();
+  for (const std::string& doubt : doubts_about(experiment))
+    note({"warning", "experiment", doubt});
   spdlog::info("run {} begins: {} cycles, {:.1f} s", record.run_id, record.planned_cycles, record.planned_s);
   done(nullptr,
        {{"run_id", record.run_id}, {"journal", path.string()}, {"run_file", run_file_beside(path).string()}});
@@ -173,9 +176,11 @@ void RigService::do_run(const RunOrder& order, const Done& done) {
   activity_.clear();
 }
 
-void RigService::check_disk(const RunRecord& record, double sample_rate_Hz, int64_t most_cycles) {
-  check_room(rig_.daemon.journal_dir, {record.planned_s, sample_rate_Hz, controller_->position_rate_Hz(),
-                                       rig_.daq.channels.size(), static_cast<uint64_t>(most_cycles)});
+void RigService::check_disk(const RunRecord& record, const daq::RatePlan& rate, int64_t most_cycles) {
+  RunSize size{record.planned_s, rate.rate_Hz, controller_->position_rate_Hz(), rig_.daq.channels.size(),
+               static_cast<uint64_t>(most_cycles)};
+  if (!rate.warning.empty()) size.gaps_Hz = rate.rate_Hz / 2;
+  check_room(rig_.daemon.journal_dir, size);
 }
 
 void RigService::tidy_journals() {

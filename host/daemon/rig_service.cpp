@@ -352,9 +352,7 @@ void RigService::note(const RunRemark& what) {
 
 void RigService::keep(const RunRemark& remark) {
   const std::lock_guard lock(mutex_);
-  if (run_->remarks.size() >= most_remarks) return;
-  run_->remarks.push_back(
-      {{"utc", utc_now()}, {"level", remark.level}, {"code", remark.code}, {"text", remark.text}});
+  run_->remarks.add(remark, utc_now());
 }
 
 bool RigService::stop(StopRequest how) {
@@ -388,11 +386,7 @@ bool RigService::idle() const {
 json RigService::run_progress(size_t first_remark) const {
   const std::lock_guard lock(mutex_);
   if (!run_) return nullptr;
-  json remarks = json::array();
-  const size_t first = std::min(first_remark, run_->remarks.size());
-  for (size_t i = first; i < std::min(run_->remarks.size(), first + remarks_at_once); ++i) {
-    remarks.push_back(run_->remarks[i]);
-  }
+  const auto [remarks, next_remark] = run_->remarks.from(first_remark, remarks_at_once);
   return {{"run_id", run_->run_id},
           {"state", run_->state},
           {"planned_s", run_->estimate_s},
@@ -405,6 +399,7 @@ json RigService::run_progress(size_t first_remark) const {
           {"filtered_kPa", run_->progress.filtered_kPa},
           {"schedule", schedule_as_json(run_->progress.schedule)},
           {"remarks", remarks},
+          {"next_remark", next_remark},
           {"result", run_->result}};
 }
 

@@ -24,6 +24,7 @@
 #include "host/config/experiment.hpp"
 #include "host/config/rig_config.hpp"
 #include "host/controller/controller_client.hpp"
+#include "host/daemon/remark_log.hpp"
 #include "host/daemon/service_manager.hpp"
 #include "host/daq/instrument.hpp"
 #include "host/transport/clock.hpp"
@@ -56,7 +57,6 @@ class RigService {
   /// Called once on the rig's thread: with an error, or with a result.
   using Done = std::function<void(std::exception_ptr error, nlohmann::json result)>;
 
-  static constexpr size_t most_remarks = 10'000;
   static constexpr size_t remarks_at_once = 200;
 
   /// Opens controller and instrument. Throws HardwareError if one is not there; a controller with a latched fault is:
@@ -104,8 +104,9 @@ class RigService {
   /// Tells the log, and while a run is on its events and whoever follows it.
   void note(const RunRemark& what);
   /// The present or last run: {"run_id", "state": running|writing|done|failed, "received", "missing",
-  /// "triggers", "gate_pulses" (null if not counted), "last_kPa", "filtered_kPa", "schedule" (null without one), "remarks": at most remarks_at_once from number `first_remark` on, "result"}. null
-  /// if there was none. Of a run's remarks the first most_remarks are kept here; its file has all.
+  /// "triggers", "gate_pulses" (null if not counted), "last_kPa", "filtered_kPa", "schedule" (null without one),
+  /// "remarks": as RemarkLog gives them, at most remarks_at_once from number `first_remark` on, "next_remark": the
+  /// number to ask for next, "result"}. null if there was none.
   [[nodiscard]] nlohmann::json run_progress(size_t first_remark) const;
   /// The newest pressure of the present or last run.
   [[nodiscard]] const LiveTrace& live() const { return live_; }
@@ -123,7 +124,7 @@ class RigService {
     double estimate_s = 0;  ///< without that
     int64_t planned_cycles = 0;
     RunProgress progress;
-    nlohmann::json remarks = nlohmann::json::array();  ///< {"utc", "level", "code", "text"}
+    RemarkLog remarks;
     nlohmann::json result;
   };
 
@@ -157,7 +158,7 @@ class RigService {
   [[noreturn]] void refuse_after_motion() const;
   bool begin(const RunRecord& record);
   /// Throws InputError if the journals' disk cannot hold the run.
-  void check_disk(const RunRecord& record, double sample_rate_Hz, int64_t most_cycles);
+  void check_disk(const RunRecord& record, const daq::RatePlan& rate, int64_t most_cycles);
   /// Removes what need not be kept (journal_store.hpp) and counts the rest.
   void tidy_journals();
   void do_run(const RunOrder& order, const Done& done);

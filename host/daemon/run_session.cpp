@@ -47,9 +47,13 @@ SessionProgress progress_of(const json& state, size_t& remarks_seen) {
                          schedule.at("phase"), schedule.at("cycles_left"), schedule.at("prompt")};
   }
   for (const json& remark : state.at("remarks")) {
+    if (const size_t number = remark.at("number"); number > remarks_seen) {
+      progress.new_remarks.push_back(fmt::format(
+          "warning: {} remarks came too fast to be shown; the daemon's log has them", number - remarks_seen));
+    }
+    remarks_seen = remark.at("number").get<size_t>() + 1;
     progress.new_remarks.push_back(
         fmt::format("{}: {}", remark.at("level").get<std::string>(), remark.at("text").get<std::string>()));
-    ++remarks_seen;
   }
   return progress;
 }

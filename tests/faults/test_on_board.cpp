@@ -46,8 +46,9 @@ TEST(Faults, PowerCutsWhileFlashing) {
     return running && running->slot != wire::ImageSlot::none &&
            verifies(bench.board().flash(), running->slot);
   });
-  add_to_table({"power cut while flashing", fmt::format("any of {} flash operations", history.operations()),
-                tried, survived, "0 unbootable, 0 unverified images started"});
+  add_to_table({"power cut while flashing",
+                fmt::format("{} of {} flash operations", tried, history.operations()), tried, survived,
+                "0 unbootable, 0 unverified images started"});
 }
 
 }  // namespace

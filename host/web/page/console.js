@@ -213,7 +213,7 @@ function showEvents() {
     by("events").replaceChildren();
     return;
   }
-  nextRemark += progress.remarks.length;
+  nextRemark = progress.next_remark;
   for (const remark of progress.remarks) {
     const item = document.createElement("li");
     item.className = remark.level;

@@ -2,7 +2,9 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <cmath>
+#include <cstdio>
 
 #include "protocol/runfile/frame_bins.hpp"
 #include "protocol/runfile/reader.hpp"
@@ -193,6 +195,28 @@ TEST(Acquisition, AStallOfManyReadingsIsOneGapAndTwoRemarks) {
               testing::HasSubstr("cost " + std::to_string(assembled.run.gaps[0].count) + " samples"));
 }
 
+TEST(Acquisition, AnInstrumentTooSlowForTheRateDrownsNoEmergencyStop) {
+  SessionOnDesk session(short_session);
+  session.instrument.delay_ns = [](uint64_t) { return uint64_t{4'000'000}; };
+  session.clock.each_turn = [&] {
+    if (session.instrument.readings == 240) session.desk.controller->set_estop(true);
+  };
+  session.run();
+  EXPECT_EQ(session.outcome.end, "faulted");
+  const AssembledRun assembled = session.assemble();
+  expect_books_balance(assembled);
+  EXPECT_GT(assembled.run.gaps.size(), 40U) << "the file has every one of them";
+  EXPECT_LE(session.remarks.size(), 8U);
+  EXPECT_EQ(std::ranges::count(session.remarks, "estop", &RunRemark::code), 1);
+  uint64_t told = 0;
+  for (const RunRemark& remark : session.remarks) {
+    uint64_t gaps = 0, samples = 0;
+    if (std::sscanf(remark.text.c_str(), "%lu gap%*[s,] %lu", &gaps, &samples) == 2) told += samples;
+    if (std::sscanf(remark.text.c_str(), "the gap cost %lu", &samples) == 1) told += samples;
+  }
+  EXPECT_EQ(told, assembled.samples_missing);
+}
+
 TEST(Acquisition, ASlowAnswerIsNotBlamedOnTheHost) {
   SessionOnDesk session(short_session);
   session.instrument.delay_ns = [](uint64_t reading) {
@@ -261,6 +285,36 @@ TEST(Acquisition, StopNowKeepsWhatWasRecorded) {
   const AssembledRun assembled = session.assemble();
   expect_books_balance(assembled);
   EXPECT_GT(assembled.samples_received, 100U);
+}
+
+/// Stops a run at `stop_ns` on the desk's clock.
+void stop_at(SessionOnDesk& session, uint64_t stop_ns, StopRequest how) {
+  session.run([&session, stop_ns, how] { return session.desk.now_ns >= stop_ns ? how : StopRequest::none; });
+}
+
+TEST(Acquisition, AStopAroundTheEndOfARunHarmsNothing) {
+  SessionOnDesk undisturbed(short_session);
+  uint64_t rest_ns = 0;
+  undisturbed.clock.each_turn = [&] {
+    const bool moved = undisturbed.instrument.readings > 100;
+    if (rest_ns == 0 && moved && undisturbed.client.last_known().state == wire::State::homed)
+      rest_ns = undisturbed.desk.now_ns;
+  };
+  undisturbed.run();
+  for (const StopRequest how : {StopRequest::at_cycle_end, StopRequest::now}) {
+    for (const int64_t from_end_ms : {-20, -10, -6, -4, -3, -2, -1, 0, 1, 2, 4, 10, 100, 200}) {
+      SCOPED_TRACE(from_end_ms);
+      SessionOnDesk session(short_session);
+      stop_at(session, rest_ns + static_cast<uint64_t>(1'000'000 * from_end_ms), how);
+      EXPECT_TRUE(session.outcome.regular()) << session.outcome.end;
+      if (from_end_ms >= 0) {
+        EXPECT_EQ(session.outcome.end, "completed");
+      }
+      EXPECT_EQ(std::ranges::count(session.remarks, "error", &RunRemark::level), 0);
+      EXPECT_GE(std::ranges::count(session.remarks, "stop", &RunRemark::code), 1) << "the order is kept";
+      EXPECT_THAT(runfile::assess(session.assemble().run).problems, testing::IsEmpty());
+    }
+  }
 }
 
 TEST(Acquisition, AnUnpluggedLineEndsTheRunAndSaysSo) {

@@ -90,5 +90,56 @@ TEST(ScheduleRun, AStopWithinASliceKeepsWhatItHas) {
   EXPECT_NO_THROW(runfile::check(run));
 }
 
+/// What follows the trigger of the last imaged cycle, the eighth.
+class StopInTheLastCycle : public testing::TestWithParam<int> {};
+
+TEST_P(StopInTheLastCycle, LeavesACompleteStudy) {
+  SessionOnDesk session(study("", ""));
+  uint64_t last_trigger_ns = 0;
+  session.run([&] {
+    if (last_trigger_ns == 0 && session.client.last_known().triggers == 8)
+      last_trigger_ns = session.desk.now_ns;
+    const bool due = last_trigger_ns != 0 &&
+                     session.desk.now_ns >= last_trigger_ns + static_cast<uint64_t>(1'000'000 * GetParam());
+    return due ? StopRequest::at_cycle_end : StopRequest::none;
+  });
+  EXPECT_EQ(session.outcome.end, "completed");
+  EXPECT_EQ(std::ranges::count(session.remarks, "error", &RunRemark::level), 0);
+  const runfile::RecordedRun run = session.assemble().run;
+  EXPECT_EQ(run.trigger_s.size(), 8U);
+  EXPECT_THAT(runfile::assess(run).problems, testing::IsEmpty());
+}
+
+// 0: with the trigger; 700: the pump is at rest, and the last samples are being taken
+INSTANTIATE_TEST_SUITE_P(ScheduleRun, StopInTheLastCycle, testing::Values(0, 1, 10, 250, 480, 700));
+
+TEST(ScheduleRun, AStopJustBeforeTheLastTriggerIsSentOnceAndRefusedNever) {
+  for (const int64_t before_ms : {1, 2, 4, 8, 15, 30}) {
+    SCOPED_TRACE(before_ms);
+    uint64_t seventh_ns = 0;
+    SessionOnDesk session(study("", ""));
+    session.run([&] {
+      if (seventh_ns == 0 && session.client.last_known().triggers == 7) seventh_ns = session.desk.now_ns;
+      const bool due =
+          seventh_ns != 0 &&
+          session.desk.now_ns >= seventh_ns + 500'000'000 - static_cast<uint64_t>(1'000'000 * before_ms);
+      return due ? StopRequest::at_cycle_end : StopRequest::none;
+    });
+    EXPECT_TRUE(session.outcome.regular()) << session.outcome.end;
+    EXPECT_EQ(session.outcome.end == "completed", session.outcome.counts.triggers == 8);
+    EXPECT_EQ(std::ranges::count(session.remarks, "error", &RunRemark::level), 0);
+    EXPECT_EQ(std::ranges::count(session.remarks, "stop", &RunRemark::code), 1);
+    EXPECT_THAT(runfile::assess(session.assemble().run).problems, testing::IsEmpty());
+  }
+}
+
+TEST(ScheduleRun, AStopNowInTheLastCycleIsSent) {
+  SessionOnDesk session(study("", ""));
+  session.run(
+      [&] { return session.client.last_known().triggers == 8 ? StopRequest::now : StopRequest::none; });
+  EXPECT_EQ(session.outcome.end, "stopped_now");
+  EXPECT_LT(session.outcome.cycles, 8U);
+}
+
 }  // namespace
 }  // namespace diastole

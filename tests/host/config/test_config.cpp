@@ -5,6 +5,7 @@
 #include <sstream>
 
 #include "host/config/experiment.hpp"
+#include "host/config/experiment_doubts.hpp"
 #include "host/config/rig_config.hpp"
 #include "protocol/contract/input_error.hpp"
 #include "tests/host/bench/scratch.hpp"
@@ -102,6 +103,16 @@ TEST(Experiment, TheExampleIsThePapersSession) {
 TEST(Experiment, WaveformsAreSpelledWithDashes) {
   const std::string text = changed(example("gel.experiment.toml"), "\"parabolic\"", "\"reversed-sawtooth\"");
   EXPECT_EQ(parse_experiment(text, "x").segments[0].waveform, wire::Waveform::reversed_sawtooth);
+}
+
+TEST(Experiment, AStrokeThatWasMeantInLitresIsDoubted) {
+  const std::string good = example("gel.experiment.toml");
+  const auto doubts = [](const std::string& text) { return doubts_about(parse_experiment(text, "x")); };
+  EXPECT_TRUE(doubts(good).empty());
+  const auto found = doubts(changed(good, "stroke_mL = 40.0", "stroke_mL = 0.04"));
+  ASSERT_EQ(found.size(), 1U);
+  EXPECT_THAT(found[0], AllOf(HasSubstr("segment[0].stroke_mL"), HasSubstr("0.04 mL; 40?")));
+  EXPECT_TRUE(doubts(changed(good, "stroke_mL = 40.0", "stroke_mL = 1.0")).empty());
 }
 
 TEST(Experiment, MistakesAreNamedWithTheirPlace) {
