@@ -20,9 +20,10 @@ namespace diastole::daq {
 struct OpenOptions {
   /// Where the instrument is, instead of what the rig file says ("127.0.0.1:1502").
   std::optional<std::string> address = {};
-  /// Patience for one answer, at least; a conducted simulation is patient with a loaded machine.
+  /// Patience for one answer, at least, on the wall's clock; a conducted simulation is patient with a loaded machine.
   int least_timeout_ms = 0;
-  /// The time by which an instrument that is not there samples; empty: CLOCK_MONOTONIC.
+  /// The time by which an instrument that is not there samples, and by which patience counts that a simulation has
+  /// ended by closing the connection; empty: CLOCK_MONOTONIC.
   std::function<uint64_t()> now_ns = {};
 };
 

@@ -64,7 +64,13 @@ std::vector<std::string> addresses_of(const std::string& host) {
 
 class TcpLine final : public ModbusLine {
  public:
-  TcpLine(TcpAddress address, int unit) : at_(std::move(address)), unit_(unit) { find(); }
+  TcpLine(TcpAddress address, int unit, const OpenOptions& options)
+      : at_(std::move(address)),
+        unit_(unit),
+        wall_patience_ms_(std::max(at_.timeout_ms, options.least_timeout_ms)),
+        now_ns_(options.now_ns ? options.now_ns : [] { return uint64_t{0}; }) {
+    find();
+  }
 
   [[nodiscard]] std::string describe() const override {
     return fmt::format("modbus-tcp at {}:{}", at_.host, at_.port);
@@ -75,6 +81,7 @@ class TcpLine final : public ModbusLine {
   [[nodiscard]] bool ready() const override { return context_ != nullptr; }
 
   std::string ask(bool input_function, int first, std::span<uint16_t> out) override {
+    const uint64_t asked_ns = now_ns_();
     const Moment give_up = end_of_patience();
     if (context_ == nullptr) {
       if (std::string fault = connect(give_up); !fault.empty()) return fault;
@@ -83,8 +90,10 @@ class TcpLine final : public ModbusLine {
     const auto read = input_function ? modbus_read_input_registers : modbus_read_registers;
     const int count = static_cast<int>(out.size());
     if (read(context_.get(), first, count, out.data()) == count) return {};
-    const std::string reason =
-        errno == ETIMEDOUT ? fmt::format("no answer within {} ms", at_.timeout_ms) : modbus_strerror(errno);
+    const int error = errno;
+    std::string reason = modbus_strerror(error);
+    if (error == ETIMEDOUT) reason = no_answer_within(wall_patience_ms_);
+    if (simulated_wait_ms(asked_ns) >= at_.timeout_ms) reason = no_answer_within(at_.timeout_ms);
     context_.reset();
     return reason;
   }
@@ -93,7 +102,15 @@ class TcpLine final : public ModbusLine {
   using Moment = std::chrono::steady_clock::time_point;
 
   [[nodiscard]] Moment end_of_patience() const {
-    return std::chrono::steady_clock::now() + std::chrono::milliseconds(at_.timeout_ms);
+    return std::chrono::steady_clock::now() + std::chrono::milliseconds(wall_patience_ms_);
+  }
+
+  static std::string no_answer_within(int ms) { return fmt::format("no answer within {} ms", ms); }
+
+  /// To the nearest millisecond: clocks drift.
+  [[nodiscard]] int simulated_wait_ms(uint64_t asked_ns) const {
+    constexpr uint64_t ns_per_ms = 1'000'000;
+    return static_cast<int>((now_ns_() - asked_ns + ns_per_ms / 2) / ns_per_ms);
   }
 
   /// Connects to the first of the host's addresses that answers, and keeps to it.
@@ -130,6 +147,8 @@ class TcpLine final : public ModbusLine {
 
   TcpAddress at_;
   int unit_;
+  int wall_patience_ms_;
+  std::function<uint64_t()> now_ns_;  // simulated; stands still in real time
   std::string address_;
   std::unique_ptr<modbus_t, FreeModbus> context_;
 };
@@ -156,8 +175,7 @@ OpenInstrument configure_modbus_tcp(TableReader& daq, std::vector<TableReader>& 
   return [at, map](const OpenOptions& options) -> std::unique_ptr<Instrument> {
     TcpAddress opened = at;
     if (options.address) take_address(opened, *options.address);
-    opened.timeout_ms = std::max(opened.timeout_ms, options.least_timeout_ms);
-    return open_modbus(map, std::make_unique<TcpLine>(opened, map.unit));
+    return open_modbus(map, std::make_unique<TcpLine>(opened, map.unit, options));
   };
 }
 

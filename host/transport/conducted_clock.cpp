@@ -29,10 +29,22 @@ ConductedClock::ConductedClock(const std::string& path) : path_(path), socket_(c
   now_ns_ = ask({}).now_ns;
 }
 
+uint64_t ConductedClock::now_ns() {
+  conductor::Record record{};
+  while (::recv(socket_.get(), record.data(), record.size(), MSG_DONTWAIT | MSG_PEEK) ==
+         static_cast<ssize_t>(record.size())) {
+    (void)::recv(socket_.get(), record.data(), record.size(), 0);
+    take(conductor::decode_advanced(record));
+  }
+  return now_ns_;
+}
+
+void ConductedClock::take(const conductor::Advanced& told) { now_ns_ = std::max(now_ns_, told.now_ns); }
+
 void ConductedClock::sleep_until_ns(uint64_t until_ns, ByteLine* line) {
   if (line != nullptr) line->flush(longest_wait_ms);
   const auto answer = ask({until_ns, line == nullptr ? 0 : line->written_total()});
-  now_ns_ = std::max(now_ns_, answer.now_ns);
+  take(answer);
   if (line != nullptr && answer.serial_bytes_sent_total > sent_before_opening_) {
     line->wait_received(answer.serial_bytes_sent_total - sent_before_opening_, longest_wait_ms);
   }
@@ -45,16 +57,16 @@ void ConductedClock::line_opened(ByteLine& line) {
 conductor::Advanced ConductedClock::ask(const conductor::Advance& question) {
   conductor::Record record = conductor::encode(question);
   const int fd = socket_.get();
-  const bool answered =
-      transfer_all(record.data(), record.size(),
-                   [&](std::byte* at, size_t size) { return ::send(fd, at, size, MSG_NOSIGNAL); }) &&
-      transfer_all(record.data(), record.size(),
-                   [&](std::byte* at, size_t size) { return ::read(fd, at, size); });
-  if (!answered) {
-    throw HardwareError(path_, "the simulated rig that conducts time has gone",
-                        "Start the simulation again.");
+  bool told = transfer_all(record.data(), record.size(),
+                           [&](std::byte* at, size_t size) { return ::send(fd, at, size, MSG_NOSIGNAL); });
+  while (told) {
+    told = transfer_all(record.data(), record.size(),
+                        [&](std::byte* at, size_t size) { return ::read(fd, at, size); });
+    const conductor::Advanced answer = conductor::decode_advanced(record);
+    if (told && answer.serial_bytes_sent_total != conductor::unasked) return answer;
+    if (told) take(answer);
   }
-  return conductor::decode_advanced(record);
+  throw HardwareError(path_, "the simulated rig that conducts time has gone", "Start the simulation again.");
 }
 
 }  // namespace diastole

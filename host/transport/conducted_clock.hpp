@@ -14,13 +14,15 @@ class ConductedClock final : public Clock {
   /// Connects to the rig's socket. Throws HardwareError if nobody listens there.
   explicit ConductedClock(const std::string& path);
 
-  [[nodiscard]] uint64_t now_ns() override { return now_ns_; }
+  /// Moves outside of sleeps only when the rig says so unasked.
+  [[nodiscard]] uint64_t now_ns() override;
   /// Throws HardwareError if the rig has gone: without it time cannot go on.
   void sleep_until_ns(uint64_t until_ns, ByteLine* line) override;
   void line_opened(ByteLine& line) override;
   [[nodiscard]] bool stands_still() const override { return true; }
 
  private:
+  void take(const conductor::Advanced& told);
   conductor::Advanced ask(const conductor::Advance& question);
 
   std::string path_;

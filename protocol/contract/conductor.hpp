@@ -19,6 +19,11 @@
 // has serial_bytes_sent_total bytes, and only then goes on. Each of these waits ends after one second of wall
 // time at the latest. The totals count from the moment the daemon opened the serial port, when both are 0.
 // until_ns at or before the rig's present does not move time; the answer tells the present.
+//
+// While the daemon waits for its instrument, time stands still, unless the answer is late or will not come. Then the
+// rig moves time on by itself, to the answer or to the end of the daemon's patience (timeout_ms of the rig file),
+// and says so unasked, before it answers or closes the connection: an Advanced whose serial_bytes_sent_total is
+// 2^64 - 1.
 
 #include <array>
 #include <bit>
@@ -40,6 +45,8 @@ struct Advanced {
   uint64_t serial_bytes_sent_total = 0;
   bool operator==(const Advanced&) const = default;
 };
+
+inline constexpr uint64_t unasked = UINT64_MAX;  ///< serial_bytes_sent_total of what the rig says unasked
 
 using Record = std::array<std::byte, 16>;
 

@@ -128,10 +128,12 @@ bool ModbusInstrument::receive_from(int client) {
   if (length < 0) return false;
   request.resize(static_cast<size_t>(length));
   const uint64_t now_ns = inputs_.now_ns();
-  if (config_.faults.stall.holds(now_ns)) return true;
+  if (config_.faults.stall.holds(now_ns)) return inputs_.wait(InstrumentInputs::never_ns) != Wait::given_up;
   if (!config_.faults.delay.holds(now_ns)) return answer(client, request);
-  delayed_.push_back({client, now_ns + config_.faults.delay_ns, std::move(request)});
-  return true;
+  const uint64_t delay_ns = config_.faults.delay_ns;
+  const Wait wait = inputs_.wait(delay_ns);
+  if (wait == Wait::goes_on) delayed_.push_back({client, now_ns + delay_ns, std::move(request)});
+  return wait == Wait::is_over ? answer(client, request) : wait == Wait::goes_on;
 }
 
 void ModbusInstrument::drop(int client) {

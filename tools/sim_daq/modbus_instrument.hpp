@@ -35,12 +35,22 @@ struct InstrumentConfig {
   DaqFaults faults{};
 };
 
+/// What becomes of a client that waits for a late answer.
+enum class Wait {
+  goes_on,   ///< time passes by itself
+  is_over,   ///< the time was let pass
+  given_up,  ///< it has waited for as long as it would
+};
+
 /// Where the instrument gets the time and its inputs from. The time never decreases.
 struct InstrumentInputs {
   std::function<uint64_t()> now_ns;
   std::function<double(int channel)> volts;  ///< at now_ns()
   /// Asked once before the inputs are read: whether this reading fails, with exception 11.
   std::function<bool()> reading_fails = [] { return false; };
+  /// Told when an answer comes that much late, or (never_ns) not at all.
+  std::function<Wait(uint64_t late_ns)> wait = [](uint64_t) { return Wait::goes_on; };
+  static constexpr uint64_t never_ns = UINT64_MAX;
 };
 
 class ModbusInstrument {

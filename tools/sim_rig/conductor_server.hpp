@@ -21,6 +21,7 @@ class ConductorServer {
   [[nodiscard]] int descriptor() const { return client_ >= 0 ? client_ : listener_; }
   /// Call when descriptor() is readable. The daemon's question, if a whole one has come.
   std::optional<conductor::Advance> receive();
+  [[nodiscard]] bool connected() const { return client_ >= 0; }
   void answer(const conductor::Advanced& now);
 
  private:

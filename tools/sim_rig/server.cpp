@@ -40,6 +40,7 @@ int64_t gained_ns(uint64_t time_ns, double ppm) {
 Server::Server(const RigDescription& description, std::unique_ptr<SimulatedController> controller,
                const ServerOptions& options)
     : options_(options),
+      daq_patience_ns_(description.daq_patience_ns),
       cables_(options.link),
       rig_(description, std::move(controller),
            {.sent = [this](std::span<const uint8_t> bytes) { take_sent(bytes); },
@@ -53,7 +54,8 @@ Server::Server(const RigDescription& description, std::unique_ptr<SimulatedContr
                  if (!playback_) return false;
                  playback_->sample(rig_.now_ns(), run_clock_.run_start_ns());
                  return playback_->missing();
-               }}) {
+               },
+           .wait = [this](uint64_t late_ns) { return let_wait(late_ns); }}) {
   timeline_.plan(options.faults);
   if (!options.play.empty()) playback_.emplace(options.play, description.channels);
   if (!options.pins.empty()) pins_.emplace(options.pins);
@@ -75,7 +77,7 @@ void Server::run(int stop_descriptor) {
     cables_.line.refresh();
     std::vector<pollfd> waiting{{stop_descriptor, POLLIN, 0},
                                 {conductor_ && !held_ ? conductor_->descriptor() : -1, POLLIN, 0},
-                                {cables_.line.descriptor(), POLLIN, 0}};
+                                {conducted() ? -1 : cables_.line.descriptor(), POLLIN, 0}};
     for (const int fd : instrument_.descriptors())
       waiting.push_back({fd, POLLIN, 0});
     if (control_) {
@@ -89,7 +91,7 @@ void Server::run(int stop_descriptor) {
       while (const auto hold = timeline_.take_hold(run_clock_, rig_.now_ns()))
         control_->tell(hold->client, "held " + hold->moment);
     }
-    take_serial();
+    if (!conducted()) take_serial();  // otherwise with the question that tells how much was written
     if (waiting[1].revents != 0) {
       if (const auto question = conductor_->receive()) conduct(*question);
     }
@@ -153,9 +155,20 @@ void Server::conduct(const conductor::Advance& question) {
   }
   const int64_t gained = gained_ns(question.until_ns, options_.host_drift_ppm);
   advance_to(question.until_ns - static_cast<uint64_t>(gained));
-  const uint64_t host_ns =
-      rig_.now_ns() + static_cast<uint64_t>(gained_ns(rig_.now_ns(), options_.host_drift_ppm));
-  hold_or_answer({std::max(host_ns, question.until_ns), cables_.line.sent_total()});
+  hold_or_answer({std::max(host_ns(), question.until_ns), cables_.line.sent_total()});
+}
+
+/// The rig's present on the host's clock.
+uint64_t Server::host_ns() const {
+  return rig_.now_ns() + static_cast<uint64_t>(gained_ns(rig_.now_ns(), options_.host_drift_ppm));
+}
+
+/// A conducted daemon that waits for its instrument moves no time: it is moved for it.
+sim_daq::Wait Server::let_wait(uint64_t late_ns) {
+  if (!conducted()) return sim_daq::Wait::goes_on;
+  advance_to(rig_.now_ns() + std::min(late_ns, daq_patience_ns_));
+  conductor_->answer({host_ns(), conductor::unasked});
+  return late_ns < daq_patience_ns_ ? sim_daq::Wait::is_over : sim_daq::Wait::given_up;
 }
 
 void Server::hold_or_answer(const conductor::Advanced& answer) {

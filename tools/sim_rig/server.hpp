@@ -64,13 +64,17 @@ class Server {
   void take_sent(std::span<const uint8_t> bytes);
   void take_edge(const PinEdge& edge);
   void take_serial();
+  [[nodiscard]] bool conducted() const { return conductor_ && conductor_->connected(); }
   void conduct(const conductor::Advance& question);
+  [[nodiscard]] uint64_t host_ns() const;
+  sim_daq::Wait let_wait(uint64_t late_ns);
   void hold_or_answer(const conductor::Advanced& answer);
   std::string obey(ControlServer::ClientId client, const std::string& order);
   std::string obey_fault(const std::string& order);
   [[nodiscard]] std::string state() const;
 
   ServerOptions options_;
+  uint64_t daq_patience_ns_;
   Cables cables_;
   std::optional<PinTrace> pins_;
   RunClock run_clock_;
