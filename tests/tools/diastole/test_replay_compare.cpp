@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "tools/diastole/replay/compare.hpp"
+#include "tools/diastole/replay/replay_report.hpp"
 
 namespace diastole::replay {
 namespace {
@@ -43,6 +44,22 @@ TEST(ReplayCompare, ARunEqualsItselfWhateverTheStartPhase) {
   later.pressure.time_s.pop_back();
   later.pressure.channels["cavity_kPa"].pop_back();
   EXPECT_TRUE(compare(run, later).equal()) << "with another phase one sample less lies before the end";
+}
+
+TEST(ReplayCompare, SamplesMoreThanOneSpacingOffAreToldInTheLastLine) {
+  const RecordedRun replayed = run_of_three_cycles();
+  const auto last_line = [&](double late_s) {
+    RecordedRun run = replayed;
+    run.pressure.time_s[200] += late_s;
+    ReplayReport report;
+    report.comparison = compare(run, replayed);
+    EXPECT_EQ(report.comparison.samples_in_time(), late_s < 0.01);
+    EXPECT_NEAR(report.comparison.max_sample_time_diff_s, late_s, 1e-9);
+    return as_table(report);
+  };
+  EXPECT_THAT(last_line(0.009), testing::EndsWith("The replay is the recording.\n"));
+  EXPECT_THAT(last_line(0.0135),
+              testing::AllOf(HasSubstr("but for the times of samples"), HasSubstr("13.500 ms off")));
 }
 
 TEST(ReplayCompare, TellsTheFirstDifferenceWithTimeAndCycle) {

@@ -212,6 +212,8 @@ void Comparer::compare_samples() {
   double most_s = 0;
   for (size_t i = 0; i < common; ++i)
     most_s = std::max(most_s, std::abs(after[i] - before[i] - out_.start_phase_s));
+  out_.max_sample_time_diff_s = most_s;
+  out_.sample_spacing_s = (before.back() - before.front()) / static_cast<double>(before.size() - 1);
   out_.lines.push_back(
       {"first sample after the start of run", fmt::format("{:.6f} s", before[0]),
        fmt::format("{:.6f} s", after[0]),

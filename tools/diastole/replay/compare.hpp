@@ -10,7 +10,9 @@
 //   events       faults of the controller, stops, the end: the same, in the same order; faults to 250 us (the turn of
 //                the controller's main loop that notes them), but lease_lost to a heartbeat (50 ms), whose phase is
 //                not in the file; what the host noted to one sample and the start phase
-// What may differ, and is told: where within the sampling interval the run began (the start phase).
+// What may differ, and is told: where within the sampling interval the run began (the start phase), and by how much
+// samples came late in the recording (a busy host, a slow answer), which is not brought about. More than one spacing
+// of the samples is told with the verdict.
 //
 // Of a recording that broke off, only as much as there is.
 
@@ -52,12 +54,16 @@ struct Comparison {
   int64_t max_steps_diff = 0;  ///< microsteps
   double max_abs_diff_kPa = 0;
   double tolerance_kPa = 0;
+  double max_sample_time_diff_s = 0;  ///< beyond the start phase
+  double sample_spacing_s = 0;        ///< of the recording
   double start_phase_s = 0;  ///< the replay's first sample lies this much later after the start of run
 
   [[nodiscard]] bool equal() const {
     return !first && triggers_equal && steps_equal && samples_equal && missing_equal && pressure_equal &&
            events_equal;
   }
+  /// Whether every sample of the replay lies within one spacing of where the recording's does.
+  [[nodiscard]] bool samples_in_time() const { return max_sample_time_diff_s <= sample_spacing_s; }
 };
 
 Comparison compare(const runfile::RecordedRun& recorded, const runfile::RecordedRun& replayed);

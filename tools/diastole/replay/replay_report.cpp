@@ -51,8 +51,16 @@ std::string as_table(const ReplayReport& report) {
   if (report.comparison.first) {
     const Difference& first = *report.comparison.first;
     text += fmt::format("The runs part at {:.6f} s, {}: {}\n", first.time_s, place_of(first), first.text);
+  } else if (!report.comparison.equal()) {
+    text += "The runs differ.\n";
+  } else if (report.comparison.samples_in_time()) {
+    text += "The replay is the recording.\n";
   } else {
-    text += report.comparison.equal() ? "The replay is the recording.\n" : "The runs differ.\n";
+    text += fmt::format(
+        "The replay is the recording, but for the times of samples: up to {:.3f} ms off, more than their "
+        "spacing of "
+        "{:.3f} ms. Lateness of the recording's host or instrument is not replayed.\n",
+        1e3 * report.comparison.max_sample_time_diff_s, 1e3 * report.comparison.sample_spacing_s);
   }
   return text;
 }
@@ -89,6 +97,8 @@ nlohmann::json as_json(const ReplayReport& report) {
           {"max_abs_diff_kPa", found.max_abs_diff_kPa},
           {"tolerance_kPa", found.tolerance_kPa},
           {"start_phase_s", found.start_phase_s},
+          {"max_sample_time_diff_s", found.max_sample_time_diff_s},
+          {"sample_times_equal", found.samples_in_time()},
           {"host_drift_ppm", report.plan.host_drift_ppm},
           {"first_difference", first},
           {"lines", lines},
