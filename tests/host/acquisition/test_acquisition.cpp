@@ -214,7 +214,7 @@ TEST(Acquisition, AnInstrumentTooSlowForTheRateDrownsNoEmergencyStop) {
     if (std::sscanf(remark.text.c_str(), "%lu gap%*[s,] %lu", &gaps, &samples) == 2) told += samples;
     if (std::sscanf(remark.text.c_str(), "the gap cost %lu", &samples) == 1) told += samples;
   }
-  EXPECT_EQ(told, assembled.samples_missing);
+  EXPECT_EQ(told, session.outcome.counts.missing);
 }
 
 TEST(Acquisition, ASlowAnswerIsNotBlamedOnTheHost) {
