@@ -34,6 +34,7 @@ struct SolveArguments {
   StudyOptions study;
   std::optional<double> pressure_kPa;
   std::optional<double> volume_change_mL;
+  double fibre_tension_kPa = 0.0;
   bool frames = false;
   std::vector<std::string> probes;
   SolutionOutputs outputs;
@@ -106,6 +107,7 @@ nlohmann::ordered_json as_json(const Study& study, ElasticModel& model, const So
   nlohmann::ordered_json json;
   json["reason"] = describe(report.reason);
   add_equilibrium(json, model, solution.state);
+  json["fibre_tension_kPa"] = solution.state.fibre_tension_kPa;
   json["law"] = model.law().name();
   for (const StudyParameter& parameter : study.law.parameters)
     json["parameters"][parameter.name] = parameter.start;
@@ -117,7 +119,10 @@ nlohmann::ordered_json as_json(const Study& study, ElasticModel& model, const So
   json["factorisations"] = report.factorisations;
   json["negative_pivots"] = report.negative_pivots;
   json["pressure_unknowns"] = report.pressure_unknowns;
-  json["unstable_motions"] = report.unstable_motions;
+  json["unstable_motions"] = nullptr;
+  if (report.unstable_motions) json["unstable_motions"] = *report.unstable_motions;
+  json["stable"] = nullptr;
+  if (const std::optional<bool> stable = report.stable()) json["stable"] = *stable;
   json["seconds"] = seconds;
   const ElasticState shown = with_averaged_pressure(model.system(), solution.state);
   json["probes"] = nlohmann::ordered_json::array();
@@ -189,6 +194,22 @@ void require_one_load(const SolveArguments& arguments) {
     refuse("--volume-change-mL", fmt::format("{} is not a finite volume", *arguments.volume_change_mL));
 }
 
+void require_fibres_for_tension(const SolveArguments& arguments, const ElasticModel& model) {
+  const double tension_kPa = arguments.fibre_tension_kPa;
+  const auto refuse = [](std::string problem, std::string remedy) {
+    throw InputError({.file = "",
+                      .place = "--fibre-tension-kPa",
+                      .problem = std::move(problem),
+                      .remedy = std::move(remedy)});
+  };
+  if (!std::isfinite(tension_kPa) || tension_kPa < 0.0)
+    refuse(fmt::format("{} is not a tension", tension_kPa), "Give zero or more, for example 60.");
+  if (tension_kPa > 0.0 && !model.system().material_axes()) {
+    refuse("the specimen has no fibres to pull along",
+           "Give an ellipsoid, or a mesh file with fibre_deg (docs/mesh-file.md).");
+  }
+}
+
 struct TimedLoad {
   double time_s;
   Load load;
@@ -197,16 +218,18 @@ struct TimedLoad {
 /// The loads to solve for: the one of the command line, or the study's frames.
 std::vector<TimedLoad> loads_of(const SolveArguments& arguments, const Study& study,
                                 const ElasticModel& model) {
+  const double tension_kPa = arguments.fibre_tension_kPa;
   if (arguments.volume_change_mL) {
     require_closed_cavity(study, model);
     const double rest_mL = model.cavity_volume_mL(model.rest_state());
-    return {{0.0, {.cavity_volume_mL = rest_mL + *arguments.volume_change_mL}}};
+    return {
+        {0.0, {.fibre_tension_kPa = tension_kPa, .cavity_volume_mL = rest_mL + *arguments.volume_change_mL}}};
   }
   if (arguments.pressure_kPa != 0.0) require_cavity(study, model);
-  if (arguments.pressure_kPa) return {{0.0, {.pressure_kPa = *arguments.pressure_kPa}}};
+  if (arguments.pressure_kPa) return {{0.0, {*arguments.pressure_kPa, tension_kPa}}};
   std::vector<TimedLoad> loads;
   for (const Frame& frame : read_frames(*study.data.frames))
-    loads.push_back({frame.time_s, {.pressure_kPa = frame.pressure_kPa}});
+    loads.push_back({frame.time_s, {frame.pressure_kPa, tension_kPa}});
   return loads;
 }
 
@@ -230,6 +253,25 @@ Solution solve_all(ElasticModel& model, const std::vector<TimedLoad>& loads,
   return solution;
 }
 
+void tell_failure_or_instability(const SolveArguments& arguments, const SolveReport& report) {
+  if (report.converged()) {
+    if (report.stable() != false) return;
+    const std::string motions = report.singular ? "some motion meets no resistance"
+                                                : fmt::format("in {} independent motions it leaves by itself",
+                                                              *report.unstable_motions);
+    fmt::print(stderr, "diastole solve: this equilibrium is not stable: {}\n", motions);
+    return;
+  }
+  fmt::print(stderr, "diastole solve: {}\n", report.describe());
+  if (arguments.volume_change_mL || report.load_steps == 0) return;
+  if (report.reason == SolveReason::limit_point) {
+    fmt::print(stderr, "  `diastole pv` leads the volume instead, finds that point and goes on beyond.\n");
+  } else if (report.reason != SolveReason::out_of_steps) {
+    fmt::print(stderr,
+               "  If the pressure has a maximum on the way, `diastole pv` finds it and goes on beyond.\n");
+  }
+}
+
 ExitCode run_solve(const SolveArguments& arguments, const CommandOutput& out) {
   const Clock::time_point begun = Clock::now();
   require_one_load(arguments);
@@ -239,6 +281,7 @@ ExitCode run_solve(const SolveArguments& arguments, const CommandOutput& out) {
   SolveOptions options = with_progress("solve");
   options.check_stability = true;
   ElasticModel model = make_model(study, std::move(options));
+  require_fibres_for_tension(arguments, model);
   const std::vector<TimedLoad> loads = loads_of(arguments, study, model);
   const std::vector<Probe> probes = locate_probes(model.mesh(), arguments.probes);
 
@@ -251,18 +294,7 @@ ExitCode run_solve(const SolveArguments& arguments, const CommandOutput& out) {
       json["files"].push_back(file.string());
   }
   if (arguments.frames) json["frames"] = frames_json(model, solved);
-  if (!solution.report.converged()) std::cerr << "diastole solve: " << solution.report.describe() << '\n';
-  if (arguments.pressure_kPa && solution.report.load_steps > 0 &&
-      (solution.report.reason == SolveReason::no_convergence ||
-       solution.report.reason == SolveReason::singular_tangent)) {
-    std::cerr << "  If the pressure has a maximum on the way, `diastole pv` finds it and goes on beyond.\n";
-  }
-  if (solution.report.converged() && solution.report.unstable_motions > 0) {
-    fmt::print(
-        stderr,
-        "diastole solve: this equilibrium is not stable: in {} independent motions it leaves by itself\n",
-        solution.report.unstable_motions);
-  }
+  tell_failure_or_instability(arguments, solution.report);
   if (out.json) {
     std::cout << json.dump(1) << '\n';
   } else if (solution.report.converged()) {
@@ -281,6 +313,7 @@ void add_solve(CommandLine& line) {
       "  diastole solve phantom-a.study.toml --pressure-kPa 3.1 --probe 22.5,0,0 --probe 50,0,0 --json\n"
       "  diastole solve phantom-a.study.toml --pressure-kPa 6 --mesh 8,8,4 -o gel.vtkhdf -o gel.csv\n"
       "  diastole solve phantom-a.study.toml --volume-change-mL 24\n"
+      "  diastole solve lv-clean.study.toml --pressure-kPa 2 --fibre-tension-kPa 10\n"
       "  diastole solve phantom-a.study.toml --frames -o gel.vtkhdf\n"
       "A parameter has its `start` value unless --set gives another.\n"
       "Exit code 1: no equilibrium was found; the message says where the solver stopped and why.");
@@ -288,6 +321,9 @@ void add_solve(CommandLine& line) {
   command->add_option("--pressure-kPa", arguments->pressure_kPa, "cavity pressure above the outside");
   command->add_option("--volume-change-mL", arguments->volume_change_mL,
                       "volume that the cavity takes, instead of its pressure");
+  command->add_option(
+      "--fibre-tension-kPa", arguments->fibre_tension_kPa,
+      "active tension along the fibres, beside the pressure or volume (second Piola-Kirchhoff)");
   command->add_flag("--frames", arguments->frames,
                     "solve for all frames of the study instead, one after the other");
   command

@@ -1,6 +1,7 @@
 #include "estimator/fe/elastic_model.hpp"
 
 #include <algorithm>
+#include <stdexcept>
 #include <thread>
 #include <utility>
 
@@ -84,7 +85,26 @@ Solution ElasticModel::solve(double pressure_kPa, const ElasticState& start) {
 
 Solution ElasticModel::solve(const Load& load, const ElasticState& start) {
   PathResult path = follow_load(*system_, start, load, solve_options_);
+  judge_end(path, load, start.pressure_kPa);
   return {std::move(path.state), std::move(path.report)};
+}
+
+void ElasticModel::judge_end(PathResult& path, const Load& load, double start_kPa) {
+  constexpr double nearly_vanished = 0.1;
+  SolveReport& report = path.report;
+  const bool pressure_path =
+      !load.cavity_volume_mL && load.pressure_kPa != start_kPa && system_->cavity_closed();
+  const bool gave_up = !report.converged() && report.reason != SolveReason::out_of_steps;
+  if (!pressure_path || !gave_up || report.load_steps == 0) return;
+  const std::optional<double> at_rest = cavity_stiffness_kPa_per_mL(rest_state());
+  const std::optional<double> at_end = cavity_stiffness_kPa_per_mL(path.state);
+  if (!at_rest || !at_end || !(*at_end < nearly_vanished * *at_rest)) return;
+  report.reason = SolveReason::limit_point;
+  report.pressure_limit = PressureLimit{.pressure_kPa = report.reached_pressure_kPa,
+                                        .left = *at_end / *at_rest,
+                                        .maximum = load.pressure_kPa > start_kPa};
+  report.inverted.reset();
+  report.beyond_law.reset();
 }
 
 Sensitivities ElasticModel::sensitivities(const ElasticState& at, std::span<const ParameterGroup> groups) {
@@ -105,6 +125,7 @@ Sensitivities ElasticModel::sensitivities(const ElasticState& at, std::span<cons
   Sensitivities result;
   if (!system_->rim_skew().empty()) result.negative_pivots = system_->stability(state).negative_pivots;
   const FactorResult factor = system_->factorise(state);
+  if (factor.singular) throw std::domain_error("an equilibrium with a singular tangent has no derivatives");
   if (system_->rim_skew().empty()) result.negative_pivots = factor.negative_pivots;
   system_->solve(right_sides, groups.size() + 1);
   result.pressure = system_->node_field(column(0));
@@ -122,12 +143,12 @@ double ElasticModel::stored_energy_mJ(const ElasticState& state) const {
   return mJ_per_uJ * (residual.energy_uJ + residual.bond_energy_uJ);
 }
 
-double ElasticModel::cavity_stiffness_kPa_per_mL(const ElasticState& at) {
+std::optional<double> ElasticModel::cavity_stiffness_kPa_per_mL(const ElasticState& at) {
   ElasticState state = at;
   state.held_volume_mm3 = system_->cavity_volume_mm3(at);
   std::vector<double> change(system_->equations().unknowns(true), 0.0);
   change.back() = -1.0;  // minus the derivative of the volume's equation with respect to the volume
-  system_->factorise(state);
+  if (system_->factorise(state).singular) return {};
   system_->solve(change);
   return change.back() / mL_per_mm3;
 }

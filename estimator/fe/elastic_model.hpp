@@ -35,6 +35,7 @@
 namespace diastole {
 
 class ElasticSystem;
+struct PathResult;
 
 struct ElasticOptions {
   std::vector<double> parameters{};  ///< the law's, in its order; the same in all elements
@@ -99,17 +100,20 @@ class ElasticModel {
   /// Equilibrium at a cavity pressure, from rest or from an earlier state (of any pressure and parameters).
   [[nodiscard]] Solution solve(double pressure_kPa);
   [[nodiscard]] Solution solve(double pressure_kPa, const ElasticState& start);
-  /// The same for any load; pressure (or volume) and tension go from the start's to the load's in proportion.
+  /// The same for any load; pressure (or volume) and tension go from the start's to the load's in proportion. A pressure
+  /// that is not reached is judged by the last equilibrium: SolveReason::limit_point.
   /// Precondition: a volume is asked only of a closed cavity (ElasticSystem::cavity_closed).
   [[nodiscard]] Solution solve(const Load& load, const ElasticState& start);
 
   /// Exact derivatives at a converged state, at constant cavity pressure: one factorisation, one back-substitution a group.
+  /// Throws std::domain_error where the tangent is singular (a limit point, a missing support): there are none.
   [[nodiscard]] Sensitivities sensitivities(const ElasticState& state,
                                             std::span<const ParameterGroup> groups);
 
   [[nodiscard]] double cavity_volume_mL(const ElasticState& state) const;
-  /// dP/dV of the closed cavity at an equilibrium; negative beyond a pressure maximum.
-  [[nodiscard]] double cavity_stiffness_kPa_per_mL(const ElasticState& state);
+  /// dP/dV of the closed cavity at an equilibrium; negative beyond a pressure maximum. None if the tangent at held volume
+  /// is singular.
+  [[nodiscard]] std::optional<double> cavity_stiffness_kPa_per_mL(const ElasticState& state);
   /// In the material (integral of W) and in springs, mJ (kPa mL).
   [[nodiscard]] double stored_energy_mJ(const ElasticState& state) const;
 
@@ -118,6 +122,8 @@ class ElasticModel {
   [[nodiscard]] const ElasticSystem& system() const;
 
  private:
+  void judge_end(PathResult& path, const Load& load, double start_kPa);
+
   std::unique_ptr<ElasticSystem> system_;
   SolveOptions solve_options_;
 };

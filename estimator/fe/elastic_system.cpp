@@ -307,9 +307,9 @@ FactorResult ElasticSystem::factorise(const ElasticState& state) {
   return factor_.factorise_symmetric(values, state.held_volume_mm3.has_value());
 }
 
-size_t ElasticSystem::negative_pivots(const ElasticState& state, double probing_stiffness_kPa) {
+FactorResult ElasticSystem::inertia(const ElasticState& state, double probing_stiffness_kPa) {
   std::vector<double> values = tangent(state, probing_stiffness_kPa);
-  return factor_.factorise_symmetric(values, state.held_volume_mm3.has_value()).negative_pivots;
+  return factor_.factorise_symmetric(values, state.held_volume_mm3.has_value());
 }
 
 double ElasticSystem::material_stiffness_kPa() const {
@@ -324,10 +324,18 @@ double ElasticSystem::material_stiffness_kPa() const {
 
 Stability ElasticSystem::stability(const ElasticState& state) {
   const size_t needed = pressure_unknowns(state);
-  Stability found{.negative_pivots = negative_pivots(state, 0.0)};
+  const FactorResult exact = inertia(state, 0.0);
+  Stability found{.negative_pivots = exact.negative_pivots};
+  if (!skew_.empty()) return found;
+  found.singular = exact.singular;
+  if (found.singular) return found;
+  found.unstable_motions = 0;
   if (found.negative_pivots > needed) {
-    const size_t left = negative_pivots(state, material_stiffness_kPa());
-    found.unstable_motions = left - std::min(left, needed);
+    const FactorResult probed = inertia(state, material_stiffness_kPa());
+    found.singular = probed.singular;
+    found.unstable_motions.reset();
+    if (!probed.singular)
+      found.unstable_motions = probed.negative_pivots - std::min(probed.negative_pivots, needed);
   }
   return found;
 }

@@ -47,11 +47,16 @@ struct SystemOptions {
 };
 
 struct Stability {
-  size_t negative_pivots =
-      0;  ///< one for each pressure unknown, and for each motion that lowers the potential
+  bool singular =
+      false;  ///< some motion meets no resistance: a limit point, a bifurcation, or a missing support
+  /// One for each pressure unknown, and for each motion that lowers the potential; of no account if singular.
+  size_t negative_pivots = 0;
   /// Motions that lower it and keep the volume of the material. Others are spurious: eight pressures an element do not
-  /// see all changes of volume, whose energy may be negative; as stiff as the material, they are gone.
-  size_t unstable_motions = 0;
+  /// see all changes of volume, whose energy may be negative; as stiff as the material, they are gone. Not known if
+  /// singular, nor where the cavity's wall has a free rim: its pressure has no potential.
+  std::optional<size_t> unstable_motions{};
+
+  [[nodiscard]] bool stable() const { return unstable_motions && *unstable_motions == 0; }
 };
 
 class ElasticSystem {
@@ -130,7 +135,7 @@ class ElasticSystem {
   [[nodiscard]] double rest_pressure_kPa(size_t element) const;
   /// The largest over the elements: pressure at rest and stiffness against stretch there.
   [[nodiscard]] double material_stiffness_kPa() const;
-  size_t negative_pivots(const ElasticState& state, double probing_stiffness_kPa);
+  FactorResult inertia(const ElasticState& state, double probing_stiffness_kPa);
   /// Adds factor * area vectors of a fluid's surface.
   void add_area(const FluidSurface& surface, const NodeField& position_mm, double factor,
                 std::span<double> target) const;

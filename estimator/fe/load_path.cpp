@@ -137,6 +137,7 @@ PathResult follow_load(ElasticSystem& system, const ElasticState& start, const L
     const Stability stability = system.stability(last.state);
     report.negative_pivots = stability.negative_pivots;
     report.unstable_motions = stability.unstable_motions;
+    report.singular = stability.singular;
   }
   report.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
   return {std::move(last.state), std::move(report)};

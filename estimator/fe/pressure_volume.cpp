@@ -58,9 +58,14 @@ PressureVolumeCurve pressure_volume_curve(ElasticModel& model, const PressureVol
     if (!curve.last.converged()) break;
     curve.state = std::move(solution.state);
     PressureVolumePoint point{.volume_change_mL = change_mL, .pressure_kPa = curve.state.pressure_kPa};
-    point.stiffness_kPa_per_mL = model.cavity_stiffness_kPa_per_mL(curve.state);
+    const std::optional<double> stiffness = model.cavity_stiffness_kPa_per_mL(curve.state);
+    if (!stiffness) {
+      curve.last.reason = SolveReason::singular_tangent;
+      break;
+    }
+    point.stiffness_kPa_per_mL = *stiffness;
     point.stored_energy_mJ = model.stored_energy_mJ(curve.state);
-    point.stable_at_volume = model.system().stability(curve.state).unstable_motions == 0;
+    point.stable_at_volume = model.system().stability(curve.state).stable();
     point.newton_iterations = curve.last.newton_iterations;
     if (!curve.points.empty()) {
       if (const auto limit = limit_between(curve.points.back(), point)) curve.limits.push_back(*limit);

@@ -16,10 +16,18 @@ std::string_view describe(SolveReason reason) {
       return "no convergence";
     case SolveReason::singular_tangent:
       return "singular tangent";
+    case SolveReason::limit_point:
+      return "limit point";
     case SolveReason::out_of_steps:
       return "load-step limit reached";
   }
   return "unknown";
+}
+
+std::optional<bool> SolveReport::stable() const {
+  if (singular) return false;
+  if (!unstable_motions) return {};
+  return *unstable_motions == 0;
 }
 
 std::string SolveReport::describe() const {
@@ -40,7 +48,13 @@ std::string SolveReport::describe() const {
   if (reason == SolveReason::singular_tangent && load_steps == 0)
     text +=
         "; the body can move without resistance: its supports or springs do not hold it in every direction";
-  if (unstable_motions > 0) text += "; the last equilibrium is not stable";
+  if (pressure_limit) {
+    text += fmt::format(
+        "; pressure {} near {:.4g} kPa, where the cavity's stiffness dP/dV is {:.1f} % of that at rest",
+        pressure_limit->maximum ? "maximum" : "minimum", pressure_limit->pressure_kPa,
+        100.0 * pressure_limit->left);
+  }
+  if (stable() == false) text += "; the last equilibrium is not stable";
   if (beyond_law) text += fmt::format("; the law has no stress at the strain of element {}", *beyond_law);
   if (!history.empty() && !history.back().iterations.empty()) {
     text += fmt::format("; the last attempt at {:g} kPa had corrections", history.back().pressure_kPa);

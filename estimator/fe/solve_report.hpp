@@ -19,7 +19,8 @@ enum class SolveReason {
   beyond_law,        ///< a strain at which the law has no stress, such as a pole, however small the load step
   no_convergence,    ///< Newton's method stalls however small the load step
   singular_tangent,  ///< the factorisation met a zero pivot: a missing support, or a limit point
-  out_of_steps       ///< the load-step limit was reached
+  limit_point,  ///< the cavity's pressure has a maximum or minimum; judged by the last equilibrium (PressureLimit)
+  out_of_steps  ///< the load-step limit was reached
 };
 
 /// "converged", "inverted element", ... for reports and JSON.
@@ -30,6 +31,14 @@ struct InvertedPlace {
   MaterialPoint point;
   Eigen::Vector3d reference_mm;
   double volume_ratio = 0.0;
+};
+
+/// The cavity's stiffness dP/dV has nearly vanished at the last equilibrium: a little further the pressure has an
+/// extremum, beyond which no equilibrium follows, whatever the attempts there failed of.
+struct PressureLimit {
+  double pressure_kPa = 0.0;  ///< reached
+  double left = 0.0;          ///< of dP/dV at rest
+  bool maximum = true;        ///< else a minimum
 };
 
 /// One step of Newton's method: a new tangent, then corrections that reuse its factors.
@@ -54,14 +63,18 @@ struct SolveReport {
   /// One a pressure unknown, and more if the state is unstable or, spuriously, on a coarse mesh. Of the solution's tangent if SolveOptions::check_stability asks
   /// for it or the cavity's wall has a free rim, else of the last one on the way.
   size_t negative_pivots = 0;
-  size_t unstable_motions = 0;   ///< with check_stability: elastic_system.hpp
-  size_t pressure_unknowns = 0;  ///< Lagrange pressures, and those of fluids that are unknown
+  std::optional<size_t> unstable_motions;  ///< with check_stability, where known: elastic_system.hpp
+  bool singular = false;                   ///< with check_stability: the solution's tangent
+  size_t pressure_unknowns = 0;            ///< Lagrange pressures, and those of fluids that are unknown
   double reached_pressure_kPa = 0.0;
   std::optional<InvertedPlace> inverted;
   std::optional<size_t> beyond_law;  ///< the element
+  std::optional<PressureLimit> pressure_limit{};
   double seconds = 0.0;
 
   [[nodiscard]] bool converged() const { return reason == SolveReason::converged; }
+  /// Of the last equilibrium; not known unless asked for, nor with a free rim (elastic_system.hpp).
+  [[nodiscard]] std::optional<bool> stable() const;
   /// A sentence for a person: what happened, where, at which pressure, and what may help.
   [[nodiscard]] std::string describe() const;
 };

@@ -197,6 +197,44 @@ TEST_F(SolveCommand, NoEquilibriumIsANegativeAnswerWithAReason) {
   EXPECT_FALSE(json.contains("files")) << "none was written";
   EXPECT_FALSE(std::filesystem::exists(table));
   EXPECT_THAT(message, testing::HasSubstr("was reached"));
+  EXPECT_EQ(json["reason"], "limit point");
+  EXPECT_THAT(message, testing::HasSubstr("pressure maximum near"));
+  EXPECT_THAT(message, testing::HasSubstr("`diastole pv` leads the volume"));
+}
+
+TEST_F(SolveCommand, BlamesNoPressureMaximumWhereNoLoadWasBorne) {
+  std::string text = gel_study;
+  write_study(
+      text.replace(text.find("ends = \"fixed\""), 14,
+                   "ends = \"sprung\"\nbond_normal_kPa_per_mm = 0.0\nbond_tangential_kPa_per_mm = 0.0"));
+  testing::internal::CaptureStderr();
+  EXPECT_EQ(run({"--pressure-kPa", "1", "--mesh", "4,1,1"}).code, ExitCode::negative);
+  EXPECT_THAT(testing::internal::GetCapturedStderr(),
+              testing::AllOf(testing::HasSubstr("its supports or springs do not hold it"),
+                             testing::Not(testing::HasSubstr("maximum"))));
+}
+
+TEST_F(SolveCommand, PullsAlongTheFibresOfABodyThatHasThem) {
+  EXPECT_THAT(refusal({"--pressure-kPa", "1", "--fibre-tension-kPa", "5"}), testing::HasSubstr("no fibres"));
+  EXPECT_THAT(refusal({"--pressure-kPa", "1", "--fibre-tension-kPa", "-5"}),
+              testing::HasSubstr("not a tension"));
+  std::string text = gel_study;
+  const size_t kind = text.find("kind =");
+  write_study(
+      text.replace(kind, text.find("ends =") - kind,
+                   "kind = \"ellipsoid\"\ninner_axes_mm = [21.0, 51.0]\nouter_axes_mm = [30.0, 60.0]\n"
+                   "base_z_mm = 15.0\nfibre_endo_deg = 60.0\nfibre_epi_deg = -60.0\nmesh = [4, 2, 1]\n"));
+  make_anisotropic();
+  const auto solved = [&](const char* tension_kPa) {
+    return nlohmann::json::parse(
+        run({"--pressure-kPa", "0.3", "--fibre-tension-kPa", tension_kPa, "--json"}).output);
+  };
+  const auto passive = solved("0");
+  const auto active = solved("2");
+  EXPECT_EQ(active["fibre_tension_kPa"], 2.0);
+  EXPECT_EQ(active["stable"], true);
+  EXPECT_GT(passive["cavity_volume_change_mL"].get<double>(), 0.0);
+  EXPECT_LT(active["cavity_volume_change_mL"].get<double>(), 0.0);
 }
 
 TEST_F(SolveCommand, TellsTheForcesThatHoldTheSpecimen) {
@@ -325,6 +363,8 @@ TEST_F(SolveOfAMeshFile, TellsNoVolumeOfAnOpenCavity) {
   const nlohmann::json json =
       nlohmann::json::parse(run({"--pressure-kPa", "0.5", "-o", record, "--json"}).output);
   EXPECT_EQ(json["reason"], "converged");
+  EXPECT_TRUE(json.at("unstable_motions").is_null()) << "a pressure on a free rim has no potential";
+  EXPECT_TRUE(json.at("stable").is_null());
   EXPECT_TRUE(json.at("cavity_volume_mL").is_null());
   EXPECT_TRUE(json.at("cavity_volume_change_mL").is_null());
   EXPECT_TRUE(nlohmann::json::parse(std::ifstream(record)).at("cavity_volume_mL").is_null());

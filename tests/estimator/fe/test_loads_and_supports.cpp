@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <stdexcept>
 
 #include "estimator/fe/force_balance.hpp"
 #include "estimator/fe/pressure_volume.hpp"
@@ -92,6 +93,21 @@ TEST(LoadsAndSupports, ParameterDerivativeOfCompressibleMaterialIsThatOfTheResid
   for (size_t i = 0; i < slope.size(); ++i)
     slope[i] = (slope[i] - low[i]) / 2e-4;
   EXPECT_LT(largest_difference(exact, slope), 1e-7 * largest(exact));
+}
+
+TEST(FreeRim, LeavesStabilityUndecided) {
+  ElasticModel model = pushed_beam();
+  EXPECT_FALSE(model.system().stability(model.rest_state()).unstable_motions);
+  EXPECT_FALSE(model.solve(0.001).report.stable());
+}
+
+TEST(LoadsAndSupports, WhatNothingHoldsIsNotStableAndHasNoDerivatives) {
+  ElasticModel model = sprung_gel(6.5, {0.0, 0.0});
+  const Stability stability = model.system().stability(model.rest_state());
+  EXPECT_TRUE(stability.singular);
+  EXPECT_FALSE(stability.stable());
+  EXPECT_THROW((void)model.sensitivities(model.rest_state(), {}), std::domain_error);
+  EXPECT_FALSE(model.cavity_stiffness_kPa_per_mL(model.rest_state()));
 }
 
 TEST(LoadsAndSupports, SensitivitiesEqualFiniteDifferencesOfNewSolutions) {
@@ -188,7 +204,7 @@ TEST(HeldVolume, StiffnessOfTheCavityIsTheCurvesSlope) {
   constexpr double h_kPa = 1e-3;
   const double taken_mL = model.cavity_volume_mL(model.solve(3.0 + h_kPa, middle.state).state) -
                           model.cavity_volume_mL(model.solve(3.0 - h_kPa, middle.state).state);
-  EXPECT_NEAR(model.cavity_stiffness_kPa_per_mL(middle.state), 2 * h_kPa / taken_mL, 1e-6);
+  EXPECT_NEAR(model.cavity_stiffness_kPa_per_mL(middle.state).value(), 2 * h_kPa / taken_mL, 1e-6);
 }
 
 TEST(SealedChamber, HoldsBackWhatTheSpecimenTakes) {

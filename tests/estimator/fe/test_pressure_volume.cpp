@@ -49,6 +49,10 @@ TEST(PressureVolume, PressureControlEndsAtTheMaximum) {
   const Solution above = model.solve(1.02 * most_kPa);
   EXPECT_FALSE(above.report.converged());
   EXPECT_LT(above.report.reached_pressure_kPa, 1.005 * most_kPa);
+  EXPECT_EQ(above.report.reason, SolveReason::limit_point);
+  ASSERT_TRUE(above.report.pressure_limit);
+  EXPECT_NEAR(above.report.pressure_limit->pressure_kPa, most_kPa, 0.005 * most_kPa);
+  EXPECT_LT(above.report.pressure_limit->left, 0.1);
 }
 
 TEST(PressureVolume, CanBeStoppedAndEmptiesTheCavityToo) {
