@@ -170,21 +170,22 @@ StudyCompression read_compression(TableReader& model) {
 
 StudyData read_data(TableReader& root, const std::filesystem::path& folder) {
   StudyData data;
-  TableReader table = root.table("data");
-  for (const std::string& run : table.texts_or("runs", {}))
+  std::optional<TableReader> table = root.table_if("data");
+  if (!table) return data;
+  for (const std::string& run : table->texts_or("runs", {}))
     data.runs.push_back(folder / run);
   const auto path_if = [&](std::string_view key) -> std::optional<std::filesystem::path> {
-    if (!table.has(key)) return std::nullopt;
-    return folder / table.text(key);
+    if (!table->has(key)) return std::nullopt;
+    return folder / table->text(key);
   };
   data.tags = path_if("tags");
   data.points = path_if("points");
   data.frames = path_if("frames");
   if ((data.tags || data.points) && !data.frames) {
-    table.fail("frames", "missing, although tags or points are given",
-               "Name the file with each frame's pressure: frames = \"NAME.frames.csv\".");
+    table->fail("frames", "missing, although tags or points are given",
+                "Name the file with each frame's pressure: frames = \"NAME.frames.csv\".");
   }
-  table.finish();
+  table->finish();
   return data;
 }
 

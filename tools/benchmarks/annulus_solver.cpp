@@ -69,7 +69,7 @@ std::vector<AnnulusSolver> annulus_solvers(const std::string& own_program) {
        {},
        {python, "{4}/fenicsx.py", "{0}", "{1}", "{2}", "{3}"},
        {},
-       {{6, 4, 2}, {8, 4, 2}, {8, 6, 2}, {8, 8, 2}, {8, 8, 3}, {12, 8, 3}, {12, 12, 4}}},
+       {{6, 4, 2}, {6, 6, 2}, {8, 4, 2}, {8, 6, 2}, {8, 8, 2}, {8, 8, 3}, {12, 8, 3}, {12, 12, 4}}},
       {"CalculiX",
        "20-node bricks, reduced integration, bulk modulus 1000 C1; SPOOLES",
        {"ccx", "-v"},

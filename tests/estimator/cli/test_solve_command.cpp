@@ -101,6 +101,12 @@ TEST_F(SolveCommand, JsonHoldsWhatTheContractSays) {
   EXPECT_NEAR(json["probes"][1]["displacement_mm"][0].get<double>(), -4.2197, 0.04);
 }
 
+TEST_F(SolveCommand, NeedsNoData) {
+  const std::string text = gel_study;
+  write_study(text.substr(0, text.find("[data]")));
+  EXPECT_EQ(run({"--pressure-kPa", "1", "--mesh", "4,1,1"}).code, ExitCode::done);
+}
+
 TEST_F(SolveCommand, SetAndMeshReplaceTheStudys) {
   const nlohmann::json json = nlohmann::json::parse(
       run({"--pressure-kPa", "3.1", "--set", "C1_kPa=8.8", "--mesh", "6,2,1", "--json"}).output);

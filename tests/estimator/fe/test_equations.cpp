@@ -105,7 +105,7 @@ TEST_P(Equations, SumsAreTheSameForAnyNumberOfThreads) {
   }
 }
 
-// A rigid rotation of the whole body about z leaves the ends where a turned plate would hold them: no force
+// A rigid rotation of the whole body, about a slanting axis, leaves the ends where a turned plate would hold them: no force
 // anywhere.
 TEST_P(Equations, RigidMotionIsStressFree) {
   ElasticSystem& system = model_->system();

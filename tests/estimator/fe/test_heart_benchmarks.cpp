@@ -28,6 +28,16 @@ TEST(LandBenchmark, EllipsoidInflates) {
   EXPECT_NEAR(inflated.apex_mm(1.0), -28.280, 0.1);
 }
 
+TEST(LandBenchmark, EllipsoidContracts) {
+  const LandVentricle contracted = stable(land_contracted(land_ellipsoid({8, 4, 2})));
+  EXPECT_NEAR(contracted.cavity_mL(), 1.796, 0.006);
+  EXPECT_NEAR(contracted.apex_mm(0.5), -14.22, 0.06);
+  EXPECT_NEAR(contracted.apex_mm(1.0), -15.47, 0.08);
+  EXPECT_NEAR(contracted.twist_deg(0.25), -22.4, 0.15);
+  EXPECT_NEAR(contracted.twist_deg(0.50), -12.9, 0.15);
+  EXPECT_NEAR(contracted.twist_deg(0.75), -6.2, 0.15);
+}
+
 // Noise-free displacements of an independent solver at known parameters; every twentieth of its points.
 TEST(LeftVentricle, MovesAsAnIndependentSolverSays) {
   const std::filesystem::path examples = std::filesystem::path(DIASTOLE_SOURCE_DIR) / "examples";

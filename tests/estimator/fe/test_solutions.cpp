@@ -153,7 +153,7 @@ TEST(Sensitivities, ElementsAddUpToTheWhole) {
     for (size_t i = 0; i < sum.size(); ++i)
       sum[i] += by.parameter[e][i];
   }
-  EXPECT_LT(largest_difference(sum, by.parameter.back()), 1e-9 * largest(sum));
+  EXPECT_LT(largest_difference(sum, by.parameter.back()), 1e-10 * largest(sum));
 }
 
 TEST(Solve, WarmStartReachesTheSameState) {
