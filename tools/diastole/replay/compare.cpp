@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
+#include <vector>
 
 #include "protocol/runfile/soundness.hpp"
 #include "tools/diastole/replay/replay_plan.hpp"
@@ -108,6 +110,14 @@ void Comparer::compare_triggers() {
   out_.triggers_equal = out_.triggers_equal && in_time;
 }
 
+/// Rows whose position stands in both; a missing one is no standstill.
+std::vector<size_t> known_positions(const RecordedRun& one, const RecordedRun& other) {
+  std::vector<size_t> rows;
+  for (size_t i = 0; i < std::min(one.pump.time_s.size(), other.pump.time_s.size()); ++i)
+    if (!std::isnan(one.pump.commanded_mL[i]) && !std::isnan(other.pump.commanded_mL[i])) rows.push_back(i);
+  return rows;
+}
+
 void Comparer::compare_positions() {
   const double microstep_mL = rig_number(recorded_, "volume_per_step_mL").value_or(1);
   const auto &before = recorded_.pump, &after = replayed_.pump;
@@ -132,9 +142,10 @@ void Comparer::compare_positions() {
     }
   }
   out_.max_steps_diff = most;
+  const std::vector<size_t> known = known_positions(recorded_, replayed_);
   const auto last = [&](const runfile::PumpTrace& pump) {
-    return common == 0 ? std::string("-")
-                       : fmt::format("{}", std::llround(pump.commanded_mL[common - 1] / microstep_mL));
+    return known.empty() ? std::string("-")
+                         : fmt::format("{}", std::llround(pump.commanded_mL[known.back()] / microstep_mL));
   };
   add("positions, last one in microsteps", last(before), last(after), fmt::format("{} at most", most), equal);
   if (!out_.steps_equal && common > 0)
@@ -142,33 +153,29 @@ void Comparer::compare_positions() {
   out_.steps_equal = out_.steps_equal && equal;
 }
 
-/// Steps of each cycle of the recording, as the positions tell them.
+/// Steps of each cycle of the recording, as the positions in these rows tell them.
 std::vector<CycleSteps> cycle_steps(const RecordedRun& run, const std::vector<double>& trigger_s,
-                                    double microstep_mL, double until_s) {
+                                    double microstep_mL, const std::vector<size_t>& rows) {
   std::vector<CycleSteps> cycles(trigger_s.size());
   size_t cycle = 0;
-  int64_t last = 0;
-  bool known = false;
-  for (size_t i = 0; i < run.pump.time_s.size() && run.pump.time_s[i] <= until_s; ++i) {
-    if (std::isnan(run.pump.commanded_mL[i])) continue;
+  std::optional<int64_t> last;
+  for (const size_t i : rows) {
     const int64_t now = std::llround(run.pump.commanded_mL[i] / microstep_mL);
     while (cycle + 1 < trigger_s.size() && run.pump.time_s[i] >= trigger_s[cycle + 1])
       ++cycle;
-    if (known && !trigger_s.empty() && run.pump.time_s[i] >= trigger_s[0])
-      (now > last ? cycles[cycle].inflating : cycles[cycle].deflating) += std::abs(now - last);
+    if (last && run.pump.time_s[i] >= trigger_s[0])
+      (now > *last ? cycles[cycle].inflating : cycles[cycle].deflating) += std::abs(now - *last);
     last = now;
-    known = true;
   }
   return cycles;
 }
 
 void Comparer::compare_cycles() {
   const double microstep_mL = rig_number(recorded_, "volume_per_step_mL").value_or(1);
-  if (recorded_.pump.time_s.empty() || replayed_.pump.time_s.empty() || recorded_.trigger_s.empty()) return;
-  const double until_s =
-      std::min(recorded_.pump.time_s.back(), replayed_.pump.time_s.back()) + trigger_tolerance_s;
-  const auto before = cycle_steps(recorded_, recorded_.trigger_s, microstep_mL, until_s);
-  const auto after = cycle_steps(replayed_, recorded_.trigger_s, microstep_mL, until_s);
+  const std::vector<size_t> rows = known_positions(recorded_, replayed_);
+  if (rows.empty() || recorded_.trigger_s.empty()) return;
+  const auto before = cycle_steps(recorded_, recorded_.trigger_s, microstep_mL, rows);
+  const auto after = cycle_steps(replayed_, recorded_.trigger_s, microstep_mL, rows);
   const auto compare_way = [&](const char* what, int64_t CycleSteps::*way) {
     int64_t was = 0, is = 0, worst = 0;
     size_t where = 0;
