@@ -8,7 +8,8 @@
 //
 // H⁻¹ is the covariance of q if the field were drawn from the prior that λ stands for (Wahba 1983, J. R. Stat.
 // Soc. B 45:133): its standard errors hold the mean square of smoothing's own bias as well as the noise.
-// One instance is used by one thread at a time; different ones may run at once.
+// Never two at the same time, not even different instances: the BLAS that CHOLMOD calls (OpenBLAS built for one
+// thread) has one work space for the process, and gives wrong products when two threads share it.
 
 #include <Eigen/CholmodSupport>
 #include <span>

@@ -3,11 +3,8 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <mutex>
 #include <set>
-#include <thread>
 
-#include "estimator/fe/parallel_for.hpp"
 #include "estimator/fe/study_model.hpp"
 #include "estimator/reconstruction/measurement_findings.hpp"
 #include "estimator/reconstruction/stiffness_check.hpp"
@@ -57,17 +54,10 @@ void reconstruct_frames(StudyReconstruction& result, const Measurement& measurem
                                    .robust = options.robust,
                                    .reject_sigma = 5.0,
                                    .locator = locator_for(result.body->mesh)};
-  const size_t threads =
-      options.threads > 0 ? options.threads : std::max(1U, std::thread::hardware_concurrency());
-  result.fields.resize(frames.size());
-  std::mutex telling;
-  size_t done = 0;
-  parallel_for(frames.size(), threads, [&](size_t i) {
-    result.fields[i] = reconstruct_frame(*result.forms, measurement, frames[i], frame_options);
-    const std::lock_guard lock(telling);
-    ++done;
-    if (options.on_frame) options.on_frame(done, frames.size());
-  });
+  for (const int frame : frames) {
+    result.fields.push_back(reconstruct_frame(*result.forms, measurement, frame, frame_options));
+    if (options.on_frame) options.on_frame(result.fields.size(), frames.size());
+  }
 }
 
 void sample_fields(StudyReconstruction& result, const ReconstructionOptions& options) {

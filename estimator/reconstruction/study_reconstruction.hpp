@@ -27,8 +27,7 @@ struct ReconstructionOptions {
   bool robust = true;
   std::optional<size_t> points_a_frame;  ///< default: as many as the fields have freedoms (field_samples.hpp)
   bool check_stiffness = true;           ///< one forward model, for the pressures' unit
-  size_t threads = 0;                    ///< 0: as many as the machine has; frames side by side
-  std::function<void(size_t done, size_t of)> on_frame;  ///< called from any thread, one call at a time
+  std::function<void(size_t done, size_t of)> on_frame;
 };
 
 /// Without fields when the data cannot be what they say (an error among the findings of the measurement).
