@@ -1,4 +1,5 @@
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <fstream>
 
@@ -20,7 +21,7 @@ class PlantedViolation : public testing::TestWithParam<std::pair<std::string, st
 
 TEST_P(PlantedViolation, IsFound) {
   const auto& [file, included] = GetParam();
-  const fs::path root = fs::path(testing::TempDir()) / "planted_violation";
+  const fs::path root = fs::path(testing::TempDir()) / ("planted_violation-" + std::to_string(::getpid()));
   fs::remove_all(root);
   fs::create_directories((root / file).parent_path());
   std::ofstream(root / file) << "#pragma once\n#include \"" << included << "\"\n";
