@@ -291,6 +291,7 @@ bool nothing_hidden(const json& result) {
 }
 
 TEST(Faults, HostileClients) {
+  if (sanitized) GTEST_SKIP() << "real time, of which sanitizers leave too little";
   uint64_t sent = 0;
   double growth_MB = 0;
   int64_t received = 0, missing = 0;
@@ -321,9 +322,7 @@ TEST(Faults, HostileClients) {
     return held && granted == 0;
   });
   EXPECT_GT(received, 0);
-  if (!sanitized) {
-    EXPECT_LT(growth_MB, 40);
-  }
+  EXPECT_LT(growth_MB, 40);
   add_to_table({"hostile clients", "50 of them, 10000 messages/s, real time", tried, survived,
                 fmt::format("{} messages: one lease, {} of {} samples missing, all declared; {:+.1f} MB",
                             sent, missing, received + missing, growth_MB)});

@@ -48,7 +48,7 @@ TEST(Control, TheSecondClientIsToldWhoHoldsItAndTakesItOverByName) {
   EXPECT_EQ(second.call("control.take", {{"take_over", own_name()}})["user"], own_name());
   EXPECT_THROW(first.call("rig.home"), HardwareError) << "the lease is one";
   second.call("rig.home");
-  EXPECT_THAT(rig.daemon->err(), HasSubstr("control was taken over from " + own_name()));
+  EXPECT_TRUE(rig.daemon->wait_for_text("control was taken over from " + own_name())) << rig.daemon->err();
 }
 
 TEST(Control, ATakeoverDuringARunIsAnEventOfTheRun) {

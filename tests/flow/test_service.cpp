@@ -99,7 +99,7 @@ TEST(Service, ALoopThatHangsIsNotAliveHoweverTheServerAnswers) {
 TEST(Service, AJournalGetsLevelsInsteadOfTimes) {
   RigWithDaemon rig(RigWithDaemon::Time::conducted);
   rig.start_daemon({"/bin/sh", "-c", "JOURNAL_STREAM=$(stat -L -c %d:%i /dev/stderr) exec \"$0\" \"$@\""});
-  EXPECT_THAT(rig.daemon->err(), HasSubstr("<6>controller at "));
+  EXPECT_TRUE(rig.daemon->wait_for_text("<6>controller at ")) << rig.daemon->err();
 }
 
 }  // namespace
