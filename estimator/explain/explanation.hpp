@@ -1,0 +1,132 @@
+#pragma once
+// What `diastole explain` found: where model and data disagree, the missing effects, what remains open, and what the
+// report draws. Written as JSON (docs/explain.md); nothing here is computed.
+
+#include <array>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace diastole::explain {
+
+/// named: exactly one set of effects survives. ambiguous: these data cannot tell several sets apart. unexplained: the
+/// misfit has structure that no known effect removes; `effects` then holds only what is certain. none: nothing exceeds
+/// the noise.
+enum class Verdict { named, ambiguous, unexplained, none };
+std::string_view name_of(Verdict verdict);
+
+struct FoundParameter {
+  std::string name;  ///< with its unit: "wave_speed_m_s"
+  double value = 0.0;
+  double standard_error = 0.0;
+  std::array<double, 2> ci90{};  ///< of the profile or, where it is symmetric, 1.645 standard errors
+};
+
+/// A moment that an effect needs: the run and the second at which steps were lost or a sensor stepped.
+struct FoundMoment {
+  std::string run;
+  double time_s = 0.0;
+};
+
+struct FoundEffect {
+  std::string id;
+  std::vector<FoundParameter> parameters;
+  std::vector<FoundMoment> moments;
+};
+
+/// A place in the data where the base model fails beyond the noise, after correction for how many were looked at.
+struct Misfit {
+  std::string port;     ///< "drive", "specimen", "sensor", "clock", "field"
+  std::string run;      ///< empty for tags
+  std::string channel;  ///< "cavity_kPa", "pump_kPa", "cavity_mL", "tags"
+  std::optional<int> segment;
+  std::optional<std::array<double, 2>> phase;    ///< of the cycle
+  std::optional<std::array<double, 2>> band_Hz;  ///< if one stands out
+  std::string region;                            ///< "" or in words: "around 60 deg, z 12 mm, inner third"
+  double excess_chi2 = 0.0;                      ///< above what noise gives
+  double p_value = 1.0;
+};
+
+/// Reduced chi-squares on data that were not used for the fit. closed = 1 - (after - floor) / (before - floor).
+struct Gap {
+  double before = 1.0;
+  double after = 1.0;
+  double floor = 1.0;
+  double closed = 0.0;
+  std::vector<std::string> held_out;
+};
+
+/// One row of the evidence table.
+struct Candidate {
+  std::vector<std::string> ids;
+  double chi_square_drop = 0.0;  ///< of a refit, or of the score test if it was not refitted
+  bool refitted = false;
+  size_t parameters = 0;
+  std::optional<double> held_out_drop;  ///< of chi-square on runs that were not fitted
+  std::string verdict;                  ///< in words: "named", "as good", "refuted: ...", "not needed"
+};
+
+struct ParameterShift {
+  std::string name;  ///< "C1_kPa"
+  double before = 0.0;
+  double before_error = 0.0;
+  double after = 0.0;
+  double after_error = 0.0;
+};
+
+/// A channel of a run as measured and as the two models see it; all of one length.
+struct Trace {
+  std::string run;
+  std::string channel;
+  std::string unit;
+  double noise_sd = 0.0;
+  std::vector<double> time_s;
+  std::vector<double> measured;  ///< NaN where a gap is declared
+  std::vector<double> before;
+  std::vector<double> after;
+  std::vector<double> cavity_mL;  ///< volume by the augmented model, for p-V loops; may be empty
+  std::vector<double> trigger_s;  ///< starts of the run's cycles
+};
+
+/// A tag or point in the undeformed body with its residual before and after, in sigmas.
+struct FieldResidual {
+  std::array<double, 3> place_mm{};
+  int frame = 0;
+  double before = 0.0;
+  double after = 0.0;
+};
+
+/// What the gap was after each effect, in the order in which they were added; the first is the base model.
+struct Step {
+  std::string added;
+  double reduced_chi_square = 0.0;
+};
+
+struct NextExperiment {
+  std::string toml;  ///< runnable: contracts.md section 6
+  std::vector<std::string> separates;
+  double predicted_separation_sigma = 0.0;
+  std::string reason;  ///< one sentence for people
+};
+
+struct Explanation {
+  std::string study;  ///< file
+  Verdict verdict = Verdict::none;
+  std::vector<FoundEffect> effects;
+  std::vector<std::vector<std::string>> ambiguous_with;
+  std::vector<Misfit> where;
+  Gap gap;
+  std::optional<NextExperiment> next_experiment;
+  std::string study_after;  ///< file name beside the JSON; empty if nothing was added
+  std::string summary;      ///< a few sentences for people
+
+  std::vector<Candidate> evidence;
+  std::vector<ParameterShift> shifts;
+  std::vector<Step> steps;
+  std::vector<Trace> traces;
+  std::vector<FieldResidual> field;
+  double seconds = 0.0;
+};
+
+}  // namespace diastole::explain
