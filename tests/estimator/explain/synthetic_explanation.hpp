@@ -1,0 +1,13 @@
+#pragma once
+// Explanations as the engine would hand them over, without a rig: pressures with a made-up effect, tags with a lump.
+
+#include "estimator/explain/explanation.hpp"
+
+namespace diastole::test {
+
+/// A named hose-compliance on two runs, with everything that the report draws of a rig.
+explain::Explanation explained_hose();
+/// A named stiff inclusion at 60 degrees, seen by tags only.
+explain::Explanation explained_inclusion();
+
+}  // namespace diastole::test
