@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "host/transport/real_time.hpp"
 #include "protocol/contract/input_error.hpp"
 
 namespace diastole::sim_rig {
@@ -22,6 +23,8 @@ using WallClock = std::chrono::steady_clock;
 constexpr auto longest_serial_wait = 1s;
 constexpr int wall_clock_tick_ms = 1;
 constexpr uint64_t origin_step_ns = 1'000'000;
+constexpr uint64_t longest_leap_ns = 5'000'000;
+constexpr int hardware_priority = 30;  // below the daemon's, which has to answer it
 
 sim_daq::InstrumentConfig instrument_config(const RigDescription& description, const ServerOptions& options) {
   sim_daq::InstrumentConfig config;
@@ -73,6 +76,7 @@ std::string Server::addresses() const {
 
 void Server::run(int stop_descriptor) {
   const auto start = WallClock::now();
+  if (!conductor_) ask_for_real_time(hardware_priority);  // hardware is never late
   while (true) {
     cables_.line.refresh();
     std::vector<pollfd> waiting{{stop_descriptor, POLLIN, 0},
@@ -87,7 +91,7 @@ void Server::run(int stop_descriptor) {
     ::poll(waiting.data(), waiting.size(), conductor_ ? -1 : wall_clock_tick_ms);
     if (waiting[0].revents != 0) break;
     if (!conductor_) {
-      advance_to(static_cast<uint64_t>(std::chrono::nanoseconds(WallClock::now() - start).count()));
+      catch_up(static_cast<uint64_t>(std::chrono::nanoseconds(WallClock::now() - start).count()));
       while (const auto hold = timeline_.take_hold(run_clock_, rig_.now_ns()))
         control_->tell(hold->client, "held " + hold->moment);
     }
@@ -102,6 +106,14 @@ void Server::run(int stop_descriptor) {
     instrument_.service();
   }
   if (pins_) pins_->close();
+}
+
+/// In short leaps, so that a rig that was kept from the processor still hears the host's answers in between.
+void Server::catch_up(uint64_t until_ns) {
+  while (rig_.now_ns() < until_ns) {
+    advance_to(std::min(until_ns, rig_.now_ns() + longest_leap_ns));
+    take_serial();
+  }
 }
 
 void Server::advance_to(uint64_t until_ns) {

@@ -59,6 +59,7 @@ class Server {
     ControlServer::ClientId by;
   };
 
+  void catch_up(uint64_t until_ns);
   void advance_to(uint64_t until_ns);
   void set(const FaultKind& kind, std::optional<double> value);
   void take_sent(std::span<const uint8_t> bytes);
