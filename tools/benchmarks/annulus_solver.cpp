@@ -30,11 +30,11 @@ std::vector<std::string> filled(const std::vector<std::string>& command, const A
   return words;
 }
 
-ProcessFigures run_step(const AnnulusSolver& solver, const char* step,
+ProcessCost run_step(const AnnulusSolver& solver, const char* step,
                         const std::vector<std::string>& command, const AnnulusElements& elements,
                         const AnnulusWorkplace& place) {
   const std::filesystem::path log = place.folder / fmt::format("{}.log", step);
-  const ProcessFigures figures = run_timed(filled(command, elements, place), place.folder, log);
+  const ProcessCost figures = run_timed(filled(command, elements, place), place.folder, log);
   if (figures.exit_code != 0) {
     throw std::runtime_error(fmt::format("{} failed with code {}; its output is in {}", solver.name,
                                          figures.exit_code, log.string()));

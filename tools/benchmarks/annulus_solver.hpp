@@ -24,7 +24,7 @@ struct AnnulusAnswer {
   size_t unknowns = 0;
   std::string newton;  ///< steps of Newton's method, in words
   std::array<double, 5> radial_mm{};
-  ProcessFigures process;
+  ProcessCost process;
   size_t factor_entries = 0;  ///< numbers in the factorised tangent; 0 if the program does not tell
   double solve_wall_s =
       0.0;  ///< from the undeformed state to the answer; the whole process if not told apart

@@ -38,7 +38,7 @@ std::vector<char*> pointers_to(std::vector<std::string>& texts) {
 
 }  // namespace
 
-ProcessFigures run_timed(const std::vector<std::string>& command, const std::filesystem::path& folder,
+ProcessCost run_timed(const std::vector<std::string>& command, const std::filesystem::path& folder,
                          const std::filesystem::path& log) {
   std::vector<std::string> arguments = command;
   std::vector<std::string> variables = one_thread_environment();
@@ -59,7 +59,7 @@ ProcessFigures run_timed(const std::vector<std::string>& command, const std::fil
   rusage usage{};
   while (wait4(child, &status, 0, &usage) < 0 && errno == EINTR) {
   }
-  ProcessFigures figures;
+  ProcessCost figures;
   figures.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
   figures.processor_s = seconds(usage.ru_utime) + seconds(usage.ru_stime);
   figures.peak_MB = static_cast<double>(usage.ru_maxrss) / 1024.0;

@@ -8,7 +8,7 @@
 
 namespace diastole {
 
-struct ProcessFigures {
+struct ProcessCost {
   int exit_code = -1;  ///< -1: not started, or killed by a signal
   double wall_s = 0.0;
   double processor_s = 0.0;  ///< user and system
@@ -17,7 +17,7 @@ struct ProcessFigures {
 
 /// `command[0]` is looked for in PATH; the program's output goes to `log`, its directory is `folder`. Numerical
 /// libraries are told to use one thread. Throws std::system_error when the machine starts no process at all.
-ProcessFigures run_timed(const std::vector<std::string>& command, const std::filesystem::path& folder,
+ProcessCost run_timed(const std::vector<std::string>& command, const std::filesystem::path& folder,
                          const std::filesystem::path& log);
 
 }  // namespace diastole
