@@ -182,6 +182,7 @@ ExitCode run_pv(const PvArguments& arguments, const CommandOutput& out) {
   const Study study = read_study(arguments.study);
   ElasticModel model = make_model(study, with_progress("pv"));
   require_closed_cavity(study, model);
+  remark_on_size(model.mesh(), "pv");
   const StopOnInterrupt stop;
   PressureVolumeOptions options{.volume_change_mL = arguments.volume_change_mL, .steps = arguments.steps};
   options.on_point = [&](const PressureVolumePoint& point) {

@@ -263,6 +263,14 @@ void tell_failure_or_instability(const SolveArguments& arguments, const SolveRep
     return;
   }
   fmt::print(stderr, "diastole solve: {}\n", report.describe());
+  constexpr double borne_share = 0.01;  // less than this of what was asked for is a matter of units
+  if (arguments.pressure_kPa &&
+      std::abs(report.reached_pressure_kPa) < borne_share * std::abs(*arguments.pressure_kPa) &&
+      report.reason != SolveReason::singular_tangent) {
+    fmt::print(stderr, "  {:g} kPa is far more than this body bears: 1 kPa = 1000 Pa = 7.5 mmHg = 10 mbar.\n",
+               *arguments.pressure_kPa);
+    return;
+  }
   if (arguments.volume_change_mL || report.load_steps == 0) return;
   if (report.reason == SolveReason::limit_point) {
     fmt::print(stderr, "  `diastole pv` leads the volume instead, finds that point and goes on beyond.\n");
@@ -282,6 +290,7 @@ ExitCode run_solve(const SolveArguments& arguments, const CommandOutput& out) {
   options.check_stability = true;
   ElasticModel model = make_model(study, std::move(options));
   require_fibres_for_tension(arguments, model);
+  remark_on_size(model.mesh(), "solve");
   const std::vector<TimedLoad> loads = loads_of(arguments, study, model);
   const std::vector<Probe> probes = locate_probes(model.mesh(), arguments.probes);
 

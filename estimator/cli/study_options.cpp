@@ -24,14 +24,23 @@ Study read_study(const StudyOptions& options) {
   return study;
 }
 
+void remark_on_size(const HermiteMesh& mesh, std::string_view command) {
+  constexpr double least_mm = 2.0, most_mm = 1000.0;
+  const double extent_mm = mesh.extent_mm();
+  if (extent_mm >= least_mm && extent_mm <= most_mm) return;
+  fmt::print(stderr, "diastole {}: the body reaches over {:.2g} mm; were its lengths meant in {}?\n", command,
+             extent_mm, extent_mm < least_mm ? "metres" : "micrometres");
+}
+
 SolveOptions with_progress(std::string_view command) {
-  constexpr double patience_s = 2.0;
+  constexpr double patience_s = 2.0, pause_s = 1.0;
   using Clock = std::chrono::steady_clock;
   SolveOptions options;
-  options.on_iteration = [begun = Clock::now(), command](double pressure_kPa,
-                                                         const NewtonIteration& iteration) {
+  options.on_iteration = [begun = Clock::now(), next_s = patience_s, command](
+                             double pressure_kPa, const NewtonIteration& iteration) mutable {
     const double elapsed_s = std::chrono::duration<double>(Clock::now() - begun).count();
-    if (elapsed_s < patience_s) return;
+    if (elapsed_s < next_s) return;
+    next_s = elapsed_s + pause_s;
     fmt::print(stderr, "{}: {:.3g} kPa, correction {:.1e}, {:.0f} s\n", command, pressure_kPa, iteration.step,
                elapsed_s);
   };

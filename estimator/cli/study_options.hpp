@@ -26,8 +26,11 @@ void add_study_options(CLI::App& command, StudyOptions& options);
 /// The study with its replaced values. Throws InputError.
 Study read_study(const StudyOptions& options);
 
-/// A line on standard error for each Newton iteration, once the work has lasted longer than people like to
-/// wait. `command` begins the line.
+/// Asks on standard error, in the name of a command, whether a body so small or so large is meant to be in millimetres.
+void remark_on_size(const HermiteMesh& mesh, std::string_view command);
+
+/// A line on standard error for Newton's iterations, one a second at most, once the work has lasted longer than people like
+/// to wait. `command` begins the line.
 SolveOptions with_progress(std::string_view command);
 
 }  // namespace diastole

@@ -85,9 +85,9 @@ MeshSpecimen read_mesh_specimen(TableReader& table, const std::filesystem::path&
 
 Specimen read_specimen(TableReader& root, const std::filesystem::path& folder) {
   TableReader table = root.table("specimen");
-  const std::string kind = table.choice("kind", {"annulus", "ellipsoid", "mesh"});
+  const std::string kind = table.choice("kind", {"annulus", "ellipsoid", "mesh", "fitted-lv"});
   Specimen specimen;
-  if (kind == "mesh") {
+  if (kind == "mesh" || kind == "fitted-lv") {
     specimen = read_mesh_specimen(table, folder);
   } else if (kind == "ellipsoid") {
     specimen = read_ellipsoid(table);

@@ -44,7 +44,7 @@ struct EllipsoidSpecimen {
   std::optional<EndSprings> end_springs{};  ///< given if the ends are sprung
 };
 
-/// Any body: a mesh file (docs/mesh-file.md) that names its faces.
+/// Any body: a mesh file (docs/mesh-file.md) that names its faces. Kind "mesh", or "fitted-lv" for a ventricle.
 struct MeshSpecimen {
   std::filesystem::path file;
   std::string ends;                         ///< of the faces bottom and top: "fixed", or "sprung"

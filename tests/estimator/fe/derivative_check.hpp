@@ -63,4 +63,18 @@ inline double tangent_fault(const ElasticSystem& system, const ElasticState& sta
   return worst;
 }
 
+/// How far the cavity wall's area vectors are from the derivative of its volume along a random step, relative to it.
+inline double area_fault(const ElasticSystem& system, const ElasticState& state) {
+  const std::vector<double> area = system.cavity_area(state);
+  const std::vector<double> step = random_step(area.size(), 4);
+  constexpr double h = 1e-4;
+  const double slope = (system.cavity_volume_mm3(system.moved(state, step, h)) -
+                        system.cavity_volume_mm3(system.moved(state, step, -h))) /
+                       (2 * h);
+  double along = 0.0;
+  for (size_t i = 0; i < step.size(); ++i)
+    along += area[i] * step[i];
+  return std::abs(along / slope - 1.0);
+}
+
 }  // namespace diastole

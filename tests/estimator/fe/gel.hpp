@@ -26,6 +26,20 @@ inline ElasticModel gel(double c1_kPa, std::array<size_t, 3> elements = {8, 4, 1
   return ElasticModel(make_annulus(gel_shape(elements)), *find_law("neo-hookean"), std::move(options));
 }
 
+/// A slice of the gel between frictionless plates; three dofs at nodes where symmetry makes them zero stop rigid motion.
+inline ElasticModel plane_strain_slice(double c1_kPa, size_t layers) {
+  AnnulusShape shape = gel_shape({8, 1, layers});
+  shape.height_mm = 20.0;
+  shape.plate_grading = 0.0;
+  HermiteMesh mesh = make_annulus(shape);
+  HeldDofs held = hold_nothing(mesh);
+  hold_face_component(mesh, mesh.faces().bottom, 2, held);
+  hold_face_component(mesh, mesh.faces().top, 2, held);
+  held[dof_of(0, 0, 1)] = held[dof_of(4, 0, 1)] = held[dof_of(2, 0, 0)] = 1;
+  return ElasticModel(std::move(mesh), *find_law("neo-hookean"),
+                      {.parameters = {c1_kPa}, .held = held, .solve = {.check_stability = true}});
+}
+
 /// A law with fibres, stiffening and a full tangent, for the paths that the neo-Hookean law does not take.
 struct FibreExponential {
   static constexpr std::string_view name = "test-fibre-exponential";

@@ -159,16 +159,7 @@ TEST(CavityLoad, AreaIsTheDerivativeOfTheVolume) {
   ElasticModel model = gel(6.5, {5, 3, 1});
   ElasticSystem& system = model.system();
   const ElasticState state = shaken(system, model.rest_state(), 0.4, 9);
-  const std::vector<double> area = system.cavity_area(state);
-  const std::vector<double> step = random_step(model.dofs(), 4);
-  constexpr double h = 1e-4;
-  const double slope = (system.cavity_volume_mm3(system.moved(state, step, h)) -
-                        system.cavity_volume_mm3(system.moved(state, step, -h))) /
-                       (2 * h);
-  double along = 0.0;
-  for (size_t i = 0; i < step.size(); ++i)
-    along += area[i] * step[i];
-  EXPECT_NEAR(along, slope, 1e-8 * std::abs(slope));
+  EXPECT_LT(area_fault(system, state), 1e-8);
 }
 
 TEST(CavityLoad, VolumeOfTheUndeformedCavityIsACylinders) {

@@ -41,20 +41,6 @@ double cylinder_pressure_kPa(double u, double c1_kPa) {
   return 2.0 * c1_kPa * (std::log(outer * a / (inner * b)) + 0.5 * c * (1.0 / (a * a) - 1.0 / (b * b)));
 }
 
-/// A slice between frictionless plates; three dofs at nodes where symmetry makes them zero stop rigid motion.
-ElasticModel plane_strain_slice(double c1_kPa, size_t layers) {
-  AnnulusShape shape = gel_shape({8, 1, layers});
-  shape.height_mm = 20.0;
-  shape.plate_grading = 0.0;
-  HermiteMesh mesh = make_annulus(shape);
-  HeldDofs held = hold_nothing(mesh);
-  hold_face_component(mesh, mesh.faces().bottom, 2, held);
-  hold_face_component(mesh, mesh.faces().top, 2, held);
-  held[dof_of(0, 0, 1)] = held[dof_of(4, 0, 1)] = held[dof_of(2, 0, 0)] = 1;
-  return ElasticModel(std::move(mesh), *find_law("neo-hookean"),
-                      {.parameters = {c1_kPa}, .held = held, .solve = {.check_stability = true}});
-}
-
 TEST(PlaneStrainCylinder, MatchesTheClosedFormAndConvergesWithLayers) {
   constexpr double wall_mm = 6.0;
   constexpr double c1_kPa = 6.5;

@@ -1,6 +1,7 @@
 #include <gmock/gmock.h>
 
 #include "estimator/io/study.hpp"
+#include "tests/estimator/io/gel_study.hpp"
 #include "tests/estimator/io/scratch_file.hpp"
 
 namespace diastole {
@@ -10,23 +11,7 @@ using test::message_of;
 using testing::AllOf;
 using testing::HasSubstr;
 
-constexpr const char* gel = R"(format = "diastole-study"
-version = 1
-[specimen]
-kind = "annulus"
-inner_radius_mm = 22.5
-outer_radius_mm = 50.0
-height_mm = 85.0
-mesh = [8, 4, 1]
-ends = "fixed"
-[law]
-name = "neo-hookean"
-[law.parameters.C1_kPa]
-start = 6.0
-bounds = [1.0, 15.0]
-vary = "whole"
-[data]
-runs = ["a.run.h5", "b.run.h5"]
+const std::string gel = std::string(test::gel_study) + R"(runs = ["a.run.h5", "b.run.h5"]
 tags = "gel.tags.csv"
 frames = "gel.frames.csv"
 [model]
@@ -60,7 +45,7 @@ TEST_F(StudyFile, EveryValueArrives) {
   ASSERT_EQ(study.law.parameters.size(), 1U);
   const StudyParameter& c1 = study.law.parameters[0];
   EXPECT_EQ(c1.name, "C1_kPa");
-  EXPECT_EQ(c1.start, 6.0);
+  EXPECT_EQ(c1.start, 6.5);
   EXPECT_EQ(c1.lower, 1.0);
   EXPECT_EQ(c1.upper, 15.0);
   EXPECT_EQ(c1.vary, Variation::whole);
@@ -80,7 +65,7 @@ TEST_F(StudyFile, FaultsNamePlaceValueAndRemedy) {
               AllOf(HasSubstr("outer_radius_mm"), HasSubstr("20"), HasSubstr("greater than 22.5")));
   EXPECT_THAT(message_with("[8, 4, 1]", "[800, 4, 1]"), AllOf(HasSubstr("mesh"), HasSubstr("800")));
   EXPECT_THAT(message_with("[8, 4, 1]", "[2, 4, 1]"), HasSubstr("circle"));
-  EXPECT_THAT(message_with("start = 6.0", "start = 16.0"),
+  EXPECT_THAT(message_with("start = 6.5", "start = 16.0"),
               AllOf(HasSubstr("start"), HasSubstr("at most 15")));
   EXPECT_THAT(message_with("[1.0, 15.0]", "[15.0, 1.0]"),
               AllOf(HasSubstr("bounds"), HasSubstr("not an interval")));
@@ -88,7 +73,7 @@ TEST_F(StudyFile, FaultsNamePlaceValueAndRemedy) {
   EXPECT_THAT(message_with("frames = \"gel.frames.csv\"", ""),
               AllOf(HasSubstr("data.frames"), HasSubstr("missing")));
   EXPECT_THAT(message_with("effects = []", "efects = []"), AllOf(HasSubstr("efects"), HasSubstr("effects")));
-  EXPECT_THAT(message_with("start = 6.0", "start = nan"), HasSubstr("start"));
+  EXPECT_THAT(message_with("start = 6.5", "start = nan"), HasSubstr("start"));
 }
 
 TEST_F(StudyFile, SmoothnessArrivesAndCanBeSetOnTheCommandLine) {
@@ -204,6 +189,13 @@ TEST_F(StudyFile, AnEllipsoidArrives) {
   EXPECT_EQ(ellipsoid.ends, "fixed");
   set_mesh(study, "8,6,3");
   EXPECT_THAT(mesh_of(study.specimen), testing::ElementsAre(8, 6, 3));
+}
+
+TEST_F(StudyFile, AFittedVentricleIsAMeshFile) {
+  std::string content = gel;
+  const size_t kind = content.find("kind =");
+  content.replace(kind, content.find("ends =") - kind, "kind = \"fitted-lv\"\nfile = \"heart.mesh.toml\"\n");
+  EXPECT_EQ(std::get<MeshSpecimen>(read(content).specimen).file, folder_.path() / "heart.mesh.toml");
 }
 
 TEST_F(StudyFile, AnEllipsoidThatCannotBeIsRefused) {
