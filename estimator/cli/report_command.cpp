@@ -36,12 +36,14 @@ ExitCode run_report(const ReportArguments& arguments, const CommandOutput& out) 
 
 void add_report(CommandLine& line) {
   auto arguments = std::make_shared<ReportArguments>();
-  CLI::App* command = line.add("report", "a self-contained page with plots for runs, fits and solutions",
-                               "  diastole report gel.run.h5 -o session.html\n"
-                               "  diastole report gel.run.h5 fit.json -o gel.html");
+  CLI::App* command =
+      line.add("report", "a self-contained page with plots for runs, fits, solutions and explanations",
+               "  diastole report gel.run.h5 -o session.html\n"
+               "  diastole report gel.run.h5 fit.json -o gel.html");
   command
-      ->add_option("FILE", arguments->files,
-                   "run files, fit results, solutions and shear tests, recognised by their content")
+      ->add_option(
+          "FILE", arguments->files,
+          "run files, fit results, explanations, solutions and shear tests, recognised by their content")
       ->required();
   command->add_option("-o,--output", arguments->page, "the HTML page to write")->required();
   command->add_flag("--force", arguments->force, "replace an output file that is no report");

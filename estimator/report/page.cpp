@@ -127,11 +127,12 @@ void Page::time_chart(const TimeChart& chart) {
 }
 
 void Page::table(const std::vector<std::string>& header, const std::vector<std::vector<std::string>>& rows,
-                 const std::string& caption) {
-  const auto row_html = [](const std::vector<std::string>& cells, const char* tag) {
+                 const std::string& caption, size_t words_from) {
+  const auto row_html = [words_from](const std::vector<std::string>& cells, const char* tag) {
     std::string text = "<tr>";
-    for (const std::string& cell : cells)
-      text += fmt::format("<{0}>{1}</{0}>", tag, escaped(cell));
+    for (size_t i = 0; i < cells.size(); ++i)
+      text +=
+          fmt::format("<{0}{1}>{2}</{0}>", tag, i >= words_from ? " class=\"words\"" : "", escaped(cells[i]));
     return text + "</tr>\n";
   };
   std::string text = "<table><thead>" + row_html(header, "th") + "</thead><tbody>\n";

@@ -45,9 +45,9 @@ class Page {
   /// Figures side by side where the width allows.
   void figures(const std::vector<Figure>& row);
   void time_chart(const TimeChart& chart);
-  /// First column left-aligned, the others as numbers.
+  /// First column left-aligned, the others as numbers, and from column `words_from` on as words that may wrap.
   void table(const std::vector<std::string>& header, const std::vector<std::vector<std::string>>& rows,
-             const std::string& caption);
+             const std::string& caption, size_t words_from = std::string::npos);
   /// Preformatted text that unfolds on a click.
   void listing(const std::string& title, const std::string& text);
 

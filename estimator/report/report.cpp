@@ -4,6 +4,7 @@
 
 #include <vector>
 
+#include "estimator/explain/explanation_json.hpp"
 #include "estimator/io/fit_file.hpp"
 #include "estimator/io/reconstruction_file.hpp"
 #include "estimator/io/solution_file.hpp"
@@ -31,12 +32,20 @@ std::string title_of(size_t estimates, size_t runs) {
   return runs == 0 ? "Material stiffness" : "From a pump session to a material stiffness";
 }
 
+std::string explanation_title(const std::vector<explain::Explanation>& explanations) {
+  if (explanations.size() > 1) return "Where models and measurements disagree";
+  std::string name = std::filesystem::path(explanations[0].study).filename().string();
+  name = name.substr(0, name.find(".study.toml"));
+  return "Where model and measurement disagree" + (name.empty() ? "" : ": " + name);
+}
+
 }  // namespace
 
 std::string make_report(std::span<const std::filesystem::path> files, const ReportOptions& options) {
   std::vector<FitRecord> fits;
   std::vector<SolutionRecord> solutions;
   std::vector<ReconstructionRecord> reconstructions;
+  std::vector<explain::Explanation> explanations;
   std::vector<ShearTest> shear_tests;
   std::vector<runfile::RecordedRun> runs;
   for (const std::filesystem::path& file : files) {
@@ -52,10 +61,15 @@ std::string make_report(std::span<const std::filesystem::path> files, const Repo
     if (!is_json_object(content)) {
       throw InputError(
           {file.string(), "",
-           "is neither a run file nor a fit result, a reconstruction, a solution or a shear test",
-           "Give files that `diastole run`, `diastole simulate`, `diastole fit -o`, "
+           "is neither a run file nor a fit result, an explanation, a reconstruction, a solution or a shear "
+           "test",
+           "Give files that `diastole run`, `diastole simulate`, `diastole fit -o`, `diastole explain -o`, "
            "`diastole reconstruct -o NAME.json` or `diastole solve -o NAME.json` wrote, or the CSV that "
            "`diastole shear` reads."});
+    }
+    if (explain::is_explanation(content)) {
+      explanations.push_back(explain::explanation_from_json(content, file.string()));
+      continue;
     }
     if (is_solution(content)) {
       solutions.push_back(solution_record_from_json(content, file.string()));
@@ -68,9 +82,12 @@ std::string make_report(std::span<const std::filesystem::path> files, const Repo
     fits.push_back(fit_record_from_json(content, file.string()));
   }
   const bool no_estimate = fits.empty() && shear_tests.empty() && runs.empty();
-  Page page(no_estimate ? (solutions.empty() && !reconstructions.empty() ? "Displacement from tagged images"
-                                                                         : "Strain and stress under load")
-                        : title_of(fits.size() + shear_tests.size(), runs.size()));
+  Page page(!explanations.empty() ? explanation_title(explanations)
+            : no_estimate ? (solutions.empty() && !reconstructions.empty() ? "Displacement from tagged images"
+                                                                           : "Strain and stress under load")
+                          : title_of(fits.size() + shear_tests.size(), runs.size()));
+  for (const explain::Explanation& explanation : explanations)
+    add_explanation(page, explanation);
   for (const FitRecord& fit : fits)
     add_fit(page, fit);
   for (const ReconstructionRecord& reconstruction : reconstructions)
@@ -81,6 +98,12 @@ std::string make_report(std::span<const std::filesystem::path> files, const Repo
     add_shear(page, test, fit_shear(test));
   for (const runfile::RecordedRun& run : runs)
     add_run(page, run, options.frames);
+  return page.html();
+}
+
+std::string make_report(const explain::Explanation& explanation) {
+  Page page(explanation_title({explanation}));
+  add_explanation(page, explanation);
   return page.html();
 }
 

@@ -1,10 +1,13 @@
 #pragma once
-// The report: one self-contained page about any number of run files, fit results, solutions and shear tests.
+// The report: one self-contained page about any number of run files, fit results, explanations, solutions and shear
+// tests.
 
 #include <cstddef>
 #include <filesystem>
 #include <span>
 #include <string>
+
+#include "estimator/explain/explanation.hpp"
 
 namespace diastole::report {
 
@@ -12,8 +15,11 @@ struct ReportOptions {
   size_t frames = 16;  ///< image frames of a cycle
 };
 
-/// The page's HTML. Files are recognised by their content; fits come first, then shear tests,
-/// then runs, each in the given order. Throws InputError for a file that is missing, unreadable or of no kind that the report knows.
+/// The page's HTML. Files are recognised by their content; explanations come first, then fits, then
+/// shear tests, then runs, each in the given order. Throws InputError for a file that is missing, unreadable or of no kind that the report knows.
 std::string make_report(std::span<const std::filesystem::path> files, const ReportOptions& options);
+
+/// The same page of an explanation at hand.
+std::string make_report(const explain::Explanation& explanation);
 
 }  // namespace diastole::report

@@ -1,6 +1,7 @@
 #pragma once
 // What the report tells about each kind of file.
 
+#include "estimator/explain/explanation.hpp"
 #include "estimator/io/fit_file.hpp"
 #include "estimator/io/reconstruction_file.hpp"
 #include "estimator/io/solution_file.hpp"
@@ -27,5 +28,9 @@ void add_reconstruction(Page& page, const ReconstructionRecord& record);
 
 /// C1 of a rotational shear test, Eq. 1's two sides with the line, the residuals, each load by itself.
 void add_shear(Page& page, const ShearTest& test, const ShearFit& fit);
+
+/// What the model lacks in words, with its parameters, the places of the misfit, the gap effect by effect, recordings and
+/// wall before and after, all candidates' evidence and the next experiment.
+void add_explanation(Page& page, const explain::Explanation& explanation);
 
 }  // namespace diastole::report

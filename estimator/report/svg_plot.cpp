@@ -22,9 +22,9 @@ struct Interval {
   double low = std::numeric_limits<double>::infinity();
   double high = -std::numeric_limits<double>::infinity();
 
-  void cover(std::span<const double> values) {
+  void cover(std::span<const double> values, bool only_positive) {
     for (const double value : values) {
-      if (!std::isfinite(value)) continue;
+      if (!std::isfinite(value) || (only_positive && !(value > 0))) continue;
       low = std::min(low, value);
       high = std::max(high, value);
     }
@@ -59,13 +59,30 @@ std::vector<double> ticks_over(double from, double to, int count) {
   return ticks;
 }
 
+std::vector<double> decades_over(double from, double to) {
+  const int first = static_cast<int>(std::floor(std::log10(from) + 1e-9));
+  const int last = std::max(first + 1, static_cast<int>(std::ceil(std::log10(to) - 1e-9)));
+  std::vector<double> ticks;
+  for (int k = first; k <= last; ++k) {
+    for (const double part : {1.0, 2.0, 5.0}) {
+      if (part == 1.0 || (last - first <= 3 && k < last)) ticks.push_back(part * std::pow(10.0, k));
+    }
+  }
+  return ticks;
+}
+
+/// x0 ... y1 are the natural ends of the axes.
 struct SvgPlot::Frame {
   double left, top, width, height;
   double x0, x1, y0, y1;
   std::vector<double> x_ticks, y_ticks;
+  bool log_x, log_y;
 
-  [[nodiscard]] double px(double x) const { return left + width * (x - x0) / (x1 - x0); }
-  [[nodiscard]] double py(double y) const { return top + height * (y1 - y) / (y1 - y0); }
+  [[nodiscard]] static double part(double value, double from, double to, bool logarithmic) {
+    return logarithmic ? std::log(value / from) / std::log(to / from) : (value - from) / (to - from);
+  }
+  [[nodiscard]] double px(double x) const { return left + width * part(x, x0, x1, log_x); }
+  [[nodiscard]] double py(double y) const { return top + height * (1.0 - part(y, y0, y1, log_y)); }
 };
 
 void SvgPlot::line(std::span<const double> x, std::span<const double> y, std::string style,
@@ -101,9 +118,9 @@ SvgPlot::Frame SvgPlot::frame() const {
   Interval x_range, y_range;
   bool has_legend = false;
   for (const Series& series : series_) {
-    x_range.cover(series.x);
-    y_range.cover(series.y);
-    y_range.cover(series.y2);
+    x_range.cover(series.x, options_.x.logarithmic);
+    y_range.cover(series.y, options_.y.logarithmic);
+    y_range.cover(series.y2, options_.y.logarithmic);
     has_legend = has_legend || !series.name.empty();
   }
   const Interval x = x_range.drawable(), y = y_range.drawable();
@@ -112,8 +129,15 @@ SvgPlot::Frame SvgPlot::frame() const {
   frame.top = top_margin + (has_legend ? legend_height : 0);
   frame.width = options_.width - left_margin - right_margin;
   frame.height = options_.height - frame.top - bottom_margin;
-  frame.x_ticks = ticks_over(options_.x.from.value_or(x.low), options_.x.to.value_or(x.high), 7);
-  frame.y_ticks = ticks_over(options_.y.from.value_or(y.low), options_.y.to.value_or(y.high), 6);
+  const auto ticks = [](const PlotAxis& axis, const Interval& range, int count) {
+    const double from = axis.from.value_or(range.low), to = axis.to.value_or(range.high);
+    if (!axis.logarithmic) return ticks_over(from, to, count);
+    return from > 0 ? decades_over(from, to) : decades_over(0.1, 1);
+  };
+  frame.log_x = options_.x.logarithmic;
+  frame.log_y = options_.y.logarithmic;
+  frame.x_ticks = ticks(options_.x, x, 7);
+  frame.y_ticks = ticks(options_.y, y, 6);
   frame.x0 = options_.x.from.value_or(frame.x_ticks.front());
   frame.x1 = options_.x.to.value_or(frame.x_ticks.back());
   frame.y0 = options_.y.from.value_or(frame.y_ticks.front());
@@ -136,8 +160,11 @@ std::string SvgPlot::drawn(const Series& series, const Frame& frame) {
   switch (series.kind) {
     case Kind::line:
       for (size_t i = 0; i < count; ++i) {
-        if (!std::isfinite(series.y[i])) continue;
-        const bool starts = i == 0 || !std::isfinite(series.y[i - 1]);
+        const auto shown = [&](size_t k) {
+          return std::isfinite(frame.px(series.x[k])) && std::isfinite(frame.py(series.y[k]));
+        };
+        if (!shown(i)) continue;
+        const bool starts = i == 0 || !shown(i - 1);
         to(starts ? 'M' : 'L', series.x[i], series.y[i]);
       }
       break;
@@ -185,20 +212,21 @@ std::string SvgPlot::drawn(const Series& series, const Frame& frame) {
 std::string SvgPlot::axes(const Frame& frame) const {
   std::string grid, texts;
   const double bottom = frame.top + frame.height, right = frame.left + frame.width;
-  const auto step_of = [](const std::vector<double>& ticks) {
-    return ticks.size() > 1 ? ticks[1] - ticks[0] : 1.0;
+  const auto text_of = [](double tick, const std::vector<double>& ticks, bool logarithmic) {
+    if (logarithmic) return chosen(tick);
+    return tick_text(tick, ticks.size() > 1 ? ticks[1] - ticks[0] : 1.0);
   };
   for (const double tick : frame.x_ticks) {
     if (tick < frame.x0 - 1e-9 || tick > frame.x1 + 1e-9) continue;
     grid += fmt::format("M{:.1f} {:.1f}V{:.1f}", frame.px(tick), frame.top, bottom);
     texts += fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"middle\">{}</text>", frame.px(tick),
-                         bottom + 17, tick_text(tick, step_of(frame.x_ticks)));
+                         bottom + 17, text_of(tick, frame.x_ticks, frame.log_x));
   }
   for (const double tick : frame.y_ticks) {
     if (tick < frame.y0 - 1e-9 || tick > frame.y1 + 1e-9) continue;
     grid += fmt::format("M{:.1f} {:.1f}H{:.1f}", frame.left, frame.py(tick), right);
     texts += fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"end\">{}</text>", frame.left - 7,
-                         frame.py(tick) + 4, tick_text(tick, step_of(frame.y_ticks)));
+                         frame.py(tick) + 4, text_of(tick, frame.y_ticks, frame.log_y));
   }
   if (options_.equal_scale) {
     // A drawing gets a frame only: lines across it would be taken for the specimen's.

@@ -22,6 +22,7 @@ struct PlotAxis {
   std::string label;                ///< with its unit
   std::optional<double> from = {};  ///< fixed end instead of the data's
   std::optional<double> to = {};
+  bool logarithmic = false;  ///< values that are not positive are left out; not for bars
 };
 
 struct PlotOptions {
@@ -74,5 +75,9 @@ class SvgPlot {
 /// Ticks at multiples of 1, 2 or 5 x 10^k, from the last at or below `from` to the first at or above `to`;
 /// about `count` of them.
 std::vector<double> ticks_over(double from, double to, int count);
+
+/// Ticks for a logarithmic axis: powers of ten, with twice and five times each where there are no more than three.
+/// Precondition: 0 < from <= to.
+std::vector<double> decades_over(double from, double to);
 
 }  // namespace diastole::report

@@ -89,7 +89,7 @@ Explanation explained_inclusion() {
   e.steps = {{"", 1.31}, {"stiff-inclusion", 1.01}};
   std::mt19937 random(3);
   std::normal_distribution<double> noise(0.0, 1.0);
-  for (int k = 0; k < 2600; ++k) {
+  for (int k = 0; k < 9000; ++k) {
     const double theta = 2 * pi * ((k * 0.6180339887) - std::floor(k * 0.6180339887));
     const double radius = 22.5 + 27.5 * ((k * 0.7548776662) - std::floor(k * 0.7548776662));
     const double z = 85.0 * ((k * 0.5698402910) - std::floor(k * 0.5698402910)) - 42.5;
