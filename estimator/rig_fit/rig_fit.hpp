@@ -2,8 +2,10 @@
 // Fits the rig's model, with any effects, to a session's runs: least squares on whitened residuals.
 //
 // Unknowns: the specimen's modulus, one offset a sensor, and the effects' parameters in their search scales. The
-// Jacobian is by differences; runs are simulated on several threads, and parameters that only the sensors see reuse the
-// plant. Steps are damped (Levenberg-Marquardt); an unknown that is pushed against its bound is held there.
+// Jacobian is by differences of simulations with steps twice as long (the cavity's pressure errs by less than 0.1 Pa
+// then, and most of it cancels), and is kept between the search's steps by Broyden's updates until they have led far;
+// columns and runs are simulated on several threads, and parameters that only the sensors see reuse the plant. Steps
+// are damped (Levenberg-Marquardt); an unknown that is pushed against its bound is held there.
 
 #include <Eigen/Dense>
 #include <string>
@@ -42,9 +44,9 @@ struct RigFit {
   Eigen::VectorXd residuals;   ///< whitened, at the end
   Eigen::MatrixXd jacobian;    ///< of the residuals by the search coordinates, at the last step
   double chi_square = 0.0;
-  size_t count = 0;  ///< residuals that are not missing
+  size_t count = 0;  ///< residuals that are fitted and not missing
   size_t iterations = 0;
-  size_t simulations = 0;  ///< of whole sessions
+  size_t simulations = 0;  ///< of the fitted runs, whatever their steps
   bool converged = false;
 
   [[nodiscard]] double reduced() const {
@@ -57,10 +59,16 @@ struct RigFit {
 /// Whitened residuals, or their means over a tenth of a second, which know no resonances and lead a search from afar.
 enum class Look { fine, coarse };
 
+/// What a fit compares.
+struct FitRequest {
+  Look look = Look::fine;
+  std::vector<bool> runs = {};  ///< which of the session's runs; empty: all
+};
+
 struct RigFitOptions {
   size_t threads = 2;
-  size_t most_iterations = 25;
-  SimulationOptions simulation{};
+  size_t most_iterations = 40;
+  SimulationOptions simulation{};  ///< steps are twice as long where there is no sensor at the pump
 };
 
 class RigProblem {
@@ -72,13 +80,32 @@ class RigProblem {
   [[nodiscard]] const std::vector<ResidualBlock>& blocks() const { return blocks_; }
   /// The model without effects, fitted; made once.
   [[nodiscard]] const RigFit& base() const { return base_; }
-  /// Starts from the base's values and the effects' typical ones, of several sizes and signs the best.
-  [[nodiscard]] RigFit fit(const std::vector<Ingredient>& ingredients) const;
-  /// The same from given values.
-  [[nodiscard]] RigFit fit_from(const std::vector<Ingredient>& ingredients, std::vector<double> values,
-                                Look look = Look::fine) const;
+  /// From `before`'s values and, for the ingredients that follow those of `before`, from the best of several sizes and
+  /// signs of their typical ones. Precondition: `ingredients` begin with those of `before`.
+  [[nodiscard]] RigFit fit(const std::vector<Ingredient>& ingredients, const RigFit& before) const;
+  /// The same from the base.
+  [[nodiscard]] RigFit fit(const std::vector<Ingredient>& ingredients) const {
+    return fit(ingredients, base_);
+  }
+  /// From given values only. Runs that the request leaves out are not simulated; their residuals stay zero.
+  [[nodiscard]] RigFit fit_from(const std::vector<Ingredient>& ingredients, const std::vector<double>& values,
+                                const FitRequest& request) const;
+  [[nodiscard]] RigFit fit_from(const std::vector<Ingredient>& ingredients, const std::vector<double>& values,
+                                Look look = Look::fine) const {
+    return fit_from(ingredients, values, FitRequest{.look = look, .runs = {}});
+  }
+  /// Derivatives of the residuals by the unknowns' search coordinates at these values, a column each from `first` on
+  /// (3: without modulus and offsets). An effect at its neutral value has columns too, except bubbles, which begin
+  /// at 0.05 mL.
+  [[nodiscard]] Eigen::MatrixXd columns(const std::vector<Ingredient>& ingredients,
+                                        const std::vector<double>& values, const FitRequest& request = {},
+                                        size_t first = 0) const;
   [[nodiscard]] Eigen::VectorXd residuals(const std::vector<Ingredient>& ingredients,
-                                          const std::vector<double>& values, Look look = Look::fine) const;
+                                          const std::vector<double>& values, const FitRequest& request) const;
+  [[nodiscard]] Eigen::VectorXd residuals(const std::vector<Ingredient>& ingredients,
+                                          const std::vector<double>& values, Look look = Look::fine) const {
+    return residuals(ingredients, values, FitRequest{.look = look, .runs = {}});
+  }
   /// What each run's instruments show by a model.
   [[nodiscard]] std::vector<Prediction> predictions(const std::vector<Ingredient>& ingredients,
                                                     const std::vector<double>& values) const;
@@ -87,13 +114,20 @@ class RigProblem {
                                const std::vector<double>& values) const;
 
  private:
-  /// The plant's traces of all runs.
-  [[nodiscard]] std::vector<PlantTrace> plants(const RigModel& model) const;
-  [[nodiscard]] Eigen::VectorXd compare(const RigModel& model, const std::vector<PlantTrace>& plants,
-                                        Look look) const;
-  void add_channel(const SessionRun& run, Channel channel, const std::vector<double>& predicted, size_t first,
-                   Look look, Eigen::VectorXd& out) const;
-  void shrink_beats(Eigen::VectorXd& residuals) const;
+  [[nodiscard]] PlantTrace plant(const RigModel& model, size_t run, double step_s) const;
+  /// Sets one run's rows of the residuals.
+  void compare(const RigModel& model, const PlantTrace& plant, size_t run, Look look,
+               Eigen::Ref<Eigen::VectorXd> out) const;
+  void compare_channel(const ResidualBlock& block, Channel channel, const std::vector<double>& predicted,
+                       Look look, Eigen::Ref<Eigen::VectorXd> out) const;
+  void shrink_beats(size_t run, Eigen::Ref<Eigen::VectorXd> residuals) const;
+  /// Seconds of a step for a look.
+  [[nodiscard]] double step_s(Look look) const;
+  [[nodiscard]] std::vector<size_t> chosen_runs(const FitRequest& request) const;
+  [[nodiscard]] size_t count_rows(const FitRequest& request) const;
+  /// Values from which a fit of more ingredients than `before` may start, the best first.
+  [[nodiscard]] std::vector<std::vector<double>> starts(const std::vector<Ingredient>& ingredients,
+                                                        const RigFit& before, size_t& simulations) const;
   void set_blocks();
   void set_beats();
   /// Whitened change of each run's channels by the stroke of every second cycle, per relative change.
@@ -105,10 +139,11 @@ class RigProblem {
   NoiseModel noise_;
   std::vector<ResidualBlock> blocks_;
   size_t rows_ = 0;
-  size_t missing_ = 0;
+  std::vector<size_t> present_;  ///< rows of each block that are not missing
 
   /// A cycle's whitened shape in all channels, of unit length, and how much of it is taken off.
   struct Beat {
+    size_t run = 0;
     std::vector<CycleRows> rows;
     Eigen::VectorXd direction;
     double taken = 0.0;
