@@ -33,10 +33,7 @@ class SealLeakPump final : public Effect {
     return list;
   }
   void apply(std::span<const double> values, const Context&, rig::RigModel& model) const override {
-    const double conductance = values[0];
-    if (conductance == 0.0) return;
-    model.pump_leaks.emplace_back(
-        [conductance](double pressure_kPa, double) { return conductance * pressure_kPa; });
+    model.pump_leak_mL_s_kPa += values[0];
   }
 };
 

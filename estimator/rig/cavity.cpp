@@ -10,8 +10,9 @@ Cavity::Cavity(const RigModel& model, const RunPlace& place)
     memories_.push_back(make(place));
 }
 
-double Cavity::pressure_kPa(double specimen_mL, double time_s) const {
-  double pressure = model_.modulus_kPa * model_.curve.at(specimen_mL).pressure_kPa;
+double Cavity::pressure_kPa(double specimen_mL, double time_s) {
+  elastic_kPa_ = model_.modulus_kPa * model_.curve.at(specimen_mL).pressure_kPa;
+  double pressure = elastic_kPa_;
   for (const auto& memory : memories_)
     pressure = memory->look(pressure, specimen_mL, time_s);
   return pressure;
@@ -19,9 +20,11 @@ double Cavity::pressure_kPa(double specimen_mL, double time_s) const {
 
 double Cavity::look(double arrived_mL, double time_s) {
   const double held = arrived_mL - lost_mL_ - leak_mL_per_s_ * (begun_ ? time_s - passed_s_ : 0.0);
+  time_s_ = time_s;
   if (!gas_.present()) {
     specimen_mL_ = held;
-    return pressure_kPa(held, time_s);
+    pressure_kPa_ = pressure_kPa(held, time_s);
+    return pressure_kPa_;
   }
   // specimen + squeezed(p(specimen)) = held, by a few secant steps from the last solution.
   double a = specimen_mL_;
@@ -36,22 +39,22 @@ double Cavity::look(double arrived_mL, double time_s) {
     b = next;
   }
   specimen_mL_ = b;
-  return pressure_kPa(b, time_s);
+  pressure_kPa_ = pressure_kPa(b, time_s);
+  return pressure_kPa_;
 }
 
-void Cavity::pass(double arrived_mL, double time_s) {
-  double pressure = look(arrived_mL, time_s);
-  if (begun_) lost_mL_ += leak_mL_per_s_ * (time_s - passed_s_);
+void Cavity::pass() {
+  if (begun_) lost_mL_ += leak_mL_per_s_ * (time_s_ - passed_s_);
   leak_mL_per_s_ = 0.0;
   for (const LeakLaw& leak : model_.cavity_leaks)
-    leak_mL_per_s_ += leak(pressure, time_s);
-  pressure = model_.modulus_kPa * model_.curve.at(specimen_mL_).pressure_kPa;
+    leak_mL_per_s_ += leak(pressure_kPa_, time_s_);
+  double pressure = elastic_kPa_;
   for (const auto& memory : memories_) {
     const double given = pressure;
-    pressure = memory->look(given, specimen_mL_, time_s);
-    memory->pass(given, specimen_mL_, time_s);
+    pressure = memory->look(given, specimen_mL_, time_s_);
+    memory->pass(given, specimen_mL_, time_s_);
   }
-  passed_s_ = time_s;
+  passed_s_ = time_s_;
   begun_ = true;
 }
 

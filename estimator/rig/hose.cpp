@@ -44,9 +44,18 @@ WallFriction::WallFriction(const Hose& hose)
       viscosity_(hose.viscosity_Pa_s),
       bore_m_(hose.bore_mm * 1e-3),
       wave_speed_m_s_(hose.wave_speed_m_s),
-      unsteady_(hose.unsteady_friction) {
+      unsteady_(hose.unsteady_friction),
+      to_place_(density_ * bore_m_ / (viscosity_ * table_step)) {
   for (size_t k = 0; k < table_size; ++k)
-    brunone_table_.push_back(std::sqrt(shear_decay(table_step * static_cast<double>(k))) / 4.0);
+    table_.push_back(node(table_step * static_cast<double>(k)));
+}
+
+WallFriction::Node WallFriction::node(double reynolds) const {
+  const double speed = reynolds * viscosity_ / (density_ * bore_m_);
+  const double small = 1e-3 / to_place_;
+  const double growth = (steady_kPa_per_m(speed + small) - steady_kPa_per_m(speed - small)) / 2e-3;
+  const double inertia = unsteady_ ? density_ * std::sqrt(shear_decay(reynolds)) / 4.0 * 1e-3 : 0.0;
+  return {steady_kPa_per_m(speed), growth, inertia};
 }
 
 double WallFriction::reynolds(double speed_m_s) const {
@@ -63,18 +72,29 @@ double WallFriction::steady_kPa_per_m(double speed_m_s) const {
   return (share * turbulent + (1.0 - share) * laminar) * 1e-3;
 }
 
-double WallFriction::brunone(double reynolds) const {
-  const double place = reynolds / table_step;
-  const size_t k = static_cast<size_t>(std::min(place, static_cast<double>(table_size - 2)));
-  const double part = std::min(place - static_cast<double>(k), 1.0);
-  return (1.0 - part) * brunone_table_[k] + part * brunone_table_[k + 1];
-}
-
-double WallFriction::unsteady_kPa_per_m(double speed_m_s, double speed_rate, double stretching) const {
-  if (!unsteady_) return 0.0;
-  const double turning = speed_m_s / (std::abs(speed_m_s) + 1e-4);
-  return density_ * brunone(reynolds(speed_m_s)) *
-         (speed_rate + wave_speed_m_s_ * turning * std::abs(stretching)) * 1e-3;
+WallFriction::Drag WallFriction::drag(double speed_m_s, double stretching) const {
+  const double speed = std::abs(speed_m_s);
+  const double place = speed * to_place_;
+  Drag drag;
+  double steady = 0.0;
+  if (place < static_cast<double>(table_size - 1)) {
+    const auto k = static_cast<size_t>(place);
+    const Node& left = table_[k];
+    const Node& right = table_[k + 1];
+    const double s = place - static_cast<double>(k);
+    const double rise = right.steady_kPa_per_m - left.steady_kPa_per_m;
+    const double square = 3.0 * rise - 2.0 * left.growth_kPa_per_m - right.growth_kPa_per_m;
+    const double cube = left.growth_kPa_per_m + right.growth_kPa_per_m - 2.0 * rise;
+    steady = left.steady_kPa_per_m + s * (left.growth_kPa_per_m + s * (square + s * cube));
+    drag.by_rate = left.inertia + s * (right.inertia - left.inertia);
+  } else {
+    steady = steady_kPa_per_m(speed);
+    drag.by_rate = table_.back().inertia;
+  }
+  const double turning = speed_m_s / (speed + 1e-4);
+  drag.still_kPa_per_m =
+      std::copysign(steady, speed_m_s) + drag.by_rate * wave_speed_m_s_ * turning * std::abs(stretching);
+  return drag;
 }
 
 }  // namespace diastole::rig

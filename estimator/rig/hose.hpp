@@ -42,16 +42,27 @@ class WallFriction {
   explicit WallFriction(const Hose& hose);
 
   [[nodiscard]] double steady_kPa_per_m(double speed_m_s) const;
-  /// `speed_rate` dv/dt, m/s^2; `stretching` dv/dx, 1/s.
-  [[nodiscard]] double unsteady_kPa_per_m(double speed_m_s, double speed_rate, double stretching) const;
   [[nodiscard]] double reynolds(double speed_m_s) const;
 
+  /// The gradient as it depends on dv/dt: still + by_rate dv/dt.
+  struct Drag {
+    double still_kPa_per_m = 0.0;
+    double by_rate = 0.0;  ///< kPa s^2/m^2
+  };
+  /// Interpolated in Re, within 1e-4. `stretching` is dv/dx, 1/s.
+  [[nodiscard]] Drag drag(double speed_m_s, double stretching) const;
+
  private:
-  [[nodiscard]] double brunone(double reynolds) const;
+  /// At an even step of Re: the steady gradient, how it grows over a step, and rho k / 2.
+  struct Node {
+    double steady_kPa_per_m, growth_kPa_per_m, inertia;
+  };
+  [[nodiscard]] Node node(double reynolds) const;
 
   double density_, viscosity_, bore_m_, wave_speed_m_s_;
   bool unsteady_;
-  std::vector<double> brunone_table_;  ///< k/2 at even steps of Re
+  double to_place_;  ///< of a speed in the table
+  std::vector<Node> table_;
 };
 
 }  // namespace diastole::rig

@@ -21,28 +21,31 @@
 // within a step (exponential time differencing, predictor and corrector). So the step may be far longer than the
 // line's fastest period, and no numerical damping is added.
 //
-// The pump end either has its volume prescribed, or (with `pump_stiffness`) is one more degree of freedom, pushed by
-// the pressure p_0 of a gas between piston and hose.
+// What enters is what the piston displaces, or that and a degree of freedom y more (less, as y is negative), if there is
+// a gas or a leak before the hose: p_0 = -K y for a gas of stiffness K, p_0 = -R y' for a leak of resistance R, and what
+// differs from this linear end is given as a load.
 
 #include <Eigen/Dense>
 #include <optional>
 #include <vector>
 
 #include "estimator/rig/hose.hpp"
+#include "estimator/rig/small_matrix.hpp"
 
 namespace diastole::rig {
 
 struct LineOptions {
   double step_s = 1.0 / 600.0;
-  size_t components = 4;                      ///< n = 1 ... components
-  std::optional<double> pump_stiffness = {};  ///< kPa/mL, of the gas at rest
+  size_t components = 4;                       ///< n = 1 ... components
+  std::optional<double> pump_stiffness = {};   ///< K, kPa/mL
+  std::optional<double> pump_resistance = {};  ///< R, kPa s/mL
 };
 
 /// What acts on the line's ends at one time.
 struct EndLoads {
-  double entering_acceleration = 0.0;  ///< xi0'', mL/s^2; only if the volume is prescribed
-  double pump_kPa = 0.0;               ///< p_0; only with pump_stiffness
-  double cavity_kPa = 0.0;             ///< p_L
+  double piston_acceleration = 0.0;  ///< mL/s^2
+  double pump_kPa = 0.0;             ///< p_0 less what the linear end makes; only if there is a gas or a leak
+  double cavity_kPa = 0.0;           ///< p_L
 };
 
 class HoseLine {
@@ -53,20 +56,19 @@ class HoseLine {
   void rest_at(double pressure_kPa);
 
   [[nodiscard]] double kept_mL() const { return kept(0); }
-  [[nodiscard]] double entered_mL() const {
-    return free_ ? state_[0] : 0.0;
-  }  ///< xi0, if a degree of freedom
-  [[nodiscard]] double entering_mL_per_s() const { return free_ ? state_[count_] : entering_flow_; }
+  /// y: what has entered beyond what the piston displaced.
+  [[nodiscard]] double yielded_mL() const { return yields_ ? state_[0] : 0.0; }
+  [[nodiscard]] double entering_mL_per_s() const { return piston_flow_ + (yields_ ? state_[count_] : 0.0); }
   [[nodiscard]] double leaving_mL_per_s() const { return entering_mL_per_s() - kept(count_); }
 
-  /// The balance at the state at hand under these loads: pump_kPa() and the accelerations.
+  /// The balance at the state at hand under these loads: pump_kPa() and the forces.
   void settle(const EndLoads& loads);
-  /// Begins a step after `settle`: predicts its end. With the volume prescribed, `now` may hold another acceleration
-  /// than was settled (one whose integral is right), and `entering_flow_at_end` is xi0' at the end.
-  void begin_step(const EndLoads& now, double entering_flow_at_end);
+  /// Begins a step after `settle`: predicts its end. `now` may hold another acceleration than was settled (one whose
+  /// integral is right); `piston_flow_at_end` is the piston's at the end, mL/s.
+  void begin_step(const EndLoads& now, double piston_flow_at_end);
   /// The state at the step's end, with the loads that belong to the predicted one.
   void end_step(const EndLoads& then);
-  /// The pressure at the pump end that keeps the momentum balance, kPa, when last settled.
+  /// p_0 when last settled, kPa.
   [[nodiscard]] double pump_kPa() const { return pump_kPa_; }
 
   /// Kinetic energy of the fluid and energy stored in the wall's elastic part, mJ (kPa mL).
@@ -77,36 +79,43 @@ class HoseLine {
  private:
   /// What the hose keeps of the positions (from = 0) or velocities (from = count_).
   [[nodiscard]] double kept(Eigen::Index from) const {
-    return cavity_shape_.tail(modes_ + 1).dot(state_.segment(from + first_, modes_ + 1));
+    double sum = 0.0;
+    for (Eigen::Index n = 0; n <= modes_; ++n)
+      sum += cavity_shape_[first_ + n] * state_[from + first_ + n];
+    return sum;
   }
-  void make_matrices(const Hose& hose, double step_s);
-  /// Forces and accelerations at the state at hand. The drag holds dv/dt, which it changes by less than two percent:
-  /// each pass starts from the rate found last.
+  void make_equations();
+  void make_step(double step_s);
+  void make_drag(double length_m);
+  /// Forces at the state at hand. The drag holds dv/dt, which it changes by less than two percent: each pass starts
+  /// from the rate found last.
   void forces(const EndLoads& loads, int passes);
   /// Coefficients of the pressure along the line: uniform, cosines.
   [[nodiscard]] Eigen::VectorXd pressures() const;
   /// Mean over the length of the product of two such functions.
   [[nodiscard]] double mean_product(const Eigen::VectorXd& a, const Eigen::VectorXd& b) const;
-  void add_drag(double entering_acceleration, int passes);
 
-  bool free_;           ///< the pump end is a degree of freedom
+  bool yields_;         ///< y is a degree of freedom
   Eigen::Index first_;  ///< index of u
   Eigen::Index count_;  ///< degrees of freedom
   Eigen::Index modes_;
-  double inertance_, compliance_, creep_, creep_time_, to_speed_, pump_stiffness_;
+  double inertance_, compliance_, creep_, creep_time_, to_speed_, pump_stiffness_, pump_resistance_;
   WallFriction friction_;
 
-  Eigen::MatrixXd mass_, inverse_mass_, stiffness_, creep_coupling_;
-  Eigen::VectorXd cavity_shape_;   ///< of p_L in the equations
-  Eigen::VectorXd entering_mass_;  ///< of xi0'' in the equations, when prescribed
-  Eigen::MatrixXd pull_;           ///< accelerations by the state
-  Eigen::MatrixXd flow_, from_start_, from_end_;
-  Eigen::MatrixXd speed_shape_, stretch_shape_, drag_weight_;  ///< at the points along the line
-  Eigen::VectorXd point_weight_;
+  Eigen::MatrixXd mass_, inverse_mass_, stiffness_, damping_, creep_coupling_;
+  Eigen::VectorXd cavity_shape_;  ///< of p_L in the equations
+  Eigen::VectorXd piston_mass_;   ///< of the piston's acceleration in the equations
+  Eigen::MatrixXd pull_;          ///< accelerations by the state
 
-  Eigen::VectorXd state_, drifted_, force_, acceleration_, speed_, speed_rate_, stretch_, steady_, gradient_,
-      pulled_, bare_force_;
-  double entering_flow_ = 0.0, settled_acceleration_ = 0.0, drag_along_ = 0.0, pump_kPa_ = 0.0;
+  // A step: state at the end by the state and the forces at its ends.
+  SmallMatrix flow_, from_start_, from_end_;
+  // At the points along the line: speeds and stretchings by velocities; dv/dt by state, forces, drag.
+  SmallMatrix speeds_, rate_by_state_, rate_by_force_, rate_by_drag_, force_by_drag_;
+  Eigen::VectorXd point_weight_, pump_by_state_, pump_by_force_;
+
+  Eigen::VectorXd state_, drifted_, bare_, force_, speed_, bare_rate_, rate_, gradient_;
+  std::vector<WallFriction::Drag> drag_;
+  double piston_flow_ = 0.0, settled_acceleration_ = 0.0, pump_kPa_ = 0.0;
 };
 
 }  // namespace diastole::rig

@@ -84,7 +84,7 @@ struct RigModel {
   double cavity_gas_mL = 0.0;  ///< at rest; beside the specimen
   double gas_exponent =
       1.2;  ///< of p V^n: bubbles at about a hertz are between isothermal (1) and adiabatic (1.4)
-  std::vector<LeakLaw> pump_leaks;
+  double pump_leak_mL_s_kPa = 0.0;  ///< conductance past the seal
   std::vector<LeakLaw> cavity_leaks;
   std::vector<MemoryMaker> memories;
   std::vector<SensorMap> cavity_sensor;

@@ -37,7 +37,13 @@ struct RunDrive {
   double end_s = 0.0;
 };
 
+/// The run's motion sampled at these steps: the same for all models.
+DriveTrace sampled_motion(const RunDrive& run, double step_s);
+
 PlantTrace simulate_plant(const RigModel& model, const RunDrive& run, const SimulationOptions& options = {});
+/// The same with `sampled_motion(run, options.step_s)` at hand.
+PlantTrace simulate_plant(const RigModel& model, const RunDrive& run, const DriveTrace& motion,
+                          const SimulationOptions& options);
 
 /// Catheter, gains, offsets and clocks on a plant's trace, at the samples' times.
 Prediction observe(const RigModel& model, const PlantTrace& plant, const RunPlace& place,

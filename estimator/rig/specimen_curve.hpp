@@ -30,6 +30,7 @@ class SpecimenCurve {
  private:
   std::vector<Point> points_;
   double spacing_mL_ = 1.0;
+  double per_mL_ = 1.0;
 };
 
 }  // namespace diastole::rig

@@ -64,8 +64,8 @@ std::vector<std::map<Channel, std::vector<double>>> RigProblem::beat_shapes(size
   std::vector<std::map<Channel, std::vector<double>>> shapes(session_.runs.size());
   parallel_for(session_.runs.size(), options_.threads, [&](size_t r) {
     const SessionRun& run = session_.runs[r];
-    const Prediction a = observe(plain, plant(plain, r, step_s(Look::fine)), run.drive.place, run.sample_s);
-    Prediction b = observe(varied, plant(varied, r, step_s(Look::fine)), run.drive.place, run.sample_s);
+    const Prediction a = observe(plain, plant(plain, r, Look::fine), run.drive.place, run.sample_s);
+    Prediction b = observe(varied, plant(varied, r, Look::fine), run.drive.place, run.sample_s);
     for (size_t k = 0; k < run.sample_s.size(); ++k) {
       b.cavity_kPa[k] = (b.cavity_kPa[k] - a.cavity_kPa[k]) / small;
       b.pump_kPa[k] = (b.pump_kPa[k] - a.pump_kPa[k]) / small;

@@ -58,6 +58,10 @@ double RigFit::value(std::string_view name) const {
 RigProblem::RigProblem(const Session& session, const SpecimenFamily& family, const RigFitOptions& options)
     : session_(session), family_(family), options_(options), noise_(estimate_noise(session)) {
   set_blocks();
+  for (const SessionRun& run : session.runs) {
+    motions_.push_back(sampled_motion(run.drive, step_s(Look::fine)));
+    coarse_motions_.push_back(sampled_motion(run.drive, step_s(Look::coarse)));
+  }
   base_ = fit_from({}, {family.modulus_start_kPa(), 0.0, 0.0});
   set_beats();
   base_ = fit_from({}, base_.values);
@@ -134,10 +138,11 @@ size_t RigProblem::count_rows(const FitRequest& request) const {
   return count;
 }
 
-PlantTrace RigProblem::plant(const RigModel& model, size_t run, double step_s) const {
+PlantTrace RigProblem::plant(const RigModel& model, size_t run, Look steps) const {
   SimulationOptions simulation = options_.simulation;
-  simulation.step_s = step_s;
-  return simulate_plant(model, session_.runs[run].drive, simulation);
+  simulation.step_s = step_s(steps);
+  const DriveTrace& motion = (steps == Look::fine ? motions_ : coarse_motions_)[run];
+  return simulate_plant(model, session_.runs[run].drive, motion, simulation);
 }
 
 void RigProblem::compare_channel(const ResidualBlock& block, Channel channel,
@@ -182,7 +187,7 @@ Eigen::VectorXd RigProblem::residuals(const std::vector<Ingredient>& ingredients
   const std::vector<size_t> runs = chosen_runs(request);
   Eigen::VectorXd out = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(rows_));
   parallel_for(runs.size(), options_.threads, [&](size_t i) {
-    compare(made, plant(made, runs[i], step_s(request.look)), runs[i], request.look, out);
+    compare(made, plant(made, runs[i], request.look), runs[i], request.look, out);
   });
   return out;
 }
@@ -203,12 +208,11 @@ Eigen::MatrixXd RigProblem::columns(const std::vector<Ingredient>& ingredients,
     moved.push_back(model(ingredients, other));
   }
   const std::vector<size_t> runs = chosen_runs(request);
-  const double long_step_s = step_s(Look::coarse);
   const auto rows = static_cast<Eigen::Index>(rows_);
   Eigen::VectorXd there = Eigen::VectorXd::Zero(rows);
   std::vector<PlantTrace> plants(runs.size());
   parallel_for(runs.size(), options_.threads, [&](size_t i) {
-    plants[i] = plant(here, runs[i], long_step_s);
+    plants[i] = plant(here, runs[i], Look::coarse);
     compare(here, plants[i], runs[i], request.look, there);
   });
   Eigen::MatrixXd out = Eigen::MatrixXd::Zero(rows, static_cast<Eigen::Index>(moved.size()));
@@ -217,7 +221,7 @@ Eigen::MatrixXd RigProblem::columns(const std::vector<Ingredient>& ingredients,
     const size_t j = task / runs.size();
     auto column = out.col(static_cast<Eigen::Index>(j));
     const bool same_plant = coordinates[first + j].sensors_only;
-    compare(moved[j], same_plant ? plants[i] : plant(moved[j], runs[i], long_step_s), runs[i], request.look,
+    compare(moved[j], same_plant ? plants[i] : plant(moved[j], runs[i], Look::coarse), runs[i], request.look,
             column);
   });
   for (size_t j = 0; j < moved.size(); ++j) {
@@ -233,7 +237,7 @@ std::vector<Prediction> RigProblem::predictions(const std::vector<Ingredient>& i
   std::vector<Prediction> seen(session_.runs.size());
   parallel_for(seen.size(), options_.threads, [&](size_t r) {
     const SessionRun& run = session_.runs[r];
-    seen[r] = observe(made, plant(made, r, step_s(Look::fine)), run.drive.place, run.sample_s);
+    seen[r] = observe(made, plant(made, r, Look::fine), run.drive.place, run.sample_s);
   });
   return seen;
 }

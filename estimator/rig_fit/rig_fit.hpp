@@ -114,7 +114,8 @@ class RigProblem {
                                const std::vector<double>& values) const;
 
  private:
-  [[nodiscard]] PlantTrace plant(const RigModel& model, size_t run, double step_s) const;
+  /// With the steps of a look.
+  [[nodiscard]] PlantTrace plant(const RigModel& model, size_t run, Look steps) const;
   /// Sets one run's rows of the residuals.
   void compare(const RigModel& model, const PlantTrace& plant, size_t run, Look look,
                Eigen::Ref<Eigen::VectorXd> out) const;
@@ -138,6 +139,7 @@ class RigProblem {
   RigFitOptions options_;
   NoiseModel noise_;
   std::vector<ResidualBlock> blocks_;
+  std::vector<DriveTrace> motions_, coarse_motions_;  ///< of each run, at the steps of both looks
   size_t rows_ = 0;
   std::vector<size_t> present_;  ///< rows of each block that are not missing
 

@@ -25,7 +25,7 @@ void drive(HoseLine& line, double step_s, double end_s, const Flow& flow, const 
   line.rest_at(0.0);
   for (double t = 0.0; t < end_s; t += step_s) {
     EndLoads loads;
-    loads.entering_acceleration = (flow(t + step_s) - flow(t)) / step_s;
+    loads.piston_acceleration = (flow(t + step_s) - flow(t)) / step_s;
     line.settle(loads);
     see(t, line);
     line.begin_step(loads, flow(t + step_s));
@@ -125,17 +125,13 @@ TEST(HoseLine, SwingsAgainstAGasAsInertanceAndCompliance) {
   double before = 0.0;
   const double squeezed_mL = 1.0;  // the piston is put here at once
   for (int k = 0; k < 6000; ++k) {
-    const auto loads = [&] {
-      EndLoads now;
-      now.pump_kPa = stiffness_kPa_per_mL * (squeezed_mL - line.entered_mL());
-      return now;
-    };
-    const EndLoads now = loads();
+    EndLoads now;
+    now.pump_kPa = stiffness_kPa_per_mL * squeezed_mL;
     line.settle(now);
     line.begin_step(now, 0.0);
-    line.end_step(loads());
-    if (before < squeezed_mL && line.entered_mL() >= squeezed_mL) ++crossings;
-    before = line.entered_mL();
+    line.end_step(now);
+    if (before < squeezed_mL && line.yielded_mL() >= squeezed_mL) ++crossings;
+    before = line.yielded_mL();
   }
   const double natural_Hz = std::sqrt(stiffness_kPa_per_mL / hose.inertance()) / (2.0 * pi);
   EXPECT_NEAR(crossings / 10.0, natural_Hz, 0.1 + 0.01 * natural_Hz);
