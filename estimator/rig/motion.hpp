@@ -62,6 +62,9 @@ class Motion {
   double spread_s_ = 0.0;
 };
 
+/// A segment's strokes from its start_s on; none for a waveform whose shape the contract does not fix.
+std::vector<Stroke> strokes_of(const runfile::Segment& segment);
+
 struct FoundMotion {
   Motion motion;
   double worst_mL = 0.0;   ///< farthest from the counted steps

@@ -73,7 +73,9 @@ std::vector<Stroke> named_cycle(const Segment& segment, double start_s) {
   return {};
 }
 
-std::vector<Stroke> named_strokes(const Segment& segment) {
+}  // namespace
+
+std::vector<Stroke> strokes_of(const Segment& segment) {
   std::vector<Stroke> strokes;
   for (int64_t cycle = 0; cycle < segment.cycles; ++cycle) {
     const auto one = named_cycle(segment, segment.start_s + static_cast<double>(cycle) * segment.period_s);
@@ -81,6 +83,8 @@ std::vector<Stroke> named_strokes(const Segment& segment) {
   }
   return strokes;
 }
+
+namespace {
 
 /// Monotone pieces between rests and turns, as strokes with rough times.
 std::vector<Stroke> rough_strokes(const Counted& counted) {
@@ -259,7 +263,7 @@ std::vector<Stretch> stretches_of(const RecordedRun& run, double step_mL) {
 std::vector<Stroke> strokes_with(const std::vector<Stretch>& stretches, double spread_s) {
   std::vector<Stroke> strokes;
   for (const Stretch& stretch : stretches) {
-    const auto more = stretch.named ? named_strokes(stretch.segment)
+    const auto more = stretch.named ? strokes_of(stretch.segment)
                                     : fitted_strokes(stretch.segment, spread_s, stretch.counted);
     strokes.insert(strokes.end(), more.begin(), more.end());
   }
