@@ -13,6 +13,7 @@ void add_estimator_commands(CommandLine& line) {
   add_report(line);
   add_mesh(line);
   add_effects(line);
+  add_explain(line);
 }
 
 }  // namespace diastole

@@ -15,6 +15,7 @@ void add_shear(CommandLine& line);
 void add_report(CommandLine& line);
 void add_mesh(CommandLine& line);
 void add_effects(CommandLine& line);
+void add_explain(CommandLine& line);
 
 void add_estimator_commands(CommandLine& line);
 

@@ -1,0 +1,169 @@
+#include <fmt/format.h>
+
+#include <csignal>
+#include <filesystem>
+#include <iostream>
+#include <memory>
+#include <string>
+
+#include "estimator/cli/commands.hpp"
+#include "estimator/explain/explain_rig.hpp"
+#include "estimator/explain/explained_study.hpp"
+#include "estimator/explain/explanation_json.hpp"
+#include "estimator/io/whole_file.hpp"
+#include "protocol/contract/input_error.hpp"
+
+namespace diastole {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::string_view explanation_file = "explanation.json";
+constexpr std::string_view study_file = "explained.study.toml";
+constexpr std::string_view study_mark = "# Written by diastole explain";
+
+struct ExplainArguments {
+  fs::path study;
+  fs::path folder;
+  size_t threads = 2;
+  bool force = false;
+};
+
+volatile std::sig_atomic_t interrupted = 0;
+
+struct Interrupted {};
+
+/// While it lives, the first Ctrl-C ends the work at the next simulation; the second ends the program.
+class EndOnInterrupt {
+ public:
+  EndOnInterrupt() {
+    interrupted = 0;
+    before_ = std::signal(SIGINT, [](int) {
+      interrupted = 1;
+      std::signal(SIGINT, SIG_DFL);
+    });
+  }
+  ~EndOnInterrupt() { std::signal(SIGINT, before_); }
+  EndOnInterrupt(const EndOnInterrupt&) = delete;
+  EndOnInterrupt& operator=(const EndOnInterrupt&) = delete;
+
+ private:
+  void (*before_)(int) = SIG_DFL;
+};
+
+void tell(const std::string& text) {
+  if (interrupted != 0) throw Interrupted{};
+  if (!text.empty()) fmt::print(stderr, "explain: {}\n", text);
+}
+
+std::string with_units(const explain::FoundParameter& parameter) {
+  return fmt::format("    {:<28} {:.6g}   (90 %: {:.6g} to {:.6g})\n", parameter.name, parameter.value,
+                     parameter.ci90[0], parameter.ci90[1]);
+}
+
+std::string place_of(const explain::Misfit& misfit) {
+  std::string text = fmt::format("  {:<9} {} of {}", misfit.port, misfit.channel, misfit.run);
+  if (misfit.segment) text += fmt::format(", segment {}", *misfit.segment);
+  if (misfit.phase) text += fmt::format(", phase {:.1f} to {:.1f}", (*misfit.phase)[0], (*misfit.phase)[1]);
+  if (misfit.band_Hz) text += fmt::format(", {:g} to {:g} Hz", (*misfit.band_Hz)[0], (*misfit.band_Hz)[1]);
+  return text + fmt::format(": {:.0f} above the noise\n", misfit.excess_chi2);
+}
+
+void print_for_people(const explain::Explanation& found, const fs::path& folder) {
+  fmt::print("{}\n\n  verdict: {}\n", found.summary, explain::name_of(found.verdict));
+  for (const explain::FoundEffect& effect : found.effects) {
+    fmt::print("  {}\n", effect.id);
+    for (const explain::FoundParameter& parameter : effect.parameters)
+      fmt::print("{}", with_units(parameter));
+    for (const explain::FoundMoment& moment : effect.moments)
+      fmt::print("    at {:.3f} s of {}\n", moment.time_s, moment.run);
+  }
+  if (!found.where.empty()) fmt::print("\nWhere the model fails\n");
+  for (const explain::Misfit& misfit : found.where)
+    fmt::print("{}", place_of(misfit));
+  fmt::print("\nReduced chi-square on data that were not fitted: {:.3f} before, {:.3f} after, {:.3f} without any error.\n",
+             found.gap.before, found.gap.after, found.gap.floor);
+  for (const explain::ParameterShift& shift : found.shifts)
+    fmt::print("  {:<18} {:.4f} +- {:.4f} without, {:.4f} +- {:.4f} with what was found\n", shift.name, shift.before,
+               shift.before_error, shift.after, shift.after_error);
+  fmt::print("\nIn {}: {}{}\n", folder.string(), explanation_file,
+             found.study_after.empty() ? "" : fmt::format(", {}", found.study_after));
+}
+
+explain::Explanation explained(const Study& study, const ExplainArguments& arguments) {
+  if (study.data.runs.empty()) {
+    throw InputError({.file = study.file.string(),
+                      .place = "data.runs",
+                      .problem = "names no run files, so that there is nothing to explain",
+                      .remedy = "List the session's runs: runs = [\"baseline.run.h5\"]."});
+  }
+  return explain::explain_rig(study, {.threads = arguments.threads, .progress = tell});
+}
+
+ExitCode run_explain(const ExplainArguments& arguments, const CommandOutput& out) {
+  const Study study = read_study(arguments.study);
+  const fs::path json_file = arguments.folder / explanation_file;
+  const fs::path new_study = arguments.folder / study_file;
+  std::error_code error;
+  fs::create_directories(arguments.folder, error);
+  if (error) {
+    throw InputError({.file = arguments.folder.string(),
+                      .place = "-o",
+                      .problem = fmt::format("the folder cannot be made: {}", error.message()),
+                      .remedy = "Name a folder that you may write."});
+  }
+  require_output({json_file, inputs_of(study), explain::explanation_file_mark, arguments.force});
+  require_output({new_study, inputs_of(study), study_mark, arguments.force});
+  const EndOnInterrupt end;
+  explain::Explanation found;
+  try {
+    found = explained(study, arguments);
+  } catch (const Interrupted&) {
+    std::cerr << "diastole explain: interrupted; nothing was written\n";
+    return ExitCode::negative;
+  }
+  if (!found.effects.empty()) {
+    found.study_after = study_file;
+    write_whole_file(new_study, fmt::format("{}: {}.\n", study_mark, explain::name_of(found.verdict)) +
+                                    explain::explained_study(study, arguments.folder, found.effects, found.shifts));
+  } else {
+    fs::remove(new_study, error);  // of an earlier explanation
+  }
+  write_whole_file(json_file, explain::to_json(found));
+  if (out.json) {
+    explain::Explanation brief = found;
+    brief.traces.clear();
+    std::cout << explain::to_json(brief);
+  } else {
+    print_for_people(found, arguments.folder);
+  }
+  return ExitCode::done;
+}
+
+}  // namespace
+
+void add_explain(CommandLine& line) {
+  auto arguments = std::make_shared<ExplainArguments>();
+  CLI::App* command = line.add(
+      "explain", "where model and recordings disagree, which effect is missing, and what stays open",
+      "  diastole explain case.study.toml -o out/\n"
+      "  diastole explain case.study.toml -o out/ --json\n"
+      "  diastole explain out/explained.study.toml -o further/     what is missing beside what was found\n"
+      "The verdict is one of\n"
+      "  named        one set of effects explains the misfit; its parameters come with 90 % intervals\n"
+      "  ambiguous    these data cannot tell several sets apart\n"
+      "  unexplained  the misfit has structure that no known effect removes; where it sits is told\n"
+      "  none         nothing exceeds the noise\n"
+      "OUT gets explanation.json, for `diastole report`, and explained.study.toml: the study with what was found.\n"
+      "`diastole effects` lists the effects that are known. Exit code 0: done, whatever the verdict; 1: "
+      "interrupted; 2: unreadable input.");
+  command->add_option("STUDY", arguments->study, "study file with [data] runs")->required();
+  command->add_option("-o,--output", arguments->folder, "folder for the result; made if it is not there")->required();
+  command->add_option("--threads", arguments->threads, "simulations at a time")
+      ->check(CLI::Range(1, 256))
+      ->capture_default_str();
+  command->add_flag("--force", arguments->force, "replace files in the folder that hold something else");
+  line.on_run(command, [arguments](const CommandOutput& out) { return run_explain(*arguments, out); });
+}
+
+}  // namespace diastole

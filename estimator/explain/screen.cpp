@@ -1,0 +1,109 @@
+#include "estimator/explain/screen.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "estimator/rig_fit/search_scale.hpp"
+
+namespace diastole::explain {
+namespace {
+
+constexpr std::array trial_sizes{0.3, 1.5};  // of the typical one
+
+bool contains(const std::vector<rig::Ingredient>& ingredients, const Effect* effect) {
+  return std::any_of(ingredients.begin(), ingredients.end(),
+                     [&](const rig::Ingredient& ingredient) { return ingredient.effect == effect; });
+}
+
+/// The effect's values with the first parameter at `size` of the way from neutral to typical.
+std::vector<double> values_at(const Effect& effect, const rig::RigModel& base, double size) {
+  std::vector<double> values = effect.neutral(base);
+  for (size_t j = 0; j < values.size(); ++j) {
+    const EffectParameter& parameter = effect.parameters()[j];
+    if (j > 0) {
+      values[j] = parameter.typical;
+      continue;
+    }
+    const double from = rig::to_search(parameter.scale, values[j]);
+    const double towards = rig::to_search(parameter.scale, parameter.typical);
+    values[j] = std::clamp(rig::from_search(parameter.scale, from + size * (towards - from)), parameter.lower,
+                           parameter.upper);
+  }
+  return values;
+}
+
+/// Another value of a further parameter: neutral if that is another, else some way towards the farther bound.
+double varied(const EffectParameter& parameter) {
+  if (parameter.neutral != parameter.typical) return parameter.neutral;
+  const double at = rig::to_search(parameter.scale, parameter.typical);
+  const double a = rig::to_search(parameter.scale, parameter.lower);
+  const double b = rig::to_search(parameter.scale, parameter.upper);
+  return rig::from_search(parameter.scale, at + 0.3 * ((std::abs(b - at) > std::abs(a - at) ? b : a) - at));
+}
+
+}  // namespace
+
+Eigen::MatrixXd basis_of(const Eigen::MatrixXd& columns) {
+  constexpr double dependent = 1e-6;
+  Eigen::MatrixXd basis(columns.rows(), columns.cols());
+  Eigen::Index count = 0;
+  for (Eigen::Index c = 0; c < columns.cols(); ++c) {
+    Eigen::VectorXd column = columns.col(c);
+    const double size = column.norm();
+    if (!(size > 0.0) || !std::isfinite(size)) continue;
+    for (int again = 0; again < 2; ++again)
+      column -= basis.leftCols(count) * (basis.leftCols(count).transpose() * column);
+    if (column.norm() < dependent * size) continue;
+    basis.col(count++) = column.normalized();
+  }
+  return basis.leftCols(count);
+}
+
+double linear_gain(const Eigen::MatrixXd& basis, const Eigen::MatrixXd& columns, const Eigen::VectorXd& residuals) {
+  Eigen::MatrixXd both(columns.rows(), basis.cols() + columns.cols());
+  both << basis, columns;
+  const Eigen::MatrixXd reached = basis_of(both);
+  return (reached.rightCols(reached.cols() - basis.cols()).transpose() * residuals).squaredNorm();
+}
+
+std::vector<Lead> screen(const rig::RigProblem& problem, const rig::SpecimenFamily& family,
+                         const rig::Session& session, const rig::RigFit& current, const Eigen::VectorXd& weights,
+                         const std::function<void()>& going_on) {
+  const Eigen::VectorXd root = weights.cwiseSqrt();
+  const Eigen::VectorXd residuals = root.asDiagonal() * current.residuals;
+  const Eigen::MatrixXd known = basis_of(root.asDiagonal() * current.jacobian);
+  const auto change_by = [&](const Effect* effect, const std::vector<double>& values) -> Eigen::VectorXd {
+    going_on();
+    std::vector<rig::Ingredient> ingredients = current.ingredients;
+    ingredients.push_back({effect, {}});
+    std::vector<double> all = current.values;
+    all.insert(all.end(), values.begin(), values.end());
+    return root.asDiagonal() * (problem.residuals(ingredients, all) - current.residuals);
+  };
+  std::vector<Lead> leads;
+  for (const Effect* effect : all_effects()) {
+    if (contains(current.ingredients, effect) || !effect->fits(family) || effect->occasions() != Occasions::none)
+      continue;
+    const auto parameters = effect->parameters();
+    Lead lead{{effect, {}}, 0.0, 0.0, parameters.size()};
+    for (const double size : trial_sizes) {
+      std::vector<double> values = values_at(*effect, session.base, size);
+      Eigen::MatrixXd columns(residuals.size(), static_cast<Eigen::Index>(parameters.size()));
+      columns.col(0) = change_by(effect, values);
+      for (size_t j = 1; j < parameters.size(); ++j) {
+        std::vector<double> other = values;
+        other[j] = varied(parameters[j]);
+        columns.col(static_cast<Eigen::Index>(j)) =
+            size == trial_sizes.front() ? columns.col(0) : change_by(effect, other);
+      }
+      lead.gain = std::max(lead.gain, linear_gain(known, columns, residuals));
+      const Eigen::VectorXd seen = columns.col(0) - known * (known.transpose() * columns.col(0));
+      lead.visibility = std::max(lead.visibility, seen.norm() / size);
+    }
+    leads.push_back(lead);
+  }
+  std::sort(leads.begin(), leads.end(), [](const Lead& a, const Lead& b) { return a.gain > b.gain; });
+  return leads;
+}
+
+}  // namespace diastole::explain

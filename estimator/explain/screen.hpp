@@ -1,0 +1,40 @@
+#pragma once
+// Which effects could lower the misfit: a score test of each at sizes worth finding.
+//
+// An effect's trial is one simulation of the session with the effect added to the current model. The change D of the
+// whitened residuals r spans, with the changes by the effect's other parameters, what a small fit can reach; unknowns
+// of the current model and the nuisances J are free beside it. The gain is what least squares over [J, D] takes off
+// beyond J alone:
+//
+//   gain = |Q^T r|^2,  Q an orthonormal basis of D with J projected out
+//
+// Finite sizes, because some effects show nothing near their neutral value (gas at the pump, a slow catheter).
+
+#include <Eigen/Dense>
+#include <functional>
+#include <vector>
+
+#include "estimator/rig_fit/rig_fit.hpp"
+
+namespace diastole::explain {
+
+struct Lead {
+  rig::Ingredient ingredient;
+  double gain = 0.0;        ///< of weighted squares; infinite gains do not exist: at most what is there
+  double visibility = 0.0;  ///< of the effect at its typical size, in sigmas, the nuisances refitted
+  size_t parameters = 0;
+};
+
+/// An orthonormal basis of the columns' span; columns that depend on others are left out.
+Eigen::MatrixXd basis_of(const Eigen::MatrixXd& columns);
+
+/// What least squares over `columns` takes off beyond `basis`; all rows times sqrt(weights).
+double linear_gain(const Eigen::MatrixXd& basis, const Eigen::MatrixXd& columns, const Eigen::VectorXd& residuals);
+
+/// All effects that fit the specimen and are not in `current` already, the largest gain first. `weights`: one a
+/// residual, what a square counts for (search.hpp). `going_on` is asked between simulations.
+std::vector<Lead> screen(const rig::RigProblem& problem, const rig::SpecimenFamily& family,
+                         const rig::Session& session, const rig::RigFit& current, const Eigen::VectorXd& weights,
+                         const std::function<void()>& going_on);
+
+}  // namespace diastole::explain

@@ -1,0 +1,51 @@
+#pragma once
+// Which sets of effects explain the session: forward by screening and refits, with a beam so that a mixture that one
+// effect imitates is still found; then backward, each effect against the set without it; then each against its
+// look-alikes.
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "estimator/explain/screen.hpp"
+
+namespace diastole::explain {
+
+/// A set of effects, refitted.
+struct FittedSet {
+  rig::RigFit fit;
+  double chi_square = 0.0;  ///< weighted
+
+  [[nodiscard]] std::vector<std::string> ids() const;
+  [[nodiscard]] size_t parameters() const;
+};
+
+/// What the search has seen. sets.front() is the base model.
+struct SearchResult {
+  std::vector<FittedSet> sets;
+  std::vector<Lead> leads;  ///< by the base model's residuals, refitted or not
+  size_t best = 0;          ///< the set chosen
+};
+
+struct SearchOptions {
+  size_t most_effects = 3;
+  size_t refitted = 4;  ///< of each screening
+  size_t beam = 2;
+  std::function<void(const std::string&)> progress;  ///< may throw to end the search
+};
+
+/// By how much weighted squares must fall for a set with `parameters` more to be taken: what chance reaches with a
+/// probability of 1e-7 a candidate.
+double admission(size_t parameters);
+
+/// Within this of the best set's squares another set fits as well (3 sigma).
+inline constexpr double as_good = 9.0;
+
+/// What the square of each residual counts for: 1 / (1 + cycles x model variance), since the model's error repeats in
+/// each of a segment's cycles while noise does not.
+Eigen::VectorXd row_weights(const rig::Session& session, const rig::RigProblem& problem);
+
+SearchResult search(const rig::Session& session, const rig::SpecimenFamily& family, const rig::RigProblem& problem,
+                    const SearchOptions& options);
+
+}  // namespace diastole::explain

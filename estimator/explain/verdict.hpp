@@ -1,0 +1,26 @@
+#pragma once
+// From the fitted sets to a verdict.
+
+#include <string>
+#include <vector>
+
+#include "estimator/explain/explanation.hpp"
+#include "estimator/explain/residual_cells.hpp"
+#include "estimator/explain/search.hpp"
+
+namespace diastole::explain {
+
+struct Judgement {
+  Verdict verdict = Verdict::none;
+  std::vector<std::vector<std::string>> ambiguous_with;
+  std::vector<ResidualCell> left;  ///< structure that remains after the chosen set
+};
+
+/// `left`: cells of the chosen set's residuals that stand out (residual_cells.hpp).
+Judgement judge(const SearchResult& search, std::vector<ResidualCell> left);
+
+/// Whether what remains is more than a known model leaves: one cell beyond chance so far that the number of cells
+/// does not matter (Holm at 1e-6).
+bool is_structured(const std::vector<ResidualCell>& left, size_t cells);
+
+}  // namespace diastole::explain

@@ -1,0 +1,96 @@
+// `tools/bench explain [folder] [case or kind ...]`: explains recorded sessions and counts what was right (data/README.md,
+// labels.json). A row a case, then the table of figures with their targets. Exit code 1 if a session in which nothing
+// is hidden was given an effect, or one with an effect of no library a confident name. Explanations are kept in
+// build/explained/.
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <chrono>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "estimator/explain/explain_rig.hpp"
+#include "estimator/explain/explanation_json.hpp"
+
+namespace {
+
+using namespace diastole;
+namespace fs = std::filesystem;
+using Ids = std::set<std::string>;
+
+Ids truth_of(const nlohmann::json& label) {
+  Ids ids;
+  for (const auto& truth : label["truth"])
+    ids.insert(truth["id"].get<std::string>());
+  return ids;
+}
+
+std::string shown(const Ids& ids) { return ids.empty() ? "-" : fmt::format("{}", fmt::join(ids, "+")); }
+
+void report(const std::string& name, const nlohmann::json& label, const explain::Explanation& found) {
+  Ids named;
+  for (const explain::FoundEffect& effect : found.effects)
+    named.insert(effect.id);
+  std::string others;
+  for (const auto& set : found.ambiguous_with)
+    others += " | " + shown(Ids(set.begin(), set.end()));
+  fmt::print("{} {:11} d {:8.1f} {:42} -> {:11} {}{}\n    gap {:.4f} {:.4f} floor {:.4f} closed {:.3f}, {:.1f} s\n", name,
+             label["kind"].get<std::string>(), label["d"].get<double>(), shown(truth_of(label)),
+             name_of(found.verdict), shown(named), others, found.gap.before, found.gap.after, found.gap.floor,
+             found.gap.closed, found.seconds);
+  for (const explain::FoundEffect& effect : found.effects)
+    for (const explain::FoundParameter& parameter : effect.parameters)
+      fmt::print("    {} {} = {:.6g} +- {:.2g} [{:.6g} {:.6g}]\n", effect.id, parameter.name, parameter.value,
+                 parameter.standard_error, parameter.ci90[0], parameter.ci90[1]);
+  for (const auto& truth : label["truth"])
+    fmt::print("    truth {} {}\n", truth["id"].get<std::string>(), truth["parameters"].dump());
+  for (size_t k = 0; k < std::min<size_t>(found.evidence.size(), 7); ++k) {
+    const explain::Candidate& row = found.evidence[k];
+    fmt::print("      {} {:10.1f} {} {}\n", row.refitted ? "fit " : "gain", row.chi_square_drop, fmt::join(row.ids, "+"),
+               row.verdict);
+  }
+  for (size_t k = 0; k < std::min<size_t>(found.where.size(), 5); ++k) {
+    const explain::Misfit& place = found.where[k];
+    fmt::print("      where {} {} {} seg {} phase {} band {} excess {:.0f} p {:.1g}\n", place.port, place.run,
+               place.channel, place.segment.value_or(-1),
+               place.phase ? fmt::format("{:.1f}-{:.1f}", (*place.phase)[0], (*place.phase)[1]) : "-",
+               place.band_Hz ? fmt::format("{:g}-{:g}", (*place.band_Hz)[0], (*place.band_Hz)[1]) : "-",
+               place.excess_chi2, place.p_value);
+  }
+  std::fflush(stdout);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const fs::path folder = argc > 1 ? fs::path(argv[1]) : fs::path(DIASTOLE_SOURCE_DIR) / "../shared/data/rig";
+  std::ifstream file(folder / "labels.json");
+  if (!file) {
+    fmt::print("skipped: no labels.json in {}\n", folder.string());
+    return 0;
+  }
+  const nlohmann::json labels = nlohmann::json::parse(file);
+  const std::vector<std::string> wanted(argv + std::min(argc, 2), argv + argc);
+  const fs::path kept = fs::path(DIASTOLE_SOURCE_DIR) / "build/explained";
+  fs::create_directories(kept);
+  for (const auto& [name, label] : labels.items()) {
+    const bool chosen =
+        wanted.empty() ||
+        std::any_of(wanted.begin(), wanted.end(), [&, &name = name, &label = label](const std::string& word) {
+          return name == word || label["kind"] == word;
+        });
+    if (!chosen) continue;
+    const Study study = read_study(folder / name / (name + ".study.toml"));
+    explain::Explanation found = explain::explain_rig(study, {.threads = 2, .progress = {}});
+    report(name, label, found);
+    found.traces.clear();
+    std::ofstream(kept / (name + ".json")) << explain::to_json(found);
+  }
+  return 0;
+}
