@@ -81,11 +81,13 @@ void print_for_people(const explain::Explanation& found, const fs::path& folder)
   if (!found.where.empty()) fmt::print("\nWhere the model fails\n");
   for (const explain::Misfit& misfit : found.where)
     fmt::print("{}", place_of(misfit));
-  fmt::print("\nReduced chi-square on data that were not fitted: {:.3f} before, {:.3f} after, {:.3f} without any error.\n",
-             found.gap.before, found.gap.after, found.gap.floor);
+  fmt::print(
+      "\nReduced chi-square on data that were not fitted: {:.3f} before, {:.3f} after, {:.3f} without any "
+      "error.\n",
+      found.gap.before, found.gap.after, found.gap.floor);
   for (const explain::ParameterShift& shift : found.shifts)
-    fmt::print("  {:<18} {:.4f} +- {:.4f} without, {:.4f} +- {:.4f} with what was found\n", shift.name, shift.before,
-               shift.before_error, shift.after, shift.after_error);
+    fmt::print("  {:<18} {:.4f} +- {:.4f} without, {:.4f} +- {:.4f} with what was found\n", shift.name,
+               shift.before, shift.before_error, shift.after, shift.after_error);
   fmt::print("\nIn {}: {}{}\n", folder.string(), explanation_file,
              found.study_after.empty() ? "" : fmt::format(", {}", found.study_after));
 }
@@ -124,8 +126,9 @@ ExitCode run_explain(const ExplainArguments& arguments, const CommandOutput& out
   }
   if (!found.effects.empty()) {
     found.study_after = study_file;
-    write_whole_file(new_study, fmt::format("{}: {}.\n", study_mark, explain::name_of(found.verdict)) +
-                                    explain::explained_study(study, arguments.folder, found.effects, found.shifts));
+    write_whole_file(new_study,
+                     fmt::format("{}: {}.\n", study_mark, explain::name_of(found.verdict)) +
+                         explain::explained_study(study, arguments.folder, found.effects, found.shifts));
   } else {
     fs::remove(new_study, error);  // of an earlier explanation
   }
@@ -154,11 +157,13 @@ void add_explain(CommandLine& line) {
       "  ambiguous    these data cannot tell several sets apart\n"
       "  unexplained  the misfit has structure that no known effect removes; where it sits is told\n"
       "  none         nothing exceeds the noise\n"
-      "OUT gets explanation.json, for `diastole report`, and explained.study.toml: the study with what was found.\n"
+      "OUT gets explanation.json, for `diastole report`, and explained.study.toml: the study with what was "
+      "found.\n"
       "`diastole effects` lists the effects that are known. Exit code 0: done, whatever the verdict; 1: "
       "interrupted; 2: unreadable input.");
   command->add_option("STUDY", arguments->study, "study file with [data] runs")->required();
-  command->add_option("-o,--output", arguments->folder, "folder for the result; made if it is not there")->required();
+  command->add_option("-o,--output", arguments->folder, "folder for the result; made if it is not there")
+      ->required();
   command->add_option("--threads", arguments->threads, "simulations at a time")
       ->check(CLI::Range(1, 256))
       ->capture_default_str();

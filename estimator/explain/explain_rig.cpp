@@ -23,19 +23,23 @@ std::string summary_of(const Explanation& found) {
     case Verdict::none:
       return "Nothing exceeds the noise: the rig's model explains these recordings.";
     case Verdict::named:
-      return fmt::format("The model lacks {}: with it {:.0f} % of the gap on data that were not fitted is closed.",
-                         set, 100.0 * found.gap.closed);
+      return fmt::format(
+          "The model lacks {}: with it {:.0f} % of the gap on data that were not fitted is closed.", set,
+          100.0 * found.gap.closed);
     case Verdict::ambiguous: {
       std::string others;
       for (const auto& other : found.ambiguous_with)
-        others += fmt::format("{}{}", others.empty() ? "" : ", ", other.empty() ? "nothing at all" : fmt::format("{}", fmt::join(other, " + ")));
-      return fmt::format("The model lacks something that these data cannot tell apart: {}, or {}.", set, others);
+        others += fmt::format("{}{}", others.empty() ? "" : ", ",
+                              other.empty() ? "nothing at all" : fmt::format("{}", fmt::join(other, " + ")));
+      return fmt::format("The model lacks something that these data cannot tell apart: {}, or {}.", set,
+                         others);
     }
     case Verdict::unexplained:
       return found.where.empty()
                  ? "The misfit has structure that no known effect removes."
-                 : fmt::format("The misfit has structure that no known effect removes, most of it in {} of {}.",
-                               found.where.front().channel, found.where.front().run);
+                 : fmt::format(
+                       "The misfit has structure that no known effect removes, most of it in {} of {}.",
+                       found.where.front().channel, found.where.front().run);
   }
   return "";
 }
@@ -81,8 +85,8 @@ Explanation explain_rig(const Study& study, const ExplainOptions& options) {
 
   tell("judging");
   const Eigen::VectorXd change = problem.base().residuals - best.fit.residuals;
-  const auto cells = residual_cells(session, problem.blocks(), best.fit.residuals,
-                                    model_variance(problem, change));
+  const auto cells =
+      residual_cells(session, problem.blocks(), best.fit.residuals, model_variance(problem, change));
   std::vector<ResidualCell> left = significant(cells, discovery_rate);
   const size_t cell_count = cells.size();
   if (!is_structured(left, cell_count)) left.clear();

@@ -15,7 +15,8 @@ namespace diastole::explain {
 
 struct ExplainOptions {
   size_t threads = 2;
-  std::function<void(const std::string&)> progress;  ///< a line for people; empty text: only asks whether to go on
+  std::function<void(const std::string&)>
+      progress;  ///< a line for people; empty text: only asks whether to go on
 };
 
 /// Throws InputError for runs that cannot be read; whatever `progress` throws ends the work.

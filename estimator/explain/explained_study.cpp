@@ -35,7 +35,8 @@ toml::table settings_of(const FoundEffect& effect) {
 }  // namespace
 
 std::string explained_study(const Study& study, const std::filesystem::path& folder,
-                            const std::vector<FoundEffect>& effects, const std::vector<ParameterShift>& starts) {
+                            const std::vector<FoundEffect>& effects,
+                            const std::vector<ParameterShift>& starts) {
   toml::table root = toml::parse_file(study.file.string());
   const std::filesystem::path from = study.file.parent_path();
   if (toml::table* data = root["data"].as_table()) {

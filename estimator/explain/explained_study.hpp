@@ -13,6 +13,7 @@ namespace diastole::explain {
 
 /// TOML text. `folder`: where it will stand. Law parameters that were refitted (`starts`) get new starts.
 std::string explained_study(const Study& study, const std::filesystem::path& folder,
-                            const std::vector<FoundEffect>& effects, const std::vector<ParameterShift>& starts);
+                            const std::vector<FoundEffect>& effects,
+                            const std::vector<ParameterShift>& starts);
 
 }  // namespace diastole::explain

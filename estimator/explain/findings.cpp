@@ -54,7 +54,8 @@ std::vector<double> parameter_errors(const rig::RigFit& fit, const Eigen::Vector
     const auto k = static_cast<Eigen::Index>(i);
     const SearchScale scale = scale_of(fit, i);
     const double slope = rig::natural_slope(scale, rig::to_search(scale, fit.values[i]));
-    errors.push_back(fit.errors[i] > 0.0 ? std::abs(slope) * std::sqrt(std::max(covariance(k, k), 0.0)) : 0.0);
+    errors.push_back(fit.errors[i] > 0.0 ? std::abs(slope) * std::sqrt(std::max(covariance(k, k), 0.0))
+                                         : 0.0);
   }
   return errors;
 }
@@ -78,8 +79,10 @@ std::vector<FoundEffect> found_effects(const rig::RigFit& fit, const std::vector
   return effects;
 }
 
-std::vector<ParameterShift> parameter_shifts(const rig::RigFit& before, const std::vector<double>& before_errors,
-                                             const rig::RigFit& after, const std::vector<double>& after_errors) {
+std::vector<ParameterShift> parameter_shifts(const rig::RigFit& before,
+                                             const std::vector<double>& before_errors,
+                                             const rig::RigFit& after,
+                                             const std::vector<double>& after_errors) {
   std::vector<ParameterShift> shifts;
   for (size_t i = 0; i < nuisances; ++i) {
     if (before_errors[i] == 0.0 && after_errors[i] == 0.0) continue;
@@ -109,7 +112,8 @@ std::optional<std::array<double, 2>> phase_of(const std::vector<const ResidualCe
       for (size_t bin = first; bin < first + width; ++bin)
         part += excess[bin];
       if (part >= most * sum)
-        return std::array{static_cast<double>(first) / phase_bins, static_cast<double>(first + width) / phase_bins};
+        return std::array{static_cast<double>(first) / phase_bins,
+                          static_cast<double>(first + width) / phase_bins};
     }
   }
   return {};
@@ -129,8 +133,8 @@ std::string port_at(const rig::ResidualBlock& block, const std::vector<const rig
     if (other == nullptr) continue;
     const auto first = static_cast<Eigen::Index>(block.first);
     const auto count = static_cast<Eigen::Index>(block.count);
-    const double rise =
-        other->residuals.segment(first, count).squaredNorm() - after.residuals.segment(first, count).squaredNorm();
+    const double rise = other->residuals.segment(first, count).squaredNorm() -
+                        after.residuals.segment(first, count).squaredNorm();
     if (rise > largest) {
       largest = rise;
       effect = after.ingredients[member].effect;
@@ -142,8 +146,8 @@ std::string port_at(const rig::ResidualBlock& block, const std::vector<const rig
 }  // namespace
 
 std::vector<Misfit> misfits(const rig::Session& session, const rig::RigProblem& problem,
-                            const std::vector<ResidualCell>& cells, const std::vector<const rig::RigFit*>& without,
-                            const rig::RigFit& after) {
+                            const std::vector<ResidualCell>& cells,
+                            const std::vector<const rig::RigFit*>& without, const rig::RigFit& after) {
   constexpr size_t most = 12;
   using Key = std::tuple<size_t, std::string, int>;
   std::map<Key, std::vector<const ResidualCell*>> groups;
@@ -170,7 +174,8 @@ std::vector<Misfit> misfits(const rig::Session& session, const rig::RigProblem& 
     misfit.channel = channel;
     if (segment >= 0) misfit.segment = segment;
     misfit.phase = phase_of(members);
-    if (const auto band = bands.find({run, channel}); band != bands.end()) misfit.band_Hz = band->second->band_Hz;
+    if (const auto band = bands.find({run, channel}); band != bands.end())
+      misfit.band_Hz = band->second->band_Hz;
     for (const ResidualCell* cell : members) {
       misfit.p_value = std::min(misfit.p_value, cell->p_value);
       misfit.excess_chi2 = std::max(misfit.excess_chi2, 0.0);
@@ -183,7 +188,8 @@ std::vector<Misfit> misfits(const rig::Session& session, const rig::RigProblem& 
       if (block.run == run && block.channel == channel) misfit.port = port_at(block, without, after);
     list.push_back(std::move(misfit));
   }
-  std::sort(list.begin(), list.end(), [](const Misfit& a, const Misfit& b) { return a.excess_chi2 > b.excess_chi2; });
+  std::sort(list.begin(), list.end(),
+            [](const Misfit& a, const Misfit& b) { return a.excess_chi2 > b.excess_chi2; });
   list.resize(std::min(list.size(), most));
   return list;
 }
@@ -215,16 +221,20 @@ std::vector<Candidate> evidence(const SearchResult& search, const Judgement& jud
       return row.refitted && row.ids == std::vector<std::string>{id};
     });
     if (!fitted)
-      list.push_back({{id}, lead.gain, false, lead.parameters, {}, lead.visibility < 3.0 ? "not visible in these data"
-                                                                                         : "screened out"});
+      list.push_back({{id},
+                      lead.gain,
+                      false,
+                      lead.parameters,
+                      {},
+                      lead.visibility < 3.0 ? "not visible in these data" : "screened out"});
   }
   std::sort(list.begin(), list.end(),
             [](const Candidate& a, const Candidate& b) { return a.chi_square_drop > b.chi_square_drop; });
   return list;
 }
 
-std::vector<Trace> traces(const rig::Session& session, const rig::RigProblem& problem, const rig::RigFit& before,
-                          const rig::RigFit& after) {
+std::vector<Trace> traces(const rig::Session& session, const rig::RigProblem& problem,
+                          const rig::RigFit& before, const rig::RigFit& after) {
   constexpr size_t kept = 4;  // every so many samples are shown
   const auto old = problem.predictions(before.ingredients, before.values);
   const auto now = problem.predictions(after.ingredients, after.values);

@@ -17,19 +17,21 @@ std::vector<FoundEffect> found_effects(const rig::RigFit& fit, const std::vector
 /// repeating error together leave open.
 std::vector<double> parameter_errors(const rig::RigFit& fit, const Eigen::VectorXd& weights);
 
-std::vector<ParameterShift> parameter_shifts(const rig::RigFit& before, const std::vector<double>& before_errors,
-                                             const rig::RigFit& after, const std::vector<double>& after_errors);
+std::vector<ParameterShift> parameter_shifts(const rig::RigFit& before,
+                                             const std::vector<double>& before_errors,
+                                             const rig::RigFit& after,
+                                             const std::vector<double>& after_errors);
 
 /// Places where `before` misses, from its cells that stand out: one a channel and segment. Each goes to the port of
 /// the effect of `after` that takes most of the misfit off there, or to the port that the channel suggests.
 std::vector<Misfit> misfits(const rig::Session& session, const rig::RigProblem& problem,
-                            const std::vector<ResidualCell>& cells, const std::vector<const rig::RigFit*>& without,
-                            const rig::RigFit& after);
+                            const std::vector<ResidualCell>& cells,
+                            const std::vector<const rig::RigFit*>& without, const rig::RigFit& after);
 
 std::vector<Candidate> evidence(const SearchResult& search, const Judgement& judgement,
                                 const std::vector<double>& held_out_drops);
 
-std::vector<Trace> traces(const rig::Session& session, const rig::RigProblem& problem, const rig::RigFit& before,
-                          const rig::RigFit& after);
+std::vector<Trace> traces(const rig::Session& session, const rig::RigProblem& problem,
+                          const rig::RigFit& before, const rig::RigFit& after);
 
 }  // namespace diastole::explain

@@ -6,7 +6,7 @@
 namespace diastole::explain {
 namespace {
 
-constexpr size_t parts = 3;              // into which a run's cycles are dealt when it cannot be left out whole
+constexpr size_t parts = 3;  // into which a run's cycles are dealt when it cannot be left out whole
 constexpr double determined_by = 0.999;  // of an unknown's information from one run: no other tells about it
 
 Fold whole_run(const rig::Session& session, const rig::RigProblem& problem, size_t run) {
@@ -56,8 +56,8 @@ bool undetermined(const Eigen::MatrixXd& normal, const Eigen::MatrixXd& left_out
 
 }  // namespace
 
-std::vector<Fold> folds_for(const rig::Session& session, const rig::RigProblem& problem, const rig::RigFit& fit,
-                            const Eigen::VectorXd& weights) {
+std::vector<Fold> folds_for(const rig::Session& session, const rig::RigProblem& problem,
+                            const rig::RigFit& fit, const Eigen::VectorXd& weights) {
   const Eigen::MatrixXd normal = full_normal(fit, weights);
   std::vector<Fold> folds;
   for (size_t run = 0; run < session.runs.size(); ++run) {
@@ -72,7 +72,8 @@ std::vector<Fold> folds_for(const rig::Session& session, const rig::RigProblem& 
   return folds;
 }
 
-double predicted_square(const std::vector<Fold>& folds, const rig::RigFit& fit, const Eigen::VectorXd& weights) {
+double predicted_square(const std::vector<Fold>& folds, const rig::RigFit& fit,
+                        const Eigen::VectorXd& weights) {
   const Eigen::MatrixXd normal = full_normal(fit, weights);
   double square = 0.0;
   for (const Fold& fold : folds) {

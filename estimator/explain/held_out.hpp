@@ -23,11 +23,12 @@ struct Fold {
 };
 
 /// One a run, or three a run whose rows alone determine an unknown of `fit`.
-std::vector<Fold> folds_for(const rig::Session& session, const rig::RigProblem& problem, const rig::RigFit& fit,
-                            const Eigen::VectorXd& weights);
+std::vector<Fold> folds_for(const rig::Session& session, const rig::RigProblem& problem,
+                            const rig::RigFit& fit, const Eigen::VectorXd& weights);
 
 /// Squared weighted residuals at the folds' rows, each predicted without its fold.
-double predicted_square(const std::vector<Fold>& folds, const rig::RigFit& fit, const Eigen::VectorXd& weights);
+double predicted_square(const std::vector<Fold>& folds, const rig::RigFit& fit,
+                        const Eigen::VectorXd& weights);
 
 /// Reduced chi-squares before (base) and after (fit). The floor is half the mean square of successive cycles'
 /// differences: what does not repeat, and no model can predict.

@@ -19,7 +19,8 @@ class ChannelView {
       : run_(run),
         block_(block),
         r_(residuals.segment(static_cast<Eigen::Index>(block.first), static_cast<Eigen::Index>(block.count))),
-        v_(variance.segment(static_cast<Eigen::Index>(block.first), static_cast<Eigen::Index>(block.count))) {}
+        v_(variance.segment(static_cast<Eigen::Index>(block.first), static_cast<Eigen::Index>(block.count))) {
+  }
 
   void add_segments(std::vector<ResidualCell>& out) const;
   void add_rest(std::vector<ResidualCell>& out) const;
@@ -34,7 +35,8 @@ class ChannelView {
     return made;
   }
   void add_bins(const std::vector<rig::CycleRows>& cycles, int segment, std::vector<ResidualCell>& out) const;
-  void add_cycles(const std::vector<rig::CycleRows>& cycles, int segment, std::vector<ResidualCell>& out) const;
+  void add_cycles(const std::vector<rig::CycleRows>& cycles, int segment,
+                  std::vector<ResidualCell>& out) const;
   [[nodiscard]] double r(size_t row) const { return r_[static_cast<Eigen::Index>(row)]; }
   [[nodiscard]] double v(size_t row) const { return v_[static_cast<Eigen::Index>(row)]; }
 
@@ -175,7 +177,8 @@ ResidualCell volume_cell(const rig::ResidualBlock& block, const Eigen::VectorXd&
 
 }  // namespace
 
-std::vector<ResidualCell> residual_cells(const rig::Session& session, const std::vector<rig::ResidualBlock>& blocks,
+std::vector<ResidualCell> residual_cells(const rig::Session& session,
+                                         const std::vector<rig::ResidualBlock>& blocks,
                                          const Eigen::VectorXd& residuals, const Eigen::VectorXd& variance) {
   std::vector<ResidualCell> cells;
   for (const rig::ResidualBlock& block : blocks) {

@@ -37,10 +37,12 @@ struct ResidualCell {
 };
 
 inline constexpr size_t phase_bins = 10;
-inline constexpr double noise_uncertainty = 0.04;  ///< relative, of variances estimated from some seconds of rest
+inline constexpr double noise_uncertainty =
+    0.04;  ///< relative, of variances estimated from some seconds of rest
 
 /// `variance`: of the model's error (tolerance.hpp), one a residual.
-std::vector<ResidualCell> residual_cells(const rig::Session& session, const std::vector<rig::ResidualBlock>& blocks,
+std::vector<ResidualCell> residual_cells(const rig::Session& session,
+                                         const std::vector<rig::ResidualBlock>& blocks,
                                          const Eigen::VectorXd& residuals, const Eigen::VectorXd& variance);
 
 /// Those beyond chance at a false discovery rate, the largest excess first.

@@ -8,7 +8,15 @@
 namespace diastole::explain {
 namespace {
 
-constexpr std::array trial_sizes{0.3, 1.5};  // of the typical one
+constexpr size_t further_columns = 2;  // by an effect's other parameters, at most
+
+/// Parts of the typical size at which an effect is tried: one where the answer is nearly proportional to it, more where
+/// resonances move.
+std::vector<double> trial_sizes(const Effect& effect) {
+  const bool resonant = effect.text().port == Port::drive && effect.text().synergies.size() > 0;
+  if (resonant || effect.parameters()[0].scale != SearchScale::linear) return {0.2, 0.7, 1.5};
+  return {0.5};
+}
 
 bool contains(const std::vector<rig::Ingredient>& ingredients, const Effect* effect) {
   return std::any_of(ingredients.begin(), ingredients.end(),
@@ -59,7 +67,8 @@ Eigen::MatrixXd basis_of(const Eigen::MatrixXd& columns) {
   return basis.leftCols(count);
 }
 
-double linear_gain(const Eigen::MatrixXd& basis, const Eigen::MatrixXd& columns, const Eigen::VectorXd& residuals) {
+double linear_gain(const Eigen::MatrixXd& basis, const Eigen::MatrixXd& columns,
+                   const Eigen::VectorXd& residuals) {
   Eigen::MatrixXd both(columns.rows(), basis.cols() + columns.cols());
   both << basis, columns;
   const Eigen::MatrixXd reached = basis_of(both);
@@ -67,8 +76,8 @@ double linear_gain(const Eigen::MatrixXd& basis, const Eigen::MatrixXd& columns,
 }
 
 std::vector<Lead> screen(const rig::RigProblem& problem, const rig::SpecimenFamily& family,
-                         const rig::Session& session, const rig::RigFit& current, const Eigen::VectorXd& weights,
-                         const std::function<void()>& going_on) {
+                         const rig::Session& session, const rig::RigFit& current,
+                         const Eigen::VectorXd& weights, const std::function<void()>& going_on) {
   const Eigen::VectorXd root = weights.cwiseSqrt();
   const Eigen::VectorXd residuals = root.asDiagonal() * current.residuals;
   const Eigen::MatrixXd known = basis_of(root.asDiagonal() * current.jacobian);
@@ -82,19 +91,23 @@ std::vector<Lead> screen(const rig::RigProblem& problem, const rig::SpecimenFami
   };
   std::vector<Lead> leads;
   for (const Effect* effect : all_effects()) {
-    if (contains(current.ingredients, effect) || !effect->fits(family) || effect->occasions() != Occasions::none)
+    if (contains(current.ingredients, effect) || !effect->fits(family) ||
+        effect->occasions() != Occasions::none)
       continue;
     const auto parameters = effect->parameters();
     Lead lead{{effect, {}}, 0.0, 0.0, parameters.size()};
-    for (const double size : trial_sizes) {
-      std::vector<double> values = values_at(*effect, session.base, size);
-      Eigen::MatrixXd columns(residuals.size(), static_cast<Eigen::Index>(parameters.size()));
-      columns.col(0) = change_by(effect, values);
-      for (size_t j = 1; j < parameters.size(); ++j) {
+    for (const double size : trial_sizes(*effect)) {
+      const std::vector<double> values = values_at(*effect, session.base, size);
+      Eigen::MatrixXd columns(residuals.size(), 0);
+      const auto add_column = [&](const std::vector<double>& at) {
+        columns.conservativeResize(Eigen::NoChange, columns.cols() + 1);
+        columns.rightCols(1) = change_by(effect, at);
+      };
+      add_column(values);
+      for (size_t j = 1; j < std::min(parameters.size(), further_columns + 1); ++j) {
         std::vector<double> other = values;
         other[j] = varied(parameters[j]);
-        columns.col(static_cast<Eigen::Index>(j)) =
-            size == trial_sizes.front() ? columns.col(0) : change_by(effect, other);
+        add_column(other);
       }
       lead.gain = std::max(lead.gain, linear_gain(known, columns, residuals));
       const Eigen::VectorXd seen = columns.col(0) - known * (known.transpose() * columns.col(0));

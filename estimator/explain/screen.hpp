@@ -29,12 +29,13 @@ struct Lead {
 Eigen::MatrixXd basis_of(const Eigen::MatrixXd& columns);
 
 /// What least squares over `columns` takes off beyond `basis`; all rows times sqrt(weights).
-double linear_gain(const Eigen::MatrixXd& basis, const Eigen::MatrixXd& columns, const Eigen::VectorXd& residuals);
+double linear_gain(const Eigen::MatrixXd& basis, const Eigen::MatrixXd& columns,
+                   const Eigen::VectorXd& residuals);
 
 /// All effects that fit the specimen and are not in `current` already, the largest gain first. `weights`: one a
 /// residual, what a square counts for (search.hpp). `going_on` is asked between simulations.
 std::vector<Lead> screen(const rig::RigProblem& problem, const rig::SpecimenFamily& family,
-                         const rig::Session& session, const rig::RigFit& current, const Eigen::VectorXd& weights,
-                         const std::function<void()>& going_on);
+                         const rig::Session& session, const rig::RigFit& current,
+                         const Eigen::VectorXd& weights, const std::function<void()>& going_on);
 
 }  // namespace diastole::explain

@@ -4,12 +4,19 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <map>
 
 #include "estimator/explain/chi_square.hpp"
 #include "estimator/explain/tolerance.hpp"
 
 namespace diastole::explain {
 namespace {
+
+constexpr double far_behind = 4.0;      // of the best set's excess over the floor: not followed further
+constexpr double at_the_floor = 0.003;  // of reduced chi-squares
+constexpr double alike =
+    0.8;  // of a member's drop in chi-square: what a look-alike's linear gain reaches at least
+constexpr double hopeless = 0.3;  // of the best lead's gain: linear gains of large effects are rough
 
 std::vector<std::string> ids_of(const std::vector<rig::Ingredient>& ingredients) {
   std::vector<std::string> ids;
@@ -40,18 +47,21 @@ class Search {
     return result_.sets.size() - 1;
   }
   /// The place of the set, fitted now if it was not before.
-  size_t fitted(const std::vector<rig::Ingredient>& ingredients);
+  size_t fitted(const std::vector<rig::Ingredient>& ingredients, const rig::RigFit& before);
   /// chi-square with what its parameters cost.
   [[nodiscard]] double penalised(size_t set) const {
     const FittedSet& at = result_.sets[set];
     return at.chi_square + (at.fit.ingredients.empty() ? 0.0 : cost(at));
   }
+  [[nodiscard]] double reduced(size_t set) const { return result_.sets[set].chi_square / weights_.sum(); }
   [[nodiscard]] static double cost(const FittedSet& set) {
     double sum = 0.0;
     for (const rig::Ingredient& ingredient : set.fit.ingredients)
       sum += admission(ingredient.effect->parameters().size());
     return sum;
   }
+  /// Screening of the residuals of a set; done once.
+  const std::vector<Lead>& leads_beside(size_t set);
   std::vector<size_t> grow(size_t from);
   void compare_alike(size_t set);
   void tell(const std::string& text) const {
@@ -64,46 +74,63 @@ class Search {
   const SearchOptions& options_;
   Eigen::VectorXd weights_;
   SearchResult result_;
+  std::map<size_t, std::vector<Lead>> leads_;
 };
 
-size_t Search::fitted(const std::vector<rig::Ingredient>& ingredients) {
+size_t Search::fitted(const std::vector<rig::Ingredient>& ingredients, const rig::RigFit& before) {
   const std::vector<std::string> ids = ids_of(ingredients);
   for (size_t k = 0; k < result_.sets.size(); ++k)
     if (result_.sets[k].ids() == ids) return k;
   tell(fmt::format("fitting {}", fmt::join(ids, " + ")));
-  return add(problem_.fit(ingredients));
+  return add(problem_.fit(ingredients, before));
+}
+
+const std::vector<Lead>& Search::leads_beside(size_t set) {
+  const auto known = leads_.find(set);
+  if (known != leads_.end()) return known->second;
+  const rig::RigFit& current = result_.sets[set].fit;
+  tell(current.ingredients.empty()
+           ? "screening the effects"
+           : fmt::format("screening beside {}", fmt::join(ids_of(current.ingredients), " + ")));
+  std::vector<Lead> leads = screen(problem_, family_, session_, current, weights_, [this] { tell(""); });
+  if (set == 0) result_.leads = leads;
+  return leads_.emplace(set, std::move(leads)).first->second;
 }
 
 /// The sets with one effect more that a screening finds worth a fit.
 std::vector<size_t> Search::grow(size_t from) {
   const rig::RigFit current = result_.sets[from].fit;
-  tell(current.ingredients.empty() ? "screening the effects"
-                                   : fmt::format("screening beside {}", fmt::join(ids_of(current.ingredients), " + ")));
-  const std::vector<Lead> leads =
-      screen(problem_, family_, session_, current, weights_, [this] { tell(""); });
-  if (from == 0) result_.leads = leads;
+  const std::vector<Lead>& leads = leads_beside(from);
   std::vector<size_t> grown;
   for (const Lead& lead : leads) {
-    if (grown.size() >= options_.refitted || lead.gain < admission(lead.parameters)) break;
+    if (grown.size() >= options_.refitted || lead.gain < hopeless * leads.front().gain) break;
+    if (lead.gain < admission(lead.parameters)) continue;
     std::vector<rig::Ingredient> ingredients = current.ingredients;
     ingredients.push_back(lead.ingredient);
-    grown.push_back(fitted(ingredients));
+    grown.push_back(fitted(ingredients, current));
   }
   std::sort(grown.begin(), grown.end(), [this](size_t a, size_t b) { return penalised(a) < penalised(b); });
   return grown;
 }
 
-/// Each member of the set replaced by what looks like it.
+/// Each member of the set replaced by what looks like it, unless the screening without that member already says that
+/// it takes off much less.
 void Search::compare_alike(size_t set) {
   const std::vector<rig::Ingredient> chosen = result_.sets[set].fit.ingredients;
   for (size_t member = 0; member < chosen.size(); ++member) {
-    for (const std::string_view id : chosen[member].effect->text().conflicts) {
-      const Effect* other = find_effect(id);
-      if (other == nullptr || !other->fits(family_) || other->occasions() != Occasions::none) continue;
-      std::vector<rig::Ingredient> swapped = chosen;
-      swapped[member] = {other, {}};
-      const std::vector<std::string> ids = ids_of(swapped);
-      if (std::adjacent_find(ids.begin(), ids.end()) == ids.end()) fitted(swapped);
+    std::vector<rig::Ingredient> rest = chosen;
+    rest.erase(rest.begin() + static_cast<std::ptrdiff_t>(member));
+    const size_t without = fitted(rest, problem_.base());
+    const double drop = result_.sets[without].chi_square - result_.sets[set].chi_square;
+    for (const Lead& lead : leads_beside(without)) {
+      const Effect* other = lead.ingredient.effect;
+      const bool contained = std::any_of(chosen.begin(), chosen.end(),
+                                         [&](const rig::Ingredient& in) { return in.effect == other; });
+      if (contained || lead.gain < alike * drop - as_good || lead.gain < admission(lead.parameters) - as_good)
+        continue;
+      std::vector<rig::Ingredient> swapped = rest;
+      swapped.push_back(lead.ingredient);
+      fitted(swapped, result_.sets[without].fit);
     }
   }
 }
@@ -121,6 +148,8 @@ SearchResult Search::run() {
     if (grown.empty() || penalised(grown.front()) >= penalised(result_.best)) break;
     result_.best = grown.front();
     grown.resize(std::min(grown.size(), options_.beam));
+    const double left = reduced(result_.best) - 1.0;
+    std::erase_if(grown, [&](size_t set) { return reduced(set) - 1.0 > far_behind * left + at_the_floor; });
     beam = grown;
   }
   compare_alike(result_.best);
@@ -155,8 +184,8 @@ Eigen::VectorXd row_weights(const rig::Session& session, const rig::RigProblem& 
   return (1.0 + variance.array()).inverse();
 }
 
-SearchResult search(const rig::Session& session, const rig::SpecimenFamily& family, const rig::RigProblem& problem,
-                    const SearchOptions& options) {
+SearchResult search(const rig::Session& session, const rig::SpecimenFamily& family,
+                    const rig::RigProblem& problem, const SearchOptions& options) {
   return Search(session, family, problem, options).run();
 }
 

@@ -45,7 +45,7 @@ inline constexpr double as_good = 9.0;
 /// each of a segment's cycles while noise does not.
 Eigen::VectorXd row_weights(const rig::Session& session, const rig::RigProblem& problem);
 
-SearchResult search(const rig::Session& session, const rig::SpecimenFamily& family, const rig::RigProblem& problem,
-                    const SearchOptions& options);
+SearchResult search(const rig::Session& session, const rig::SpecimenFamily& family,
+                    const rig::RigProblem& problem, const SearchOptions& options);
 
 }  // namespace diastole::explain

@@ -7,7 +7,8 @@ namespace {
 double relative_variance(const rig::RigProblem& problem, const std::string& channel,
                          const ModelFloor& floor) {
   if (channel == "cavity_mL") return floor.volume_sigmas * floor.volume_sigmas;
-  const rig::Channel kind = channel == name_of(rig::Channel::pump) ? rig::Channel::pump : rig::Channel::cavity;
+  const rig::Channel kind =
+      channel == name_of(rig::Channel::pump) ? rig::Channel::pump : rig::Channel::cavity;
   const double error_kPa = kind == rig::Channel::pump ? floor.pump_kPa : floor.cavity_kPa;
   const double ratio = error_kPa / problem.noise().channels.at(kind).sd_kPa;
   return ratio * ratio;

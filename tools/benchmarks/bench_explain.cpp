@@ -40,10 +40,11 @@ void report(const std::string& name, const nlohmann::json& label, const explain:
   std::string others;
   for (const auto& set : found.ambiguous_with)
     others += " | " + shown(Ids(set.begin(), set.end()));
-  fmt::print("{} {:11} d {:8.1f} {:42} -> {:11} {}{}\n    gap {:.4f} {:.4f} floor {:.4f} closed {:.3f}, {:.1f} s\n", name,
-             label["kind"].get<std::string>(), label["d"].get<double>(), shown(truth_of(label)),
-             name_of(found.verdict), shown(named), others, found.gap.before, found.gap.after, found.gap.floor,
-             found.gap.closed, found.seconds);
+  fmt::print(
+      "{} {:11} d {:8.1f} {:42} -> {:11} {}{}\n    gap {:.4f} {:.4f} floor {:.4f} closed {:.3f}, {:.1f} s\n",
+      name, label["kind"].get<std::string>(), label["d"].get<double>(), shown(truth_of(label)),
+      name_of(found.verdict), shown(named), others, found.gap.before, found.gap.after, found.gap.floor,
+      found.gap.closed, found.seconds);
   for (const explain::FoundEffect& effect : found.effects)
     for (const explain::FoundParameter& parameter : effect.parameters)
       fmt::print("    {} {} = {:.6g} +- {:.2g} [{:.6g} {:.6g}]\n", effect.id, parameter.name, parameter.value,
@@ -52,8 +53,8 @@ void report(const std::string& name, const nlohmann::json& label, const explain:
     fmt::print("    truth {} {}\n", truth["id"].get<std::string>(), truth["parameters"].dump());
   for (size_t k = 0; k < std::min<size_t>(found.evidence.size(), 7); ++k) {
     const explain::Candidate& row = found.evidence[k];
-    fmt::print("      {} {:10.1f} {} {}\n", row.refitted ? "fit " : "gain", row.chi_square_drop, fmt::join(row.ids, "+"),
-               row.verdict);
+    fmt::print("      {} {:10.1f} {} {}\n", row.refitted ? "fit " : "gain", row.chi_square_drop,
+               fmt::join(row.ids, "+"), row.verdict);
   }
   for (size_t k = 0; k < std::min<size_t>(found.where.size(), 5); ++k) {
     const explain::Misfit& place = found.where[k];
