@@ -99,7 +99,7 @@ explain::Explanation explained(const Study& study, const ExplainArguments& argum
                       .problem = "names no run files, so that there is nothing to explain",
                       .remedy = "List the session's runs: runs = [\"baseline.run.h5\"]."});
   }
-  return explain::explain_rig(study, {.threads = arguments.threads, .progress = tell});
+  return explain::explain_rig(study, {.threads = arguments.threads, .propose = true, .progress = tell});
 }
 
 ExitCode run_explain(const ExplainArguments& arguments, const CommandOutput& out) {

@@ -3,11 +3,16 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <chrono>
+#include <cmath>
+#include <optional>
 
 #include "estimator/explain/findings.hpp"
 #include "estimator/explain/held_out.hpp"
+#include "estimator/explain/next_experiment.hpp"
 #include "estimator/explain/tolerance.hpp"
+#include "protocol/contract/input_error.hpp"
 
 namespace diastole::explain {
 namespace {
@@ -62,6 +67,110 @@ std::vector<Step> steps_of(const SearchResult& search) {
   return steps;
 }
 
+/// The effects that the study's model has already, in its order.
+std::vector<rig::Ingredient> ingredients_of(const Study& study, const rig::Session& session) {
+  std::vector<rig::Ingredient> list;
+  for (const std::string& id : study.effects) {
+    const Effect* effect = find_effect(id);
+    if (effect == nullptr) {
+      throw InputError({.file = study.file.string(),
+                        .place = "model.effects",
+                        .problem = fmt::format("there is no effect \"{}\"", id),
+                        .remedy = "`diastole effects` lists those that are known."});
+    }
+    rig::Ingredient ingredient{effect, {}};
+    for (const StudyEffect& told : study.effect_values) {
+      if (told.id != id) continue;
+      for (const StudyMoment& moment : told.moments)
+        for (const rig::SessionRun& run : session.runs)
+          if (run.drive.place.name == moment.run)
+            ingredient.occasions.push_back(
+                {moment.run, moment.time_s, run.drive.place.started_s + moment.time_s});
+    }
+    list.push_back(std::move(ingredient));
+  }
+  return list;
+}
+
+/// The session as it would be without the effects of a fit: what the model says they do is taken off. Its cycles repeat,
+/// so that the noise can be told.
+rig::Session without_effects(const rig::Session& session, const rig::RigProblem& problem,
+                             const rig::RigFit& fit) {
+  rig::Session plain = session;
+  const auto with = problem.predictions(fit.ingredients, fit.values);
+  const auto base = problem.predictions({}, {fit.values.begin(), fit.values.begin() + 3});
+  for (size_t r = 0; r < plain.runs.size(); ++r) {
+    for (auto& [channel, values] : plain.runs[r].pressure_kPa) {
+      const bool cavity = channel == rig::Channel::cavity;
+      const auto& now = cavity ? with[r].cavity_kPa : with[r].pump_kPa;
+      const auto& then = cavity ? base[r].cavity_kPa : base[r].pump_kPa;
+      for (size_t k = 0; k < values.size(); ++k)
+        values[k] += then[k] - now[k];
+    }
+  }
+  return plain;
+}
+
+bool differ(const rig::NoiseModel& a, const rig::NoiseModel& b) {
+  constexpr double noise_part = 0.05;
+  constexpr double beat_part = 0.3;
+  constexpr double smallest_beat = 5e-4;
+  for (const auto& [channel, noise] : a.channels)
+    if (std::abs(b.channels.at(channel).innovation_kPa / noise.innovation_kPa - 1.0) > noise_part)
+      return true;
+  return std::abs(a.beat_sd - b.beat_sd) > beat_part * std::max(b.beat_sd, smallest_beat);
+}
+
+/// The session's problem and what was found in it.
+struct Work {
+  rig::RigProblem problem;
+  SearchResult found;
+
+  [[nodiscard]] const FittedSet& best() const { return found.sets[found.best]; }
+};
+
+/// A first search, and a second one if the effects had spoiled the estimate of the noise.
+Work searched(const rig::Session& session, const rig::SpecimenFamily& family, const Study& study,
+              const ExplainOptions& options) {
+  const auto tell = [&](const std::string& text) {
+    if (options.progress) options.progress(text);
+  };
+  tell("fitting the rig's model");
+  rig::RigFitOptions fitting;
+  fitting.threads = options.threads;
+  SearchOptions searching;
+  searching.progress = options.progress;
+  searching.start = ingredients_of(study, session);
+  rig::RigProblem problem(session, family, fitting);
+  SearchResult found = search(session, family, problem, searching);
+  const rig::RigFit& best = found.sets[found.best].fit;
+  const rig::NoiseModel noise = rig::estimate_noise(without_effects(session, problem, best));
+  if (!best.ingredients.empty() && differ(problem.noise(), noise)) {
+    tell("fitting again with the noise that is left");
+    fitting.noise = noise;
+    searching.start = best.ingredients;
+    rig::RigProblem again(session, family, fitting);
+    SearchResult second = search(session, family, again, searching);
+    return {std::move(again), std::move(second)};
+  }
+  return {std::move(problem), std::move(found)};
+}
+
+std::optional<NextExperiment> next_experiment(const rig::Session& session, const Work& work,
+                                              const Explanation& found, size_t threads) {
+  const ExperimentDesign design{session, work.problem, {}, threads};
+  if (found.verdict == Verdict::unexplained && !found.where.empty())
+    return exposing_experiment(design, found.where.front());
+  if (found.verdict == Verdict::named) return sharpening_experiment(design, work.best().fit);
+  if (found.verdict != Verdict::ambiguous) return {};
+  std::vector<const rig::RigFit*> competing{&work.best().fit};
+  for (const FittedSet& set : work.found.sets)
+    if (std::find(found.ambiguous_with.begin(), found.ambiguous_with.end(), set.ids()) !=
+        found.ambiguous_with.end())
+      competing.push_back(&set.fit);
+  return separating_experiment(design, competing);
+}
+
 }  // namespace
 
 Explanation explain_rig(const Study& study, const ExplainOptions& options) {
@@ -73,44 +182,41 @@ Explanation explain_rig(const Study& study, const ExplainOptions& options) {
   const rig::Session session = rig::read_session(study);
   tell("computing the specimen");
   const rig::SpecimenFamily family(study);
-  tell("fitting the rig's model");
-  rig::RigFitOptions fit_options;
-  fit_options.threads = options.threads;
-  const rig::RigProblem problem(session, family, fit_options);
-
-  SearchOptions search_options;
-  search_options.progress = options.progress;
-  const SearchResult found = search(session, family, problem, search_options);
-  const FittedSet& best = found.sets[found.best];
+  const Work work = searched(session, family, study, options);
+  const rig::RigProblem& problem = work.problem;
+  const rig::RigFit& base = problem.base();
+  const rig::RigFit& best = work.best().fit;
 
   tell("judging");
-  const Eigen::VectorXd change = problem.base().residuals - best.fit.residuals;
-  const auto cells =
-      residual_cells(session, problem.blocks(), best.fit.residuals, model_variance(problem, change));
+  const auto cells = residual_cells(session, problem.blocks(), best.residuals,
+                                    model_variance(problem, base.residuals - best.residuals));
   std::vector<ResidualCell> left = significant(cells, discovery_rate);
-  const size_t cell_count = cells.size();
-  if (!is_structured(left, cell_count)) left.clear();
-  const Judgement judgement = judge(found, left);
+  if (!is_structured(left, cells.size())) left.clear();
+  const Judgement judgement = judge(work.found, left);
 
   Explanation out;
   out.study = study.file.string();
   out.verdict = judgement.verdict;
-  out.ambiguous_with = judgement.ambiguous_with;
   const Eigen::VectorXd weights = row_weights(session, problem);
-  const std::vector<double> errors = parameter_errors(best.fit, weights);
-  if (judgement.verdict != Verdict::unexplained) out.effects = found_effects(best.fit, errors);
-  const bool unexplained = judgement.verdict == Verdict::unexplained;
-  const auto where = unexplained
-                         ? judgement.left
-                         : significant(residual_cells(session, problem.blocks(), problem.base().residuals,
-                                                      model_variance(problem, {})),
-                                       discovery_rate);
-  if (out.verdict != Verdict::none) out.where = misfits(session, problem, where, {}, best.fit);
-  out.gap = held_out_gap(session, problem, best.fit, weights);
-  out.evidence = evidence(found, judgement, {});
-  out.shifts = parameter_shifts(problem.base(), parameter_errors(problem.base(), weights), best.fit, errors);
-  out.steps = steps_of(found);
-  out.traces = traces(session, problem, problem.base(), best.fit);
+  const std::vector<double> errors = parameter_errors(best, weights);
+  if (judgement.verdict == Verdict::unexplained) {
+    out.where = misfits(session, problem, judgement.left, {}, base);
+  } else {
+    out.ambiguous_with = judgement.ambiguous_with;
+    out.effects = found_effects(best, errors);
+    if (out.verdict != Verdict::none) {
+      const auto before =
+          residual_cells(session, problem.blocks(), base.residuals, model_variance(problem, {}));
+      out.where = misfits(session, problem, significant(before, discovery_rate), {}, best);
+    }
+  }
+  out.gap = held_out_gap(session, problem, best, weights);
+  out.evidence = evidence(work.found, judgement, {});
+  out.shifts = parameter_shifts(base, parameter_errors(base, weights), best, errors);
+  out.steps = steps_of(work.found);
+  out.traces = traces(session, problem, base, best);
+  tell("designing the next experiment");
+  if (options.propose) out.next_experiment = next_experiment(session, work, out, options.threads);
   out.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
   out.summary = summary_of(out);
   return out;

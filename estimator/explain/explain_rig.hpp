@@ -15,6 +15,7 @@ namespace diastole::explain {
 
 struct ExplainOptions {
   size_t threads = 2;
+  bool propose = true;  ///< a next experiment
   std::function<void(const std::string&)>
       progress;  ///< a line for people; empty text: only asks whether to go on
 };

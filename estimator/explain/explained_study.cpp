@@ -19,17 +19,18 @@ toml::table& subtable(toml::table& parent, std::string_view key) {
   return *parent[key].as_table();
 }
 
-toml::table settings_of(const FoundEffect& effect) {
-  toml::table settings;
+toml::table starts_of(const FoundEffect& effect) {
+  toml::table starts;
   for (const FoundParameter& parameter : effect.parameters)
-    settings.insert_or_assign(parameter.name, parameter.value);
-  if (!effect.moments.empty()) {
-    toml::array moments;
-    for (const FoundMoment& moment : effect.moments)
-      moments.push_back(toml::table{{"run", moment.run}, {"time_s", moment.time_s}});
-    settings.insert_or_assign("moments", std::move(moments));
-  }
-  return settings;
+    starts.insert_or_assign(parameter.name, toml::table{{"start", parameter.value}});
+  return starts;
+}
+
+toml::array moments_of(const FoundEffect& effect) {
+  toml::array moments;
+  for (const FoundMoment& moment : effect.moments)
+    moments.push_back(toml::table{{"run", moment.run}, {"time_s", moment.time_s}});
+  return moments;
 }
 
 }  // namespace
@@ -54,13 +55,12 @@ std::string explained_study(const Study& study, const std::filesystem::path& fol
   }
   toml::table& model = subtable(root, "model");
   toml::array ids;
-  for (const FoundEffect& effect : effects)
+  for (const FoundEffect& effect : effects) {
     ids.push_back(effect.id);
+    subtable(model, "parameters").insert_or_assign(effect.id, starts_of(effect));
+    if (!effect.moments.empty()) subtable(model, "moments").insert_or_assign(effect.id, moments_of(effect));
+  }
   model.insert_or_assign("effects", std::move(ids));
-  toml::table parameters;
-  for (const FoundEffect& effect : effects)
-    parameters.insert_or_assign(effect.id, settings_of(effect));
-  if (!effects.empty()) model.insert_or_assign("parameters", std::move(parameters));
   std::ostringstream text;
   text << root << '\n';
   return text.str();

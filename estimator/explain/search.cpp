@@ -136,7 +136,8 @@ void Search::compare_alike(size_t set) {
 }
 
 SearchResult Search::run() {
-  std::vector<size_t> beam{0};
+  if (!options_.start.empty()) result_.best = fitted(options_.start, problem_.base());
+  std::vector<size_t> beam{result_.best};
   for (size_t effects = 0; effects < options_.most_effects; ++effects) {
     std::vector<size_t> grown;
     for (const size_t from : beam) {

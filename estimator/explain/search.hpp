@@ -31,6 +31,7 @@ struct SearchOptions {
   size_t most_effects = 3;
   size_t refitted = 4;  ///< of each screening
   size_t beam = 2;
+  std::vector<rig::Ingredient> start = {};           ///< effects that the model has already
   std::function<void(const std::string&)> progress;  ///< may throw to end the search
 };
 

@@ -156,6 +156,33 @@ std::optional<StudyChamber> read_chamber(TableReader& root) {
   return chamber;
 }
 
+/// [model.parameters.ID.NAME] start = ... and [[model.moments.ID]] of the effects of the list.
+std::vector<StudyEffect> read_effect_values(TableReader& model, const std::vector<std::string>& effects) {
+  std::vector<StudyEffect> list;
+  std::optional<TableReader> parameters = model.table_if("parameters");
+  std::optional<TableReader> moments = model.table_if("moments");
+  for (const std::string& id : effects) {
+    StudyEffect effect{id, {}, {}};
+    if (parameters && parameters->has(id)) {
+      for (auto& [name, parameter] : parameters->table(id).named_tables()) {
+        effect.starts[name] = parameter.number("start");
+        parameter.finish();
+      }
+    }
+    if (moments) {
+      for (TableReader& moment : moments->tables(id)) {
+        effect.moments.push_back({moment.text("run"), moment.number("time_s", {.at_least = 0})});
+        moment.finish();
+      }
+    }
+    if (!effect.starts.empty() || !effect.moments.empty()) list.push_back(std::move(effect));
+  }
+  // Tables of effects that are not in the list are errors.
+  if (parameters) parameters->finish();
+  if (moments) moments->finish();
+  return list;
+}
+
 StudyCompression read_compression(TableReader& model) {
   StudyCompression compression;
   if (model.has("bulk_modulus_kPa"))
@@ -218,6 +245,7 @@ Study read_study(const std::filesystem::path& path) {
   study.chamber = read_chamber(root);
   if (auto model = root.table_if("model")) {
     study.effects = model->texts_or("effects", {});
+    study.effect_values = read_effect_values(*model, study.effects);
     study.compression = read_compression(*model);
     if (model->has("refine")) {
       const std::vector<int64_t> halvings =

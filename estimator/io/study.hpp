@@ -5,6 +5,7 @@
 
 #include <array>
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -104,12 +105,27 @@ struct StudyCompression {
   double volume_stiffness_kPa = 0.0;            ///< helps an incompressible solution to converge
 };
 
+/// A moment of a run at which an effect happened.
+struct StudyMoment {
+  std::string run;  ///< "baseline"
+  double time_s;
+};
+
+/// What the study tells of one of its effects: [model.parameters.ID.NAME] and [[model.moments.ID]]. Whether id and
+/// names are known is decided where the model is built.
+struct StudyEffect {
+  std::string id;
+  std::map<std::string, double> starts;  ///< by parameter
+  std::vector<StudyMoment> moments;
+};
+
 struct Study {
   std::filesystem::path file;
   Specimen specimen;
   StudyLaw law;
   StudyData data;
-  std::vector<std::string> effects;  ///< effects that the model already includes
+  std::vector<std::string> effects;             ///< effects that the model already includes
+  std::vector<StudyEffect> effect_values = {};  ///< of some or all of them
   std::optional<StudyChamber> chamber = {};
   StudyCompression compression = {};
   /// How often the specimen's elements are halved along each direction: a finer mesh of the very same body

@@ -56,7 +56,10 @@ double RigFit::value(std::string_view name) const {
 }
 
 RigProblem::RigProblem(const Session& session, const SpecimenFamily& family, const RigFitOptions& options)
-    : session_(session), family_(family), options_(options), noise_(estimate_noise(session)) {
+    : session_(session),
+      family_(family),
+      options_(options),
+      noise_(options.noise ? *options.noise : estimate_noise(session)) {
   set_blocks();
   for (const SessionRun& run : session.runs) {
     motions_.push_back(sampled_motion(run.drive, step_s(Look::fine)));

@@ -8,6 +8,7 @@
 // are damped (Levenberg-Marquardt); an unknown that is pushed against its bound is held there.
 
 #include <Eigen/Dense>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -68,7 +69,8 @@ struct FitRequest {
 struct RigFitOptions {
   size_t threads = 2;
   size_t most_iterations = 40;
-  SimulationOptions simulation{};  ///< steps are twice as long where there is no sensor at the pump
+  std::optional<NoiseModel> noise = {};  ///< known from elsewhere; else estimated from the session
+  SimulationOptions simulation{};        ///< steps are twice as long where there is no sensor at the pump
 };
 
 class RigProblem {

@@ -88,7 +88,8 @@ int main(int argc, char** argv) {
         });
     if (!chosen) continue;
     const Study study = read_study(folder / name / (name + ".study.toml"));
-    explain::Explanation found = explain::explain_rig(study, {.threads = 2, .progress = {}});
+    explain::Explanation found =
+        explain::explain_rig(study, {.threads = 2, .propose = false, .progress = {}});
     report(name, label, found);
     found.traces.clear();
     std::ofstream(kept / (name + ".json")) << explain::to_json(found);
