@@ -2,12 +2,15 @@
 
 #include <array>
 #include <cmath>
+#include <numbers>
 #include <vector>
 
 #include "estimator/effects/effect.hpp"
 
 namespace diastole {
 namespace {
+
+constexpr double reach = 6.0;  ///< of the loss, in sd
 
 class MissedSteps final : public Effect {
  public:
@@ -17,8 +20,8 @@ class MissedSteps final : public Effect {
         .title = "missed steps",
         .port = Port::drive,
         .equations =
-            "V_piston = V_commanded - lost_mL sum 1 / (1 + exp(-(t - t_i) / stall)) over the moments "
-            "t_i.",
+            "V_piston = V_commanded - lost_mL sum Phi((t - t_i) / stall_s) over the moments t_i, Phi the "
+            "normal distribution.",
         .source = "A stepper that falls out of step loses whole electrical cycles at once.",
         .looks_like =
             "From a moment on the pressure of all later phases is shifted, first visible where the "
@@ -32,7 +35,7 @@ class MissedSteps final : public Effect {
   [[nodiscard]] std::span<const EffectParameter> parameters() const override {
     static constexpr std::array<EffectParameter, 2> list{
         {{"lost_mL", "mL", "volume lost each time", 0.0, -3.0, 3.0, 0.25},
-         {"stall_s", "s", "time constant of the loss", 0.012, 0.004, 0.05, 0.012, SearchScale::logarithmic}}};
+         {"stall_s", "s", "sd of the loss in time", 0.02, 0.004, 0.06, 0.02, SearchScale::logarithmic}}};
     return list;
   }
   [[nodiscard]] Occasions occasions() const override { return Occasions::several; }
@@ -45,11 +48,13 @@ class MissedSteps final : public Effect {
       for (const Occasion& moment : moments) {
         if (moment.run != place.name) continue;
         for (size_t k = 0; k < trace.volume_mL.size(); ++k) {
-          const double part = 1.0 / (1.0 + std::exp((moment.time_s - trace.time_s(k)) / stall_s));
-          const double speed = part * (1.0 - part) / stall_s;
-          trace.volume_mL[k] -= lost_mL * part;
+          const double late = (trace.time_s(k) - moment.time_s) / stall_s;
+          if (late < -reach) continue;
+          trace.volume_mL[k] -= lost_mL * 0.5 * std::erfc(-late / std::numbers::sqrt2);
+          if (late > reach) continue;
+          const double speed = std::exp(-0.5 * late * late) / (stall_s * std::sqrt(2.0 * std::numbers::pi));
           trace.flow_mL_per_s[k] -= lost_mL * speed;
-          trace.acceleration_mL_per_s2[k] -= lost_mL * speed * (1.0 - 2.0 * part) / stall_s;
+          trace.acceleration_mL_per_s2[k] += lost_mL * speed * late / stall_s;
         }
       }
     });

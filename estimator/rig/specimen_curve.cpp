@@ -32,10 +32,11 @@ SpecimenCurve::Value SpecimenCurve::at(double volume_mL) const {
 
 SpecimenCurve SpecimenCurve::plus(const SpecimenCurve& other, double factor, double other_factor) const {
   std::vector<Point> points = points_;
-  for (size_t k = 0; k < points.size(); ++k) {
-    points[k].pressure_kPa = factor * points[k].pressure_kPa + other_factor * other.points_[k].pressure_kPa;
-    points[k].stiffness_kPa_per_mL =
-        factor * points[k].stiffness_kPa_per_mL + other_factor * other.points_[k].stiffness_kPa_per_mL;
+  for (Point& point : points) {
+    const Value more = other.at(point.volume_mL);
+    point.pressure_kPa = factor * point.pressure_kPa + other_factor * more.pressure_kPa;
+    point.stiffness_kPa_per_mL =
+        factor * point.stiffness_kPa_per_mL + other_factor * more.stiffness_kPa_per_mL;
   }
   return SpecimenCurve(std::move(points));
 }

@@ -24,7 +24,7 @@ class SpecimenCurve {
 
   [[nodiscard]] Value at(double volume_mL) const;
   [[nodiscard]] const std::vector<Point>& points() const { return points_; }
-  /// The curve times `factor` plus `other` times its factor; both over the same volumes.
+  /// The curve times `factor` plus `other` times its factor, at this curve's volumes.
   [[nodiscard]] SpecimenCurve plus(const SpecimenCurve& other, double factor, double other_factor) const;
 
  private:

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <utility>
 
@@ -13,7 +14,9 @@ namespace diastole::rig {
 namespace {
 
 constexpr double plate_kPa_per_mm = 1e5;  ///< holds the ends along the axis
-constexpr double softest_mm = 8.0;        ///< where half of the way to free ends is gone, about
+/// The edges at the held ends are corners: of what the fine mesh changes, so much again is missing (Richardson).
+constexpr double still_missing = 0.3;
+constexpr double softest_mm = 8.0;  ///< where half of the way to free ends is gone, about
 
 void follow(Study study, double to_mL, size_t steps, std::vector<SpecimenCurve::Point>& points) {
   ElasticModel model = make_model(study);
@@ -52,15 +55,21 @@ SpecimenFamily::SpecimenFamily(Study study, const SpecimenResolution& resolution
     if (is_modulus(parameter)) parameter.start /= modulus_kPa_;
 }
 
-SpecimenCurve SpecimenFamily::compute(const Study& study) const {
-  const double spacing_mL = resolution_.spacing_mL;
+SpecimenResolution SpecimenResolution::reaching(double volume_mL) const {
+  SpecimenResolution wider = *this;
+  wider.spacing_mL = std::max(spacing_mL, volume_mL / static_cast<double>(points_inflated));
+  return wider;
+}
+
+SpecimenCurve SpecimenFamily::compute(const Study& study, size_t stride) const {
+  const double spacing_mL = resolution_.spacing_mL * static_cast<double>(stride);
+  const size_t points_emptied = resolution_.points_emptied / stride;
   std::vector<SpecimenCurve::Point> emptied;
-  follow(study, -spacing_mL * static_cast<double>(resolution_.points_emptied), resolution_.points_emptied,
-         emptied);
+  follow(study, -spacing_mL * static_cast<double>(points_emptied), points_emptied, emptied);
   std::vector<SpecimenCurve::Point> points(emptied.rbegin(), emptied.rend());
   points.pop_back();  // rest, which begins both
-  follow(study, spacing_mL * static_cast<double>(resolution_.points_inflated), resolution_.points_inflated,
-         points);
+  const size_t points_inflated = resolution_.points_inflated / stride;
+  follow(study, spacing_mL * static_cast<double>(points_inflated), points_inflated, points);
   return SpecimenCurve(std::move(points));
 }
 
@@ -70,73 +79,109 @@ bool SpecimenFamily::has_neighbours() const {
   return std::holds_alternative<AnnulusSpecimen>(study_.specimen) && study_.law.name == "neo-hookean";
 }
 
-const SpecimenCurve& SpecimenFamily::computed(const std::string& name, const Study& study) const {
-  const std::scoped_lock lock(mutex_);
+const SpecimenCurve& SpecimenFamily::computed(const std::string& name, const Study& study,
+                                              size_t stride) const {
   auto found = curves_.find(name);
-  if (found == curves_.end()) found = curves_.emplace(name, compute(study)).first;
+  if (found == curves_.end()) found = curves_.emplace(name, compute(study, stride)).first;
   return found->second;
 }
 
-const SpecimenCurve& SpecimenFamily::plain() const {
+Study SpecimenFamily::coarse_study() const {
   Study study = study_;
-  if (auto* annulus = std::get_if<AnnulusSpecimen>(&study.specimen)) annulus->mesh = resolution_.fine;
-  return computed("plain", study);
+  std::get<AnnulusSpecimen>(study.specimen).mesh = resolution_.coarse;
+  return study;
 }
 
-SpecimenCurve SpecimenFamily::between(const std::string& name, const std::vector<double>& nodes, double value,
-                                      const Neighbour& neighbour) const {
-  Study coarse = study_;
-  std::get<AnnulusSpecimen>(coarse.specimen).mesh = resolution_.coarse;
-  const SpecimenCurve& base = computed("coarse", coarse);
-  SpecimenCurve sum = plain();
-  for (const double node : nodes) {
+const SpecimenCurve& SpecimenFamily::plain() const {
+  const std::scoped_lock lock(mutex_);
+  if (plain_) return *plain_;
+  if (!std::holds_alternative<AnnulusSpecimen>(study_.specimen)) {
+    plain_ = computed("own mesh", study_, 1);
+    return *plain_;
+  }
+  const SpecimenCurve& coarse = computed("coarse", coarse_study(), 1);
+  plain_ = coarse;
+  if (resolution_.fine != resolution_.coarse) {
+    Study fine = study_;
+    std::get<AnnulusSpecimen>(fine.specimen).mesh = resolution_.fine;
+    const SpecimenCurve& solved = computed("fine", fine, resolution_.stride);
+    plain_ = coarse.plus(solved.plus(coarse, 1.0, -1.0), 1.0, 1.0);
+  }
+  return *plain_;
+}
+
+SpecimenCurve SpecimenFamily::between(const Neighbours& of, double value) const {
+  const SpecimenCurve& here = plain();
+  const std::scoped_lock lock(mutex_);
+  const SpecimenCurve& base = computed("coarse", coarse_study(), 1);
+  const auto differing = [&](double node, const std::array<int, 3>& mesh, const SpecimenCurve& from) {
+    Study study = coarse_study();
+    std::get<AnnulusSpecimen>(study.specimen).mesh = mesh;
+    of.change(node, study);
+    const std::string name = fmt::format("{} {} {}", of.name, node, mesh == resolution_.fine);
+    return computed(name, study, resolution_.stride).plus(from, 1.0, -1.0);
+  };
+  std::optional<SpecimenCurve> sum;
+  for (const double node : of.nodes) {
     if (node == 0.0) continue;
     double weight = 1.0;
-    for (const double other : nodes)
+    for (const double other : of.nodes)
       if (other != node) weight *= (value - other) / (node - other);
-    const SpecimenCurve& at_node = computed(fmt::format("{} {}", name, node), neighbour(node));
-    sum = sum.plus(at_node, 1.0, weight).plus(base, 1.0, -weight);
+    const SpecimenCurve one = differing(node, resolution_.coarse, base);
+    sum = sum ? sum->plus(one, 1.0, weight) : one.plus(one, weight, 0.0);
   }
-  return sum;
+  if (of.refined_at != 0.0 && resolution_.fine != resolution_.coarse) {
+    const double at_mL = 0.5 * resolution_.spacing_mL * static_cast<double>(resolution_.points_inflated);
+    const SpecimenCurve coarse = differing(of.refined_at, resolution_.coarse, base);
+    const SpecimenCurve fine = differing(of.refined_at, resolution_.fine, here);
+    const double share = sum->at(at_mL).pressure_kPa / coarse.at(at_mL).pressure_kPa;
+    sum = sum->plus(fine.plus(coarse, 1.0, -1.0), 1.0, share * (1.0 + still_missing));
+  }
+  return here.plus(*sum, 1.0, 1.0);
 }
 
 SpecimenCurve SpecimenFamily::with_inner_radius(double fraction) const {
-  return between("radius", {-0.1, -0.05, 0.0, 0.05, 0.1}, fraction, [&](double node) {
-    Study study = study_;
-    auto& annulus = std::get<AnnulusSpecimen>(study.specimen);
-    annulus.mesh = resolution_.coarse;
-    annulus.inner_radius_mm *= 1.0 + node;
-    return study;
-  });
+  return between({.name = "radius",
+                  .nodes = {-0.1, -0.05, 0.0, 0.05, 0.1},
+                  .refined_at = 0.0,
+                  .change =
+                      [](double node, Study& study) {
+                        std::get<AnnulusSpecimen>(study.specimen).inner_radius_mm *= 1.0 + node;
+                      }},
+                 fraction);
 }
 
 SpecimenCurve SpecimenFamily::stiffened(double beta) const {
-  return between("beta", {0.0, 0.75, 1.5, 3.0}, beta, [&](double node) {
-    Study study = study_;
-    std::get<AnnulusSpecimen>(study.specimen).mesh = resolution_.coarse;
-    StudyParameter stiffening = study.law.parameters.front();
-    stiffening.name = "beta";
-    stiffening.start = node;
-    stiffening.lower = 0.0;
-    stiffening.upper = 10.0;
-    study.law.name = "demiray";
-    study.law.parameters.push_back(stiffening);
-    return study;
-  });
+  return between({.name = "beta",
+                  .nodes = {0.0, 0.75, 1.5, 3.0},
+                  .refined_at = 1.5,
+                  .change =
+                      [](double node, Study& study) {
+                        StudyParameter stiffening = study.law.parameters.front();
+                        stiffening.name = "beta";
+                        stiffening.start = node;
+                        stiffening.lower = 0.0;
+                        stiffening.upper = 10.0;
+                        study.law.name = "demiray";
+                        study.law.parameters.push_back(stiffening);
+                      }},
+                 beta);
 }
 
 SpecimenCurve SpecimenFamily::slipping(double compliance_mm) const {
   // In c / (c + c0) the curve is nearly straight from held to free ends.
   const double way = compliance_mm / (compliance_mm + softest_mm);
-  return between("slip", {0.0, 0.25, 0.5, 0.75}, way, [&](double node) {
-    Study study = study_;
-    auto& annulus = std::get<AnnulusSpecimen>(study.specimen);
-    annulus.mesh = resolution_.coarse;
-    annulus.ends = "sprung";
-    const double compliance = softest_mm * node / (1.0 - node);
-    annulus.end_springs = EndSprings{plate_kPa_per_mm, 1.0 / compliance};
-    return study;
-  });
+  return between({.name = "slip",
+                  .nodes = {0.0, 0.25, 0.5, 0.75},
+                  .refined_at = 0.5,
+                  .change =
+                      [](double node, Study& study) {
+                        auto& annulus = std::get<AnnulusSpecimen>(study.specimen);
+                        annulus.ends = "sprung";
+                        const double compliance = softest_mm * node / (1.0 - node);
+                        annulus.end_springs = EndSprings{plate_kPa_per_mm, 1.0 / compliance};
+                      }},
+                 way);
 }
 
 }  // namespace diastole::rig

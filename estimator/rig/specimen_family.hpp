@@ -2,15 +2,18 @@
 // The pressure-volume curves of a study's specimen and of its neighbours: what finite elasticity says about another
 // inner radius, a stiffening law, ends that slip. All at a modulus of 1 kPa, computed once each and kept.
 //
-// The plain curve comes from a fine mesh; neighbours differ from it by what they differ on a coarse mesh, and between
-// the computed ones by a polynomial. A cylinder is symmetric about its axis, so that four elements around it are enough:
-// shapes agree with those of finer meshes within 1e-4.
+// A cylinder's plain curve comes from a coarse mesh at all volumes and from a fine one at every fourth: their difference
+// is so smooth that the curve is the fine mesh's within 1e-6 of its pressure. Neighbours differ from it by what they
+// differ on the coarse mesh, at every fourth volume too, and between the computed ones by a polynomial. A cylinder is
+// symmetric about its axis, so that four elements around it are enough: shapes agree with those of finer meshes within
+// 2e-5.
 
 #include <array>
 #include <cstddef>
 #include <functional>
 #include <map>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -21,11 +24,15 @@ namespace diastole::rig {
 
 /// How finely curves are computed. A cylinder's meshes are these; another specimen has its own.
 struct SpecimenResolution {
-  std::array<int, 3> fine{4, 10, 3};
+  std::array<int, 3> fine{4, 10, 2};
   std::array<int, 3> coarse{4, 4, 1};
-  double spacing_mL = 4.0;
-  size_t points_inflated = 14;
+  double spacing_mL = 3.5;
+  size_t points_inflated = 16;
   size_t points_emptied = 4;
+  size_t stride = 4;  ///< between volumes at which meshes are compared; divides both numbers of points
+
+  /// The same up to a larger volume, if need be: curves go on straight beyond their ends.
+  [[nodiscard]] SpecimenResolution reaching(double volume_mL) const;
 };
 
 class SpecimenFamily {
@@ -49,20 +56,30 @@ class SpecimenFamily {
   [[nodiscard]] SpecimenCurve slipping(double compliance_mm) const;
 
  private:
-  using Neighbour = std::function<Study(double)>;
-  [[nodiscard]] const SpecimenCurve& computed(const std::string& name, const Study& study) const;
-  /// plain() and the coarse meshes' difference between neighbour and plain, at `value`, by the polynomial through `nodes`.
-  [[nodiscard]] SpecimenCurve between(const std::string& name, const std::vector<double>& nodes, double value,
-                                      const Neighbour& neighbour) const;
-
-  [[nodiscard]] SpecimenCurve compute(const Study& study) const;
+  /// Specimens that differ by one value.
+  struct Neighbours {
+    std::string name;
+    std::vector<double> nodes;  ///< values at which they are solved for; 0 is the plain one
+    double refined_at = 0.0;  ///< a node for which the fine mesh is asked too; 0 if the coarse one is enough
+    std::function<void(double, Study&)> change;
+  };
+  /// At every `stride`-th volume; kept by its name.
+  [[nodiscard]] const SpecimenCurve& computed(const std::string& name, const Study& study,
+                                              size_t stride) const;
+  /// The study's cylinder on the coarse mesh.
+  [[nodiscard]] Study coarse_study() const;
+  /// plain() and what the neighbour differs from it on the coarse mesh, at `value` by the polynomial through the nodes;
+  /// what the fine mesh changes at one node is taken as a constant part of the difference.
+  [[nodiscard]] SpecimenCurve between(const Neighbours& of, double value) const;
+  [[nodiscard]] SpecimenCurve compute(const Study& study, size_t stride) const;
 
   Study study_;
   SpecimenResolution resolution_;
   double modulus_kPa_ = 1.0;
   size_t modulus_index_ = 0;
   mutable std::mutex mutex_;
-  mutable std::map<std::string, SpecimenCurve> curves_;
+  mutable std::map<std::string, SpecimenCurve> curves_;  ///< that were solved for
+  mutable std::optional<SpecimenCurve> plain_;
 };
 
 }  // namespace diastole::rig
