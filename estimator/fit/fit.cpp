@@ -164,6 +164,7 @@ FitOutcome fit_motion(MotionModel& model, const std::vector<SoughtValue>& sought
   if (options.robustness == Robustness::always) problem.set_robust(RobustLoss::for_deviation(1));
   // Which points lie on the body depends on the motion, and how smooth the values are depends on the data: search
   // again while a better motion finds more points or another smoothness.
+  bool again = true;
   for (int search = 0; search < most_searches; ++search) {
     const std::optional<size_t> gained = problem.find_points(q);
     if (!gained) {
@@ -174,13 +175,15 @@ FitOutcome fit_motion(MotionModel& model, const std::vector<SoughtValue>& sought
     const bool prepared = search == 1 && any_by_evidence(options);
     const bool other_smoothness = search > 0 && choose_smoothness(problem, q, options);
     const bool other_loss = search > 0 && problem.residuals(q) != nullptr && choose_loss(problem, options);
-    if (*gained == 0 && !other_smoothness && !other_loss && !prepared && search > 0) break;
+    if (*gained == 0 && !other_smoothness && !other_loss && !prepared && !again) break;
     OptimiserResult found = search_from(problem, q, outcome, options, roughly);
     q = found.q;
     outcome.converged = found.converged;
     outcome.reason = std::move(found.reason);
     outcome.iterations += found.iterations;
-    if (!found.converged) break;
+    // Tags that come and go from trial to trial make the cost jump: without them it goes on.
+    again = found.stalled && problem.give_up_lost() > 0;
+    if (!found.converged && !again) break;
   }
   if (!outcome.history.empty()) {
     const Eigen::MatrixXd covariance = tell_uncertainty(outcome, problem, q, options);

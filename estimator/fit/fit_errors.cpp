@@ -43,6 +43,7 @@ EstimatedFrame estimated(const JointProblem::LoadedFrame& frame, const Eigen::Ve
           .se_kPa = unknown ? std::sqrt(covariance(*unknown, *unknown)) : 0.0,
           .usable = frame.residuals.usable(),
           .tags_left_out = frame.residuals.tags_left_out(),
+          .tags_unfollowed = frame.residuals.tags_unfollowed(),
           .points_left_out = frame.residuals.points_left_out(),
           .weighted = frame.residuals.weighted(),
           .unweighted_mm = frame.residuals.unweighted_mm(),

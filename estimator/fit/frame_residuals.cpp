@@ -1,12 +1,14 @@
 #include "estimator/fit/frame_residuals.hpp"
 
-#include <atomic>
+#include <algorithm>
 #include <thread>
 
 #include "estimator/fe/parallel_for.hpp"
 
 namespace diastole {
 namespace {
+
+constexpr double most_lost = 0.1;  // of a frame's usable tags, in a motion that is not too far off
 
 Eigen::Vector3d vector_of(const std::array<double, 3>& v) { return {v[0], v[1], v[2]}; }
 
@@ -16,7 +18,11 @@ size_t machine_threads() { return std::max(1U, std::thread::hardware_concurrency
 
 FrameResiduals::FrameResiduals(const HermiteMesh& mesh, const PointLocator& reference,
                                std::vector<TagPoint> tags, std::vector<ObservedPoint> points)
-    : mesh_(mesh), reference_(reference), tags_(std::move(tags)), points_(std::move(points)) {
+    : mesh_(mesh),
+      reference_(reference),
+      tags_(std::move(tags)),
+      points_(std::move(points)),
+      given_up_(tags_.size(), false) {
   for (size_t i = 0; i < points_.size(); ++i) {
     if (const auto found = reference_.find(vector_of(points_[i].X_mm)))
       usable_points_.push_back({i, found->point});
@@ -26,14 +32,21 @@ FrameResiduals::FrameResiduals(const HermiteMesh& mesh, const PointLocator& refe
 std::vector<FrameResiduals::UsableTag> FrameResiduals::find_tags(std::span<const double> position_mm,
                                                                  const LocatorOptions& options) {
   const PointLocator deformed(mesh_, position_mm, options);
+  std::vector<std::optional<MaterialPoint>> guesses(tags_.size());
   std::vector<std::optional<TagMatch>> matches(tags_.size());
   parallel_for(tags_.size(), machine_threads(), [&](size_t i) {
-    const auto guess = find_tag(deformed, tags_[i]);
-    if (guess) matches[i] = match_tag(mesh_, reference_, position_mm, tags_[i], *guess);
+    guesses[i] = find_tag(deformed, tags_[i]);
+    if (guesses[i] && !given_up_[i])
+      matches[i] = match_tag(mesh_, reference_, position_mm, tags_[i], *guesses[i]);
   });
   std::vector<UsableTag> found;
+  unfollowed_ = 0;
   for (size_t i = 0; i < matches.size(); ++i) {
-    if (matches[i]) found.push_back({i, *matches[i]});
+    if (matches[i]) {
+      found.push_back({i, *matches[i], matches[i]->error_mm});
+    } else if (guesses[i]) {
+      ++unfollowed_;
+    }
   }
   return found;
 }
@@ -53,23 +66,25 @@ size_t FrameResiduals::find_points(std::span<const double> position_mm, const Lo
 }
 
 bool FrameResiduals::evaluate(std::span<const double> position_mm) {
-  std::atomic<bool> all_found = true;
-  std::vector<TagMatch> matches(usable_tags_.size());
+  std::vector<std::optional<TagMatch>> matches(usable_tags_.size());
   parallel_for(usable_tags_.size(), machine_threads(), [&](size_t row) {
     const UsableTag& tag = usable_tags_[row];
-    const auto match = match_tag(mesh_, reference_, position_mm, tags_[tag.index], tag.match.point);
-    if (match) {
-      matches[row] = *match;
-    } else {
-      all_found = false;
-    }
+    matches[row] = match_tag(mesh_, reference_, position_mm, tags_[tag.index], tag.match.point);
   });
-  if (!all_found) return false;
+  const auto lost = std::count(matches.begin(), matches.end(), std::nullopt);
+  if (static_cast<double>(lost) > most_lost * static_cast<double>(usable_tags_.size())) return false;
   Eigen::Index row = 0;
   for (size_t i = 0; i < usable_tags_.size(); ++i, ++row) {
-    usable_tags_[i].match = matches[i];
-    unweighted_mm_[row] = matches[i].error_mm;
-    weighted_[row] = matches[i].error_mm / tags_[usable_tags_[i].index].sigma_mm;
+    UsableTag& tag = usable_tags_[i];
+    if (matches[i]) {
+      tag.match = *matches[i];
+    } else {
+      tag.was_lost = true;
+      tag.match.error_mm = tag.found_error_mm;
+      tag.match.by_motion.setZero();
+    }
+    unweighted_mm_[row] = tag.match.error_mm;
+    weighted_[row] = tag.match.error_mm / tags_[tag.index].sigma_mm;
   }
   for (const UsablePoint& usable : usable_points_) {
     const ObservedPoint& seen = points_[usable.index];
@@ -79,6 +94,16 @@ bool FrameResiduals::evaluate(std::span<const double> position_mm) {
     row += 3;
   }
   return true;
+}
+
+size_t FrameResiduals::give_up_lost() {
+  size_t count = 0;
+  for (const UsableTag& tag : usable_tags_) {
+    if (!tag.was_lost) continue;
+    given_up_[tag.index] = true;
+    ++count;
+  }
+  return count;
 }
 
 namespace {

@@ -7,6 +7,10 @@
 // Rows: the usable tags in their order, then the usable points, x y z of each. A point is usable when it was
 // found on the body at the motion given to `find_points`; the choice then stays until the next call, so that
 // the cost is a smooth function of the unknowns.
+//
+// A wild tag near the edge of the body may be lost in another motion: its line of error no longer meets its plane
+// there. It then keeps the residual that it had when it was found, with derivatives of zero, so that no single tag
+// can forbid a motion. Only when many are lost the motion is too far off.
 
 #include <Eigen/Dense>
 #include <span>
@@ -27,9 +31,11 @@ class FrameResiduals {
   /// Looks for every point on the body in this motion; returns how many became usable that were not.
   size_t find_points(std::span<const double> position_mm, const LocatorOptions& options);
 
-  /// The residuals in this motion. False when a usable point cannot be followed there: the motion is too far
-  /// off.
+  /// The residuals in this motion. False when more than a tenth of the usable tags are lost there.
   [[nodiscard]] bool evaluate(std::span<const double> position_mm);
+
+  /// Leaves the tags that were lost since the last `find_points` out for good, from the next one on; how many.
+  size_t give_up_lost();
 
   /// Of the last successful `evaluate`.
   [[nodiscard]] const Eigen::VectorXd& weighted() const { return weighted_; }
@@ -40,12 +46,16 @@ class FrameResiduals {
   [[nodiscard]] Eigen::Index rows() const { return weighted_.size(); }
   [[nodiscard]] size_t usable() const { return usable_tags_.size() + usable_points_.size(); }
   [[nodiscard]] size_t tags_left_out() const { return tags_.size() - usable_tags_.size(); }
+  /// Of those left out: on the body, but with a line of error that does not meet their plane there.
+  [[nodiscard]] size_t tags_unfollowed() const { return unfollowed_; }
   [[nodiscard]] size_t points_left_out() const { return points_.size() - usable_points_.size(); }
 
  private:
   struct UsableTag {
     size_t index;
     TagMatch match;
+    double found_error_mm;  // the error in the motion of `find_points`
+    bool was_lost = false;  // in some motion since
   };
   struct UsablePoint {
     size_t index;
@@ -59,6 +69,8 @@ class FrameResiduals {
   const PointLocator& reference_;
   std::vector<TagPoint> tags_;
   std::vector<ObservedPoint> points_;
+  std::vector<bool> given_up_;
+  size_t unfollowed_ = 0;
   std::vector<UsableTag> usable_tags_;
   std::vector<UsablePoint> usable_points_;
   Eigen::VectorXd weighted_;

@@ -154,6 +154,13 @@ std::optional<size_t> JointProblem::find_points(const Eigen::VectorXd& q) {
   return gained;
 }
 
+size_t JointProblem::give_up_lost() {
+  size_t count = 0;
+  for (LoadedFrame& frame : frames_)
+    count += frame.residuals.give_up_lost();
+  return count;
+}
+
 const Eigen::VectorXd* JointProblem::residuals(const Eigen::VectorXd& q) {
   if (residuals_at_ && *residuals_at_ == q) return &residuals_;
   residuals_at_.reset();
@@ -162,7 +169,7 @@ const Eigen::VectorXd* JointProblem::residuals(const Eigen::VectorXd& q) {
   Eigen::Index row = 0;
   for (LoadedFrame& frame : frames_) {
     if (!frame.residuals.evaluate(frame.position_mm)) {
-      failure_ = fmt::format("frame {}: measured points cannot be followed on the body at these values",
+      failure_ = fmt::format("frame {}: many tag points cannot be followed on the body at these values",
                              frame.number);
       return nullptr;
     }

@@ -96,7 +96,11 @@ class JointProblem {
   /// (and `failure`) without equilibrium.
   std::optional<size_t> find_points(const Eigen::VectorXd& q);
 
-  /// Residuals at q; nullptr (and `failure`) if a frame has no equilibrium or a point cannot be followed.
+  /// Leaves the tags that were lost since the last `find_points` out of the next one and all later ones; how many.
+  size_t give_up_lost();
+
+  /// Residuals at q; nullptr (and `failure`) if a frame has no equilibrium or many tags are lost there
+  /// (frame_residuals.hpp).
   [[nodiscard]] const Eigen::VectorXd* residuals(const Eigen::VectorXd& q);
   /// Derivatives at q, by the model's exact sensitivities. Precondition: `residuals(q)` succeeded just
   /// before.

@@ -5,9 +5,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace diastole {
 namespace {
+
+constexpr double nothing_gained = 1e-3;   // of the cost: a twentieth of a standard error
+constexpr double tolerances_gained = 10;  // or as many of the tolerance of the cost
 
 using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
@@ -53,12 +57,14 @@ class Recorder : public ceres::IterationCallback {
 
   ceres::CallbackReturnType operator()(const ceres::IterationSummary& step) override {
     iterations = step.iteration;
+    if (step.iteration > 0 && !step.step_is_successful) ++refused;
     if (options_.on_step) options_.on_step({step.iteration, step.cost, step.step_is_successful, q_});
     interrupted = options_.interrupted && options_.interrupted();
     return interrupted ? ceres::SOLVER_TERMINATE_SUCCESSFULLY : ceres::SOLVER_CONTINUE;
   }
 
   int iterations = 0;
+  int refused = 0;
   bool interrupted = false;
 
  private:
@@ -86,6 +92,21 @@ std::string reason_of(const ceres::Solver::Summary& summary, const JointProblem&
       return problem.failure().empty() ? "Failed: no step lowers the cost."
                                        : fmt::format("Failed: {}.", problem.failure());
   }
+}
+
+/// By how much the cost would fall in a step of its quadratic model, bounds held.
+double promised_gain(const JointCost& cost, const JointProblem& problem, const Eigen::VectorXd& q) {
+  Eigen::VectorXd residuals(problem.rows());
+  RowMajor jacobian(problem.rows(), problem.unknowns());
+  const double* unknowns[] = {q.data()};
+  double* jacobians[] = {jacobian.data()};
+  if (!cost.Evaluate(unknowns, residuals.data(), jacobians)) return std::numeric_limits<double>::infinity();
+  const Eigen::VectorXd length = jacobian.colwise().norm();
+  for (Eigen::Index i = 0; i < q.size(); ++i)
+    jacobian.col(i) /= length[i] > 0 ? length[i] : 1.0;
+  const Eigen::VectorXd gradient = jacobian.transpose() * residuals;
+  const Eigen::MatrixXd curvature = jacobian.transpose() * jacobian;
+  return 0.5 * gradient.dot(curvature.completeOrthogonalDecomposition().solve(gradient));
 }
 
 }  // namespace
@@ -118,13 +139,22 @@ OptimiserResult minimise(JointProblem& problem, const Eigen::VectorXd& start,
   settings.logging_type = ceres::SILENT;
   ceres::Solver::Summary summary;
   ceres::Solve(settings, &least_squares, &summary);
-  return {.q = q,
-          .converged = summary.termination_type == ceres::CONVERGENCE,
-          .reason = recorder.interrupted
-                        ? fmt::format("Stopped on request after {} iterations; the cost was still falling.",
-                                      options.iterations_before + recorder.iterations)
-                        : reason_of(summary, problem, options),
-          .iterations = recorder.iterations};
+  OptimiserResult result{
+      .q = q,
+      .converged = summary.termination_type == ceres::CONVERGENCE,
+      .reason = recorder.interrupted
+                    ? fmt::format("Stopped on request after {} iterations; the cost was still falling.",
+                                  options.iterations_before + recorder.iterations)
+                    : reason_of(summary, problem, options),
+      .iterations = recorder.iterations};
+  const double little =
+      std::max(nothing_gained, tolerances_gained * options.cost_tolerance * summary.final_cost);
+  if (result.converged && recorder.refused > 0 && promised_gain(cost, problem, q) > little) {
+    result.converged = false;
+    result.stalled = true;
+    result.reason = "Failed: the cost has a slope, but no step lowers it.";
+  }
+  return result;
 }
 
 }  // namespace diastole

@@ -1,7 +1,8 @@
 #pragma once
 // Levenberg-Marquardt with bounds (Ceres Solver's trust-region minimiser) on a joint problem, with the exact
 // Jacobian. A trial point without equilibrium counts as a failed step: the trust region shrinks and the
-// search goes on.
+// search goes on. A search whose trust region has shrunk to nothing has small steps, too: it counts as converged only
+// if the cost's quadratic model promises nothing any more, and has stalled otherwise.
 //
 // An unknown that rests on its bound while the cost falls only beyond it is held there for the next step: its
 // column of the Jacobian is zero, so that the step is the others' own best one and not one that is spoilt when
@@ -38,8 +39,9 @@ struct OptimiserOptions {
 struct OptimiserResult {
   Eigen::VectorXd q;
   bool converged;
-  std::string reason;  ///< a sentence
-  int iterations;      ///< steps tried
+  std::string reason;    ///< a sentence
+  int iterations;        ///< steps tried
+  bool stalled = false;  ///< every step was refused although the cost has a slope
 };
 
 OptimiserResult minimise(JointProblem& problem, const Eigen::VectorXd& start,

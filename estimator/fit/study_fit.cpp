@@ -205,7 +205,7 @@ FitRecord checkpoint_of(FitRecord record, const OptimiserStep& step, const Study
 }
 
 void record_frames(FitRecord& record, const FitOutcome& fit) {
-  size_t tags_left_out = 0, points_left_out = 0;
+  size_t tags_outside = 0, tags_unfollowed = 0, points_left_out = 0;
   double squares_mm2 = 0;
   for (const EstimatedFrame& frame : fit.frames) {
     const auto rows = static_cast<double>(frame.weighted.size());
@@ -221,13 +221,19 @@ void record_frames(FitRecord& record, const FitOutcome& fit) {
     squares_mm2 += frame.unweighted_mm.squaredNorm();
     record.residuals_used += static_cast<size_t>(frame.weighted.size());
     record.outliers_5sigma += static_cast<size_t>((frame.weighted.array().abs() > outlier_sigma).count());
-    tags_left_out += frame.tags_left_out;
+    tags_outside += frame.tags_left_out - frame.tags_unfollowed;
+    tags_unfollowed += frame.tags_unfollowed;
     points_left_out += frame.points_left_out;
   }
   record.rms_mm = std::sqrt(squares_mm2 / static_cast<double>(record.residuals_used));
-  if (tags_left_out > 0) {
+  if (tags_outside > 0) {
     record.excluded.push_back(
-        {fmt::format("tag points farther than about {} mm from the body", outside_mm), tags_left_out});
+        {fmt::format("tag points farther than about {} mm from the body", outside_mm), tags_outside});
+  }
+  if (tags_unfollowed > 0) {
+    record.excluded.push_back(
+        {"wild tag points, so far off that their line of error does not meet their tag plane on the body",
+         tags_unfollowed});
   }
   if (points_left_out > 0) {
     record.excluded.push_back(

@@ -81,6 +81,37 @@ TEST_F(WildPoints, FivePerCentOfThemDoNotMoveTheStiffness) {
   }
 }
 
+/// Tags in three frames, each with a probability of 5 % thrown by up to `most_mm` along every axis: many of them
+/// end near the body's surface, where some motions lose them.
+Measurement thrown_about(double most_mm, unsigned seed) {
+  ElasticModel truth = test::coarse_gel(8.71);
+  Measurement measurement = test::synthetic(
+      truth, {.pressures_kPa = {1.0, 2.0, 3.0}, .tags_a_frame = 700, .sigma_mm = 0.8, .seed = seed});
+  std::mt19937 generator(seed);
+  std::uniform_real_distribution<double> chance(0, 1), throw_mm(-most_mm, most_mm);
+  for (TagPoint& tag : measurement.tags) {
+    if (chance(generator) > 0.05) continue;
+    for (double& x_mm : tag.x_mm)
+      x_mm += throw_mm(generator);
+  }
+  return measurement;
+}
+
+TEST_F(WildPoints, ThrownInAllDirectionsTheyNeitherMoveNorStopTheFit) {
+  for (const double most_mm : {20.0, 40.0}) {
+    for (const unsigned seed : {2U, 3U}) {
+      SCOPED_TRACE(testing::Message() << "up to " << most_mm << " mm, seed " << seed);
+      const Measurement measurement = thrown_about(most_mm, seed);
+      const FitOutcome found = fit(measurement, Robustness::if_needed);
+      ASSERT_TRUE(found.converged) << found.reason;
+      EXPECT_TRUE(found.robust);
+      EXPECT_LT(found.iterations, 30);
+      EXPECT_NEAR(found.values[0].value, 8.71, 3 * found.values[0].se);
+      EXPECT_LT(found.values[0].se, 0.3);
+    }
+  }
+}
+
 TEST_F(WildPoints, CleanDataCostLittleAndAreLeftToTheNormalLoss) {
   const Measurement measurement = measured(0, 1);
   const FitOutcome normal = fit(measurement, Robustness::if_needed),
