@@ -7,7 +7,9 @@
 #include <CLI/CLI.hpp>
 #include <csignal>
 #include <cstdio>
+#include <fstream>
 #include <iostream>
+#include <optional>
 
 #include "protocol/contract/exit_code.hpp"
 #include "protocol/contract/input_error.hpp"
@@ -15,6 +17,7 @@
 #include "tools/sim_rig/control_client.hpp"
 #include "tools/sim_rig/faults/fault_kind.hpp"
 #include "tools/sim_rig/faults/fault_schedule.hpp"
+#include "tools/sim_rig/hidden/hidden_effects.hpp"
 #include "tools/sim_rig/host_built_controller.hpp"
 #include "tools/sim_rig/rig_description.hpp"
 #include "tools/sim_rig/server.hpp"
@@ -47,6 +50,10 @@ Faults are switched by name, at a given time or by hand while it runs; `sim_rig 
   sim_rig ctl --at /tmp/rig fault on air-bubble 50
   sim_rig ctl --at /tmp/rig fault off air-bubble
 
+Effects can be hidden in the rig, to try `diastole explain` on; `sim_rig hidden` lists them. How large they are, the
+seed draws, and only the sealed file tells:
+  sim_rig --hide air-bubble-pump --hide sensor-drift --hide-seed 7 --sealed mine.sealed.json
+
 With --play the instrument shows a recorded run's pressure, sample by sample; `diastole replay` uses it.)";
 
 struct Arguments {
@@ -55,6 +62,9 @@ struct Arguments {
   uint64_t seed = 1;
   bool real_time = false;
   std::vector<std::string> faults;
+  std::vector<std::string> hidden;
+  std::optional<uint64_t> hide_seed;
+  std::string sealed;
   sim_rig::ServerOptions server;
   std::string control;             ///< of the rig to which `ctl` speaks
   std::vector<std::string> order;  ///< its words
@@ -80,10 +90,16 @@ void add_options(CLI::App& app, Arguments& arguments) {
       ->check(CLI::Range(-1000.0, 1000.0));
   app.add_option("--seed", arguments.seed, "of the sensors' noise")->capture_default_str();
   app.add_option("--fault", arguments.faults, "make something go wrong, NAME@T; may be repeated");
+  app.add_option("--hide", arguments.hidden,
+                 "an effect (sim_rig hidden), none, outside or any; may be repeated");
+  app.add_option("--hide-seed", arguments.hide_seed,
+                 "of the hidden effects' sizes, if not that of the noise");
+  app.add_option("--sealed", arguments.sealed, "write what is hidden to this file");
 }
 
 void add_commands(CLI::App& app, Arguments& arguments) {
   app.add_subcommand("faults", "list the faults: name, usual value, what each looks like");
+  app.add_subcommand("hidden", "list the effects that can be hidden: id and port");
   CLI::App* ctl = app.add_subcommand("ctl", "give a running rig an order");
   ctl->add_option("--at", arguments.control, "its --control socket")->required();
   ctl->add_option("ORDER", arguments.order, "fault on NAME [VALUE] | fault off NAME | state")->required();
@@ -106,12 +122,24 @@ int stop_descriptor() {
   return signalfd(-1, &signals, SFD_CLOEXEC);
 }
 
+void hide(const Arguments& arguments, sim_rig::PlantConfig& plant) {
+  const std::string truth =
+      sim_rig::hide(arguments.hidden, arguments.hide_seed.value_or(arguments.seed), plant);
+  if (arguments.sealed.empty()) return;
+  std::ofstream file(arguments.sealed, std::ios::binary);
+  file << truth;
+  if (!file.flush())
+    throw diastole::InputError(
+        {arguments.sealed, "", "cannot be written", "Name a file in a folder that exists for --sealed."});
+}
+
 void serve(Arguments arguments) {
   using diastole::TableReader;
   auto description = sim_rig::read_rig_description(
       arguments.config.empty() ? TableReader::from_text(sim_rig::default_rig_toml(), "the built-in rig file")
                                : TableReader::from_file(arguments.config));
   description.plant.seed = arguments.seed;
+  hide(arguments, description.plant);
   arguments.server.faults = sim_rig::parse_faults(arguments.faults);
   const int stop = stop_descriptor();
   sim_rig::Server server(description, make_controller(arguments.image), arguments.server);
@@ -123,6 +151,8 @@ void serve(Arguments arguments) {
 void carry_out(const CLI::App& app, const Arguments& arguments) {
   if (app.got_subcommand("faults")) {
     fmt::print("{}", sim_rig::told_faults());
+  } else if (app.got_subcommand("hidden")) {
+    fmt::print("{}", sim_rig::told_hidden());
   } else if (app.got_subcommand("ctl")) {
     fmt::print(
         "{}\n",

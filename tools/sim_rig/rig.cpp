@@ -24,6 +24,7 @@ void Rig::advance_to(uint64_t until_ns) {
     if (const auto displaced_mL = carriage_.take(edge, plant_.pump_end_kPa())) {
       plant_.displace(seconds(edge.time_ns), *displaced_mL);
     }
+    if (edge.pin == Pin::ttl && edge.value != 0) plant_.begin_cycle();
     listeners_.edge(edge);
   }
   if (!output.sent.empty()) listeners_.sent(output.sent);

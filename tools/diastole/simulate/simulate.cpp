@@ -8,6 +8,7 @@
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "host/cli/session_view.hpp"
 #include "host/config/experiment.hpp"
@@ -15,6 +16,7 @@
 #include "protocol/contract/input_error.hpp"
 #include "tools/diastole/simulate/simulated_rig.hpp"
 #include "tools/diastole/simulate/stop_signals.hpp"
+#include "tools/sim_rig/hidden/hidden_effects.hpp"
 
 namespace diastole {
 namespace {
@@ -25,6 +27,9 @@ struct SimulateOptions {
   SessionOptions session;
   SimulatedRigOptions rig;
   std::vector<std::string> faults;
+  std::vector<std::string> hidden;
+  std::optional<uint64_t> hide_seed;
+  std::string sealed;
 };
 
 struct SimulatedSession {
@@ -48,6 +53,13 @@ void require_writable_folder(const fs::path& file, const char* option) {
 void check_outputs(const SimulateOptions& options) {
   const fs::path run = options.session.output, pins = options.rig.pins;
   require_writable_folder(run, "-o");
+  if (!options.sealed.empty()) {
+    require_writable_folder(options.sealed, "--sealed");
+    if (options.hidden.empty()) {
+      throw InputError(
+          {"", "option --sealed", "nothing is hidden", "Say what to hide: --hide ID, none, outside or any."});
+    }
+  }
   for (const fs::path& output : {run, pins}) {
     for (const fs::path input : {options.session.experiment, options.rig.config, options.rig.image}) {
       std::error_code missing;
@@ -110,10 +122,17 @@ SimulatedSession simulate(SimulateOptions options) {
   const auto started = std::chrono::steady_clock::now();
   const Experiment experiment = read_experiment(options.session.experiment);
   check_outputs(options);
+  sim_rig::PlantConfig unused;
+  sim_rig::hide(options.hidden, 0, unused);  // refuses unknown ids
   const PendingFile pins(options.rig.pins, options.session.force);
   options.rig.pins = pins.path();
   for (const std::string& fault : options.faults)
     options.rig.more.insert(options.rig.more.end(), {"--fault", fault});
+  for (const std::string& id : options.hidden)
+    options.rig.more.insert(options.rig.more.end(), {"--hide", id});
+  if (options.hide_seed)
+    options.rig.more.insert(options.rig.more.end(), {"--hide-seed", fmt::to_string(*options.hide_seed)});
+  if (!options.sealed.empty()) options.rig.more.insert(options.rig.more.end(), {"--sealed", options.sealed});
   const StopSignals signals;
   SessionView view(isatty(STDERR_FILENO) != 0);
   options.session.stops_asked = [&signals] { return signals.asked(); };
@@ -166,6 +185,9 @@ void add_simulate(CommandLine& line) {
       "      another rig; its table [simulation] holds the gel's stiffness C1_kPa, noise and more\n"
       "  diastole simulate gel.experiment.toml -o stopped.run.h5 --fault estop@run+3.2 --fault leak@run+1\n"
       "      with faults of the rig, by name; `sim_rig faults` lists them\n"
+      "  diastole simulate gel.experiment.toml -o mine.run.h5 --hide any --hide-seed 7 --sealed "
+      "mine.sealed.json\n"
+      "      a rig in which something is hidden (sim_rig hidden), for diastole explain to find\n"
       "The same seed gives the same run. Ctrl-C once stops at the end of the cycle, twice at once; what\n"
       "was recorded is kept. Exit code 1: samples are missing; 3: a fault ended the run.");
   command->add_option("EXPERIMENT", options->session.experiment, "experiment file (.toml)")->required();
@@ -179,6 +201,12 @@ void add_simulate(CommandLine& line) {
   command->add_option("--config", options->rig.config, "rig file, instead of the built-in one");
   command->add_option("--fault", options->faults,
                       "make something go wrong, NAME@run+SECONDS (sim_rig faults, sim_rig --help)");
+  command->add_option("--hide", options->hidden,
+                      "hide an effect (sim_rig hidden), none, outside or any; may be repeated");
+  command->add_option(
+      "--hide-seed", options->hide_seed,
+      "of the hidden effects' sizes, the same for all runs of a session; if not given, that of the noise");
+  command->add_option("--sealed", options->sealed, "file for what is hidden; the run file does not tell");
   command->add_flag("--real-time", options->rig.real_time, "as slow as the real thing");
   command->add_flag("--force", options->session.force, "replace files that exist");
   line.on_run(command, [options](const CommandOutput& out) { return report(simulate(*options), out.json); });

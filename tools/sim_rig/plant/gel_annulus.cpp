@@ -17,16 +17,43 @@ struct PlaneStrain {
   double slope_per_mL;
 };
 
-PlaneStrain plane_strain(double inflation_mL) {
-  constexpr double mm2_per_mL = 1000 / (std::numbers::pi * height_mm);
+constexpr double mm2_per_mL = 1000 / (std::numbers::pi * height_mm);
+
+PlaneStrain plane_strain(double inflation_mL, double inner_mm = inner_radius_mm) {
   const double c = inflation_mL * mm2_per_mL;
-  const double a2 = inner_radius_mm * inner_radius_mm + c;
+  const double a2 = inner_mm * inner_mm + c;
   const double b2 = outer_radius_mm * outer_radius_mm + c;
   const double log_ratio =
-      0.5 * std::log(outer_radius_mm * outer_radius_mm * a2 / (inner_radius_mm * inner_radius_mm * b2));
+      0.5 * std::log(outer_radius_mm * outer_radius_mm * a2 / (inner_mm * inner_mm * b2));
   const double pressure = 2 * (log_ratio + 0.5 * c * (1 / a2 - 1 / b2));
   const double slope = 2 * (1 / a2 - 1 / b2) - c * (1 / (a2 * a2) - 1 / (b2 * b2));
   return {pressure, slope * mm2_per_mL};
+}
+
+/// p / C1 of a stiffening wall: the integral of 2 exp(beta (I1 - 3)) (l^2 - 1/l^2) dr/r, l = r/R, by Simpson's rule.
+double stiffening_pressure(double inflation_mL, double inner_mm, double beta) {
+  constexpr int intervals = 32;
+  const double c = inflation_mL * mm2_per_mL;
+  const double h = (outer_radius_mm - inner_mm) / intervals;
+  double sum = 0;
+  for (int i = 0; i <= intervals; ++i) {
+    const double R = inner_mm + h * i;
+    const double r2 = R * R + c;
+    const double l2 = r2 / (R * R);
+    const double integrand = 2 * std::exp(beta * (l2 + 1 / l2 - 2)) * (l2 - 1 / l2) * R / r2;
+    sum += integrand * (i == 0 || i == intervals ? 1 : (i % 2 == 1 ? 4 : 2));
+  }
+  return sum * h / 3;
+}
+
+PlaneStrain plane_strain(double inflation_mL, const GelShape& shape) {
+  const double inner_mm = inner_radius_mm * (1 + shape.inner_radius_part);
+  if (shape.stiffening == 0) return plane_strain(inflation_mL, inner_mm);
+  constexpr double nudge_mL = 0.01;
+  const auto at = [&](double volume_mL) {
+    return stiffening_pressure(volume_mL, inner_mm, shape.stiffening);
+  };
+  return {at(inflation_mL), (at(inflation_mL + nudge_mL) - at(inflation_mL - nudge_mL)) / (2 * nudge_mL)};
 }
 
 struct Point {
@@ -58,15 +85,21 @@ EndStiffening end_stiffening(double inflation_mL) {
   return {ratio[0] + from_0 * (first + from_1 * second), first + second * (from_0 + from_1)};
 }
 
+EndStiffening end_stiffening(double inflation_mL, const GelShape& shape) {
+  const EndStiffening bonded = end_stiffening(inflation_mL);
+  if (shape.bond_left == 1) return bonded;
+  return {1 + shape.bond_left * (bonded.factor - 1), shape.bond_left * bonded.slope_per_mL};
+}
+
 }  // namespace
 
 double GelAnnulus::pressure_kPa(double inflation_mL) const {
-  return C1_kPa_ * end_stiffening(inflation_mL).factor * plane_strain(inflation_mL).pressure;
+  return C1_kPa_ * end_stiffening(inflation_mL, shape_).factor * plane_strain(inflation_mL, shape_).pressure;
 }
 
 double GelAnnulus::stiffness_kPa_per_mL(double inflation_mL) const {
-  const EndStiffening ends = end_stiffening(inflation_mL);
-  const PlaneStrain plane = plane_strain(inflation_mL);
+  const EndStiffening ends = end_stiffening(inflation_mL, shape_);
+  const PlaneStrain plane = plane_strain(inflation_mL, shape_);
   return C1_kPa_ * (ends.factor * plane.slope_per_mL + ends.slope_per_mL * plane.pressure);
 }
 

@@ -9,10 +9,18 @@
 
 namespace diastole::sim_rig {
 
+/// How a gel may differ from its description (flaws.hpp).
+struct GelShape {
+  double inner_radius_part = 0;
+  double stiffening =
+      0;  ///< the plane-strain pressure is then an integral over the wall; the ends' factor stays
+  double bond_left = 1;
+};
+
 class GelAnnulus {
  public:
   /// Precondition: C1_kPa > 0.
-  explicit GelAnnulus(double C1_kPa) : C1_kPa_(C1_kPa) {}
+  explicit GelAnnulus(double C1_kPa, const GelShape& shape = {}) : C1_kPa_(C1_kPa), shape_(shape) {}
 
   /// Cavity pressure at a volume change of `inflation_mL` from the unloaded cavity (135.2 mL).
   /// Precondition: -100 mL < inflation_mL < 200 mL (beyond the fitted points, 0 to 78 mL, it is an
@@ -25,6 +33,7 @@ class GelAnnulus {
 
  private:
   double C1_kPa_;
+  GelShape shape_;
 };
 
 }  // namespace diastole::sim_rig

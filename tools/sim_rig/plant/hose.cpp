@@ -31,9 +31,10 @@ Hose::Hose(const HoseConfig& config)
     : config_(config),
       area_m2_(std::numbers::pi / 4 * config.bore_mm * config.bore_mm * 1e-6),
       segment_m_(config.length_m / config.segments),
-      step_s_(segment_m_ / config.wave_speed_m_s),
-      impedance_kPa_s_per_mL_(config.fluid_density_kg_m3 * config.wave_speed_m_s / area_m2_ * m3_per_mL *
-                              kPa_per_Pa),
+      wave_speed_m_s_(config.wave_speed_m_s / std::sqrt(config.inertia_factor)),
+      step_s_(segment_m_ / wave_speed_m_s_),
+      impedance_kPa_s_per_mL_(config.inertia_factor * config.fluid_density_kg_m3 * wave_speed_m_s_ /
+                              area_m2_ * m3_per_mL * kPa_per_Pa),
       compliance_mL_per_kPa_(area_m2_ * segment_m_ /
                              (config.fluid_density_kg_m3 * config.wave_speed_m_s * config.wave_speed_m_s) /
                              m3_per_mL / kPa_per_Pa) {
@@ -71,7 +72,7 @@ double Hose::friction_at(size_t node) const {
       (flow_mL_s_[right] - flow_mL_s_[left]) / (static_cast<double>(right - left) * segment_m_);
   const double in_time_mL_s2 = (flow - flow_before_mL_s_[node]) / step_s_;
   const double sign = flow > 0 ? 1 : (flow < 0 ? -1 : 0);
-  const double unsteady_mL_s2 = in_time_mL_s2 + config_.wave_speed_m_s * sign * std::abs(along_mL_s_m);
+  const double unsteady_mL_s2 = in_time_mL_s2 + wave_speed_m_s_ * sign * std::abs(along_mL_s_m);
   const double density_over_area = config_.fluid_density_kg_m3 / area_m2_ * m3_per_mL * kPa_per_Pa;
   return steady_friction_kPa_per_m(flow) +
          0.5 * brunone_coefficient(reynolds(flow)) * density_over_area * unsteady_mL_s2;
@@ -88,6 +89,12 @@ Characteristic Hose::outlet() const {
   const size_t last = pressure_kPa_.size() - 1;
   return {pressure_kPa_[last - 1] + impedance_kPa_s_per_mL_ * flow_mL_s_[last - 1] -
               segment_m_ * friction_kPa_per_m_[last - 1] - creep_drop_kPa_[last],
+          impedance_kPa_s_per_mL_};
+}
+
+Characteristic Hose::inlet() const {
+  return {pressure_kPa_[1] - impedance_kPa_s_per_mL_ * flow_mL_s_[1] + segment_m_ * friction_kPa_per_m_[1] -
+              creep_drop_kPa_[0],
           impedance_kPa_s_per_mL_};
 }
 

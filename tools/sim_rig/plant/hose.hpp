@@ -26,6 +26,7 @@ struct HoseConfig {
   double fluid_viscosity_Pa_s = 0.001;
   double wall_creep_fraction = 0.05;
   double wall_creep_time_s = 0.1;
+  double inertia_factor = 1;  ///< the fluid's inertia over that of a plain tube; the compliance stays
   bool friction = true;
   int segments = 20;
 };
@@ -43,6 +44,8 @@ class Hose {
 
   [[nodiscard]] double step_s() const { return step_s_; }
   [[nodiscard]] Characteristic outlet() const;
+  /// The same at the pump's end: p = pressure_kPa + impedance_kPa_s_per_mL * flow.
+  [[nodiscard]] Characteristic inlet() const;
   /// Carries the line over one step to the given flows at its ends (mL/s at the step's end).
   void advance(double pump_flow_mL_s, double outlet_flow_mL_s);
 
@@ -61,6 +64,7 @@ class Hose {
   HoseConfig config_;
   double area_m2_;
   double segment_m_;
+  double wave_speed_m_s_;  // with the inertia as it is
   double step_s_;
   double impedance_kPa_s_per_mL_;
   double compliance_mL_per_kPa_;  // elastic, of one segment

@@ -2,8 +2,8 @@
 // The rig without its electronics: piston, hose, gel phantom, catheter and transducers, as one initial-value
 // problem.
 //
-//   step edges -> Piston -> flow -> Hose -> flow -> cavity (dV/dt = Q, p = gel(V)) -> Sensor "cavity"
-//                                    |-> pressure at the pump's end -----------------> Sensor "pump"
+//   step edges -> Screw -> Piston -> flow -> Hose -> flow -> cavity (dV/dt = Q, p = gel(V)) -> Sensor "cavity"
+//                                             |-> pressure at the pump's end -----------------> Sensor "pump"
 //
 // It moves in fixed steps (hose segment / wave speed, 0.625 ms by default) whatever the times that are asked
 // for, so the same edges and seed give the same readings. Rest pressure is zero. It shares no code with the
@@ -14,11 +14,13 @@
 
 #include "tools/sim_rig/plant/air_bubble.hpp"
 #include "tools/sim_rig/plant/blockage.hpp"
-#include "tools/sim_rig/plant/gel_annulus.hpp"
+#include "tools/sim_rig/plant/flaws.hpp"
 #include "tools/sim_rig/plant/hose.hpp"
 #include "tools/sim_rig/plant/leak.hpp"
 #include "tools/sim_rig/plant/piston.hpp"
+#include "tools/sim_rig/plant/screw.hpp"
 #include "tools/sim_rig/plant/sensor.hpp"
+#include "tools/sim_rig/plant/specimen.hpp"
 
 namespace diastole::sim_rig {
 
@@ -29,6 +31,7 @@ struct PlantConfig {
   double piston_lag_ms = 2;
   SensorConfig cavity{};
   SensorConfig pump{.f0_Hz = 200, .zeta = 0.7, .range_kPa = 100};
+  Flaws flaws{};  ///< those of the sensors go to `cavity` and `pump` when the plant is made
   uint64_t seed = 1;
 };
 
@@ -37,7 +40,9 @@ class Plant {
   explicit Plant(const PlantConfig& config);
 
   /// The controller has displaced `volume_mL` in all since `time_s` (not before the plant's present).
-  void displace(double time_s, double volume_mL) { piston_.displace(time_s, volume_mL); }
+  void displace(double time_s, double volume_mL) { piston_.displace(time_s, screw_.follow(volume_mL)); }
+  /// The controller's TTL has risen.
+  void begin_cycle();
 
   /// Moves to `time_s`; every edge up to then must have been told.
   void advance_to(double time_s);
@@ -54,7 +59,7 @@ class Plant {
   [[nodiscard]] Sensor& cavity_sensor() { return cavity_sensor_; }
 
   /// The truth at the last whole step.
-  [[nodiscard]] double cavity_kPa() const { return gel_.pressure_kPa(cavity_mL_); }
+  [[nodiscard]] double cavity_kPa() const { return specimen_.pressure_kPa(cavity_mL_); }
   [[nodiscard]] double cavity_mL() const { return cavity_mL_; }
   [[nodiscard]] double cavity_flow_mL_s() const { return outlet_flow_mL_s_; }
   [[nodiscard]] double pump_end_kPa() const { return hose_.pump_end_kPa(); }
@@ -66,6 +71,8 @@ class Plant {
   void step();
   /// The flow into the cavity at the step's end, from the hose's characteristic, cannula loss and gel.
   [[nodiscard]] double solve_outlet_flow_mL_s() const;
+  /// What of the piston's flow enters the hose, beside gas and leak at the pump.
+  [[nodiscard]] double entering_flow_mL_s() const;
 
   void take_disturbances();
   /// Volume that enters the gel in a step with this flow at its end, beside bubble and leak.
@@ -73,13 +80,17 @@ class Plant {
 
   double minor_loss_K_;
   Hose hose_;
-  GelAnnulus gel_;
+  Specimen specimen_;
+  Screw screw_;
   Piston piston_;
   Sensor cavity_sensor_;
   Sensor pump_sensor_;
   double loss_kPa_s2_per_mL2_;  // for K = 1
   long step_count_ = 0;
   double since_step_s_ = 0;
+  AirBubble pump_gas_;
+  Leak pump_leak_;
+  CavityFlaws cavity_flaws_;
   Leak leak_;
   Blockage blockage_;
   AirBubble bubble_;

@@ -3,8 +3,10 @@
 // over some 10 ms (first-order autoregressive, seeded), and the converter's steps.
 
 #include <cstdint>
+#include <deque>
 #include <random>
 
+#include "tools/sim_rig/plant/flaws.hpp"
 #include "tools/sim_rig/plant/second_order.hpp"
 
 namespace diastole::sim_rig {
@@ -17,6 +19,7 @@ struct SensorConfig {
   double noise_correlation_ms = 10;  ///< > 0
   double range_kPa = 20;             ///< the converter spans -range to +range, and clips there
   int bits = 12;                     ///< 0: no steps
+  SensorFlaws flaws{};
 };
 
 class Sensor {
@@ -24,6 +27,7 @@ class Sensor {
   Sensor(const SensorConfig& config, double step_s, uint64_t seed);
 
   void advance(double mean_pressure_kPa);
+  void begin_cycle();
 
   /// From now on the reading is off by `offset_kPa`, and by another `drift_kPa_per_s` every second; 0, 0: true again.
   void falsify(double offset_kPa, double drift_kPa_per_s);
@@ -32,6 +36,10 @@ class Sensor {
   [[nodiscard]] double reading_kPa(double since_step_s) const;
 
  private:
+  /// What the line shows `earlier_s` before the last step.
+  [[nodiscard]] double line_kPa(double earlier_s) const;
+  [[nodiscard]] double flaw_kPa() const;
+
   SensorConfig config_;
   double step_s_;
   double error_kPa_ = 0;
@@ -39,6 +47,9 @@ class Sensor {
   SecondOrder line_;
   double noise_memory_;
   double noise_kPa_ = 0;
+  int cycle_ = 0;
+  double since_first_cycle_s_ = 0;
+  std::deque<double> history_;  // of the line, the latest first; as long as readings are late
   std::mt19937_64 random_;
   std::normal_distribution<double> normal_;
 };
