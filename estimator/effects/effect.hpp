@@ -56,7 +56,8 @@ struct Occasion {
   double session_s = 0.0;  ///< the same since the session's first run began
 };
 
-/// How many occasions an effect has; they are searched, not differentiated.
+/// How many occasions an effect has; they are searched (estimator/rig_fit/moment_search.hpp). What begins at the only one
+/// lasts for the rest of the session, what begins at one of several for the rest of its run.
 enum class Occasions { none, one, several };
 
 /// Whether the fluid's motion changes, or only what the instruments show of it.

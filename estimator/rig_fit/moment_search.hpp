@@ -1,0 +1,31 @@
+#pragma once
+// When did it happen? Moments of effects that begin at one (effect.hpp, Occasions): a sensor's step, steps lost.
+//
+// From a moment on, the residuals hold the effect's lasting change D (of the whole run, were it there from the start).
+// For every sample as the moment the drop of chi-square is known from sums over the samples after it,
+//
+//   gain(t) = (sum_{s >= t} D r)^2 / (sum_{s >= t} D^2 - what the fitted unknowns take up of it),
+//
+// a change-point scan by matched filter. The best moment is shifted to where the simulated change correlates best with
+// the residuals, and moments and all values are refined together by Gauss-Newton steps. Effects of several moments
+// go on until another one gains too little for having been chosen among so many samples.
+
+#include <optional>
+
+#include "estimator/rig_fit/rig_fit.hpp"
+
+namespace diastole::rig {
+
+struct FoundMoments {
+  Ingredient ingredient;       ///< with its occasions
+  std::vector<double> values;  ///< of the effect
+  RigFit fit;                  ///< of the ingredients before and this one, from which further fits may start
+  double gain = 0.0;           ///< of chi-square, for all moments
+};
+
+/// Added to the residuals `before` left. None if no moment gains enough, or the effect has no occasions.
+/// Precondition: `before` is a fine fit of `problem` to all runs; `session` is the problem's.
+std::optional<FoundMoments> find_moments(const RigProblem& problem, const Session& session,
+                                         const RigFit& before, const Effect& effect);
+
+}  // namespace diastole::rig
