@@ -10,7 +10,10 @@
 #include "estimator/explain/explain_rig.hpp"
 #include "estimator/explain/explained_study.hpp"
 #include "estimator/explain/explanation_json.hpp"
+#include "estimator/explain/score.hpp"
 #include "estimator/io/whole_file.hpp"
+#include "estimator/report/page.hpp"
+#include "estimator/report/report.hpp"
 #include "protocol/contract/input_error.hpp"
 
 namespace diastole {
@@ -20,11 +23,13 @@ namespace fs = std::filesystem;
 
 constexpr std::string_view explanation_file = "explanation.json";
 constexpr std::string_view study_file = "explained.study.toml";
+constexpr std::string_view report_file = "report.html";
 constexpr std::string_view study_mark = "# Written by diastole explain";
 
 struct ExplainArguments {
-  fs::path study;
+  fs::path study;  ///< or, with `truths`, the folder of explanations
   fs::path folder;
+  fs::path truths;
   size_t threads = 2;
   bool force = false;
 };
@@ -88,7 +93,8 @@ void print_for_people(const explain::Explanation& found, const fs::path& folder)
   for (const explain::ParameterShift& shift : found.shifts)
     fmt::print("  {:<18} {:.4f} +- {:.4f} without, {:.4f} +- {:.4f} with what was found\n", shift.name,
                shift.before, shift.before_error, shift.after, shift.after_error);
-  fmt::print("\nIn {}: {}{}\n", folder.string(), explanation_file,
+  if (found.next_experiment) fmt::print("\nNext: {}\n", found.next_experiment->reason);
+  fmt::print("\nIn {}: {}, {}{}\n", folder.string(), explanation_file, report_file,
              found.study_after.empty() ? "" : fmt::format(", {}", found.study_after));
 }
 
@@ -102,10 +108,28 @@ explain::Explanation explained(const Study& study, const ExplainArguments& argum
   return explain::explain_rig(study, {.threads = arguments.threads, .propose = true, .progress = tell});
 }
 
+ExitCode run_score(const ExplainArguments& arguments, const CommandOutput& out) {
+  const explain::Score score = explain::score_folder(arguments.truths, arguments.study);
+  if (out.json) {
+    std::cout << explain::to_json(score) << '\n';
+  } else {
+    fmt::print("{}", explain::told(score));
+  }
+  return score.passed() ? ExitCode::done : ExitCode::negative;
+}
+
 ExitCode run_explain(const ExplainArguments& arguments, const CommandOutput& out) {
+  if (!arguments.truths.empty()) return run_score(arguments, out);
+  if (arguments.folder.empty()) {
+    throw InputError({.file = "",
+                      .place = "option -o",
+                      .problem = "is missing",
+                      .remedy = "Name a folder for the result: -o out/."});
+  }
   const Study study = read_study(arguments.study);
   const fs::path json_file = arguments.folder / explanation_file;
   const fs::path new_study = arguments.folder / study_file;
+  const fs::path page = arguments.folder / report_file;
   std::error_code error;
   fs::create_directories(arguments.folder, error);
   if (error) {
@@ -116,6 +140,7 @@ ExitCode run_explain(const ExplainArguments& arguments, const CommandOutput& out
   }
   require_output({json_file, inputs_of(study), explain::explanation_file_mark, arguments.force});
   require_output({new_study, inputs_of(study), study_mark, arguments.force});
+  require_output({page, inputs_of(study), report::page_mark, arguments.force});
   const EndOnInterrupt end;
   explain::Explanation found;
   try {
@@ -133,6 +158,7 @@ ExitCode run_explain(const ExplainArguments& arguments, const CommandOutput& out
     fs::remove(new_study, error);  // of an earlier explanation
   }
   write_whole_file(json_file, explain::to_json(found));
+  write_whole_file(page, report::make_report(found));
   if (out.json) {
     explain::Explanation brief = found;
     brief.traces.clear();
@@ -152,18 +178,26 @@ void add_explain(CommandLine& line) {
       "  diastole explain case.study.toml -o out/\n"
       "  diastole explain case.study.toml -o out/ --json\n"
       "  diastole explain out/explained.study.toml -o further/     what is missing beside what was found\n"
+      "  diastole explain --score sealed/ results/                 right how often? "
+      "results/NAME/explanation.json\n"
+      "      against sealed/NAME.sealed.json (diastole simulate --hide) or a labels.json; exit code 1: false "
+      "alarms\n"
+      "      where nothing is hidden, or names where nothing known is\n"
       "The verdict is one of\n"
       "  named        one set of effects explains the misfit; its parameters come with 90 % intervals\n"
       "  ambiguous    these data cannot tell several sets apart\n"
       "  unexplained  the misfit has structure that no known effect removes; where it sits is told\n"
       "  none         nothing exceeds the noise\n"
-      "OUT gets explanation.json, for `diastole report`, and explained.study.toml: the study with what was "
-      "found.\n"
+      "OUT gets report.html, explanation.json for `diastole report`, and explained.study.toml: the study "
+      "with\n"
+      "what was found.\n"
       "`diastole effects` lists the effects that are known. Exit code 0: done, whatever the verdict; 1: "
       "interrupted; 2: unreadable input.");
-  command->add_option("STUDY", arguments->study, "study file with [data] runs")->required();
-  command->add_option("-o,--output", arguments->folder, "folder for the result; made if it is not there")
+  command
+      ->add_option("STUDY", arguments->study, "study file with [data] runs; with --score the results' folder")
       ->required();
+  command->add_option("-o,--output", arguments->folder, "folder for the result; made if it is not there");
+  command->add_option("--score", arguments->truths, "compare explanations with what was hidden");
   command->add_option("--threads", arguments->threads, "simulations at a time")
       ->check(CLI::Range(1, 256))
       ->capture_default_str();
