@@ -17,15 +17,25 @@ class Softening final : public rig::SpecimenMemory {
         cycles_(cycles),
         scale_mL_(scale_mL),
         place_(place),
-        largest_mL_(place.largest_before_mL) {}
+        largest_mL_(place.largest_before_mL),
+        count_(place.cycles_before),
+        lost_(-std::expm1(-count_ / cycles_) * final_part(largest_mL_)) {}
   [[nodiscard]] double look(double elastic_kPa, double volume_mL, double time_s) const override {
-    const double lost =
-        -std::expm1(-done(time_s) / cycles_) * -std::expm1(-std::max(largest_mL_, volume_mL) / scale_mL_);
-    return elastic_kPa * (1.0 - delta_ * lost);
+    return elastic_kPa * (1.0 - delta_ * lost(volume_mL, done(time_s)));
   }
-  void pass(double, double volume_mL, double) override { largest_mL_ = std::max(largest_mL_, volume_mL); }
+  void pass(double, double volume_mL, double time_s) override {
+    const double count = done(time_s);
+    lost_ = lost(volume_mL, count);
+    count_ = count;
+    largest_mL_ = std::max(largest_mL_, volume_mL);
+  }
 
  private:
+  [[nodiscard]] double final_part(double largest_mL) const { return -std::expm1(-largest_mL / scale_mL_); }
+  [[nodiscard]] double lost(double volume_mL, double count) const {
+    return lost_ -
+           std::expm1((count_ - count) / cycles_) * (final_part(std::max(largest_mL_, volume_mL)) - lost_);
+  }
   /// Cycles begun, with the running one in part.
   [[nodiscard]] double done(double time_s) const {
     const auto& starts = place_.trigger_s;
@@ -37,6 +47,8 @@ class Softening final : public rig::SpecimenMemory {
   double delta_, cycles_, scale_mL_;
   rig::RunPlace place_;
   double largest_mL_;
+  double count_;  ///< cycles done
+  double lost_;   ///< D
 };
 
 class StressSoftening final : public Effect {
@@ -47,8 +59,9 @@ class StressSoftening final : public Effect {
         .title = "stress softening",
         .port = Port::specimen,
         .equations =
-            "p = p_e(V) (1 - delta D), D = (1 - exp(-n / cycles)) (1 - exp(-V_max / V0)): n cycles "
-            "done, V_max the largest volume so far; it stays for the session's later runs.",
+            "p = p_e(V) (1 - delta D), dD/dn = (1 - exp(-V_max / V0_mL) - D) / cycles: n cycles done, V_max "
+            "the "
+            "largest volume so far; it stays for the session's later runs.",
         .source =
             "L. Mullins, Rubber Chem. Technol. 42 (1969) 339; the softening of a cyclic test in two "
             "exponentials.",
