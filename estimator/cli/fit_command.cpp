@@ -8,8 +8,10 @@
 #include <optional>
 
 #include "estimator/cli/commands.hpp"
+#include "estimator/cli/findings_text.hpp"
 #include "estimator/fit/study_fit.hpp"
 #include "estimator/io/whole_file.hpp"
+#include "estimator/reconstruction/study_reconstruction.hpp"
 #include "protocol/contract/input_error.hpp"
 
 namespace diastole {
@@ -30,6 +32,7 @@ struct FitArguments {
   bool resume = false;
   std::optional<std::filesystem::path> output;
   bool force = false;
+  bool unexamined = false;
   int iteration_limit = 50;
 };
 
@@ -68,6 +71,7 @@ void print_shapes(const FitRecord& record) {
 }
 
 void print_record(const FitRecord& record) {
+  if (record.parameters.empty()) return;  // the search did not even begin: its reason says why
   for (const FittedParameter& parameter : record.parameters)
     print_parameter(parameter);
   print_shapes(record);
@@ -121,6 +125,21 @@ std::optional<FitRecord> start_of(const FitArguments& arguments) {
   return record;
 }
 
+std::vector<Finding> examined(const FitArguments& arguments, const Study& study,
+                              const Measurement& measurement) {
+  if (arguments.unexamined) return {};
+  fmt::print(stderr, "Examining the data; --unexamined skips that.\n");
+  return examine_measurement(study, measurement);
+}
+
+ExitCode refuse_data(const FitRecord& record, const CommandOutput& out) {
+  print_findings(record.findings, out.json ? stderr : stdout);
+  fmt::print(stderr, "{} `diastole reconstruct` shows them; --unexamined fits them nevertheless.\n",
+             record.reason);
+  if (out.json) std::cout << to_json(record);
+  return ExitCode::negative;
+}
+
 ExitCode run_fit(const FitArguments& arguments, const CommandOutput& out) {
   Study study = read_study(arguments.study);
   if (!arguments.mesh.empty()) set_mesh(study, arguments.mesh);
@@ -135,6 +154,8 @@ ExitCode run_fit(const FitArguments& arguments, const CommandOutput& out) {
              measurement.tags.empty() ? fmt::format("{} 3-D points", measurement.points.size())
                                       : fmt::format("{} tag points", measurement.tags.size()),
              measurement.frames.size());
+  std::vector<Finding> findings = examined(arguments, study, measurement);
+  if (has_error(findings)) return refuse_data(refused_fit(study, measurement, std::move(findings)), out);
   StudyFitOptions options;
   options.iteration_limit = arguments.iteration_limit;
   options.robustness = arguments.robust == "yes"  ? Robustness::always
@@ -167,7 +188,8 @@ ExitCode run_fit(const FitArguments& arguments, const CommandOutput& out) {
   }
   const Interruption interruption;
   options.interrupted = [] { return interrupts > 0; };
-  const FitRecord record = fit_study(study, measurement, options);
+  FitRecord record = fit_study(study, measurement, options);
+  record.findings = std::move(findings);
   fmt::print(stderr, "{} {} iterations, {} equilibrium solutions, {:.1f} s.\n", record.reason,
              record.iterations, record.forward_solves, record.seconds);
   if (arguments.output) write_fit_file(record, *arguments.output);
@@ -179,8 +201,10 @@ ExitCode run_fit(const FitArguments& arguments, const CommandOutput& out) {
                     : "With --checkpoint FILE a search can go on from where it was ended.");
   }
   if (out.json) {
+    print_findings(record.findings, stderr);
     std::cout << to_json(record);
   } else {
+    print_findings(record.findings, stdout);
     print_record(record);
     if (arguments.output) fmt::print("\nThe result is in {}\n", arguments.output->string());
   }
@@ -217,6 +241,10 @@ void add_fit(CommandLine& line) {
           "--pressure-offset", arguments->pressure_offset_kPa,
           "seek a common offset of all frame pressures too, about zero with this standard deviation, kPa")
       ->check(CLI::PositiveNumber);
+  command->add_flag(
+      "--unexamined", arguments->unexamined,
+      "do not look beforehand for what is wrong with the data (docs/reconstruction.md), and fit "
+      "data that cannot be what they say");
   command->add_flag("--profile", arguments->profile, "95 % intervals from the likelihood's true shape too");
   command
       ->add_option("--posterior", arguments->posterior_draws,

@@ -15,6 +15,7 @@
 #include "estimator/io/whole_file.hpp"
 #include "estimator/montecarlo/cells_file.hpp"
 #include "estimator/montecarlo/montecarlo.hpp"
+#include "estimator/montecarlo/paper_table.hpp"
 #include "estimator/montecarlo/worker_pool.hpp"
 #include "protocol/contract/input_error.hpp"
 
@@ -128,6 +129,18 @@ void print_json(const std::vector<TableEntry>& table, const Study& study, const 
   std::cout << json.dump(1) << '\n';
 }
 
+/// The paper's Table 1 beside, where the law is the paper's.
+void print_papers(const std::vector<TableEntry>& table, const Study& study) {
+  if (study.law.name != "guccione") return;
+  for (const TableEntry& entry : table) {
+    if (const auto cells = paper_sd_percent(entry.noise_mm, entry.frames)) {
+      fmt::print("  the paper's for {} and {} frames: C {:g}, b1 {:g}, b2 {:g}, b3 {:g}\n",
+                 noise_words(entry.noise_mm), entry.frames, (*cells)[0], (*cells)[1], (*cells)[2],
+                 (*cells)[3]);
+    }
+  }
+}
+
 void print_table(const std::vector<TableEntry>& table, const Study& study) {
   fmt::print("Standard deviations of the refitted parameters, in % of their mean\n\n");
   fmt::print("  noise       frames  refits");
@@ -141,6 +154,7 @@ void print_table(const std::vector<TableEntry>& table, const Study& study) {
     fmt::print("{}\n", entry.failed > 0 ? fmt::format("   {} did not converge", entry.failed) : "");
   }
   fmt::print("\n");
+  print_papers(table, study);
   for (const ParameterSpread& spread : table.front().parameters) {
     fmt::print(
         "At noise {} and {} frames: {} = {:.4g} ± {:.2g} (95 % of the refits within {:.4g} to {:.4g}; truth "

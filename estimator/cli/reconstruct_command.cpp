@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "estimator/cli/commands.hpp"
+#include "estimator/cli/findings_text.hpp"
 #include "estimator/cli/study_options.hpp"
 #include "estimator/io/measurement.hpp"
 #include "estimator/io/whole_file.hpp"
@@ -72,13 +73,6 @@ void write_outputs(const std::vector<std::filesystem::path>& files, const StudyR
     if (file.extension() == ".csv") write_whole_file(file, points_csv(reconstruction.samples));
     if (file.extension() == ".vtkhdf") write_vtkhdf(file, reconstruction_grid(reconstruction));
     if (file.extension() == ".json") write_whole_file(file, to_json(record));
-  }
-}
-
-void print_findings(const std::vector<Finding>& findings, std::FILE* stream) {
-  for (const Finding& finding : findings) {
-    fmt::print(stream, "{}: {} [{}]\n  {}\n", describe(finding.severity), finding.what, finding.where,
-               finding.remedy);
   }
 }
 

@@ -98,10 +98,17 @@ void tell_profiles(FitOutcome& outcome, JointProblem& problem, const Eigen::Vect
     if (problem.bound_under(q, which) != BoundSide::none || !std::isfinite(covariance(which, which)))
       continue;
     const std::array<ProfileEnd, 2> ends = profile_interval({problem, q, covariance, cost}, which);
-    ProfileInterval interval{place, {}, {}, ends[0].found && ends[1].found};
+    ProfileInterval interval{place, {}, {}, ends[0].found && ends[1].found, {}, {}};
+    std::vector<std::array<double, 2>> tried{{q[which], 0.0}};
     for (size_t side = 0; side < 2; ++side) {
       interval.ci95[side] = problem.value(which).value(ends[side].coordinate);
       interval.at_bound[side] = ends[side].at_bound;
+      tried.insert(tried.end(), ends[side].tried.begin(), ends[side].tried.end());
+    }
+    std::sort(tried.begin(), tried.end());
+    for (const auto& [coordinate, rise] : tried) {
+      interval.at.push_back(problem.value(which).value(coordinate));
+      interval.cost_rise.push_back(rise);
     }
     outcome.profiles.push_back(interval);
   }

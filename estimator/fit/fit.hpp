@@ -98,6 +98,8 @@ struct ProfileInterval {
   std::array<double, 2> ci95;
   std::array<bool, 2> at_bound;  ///< the interval ends there because the bound does
   bool found;
+  std::vector<double> at;         ///< values at which it was tried, rising, the estimate among them
+  std::vector<double> cost_rise;  ///< of each: how far the cost is above the least
 };
 
 struct PosteriorOfValue {

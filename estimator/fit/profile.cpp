@@ -30,24 +30,35 @@ std::optional<double> ratio_root(const ProfileProblem& at, Eigen::Index which, d
 ProfileEnd profile_end(const ProfileProblem& at, Eigen::Index which, double direction) {
   const double bound = direction > 0 ? at.problem.upper(which) : at.problem.lower(which);
   const double farthest = std::abs(bound - at.best[which]);
+  std::vector<std::array<double, 2>> tried;
+  const auto root_at = [&](double distance) {
+    const std::optional<double> root = ratio_root(at, which, direction * distance);
+    if (root) tried.push_back({at.best[which] + direction * distance, 0.5 * *root * *root});
+    return root;
+  };
+  const auto end = [&](double distance, bool at_bound) {
+    (void)root_at(0.5 * distance);
+    return ProfileEnd{at_bound ? bound : at.best[which] + direction * distance, at_bound, true,
+                      std::move(tried)};
+  };
   double inner = 0, inner_root = 0;
   double away = normal_95 * std::sqrt(at.covariance(which, which));
   for (int attempt = 0; attempt < most_tries; ++attempt) {
     away = std::min(away, farthest);
-    const std::optional<double> root = ratio_root(at, which, direction * away);
+    const std::optional<double> root = root_at(away);
     if (!root) {
       away = 0.5 * (inner + away);
       continue;
     }
-    if (std::abs(*root - normal_95) < settled) return {at.best[which] + direction * away, false, true};
-    if (*root < normal_95 && away >= farthest) return {bound, true, true};
+    if (std::abs(*root - normal_95) < settled) return end(away, false);
+    if (*root < normal_95 && away >= farthest) return end(away, true);
     // The root is nearly proportional to the distance: a line through the last two points.
     const double slope = away > inner ? (*root - inner_root) / (away - inner) : *root / away;
     const double next = away + (normal_95 - *root) / std::max(slope, 1e-12);
     if (*root < normal_95) inner = away, inner_root = *root;
     away = std::clamp(next, 0.3 * away, 3 * away);
   }
-  return {at.best[which] + direction * away, false, false};
+  return {at.best[which] + direction * away, false, false, std::move(tried)};
 }
 
 }  // namespace

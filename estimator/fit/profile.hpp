@@ -1,19 +1,21 @@
 #pragma once
 // Profile-likelihood intervals: how far one unknown can be moved, all others adjusting themselves, until the cost has
 // risen by half of chi-square's 95 % point (1.92). Right where the likelihood is not a parabola, which the symmetric
-// interval takes it for (Venzon & Moolgavkar, Appl. Stat. 37 (1988) 87). Each end costs two to four searches with the
-// full finite-element model.
+// interval takes it for (Venzon & Moolgavkar, Appl. Stat. 37 (1988) 87). Each end costs three to five searches with the
+// full finite-element model, one of them half-way, for the picture.
 
 #include <array>
+#include <vector>
 
 #include "estimator/fit/joint_problem.hpp"
 
 namespace diastole {
 
 struct ProfileEnd {
-  double coordinate;  ///< of the unknown at the end
-  bool at_bound;      ///< the data do not end the interval: the bound does
-  bool found;         ///< false if the search did not settle
+  double coordinate;                              ///< of the unknown at the end
+  bool at_bound;                                  ///< the data do not end the interval: the bound does
+  bool found;                                     ///< false if the search did not settle
+  std::vector<std::array<double, 2>> tried = {};  ///< coordinates and how far the cost rises there
 };
 
 /// Both ends of unknown `which`. `best` is the optimum with its cost and the covariance there.

@@ -36,6 +36,11 @@ const char* kind_of(const Specimen& specimen) {
   return kinds[specimen.index()];
 }
 
+std::string data_words(const Measurement& measurement) {
+  if (measurement.points.empty()) return "tags";
+  return measurement.tags.empty() ? "points" : "tags and points";
+}
+
 bool has_loaded_point(const Measurement& measurement) {
   const auto loaded = [](const auto& row) { return row.frame > 0; };
   return std::any_of(measurement.tags.begin(), measurement.tags.end(), loaded) ||
@@ -89,7 +94,7 @@ void record_shape(FittedParameter& parameter, const FitOutcome& fit, size_t plac
   if (!parameter.elements.empty()) return;
   for (const ProfileInterval& profile : fit.profiles) {
     if (profile.value == place && profile.found)
-      parameter.profile = FittedProfile{profile.ci95, profile.at_bound};
+      parameter.profile = FittedProfile{profile.ci95, profile.at_bound, profile.at, profile.cost_rise};
   }
   if (fit.posterior) {
     const PosteriorOfValue& told = fit.posterior->values[place];
@@ -180,13 +185,84 @@ void take_start(Sought& sought, const FitRecord& start, const Study& study, size
   }
 }
 
-/// A result that has only got so far: values without errors.
-FitRecord checkpoint_of(FitRecord record, const OptimiserStep& step, const Study& study, size_t elements) {
-  constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
-  record.reason = fmt::format("Checkpoint after iteration {}.", step.iteration);
-  record.iterations = step.iteration;
+constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
+
+/// What is known before the search.
+FitRecord head_of(const Study& study, const Measurement& measurement) {
+  FitRecord record{};
+  record.study = study.file.string();
+  record.law = study.law.name;
+  record.specimen = kind_of(study.specimen);
+  record.mesh = mesh_of(study.specimen);
+  record.data = data_words(measurement);
   record.rms_mm = record.chi2 = record.chi2_per_dof = unknown;
   record.undeformed_chi2_per_residual = record.undeformed_mean_mm = unknown;
+  return record;
+}
+
+/// Multiplies the stiffnesses at which the search begins, within their bounds; whether one changed. With all of them
+/// multiplied by a factor, a body carries the load times that factor.
+bool stiffen(Sought& sought, const Study& study, size_t elements) {
+  constexpr double factor = 3.0;
+  bool changed = false;
+  size_t first = 0;
+  for (const StudyParameter& parameter : study.law.parameters) {
+    const size_t count = value_count(parameter, elements);
+    for (size_t i = first; parameter.name.ends_with("_kPa") && i < first + count; ++i) {
+      SoughtValue& value = sought.values[i];
+      const double stiffer = std::clamp(factor * value.start, value.lower, value.upper);
+      changed = changed || stiffer > value.start;
+      value.start = std::max(value.start, stiffer);
+    }
+    first += count;
+  }
+  return changed;
+}
+
+std::string start_words(const Sought& sought, const Study& study, size_t elements) {
+  std::string words;
+  size_t first = 0;
+  for (const StudyParameter& parameter : study.law.parameters) {
+    if (parameter.name.ends_with("_kPa"))
+      words +=
+          fmt::format("{}{} = {:.4g}", words.empty() ? "" : ", ", parameter.name, sought.values[first].start);
+    first += value_count(parameter, elements);
+  }
+  return words;
+}
+
+/// The fit, begun with a stiffer material where the start values carry no equilibrium.
+FitOutcome fit_from_where_it_stands(ElasticMotion& motion, Sought& sought, const Study& study,
+                                    const Measurement& measurement, const FitOptions& options,
+                                    FitRecord& record) {
+  const size_t elements = motion.mesh().element_count();
+  const std::string given = start_words(sought, study, elements);
+  FitOutcome fit = fit_motion(motion, sought.values, measurement, options);
+  const auto failed_at_start = [&] { return !fit.converged && fit.history.empty(); };
+  if (!failed_at_start()) return fit;
+  int solves = fit.forward_solves;
+  while (failed_at_start() && stiffen(sought, study, elements)) {
+    fit = fit_motion(motion, sought.values, measurement, options);
+    fit.forward_solves = solves += fit.forward_solves;
+  }
+  if (failed_at_start()) {
+    fit.reason += fmt::format(
+        " Nor is there an equilibrium with {}, as stiff as the bounds allow: widen `bounds`, or see whether "
+        "the "
+        "pressures are in kPa and the lengths in mm.",
+        start_words(sought, study, elements));
+  } else {
+    record.remarks.push_back(fmt::format(
+        "With the start values ({}) the body does not carry the pressures: the search began at {} instead.",
+        given, start_words(sought, study, elements)));
+  }
+  return fit;
+}
+
+/// A result that has only got so far: values without errors.
+FitRecord checkpoint_of(FitRecord record, const OptimiserStep& step, const Study& study, size_t elements) {
+  record.reason = fmt::format("Checkpoint after iteration {}.", step.iteration);
+  record.iterations = step.iteration;
   size_t first = 0;
   for (const StudyParameter& parameter : study.law.parameters) {
     const size_t count = value_count(parameter, elements);
@@ -288,11 +364,6 @@ void record_undeformed(FitRecord& record, const Measurement& measurement) {
   record.undeformed_chi2_per_residual = rows > 0 ? chi2 / count : std::numeric_limits<double>::quiet_NaN();
 }
 
-std::string data_words(const Measurement& measurement) {
-  if (measurement.points.empty()) return "tags";
-  return measurement.tags.empty() ? "points" : "tags and points";
-}
-
 }  // namespace
 
 // Extrapolation beyond an element, as a fraction of it: `outside_mm` through the wall, never more than an
@@ -300,6 +371,13 @@ std::string data_words(const Measurement& measurement) {
 LocatorOptions locator_for(const Specimen& specimen) {
   const double size_mm = std::visit([](const auto& kind) { return element_mm(kind); }, specimen);
   return {.outside_xi = std::clamp(outside_mm / size_mm, 0.25, 1.0)};
+}
+
+FitRecord refused_fit(const Study& study, const Measurement& measurement, std::vector<Finding> findings) {
+  FitRecord record = head_of(study, measurement);
+  record.reason = "Not fitted: the data cannot be what they say.";
+  record.findings = std::move(findings);
+  return record;
 }
 
 FitRecord fit_study(const Study& study, const Measurement& measurement, const StudyFitOptions& options) {
@@ -312,13 +390,8 @@ FitRecord fit_study(const Study& study, const Measurement& measurement, const St
   ElasticModel model = make_model(study);
   require_cavity(study, model);
   const size_t elements = model.mesh().element_count();
-  FitRecord record{};
-  record.study = study.file.string();
-  record.law = study.law.name;
-  record.specimen = kind_of(study.specimen);
-  record.mesh = mesh_of(study.specimen);
+  FitRecord record = head_of(study, measurement);
   record.unknowns = model.dofs();
-  record.data = data_words(measurement);
 
   Sought sought = sought_of(study, model);
   if (options.start) take_start(sought, *options.start, study, elements);
@@ -342,7 +415,7 @@ FitRecord fit_study(const Study& study, const Measurement& measurement, const St
     if (options.on_checkpoint && step.accepted)
       options.on_checkpoint(checkpoint_of(record, step, study, elements));
   };
-  const FitOutcome fit = fit_motion(motion, sought.values, measurement, fit_options);
+  const FitOutcome fit = fit_from_where_it_stands(motion, sought, study, measurement, fit_options, record);
 
   record.converged = fit.converged;
   record.reason = fit.reason;

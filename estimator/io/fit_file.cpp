@@ -6,6 +6,7 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
+#include "estimator/io/finding_json.hpp"
 #include "estimator/io/whole_file.hpp"
 #include "protocol/contract/input_error.hpp"
 
@@ -34,7 +35,7 @@ Json from_lengths(const std::vector<double>& values_mm) {
     json.push_back(from_number(std::round(value * 100) / 100));
   return json;
 }
-std::vector<double> to_lengths(const Json& json) {
+std::vector<double> to_numbers(const Json& json) {
   std::vector<double> values;
   for (const Json& value : json)
     values.push_back(to_number(value));
@@ -45,7 +46,7 @@ Json from_curve(const PlaneCurve& curve) {
   return {{"h_mm", from_lengths(curve.h_mm)}, {"v_mm", from_lengths(curve.v_mm)}};
 }
 PlaneCurve to_curve(const Json& json) {
-  PlaneCurve curve{to_lengths(json.at("h_mm")), to_lengths(json.at("v_mm"))};
+  PlaneCurve curve{to_numbers(json.at("h_mm")), to_numbers(json.at("v_mm"))};
   if (curve.h_mm.size() != curve.v_mm.size()) throw std::invalid_argument("h_mm and v_mm differ in length");
   return curve;
 }
@@ -83,7 +84,10 @@ Json from_parameter(const FittedParameter& parameter) {
                           {"effective_values", from_number(smoothness->effective_values)}};
   }
   if (const auto& profile = parameter.profile)
-    json["profile"] = {{"ci95", from_interval(profile->ci95)}, {"at_bound", profile->at_bound}};
+    json["profile"] = {{"ci95", from_interval(profile->ci95)},
+                       {"at_bound", profile->at_bound},
+                       {"value", profile->value},
+                       {"cost_rise", profile->cost_rise}};
   if (const auto& posterior = parameter.posterior) {
     json["posterior"] = {{"mean", posterior->mean},
                          {"sd", posterior->sd},
@@ -110,8 +114,14 @@ FittedParameter to_parameter(const std::string& name, const Json& json) {
     }
   }
   if (json.contains("profile")) {
-    parameter.profile =
-        FittedProfile{to_interval(json.at("profile").at("ci95")), json.at("profile").at("at_bound")};
+    const Json& told = json.at("profile");
+    parameter.profile = FittedProfile{to_interval(told.at("ci95")), told.at("at_bound")};
+    if (told.contains("value")) {
+      parameter.profile->value = to_numbers(told.at("value"));
+      parameter.profile->cost_rise = to_numbers(told.at("cost_rise"));
+    }
+    if (parameter.profile->value.size() != parameter.profile->cost_rise.size())
+      throw std::invalid_argument("the lists of a profile differ in length");
   }
   if (json.contains("posterior")) {
     const Json& told = json.at("posterior");
@@ -202,6 +212,9 @@ Json from_record(const FitRecord& record) {
   json["forward_solves"] = record.forward_solves;
   json["seconds"] = record.seconds;
   json["remarks"] = record.remarks;
+  json["findings"] = Json::array();
+  for (const Finding& finding : record.findings)
+    json["findings"].push_back(from_finding(finding));
   json["mesh"] = record.mesh;
   json["unknowns"] = record.unknowns;
   json["residuals_used"] = record.residuals_used;
@@ -265,6 +278,10 @@ FitRecord to_record(const Json& json) {
   record.forward_solves = json.at("forward_solves");
   record.seconds = json.at("seconds");
   record.remarks = json.at("remarks").get<std::vector<std::string>>();
+  if (json.contains("findings")) {
+    for (const Json& finding : json.at("findings"))
+      record.findings.push_back(to_finding(finding));
+  }
   record.mesh = json.at("mesh").get<std::vector<int>>();
   record.unknowns = json.at("unknowns");
   record.residuals_used = json.at("residuals_used");
@@ -280,7 +297,7 @@ FitRecord to_record(const Json& json) {
     record.frames.push_back(to_frame(frame));
   record.correlation.names = json.at("correlation").at("names").get<std::vector<std::string>>();
   for (const Json& row : json.at("correlation").at("matrix")) {
-    record.correlation.matrix.push_back(to_lengths(row));
+    record.correlation.matrix.push_back(to_numbers(row));
   }
   if (json.contains("directions")) {
     for (const Json& told : json.at("directions")) {
@@ -308,10 +325,10 @@ FitRecord to_record(const Json& json) {
   }
   for (const Json& step : json.at("history")) {
     record.history.push_back({step.at("iteration"), to_number(step.at("cost")), step.at("accepted"),
-                              to_lengths(step.at("parameters"))});
+                              to_numbers(step.at("parameters"))});
   }
-  record.residuals = {to_lengths(json.at("residuals").at("edges")),
-                      to_lengths(json.at("residuals").at("counts"))};
+  record.residuals = {to_numbers(json.at("residuals").at("edges")),
+                      to_numbers(json.at("residuals").at("counts"))};
   record.section_frame = json.at("section_frame");
   for (const Json& section : json.at("sections"))
     record.sections.push_back(to_section(section));

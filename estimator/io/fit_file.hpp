@@ -11,6 +11,8 @@
 #include <string_view>
 #include <vector>
 
+#include "estimator/io/finding.hpp"
+
 namespace diastole {
 
 struct FittedElement {
@@ -31,7 +33,9 @@ struct FittedSmoothness {
 /// From the likelihood's true shape (estimator/fit/profile.hpp).
 struct FittedProfile {
   std::array<double, 2> ci95;
-  std::array<bool, 2> at_bound;  ///< the bound ends the interval, not the data
+  std::array<bool, 2> at_bound;        ///< the bound ends the interval, not the data
+  std::vector<double> value = {};      ///< where it was tried, rising
+  std::vector<double> cost_rise = {};  ///< of each, above the least cost
 };
 
 /// From draws of the posterior (estimator/fit/posterior.hpp).
@@ -171,6 +175,7 @@ struct FitRecord {
   int section_frame;
   std::vector<FitSection> sections;
   std::vector<std::string> remarks;  ///< whole sentences for the reader
+  std::vector<Finding> findings;     ///< what is wrong with the data, the gravest first
 };
 
 /// Near the start of each such document.

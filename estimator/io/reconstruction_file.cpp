@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <type_traits>
 
+#include "estimator/io/finding_json.hpp"
 #include "estimator/io/section_json.hpp"
 #include "protocol/contract/input_error.hpp"
 
@@ -93,17 +94,6 @@ void each_member(Visit&& visit,
   visit("degrees_of_freedom", c.degrees_of_freedom);
 }
 
-template <class Visit, class Found>
-void each_member(Visit&& visit, Found& f) requires std::is_same_v<std::remove_const_t<Found>, Finding> {
-  visit("severity", f.severity);
-  visit("id", f.id);
-  visit("what", f.what);
-  visit("where", f.where);
-  visit("number", f.number);
-  visit("unit", f.unit);
-  visit("remedy", f.remedy);
-}
-
 template <class Visit, class Record>
 void each_member(Visit&& visit,
                  Record& r) requires std::is_same_v<std::remove_const_t<Record>, ReconstructionRecord> {
@@ -133,7 +123,7 @@ concept HasMembers = requires(T& value) {
 
 Json written(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
 Json written(const std::string& value) { return value; }
-Json written(Severity value) { return describe(value); }
+Json written(const Finding& value) { return from_finding(value); }
 template <class Whole>
 requires std::is_integral_v<Whole> Json written(Whole value) { return value; }
 template <HasMembers T>
@@ -158,13 +148,7 @@ void read(const Json& json, double& value) {
   value = json.is_null() ? std::numeric_limits<double>::quiet_NaN() : json.get<double>();
 }
 void read(const Json& json, std::string& value) { value = json.get<std::string>(); }
-void read(const Json& json, Severity& value) {
-  const auto word = json.get<std::string>();
-  for (const Severity severity : {Severity::note, Severity::warning, Severity::error}) {
-    if (describe(severity) == word) return void(value = severity);
-  }
-  throw std::invalid_argument(word + " is no severity");
-}
+void read(const Json& json, Finding& value) { value = to_finding(json); }
 void read(const Json& json, bool& value) { value = json.get<bool>(); }
 template <class Whole>
 requires std::is_integral_v<Whole>

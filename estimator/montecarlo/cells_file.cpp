@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <limits>
+#include <sstream>
 #include <stdexcept>
 
 #include "estimator/io/whole_file.hpp"
@@ -77,6 +77,72 @@ CellResult result_of(const std::string& row, size_t parameters) {
   return result;
 }
 
+namespace {
+
+/// The rows behind the two lines of the heading; a last one that was cut off is dropped.
+std::vector<CellResult> read_rows(const std::string& text, size_t begin, size_t parameters,
+                                  const std::string& file) {
+  std::vector<CellResult> results;
+  size_t line = 2;
+  for (size_t end = text.find('\n', begin); end != std::string::npos; end = text.find('\n', begin)) {
+    ++line;
+    try {
+      results.push_back(result_of(text.substr(begin, end - begin), parameters));
+    } catch (const std::invalid_argument& error) {
+      throw InputError({file, fmt::format("line {}", line), fmt::format("is no cell: {}", error.what()),
+                        "Remove the line; its cell is then fitted again."});
+    }
+    begin = end + 1;
+  }
+  return results;
+}
+
+/// "C_kPa=3" as a parameter whose true value that is.
+StudyParameter truth_of(const std::string& word) {
+  const size_t equals = word.find('=');
+  if (equals == std::string::npos) throw std::invalid_argument("\"" + word + "\"");
+  const double truth = parsed<double>(word.substr(equals + 1));
+  return {word.substr(0, equals), truth, truth > 0 ? 0.5 * truth : -std::abs(truth), std::abs(truth),
+          Variation::whole};
+}
+
+}  // namespace
+
+SavedTable saved_table(const std::string& text, const std::string& file) {
+  const InputError no_table({file, "line 1", "is no file of Monte Carlo cells",
+                             "Give one that `diastole montecarlo --cells NAME.cells.csv` wrote."});
+  const size_t first_end = text.find('\n');
+  const size_t second_end = first_end == std::string::npos ? first_end : text.find('\n', first_end + 1);
+  if (!is_cells_file(text) || second_end == std::string::npos) throw no_table;
+  SavedTable saved;
+  Study study{};
+  MonteCarloPlan plan;
+  plan.noise_mm.clear();
+  std::istringstream words(text.substr(cells_file_mark.size(), first_end - cells_file_mark.size()));
+  std::string seed, exact;
+  words >> saved.study >> seed >> exact;
+  saved.exact_pressures = exact.ends_with("=1");
+  try {
+    for (std::string word; words >> word;)
+      study.law.parameters.push_back(truth_of(word));
+  } catch (const std::invalid_argument&) {
+    throw no_table;
+  }
+  const std::vector<CellResult> results = read_rows(text, second_end + 1, study.law.parameters.size(), file);
+  plan.repeats = 0;
+  for (const CellResult& result : results) {
+    plan.repeats = std::max(plan.repeats, result.cell.repeat);
+    if (std::find(plan.noise_mm.begin(), plan.noise_mm.end(), result.cell.noise_mm) == plan.noise_mm.end())
+      plan.noise_mm.push_back(result.cell.noise_mm);
+    if (std::find(plan.frames.begin(), plan.frames.end(), result.cell.frames) == plan.frames.end())
+      plan.frames.push_back(result.cell.frames);
+  }
+  std::sort(plan.noise_mm.begin(), plan.noise_mm.end());
+  std::sort(plan.frames.begin(), plan.frames.end());
+  saved.entries = table_of(plan, study, results);
+  return saved;
+}
+
 CellsFile::CellsFile(const std::filesystem::path& path, const Study& study, const MonteCarloPlan& plan)
     : path_(path), parameters_(study.law.parameters.size()) {
   const std::string heading = heading_of(study, plan);
@@ -87,20 +153,9 @@ CellsFile::CellsFile(const std::filesystem::path& path, const Study& study, cons
       throw InputError({path.string(), "line 1", "belongs to another study, seed or truth",
                         "Choose another file, or remove this one to begin anew."});
     }
-    size_t line = 2, begin = heading.size();
-    for (size_t end = text.find('\n', begin); end != std::string::npos; end = text.find('\n', begin)) {
-      ++line;
-      const std::string row = text.substr(begin, end - begin);
-      try {
-        results_.push_back(result_of(row, parameters_));
-      } catch (const std::invalid_argument& error) {
-        throw InputError({path.string(), fmt::format("line {}", line),
-                          fmt::format("is no cell: {}", error.what()),
-                          "Remove the line; its cell is then fitted again."});
-      }
-      kept += row + "\n";
-      begin = end + 1;
-    }
+    results_ = read_rows(text, heading.size(), parameters_, path.string());
+    for (const CellResult& result : results_)
+      kept += row_of(result, parameters_) + "\n";
   }
   write_whole_file(path, kept);
   file_.open(path, std::ios::app);

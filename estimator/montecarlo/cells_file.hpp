@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <fstream>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "estimator/montecarlo/montecarlo.hpp"
@@ -20,6 +21,18 @@ inline constexpr std::string_view cells_file_mark = "# diastole-cells 1 ";
 std::string row_of(const CellResult& result, size_t parameters);
 /// Throws std::invalid_argument.
 CellResult result_of(const std::string& row, size_t parameters);
+
+/// What a file of cells holds, without its study.
+struct SavedTable {
+  std::string study;  ///< the study file's name
+  bool exact_pressures = false;
+  std::vector<TableEntry>
+      entries;  ///< by noise, then by number of frames; those of fewer than two refits have no spread
+};
+
+inline bool is_cells_file(std::string_view text) { return text.starts_with(cells_file_mark); }
+/// Throws InputError if the text is no such file; `file` stands for it in messages.
+SavedTable saved_table(const std::string& text, const std::string& file);
 
 class CellsFile {
  public:

@@ -173,9 +173,11 @@ void check_pressure_offset(Findings& findings, const MotionEvidence& evidence) {
       {Severity::warning, "pressure-offset",
        fmt::format("The motion vanishes at {:+.3g} ± {:.2g} kPa and not at 0.", rest.value_kPa, rest.se_kPa),
        "column pressure_kPa, loaded frames", rest.value_kPa, "kPa",
-       fmt::format("If the transducer has an offset subtract {:.3g} kPa from the loaded frames; if the two "
-                   "files number their frames differently, number them alike.",
-                   rest.value_kPa)});
+       fmt::format(
+           "If the transducer has an offset subtract {:.3g} kPa from the loaded frames, or let the fit "
+           "find it: `diastole fit --pressure-offset {:.1g}`; if the two files number their frames "
+           "differently, number them alike.",
+           rest.value_kPa, std::abs(rest.value_kPa))});
 }
 
 void check_volumes(Findings& findings, const MotionEvidence& evidence) {
@@ -243,13 +245,20 @@ std::vector<MotionAmplitude> motion_amplitudes(const FieldForms& forms,
                                                const std::vector<FrameField>& fields) {
   std::vector<MotionAmplitude> amplitudes;
   const Eigen::VectorXd last = forms.space.unknowns_of(fields.back().displacement_mm);
-  const Eigen::VectorXd weighted =
-      forms.quadratic.matrix(forms.sobolev.mean_square).selfadjointView<Eigen::Lower>() * last;
-  const Eigen::VectorXd along = weighted / std::max(last.dot(weighted), 1e-12);
   for (const FrameField& field : fields) {
-    const double variance = along.dot(field.system->solve(along).col(0));
-    amplitudes.push_back({along.dot(forms.space.unknowns_of(field.displacement_mm)), std::sqrt(variance)});
+    const auto& rows = field.system->weighted_rows();
+    Eigen::VectorXd seen = rows * forms.space.unknowns_of(field.displacement_mm);
+    for (size_t i = 0; i < field.rows.size(); ++i)
+      seen[static_cast<Eigen::Index>(i)] += field.rows[i].rejected ? 0.0 : field.rows[i].residual;
+    const Eigen::VectorXd expected = rows * last;
+    const double information = std::max(expected.squaredNorm(), 1e-12);
+    amplitudes.push_back(
+        {expected.dot(seen) / information, std::max(field.scale, 1.0) / std::sqrt(information)});
   }
+  const double whole = amplitudes.back().value;
+  if (!(whole > 0.0)) return amplitudes;
+  for (MotionAmplitude& amplitude : amplitudes)
+    amplitude = {amplitude.value / whole, amplitude.se / whole};
   return amplitudes;
 }
 

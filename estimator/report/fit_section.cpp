@@ -5,6 +5,7 @@
 #include <cmath>
 #include <filesystem>
 
+#include "estimator/report/fit_figures.hpp"
 #include "estimator/report/html_text.hpp"
 #include "estimator/report/sections.hpp"
 #include "estimator/report/svg_plot.hpp"
@@ -43,6 +44,12 @@ void add_shapes(Page& page, const FitRecord& fit) {
   page.table(
       {"parameter", "95 % interval", "profile", "posterior", "R-hat", "effective draws"}, rows,
       "Intervals from the likelihood's curvature, from its true shape, and from draws of the posterior.");
+  std::vector<Figure> profiles;
+  for (const FittedParameter& parameter : fit.parameters) {
+    if (parameter.profile && parameter.profile->value.size() > 2)
+      profiles.push_back(profile_figure(parameter));
+  }
+  page.figures(profiles);
 }
 
 void add_parameters(Page& page, const FitRecord& fit) {
@@ -60,16 +67,7 @@ void add_parameters(Page& page, const FitRecord& fit) {
   add_shapes(page, fit);
   for (const FittedParameter& parameter : fit.parameters) {
     if (parameter.elements.empty()) continue;
-    SvgPlot plot({.x = {.label = "element"}, .y = {.label = parameter.name}});
-    std::vector<double> index, value, error;
-    for (size_t i = 0; i < parameter.elements.size(); ++i) {
-      index.push_back(static_cast<double>(i));
-      value.push_back(parameter.elements[i].value);
-      error.push_back(1.96 * parameter.elements[i].se);
-    }
-    plot.error_bars(index, value, error, "a");
-    plot.points(index, value, "a", "value and 95 % interval of each element");
-    page.figures({{plot.svg(), "Regional values, one an element."}});
+    page.figures(regional_figures(fit, parameter));
   }
 }
 
@@ -214,6 +212,7 @@ void add_fit(Page& page, const FitRecord& fit) {
                   fit.mesh.empty() ? "a mesh of its own"
                                    : fmt::format("a mesh of {} elements", fmt::join(fit.mesh, " × "))));
   if (!fit.converged) page.warning("The fit did not converge: " + fit.reason);
+  if (!fit.findings.empty()) add_findings(page, fit.findings);
   add_parameters(page, fit);
   for (const std::string& remark : fit.remarks)
     page.paragraph(remark);

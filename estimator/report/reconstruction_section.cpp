@@ -30,17 +30,6 @@ constexpr MapChoice maps[] = {
      "local volume over the undeformed one, which the reconstruction does not hold at 1"},
 };
 
-void add_findings(Page& page, const ReconstructionRecord& record) {
-  for (const Finding& finding : record.findings) {
-    const std::string text = fmt::format("{} {} ({})", finding.what, finding.remedy, finding.where);
-    if (finding.severity == Severity::note)
-      page.paragraph(text);
-    else
-      page.warning(text);
-  }
-  if (record.findings.empty()) page.paragraph("Nothing was found wrong with the data.");
-}
-
 void add_maps(Page& page, const ReconstructionRecord& record) {
   const std::string frame = fmt::format("frame {}", record.frames.back().frame);
   for (const MapChoice& map : maps) {
@@ -181,7 +170,8 @@ void add_reconstruction(Page& page, const ReconstructionRecord& record) {
                               : fmt::format("{} elements", fmt::join(record.mesh, " × ")),
           chosen(record.smoothing[0]), chosen(record.smoothing[1]), chosen(record.smoothing[2]),
           record.modes_seen, record.unknowns));
-  add_findings(page, record);
+  add_findings(page, record.findings);
+  if (record.findings.empty()) page.paragraph("Nothing was found wrong with the data.");
   if (record.frames.empty()) {
     page.paragraph("Nothing was reconstructed.");
     return;

@@ -47,6 +47,7 @@ std::string make_report(std::span<const std::filesystem::path> files, const Repo
   std::vector<ReconstructionRecord> reconstructions;
   std::vector<explain::Explanation> explanations;
   std::vector<ShearTest> shear_tests;
+  std::vector<SavedTable> tables;
   std::vector<runfile::RecordedRun> runs;
   for (const std::filesystem::path& file : files) {
     const std::string content = read_whole_file(file);
@@ -58,12 +59,18 @@ std::string make_report(std::span<const std::filesystem::path> files, const Repo
       shear_tests.push_back(shear_test_from_text(content, file.string()));
       continue;
     }
+    if (is_cells_file(content)) {
+      tables.push_back(saved_table(content, file.string()));
+      continue;
+    }
     if (!is_json_object(content)) {
       throw InputError(
           {file.string(), "",
-           "is neither a run file nor a fit result, an explanation, a reconstruction, a solution or a shear "
-           "test",
+           "is neither a run file nor a fit result, a Monte Carlo table, an explanation, a reconstruction, a "
+           "solution "
+           "or a shear test",
            "Give files that `diastole run`, `diastole simulate`, `diastole fit -o`, `diastole explain -o`, "
+           "`diastole montecarlo --cells`, "
            "`diastole reconstruct -o NAME.json` or `diastole solve -o NAME.json` wrote, or the CSV that "
            "`diastole shear` reads."});
     }
@@ -81,15 +88,17 @@ std::string make_report(std::span<const std::filesystem::path> files, const Repo
     }
     fits.push_back(fit_record_from_json(content, file.string()));
   }
-  const bool no_estimate = fits.empty() && shear_tests.empty() && runs.empty();
+  const bool no_estimate = fits.empty() && shear_tests.empty() && tables.empty() && runs.empty();
   Page page(!explanations.empty() ? explanation_title(explanations)
             : no_estimate ? (solutions.empty() && !reconstructions.empty() ? "Displacement from tagged images"
                                                                            : "Strain and stress under load")
-                          : title_of(fits.size() + shear_tests.size(), runs.size()));
+                          : title_of(fits.size() + shear_tests.size() + tables.size(), runs.size()));
   for (const explain::Explanation& explanation : explanations)
     add_explanation(page, explanation);
   for (const FitRecord& fit : fits)
     add_fit(page, fit);
+  for (const SavedTable& table : tables)
+    add_montecarlo(page, table);
   for (const ReconstructionRecord& reconstruction : reconstructions)
     add_reconstruction(page, reconstruction);
   for (const SolutionRecord& solution : solutions)

@@ -7,6 +7,7 @@
 #include <iterator>
 #include <limits>
 
+#include "estimator/report/colour_scale.hpp"
 #include "estimator/report/html_text.hpp"
 #include "estimator/report/svg_plot.hpp"
 
@@ -15,8 +16,7 @@ namespace {
 
 constexpr double panel_width = 225, panel_gap = 16, largest_height = 400;
 constexpr double title_height = 24, foot_height = 30;
-constexpr double bar_left = 2 * panel_width + 2 * panel_gap, bar_width = 14, bar_room = 62;
-constexpr size_t colours = 48;
+constexpr double bar_left = 2 * panel_width + 2 * panel_gap;
 
 /// Places of both states on one scale.
 struct Scale {
@@ -79,19 +79,19 @@ class Path {
 
 std::string panel(const std::vector<FlatPoints>& cells, const std::vector<double>& values,
                   const std::array<double, 2>& range, const Scale& scale) {
-  std::vector<Path> bins(colours, Path(scale));
+  std::vector<Path> bins(map_colours, Path(scale));
   for (size_t i = 0; i < cells.size(); ++i) {
     if (!std::isfinite(values[i])) continue;
     const double fraction = std::clamp((values[i] - range[0]) / (range[1] - range[0]), 0.0, 1.0);
-    bins[std::min(colours - 1, static_cast<size_t>(fraction * static_cast<double>(colours)))].polygon(
+    bins[std::min(map_colours - 1, static_cast<size_t>(fraction * static_cast<double>(map_colours)))].polygon(
         cells[i]);
   }
   std::string result;
-  for (size_t bin = 0; bin < colours; ++bin) {
+  for (size_t bin = 0; bin < map_colours; ++bin) {
     if (bins[bin].text().empty()) continue;
     // A stroke of the same colour closes the hairlines between neighbours.
     result += fmt::format("<path fill=\"{0}\" stroke=\"{0}\" stroke-width=\".6\" d=\"{1}\"/>",
-                          map_colour((static_cast<double>(bin) + 0.5) / static_cast<double>(colours)),
+                          map_colour((static_cast<double>(bin) + 0.5) / static_cast<double>(map_colours)),
                           bins[bin].text());
   }
   return result;
@@ -101,29 +101,6 @@ std::string lines(const FlatPoints& points, const char* style, const Scale& scal
   Path path(scale);
   path.lines(points);
   return fmt::format("<path class=\"{}\" d=\"{}\"/>", style, path.text());
-}
-
-std::string colour_bar(const std::array<double, 2>& range, const std::string& label, double height) {
-  std::string result;
-  const double step = height / static_cast<double>(colours);
-  for (size_t i = 0; i < colours; ++i) {
-    result +=
-        fmt::format("<path stroke=\"{}\" stroke-width=\"{:.2f}\" d=\"M{} {:.2f}h{}\"/>",
-                    map_colour((static_cast<double>(i) + 0.5) / static_cast<double>(colours)), step + 0.3,
-                    bar_left, title_height + height - (static_cast<double>(i) + 0.5) * step, bar_width);
-  }
-  const std::vector<double> ticks = ticks_over(range[0], range[1], 5);
-  const double slack = 1e-9 * (range[1] - range[0]);
-  for (const double tick : ticks) {
-    if (tick < range[0] - slack || tick > range[1] + slack) continue;
-    const double y = title_height + height * (range[1] - tick) / (range[1] - range[0]);
-    const double shown = std::abs(tick) < 1e-6 * (ticks[1] - ticks[0]) ? 0.0 : tick;
-    result +=
-        fmt::format("<path class=\"grid\" d=\"M{0} {1:.1f}h4\"/><text x=\"{2}\" y=\"{3:.1f}\">{4}</text>",
-                    bar_left + bar_width, y, bar_left + bar_width + 7, y + 4, chosen(shown));
-  }
-  return result + fmt::format("<text class=\"label\" x=\"{}\" y=\"14\" text-anchor=\"end\">{}</text>",
-                              bar_left + bar_width + bar_room, escaped(label));
 }
 
 /// A bar of a round length under the first drawing.
@@ -143,45 +120,12 @@ std::string length_bar(const SolutionSection& section, const Scale& scale) {
 
 }  // namespace
 
-std::string map_colour(double fraction) {
-  constexpr std::array<std::array<double, 3>, 10> anchors{{{68, 1, 84},
-                                                           {72, 40, 120},
-                                                           {62, 73, 137},
-                                                           {49, 104, 142},
-                                                           {38, 130, 142},
-                                                           {31, 158, 137},
-                                                           {53, 183, 121},
-                                                           {110, 206, 88},
-                                                           {181, 222, 43},
-                                                           {253, 231, 37}}};
-  const double place = std::clamp(fraction, 0.0, 1.0) * static_cast<double>(anchors.size() - 1);
-  const size_t low = std::min(static_cast<size_t>(place), anchors.size() - 2);
-  std::string colour = "#";
-  for (size_t i = 0; i < 3; ++i) {
-    colour += fmt::format("{:02x}", std::lround(std::lerp(anchors[low][i], anchors[low + 1][i],
-                                                          place - static_cast<double>(low))));
-  }
-  return colour;
-}
-
-std::array<double, 2> colour_range(const std::vector<double>& values) {
-  std::vector<double> sorted;
-  std::copy_if(values.begin(), values.end(), std::back_inserter(sorted),
-               [](double v) { return std::isfinite(v); });
-  if (sorted.empty()) return {0.0, 1.0};
-  std::sort(sorted.begin(), sorted.end());
-  const auto last = static_cast<double>(sorted.size() - 1);
-  const double low = sorted[static_cast<size_t>(0.02 * last)];
-  const double high = sorted[static_cast<size_t>(std::ceil(0.98 * last))];
-  const double least = 1e-6 + 1e-6 * std::abs(low);
-  return {low, std::max(high, low + least)};
-}
-
 std::string section_map(const SolutionSection& section, const NamedField& field,
                         const SectionMapLabels& labels) {
   const Scale scale = scale_of(section);
   const std::array<double, 2> range = colour_range(field.values);
   const double after = panel_width + panel_gap;
+  const ColourBarPlace bar{bar_left, title_height, scale.height};
   std::string body =
       fmt::format("<text x=\"{}\" y=\"14\" text-anchor=\"middle\">undeformed</text>", 0.5 * panel_width);
   body += panel(section.cells_before, field.values, range, scale);
@@ -194,10 +138,10 @@ std::string section_map(const SolutionSection& section, const NamedField& field,
   body += lines(section.elements_after, "element-line", scale) +
           lines(section.outline_after, "outline", scale) +
           lines(section.outline_before, "outline before", scale) + "</g>";
-  body += colour_bar(range, labels.bar, scale.height) + length_bar(section, scale);
+  body += colour_bar(range, labels.bar, bar) + length_bar(section, scale);
   return fmt::format(
       "<svg class=\"plot\" viewBox=\"0 0 {0:.0f} {1:.0f}\" width=\"{0:.0f}\" role=\"img\">{2}</svg>",
-      bar_left + bar_width + bar_room, title_height + scale.height + foot_height, body);
+      bar_left + bar.width + bar.room, title_height + scale.height + foot_height, body);
 }
 
 }  // namespace diastole::report

@@ -5,6 +5,7 @@
 #include "estimator/io/fit_file.hpp"
 #include "estimator/io/reconstruction_file.hpp"
 #include "estimator/io/solution_file.hpp"
+#include "estimator/montecarlo/cells_file.hpp"
 #include "estimator/report/page.hpp"
 #include "estimator/shear/shear_fit.hpp"
 #include "protocol/runfile/run.hpp"
@@ -25,6 +26,13 @@ void add_solution(Page& page, const SolutionRecord& record);
 /// What is wrong with the data, the field's frames, maps of residuals, errors, coverage and volume, cross-validation, tag
 /// directions, slices and the worst-covered elements.
 void add_reconstruction(Page& page, const ReconstructionRecord& record);
+
+/// Each in its severity's dress.
+void add_findings(Page& page, const std::vector<Finding>& findings);
+
+/// A Monte Carlo table: spread and own errors of the refits by noise and number of frames, beside the paper's where they
+/// are its cells.
+void add_montecarlo(Page& page, const SavedTable& table);
 
 /// C1 of a rotational shear test, Eq. 1's two sides with the line, the residuals, each load by itself.
 void add_shear(Page& page, const ShearTest& test, const ShearFit& fit);

@@ -1,3 +1,4 @@
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 
 #include <algorithm>
@@ -138,6 +139,52 @@ TEST_F(ReportPage, AFitShowsItsNumbersAndDrawings) {
   }
   EXPECT_GE(count(html, "<svg"), 3U);
   EXPECT_EQ(count(html, "<script"), 0U);  // SVG alone needs none
+}
+
+TEST_F(ReportPage, ARegionalFitIsShownOnTheUnrolledWall) {
+  FitRecord fit = gel_fit();
+  fit.mesh = {4, 2, 1};
+  for (size_t i = 0; i < 8; ++i)
+    fit.parameters[0].elements.push_back({8.0 + 0.1 * static_cast<double>(i), 0.2, {}});
+  fit.parameters[0].elements[5].se = std::numeric_limits<double>::quiet_NaN();
+  const std::string html = page({folder_.write("map.json", to_json(fit))});
+  expect_self_contained(html);
+  for (const char* shown : {"on the wall unrolled", "270°", ">8.50</text>", ">2.50</text>", "var(--rule)"})
+    expect_shown(html, shown);
+  fit.mesh.clear();  // a mesh file: no wall to unroll
+  expect_shown(page({folder_.write("mesh.json", to_json(fit))}), "value and 95 % interval of each element");
+}
+
+TEST_F(ReportPage, AFitShowsItsProfilesAndWhatIsWrongWithItsData) {
+  FitRecord fit = gel_fit();
+  fit.parameters[0].profile =
+      FittedProfile{{8.4, 8.75}, {false, false}, {8.4, 8.48, 8.5692, 8.66, 8.75}, {1.92, 0.5, 0, 0.5, 1.92}};
+  fit.findings = {{Severity::warning, "wild-points", "5 % are wild.", "frame <2>", 5, "%", "Look at them."}};
+  const std::string html = page({folder_.write("profile.json", to_json(fit))});
+  expect_self_contained(html);
+  for (const char* shown : {"rise of −log likelihood", "what the standard error says",
+                            "5 % are wild. Look at them.", "frame &lt;2&gt;"})
+    expect_shown(html, shown);
+  const FitRecord back = fit_record_from_json(to_json(fit), "fit.json");
+  EXPECT_EQ(back.parameters[0].profile->cost_rise[1], 0.5);
+  EXPECT_EQ(back.findings[0].id, "wild-points");
+}
+
+TEST_F(ReportPage, AMonteCarloTableStandsBesideThePapers) {
+  std::string cells =
+      "# diastole-cells 1 heart<1>.study.toml seed=1 exact_pressures=1 C_kPa=3 b1=11 b2=2 b3=10\n"
+      "noise_mm,frames,repeat,converged,iterations,seconds,C_kPa,C_kPa_se,b1,b1_se,b2,b2_se,b3,b3_se\n";
+  for (const char* noise : {"0.4", "0.8"}) {
+    for (const char* repeat : {"1", "2"})
+      cells += fmt::format("{},1,{},1,4,1.0,3.{},0.2,11,0.5,2,0.1,10,1\n", noise, repeat, repeat);
+  }
+  const std::string html = page({folder_.write("heart.cells.csv", cells)});
+  expect_self_contained(html);
+  for (const char* shown : {"heart&lt;1&gt;.study.toml", "10 / 7 / 7 / 13", "2.2 / 0.0 / 0.0 / 0.0",
+                            "exactly known", "Dots are the paper's", "C_kPa = 3"})
+    expect_shown(html, shown);
+  EXPECT_THAT(message_of([&] { (void)page({folder_.write("cut.csv", cells.substr(0, 100))}); }),
+              AllOf(HasSubstr("cut.csv"), HasSubstr("no file of Monte Carlo cells")));
 }
 
 TEST_F(ReportPage, ARunShowsItsTracesFramesAndSoundness) {

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 
 #include "estimator/io/solution_file.hpp"
+#include "estimator/report/colour_scale.hpp"
 #include "estimator/report/report.hpp"
 #include "estimator/report/section_map.hpp"
 #include "tests/estimator/io/scratch_file.hpp"

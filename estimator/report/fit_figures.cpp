@@ -1,0 +1,73 @@
+#include "estimator/report/fit_figures.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "estimator/report/html_text.hpp"
+#include "estimator/report/svg_plot.hpp"
+#include "estimator/report/wall_map.hpp"
+
+namespace diastole::report {
+namespace {
+
+constexpr double rise_at_95 = 1.92;  // half of chi-square's 95 % point, one degree of freedom
+
+Figure values_by_number(const FittedParameter& parameter) {
+  SvgPlot plot({.x = {.label = "element"}, .y = {.label = parameter.name}});
+  std::vector<double> index, value, error;
+  for (size_t i = 0; i < parameter.elements.size(); ++i) {
+    index.push_back(static_cast<double>(i));
+    value.push_back(parameter.elements[i].value);
+    error.push_back(1.96 * parameter.elements[i].se);
+  }
+  plot.error_bars(index, value, error, "a");
+  plot.points(index, value, "a", "value and 95 % interval of each element");
+  return {plot.svg(), "Regional values, one an element."};
+}
+
+}  // namespace
+
+std::vector<Figure> regional_figures(const FitRecord& fit, const FittedParameter& parameter) {
+  const bool rings = fit.mesh.size() == 3 && static_cast<size_t>(fit.mesh[0]) *
+                                                     static_cast<size_t>(fit.mesh[1]) *
+                                                     static_cast<size_t>(fit.mesh[2]) ==
+                                                 parameter.elements.size();
+  if (!rings) return {values_by_number(parameter)};
+  const std::array<size_t, 3> elements{static_cast<size_t>(fit.mesh[0]), static_cast<size_t>(fit.mesh[1]),
+                                       static_cast<size_t>(fit.mesh[2])};
+  std::vector<double> value, error_percent;
+  for (const FittedElement& element : parameter.elements) {
+    value.push_back(element.value);
+    error_percent.push_back(100 * element.se / element.value);
+  }
+  return {{wall_map(elements, value, parameter.name),
+           fmt::format("{} of each element on the wall unrolled.", parameter.name)},
+          {wall_map(elements, error_percent, "error (%)"),
+           "Their standard errors. Neighbours that are held alike share what they know."}};
+}
+
+Figure profile_figure(const FittedParameter& parameter) {
+  const FittedProfile& profile = *parameter.profile;
+  SvgPlot plot({.x = {.label = parameter.name}, .y = {.label = "rise of −log likelihood", .from = 0.0}});
+  std::vector<double> x, parabola;
+  const double low = profile.value.front(), high = profile.value.back();
+  const bool factor = low > 0;  // the symmetric interval of a positive value is one of its logarithm
+  constexpr int samples = 81;
+  for (int i = 0; i < samples; ++i) {
+    const double at = low + (high - low) * i / (samples - 1);
+    const double away = factor ? std::log(at / parameter.value) * parameter.value : at - parameter.value;
+    x.push_back(at);
+    parabola.push_back(0.5 * std::pow(away / parameter.se, 2));
+  }
+  plot.line(x, parabola, "muted dashed", "what the standard error says");
+  plot.line(profile.value, profile.cost_rise, "a", "the likelihood's profile");
+  plot.points(profile.value, profile.cost_rise, "a");
+  const std::vector<double> ends{low, high}, limit{rise_at_95, rise_at_95};
+  plot.line(ends, limit, "b thin", "95 %");
+  return {plot.svg(),
+          fmt::format("{}: the cost with it held there and all others at their best. {} to {} with 95 %.",
+                      parameter.name, number(profile.ci95[0], 4), number(profile.ci95[1], 4))};
+}
+
+}  // namespace diastole::report

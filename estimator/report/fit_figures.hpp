@@ -1,0 +1,18 @@
+#pragma once
+// Pictures of what a fit tells of its parameters.
+
+#include <vector>
+
+#include "estimator/io/fit_file.hpp"
+#include "estimator/report/page.hpp"
+
+namespace diastole::report {
+
+/// Values and standard errors of a regional parameter: on the unrolled wall where the specimen has one, else over the
+/// elements' numbers.
+std::vector<Figure> regional_figures(const FitRecord& fit, const FittedParameter& parameter);
+
+/// The profile likelihood, with the parabola that the standard error stands for. Precondition: it has one.
+Figure profile_figure(const FittedParameter& parameter);
+
+}  // namespace diastole::report
