@@ -7,8 +7,8 @@
 #include <iterator>
 #include <map>
 
+#include "estimator/report/colour_scale.hpp"
 #include "estimator/report/html_text.hpp"
-#include "estimator/report/section_map.hpp"
 #include "estimator/report/svg_plot.hpp"
 
 namespace diastole::report {

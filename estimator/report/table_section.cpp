@@ -3,6 +3,9 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <functional>
+#include <optional>
 #include <set>
 
 #include "estimator/montecarlo/paper_table.hpp"
@@ -31,6 +34,49 @@ std::string percents(const TableEntry& entry, double (*of)(const ParameterSpread
 std::string papers(const TableEntry& entry) {
   const auto cells = paper_sd_percent(entry.noise_mm, entry.frames);
   return cells ? fmt::format("{:g}", fmt::join(*cells, " / ")) : "–";
+}
+
+/// The geometric mean over the noises of what `percent` gives for an entry, a millimetre of noise. Standard deviations are
+/// proportional to the noise where they are small, so that this pools all cells of one number of frames.
+std::string pooled(const SavedTable& table, int frames,
+                   const std::function<std::optional<std::array<double, 4>>(const TableEntry&)>& percent) {
+  std::array<double, 4> logarithms{};
+  double count = 0;
+  for (const TableEntry& entry : table.entries) {
+    if (entry.frames != frames || !(entry.noise_mm > 0) || entry.parameters.empty()) continue;
+    const auto cells = percent(entry);
+    if (!cells) continue;
+    for (size_t i = 0; i < cells->size(); ++i)
+      logarithms[i] += std::log((*cells)[i] / entry.noise_mm);
+    ++count;
+  }
+  if (count == 0) return "–";
+  for (double& value : logarithms)
+    value = std::exp(value / count);
+  return fmt::format("{:.1f}", fmt::join(logarithms, " / "));
+}
+
+/// All noises together beside the paper's, a row for each number of frames.
+void add_pooled(Page& page, const SavedTable& table, const std::set<int>& frames) {
+  const auto of = [](double (*percent)(const ParameterSpread&)) {
+    return [percent](const TableEntry& entry) -> std::optional<std::array<double, 4>> {
+      std::array<double, 4> values{};
+      for (size_t i = 0; i < values.size(); ++i)
+        values[i] = percent(entry.parameters[i]);
+      return values;
+    };
+  };
+  std::vector<std::vector<std::string>> rows;
+  for (const int count : frames) {
+    rows.push_back(
+        {std::to_string(count),
+         pooled(table, count, of([](const ParameterSpread& spread) { return spread.sd_percent; })),
+         pooled(table, count, of([](const ParameterSpread& s) { return 100 * s.mean_se / s.mean; })),
+         pooled(table, count,
+                [](const TableEntry& entry) { return paper_sd_percent(entry.noise_mm, entry.frames); })});
+  }
+  page.table({"frames", "standard deviation (% a mm)", "their own error (% a mm)", "paper (% a mm)"}, rows,
+             "The same for all noises together: geometric means of the spread divided by the noise.");
 }
 
 }  // namespace
@@ -103,6 +149,12 @@ void add_montecarlo(Page& page, const SavedTable& table) {
       "noise", "frames", "refits", "standard deviation (%)", "their own error (%)", "truth inside 95 % (%)"};
   if (compared) header.emplace_back("paper (%)");
   page.table(header, rows, fmt::format("In the order {}.", fmt::join(names, ", ")));
+  if (compared) {
+    std::set<int> frames;
+    for (const TableEntry& entry : table.entries)
+      frames.insert(entry.frames);
+    add_pooled(page, table, frames);
+  }
   std::vector<Figure> figures;
   for (size_t i = 0; i < known->parameters.size(); ++i)
     figures.push_back(table_figure(table, i));
