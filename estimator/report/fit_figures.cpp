@@ -26,6 +26,19 @@ Figure values_by_number(const FittedParameter& parameter) {
   return {plot.svg(), "Regional values, one an element."};
 }
 
+/// The profile between the points where it was tried: its signed root is nearly straight.
+double rise_at(const FittedProfile& profile, double best, double at) {
+  const auto root = [&](size_t i) {
+    return std::copysign(std::sqrt(profile.cost_rise[i]), profile.value[i] - best);
+  };
+  size_t i = 1;
+  while (i + 1 < profile.value.size() && profile.value[i] < at)
+    ++i;
+  const double width = profile.value[i] - profile.value[i - 1];
+  const double part = width > 0 ? (at - profile.value[i - 1]) / width : 0.0;
+  return std::pow(std::lerp(root(i - 1), root(i), part), 2);
+}
+
 }  // namespace
 
 std::vector<Figure> regional_figures(const FitRecord& fit, const FittedParameter& parameter) {
@@ -50,7 +63,7 @@ std::vector<Figure> regional_figures(const FitRecord& fit, const FittedParameter
 Figure profile_figure(const FittedParameter& parameter) {
   const FittedProfile& profile = *parameter.profile;
   SvgPlot plot({.x = {.label = parameter.name}, .y = {.label = "rise of −log likelihood", .from = 0.0}});
-  std::vector<double> x, parabola;
+  std::vector<double> x, parabola, curve;
   const double low = profile.value.front(), high = profile.value.back();
   const bool factor = low > 0;  // the symmetric interval of a positive value is one of its logarithm
   constexpr int samples = 81;
@@ -59,9 +72,10 @@ Figure profile_figure(const FittedParameter& parameter) {
     const double away = factor ? std::log(at / parameter.value) * parameter.value : at - parameter.value;
     x.push_back(at);
     parabola.push_back(0.5 * std::pow(away / parameter.se, 2));
+    curve.push_back(rise_at(profile, parameter.value, at));
   }
   plot.line(x, parabola, "muted dashed", "what the standard error says");
-  plot.line(profile.value, profile.cost_rise, "a", "the likelihood's profile");
+  plot.line(x, curve, "a", "the likelihood's profile");
   plot.points(profile.value, profile.cost_rise, "a");
   const std::vector<double> ends{low, high}, limit{rise_at_95, rise_at_95};
   plot.line(ends, limit, "b thin", "95 %");

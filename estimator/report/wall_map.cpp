@@ -11,7 +11,7 @@
 namespace diastole::report {
 namespace {
 
-constexpr double map_width = 460, map_height = 190, left = 44, title_height = 24, gap = 34, foot = 26;
+constexpr double map_width = 460, map_height = 190, left = 56, title_height = 24, gap = 34, foot = 26;
 constexpr double least_cell_for_text = 34;
 
 /// The values' own range, but never narrower than a hundredth of them: equal values are one colour.

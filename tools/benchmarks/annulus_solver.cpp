@@ -30,9 +30,8 @@ std::vector<std::string> filled(const std::vector<std::string>& command, const A
   return words;
 }
 
-ProcessCost run_step(const AnnulusSolver& solver, const char* step,
-                        const std::vector<std::string>& command, const AnnulusElements& elements,
-                        const AnnulusWorkplace& place) {
+ProcessCost run_step(const AnnulusSolver& solver, const char* step, const std::vector<std::string>& command,
+                     const AnnulusElements& elements, const AnnulusWorkplace& place) {
   const std::filesystem::path log = place.folder / fmt::format("{}.log", step);
   const ProcessCost figures = run_timed(filled(command, elements, place), place.folder, log);
   if (figures.exit_code != 0) {

@@ -24,8 +24,8 @@ double megabytes(const fs::path& file) { return 1e-6 * static_cast<double>(fs::f
 bool measure(const fs::path& directory, const JournalLoad& load, const std::string& program) {
   const fs::path journal = directory / "long.journal", run = directory / "long.run.h5";
   write_long_journal(journal, load);
-  const ProcessCost figures = run_timed({program, "recover", journal.string(), "-o", run.string()},
-                                           directory, directory / "recover.log");
+  const ProcessCost figures = run_timed({program, "recover", journal.string(), "-o", run.string()}, directory,
+                                        directory / "recover.log");
   fmt::print("{:>8} {:>12.1f} {:>12.1f} {:>10.2f} {:>12.1f}\n", load.seconds, megabytes(journal),
              figures.exit_code == 0 ? megabytes(run) : 0, figures.processor_s, figures.peak_MB);
   std::fflush(stdout);

@@ -39,7 +39,7 @@ std::vector<char*> pointers_to(std::vector<std::string>& texts) {
 }  // namespace
 
 ProcessCost run_timed(const std::vector<std::string>& command, const std::filesystem::path& folder,
-                         const std::filesystem::path& log) {
+                      const std::filesystem::path& log) {
   std::vector<std::string> arguments = command;
   std::vector<std::string> variables = one_thread_environment();
   posix_spawn_file_actions_t actions;

@@ -16,7 +16,9 @@ inline Study gel_study() {
 }
 
 /// Coarse, for tests that compare the family with itself.
-inline SpecimenFamily gel_family() { return SpecimenFamily(gel_study(), {{4, 2, 1}, {4, 2, 1}, 16.0, 3, 1, 1}); }
+inline SpecimenFamily gel_family() {
+  return SpecimenFamily(gel_study(), {{4, 2, 1}, {4, 2, 1}, 16.0, 3, 1, 1});
+}
 
 inline SessionRun empty_run(const std::string& name, const runfile::Segment& segment, double started_s) {
   constexpr double rest_s = 1.2;
