@@ -12,6 +12,18 @@
 namespace diastole {
 namespace {
 
+nlohmann::ordered_json to_json(std::span<const EffectParameter> parameters) {
+  auto list = nlohmann::ordered_json::array();
+  for (const EffectParameter& parameter : parameters) {
+    list.push_back({{"name", parameter.name},
+                    {"unit", parameter.unit},
+                    {"meaning", parameter.meaning},
+                    {"neutral", parameter.neutral},
+                    {"bounds", {parameter.lower, parameter.upper}}});
+  }
+  return list;
+}
+
 nlohmann::ordered_json to_json(const Effect& effect) {
   const EffectText& text = effect.text();
   nlohmann::ordered_json json = {{"id", text.id},
@@ -23,19 +35,22 @@ nlohmann::ordered_json to_json(const Effect& effect) {
                                  {"revealed_by", text.revealed_by},
                                  {"conflicts", text.conflicts},
                                  {"synergies", text.synergies},
-                                 {"parameters", nlohmann::ordered_json::array()}};
-  for (const EffectParameter& parameter : effect.parameters()) {
-    json["parameters"].push_back({{"name", parameter.name},
-                                  {"unit", parameter.unit},
-                                  {"meaning", parameter.meaning},
-                                  {"neutral", parameter.neutral},
-                                  {"bounds", {parameter.lower, parameter.upper}}});
-  }
+                                 {"parameters", to_json(effect.parameters())},
+                                 {"field_parameters", to_json(effect.field_parameters())}};
   return json;
 }
 
 std::string joined(const std::vector<std::string_view>& ids) {
   return fmt::format("{}", fmt::join(ids, ", "));
+}
+
+void print_for_people(std::string_view title, std::span<const EffectParameter> parameters) {
+  if (parameters.empty()) return;
+  fmt::print("\n  {}\n", title);
+  for (const EffectParameter& parameter : parameters) {
+    fmt::print("    {:<28} {}; neutral {:g}, from {:g} to {:g}\n", parameter.name, parameter.meaning,
+               parameter.neutral, parameter.lower, parameter.upper);
+  }
 }
 
 void print_for_people(const Effect& effect) {
@@ -45,11 +60,8 @@ void print_for_people(const Effect& effect) {
              text.source, text.looks_like, text.revealed_by);
   if (!text.conflicts.empty()) fmt::print("  Looks alike  {}\n", joined(text.conflicts));
   if (!text.synergies.empty()) fmt::print("  Shows with   {}\n", joined(text.synergies));
-  fmt::print("\n  Parameters\n");
-  for (const EffectParameter& parameter : effect.parameters()) {
-    fmt::print("    {:<28} {}; neutral {:g}, from {:g} to {:g}\n", parameter.name, parameter.meaning,
-               parameter.neutral, parameter.lower, parameter.upper);
-  }
+  print_for_people("Parameters", effect.parameters());
+  print_for_people("Parameters in images", effect.field_parameters());
 }
 
 const Effect& known(const std::string& id) {

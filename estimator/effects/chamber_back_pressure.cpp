@@ -41,6 +41,14 @@ class ChamberBackPressure final : public Effect {
     }
     model.curve = rig::SpecimenCurve(std::move(points));
   }
+  [[nodiscard]] std::span<const EffectParameter> field_parameters() const override {
+    static constexpr std::array<EffectParameter, 1> list{
+        {{"k_kPa_per_mL", "kPa/mL", "stiffness of the chamber", 0.0, 0.0, 0.2, 0.01}}};
+    return list;
+  }
+  void apply_to_field(std::span<const double> values, FieldModel& model) const override {
+    model.chamber_stiffness_kPa_per_mL = values[0];
+  }
 };
 
 }  // namespace

@@ -31,12 +31,40 @@ std::vector<double> Effect::neutral(const rig::RigModel&) const {
   return values;
 }
 
+std::vector<double> Effect::field_neutral(const FieldModel&) const {
+  std::vector<double> values;
+  for (const EffectParameter& parameter : field_parameters())
+    values.push_back(parameter.neutral);
+  return values;
+}
+
 const std::vector<const Effect*>& all_effects() {
   static const std::vector<const Effect*> list{
 #define DIASTOLE_EFFECT(name) &name##_effect(),
 #include "estimator/effects/effect_list.inc"
 #undef DIASTOLE_EFFECT
   };
+  return list;
+}
+
+namespace {
+
+std::vector<const Effect*> those_with(std::span<const EffectParameter> (Effect::*parameters)() const) {
+  std::vector<const Effect*> shown;
+  for (const Effect* effect : all_effects())
+    if (!(effect->*parameters)().empty()) shown.push_back(effect);
+  return shown;
+}
+
+}  // namespace
+
+const std::vector<const Effect*>& rig_effects() {
+  static const std::vector<const Effect*> list = those_with(&Effect::parameters);
+  return list;
+}
+
+const std::vector<const Effect*>& field_effects() {
+  static const std::vector<const Effect*> list = those_with(&Effect::field_parameters);
   return list;
 }
 

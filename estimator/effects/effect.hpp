@@ -13,6 +13,7 @@
 #include <string_view>
 #include <vector>
 
+#include "estimator/effects/field_model.hpp"
 #include "estimator/rig/rig_model.hpp"
 #include "estimator/rig/specimen_family.hpp"
 
@@ -83,10 +84,34 @@ class Effect {
   };
   /// Adds itself to the model. `values`: one a parameter. The model's curve and modulus must be set.
   virtual void apply(std::span<const double> values, const Context& context, rig::RigModel& model) const = 0;
+
+  // The same effect in images of the specimen (field_model.hpp), if it shows there.
+
+  /// Empty: it does not. The first is the effect's size; those after `field_essentials` are only freed once the others
+  /// have been found.
+  [[nodiscard]] virtual std::span<const EffectParameter> field_parameters() const { return {}; }
+  [[nodiscard]] virtual size_t field_essentials() const { return field_parameters().size(); }
+  /// The values that leave `base` as it is.
+  [[nodiscard]] virtual std::vector<double> field_neutral(const FieldModel& base) const;
+  /// Adds itself to the model. `values`: one for each of field_parameters().
+  virtual void apply_to_field(std::span<const double>, FieldModel&) const {}
+};
+
+/// An effect that shows in images only: recordings of the rig cannot have it.
+class FieldEffect : public Effect {
+ public:
+  [[nodiscard]] std::span<const EffectParameter> parameters() const final { return {}; }
+  [[nodiscard]] bool fits(const rig::SpecimenFamily&) const final { return false; }
+  void apply(std::span<const double>, const Context&, rig::RigModel&) const final {}
 };
 
 /// The effects of effect_list.inc, in its order. They live as long as the program.
 const std::vector<const Effect*>& all_effects();
+
+/// Those of them that show in recordings of the rig.
+const std::vector<const Effect*>& rig_effects();
+/// Those of them that show in images of the specimen.
+const std::vector<const Effect*>& field_effects();
 
 /// nullptr when no effect has that id.
 const Effect* find_effect(std::string_view id);

@@ -41,6 +41,18 @@ class EndBondSlip final : public Effect {
     model.curve = model.curve.plus(context.family.slipping(compliance_mm), 1.0, 1.0)
                       .plus(context.family.plain(), 1.0, -1.0);
   }
+  [[nodiscard]] std::span<const EffectParameter> field_parameters() const override {
+    static constexpr std::array<EffectParameter, 1> list{
+        {{"bond_stiffness_kPa_per_mm", "kPa/mm", "traction across the axis for slip; 1000 is as good as held",
+          as_good_as_held, 0.02, as_good_as_held, 1.0, SearchScale::logarithmic}}};
+    return list;
+  }
+  void apply_to_field(std::span<const double> values, FieldModel& model) const override {
+    if (values[0] < as_good_as_held) model.bond_stiffness_kPa_per_mm = values[0];
+  }
+
+ private:
+  static constexpr double as_good_as_held = 1000.0;
 };
 
 }  // namespace

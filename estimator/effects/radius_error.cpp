@@ -38,6 +38,17 @@ class RadiusError final : public Effect {
     model.curve = model.curve.plus(context.family.with_inner_radius(values[0]), 1.0, 1.0)
                       .plus(context.family.plain(), 1.0, -1.0);
   }
+  [[nodiscard]] std::span<const EffectParameter> field_parameters() const override {
+    static constexpr std::array<EffectParameter, 1> list{
+        {{"true_inner_radius_mm", "mm", "inner radius of the specimen itself", 22.5, 5.0, 45.0, 23.4}}};
+    return list;
+  }
+  [[nodiscard]] std::vector<double> field_neutral(const FieldModel& base) const override {
+    return {base.inner_radius_mm};
+  }
+  void apply_to_field(std::span<const double> values, FieldModel& model) const override {
+    model.inner_radius_mm = values[0];
+  }
 };
 
 }  // namespace

@@ -36,6 +36,14 @@ class StrainStiffening final : public Effect {
     model.curve = model.curve.plus(context.family.stiffened(values[0]), 1.0, 1.0)
                       .plus(context.family.plain(), 1.0, -1.0);
   }
+  [[nodiscard]] std::span<const EffectParameter> field_parameters() const override {
+    static constexpr std::array<EffectParameter, 1> list{
+        {{"beta", "", "stiffening with I1 - 3", 0.0, 0.0, 40.0, 4.0}}};
+    return list;
+  }
+  void apply_to_field(std::span<const double> values, FieldModel& model) const override {
+    model.beta = values[0];
+  }
 };
 
 }  // namespace

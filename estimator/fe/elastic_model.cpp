@@ -44,6 +44,7 @@ ElasticModel::ElasticModel(HermiteMesh mesh, const Law& law, ElasticOptions opti
   system.chamber = options.chamber;
   system.loaded = options.loaded ? *options.loaded : mesh.faces().inner;
   system.material_axes = std::move(options.material_axes);
+  system.stiffness = std::move(options.stiffness);
   system.volume_stiffness_kPa = options.volume_stiffness_kPa;
   system.compressibility_per_kPa = options.bulk_modulus_kPa ? 1.0 / *options.bulk_modulus_kPa : 0.0;
   system.threads = options.threads > 0 ? options.threads : std::max(1U, std::thread::hardware_concurrency());

@@ -46,6 +46,7 @@ struct ElasticOptions {
   std::optional<std::vector<ElementFace>>
       loaded{};                              ///< default: the inner faces; see fluid_surface.hpp on free rims
   MaterialAxesField material_axes{};         ///< default: the coordinate axes
+  StiffnessField stiffness{};                ///< of incompressible material; default: 1 everywhere
   double volume_stiffness_kPa = 0.0;         ///< kappa of element_mechanics.hpp
   std::optional<double> bulk_modulus_kPa{};  ///< K of element_mechanics.hpp; default: incompressible
   SolveOptions solve{};

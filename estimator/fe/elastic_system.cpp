@@ -55,7 +55,7 @@ ElasticSystem::ElasticSystem(HermiteMesh mesh, const Law& law, const SystemOptio
       factor_(equations_, skew_) {
   for (size_t e = 0; e < mesh_.element_count(); ++e) {
     parameters_.insert(parameters_.end(), options.parameters.begin(), options.parameters.end());
-    reference_.push_back(make_reference_element(mesh_, e, options.material_axes));
+    reference_.push_back(make_reference_element(mesh_, e, options.material_axes, options.stiffness));
   }
   if (chamber_) {
     chamber_wall_ = FluidSurface(mesh_, mesh_.faces().outer, options.held, plates_of(options));

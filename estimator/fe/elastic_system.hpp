@@ -41,6 +41,7 @@ struct SystemOptions {
   std::optional<Chamber> chamber{};      ///< around the outer faces
   std::vector<BondedFaces> bonded{};     ///< faces on springs, at plates z = const
   MaterialAxesField material_axes;       ///< empty: the coordinate axes
+  StiffnessField stiffness{};            ///< empty: 1 everywhere
   double volume_stiffness_kPa = 0.0;     ///< kappa of element_mechanics.hpp
   double compressibility_per_kPa = 0.0;  ///< 1/K of element_mechanics.hpp
   size_t threads = 1;

@@ -126,7 +126,7 @@ MaterialAxesField material_axes_of(FibreField fibres) {
 }
 
 ReferenceElement make_reference_element(const HermiteMesh& mesh, size_t element,
-                                        const MaterialAxesField& axes) {
+                                        const MaterialAxesField& axes, const StiffnessField& stiffness) {
   const GaussMatrices gradients = gradients_at_points(mesh.gather(element, mesh.reference()));
   ReferenceElement reference;
   for (size_t q = 0; q < gauss_points; ++q) {
@@ -134,6 +134,8 @@ ReferenceElement make_reference_element(const HermiteMesh& mesh, size_t element,
     reference[q].material_to_xi = g.inverse();
     if (axes) reference[q].material_to_xi *= axes(mesh, {element, gauss_tables().xi[q]});
     reference[q].volume = gauss_tables().weight[q] * g.determinant();
+    if (stiffness)
+      reference[q].stiffness = stiffness(mesh.value(mesh.reference(), {element, gauss_tables().xi[q]}));
   }
   return reference;
 }
@@ -155,12 +157,11 @@ ElementResidual element_residual(const ReferenceElement& reference, const Elemen
     const Matrix3d& t = reference[q].material_to_xi;
     const Matrix3d f = g * t;
     const SymmetricTensor<double> c = right_cauchy_green(f);
-    SymmetricTensor<double> material_stress = law.stress(c, parameters);
-    material_stress[0] += state.fibre_tension_kPa;
-    const Matrix3d stress = full_matrix(material_stress);
+    Matrix3d stress = reference[q].stiffness * full_matrix(law.stress(c, parameters));
+    stress(0, 0) += state.fibre_tension_kPa;
     const double pressure = effective_pressure(state, q, ratio);
     piola.set(q, reference[q].volume * f * stress * t.transpose() - (pressure * tables.weight[q]) * cofactor);
-    result.energy += reference[q].volume * law.energy(c, parameters);
+    result.energy += reference[q].volume * reference[q].stiffness * law.energy(c, parameters);
     double growth = volume - reference[q].volume;
     if (state.compressibility_per_kPa > 0.0) {
       const double above_rest = pressure_at(state.pressure_kPa, q) - state.rest_pressure_kPa;
@@ -188,14 +189,15 @@ void element_tangent(const ReferenceElement& reference, const ElementState& stat
     const Matrix3d cofactor = cofactors(g);
     const double weight = tables.weight[q];
     const double ratio = weight * g.col(0).dot(cofactor.col(0)) / reference[q].volume;
-    MaterialResponse response = law.response(right_cauchy_green(f), parameters);
-    response.stress[0] += state.fibre_tension_kPa;
+    const MaterialResponse response = law.response(right_cauchy_green(f), parameters);
+    Matrix3d material_stress = reference[q].stiffness * full_matrix(response.stress);
+    material_stress(0, 0) += state.fibre_tension_kPa;
     const double pressure = effective_pressure(state, q, ratio) * weight;
-    const Matrix3d stress = reference[q].volume * t * full_matrix(response.stress) * t.transpose();
+    const Matrix3d stress = reference[q].volume * t * material_stress * t.transpose();
     double* point = tangent.stiffness.moduli_at(q);
     set_geometric_moduli(point, stress, pressure, g);
     if (!response.tangent.isZero(0.0))
-      add_material_moduli(point, f, reference[q].volume * response.tangent, t);
+      add_material_moduli(point, f, reference[q].volume * reference[q].stiffness * response.tangent, t);
     const double volume_stiffness_kPa = state.volume_stiffness_kPa + state.probing_stiffness_kPa;
     if (volume_stiffness_kPa > 0.0)
       add_volume_moduli(point, volume_stiffness_kPa * weight * weight / reference[q].volume, cofactor);
@@ -227,7 +229,7 @@ ElementField element_parameter_force(const ReferenceElement& reference, const El
     const Matrix3d& t = reference[q].material_to_xi;
     const Matrix3d f = gradients.at(q) * t;
     const Matrix3d stress = full_matrix(law.stress_sensitivity(right_cauchy_green(f), parameters, parameter));
-    piola.set(q, reference[q].volume * f * stress * t.transpose());
+    piola.set(q, reference[q].volume * reference[q].stiffness * f * stress * t.transpose());
   }
   return force_of(piola);
 }

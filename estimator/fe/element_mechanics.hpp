@@ -1,10 +1,10 @@
 #pragma once
 // One element's share of the potential
 //
-//   Pi(x, p) = integral of  W(C; parameters) + T Eff - p (J - 1) + kappa/2 (J - 1)^2  dV
+//   Pi(x, p) = integral of  m W(C; parameters) + T Eff - p (J - 1) + kappa/2 (J - 1)^2  dV
 //              - P_cavity V_cavity(x)
 //
-// (the last term is in cavity_load.hpp), with T an active tension along the fibre (second Piola-Kirchhoff
+// (the last term is in cavity_load.hpp), with m a factor that may vary from place to place, T an active tension along the fibre (second Piola-Kirchhoff
 // stress T f x f) and kappa a volume stiffness *beside* the Lagrange pressure: the exact solution, J = 1,
 // does not know it, but Newton's method converges from farther away.
 //
@@ -44,6 +44,7 @@ namespace diastole {
 struct ReferencePoint {
   Eigen::Matrix3d material_to_xi;  ///< T
   double volume = 0.0;             ///< w det G, mm^3
+  double stiffness = 1.0;          ///< factor of the law's energy
 };
 using ReferenceElement = std::array<ReferencePoint, gauss_points>;
 
@@ -53,8 +54,12 @@ using MaterialAxes = Eigen::Matrix3d;
 using MaterialAxesField = std::function<MaterialAxes(const HermiteMesh&, const MaterialPoint&)>;
 MaterialAxesField material_axes_of(FibreField fibres);
 
+/// Factor of the law's energy at a place of the undeformed body, > 0; empty: 1 everywhere.
+using StiffnessField = std::function<double(const Eigen::Vector3d& X_mm)>;
+
 ReferenceElement make_reference_element(const HermiteMesh& mesh, size_t element,
-                                        const MaterialAxesField& axes = {});
+                                        const MaterialAxesField& axes = {},
+                                        const StiffnessField& stiffness = {});
 
 struct ElementState {
   ElementField position_mm;

@@ -45,7 +45,7 @@ std::string test_name(const testing::TestParamInfo<const Effect*>& info) {
   return name;
 }
 
-INSTANTIATE_TEST_SUITE_P(List, EveryEffect, testing::ValuesIn(all_effects()), test_name);
+INSTANTIATE_TEST_SUITE_P(List, EveryEffect, testing::ValuesIn(rig_effects()), test_name);
 
 }  // namespace
 }  // namespace diastole

@@ -1,0 +1,306 @@
+#include "estimator/explain/explain_field.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+#include "estimator/explain/field_gap.hpp"
+#include "estimator/explain/field_hypotheses.hpp"
+#include "estimator/explain/field_modes.hpp"
+#include "estimator/explain/field_regions.hpp"
+#include "estimator/explain/linear_evidence.hpp"
+#include "protocol/contract/input_error.hpp"
+
+namespace diastole::explain {
+namespace {
+
+using Eigen::Index;
+
+constexpr std::array<size_t, 3> round_mesh{4, 6, 2};  // for what is the same all around the axis
+constexpr std::array<size_t, 3> full_mesh{8, 6, 2};
+constexpr double significant = 1e-3;
+constexpr double indistinct = 9.0;      // of the score
+constexpr double clearly_better = 6.0;  // of a rival's score
+/// Part of an effect's gain that meshes of this size may leave as structure.
+constexpr double mesh_error = 0.01;
+constexpr double ci90 = 1.6449;
+
+struct Family {
+  std::string name;
+  std::vector<Index> columns;
+};
+
+/// Structure beyond noise, whatever it is.
+struct Structure {
+  std::string family;
+  double excess = 0.0;
+  double p_value = 1.0;
+};
+
+class Explainer {
+ public:
+  Explainer(const Study& study, const FieldOptions& options)
+      : options_(options), study_file_(study.file.string()), field_(field_case(study)) {}
+
+  Explanation run() {
+    fit_base();
+    fit_effects();
+    judge();
+    fill_evidence();
+    fill_field();
+    return std::move(out_);
+  }
+
+ private:
+  void tell(const std::string& text) const {
+    if (options_.on_step) options_.on_step(text);
+  }
+
+  void fit_base() {
+    tell("fitting the base model to the tags");
+    fit_both_meshes();
+    if (round_->rows().left_out() + full_->rows().left_out() > 0) {
+      leave_out_lost_points();
+      fit_both_meshes();
+    }
+    tell("looking for structure in what is left");
+    modes_ = field_modes(*full_, full_base_.pressures_kPa);
+    for (size_t i = 0; i < modes_.modes.size(); ++i) {
+      const std::string& family = modes_.modes[i].family;
+      const auto same = std::ranges::find(families_, family, &Family::name);
+      Family& into = same == families_.end() ? families_.emplace_back(family, std::vector<Index>{}) : *same;
+      into.columns.push_back(static_cast<Index>(i));
+      if (modes_.modes[i].smooth) rivals_.push_back(static_cast<Index>(i));
+    }
+  }
+
+  void fit_both_meshes() {
+    round_.emplace(field_, round_mesh);
+    base_ = round_->fit({}, round_->start());
+    full_.emplace(field_, full_mesh);
+    full_base_ = full_->fit({}, {base_.C1_kPa, base_.pressures_kPa});
+    if (!std::isfinite(base_.chi_square) || !std::isfinite(full_base_.chi_square))
+      throw InputError(
+          {.file = study_file_,
+           .place = "law.parameters.C1_kPa",
+           .problem = fmt::format("the base model has no equilibrium at {:g} kPa", field_.C1_start_kPa.value),
+           .remedy = "Start from a stiffer gel, or check the frames' pressures."});
+  }
+
+  /// Keeps the points that both meshes can follow, so that their residuals correspond.
+  void leave_out_lost_points() {
+    Measurement& measurement = field_.measurement;
+    std::vector<int> seen(measurement.tags.size() + measurement.points.size(), 0);
+    for (const FieldProblem* problem : {&*round_, &*full_})
+      for (const FieldRow& row : problem->rows().rows())
+        if (row.component == 0) ++seen[row.source];
+    const size_t tags = measurement.tags.size();
+    size_t index = 0;
+    std::erase_if(measurement.tags, [&](const TagPoint& tag) { return seen[index++] < 2 && tag.frame > 0; });
+    index = tags;
+    std::erase_if(measurement.points,
+                  [&](const ObservedPoint& point) { return seen[index++] < 2 && point.frame > 0; });
+  }
+
+  void fit_effects() {
+    tell("fitting each effect");
+    hypotheses_ = fit_round_effects(*round_, base_);
+    tell("searching a lump of another stiffness");
+    std::ranges::move(fit_inclusion(*full_, full_base_, search_inclusion(*full_, full_base_)),
+                      std::back_inserter(hypotheses_));
+    std::ranges::stable_sort(hypotheses_, std::greater{}, &FieldHypothesis::score);
+  }
+
+  /// The family of modes in which the fit leaves most structure.
+  [[nodiscard]] Structure structure_left(const FieldFit& fit, double allowed) const {
+    const LinearEvidence evidence(fit, modes_.columns);
+    Structure most;
+    for (const Family& family : families_) {
+      const LinearEvidence::Gain gain = evidence.gain(family.columns);
+      const auto degrees = static_cast<double>(gain.degrees);
+      const double p = std::min(
+          1.0, static_cast<double>(families_.size()) * tail_probability(gain.chi_square - allowed, degrees));
+      if (p < most.p_value) most = {family.name, gain.chi_square - degrees, p};
+    }
+    return most;
+  }
+
+  void judge() {
+    tell("comparing what explains it");
+    rival_evidence_.emplace(full_base_, modes_.columns);
+    rival_ = rival_evidence_->best_of(rivals_);
+    const Structure before = structure_left(full_base_, 0.0);
+    const FieldHypothesis& best = hypotheses_.front();
+    const bool effect_seen = best.p_value < significant && best.score > 0.0;
+    if (!effect_seen && before.p_value > significant) {
+      out_.verdict = Verdict::none;
+      out_.summary = fmt::format(
+          "Nothing exceeds the noise: C1 = {:.3f} kPa explains {} tag residuals; the nearest effect, {}, "
+          "would gain "
+          "{:.1f} of chi2.",
+          base_.C1_kPa, base_.residuals.size(), best.id, best.gain);
+      return;
+    }
+    const Structure after = effect_seen ? structure_left(best.fit, mesh_error * best.gain) : before;
+    const bool rivalled = rival_.score > best.score + clearly_better;
+    if (!effect_seen || rivalled || after.p_value < significant) {
+      out_.verdict = Verdict::unexplained;
+      out_.summary = unexplained_summary(best, effect_seen, rivalled, after);
+      return;
+    }
+    name(best);
+  }
+
+  [[nodiscard]] std::string unexplained_summary(const FieldHypothesis& best, bool effect_seen, bool rivalled,
+                                                const Structure& after) const {
+    std::string text =
+        "The motion differs from the model's beyond noise, and no effect of the library removes that.";
+    if (effect_seen)
+      text += fmt::format(" The best one, {}, gains {:.1f} of chi2 and leaves {:.1f} ({}; p = {:.1g}).",
+                          best.id, best.gain, after.excess, after.family, after.p_value);
+    if (rivalled || (rival_.score > 0.0 && rival_.chi_square > 0.5 * best.gain)) {
+      std::vector<std::string> names;
+      for (const Index column : rival_.columns)
+        names.push_back(modes_.modes[static_cast<size_t>(column)].name);
+      text += fmt::format(" Something outside the library would gain {:.1f}: {}.", rival_.chi_square,
+                          fmt::join(names, "; "));
+    }
+    return text;
+  }
+
+  void name(const FieldHypothesis& best) {
+    out_.effects = {found(best)};
+    for (const FieldHypothesis& other : hypotheses_) {
+      if (&other == &best || other.score < best.score - indistinct || other.p_value > 10.0 * significant)
+        continue;
+      if (structure_left(other.fit, mesh_error * other.gain).p_value < significant) continue;
+      out_.ambiguous_with.push_back({other.id});
+    }
+    out_.verdict = out_.ambiguous_with.empty() ? Verdict::named : Verdict::ambiguous;
+    out_.summary = fmt::format(
+        "{} explains what the base model does not: chi2 falls by {:.1f}, C1 becomes {:.3f} kPa "
+        "instead of {:.3f}.",
+        best.id, best.gain, best.fit.C1_kPa, base_.C1_kPa);
+    if (!out_.ambiguous_with.empty()) {
+      std::vector<std::string> ids;
+      for (const auto& set : out_.ambiguous_with)
+        ids.push_back(set.front());
+      out_.summary += fmt::format(" These data cannot tell it from {}.", fmt::join(ids, ", "));
+    }
+    chosen_ = &best;
+    out_.shifts = {{"C1_kPa", base_.C1_kPa, base_.C1_kPa * std::sqrt(base_.covariance(0, 0)), best.fit.C1_kPa,
+                    best.fit.C1_kPa * std::sqrt(best.fit.covariance(0, 0))}};
+  }
+
+  [[nodiscard]] FoundEffect found(const FieldHypothesis& hypothesis) const {
+    FoundEffect effect{hypothesis.id, {}, {}};
+    const FieldChoice& choice = hypothesis.fit.choice;
+    const auto parameters = choice.effect->field_parameters();
+    for (size_t i = 0; i < choice.values.size(); ++i) {
+      const EffectParameter& parameter = parameters[i];
+      FoundParameter& out = effect.parameters.emplace_back();
+      out.name = parameter.name;
+      out.value = choice.values[i];
+      out.ci90 = {out.value, out.value};
+      const auto place = std::ranges::find(choice.free, i);
+      if (place == choice.free.end()) continue;
+      const Index unknown = 1 + (place - choice.free.begin());
+      const double error = std::sqrt(hypothesis.fit.covariance(unknown, unknown));
+      const double coordinate = to_coordinate(parameter, out.value);
+      out.ci90 = {from_coordinate(parameter, coordinate - ci90 * error),
+                  from_coordinate(parameter, coordinate + ci90 * error)};
+      out.standard_error = parameter.scale == SearchScale::logarithmic ? out.value * error : error;
+    }
+    return effect;
+  }
+
+  void fill_evidence() {
+    const bool lump = chosen_ != nullptr && chosen_->id == "stiff-inclusion";
+    const FieldProblem& problem = lump ? *full_ : *round_;
+    const FieldFit& base = lump ? full_base_ : base_;
+    for (const FieldHypothesis& tried : hypotheses_) {
+      Candidate row;
+      row.ids = {tried.id};
+      row.chi_square_drop = tried.gain;
+      row.refitted = true;
+      row.parameters = tried.fit.choice.free.size();
+      const bool as_good =
+          std::ranges::any_of(out_.ambiguous_with, [&](const auto& set) { return set.front() == tried.id; });
+      row.verdict = &tried == chosen_             ? (as_good ? "as good" : "named")
+                    : as_good                     ? "as good"
+                    : tried.p_value > significant ? "not needed"
+                                                  : fmt::format("explains less than the best by {:.1f}",
+                                                                hypotheses_.front().score - tried.score);
+      if (&tried == chosen_ && out_.verdict == Verdict::ambiguous) row.verdict = "as good";
+      out_.evidence.push_back(std::move(row));
+    }
+    if (out_.verdict == Verdict::none) return;
+    out_.where = misfit_regions(field_, problem.rows(), base, 5);
+    if (out_.where.empty()) {
+      const Structure before = structure_left(full_base_, 0.0);
+      Misfit everywhere;
+      everywhere.port = "field";
+      everywhere.channel = "tags";
+      everywhere.region = "all of the specimen, in proportion to the load";
+      everywhere.excess_chi2 = std::max(before.excess, hypotheses_.front().gain);
+      everywhere.p_value = std::min(before.p_value, hypotheses_.front().p_value);
+      out_.where.push_back(std::move(everywhere));
+    }
+    const FieldFit& after = chosen_ != nullptr ? chosen_->fit : base;
+    Eigen::MatrixXd directions(base.residuals.size(),
+                               static_cast<Index>(rivals_.size()) + after.jacobian.cols());
+    directions << modes_.columns(Eigen::all, rivals_), after.jacobian.topRows(base.residuals.size());
+    out_.gap = field_gap(base, after, deal_folds(field_.measurement, problem.rows(), 5), directions);
+    out_.steps = {{"", out_.gap.before}};
+    if (chosen_ != nullptr) out_.steps.push_back({chosen_->id, out_.gap.after});
+  }
+
+  /// Residuals of the frame of highest pressure.
+  void fill_field() {
+    const bool lump = chosen_ != nullptr && chosen_->id == "stiff-inclusion";
+    const FieldProblem& problem = lump ? *full_ : *round_;
+    const FieldFit& base = lump ? full_base_ : base_;
+    const FieldFit& after = chosen_ != nullptr ? chosen_->fit : base;
+    const auto most = std::ranges::max_element(base.pressures_kPa);
+    const auto slot = static_cast<size_t>(most - base.pressures_kPa.begin());
+    for (Index i = problem.rows().first(slot); i < problem.rows().first(slot) + problem.rows().count(slot);
+         ++i) {
+      const FieldRow& row = problem.rows().rows()[static_cast<size_t>(i)];
+      out_.field.push_back({{row.X_mm[0], row.X_mm[1], row.X_mm[2]},
+                            problem.rows().frames()[slot],
+                            base.residuals[i],
+                            after.residuals[i]});
+    }
+  }
+
+  FieldOptions options_;
+  std::string study_file_;
+  FieldCase field_;
+  std::optional<FieldProblem> round_;
+  std::optional<FieldProblem> full_;
+  FieldFit base_;
+  FieldFit full_base_;
+  FieldModes modes_;
+  std::vector<Family> families_;
+  std::vector<Index> rivals_;
+  std::vector<FieldHypothesis> hypotheses_;
+  std::optional<LinearEvidence> rival_evidence_;
+  LinearEvidence::Choice rival_;
+  const FieldHypothesis* chosen_ = nullptr;
+  Explanation out_;
+};
+
+}  // namespace
+
+Explanation explain_field(const Study& study, const FieldOptions& options) {
+  const auto begun = std::chrono::steady_clock::now();
+  Explanation explanation = Explainer(study, options).run();
+  explanation.study = study.file.string();
+  explanation.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
+  return explanation;
+}
+
+}  // namespace diastole::explain

@@ -1,0 +1,16 @@
+#pragma once
+// Where on the specimen a fit's residuals keep a direction: cells of 45 degrees, a quarter of the height and half the wall,
+// in each of which the displacement may be off by a vector that grows with the load.
+
+#include <vector>
+
+#include "estimator/explain/explanation.hpp"
+#include "estimator/explain/field_fit.hpp"
+
+namespace diastole::explain {
+
+/// The cells that are beyond chance after correction for their number, most certain first, at most `most`.
+std::vector<Misfit> misfit_regions(const FieldCase& field, const FieldRows& rows, const FieldFit& fit,
+                                   size_t most);
+
+}  // namespace diastole::explain
