@@ -7,7 +7,7 @@
 #include <string>
 
 #include "estimator/cli/commands.hpp"
-#include "estimator/explain/explain_rig.hpp"
+#include "estimator/explain/explain_study.hpp"
 #include "estimator/explain/explained_study.hpp"
 #include "estimator/explain/explanation_json.hpp"
 #include "estimator/explain/score.hpp"
@@ -67,7 +67,9 @@ std::string with_units(const explain::FoundParameter& parameter) {
 }
 
 std::string place_of(const explain::Misfit& misfit) {
-  std::string text = fmt::format("  {:<9} {} of {}", misfit.port, misfit.channel, misfit.run);
+  std::string text = fmt::format("  {:<9} {}", misfit.port, misfit.channel);
+  if (!misfit.run.empty()) text += " of " + misfit.run;
+  if (!misfit.region.empty()) text += ", " + misfit.region;
   if (misfit.segment) text += fmt::format(", segment {}", *misfit.segment);
   if (misfit.phase) text += fmt::format(", phase {:.1f} to {:.1f}", (*misfit.phase)[0], (*misfit.phase)[1]);
   if (misfit.band_Hz) text += fmt::format(", {:g} to {:g} Hz", (*misfit.band_Hz)[0], (*misfit.band_Hz)[1]);
@@ -96,16 +98,6 @@ void print_for_people(const explain::Explanation& found, const fs::path& folder)
   if (found.next_experiment) fmt::print("\nNext: {}\n", found.next_experiment->reason);
   fmt::print("\nIn {}: {}, {}{}\n", folder.string(), explanation_file, report_file,
              found.study_after.empty() ? "" : fmt::format(", {}", found.study_after));
-}
-
-explain::Explanation explained(const Study& study, const ExplainArguments& arguments) {
-  if (study.data.runs.empty()) {
-    throw InputError({.file = study.file.string(),
-                      .place = "data.runs",
-                      .problem = "names no run files, so that there is nothing to explain",
-                      .remedy = "List the session's runs: runs = [\"baseline.run.h5\"]."});
-  }
-  return explain::explain_rig(study, {.threads = arguments.threads, .propose = true, .progress = tell});
 }
 
 ExitCode run_score(const ExplainArguments& arguments, const CommandOutput& out) {
@@ -144,7 +136,7 @@ ExitCode run_explain(const ExplainArguments& arguments, const CommandOutput& out
   const EndOnInterrupt end;
   explain::Explanation found;
   try {
-    found = explained(study, arguments);
+    found = explain::explain_study(study, {.threads = arguments.threads, .propose = true, .progress = tell});
   } catch (const Interrupted&) {
     std::cerr << "diastole explain: interrupted; nothing was written\n";
     return ExitCode::negative;

@@ -7,6 +7,7 @@
 #include <chrono>
 #include <cmath>
 
+#include "estimator/explain/chi_square.hpp"
 #include "estimator/explain/field_gap.hpp"
 #include "estimator/explain/field_hypotheses.hpp"
 #include "estimator/explain/field_modes.hpp"
@@ -56,7 +57,7 @@ class Explainer {
 
  private:
   void tell(const std::string& text) const {
-    if (options_.on_step) options_.on_step(text);
+    if (options_.progress) options_.progress(text);
   }
 
   void fit_base() {
@@ -122,7 +123,7 @@ class Explainer {
       const LinearEvidence::Gain gain = evidence.gain(family.columns);
       const auto degrees = static_cast<double>(gain.degrees);
       const double p = std::min(
-          1.0, static_cast<double>(families_.size()) * tail_probability(gain.chi_square - allowed, degrees));
+          1.0, static_cast<double>(families_.size()) * chi_square_tail(gain.chi_square - allowed, degrees));
       if (p < most.p_value) most = {family.name, gain.chi_square - degrees, p};
     }
     return most;

@@ -17,7 +17,8 @@
 namespace diastole::explain {
 
 struct FieldOptions {
-  std::function<void(const std::string&)> on_step;  ///< told what is being done
+  /// Told what is being done; whatever it throws ends the work.
+  std::function<void(const std::string&)> progress;
 };
 
 /// Throws InputError for studies that field_case() refuses.

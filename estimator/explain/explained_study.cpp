@@ -2,6 +2,7 @@
 
 #include <toml++/toml.h>
 
+#include <algorithm>
 #include <sstream>
 
 namespace diastole::explain {
@@ -50,8 +51,11 @@ std::string explained_study(const Study& study, const std::filesystem::path& fol
   if (root["specimen"]["kind"].value_or(std::string()) == "mesh")
     if (toml::node* mesh = root["specimen"].as_table()->get("file")) move_path(*mesh, from, folder);
   for (const ParameterShift& shift : starts) {
-    if (toml::table* parameter = root["law"]["parameters"][shift.name].as_table())
-      parameter->insert_or_assign("start", shift.after);
+    if (toml::table* parameter = root["law"]["parameters"][shift.name].as_table()) {
+      const double lower = (*parameter)["bounds"][0].value_or(shift.after);
+      const double upper = (*parameter)["bounds"][1].value_or(shift.after);
+      parameter->insert_or_assign("start", std::clamp(shift.after, lower, upper));
+    }
   }
   toml::table& model = subtable(root, "model");
   toml::array ids;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "estimator/explain/chi_square.hpp"
 #include "estimator/explain/linear_evidence.hpp"
 
 namespace diastole::explain {
@@ -98,7 +99,7 @@ std::vector<FieldHypothesis> fit_round_effects(FieldProblem& problem, const Fiel
     const auto parameters = static_cast<double>(tried.fit.choice.free.size());
     tried.score = tried.gain - 2.0 * parameters;
     tried.p_value =
-        std::min(1.0, static_cast<double>(field_effects().size()) * tail_probability(tried.gain, parameters));
+        std::min(1.0, static_cast<double>(field_effects().size()) * chi_square_tail(tried.gain, parameters));
     result.push_back(std::move(tried));
   }
   return result;

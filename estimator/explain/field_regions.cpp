@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "estimator/explain/chi_square.hpp"
 #include "estimator/explain/linear_evidence.hpp"
 
 namespace diastole::explain {
@@ -56,7 +57,7 @@ std::vector<Misfit> misfit_regions(const FieldCase& field, const FieldRows& rows
     const auto first = static_cast<Index>(3 * cell);
     const LinearEvidence::Gain gain = evidence.gain({first, first + 1, first + 2});
     const double p = std::min(1.0, static_cast<double>(cells) *
-                                       tail_probability(gain.chi_square, static_cast<double>(gain.degrees)));
+                                       chi_square_tail(gain.chi_square, static_cast<double>(gain.degrees)));
     if (p > significant) continue;
     Misfit misfit;
     misfit.port = "field";

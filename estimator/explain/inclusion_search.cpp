@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "estimator/explain/chi_square.hpp"
 #include "estimator/explain/linear_evidence.hpp"
 
 namespace diastole::explain {
@@ -78,7 +79,7 @@ std::vector<InclusionGuess> search_inclusion(FieldProblem& problem, const FieldF
     guess.inclusion.edge_width_mm = 2.0;
     // A lump saturates: its own strain vanishes as it stiffens.
     guess.inclusion.contrast = amount > 0.0 ? std::min(4.0, 1.0 + 1.5 * amount) : std::max(0.3, 1.0 + amount);
-    guess.p_value = std::min(1.0, places_told_apart(problem.field().base) * tail_probability(gain, 1.0));
+    guess.p_value = std::min(1.0, places_told_apart(problem.field().base) * chi_square_tail(gain, 1.0));
   }
   if (best[1].gain > best[0].gain) std::swap(best[0], best[1]);
   return best;

@@ -1,17 +1,11 @@
 #include "estimator/explain/linear_evidence.hpp"
 
 #include <algorithm>
-#include <boost/math/distributions/chi_squared.hpp>
 #include <cmath>
 
 namespace diastole::explain {
 
 using Eigen::Index;
-
-double tail_probability(double chi_square, double degrees) {
-  if (chi_square <= 0.0) return 1.0;
-  return boost::math::cdf(boost::math::complement(boost::math::chi_squared(degrees), chi_square));
-}
 
 LinearEvidence::LinearEvidence(const FieldFit& fit, const Eigen::MatrixXd& columns) {
   const Eigen::MatrixXd across = fit.jacobian.topRows(columns.rows()).transpose() * columns;

@@ -11,9 +11,6 @@
 
 namespace diastole::explain {
 
-/// chi2 that a chi2-distributed number with so many degrees of freedom exceeds, as a probability.
-double tail_probability(double chi_square, double degrees);
-
 class LinearEvidence {
  public:
   /// `columns` over the fit's rows.
