@@ -110,7 +110,7 @@ class Explainer {
     tell("fitting each effect");
     hypotheses_ = fit_round_effects(*round_, base_);
     tell("searching a lump of another stiffness");
-    std::ranges::move(fit_inclusion(*full_, full_base_, search_inclusion(*full_, full_base_)),
+    std::ranges::move(fit_inclusion(*round_, base_, search_inclusion(*full_, full_base_)),
                       std::back_inserter(hypotheses_));
     std::ranges::stable_sort(hypotheses_, std::greater{}, &FieldHypothesis::score);
   }
@@ -219,9 +219,8 @@ class Explainer {
   }
 
   void fill_evidence() {
-    const bool lump = chosen_ != nullptr && chosen_->id == "stiff-inclusion";
-    const FieldProblem& problem = lump ? *full_ : *round_;
-    const FieldFit& base = lump ? full_base_ : base_;
+    const FieldProblem& problem = *round_;
+    const FieldFit& base = base_;
     for (const FieldHypothesis& tried : hypotheses_) {
       Candidate row;
       row.ids = {tried.id};
@@ -261,9 +260,8 @@ class Explainer {
 
   /// Residuals of the frame of highest pressure.
   void fill_field() {
-    const bool lump = chosen_ != nullptr && chosen_->id == "stiff-inclusion";
-    const FieldProblem& problem = lump ? *full_ : *round_;
-    const FieldFit& base = lump ? full_base_ : base_;
+    const FieldProblem& problem = *round_;
+    const FieldFit& base = base_;
     const FieldFit& after = chosen_ != nullptr ? chosen_->fit : base;
     const auto most = std::ranges::max_element(base.pressures_kPa);
     const auto slot = static_cast<size_t>(most - base.pressures_kPa.begin());

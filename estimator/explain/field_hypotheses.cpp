@@ -5,6 +5,7 @@
 
 #include "estimator/explain/chi_square.hpp"
 #include "estimator/explain/linear_evidence.hpp"
+#include "estimator/explain/lump_fit.hpp"
 
 namespace diastole::explain {
 namespace {
@@ -105,18 +106,10 @@ std::vector<FieldHypothesis> fit_round_effects(FieldProblem& problem, const Fiel
   return result;
 }
 
-std::vector<FieldHypothesis> fit_inclusion(FieldProblem& problem, const FieldFit& base,
+std::vector<FieldHypothesis> fit_inclusion(const FieldProblem& problem, const FieldFit& base,
                                            const std::vector<InclusionGuess>& guesses) {
   if (guesses.front().p_value > beyond_chance) return {};
-  const Effect& effect = *find_effect("stiff-inclusion");
-  const Inclusion& lump = guesses.front().inclusion;
-  FieldChoice choice{&effect,
-                     {lump.contrast, lump.radius_mm, lump.z_mm, lump.theta_deg, lump.semi_axes_mm[0],
-                      lump.semi_axes_mm[1], lump.semi_axes_mm[2]},
-                     {0, 1, 2, 3, 4, 5, 6},
-                     0.3};
-  FieldHypothesis tried{std::string(effect.text().id),
-                        problem.fit(std::move(choice), {base.C1_kPa, base.pressures_kPa})};
+  FieldHypothesis tried{"stiff-inclusion", fit_lump(problem, base, guesses.front().inclusion)};
   tried.gain = base.chi_square - tried.fit.chi_square;
   constexpr double effective_parameters = 5.0;  // sizes are tied to one another
   tried.score =

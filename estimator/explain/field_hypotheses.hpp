@@ -20,8 +20,8 @@ struct FieldHypothesis {
 /// All effects that are the same all around the axis, on a mesh that is. Precondition: the solver stands at `base`.
 std::vector<FieldHypothesis> fit_round_effects(FieldProblem& problem, const FieldFit& base);
 
-/// A lump from the search's best guesses; empty if none of them is beyond chance.
-std::vector<FieldHypothesis> fit_inclusion(FieldProblem& problem, const FieldFit& base,
+/// A lump from the search's best guess; empty if that is not beyond chance. `base`: the problem's base fit.
+std::vector<FieldHypothesis> fit_inclusion(const FieldProblem& problem, const FieldFit& base,
                                            const std::vector<InclusionGuess>& guesses);
 
 }  // namespace diastole::explain

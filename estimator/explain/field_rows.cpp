@@ -171,6 +171,24 @@ bool FieldRows::follow(const HermiteMesh& mesh, const PointLocator& reference,
   return true;
 }
 
+FieldRows FieldRows::relocated(const PointLocator& reference) const {
+  FieldRows other = *this;
+  parallel_for(other.rows_.size(), machine_threads(), [&](size_t i) {
+    FieldRow& row = other.rows_[i];
+    const auto place = reference.find(row.X_mm);
+    if (place) row.point = place->point;
+    if (!place)
+      row = {row.slot,
+             row.source,
+             row.component,
+             {},
+             row.X_mm,
+             Eigen::Vector3d::Zero(),
+             Eigen::Vector3d::Zero()};
+  });
+  return other;
+}
+
 Eigen::MatrixXd FieldRows::columns(size_t slot, const HermiteMesh& mesh,
                                    std::span<const NodeField* const> motion,
                                    std::span<const NodeField* const> reference) const {

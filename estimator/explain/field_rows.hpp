@@ -48,6 +48,9 @@ class FieldRows {
   /// last call, exact where that is large. False when a point cannot be followed: then nothing has changed.
   [[nodiscard]] bool follow(const HermiteMesh& mesh, const PointLocator& reference,
                             const std::vector<NodeField>& seen_mm);
+  /// The same rows at the same places of another undeformed mesh, for `columns` there; places outside it count nothing.
+  [[nodiscard]] FieldRows relocated(const PointLocator& reference) const;
+
   /// A column a field of dx over a slot's rows; `reference`: of dX, null where it is zero.
   [[nodiscard]] Eigen::MatrixXd columns(size_t slot, const HermiteMesh& mesh,
                                         std::span<const NodeField* const> motion,

@@ -1,0 +1,20 @@
+#pragma once
+// The fit of a lump of another stiffness, on a mesh that is fine around it.
+//
+// What a lump adds to the motion is small beside the motion: from the base model's equilibrium x at the highest pressure,
+// with the lump's stiffness m,
+//
+//   K(x; m) d1 = - R(x; m),     K(x; m) d2 = - R(x + d1; m),     x_lump = x + d1 + d2
+//
+// and in the other frames it is taken to be in proportion to the pressure. C1 and the frames' pressures answer linearly, by
+// the base fit's Jacobian. One factorisation a step, instead of a dozen.
+
+#include "estimator/explain/field_fit.hpp"
+
+namespace diastole::explain {
+
+/// Best lump near the guess. `problem` is the one of the base fit; chi2 and residuals compare with it. Not converged if no
+/// lump was better than none.
+FieldFit fit_lump(const FieldProblem& problem, const FieldFit& base, const Inclusion& guess);
+
+}  // namespace diastole::explain
