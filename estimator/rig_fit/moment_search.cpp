@@ -32,7 +32,7 @@ struct Candidate {
 class MomentSearch {
  public:
   MomentSearch(const RigProblem& problem, const Session& session, const RigFit& before, const Effect& effect)
-      : problem_(problem), session_(session), effect_(effect), fit_(before), known_(before.values.size()) {
+      : problem_(problem), session_(session), fit_(before), known_(before.values.size()) {
     fit_.ingredients.push_back({&effect, {}});
     for (const EffectParameter& parameter : effect.parameters())
       typical_.push_back(parameter.typical);
@@ -70,7 +70,6 @@ class MomentSearch {
 
   const RigProblem& problem_;
   const Session& session_;
-  const Effect& effect_;
   RigFit fit_;
   size_t known_;  ///< values before the effect's
   std::vector<double> typical_;
