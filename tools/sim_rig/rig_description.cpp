@@ -71,6 +71,8 @@ void read_simulation(TableReader& table, RigDescription& description) {
   hose.wall_creep_fraction =
       table.number_or("wall_creep_fraction", hose.wall_creep_fraction, {.at_least = 0, .at_most = 0.5});
   hose.wall_creep_time_s = table.number_or("wall_creep_time_s", hose.wall_creep_time_s, {.at_least = 0.01});
+  hose.wave_speed_m_s = table.number_or("hose_wave_speed_m_s", hose.wave_speed_m_s, positive);
+  plant.minor_loss_K = table.number_or("minor_loss_K", plant.minor_loss_K, not_negative);
   table.finish();
 }
 
@@ -91,6 +93,7 @@ RigDescription read_rig_description(TableReader root) {
   description.daq_patience_ns = static_cast<uint64_t>(
       ns_per_ms * daq.integer_or("timeout_ms", usual_timeout_ms, {.at_least = 1, .at_most = 1000}));
   if (auto simulation = root.table_if("simulation")) read_simulation(*simulation, description);
+  description.plant.hose.segments = segments_for(description.plant.hose);
   return description;
 }
 

@@ -1,8 +1,5 @@
 // Effects between the controller's steps and the volume in the cavity.
 
-#include <algorithm>
-#include <cmath>
-
 #include "tools/sim_rig/hidden/hidden_effects.hpp"
 
 namespace diastole::sim_rig::hidden {
@@ -24,11 +21,8 @@ void air_bubble_pump(Draw& draw) { draw.plant.flaws.pump.gas_mL = draw.within("v
 
 void hose_compliance(Draw& draw) {
   HoseConfig& hose = draw.plant.hose;
-  const double described_m_s = hose.wave_speed_m_s;
   hose.wave_speed_m_s = draw.within("wave_speed_m_s", 30.0, 120.0);
-  // The wave travels a segment a step: shorter segments keep the step.
-  hose.segments =
-      static_cast<int>(std::lround(hose.segments * std::max(1.0, described_m_s / hose.wave_speed_m_s)));
+  hose.segments = segments_for(hose);
 }
 
 void hose_inertance_excess(Draw& draw) {

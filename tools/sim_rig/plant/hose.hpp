@@ -13,6 +13,8 @@
 //
 //   pump | 0 ---- 1 ---- 2 ---- ... ---- N | cavity        nodes; flow positive towards the cavity
 
+#include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <vector>
 
@@ -30,6 +32,12 @@ struct HoseConfig {
   bool friction = true;
   int segments = 20;
 };
+
+/// So many that a step lasts no longer than 0.7 ms, and 20 at least: the wave goes a segment a step.
+inline int segments_for(const HoseConfig& hose) {
+  constexpr double longest_step_s = 0.7e-3;
+  return std::max(20, static_cast<int>(std::ceil(hose.length_m / hose.wave_speed_m_s / longest_step_s)));
+}
 
 /// What the line offers at its cavity end at the next step: p = pressure_kPa - impedance_kPa_s_per_mL * flow.
 struct Characteristic {
