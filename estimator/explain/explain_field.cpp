@@ -245,6 +245,11 @@ class Explainer {
       everywhere.port = "field";
       everywhere.channel = "tags";
       everywhere.region = "all of the specimen, in proportion to the load";
+      if (chosen_ != nullptr && chosen_->id == "stiff-inclusion") {
+        const std::vector<double>& at = chosen_->fit.choice.values;
+        everywhere.region =
+            fmt::format("around {:.0f} deg, z {:.0f} mm, {:.0f} mm from the axis", at[3], at[2], at[1]);
+      }
       everywhere.excess_chi2 = std::max(before.excess, hypotheses_.front().gain);
       everywhere.p_value = std::min(before.p_value, hypotheses_.front().p_value);
       out_.where.push_back(std::move(everywhere));
