@@ -1,4 +1,5 @@
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -45,8 +46,9 @@ void print_parameter(const FittedParameter& parameter) {
     fmt::print("{} = {:.3f} \u00b1 {:.3f}{} (95 % interval {:.3f} to {:.3f}{})\n", what, parameter.value,
                parameter.se, unit, parameter.ci95[0], parameter.ci95[1], unit);
   } else {
-    fmt::print("{} = {:.3f}{}, on its {} bound: no error can be given\n", what, parameter.value, unit,
-               parameter.at_bound);
+    fmt::print("{} = {:.3f}{}, {}: no error can be given\n", what, parameter.value, unit,
+               parameter.at_bound.empty() ? "which the data do not see"
+                                          : fmt::format("on its {} bound", parameter.at_bound));
   }
   if (parameter.elements.empty()) return;
   fmt::print("  element   value{}   standard error\n", unit);
@@ -106,7 +108,18 @@ class Interruption {
   Interruption& operator=(const Interruption&) = delete;
 };
 
-std::optional<FitRecord> start_of(const FitArguments& arguments) {
+/// A checkpoint is taken up only by the fit that left it; --start takes any result with the same parameters.
+void require_own_checkpoint(const FitRecord& checkpoint, const Study& study, const std::string& file) {
+  const bool own = std::filesystem::path(checkpoint.study).filename() == study.file.filename() &&
+                   checkpoint.law == study.law.name && checkpoint.mesh == mesh_of(study.specimen);
+  if (own) return;
+  throw InputError(
+      {file, "--resume",
+       fmt::format("is of another fit: {} on {} elements", checkpoint.study, fmt::join(checkpoint.mesh, "x")),
+       "Give another --checkpoint, or take its values up with --start."});
+}
+
+std::optional<FitRecord> start_of(const FitArguments& arguments, const Study& study) {
   std::filesystem::path file = arguments.start;
   if (arguments.resume) {
     if (!arguments.checkpoint) {
@@ -121,6 +134,7 @@ std::optional<FitRecord> start_of(const FitArguments& arguments) {
   }
   if (file.empty()) return {};
   FitRecord record = fit_record_from_json(read_whole_file(file), file.string());
+  if (arguments.resume) require_own_checkpoint(record, study, file.string());
   fmt::print(stderr, "Starting from {}.\n", file.string());
   return record;
 }
@@ -146,6 +160,10 @@ ExitCode run_fit(const FitArguments& arguments, const CommandOutput& out) {
   if (!arguments.smooth.empty()) set_smoothness(study, arguments.smooth);
   for (const std::string& start : arguments.starts)
     set_start(study, start);
+  if (arguments.output && arguments.output == arguments.checkpoint) {
+    throw InputError({arguments.output->string(), "--checkpoint", "is the file of the result too",
+                      "Give the checkpoint a file of its own."});
+  }
   if (arguments.output) {
     require_output({*arguments.output, inputs_of(study), fit_file_mark, arguments.force});
   }
@@ -166,10 +184,11 @@ ExitCode run_fit(const FitArguments& arguments, const CommandOutput& out) {
     for (size_t i = 0; i < step.parameters.size(); ++i) {
       values += fmt::format("  {} {:.5g}", study.law.parameters[i].name, step.parameters[i]);
     }
-    fmt::print(stderr, "  iteration {:>2}  cost {:.4f}{}{}\n", step.iteration, step.cost, values,
+    const std::string cost = step.cost < 1e300 ? fmt::format("{:.4f}", step.cost) : "none";
+    fmt::print(stderr, "  iteration {:>2}  cost {}{}{}\n", step.iteration, cost, values,
                step.accepted ? "" : "  (step refused)");
   };
-  options.start = start_of(arguments);
+  options.start = start_of(arguments, study);
   options.profile = arguments.profile;
   options.paper_mode = arguments.paper_mode;
   if (arguments.pressure_offset_kPa > 0) options.pressure_offset_sigma_kPa = arguments.pressure_offset_kPa;

@@ -187,6 +187,11 @@ ExitCode run_montecarlo(const MonteCarloArguments& arguments, const CommandOutpu
   if (plan.noise_mm.empty()) plan.noise_mm = {0.0};
   if (plan.frames.empty()) plan.frames = {loaded_frames(measurement)};
 
+  for (const double noise_mm : plan.noise_mm) {
+    if (!std::isfinite(noise_mm))
+      throw InputError(
+          {"", "--noise", "is not a finite number", "Give standard deviations in mm, as 0.4,0.8."});
+  }
   CellFitter fitter(study, measurement, plan);
   const std::vector<Cell> cells = cells_of(plan);
   const size_t parameters = study.law.parameters.size();

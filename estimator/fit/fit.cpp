@@ -7,6 +7,7 @@
 #include "estimator/fit/fit_errors.hpp"
 #include "estimator/fit/paper_search.hpp"
 #include "estimator/fit/profile.hpp"
+#include "estimator/fit/usable_points.hpp"
 
 namespace diastole {
 namespace {
@@ -88,12 +89,20 @@ OptimiserResult search_from(JointProblem& problem, const Eigen::VectorXd& q, Fit
   return options.paper_mode ? paper_search(problem, q, settings) : minimise(problem, q, settings);
 }
 
+bool is_interrupted(const FitOptions& options) {
+  return options.optimiser.interrupted && options.optimiser.interrupted();
+}
+
 void tell_profiles(FitOutcome& outcome, JointProblem& problem, const Eigen::VectorXd& q,
                    const Eigen::MatrixXd& covariance, const FitOptions& options) {
   const Eigen::VectorXd* residuals = problem.residuals(q);
   if (residuals == nullptr) return;
   const double cost = residuals->squaredNorm() / 2;
   for (const size_t place : options.profiled) {
+    if (is_interrupted(options)) {
+      outcome.interrupted = "profile";
+      return;
+    }
     const auto which = static_cast<Eigen::Index>(place);
     if (problem.bound_under(q, which) != BoundSide::none || !std::isfinite(covariance(which, which)))
       continue;
@@ -140,7 +149,13 @@ void tell_posterior(FitOutcome& outcome, JointProblem& problem, const Eigen::Vec
                     const Eigen::MatrixXd& covariance, const FitOptions& options) {
   if (!options.posterior || problem.residuals(q) == nullptr) return;
   const auto begun = std::chrono::steady_clock::now();
-  const PosteriorSample sample = sample_posterior(problem, q, covariance, *options.posterior);
+  PosteriorOptions settings = *options.posterior;
+  settings.interrupted = options.optimiser.interrupted;
+  const PosteriorSample sample = sample_posterior(problem, q, covariance, settings);
+  if (sample.interrupted) {
+    outcome.interrupted = "posterior";
+    return;
+  }
   PosteriorOutcome result;
   result.draws = options.posterior->chains * options.posterior->steps;
   result.accepted = sample.accepted;
@@ -178,6 +193,7 @@ FitOutcome fit_motion(MotionModel& model, const std::vector<SoughtValue>& sought
       outcome.reason = "Failed: " + problem.failure() + ".";
       break;
     }
+    if (search == 0) require_any_usable(problem, options.file);
     const bool roughly = search == 0 && any_by_evidence(options);
     const bool prepared = search == 1 && any_by_evidence(options);
     const bool other_smoothness = search > 0 && choose_smoothness(problem, q, options);
@@ -192,6 +208,7 @@ FitOutcome fit_motion(MotionModel& model, const std::vector<SoughtValue>& sought
     again = found.stalled && problem.give_up_lost() > 0;
     if (!found.converged && !again) break;
   }
+  if (outcome.converged) require_half_usable(point_share(problem), options.file);
   if (!outcome.history.empty()) {
     const Eigen::MatrixXd covariance = tell_uncertainty(outcome, problem, q, options);
     if (outcome.converged) {

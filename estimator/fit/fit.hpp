@@ -38,6 +38,7 @@ enum class Robustness {
 };
 
 struct FitOptions {
+  std::string file;            ///< named in errors
   OptimiserOptions optimiser;  ///< its on_step is not used
   LocatorOptions locator;      ///< how far outside the body a point may lie
   std::vector<SmoothRegion> smooth;
@@ -93,6 +94,13 @@ struct PressureOffset {
   double se_kPa;
 };
 
+/// A common offset that was not sought (offset_score.hpp).
+struct UnsoughtOffset {
+  double value_kPa;  ///< measured less true
+  double se_kPa;
+  std::vector<double> values;  ///< what the values would be with it
+};
+
 struct ProfileInterval {
   size_t value;
   std::array<double, 2> ci95;
@@ -123,6 +131,7 @@ struct FitOutcome {
   std::vector<EstimatedFrame> frames;
   Eigen::MatrixXd covariance;  ///< of values, unknown pressures and offset, in their own units
   std::optional<PressureOffset> pressure_offset;
+  std::optional<UnsoughtOffset> unsought_offset;  ///< without pressure_offset, where the data see one
   std::vector<ProfileInterval> profiles;
   std::optional<PosteriorOutcome> posterior;
   double chi2 = 0;        ///< including the pressures' priors
@@ -131,6 +140,7 @@ struct FitOutcome {
   std::vector<SmoothOutcome> smoothness;
   std::optional<RobustOutcome> robust;  ///< if the loss was not the normal's
   bool converged = false;
+  std::string interrupted;  ///< what was ended on request after the search: "profile", "posterior" or neither
   std::string reason;
   int iterations = 0;
   int forward_solves = 0;
@@ -138,7 +148,8 @@ struct FitOutcome {
   std::vector<OptimiserStep> history;  ///< q of each step with values in their own units
 };
 
-/// Never throws for numerical trouble: `converged` and `reason` tell it (values then are the best found).
+/// Never throws for numerical trouble: `converged` and `reason` tell it (values then are the best found). Throws
+/// InputError when hardly any point lies on the body (usable_points.hpp).
 /// Precondition: at least one loaded frame has points.
 FitOutcome fit_motion(MotionModel& model, const std::vector<SoughtValue>& sought,
                       const Measurement& measurement, const FitOptions& options);

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "estimator/fit/offset_score.hpp"
 #include "estimator/fit/uncertainty.hpp"
 
 namespace diastole {
@@ -63,35 +64,66 @@ double step_at(const EvidenceOfStep& evidence, double share) {
 /// (a J'J + P)^-1 (b J'J + P) (a J'J + P)^-1 with J of the motion, P of the priors, a and b the means of the
 /// influence's slope and square: the covariance of an M-estimator (Huber, Robust Statistics, 1981, 7.6).
 struct RobustErrors {
+  Eigen::MatrixXd excess;  ///< (b - a) J'J, what the residuals' spread has over the curvature
   Eigen::MatrixXd covariance;
   Eigen::MatrixXd jacobian;      ///< whose J'J is a J'J + P
+  Eigen::VectorXd residuals;     ///< whose J'r is the cost's gradient
+  double scale;                  ///< of the motion's rows of the jacobian
   double exact_variance_factor;  ///< b / a
 };
+
+/// Means of the influence's slope (a) and square (b) over the motion's residuals.
+struct InfluenceMeans {
+  double slope = 0, square = 0;
+};
+
+InfluenceMeans influence_means(const RobustLoss& loss, const Eigen::VectorXd& residuals) {
+  constexpr double least_slope = 0.01;  // of the square: a curvature that hardly any residual supports
+  InfluenceMeans means;
+  for (const double r : residuals) {
+    means.slope += loss.influence_slope(r) / static_cast<double>(residuals.size());
+    means.square += loss.influence(r) * loss.influence(r) / static_cast<double>(residuals.size());
+  }
+  means.slope = std::max(means.slope, least_slope * means.square);
+  return means;
+}
+
+/// The least-squares problem with the gradient and the mean curvature of the robust cost.
+struct WeightedProblem {
+  Eigen::MatrixXd jacobian;
+  Eigen::VectorXd residuals;
+};
+
+WeightedProblem weighted_problem(JointProblem& problem, const Eigen::VectorXd& q, double slope) {
+  const Eigen::VectorXd motion = problem.motion_residuals();
+  WeightedProblem weighted{problem.plain_jacobian(q), *problem.residuals(q)};
+  weighted.jacobian.topRows(motion.size()) *= std::sqrt(slope);
+  for (Eigen::Index i = 0; i < motion.size(); ++i)
+    weighted.residuals[i] = problem.robust()->influence(motion[i]) / std::sqrt(slope);
+  return weighted;
+}
 
 RobustErrors robust_errors(JointProblem& problem, const Eigen::VectorXd& q,
                            const std::vector<bool>& is_free) {
   const Eigen::VectorXd residuals = problem.motion_residuals();
-  const RobustLoss& loss = *problem.robust();
-  double slope = 0, square = 0;
-  for (const double r : residuals) {
-    slope += loss.influence_slope(r) / static_cast<double>(residuals.size());
-    square += loss.influence(r) * loss.influence(r) / static_cast<double>(residuals.size());
-  }
+  const InfluenceMeans means = influence_means(*problem.robust(), residuals);
+  WeightedProblem weighted = weighted_problem(problem, q, means.slope);
   RobustErrors errors;
-  errors.jacobian = problem.plain_jacobian(q);
+  errors.scale = std::sqrt(means.slope);
+  errors.jacobian = std::move(weighted.jacobian);
+  errors.residuals = std::move(weighted.residuals);
   const Eigen::MatrixXd motion = errors.jacobian.topRows(residuals.size());
-  errors.jacobian.topRows(residuals.size()) *= std::sqrt(slope);
   const Eigen::MatrixXd inverse = covariance(errors.jacobian, is_free);
-  const Eigen::MatrixXd spread =
-      errors.jacobian.transpose() * errors.jacobian + (square - slope) * motion.transpose() * motion;
-  errors.covariance = inverse * spread * inverse;
-  errors.exact_variance_factor = square / slope;
+  errors.excess = (means.square / means.slope - 1) * motion.transpose() * motion;
+  errors.covariance = inverse + inverse * errors.excess * inverse;
+  errors.exact_variance_factor = means.square / means.slope;
   return errors;
 }
 
 /// What the smoothness' own uncertainty adds to the covariance at the chosen steps.
 void tell_smoothness(FitOutcome& outcome, JointProblem& problem, const Eigen::VectorXd& q,
-                     const FitOptions& options, const std::vector<bool>& is_free) {
+                     const FitOptions& options, const std::vector<bool>& is_free,
+                     const Eigen::MatrixXd& excess) {
   if (options.smooth.empty()) return;
   const QuadraticModel model = quadratic_model(problem, q);
   const Eigen::MatrixXd at_chosen = outcome.covariance;
@@ -108,12 +140,20 @@ void tell_smoothness(FitOutcome& outcome, JointProblem& problem, const Eigen::Ve
       told.step90 = {step_at(evidence, 0.05), step_at(evidence, 0.95)};
       for (size_t k = 0; k < evidence.steps.size(); ++k) {
         const Eigen::VectorXd apart = evidence.q[k] - q;
-        outcome.covariance +=
-            evidence.weights[k] * (evidence.covariance[k] + apart * apart.transpose() - at_chosen);
+        const Eigen::MatrixXd& inverse = evidence.covariance[k];
+        outcome.covariance += evidence.weights[k] *
+                              (inverse + inverse * excess * inverse + apart * apart.transpose() - at_chosen);
       }
     }
     outcome.smoothness.push_back(told);
   }
+}
+
+void tell_unsought_offset(FitOutcome& outcome, const JointProblem& problem, const Eigen::VectorXd& q,
+                          const LinearProblem& linear, const Eigen::VectorXd& column) {
+  if (problem.offset_unknown()) return;
+  if (const auto score = offset_score(problem, q, linear, column))
+    outcome.unsought_offset = UnsoughtOffset{score->offset_kPa, score->se_kPa, score->values};
 }
 
 }  // namespace
@@ -126,8 +166,18 @@ std::vector<bool> free_unknowns(const JointProblem& problem, const Eigen::Vector
 }
 
 QuadraticModel quadratic_model(JointProblem& problem, const Eigen::VectorXd& q) {
-  const Eigen::VectorXd residuals = problem.residuals(q)->head(problem.data_rows());
-  const Eigen::MatrixXd jacobian = problem.jacobian(q).topRows(problem.data_rows());
+  Eigen::VectorXd residuals = *problem.residuals(q);
+  Eigen::MatrixXd jacobian;
+  if (problem.robust()) {
+    const InfluenceMeans means = influence_means(*problem.robust(), problem.motion_residuals());
+    WeightedProblem weighted = weighted_problem(problem, q, means.slope);
+    jacobian = std::move(weighted.jacobian);
+    residuals = std::move(weighted.residuals);
+  } else {
+    jacobian = problem.jacobian(q);
+  }
+  jacobian.conservativeResize(problem.data_rows(), Eigen::NoChange);
+  residuals.conservativeResize(problem.data_rows());
   return {q, jacobian.transpose() * residuals, jacobian.transpose() * jacobian};
 }
 
@@ -147,16 +197,25 @@ Eigen::MatrixXd tell_uncertainty(FitOutcome& outcome, JointProblem& problem, con
       motion.squaredNorm() + residuals->segment(motion.size(), outcome.rows - motion.size()).squaredNorm();
   outcome.covariance = covariance(jacobian, is_free);
   double exact_factor = 1;
+  Eigen::VectorXd column = problem.offset_column();
+  Eigen::MatrixXd excess = Eigen::MatrixXd::Zero(q.size(), q.size());
   if (problem.robust()) {
     RobustErrors errors = robust_errors(problem, q, is_free);
     outcome.covariance = std::move(errors.covariance);
     jacobian = std::move(errors.jacobian);
+    excess = std::move(errors.excess);
     exact_factor = errors.exact_variance_factor;
+    column.head(motion.size()) *= errors.scale;
+    tell_unsought_offset(outcome, problem, q, {jacobian, errors.residuals, is_free, exact_factor}, column);
     outcome.robust = RobustOutcome{*problem.robust(), wild_count(motion)};
   }
   const Eigen::MatrixXd data_jacobian = jacobian.topRows(outcome.rows);
   outcome.unknowns = effective_count(outcome.covariance, data_jacobian);
-  tell_smoothness(outcome, problem, q, options, is_free);
+  if (!problem.robust()) {
+    const double spread = outcome.chi2 / (static_cast<double>(outcome.rows) - outcome.unknowns);
+    tell_unsought_offset(outcome, problem, q, {jacobian, *residuals, is_free, spread}, column);
+  }
+  tell_smoothness(outcome, problem, q, options, is_free, excess);
   Eigen::MatrixXd in_coordinates = outcome.covariance;
   const Eigen::VectorXd exact =
       exact_factor * variances_at_exact_pressure(jacobian, is_free, problem.values());

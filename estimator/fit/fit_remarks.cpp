@@ -10,6 +10,8 @@
 namespace diastole {
 namespace {
 
+constexpr double telling_offset =
+    3.5;  // standard deviations: one of two thousand sound measurements is suspected
 constexpr double telling_deviation = 4.0;  // standard deviations of chi2/dof that chance does not explain
 
 /// How far chi2/dof is from 1, in its own standard deviations sqrt(2/dof).
@@ -32,6 +34,27 @@ std::string remark_on_misfit(const FitRecord& record) {
         figure);
   }
   return fmt::format("The residuals spread as the stated noise says ({}).", figure);
+}
+
+/// Under a robust loss: wild residuals would dominate chi2/dof, so that only the others' core can tell.
+std::string remark_on_core(const FitOutcome& fit) {
+  constexpr double telling_factor = 1.2;
+  std::vector<double> all;
+  for (const EstimatedFrame& frame : fit.frames)
+    all.insert(all.end(), frame.weighted.begin(), frame.weighted.end());
+  const double core =
+      core_deviation(Eigen::Map<const Eigen::VectorXd>(all.data(), static_cast<Eigen::Index>(all.size())));
+  const std::string figure = fmt::format("their core spreads {:.2f} times as far as stated", core);
+  if (core > telling_factor) {
+    return fmt::format(
+        "Even the residuals that are not wild are larger than the stated noise ({}): the model lacks "
+        "something, or "
+        "sigma_mm is stated too small.",
+        figure);
+  }
+  if (core < 1 / telling_factor)
+    return fmt::format("The residuals are smaller than the stated noise ({}).", figure);
+  return fmt::format("Apart from the wild ones, the residuals spread as the stated noise says ({}).", figure);
 }
 
 void add_pressure_share(std::vector<std::string>& remarks, const FitRecord& record, const FitOutcome& fit) {
@@ -127,6 +150,37 @@ void add_posterior(std::vector<std::string>& remarks, const FitRecord& record) {
           : ""));
 }
 
+/// "C1_kPa 8.9 instead of 9.8", regional values by their mean.
+std::string values_with_offset(const FitRecord& record, const UnsoughtOffset& offset) {
+  std::string words;
+  size_t first = 0;
+  for (const FittedParameter& parameter : record.parameters) {
+    const size_t count = std::max<size_t>(1, parameter.elements.size());
+    double sum = 0;
+    for (size_t i = first; i < first + count; ++i)
+      sum += offset.values[i];
+    words += fmt::format("{}{} {:.4g} instead of {:.4g}", words.empty() ? "" : ", ", parameter.name,
+                         sum / static_cast<double>(count), parameter.value);
+    first += count;
+  }
+  return words;
+}
+
+void add_unsought_offset(std::vector<std::string>& remarks, const FitRecord& record, const FitOutcome& fit) {
+  if (!fit.converged || !fit.unsought_offset) return;
+  const UnsoughtOffset& offset = *fit.unsought_offset;
+  const double deviations = std::abs(offset.value_kPa) / offset.se_kPa;
+  if (!(deviations > telling_offset)) return;
+  remarks.push_back(
+      fmt::format("The pressures seem to read {:.3g} ± {:.2g} kPa too {} ({:.1f} standard deviations): with "
+                  "that the frames "
+                  "agree better, and the values would be about {}. Check the catheter's zero; "
+                  "--pressure-offset {:.2g} seeks "
+                  "the offset, and the errors then hold it.",
+                  std::abs(offset.value_kPa), offset.se_kPa, offset.value_kPa > 0 ? "high" : "low",
+                  deviations, values_with_offset(record, offset), 2 * std::abs(offset.value_kPa)));
+}
+
 void add_undeformed(std::vector<std::string>& remarks, const FitRecord& record) {
   if (record.undeformed_points == 0) return;
   const double off =
@@ -148,15 +202,18 @@ void add_undeformed(std::vector<std::string>& remarks, const FitRecord& record) 
 }  // namespace
 
 std::vector<std::string> remarks_on(const FitRecord& record, const FitOutcome& fit) {
-  std::vector<std::string> remarks = {remark_on_misfit(record)};
+  std::vector<std::string> remarks = {fit.robust ? remark_on_core(fit) : remark_on_misfit(record)};
   add_pressure_share(remarks, record, fit);
   add_bounds(remarks, record);
   add_conditional_mean(remarks, record);
   add_regional(remarks, record);
+  add_unsought_offset(remarks, record, fit);
   add_undeformed(remarks, record);
   for (std::string& remark : identifiability_remarks(record))
     remarks.push_back(std::move(remark));
   if (record.posterior) add_posterior(remarks, record);
+  if (!fit.interrupted.empty())
+    remarks.push_back(fmt::format("The {} was ended on request; the fit itself is whole.", fit.interrupted));
   if (record.search == "finite differences") {
     remarks.push_back(
         "Searched as the paper did: sums of squares in mm, pressures taken as exact, derivatives by finite "

@@ -41,6 +41,10 @@ JointProblem::JointProblem(MotionModel& model, std::vector<SoughtValue> values,
                        pressure_unknown,
                        {}});
   }
+  if (!measurement.frames.empty()) {
+    const Frame& rest = measurement.frames.front();
+    if (rest.pressure_kPa != 0 && rest.sigma_kPa > 0) rest_reading_ = rest;
+  }
   if (offset_sigma_kPa) {
     offset_sigma_kPa_ = *offset_sigma_kPa;
     offset_unknown_ = unknowns_++;
@@ -78,7 +82,7 @@ Eigen::Index JointProblem::smooth_rows() const {
 }
 
 Eigen::Index JointProblem::data_rows() const {
-  Eigen::Index rows = unknowns() - values();
+  Eigen::Index rows = unknowns() - values() + (fits_rest() ? 1 : 0);
   for (const LoadedFrame& frame : frames_)
     rows += frame.residuals.rows();
   return rows;
@@ -186,6 +190,8 @@ const Eigen::VectorXd* JointProblem::residuals(const Eigen::VectorXd& q) {
         (q[*frame.pressure_unknown] + offset_at(q) - frame.load.pressure_kPa) / frame.load.sigma_kPa;
   }
   if (offset_unknown_) residuals_[row++] = q[*offset_unknown_] / offset_sigma_kPa_;
+  if (fits_rest())
+    residuals_[row++] = (q[*offset_unknown_] - rest_reading_->pressure_kPa) / rest_reading_->sigma_kPa;
   for (const SmoothBlock& block : smooth_) {
     const Eigen::Index size = block.differences.rows();
     residuals_.segment(row, size) =
@@ -232,12 +238,31 @@ Eigen::MatrixXd JointProblem::plain_jacobian(const Eigen::VectorXd& q) {
     result(row++, *frame.pressure_unknown) = 1 / frame.load.sigma_kPa;
   }
   if (offset_unknown_) result(row++, *offset_unknown_) = 1 / offset_sigma_kPa_;
+  if (fits_rest()) result(row++, *offset_unknown_) = 1 / rest_reading_->sigma_kPa;
   for (const SmoothBlock& block : smooth_) {
     const Eigen::Index size = block.differences.rows();
     result.block(row, block.first, size, block.differences.cols()) = block.differences / block.step;
     row += size;
   }
   return result;
+}
+
+Eigen::VectorXd JointProblem::offset_column() {
+  Eigen::VectorXd column = Eigen::VectorXd::Zero(rows());
+  Eigen::Index row = 0, prior = motion_residuals().size();
+  for (size_t slot = 0; slot < frames_.size(); ++slot) {
+    const LoadedFrame& frame = frames_[slot];
+    const Eigen::Index size = frame.residuals.rows();
+    if (frame.pressure_unknown) {
+      column[prior++] = 1 / frame.load.sigma_kPa;
+    } else {
+      const NodeField by_pressure = model_.derivatives(slot).by_pressure;
+      const NodeField* const fields[] = {&by_pressure};
+      column.segment(row, size) = -frame.residuals.derivatives(fields).col(0);
+    }
+    row += size;
+  }
+  return column;
 }
 
 }  // namespace diastole

@@ -6,7 +6,8 @@
 //
 //   minimise  1/2 sum_frames |r_frame(values, P_frame)|^2  +  1/2 sum_frames ((P_frame - measured) / sigma)^2
 //
-// All measurements may be off by a common offset, one more unknown with a prior about zero.
+// All measurements may be off by a common offset, one more unknown with a prior about zero; a pressure read in the
+// undeformed frame 0 is a measurement of it.
 // A frame with sigma_kPa = 0 has an exactly known pressure (but for the offset) and no unknown. A value with a positive lower
 // bound enters as its logarithm (its error is closer to a factor than to a term); other values enter as they
 // are.
@@ -14,9 +15,9 @@
 // With a robust loss (robust_loss.hpp) the motion's residuals enter as u(r), and the cost changes with them.
 // Parameters that vary by element may carry a smoothness prior (smoothness.hpp).
 //
-// Residual rows: frame after frame (frame_residuals.hpp), then one for each unknown pressure, then those of the
-// smoothness priors.
-// Frame 0 is not part of the problem: without load there is no information on stiffness.
+// Residual rows: frame after frame (frame_residuals.hpp), then one for each unknown pressure, those of the offset, then
+// those of the smoothness priors.
+// The points of frame 0 are not part of the problem: without load there is no information on stiffness.
 
 #include <Eigen/Dense>
 #include <memory>
@@ -81,6 +82,12 @@ class JointProblem {
   /// Place in q of the pressures' common offset (measured less true), if there is one.
   [[nodiscard]] std::optional<Eigen::Index> offset_unknown() const { return offset_unknown_; }
 
+  /// Derivatives by an offset, for a problem without that unknown: its column of `plain_jacobian`. Precondition as
+  /// there.
+  [[nodiscard]] Eigen::VectorXd offset_column();
+  /// The load of frame 0 where it was measured: a sigma, and a pressure other than exactly 0.
+  [[nodiscard]] const std::optional<Frame>& rest_reading() const { return rest_reading_; }
+
   /// The priors of smooth blocks of values; none at first. Changes `rows`.
   void set_smoothness(std::vector<SmoothBlock> blocks);
   [[nodiscard]] const std::vector<SmoothBlock>& smoothness() const { return smooth_; }
@@ -116,6 +123,8 @@ class JointProblem {
   [[nodiscard]] double offset_at(const Eigen::VectorXd& q) const;
   [[nodiscard]] double pressure_at(const LoadedFrame& frame, const Eigen::VectorXd& q) const;
   [[nodiscard]] Eigen::Index smooth_rows() const;
+  /// A reading at rest counts only where the offset is sought.
+  [[nodiscard]] bool fits_rest() const { return offset_unknown_ && rest_reading_; }
   bool solve_frames(const Eigen::VectorXd& q);
 
   MotionModel& model_;
@@ -125,6 +134,7 @@ class JointProblem {
   std::vector<LoadedFrame> frames_;
   std::optional<Eigen::Index> offset_unknown_;
   double offset_sigma_kPa_ = 0;
+  std::optional<Frame> rest_reading_;
   std::vector<SmoothBlock> smooth_;
   std::optional<RobustLoss> robust_;
   Eigen::Index unknowns_ = 0;

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <nlopt.h>
 
+#include <algorithm>
 #include <cmath>
 #include <memory>
 #include <vector>
@@ -15,6 +16,7 @@ constexpr double difference = 1e-4;  // of a parameter's value: well above the e
 struct Search {
   JointProblem& problem;
   const OptimiserOptions& options;
+  nlopt_opt optimiser;
   int iterations = 0;
   double worst_cost = 0;  ///< what a point without equilibrium is said to cost
   double best_cost = 0;
@@ -48,6 +50,11 @@ double evaluate(unsigned count, const double* values, double* gradient, void* da
   }
   if (gradient == nullptr) return here;
   if (search.options.on_step) search.options.on_step({search.iterations, here, better, search.best_q});
+  if (search.options.interrupted && search.options.interrupted()) {
+    nlopt_force_stop(search.optimiser);
+    std::fill(gradient, gradient + count, 0.0);
+    return here;
+  }
   ++search.iterations;
   std::vector<double> moved(values, values + count);
   for (unsigned i = 0; i < count; ++i) {
@@ -69,8 +76,11 @@ std::string reason_of(nlopt_result result, const Search& search) {
       return "Converged: the cost's gradient vanishes.";
     case NLOPT_ROUNDOFF_LIMITED:
       return "Failed: the differences' own error hides the direction in which the cost falls.";
+    case NLOPT_FORCED_STOP:
+      return fmt::format("Stopped on request after {} iterations; the cost was still falling.",
+                         search.iterations);
     case NLOPT_MAXEVAL_REACHED:
-      return fmt::format("Stopped at the limit of {} iterations; the cost was still falling.",
+      return fmt::format("Stopped at the limit of {} evaluations of the cost; it was still falling.",
                          search.options.iteration_limit);
     default:
       return "Failed: sequential quadratic programming found no step.";
@@ -82,7 +92,6 @@ std::string reason_of(nlopt_result result, const Search& search) {
 OptimiserResult paper_search(JointProblem& problem, const Eigen::VectorXd& start,
                              const OptimiserOptions& options) {
   const auto count = static_cast<unsigned>(problem.values());
-  Search search{problem, options};
   std::vector<double> values, lower, upper;
   for (Eigen::Index i = 0; i < problem.values(); ++i) {
     values.push_back(problem.value(i).value(start[i]));
@@ -91,6 +100,7 @@ OptimiserResult paper_search(JointProblem& problem, const Eigen::VectorXd& start
   }
   const std::unique_ptr<std::remove_pointer_t<nlopt_opt>, decltype(&nlopt_destroy)> optimiser(
       nlopt_create(NLOPT_LD_SLSQP, count), nlopt_destroy);
+  Search search{problem, options, optimiser.get()};
   nlopt_set_lower_bounds(optimiser.get(), lower.data());
   nlopt_set_upper_bounds(optimiser.get(), upper.data());
   nlopt_set_min_objective(optimiser.get(), evaluate, &search);

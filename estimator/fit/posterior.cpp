@@ -119,6 +119,10 @@ PosteriorSample sample_posterior(JointProblem& problem, const Eigen::VectorXd& b
     Chain chain(problem, best, covariance, options.seed + static_cast<unsigned>(number));
     Eigen::MatrixXd draws(options.steps, best.size());
     for (int step = -options.warm_up; step < options.steps; ++step) {
+      if (options.interrupted && options.interrupted()) {
+        sample.interrupted = true;
+        return sample;
+      }
       const bool moved = chain.step(beta);
       if (step >= 0) {
         accepted += moved ? 1 : 0;

@@ -25,6 +25,7 @@ struct PosteriorOptions {
   int warm_up = 60;  ///< adapts beta, is thrown away
   unsigned seed = 1;
   std::function<void(int done, int all)> on_step;
+  std::function<bool()> interrupted;  ///< asked before each step: true ends the drawing, without a sample
 };
 
 struct PosteriorSample {
@@ -32,6 +33,7 @@ struct PosteriorSample {
   double accepted = 0;                  ///< share of steps
   double beta = 0;
   long solutions = 0;  ///< equilibria solved
+  bool interrupted = false;
 };
 
 /// `best` is the estimate with its covariance; unknowns of no variance (on a bound) stay there.

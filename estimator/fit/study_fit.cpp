@@ -14,6 +14,7 @@
 #include "estimator/fit/identifiability.hpp"
 #include "estimator/fit/sought.hpp"
 #include "estimator/fit/uncertainty.hpp"
+#include "estimator/fit/usable_points.hpp"
 #include "protocol/contract/input_error.hpp"
 
 namespace diastole {
@@ -39,12 +40,6 @@ const char* kind_of(const Specimen& specimen) {
 std::string data_words(const Measurement& measurement) {
   if (measurement.points.empty()) return "tags";
   return measurement.tags.empty() ? "points" : "tags and points";
-}
-
-bool has_loaded_point(const Measurement& measurement) {
-  const auto loaded = [](const auto& row) { return row.frame > 0; };
-  return std::any_of(measurement.tags.begin(), measurement.tags.end(), loaded) ||
-         std::any_of(measurement.points.begin(), measurement.points.end(), loaded);
 }
 
 double mean_of_values(const Eigen::VectorXd& q, size_t first, size_t count) {
@@ -118,6 +113,7 @@ void record_parameters(FitRecord& record, const Study& study, const FitOutcome& 
   for (const EstimatedFrame& frame : fit.frames) {
     if (frame.se_kPa > 0) record.correlation.names.push_back(fmt::format("pressure_kPa[{}]", frame.number));
   }
+  if (fit.pressure_offset) record.correlation.names.emplace_back("pressure_offset_kPa");
   const Eigen::MatrixXd matrix = correlation(fit.covariance);
   for (Eigen::Index row = 0; row < matrix.rows(); ++row) {
     const Eigen::VectorXd values = matrix.row(row);
@@ -127,9 +123,10 @@ void record_parameters(FitRecord& record, const Study& study, const FitOutcome& 
   if (const auto& offset = fit.pressure_offset) {
     record.pressure_offset_kPa = {offset->value_kPa, offset->se_kPa};
     record.remarks.push_back(fmt::format(
-        "The pressures read {:+.4f} ± {:.4f} kPa too high, as far as these data tell; the parameters' errors "
-        "hold this.",
-        offset->value_kPa, offset->se_kPa));
+        "The pressures differ from the true ones by {:+.4f} ± {:.4f} kPa, as far as these data tell{}; the "
+        "parameters' errors hold this.",
+        offset->value_kPa, offset->se_kPa,
+        std::abs(offset->value_kPa) < 2 * offset->se_kPa ? ": consistent with none" : ""));
   }
   for (size_t i = 0; i < record.parameters.size(); ++i)
     record_shape(record.parameters[i], fit, places[i]);
@@ -381,11 +378,7 @@ FitRecord refused_fit(const Study& study, const Measurement& measurement, std::v
 }
 
 FitRecord fit_study(const Study& study, const Measurement& measurement, const StudyFitOptions& options) {
-  if (!has_loaded_point(measurement)) {
-    throw InputError({study.file.string(), "table [data]",
-                      "every measured point is of frame 0, the undeformed state",
-                      "Give points of loaded frames: only they tell about stiffness."});
-  }
+  require_loaded_points(study, measurement);
   const auto* annulus = std::get_if<AnnulusSpecimen>(&study.specimen);
   ElasticModel model = make_model(study);
   require_cavity(study, model);
@@ -397,6 +390,7 @@ FitRecord fit_study(const Study& study, const Measurement& measurement, const St
   if (options.start) take_start(sought, *options.start, study, elements);
   ElasticMotion motion(std::move(model), sought.groups);
   FitOptions fit_options;
+  fit_options.file = study.file.string();
   fit_options.locator = locator_for(study.specimen);
   fit_options.smooth = sought.smooth;
   fit_options.robustness = options.paper_mode ? Robustness::never : options.robustness;

@@ -1,6 +1,7 @@
 #include "estimator/montecarlo/cells_file.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <charconv>
@@ -10,15 +11,35 @@
 
 #include "estimator/io/whole_file.hpp"
 #include "protocol/contract/input_error.hpp"
+#include "protocol/wire/crc32.hpp"
 
 namespace diastole {
 namespace {
 
 constexpr size_t fixed_columns = 6;
 
+/// A number that changes with the study's file, with any file of its data, and with what the command line said instead.
+std::uint32_t fingerprint(const Study& study) {
+  std::string content =
+      fmt::format("mesh {} refine {}", fmt::join(mesh_of(study.specimen), ","), fmt::join(study.refine, ","));
+  for (const StudyParameter& parameter : study.law.parameters) {
+    content += fmt::format(" {} {:d} {}", parameter.name, static_cast<int>(parameter.smoothness.kind),
+                           parameter.smoothness.step);
+  }
+  for (const std::filesystem::path& file : inputs_of(study)) {
+    content += '\n';
+    if (std::filesystem::is_regular_file(file)) content += read_whole_file(file);
+  }
+  wire::Crc32 crc;
+  for (const char c : content)
+    crc.add(static_cast<std::uint8_t>(c));
+  return crc.value();
+}
+
 std::string heading_of(const Study& study, const MonteCarloPlan& plan) {
-  std::string first = fmt::format("{}{} seed={} exact_pressures={:d}", cells_file_mark,
-                                  study.file.filename().string(), plan.seed, plan.exact_pressures);
+  std::string first =
+      fmt::format("{}{}#{:08x} seed={} exact_pressures={:d}", cells_file_mark, study.file.filename().string(),
+                  fingerprint(study), plan.seed, plan.exact_pressures);
   std::string second = "noise_mm,frames,repeat,converged,iterations,seconds";
   for (const StudyParameter& parameter : study.law.parameters) {
     first += fmt::format(" {}={:.10g}", parameter.name, parameter.start);
@@ -121,6 +142,7 @@ SavedTable saved_table(const std::string& text, const std::string& file) {
   std::istringstream words(text.substr(cells_file_mark.size(), first_end - cells_file_mark.size()));
   std::string seed, exact;
   words >> saved.study >> seed >> exact;
+  saved.study.erase(std::min(saved.study.find('#'), saved.study.size()));  // without its fingerprint
   saved.exact_pressures = exact.ends_with("=1");
   try {
     for (std::string word; words >> word;)
@@ -148,9 +170,10 @@ CellsFile::CellsFile(const std::filesystem::path& path, const Study& study, cons
   const std::string heading = heading_of(study, plan);
   std::string kept = heading;
   if (std::filesystem::exists(path)) {
-    const std::string text = read_whole_file(path);
+    std::string text = read_whole_file(path);
+    if (text.empty()) text = heading;
     if (!text.starts_with(heading)) {
-      throw InputError({path.string(), "line 1", "belongs to another study, seed or truth",
+      throw InputError({path.string(), "line 1", "belongs to another study, mesh, data, seed or truth",
                         "Choose another file, or remove this one to begin anew."});
     }
     results_ = read_rows(text, heading.size(), parameters_, path.string());

@@ -36,7 +36,7 @@ SavedTable saved_table(const std::string& text, const std::string& file);
 
 class CellsFile {
  public:
-  /// Opens or begins the file. Throws InputError if it belongs to another study, seed or truth, or holds a row that
+  /// Opens or begins the file. Throws InputError if it belongs to another study (its file, mesh or data), seed or truth, or holds a row that
   /// is none; a last row that was cut off in its middle is dropped.
   CellsFile(const std::filesystem::path& path, const Study& study, const MonteCarloPlan& plan);
 

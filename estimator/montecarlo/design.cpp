@@ -9,12 +9,14 @@
 #include "estimator/fit/elastic_motion.hpp"
 #include "estimator/fit/sought.hpp"
 #include "estimator/fit/study_fit.hpp"
+#include "estimator/fit/usable_points.hpp"
 #include "estimator/montecarlo/synthetic_data.hpp"
 #include "protocol/contract/input_error.hpp"
 
 namespace diastole {
 namespace {
 
+constexpr double most_se_percent = 1e4;  // a hundred times its value: nothing is known about a parameter
 constexpr double new_frames[] = {0.25, 0.5, 0.75, 1.0, 1.25, 1.5};  // of the highest pressure so far
 
 /// What one frame tells, its pressure not yet eliminated.
@@ -111,6 +113,7 @@ class Explorer {
       throw InputError({study_.file.string(), "", fmt::format("cannot be solved: {}", problem.failure()),
                         "Give other values with --set."});
     }
+    require_half_usable(point_share(problem), study_.file.string());
     const Eigen::MatrixXd jacobian = problem.jacobian(q);
     std::vector<FrameInformation> frames;
     Eigen::Index row = 0;
@@ -147,9 +150,18 @@ double log_determinant(const Eigen::MatrixXd& information) {
   return information.ldlt().vectorD().array().abs().max(1e-300).log().sum();
 }
 
+void require_known(const DesignStudy& design, const std::string& file) {
+  for (size_t i = 0; i < design.parameters.size(); ++i) {
+    if (design.se_percent[i] < most_se_percent) continue;
+    throw InputError({file, "table [data]", fmt::format("says nothing about {}", design.parameters[i]),
+                      "Give frames with a load at which the body moves, or hold the parameter."});
+  }
+}
+
 }  // namespace
 
 DesignStudy explore_design(const Study& study, const Measurement& measurement) {
+  require_loaded_points(study, measurement);
   Explorer explorer(study, measurement);
   const std::vector<FrameInformation> frames = explorer.present();
   const Eigen::MatrixXd now = total(frames);
@@ -159,6 +171,7 @@ DesignStudy explore_design(const Study& study, const Measurement& measurement) {
     result.values.push_back(parameter.start);
   }
   result.se_percent = explorer.se_percent(now);
+  require_known(result, study.file.string());
   const auto add = [&](std::string change, const Eigen::MatrixXd& information) {
     result.options.push_back({std::move(change), explorer.se_percent(information),
                               std::exp(0.5 * (log_determinant(now) - log_determinant(information)))});

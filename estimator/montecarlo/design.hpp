@@ -29,7 +29,8 @@ struct DesignStudy {
   std::vector<DesignOption> options;  ///< the one that shrinks the region most first
 };
 
-/// At the study's start values. Throws InputError without equilibrium there.
+/// At the study's start values. Throws InputError without equilibrium there, without loaded points on the specimen, and for data that
+/// say nothing about a parameter.
 DesignStudy explore_design(const Study& study, const Measurement& measurement);
 
 }  // namespace diastole

@@ -10,6 +10,7 @@
 #include "estimator/fit/sought.hpp"
 #include "estimator/fit/study_fit.hpp"
 #include "estimator/fit/uncertainty.hpp"
+#include "estimator/fit/usable_points.hpp"
 #include "estimator/montecarlo/synthetic_data.hpp"
 #include "protocol/contract/input_error.hpp"
 
@@ -91,6 +92,7 @@ struct CellFitter::Impl {
 };
 
 CellFitter::CellFitter(const Study& study, const Measurement& design, const MonteCarloPlan& plan) {
+  require_loaded_points(study, design);
   for (const int frames : plan.frames)
     (void)spread_frames(design, frames);
   ElasticModel model = make_model(study);
@@ -100,7 +102,9 @@ CellFitter::CellFitter(const Study& study, const Measurement& design, const Mont
   const LocatorOptions locator = locator_for(study.specimen);
   Measurement exact =
       exact_measurement(motion.mesh(), design, true_motions(study, motion, sought, design), locator);
+  require_half_usable({loaded_points(exact), loaded_points(design)}, study.file.string());
   FitOptions options;
+  options.file = study.file.string();
   options.locator = locator;
   options.smooth = sought.smooth;
   options.robustness = Robustness::never;

@@ -24,5 +24,21 @@ TEST(FitInterruption, CtrlCLeavesAWholeCheckpointAndSaysHowToGoOn) {
   EXPECT_NEAR(resumed.json().at("parameters").at("C1_kPa").at("value").get<double>(), 8.57, 0.02);
 }
 
+TEST(FitInterruption, ACheckpointOfAnotherFitIsNotTakenUp) {
+  const flow::Workplace place;
+  const std::string study = DIASTOLE_SOURCE_DIR "/examples/phantom-a-points.study.toml";
+  const std::vector<std::string> coarse = {"diastole",     "fit",    study,          "--mesh", "4,2,1",
+                                           "--checkpoint", "k.json", "--iterations", "1"};
+  (void)flow::run(place, coarse);
+  const flow::Ended ended =
+      flow::run(place, {"diastole", "fit", study, "--mesh", "3,2,1", "--checkpoint", "k.json", "--resume"});
+  EXPECT_EQ(ended.exit_code, 2) << ended.err;
+  EXPECT_THAT(ended.err, testing::AllOf(testing::HasSubstr("another fit"), testing::HasSubstr("4x2x1")));
+  const flow::Ended same =
+      flow::run(place, {"diastole", "fit", study, "--checkpoint", "k.json", "-o", "k.json"});
+  EXPECT_EQ(same.exit_code, 2) << same.err;
+  EXPECT_THAT(same.err, testing::HasSubstr("a file of its own"));
+}
+
 }  // namespace
 }  // namespace diastole

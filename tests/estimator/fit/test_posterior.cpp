@@ -134,5 +134,30 @@ TEST_F(CoarseFit, AnInterruptionKeepsTheBestSoFar) {
   EXPECT_GT(outcome.values[0].value, 2.5);
 }
 
+TEST_F(CoarseFit, AnInterruptedPosteriorLeavesTheFit) {
+  bool asked_to_end = false;
+  FitOptions options;
+  options.posterior.emplace();
+  options.posterior->on_step = [&](int done, int) { asked_to_end = done == 3; };
+  options.optimiser.interrupted = [&] { return asked_to_end; };
+  const FitOutcome outcome = fit(options, {6.0, 1.0, 15.0}, 0.3, 40);
+  EXPECT_TRUE(outcome.converged) << outcome.reason;
+  EXPECT_FALSE(outcome.posterior);
+  EXPECT_EQ(outcome.interrupted, "posterior");
+  ASSERT_EQ(outcome.values.size(), 1U);
+  EXPECT_GT(outcome.values[0].se, 0);
+}
+
+TEST_F(CoarseFit, ThePapersSearchCanBeInterrupted) {
+  FitOptions paper;
+  paper.paper_mode = true;
+  paper.robustness = Robustness::never;
+  int asked = 0;
+  paper.optimiser.interrupted = [&] { return ++asked > 1; };
+  const FitOutcome outcome = fit(paper, {2.0, 1.0, 15.0}, 0.3, 40, 0);
+  EXPECT_FALSE(outcome.converged);
+  EXPECT_THAT(outcome.reason, testing::HasSubstr("Stopped on request"));
+}
+
 }  // namespace
 }  // namespace diastole

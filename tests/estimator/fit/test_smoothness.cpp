@@ -80,9 +80,11 @@ class RegionalGel : public testing::Test {
       gel.set_element_parameter(0, e, truth(e, amplitude));
     return test::synthetic(gel, {.tags_a_frame = 250, .sigma_mm = 0.4, .seed = seed});
   }
-  static FitOutcome fit(const Measurement& measurement, std::optional<SmoothRegion> smooth) {
+  static FitOutcome fit(const Measurement& measurement, std::optional<SmoothRegion> smooth,
+                        Robustness robustness = Robustness::if_needed) {
     ElasticMotion motion(test::coarse_gel(6), each_element(0, elements));
     FitOptions options;
+    options.robustness = robustness;
     if (smooth) options.smooth = {*smooth};
     return fit_motion(motion, std::vector<SoughtValue>(elements, {6.0, 1.0, 20.0}), measurement, options);
   }
@@ -117,6 +119,24 @@ TEST_F(RegionalGel, DifferencesThatTheDataShowAreKept) {
   EXPECT_GT(outcome.smoothness[0].effective_values, 3);
   EXPECT_LT(outcome.unknowns, 10);
   EXPECT_LT(rms(outcome, 0.3), 0.08);
+}
+
+TEST_F(RegionalGel, ARobustLossChangesItsErrorsAsItDoesWithoutSmoothing) {
+  const Measurement measurement = measured(0.3, 1);
+  const auto mean_ratio = [&](std::optional<SmoothRegion> smooth) {
+    const FitOutcome normal = fit(measurement, smooth, Robustness::never),
+                     robust = fit(measurement, smooth, Robustness::always);
+    EXPECT_TRUE(normal.converged && robust.converged);
+    double sum = 0;
+    for (size_t e = 0; e < elements; ++e)
+      sum += robust.values[e].se / normal.values[e].se;
+    return sum / static_cast<double>(elements);
+  };
+  const double free = mean_ratio({}), given = mean_ratio(SmoothRegion{0, 0.2}),
+               by_evidence = mean_ratio(SmoothRegion{0, {}});
+  EXPECT_GT(free, 0.95);
+  EXPECT_NEAR(given, free, 0.05);
+  EXPECT_NEAR(by_evidence, free, 0.08);
 }
 
 TEST_F(RegionalGel, AGivenStepIsKept) {

@@ -162,6 +162,26 @@ TEST_F(CoarseStudy, AStartOnABoundIsLeftWhenTheCostFallsInside) {
   EXPECT_EQ(from_bound.parameters[0].at_bound, "");
 }
 
+TEST_F(CoarseStudy, PointsThatAreNotOnTheSpecimenAreRefused) {
+  const Measurement sound = measurement_;
+  for (const double per_mm : {0.1, 0.001, 1 / 25.4}) {
+    measurement_ = sound;
+    for (TagPoint& tag : measurement_.tags) {
+      tag.plane_mm *= per_mm;
+      for (double& x_mm : tag.x_mm)
+        x_mm *= per_mm;
+    }
+    EXPECT_THAT(message_of([&] { (void)fit(); }), AllOf(HasSubstr("gel.study.toml"), HasSubstr("only 0 of"),
+                                                        HasSubstr("coordinates are in mm")))
+        << per_mm;
+  }
+  measurement_ = sound;
+  for (size_t i = 0; i < measurement_.tags.size(); ++i) {
+    if (i % 5 < 3) measurement_.tags[i].x_mm = {90, 0, 0};
+  }
+  EXPECT_THAT(message_of([&] { (void)fit(); }), HasSubstr("lie on the specimen"));
+}
+
 TEST_F(CoarseStudy, WhatCannotBeFittedIsRefused) {
   Study other = study_;
   other.law.name = "neo-hokean";

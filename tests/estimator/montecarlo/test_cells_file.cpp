@@ -60,10 +60,33 @@ TEST_F(Cells, AnotherTruthSeedOrStudyIsRefused) {
   { CellsFile(path(), study_, plan_).append(good_); }
   study_.law.parameters[0].start = 9;
   EXPECT_THAT(message_of([&] { CellsFile(path(), study_, plan_); }),
-              AllOf(HasSubstr("gel.cells.csv"), HasSubstr("another study, seed or truth")));
+              AllOf(HasSubstr("gel.cells.csv"), HasSubstr("another study, mesh, data, seed or truth")));
   study_.law.parameters[0].start = 8.71;
   plan_.seed = 2;
   EXPECT_THAT(message_of([&] { CellsFile(path(), study_, plan_); }), HasSubstr("another study"));
+}
+
+TEST_F(Cells, AnotherMeshOrOtherDataAreRefusedToo) {
+  const auto refused = [&] { return message_of([&] { CellsFile(path(), study_, plan_); }); };
+  study_.specimen = AnnulusSpecimen{22.5, 50, 85, {4, 2, 1}, "fixed"};
+  study_.data.tags = folder_.path() / "gel.tags.csv";
+  write_whole_file(*study_.data.tags, "one\n");
+  { CellsFile(path(), study_, plan_).append(good_); }
+  EXPECT_EQ(refused(), "(no error)");
+  std::get<AnnulusSpecimen>(study_.specimen).mesh = {3, 2, 1};
+  EXPECT_THAT(refused(), HasSubstr("another study, mesh"));
+  std::get<AnnulusSpecimen>(study_.specimen).mesh = {4, 2, 1};
+  study_.law.parameters[0].smoothness = {Smoothness::Kind::given, 0.1};
+  EXPECT_THAT(refused(), HasSubstr("another study, mesh"));
+  study_.law.parameters[0].smoothness = {};
+  write_whole_file(*study_.data.tags, "two\n");
+  EXPECT_THAT(refused(), HasSubstr("another study, mesh"));
+}
+
+TEST_F(Cells, AnEmptyFileIsBegun) {
+  write_whole_file(path(), "");
+  { CellsFile(path(), study_, plan_).append(good_); }
+  EXPECT_EQ(CellsFile(path(), study_, plan_).results().size(), 1U);
 }
 
 TEST_F(Cells, ARowThatIsNoneIsToldWithItsLine) {

@@ -4,6 +4,8 @@
 
 #include <cmath>
 
+#include "tests/estimator/io/scratch_file.hpp"
+
 namespace diastole {
 namespace {
 
@@ -62,6 +64,25 @@ TEST_F(GelDesign, TheBestChangeStandsFirst) {
   for (size_t i = 1; i < design.options.size(); ++i)
     EXPECT_LE(design.options[i - 1].volume, design.options[i].volume);
   EXPECT_THAT(design.options.back().change, testing::HasSubstr("without frame 2"));
+}
+
+TEST_F(GelDesign, DataThatSayNothingAreRefused) {
+  const auto message = [&] { return test::message_of([&] { (void)explore_design(study_, measurement_); }); };
+  const Measurement sound = measurement_;
+  for (ObservedPoint& point : measurement_.points)
+    point.frame = 0;
+  EXPECT_THAT(message(), testing::HasSubstr("every measured point is of frame 0"));
+  measurement_ = sound;
+  for (ObservedPoint& point : measurement_.points) {
+    for (double& X_mm : point.X_mm)
+      X_mm /= 10;
+  }
+  EXPECT_THAT(message(),
+              testing::AllOf(testing::HasSubstr("only 0 of 80"), testing::HasSubstr("gel.study.toml")));
+  measurement_ = sound;
+  for (Frame& frame : measurement_.frames)
+    frame.pressure_kPa = 0;
+  EXPECT_THAT(message(), testing::HasSubstr("says nothing about C1_kPa"));
 }
 
 }  // namespace

@@ -119,5 +119,18 @@ TEST_F(CoarseGel, FailedRefitsAreCounted) {
   EXPECT_NEAR(entry.parameters[0].sd, std::sqrt(2.0), 1e-12);
 }
 
+TEST_F(CoarseGel, PointsThatAreNotOnTheSpecimenAreRefusedBeforeAnyRefit) {
+  for (ObservedPoint& point : design_.points) {
+    for (double& X_mm : point.X_mm)
+      X_mm /= 10;
+  }
+  for (TagPoint& tag : design_.tags)
+    tag.plane_mm /= 10;
+  design_.tags.resize(10);
+  EXPECT_THAT(
+      test::message_of([&] { CellFitter(study_, design_, {}); }),
+      testing::AllOf(testing::HasSubstr("gel.study.toml"), testing::HasSubstr("lie on the specimen")));
+}
+
 }  // namespace
 }  // namespace diastole

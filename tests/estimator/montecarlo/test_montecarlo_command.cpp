@@ -84,5 +84,15 @@ TEST(MonteCarloCommand, GivesTheSameTableOverTwoMpiRanks) {
   EXPECT_EQ(rows_of(place / "cells.csv"), rows);
 }
 
+TEST(MonteCarloCommand, RefusesANoiseThatIsNoNumber) {
+  const flow::Workplace place;
+  const flow::Ended ended = flow::run_line(
+      place,
+      fmt::format("diastole montecarlo {}/examples/phantom-a-points.study.toml --set C1_kPa=8.7 --noise nan",
+                  DIASTOLE_SOURCE_DIR));
+  EXPECT_EQ(ended.exit_code, 2);
+  EXPECT_THAT(ended.err, HasSubstr("--noise"));
+}
+
 }  // namespace
 }  // namespace diastole
