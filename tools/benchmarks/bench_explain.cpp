@@ -91,7 +91,7 @@ int main(int argc, char** argv) {
     explain::Explanation found =
         explain::explain_rig(study, {.threads = 2, .propose = false, .progress = {}});
     report(name, label, found);
-    found.traces.clear();
+    if (std::getenv("DIASTOLE_KEEP_TRACES") == nullptr) found.traces.clear();
     std::ofstream(kept / (name + ".json")) << explain::to_json(found);
   }
   return 0;
