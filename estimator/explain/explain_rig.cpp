@@ -36,6 +36,9 @@ std::string summary_of(const Explanation& found) {
       for (const auto& other : found.ambiguous_with)
         others += fmt::format("{}{}", others.empty() ? "" : ", ",
                               other.empty() ? "nothing at all" : fmt::format("{}", fmt::join(other, " + ")));
+      if (found.effects.empty())
+        return fmt::format("Too weak to name and too strong to be chance: perhaps {}, perhaps nothing.",
+                           others);
       return fmt::format("The model lacks something that these data cannot tell apart: {}, or {}.", set,
                          others);
     }
@@ -185,7 +188,8 @@ Explanation explain_rig(const Study& study, const ExplainOptions& options) {
   const Work work = searched(session, family, study, options);
   const rig::RigProblem& problem = work.problem;
   const rig::RigFit& base = problem.base();
-  const rig::RigFit& best = work.best().fit;
+  rig::RigFit best = work.best().fit;
+  best.jacobian = problem.columns(best.ingredients, best.values);  // at the very optimum
 
   tell("judging");
   const auto cells = residual_cells(session, problem.blocks(), best.residuals,

@@ -32,17 +32,14 @@ std::vector<Fold> cycles_dealt(const rig::Session& session, const rig::RigProble
   return folds;
 }
 
-Eigen::MatrixXd normal_of(const Eigen::MatrixXd& jacobian, const std::vector<Eigen::Index>& rows,
-                          const Eigen::VectorXd& weights) {
+Eigen::MatrixXd normal_of(const Eigen::MatrixXd& jacobian, const std::vector<Eigen::Index>& rows) {
   Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(jacobian.cols(), jacobian.cols());
   for (const Eigen::Index row : rows)
-    normal.selfadjointView<Eigen::Lower>().rankUpdate(jacobian.row(row).transpose(), weights[row]);
+    normal.selfadjointView<Eigen::Lower>().rankUpdate(jacobian.row(row).transpose());
   return normal.selfadjointView<Eigen::Lower>();
 }
 
-Eigen::MatrixXd full_normal(const rig::RigFit& fit, const Eigen::VectorXd& weights) {
-  return fit.jacobian.transpose() * weights.asDiagonal() * fit.jacobian;
-}
+Eigen::MatrixXd full_normal(const rig::RigFit& fit) { return fit.jacobian.transpose() * fit.jacobian; }
 
 /// Whether some unknown that the data determine is no longer determined without the rows.
 bool undetermined(const Eigen::MatrixXd& normal, const Eigen::MatrixXd& left_out) {
@@ -57,12 +54,12 @@ bool undetermined(const Eigen::MatrixXd& normal, const Eigen::MatrixXd& left_out
 }  // namespace
 
 std::vector<Fold> folds_for(const rig::Session& session, const rig::RigProblem& problem,
-                            const rig::RigFit& fit, const Eigen::VectorXd& weights) {
-  const Eigen::MatrixXd normal = full_normal(fit, weights);
+                            const rig::RigFit& fit) {
+  const Eigen::MatrixXd normal = full_normal(fit);
   std::vector<Fold> folds;
   for (size_t run = 0; run < session.runs.size(); ++run) {
     Fold fold = whole_run(session, problem, run);
-    if (session.runs.size() > 1 && !undetermined(normal, normal_of(fit.jacobian, fold.rows, weights))) {
+    if (session.runs.size() > 1 && !undetermined(normal, normal_of(fit.jacobian, fold.rows))) {
       folds.push_back(std::move(fold));
     } else {
       for (Fold& dealt : cycles_dealt(session, problem, run))
@@ -74,13 +71,13 @@ std::vector<Fold> folds_for(const rig::Session& session, const rig::RigProblem& 
 
 double predicted_square(const std::vector<Fold>& folds, const rig::RigFit& fit,
                         const Eigen::VectorXd& weights) {
-  const Eigen::MatrixXd normal = full_normal(fit, weights);
+  const Eigen::MatrixXd normal = full_normal(fit);
   double square = 0.0;
   for (const Fold& fold : folds) {
     Eigen::VectorXd gradient = Eigen::VectorXd::Zero(normal.rows());
     for (const Eigen::Index row : fold.rows)
-      gradient += weights[row] * fit.residuals[row] * fit.jacobian.row(row).transpose();
-    const Eigen::MatrixXd rest = normal - normal_of(fit.jacobian, fold.rows, weights);
+      gradient += fit.residuals[row] * fit.jacobian.row(row).transpose();
+    const Eigen::MatrixXd rest = normal - normal_of(fit.jacobian, fold.rows);
     const Eigen::VectorXd step = rest.completeOrthogonalDecomposition().solve(gradient);
     for (const Eigen::Index row : fold.rows) {
       const double predicted = fit.residuals[row] + fit.jacobian.row(row).dot(step);
@@ -120,7 +117,7 @@ double unrepeatable(const rig::Session& session, const rig::RigProblem& problem,
 Gap held_out_gap(const rig::Session& session, const rig::RigProblem& problem, const rig::RigFit& fit,
                  const Eigen::VectorXd& weights) {
   Gap gap;
-  const std::vector<Fold> folds = folds_for(session, problem, fit, weights);
+  const std::vector<Fold> folds = folds_for(session, problem, fit);
   double count = 0.0;
   for (const Fold& fold : folds) {
     for (const Eigen::Index row : fold.rows)

@@ -2,7 +2,7 @@
 // How well a fitted model predicts what it was not fitted to.
 //
 // Runs are left out one after another. At a least-squares optimum the fit without the rows f is, to second order, one
-// step d = (A - A_f)^-1 g_f away (A = J^T W J, g_f = J_f^T W r_f), so that no simulation is needed; its residuals at
+// step d = (A - A_f)^-1 g_f away (A = J^T J, g_f = J_f^T r_f), so that no simulation is needed; its residuals at
 // the rows are r_f + J_f d. A run that alone determines an unknown cannot be predicted (lost steps happen once):
 // it is left out in thirds of its cycles instead, and so is the only run of a session.
 
@@ -24,7 +24,7 @@ struct Fold {
 
 /// One a run, or three a run whose rows alone determine an unknown of `fit`.
 std::vector<Fold> folds_for(const rig::Session& session, const rig::RigProblem& problem,
-                            const rig::RigFit& fit, const Eigen::VectorXd& weights);
+                            const rig::RigFit& fit);
 
 /// Squared weighted residuals at the folds' rows, each predicted without its fold.
 double predicted_square(const std::vector<Fold>& folds, const rig::RigFit& fit,

@@ -1,5 +1,7 @@
 #include "estimator/explain/tolerance.hpp"
 
+#include <deque>
+
 namespace diastole::explain {
 namespace {
 
@@ -14,6 +16,29 @@ double relative_variance(const rig::RigProblem& problem, const std::string& chan
   return ratio * ratio;
 }
 
+/// Adds `part` of the largest squared change within some samples, which lasts as long as an error rings.
+void add_largest_around(const Eigen::VectorXd& change, const rig::ResidualBlock& block, double part,
+                        Eigen::VectorXd& variance) {
+  constexpr size_t reach = 15;  // samples at 300 Hz
+  const auto square = [&](size_t k) {
+    const double value = change[static_cast<Eigen::Index>(block.first + k)];
+    return value * value;
+  };
+  std::deque<size_t> falling;  // places of squares that may still be the largest
+  for (size_t next = 0; next < block.count + reach; ++next) {
+    if (next < block.count) {
+      while (!falling.empty() && square(falling.back()) <= square(next))
+        falling.pop_back();
+      falling.push_back(next);
+    }
+    if (next < reach) continue;
+    const size_t k = next - reach;
+    while (falling.front() + reach < k)
+      falling.pop_front();
+    variance[static_cast<Eigen::Index>(block.first + k)] += part * square(falling.front());
+  }
+}
+
 }  // namespace
 
 Eigen::VectorXd model_variance(const rig::RigProblem& problem, const Eigen::VectorXd& change,
@@ -25,8 +50,12 @@ Eigen::VectorXd model_variance(const rig::RigProblem& problem, const Eigen::Vect
     variance.conservativeResize(first + count);
     variance.segment(first, count).setConstant(relative_variance(problem, block.channel, floor));
   }
-  if (change.size() == variance.size())
-    variance += floor.part_of_change * floor.part_of_change * change.cwiseAbs2();
+  if (change.size() != variance.size()) return variance;
+  for (const rig::ResidualBlock& block : problem.blocks()) {
+    const double part = block.channel == name_of(rig::Channel::pump) ? floor.part_of_change_pump
+                                                                     : floor.part_of_change_cavity;
+    add_largest_around(change, block, part * part, variance);
+  }
   return variance;
 }
 

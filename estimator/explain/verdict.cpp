@@ -2,7 +2,28 @@
 
 #include <algorithm>
 
+#include "estimator/effects/effect.hpp"
+#include "estimator/explain/chi_square.hpp"
+
 namespace diastole::explain {
+namespace {
+
+constexpr double hint_probability = 1e-4;  // by chance, for each effect
+
+/// Effects that alone gain nearly as much as the best, if that is more than chance suggests.
+std::vector<std::vector<std::string>> hinted(const std::vector<Lead>& leads) {
+  std::vector<std::vector<std::string>> sets;
+  double best = 0.0;
+  for (const Lead& lead : leads)
+    if (lead.gain > chi_square_exceeded(hint_probability, static_cast<double>(lead.parameters)))
+      best = std::max(best, lead.gain);
+  for (const Lead& lead : leads)
+    if (best > 0.0 && lead.gain > best - as_good)
+      sets.push_back({std::string(lead.ingredient.effect->text().id)});
+  return sets;
+}
+
+}  // namespace
 
 bool is_structured(const std::vector<ResidualCell>& left, size_t cells) {
   return std::any_of(left.begin(), left.end(), [&](const ResidualCell& cell) {
@@ -22,7 +43,8 @@ Judgement judge(const SearchResult& search, std::vector<ResidualCell> left) {
   if (!judgement.left.empty()) {
     judgement.verdict = Verdict::unexplained;
   } else if (best.fit.ingredients.empty()) {
-    judgement.verdict = Verdict::none;
+    judgement.ambiguous_with = hinted(search.leads);
+    judgement.verdict = judgement.ambiguous_with.empty() ? Verdict::none : Verdict::ambiguous;
   } else {
     judgement.verdict = judgement.ambiguous_with.empty() ? Verdict::named : Verdict::ambiguous;
   }

@@ -16,7 +16,8 @@ struct Judgement {
   std::vector<ResidualCell> left;  ///< structure that remains after the chosen set
 };
 
-/// `left`: cells of the chosen set's residuals that stand out (residual_cells.hpp).
+/// Evidence that is too weak to name anything and too strong to say "none" leaves all effects that could be meant beside
+/// nothing at all: ambiguous, with no effect. `left`: cells of the chosen set's residuals that stand out (residual_cells.hpp).
 Judgement judge(const SearchResult& search, std::vector<ResidualCell> left);
 
 /// Whether what remains is more than a known model leaves: one cell beyond chance so far that the number of cells

@@ -158,31 +158,70 @@ ChannelNoise channel_noise(const Session& session, Channel channel) {
   return {std::sqrt(rough.at(0)), std::sqrt(rough.at(0)), {}};
 }
 
-/// From successive cycles' gains: twice the variance, less what noise makes of it.
+/// The pressure at which a cycle starts: its stroke's least volume.
+double start_of(const std::vector<double>& values, const CyclePair& pair) {
+  constexpr size_t samples = 5;
+  double sum = 0.0;
+  double count = 0.0;
+  for (const CycleRows& rows : {pair.before, pair.after}) {
+    for (size_t k = rows.first; k < std::min(rows.first + samples, rows.last); ++k) {
+      if (!std::isfinite(values[k])) continue;
+      sum += values[k];
+      count += 1.0;
+    }
+  }
+  return count > 0.0 ? sum / count : 0.0;
+}
+
+/// Relative change from a cycle to the next, squared, and the part of it that noise makes.
+struct BeatChange {
+  double square = 0.0;
+  double noise = 0.0;
+};
+
+/// s in E[square] = 2 s^2 + noise by weighted squares, single outliers cut.
+double common_beat(const std::vector<BeatChange>& changes) {
+  constexpr double cut = 9.0;
+  constexpr size_t rounds = 30;
+  std::vector<double> sizes;
+  for (const BeatChange& change : changes)
+    sizes.push_back(std::sqrt(change.square));
+  double variance = 0.5 * std::pow(median(sizes) / 0.6745, 2);
+  for (size_t round = 0; round < rounds; ++round) {
+    double sum = 0.0;
+    double weight = 0.0;
+    for (const BeatChange& change : changes) {
+      const double expected = 2.0 * variance + change.noise;
+      sum += 0.5 * (std::min(change.square, cut * expected) - change.noise) / (expected * expected);
+      weight += 1.0 / (expected * expected);
+    }
+    variance = std::max(sum / weight, 1e-8);
+  }
+  return std::sqrt(variance);
+}
+
+/// From successive cycles' gains: twice the variance, and what noise makes of it.
 double beat_sd(const Session& session, const NoiseModel& noise) {
-  std::vector<double> changes;
-  double noise_part = 0.0;
+  std::vector<BeatChange> changes;
   std::vector<double> rest;
+  const ChannelNoise& channel = noise.channels.at(Channel::cavity);
+  double correlation = 1.0;  // of a mean over many samples, to that of independent ones
+  for (const double a : channel.autoregression)
+    correlation -= a;
+  const double level = channel.innovation_kPa / std::max(correlation, 0.05);
   for (const SessionRun& run : session.runs) {
     const auto& values = run.pressure_kPa.at(Channel::cavity);
-    const double zero = zero_of(run, values);
     for (const CyclePair& pair : equal_pairs(run)) {
+      const double zero = start_of(values, pair);
       const double gain = relative_change(values, pair, zero, rest);
       double square = 0.0;
       for (size_t k = pair.before.first; k < pair.before.last; ++k)
         if (std::isfinite(values[k])) square += (values[k] - zero) * (values[k] - zero);
-      const ChannelNoise& channel = noise.channels.at(Channel::cavity);
-      double correlation = 1.0;  // of a mean over many samples, to that of independent ones
-      for (const double a : channel.autoregression)
-        correlation -= a;
-      const double level = channel.innovation_kPa / std::max(correlation, 0.05);
-      changes.push_back(std::abs(gain));
-      noise_part += 2.0 * level * level / square;
+      changes.push_back({gain * gain, 2.0 * level * level / square});
     }
   }
   if (changes.size() < 4) return 0.003;  // none repeat: the middle of what pumps do
-  const double sd = median(changes) / 0.6745;
-  return std::sqrt(std::max(0.5 * (sd * sd - noise_part / static_cast<double>(changes.size())), 1e-8));
+  return common_beat(changes);
 }
 
 }  // namespace

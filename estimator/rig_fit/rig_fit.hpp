@@ -133,8 +133,8 @@ class RigProblem {
                                                         const RigFit& before, size_t& simulations) const;
   void set_blocks();
   void set_beats();
-  /// Whitened change of each run's channels by the stroke of every second cycle, per relative change.
-  [[nodiscard]] std::vector<std::map<Channel, std::vector<double>>> beat_shapes(size_t parity) const;
+  /// Whitened change of each run's channels by the strokes of a group of cycles (beats.cpp), per relative change.
+  [[nodiscard]] std::vector<std::map<Channel, std::vector<double>>> beat_shapes(size_t group) const;
 
   const Session& session_;
   const SpecimenFamily& family_;
