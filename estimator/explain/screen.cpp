@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "estimator/rig_fit/moment_search.hpp"
 #include "estimator/rig_fit/search_scale.hpp"
 
 namespace diastole::explain {
@@ -49,6 +50,15 @@ double varied(const EffectParameter& parameter) {
   return rig::from_search(parameter.scale, at + 0.3 * ((std::abs(b - at) > std::abs(a - at) ? b : a) - at));
 }
 
+Lead lead_of(rig::FoundMoments found, const rig::RigFit& current, const Eigen::VectorXd& weights) {
+  Lead lead{std::move(found.ingredient), 0.0, 0.0, found.values.size(), {}};
+  lead.parameters += moment_parameters * lead.ingredient.occasions.size();
+  lead.gain = weights.dot(current.residuals.cwiseAbs2() - found.fit.residuals.cwiseAbs2());
+  lead.visibility = std::sqrt(std::max(lead.gain, 0.0));
+  lead.fit = std::move(found.fit);
+  return lead;
+}
+
 }  // namespace
 
 Eigen::MatrixXd basis_of(const Eigen::MatrixXd& columns) {
@@ -91,11 +101,15 @@ std::vector<Lead> screen(const rig::RigProblem& problem, const rig::SpecimenFami
   };
   std::vector<Lead> leads;
   for (const Effect* effect : all_effects()) {
-    if (contains(current.ingredients, effect) || !effect->fits(family) ||
-        effect->occasions() != Occasions::none)
+    if (contains(current.ingredients, effect) || !effect->fits(family)) continue;
+    if (effect->occasions() != Occasions::none) {
+      going_on();
+      if (auto found = rig::find_moments(problem, session, current, *effect))
+        leads.push_back(lead_of(std::move(*found), current, weights));
       continue;
+    }
     const auto parameters = effect->parameters();
-    Lead lead{{effect, {}}, 0.0, 0.0, parameters.size()};
+    Lead lead{{effect, {}}, 0.0, 0.0, parameters.size(), {}};
     for (const double size : trial_sizes(*effect)) {
       const std::vector<double> values = values_at(*effect, session.base, size);
       Eigen::MatrixXd columns(residuals.size(), 0);

@@ -8,10 +8,14 @@
 //
 //   gain = |Q^T r|^2,  Q an orthonormal basis of D with J projected out
 //
+// An effect that begins at a moment has its moments searched and is fitted at once (estimator/rig_fit/moment_search.hpp);
+// each moment counts as a parameter, and for the samples among which it was chosen.
+//
 // Finite sizes, because some effects show nothing near their neutral value (gas at the pump, a slow catheter).
 
 #include <Eigen/Dense>
 #include <functional>
+#include <optional>
 #include <vector>
 
 #include "estimator/rig_fit/rig_fit.hpp"
@@ -23,7 +27,11 @@ struct Lead {
   double gain = 0.0;        ///< of weighted squares; infinite gains do not exist: at most what is there
   double visibility = 0.0;  ///< of the effect at its typical size, in sigmas, the nuisances refitted
   size_t parameters = 0;
+  std::optional<rig::RigFit> fit = {};  ///< already made, of an effect whose moments were searched
 };
+
+/// What choosing a moment among a session's samples is worth in parameters.
+inline constexpr size_t moment_parameters = 3;
 
 /// An orthonormal basis of the columns' span; columns that depend on others are left out.
 Eigen::MatrixXd basis_of(const Eigen::MatrixXd& columns);

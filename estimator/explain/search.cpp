@@ -47,7 +47,8 @@ class Search {
     return result_.sets.size() - 1;
   }
   /// The place of the set, fitted now if it was not before.
-  size_t fitted(const std::vector<rig::Ingredient>& ingredients, const rig::RigFit& before);
+  size_t fitted(const std::vector<rig::Ingredient>& ingredients, const rig::RigFit& before,
+                const std::optional<rig::RigFit>& made = {});
   /// chi-square with what its parameters cost.
   [[nodiscard]] double penalised(size_t set) const {
     const FittedSet& at = result_.sets[set];
@@ -57,7 +58,8 @@ class Search {
   [[nodiscard]] static double cost(const FittedSet& set) {
     double sum = 0.0;
     for (const rig::Ingredient& ingredient : set.fit.ingredients)
-      sum += admission(ingredient.effect->parameters().size());
+      sum +=
+          admission(ingredient.effect->parameters().size() + moment_parameters * ingredient.occasions.size());
     return sum;
   }
   /// Screening of the residuals of a set; done once.
@@ -77,10 +79,12 @@ class Search {
   std::map<size_t, std::vector<Lead>> leads_;
 };
 
-size_t Search::fitted(const std::vector<rig::Ingredient>& ingredients, const rig::RigFit& before) {
+size_t Search::fitted(const std::vector<rig::Ingredient>& ingredients, const rig::RigFit& before,
+                      const std::optional<rig::RigFit>& made) {
   const std::vector<std::string> ids = ids_of(ingredients);
   for (size_t k = 0; k < result_.sets.size(); ++k)
     if (result_.sets[k].ids() == ids) return k;
+  if (made) return add(*made);
   tell(fmt::format("fitting {}", fmt::join(ids, " + ")));
   return add(problem_.fit(ingredients, before));
 }
@@ -107,7 +111,7 @@ std::vector<size_t> Search::grow(size_t from) {
     if (lead.gain < admission(lead.parameters)) continue;
     std::vector<rig::Ingredient> ingredients = current.ingredients;
     ingredients.push_back(lead.ingredient);
-    grown.push_back(fitted(ingredients, current));
+    grown.push_back(fitted(ingredients, current, lead.fit));
   }
   std::sort(grown.begin(), grown.end(), [this](size_t a, size_t b) { return penalised(a) < penalised(b); });
   return grown;
@@ -130,7 +134,7 @@ void Search::compare_alike(size_t set) {
         continue;
       std::vector<rig::Ingredient> swapped = rest;
       swapped.push_back(lead.ingredient);
-      fitted(swapped, result_.sets[without].fit);
+      fitted(swapped, result_.sets[without].fit, lead.fit);
     }
   }
 }

@@ -17,6 +17,7 @@
 
 #include "estimator/explain/explain_rig.hpp"
 #include "estimator/explain/explanation_json.hpp"
+#include "estimator/explain/score.hpp"
 
 namespace {
 
@@ -79,6 +80,7 @@ int main(int argc, char** argv) {
   const nlohmann::json labels = nlohmann::json::parse(file);
   const std::vector<std::string> wanted(argv + std::min(argc, 2), argv + argc);
   const fs::path kept = fs::path(DIASTOLE_SOURCE_DIR) / "build/explained";
+  fs::remove_all(kept);  // what is scored is of this run
   fs::create_directories(kept);
   for (const auto& [name, label] : labels.items()) {
     const bool chosen =
@@ -91,8 +93,10 @@ int main(int argc, char** argv) {
     explain::Explanation found =
         explain::explain_rig(study, {.threads = 2, .propose = false, .progress = {}});
     report(name, label, found);
-    if (std::getenv("DIASTOLE_KEEP_TRACES") == nullptr) found.traces.clear();
+    found.traces.clear();
     std::ofstream(kept / (name + ".json")) << explain::to_json(found);
   }
-  return 0;
+  const explain::Score score = explain::score_folder(folder, kept);
+  fmt::print("\n{}", explain::told(score));
+  return score.passed() ? 0 : 1;
 }
