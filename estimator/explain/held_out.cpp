@@ -6,11 +6,12 @@
 namespace diastole::explain {
 namespace {
 
-constexpr size_t parts = 3;  // into which a run's cycles are dealt when it cannot be left out whole
+constexpr double linear_reach = 10.0;  // standard errors of a step that is taken for the fit
+constexpr size_t parts = 3;            // into which a run's cycles are dealt when it cannot be left out whole
 constexpr double determined_by = 0.999;  // of an unknown's information from one run: no other tells about it
 
 Fold whole_run(const rig::Session& session, const rig::RigProblem& problem, size_t run) {
-  Fold fold{session.runs[run].drive.place.name + ".run.h5", run, {}};
+  Fold fold{session.runs[run].drive.place.name + ".run.h5", run, {}, {}};
   for (const rig::ResidualBlock& block : problem.blocks()) {
     if (block.run != run) continue;
     for (size_t k = 0; k < block.count; ++k)
@@ -20,7 +21,7 @@ Fold whole_run(const rig::Session& session, const rig::RigProblem& problem, size
 }
 
 std::vector<Fold> cycles_dealt(const rig::Session& session, const rig::RigProblem& problem, size_t run) {
-  std::vector<Fold> folds(parts, Fold{session.runs[run].drive.place.name + ".run.h5", run, {}});
+  std::vector<Fold> folds(parts, Fold{session.runs[run].drive.place.name + ".run.h5", run, {}, {}});
   const std::vector<rig::CycleRows> cycles = rig::cycles_of(session.runs[run]);
   for (const rig::ResidualBlock& block : problem.blocks()) {
     if (block.run != run || block.channel == "cavity_mL") continue;
@@ -60,6 +61,8 @@ std::vector<Fold> folds_for(const rig::Session& session, const rig::RigProblem& 
   for (size_t run = 0; run < session.runs.size(); ++run) {
     Fold fold = whole_run(session, problem, run);
     if (session.runs.size() > 1 && !undetermined(normal, normal_of(fit.jacobian, fold.rows))) {
+      fold.others.assign(session.runs.size(), true);
+      fold.others[run] = false;
       folds.push_back(std::move(fold));
     } else {
       for (Fold& dealt : cycles_dealt(session, problem, run))
@@ -69,8 +72,8 @@ std::vector<Fold> folds_for(const rig::Session& session, const rig::RigProblem& 
   return folds;
 }
 
-double predicted_square(const std::vector<Fold>& folds, const rig::RigFit& fit,
-                        const Eigen::VectorXd& weights) {
+double predicted_square(const rig::RigProblem& problem, const std::vector<Fold>& folds,
+                        const rig::RigFit& fit, const Eigen::VectorXd& weights) {
   const Eigen::MatrixXd normal = full_normal(fit);
   double square = 0.0;
   for (const Fold& fold : folds) {
@@ -79,10 +82,17 @@ double predicted_square(const std::vector<Fold>& folds, const rig::RigFit& fit,
       gradient += fit.residuals[row] * fit.jacobian.row(row).transpose();
     const Eigen::MatrixXd rest = normal - normal_of(fit.jacobian, fold.rows);
     const Eigen::VectorXd step = rest.completeOrthogonalDecomposition().solve(gradient);
-    for (const Eigen::Index row : fold.rows) {
-      const double predicted = fit.residuals[row] + fit.jacobian.row(row).dot(step);
-      square += weights[row] * predicted * predicted;
+    Eigen::VectorXd predicted = fit.residuals;
+    if (step.dot(normal * step) < linear_reach * linear_reach || fold.others.empty()) {
+      for (const Eigen::Index row : fold.rows)
+        predicted[row] += fit.jacobian.row(row).dot(step);
+    } else {
+      const rig::RigFit others =
+          problem.fit_from(fit.ingredients, fit.values, {.look = rig::Look::fine, .runs = fold.others});
+      predicted = problem.residuals(fit.ingredients, others.values);
     }
+    for (const Eigen::Index row : fold.rows)
+      square += weights[row] * predicted[row] * predicted[row];
   }
   return square;
 }
@@ -124,8 +134,8 @@ Gap held_out_gap(const rig::Session& session, const rig::RigProblem& problem, co
       count += weights[row];
     if (gap.held_out.empty() || gap.held_out.back() != fold.name) gap.held_out.push_back(fold.name);
   }
-  gap.before = predicted_square(folds, problem.base(), weights) / count;
-  gap.after = predicted_square(folds, fit, weights) / count;
+  gap.before = predicted_square(problem, folds, problem.base(), weights) / count;
+  gap.after = predicted_square(problem, folds, fit, weights) / count;
   gap.floor = std::min(unrepeatable(session, problem, fit, weights), gap.after);
   gap.closed = gap.before > gap.floor ? 1.0 - (gap.after - gap.floor) / (gap.before - gap.floor) : 0.0;
   return gap;
