@@ -109,6 +109,8 @@ TEST_F(IndependentData, TheVentriclesLawIsInsideItsIntervals) {
 TEST_F(IndependentData, FivePerCentOfWildPointsKeepTheGelsStiffness) {
   const Study study = read_study(data / "phantom-a.study.toml");
   const Measurement sound = read_measurement(study);
+  // 1.6 % below the truth, by the errors of the measured pressures.
+  const double sound_kPa = fit_study(study, sound, {}).parameters[0].value;
   for (unsigned draw = 1; draw <= 10; ++draw) {
     const double most_mm = 5.0 * (1 << draw % 4);  // 5, 10, 20, 40
     SCOPED_TRACE(testing::Message() << "draw " << draw << ", thrown up to " << most_mm
@@ -123,7 +125,8 @@ TEST_F(IndependentData, FivePerCentOfWildPointsKeepTheGelsStiffness) {
     }
     const FitRecord record = fit_study(study, measurement, {});
     ASSERT_TRUE(record.converged) << record.reason;
-    EXPECT_NEAR(record.parameters[0].value / 8.71, 1, 0.02);
+    EXPECT_NEAR(record.parameters[0].value / sound_kPa, 1, 0.02);
+    EXPECT_NEAR(record.parameters[0].value, 8.71, 3 * record.parameters[0].se);
     ASSERT_TRUE(record.robust);
     EXPECT_THAT(record.remarks, testing::Contains(testing::HasSubstr("wild residuals")));
   }
