@@ -27,7 +27,7 @@ class HoseCompliance final : public Effect {
   }
   [[nodiscard]] std::span<const EffectParameter> parameters() const override {
     static constexpr std::array<EffectParameter, 1> list{
-        {{"wave_speed_m_s", "m/s", "speed of pressure waves in the hose", 400.0, 15.0, 2000.0, 80.0,
+        {{"wave_speed_m_s", "m/s", "speed of pressure waves in the hose", 400.0, 8.0, 2000.0, 80.0,
           SearchScale::inverse_square}}};
     return list;
   }

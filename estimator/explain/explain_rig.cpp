@@ -196,25 +196,26 @@ Explanation explain_rig(const Study& study, const ExplainOptions& options) {
                                     model_variance(problem, base.residuals - best.residuals));
   std::vector<ResidualCell> left = significant(cells, discovery_rate);
   if (!is_structured(left, cells.size())) left.clear();
-  const Judgement judgement = judge(work.found, left);
+  const Eigen::VectorXd weights = row_weights(session, problem);
+  const Gap gap = held_out_gap(session, problem, best, weights);
+  const Judgement judgement = judge(work.found, left, gap);
 
   Explanation out;
   out.study = study.file.string();
   out.verdict = judgement.verdict;
-  const Eigen::VectorXd weights = row_weights(session, problem);
+  out.gap = gap;
   const std::vector<double> errors = parameter_errors(best, weights);
-  if (judgement.verdict == Verdict::unexplained) {
-    out.where = misfits(session, problem, judgement.left, {}, base);
-  } else {
+  if (judgement.verdict != Verdict::unexplained) {
     out.ambiguous_with = judgement.ambiguous_with;
     out.effects = found_effects(best, errors);
-    if (out.verdict != Verdict::none) {
-      const auto before =
-          residual_cells(session, problem.blocks(), base.residuals, model_variance(problem, {}));
-      out.where = misfits(session, problem, significant(before, discovery_rate), {}, best);
-    }
   }
-  out.gap = held_out_gap(session, problem, best, weights);
+  if (!judgement.left.empty()) {
+    out.where = misfits(session, problem, judgement.left, {}, base);
+  } else if (out.verdict != Verdict::none) {
+    const auto before =
+        residual_cells(session, problem.blocks(), base.residuals, model_variance(problem, {}));
+    out.where = misfits(session, problem, significant(before, discovery_rate), {}, best);
+  }
   out.evidence = evidence(work.found, judgement, {});
   out.shifts = parameter_shifts(base, parameter_errors(base, weights), best, errors);
   out.steps = steps_of(work.found);

@@ -4,6 +4,8 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 #include <map>
 
 #include "estimator/explain/chi_square.hpp"
@@ -43,6 +45,7 @@ class Search {
   size_t add(rig::RigFit fit) {
     FittedSet set{std::move(fit), 0.0};
     set.chi_square = set.fit.residuals.cwiseAbs2().dot(weights_);
+    if (!std::isfinite(set.chi_square)) set.chi_square = std::numeric_limits<double>::infinity();
     result_.sets.push_back(std::move(set));
     return result_.sets.size() - 1;
   }

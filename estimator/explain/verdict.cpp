@@ -1,6 +1,7 @@
 #include "estimator/explain/verdict.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 #include "estimator/effects/effect.hpp"
 #include "estimator/explain/chi_square.hpp"
@@ -23,6 +24,13 @@ std::vector<std::vector<std::string>> hinted(const std::vector<Lead>& leads) {
   return sets;
 }
 
+/// Whether the chosen set predicts left-out data at least as well as the base model does.
+bool predicts(const SearchResult& search, const Gap& gap) {
+  const FittedSet& best = search.sets[search.best];
+  if (!std::isfinite(search.sets.front().chi_square) || !std::isfinite(best.chi_square)) return false;
+  return best.fit.ingredients.empty() || gap.after <= gap.before;
+}
+
 }  // namespace
 
 bool is_structured(const std::vector<ResidualCell>& left, size_t cells) {
@@ -31,7 +39,7 @@ bool is_structured(const std::vector<ResidualCell>& left, size_t cells) {
   });
 }
 
-Judgement judge(const SearchResult& search, std::vector<ResidualCell> left) {
+Judgement judge(const SearchResult& search, std::vector<ResidualCell> left, const Gap& gap) {
   Judgement judgement;
   judgement.left = std::move(left);
   const FittedSet& best = search.sets[search.best];
@@ -40,7 +48,7 @@ Judgement judge(const SearchResult& search, std::vector<ResidualCell> left) {
     if (k == search.best || other.fit.ingredients.size() > best.fit.ingredients.size()) continue;
     if (other.chi_square < best.chi_square + as_good) judgement.ambiguous_with.push_back(other.ids());
   }
-  if (!judgement.left.empty()) {
+  if (!judgement.left.empty() || !predicts(search, gap)) {
     judgement.verdict = Verdict::unexplained;
   } else if (best.fit.ingredients.empty()) {
     judgement.ambiguous_with = hinted(search.leads);

@@ -1,5 +1,8 @@
 #include <gmock/gmock.h>
 
+#include <cmath>
+#include <limits>
+
 #include "estimator/effects/effect.hpp"
 #include "estimator/explain/search.hpp"
 #include "estimator/explain/verdict.hpp"
@@ -8,6 +11,14 @@ namespace diastole::explain {
 namespace {
 
 using testing::ElementsAre;
+
+Gap gap_of(double before, double after) {
+  Gap gap;
+  gap.before = before;
+  gap.after = after;
+  return gap;
+}
+const Gap better = gap_of(2.0, 1.0);
 
 TEST(Screening, GainIsWhatAFitOverBothTakesOffBeyondTheKnown) {
   Eigen::MatrixXd known(4, 1);
@@ -33,10 +44,31 @@ TEST(Verdicts, StructureThatIsLeftForbidsAName) {
   search.sets[1].chi_square = 3000.0;
   search.sets[1].fit.ingredients = {{find_effect("hose-loss-excess"), {}}};
   search.best = 1;
-  EXPECT_EQ(judge(search, {}).verdict, Verdict::named);
+  EXPECT_EQ(judge(search, {}, better).verdict, Verdict::named);
   ResidualCell cell;
   cell.p_value = 1e-30;
-  EXPECT_EQ(judge(search, {cell}).verdict, Verdict::unexplained);
+  EXPECT_EQ(judge(search, {cell}, better).verdict, Verdict::unexplained);
+}
+
+TEST(Verdicts, WhatPredictsLeftOutRunsWorseThanNothingHasNoName) {
+  SearchResult search;
+  search.sets.resize(2);
+  search.sets[0].chi_square = 5000.0;
+  search.sets[1].chi_square = 3000.0;
+  search.sets[1].fit.ingredients = {{find_effect("temperature-drift"), {}}};
+  search.best = 1;
+  EXPECT_EQ(judge(search, {}, gap_of(1.02, 1.10)).verdict, Verdict::unexplained);
+  EXPECT_EQ(judge(search, {}, gap_of(1.02, std::nan(""))).verdict, Verdict::unexplained);
+}
+
+TEST(Verdicts, SquaresThatAreNoNumbersNameNothing) {
+  SearchResult search;
+  search.sets.resize(2);
+  search.sets[0].chi_square = std::numeric_limits<double>::infinity();
+  search.sets[1].chi_square = 3000.0;
+  search.sets[1].fit.ingredients = {{find_effect("hose-compliance"), {}}};
+  search.best = 1;
+  EXPECT_EQ(judge(search, {}, better).verdict, Verdict::unexplained);
 }
 
 TEST(Verdicts, AsGoodASetOfTheSameSizeIsToldBesideIt) {
@@ -48,7 +80,7 @@ TEST(Verdicts, AsGoodASetOfTheSameSizeIsToldBesideIt) {
   search.sets[1].fit.ingredients = {{find_effect("stroke-gain"), {}}};
   search.sets[2].fit.ingredients = {{find_effect("radius-error"), {}}};
   search.best = 1;
-  const Judgement judgement = judge(search, {});
+  const Judgement judgement = judge(search, {}, better);
   EXPECT_EQ(judgement.verdict, Verdict::ambiguous);
   EXPECT_THAT(judgement.ambiguous_with, ElementsAre(ElementsAre("radius-error")));
 }
@@ -58,7 +90,7 @@ TEST(Verdicts, WeakEvidenceIsNeitherANameNorNothing) {
   search.sets.resize(1);
   search.leads = {{{find_effect("stroke-gain"), {}}, 20.0, 5.0, 1, {}},
                   {{find_effect("clock-skew"), {}}, 2.0, 5.0, 1, {}}};
-  const Judgement judgement = judge(search, {});
+  const Judgement judgement = judge(search, {}, better);
   EXPECT_EQ(judgement.verdict, Verdict::ambiguous);
   EXPECT_THAT(judgement.ambiguous_with, ElementsAre(ElementsAre("stroke-gain")));
 }
