@@ -44,6 +44,7 @@ function(diastole_test name)
   cmake_parse_arguments(ARG "SERIAL" "TIMEOUT" "SOURCES;LIBS;LABELS" ${ARGN})
   add_executable(${name} ${ARG_SOURCES})
   target_link_libraries(${name} PRIVATE diastole_options ${ARG_LIBS} GTest::gmock GTest::gtest_main)
+  target_precompile_headers(${name} REUSE_FROM test_prelude)
   set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/tests)
   target_compile_definitions(${name} PRIVATE
     DIASTOLE_SOURCE_DIR="${CMAKE_SOURCE_DIR}" DIASTOLE_BIN_DIR="${CMAKE_RUNTIME_OUTPUT_DIRECTORY}")

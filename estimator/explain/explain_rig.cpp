@@ -205,7 +205,10 @@ Explanation explain_rig(const Study& study, const ExplainOptions& options) {
   out.verdict = judgement.verdict;
   out.gap = gap;
   const std::vector<double> errors = parameter_errors(best, weights);
-  if (judgement.verdict != Verdict::unexplained) {
+  if (judgement.verdict == Verdict::unexplained) {  // nothing is added, so that nothing is closed
+    out.gap.after = gap.before;
+    out.gap.closed = 0.0;
+  } else {
     out.ambiguous_with = judgement.ambiguous_with;
     out.effects = found_effects(best, errors);
   }
@@ -217,7 +220,8 @@ Explanation explain_rig(const Study& study, const ExplainOptions& options) {
     out.where = misfits(session, problem, significant(before, discovery_rate), {}, best);
   }
   out.evidence = evidence(work.found, judgement, {});
-  out.shifts = parameter_shifts(base, parameter_errors(base, weights), best, errors);
+  if (!out.effects.empty())
+    out.shifts = parameter_shifts(base, parameter_errors(base, weights), best, errors);
   out.steps = steps_of(work.found);
   out.traces = traces(session, problem, base, best);
   tell("designing the next experiment");
