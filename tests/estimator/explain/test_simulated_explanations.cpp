@@ -30,7 +30,9 @@ class SimulatedSession : public testing::Test {
 TEST_F(SimulatedSession, WithoutAnEffectGetsNoName) {
   const SearchResult found = searched({.seed = 4});
   EXPECT_THAT(found.sets[found.best].ids(), IsEmpty());
-  EXPECT_NE(judge(found, {}).verdict, Verdict::named);
+  const Gap gap =
+      held_out_gap(session_, *problem_, found.sets[found.best].fit, row_weights(session_, *problem_));
+  EXPECT_NE(judge(found, {}, gap).verdict, Verdict::named);
 }
 
 TEST_F(SimulatedSession, WithALeakIsExplainedByItAndPredictsWhatWasNotFitted) {

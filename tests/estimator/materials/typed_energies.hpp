@@ -75,6 +75,12 @@ inline Real pole_zero(const RealMatrix& c, const std::vector<Real>& k) {
   return w;
 }
 
+/// Matrix and one family of fibres, which bear compression too.
+inline Real fibre_reinforced(const RealMatrix& c, const std::vector<Real>& k) {
+  return k[0] / k[1] * std::expm1(k[1] * (c.trace() - 3)) +
+         k[2] / (2 * k[3]) * std::expm1(k[3] * (c(0, 0) - 1) * (c(0, 0) - 1));
+}
+
 /// By Criscione's kinematics: C = R^T R with R upper triangular, the fibre first. R11 is the fibre stretch, (R12, R13)
 /// / R11 the sliding along it, and the singular values of the rest, in the ratio exp(2 beta3), the cross-fibre shear.
 inline Real strain_attribute(const RealMatrix& c, const std::vector<Real>& k) {
@@ -100,6 +106,7 @@ inline TypedEnergy typed_energy(std::string_view law) {
       {"demiray", typed::demiray},
       {"holzapfel-ogden", typed::holzapfel_ogden},
       {"pole-zero", typed::pole_zero},
+      {"fibre-reinforced", typed::fibre_reinforced},
       {"strain-attribute", typed::strain_attribute}};
   for (const auto& [name, energy] : all) {
     if (name == law) return energy;
