@@ -71,9 +71,9 @@ class Explainer {
     modes_ = field_modes(*full_, full_base_.pressures_kPa);
     for (size_t i = 0; i < modes_.modes.size(); ++i) {
       const std::string& family = modes_.modes[i].family;
-      const auto same = std::ranges::find(families_, family, &Family::name);
-      Family& into = same == families_.end() ? families_.emplace_back(family, std::vector<Index>{}) : *same;
-      into.columns.push_back(static_cast<Index>(i));
+      auto same = std::ranges::find(families_, family, &Family::name);
+      if (same == families_.end()) same = families_.insert(same, {.name = family, .columns = {}});
+      same->columns.push_back(static_cast<Index>(i));
       if (modes_.modes[i].smooth) rivals_.push_back(static_cast<Index>(i));
     }
   }

@@ -185,10 +185,10 @@ class Builder {
       columns.block(first, static_cast<Index>(c) * driven, rows, driven) =
           course_at(c, slot) * elastic.leftCols(driven);
     const Index stiffness = elastic.cols() - driven;
-    columns.block(first, courses * driven, rows, stiffness) =
+    columns.block(first, static_cast<Index>(courses) * driven, rows, stiffness) =
         course_at(0, slot) * elastic.rightCols(stiffness);
     const auto count = static_cast<Index>(harmonics_.size());
-    const Index motion = courses * driven + stiffness;
+    const Index motion = static_cast<Index>(courses) * driven + stiffness;
     for (Index i = 0; i < rows; ++i) {
       const FieldRow& row = problem_.rows().rows()[static_cast<size_t>(first + i)];
       const Vector3d outwards = Vector3d(row.X_mm[0], row.X_mm[1], 0.0).normalized();
