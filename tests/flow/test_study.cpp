@@ -119,9 +119,9 @@ TEST(RunFile, OfALongJournalTakesNoMoreMemoryThanThatOfAShortOne) {
   const auto memory_MB = [&](int seconds) {
     std::filesystem::remove(place / "long.journal");
     write_long_journal(place / "long.journal", {.channels = 10, .rate_Hz = 10'000, .seconds = seconds});
-    const ProcessFigures figures = run_timed({DIASTOLE_BIN_DIR "/diastole", "recover", place / "long.journal",
-                                              "-o", place / "long.run.h5", "--force"},
-                                             place.path(), place / "log");
+    const ProcessCost figures = run_timed({DIASTOLE_BIN_DIR "/diastole", "recover", place / "long.journal",
+                                           "-o", place / "long.run.h5", "--force"},
+                                          place.path(), place / "log");
     EXPECT_EQ(figures.exit_code, 0);
     return figures.peak_MB;
   };
