@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <boost/crc.hpp>
 #include <charconv>
 #include <cmath>
 #include <sstream>
@@ -11,7 +12,6 @@
 
 #include "estimator/io/whole_file.hpp"
 #include "protocol/contract/input_error.hpp"
-#include "protocol/wire/crc32.hpp"
 
 namespace diastole {
 namespace {
@@ -30,10 +30,9 @@ std::uint32_t fingerprint(const Study& study) {
     content += '\n';
     if (std::filesystem::is_regular_file(file)) content += read_whole_file(file);
   }
-  wire::Crc32 crc;
-  for (const char c : content)
-    crc.add(static_cast<std::uint8_t>(c));
-  return crc.value();
+  boost::crc_32_type crc;
+  crc.process_bytes(content.data(), content.size());
+  return crc.checksum();
 }
 
 std::string heading_of(const Study& study, const MonteCarloPlan& plan) {
