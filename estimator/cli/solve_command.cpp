@@ -5,9 +5,11 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
+#include <functional>
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <numeric>
 #include <string>
 #include <utility>
 #include <vector>
@@ -136,6 +138,13 @@ nlohmann::ordered_json as_json(const Study& study, ElasticModel& model, const So
   return json;
 }
 
+/// "8 x 4 x 1 = ", or "8 x 4 x 1, refined: " where halving has made more elements of them.
+std::string mesh_in_words(const std::vector<int>& mesh, int elements) {
+  if (mesh.empty()) return "";
+  const bool refined = std::accumulate(mesh.begin(), mesh.end(), 1, std::multiplies<>()) != elements;
+  return fmt::format("{}{}", fmt::join(mesh, " x "), refined ? ", refined: " : " = ");
+}
+
 nlohmann::ordered_json frames_json(const ElasticModel& model, const std::vector<SolvedFrame>& solved) {
   nlohmann::ordered_json json = nlohmann::ordered_json::array();
   const double rest_mL = model.cavity_volume_mL(model.rest_state());
@@ -166,7 +175,7 @@ void print_for_people(const nlohmann::ordered_json& json) {
   fmt::print(
       "  {}{} elements, {} unknowns, {} load steps, {} Newton iterations with {} factorisations, "
       "{:.2f} s\n",
-      mesh.empty() ? "" : fmt::format("{} = ", fmt::join(mesh, " x ")), json["elements"].get<size_t>(),
+      mesh_in_words(mesh, json["elements"].get<int>()), json["elements"].get<size_t>(),
       json["dofs"].get<size_t>(), json["load_steps"].get<size_t>(), json["newton_iterations"].get<size_t>(),
       json["factorisations"].get<size_t>(), json["seconds"].get<double>());
   if (json.contains("files"))
