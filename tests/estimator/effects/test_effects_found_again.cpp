@@ -25,9 +25,7 @@ TEST_P(EveryEffect, IsFoundAgain) {
   const rig::Session session = rig::simulated_session(family_, options);
   const rig::RigProblem problem(session, family_);
   const rig::RigFit fit = problem.fit(ingredients_);
-  // A step between cycles counts as their scatter: the floor is higher then.
-  EXPECT_GT(fit.reduced(), GetParam()->occasions() == Occasions::none ? 0.94 : 0.8);
-  EXPECT_LT(fit.reduced(), 1.06);
+  EXPECT_NEAR(fit.reduced(), 1.0, 0.06);
   EXPECT_LE(fit.chi_square, problem.base().chi_square + 1.0);
   EXPECT_NEAR(fit.values[3], options.values[0], 5.0 * fit.errors[3] + 0.02 * std::abs(options.values[0]));
 }
