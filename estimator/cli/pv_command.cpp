@@ -15,6 +15,7 @@
 #include "estimator/cli/commands.hpp"
 #include "estimator/cli/solution_json.hpp"
 #include "estimator/cli/study_options.hpp"
+#include "estimator/effects/affected_model.hpp"
 #include "estimator/fe/pressure_volume.hpp"
 #include "estimator/fe/study_model.hpp"
 #include "estimator/io/whole_file.hpp"
@@ -180,7 +181,7 @@ ExitCode run_pv(const PvArguments& arguments, const CommandOutput& out) {
   }
   require_outputs(arguments);
   const Study study = read_study(arguments.study);
-  ElasticModel model = make_model(study, with_progress("pv"));
+  ElasticModel model = make_affected_model(study, with_progress("pv"));
   require_closed_cavity(study, model);
   remark_on_size(model.mesh(), "pv");
   const StopOnInterrupt stop;

@@ -18,6 +18,7 @@
 #include "estimator/cli/solution_json.hpp"
 #include "estimator/cli/solution_outputs.hpp"
 #include "estimator/cli/study_options.hpp"
+#include "estimator/effects/affected_model.hpp"
 #include "estimator/fe/averaged_pressure.hpp"
 #include "estimator/fe/elastic_system.hpp"
 #include "estimator/fe/point_fields.hpp"
@@ -297,7 +298,7 @@ ExitCode run_solve(const SolveArguments& arguments, const CommandOutput& out) {
   require_outputs(arguments.outputs, study);
   SolveOptions options = with_progress("solve");
   options.check_stability = true;
-  ElasticModel model = make_model(study, std::move(options));
+  ElasticModel model = make_affected_model(study, std::move(options));
   require_fibres_for_tension(arguments, model);
   remark_on_size(model.mesh(), "solve");
   const std::vector<TimedLoad> loads = loads_of(arguments, study, model);

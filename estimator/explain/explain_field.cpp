@@ -43,8 +43,8 @@ struct Structure {
 
 class Explainer {
  public:
-  Explainer(const Study& study, const FieldOptions& options)
-      : options_(options), study_file_(study.file.string()), field_(field_case(study)) {}
+  Explainer(FieldCase field, std::string name, const FieldOptions& options)
+      : options_(options), study_file_(std::move(name)), field_(std::move(field)) {}
 
   Explanation run() {
     fit_base();
@@ -300,9 +300,13 @@ class Explainer {
 }  // namespace
 
 Explanation explain_field(const Study& study, const FieldOptions& options) {
+  return explain_field(field_case(study), study.file.string(), options);
+}
+
+Explanation explain_field(FieldCase field, const std::string& name, const FieldOptions& options) {
   const auto begun = std::chrono::steady_clock::now();
-  Explanation explanation = Explainer(study, options).run();
-  explanation.study = study.file.string();
+  Explanation explanation = Explainer(std::move(field), name, options).run();
+  explanation.study = name;
   explanation.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
   return explanation;
 }

@@ -12,6 +12,7 @@
 #include <string>
 
 #include "estimator/explain/explanation.hpp"
+#include "estimator/explain/field_fit.hpp"
 #include "estimator/io/study.hpp"
 
 namespace diastole::explain {
@@ -23,5 +24,7 @@ struct FieldOptions {
 
 /// Throws InputError for studies that field_case() refuses.
 Explanation explain_field(const Study& study, const FieldOptions& options = {});
+/// The same of what a study says; `name` stands for it in errors.
+Explanation explain_field(FieldCase field, const std::string& name, const FieldOptions& options = {});
 
 }  // namespace diastole::explain

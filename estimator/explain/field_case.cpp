@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "estimator/effects/affected_model.hpp"
 #include "estimator/explain/field_fit.hpp"
 #include "protocol/contract/input_error.hpp"
 
@@ -17,25 +18,6 @@ namespace {
 
 /// Half the bounds' width over their middle up to which they are a measurement.
 constexpr double narrow = 0.05;
-
-/// The effects that the study's model has already, at their values.
-void add_known_effects(const Study& study, FieldModel& model) {
-  for (const std::string& id : study.effects) {
-    const Effect* effect = find_effect(id);
-    if (effect == nullptr)
-      refuse(study, "model.effects", fmt::format("there is no effect \"{}\"", id),
-             "`diastole effects` lists those that are known.");
-    std::vector<double> values = effect->field_neutral(model);
-    for (const StudyEffect& told : study.effect_values) {
-      if (told.id != id) continue;
-      for (size_t i = 0; i < values.size(); ++i) {
-        const auto start = told.starts.find(std::string(effect->field_parameters()[i].name));
-        if (start != told.starts.end()) values[i] = start->second;
-      }
-    }
-    if (!values.empty()) effect->apply_to_field(values, model);
-  }
-}
 
 }  // namespace
 
@@ -73,10 +55,7 @@ FieldCase field_case(const Study& study) {
     refuse(study, "data", "the study has neither tags nor points",
            "Name a tags or points file and its frames.");
   FieldCase field;
-  field.base.inner_radius_mm = annulus->inner_radius_mm;
-  field.base.outer_radius_mm = annulus->outer_radius_mm;
-  field.base.height_mm = annulus->height_mm;
-  add_known_effects(study, field.base);
+  field.base = field_model_of(study);
   field.measurement = read_measurement(study);
   for (size_t frame = 1; frame < field.measurement.frames.size(); ++frame) {
     const double pressure_kPa = field.measurement.frames[frame].pressure_kPa;

@@ -1,10 +1,9 @@
 #include "estimator/explain/field_solver.hpp"
 
 #include <algorithm>
-#include <cmath>
-#include <numbers>
 #include <utility>
 
+#include "estimator/effects/affected_model.hpp"
 #include "estimator/fe/elastic_system.hpp"
 #include "estimator/fe/gauss_contraction.hpp"
 #include "estimator/mesh/annulus.hpp"
@@ -19,31 +18,6 @@ AnnulusShape shape_of(const FieldModel& model, const std::array<size_t, 3>& elem
   shape.height_mm = model.height_mm;
   shape.elements = elements;
   return shape;
-}
-
-/// Fibres on cylinders about z, at an angle from the circumference towards z.
-MaterialAxesField helical_axes(double angle_deg) {
-  const double angle = angle_deg * std::numbers::pi / 180.0;
-  return [angle](const HermiteMesh& mesh, const MaterialPoint& point) {
-    const Eigen::Vector3d X_mm = mesh.value(mesh.reference(), point);
-    const Eigen::Vector3d outwards = Eigen::Vector3d(X_mm[0], X_mm[1], 0.0).normalized();
-    const Eigen::Vector3d around(-outwards[1], outwards[0], 0.0);
-    const Eigen::Vector3d up = Eigen::Vector3d::UnitZ();
-    MaterialAxes axes;
-    axes << std::cos(angle) * around + std::sin(angle) * up, std::cos(angle) * up - std::sin(angle) * around,
-        outwards;
-    return axes;
-  };
-}
-
-/// Both ends kept in their planes by the plates, and on springs across z.
-void let_ends_slip(const HermiteMesh& mesh, double stiffness_kPa_per_mm, ElasticOptions& options) {
-  HeldDofs held = hold_nothing(mesh);
-  for (const auto* faces : {&mesh.faces().bottom, &mesh.faces().top}) {
-    hold_face_component(mesh, *faces, 2, held);
-    options.bonded.push_back({*faces, {0.0, stiffness_kPa_per_mm}});
-  }
-  options.held = std::move(held);
 }
 
 void add_scaled(NodeField& field, double factor, const NodeField& direction) {
@@ -61,22 +35,9 @@ NodeField difference(const NodeField& a, const NodeField& b) {
 
 std::unique_ptr<ElasticModel> FieldSolver::build(const FieldModel& model) const {
   HermiteMesh mesh = make_annulus(shape_of(model, elements_));
-  ElasticOptions options;
-  options.solve.tolerance = 1e-8;
-  const bool plain = model.beta == 0.0 && model.k1_kPa == 0.0;
-  options.parameters =
-      plain ? std::vector{C1_kPa_} : std::vector{C1_kPa_, model.beta, model.k1_kPa, model.k2};
-  if (!plain) options.material_axes = helical_axes(model.fibre_angle_deg);
-  if (model.bond_stiffness_kPa_per_mm) let_ends_slip(mesh, *model.bond_stiffness_kPa_per_mm, options);
-  if (model.chamber_stiffness_kPa_per_mL != 0.0)
-    options.chamber = Chamber{.compliance_mL_per_kPa = 1.0 / model.chamber_stiffness_kPa_per_mL};
-  if (model.inclusion) {
-    options.stiffness = [inclusion = *model.inclusion](const Eigen::Vector3d& X_mm) {
-      return inclusion.stiffness({X_mm[0], X_mm[1], X_mm[2]});
-    };
-  }
-  const Law& law = *find_law(plain ? "neo-hookean" : "fibre-reinforced");
-  return std::make_unique<ElasticModel>(std::move(mesh), law, std::move(options));
+  FieldElasticity elastic = elasticity_of(model, mesh, C1_kPa_);
+  elastic.options.solve.tolerance = 1e-8;
+  return std::make_unique<ElasticModel>(std::move(mesh), *elastic.law, std::move(elastic.options));
 }
 
 void FieldSolver::set(const FieldModel& model, double C1_kPa) {

@@ -60,9 +60,11 @@ MotionOutcome ElasticMotion::solve(size_t slot, std::span<const double> values, 
   Solution solution = solve_from(nearest(slot, pressure_kPa), values, pressure_kPa);
   if (!solution.report.converged()) return {std::nullopt, solution.report.describe()};
   if (slots_.size() <= slot) slots_.resize(slot + 1);
-  NodeField position_mm = solution.state.position_mm;
+  NodeField seen_mm = solution.state.position_mm;
+  add_scaled(seen_mm, displacement_gain_ - 1.0, solution.state.position_mm);
+  add_scaled(seen_mm, 1.0 - displacement_gain_, mesh().reference());
   slots_[slot] = Slot{{values.begin(), values.end()}, std::move(solution.state), std::nullopt};
-  return {std::move(position_mm), ""};
+  return {std::move(seen_mm), ""};
 }
 
 MotionDerivatives ElasticMotion::derivatives(size_t slot) {
@@ -72,7 +74,12 @@ MotionDerivatives ElasticMotion::derivatives(size_t slot) {
     Sensitivities by = model_.sensitivities(solved.state, groups_);
     solved.derivatives = MotionDerivatives{std::move(by.parameter), std::move(by.pressure)};
   }
-  return *solved.derivatives;
+  MotionDerivatives seen = *solved.derivatives;
+  if (displacement_gain_ == 1.0) return seen;
+  for (NodeField& field : seen.by_value)
+    add_scaled(field, displacement_gain_ - 1.0, NodeField(field));
+  add_scaled(seen.by_pressure, displacement_gain_ - 1.0, NodeField(seen.by_pressure));
+  return seen;
 }
 
 }  // namespace diastole

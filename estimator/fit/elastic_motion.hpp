@@ -12,9 +12,10 @@ namespace diastole {
 
 class ElasticMotion : public MotionModel {
  public:
-  /// `groups[i]` says which parameter of which elements value i sets.
-  ElasticMotion(ElasticModel model, std::vector<ParameterGroup> groups)
-      : model_(std::move(model)), groups_(std::move(groups)) {}
+  /// `groups[i]` says which parameter of which elements value i sets; images show `displacement_gain` times the
+  /// displacement.
+  ElasticMotion(ElasticModel model, std::vector<ParameterGroup> groups, double displacement_gain = 1.0)
+      : model_(std::move(model)), groups_(std::move(groups)), displacement_gain_(displacement_gain) {}
 
   [[nodiscard]] const HermiteMesh& mesh() const override { return model_.mesh(); }
   [[nodiscard]] size_t value_count() const override { return groups_.size(); }
@@ -37,6 +38,7 @@ class ElasticMotion : public MotionModel {
 
   ElasticModel model_;
   std::vector<ParameterGroup> groups_;
+  double displacement_gain_;
   std::vector<std::optional<Slot>> slots_;
 };
 

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 
+#include "estimator/effects/affected_model.hpp"
 #include "estimator/fe/study_model.hpp"
 #include "estimator/fit/elastic_motion.hpp"
 #include "estimator/fit/fit_remarks.hpp"
@@ -380,7 +381,7 @@ FitRecord refused_fit(const Study& study, const Measurement& measurement, std::v
 FitRecord fit_study(const Study& study, const Measurement& measurement, const StudyFitOptions& options) {
   require_loaded_points(study, measurement);
   const auto* annulus = std::get_if<AnnulusSpecimen>(&study.specimen);
-  ElasticModel model = make_model(study);
+  ElasticModel model = make_affected_model(study);
   require_cavity(study, model);
   const size_t elements = model.mesh().element_count();
   FitRecord record = head_of(study, measurement);
@@ -388,7 +389,7 @@ FitRecord fit_study(const Study& study, const Measurement& measurement, const St
 
   Sought sought = sought_of(study, model);
   if (options.start) take_start(sought, *options.start, study, elements);
-  ElasticMotion motion(std::move(model), sought.groups);
+  ElasticMotion motion(std::move(model), sought.groups, displacement_gain_of(study));
   FitOptions fit_options;
   fit_options.file = study.file.string();
   fit_options.locator = locator_for(study.specimen);

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "estimator/effects/affected_model.hpp"
 #include "estimator/fe/study_model.hpp"
 #include "estimator/fit/elastic_motion.hpp"
 #include "estimator/fit/sought.hpp"
@@ -40,14 +41,14 @@ struct FrameInformation {
 class Explorer {
  public:
   Explorer(const Study& study, Measurement measurement)
-      : study_(study), measurement_(std::move(measurement)), model_(make_model(study)) {
+      : study_(study), measurement_(std::move(measurement)), model_(make_affected_model(study)) {
     require_cavity(study_, model_);
     sought_ = sought_of(study_, model_);
     elements_ = model_.mesh().element_count();
     // Every frame's derivative by its pressure is wanted, known exactly or not.
     for (const Frame& frame : measurement_.frames)
       stated_sigma_kPa_.push_back(frame.sigma_kPa);
-    motion_.emplace(std::move(model_), sought_.groups);
+    motion_.emplace(std::move(model_), sought_.groups, displacement_gain_of(study));
   }
 
   [[nodiscard]] std::vector<FrameInformation> present() {

@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "estimator/effects/affected_model.hpp"
 #include "estimator/fe/study_model.hpp"
 #include "estimator/fit/elastic_motion.hpp"
 #include "estimator/fit/fit.hpp"
@@ -95,10 +96,10 @@ CellFitter::CellFitter(const Study& study, const Measurement& design, const Mont
   require_loaded_points(study, design);
   for (const int frames : plan.frames)
     (void)spread_frames(design, frames);
-  ElasticModel model = make_model(study);
+  ElasticModel model = make_affected_model(study);
   require_cavity(study, model);
   Sought sought = sought_of(study, model);
-  ElasticMotion motion(std::move(model), sought.groups);
+  ElasticMotion motion(std::move(model), sought.groups, displacement_gain_of(study));
   const LocatorOptions locator = locator_for(study.specimen);
   Measurement exact =
       exact_measurement(motion.mesh(), design, true_motions(study, motion, sought, design), locator);

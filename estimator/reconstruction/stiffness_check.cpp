@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "estimator/fe/study_model.hpp"
+#include "estimator/effects/affected_model.hpp"
 
 namespace diastole {
 namespace {
@@ -36,7 +36,8 @@ const StudyParameter* stiffness_parameter(const Study& study) {
 std::optional<ApparentStiffness> apparent_stiffness(const Study& study, const FieldForms& forms,
                                                     const FrameField& field) {
   if (stiffness_parameter(study) == nullptr || !(field.load.pressure_kPa > 0)) return {};
-  ElasticModel model = make_model(study);
+  ElasticModel model = make_affected_model(study);
+  const double gain = displacement_gain_of(study);
   const Eigen::VectorXd seen = forms.space.unknowns_of(field.displacement_mm);
   const Eigen::VectorXd along =
       forms.quadratic.matrix(forms.sobolev.mean_square).selfadjointView<Eigen::Lower>() * seen;
@@ -45,7 +46,7 @@ std::optional<ApparentStiffness> apparent_stiffness(const Study& study, const Fi
   const auto amplitude = [&](const ElasticState& state) {
     NodeField moved = state.position_mm;
     for (size_t dof = 0; dof < moved.size(); ++dof)
-      moved[dof] -= model.mesh().reference()[dof];
+      moved[dof] = gain * (moved[dof] - model.mesh().reference()[dof]);
     return along.dot(forms.space.unknowns_of(moved)) / size;
   };
 

@@ -1,7 +1,7 @@
 // `tools/bench explain [folder] [case or kind ...]`: explains recorded sessions and counts what was right (data/README.md,
-// labels.json). A row a case, then the table of figures with their targets. Exit code 1 if a session in which nothing
-// is hidden was given an effect, or one with an effect of no library a confident name. Explanations are kept in
-// build/explained/.
+// labels.json); the folder may be one of imaged motion instead (bench_explain_field.hpp). A row a case, then the table of
+// figures with their targets. Exit code 1 if a session in which nothing is hidden was given an effect, or one with an
+// effect of no library a confident name. Explanations are kept in build/explained/.
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -18,6 +18,7 @@
 #include "estimator/explain/explain_rig.hpp"
 #include "estimator/explain/explanation_json.hpp"
 #include "estimator/explain/score.hpp"
+#include "tools/benchmarks/bench_explain_field.hpp"
 
 namespace {
 
@@ -68,6 +69,24 @@ void report(const std::string& name, const nlohmann::json& label, const explain:
   std::fflush(stdout);
 }
 
+void explain_sessions(const fs::path& folder, const nlohmann::json& labels,
+                      const std::vector<std::string>& wanted, const fs::path& kept) {
+  for (const auto& [name, label] : labels.items()) {
+    const bool chosen =
+        wanted.empty() ||
+        std::any_of(wanted.begin(), wanted.end(), [&, &name = name, &label = label](const std::string& word) {
+          return name == word || label["kind"] == word;
+        });
+    if (!chosen) continue;
+    const Study study = read_study(folder / name / (name + ".study.toml"));
+    explain::Explanation found =
+        explain::explain_rig(study, {.threads = 2, .propose = false, .progress = {}});
+    report(name, label, found);
+    found.traces.clear();
+    std::ofstream(kept / (name + ".json")) << explain::to_json(found);
+  }
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -82,19 +101,10 @@ int main(int argc, char** argv) {
   const fs::path kept = fs::path(DIASTOLE_SOURCE_DIR) / "build/explained";
   fs::remove_all(kept);  // what is scored is of this run
   fs::create_directories(kept);
-  for (const auto& [name, label] : labels.items()) {
-    const bool chosen =
-        wanted.empty() ||
-        std::any_of(wanted.begin(), wanted.end(), [&, &name = name, &label = label](const std::string& word) {
-          return name == word || label["kind"] == word;
-        });
-    if (!chosen) continue;
-    const Study study = read_study(folder / name / (name + ".study.toml"));
-    explain::Explanation found =
-        explain::explain_rig(study, {.threads = 2, .propose = false, .progress = {}});
-    report(name, label, found);
-    found.traces.clear();
-    std::ofstream(kept / (name + ".json")) << explain::to_json(found);
+  if (labels.contains("cases")) {
+    bench::explain_imaged_motion(folder, wanted, kept);
+  } else {
+    explain_sessions(folder, labels, wanted, kept);
   }
   const explain::Score score = explain::score_folder(folder, kept);
   fmt::print("\n{}", explain::told(score));
