@@ -151,6 +151,7 @@ Work searched(const rig::Session& session, const rig::SpecimenFamily& family, co
   if (!best.ingredients.empty() && differ(problem.noise(), noise)) {
     tell("fitting again with the noise that is left");
     fitting.noise = noise;
+    fitting.beats_of = rig::KnownModel{best.ingredients, best.values};
     searching.start = best.ingredients;
     rig::RigProblem again(session, family, fitting);
     SearchResult second = search(session, family, again, searching);

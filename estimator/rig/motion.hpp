@@ -48,6 +48,7 @@ class Motion {
   };
   [[nodiscard]] Moment at(double time_s) const;
   [[nodiscard]] const std::vector<Stroke>& strokes() const { return strokes_; }
+  [[nodiscard]] double rest_mL() const { return rest_mL_; }
   [[nodiscard]] double spread_s() const { return spread_s_; }
 
  private:

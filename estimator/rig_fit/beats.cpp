@@ -1,6 +1,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
+#include <utility>
 
 #include "estimator/fe/parallel_for.hpp"
 #include "estimator/rig_fit/rig_fit.hpp"
@@ -26,29 +28,51 @@ size_t group_of(const SessionRun& run, const std::vector<CycleRows>& cycles, siz
   return ramp ? ramp_group : c % 2;
 }
 
-/// Strokes of a group's cycles larger by `part`, fading over the window in which accelerations are spread. What a ramp
-/// has gone too far remains until the volume has come back.
-void vary_cycles(const SessionRun& run, size_t group, double part, DriveTrace& trace) {
+/// A ramp that went too far by `part`: what is above its start by now stays too far.
+struct Overshoot {
+  double from_mL = 0.0;
+  double gone_mL = 0.0;
+
+  [[nodiscard]] double at(double volume_mL) const {
+    return gone_mL * std::clamp((volume_mL - from_mL) / gone_mL, 0.0, 1.0);
+  }
+};
+
+/// The motion with the strokes of a group's cycles larger by `part`, in turn smaller, so that nothing piles up where the
+/// rig remembers.
+Motion varied(const SessionRun& run, size_t group, double part) {
+  const Motion& motion = run.drive.motion;
+  std::vector<Stroke> strokes = motion.strokes();
   const std::vector<CycleRows> cycles = cycles_of(run);
-  const double fade_s = std::max(run.drive.motion.spread_s(), trace.step_s);
+  std::vector<Overshoot> overshot;
+  size_t stroke = 0;
+  const auto shift = [&](double volume_mL, double own_part, double least_mL) {
+    double shifted = volume_mL + own_part * (volume_mL - least_mL);
+    for (const Overshoot& ramp : overshot)
+      shifted += part * ramp.at(volume_mL);
+    return shifted;
+  };
+  const auto shift_until = [&](double time_s, double own_part, double least_mL) {
+    for (; stroke < strokes.size(); ++stroke) {
+      Stroke& at = strokes[stroke];
+      if (0.5 * (at.start_s + at.end_s) >= time_s) return;
+      at.from_mL = shift(at.from_mL, own_part, least_mL);
+      at.to_mL = shift(at.to_mL, own_part, least_mL);
+    }
+  };
   for (size_t c = 0; c < cycles.size(); ++c) {
-    if (group_of(run, cycles, c) != group) continue;
     const double start_s = run.sample_s[cycles[c].first];
     const double end_s = run.sample_s[cycles[c].last - 1] + 1.0 / sample_rate_Hz(run);
-    const double least_mL = run.drive.motion.at(start_s).volume_mL;
-    const double gone_mL = run.drive.motion.at(end_s).volume_mL - least_mL;
-    for (size_t k = 0; k < trace.volume_mL.size(); ++k) {
-      const double begun = std::clamp((trace.time_s(k) - start_s) / fade_s + 0.5, 0.0, 1.0);
-      const double ended = std::clamp((trace.time_s(k) - end_s) / fade_s + 0.5, 0.0, 1.0);
-      const double larger = part * begun * (1.0 - ended);
-      const double away_mL = trace.volume_mL[k] - least_mL;
-      trace.volume_mL[k] += larger * away_mL;
-      if (group == ramp_group)
-        trace.volume_mL[k] += part * ended * gone_mL * std::clamp(away_mL / gone_mL, 0.0, 1.0);
-      trace.flow_mL_per_s[k] *= 1.0 + larger;
-      trace.acceleration_mL_per_s2[k] *= 1.0 + larger;
-    }
+    shift_until(start_s, 0.0, 0.0);
+    const double least_mL = motion.at(start_s).volume_mL;
+    double own_part = 0.0;
+    if (group_of(run, cycles, c) == group) own_part = group != ramp_group && c / 2 % 2 == 1 ? -part : part;
+    shift_until(end_s, own_part, least_mL);
+    if (own_part != 0.0 && group == ramp_group)
+      overshot.push_back({least_mL, motion.at(end_s).volume_mL - least_mL});
   }
+  shift_until(std::numeric_limits<double>::infinity(), 0.0, 0.0);
+  return {std::move(strokes), motion.rest_mL(), motion.spread_s()};
 }
 
 }  // namespace
@@ -74,19 +98,19 @@ void RigProblem::shrink_beats(size_t run, Eigen::Ref<Eigen::VectorXd> residuals)
   }
 }
 
-std::vector<std::map<Channel, std::vector<double>>> RigProblem::beat_shapes(size_t group) const {
+std::vector<std::map<Channel, std::vector<double>>> RigProblem::beat_shapes(const KnownModel& of,
+                                                                            size_t group) const {
   constexpr double small = 0.01;
-  RigModel plain = model({}, base_.values);
-  RigModel varied = plain;
-  varied.drive.emplace_back([&](DriveTrace& trace, const RunPlace& place) {
-    for (const SessionRun& run : session_.runs)
-      if (run.drive.place.name == place.name) vary_cycles(run, group, small, trace);
-  });
+  const RigModel plain = model(of.ingredients, of.values);
   std::vector<std::map<Channel, std::vector<double>>> shapes(session_.runs.size());
   parallel_for(session_.runs.size(), options_.threads, [&](size_t r) {
     const SessionRun& run = session_.runs[r];
     const Prediction a = observe(plain, plant(plain, r, Look::fine), run.drive.place, run.sample_s);
-    Prediction b = observe(varied, plant(varied, r, Look::fine), run.drive.place, run.sample_s);
+    RunDrive other = run.drive;
+    other.motion = varied(run, group, small);
+    SimulationOptions simulation = options_.simulation;
+    simulation.step_s = step_s(Look::fine);
+    Prediction b = observe(plain, simulate_plant(plain, other, simulation), other.place, run.sample_s);
     for (size_t k = 0; k < run.sample_s.size(); ++k) {
       b.cavity_kPa[k] = (b.cavity_kPa[k] - a.cavity_kPa[k]) / small;
       b.pump_kPa[k] = (b.pump_kPa[k] - a.pump_kPa[k]) / small;
@@ -97,10 +121,10 @@ std::vector<std::map<Channel, std::vector<double>>> RigProblem::beat_shapes(size
   return shapes;
 }
 
-void RigProblem::set_beats() {
+void RigProblem::set_beats(const KnownModel& of) {
   constexpr double ringing = 0.4;  // of a cycle: how far into the next one its line rings on
   const std::array<std::vector<std::map<Channel, std::vector<double>>>, groups> shapes{
-      beat_shapes(0), beat_shapes(1), beat_shapes(ramp_group)};
+      beat_shapes(of, 0), beat_shapes(of, 1), beat_shapes(of, ramp_group)};
   for (size_t r = 0; r < session_.runs.size(); ++r) {
     const std::vector<CycleRows> cycles = cycles_of(session_.runs[r]);
     const auto lead = static_cast<size_t>(session_.runs[r].drive.motion.spread_s() / 2.0 *

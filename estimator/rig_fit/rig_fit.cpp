@@ -65,9 +65,10 @@ RigProblem::RigProblem(const Session& session, const SpecimenFamily& family, con
     motions_.push_back(sampled_motion(run.drive, step_s(Look::fine)));
     coarse_motions_.push_back(sampled_motion(run.drive, step_s(Look::coarse)));
   }
-  base_ = fit_from({}, {family.modulus_start_kPa(), 0.0, 0.0});
-  set_beats();
-  base_ = fit_from({}, base_.values);
+  KnownModel varying = options.beats_of.value_or(KnownModel{{}, {family.modulus_start_kPa(), 0.0, 0.0}});
+  if (!options.beats_of) varying.values = fit_from({}, varying.values).values;
+  set_beats(varying);
+  base_ = fit_from({}, {varying.values.begin(), varying.values.begin() + nuisances});
 }
 
 void RigProblem::set_blocks() {

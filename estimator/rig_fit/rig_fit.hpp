@@ -66,16 +66,23 @@ struct FitRequest {
   std::vector<bool> runs = {};  ///< which of the session's runs; empty: all
 };
 
+/// Effects and all unknowns' values of a fit that was made before.
+struct KnownModel {
+  std::vector<Ingredient> ingredients;
+  std::vector<double> values;
+};
+
 struct RigFitOptions {
   size_t threads = 2;
   size_t most_iterations = 40;
-  std::optional<NoiseModel> noise = {};  ///< known from elsewhere; else estimated from the session
-  SimulationOptions simulation{};        ///< steps are twice as long where there is no sensor at the pump
+  std::optional<KnownModel> beats_of = {};  ///< whose strokes vary; else the base model's, fitted
+  std::optional<NoiseModel> noise = {};     ///< known from elsewhere; else estimated from the session
+  SimulationOptions simulation{};           ///< steps are twice as long where there is no sensor at the pump
 };
 
 class RigProblem {
  public:
-  /// `session` and `family` must outlive it. The beats' shapes are those of the base model's fit.
+  /// `session` and `family` must outlive it.
   RigProblem(const Session& session, const SpecimenFamily& family, const RigFitOptions& options = {});
 
   [[nodiscard]] const NoiseModel& noise() const { return noise_; }
@@ -132,9 +139,10 @@ class RigProblem {
   [[nodiscard]] std::vector<std::vector<double>> starts(const std::vector<Ingredient>& ingredients,
                                                         const RigFit& before, size_t& simulations) const;
   void set_blocks();
-  void set_beats();
+  void set_beats(const KnownModel& of);
   /// Whitened change of each run's channels by the strokes of a group of cycles (beats.cpp), per relative change.
-  [[nodiscard]] std::vector<std::map<Channel, std::vector<double>>> beat_shapes(size_t group) const;
+  [[nodiscard]] std::vector<std::map<Channel, std::vector<double>>> beat_shapes(const KnownModel& of,
+                                                                                size_t group) const;
 
   const Session& session_;
   const SpecimenFamily& family_;

@@ -48,8 +48,20 @@ struct SessionOptions {
   std::vector<Ingredient> ingredients = {};
   std::vector<double> values = {};  ///< of the ingredients
   double noise_kPa = 0.01;
+  double beat_sd = 0.0;  ///< of each cycle's stroke, relative
   unsigned seed = 1;
 };
+
+/// Each cycle's stroke larger or smaller. Precondition: two strokes a cycle, from zero and back.
+inline Motion beating(const Motion& motion, double beat_sd, std::mt19937& generator) {
+  std::normal_distribution<double> normal;
+  std::vector<Stroke> strokes = motion.strokes();
+  for (size_t k = 0; k + 1 < strokes.size(); k += 2) {
+    strokes[k].to_mL *= 1.0 + beat_sd * normal(generator);
+    strokes[k + 1].from_mL = strokes[k].to_mL;
+  }
+  return {std::move(strokes), motion.rest_mL(), motion.spread_s()};
+}
 
 inline Session simulated_session(const SpecimenFamily& family, const SessionOptions& options) {
   Session session;
@@ -68,7 +80,9 @@ inline Session simulated_session(const SpecimenFamily& family, const SessionOpti
   std::mt19937 generator(options.seed);
   std::normal_distribution<double> normal;
   for (SessionRun& run : session.runs) {
-    const PlantTrace plant = simulate_plant(model, run.drive);
+    RunDrive drive = run.drive;
+    if (options.beat_sd > 0.0) drive.motion = beating(drive.motion, options.beat_sd, generator);
+    const PlantTrace plant = simulate_plant(model, drive);
     Prediction seen = observe(model, plant, run.drive.place, run.sample_s);
     for (auto* channel : {&seen.cavity_kPa, &seen.pump_kPa}) {
       const double sd = channel == &seen.cavity_kPa ? options.noise_kPa : 5.0 * options.noise_kPa;

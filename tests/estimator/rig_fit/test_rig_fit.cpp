@@ -31,6 +31,35 @@ TEST(RigFit, AnEffectThatIsThereStandsOutAndIsFoundAgain) {
   EXPECT_LT(fit.errors[3], 0.01);
 }
 
+TEST(RigFit, BeatsOfKnownSizeLeaveTheNoise) {
+  const SpecimenFamily family = gel_family();
+  constexpr double beat_sd = 0.008;
+  const Session session = simulated_session(family, {.beat_sd = beat_sd});
+  NoiseModel noise = estimate_noise(simulated_session(family, {}));
+  const auto reduced_with = [&](double beats) {
+    noise.beat_sd = beats;
+    return RigProblem(session, family, {.noise = noise}).base().reduced();
+  };
+  EXPECT_NEAR(reduced_with(beat_sd), 1.0, 0.04);
+  EXPECT_GT(reduced_with(1e-6), 1.2);
+}
+
+TEST(RigFit, BeatsMayBeThoseOfAModelWithEffects) {
+  const SpecimenFamily family = gel_family();
+  constexpr double beat_sd = 0.005;
+  const std::vector<Ingredient> leaking{{find_effect("cannula-leak-cavity")}};
+  const Session session =
+      simulated_session(family, {.ingredients = leaking, .values = {1.5}, .beat_sd = beat_sd});
+  NoiseModel noise = estimate_noise(simulated_session(family, {}));
+  noise.beat_sd = beat_sd;
+  const RigProblem plain(session, family, {.noise = noise});
+  const RigFit first = plain.fit(leaking);
+  const RigProblem leaky(session, family, {.beats_of = KnownModel{leaking, first.values}, .noise = noise});
+  const RigFit second = leaky.fit_from(leaking, first.values);
+  EXPECT_NEAR(second.reduced(), 1.0, 0.04);
+  EXPECT_LT(second.chi_square, first.chi_square);
+}
+
 TEST(RigFit, AMissingSampleCostsOnlyItsNeighbours) {
   const SpecimenFamily family = gel_family();
   Session session = simulated_session(family, {});
