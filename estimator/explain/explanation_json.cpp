@@ -3,48 +3,38 @@
 #include <fmt/format.h>
 
 #include <cmath>
-#include <limits>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
-#include <type_traits>
 #include <utility>
 
+#include "estimator/io/member_json.hpp"
 #include "protocol/contract/input_error.hpp"
 
-namespace diastole::explain {
-namespace {
+namespace diastole {
+namespace explain {
 
-using Json = nlohmann::ordered_json;
-
-constexpr int newest_version = 1;
-
-template <class T, class Struct>
-concept Is = std::is_same_v<std::remove_const_t<T>, Struct>;
-
-// One list of members a struct serves writing and reading: `visit(name, member)`.
-
-template <class Visit>
-void each_member(Visit&& visit, Is<FoundParameter> auto& p) {
+template <class Visit, IsRecord<FoundParameter> Record>
+void each_member(Visit&& visit, Record& p) {
   visit("value", p.value);
   visit("ci90", p.ci90);
   visit("standard_error", p.standard_error);
 }
 
-template <class Visit>
-void each_member(Visit&& visit, Is<FoundMoment> auto& m) {
+template <class Visit, IsRecord<FoundMoment> Record>
+void each_member(Visit&& visit, Record& m) {
   visit("run", m.run);
   visit("time_s", m.time_s);
 }
 
-template <class Visit>
-void each_member(Visit&& visit, Is<FoundEffect> auto& e) {
+template <class Visit, IsRecord<FoundEffect> Record>
+void each_member(Visit&& visit, Record& e) {
   visit("id", e.id);
   visit("parameters", e.parameters);
   visit("moments", e.moments);
 }
 
-template <class Visit>
-void each_member(Visit&& visit, Is<Misfit> auto& m) {
+template <class Visit, IsRecord<Misfit> Record>
+void each_member(Visit&& visit, Record& m) {
   visit("port", m.port);
   visit("run", m.run);
   visit("channel", m.channel);
@@ -56,8 +46,8 @@ void each_member(Visit&& visit, Is<Misfit> auto& m) {
   visit("p_value", m.p_value);
 }
 
-template <class Visit>
-void each_member(Visit&& visit, Is<Gap> auto& g) {
+template <class Visit, IsRecord<Gap> Record>
+void each_member(Visit&& visit, Record& g) {
   visit("before", g.before);
   visit("after", g.after);
   visit("floor", g.floor);
@@ -65,8 +55,8 @@ void each_member(Visit&& visit, Is<Gap> auto& g) {
   visit("held_out", g.held_out);
 }
 
-template <class Visit>
-void each_member(Visit&& visit, Is<Candidate> auto& c) {
+template <class Visit, IsRecord<Candidate> Record>
+void each_member(Visit&& visit, Record& c) {
   visit("ids", c.ids);
   visit("chi_square_drop", c.chi_square_drop);
   visit("refitted", c.refitted);
@@ -75,8 +65,8 @@ void each_member(Visit&& visit, Is<Candidate> auto& c) {
   visit("verdict", c.verdict);
 }
 
-template <class Visit>
-void each_member(Visit&& visit, Is<ParameterShift> auto& s) {
+template <class Visit, IsRecord<ParameterShift> Record>
+void each_member(Visit&& visit, Record& s) {
   visit("name", s.name);
   visit("before", s.before);
   visit("before_error", s.before_error);
@@ -84,8 +74,8 @@ void each_member(Visit&& visit, Is<ParameterShift> auto& s) {
   visit("after_error", s.after_error);
 }
 
-template <class Visit>
-void each_member(Visit&& visit, Is<Trace> auto& t) {
+template <class Visit, IsRecord<Trace> Record>
+void each_member(Visit&& visit, Record& t) {
   visit("run", t.run);
   visit("channel", t.channel);
   visit("unit", t.unit);
@@ -98,30 +88,30 @@ void each_member(Visit&& visit, Is<Trace> auto& t) {
   visit("trigger_s", t.trigger_s);
 }
 
-template <class Visit>
-void each_member(Visit&& visit, Is<FieldResidual> auto& r) {
+template <class Visit, IsRecord<FieldResidual> Record>
+void each_member(Visit&& visit, Record& r) {
   visit("place_mm", r.place_mm);
   visit("frame", r.frame);
   visit("before", r.before);
   visit("after", r.after);
 }
 
-template <class Visit>
-void each_member(Visit&& visit, Is<Step> auto& s) {
+template <class Visit, IsRecord<Step> Record>
+void each_member(Visit&& visit, Record& s) {
   visit("added", s.added);
   visit("reduced_chi_square", s.reduced_chi_square);
 }
 
-template <class Visit>
-void each_member(Visit&& visit, Is<NextExperiment> auto& n) {
+template <class Visit, IsRecord<NextExperiment> Record>
+void each_member(Visit&& visit, Record& n) {
   visit("toml", n.toml);
   visit("separates", n.separates);
   visit("predicted_separation_sigma", n.predicted_separation_sigma);
   visit("reason", n.reason);
 }
 
-template <class Visit>
-void each_member(Visit&& visit, Is<Explanation> auto& e) {
+template <class Visit, IsRecord<Explanation> Record>
+void each_member(Visit&& visit, Record& e) {
   visit("study", e.study);
   visit("verdict", e.verdict);
   visit("summary", e.summary);
@@ -139,118 +129,46 @@ void each_member(Visit&& visit, Is<Explanation> auto& e) {
   visit("seconds", e.seconds);
 }
 
-template <class T>
-concept HasMembers = requires(T& value) {
-  each_member([](const char*, auto&) {}, value);
+}  // namespace explain
+
+template <>
+struct JsonForm<explain::Verdict> {
+  static nlohmann::ordered_json written(explain::Verdict verdict) { return name_of(verdict); }
+  static void read(const nlohmann::ordered_json& json, explain::Verdict& verdict) {
+    using explain::Verdict;
+    const auto word = json.get<std::string>();
+    for (const Verdict known : {Verdict::named, Verdict::ambiguous, Verdict::unexplained, Verdict::none}) {
+      if (name_of(known) == word) return void(verdict = known);
+    }
+    throw std::invalid_argument("\"" + word + "\" is no verdict");
+  }
 };
 
-Json written(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
-Json written(const std::string& value) { return value; }
-Json written(Verdict value) { return name_of(value); }
-template <class Whole>
-requires std::is_integral_v<Whole> Json written(Whole value) { return value; }
-template <HasMembers T>
-Json written(const T& value);
-template <class T>
-Json written(const std::optional<T>& value);
-template <class T, size_t Count>
-Json written(const std::array<T, Count>& list);
-template <class T>
-Json written(const std::vector<T>& list) {
-  Json json = Json::array();
-  for (const auto& value : list)
-    json.push_back(written(value));
-  return json;
-}
-Json written(const std::vector<FoundParameter>& parameters) {
-  Json json = Json::object();
-  for (const FoundParameter& parameter : parameters)
-    json[parameter.name] = written<FoundParameter>(parameter);
-  return json;
-}
-template <class T>
-Json written(const std::optional<T>& value) {
-  return value ? written(*value) : Json(nullptr);
-}
-template <class T, size_t Count>
-Json written(const std::array<T, Count>& list) {
-  Json json = Json::array();
-  for (const T& value : list)
-    json.push_back(written(value));
-  return json;
-}
-template <HasMembers T>
-Json written(const T& value) {
-  Json json = Json::object();
-  each_member([&](const char* name, const auto& member) { json[name] = written(member); }, value);
-  return json;
-}
+// An object with the parameters' names as keys.
+template <>
+struct JsonForm<std::vector<explain::FoundParameter>> {
+  static nlohmann::ordered_json written(const std::vector<explain::FoundParameter>& parameters) {
+    auto json = nlohmann::ordered_json::object();
+    for (const explain::FoundParameter& parameter : parameters)
+      json[parameter.name] = diastole::written(parameter);
+    return json;
+  }
+  static void read(const nlohmann::ordered_json& json, std::vector<explain::FoundParameter>& parameters) {
+    if (!json.is_object()) throw std::invalid_argument("is no object of parameters");
+    parameters.clear();
+    for (const auto& [name, value] : json.items()) {
+      parameters.emplace_back().name = name;
+      read_json(value, parameters.back(), MissingMembers::kept);
+    }
+  }
+};
 
-void read(const Json& json, double& value) {
-  value = json.is_null() ? std::numeric_limits<double>::quiet_NaN() : json.get<double>();
-}
-void read(const Json& json, std::string& value) { value = json.is_null() ? "" : json.get<std::string>(); }
-void read(const Json& json, bool& value) { value = json.get<bool>(); }
-void read(const Json& json, Verdict& value) {
-  const auto word = json.get<std::string>();
-  for (const Verdict verdict : {Verdict::named, Verdict::ambiguous, Verdict::unexplained, Verdict::none}) {
-    if (name_of(verdict) == word) return void(value = verdict);
-  }
-  throw std::invalid_argument("\"" + word + "\" is no verdict");
-}
-template <class Whole>
-requires std::is_integral_v<Whole>
-void read(const Json& json, Whole& value) {
-  if (!json.is_number_integer() || !std::in_range<Whole>(json.get<int64_t>()))
-    throw std::invalid_argument(json.dump() + " is no whole number in range");
-  value = static_cast<Whole>(json.get<int64_t>());
-}
-template <HasMembers T>
-void read(const Json& json, T& value);
-template <class T>
-void read(const Json& json, std::optional<T>& value);
-template <class T, size_t Count>
-void read(const Json& json, std::array<T, Count>& list) {
-  if (!json.is_array() || json.size() != Count) throw std::invalid_argument("is a list of another length");
-  for (size_t i = 0; i < Count; ++i)
-    read(json[i], list[i]);
-}
-template <class T>
-void read(const Json& json, std::vector<T>& list) {
-  if (!json.is_array()) throw std::invalid_argument("is no list");
-  list.clear();
-  for (const Json& value : json)
-    read(value, list.emplace_back());
-}
-void read(const Json& json, std::vector<FoundParameter>& parameters) {
-  if (!json.is_object()) throw std::invalid_argument("is no object of parameters");
-  parameters.clear();
-  for (const auto& [name, value] : json.items()) {
-    parameters.emplace_back().name = name;
-    read<FoundParameter>(value, parameters.back());
-  }
-}
-template <class T>
-void read(const Json& json, std::optional<T>& value) {
-  if (json.is_null()) return value.reset();
-  read(json, value.emplace());
-}
-template <HasMembers T>
-void read(const Json& json, T& value) {
-  if (!json.is_object()) throw std::invalid_argument("is no object");
-  each_member(
-      [&](const char* name, auto& member) {
-        if (!json.contains(name)) return;
-        try {
-          read(json.at(name), member);
-        } catch (const nlohmann::json::exception& error) {
-          throw std::invalid_argument(fmt::format("key {}: {}", name, error.what()));
-        } catch (const std::invalid_argument& error) {
-          throw std::invalid_argument(fmt::format("key {}: {}", name, error.what()));
-        }
-      },
-      value);
-}
+namespace explain {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr int newest_version = 1;
 
 void round_traces(std::vector<Trace>& traces) {
   const auto shorten = [](std::vector<double>& values) {
@@ -313,7 +231,7 @@ Explanation explanation_from_json(std::string_view text, const std::string& file
                         "Update the program."});
     }
     Explanation explanation;
-    read(json, explanation);
+    read_json(json, explanation, MissingMembers::kept);
     for (const char* key : {"verdict", "effects", "where", "gap"})
       if (!json.contains(key)) throw std::invalid_argument(fmt::format("has no key {}", key));
     require_sound(explanation);
@@ -325,4 +243,5 @@ Explanation explanation_from_json(std::string_view text, const std::string& file
   }
 }
 
-}  // namespace diastole::explain
+}  // namespace explain
+}  // namespace diastole

@@ -2,25 +2,17 @@
 
 #include <fmt/format.h>
 
-#include <cmath>
-#include <limits>
 #include <stdexcept>
-#include <type_traits>
 
 #include "estimator/io/finding_json.hpp"
+#include "estimator/io/member_json.hpp"
 #include "estimator/io/section_json.hpp"
 #include "protocol/contract/input_error.hpp"
 
 namespace diastole {
-namespace {
 
-constexpr int newest_version = 1;
-
-// One list of members a struct serves writing and reading: `visit(name, member)`.
-
-template <class Visit, class Frame>
-void each_member(Visit&& visit,
-                 Frame& f) requires std::is_same_v<std::remove_const_t<Frame>, ReconstructedFrame> {
+template <class Visit, IsRecord<ReconstructedFrame> Record>
+void each_member(Visit&& visit, Record& f) {
   visit("frame", f.frame);
   visit("time_s", f.time_s);
   visit("pressure_kPa", f.pressure_kPa);
@@ -46,18 +38,16 @@ void each_member(Visit&& visit,
   visit("settled", f.settled);
 }
 
-template <class Visit, class Family>
-void each_member(Visit&& visit,
-                 Family& f) requires std::is_same_v<std::remove_const_t<Family>, ReconstructedFamily> {
+template <class Visit, IsRecord<ReconstructedFamily> Record>
+void each_member(Visit&& visit, Record& f) {
   visit("normal", f.normal);
   visit("rows", f.rows);
   visit("chi2_per_dof", f.chi2_per_dof);
   visit("by_frame", f.by_frame);
 }
 
-template <class Visit, class Slice>
-void each_member(Visit&& visit,
-                 Slice& s) requires std::is_same_v<std::remove_const_t<Slice>, ReconstructedSlice> {
+template <class Visit, IsRecord<ReconstructedSlice> Record>
+void each_member(Visit&& visit, Record& s) {
   visit("where", s.where);
   visit("rows", s.rows);
   visit("offset_mm", s.offset_mm);
@@ -65,9 +55,8 @@ void each_member(Visit&& visit,
   visit("displaced", s.displaced);
 }
 
-template <class Visit, class Element>
-void each_member(Visit&& visit,
-                 Element& e) requires std::is_same_v<std::remove_const_t<Element>, ReconstructedElement> {
+template <class Visit, IsRecord<ReconstructedElement> Record>
+void each_member(Visit&& visit, Record& e) {
   visit("element", e.element);
   visit("rows", e.rows);
   visit("weakest_direction", e.weakest_direction);
@@ -78,25 +67,22 @@ void each_member(Visit&& visit,
   visit("volume_ratio_se", e.volume_ratio_se);
 }
 
-template <class Visit, class Mode>
-void each_member(Visit&& visit,
-                 Mode& m) requires std::is_same_v<std::remove_const_t<Mode>, ReconstructedMode> {
+template <class Visit, IsRecord<ReconstructedMode> Record>
+void each_member(Visit&& visit, Record& m) {
   visit("words", m.words);
   visit("se_mm", m.se_mm);
 }
 
-template <class Visit, class Curve>
-void each_member(Visit&& visit,
-                 Curve& c) requires std::is_same_v<std::remove_const_t<Curve>, CrossValidationCurve> {
+template <class Visit, IsRecord<CrossValidationCurve> Record>
+void each_member(Visit&& visit, Record& c) {
   visit("frame", c.frame);
   visit("lambda", c.lambda);
   visit("score", c.score);
   visit("degrees_of_freedom", c.degrees_of_freedom);
 }
 
-template <class Visit, class Record>
-void each_member(Visit&& visit,
-                 Record& r) requires std::is_same_v<std::remove_const_t<Record>, ReconstructionRecord> {
+template <class Visit, IsRecord<ReconstructionRecord> Record>
+void each_member(Visit&& visit, Record& r) {
   visit("study", r.study);
   visit("data", r.data);
   visit("mesh", r.mesh);
@@ -116,66 +102,15 @@ void each_member(Visit&& visit,
   visit("residual_counts", r.residual_counts);
 }
 
-template <class T>
-concept HasMembers = requires(T& value) {
-  each_member([](const char*, auto&) {}, value);
+template <>
+struct JsonForm<Finding> {
+  static Json written(const Finding& finding) { return from_finding(finding); }
+  static void read(const Json& json, Finding& finding) { finding = to_finding(json); }
 };
 
-Json written(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
-Json written(const std::string& value) { return value; }
-Json written(const Finding& value) { return from_finding(value); }
-template <class Whole>
-requires std::is_integral_v<Whole> Json written(Whole value) { return value; }
-template <HasMembers T>
-Json written(const T& value);
-template <class List>
-requires requires(const List& list) {
-  list.begin();
-} &&(!std::is_same_v<List, std::string>)Json written(const List& list) {
-  Json json = Json::array();
-  for (const auto& value : list)
-    json.push_back(written(value));
-  return json;
-}
-template <HasMembers T>
-Json written(const T& value) {
-  Json json = Json::object();
-  each_member([&](const char* name, const auto& member) { json[name] = written(member); }, value);
-  return json;
-}
+namespace {
 
-void read(const Json& json, double& value) {
-  value = json.is_null() ? std::numeric_limits<double>::quiet_NaN() : json.get<double>();
-}
-void read(const Json& json, std::string& value) { value = json.get<std::string>(); }
-void read(const Json& json, Finding& value) { value = to_finding(json); }
-void read(const Json& json, bool& value) { value = json.get<bool>(); }
-template <class Whole>
-requires std::is_integral_v<Whole>
-void read(const Json& json, Whole& value) {
-  if (!json.is_number_unsigned() || !std::in_range<Whole>(json.get<uint64_t>()))
-    throw std::invalid_argument(json.dump() + " is no whole number in range");
-  value = static_cast<Whole>(json.get<uint64_t>());
-}
-template <HasMembers T>
-void read(const Json& json, T& value);
-template <class T, size_t Count>
-void read(const Json& json, std::array<T, Count>& list) {
-  if (!json.is_array() || json.size() != Count) throw std::invalid_argument("a list has another length");
-  for (size_t i = 0; i < Count; ++i)
-    read(json[i], list[i]);
-}
-template <class T>
-void read(const Json& json, std::vector<T>& list) {
-  if (!json.is_array()) throw std::invalid_argument("something is no list");
-  list.clear();
-  for (const Json& value : json)
-    read(value, list.emplace_back());
-}
-template <HasMembers T>
-void read(const Json& json, T& value) {
-  each_member([&](const char* name, auto& member) { read(json.at(name), member); }, value);
-}
+constexpr int newest_version = 1;
 
 void require_lengths(const ReconstructionRecord& record) {
   for (const CrossValidationCurve& curve : record.curves) {
@@ -214,7 +149,7 @@ ReconstructionRecord reconstruction_record_from_json(std::string_view text, cons
     if (!json.is_object() || json.value("format", "") != reconstruction_file_mark)
       throw InputError({file, "key format", fmt::format("is not \"{}\"", reconstruction_file_mark), remedy});
     int version = 0;
-    read(json.at("format_version"), version);
+    read_json(json.at("format_version"), version);
     if (version > newest_version) {
       throw InputError(
           {file, "key format_version",
@@ -222,7 +157,7 @@ ReconstructionRecord reconstruction_record_from_json(std::string_view text, cons
            "Update the program."});
     }
     ReconstructionRecord record;
-    read(json, record);
+    read_json(json, record);
     for (const Json& section : json.at("sections"))
       record.sections.push_back(to_section(section));
     require_lengths(record);
