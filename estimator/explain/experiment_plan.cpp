@@ -31,14 +31,6 @@ constexpr std::array<Waveform, 4> waveforms{
      {"sawtooth", 4.76, 119.05},
      {"reversed-sawtooth", 4.76, 119.05}}};
 
-double attribute(const runfile::RecordedRun& run, const char* name, double otherwise) {
-  const auto found = run.rig.find(name);
-  if (found == run.rig.end()) return otherwise;
-  if (const auto* number = std::get_if<double>(&found->second)) return *number;
-  if (const auto* whole = std::get_if<int64_t>(&found->second)) return static_cast<double>(*whole);
-  return otherwise;
-}
-
 Segment cycling(const char* waveform, double stroke_mL, double period_s, double offset_mL) {
   const auto cycles = std::max<int64_t>(6, std::llround(seconds_a_segment / period_s));
   return {0.0, waveform, stroke_mL, period_s, offset_mL, cycles};
@@ -48,14 +40,12 @@ double round_to_half(double volume_mL) { return std::floor(2 * volume_mL) / 2; }
 
 }  // namespace
 
-ExperimentLimits ExperimentLimits::of(const rig::Session& session, const runfile::RecordedRun& run) {
+ExperimentLimits ExperimentLimits::of(const rig::Session& session) {
   ExperimentLimits limits;
-  limits.flow_mL_s = attribute(run, "limit_flow_mL_s", limits.flow_mL_s);
-  limits.acceleration_mL_s2 = attribute(run, "limit_acceleration_mL_s2", limits.acceleration_mL_s2);
-  limits.pressure_kPa = attribute(run, "limit_pressure_kPa", limits.pressure_kPa);
+  limits.motion = session.limits;
   double largest_mL = 0.0;
-  for (const rig::SessionRun& other : session.runs) {
-    for (const rig::Stroke& stroke : other.drive.motion.strokes())
+  for (const rig::SessionRun& run : session.runs) {
+    for (const rig::Stroke& stroke : run.drive.motion.strokes())
       largest_mL = std::max({largest_mL, stroke.from_mL, stroke.to_mL});
   }
   if (largest_mL > 0.0) limits.largest_mL = largest_mL;
@@ -67,8 +57,9 @@ bool ExperimentLimits::allow(const Segment& segment, const rig::Hose& hose) cons
   const auto* shape = std::ranges::find(waveforms, segment.waveform, &Waveform::name);
   if (shape == waveforms.end()) return segment.waveform == "hold";
   const double acceleration = shape->acceleration * segment.stroke_mL / (segment.period_s * segment.period_s);
-  return shape->flow * segment.stroke_mL / segment.period_s < spare * flow_mL_s &&
-         acceleration < spare * acceleration_mL_s2 && hose.inertance() * acceleration < spare * pressure_kPa;
+  return shape->flow * segment.stroke_mL / segment.period_s < spare * motion.flow_mL_s &&
+         acceleration < spare * motion.acceleration_mL_s2 &&
+         hose.inertance() * acceleration < spare * motion.pressure_kPa;
 }
 
 std::vector<Segment> possible_segments(const ExperimentLimits& limits, const rig::Hose& hose) {

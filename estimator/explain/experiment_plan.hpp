@@ -12,13 +12,10 @@ namespace diastole::explain {
 
 /// What the controller refuses beyond, and what this specimen has borne.
 struct ExperimentLimits {
-  double flow_mL_s = 1860.0;
-  double acceleration_mL_s2 = 1700.0;
-  double pressure_kPa = 79.3;  ///< at the piston, from accelerating the fluid in the hose
-  double largest_mL = 40.0;    ///< the largest volume in the session's runs
+  rig::MotionLimits motion;
+  double largest_mL = 40.0;  ///< the largest volume in the session's runs
 
-  /// From a run's /rig (limit_flow_mL_s and so on; the controller's own where it does not tell) and the session.
-  static ExperimentLimits of(const rig::Session& session, const runfile::RecordedRun& run);
+  static ExperimentLimits of(const rig::Session& session);
   /// With a tenth to spare.
   [[nodiscard]] bool allow(const runfile::Segment& segment, const rig::Hose& hose) const;
 };

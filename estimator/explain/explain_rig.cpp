@@ -162,7 +162,7 @@ Work searched(const rig::Session& session, const rig::SpecimenFamily& family, co
 
 std::optional<NextExperiment> next_experiment(const rig::Session& session, const Work& work,
                                               const Explanation& found, size_t threads) {
-  const ExperimentDesign design{session, work.problem, {}, threads};
+  const ExperimentDesign design{session, work.problem, ExperimentLimits::of(session), threads};
   if (found.verdict == Verdict::unexplained && !found.where.empty())
     return exposing_experiment(design, found.where.front());
   if (found.verdict == Verdict::named) return sharpening_experiment(design, work.best().fit);

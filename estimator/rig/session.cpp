@@ -118,6 +118,18 @@ RigModel base_model(const RecordedRun& run) {
   return model;
 }
 
+namespace {
+
+MotionLimits limits_of(const RecordedRun& run) {
+  MotionLimits limits;
+  limits.flow_mL_s = attribute(run, "limit_flow_mL_s", limits.flow_mL_s);
+  limits.acceleration_mL_s2 = attribute(run, "limit_acceleration_mL_s2", limits.acceleration_mL_s2);
+  limits.pressure_kPa = attribute(run, "limit_pressure_kPa", limits.pressure_kPa);
+  return limits;
+}
+
+}  // namespace
+
 Session read_session(const Study& study) {
   if (study.data.runs.empty()) {
     throw InputError(
@@ -135,7 +147,10 @@ Session read_session(const Study& study) {
                         .problem = "the run holds no motion or no pressures",
                         .remedy = "Take the run off the study's list."});
     }
-    if (session.runs.empty()) session.base = base_model(run);
+    if (session.runs.empty()) {
+      session.base = base_model(run);
+      session.limits = limits_of(run);
+    }
     session.runs.push_back(take(std::move(run), short_name(file)));
   }
   double first_s = std::numeric_limits<double>::infinity();

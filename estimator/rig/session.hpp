@@ -30,9 +30,17 @@ struct SessionRun {
   std::vector<GatedVolume> volumes;
 };
 
+/// Beyond these the controller refuses a motion.
+struct MotionLimits {
+  double flow_mL_s = 1860.0;
+  double acceleration_mL_s2 = 1700.0;
+  double pressure_kPa = 79.3;  ///< at the piston, from accelerating the fluid in the hose
+};
+
 struct Session {
   std::vector<SessionRun> runs;  ///< in the study's order
   RigModel base;                 ///< of the first run's /rig; its curve is not yet set
+  MotionLimits limits;           ///< of the first run's /rig; the controller's own where it does not tell
 };
 
 /// Throws InputError if the study names no runs, a run cannot be read, or runs are of different rigs.

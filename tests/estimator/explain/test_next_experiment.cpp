@@ -33,7 +33,7 @@ TEST(ExperimentPlan, StaysWithinTheLimits) {
   limits.largest_mL = 20.0;
   for (const auto& segment : possible_segments(limits, hose))
     EXPECT_LE(segment.offset_mL + segment.stroke_mL, 20.0) << words_of(segment);
-  limits.acceleration_mL_s2 = 100.0;
+  limits.motion.acceleration_mL_s2 = 100.0;
   const auto gentle = possible_segments(limits, hose);
   EXPECT_LT(gentle.size(), all.size());
   for (const auto& segment : gentle) {
