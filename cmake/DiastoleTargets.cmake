@@ -5,11 +5,13 @@ target_include_directories(diastole_options INTERFACE ${CMAKE_SOURCE_DIR})
 target_compile_options(diastole_options INTERFACE
   -Wall -Wextra -Wconversion -Wdouble-promotion -Wshadow -Wnon-virtual-dtor -Werror)
 
-# diastole_library(NAME SOURCES a.cpp ... [LIBS x ...])
+# diastole_library(NAME [TOGETHER] SOURCES a.cpp ... [LIBS x ...])
 # A static library; sources are found and included by their path from the root ("protocol/wire/frame.hpp").
+# TOGETHER: its sources are compiled six at a time, since each alone would mostly compile CLI11 or Asio anew.
 function(diastole_library name)
-  cmake_parse_arguments(ARG "" "" "SOURCES;LIBS" ${ARGN})
+  cmake_parse_arguments(ARG "TOGETHER" "" "SOURCES;LIBS" ${ARGN})
   add_library(${name} STATIC ${ARG_SOURCES})
+  set_target_properties(${name} PROPERTIES UNITY_BUILD ${ARG_TOGETHER} UNITY_BUILD_BATCH_SIZE 6)
   target_link_libraries(${name} PUBLIC diastole_options ${ARG_LIBS})
 endfunction()
 
