@@ -18,6 +18,7 @@ namespace diastole::explain {
 namespace {
 
 constexpr double discovery_rate = 0.01;
+constexpr double other_beats = 0.5;  // of chi-square left by effects that change what a beat looks like, too
 
 std::string summary_of(const Explanation& found) {
   std::vector<std::string> ids;
@@ -132,7 +133,8 @@ struct Work {
   [[nodiscard]] const FittedSet& best() const { return found.sets[found.best]; }
 };
 
-/// A first search, and a second one if the effects had spoiled the estimate of the noise.
+/// A first search, and a second one if the effects had spoiled the estimate of the noise or are so large that strokes
+/// vary otherwise with them.
 Work searched(const rig::Session& session, const rig::SpecimenFamily& family, const Study& study,
               const ExplainOptions& options) {
   const auto tell = [&](const std::string& text) {
@@ -148,7 +150,8 @@ Work searched(const rig::Session& session, const rig::SpecimenFamily& family, co
   SearchResult found = search(session, family, problem, searching);
   const rig::RigFit& best = found.sets[found.best].fit;
   const rig::NoiseModel noise = rig::estimate_noise(without_effects(session, problem, best));
-  if (!best.ingredients.empty() && differ(problem.noise(), noise)) {
+  const bool large = best.chi_square < other_beats * problem.base().chi_square;
+  if (!best.ingredients.empty() && (large || differ(problem.noise(), noise))) {
     tell("fitting again with the noise that is left");
     fitting.noise = noise;
     fitting.beats_of = rig::KnownModel{best.ingredients, best.values};

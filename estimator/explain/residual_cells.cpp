@@ -142,8 +142,12 @@ void ChannelView::add_rest(std::vector<ResidualCell>& out) const {
 
 void ChannelView::add_bands(std::vector<ResidualCell>& out) const {
   std::vector<double> scaled(block_.count);
-  for (size_t k = 0; k < block_.count; ++k)
+  double models_part = 0.0;  // of the variance
+  for (size_t k = 0; k < block_.count; ++k) {
     scaled[k] = r(k) / std::sqrt(1.0 + v(k));
+    models_part += v(k) / (1.0 + v(k)) / static_cast<double>(block_.count);
+  }
+  const bool rings = block_.channel == name_of(rig::Channel::pump);
   Eigen::FFT<double> transform;
   std::vector<std::complex<double>> spectrum;
   transform.fwd(spectrum, scaled);
@@ -157,7 +161,11 @@ void ChannelView::add_bands(std::vector<ResidualCell>& out) const {
       made.chi_square += 2.0 * std::norm(spectrum[k]) / static_cast<double>(block_.count);
       made.dofs += 2.0;
     }
-    if (made.dofs > 0.0) out.push_back(made);
+    if (made.dofs == 0.0) continue;
+    // The line rings at single frequencies: all of the model's error may lie in this band.
+    const double share = made.dofs / static_cast<double>(block_.count);
+    if (rings) made.chi_square /= 1.0 + models_part * (1.0 / share - 1.0);
+    out.push_back(made);
   }
 }
 

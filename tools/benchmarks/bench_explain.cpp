@@ -19,6 +19,7 @@
 #include "estimator/explain/explanation_json.hpp"
 #include "estimator/explain/score.hpp"
 #include "tools/benchmarks/bench_explain_field.hpp"
+#include "tools/benchmarks/recorded_cases.hpp"
 
 namespace {
 
@@ -69,44 +70,30 @@ void report(const std::string& name, const nlohmann::json& label, const explain:
   std::fflush(stdout);
 }
 
-void explain_sessions(const fs::path& folder, const nlohmann::json& labels,
-                      const std::vector<std::string>& wanted, const fs::path& kept) {
-  for (const auto& [name, label] : labels.items()) {
-    const bool chosen =
-        wanted.empty() ||
-        std::any_of(wanted.begin(), wanted.end(), [&, &name = name, &label = label](const std::string& word) {
-          return name == word || label["kind"] == word;
-        });
-    if (!chosen) continue;
-    const Study study = read_study(folder / name / (name + ".study.toml"));
+void explain_sessions(const bench::Recordings& recordings, const fs::path& kept) {
+  bench::visit_cases(recordings, [&](const bench::RecordedCase& recorded) {
     explain::Explanation found =
-        explain::explain_rig(study, {.threads = 2, .propose = false, .progress = {}});
-    report(name, label, found);
+        explain::explain_rig(read_study(recorded.study), {.threads = 2, .propose = false, .progress = {}});
+    report(recorded.name, recorded.label, found);
     found.traces.clear();
-    std::ofstream(kept / (name + ".json")) << explain::to_json(found);
-  }
+    std::ofstream(kept / (recorded.name + ".json")) << explain::to_json(found);
+  });
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
-  const fs::path folder = argc > 1 ? fs::path(argv[1]) : fs::path(DIASTOLE_SOURCE_DIR) / "../shared/data/rig";
-  std::ifstream file(folder / "labels.json");
-  if (!file) {
-    fmt::print("skipped: no labels.json in {}\n", folder.string());
-    return 0;
-  }
-  const nlohmann::json labels = nlohmann::json::parse(file);
-  const std::vector<std::string> wanted(argv + std::min(argc, 2), argv + argc);
+  const auto recordings = bench::recordings_of(argc, argv);
+  if (!recordings) return 0;
   const fs::path kept = fs::path(DIASTOLE_SOURCE_DIR) / "build/explained";
   fs::remove_all(kept);  // what is scored is of this run
   fs::create_directories(kept);
-  if (labels.contains("cases")) {
-    bench::explain_imaged_motion(folder, wanted, kept);
+  if (recordings->labels.contains("cases")) {
+    bench::explain_imaged_motion(recordings->folder, recordings->wanted, kept);
   } else {
-    explain_sessions(folder, labels, wanted, kept);
+    explain_sessions(*recordings, kept);
   }
-  const explain::Score score = explain::score_folder(folder, kept);
+  const explain::Score score = explain::score_folder(recordings->folder, kept);
   fmt::print("\n{}", explain::told(score));
   return score.passed() ? 0 : 1;
 }

@@ -1,4 +1,4 @@
-// `tools/bench rig [folder] [case ...]`: how well the rig's model fits recorded sessions (data/README.md, labels.json).
+// `tools/bench rig [folder] [case or kind ...]`: how well the rig's model fits recorded sessions (data/README.md, labels.json).
 // A row a case: reduced chi-square of the base model and of the model with the labelled effects, by channel too, the
 // effects' parameters with their errors and the truth, simulations and seconds.
 
@@ -7,18 +7,17 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <filesystem>
-#include <fstream>
+#include <memory>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
 #include "estimator/rig_fit/rig_fit.hpp"
+#include "tools/benchmarks/recorded_cases.hpp"
 
 namespace {
 
 using namespace diastole;
-namespace fs = std::filesystem;
 
 double seconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -69,9 +68,8 @@ std::vector<rig::Ingredient> labelled(const nlohmann::json& label, const rig::Se
   return list;
 }
 
-void report(const std::string& name, const nlohmann::json& label, const fs::path& folder,
-            const rig::SpecimenFamily& family) {
-  const Study study = read_study(folder / name / (name + ".study.toml"));
+void report(const bench::RecordedCase& recorded, const Study& study, const rig::SpecimenFamily& family) {
+  const nlohmann::json& label = recorded.label;
   const auto begun = std::chrono::steady_clock::now();
   const rig::Session session = rig::read_session(study);
   const rig::RigProblem problem(session, family);
@@ -82,11 +80,12 @@ void report(const std::string& name, const nlohmann::json& label, const fs::path
   fmt::print(
       "{} {:11} {:38} d {:8.1f} base {:9.3f} |{} | C1 {:.4f}+-{:.4f} ({:.4f}) off {:.1f} {:.1f} ({:.1f}) "
       "noise {:.1f} beat {:.2e} ({:.2e}) {:.1f} s\n",
-      name, label["kind"].get<std::string>(), kinds, label["d"].get<double>(), problem.base().reduced(),
-      by_channel(problem, problem.base()), problem.base().values[0], problem.base().errors[0],
-      label["C1_kPa"].get<double>(), problem.base().values[1], problem.base().values[2],
-      label["offset_Pa"].get<double>(), 1e3 * noise.channels.at(rig::Channel::cavity).sd_kPa, noise.beat_sd,
-      label["beat_sd"].get<double>(), seconds_since(begun));
+      recorded.name, label["kind"].get<std::string>(), kinds, label["d"].get<double>(),
+      problem.base().reduced(), by_channel(problem, problem.base()), problem.base().values[0],
+      problem.base().errors[0], label["C1_kPa"].get<double>(), problem.base().values[1],
+      problem.base().values[2], label["offset_Pa"].get<double>(),
+      1e3 * noise.channels.at(rig::Channel::cavity).sd_kPa, noise.beat_sd, label["beat_sd"].get<double>(),
+      seconds_since(begun));
   const std::vector<rig::Ingredient> effects = labelled(label, session);
   if (effects.empty()) return;
   const auto second = std::chrono::steady_clock::now();
@@ -104,25 +103,13 @@ void report(const std::string& name, const nlohmann::json& label, const fs::path
 }  // namespace
 
 int main(int argc, char** argv) {
-  const fs::path folder = argc > 1 ? fs::path(argv[1]) : fs::path(DIASTOLE_SOURCE_DIR) / "../shared/data/rig";
-  std::ifstream file(folder / "labels.json");
-  if (!file) {
-    fmt::print("skipped: no labels.json in {}\n", folder.string());
-    return 0;
-  }
-  const nlohmann::json labels = nlohmann::json::parse(file);
-  std::vector<std::string> wanted(argv + std::min(argc, 2), argv + argc);
+  const auto recordings = bench::recordings_of(argc, argv);
+  if (!recordings) return 0;
   std::unique_ptr<rig::SpecimenFamily> family;  // all sessions have the same specimen
-  for (const auto& [name, label] : labels.items()) {
-    const bool chosen =
-        wanted.empty() ||
-        std::any_of(wanted.begin(), wanted.end(), [&, &name = name, &label = label](const std::string& word) {
-          return name == word || label["kind"] == word;
-        });
-    if (!chosen) continue;
-    if (!family)
-      family = std::make_unique<rig::SpecimenFamily>(read_study(folder / name / (name + ".study.toml")));
-    report(name, label, folder, *family);
-  }
+  bench::visit_cases(*recordings, [&](const bench::RecordedCase& recorded) {
+    const Study study = read_study(recorded.study);
+    if (!family) family = std::make_unique<rig::SpecimenFamily>(study);
+    report(recorded, study, *family);
+  });
   return 0;
 }
