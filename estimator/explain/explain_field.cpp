@@ -11,8 +11,11 @@
 #include "estimator/explain/field_gap.hpp"
 #include "estimator/explain/field_hypotheses.hpp"
 #include "estimator/explain/field_modes.hpp"
+#include "estimator/explain/field_next_experiment.hpp"
+#include "estimator/explain/field_pairs.hpp"
 #include "estimator/explain/field_regions.hpp"
 #include "estimator/explain/linear_evidence.hpp"
+#include "estimator/explain/lump_fit.hpp"
 #include "protocol/contract/input_error.hpp"
 
 namespace diastole::explain {
@@ -23,8 +26,10 @@ using Eigen::Index;
 constexpr std::array<size_t, 3> round_mesh{4, 6, 2};  // for what is the same all around the axis
 constexpr std::array<size_t, 3> full_mesh{8, 6, 2};
 constexpr double significant = 1e-3;
+constexpr double suspicious = 1e-2;     // of what one effect leaves: reason to try two
 constexpr double indistinct = 9.0;      // of the score
 constexpr double clearly_better = 6.0;  // of a rival's score
+constexpr double far_better = 1.5;      // a rival's score over the best effect's: pairs will not do either
 /// Part of an effect's gain that meshes of this size may leave as structure.
 constexpr double mesh_error = 0.01;
 constexpr double ci90 = 1.6449;
@@ -52,6 +57,7 @@ class Explainer {
     judge();
     fill_evidence();
     fill_field();
+    propose();
     return std::move(out_);
   }
 
@@ -110,8 +116,11 @@ class Explainer {
     tell("fitting each effect");
     hypotheses_ = fit_round_effects(*round_, base_);
     tell("searching a lump of another stiffness");
-    std::ranges::move(fit_inclusion(*round_, base_, search_inclusion(*full_, full_base_)),
-                      std::back_inserter(hypotheses_));
+    lattice_ = lump_lattice(*full_, full_base_);
+    const double to_beat = std::ranges::max(hypotheses_, {}, &FieldHypothesis::score).score;
+    std::ranges::move(
+        fit_inclusion(*round_, base_, search_inclusion(lattice_, field_.base, full_base_), to_beat),
+        std::back_inserter(hypotheses_));
     std::ranges::stable_sort(hypotheses_, std::greater{}, &FieldHypothesis::score);
   }
 
@@ -129,20 +138,42 @@ class Explainer {
     return most;
   }
 
+  /// Whether pressures, C1 or the radius must be farther off than their errors allow.
+  [[nodiscard]] static bool is_strained(const FieldFit& fit) {
+    return chi_square_tail(fit.priors.squaredNorm(), static_cast<double>(fit.priors.size())) < suspicious;
+  }
+
+  /// Where the best single effect leaves something, pairs are fitted; they count if one is clearly better.
+  void try_pairs() {
+    const FieldHypothesis single = hypotheses_.front();
+    if (rival_.score > far_better * single.score) return;
+    if (structure_left(single.fit, mesh_error * single.gain).p_value > suspicious && !is_strained(single.fit))
+      return;
+    tell("fitting pairs of effects");
+    std::vector<FieldHypothesis> pairs = fit_pairs(*round_, base_, hypotheses_, lattice_);
+    if (pairs.empty() || pairs.front().score < single.score + clearly_better ||
+        pairs.front().p_value > significant)
+      return;
+    std::ranges::move(pairs, std::back_inserter(hypotheses_));
+    std::ranges::stable_sort(hypotheses_, std::greater{}, &FieldHypothesis::score);
+  }
+
   void judge() {
     tell("comparing what explains it");
     rival_evidence_.emplace(full_base_, modes_.columns);
     rival_ = rival_evidence_->best_of(rivals_);
     const Structure before = structure_left(full_base_, 0.0);
+    const FieldHypothesis& single = hypotheses_.front();
+    const bool effect_seen = single.p_value < significant && single.score > 0.0;
+    if (effect_seen) try_pairs();
     const FieldHypothesis& best = hypotheses_.front();
-    const bool effect_seen = best.p_value < significant && best.score > 0.0;
     if (!effect_seen && before.p_value > significant) {
       out_.verdict = Verdict::none;
       out_.summary = fmt::format(
           "Nothing exceeds the noise: C1 = {:.3f} kPa explains {} tag residuals; the nearest effect, {}, "
           "would gain "
           "{:.1f} of chi2.",
-          base_.C1_kPa, base_.residuals.size(), best.id, best.gain);
+          base_.C1_kPa, base_.residuals.size(), best.name(), best.gain);
       return;
     }
     const Structure after = effect_seen ? structure_left(best.fit, mesh_error * best.gain) : before;
@@ -161,7 +192,7 @@ class Explainer {
         "The motion differs from the model's beyond noise, and no effect of the library removes that.";
     if (effect_seen)
       text += fmt::format(" The best one, {}, gains {:.1f} of chi2 and leaves {:.1f} ({}; p = {:.1g}).",
-                          best.id, best.gain, after.excess, after.family, after.p_value);
+                          best.name(), best.gain, after.excess, after.family, after.p_value);
     if (rivalled || (rival_.score > 0.0 && rival_.chi_square > 0.5 * best.gain)) {
       std::vector<std::string> names;
       for (const Index column : rival_.columns)
@@ -173,22 +204,22 @@ class Explainer {
   }
 
   void name(const FieldHypothesis& best) {
-    out_.effects = {found(best)};
+    out_.effects = found(best);
     for (const FieldHypothesis& other : hypotheses_) {
       if (&other == &best || other.score < best.score - indistinct || other.p_value > 10.0 * significant)
         continue;
       if (structure_left(other.fit, mesh_error * other.gain).p_value < significant) continue;
-      out_.ambiguous_with.push_back({other.id});
+      out_.ambiguous_with.push_back(other.ids);
     }
     out_.verdict = out_.ambiguous_with.empty() ? Verdict::named : Verdict::ambiguous;
     out_.summary = fmt::format(
         "{} explains what the base model does not: chi2 falls by {:.1f}, C1 becomes {:.3f} kPa "
         "instead of {:.3f}.",
-        best.id, best.gain, best.fit.C1_kPa, base_.C1_kPa);
+        best.name(), best.gain, best.fit.C1_kPa, base_.C1_kPa);
     if (!out_.ambiguous_with.empty()) {
       std::vector<std::string> ids;
       for (const auto& set : out_.ambiguous_with)
-        ids.push_back(set.front());
+        ids.push_back(fmt::format("{}", fmt::join(set, " + ")));
       out_.summary += fmt::format(" These data cannot tell it from {}.", fmt::join(ids, ", "));
     }
     chosen_ = &best;
@@ -196,26 +227,59 @@ class Explainer {
                     best.fit.C1_kPa * std::sqrt(best.fit.covariance(0, 0))}};
   }
 
-  [[nodiscard]] FoundEffect found(const FieldHypothesis& hypothesis) const {
-    FoundEffect effect{hypothesis.id, {}, {}};
-    const FieldChoice& choice = hypothesis.fit.choice;
-    const auto parameters = choice.effect->field_parameters();
-    for (size_t i = 0; i < choice.values.size(); ++i) {
-      const EffectParameter& parameter = parameters[i];
-      FoundParameter& out = effect.parameters.emplace_back();
-      out.name = parameter.name;
-      out.value = choice.values[i];
-      out.ci90 = {out.value, out.value};
-      const auto place = std::ranges::find(choice.free, i);
-      if (place == choice.free.end()) continue;
-      const Index unknown = 1 + (place - choice.free.begin());
-      const double error = std::sqrt(hypothesis.fit.covariance(unknown, unknown));
-      const double coordinate = to_coordinate(parameter, out.value);
-      out.ci90 = {from_coordinate(parameter, coordinate - ci90 * error),
-                  from_coordinate(parameter, coordinate + ci90 * error)};
-      out.standard_error = parameter.scale == SearchScale::logarithmic ? out.value * error : error;
+  [[nodiscard]] static std::vector<FoundEffect> found(const FieldHypothesis& hypothesis) {
+    std::vector<FoundEffect> effects;
+    size_t value = 0;
+    for (const Effect* effect : hypothesis.fit.choice.effects) {
+      FoundEffect& out = effects.emplace_back(FoundEffect{std::string(effect->text().id), {}, {}});
+      for (size_t i = 0; i < effect->field_parameters().size(); ++i)
+        out.parameters.push_back(found_parameter(hypothesis.fit, value++));
     }
-    return effect;
+    std::ranges::sort(effects, {}, &FoundEffect::id);
+    return effects;
+  }
+
+  [[nodiscard]] static FoundParameter found_parameter(const FieldFit& fit, size_t value) {
+    const FieldChoice& choice = fit.choice;
+    const EffectParameter& parameter = choice.parameter(value);
+    FoundParameter out;
+    out.name = parameter.name;
+    out.value = choice.values[value];
+    out.ci90 = {out.value, out.value};
+    const auto place = std::ranges::find(choice.free, value);
+    if (place == choice.free.end()) return out;
+    const Index unknown = 1 + (place - choice.free.begin());
+    double error = std::sqrt(fit.covariance(unknown, unknown));
+    const double coordinate = to_coordinate(parameter, out.value);
+    out.ci90 = {from_coordinate(parameter, coordinate - ci90 * error),
+                from_coordinate(parameter, coordinate + ci90 * error)};
+    if (!fit.ci90.empty() && fit.ci90[value][0] < fit.ci90[value][1]) {
+      out.ci90 = fit.ci90[value];
+      error = (to_coordinate(parameter, out.ci90[1]) - to_coordinate(parameter, out.ci90[0])) / (2.0 * ci90);
+    }
+    out.standard_error = parameter.scale == SearchScale::logarithmic ? out.value * error : error;
+    return out;
+  }
+
+  /// A lump's own place first; all of the specimen where no part of it stands out.
+  void find_places() {
+    out_.where = misfit_regions(field_, round_->rows(), base_, 5);
+    const bool lumped = chosen_ != nullptr && chosen_->has("stiff-inclusion");
+    if (!lumped && !out_.where.empty()) return;
+    const Structure before = structure_left(full_base_, 0.0);
+    Misfit place;
+    place.port = "field";
+    place.channel = "tags";
+    place.region = "all of the specimen, in proportion to the load";
+    if (lumped) {
+      const Inclusion lump = lump_of(chosen_->fit);
+      place.region =
+          fmt::format("around {:.0f} deg, z {:.0f} mm, {:.0f} mm from the axis",
+                      std::remainder(lump.theta_deg - 180.0, 360.0) + 180.0, lump.z_mm, lump.radius_mm);
+    }
+    place.excess_chi2 = std::max(before.excess, hypotheses_.front().gain);
+    place.p_value = std::min(before.p_value, hypotheses_.front().p_value);
+    out_.where.insert(out_.where.begin(), std::move(place));
   }
 
   void fill_evidence() {
@@ -223,12 +287,12 @@ class Explainer {
     const FieldFit& base = base_;
     for (const FieldHypothesis& tried : hypotheses_) {
       Candidate row;
-      row.ids = {tried.id};
+      row.ids = tried.ids;
       row.chi_square_drop = tried.gain;
       row.refitted = true;
       row.parameters = tried.fit.choice.free.size();
       const bool as_good =
-          std::ranges::any_of(out_.ambiguous_with, [&](const auto& set) { return set.front() == tried.id; });
+          std::ranges::any_of(out_.ambiguous_with, [&](const auto& set) { return set == tried.ids; });
       row.verdict = &tried == chosen_             ? (as_good ? "as good" : "named")
                     : as_good                     ? "as good"
                     : tried.p_value > significant ? "not needed"
@@ -238,29 +302,14 @@ class Explainer {
       out_.evidence.push_back(std::move(row));
     }
     if (out_.verdict == Verdict::none) return;
-    out_.where = misfit_regions(field_, problem.rows(), base, 5);
-    if (out_.where.empty()) {
-      const Structure before = structure_left(full_base_, 0.0);
-      Misfit everywhere;
-      everywhere.port = "field";
-      everywhere.channel = "tags";
-      everywhere.region = "all of the specimen, in proportion to the load";
-      if (chosen_ != nullptr && chosen_->id == "stiff-inclusion") {
-        const std::vector<double>& at = chosen_->fit.choice.values;
-        everywhere.region =
-            fmt::format("around {:.0f} deg, z {:.0f} mm, {:.0f} mm from the axis", at[3], at[2], at[1]);
-      }
-      everywhere.excess_chi2 = std::max(before.excess, hypotheses_.front().gain);
-      everywhere.p_value = std::min(before.p_value, hypotheses_.front().p_value);
-      out_.where.push_back(std::move(everywhere));
-    }
+    find_places();
     const FieldFit& after = chosen_ != nullptr ? chosen_->fit : base;
     Eigen::MatrixXd directions(base.residuals.size(),
                                static_cast<Index>(rivals_.size()) + after.jacobian.cols());
     directions << modes_.columns(Eigen::all, rivals_), after.jacobian.topRows(base.residuals.size());
     out_.gap = field_gap(base, after, deal_folds(field_.measurement, problem.rows(), 5), directions);
     out_.steps = {{"", out_.gap.before}};
-    if (chosen_ != nullptr) out_.steps.push_back({chosen_->id, out_.gap.after});
+    if (chosen_ != nullptr) out_.steps.push_back({chosen_->name(), out_.gap.after});
   }
 
   /// Residuals of the frame of highest pressure.
@@ -280,6 +329,27 @@ class Explainer {
     }
   }
 
+  /// What the cavity takes at the highest pressure; not known of fits around a lump.
+  [[nodiscard]] ImagedModel imaged(const FieldHypothesis& hypothesis) {
+    if (hypothesis.has("stiff-inclusion")) return {&hypothesis, std::nan("")};
+    return {&hypothesis, round_->taken_mL(hypothesis.fit)};
+  }
+
+  void propose() {
+    if (out_.verdict == Verdict::none) return;
+    tell("designing the next experiment");
+    if (out_.verdict == Verdict::unexplained) {
+      out_.next_experiment = exposing_images();
+      return;
+    }
+    std::vector<ImagedModel> models{imaged(*chosen_)};
+    for (const FieldHypothesis& other : hypotheses_)
+      if (std::ranges::find(out_.ambiguous_with, other.ids) != out_.ambiguous_with.end())
+        models.push_back(imaged(other));
+    out_.next_experiment = models.size() > 1 ? separating_images(field_, round_->rows(), models)
+                                             : sharpening_images(field_, round_->rows(), models.front());
+  }
+
   FieldOptions options_;
   std::string study_file_;
   FieldCase field_;
@@ -290,6 +360,7 @@ class Explainer {
   FieldModes modes_;
   std::vector<Family> families_;
   std::vector<Index> rivals_;
+  LumpLattice lattice_;
   std::vector<FieldHypothesis> hypotheses_;
   std::optional<LinearEvidence> rival_evidence_;
   LinearEvidence::Choice rival_;

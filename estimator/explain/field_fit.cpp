@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
+#include <stdexcept>
 
 namespace diastole::explain {
 namespace {
@@ -29,6 +31,42 @@ double from_coordinate(const EffectParameter& parameter, double coordinate) {
   return logarithmic(parameter) ? std::exp(coordinate) : coordinate;
 }
 
+const EffectParameter& FieldChoice::parameter(size_t value) const {
+  for (const Effect* effect : effects) {
+    const auto parameters = effect->field_parameters();
+    if (value < parameters.size()) return parameters[value];
+    value -= parameters.size();
+  }
+  throw std::out_of_range("the choice has fewer values");
+}
+
+size_t FieldChoice::first_of(const Effect& wanted) const {
+  size_t first = 0;
+  for (const Effect* effect : effects) {
+    if (effect == &wanted) break;
+    first += effect->field_parameters().size();
+  }
+  return first;
+}
+
+void FieldChoice::apply_to(FieldModel& model) const {
+  std::span<const double> left(values);
+  for (const Effect* effect : effects) {
+    const size_t count = effect->field_parameters().size();
+    effect->apply_to_field(left.first(count), model);
+    left = left.subspan(count);
+  }
+}
+
+FieldChoice together(const FieldChoice& a, const FieldChoice& b) {
+  FieldChoice both = a;
+  both.effects.insert(both.effects.end(), b.effects.begin(), b.effects.end());
+  both.values.insert(both.values.end(), b.values.begin(), b.values.end());
+  for (const size_t value : b.free)
+    both.free.push_back(a.values.size() + value);
+  return both;
+}
+
 struct FieldProblem::Point {
   double log_C1 = 0.0;
   FieldChoice choice;
@@ -45,7 +83,7 @@ struct FieldProblem::Point {
     next.log_C1 = std::clamp(log_C1 + step[0], std::log(C1_bounds_kPa[0]), std::log(C1_bounds_kPa[1]));
     Index at = 1;
     for (const size_t i : choice.free) {
-      const EffectParameter& parameter = choice.effect->field_parameters()[i];
+      const EffectParameter& parameter = choice.parameter(i);
       const double value =
           from_coordinate(parameter, to_coordinate(parameter, choice.values[i]) + step[at++]);
       next.choice.values[i] = std::clamp(value, least(parameter), parameter.upper);
@@ -88,7 +126,7 @@ NodeField combined(NodeField start, const std::vector<double>& shares, const std
 
 FieldModel FieldProblem::model_of(const FieldChoice& choice) const {
   FieldModel model = field_.base;
-  if (choice.effect != nullptr) choice.effect->apply_to_field(choice.values, model);
+  choice.apply_to(model);
   return model;
 }
 
@@ -98,18 +136,6 @@ FieldProblem::Start FieldProblem::start() const {
     start.pressures_kPa.push_back(field_.measurement.frames[static_cast<size_t>(frame)].pressure_kPa);
   return start;
 }
-
-namespace {
-
-/// Places among the free parameters of an inclusion's semi-axes.
-std::vector<size_t> free_axes(const FieldChoice& choice) {
-  std::vector<size_t> axes;
-  for (size_t i = 0; i < choice.free.size(); ++i)
-    if (choice.effect->field_parameters()[choice.free[i]].name.starts_with("semi_axis")) axes.push_back(i);
-  return axes;
-}
-
-}  // namespace
 
 Eigen::VectorXd FieldProblem::priors(const Point& at) const {
   std::vector<double> values;
@@ -122,10 +148,6 @@ Eigen::VectorXd FieldProblem::priors(const Point& at) const {
   if (field_.inner_radius_mm)
     values.push_back((model_of(at.choice).inner_radius_mm - field_.inner_radius_mm->value) /
                      field_.inner_radius_mm->sigma);
-  if (at.choice.tightness > 0.0) {
-    for (const size_t i : free_axes(at.choice))
-      values.push_back(std::log(at.choice.values[at.choice.free[i]] / 10.0) / at.choice.tightness);
-  }
   return Eigen::Map<const Eigen::VectorXd>(values.data(), static_cast<Index>(values.size()));
 }
 
@@ -152,7 +174,7 @@ void FieldProblem::differentiate(Point& at) {
   at.jacobian.setZero(rows_.size() + at.priors.size(), unknowns);
   std::vector<FieldNudge> nudges;
   for (const size_t i : at.choice.free) {
-    const EffectParameter& parameter = at.choice.effect->field_parameters()[i];
+    const EffectParameter& parameter = at.choice.parameter(i);
     const double h = nudge_of(parameter);
     FieldChoice up = at.choice;
     FieldChoice down = at.choice;
@@ -206,6 +228,13 @@ void FieldProblem::differentiate(Point& at) {
     Point down = at.moved(-step, {0.0, HUGE_VAL});
     at.jacobian.col(j).tail(at.priors.size()) = (priors(up) - priors(down)) / 2e-6;
   }
+}
+
+double FieldProblem::taken_mL(const FieldFit& fit) {
+  solver_.set(model_of(fit.choice), fit.C1_kPa);
+  if (!solver_.solve(highest_node(), nodes_kPa_.back())) return std::nan("");
+  const ElasticModel& model = solver_.elastic();
+  return model.cavity_volume_mL(solver_.state(highest_node())) - model.cavity_volume_mL(model.rest_state());
 }
 
 FieldFit FieldProblem::fit(FieldChoice choice, const Start& start, const Options& options) {

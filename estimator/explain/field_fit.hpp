@@ -42,13 +42,20 @@ FieldCase field_case(const Study& study);
 /// The radius at which frame 0's tags begin, taking it that they come as near to the inner wall as to the outer one.
 std::optional<Measured> seen_inner_radius(const Measurement& measurement, double outer_radius_mm);
 
-/// An effect in a fit, with those of its parameters that are free.
+/// Effects in a fit, with those of their parameters that are free.
 struct FieldChoice {
-  const Effect* effect = nullptr;  ///< none: the base model
-  std::vector<double> values;      ///< start, then result
-  std::vector<size_t> free;
-  double tightness = 0.0;  ///< standard deviation of semi-axes about their mean, in logarithms; 0: none
+  std::vector<const Effect*> effects;  ///< none: the base model
+  std::vector<double> values;          ///< start, then result; one effect's parameters after the other's
+  std::vector<size_t> free;            ///< among the values
+
+  [[nodiscard]] const EffectParameter& parameter(size_t value) const;
+  /// Place of an effect's first value.
+  [[nodiscard]] size_t first_of(const Effect& effect) const;
+  void apply_to(FieldModel& model) const;
 };
+
+/// One choice beside another, which must not have the same effects.
+FieldChoice together(const FieldChoice& a, const FieldChoice& b);
 
 struct FieldFit {
   FieldChoice choice;
@@ -61,6 +68,8 @@ struct FieldFit {
   Eigen::VectorXd residuals;  ///< of the rows, in sigmas
   Eigen::MatrixXd jacobian;   ///< of the rows, then of the priors
   Eigen::VectorXd priors;     ///< the remaining residuals
+  /// Intervals of choice.values where the covariance does not tell them; empty: it does.
+  std::vector<std::array<double, 2>> ci90;
 };
 
 class FieldProblem {
@@ -80,6 +89,9 @@ class FieldProblem {
     return fit(std::move(choice), start, {});
   }
   [[nodiscard]] Start start() const;
+  /// What the cavity of a fit's specimen takes at the highest node; NaN without an equilibrium. The solver stands there
+  /// afterwards, the rows stay.
+  [[nodiscard]] double taken_mL(const FieldFit& fit);
 
   /// Its slots stand at nodes_kPa().
   [[nodiscard]] FieldSolver& solver() { return solver_; }

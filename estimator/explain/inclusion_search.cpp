@@ -64,9 +64,16 @@ double places_told_apart(const FieldModel& body) {
   return std::max(1.0, volume_mm3 / (8.0 * lump_mm * lump_mm * lump_mm));
 }
 
-std::vector<InclusionGuess> search_inclusion(FieldProblem& problem, const FieldFit& base) {
-  const std::vector<Inclusion> places = lattice(problem.field().base);
-  const LinearEvidence evidence(base, responses(problem, base, places));
+LumpLattice lump_lattice(FieldProblem& problem, const FieldFit& base) {
+  std::vector<Inclusion> places = lattice(problem.field().base);
+  Eigen::MatrixXd columns = responses(problem, base, places);
+  return {std::move(places), std::move(columns)};
+}
+
+std::vector<InclusionGuess> search_inclusion(const LumpLattice& lattice, const FieldModel& body,
+                                             const FieldFit& fit) {
+  const std::vector<Inclusion>& places = lattice.places;
+  const LinearEvidence evidence(fit, lattice.columns);
   std::vector<InclusionGuess> best(2);
   for (size_t i = 0; i < places.size(); ++i) {
     const auto column = static_cast<Eigen::Index>(i);
@@ -79,7 +86,7 @@ std::vector<InclusionGuess> search_inclusion(FieldProblem& problem, const FieldF
     guess.inclusion.edge_width_mm = 2.0;
     // A lump saturates: its own strain vanishes as it stiffens.
     guess.inclusion.contrast = amount > 0.0 ? std::min(4.0, 1.0 + 1.5 * amount) : std::max(0.3, 1.0 + amount);
-    guess.p_value = std::min(1.0, places_told_apart(problem.field().base) * chi_square_tail(gain, 1.0));
+    guess.p_value = std::min(1.0, places_told_apart(body) * chi_square_tail(gain, 1.0));
   }
   if (best[1].gain > best[0].gain) std::swap(best[0], best[1]);
   return best;

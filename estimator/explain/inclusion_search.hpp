@@ -18,7 +18,17 @@ struct InclusionGuess {
 /// How many lumps of a usual size the wall has room for: places that can be told apart.
 double places_told_apart(const FieldModel& body);
 
-/// The best stiffer and the best softer lump, best first. Precondition: the problem's solver stands at `base`.
-std::vector<InclusionGuess> search_inclusion(FieldProblem& problem, const FieldFit& base);
+/// Small lumps everywhere, and what each does to the motion.
+struct LumpLattice {
+  std::vector<Inclusion> places;
+  Eigen::MatrixXd columns;  ///< over the problem's rows
+};
+
+/// Precondition: the problem's solver stands at `base`.
+LumpLattice lump_lattice(FieldProblem& problem, const FieldFit& base);
+
+/// The best stiffer and the best softer lump beside a fit, best first. `fit`: over the lattice's rows.
+std::vector<InclusionGuess> search_inclusion(const LumpLattice& lattice, const FieldModel& body,
+                                             const FieldFit& fit);
 
 }  // namespace diastole::explain

@@ -6,15 +6,23 @@
 //
 //   K(x; m) d1 = - R(x; m),     K(x; m) d2 = - R(x + d1; m),     x_lump = x + d1 + d2
 //
-// and in the other frames it is taken to be in proportion to the pressure. C1 and the frames' pressures answer linearly, by
+// and in the other frames it is taken to grow as what a change of C1 does. C1 and the frames' pressures answer linearly, by
 // the base fit's Jacobian. One factorisation a step, instead of a dozen.
 
 #include "estimator/explain/field_fit.hpp"
 
 namespace diastole::explain {
 
-/// Best lump near the guess. `problem` is the one of the base fit; chi2 and residuals compare with it. Not converged if no
-/// lump was better than none.
-FieldFit fit_lump(const FieldProblem& problem, const FieldFit& base, const Inclusion& guess);
+/// once: to a unit of chi2. fully: to a tenth, with intervals (FieldFit::ci90), which take a quarter of the change from the guess as
+/// the meshes' error: the guess should be what `once` has found, on another mesh.
+enum class LumpEffort { once, fully };
+
+/// Best lump near the guess, beside the effects of `base`, whose parameters answer linearly too. `problem` is the one of the
+/// base fit; chi2 and residuals compare with it. Not converged if no lump was better than none.
+FieldFit fit_lump(const FieldProblem& problem, const FieldFit& base, const Inclusion& guess,
+                  LumpEffort effort);
+
+/// The lump of a fit that has one.
+Inclusion lump_of(const FieldFit& fit);
 
 }  // namespace diastole::explain

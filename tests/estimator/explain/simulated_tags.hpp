@@ -19,7 +19,7 @@ struct OutsideMotion {
 };
 
 struct SimulatedTags {
-  FieldModel truth;
+  FieldModel truth = {};
   OutsideMotion outside = {};
   double C1_kPa = 8.0;
   bool C1_known = false;  ///< by a test right to 0.7 %

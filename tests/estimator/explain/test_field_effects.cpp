@@ -19,7 +19,7 @@ std::vector<double> typical(const Effect& effect) {
 
 /// Typical sizes, all parameters free.
 FieldChoice all_free(const Effect& effect) {
-  FieldChoice choice{&effect, typical(effect), {}, 0.0};
+  FieldChoice choice{{&effect}, typical(effect), {}};
   for (size_t i = 0; i < choice.values.size(); ++i)
     choice.free.push_back(i);
   return choice;
