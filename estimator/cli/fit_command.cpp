@@ -11,6 +11,7 @@
 #include "estimator/cli/commands.hpp"
 #include "estimator/cli/findings_text.hpp"
 #include "estimator/fit/study_fit.hpp"
+#include "estimator/io/study_fingerprint.hpp"
 #include "estimator/io/whole_file.hpp"
 #include "estimator/reconstruction/study_reconstruction.hpp"
 #include "protocol/contract/input_error.hpp"
@@ -110,12 +111,12 @@ class Interruption {
 
 /// A checkpoint is taken up only by the fit that left it; --start takes any result with the same parameters.
 void require_own_checkpoint(const FitRecord& checkpoint, const Study& study, const std::string& file) {
-  const bool own = std::filesystem::path(checkpoint.study).filename() == study.file.filename() &&
-                   checkpoint.law == study.law.name && checkpoint.mesh == mesh_of(study.specimen);
+  const bool own = checkpoint.fingerprint == study_fingerprint(study);
   if (own) return;
   throw InputError(
       {file, "--resume",
-       fmt::format("is of another fit: {} on {} elements", checkpoint.study, fmt::join(checkpoint.mesh, "x")),
+       fmt::format("is of another fit, or its study or data have changed since: {} on {} elements",
+                   checkpoint.study, fmt::join(checkpoint.mesh, "x")),
        "Give another --checkpoint, or take its values up with --start."});
 }
 
@@ -152,6 +153,14 @@ ExitCode refuse_data(const FitRecord& record, const CommandOutput& out) {
              record.reason);
   if (out.json) std::cout << to_json(record);
   return ExitCode::negative;
+}
+
+/// Whether a whole parameter rests on its bound: the search has converged, but to no estimate.
+bool ended_on_bound(const FitRecord& record) {
+  return std::any_of(record.parameters.begin(), record.parameters.end(),
+                     [](const FittedParameter& parameter) {
+                       return parameter.elements.empty() && !parameter.at_bound.empty();
+                     });
 }
 
 ExitCode run_fit(const FitArguments& arguments, const CommandOutput& out) {
@@ -227,18 +236,20 @@ ExitCode run_fit(const FitArguments& arguments, const CommandOutput& out) {
     print_record(record);
     if (arguments.output) fmt::print("\nThe result is in {}\n", arguments.output->string());
   }
-  return record.converged ? ExitCode::done : ExitCode::negative;
+  return record.converged && !ended_on_bound(record) ? ExitCode::done : ExitCode::negative;
 }
 
 }  // namespace
 
 void add_fit(CommandLine& line) {
   auto arguments = std::make_shared<FitArguments>();
-  CLI::App* command =
-      line.add("fit", "estimate the material parameters from imaged motion and pressure",
-               "  diastole fit examples/phantom-a.study.toml\n"
-               "  diastole fit examples/phantom-a.study.toml -o fit.json\n"
-               "  diastole fit examples/phantom-a.study.toml --set C1_kPa=12 --mesh 8,8,2 --json");
+  CLI::App* command = line.add(
+      "fit", "estimate the material parameters from imaged motion and pressure",
+      "  diastole fit examples/phantom-a.study.toml\n"
+      "  diastole fit examples/phantom-a.study.toml -o fit.json\n"
+      "  diastole fit examples/phantom-a.study.toml --set C1_kPa=12 --mesh 8,8,2 --json\n"
+      "Exit code 1: the data cannot be what they say, the search did not converge, or a parameter ended on\n"
+      "its bound, which is no estimate.");
   command->add_option("STUDY", arguments->study, "study file")->required();
   command->add_option("--set", arguments->starts, "another start value, NAME=NUMBER (may be repeated)")
       ->allow_extra_args(false);

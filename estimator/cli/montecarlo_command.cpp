@@ -1,4 +1,5 @@
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -28,6 +29,7 @@ struct MonteCarloArguments {
   std::filesystem::path study;
   std::vector<double> noise_mm;
   std::vector<int> frames;
+  std::vector<double> grid_mm;
   std::vector<std::string> truths;
   std::filesystem::path at;
   std::string mesh;
@@ -107,9 +109,14 @@ Json from_entry(const TableEntry& entry) {
             {"parameters", Json::object()}};
   for (const ParameterSpread& spread : entry.parameters) {
     json["parameters"][spread.name] = {
-        {"truth", spread.truth},           {"mean", spread.mean}, {"sd", spread.sd},
-        {"sd_percent", spread.sd_percent}, {"ci95", spread.ci95}, {"mean_se", spread.mean_se},
-        {"coverage", spread.coverage}};
+        {"truth", spread.truth},
+        {"mean", spread.mean},
+        {"sd", spread.sd},
+        {"sd_percent", spread.sd_percent},
+        {"ci95", spread.ci95},
+        {"mean_se", spread.mean_se},
+        {"coverage", spread.coverage},
+        {"bound", std::isfinite(spread.bound) ? Json(spread.bound) : Json(nullptr)}};
   }
   return json;
 }
@@ -129,16 +136,16 @@ void print_json(const std::vector<TableEntry>& table, const Study& study, const 
   std::cout << json.dump(1) << '\n';
 }
 
-/// The paper's Table 1 beside, where the law is the paper's.
-void print_papers(const std::vector<TableEntry>& table, const Study& study) {
-  if (study.law.name != "guccione") return;
-  for (const TableEntry& entry : table) {
-    if (const auto cells = paper_sd_percent(entry.noise_mm, entry.frames)) {
-      fmt::print("  the paper's for {} and {} frames: C {:g}, b1 {:g}, b2 {:g}, b3 {:g}\n",
-                 noise_words(entry.noise_mm), entry.frames, (*cells)[0], (*cells)[1], (*cells)[2],
-                 (*cells)[3]);
-    }
-  }
+/// Below an entry: what no unbiased estimator can go below, and the paper's entry where the law is the paper's.
+void print_beside(const TableEntry& entry, const Study& study) {
+  fmt::print("  {:26}", "  least possible");
+  for (const ParameterSpread& spread : entry.parameters)
+    fmt::print("  {:>9.2f}", 100 * spread.bound / spread.truth);
+  fmt::print("\n");
+  const auto cells =
+      study.law.name == "guccione" ? paper_sd_percent(entry.noise_mm, entry.frames) : std::nullopt;
+  if (!cells) return;
+  fmt::print("  {:26}  {:>9g}\n", "  the paper's", fmt::join(*cells, "  "));
 }
 
 void print_table(const std::vector<TableEntry>& table, const Study& study) {
@@ -152,9 +159,10 @@ void print_table(const std::vector<TableEntry>& table, const Study& study) {
     for (const ParameterSpread& spread : entry.parameters)
       fmt::print("  {:>9.2f}", spread.sd_percent);
     fmt::print("{}\n", entry.failed > 0 ? fmt::format("   {} did not converge", entry.failed) : "");
+    print_beside(entry, study);
   }
-  fmt::print("\n");
-  print_papers(table, study);
+  fmt::print(
+      "\n'least possible' is the Cramér–Rao bound of these points: no unbiased estimate scatters less.\n\n");
   for (const ParameterSpread& spread : table.front().parameters) {
     fmt::print(
         "At noise {} and {} frames: {} = {:.4g} ± {:.2g} (95 % of the refits within {:.4g} to {:.4g}; truth "
@@ -185,6 +193,8 @@ ExitCode run_montecarlo(const MonteCarloArguments& arguments, const CommandOutpu
                       .exact_pressures = arguments.exact_pressures,
                       .seed = arguments.seed};
   if (plan.noise_mm.empty()) plan.noise_mm = {0.0};
+  if (!arguments.grid_mm.empty())
+    plan.grid = TagGrid{.stripe_mm = arguments.grid_mm[0], .pixel_mm = arguments.grid_mm[1]};
   if (plan.frames.empty()) plan.frames = {loaded_frames(measurement)};
 
   for (const double noise_mm : plan.noise_mm) {
@@ -264,6 +274,14 @@ void add_montecarlo(CommandLine& line) {
   command->add_option("--frames", arguments->frames, "numbers of loaded frames to use; default: all")
       ->delimiter(',')
       ->check(CLI::PositiveNumber);
+  command
+      ->add_option(
+          "--tag-grid", arguments->grid_mm,
+          "STRIPE,PIXEL, mm, instead of the study's points: a grid of stripes so far apart in six "
+          "short-axis and six long-axis images, a 3-D point a pixel along each stripe, as in the paper")
+      ->delimiter(',')
+      ->expected(2)
+      ->check(CLI::Range(0.05, 100.0));
   command->add_option("--repeats", arguments->repeats, "refits of each noise and number of frames")
       ->check(CLI::Range(2, 100000))
       ->capture_default_str();

@@ -106,7 +106,12 @@ void tell_profiles(FitOutcome& outcome, JointProblem& problem, const Eigen::Vect
     const auto which = static_cast<Eigen::Index>(place);
     if (problem.bound_under(q, which) != BoundSide::none || !std::isfinite(covariance(which, which)))
       continue;
-    const std::array<ProfileEnd, 2> ends = profile_interval({problem, q, covariance, cost}, which);
+    const std::array<ProfileEnd, 2> ends =
+        profile_interval({problem, q, covariance, cost, options.optimiser.interrupted}, which);
+    if (is_interrupted(options)) {
+      outcome.interrupted = "profile";
+      return;
+    }
     ProfileInterval interval{place, {}, {}, ends[0].found && ends[1].found, {}, {}};
     std::vector<std::array<double, 2>> tried{{q[which], 0.0}};
     for (size_t side = 0; side < 2; ++side) {
@@ -210,7 +215,10 @@ FitOutcome fit_motion(MotionModel& model, const std::vector<SoughtValue>& sought
   }
   if (outcome.converged) require_half_usable(point_share(problem), options.file);
   if (!outcome.history.empty()) {
-    const Eigen::MatrixXd covariance = tell_uncertainty(outcome, problem, q, options);
+    const bool averaged = outcome.converged && any_by_evidence(options) && problem.residuals(q) != nullptr;
+    const Eigen::VectorXd told = averaged ? mean_over_steps(problem, q, options) : q;
+    const Eigen::MatrixXd covariance =
+        tell_uncertainty(outcome, problem, problem.residuals(told) != nullptr ? told : q, options);
     if (outcome.converged) {
       tell_profiles(outcome, problem, q, covariance, options);
       tell_posterior(outcome, problem, q, covariance, options);

@@ -10,7 +10,8 @@
 // A robust fit's errors are those of an M-estimator: they come from the residuals' own spread. The 95 %
 // interval is symmetric in the coordinate of the value: for a positive one a factor up and down. Smooth regional
 // values have the posterior's standard deviation instead: data and smoothness together, the smoothness' own
-// uncertainty included.
+// uncertainty included, and are the posterior's means over that uncertainty: a map that the most probable smoothness
+// would flatten keeps what the data may have seen.
 
 #include <Eigen/Dense>
 #include <array>
@@ -81,7 +82,7 @@ struct SmoothOutcome {
   bool by_evidence;
   bool none_seen;                ///< the evidence asks for no difference between elements
   std::array<double, 2> step90;  ///< where the step lies with 90 % probability; `step` twice if it was given
-  double effective_values;       ///< how many independent values the data see: 1 to the number of elements
+  double effective_values;  ///< how many values the data determine: 1 to their number; by evidence its mean
 };
 
 struct RobustOutcome {

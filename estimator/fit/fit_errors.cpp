@@ -127,20 +127,23 @@ void tell_smoothness(FitOutcome& outcome, JointProblem& problem, const Eigen::Ve
   if (options.smooth.empty()) return;
   const QuadraticModel model = quadratic_model(problem, q);
   const Eigen::MatrixXd at_chosen = outcome.covariance;
-  const Eigen::MatrixXd seen = at_chosen * model.hessian;
+  const auto determined = [&](const Eigen::MatrixXd& covariance, const SmoothBlock& block) {
+    return (covariance * model.hessian).diagonal().segment(block.first, block.differences.cols()).sum();
+  };
   for (size_t i = 0; i < options.smooth.size(); ++i) {
     const SmoothBlock& block = problem.smoothness()[i];
-    SmoothOutcome told{
-        options.smooth[i].first_value, block.step,
-        !options.smooth[i].step,       false,
-        {block.step, block.step},      seen.diagonal().segment(block.first, block.differences.cols()).sum()};
+    SmoothOutcome told{options.smooth[i].first_value, block.step,
+                       !options.smooth[i].step,       false,
+                       {block.step, block.step},      determined(at_chosen, block)};
     if (told.by_evidence) {
       const EvidenceOfStep evidence = evidence_of_step(model, problem.smoothness(), i, is_free);
       told.none_seen = evidence.none_seen;
       told.step90 = {step_at(evidence, 0.05), step_at(evidence, 0.95)};
+      told.effective_values = 0;
       for (size_t k = 0; k < evidence.steps.size(); ++k) {
         const Eigen::VectorXd apart = evidence.q[k] - q;
         const Eigen::MatrixXd& inverse = evidence.covariance[k];
+        told.effective_values += evidence.weights[k] * determined(inverse, block);
         outcome.covariance += evidence.weights[k] *
                               (inverse + inverse * excess * inverse + apart * apart.transpose() - at_chosen);
       }
@@ -179,6 +182,22 @@ QuadraticModel quadratic_model(JointProblem& problem, const Eigen::VectorXd& q) 
   jacobian.conservativeResize(problem.data_rows(), Eigen::NoChange);
   residuals.conservativeResize(problem.data_rows());
   return {q, jacobian.transpose() * residuals, jacobian.transpose() * jacobian};
+}
+
+Eigen::VectorXd mean_over_steps(JointProblem& problem, const Eigen::VectorXd& q, const FitOptions& options) {
+  Eigen::VectorXd mean = q;
+  if (options.smooth.empty()) return mean;
+  const QuadraticModel model = quadratic_model(problem, q);
+  const std::vector<bool> is_free = free_unknowns(problem, q);
+  for (size_t i = 0; i < options.smooth.size(); ++i) {
+    if (options.smooth[i].step) continue;
+    const EvidenceOfStep evidence = evidence_of_step(model, problem.smoothness(), i, is_free);
+    for (size_t k = 0; k < evidence.steps.size(); ++k)
+      mean += evidence.weights[k] * (evidence.q[k] - q);
+  }
+  for (Eigen::Index i = 0; i < mean.size(); ++i)
+    mean[i] = std::clamp(mean[i], problem.lower(i), problem.upper(i));
+  return mean;
 }
 
 Eigen::MatrixXd tell_uncertainty(FitOutcome& outcome, JointProblem& problem, const Eigen::VectorXd& q,

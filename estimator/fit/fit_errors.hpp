@@ -11,6 +11,10 @@ std::vector<bool> free_unknowns(const JointProblem& problem, const Eigen::Vector
 /// Of the data alone, at q. Precondition: `residuals(q)` succeeds.
 QuadraticModel quadratic_model(JointProblem& problem, const Eigen::VectorXd& q);
 
+/// The unknowns at q with each smooth region averaged over what the evidence says of its step, instead of those at
+/// the most probable step alone; q where all steps are given. Precondition: `residuals(q)` succeeds.
+Eigen::VectorXd mean_over_steps(JointProblem& problem, const Eigen::VectorXd& q, const FitOptions& options);
+
 /// Fills values, frames, covariance, chi2 and what goes with them, at the optimum q. Returns the covariance in the
 /// unknowns' own coordinates; empty (and the outcome not converged) if the model fails there.
 Eigen::MatrixXd tell_uncertainty(FitOutcome& outcome, JointProblem& problem, const Eigen::VectorXd& q,

@@ -12,6 +12,15 @@ constexpr double most_lost = 0.1;  // of a frame's usable tags, in a motion that
 
 Eigen::Vector3d vector_of(const std::array<double, 3>& v) { return {v[0], v[1], v[2]}; }
 
+/// How far a point lies beyond its element in the undeformed body.
+double outside_mm(const HermiteMesh& mesh, const MaterialPoint& point) {
+  MaterialPoint nearest = point;
+  for (double& xi : nearest.xi)
+    xi = std::clamp(xi, 0.0, 1.0);
+  if (nearest.xi == point.xi) return 0;
+  return (mesh.value(mesh.reference(), point) - mesh.value(mesh.reference(), nearest)).norm();
+}
+
 size_t machine_threads() { return std::max(1U, std::thread::hardware_concurrency()); }
 
 }  // namespace
@@ -36,8 +45,10 @@ std::vector<FrameResiduals::UsableTag> FrameResiduals::find_tags(std::span<const
   std::vector<std::optional<TagMatch>> matches(tags_.size());
   parallel_for(tags_.size(), machine_threads(), [&](size_t i) {
     guesses[i] = find_tag(deformed, tags_[i]);
-    if (guesses[i] && !given_up_[i])
-      matches[i] = match_tag(mesh_, reference_, position_mm, tags_[i], *guesses[i]);
+    if (!guesses[i] || given_up_[i]) return;
+    matches[i] = match_tag(mesh_, reference_, position_mm, tags_[i], *guesses[i]);
+    const MaterialPoint& place = matches[i] ? matches[i]->point : *guesses[i];
+    if (outside_mm(mesh_, place) > farthest_outside_mm) guesses[i].reset(), matches[i].reset();
   });
   std::vector<UsableTag> found;
   unfollowed_ = 0;

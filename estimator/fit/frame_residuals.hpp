@@ -22,6 +22,9 @@
 
 namespace diastole {
 
+/// Farther from the undeformed body than this a tag is not the specimen's.
+inline constexpr double farthest_outside_mm = 5.0;
+
 class FrameResiduals {
  public:
   /// `mesh` and `reference` (its undeformed locator) must outlive this object.

@@ -2,6 +2,7 @@
 
 #include <ceres/ceres.h>
 #include <fmt/format.h>
+#include <glog/logging.h>
 
 #include <algorithm>
 #include <cmath>
@@ -137,6 +138,7 @@ OptimiserResult minimise(JointProblem& problem, const Eigen::VectorXd& start,
   settings.update_state_every_iteration = true;
   settings.callbacks = {&recorder};
   settings.logging_type = ceres::SILENT;
+  FLAGS_minloglevel = google::GLOG_FATAL;  // a failed solution is told by the summary
   ceres::Solver::Summary summary;
   ceres::Solve(settings, &least_squares, &summary);
   OptimiserResult result{

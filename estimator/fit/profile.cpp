@@ -20,6 +20,7 @@ std::optional<double> ratio_root(const ProfileProblem& at, Eigen::Index which, d
   start[which] = at.best[which] + away;
   OptimiserOptions options;
   options.held = which;
+  options.interrupted = at.interrupted;
   options.cost_tolerance = std::max(1e-9, 1e-3 / at.cost);
   const OptimiserResult found = minimise(at.problem, start, options);
   const Eigen::VectorXd* residuals = at.problem.residuals(found.q);
@@ -43,7 +44,7 @@ ProfileEnd profile_end(const ProfileProblem& at, Eigen::Index which, double dire
   };
   double inner = 0, inner_root = 0;
   double away = normal_95 * std::sqrt(at.covariance(which, which));
-  for (int attempt = 0; attempt < most_tries; ++attempt) {
+  for (int attempt = 0; attempt < most_tries && !(at.interrupted && at.interrupted()); ++attempt) {
     away = std::min(away, farthest);
     const std::optional<double> root = root_at(away);
     if (!root) {

@@ -5,6 +5,7 @@
 // full finite-element model, one of them half-way, for the picture.
 
 #include <array>
+#include <functional>
 #include <vector>
 
 #include "estimator/fit/joint_problem.hpp"
@@ -24,6 +25,7 @@ struct ProfileProblem {
   const Eigen::VectorXd& best;
   const Eigen::MatrixXd& covariance;
   double cost;
+  std::function<bool()> interrupted = {};  ///< asked at each step: true ends the search, with ends not found
 };
 std::array<ProfileEnd, 2> profile_interval(const ProfileProblem& at, Eigen::Index which);
 

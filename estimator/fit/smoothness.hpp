@@ -13,7 +13,8 @@
 //
 // The step is the one of greatest evidence: p(data | step) with q integrated out, on the Gauss-Newton model of the
 // data (MacKay, Neural Computation 4 (1992) 415). How little the data know about the step is not dropped: the
-// covariance is integrated over it, with a flat prior on the step (Gelman, Bayesian Analysis 1 (2006) 515).
+// values told and their covariance are integrated over it, with a flat prior on the step (Gelman, Bayesian Analysis 1
+// (2006) 515). The search itself uses the step of greatest evidence.
 
 #include <Eigen/Dense>
 #include <vector>

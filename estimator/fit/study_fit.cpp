@@ -16,12 +16,12 @@
 #include "estimator/fit/sought.hpp"
 #include "estimator/fit/uncertainty.hpp"
 #include "estimator/fit/usable_points.hpp"
+#include "estimator/io/study_fingerprint.hpp"
 #include "protocol/contract/input_error.hpp"
 
 namespace diastole {
 namespace {
 
-constexpr double outside_mm = 5.0;  // farther from the body than this a point is not the specimen's
 constexpr double outlier_sigma = 5.0;
 
 double wall_mm(const AnnulusSpecimen& annulus) { return annulus.outer_radius_mm - annulus.inner_radius_mm; }
@@ -31,7 +31,9 @@ double wall_mm(const EllipsoidSpecimen& ellipsoid) {
 
 double element_mm(const AnnulusSpecimen& annulus) { return wall_mm(annulus) / annulus.mesh[2]; }
 double element_mm(const EllipsoidSpecimen& ellipsoid) { return wall_mm(ellipsoid) / ellipsoid.mesh[2]; }
-double element_mm(const MeshSpecimen&) { return 4.0 * outside_mm; }  // not known: the least extrapolation
+double element_mm(const MeshSpecimen&) {
+  return 4.0 * farthest_outside_mm;
+}  // not known: the least extrapolation
 
 const char* kind_of(const Specimen& specimen) {
   constexpr std::array<const char*, 3> kinds{"annulus", "ellipsoid", "mesh"};
@@ -189,6 +191,7 @@ constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
 FitRecord head_of(const Study& study, const Measurement& measurement) {
   FitRecord record{};
   record.study = study.file.string();
+  record.fingerprint = study_fingerprint(study);
   record.law = study.law.name;
   record.specimen = kind_of(study.specimen);
   record.mesh = mesh_of(study.specimen);
@@ -302,7 +305,8 @@ void record_frames(FitRecord& record, const FitOutcome& fit) {
   record.rms_mm = std::sqrt(squares_mm2 / static_cast<double>(record.residuals_used));
   if (tags_outside > 0) {
     record.excluded.push_back(
-        {fmt::format("tag points farther than about {} mm from the body", outside_mm), tags_outside});
+        {fmt::format("tag points farther than about {} mm from the body", farthest_outside_mm),
+         tags_outside});
   }
   if (tags_unfollowed > 0) {
     record.excluded.push_back(
@@ -312,7 +316,7 @@ void record_frames(FitRecord& record, const FitOutcome& fit) {
   if (points_left_out > 0) {
     record.excluded.push_back(
         {fmt::format("3-D points whose undeformed place is farther than about {} mm from the body",
-                     outside_mm),
+                     farthest_outside_mm),
          points_left_out});
   }
 }
@@ -364,11 +368,11 @@ void record_undeformed(FitRecord& record, const Measurement& measurement) {
 
 }  // namespace
 
-// Extrapolation beyond an element, as a fraction of it: `outside_mm` through the wall, never more than an
+// Extrapolation beyond an element, as a fraction of it: `farthest_outside_mm` through the wall, never more than an
 // element.
 LocatorOptions locator_for(const Specimen& specimen) {
   const double size_mm = std::visit([](const auto& kind) { return element_mm(kind); }, specimen);
-  return {.outside_xi = std::clamp(outside_mm / size_mm, 0.25, 1.0)};
+  return {.outside_xi = std::clamp(farthest_outside_mm / size_mm, 0.25, 1.0)};
 }
 
 FitRecord refused_fit(const Study& study, const Measurement& measurement, std::vector<Finding> findings) {
@@ -420,6 +424,8 @@ FitRecord fit_study(const Study& study, const Measurement& measurement, const St
   for (const OptimiserStep& step : fit.history)
     record.history.push_back(record_of(step, study, elements));
   record_undeformed(record, measurement);
+  if (measurement.repeated_rows > 0)
+    record.excluded.push_back({"rows that repeat another to the last digit", measurement.repeated_rows});
   if (fit.values.empty()) return record;
   record.chi2 = fit.chi2;
   record.dof = static_cast<size_t>(std::max(0.0, std::round(static_cast<double>(fit.rows) - fit.unknowns)));

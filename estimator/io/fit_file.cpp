@@ -195,6 +195,7 @@ Json from_history(const std::vector<FitIteration>& history) {
 Json from_record(const FitRecord& record) {
   Json json = {{"format", format_name}, {"format_version", newest_version}};
   json["study"] = record.study;
+  json["fingerprint"] = record.fingerprint;
   json["specimen"] = record.specimen;
   json["law"] = record.law;
   json["data"] = record.data;
@@ -262,6 +263,7 @@ Json from_record(const FitRecord& record) {
 FitRecord to_record(const Json& json) {
   FitRecord record{};
   record.study = json.at("study");
+  record.fingerprint = json.value("fingerprint", "");
   record.specimen = json.at("specimen");
   record.law = json.at("law");
   record.data = json.at("data");

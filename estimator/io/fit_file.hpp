@@ -176,6 +176,7 @@ struct FitRecord {
   std::vector<FitSection> sections;
   std::vector<std::string> remarks;  ///< whole sentences for the reader
   std::vector<Finding> findings;     ///< what is wrong with the data, the gravest first
+  std::string fingerprint = {};      ///< of the study and its data (study_fingerprint.hpp)
 };
 
 /// Near the start of each such document.

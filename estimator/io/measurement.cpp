@@ -3,7 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <set>
+#include <vector>
 
 #include "estimator/io/number_table.hpp"
 #include "protocol/contract/input_error.hpp"
@@ -164,6 +167,41 @@ std::vector<ObservedPoint> read_points(const std::filesystem::path& path, int fr
   return points;
 }
 
+namespace {
+
+std::array<double, 9> numbers_of(const TagPoint& t) {
+  return {static_cast<double>(t.frame),
+          t.normal[0],
+          t.normal[1],
+          t.normal[2],
+          t.plane_mm,
+          t.x_mm[0],
+          t.x_mm[1],
+          t.x_mm[2],
+          t.sigma_mm};
+}
+
+std::array<double, 9> numbers_of(const ObservedPoint& p) {
+  return {static_cast<double>(p.frame),
+          p.X_mm[0],
+          p.X_mm[1],
+          p.X_mm[2],
+          p.x_mm[0],
+          p.x_mm[1],
+          p.x_mm[2],
+          p.sigma_mm,
+          0.0};
+}
+
+/// Leaves each row once, in its order; how many went.
+template <class Row>
+size_t drop_repeated(std::vector<Row>& rows) {
+  std::set<std::array<double, 9>> seen;
+  return std::erase_if(rows, [&](const Row& row) { return !seen.insert(numbers_of(row)).second; });
+}
+
+}  // namespace
+
 Measurement read_measurement(const Study& study) {
   const StudyData& data = study.data;
   if (!data.tags && !data.points) {
@@ -182,6 +220,7 @@ Measurement read_measurement(const Study& study) {
     measurement.points = read_points(*data.points, frame_count);
     check_extent(measurement.points, study.specimen, *data.points);
   }
+  measurement.repeated_rows = drop_repeated(measurement.tags) + drop_repeated(measurement.points);
   return measurement;
 }
 

@@ -41,6 +41,8 @@ struct Measurement {
   std::vector<Frame> frames;
   std::vector<TagPoint> tags;
   std::vector<ObservedPoint> points;
+  size_t repeated_rows =
+      0;  ///< rows of the files that were left out here: the same as another, to the last digit
 };
 
 // Each throws InputError with file, line, column, value and remedy.
@@ -52,7 +54,7 @@ std::vector<TagPoint> read_tags(const std::filesystem::path& path, int frame_cou
 /// Every row's frame must exist; sigma > 0.
 std::vector<ObservedPoint> read_points(const std::filesystem::path& path, int frame_count);
 
-/// Everything that the study names, checked against the specimen's size (points in metres, or in the
+/// Everything that the study names, each row once, checked against the specimen's size (points in metres, or in the
 /// scanner's axes instead of the specimen's, are refused).
 Measurement read_measurement(const Study& study);
 

@@ -1,15 +1,14 @@
 #include "estimator/montecarlo/cells_file.hpp"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <algorithm>
-#include <boost/crc.hpp>
 #include <charconv>
 #include <cmath>
 #include <sstream>
 #include <stdexcept>
 
+#include "estimator/io/study_fingerprint.hpp"
 #include "estimator/io/whole_file.hpp"
 #include "protocol/contract/input_error.hpp"
 
@@ -18,27 +17,16 @@ namespace {
 
 constexpr size_t fixed_columns = 6;
 
-/// A number that changes with the study's file, with any file of its data, and with what the command line said instead.
-std::uint32_t fingerprint(const Study& study) {
-  std::string content =
-      fmt::format("mesh {} refine {}", fmt::join(mesh_of(study.specimen), ","), fmt::join(study.refine, ","));
-  for (const StudyParameter& parameter : study.law.parameters) {
-    content += fmt::format(" {} {:d} {}", parameter.name, static_cast<int>(parameter.smoothness.kind),
-                           parameter.smoothness.step);
-  }
-  for (const std::filesystem::path& file : inputs_of(study)) {
-    content += '\n';
-    if (std::filesystem::is_regular_file(file)) content += read_whole_file(file);
-  }
-  boost::crc_32_type crc;
-  crc.process_bytes(content.data(), content.size());
-  return crc.checksum();
+std::string grid_words(const MonteCarloPlan& plan) {
+  if (!plan.grid) return "";
+  return fmt::format("+{}-{}-{}-{}", plan.grid->stripe_mm, plan.grid->pixel_mm, plan.grid->short_axis_images,
+                     plan.grid->long_axis_images);
 }
 
 std::string heading_of(const Study& study, const MonteCarloPlan& plan) {
   std::string first =
-      fmt::format("{}{}#{:08x} seed={} exact_pressures={:d}", cells_file_mark, study.file.filename().string(),
-                  fingerprint(study), plan.seed, plan.exact_pressures);
+      fmt::format("{}{}#{}{} seed={} exact_pressures={:d}", cells_file_mark, study.file.filename().string(),
+                  study_fingerprint(study), grid_words(plan), plan.seed, plan.exact_pressures);
   std::string second = "noise_mm,frames,repeat,converged,iterations,seconds";
   for (const StudyParameter& parameter : study.law.parameters) {
     first += fmt::format(" {}={:.10g}", parameter.name, parameter.start);

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <limits>
 
 #include "estimator/effects/affected_model.hpp"
 #include "estimator/fe/study_model.hpp"
@@ -17,6 +18,8 @@
 
 namespace diastole {
 namespace {
+
+constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
 
 std::vector<NodeField> true_motions(const Study& study, ElasticMotion& motion, const Sought& sought,
                                     const Measurement& design) {
@@ -58,7 +61,7 @@ bool holds(const StudyParameter& parameter, double value, double se) {
 
 ParameterSpread spread_of(const StudyParameter& parameter, const std::vector<double>& values,
                           const std::vector<double>& errors) {
-  ParameterSpread spread{parameter.name, parameter.start, mean(values), 0, 0, {}, mean(errors), 0};
+  ParameterSpread spread{parameter.name, parameter.start, mean(values), 0, 0, {}, mean(errors), 0, unknown};
   for (size_t i = 0; i < values.size(); ++i) {
     spread.sd += std::pow(values[i] - spread.mean, 2);
     spread.coverage +=
@@ -74,7 +77,7 @@ ParameterSpread spread_of(const StudyParameter& parameter, const std::vector<dou
 
 std::vector<Cell> cells_of(const MonteCarloPlan& plan) {
   std::vector<Cell> cells;
-  for (int repeat = 1; repeat <= plan.repeats; ++repeat) {
+  for (int repeat = 0; repeat <= plan.repeats; ++repeat) {
     for (const double noise_mm : plan.noise_mm) {
       for (const int frames : plan.frames)
         cells.push_back({noise_mm, frames, repeat});
@@ -92,11 +95,12 @@ struct CellFitter::Impl {
   Measurement exact;
 };
 
-CellFitter::CellFitter(const Study& study, const Measurement& design, const MonteCarloPlan& plan) {
+CellFitter::CellFitter(const Study& study, const Measurement& measured, const MonteCarloPlan& plan) {
+  ElasticModel model = make_affected_model(study);
+  const Measurement design = plan.grid ? imaged_design(model.mesh(), *plan.grid, measured.frames) : measured;
   require_loaded_points(study, design);
   for (const int frames : plan.frames)
     (void)spread_frames(design, frames);
-  ElasticModel model = make_affected_model(study);
   require_cavity(study, model);
   Sought sought = sought_of(study, model);
   ElasticMotion motion(std::move(model), sought.groups, displacement_gain_of(study));
@@ -121,7 +125,8 @@ CellResult CellFitter::fit(const Cell& cell) {
   std::mt19937_64 generator = generator_of(cell, impl_->plan.seed);
   const std::vector<int> frames = spread_frames(impl_->exact, cell.frames);
   const Measurement measurement =
-      with_noise(impl_->exact, frames, {cell.noise_mm, impl_->plan.exact_pressures}, generator);
+      with_noise(impl_->exact, frames,
+                 {cell.noise_mm, impl_->plan.exact_pressures, cell.repeat == 0 ? 0.0 : 1.0}, generator);
   const FitOutcome outcome = fit_motion(impl_->motion, impl_->sought.values, measurement, impl_->options);
   CellResult result{
       cell, outcome.converged && !outcome.values.empty(), outcome.iterations, outcome.seconds, {}, {}};
@@ -150,10 +155,15 @@ std::vector<TableEntry> table_of(const MonteCarloPlan& plan, const Study& study,
     for (const int frames : plan.frames) {
       TableEntry entry{noise_mm, frames, 0, 0, {}};
       std::vector<std::vector<double>> values(study.law.parameters.size()), errors = values;
+      std::vector<double> bounds;
       for (const CellResult& result : results) {
         if (result.cell.noise_mm != noise_mm || result.cell.frames != frames ||
             result.cell.repeat > plan.repeats)
           continue;
+        if (result.cell.repeat == 0) {
+          bounds = result.se;
+          continue;
+        }
         ++(result.converged ? entry.refits : entry.failed);
         for (size_t i = 0; result.converged && i < values.size(); ++i) {
           values[i].push_back(result.value[i]);
@@ -161,8 +171,10 @@ std::vector<TableEntry> table_of(const MonteCarloPlan& plan, const Study& study,
         }
       }
       if (entry.refits > 1) {
-        for (size_t i = 0; i < values.size(); ++i)
+        for (size_t i = 0; i < values.size(); ++i) {
           entry.parameters.push_back(spread_of(study.law.parameters[i], values[i], errors[i]));
+          if (!bounds.empty()) entry.parameters.back().bound = bounds[i];
+        }
       }
       table.push_back(std::move(entry));
     }

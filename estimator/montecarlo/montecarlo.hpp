@@ -2,16 +2,20 @@
 // How precisely a study's design tells its parameters: synthetic data with known values are refitted many times
 // (Augenstein et al. 2005, Table 1: noise levels by numbers of frames).
 //
-// The truth is the study's start values and its frames' measured pressures; the points are the study's own. A cell is
-// one refit; cells of equal noise and number of frames make an entry of the table.
+// The truth is the study's start values and its frames' measured pressures; the points are the study's own, or those
+// of a tag grid (tag_grid.hpp). A cell is one refit; cells of equal noise and number of frames make an entry of the
+// table. Repeat 0 is fitted to data without noise, its size being stated nevertheless: its standard errors are the
+// Cramér–Rao bound of the design, below which no unbiased estimator's can be.
 
 #include <array>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "estimator/io/measurement.hpp"
 #include "estimator/io/study.hpp"
+#include "estimator/montecarlo/tag_grid.hpp"
 
 namespace diastole {
 
@@ -21,12 +25,13 @@ struct MonteCarloPlan {
   int repeats = 10;
   bool exact_pressures = false;
   unsigned seed = 1;
+  std::optional<TagGrid> grid = {};  ///< instead of the study's own points
 };
 
 struct Cell {
   double noise_mm;
   int frames;
-  int repeat;  ///< 1, 2, ...
+  int repeat;  ///< 1, 2, ...; 0 without noise
   friend bool operator==(const Cell&, const Cell&) = default;
 };
 
@@ -66,6 +71,7 @@ struct ParameterSpread {
   std::array<double, 2> ci95;  ///< mean ± 1.96 sd: the paper's confidence interval
   double mean_se;              ///< what the refits say of themselves
   double coverage;             ///< share of refits whose own 95 % interval holds the truth
+  double bound;                ///< Cramér–Rao: the standard error of repeat 0; NaN without one
 };
 
 struct TableEntry {

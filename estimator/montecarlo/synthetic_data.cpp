@@ -51,7 +51,7 @@ Measurement with_noise(const Measurement& exact, std::span<const int> frames, co
   Measurement noisy;
   noisy.frames = exact.frames;
   for (Frame& frame : noisy.frames) {
-    const double error_kPa = frame.sigma_kPa * normal(generator);
+    const double error_kPa = options.share * frame.sigma_kPa * normal(generator);
     if (options.exact_pressures) {
       frame.sigma_kPa = 0;
     } else {
@@ -64,7 +64,7 @@ Measurement with_noise(const Measurement& exact, std::span<const int> frames, co
   for (TagPoint tag : exact.tags) {
     if (!wanted(tag.frame)) continue;
     if (options.noise_mm > 0) tag.sigma_mm = options.noise_mm;
-    const double error_mm = tag.sigma_mm * normal(generator);
+    const double error_mm = options.share * tag.sigma_mm * normal(generator);
     for (size_t k = 0; k < 3; ++k)
       tag.x_mm[k] += error_mm * tag.normal[k];
     noisy.tags.push_back(tag);
@@ -73,7 +73,7 @@ Measurement with_noise(const Measurement& exact, std::span<const int> frames, co
     if (!wanted(point.frame)) continue;
     if (options.noise_mm > 0) point.sigma_mm = options.noise_mm;
     for (double& x_mm : point.x_mm)
-      x_mm += point.sigma_mm * normal(generator);
+      x_mm += options.share * point.sigma_mm * normal(generator);
     noisy.points.push_back(point);
   }
   return noisy;

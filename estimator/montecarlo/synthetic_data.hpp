@@ -22,6 +22,7 @@ struct NoiseOptions {
   double noise_mm =
       0;  ///< standard deviation of a tag along its normal, of a 3-D point's components; 0: as stated
   bool exact_pressures = false;  ///< or else frame pressures err by their stated sigma
+  double share = 1;              ///< of the noise that is added; what is stated stays
 };
 
 /// The points of some frames with noise, its size stated with them; the other frames keep their pressures.

@@ -146,7 +146,7 @@ Coverage coverage_of(const FieldForms& forms, const FrameField& field) {
   seeing.factorise_without_smoothness(mode_amplitude_mm);
   coverage.affine_modes = affine_modes(forms, seeing);
   coverage.modes = static_cast<size_t>(forms.space.unknowns());
-  coverage.modes_seen = stochastic_trace(seeing, random_signs(seeing.weighted_rows().rows()));
+  coverage.modes_seen = stochastic_trace(seeing, seen_signs(seeing));
 
   const std::vector<Functional> probes = probes_of(mesh);
   const std::vector<double> with_smoothness = field.system->variances(probes);

@@ -8,7 +8,6 @@ namespace diastole {
 namespace {
 
 constexpr double lowest_exponent = 0, highest_exponent = 8;
-constexpr double fine_enough = 0.1;  // decades
 constexpr double golden = 0.6180339887498949;
 
 }  // namespace
@@ -23,9 +22,12 @@ Eigen::MatrixXd random_signs(Eigen::Index rows, Eigen::Index probes) {
   return signs;
 }
 
-double stochastic_trace(const SmoothedSystem& system, const Eigen::MatrixXd& signs) {
-  const Eigen::MatrixXd right_sides = system.weighted_rows().transpose() * signs;
-  return right_sides.cwiseProduct(system.solve(right_sides)).sum() / static_cast<double>(signs.cols());
+Eigen::MatrixXd seen_signs(const SmoothedSystem& system) {
+  return system.weighted_rows().transpose() * random_signs(system.weighted_rows().rows());
+}
+
+double stochastic_trace(const SmoothedSystem& system, const Eigen::MatrixXd& right_sides) {
+  return right_sides.cwiseProduct(system.solve(right_sides)).sum() / static_cast<double>(right_sides.cols());
 }
 
 double exact_trace(const SmoothedSystem& system) {
@@ -46,14 +48,14 @@ Eigen::VectorXd residual_shares(const SmoothedSystem& system, const Eigen::Matri
   return left.rowwise().squaredNorm() / static_cast<double>(signs.cols());
 }
 
-CrossValidation choose_lambda(SmoothedSystem& system) {
-  const Eigen::MatrixXd signs = random_signs(system.weighted_rows().rows());
+CrossValidation choose_lambda(SmoothedSystem& system, double fineness) {
+  const Eigen::MatrixXd right_sides = seen_signs(system);
   const auto measured = static_cast<double>(system.measured());
   CrossValidation result;
   const auto score = [&](double exponent) {
     system.factorise(std::pow(10.0, exponent));
     const Eigen::VectorXd misfit = system.weighted_rows() * system.solution() - system.weighted_targets();
-    const double trace = stochastic_trace(system, signs);
+    const double trace = stochastic_trace(system, right_sides);
     const double freedom = std::max(measured - trace, 1e-3 * measured);
     result.curve.push_back({system.lambda(), measured * misfit.squaredNorm() / (freedom * freedom), trace});
     return result.curve.back().score;
@@ -70,7 +72,7 @@ CrossValidation choose_lambda(SmoothedSystem& system) {
   result.at_edge = best == lowest_exponent || best == highest_exponent;
   double left = high - golden * (high - low), right = low + golden * (high - low);
   double score_left = score(left), score_right = score(right);
-  while (high - low > fine_enough) {
+  while (high - low > fineness) {
     if (score_left < score_right) {
       high = right;
       right = left;

@@ -28,15 +28,18 @@ struct CrossValidation {
 /// Random signs, one column a probe; the same for the same size.
 Eigen::MatrixXd random_signs(Eigen::Index rows, Eigen::Index probes = 24);
 
+/// Gᵀz: as long as the rows are the same, so is this.
+Eigen::MatrixXd seen_signs(const SmoothedSystem& system);
+
 /// Of the system's present factorisation.
-double stochastic_trace(const SmoothedSystem& system, const Eigen::MatrixXd& signs);
+double stochastic_trace(const SmoothedSystem& system, const Eigen::MatrixXd& seen_signs);
 double exact_trace(const SmoothedSystem& system);
 /// E[(z - K z)²] of each row: the share of a measured number's variance that is left in its residual. Their sum over
 /// the rows that count, tr[(1 - K)²], is what χ² is to be compared with; it is less than N - tr K when K smooths.
 Eigen::VectorXd residual_shares(const SmoothedSystem& system, const Eigen::MatrixXd& signs);
 
-/// Searches λ from 1 to 10^8, by decades and then by golden section to a tenth of a decade. Leaves the system
+/// Searches λ from 1 to 10^8, by decades and then by golden section to `fineness` decades. Leaves the system
 /// factorised at the λ found.
-CrossValidation choose_lambda(SmoothedSystem& system);
+CrossValidation choose_lambda(SmoothedSystem& system, double fineness = 0.1);
 
 }  // namespace diastole

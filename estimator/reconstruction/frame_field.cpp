@@ -9,10 +9,9 @@ namespace diastole {
 namespace {
 
 constexpr double first_lambda = 1e3;
-constexpr int huber_rounds = 4, most_rounds = 12;
+constexpr int most_rounds = 12;
 constexpr int tukey_round = 1, validation_round = 2, last_validation_round = 3;
 constexpr double huber_bend = 1.345, tukey_reach = 4.685;
-constexpr double settled_mm = 1e-3;
 constexpr double least_scale = 1.0;  // nothing is wild within its own sigmas, however good the others are
 
 Eigen::Vector3d vector_of(const std::array<double, 3>& v) { return {v[0], v[1], v[2]}; }
@@ -126,9 +125,9 @@ std::vector<double> linear_residuals(const FieldSpace& space, const std::vector<
 }
 
 /// The first field: from rest, with Huber's weights, so that wild points do not tear it.
-Eigen::VectorXd first_solution(SmoothedSystem& system, std::vector<ObservationRow>& rows, bool robust) {
+Eigen::VectorXd first_solution(SmoothedSystem& system, std::vector<ObservationRow>& rows, int rounds) {
   Eigen::VectorXd q;
-  for (int round = 0; round < (robust ? huber_rounds : 1); ++round) {
+  for (int round = 0; round < rounds; ++round) {
     if (round > 0) {
       const std::vector<double> residuals = linear_residuals(system.forms().space, rows, q);
       const double spread = std::max(robust_spread(residuals), least_scale);
@@ -160,7 +159,7 @@ size_t weigh(std::vector<ObservationRow>& rows, FrameField& field, double reject
 /// What the system's present factorisation takes from the data, and what it leaves to the residuals.
 void take_freedoms(FrameField& field) {
   const Eigen::MatrixXd signs = random_signs(field.system->weighted_rows().rows());
-  field.degrees_of_freedom = stochastic_trace(*field.system, signs);
+  field.degrees_of_freedom = stochastic_trace(*field.system, seen_signs(*field.system));
   field.residual_shares = residual_shares(*field.system, signs);
   for (size_t i = 0; i < field.rows.size(); ++i) {
     if (field.rows[i].rejected) field.residual_shares[static_cast<Eigen::Index>(i)] = 0.0;
@@ -215,7 +214,7 @@ FrameField reconstruct_frame(const FieldForms& forms, const Measurement& measure
     std::vector<ObservationRow> rows = data.linearise(field);
     Eigen::VectorXd moved;
     if (field.rounds == 0) {
-      moved = first_solution(system, rows, options.robust);
+      moved = first_solution(system, rows, options.robust ? options.huber_rounds : 1);
     } else {
       const size_t before = rejected;
       if (options.robust) rejected = weigh(rows, field, options.reject_sigma);
@@ -224,15 +223,15 @@ FrameField reconstruct_frame(const FieldForms& forms, const Measurement& measure
       const bool validate =
           field.rounds == validation_round || (field.rounds == last_validation_round && rejected != before);
       if (validate && !options.lambda) {
-        field.smoothing = choose_lambda(system);
+        field.smoothing = choose_lambda(system, options.fineness);
         lambda = field.smoothing.lambda;
       }
       system.factorise(lambda);
       moved = system.solution();
-      field.degrees_of_freedom = stochastic_trace(system, random_signs(system.weighted_rows().rows()));
     }
     const double change_mm = std::sqrt(forms.quadratic.apply(forms.sobolev.mean_square, moved - q));
-    field.converged = field.rounds >= last_validation_round && change_mm < settled_mm;
+    field.converged = field.rounds >= (options.lambda ? tukey_round + 1 : last_validation_round) &&
+                      change_mm < options.settled_mm;
     q = moved;
     move_to(field, space, q);
   }

@@ -34,6 +34,9 @@ struct FrameOptions {
   bool robust = true;            ///< leave wild points out
   double reject_sigma = 5.0;     ///< in units of the residuals' own spread, or of sigma if that is more
   LocatorOptions locator{};      ///< how far outside the body a point may lie
+  double settled_mm = 1e-3;      ///< RMS: a round that moves the body by less is the last
+  double fineness = 0.1;         ///< of the search for λ, decades
+  int huber_rounds = 4;          ///< in the first round, from rest
 };
 
 struct FieldRow {
@@ -61,7 +64,7 @@ struct FrameField {
   std::vector<size_t> tags_not_found;  ///< sources that lie nowhere on the moved body
   std::vector<size_t> points_not_found;
   int rounds = 0;
-  bool converged = false;                  ///< the last round moved the body by less than a micrometre RMS
+  bool converged = false;                  ///< the last round moved the body by less than `settled_mm`
   std::unique_ptr<SmoothedSystem> system;  ///< of the last round: covariances
 
   [[nodiscard]] size_t used() const;

@@ -176,6 +176,13 @@ void check_duplicates(Findings& findings, const Measurement& measurement) {
                         measurement.tags.empty() ? "points file" : "tags file", static_cast<double>(twice),
                         "rows", "Remove the repeated rows."});
   }
+  if (const size_t once = measurement.repeated_rows; once > 0) {
+    findings.push_back(
+        {Severity::warning, "duplicate-rows",
+         fmt::format("{} of {} rows repeat another to the last digit: each counts once.", once, all + once),
+         measurement.tags.empty() ? "points file" : "tags file", static_cast<double>(once), "rows",
+         "Remove the repeated rows."});
+  }
   for (const auto& [frame, count] : repeated) {
     if (static_cast<double>(count) < 0.1 * static_cast<double>(rows[frame])) continue;
     findings.push_back(

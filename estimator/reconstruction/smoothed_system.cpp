@@ -19,33 +19,52 @@ void SmoothedSystem::set_rows(std::span<const ObservationRow> rows) {
   data_ = forms_.quadratic.zero();
   measured_ = static_cast<size_t>(
       std::count_if(rows.begin(), rows.end(), [](const ObservationRow& row) { return row.weight > 0; }));
-  std::vector<std::vector<size_t>> of_element(forms_.space.mesh().element_count());
+  blocks_.assign(forms_.space.mesh().element_count(), {});
   for (size_t i = 0; i < rows.size(); ++i)
-    of_element[rows[i].functional.element].push_back(i);
-  std::vector<Eigen::Triplet<double>> entries;
-  entries.reserve(rows.size() * element_coefficients);
+    blocks_[rows[i].functional.element].rows.push_back(static_cast<Eigen::Index>(i));
   targets_.setZero(static_cast<Eigen::Index>(rows.size()));
-  for (size_t e = 0; e < of_element.size(); ++e) {
-    if (of_element[e].empty()) continue;
+  right_side_.setZero(forms_.space.unknowns());
+  rows_.resize(0, 0);
+  for (size_t e = 0; e < blocks_.size(); ++e) {
+    const std::vector<Eigen::Index>& of_element = blocks_[e].rows;
+    if (of_element.empty()) continue;
     const auto& unknowns = forms_.space.element_unknowns(e);
-    Eigen::MatrixXd block(element_coefficients, of_element[e].size());
-    for (size_t j = 0; j < of_element[e].size(); ++j) {
-      const size_t i = of_element[e][j];
+    Eigen::MatrixXd& block = blocks_[e].coefficients;
+    block.resize(element_coefficients, static_cast<Eigen::Index>(of_element.size()));
+    for (size_t j = 0; j < of_element.size(); ++j) {
+      const auto i = static_cast<size_t>(of_element[j]);
       const double factor = std::sqrt(rows[i].weight) / rows[i].sigma;
       targets_[static_cast<Eigen::Index>(i)] = factor * rows[i].target;
       block.col(static_cast<Eigen::Index>(j)) = factor * rows[i].functional.coefficients;
-      for (size_t l = 0; l < element_coefficients; ++l) {
-        if (unknowns[l] < 0) continue;
-        entries.emplace_back(static_cast<int>(i), unknowns[l],
-                             block(static_cast<Eigen::Index>(l), static_cast<Eigen::Index>(j)));
-      }
+    }
+    const Eigen::VectorXd pull = block * targets_(of_element);
+    for (size_t l = 0; l < element_coefficients; ++l) {
+      if (unknowns[l] >= 0) right_side_[unknowns[l]] += pull[static_cast<Eigen::Index>(l)];
     }
     ElementMatrix matrix = ElementMatrix::Zero(element_coefficients, element_coefficients);
     matrix.selfadjointView<Eigen::Lower>().rankUpdate(block);
     forms_.quadratic.add(data_, e, matrix);
   }
-  rows_.resize(static_cast<Eigen::Index>(rows.size()), forms_.space.unknowns());
+}
+
+const Eigen::SparseMatrix<double, Eigen::RowMajor>& SmoothedSystem::weighted_rows() const {
+  if (rows_.rows() == targets_.size()) return rows_;
+  std::vector<Eigen::Triplet<double>> entries;
+  entries.reserve(static_cast<size_t>(targets_.size()) * element_coefficients);
+  for (size_t e = 0; e < blocks_.size(); ++e) {
+    const auto& unknowns = forms_.space.element_unknowns(e);
+    for (size_t j = 0; j < blocks_[e].rows.size(); ++j) {
+      for (size_t l = 0; l < element_coefficients; ++l) {
+        if (unknowns[l] < 0) continue;
+        entries.emplace_back(
+            static_cast<int>(blocks_[e].rows[j]), unknowns[l],
+            blocks_[e].coefficients(static_cast<Eigen::Index>(l), static_cast<Eigen::Index>(j)));
+      }
+    }
+  }
+  rows_.resize(targets_.size(), forms_.space.unknowns());
   rows_.setFromTriplets(entries.begin(), entries.end());
+  return rows_;
 }
 
 void SmoothedSystem::factorise_values(QuadraticForms::Values values) {
@@ -79,10 +98,7 @@ void SmoothedSystem::factorise_without_smoothness(double amplitude_mm) {
   factorise_values(std::move(values));
 }
 
-Eigen::VectorXd SmoothedSystem::solution() const {
-  const Eigen::VectorXd right_side = rows_.transpose() * targets_;
-  return solve(right_side);
-}
+Eigen::VectorXd SmoothedSystem::solution() const { return solve(right_side_); }
 
 Eigen::MatrixXd SmoothedSystem::solve(const Eigen::MatrixXd& right_sides) const {
   return factor_.solve(right_sides);

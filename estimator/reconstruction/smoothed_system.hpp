@@ -55,8 +55,8 @@ class SmoothedSystem {
   /// Variances of functionals: diagonal of C H⁻¹ Cᵀ, solved in blocks.
   [[nodiscard]] std::vector<double> variances(std::span<const Functional> functionals) const;
 
-  /// Rows √w g/σ, and √w y/σ.
-  [[nodiscard]] const Eigen::SparseMatrix<double, Eigen::RowMajor>& weighted_rows() const { return rows_; }
+  /// Rows √w g/σ, and √w y/σ. The matrix is made when it is first asked for.
+  [[nodiscard]] const Eigen::SparseMatrix<double, Eigen::RowMajor>& weighted_rows() const;
   [[nodiscard]] const Eigen::VectorXd& weighted_targets() const { return targets_; }
   /// How many rows have a weight.
   [[nodiscard]] size_t measured() const { return measured_; }
@@ -67,8 +67,16 @@ class SmoothedSystem {
   void factorise_values(QuadraticForms::Values values);
 
   const FieldForms& forms_;
+  /// The rows of one element: a column each.
+  struct Block {
+    std::vector<Eigen::Index> rows;
+    Eigen::MatrixXd coefficients;
+  };
+
   QuadraticForms::Values data_;
-  Eigen::SparseMatrix<double, Eigen::RowMajor> rows_;
+  std::vector<Block> blocks_;
+  mutable Eigen::SparseMatrix<double, Eigen::RowMajor> rows_;
+  Eigen::VectorXd right_side_;
   Eigen::VectorXd targets_;
   size_t measured_ = 0;
   double lambda_ = 0.0;

@@ -16,6 +16,9 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 constexpr double outside_mm = 5.0;  // farther from the body than this a point is not the specimen's
+constexpr double quick_settled_mm = 0.01;
+constexpr double quick_fineness = 0.5;  // decades
+constexpr int quick_huber_rounds = 2;
 
 /// Extrapolation beyond an element as a fraction of the thinnest one: `outside_mm`, never more than an element.
 LocatorOptions locator_for(const HermiteMesh& mesh) {
@@ -48,16 +51,34 @@ std::vector<int> loaded_frames(const Study& study, const Measurement& measuremen
   return {frames.begin(), frames.end()};
 }
 
+/// The frames in their order; or, where one λ must do for all, the most loaded one first, which tells it best.
+std::vector<int> in_order_of_work(std::vector<int> frames, const Measurement& measurement, bool quick) {
+  if (!quick) return frames;
+  const auto load_kPa = [&](int frame) {
+    return std::abs(measurement.frames[static_cast<size_t>(frame)].pressure_kPa);
+  };
+  std::stable_sort(frames.begin(), frames.end(), [&](int a, int b) { return load_kPa(a) > load_kPa(b); });
+  return frames;
+}
+
 void reconstruct_frames(StudyReconstruction& result, const Measurement& measurement,
                         const std::vector<int>& frames, const ReconstructionOptions& options) {
-  const FrameOptions frame_options{.lambda = options.lambda,
-                                   .robust = options.robust,
-                                   .reject_sigma = 5.0,
-                                   .locator = locator_for(result.body->mesh)};
-  for (const int frame : frames) {
+  FrameOptions frame_options{.lambda = options.lambda,
+                             .robust = options.robust,
+                             .reject_sigma = 5.0,
+                             .locator = locator_for(result.body->mesh)};
+  if (options.quick) {
+    frame_options.settled_mm = quick_settled_mm;
+    frame_options.fineness = quick_fineness;
+    frame_options.huber_rounds = quick_huber_rounds;
+  }
+  for (const int frame : in_order_of_work(frames, measurement, options.quick)) {
     result.fields.push_back(reconstruct_frame(*result.forms, measurement, frame, frame_options));
+    if (options.quick) frame_options.lambda = result.fields.front().smoothing.lambda;
     if (options.on_frame) options.on_frame(result.fields.size(), frames.size());
   }
+  std::sort(result.fields.begin(), result.fields.end(),
+            [](const FrameField& a, const FrameField& b) { return a.number < b.number; });
 }
 
 void sample_fields(StudyReconstruction& result, const ReconstructionOptions& options) {
@@ -71,7 +92,7 @@ void sample_fields(StudyReconstruction& result, const ReconstructionOptions& opt
 }
 
 void judge(StudyReconstruction& result, const Study& study, const Measurement& measurement,
-           bool check_stiffness) {
+           const ReconstructionOptions& options) {
   const FieldForms& forms = *result.forms;
   result.groups = group_tags(measurement.tags);
   result.amplitudes = motion_amplitudes(forms, result.fields);
@@ -79,12 +100,12 @@ void judge(StudyReconstruction& result, const Study& study, const Measurement& m
   result.slices = slice_offsets(result.fields, result.groups, measurement.tags);
   for (const FrameField& field : result.fields)
     result.volumes.push_back(check_volume(forms, field));
-  result.coverage = coverage_of(forms, result.fields.back());
+  if (!options.quick) result.coverage = coverage_of(forms, result.fields.back());
   const std::vector<Finding> found =
       motion_findings({forms, result.fields, result.groups, result.amplitudes, result.families, result.slices,
                        result.volumes, result.coverage});
   result.findings.insert(result.findings.end(), found.begin(), found.end());
-  if (!check_stiffness || has_error(result.findings)) return;
+  if (!options.check_stiffness || has_error(result.findings)) return;
   if (const auto apparent = apparent_stiffness(study, forms, result.fields.back())) {
     if (const auto finding = pressure_unit_finding(study, *apparent)) result.findings.push_back(*finding);
   }
@@ -102,8 +123,8 @@ StudyReconstruction reconstruct_study(const Study& study, const Measurement& mea
   if (!has_error(result.findings)) {
     result.forms = std::make_unique<const FieldForms>(result.body->mesh, options.smoothing);
     reconstruct_frames(result, measurement, frames, options);
-    sample_fields(result, options);
-    judge(result, study, measurement, options.check_stiffness);
+    if (!options.quick) sample_fields(result, options);
+    judge(result, study, measurement, options);
   }
   std::stable_sort(result.findings.begin(), result.findings.end(),
                    [](const Finding& a, const Finding& b) { return a.severity > b.severity; });
@@ -112,7 +133,7 @@ StudyReconstruction reconstruct_study(const Study& study, const Measurement& mea
 }
 
 std::vector<Finding> examine_measurement(const Study& study, const Measurement& measurement) {
-  return reconstruct_study(study, measurement, {}).findings;
+  return reconstruct_study(study, measurement, {.quick = true}).findings;
 }
 
 }  // namespace diastole

@@ -7,8 +7,8 @@
 //   result.findings                          what the user should know first
 //   result.fields[i].displacement_mm         in the order of the frames
 //
-// `examine_measurement` is the same for a command that wants the findings only (some seconds); the fast part by
-// itself is measurement_findings.hpp.
+// `examine_measurement` is the same, quickly, for a command that wants the findings only; the fast part by itself is
+// measurement_findings.hpp.
 
 #include <functional>
 #include <memory>
@@ -23,11 +23,14 @@ namespace diastole {
 
 struct ReconstructionOptions {
   SobolevWeights smoothing{};
-  std::optional<double> lambda;  ///< instead of cross-validation
+  std::optional<double> lambda = {};  ///< instead of cross-validation
   bool robust = true;
-  std::optional<size_t> points_a_frame;  ///< default: as many as the fields have freedoms (field_samples.hpp)
-  bool check_stiffness = true;           ///< one forward model, for the pressures' unit
-  std::function<void(size_t done, size_t of)> on_frame;
+  std::optional<size_t> points_a_frame =
+      {};                       ///< default: as many as the fields have freedoms (field_samples.hpp)
+  bool check_stiffness = true;  ///< one forward model, for the pressures' unit
+  /// For the findings only: the most loaded frame's λ for all, found and settled less finely, no samples, no coverage.
+  bool quick = false;
+  std::function<void(size_t done, size_t of)> on_frame = {};
 };
 
 /// Without fields when the data cannot be what they say (an error among the findings of the measurement).
@@ -40,7 +43,7 @@ struct StudyReconstruction {
   std::vector<FamilyFit> families;
   std::vector<SliceOffset> slices;
   std::vector<VolumeCheck> volumes;
-  Coverage coverage;  ///< of the last frame
+  Coverage coverage;  ///< of the last frame; empty if it was quick
   std::vector<SampledFrame> samples;
   std::vector<Finding> findings;  ///< the gravest first
   double seconds = 0.0;

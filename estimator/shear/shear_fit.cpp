@@ -3,10 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <map>
 #include <numbers>
+#include <set>
 
 #include "estimator/shear/origin_line.hpp"
 
@@ -19,6 +21,8 @@ constexpr double doubt = 0.05;                // of the interval, and of an outl
 constexpr double strong_doubt = 0.001;        // of remarks that question the test itself
 constexpr double rounding = 1e-9;             // relative scatter below which only arithmetic is seen
 constexpr size_t rows_that_show_scatter = 5;  // of one load
+constexpr double softest_kPa = 0.02, stiffest_kPa = 200;  // gels, tissues and soft rubbers lie between
+constexpr double sharpest_deg = 0.002;  // of what a camera sees of a marker: 0.6 um at a radius of 17 mm
 
 /// Rows as pairs of the line y = x / C1, C1 in N/mm2.
 struct Pairs {
@@ -202,6 +206,34 @@ void remark_on_the_line(ShearFit& fit, const ShearTest& test, const OriginLine& 
   }
 }
 
+/// What no gel and no camera is like: a wrong unit.
+void remark_on_units(ShearFit& fit, const OriginLine& line) {
+  if (fit.determined && (fit.C1_kPa < softest_kPa || fit.C1_kPa > stiffest_kPa)) {
+    fit.remarks.push_back(
+        fmt::format("C1 = {:.3g} kPa is no soft gel's ({:g} to {:g} kPa): check that rotations are in "
+                    "degrees, moments in N mm "
+                    "and lengths in mm.",
+                    fit.C1_kPa, softest_kPa, stiffest_kPa));
+  } else if (fit.rms_deg < sharpest_deg && !only_rounding(line)) {
+    fit.remarks.push_back(fmt::format(
+        "The rotations agree within {:.2g} degrees, better than markers can be tracked: check that they "
+        "are in degrees and were measured.",
+        fit.rms_deg));
+  }
+}
+
+void remark_on_repeats(ShearFit& fit, const ShearTest& test) {
+  std::set<std::array<double, 3>> seen;
+  const auto repeats = std::ranges::count_if(test.rows, [&](const ShearRow& row) {
+    return !seen.insert({row.moment_Nmm, row.radius_mm, row.rotation_rad}).second;
+  });
+  if (repeats == 0) return;
+  fit.remarks.push_back(fmt::format(
+      "{} of {} rows repeat another to the last digit and count as measurements of their own, so that the "
+      "standard error is too small: remove them.",
+      repeats, test.rows.size()));
+}
+
 void remark_on_outliers(ShearFit& fit) {
   for (const ShearOutlier& outlier : fit.outliers) {
     fit.remarks.push_back(
@@ -223,6 +255,8 @@ ShearFit fit_shear(const ShearTest& test, ShearForm form) {
   set_estimate(fit, line, pairs);
   set_points(fit, test.rows, line.slope);
   remark_on_the_line(fit, test, line);
+  remark_on_units(fit, line);
+  remark_on_repeats(fit, test);
   judge_loads(fit, test, pairs);
   remark_on_outliers(fit);
   return fit;

@@ -2,6 +2,7 @@
 
 #include <csignal>
 
+#include "estimator/io/whole_file.hpp"
 #include "tests/flow/programs.hpp"
 
 namespace diastole {
@@ -34,6 +35,16 @@ TEST(FitInterruption, ACheckpointOfAnotherFitIsNotTakenUp) {
       flow::run(place, {"diastole", "fit", study, "--mesh", "3,2,1", "--checkpoint", "k.json", "--resume"});
   EXPECT_EQ(ended.exit_code, 2) << ended.err;
   EXPECT_THAT(ended.err, testing::AllOf(testing::HasSubstr("another fit"), testing::HasSubstr("4x2x1")));
+  // A study of the same name that is not the same.
+  std::string other = read_whole_file(study);
+  other.replace(other.find("start = 6.0"), 11, "start = 7.0");
+  for (size_t at = other.find("\"phantom"); at != std::string::npos; at = other.find("\"phantom", at + 20))
+    other.replace(at, 1, std::string("\"") + DIASTOLE_SOURCE_DIR + "/examples/");
+  write_whole_file(place / "phantom-a-points.study.toml", other);
+  const flow::Ended elsewhere = flow::run(place, {"diastole", "fit", "phantom-a-points.study.toml", "--mesh",
+                                                  "4,2,1", "--checkpoint", "k.json", "--resume"});
+  EXPECT_EQ(elsewhere.exit_code, 2) << elsewhere.err;
+  EXPECT_THAT(elsewhere.err, testing::HasSubstr("have changed since"));
   const flow::Ended same =
       flow::run(place, {"diastole", "fit", study, "--checkpoint", "k.json", "-o", "k.json"});
   EXPECT_EQ(same.exit_code, 2) << same.err;

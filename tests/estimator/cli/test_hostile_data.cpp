@@ -101,6 +101,29 @@ TEST_F(HostileData, FramesWithoutPointsAndPointsOutsideTheWallAreTold) {
   EXPECT_NEAR(stiffness_kPa(spoilt), sound_kPa, 0.03 * sound_kPa);
 }
 
+TEST_F(HostileData, RowsThatAreThereTwiceCountOnce) {
+  const auto sound = fit();
+  phantom_.tags.rows.insert(phantom_.tags.rows.end(), phantom_.tags.rows.begin(), phantom_.tags.rows.end());
+  const auto spoilt = fit();
+  EXPECT_EQ(code_, ExitCode::done);
+  EXPECT_THAT(ids(spoilt), testing::ElementsAre("duplicate-rows"));
+  EXPECT_EQ(spoilt.at("parameters").at("C1_kPa"), sound.at("parameters").at("C1_kPa"));
+  EXPECT_THAT(spoilt.at("excluded").dump(), HasSubstr("repeat another"));
+}
+
+TEST_F(HostileData, AnEstimateOnItsBoundIsNone) {
+  std::string text = read_whole_file(phantom_.study());
+  text.replace(text.find("[1.0, 15.0]"), 11, "[1.0, 7.0]");
+  std::ofstream(phantom_.file("bounded.study.toml")) << text;
+  testing::internal::CaptureStderr();
+  const test::Outcome outcome = test::run_command(
+      {"fit", phantom_.file("bounded.study.toml"), "--mesh", "4,2,1", "--unexamined", "--json"});
+  (void)testing::internal::GetCapturedStderr();
+  EXPECT_EQ(outcome.code, ExitCode::negative);
+  const auto C1 = nlohmann::json::parse(outcome.output).at("parameters").at("C1_kPa");
+  EXPECT_EQ(C1.at("at_bound"), "upper");
+}
+
 TEST_F(HostileData, CentimetresAreRefusedBeforeTheFit) {
   for (std::vector<double>& row : phantom_.tags.rows) {
     for (size_t k = 0; k < 3; ++k)

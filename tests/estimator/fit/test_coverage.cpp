@@ -1,36 +1,136 @@
+// How often 95 % intervals hold the truth, over synthetic repeats with fresh noise. Nominal 95 % must come out between
+// 92 and 98 %; by chance alone, 200 repeats leave that range in 2 to 4 % of sound methods.
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
 
+#include "estimator/fit/elastic_motion.hpp"
+#include "estimator/montecarlo/montecarlo.hpp"
 #include "tests/estimator/fit/synthetic.hpp"
 
 namespace diastole {
 namespace {
 
-TEST(Coverage, NinetyFivePercentIntervalsHoldTheTruthThatOften) {
-  constexpr unsigned repeats = 240;
-  constexpr double truth_kPa = 8.71;
+constexpr unsigned repeats = 240;
+constexpr double truth_kPa = 8.71;
+
+bool holds(const EstimatedValue& value, double truth) {
+  return value.ci95[0] <= truth && truth <= value.ci95[1];
+}
+
+void expect_nominal(double rate) {
+  EXPECT_GE(rate, 0.92);
+  EXPECT_LE(rate, 0.98);
+}
+
+/// The whole C1 of the coarse gel; the mean of (estimate - truth) / standard error must vanish, its deviation be 1.
+void expect_whole_value_held(Robustness robustness) {
   ElasticModel truth = test::coarse_gel(truth_kPa);
   unsigned held = 0;
   double pull_sum = 0, pull_squares = 0;
+  FitOptions options;
+  options.robustness = robustness;
   for (unsigned seed = 1; seed <= repeats; ++seed) {
     const Measurement measurement =
         test::synthetic(truth, {.tags_a_frame = 100, .points_a_frame = 20, .sigma_kPa = 0.1, .seed = seed});
-    const FitOutcome fit = test::fit_C1(measurement);
+    ElasticMotion motion(test::coarse_gel(6), {whole_parameter(0)});
+    const FitOutcome fit = fit_motion(motion, {{6.0, 1.0, 15.0}}, measurement, options);
     ASSERT_TRUE(fit.converged) << fit.reason;
-    const EstimatedValue& value = fit.values[0];
-    held += value.ci95[0] <= truth_kPa && truth_kPa <= value.ci95[1] ? 1 : 0;
-    const double pull = (value.value - truth_kPa) / value.se;
+    held += holds(fit.values[0], truth_kPa) ? 1 : 0;
+    const double pull = (fit.values[0].value - truth_kPa) / fit.values[0].se;
     pull_sum += pull;
     pull_squares += pull * pull;
   }
   const double rate = static_cast<double>(held) / repeats;
-  RecordProperty("coverage", std::to_string(rate));
-  EXPECT_GE(rate, 0.92);
-  EXPECT_LE(rate, 0.98);
+  testing::Test::RecordProperty("coverage", fmt::format("{:.3f}", rate));
+  fmt::print("coverage {:.3f}, mean pull {:+.2f}, its deviation {:.2f}\n", rate, pull_sum / repeats,
+             std::sqrt(pull_squares / repeats));
+  expect_nominal(rate);
   // Normal 0.1 % tails for so many repeats.
   EXPECT_LT(std::abs(pull_sum / repeats), 0.21);
   EXPECT_NEAR(std::sqrt(pull_squares / repeats), 1.0, 0.15);
+}
+
+TEST(Coverage, NinetyFivePercentIntervalsHoldTheTruthThatOften) {
+  expect_whole_value_held(Robustness::if_needed);
+}
+
+TEST(Coverage, SoDoThoseOfTheRobustLossOnSoundData) { expect_whole_value_held(Robustness::always); }
+
+// Eight values, smooth by evidence. The intervals are a posterior's: they hold the truth at their rate on average over
+// maps, so every repeat has the map turned anew; a single element may be off by what its place makes of smoothing.
+TEST(Coverage, SoDoThoseOfSmoothRegionalValues) {
+  constexpr size_t elements = 8;
+  for (const double amplitude : {0.08, 0.2}) {
+    std::array<unsigned, elements> held{};
+    double squares = 0;
+    ElasticModel gel = test::coarse_gel(truth_kPa);
+    for (unsigned seed = 1; seed <= repeats; ++seed) {
+      std::array<double, elements> map{};
+      const double turned = 2.4 * seed;  // the golden angle: evenly through the turns
+      for (size_t e = 0; e < elements; ++e) {
+        map[e] = truth_kPa * (1 + amplitude * std::cos(M_PI / 2 * static_cast<double>(e % 4) - turned) +
+                              0.3 * amplitude * (e < 4 ? 1 : -1));
+        gel.set_element_parameter(0, e, map[e]);
+      }
+      const Measurement measurement =
+          test::synthetic(gel, {.tags_a_frame = 250, .sigma_mm = 0.4, .seed = 1000 + seed});
+      ElasticMotion motion(test::coarse_gel(truth_kPa), each_element(0, elements));
+      FitOptions options;
+      options.smooth = {{0, {}}};
+      const FitOutcome fit = fit_motion(motion, std::vector<SoughtValue>(elements, {truth_kPa, 1.0, 30.0}),
+                                        measurement, options);
+      ASSERT_TRUE(fit.converged) << fit.reason;
+      for (size_t e = 0; e < elements; ++e) {
+        held[e] += holds(fit.values[e], map[e]) ? 1 : 0;
+        squares += std::pow((fit.values[e].value - map[e]) / fit.values[e].se, 2);
+      }
+    }
+    double all = 0;
+    std::vector<std::string> words;
+    for (const unsigned count : held) {
+      all += static_cast<double>(count) / repeats / elements;
+      words.push_back(fmt::format("{:.3f}", static_cast<double>(count) / repeats));
+      EXPECT_GE(static_cast<double>(count) / repeats, 0.90);
+    }
+    fmt::print("contrast {} %: coverage {:.3f} of all, {} by element; deviation of pulls {:.2f}\n",
+               100 * amplitude, all, fmt::join(words, " "), std::sqrt(squares / (repeats * elements)));
+    RecordProperty(fmt::format("coverage_{:.0f}_percent", 100 * amplitude), fmt::format("{:.3f}", all));
+    expect_nominal(all);
+  }
+}
+
+// A ventricle of 4 x 2 x 1 elements seen by a coarse tag grid.
+TEST(Coverage, SoDoThoseOfTheVentriclesFourParameters) {
+  Study study{};
+  study.file = "coarse.study.toml";
+  study.specimen = EllipsoidSpecimen{{21, 51}, {30, 60}, 15, 60, -60, {4, 2, 1}, "fixed"};
+  study.law = {"guccione",
+               {{"C_kPa", 3.0, 0.2, 12.0, Variation::whole},
+                {"b1", 11.09, 1.0, 60.0, Variation::whole},
+                {"b2", 1.76, 0.2, 20.0, Variation::whole},
+                {"b3", 10.0, 0.5, 50.0, Variation::whole}}};
+  Measurement design;
+  for (int frame = 0; frame <= 3; ++frame)
+    design.frames.push_back({0.1 * frame, 0.6 * frame, frame == 0 ? 0.0 : 0.02});
+  const MonteCarloPlan plan{
+      .noise_mm = {0.8}, .frames = {3}, .repeats = repeats, .grid = TagGrid{.stripe_mm = 8, .pixel_mm = 3}};
+  CellFitter fitter(study, design, plan);
+  std::vector<CellResult> results;
+  for (const Cell& cell : cells_of(plan))
+    results.push_back(fitter.fit(cell));
+  const TableEntry entry = table_of(plan, study, results).at(0);
+  EXPECT_EQ(entry.failed, 0);
+  for (const ParameterSpread& spread : entry.parameters) {
+    fmt::print("{}: coverage {:.3f}, standard deviation {:.3g}, mean standard error {:.3g}, bound {:.3g}\n",
+               spread.name, spread.coverage, spread.sd, spread.mean_se, spread.bound);
+    RecordProperty("coverage_" + spread.name, fmt::format("{:.3f}", spread.coverage));
+    expect_nominal(spread.coverage);
+    EXPECT_NEAR(spread.bound / spread.mean_se, 1, 0.05);
+  }
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 
 #include <cmath>
+#include <limits>
 #include <random>
 
 #include "estimator/fit/elastic_motion.hpp"
@@ -146,6 +147,23 @@ TEST_F(CoarseFit, AnInterruptedPosteriorLeavesTheFit) {
   EXPECT_EQ(outcome.interrupted, "posterior");
   ASSERT_EQ(outcome.values.size(), 1U);
   EXPECT_GT(outcome.values[0].se, 0);
+}
+
+TEST_F(CoarseFit, AnInterruptionInsideAProfileLeavesTheFit) {
+  int asked = 0, last = std::numeric_limits<int>::max();
+  FitOptions options;
+  options.optimiser.interrupted = [&] { return ++asked > last; };
+  const FitOutcome searched = fit(options, {6.0, 1.0, 15.0}, 0.3, 40);
+  ASSERT_TRUE(searched.converged) << searched.reason;
+  options.profiled = {0};
+  last = asked + 3;  // asked once before the profile, then at each of its steps
+  asked = 0;
+  const FitOutcome profiled = fit(options, {6.0, 1.0, 15.0}, 0.3, 40);
+  EXPECT_TRUE(profiled.converged) << profiled.reason;
+  EXPECT_EQ(profiled.interrupted, "profile");
+  EXPECT_TRUE(profiled.profiles.empty());
+  EXPECT_LE(asked, last + 4);
+  EXPECT_NEAR(profiled.values[0].value, searched.values[0].value, 1e-9);
 }
 
 TEST_F(CoarseFit, ThePapersSearchCanBeInterrupted) {

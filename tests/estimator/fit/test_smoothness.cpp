@@ -109,6 +109,30 @@ TEST_F(RegionalGel, WithoutDifferencesTheEvidenceAsksForNone) {
   EXPECT_LE(smooth.iterations, 7);
 }
 
+// The most probable step would make the map flat; its mean over the steps that the data allow keeps what they saw.
+TEST_F(RegionalGel, WeakDifferencesAreNotFlattened) {
+  constexpr double weak = 0.08;
+  double along = 0, flat = 0;
+  for (const unsigned seed : {1U, 2U, 3U, 4U}) {
+    const FitOutcome outcome = fit(measured(weak, seed), SmoothRegion{0, {}});
+    ASSERT_TRUE(outcome.converged) << outcome.reason;
+    double mean = 0;
+    for (const EstimatedValue& value : outcome.values)
+      mean += value.value / static_cast<double>(elements);
+    for (size_t e = 0; e < elements; ++e) {
+      along += (outcome.values[e].value / mean - 1) * (truth(e, weak) / 8.7 - 1);
+      flat += std::pow(truth(e, weak) / 8.7 - 1, 2);
+      EXPECT_LE(outcome.values[e].ci95[0], truth(e, weak));
+      EXPECT_GE(outcome.values[e].ci95[1], truth(e, weak));
+    }
+    EXPECT_NE(outcome.values[0].value, outcome.values[2].value);
+  }
+  // The share of the true contrast that the maps show.
+  RecordProperty("contrast_found", std::to_string(along / flat));
+  EXPECT_GT(along / flat, 0.25);
+  EXPECT_LT(along / flat, 1.2);
+}
+
 TEST_F(RegionalGel, DifferencesThatTheDataShowAreKept) {
   const FitOutcome outcome = fit(measured(0.3, 1), SmoothRegion{0, {}});
   ASSERT_TRUE(outcome.converged) << outcome.reason;

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <set>
 
+#include "estimator/mesh/annulus.hpp"
 #include "estimator/montecarlo/synthetic_data.hpp"
 #include "tests/estimator/io/scratch_file.hpp"
 
@@ -84,7 +85,7 @@ TEST_F(CoarseGel, CellsAreTheSameInWhateverPlanTheyStand) {
   ASSERT_TRUE(alone.converged);
   EXPECT_NEAR(alone.value[0], among.value[0], 1e-6);
   EXPECT_NE(alone.value[0], one.fit({0.4, 2, 1}).value[0]);
-  EXPECT_EQ(cells_of(plan).size(), 8U);
+  EXPECT_EQ(cells_of(plan).size(), 12U);  // two repeats and one without noise
 }
 
 TEST_F(CoarseGel, TheSpreadIsWhatTheStandardErrorsSay) {
@@ -104,6 +105,37 @@ TEST_F(CoarseGel, TheSpreadIsWhatTheStandardErrorsSay) {
     EXPECT_GE(C1.coverage, 0.75);
     EXPECT_DOUBLE_EQ(C1.sd_percent, 100 * C1.sd / C1.mean);
   }
+}
+
+TEST_F(CoarseGel, RepeatZeroHasNoNoiseAndTellsTheBound) {
+  const MonteCarloPlan plan{.noise_mm = {1.6}, .frames = {2}, .repeats = 2};
+  CellFitter fitter(study_, design_, plan);
+  std::vector<CellResult> results;
+  for (const Cell& cell : cells_of(plan))
+    results.push_back(fitter.fit(cell));
+  EXPECT_NEAR(results[0].value[0], 8.71, 1e-6);
+  const TableEntry entry = table_of(plan, study_, results).at(0);
+  EXPECT_EQ(entry.refits, 2);
+  EXPECT_DOUBLE_EQ(entry.parameters[0].bound, results[0].se[0]);
+  EXPECT_NEAR(entry.parameters[0].bound / entry.parameters[0].mean_se, 1, 0.1);
+}
+
+TEST(TagGridOfImages, HasAPointAPixelAlongEveryStripeInTheWall) {
+  AnnulusShape shape;
+  shape.elements = {8, 4, 1};
+  const HermiteMesh mesh = make_annulus(shape);
+  const TagGrid grid{.stripe_mm = 5, .pixel_mm = 1, .short_axis_images = 2, .long_axis_images = 3};
+  const auto places = grid_places(mesh, grid);
+  // A point stands for 5 mm by 1 mm of the wall in an image, in each of two families.
+  const double area_mm2 = 2 * M_PI * (50.0 * 50.0 - 22.5 * 22.5) + 3 * 2 * 27.5 * 85.0;
+  EXPECT_NEAR(static_cast<double>(places.size()) / (2 * area_mm2 / 5), 1, 0.02);
+  for (const auto& X : places) {
+    const double radius_mm = std::hypot(X[0], X[1]);
+    EXPECT_GT(radius_mm, 22.4);
+    EXPECT_LT(radius_mm, 50.1);
+  }
+  const Measurement design = imaged_design(mesh, grid, {{0, 0, 0}, {1, 1, 0}, {2, 2, 0}});
+  EXPECT_EQ(design.points.size(), 2 * places.size());
 }
 
 TEST_F(CoarseGel, FailedRefitsAreCounted) {

@@ -57,6 +57,17 @@ TEST(ShearFit, RecoversThePapersFigureWithItsError) {
   EXPECT_NEAR(fit.rms_deg, camera_noise_deg, 0.3 * camera_noise_deg);
 }
 
+TEST(ShearFit, RadiansInPlaceOfDegreesAndRepeatedRowsAreRemarked) {
+  ShearTest radians = synthetic_shear(camera_noise_deg, 1);
+  for (ShearRow& row : radians.rows)
+    row.rotation_rad *= std::numbers::pi / 180;
+  EXPECT_THAT(fit_shear(radians).remarks, Contains(HasSubstr("rotations are in degrees")));
+  ShearTest twice = synthetic_shear(camera_noise_deg, 1);
+  EXPECT_THAT(fit_shear(twice).remarks, IsEmpty());
+  twice.rows.insert(twice.rows.end(), twice.rows.begin(), twice.rows.begin() + 20);
+  EXPECT_THAT(fit_shear(twice).remarks, Contains(HasSubstr("20 of 80 rows repeat another")));
+}
+
 // Every rotation has the same error, so the normalised form's small loads scatter most: the interval must hold
 // in both forms, and the rotation form must be the sharper one.
 TEST(ShearFit, TheIntervalHoldsTheTruthAtItsRate) {
