@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
+#include <numbers>
 
 #include "estimator/fit/offset_score.hpp"
 #include "estimator/fit/uncertainty.hpp"
@@ -120,11 +122,55 @@ RobustErrors robust_errors(JointProblem& problem, const Eigen::VectorXd& q,
   return errors;
 }
 
-/// What the smoothness' own uncertainty adds to the covariance at the chosen steps.
-void tell_smoothness(FitOutcome& outcome, JointProblem& problem, const Eigen::VectorXd& q,
-                     const FitOptions& options, const std::vector<bool>& is_free,
-                     const Eigen::MatrixXd& excess) {
-  if (options.smooth.empty()) return;
+/// Normal distributions of one unknown, one a step, with the steps' weights.
+struct StepMixture {
+  std::vector<double> weights, means, deviations;
+
+  [[nodiscard]] double share_below(double x) const {
+    double share = 0;
+    for (size_t k = 0; k < weights.size(); ++k)
+      share += weights[k] * 0.5 * std::erfc((means[k] - x) / (deviations[k] * std::numbers::sqrt2));
+    return share;
+  }
+  [[nodiscard]] double quantile(double share) const {
+    const auto [least, most] = std::minmax_element(means.begin(), means.end());
+    const double reach = 10 * *std::max_element(deviations.begin(), deviations.end());
+    double low = *least - reach, high = *most + reach;
+    for (int halving = 0; halving < 60; ++halving) {
+      const double middle = (low + high) / 2;
+      (share_below(middle) < share ? low : high) = middle;
+    }
+    return (low + high) / 2;
+  }
+};
+
+using Intervals = std::map<Eigen::Index, std::array<double, 2>>;
+
+/// The central 95 % of each value of a block. Its mixture over the steps has longer tails than a normal distribution:
+/// 1.96 standard deviations would hold more.
+void add_intervals(Intervals& intervals, const EvidenceOfStep& evidence, const SmoothBlock& block,
+                   const Eigen::MatrixXd& excess) {
+  std::vector<Eigen::VectorXd> variances;
+  for (const Eigen::MatrixXd& inverse : evidence.covariance)
+    variances.emplace_back((inverse + inverse * excess * inverse).diagonal());
+  for (Eigen::Index u = block.first; u < block.first + block.differences.cols(); ++u) {
+    if (!(variances.front()[u] > 0)) continue;
+    StepMixture mixture{evidence.weights, {}, {}};
+    for (size_t k = 0; k < evidence.steps.size(); ++k) {
+      mixture.means.push_back(evidence.q[k][u]);
+      mixture.deviations.push_back(std::sqrt(variances[k][u]));
+    }
+    intervals[u] = {mixture.quantile(0.025), mixture.quantile(0.975)};
+  }
+}
+
+/// What the smoothness' own uncertainty adds to the covariance at the chosen steps. Returns the values' intervals where
+/// it does.
+Intervals tell_smoothness(FitOutcome& outcome, JointProblem& problem, const Eigen::VectorXd& q,
+                          const FitOptions& options, const std::vector<bool>& is_free,
+                          const Eigen::MatrixXd& excess) {
+  Intervals intervals;
+  if (options.smooth.empty()) return intervals;
   const QuadraticModel model = quadratic_model(problem, q);
   const Eigen::MatrixXd at_chosen = outcome.covariance;
   const auto determined = [&](const Eigen::MatrixXd& covariance, const SmoothBlock& block) {
@@ -140,6 +186,7 @@ void tell_smoothness(FitOutcome& outcome, JointProblem& problem, const Eigen::Ve
       told.none_seen = evidence.none_seen;
       told.step90 = {step_at(evidence, 0.05), step_at(evidence, 0.95)};
       told.effective_values = 0;
+      add_intervals(intervals, evidence, block, excess);
       for (size_t k = 0; k < evidence.steps.size(); ++k) {
         const Eigen::VectorXd apart = evidence.q[k] - q;
         const Eigen::MatrixXd& inverse = evidence.covariance[k];
@@ -150,6 +197,7 @@ void tell_smoothness(FitOutcome& outcome, JointProblem& problem, const Eigen::Ve
     }
     outcome.smoothness.push_back(told);
   }
+  return intervals;
 }
 
 void tell_unsought_offset(FitOutcome& outcome, const JointProblem& problem, const Eigen::VectorXd& q,
@@ -234,13 +282,17 @@ Eigen::MatrixXd tell_uncertainty(FitOutcome& outcome, JointProblem& problem, con
     const double spread = outcome.chi2 / (static_cast<double>(outcome.rows) - outcome.unknowns);
     tell_unsought_offset(outcome, problem, q, {jacobian, *residuals, is_free, spread}, column);
   }
-  tell_smoothness(outcome, problem, q, options, is_free, excess);
+  const Intervals intervals = tell_smoothness(outcome, problem, q, options, is_free, excess);
   Eigen::MatrixXd in_coordinates = outcome.covariance;
   const Eigen::VectorXd exact =
       exact_factor * variances_at_exact_pressure(jacobian, is_free, problem.values());
   for (Eigen::Index i = 0; i < problem.values(); ++i) {
     outcome.values.push_back(
         estimated(problem.value(i), q[i], problem.bound_under(q, i), outcome.covariance(i, i), exact[i]));
+    if (const auto found = intervals.find(i); found != intervals.end()) {
+      for (size_t side = 0; side < 2; ++side)
+        outcome.values.back().ci95[side] = problem.value(i).value(found->second[side]);
+    }
     const double slope = problem.value(i).slope(q[i]);
     outcome.covariance.row(i) *= slope;
     outcome.covariance.col(i) *= slope;

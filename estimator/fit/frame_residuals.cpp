@@ -46,9 +46,11 @@ std::vector<FrameResiduals::UsableTag> FrameResiduals::find_tags(std::span<const
   parallel_for(tags_.size(), machine_threads(), [&](size_t i) {
     guesses[i] = find_tag(deformed, tags_[i]);
     if (!guesses[i] || given_up_[i]) return;
-    matches[i] = match_tag(mesh_, reference_, position_mm, tags_[i], *guesses[i]);
-    const MaterialPoint& place = matches[i] ? matches[i]->point : *guesses[i];
-    if (outside_mm(mesh_, place) > farthest_outside_mm) guesses[i].reset(), matches[i].reset();
+    if (outside_mm(mesh_, *guesses[i]) > farthest_outside_mm) {
+      guesses[i].reset();
+    } else {
+      matches[i] = match_tag(mesh_, reference_, position_mm, tags_[i], *guesses[i]);
+    }
   });
   std::vector<UsableTag> found;
   unfollowed_ = 0;

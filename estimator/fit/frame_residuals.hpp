@@ -22,7 +22,7 @@
 
 namespace diastole {
 
-/// Farther from the undeformed body than this a tag is not the specimen's.
+/// A tag seen farther outside the body than this (measured on the undeformed body) is not the specimen's.
 inline constexpr double farthest_outside_mm = 5.0;
 
 class FrameResiduals {

@@ -16,7 +16,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 constexpr double outside_mm = 5.0;  // farther from the body than this a point is not the specimen's
-constexpr double quick_settled_mm = 0.01;
+constexpr double quick_settled_mm = 0.05;
 constexpr double quick_fineness = 0.5;  // decades
 constexpr int quick_huber_rounds = 2;
 

@@ -108,7 +108,7 @@ TEST_F(CoarseGel, TheSpreadIsWhatTheStandardErrorsSay) {
 }
 
 TEST_F(CoarseGel, RepeatZeroHasNoNoiseAndTellsTheBound) {
-  const MonteCarloPlan plan{.noise_mm = {1.6}, .frames = {2}, .repeats = 2};
+  const MonteCarloPlan plan{.noise_mm = {0.1}, .frames = {2}, .repeats = 2};
   CellFitter fitter(study_, design_, plan);
   std::vector<CellResult> results;
   for (const Cell& cell : cells_of(plan))
@@ -117,7 +117,7 @@ TEST_F(CoarseGel, RepeatZeroHasNoNoiseAndTellsTheBound) {
   const TableEntry entry = table_of(plan, study_, results).at(0);
   EXPECT_EQ(entry.refits, 2);
   EXPECT_DOUBLE_EQ(entry.parameters[0].bound, results[0].se[0]);
-  EXPECT_NEAR(entry.parameters[0].bound / entry.parameters[0].mean_se, 1, 0.1);
+  EXPECT_NEAR(entry.parameters[0].bound / entry.parameters[0].mean_se, 1, 0.05);
 }
 
 TEST(TagGridOfImages, HasAPointAPixelAlongEveryStripeInTheWall) {
