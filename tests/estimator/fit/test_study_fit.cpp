@@ -188,8 +188,8 @@ TEST_F(CoarseStudy, WhatCannotBeFittedIsRefused) {
   EXPECT_THAT(message_of([&] { (void)fit_study(other, measurement_, {}); }),
               AllOf(HasSubstr("gel.study.toml"), HasSubstr("neo-hokean"), HasSubstr("neo-hookean")));
   other = study_;
-  other.effects = {"end-bond-slip"};
-  EXPECT_THAT(message_of([&] { (void)fit_study(other, measurement_, {}); }), HasSubstr("end-bond-slip"));
+  other.effects = {"end-bond-slop"};
+  EXPECT_THAT(message_of([&] { (void)fit_study(other, measurement_, {}); }), HasSubstr("end-bond-slop"));
   other = study_;
   other.law.parameters[0] = {"C1_kPa", 6.0, -1.0, 15.0, Variation::whole};
   EXPECT_THAT(message_of([&] { (void)fit_study(other, measurement_, {}); }), HasSubstr("lower bound -1"));
