@@ -81,7 +81,7 @@ std::vector<Hidden> hidden() {
       {"Lump", {.truth = lumpy(), .seed = 111}, Verdict::named, {"stiff-inclusion"}},
       {"SlipAndStiffening",
        {.truth = stiffening_and_slipping(), .C1_kPa = 7.2, .highest_kPa = 2.7, .seed = 112},
-       Verdict::ambiguous,
+       Verdict::named,
        {"end-bond-slip", "strain-stiffening"}},
   };
 }
