@@ -129,6 +129,7 @@ bool differ(const rig::NoiseModel& a, const rig::NoiseModel& b) {
 struct Work {
   rig::RigProblem problem;
   SearchResult found;
+  Eigen::VectorXd weights;  ///< of the residuals' squares
 
   [[nodiscard]] const FittedSet& best() const { return found.sets[found.best]; }
 };
@@ -157,10 +158,13 @@ Work searched(const rig::Session& session, const rig::SpecimenFamily& family, co
     fitting.beats_of = rig::KnownModel{best.ingredients, best.values};
     searching.start = best.ingredients;
     rig::RigProblem again(session, family, fitting);
+    searching.change = again.base().residuals - again.residuals(best.ingredients, best.values);
     SearchResult second = search(session, family, again, searching);
-    return {std::move(again), std::move(second)};
+    Eigen::VectorXd weights = row_weights(session, again, searching.change);
+    return {std::move(again), std::move(second), std::move(weights)};
   }
-  return {std::move(problem), std::move(found)};
+  Eigen::VectorXd weights = row_weights(session, problem, searching.change);
+  return {std::move(problem), std::move(found), std::move(weights)};
 }
 
 std::optional<NextExperiment> next_experiment(const rig::Session& session, const Work& work,
@@ -200,7 +204,7 @@ Explanation explain_rig(const Study& study, const ExplainOptions& options) {
                                     model_variance(problem, base.residuals - best.residuals));
   std::vector<ResidualCell> left = significant(cells, discovery_rate);
   if (!is_structured(left, cells.size())) left.clear();
-  const Eigen::VectorXd weights = row_weights(session, problem);
+  const Eigen::VectorXd& weights = work.weights;
   const Gap gap = held_out_gap(session, problem, best, weights);
   const Judgement judgement = judge(work.found, left, gap);
 

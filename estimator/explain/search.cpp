@@ -36,7 +36,7 @@ class Search {
         family_(family),
         problem_(problem),
         options_(options),
-        weights_(row_weights(session, problem)) {
+        weights_(row_weights(session, problem, options.change)) {
     add(problem.base());
   }
   SearchResult run();
@@ -160,9 +160,12 @@ SearchResult Search::run() {
     std::erase_if(grown, [&](size_t set) { return reduced(set) - 1.0 > far_behind * left + at_the_floor; });
     beam = grown;
   }
-  compare_alike(result_.best);
-  for (size_t k = 0; k < result_.sets.size(); ++k)
-    if (penalised(k) < penalised(result_.best)) result_.best = k;
+  for (size_t compared = result_.sets.size(); compared != result_.best;) {
+    compared = result_.best;
+    compare_alike(compared);
+    for (size_t k = 0; k < result_.sets.size(); ++k)
+      if (penalised(k) < penalised(result_.best)) result_.best = k;
+  }
   return std::move(result_);
 }
 
@@ -179,8 +182,9 @@ size_t FittedSet::parameters() const {
 
 double admission(size_t parameters) { return chi_square_exceeded(1e-7, static_cast<double>(parameters)); }
 
-Eigen::VectorXd row_weights(const rig::Session& session, const rig::RigProblem& problem) {
-  Eigen::VectorXd variance = model_variance(problem, {});
+Eigen::VectorXd row_weights(const rig::Session& session, const rig::RigProblem& problem,
+                            const Eigen::VectorXd& change) {
+  Eigen::VectorXd variance = model_variance(problem, change);
   for (const rig::ResidualBlock& block : problem.blocks()) {
     if (block.channel == "cavity_mL") continue;
     const rig::SessionRun& run = session.runs[block.run];

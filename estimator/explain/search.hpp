@@ -31,7 +31,9 @@ struct SearchOptions {
   size_t most_effects = 3;
   size_t refitted = 4;  ///< of each screening
   size_t beam = 2;
-  std::vector<rig::Ingredient> start = {};           ///< effects that the model has already
+  std::vector<rig::Ingredient> start = {};  ///< effects that the model has already
+  Eigen::VectorXd change =
+      {};  ///< of the residuals by effects that are known: the model errs by a part of it
   std::function<void(const std::string&)> progress;  ///< may throw to end the search
 };
 
@@ -43,8 +45,9 @@ double admission(size_t parameters);
 inline constexpr double as_good = 9.0;
 
 /// What the square of each residual counts for: 1 / (1 + cycles x model variance), since the model's error repeats in
-/// each of a segment's cycles while noise does not.
-Eigen::VectorXd row_weights(const rig::Session& session, const rig::RigProblem& problem);
+/// each of a segment's cycles while noise does not. `change` as in tolerance.hpp.
+Eigen::VectorXd row_weights(const rig::Session& session, const rig::RigProblem& problem,
+                            const Eigen::VectorXd& change);
 
 SearchResult search(const rig::Session& session, const rig::SpecimenFamily& family,
                     const rig::RigProblem& problem, const SearchOptions& options);

@@ -31,7 +31,7 @@ TEST_F(SimulatedSession, WithoutAnEffectGetsNoName) {
   const SearchResult found = searched({.seed = 4});
   EXPECT_THAT(found.sets[found.best].ids(), IsEmpty());
   const Gap gap =
-      held_out_gap(session_, *problem_, found.sets[found.best].fit, row_weights(session_, *problem_));
+      held_out_gap(session_, *problem_, found.sets[found.best].fit, row_weights(session_, *problem_, {}));
   EXPECT_NE(judge(found, {}, gap).verdict, Verdict::named);
 }
 
@@ -40,7 +40,7 @@ TEST_F(SimulatedSession, WithALeakIsExplainedByItAndPredictsWhatWasNotFitted) {
   const SearchResult found = searched({.ingredients = {{leak, {}}}, .values = {0.15}, .seed = 5});
   const FittedSet& best = found.sets[found.best];
   EXPECT_THAT(best.ids(), ElementsAre("cannula-leak-cavity"));
-  const Eigen::VectorXd weights = row_weights(session_, *problem_);
+  const Eigen::VectorXd weights = row_weights(session_, *problem_, {});
   const Gap gap = held_out_gap(session_, *problem_, best.fit, weights);
   EXPECT_GT(gap.before, 1.5);
   EXPECT_GT(gap.closed, 0.95);
