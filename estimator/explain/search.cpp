@@ -156,8 +156,7 @@ SearchResult Search::run() {
     if (grown.empty() || penalised(grown.front()) >= penalised(result_.best)) break;
     result_.best = grown.front();
     grown.resize(std::min(grown.size(), options_.beam));
-    const double left = reduced(result_.best) - 1.0;
-    std::erase_if(grown, [&](size_t set) { return reduced(set) - 1.0 > far_behind * left + at_the_floor; });
+    std::erase_if(grown, [&](size_t set) { return !worth_following(reduced(set), reduced(result_.best)); });
     beam = grown;
   }
   for (size_t compared = result_.sets.size(); compared != result_.best;) {
@@ -170,6 +169,12 @@ SearchResult Search::run() {
 }
 
 }  // namespace
+
+bool worth_following(double reduced, double best) {
+  const double left =
+      std::max(best - 1.0, 0.0);  // the noise is estimated: the best may have less than none left
+  return reduced - std::min(best, 1.0) <= far_behind * left + at_the_floor;
+}
 
 std::vector<std::string> FittedSet::ids() const { return ids_of(fit.ingredients); }
 

@@ -44,6 +44,10 @@ double admission(size_t parameters);
 /// Within this of the best set's squares another set fits as well (3 sigma).
 inline constexpr double as_good = 9.0;
 
+/// Whether a set is grown further beside the best one so far, by their reduced chi-squares: one that leaves four times as much
+/// above the noise is not. The best itself always is.
+bool worth_following(double reduced, double best);
+
 /// What the square of each residual counts for: 1 / (1 + cycles x model variance), since the model's error repeats in
 /// each of a segment's cycles while noise does not. `change` as in tolerance.hpp.
 Eigen::VectorXd row_weights(const rig::Session& session, const rig::RigProblem& problem,

@@ -37,6 +37,14 @@ TEST(Screening, DependentColumnsAreLeftOut) {
   EXPECT_EQ(basis_of(columns).cols(), 2);
 }
 
+TEST(Search, FollowsTheBestSetHoweverLowItLies) {
+  EXPECT_TRUE(worth_following(0.9, 0.9));
+  EXPECT_TRUE(worth_following(1.4, 1.4));
+  EXPECT_TRUE(worth_following(1.3, 1.1));
+  EXPECT_FALSE(worth_following(1.5, 1.1));
+  EXPECT_FALSE(worth_following(1.02, 0.99));
+}
+
 TEST(Verdicts, StructureThatIsLeftForbidsAName) {
   SearchResult search;
   search.sets.resize(2);
