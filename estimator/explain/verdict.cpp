@@ -27,7 +27,8 @@ std::vector<std::vector<std::string>> hinted(const std::vector<Lead>& leads) {
 /// Whether the chosen set predicts left-out data at least as well as the base model does.
 bool predicts(const SearchResult& search, const Gap& gap) {
   const FittedSet& best = search.sets[search.best];
-  if (!std::isfinite(search.sets.front().chi_square) || !std::isfinite(best.chi_square)) return false;
+  for (const double number : {search.sets.front().chi_square, best.chi_square, gap.before})
+    if (!std::isfinite(number)) return false;
   return best.fit.ingredients.empty() || gap.after <= gap.before;
 }
 

@@ -138,6 +138,7 @@ std::vector<std::vector<double>> RigProblem::starts(const std::vector<Ingredient
     }
     const VectorXd misfit = residuals(ingredients, values, coarse);
     ++simulations;
+    if (!misfit.allFinite()) return;  // no motion at these values: the cavity is empty, say
     // What was known before follows, as far as it is linear.
     const VectorXd shift = -normal.solve(known.transpose() * misfit);
     const VectorXd at = search.clamped(search.sought(before.values) + shift);
@@ -153,6 +154,7 @@ std::vector<std::vector<double>> RigProblem::starts(const std::vector<Ingredient
          {0.14, 0.2, 0.25, 0.36, 0.43, 0.51, 0.7, 0.8, 0.9, 1.12, 1.25, 1.37, 1.75, 2.1, 3.0, 3.5})
       add(size);
   }
+  if (tried.empty()) add(0.0);
   std::sort(tried.begin(), tried.end());
   std::vector<std::vector<double>> values;
   for (auto& [square, start] : tried)
@@ -220,9 +222,10 @@ RigFit RigProblem::fit_from(const std::vector<Ingredient>& ingredients, const st
     }
     const VectorXd next = search.clamped(at + search.step(damping));
     const VectorXd step = next - at;
-    const VectorXd tried = residuals(ingredients, search.natural(next), request);
+    const bool sound = next.allFinite();
+    const VectorXd tried = sound ? residuals(ingredients, search.natural(next), request) : fit.residuals;
     ++fit.simulations;
-    const double gain = before - tried.squaredNorm();
+    const double gain = sound ? before - tried.squaredNorm() : std::nan("");
     const double expected = search.expected_gain(step);
     if (std::isfinite(gain) && gain >= 0.0) {
       fit.converged = led_sigma == 0.0 && gain < small_gain;

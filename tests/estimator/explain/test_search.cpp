@@ -77,6 +77,10 @@ TEST(Verdicts, SquaresThatAreNoNumbersNameNothing) {
   search.sets[1].fit.ingredients = {{find_effect("hose-compliance"), {}}};
   search.best = 1;
   EXPECT_EQ(judge(search, {}, better).verdict, Verdict::unexplained);
+  search.best = 0;
+  search.sets[0].chi_square = 3000.0;
+  EXPECT_EQ(judge(search, {}, better).verdict, Verdict::none);
+  EXPECT_EQ(judge(search, {}, gap_of(std::nan(""), std::nan(""))).verdict, Verdict::unexplained);
 }
 
 TEST(Verdicts, AsGoodASetOfTheSameSizeIsToldBesideIt) {
