@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <memory>
+#include <optional>
 
 #include "estimator/fe/elastic_system.hpp"
 #include "estimator/mesh/annulus_grid.hpp"
@@ -87,6 +89,15 @@ FieldFit with_lump(const FieldFit& base, const Inclusion& guess) {
   return result;
 }
 
+/// A ball there: where a guess's contrast and axes have gone astray together, the better valley may begin here.
+Inclusion usual_lump(const Inclusion& guess) {
+  constexpr double usual_contrast = 3.0;
+  Inclusion usual = guess;
+  usual.contrast = guess.contrast > 1.0 ? usual_contrast : 1.0 / usual_contrast;
+  usual.semi_axes_mm = {usual_axis_mm, usual_axis_mm, usual_axis_mm};
+  return usual;
+}
+
 class LumpFit {
  public:
   LumpFit(const FieldProblem& problem, const FieldFit& base, const Inclusion& guess)
@@ -103,52 +114,41 @@ class LumpFit {
     state_ = std::move(solution.state);
   }
 
-  /// Until a step gains less than `tolerance` of chi2.
-  FieldFit run(const Inclusion& guess, double tolerance) {
-    FieldFit result = with_lump(base_, guess);
-    if (!solved_) return result;
-    const auto first = result.choice.values.begin() + static_cast<std::ptrdiff_t>(base_.choice.values.size());
-    best_ = evaluate({first, result.choice.values.end()}, Eigen::VectorXd::Zero(base_.jacobian.cols()));
-    result.converged = minimise(best_, false, tolerance);
-    finish(best_, result);
-    return result;
+  /// Downhill from a lump, until a step gains less than `tolerance` of chi2; the best one so far is kept.
+  void descend(const Inclusion& from, double tolerance) {
+    if (!solved_) return;
+    const FieldFit start = with_lump(base_, from);
+    const auto first = start.choice.values.begin() + static_cast<std::ptrdiff_t>(base_.choice.values.size());
+    Point at = evaluate({first, start.choice.values.end()}, Eigen::VectorXd::Zero(base_.jacobian.cols()));
+    const bool converged = minimise(at, false, tolerance);
+    if (begun_ && at.cost() >= best_.cost()) return;
+    best_ = std::move(at);
+    converged_ = converged;
+    begun_ = true;
+  }
+
+  /// The best lump so far; the guess, not converged, if there is none.
+  [[nodiscard]] FieldFit result(const Inclusion& guess) const {
+    FieldFit found = with_lump(base_, guess);
+    if (!begun_) return found;
+    found.converged = converged_;
+    finish(best_, found);
+    return found;
   }
 
   /// 90 % intervals of the parameters' coordinates. Contrast, size and depth trade off against one another, not always
   /// within one valley: the others are refitted at held contrasts on both sides, until that costs 2.7 of chi2, and every
-  /// parameter's interval is what all these fits leave open. Precondition: `run` has converged.
-  [[nodiscard]] Intervals intervals() const {
-    Intervals found = open_at(best_, 0.0);
-    const double start = coordinates(best_)[0];
-    const double usual = std::clamp(std::sqrt(conditional(best_, false)(0, 0)), 0.08, 0.6);
-    for (const double direction : {-1.0, 1.0}) {
-      Point at = best_;
-      double cost_before = 0.0;
-      std::array<double, lump_parameters> before = coordinates(best_);
-      for (double away = usual; away < 6.0 * usual; away *= 1.6) {
-        at.values[0] = std::clamp(std::exp(start + direction * away), parameter(0).lower, parameter(0).upper);
-        at = evaluate(at.values, at.shift);
-        (void)minimise(at, true, 0.2);
-        const std::array<double, lump_parameters> here = coordinates(at);
-        const double cost = std::max(0.0, at.cost() - best_.cost());
-        if (cost < allowed) {
-          widen(found, open_at(at, cost));
-        } else {
-          const double part =
-              (std::sqrt(allowed) - std::sqrt(cost_before)) / (std::sqrt(cost) - std::sqrt(cost_before));
-          for (size_t i = 0; i < lump_parameters; ++i) {
-            const double crossing = std::lerp(before[i], here[i], part);
-            widen(found[i], {crossing, crossing});
-          }
-          break;
-        }
-        widen(found[0], {here[0], here[0]});
-        before = here;
-        cost_before = cost;
-        if (at.values[0] == parameter(0).lower || at.values[0] == parameter(0).upper) break;
-      }
+  /// parameter's interval is what all these fits leave open. A held fit in a deeper valley than the best one's replaces it,
+  /// and the profile begins again there. Precondition: `descend` has found a lump.
+  [[nodiscard]] Intervals intervals(double tolerance) {
+    constexpr int valleys = 4;
+    for (int valley = 1; valley < valleys; ++valley) {
+      const Profile profile = profile_of_contrast(tolerance);
+      if (!profile.deeper) return profile.intervals;
+      best_ = *profile.deeper;
+      converged_ = minimise(best_, false, tolerance);
     }
-    return found;
+    return profile_of_contrast(std::numeric_limits<double>::infinity()).intervals;
   }
 
  private:
@@ -160,7 +160,51 @@ class LumpFit {
     [[nodiscard]] double cost() const { return residuals.squaredNorm(); }
   };
 
+  struct Profile {
+    Intervals intervals{};
+    std::optional<Point> deeper;  // where it ended, if there
+  };
+
   static constexpr double allowed = 2.706;  // of chi2: 90 % of one parameter
+
+  /// Ends at a fit that is better than the best one by more than `gain`.
+  [[nodiscard]] Profile profile_of_contrast(double gain) const {
+    Profile profile{open_at(best_, 0.0), {}};
+    Intervals& found = profile.intervals;
+    const double start = coordinates(best_)[0];
+    const double usual = std::clamp(std::sqrt(conditional(best_, false)(0, 0)), 0.08, 0.6);
+    for (const double direction : {-1.0, 1.0}) {
+      Point at = best_;
+      double cost_before = 0.0;
+      std::array<double, lump_parameters> before = coordinates(best_);
+      for (double away = usual; away < 6.0 * usual; away *= 1.6) {
+        at.values[0] = std::clamp(std::exp(start + direction * away), parameter(0).lower, parameter(0).upper);
+        at = evaluate(at.values, at.shift);
+        (void)minimise(at, true, 0.2);
+        if (at.cost() < best_.cost() - gain) {
+          profile.deeper = std::move(at);
+          return profile;
+        }
+        const std::array<double, lump_parameters> here = coordinates(at);
+        const double cost = std::max(0.0, at.cost() - best_.cost());
+        if (cost >= allowed) {
+          const double part =
+              (std::sqrt(allowed) - std::sqrt(cost_before)) / (std::sqrt(cost) - std::sqrt(cost_before));
+          for (size_t i = 0; i < lump_parameters; ++i) {
+            const double crossing = std::lerp(before[i], here[i], part);
+            widen(found[i], {crossing, crossing});
+          }
+          break;
+        }
+        widen(found, open_at(at, cost));
+        widen(found[0], {here[0], here[0]});
+        before = here;
+        cost_before = cost;
+        if (at.values[0] == parameter(0).lower || at.values[0] == parameter(0).upper) break;
+      }
+    }
+    return profile;
+  }
 
   [[nodiscard]] const EffectParameter& parameter(size_t i) const { return effect_.field_parameters()[i]; }
 
@@ -201,27 +245,29 @@ class LumpFit {
 
   /// Levenberg-Marquardt from a point. Whether it converged.
   [[nodiscard]] bool minimise(Point& best, bool hold_contrast, double tolerance) const {
+    constexpr double hardly_damped = 0.1;
     double damping = 1e-3;
     bool converged = false;
-    for (int iteration = 0; iteration < 10 && !converged; ++iteration) {
+    for (int iteration = 0; iteration < 12 && !converged; ++iteration) {
       Eigen::MatrixXd normal = best.jacobian.transpose() * best.jacobian;
       Eigen::VectorXd gradient = best.jacobian.transpose() * best.residuals;
-      normal.diagonal() *= 1.0 + damping;
       if (hold_contrast) {
         normal.row(0).setZero();
         normal.col(0).setZero();
         normal(0, 0) = 1.0;
         gradient[0] = 0.0;
       }
+      const double promised = gradient.dot(normal.ldlt().solve(gradient));
+      normal.diagonal() *= 1.0 + damping;
       const Eigen::VectorXd step = -normal.ldlt().solve(gradient);
       Point trial = evaluate(moved(best.values, step.head<lump_parameters>()),
                              best.shift + step.tail(best.shift.size()));
       if (trial.cost() < best.cost()) {
-        converged = best.cost() - trial.cost() < tolerance;
+        converged = best.cost() - trial.cost() < tolerance && damping < hardly_damped;
         best = std::move(trial);
         damping = std::max(1e-6, 0.1 * damping);
       } else {
-        converged = -gradient.dot(step) < tolerance;
+        converged = promised < tolerance;
         damping *= 10.0;
       }
     }
@@ -353,6 +399,8 @@ class LumpFit {
       course_;  ///< what a change of stiffness moves in each frame, as a share of that at highest_kPa_
   ElasticState state_;
   bool solved_ = false;
+  bool begun_ = false;
+  bool converged_ = false;
   Point best_;
 };
 
@@ -367,9 +415,13 @@ Inclusion lump_of(const FieldFit& fit) {
 FieldFit fit_lump(const FieldProblem& problem, const FieldFit& base, const Inclusion& guess,
                   LumpEffort effort) {
   LumpFit around_guess(problem, base, guess);
-  FieldFit found = around_guess.run(guess, effort == LumpEffort::once ? 1.0 : 0.1);
-  if (effort == LumpEffort::once || !(found.chi_square < base.chi_square)) return found;
-  const Intervals intervals = around_guess.intervals();
+  constexpr double fine = 0.1;
+  around_guess.descend(guess, effort == LumpEffort::once ? 1.0 : fine);
+  if (effort == LumpEffort::once) return around_guess.result(guess);
+  around_guess.descend(usual_lump(guess), fine);
+  if (!(around_guess.result(guess).chi_square < base.chi_square)) return around_guess.result(guess);
+  const Intervals intervals = around_guess.intervals(fine);
+  FieldFit found = around_guess.result(guess);
   const FieldFit before = with_lump(base, guess);
   const size_t offset = base.choice.values.size();
   found.ci90.resize(found.choice.values.size());

@@ -13,8 +13,9 @@
 
 namespace diastole::explain {
 
-/// once: to a unit of chi2. fully: to a tenth, with intervals (FieldFit::ci90), which take a quarter of the change from the guess as
-/// the meshes' error: the guess should be what `once` has found, on another mesh.
+/// once: to a unit of chi2. fully: to a tenth, from the guess and from a ball of a usual contrast at its place, and wherever the
+/// profile of the contrast finds a deeper valley; with intervals (FieldFit::ci90), which take a quarter of the change from the
+/// guess as the meshes' error: the guess should be what `once` has found, on another mesh.
 enum class LumpEffort { once, fully };
 
 /// Best lump near the guess, beside the effects of `base`, whose parameters answer linearly too. `problem` is the one of the
