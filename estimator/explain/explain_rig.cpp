@@ -18,6 +18,7 @@ namespace diastole::explain {
 namespace {
 
 constexpr double discovery_rate = 0.01;
+constexpr double dominated = 0.1;  // of chi-square left by effects beside which a first search seeks no more
 constexpr double other_beats = 0.5;  // of chi-square left by effects that change what a beat looks like, too
 
 std::string summary_of(const Explanation& found) {
@@ -147,16 +148,18 @@ Work searched(const rig::Session& session, const rig::SpecimenFamily& family, co
   SearchOptions searching;
   searching.progress = options.progress;
   searching.start = ingredients_of(study, session);
+  searching.enough = dominated;
   rig::RigProblem problem(session, family, fitting);
   SearchResult found = search(session, family, problem, searching);
   const rig::RigFit& best = found.sets[found.best].fit;
   const rig::NoiseModel noise = rig::estimate_noise(without_effects(session, problem, best));
-  const bool large = best.chi_square < other_beats * problem.base().chi_square;
+  const bool large = found.sets[found.best].chi_square < other_beats * found.sets.front().chi_square;
   if (!best.ingredients.empty() && (large || differ(problem.noise(), noise))) {
     tell("fitting again with the noise that is left");
     fitting.noise = noise;
     fitting.beats_of = rig::KnownModel{best.ingredients, best.values};
     searching.start = best.ingredients;
+    searching.enough = 0.0;
     rig::RigProblem again(session, family, fitting);
     searching.change = again.base().residuals - again.residuals(best.ingredients, best.values);
     SearchResult second = search(session, family, again, searching);

@@ -155,6 +155,7 @@ SearchResult Search::run() {
     grown.erase(std::unique(grown.begin(), grown.end()), grown.end());
     if (grown.empty() || penalised(grown.front()) >= penalised(result_.best)) break;
     result_.best = grown.front();
+    if (reduced(result_.best) < options_.enough * reduced(0)) return std::move(result_);
     grown.resize(std::min(grown.size(), options_.beam));
     std::erase_if(grown, [&](size_t set) { return !worth_following(reduced(set), reduced(result_.best)); });
     beam = grown;
