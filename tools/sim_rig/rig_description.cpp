@@ -15,6 +15,9 @@ void read_geometry(TableReader& rig, int64_t microsteps, RigDescription& descrip
   hose.length_m = rig.number("hose_length_m", positive);
   hose.bore_mm = rig.number("hose_bore_mm", positive);
   hose.wave_speed_m_s = rig.number_or("hose_wave_speed_m_s", hose.wave_speed_m_s, positive);
+  hose.wall_creep_fraction =
+      rig.number_or("hose_creep_fraction", hose.wall_creep_fraction, {.at_least = 0, .at_most = 0.5});
+  hose.wall_creep_time_s = rig.number_or("hose_creep_time_s", hose.wall_creep_time_s, {.at_least = 0.01});
   hose.fluid_density_kg_m3 = rig.number("fluid_density_kg_m3", positive);
   hose.fluid_viscosity_Pa_s = rig.number_or("fluid_viscosity_Pa_s", hose.fluid_viscosity_Pa_s, positive);
   PlantConfig& plant = description.plant;
