@@ -8,17 +8,10 @@
 
 #include "estimator/effects/effect.hpp"
 #include "estimator/fe/study_model.hpp"
-#include "protocol/contract/input_error.hpp"
+#include "estimator/io/study_refusal.hpp"
 
 namespace diastole {
 namespace {
-
-[[noreturn]] void refuse(const Study& study, std::string key, std::string problem, std::string remedy) {
-  throw InputError({.file = study.file.string(),
-                    .place = "key " + std::move(key),
-                    .problem = std::move(problem),
-                    .remedy = std::move(remedy)});
-}
 
 const Effect& effect_of(const Study& study, const std::string& id) {
   if (const Effect* effect = find_effect(id)) return *effect;

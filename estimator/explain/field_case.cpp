@@ -4,17 +4,10 @@
 
 #include "estimator/effects/affected_model.hpp"
 #include "estimator/explain/field_fit.hpp"
-#include "protocol/contract/input_error.hpp"
+#include "estimator/io/study_refusal.hpp"
 
 namespace diastole::explain {
 namespace {
-
-[[noreturn]] void refuse(const Study& study, std::string key, std::string problem, std::string remedy) {
-  throw InputError({.file = study.file.string(),
-                    .place = "key " + std::move(key),
-                    .problem = std::move(problem),
-                    .remedy = std::move(remedy)});
-}
 
 /// Half the bounds' width over their middle up to which they are a measurement.
 constexpr double narrow = 0.05;

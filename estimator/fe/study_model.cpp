@@ -12,21 +12,14 @@
 #include <vector>
 
 #include "estimator/fe/elastic_system.hpp"
+#include "estimator/io/study_refusal.hpp"
 #include "estimator/mesh/annulus.hpp"
 #include "estimator/mesh/ellipsoid.hpp"
 #include "estimator/mesh/refinement.hpp"
-#include "protocol/contract/input_error.hpp"
 #include "protocol/contract/table_reader.hpp"
 
 namespace diastole {
 namespace {
-
-[[noreturn]] void refuse(const Study& study, std::string key, std::string problem, std::string remedy) {
-  throw InputError({.file = study.file.string(),
-                    .place = "key " + std::move(key),
-                    .problem = std::move(problem),
-                    .remedy = std::move(remedy)});
-}
 
 const Law& law_of(const Study& study) {
   if (const Law* law = find_law(study.law.name)) return *law;
