@@ -312,20 +312,24 @@ class Explainer {
     if (chosen_ != nullptr) out_.steps.push_back({chosen_->name(), out_.gap.after});
   }
 
-  /// Residuals of the frame of highest pressure.
+  /// As precise as a drawing needs, so that the file stays small.
   void fill_field() {
-    const FieldProblem& problem = *round_;
-    const FieldFit& base = base_;
-    const FieldFit& after = chosen_ != nullptr ? chosen_->fit : base;
-    const auto most = std::ranges::max_element(base.pressures_kPa);
-    const auto slot = static_cast<size_t>(most - base.pressures_kPa.begin());
-    for (Index i = problem.rows().first(slot); i < problem.rows().first(slot) + problem.rows().count(slot);
-         ++i) {
-      const FieldRow& row = problem.rows().rows()[static_cast<size_t>(i)];
-      out_.field.push_back({{row.X_mm[0], row.X_mm[1], row.X_mm[2]},
-                            problem.rows().frames()[slot],
-                            base.residuals[i],
-                            after.residuals[i]});
+    const FieldFit& after = chosen_ != nullptr ? chosen_->fit : base_;
+    const double highest_kPa = std::ranges::max(base_.pressures_kPa);
+    const auto rounded = [](double value, double scale) { return std::round(scale * value) / scale; };
+    for (Index i = 0; i < round_->rows().size(); ++i) {
+      const FieldRow& row = round_->rows().rows()[static_cast<size_t>(i)];
+      const double share = base_.pressures_kPa[row.slot] / highest_kPa;
+      FieldResidual seen;
+      seen.frame = round_->rows().frames()[row.slot];
+      seen.before = rounded(base_.residuals[i], 1e3);
+      seen.after = rounded(after.residuals[i], 1e3);
+      for (size_t k = 0; k < 3; ++k) {
+        const auto axis = static_cast<Index>(k);
+        seen.place_mm[k] = rounded(row.X_mm[axis], 1e2);
+        seen.per_mm[k] = rounded(-share * row.by_motion[axis], 1e3);
+      }
+      out_.field.push_back(seen);
     }
   }
 

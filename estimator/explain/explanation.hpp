@@ -95,6 +95,8 @@ struct FieldResidual {
   int frame = 0;
   double before = 0.0;
   double after = 0.0;
+  /// Of the residual by a motion that the model lacks there and that grows with the pressure, at the highest one.
+  std::array<double, 3> per_mm{};
 };
 
 /// What the gap was after each effect, in the order in which they were added; the first is the base model.

@@ -94,6 +94,7 @@ void each_member(Visit&& visit, Record& r) {
   visit("frame", r.frame);
   visit("before", r.before);
   visit("after", r.after);
+  visit("per_mm", r.per_mm);
 }
 
 template <class Visit, IsRecord<Step> Record>

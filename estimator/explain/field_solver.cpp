@@ -4,8 +4,8 @@
 #include <utility>
 
 #include "estimator/effects/affected_model.hpp"
+#include "estimator/explain/stiffness_sides.hpp"
 #include "estimator/fe/elastic_system.hpp"
-#include "estimator/fe/gauss_contraction.hpp"
 #include "estimator/mesh/annulus.hpp"
 
 namespace diastole::explain {
@@ -139,33 +139,7 @@ NodeField FieldSolver::reference_slope(const FieldNudge& nudge) const {
 
 std::vector<std::vector<double>> FieldSolver::stiffness_sides(
     size_t slot, const std::vector<StiffnessField>& fields) const {
-  const ElasticSystem& system = elastic_->system();
-  std::vector<std::vector<double>> sides(fields.size(), std::vector<double>(elastic_->dofs(), 0.0));
-  for (size_t e = 0; e < mesh().element_count(); ++e) {
-    const ReferenceElement reference = make_reference_element(mesh(), e, system.material_axes());
-    const GaussMatrices gradients = gradients_at_points(mesh().gather(e, state(slot).position_mm));
-    std::array<Eigen::Matrix3d, gauss_points> piola;
-    std::array<Eigen::Vector3d, gauss_points> X_mm;
-    for (size_t q = 0; q < gauss_points; ++q) {
-      const Eigen::Matrix3d& t = reference[q].material_to_xi;
-      const Eigen::Matrix3d f = gradients.at(q) * t;
-      const SymmetricTensor<double> stress =
-          elastic_->law().stress_sensitivity(symmetric_part(f.transpose() * f), system.parameters(e), 0);
-      piola[q] = -C1_kPa_ * reference[q].volume * f * full_matrix(stress) * t.transpose();
-      X_mm[q] = mesh().value(mesh().reference(), {e, gauss_tables().xi[q]});
-    }
-    for (size_t i = 0; i < fields.size(); ++i) {
-      GaussMatrices weighted;
-      double most = 0.0;
-      for (size_t q = 0; q < gauss_points; ++q) {
-        const double factor = fields[i](X_mm[q]);
-        most = std::max(most, std::abs(factor));
-        weighted.set(q, factor * piola[q]);
-      }
-      if (most > 1e-6) system.equations().add_force(e, force_of(weighted), sides[i]);
-    }
-  }
-  return sides;
+  return explain::stiffness_sides(elastic_->system(), state(slot), fields);
 }
 
 std::vector<NodeField> FieldSolver::responses(size_t slot, std::vector<std::vector<double>> right_sides) {

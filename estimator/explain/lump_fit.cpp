@@ -4,61 +4,21 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <memory>
 #include <optional>
 
-#include "estimator/fe/elastic_system.hpp"
-#include "estimator/mesh/annulus_grid.hpp"
+#include "estimator/explain/lump_body.hpp"
 
 namespace diastole::explain {
 namespace {
 
 using Eigen::Index;
 
-constexpr size_t lump_parameters = 7;
 constexpr double ci90 = 1.6449;
 constexpr double usual_axis_mm = 10.0;
 // Weak priors, of the logarithms: few data tell size from contrast.
 constexpr double axis_spread = 0.35;
 constexpr double contrast_spread = 1.0;
 constexpr Index priors = 4;
-
-/// Levels at both ends and around a centre, gaps of more than 20 mm halved.
-std::vector<double> levels_around(double low_mm, double high_mm, double centre_mm) {
-  constexpr double lump_mm = 11.0;
-  constexpr double plate_mm = 7.0;
-  constexpr double gap_mm = 20.0;
-  constexpr double too_close_mm = 5.0;
-  std::vector<double> wanted{low_mm, high_mm, low_mm + plate_mm, high_mm - plate_mm};
-  for (const double level_mm : {centre_mm, centre_mm - lump_mm, centre_mm + lump_mm}) {
-    const bool apart =
-        std::ranges::all_of(wanted, [&](double other) { return std::abs(other - level_mm) > too_close_mm; });
-    if (level_mm > low_mm && level_mm < high_mm && apart) wanted.push_back(level_mm);
-  }
-  std::ranges::sort(wanted);
-  std::vector<double> levels{wanted.front()};
-  for (size_t i = 1; i < wanted.size(); ++i) {
-    if (wanted[i] - wanted[i - 1] > gap_mm) levels.push_back(0.5 * (wanted[i] + wanted[i - 1]));
-    levels.push_back(wanted[i]);
-  }
-  return levels;
-}
-
-HermiteMesh mesh_around(const FieldModel& body, const Inclusion& lump) {
-  AnnulusGrid grid;
-  for (const double offset_deg : {-115.0, -70.0, -36.0, -16.0, 0.0, 16.0, 36.0, 70.0, 115.0, 180.0})
-    grid.angles_deg.push_back(lump.theta_deg + offset_deg);
-  grid.heights_mm = levels_around(-0.5 * body.height_mm, 0.5 * body.height_mm, lump.z_mm);
-  const double wall_mm = body.outer_radius_mm - body.inner_radius_mm;
-  constexpr double half_lump_mm = 6.0;
-  const double inner_mm = body.inner_radius_mm;
-  grid.radii_mm = {
-      inner_mm,
-      std::clamp(lump.radius_mm - half_lump_mm, inner_mm + 0.2 * wall_mm, inner_mm + 0.45 * wall_mm),
-      std::clamp(lump.radius_mm + half_lump_mm, inner_mm + 0.55 * wall_mm, inner_mm + 0.8 * wall_mm),
-      body.outer_radius_mm};
-  return make_annulus(grid);
-}
 
 /// The motion that a change of C1 makes grows faster than the pressure; so does that of a lump.
 std::vector<double> course_of_stiffness(const FieldFit& base, const FieldRows& rows, double highest_kPa) {
@@ -82,7 +42,7 @@ FieldFit with_lump(const FieldFit& base, const Inclusion& guess) {
   FieldFit result = base;
   result.converged = false;
   result.choice =
-      together(base.choice, {{find_effect("stiff-inclusion")},
+      together(base.choice, {{&lump_effect()},
                              {guess.contrast, guess.radius_mm, guess.z_mm, guess.theta_deg,
                               guess.semi_axes_mm[0], guess.semi_axes_mm[1], guess.semi_axes_mm[2]},
                              {0, 1, 2, 3, 4, 5, 6}});
@@ -101,25 +61,18 @@ Inclusion usual_lump(const Inclusion& guess) {
 class LumpFit {
  public:
   LumpFit(const FieldProblem& problem, const FieldFit& base, const Inclusion& guess)
-      : effect_(*find_effect("stiff-inclusion")),
-        base_(base),
-        body_(problem.field().base),
-        mesh_(mesh_around(body_, guess)),
-        rows_(problem.rows().relocated(PointLocator(mesh_, mesh_.reference(), problem.field().locator))),
-        highest_kPa_(problem.nodes_kPa().back()),
-        course_(course_of_stiffness(base, problem.rows(), highest_kPa_)) {
-    const std::unique_ptr<ElasticModel> plain = build({});
-    Solution solution = plain->solve(highest_kPa_);
-    solved_ = solution.report.converged();
-    state_ = std::move(solution.state);
-  }
+      : base_(base),
+        body_(problem.field().base, base.C1_kPa, problem.nodes_kPa().back(), guess),
+        rows_(problem.rows().relocated(
+            PointLocator(body_.mesh(), body_.mesh().reference(), problem.field().locator))),
+        course_(course_of_stiffness(base, problem.rows(), problem.nodes_kPa().back())) {}
 
   /// Downhill from a lump, until a step gains less than `tolerance` of chi2; the best one so far is kept.
   void descend(const Inclusion& from, double tolerance) {
-    if (!solved_) return;
-    const FieldFit start = with_lump(base_, from);
-    const auto first = start.choice.values.begin() + static_cast<std::ptrdiff_t>(base_.choice.values.size());
-    Point at = evaluate({first, start.choice.values.end()}, Eigen::VectorXd::Zero(base_.jacobian.cols()));
+    Point at = evaluate({from.contrast, from.radius_mm, from.z_mm, from.theta_deg, from.semi_axes_mm[0],
+                         from.semi_axes_mm[1], from.semi_axes_mm[2]},
+                        Eigen::VectorXd::Zero(base_.jacobian.cols()));
+    if (!std::isfinite(at.cost())) return;
     const bool converged = minimise(at, false, tolerance);
     if (begun_ && at.cost() >= best_.cost()) return;
     best_ = std::move(at);
@@ -153,7 +106,7 @@ class LumpFit {
 
  private:
   struct Point {
-    std::vector<double> values;
+    LumpValues values{};
     Eigen::VectorXd shift;      // of log C1 and the pressures, from the base fit
     Eigen::VectorXd residuals;  // rows, the base fit's priors, the lump's priors
     Eigen::MatrixXd jacobian;   // lump parameters, then shift
@@ -168,7 +121,7 @@ class LumpFit {
   static constexpr double allowed = 2.706;  // of chi2: 90 % of one parameter
 
   /// Ends at a fit that is better than the best one by more than `gain`.
-  [[nodiscard]] Profile profile_of_contrast(double gain) const {
+  [[nodiscard]] Profile profile_of_contrast(double gain) {
     Profile profile{open_at(best_, 0.0), {}};
     Intervals& found = profile.intervals;
     const double start = coordinates(best_)[0];
@@ -206,7 +159,9 @@ class LumpFit {
     return profile;
   }
 
-  [[nodiscard]] const EffectParameter& parameter(size_t i) const { return effect_.field_parameters()[i]; }
+  [[nodiscard]] static const EffectParameter& parameter(size_t i) {
+    return lump_effect().field_parameters()[i];
+  }
 
   [[nodiscard]] std::array<double, lump_parameters> coordinates(const Point& at) const {
     std::array<double, lump_parameters> result{};
@@ -244,7 +199,7 @@ class LumpFit {
   }
 
   /// Levenberg-Marquardt from a point. Whether it converged.
-  [[nodiscard]] bool minimise(Point& best, bool hold_contrast, double tolerance) const {
+  [[nodiscard]] bool minimise(Point& best, bool hold_contrast, double tolerance) {
     constexpr double hardly_damped = 0.1;
     double damping = 1e-3;
     bool converged = false;
@@ -274,82 +229,33 @@ class LumpFit {
     return converged;
   }
 
-  [[nodiscard]] std::unique_ptr<ElasticModel> build(const StiffnessField& stiffness) const {
-    ElasticOptions options;
-    options.parameters = {base_.C1_kPa};
-    options.stiffness = stiffness;
-    return std::make_unique<ElasticModel>(mesh_, *find_law("neo-hookean"), std::move(options));
-  }
-
-  [[nodiscard]] StiffnessField stiffness_of(const std::vector<double>& values) const {
-    FieldModel model = body_;
-    effect_.apply_to_field(values, model);
-    return [lump = model.inclusion.value_or(Inclusion{.semi_axes_mm = {1.0, 1.0, 1.0}})](
-               const Eigen::Vector3d& X_mm) {
-      return lump.stiffness({X_mm[0], X_mm[1], X_mm[2]});
-    };
-  }
-
-  [[nodiscard]] std::vector<double> moved(const std::vector<double>& values,
-                                          const Eigen::VectorXd& step) const {
-    std::vector<double> result;
+  [[nodiscard]] static LumpValues moved(const LumpValues& values, const Eigen::VectorXd& step) {
+    LumpValues result{};
     for (size_t i = 0; i < lump_parameters; ++i) {
-      const EffectParameter& parameter = effect_.field_parameters()[i];
-      const double longest = parameter.scale == SearchScale::logarithmic ? 0.5 : 8.0;
+      const double longest = parameter(i).scale == SearchScale::logarithmic ? 0.5 : 8.0;
       const double change = std::clamp(step[static_cast<Index>(i)], -longest, longest);
-      result.push_back(std::clamp(from_coordinate(parameter, to_coordinate(parameter, values[i]) + change),
-                                  parameter.lower, parameter.upper));
+      result[i] = std::clamp(from_coordinate(parameter(i), to_coordinate(parameter(i), values[i]) + change),
+                             parameter(i).lower, parameter(i).upper);
     }
     return result;
   }
 
-  /// What the lump adds to the motion at the highest pressure, and its derivatives by the parameters' coordinates.
-  [[nodiscard]] std::vector<NodeField> additions(const std::vector<double>& values) const {
-    const std::unique_ptr<ElasticModel> model = build(stiffness_of(values));
-    ElasticSystem& system = model->system();
-    ElasticState at = state_;
-    system.factorise(at);
-    for (int correction = 0; correction < 2; ++correction) {
-      std::vector<double> step = system.residual(at).values;
-      system.solve(step);
-      at = system.moved(at, step, -1.0);
-    }
-    std::vector<NodeField> fields{at.position_mm};
-    for (size_t dof = 0; dof < fields[0].size(); ++dof)
-      fields[0][dof] -= state_.position_mm[dof];
-    std::vector<double> sides;
-    for (size_t i = 0; i < lump_parameters; ++i) {
-      const EffectParameter& parameter = effect_.field_parameters()[i];
-      const double h = parameter.scale == SearchScale::logarithmic ? 1e-3 : 1e-2;
-      std::vector<double> up = values;
-      std::vector<double> down = values;
-      up[i] = from_coordinate(parameter, to_coordinate(parameter, values[i]) + h);
-      down[i] = from_coordinate(parameter, to_coordinate(parameter, values[i]) - h);
-      const std::vector<double> above = build(stiffness_of(up))->system().residual(at).values;
-      const std::vector<double> below = build(stiffness_of(down))->system().residual(at).values;
-      for (size_t k = 0; k < above.size(); ++k)
-        sides.push_back((below[k] - above[k]) / (2.0 * h));
-    }
-    system.solve(sides, lump_parameters);
-    for (size_t i = 0; i < lump_parameters; ++i)
-      fields.push_back(system.node_field(std::span(sides).subspan(i * model->dofs(), model->dofs())));
-    return fields;
-  }
-
-  [[nodiscard]] Point evaluate(std::vector<double> values, Eigen::VectorXd shift) const {
-    const std::vector<NodeField> fields = additions(values);
-    std::vector<const NodeField*> pointers;
-    for (const NodeField& field : fields)
+  /// A cost that is no number where the lump has no equilibrium.
+  [[nodiscard]] Point evaluate(const LumpValues& values, Eigen::VectorXd shift) {
+    const std::optional<LumpBody::Addition> addition = body_.addition(values);
+    if (!addition) return {values, std::move(shift), Eigen::VectorXd::Constant(1, std::nan("")), {}};
+    std::vector<const NodeField*> pointers{&addition->position_mm};
+    for (const NodeField& field : addition->by)
       pointers.push_back(&field);
     const Index all = base_.jacobian.rows();
-    Point point{std::move(values), std::move(shift), {}, {}};
+    Point point{values, std::move(shift), {}, {}};
     point.residuals.setZero(all + priors);
     point.jacobian.setZero(all + priors, static_cast<Index>(lump_parameters) + base_.jacobian.cols());
     point.residuals.head(all) << base_.residuals, base_.priors;
     point.residuals.head(all) += base_.jacobian * point.shift;
     point.jacobian.topRightCorner(all, base_.jacobian.cols()) = base_.jacobian;
     for (size_t slot = 0; slot < base_.pressures_kPa.size(); ++slot) {
-      const Eigen::MatrixXd block = course_[slot] * rows_.columns(slot, mesh_, pointers);
+      const Eigen::MatrixXd block = course_[slot] * rows_.columns(slot, body_.mesh(), pointers);
       point.residuals.segment(rows_.first(slot), block.rows()) += block.col(0);
       point.jacobian.block(rows_.first(slot), 0, block.rows(), lump_parameters) =
           block.rightCols<lump_parameters>();
@@ -389,16 +295,11 @@ class LumpFit {
     result.covariance = (result.jacobian.transpose() * result.jacobian).inverse();
   }
 
-  const Effect& effect_;
   const FieldFit& base_;
-  FieldModel body_;
-  HermiteMesh mesh_;
+  LumpBody body_;
   FieldRows rows_;
-  double highest_kPa_;
   std::vector<double>
-      course_;  ///< what a change of stiffness moves in each frame, as a share of that at highest_kPa_
-  ElasticState state_;
-  bool solved_ = false;
+      course_;  ///< what a change of stiffness moves in each frame, as a share of that at the highest pressure
   bool begun_ = false;
   bool converged_ = false;
   Point best_;

@@ -1,13 +1,8 @@
 #pragma once
 // The fit of a lump of another stiffness, on a mesh that is fine around it.
 //
-// What a lump adds to the motion is small beside the motion: from the base model's equilibrium x at the highest pressure,
-// with the lump's stiffness m,
-//
-//   K(x; m) d1 = - R(x; m),     K(x; m) d2 = - R(x + d1; m),     x_lump = x + d1 + d2
-//
-// and in the other frames it is taken to grow as what a change of C1 does. C1 and the frames' pressures answer linearly, by
-// the base fit's Jacobian. One factorisation a step, instead of a dozen.
+// What a lump adds to the motion at the highest pressure is that of equilibria with it (lump_body.hpp); in the other frames it
+// is taken to grow as what a change of C1 does. C1 and the frames' pressures answer linearly, by the base fit's Jacobian.
 
 #include "estimator/explain/field_fit.hpp"
 

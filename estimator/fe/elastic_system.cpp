@@ -67,6 +67,11 @@ ElasticSystem::ElasticSystem(HermiteMesh mesh, const Law& law, const SystemOptio
   }
 }
 
+void ElasticSystem::set_stiffness(const StiffnessField& stiffness) {
+  for (size_t e = 0; e < mesh_.element_count(); ++e)
+    reference_[e] = make_reference_element(mesh_, e, material_axes_, stiffness);
+}
+
 ElementState ElasticSystem::element_state(const ElasticState& state, size_t element) const {
   ElementState local;
   local.position_mm = mesh_.gather(element, state.position_mm);

@@ -77,6 +77,8 @@ class ElasticSystem {
     return {&parameters_[element * count_], count_};
   }
 
+  /// Another stiffness of the material from place to place (empty: 1 everywhere); a factor is kept as it is.
+  void set_stiffness(const StiffnessField& stiffness);
   [[nodiscard]] const HeldDofs& held() const { return held_; }
   [[nodiscard]] bool on_springs(const ElementFace& face) const;
 

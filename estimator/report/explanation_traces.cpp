@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <numbers>
 
 #include "estimator/report/explanation_views.hpp"
 #include "estimator/report/field_views.hpp"
@@ -136,6 +138,20 @@ void add_trace(Page& page, const Trace& trace) {
   add_heat_map(page, trace);
 }
 
+std::vector<std::array<double, 3>> lumps_mm(const Explanation& explanation) {
+  std::vector<std::array<double, 3>> places;
+  for (const explain::FoundEffect& effect : explanation.effects) {
+    std::map<std::string, double> value;
+    for (const explain::FoundParameter& parameter : effect.parameters)
+      value[parameter.name] = parameter.value;
+    if (!value.contains("radius_mm") || !value.contains("z_mm") || !value.contains("theta_deg")) continue;
+    const double theta = value["theta_deg"] * std::numbers::pi / 180.0;
+    places.push_back(
+        {value["radius_mm"] * std::cos(theta), value["radius_mm"] * std::sin(theta), value["z_mm"]});
+  }
+  return places;
+}
+
 }  // namespace
 
 void add_explained_traces(Page& page, const Explanation& explanation) {
@@ -168,20 +184,26 @@ void add_explained_traces(Page& page, const Explanation& explanation) {
 void add_explained_field(Page& page, const Explanation& explanation) {
   if (explanation.field.empty()) return;
   const std::array<double, 2> rms = rms_of(explanation.field);
+  const std::vector<std::array<double, 3>> lumps = lumps_mm(explanation);
   page.section(
       "Where in the wall",
       fmt::format(
-          "{} tags or points, in units of their own errors: {} before and {} after, where 1 is noise alone. "
-          "Places are those of the undeformed body; holes hold too few.",
-          explanation.field.size(), number(rms[0], 3), number(rms[1], 3)));
-  for (const FieldView& view : field_views(explanation.field)) {
+          "{} residuals of tags or points, in units of their own errors: {} before and {} after, where 1 is "
+          "noise alone. One tag tells little: the maps show how far the motion is off on the average over a "
+          "lump's size, beside the noise of that average, again 1 where noise is all. Places are those of "
+          "the "
+          "undeformed body; holes hold too few.{}",
+          explanation.field.size(), number(rms[0], 3), number(rms[1], 3),
+          lumps.empty() ? "" : " The ring is where the lump was found."));
+  for (const FieldView& view : field_views(explanation.field, lumps)) {
     page.figures({{heat_map(view.before, view.after,
                             {.x = "angle about the axis (degrees)",
                              .y = view.y_label,
-                             .bar = "residual / σ",
+                             .bar = "misfit / noise",
                              .x_range = {-180, 180},
                              .y_range = view.y_range,
-                             .is_signed = false}),
+                             .is_signed = false,
+                             .marks = view.marks}),
                    view.title + "."}});
   }
 }

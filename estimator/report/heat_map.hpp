@@ -18,6 +18,7 @@ struct HeatMapLabels {
   std::array<double, 2> x_range{};  ///< of the columns' outer edges
   std::array<double, 2> y_range{};  ///< top edge, bottom edge
   bool is_signed = true;
+  std::vector<std::array<double, 2>> marks = {};  ///< rings in both grids, in the ranges' units
 };
 
 /// The scale covers 995 of 1000 cells of both grids, and at least +-2 (signed) or 0 to 2.

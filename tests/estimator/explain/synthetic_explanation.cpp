@@ -96,8 +96,10 @@ Explanation explained_inclusion() {
     const double turn = std::remainder(theta - pi / 3, 2 * pi);
     const double lump = 4.0 * std::exp(-turn * turn / 0.12 - (z - 10) * (z - 10) / 200 - (radius - 28) / 15);
     const double after = noise(random);
-    e.field.push_back(
-        {{radius * std::cos(theta), radius * std::sin(theta), z}, 1 + k % 5, after + lump, after});
+    explain::FieldResidual seen{
+        {radius * std::cos(theta), radius * std::sin(theta), z}, 1 + k % 5, after + lump, after, {}};
+    seen.per_mm[static_cast<size_t>(k % 3)] = 1.2;
+    e.field.push_back(seen);
   }
   return e;
 }

@@ -83,8 +83,15 @@ TEST(TraceViews, TheMeanCycleIsThatOfTheWorstGroup) {
 }
 
 TEST(FieldViews, ShowALumpWhereItIs) {
-  const auto views = field_views(test::explained_inclusion().field);
+  const double theta = std::numbers::pi / 3;
+  const auto views = field_views(test::explained_inclusion().field,
+                                 {{28.0 * std::cos(theta), 28.0 * std::sin(theta), 10.0}});
   ASSERT_EQ(views.size(), 4U);
+  ASSERT_EQ(views[0].marks.size(), 1U);
+  EXPECT_NEAR(views[0].marks[0][0], 60.0, 1e-9);
+  EXPECT_EQ(views[0].marks[0][1], 10.0);
+  EXPECT_TRUE(views[1].marks.empty());
+  EXPECT_EQ(views[3].marks.size(), 1U);
   const CellGrid& inner = views[0].before;
   double worst = 0.0;
   size_t row = 0, column = 0;
@@ -99,8 +106,22 @@ TEST(FieldViews, ShowALumpWhereItIs) {
   const auto columns = static_cast<double>(inner[0].size()), rows = static_cast<double>(inner.size());
   EXPECT_NEAR(-180 + 360 * (static_cast<double>(column) + 0.5) / columns, 60.0, 180 / columns + 1);
   EXPECT_NEAR(42.5 - 85 * (static_cast<double>(row) + 0.5) / rows, 10.0, 43 / rows + 3);
-  EXPECT_GT(worst, 2.0);
+  EXPECT_GT(worst, 5.0);
   EXPECT_GT(rms_of(test::explained_inclusion().field)[0], rms_of(test::explained_inclusion().field)[1]);
+}
+
+TEST(FieldViews, ShowOneWhereNoiseIsAll) {
+  double squares = 0.0;
+  double cells = 0.0;
+  for (const FieldView& view : field_views(test::explained_inclusion().field)) {
+    for (const auto& row : view.after) {
+      for (const double value : row) {
+        squares += value * value;
+        ++cells;
+      }
+    }
+  }
+  EXPECT_NEAR(squares / cells, 1.0, 0.15);
 }
 
 TEST(HeatMap, LeavesHolesAndShowsTheScale) {
