@@ -139,7 +139,10 @@ NodeField FieldSolver::reference_slope(const FieldNudge& nudge) const {
 
 std::vector<std::vector<double>> FieldSolver::stiffness_sides(
     size_t slot, const std::vector<StiffnessField>& fields) const {
-  return explain::stiffness_sides(elastic_->system(), state(slot), fields);
+  std::vector<GaussNumbers> numbers;
+  for (const StiffnessField& field : fields)
+    numbers.push_back(at_gauss_points(mesh(), field));
+  return explain::stiffness_sides(elastic_->system(), state(slot), numbers);
 }
 
 std::vector<NodeField> FieldSolver::responses(size_t slot, std::vector<std::vector<double>> right_sides) {

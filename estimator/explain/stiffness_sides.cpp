@@ -30,29 +30,29 @@ std::array<Eigen::Matrix3d, gauss_points> law_forces(const ElasticSystem& system
 
 }  // namespace
 
+GaussNumbers at_gauss_points(const HermiteMesh& mesh, const StiffnessField& field) {
+  GaussNumbers numbers(mesh.element_count());
+  for (size_t e = 0; e < mesh.element_count(); ++e)
+    for (size_t q = 0; q < gauss_points; ++q)
+      numbers[e][q] = field(mesh.value(mesh.reference(), {e, gauss_tables().xi[q]}));
+  return numbers;
+}
+
 std::vector<std::vector<double>> stiffness_sides(const ElasticSystem& system, const ElasticState& state,
-                                                 const std::vector<StiffnessField>& fields) {
+                                                 const std::vector<GaussNumbers>& fields) {
   constexpr double least = 1e-6;
   const HermiteMesh& mesh = system.mesh();
   std::vector<std::vector<double>> sides(fields.size(),
                                          std::vector<double>(system.equations().unknowns(), 0.0));
   for (size_t e = 0; e < mesh.element_count(); ++e) {
-    std::array<Eigen::Vector3d, gauss_points> X_mm;
-    for (size_t q = 0; q < gauss_points; ++q)
-      X_mm[q] = mesh.value(mesh.reference(), {e, gauss_tables().xi[q]});
     std::optional<std::array<Eigen::Matrix3d, gauss_points>> forces;
     for (size_t i = 0; i < fields.size(); ++i) {
-      std::array<double, gauss_points> factor{};
-      double most = 0.0;
-      for (size_t q = 0; q < gauss_points; ++q) {
-        factor[q] = fields[i](X_mm[q]);
-        most = std::max(most, std::abs(factor[q]));
-      }
-      if (most <= least) continue;
+      const std::array<double, gauss_points>& here = fields[i][e];
+      if (std::ranges::all_of(here, [](double value) { return std::abs(value) <= least; })) continue;
       if (!forces) forces = law_forces(system, state, e);
       GaussMatrices weighted;
       for (size_t q = 0; q < gauss_points; ++q)
-        weighted.set(q, factor[q] * (*forces)[q]);
+        weighted.set(q, here[q] * (*forces)[q]);
       system.equations().add_force(e, force_of(weighted), sides[i]);
     }
   }

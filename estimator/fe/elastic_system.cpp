@@ -67,9 +67,9 @@ ElasticSystem::ElasticSystem(HermiteMesh mesh, const Law& law, const SystemOptio
   }
 }
 
-void ElasticSystem::set_stiffness(const StiffnessField& stiffness) {
-  for (size_t e = 0; e < mesh_.element_count(); ++e)
-    reference_[e] = make_reference_element(mesh_, e, material_axes_, stiffness);
+void ElasticSystem::set_stiffness(size_t element, const std::array<double, gauss_points>& stiffness) {
+  for (size_t q = 0; q < gauss_points; ++q)
+    reference_[element][q].stiffness = stiffness[q];
 }
 
 ElementState ElasticSystem::element_state(const ElasticState& state, size_t element) const {

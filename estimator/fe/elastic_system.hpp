@@ -7,6 +7,7 @@
 // pressure in states that hold its volume. The equations of the latter two are  - (V(x) - V_held) = 0  and, for a
 // chamber's fluid,  - (V(x) - V(X)) - C (q - p0) = 0  (chamber.hpp).
 
+#include <array>
 #include <optional>
 #include <span>
 #include <vector>
@@ -77,8 +78,8 @@ class ElasticSystem {
     return {&parameters_[element * count_], count_};
   }
 
-  /// Another stiffness of the material from place to place (empty: 1 everywhere); a factor is kept as it is.
-  void set_stiffness(const StiffnessField& stiffness);
+  /// Another stiffness of the material at an element's Gauss points; a factor is kept as it is.
+  void set_stiffness(size_t element, const std::array<double, gauss_points>& stiffness);
   [[nodiscard]] const HeldDofs& held() const { return held_; }
   [[nodiscard]] bool on_springs(const ElementFace& face) const;
 

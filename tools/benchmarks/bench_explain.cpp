@@ -1,7 +1,7 @@
 // `tools/bench explain [folder] [case or kind ...]`: explains recorded sessions and counts what was right (data/README.md,
 // labels.json); the folder may be one of imaged motion instead (bench_explain_field.hpp). A row a case, then the table of
 // figures with their targets. Exit code 1 if a session in which nothing is hidden was given an effect, or one with an
-// effect of no library a confident name. Explanations are kept in build/explained/.
+// effect of no library a confident name. Explanations are kept in build/explained/FOLDER/.
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -85,7 +85,8 @@ void explain_sessions(const bench::Recordings& recordings, const fs::path& kept)
 int main(int argc, char** argv) {
   const auto recordings = bench::recordings_of(argc, argv);
   if (!recordings) return 0;
-  const fs::path kept = fs::path(DIASTOLE_SOURCE_DIR) / "build/explained";
+  const fs::path kept = fs::path(DIASTOLE_SOURCE_DIR) / "build/explained" /
+                        fs::absolute(recordings->folder / "").parent_path().filename();
   fs::remove_all(kept);  // what is scored is of this run
   fs::create_directories(kept);
   if (recordings->labels.contains("cases")) {
