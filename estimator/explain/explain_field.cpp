@@ -52,6 +52,7 @@ class Explainer {
       : options_(options), study_file_(std::move(name)), field_(std::move(field)) {}
 
   Explanation run() {
+    field_.alive = [this] { tell(""); };
     fit_base();
     fit_effects();
     judge();

@@ -44,6 +44,17 @@ FieldCase field_case(const Study& study) {
     refuse(study, "law.name",
            fmt::format("field effects start from neo-Hookean gel, not from {}", study.law.name),
            "Set name = \"neo-hookean\": another law is one of the effects.");
+  if (study.law.parameters.front().vary == Variation::element)
+    refuse(study, "law.parameters.C1_kPa.vary",
+           "images are explained from a gel of one stiffness, not of one value an element",
+           "Set vary = \"whole\": a lump is then found by name, and a stiffness that varies smoothly is told "
+           "as something "
+           "outside the library. `diastole fit` maps one value an element.");
+  if (study.chamber)
+    refuse(study, "chamber", "field effects start from a specimen in the open",
+           "Leave [chamber] out: what it does is the effect chamber-back-pressure.");
+  if (study.compression.bulk_modulus_kPa)
+    refuse(study, "model.bulk_modulus_kPa", "field effects start from incompressible gel", "Leave it out.");
   if (!study.data.tags && !study.data.points)
     refuse(study, "data", "the study has neither tags nor points",
            "Name a tags or points file and its frames.");

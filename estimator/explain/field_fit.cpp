@@ -152,6 +152,7 @@ Eigen::VectorXd FieldProblem::priors(const Point& at) const {
 }
 
 bool FieldProblem::evaluate(Point& at) {
+  if (field_.alive) field_.alive();
   solver_.set(model_of(at.choice), std::exp(at.log_C1));
   std::vector<NodeField> displacements_mm;
   for (size_t node = 0; node < nodes_kPa_.size(); ++node) {

@@ -10,6 +10,7 @@
 // two standard deviations (docs/decisions/0070-narrow-bounds-are-a-measurement.md).
 
 #include <Eigen/Dense>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -34,6 +35,7 @@ struct FieldCase {
   Measured C1_start_kPa;  ///< sigma 0: free within the bounds
   std::array<double, 2> C1_bounds_kPa{};
   std::optional<Measured> inner_radius_mm;  ///< as frame 0 shows it
+  std::function<void()> alive = {};  ///< called before each equilibrium of a fit; ends it by an exception
 };
 
 /// Throws InputError unless the study is a neo-Hookean annulus with held ends and imaged motion.

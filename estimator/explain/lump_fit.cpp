@@ -366,6 +366,7 @@ class LumpFit {
 
   /// A cost that is no number where the lump has no equilibrium.
   [[nodiscard]] Point evaluate(const LumpValues& values, Eigen::VectorXd shift) {
+    if (problem_.field().alive) problem_.field().alive();
     const std::optional<LumpColumns> lump = columns(values);
     if (!lump) return {values, std::move(shift), Eigen::VectorXd::Constant(1, std::nan("")), {}};
     const Index all = base_.jacobian.rows();
