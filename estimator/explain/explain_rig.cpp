@@ -154,7 +154,8 @@ Work searched(const rig::Session& session, const rig::SpecimenFamily& family, co
   const rig::RigFit& best = found.sets[found.best].fit;
   const rig::NoiseModel noise = rig::estimate_noise(without_effects(session, problem, best));
   const bool large = found.sets[found.best].chi_square < other_beats * found.sets.front().chi_square;
-  if (!best.ingredients.empty() && (large || differ(problem.noise(), noise))) {
+  const bool hopeless = leaves_misfit(found.sets.front(), found.sets[found.best]);
+  if (!best.ingredients.empty() && !hopeless && (large || differ(problem.noise(), noise))) {
     tell("fitting again with the noise that is left");
     fitting.noise = noise;
     fitting.beats_of = rig::KnownModel{best.ingredients, best.values};
@@ -215,7 +216,8 @@ Explanation explain_rig(const Study& study, const ExplainOptions& options) {
   out.study = study.file.string();
   out.verdict = judgement.verdict;
   out.gap = gap;
-  const std::vector<double> errors = parameter_errors(best, weights);
+  const double explained = weights.dot(base.residuals.cwiseAbs2() - best.residuals.cwiseAbs2());
+  const std::vector<double> errors = parameter_errors(best, weights, explained);
   if (judgement.verdict == Verdict::unexplained) {  // nothing is added, so that nothing is closed
     out.gap.after = gap.before;
     out.gap.closed = 0.0;
@@ -232,7 +234,7 @@ Explanation explain_rig(const Study& study, const ExplainOptions& options) {
   }
   out.evidence = evidence(work.found, judgement, {});
   if (!out.effects.empty())
-    out.shifts = parameter_shifts(base, parameter_errors(base, weights), best, errors);
+    out.shifts = parameter_shifts(base, parameter_errors(base, weights, 0.0), best, errors);
   out.steps = steps_of(work.found);
   out.traces = traces(session, problem, base, best);
   tell("designing the next experiment");

@@ -40,7 +40,11 @@ Port port_of(std::string_view channel) { return channel == "pump_kPa" ? Port::dr
 
 }  // namespace
 
-std::vector<double> parameter_errors(const rig::RigFit& fit, const Eigen::VectorXd& weights) {
+std::vector<double> parameter_errors(const rig::RigFit& fit, const Eigen::VectorXd& weights,
+                                     double explained) {
+  constexpr double looks_alike =
+      1.5e-3;  // of a change: the model's error of it that its parameters can take up
+  const double with_models = std::sqrt(1.0 + looks_alike * looks_alike * std::max(explained, 0.0));
   Eigen::MatrixXd normal = fit.jacobian.transpose() * weights.asDiagonal() * fit.jacobian;
   for (Eigen::Index i = 0; i < normal.rows(); ++i) {
     if (fit.errors[static_cast<size_t>(i)] > 0.0) continue;
@@ -54,8 +58,8 @@ std::vector<double> parameter_errors(const rig::RigFit& fit, const Eigen::Vector
     const auto k = static_cast<Eigen::Index>(i);
     const SearchScale scale = scale_of(fit, i);
     const double slope = rig::natural_slope(scale, rig::to_search(scale, fit.values[i]));
-    errors.push_back(fit.errors[i] > 0.0 ? std::abs(slope) * std::sqrt(std::max(covariance(k, k), 0.0))
-                                         : 0.0);
+    const double noise_alone = std::abs(slope) * std::sqrt(std::max(covariance(k, k), 0.0));
+    errors.push_back(fit.errors[i] > 0.0 ? with_models * noise_alone : 0.0);
   }
   return errors;
 }

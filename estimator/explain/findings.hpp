@@ -14,8 +14,10 @@ namespace diastole::explain {
 std::vector<FoundEffect> found_effects(const rig::RigFit& fit, const std::vector<double>& errors);
 
 /// Standard errors in natural units of the fit's unknowns, with each square weighted: what noise and the model's
-/// repeating error together leave open.
-std::vector<double> parameter_errors(const rig::RigFit& fit, const Eigen::VectorXd& weights);
+/// repeating error together leave open. `explained`: squares that the fit's effects take off; of a change so large the
+/// model's error is no longer small beside the noise, and a part of it looks like a change of the parameters.
+std::vector<double> parameter_errors(const rig::RigFit& fit, const Eigen::VectorXd& weights,
+                                     double explained);
 
 std::vector<ParameterShift> parameter_shifts(const rig::RigFit& before,
                                              const std::vector<double>& before_errors,

@@ -50,16 +50,42 @@ double varied(const EffectParameter& parameter) {
   return rig::from_search(parameter.scale, at + 0.3 * ((std::abs(b - at) > std::abs(a - at) ? b : a) - at));
 }
 
-Lead lead_of(rig::FoundMoments found, const rig::RigFit& current, const Eigen::VectorXd& weights) {
-  Lead lead{std::move(found.ingredient), 0.0, 0.0, found.values.size(), {}};
-  lead.parameters += moment_parameters * lead.ingredient.occasions.size();
-  lead.gain = weights.dot(current.residuals.cwiseAbs2() - found.fit.residuals.cwiseAbs2());
+/// Sizes beyond those of `trial_sizes` up to the bound, for what moves a resonance.
+std::vector<double> far_sizes(const Effect& effect, const rig::RigModel& base) {
+  constexpr double ratio = 1.3;
+  const EffectParameter& parameter = effect.parameters()[0];
+  if (parameter.scale != SearchScale::inverse_square) return {};
+  const double from = rig::to_search(parameter.scale, effect.neutral(base)[0]);
+  const double towards = rig::to_search(parameter.scale, parameter.typical);
+  const double bound = rig::to_search(parameter.scale, towards > from ? parameter.lower : parameter.upper);
+  std::vector<double> sizes;
+  for (double size = ratio * trial_sizes(effect).back(); size < (bound - from) / (towards - from);
+       size *= ratio)
+    sizes.push_back(size);
+  return sizes;
+}
+
+void set_moments(Lead& lead, size_t moments, const Eigen::VectorXd& left, const rig::RigFit& current,
+                 const Eigen::VectorXd& weights) {
+  lead.parameters = lead.ingredient.effect->parameters().size() + moment_parameters * moments;
+  lead.gain = weights.dot(current.residuals.cwiseAbs2() - left.cwiseAbs2());
   lead.visibility = std::sqrt(std::max(lead.gain, 0.0));
-  lead.fit = std::move(found.fit);
-  return lead;
 }
 
 }  // namespace
+
+void search_moments(Lead& lead, const rig::RigProblem& problem, const rig::Session& session,
+                    const rig::RigFit& current, const Eigen::VectorXd& weights) {
+  if (lead.ingredient.effect->occasions() == Occasions::none || lead.fit) return;
+  auto found = rig::find_moments(problem, session, current, *lead.ingredient.effect);
+  if (!found) {
+    lead.gain = 0.0;
+    return;
+  }
+  lead.ingredient = std::move(found->ingredient);
+  set_moments(lead, lead.ingredient.occasions.size(), found->fit.residuals, current, weights);
+  lead.fit = std::move(found->fit);
+}
 
 Eigen::MatrixXd basis_of(const Eigen::MatrixXd& columns) {
   constexpr double dependent = 1e-6;
@@ -104,8 +130,10 @@ std::vector<Lead> screen(const rig::RigProblem& problem, const rig::SpecimenFami
     if (contains(current.ingredients, effect) || !effect->fits(family)) continue;
     if (effect->occasions() != Occasions::none) {
       going_on();
-      if (auto found = rig::find_moments(problem, session, current, *effect))
-        leads.push_back(lead_of(std::move(*found), current, weights));
+      const auto promised = rig::promise_moments(problem, session, current, *effect);
+      if (!promised) continue;
+      leads.push_back({{effect, {}}});
+      set_moments(leads.back(), promised->count, promised->residuals, current, weights);
       continue;
     }
     const auto parameters = effect->parameters();
@@ -126,6 +154,11 @@ std::vector<Lead> screen(const rig::RigProblem& problem, const rig::SpecimenFami
       lead.gain = std::max(lead.gain, linear_gain(known, columns, residuals));
       const Eigen::VectorXd seen = columns.col(0) - known * (known.transpose() * columns.col(0));
       lead.visibility = std::max(lead.visibility, seen.norm() / size);
+    }
+    for (const double size : far_sizes(*effect, session.base)) {
+      const Eigen::VectorXd there = residuals + change_by(effect, values_at(*effect, session.base, size));
+      const Eigen::VectorXd left = there - known * (known.transpose() * there);
+      lead.gain = std::max(lead.gain, residuals.squaredNorm() - left.squaredNorm());
     }
     leads.push_back(lead);
   }

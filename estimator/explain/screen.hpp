@@ -8,10 +8,12 @@
 //
 //   gain = |Q^T r|^2,  Q an orthonormal basis of D with J projected out
 //
-// An effect that begins at a moment has its moments searched and is fitted at once (estimator/rig_fit/moment_search.hpp);
-// each moment counts as a parameter, and for the samples among which it was chosen.
+// An effect that begins at a moment has its moments scanned (estimator/rig_fit/moment_search.hpp) and searched when it is
+// tried; each counts as a parameter, and for the samples among which it was chosen.
 //
-// Finite sizes, because some effects show nothing near their neutral value (gas at the pump, a slow catheter).
+// Finite sizes, because some effects show nothing near their neutral value (gas at the pump, a slow catheter). One that moves
+// a resonance shows the truth's likeness only near the truth: it is tried at sizes up to its bound, and what counts of
+// the large ones is the drop of squares itself, nothing extrapolated: gain = |r|^2 - |r + D - Q_J Q_J^T (r + D)|^2.
 
 #include <Eigen/Dense>
 #include <functional>
@@ -27,8 +29,12 @@ struct Lead {
   double gain = 0.0;        ///< of weighted squares; infinite gains do not exist: at most what is there
   double visibility = 0.0;  ///< of the effect at its typical size, in sigmas, the nuisances refitted
   size_t parameters = 0;
-  std::optional<rig::RigFit> fit = {};  ///< already made, of an effect whose moments were searched
+  std::optional<rig::RigFit> fit = {};  ///< made when an effect's moments were searched
 };
+
+/// Searches the moments of an effect that has them, of which `screen` only scanned. No gain is left if there are none.
+void search_moments(Lead& lead, const rig::RigProblem& problem, const rig::Session& session,
+                    const rig::RigFit& current, const Eigen::VectorXd& weights);
 
 /// What choosing a moment among a session's samples is worth in parameters.
 inline constexpr size_t moment_parameters = 3;

@@ -20,6 +20,17 @@ constexpr double alike =
     0.8;  // of a member's drop in chi-square: what a look-alike's linear gain reaches at least
 constexpr double hopeless = 0.3;  // of the best lead's gain: linear gains of large effects are rough
 
+constexpr double models_error = 5e-5;  // of explained squares: the model errs by 0.7 % of what effects change
+constexpr double worth_a_partner = 0.02;  // of reduced chi-square above the noise, for a synergy to be tried
+
+bool names(const std::vector<std::string_view>& ids, const Effect& effect) {
+  return std::find(ids.begin(), ids.end(), effect.text().id) != ids.end();
+}
+
+bool are_partners(const Effect& a, const Effect& b) {
+  return names(a.text().synergies, b) || names(b.text().synergies, a);
+}
+
 std::vector<std::string> ids_of(const std::vector<rig::Ingredient>& ingredients) {
   std::vector<std::string> ids;
   for (const rig::Ingredient& ingredient : ingredients)
@@ -52,10 +63,14 @@ class Search {
   /// The place of the set, fitted now if it was not before.
   size_t fitted(const std::vector<rig::Ingredient>& ingredients, const rig::RigFit& before,
                 const std::optional<rig::RigFit>& made = {});
-  /// chi-square with what its parameters cost.
+  /// chi-square with what its parameters cost, and what each further effect might only take from the model's error of
+  /// the others.
   [[nodiscard]] double penalised(size_t set) const {
     const FittedSet& at = result_.sets[set];
-    return at.chi_square + (at.fit.ingredients.empty() ? 0.0 : cost(at));
+    if (at.fit.ingredients.empty()) return at.chi_square;
+    const double explained = std::max(result_.sets.front().chi_square - at.chi_square, 0.0);
+    const auto further = static_cast<double>(at.fit.ingredients.size() - 1);
+    return at.chi_square + cost(at) + further * models_error * explained;
   }
   [[nodiscard]] double reduced(size_t set) const { return result_.sets[set].chi_square / weights_.sum(); }
   [[nodiscard]] static double cost(const FittedSet& set) {
@@ -66,8 +81,12 @@ class Search {
     return sum;
   }
   /// Screening of the residuals of a set; done once.
-  const std::vector<Lead>& leads_beside(size_t set);
+  std::vector<Lead>& leads_beside(size_t set);
+  /// The set with a lead added, unless its moments are searched and gain too little.
+  std::optional<size_t> tried(size_t from, Lead& lead, double least_gain);
   std::vector<size_t> grow(size_t from);
+  std::vector<size_t> with_partners(size_t from, const std::vector<size_t>& grown);
+  void seek();
   void compare_alike(size_t set);
   void tell(const std::string& text) const {
     if (options_.progress) options_.progress(text);
@@ -92,7 +111,7 @@ size_t Search::fitted(const std::vector<rig::Ingredient>& ingredients, const rig
   return add(problem_.fit(ingredients, before));
 }
 
-const std::vector<Lead>& Search::leads_beside(size_t set) {
+std::vector<Lead>& Search::leads_beside(size_t set) {
   const auto known = leads_.find(set);
   if (known != leads_.end()) return known->second;
   const rig::RigFit& current = result_.sets[set].fit;
@@ -100,22 +119,51 @@ const std::vector<Lead>& Search::leads_beside(size_t set) {
            ? "screening the effects"
            : fmt::format("screening beside {}", fmt::join(ids_of(current.ingredients), " + ")));
   std::vector<Lead> leads = screen(problem_, family_, session_, current, weights_, [this] { tell(""); });
-  if (set == 0) result_.leads = leads;
   return leads_.emplace(set, std::move(leads)).first->second;
+}
+
+std::optional<size_t> Search::tried(size_t from, Lead& lead, double least_gain) {
+  if (lead.gain < least_gain) return {};
+  const rig::RigFit current = result_.sets[from].fit;
+  search_moments(lead, problem_, session_, current, weights_);
+  if (lead.gain < least_gain) return {};
+  std::vector<rig::Ingredient> ingredients = current.ingredients;
+  ingredients.push_back(lead.ingredient);
+  return fitted(ingredients, current, lead.fit);
+}
+
+/// Sets grown by one effect, grown by its synergies as well: together they do what neither begins alone.
+std::vector<size_t> Search::with_partners(size_t from, const std::vector<size_t>& grown) {
+  std::vector<size_t> pairs;
+  for (const size_t set : grown) {
+    if (reduced(set) < 1.0 + worth_a_partner) continue;
+    const rig::RigFit one = result_.sets[set].fit;
+    for (const Effect* partner : all_effects()) {
+      if (!are_partners(*one.ingredients.back().effect, *partner) || !partner->fits(family_) ||
+          partner->occasions() != Occasions::none)
+        continue;
+      std::vector<rig::Ingredient> both = one.ingredients;
+      if (std::any_of(both.begin(), both.end(), [&](const auto& in) { return in.effect == partner; }))
+        continue;
+      both.push_back({partner, {}});
+      const size_t pair = fitted(both, one);
+      if (penalised(pair) < penalised(from)) pairs.push_back(pair);
+    }
+  }
+  return pairs;
 }
 
 /// The sets with one effect more that a screening finds worth a fit.
 std::vector<size_t> Search::grow(size_t from) {
-  const rig::RigFit current = result_.sets[from].fit;
-  const std::vector<Lead>& leads = leads_beside(from);
+  std::vector<Lead>& leads = leads_beside(from);
   std::vector<size_t> grown;
-  for (const Lead& lead : leads) {
-    if (grown.size() >= options_.refitted || lead.gain < hopeless * leads.front().gain) break;
-    if (lead.gain < admission(lead.parameters)) continue;
-    std::vector<rig::Ingredient> ingredients = current.ingredients;
-    ingredients.push_back(lead.ingredient);
-    grown.push_back(fitted(ingredients, current, lead.fit));
+  const double hope = leads.empty() ? 0.0 : hopeless * leads.front().gain;
+  for (Lead& lead : leads) {
+    if (grown.size() >= options_.refitted || lead.gain < hope) break;
+    if (const auto set = tried(from, lead, admission(lead.parameters))) grown.push_back(*set);
   }
+  for (const size_t pair : with_partners(from, grown))
+    grown.push_back(pair);
   std::sort(grown.begin(), grown.end(), [this](size_t a, size_t b) { return penalised(a) < penalised(b); });
   return grown;
 }
@@ -129,20 +177,24 @@ void Search::compare_alike(size_t set) {
     rest.erase(rest.begin() + static_cast<std::ptrdiff_t>(member));
     const size_t without = fitted(rest, problem_.base());
     const double drop = result_.sets[without].chi_square - result_.sets[set].chi_square;
-    for (const Lead& lead : leads_beside(without)) {
+    for (Lead& lead : leads_beside(without)) {
       const Effect* other = lead.ingredient.effect;
       const bool contained = std::any_of(chosen.begin(), chosen.end(),
                                          [&](const rig::Ingredient& in) { return in.effect == other; });
-      if (contained || lead.gain < alike * drop - as_good || lead.gain < admission(lead.parameters) - as_good)
-        continue;
-      std::vector<rig::Ingredient> swapped = rest;
-      swapped.push_back(lead.ingredient);
-      fitted(swapped, result_.sets[without].fit, lead.fit);
+      if (!contained) tried(without, lead, std::max(alike * drop, admission(lead.parameters)) - as_good);
     }
   }
 }
 
 SearchResult Search::run() {
+  seek();
+  result_.leads = leads_beside(0);
+  std::sort(result_.leads.begin(), result_.leads.end(),
+            [](const Lead& a, const Lead& b) { return a.gain > b.gain; });
+  return std::move(result_);
+}
+
+void Search::seek() {
   if (!options_.start.empty()) result_.best = fitted(options_.start, problem_.base());
   std::vector<size_t> beam{result_.best};
   for (size_t effects = 0; effects < options_.most_effects; ++effects) {
@@ -155,18 +207,18 @@ SearchResult Search::run() {
     grown.erase(std::unique(grown.begin(), grown.end()), grown.end());
     if (grown.empty() || penalised(grown.front()) >= penalised(result_.best)) break;
     result_.best = grown.front();
-    if (reduced(result_.best) < options_.enough * reduced(0)) return std::move(result_);
+    if (reduced(result_.best) < options_.enough * reduced(0)) return;
     grown.resize(std::min(grown.size(), options_.beam));
     std::erase_if(grown, [&](size_t set) { return !worth_following(reduced(set), reduced(result_.best)); });
     beam = grown;
   }
+  if (leaves_misfit(result_.sets.front(), result_.sets[result_.best])) return;
   for (size_t compared = result_.sets.size(); compared != result_.best;) {
     compared = result_.best;
     compare_alike(compared);
     for (size_t k = 0; k < result_.sets.size(); ++k)
       if (penalised(k) < penalised(result_.best)) result_.best = k;
   }
-  return std::move(result_);
 }
 
 }  // namespace
@@ -175,6 +227,12 @@ bool worth_following(double reduced, double best) {
   const double left =
       std::max(best - 1.0, 0.0);  // the noise is estimated: the best may have less than none left
   return reduced - std::min(best, 1.0) <= far_behind * left + at_the_floor;
+}
+
+bool leaves_misfit(const FittedSet& base, const FittedSet& best) {
+  constexpr double plainly = 1.5;  // of reduced chi-squares
+  constexpr double hardly = 0.1;   // of the base model's: the best is right as far as it goes
+  return best.fit.reduced() > plainly && best.chi_square > hardly * base.chi_square;
 }
 
 std::vector<std::string> FittedSet::ids() const { return ids_of(fit.ingredients); }

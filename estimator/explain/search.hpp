@@ -51,6 +51,10 @@ inline constexpr double as_good = 9.0;
 /// above the noise is not. The best itself always is.
 bool worth_following(double reduced, double best);
 
+/// Whether the best set plainly leaves misfit and has not found what most of it is: neither look-alikes nor a second search would
+/// change that nothing can be named.
+bool leaves_misfit(const FittedSet& base, const FittedSet& best);
+
 /// What the square of each residual counts for: 1 / (1 + cycles x model variance), since the model's error repeats in
 /// each of a segment's cycles while noise does not. `change` as in tolerance.hpp.
 Eigen::VectorXd row_weights(const rig::Session& session, const rig::RigProblem& problem,

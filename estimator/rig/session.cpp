@@ -114,6 +114,7 @@ RigModel base_model(const RecordedRun& run) {
   hose.viscosity_Pa_s = attribute(run, "fluid_viscosity_Pa_s", hose.viscosity_Pa_s);
   hose.wave_speed_m_s = attribute(run, "hose_wave_speed_m_s", hose.wave_speed_m_s);
   hose.loss_coefficient = attribute(run, "hose_minor_loss_K", hose.loss_coefficient);
+  hose.loss_at_cavity = attribute(run, "hose_loss_at_cavity", hose.loss_at_cavity);
   hose.creep_fraction = attribute(run, "hose_creep_fraction", calibrated_creep_fraction);
   hose.creep_time_s = attribute(run, "hose_creep_time_s", hose.creep_time_s);
   model.catheter.resonance_Hz = attribute(run, "catheter_f0_Hz", model.catheter.resonance_Hz);
@@ -152,6 +153,12 @@ Session read_session(const Study& study) {
     }
     if (session.runs.empty()) {
       session.base = base_model(run);
+      if (const double part = session.base.hose.loss_at_cavity; !(part >= 0.0 && part <= 1.0)) {
+        throw InputError({.file = file.string(),
+                          .place = "attribute /rig hose_loss_at_cavity",
+                          .problem = fmt::format("is {}, and a part of a loss is between 0 and 1", part),
+                          .remedy = "1: all of it is at the cavity. Correct the rig's description."});
+      }
       session.limits = limits_of(run);
     }
     session.runs.push_back(take(std::move(run), short_name(file)));

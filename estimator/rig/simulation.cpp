@@ -12,6 +12,8 @@
 namespace diastole::rig {
 namespace {
 
+/// A line whose first resonance is slower than this has twice the components: strokes move its higher ones, too.
+constexpr double slow_quarter_wave_Hz = 3.0;
 /// A gas at the pump is not linear: its steps are this many times shorter.
 constexpr double gas_steps = 2.0;
 
@@ -42,6 +44,17 @@ class Plant {
         cavity_(model, run.place) {}
 
   PlantTrace run();
+  /// By how much a loss at the ends overshoots in a step if the flow were as fast as the piston makes it. Such a load is
+  /// explicit; steps blow up from 4.5 on.
+  [[nodiscard]] double loss_overshoot() const {
+    double fastest = 0.0;
+    for (const double flow : drive_.flow_mL_per_s)
+      fastest = std::max(fastest, std::abs(flow));
+    const Hose& hose = model_.hose;
+    const double area = hose.area_mm2();
+    const double resistance = 1e-3 * hose.loss_coefficient * hose.density_kg_m3 * fastest / (area * area);
+    return resistance * line_.outflow_by_suction() * drive_.step_s;
+  }
 
  private:
   [[nodiscard]] double turning_loss_kPa(double flow_mL_per_s) const {
@@ -136,9 +149,17 @@ PlantTrace simulate_plant(const RigModel& model, const RunDrive& run, const Simu
 
 PlantTrace simulate_plant(const RigModel& model, const RunDrive& run, const DriveTrace& motion,
                           const SimulationOptions& options) {
-  if (model.pump_gas_mL == 0.0) return Plant(model, run, motion, options).run();
+  constexpr double most_overshoot = 3.0;
   SimulationOptions finer = options;
-  finer.step_s /= gas_steps;
+  finer.components *= model.hose.wave_speed_m_s < slow_quarter_wave_Hz * 4.0 * model.hose.length_m ? 2 : 1;
+  double times_finer = gas_steps;
+  if (model.pump_gas_mL == 0.0) {
+    Plant plant(model, run, motion, finer);
+    const double overshoot = plant.loss_overshoot();
+    if (!(overshoot > most_overshoot)) return plant.run();
+    times_finer = std::ceil(overshoot / most_overshoot);
+  }
+  finer.step_s /= times_finer;
   return Plant(model, run, sampled_motion(run, finer.step_s), finer).run();
 }
 

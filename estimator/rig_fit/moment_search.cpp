@@ -48,6 +48,7 @@ class MomentSearch {
   }
 
   std::optional<FoundMoments> run();
+  std::optional<PromisedMoments> promise();
 
  private:
   [[nodiscard]] const std::vector<Occasion>& occasions() const { return fit_.ingredients.back().occasions; }
@@ -58,6 +59,15 @@ class MomentSearch {
   }
   void set_lasting_change();
   [[nodiscard]] Candidate scan() const;
+  /// The least gain of a next moment that counts, of what was above the noise at first.
+  [[nodiscard]] double least(size_t moments, double excess) const {
+    return std::max(least_gain, moments == 0 ? least_part * excess : 0.0);
+  }
+  [[nodiscard]] size_t most() const { return lasts_ ? 1 : most_moments; }
+  [[nodiscard]] double excess() const {
+    return std::max(fit_.residuals.squaredNorm() - static_cast<double>(fit_.count), 0.0);
+  }
+  [[nodiscard]] VectorXd lasting_from(const Candidate& at) const;
   /// When the candidate happened, by the whole of its change; `amplitude` is its size then.
   [[nodiscard]] double shifted_s(const Candidate& at, double& amplitude) const;
   bool refine(int steps);
@@ -127,6 +137,30 @@ Candidate MomentSearch::scan() const {
   return best;
 }
 
+VectorXd MomentSearch::lasting_from(const Candidate& at) const {
+  VectorXd change = VectorXd::Zero(lasting_.size());
+  const auto place = std::find(order_.begin(), order_.end(), at.run);
+  for (const ResidualBlock& block : problem_.blocks()) {
+    const auto run = std::find(order_.begin(), order_.end(), block.run);
+    if (block.channel == "cavity_mL" || run < place || (run > place && !lasts_)) continue;
+    const size_t skipped = run == place ? std::min(at.sample, block.count) : 0;
+    const auto first = static_cast<Index>(block.first + skipped);
+    const auto count = static_cast<Index>(block.count - skipped);
+    change.segment(first, count) = lasting_.segment(first, count);
+  }
+  return change;
+}
+
+/// The best step along the columns of `known` and `change`: least squares; unknowns that nothing sees stay.
+VectorXd step_along(const MatrixXd& known, const VectorXd& change, const VectorXd& residuals) {
+  MatrixXd all(change.size(), known.cols() + 1);
+  all << known, change;
+  MatrixXd normal = all.transpose() * all;
+  for (Index i = 0; i < normal.rows(); ++i)
+    normal(i, i) = normal(i, i) > 0.0 ? normal(i, i) * (1.0 + 1e-9) : 1.0;
+  return -normal.ldlt().solve(all.transpose() * residuals);
+}
+
 double MomentSearch::shifted_s(const Candidate& at, double& amplitude) const {
   const SessionRun& run = session_.runs[at.run];
   std::vector<Ingredient> more = fit_.ingredients;
@@ -135,12 +169,7 @@ double MomentSearch::shifted_s(const Candidate& at, double& amplitude) const {
   if (occasions().empty()) values[known_] = at.amplitude;
   const VectorXd change = problem_.residuals(more, values) - fit_.residuals;
   // What is left when the other unknowns have given way to the change where it was found.
-  MatrixXd all(change.size(), fit_.jacobian.cols() + 1);
-  all << fit_.jacobian, change;
-  MatrixXd normal = all.transpose() * all;
-  for (Index i = 0; i < normal.rows(); ++i)
-    normal(i, i) = normal(i, i) > 0.0 ? normal(i, i) * (1.0 + 1e-9) : 1.0;
-  const VectorXd move = -normal.ldlt().solve(all.transpose() * fit_.residuals);
+  const VectorXd move = step_along(fit_.jacobian, change, fit_.residuals);
   const VectorXd left = fit_.residuals + fit_.jacobian * move.head(fit_.jacobian.cols());
   const double size = move[fit_.jacobian.cols()];
   const double spacing_s =
@@ -242,11 +271,10 @@ bool MomentSearch::refine(int steps) {
 
 std::optional<FoundMoments> MomentSearch::run() {
   const double at_first = fit_.residuals.squaredNorm();
-  const double excess = std::max(at_first - static_cast<double>(fit_.count), 0.0);
-  const size_t most = lasts_ ? 1 : most_moments;
-  while (occasions().size() < most) {
+  const double above_noise = excess();
+  while (occasions().size() < most()) {
     const Candidate found = scan();
-    if (found.gain < std::max(least_gain, occasions().empty() ? least_part * excess : 0.0)) break;
+    if (found.gain < least(occasions().size(), above_noise)) break;
     const RigFit kept = fit_;
     double amplitude = found.amplitude;
     const double at_s = shifted_s(found, amplitude);
@@ -269,7 +297,28 @@ std::optional<FoundMoments> MomentSearch::run() {
   return found;
 }
 
+std::optional<PromisedMoments> MomentSearch::promise() {
+  const double above_noise = excess();
+  PromisedMoments promised;
+  for (; promised.count < most(); ++promised.count) {
+    const Candidate found = scan();
+    if (found.gain < least(promised.count, above_noise)) break;
+    const VectorXd change = lasting_from(found);
+    const VectorXd move = step_along(fit_.jacobian, change, fit_.residuals);
+    fit_.residuals += fit_.jacobian * move.head(fit_.jacobian.cols()) + change * move[fit_.jacobian.cols()];
+  }
+  if (promised.count == 0) return {};
+  promised.residuals = std::move(fit_.residuals);
+  return promised;
+}
+
 }  // namespace
+
+std::optional<PromisedMoments> promise_moments(const RigProblem& problem, const Session& session,
+                                               const RigFit& before, const Effect& effect) {
+  if (effect.occasions() == Occasions::none) return {};
+  return MomentSearch(problem, session, before, effect).promise();
+}
 
 std::optional<FoundMoments> find_moments(const RigProblem& problem, const Session& session,
                                          const RigFit& before, const Effect& effect) {

@@ -23,6 +23,17 @@ struct FoundMoments {
   double gain = 0.0;           ///< of chi-square, for all moments
 };
 
+/// What the scan alone promises: moment by moment the lasting change of the size that fits best, all else linear. One
+/// simulation; `find_moments` takes some ten a moment.
+struct PromisedMoments {
+  size_t count = 0;
+  Eigen::VectorXd residuals;  ///< that would be left
+};
+
+/// None as of `find_moments`.
+std::optional<PromisedMoments> promise_moments(const RigProblem& problem, const Session& session,
+                                               const RigFit& before, const Effect& effect);
+
 /// Added to the residuals `before` left. None if no moment gains enough, or the effect has no occasions.
 /// Precondition: `before` is a fine fit of `problem` to all runs; `session` is the problem's.
 std::optional<FoundMoments> find_moments(const RigProblem& problem, const Session& session,

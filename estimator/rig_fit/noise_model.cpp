@@ -137,25 +137,53 @@ double median(std::vector<double> values) {
   return *middle;
 }
 
+/// Mean squares of a series and of its second differences (over 6, so that white noise has two equal ones).
+struct Roughness {
+  double square = 0.0;
+  double rough = 0.0;
+  double count = 0.0;
+
+  void add(const std::vector<double>& values) {
+    for (size_t k = 2; k < values.size(); ++k) {
+      const double second = values[k] - 2.0 * values[k - 1] + values[k - 2];
+      if (!std::isfinite(second)) continue;
+      square += values[k] * values[k];
+      rough += second * second / 6.0;
+      count += 1.0;
+    }
+  }
+  /// Of slow over fast: what transients and drift raise, and a louder noise of the same colour does not.
+  [[nodiscard]] double slowness() const { return rough > 0.0 ? square / rough : 0.0; }
+};
+
 ChannelNoise channel_noise(const Session& session, Channel channel) {
+  constexpr double enough = 300.0;         // samples at rest that tell the noise's colour
+  constexpr double not_noise_alone = 2.0;  // slowness of cycles' difference over that at rest
   Autocovariance covariance;
-  Autocovariance rough;
-  std::vector<double> rest;
+  Roughness whole, still;
+  std::vector<double> series;
   for (const SessionRun& run : session.runs) {
     const auto found = run.pressure_kPa.find(channel);
     if (found == run.pressure_kPa.end()) continue;
-    covariance.add(rest_of(run, found->second), 1.0);
+    series = rest_of(run, found->second);
+    covariance.add(series, 1.0);
+    still.add(series);
+    whole.add(found->second);
+  }
+  for (const SessionRun& run : session.runs) {
+    const auto found = run.pressure_kPa.find(channel);
+    if (found == run.pressure_kPa.end() || channel != Channel::cavity) continue;
     for (const CyclePair& pair : equal_pairs(run)) {
-      relative_change(found->second, pair, zero_of(run, found->second), rest);
-      if (channel == Channel::cavity) covariance.add(rest, 0.5);
+      relative_change(found->second, pair, zero_of(run, found->second), series);
+      Roughness differing;
+      differing.add(series);
+      if (still.count < enough || differing.slowness() < not_noise_alone * still.slowness())
+        covariance.add(series, 0.5);
     }
-    rest.clear();
-    for (size_t k = 2; k < found->second.size(); ++k)
-      rest.push_back(found->second[k] - 2.0 * found->second[k - 1] + found->second[k - 2]);
-    rough.add(rest, 1.0 / 6.0);
   }
   if (covariance.count[0] > 100.0) return autoregression_of(covariance);
-  return {std::sqrt(rough.at(0)), std::sqrt(rough.at(0)), {}};
+  const double sd = whole.count > 0.0 ? std::sqrt(whole.rough / whole.count) : 0.0;
+  return {sd, sd, {}};
 }
 
 /// The pressure at which a cycle starts: its stroke's least volume.

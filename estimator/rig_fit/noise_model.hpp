@@ -3,7 +3,8 @@
 //
 // Three parts, all from the data and without the rig's model:
 //   - each channel's noise, correlated over some samples: an autoregression (order 6) of the autocovariance at rest and
-//     of successive cycles' differences, pooled over the runs;
+//     of successive cycles' differences, pooled over the runs. Cycles that differ by far more slow change than the rest
+//     shows (a transient, drift) do not count;
 //   - the beat's variation: each cycle's pressures are larger or smaller by a random factor, the same in both
 //     channels; its sd from successive cycles' differences, so that slow changes do not count;
 //   - the gated volumes' own sigmas.

@@ -120,7 +120,8 @@ std::vector<double> sized(const Ingredient& ingredient, const RigModel& base, do
 
 std::vector<std::vector<double>> RigProblem::starts(const std::vector<Ingredient>& ingredients,
                                                     const RigFit& before, size_t& simulations) const {
-  constexpr double far_off = 4.0;  // coarse squares a row, when even the best start is not near
+  constexpr double far_off = 4.0;     // coarse squares a row, when even the best start is not near
+  constexpr double farthest = 120.0;  // typical sizes, if no bound is nearer
   const FitRequest coarse{.look = Look::coarse, .runs = {}};
   const MatrixXd known = columns(before.ingredients, before.values, coarse);
   const Eigen::LDLT<MatrixXd> normal(
@@ -152,6 +153,10 @@ std::vector<std::vector<double>> RigProblem::starts(const std::vector<Ingredient
       std::min_element(tried.begin(), tried.end())->first > far_off * static_cast<double>(rows_)) {
     for (const double size :
          {0.14, 0.2, 0.25, 0.36, 0.43, 0.51, 0.7, 0.8, 0.9, 1.12, 1.25, 1.37, 1.75, 2.1, 3.0, 3.5})
+      add(size);
+    const size_t within = tried.size();
+    size_t far = 0;
+    for (double size = 4.6; size < farthest && tried.size() == within + far; size *= 1.15, ++far)
       add(size);
   }
   if (tried.empty()) add(0.0);

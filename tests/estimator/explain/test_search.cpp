@@ -45,6 +45,18 @@ TEST(Search, FollowsTheBestSetHoweverLowItLies) {
   EXPECT_FALSE(worth_following(1.02, 0.99));
 }
 
+TEST(Search, GivesUpWhereTheBestLeavesMostOfAPlainMisfit) {
+  const auto set = [](double chi_square) {
+    FittedSet made;
+    made.fit.count = 1000;
+    made.fit.chi_square = made.chi_square = chi_square;
+    return made;
+  };
+  EXPECT_TRUE(leaves_misfit(set(5000.0), set(2000.0)));
+  EXPECT_FALSE(leaves_misfit(set(5000.0), set(1200.0)));   // close to the noise
+  EXPECT_FALSE(leaves_misfit(set(50000.0), set(2000.0)));  // most of it is found
+}
+
 TEST(Verdicts, StructureThatIsLeftForbidsAName) {
   SearchResult search;
   search.sets.resize(2);

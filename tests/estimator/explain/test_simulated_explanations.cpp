@@ -45,7 +45,7 @@ TEST_F(SimulatedSession, WithALeakIsExplainedByItAndPredictsWhatWasNotFitted) {
   EXPECT_GT(gap.before, 1.5);
   EXPECT_GT(gap.closed, 0.95);
   EXPECT_EQ(gap.held_out.size(), 3U);
-  const FoundEffect effect = found_effects(best.fit, parameter_errors(best.fit, weights)).at(0);
+  const FoundEffect effect = found_effects(best.fit, parameter_errors(best.fit, weights, 0.0)).at(0);
   EXPECT_LT(effect.parameters.at(0).ci90[0], 0.15);
   EXPECT_GT(effect.parameters.at(0).ci90[1], 0.15);
 }

@@ -38,6 +38,10 @@ RunDrive ramp(double to_mL, double end_s) {
   return run;
 }
 
+double cavity_kPa_at(const PlantTrace& trace, double time_s) {
+  return trace.cavity_kPa[static_cast<size_t>(std::lround((time_s - trace.start_s) / trace.step_s))];
+}
+
 TEST(Simulation, KeepsVolume) {
   const RigModel model = straight_model();
   const PlantTrace trace = simulate_plant(model, ramp(30.0, 20.0));
@@ -61,6 +65,28 @@ TEST(Simulation, ConvergesInStepAndComponents) {
   }
   EXPECT_LT(std::sqrt(pump / static_cast<double>(coarse.pump_kPa.size())), 0.015);  // of +-30 kPa
   EXPECT_LT(cavity, 0.002);
+}
+
+TEST(Simulation, AThrottledSoftHoseStaysStableInLongSteps) {
+  RigModel model = straight_model();
+  model.hose.wave_speed_m_s = 60.0;
+  model.hose.loss_coefficient = 240.0;
+  const RunDrive run = cycles(2);
+  const PlantTrace coarse = simulate_plant(model, run, {.step_s = 1.0 / 300.0});
+  const PlantTrace fine = simulate_plant(model, run, {.step_s = 1.0 / 2400.0});
+  for (double time_s = 0.5; time_s < 3.0; time_s += 0.1)
+    EXPECT_NEAR(cavity_kPa_at(coarse, time_s), cavity_kPa_at(fine, time_s), 0.01) << time_s;
+}
+
+TEST(Simulation, ASlowLineConvergesInComponents) {
+  RigModel model = straight_model();
+  model.hose.wave_speed_m_s = 16.0;
+  model.hose.loss_coefficient = 100.0;
+  const RunDrive run = cycles(3);
+  const PlantTrace usual = simulate_plant(model, run);
+  const PlantTrace more = simulate_plant(model, run, {.components = 8});
+  for (double time_s = 0.5; time_s < 4.0; time_s += 0.1)
+    EXPECT_NEAR(cavity_kPa_at(usual, time_s), cavity_kPa_at(more, time_s), 0.01) << time_s;  // of 3 kPa
 }
 
 TEST(Simulation, ALeakEmptiesTheCavityAsResistanceAndCompliance) {

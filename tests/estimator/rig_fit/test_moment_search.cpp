@@ -41,6 +41,22 @@ TEST(MomentSearch, FindsEachLossOfSteps) {
   EXPECT_NEAR(found->values[0], 0.2, 5.0 * found->fit.errors[3]);
 }
 
+TEST(MomentSearch, AScanPromisesWhatTheSearchFinds) {
+  const SpecimenFamily family = gel_family();
+  const Effect* step = find_effect("sensor-offset");
+  const Session session =
+      simulated_session(family, {.ingredients = {{step, {{"sweep", 2.5, 62.5}}}}, .values = {50.0}});
+  const RigProblem problem(session, family);
+  const auto promised = promise_moments(problem, session, problem.base(), *step);
+  const auto found = find_moments(problem, session, problem.base(), *step);
+  ASSERT_TRUE(promised.has_value());
+  ASSERT_TRUE(found.has_value());
+  EXPECT_EQ(promised->count, 1);
+  const double gain = problem.base().chi_square - promised->residuals.squaredNorm();
+  EXPECT_NEAR(gain, found->gain, 0.05 * found->gain);
+  EXPECT_FALSE(promise_moments(problem, session, problem.base(), *find_effect("stroke-gain")).has_value());
+}
+
 TEST(MomentSearch, FindsNothingInNoise) {
   const SpecimenFamily family = gel_family();
   const Session quiet = simulated_session(family, {.seed = 5});
