@@ -113,7 +113,7 @@ class LumpFit {
   /// Downhill from a lump, until a step gains less than `tolerance` of chi2; the best one so far is kept.
   void descend(const Inclusion& from, double tolerance) {
     Point at = evaluate(values_of(from), Eigen::VectorXd::Zero(base_.jacobian.cols()));
-    if (!std::isfinite(at.cost())) return;
+    if (!at.found()) return;
     const bool converged = minimise(at, false, tolerance);
     if (begun_ && at.cost() >= best_.cost()) return;
     best_ = std::move(at);
@@ -134,7 +134,12 @@ class LumpFit {
     correction_ = (*finer - *coarse) + (*followed - *coarse);
     mesh_error_ = left_by_fine_mesh * (*finer - *coarse).col(0).norm();
     corrected_at_ = best_.values;
-    best_ = evaluate(best_.values, best_.shift);
+    Point corrected = evaluate(best_.values, best_.shift);
+    if (!corrected.found()) {
+      correction_.resize(0, Eigen::NoChange);
+      return;
+    }
+    best_ = std::move(corrected);
     converged_ = minimise(best_, false, tolerance);
   }
 
@@ -174,6 +179,7 @@ class LumpFit {
     Eigen::VectorXd residuals;  // rows, the base fit's priors, the lump's priors
     Eigen::MatrixXd jacobian;   // lump parameters, then shift
     [[nodiscard]] double cost() const { return residuals.squaredNorm(); }
+    [[nodiscard]] bool found() const { return std::isfinite(cost()); }  // an equilibrium
   };
 
   struct Profile {
@@ -196,6 +202,7 @@ class LumpFit {
       for (double away = usual; away < 6.0 * usual; away *= 1.6) {
         at.values[0] = std::clamp(std::exp(start + direction * away), parameter(0).lower, parameter(0).upper);
         at = evaluate(at.values, at.shift);
+        if (!at.found()) break;
         (void)minimise(at, true, 0.2);
         if (at.cost() < best_.cost() - gain) {
           profile.deeper = std::move(at);
@@ -261,7 +268,7 @@ class LumpFit {
       widen(intervals[i], by[i]);
   }
 
-  /// Levenberg-Marquardt from a point. Whether it converged.
+  /// Levenberg-Marquardt from a point that is found. Whether it converged.
   [[nodiscard]] bool minimise(Point& best, bool hold_contrast, double tolerance) {
     constexpr double hardly_damped = 0.1;
     double damping = 1e-3;
