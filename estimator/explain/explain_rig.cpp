@@ -171,6 +171,21 @@ Work searched(const rig::Session& session, const rig::SpecimenFamily& family, co
   return {std::move(problem), std::move(found), std::move(weights)};
 }
 
+/// Of each effect found, the fit of the others alone, which the search made when it compared look-alikes.
+std::vector<const rig::RigFit*> fits_without(const SearchResult& search, const rig::RigFit& best) {
+  std::vector<const rig::RigFit*> fits;
+  for (const rig::Ingredient& left_out : best.ingredients) {
+    std::vector<std::string> others;
+    for (const rig::Ingredient& in : best.ingredients)
+      if (in.effect != left_out.effect) others.emplace_back(in.effect->text().id);
+    std::sort(others.begin(), others.end());
+    const auto made = std::find_if(search.sets.begin(), search.sets.end(),
+                                   [&](const FittedSet& set) { return set.ids() == others; });
+    fits.push_back(made == search.sets.end() ? nullptr : &made->fit);
+  }
+  return fits;
+}
+
 std::optional<NextExperiment> next_experiment(const rig::Session& session, const Work& work,
                                               const Explanation& found, size_t threads) {
   const ExperimentDesign design{session, work.problem, ExperimentLimits::of(session), threads};
@@ -230,7 +245,8 @@ Explanation explain_rig(const Study& study, const ExplainOptions& options) {
   } else if (out.verdict != Verdict::none) {
     const auto before =
         residual_cells(session, problem.blocks(), base.residuals, model_variance(problem, {}));
-    out.where = misfits(session, problem, significant(before, discovery_rate), {}, best);
+    out.where =
+        misfits(session, problem, significant(before, discovery_rate), fits_without(work.found, best), best);
   }
   out.evidence = evidence(work.found, judgement, {});
   if (!out.effects.empty())

@@ -136,8 +136,10 @@ std::optional<size_t> Search::tried(size_t from, Lead& lead, double least_gain) 
 std::vector<size_t> Search::with_partners(size_t from, const std::vector<size_t>& grown) {
   std::vector<size_t> pairs;
   for (const size_t set : grown) {
-    if (reduced(set) < 1.0 + worth_a_partner) continue;
     const rig::RigFit one = result_.sets[set].fit;
+    if (reduced(set) < 1.0 + worth_a_partner ||
+        one.ingredients.size() >= options_.start.size() + options_.most_effects)
+      continue;
     for (const Effect* partner : all_effects()) {
       if (!are_partners(*one.ingredients.back().effect, *partner) || !partner->fits(family_) ||
           partner->occasions() != Occasions::none)

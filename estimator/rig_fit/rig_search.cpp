@@ -13,6 +13,7 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr double small_gain = 0.01;  ///< of chi-square: not worth a step
+constexpr double small_part = 1e-4;  ///< of what is above the noise: the same where a model is wrong
 constexpr double far_sigma =
     2.0;  ///< steps in all, after which Broyden's updates are no longer trusted at the end
 
@@ -220,7 +221,8 @@ RigFit RigProblem::fit_from(const std::vector<Ingredient>& ingredients, const st
     ++fit.iterations;
     search.set_normal(fit.jacobian, fit.residuals, at);
     const double before = fit.residuals.squaredNorm();
-    if (search.expected_gain(search.step(0.0)) < small_gain + 1e-7 * before) {
+    const double worth = small_gain + small_part * std::max(before - static_cast<double>(fit.count), 0.0);
+    if (search.expected_gain(search.step(0.0)) < worth) {
       if (led_sigma < far_sigma) break;
       difference();
       search.set_normal(fit.jacobian, fit.residuals, at);
@@ -233,7 +235,7 @@ RigFit RigProblem::fit_from(const std::vector<Ingredient>& ingredients, const st
     const double gain = sound ? before - tried.squaredNorm() : std::nan("");
     const double expected = search.expected_gain(step);
     if (std::isfinite(gain) && gain >= 0.0) {
-      fit.converged = led_sigma == 0.0 && gain < small_gain;
+      fit.converged = led_sigma == 0.0 && gain < worth;
       search.update(fit.jacobian, step, tried - fit.residuals);
       led_sigma += search.sigmas(step);
       at = next;
