@@ -74,7 +74,7 @@ std::string panel(const CellGrid& grid, const std::array<double, 2>& range, cons
   body += cells(grid, range, labels.is_signed);
   body += fmt::format("<path class=\"grid\" d=\"M0 0h{}v{}h-{}z\"/>", panel_width, panel_height, panel_width);
   for (const auto& [x, y] : labels.marks) {
-    body += fmt::format("<circle class=\"mark\" r=\"9\" cx=\"{:.1f}\" cy=\"{:.1f}\"/>",
+    body += fmt::format("<circle class=\"ring\" r=\"9\" cx=\"{:.1f}\" cy=\"{:.1f}\"/>",
                         panel_width * (x - labels.x_range[0]) / (labels.x_range[1] - labels.x_range[0]),
                         panel_height * (y - labels.y_range[0]) / (labels.y_range[1] - labels.y_range[0]));
   }
