@@ -72,9 +72,7 @@ class HoseLine {
   [[nodiscard]] double pump_kPa() const { return pump_kPa_; }
 
   /// How fast the flow that leaves gathers when the cavity sucks by a kPa, mL/(s^2 kPa), nothing else giving way.
-  [[nodiscard]] double outflow_by_suction() const {
-    return cavity_shape_.dot(inverse_mass_ * cavity_shape_);
-  }
+  [[nodiscard]] double outflow_by_suction() const { return cavity_shape_.dot(inverse_mass_ * cavity_shape_); }
   /// Kinetic energy of the fluid and energy stored in the wall's elastic part, mJ (kPa mL).
   [[nodiscard]] double energy_mJ() const;
   /// Power lost in drag and creep, mW, at the state at hand.
