@@ -231,7 +231,7 @@ Explanation explain_rig(const Study& study, const ExplainOptions& options) {
   out.study = study.file.string();
   out.verdict = judgement.verdict;
   out.gap = gap;
-  const double explained = weights.dot(base.residuals.cwiseAbs2() - best.residuals.cwiseAbs2());
+  const double explained = base.chi_square - best.chi_square;
   const std::vector<double> errors = parameter_errors(best, weights, explained);
   if (judgement.verdict == Verdict::unexplained) {  // nothing is added, so that nothing is closed
     out.gap.after = gap.before;
