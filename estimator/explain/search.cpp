@@ -85,9 +85,16 @@ class Search {
   /// The set with a lead added, unless its moments are searched and gain too little.
   std::optional<size_t> tried(size_t from, Lead& lead, double least_gain);
   std::vector<size_t> grow(size_t from);
+  std::vector<size_t> with_rivals(size_t from, const std::vector<size_t>& grown);
   std::vector<size_t> with_partners(size_t from, const std::vector<size_t>& grown);
+  void begin_with(const std::vector<rig::Ingredient>& start);
   void seek();
   void compare_alike(size_t set);
+  /// Whether an effect without moments is not in the set yet and fits the specimen.
+  [[nodiscard]] bool can_join(const std::vector<rig::Ingredient>& set, const Effect& effect) const {
+    return effect.occasions() == Occasions::none && effect.fits(family_) &&
+           std::none_of(set.begin(), set.end(), [&](const auto& in) { return in.effect == &effect; });
+  }
   void tell(const std::string& text) const {
     if (options_.progress) options_.progress(text);
   }
@@ -132,6 +139,25 @@ std::optional<size_t> Search::tried(size_t from, Lead& lead, double least_gain) 
   return fitted(ingredients, current, lead.fit);
 }
 
+/// Where the best of the grown sets leaves misfit, what its effect is mistaken for in its place, whatever the screening says of it.
+std::vector<size_t> Search::with_rivals(size_t from, const std::vector<size_t>& grown) {
+  if (grown.empty()) return {};
+  const size_t best = *std::min_element(grown.begin(), grown.end(),
+                                        [this](size_t a, size_t b) { return penalised(a) < penalised(b); });
+  if (reduced(best) < 1.0 + worth_a_partner) return {};
+  const rig::RigFit current = result_.sets[from].fit;
+  const Effect& mistaken = *result_.sets[best].fit.ingredients.back().effect;
+  std::vector<size_t> rivals;
+  for (const Effect* rival : all_effects()) {
+    if (!names(mistaken.text().conflicts, *rival) || !can_join(current.ingredients, *rival)) continue;
+    std::vector<rig::Ingredient> swapped = current.ingredients;
+    swapped.push_back({rival, {}});
+    const size_t set = fitted(swapped, current);
+    if (std::find(grown.begin(), grown.end(), set) == grown.end()) rivals.push_back(set);
+  }
+  return rivals;
+}
+
 /// Sets grown by one effect, grown by its synergies as well: together they do what neither begins alone.
 std::vector<size_t> Search::with_partners(size_t from, const std::vector<size_t>& grown) {
   std::vector<size_t> pairs;
@@ -141,12 +167,9 @@ std::vector<size_t> Search::with_partners(size_t from, const std::vector<size_t>
         one.ingredients.size() >= options_.start.size() + options_.most_effects)
       continue;
     for (const Effect* partner : all_effects()) {
-      if (!are_partners(*one.ingredients.back().effect, *partner) || !partner->fits(family_) ||
-          partner->occasions() != Occasions::none)
+      if (!are_partners(*one.ingredients.back().effect, *partner) || !can_join(one.ingredients, *partner))
         continue;
       std::vector<rig::Ingredient> both = one.ingredients;
-      if (std::any_of(both.begin(), both.end(), [&](const auto& in) { return in.effect == partner; }))
-        continue;
       both.push_back({partner, {}});
       const size_t pair = fitted(both, one);
       if (penalised(pair) < penalised(from)) pairs.push_back(pair);
@@ -164,6 +187,8 @@ std::vector<size_t> Search::grow(size_t from) {
     if (grown.size() >= options_.refitted || lead.gain < hope) break;
     if (const auto set = tried(from, lead, admission(lead.parameters))) grown.push_back(*set);
   }
+  for (const size_t rival : with_rivals(from, grown))
+    grown.push_back(rival);
   for (const size_t pair : with_partners(from, grown))
     grown.push_back(pair);
   std::sort(grown.begin(), grown.end(), [this](size_t a, size_t b) { return penalised(a) < penalised(b); });
@@ -196,8 +221,19 @@ SearchResult Search::run() {
   return std::move(result_);
 }
 
+/// The set, or what is better without a member that another noise has made superfluous.
+void Search::begin_with(const std::vector<rig::Ingredient>& start) {
+  result_.best = fitted(start, problem_.base());
+  for (size_t member = 0; start.size() > 1 && member < start.size(); ++member) {
+    std::vector<rig::Ingredient> rest = start;
+    rest.erase(rest.begin() + static_cast<std::ptrdiff_t>(member));
+    const size_t without = fitted(rest, problem_.base());
+    if (penalised(without) < penalised(result_.best)) result_.best = without;
+  }
+}
+
 void Search::seek() {
-  if (!options_.start.empty()) result_.best = fitted(options_.start, problem_.base());
+  if (!options_.start.empty()) begin_with(options_.start);
   std::vector<size_t> beam{result_.best};
   for (size_t effects = 0; effects < options_.most_effects; ++effects) {
     std::vector<size_t> grown;
