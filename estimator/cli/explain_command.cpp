@@ -110,6 +110,19 @@ ExitCode run_score(const ExplainArguments& arguments, const CommandOutput& out) 
   return score.passed() ? ExitCode::done : ExitCode::negative;
 }
 
+/// A folder that was made for results: gone again if nothing was written into it.
+struct MadeFolder {
+  fs::path made = {};
+
+  MadeFolder() = default;
+  MadeFolder(const MadeFolder&) = delete;
+  MadeFolder& operator=(const MadeFolder&) = delete;
+  ~MadeFolder() {
+    std::error_code not_empty;
+    if (!made.empty()) fs::remove(made, not_empty);
+  }
+};
+
 ExitCode run_explain(const ExplainArguments& arguments, const CommandOutput& out) {
   if (!arguments.truths.empty()) return run_score(arguments, out);
   if (arguments.folder.empty()) {
@@ -123,7 +136,8 @@ ExitCode run_explain(const ExplainArguments& arguments, const CommandOutput& out
   const fs::path new_study = arguments.folder / study_file;
   const fs::path page = arguments.folder / report_file;
   std::error_code error;
-  fs::create_directories(arguments.folder, error);
+  MadeFolder folder;
+  if (fs::create_directories(arguments.folder, error)) folder.made = arguments.folder;
   if (error) {
     throw InputError({.file = arguments.folder.string(),
                       .place = "-o",
