@@ -81,6 +81,7 @@ class Effect {
   struct Context {
     const rig::SpecimenFamily& family;
     std::span<const Occasion> occasions = {};
+    bool rough = false;  ///< specimens' neighbours may be (specimen_family.hpp)
   };
   /// Adds itself to the model. `values`: one a parameter. The model's curve and modulus must be set.
   virtual void apply(std::span<const double> values, const Context& context, rig::RigModel& model) const = 0;

@@ -27,7 +27,7 @@ class RadiusError final : public Effect {
   }
   [[nodiscard]] std::span<const EffectParameter> parameters() const override {
     static constexpr std::array<EffectParameter, 1> list{
-        {{"fraction", "", "part by which the inner radius is larger", 0.0, -0.1, 0.1, 0.04}}};
+        {{"fraction", "", "part by which the inner radius is larger", 0.0, -0.08, 0.08, 0.04}}};
     return list;
   }
   [[nodiscard]] bool fits(const rig::SpecimenFamily& family) const override {
@@ -35,7 +35,7 @@ class RadiusError final : public Effect {
   }
   void apply(std::span<const double> values, const Context& context, rig::RigModel& model) const override {
     if (values[0] == 0.0) return;
-    model.curve = model.curve.plus(context.family.with_inner_radius(values[0]), 1.0, 1.0)
+    model.curve = model.curve.plus(context.family.with_inner_radius(values[0], context.rough), 1.0, 1.0)
                       .plus(context.family.plain(), 1.0, -1.0);
   }
   [[nodiscard]] std::span<const EffectParameter> field_parameters() const override {

@@ -211,7 +211,8 @@ Explanation explain_rig(const Study& study, const ExplainOptions& options) {
   tell("reading the runs");
   const rig::Session session = rig::read_session(study);
   tell("computing the specimen");
-  const rig::SpecimenFamily family(study);
+  rig::SpecimenFamily family(study);
+  family.compute_ahead();
   const Work work = searched(session, family, study, options);
   const rig::RigProblem& problem = work.problem;
   const rig::RigFit& base = problem.base();

@@ -3,13 +3,17 @@
 #include <algorithm>
 #include <cmath>
 
+#include "estimator/fe/parallel_for.hpp"
 #include "estimator/rig_fit/moment_search.hpp"
 #include "estimator/rig_fit/search_scale.hpp"
 
 namespace diastole::explain {
 namespace {
 
+constexpr double dependent = 1e-6;     // of a column's size: what is left of it is rounding
 constexpr size_t further_columns = 2;  // by an effect's other parameters, at most
+
+const rig::FitRequest of_difference{.look = rig::Look::fine, .runs = {}, .difference = true};
 
 /// Parts of the typical size at which an effect is tried: one where the answer is nearly proportional to it, more where
 /// resonances move.
@@ -88,7 +92,6 @@ void search_moments(Lead& lead, const rig::RigProblem& problem, const rig::Sessi
 }
 
 Eigen::MatrixXd basis_of(const Eigen::MatrixXd& columns) {
-  constexpr double dependent = 1e-6;
   Eigen::MatrixXd basis(columns.rows(), columns.cols());
   Eigen::Index count = 0;
   for (Eigen::Index c = 0; c < columns.cols(); ++c) {
@@ -105,63 +108,101 @@ Eigen::MatrixXd basis_of(const Eigen::MatrixXd& columns) {
 
 double linear_gain(const Eigen::MatrixXd& basis, const Eigen::MatrixXd& columns,
                    const Eigen::VectorXd& residuals) {
-  Eigen::MatrixXd both(columns.rows(), basis.cols() + columns.cols());
-  both << basis, columns;
-  const Eigen::MatrixXd reached = basis_of(both);
-  return (reached.rightCols(reached.cols() - basis.cols()).transpose() * residuals).squaredNorm();
+  Eigen::MatrixXd free = columns;
+  for (int again = 0; again < 2; ++again)
+    free -= basis * (basis.transpose() * free);
+  for (Eigen::Index c = 0; c < free.cols(); ++c)
+    if (free.col(c).norm() < dependent * columns.col(c).norm()) free.col(c).setZero();
+  return (basis_of(free).transpose() * residuals).squaredNorm();
 }
+
+namespace {
+
+/// One screening of a set; `lead_of` may be called by several threads at once.
+class Screening {
+ public:
+  Screening(const rig::RigProblem& problem, const rig::Session& session, const rig::RigFit& current,
+            const Eigen::VectorXd& weights)
+      : problem_(problem),
+        session_(session),
+        current_(current),
+        weights_(weights),
+        root_(weights.cwiseSqrt()),
+        residuals_(root_.asDiagonal() * current.residuals),
+        without_(problem.residuals(current.ingredients, current.values, of_difference)),
+        known_(basis_of(root_.asDiagonal() * current.jacobian)) {}
+
+  [[nodiscard]] std::optional<Lead> lead_of(const Effect& effect) const {
+    return effect.occasions() == Occasions::none ? lead_by_size(effect) : lead_by_moments(effect);
+  }
+
+ private:
+  [[nodiscard]] Eigen::VectorXd change_by(const Effect& effect, const std::vector<double>& values) const {
+    std::vector<rig::Ingredient> ingredients = current_.ingredients;
+    ingredients.push_back({&effect, {}});
+    std::vector<double> all = current_.values;
+    all.insert(all.end(), values.begin(), values.end());
+    return root_.asDiagonal() * (problem_.residuals(ingredients, all, of_difference) - without_);
+  }
+  [[nodiscard]] Eigen::VectorXd beyond_known(const Eigen::VectorXd& change) const {
+    return change - known_ * (known_.transpose() * change);
+  }
+  [[nodiscard]] std::optional<Lead> lead_by_moments(const Effect& effect) const {
+    const auto promised = rig::promise_moments(problem_, session_, current_, effect);
+    if (!promised) return {};
+    Lead lead{{&effect, {}}};
+    set_moments(lead, promised->count, promised->residuals, current_, weights_);
+    return lead;
+  }
+  [[nodiscard]] Lead lead_by_size(const Effect& effect) const {
+    const auto parameters = effect.parameters();
+    Lead lead{{&effect, {}}, 0.0, 0.0, parameters.size(), {}};
+    for (const double size : trial_sizes(effect)) {
+      const std::vector<double> values = values_at(effect, session_.base, size);
+      const size_t count = std::min(parameters.size(), further_columns + 1);
+      Eigen::MatrixXd columns(residuals_.size(), static_cast<Eigen::Index>(count));
+      for (size_t j = 0; j < count; ++j) {
+        std::vector<double> other = values;
+        if (j > 0) other[j] = varied(parameters[j]);
+        columns.col(static_cast<Eigen::Index>(j)) = change_by(effect, other);
+      }
+      lead.gain = std::max(lead.gain, linear_gain(known_, columns, residuals_));
+      lead.visibility = std::max(lead.visibility, beyond_known(columns.col(0)).norm() / size);
+    }
+    for (const double size : far_sizes(effect, session_.base)) {
+      const Eigen::VectorXd left =
+          beyond_known(residuals_ + change_by(effect, values_at(effect, session_.base, size)));
+      lead.gain = std::max(lead.gain, residuals_.squaredNorm() - left.squaredNorm());
+    }
+    return lead;
+  }
+
+  const rig::RigProblem& problem_;
+  const rig::Session& session_;
+  const rig::RigFit& current_;
+  const Eigen::VectorXd& weights_;
+  const Eigen::VectorXd root_, residuals_;
+  const Eigen::VectorXd without_;  ///< any of the effects; not weighted
+  const Eigen::MatrixXd known_;
+};
+
+}  // namespace
 
 std::vector<Lead> screen(const rig::RigProblem& problem, const rig::SpecimenFamily& family,
                          const rig::Session& session, const rig::RigFit& current,
                          const Eigen::VectorXd& weights, const std::function<void()>& going_on) {
-  const Eigen::VectorXd root = weights.cwiseSqrt();
-  const Eigen::VectorXd residuals = root.asDiagonal() * current.residuals;
-  const Eigen::MatrixXd known = basis_of(root.asDiagonal() * current.jacobian);
-  const auto change_by = [&](const Effect* effect, const std::vector<double>& values) -> Eigen::VectorXd {
+  const Screening screening(problem, session, current, weights);
+  std::vector<const Effect*> tried;
+  for (const Effect* effect : all_effects())
+    if (!contains(current.ingredients, effect) && effect->fits(family)) tried.push_back(effect);
+  std::vector<std::optional<Lead>> found(tried.size());
+  parallel_for(tried.size(), problem.threads(), [&](size_t i) {
     going_on();
-    std::vector<rig::Ingredient> ingredients = current.ingredients;
-    ingredients.push_back({effect, {}});
-    std::vector<double> all = current.values;
-    all.insert(all.end(), values.begin(), values.end());
-    return root.asDiagonal() * (problem.residuals(ingredients, all) - current.residuals);
-  };
+    found[i] = screening.lead_of(*tried[i]);
+  });
   std::vector<Lead> leads;
-  for (const Effect* effect : all_effects()) {
-    if (contains(current.ingredients, effect) || !effect->fits(family)) continue;
-    if (effect->occasions() != Occasions::none) {
-      going_on();
-      const auto promised = rig::promise_moments(problem, session, current, *effect);
-      if (!promised) continue;
-      leads.push_back({{effect, {}}});
-      set_moments(leads.back(), promised->count, promised->residuals, current, weights);
-      continue;
-    }
-    const auto parameters = effect->parameters();
-    Lead lead{{effect, {}}, 0.0, 0.0, parameters.size(), {}};
-    for (const double size : trial_sizes(*effect)) {
-      const std::vector<double> values = values_at(*effect, session.base, size);
-      Eigen::MatrixXd columns(residuals.size(), 0);
-      const auto add_column = [&](const std::vector<double>& at) {
-        columns.conservativeResize(Eigen::NoChange, columns.cols() + 1);
-        columns.rightCols(1) = change_by(effect, at);
-      };
-      add_column(values);
-      for (size_t j = 1; j < std::min(parameters.size(), further_columns + 1); ++j) {
-        std::vector<double> other = values;
-        other[j] = varied(parameters[j]);
-        add_column(other);
-      }
-      lead.gain = std::max(lead.gain, linear_gain(known, columns, residuals));
-      const Eigen::VectorXd seen = columns.col(0) - known * (known.transpose() * columns.col(0));
-      lead.visibility = std::max(lead.visibility, seen.norm() / size);
-    }
-    for (const double size : far_sizes(*effect, session.base)) {
-      const Eigen::VectorXd there = residuals + change_by(effect, values_at(*effect, session.base, size));
-      const Eigen::VectorXd left = there - known * (known.transpose() * there);
-      lead.gain = std::max(lead.gain, residuals.squaredNorm() - left.squaredNorm());
-    }
-    leads.push_back(lead);
-  }
+  for (std::optional<Lead>& lead : found)
+    if (lead) leads.push_back(std::move(*lead));
   std::sort(leads.begin(), leads.end(), [](const Lead& a, const Lead& b) { return a.gain > b.gain; });
   return leads;
 }

@@ -47,7 +47,8 @@ double linear_gain(const Eigen::MatrixXd& basis, const Eigen::MatrixXd& columns,
                    const Eigen::VectorXd& residuals);
 
 /// All effects that fit the specimen and are not in `current` already, the largest gain first. `weights`: one a
-/// residual, what a square counts for (search.hpp). `going_on` is asked between simulations.
+/// residual, what a square counts for (search.hpp). `going_on` is asked before each effect, by any of the
+/// problem's threads; it may throw.
 std::vector<Lead> screen(const rig::RigProblem& problem, const rig::SpecimenFamily& family,
                          const rig::Session& session, const rig::RigFit& current,
                          const Eigen::VectorXd& weights, const std::function<void()>& going_on);

@@ -7,9 +7,11 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <mutex>
 
 #include "estimator/explain/chi_square.hpp"
 #include "estimator/explain/tolerance.hpp"
+#include "estimator/fe/parallel_for.hpp"
 
 namespace diastole::explain {
 namespace {
@@ -18,7 +20,8 @@ constexpr double far_behind = 4.0;      // of the best set's excess over the flo
 constexpr double at_the_floor = 0.003;  // of reduced chi-squares
 constexpr double alike =
     0.8;  // of a member's drop in chi-square: what a look-alike's linear gain reaches at least
-constexpr double hopeless = 0.3;  // of the best lead's gain: linear gains of large effects are rough
+constexpr double alike_by_scan = 0.9;  // the same for scanned moments, whose gain is known within 5 %
+constexpr double hopeless = 0.3;       // of the best lead's gain: linear gains of large effects are rough
 
 constexpr double models_error = 5e-5;  // of explained squares: the model errs by 0.7 % of what effects change
 constexpr double worth_a_partner = 0.02;  // of reduced chi-square above the noise, for a synergy to be tried
@@ -37,6 +40,16 @@ std::vector<std::string> ids_of(const std::vector<rig::Ingredient>& ingredients)
     ids.emplace_back(ingredient.effect->text().id);
   std::sort(ids.begin(), ids.end());
   return ids;
+}
+
+bool has_moments(const Lead& lead) { return lead.ingredient.effect->occasions() != Occasions::none; }
+
+/// The sets with one member less.
+std::vector<std::vector<rig::Ingredient>> each_left_out(const std::vector<rig::Ingredient>& set) {
+  std::vector<std::vector<rig::Ingredient>> sets(set.size(), set);
+  for (size_t member = 0; member < set.size(); ++member)
+    sets[member].erase(sets[member].begin() + static_cast<std::ptrdiff_t>(member));
+  return sets;
 }
 
 class Search {
@@ -60,9 +73,13 @@ class Search {
     result_.sets.push_back(std::move(set));
     return result_.sets.size() - 1;
   }
-  /// The place of the set, fitted now if it was not before.
-  size_t fitted(const std::vector<rig::Ingredient>& ingredients, const rig::RigFit& before,
-                const std::optional<rig::RigFit>& made = {});
+  /// The sets' places; those that were not fitted before are fitted now, several at a time.
+  std::vector<size_t> fitted(const std::vector<std::vector<rig::Ingredient>>& sets,
+                             const rig::RigFit& before);
+  size_t fitted(const std::vector<rig::Ingredient>& set, const rig::RigFit& before) {
+    return fitted(std::vector<std::vector<rig::Ingredient>>{set}, before).front();
+  }
+  [[nodiscard]] std::optional<size_t> place_of(const std::vector<std::string>& ids) const;
   /// chi-square with what its parameters cost, and what each further effect might only take from the model's error of
   /// the others.
   [[nodiscard]] double penalised(size_t set) const {
@@ -82,8 +99,13 @@ class Search {
   }
   /// Screening of the residuals of a set; done once.
   std::vector<Lead>& leads_beside(size_t set);
-  /// The set with a lead added, unless its moments are searched and gain too little.
-  std::optional<size_t> tried(size_t from, Lead& lead, double least_gain);
+  struct Attempt {
+    Lead* lead;
+    double least_gain;
+  };
+  /// The sets with each lead added, but for those whose moments are searched and gain too little.
+  std::vector<size_t> tried(size_t from, const std::vector<Attempt>& attempts);
+  [[nodiscard]] bool worth_searching(size_t from, const Lead& lead, const std::vector<size_t>& grown) const;
   std::vector<size_t> grow(size_t from);
   std::vector<size_t> with_rivals(size_t from, const std::vector<size_t>& grown);
   std::vector<size_t> with_partners(size_t from, const std::vector<size_t>& grown);
@@ -95,7 +117,9 @@ class Search {
     return effect.occasions() == Occasions::none && effect.fits(family_) &&
            std::none_of(set.begin(), set.end(), [&](const auto& in) { return in.effect == &effect; });
   }
-  void tell(const std::string& text) const {
+  /// One thread at a time; may throw.
+  void tell(const std::string& text) {
+    const std::scoped_lock lock(telling_);
     if (options_.progress) options_.progress(text);
   }
 
@@ -106,16 +130,30 @@ class Search {
   Eigen::VectorXd weights_;
   SearchResult result_;
   std::map<size_t, std::vector<Lead>> leads_;
+  std::mutex telling_;
 };
 
-size_t Search::fitted(const std::vector<rig::Ingredient>& ingredients, const rig::RigFit& before,
-                      const std::optional<rig::RigFit>& made) {
-  const std::vector<std::string> ids = ids_of(ingredients);
+std::optional<size_t> Search::place_of(const std::vector<std::string>& ids) const {
   for (size_t k = 0; k < result_.sets.size(); ++k)
     if (result_.sets[k].ids() == ids) return k;
-  if (made) return add(*made);
-  tell(fmt::format("fitting {}", fmt::join(ids, " + ")));
-  return add(problem_.fit(ingredients, before));
+  return {};
+}
+
+std::vector<size_t> Search::fitted(const std::vector<std::vector<rig::Ingredient>>& sets,
+                                   const rig::RigFit& before) {
+  std::vector<std::optional<rig::RigFit>> fits(sets.size());
+  parallel_for(sets.size(), problem_.threads(), [&](size_t i) {
+    const std::vector<std::string> ids = ids_of(sets[i]);
+    if (place_of(ids)) return;
+    tell(fmt::format("fitting {}", fmt::join(ids, " + ")));
+    fits[i] = problem_.fit(sets[i], before);
+  });
+  std::vector<size_t> places;
+  for (size_t i = 0; i < sets.size(); ++i) {
+    const auto place = place_of(ids_of(sets[i]));
+    places.push_back(place ? *place : add(std::move(*fits[i])));
+  }
+  return places;
 }
 
 std::vector<Lead>& Search::leads_beside(size_t set) {
@@ -129,14 +167,31 @@ std::vector<Lead>& Search::leads_beside(size_t set) {
   return leads_.emplace(set, std::move(leads)).first->second;
 }
 
-std::optional<size_t> Search::tried(size_t from, Lead& lead, double least_gain) {
-  if (lead.gain < least_gain) return {};
+std::vector<size_t> Search::tried(size_t from, const std::vector<Attempt>& attempts) {
   const rig::RigFit current = result_.sets[from].fit;
-  search_moments(lead, problem_, session_, current, weights_);
-  if (lead.gain < least_gain) return {};
-  std::vector<rig::Ingredient> ingredients = current.ingredients;
-  ingredients.push_back(lead.ingredient);
-  return fitted(ingredients, current, lead.fit);
+  parallel_for(attempts.size(), problem_.threads(), [&](size_t i) {
+    Lead& lead = *attempts[i].lead;
+    if (!has_moments(lead)) return;
+    tell(fmt::format("searching moments of {}", lead.ingredient.effect->text().id));
+    search_moments(lead, problem_, session_, current, weights_);
+  });
+  std::vector<size_t> places;
+  std::vector<std::vector<rig::Ingredient>> sets;
+  for (const Attempt& attempt : attempts) {
+    const Lead& lead = *attempt.lead;
+    if (lead.gain < attempt.least_gain) continue;
+    std::vector<rig::Ingredient> set = current.ingredients;
+    set.push_back(lead.ingredient);
+    if (!lead.fit) {
+      sets.push_back(std::move(set));
+    } else {
+      const auto place = place_of(ids_of(set));
+      places.push_back(place ? *place : add(*lead.fit));
+    }
+  }
+  for (const size_t place : fitted(sets, current))
+    places.push_back(place);
+  return places;
 }
 
 /// Where the best of the grown sets leaves misfit, what its effect is mistaken for in its place, whatever the screening says of it.
@@ -147,14 +202,15 @@ std::vector<size_t> Search::with_rivals(size_t from, const std::vector<size_t>& 
   if (reduced(best) < 1.0 + worth_a_partner) return {};
   const rig::RigFit current = result_.sets[from].fit;
   const Effect& mistaken = *result_.sets[best].fit.ingredients.back().effect;
-  std::vector<size_t> rivals;
+  std::vector<std::vector<rig::Ingredient>> swapped;
   for (const Effect* rival : all_effects()) {
     if (!names(mistaken.text().conflicts, *rival) || !can_join(current.ingredients, *rival)) continue;
-    std::vector<rig::Ingredient> swapped = current.ingredients;
-    swapped.push_back({rival, {}});
-    const size_t set = fitted(swapped, current);
-    if (std::find(grown.begin(), grown.end(), set) == grown.end()) rivals.push_back(set);
+    swapped.push_back(current.ingredients);
+    swapped.back().push_back({rival, {}});
   }
+  std::vector<size_t> rivals = fitted(swapped, current);
+  std::erase_if(rivals,
+                [&](size_t set) { return std::find(grown.begin(), grown.end(), set) != grown.end(); });
   return rivals;
 }
 
@@ -166,26 +222,49 @@ std::vector<size_t> Search::with_partners(size_t from, const std::vector<size_t>
     if (reduced(set) < 1.0 + worth_a_partner ||
         one.ingredients.size() >= options_.start.size() + options_.most_effects)
       continue;
+    std::vector<std::vector<rig::Ingredient>> together;
     for (const Effect* partner : all_effects()) {
       if (!are_partners(*one.ingredients.back().effect, *partner) || !can_join(one.ingredients, *partner))
         continue;
-      std::vector<rig::Ingredient> both = one.ingredients;
-      both.push_back({partner, {}});
-      const size_t pair = fitted(both, one);
-      if (penalised(pair) < penalised(from)) pairs.push_back(pair);
+      together.push_back(one.ingredients);
+      together.back().push_back({partner, {}});
     }
+    for (const size_t pair : fitted(together, one))
+      if (penalised(pair) < penalised(from)) pairs.push_back(pair);
   }
   return pairs;
+}
+
+/// Whether a lead's moments are worth their search, which costs more than all other fits: not if what a scan promises is
+/// far behind what was fitted already.
+bool Search::worth_searching(size_t from, const Lead& lead, const std::vector<size_t>& grown) const {
+  constexpr double rough = 1.1;  // of the promise
+  const double promised = std::max(result_.sets[from].chi_square - rough * lead.gain, 0.0) / weights_.sum();
+  return std::all_of(grown.begin(), grown.end(),
+                     [&](size_t set) { return worth_following(promised, reduced(set)); });
 }
 
 /// The sets with one effect more that a screening finds worth a fit.
 std::vector<size_t> Search::grow(size_t from) {
   std::vector<Lead>& leads = leads_beside(from);
   std::vector<size_t> grown;
+  const auto try_all = [&](const std::vector<Attempt>& attempts) {
+    for (const size_t set : tried(from, attempts))
+      grown.push_back(set);
+  };
   const double hope = leads.empty() ? 0.0 : hopeless * leads.front().gain;
-  for (Lead& lead : leads) {
-    if (grown.size() >= options_.refitted || lead.gain < hope) break;
-    if (const auto set = tried(from, lead, admission(lead.parameters))) grown.push_back(*set);
+  for (size_t next = 0; grown.size() < options_.refitted && next < leads.size();) {
+    std::vector<Attempt> sized, with_moments;  // more follow where searched moments come to nothing
+    for (; grown.size() + sized.size() + with_moments.size() < options_.refitted && next < leads.size();
+         ++next) {
+      const double least = admission(leads[next].parameters);
+      if (leads[next].gain >= std::max(hope, least))
+        (has_moments(leads[next]) ? with_moments : sized).push_back({&leads[next], least});
+    }
+    try_all(sized);
+    std::erase_if(with_moments,
+                  [&](const Attempt& attempt) { return !worth_searching(from, *attempt.lead, grown); });
+    try_all(with_moments);
   }
   for (const size_t rival : with_rivals(from, grown))
     grown.push_back(rival);
@@ -199,17 +278,18 @@ std::vector<size_t> Search::grow(size_t from) {
 /// it takes off much less.
 void Search::compare_alike(size_t set) {
   const std::vector<rig::Ingredient> chosen = result_.sets[set].fit.ingredients;
-  for (size_t member = 0; member < chosen.size(); ++member) {
-    std::vector<rig::Ingredient> rest = chosen;
-    rest.erase(rest.begin() + static_cast<std::ptrdiff_t>(member));
-    const size_t without = fitted(rest, problem_.base());
+  for (const size_t without : fitted(each_left_out(chosen), problem_.base())) {
     const double drop = result_.sets[without].chi_square - result_.sets[set].chi_square;
+    std::vector<Attempt> attempts;
     for (Lead& lead : leads_beside(without)) {
       const Effect* other = lead.ingredient.effect;
       const bool contained = std::any_of(chosen.begin(), chosen.end(),
                                          [&](const rig::Ingredient& in) { return in.effect == other; });
-      if (!contained) tried(without, lead, std::max(alike * drop, admission(lead.parameters)) - as_good);
+      const double near = has_moments(lead) ? alike_by_scan : alike;
+      const double least = std::max(near * drop, admission(lead.parameters)) - as_good;
+      if (!contained && lead.gain >= least) attempts.push_back({&lead, least});
     }
+    tried(without, attempts);
   }
 }
 
@@ -224,12 +304,9 @@ SearchResult Search::run() {
 /// The set, or what is better without a member that another noise has made superfluous.
 void Search::begin_with(const std::vector<rig::Ingredient>& start) {
   result_.best = fitted(start, problem_.base());
-  for (size_t member = 0; start.size() > 1 && member < start.size(); ++member) {
-    std::vector<rig::Ingredient> rest = start;
-    rest.erase(rest.begin() + static_cast<std::ptrdiff_t>(member));
-    const size_t without = fitted(rest, problem_.base());
+  if (start.size() == 1) return;
+  for (const size_t without : fitted(each_left_out(start), problem_.base()))
     if (penalised(without) < penalised(result_.best)) result_.best = without;
-  }
 }
 
 void Search::seek() {

@@ -5,24 +5,37 @@
 #include <algorithm>
 #include <atomic>
 #include <cstddef>
+#include <exception>
+#include <mutex>
 #include <thread>
 #include <vector>
 
 namespace diastole {
 
-/// Calls body(i) for 0 <= i < count on at most `threads` threads, the caller's included; `body` must not
-/// throw.
+/// Calls body(i) for 0 <= i < count on at most `threads` threads, the caller's included. If a body throws, no further
+/// index is begun, and the first exception is thrown to the caller once all threads are done.
 template <class Body>
 void parallel_for(size_t count, size_t threads, const Body& body) {
   std::atomic<size_t> next{0};
+  std::mutex failing;
+  std::exception_ptr failure;
   const auto work = [&] {
-    for (size_t i = next++; i < count; i = next++)
-      body(i);
+    try {
+      for (size_t i = next++; i < count; i = next++)
+        body(i);
+    } catch (...) {
+      next = count;
+      const std::scoped_lock lock(failing);
+      if (!failure) failure = std::current_exception();
+    }
   };
-  std::vector<std::jthread> helpers;
-  for (size_t t = 1; t < std::min(threads, count); ++t)
-    helpers.emplace_back(work);
-  work();
+  {
+    std::vector<std::jthread> helpers;
+    for (size_t t = 1; t < std::min(threads, count); ++t)
+      helpers.emplace_back(work);
+    work();
+  }
+  if (failure) std::rethrow_exception(failure);
 }
 
 }  // namespace diastole

@@ -30,6 +30,17 @@ std::optional<LimitPoint> limit_between(const PressureVolumePoint& from, const P
                     from.pressure_kPa + low * (first + low * (square + low * cube))};
 }
 
+/// Where the next equal step leads if the shape goes on as from `before` to `last`.
+ElasticState extrapolated(const ElasticState& before, const ElasticState& last) {
+  ElasticState next = last;
+  next.pressure_kPa += last.pressure_kPa - before.pressure_kPa;
+  for (size_t i = 0; i < next.position_mm.size(); ++i)
+    next.position_mm[i] += last.position_mm[i] - before.position_mm[i];
+  for (size_t i = 0; i < next.lagrange_pressure_kPa.size(); ++i)
+    next.lagrange_pressure_kPa[i] += last.lagrange_pressure_kPa[i] - before.lagrange_pressure_kPa[i];
+  return next;
+}
+
 }  // namespace
 
 double PressureVolumeCurve::work_mJ() const {
@@ -48,14 +59,16 @@ PressureVolumeCurve pressure_volume_curve(ElasticModel& model, const PressureVol
   const double rest_mL = model.cavity_volume_mL(model.rest_state());
   PressureVolumeCurve curve;
   curve.state = model.rest_state();
+  ElasticState start = curve.state;
   for (size_t step = 0; step <= options.steps; ++step) {
     const double change_mL =
         options.volume_change_mL * static_cast<double>(step) / static_cast<double>(options.steps);
     Load load = options.load;
     load.cavity_volume_mL = rest_mL + change_mL;
-    Solution solution = model.solve(load, curve.state);
+    Solution solution = model.solve(load, start);
     curve.last = std::move(solution.report);
     if (!curve.last.converged()) break;
+    start = step == 0 ? solution.state : extrapolated(curve.state, solution.state);
     curve.state = std::move(solution.state);
     PressureVolumePoint point{.volume_change_mL = change_mL, .pressure_kPa = curve.state.pressure_kPa};
     const std::optional<double> stiffness = model.cavity_stiffness_kPa_per_mL(curve.state);
@@ -65,7 +78,7 @@ PressureVolumeCurve pressure_volume_curve(ElasticModel& model, const PressureVol
     }
     point.stiffness_kPa_per_mL = *stiffness;
     point.stored_energy_mJ = model.stored_energy_mJ(curve.state);
-    point.stable_at_volume = model.system().stability(curve.state).stable();
+    if (options.judge_stability) point.stable_at_volume = model.system().stability(curve.state).stable();
     point.newton_iterations = curve.last.newton_iterations;
     if (!curve.points.empty()) {
       if (const auto limit = limit_between(curve.points.back(), point)) curve.limits.push_back(*limit);

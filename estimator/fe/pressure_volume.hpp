@@ -42,7 +42,8 @@ struct PressureVolumeCurve {
 struct PressureVolumeOptions {
   double volume_change_mL = 0.0;  ///< at the end; negative empties the cavity
   size_t steps = 20;
-  Load load{};  ///< fibre tension at all points; the pressure is of no account
+  bool judge_stability = true;  ///< one more factorisation a point; without it stable_at_volume stays true
+  Load load{};                  ///< fibre tension at all points; the pressure is of no account
   /// Called after each point; false ends the curve there.
   std::function<bool(const PressureVolumePoint&)> on_point{};
 };

@@ -8,7 +8,7 @@
 namespace diastole::rig {
 
 /// A hose of constant bore. The wall stores volume as A/(rho c^2) (p + creep e) a length, with e following p in the
-/// creep time (a standard linear solid).
+/// creep time (a standard linear solid), and resists being stretched with wall_loss_s times the pressure's rate.
 struct Hose {
   double length_m = 5.0;
   double bore_mm = 12.0;
@@ -17,6 +17,7 @@ struct Hose {
   double wave_speed_m_s = 400.0;  ///< of the instantaneous, elastic response of wall and fluid
   double creep_fraction = 0.05;   ///< of the elastic compliance, added slowly
   double creep_time_s = 0.1;
+  double wall_loss_s = 2.5e-6;    ///< damps waves of rate w by w^2 / 2 times this, 1/s (Kelvin and Voigt)
   double inertance_factor = 1.0;  ///< the fluid's inertia over that of a plain tube of this bore
   double loss_coefficient = 1.5;  ///< K: entries and bends take K rho v |v| / 2
   double loss_at_cavity =

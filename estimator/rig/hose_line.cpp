@@ -28,6 +28,7 @@ HoseLine::HoseLine(const Hose& hose, const LineOptions& options)
       compliance_(hose.compliance_mL_per_kPa()),
       creep_(hose.creep_fraction),
       creep_time_(hose.creep_time_s),
+      wall_loss_(hose.wall_loss_s),
       to_speed_(1.0 / hose.area_mm2()),
       pump_stiffness_(options.pump_stiffness.value_or(0.0)),
       pump_resistance_(options.pump_resistance.value_or(0.0)),
@@ -76,6 +77,8 @@ void HoseLine::make_equations() {
     creep_coupling_(first_ + n, n) = creep_ * wave / 2.0;
     cavity_shape_[first_ + n] = -sine_at_end(n);
   }
+  damping_.bottomRightCorner(modes_ + 1, modes_ + 1) +=
+      wall_loss_ * stiffness_.bottomRightCorner(modes_ + 1, modes_ + 1);
   inverse_mass_ = mass_.inverse();
 }
 
@@ -240,7 +243,10 @@ double HoseLine::loss_mW() const {
   double drag = 0.0;
   for (Index g = 0; g < point_weight_.size(); ++g)
     drag += point_weight_[g] * gradient_[g] * speed_[g] / to_speed_;
-  return drag + compliance_ * creep_ / creep_time_ * mean_product(lag, lag);
+  const auto stretching = state_.segment(count_ + first_, modes_ + 1);
+  const auto elastic = stiffness_.bottomRightCorner(modes_ + 1, modes_ + 1);
+  return drag + compliance_ * creep_ / creep_time_ * mean_product(lag, lag) +
+         wall_loss_ * stretching.dot(elastic * stretching);
 }
 
 }  // namespace diastole::rig

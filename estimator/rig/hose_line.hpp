@@ -14,8 +14,9 @@
 //
 //   I inertance, g_n = (1 - (-1)^n)/(n pi), b_n = (-1)^(n+1)/(n pi), F the drag's weighted integrals over the length;
 //   P_0 = u/C - d e_0, P_n = -n pi a_n/C - d e_n are the pressure's cosine components, e_n' = (P_n - e_n)/tau the
-//   creep's (d its fraction of the elastic compliance C). Energy is kept exactly but for drag and creep; components
-//   converge as 1/n^3 and fast, since motors spread their accelerations over many travel times.
+//   creep's (d its fraction of the elastic compliance C); the wall's own loss adds wall_loss times the rates of u and a_n to
+//   them. Energy is kept exactly but for drag, creep and that; components converge as 1/n^3 and fast, since motors spread
+//   their accelerations over many travel times.
 //
 // Time: the linear part by its matrix exponential, exactly; end pressures and drag enter as forces that are linear
 // within a step (exponential time differencing, predictor and corrector). So the step may be far longer than the
@@ -75,7 +76,7 @@ class HoseLine {
   [[nodiscard]] double outflow_by_suction() const { return cavity_shape_.dot(inverse_mass_ * cavity_shape_); }
   /// Kinetic energy of the fluid and energy stored in the wall's elastic part, mJ (kPa mL).
   [[nodiscard]] double energy_mJ() const;
-  /// Power lost in drag and creep, mW, at the state at hand.
+  /// Power lost in drag and in the wall, mW, at the state at hand.
   [[nodiscard]] double loss_mW() const;
 
  private:
@@ -101,7 +102,8 @@ class HoseLine {
   Eigen::Index first_;  ///< index of u
   Eigen::Index count_;  ///< degrees of freedom
   Eigen::Index modes_;
-  double inertance_, compliance_, creep_, creep_time_, to_speed_, pump_stiffness_, pump_resistance_;
+  double inertance_, compliance_, creep_, creep_time_, wall_loss_, to_speed_, pump_stiffness_,
+      pump_resistance_;
   WallFriction friction_;
 
   Eigen::MatrixXd mass_, inverse_mass_, stiffness_, damping_, creep_coupling_;

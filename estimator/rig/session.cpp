@@ -23,9 +23,6 @@ double attribute(const RecordedRun& run, std::string_view name, double otherwise
   return otherwise;
 }
 
-/// Of a wall that /rig does not tell about: calibrated on sessions in which nothing is hidden.
-constexpr double calibrated_creep_fraction = 0.0655;
-
 /// Seconds of an ISO 8601 time, from any fixed origin; NaN if it is none.
 double seconds_of(const std::string& utc) {
   int year = 0;
@@ -115,7 +112,7 @@ RigModel base_model(const RecordedRun& run) {
   hose.wave_speed_m_s = attribute(run, "hose_wave_speed_m_s", hose.wave_speed_m_s);
   hose.loss_coefficient = attribute(run, "hose_minor_loss_K", hose.loss_coefficient);
   hose.loss_at_cavity = attribute(run, "hose_loss_at_cavity", hose.loss_at_cavity);
-  hose.creep_fraction = attribute(run, "hose_creep_fraction", calibrated_creep_fraction);
+  hose.creep_fraction = attribute(run, "hose_creep_fraction", hose.creep_fraction);
   hose.creep_time_s = attribute(run, "hose_creep_time_s", hose.creep_time_s);
   model.catheter.resonance_Hz = attribute(run, "catheter_f0_Hz", model.catheter.resonance_Hz);
   model.catheter.damping = attribute(run, "catheter_zeta", model.catheter.damping);

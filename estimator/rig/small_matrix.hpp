@@ -6,13 +6,13 @@
 
 namespace diastole::rig {
 
-/// Rows are kept by columns and filled up with zeros to a multiple of four, and so must be what products are written to.
+/// Rows are kept by columns and filled up with zeros to a multiple of eight, and so must be what products are written to.
 class SmallMatrix {
  public:
   SmallMatrix() = default;
   explicit SmallMatrix(const Eigen::MatrixXd& matrix);
 
-  static Eigen::Index padded(Eigen::Index rows) { return (rows + 3) / 4 * 4; }
+  static Eigen::Index padded(Eigen::Index rows) { return (rows + 7) / 8 * 8; }
   /// out = this in; `in` may be longer than there are columns.
   void times(const Eigen::VectorXd& in, Eigen::VectorXd& out) const {
     multiply(in.data(), out.data(), false);

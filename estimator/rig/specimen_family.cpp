@@ -21,7 +21,8 @@ constexpr double softest_mm = 8.0;  ///< where half of the way to free ends is g
 void follow(Study study, double to_mL, size_t steps, std::vector<SpecimenCurve::Point>& points) {
   ElasticModel model = make_model(study);
   require_closed_cavity(study, model);
-  const PressureVolumeCurve curve = pressure_volume_curve(model, {.volume_change_mL = to_mL, .steps = steps});
+  const PressureVolumeCurve curve =
+      pressure_volume_curve(model, {.volume_change_mL = to_mL, .steps = steps, .judge_stability = false});
   if (!curve.last.converged()) {
     throw InputError({.file = study.file.string(),
                       .place = "specimen",
@@ -81,9 +82,17 @@ bool SpecimenFamily::has_neighbours() const {
 
 const SpecimenCurve& SpecimenFamily::computed(const std::string& name, const Study& study,
                                               size_t stride) const {
-  auto found = curves_.find(name);
-  if (found == curves_.end()) found = curves_.emplace(name, compute(study, stride)).first;
-  return found->second;
+  const auto kept = [&]() -> const SpecimenCurve* {
+    const std::scoped_lock lock(keeping_);
+    const auto found = curves_.find(name);
+    return found == curves_.end() ? nullptr : &found->second;
+  };
+  if (const SpecimenCurve* curve = kept()) return *curve;
+  const std::scoped_lock alone(solving_);
+  if (const SpecimenCurve* curve = kept()) return *curve;  // another thread was faster
+  SpecimenCurve curve = compute(study, stride);
+  const std::scoped_lock lock(keeping_);
+  return curves_.emplace(name, std::move(curve)).first->second;
 }
 
 Study SpecimenFamily::coarse_study() const {
@@ -92,34 +101,56 @@ Study SpecimenFamily::coarse_study() const {
   return study;
 }
 
-const SpecimenCurve& SpecimenFamily::plain() const {
-  const std::scoped_lock lock(mutex_);
-  if (plain_) return *plain_;
-  if (!std::holds_alternative<AnnulusSpecimen>(study_.specimen)) {
-    plain_ = computed("own mesh", study_, 1);
-    return *plain_;
-  }
+SpecimenCurve SpecimenFamily::combined() const {
+  if (!std::holds_alternative<AnnulusSpecimen>(study_.specimen)) return computed("own mesh", study_, 1);
   const SpecimenCurve& coarse = computed("coarse", coarse_study(), 1);
-  plain_ = coarse;
-  if (resolution_.fine != resolution_.coarse) {
-    Study fine = study_;
-    std::get<AnnulusSpecimen>(fine.specimen).mesh = resolution_.fine;
-    const SpecimenCurve& solved = computed("fine", fine, resolution_.stride);
-    plain_ = coarse.plus(solved.plus(coarse, 1.0, -1.0), 1.0, 1.0);
+  if (resolution_.fine == resolution_.coarse) return coarse;
+  Study fine = study_;
+  std::get<AnnulusSpecimen>(fine.specimen).mesh = resolution_.fine;
+  const SpecimenCurve& solved = computed("fine", fine, resolution_.stride);
+  return coarse.plus(solved.plus(coarse, 1.0, -1.0), 1.0, 1.0);
+}
+
+const SpecimenCurve& SpecimenFamily::plain() const {
+  {
+    const std::scoped_lock lock(keeping_);
+    if (plain_) return *plain_;
   }
+  SpecimenCurve curve = combined();
+  const std::scoped_lock lock(keeping_);
+  if (!plain_) plain_ = std::move(curve);
   return *plain_;
 }
 
-SpecimenCurve SpecimenFamily::between(const Neighbours& of, double value) const {
+void SpecimenFamily::compute_ahead() {
+  ahead_ = std::jthread([this](const std::stop_token& stop) {
+    try {
+      (void)plain();
+      if (!has_neighbours()) return;
+      for (const Neighbours& neighbours : {radii(), stiffenings(), slips()})
+        for (const double node : neighbours.nodes) {
+          if (stop.stop_requested()) return;
+          if (node != 0.0) (void)solved(neighbours, node, resolution_.coarse);
+        }
+    } catch (const std::exception&) {  // whoever asks for the curve gets to know
+    }
+  });
+}
+
+const SpecimenCurve& SpecimenFamily::solved(const Neighbours& of, double node,
+                                            const std::array<int, 3>& mesh) const {
+  Study study = study_;
+  std::get<AnnulusSpecimen>(study.specimen).mesh = mesh;
+  of.change(node, study);
+  return computed(fmt::format("{} {} {}", of.name, node, mesh == resolution_.fine), study,
+                  resolution_.stride);
+}
+
+SpecimenCurve SpecimenFamily::between(const Neighbours& of, double value, bool rough) const {
   const SpecimenCurve& here = plain();
-  const std::scoped_lock lock(mutex_);
   const SpecimenCurve& base = computed("coarse", coarse_study(), 1);
   const auto differing = [&](double node, const std::array<int, 3>& mesh, const SpecimenCurve& from) {
-    Study study = coarse_study();
-    std::get<AnnulusSpecimen>(study.specimen).mesh = mesh;
-    of.change(node, study);
-    const std::string name = fmt::format("{} {} {}", of.name, node, mesh == resolution_.fine);
-    return computed(name, study, resolution_.stride).plus(from, 1.0, -1.0);
+    return solved(of, node, mesh).plus(from, 1.0, -1.0);
   };
   std::optional<SpecimenCurve> sum;
   for (const double node : of.nodes) {
@@ -130,7 +161,7 @@ SpecimenCurve SpecimenFamily::between(const Neighbours& of, double value) const 
     const SpecimenCurve one = differing(node, resolution_.coarse, base);
     sum = sum ? sum->plus(one, 1.0, weight) : one.plus(one, weight, 0.0);
   }
-  if (of.refined_at != 0.0 && resolution_.fine != resolution_.coarse) {
+  if (!rough && of.refined_at != 0.0 && resolution_.fine != resolution_.coarse) {
     const double at_mL = 0.5 * resolution_.spacing_mL * static_cast<double>(resolution_.points_inflated);
     const SpecimenCurve coarse = differing(of.refined_at, resolution_.coarse, base);
     const SpecimenCurve fine = differing(of.refined_at, resolution_.fine, here);
@@ -140,48 +171,53 @@ SpecimenCurve SpecimenFamily::between(const Neighbours& of, double value) const 
   return here.plus(*sum, 1.0, 1.0);
 }
 
-SpecimenCurve SpecimenFamily::with_inner_radius(double fraction) const {
-  return between({.name = "radius",
-                  .nodes = {-0.1, -0.05, 0.0, 0.05, 0.1},
-                  .refined_at = 0.0,
-                  .change =
-                      [](double node, Study& study) {
-                        std::get<AnnulusSpecimen>(study.specimen).inner_radius_mm *= 1.0 + node;
-                      }},
-                 fraction);
+SpecimenFamily::Neighbours SpecimenFamily::radii() {
+  return {.name = "radius",
+          .nodes = {-0.1, -0.05, 0.0, 0.05, 0.1},
+          .refined_at = 0.0,
+          .change = [](double node, Study& study) {
+            std::get<AnnulusSpecimen>(study.specimen).inner_radius_mm *= 1.0 + node;
+          }};
 }
 
-SpecimenCurve SpecimenFamily::stiffened(double beta) const {
-  return between({.name = "beta",
-                  .nodes = {0.0, 0.75, 1.5, 3.0},
-                  .refined_at = 1.5,
-                  .change =
-                      [](double node, Study& study) {
-                        StudyParameter stiffening = study.law.parameters.front();
-                        stiffening.name = "beta";
-                        stiffening.start = node;
-                        stiffening.lower = 0.0;
-                        stiffening.upper = 10.0;
-                        study.law.name = "demiray";
-                        study.law.parameters.push_back(stiffening);
-                      }},
-                 beta);
+SpecimenFamily::Neighbours SpecimenFamily::stiffenings() {
+  return {.name = "beta",
+          .nodes = {0.0, 0.75, 1.5, 3.0},
+          .refined_at = 1.5,
+          .change = [](double node, Study& study) {
+            StudyParameter stiffening = study.law.parameters.front();
+            stiffening.name = "beta";
+            stiffening.start = node;
+            stiffening.lower = 0.0;
+            stiffening.upper = 10.0;
+            study.law.name = "demiray";
+            study.law.parameters.push_back(stiffening);
+          }};
 }
 
-SpecimenCurve SpecimenFamily::slipping(double compliance_mm) const {
+SpecimenFamily::Neighbours SpecimenFamily::slips() {
+  return {.name = "slip",
+          .nodes = {0.0, 0.25, 0.5, 0.75},
+          .refined_at = 0.5,
+          .change = [](double node, Study& study) {
+            auto& annulus = std::get<AnnulusSpecimen>(study.specimen);
+            annulus.ends = "sprung";
+            const double compliance = softest_mm * node / (1.0 - node);
+            annulus.end_springs = EndSprings{plate_kPa_per_mm, 1.0 / compliance};
+          }};
+}
+
+SpecimenCurve SpecimenFamily::with_inner_radius(double fraction, bool rough) const {
+  return between(radii(), fraction, rough);
+}
+
+SpecimenCurve SpecimenFamily::stiffened(double beta, bool rough) const {
+  return between(stiffenings(), beta, rough);
+}
+
+SpecimenCurve SpecimenFamily::slipping(double compliance_mm, bool rough) const {
   // In c / (c + c0) the curve is nearly straight from held to free ends.
-  const double way = compliance_mm / (compliance_mm + softest_mm);
-  return between({.name = "slip",
-                  .nodes = {0.0, 0.25, 0.5, 0.75},
-                  .refined_at = 0.5,
-                  .change =
-                      [](double node, Study& study) {
-                        auto& annulus = std::get<AnnulusSpecimen>(study.specimen);
-                        annulus.ends = "sprung";
-                        const double compliance = softest_mm * node / (1.0 - node);
-                        annulus.end_springs = EndSprings{plate_kPa_per_mm, 1.0 / compliance};
-                      }},
-                 way);
+  return between(slips(), compliance_mm / (compliance_mm + softest_mm), rough);
 }
 
 }  // namespace diastole::rig

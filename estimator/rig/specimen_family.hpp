@@ -15,6 +15,7 @@
 #include <mutex>
 #include <optional>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "estimator/io/study.hpp"
@@ -42,18 +43,22 @@ class SpecimenFamily {
 
   /// Of the study's own specimen and law, its parameters at their starts divided by the modulus.
   [[nodiscard]] const SpecimenCurve& plain() const;
+  /// Begins to compute plain() and the rough neighbours beside other work, so that they are at hand when asked for. One
+  /// thread: the BLAS under the solver bears no more. Stopped by the destructor, after the curve at work.
+  void compute_ahead();
   /// The first parameter of the law in kPa: all of the law's moduli are scaled with it.
   [[nodiscard]] double modulus_start_kPa() const { return modulus_kPa_; }
   [[nodiscard]] const StudyParameter& modulus() const;
 
   /// Neighbours exist for a cylinder of neo-Hookean material.
   [[nodiscard]] bool has_neighbours() const;
+  // `rough`: how the neighbour differs is taken from the coarse mesh alone, which tells it within some percent at once.
   /// The inner radius is larger by this part, within +-0.1.
-  [[nodiscard]] SpecimenCurve with_inner_radius(double fraction) const;
+  [[nodiscard]] SpecimenCurve with_inner_radius(double fraction, bool rough = false) const;
   /// W = C1/beta (exp(beta (I1 - 3)) - 1), beta in [0, 3].
-  [[nodiscard]] SpecimenCurve stiffened(double beta) const;
+  [[nodiscard]] SpecimenCurve stiffened(double beta, bool rough = false) const;
   /// The plates hold the ends along the axis; across it they yield by this compliance times C1, mm.
-  [[nodiscard]] SpecimenCurve slipping(double compliance_mm) const;
+  [[nodiscard]] SpecimenCurve slipping(double compliance_mm, bool rough = false) const;
 
  private:
   /// Specimens that differ by one value.
@@ -63,23 +68,33 @@ class SpecimenFamily {
     double refined_at = 0.0;  ///< a node for which the fine mesh is asked too; 0 if the coarse one is enough
     std::function<void(double, Study&)> change;
   };
+  static Neighbours radii();
+  static Neighbours stiffenings();
+  static Neighbours slips();
   /// At every `stride`-th volume; kept by its name.
   [[nodiscard]] const SpecimenCurve& computed(const std::string& name, const Study& study,
                                               size_t stride) const;
+  /// A neighbour at one of its nodes.
+  [[nodiscard]] const SpecimenCurve& solved(const Neighbours& of, double node,
+                                            const std::array<int, 3>& mesh) const;
   /// The study's cylinder on the coarse mesh.
   [[nodiscard]] Study coarse_study() const;
+  /// What plain() returns.
+  [[nodiscard]] SpecimenCurve combined() const;
   /// plain() and what the neighbour differs from it on the coarse mesh, at `value` by the polynomial through the nodes;
   /// what the fine mesh changes at one node is taken as a constant part of the difference.
-  [[nodiscard]] SpecimenCurve between(const Neighbours& of, double value) const;
+  [[nodiscard]] SpecimenCurve between(const Neighbours& of, double value, bool rough) const;
   [[nodiscard]] SpecimenCurve compute(const Study& study, size_t stride) const;
 
   Study study_;
   SpecimenResolution resolution_;
   double modulus_kPa_ = 1.0;
   size_t modulus_index_ = 0;
-  mutable std::mutex mutex_;
+  mutable std::mutex solving_;  ///< held while finite elements are solved
+  mutable std::mutex keeping_;  ///< held while curves_ or plain_ are looked at or added to
   mutable std::map<std::string, SpecimenCurve> curves_;  ///< that were solved for
   mutable std::optional<SpecimenCurve> plain_;
+  std::jthread ahead_;
 };
 
 }  // namespace diastole::rig

@@ -22,6 +22,8 @@ constexpr size_t most_moments = 12;
 constexpr double level_reach_s = 0.3;
 constexpr double blow_reach_s = 2.0;
 
+const FitRequest of_difference{.look = Look::fine, .runs = {}, .difference = true};
+
 struct Candidate {
   size_t run = 0;
   size_t sample = 0;
@@ -96,7 +98,12 @@ void MomentSearch::set_lasting_change() {
   }
   std::vector<double> values = fit_.values;
   values[known_] = 0.3 * typical_[0];
-  lasting_ = (problem_.residuals(there, values) - fit_.residuals) / values[known_];
+  std::vector<Ingredient> known = fit_.ingredients;
+  known.pop_back();
+  const std::vector<double> before(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(known_));
+  lasting_ =
+      (problem_.residuals(there, values, of_difference) - problem_.residuals(known, before, of_difference)) /
+      values[known_];
 }
 
 Candidate MomentSearch::scan() const {
@@ -167,7 +174,8 @@ double MomentSearch::shifted_s(const Candidate& at, double& amplitude) const {
   more.back().occasions.push_back(occasion(at.run, run.sample_s[at.sample]));
   std::vector<double> values = fit_.values;
   if (occasions().empty()) values[known_] = at.amplitude;
-  const VectorXd change = problem_.residuals(more, values) - fit_.residuals;
+  const VectorXd change = problem_.residuals(more, values, of_difference) -
+                          problem_.residuals(fit_.ingredients, fit_.values, of_difference);
   // What is left when the other unknowns have given way to the change where it was found.
   const VectorXd move = step_along(fit_.jacobian, change, fit_.residuals);
   const VectorXd left = fit_.residuals + fit_.jacobian * move.head(fit_.jacobian.cols());
@@ -207,7 +215,7 @@ MatrixXd MomentSearch::time_columns() const {
   const std::vector<Occasion>& moments = fit_.ingredients.back().occasions;
   MatrixXd columns(fit_.residuals.size(), static_cast<Index>(moments.size()));
   for (size_t m = 0; m < moments.size(); ++m) {
-    FitRequest one;
+    FitRequest one = of_difference;
     one.runs.assign(session_.runs.size(), false);
     one.runs[run_of(moments[m])] = true;
     std::vector<Ingredient> moved = fit_.ingredients;

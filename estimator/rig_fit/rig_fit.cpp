@@ -106,8 +106,8 @@ std::vector<Unknown> RigProblem::unknowns(const std::vector<Ingredient>& ingredi
   return list;
 }
 
-RigModel RigProblem::model(const std::vector<Ingredient>& ingredients,
-                           const std::vector<double>& values) const {
+RigModel RigProblem::model(const std::vector<Ingredient>& ingredients, const std::vector<double>& values,
+                           bool rough) const {
   RigModel model = session_.base;
   model.curve = family_.plain();
   model.modulus_kPa = values[0];
@@ -116,7 +116,7 @@ RigModel RigProblem::model(const std::vector<Ingredient>& ingredients,
   size_t at = nuisances;
   for (const Ingredient& ingredient : ingredients) {
     const size_t count = ingredient.effect->parameters().size();
-    ingredient.effect->apply({values.data() + at, count}, {family_, ingredient.occasions}, model);
+    ingredient.effect->apply({values.data() + at, count}, {family_, ingredient.occasions, rough}, model);
     at += count;
   }
   return model;
@@ -187,11 +187,12 @@ void RigProblem::compare(const RigModel& model, const PlantTrace& plant, size_t 
 
 Eigen::VectorXd RigProblem::residuals(const std::vector<Ingredient>& ingredients,
                                       const std::vector<double>& values, const FitRequest& request) const {
-  const RigModel made = model(ingredients, values);
+  const RigModel made = model(ingredients, values, request.difference);
   const std::vector<size_t> runs = chosen_runs(request);
   Eigen::VectorXd out = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(rows_));
   parallel_for(runs.size(), options_.threads, [&](size_t i) {
-    compare(made, plant(made, runs[i], request.look), runs[i], request.look, out);
+    const Look steps = request.difference ? Look::coarse : request.look;
+    compare(made, plant(made, runs[i], steps), runs[i], request.look, out);
   });
   return out;
 }

@@ -64,6 +64,7 @@ enum class Look { fine, coarse };
 struct FitRequest {
   Look look = Look::fine;
   std::vector<bool> runs = {};  ///< which of the session's runs; empty: all
+  bool difference = false;  ///< only differences of what is returned count: longer steps, rough neighbours
 };
 
 /// Effects and all unknowns' values of a fit that was made before.
@@ -85,6 +86,7 @@ class RigProblem {
   /// `session` and `family` must outlive it.
   RigProblem(const Session& session, const SpecimenFamily& family, const RigFitOptions& options = {});
 
+  [[nodiscard]] size_t threads() const { return options_.threads; }
   [[nodiscard]] const NoiseModel& noise() const { return noise_; }
   [[nodiscard]] const std::vector<ResidualBlock>& blocks() const { return blocks_; }
   /// The model without effects, fitted; made once.
@@ -119,8 +121,8 @@ class RigProblem {
   [[nodiscard]] std::vector<Prediction> predictions(const std::vector<Ingredient>& ingredients,
                                                     const std::vector<double>& values) const;
   [[nodiscard]] std::vector<Unknown> unknowns(const std::vector<Ingredient>& ingredients) const;
-  [[nodiscard]] RigModel model(const std::vector<Ingredient>& ingredients,
-                               const std::vector<double>& values) const;
+  [[nodiscard]] RigModel model(const std::vector<Ingredient>& ingredients, const std::vector<double>& values,
+                               bool rough = false) const;
 
  private:
   /// With the steps of a look.

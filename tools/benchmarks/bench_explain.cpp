@@ -73,7 +73,7 @@ void report(const std::string& name, const nlohmann::json& label, const explain:
 void explain_sessions(const bench::Recordings& recordings, const fs::path& kept) {
   bench::visit_cases(recordings, [&](const bench::RecordedCase& recorded) {
     explain::Explanation found =
-        explain::explain_rig(read_study(recorded.study), {.threads = 2, .propose = false, .progress = {}});
+        explain::explain_rig(read_study(recorded.study), {.threads = 2, .progress = {}});
     report(recorded.name, recorded.label, found);
     found.traces.clear();
     std::ofstream(kept / (recorded.name + ".json")) << explain::to_json(found);

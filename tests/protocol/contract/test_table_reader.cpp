@@ -2,6 +2,8 @@
 
 #include <gmock/gmock.h>
 
+#include <fstream>
+
 #include "protocol/contract/input_error.hpp"
 
 namespace diastole {
@@ -104,6 +106,14 @@ TEST(TableReader, AnUnreadableFileIsAnInputError) {
   EXPECT_THAT(message_of([] { (void)TableReader::from_file("no/such.toml"); }), HasSubstr("no/such.toml"));
   EXPECT_THAT(message_of([] { (void)reader("a = \n"); }), AllOf(HasSubstr("line 1"), HasSubstr("not TOML")));
   EXPECT_THAT(message_of([] { (void)TableReader::from_file("/"); }), HasSubstr("cannot be opened"));
+}
+
+TEST(TableReader, ARunFileInPlaceOfAStudyIsTold) {
+  const std::filesystem::path file = std::filesystem::temp_directory_path() / "table_reader.run.h5";
+  std::ofstream(file, std::ios::binary) << "\x89HDF\r\n\x1a\n";
+  EXPECT_THAT(message_of([&] { (void)TableReader::from_file(file); }),
+              AllOf(HasSubstr("HDF5"), HasSubstr("NAME.study.toml")));
+  std::filesystem::remove(file);
 }
 
 TEST(TableReader, AForeignFormatOrNewerVersionIsRefused) {
