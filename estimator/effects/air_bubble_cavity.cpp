@@ -30,7 +30,8 @@ class AirBubbleCavity final : public Effect {
   }
   [[nodiscard]] std::span<const EffectParameter> parameters() const override {
     static constexpr std::array<EffectParameter, 1> list{
-        {{"volume_mL", "mL", "of the gas at atmospheric pressure", 0.0, 0.0, 20.0, 10.0}}};
+        {{"volume_mL", "mL", "of the gas at atmospheric pressure; any image shows more", 0.0, 0.0, 20.0,
+          10.0}}};
     return list;
   }
   void apply(std::span<const double> values, const Context&, rig::RigModel& model) const override {

@@ -139,7 +139,7 @@ Eigen::MatrixXd known_before(const rig::RigProblem& problem, const rig::RigFit& 
 }
 
 Equipment equipment_of(const rig::Session& session) {
-  Equipment equipment{true, false, false};
+  Equipment equipment{true};
   for (const rig::SessionRun& run : session.runs) {
     equipment[1] = equipment[1] || run.pressure_kPa.contains(Channel::pump);
     equipment[2] = equipment[2] || !run.volumes.empty();
@@ -173,6 +173,41 @@ SegmentOutlook look_ahead(const rig::Session& session, const rig::RigProblem& pr
     }
   }
   return outlook;
+}
+
+Eigen::MatrixXd gram_beside(const rig::RigFit& truth, const rig::RigFit& adapting, const Equipment& equipment,
+                            const SpecimenKnowledge& knowledge) {
+  const auto count = static_cast<Eigen::Index>(adapting.values.size());
+  Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(count + zeros + 1, count + zeros + 1);
+  const auto coordinates = rig::search_coordinates(adapting.ingredients, adapting.unknowns);
+  const auto add = [&](std::string_view unknown, double difference, double error) {
+    Eigen::VectorXd row = Eigen::VectorXd::Zero(sum.cols());
+    row[0] = difference / error;
+    for (Eigen::Index i = 0; i < count; ++i) {
+      const auto k = static_cast<size_t>(i);
+      if (adapting.unknowns[k].name != unknown) continue;
+      const auto scale = coordinates[k].scale;
+      row[1 + i] = rig::natural_slope(scale, rig::to_search(scale, adapting.values[k])) / error;
+    }
+    sum += row * row.transpose();
+  };
+  if (equipment[static_cast<size_t>(Measured::radius)] && knowledge.inner_radius_mm > 0.0) {
+    const auto larger = [](const rig::RigFit& fit) {
+      const double part = fit.value("radius-error.fraction");
+      return std::isfinite(part) ? part : 0.0;
+    };
+    add("radius-error.fraction", larger(truth) - larger(adapting),
+        knowledge.radius_error_mm / knowledge.inner_radius_mm);
+  }
+  const auto is_lasting = [](const rig::RigFit& fit) {
+    return std::ranges::none_of(fit.ingredients, [](const rig::Ingredient& ingredient) {
+      const std::string_view id = ingredient.effect->text().id;
+      return id == "viscoelasticity" || id == "stress-softening" || id == "temperature-drift";
+    });
+  };
+  if (equipment[static_cast<size_t>(Measured::stiffness)] && is_lasting(truth) && is_lasting(adapting))
+    add("modulus_kPa", truth.values[0] - adapting.values[0], knowledge.relative_C1_error * truth.values[0]);
+  return sum;
 }
 
 double separation(const Eigen::MatrixXd& gram, const Eigen::MatrixXd& known) {

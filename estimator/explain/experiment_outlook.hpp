@@ -20,10 +20,11 @@
 
 namespace diastole::explain {
 
-/// What may be measured: cavity pressure, pump-end pressure, gated cavity volumes.
-enum class Measured : size_t { cavity, pump, volume };
-inline constexpr size_t measured_count = 3;
-using Equipment = std::array<bool, measured_count>;
+/// What may be measured in a segment: cavity pressure, pump-end pressure, gated cavity volumes; and once beside them:
+/// the inner radius in an image of the specimen at rest, C1 by a rotational shear test.
+enum class Measured : size_t { cavity, pump, volume, radius, stiffness };
+inline constexpr size_t measured_count = 3;  ///< in a segment
+using Equipment = std::array<bool, 5>;
 
 /// What one segment shows of all models. Indices: [true model][adapting model][channel].
 struct SegmentOutlook {
@@ -41,6 +42,17 @@ Equipment equipment_of(const rig::Session& session);
 
 SegmentOutlook look_ahead(const rig::Session& session, const rig::RigProblem& problem,
                           const std::vector<const rig::RigFit*>& models, const runfile::Segment& segment);
+
+/// How exact the measurements beside are.
+struct SpecimenKnowledge {
+  double inner_radius_mm = 0.0;      ///< 0: the specimen has none
+  double radius_error_mm = 0.2;      ///< a quarter of the paper's pixel of 0.8 mm: an edge seen all around
+  double relative_C1_error = 0.007;  ///< of a rotational shear test
+};
+
+/// What they add to a sum of Gram matrices. C1 counts only if neither model's stiffness depends on time.
+Eigen::MatrixXd gram_beside(const rig::RigFit& truth, const rig::RigFit& adapting, const Equipment& equipment,
+                            const SpecimenKnowledge& knowledge);
 
 /// d of the header, from a sum of Gram matrices.
 double separation(const Eigen::MatrixXd& gram, const Eigen::MatrixXd& known);

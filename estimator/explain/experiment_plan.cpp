@@ -104,6 +104,14 @@ std::string to_toml(const PlannedExperiment& experiment, const std::string& rema
   if (experiment.volumes) {
     text += "# Image the cavity with gated phase contrast meanwhile: 256 lines, one every second cycle.\n";
   }
+  if (experiment.radius) {
+    text +=
+        "# Image the specimen at rest and give its inner radius to the study: specimen.inner_radius_mm.\n";
+  }
+  if (experiment.stiffness) {
+    text +=
+        "# Measure C1 by a rotational shear test and bound it in the study: law.parameters.C1_kPa.bounds.\n";
+  }
   text += fmt::format(
       "format = \"diastole-experiment\"\nversion = 1\nsample_rate_Hz = 300\ngate_every = {}\nrest_s = {}\n",
       experiment.volumes ? 2 : 1, "3.0");

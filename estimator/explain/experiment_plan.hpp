@@ -24,6 +24,8 @@ struct PlannedExperiment {
   std::vector<runfile::Segment> segments;  ///< start_s is not used
   bool new_pump_sensor = false;            ///< asks for a transducer at the pump end that the session lacked
   bool volumes = false;                    ///< phase contrast beside it: every second cycle is imaged
+  bool radius = false;                     ///< measured in an image of the specimen at rest
+  bool stiffness = false;                  ///< C1 measured by a shear test
 };
 
 /// Large and small, fast and slow strokes of the named waveforms, preloads and holds, as many as the limits allow; some

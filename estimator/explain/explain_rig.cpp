@@ -19,6 +19,7 @@ namespace {
 
 constexpr double discovery_rate = 0.01;
 constexpr double dominated = 0.1;  // of chi-square left by effects beside which a first search seeks no more
+constexpr size_t most_hints = 2;   // that a next experiment is designed for, beside nothing at all
 constexpr double other_beats = 0.5;  // of chi-square left by effects that change what a beat looks like, too
 
 std::string summary_of(const Explanation& found) {
@@ -186,14 +187,27 @@ std::vector<const rig::RigFit*> fits_without(const SearchResult& search, const r
   return fits;
 }
 
-std::optional<NextExperiment> next_experiment(const rig::Session& session, const Work& work,
-                                              const Explanation& found, size_t threads) {
-  const ExperimentDesign design{session, work.problem, ExperimentLimits::of(session), threads};
+std::optional<NextExperiment> next_experiment(const Study& study, const rig::Session& session,
+                                              const Work& work, const Explanation& found, size_t threads) {
+  SpecimenKnowledge knowledge;
+  if (const auto* annulus = std::get_if<AnnulusSpecimen>(&study.specimen))
+    knowledge.inner_radius_mm = annulus->inner_radius_mm;
+  const ExperimentDesign design{session, work.problem, ExperimentLimits::of(session), threads, knowledge};
   if (found.verdict == Verdict::unexplained && !found.where.empty())
     return exposing_experiment(design, found.where.front());
   if (found.verdict == Verdict::named) return sharpening_experiment(design, work.best().fit);
   if (found.verdict != Verdict::ambiguous) return {};
   std::vector<const rig::RigFit*> competing{&work.best().fit};
+  std::vector<rig::RigFit> hinted;  // too weak to be fitted in the search
+  if (found.effects.empty()) {
+    for (const auto& ids : found.ambiguous_with)
+      if (const Effect* effect = ids.size() == 1 ? find_effect(ids.front()) : nullptr;
+          effect != nullptr && effect->occasions() == Occasions::none && hinted.size() < most_hints)
+        hinted.push_back(work.problem.fit({{effect, {}}}));
+    for (const rig::RigFit& fit : hinted)
+      competing.push_back(&fit);
+    return separating_experiment(design, competing);
+  }
   for (const FittedSet& set : work.found.sets)
     if (std::find(found.ambiguous_with.begin(), found.ambiguous_with.end(), set.ids()) !=
         found.ambiguous_with.end())
@@ -255,7 +269,7 @@ Explanation explain_rig(const Study& study, const ExplainOptions& options) {
   out.steps = steps_of(work.found);
   out.traces = traces(session, problem, base, best);
   tell("designing the next experiment");
-  if (options.propose) out.next_experiment = next_experiment(session, work, out, options.threads);
+  if (options.propose) out.next_experiment = next_experiment(study, session, work, out, options.threads);
   out.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
   out.summary = summary_of(out);
   return out;

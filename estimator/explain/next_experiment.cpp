@@ -71,11 +71,17 @@ Plan plan_of(const rig::Session& session, const std::vector<runfile::Segment>& s
       plan.experiment.segments.push_back(segments[i]);
     plan.experiment.new_pump_sensor = equipment[1] && !present[1];
     plan.experiment.volumes = equipment[2];
+    plan.experiment.radius = equipment[3];
+    plan.experiment.stiffness = equipment[4];
     return plan;
   };
   // Volumes cost ten minutes of imaging a segment: they are an addition even where the session has some.
-  Plan best = plan_with({true, present[1], false});
-  for (const Equipment& more : {Equipment{true, true, false}, Equipment{true, present[1], true}}) {
+  const bool pump = present[1];
+  Plan best = plan_with({true, pump});
+  for (const Equipment& more :
+       {Equipment{true, true}, Equipment{true, pump, true}, Equipment{true, pump, false, true},
+        Equipment{true, pump, false, false, true}, Equipment{true, pump, true, true},
+        Equipment{true, pump, false, true, true}, Equipment{true, pump, true, true, true}}) {
     if (best.worth >= enough) break;
     Plan other = plan_with(more);
     if (other.worth > bother * best.worth) best = std::move(other);
@@ -90,6 +96,8 @@ std::string plan_words(const PlannedExperiment& experiment) {
   std::string words = fmt::format("{}", fmt::join(parts, ", then "));
   if (experiment.new_pump_sensor) words += ", with a pressure transducer added at the pump end of the hose";
   if (experiment.volumes) words += ", with gated phase-contrast volumes of the cavity";
+  if (experiment.radius) words += ", with the inner radius measured in an image at rest";
+  if (experiment.stiffness) words += ", with C1 measured by a shear test";
   if (!words.empty() && words[0] >= 'a' && words[0] <= 'z')
     words[0] = static_cast<char>(words[0] - 'a' + 'A');
   return words;
@@ -163,7 +171,11 @@ std::optional<NextExperiment> separating_experiment(const ExperimentDesign& desi
     double least = std::numeric_limits<double>::infinity();
     for (size_t a = 0; a < models.size(); ++a) {
       for (size_t b = 0; b < models.size(); ++b)
-        if (a != b) least = std::min(least, separation(gram_of(outlooks, chosen, a, b, equipment), known[b]));
+        if (a != b) {
+          const Eigen::MatrixXd gram = gram_of(outlooks, chosen, a, b, equipment) +
+                                       gram_beside(*models[a], *models[b], equipment, design.knowledge);
+          least = std::min(least, separation(gram, known[b]));
+        }
     }
     return least / scatter;
   };

@@ -1,7 +1,8 @@
 #pragma once
 // Which experiment to run next, from a lattice of what the rig can do (experiment_plan.hpp) and what each would tell
 // (experiment_outlook.hpp): up to three segments in one file, with the equipment that the session had; with a
-// transducer at the pump end or gated volumes in addition only where nothing else separates.
+// transducer at the pump end, gated volumes, an image at rest or a shear test in addition only where nothing else
+// separates.
 
 #include <optional>
 #include <vector>
@@ -16,6 +17,7 @@ struct ExperimentDesign {
   const rig::RigProblem& problem;
   ExperimentLimits limits;
   size_t threads = 2;
+  SpecimenKnowledge knowledge = {};
 };
 
 /// For an ambiguous verdict: what tells the fitted models apart best, judged by its least distinguishable pair, whichever of

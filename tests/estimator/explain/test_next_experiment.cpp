@@ -43,7 +43,7 @@ TEST(ExperimentPlan, StaysWithinTheLimits) {
 }
 
 TEST(ExperimentPlan, WritesFilesThatDiastoleRunReads) {
-  PlannedExperiment plan{possible_segments({}, {}), true, true};
+  PlannedExperiment plan{possible_segments({}, {}), true, true, true, true};
   const Experiment read = parse_experiment(to_toml(plan, "Separates a from b"), "next.experiment.toml");
   ASSERT_EQ(read.segments.size(), plan.segments.size());
   EXPECT_EQ(read.gate_every, 2);
@@ -120,11 +120,33 @@ TEST(NextExperiment, SeparatesWhatLooksAlikeAsPredicted) {
   // The prediction for one segment against what happens when it is run.
   const runfile::Segment segment{0.0, "parabolic", 20.0, 1.2, 0.0, 10};
   const SegmentOutlook outlook = look_ahead(session, problem, {&bubble, &hose}, segment);
-  const double predicted = separation(outlook.of(0, 1, {true, false, false}), known_before(problem, hose));
+  const double predicted = separation(outlook.of(0, 1, {true}), known_before(problem, hose));
   const double found = found_sigma(family, session, segment, bubble, hose);
   EXPECT_GT(found, 3.0);
   EXPECT_THAT(predicted / found, testing::AllOf(testing::Gt(0.65), testing::Lt(1.65)))
       << predicted << " predicted, " << found << " found";
+}
+
+TEST(NextExperiment, AnImageAtRestTellsARadiusFromSlippingEnds) {
+  const rig::SpecimenFamily family = rig::gel_family();
+  const rig::Session session = slow_session(family, "radius-error", -0.06);
+  const rig::RigProblem problem(session, family);
+  const rig::RigFit radius = problem.fit({{find_effect("radius-error")}});
+  const rig::RigFit slip = problem.fit({{find_effect("end-bond-slip")}});
+  const Equipment image{true, false, false, true};
+  const SpecimenKnowledge knowledge{.inner_radius_mm = 22.5};
+  const auto apart = [&](const rig::RigFit& truth, const rig::RigFit& adapting) {
+    return separation(gram_beside(truth, adapting, image, knowledge), known_before(problem, adapting));
+  };
+  const double seen = 22.5 * std::abs(radius.value("radius-error.fraction")) / knowledge.radius_error_mm;
+  EXPECT_GT(seen, 5.0);
+  EXPECT_NEAR(apart(radius, slip), seen, 1e-6);  // slipping ends leave the radius as it is
+  EXPECT_LT(apart(slip, radius), seen);          // a radius that the session only suspects gives way
+  EXPECT_EQ(gram_beside(radius, slip, {true}, knowledge).norm(), 0.0);
+
+  const auto next = separating_experiment({session, problem, {}, 2, knowledge}, {&radius, &slip});
+  ASSERT_TRUE(next.has_value());
+  EXPECT_NO_THROW(parse_experiment(next->toml, "next.experiment.toml"));
 }
 
 TEST(NextExperiment, NarrowsWhatIsNamed) {
