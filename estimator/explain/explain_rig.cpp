@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <map>
 #include <optional>
 
 #include "estimator/explain/findings.hpp"
@@ -187,6 +188,20 @@ std::vector<const rig::RigFit*> fits_without(const SearchResult& search, const r
   return fits;
 }
 
+/// Where sets of one effect look alike, the port that most of them have; none if they have several effects.
+std::optional<std::string> common_port(const Explanation& found) {
+  std::map<std::string, size_t> votes;
+  std::vector<std::vector<std::string>> sets = found.ambiguous_with;
+  sets.emplace_back();
+  for (const FoundEffect& effect : found.effects)
+    sets.back().push_back(effect.id);
+  for (const std::vector<std::string>& ids : sets) {
+    if (ids.size() != 1) return {};
+    ++votes[std::string(name_of(find_effect(ids.front())->text().port))];
+  }
+  return std::ranges::max_element(votes, {}, [](const auto& vote) { return vote.second; })->first;
+}
+
 std::optional<NextExperiment> next_experiment(const Study& study, const rig::Session& session,
                                               const Work& work, const Explanation& found, size_t threads) {
   SpecimenKnowledge knowledge;
@@ -263,6 +278,9 @@ Explanation explain_rig(const Study& study, const ExplainOptions& options) {
     out.where =
         misfits(session, problem, significant(before, discovery_rate), fits_without(work.found, best), best);
   }
+  if (const auto port = common_port(out); port && out.verdict == Verdict::ambiguous)
+    for (Misfit& place : out.where)
+      place.port = *port;
   out.evidence = evidence(work.found, judgement, {});
   if (!out.effects.empty())
     out.shifts = parameter_shifts(base, parameter_errors(base, weights, 0.0), best, errors);

@@ -110,6 +110,12 @@ class Search {
   std::vector<size_t> with_rivals(size_t from, const std::vector<size_t>& grown);
   std::vector<size_t> with_partners(size_t from, const std::vector<size_t>& grown);
   void begin_with(const std::vector<rig::Ingredient>& start);
+  /// Whether a set may get a third effect: not if two left most of the misfit.
+  [[nodiscard]] bool may_grow(size_t set) const {
+    constexpr double most = 0.5;
+    return result_.sets[set].fit.ingredients.size() < 2 ||
+           result_.sets[set].chi_square < most * result_.sets.front().chi_square;
+  }
   void seek();
   void compare_alike(size_t set);
   /// Whether an effect without moments is not in the set yet and fits the specimen.
@@ -219,7 +225,7 @@ std::vector<size_t> Search::with_partners(size_t from, const std::vector<size_t>
   std::vector<size_t> pairs;
   for (const size_t set : grown) {
     const rig::RigFit one = result_.sets[set].fit;
-    if (reduced(set) < 1.0 + worth_a_partner ||
+    if (reduced(set) < 1.0 + worth_a_partner || !may_grow(set) ||
         one.ingredients.size() >= options_.start.size() + options_.most_effects)
       continue;
     std::vector<std::vector<rig::Ingredient>> together;
@@ -315,6 +321,7 @@ void Search::seek() {
   for (size_t effects = 0; effects < options_.most_effects; ++effects) {
     std::vector<size_t> grown;
     for (const size_t from : beam) {
+      if (!may_grow(from)) continue;
       for (const size_t set : grow(from))
         if (penalised(set) < penalised(from)) grown.push_back(set);
     }
