@@ -188,18 +188,22 @@ std::vector<const rig::RigFit*> fits_without(const SearchResult& search, const r
   return fits;
 }
 
-/// Where sets of one effect look alike, the port that most of them have; none if they have several effects.
+/// Where sets of one effect look alike, the port that most of them have, or the best one's; none if they have several
+/// effects.
 std::optional<std::string> common_port(const Explanation& found) {
   std::map<std::string, size_t> votes;
-  std::vector<std::vector<std::string>> sets = found.ambiguous_with;
-  sets.emplace_back();
-  for (const FoundEffect& effect : found.effects)
-    sets.back().push_back(effect.id);
-  for (const std::vector<std::string>& ids : sets) {
+  const auto vote = [&](const std::string& id, size_t weight) {
+    votes[std::string(name_of(find_effect(id)->text().port))] += weight;
+  };
+  if (found.effects.size() > 1) return {};
+  for (const FoundEffect& best : found.effects)
+    vote(best.id, 3);
+  for (const std::vector<std::string>& ids : found.ambiguous_with) {
     if (ids.size() != 1) return {};
-    ++votes[std::string(name_of(find_effect(ids.front())->text().port))];
+    vote(ids.front(), 2);
   }
-  return std::ranges::max_element(votes, {}, [](const auto& vote) { return vote.second; })->first;
+  if (votes.empty()) return {};
+  return std::ranges::max_element(votes, {}, [](const auto& port) { return port.second; })->first;
 }
 
 std::optional<NextExperiment> next_experiment(const Study& study, const rig::Session& session,
