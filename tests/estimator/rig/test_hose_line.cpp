@@ -137,5 +137,35 @@ TEST(HoseLine, SwingsAgainstAGasAsInertanceAndCompliance) {
   EXPECT_NEAR(crossings / 10.0, natural_Hz, 0.1 + 0.01 * natural_Hz);
 }
 
+/// How large the swing against a gas still is in the twelfth second, mL; the piston was put 0.2 mL further in 0.1 s.
+double still_swinging_mL(const Hose& hose, size_t components) {
+  constexpr double stiffness_kPa_per_mL = 33.0;
+  constexpr double put_mL = 0.2;
+  constexpr double rate_Hz = 1200.0;
+  HoseLine line(hose,
+                {.step_s = 1.0 / rate_Hz, .components = components, .pump_stiffness = stiffness_kPa_per_mL});
+  line.rest_at(0.0);
+  double largest = 0.0;
+  for (int k = 0; k < 12 * static_cast<int>(rate_Hz); ++k) {
+    const double part = std::min(static_cast<double>(k) / (0.1 * rate_Hz), 1.0);
+    const EndLoads loads{.pump_kPa = stiffness_kPa_per_mL * put_mL * 0.5 * (1.0 - std::cos(pi * part))};
+    line.settle(loads);
+    line.begin_step(loads, 0.0);
+    line.end_step(loads);
+    if (k > 11 * static_cast<int>(rate_Hz)) largest = std::max(largest, std::abs(line.yielded_mL() - put_mL));
+  }
+  return largest;
+}
+
+TEST(HoseLine, FastWavesDoNotDampTheSlowSwing) {
+  Hose hose;
+  const double alone = still_swinging_mL(hose, 1);
+  EXPECT_GT(alone, 0.01);
+  for (const size_t components : {2U, 4U, 8U})
+    EXPECT_NEAR(still_swinging_mL(hose, components), alone, 0.2 * alone) << components;  // after 47 swings
+  hose.wall_loss_s = 0.0;  // then the unsteady friction feeds them, and they it
+  EXPECT_LT(still_swinging_mL(hose, 8), 0.5 * alone);
+}
+
 }  // namespace
 }  // namespace diastole::rig
