@@ -238,6 +238,7 @@ std::string file_of(double taken_mL, unsigned set, const std::string& remark) {
       (std::isfinite(taken_mL) ? taken_mL : usual_mL) * (imaging.higher_frames ? higher : 1.0);
   PlannedExperiment plan;
   plan.volumes = imaging.volumes;
+  plan.stiffness = imaging.shear_test;
   const int cycles = cycles_a_slice * slices * static_cast<int>(imaging.tags);
   plan.segments = {{0.0, "parabolic", 0.5 * std::round(2.0 * stroke_mL), period_s, 0.0, cycles}};
   return to_toml(plan, remark);
