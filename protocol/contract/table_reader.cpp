@@ -97,9 +97,10 @@ TableReader TableReader::from_file(const std::filesystem::path& path) {
   std::stringstream text;
   text << stream.rdbuf();
   if (text.view().starts_with("\x89HDF")) {
-    throw InputError({path.string(), "", "is an HDF5 file such as a run file, but a TOML file is expected here",
-                      "Give the TOML file that belongs here; a study (NAME.study.toml) names its run files under "
-                      "[data] runs."});
+    throw InputError(
+        {path.string(), "", "is an HDF5 file such as a run file, but a TOML file is expected here",
+         "Give the TOML file that belongs here; a study (NAME.study.toml) names its run files under "
+         "[data] runs."});
   }
   return from_text(text.str(), path.string());
 }
