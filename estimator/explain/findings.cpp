@@ -43,7 +43,7 @@ Port port_of(std::string_view channel) { return channel == "pump_kPa" ? Port::dr
 std::vector<double> parameter_errors(const rig::RigFit& fit, const Eigen::VectorXd& weights,
                                      double explained) {
   constexpr double looks_alike =
-      1.5e-3;  // of a change: the model's error of it that its parameters can take up
+      2e-3;  // of a change: the model's error of it that its parameters can take up
   const double with_models = std::sqrt(1.0 + looks_alike * looks_alike * std::max(explained, 0.0));
   Eigen::MatrixXd normal = fit.jacobian.transpose() * weights.asDiagonal() * fit.jacobian;
   for (Eigen::Index i = 0; i < normal.rows(); ++i) {

@@ -13,8 +13,6 @@ namespace {
 constexpr double dependent = 1e-6;     // of a column's size: what is left of it is rounding
 constexpr size_t further_columns = 2;  // by an effect's other parameters, at most
 
-const rig::FitRequest of_difference{.look = rig::Look::fine, .runs = {}, .difference = true};
-
 /// Parts of the typical size at which an effect is tried: one where the answer is nearly proportional to it, more where
 /// resonances move.
 std::vector<double> trial_sizes(const Effect& effect) {
@@ -129,7 +127,7 @@ class Screening {
         weights_(weights),
         root_(weights.cwiseSqrt()),
         residuals_(root_.asDiagonal() * current.residuals),
-        without_(problem.residuals(current.ingredients, current.values, of_difference)),
+        without_(problem.residuals(current.ingredients, current.values, rig::of_difference)),
         known_(basis_of(root_.asDiagonal() * current.jacobian)) {}
 
   [[nodiscard]] std::optional<Lead> lead_of(const Effect& effect) const {
@@ -142,7 +140,7 @@ class Screening {
     ingredients.push_back({&effect, {}});
     std::vector<double> all = current_.values;
     all.insert(all.end(), values.begin(), values.end());
-    return root_.asDiagonal() * (problem_.residuals(ingredients, all, of_difference) - without_);
+    return root_.asDiagonal() * (problem_.residuals(ingredients, all, rig::of_difference) - without_);
   }
   [[nodiscard]] Eigen::VectorXd beyond_known(const Eigen::VectorXd& change) const {
     return change - known_ * (known_.transpose() * change);

@@ -22,8 +22,6 @@ constexpr size_t most_moments = 12;
 constexpr double level_reach_s = 0.3;
 constexpr double blow_reach_s = 2.0;
 
-const FitRequest of_difference{.look = Look::fine, .runs = {}, .difference = true};
-
 struct Candidate {
   size_t run = 0;
   size_t sample = 0;

@@ -67,6 +67,9 @@ struct FitRequest {
   bool difference = false;  ///< only differences of what is returned count: longer steps, rough neighbours
 };
 
+/// All runs, for differences.
+inline const FitRequest of_difference{.look = Look::fine, .runs = {}, .difference = true};
+
 /// Effects and all unknowns' values of a fit that was made before.
 struct KnownModel {
   std::vector<Ingredient> ingredients;
