@@ -136,10 +136,12 @@ void add_shifts(Page& page, const Explanation& e) {
   if (e.shifts.empty()) return;
   std::vector<std::vector<std::string>> rows;
   for (const ParameterShift& shift : e.shifts) {
-    const double percent = 100 * (shift.before - shift.after) / shift.after;
+    const double change = shift.before - shift.after;
+    const bool is_zero = shift.name.ends_with("offset_Pa");  // of which nothing is a part
+    const double off = is_zero ? change : 100 * change / shift.after;
     rows.push_back({shift.name, with_error(shift.before, shift.before_error),
                     with_error(shift.after, shift.after_error),
-                    fmt::format("{}{} %", percent > 0 ? "+" : "", number(percent, 2))});
+                    fmt::format("{}{} {}", off > 0 ? "+" : "", number(off, 2), is_zero ? "Pa" : "%")});
   }
   page.table({"parameter", "without", "with", "bias without"}, rows,
              "How far the estimates were off while the model lacked what was added.");
