@@ -1,7 +1,6 @@
 // Equilibria: against closed forms, conservation laws, symmetry, and finite differences of the solutions
 // themselves.
 
-#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
