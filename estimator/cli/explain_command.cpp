@@ -8,9 +8,9 @@
 
 #include "estimator/cli/commands.hpp"
 #include "estimator/explain/explain_study.hpp"
-#include "estimator/explain/explained_study.hpp"
-#include "estimator/explain/explanation_json.hpp"
 #include "estimator/explain/score.hpp"
+#include "estimator/explain/verdict/explained_study.hpp"
+#include "estimator/explain/verdict/explanation_json.hpp"
 #include "estimator/io/whole_file.hpp"
 #include "estimator/report/page.hpp"
 #include "estimator/report/report.hpp"

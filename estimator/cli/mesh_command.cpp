@@ -7,10 +7,10 @@
 #include <vector>
 
 #include "estimator/cli/commands.hpp"
-#include "estimator/fe/study_model.hpp"
 #include "estimator/io/whole_file.hpp"
 #include "estimator/mesh/exfile_import.hpp"
 #include "estimator/mesh/mesh_file.hpp"
+#include "estimator/model/study_model.hpp"
 #include "protocol/contract/input_error.hpp"
 
 namespace diastole {

@@ -18,14 +18,14 @@
 #include "estimator/cli/solution_json.hpp"
 #include "estimator/cli/solution_outputs.hpp"
 #include "estimator/cli/study_options.hpp"
-#include "estimator/effects/affected_model.hpp"
 #include "estimator/fe/averaged_pressure.hpp"
 #include "estimator/fe/elastic_system.hpp"
 #include "estimator/fe/point_fields.hpp"
-#include "estimator/fe/study_model.hpp"
 #include "estimator/io/measurement.hpp"
 #include "estimator/io/study.hpp"
 #include "estimator/mesh/point_locator.hpp"
+#include "estimator/model/affected_model.hpp"
+#include "estimator/model/study_model.hpp"
 #include "protocol/contract/input_error.hpp"
 
 namespace diastole {

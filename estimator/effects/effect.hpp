@@ -13,7 +13,7 @@
 #include <string_view>
 #include <vector>
 
-#include "estimator/effects/field_model.hpp"
+#include "estimator/model/field_model.hpp"
 #include "estimator/rig/rig_model.hpp"
 #include "estimator/rig/specimen_family.hpp"
 

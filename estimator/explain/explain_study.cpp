@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <iterator>
 
-#include "estimator/explain/explain_field.hpp"
+#include "estimator/explain/imaging/explain_field.hpp"
 #include "protocol/contract/input_error.hpp"
 
 namespace diastole::explain {

@@ -1,8 +1,8 @@
 #pragma once
 // `diastole explain`: a study's runs, its imaged motion, or both.
 
-#include "estimator/explain/explain_rig.hpp"
-#include "estimator/explain/explanation.hpp"
+#include "estimator/explain/rig/explain_rig.hpp"
+#include "estimator/explain/verdict/explanation.hpp"
 #include "estimator/io/study.hpp"
 
 namespace diastole::explain {

@@ -12,7 +12,7 @@
 #include <optional>
 
 #include "estimator/effects/effect.hpp"
-#include "estimator/explain/explanation_json.hpp"
+#include "estimator/explain/verdict/explanation_json.hpp"
 #include "estimator/io/whole_file.hpp"
 #include "protocol/contract/input_error.hpp"
 

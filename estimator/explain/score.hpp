@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
-#include "estimator/explain/explanation.hpp"
 #include "estimator/explain/truth_file.hpp"
+#include "estimator/explain/verdict/explanation.hpp"
 
 namespace diastole::explain {
 

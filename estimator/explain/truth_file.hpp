@@ -13,7 +13,7 @@
 #include <string>
 #include <vector>
 
-#include "estimator/explain/explanation.hpp"
+#include "estimator/explain/verdict/explanation.hpp"
 
 namespace diastole::explain {
 

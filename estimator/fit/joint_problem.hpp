@@ -26,11 +26,11 @@
 #include <string>
 #include <vector>
 
-#include "estimator/fit/frame_residuals.hpp"
 #include "estimator/fit/motion_model.hpp"
 #include "estimator/fit/robust_loss.hpp"
 #include "estimator/fit/smoothness.hpp"
 #include "estimator/io/measurement.hpp"
+#include "estimator/motion_residuals/frame_residuals.hpp"
 
 namespace diastole {
 

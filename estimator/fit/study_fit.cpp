@@ -7,8 +7,6 @@
 #include <cmath>
 #include <limits>
 
-#include "estimator/effects/affected_model.hpp"
-#include "estimator/fe/study_model.hpp"
 #include "estimator/fit/elastic_motion.hpp"
 #include "estimator/fit/fit_remarks.hpp"
 #include "estimator/fit/fit_sections.hpp"
@@ -17,6 +15,8 @@
 #include "estimator/fit/uncertainty.hpp"
 #include "estimator/fit/usable_points.hpp"
 #include "estimator/io/study_fingerprint.hpp"
+#include "estimator/model/affected_model.hpp"
+#include "estimator/model/study_model.hpp"
 #include "protocol/contract/input_error.hpp"
 
 namespace diastole {

@@ -5,14 +5,14 @@
 #include <cmath>
 #include <limits>
 
-#include "estimator/effects/affected_model.hpp"
-#include "estimator/fe/study_model.hpp"
 #include "estimator/fit/elastic_motion.hpp"
 #include "estimator/fit/fit.hpp"
 #include "estimator/fit/sought.hpp"
 #include "estimator/fit/study_fit.hpp"
 #include "estimator/fit/uncertainty.hpp"
 #include "estimator/fit/usable_points.hpp"
+#include "estimator/model/affected_model.hpp"
+#include "estimator/model/study_model.hpp"
 #include "estimator/montecarlo/synthetic_data.hpp"
 #include "protocol/contract/input_error.hpp"
 

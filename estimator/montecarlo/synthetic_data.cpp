@@ -6,7 +6,7 @@
 #include <cmath>
 #include <set>
 
-#include "estimator/fit/tag_match.hpp"
+#include "estimator/motion_residuals/tag_match.hpp"
 #include "protocol/contract/input_error.hpp"
 
 namespace diastole {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "estimator/fit/tag_match.hpp"
+#include "estimator/motion_residuals/tag_match.hpp"
 
 namespace diastole {
 namespace {

@@ -6,7 +6,7 @@
 //   forms.space.mesh().value(field.displacement_mm, point)            mm, at a material point
 //
 // The unknown is u(X) on the undeformed mesh, x = X + u. A tag point gives one residual, its error s along the tag's
-// normal (estimator/fit/tag_match.hpp); a 3-D point gives three. To first order in the change of u
+// normal (estimator/motion_residuals/tag_match.hpp); a 3-D point gives three. To first order in the change of u
 //
 //   s(u) = s(u0) − d · (u − u0)(X),        d = F⁻ᵀn / (n·F⁻¹n),
 //

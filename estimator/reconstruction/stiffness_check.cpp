@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "estimator/effects/affected_model.hpp"
+#include "estimator/model/affected_model.hpp"
 
 namespace diastole {
 namespace {

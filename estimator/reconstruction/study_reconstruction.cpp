@@ -5,7 +5,7 @@
 #include <cmath>
 #include <set>
 
-#include "estimator/fe/study_model.hpp"
+#include "estimator/model/study_model.hpp"
 #include "estimator/reconstruction/measurement_findings.hpp"
 #include "estimator/reconstruction/stiffness_check.hpp"
 #include "protocol/contract/input_error.hpp"

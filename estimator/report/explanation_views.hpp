@@ -1,7 +1,7 @@
 #pragma once
 // The parts of an explanation's page that draw recordings and the wall.
 
-#include "estimator/explain/explanation.hpp"
+#include "estimator/explain/verdict/explanation.hpp"
 #include "estimator/report/page.hpp"
 
 namespace diastole::report {

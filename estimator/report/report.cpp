@@ -4,7 +4,7 @@
 
 #include <vector>
 
-#include "estimator/explain/explanation_json.hpp"
+#include "estimator/explain/verdict/explanation_json.hpp"
 #include "estimator/io/fit_file.hpp"
 #include "estimator/io/reconstruction_file.hpp"
 #include "estimator/io/solution_file.hpp"

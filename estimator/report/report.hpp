@@ -7,7 +7,7 @@
 #include <span>
 #include <string>
 
-#include "estimator/explain/explanation.hpp"
+#include "estimator/explain/verdict/explanation.hpp"
 
 namespace diastole::report {
 

@@ -1,7 +1,7 @@
 #pragma once
 // What the report tells about each kind of file.
 
-#include "estimator/explain/explanation.hpp"
+#include "estimator/explain/verdict/explanation.hpp"
 #include "estimator/io/fit_file.hpp"
 #include "estimator/io/reconstruction_file.hpp"
 #include "estimator/io/solution_file.hpp"

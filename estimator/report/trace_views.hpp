@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "estimator/explain/explanation.hpp"
+#include "estimator/explain/verdict/explanation.hpp"
 
 namespace diastole::report {
 

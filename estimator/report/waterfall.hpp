@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "estimator/explain/explanation.hpp"
+#include "estimator/explain/verdict/explanation.hpp"
 
 namespace diastole::report {
 

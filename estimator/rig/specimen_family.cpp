@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "estimator/fe/pressure_volume.hpp"
-#include "estimator/fe/study_model.hpp"
+#include "estimator/model/study_model.hpp"
 #include "protocol/contract/input_error.hpp"
 
 namespace diastole::rig {

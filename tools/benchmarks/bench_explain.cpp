@@ -15,9 +15,9 @@
 #include <string>
 #include <vector>
 
-#include "estimator/explain/explain_rig.hpp"
-#include "estimator/explain/explanation_json.hpp"
+#include "estimator/explain/rig/explain_rig.hpp"
 #include "estimator/explain/score.hpp"
+#include "estimator/explain/verdict/explanation_json.hpp"
 #include "tools/benchmarks/bench_explain_field.hpp"
 #include "tools/benchmarks/recorded_cases.hpp"
 

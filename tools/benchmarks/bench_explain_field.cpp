@@ -6,9 +6,9 @@
 #include <algorithm>
 #include <fstream>
 
-#include "estimator/explain/explain_field.hpp"
-#include "estimator/explain/explanation_json.hpp"
+#include "estimator/explain/imaging/explain_field.hpp"
 #include "estimator/explain/truth_file.hpp"
+#include "estimator/explain/verdict/explanation_json.hpp"
 
 namespace diastole::bench {
 namespace {

@@ -16,10 +16,10 @@
 #include <filesystem>
 #include <thread>
 
-#include "estimator/fe/study_model.hpp"
 #include "estimator/fit/elastic_motion.hpp"
 #include "estimator/fit/sought.hpp"
 #include "estimator/fit/study_fit.hpp"
+#include "estimator/model/study_model.hpp"
 #include "estimator/montecarlo/cells_file.hpp"
 #include "estimator/montecarlo/montecarlo.hpp"
 #include "estimator/montecarlo/worker_pool.hpp"

@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "estimator/effects/affected_model.hpp"
 #include "estimator/effects/effect.hpp"
 #include "estimator/fit/elastic_motion.hpp"
+#include "estimator/model/affected_model.hpp"
 #include "protocol/contract/input_error.hpp"
 
 namespace diastole {

@@ -3,7 +3,7 @@
 
 #include <array>
 
-#include "estimator/explain/field_fit.hpp"
+#include "estimator/explain/imaging/field_fit.hpp"
 
 namespace diastole::explain {
 

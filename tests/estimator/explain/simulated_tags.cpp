@@ -8,8 +8,8 @@
 
 #include "estimator/fe/elastic_system.hpp"
 #include "estimator/fe/gauss_points.hpp"
-#include "estimator/fit/tag_match.hpp"
 #include "estimator/mesh/annulus_grid.hpp"
+#include "estimator/motion_residuals/tag_match.hpp"
 
 namespace diastole::explain {
 namespace {

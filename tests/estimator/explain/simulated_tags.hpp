@@ -7,7 +7,7 @@
 #include <array>
 #include <optional>
 
-#include "estimator/explain/field_fit.hpp"
+#include "estimator/explain/imaging/field_fit.hpp"
 
 namespace diastole::explain {
 

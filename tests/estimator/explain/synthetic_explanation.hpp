@@ -1,7 +1,7 @@
 #pragma once
 // Explanations as the engine would hand them over, without a rig: pressures with a made-up effect, tags with a lump.
 
-#include "estimator/explain/explanation.hpp"
+#include "estimator/explain/verdict/explanation.hpp"
 
 namespace diastole::test {
 

@@ -4,7 +4,7 @@
 
 #include <filesystem>
 
-#include "estimator/explain/explain_field.hpp"
+#include "estimator/explain/imaging/explain_field.hpp"
 
 namespace diastole::explain {
 namespace {

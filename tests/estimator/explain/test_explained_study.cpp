@@ -1,6 +1,6 @@
 #include <gmock/gmock.h>
 
-#include "estimator/explain/explained_study.hpp"
+#include "estimator/explain/verdict/explained_study.hpp"
 #include "tests/estimator/io/gel_study.hpp"
 #include "tests/estimator/io/scratch_file.hpp"
 

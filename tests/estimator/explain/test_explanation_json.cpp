@@ -2,7 +2,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "estimator/explain/explanation_json.hpp"
+#include "estimator/explain/verdict/explanation_json.hpp"
 #include "protocol/contract/input_error.hpp"
 #include "tests/estimator/explain/synthetic_explanation.hpp"
 

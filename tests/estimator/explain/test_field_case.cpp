@@ -2,7 +2,7 @@
 
 #include <gmock/gmock.h>
 
-#include "estimator/explain/field_fit.hpp"
+#include "estimator/explain/imaging/field_fit.hpp"
 #include "tests/estimator/io/scratch_file.hpp"
 
 namespace diastole::explain {

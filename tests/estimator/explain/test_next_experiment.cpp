@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "estimator/explain/next_experiment.hpp"
+#include "estimator/explain/rig/next_experiment.hpp"
 #include "host/config/experiment.hpp"
 #include "tests/estimator/rig_fit/simulated_session.hpp"
 

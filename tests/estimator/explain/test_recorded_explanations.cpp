@@ -4,7 +4,7 @@
 
 #include <filesystem>
 
-#include "estimator/explain/explain_rig.hpp"
+#include "estimator/explain/rig/explain_rig.hpp"
 
 namespace diastole::explain {
 namespace {

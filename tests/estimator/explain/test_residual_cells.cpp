@@ -2,8 +2,8 @@
 
 #include <random>
 
-#include "estimator/explain/chi_square.hpp"
-#include "estimator/explain/residual_cells.hpp"
+#include "estimator/explain/rig/residual_cells.hpp"
+#include "estimator/explain/verdict/chi_square.hpp"
 
 namespace diastole::explain {
 namespace {

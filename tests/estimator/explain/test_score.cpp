@@ -1,7 +1,7 @@
 #include <gmock/gmock.h>
 
-#include "estimator/explain/explanation_json.hpp"
 #include "estimator/explain/score.hpp"
+#include "estimator/explain/verdict/explanation_json.hpp"
 #include "tests/estimator/io/scratch_file.hpp"
 
 namespace diastole::explain {

@@ -4,8 +4,8 @@
 #include <limits>
 
 #include "estimator/effects/effect.hpp"
-#include "estimator/explain/search.hpp"
-#include "estimator/explain/verdict.hpp"
+#include "estimator/explain/rig/search.hpp"
+#include "estimator/explain/verdict/verdict.hpp"
 
 namespace diastole::explain {
 namespace {

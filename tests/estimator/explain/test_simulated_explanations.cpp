@@ -3,10 +3,10 @@
 #include <optional>
 
 #include "estimator/effects/effect.hpp"
-#include "estimator/explain/findings.hpp"
-#include "estimator/explain/held_out.hpp"
-#include "estimator/explain/search.hpp"
-#include "estimator/explain/verdict.hpp"
+#include "estimator/explain/rig/findings.hpp"
+#include "estimator/explain/rig/held_out.hpp"
+#include "estimator/explain/rig/search.hpp"
+#include "estimator/explain/verdict/verdict.hpp"
 #include "tests/estimator/rig_fit/simulated_session.hpp"
 
 namespace diastole::explain {

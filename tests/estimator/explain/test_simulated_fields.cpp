@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "estimator/explain/explain_field.hpp"
+#include "estimator/explain/imaging/explain_field.hpp"
 #include "tests/estimator/explain/simulated_tags.hpp"
 
 namespace diastole::explain {

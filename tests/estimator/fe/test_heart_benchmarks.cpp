@@ -5,9 +5,9 @@
 #include <cmath>
 #include <filesystem>
 
-#include "estimator/fe/study_model.hpp"
 #include "estimator/io/measurement.hpp"
 #include "estimator/mesh/point_locator.hpp"
+#include "estimator/model/study_model.hpp"
 #include "tests/estimator/fe/land.hpp"
 
 namespace diastole {

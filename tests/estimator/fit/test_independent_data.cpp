@@ -9,8 +9,8 @@
 #include <numeric>
 #include <random>
 
-#include "estimator/fe/study_model.hpp"
 #include "estimator/fit/study_fit.hpp"
+#include "estimator/model/study_model.hpp"
 #include "estimator/montecarlo/synthetic_data.hpp"
 
 namespace diastole {

@@ -1,6 +1,6 @@
 #include <gmock/gmock.h>
 
-#include "estimator/fit/tag_match.hpp"
+#include "estimator/motion_residuals/tag_match.hpp"
 #include "tests/estimator/fit/synthetic.hpp"
 
 namespace diastole {

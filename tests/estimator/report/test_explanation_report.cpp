@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "estimator/explain/explanation_json.hpp"
+#include "estimator/explain/verdict/explanation_json.hpp"
 #include "estimator/report/field_views.hpp"
 #include "estimator/report/heat_map.hpp"
 #include "estimator/report/report.hpp"

@@ -1,0 +1,390 @@
+#include "estimator/explain/imaging/explain_field.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+#include "estimator/explain/imaging/field_gap.hpp"
+#include "estimator/explain/imaging/field_hypotheses.hpp"
+#include "estimator/explain/imaging/field_modes.hpp"
+#include "estimator/explain/imaging/field_next_experiment.hpp"
+#include "estimator/explain/imaging/field_pairs.hpp"
+#include "estimator/explain/imaging/field_regions.hpp"
+#include "estimator/explain/imaging/linear_evidence.hpp"
+#include "estimator/explain/imaging/lump_fit.hpp"
+#include "estimator/explain/verdict/chi_square.hpp"
+#include "protocol/contract/input_error.hpp"
+
+namespace diastole::explain {
+namespace {
+
+using Eigen::Index;
+
+constexpr std::array<size_t, 3> round_mesh{4, 6, 2};  // for what is the same all around the axis
+constexpr std::array<size_t, 3> full_mesh{8, 6, 2};
+constexpr double significant = 1e-3;
+constexpr double suspicious = 1e-2;     // of what one effect leaves: reason to try two
+constexpr double indistinct = 9.0;      // of the score
+constexpr double clearly_better = 6.0;  // of a rival's score
+constexpr double far_better = 1.5;      // a rival's score over the best effect's: pairs will not do either
+/// Part of an effect's gain that meshes of this size may leave as structure.
+constexpr double mesh_error = 0.01;
+constexpr double ci90 = 1.6449;
+
+struct Family {
+  std::string name;
+  std::vector<Index> columns;
+};
+
+/// Structure beyond noise, whatever it is.
+struct Structure {
+  std::string family;
+  double excess = 0.0;
+  double p_value = 1.0;
+};
+
+class Explainer {
+ public:
+  Explainer(FieldCase field, std::string name, const FieldOptions& options)
+      : options_(options), study_file_(std::move(name)), field_(std::move(field)) {}
+
+  Explanation run() {
+    field_.alive = [this] { tell(""); };
+    fit_base();
+    fit_effects();
+    judge();
+    fill_evidence();
+    fill_field();
+    propose();
+    return std::move(out_);
+  }
+
+ private:
+  void tell(const std::string& text) const {
+    if (options_.progress) options_.progress(text);
+  }
+
+  void fit_base() {
+    tell("fitting the base model to the tags");
+    fit_both_meshes();
+    if (round_->rows().left_out() + full_->rows().left_out() > 0) {
+      leave_out_lost_points();
+      fit_both_meshes();
+    }
+    tell("looking for structure in what is left");
+    modes_ = field_modes(*full_, full_base_.pressures_kPa);
+    for (size_t i = 0; i < modes_.modes.size(); ++i) {
+      const std::string& family = modes_.modes[i].family;
+      auto same = std::ranges::find(families_, family, &Family::name);
+      if (same == families_.end()) same = families_.insert(same, {.name = family, .columns = {}});
+      same->columns.push_back(static_cast<Index>(i));
+      if (modes_.modes[i].smooth) rivals_.push_back(static_cast<Index>(i));
+    }
+  }
+
+  void fit_both_meshes() {
+    round_.emplace(field_, round_mesh);
+    base_ = round_->fit({}, round_->start());
+    full_.emplace(field_, full_mesh);
+    full_base_ = full_->fit({}, {base_.C1_kPa, base_.pressures_kPa});
+    if (!std::isfinite(base_.chi_square) || !std::isfinite(full_base_.chi_square))
+      throw InputError(
+          {.file = study_file_,
+           .place = "law.parameters.C1_kPa",
+           .problem = fmt::format("the base model has no equilibrium at {:g} kPa", field_.C1_start_kPa.value),
+           .remedy = "Start from a stiffer gel, or check the frames' pressures."});
+  }
+
+  /// Keeps the points that both meshes can follow, so that their residuals correspond.
+  void leave_out_lost_points() {
+    Measurement& measurement = field_.measurement;
+    std::vector<int> seen(measurement.tags.size() + measurement.points.size(), 0);
+    for (const FieldProblem* problem : {&*round_, &*full_})
+      for (const FieldRow& row : problem->rows().rows())
+        if (row.component == 0) ++seen[row.source];
+    const size_t tags = measurement.tags.size();
+    size_t index = 0;
+    std::erase_if(measurement.tags, [&](const TagPoint& tag) { return seen[index++] < 2 && tag.frame > 0; });
+    index = tags;
+    std::erase_if(measurement.points,
+                  [&](const ObservedPoint& point) { return seen[index++] < 2 && point.frame > 0; });
+  }
+
+  void fit_effects() {
+    tell("fitting each effect");
+    hypotheses_ = fit_round_effects(*round_, base_);
+    tell("searching a lump of another stiffness");
+    lattice_ = lump_lattice(*full_, full_base_);
+    const double to_beat = std::ranges::max(hypotheses_, {}, &FieldHypothesis::score).score;
+    std::ranges::move(
+        fit_inclusion(*round_, base_, search_inclusion(lattice_, field_.base, full_base_), to_beat),
+        std::back_inserter(hypotheses_));
+    std::ranges::stable_sort(hypotheses_, std::greater{}, &FieldHypothesis::score);
+  }
+
+  /// The family of modes in which the fit leaves most structure.
+  [[nodiscard]] Structure structure_left(const FieldFit& fit, double allowed) const {
+    const LinearEvidence evidence(fit, modes_.columns);
+    Structure most;
+    for (const Family& family : families_) {
+      const LinearEvidence::Gain gain = evidence.gain(family.columns);
+      const auto degrees = static_cast<double>(gain.degrees);
+      const double p = std::min(
+          1.0, static_cast<double>(families_.size()) * chi_square_tail(gain.chi_square - allowed, degrees));
+      if (p < most.p_value) most = {family.name, gain.chi_square - degrees, p};
+    }
+    return most;
+  }
+
+  /// Whether pressures, C1 or the radius must be farther off than their errors allow.
+  [[nodiscard]] static bool is_strained(const FieldFit& fit) {
+    return chi_square_tail(fit.priors.squaredNorm(), static_cast<double>(fit.priors.size())) < suspicious;
+  }
+
+  /// Where the best single effect leaves something, pairs are fitted; they count if one is clearly better.
+  void try_pairs() {
+    const FieldHypothesis single = hypotheses_.front();
+    if (rival_.score > far_better * single.score) return;
+    if (structure_left(single.fit, mesh_error * single.gain).p_value > suspicious && !is_strained(single.fit))
+      return;
+    tell("fitting pairs of effects");
+    std::vector<FieldHypothesis> pairs = fit_pairs(*round_, base_, hypotheses_, lattice_);
+    if (pairs.empty() || pairs.front().score < single.score + clearly_better ||
+        pairs.front().p_value > significant)
+      return;
+    std::ranges::move(pairs, std::back_inserter(hypotheses_));
+    std::ranges::stable_sort(hypotheses_, std::greater{}, &FieldHypothesis::score);
+  }
+
+  void judge() {
+    tell("comparing what explains it");
+    rival_evidence_.emplace(full_base_, modes_.columns);
+    rival_ = rival_evidence_->best_of(rivals_);
+    const Structure before = structure_left(full_base_, 0.0);
+    const FieldHypothesis& single = hypotheses_.front();
+    const bool effect_seen = single.p_value < significant && single.score > 0.0;
+    if (effect_seen) try_pairs();
+    const FieldHypothesis& best = hypotheses_.front();
+    if (!effect_seen && before.p_value > significant) {
+      out_.verdict = Verdict::none;
+      out_.summary = fmt::format(
+          "Nothing exceeds the noise: C1 = {:.3f} kPa explains {} tag residuals; the nearest effect, {}, "
+          "would gain "
+          "{:.1f} of chi2.",
+          base_.C1_kPa, base_.residuals.size(), best.name(), best.gain);
+      return;
+    }
+    const Structure after = effect_seen ? structure_left(best.fit, mesh_error * best.gain) : before;
+    const bool rivalled = rival_.score > best.score + clearly_better;
+    if (!effect_seen || rivalled || after.p_value < significant) {
+      out_.verdict = Verdict::unexplained;
+      out_.summary = unexplained_summary(best, effect_seen, rivalled, after);
+      return;
+    }
+    name(best);
+  }
+
+  [[nodiscard]] std::string unexplained_summary(const FieldHypothesis& best, bool effect_seen, bool rivalled,
+                                                const Structure& after) const {
+    std::string text =
+        "The motion differs from the model's beyond noise, and no effect of the library removes that.";
+    if (effect_seen)
+      text += fmt::format(" The best one, {}, gains {:.1f} of chi2 and leaves {:.1f} ({}; p = {:.1g}).",
+                          best.name(), best.gain, after.excess, after.family, after.p_value);
+    if (rivalled || (rival_.score > 0.0 && rival_.chi_square > 0.5 * best.gain)) {
+      std::vector<std::string> names;
+      for (const Index column : rival_.columns)
+        names.push_back(modes_.modes[static_cast<size_t>(column)].name);
+      text += fmt::format(" Something outside the library would gain {:.1f}: {}.", rival_.chi_square,
+                          fmt::join(names, "; "));
+    }
+    return text;
+  }
+
+  void name(const FieldHypothesis& best) {
+    out_.effects = found(best);
+    for (const FieldHypothesis& other : hypotheses_) {
+      if (&other == &best || other.score < best.score - indistinct || other.p_value > 10.0 * significant)
+        continue;
+      if (structure_left(other.fit, mesh_error * other.gain).p_value < significant) continue;
+      out_.ambiguous_with.push_back(other.ids);
+    }
+    out_.verdict = out_.ambiguous_with.empty() ? Verdict::named : Verdict::ambiguous;
+    out_.summary = fmt::format(
+        "{} explains what the base model does not: chi2 falls by {:.1f}, C1 becomes {:.3f} kPa "
+        "instead of {:.3f}.",
+        best.name(), best.gain, best.fit.C1_kPa, base_.C1_kPa);
+    if (!out_.ambiguous_with.empty()) {
+      std::vector<std::string> ids;
+      for (const auto& set : out_.ambiguous_with)
+        ids.push_back(fmt::format("{}", fmt::join(set, " + ")));
+      out_.summary += fmt::format(" These data cannot tell it from {}.", fmt::join(ids, ", "));
+    }
+    chosen_ = &best;
+    out_.shifts = {{"C1_kPa", base_.C1_kPa, base_.C1_kPa * std::sqrt(base_.covariance(0, 0)), best.fit.C1_kPa,
+                    best.fit.C1_kPa * std::sqrt(best.fit.covariance(0, 0))}};
+  }
+
+  [[nodiscard]] static std::vector<FoundEffect> found(const FieldHypothesis& hypothesis) {
+    std::vector<FoundEffect> effects;
+    size_t value = 0;
+    for (const Effect* effect : hypothesis.fit.choice.effects) {
+      FoundEffect& out = effects.emplace_back(FoundEffect{std::string(effect->text().id), {}, {}});
+      for (size_t i = 0; i < effect->field_parameters().size(); ++i)
+        out.parameters.push_back(found_parameter(hypothesis.fit, value++));
+    }
+    std::ranges::sort(effects, {}, &FoundEffect::id);
+    return effects;
+  }
+
+  [[nodiscard]] static FoundParameter found_parameter(const FieldFit& fit, size_t value) {
+    const FieldChoice& choice = fit.choice;
+    const EffectParameter& parameter = choice.parameter(value);
+    FoundParameter out;
+    out.name = parameter.name;
+    out.value = choice.values[value];
+    out.ci90 = {out.value, out.value};
+    const auto place = std::ranges::find(choice.free, value);
+    if (place == choice.free.end()) return out;
+    const Index unknown = 1 + (place - choice.free.begin());
+    double error = std::sqrt(fit.covariance(unknown, unknown));
+    const double coordinate = to_coordinate(parameter, out.value);
+    out.ci90 = {from_coordinate(parameter, coordinate - ci90 * error),
+                from_coordinate(parameter, coordinate + ci90 * error)};
+    if (!fit.ci90.empty() && fit.ci90[value][0] < fit.ci90[value][1]) {
+      out.ci90 = fit.ci90[value];
+      error = (to_coordinate(parameter, out.ci90[1]) - to_coordinate(parameter, out.ci90[0])) / (2.0 * ci90);
+    }
+    out.standard_error = parameter.scale == SearchScale::logarithmic ? out.value * error : error;
+    return out;
+  }
+
+  /// A lump's own place first; all of the specimen where no part of it stands out.
+  void find_places() {
+    out_.where = misfit_regions(field_, round_->rows(), base_, 5);
+    const bool lumped = chosen_ != nullptr && chosen_->has("stiff-inclusion");
+    if (!lumped && !out_.where.empty()) return;
+    const Structure before = structure_left(full_base_, 0.0);
+    Misfit place;
+    place.port = "field";
+    place.channel = "tags";
+    place.region = "all of the specimen, in proportion to the load";
+    if (lumped) {
+      const Inclusion lump = lump_of(chosen_->fit);
+      place.region =
+          fmt::format("around {:.0f} deg, z {:.0f} mm, {:.0f} mm from the axis",
+                      std::remainder(lump.theta_deg - 180.0, 360.0) + 180.0, lump.z_mm, lump.radius_mm);
+    }
+    place.excess_chi2 = std::max(before.excess, hypotheses_.front().gain);
+    place.p_value = std::min(before.p_value, hypotheses_.front().p_value);
+    out_.where.insert(out_.where.begin(), std::move(place));
+  }
+
+  void fill_evidence() {
+    const FieldProblem& problem = *round_;
+    const FieldFit& base = base_;
+    for (const FieldHypothesis& tried : hypotheses_) {
+      Candidate row;
+      row.ids = tried.ids;
+      row.chi_square_drop = tried.gain;
+      row.refitted = true;
+      row.parameters = tried.fit.choice.free.size();
+      const bool as_good =
+          std::ranges::any_of(out_.ambiguous_with, [&](const auto& set) { return set == tried.ids; });
+      row.verdict = &tried == chosen_             ? (as_good ? "as good" : "named")
+                    : as_good                     ? "as good"
+                    : tried.p_value > significant ? "not needed"
+                                                  : fmt::format("explains less than the best by {:.1f}",
+                                                                hypotheses_.front().score - tried.score);
+      if (&tried == chosen_ && out_.verdict == Verdict::ambiguous) row.verdict = "as good";
+      out_.evidence.push_back(std::move(row));
+    }
+    if (out_.verdict == Verdict::none) return;
+    find_places();
+    const FieldFit& after = chosen_ != nullptr ? chosen_->fit : base;
+    Eigen::MatrixXd directions(base.residuals.size(),
+                               static_cast<Index>(rivals_.size()) + after.jacobian.cols());
+    directions << modes_.columns(Eigen::all, rivals_), after.jacobian.topRows(base.residuals.size());
+    out_.gap = field_gap(base, after, deal_folds(field_.measurement, problem.rows(), 5), directions);
+    out_.steps = {{"", out_.gap.before}};
+    if (chosen_ != nullptr) out_.steps.push_back({chosen_->name(), out_.gap.after});
+  }
+
+  /// As precise as a drawing needs, so that the file stays small.
+  void fill_field() {
+    const FieldFit& after = chosen_ != nullptr ? chosen_->fit : base_;
+    const double highest_kPa = std::ranges::max(base_.pressures_kPa);
+    const auto rounded = [](double value, double scale) { return std::round(scale * value) / scale; };
+    for (Index i = 0; i < round_->rows().size(); ++i) {
+      const FieldRow& row = round_->rows().rows()[static_cast<size_t>(i)];
+      const double share = base_.pressures_kPa[row.slot] / highest_kPa;
+      FieldResidual seen;
+      seen.frame = round_->rows().frames()[row.slot];
+      seen.before = rounded(base_.residuals[i], 1e3);
+      seen.after = rounded(after.residuals[i], 1e3);
+      for (size_t k = 0; k < 3; ++k) {
+        const auto axis = static_cast<Index>(k);
+        seen.place_mm[k] = rounded(row.X_mm[axis], 1e2);
+        seen.per_mm[k] = rounded(-share * row.by_motion[axis], 1e3);
+      }
+      out_.field.push_back(seen);
+    }
+  }
+
+  /// What the cavity takes at the highest pressure; not known of fits around a lump.
+  [[nodiscard]] ImagedModel imaged(const FieldHypothesis& hypothesis) {
+    if (hypothesis.has("stiff-inclusion")) return {&hypothesis, std::nan("")};
+    return {&hypothesis, round_->taken_mL(hypothesis.fit)};
+  }
+
+  void propose() {
+    if (out_.verdict == Verdict::none) return;
+    tell("designing the next experiment");
+    if (out_.verdict == Verdict::unexplained) {
+      out_.next_experiment = exposing_images();
+      return;
+    }
+    std::vector<ImagedModel> models{imaged(*chosen_)};
+    for (const FieldHypothesis& other : hypotheses_)
+      if (std::ranges::find(out_.ambiguous_with, other.ids) != out_.ambiguous_with.end())
+        models.push_back(imaged(other));
+    out_.next_experiment = models.size() > 1 ? separating_images(field_, round_->rows(), models)
+                                             : sharpening_images(field_, round_->rows(), models.front());
+  }
+
+  FieldOptions options_;
+  std::string study_file_;
+  FieldCase field_;
+  std::optional<FieldProblem> round_;
+  std::optional<FieldProblem> full_;
+  FieldFit base_;
+  FieldFit full_base_;
+  FieldModes modes_;
+  std::vector<Family> families_;
+  std::vector<Index> rivals_;
+  LumpLattice lattice_;
+  std::vector<FieldHypothesis> hypotheses_;
+  std::optional<LinearEvidence> rival_evidence_;
+  LinearEvidence::Choice rival_;
+  const FieldHypothesis* chosen_ = nullptr;
+  Explanation out_;
+};
+
+}  // namespace
+
+Explanation explain_field(const Study& study, const FieldOptions& options) {
+  return explain_field(field_case(study), study.file.string(), options);
+}
+
+Explanation explain_field(FieldCase field, const std::string& name, const FieldOptions& options) {
+  const auto begun = std::chrono::steady_clock::now();
+  Explanation explanation = Explainer(std::move(field), name, options).run();
+  explanation.study = name;
+  explanation.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
+  return explanation;
+}
+
+}  // namespace diastole::explain

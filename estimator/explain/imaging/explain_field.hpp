@@ -1,0 +1,30 @@
+#pragma once
+// Where imaged motion and model disagree, and which field effect that is.
+//
+//   base fit, every effect's refit, rivals outside the library (field_modes.hpp), what is left after the best
+//
+// Verdicts: none - neither an effect nor any structure gains more than noise would (p above 1e-3 after correction for
+// how many were tried). unexplained - structure is left after the best effect, or something outside the library gains more
+// than any effect. ambiguous - other effects' scores are within 9 of the best one's; named - none is. The score is the gain
+// of chi2, less 2 for each parameter and 2 log(number of places) for a place that was searched.
+
+#include <functional>
+#include <string>
+
+#include "estimator/explain/imaging/field_fit.hpp"
+#include "estimator/explain/verdict/explanation.hpp"
+#include "estimator/io/study.hpp"
+
+namespace diastole::explain {
+
+struct FieldOptions {
+  /// Told what is being done; whatever it throws ends the work.
+  std::function<void(const std::string&)> progress;
+};
+
+/// Throws InputError for studies that field_case() refuses.
+Explanation explain_field(const Study& study, const FieldOptions& options = {});
+/// The same of what a study says; `name` stands for it in errors.
+Explanation explain_field(FieldCase field, const std::string& name, const FieldOptions& options = {});
+
+}  // namespace diastole::explain

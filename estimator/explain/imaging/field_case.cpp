@@ -1,0 +1,82 @@
+#include <fmt/format.h>
+#include <algorithm>
+#include <cmath>
+
+#include "estimator/explain/imaging/field_fit.hpp"
+#include "estimator/io/study_refusal.hpp"
+#include "estimator/model/affected_model.hpp"
+
+namespace diastole::explain {
+namespace {
+
+/// Half the bounds' width over their middle up to which they are a measurement.
+constexpr double narrow = 0.05;
+
+}  // namespace
+
+std::optional<Measured> seen_inner_radius(const Measurement& measurement, double outer_radius_mm) {
+  constexpr size_t enough = 200;
+  constexpr double trusted_mm = 0.3;
+  std::vector<double> radii_mm;
+  for (const TagPoint& tag : measurement.tags) {
+    if (tag.frame != 0) continue;
+    double error_mm = -tag.plane_mm;
+    for (size_t i = 0; i < 3; ++i)
+      error_mm += tag.normal[i] * tag.x_mm[i];
+    radii_mm.push_back(
+        std::hypot(tag.x_mm[0] - error_mm * tag.normal[0], tag.x_mm[1] - error_mm * tag.normal[1]));
+  }
+  if (radii_mm.size() < enough) return {};
+  const auto [inner, outer] = std::minmax_element(radii_mm.begin(), radii_mm.end());
+  const double margin_mm = outer_radius_mm - *outer;
+  if (margin_mm < 0.0) return {};
+  return Measured{*inner - margin_mm, trusted_mm};
+}
+
+FieldCase field_case(const Study& study) {
+  const auto* annulus = std::get_if<AnnulusSpecimen>(&study.specimen);
+  if (annulus == nullptr)
+    refuse(study, "specimen.kind", "images of this kind of specimen cannot be explained",
+           "`diastole explain` knows field effects of an annulus; `diastole fit` fits any specimen.");
+  if (annulus->ends != "fixed")
+    refuse(study, "specimen.ends", "field effects start from held ends", "Set ends = \"fixed\".");
+  if (study.law.name != "neo-hookean")
+    refuse(study, "law.name",
+           fmt::format("field effects start from neo-Hookean gel, not from {}", study.law.name),
+           "Set name = \"neo-hookean\": another law is one of the effects.");
+  if (study.law.parameters.front().vary == Variation::element)
+    refuse(study, "law.parameters.C1_kPa.vary",
+           "images are explained from a gel of one stiffness, not of one value an element",
+           "Set vary = \"whole\": a lump is then found by name, and a stiffness that varies smoothly is told "
+           "as something "
+           "outside the library. `diastole fit` maps one value an element.");
+  if (study.chamber)
+    refuse(study, "chamber", "field effects start from a specimen in the open",
+           "Leave [chamber] out: what it does is the effect chamber-back-pressure.");
+  if (study.compression.bulk_modulus_kPa)
+    refuse(study, "model.bulk_modulus_kPa", "field effects start from incompressible gel", "Leave it out.");
+  if (!study.data.tags && !study.data.points)
+    refuse(study, "data", "the study has neither tags nor points",
+           "Name a tags or points file and its frames.");
+  FieldCase field;
+  field.base = field_model_of(study);
+  field.measurement = read_measurement(study);
+  for (size_t frame = 1; frame < field.measurement.frames.size(); ++frame) {
+    const double pressure_kPa = field.measurement.frames[frame].pressure_kPa;
+    if (pressure_kPa <= 0.0)
+      refuse(study, "data.frames", fmt::format("frame {} has a pressure of {:g} kPa", frame, pressure_kPa),
+             "Frames after the first must be inflated; leave others out.");
+  }
+  const StudyParameter& C1 = study.law.parameters.front();
+  field.C1_start_kPa.value = C1.start;
+  field.C1_bounds_kPa = {C1.lower, C1.upper};
+  const double half_width_kPa = 0.5 * (C1.upper - C1.lower);
+  if (half_width_kPa < narrow * 0.5 * (C1.upper + C1.lower)) {
+    field.C1_start_kPa = {0.5 * (C1.upper + C1.lower), 0.5 * half_width_kPa};
+    field.C1_bounds_kPa = {0.2 * C1.start, 5.0 * C1.start};
+  }
+  field.inner_radius_mm = seen_inner_radius(field.measurement, annulus->outer_radius_mm);
+  return field;
+}
+
+}  // namespace diastole::explain

@@ -1,0 +1,27 @@
+#pragma once
+// How well fits predict tags that they have not seen.
+//
+// The tags are dealt into five folds by the direction in which they know the motion (3-D points by turns). Each fold is
+// predicted by the fit to the others: one Gauss-Newton step away from the fit to all. Of the predictions' errors those
+// parts count in which the motion can be off at all: their projection on smooth modes, beside what is measured besides the
+// tags: the frames' pressures, and C1 where it is known. Their reduced chi2 is 1 for noise.
+
+#include <Eigen/Dense>
+#include <vector>
+
+#include "estimator/explain/imaging/field_fit.hpp"
+#include "estimator/explain/verdict/explanation.hpp"
+
+namespace diastole::explain {
+
+/// Fold of each row.
+std::vector<size_t> deal_folds(const Measurement& measurement, const FieldRows& rows, size_t folds);
+
+/// Residuals of each row as predicted from the other folds.
+Eigen::VectorXd held_out_residuals(const FieldFit& fit, const std::vector<size_t>& folds);
+
+/// `directions` over the rows: a basis of what may be off.
+Gap field_gap(const FieldFit& base, const FieldFit& after, const std::vector<size_t>& folds,
+              const Eigen::MatrixXd& directions);
+
+}  // namespace diastole::explain

@@ -1,0 +1,137 @@
+#include "estimator/explain/imaging/field_hypotheses.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "estimator/explain/imaging/linear_evidence.hpp"
+#include "estimator/explain/imaging/lump_fit.hpp"
+#include "estimator/explain/verdict/chi_square.hpp"
+
+namespace diastole::explain {
+namespace {
+
+constexpr double worth_freeing = 9.0;  // gain of chi2 by which further parameters of an effect must pay
+constexpr double beyond_chance = 1e-2;
+
+FieldChoice with_essentials(const Effect& effect, std::vector<double> values) {
+  FieldChoice choice{{&effect}, std::move(values), {}};
+  for (size_t i = 0; i < effect.field_essentials(); ++i)
+    choice.free.push_back(i);
+  return choice;
+}
+
+/// Where an angle starts is decided by what a little of the effect would gain at each.
+std::vector<double> start_of_fibres(FieldProblem& problem, const FieldFit& base, const Effect& effect) {
+  constexpr int angles = 12;
+  constexpr double little_kPa = 0.01;
+  std::vector<FieldNudge> nudges;
+  for (int i = 0; i < angles; ++i) {
+    FieldNudge nudge{problem.field().base, problem.field().base, 2.0 * little_kPa};
+    nudge.up.fibre_angle_deg = nudge.down.fibre_angle_deg = 180.0 * i / angles;
+    nudge.up.k1_kPa = little_kPa;
+    nudge.down.k1_kPa = -little_kPa;
+    nudges.push_back(nudge);
+  }
+  const size_t loudest = problem.highest_node();
+  const FieldSolver::Slopes slopes = problem.solver().slopes(loudest, nudges);
+  std::vector<const NodeField*> fields;
+  for (const NodeField& field : slopes.model)
+    fields.push_back(&field);
+  const FieldRows& rows = problem.rows();
+  Eigen::MatrixXd columns(rows.size(), angles);
+  for (size_t slot = 0; slot < base.pressures_kPa.size(); ++slot) {
+    const double share = base.pressures_kPa[slot] / problem.nodes_kPa()[loudest];
+    columns.middleRows(rows.first(slot), rows.count(slot)) =
+        share * share * rows.columns(slot, problem.solver().mesh(), fields);
+  }
+  const LinearEvidence evidence(base, columns);
+  std::vector<double> values = effect.field_neutral(problem.field().base);
+  values[0] = effect.field_parameters()[0].typical;
+  double best = 0.0;
+  for (int i = 0; i < angles; ++i) {
+    const double amount = evidence.amount(i);
+    if (amount <= 0.0 || evidence.gain(i) < best) continue;
+    best = evidence.gain(i);
+    values[0] = std::clamp(amount, 0.1, 20.0);
+    values[1] = nudges[static_cast<size_t>(i)].up.fibre_angle_deg;
+  }
+  return values;
+}
+
+std::vector<double> start_of(FieldProblem& problem, const FieldFit& base, const Effect& effect) {
+  if (effect.text().id == "fibre-anisotropy") return start_of_fibres(problem, base, effect);
+  std::vector<double> values = effect.field_neutral(problem.field().base);
+  const EffectParameter& size = effect.field_parameters()[0];
+  values[0] = size.neutral != 0.0 && size.scale == SearchScale::linear
+                  ? values[0] * size.typical / size.neutral
+                  : size.typical;
+  return values;
+}
+
+/// The essentials first, then all parameters if they pay.
+FieldFit refit(FieldProblem& problem, FieldChoice choice, const FieldProblem::Start& start) {
+  FieldFit fit = problem.fit(choice, start);
+  if (choice.free.size() == choice.values.size()) return fit;
+  FieldChoice all = fit.choice;
+  for (size_t i = choice.free.size(); i < choice.values.size(); ++i) {
+    all.free.push_back(i);
+    const EffectParameter& parameter = choice.parameter(i);
+    if (parameter.scale == SearchScale::linear) all.values[i] = parameter.typical;
+  }
+  FieldFit fuller = problem.fit(std::move(all), {fit.C1_kPa, fit.pressures_kPa});
+  return fit.chi_square - fuller.chi_square > worth_freeing ? fuller : fit;
+}
+
+}  // namespace
+
+std::string FieldHypothesis::name() const { return fmt::format("{}", fmt::join(ids, " + ")); }
+
+bool FieldHypothesis::has(std::string_view id) const { return std::ranges::find(ids, id) != ids.end(); }
+
+std::vector<FieldHypothesis> fit_round_effects(FieldProblem& problem, const FieldFit& base) {
+  std::vector<FieldHypothesis> result;
+  const FieldProblem::Start start{base.C1_kPa, base.pressures_kPa};
+  std::vector<double> fibres;
+  for (const Effect* effect : field_effects())
+    if (effect->text().id == "fibre-anisotropy") fibres = start_of(problem, base, *effect);
+  for (const Effect* effect : field_effects()) {
+    if (effect->text().id == "stiff-inclusion") continue;
+    const bool fibrous = effect->text().id == "fibre-anisotropy";
+    FieldHypothesis tried{{std::string(effect->text().id)}, {}};
+    FieldChoice choice = with_essentials(*effect, fibrous ? fibres : start_of(problem, base, *effect));
+    tried.fit = refit(problem, std::move(choice), start);
+    tried.gain = base.chi_square - tried.fit.chi_square;
+    const auto parameters = static_cast<double>(tried.fit.choice.free.size());
+    tried.score = tried.gain - 2.0 * parameters;
+    tried.p_value =
+        std::min(1.0, static_cast<double>(field_effects().size()) * chi_square_tail(tried.gain, parameters));
+    result.push_back(std::move(tried));
+  }
+  return result;
+}
+
+std::vector<FieldHypothesis> fit_inclusion(const FieldProblem& problem, const FieldFit& base,
+                                           const std::vector<InclusionGuess>& guesses, double to_beat) {
+  if (guesses.front().p_value > beyond_chance) return {};
+  constexpr double effective_parameters = 5.0;  // sizes are tied to one another
+  constexpr double near = 20.0;
+  FieldHypothesis tried{{"stiff-inclusion"},
+                        fit_lump(problem, base, guesses.front().inclusion, LumpEffort::once)};
+  const auto judge = [&] {
+    tried.gain = base.chi_square - tried.fit.chi_square;
+    tried.score =
+        tried.gain - 2.0 * effective_parameters - 2.0 * std::log(places_told_apart(problem.field().base));
+  };
+  judge();
+  if (tried.score > to_beat - near && tried.gain > 0.0) {
+    tried.fit = fit_lump(problem, base, lump_of(tried.fit), LumpEffort::fully);
+    judge();
+  }
+  tried.p_value = std::min(1.0, static_cast<double>(field_effects().size()) * guesses.front().p_value);
+  return {std::move(tried)};
+}
+
+}  // namespace diastole::explain

@@ -1,0 +1,32 @@
+#pragma once
+// The library's effects, each fitted to the imaged motion.
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "estimator/explain/imaging/field_fit.hpp"
+#include "estimator/explain/imaging/inclusion_search.hpp"
+
+namespace diastole::explain {
+
+struct FieldHypothesis {
+  std::vector<std::string> ids;  ///< of the effects
+  FieldFit fit;
+  double gain = 0.0;     ///< of chi2 over the base model on the same mesh
+  double score = 0.0;    ///< explain_field.hpp
+  double p_value = 1.0;  ///< corrected for the effects and places that were tried
+
+  [[nodiscard]] std::string name() const;  ///< "end-bond-slip + strain-stiffening"
+  [[nodiscard]] bool has(std::string_view id) const;
+};
+
+/// All effects that are the same all around the axis, on a mesh that is. Precondition: the solver stands at `base`.
+std::vector<FieldHypothesis> fit_round_effects(FieldProblem& problem, const FieldFit& base);
+
+/// A lump from the search's best guess; empty if that is not beyond chance. `base`: the problem's base fit. Its intervals are
+/// only sought if its score comes near the one `to_beat`.
+std::vector<FieldHypothesis> fit_inclusion(const FieldProblem& problem, const FieldFit& base,
+                                           const std::vector<InclusionGuess>& guesses, double to_beat);
+
+}  // namespace diastole::explain

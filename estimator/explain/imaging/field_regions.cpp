@@ -1,0 +1,116 @@
+#include "estimator/explain/imaging/field_regions.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <functional>
+#include <numbers>
+
+#include "estimator/explain/imaging/linear_evidence.hpp"
+#include "estimator/explain/verdict/chi_square.hpp"
+
+namespace diastole::explain {
+namespace {
+
+using Eigen::Index;
+
+constexpr double significant = 1e-3;
+/// By how much a coarser part must stand out more than any finer one to be the place.
+constexpr double coarser_pays = 10.0;
+
+/// Equal parts of the specimen.
+struct Partition {
+  size_t turns;
+  size_t levels;
+  size_t depths;
+
+  [[nodiscard]] size_t cells() const { return turns * levels * depths; }
+
+  static size_t part(double share, size_t count) {
+    return static_cast<size_t>(
+        std::clamp(share * static_cast<double>(count), 0.0, static_cast<double>(count) - 1.0));
+  }
+
+  [[nodiscard]] size_t cell_of(const FieldModel& body, const Eigen::Vector3d& X_mm) const {
+    const double turn = std::atan2(X_mm[1], X_mm[0]) / (2.0 * std::numbers::pi);
+    const double wall_mm = body.outer_radius_mm - body.inner_radius_mm;
+    return part(turn < 0.0 ? turn + 1.0 : turn, turns) +
+           turns * (part(X_mm[2] / body.height_mm + 0.5, levels) +
+                    levels * part((std::hypot(X_mm[0], X_mm[1]) - body.inner_radius_mm) / wall_mm, depths));
+  }
+
+  [[nodiscard]] std::string words(const FieldModel& body, size_t cell) const {
+    const double theta_deg = (static_cast<double>(cell % turns) + 0.5) * 360.0 / static_cast<double>(turns);
+    const double low_mm =
+        body.height_mm * (static_cast<double>(cell / turns % levels) / static_cast<double>(levels) - 0.5);
+    const double thick_mm = body.height_mm / static_cast<double>(levels);
+    std::string text = turns == 1 ? "all around" : fmt::format("around {:.0f} deg", theta_deg);
+    if (levels > 1) text += fmt::format(", z {:.0f} to {:.0f} mm", low_mm, low_mm + thick_mm);
+    if (depths > 1)
+      text += fmt::format(", {} half of the wall", cell / turns / levels == 0 ? "inner" : "outer");
+    return text;
+  }
+};
+
+/// Fine ones show a lump's place, rings and layers what is the same all around.
+constexpr std::array<Partition, 5> partitions{{{8, 4, 2}, {4, 2, 1}, {1, 4, 2}, {1, 2, 1}, {1, 1, 2}}};
+
+}  // namespace
+
+std::vector<Misfit> misfit_regions(const FieldCase& field, const FieldRows& rows, const FieldFit& fit,
+                                   size_t most) {
+  size_t cells = 0;
+  for (const Partition& partition : partitions)
+    cells += partition.cells();
+  Eigen::MatrixXd columns = Eigen::MatrixXd::Zero(rows.size(), static_cast<Index>(3 * cells));
+  const double highest_kPa = std::ranges::max(fit.pressures_kPa);
+  std::vector<size_t> tags(cells, 0);
+  for (Index i = 0; i < rows.size(); ++i) {
+    const FieldRow& row = rows.rows()[static_cast<size_t>(i)];
+    const Eigen::Vector3d outwards = Eigen::Vector3d(row.X_mm[0], row.X_mm[1], 0.0).normalized();
+    const Eigen::RowVector3d along(row.by_motion.dot(outwards),
+                                   row.by_motion.dot(Eigen::Vector3d(-outwards[1], outwards[0], 0.0)),
+                                   row.by_motion[2]);
+    size_t begun = 0;
+    for (const Partition& partition : partitions) {
+      const size_t cell = begun + partition.cell_of(field.base, row.X_mm);
+      columns.block<1, 3>(i, static_cast<Index>(3 * cell)) =
+          fit.pressures_kPa[row.slot] / highest_kPa * along;
+      ++tags[cell];
+      begun += partition.cells();
+    }
+  }
+  const LinearEvidence evidence(fit, columns);
+  std::vector<Misfit> found;
+  size_t begun = 0;
+  for (const Partition& partition : partitions) {
+    std::vector<Misfit> here;
+    for (size_t cell = 0; cell < partition.cells(); ++cell) {
+      const auto first = static_cast<Index>(3 * (begun + cell));
+      if (tags[begun + cell] < 30) continue;
+      const LinearEvidence::Gain gain = evidence.gain({first, first + 1, first + 2});
+      if (gain.degrees == 0) continue;
+      const double p = std::min(1.0, static_cast<double>(cells) *
+                                         chi_square_tail(gain.chi_square, static_cast<double>(gain.degrees)));
+      if (p > significant) continue;
+      Misfit misfit;
+      misfit.port = "field";
+      misfit.channel = "tags";
+      misfit.region = partition.words(field.base, cell);
+      misfit.excess_chi2 = gain.chi_square - static_cast<double>(gain.degrees);
+      misfit.p_value = p;
+      here.push_back(std::move(misfit));
+    }
+    begun += partition.cells();
+    std::ranges::stable_sort(here, std::greater{}, &Misfit::excess_chi2);
+    if (!here.empty() &&
+        (found.empty() || here.front().excess_chi2 > found.front().excess_chi2 + coarser_pays))
+      found = std::move(here);
+  }
+  if (found.size() > most) found.resize(most);
+  return found;
+}
+
+}  // namespace diastole::explain

@@ -1,0 +1,80 @@
+#pragma once
+// Equilibria of a specimen with field effects (estimator/model/field_model.hpp), and their exact derivatives.
+//
+// The mesh's topology is fixed; the model, its inner radius included, may change between solutions, each of which
+// starts from the displacements of the last one. A derivative with respect to anything in the model comes from the
+// residual's central difference at the fixed displacement and one back-substitution:
+//
+//   du/dm = - K^-1 (R(u; m + h) - R(u; m - h)) / 2h
+//
+// Units: mm, kPa.
+
+#include <array>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "estimator/fe/elastic_model.hpp"
+#include "estimator/mesh/point_locator.hpp"
+#include "estimator/model/field_model.hpp"
+
+namespace diastole::explain {
+
+/// A direction in which the model may change, by the models on both sides of it.
+struct FieldNudge {
+  FieldModel up;
+  FieldModel down;
+  double width = 0.0;  ///< between them, in the parameter's coordinate
+};
+
+class FieldSolver {
+ public:
+  FieldSolver(std::array<size_t, 3> elements, LocatorOptions locator)
+      : elements_(elements), locator_(locator) {}
+
+  void set(const FieldModel& model, double C1_kPa);
+  /// Equilibrium at a cavity pressure, kept under the slot's number; false if none was found.
+  bool solve(size_t slot, double pressure_kPa);
+
+  [[nodiscard]] const HermiteMesh& mesh() const { return elastic_->mesh(); }
+  /// Of the undeformed mesh.
+  [[nodiscard]] const PointLocator& reference() const { return *reference_; }
+  [[nodiscard]] NodeField displacement_mm(size_t slot) const;
+  /// As images show it.
+  [[nodiscard]] NodeField seen_displacement_mm(size_t slot) const;
+
+  /// Derivatives of seen_displacement_mm at the slot's solution.
+  struct Slopes {
+    NodeField modulus;  ///< by C1
+    std::vector<NodeField> model;
+  };
+  [[nodiscard]] Slopes slopes(size_t slot, const std::vector<FieldNudge>& nudges);
+  /// Of the undeformed mesh by a nudge; empty where it stays.
+  [[nodiscard]] NodeField reference_slope(const FieldNudge& nudge) const;
+
+  /// K^-1 applied to each of these right-hand sides over the unknowns, as displacement fields; the tangent is that of the
+  /// slot's solution.
+  [[nodiscard]] std::vector<NodeField> responses(size_t slot, std::vector<std::vector<double>> right_sides);
+
+  /// - dR/dc for C1(X) (1 + c field(X)), one for each field: what `responses` turns into the motion's changes by c.
+  [[nodiscard]] std::vector<std::vector<double>> stiffness_sides(
+      size_t slot, const std::vector<StiffnessField>& fields) const;
+
+  [[nodiscard]] ElasticModel& elastic() { return *elastic_; }
+  [[nodiscard]] const ElasticState& state(size_t slot) const { return states_[slot].value(); }
+
+ private:
+  [[nodiscard]] std::unique_ptr<ElasticModel> build(const FieldModel& model) const;
+  [[nodiscard]] ElasticState carried_over(const ElasticState& state, const HermiteMesh& from) const;
+  [[nodiscard]] std::vector<double> residual_of(const FieldModel& model, const ElasticState& state) const;
+
+  std::array<size_t, 3> elements_;
+  LocatorOptions locator_;
+  FieldModel model_;
+  double C1_kPa_ = 1.0;
+  std::unique_ptr<ElasticModel> elastic_;
+  std::unique_ptr<PointLocator> reference_;
+  std::vector<std::optional<ElasticState>> states_;
+};
+
+}  // namespace diastole::explain

@@ -1,0 +1,42 @@
+#pragma once
+// What columns beside a fit would gain: chi2 of the residuals' projection on them, the fit's own unknowns free.
+//
+// With r the residuals at the optimum, J the fit's Jacobian (priors included) and c a column, C1 and pressures answer to c,
+// so that  c' = c - J (J^T J)^-1 J^T c  is what counts, and chi2 falls by  (c' . r)^2 / |c'|^2.
+
+#include <Eigen/Dense>
+#include <vector>
+
+#include "estimator/explain/imaging/field_fit.hpp"
+
+namespace diastole::explain {
+
+class LinearEvidence {
+ public:
+  /// `columns` over the fit's rows.
+  LinearEvidence(const FieldFit& fit, const Eigen::MatrixXd& columns);
+
+  struct Gain {
+    double chi_square = 0.0;
+    Eigen::Index degrees = 0;
+  };
+  /// Of all the chosen columns together; columns that the others hold already are not counted.
+  [[nodiscard]] Gain gain(const std::vector<Eigen::Index>& chosen) const;
+  [[nodiscard]] double gain(Eigen::Index column) const;
+  /// The amount of a column that the residuals ask for.
+  [[nodiscard]] double amount(Eigen::Index column) const;
+
+  struct Choice {
+    std::vector<Eigen::Index> columns;
+    double score = 0.0;  ///< gain - 2 a column - 2 log(number to choose from) for each choice
+    double chi_square = 0.0;
+  };
+  /// Up to three columns, one after the other, that gain most.
+  [[nodiscard]] Choice best_of(const std::vector<Eigen::Index>& candidates) const;
+
+ private:
+  Eigen::MatrixXd normal_;    // of the projected columns
+  Eigen::VectorXd gradient_;  // their products with the residuals
+};
+
+}  // namespace diastole::explain

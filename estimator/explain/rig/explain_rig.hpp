@@ -1,0 +1,26 @@
+#pragma once
+// `diastole explain` for the runs of a rig: where the rig's model and the recordings disagree, what is missing, and
+// what remains open.
+//
+//   read the session -> noise floor and base fit (rig_fit) -> cells of the residuals (where) -> screen, refit, compare
+//   (search) -> noise floor again, with what was found taken off -> held-out prediction -> verdict
+
+#include <functional>
+#include <string>
+
+#include "estimator/explain/verdict/explanation.hpp"
+#include "estimator/io/study.hpp"
+
+namespace diastole::explain {
+
+struct ExplainOptions {
+  size_t threads = 2;
+  bool propose = true;  ///< a next experiment
+  std::function<void(const std::string&)>
+      progress;  ///< a line for people; empty text: only asks whether to go on
+};
+
+/// Throws InputError for runs that cannot be read; whatever `progress` throws ends the work.
+Explanation explain_rig(const Study& study, const ExplainOptions& options);
+
+}  // namespace diastole::explain

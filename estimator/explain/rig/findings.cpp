@@ -1,0 +1,269 @@
+#include "estimator/explain/rig/findings.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "estimator/effects/effect.hpp"
+#include "estimator/rig_fit/search_scale.hpp"
+
+namespace diastole::explain {
+namespace {
+
+constexpr size_t nuisances = 3;
+constexpr double ninety = 1.645;  // standard errors of a 90 % interval's half
+
+SearchScale scale_of(const rig::RigFit& fit, size_t unknown) {
+  size_t at = nuisances;
+  for (const rig::Ingredient& ingredient : fit.ingredients)
+    for (const EffectParameter& parameter : ingredient.effect->parameters())
+      if (at++ == unknown) return parameter.scale;
+  return SearchScale::linear;
+}
+
+/// The interval is symmetric where the search is.
+std::array<double, 2> interval(SearchScale scale, double value, double error, double lower, double upper) {
+  const double at = rig::to_search(scale, value);
+  const double slope = rig::natural_slope(scale, at);
+  const double reach = error > 0.0 ? ninety * std::abs(error / slope) : 0.0;
+  const double search_low = std::min(rig::to_search(scale, lower), rig::to_search(scale, upper));
+  const double search_high = std::max(rig::to_search(scale, lower), rig::to_search(scale, upper));
+  const double a = rig::from_search(scale, std::clamp(at - reach, search_low, search_high));
+  const double b = rig::from_search(scale, std::clamp(at + reach, search_low, search_high));
+  return {std::min(a, b), std::max(a, b)};
+}
+
+Port port_of(std::string_view channel) { return channel == "pump_kPa" ? Port::drive : Port::specimen; }
+
+}  // namespace
+
+std::vector<double> parameter_errors(const rig::RigFit& fit, const Eigen::VectorXd& weights,
+                                     double explained) {
+  constexpr double looks_alike =
+      2e-3;  // of a change: the model's error of it that its parameters can take up
+  const double with_models = std::sqrt(1.0 + looks_alike * looks_alike * std::max(explained, 0.0));
+  Eigen::MatrixXd normal = fit.jacobian.transpose() * weights.asDiagonal() * fit.jacobian;
+  for (Eigen::Index i = 0; i < normal.rows(); ++i) {
+    if (fit.errors[static_cast<size_t>(i)] > 0.0) continue;
+    normal.row(i).setZero();
+    normal.col(i).setZero();
+    normal(i, i) = 1.0;
+  }
+  const Eigen::MatrixXd covariance = normal.completeOrthogonalDecomposition().pseudoInverse();
+  std::vector<double> errors;
+  for (size_t i = 0; i < fit.values.size(); ++i) {
+    const auto k = static_cast<Eigen::Index>(i);
+    const SearchScale scale = scale_of(fit, i);
+    const double slope = rig::natural_slope(scale, rig::to_search(scale, fit.values[i]));
+    const double noise_alone = std::abs(slope) * std::sqrt(std::max(covariance(k, k), 0.0));
+    errors.push_back(fit.errors[i] > 0.0 ? with_models * noise_alone : 0.0);
+  }
+  return errors;
+}
+
+std::vector<FoundEffect> found_effects(const rig::RigFit& fit, const std::vector<double>& errors) {
+  std::vector<FoundEffect> effects;
+  size_t at = nuisances;
+  for (const rig::Ingredient& ingredient : fit.ingredients) {
+    FoundEffect found;
+    found.id = ingredient.effect->text().id;
+    for (const EffectParameter& parameter : ingredient.effect->parameters()) {
+      found.parameters.push_back(
+          {std::string(parameter.name), fit.values[at], errors[at],
+           interval(parameter.scale, fit.values[at], errors[at], parameter.lower, parameter.upper)});
+      ++at;
+    }
+    for (const Occasion& occasion : ingredient.occasions)
+      found.moments.push_back({occasion.run, occasion.time_s});
+    effects.push_back(std::move(found));
+  }
+  return effects;
+}
+
+std::vector<ParameterShift> parameter_shifts(const rig::RigFit& before,
+                                             const std::vector<double>& before_errors,
+                                             const rig::RigFit& after,
+                                             const std::vector<double>& after_errors) {
+  std::vector<ParameterShift> shifts;
+  for (size_t i = 0; i < nuisances; ++i) {
+    if (before_errors[i] == 0.0 && after_errors[i] == 0.0) continue;
+    const std::string name = i == 0 ? "C1_kPa" : before.unknowns[i].name;
+    shifts.push_back({name, before.values[i], before_errors[i], after.values[i], after_errors[i]});
+  }
+  return shifts;
+}
+
+namespace {
+
+/// The widest run of phase bins that hold most of the excess.
+std::optional<std::array<double, 2>> phase_of(const std::vector<const ResidualCell*>& cells) {
+  constexpr double most = 0.7;
+  std::array<double, phase_bins> excess{};
+  double sum = 0.0;
+  for (const ResidualCell* cell : cells) {
+    if (!cell->phase) continue;
+    const auto bin = static_cast<size_t>(std::lround((*cell->phase)[0] * phase_bins));
+    excess[bin] += std::max(cell->excess(), 0.0);
+    sum += std::max(cell->excess(), 0.0);
+  }
+  if (!(sum > 0.0)) return {};
+  for (size_t width = 1; width <= phase_bins; ++width) {
+    for (size_t first = 0; first + width <= phase_bins; ++first) {
+      double part = 0.0;
+      for (size_t bin = first; bin < first + width; ++bin)
+        part += excess[bin];
+      if (part >= most * sum)
+        return std::array{static_cast<double>(first) / phase_bins,
+                          static_cast<double>(first + width) / phase_bins};
+    }
+  }
+  return {};
+}
+
+/// The effect whose leaving-out raises a block's squares most.
+std::string port_at(const rig::ResidualBlock& block, const std::vector<const rig::RigFit*>& without,
+                    const rig::RigFit& after) {
+  double largest = 0.0;
+  const Effect* effect = nullptr;
+  for (size_t member = 0; member < after.ingredients.size(); ++member) {
+    const rig::RigFit* other = member < without.size() ? without[member] : nullptr;
+    if (after.ingredients.size() == 1) {
+      effect = after.ingredients.front().effect;
+      break;
+    }
+    if (other == nullptr) continue;
+    const auto first = static_cast<Eigen::Index>(block.first);
+    const auto count = static_cast<Eigen::Index>(block.count);
+    const double rise = other->residuals.segment(first, count).squaredNorm() -
+                        after.residuals.segment(first, count).squaredNorm();
+    if (rise > largest) {
+      largest = rise;
+      effect = after.ingredients[member].effect;
+    }
+  }
+  return std::string(name_of(effect != nullptr ? effect->text().port : port_of(block.channel)));
+}
+
+}  // namespace
+
+std::vector<Misfit> misfits(const rig::Session& session, const rig::RigProblem& problem,
+                            const std::vector<ResidualCell>& cells,
+                            const std::vector<const rig::RigFit*>& without, const rig::RigFit& after) {
+  constexpr size_t most = 12;
+  using Key = std::tuple<size_t, std::string, int>;
+  std::map<Key, std::vector<const ResidualCell*>> groups;
+  std::map<std::pair<size_t, std::string>, const ResidualCell*> bands;
+  for (const ResidualCell& cell : cells) {
+    if (cell.look == Look::band) {
+      const ResidualCell*& band = bands[{cell.run, cell.channel}];
+      if (band == nullptr || cell.excess() / cell.dofs > band->excess() / band->dofs) band = &cell;
+    } else {
+      groups[{cell.run, cell.channel, cell.segment.value_or(-1)}].push_back(&cell);
+    }
+  }
+  for (const auto& [place, band] : bands) {  // a band that no phase or rest tells of
+    const bool told = std::any_of(groups.begin(), groups.end(), [&, &at = place](const auto& group) {
+      return std::get<0>(group.first) == at.first && std::get<1>(group.first) == at.second;
+    });
+    if (!told) groups[{place.first, place.second, -1}].push_back(band);
+  }
+  std::vector<Misfit> list;
+  for (const auto& [key, members] : groups) {
+    const auto& [run, channel, segment] = key;
+    Misfit misfit;
+    misfit.run = session.runs[run].drive.place.name + ".run.h5";
+    misfit.channel = channel;
+    if (segment >= 0) misfit.segment = segment;
+    misfit.phase = phase_of(members);
+    if (const auto band = bands.find({run, channel}); band != bands.end())
+      misfit.band_Hz = band->second->band_Hz;
+    for (const ResidualCell* cell : members) {
+      misfit.p_value = std::min(misfit.p_value, cell->p_value);
+      misfit.excess_chi2 = std::max(misfit.excess_chi2, 0.0);
+      if (cell->look != Look::shape && cell->look != Look::cycles) misfit.excess_chi2 += cell->excess();
+    }
+    if (misfit.excess_chi2 == 0.0)
+      for (const ResidualCell* cell : members)
+        misfit.excess_chi2 += cell->excess();
+    for (const rig::ResidualBlock& block : problem.blocks())
+      if (block.run == run && block.channel == channel) misfit.port = port_at(block, without, after);
+    list.push_back(std::move(misfit));
+  }
+  std::sort(list.begin(), list.end(),
+            [](const Misfit& a, const Misfit& b) { return a.excess_chi2 > b.excess_chi2; });
+  list.resize(std::min(list.size(), most));
+  return list;
+}
+
+std::vector<Candidate> evidence(const SearchResult& search, const Judgement& judgement,
+                                const std::vector<double>& held_out_drops) {
+  std::vector<Candidate> list;
+  const FittedSet& base = search.sets.front();
+  const FittedSet& best = search.sets[search.best];
+  for (size_t k = 1; k < search.sets.size(); ++k) {
+    const FittedSet& set = search.sets[k];
+    Candidate row{set.ids(), base.chi_square - set.chi_square, true, set.parameters(), {}, ""};
+    if (k < held_out_drops.size()) row.held_out_drop = held_out_drops[k];
+    const auto& alike = judgement.ambiguous_with;
+    if (k == search.best) {
+      row.verdict = judgement.verdict == Verdict::unexplained ? "fits best, and not well enough" : "named";
+    } else if (std::find(alike.begin(), alike.end(), row.ids) != alike.end()) {
+      row.verdict = "as good";
+    } else if (set.chi_square < best.chi_square + as_good) {
+      row.verdict = "not needed: no better than the smaller set";
+    } else {
+      row.verdict = fmt::format("refuted: {:.1f} sigma worse", std::sqrt(set.chi_square - best.chi_square));
+    }
+    list.push_back(std::move(row));
+  }
+  for (const Lead& lead : search.leads) {
+    const std::string id(lead.ingredient.effect->text().id);
+    const bool fitted = std::any_of(list.begin(), list.end(), [&](const Candidate& row) {
+      return row.refitted && row.ids == std::vector<std::string>{id};
+    });
+    if (!fitted)
+      list.push_back({{id},
+                      lead.gain,
+                      false,
+                      lead.parameters,
+                      {},
+                      lead.visibility < 3.0 ? "not visible in these data" : "screened out"});
+  }
+  std::sort(list.begin(), list.end(),
+            [](const Candidate& a, const Candidate& b) { return a.chi_square_drop > b.chi_square_drop; });
+  return list;
+}
+
+std::vector<Trace> traces(const rig::Session& session, const rig::RigProblem& problem,
+                          const rig::RigFit& before, const rig::RigFit& after) {
+  constexpr size_t kept = 4;  // every so many samples are shown
+  const auto old = problem.predictions(before.ingredients, before.values);
+  const auto now = problem.predictions(after.ingredients, after.values);
+  std::vector<Trace> list;
+  for (size_t r = 0; r < session.runs.size(); ++r) {
+    const rig::SessionRun& run = session.runs[r];
+    for (const auto& [channel, noise] : problem.noise().channels) {
+      Trace trace;
+      trace.run = run.drive.place.name + ".run.h5";
+      trace.channel = name_of(channel);
+      trace.unit = "kPa";
+      trace.noise_sd = noise.sd_kPa;
+      trace.trigger_s = run.drive.place.trigger_s;
+      const bool cavity = channel == rig::Channel::cavity;
+      for (size_t k = 0; k < run.sample_s.size(); k += kept) {
+        trace.time_s.push_back(run.sample_s[k]);
+        trace.measured.push_back(run.pressure_kPa.at(channel)[k]);
+        trace.before.push_back(cavity ? old[r].cavity_kPa[k] : old[r].pump_kPa[k]);
+        trace.after.push_back(cavity ? now[r].cavity_kPa[k] : now[r].pump_kPa[k]);
+        if (cavity) trace.cavity_mL.push_back(run.drive.motion.at(run.sample_s[k]).volume_mL);
+      }
+      list.push_back(std::move(trace));
+    }
+  }
+  return list;
+}
+
+}  // namespace diastole::explain

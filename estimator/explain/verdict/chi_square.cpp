@@ -1,0 +1,26 @@
+#include "estimator/explain/verdict/chi_square.hpp"
+
+#include <algorithm>
+#include <boost/math/special_functions/gamma.hpp>
+
+namespace diastole::explain {
+
+double chi_square_tail(double value, double dofs) {
+  if (!(value > 0.0)) return 1.0;
+  return boost::math::gamma_q(0.5 * dofs, 0.5 * value);
+}
+
+double chi_square_exceeded(double probability, double dofs) {
+  return 2.0 * boost::math::gamma_q_inv(0.5 * dofs, probability);
+}
+
+double discovery_limit(std::vector<double> p_values, double rate) {
+  std::sort(p_values.begin(), p_values.end());
+  for (size_t k = p_values.size(); k > 0; --k) {
+    const double limit = rate * static_cast<double>(k) / static_cast<double>(p_values.size());
+    if (p_values[k - 1] <= limit) return p_values[k - 1];
+  }
+  return 0.0;
+}
+
+}  // namespace diastole::explain

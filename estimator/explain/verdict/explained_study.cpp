@@ -1,0 +1,73 @@
+#include "estimator/explain/verdict/explained_study.hpp"
+
+#include <toml++/toml.h>
+
+#include <algorithm>
+#include <sstream>
+
+namespace diastole::explain {
+namespace {
+
+void move_path(toml::node& node, const std::filesystem::path& from, const std::filesystem::path& to) {
+  auto* text = node.as_string();
+  if (text == nullptr) return;
+  const auto there = std::filesystem::absolute(from / text->get()).lexically_normal();
+  *text = there.lexically_relative(std::filesystem::absolute(to).lexically_normal()).string();
+}
+
+toml::table& subtable(toml::table& parent, std::string_view key) {
+  if (parent[key].as_table() == nullptr) parent.insert_or_assign(key, toml::table{});
+  return *parent[key].as_table();
+}
+
+toml::table starts_of(const FoundEffect& effect) {
+  toml::table starts;
+  for (const FoundParameter& parameter : effect.parameters)
+    starts.insert_or_assign(parameter.name, toml::table{{"start", parameter.value}});
+  return starts;
+}
+
+toml::array moments_of(const FoundEffect& effect) {
+  toml::array moments;
+  for (const FoundMoment& moment : effect.moments)
+    moments.push_back(toml::table{{"run", moment.run}, {"time_s", moment.time_s}});
+  return moments;
+}
+
+}  // namespace
+
+std::string explained_study(const Study& study, const std::filesystem::path& folder,
+                            const std::vector<FoundEffect>& effects,
+                            const std::vector<ParameterShift>& starts) {
+  toml::table root = toml::parse_file(study.file.string());
+  const std::filesystem::path from = study.file.parent_path();
+  if (toml::table* data = root["data"].as_table()) {
+    for (const char* key : {"tags", "points", "frames"})
+      if (toml::node* path = data->get(key)) move_path(*path, from, folder);
+    if (toml::array* runs = (*data)["runs"].as_array())
+      for (toml::node& run : *runs)
+        move_path(run, from, folder);
+  }
+  if (root["specimen"]["kind"].value_or(std::string()) == "mesh")
+    if (toml::node* mesh = root["specimen"].as_table()->get("file")) move_path(*mesh, from, folder);
+  for (const ParameterShift& shift : starts) {
+    if (toml::table* parameter = root["law"]["parameters"][shift.name].as_table()) {
+      const double lower = (*parameter)["bounds"][0].value_or(shift.after);
+      const double upper = (*parameter)["bounds"][1].value_or(shift.after);
+      parameter->insert_or_assign("start", std::clamp(shift.after, lower, upper));
+    }
+  }
+  toml::table& model = subtable(root, "model");
+  toml::array ids;
+  for (const FoundEffect& effect : effects) {
+    ids.push_back(effect.id);
+    subtable(model, "parameters").insert_or_assign(effect.id, starts_of(effect));
+    if (!effect.moments.empty()) subtable(model, "moments").insert_or_assign(effect.id, moments_of(effect));
+  }
+  model.insert_or_assign("effects", std::move(ids));
+  std::ostringstream text;
+  text << root << '\n';
+  return text.str();
+}
+
+}  // namespace diastole::explain

@@ -1,0 +1,121 @@
+#include "estimator/model/affected_model.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "estimator/effects/effect.hpp"
+#include "estimator/io/study_refusal.hpp"
+#include "estimator/model/study_model.hpp"
+
+namespace diastole {
+namespace {
+
+const Effect& effect_of(const Study& study, const std::string& id) {
+  if (const Effect* effect = find_effect(id)) return *effect;
+  refuse(study, "model.effects", fmt::format("there is no effect \"{}\"", id),
+         "`diastole effects` lists those that are known.");
+}
+
+bool shows_in_images(const Study& study) {
+  return std::ranges::any_of(
+      study.effects, [&](const std::string& id) { return !effect_of(study, id).field_parameters().empty(); });
+}
+
+/// Fibres on cylinders about z, at an angle from the circumference towards z.
+MaterialAxesField helical_axes(double angle_deg) {
+  const double angle = angle_deg * std::numbers::pi / 180.0;
+  return [angle](const HermiteMesh& mesh, const MaterialPoint& point) {
+    const Eigen::Vector3d X_mm = mesh.value(mesh.reference(), point);
+    const Eigen::Vector3d outwards = Eigen::Vector3d(X_mm[0], X_mm[1], 0.0).normalized();
+    const Eigen::Vector3d around(-outwards[1], outwards[0], 0.0);
+    const Eigen::Vector3d up = Eigen::Vector3d::UnitZ();
+    MaterialAxes axes;
+    axes << std::cos(angle) * around + std::sin(angle) * up, std::cos(angle) * up - std::sin(angle) * around,
+        outwards;
+    return axes;
+  };
+}
+
+/// Both ends kept in their planes by the plates, and on springs across z.
+void let_ends_slip(const HermiteMesh& mesh, double stiffness_kPa_per_mm, ElasticOptions& options) {
+  HeldDofs held = hold_nothing(mesh);
+  for (const auto* faces : {&mesh.faces().bottom, &mesh.faces().top}) {
+    hold_face_component(mesh, *faces, 2, held);
+    options.bonded.push_back({*faces, {0.0, stiffness_kPa_per_mm}});
+  }
+  options.held = std::move(held);
+}
+
+/// A study whose specimen may have field effects.
+void require_base(const Study& study) {
+  const auto* annulus = std::get_if<AnnulusSpecimen>(&study.specimen);
+  if (annulus == nullptr || annulus->ends != "fixed" || study.law.name != "neo-hookean" || study.chamber)
+    refuse(
+        study, "model.effects",
+        "effects that show in images start from neo-Hookean gel in an annulus whose ends are fixed, without "
+        "a [chamber]",
+        "Leave the list empty, or describe such a specimen.");
+}
+
+}  // namespace
+
+FieldModel field_model_of(const Study& study) {
+  const auto& annulus = std::get<AnnulusSpecimen>(study.specimen);
+  FieldModel model;
+  model.inner_radius_mm = annulus.inner_radius_mm;
+  model.outer_radius_mm = annulus.outer_radius_mm;
+  model.height_mm = annulus.height_mm;
+  for (const std::string& id : study.effects) {
+    const Effect& effect = effect_of(study, id);
+    std::vector<double> values = effect.field_neutral(model);
+    const auto told = std::ranges::find(study.effect_values, id, &StudyEffect::id);
+    for (size_t i = 0; told != study.effect_values.end() && i < values.size(); ++i) {
+      const auto start = told->starts.find(std::string(effect.field_parameters()[i].name));
+      if (start != told->starts.end()) values[i] = start->second;
+    }
+    if (!values.empty()) effect.apply_to_field(values, model);
+  }
+  return model;
+}
+
+FieldElasticity elasticity_of(const FieldModel& model, const HermiteMesh& mesh, double C1_kPa) {
+  FieldElasticity result;
+  ElasticOptions& options = result.options;
+  const bool plain = model.beta == 0.0 && model.k1_kPa == 0.0;
+  result.law = find_law(plain ? "neo-hookean" : "fibre-reinforced");
+  options.parameters = plain ? std::vector{C1_kPa} : std::vector{C1_kPa, model.beta, model.k1_kPa, model.k2};
+  if (!plain) options.material_axes = helical_axes(model.fibre_angle_deg);
+  if (model.bond_stiffness_kPa_per_mm) let_ends_slip(mesh, *model.bond_stiffness_kPa_per_mm, options);
+  if (model.chamber_stiffness_kPa_per_mL != 0.0)
+    options.chamber = Chamber{.compliance_mL_per_kPa = 1.0 / model.chamber_stiffness_kPa_per_mL};
+  if (model.inclusion) {
+    options.stiffness = [inclusion = *model.inclusion](const Eigen::Vector3d& X_mm) {
+      return inclusion.stiffness({X_mm[0], X_mm[1], X_mm[2]});
+    };
+  }
+  return result;
+}
+
+ElasticModel make_affected_model(const Study& study, SolveOptions options) {
+  Study plain = study;
+  plain.effects.clear();
+  if (!shows_in_images(study)) return make_model(plain, std::move(options));
+  require_base(study);
+  const FieldModel field = field_model_of(study);
+  std::get<AnnulusSpecimen>(plain.specimen).inner_radius_mm = field.inner_radius_mm;
+  const ElasticModel base = make_model(plain);
+  FieldElasticity elastic = elasticity_of(field, base.mesh(), base.element_parameter(0, 0));
+  elastic.options.solve = std::move(options);
+  elastic.options.bulk_modulus_kPa = study.compression.bulk_modulus_kPa;
+  elastic.options.volume_stiffness_kPa = study.compression.volume_stiffness_kPa;
+  return {base.mesh(), *elastic.law, std::move(elastic.options)};
+}
+
+double displacement_gain_of(const Study& study) {
+  return shows_in_images(study) ? field_model_of(study).displacement_gain : 1.0;
+}
+
+}  // namespace diastole

@@ -1,0 +1,28 @@
+#pragma once
+// The forward model of a study whose [model] names effects that show in images (field_model.hpp), at the values stated
+// there: what `solve`, `pv` and `fit` use of explained.study.toml. Effects of the rig alone leave the specimen as it is.
+
+#include "estimator/fe/elastic_model.hpp"
+#include "estimator/io/study.hpp"
+#include "estimator/model/field_model.hpp"
+
+namespace diastole {
+
+/// The study's specimen with its effects. Throws InputError for an effect that does not exist. Precondition: an annulus.
+FieldModel field_model_of(const Study& study);
+
+/// Law and options for a mesh of the model's geometry, tolerances left to the caller.
+struct FieldElasticity {
+  const Law* law;
+  ElasticOptions options;
+};
+FieldElasticity elasticity_of(const FieldModel& model, const HermiteMesh& mesh, double C1_kPa);
+
+/// make_model (estimator/model/study_model.hpp) with the study's effects. Throws InputError besides if the specimen cannot have
+/// them: they start from a neo-Hookean annulus with held ends and no [chamber].
+ElasticModel make_affected_model(const Study& study, SolveOptions options = {});
+
+/// Displacement as imaged over the true one: 1 unless the study has `tag-bias`.
+double displacement_gain_of(const Study& study);
+
+}  // namespace diastole
