@@ -17,7 +17,7 @@
 //   singular R(t) = (1 - w) [A + (B - A) t] + w A (B/A)^t  elements shrink towards the cavity, where
 //   displacement falls as 1/R
 // Both are smooth, so that all scale factors are one. The defaults are measured:
-// docs/decisions/0010-annulus-grading.md.
+// docs/decisions/0010-meshes-are-graded-halved-and-drawn-exactly.md.
 
 #include <array>
 #include <cstddef>

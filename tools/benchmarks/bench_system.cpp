@@ -3,7 +3,7 @@
 //
 //   tools/bench system [--rounds N]     least times of N rounds, taken in turn
 //
-// The figures are in docs/decisions/0012 and 0077.
+// The figures are in docs/decisions/0012.
 
 #include <fmt/format.h>
 

@@ -7,7 +7,7 @@
 //        + ((inner radius - seen) / sigma)^2, if frame 0 shows where the wall begins
 //
 // A study whose bounds of C1 are within 5 % of its start states an independent test's result: they are its interval of
-// two standard deviations (docs/decisions/0070-narrow-bounds-are-a-measurement.md).
+// two standard deviations (docs/decisions/0071-field-effects-against-rivals.md).
 
 #include <Eigen/Dense>
 #include <functional>

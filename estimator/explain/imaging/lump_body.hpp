@@ -4,7 +4,7 @@
 //   R(x; m) = 0,     dx/dm_i = - K^-1 dR/dm_i
 //
 // with m the stiffness from place to place: at a Gauss point the mean over the part of the element that it stands for, because a
-// lump's edge is as sharp as Gauss points are apart, and what is only sampled there moves by leaps. The factor of K is kept while the lump changes little (decision 0090): Broyden's
+// lump's edge is as sharp as Gauss points are apart, and what is only sampled there moves by leaps. The factor of K is kept while the lump changes little (decision 0071): Broyden's
 // corrections (estimator/fe/kept_factor.hpp) find the equilibrium with it, and derivatives are right to the lump's change since.
 
 #include <array>

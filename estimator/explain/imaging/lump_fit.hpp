@@ -4,7 +4,7 @@
 // What a lump adds to the motion at the highest pressure is that of equilibria with it (lump_body.hpp); in the other frames it
 // is taken to grow as what a change of C1 does. C1 and the frames' pressures answer linearly, by the base fit's Jacobian. A full
 // fit corrects this, at the best lump and by its slopes there, by what a finer mesh says, equilibria at three pressures, and tags
-// followed through the whole motion (decision 0091).
+// followed through the whole motion (decision 0071).
 
 #include "estimator/explain/imaging/field_fit.hpp"
 
