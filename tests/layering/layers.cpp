@@ -57,6 +57,7 @@ const std::vector<Rule>& rules() {
       {"firmware/boards", {"protocol/wire", "firmware/core", "firmware/boot"}},
       {"firmware/boot", {"protocol/wire"}},
       {"host", {"protocol"}},
+      {"estimator/inference", {"protocol/contract"}},
       {"estimator", {"protocol/contract", "protocol/runfile", "protocol/signal"}},
       {"tools/sim_rig", {"protocol", "firmware", "host", "tools/sim_board", "tools/sim_daq"}},
       {"tools", {"protocol", "firmware", "host", "estimator"}},
