@@ -13,9 +13,9 @@
 #include <string_view>
 #include <vector>
 
-#include "estimator/model/field_model.hpp"
+#include "estimator/effects/field_model.hpp"
 #include "estimator/rig/rig_model.hpp"
-#include "estimator/rig/specimen_family.hpp"
+#include "estimator/rig/specimen_curves.hpp"
 
 namespace diastole {
 
@@ -73,15 +73,15 @@ class Effect {
   [[nodiscard]] virtual Stage stage() const { return Stage::plant; }
   [[nodiscard]] virtual Occasions occasions() const { return Occasions::none; }
   /// Whether the specimen can have it.
-  [[nodiscard]] virtual bool fits(const rig::SpecimenFamily&) const { return true; }
+  [[nodiscard]] virtual bool fits(const rig::SpecimenCurves&) const { return true; }
   /// The values that leave `base` as it is.
   [[nodiscard]] virtual std::vector<double> neutral(const rig::RigModel& base) const;
 
   /// What apply needs besides the model.
   struct Context {
-    const rig::SpecimenFamily& family;
+    const rig::SpecimenCurves& family;
     std::span<const Occasion> occasions = {};
-    bool rough = false;  ///< specimens' neighbours may be (specimen_family.hpp)
+    bool rough = false;  ///< specimens' neighbours may be (specimen_curves.hpp)
   };
   /// Adds itself to the model. `values`: one a parameter. The model's curve and modulus must be set.
   virtual void apply(std::span<const double> values, const Context& context, rig::RigModel& model) const = 0;
@@ -102,7 +102,7 @@ class Effect {
 class FieldEffect : public Effect {
  public:
   [[nodiscard]] std::span<const EffectParameter> parameters() const final { return {}; }
-  [[nodiscard]] bool fits(const rig::SpecimenFamily&) const final { return false; }
+  [[nodiscard]] bool fits(const rig::SpecimenCurves&) const final { return false; }
   void apply(std::span<const double>, const Context&, rig::RigModel&) const final {}
 };
 

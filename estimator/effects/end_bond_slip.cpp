@@ -32,7 +32,7 @@ class EndBondSlip final : public Effect {
         {{"bond_compliance_mm_per_kPa", "mm/kPa", "slip across the axis by traction", 0.0, 0.0, 10.0, 1.0}}};
     return list;
   }
-  [[nodiscard]] bool fits(const rig::SpecimenFamily& family) const override {
+  [[nodiscard]] bool fits(const rig::SpecimenCurves& family) const override {
     return family.has_neighbours();
   }
   void apply(std::span<const double> values, const Context& context, rig::RigModel& model) const override {

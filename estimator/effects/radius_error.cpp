@@ -31,7 +31,7 @@ class RadiusError final : public Effect {
           0.04}}};
     return list;
   }
-  [[nodiscard]] bool fits(const rig::SpecimenFamily& family) const override {
+  [[nodiscard]] bool fits(const rig::SpecimenCurves& family) const override {
     return family.has_neighbours();
   }
   void apply(std::span<const double> values, const Context& context, rig::RigModel& model) const override {

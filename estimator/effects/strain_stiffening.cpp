@@ -28,7 +28,7 @@ class StrainStiffening final : public Effect {
         {{"beta", "", "stiffening with I1 - 3", 0.0, 0.0, 3.0, 1.0}}};
     return list;
   }
-  [[nodiscard]] bool fits(const rig::SpecimenFamily& family) const override {
+  [[nodiscard]] bool fits(const rig::SpecimenCurves& family) const override {
     return family.has_neighbours();
   }
   void apply(std::span<const double> values, const Context& context, rig::RigModel& model) const override {

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <utility>
 
-#include "estimator/fe/parallel_for.hpp"
+#include "estimator/parallel/parallel_for.hpp"
 
 namespace diastole {
 

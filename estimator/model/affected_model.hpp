@@ -2,9 +2,9 @@
 // The forward model of a study whose [model] names effects that show in images (field_model.hpp), at the values stated
 // there: what `solve`, `pv` and `fit` use of explained.study.toml. Effects of the rig alone leave the specimen as it is.
 
+#include "estimator/effects/field_model.hpp"
 #include "estimator/fe/elastic_model.hpp"
 #include "estimator/io/study.hpp"
-#include "estimator/model/field_model.hpp"
 
 namespace diastole {
 

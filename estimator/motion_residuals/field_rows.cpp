@@ -5,8 +5,8 @@
 #include <optional>
 #include <thread>
 
-#include "estimator/fe/parallel_for.hpp"
 #include "estimator/motion_residuals/tag_match.hpp"
+#include "estimator/parallel/parallel_for.hpp"
 
 namespace diastole::explain {
 namespace {

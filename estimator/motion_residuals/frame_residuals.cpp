@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <thread>
 
-#include "estimator/fe/parallel_for.hpp"
+#include "estimator/parallel/parallel_for.hpp"
 
 namespace diastole {
 namespace {

@@ -4,7 +4,7 @@
 #include <limits>
 #include <utility>
 
-#include "estimator/fe/parallel_for.hpp"
+#include "estimator/parallel/parallel_for.hpp"
 #include "estimator/rig_fit/rig_fit.hpp"
 
 namespace diastole::rig {

@@ -16,7 +16,7 @@
 #include <map>
 #include <vector>
 
-#include "estimator/rig/session.hpp"
+#include "estimator/model/session.hpp"
 
 namespace diastole::rig {
 

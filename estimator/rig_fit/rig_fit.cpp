@@ -5,7 +5,7 @@
 #include <limits>
 #include <utility>
 
-#include "estimator/fe/parallel_for.hpp"
+#include "estimator/parallel/parallel_for.hpp"
 #include "estimator/rig/sampled_signal.hpp"
 #include "estimator/rig_fit/search_scale.hpp"
 

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "estimator/effects/effect.hpp"
+#include "estimator/model/specimen_family.hpp"
 #include "estimator/rig_fit/noise_model.hpp"
 
 namespace diastole::rig {

@@ -21,9 +21,9 @@
 
 #include "estimator/fe/elastic_model.hpp"
 #include "estimator/fe/elastic_system.hpp"
-#include "estimator/fe/parallel_for.hpp"
 #include "estimator/fe/sparse_factor.hpp"
 #include "estimator/mesh/annulus.hpp"
+#include "estimator/parallel/parallel_for.hpp"
 
 namespace diastole {
 namespace {

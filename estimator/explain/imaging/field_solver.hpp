@@ -1,5 +1,5 @@
 #pragma once
-// Equilibria of a specimen with field effects (estimator/model/field_model.hpp), and their exact derivatives.
+// Equilibria of a specimen with field effects (estimator/effects/field_model.hpp), and their exact derivatives.
 //
 // The mesh's topology is fixed; the model, its inner radius included, may change between solutions, each of which
 // starts from the displacements of the last one. A derivative with respect to anything in the model comes from the
@@ -14,9 +14,9 @@
 #include <optional>
 #include <vector>
 
+#include "estimator/effects/field_model.hpp"
 #include "estimator/fe/elastic_model.hpp"
 #include "estimator/mesh/point_locator.hpp"
-#include "estimator/model/field_model.hpp"
 
 namespace diastole::explain {
 

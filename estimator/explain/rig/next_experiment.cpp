@@ -8,7 +8,7 @@
 #include <functional>
 #include <limits>
 
-#include "estimator/fe/parallel_for.hpp"
+#include "estimator/parallel/parallel_for.hpp"
 #include "estimator/rig_fit/search_scale.hpp"
 
 namespace diastole::explain {

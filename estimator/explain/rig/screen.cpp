@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "estimator/fe/parallel_for.hpp"
+#include "estimator/parallel/parallel_for.hpp"
 #include "estimator/rig_fit/moment_search.hpp"
 #include "estimator/rig_fit/search_scale.hpp"
 

@@ -11,7 +11,7 @@
 
 #include "estimator/explain/rig/tolerance.hpp"
 #include "estimator/explain/verdict/chi_square.hpp"
-#include "estimator/fe/parallel_for.hpp"
+#include "estimator/parallel/parallel_for.hpp"
 
 namespace diastole::explain {
 namespace {

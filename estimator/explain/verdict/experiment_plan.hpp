@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "estimator/rig/session.hpp"
+#include "estimator/model/session.hpp"
 #include "protocol/runfile/run.hpp"
 
 namespace diastole::explain {

@@ -1,4 +1,4 @@
-#include "estimator/fe/parallel_for.hpp"
+#include "estimator/parallel/parallel_for.hpp"
 
 #include <gtest/gtest.h>
 

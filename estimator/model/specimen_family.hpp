@@ -19,7 +19,7 @@
 #include <vector>
 
 #include "estimator/io/study.hpp"
-#include "estimator/rig/specimen_curve.hpp"
+#include "estimator/rig/specimen_curves.hpp"
 
 namespace diastole::rig {
 
@@ -36,13 +36,13 @@ struct SpecimenResolution {
   [[nodiscard]] SpecimenResolution reaching(double volume_mL) const;
 };
 
-class SpecimenFamily {
+class SpecimenFamily final : public SpecimenCurves {
  public:
   /// Throws InputError if the study's law or mesh is wrong or the cavity is open.
   explicit SpecimenFamily(Study study, const SpecimenResolution& resolution = {});
 
   /// Of the study's own specimen and law, its parameters at their starts divided by the modulus.
-  [[nodiscard]] const SpecimenCurve& plain() const;
+  [[nodiscard]] const SpecimenCurve& plain() const override;
   /// Begins to compute plain() and the rough neighbours beside other work, so that they are at hand when asked for. One
   /// thread: the BLAS under the solver bears no more. Stopped by the destructor, after the curve at work.
   void compute_ahead();
@@ -50,15 +50,10 @@ class SpecimenFamily {
   [[nodiscard]] double modulus_start_kPa() const { return modulus_kPa_; }
   [[nodiscard]] const StudyParameter& modulus() const;
 
-  /// Neighbours exist for a cylinder of neo-Hookean material.
-  [[nodiscard]] bool has_neighbours() const;
-  // `rough`: how the neighbour differs is taken from the coarse mesh alone, which tells it within some percent at once.
-  /// The inner radius is larger by this part, within +-0.1.
-  [[nodiscard]] SpecimenCurve with_inner_radius(double fraction, bool rough = false) const;
-  /// W = C1/beta (exp(beta (I1 - 3)) - 1), beta in [0, 3].
-  [[nodiscard]] SpecimenCurve stiffened(double beta, bool rough = false) const;
-  /// The plates hold the ends along the axis; across it they yield by this compliance times C1, mm.
-  [[nodiscard]] SpecimenCurve slipping(double compliance_mm, bool rough = false) const;
+  [[nodiscard]] bool has_neighbours() const override;
+  [[nodiscard]] SpecimenCurve with_inner_radius(double fraction, bool rough) const override;
+  [[nodiscard]] SpecimenCurve stiffened(double beta, bool rough) const override;
+  [[nodiscard]] SpecimenCurve slipping(double compliance_mm, bool rough) const override;
 
  private:
   /// Specimens that differ by one value.

@@ -1,4 +1,4 @@
-#include "estimator/rig/session.hpp"
+#include "estimator/model/session.hpp"
 
 #include <fmt/format.h>
 

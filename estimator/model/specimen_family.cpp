@@ -1,4 +1,4 @@
-#include "estimator/rig/specimen_family.hpp"
+#include "estimator/model/specimen_family.hpp"
 
 #include <fmt/format.h>
 
