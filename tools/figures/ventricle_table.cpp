@@ -1,7 +1,7 @@
 // A ventricle at known parameters against another solver's displacements in the last frame, on several meshes: the table of
 // docs/verification.md.
 //
-//   ventricle_table ../shared/data/fe/lv-clean.study.toml > table.md
+//   ventricle_table examples/lv-clean.study.toml > table.md
 //
 // The study gives body, fibres, frames and points; the parameters are lv-clean's true ones.
 

@@ -1,10 +1,12 @@
-// Explanations of recordings that an independent solver made (../shared/data/README.md). Skipped where they are absent.
+// Explanations of recordings that an independent solver made (two of them in tests/data/fe). The others are
+// skipped where they are absent.
 
 #include <gtest/gtest.h>
 
 #include <filesystem>
 
 #include "estimator/explain/imaging/explain_field.hpp"
+#include "tests/recorded_data.hpp"
 
 namespace diastole::explain {
 namespace {
@@ -18,8 +20,7 @@ struct Known {
 class RecordedField : public testing::TestWithParam<Known> {};
 
 TEST_P(RecordedField, IsExplained) {
-  const std::filesystem::path study =
-      std::filesystem::path(DIASTOLE_SOURCE_DIR) / "../shared/data/fe" / GetParam().study;
+  const std::filesystem::path study = test::recorded(std::string("fe/") + GetParam().study);
   if (!std::filesystem::exists(study)) GTEST_SKIP() << study << " is not there";
   const Explanation explanation = explain_field(read_study(study));
   EXPECT_EQ(name_of(explanation.verdict), name_of(GetParam().verdict)) << explanation.summary;

@@ -1,33 +1,28 @@
-// Recordings of an independent program (../shared/data/rig beside the source tree), explained end to end.
+// Recordings of an independent program (tests/data/rig), explained end to end.
 
 #include <gmock/gmock.h>
 
 #include <filesystem>
 
 #include "estimator/explain/rig/explain_rig.hpp"
+#include "tests/recorded_data.hpp"
 
 namespace diastole::explain {
 namespace {
 
 Explanation explained(const std::string& name) {
-  const auto folder = std::filesystem::path(DIASTOLE_SOURCE_DIR) / "../shared/data/rig" / name;
+  const auto folder = test::recorded("rig/" + name);
   return explain_rig(read_study(folder / (name + ".study.toml")),
                      {.threads = 2, .propose = false, .progress = {}});
 }
 
-bool absent() {
-  return !std::filesystem::exists(std::filesystem::path(DIASTOLE_SOURCE_DIR) / "../shared/data/rig");
-}
-
 TEST(RecordedExplanations, NothingIsNamedWhereNothingIsHidden) {
-  if (absent()) GTEST_SKIP() << "no ../shared/data/rig beside the source tree";
   const Explanation found = explained("case-030");
   EXPECT_EQ(found.verdict, Verdict::none);
   EXPECT_TRUE(found.effects.empty());
 }
 
 TEST(RecordedExplanations, ASoftHoseIsNamedWithItsWaveSpeed) {
-  if (absent()) GTEST_SKIP() << "no ../shared/data/rig beside the source tree";
   const Explanation found = explained("case-054");
   EXPECT_EQ(found.verdict, Verdict::named);
   ASSERT_EQ(found.effects.size(), 1U);

@@ -1,4 +1,4 @@
-// Estimates from data that an independent solver made (../shared/data/fe beside the source; skipped where absent).
+// Estimates from data that an independent solver made (tests/data/fe).
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -12,17 +12,15 @@
 #include "estimator/fit/study_fit.hpp"
 #include "estimator/model/study_model.hpp"
 #include "estimator/montecarlo/synthetic_data.hpp"
+#include "tests/recorded_data.hpp"
 
 namespace diastole {
 namespace {
 
-const std::filesystem::path data = std::filesystem::path(DIASTOLE_SOURCE_DIR) / "../shared/data/fe";
+const std::filesystem::path data = test::recorded("fe");
 
 class IndependentData : public testing::Test {
  protected:
-  void SetUp() override {
-    if (!std::filesystem::exists(data)) GTEST_SKIP() << "skipped: there is no " << data.string();
-  }
   static FitRecord fit(const char* name, const StudyFitOptions& options = {}) {
     const Study study = read_study(data / name);
     return fit_study(study, read_measurement(study), options);

@@ -7,16 +7,15 @@
 
 #include "estimator/fit/study_fit.hpp"
 #include "estimator/reconstruction/study_reconstruction.hpp"
+#include "tests/recorded_data.hpp"
 
 namespace diastole {
 namespace {
 
-const std::filesystem::path folder = std::filesystem::path(DIASTOLE_SOURCE_DIR) / "../shared/data/fe";
-
 class SoundData : public testing::TestWithParam<const char*> {};
 
 TEST_P(SoundData, IsMetWithSilence) {
-  const std::filesystem::path file = folder / (std::string(GetParam()) + ".study.toml");
+  const std::filesystem::path file = test::recorded("fe/" + std::string(GetParam()) + ".study.toml");
   if (!std::filesystem::exists(file)) GTEST_SKIP() << file << " is not there";
   const Study study = read_study(file);
   for (const Finding& finding : examine_measurement(study, read_measurement(study))) {
@@ -30,8 +29,7 @@ INSTANTIATE_TEST_SUITE_P(Recorded, SoundData,
                                          "field-009", "field-010", "field-011", "lv-a", "lv-clean"));
 
 TEST(RecordedData, ReconstructedPointsGiveTheSameStiffness) {
-  const std::filesystem::path file = folder / "phantom-a.study.toml";
-  if (!std::filesystem::exists(file)) GTEST_SKIP() << file << " is not there";
+  const std::filesystem::path file = test::recorded("fe/phantom-a.study.toml");
   const Study study = read_study(file);
   const Measurement measurement = read_measurement(study);
   const StudyReconstruction reconstruction = reconstruct_study(study, measurement, {});

@@ -1,4 +1,4 @@
-// The base model against recordings of another program in which nothing is hidden (../shared/data/rig): whatever is
+// The base model against recordings of another program in which nothing is hidden (tests/data/rig): whatever is
 // left over there is the model's fault, and every later explanation would be wrong by it.
 
 #include <gtest/gtest.h>
@@ -6,18 +6,17 @@
 #include <filesystem>
 
 #include "estimator/rig_fit/rig_fit.hpp"
+#include "tests/recorded_data.hpp"
 
 namespace diastole::rig {
 namespace {
 
 TEST(RecordedSessions, WithNothingHiddenTheBaseModelMeetsTheNoise) {
-  const std::filesystem::path folder = std::filesystem::path(DIASTOLE_SOURCE_DIR) / "../shared/data/rig";
-  if (!std::filesystem::exists(folder)) GTEST_SKIP() << "no recordings in " << folder;
   std::unique_ptr<SpecimenFamily> family;
   const std::vector<std::pair<std::string, double>> sessions{
       {"case-028", 11.9097}, {"case-050", 8.39819}, {"case-009", 5.87946}};
   for (const auto& [name, modulus_kPa] : sessions) {
-    const Study study = read_study(folder / name / (name + ".study.toml"));
+    const Study study = read_study(test::recorded("rig/" + name) / (name + ".study.toml"));
     if (!family) family = std::make_unique<SpecimenFamily>(study);
     const Session session = read_session(study);
     const RigProblem problem(session, *family);

@@ -1,5 +1,5 @@
 // Recordings that an independent program made must open and bin without complaint: three small ones in
-// examples/, and the whole set beside the source tree where it is there.
+// examples/, sessions in tests/data, and the whole set beside the source tree where it is there.
 
 #include <gmock/gmock.h>
 
@@ -55,13 +55,11 @@ TEST(Recordings, TheExampleWithoutAnEffectBinsWhole) {
   EXPECT_TRUE(assess(run).sound());
 }
 
-TEST(Recordings, EverySessionBesideTheSourceTreeOpensAndBins) {
-  const auto folder = source_dir.parent_path() / "shared/data/rig";
-  if (!std::filesystem::exists(folder)) {
-    GTEST_SKIP() << "the recorded sessions are not at " << folder << "; those in examples/ were tested";
-  }
+TEST(Recordings, EverySessionOpensAndBins) {
+  const auto whole = source_dir.parent_path() / "shared/data/rig";
   size_t runs = 0;
-  for (const auto& entry : std::filesystem::recursive_directory_iterator(folder)) {
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(
+           std::filesystem::exists(whole) ? whole : source_dir / "tests/data/rig")) {
     if (!entry.path().string().ends_with(".run.h5")) continue;
     SCOPED_TRACE(entry.path());
     const RecordedRun run = read_run(entry.path());
@@ -71,7 +69,7 @@ TEST(Recordings, EverySessionBesideTheSourceTreeOpensAndBins) {
     EXPECT_TRUE(assess(run).sound());
     ++runs;
   }
-  EXPECT_GT(runs, 54U);
+  EXPECT_GT(runs, 15U);
 }
 
 }  // namespace

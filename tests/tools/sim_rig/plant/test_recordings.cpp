@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include "protocol/runfile/reader.hpp"
+#include "tests/recorded_data.hpp"
 #include "tools/sim_rig/plant/plant.hpp"
 
 namespace diastole::sim_rig {
@@ -17,9 +18,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-const fs::path recordings = fs::path(DIASTOLE_SOURCE_DIR) / "../shared/data/rig";
+const fs::path recordings = test::recorded("rig");
 
-/// Tells the plant a volume trace as edges every half millisecond, the line between two points in small
+/// Gives the plant a volume trace as edges every half millisecond, the line between two points in small
 /// stairs.
 void displace_between(Plant& plant, const runfile::PumpTrace& pump, size_t i) {
   constexpr int stairs = 7;
@@ -41,10 +42,10 @@ double rms_difference_kPa(const runfile::RecordedRun& run, double C1_kPa, double
   const auto& pressure = run.pressure;
   const auto& cavity_kPa = pressure.channels.at("cavity_kPa");
   double sum = 0;
-  size_t told = 0;
+  size_t given = 0;
   for (size_t k = 0; k < pressure.time_s.size(); ++k) {
-    for (; told + 1 < run.pump.time_s.size() && run.pump.time_s[told] <= pressure.time_s[k]; ++told) {
-      displace_between(plant, run.pump, told);
+    for (; given + 1 < run.pump.time_s.size() && run.pump.time_s[given] <= pressure.time_s[k]; ++given) {
+      displace_between(plant, run.pump, given);
     }
     plant.advance_to(pressure.time_s[k]);
     sum += std::pow(plant.cavity_reading_kPa() - cavity_kPa[k], 2);
@@ -56,16 +57,15 @@ constexpr double bound_kPa = 0.025;
 
 TEST(PlantAgainstTheExample, CavityPressureIsTheRecorded) {
   const auto run = runfile::read_run(fs::path(DIASTOLE_SOURCE_DIR) / "examples/recorded-no-effect.run.h5");
-  constexpr double C1_kPa = 5.87946;  // what the recording program was told
+  constexpr double C1_kPa = 5.87946;  // of the recording program
   constexpr double offset_kPa = -0.00716721;
   EXPECT_LT(rms_difference_kPa(run, C1_kPa, offset_kPa), bound_kPa);
-  EXPECT_GT(rms_difference_kPa(run, 1.05 * C1_kPa, offset_kPa), bound_kPa) << "the bound must tell 5 %";
+  EXPECT_GT(rms_difference_kPa(run, 1.05 * C1_kPa, offset_kPa), bound_kPa) << "the bound must see 5 %";
 }
 
 class PlantAgainstRecording : public testing::TestWithParam<const char*> {};
 
 TEST_P(PlantAgainstRecording, CavityPressureIsTheRecorded) {
-  if (!fs::exists(recordings)) GTEST_SKIP() << recordings << " is not there";
   std::ifstream labels_file(recordings / "labels.json");
   const auto label = nlohmann::json::parse(labels_file).at(GetParam());
   ASSERT_EQ(label.at("kind"), "none");
