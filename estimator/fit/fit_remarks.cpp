@@ -182,20 +182,20 @@ void add_unsought_offset(std::vector<std::string>& remarks, const FitRecord& rec
 }
 
 void add_undeformed(std::vector<std::string>& remarks, const FitRecord& record) {
-  if (record.undeformed_points == 0) return;
+  if (record.undeformed.points == 0) return;
   const double off =
-      deviation(record.undeformed_chi2_per_residual, static_cast<double>(record.undeformed_residuals));
+      deviation(record.undeformed.chi2_per_residual, static_cast<double>(record.undeformed.residuals));
   if (off > telling_deviation) {
     remarks.push_back(fmt::format(
         "Frame 0 contradicts the data's own frame of reference: its {} points miss their undeformed "
         "places by more than the noise (chi2/residual = {:.2f}, mean {:+.3f} mm). Check plane_mm, "
         "the axes, and that frame 0 is unloaded.",
-        record.undeformed_points, record.undeformed_chi2_per_residual, record.undeformed_mean_mm));
+        record.undeformed.points, record.undeformed.chi2_per_residual, record.undeformed.mean_mm));
   } else {
     remarks.push_back(fmt::format(
         "Frame 0, which is not fitted, confirms the noise: its {} points miss their undeformed places "
         "with chi2/residual = {:.2f} and a mean of {:+.3f} mm.",
-        record.undeformed_points, record.undeformed_chi2_per_residual, record.undeformed_mean_mm));
+        record.undeformed.points, record.undeformed.chi2_per_residual, record.undeformed.mean_mm));
   }
 }
 

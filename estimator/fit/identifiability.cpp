@@ -44,11 +44,10 @@ std::vector<Pair> trading_pairs(const FitRecord& record) {
 
 std::string changes(const FittedDirection& direction) {
   std::vector<std::string> parts;
-  for (size_t i = 0; i < direction.names.size(); ++i) {
-    if (std::abs(direction.change[i]) < small_share) continue;
-    parts.push_back(fmt::format("{} {} by {:.2g} %", direction.names[i],
-                                direction.change[i] > 0 ? "up" : "down",
-                                100 * direction.relative_sd * std::abs(direction.change[i])));
+  for (const auto& [name, change] : direction.change) {
+    if (std::abs(change) < small_share) continue;
+    parts.push_back(fmt::format("{} {} by {:.2g} %", name, change > 0 ? "up" : "down",
+                                100 * direction.relative_sd * std::abs(change)));
   }
   return fmt::format("{}", fmt::join(parts, ", "));
 }
@@ -82,8 +81,10 @@ std::vector<FittedDirection> directions_of(const FitRecord& record, const FitOut
     Eigen::Index largest = 0;
     change.cwiseAbs().maxCoeff(&largest);
     if (change[largest] < 0) change = -change;
-    directions.push_back(
-        {std::sqrt(std::max(0.0, solver.eigenvalues()[k])), names, {change.begin(), change.end()}});
+    FittedDirection direction{std::sqrt(std::max(0.0, solver.eigenvalues()[k])), {}};
+    for (Eigen::Index i = 0; i < count; ++i)
+      direction.change.emplace_back(names[static_cast<size_t>(i)], change[i]);
+    directions.push_back(std::move(direction));
   }
   return directions;
 }

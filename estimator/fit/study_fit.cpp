@@ -124,7 +124,7 @@ void record_parameters(FitRecord& record, const Study& study, const FitOutcome& 
   }
   record.directions = directions_of(record, fit, places);
   if (const auto& offset = fit.pressure_offset) {
-    record.pressure_offset_kPa = {offset->value_kPa, offset->se_kPa};
+    record.pressure_offset_kPa = FittedOffset{offset->value_kPa, offset->se_kPa};
     record.remarks.push_back(fmt::format(
         "The pressures differ from the true ones by {:+.4f} ± {:.4f} kPa, as far as these data tell{}; the "
         "parameters' errors hold this.",
@@ -197,7 +197,7 @@ FitRecord head_of(const Study& study, const Measurement& measurement) {
   record.mesh = mesh_of(study.specimen);
   record.data = data_words(measurement);
   record.rms_mm = record.chi2 = record.chi2_per_dof = unknown;
-  record.undeformed_chi2_per_residual = record.undeformed_mean_mm = unknown;
+  record.undeformed.chi2_per_residual = record.undeformed.mean_mm = unknown;
   return record;
 }
 
@@ -348,7 +348,7 @@ void record_undeformed(FitRecord& record, const Measurement& measurement) {
   };
   for (const TagPoint& tag : measurement.tags) {
     if (tag.frame != 0) continue;
-    ++record.undeformed_points;
+    ++record.undeformed.points;
     double along_mm = -tag.plane_mm;
     for (size_t k = 0; k < 3; ++k)
       along_mm += tag.normal[k] * tag.x_mm[k];
@@ -356,14 +356,14 @@ void record_undeformed(FitRecord& record, const Measurement& measurement) {
   }
   for (const ObservedPoint& point : measurement.points) {
     if (point.frame != 0) continue;
-    ++record.undeformed_points;
+    ++record.undeformed.points;
     for (size_t k = 0; k < 3; ++k)
       add(point.x_mm[k] - point.X_mm[k], point.sigma_mm);
   }
   const double count = static_cast<double>(rows);
-  record.undeformed_residuals = rows;
-  record.undeformed_mean_mm = rows > 0 ? sum_mm / count : std::numeric_limits<double>::quiet_NaN();
-  record.undeformed_chi2_per_residual = rows > 0 ? chi2 / count : std::numeric_limits<double>::quiet_NaN();
+  record.undeformed.residuals = rows;
+  record.undeformed.mean_mm = rows > 0 ? sum_mm / count : std::numeric_limits<double>::quiet_NaN();
+  record.undeformed.chi2_per_residual = rows > 0 ? chi2 / count : std::numeric_limits<double>::quiet_NaN();
 }
 
 }  // namespace

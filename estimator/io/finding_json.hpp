@@ -1,17 +1,18 @@
 #pragma once
 // A finding as it stands in the JSON of fits and reconstructions.
 
-#include <nlohmann/json.hpp>
-
 #include "estimator/io/finding.hpp"
+#include "estimator/io/member_json.hpp"
 
 namespace diastole {
 
-/// A number that does not exist is null.
-nlohmann::ordered_json from_finding(const Finding& finding);
+template <>
+struct JsonWords<Severity> {
+  static constexpr const char* kind = "severity";
+  static constexpr std::array all{Severity::note, Severity::warning, Severity::error};
+  static constexpr auto word_of = describe;
+};
 
-/// Throws nlohmann::json::exception for a member that is missing or of another kind, std::invalid_argument for a
-/// severity that there is not.
-Finding to_finding(const nlohmann::ordered_json& json);
+DIASTOLE_MEMBERS(Finding, severity, id, what, where, number, unit, remedy)
 
 }  // namespace diastole

@@ -9,6 +9,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "estimator/io/finding.hpp"
@@ -91,8 +92,7 @@ struct FitIteration {
 /// A combination of parameters, one relative change each, in the order of `parameters` (whole, positive ones only).
 struct FittedDirection {
   double relative_sd;  ///< how far the data let the combination go, as a standard deviation
-  std::vector<std::string> names;
-  std::vector<double> change;  ///< of length 1, the largest positive
+  std::vector<std::pair<std::string, double>> change;  ///< by parameter; of length 1, the largest positive
 };
 
 /// Of a fit whose loss is not the normal's (estimator/fit/robust_loss.hpp).
@@ -100,6 +100,20 @@ struct FittedRobust {
   double degrees;  ///< of Student's t
   double scale;    ///< in stated standard deviations
   size_t wild;     ///< residuals beyond five standard deviations
+};
+
+/// A pressure's offset with its standard error.
+struct FittedOffset {
+  double value;
+  double se;
+};
+
+/// How frame 0, which is not fitted, agrees with the undeformed body.
+struct UndeformedCheck {
+  size_t points;
+  size_t residuals;
+  double chi2_per_residual;  ///< NaN without such points
+  double mean_mm;
 };
 
 /// Points that could not be used, and why.
@@ -150,8 +164,8 @@ struct FitRecord {
       {};  ///< from the one that the data see worst; empty for one parameter
   std::optional<FittedRobust> robust = {};
   std::optional<PosteriorDrawing> posterior = {};
-  /// Of all frame pressures, measured less true, with its standard error; if it was sought.
-  std::optional<std::array<double, 2>> pressure_offset_kPa = {};
+  /// Of all frame pressures, measured less true; if it was sought.
+  std::optional<FittedOffset> pressure_offset_kPa = {};
   std::string search = "exact sensitivities";  ///< or "finite differences": the paper's
   double rms_mm;  ///< of the unweighted residuals (a tag's along its normal; a point's three components)
   double chi2;
@@ -166,10 +180,7 @@ struct FitRecord {
   size_t residuals_used;
   std::vector<Exclusion> excluded;
   size_t outliers_5sigma;
-  size_t undeformed_points;  ///< of frame 0: a check, not part of the fit
-  size_t undeformed_residuals;
-  double undeformed_chi2_per_residual;  ///< NaN without such points
-  double undeformed_mean_mm;
+  UndeformedCheck undeformed;
   std::vector<FittedFrame> frames;
   ResidualHistogram residuals;
   int section_frame;

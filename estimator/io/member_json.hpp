@@ -1,21 +1,29 @@
 #pragma once
 // Records as JSON by one list of their members, which serves writing and reading:
 //
-//   template <class Visit, IsRecord<Slice> Record>          // beside Slice, in its namespace
-//   void each_member(Visit&& visit, Record& slice) {
-//     visit("rows", slice.rows);
-//     visit("offset_mm", slice.offset_mm);
-//   }
+//   DIASTOLE_MEMBERS(Slice, rows, offset_mm)                // beside Slice, in its namespace
 //
 //   json = written(slice);        read_json(json, slice);
 //
-// A member is a number, a text, a record, or a list, std::array or std::optional of such. JSON has no NaN and no infinity:
-// they are written as null, and null is read as NaN, an empty text or an empty optional. A type with a form of its own
-// specialises JsonForm.
+// A member is a number, a text, an enumeration with JsonWords, a record, or a list, std::array or std::optional of such.
+// JSON has no NaN and no infinity: they are written as null, and null is read as NaN, an empty text or an empty optional.
+// A list in which members need one of the forms below (may_lack, if_any, by_name) is written out:
+//
+//   template <class Visit, IsRecord<Slice> Record>
+//   void each_member(Visit&& visit, Record& slice) {
+//     DIASTOLE_VISIT(visit, slice, rows, offset_mm)
+//     visit("tags", by_name(slice.tags));
+//   }
+//
+// A type with a form of its own specialises JsonForm.
 
 #include <fmt/format.h>
 
 #include <array>
+#include <boost/preprocessor/seq/for_each.hpp>
+#include <boost/preprocessor/stringize.hpp>
+#include <boost/preprocessor/tuple/elem.hpp>
+#include <boost/preprocessor/variadic/to_seq.hpp>
 #include <cmath>
 #include <limits>
 #include <nlohmann/json.hpp>
@@ -23,39 +31,116 @@
 #include <ranges>
 #include <stdexcept>
 #include <string>
+#include <tuple>
 #include <type_traits>
 #include <utility>
 #include <vector>
 
 namespace diastole {
 
+using Json = nlohmann::ordered_json;
+
 /// A record of this type, to be read or to be written.
 template <class T, class Record>
 concept IsRecord = std::is_same_v<std::remove_const_t<T>, Record>;
 
+#define DIASTOLE_VISIT_ONE(r, visit_and_record, member) \
+  BOOST_PP_TUPLE_ELEM(0, visit_and_record)              \
+  (BOOST_PP_STRINGIZE(member), BOOST_PP_TUPLE_ELEM(1, visit_and_record).member);
+/// Visits members under their own names, in this order.
+#define DIASTOLE_VISIT(visit, record, ...) \
+  BOOST_PP_SEQ_FOR_EACH(DIASTOLE_VISIT_ONE, (visit, record), BOOST_PP_VARIADIC_TO_SEQ(__VA_ARGS__))
+/// A record whose members are all visited so.
+#define DIASTOLE_MEMBERS(Type, ...)                         \
+  template <class Visit, ::diastole::IsRecord<Type> Record> \
+  void each_member(Visit&& visit, Record& record) {         \
+    DIASTOLE_VISIT(visit, record, __VA_ARGS__)              \
+  }
+
 template <class T>
 concept HasMembers = requires(T& value) {
-  each_member([](const char*, auto&) {}, value);
+  each_member([](const char*, auto&&) {}, value);
 };
+
+/// A member that a file may lack, which then keeps its value.
+template <class T>
+struct MayLack {
+  T& value;
+  bool written_if_empty;
+};
+template <class T>
+MayLack<T> may_lack(T& value) {
+  return {value, true};
+}
+/// A list or optional that a file lacks if it is empty.
+template <class T>
+MayLack<T> if_any(T& value) {
+  return {value, false};
+}
+
+template <class T>
+bool is_empty(const T& value) {
+  if constexpr (requires { value.empty(); }) {
+    return value.empty();
+  } else {
+    return !value.has_value();
+  }
+}
+
+/// A list as an object: its entries' first or `name` are the keys, their second or they themselves the values.
+template <class List>
+struct ByName {
+  List& entries;
+};
+template <class List>
+ByName<List> by_name(List& entries) {
+  return {entries};
+}
+template <class Entry>
+auto key_and_value(Entry& entry) {
+  if constexpr (requires { entry.first; }) {
+    return std::tie(entry.first, entry.second);
+  } else {
+    return std::tie(entry.name, entry);
+  }
+}
 
 /// Specialise with `static Json written(const T&)` and `static void read(const Json&, T&)`.
 template <class T>
 struct JsonForm;
-
 template <class T>
 concept HasJsonForm = requires {
   sizeof(JsonForm<T>);
 };
 
+/// Specialise for an enumeration: `kind`, what its values are called, `all` of them, and `word_of(value)`.
 template <class T>
-nlohmann::ordered_json written(const T& value) {
-  using Json = nlohmann::ordered_json;
+struct JsonWords;
+
+template <class T>
+Json written(const T& value) {
   if constexpr (HasJsonForm<T>) {
     return JsonForm<T>::written(value);
   } else if constexpr (HasMembers<const T>) {
     Json json = Json::object();
-    each_member([&](const char* name, const auto& member) { json[name] = written(member); }, value);
+    const auto write_member = [&](const char* name, const auto& member) {
+      if constexpr (requires { member.written_if_empty; }) {
+        if (member.written_if_empty || !is_empty(member.value)) json[name] = written(member.value);
+      } else {
+        json[name] = written(member);
+      }
+    };
+    each_member(write_member, value);
     return json;
+  } else if constexpr (requires { value.entries; }) {
+    Json json = Json::object();
+    for (const auto& entry : value.entries) {
+      const auto [name, of_name] = key_and_value(entry);
+      json[name] = written(of_name);
+    }
+    return json;
+  } else if constexpr (std::is_enum_v<T>) {
+    return JsonWords<T>::word_of(value);
   } else if constexpr (std::is_floating_point_v<T>) {
     return std::isfinite(value) ? Json(value) : Json(nullptr);
   } else if constexpr (std::is_integral_v<T> || std::is_same_v<T, std::string>) {
@@ -70,21 +155,33 @@ nlohmann::ordered_json written(const T& value) {
   }
 }
 
+/// Every number in it that has a fraction, as `round` makes it.
+inline void round_numbers(Json& json, double (*round)(double)) {
+  for (Json& member : json) {
+    if (member.is_structured()) round_numbers(member, round);
+    if (member.is_number_float()) member = round(member.get<double>());
+  }
+}
+
 /// Whether a record may lack members, which then keep the values that they have.
 enum class MissingMembers { refused, kept };
 
 /// Throws nlohmann::json::exception or std::invalid_argument, which names the key, for what is missing or of another kind.
 template <class T>
-void read_json(const nlohmann::ordered_json& json, T& value,
-               MissingMembers missing = MissingMembers::refused);
+void read_json(const Json& json, T& value, MissingMembers missing = MissingMembers::refused);
 
 template <HasMembers T>
-void read_members(const nlohmann::ordered_json& json, T& record, MissingMembers missing) {
+void read_members(const Json& json, T& record, MissingMembers missing) {
   if (!json.is_object()) throw std::invalid_argument("is no object");
-  const auto read_member = [&](const char* name, auto& member) {
-    if (!json.contains(name) && missing == MissingMembers::kept) return;
+  const auto read_member = [&](const char* name, auto&& member) {
+    constexpr bool optional = requires { member.written_if_empty; };
+    if (!json.contains(name) && (optional || missing == MissingMembers::kept)) return;
     try {
-      read_json(json.at(name), member, missing);
+      if constexpr (optional) {
+        read_json(json.at(name), member.value, missing);
+      } else {
+        read_json(json.at(name), member, missing);
+      }
     } catch (const nlohmann::json::exception& error) {
       throw std::invalid_argument(fmt::format("key {}: {}", name, error.what()));
     } catch (const std::invalid_argument& error) {
@@ -94,15 +191,35 @@ void read_members(const nlohmann::ordered_json& json, T& record, MissingMembers 
   each_member(read_member, record);
 }
 
+template <class List>
+void read_entries(const Json& json, List& entries, MissingMembers missing) {
+  if (!json.is_object()) throw std::invalid_argument("is no object");
+  entries.clear();
+  for (const auto& [key, of_key] : json.items()) {
+    auto [name, value] = key_and_value(entries.emplace_back());
+    name = key;
+    read_json(of_key, value, missing);
+  }
+}
+
+template <class T>
+void read_word(const Json& json, T& value) {
+  const auto word = json.get<std::string>();
+  for (const T known : JsonWords<T>::all) {
+    if (JsonWords<T>::word_of(known) == word) return void(value = known);
+  }
+  throw std::invalid_argument(fmt::format("\"{}\" is no {}", word, JsonWords<T>::kind));
+}
+
 template <class Whole>
-void read_whole(const nlohmann::ordered_json& json, Whole& value) {
+void read_whole(const Json& json, Whole& value) {
   if (!json.is_number_integer() || !std::in_range<Whole>(json.get<int64_t>()))
     throw std::invalid_argument(json.dump() + " is no whole number in range");
   value = static_cast<Whole>(json.get<int64_t>());
 }
 
 template <class T, size_t Count>
-void read_list(const nlohmann::ordered_json& json, std::array<T, Count>& list, MissingMembers missing) {
+void read_list(const Json& json, std::array<T, Count>& list, MissingMembers missing) {
   if (!json.is_array() || json.size() != Count)
     throw std::invalid_argument(fmt::format("is no list of {}", Count));
   for (size_t i = 0; i < Count; ++i)
@@ -110,7 +227,7 @@ void read_list(const nlohmann::ordered_json& json, std::array<T, Count>& list, M
 }
 
 template <class T>
-void read_list(const nlohmann::ordered_json& json, std::vector<T>& list, MissingMembers missing) {
+void read_list(const Json& json, std::vector<T>& list, MissingMembers missing) {
   if (!json.is_array()) throw std::invalid_argument("is no list");
   list.clear();
   for (const auto& member : json)
@@ -118,11 +235,15 @@ void read_list(const nlohmann::ordered_json& json, std::vector<T>& list, Missing
 }
 
 template <class T>
-void read_json(const nlohmann::ordered_json& json, T& value, MissingMembers missing) {
+void read_json(const Json& json, T& value, MissingMembers missing) {
   if constexpr (HasJsonForm<T>) {
     JsonForm<T>::read(json, value);
   } else if constexpr (HasMembers<T>) {
     read_members(json, value, missing);
+  } else if constexpr (requires { value.entries; }) {
+    read_entries(json, value.entries, missing);
+  } else if constexpr (std::is_enum_v<T>) {
+    read_word(json, value);
   } else if constexpr (std::is_floating_point_v<T>) {
     value = json.is_null() ? std::numeric_limits<T>::quiet_NaN() : json.get<T>();
   } else if constexpr (std::is_same_v<T, bool>) {

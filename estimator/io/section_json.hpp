@@ -1,25 +1,45 @@
 #pragma once
-// Drawn sections, fields and lists of numbers as JSON, for the files that `diastole report` reads. Numbers are kept to
-// six significant digits, which is more than a drawing shows; JSON has no NaN, which is written as null.
-// Readers throw nlohmann::json::exception or std::invalid_argument, which files turn into an InputError.
+// Drawn sections and fields as JSON, for the files that `diastole report` reads. Numbers are kept to six significant
+// digits (six_digits with round_numbers), which is more than a drawing shows.
 
-#include <nlohmann/json.hpp>
-#include <vector>
+#include <cmath>
 
+#include "estimator/io/member_json.hpp"
 #include "estimator/io/solution_file.hpp"
 
 namespace diastole {
 
-using Json = nlohmann::ordered_json;
+template <IsRecord<NamedField> Field>
+auto key_and_value(Field& field) {
+  return std::tie(field.name, field.values);
+}
 
-Json from_numbers(const std::vector<double>& values);
-std::vector<double> to_numbers(const Json& json);
+template <class Visit, IsRecord<SolutionSection> Record>
+void each_member(Visit&& visit, Record& section) {
+  DIASTOLE_VISIT(visit, section, title, horizontal, vertical, cells_before, cells_after, outline_before,
+                 outline_after, elements_before, elements_after)
+  visit("fields", by_name(section.fields));
+}
 
-Json from_fields(const std::vector<NamedField>& fields);
-/// Each field must have `count` values.
-std::vector<NamedField> to_fields(const Json& json, size_t count);
+inline double six_digits(double value) {
+  if (std::abs(value) < 1e-9) return 0.0;
+  const double power = std::pow(10.0, 5 - std::floor(std::log10(std::abs(value))));
+  return std::round(value * power) / power;
+}
 
-Json from_section(const SolutionSection& section);
-SolutionSection to_section(const Json& json);
+/// Throws std::invalid_argument unless each field has `count` values.
+inline void require_lengths(const std::vector<NamedField>& fields, size_t count) {
+  for (const NamedField& field : fields) {
+    if (field.values.size() != count) throw std::invalid_argument(field.name + " has another length");
+  }
+}
+
+inline void require_sound(const std::vector<SolutionSection>& sections) {
+  for (const SolutionSection& section : sections) {
+    if (section.cells_before.size() != section.cells_after.size())
+      throw std::invalid_argument("cells_before and cells_after differ in number");
+    require_lengths(section.fields, section.cells_before.size());
+  }
+}
 
 }  // namespace diastole

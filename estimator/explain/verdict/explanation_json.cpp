@@ -1,175 +1,58 @@
 #include "estimator/explain/verdict/explanation_json.hpp"
 
-#include <fmt/format.h>
-
 #include <cmath>
-#include <nlohmann/json.hpp>
-#include <stdexcept>
 #include <utility>
 
-#include "estimator/io/member_json.hpp"
-#include "protocol/contract/input_error.hpp"
+#include "estimator/io/record_file.hpp"
 
 namespace diastole {
 namespace explain {
 
-template <class Visit, IsRecord<FoundParameter> Record>
-void each_member(Visit&& visit, Record& p) {
-  visit("value", p.value);
-  visit("ci90", p.ci90);
-  visit("standard_error", p.standard_error);
-}
+DIASTOLE_MEMBERS(FoundParameter, value, ci90, standard_error)
 
-template <class Visit, IsRecord<FoundMoment> Record>
-void each_member(Visit&& visit, Record& m) {
-  visit("run", m.run);
-  visit("time_s", m.time_s);
-}
+DIASTOLE_MEMBERS(FoundMoment, run, time_s)
 
 template <class Visit, IsRecord<FoundEffect> Record>
-void each_member(Visit&& visit, Record& e) {
-  visit("id", e.id);
-  visit("parameters", e.parameters);
-  visit("moments", e.moments);
+void each_member(Visit&& visit, Record& effect) {
+  visit("id", effect.id);
+  visit("parameters", by_name(effect.parameters));
+  visit("moments", effect.moments);
 }
 
-template <class Visit, IsRecord<Misfit> Record>
-void each_member(Visit&& visit, Record& m) {
-  visit("port", m.port);
-  visit("run", m.run);
-  visit("channel", m.channel);
-  visit("segment", m.segment);
-  visit("phase", m.phase);
-  visit("band_Hz", m.band_Hz);
-  visit("region", m.region);
-  visit("excess_chi2", m.excess_chi2);
-  visit("p_value", m.p_value);
-}
+DIASTOLE_MEMBERS(Misfit, port, run, channel, segment, phase, band_Hz, region, excess_chi2, p_value)
 
-template <class Visit, IsRecord<Gap> Record>
-void each_member(Visit&& visit, Record& g) {
-  visit("before", g.before);
-  visit("after", g.after);
-  visit("floor", g.floor);
-  visit("closed", g.closed);
-  visit("held_out", g.held_out);
-}
+DIASTOLE_MEMBERS(Gap, before, after, floor, closed, held_out)
 
-template <class Visit, IsRecord<Candidate> Record>
-void each_member(Visit&& visit, Record& c) {
-  visit("ids", c.ids);
-  visit("chi_square_drop", c.chi_square_drop);
-  visit("refitted", c.refitted);
-  visit("parameters", c.parameters);
-  visit("held_out_drop", c.held_out_drop);
-  visit("verdict", c.verdict);
-}
+DIASTOLE_MEMBERS(Candidate, ids, chi_square_drop, refitted, parameters, held_out_drop, verdict)
 
-template <class Visit, IsRecord<ParameterShift> Record>
-void each_member(Visit&& visit, Record& s) {
-  visit("name", s.name);
-  visit("before", s.before);
-  visit("before_error", s.before_error);
-  visit("after", s.after);
-  visit("after_error", s.after_error);
-}
+DIASTOLE_MEMBERS(ParameterShift, name, before, before_error, after, after_error)
 
-template <class Visit, IsRecord<Trace> Record>
-void each_member(Visit&& visit, Record& t) {
-  visit("run", t.run);
-  visit("channel", t.channel);
-  visit("unit", t.unit);
-  visit("noise_sd", t.noise_sd);
-  visit("time_s", t.time_s);
-  visit("measured", t.measured);
-  visit("before", t.before);
-  visit("after", t.after);
-  visit("cavity_mL", t.cavity_mL);
-  visit("trigger_s", t.trigger_s);
-}
+DIASTOLE_MEMBERS(Trace, run, channel, unit, noise_sd, time_s, measured, before, after, cavity_mL, trigger_s)
 
-template <class Visit, IsRecord<FieldResidual> Record>
-void each_member(Visit&& visit, Record& r) {
-  visit("place_mm", r.place_mm);
-  visit("frame", r.frame);
-  visit("before", r.before);
-  visit("after", r.after);
-  visit("per_mm", r.per_mm);
-}
+DIASTOLE_MEMBERS(FieldResidual, place_mm, frame, before, after, per_mm)
 
-template <class Visit, IsRecord<Step> Record>
-void each_member(Visit&& visit, Record& s) {
-  visit("added", s.added);
-  visit("reduced_chi_square", s.reduced_chi_square);
-}
+DIASTOLE_MEMBERS(Step, added, reduced_chi_square)
 
-template <class Visit, IsRecord<NextExperiment> Record>
-void each_member(Visit&& visit, Record& n) {
-  visit("toml", n.toml);
-  visit("separates", n.separates);
-  visit("predicted_separation_sigma", n.predicted_separation_sigma);
-  visit("reason", n.reason);
-}
+DIASTOLE_MEMBERS(NextExperiment, toml, separates, predicted_separation_sigma, reason)
 
-template <class Visit, IsRecord<Explanation> Record>
-void each_member(Visit&& visit, Record& e) {
-  visit("study", e.study);
-  visit("verdict", e.verdict);
-  visit("summary", e.summary);
-  visit("effects", e.effects);
-  visit("ambiguous_with", e.ambiguous_with);
-  visit("where", e.where);
-  visit("gap", e.gap);
-  visit("next_experiment", e.next_experiment);
-  visit("study_after", e.study_after);
-  visit("evidence", e.evidence);
-  visit("shifts", e.shifts);
-  visit("steps", e.steps);
-  visit("traces", e.traces);
-  visit("field", e.field);
-  visit("seconds", e.seconds);
-}
+DIASTOLE_MEMBERS(Explanation, study, verdict, summary, effects, ambiguous_with, where, gap, next_experiment,
+                 study_after, evidence, shifts, steps, traces, field, seconds)
 
 }  // namespace explain
 
 template <>
-struct JsonForm<explain::Verdict> {
-  static nlohmann::ordered_json written(explain::Verdict verdict) { return name_of(verdict); }
-  static void read(const nlohmann::ordered_json& json, explain::Verdict& verdict) {
-    using explain::Verdict;
-    const auto word = json.get<std::string>();
-    for (const Verdict known : {Verdict::named, Verdict::ambiguous, Verdict::unexplained, Verdict::none}) {
-      if (name_of(known) == word) return void(verdict = known);
-    }
-    throw std::invalid_argument("\"" + word + "\" is no verdict");
-  }
-};
-
-// An object with the parameters' names as keys.
-template <>
-struct JsonForm<std::vector<explain::FoundParameter>> {
-  static nlohmann::ordered_json written(const std::vector<explain::FoundParameter>& parameters) {
-    auto json = nlohmann::ordered_json::object();
-    for (const explain::FoundParameter& parameter : parameters)
-      json[parameter.name] = diastole::written(parameter);
-    return json;
-  }
-  static void read(const nlohmann::ordered_json& json, std::vector<explain::FoundParameter>& parameters) {
-    if (!json.is_object()) throw std::invalid_argument("is no object of parameters");
-    parameters.clear();
-    for (const auto& [name, value] : json.items()) {
-      parameters.emplace_back().name = name;
-      read_json(value, parameters.back(), MissingMembers::kept);
-    }
-  }
+struct JsonWords<explain::Verdict> {
+  static constexpr const char* kind = "verdict";
+  static constexpr std::array all{explain::Verdict::named, explain::Verdict::ambiguous,
+                                  explain::Verdict::unexplained, explain::Verdict::none};
+  static constexpr auto word_of = explain::name_of;
 };
 
 namespace explain {
 namespace {
 
-using Json = nlohmann::ordered_json;
-
-constexpr int newest_version = 1;
+constexpr RecordFormat format{explanation_file_mark, "an explanation",
+                              "Give an explanation.json that `diastole explain STUDY -o DIR` wrote.", false};
 
 void round_traces(std::vector<Trace>& traces) {
   const auto shorten = [](std::vector<double>& values) {
@@ -198,8 +81,7 @@ void require_sound(const Explanation& explanation) {
 std::string to_json(const Explanation& explanation) {
   Explanation rounded = explanation;
   round_traces(rounded.traces);
-  Json json = {{"format", explanation_file_mark}, {"format_version", newest_version}};
-  json.update(written(rounded));
+  Json json = format.document(written(rounded));
   for (Json& place : json["where"]) {
     if (place["region"] == "") place["region"] = nullptr;
   }
@@ -216,32 +98,17 @@ std::string to_json(const Explanation& explanation) {
   return text + "\n";
 }
 
-bool is_explanation(std::string_view text) {
-  constexpr size_t head = 200;
-  return text.substr(0, head).find(explanation_file_mark) != std::string_view::npos;
-}
+bool is_explanation(std::string_view text) { return format.marks(text); }
 
 Explanation explanation_from_json(std::string_view text, const std::string& file) {
-  const std::string remedy = "Give an explanation.json that `diastole explain STUDY -o DIR` wrote.";
-  try {
-    const Json json = Json::parse(text);
-    if (json.is_object() && json.value("format_version", newest_version) > newest_version) {
-      throw InputError({file, "key format_version",
-                        fmt::format("version {} is newer than this program knows ({})",
-                                    json.at("format_version").dump(), newest_version),
-                        "Update the program."});
-    }
-    Explanation explanation;
+  Explanation explanation;
+  format.read(text, file, [&](const Json& json) {
     read_json(json, explanation, MissingMembers::kept);
     for (const char* key : {"verdict", "effects", "where", "gap"})
       if (!json.contains(key)) throw std::invalid_argument(fmt::format("has no key {}", key));
     require_sound(explanation);
-    return explanation;
-  } catch (const nlohmann::json::exception& error) {
-    throw InputError({file, "", fmt::format("is not an explanation: {}", error.what()), remedy});
-  } catch (const std::invalid_argument& error) {
-    throw InputError({file, "", fmt::format("is not an explanation: {}", error.what()), remedy});
-  }
+  });
+  return explanation;
 }
 
 }  // namespace explain

@@ -97,11 +97,11 @@ TEST_F(CoarseStudy, OutliersAreCountedAndSaid) {
 
 TEST_F(CoarseStudy, FrameZeroIsACheckAndNotFitted) {
   const FitRecord with = fit();
-  EXPECT_EQ(with.undeformed_points, 150U);
-  EXPECT_NEAR(with.undeformed_chi2_per_residual, 1.0, 0.4);
+  EXPECT_EQ(with.undeformed.points, 150U);
+  EXPECT_NEAR(with.undeformed.chi2_per_residual, 1.0, 0.4);
   std::erase_if(measurement_.tags, [](const TagPoint& tag) { return tag.frame == 0; });
   const FitRecord without = fit();
-  EXPECT_EQ(without.undeformed_points, 0U);
+  EXPECT_EQ(without.undeformed.points, 0U);
   EXPECT_DOUBLE_EQ(with.parameters[0].value, without.parameters[0].value);
 }
 

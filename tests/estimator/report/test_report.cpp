@@ -32,9 +32,9 @@ FitRecord gel_fit() {
   fit.parameters[0].profile = FittedProfile{{8.4, 15.0}, {false, true}};
   fit.parameters[0].posterior = FittedPosterior{8.57, 0.09, {8.4, 8.75}, 1.01, 180};
   fit.posterior = PosteriorDrawing{200, 0.97, 1300, 12.5};
-  fit.directions = {{0.05, {"b1", "b2"}, {0.8, -0.6}}, {0.01, {"b1", "b2"}, {0.6, 0.8}}};
+  fit.directions = {{0.05, {{"b1", 0.8}, {"b2", -0.6}}}, {0.01, {{"b1", 0.6}, {"b2", 0.8}}}};
   fit.robust = FittedRobust{4, 0.8, 700};
-  fit.pressure_offset_kPa = {0.02, 0.01};
+  fit.pressure_offset_kPa = FittedOffset{0.02, 0.01};
   fit.search = "finite differences";
   fit.correlation = {{"C1_kPa", "pressure_kPa[1]"}, {{1.0, 0.32}, {0.32, 1.0}}};
   fit.rms_mm = 0.79436;
@@ -49,8 +49,8 @@ FitRecord gel_fit() {
   fit.history = {{0, 7589.1, true, {6.0}}, {1, 6408.2, true, {8.5692}}};
   fit.residuals_used = 13000;
   fit.excluded = {{"farther than 5 mm from the body", 2}};
-  fit.undeformed_chi2_per_residual = std::numeric_limits<double>::quiet_NaN();
-  fit.undeformed_mean_mm = std::numeric_limits<double>::quiet_NaN();
+  fit.undeformed.chi2_per_residual = std::numeric_limits<double>::quiet_NaN();
+  fit.undeformed.mean_mm = std::numeric_limits<double>::quiet_NaN();
   fit.frames = {{1, 0.2613, 0.5969, 0.02, 0.6002, 0.0186, 2600, 0.805, 1.012}};
   fit.residuals = {{-5, 0, 5}, {6400, 6600}};
   fit.section_frame = 5;
@@ -76,10 +76,10 @@ TEST(FitFile, ComesBackAsItWasWritten) {
   EXPECT_EQ(back.parameters[0].smoothness->step90[1], 0.15);
   EXPECT_TRUE(back.parameters[0].profile->at_bound[1]);
   EXPECT_EQ(back.parameters[0].posterior->effective_draws, 180);
-  EXPECT_EQ(back.directions[0].change[1], -0.6);
+  EXPECT_EQ(back.directions[0].change[1].second, -0.6);
   EXPECT_EQ(back.robust->wild, 700U);
-  EXPECT_EQ((*back.pressure_offset_kPa)[0], 0.02);
-  EXPECT_TRUE(std::isnan(back.undeformed_mean_mm));
+  EXPECT_EQ(back.pressure_offset_kPa->value, 0.02);
+  EXPECT_TRUE(std::isnan(back.undeformed.mean_mm));
 }
 
 TEST(FitFile, JunkIsRefusedWithItsReason) {
