@@ -68,6 +68,11 @@ const std::vector<const Effect*>& field_effects() {
   return list;
 }
 
+const Effect& inclusion_effect() {
+  static const Effect& inclusion = **std::ranges::find_if(all_effects(), &Effect::is_inclusion);
+  return inclusion;
+}
+
 const Effect* find_effect(std::string_view id) {
   const auto& list = all_effects();
   const auto found =

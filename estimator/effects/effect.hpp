@@ -35,6 +35,15 @@ struct EffectParameter {
   double upper;
   double typical;  ///< a size worth finding: where searches start and tests simulate
   SearchScale scale = SearchScale::linear;
+  bool seen_at_rest =
+      false;  ///< the part by which the inner radius is larger: an image of the specimen at rest shows it
+};
+
+/// A parameter in images that is a direction: where its search starts is decided by what a little of the effect would gain
+/// at each of the directions of a half turn.
+struct FieldDirection {
+  size_t parameter;  ///< its place in field_parameters()
+  double half_turn;  ///< in its unit; there the effect is the same again
 };
 
 /// What effects tell about themselves; every text is shown to users.
@@ -72,6 +81,8 @@ class Effect {
   [[nodiscard]] virtual std::span<const EffectParameter> parameters() const = 0;
   [[nodiscard]] virtual Stage stage() const { return Stage::plant; }
   [[nodiscard]] virtual Occasions occasions() const { return Occasions::none; }
+  /// Whether the specimen's modulus is the same at every time, so that a test beside the session measures it too.
+  [[nodiscard]] virtual bool keeps_modulus() const { return true; }
   /// Whether the specimen can have it.
   [[nodiscard]] virtual bool fits(const rig::SpecimenCurves&) const { return true; }
   /// The values that leave `base` as it is.
@@ -92,6 +103,10 @@ class Effect {
   /// have been found.
   [[nodiscard]] virtual std::span<const EffectParameter> field_parameters() const { return {}; }
   [[nodiscard]] virtual size_t field_essentials() const { return field_parameters().size(); }
+  /// Whether it is an Inclusion, whose parameters are those of `stiff_inclusion.cpp` in their order: it has a place, which is
+  /// searched on a lattice. All others are the same all around the axis.
+  [[nodiscard]] virtual bool is_inclusion() const { return false; }
+  [[nodiscard]] virtual std::optional<FieldDirection> field_direction() const { return {}; }
   /// The values that leave `base` as it is.
   [[nodiscard]] virtual std::vector<double> field_neutral(const FieldModel& base) const;
   /// Adds itself to the model. `values`: one for each of field_parameters().
@@ -113,6 +128,9 @@ const std::vector<const Effect*>& all_effects();
 const std::vector<const Effect*>& rig_effects();
 /// Those of them that show in images of the specimen.
 const std::vector<const Effect*>& field_effects();
+
+/// The one of them that is an inclusion.
+const Effect& inclusion_effect();
 
 /// nullptr when no effect has that id.
 const Effect* find_effect(std::string_view id);

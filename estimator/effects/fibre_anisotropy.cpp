@@ -38,6 +38,7 @@ class FibreAnisotropy final : public FieldEffect {
          {"k2", "", "stiffening of the fibres with (I4 - 1)^2", 0.0, 0.0, 60.0, 2.0}}};
     return list;
   }
+  [[nodiscard]] std::optional<FieldDirection> field_direction() const override { return {{1, 180.0}}; }
   [[nodiscard]] size_t field_essentials() const override { return 2; }
   void apply_to_field(std::span<const double> values, FieldModel& model) const override {
     model.k1_kPa = values[0];

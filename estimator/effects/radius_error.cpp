@@ -28,7 +28,7 @@ class RadiusError final : public Effect {
   [[nodiscard]] std::span<const EffectParameter> parameters() const override {
     static constexpr std::array<EffectParameter, 1> list{
         {{"fraction", "", "part by which the inner radius is larger; any image shows more", 0.0, -0.08, 0.08,
-          0.04}}};
+          0.04, SearchScale::linear, true}}};
     return list;
   }
   [[nodiscard]] bool fits(const rig::SpecimenCurves& family) const override {

@@ -57,6 +57,7 @@ class StiffInclusion final : public FieldEffect {
          {"semi_axis_axial_mm", "mm", "", 10.0, 3.0, 30.0, 10.0, factor}}};
     return list;
   }
+  [[nodiscard]] bool is_inclusion() const override { return true; }
   [[nodiscard]] size_t field_essentials() const override { return 4; }
   void apply_to_field(std::span<const double> values, FieldModel& model) const override {
     if (values[0] == 1.0) return;

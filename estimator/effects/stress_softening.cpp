@@ -82,6 +82,7 @@ class StressSoftening final : public Effect {
           SearchScale::logarithmic}}};
     return list;
   }
+  [[nodiscard]] bool keeps_modulus() const override { return false; }
   void apply(std::span<const double> values, const Context&, rig::RigModel& model) const override {
     const double delta = values[0];
     const double cycles = values[1];

@@ -46,6 +46,7 @@ class TemperatureDrift final : public Effect {
          {"tau_s", "s", "of the warming", 300.0, 20.0, 5000.0, 200.0, SearchScale::logarithmic}}};
     return list;
   }
+  [[nodiscard]] bool keeps_modulus() const override { return false; }
   void apply(std::span<const double> values, const Context&, rig::RigModel& model) const override {
     const double fraction = values[0];
     const double tau_s = values[1];

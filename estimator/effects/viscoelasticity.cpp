@@ -74,6 +74,7 @@ class Viscoelasticity final : public Effect {
          {"tau_slow_s", "s", "", 6.0, 2.5, 60.0, 6.0, SearchScale::logarithmic}}};
     return list;
   }
+  [[nodiscard]] bool keeps_modulus() const override { return false; }
   void apply(std::span<const double> values, const Context&, rig::RigModel& model) const override {
     std::array<double, 3> parts{values[0], values[1], values[2]};
     std::array<double, 3> times{values[3], values[4], values[5]};

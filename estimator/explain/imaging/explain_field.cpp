@@ -265,7 +265,7 @@ class Explainer {
   /// A lump's own place first; all of the specimen where no part of it stands out.
   void find_places() {
     out_.where = misfit_regions(field_, round_->rows(), base_, 5);
-    const bool lumped = chosen_ != nullptr && chosen_->has("stiff-inclusion");
+    const bool lumped = chosen_ != nullptr && chosen_->has_inclusion();
     if (!lumped && !out_.where.empty()) return;
     const Structure before = structure_left(full_base_, 0.0);
     Misfit place;
@@ -336,7 +336,7 @@ class Explainer {
 
   /// What the cavity takes at the highest pressure; not known of fits around a lump.
   [[nodiscard]] ImagedModel imaged(const FieldHypothesis& hypothesis) {
-    if (hypothesis.has("stiff-inclusion")) return {&hypothesis, std::nan("")};
+    if (hypothesis.has_inclusion()) return {&hypothesis, std::nan("")};
     return {&hypothesis, round_->taken_mL(hypothesis.fit)};
   }
 

@@ -52,7 +52,7 @@ FieldCase field_case(const Study& study) {
            "outside the library. `diastole fit` maps one value an element.");
   if (study.chamber)
     refuse(study, "chamber", "field effects start from a specimen in the open",
-           "Leave [chamber] out: what it does is the effect chamber-back-pressure.");
+           "Leave [chamber] out: its back pressure is one of the effects.");
   if (study.compression.bulk_modulus_kPa)
     refuse(study, "model.bulk_modulus_kPa", "field effects start from incompressible gel", "Leave it out.");
   if (!study.data.tags && !study.data.points)

@@ -23,16 +23,21 @@ FieldChoice with_essentials(const Effect& effect, std::vector<double> values) {
   return choice;
 }
 
-/// Where an angle starts is decided by what a little of the effect would gain at each.
-std::vector<double> start_of_fibres(FieldProblem& problem, const FieldFit& base, const Effect& effect) {
-  constexpr int angles = 12;
-  constexpr double little_kPa = 0.01;
+/// The start of an effect with a direction: the one in which a little of it would gain most.
+std::vector<double> start_in_direction(FieldProblem& problem, const FieldFit& base, const Effect& effect,
+                                       const FieldDirection& direction) {
+  constexpr int directions = 12;
+  std::vector<double> values = effect.field_neutral(problem.field().base);
+  const double typical = effect.field_parameters()[0].typical;
+  const double little = typical / 300.0;
   std::vector<FieldNudge> nudges;
-  for (int i = 0; i < angles; ++i) {
-    FieldNudge nudge{problem.field().base, problem.field().base, 2.0 * little_kPa};
-    nudge.up.fibre_angle_deg = nudge.down.fibre_angle_deg = 180.0 * i / angles;
-    nudge.up.k1_kPa = little_kPa;
-    nudge.down.k1_kPa = -little_kPa;
+  for (int i = 0; i < directions; ++i) {
+    FieldNudge nudge{problem.field().base, problem.field().base, 2.0 * little};
+    values[direction.parameter] = direction.half_turn * i / directions;
+    values[0] = little;
+    effect.apply_to_field(values, nudge.up);
+    values[0] = -little;
+    effect.apply_to_field(values, nudge.down);
     nudges.push_back(nudge);
   }
   const size_t loudest = problem.highest_node();
@@ -41,28 +46,29 @@ std::vector<double> start_of_fibres(FieldProblem& problem, const FieldFit& base,
   for (const NodeField& field : slopes.model)
     fields.push_back(&field);
   const FieldRows& rows = problem.rows();
-  Eigen::MatrixXd columns(rows.size(), angles);
+  Eigen::MatrixXd columns(rows.size(), directions);
   for (size_t slot = 0; slot < base.pressures_kPa.size(); ++slot) {
     const double share = base.pressures_kPa[slot] / problem.nodes_kPa()[loudest];
     columns.middleRows(rows.first(slot), rows.count(slot)) =
         share * share * rows.columns(slot, problem.solver().mesh(), fields);
   }
   const LinearEvidence evidence(base, columns);
-  std::vector<double> values = effect.field_neutral(problem.field().base);
-  values[0] = effect.field_parameters()[0].typical;
+  values = effect.field_neutral(problem.field().base);
+  values[0] = typical;
   double best = 0.0;
-  for (int i = 0; i < angles; ++i) {
+  for (int i = 0; i < directions; ++i) {
     const double amount = evidence.amount(i);
     if (amount <= 0.0 || evidence.gain(i) < best) continue;
     best = evidence.gain(i);
-    values[0] = std::clamp(amount, 0.1, 20.0);
-    values[1] = nudges[static_cast<size_t>(i)].up.fibre_angle_deg;
+    values[0] = std::clamp(amount, typical / 30.0, typical * 20.0 / 3.0);
+    values[direction.parameter] = direction.half_turn * i / directions;
   }
   return values;
 }
 
 std::vector<double> start_of(FieldProblem& problem, const FieldFit& base, const Effect& effect) {
-  if (effect.text().id == "fibre-anisotropy") return start_of_fibres(problem, base, effect);
+  if (const auto direction = effect.field_direction())
+    return start_in_direction(problem, base, effect, *direction);
   std::vector<double> values = effect.field_neutral(problem.field().base);
   const EffectParameter& size = effect.field_parameters()[0];
   values[0] = size.neutral != 0.0 && size.scale == SearchScale::linear
@@ -89,19 +95,19 @@ FieldFit refit(FieldProblem& problem, FieldChoice choice, const FieldProblem::St
 
 std::string FieldHypothesis::name() const { return fmt::format("{}", fmt::join(ids, " + ")); }
 
-bool FieldHypothesis::has(std::string_view id) const { return std::ranges::find(ids, id) != ids.end(); }
+bool FieldHypothesis::has_inclusion() const {
+  return std::ranges::find(ids, inclusion_effect().text().id) != ids.end();
+}
 
 std::vector<FieldHypothesis> fit_round_effects(FieldProblem& problem, const FieldFit& base) {
   std::vector<FieldHypothesis> result;
   const FieldProblem::Start start{base.C1_kPa, base.pressures_kPa};
-  std::vector<double> fibres;
+  std::vector<FieldChoice> choices;  // made before the first fit, which moves the solver
   for (const Effect* effect : field_effects())
-    if (effect->text().id == "fibre-anisotropy") fibres = start_of(problem, base, *effect);
-  for (const Effect* effect : field_effects()) {
-    if (effect->text().id == "stiff-inclusion") continue;
-    const bool fibrous = effect->text().id == "fibre-anisotropy";
-    FieldHypothesis tried{{std::string(effect->text().id)}, {}};
-    FieldChoice choice = with_essentials(*effect, fibrous ? fibres : start_of(problem, base, *effect));
+    if (!effect->is_inclusion())
+      choices.push_back(with_essentials(*effect, start_of(problem, base, *effect)));
+  for (FieldChoice& choice : choices) {
+    FieldHypothesis tried{{std::string(choice.effects.front()->text().id)}, {}};
     tried.fit = refit(problem, std::move(choice), start);
     tried.gain = base.chi_square - tried.fit.chi_square;
     const auto parameters = static_cast<double>(tried.fit.choice.free.size());
@@ -118,7 +124,7 @@ std::vector<FieldHypothesis> fit_inclusion(const FieldProblem& problem, const Fi
   if (guesses.front().p_value > beyond_chance) return {};
   constexpr double effective_parameters = 5.0;  // sizes are tied to one another
   constexpr double near = 20.0;
-  FieldHypothesis tried{{"stiff-inclusion"},
+  FieldHypothesis tried{{std::string(inclusion_effect().text().id)},
                         fit_lump(problem, base, guesses.front().inclusion, LumpEffort::once)};
   const auto judge = [&] {
     tried.gain = base.chi_square - tried.fit.chi_square;

@@ -18,7 +18,7 @@ struct FieldHypothesis {
   double p_value = 1.0;  ///< corrected for the effects and places that were tried
 
   [[nodiscard]] std::string name() const;  ///< "end-bond-slip + strain-stiffening"
-  [[nodiscard]] bool has(std::string_view id) const;
+  [[nodiscard]] bool has_inclusion() const;
 };
 
 /// All effects that are the same all around the axis, on a mesh that is. Precondition: the solver stands at `base`.

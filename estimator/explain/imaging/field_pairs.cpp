@@ -20,8 +20,6 @@ double pairs_tried() {
   return 0.5 * effects * (effects - 1.0);
 }
 
-bool is_lump(const FieldHypothesis& hypothesis) { return hypothesis.has("stiff-inclusion"); }
-
 /// Gain, score and p-value of a joint fit.
 FieldHypothesis judged(FieldFit fit, const FieldFit& base, const FieldHypothesis& a, const FieldHypothesis& b,
                        double parameters, double places) {
@@ -64,7 +62,7 @@ std::vector<FieldHypothesis> lumps_beside(const FieldProblem& problem, const Fie
   if (promises.size() > lumps_fitted) promises.resize(lumps_fitted);
   std::vector<FieldHypothesis> pairs;
   for (const Promise& promise : promises) {
-    const FieldHypothesis lump{{"stiff-inclusion"}, {}};
+    const FieldHypothesis lump{{std::string(inclusion_effect().text().id)}, {}};
     FieldFit fit = fit_lump(problem, promise.other->fit, promise.guess.inclusion, LumpEffort::once);
     if (fit.chi_square < promise.other->fit.chi_square && &promise == &promises.front())
       fit = fit_lump(problem, promise.other->fit, lump_of(fit), LumpEffort::fully);
@@ -83,12 +81,12 @@ std::vector<FieldHypothesis> fit_pairs(FieldProblem& problem, const FieldFit& ba
   std::vector<const FieldHypothesis*> beside_lump;
   const size_t begun = std::min(firsts, singles.size());
   for (size_t a = 0; a < singles.size(); ++a) {
-    if (is_lump(singles[a])) continue;
-    const bool lump_leads =
-        std::any_of(singles.begin(), singles.begin() + static_cast<std::ptrdiff_t>(begun), is_lump);
+    if (singles[a].has_inclusion()) continue;
+    const bool lump_leads = std::any_of(singles.begin(), singles.begin() + static_cast<std::ptrdiff_t>(begun),
+                                        [](const FieldHypothesis& single) { return single.has_inclusion(); });
     if (a < begun || lump_leads) beside_lump.push_back(&singles[a]);
     for (size_t b = a + 1; a < begun && b < singles.size(); ++b)
-      if (!is_lump(singles[b])) pairs.push_back(fit_both(problem, base, singles[a], singles[b]));
+      if (!singles[b].has_inclusion()) pairs.push_back(fit_both(problem, base, singles[a], singles[b]));
   }
   std::ranges::move(lumps_beside(problem, base, beside_lump, lattice), std::back_inserter(pairs));
   std::ranges::stable_sort(pairs, std::greater{}, &FieldHypothesis::score);

@@ -82,7 +82,7 @@ ElasticModel model_around(const FieldModel& body, double C1_kPa, const Inclusion
   return {mesh_around(body, lump, mesh), *find_law("neo-hookean"), std::move(options)};
 }
 
-const EffectParameter& parameter(size_t i) { return lump_effect().field_parameters()[i]; }
+const EffectParameter& parameter(size_t i) { return inclusion_effect().field_parameters()[i]; }
 
 /// Whether a tangent of one lump still serves for the other.
 bool alike(const LumpValues& a, const LumpValues& b) {
@@ -105,11 +105,9 @@ double largest(const NodeField& field) {
 
 }  // namespace
 
-const Effect& lump_effect() { return *find_effect("stiff-inclusion"); }
-
 Inclusion lump_with(const LumpValues& values, const FieldModel& body) {
   FieldModel model = body;
-  lump_effect().apply_to_field(values, model);
+  inclusion_effect().apply_to_field(values, model);
   return model.inclusion.value_or(Inclusion{.semi_axes_mm = {1.0, 1.0, 1.0}});
 }
 

@@ -19,9 +19,8 @@
 namespace diastole::explain {
 
 constexpr size_t lump_parameters = 7;
-using LumpValues = std::array<double, lump_parameters>;  ///< in the order of the effect `stiff-inclusion`
+using LumpValues = std::array<double, lump_parameters>;  ///< in the order of inclusion_effect()
 
-const Effect& lump_effect();
 Inclusion lump_with(const LumpValues& values, const FieldModel& body);
 
 /// Elements around the lump: about as large as it (9,400 unknowns), or half of that (19,000).

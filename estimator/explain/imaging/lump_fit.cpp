@@ -43,7 +43,7 @@ FieldFit with_lump(const FieldFit& base, const Inclusion& guess) {
   FieldFit result = base;
   result.converged = false;
   result.choice =
-      together(base.choice, {{&lump_effect()},
+      together(base.choice, {{&inclusion_effect()},
                              {guess.contrast, guess.radius_mm, guess.z_mm, guess.theta_deg,
                               guess.semi_axes_mm[0], guess.semi_axes_mm[1], guess.semi_axes_mm[2]},
                              {0, 1, 2, 3, 4, 5, 6}});
@@ -230,7 +230,7 @@ class LumpFit {
   }
 
   [[nodiscard]] static const EffectParameter& parameter(size_t i) {
-    return lump_effect().field_parameters()[i];
+    return inclusion_effect().field_parameters()[i];
   }
 
   [[nodiscard]] std::array<double, lump_parameters> coordinates(const Point& at) const {

@@ -1,5 +1,7 @@
 #include "estimator/explain/rig/experiment_outlook.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <optional>
@@ -192,17 +194,22 @@ Eigen::MatrixXd gram_beside(const rig::RigFit& truth, const rig::RigFit& adaptin
     sum += row * row.transpose();
   };
   if (equipment[static_cast<size_t>(Measured::radius)] && knowledge.inner_radius_mm > 0.0) {
-    const auto larger = [](const rig::RigFit& fit) {
-      const double part = fit.value("radius-error.fraction");
+    const auto value = [](const rig::RigFit& fit, const std::string& unknown) {
+      const double part = fit.value(unknown);
       return std::isfinite(part) ? part : 0.0;
     };
-    add("radius-error.fraction", larger(truth) - larger(adapting),
-        knowledge.radius_error_mm / knowledge.inner_radius_mm);
+    for (const Effect* effect : rig_effects()) {
+      for (const EffectParameter& parameter : effect->parameters()) {
+        if (!parameter.seen_at_rest) continue;
+        const std::string unknown = fmt::format("{}.{}", effect->text().id, parameter.name);
+        add(unknown, value(truth, unknown) - value(adapting, unknown),
+            knowledge.radius_error_mm / knowledge.inner_radius_mm);
+      }
+    }
   }
   const auto is_lasting = [](const rig::RigFit& fit) {
-    return std::ranges::none_of(fit.ingredients, [](const rig::Ingredient& ingredient) {
-      const std::string_view id = ingredient.effect->text().id;
-      return id == "viscoelasticity" || id == "stress-softening" || id == "temperature-drift";
+    return std::ranges::all_of(fit.ingredients, [](const rig::Ingredient& ingredient) {
+      return ingredient.effect->keeps_modulus();
     });
   };
   if (equipment[static_cast<size_t>(Measured::stiffness)] && is_lasting(truth) && is_lasting(adapting))
