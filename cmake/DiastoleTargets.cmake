@@ -15,6 +15,15 @@ function(diastole_library name)
   target_link_libraries(${name} PUBLIC diastole_options ${ARG_LIBS})
 endfunction()
 
+# diastole_listed(VARIABLE LIST MACRO)
+# The sources that a list of declarations names: NAME.cpp for each of its lines MACRO(..., NAME).
+function(diastole_listed variable list macro)
+  set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${list})
+  file(STRINGS ${list} sources REGEX "^${macro}\\(")
+  list(TRANSFORM sources REPLACE "^.*[(, ]([a-z0-9_]+)\\).*" "\\1.cpp")
+  set(${variable} ${sources} PARENT_SCOPE)
+endfunction()
+
 # diastole_program(NAME SOURCES a.cpp ... [LIBS x ...])  — lands in build/<preset>/bin
 function(diastole_program name)
   cmake_parse_arguments(ARG "" "" "SOURCES;LIBS" ${ARGN})

@@ -17,7 +17,6 @@ namespace {
 constexpr std::string_view waveform_names[] = {
 #define DIASTOLE_WAVEFORM(number, name) #name,
 #include "protocol/wire/waveform_list.inc"
-#undef DIASTOLE_WAVEFORM
 };
 
 /// The waveforms as files spell them, in the order of their numbers on the wire.

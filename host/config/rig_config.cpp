@@ -133,8 +133,8 @@ std::string channel_name(TableReader& channel) {
 DaqConfig read_daq(TableReader table) {
   DaqConfig config;
   std::vector<std::string> names;
-  for (const daq::Driver& driver : daq::drivers())
-    names.emplace_back(driver.name);
+  for (const daq::Driver* driver : daq::drivers())
+    names.emplace_back(driver->name);
   config.driver = table.choice("driver", names);
   std::vector<TableReader> channels = table.tables("channel");
   if (channels.empty()) table.fail("channel", "is missing", "Add [[daq.channel]] with name = \"cavity\".");
@@ -153,7 +153,7 @@ DaqConfig read_daq(TableReader table) {
                "A run file always holds the cavity's pressure.");
   }
   const auto driver = std::find(names.begin(), names.end(), config.driver) - names.begin();
-  config.open = daq::drivers()[static_cast<size_t>(driver)].configure(table, channels);
+  config.open = daq::drivers()[static_cast<size_t>(driver)]->configure(table, channels);
   for (TableReader& channel : channels)
     channel.finish();
   table.finish();

@@ -5,14 +5,14 @@
 namespace diastole::daq {
 namespace {
 
-constexpr auto known = std::to_array<Driver>({
-#define DIASTOLE_DAQ_DRIVER(name, configure) {name, configure},
+constexpr std::array known{
+#define DIASTOLE_DAQ_DRIVER(name) &name##_driver,
 #include "host/daq/driver_list.inc"
 #undef DIASTOLE_DAQ_DRIVER
-});
+};
 
 }  // namespace
 
-std::span<const Driver> drivers() { return known; }
+std::span<const Driver* const> drivers() { return known; }
 
 }  // namespace diastole::daq

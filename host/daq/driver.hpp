@@ -1,7 +1,8 @@
 #pragma once
 // The drivers of driver_list.inc. A driver is one file with one function, `configure`: it reads what it needs
 // of the rig file at start-up (strictly, with line numbers in its messages) and returns how to open the
-// instrument.
+// instrument. Of one that speaks to a device the tests replay a recording over its line:
+// tests/host/daq/recordings/NAME.session.
 
 #include <cstdint>
 #include <functional>
@@ -12,6 +13,7 @@
 #include <string_view>
 #include <vector>
 
+#include "host/daq/hid_port.hpp"
 #include "host/daq/instrument.hpp"
 #include "protocol/contract/table_reader.hpp"
 
@@ -25,6 +27,7 @@ struct OpenOptions {
   /// The time by which an instrument that is not there samples, and by which patience counts that a simulation has
   /// ended by closing the connection; empty: CLOCK_MONOTONIC.
   std::function<uint64_t()> now_ns = {};
+  OpenHid open_hid = {};  ///< instead of open_hidapi
 };
 
 /// Patience that a rig file may give an instrument for one answer: the samples that come due meanwhile are lost,
@@ -38,16 +41,20 @@ using OpenInstrument = std::function<std::unique_ptr<Instrument>(const OpenOptio
 /// already.
 using Configure = OpenInstrument (*)(TableReader& daq, std::vector<TableReader>& channels);
 
+/// What carries the instrument's bytes: nothing, TCP (keys host, port, timeout_ms), a serial port (port, timeout_ms) or
+/// OpenOptions::open_hid.
+enum class Line { none, tcp, serial, hid };
+
 struct Driver {
-  std::string_view name;
+  std::string_view name;  ///< what [daq] driver = "..." says
+  Line line;
   Configure configure;
 };
 
-#define DIASTOLE_DAQ_DRIVER(name, configure) \
-  OpenInstrument configure(TableReader& daq, std::vector<TableReader>& channels);
+#define DIASTOLE_DAQ_DRIVER(name) extern const Driver name##_driver;
 #include "host/daq/driver_list.inc"
 #undef DIASTOLE_DAQ_DRIVER
 
-std::span<const Driver> drivers();
+std::span<const Driver* const> drivers();
 
 }  // namespace diastole::daq

@@ -159,9 +159,7 @@ SerialLine read_line(TableReader& daq) {
   return line;
 }
 
-}  // namespace
-
-OpenInstrument configure_modbus_rtu(TableReader& daq, std::vector<TableReader>& channels) {
+OpenInstrument configure(TableReader& daq, std::vector<TableReader>& channels) {
   const SerialLine line = read_line(daq);
   const RegisterMap map = read_register_map(daq, channels);
   return [line, map](const OpenOptions& options) -> std::unique_ptr<Instrument> {
@@ -171,5 +169,9 @@ OpenInstrument configure_modbus_rtu(TableReader& daq, std::vector<TableReader>& 
     return open_modbus(map, std::make_unique<RtuLine>(opened, map.unit));
   };
 }
+
+}  // namespace
+
+const Driver modbus_rtu_driver{"modbus-rtu", Line::serial, configure};
 
 }  // namespace diastole::daq

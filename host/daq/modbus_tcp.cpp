@@ -163,9 +163,7 @@ void take_address(TcpAddress& at, const std::string& address) {
   at.host = address.substr(0, colon);
 }
 
-}  // namespace
-
-OpenInstrument configure_modbus_tcp(TableReader& daq, std::vector<TableReader>& channels) {
+OpenInstrument configure(TableReader& daq, std::vector<TableReader>& channels) {
   TcpAddress at;
   at.host = daq.text("host");
   at.port = static_cast<int>(daq.integer_or("port", at.port, {.at_least = 1, .at_most = 65535}));
@@ -178,5 +176,9 @@ OpenInstrument configure_modbus_tcp(TableReader& daq, std::vector<TableReader>& 
     return open_modbus(map, std::make_unique<TcpLine>(opened, map.unit, options));
   };
 }
+
+}  // namespace
+
+const Driver modbus_tcp_driver{"modbus-tcp", Line::tcp, configure};
 
 }  // namespace diastole::daq

@@ -82,9 +82,7 @@ uint64_t monotonic_ns() {
   return static_cast<uint64_t>(std::chrono::steady_clock::now().time_since_epoch().count());
 }
 
-}  // namespace
-
-OpenInstrument configure_simulated(TableReader& /*daq*/, std::vector<TableReader>& channels) {
+OpenInstrument configure(TableReader& /*daq*/, std::vector<TableReader>& channels) {
   std::vector<int64_t> inputs;
   for (TableReader& channel : channels)
     inputs.push_back(channel.integer("input", {.at_least = 0, .at_most = 63}));
@@ -96,5 +94,9 @@ OpenInstrument configure_simulated(TableReader& /*daq*/, std::vector<TableReader
     return std::make_unique<Simulated>(inputs, options.now_ns ? options.now_ns : monotonic_ns);
   };
 }
+
+}  // namespace
+
+const Driver simulated_driver{"simulated", Line::none, configure};
 
 }  // namespace diastole::daq

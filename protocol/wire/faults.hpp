@@ -3,6 +3,8 @@
 
 #include <cstdint>
 
+#include "protocol/wire/last_of.hpp"
+
 namespace diastole::wire {
 
 #define DIASTOLE_FAULT(number, name, explanation, remedy) name = number,
@@ -10,20 +12,32 @@ enum class Fault : std::uint8_t {
 #include "protocol/wire/fault_list.inc"
 };
 #undef DIASTOLE_FAULT
-inline constexpr Fault kLastFault = Fault::home_switch_stuck;
+#define DIASTOLE_FAULT(number, name, explanation, remedy) Fault::name,
+inline constexpr Fault kLastFault = last_of({
+#include "protocol/wire/fault_list.inc"
+});
+#undef DIASTOLE_FAULT
 
 #define DIASTOLE_REFUSAL(number, name, explanation) name = number,
 enum class Refusal : std::uint8_t {
 #include "protocol/wire/refusal_list.inc"
 };
 #undef DIASTOLE_REFUSAL
-inline constexpr Refusal kLastRefusal = Refusal::waveforms_full;
+#define DIASTOLE_REFUSAL(number, name, explanation) Refusal::name,
+inline constexpr Refusal kLastRefusal = last_of({
+#include "protocol/wire/refusal_list.inc"
+});
+#undef DIASTOLE_REFUSAL
 
 #define DIASTOLE_LIMIT(number, name, unit) name = number,
 enum class Limit : std::uint8_t {
 #include "protocol/wire/limit_list.inc"
 };
 #undef DIASTOLE_LIMIT
-inline constexpr Limit kLastLimit = Limit::trigger_delay;
+#define DIASTOLE_LIMIT(number, name, unit) Limit::name,
+inline constexpr Limit kLastLimit = last_of({
+#include "protocol/wire/limit_list.inc"
+});
+#undef DIASTOLE_LIMIT
 
 }  // namespace diastole::wire

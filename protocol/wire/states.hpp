@@ -13,6 +13,8 @@
 
 #include <cstdint>
 
+#include "protocol/wire/last_of.hpp"
+
 namespace diastole::wire {
 
 #define DIASTOLE_STATE(number, name) name = number,
@@ -20,21 +22,31 @@ enum class State : std::uint8_t {
 #include "protocol/wire/state_list.inc"
 };
 #undef DIASTOLE_STATE
-inline constexpr State kLastState = State::jogging;
+#define DIASTOLE_STATE(number, name) State::name,
+inline constexpr State kLastState = last_of({
+#include "protocol/wire/state_list.inc"
+});
+#undef DIASTOLE_STATE
 
 #define DIASTOLE_WAVEFORM(number, name) name = number,
 enum class Waveform : std::uint8_t {
 #include "protocol/wire/waveform_list.inc"
 };
-#undef DIASTOLE_WAVEFORM
-inline constexpr Waveform kLastWaveform = Waveform::uploaded;
+#define DIASTOLE_WAVEFORM(number, name) Waveform::name,
+inline constexpr Waveform kLastWaveform = last_of({
+#include "protocol/wire/waveform_list.inc"
+});
 
 #define DIASTOLE_RUN_END(number, name) name = number,
 enum class RunEnd : std::uint8_t {
 #include "protocol/wire/run_end_list.inc"
 };
 #undef DIASTOLE_RUN_END
-inline constexpr RunEnd kLastRunEnd = RunEnd::faulted;
+#define DIASTOLE_RUN_END(number, name) RunEnd::name,
+inline constexpr RunEnd kLastRunEnd = last_of({
+#include "protocol/wire/run_end_list.inc"
+});
+#undef DIASTOLE_RUN_END
 
 enum class ResetCause : std::uint8_t { unknown = 0, power_on = 1, reset_pin = 2, software = 3, watchdog = 4 };
 inline constexpr ResetCause kLastResetCause = ResetCause::watchdog;

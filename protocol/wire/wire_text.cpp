@@ -33,7 +33,6 @@ constexpr Words kStates[] = {
 constexpr Words kWaveforms[] = {
 #define DIASTOLE_WAVEFORM(number, name) {#name, {}, {}},
 #include "protocol/wire/waveform_list.inc"
-#undef DIASTOLE_WAVEFORM
 };
 constexpr Words kRunEnds[] = {
 #define DIASTOLE_RUN_END(number, name) {#name, {}, {}},

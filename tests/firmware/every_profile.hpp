@@ -1,5 +1,5 @@
 #pragma once
-// The waveforms that the firmware can run, by name, as parameters of tests: the profiles of profile_list.inc and
+// The waveforms that the firmware can run, by name, as parameters of tests: the profiles of waveform_list.inc and
 // an uploaded one.
 
 #include <ostream>
@@ -36,9 +36,8 @@ inline void PrintTo(const NamedProfile& named, std::ostream* out) { *out << name
 
 inline std::vector<NamedProfile> every_profile() {
   return {
-#define DIASTOLE_PROFILE(name) {#name, wire::Waveform::name, &name##_profile},
-#include "firmware/core/profiles/profile_list.inc"
-#undef DIASTOLE_PROFILE
+#define DIASTOLE_PROFILE(number, name) {#name, wire::Waveform::name, &name##_profile},
+#include "protocol/wire/waveform_list.inc"
       {"uploaded", wire::Waveform::uploaded, nullptr, &heart_waveform()},
   };
 }

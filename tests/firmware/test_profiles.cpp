@@ -1,4 +1,4 @@
-// Properties of every profile in profile_list.inc, and agreement with the analytic waveforms.
+// Properties of every profile in waveform_list.inc, and agreement with the analytic waveforms.
 
 #include <gtest/gtest.h>
 
@@ -101,7 +101,6 @@ TEST_P(EveryProfile, IsFoundUnderItsWaveformName) {
 #define DIASTOLE_WAVEFORM(number, name) \
   if (wanted == #name) found = find_profile(wire::Waveform::name) == GetParam().profile;
 #include "protocol/wire/waveform_list.inc"
-#undef DIASTOLE_WAVEFORM
   EXPECT_TRUE(found);
 }
 

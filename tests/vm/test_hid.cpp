@@ -7,7 +7,7 @@
 #include <filesystem>
 #include <memory>
 
-#include "host/daq/usb1208ls_instrument.hpp"
+#include "host/daq/usb1208ls.hpp"
 #include "protocol/contract/input_error.hpp"
 #include "tests/vm/simulated_1208ls.hpp"
 #ifdef DIASTOLE_VM_HIDRAW

@@ -57,7 +57,7 @@ class Server {
 };
 
 daq::OpenPolled rtu(const std::string& parity) {
-  return daq::configured(daq::configure_modbus_rtu,
+  return daq::configured(daq::modbus_rtu_driver.configure,
                          fmt::format("port = \"{}\"\nparity = \"{}\"\ntimeout_ms = 400\n", left, parity),
                          "[[daq.channel]]\nregister = 3\ntype = \"uint16\"\nV_per_count = 0.001\n");
 }

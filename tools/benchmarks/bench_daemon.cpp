@@ -61,7 +61,7 @@ double bare_loop(const BenchLoad& load, double seconds) {
   TableReader root = TableReader::from_text(text, "bench");
   TableReader table = root.table("daq");
   std::vector<TableReader> channels = table.tables("channel");
-  const auto instrument = daq::configure_simulated(table, channels)({});
+  const auto instrument = daq::simulated_driver.configure(table, channels)({});
   auto& blocks = dynamic_cast<daq::BlockInstrument&>(*instrument);
   (void)blocks.start(load.rate_Hz);
   const std::chrono::duration<double> pause(static_cast<double>(blocks.block_samples()) / load.rate_Hz / 4);

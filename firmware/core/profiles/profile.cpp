@@ -4,11 +4,10 @@ namespace diastole::firmware {
 
 const Profile* find_profile(wire::Waveform waveform) {
   switch (waveform) {
-#define DIASTOLE_PROFILE(name) \
-  case wire::Waveform::name:   \
+#define DIASTOLE_PROFILE(number, name) \
+  case wire::Waveform::name:           \
     return &name##_profile;
-#include "firmware/core/profiles/profile_list.inc"
-#undef DIASTOLE_PROFILE
+#include "protocol/wire/waveform_list.inc"
     default:
       return nullptr;
   }

@@ -24,9 +24,8 @@ struct Profile {
   [[nodiscard]] bool moves() const { return phase_rising != nullptr; }
 };
 
-#define DIASTOLE_PROFILE(name) extern const Profile name##_profile;
-#include "firmware/core/profiles/profile_list.inc"
-#undef DIASTOLE_PROFILE
+#define DIASTOLE_PROFILE(number, name) extern const Profile name##_profile;
+#include "protocol/wire/waveform_list.inc"
 
 /// The profile of a waveform, or nullptr if this firmware has none.
 const Profile* find_profile(wire::Waveform waveform);

@@ -74,7 +74,7 @@ class RtuInstrument {
 };
 
 OpenPolled rtu(const std::string& port, const std::string& more = "parity = \"none\"\ntimeout_ms = 1000\n") {
-  return configured(configure_modbus_rtu, fmt::format("port = \"{}\"\n", port) + more,
+  return configured(modbus_rtu_driver.configure, fmt::format("port = \"{}\"\n", port) + more,
                     "[[daq.channel]]\nregister = 0\ntype = \"float32\"\n");
 }
 

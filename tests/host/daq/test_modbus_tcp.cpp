@@ -16,7 +16,7 @@ using testing::AllOf;
 using testing::HasSubstr;
 
 OpenPolled configured(const std::string& daq, const std::string& channels) {
-  return configured(configure_modbus_tcp, daq, channels);
+  return configured(modbus_tcp_driver.configure, daq, channels);
 }
 
 constexpr const char* two_inputs = "[[daq.channel]]\ninput = 0\n[[daq.channel]]\ninput = 3\n";

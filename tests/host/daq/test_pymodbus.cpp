@@ -94,10 +94,11 @@ TEST(Pymodbus, OverTcp) {
   const Pymodbus server({"tcp"});
   ASSERT_FALSE(server.ready().empty());
   const std::string where = fmt::format("host = \"127.0.0.1\"\nport = {}\n", server.ready());
-  expect_labjack(*configured(configure_modbus_tcp, where + "preset = \"labjack-t\"\n", inputs)(patient));
+  expect_labjack(
+      *configured(modbus_tcp_driver.configure, where + "preset = \"labjack-t\"\n", inputs)(patient));
   for (const char* function : {"holding", "input"}) {
-    expect_described(*configured(configure_modbus_tcp, where + fmt::format("function = \"{}\"\n", function),
-                                 described)(patient));
+    expect_described(*configured(modbus_tcp_driver.configure,
+                                 where + fmt::format("function = \"{}\"\n", function), described)(patient));
   }
 }
 
@@ -107,8 +108,9 @@ TEST(Pymodbus, OverASerialLine) {
   const Pymodbus server({"rtu", cable.right()});
   ASSERT_FALSE(server.ready().empty());
   const std::string where = fmt::format("port = \"{}\"\nparity = \"none\"\ntimeout_ms = 500\n", cable.left());
-  expect_labjack(*configured(configure_modbus_rtu, where + "preset = \"labjack-t\"\n", inputs)(patient));
-  expect_described(*configured(configure_modbus_rtu, where, described)(patient));
+  expect_labjack(
+      *configured(modbus_rtu_driver.configure, where + "preset = \"labjack-t\"\n", inputs)(patient));
+  expect_described(*configured(modbus_rtu_driver.configure, where, described)(patient));
 }
 
 }  // namespace

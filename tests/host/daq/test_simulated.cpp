@@ -12,7 +12,7 @@ constexpr uint64_t ms = 1'000'000;
 
 TEST(Simulated, NumbersWhatItGivesAndLosesWhatIsNotTakenInTime) {
   uint64_t now_ns = 5 * ms;
-  const auto instrument = configured_any(configure_simulated, "",
+  const auto instrument = configured_any(simulated_driver.configure, "",
                                          "[[daq.channel]]\ninput = 0\n")({.now_ns = [&] { return now_ns; }});
   auto& blocks = dynamic_cast<BlockInstrument&>(*instrument);
   ASSERT_TRUE(blocks.start(1000).ok);
@@ -31,7 +31,7 @@ TEST(Simulated, NumbersWhatItGivesAndLosesWhatIsNotTakenInTime) {
 }
 
 TEST(Simulated, SaysThatNothingIsMeasuredAndIsNowhere) {
-  const auto open = configured_any(configure_simulated, "", "[[daq.channel]]\ninput = 0\n");
+  const auto open = configured_any(simulated_driver.configure, "", "[[daq.channel]]\ninput = 0\n");
   EXPECT_THAT(open({})->plan_rate(10'000).warning, testing::HasSubstr("simulated"));
   EXPECT_THAT(message_of<InputError>([&] { (void)open({.address = "127.0.0.1:502"}); }),
               testing::HasSubstr("--daq 127.0.0.1:502"));

@@ -1,10 +1,10 @@
-#include "host/daq/usb1208ls.hpp"
+#include "host/daq/usb1208ls_bytes.hpp"
 
 #include <gmock/gmock.h>
 
 #include <deque>
 
-#include "host/daq/usb1208ls_instrument.hpp"
+#include "host/daq/usb1208ls.hpp"
 #include "protocol/contract/input_error.hpp"
 #include "tests/host/bench/scratch.hpp"
 #include "tests/host/daq/configured.hpp"
@@ -202,7 +202,7 @@ TEST(Usb1208ls, RatesThatItDoesNotHaveAreRefusedWithThoseItHas) {
 
 TEST(Usb1208ls, TheRigFileNamesInputAndRange) {
   const auto configure = [](const std::string& channels) {
-    return message_of<InputError>([&] { configured_any(configure_usb1208ls, "", channels); });
+    return message_of<InputError>([&] { configured_any(usb1208ls_driver.configure, "", channels); });
   };
   EXPECT_EQ(configure("[[daq.channel]]\ninput = 0\nrange_V = 2.5\n"), "(no error)");
   EXPECT_THAT(configure("[[daq.channel]]\ninput = 4\n"), HasSubstr("input"));

@@ -32,7 +32,6 @@ TEST(WireText, ListsAreNumberedFromZeroWithoutHoles) {
   next = 0;
 #define DIASTOLE_WAVEFORM(number, name) EXPECT_EQ(number, next++) << #name;
 #include "protocol/wire/waveform_list.inc"
-#undef DIASTOLE_WAVEFORM
   EXPECT_EQ(next - 1, static_cast<int>(kLastWaveform));
   next = 0;
 #define DIASTOLE_RUN_END(number, name) EXPECT_EQ(number, next++) << #name;

@@ -42,10 +42,9 @@ TEST_P(EveryWaveform, IsPlannedInTimeAt200kHz) {
 
 std::vector<Waveform> moving_waveforms() {
   std::vector<Waveform> moving{Waveform::uploaded};
-#define DIASTOLE_PROFILE(name) \
+#define DIASTOLE_PROFILE(number, name) \
   if (firmware::name##_profile.moves()) moving.push_back(Waveform::name);
-#include "firmware/core/profiles/profile_list.inc"
-#undef DIASTOLE_PROFILE
+#include "protocol/wire/waveform_list.inc"
   return moving;
 }
 INSTANTIATE_TEST_SUITE_P(Profiles, EveryWaveform, testing::ValuesIn(moving_waveforms()),

@@ -81,11 +81,10 @@ std::string name_of(const testing::TestParamInfo<StepRateTrial>& tested) {
 std::vector<StepRateTrial> trials() {
   std::vector<StepRateTrial> all;
   for (const double rate_Hz : {30e3, 200e3}) {
-#define DIASTOLE_PROFILE(name)          \
+#define DIASTOLE_PROFILE(number, name)  \
   if (firmware::name##_profile.moves()) \
     all.push_back({.waveform = wire::Waveform::name, .peak_rate_Hz = rate_Hz, .period_s = 0.4, .cycles = 2});
-#include "firmware/core/profiles/profile_list.inc"
-#undef DIASTOLE_PROFILE
+#include "protocol/wire/waveform_list.inc"
   }
   return all;
 }

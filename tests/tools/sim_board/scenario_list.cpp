@@ -44,10 +44,9 @@ void jog(MiniatureHost& host) {
 const std::vector<Scenario>& scenarios() {
   static const std::vector<Scenario> list{
   // Undisturbed: equal to the last edge.
-#define DIASTOLE_PROFILE(profile) \
+#define DIASTOLE_PROFILE(number, profile) \
   {.name = #profile, .program = {segment(Waveform::profile, 2, 8'000'000, 800'000)}},
-#include "firmware/core/profiles/profile_list.inc"
-#undef DIASTOLE_PROFILE
+#include "protocol/wire/waveform_list.inc"
       {.name = "the_papers_cycle", .program = {paper()}},
       {.name = "uploaded",
        .program = {segment(Waveform::uploaded, 2, 20'000'000, 1'200'000)},

@@ -31,7 +31,7 @@ class LateAnswers : public testing::Test {
     thread_ = std::thread([this] { server_->run(stop_[0]); });
     clock_.emplace(options_.conductor.string());
     const auto at = nlohmann::json::parse(server_->addresses());
-    const auto open = daq::configured(daq::configure_modbus_tcp,
+    const auto open = daq::configured(daq::modbus_tcp_driver.configure,
                                       "host = \"127.0.0.1\"\nport = " + at["modbus_port"].dump() +
                                           "\npreset = \"labjack-t\"\ntimeout_ms = 20\n",
                                       "[[daq.channel]]\ninput = 0\n");
