@@ -7,27 +7,27 @@ namespace diastole::boot {
 namespace {
 
 using wire::ImageSlot;
-using wire::Standing;
+using wire::ImageState;
 
 struct LastEvent {
   BootEvent event = BootEvent::none;
   int age = 0;  ///< number of the record: the greater, the younger
 };
 
-Standing standing_of(const SlotFacts& slot, BootEvent last) {
-  if (!slot.has_header) return Standing::empty;
-  if (!slot.verified) return Standing::incomplete;
+ImageState state_of(const SlotFacts& slot, BootEvent last) {
+  if (!slot.has_header) return ImageState::empty;
+  if (!slot.verified) return ImageState::incomplete;
   switch (last) {
     case BootEvent::installed:
-      return Standing::installed;
+      return ImageState::installed;
     case BootEvent::tried:
-      return Standing::failed;
+      return ImageState::failed;
     case BootEvent::confirmed:
-      return Standing::confirmed;
+      return ImageState::confirmed;
     case BootEvent::none:
       break;
   }
-  return Standing::unrecorded;
+  return ImageState::unrecorded;
 }
 
 ImageSlot slot_of(std::size_t index) { return static_cast<ImageSlot>(index); }
@@ -44,21 +44,21 @@ BootDecision decide(std::span<const std::uint8_t> records, const std::array<Slot
 
   BootDecision decision;
   for (std::size_t i = 0; i < slots.size(); ++i)
-    decision.standing[i] = standing_of(slots[i], last[i].event);
-  const auto youngest = [&](Standing wanted) {
+    decision.state[i] = state_of(slots[i], last[i].event);
+  const auto youngest = [&](ImageState wanted) {
     ImageSlot found = ImageSlot::none;
     int found_age = -1;
     for (std::size_t i = 0; i < slots.size(); ++i) {
-      if (decision.standing[i] != wanted || last[i].age <= found_age) continue;
+      if (decision.state[i] != wanted || last[i].age <= found_age) continue;
       found = slot_of(i);
       found_age = last[i].age;
     }
     return found;
   };
 
-  for (const Standing standing : {Standing::confirmed, Standing::unrecorded, Standing::failed})
-    if (decision.keep == ImageSlot::none) decision.keep = youngest(standing);
-  const ImageSlot installed = youngest(Standing::installed);
+  for (const ImageState state : {ImageState::confirmed, ImageState::unrecorded, ImageState::failed})
+    if (decision.keep == ImageSlot::none) decision.keep = youngest(state);
+  const ImageSlot installed = youngest(ImageState::installed);
   const ImageSlot kept = decision.keep != ImageSlot::none ? decision.keep : installed;
   decision.trial = installed != ImageSlot::none && records_left(records) > 0;
   decision.start = decision.trial ? installed : kept;

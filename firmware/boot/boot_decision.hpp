@@ -30,7 +30,7 @@ struct BootDecision {
   bool trial = false;
   wire::ImageSlot keep = wire::ImageSlot::none;  ///< what is started if not on trial
   wire::ImageSlot free = wire::ImageSlot::a;     ///< where an update goes
-  std::array<wire::Standing, 2> standing{};
+  std::array<wire::ImageState, 2> state{};
 };
 
 BootDecision decide(std::span<const std::uint8_t> records, const std::array<SlotFacts, 2>& slots);

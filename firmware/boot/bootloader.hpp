@@ -35,7 +35,7 @@ struct Start {
 inline constexpr std::uint64_t kStayWindow_us = 30'000;
 /// After this silence of the line a bootloader with something to start starts it.
 inline constexpr std::uint64_t kPatience_us = 30'000'000;
-/// Of the bootloader itself, as Hello tells it.
+/// Of the bootloader itself, as Hello reports it.
 inline constexpr wire::FirmwareVersion kBootloaderVersion{1, 0, 0};
 
 template <BootHardware H>
@@ -48,7 +48,7 @@ class Bootloader {
  private:
   static constexpr std::uint64_t kLastAnswer_us = 100'000;
 
-  bool told_to_stay(std::uint64_t until_us);
+  bool stay_requested(std::uint64_t until_us);
   /// One turn of serving; false when the bootloader is to be left.
   bool serve_turn();
   void receive(const wire::Received& received);
@@ -79,7 +79,7 @@ template <BootHardware H>
 Start Bootloader<H>::run(bool asked_to_stay) {
   const std::uint64_t window_end_us = hardware_.now_us() + kStayWindow_us;
   const BootDecision decision = decide(hardware_);
-  if (asked_to_stay || decision.start == wire::ImageSlot::none || told_to_stay(window_end_us)) {
+  if (asked_to_stay || decision.start == wire::ImageSlot::none || stay_requested(window_end_us)) {
     heard_us_ = hardware_.now_us();
     while (serve_turn()) {
     }
@@ -92,7 +92,7 @@ Start Bootloader<H>::run(bool asked_to_stay) {
 }
 
 template <BootHardware H>
-bool Bootloader<H>::told_to_stay(std::uint64_t until_us) {
+bool Bootloader<H>::stay_requested(std::uint64_t until_us) {
   wire::FrameDecoder decoder;
   while (hardware_.now_us() < until_us) {
     const auto byte = hardware_.serial_read();
@@ -187,7 +187,7 @@ void Bootloader<H>::handle(const wire::ImageQuery& query) {
   report.slot = query.slot;
   report.free_slot = decision.free;
   if (query.slot != wire::ImageSlot::none) {
-    report.standing = decision.standing[static_cast<std::size_t>(query.slot)];
+    report.standing = decision.state[static_cast<std::size_t>(query.slot)];
     report.link_address = hardware_.slot_address(query.slot);
     if (const auto header = header_in(hardware_.slot(query.slot))) {
       report.version_major = header->version.major;
@@ -195,7 +195,7 @@ void Bootloader<H>::handle(const wire::ImageQuery& query) {
       report.version_patch = header->version.patch;
       report.build_id = header->build_id;
       report.code_bytes = header->code_bytes;
-      if (report.standing == wire::Standing::incomplete &&
+      if (report.standing == wire::ImageState::incomplete &&
           header->code_bytes <= hardware_.slot(query.slot).size() - wire::kImageHeaderArea)
         report.held_bytes = held_code(hardware_.slot(query.slot), header->code_bytes);
       else

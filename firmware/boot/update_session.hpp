@@ -1,6 +1,6 @@
 #pragma once
 // An update as the bootloader carries it out: begin, data in order, finish. Whatever interrupts it, the slot
-// tells how far it came: the header says of which image, the last written word how much.
+// shows how far it came: the header says of which image, the last written word how much.
 
 #include <optional>
 
@@ -94,7 +94,7 @@ template <SlotStore S>
 bool UpdateSession<S>::compact_records(const BootDecision& decision) {
   if (!store_.erase_records()) return false;
   if (decision.keep == wire::ImageSlot::none) return true;
-  if (decision.standing[static_cast<std::size_t>(decision.keep)] != wire::Standing::confirmed) return true;
+  if (decision.state[static_cast<std::size_t>(decision.keep)] != wire::ImageState::confirmed) return true;
   const auto header = header_in(store_.slot(decision.keep));
   return append(store_, {BootEvent::confirmed, decision.keep, tag_of(*header)});
 }
@@ -126,7 +126,7 @@ UpdateReply UpdateSession<S>::finish() {
     return refuse(not_verified);
   }
   const BootDecision decision = decide(store_);
-  if (decision.standing[static_cast<std::size_t>(slot_)] == wire::Standing::installed) return {};
+  if (decision.state[static_cast<std::size_t>(slot_)] == wire::ImageState::installed) return {};
   if (!append(store_, {BootEvent::installed, slot_, facts.tag})) return refuse(flash_failed, 0);
   return {};
 }

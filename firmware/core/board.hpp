@@ -44,7 +44,7 @@ struct Identity {
 /// The image that the board runs, among those in its slots.
 struct RunningImage {
   wire::ImageSlot slot = wire::ImageSlot::a;
-  wire::Standing standing = wire::Standing::unrecorded;
+  wire::ImageState state = wire::ImageState::unrecorded;
   wire::FirmwareVersion version;
   std::uint64_t build_id = 0;
   std::uint32_t code_bytes = 0;

@@ -94,7 +94,7 @@ class Dispatch {
                                               (inputs.far_limit ? 4 : 0) | (motion_.motor_enabled() ? 8 : 0));
     status.tick = on_wire(board_.now());
     status.position_microsteps = counters.position.count;
-    status.segment = motion_.segment();
+    status.segment = motion_.run().segment();
     status.cycle = counters.cycles_begun;
     status.triggers = counters.triggers;
     status.r_waves = counters.r_waves;
@@ -147,7 +147,7 @@ class Dispatch {
     wire::ImageReport report;
     report.request_id = query.request_id;
     report.slot = image.slot;
-    report.standing = image.standing;
+    report.standing = image.state;
     report.version_major = image.version.major;
     report.version_minor = image.version.minor;
     report.version_patch = image.version.patch;

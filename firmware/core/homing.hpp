@@ -21,8 +21,8 @@
 #include <algorithm>
 #include <cstdint>
 
-#include "firmware/core/glide.hpp"
 #include "firmware/core/program.hpp"
+#include "firmware/core/rest_to_rest_move.hpp"
 #include "firmware/core/units.hpp"
 
 namespace diastole::firmware {
@@ -35,7 +35,7 @@ inline constexpr Ticks kHomingPause = microseconds(100'000);
 
 struct HomingMove {
   bool inflate = false;
-  Glide glide;  ///< as far as the switch may be away
+  RestToRestMove move;  ///< as far as the switch may be away
 };
 
 /// Fast is the configured speed as far as hand_steps_per_s allows, slow a quarter of it or what stops within a step. The switch must be found within a

@@ -29,7 +29,7 @@ class ImageTrial {
   wire::UpdateOutcome confirm(std::uint64_t build_id) {
     const RunningImage image = board_.running_image();
     if (image.build_id != build_id) return wire::UpdateOutcome::other_image;
-    if (image.standing == wire::Standing::confirmed) return wire::UpdateOutcome::done;
+    if (image.state == wire::ImageState::confirmed) return wire::UpdateOutcome::done;
     if (!at_rest_and_disarmed()) return wire::UpdateOutcome::not_at_rest;
     if (!board_.confirm_image()) return wire::UpdateOutcome::flash_failed;
     trial_ends_.reset();
@@ -40,7 +40,7 @@ class ImageTrial {
   /// after the order to enter the bootloader takes that order back.
   void poll() {
     const Ticks now = board_.now();
-    if (!begun_ && board_.running_image().standing == wire::Standing::on_trial) trial_ends_ = now + kTrial;
+    if (!begun_ && board_.running_image().state == wire::ImageState::on_trial) trial_ends_ = now + kTrial;
     begun_ = true;
     if (!at_rest_and_disarmed()) farewell_ends_.reset();
     const bool farewell = farewell_ends_ && *farewell_ends_ <= now;

@@ -39,7 +39,7 @@ PlanRefusal check_jog(const wire::Jog& jog, const Settings& settings, bool posit
   return {};
 }
 
-Glide jog_glide(const wire::Jog& jog, const Settings& settings) {
+RestToRestMove jog_move(const wire::Jog& jog, const Settings& settings) {
   const std::uint64_t speed = std::max<std::uint64_t>(settings.steps_per_s(jog.flow_uL_per_s), 1);
   return {static_cast<std::uint32_t>(settings.steps_of_nL(size_of(jog.distance_nL)).count), speed,
           std::max<std::uint64_t>(settings.stop_steps_per_s2() / 4, 1)};

@@ -1,9 +1,9 @@
 #pragma once
 // Moving the piston by hand, so to speak: how far, how fast, and what is too much.
 
-#include "firmware/core/glide.hpp"
 #include "firmware/core/plan_check.hpp"
 #include "firmware/core/program.hpp"
+#include "firmware/core/rest_to_rest_move.hpp"
 #include "protocol/wire/motion_messages.hpp"
 
 namespace diastole::firmware {
@@ -13,6 +13,6 @@ namespace diastole::firmware {
 PlanRefusal check_jog(const wire::Jog& jog, const Settings& settings, bool position_known, Steps position);
 
 /// Precondition: check_jog accepted it.
-Glide jog_glide(const wire::Jog& jog, const Settings& settings);
+RestToRestMove jog_move(const wire::Jog& jog, const Settings& settings);
 
 }  // namespace diastole::firmware

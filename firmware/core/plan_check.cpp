@@ -2,8 +2,8 @@
 
 #include <algorithm>
 
+#include "firmware/core/backlash_compensation.hpp"
 #include "firmware/core/profiles/profile.hpp"
-#include "firmware/core/take_up.hpp"
 #include "firmware/core/uploaded/crossings.hpp"
 
 namespace diastole::firmware {
@@ -141,8 +141,8 @@ wire::Result<Ticks, PlanRefusal> check_program(const Program& program, const Set
   return microseconds(static_cast<std::int64_t>(slowest_us));
 }
 
-wire::Result<std::uint32_t, PlanRefusal> check_take_up(const Program& program, const Settings& settings,
-                                                       std::uint32_t backlash_steps) {
+wire::Result<std::uint32_t, PlanRefusal> check_compensation(const Program& program, const Settings& settings,
+                                                            std::uint32_t backlash_steps) {
   if (backlash_steps == 0) return std::uint32_t{0};
   constexpr std::uint64_t kMost_us = 250'000;
   // Ramps accelerate at a quarter of what is allowed.
@@ -151,7 +151,7 @@ wire::Result<std::uint32_t, PlanRefusal> check_take_up(const Program& program, c
     peak_steps_per_s2 =
         std::max(peak_steps_per_s2,
                  settings.steps_per_s(segment_peaks(program.segments[i], settings).acceleration_uL_per_s2));
-  const std::uint64_t window_us = take_up_window_us(backlash_steps, peak_steps_per_s2, settings);
+  const std::uint64_t window_us = compensation_window_us(backlash_steps, peak_steps_per_s2, settings);
   for (std::size_t i = 0; i < program.size; ++i) {
     const Segment& segment = program.segments[i];
     const auto index = static_cast<std::uint16_t>(i);

@@ -39,10 +39,11 @@ struct PlanRefusal {
 /// and neither more travel nor more steps a second than it has.
 PlanRefusal check_configuration(const wire::Configure& configure, const wire::MachineSettings& machine);
 
-/// The window in which every reversal of the program takes up the play (take_up.hpp), in µs: at most an eighth of any
-/// period and a quarter of a second, and with room between the steps of the profile; or the limit that it exceeds.
-wire::Result<std::uint32_t, PlanRefusal> check_take_up(const Program& program, const Settings& settings,
-                                                       std::uint32_t backlash_steps);
+/// The window in which every reversal of the program takes up the play (backlash_compensation.hpp), in µs: at most an
+/// eighth of any period and a quarter of a second, and with room between the steps of the profile; or the limit that it
+/// exceeds.
+wire::Result<std::uint32_t, PlanRefusal> check_compensation(const Program& program, const Settings& settings,
+                                                            std::uint32_t backlash_steps);
 
 /// Peaks of one segment. Precondition: the firmware has its waveform.
 SegmentPeaks segment_peaks(const Segment& segment, const Settings& settings);

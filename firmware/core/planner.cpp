@@ -31,15 +31,15 @@ void Planner::begin_run(const Program& program, const Settings& settings, Ticks 
   plan_next();
 }
 
-void Planner::begin_glide(bool inflate, const Glide& glide, Ticks start) {
+void Planner::begin_move(bool inflate, const RestToRestMove& move, Ticks start) {
   origin_ = start;
-  glide_ = glide;
-  length_ = glide.duration();
+  move_ = move;
+  length_ = move.duration();
   inflate_ = inflate;
-  count_ = glide.count();
+  count_ = move.count();
   index_ = 0;
   last_ = before_last_ = {};
-  phase_ = Phase::glide;
+  phase_ = Phase::move;
   plan_next();
 }
 
@@ -174,8 +174,8 @@ void Planner::finish_cycle() {
   }
 }
 
-MotionEvent Planner::glide_step() {
-  return {origin_ + glide_.time_of(index_++),
+MotionEvent Planner::move_step() {
+  return {origin_ + move_.time_of(index_++),
           static_cast<std::uint16_t>(MotionEvent::kStep | (inflate_ ? MotionEvent::kInflate : 0))};
 }
 
@@ -229,9 +229,9 @@ void Planner::plan_in_phase() {
       else
         next_ = still_cycle_mark();
       break;
-    case Phase::glide:
+    case Phase::move:
       if (index_ < count_)
-        next_ = glide_step();
+        next_ = move_step();
       else
         end_steps(length_);
       break;

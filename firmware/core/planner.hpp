@@ -13,9 +13,9 @@
 
 #include <cstdint>
 
-#include "firmware/core/glide.hpp"
 #include "firmware/core/profiles/profile.hpp"
 #include "firmware/core/program.hpp"
+#include "firmware/core/rest_to_rest_move.hpp"
 #include "firmware/core/stepped_fraction.hpp"
 #include "firmware/core/units.hpp"
 #include "firmware/core/uploaded/crossings.hpp"
@@ -33,7 +33,7 @@ struct MotionEvent {
     kRunStart = 32,      ///< run time zero; no step
     kSegmentStart = 64,  ///< first cycle of the next segment begins; no step
     kEnd = 128,          ///< everything planned has been done; no step
-    kTakeUp = 256,       ///< a step that takes up play: the motor moves, the load does not (take_up.hpp)
+    kBacklash = 256,     ///< a step that takes up play: the motor moves, the load does not
   };
   Ticks tick;
   std::uint16_t flags = 0;  ///< 0: no event
@@ -49,7 +49,7 @@ class Planner {
   /// Plans the program from `start`. `program` must outlive the run. Precondition: check_program accepted it.
   void begin_run(const Program& program, const Settings& settings, Ticks start, Steps position);
   /// Plans one motion from rest to rest (homing, jog).
-  void begin_glide(bool inflate, const Glide& glide, Ticks start);
+  void begin_move(bool inflate, const RestToRestMove& move, Ticks start);
   /// After the cycle being planned: ramp to 0 and end.
   void stop_at_cycle_end() { stop_at_cycle_end_ = true; }
   /// Comes to rest from the last popped event at no more than `deceleration_steps_per_s2`: what has been popped
@@ -75,7 +75,7 @@ class Planner {
   static Ticks segment_offset(const Program& program, const Settings& settings, std::size_t segment);
 
  private:
-  enum class Phase : std::uint8_t { idle, run_start, rest, ramp, segment_start, cycles, glide, stop, end };
+  enum class Phase : std::uint8_t { idle, run_start, rest, ramp, segment_start, cycles, move, stop, end };
 
   void plan_next();
   [[nodiscard]] Ticks last_interval() const;
@@ -89,7 +89,7 @@ class Planner {
   MotionEvent uploaded_step();
   MotionEvent still_cycle_mark();
   [[nodiscard]] std::uint16_t cycle_start_flags() const;
-  MotionEvent glide_step();
+  MotionEvent move_step();
   MotionEvent stop_step();
   void finish_cycle();
 
@@ -98,16 +98,16 @@ class Planner {
   MotionEvent next_;
   Phase phase_ = Phase::idle;
   Phase after_ramp_ = Phase::idle;
-  Ticks origin_;             ///< when the present ramp, cycle, glide or stop began
+  Ticks origin_;             ///< when the present ramp, cycle, move or stop began
   Steps position_;           ///< at the beginning of the present phase
   std::uint32_t index_ = 0;  ///< next step of the present phase
-  std::uint32_t count_ = 0;  ///< steps of the present ramp, half cycle, glide or stop
+  std::uint32_t count_ = 0;  ///< steps of the present ramp, half cycle, move or stop
   SteppedFraction level_;    ///< y of the next step of the present ramp, cycle or stop
   bool inflate_ = false;
-  Ticks length_;                      ///< of the ramp, cycle, glide or stop
+  Ticks length_;                      ///< of the ramp, cycle, move or stop
   const Profile* profile_ = nullptr;  ///< null: the segment's waveform was uploaded
   UploadedCrossings crossings_;       ///< of that one
-  Glide glide_;
+  RestToRestMove move_;
   std::size_t segment_ = 0;
   std::uint32_t cycle_ = 0;  ///< in the segment
   std::uint64_t cycle_in_run_ = 0;

@@ -14,7 +14,7 @@
 
 namespace diastole::firmware {
 
-/// What on_match() tells the main loop: an event of the motion that the host must hear of.
+/// What on_match() reports to the main loop: an event of the motion that the host must hear of.
 struct MotionReport {
   Ticks tick;
   std::uint16_t flags = 0;  ///< MotionEvent::Flag
@@ -196,7 +196,7 @@ class StepEngine {
 
   /// Beginnings and ends: a few in a cycle.
   void mark(const Queued& event) {
-    if (event.has(MotionEvent::kTakeUp)) {  // count() has taken it for a step of the load
+    if (event.has(MotionEvent::kBacklash)) {  // count() has taken it for a step of the load
       const Steps way{event.has(MotionEvent::kInflate) ? 1 : -1};
       counters_.position -= way;
       counters_.motor_beside_load += way;
@@ -219,7 +219,7 @@ class StepEngine {
     if (event.has(MotionEvent::kRWave)) ++counters_.r_waves;
   }
 
-  /// The delayed trigger counts and is told once it has risen.
+  /// The delayed trigger counts and is reported once it has risen.
   void settle_trigger(std::uint32_t now) {
     if (trigger_.flags == 0 || ticks_between(trigger_.tick, now) < 0) return;
     count_trigger(trigger_);

@@ -23,16 +23,16 @@ class Telemetry {
 
   void pump(wire::ReliableLink& link) {
     motion_.engine().sample_to_now();
-    if (motion_.run_start() != run_start_) {
-      run_start_ = motion_.run_start();
+    if (motion_.run().start() != run_start_) {
+      run_start_ = motion_.run().start();
       next_index_ = 0;
     }
     outbox_.flush(link);
     auto& samples = motion_.engine().samples();
-    const std::size_t least = motion_.run_end_due() ? 1 : kBatch;
+    const std::size_t least = motion_.run().end_due() ? 1 : kBatch;
     while (link.room() > kReserve && samples.size() >= least)
       send_batch(link);
-    if (motion_.run_end_due() && samples.size() == 0 && outbox_.empty()) {
+    if (motion_.run().end_due() && samples.size() == 0 && outbox_.empty()) {
       motion_.report_run_end();
       outbox_.flush(link);
     }

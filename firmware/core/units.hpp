@@ -31,7 +31,7 @@ inline constexpr std::int64_t kTicksPerSecond = 84'000'000;
 
 constexpr Ticks microseconds(std::int64_t count) { return {count * kTicksPerMicrosecond}; }
 
-/// The lower half of a time, as a 32-bit counter shows it: tells moments apart that lie within 25 s.
+/// The lower half of a time, as a 32-bit counter shows it: distinguishes moments that lie within 25 s.
 constexpr std::uint32_t lower_half(Ticks time) { return static_cast<std::uint32_t>(time.count); }
 /// From one lower half to another, positive if `to` is later.
 constexpr std::int32_t ticks_between(std::uint32_t from, std::uint32_t to) {

@@ -103,7 +103,7 @@ bool Updater::wanted(const UpdateFile& file, const Greeting& found, const Update
       link_.ask<wire::ImageReport>(wire::ImageQuery{.slot = wire::ImageSlot::none}, answer_patience);
   options.say(fmt::format("the controller runs {}, the file holds {}", in_words(*result.before),
                           in_words(file.version)));
-  if (running && running->build_id == file.build_id && running->standing == wire::Standing::confirmed &&
+  if (running && running->build_id == file.build_id && running->standing == wire::ImageState::confirmed &&
       !options.force) {
     result.end = UpdateEnd::already_there;
     result.held_bytes = running->code_bytes;

@@ -32,8 +32,7 @@ struct BlackBoxEntry {
   std::uint64_t tick = 0;  ///< since that start
   std::int32_t argument = 0;
 
-  template <class Self, class Visitor>
-  static constexpr void layout(Self& self, Visitor& visit) {
+  static constexpr void layout(auto& self, auto& visit) {
     visit.field("number", self.number);
     visit.field("boot", self.boot);
     visit.choice("kind", self.kind, kLastNoted);
@@ -56,17 +55,11 @@ struct ReadBlackBox {
   std::uint16_t request_id = 0;
   std::uint32_t from = 0;
 
-  template <class Self, class Visitor>
-  static constexpr void layout([[maybe_unused]] Self& self, [[maybe_unused]] Visitor& visit) {
+  static constexpr void layout(auto& self, auto& visit) {
     visit.field("request_id", self.request_id);
     visit.field("from", self.from);
   }
-  static constexpr ReadBlackBox example() {
-    ReadBlackBox message;
-    message.request_id = 0x0107;
-    message.from = 42;
-    return message;
-  }
+  static constexpr ReadBlackBox example() { return {.request_id = 0x0107, .from = 42}; }
 };
 
 // Controller → host, the answer to ReadBlackBox. Entry number 0, kind nothing: there is none from there on.
@@ -88,18 +81,13 @@ struct BlackBoxReport {
   std::uint32_t newest = 0;
   BlackBoxEntry entry;
 
-  template <class Self, class Visitor>
-  static constexpr void layout([[maybe_unused]] Self& self, [[maybe_unused]] Visitor& visit) {
+  static constexpr void layout(auto& self, auto& visit) {
     visit.field("request_id", self.request_id);
     visit.field("newest", self.newest);
     BlackBoxEntry::layout(self.entry, visit);
   }
   static constexpr BlackBoxReport example() {
-    BlackBoxReport message;
-    message.request_id = 0x0107;
-    message.newest = 44;
-    message.entry = {42, 2, Noted::fault, 1, 168'000'000, 300};
-    return message;
+    return {.request_id = 0x0107, .newest = 44, .entry = {42, 2, Noted::fault, 1, 168'000'000, 300}};
   }
 };
 

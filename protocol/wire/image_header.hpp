@@ -14,7 +14,7 @@
 //       19     1  0
 //       20     8  build_id        the same in the images of one build for either slot
 //       28    32  sha256          of bytes 0 ... 27 and the application's code_bytes
-//       60     4  crc             CRC-32 (crc32.hpp) of bytes 0 ... 59: tells a header from its remains
+//       60     4  crc             CRC-32 (crc32.hpp) of bytes 0 ... 59: a header, not its remains
 //
 // Integers are little-endian; the 448 bytes up to the application stay erased (0xFF).
 //

@@ -25,8 +25,7 @@ struct MachineSettings {
   std::array<std::uint8_t, kMaxNameBytes> board_name{};  ///< UTF-8, for people
 
   /// Its fields as part of a message or record, in the order of setting_list.inc, the name last.
-  template <class Self, class Visitor>
-  static constexpr void layout(Self& self, Visitor& visit) {
+  static constexpr void layout(auto& self, auto& visit) {
 #define DIASTOLE_SETTING(number, name, least, initial, most, shown, scale, explanation) \
   visit.field(#name, self.name);
 #include "protocol/wire/setting_list.inc"

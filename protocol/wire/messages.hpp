@@ -75,52 +75,50 @@ consteval std::uint32_t schema_hash() {
 /// Equal on both sides, or host and firmware do not belong together.
 inline constexpr std::uint32_t kSchemaHash = detail::schema_hash();
 
-/// A payload that is no valid message: `known` tells an unknown type from a bad payload.
+/// A payload that is no valid message: `known` if the type is, and its payload bad.
 struct Undecodable {
   std::uint8_t type = 0;
   bool known = false;
   DecodeFault fault;
 };
 
-/// Decodes and calls `handler` with the message, or with Undecodable.
-template <class Handler>
-constexpr void visit_message(std::uint8_t type, std::span<const std::uint8_t> payload, Handler&& handler) {
+namespace detail {
+template <bool (*wanted)(MessageType), class Handler>
+constexpr void visit(std::uint8_t type, std::span<const std::uint8_t> payload, Handler&& handler) {
   switch (static_cast<MessageType>(type)) {
-#define DIASTOLE_MESSAGE(number, name, sender, delivery) \
-  case MessageType::name: {                              \
-    const auto message = decode<name>(payload);          \
-    if (message.ok())                                    \
-      handler(message.value());                          \
-    else                                                 \
-      handler(Undecodable{type, true, message.error()}); \
-    return;                                              \
-  }
+#define DIASTOLE_MESSAGE(number, name, sender, delivery)   \
+  case MessageType::name:                                  \
+    if constexpr (wanted(MessageType::name)) {             \
+      const auto message = decode<name>(payload);          \
+      if (message.ok())                                    \
+        handler(message.value());                          \
+      else                                                 \
+        handler(Undecodable{type, true, message.error()}); \
+      return;                                              \
+    }                                                      \
+    break;
 #include "protocol/wire/message_list.inc"
 #undef DIASTOLE_MESSAGE
   }
   handler(Undecodable{type, false, {}});
+}
+constexpr bool any(MessageType) { return true; }
+constexpr bool for_application(MessageType type) {
+  return sender_of(type) == Sender::host && !for_bootloader(type);
+}
+}  // namespace detail
+
+/// Decodes and calls `handler` with the message, or with Undecodable.
+template <class Handler>
+constexpr void visit_message(std::uint8_t type, std::span<const std::uint8_t> payload, Handler&& handler) {
+  detail::visit<detail::any>(type, payload, handler);
 }
 
 /// As visit_message, for a controller's application: only what a host asks of it is decoded, anything else is an
 /// unknown Undecodable. An image carries no more than it needs.
 template <class Handler>
 constexpr void visit_request(std::uint8_t type, std::span<const std::uint8_t> payload, Handler&& handler) {
-  switch (static_cast<MessageType>(type)) {
-#define DIASTOLE_MESSAGE(number, name, sender, delivery)                                  \
-  case MessageType::name:                                                                 \
-    if constexpr (Sender::sender == Sender::host && !for_bootloader(MessageType::name)) { \
-      const auto message = decode<name>(payload);                                         \
-      if (message.ok())                                                                   \
-        handler(message.value());                                                         \
-      else                                                                                \
-        handler(Undecodable{type, true, message.error()});                                \
-      return;                                                                             \
-    }                                                                                     \
-    break;
-#include "protocol/wire/message_list.inc"
-#undef DIASTOLE_MESSAGE
-  }
-  handler(Undecodable{type, false, {}});
+  detail::visit<detail::for_application>(type, payload, handler);
 }
 
 /// Lambdas as one handler for visit_message.

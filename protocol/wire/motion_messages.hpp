@@ -3,6 +3,7 @@
 
 #include <cstdint>
 
+#include "protocol/wire/common_requests.hpp"
 #include "protocol/wire/message_type.hpp"
 
 namespace diastole::wire {
@@ -14,23 +15,7 @@ namespace diastole::wire {
 //        2    4 lease_id                     the lease whose heartbeats keep the motor going
 //
 // Example Home: 05 00 44 33 22 11
-struct Home {
-  static constexpr MessageType kType = MessageType::Home;
-  std::uint16_t request_id = 0;
-  std::uint32_t lease_id = 0;
-
-  template <class Self, class Visitor>
-  static constexpr void layout([[maybe_unused]] Self& self, [[maybe_unused]] Visitor& visit) {
-    visit.field("request_id", self.request_id);
-    visit.field("lease_id", self.lease_id);
-  }
-  static constexpr Home example() {
-    Home message;
-    message.request_id = 5;
-    message.lease_id = 0x11223344;
-    return message;
-  }
-};
+using Home = LeaseRequest<MessageType::Home, 5>;
 
 // Host → controller: moves the piston by a distance, from rest to rest, at a quarter of the allowed acceleration.
 // StateChanged (jogging), Ack, and StateChanged when it is at rest. Unhomed it goes at most at the speed of homing; a
@@ -50,47 +35,25 @@ struct Jog {
   std::int64_t distance_nL = 0;
   std::uint32_t flow_uL_per_s = 1U;
 
-  template <class Self, class Visitor>
-  static constexpr void layout([[maybe_unused]] Self& self, [[maybe_unused]] Visitor& visit) {
+  static constexpr void layout(auto& self, auto& visit) {
     visit.field("request_id", self.request_id);
     visit.field("lease_id", self.lease_id);
     visit.field("distance_nL", self.distance_nL, -50'000'000'000, 50'000'000'000);
     visit.field("flow_uL_per_s", self.flow_uL_per_s, 1U, 10'000'000U);
   }
   static constexpr Jog example() {
-    Jog message;
-    message.request_id = 10;
-    message.lease_id = 0x11223344;
-    message.distance_nL = -5'000'000;
-    message.flow_uL_per_s = 5'000;
-    return message;
+    return {.request_id = 10, .lease_id = 0x11223344, .distance_nL = -5'000'000, .flow_uL_per_s = 5'000};
   }
 };
 
-// Host → controller: runs the armed program. RunStarted tells the tick of the start of run.
+// Host → controller: runs the armed program. RunStarted reports the tick of the start of run.
 //
 //   offset size field
 //        0    2 request_id                   chosen by the host; the answer repeats it
 //        2    4 lease_id                     the lease whose heartbeats keep the motor going
 //
 // Example Start: 06 00 44 33 22 11
-struct Start {
-  static constexpr MessageType kType = MessageType::Start;
-  std::uint16_t request_id = 0;
-  std::uint32_t lease_id = 0;
-
-  template <class Self, class Visitor>
-  static constexpr void layout([[maybe_unused]] Self& self, [[maybe_unused]] Visitor& visit) {
-    visit.field("request_id", self.request_id);
-    visit.field("lease_id", self.lease_id);
-  }
-  static constexpr Start example() {
-    Start message;
-    message.request_id = 6;
-    message.lease_id = 0x11223344;
-    return message;
-  }
-};
+using Start = LeaseRequest<MessageType::Start, 6>;
 
 // Host → controller: end the run when the present cycle is complete.
 //
@@ -98,20 +61,7 @@ struct Start {
 //        0    2 request_id                   chosen by the host; the answer repeats it
 //
 // Example StopAtCycleEnd: 07 01
-struct StopAtCycleEnd {
-  static constexpr MessageType kType = MessageType::StopAtCycleEnd;
-  std::uint16_t request_id = 0;
-
-  template <class Self, class Visitor>
-  static constexpr void layout([[maybe_unused]] Self& self, [[maybe_unused]] Visitor& visit) {
-    visit.field("request_id", self.request_id);
-  }
-  static constexpr StopAtCycleEnd example() {
-    StopAtCycleEnd message;
-    message.request_id = 0x0107;
-    return message;
-  }
-};
+using StopAtCycleEnd = BareRequest<MessageType::StopAtCycleEnd>;
 
 // Host → controller: decelerate to rest now, at Configure.acceleration_uL_per_s2: a run, homing, a jog.
 //
@@ -119,20 +69,7 @@ struct StopAtCycleEnd {
 //        0    2 request_id                   chosen by the host; the answer repeats it
 //
 // Example StopNow: 07 01
-struct StopNow {
-  static constexpr MessageType kType = MessageType::StopNow;
-  std::uint16_t request_id = 0;
-
-  template <class Self, class Visitor>
-  static constexpr void layout([[maybe_unused]] Self& self, [[maybe_unused]] Visitor& visit) {
-    visit.field("request_id", self.request_id);
-  }
-  static constexpr StopNow example() {
-    StopNow message;
-    message.request_id = 0x0107;
-    return message;
-  }
-};
+using StopNow = BareRequest<MessageType::StopNow>;
 
 // Host → controller: cut the motor off at once. Position is lost: Fault::halted.
 //
@@ -140,20 +77,7 @@ struct StopNow {
 //        0    2 request_id                   chosen by the host; the answer repeats it
 //
 // Example Halt: 07 01
-struct Halt {
-  static constexpr MessageType kType = MessageType::Halt;
-  std::uint16_t request_id = 0;
-
-  template <class Self, class Visitor>
-  static constexpr void layout([[maybe_unused]] Self& self, [[maybe_unused]] Visitor& visit) {
-    visit.field("request_id", self.request_id);
-  }
-  static constexpr Halt example() {
-    Halt message;
-    message.request_id = 0x0107;
-    return message;
-  }
-};
+using Halt = BareRequest<MessageType::Halt>;
 
 // Host → controller: leave the state faulted. Position is kept only after lease_lost.
 //
@@ -161,19 +85,6 @@ struct Halt {
 //        0    2 request_id                   chosen by the host; the answer repeats it
 //
 // Example ClearFault: 07 01
-struct ClearFault {
-  static constexpr MessageType kType = MessageType::ClearFault;
-  std::uint16_t request_id = 0;
-
-  template <class Self, class Visitor>
-  static constexpr void layout([[maybe_unused]] Self& self, [[maybe_unused]] Visitor& visit) {
-    visit.field("request_id", self.request_id);
-  }
-  static constexpr ClearFault example() {
-    ClearFault message;
-    message.request_id = 0x0107;
-    return message;
-  }
-};
+using ClearFault = BareRequest<MessageType::ClearFault>;
 
 }  // namespace diastole::wire

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "protocol/wire/common_requests.hpp"
 #include "protocol/wire/message_type.hpp"
 #include "protocol/wire/states.hpp"
 
@@ -42,8 +43,7 @@ struct Configure {
   std::uint32_t lease_us = 100'000U;
   std::uint32_t homing_flow_uL_per_s = 1U;
 
-  template <class Self, class Visitor>
-  static constexpr void layout([[maybe_unused]] Self& self, [[maybe_unused]] Visitor& visit) {
+  static constexpr void layout(auto& self, auto& visit) {
     visit.field("request_id", self.request_id);
     visit.field("microstep_pL", self.microstep_pL, 1U, 4'000'000'000U);
     visit.field("travel_uL", self.travel_uL, 1U, 50'000'000U);
@@ -56,18 +56,16 @@ struct Configure {
     visit.field("homing_flow_uL_per_s", self.homing_flow_uL_per_s, 1U, 10'000'000U);
   }
   static constexpr Configure example() {
-    Configure message;
-    message.request_id = 2;
-    message.microstep_pL = 7'791'649;
-    message.travel_uL = 7'000'000;
-    message.flow_uL_per_s = 1'860'000;
-    message.acceleration_uL_per_s2 = 1'700'000;
-    message.step_rate_Hz = 240'000;
-    message.pressure_Pa = 79'300;
-    message.inertance_kg_per_m4 = 44'000'000;
-    message.lease_us = 500'000;
-    message.homing_flow_uL_per_s = 5'000;
-    return message;
+    return {.request_id = 2,
+            .microstep_pL = 7'791'649,
+            .travel_uL = 7'000'000,
+            .flow_uL_per_s = 1'860'000,
+            .acceleration_uL_per_s2 = 1'700'000,
+            .step_rate_Hz = 240'000,
+            .pressure_Pa = 79'300,
+            .inertance_kg_per_m4 = 44'000'000,
+            .lease_us = 500'000,
+            .homing_flow_uL_per_s = 5'000};
   }
 };
 
@@ -77,20 +75,7 @@ struct Configure {
 //        0    2 request_id                   chosen by the host; the answer repeats it
 //
 // Example ClearProgram: 07 01
-struct ClearProgram {
-  static constexpr MessageType kType = MessageType::ClearProgram;
-  std::uint16_t request_id = 0;
-
-  template <class Self, class Visitor>
-  static constexpr void layout([[maybe_unused]] Self& self, [[maybe_unused]] Visitor& visit) {
-    visit.field("request_id", self.request_id);
-  }
-  static constexpr ClearProgram example() {
-    ClearProgram message;
-    message.request_id = 0x0107;
-    return message;
-  }
-};
+using ClearProgram = BareRequest<MessageType::ClearProgram>;
 
 // Host → controller: appends one segment. V(t) = offset + stroke times the waveform, repeated `cycles`
 // times; a smooth ramp leads to the offset before it. The experiment file describes the same in mL and s.
@@ -115,8 +100,7 @@ struct AddSegment {
   std::uint32_t period_us = 1'000U;
   std::uint8_t upload = 0U;
 
-  template <class Self, class Visitor>
-  static constexpr void layout([[maybe_unused]] Self& self, [[maybe_unused]] Visitor& visit) {
+  static constexpr void layout(auto& self, auto& visit) {
     visit.field("request_id", self.request_id);
     visit.choice("waveform", self.waveform, kLastWaveform);
     visit.field("cycles", self.cycles, 1U, 10'000'000U);
@@ -126,14 +110,12 @@ struct AddSegment {
     visit.field("upload", self.upload);
   }
   static constexpr AddSegment example() {
-    AddSegment message;
-    message.request_id = 3;
-    message.waveform = Waveform::parabolic;
-    message.cycles = 10;
-    message.stroke_nL = 40'000'000;
-    message.offset_nL = 0;
-    message.period_us = 1'200'000;
-    return message;
+    return {.request_id = 3,
+            .waveform = Waveform::parabolic,
+            .cycles = 10,
+            .stroke_nL = 40'000'000,
+            .offset_nL = 0,
+            .period_us = 1'200'000};
   }
 };
 
@@ -159,20 +141,14 @@ struct UploadWaveform {
   std::uint16_t points = 2U;
   std::uint32_t crc = 0;
 
-  template <class Self, class Visitor>
-  static constexpr void layout([[maybe_unused]] Self& self, [[maybe_unused]] Visitor& visit) {
+  static constexpr void layout(auto& self, auto& visit) {
     visit.field("request_id", self.request_id);
     visit.field("waveform", self.waveform);
     visit.field("points", self.points, 2U, kMaxWaveformPoints);
     visit.field("crc", self.crc);
   }
   static constexpr UploadWaveform example() {
-    UploadWaveform message;
-    message.request_id = 8;
-    message.waveform = 0;
-    message.points = 4;
-    message.crc = 0x54EB1D1E;
-    return message;
+    return {.request_id = 8, .waveform = 0, .points = 4, .crc = 0x54EB1D1E};
   }
 };
 
@@ -195,22 +171,13 @@ struct WaveformPoints {
   std::uint8_t count = 0U;
   std::array<std::int16_t, kMaxCount> rise{};
 
-  template <class Self, class Visitor>
-  static constexpr void layout([[maybe_unused]] Self& self, [[maybe_unused]] Visitor& visit) {
+  static constexpr void layout(auto& self, auto& visit) {
     visit.field("request_id", self.request_id);
     visit.field("first", self.first);
     visit.list("rise", self.count, self.rise);
   }
   static constexpr WaveformPoints example() {
-    WaveformPoints message;
-    message.request_id = 9;
-    message.first = 0;
-    message.count = 4;
-    message.rise[0] = 16'384;
-    message.rise[1] = 16'383;
-    message.rise[2] = -16'383;
-    message.rise[3] = -16'384;
-    return message;
+    return {.request_id = 9, .first = 0, .count = 4, .rise = {16'384, 16'383, -16'383, -16'384}};
   }
 };
 
@@ -236,8 +203,7 @@ struct Arm {
   std::uint32_t position_period_ticks = 1'000U;
   std::uint32_t trigger_delay_us = 0U;
 
-  template <class Self, class Visitor>
-  static constexpr void layout([[maybe_unused]] Self& self, [[maybe_unused]] Visitor& visit) {
+  static constexpr void layout(auto& self, auto& visit) {
     visit.field("request_id", self.request_id);
     visit.field("gate_every", self.gate_every, 1U, 10'000U);
     visit.field("rest_us", self.rest_us, 1'000U, 60'000'000U);
@@ -246,14 +212,12 @@ struct Arm {
     visit.field("trigger_delay_us", self.trigger_delay_us, 0U, 10'000'000U);
   }
   static constexpr Arm example() {
-    Arm message;
-    message.request_id = 4;
-    message.gate_every = 1;
-    message.rest_us = 1'000'000;
-    message.ttl_width_us = 10'000;
-    message.position_period_ticks = 280'000;
-    message.trigger_delay_us = 0;
-    return message;
+    return {.request_id = 4,
+            .gate_every = 1,
+            .rest_us = 1'000'000,
+            .ttl_width_us = 10'000,
+            .position_period_ticks = 280'000,
+            .trigger_delay_us = 0};
   }
 };
 
@@ -282,8 +246,7 @@ struct SegmentPlanned {
   std::uint32_t peak_pressure_Pa = 0;
   std::uint32_t cycle_microsteps = 0;
 
-  template <class Self, class Visitor>
-  static constexpr void layout([[maybe_unused]] Self& self, [[maybe_unused]] Visitor& visit) {
+  static constexpr void layout(auto& self, auto& visit) {
     visit.field("segment", self.segment);
     visit.field("start_us", self.start_us);
     visit.field("duration_us", self.duration_us);
@@ -294,16 +257,14 @@ struct SegmentPlanned {
     visit.field("cycle_microsteps", self.cycle_microsteps);
   }
   static constexpr SegmentPlanned example() {
-    SegmentPlanned message;
-    message.segment = 0;
-    message.start_us = 1'000'000;
-    message.duration_us = 12'000'000;
-    message.peak_flow_uL_per_s = 133'334;
-    message.peak_acceleration_uL_per_s2 = 444'445;
-    message.peak_step_rate_Hz = 17'113;
-    message.peak_pressure_Pa = 19'556;
-    message.cycle_microsteps = 5'134;
-    return message;
+    return {.segment = 0,
+            .start_us = 1'000'000,
+            .duration_us = 12'000'000,
+            .peak_flow_uL_per_s = 133'334,
+            .peak_acceleration_uL_per_s2 = 444'445,
+            .peak_step_rate_Hz = 17'113,
+            .peak_pressure_Pa = 19'556,
+            .cycle_microsteps = 5'134};
   }
 };
 

@@ -83,7 +83,7 @@ class ReliableLink {
 
   [[nodiscard]] State state() const { return state_; }
   [[nodiscard]] std::uint16_t session() const { return session_; }
-  /// Sessions opened so far: a change tells the controller that its peer has begun anew.
+  /// Sessions opened so far: a change shows the controller that its peer has begun anew.
   [[nodiscard]] std::uint32_t generation() const { return generation_; }
   /// When the last intact frame of this session came.
   [[nodiscard]] std::uint64_t last_heard_us() const { return last_heard_us_; }

@@ -31,8 +31,7 @@ struct HelloRequest {
   std::uint8_t version_minor = 0;
   std::uint8_t version_patch = 0;
 
-  template <class Self, class Visitor>
-  static constexpr void layout([[maybe_unused]] Self& self, [[maybe_unused]] Visitor& visit) {
+  static constexpr void layout(auto& self, auto& visit) {
     visit.field("request_id", self.request_id);
     visit.field("schema_hash", self.schema_hash);
     visit.field("version_major", self.version_major);
@@ -40,11 +39,7 @@ struct HelloRequest {
     visit.field("version_patch", self.version_patch);
   }
   static constexpr HelloRequest example() {
-    HelloRequest message;
-    message.request_id = 1;
-    message.schema_hash = 0xA1B2C3D4;
-    message.version_minor = 1;
-    return message;
+    return {.request_id = 1, .schema_hash = 0xA1B2C3D4, .version_minor = 1};
   }
 };
 
@@ -75,8 +70,7 @@ struct Hello {
   std::uint32_t tick_rate_Hz = 1U;
   ResetCause reset_cause{};
 
-  template <class Self, class Visitor>
-  static constexpr void layout([[maybe_unused]] Self& self, [[maybe_unused]] Visitor& visit) {
+  static constexpr void layout(auto& self, auto& visit) {
     visit.field("request_id", self.request_id);
     visit.field("schema_hash", self.schema_hash);
     visit.field("version_major", self.version_major);
@@ -88,15 +82,13 @@ struct Hello {
     visit.choice("reset_cause", self.reset_cause, kLastResetCause);
   }
   static constexpr Hello example() {
-    Hello message;
-    message.request_id = 1;
-    message.schema_hash = 0xA1B2C3D4;
-    message.version_minor = 1;
-    message.board_id = 2;
-    message.boot_id = 0x00C0FFEE;
-    message.tick_rate_Hz = 84'000'000;
-    message.reset_cause = ResetCause::power_on;
-    return message;
+    return {.request_id = 1,
+            .schema_hash = 0xA1B2C3D4,
+            .version_minor = 1,
+            .board_id = 2,
+            .boot_id = 0x00C0FFEE,
+            .tick_rate_Hz = 84'000'000,
+            .reset_cause = ResetCause::power_on};
   }
 };
 
@@ -112,15 +104,8 @@ struct Heartbeat {
   static constexpr MessageType kType = MessageType::Heartbeat;
   std::uint32_t lease_id = 0;
 
-  template <class Self, class Visitor>
-  static constexpr void layout([[maybe_unused]] Self& self, [[maybe_unused]] Visitor& visit) {
-    visit.field("lease_id", self.lease_id);
-  }
-  static constexpr Heartbeat example() {
-    Heartbeat message;
-    message.lease_id = 0x11223344;
-    return message;
-  }
+  static constexpr void layout(auto& self, auto& visit) { visit.field("lease_id", self.lease_id); }
+  static constexpr Heartbeat example() { return {.lease_id = 0x11223344}; }
 };
 
 // Host → controller: what time is it with you?
@@ -133,15 +118,8 @@ struct TimeSyncRequest {
   static constexpr MessageType kType = MessageType::TimeSyncRequest;
   std::uint32_t token = 0;
 
-  template <class Self, class Visitor>
-  static constexpr void layout([[maybe_unused]] Self& self, [[maybe_unused]] Visitor& visit) {
-    visit.field("token", self.token);
-  }
-  static constexpr TimeSyncRequest example() {
-    TimeSyncRequest message;
-    message.token = 77;
-    return message;
-  }
+  static constexpr void layout(auto& self, auto& visit) { visit.field("token", self.token); }
+  static constexpr TimeSyncRequest example() { return {.token = 77}; }
 };
 
 // Controller → host, the answer to TimeSyncRequest.
@@ -158,18 +136,13 @@ struct TimeSync {
   std::uint64_t received_tick = 0;
   std::uint64_t replied_tick = 0;
 
-  template <class Self, class Visitor>
-  static constexpr void layout([[maybe_unused]] Self& self, [[maybe_unused]] Visitor& visit) {
+  static constexpr void layout(auto& self, auto& visit) {
     visit.field("token", self.token);
     visit.field("received_tick", self.received_tick);
     visit.field("replied_tick", self.replied_tick);
   }
   static constexpr TimeSync example() {
-    TimeSync message;
-    message.token = 77;
-    message.received_tick = 84'000'000;
-    message.replied_tick = 84'000'420;
-    return message;
+    return {.token = 77, .received_tick = 84'000'000, .replied_tick = 84'000'420};
   }
 };
 

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 
+#include "protocol/wire/common_requests.hpp"
 #include "protocol/wire/machine_settings.hpp"
 #include "protocol/wire/message_type.hpp"
 
@@ -14,20 +15,7 @@ namespace diastole::wire {
 //        0    2 request_id                   chosen by the host; the answer repeats it
 //
 // Example ReadSettings: 07 01
-struct ReadSettings {
-  static constexpr MessageType kType = MessageType::ReadSettings;
-  std::uint16_t request_id = 0;
-
-  template <class Self, class Visitor>
-  static constexpr void layout([[maybe_unused]] Self& self, [[maybe_unused]] Visitor& visit) {
-    visit.field("request_id", self.request_id);
-  }
-  static constexpr ReadSettings example() {
-    ReadSettings message;
-    message.request_id = 0x0107;
-    return message;
-  }
-};
+using ReadSettings = BareRequest<MessageType::ReadSettings>;
 
 // Host → controller: keep these settings in flash and use them from now on; nothing may be moving, and geometry
 // and limits have to be configured anew. One out of its range (setting_list.inc) is refused with
@@ -53,20 +41,17 @@ struct WriteSettings {
   std::uint16_t request_id = 0;
   MachineSettings settings;
 
-  template <class Self, class Visitor>
-  static constexpr void layout([[maybe_unused]] Self& self, [[maybe_unused]] Visitor& visit) {
+  static constexpr void layout(auto& self, auto& visit) {
     visit.field("request_id", self.request_id);
     MachineSettings::layout(self.settings, visit);
   }
   static constexpr WriteSettings example() {
-    WriteSettings message;
-    message.request_id = 8;
-    message.settings.microsteps = 16;
-    message.settings.calibration_ppm = -1500;
-    message.settings.backlash_nm = 50'000;
-    message.settings.board_name_size = 4;
-    message.settings.board_name = {'r', 'i', 'g', 'A'};
-    return message;
+    return {.request_id = 8,
+            .settings = {.microsteps = 16,
+                         .calibration_ppm = -1500,
+                         .backlash_nm = 50'000,
+                         .board_name_size = 4,
+                         .board_name = {'r', 'i', 'g', 'A'}}};
   }
 };
 
@@ -91,8 +76,7 @@ struct SettingsReport {
   std::uint32_t backlash_microsteps = 0;
   MachineSettings settings;
 
-  template <class Self, class Visitor>
-  static constexpr void layout([[maybe_unused]] Self& self, [[maybe_unused]] Visitor& visit) {
+  static constexpr void layout(auto& self, auto& visit) {
     visit.field("request_id", self.request_id);
     visit.field("records_written", self.records_written);
     visit.field("microstep_pL", self.microstep_pL);
@@ -100,15 +84,11 @@ struct SettingsReport {
     MachineSettings::layout(self.settings, visit);
   }
   static constexpr SettingsReport example() {
-    SettingsReport message;
-    message.request_id = 0x0107;
-    message.records_written = 3;
-    message.microstep_pL = 7'791'649;
-    message.backlash_microsteps = 50;
-    message.settings.backlash_nm = 50'000;
-    message.settings.board_name_size = 4;
-    message.settings.board_name = {'r', 'i', 'g', 'A'};
-    return message;
+    return {.request_id = 0x0107,
+            .records_written = 3,
+            .microstep_pL = 7'791'649,
+            .backlash_microsteps = 50,
+            .settings = {.backlash_nm = 50'000, .board_name_size = 4, .board_name = {'r', 'i', 'g', 'A'}}};
   }
 };
 

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 
+#include "protocol/wire/common_requests.hpp"
 #include "protocol/wire/faults.hpp"
 #include "protocol/wire/message_type.hpp"
 #include "protocol/wire/states.hpp"
@@ -15,20 +16,7 @@ namespace diastole::wire {
 //        0    2 request_id                   chosen by the host; the answer repeats it
 //
 // Example StatusRequest: 07 01
-struct StatusRequest {
-  static constexpr MessageType kType = MessageType::StatusRequest;
-  std::uint16_t request_id = 0;
-
-  template <class Self, class Visitor>
-  static constexpr void layout([[maybe_unused]] Self& self, [[maybe_unused]] Visitor& visit) {
-    visit.field("request_id", self.request_id);
-  }
-  static constexpr StatusRequest example() {
-    StatusRequest message;
-    message.request_id = 0x0107;
-    return message;
-  }
-};
+using StatusRequest = BareRequest<MessageType::StatusRequest>;
 
 // Controller → host: the request was carried out, or for a motion begun.
 //
@@ -42,17 +30,11 @@ struct Ack {
   std::uint16_t request_id = 0;
   std::uint8_t request_type = 0;
 
-  template <class Self, class Visitor>
-  static constexpr void layout([[maybe_unused]] Self& self, [[maybe_unused]] Visitor& visit) {
+  static constexpr void layout(auto& self, auto& visit) {
     visit.field("request_id", self.request_id);
     visit.field("request_type", self.request_type);
   }
-  static constexpr Ack example() {
-    Ack message;
-    message.request_id = 4;
-    message.request_type = 0x13;
-    return message;
-  }
+  static constexpr Ack example() { return {.request_id = 4, .request_type = 0x13}; }
 };
 
 // Controller → host: the request was refused and nothing was changed.
@@ -77,8 +59,7 @@ struct Nak {
   std::int64_t asked = 0;
   std::int64_t allowed = 0;
 
-  template <class Self, class Visitor>
-  static constexpr void layout([[maybe_unused]] Self& self, [[maybe_unused]] Visitor& visit) {
+  static constexpr void layout(auto& self, auto& visit) {
     visit.field("request_id", self.request_id);
     visit.field("request_type", self.request_type);
     visit.choice("refusal", self.refusal, kLastRefusal);
@@ -88,15 +69,13 @@ struct Nak {
     visit.field("allowed", self.allowed);
   }
   static constexpr Nak example() {
-    Nak message;
-    message.request_id = 4;
-    message.request_type = 0x13;
-    message.refusal = Refusal::limit_exceeded;
-    message.limit = Limit::acceleration;
-    message.segment = 0;
-    message.asked = 2'000'000;
-    message.allowed = 1'700'000;
-    return message;
+    return {.request_id = 4,
+            .request_type = 0x13,
+            .refusal = Refusal::limit_exceeded,
+            .limit = Limit::acceleration,
+            .segment = 0,
+            .asked = 2'000'000,
+            .allowed = 1'700'000};
   }
 };
 
@@ -147,8 +126,7 @@ struct Status {
   std::uint32_t out_of_order = 0;
   std::uint32_t retransmissions = 0;
 
-  template <class Self, class Visitor>
-  static constexpr void layout([[maybe_unused]] Self& self, [[maybe_unused]] Visitor& visit) {
+  static constexpr void layout(auto& self, auto& visit) {
     visit.field("request_id", self.request_id);
     visit.choice("state", self.state, kLastState);
     visit.choice("fault", self.fault, kLastFault);
@@ -169,18 +147,16 @@ struct Status {
     visit.field("retransmissions", self.retransmissions);
   }
   static constexpr Status example() {
-    Status message;
-    message.request_id = 9;
-    message.state = State::running;
-    message.inputs = 8;
-    message.tick = 168'000'000;
-    message.position_microsteps = -2;
-    message.cycle = 3;
-    message.triggers = 3;
-    message.r_waves = 2;
-    message.steps = 30'804;
-    message.frames_received = 40;
-    return message;
+    return {.request_id = 9,
+            .state = State::running,
+            .inputs = 8,
+            .tick = 168'000'000,
+            .position_microsteps = -2,
+            .cycle = 3,
+            .triggers = 3,
+            .r_waves = 2,
+            .steps = 30'804,
+            .frames_received = 40};
   }
 };
 

@@ -25,18 +25,13 @@ struct StateChanged {
   State to{};
   std::uint64_t tick = 0;
 
-  template <class Self, class Visitor>
-  static constexpr void layout([[maybe_unused]] Self& self, [[maybe_unused]] Visitor& visit) {
+  static constexpr void layout(auto& self, auto& visit) {
     visit.choice("from", self.from, kLastState);
     visit.choice("to", self.to, kLastState);
     visit.field("tick", self.tick);
   }
   static constexpr StateChanged example() {
-    StateChanged message;
-    message.from = State::homing;
-    message.to = State::homed;
-    message.tick = 84'000'000;
-    return message;
+    return {.from = State::homing, .to = State::homed, .tick = 84'000'000};
   }
 };
 
@@ -54,19 +49,12 @@ struct RunStarted {
   std::uint16_t segments = 0;
   std::uint32_t cycles = 0;
 
-  template <class Self, class Visitor>
-  static constexpr void layout([[maybe_unused]] Self& self, [[maybe_unused]] Visitor& visit) {
+  static constexpr void layout(auto& self, auto& visit) {
     visit.field("tick", self.tick);
     visit.field("segments", self.segments);
     visit.field("cycles", self.cycles);
   }
-  static constexpr RunStarted example() {
-    RunStarted message;
-    message.tick = 168'000'000;
-    message.segments = 1;
-    message.cycles = 10;
-    return message;
-  }
+  static constexpr RunStarted example() { return {.tick = 168'000'000, .segments = 1, .cycles = 10}; }
 };
 
 // Controller → host: the first cycle of a segment begins.
@@ -81,17 +69,11 @@ struct SegmentStarted {
   std::uint16_t segment = 0;
   std::uint64_t tick = 0;
 
-  template <class Self, class Visitor>
-  static constexpr void layout([[maybe_unused]] Self& self, [[maybe_unused]] Visitor& visit) {
+  static constexpr void layout(auto& self, auto& visit) {
     visit.field("segment", self.segment);
     visit.field("tick", self.tick);
   }
-  static constexpr SegmentStarted example() {
-    SegmentStarted message;
-    message.segment = 0;
-    message.tick = 252'000'000;
-    return message;
-  }
+  static constexpr SegmentStarted example() { return {.segment = 0, .tick = 252'000'000}; }
 };
 
 // Controller → host: the TTL rose, with the first step of a cycle or, in a hold, at the cycle's time, or
@@ -109,19 +91,12 @@ struct Trigger {
   std::uint64_t tick = 0;
   std::uint8_t r_wave = 0U;
 
-  template <class Self, class Visitor>
-  static constexpr void layout([[maybe_unused]] Self& self, [[maybe_unused]] Visitor& visit) {
+  static constexpr void layout(auto& self, auto& visit) {
     visit.field("cycle", self.cycle);
     visit.field("tick", self.tick);
     visit.field("r_wave", self.r_wave, 0U, 1U);
   }
-  static constexpr Trigger example() {
-    Trigger message;
-    message.cycle = 0;
-    message.tick = 252'352'000;
-    message.r_wave = 1;
-    return message;
-  }
+  static constexpr Trigger example() { return {.cycle = 0, .tick = 252'352'000, .r_wave = 1}; }
 };
 
 // Controller → host: positions at first_tick + i period_ticks; first_index continues the batch before. A
@@ -145,21 +120,18 @@ struct PositionBatch {
   std::uint8_t count = 0;
   std::array<std::int32_t, kMaxCount> position_microsteps{};
 
-  template <class Self, class Visitor>
-  static constexpr void layout([[maybe_unused]] Self& self, [[maybe_unused]] Visitor& visit) {
+  static constexpr void layout(auto& self, auto& visit) {
     visit.field("first_index", self.first_index);
     visit.field("first_tick", self.first_tick);
     visit.field("period_ticks", self.period_ticks);
     visit.list("position_microsteps", self.count, self.position_microsteps);
   }
   static constexpr PositionBatch example() {
-    PositionBatch message;
-    message.first_index = 600;
-    message.first_tick = 336'000'000;
-    message.period_ticks = 280'000;
-    message.count = 3;
-    message.position_microsteps = {100, 101, -1};
-    return message;
+    return {.first_index = 600,
+            .first_tick = 336'000'000,
+            .period_ticks = 280'000,
+            .count = 3,
+            .position_microsteps = {100, 101, -1}};
   }
 };
 
@@ -183,8 +155,7 @@ struct RunEnded {
   std::uint32_t r_waves = 0;
   std::int32_t position_microsteps = 0;
 
-  template <class Self, class Visitor>
-  static constexpr void layout([[maybe_unused]] Self& self, [[maybe_unused]] Visitor& visit) {
+  static constexpr void layout(auto& self, auto& visit) {
     visit.choice("reason", self.reason, kLastRunEnd);
     visit.field("tick", self.tick);
     visit.field("cycles", self.cycles);
@@ -193,13 +164,7 @@ struct RunEnded {
     visit.field("position_microsteps", self.position_microsteps);
   }
   static constexpr RunEnded example() {
-    RunEnded message;
-    message.reason = RunEnd::completed;
-    message.tick = 1'344'000'000;
-    message.cycles = 10;
-    message.triggers = 10;
-    message.r_waves = 10;
-    return message;
+    return {.reason = RunEnd::completed, .tick = 1'344'000'000, .cycles = 10, .triggers = 10, .r_waves = 10};
   }
 };
 
@@ -217,18 +182,13 @@ struct FaultRaised {
   std::uint64_t tick = 0;
   std::int64_t argument = 0;
 
-  template <class Self, class Visitor>
-  static constexpr void layout([[maybe_unused]] Self& self, [[maybe_unused]] Visitor& visit) {
+  static constexpr void layout(auto& self, auto& visit) {
     visit.choice("fault", self.fault, kLastFault);
     visit.field("tick", self.tick);
     visit.field("argument", self.argument);
   }
   static constexpr FaultRaised example() {
-    FaultRaised message;
-    message.fault = Fault::estop;
-    message.tick = 300'000'000;
-    message.argument = 812;
-    return message;
+    return {.fault = Fault::estop, .tick = 300'000'000, .argument = 812};
   }
 };
 

@@ -14,7 +14,7 @@ inline constexpr ImageSlot kLastImageSlot = ImageSlot::none;
 //   empty ──BeginUpdate──▶ incomplete ──FinishUpdate──▶ installed ──next start──▶ on_trial ──Confirm──▶ confirmed
 //                              ▲                                                     │ any reset
 //                              └──────────────── BeginUpdate ─────────── failed ◀────┘
-enum class Standing : std::uint8_t {
+enum class ImageState : std::uint8_t {
   empty = 0,       ///< erased, or remains without a header
   incomplete = 1,  ///< a header, but the code does not match it (yet); never started
   installed = 2,   ///< verified; the next start tries it once
@@ -23,7 +23,7 @@ enum class Standing : std::uint8_t {
   failed = 5,      ///< was on trial and not confirmed
   unrecorded = 6,  ///< verified, but nobody knows whether it works: written past the bootloader
 };
-inline constexpr Standing kLastStanding = Standing::unrecorded;
+inline constexpr ImageState kLastImageState = ImageState::unrecorded;
 
 #define DIASTOLE_UPDATE_OUTCOME(number, name, explanation, remedy) name = number,
 enum class UpdateOutcome : std::uint8_t {

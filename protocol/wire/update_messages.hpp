@@ -27,6 +27,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "protocol/wire/common_requests.hpp"
 #include "protocol/wire/image_header.hpp"
 #include "protocol/wire/message_type.hpp"
 #include "protocol/wire/update.hpp"
@@ -40,20 +41,7 @@ namespace diastole::wire {
 //        0    2 request_id                   chosen by the host; the answer repeats it
 //
 // Example EnterBootloader: 09 00
-struct EnterBootloader {
-  static constexpr MessageType kType = MessageType::EnterBootloader;
-  std::uint16_t request_id = 0;
-
-  template <class Self, class Visitor>
-  static constexpr void layout([[maybe_unused]] Self& self, [[maybe_unused]] Visitor& visit) {
-    visit.field("request_id", self.request_id);
-  }
-  static constexpr EnterBootloader example() {
-    EnterBootloader message;
-    message.request_id = 9;
-    return message;
-  }
-};
+using EnterBootloader = BareRequest<MessageType::EnterBootloader, 9>;
 
 // Host → application or bootloader: what is in a slot? Answered with ImageReport.
 //
@@ -67,17 +55,11 @@ struct ImageQuery {
   std::uint16_t request_id = 0;
   ImageSlot slot{};
 
-  template <class Self, class Visitor>
-  static constexpr void layout([[maybe_unused]] Self& self, [[maybe_unused]] Visitor& visit) {
+  static constexpr void layout(auto& self, auto& visit) {
     visit.field("request_id", self.request_id);
     visit.choice("slot", self.slot, kLastImageSlot);
   }
-  static constexpr ImageQuery example() {
-    ImageQuery message;
-    message.request_id = 9;
-    message.slot = ImageSlot::b;
-    return message;
-  }
+  static constexpr ImageQuery example() { return {.request_id = 9, .slot = ImageSlot::b}; }
 };
 
 // Host → application on trial: you work; from now on you are the one to start.
@@ -93,17 +75,11 @@ struct ConfirmImage {
   std::uint16_t request_id = 0;
   std::uint64_t build_id = 0;
 
-  template <class Self, class Visitor>
-  static constexpr void layout([[maybe_unused]] Self& self, [[maybe_unused]] Visitor& visit) {
+  static constexpr void layout(auto& self, auto& visit) {
     visit.field("request_id", self.request_id);
     visit.field("build_id", self.build_id);
   }
-  static constexpr ConfirmImage example() {
-    ConfirmImage message;
-    message.request_id = 9;
-    message.build_id = 0x1122334455667788;
-    return message;
-  }
+  static constexpr ConfirmImage example() { return {.request_id = 9, .build_id = 0x1122334455667788}; }
 };
 
 // Host → bootloader: an image for the free slot. If the slot holds the beginning of this very image, it is kept
@@ -125,8 +101,7 @@ struct BeginUpdate {
   std::uint8_t header_bytes = kImageHeaderBytes;
   ImageHeaderBytes header{};
 
-  template <class Self, class Visitor>
-  static constexpr void layout([[maybe_unused]] Self& self, [[maybe_unused]] Visitor& visit) {
+  static constexpr void layout(auto& self, auto& visit) {
     visit.field("request_id", self.request_id);
     visit.field("allow_older", self.allow_older, 0, 1);
     visit.list("header", self.header_bytes, self.header);
@@ -157,20 +132,13 @@ struct UpdateData {
   std::uint8_t count = 0;
   std::array<std::uint8_t, kMaxCount> data{};
 
-  template <class Self, class Visitor>
-  static constexpr void layout([[maybe_unused]] Self& self, [[maybe_unused]] Visitor& visit) {
+  static constexpr void layout(auto& self, auto& visit) {
     visit.field("request_id", self.request_id);
     visit.field("offset", self.offset);
     visit.list("data", self.count, self.data);
   }
   static constexpr UpdateData example() {
-    UpdateData message;
-    message.request_id = 9;
-    message.offset = 256;
-    message.count = 4;
-    message.data[0] = 1;
-    message.data[3] = 0x20;
-    return message;
+    return {.request_id = 9, .offset = 256, .count = 4, .data = {1, 0, 0, 0x20}};
   }
 };
 
@@ -180,20 +148,7 @@ struct UpdateData {
 //        0    2 request_id                   chosen by the host; the answer repeats it
 //
 // Example FinishUpdate: 09 00
-struct FinishUpdate {
-  static constexpr MessageType kType = MessageType::FinishUpdate;
-  std::uint16_t request_id = 0;
-
-  template <class Self, class Visitor>
-  static constexpr void layout([[maybe_unused]] Self& self, [[maybe_unused]] Visitor& visit) {
-    visit.field("request_id", self.request_id);
-  }
-  static constexpr FinishUpdate example() {
-    FinishUpdate message;
-    message.request_id = 9;
-    return message;
-  }
-};
+using FinishUpdate = BareRequest<MessageType::FinishUpdate, 9>;
 
 // Host → bootloader: reset and start what is to be started.
 //
@@ -201,20 +156,7 @@ struct FinishUpdate {
 //        0    2 request_id                   chosen by the host; the answer repeats it
 //
 // Example StartImage: 09 00
-struct StartImage {
-  static constexpr MessageType kType = MessageType::StartImage;
-  std::uint16_t request_id = 0;
-
-  template <class Self, class Visitor>
-  static constexpr void layout([[maybe_unused]] Self& self, [[maybe_unused]] Visitor& visit) {
-    visit.field("request_id", self.request_id);
-  }
-  static constexpr StartImage example() {
-    StartImage message;
-    message.request_id = 9;
-    return message;
-  }
-};
+using StartImage = BareRequest<MessageType::StartImage, 9>;
 
 // Host → bootloader, repeated without pause while the controller is reset by hand: a bootloader that sees one
 // within 30 ms of its start stays, whatever the slots hold. Needs no open session.
@@ -228,14 +170,8 @@ struct StayInBootloader {
   static constexpr std::uint32_t kWord = 0x59415453;
   std::uint32_t word = kWord;
 
-  template <class Self, class Visitor>
-  static constexpr void layout([[maybe_unused]] Self& self, [[maybe_unused]] Visitor& visit) {
-    visit.field("word", self.word, kWord, kWord);
-  }
-  static constexpr StayInBootloader example() {
-    StayInBootloader message;
-    return message;
-  }
+  static constexpr void layout(auto& self, auto& visit) { visit.field("word", self.word, kWord, kWord); }
+  static constexpr StayInBootloader example() { return {}; }
 };
 
 // Application or bootloader → host. The application knows its own slot only.
@@ -259,7 +195,7 @@ struct ImageReport {
   static constexpr MessageType kType = MessageType::ImageReport;
   std::uint16_t request_id = 0;
   ImageSlot slot{};
-  Standing standing{};
+  ImageState standing{};
   std::uint8_t version_major = 0;
   std::uint8_t version_minor = 0;
   std::uint8_t version_patch = 0;
@@ -269,11 +205,10 @@ struct ImageReport {
   std::uint32_t link_address = 0;
   ImageSlot free_slot{};
 
-  template <class Self, class Visitor>
-  static constexpr void layout([[maybe_unused]] Self& self, [[maybe_unused]] Visitor& visit) {
+  static constexpr void layout(auto& self, auto& visit) {
     visit.field("request_id", self.request_id);
     visit.choice("slot", self.slot, kLastImageSlot);
-    visit.choice("standing", self.standing, kLastStanding);
+    visit.choice("standing", self.standing, kLastImageState);
     visit.field("version_major", self.version_major);
     visit.field("version_minor", self.version_minor);
     visit.field("version_patch", self.version_patch);
@@ -284,17 +219,15 @@ struct ImageReport {
     visit.choice("free_slot", self.free_slot, kLastImageSlot);
   }
   static constexpr ImageReport example() {
-    ImageReport message;
-    message.request_id = 9;
-    message.slot = ImageSlot::b;
-    message.standing = Standing::incomplete;
-    message.version_minor = 1;
-    message.build_id = 0x1122334455667788;
-    message.code_bytes = 30'000;
-    message.held_bytes = 1024;
-    message.link_address = 0x0804'0000;
-    message.free_slot = ImageSlot::b;
-    return message;
+    return {.request_id = 9,
+            .slot = ImageSlot::b,
+            .standing = ImageState::incomplete,
+            .version_minor = 1,
+            .build_id = 0x1122334455667788,
+            .code_bytes = 30'000,
+            .held_bytes = 1024,
+            .link_address = 0x0804'0000,
+            .free_slot = ImageSlot::b};
   }
 };
 
@@ -316,8 +249,7 @@ struct UpdateAnswer {
   std::uint32_t held_bytes = 0;
   std::uint32_t value = 0;
 
-  template <class Self, class Visitor>
-  static constexpr void layout([[maybe_unused]] Self& self, [[maybe_unused]] Visitor& visit) {
+  static constexpr void layout(auto& self, auto& visit) {
     visit.field("request_id", self.request_id);
     visit.field("request_type", self.request_type);
     visit.choice("outcome", self.outcome, kLastUpdateOutcome);
@@ -325,12 +257,7 @@ struct UpdateAnswer {
     visit.field("value", self.value);
   }
   static constexpr UpdateAnswer example() {
-    UpdateAnswer message;
-    message.request_id = 9;
-    message.request_type = 0x33;
-    message.outcome = UpdateOutcome::wrong_board;
-    message.value = 2;
-    return message;
+    return {.request_id = 9, .request_type = 0x33, .outcome = UpdateOutcome::wrong_board, .value = 2};
   }
 };
 

@@ -38,7 +38,7 @@ struct Plan {
     program.rest_us = 1'000'000;
     const auto checked = check_program(program, Settings(configure));
     if (!checked.ok()) return checked.error();
-    const auto window_us = check_take_up(program, Settings(configure), backlash_steps);
+    const auto window_us = check_compensation(program, Settings(configure), backlash_steps);
     return window_us.ok() ? PlanRefusal{} : window_us.error();
   }
 };
@@ -97,7 +97,7 @@ Excess microstep() {
   return excess;
 }
 
-/// An eighth of 1.2 s; see take_up.hpp for the window.
+/// An eighth of 1.2 s; see backlash_compensation.hpp for the window.
 Excess take_up() {
   Excess excess{{}, 150'049, 150'000, {}};
   excess.beyond.backlash_steps = 907;

@@ -242,15 +242,15 @@ TEST(Jog, StopsUnderControlForAStopAndForASilentHost) {
   EXPECT_EQ(bench.rig.mechanical_microsteps() - bench.rig.position_microsteps(), kReference);
 }
 
-TEST(Glide, EveryStepIsInOrderWithinSpeedAndAcceleration) {
+TEST(RestToRestMove, EveryStepIsInOrderWithinSpeedAndAcceleration) {
   for (const std::uint32_t count : {1U, 2U, 3U, 10U, 641U, 5000U})
     for (const std::uint64_t speed : {1U, 160U, 641U, 20'000U})
       for (const std::uint64_t acceleration : {100U, 10'000U, 218'000U}) {
-        const Glide glide(count, speed, acceleration);
+        const RestToRestMove move(count, speed, acceleration);
         const auto v = static_cast<double>(speed), a = static_cast<double>(acceleration);
         double before_s = -1;
         for (std::uint32_t k = 0; k < count; ++k) {
-          const double t_s = static_cast<double>(glide.time_of(k).count) / kTicksPerSecond;
+          const double t_s = static_cast<double>(move.time_of(k).count) / kTicksPerSecond;
           ASSERT_GT(t_s, 0);
           // From rest, (k + 1/2) steps need at least √(2 (k + 1/2) / a), and 1/v each.
           ASSERT_GE(t_s * 1.000001, std::min(std::sqrt((2 * k + 1) / a), (k + 0.5) / v)) << count << " " << k;
@@ -259,7 +259,7 @@ TEST(Glide, EveryStepIsInOrderWithinSpeedAndAcceleration) {
           }
           before_s = t_s;
         }
-        const double end_s = static_cast<double>(glide.duration().count) / kTicksPerSecond;
+        const double end_s = static_cast<double>(move.duration().count) / kTicksPerSecond;
         ASSERT_GT(end_s, before_s);
         ASSERT_LE(end_s, count / v + v / a + std::sqrt(8 * count / a) + 2 / v);
       }

@@ -10,9 +10,9 @@ namespace {
 using Restart = RecordingBoard::Restart;
 using wire::UpdateOutcome;
 
-RecordedController::Options running(wire::Standing standing) {
+RecordedController::Options running(wire::ImageState state) {
   RecordedController::Options options;
-  options.board.image = {wire::ImageSlot::b, standing, {0, 1, 1}, 0xB17D, 30'000, 0x0804'0000};
+  options.board.image = {wire::ImageSlot::b, state, {0, 1, 1}, 0xB17D, 30'000, 0x0804'0000};
   return options;
 }
 
@@ -55,7 +55,7 @@ TEST(ImageTrial, AMotionAskedForAfterwardsTakesTheOrderBack) {
 }
 
 TEST(ImageTrial, AnswersAHostOfAnotherProtocolVersion) {
-  Bench bench(running(wire::Standing::on_trial));
+  Bench bench(running(wire::ImageState::on_trial));
   bench.link.open(9, 0);
   bench.run_for(microseconds(200'000));
   bench.request(wire::HelloRequest{0, wire::kSchemaHash + 1, 9, 9, 9});
@@ -64,14 +64,14 @@ TEST(ImageTrial, AnswersAHostOfAnotherProtocolVersion) {
   const wire::ImageReport& image = bench.heard.images.back();
   EXPECT_EQ(image.slot, wire::ImageSlot::b);
   EXPECT_EQ(image.free_slot, wire::ImageSlot::a);
-  EXPECT_EQ(image.standing, wire::Standing::on_trial);
+  EXPECT_EQ(image.standing, wire::ImageState::on_trial);
   EXPECT_EQ(image.build_id, 0xB17DU);
   EXPECT_EQ(asked(bench, wire::ConfirmImage{0, 0xB17D}), UpdateOutcome::done);
   EXPECT_EQ(asked(bench, wire::EnterBootloader{}), UpdateOutcome::done);
 }
 
 TEST(ImageTrial, OnlyTheImageThatIsMeantIsConfirmed) {
-  Bench bench(running(wire::Standing::on_trial));
+  Bench bench(running(wire::ImageState::on_trial));
   bench.connect();
   EXPECT_EQ(asked(bench, wire::ConfirmImage{0, 0xBAD}), UpdateOutcome::other_image);
   bench.run_for(microseconds(21'000'000));
@@ -79,7 +79,7 @@ TEST(ImageTrial, OnlyTheImageThatIsMeantIsConfirmed) {
 }
 
 TEST(ImageTrial, AConfirmedImageStays) {
-  Bench bench(running(wire::Standing::on_trial));
+  Bench bench(running(wire::ImageState::on_trial));
   bench.connect();
   EXPECT_EQ(asked(bench, wire::ConfirmImage{0, 0xB17D}), UpdateOutcome::done);
   EXPECT_EQ(asked(bench, wire::ConfirmImage{0, 0xB17D}), UpdateOutcome::done) << "repeated";

@@ -84,7 +84,7 @@ class StopAnywhere : public testing::TestWithParam<Case> {
                                     program.position_period_ticks}));
     const Steps position{bench.rig.position_microsteps()};
     EXPECT_TRUE(bench.ask(wire::Start{0, Bench::kLease}));
-    run_start = rest_start = bench.rig.controller().motion().run_start();
+    run_start = rest_start = bench.rig.controller().motion().run().start();
     if (position != Steps{0}) rest_start += settings.ramp_time(-position);
   }
 

@@ -1,5 +1,5 @@
 #pragma once
-// The firmware on the recording board: bytes in, bytes out, time told from outside.
+// The firmware on the recording board: bytes in, bytes out, time given from outside.
 //
 //   RecordedController controller;
 //   controller.feed(bytes_from_host);                  // taken from the line now

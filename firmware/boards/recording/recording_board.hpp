@@ -94,7 +94,7 @@ class RecordingBoard {
   MemoryFlash& settings_flash() { return options_.memory->flash; }
   [[nodiscard]] RunningImage running_image() const { return options_.image; }
   bool confirm_image() {
-    options_.image.standing = wire::Standing::confirmed;
+    options_.image.state = wire::ImageState::confirmed;
     return true;
   }
   void restart(bool into_bootloader) {

@@ -13,7 +13,7 @@ wire::ResetCause take_reset_cause();
 /// From the hand-over that the bootloader left, and the random number generator, whose clock must be on.
 firmware::Identity read_identity();
 
-/// `starts` tells starts apart even if the random generator does not run.
+/// `starts` distinguishes starts even if the random generator does not run.
 std::uint32_t make_boot_id(std::uint32_t starts);
 
 }  // namespace diastole::stm32

@@ -24,7 +24,7 @@ class PulseTimer {
   [[nodiscard]] std::int32_t ticks_until(std::uint32_t tick) const {
     return firmware::ticks_between(tim2().CNT.read(), tick);
   }
-  /// TIM5's interrupt tells when the order has been carried out.
+  /// TIM5's interrupt reports when the order has been carried out.
   void schedule(const firmware::PulseOrder& order) {
     steps_.schedule(order.tick, order.step);
     if (order.ttl) raise_ttl(order.tick, order.ttl_width);

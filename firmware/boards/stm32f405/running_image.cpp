@@ -31,10 +31,10 @@ firmware::RunningImage running_image() {
     if (record.slot == image.slot && record.tag == boot::tag_of(*header)) last = record.event;
   });
   const bool trial = read_hand_over().value_or(HandOver{}).trial != 0;
-  image.standing = last == boot::BootEvent::confirmed ? wire::Standing::confirmed
-                   : trial                            ? wire::Standing::on_trial
-                   : last == boot::BootEvent::tried   ? wire::Standing::failed
-                                                      : wire::Standing::unrecorded;
+  image.state = last == boot::BootEvent::confirmed ? wire::ImageState::confirmed
+                : trial                            ? wire::ImageState::on_trial
+                : last == boot::BootEvent::tried   ? wire::ImageState::failed
+                                                   : wire::ImageState::unrecorded;
   return image;
 }
 

@@ -3,6 +3,6 @@
 namespace diastole::firmware {
 
 template class StepEngine<stm32::Stm32Board>;
-template void Motion<stm32::Stm32Board>::refill();
+template void StepFeed<stm32::Stm32Board>::refill(Ticks);
 
 }  // namespace diastole::firmware

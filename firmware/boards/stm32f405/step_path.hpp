@@ -8,6 +8,6 @@
 namespace diastole::firmware {
 
 extern template class StepEngine<stm32::Stm32Board>;
-extern template void Motion<stm32::Stm32Board>::refill();
+extern template void StepFeed<stm32::Stm32Board>::refill(Ticks);
 
 }  // namespace diastole::firmware

@@ -11,7 +11,7 @@ namespace diastole::boot {
 namespace {
 
 using wire::ImageSlot;
-using wire::Standing;
+using wire::ImageState;
 
 constexpr ImageTag tag_a{1, 2, 3, 4, 5, 6, 7, 8}, tag_b{8, 7, 6, 5, 4, 3, 2, 1}, other_tag{9};
 constexpr std::array<SlotFacts, 2> both_whole{{{true, true, tag_a}, {true, true, tag_b}}};
@@ -78,7 +78,7 @@ TEST(BootDecision, TriesAnInstalledImageOnceAndReturns) {
   const BootDecision second = decide(tried, both_whole);
   EXPECT_EQ(second.start, ImageSlot::a);
   EXPECT_FALSE(second.trial);
-  EXPECT_EQ(second.standing[1], Standing::failed);
+  EXPECT_EQ(second.state[1], ImageState::failed);
 }
 
 TEST(BootDecision, DoesNotTryWhatItCannotRecord) {
@@ -93,7 +93,7 @@ TEST(BootDecision, RecordsOfAnotherImageSayNothing) {
       sector({{BootEvent::installed, ImageSlot::b, other_tag}, record(BootEvent::confirmed, ImageSlot::a)});
   const BootDecision decision = decide(records, both_whole);
   EXPECT_EQ(decision.start, ImageSlot::a);
-  EXPECT_EQ(decision.standing[1], Standing::unrecorded);
+  EXPECT_EQ(decision.state[1], ImageState::unrecorded);
 }
 
 TEST(BootDecision, PrefersAnUnknownImageToAFailedOneAndAFailedOneToNone) {
@@ -142,7 +142,7 @@ TEST(BootDecision, HoldsItsPromisesForRandomRecordsAndSlots) {
       ASSERT_NE(decision.free, decision.keep);
     }
     if (decision.trial) {
-      ASSERT_EQ(decision.standing[static_cast<std::size_t>(decision.start)], Standing::installed);
+      ASSERT_EQ(decision.state[static_cast<std::size_t>(decision.start)], ImageState::installed);
       ASSERT_GT(records_left(records), 0U);
     }
   }

@@ -14,7 +14,7 @@ using boot::BootEvent;
 using boot::decide;
 using boot::inspect;
 using boot::UpdateSession;
-using wire::Standing;
+using wire::ImageState;
 using wire::UpdateOutcome;
 
 const TestImage old_image = make_image(2048, {0, 1, 0}, 1);
@@ -195,7 +195,7 @@ struct PowerCutCampaign {
     const auto decision = decide(slots);
     return decision.start != ImageSlot::none &&
            inspect(slots, decision.start).tag == tag(image, decision.start) &&
-           decision.standing[static_cast<std::size_t>(decision.start)] == Standing::confirmed;
+           decision.state[static_cast<std::size_t>(decision.start)] == ImageState::confirmed;
   }
 
   /// Every cut in [1, operations], with `stride` from `first`.

@@ -58,7 +58,7 @@ class FlashBench {
     if (report->slot == wire::ImageSlot::none) return "bootloader";
     const std::string version =
         in_words({report->version_major, report->version_minor, report->version_patch});
-    return version + (report->standing == wire::Standing::confirmed ? " confirmed" : " unconfirmed");
+    return version + (report->standing == wire::ImageState::confirmed ? " confirmed" : " unconfirmed");
   }
   [[nodiscard]] SimBoard& board() { return desk.controller.board(); }
   void power_cycle() {

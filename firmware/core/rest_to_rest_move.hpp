@@ -14,12 +14,12 @@ namespace diastole::firmware {
 /// ⌊√square⌋
 std::uint64_t whole_root(std::uint64_t square);
 
-class Glide {
+class RestToRestMove {
  public:
-  Glide() = default;
+  RestToRestMove() = default;
   /// At most the speed and the acceleration given. Precondition: speed and acceleration at least 1, speed at most
   /// 1e6, count at most 2^31 - 1.
-  Glide(std::uint32_t count, std::uint64_t steps_per_s, std::uint64_t steps_per_s2);
+  RestToRestMove(std::uint32_t count, std::uint64_t steps_per_s, std::uint64_t steps_per_s2);
 
   [[nodiscard]] std::uint32_t count() const { return count_; }
   /// When a step is made, from the start. Precondition: step < count().

@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "firmware/core/take_up.hpp"
+#include "firmware/core/backlash_compensation.hpp"
 #include "protocol/wire/wire_text.hpp"
 #include "tests/firmware/bench.hpp"
 #include "tests/firmware/every_profile.hpp"
@@ -88,7 +88,7 @@ TEST_P(EveryWaveformWithPlay, TheLoadFollowsThePlanOutsideOfTheWindows) {
   Program program;
   program.segments[program.size++] = {GetParam(), 3, 8'000'000, 0, 1'500'000};
   program.segments[program.size++] = {GetParam(), 2, 6'000'000, 3'000'000, 1'300'000};
-  const auto window_us = check_take_up(program, Settings(wire::Configure::example()), play);
+  const auto window_us = check_compensation(program, Settings(wire::Configure::example()), play);
   ASSERT_TRUE(window_us.ok());
   const Ticks window = microseconds(*window_us);
 
@@ -129,7 +129,7 @@ INSTANTIATE_TEST_SUITE_P(Waveforms, EveryWaveformWithPlay,
                          testing::Values(Waveform::parabolic, Waveform::sinusoidal, Waveform::trapezoidal,
                                          Waveform::sawtooth, Waveform::reversed_sawtooth, Waveform::hold));
 
-TEST(TakeUp, WithoutPlayEveryEdgeIsAsBefore) {
+TEST(BacklashCompensation, WithoutPlayEveryEdgeIsAsBefore) {
   PlayBench plain(0, -1), written(0, 0);
   std::vector<Edge> edges[2];
   Ticks start[2];
@@ -145,7 +145,7 @@ TEST(TakeUp, WithoutPlayEveryEdgeIsAsBefore) {
     ASSERT_EQ((edges[0][k].tick - start[0]).count, (edges[1][k].tick - start[1]).count);
 }
 
-TEST(TakeUp, DoesNotDriftOverManyCyclesJogsAndStops) {
+TEST(BacklashCompensation, DoesNotDriftOverManyCyclesJogsAndStops) {
   PlayBench play(40, 40'000);
   Bench& bench = play.bench;
   const std::int32_t reference = bench.rig.load_microsteps();
@@ -167,7 +167,7 @@ TEST(TakeUp, DoesNotDriftOverManyCyclesJogsAndStops) {
   }
 }
 
-TEST(TakeUp, AProgramThatLeavesNoTimeForItIsRefused) {
+TEST(BacklashCompensation, AProgramThatLeavesNoTimeForItIsRefused) {
   PlayBench play(900, 900'000);
   play.bench.add_segment(Waveform::parabolic, 1, 1'000'000, 500'000);
   EXPECT_FALSE(play.bench.ask(wire::Arm::example()));
@@ -176,7 +176,7 @@ TEST(TakeUp, AProgramThatLeavesNoTimeForItIsRefused) {
   EXPECT_GT(play.bench.heard.naks.back().asked, 62'500);
 }
 
-TEST(TakeUp, ALostLeaseStillEndsInTime) {
+TEST(BacklashCompensation, ALostLeaseStillEndsInTime) {
   PlayBench play(40, 40'000);
   Bench& bench = play.bench;
   for (int moment = 0; moment < 30; ++moment) {

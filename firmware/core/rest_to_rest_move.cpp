@@ -1,4 +1,4 @@
-#include "firmware/core/glide.hpp"
+#include "firmware/core/rest_to_rest_move.hpp"
 
 #include <algorithm>
 
@@ -13,7 +13,8 @@ std::uint64_t whole_root(std::uint64_t square) {
   return root;
 }
 
-Glide::Glide(std::uint32_t count, std::uint64_t steps_per_s, std::uint64_t steps_per_s2) : count_(count) {
+RestToRestMove::RestToRestMove(std::uint32_t count, std::uint64_t steps_per_s, std::uint64_t steps_per_s2)
+    : count_(count) {
   std::uint64_t speed = steps_per_s;
   const std::uint64_t wanted = (speed * speed + 2 * steps_per_s2 - 1) / (2 * steps_per_s2);
   ramp_ = static_cast<std::uint32_t>(std::min<std::uint64_t>(wanted, count / 2));
@@ -25,12 +26,12 @@ Glide::Glide(std::uint32_t count, std::uint64_t steps_per_s, std::uint64_t steps
   ramp_time_ = interval_ * (2 * std::int64_t{ramp_});
 }
 
-Ticks Glide::ramp_up(std::uint32_t step) const {
+Ticks RestToRestMove::ramp_up(std::uint32_t step) const {
   const Q64 part = square_root(ratio(2 * step + 1, 2 * ramp_));
   return {static_cast<std::int64_t>(scale(static_cast<std::uint64_t>(ramp_time_.count), part))};
 }
 
-Ticks Glide::time_of(std::uint32_t step) const {
+Ticks RestToRestMove::time_of(std::uint32_t step) const {
   if (step < ramp_) return ramp_up(step);
   if (step >= count_ - ramp_) return duration() - ramp_up(count_ - 1 - step);
   return ramp_time_ + interval_ * (std::int64_t{step} - std::int64_t{ramp_}) + Ticks{interval_.count / 2};

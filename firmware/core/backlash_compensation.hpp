@@ -4,12 +4,12 @@
 // planner's own steps, which keep their times:
 //
 //   load    ─╱‾‾‾╲─   turns: its last step up, then (here) its first step down
-//   take-up   ▂▅▂      b steps from rest to rest within the window that begins with that last step
-//   motor   ─╱‾‾╲╲─   = load - taken up
+//   lag       ▂▅▂      b steps from rest to rest within the window that begins with that last step
+//   motor   ─╱‾‾╲╲─   = load - lag
 //
 // Outside of the windows the load follows the plan to a microstep; within one it waits until the motor has caught up.
 // The window W is the shortest in which b steps can be made with the acceleration that the motion leaves,
-// W = 2 √(b / (allowed - peak)), at no more than a quarter of the step rate; take_up_window says how that is checked.
+// W = 2 √(b / (allowed - peak)), at no more than a quarter of the step rate; check_compensation says how that is checked.
 //
 // After homing the play lies on the side of inflating: there load and motor agree.
 
@@ -22,18 +22,18 @@ namespace diastole::firmware {
 
 /// The window in µs for b steps beside a motion that accelerates at `peak_steps_per_s2`; 0 for none, UINT32_MAX if
 /// nothing of the allowed acceleration is left.
-std::uint32_t take_up_window_us(std::uint32_t backlash_steps, std::uint64_t peak_steps_per_s2,
-                                const Settings& settings);
+std::uint32_t compensation_window_us(std::uint32_t backlash_steps, std::uint64_t peak_steps_per_s2,
+                                     const Settings& settings);
 
-class TakeUp {
+class BacklashCompensation {
  public:
   /// A motion begins at `start`. The play lies where the last motion left it.
   void begin(std::uint32_t backlash_steps, Ticks window, Ticks least_interval, Ticks start);
   /// The play lies on the side of inflating: the motor is where the load is.
-  void home() { taken_up_ = target_ = 0; }
+  void home() { lag_ = target_ = 0; }
 
-  /// The next event for the engine: the planner's (null: it has none), later by a least interval if a take-up step
-  /// has just been made, or a take-up step that is due before it. Null: nothing.
+  /// The next event for the engine: the planner's (null: it has none), later by a least interval if a compensation step
+  /// has just been made, or a compensation step that is due before it. Null: nothing.
   const MotionEvent* merge(const MotionEvent* planned);
   /// What merge() gave has been handed over; true if it was the planner's.
   bool pop();
@@ -41,7 +41,7 @@ class TakeUp {
   /// The load has come to its turning point and not left it yet.
   [[nodiscard]] bool turning() const { return steps_ > 0 && load_inflates_ == (target_ != 0); }
   /// Steps by which the motor is behind the load's count.
-  [[nodiscard]] std::int32_t taken_up() const { return taken_up_; }
+  [[nodiscard]] std::int32_t lag() const { return lag_; }
 
  private:
   void aim(std::int32_t target);
@@ -50,9 +50,9 @@ class TakeUp {
   std::int32_t backlash_ = 0;
   Ticks window_;
   Ticks least_interval_;
-  std::int32_t taken_up_ = 0;  ///< 0: on the side of inflating; backlash_: on that of withdrawing
+  std::int32_t lag_ = 0;  ///< 0: on the side of inflating; backlash_: on that of withdrawing
   std::int32_t target_ = 0;
-  std::uint32_t steps_ = 0;  ///< of the present take-up; 0: none
+  std::uint32_t steps_ = 0;  ///< of the present compensation; 0: none
   std::uint32_t index_ = 0;  ///< next of them
   Ticks start_;
   Ticks last_tick_;
