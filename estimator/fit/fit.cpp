@@ -6,11 +6,13 @@
 
 #include "estimator/fit/fit_errors.hpp"
 #include "estimator/fit/paper_search.hpp"
-#include "estimator/fit/profile.hpp"
 #include "estimator/fit/usable_points.hpp"
+#include "estimator/inference/profile.hpp"
 
 namespace diastole {
 namespace {
+
+using inference::Termination;
 
 // The choice of usable points settles in one or two searches, those of smoothness and loss in two or three.
 constexpr int most_searches = 8;
@@ -36,13 +38,13 @@ bool any_by_evidence(const FitOptions& options) {
 
 /// Gives each block the step of greatest evidence; whether one changed.
 bool choose_smoothness(JointProblem& problem, const Eigen::VectorXd& q, const FitOptions& options) {
-  if (!any_by_evidence(options) || problem.residuals(q) == nullptr) return false;
+  if (!any_by_evidence(options) || !problem.residuals(q)) return false;
   const QuadraticModel model = quadratic_model(problem, q);
   std::vector<SmoothBlock> blocks = problem.smoothness();
   bool changed = false;
   for (size_t i = 0; i < blocks.size(); ++i) {
     if (options.smooth[i].step) continue;
-    const double step = evidence_of_step(model, blocks, i, free_unknowns(problem, q)).step;
+    const double step = evidence_of_step(model, blocks, i, problem.space().free_unknowns(q)).step;
     changed = changed || step != blocks[i].step;
     blocks[i].step = step;
   }
@@ -68,35 +70,35 @@ bool choose_loss(JointProblem& problem, const FitOptions& options) {
 }
 
 /// The step with its values in their own units.
-OptimiserStep in_own_units(OptimiserStep step, const JointProblem& problem) {
+inference::SearchStep in_own_units(inference::SearchStep step, const JointProblem& problem) {
   for (Eigen::Index i = 0; i < problem.values(); ++i)
-    step.q[i] = problem.value(i).value(step.q[i]);
+    step.q[i] = problem.space()[i].value(step.q[i]);
   return step;
 }
 
-OptimiserResult search_from(JointProblem& problem, const Eigen::VectorXd& q, FitOutcome& outcome,
-                            const FitOptions& options, bool roughly) {
-  OptimiserOptions settings = options.optimiser;
+inference::SearchResult search_from(JointProblem& problem, const Eigen::VectorXd& q, FitOutcome& outcome,
+                                    const FitOptions& options, bool roughly) {
+  inference::SearchOptions settings = options.search;
   if (roughly) settings.cost_tolerance = rough_tolerance;
   settings.iterations_before = outcome.iterations;
-  settings.on_step = [&](const OptimiserStep& step) {
+  settings.on_step = [&](const inference::SearchStep& step) {
     // A second search starts where the first ended: its step 0 says nothing new.
     if (step.iteration == 0 && !outcome.history.empty()) return;
     outcome.history.push_back(in_own_units(step, problem));
     outcome.history.back().iteration = static_cast<int>(outcome.history.size()) - 1;
     if (options.on_step) options.on_step(outcome.history.back());
   };
-  return options.paper_mode ? paper_search(problem, q, settings) : minimise(problem, q, settings);
+  return options.paper_mode ? paper_search(problem, q, settings) : inference::minimise(problem, q, settings);
 }
 
 bool is_interrupted(const FitOptions& options) {
-  return options.optimiser.interrupted && options.optimiser.interrupted();
+  return options.search.interrupted && options.search.interrupted();
 }
 
-void tell_profiles(FitOutcome& outcome, JointProblem& problem, const Eigen::VectorXd& q,
-                   const Eigen::MatrixXd& covariance, const FitOptions& options) {
-  const Eigen::VectorXd* residuals = problem.residuals(q);
-  if (residuals == nullptr) return;
+void estimate_profiles(FitOutcome& outcome, JointProblem& problem, const Eigen::VectorXd& q,
+                       const Eigen::MatrixXd& covariance, const FitOptions& options) {
+  const std::optional<Eigen::VectorXd> residuals = problem.residuals(q);
+  if (!residuals) return;
   const double cost = residuals->squaredNorm() / 2;
   for (const size_t place : options.profiled) {
     if (is_interrupted(options)) {
@@ -104,10 +106,12 @@ void tell_profiles(FitOutcome& outcome, JointProblem& problem, const Eigen::Vect
       return;
     }
     const auto which = static_cast<Eigen::Index>(place);
-    if (problem.bound_under(q, which) != BoundSide::none || !std::isfinite(covariance(which, which)))
+    if (problem.space().bound_under(q, which) != inference::BoundSide::none ||
+        !std::isfinite(covariance(which, which)))
       continue;
-    const std::array<ProfileEnd, 2> ends =
-        profile_interval({problem, q, covariance, cost, options.optimiser.interrupted}, which);
+    const std::array<inference::ProfileEnd, 2> ends =
+        inference::profile_interval({problem, q, covariance, cost, options.search.interrupted}, which);
+    const inference::Parameter& parameter = problem.space()[which];
     if (is_interrupted(options)) {
       outcome.interrupted = "profile";
       return;
@@ -115,27 +119,27 @@ void tell_profiles(FitOutcome& outcome, JointProblem& problem, const Eigen::Vect
     ProfileInterval interval{place, {}, {}, ends[0].found && ends[1].found, {}, {}};
     std::vector<std::array<double, 2>> tried{{q[which], 0.0}};
     for (size_t side = 0; side < 2; ++side) {
-      interval.ci95[side] = problem.value(which).value(ends[side].coordinate);
+      interval.ci95[side] = parameter.value(ends[side].coordinate);
       interval.at_bound[side] = ends[side].at_bound;
       tried.insert(tried.end(), ends[side].tried.begin(), ends[side].tried.end());
     }
     std::sort(tried.begin(), tried.end());
     for (const auto& [coordinate, rise] : tried) {
-      interval.at.push_back(problem.value(which).value(coordinate));
+      interval.at.push_back(parameter.value(coordinate));
       interval.cost_rise.push_back(rise);
     }
     outcome.profiles.push_back(interval);
   }
 }
 
-PosteriorOfValue told(const std::vector<Eigen::MatrixXd>& chains, Eigen::Index unknown,
-                      const SoughtValue& sought) {
+PosteriorOfValue summarised(const std::vector<Eigen::MatrixXd>& chains, Eigen::Index unknown,
+                            const inference::Parameter& parameter) {
   std::vector<Eigen::VectorXd> draws;
   std::vector<double> sorted;
   for (const Eigen::MatrixXd& chain : chains) {
     Eigen::VectorXd& values = draws.emplace_back(chain.col(unknown));
     for (double& value : values)
-      value = sought.value(value);
+      value = parameter.value(value);
     sorted.insert(sorted.end(), values.begin(), values.end());
   }
   std::sort(sorted.begin(), sorted.end());
@@ -150,12 +154,12 @@ PosteriorOfValue told(const std::vector<Eigen::MatrixXd>& chains, Eigen::Index u
           effective_sample_size(draws)};
 }
 
-void tell_posterior(FitOutcome& outcome, JointProblem& problem, const Eigen::VectorXd& q,
-                    const Eigen::MatrixXd& covariance, const FitOptions& options) {
-  if (!options.posterior || problem.residuals(q) == nullptr) return;
+void estimate_posterior(FitOutcome& outcome, JointProblem& problem, const Eigen::VectorXd& q,
+                        const Eigen::MatrixXd& covariance, const FitOptions& options) {
+  if (!options.posterior || !problem.residuals(q)) return;
   const auto begun = std::chrono::steady_clock::now();
   PosteriorOptions settings = *options.posterior;
-  settings.interrupted = options.optimiser.interrupted;
+  settings.interrupted = options.search.interrupted;
   const PosteriorSample sample = sample_posterior(problem, q, covariance, settings);
   if (sample.interrupted) {
     outcome.interrupted = "posterior";
@@ -166,7 +170,7 @@ void tell_posterior(FitOutcome& outcome, JointProblem& problem, const Eigen::Vec
   result.accepted = sample.accepted;
   result.solutions = sample.solutions;
   for (Eigen::Index i = 0; i < problem.values(); ++i)
-    result.values.push_back(told(sample.chains, i, problem.value(i)));
+    result.values.push_back(summarised(sample.chains, i, problem.space()[i]));
   result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
   outcome.posterior = std::move(result);
 }
@@ -180,12 +184,13 @@ Measurement with_exact_pressures(Measurement measurement) {
 
 }  // namespace
 
-FitOutcome fit_motion(MotionModel& model, const std::vector<SoughtValue>& sought,
+FitOutcome fit_motion(MotionModel& model, const std::vector<EstimatedParameter>& parameters,
                       const Measurement& measurement, const FitOptions& options) {
   const auto begun = std::chrono::steady_clock::now();
   FitOutcome outcome;
-  JointProblem problem(model, sought, options.paper_mode ? with_exact_pressures(measurement) : measurement,
-                       options.locator, options.pressure_offset_sigma_kPa);
+  JointProblem problem(model, parameters,
+                       options.paper_mode ? with_exact_pressures(measurement) : measurement, options.locator,
+                       options.pressure_offset_sigma_kPa);
   Eigen::VectorXd q = problem.start();
   problem.set_smoothness(smooth_blocks(model, options));
   if (options.robustness == Robustness::always) problem.set_robust(RobustLoss::for_deviation(1));
@@ -202,26 +207,26 @@ FitOutcome fit_motion(MotionModel& model, const std::vector<SoughtValue>& sought
     const bool roughly = search == 0 && any_by_evidence(options);
     const bool prepared = search == 1 && any_by_evidence(options);
     const bool other_smoothness = search > 0 && choose_smoothness(problem, q, options);
-    const bool other_loss = search > 0 && problem.residuals(q) != nullptr && choose_loss(problem, options);
+    const bool other_loss = search > 0 && problem.residuals(q) && choose_loss(problem, options);
     if (*gained == 0 && !other_smoothness && !other_loss && !prepared && !again) break;
-    OptimiserResult found = search_from(problem, q, outcome, options, roughly);
+    inference::SearchResult found = search_from(problem, q, outcome, options, roughly);
     q = found.q;
-    outcome.converged = found.converged;
+    outcome.termination = found.termination;
     outcome.reason = std::move(found.reason);
     outcome.iterations += found.iterations;
     // Tags that come and go from trial to trial make the cost jump: without them it goes on.
-    again = found.stalled && problem.give_up_lost() > 0;
-    if (!found.converged && !again) break;
+    again = found.termination == Termination::stalled && problem.give_up_lost() > 0;
+    if (!outcome.converged() && !again) break;
   }
-  if (outcome.converged) require_half_usable(point_share(problem), options.file);
+  if (outcome.converged()) require_half_usable(point_share(problem), options.file);
   if (!outcome.history.empty()) {
-    const bool averaged = outcome.converged && any_by_evidence(options) && problem.residuals(q) != nullptr;
-    const Eigen::VectorXd told = averaged ? mean_over_steps(problem, q, options) : q;
+    const bool averaged = outcome.converged() && any_by_evidence(options) && problem.residuals(q);
+    const Eigen::VectorXd estimate = averaged ? mean_over_steps(problem, q, options) : q;
     const Eigen::MatrixXd covariance =
-        tell_uncertainty(outcome, problem, problem.residuals(told) != nullptr ? told : q, options);
-    if (outcome.converged) {
-      tell_profiles(outcome, problem, q, covariance, options);
-      tell_posterior(outcome, problem, q, covariance, options);
+        estimate_errors(outcome, problem, problem.residuals(estimate) ? estimate : q, options);
+    if (outcome.converged()) {
+      estimate_profiles(outcome, problem, q, covariance, options);
+      estimate_posterior(outcome, problem, q, covariance, options);
     }
   }
   outcome.forward_solves = problem.forward_solves();

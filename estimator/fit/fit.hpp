@@ -21,8 +21,9 @@
 #include <vector>
 
 #include "estimator/fit/joint_problem.hpp"
-#include "estimator/fit/optimiser.hpp"
+#include "estimator/fit/offset_score.hpp"
 #include "estimator/fit/posterior.hpp"
+#include "estimator/inference/least_squares.hpp"
 
 namespace diastole {
 
@@ -39,9 +40,9 @@ enum class Robustness {
 };
 
 struct FitOptions {
-  std::string file;            ///< named in errors
-  OptimiserOptions optimiser;  ///< its on_step is not used
-  LocatorOptions locator;      ///< how far outside the body a point may lie
+  std::string file;                 ///< named in errors
+  inference::SearchOptions search;  ///< its on_step is not used
+  LocatorOptions locator;           ///< how far outside the body a point may lie
   std::vector<SmoothRegion> smooth;
   Robustness robustness = Robustness::if_needed;
   /// All frame pressures may be off by one and the same unknown amount, 0 with this standard deviation.
@@ -50,7 +51,7 @@ struct FitOptions {
   std::optional<PosteriorOptions> posterior;
   bool paper_mode = false;  ///< the paper's search (paper_search.hpp); no smoothness, no robust loss then
   /// Called at each iteration with values in their own units.
-  std::function<void(const OptimiserStep&)> on_step;
+  std::function<void(const inference::SearchStep&)> on_step;
 };
 
 struct EstimatedValue {
@@ -95,13 +96,6 @@ struct PressureOffset {
   double se_kPa;
 };
 
-/// A common offset that was not sought (offset_score.hpp).
-struct UnsoughtOffset {
-  double value_kPa;  ///< measured less true
-  double se_kPa;
-  std::vector<double> values;  ///< what the values would be with it
-};
-
 struct ProfileInterval {
   size_t value;
   std::array<double, 2> ci95;
@@ -130,9 +124,10 @@ struct PosteriorOutcome {
 struct FitOutcome {
   std::vector<EstimatedValue> values;
   std::vector<EstimatedFrame> frames;
-  Eigen::MatrixXd covariance;  ///< of values, unknown pressures and offset, in their own units
+  Eigen::MatrixXd covariance;              ///< of values, unknown pressures and offset, in their own units
+  std::vector<std::string> unknown_names;  ///< in its order
   std::optional<PressureOffset> pressure_offset;
-  std::optional<UnsoughtOffset> unsought_offset;  ///< without pressure_offset, where the data see one
+  std::optional<OffsetScore> offset_score;  ///< without pressure_offset, where the data see one
   std::vector<ProfileInterval> profiles;
   std::optional<PosteriorOutcome> posterior;
   double chi2 = 0;        ///< including the pressures' priors
@@ -140,19 +135,21 @@ struct FitOutcome {
   double unknowns = 0;    ///< not counting those on a bound; smooth values as many as the data see
   std::vector<SmoothOutcome> smoothness;
   std::optional<RobustOutcome> robust;  ///< if the loss was not the normal's
-  bool converged = false;
+  inference::Termination termination = inference::Termination::no_solution;
   std::string interrupted;  ///< what was ended on request after the search: "profile", "posterior" or neither
   std::string reason;
   int iterations = 0;
   int forward_solves = 0;
   double seconds = 0;
-  std::vector<OptimiserStep> history;  ///< q of each step with values in their own units
+  std::vector<inference::SearchStep> history;  ///< q of each step with values in their own units
+
+  [[nodiscard]] bool converged() const { return inference::is_settled(termination); }
 };
 
-/// Never throws for numerical trouble: `converged` and `reason` tell it (values then are the best found). Throws
+/// Never throws for numerical trouble: `termination` and `reason` report it (values then are the best found). Throws
 /// InputError when hardly any point lies on the body (usable_points.hpp).
 /// Precondition: at least one loaded frame has points.
-FitOutcome fit_motion(MotionModel& model, const std::vector<SoughtValue>& sought,
+FitOutcome fit_motion(MotionModel& model, const std::vector<EstimatedParameter>& parameters,
                       const Measurement& measurement, const FitOptions& options);
 
 }  // namespace diastole

@@ -7,10 +7,14 @@
 #include <numbers>
 
 #include "estimator/fit/offset_score.hpp"
-#include "estimator/fit/uncertainty.hpp"
+#include "estimator/inference/covariance.hpp"
+#include "estimator/inference/intervals.hpp"
 
 namespace diastole {
 namespace {
+
+using inference::BoundSide;
+using inference::estimate_covariance;
 
 constexpr double not_a_number = std::numeric_limits<double>::quiet_NaN();
 
@@ -18,22 +22,19 @@ constexpr double not_a_number = std::numeric_limits<double>::quiet_NaN();
 Eigen::VectorXd variances_at_exact_pressure(const Eigen::MatrixXd& jacobian, const std::vector<bool>& is_free,
                                             Eigen::Index values) {
   const std::vector<bool> free_values(is_free.begin(), is_free.begin() + values);
-  return covariance(jacobian.leftCols(values), free_values).diagonal();
+  return estimate_covariance(jacobian.leftCols(values), free_values).matrix.diagonal();
 }
 
-EstimatedValue estimated(const SoughtValue& sought, double q, BoundSide bound, double variance,
+EstimatedValue estimated(const inference::Parameter& parameter, double q, BoundSide bound, double variance,
                          double exact_variance) {
-  EstimatedValue result{sought.value(q),
-                        not_a_number,
-                        {not_a_number, not_a_number},
-                        not_a_number,
-                        bound == BoundSide::lower,
-                        bound == BoundSide::upper};
+  EstimatedValue result{parameter.value(q),           not_a_number,
+                        {not_a_number, not_a_number}, not_a_number,
+                        bound == BoundSide::lower,    bound == BoundSide::upper};
   if (bound != BoundSide::none) return result;
   const double sd = std::sqrt(variance);
-  result.se = sought.slope(q) * sd;
-  result.se_exact_pressure = sought.slope(q) * std::sqrt(exact_variance);
-  result.ci95 = {sought.value(q - normal_95 * sd), sought.value(q + normal_95 * sd)};
+  result.se = standard_error(parameter, q, sd);
+  result.se_exact_pressure = standard_error(parameter, q, std::sqrt(exact_variance));
+  result.ci95 = interval(parameter, q, inference::normal_95 * sd);
   return result;
 }
 
@@ -98,7 +99,7 @@ struct WeightedProblem {
 
 WeightedProblem weighted_problem(JointProblem& problem, const Eigen::VectorXd& q, double slope) {
   const Eigen::VectorXd motion = problem.motion_residuals();
-  WeightedProblem weighted{problem.plain_jacobian(q), *problem.residuals(q)};
+  WeightedProblem weighted{problem.plain_jacobian(q), problem.residuals(q).value()};
   weighted.jacobian.topRows(motion.size()) *= std::sqrt(slope);
   for (Eigen::Index i = 0; i < motion.size(); ++i)
     weighted.residuals[i] = problem.robust()->influence(motion[i]) / std::sqrt(slope);
@@ -115,7 +116,7 @@ RobustErrors robust_errors(JointProblem& problem, const Eigen::VectorXd& q,
   errors.jacobian = std::move(weighted.jacobian);
   errors.residuals = std::move(weighted.residuals);
   const Eigen::MatrixXd motion = errors.jacobian.topRows(residuals.size());
-  const Eigen::MatrixXd inverse = covariance(errors.jacobian, is_free);
+  const Eigen::MatrixXd inverse = estimate_covariance(errors.jacobian, is_free).matrix;
   errors.excess = (means.square / means.slope - 1) * motion.transpose() * motion;
   errors.covariance = inverse + inverse * errors.excess * inverse;
   errors.exact_variance_factor = means.square / means.slope;
@@ -166,9 +167,9 @@ void add_intervals(Intervals& intervals, const EvidenceOfStep& evidence, const S
 
 /// What the smoothness' own uncertainty adds to the covariance at the chosen steps. Returns the values' intervals where
 /// it does.
-Intervals tell_smoothness(FitOutcome& outcome, JointProblem& problem, const Eigen::VectorXd& q,
-                          const FitOptions& options, const std::vector<bool>& is_free,
-                          const Eigen::MatrixXd& excess) {
+Intervals estimate_smoothness(FitOutcome& outcome, JointProblem& problem, const Eigen::VectorXd& q,
+                              const FitOptions& options, const std::vector<bool>& is_free,
+                              const Eigen::MatrixXd& excess) {
   Intervals intervals;
   if (options.smooth.empty()) return intervals;
   const QuadraticModel model = quadratic_model(problem, q);
@@ -178,46 +179,37 @@ Intervals tell_smoothness(FitOutcome& outcome, JointProblem& problem, const Eige
   };
   for (size_t i = 0; i < options.smooth.size(); ++i) {
     const SmoothBlock& block = problem.smoothness()[i];
-    SmoothOutcome told{options.smooth[i].first_value, block.step,
-                       !options.smooth[i].step,       false,
-                       {block.step, block.step},      determined(at_chosen, block)};
-    if (told.by_evidence) {
+    SmoothOutcome smooth{options.smooth[i].first_value, block.step,
+                         !options.smooth[i].step,       false,
+                         {block.step, block.step},      determined(at_chosen, block)};
+    if (smooth.by_evidence) {
       const EvidenceOfStep evidence = evidence_of_step(model, problem.smoothness(), i, is_free);
-      told.none_seen = evidence.none_seen;
-      told.step90 = {step_at(evidence, 0.05), step_at(evidence, 0.95)};
-      told.effective_values = 0;
+      smooth.none_seen = evidence.none_seen;
+      smooth.step90 = {step_at(evidence, 0.05), step_at(evidence, 0.95)};
+      smooth.effective_values = 0;
       add_intervals(intervals, evidence, block, excess);
       for (size_t k = 0; k < evidence.steps.size(); ++k) {
         const Eigen::VectorXd apart = evidence.q[k] - q;
         const Eigen::MatrixXd& inverse = evidence.covariance[k];
-        told.effective_values += evidence.weights[k] * determined(inverse, block);
+        smooth.effective_values += evidence.weights[k] * determined(inverse, block);
         outcome.covariance += evidence.weights[k] *
                               (inverse + inverse * excess * inverse + apart * apart.transpose() - at_chosen);
       }
     }
-    outcome.smoothness.push_back(told);
+    outcome.smoothness.push_back(smooth);
   }
   return intervals;
 }
 
-void tell_unsought_offset(FitOutcome& outcome, const JointProblem& problem, const Eigen::VectorXd& q,
-                          const LinearProblem& linear, const Eigen::VectorXd& column) {
-  if (problem.offset_unknown()) return;
-  if (const auto score = offset_score(problem, q, linear, column))
-    outcome.unsought_offset = UnsoughtOffset{score->offset_kPa, score->se_kPa, score->values};
+void score_offset(FitOutcome& outcome, const JointProblem& problem, const Eigen::VectorXd& q,
+                  const LinearProblem& linear, const Eigen::VectorXd& column) {
+  if (!problem.offset_unknown()) outcome.offset_score = offset_score(problem, q, linear, column);
 }
 
 }  // namespace
 
-std::vector<bool> free_unknowns(const JointProblem& problem, const Eigen::VectorXd& q) {
-  std::vector<bool> is_free;
-  for (Eigen::Index i = 0; i < q.size(); ++i)
-    is_free.push_back(problem.bound_under(q, i) == BoundSide::none);
-  return is_free;
-}
-
 QuadraticModel quadratic_model(JointProblem& problem, const Eigen::VectorXd& q) {
-  Eigen::VectorXd residuals = *problem.residuals(q);
+  Eigen::VectorXd residuals = problem.residuals(q).value();
   Eigen::MatrixXd jacobian;
   if (problem.robust()) {
     const InfluenceMeans means = influence_means(*problem.robust(), problem.motion_residuals());
@@ -236,33 +228,33 @@ Eigen::VectorXd mean_over_steps(JointProblem& problem, const Eigen::VectorXd& q,
   Eigen::VectorXd mean = q;
   if (options.smooth.empty()) return mean;
   const QuadraticModel model = quadratic_model(problem, q);
-  const std::vector<bool> is_free = free_unknowns(problem, q);
+  const std::vector<bool> is_free = problem.space().free_unknowns(q);
   for (size_t i = 0; i < options.smooth.size(); ++i) {
     if (options.smooth[i].step) continue;
     const EvidenceOfStep evidence = evidence_of_step(model, problem.smoothness(), i, is_free);
     for (size_t k = 0; k < evidence.steps.size(); ++k)
       mean += evidence.weights[k] * (evidence.q[k] - q);
   }
-  for (Eigen::Index i = 0; i < mean.size(); ++i)
-    mean[i] = std::clamp(mean[i], problem.lower(i), problem.upper(i));
-  return mean;
+  return problem.space().clamped(mean);
 }
 
-Eigen::MatrixXd tell_uncertainty(FitOutcome& outcome, JointProblem& problem, const Eigen::VectorXd& q,
-                                 const FitOptions& options) {
-  const Eigen::VectorXd* residuals = problem.residuals(q);
-  if (residuals == nullptr) {
-    outcome.converged = false;
+Eigen::MatrixXd estimate_errors(FitOutcome& outcome, JointProblem& problem, const Eigen::VectorXd& q,
+                                const FitOptions& options) {
+  const std::optional<Eigen::VectorXd> residuals = problem.residuals(q);
+  if (!residuals) {
+    outcome.termination = inference::Termination::no_solution;
     outcome.reason = "Failed: " + problem.failure() + ".";
     return {};
   }
   Eigen::MatrixXd jacobian = problem.jacobian(q);
-  const std::vector<bool> is_free = free_unknowns(problem, q);
+  const std::vector<bool> is_free = problem.space().free_unknowns(q);
   outcome.rows = problem.data_rows();
+  for (Eigen::Index i = 0; i < problem.unknowns(); ++i)
+    outcome.unknown_names.push_back(problem.space()[i].name);
   const Eigen::VectorXd motion = problem.motion_residuals();
   outcome.chi2 =
       motion.squaredNorm() + residuals->segment(motion.size(), outcome.rows - motion.size()).squaredNorm();
-  outcome.covariance = covariance(jacobian, is_free);
+  outcome.covariance = estimate_covariance(jacobian, is_free).matrix;
   double exact_factor = 1;
   Eigen::VectorXd column = problem.offset_column();
   Eigen::MatrixXd excess = Eigen::MatrixXd::Zero(q.size(), q.size());
@@ -273,27 +265,28 @@ Eigen::MatrixXd tell_uncertainty(FitOutcome& outcome, JointProblem& problem, con
     excess = std::move(errors.excess);
     exact_factor = errors.exact_variance_factor;
     column.head(motion.size()) *= errors.scale;
-    tell_unsought_offset(outcome, problem, q, {jacobian, errors.residuals, is_free, exact_factor}, column);
+    score_offset(outcome, problem, q, {jacobian, errors.residuals, is_free, exact_factor}, column);
     outcome.robust = RobustOutcome{*problem.robust(), wild_count(motion)};
   }
   const Eigen::MatrixXd data_jacobian = jacobian.topRows(outcome.rows);
-  outcome.unknowns = effective_count(outcome.covariance, data_jacobian);
+  outcome.unknowns = inference::effective_count(outcome.covariance, data_jacobian);
   if (!problem.robust()) {
     const double spread = outcome.chi2 / (static_cast<double>(outcome.rows) - outcome.unknowns);
-    tell_unsought_offset(outcome, problem, q, {jacobian, *residuals, is_free, spread}, column);
+    score_offset(outcome, problem, q, {jacobian, *residuals, is_free, spread}, column);
   }
-  const Intervals intervals = tell_smoothness(outcome, problem, q, options, is_free, excess);
+  const Intervals intervals = estimate_smoothness(outcome, problem, q, options, is_free, excess);
   Eigen::MatrixXd in_coordinates = outcome.covariance;
   const Eigen::VectorXd exact =
       exact_factor * variances_at_exact_pressure(jacobian, is_free, problem.values());
   for (Eigen::Index i = 0; i < problem.values(); ++i) {
+    const inference::Parameter& parameter = problem.space()[i];
     outcome.values.push_back(
-        estimated(problem.value(i), q[i], problem.bound_under(q, i), outcome.covariance(i, i), exact[i]));
+        estimated(parameter, q[i], problem.space().bound_under(q, i), outcome.covariance(i, i), exact[i]));
     if (const auto found = intervals.find(i); found != intervals.end()) {
       for (size_t side = 0; side < 2; ++side)
-        outcome.values.back().ci95[side] = problem.value(i).value(found->second[side]);
+        outcome.values.back().ci95[side] = parameter.value(found->second[side]);
     }
-    const double slope = problem.value(i).slope(q[i]);
+    const double slope = parameter.slope(q[i]);
     outcome.covariance.row(i) *= slope;
     outcome.covariance.col(i) *= slope;
   }

@@ -5,9 +5,6 @@
 
 namespace diastole {
 
-/// Which unknowns do not rest on a bound.
-std::vector<bool> free_unknowns(const JointProblem& problem, const Eigen::VectorXd& q);
-
 /// Of the data alone, at q. Precondition: `residuals(q)` succeeds.
 QuadraticModel quadratic_model(JointProblem& problem, const Eigen::VectorXd& q);
 
@@ -16,8 +13,8 @@ QuadraticModel quadratic_model(JointProblem& problem, const Eigen::VectorXd& q);
 Eigen::VectorXd mean_over_steps(JointProblem& problem, const Eigen::VectorXd& q, const FitOptions& options);
 
 /// Fills values, frames, covariance, chi2 and what goes with them, at the optimum q. Returns the covariance in the
-/// unknowns' own coordinates; empty (and the outcome not converged) if the model fails there.
-Eigen::MatrixXd tell_uncertainty(FitOutcome& outcome, JointProblem& problem, const Eigen::VectorXd& q,
-                                 const FitOptions& options);
+/// unknowns' own coordinates; empty (and the outcome's termination no_solution) if the model fails there.
+Eigen::MatrixXd estimate_errors(FitOutcome& outcome, JointProblem& problem, const Eigen::VectorXd& q,
+                                const FitOptions& options);
 
 }  // namespace diastole

@@ -151,7 +151,7 @@ void add_posterior(std::vector<std::string>& remarks, const FitRecord& record) {
 }
 
 /// "C1_kPa 8.9 instead of 9.8", regional values by their mean.
-std::string values_with_offset(const FitRecord& record, const UnsoughtOffset& offset) {
+std::string values_with_offset(const FitRecord& record, const OffsetScore& offset) {
   std::string words;
   size_t first = 0;
   for (const FittedParameter& parameter : record.parameters) {
@@ -166,9 +166,9 @@ std::string values_with_offset(const FitRecord& record, const UnsoughtOffset& of
   return words;
 }
 
-void add_unsought_offset(std::vector<std::string>& remarks, const FitRecord& record, const FitOutcome& fit) {
-  if (!fit.converged || !fit.unsought_offset) return;
-  const UnsoughtOffset& offset = *fit.unsought_offset;
+void add_offset(std::vector<std::string>& remarks, const FitRecord& record, const FitOutcome& fit) {
+  if (!fit.converged() || !fit.offset_score) return;
+  const OffsetScore& offset = *fit.offset_score;
   const double deviations = std::abs(offset.value_kPa) / offset.se_kPa;
   if (!(deviations > telling_offset)) return;
   remarks.push_back(
@@ -207,7 +207,7 @@ std::vector<std::string> remarks_on(const FitRecord& record, const FitOutcome& f
   add_bounds(remarks, record);
   add_conditional_mean(remarks, record);
   add_regional(remarks, record);
-  add_unsought_offset(remarks, record, fit);
+  add_offset(remarks, record, fit);
   add_undeformed(remarks, record);
   for (std::string& remark : identifiability_remarks(record))
     remarks.push_back(std::move(remark));

@@ -2,25 +2,26 @@
 
 #include <fmt/format.h>
 
-#include <cmath>
-#include <limits>
-
 namespace diastole {
 
-double SoughtValue::coordinate(double value) const { return logarithmic() ? std::log(value) : value; }
-double SoughtValue::value(double coordinate) const {
-  return logarithmic() ? std::exp(coordinate) : coordinate;
-}
-double SoughtValue::slope(double coordinate) const { return logarithmic() ? std::exp(coordinate) : 1.0; }
-
-JointProblem::JointProblem(MotionModel& model, std::vector<SoughtValue> values,
+JointProblem::JointProblem(MotionModel& model, const std::vector<EstimatedParameter>& values,
                            const Measurement& measurement, LocatorOptions locator,
                            std::optional<double> offset_sigma_kPa)
     : model_(model),
-      values_(std::move(values)),
+      values_(static_cast<Eigen::Index>(values.size())),
       locator_options_(locator),
       reference_(std::make_unique<PointLocator>(model.mesh(), model.mesh().reference(), locator)) {
-  unknowns_ = static_cast<Eigen::Index>(values_.size());
+  std::vector<inference::Parameter> unknowns;
+  std::vector<double> start;
+  const auto add_unknown = [&](inference::Parameter parameter, double at) {
+    start.push_back(parameter.coordinate(at));
+    unknowns.push_back(std::move(parameter));
+    return static_cast<Eigen::Index>(start.size() - 1);
+  };
+  for (const EstimatedParameter& value : values) {
+    const auto scale = value.lower > 0 ? inference::Scale::logarithmic : inference::Scale::linear;
+    add_unknown({value.name, {}, value.lower, value.upper, scale}, value.start);
+  }
   for (size_t number = 1; number < measurement.frames.size(); ++number) {
     const int frame = static_cast<int>(number);
     std::vector<TagPoint> tags;
@@ -34,7 +35,8 @@ JointProblem::JointProblem(MotionModel& model, std::vector<SoughtValue> values,
     if (tags.empty() && points.empty()) continue;
     const Frame& load = measurement.frames[number];
     std::optional<Eigen::Index> pressure_unknown;
-    if (load.sigma_kPa > 0) pressure_unknown = unknowns_++;
+    if (load.sigma_kPa > 0)
+      pressure_unknown = add_unknown({fmt::format("pressure_kPa[{}]", frame)}, load.pressure_kPa);
     frames_.push_back({frame,
                        load,
                        FrameResiduals(model.mesh(), *reference_, std::move(tags), std::move(points)),
@@ -47,8 +49,10 @@ JointProblem::JointProblem(MotionModel& model, std::vector<SoughtValue> values,
   }
   if (offset_sigma_kPa) {
     offset_sigma_kPa_ = *offset_sigma_kPa;
-    offset_unknown_ = unknowns_++;
+    offset_unknown_ = add_unknown({"pressure_offset_kPa"}, 0.0);
   }
+  space_ = inference::ParameterSpace(std::move(unknowns));
+  start_ = Eigen::Map<const Eigen::VectorXd>(start.data(), static_cast<Eigen::Index>(start.size()));
 }
 
 void JointProblem::set_smoothness(std::vector<SmoothBlock> blocks) {
@@ -88,41 +92,6 @@ Eigen::Index JointProblem::data_rows() const {
   return rows;
 }
 
-Eigen::VectorXd JointProblem::start() const {
-  Eigen::VectorXd q(unknowns());
-  for (Eigen::Index i = 0; i < values(); ++i)
-    q[i] = value(i).coordinate(value(i).start);
-  for (const LoadedFrame& frame : frames_) {
-    if (frame.pressure_unknown) q[*frame.pressure_unknown] = frame.load.pressure_kPa;
-  }
-  if (offset_unknown_) q[*offset_unknown_] = 0;
-  return q;
-}
-
-double JointProblem::lower(Eigen::Index unknown) const {
-  if (unknown >= values()) return -std::numeric_limits<double>::infinity();
-  return value(unknown).coordinate(value(unknown).lower);
-}
-
-double JointProblem::upper(Eigen::Index unknown) const {
-  if (unknown >= values()) return std::numeric_limits<double>::infinity();
-  return value(unknown).coordinate(value(unknown).upper);
-}
-
-BoundSide JointProblem::bound_under(const Eigen::VectorXd& q, Eigen::Index unknown) const {
-  const double slack = 1e-7 * (upper(unknown) - lower(unknown));
-  if (!std::isfinite(slack)) return BoundSide::none;
-  if (q[unknown] <= lower(unknown) + slack) return BoundSide::lower;
-  return q[unknown] >= upper(unknown) - slack ? BoundSide::upper : BoundSide::none;
-}
-
-std::vector<double> JointProblem::values_at(const Eigen::VectorXd& q) const {
-  std::vector<double> result;
-  for (Eigen::Index i = 0; i < values(); ++i)
-    result.push_back(value(i).value(q[i]));
-  return result;
-}
-
 double JointProblem::offset_at(const Eigen::VectorXd& q) const {
   return offset_unknown_ ? q[*offset_unknown_] : 0.0;
 }
@@ -135,10 +104,12 @@ double JointProblem::pressure_at(const LoadedFrame& frame, const Eigen::VectorXd
 bool JointProblem::solve_frames(const Eigen::VectorXd& q) {
   if (solved_at_ && *solved_at_ == q) return true;
   solved_at_.reset();
+  std::vector<double> values = space_.values(q);
+  values.resize(static_cast<size_t>(values_));
   for (size_t slot = 0; slot < frames_.size(); ++slot) {
     LoadedFrame& frame = frames_[slot];
     ++forward_solves_;
-    MotionOutcome outcome = model_.solve(slot, values_at(q), pressure_at(frame, q));
+    MotionOutcome outcome = model_.solve(slot, values, pressure_at(frame, q));
     if (!outcome.position_mm) {
       failure_ = fmt::format("frame {} has no equilibrium: {}", frame.number, outcome.reason);
       return false;
@@ -165,17 +136,17 @@ size_t JointProblem::give_up_lost() {
   return count;
 }
 
-const Eigen::VectorXd* JointProblem::residuals(const Eigen::VectorXd& q) {
-  if (residuals_at_ && *residuals_at_ == q) return &residuals_;
+std::optional<Eigen::VectorXd> JointProblem::residuals(const Eigen::VectorXd& q) {
+  if (residuals_at_ && *residuals_at_ == q) return residuals_;
   residuals_at_.reset();
-  if (!solve_frames(q)) return nullptr;
+  if (!solve_frames(q)) return {};
   residuals_.resize(rows());
   Eigen::Index row = 0;
   for (LoadedFrame& frame : frames_) {
     if (!frame.residuals.evaluate(frame.position_mm)) {
       failure_ = fmt::format("frame {}: many tag points cannot be followed on the body at these values",
                              frame.number);
-      return nullptr;
+      return {};
     }
     residuals_.segment(row, frame.residuals.rows()) = frame.residuals.weighted();
     row += frame.residuals.rows();
@@ -199,7 +170,7 @@ const Eigen::VectorXd* JointProblem::residuals(const Eigen::VectorXd& q) {
     row += size;
   }
   residuals_at_ = q;
-  return &residuals_;
+  return residuals_;
 }
 
 Eigen::MatrixXd JointProblem::jacobian(const Eigen::VectorXd& q) {
@@ -223,7 +194,7 @@ Eigen::MatrixXd JointProblem::plain_jacobian(const Eigen::VectorXd& q) {
     fields.push_back(&by.by_pressure);
     const Eigen::MatrixXd block = frame.residuals.derivatives(fields);
     for (Eigen::Index i = 0; i < values(); ++i) {
-      result.col(i).segment(row, block.rows()) = block.col(i) * value(i).slope(q[i]);
+      result.col(i).segment(row, block.rows()) = block.col(i) * space_[i].slope(q[i]);
     }
     if (frame.pressure_unknown) {
       result.col(*frame.pressure_unknown).segment(row, block.rows()) = block.rightCols<1>();

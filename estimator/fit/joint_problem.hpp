@@ -29,28 +29,21 @@
 #include "estimator/fit/motion_model.hpp"
 #include "estimator/fit/robust_loss.hpp"
 #include "estimator/fit/smoothness.hpp"
+#include "estimator/inference/least_squares.hpp"
 #include "estimator/io/measurement.hpp"
 #include "estimator/motion_residuals/frame_residuals.hpp"
 
 namespace diastole {
 
 /// A value to be estimated, in the model's order. Invariant: lower <= start <= upper, lower < upper.
-struct SoughtValue {
+struct EstimatedParameter {
   double start;
   double lower;
   double upper;
-
-  [[nodiscard]] bool logarithmic() const { return lower > 0; }
-  /// Between the value and its coordinate in q.
-  [[nodiscard]] double coordinate(double value) const;
-  [[nodiscard]] double value(double coordinate) const;
-  /// d(value)/d(coordinate).
-  [[nodiscard]] double slope(double coordinate) const;
+  std::string name = {};
 };
 
-enum class BoundSide { none, lower, upper };
-
-class JointProblem {
+class JointProblem : public inference::LeastSquaresProblem {
  public:
   struct LoadedFrame {
     int number;
@@ -62,22 +55,18 @@ class JointProblem {
   };
 
   /// `model` must outlive the problem. Frames without points are left out. `offset_sigma_kPa`: see above.
-  JointProblem(MotionModel& model, std::vector<SoughtValue> values, const Measurement& measurement,
-               LocatorOptions locator, std::optional<double> offset_sigma_kPa = {});
+  JointProblem(MotionModel& model, const std::vector<EstimatedParameter>& values,
+               const Measurement& measurement, LocatorOptions locator,
+               std::optional<double> offset_sigma_kPa = {});
 
-  [[nodiscard]] Eigen::Index unknowns() const { return unknowns_; }
-  [[nodiscard]] Eigen::Index values() const { return static_cast<Eigen::Index>(values_.size()); }
+  /// Values, unknown pressures, offset.
+  [[nodiscard]] const inference::ParameterSpace& space() const override { return space_; }
+  [[nodiscard]] Eigen::Index unknowns() const { return space_.size(); }
+  [[nodiscard]] Eigen::Index values() const { return values_; }
   /// Residuals: those of the data (pressures' priors included) come first.
   [[nodiscard]] Eigen::Index rows() const { return data_rows() + smooth_rows(); }
   [[nodiscard]] Eigen::Index data_rows() const;
-  [[nodiscard]] Eigen::VectorXd start() const;
-  [[nodiscard]] double lower(Eigen::Index unknown) const;
-  [[nodiscard]] double upper(Eigen::Index unknown) const;
-  /// The bound on which an unknown rests, within 1e-7 of its range.
-  [[nodiscard]] BoundSide bound_under(const Eigen::VectorXd& q, Eigen::Index unknown) const;
-  [[nodiscard]] const SoughtValue& value(Eigen::Index unknown) const {
-    return values_[static_cast<size_t>(unknown)];
-  }
+  [[nodiscard]] const Eigen::VectorXd& start() const { return start_; }
   [[nodiscard]] const std::vector<LoadedFrame>& frames() const { return frames_; }
   /// Place in q of the pressures' common offset (measured less true), if there is one.
   [[nodiscard]] std::optional<Eigen::Index> offset_unknown() const { return offset_unknown_; }
@@ -106,29 +95,30 @@ class JointProblem {
   /// Leaves the tags that were lost since the last `find_points` out of the next one and all later ones; how many.
   size_t give_up_lost();
 
-  /// Residuals at q; nullptr (and `failure`) if a frame has no equilibrium or many tags are lost there
+  /// Residuals at q; nothing (and `failure`) if a frame has no equilibrium or many tags are lost there
   /// (frame_residuals.hpp).
-  [[nodiscard]] const Eigen::VectorXd* residuals(const Eigen::VectorXd& q);
+  [[nodiscard]] std::optional<Eigen::VectorXd> residuals(const Eigen::VectorXd& q) override;
   /// Derivatives at q, by the model's exact sensitivities. Precondition: `residuals(q)` succeeded just
   /// before.
-  [[nodiscard]] Eigen::MatrixXd jacobian(const Eigen::VectorXd& q);
+  [[nodiscard]] Eigen::MatrixXd jacobian(const Eigen::VectorXd& q) override;
   /// The same with the motion's residuals r instead of u(r).
   [[nodiscard]] Eigen::MatrixXd plain_jacobian(const Eigen::VectorXd& q);
 
-  [[nodiscard]] const std::string& failure() const { return failure_; }
+  [[nodiscard]] std::string failure() const override { return failure_; }
   [[nodiscard]] int forward_solves() const { return forward_solves_; }
 
  private:
-  [[nodiscard]] std::vector<double> values_at(const Eigen::VectorXd& q) const;
   [[nodiscard]] double offset_at(const Eigen::VectorXd& q) const;
   [[nodiscard]] double pressure_at(const LoadedFrame& frame, const Eigen::VectorXd& q) const;
   [[nodiscard]] Eigen::Index smooth_rows() const;
-  /// A reading at rest counts only where the offset is sought.
+  /// A reading at rest counts only where the offset is estimated.
   [[nodiscard]] bool fits_rest() const { return offset_unknown_ && rest_reading_; }
   bool solve_frames(const Eigen::VectorXd& q);
 
   MotionModel& model_;
-  std::vector<SoughtValue> values_;
+  Eigen::Index values_;
+  inference::ParameterSpace space_;
+  Eigen::VectorXd start_;
   LocatorOptions locator_options_;
   std::unique_ptr<PointLocator> reference_;  // at a fixed address: the frames refer to it
   std::vector<LoadedFrame> frames_;
@@ -137,7 +127,6 @@ class JointProblem {
   std::optional<Frame> rest_reading_;
   std::vector<SmoothBlock> smooth_;
   std::optional<RobustLoss> robust_;
-  Eigen::Index unknowns_ = 0;
   Eigen::VectorXd residuals_;
   std::optional<Eigen::VectorXd> solved_at_;     // where the frames' positions belong
   std::optional<Eigen::VectorXd> residuals_at_;  // where residuals_ belong

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "estimator/fit/uncertainty.hpp"
+#include "estimator/inference/covariance.hpp"
 
 namespace diastole {
 
@@ -23,13 +23,13 @@ std::optional<OffsetScore> offset_score(const JointProblem& problem, const Eigen
   }
   std::vector<bool> is_free = linear.is_free;
   is_free.push_back(true);
-  const Eigen::MatrixXd inverse = covariance(jacobian, is_free);
+  const Eigen::MatrixXd inverse = inference::estimate_covariance(jacobian, is_free).matrix;
   const double variance = inverse(unknowns, unknowns);
   if (!(variance > 0) || !std::isfinite(variance)) return {};
   const Eigen::VectorXd change = -inverse * (jacobian.transpose() * residuals);
   OffsetScore score{change[unknowns], std::sqrt(std::max(1.0, linear.variance_factor) * variance), {}};
   for (Eigen::Index i = 0; i < problem.values(); ++i)
-    score.values.push_back(problem.value(i).value(q[i] + change[i]));
+    score.values.push_back(problem.space()[i].value(q[i] + change[i]));
   return score;
 }
 

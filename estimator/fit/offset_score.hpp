@@ -1,5 +1,5 @@
 #pragma once
-// Whether the data ask for a common offset of the frame pressures that the fit did not seek.
+// Whether the data ask for a common offset of the frame pressures that the fit did not estimate.
 //
 // The offset's column joins the Jacobian at the estimate, and one Gauss-Newton step of all unknowns tells what it
 // would become (a score test: no equilibrium is solved). Its standard error is that of the joint problem, enlarged
@@ -17,9 +17,9 @@
 namespace diastole {
 
 struct OffsetScore {
-  double offset_kPa;  ///< measured less true
+  double value_kPa;  ///< measured less true
   double se_kPa;
-  std::vector<double> values;  ///< the values sought with it, in their own units
+  std::vector<double> values;  ///< the values estimated with it, in their own units
 };
 
 /// The linear problem at the estimate: priors included, a robust loss as weights.

@@ -15,7 +15,7 @@ constexpr double difference = 1e-4;  // of a parameter's value: well above the e
 
 struct Search {
   JointProblem& problem;
-  const OptimiserOptions& options;
+  const inference::SearchOptions& options;
   nlopt_opt optimiser;
   int iterations = 0;
   double worst_cost = 0;  ///< what a point without equilibrium is said to cost
@@ -25,12 +25,12 @@ struct Search {
   [[nodiscard]] Eigen::VectorXd coordinates(const double* values) const {
     Eigen::VectorXd q(problem.values());
     for (Eigen::Index i = 0; i < q.size(); ++i)
-      q[i] = problem.value(i).coordinate(values[i]);
+      q[i] = problem.space()[i].coordinate(values[i]);
     return q;
   }
 
   [[nodiscard]] double cost(const Eigen::VectorXd& q) {
-    if (problem.residuals(q) == nullptr) return worst_cost;
+    if (!problem.residuals(q)) return worst_cost;
     double squares_mm2 = 0;
     for (const JointProblem::LoadedFrame& frame : problem.frames())
       squares_mm2 += frame.residuals.unweighted_mm().squaredNorm();
@@ -66,6 +66,21 @@ double evaluate(unsigned count, const double* values, double* gradient, void* da
   return here;
 }
 
+inference::Termination termination_of(nlopt_result result) {
+  switch (result) {
+    case NLOPT_XTOL_REACHED:
+    case NLOPT_SUCCESS:
+    case NLOPT_FTOL_REACHED:
+      return inference::Termination::converged;
+    case NLOPT_FORCED_STOP:
+      return inference::Termination::interrupted;
+    case NLOPT_MAXEVAL_REACHED:
+      return inference::Termination::iteration_limit;
+    default:
+      return inference::Termination::stalled;
+  }
+}
+
 std::string reason_of(nlopt_result result, const Search& search) {
   switch (result) {
     case NLOPT_XTOL_REACHED:
@@ -89,14 +104,15 @@ std::string reason_of(nlopt_result result, const Search& search) {
 
 }  // namespace
 
-OptimiserResult paper_search(JointProblem& problem, const Eigen::VectorXd& start,
-                             const OptimiserOptions& options) {
+inference::SearchResult paper_search(JointProblem& problem, const Eigen::VectorXd& start,
+                                     const inference::SearchOptions& options) {
   const auto count = static_cast<unsigned>(problem.values());
   std::vector<double> values, lower, upper;
   for (Eigen::Index i = 0; i < problem.values(); ++i) {
-    values.push_back(problem.value(i).value(start[i]));
-    lower.push_back(problem.value(i).lower);
-    upper.push_back(problem.value(i).upper);
+    const inference::Parameter& parameter = problem.space()[i];
+    values.push_back(parameter.value(start[i]));
+    lower.push_back(parameter.lower);
+    upper.push_back(parameter.upper);
   }
   const std::unique_ptr<std::remove_pointer_t<nlopt_opt>, decltype(&nlopt_destroy)> optimiser(
       nlopt_create(NLOPT_LD_SLSQP, count), nlopt_destroy);
@@ -108,12 +124,15 @@ OptimiserResult paper_search(JointProblem& problem, const Eigen::VectorXd& start
   nlopt_set_maxeval(optimiser.get(), options.iteration_limit);
   double cost = 0;
   const nlopt_result result = nlopt_optimize(optimiser.get(), values.data(), &cost);
-  return {
-      .q = search.best_q.size() > 0 ? search.best_q : start,
-      .converged = result == NLOPT_SUCCESS || result == NLOPT_XTOL_REACHED || result == NLOPT_FTOL_REACHED,
-      .reason = search.best_q.size() == 0 ? fmt::format("Failed: {}.", problem.failure())
-                                          : reason_of(result, search),
-      .iterations = search.iterations};
+  inference::SearchResult found;
+  found.q = start;
+  found.reason = fmt::format("Failed: {}.", problem.failure());
+  found.iterations = search.iterations;
+  if (search.best_q.size() == 0) return found;
+  found.q = search.best_q;
+  found.termination = termination_of(result);
+  found.reason = reason_of(result, search);
+  return found;
 }
 
 }  // namespace diastole

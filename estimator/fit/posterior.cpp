@@ -18,12 +18,7 @@ class Chain {
     for (Eigen::Index i = 0; i < best.size(); ++i) {
       if (covariance(i, i) > 0 && std::isfinite(covariance(i, i))) free_.push_back(i);
     }
-    Eigen::MatrixXd kept(static_cast<Eigen::Index>(free_.size()), static_cast<Eigen::Index>(free_.size()));
-    for (size_t i = 0; i < free_.size(); ++i) {
-      for (size_t j = 0; j < free_.size(); ++j)
-        kept(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) = covariance(free_[i], free_[j]);
-    }
-    factor_.compute(kept);
+    factor_.compute(covariance(free_, free_));
     start_apart();
   }
 
@@ -61,19 +56,17 @@ class Chain {
 
   [[nodiscard]] Eigen::VectorXd q_of(const Eigen::VectorXd& away) const {
     Eigen::VectorXd q = best_;
-    for (size_t i = 0; i < free_.size(); ++i)
-      q[free_[i]] += away[static_cast<Eigen::Index>(i)];
+    q(free_) += away;
     return q;
   }
 
   double phi(const Eigen::VectorXd& away) {
     constexpr double never = std::numeric_limits<double>::infinity();
     const Eigen::VectorXd q = q_of(away);
-    for (const Eigen::Index i : free_) {
-      if (q[i] < problem_.lower(i) || q[i] > problem_.upper(i)) return never;
-    }
-    const Eigen::VectorXd* residuals = problem_.residuals(q);
-    if (residuals == nullptr) return never;
+    const inference::ParameterSpace& space = problem_.space();
+    if (space.clamped(q) != q) return never;
+    const std::optional<Eigen::VectorXd> residuals = problem_.residuals(q);
+    if (!residuals) return never;
     return 0.5 * residuals->squaredNorm() - 0.5 * away.dot(factor_.solve(away));
   }
 

@@ -8,12 +8,13 @@
 #include <limits>
 
 #include "estimator/fit/elastic_motion.hpp"
+#include "estimator/fit/estimated_parameters.hpp"
 #include "estimator/fit/fit_remarks.hpp"
 #include "estimator/fit/fit_sections.hpp"
 #include "estimator/fit/identifiability.hpp"
-#include "estimator/fit/sought.hpp"
-#include "estimator/fit/uncertainty.hpp"
 #include "estimator/fit/usable_points.hpp"
+#include "estimator/inference/covariance.hpp"
+#include "estimator/inference/intervals.hpp"
 #include "estimator/io/study_fingerprint.hpp"
 #include "estimator/model/affected_model.hpp"
 #include "estimator/model/study_model.hpp"
@@ -62,10 +63,10 @@ FittedParameter record_of(const StudyParameter& parameter, const FitOutcome& fit
                                                                   : "",
                          .elements = {},
                          .smoothness = {}};
-  for (const SmoothOutcome& told : fit.smoothness) {
-    if (told.first_value == first) {
-      result.smoothness =
-          FittedSmoothness{told.step, told.by_evidence, told.none_seen, told.step90, told.effective_values};
+  for (const SmoothOutcome& smooth : fit.smoothness) {
+    if (smooth.first_value == first) {
+      result.smoothness = FittedSmoothness{smooth.step, smooth.by_evidence, smooth.none_seen, smooth.step90,
+                                           smooth.effective_values};
     }
   }
   if (parameter.vary == Variation::whole) return result;
@@ -83,7 +84,8 @@ FittedParameter record_of(const StudyParameter& parameter, const FitOutcome& fit
   result.se = std::sqrt(fit.covariance.block(start, start, size, size).sum()) / static_cast<double>(count);
   // The elements on a bound have no error of their own: the mean's is that of the others.
   if (!(result.se > 0)) result.se = std::numeric_limits<double>::quiet_NaN();
-  result.ci95 = {result.value - normal_95 * result.se, result.value + normal_95 * result.se};
+  result.ci95 = {result.value - inference::normal_95 * result.se,
+                 result.value + inference::normal_95 * result.se};
   return result;
 }
 
@@ -95,8 +97,9 @@ void record_shape(FittedParameter& parameter, const FitOutcome& fit, size_t plac
       parameter.profile = FittedProfile{profile.ci95, profile.at_bound, profile.at, profile.cost_rise};
   }
   if (fit.posterior) {
-    const PosteriorOfValue& told = fit.posterior->values[place];
-    parameter.posterior = FittedPosterior{told.mean, told.sd, told.ci95, told.r_hat, told.effective_draws};
+    const PosteriorOfValue& drawn = fit.posterior->values[place];
+    parameter.posterior =
+        FittedPosterior{drawn.mean, drawn.sd, drawn.ci95, drawn.r_hat, drawn.effective_draws};
   }
 }
 
@@ -107,17 +110,10 @@ void record_parameters(FitRecord& record, const Study& study, const FitOutcome& 
     const size_t count = value_count(parameter, elements);
     places.push_back(first);
     record.parameters.push_back(record_of(parameter, fit, first, count));
-    for (size_t i = 0; i < count; ++i) {
-      record.correlation.names.push_back(count == 1 ? parameter.name
-                                                    : fmt::format("{}[{}]", parameter.name, i));
-    }
     first += count;
   }
-  for (const EstimatedFrame& frame : fit.frames) {
-    if (frame.se_kPa > 0) record.correlation.names.push_back(fmt::format("pressure_kPa[{}]", frame.number));
-  }
-  if (fit.pressure_offset) record.correlation.names.emplace_back("pressure_offset_kPa");
-  const Eigen::MatrixXd matrix = correlation(fit.covariance);
+  record.correlation.names = fit.unknown_names;
+  const Eigen::MatrixXd matrix = inference::correlation(fit.covariance);
   for (Eigen::Index row = 0; row < matrix.rows(); ++row) {
     const Eigen::VectorXd values = matrix.row(row);
     record.correlation.matrix.emplace_back(values.begin(), values.end());
@@ -141,7 +137,7 @@ void record_parameters(FitRecord& record, const Study& study, const FitOutcome& 
     record.robust = FittedRobust{robust->loss.degrees, robust->loss.scale, static_cast<size_t>(robust->wild)};
 }
 
-FitIteration record_of(const OptimiserStep& step, const Study& study, size_t elements) {
+FitIteration record_of(const inference::SearchStep& step, const Study& study, size_t elements) {
   FitIteration result{step.iteration, step.cost, step.accepted, {}};
   size_t first = 0;
   for (const StudyParameter& parameter : study.law.parameters) {
@@ -163,7 +159,7 @@ std::vector<size_t> whole_values(const Study& study, size_t elements) {
   return places;
 }
 
-void take_start(Sought& sought, const FitRecord& start, const Study& study, size_t elements) {
+void take_start(EstimatedParameters& estimated, const FitRecord& start, const Study& study, size_t elements) {
   size_t first = 0;
   for (const StudyParameter& parameter : study.law.parameters) {
     const auto found =
@@ -178,8 +174,8 @@ void take_start(Sought& sought, const FitRecord& start, const Study& study, size
     }
     for (size_t i = 0; i < count; ++i) {
       const double value = count > 1 && !found->elements.empty() ? found->elements[i].value : found->value;
-      SoughtValue& sought_value = sought.values[first + i];
-      sought_value.start = std::clamp(value, sought_value.lower, sought_value.upper);
+      EstimatedParameter& own = estimated.values[first + i];
+      own.start = std::clamp(value, own.lower, own.upper);
     }
     first += count;
   }
@@ -203,14 +199,14 @@ FitRecord head_of(const Study& study, const Measurement& measurement) {
 
 /// Multiplies the stiffnesses at which the search begins, within their bounds; whether one changed. With all of them
 /// multiplied by a factor, a body carries the load times that factor.
-bool stiffen(Sought& sought, const Study& study, size_t elements) {
+bool stiffen(EstimatedParameters& estimated, const Study& study, size_t elements) {
   constexpr double factor = 3.0;
   bool changed = false;
   size_t first = 0;
   for (const StudyParameter& parameter : study.law.parameters) {
     const size_t count = value_count(parameter, elements);
     for (size_t i = first; parameter.name.ends_with("_kPa") && i < first + count; ++i) {
-      SoughtValue& value = sought.values[i];
+      EstimatedParameter& value = estimated.values[i];
       const double stiffer = std::clamp(factor * value.start, value.lower, value.upper);
       changed = changed || stiffer > value.start;
       value.start = std::max(value.start, stiffer);
@@ -220,30 +216,30 @@ bool stiffen(Sought& sought, const Study& study, size_t elements) {
   return changed;
 }
 
-std::string start_words(const Sought& sought, const Study& study, size_t elements) {
+std::string start_words(const EstimatedParameters& estimated, const Study& study, size_t elements) {
   std::string words;
   size_t first = 0;
   for (const StudyParameter& parameter : study.law.parameters) {
     if (parameter.name.ends_with("_kPa"))
-      words +=
-          fmt::format("{}{} = {:.4g}", words.empty() ? "" : ", ", parameter.name, sought.values[first].start);
+      words += fmt::format("{}{} = {:.4g}", words.empty() ? "" : ", ", parameter.name,
+                           estimated.values[first].start);
     first += value_count(parameter, elements);
   }
   return words;
 }
 
 /// The fit, begun with a stiffer material where the start values carry no equilibrium.
-FitOutcome fit_from_where_it_stands(ElasticMotion& motion, Sought& sought, const Study& study,
+FitOutcome fit_from_where_it_stands(ElasticMotion& motion, EstimatedParameters& estimated, const Study& study,
                                     const Measurement& measurement, const FitOptions& options,
                                     FitRecord& record) {
   const size_t elements = motion.mesh().element_count();
-  const std::string given = start_words(sought, study, elements);
-  FitOutcome fit = fit_motion(motion, sought.values, measurement, options);
-  const auto failed_at_start = [&] { return !fit.converged && fit.history.empty(); };
+  const std::string given = start_words(estimated, study, elements);
+  FitOutcome fit = fit_motion(motion, estimated.values, measurement, options);
+  const auto failed_at_start = [&] { return !fit.converged() && fit.history.empty(); };
   if (!failed_at_start()) return fit;
   int solves = fit.forward_solves;
-  while (failed_at_start() && stiffen(sought, study, elements)) {
-    fit = fit_motion(motion, sought.values, measurement, options);
+  while (failed_at_start() && stiffen(estimated, study, elements)) {
+    fit = fit_motion(motion, estimated.values, measurement, options);
     fit.forward_solves = solves += fit.forward_solves;
   }
   if (failed_at_start()) {
@@ -251,17 +247,18 @@ FitOutcome fit_from_where_it_stands(ElasticMotion& motion, Sought& sought, const
         " Nor is there an equilibrium with {}, as stiff as the bounds allow: widen `bounds`, or see whether "
         "the "
         "pressures are in kPa and the lengths in mm.",
-        start_words(sought, study, elements));
+        start_words(estimated, study, elements));
   } else {
     record.remarks.push_back(fmt::format(
         "With the start values ({}) the body does not carry the pressures: the search began at {} instead.",
-        given, start_words(sought, study, elements)));
+        given, start_words(estimated, study, elements)));
   }
   return fit;
 }
 
 /// A result that has only got so far: values without errors.
-FitRecord checkpoint_of(FitRecord record, const OptimiserStep& step, const Study& study, size_t elements) {
+FitRecord checkpoint_of(FitRecord record, const inference::SearchStep& step, const Study& study,
+                        size_t elements) {
   record.reason = fmt::format("Checkpoint after iteration {}.", step.iteration);
   record.iterations = step.iteration;
   size_t first = 0;
@@ -391,37 +388,37 @@ FitRecord fit_study(const Study& study, const Measurement& measurement, const St
   FitRecord record = head_of(study, measurement);
   record.unknowns = model.dofs();
 
-  Sought sought = sought_of(study, model);
-  if (options.start) take_start(sought, *options.start, study, elements);
-  ElasticMotion motion(std::move(model), sought.groups, displacement_gain_of(study));
+  EstimatedParameters estimated = estimated_parameters(study, model);
+  if (options.start) take_start(estimated, *options.start, study, elements);
+  ElasticMotion motion(std::move(model), estimated.groups, displacement_gain_of(study));
   FitOptions fit_options;
   fit_options.file = study.file.string();
   fit_options.locator = locator_for(study.specimen);
-  fit_options.smooth = sought.smooth;
+  fit_options.smooth = estimated.smooth;
   fit_options.robustness = options.paper_mode ? Robustness::never : options.robustness;
   fit_options.pressure_offset_sigma_kPa = options.pressure_offset_sigma_kPa;
   fit_options.posterior = options.posterior;
   fit_options.paper_mode = options.paper_mode;
-  fit_options.optimiser.interrupted = options.interrupted;
+  fit_options.search.interrupted = options.interrupted;
   if (options.paper_mode) {
     fit_options.smooth.clear();
     record.search = "finite differences";
   }
   if (options.profile) fit_options.profiled = whole_values(study, elements);
-  fit_options.optimiser.iteration_limit = options.iteration_limit;
-  fit_options.on_step = [&](const OptimiserStep& step) {
+  fit_options.search.iteration_limit = options.iteration_limit;
+  fit_options.on_step = [&](const inference::SearchStep& step) {
     if (options.on_iteration) options.on_iteration(record_of(step, study, elements));
     if (options.on_checkpoint && step.accepted)
       options.on_checkpoint(checkpoint_of(record, step, study, elements));
   };
-  const FitOutcome fit = fit_from_where_it_stands(motion, sought, study, measurement, fit_options, record);
+  const FitOutcome fit = fit_from_where_it_stands(motion, estimated, study, measurement, fit_options, record);
 
-  record.converged = fit.converged;
+  record.converged = fit.converged();
   record.reason = fit.reason;
   record.iterations = fit.iterations;
   record.forward_solves = fit.forward_solves;
   record.seconds = fit.seconds;
-  for (const OptimiserStep& step : fit.history)
+  for (const inference::SearchStep& step : fit.history)
     record.history.push_back(record_of(step, study, elements));
   record_undeformed(record, measurement);
   if (measurement.repeated_rows > 0)

@@ -22,7 +22,7 @@ size_t loaded_points(const Measurement& measurement);
 
 /// Throws InputError (`file`, the share, what to check) when fewer than half of the points are usable.
 void require_half_usable(const PointShare& share, const std::string& file);
-/// ... when there are fewer usable numbers than values sought. Before a search: a poor start may have few points.
+/// ... when there are fewer usable numbers than values estimated. Before a search: a poor start may have few points.
 void require_any_usable(const JointProblem& problem, const std::string& file);
 /// ... when every measured point is of frame 0.
 void require_loaded_points(const Study& study, const Measurement& measurement);

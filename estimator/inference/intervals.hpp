@@ -18,4 +18,7 @@ double standard_error(const Parameter& parameter, double coordinate, double sd);
 /// Values `half_width` of the coordinate away, the smaller one first; `half_width` is normal_95 * sd, say.
 std::array<double, 2> interval(const Parameter& parameter, double coordinate, double half_width);
 
+/// The value that Student's t exceeds in size with the probability `two_sided`.
+double student_quantile(double dof, double two_sided);
+
 }  // namespace diastole::inference

@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "estimator/fit/elastic_motion.hpp"
-#include "estimator/fit/sought.hpp"
+#include "estimator/fit/estimated_parameters.hpp"
 #include "estimator/fit/study_fit.hpp"
 #include "estimator/fit/usable_points.hpp"
 #include "estimator/model/affected_model.hpp"
@@ -43,12 +43,12 @@ class Explorer {
   Explorer(const Study& study, Measurement measurement)
       : study_(study), measurement_(std::move(measurement)), model_(make_affected_model(study)) {
     require_cavity(study_, model_);
-    sought_ = sought_of(study_, model_);
+    estimated_ = estimated_parameters(study_, model_);
     elements_ = model_.mesh().element_count();
     // Every frame's derivative by its pressure is wanted, known exactly or not.
     for (const Frame& frame : measurement_.frames)
       stated_sigma_kPa_.push_back(frame.sigma_kPa);
-    motion_.emplace(std::move(model_), sought_.groups, displacement_gain_of(study));
+    motion_.emplace(std::move(model_), estimated_.groups, displacement_gain_of(study));
   }
 
   [[nodiscard]] std::vector<FrameInformation> present() {
@@ -61,7 +61,7 @@ class Explorer {
     design.frames = {measurement_.frames.front()};
     std::vector<NodeField> motions(1);
     std::vector<double> values;
-    for (const SoughtValue& value : sought_.values)
+    for (const EstimatedParameter& value : estimated_.values)
       values.push_back(value.start);
     for (const double share : new_frames) {
       const double pressure_kPa = share * highest.pressure_kPa;
@@ -108,9 +108,9 @@ class Explorer {
                                                              const std::vector<double>& sigma_kPa) {
     for (Frame& frame : measurement.frames)
       frame.sigma_kPa = 1;  // an unknown of its own; its prior is put in by `marginal`
-    JointProblem problem(*motion_, sought_.values, measurement, locator_for(study_.specimen));
+    JointProblem problem(*motion_, estimated_.values, measurement, locator_for(study_.specimen));
     const Eigen::VectorXd q = problem.start();
-    if (!problem.find_points(q) || problem.residuals(q) == nullptr) {
+    if (!problem.find_points(q) || !problem.residuals(q)) {
       throw InputError({study_.file.string(), "", fmt::format("cannot be solved: {}", problem.failure()),
                         "Give other values with --set."});
     }
@@ -133,7 +133,7 @@ class Explorer {
   const Study& study_;
   Measurement measurement_;
   ElasticModel model_;
-  Sought sought_;
+  EstimatedParameters estimated_;
   size_t elements_ = 0;
   std::vector<double> stated_sigma_kPa_;
   std::optional<ElasticMotion> motion_;

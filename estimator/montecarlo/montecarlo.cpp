@@ -6,11 +6,11 @@
 #include <limits>
 
 #include "estimator/fit/elastic_motion.hpp"
+#include "estimator/fit/estimated_parameters.hpp"
 #include "estimator/fit/fit.hpp"
-#include "estimator/fit/sought.hpp"
 #include "estimator/fit/study_fit.hpp"
-#include "estimator/fit/uncertainty.hpp"
 #include "estimator/fit/usable_points.hpp"
+#include "estimator/inference/intervals.hpp"
 #include "estimator/model/affected_model.hpp"
 #include "estimator/model/study_model.hpp"
 #include "estimator/montecarlo/synthetic_data.hpp"
@@ -21,10 +21,10 @@ namespace {
 
 constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
 
-std::vector<NodeField> true_motions(const Study& study, ElasticMotion& motion, const Sought& sought,
-                                    const Measurement& design) {
+std::vector<NodeField> true_motions(const Study& study, ElasticMotion& motion,
+                                    const EstimatedParameters& estimated, const Measurement& design) {
   std::vector<double> values;
-  for (const SoughtValue& value : sought.values)
+  for (const EstimatedParameter& value : estimated.values)
     values.push_back(value.start);
   std::vector<NodeField> motions(design.frames.size());
   for (size_t number = 1; number < design.frames.size(); ++number) {
@@ -55,8 +55,8 @@ double mean(const std::vector<double>& values) {
 }
 
 bool holds(const StudyParameter& parameter, double value, double se) {
-  if (!(parameter.lower > 0)) return std::abs(value - parameter.start) <= normal_95 * se;
-  return std::abs(std::log(parameter.start / value)) <= normal_95 * se / value;
+  if (!(parameter.lower > 0)) return std::abs(value - parameter.start) <= inference::normal_95 * se;
+  return std::abs(std::log(parameter.start / value)) <= inference::normal_95 * se / value;
 }
 
 ParameterSpread spread_of(const StudyParameter& parameter, const std::vector<double>& values,
@@ -69,7 +69,8 @@ ParameterSpread spread_of(const StudyParameter& parameter, const std::vector<dou
   }
   spread.sd = std::sqrt(spread.sd / static_cast<double>(values.size() - 1));
   spread.sd_percent = 100 * spread.sd / spread.mean;
-  spread.ci95 = {spread.mean - normal_95 * spread.sd, spread.mean + normal_95 * spread.sd};
+  spread.ci95 = {spread.mean - inference::normal_95 * spread.sd,
+                 spread.mean + inference::normal_95 * spread.sd};
   return spread;
 }
 
@@ -89,7 +90,7 @@ std::vector<Cell> cells_of(const MonteCarloPlan& plan) {
 struct CellFitter::Impl {
   Study study;
   MonteCarloPlan plan;
-  Sought sought;
+  EstimatedParameters estimated;
   ElasticMotion motion;
   FitOptions options;
   Measurement exact;
@@ -102,19 +103,19 @@ CellFitter::CellFitter(const Study& study, const Measurement& measured, const Mo
   for (const int frames : plan.frames)
     (void)spread_frames(design, frames);
   require_cavity(study, model);
-  Sought sought = sought_of(study, model);
-  ElasticMotion motion(std::move(model), sought.groups, displacement_gain_of(study));
+  EstimatedParameters estimated = estimated_parameters(study, model);
+  ElasticMotion motion(std::move(model), estimated.groups, displacement_gain_of(study));
   const LocatorOptions locator = locator_for(study.specimen);
   Measurement exact =
-      exact_measurement(motion.mesh(), design, true_motions(study, motion, sought, design), locator);
+      exact_measurement(motion.mesh(), design, true_motions(study, motion, estimated, design), locator);
   require_half_usable({loaded_points(exact), loaded_points(design)}, study.file.string());
   FitOptions options;
   options.file = study.file.string();
   options.locator = locator;
-  options.smooth = sought.smooth;
+  options.smooth = estimated.smooth;
   options.robustness = Robustness::never;
   impl_ = std::make_unique<Impl>(
-      Impl{study, plan, std::move(sought), std::move(motion), std::move(options), std::move(exact)});
+      Impl{study, plan, std::move(estimated), std::move(motion), std::move(options), std::move(exact)});
 }
 
 CellFitter::~CellFitter() = default;
@@ -127,9 +128,9 @@ CellResult CellFitter::fit(const Cell& cell) {
   const Measurement measurement =
       with_noise(impl_->exact, frames,
                  {cell.noise_mm, impl_->plan.exact_pressures, cell.repeat == 0 ? 0.0 : 1.0}, generator);
-  const FitOutcome outcome = fit_motion(impl_->motion, impl_->sought.values, measurement, impl_->options);
+  const FitOutcome outcome = fit_motion(impl_->motion, impl_->estimated.values, measurement, impl_->options);
   CellResult result{
-      cell, outcome.converged && !outcome.values.empty(), outcome.iterations, outcome.seconds, {}, {}};
+      cell, outcome.converged() && !outcome.values.empty(), outcome.iterations, outcome.seconds, {}, {}};
   size_t first = 0;
   const size_t elements = impl_->motion.mesh().element_count();
   for (const StudyParameter& parameter : impl_->study.law.parameters) {

@@ -1,6 +1,5 @@
 #include "estimator/shear/origin_line.hpp"
 
-#include <boost/math/distributions/students_t.hpp>
 #include <cmath>
 #include <limits>
 
@@ -40,10 +39,6 @@ double intercept_deviations(std::span<const double> x, std::span<const double> y
   for (size_t i = 0; i < x.size(); ++i)
     residuals2 += std::pow(y[i] - intercept - slope * x[i], 2);
   return intercept / std::sqrt(residuals2 / (n - 2) * (1 / n + mean_x * mean_x / sum_xx));
-}
-
-double student_quantile(double dof, double two_sided) {
-  return boost::math::quantile(boost::math::complement(boost::math::students_t(dof), two_sided / 2));
 }
 
 }  // namespace diastole

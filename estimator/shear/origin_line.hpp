@@ -1,5 +1,5 @@
 #pragma once
-// A straight line through the origin, y = slope * x, by least squares, and Student's t for its error.
+// A straight line through the origin, y = slope * x, by least squares.
 
 #include <span>
 
@@ -20,8 +20,5 @@ OriginLine line_through_origin(std::span<const double> x, std::span<const double
 /// The intercept of the straight line with a free intercept over its standard error: Student's t with n - 2
 /// degrees of freedom if the true line passes through the origin. NaN if all x are equal or n < 3.
 double intercept_deviations(std::span<const double> x, std::span<const double> y);
-
-/// The value that Student's t exceeds in size with the probability `two_sided`.
-double student_quantile(double dof, double two_sided);
 
 }  // namespace diastole

@@ -10,10 +10,13 @@
 #include <numbers>
 #include <set>
 
+#include "estimator/inference/intervals.hpp"
 #include "estimator/shear/origin_line.hpp"
 
 namespace diastole {
 namespace {
+
+using inference::student_quantile;
 
 constexpr double kPa_per_MPa = 1000;  // 1 MPa = 1 N/mm2
 constexpr double deg_per_rad = 180 / std::numbers::pi;

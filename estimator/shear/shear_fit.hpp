@@ -18,7 +18,7 @@
 // The fitted line is  omega/M = (1/C1) (a^-2 - R^-2)/(8 pi h), through the origin, its errors in the measured
 // rotation. The slope of the swapped axes (right side over left side, C1 itself, as the paper plots it) puts the
 // errors in the regressor and comes out low by exactly the factor r2 of the
-// normalised form; it is told as `swapped_C1_kPa`.
+// normalised form; it is reported as `swapped_C1_kPa`.
 
 #include <array>
 #include <string>
@@ -71,7 +71,7 @@ struct ShearFit {
   std::vector<std::string> remarks;
 };
 
-/// `test` as read_shear_test gives it. Outliers are told, not left out.
+/// `test` as read_shear_test gives it. Outliers are reported, not left out.
 ShearFit fit_shear(const ShearTest& test, ShearForm form = ShearForm::normalised);
 
 }  // namespace diastole

@@ -17,7 +17,7 @@
 #include <thread>
 
 #include "estimator/fit/elastic_motion.hpp"
-#include "estimator/fit/sought.hpp"
+#include "estimator/fit/estimated_parameters.hpp"
 #include "estimator/fit/study_fit.hpp"
 #include "estimator/model/study_model.hpp"
 #include "estimator/montecarlo/cells_file.hpp"
@@ -65,11 +65,11 @@ void bench_estimate(const Study& study, const Measurement& measurement) {
 
 void bench_sensitivities(const Study& study, const Measurement& measurement) {
   ElasticModel model = make_model(study);
-  const Sought sought = sought_of(study, model);
-  ElasticMotion motion(std::move(model), sought.groups);
-  JointProblem problem(motion, sought.values, measurement, locator_for(study.specimen));
+  const EstimatedParameters estimated = estimated_parameters(study, model);
+  ElasticMotion motion(std::move(model), estimated.groups);
+  JointProblem problem(motion, estimated.values, measurement, locator_for(study.specimen));
   Eigen::VectorXd q = problem.start();
-  if (!problem.find_points(q) || problem.residuals(q) == nullptr) return;
+  if (!problem.find_points(q) || !problem.residuals(q)) return;
   const Stopwatch exact_watch;
   const Eigen::MatrixXd exact = problem.jacobian(q);
   const double exact_s = exact_watch.cpu_s();
@@ -80,8 +80,8 @@ void bench_sensitivities(const Study& study, const Measurement& measurement) {
   for (Eigen::Index i = 0; i < q.size(); ++i) {
     Eigen::VectorXd moved = q;
     moved[i] += step;
-    const Eigen::VectorXd* there = problem.residuals(moved);
-    if (there == nullptr) return;
+    const std::optional<Eigen::VectorXd> there = problem.residuals(moved);
+    if (!there) return;
     differences.col(i) = (*there - here) / step;
   }
   const double difference_s = difference_watch.cpu_s();

@@ -74,9 +74,9 @@ Measurement synthetic(ElasticModel& truth, const SyntheticOptions& options) {
   return measurement;
 }
 
-FitOutcome fit_C1(const Measurement& measurement, SoughtValue sought) {
-  ElasticMotion motion(coarse_gel(sought.start), {whole_parameter(0)});
-  return fit_motion(motion, {sought}, measurement, {});
+FitOutcome fit_C1(const Measurement& measurement, EstimatedParameter estimated) {
+  ElasticMotion motion(coarse_gel(estimated.start), {whole_parameter(0)});
+  return fit_motion(motion, {estimated}, measurement, {});
 }
 
 }  // namespace diastole::test

@@ -28,6 +28,6 @@ ElasticModel coarse_gel(double C1_kPa);
 Measurement synthetic(ElasticModel& truth, const SyntheticOptions& options);
 
 /// The fit of one whole C1 on the coarse gel.
-FitOutcome fit_C1(const Measurement& measurement, SoughtValue sought = {6.0, 1.0, 15.0});
+FitOutcome fit_C1(const Measurement& measurement, EstimatedParameter estimated = {6.0, 1.0, 15.0});
 
 }  // namespace diastole::test

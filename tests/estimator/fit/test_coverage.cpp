@@ -40,7 +40,7 @@ void expect_whole_value_held(Robustness robustness) {
         test::synthetic(truth, {.tags_a_frame = 100, .points_a_frame = 20, .sigma_kPa = 0.1, .seed = seed});
     ElasticMotion motion(test::coarse_gel(6), {whole_parameter(0)});
     const FitOutcome fit = fit_motion(motion, {{6.0, 1.0, 15.0}}, measurement, options);
-    ASSERT_TRUE(fit.converged) << fit.reason;
+    ASSERT_TRUE(fit.converged()) << fit.reason;
     held += holds(fit.values[0], truth_kPa) ? 1 : 0;
     const double pull = (fit.values[0].value - truth_kPa) / fit.values[0].se;
     pull_sum += pull;
@@ -105,9 +105,9 @@ double regional_coverage(const std::string& name, Map (*map_of)(double, unsigned
     ElasticMotion motion(test::coarse_gel(truth_kPa), each_element(0, elements));
     FitOptions options;
     options.smooth = {{0, {}}};
-    const FitOutcome fit =
-        fit_motion(motion, std::vector<SoughtValue>(elements, {truth_kPa, 1.0, 40.0}), measurement, options);
-    EXPECT_TRUE(fit.converged) << fit.reason;
+    const FitOutcome fit = fit_motion(
+        motion, std::vector<EstimatedParameter>(elements, {truth_kPa, 1.0, 40.0}), measurement, options);
+    EXPECT_TRUE(fit.converged()) << fit.reason;
     for (size_t e = 0; e < elements; ++e) {
       held[e] += holds(fit.values[e], truth_kPa * map[e]) ? 1 : 0;
       squares += std::pow((fit.values[e].value - truth_kPa * map[e]) / fit.values[e].se, 2);

@@ -39,8 +39,8 @@ TEST_F(Offset, ASoundMeasurementScattersAsTheScoreSays) {
   constexpr int repeats = 12;
   for (unsigned seed = 1; seed <= repeats; ++seed) {
     const FitOutcome fit = test::fit_C1(measured(0, seed, 80));
-    ASSERT_TRUE(fit.unsought_offset);
-    squares += std::pow(fit.unsought_offset->value_kPa / fit.unsought_offset->se_kPa, 2);
+    ASSERT_TRUE(fit.offset_score);
+    squares += std::pow(fit.offset_score->value_kPa / fit.offset_score->se_kPa, 2);
   }
   EXPECT_GT(squares / repeats, 0.37);  // 99 % of chi2 with 12 degrees of freedom
   EXPECT_LT(squares / repeats, 2.36);
@@ -54,14 +54,14 @@ TEST_F(Offset, OneThatTheDataSeeIsSaidWithWhatItDoes) {
     EXPECT_THAT(found.remarks, Contains(AllOf(HasSubstr(offset_kPa > 0 ? "too high" : "too low"),
                                               HasSubstr("C1_kPa"), HasSubstr("--pressure-offset"))));
     const FitOutcome fit = test::fit_C1(measurement);
-    ASSERT_TRUE(fit.unsought_offset);
-    EXPECT_NEAR(fit.unsought_offset->value_kPa, offset_kPa, 4 * fit.unsought_offset->se_kPa);
-    EXPECT_LT(std::abs(fit.unsought_offset->values[0] - 8.71), 0.5 * std::abs(fit.values[0].value - 8.71));
+    ASSERT_TRUE(fit.offset_score);
+    EXPECT_NEAR(fit.offset_score->value_kPa, offset_kPa, 4 * fit.offset_score->se_kPa);
+    EXPECT_LT(std::abs(fit.offset_score->values[0] - 8.71), 0.5 * std::abs(fit.values[0].value - 8.71));
     for (Frame& frame : measurement.frames)
       frame.sigma_kPa = 0;  // known exactly: the motion alone tells
     const FitOutcome exact = test::fit_C1(measurement);
-    ASSERT_TRUE(exact.unsought_offset);
-    EXPECT_NEAR(exact.unsought_offset->value_kPa, offset_kPa, 0.06);
+    ASSERT_TRUE(exact.offset_score);
+    EXPECT_NEAR(exact.offset_score->value_kPa, offset_kPa, 0.06);
   }
 }
 
@@ -71,16 +71,16 @@ TEST_F(Offset, AReadingAtRestMeasuresIt) {
   measurement.frames[0].pressure_kPa = 0.05;
   measurement.frames[0].sigma_kPa = 0.005;
   const FitOutcome with = test::fit_C1(measurement);
-  ASSERT_TRUE(without.unsought_offset && with.unsought_offset);
-  EXPECT_GT(without.unsought_offset->se_kPa, 0.01);
-  EXPECT_NEAR(with.unsought_offset->se_kPa, 0.005, 0.0005);
-  EXPECT_NEAR(with.unsought_offset->value_kPa, 0.05, 0.01);
+  ASSERT_TRUE(without.offset_score && with.offset_score);
+  EXPECT_GT(without.offset_score->se_kPa, 0.01);
+  EXPECT_NEAR(with.offset_score->se_kPa, 0.005, 0.0005);
+  EXPECT_NEAR(with.offset_score->value_kPa, 0.05, 0.01);
 }
 
 TEST_F(Offset, OneLoadedFrameTellsNothing) {
   Measurement measurement = measured(0.2, 1, 80);
   std::erase_if(measurement.tags, [](const TagPoint& tag) { return tag.frame == 1 || tag.frame == 2; });
-  EXPECT_FALSE(test::fit_C1(measurement).unsought_offset);
+  EXPECT_FALSE(test::fit_C1(measurement).offset_score);
 }
 
 }  // namespace

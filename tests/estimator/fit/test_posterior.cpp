@@ -43,7 +43,7 @@ TEST(ChainDiagnostics, SeeChainsThatDisagree) {
 
 class CoarseFit : public testing::Test {
  protected:
-  static FitOutcome fit(const FitOptions& options, SoughtValue sought, double sigma_mm, size_t tags,
+  static FitOutcome fit(const FitOptions& options, EstimatedParameter estimated, double sigma_mm, size_t tags,
                         double sigma_kPa = 0.02, double noise = 1) {
     ElasticModel truth = test::coarse_gel(8.71);
     const Measurement measurement = test::synthetic(truth, {.pressures_kPa = {3.0},
@@ -51,8 +51,8 @@ class CoarseFit : public testing::Test {
                                                             .sigma_mm = sigma_mm,
                                                             .sigma_kPa = sigma_kPa,
                                                             .noise = noise});
-    ElasticMotion motion(test::coarse_gel(sought.start), {whole_parameter(0)});
-    return fit_motion(motion, {sought}, measurement, options);
+    ElasticMotion motion(test::coarse_gel(estimated.start), {whole_parameter(0)});
+    return fit_motion(motion, {estimated}, measurement, options);
   }
 };
 
@@ -117,7 +117,7 @@ TEST_F(CoarseFit, ThePapersSearchComesToTheSameValue) {
   paper.robustness = Robustness::never;
   const FitOutcome slow = fit(paper, {6.0, 1.0, 15.0}, 0.3, 150, 0),
                    quick = fit({}, {6.0, 1.0, 15.0}, 0.3, 150, 0);
-  EXPECT_TRUE(slow.converged) << slow.reason;
+  EXPECT_TRUE(slow.converged()) << slow.reason;
   EXPECT_NEAR(slow.values[0].value / quick.values[0].value, 1, 2e-3);
   EXPECT_GT(slow.iterations, 1);
   EXPECT_EQ(slow.history.size(), static_cast<size_t>(slow.iterations));
@@ -127,9 +127,9 @@ TEST_F(CoarseFit, ThePapersSearchComesToTheSameValue) {
 TEST_F(CoarseFit, AnInterruptionKeepsTheBestSoFar) {
   FitOptions options;
   int asked = 0;
-  options.optimiser.interrupted = [&] { return ++asked > 1; };
+  options.search.interrupted = [&] { return ++asked > 1; };
   const FitOutcome outcome = fit(options, {2.0, 1.0, 15.0}, 0.3, 150);
-  EXPECT_FALSE(outcome.converged);
+  EXPECT_FALSE(outcome.converged());
   EXPECT_THAT(outcome.reason, testing::HasSubstr("Stopped on request after 1 iterations"));
   ASSERT_EQ(outcome.values.size(), 1U);
   EXPECT_GT(outcome.values[0].value, 2.5);
@@ -140,9 +140,9 @@ TEST_F(CoarseFit, AnInterruptedPosteriorLeavesTheFit) {
   FitOptions options;
   options.posterior.emplace();
   options.posterior->on_step = [&](int done, int) { asked_to_end = done == 3; };
-  options.optimiser.interrupted = [&] { return asked_to_end; };
+  options.search.interrupted = [&] { return asked_to_end; };
   const FitOutcome outcome = fit(options, {6.0, 1.0, 15.0}, 0.3, 40);
-  EXPECT_TRUE(outcome.converged) << outcome.reason;
+  EXPECT_TRUE(outcome.converged()) << outcome.reason;
   EXPECT_FALSE(outcome.posterior);
   EXPECT_EQ(outcome.interrupted, "posterior");
   ASSERT_EQ(outcome.values.size(), 1U);
@@ -152,14 +152,14 @@ TEST_F(CoarseFit, AnInterruptedPosteriorLeavesTheFit) {
 TEST_F(CoarseFit, AnInterruptionInsideAProfileLeavesTheFit) {
   int asked = 0, last = std::numeric_limits<int>::max();
   FitOptions options;
-  options.optimiser.interrupted = [&] { return ++asked > last; };
+  options.search.interrupted = [&] { return ++asked > last; };
   const FitOutcome searched = fit(options, {6.0, 1.0, 15.0}, 0.3, 40);
-  ASSERT_TRUE(searched.converged) << searched.reason;
+  ASSERT_TRUE(searched.converged()) << searched.reason;
   options.profiled = {0};
   last = asked + 3;  // asked once before the profile, then at each of its steps
   asked = 0;
   const FitOutcome profiled = fit(options, {6.0, 1.0, 15.0}, 0.3, 40);
-  EXPECT_TRUE(profiled.converged) << profiled.reason;
+  EXPECT_TRUE(profiled.converged()) << profiled.reason;
   EXPECT_EQ(profiled.interrupted, "profile");
   EXPECT_TRUE(profiled.profiles.empty());
   EXPECT_LE(asked, last + 4);
@@ -171,9 +171,9 @@ TEST_F(CoarseFit, ThePapersSearchCanBeInterrupted) {
   paper.paper_mode = true;
   paper.robustness = Robustness::never;
   int asked = 0;
-  paper.optimiser.interrupted = [&] { return ++asked > 1; };
+  paper.search.interrupted = [&] { return ++asked > 1; };
   const FitOutcome outcome = fit(paper, {2.0, 1.0, 15.0}, 0.3, 40, 0);
-  EXPECT_FALSE(outcome.converged);
+  EXPECT_FALSE(outcome.converged());
   EXPECT_THAT(outcome.reason, testing::HasSubstr("Stopped on request"));
 }
 

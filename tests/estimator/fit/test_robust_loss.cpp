@@ -73,7 +73,7 @@ TEST_F(WildPoints, FivePerCentOfThemDoNotMoveTheStiffness) {
   for (const unsigned seed : {1U, 2U}) {
     const double clean = fit(measured(0, seed), Robustness::never).values[0].value;
     const FitOutcome found = fit(measured(20, seed), Robustness::if_needed);
-    ASSERT_TRUE(found.converged) << found.reason;
+    ASSERT_TRUE(found.converged()) << found.reason;
     ASSERT_TRUE(found.robust);
     EXPECT_NEAR(found.values[0].value / clean, 1, 0.02);
     EXPECT_NEAR(found.values[0].value, 8.71, 3 * found.values[0].se);
@@ -103,7 +103,7 @@ TEST_F(WildPoints, ThrownInAllDirectionsTheyNeitherMoveNorStopTheFit) {
       SCOPED_TRACE(testing::Message() << "up to " << most_mm << " mm, seed " << seed);
       const Measurement measurement = thrown_about(most_mm, seed);
       const FitOutcome found = fit(measurement, Robustness::if_needed);
-      ASSERT_TRUE(found.converged) << found.reason;
+      ASSERT_TRUE(found.converged()) << found.reason;
       EXPECT_TRUE(found.robust);
       EXPECT_LT(found.iterations, 30);
       EXPECT_NEAR(found.values[0].value, 8.71, 3 * found.values[0].se);

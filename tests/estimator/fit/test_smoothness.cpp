@@ -86,7 +86,8 @@ class RegionalGel : public testing::Test {
     FitOptions options;
     options.robustness = robustness;
     if (smooth) options.smooth = {*smooth};
-    return fit_motion(motion, std::vector<SoughtValue>(elements, {6.0, 1.0, 20.0}), measurement, options);
+    return fit_motion(motion, std::vector<EstimatedParameter>(elements, {6.0, 1.0, 20.0}), measurement,
+                      options);
   }
   static double rms(const FitOutcome& outcome, double amplitude) {
     double squares = 0;
@@ -99,7 +100,7 @@ class RegionalGel : public testing::Test {
 TEST_F(RegionalGel, WithoutDifferencesTheEvidenceAsksForNone) {
   const Measurement measurement = measured(0, 3);
   const FitOutcome smooth = fit(measurement, SmoothRegion{0, {}}), free = fit(measurement, {});
-  ASSERT_TRUE(smooth.converged) << smooth.reason;
+  ASSERT_TRUE(smooth.converged()) << smooth.reason;
   ASSERT_EQ(smooth.smoothness.size(), 1U);
   EXPECT_LT(rms(smooth, 0), 0.5 * rms(free, 0));
   EXPECT_LT(smooth.smoothness[0].effective_values, 4);
@@ -115,7 +116,7 @@ TEST_F(RegionalGel, WeakDifferencesAreNotFlattened) {
   double along = 0, flat = 0;
   for (const unsigned seed : {1U, 2U, 3U, 4U}) {
     const FitOutcome outcome = fit(measured(weak, seed), SmoothRegion{0, {}});
-    ASSERT_TRUE(outcome.converged) << outcome.reason;
+    ASSERT_TRUE(outcome.converged()) << outcome.reason;
     double mean = 0;
     for (const EstimatedValue& value : outcome.values)
       mean += value.value / static_cast<double>(elements);
@@ -135,7 +136,7 @@ TEST_F(RegionalGel, WeakDifferencesAreNotFlattened) {
 
 TEST_F(RegionalGel, DifferencesThatTheDataShowAreKept) {
   const FitOutcome outcome = fit(measured(0.3, 1), SmoothRegion{0, {}});
-  ASSERT_TRUE(outcome.converged) << outcome.reason;
+  ASSERT_TRUE(outcome.converged()) << outcome.reason;
   EXPECT_FALSE(outcome.smoothness[0].none_seen);
   EXPECT_GT(outcome.smoothness[0].step, 0.08);
   EXPECT_LT(outcome.smoothness[0].step90[0], outcome.smoothness[0].step);
@@ -150,7 +151,7 @@ TEST_F(RegionalGel, ARobustLossChangesItsErrorsAsItDoesWithoutSmoothing) {
   const auto mean_ratio = [&](std::optional<SmoothRegion> smooth) {
     const FitOutcome normal = fit(measurement, smooth, Robustness::never),
                      robust = fit(measurement, smooth, Robustness::always);
-    EXPECT_TRUE(normal.converged && robust.converged);
+    EXPECT_TRUE(normal.converged() && robust.converged());
     double sum = 0;
     for (size_t e = 0; e < elements; ++e)
       sum += robust.values[e].se / normal.values[e].se;

@@ -60,5 +60,11 @@ TEST(Intervals, AreSymmetricInTheCoordinate) {
   EXPECT_NEAR(standard_error(space[2], 0.16, 0.016), 12.5, 1e-9);
 }
 
+TEST(Intervals, StudentsQuantilesAreThoseOfTheTable) {
+  EXPECT_NEAR(student_quantile(1, 0.05), 12.7062, 1e-4);
+  EXPECT_NEAR(student_quantile(10, 0.05), 2.2281, 1e-4);
+  EXPECT_NEAR(student_quantile(59, 0.05), 2.0010, 1e-4);
+}
+
 }  // namespace
 }  // namespace diastole::inference

@@ -5,7 +5,7 @@
 #include <functional>
 #include <utility>
 
-#include "estimator/inference/least_squares.hpp"
+#include "estimator/inference/differences.hpp"
 
 namespace diastole::inference {
 
@@ -24,18 +24,7 @@ class FunctionProblem : public LeastSquaresProblem {
     ++calls;
     return function_(q);
   }
-  Eigen::MatrixXd jacobian(const Eigen::VectorXd& q) override {
-    constexpr double step = 1e-6;
-    Eigen::MatrixXd result;
-    for (Eigen::Index i = 0; i < q.size(); ++i) {
-      const Eigen::VectorXd by = step * Eigen::VectorXd::Unit(q.size(), i);
-      const Eigen::VectorXd column = (*function_(q + by) - *function_(q - by)) / (2 * step);
-      result.conservativeResize(column.size(), q.size());
-      result.col(i) = column;
-      calls += 2;
-    }
-    return result;
-  }
+  Eigen::MatrixXd jacobian(const Eigen::VectorXd& q) override { return central_differences(*this, q); }
   [[nodiscard]] std::string failure() const override { return "there is nothing here"; }
 
   int calls = 0;  ///< of the function, those for derivatives included

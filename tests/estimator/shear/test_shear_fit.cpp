@@ -159,12 +159,6 @@ TEST(OriginLine, AgreesWithHandCalculation) {
   EXPECT_DOUBLE_EQ(line.se, 1.0 / 3);
 }
 
-TEST(OriginLine, StudentsTIsThatOfTheTables) {
-  EXPECT_NEAR(student_quantile(1, 0.05), 12.7062, 1e-4);
-  EXPECT_NEAR(student_quantile(10, 0.05), 2.2281, 1e-4);
-  EXPECT_NEAR(student_quantile(59, 0.05), 2.0010, 1e-4);
-}
-
 TEST(OriginLine, TheInterceptAgreesWithHandCalculation) {
   const double x[] = {0, 1, 2}, y[] = {1, 1, 4};  // y = 0.5 + 1.5 x, residuals 0.5, -1, 0.5
   EXPECT_NEAR(intercept_deviations(x, y), 0.5 / std::sqrt(1.5 * (1.0 / 3 + 0.5)), 1e-12);

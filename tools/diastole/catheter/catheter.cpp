@@ -12,7 +12,7 @@
 #include "estimator/report/page.hpp"
 #include "protocol/contract/input_error.hpp"
 #include "protocol/runfile/reader.hpp"
-#include "protocol/signal/step_fit.hpp"
+#include "estimator/catheter/step_fit.hpp"
 #include "tools/diastole/catheter/catheter_page.hpp"
 
 namespace diastole {

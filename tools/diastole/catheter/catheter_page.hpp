@@ -4,7 +4,7 @@
 #include <string>
 
 #include "protocol/runfile/run.hpp"
-#include "protocol/signal/step_fit.hpp"
+#include "estimator/catheter/step_fit.hpp"
 
 namespace diastole {
 

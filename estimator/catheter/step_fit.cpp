@@ -1,66 +1,69 @@
-#include "protocol/signal/step_fit.hpp"
+#include "estimator/catheter/step_fit.hpp"
 
 #include <fmt/format.h>
 
-#include <Eigen/Dense>
-
+#include <Eigen/LU>
 #include <algorithm>
-#include <boost/math/distributions/students_t.hpp>
 #include <cmath>
-#include <unsupported/Eigen/NonLinearOptimization>
-#include <unsupported/Eigen/NumericalDiff>
 
-#include "protocol/signal/step_search.hpp"
+#include "estimator/catheter/step_search.hpp"
+#include "estimator/inference/covariance.hpp"
+#include "estimator/inference/differences.hpp"
+#include "estimator/inference/intervals.hpp"
+#include "estimator/inference/least_squares.hpp"
 
 namespace diastole::signal {
 namespace {
 
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
+using inference::Parameter;
 
-constexpr int parameters = 5;  // p0, dp, t0, ln f0, ln zeta
+constexpr int parameters = 5;
+const Parameter f0{"f0_Hz", "Hz", 0, HUGE_VAL, inference::Scale::logarithmic};
+const Parameter zeta{"zeta", "", 0, HUGE_VAL, inference::Scale::logarithmic};
 constexpr int correlated_rows = 20;
 constexpr double most_f0_of_rate = 0.45;
 constexpr double excess_rms = 3;
-constexpr double normal_975 = 1.959964;
 
-struct Misfit {
-  using Scalar = double;
-  using InputType = VectorXd;
-  using ValueType = VectorXd;
-  using JacobianType = MatrixXd;
-  static constexpr int InputsAtCompileTime = Eigen::Dynamic;
-  static constexpr int ValuesAtCompileTime = Eigen::Dynamic;
+class StepMisfit : public inference::LeastSquaresProblem {
+ public:
+  StepMisfit(std::vector<double> time_s, std::span<const double> pressure_kPa)
+      : time_s_(std::move(time_s)), pressure_kPa_(pressure_kPa) {}
 
-  std::span<const double> time_s;
-  std::span<const double> pressure_kPa;
-
-  [[nodiscard]] int inputs() const { return parameters; }
-  [[nodiscard]] int values() const { return static_cast<int>(time_s.size()); }
-  int operator()(const VectorXd& at, VectorXd& misfit) const {
-    const SecondOrder system{std::exp(at[3]), std::exp(at[4])};
-    for (size_t i = 0; i < time_s.size(); ++i) {
+  [[nodiscard]] const inference::ParameterSpace& space() const override { return space_; }
+  std::optional<VectorXd> residuals(const VectorXd& q) override {
+    const SecondOrder system{f0.value(q[3]), zeta.value(q[4])};
+    VectorXd misfit(static_cast<Eigen::Index>(time_s_.size()));
+    for (size_t i = 0; i < time_s_.size(); ++i) {
       misfit[static_cast<Eigen::Index>(i)] =
-          at[0] + at[1] * unit_step(system, time_s[i] - at[2]) - pressure_kPa[i];
+          q[0] + q[1] * unit_step(system, time_s_[i] - q[2]) - pressure_kPa_[i];
     }
-    return 0;
+    return misfit;
   }
+  MatrixXd jacobian(const VectorXd& q) override { return inference::central_differences(*this, q); }
+
+ private:
+  std::vector<double> time_s_;  // since the onset: differences need numbers of order one
+  std::span<const double> pressure_kPa_;
+  inference::ParameterSpace space_{
+      std::vector<Parameter>{{"before", "kPa"}, {"jump", "kPa"}, {"time", "s"}, f0, zeta}};
 };
 
 /// The best of a grid over f0, zeta and t0, levels as found.
-VectorXd first_guess(const Misfit& misfit, const FoundStep& step, double spacing_s, double onset_s) {
-  VectorXd best(parameters), left(misfit.values());
+VectorXd first_guess(StepMisfit& misfit, const FoundStep& step, double spacing_s) {
+  VectorXd best(parameters);
   double least = HUGE_VAL;
   for (const double f0_Hz : {4, 8, 15, 25, 40, 60, 90, 130}) {
     if (f0_Hz * spacing_s > most_f0_of_rate) continue;
-    for (const double zeta : {0.1, 0.3, 0.6, 1.0, 2.0}) {
+    for (const double damping : {0.1, 0.3, 0.6, 1.0, 2.0}) {
       for (const double early : {0.0, 1.0, 2.0, 4.0}) {
         VectorXd at(parameters);
-        at << step.before_kPa, step.after_kPa - step.before_kPa, onset_s - early * spacing_s, std::log(f0_Hz),
-            std::log(zeta);
-        misfit(at, left);
-        if (left.squaredNorm() >= least) continue;
-        least = left.squaredNorm();
+        at << step.before_kPa, step.after_kPa - step.before_kPa, -early * spacing_s, std::log(f0_Hz),
+            std::log(damping);
+        const double square = misfit.residuals(at)->squaredNorm();
+        if (square >= least) continue;
+        least = square;
         best = at;
       }
     }
@@ -69,7 +72,7 @@ VectorXd first_guess(const Misfit& misfit, const FoundStep& step, double spacing
 }
 
 /// (J'J)^-1 J' G J (J'J)^-1 with the tapered autocovariance of the residuals.
-MatrixXd covariance(const MatrixXd& jacobian, const VectorXd& left) {
+MatrixXd correlated_covariance(const MatrixXd& jacobian, const VectorXd& left) {
   const Eigen::Index n = left.size();
   const double freedom = static_cast<double>(n) / static_cast<double>(n - parameters);
   MatrixXd meat = MatrixXd::Zero(parameters, parameters);
@@ -79,51 +82,46 @@ MatrixXd covariance(const MatrixXd& jacobian, const VectorXd& left) {
     const MatrixXd product = jacobian.topRows(n - lag).transpose() * jacobian.bottomRows(n - lag);
     meat += taper * g * (lag == 0 ? product : MatrixXd(product + product.transpose()));
   }
-  const MatrixXd bread =
-      (jacobian.transpose() * jacobian).ldlt().solve(MatrixXd::Identity(parameters, parameters));
+  const MatrixXd bread = inference::estimate_covariance(jacobian).matrix;
   return bread * meat * bread;
 }
 
-/// Of a positive quantity, from the standard error of its logarithm.
-Estimate from_log(double value, double log_se, double quantile) {
-  return {value, value * log_se, {value * std::exp(-quantile * log_se), value * std::exp(quantile * log_se)}};
+Estimate estimate(const Parameter& parameter, double coordinate, double sd, double quantile) {
+  return {parameter.value(coordinate), standard_error(parameter, coordinate, sd),
+          interval(parameter, coordinate, quantile * sd)};
 }
 
-FittedStep fit_step(std::span<const double> time_s, std::span<const double> pressure_kPa,
-                    const FoundStep& step, double spacing_s) {
+/// Nothing if the search did not settle.
+std::optional<FittedStep> fit_step(std::span<const double> time_s, std::span<const double> pressure_kPa,
+                                   const FoundStep& step, double spacing_s) {
   const size_t rows = step.last - step.first;
-  // Times relative to the onset: Jacobians by differences need numbers of order one.
   std::vector<double> local_s;
   for (size_t i = step.first; i < step.last; ++i)
     local_s.push_back(time_s[i] - time_s[step.onset]);
-  const Misfit misfit{local_s, pressure_kPa.subspan(step.first, rows)};
-  VectorXd at = first_guess(misfit, step, spacing_s, 0);
-  Eigen::NumericalDiff<Misfit, Eigen::Central> differentiable(misfit);
-  Eigen::LevenbergMarquardt<decltype(differentiable)> search(differentiable);
-  search.parameters.maxfev = 4000;
-  search.minimize(at);
-  VectorXd left(misfit.values());
-  misfit(at, left);
-  MatrixXd jacobian(misfit.values(), parameters);
-  differentiable.df(at, jacobian);
-  const MatrixXd cov = covariance(jacobian, left);
-  const boost::math::students_t student(static_cast<double>(rows - parameters));
-  const double quantile = boost::math::quantile(student, 0.975);
-  return {.time_s = time_s[step.onset] + at[2],
-          .before_kPa = at[0],
-          .jump_kPa = at[1],
-          .f0_Hz = from_log(std::exp(at[3]), std::sqrt(cov(3, 3)), quantile),
-          .zeta = from_log(std::exp(at[4]), std::sqrt(cov(4, 4)), quantile),
-          .rms_kPa = std::sqrt(left.squaredNorm() / static_cast<double>(rows)),
-          .noise_kPa = step.noise_kPa,
-          .first = step.first,
-          .last = step.last,
-          .log_covariance = {cov(3, 3), cov(3, 4), cov(4, 3), cov(4, 4)}};
+  StepMisfit misfit(std::move(local_s), pressure_kPa.subspan(step.first, rows));
+  const inference::SearchResult found = inference::minimise(
+      misfit, first_guess(misfit, step, spacing_s), {.iteration_limit = 400, .cost_tolerance = 1e-14});
+  if (!is_settled(found.termination)) return {};
+  const VectorXd& at = found.q;
+  const MatrixXd cov = correlated_covariance(found.jacobian, found.residuals);
+  const double quantile = inference::student_quantile(static_cast<double>(rows - parameters), 0.05);
+  return FittedStep{.time_s = time_s[step.onset] + at[2],
+                    .before_kPa = at[0],
+                    .jump_kPa = at[1],
+                    .f0_Hz = estimate(f0, at[3], std::sqrt(cov(3, 3)), quantile),
+                    .zeta = estimate(zeta, at[4], std::sqrt(cov(4, 4)), quantile),
+                    .rms_kPa = std::sqrt(found.residuals.squaredNorm() / static_cast<double>(rows)),
+                    .noise_kPa = step.noise_kPa,
+                    .first = step.first,
+                    .last = step.last,
+                    .log_covariance = {cov(3, 3), cov(3, 4), cov(4, 3), cov(4, 4)}};
 }
 
 /// Why a step cannot be used; empty if it can.
-std::string fault_of(const FittedStep& step, double spacing_s) {
-  if (!std::isfinite(step.f0_Hz.se) || !std::isfinite(step.zeta.se)) return "its fit did not converge";
+std::string fault_of(const std::optional<FittedStep>& fitted, double spacing_s) {
+  if (!fitted || !std::isfinite(fitted->f0_Hz.se) || !std::isfinite(fitted->zeta.se))
+    return "its fit did not converge";
+  const FittedStep& step = *fitted;
   if (step.f0_Hz.value * spacing_s > most_f0_of_rate) {
     return fmt::format("its natural frequency of {:.0f} Hz is too near half the sample rate of {:.0f} Hz",
                        step.f0_Hz.value, 1 / spacing_s);
@@ -174,7 +172,9 @@ Estimate derived(const Averaged& mean, double (*quantity)(const SecondOrder&)) {
   constexpr double h = 1e-4;
   const Eigen::Vector2d gradient((log_at(h, 0) - log_at(-h, 0)) / (2 * h),
                                  (log_at(0, h) - log_at(0, -h)) / (2 * h));
-  return from_log(std::exp(log_at(0, 0)), std::sqrt(gradient.dot(mean.covariance * gradient)), normal_975);
+  const Parameter positive{"", "", 0, HUGE_VAL, inference::Scale::logarithmic};
+  return estimate(positive, log_at(0, 0), std::sqrt(gradient.dot(mean.covariance * gradient)),
+                  inference::normal_95);
 }
 
 }  // namespace
@@ -199,11 +199,12 @@ CatheterResponse fit_catheter(std::span<const double> time_s, std::span<const do
           fmt::format("the step at {:.3f} s is left out: samples are missing in it", at_s));
       continue;
     }
-    const FittedStep step = fit_step(time_s, pressure_kPa, found, spacing_s);
-    if (const std::string fault = fault_of(step, spacing_s); !fault.empty()) {
+    const std::optional<FittedStep> fitted = fit_step(time_s, pressure_kPa, found, spacing_s);
+    if (const std::string fault = fault_of(fitted, spacing_s); !fault.empty()) {
       response.remarks.push_back(fmt::format("the step at {:.3f} s is left out: {}", at_s, fault));
       continue;
     }
+    const FittedStep& step = *fitted;
     if (step.rms_kPa > excess_rms * step.noise_kPa) {
       response.remarks.push_back(fmt::format(
           "the step at {:.3f} s is not quite a second-order response: the fit leaves {:.4f} kPa, the noise "

@@ -1,4 +1,4 @@
-#include "protocol/signal/step_search.hpp"
+#include "estimator/catheter/step_search.hpp"
 
 #include <fmt/format.h>
 

@@ -1,4 +1,4 @@
-#include "estimator/fit/sought.hpp"
+#include "estimator/fit/estimated_parameters.hpp"
 
 #include <fmt/format.h>
 
@@ -10,8 +10,8 @@ size_t value_count(const StudyParameter& parameter, size_t elements) {
   return parameter.vary == Variation::whole ? 1 : elements;
 }
 
-Sought sought_of(const Study& study, const ElasticModel& model) {
-  Sought sought;
+EstimatedParameters estimated_parameters(const Study& study, const ElasticModel& model) {
+  EstimatedParameters estimated;
   for (const StudyParameter& parameter : study.law.parameters) {
     const size_t index = model.law().parameter_index(parameter.name);
     const double above = model.law().parameters()[index].above;
@@ -26,14 +26,19 @@ Sought sought_of(const Study& study, const ElasticModel& model) {
     const Smoothness& smoothness = parameter.smoothness;
     if (parameter.vary == Variation::element && smoothness.kind != Smoothness::Kind::none) {
       const bool given = smoothness.kind == Smoothness::Kind::given;
-      sought.smooth.push_back({sought.values.size(), given ? std::optional(smoothness.step) : std::nullopt});
+      estimated.smooth.push_back(
+          {estimated.values.size(), given ? std::optional(smoothness.step) : std::nullopt});
     }
+    const size_t first = estimated.values.size();
     for (const ParameterGroup& group : groups) {
-      sought.groups.push_back(group);
-      sought.values.push_back({parameter.start, parameter.lower, parameter.upper});
+      estimated.groups.push_back(group);
+      const std::string name = groups.size() == 1
+                                   ? parameter.name
+                                   : fmt::format("{}[{}]", parameter.name, estimated.values.size() - first);
+      estimated.values.push_back({parameter.start, parameter.lower, parameter.upper, name});
     }
   }
-  return sought;
+  return estimated;
 }
 
 }  // namespace diastole

@@ -1,6 +1,6 @@
 // Steps of known frequency and damping, with correlated noise and the steps of a 12-bit converter.
 
-#include "protocol/signal/step_fit.hpp"
+#include "estimator/catheter/step_fit.hpp"
 
 #include <gmock/gmock.h>
 
@@ -58,32 +58,6 @@ bool holds(const Estimate& estimate, double truth) {
   return estimate.ci95[0] <= truth && truth <= estimate.ci95[1];
 }
 
-TEST(StepResponse, IsTheSolutionOfTheOscillatorsEquation) {
-  for (const double zeta : {0.05, 0.6, 0.999999, 1.0, 1.000001, 3.0}) {
-    const SecondOrder system{20, zeta};
-    const double w = 2 * M_PI * 20, h = 1e-4;
-    for (const double t : {0.002, 0.01, 0.05, 0.3}) {
-      const double s = unit_step(system, t);
-      const double later = unit_step(system, t + h), earlier = unit_step(system, t - h);
-      const double curvature = (later - 2 * s + earlier) / (h * h), slope = (later - earlier) / (2 * h);
-      EXPECT_NEAR(curvature / (w * w) + 2 * zeta / w * slope + s, 1, 2e-4) << zeta << " " << t;
-    }
-  }
-  EXPECT_EQ(unit_step({20, 0.5}, -1), 0);
-  EXPECT_NEAR(unit_step({20, 5}, 100), 1, 1e-9);
-}
-
-TEST(StepResponse, LimitsAreWhereAmplitudeAndLagSaySo) {
-  for (const SecondOrder& system : {SecondOrder{60, 0.6}, {30, 0.15}, {20, 1.8}}) {
-    EXPECT_NEAR(amplitude_at(system, minus_3dB_Hz(system)), std::sqrt(0.5), 1e-12);
-    EXPECT_NEAR(lag_periods_at(system, lag_limit_Hz(system)), 0.05, 1e-12);
-    EXPECT_NEAR(std::abs(amplitude_at(system, flat_limit_Hz(system)) - 1), 0.05, 1e-9);
-    for (double f = 0; f < 0.999 * flat_limit_Hz(system); f += 0.01)
-      EXPECT_LT(std::abs(amplitude_at(system, f) - 1), 0.05);
-    EXPECT_NEAR(lag_periods_at(system, 0.01) / 0.01, delay_s(system), 1e-6);
-  }
-}
-
 class KnownCatheter : public testing::TestWithParam<SecondOrder> {};
 
 TEST_P(KnownCatheter, IsFoundFromOneStep) {
@@ -137,7 +111,7 @@ TEST(StepFit, ARecordingWithoutAStepIsRefusedInWords) {
   EXPECT_THAT(fit({}).refusal, HasSubstr("no sample"));
 }
 
-TEST(StepFit, AStepWithMissingSamplesIsLeftOutAndTold) {
+TEST(StepFit, AStepWithMissingSamplesIsLeftOutAndReported) {
   Recording recording = record({.at_s = {1.5, 3.2}, .length_s = 5}, 4);
   recording.pressure_kPa[static_cast<size_t>(1.55 * 300)] = std::numeric_limits<double>::quiet_NaN();
   const CatheterResponse response = fit(recording);
@@ -147,7 +121,7 @@ TEST(StepFit, AStepWithMissingSamplesIsLeftOutAndTold) {
   EXPECT_THAT(response.remarks[0], HasSubstr("samples are missing"));
 }
 
-TEST(StepFit, AResponseThatIsNotOfSecondOrderIsTold) {
+TEST(StepFit, AResponseThatIsNotOfSecondOrderIsReported) {
   Recording recording = record({.system = {40, 0.3}}, 5);
   for (size_t i = 0; i < recording.time_s.size(); ++i) {
     const double after_s = recording.time_s[i] - 2.0013;
