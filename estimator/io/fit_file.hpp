@@ -31,7 +31,7 @@ struct FittedSmoothness {
   double effective_values;       ///< how many independent values the data determine
 };
 
-/// From the likelihood's true shape (estimator/fit/profile.hpp).
+/// From the likelihood's true shape (estimator/inference/profile.hpp).
 struct FittedProfile {
   std::array<double, 2> ci95;
   std::array<bool, 2> at_bound;        ///< the bound ends the interval, not the data
