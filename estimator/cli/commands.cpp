@@ -2,7 +2,7 @@
 
 namespace diastole {
 
-void add_estimator_commands(CommandLine& line) {
+void add_estimator_commands(CommandLine& line, const ExplanationScorer& score) {
   add_solve(line);
   add_pressure_volume(line);
   add_reconstruct(line);
@@ -13,7 +13,7 @@ void add_estimator_commands(CommandLine& line) {
   add_report(line);
   add_mesh(line);
   add_effects(line);
-  add_explain(line);
+  add_explain(line, score);
 }
 
 }  // namespace diastole

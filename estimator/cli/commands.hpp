@@ -1,6 +1,9 @@
 #pragma once
 // The estimator's subcommands.
 
+#include <filesystem>
+#include <functional>
+
 #include "protocol/contract/command.hpp"
 
 namespace diastole {
@@ -15,8 +18,12 @@ void add_shear(CommandLine& line);
 void add_report(CommandLine& line);
 void add_mesh(CommandLine& line);
 void add_effects(CommandLine& line);
-void add_explain(CommandLine& line);
+/// Compares the explanations in a folder with what was hidden and prints how often they are right.
+using ExplanationScorer = std::function<ExitCode(
+    const std::filesystem::path& truths, const std::filesystem::path& results, const CommandOutput& out)>;
+/// `score` is what `diastole explain --score` runs: nothing of the estimator knows what was hidden.
+void add_explain(CommandLine& line, const ExplanationScorer& score);
 
-void add_estimator_commands(CommandLine& line);
+void add_estimator_commands(CommandLine& line, const ExplanationScorer& score);
 
 }  // namespace diastole

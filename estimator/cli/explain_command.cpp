@@ -8,7 +8,6 @@
 
 #include "estimator/cli/commands.hpp"
 #include "estimator/explain/explain_study.hpp"
-#include "estimator/explain/score.hpp"
 #include "estimator/explain/verdict/explained_study.hpp"
 #include "estimator/explain/verdict/explanation_json.hpp"
 #include "estimator/io/whole_file.hpp"
@@ -100,16 +99,6 @@ void print_for_people(const explain::Explanation& found, const fs::path& folder)
              found.study_after.empty() ? "" : fmt::format(", {}", found.study_after));
 }
 
-ExitCode run_score(const ExplainArguments& arguments, const CommandOutput& out) {
-  const explain::Score score = explain::score_folder(arguments.truths, arguments.study);
-  if (out.json) {
-    std::cout << explain::to_json(score) << '\n';
-  } else {
-    fmt::print("{}", explain::told(score));
-  }
-  return score.passed() ? ExitCode::done : ExitCode::negative;
-}
-
 /// A folder that was made for results: gone again if nothing was written into it.
 struct MadeFolder {
   fs::path made = {};
@@ -124,7 +113,6 @@ struct MadeFolder {
 };
 
 ExitCode run_explain(const ExplainArguments& arguments, const CommandOutput& out) {
-  if (!arguments.truths.empty()) return run_score(arguments, out);
   if (arguments.folder.empty()) {
     throw InputError({.file = "",
                       .place = "option -o",
@@ -177,7 +165,7 @@ ExitCode run_explain(const ExplainArguments& arguments, const CommandOutput& out
 
 }  // namespace
 
-void add_explain(CommandLine& line) {
+void add_explain(CommandLine& line, const ExplanationScorer& score) {
   auto arguments = std::make_shared<ExplainArguments>();
   CLI::App* command = line.add(
       "explain", "where model and recordings disagree, which effect is missing, and what stays open",
@@ -208,7 +196,10 @@ void add_explain(CommandLine& line) {
       ->check(CLI::Range(1, 256))
       ->capture_default_str();
   command->add_flag("--force", arguments->force, "replace files in the folder that hold something else");
-  line.on_run(command, [arguments](const CommandOutput& out) { return run_explain(*arguments, out); });
+  line.on_run(command, [arguments, score](const CommandOutput& out) {
+    if (!arguments->truths.empty()) return score(arguments->truths, arguments->study, out);
+    return run_explain(*arguments, out);
+  });
 }
 
 }  // namespace diastole

@@ -16,7 +16,7 @@
 #include <vector>
 
 #include "estimator/explain/rig/explain_rig.hpp"
-#include "estimator/explain/score.hpp"
+#include "tools/score/score.hpp"
 #include "estimator/explain/verdict/explanation_json.hpp"
 #include "tools/benchmarks/bench_explain_field.hpp"
 #include "tools/benchmarks/recorded_cases.hpp"
@@ -95,6 +95,6 @@ int main(int argc, char** argv) {
     explain_sessions(*recordings, kept);
   }
   const explain::Score score = explain::score_folder(recordings->folder, kept);
-  fmt::print("\n{}", explain::told(score));
+  fmt::print("\n{}", explain::in_words(score));
   return score.passed() ? 0 : 1;
 }

@@ -7,7 +7,7 @@
 #include <fstream>
 
 #include "estimator/explain/imaging/explain_field.hpp"
-#include "estimator/explain/truth_file.hpp"
+#include "tools/score/truth_file.hpp"
 #include "estimator/explain/verdict/explanation_json.hpp"
 
 namespace diastole::bench {

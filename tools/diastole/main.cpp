@@ -24,6 +24,7 @@
 #include "tools/diastole/catheter/catheter.hpp"
 #include "tools/diastole/replay/replay.hpp"
 #include "tools/diastole/simulate/simulate.hpp"
+#include "tools/score/score_command.hpp"
 
 namespace {
 
@@ -90,7 +91,7 @@ diastole::ExitCode run(int argc, char** argv) {
   diastole::add_catheter(line);
   diastole::add_simulate(line);
   diastole::add_replay(line);
-  diastole::add_estimator_commands(line);
+  diastole::add_estimator_commands(line, diastole::explain::print_score);
   if (argc < 2) {
     std::cerr << app.help();
     return ExitCode::bad_input;

@@ -1,5 +1,9 @@
 #include "estimator/explain/verdict/explanation.hpp"
 
+#include <fmt/format.h>
+
+#include <stdexcept>
+
 namespace diastole::explain {
 
 std::string_view name_of(Verdict verdict) {
@@ -14,6 +18,12 @@ std::string_view name_of(Verdict verdict) {
       return "none";
   }
   return "none";
+}
+
+Verdict verdict_named(std::string_view word) {
+  for (const Verdict verdict : {Verdict::named, Verdict::ambiguous, Verdict::unexplained, Verdict::none})
+    if (name_of(verdict) == word) return verdict;
+  throw std::invalid_argument(fmt::format("\"{}\" is no verdict", word));
 }
 
 }  // namespace diastole::explain

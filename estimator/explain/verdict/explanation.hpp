@@ -15,6 +15,8 @@ namespace diastole::explain {
 /// the noise.
 enum class Verdict { named, ambiguous, unexplained, none };
 std::string_view name_of(Verdict verdict);
+/// Throws std::invalid_argument for any other word.
+Verdict verdict_named(std::string_view word);
 
 struct FoundParameter {
   std::string name;  ///< with its unit: "wave_speed_m_s"

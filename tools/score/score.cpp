@@ -1,4 +1,4 @@
-#include "estimator/explain/score.hpp"
+#include "tools/score/score.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -106,7 +106,7 @@ std::string hidden_words(const Truth& truth) {
   return truth.kind == TruthKind::inseparable || has_alternatives(truth) ? set + " (inseparable)" : set;
 }
 
-/// "" if neither the file nor the list of effects tells.
+/// "" if neither the file nor the list of effects knows it.
 std::string port_of(const HiddenEffect& effect) {
   if (!effect.port.empty()) return effect.port;
   const Effect* known = find_effect(effect.id);
@@ -325,7 +325,7 @@ Score score_folder(const fs::path& truths, const fs::path& results) {
   return score;
 }
 
-std::string told(const Score& score) {
+std::string in_words(const Score& score) {
   std::string text = "What was hidden -> what was answered\n";
   size_t widest = 0;
   for (const Confusion& cell : score.confusion)

@@ -22,7 +22,7 @@ std::string_view name_of(TruthKind kind);
 
 struct HiddenEffect {
   std::string id;    ///< of no library: begins with "outside:"
-  std::string port;  ///< empty if the file does not tell
+  std::string port;  ///< empty if the file does not say
   std::map<std::string, double> parameters;
 };
 
@@ -32,7 +32,7 @@ struct Truth {
   std::vector<HiddenEffect> hidden;
   std::vector<std::vector<std::string>>
       alternatives;  ///< sets that fit these data as well; an empty set: no effect
-  double size_sigma = std::numeric_limits<double>::quiet_NaN();  ///< d; NaN if the file does not tell
+  double size_sigma = std::numeric_limits<double>::quiet_NaN();  ///< d; NaN if the file does not say
   std::vector<Verdict> acceptable;                               ///< if the file restricts the verdicts
 
   [[nodiscard]] std::vector<std::string> ids() const;  ///< sorted

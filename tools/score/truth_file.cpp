@@ -1,8 +1,9 @@
-#include "estimator/explain/truth_file.hpp"
+#include "tools/score/truth_file.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
@@ -17,11 +18,16 @@ using Json = nlohmann::json;
 
 constexpr std::string_view sealed_ending = ".sealed.json";
 
+constexpr std::array<std::pair<std::string_view, TruthKind>, 5> kinds{
+    {{"none", TruthKind::none},
+     {"single", TruthKind::single},
+     {"pair", TruthKind::pair},
+     {"outside", TruthKind::outside},
+     {"inseparable", TruthKind::inseparable}}};
+
 TruthKind kind_named(const std::string& word) {
-  for (const TruthKind kind :
-       {TruthKind::none, TruthKind::single, TruthKind::pair, TruthKind::outside, TruthKind::inseparable}) {
-    if (name_of(kind) == word) return kind;
-  }
+  for (const auto& [name, kind] : kinds)
+    if (name == word) return kind;
   throw std::invalid_argument("\"" + word + "\" is no kind of truth");
 }
 
@@ -46,13 +52,6 @@ Truth rig_truth(const std::string& name, const Json& json) {
   if (json.contains("alternatives")) json.at("alternatives").get_to(truth.alternatives);
   if (json.contains("d") && json.at("d").is_number()) truth.size_sigma = json.at("d").get<double>();
   return truth;
-}
-
-Verdict verdict_named(const std::string& word) {
-  for (const Verdict verdict : {Verdict::named, Verdict::ambiguous, Verdict::unexplained, Verdict::none}) {
-    if (name_of(verdict) == word) return verdict;
-  }
-  throw std::invalid_argument("\"" + word + "\" is no verdict");
 }
 
 /// One truth a study: with C1 free and with C1 known from a shear test.
@@ -119,19 +118,7 @@ std::vector<Truth> truths_of(const fs::path& file) {
 }  // namespace
 
 std::string_view name_of(TruthKind kind) {
-  switch (kind) {
-    case TruthKind::none:
-      return "none";
-    case TruthKind::single:
-      return "single";
-    case TruthKind::pair:
-      return "pair";
-    case TruthKind::outside:
-      return "outside";
-    case TruthKind::inseparable:
-      return "inseparable";
-  }
-  return "none";
+  return std::ranges::find(kinds, kind, &std::pair<std::string_view, TruthKind>::second)->first;
 }
 
 std::vector<std::string> Truth::ids() const {

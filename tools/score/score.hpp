@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
-#include "estimator/explain/truth_file.hpp"
 #include "estimator/explain/verdict/explanation.hpp"
+#include "tools/score/truth_file.hpp"
 
 namespace diastole::explain {
 
@@ -52,7 +52,7 @@ Score score_folder(const std::filesystem::path& truths, const std::filesystem::p
 Score score_cases(const std::vector<ScoredCase>& cases);
 
 /// The confusion matrix as a list and the table of targets, for people.
-std::string told(const Score& score);
+std::string in_words(const Score& score);
 std::string to_json(const Score& score);
 
 }  // namespace diastole::explain

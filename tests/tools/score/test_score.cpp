@@ -1,6 +1,6 @@
 #include <gmock/gmock.h>
 
-#include "estimator/explain/score.hpp"
+#include "tools/score/score.hpp"
 #include "estimator/explain/verdict/explanation_json.hpp"
 #include "tests/estimator/io/scratch_file.hpp"
 
@@ -65,8 +65,8 @@ TEST(Score, CountsEachRow) {
   EXPECT_NEAR(row_of(score, "parameter error").value, 0.05, 1e-12);
   EXPECT_EQ(row_of(score, "parameter's").value, 1.0);
   EXPECT_TRUE(score.passed());
-  EXPECT_THAT(told(score), HasSubstr("hose-compliance"));
-  EXPECT_THAT(told(score), HasSubstr("x   1"));
+  EXPECT_THAT(in_words(score), HasSubstr("hose-compliance"));
+  EXPECT_THAT(in_words(score), HasSubstr("x   1"));
   EXPECT_THAT(to_json(score), HasSubstr("\"passed\": true"));
 }
 
@@ -141,7 +141,7 @@ TEST(Score, PairsTruthsWithResultsByName) {
   const Score score = score_folder(folder.path(), folder.path());
   EXPECT_EQ(row_of(score, "none:").cases, 2U);
   EXPECT_THAT(score.missing, ElementsAre("c"));
-  EXPECT_THAT(told(score), HasSubstr("Without an explanation: c"));
+  EXPECT_THAT(in_words(score), HasSubstr("Without an explanation: c"));
   const test::ScratchFolder empty;
   EXPECT_THAT(message_of([&] { score_folder(folder.path(), empty.path()); }),
               HasSubstr("holds no explanation"));
