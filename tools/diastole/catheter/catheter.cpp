@@ -7,12 +7,12 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "estimator/catheter/step_fit.hpp"
 #include "estimator/io/whole_file.hpp"
 #include "estimator/report/html_text.hpp"
 #include "estimator/report/page.hpp"
 #include "protocol/contract/input_error.hpp"
 #include "protocol/runfile/reader.hpp"
-#include "estimator/catheter/step_fit.hpp"
 #include "tools/diastole/catheter/catheter_page.hpp"
 
 namespace diastole {

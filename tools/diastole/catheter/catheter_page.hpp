@@ -3,8 +3,8 @@
 
 #include <string>
 
-#include "protocol/runfile/run.hpp"
 #include "estimator/catheter/step_fit.hpp"
+#include "protocol/runfile/run.hpp"
 
 namespace diastole {
 
