@@ -6,16 +6,11 @@
 #include <nlohmann/json.hpp>
 
 #include "estimator/cli/commands.hpp"
+#include "estimator/cli/study_options.hpp"
 #include "estimator/montecarlo/design.hpp"
 
 namespace diastole {
 namespace {
-
-struct DesignArguments {
-  std::filesystem::path study;
-  std::vector<std::string> values;
-  std::string mesh;
-};
 
 void print_json(const DesignStudy& design, const Study& study) {
   const auto errors = [&](const std::vector<double>& se_percent) {
@@ -46,11 +41,8 @@ void print_best(const DesignStudy& design) {
   }
 }
 
-ExitCode run_design(const DesignArguments& arguments, const CommandOutput& out) {
-  Study study = read_study(arguments.study);
-  if (!arguments.mesh.empty()) set_mesh(study, arguments.mesh);
-  for (const std::string& value : arguments.values)
-    set_start(study, value);
+ExitCode run_design(const StudyOptions& options, const CommandOutput& out) {
+  const Study study = read_study(options);
   const DesignStudy design = explore_design(study, read_measurement(study));
   if (out.json) {
     print_json(design, study);
@@ -79,19 +71,16 @@ ExitCode run_design(const DesignArguments& arguments, const CommandOutput& out) 
 }  // namespace
 
 void add_design(CommandLine& line) {
-  auto arguments = std::make_shared<DesignArguments>();
+  auto options = std::make_shared<StudyOptions>();
   CLI::App* command =
       line.add("design", "which frame, pressure or tag spacing would tell a study's parameters best",
                "  diastole design examples/phantom-a.study.toml\n"
                "  diastole design lv.study.toml --set C_kPa=3 --set b1=11 --json\n"
                "Predictions hold at the study's start values, or at those of --set. `region` is the size\n"
                "of the joint confidence region as a share of the present one.");
-  command->add_option("STUDY", arguments->study, "study file with points or tags")->required();
-  command->add_option("--set", arguments->values, "a value, NAME=NUMBER (may be repeated)")
-      ->allow_extra_args(false);
-  command->add_option("--mesh", arguments->mesh,
-                      "other element counts: circumferential,longitudinal,transmural");
-  line.on_run(command, [arguments](const CommandOutput& out) { return run_design(*arguments, out); });
+  add_study(*command, *options);
+  add_values(*command, *options);
+  line.on_run(command, [options](const CommandOutput& out) { return run_design(*options, out); });
 }
 
 }  // namespace diastole

@@ -1,6 +1,5 @@
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -8,6 +7,7 @@
 #include "estimator/cli/commands.hpp"
 #include "estimator/effects/effect.hpp"
 #include "protocol/contract/input_error.hpp"
+#include "protocol/contract/table_reader.hpp"
 
 namespace diastole {
 namespace {
@@ -66,19 +66,11 @@ void print_for_people(const Effect& effect) {
 
 const Effect& known(const std::string& id) {
   if (const Effect* effect = find_effect(id)) return *effect;
-  const auto letters_in_common = [&](const Effect* effect) {
-    const std::string_view other = effect->text().id;
-    return std::count_if(id.begin(), id.end(), [&](char letter) { return other.find(letter) != other.npos; });
-  };
-  const auto& all = all_effects();
-  const Effect* nearest = *std::max_element(all.begin(), all.end(), [&](const Effect* a, const Effect* b) {
-    return letters_in_common(a) < letters_in_common(b);
-  });
-  throw InputError(
-      {.file = "",
-       .place = "ID",
-       .problem = fmt::format("there is no effect \"{}\"", id),
-       .remedy = fmt::format("`diastole effects` lists them; did you mean {}?", nearest->text().id)});
+  std::vector<std::string> ids;
+  for (const Effect* effect : all_effects())
+    ids.emplace_back(effect->text().id);
+  throw InputError({"", "ID", fmt::format("there is no effect \"{}\"", id),
+                    did_you_mean(id, ids) + "`diastole effects` lists them."});
 }
 
 ExitCode run_effects(const std::string& id, const CommandOutput& out) {

@@ -1,12 +1,12 @@
 #include <fmt/format.h>
 
-#include <csignal>
 #include <filesystem>
 #include <iostream>
 #include <memory>
 #include <string>
 
 #include "estimator/cli/commands.hpp"
+#include "estimator/cli/interruption.hpp"
 #include "estimator/explain/explain_study.hpp"
 #include "estimator/explain/verdict/explained_study.hpp"
 #include "estimator/explain/verdict/explanation_json.hpp"
@@ -33,30 +33,10 @@ struct ExplainArguments {
   bool force = false;
 };
 
-volatile std::sig_atomic_t interrupted = 0;
-
 struct Interrupted {};
 
-/// While it lives, the first Ctrl-C ends the work at the next simulation; the second ends the program.
-class EndOnInterrupt {
- public:
-  EndOnInterrupt() {
-    interrupted = 0;
-    before_ = std::signal(SIGINT, [](int) {
-      interrupted = 1;
-      std::signal(SIGINT, SIG_DFL);
-    });
-  }
-  ~EndOnInterrupt() { std::signal(SIGINT, before_); }
-  EndOnInterrupt(const EndOnInterrupt&) = delete;
-  EndOnInterrupt& operator=(const EndOnInterrupt&) = delete;
-
- private:
-  void (*before_)(int) = SIG_DFL;
-};
-
-void tell(const std::string& text) {
-  if (interrupted != 0) throw Interrupted{};
+void print_progress(const std::string& text) {
+  if (Interruption::requested()) throw Interrupted{};
   if (!text.empty()) fmt::print(stderr, "explain: {}\n", text);
 }
 
@@ -135,10 +115,11 @@ ExitCode run_explain(const ExplainArguments& arguments, const CommandOutput& out
   require_output({json_file, inputs_of(study), explain::explanation_file_mark, arguments.force});
   require_output({new_study, inputs_of(study), study_mark, arguments.force});
   require_output({page, inputs_of(study), report::page_mark, arguments.force});
-  const EndOnInterrupt end;
+  const Interruption interruption;
   explain::Explanation found;
   try {
-    found = explain::explain_study(study, {.threads = arguments.threads, .propose = true, .progress = tell});
+    found = explain::explain_study(
+        study, {.threads = arguments.threads, .propose = true, .progress = print_progress});
   } catch (const Interrupted&) {
     std::cerr << "diastole explain: interrupted; nothing was written\n";
     return ExitCode::negative;
@@ -180,7 +161,7 @@ void add_explain(CommandLine& line, const ExplanationScorer& score) {
       "The verdict is one of\n"
       "  named        one set of effects explains the misfit; its parameters come with 90 % intervals\n"
       "  ambiguous    these data cannot tell several sets apart\n"
-      "  unexplained  the misfit has structure that no known effect removes; where it sits is told\n"
+      "  unexplained  the misfit has structure that no known effect removes; where it sits is reported\n"
       "  none         nothing exceeds the noise\n"
       "OUT gets report.html, explanation.json for `diastole report`, and explained.study.toml: the study "
       "with\n"

@@ -3,13 +3,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <csignal>
 #include <iostream>
 #include <memory>
 #include <optional>
 
 #include "estimator/cli/commands.hpp"
 #include "estimator/cli/findings_text.hpp"
+#include "estimator/cli/interruption.hpp"
+#include "estimator/cli/study_options.hpp"
 #include "estimator/fit/study_fit.hpp"
 #include "estimator/io/study_fingerprint.hpp"
 #include "estimator/io/whole_file.hpp"
@@ -20,9 +21,7 @@ namespace diastole {
 namespace {
 
 struct FitArguments {
-  std::filesystem::path study;
-  std::vector<std::string> starts;
-  std::string mesh;
+  StudyOptions study;
   std::string smooth;
   std::string robust = "auto";
   double pressure_offset_kPa = 0;
@@ -92,23 +91,6 @@ void print_record(const FitRecord& record) {
     fmt::print("{} not used: {}.\n", exclusion.points, exclusion.reason);
 }
 
-volatile std::sig_atomic_t interrupts = 0;
-
-/// Ctrl-C ends the search after its step; a second one ends the program at once.
-class Interruption {
- public:
-  Interruption() {
-    interrupts = 0;
-    std::signal(SIGINT, [](int) {
-      interrupts = interrupts + 1;
-      std::signal(SIGINT, SIG_DFL);
-    });
-  }
-  ~Interruption() { std::signal(SIGINT, SIG_DFL); }
-  Interruption(const Interruption&) = delete;
-  Interruption& operator=(const Interruption&) = delete;
-};
-
 /// A checkpoint is taken up only by the fit that left it; --start takes any result with the same parameters.
 void require_own_checkpoint(const FitRecord& checkpoint, const Study& study, const std::string& file) {
   const bool own = checkpoint.fingerprint == study_fingerprint(study);
@@ -165,10 +147,7 @@ bool ended_on_bound(const FitRecord& record) {
 
 ExitCode run_fit(const FitArguments& arguments, const CommandOutput& out) {
   Study study = read_study(arguments.study);
-  if (!arguments.mesh.empty()) set_mesh(study, arguments.mesh);
   if (!arguments.smooth.empty()) set_smoothness(study, arguments.smooth);
-  for (const std::string& start : arguments.starts)
-    set_start(study, start);
   if (arguments.output && arguments.output == arguments.checkpoint) {
     throw InputError({arguments.output->string(), "--checkpoint", "is the file of the result too",
                       "Give the checkpoint a file of its own."});
@@ -215,13 +194,13 @@ ExitCode run_fit(const FitArguments& arguments, const CommandOutput& out) {
     options.on_checkpoint = [&](const FitRecord& reached) { write_fit_file(reached, *arguments.checkpoint); };
   }
   const Interruption interruption;
-  options.interrupted = [] { return interrupts > 0; };
+  options.interrupted = [] { return Interruption::requested(); };
   FitRecord record = fit_study(study, measurement, options);
   record.findings = std::move(findings);
   fmt::print(stderr, "{} {} iterations, {} equilibrium solutions, {:.1f} s.\n", record.reason,
              record.iterations, record.forward_solves, record.seconds);
   if (arguments.output) write_fit_file(record, *arguments.output);
-  if (interrupts > 0 && !record.converged) {
+  if (Interruption::requested() && !record.converged) {
     const bool kept = arguments.checkpoint && std::filesystem::exists(*arguments.checkpoint);
     fmt::print(stderr, "{}\n",
                kept ? fmt::format("Go on with the same command and --resume: {} holds what was reached.",
@@ -250,11 +229,8 @@ void add_fit(CommandLine& line) {
       "  diastole fit examples/phantom-a.study.toml --set C1_kPa=12 --mesh 8,8,2 --json\n"
       "Exit code 1: the data cannot be what they say, the search did not converge, or a parameter ended on\n"
       "its bound, which is no estimate.");
-  command->add_option("STUDY", arguments->study, "study file")->required();
-  command->add_option("--set", arguments->starts, "another start value, NAME=NUMBER (may be repeated)")
-      ->allow_extra_args(false);
-  command->add_option("--mesh", arguments->mesh,
-                      "other element counts: circumferential,longitudinal,transmural");
+  add_study(*command, arguments->study);
+  add_values(*command, arguments->study);
   command->add_option(
       "--smooth", arguments->smooth,
       "how alike neighbouring elements are, for values that vary by element: evidence (the data say "

@@ -25,8 +25,8 @@ struct MeshArguments {
 
 double mm_per_unit(const std::string& unit) { return unit == "m" ? 1000.0 : unit == "cm" ? 10.0 : 1.0; }
 
-ExitCode tell(const MeshArguments& arguments, const MeshBody& body, const std::vector<std::string>& remarks,
-              const CommandOutput& out) {
+ExitCode write_mesh(const MeshArguments& arguments, const MeshBody& body,
+                    const std::vector<std::string>& remarks, const CommandOutput& out) {
   write_whole_file(arguments.output, mesh_file_text(body));
   if (out.json) {
     const nlohmann::ordered_json json = {{"mesh", arguments.output.string()},
@@ -50,16 +50,16 @@ ExitCode run_import(const MeshArguments& arguments, const CommandOutput& out) {
   const ImportedMesh imported =
       import_exfiles({exnode, arguments.inputs[0].string()}, {exelem, arguments.inputs[1].string()},
                      mm_per_unit(arguments.unit));
-  return tell(arguments, imported.body, imported.remarks, out);
+  return write_mesh(arguments, imported.body, imported.remarks, out);
 }
 
 ExitCode run_export(const MeshArguments& arguments, const CommandOutput& out) {
   const Study study = read_study(arguments.inputs[0]);
   require_output({arguments.output, inputs_of(study), mesh_file_mark, arguments.force});
   const MeshBody body = study_body(study);
-  return tell(arguments, body,
-              {fmt::format("{} elements, {} nodes.", body.mesh.element_count(), body.mesh.node_count())},
-              out);
+  return write_mesh(
+      arguments, body,
+      {fmt::format("{} elements, {} nodes.", body.mesh.element_count(), body.mesh.node_count())}, out);
 }
 
 void add_output(CLI::App& command, MeshArguments& arguments) {

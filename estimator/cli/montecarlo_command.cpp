@@ -3,16 +3,16 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <iostream>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <thread>
 
 #include "estimator/cli/commands.hpp"
+#include "estimator/cli/study_options.hpp"
 #include "estimator/fit/study_fit.hpp"
+#include "estimator/io/member_json.hpp"
 #include "estimator/io/whole_file.hpp"
 #include "estimator/montecarlo/cells_file.hpp"
 #include "estimator/montecarlo/montecarlo.hpp"
@@ -21,18 +21,17 @@
 #include "protocol/contract/input_error.hpp"
 
 namespace diastole {
+
+DIASTOLE_MEMBERS(ParameterSpread, truth, mean, sd, sd_percent, ci95, mean_se, coverage, bound)
+
 namespace {
 
-using Json = nlohmann::ordered_json;
-
 struct MonteCarloArguments {
-  std::filesystem::path study;
+  StudyOptions study;  ///< with the true values
   std::vector<double> noise_mm;
   std::vector<int> frames;
   std::vector<double> grid_mm;
-  std::vector<std::string> truths;
   std::filesystem::path at;
-  std::string mesh;
   std::optional<std::filesystem::path> cells;
   int repeats = 10;
   unsigned seed = 1;
@@ -57,12 +56,10 @@ void set_truth(Study& study, const FitRecord& fit, const std::string& file) {
 
 /// What the synthetic data are made with: values given, those of an earlier fit, or those of a fit now.
 void choose_truth(Study& study, const Measurement& measurement, const MonteCarloArguments& arguments) {
-  for (const std::string& truth : arguments.truths)
-    set_start(study, truth);
   if (!arguments.at.empty()) {
     set_truth(study, fit_record_from_json(read_whole_file(arguments.at), arguments.at.string()),
               arguments.at.string());
-  } else if (arguments.truths.empty()) {
+  } else if (arguments.study.starts.empty()) {
     const FitRecord fit = fit_study(study, measurement, {});
     if (!fit.converged || fit.parameters.empty()) {
       throw InputError({study.file.string(), "", fmt::format("cannot be fitted: {}", fit.reason),
@@ -78,17 +75,16 @@ std::string noise_words(double noise_mm) {
 
 class Progress {
  public:
-  Progress(size_t cells, bool shown)
-      : cells_(cells), shown_(shown), begun_(std::chrono::steady_clock::now()) {}
+  Progress(size_t cells, bool shown) : cells_(cells), shown_(shown) {}
 
-  void tell(const CellResult& result, const Study& study) {
+  void report(const CellResult& result, const Study& study) {
     ++done_;
     if (!shown_) return;
     std::string values = result.converged ? "" : "  did not converge";
     for (size_t i = 0; i < result.value.size(); ++i)
       values += fmt::format("  {} {:.4g}", study.law.parameters[i].name, result.value[i]);
-    const double elapsed_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun_).count();
-    const double left_s = elapsed_s / static_cast<double>(done_) * static_cast<double>(cells_ - done_);
+    const double left_s =
+        seconds_since(begun_) / static_cast<double>(done_) * static_cast<double>(cells_ - done_);
     fmt::print(stderr, "  {:>4} of {}: noise {}, {} frames, repeat {}:{}   about {:.0f} s left\n", done_,
                cells_, noise_words(result.cell.noise_mm), result.cell.frames, result.cell.repeat, values,
                left_s);
@@ -97,7 +93,7 @@ class Progress {
  private:
   size_t cells_;
   bool shown_;
-  std::chrono::steady_clock::time_point begun_;
+  Clock::time_point begun_ = Clock::now();
   size_t done_ = 0;
 };
 
@@ -105,19 +101,8 @@ Json from_entry(const TableEntry& entry) {
   Json json{{"noise_mm", entry.noise_mm > 0 ? Json(entry.noise_mm) : Json(nullptr)},
             {"frames", entry.frames},
             {"refits", entry.refits},
-            {"failed", entry.failed},
-            {"parameters", Json::object()}};
-  for (const ParameterSpread& spread : entry.parameters) {
-    json["parameters"][spread.name] = {
-        {"truth", spread.truth},
-        {"mean", spread.mean},
-        {"sd", spread.sd},
-        {"sd_percent", spread.sd_percent},
-        {"ci95", spread.ci95},
-        {"mean_se", spread.mean_se},
-        {"coverage", spread.coverage},
-        {"bound", std::isfinite(spread.bound) ? Json(spread.bound) : Json(nullptr)}};
-  }
+            {"failed", entry.failed}};
+  json["parameters"] = written(by_name(entry.parameters));
   return json;
 }
 
@@ -182,9 +167,8 @@ ExitCode run_montecarlo(const MonteCarloArguments& arguments, const CommandOutpu
   std::optional<MpiWorld> world;
   if (in_mpi_world()) world.emplace();
   const bool leads = !world || world->rank() == 0;
-  const auto begun = std::chrono::steady_clock::now();
+  const Clock::time_point begun = Clock::now();
   Study study = read_study(arguments.study);
-  if (!arguments.mesh.empty()) set_mesh(study, arguments.mesh);
   const Measurement measurement = read_measurement(study);
   choose_truth(study, measurement, arguments);
   MonteCarloPlan plan{.noise_mm = arguments.noise_mm,
@@ -229,7 +213,7 @@ ExitCode run_montecarlo(const MonteCarloArguments& arguments, const CommandOutpu
     const CellResult result = result_of(row, parameters);
     results.push_back(result);
     if (file) file->append(result);
-    progress.tell(result, study);
+    progress.report(result, study);
   };
   if (world) {
     world->run(jobs, work, take);
@@ -239,7 +223,7 @@ ExitCode run_montecarlo(const MonteCarloArguments& arguments, const CommandOutpu
   if (!leads) return ExitCode::done;
 
   const std::vector<TableEntry> table = table_of(plan, study, results);
-  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
+  const double seconds = seconds_since(begun);
   if (out.json) {
     print_json(table, study, plan, seconds, processes);
   } else {
@@ -265,7 +249,8 @@ void add_montecarlo(CommandLine& line) {
       "values are --set, or --at an earlier fit, or else the study is fitted first. With --cells, the same "
       "command\n"
       "goes on after an interruption. Under mpirun or srun the refits are spread over the ranks.");
-  command->add_option("STUDY", arguments->study, "study file with points or tags")->required();
+  add_study(*command, arguments->study);
+  add_values(*command, arguments->study);
   command
       ->add_option("--noise", arguments->noise_mm,
                    "standard deviations of the points, mm; default: as stated")
@@ -285,11 +270,7 @@ void add_montecarlo(CommandLine& line) {
   command->add_option("--repeats", arguments->repeats, "refits of each noise and number of frames")
       ->check(CLI::Range(2, 100000))
       ->capture_default_str();
-  command->add_option("--set", arguments->truths, "a true value, NAME=NUMBER (may be repeated)")
-      ->allow_extra_args(false);
   command->add_option("--at", arguments->at, "true values from a result of `diastole fit -o`");
-  command->add_option("--mesh", arguments->mesh,
-                      "other element counts: circumferential,longitudinal,transmural");
   command->add_flag("--exact-pressures", arguments->exact_pressures,
                     "frame pressures without error, as in the paper's table");
   command->add_option("--seed", arguments->seed, "of the noise")->capture_default_str();

@@ -1,8 +1,7 @@
 #include <fmt/format.h>
 
-#include <chrono>
+#include <array>
 #include <cmath>
-#include <csignal>
 #include <cstdio>
 #include <iostream>
 #include <iterator>
@@ -13,6 +12,8 @@
 #include <vector>
 
 #include "estimator/cli/commands.hpp"
+#include "estimator/cli/interruption.hpp"
+#include "estimator/cli/output_files.hpp"
 #include "estimator/cli/solution_json.hpp"
 #include "estimator/cli/study_options.hpp"
 #include "estimator/fe/pressure_volume.hpp"
@@ -34,28 +35,7 @@ struct PvArguments {
   StudyOptions study;
   double volume_change_mL = 0.0;
   size_t steps = 20;
-  std::vector<std::filesystem::path> outputs;
-  bool force = false;
-};
-
-volatile std::sig_atomic_t interrupted = 0;
-
-/// While it lives, the first Ctrl-C ends the curve after the point at hand; the second ends the program.
-class StopOnInterrupt {
- public:
-  StopOnInterrupt() {
-    interrupted = 0;
-    before_ = std::signal(SIGINT, [](int) {
-      interrupted = 1;
-      std::signal(SIGINT, SIG_DFL);
-    });
-  }
-  ~StopOnInterrupt() { std::signal(SIGINT, before_); }
-  StopOnInterrupt(const StopOnInterrupt&) = delete;
-  StopOnInterrupt& operator=(const StopOnInterrupt&) = delete;
-
- private:
-  void (*before_)(int) = SIG_DFL;
+  OutputFiles outputs;
 };
 
 bool stable_at_pressure(const PressureVolumePoint& point) {
@@ -73,29 +53,16 @@ std::string to_csv(const PressureVolumeCurve& curve) {
 }
 
 std::string to_html(const Study& study, const PressureVolumeCurve& curve) {
-  std::vector<double> volume_mL;
-  std::vector<double> pressure_kPa;
-  std::vector<double> stiffness;
-  std::vector<std::vector<std::string>> rows;
-  for (const PressureVolumePoint& point : curve.points) {
-    volume_mL.push_back(point.volume_change_mL);
-    pressure_kPa.push_back(point.pressure_kPa);
-    stiffness.push_back(point.stiffness_kPa_per_mL);
-    rows.push_back({fmt::format("{:.2f}", point.volume_change_mL), fmt::format("{:.4f}", point.pressure_kPa),
-                    fmt::format("{:.5f}", point.stiffness_kPa_per_mL),
-                    fmt::format("{:.2f}", point.stored_energy_mJ), stable_at_pressure(point) ? "yes" : "no"});
-  }
+  using report::numbers_of;
+  const auto volume_mL = numbers_of(curve.points, &PressureVolumePoint::volume_change_mL);
   report::SvgPlot plot({.x = {.label = "volume taken (mL)"}, .y = {.label = "cavity pressure (kPa)"}});
-  plot.line(volume_mL, pressure_kPa, "a", "pressure");
-  std::vector<double> limit_mL;
-  std::vector<double> limit_kPa;
-  for (const LimitPoint& limit : curve.limits) {
-    limit_mL.push_back(limit.volume_change_mL);
-    limit_kPa.push_back(limit.pressure_kPa);
+  plot.line(volume_mL, numbers_of(curve.points, &PressureVolumePoint::pressure_kPa), "a", "pressure");
+  if (!curve.limits.empty()) {
+    plot.points(numbers_of(curve.limits, &LimitPoint::volume_change_mL),
+                numbers_of(curve.limits, &LimitPoint::pressure_kPa), "b", "limit point");
   }
-  if (!limit_mL.empty()) plot.points(limit_mL, limit_kPa, "b", "limit point");
   report::SvgPlot slope({.x = {.label = "volume taken (mL)"}, .y = {.label = "dP/dV (kPa/mL)"}});
-  slope.line(volume_mL, stiffness, "c");
+  slope.line(volume_mL, numbers_of(curve.points, &PressureVolumePoint::stiffness_kPa_per_mL), "c");
   report::Page page("Pressure-volume curve");
   page.section(study.file.filename().string(),
                fmt::format("Law {}; the cavity's volume is led, its pressure found.", study.law.name));
@@ -103,15 +70,22 @@ std::string to_html(const Study& study, const PressureVolumeCurve& curve) {
   page.figures(
       {{plot.svg(), "Pressure against the volume that the cavity has taken."},
        {slope.svg(), "Stiffness of the cavity. Below zero no equilibrium is stable at given pressure."}});
-  page.table({"volume taken (mL)", "pressure (kPa)", "dP/dV (kPa/mL)", "stored (mJ)", "stable at pressure"},
-             rows, "Points of the curve.");
+  const auto row_of = [](const PressureVolumePoint& point) -> report::Page::Row {
+    return {fmt::format("{:.2f}", point.volume_change_mL), fmt::format("{:.4f}", point.pressure_kPa),
+            fmt::format("{:.5f}", point.stiffness_kPa_per_mL), fmt::format("{:.2f}", point.stored_energy_mJ),
+            stable_at_pressure(point) ? "yes" : "no"};
+  };
+  page.table_of(
+      curve.points,
+      {"volume taken (mL)", "pressure (kPa)", "dP/dV (kPa/mL)", "stored (mJ)", "stable at pressure"}, row_of,
+      "Points of the curve.");
   return page.html();
 }
 
 nlohmann::ordered_json to_json(const Study& study, ElasticModel& model, const PressureVolumeCurve& curve,
                                double seconds) {
   nlohmann::ordered_json json;
-  json["reason"] = interrupted != 0 ? std::string_view("interrupted") : describe(curve.last.reason);
+  json["reason"] = Interruption::requested() ? std::string_view("interrupted") : describe(curve.last.reason);
   json["law"] = model.law().name();
   for (const StudyParameter& parameter : study.law.parameters)
     json["parameters"][parameter.name] = parameter.start;
@@ -154,24 +128,8 @@ void print_for_people(const PressureVolumeCurve& curve) {
     fmt::print("Limit point: {:.4f} kPa at {:.2f} mL.\n", limit.pressure_kPa, limit.volume_change_mL);
 }
 
-void require_outputs(const PvArguments& arguments) {
-  for (const std::filesystem::path& output : arguments.outputs) {
-    const bool page = output.extension() == ".html";
-    if (!page && output.extension() != ".csv") {
-      throw InputError({.file = output.string(),
-                        .place = "-o",
-                        .problem = "is neither .html nor .csv",
-                        .remedy = "Name the page or the table to write, for example curve.html."});
-    }
-    require_output({output,
-                    {arguments.study.study},
-                    page ? report::page_mark : csv_header.substr(0, csv_header.size() - 1),
-                    arguments.force});
-  }
-}
-
 ExitCode run_pv(const PvArguments& arguments, const CommandOutput& out) {
-  const auto begun = std::chrono::steady_clock::now();
+  const Clock::time_point begun = Clock::now();
   if (!std::isfinite(arguments.volume_change_mL) || arguments.volume_change_mL == 0.0) {
     throw InputError(
         {.file = "",
@@ -179,31 +137,34 @@ ExitCode run_pv(const PvArguments& arguments, const CommandOutput& out) {
          .problem = fmt::format("{} is no volume to go to", arguments.volume_change_mL),
          .remedy = "Give the mL that the cavity takes, for example 60; less than zero empties it."});
   }
-  require_outputs(arguments);
+  constexpr std::array kinds{OutputKind{".html", report::page_mark},
+                             OutputKind{".csv", csv_header.substr(0, csv_header.size() - 1)}};
+  arguments.outputs.require({arguments.study.study}, kinds, "is neither .html nor .csv",
+                            "Name the page or the table to write, for example curve.html.");
   const Study study = read_study(arguments.study);
   ElasticModel model = make_affected_model(study, with_progress("pv"));
   require_closed_cavity(study, model);
   remark_on_size(model.mesh(), "pv");
-  const StopOnInterrupt stop;
+  const Interruption interruption;
   PressureVolumeOptions options{.volume_change_mL = arguments.volume_change_mL, .steps = arguments.steps};
   options.on_point = [&](const PressureVolumePoint& point) {
     fmt::print(stderr, "pv: {:.3g} mL, {:.4g} kPa\n", point.volume_change_mL, point.pressure_kPa);
-    return interrupted == 0;
+    return !Interruption::requested();
   };
   const PressureVolumeCurve curve = pressure_volume_curve(model, options);
-  for (const std::filesystem::path& output : arguments.outputs)
+  for (const std::filesystem::path& output : arguments.outputs.files)
     write_whole_file(output, output.extension() == ".html" ? to_html(study, curve) : to_csv(curve));
   if (!curve.last.converged()) std::cerr << "diastole pv: " << curve.last.describe() << '\n';
-  if (interrupted != 0) std::cerr << "diastole pv: interrupted; what was found until then is told\n";
+  if (Interruption::requested())
+    std::cerr << "diastole pv: interrupted; what was found until then is reported\n";
   if (out.json) {
-    const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
-    std::cout << to_json(study, model, curve, seconds).dump(1) << '\n';
+    std::cout << to_json(study, model, curve, seconds_since(begun)).dump(1) << '\n';
   } else {
     print_for_people(curve);
-    for (const std::filesystem::path& output : arguments.outputs)
+    for (const std::filesystem::path& output : arguments.outputs.files)
       fmt::print("The curve is in {}\n", output.string());
   }
-  return curve.last.converged() && interrupted == 0 ? ExitCode::done : ExitCode::negative;
+  return curve.last.converged() && !Interruption::requested() ? ExitCode::done : ExitCode::negative;
 }
 
 }  // namespace
@@ -219,7 +180,9 @@ void add_pressure_volume(CommandLine& line) {
                "falls.\n"
                "Ctrl-C ends it after the point at hand; what was found is written. Exit code 1: the curve "
                "ends early.");
-  add_study_options(*command, arguments->study);
+  add_study(*command, arguments->study);
+  add_values(*command, arguments->study);
+  add_refinement(*command, arguments->study);
   command
       ->add_option("--volume-change-mL", arguments->volume_change_mL,
                    "volume that the cavity takes at the end")
@@ -227,11 +190,7 @@ void add_pressure_volume(CommandLine& line) {
   command->add_option("--steps", arguments->steps, "equal steps of volume")
       ->check(CLI::Range(1, 10000))
       ->capture_default_str();
-  command
-      ->add_option("-o,--output", arguments->outputs,
-                   "page (.html) or table (.csv) to write; may be repeated")
-      ->allow_extra_args(false);
-  command->add_flag("--force", arguments->force, "replace an output file that holds something else");
+  arguments->outputs.add_options(*command, "page (.html) or table (.csv) to write");
   line.on_run(command, [arguments](const CommandOutput& out) { return run_pv(*arguments, out); });
 }
 

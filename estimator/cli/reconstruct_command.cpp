@@ -1,7 +1,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
+#include <array>
 #include <cstdio>
 #include <iostream>
 #include <memory>
@@ -9,6 +9,7 @@
 
 #include "estimator/cli/commands.hpp"
 #include "estimator/cli/findings_text.hpp"
+#include "estimator/cli/output_files.hpp"
 #include "estimator/cli/study_options.hpp"
 #include "estimator/io/measurement.hpp"
 #include "estimator/io/whole_file.hpp"
@@ -18,32 +19,19 @@
 namespace diastole {
 namespace {
 
-using Clock = std::chrono::steady_clock;
-
-constexpr std::string_view hdf5_mark = "HDF\r\n";
-constexpr std::string_view points_mark = "frame,X_mm,Y_mm,Z_mm,x_mm,y_mm,z_mm,sigma_mm";
+constexpr std::array kinds{vtkhdf_kind, OutputKind{".csv", "frame,X_mm,Y_mm,Z_mm,x_mm,y_mm,z_mm,sigma_mm"},
+                           OutputKind{".json", reconstruction_file_mark}};
 constexpr double patience_s = 2.0;
 
 struct ReconstructArguments {
-  std::filesystem::path study;
-  std::string mesh;
-  std::vector<std::filesystem::path> outputs;
-  bool force = false;
+  StudyOptions study;
+  OutputFiles outputs;
   std::optional<double> lambda;
   std::vector<double> smoothing;
   std::optional<size_t> points;
   bool plain = false;
   bool skip_stiffness = false;
 };
-
-std::string_view mark_of(const std::filesystem::path& file) {
-  if (file.extension() == ".vtkhdf") return hdf5_mark;
-  if (file.extension() == ".csv") return points_mark;
-  if (file.extension() == ".json") return reconstruction_file_mark;
-  throw InputError({file.string(), "", "is no kind of file that a reconstruction is written to",
-                    "End it in .csv (points for `diastole fit`), .vtkhdf (for ParaView) or .json (for "
-                    "`diastole report`)."});
-}
 
 ReconstructionOptions options_of(const ReconstructArguments& arguments) {
   ReconstructionOptions options;
@@ -60,7 +48,7 @@ ReconstructionOptions options_of(const ReconstructArguments& arguments) {
     }
   }
   options.on_frame = [begun = Clock::now()](size_t done, size_t of) {
-    const double elapsed_s = std::chrono::duration<double>(Clock::now() - begun).count();
+    const double elapsed_s = seconds_since(begun);
     if (elapsed_s > patience_s)
       fmt::print(stderr, "reconstruct: {} of {} frames, {:.0f} s\n", done, of, elapsed_s);
   };
@@ -97,16 +85,17 @@ void print_record(const ReconstructionRecord& record) {
 }
 
 ExitCode run_reconstruct(const ReconstructArguments& arguments, const CommandOutput& out) {
-  Study study = read_study(arguments.study);
-  if (!arguments.mesh.empty()) set_mesh(study, arguments.mesh);
-  for (const std::filesystem::path& file : arguments.outputs)
-    require_output({file, inputs_of(study), mark_of(file), arguments.force});
+  const Study study = read_study(arguments.study);
+  arguments.outputs.require(
+      inputs_of(study), kinds, "is no kind of file that a reconstruction is written to",
+      "End it in .csv (points for `diastole fit`), .vtkhdf (for ParaView) or .json (for "
+      "`diastole report`).");
   const ReconstructionOptions options = options_of(arguments);
   const Measurement measurement = read_measurement(study);
   const StudyReconstruction reconstruction = reconstruct_study(study, measurement, options);
   const ReconstructionRecord record = reconstruction_record(study, measurement, options, reconstruction);
   const bool sound = !has_error(record.findings);
-  if (!reconstruction.fields.empty()) write_outputs(arguments.outputs, reconstruction, record);
+  if (!reconstruction.fields.empty()) write_outputs(arguments.outputs.files, reconstruction, record);
   if (out.json) {
     print_findings(record.findings, stderr);
     std::cout << to_json(record, false);
@@ -116,7 +105,7 @@ ExitCode run_reconstruct(const ReconstructArguments& arguments, const CommandOut
     if (record.frames.empty()) {
       fmt::print("Nothing was reconstructed: the data cannot be what they say.\n");
     } else {
-      for (const std::filesystem::path& file : arguments.outputs)
+      for (const std::filesystem::path& file : arguments.outputs.files)
         fmt::print("Written: {}\n", file.string());
     }
   }
@@ -142,16 +131,9 @@ void add_reconstruct(CommandLine& line) {
       "mean and lists what is looked for in the data.\n"
       "Exit code 1: the data cannot be what they say (another unit, frames that disagree); the message says "
       "which.");
-  command->add_option("STUDY", arguments->study, "study file")->required();
-  command
-      ->add_option(
-          "-o,--output", arguments->outputs,
-          "a .csv of points for `diastole fit`, a .vtkhdf for ParaView, or a .json for the report; may be "
-          "repeated")
-      ->allow_extra_args(false);
-  command->add_flag("--force", arguments->force, "replace an output file that is no earlier result");
-  command->add_option("--mesh", arguments->mesh,
-                      "other element counts: circumferential,longitudinal,transmural");
+  add_study(*command, arguments->study);
+  arguments->outputs.add_options(
+      *command, "a .csv of points for `diastole fit`, a .vtkhdf for ParaView, or a .json for the report");
   command
       ->add_option("--points", arguments->points,
                    "points a frame in the .csv [as many as the field has freedoms / 3]")

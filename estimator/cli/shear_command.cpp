@@ -2,16 +2,20 @@
 
 #include <iostream>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <optional>
 
 #include "estimator/cli/commands.hpp"
+#include "estimator/io/member_json.hpp"
 #include "estimator/io/whole_file.hpp"
 #include "estimator/report/page.hpp"
 #include "estimator/report/sections.hpp"
 #include "estimator/shear/shear_fit.hpp"
 
 namespace diastole {
+
+DIASTOLE_MEMBERS(ShearLoad, moment_Nmm, rows, C1_kPa, se_kPa, rms_deg)
+DIASTOLE_MEMBERS(ShearOutlier, line, residual_deg, deviations)
+
 namespace {
 
 struct ShearArguments {
@@ -22,34 +26,23 @@ struct ShearArguments {
 };
 
 std::string to_json(const ShearTest& test, const ShearFit& fit, ShearForm form) {
-  nlohmann::ordered_json json = {{"C1_kPa", fit.C1_kPa},
-                                 {"se_kPa", fit.se_kPa},
-                                 {"ci95_kPa", fit.ci95_kPa},
-                                 {"r2", fit.r2},
-                                 {"r2_kind", "uncentred: 1 - SSE / sum of squares about zero"},
-                                 {"r2_about_mean", fit.r2_about_mean},
-                                 {"swapped_C1_kPa", fit.swapped_C1_kPa},
-                                 {"determined", fit.determined},
-                                 {"rows", test.rows.size()},
-                                 {"dof", fit.dof},
-                                 {"load", test.load},
-                                 {"form", form == ShearForm::normalised ? "normalised" : "rotation"},
-                                 {"rms_deg", fit.rms_deg},
-                                 {"largest_shear", fit.largest_shear},
-                                 {"loads", nlohmann::ordered_json::array()},
-                                 {"outliers", nlohmann::ordered_json::array()},
-                                 {"remarks", fit.remarks}};
-  for (const ShearLoad& load : fit.loads) {
-    json["loads"].push_back({{"moment_Nmm", load.moment_Nmm},
-                             {"rows", load.rows},
-                             {"C1_kPa", load.C1_kPa},
-                             {"se_kPa", load.se_kPa},
-                             {"rms_deg", load.rms_deg}});
-  }
-  for (const ShearOutlier& outlier : fit.outliers) {
-    json["outliers"].push_back(
-        {{"line", outlier.line}, {"residual_deg", outlier.residual_deg}, {"deviations", outlier.deviations}});
-  }
+  const Json json = {{"C1_kPa", fit.C1_kPa},
+                     {"se_kPa", fit.se_kPa},
+                     {"ci95_kPa", fit.ci95_kPa},
+                     {"r2", fit.r2},
+                     {"r2_kind", "uncentred: 1 - SSE / sum of squares about zero"},
+                     {"r2_about_mean", fit.r2_about_mean},
+                     {"swapped_C1_kPa", fit.swapped_C1_kPa},
+                     {"determined", fit.determined},
+                     {"rows", test.rows.size()},
+                     {"dof", fit.dof},
+                     {"load", test.load},
+                     {"form", form == ShearForm::normalised ? "normalised" : "rotation"},
+                     {"rms_deg", fit.rms_deg},
+                     {"largest_shear", fit.largest_shear},
+                     {"loads", written(fit.loads)},
+                     {"outliers", written(fit.outliers)},
+                     {"remarks", fit.remarks}};
   return json.dump(1) + "\n";
 }
 

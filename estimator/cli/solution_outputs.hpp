@@ -5,27 +5,18 @@
 //   .csv      strain and stress at the Gauss points (estimator/solution/gauss_table.hpp)
 //   .json     sections and profiles of the last frame for `diastole report` (estimator/io/solution_file.hpp)
 
-#include <CLI/CLI.hpp>
-#include <filesystem>
 #include <span>
-#include <vector>
 
+#include "estimator/cli/output_files.hpp"
 #include "estimator/io/study.hpp"
 #include "estimator/solution/solution_grid.hpp"
 
 namespace diastole {
 
-struct SolutionOutputs {
-  std::vector<std::filesystem::path> files;
-  bool force = false;
-};
-
-void add_output_options(CLI::App& command, SolutionOutputs& outputs);
-
 /// Before the work. Throws InputError if a file has another ending, or may not be replaced.
-void require_outputs(const SolutionOutputs& outputs, const Study& study);
+void require_outputs(const OutputFiles& outputs, const Study& study);
 
-void write_outputs(const SolutionOutputs& outputs, const Study& study, const ElasticModel& model,
+void write_outputs(const OutputFiles& outputs, const Study& study, const ElasticModel& model,
                    std::span<const SolvedFrame> frames);
 
 }  // namespace diastole

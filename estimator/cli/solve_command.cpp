@@ -2,7 +2,6 @@
 #include <fmt/ranges.h>
 
 #include <charconv>
-#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <functional>
@@ -31,8 +30,6 @@
 namespace diastole {
 namespace {
 
-using Clock = std::chrono::steady_clock;
-
 struct SolveArguments {
   StudyOptions study;
   std::optional<double> pressure_kPa;
@@ -40,17 +37,13 @@ struct SolveArguments {
   double fibre_tension_kPa = 0.0;
   bool frames = false;
   std::vector<std::string> probes;
-  SolutionOutputs outputs;
+  OutputFiles outputs;
 };
 
 struct Probe {
   Eigen::Vector3d place_mm;
   MaterialPoint point;
 };
-
-double seconds_since(Clock::time_point begun) {
-  return std::chrono::duration<double>(Clock::now() - begun).count();
-}
 
 [[noreturn]] void refuse_probe(const std::string& text, std::string problem, std::string remedy) {
   throw InputError(
@@ -263,7 +256,7 @@ Solution solve_all(ElasticModel& model, const std::vector<TimedLoad>& loads,
   return solution;
 }
 
-void tell_failure_or_instability(const SolveArguments& arguments, const SolveReport& report) {
+void report_failure_or_instability(const SolveArguments& arguments, const SolveReport& report) {
   if (report.converged()) {
     if (report.stable() != false) return;
     const std::string motions = report.singular ? "some motion meets no resistance"
@@ -313,7 +306,7 @@ ExitCode run_solve(const SolveArguments& arguments, const CommandOutput& out) {
       json["files"].push_back(file.string());
   }
   if (arguments.frames) json["frames"] = frames_json(model, solved);
-  tell_failure_or_instability(arguments, solution.report);
+  report_failure_or_instability(arguments, solution.report);
   if (out.json) {
     std::cout << json.dump(1) << '\n';
   } else if (solution.report.converged()) {
@@ -336,7 +329,9 @@ void add_solve(CommandLine& line) {
       "  diastole solve phantom-a.study.toml --frames -o gel.vtkhdf\n"
       "A parameter has its `start` value unless --set gives another.\n"
       "Exit code 1: no equilibrium was found; the message says where the solver stopped and why.");
-  add_study_options(*command, arguments->study);
+  add_study(*command, arguments->study);
+  add_values(*command, arguments->study);
+  add_refinement(*command, arguments->study);
   command->add_option("--pressure-kPa", arguments->pressure_kPa, "cavity pressure above the outside");
   command->add_option("--volume-change-mL", arguments->volume_change_mL,
                       "volume that the cavity takes, instead of its pressure");
@@ -349,7 +344,8 @@ void add_solve(CommandLine& line) {
       ->add_option("--probe", arguments->probes,
                    "X,Y,Z of a material point in mm, undeformed; may be repeated")
       ->allow_extra_args(false);
-  add_output_options(*command, arguments->outputs);
+  arguments->outputs.add_options(
+      *command, "a .vtkhdf file for ParaView, a .csv of stress and strain, or a .json for the report");
   line.on_run(command, [arguments](const CommandOutput& out) { return run_solve(*arguments, out); });
 }
 

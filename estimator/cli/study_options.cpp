@@ -6,17 +6,23 @@
 
 namespace diastole {
 
-void add_study_options(CLI::App& command, StudyOptions& options) {
+void add_study(CLI::App& command, StudyOptions& options) {
   command.add_option("STUDY", options.study, "study file (*.study.toml)")->required();
-  command.add_option("--set", options.starts, "NAME=VALUE: another parameter value; may be repeated")
-      ->allow_extra_args(false);
   command.add_option("--mesh", options.mesh, "elements around, along, through the wall, as 8,8,4");
+}
+
+void add_values(CLI::App& command, StudyOptions& options) {
+  command.add_option("--set", options.starts, "NAME=NUMBER: another parameter value; may be repeated")
+      ->allow_extra_args(false);
+}
+
+void add_refinement(CLI::App& command, StudyOptions& options) {
   command.add_option("--refine", options.refine,
                      "how often to halve them around, along, through, keeping the body exactly, as 0,1,1");
 }
 
 Study read_study(const StudyOptions& options) {
-  Study study = read_study(std::filesystem::path(options.study));
+  Study study = read_study(options.study);
   for (const std::string& start : options.starts)
     set_start(study, start);
   if (!options.mesh.empty()) set_mesh(study, options.mesh);
@@ -34,11 +40,10 @@ void remark_on_size(const HermiteMesh& mesh, std::string_view command) {
 
 SolveOptions with_progress(std::string_view command) {
   constexpr double patience_s = 2.0, pause_s = 1.0;
-  using Clock = std::chrono::steady_clock;
   SolveOptions options;
   options.on_iteration = [begun = Clock::now(), next_s = patience_s, command](
                              double pressure_kPa, const NewtonIteration& iteration) mutable {
-    const double elapsed_s = std::chrono::duration<double>(Clock::now() - begun).count();
+    const double elapsed_s = seconds_since(begun);
     if (elapsed_s < next_s) return;
     next_s = elapsed_s + pause_s;
     fmt::print(stderr, "{}: {:.3g} kPa, correction {:.1e}, {:.0f} s\n", command, pressure_kPa, iteration.step,

@@ -1,9 +1,9 @@
 #pragma once
-// The options that every command on a study's forward model has: other parameter values, another mesh, progress.
+// What commands on a study have in common: other parameter values, another mesh, time and progress.
 
 #include <CLI/CLI.hpp>
 #include <chrono>
-#include <memory>
+#include <filesystem>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -14,20 +14,27 @@
 namespace diastole {
 
 struct StudyOptions {
-  std::string study;
+  std::filesystem::path study;
   std::vector<std::string> starts;
   std::string mesh;
   std::string refine;
 };
 
-/// Adds STUDY, --set, --mesh and --refine. `options` must live until the command has run.
-void add_study_options(CLI::App& command, StudyOptions& options);
+/// These add STUDY and --mesh; --set; --refine. `options` must live until the command has run.
+void add_study(CLI::App& command, StudyOptions& options);
+void add_values(CLI::App& command, StudyOptions& options);
+void add_refinement(CLI::App& command, StudyOptions& options);
 
 /// The study with its replaced values. Throws InputError.
 Study read_study(const StudyOptions& options);
 
 /// Asks on standard error, in the name of a command, whether a body so small or so large is meant to be in millimetres.
 void remark_on_size(const HermiteMesh& mesh, std::string_view command);
+
+using Clock = std::chrono::steady_clock;
+inline double seconds_since(Clock::time_point begun) {
+  return std::chrono::duration<double>(Clock::now() - begun).count();
+}
 
 /// A line on standard error for Newton's iterations, one a second at most, once the work has lasted longer than people like
 /// to wait. `command` begins the line.

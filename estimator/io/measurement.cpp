@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <set>
+#include <tuple>
 #include <vector>
 
 #include "estimator/io/number_table.hpp"
@@ -169,34 +170,15 @@ std::vector<ObservedPoint> read_points(const std::filesystem::path& path, int fr
 
 namespace {
 
-std::array<double, 9> numbers_of(const TagPoint& t) {
-  return {static_cast<double>(t.frame),
-          t.normal[0],
-          t.normal[1],
-          t.normal[2],
-          t.plane_mm,
-          t.x_mm[0],
-          t.x_mm[1],
-          t.x_mm[2],
-          t.sigma_mm};
+auto numbers_of(const TagPoint& t) {
+  return std::make_tuple(t.frame, t.normal, t.plane_mm, t.x_mm, t.sigma_mm);
 }
-
-std::array<double, 9> numbers_of(const ObservedPoint& p) {
-  return {static_cast<double>(p.frame),
-          p.X_mm[0],
-          p.X_mm[1],
-          p.X_mm[2],
-          p.x_mm[0],
-          p.x_mm[1],
-          p.x_mm[2],
-          p.sigma_mm,
-          0.0};
-}
+auto numbers_of(const ObservedPoint& p) { return std::make_tuple(p.frame, p.X_mm, p.x_mm, p.sigma_mm); }
 
 /// Leaves each row once, in its order; how many went.
 template <class Row>
 size_t drop_repeated(std::vector<Row>& rows) {
-  std::set<std::array<double, 9>> seen;
+  std::set<decltype(numbers_of(rows.front()))> seen;
   return std::erase_if(rows, [&](const Row& row) { return !seen.insert(numbers_of(row)).second; });
 }
 

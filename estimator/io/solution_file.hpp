@@ -3,6 +3,7 @@
 // format_version 1): the figures of the solution, plane sections through the body before and after, and
 // profiles through the wall, each with the scalar fields of docs/solutions.md. Lengths in mm, kPa.
 
+#include <algorithm>
 #include <array>
 #include <optional>
 #include <string>
@@ -19,6 +20,12 @@ struct NamedField {
   std::string name;
   std::vector<double> values;
 };
+
+/// Null if there is none of this name.
+inline const NamedField* find_field(const std::vector<NamedField>& fields, std::string_view name) {
+  const auto found = std::ranges::find(fields, name, &NamedField::name);
+  return found == fields.end() ? nullptr : &*found;
+}
 
 /// Horizontal and vertical place in the section: h0, v0, h1, v1, ...
 using FlatPoints = std::vector<double>;

@@ -78,4 +78,15 @@ size_t vtk_place_of(size_t i1, size_t i2, size_t i3) {
   return offset + 6 * inner * inner + i1 - 1 + inner * (i2 - 1 + inner * (i3 - 1));
 }
 
+void append_in_vtk_order(const Eigen::MatrixXd& control, std::vector<double>& values) {
+  const auto width = static_cast<size_t>(control.cols());
+  const size_t start = values.size();
+  values.resize(start + bezier_points * width);
+  for (size_t i = 0; i < bezier_points; ++i) {
+    const size_t row = start + width * vtk_place_of(i & 3, (i >> 2) & 3, i >> 4);
+    for (size_t j = 0; j < width; ++j)
+      values[row + j] = control(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j));
+  }
+}
+
 }  // namespace diastole

@@ -18,8 +18,6 @@ namespace diastole {
 
 inline constexpr size_t bezier_points = 64;
 
-constexpr size_t bezier_point(size_t i1, size_t i2, size_t i3) { return i1 + 4 * i2 + 16 * i3; }
-
 /// Row = component, column = control point.
 using BezierField = Eigen::Matrix<double, 3, static_cast<int>(bezier_points)>;
 
@@ -39,5 +37,8 @@ Eigen::MatrixXd bezier_through(const std::array<double, 4>& at, const Eigen::Mat
 ///    |/              |/      inside: 56-63
 ///    0-----8----9----1
 size_t vtk_place_of(size_t i1, size_t i2, size_t i3);
+
+/// Adds an element's control values, row = control point, to an array in that order.
+void append_in_vtk_order(const Eigen::MatrixXd& control, std::vector<double>& values);
 
 }  // namespace diastole

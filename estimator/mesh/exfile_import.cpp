@@ -14,6 +14,7 @@
 #include <utility>
 
 #include "estimator/mesh/exfile_lines.hpp"
+#include "estimator/mesh/face_map.hpp"
 
 namespace diastole {
 namespace {
@@ -416,30 +417,15 @@ class MeshBuilder {
   }
 
   static MeshFaces outer_faces(const HermiteMesh& mesh) {
-    const auto places = [&](const ElementFace& face) {
-      std::array<size_t, 4> nodes = face_corners(face);
-      for (size_t& node : nodes)
-        node = mesh.place_of(mesh.element(face.element)[node]);
-      std::sort(nodes.begin(), nodes.end());
-      return nodes;
-    };
-    std::map<std::array<size_t, 4>, std::vector<ElementFace>> meeting;
-    for (size_t e = 0; e < mesh.element_count(); ++e) {
-      for (size_t k = 0; k < 3; ++k) {
-        for (size_t side = 0; side < 2; ++side)
-          meeting[places({e, k, side})].push_back({e, k, side});
-      }
-    }
+    const FaceMap map(mesh);
     MeshFaces faces;
-    const std::array<std::array<std::vector<ElementFace>*, 2>, 3> lists{
-        {{&faces.left, &faces.right}, {&faces.bottom, &faces.top}, {&faces.inner, &faces.outer}}};
-    for (const auto& [nodes, found] : meeting) {
-      if (found.size() == 1) lists[found[0].direction][found[0].side]->push_back(found[0]);
-    }
-    for (const auto& pair : lists) {
-      for (std::vector<ElementFace>* list : pair)
-        std::sort(list->begin(), list->end(),
-                  [](const auto& a, const auto& b) { return a.element < b.element; });
+    const std::array<std::vector<ElementFace>*, 6> lists{&faces.left, &faces.right, &faces.bottom,
+                                                         &faces.top,  &faces.inner, &faces.outer};
+    for (size_t e = 0; e < mesh.element_count(); ++e) {
+      for (size_t side = 0; side < lists.size(); ++side) {
+        const ElementFace face{e, side / 2, side % 2};
+        if (map.is_outer(face)) lists[side]->push_back(face);
+      }
     }
     return faces;
   }

@@ -8,11 +8,11 @@
 #include <charconv>
 #include <cmath>
 #include <iterator>
-#include <map>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "estimator/mesh/face_map.hpp"
 #include "protocol/contract/table_reader.hpp"
 
 namespace diastole {
@@ -310,29 +310,16 @@ class MeshReader {
 
   /// Loads and supports are on the body's surface: no second element has a named face.
   void require_outer_faces(const HermiteMesh& mesh) {
-    const auto places_of = [&](const ElementFace& face) {
-      std::array<size_t, 4> places = face_corners(face);
-      for (size_t& place : places)
-        place = mesh.place_of(mesh.element(face.element)[place]);
-      std::sort(places.begin(), places.end());
-      return places;
-    };
     // Two elements that close a ring have the corners of their inner faces in common, but not the middles.
     const auto middle_mm = [&](const ElementFace& face) {
       Xi xi{0.5, 0.5, 0.5};
       xi[face.direction] = static_cast<double>(face.side);
       return mesh.value(mesh.reference(), {face.element, xi});
     };
-    std::map<std::array<size_t, 4>, std::vector<ElementFace>> meeting;
-    for (size_t element = 0; element < mesh.element_count(); ++element) {
-      for (size_t side = 0; side < 6; ++side) {
-        const ElementFace face{element, side / 2, side % 2};
-        meeting[places_of(face)].push_back(face);
-      }
-    }
+    const FaceMap map(mesh);
     const double slack_mm = tie_slack * mesh.extent_mm();
     for (const auto& [named, words] : named_faces_) {
-      for (const ElementFace& other : meeting.at(places_of(named))) {
+      for (const ElementFace& other : map.meeting(named)) {
         if (other.element == named.element || (middle_mm(other) - middle_mm(named)).norm() > slack_mm)
           continue;
         elements_[named.element].fail(

@@ -3,36 +3,18 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <utility>
 
-#include "estimator/solution/body_section.hpp"
+#include "estimator/solution/drawn_sections.hpp"
 
 namespace diastole {
 namespace {
 
 using Eigen::Vector3d;
 
-constexpr double cells_across = 40;
 constexpr size_t neighbours = 40;  // whose residuals make a place's
-
-FlatPoints flat(const HermiteMesh& mesh, const NodeField& position_mm, const SectionPlane& plane,
-                const std::vector<MaterialPoint>& points) {
-  FlatPoints result;
-  for (const MaterialPoint& point : points) {
-    const Vector3d place_mm = mesh.value(position_mm, point);
-    result.push_back(plane.horizontal.dot(place_mm));
-    result.push_back(plane.vertical.dot(place_mm));
-  }
-  return result;
-}
-
-std::vector<MaterialPoint> ends_of(const std::vector<MaterialLine>& lines) {
-  std::vector<MaterialPoint> points;
-  for (const MaterialLine& line : lines)
-    points.insert(points.end(), line.begin(), line.end());
-  return points;
-}
 
 /// Measured numbers with their undeformed places, for looking up what lies near.
 class ResidualMap {
@@ -64,34 +46,6 @@ class ResidualMap {
   std::vector<double> squares_;
 };
 
-SolutionSection section_of(const HermiteMesh& mesh, const FrameField& field, const Coverage& coverage,
-                           const ResidualMap& residuals, const SectionPlane& plane) {
-  const BodySection cut = cut_body(mesh, plane, mesh.extent_mm() / cells_across);
-  SolutionSection section;
-  NamedField displacement{"displacement_mm", {}}, se{"se_mm", {}}, unseen{"unseen", {}},
-      residual{"residual_rms", {}}, volume{"volume_ratio", {}};
-  for (const SectionCell& cell : cut.cells) {
-    std::vector<MaterialPoint> around;
-    for (const Xi& corner : cell.corners)
-      around.push_back({cell.element, corner});
-    section.cells_before.push_back(flat(mesh, mesh.reference(), plane, around));
-    section.cells_after.push_back(flat(mesh, field.position_mm, plane, around));
-    const MaterialPoint centre = cell.centre();
-    const ElementCoverage& element = coverage.elements[cell.element];
-    displacement.values.push_back(mesh.value(field.displacement_mm, centre).norm());
-    se.values.push_back(between_probes(element.probe_se_mm, centre.xi));
-    unseen.values.push_back(between_probes(element.probe_unseen, centre.xi));
-    residual.values.push_back(residuals.rms_near(mesh.value(mesh.reference(), centre)));
-    volume.values.push_back(mesh.reference_gradient(field.position_mm, centre).determinant());
-  }
-  section.outline_before = flat(mesh, mesh.reference(), plane, ends_of(cut.outline));
-  section.outline_after = flat(mesh, field.position_mm, plane, ends_of(cut.outline));
-  section.elements_before = flat(mesh, mesh.reference(), plane, ends_of(cut.elements));
-  section.elements_after = flat(mesh, field.position_mm, plane, ends_of(cut.elements));
-  section.fields = {displacement, se, unseen, residual, volume};
-  return section;
-}
-
 double middle_height_mm(const HermiteMesh& mesh) {
   double low = mesh.reference()[dof_of(0, 0, 2)], high = low;
   for (size_t node = 0; node < mesh.node_count(); ++node) {
@@ -106,19 +60,24 @@ double middle_height_mm(const HermiteMesh& mesh) {
 std::vector<SolutionSection> field_sections(const HermiteMesh& mesh, const FrameField& field,
                                             const Coverage& coverage) {
   const ResidualMap residuals(mesh, field);
+  const auto fields_at = [&](const std::vector<MaterialPoint>& centres) {
+    std::vector<NamedField> fields{
+        {"displacement_mm", {}}, {"se_mm", {}}, {"unseen", {}}, {"residual_rms", {}}, {"volume_ratio", {}}};
+    for (const MaterialPoint& centre : centres) {
+      const ElementCoverage& element = coverage.elements[centre.element];
+      const std::array<double, 5> values{mesh.value(field.displacement_mm, centre).norm(),
+                                         between_probes(element.probe_se_mm, centre.xi),
+                                         between_probes(element.probe_unseen, centre.xi),
+                                         residuals.rms_near(mesh.value(mesh.reference(), centre)),
+                                         mesh.reference_gradient(field.position_mm, centre).determinant()};
+      for (size_t i = 0; i < values.size(); ++i)
+        fields[i].values.push_back(values[i]);
+    }
+    return fields;
+  };
   const double height_mm = middle_height_mm(mesh);
-  const Vector3d centre_mm(0.0, 0.0, height_mm);
-  SolutionSection across =
-      section_of(mesh, field, coverage, residuals, {centre_mm, Vector3d::UnitX(), Vector3d::UnitY()});
-  across.title = fmt::format("Short axis, material of z = {:.4g} mm", height_mm);
-  across.horizontal = "x (mm)";
-  across.vertical = "y (mm)";
-  SolutionSection along =
-      section_of(mesh, field, coverage, residuals, {centre_mm, Vector3d::UnitX(), Vector3d::UnitZ()});
-  along.title = "Long axis, material of y = 0";
-  along.horizontal = "x (mm)";
-  along.vertical = "z (mm)";
-  return {std::move(across), std::move(along)};
+  return drawn_sections(mesh, field.position_mm, {0.0, 0.0, height_mm},
+                        fmt::format("z = {:.4g} mm", height_mm), fields_at);
 }
 
 }  // namespace diastole

@@ -103,18 +103,6 @@ void record_residuals(ReconstructionRecord& record, const StudyReconstruction& a
   }
 }
 
-/// Appends an element's control values in VTK's order, row = control point.
-void append(const Eigen::MatrixXd& control, std::vector<double>& values) {
-  const auto width = static_cast<size_t>(control.cols());
-  const size_t start = values.size();
-  values.resize(start + bezier_points * width);
-  for (size_t i = 0; i < bezier_points; ++i) {
-    const size_t row = start + width * vtk_place_of(i & 3, (i >> 2) & 3, i >> 4);
-    for (size_t j = 0; j < width; ++j)
-      values[row + j] = control(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j));
-  }
-}
-
 }  // namespace
 
 ReconstructionRecord reconstruction_record(const Study& study, const Measurement& measurement,
@@ -153,7 +141,7 @@ BezierGrid reconstruction_grid(const StudyReconstruction& all) {
   BezierGrid grid;
   grid.cell_data = {{"element", 1, {}}, {"rows", 1, {}}, {"se_mm", 1, {}}, {"unseen", 1, {}}};
   for (size_t e = 0; e < mesh.element_count(); ++e) {
-    append(bezier_of(mesh.gather(e, mesh.reference())).transpose(), grid.points_mm);
+    append_in_vtk_order(bezier_of(mesh.gather(e, mesh.reference())).transpose(), grid.points_mm);
     const ElementCoverage& coverage = all.coverage.elements[e];
     grid.cell_data[0].values.push_back(static_cast<double>(e));
     grid.cell_data[1].values.push_back(static_cast<double>(coverage.rows));
@@ -163,12 +151,12 @@ BezierGrid reconstruction_grid(const StudyReconstruction& all) {
   for (const FrameField& field : all.fields) {
     GridArray displacement{"displacement_mm", 3, {}}, volume{"volume_ratio", 1, {}};
     for (size_t e = 0; e < mesh.element_count(); ++e) {
-      append(bezier_of(mesh.gather(e, field.displacement_mm)).transpose(), displacement.values);
+      append_in_vtk_order(bezier_of(mesh.gather(e, field.displacement_mm)).transpose(), displacement.values);
       Eigen::MatrixXd ratios(gauss_points, 1);
       for (size_t q = 0; q < gauss_points; ++q)
         ratios(static_cast<Eigen::Index>(q), 0) =
             mesh.reference_gradient(field.position_mm, {e, gauss_tables().xi[q]}).determinant();
-      append(bezier_through(places, ratios), volume.values);
+      append_in_vtk_order(bezier_through(places, ratios), volume.values);
     }
     grid.steps.push_back({field.load.time_s,
                           {std::move(displacement), std::move(volume)},

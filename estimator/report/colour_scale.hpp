@@ -1,8 +1,9 @@
 #pragma once
-// The colours of maps: viridis, even to the eye and safe for the colour-blind.
+// The colours of maps, and cells painted in them: viridis, even to the eye and safe for the colour-blind.
 
 #include <array>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace diastole::report {
@@ -14,8 +15,34 @@ std::string map_colour(double fraction);
 /// Never empty.
 std::array<double, 2> colour_range(const std::vector<double>& values);
 
-/// How many colours a map is drawn in.
-inline constexpr size_t map_colours = 48;
+/// blue - white - red at 0..1, for signed values.
+std::string signed_colour(double fraction);
+
+/// Values in colours, in so many steps as cannot be told apart.
+struct ColourScale {
+  std::array<double, 2> range;
+  std::string (*colour)(double fraction) = map_colour;
+  size_t steps = 48;
+
+  /// 0 to 1; values beyond the range are at its ends.
+  [[nodiscard]] double fraction_of(double value) const;
+  [[nodiscard]] std::string colour_of_step(size_t step) const;
+};
+
+/// Cells of one colour become one path; values that are not finite leave a hole.
+class CellPainter {
+ public:
+  explicit CellPainter(const ColourScale& scale) : scale_(scale), paths_(scale.steps) {}
+
+  /// `outline`: the cell as commands of an SVG path.
+  void add(double value, std::string_view outline);
+  /// A stroke of the cells' own colour closes the hairlines between neighbours.
+  [[nodiscard]] std::string svg(double stroke) const;
+
+ private:
+  const ColourScale& scale_;
+  std::vector<std::string> paths_;
+};
 
 /// Where a colour bar stands, in viewBox units: its left edge, its ends, and room for the numbers on its right.
 struct ColourBarPlace {
@@ -24,7 +51,6 @@ struct ColourBarPlace {
 };
 
 /// The bar with its ticks; `label` stands above.
-std::string colour_bar(const std::array<double, 2>& range, const std::string& label,
-                       const ColourBarPlace& place);
+std::string colour_bar(const ColourScale& scale, const std::string& label, const ColourBarPlace& place);
 
 }  // namespace diastole::report

@@ -62,11 +62,10 @@ void add_headlines(Page& page, const Explanation& e) {
                 fmt::format("{} → {}", number(e.gap.before, 3), number(e.gap.after, 3)),
                 fmt::format("{} is noise; {} % closed on data that were not fitted", number(e.gap.floor, 3),
                             number(100 * e.gap.closed, 3)));
-  for (const ParameterShift& shift : e.shifts) {
-    if (&shift != &e.shifts.front()) break;
-    page.headline(shift.name, with_error(shift.after, shift.after_error),
-                  fmt::format("{} without what was added", with_error(shift.before, shift.before_error)));
-  }
+  if (e.shifts.empty()) return;
+  const ParameterShift& first = e.shifts.front();
+  page.headline(first.name, with_error(first.after, first.after_error),
+                fmt::format("{} without what was added", with_error(first.before, first.before_error)));
 }
 
 /// "in segment 2, at 0.40 to 0.60 of the cycle, between 2 and 6 Hz".
@@ -88,14 +87,16 @@ void add_where(Page& page, const Explanation& e) {
     page.paragraph("The base model misses nothing beyond the noise.");
     return;
   }
-  std::vector<std::vector<std::string>> rows;
-  for (const Misfit& misfit : e.where) {
-    rows.push_back({misfit.port, number(misfit.excess_chi2, 3),
-                    misfit.p_value < 1e-300 ? "< 1e−300" : number(misfit.p_value, 2), misfit.channel,
-                    misfit.run.empty() ? "–" : misfit.run, place_words(misfit)});
-  }
-  page.table(
-      {"port", "excess χ²", "p", "channel", "run", "where"}, rows,
+  const auto row_of = [](const Misfit& misfit) -> Page::Row {
+    return {misfit.port,
+            number(misfit.excess_chi2, 3),
+            misfit.p_value < 1e-300 ? "< 1e−300" : number(misfit.p_value, 2),
+            misfit.channel,
+            misfit.run.empty() ? "–" : misfit.run,
+            place_words(misfit)};
+  };
+  page.table_of(
+      e.where, {"port", "excess χ²", "p", "channel", "run", "where"}, row_of,
       "Where the base model fails beyond the noise, after correction for how many places were looked at. "
       "Ports: "
       "drive (command to cavity volume), specimen (volume to pressure), sensor, clock, field (displacement).",
@@ -155,15 +156,16 @@ void add_evidence(Page& page, const Explanation& e) {
       "a full "
       "refit, or by a score test where that was too small to deserve one. A true effect also predicts runs "
       "that were not fitted.");
-  std::vector<std::vector<std::string>> rows;
-  for (const Candidate& candidate : e.evidence) {
-    rows.push_back({set_words(candidate.ids), number(candidate.chi_square_drop, 4),
-                    std::to_string(candidate.parameters),
-                    candidate.held_out_drop ? number(*candidate.held_out_drop, 4) : "–",
-                    candidate.refitted ? "refit" : "score test", candidate.verdict});
-  }
-  page.table({"candidate", "χ² drop", "parameters", "on held-out runs", "by", "verdict"}, rows,
-             "All candidates that were looked at.", 4);
+  const auto row_of = [](const Candidate& candidate) -> Page::Row {
+    return {set_words(candidate.ids),
+            number(candidate.chi_square_drop, 4),
+            std::to_string(candidate.parameters),
+            candidate.held_out_drop ? number(*candidate.held_out_drop, 4) : "–",
+            candidate.refitted ? "refit" : "score test",
+            candidate.verdict};
+  };
+  page.table_of(e.evidence, {"candidate", "χ² drop", "parameters", "on held-out runs", "by", "verdict"},
+                row_of, "All candidates that were looked at.", 4);
 }
 
 void add_next(Page& page, const Explanation& e) {

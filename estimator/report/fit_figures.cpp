@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <numeric>
 
 #include "estimator/report/html_text.hpp"
 #include "estimator/report/svg_plot.hpp"
@@ -15,12 +16,10 @@ constexpr double rise_at_95 = 1.92;  // half of chi-square's 95 % point, one deg
 
 Figure values_by_number(const FittedParameter& parameter) {
   SvgPlot plot({.x = {.label = "element"}, .y = {.label = parameter.name}});
-  std::vector<double> index, value, error;
-  for (size_t i = 0; i < parameter.elements.size(); ++i) {
-    index.push_back(static_cast<double>(i));
-    value.push_back(parameter.elements[i].value);
-    error.push_back(1.96 * parameter.elements[i].se);
-  }
+  std::vector<double> index(parameter.elements.size());
+  std::iota(index.begin(), index.end(), 0.0);
+  const auto value = numbers_of(parameter.elements, &FittedElement::value);
+  const auto error = numbers_of(parameter.elements, [](const auto& element) { return 1.96 * element.se; });
   plot.error_bars(index, value, error, "a");
   plot.points(index, value, "a", "value and 95 % interval of each element");
   return {plot.svg(), "Regional values, one an element."};
@@ -49,12 +48,9 @@ std::vector<Figure> regional_figures(const FitRecord& fit, const FittedParameter
   if (!rings) return {values_by_number(parameter)};
   const std::array<size_t, 3> elements{static_cast<size_t>(fit.mesh[0]), static_cast<size_t>(fit.mesh[1]),
                                        static_cast<size_t>(fit.mesh[2])};
-  std::vector<double> value, error_percent;
-  for (const FittedElement& element : parameter.elements) {
-    value.push_back(element.value);
-    error_percent.push_back(100 * element.se / element.value);
-  }
-  return {{wall_map(elements, value, parameter.name),
+  const auto error_percent =
+      numbers_of(parameter.elements, [](const auto& element) { return 100 * element.se / element.value; });
+  return {{wall_map(elements, numbers_of(parameter.elements, &FittedElement::value), parameter.name),
            fmt::format("{} of each element on the wall unrolled.", parameter.name)},
           {wall_map(elements, error_percent, "error (%)"),
            "Their standard errors. Neighbours that are held alike share what they know."}};

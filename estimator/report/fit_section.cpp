@@ -53,17 +53,19 @@ void add_shapes(Page& page, const FitRecord& fit) {
 }
 
 void add_parameters(Page& page, const FitRecord& fit) {
-  std::vector<std::vector<std::string>> rows;
-  for (const FittedParameter& parameter : fit.parameters) {
-    rows.push_back({parameter.name, with_error(parameter.value, parameter.se),
-                    fmt::format("{} to {}", number(parameter.ci95[0], 4), number(parameter.ci95[1], 4)),
-                    chosen(parameter.start),
-                    fmt::format("{} to {}", chosen(parameter.bounds[0]), chosen(parameter.bounds[1])),
-                    parameter.at_bound.empty() ? "no" : parameter.at_bound});
-  }
-  page.table({"parameter", "value ± standard error", "95 % interval", "start", "bounds", "on a bound"}, rows,
-             "The material's parameters. Errors carry the noise of the imaged motion and of the measured "
-             "pressures.");
+  const auto row_of = [](const FittedParameter& parameter) -> Page::Row {
+    return {parameter.name,
+            with_error(parameter.value, parameter.se),
+            fmt::format("{} to {}", number(parameter.ci95[0], 4), number(parameter.ci95[1], 4)),
+            chosen(parameter.start),
+            fmt::format("{} to {}", chosen(parameter.bounds[0]), chosen(parameter.bounds[1])),
+            parameter.at_bound.empty() ? "no" : parameter.at_bound};
+  };
+  page.table_of(fit.parameters,
+                {"parameter", "value ± standard error", "95 % interval", "start", "bounds", "on a bound"},
+                row_of,
+                "The material's parameters. Errors carry the noise of the imaged motion and of the measured "
+                "pressures.");
   add_shapes(page, fit);
   for (const FittedParameter& parameter : fit.parameters) {
     if (parameter.elements.empty()) continue;
@@ -100,46 +102,23 @@ Figure section_figure(const FitSection& section, bool tags) {
 }
 
 Figure residual_figure(const FitRecord& fit) {
-  const std::vector<double>& edges = fit.residuals.edges;
-  SvgPlot plot({.x = {.label = "residual / its standard deviation"}, .y = {.label = "residuals"}});
-  plot.bars(edges, fit.residuals.counts, "a", "measured");
-  double total = 0;
-  for (const double count : fit.residuals.counts)
-    total += count;
-  std::vector<double> x, normal;
-  if (edges.size() > 1) {
-    const double width = edges[1] - edges[0];
-    constexpr int samples = 121;
-    for (int i = 0; i < samples; ++i) {
-      const double at = edges.front() + (edges.back() - edges.front()) * i / (samples - 1);
-      x.push_back(at);
-      normal.push_back(total * width * std::exp(-at * at / 2) / std::sqrt(2 * M_PI));
-    }
-  }
-  plot.line(x, normal, "b", "expected of the stated noise");
   return {
-      plot.svg(),
+      residual_histogram(fit.residuals.edges, fit.residuals.counts).svg(),
       fmt::format("Residuals in units of their stated noise. chi²/dof = {}; {} beyond 5 standard deviations.",
                   number(fit.chi2_per_dof, 4), fit.outliers_5sigma)};
 }
 
 Figure pressure_figure(const FitRecord& fit) {
-  std::vector<double> time_s, measured, sigma, estimated, se;
-  for (const FittedFrame& frame : fit.frames) {
-    time_s.push_back(frame.time_s);
-    measured.push_back(1000 * (frame.measured_kPa - frame.estimated_kPa));
-    sigma.push_back(1000 * frame.sigma_kPa);
-    estimated.push_back(0);
-    se.push_back(1000 * frame.se_kPa);
-  }
+  const auto of = [&](double (*pressure_kPa)(const FittedFrame&)) {
+    return numbers_of(fit.frames, [&](const FittedFrame& frame) { return 1000 * pressure_kPa(frame); });
+  };
+  const auto time_s = numbers_of(fit.frames, &FittedFrame::time_s);
+  const auto measured = of([](const FittedFrame& f) { return f.measured_kPa - f.estimated_kPa; });
+  const auto sigma = of([](const FittedFrame& f) { return f.sigma_kPa; });
   SvgPlot plot({.x = {.label = "time after the trigger (s)"}, .y = {.label = "pressure − estimate (Pa)"}});
-  std::vector<double> low, high;
-  for (const double error : se) {
-    low.push_back(-error);
-    high.push_back(error);
-  }
-  plot.band(time_s, low, high, "a", "estimated ± SE");
-  plot.line(time_s, estimated, "a");
+  plot.band(time_s, of([](const FittedFrame& f) { return -f.se_kPa; }),
+            of([](const FittedFrame& f) { return f.se_kPa; }), "a", "estimated ± SE");
+  plot.line(time_s, std::vector<double>(time_s.size(), 0.0), "a");
   plot.error_bars(time_s, measured, sigma, "b");
   plot.points(time_s, measured, "b", "measured ± SD");
   return {plot.svg(),
@@ -149,15 +128,19 @@ Figure pressure_figure(const FitRecord& fit) {
 }
 
 void add_frames(Page& page, const FitRecord& fit) {
-  std::vector<std::vector<std::string>> rows;
-  for (const FittedFrame& frame : fit.frames) {
-    rows.push_back({std::to_string(frame.frame), number(frame.time_s),
-                    fmt::format("{:.4f}", frame.measured_kPa), with_error(frame.estimated_kPa, frame.se_kPa),
-                    std::to_string(frame.points), fmt::format("{:.3f}", frame.rms_mm),
-                    fmt::format("{:.3f}", frame.chi2_per_point)});
-  }
-  page.table({"frame", "time (s)", "measured (kPa)", "estimated (kPa)", "points", "RMS (mm)", "chi²/point"},
-             rows, "Each frame's pressure and how well the model follows its motion.");
+  const auto row_of = [](const FittedFrame& frame) -> Page::Row {
+    return {std::to_string(frame.frame),
+            number(frame.time_s),
+            fmt::format("{:.4f}", frame.measured_kPa),
+            with_error(frame.estimated_kPa, frame.se_kPa),
+            std::to_string(frame.points),
+            fmt::format("{:.3f}", frame.rms_mm),
+            fmt::format("{:.3f}", frame.chi2_per_point)};
+  };
+  page.table_of(
+      fit.frames,
+      {"frame", "time (s)", "measured (kPa)", "estimated (kPa)", "points", "RMS (mm)", "chi²/point"}, row_of,
+      "Each frame's pressure and how well the model follows its motion.");
 }
 
 void add_course(Page& page, const FitRecord& fit) {

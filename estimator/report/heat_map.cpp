@@ -4,8 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iterator>
-#include <map>
 
 #include "estimator/report/colour_scale.hpp"
 #include "estimator/report/html_text.hpp"
@@ -16,19 +14,7 @@ namespace {
 
 constexpr double panel_width = 440, panel_height = 210, panel_gap = 20;
 constexpr double left = 58, top = 24, bottom = 44;
-constexpr double bar_gap = 18, bar_width = 14, bar_room = 58;
-constexpr int shades = 40;
-
-std::string shade(double fraction, bool is_signed) {
-  if (!is_signed) return map_colour(fraction);
-  constexpr std::array<double, 3> blue{33, 102, 172}, white{247, 247, 247}, red{178, 24, 43};
-  const std::array<double, 3>& end = fraction < 0.5 ? blue : red;
-  const double part = std::abs(2 * fraction - 1);
-  std::string colour = "#";
-  for (size_t i = 0; i < 3; ++i)
-    colour += fmt::format("{:02x}", std::lround(std::lerp(white[i], end[i], part)));
-  return colour;
-}
+constexpr double bar_gap = 18;
 
 std::array<double, 2> range_of(const CellGrid& before, const CellGrid& after, bool is_signed) {
   std::vector<double> sizes;
@@ -45,33 +31,24 @@ std::array<double, 2> range_of(const CellGrid& before, const CellGrid& after, bo
   return {is_signed ? -most : 0.0, most};
 }
 
-/// Cells of one colour are one path.
-std::string cells(const CellGrid& grid, const std::array<double, 2>& range, bool is_signed) {
-  std::map<int, std::string> paths;
+std::string cells(const CellGrid& grid, const ColourScale& scale) {
+  CellPainter painter(scale);
   const double height = panel_height / static_cast<double>(std::max<size_t>(grid.size(), 1));
   for (size_t r = 0; r < grid.size(); ++r) {
     const double width = panel_width / static_cast<double>(grid[r].size());
-    for (size_t c = 0; c < grid[r].size(); ++c) {
-      if (!std::isfinite(grid[r][c])) continue;
-      const double fraction = std::clamp((grid[r][c] - range[0]) / (range[1] - range[0]), 0.0, 1.0);
-      const int bin = std::min(shades - 1, static_cast<int>(fraction * shades));
-      fmt::format_to(std::back_inserter(paths[bin]), "M{:.1f} {:.1f}h{:.1f}v{:.1f}h{:.1f}z",
-                     width * static_cast<double>(c), height * static_cast<double>(r), width, height, -width);
-    }
+    for (size_t c = 0; c < grid[r].size(); ++c)
+      painter.add(grid[r][c],
+                  fmt::format("M{:.1f} {:.1f}h{:.1f}v{:.1f}h{:.1f}z", width * static_cast<double>(c),
+                              height * static_cast<double>(r), width, height, -width));
   }
-  std::string result;
-  for (const auto& [bin, path] : paths) {
-    result += fmt::format("<path fill=\"{0}\" stroke=\"{0}\" stroke-width=\".3\" d=\"{1}\"/>",
-                          shade((bin + 0.5) / shades, is_signed), path);
-  }
-  return result;
+  return painter.svg(0.3);
 }
 
-std::string panel(const CellGrid& grid, const std::array<double, 2>& range, const HeatMapLabels& labels,
+std::string panel(const CellGrid& grid, const ColourScale& scale, const HeatMapLabels& labels,
                   const char* title, bool has_y_ticks) {
   std::string body =
       fmt::format("<text x=\"{}\" y=\"-8\" text-anchor=\"middle\">{}</text>", panel_width / 2, title);
-  body += cells(grid, range, labels.is_signed);
+  body += cells(grid, scale);
   body += fmt::format("<path class=\"grid\" d=\"M0 0h{}v{}h-{}z\"/>", panel_width, panel_height, panel_width);
   for (const auto& [x, y] : labels.marks) {
     body += fmt::format("<circle class=\"ring\" r=\"9\" cx=\"{:.1f}\" cy=\"{:.1f}\"/>",
@@ -101,37 +78,19 @@ std::string panel(const CellGrid& grid, const std::array<double, 2>& range, cons
                     panel_height / 2, escaped(labels.y));
 }
 
-std::string colour_bar(const std::array<double, 2>& range, const HeatMapLabels& labels) {
-  std::string body;
-  const double step = panel_height / shades;
-  for (int i = 0; i < shades; ++i) {
-    body += fmt::format("<path stroke=\"{}\" stroke-width=\"{:.2f}\" d=\"M0 {:.2f}h{}\"/>",
-                        shade((i + 0.5) / shades, labels.is_signed), step + 0.3,
-                        panel_height - (i + 0.5) * step, bar_width);
-  }
-  for (const double tick : ticks_over(range[0], range[1], 5)) {
-    if (tick < range[0] - 1e-9 || tick > range[1] + 1e-9) continue;
-    body += fmt::format("<text x=\"{}\" y=\"{:.1f}\">{}</text>", bar_width + 6,
-                        panel_height * (range[1] - tick) / (range[1] - range[0]) + 4,
-                        chosen(std::abs(tick) < 1e-9 ? 0.0 : tick));
-  }
-  return body + fmt::format("<text class=\"label\" x=\"{}\" y=\"-8\" text-anchor=\"end\">{}</text>",
-                            bar_width + bar_room, escaped(labels.bar));
-}
-
 }  // namespace
 
 std::string heat_map(const CellGrid& before, const CellGrid& after, const HeatMapLabels& labels) {
-  const std::array<double, 2> range = range_of(before, after, labels.is_signed);
+  const ColourScale scale{range_of(before, after, labels.is_signed),
+                          labels.is_signed ? signed_colour : map_colour, 40};
   const double second = left + panel_width + panel_gap;
-  const double bar = second + panel_width + bar_gap;
-  return fmt::format(
-      "<svg class=\"plot\" viewBox=\"0 0 {0:.0f} {1:.0f}\" width=\"{0:.0f}\" role=\"img\">"
-      "<g transform=\"translate({2} {6})\">{3}</g><g transform=\"translate({4} {6})\">{5}</g>"
-      "<g transform=\"translate({7} {6})\">{8}</g></svg>",
-      bar + bar_width + bar_room, top + panel_height + bottom, left,
-      panel(before, range, labels, "before", true), second, panel(after, range, labels, "after", false), top,
-      bar, colour_bar(range, labels));
+  const ColourBarPlace bar{second + panel_width + bar_gap, top, panel_height};
+  return drawing(
+      bar.left + bar.width + bar.room, top + panel_height + bottom,
+      fmt::format("<g transform=\"translate({0} {2})\">{3}</g><g transform=\"translate({1} {2})\">"
+                  "{4}</g>{5}",
+                  left, second, top, panel(before, scale, labels, "before", true),
+                  panel(after, scale, labels, "after", false), colour_bar(scale, labels.bar, bar)));
 }
 
 }  // namespace diastole::report

@@ -36,6 +36,12 @@ std::string escaped(std::string_view text) {
   return result;
 }
 
+std::string drawing(double width, double height, std::string_view body) {
+  return fmt::format(
+      "<svg class=\"plot\" viewBox=\"0 0 {0:.0f} {1:.0f}\" width=\"{0:.0f}\" role=\"img\">{2}</svg>", width,
+      height, body);
+}
+
 std::string number(double value, int digits) {
   if (!std::isfinite(value)) return "\u2013";
   const double size = std::abs(value);

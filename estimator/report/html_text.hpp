@@ -12,6 +12,9 @@ std::string escaped(std::string_view text);
 /// `value` with `digits` significant digits, without exponent between 1e-4 and 1e6, and a true minus sign.
 std::string number(double value, int digits = 4);
 
+/// A drawing with the page's colours; sizes in viewBox units.
+std::string drawing(double width, double height, std::string_view body);
+
 /// The shortest text of a number that somebody chose (a bound, a period): "6", "0.25".
 std::string chosen(double value);
 

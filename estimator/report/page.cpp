@@ -4,8 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iterator>
 
+#include "estimator/io/member_json.hpp"
 #include "estimator/report/embedded.hpp"
 #include "estimator/report/html_text.hpp"
 #include "estimator/report/svg_plot.hpp"
@@ -45,47 +45,22 @@ std::string static_svg(const TimeChart& chart) {
   return plot.svg();
 }
 
-void append_numbers(std::string& text, const std::vector<double>& values, int decimals) {
-  text += '[';
-  for (const double value : values) {
-    if (text.back() != '[') text += ',';
-    if (std::isfinite(value)) {
-      fmt::format_to(std::back_inserter(text), "{:.{}f}", value, decimals);
-    } else {
-      text += "null";
-    }
-  }
-  text += ']';
-}
-
-std::string quoted(const std::string& text) {
-  std::string result = "\"";
-  for (const char c : text) {
-    if (c == '"' || c == '\\' || c == '<') {
-      result += fmt::format("\\u{:04x}", static_cast<unsigned>(c));
-    } else {
-      result += c;
-    }
-  }
-  return result + '"';
-}
+/// To a ten-thousandth, which is more than a screen shows.
+double shortened(double value) { return std::round(value * 1e4) / 1e4; }
 
 std::string chart_json(const TimeChart& chart) {
-  std::string text = fmt::format("{{\"label\":{},\"traces\":[", quoted(chart.y_label));
-  for (size_t i = 0; i < chart.traces.size(); ++i) {
-    const TimeChart::Trace& trace = chart.traces[i];
-    text += fmt::format("{}{{\"name\":{},\"style\":{}}}", i == 0 ? "" : ",", quoted(trace.name),
-                        quoted(trace.style));
-  }
-  text += "],\"marks\":";
-  append_numbers(text, chart.marks_s, 4);
-  text += ",\"data\":[";
-  append_numbers(text, chart.time_s, 4);
+  Json json{{"label", chart.y_label}, {"traces", Json::array()}};
+  json["marks"] = written(chart.marks_s);
+  json["data"].push_back(written(chart.time_s));
   for (const TimeChart::Trace& trace : chart.traces) {
-    text += ',';
-    append_numbers(text, trace.y, 4);
+    json["traces"].push_back({{"name", trace.name}, {"style", trace.style}});
+    json["data"].push_back(written(trace.y));
   }
-  return text + "]}";
+  round_numbers(json, shortened);
+  std::string text = json.dump();
+  for (size_t at = 0; (at = text.find('<', at)) != std::string::npos;)
+    text.replace(at, 1, "\\u003c");  // "</script>" would end the script
+  return text;
 }
 
 std::string figure_html(const std::string& body, const std::string& caption) {
@@ -126,9 +101,9 @@ void Page::time_chart(const TimeChart& chart) {
   charts_.push_back(chart_json(chart));
 }
 
-void Page::table(const std::vector<std::string>& header, const std::vector<std::vector<std::string>>& rows,
-                 const std::string& caption, size_t words_from) {
-  const auto row_html = [words_from](const std::vector<std::string>& cells, const char* tag) {
+void Page::table(const Row& header, const std::vector<Row>& rows, const std::string& caption,
+                 size_t words_from) {
+  const auto row_html = [words_from](const Row& cells, const char* tag) {
     std::string text = "<tr>";
     for (size_t i = 0; i < cells.size(); ++i)
       text +=

@@ -46,8 +46,18 @@ class Page {
   void figures(const std::vector<Figure>& row);
   void time_chart(const TimeChart& chart);
   /// First column left-aligned, the others as numbers, and from column `words_from` on as words that may wrap.
-  void table(const std::vector<std::string>& header, const std::vector<std::vector<std::string>>& rows,
-             const std::string& caption, size_t words_from = std::string::npos);
+  using Row = std::vector<std::string>;
+  void table(const Row& header, const std::vector<Row>& rows, const std::string& caption,
+             size_t words_from = std::string::npos);
+  /// The same, with one row of each item.
+  template <class Items, class RowOf>
+  void table_of(const Items& items, const Row& header, const RowOf& row_of, const std::string& caption,
+                size_t words_from = std::string::npos) {
+    std::vector<Row> rows;
+    for (const auto& item : items)
+      rows.push_back(row_of(item));
+    table(header, rows, caption, words_from);
+  }
   /// Preformatted text that unfolds on a click.
   void listing(const std::string& title, const std::string& text);
 

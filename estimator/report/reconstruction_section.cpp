@@ -13,12 +13,6 @@
 namespace diastole::report {
 namespace {
 
-struct MapChoice {
-  const char* field;
-  const char* bar;
-  const char* words;
-};
-
 constexpr MapChoice maps[] = {
     {"residual_rms", "residual / σ",
      "how far the nearest 40 measured numbers lie from the field, in units of their sigma; 1 is as stated"},
@@ -29,21 +23,6 @@ constexpr MapChoice maps[] = {
     {"volume_ratio", "J",
      "local volume over the undeformed one, which the reconstruction does not hold at 1"},
 };
-
-void add_maps(Page& page, const ReconstructionRecord& record) {
-  const std::string frame = fmt::format("frame {}", record.frames.back().frame);
-  for (const MapChoice& map : maps) {
-    std::vector<Figure> row;
-    for (const SolutionSection& section : record.sections) {
-      const auto field = std::find_if(section.fields.begin(), section.fields.end(),
-                                      [&](const NamedField& f) { return f.name == map.field; });
-      if (field == section.fields.end() || section.cells_before.empty()) continue;
-      row.push_back(
-          {section_map(section, *field, {map.bar, frame}), fmt::format("{}: {}.", section.title, map.words)});
-    }
-    page.figures(row);
-  }
-}
 
 Figure validation_figure(const ReconstructionRecord& record) {
   SvgPlot plot({.x = {.label = "log10 of the smoothing weight λ"},
@@ -73,19 +52,8 @@ Figure validation_figure(const ReconstructionRecord& record) {
 }
 
 Figure residual_figure(const ReconstructionRecord& record) {
-  SvgPlot plot({.x = {.label = "residual / σ"}, .y = {.label = "measured numbers"}});
-  plot.bars(record.residual_edges, record.residual_counts, "a", "measured");
-  double total = 0.0;
-  for (const double count : record.residual_counts)
-    total += count;
-  std::vector<double> x, normal;
-  const double width = record.residual_edges[1] - record.residual_edges[0];
-  for (double place = record.residual_edges.front(); place <= record.residual_edges.back(); place += 0.1) {
-    x.push_back(place);
-    normal.push_back(total * width * std::exp(-0.5 * place * place) / std::sqrt(2 * M_PI));
-  }
-  plot.line(x, normal, "b", "normal, as sigma says");
-  return {plot.svg(), "Residuals of all frames; the outermost bars hold all that is farther out."};
+  return {residual_histogram(record.residual_edges, record.residual_counts).svg(),
+          "Residuals of all frames; the outermost bars hold all that is farther out."};
 }
 
 void add_frames(Page& page, const ReconstructionRecord& record) {
@@ -182,7 +150,8 @@ void add_reconstruction(Page& page, const ReconstructionRecord& record) {
   page.headline("Data against the field", fmt::format("χ²/dof {}", number(last.chi2_per_dof, 3)),
                 "1 if the points scatter as their sigma says");
   add_frames(page, record);
-  add_maps(page, record);
+  for (const MapChoice& map : maps)
+    page.figures(section_maps(record.sections, map, fmt::format("frame {}", last.frame)));
   if (!record.residual_counts.empty()) page.figures({validation_figure(record), residual_figure(record)});
   add_families(page, record);
   add_elements(page, record);

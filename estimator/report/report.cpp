@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <functional>
+#include <map>
 #include <vector>
 
 #include "estimator/explain/verdict/explanation_json.hpp"
@@ -17,6 +19,8 @@
 
 namespace diastole::report {
 namespace {
+
+enum class Kind { explanation, fit, table, reconstruction, solution, shear_test, run };
 
 bool is_hdf5(std::string_view content) {
   return content.starts_with(std::string_view("\x89HDF\r\n\x1a\n", 8));
@@ -42,71 +46,53 @@ std::string explanation_title(const std::vector<explain::Explanation>& explanati
 }  // namespace
 
 std::string make_report(std::span<const std::filesystem::path> files, const ReportOptions& options) {
-  std::vector<FitRecord> fits;
-  std::vector<SolutionRecord> solutions;
-  std::vector<ReconstructionRecord> reconstructions;
+  std::map<Kind, std::vector<std::function<void(Page&)>>> parts;  // in the order of the page
   std::vector<explain::Explanation> explanations;
-  std::vector<ShearTest> shear_tests;
-  std::vector<SavedTable> tables;
-  std::vector<runfile::RecordedRun> runs;
+  const auto add = [&](Kind kind, auto read, auto draw) {
+    parts[kind].emplace_back([read = std::move(read), draw](Page& page) { draw(page, read); });
+  };
   for (const std::filesystem::path& file : files) {
     const std::string content = read_whole_file(file);
+    const std::string name = file.string();
     if (is_hdf5(content)) {
-      runs.push_back(runfile::read_run(file));
-      continue;
-    }
-    if (is_shear_test(content)) {
-      shear_tests.push_back(shear_test_from_text(content, file.string()));
-      continue;
-    }
-    if (is_cells_file(content)) {
-      tables.push_back(saved_table(content, file.string()));
-      continue;
-    }
-    if (!is_json_object(content)) {
+      add(Kind::run, runfile::read_run(file),
+          [&](Page& page, const runfile::RecordedRun& run) { add_run(page, run, options.frames); });
+    } else if (is_shear_test(content)) {
+      add(Kind::shear_test, shear_test_from_text(content, name),
+          [](Page& page, const ShearTest& test) { add_shear(page, test, fit_shear(test)); });
+    } else if (is_cells_file(content)) {
+      add(Kind::table, saved_table(content, name), add_montecarlo);
+    } else if (!is_json_object(content)) {
       throw InputError(
-          {file.string(), "",
+          {name, "",
            "is neither a run file nor a fit result, a Monte Carlo table, an explanation, a reconstruction, a "
-           "solution "
-           "or a shear test",
+           "solution or a shear test",
            "Give files that `diastole run`, `diastole simulate`, `diastole fit -o`, `diastole explain -o`, "
-           "`diastole montecarlo --cells`, "
-           "`diastole reconstruct -o NAME.json` or `diastole solve -o NAME.json` wrote, or the CSV that "
-           "`diastole shear` reads."});
+           "`diastole montecarlo --cells`, `diastole reconstruct -o NAME.json` or `diastole solve -o "
+           "NAME.json` "
+           "wrote, or the CSV that `diastole shear` reads."});
+    } else if (explain::is_explanation(content)) {
+      explanations.push_back(explain::explanation_from_json(content, name));
+      add(Kind::explanation, explanations.back(), add_explanation);
+    } else if (is_solution(content)) {
+      add(Kind::solution, solution_record_from_json(content, name), add_solution);
+    } else if (is_reconstruction(content)) {
+      add(Kind::reconstruction, reconstruction_record_from_json(content, name), add_reconstruction);
+    } else {
+      add(Kind::fit, fit_record_from_json(content, name), add_fit);
     }
-    if (explain::is_explanation(content)) {
-      explanations.push_back(explain::explanation_from_json(content, file.string()));
-      continue;
-    }
-    if (is_solution(content)) {
-      solutions.push_back(solution_record_from_json(content, file.string()));
-      continue;
-    }
-    if (is_reconstruction(content)) {
-      reconstructions.push_back(reconstruction_record_from_json(content, file.string()));
-      continue;
-    }
-    fits.push_back(fit_record_from_json(content, file.string()));
   }
-  const bool no_estimate = fits.empty() && shear_tests.empty() && tables.empty() && runs.empty();
-  Page page(!explanations.empty() ? explanation_title(explanations)
-            : no_estimate ? (solutions.empty() && !reconstructions.empty() ? "Displacement from tagged images"
-                                                                           : "Strain and stress under load")
-                          : title_of(fits.size() + shear_tests.size() + tables.size(), runs.size()));
-  for (const explain::Explanation& explanation : explanations)
-    add_explanation(page, explanation);
-  for (const FitRecord& fit : fits)
-    add_fit(page, fit);
-  for (const SavedTable& table : tables)
-    add_montecarlo(page, table);
-  for (const ReconstructionRecord& reconstruction : reconstructions)
-    add_reconstruction(page, reconstruction);
-  for (const SolutionRecord& solution : solutions)
-    add_solution(page, solution);
-  for (const ShearTest& test : shear_tests)
-    add_shear(page, test, fit_shear(test));
-  for (const runfile::RecordedRun& run : runs)
-    add_run(page, run, options.frames);
+  const auto count = [&](Kind kind) { return parts.contains(kind) ? parts.at(kind).size() : 0; };
+  const size_t estimates = count(Kind::fit) + count(Kind::shear_test) + count(Kind::table);
+  const bool only_images = count(Kind::reconstruction) > 0 && count(Kind::solution) == 0;
+  Page page(!explanations.empty()                   ? explanation_title(explanations)
+            : estimates > 0 || count(Kind::run) > 0 ? title_of(estimates, count(Kind::run))
+            : only_images                           ? "Displacement from tagged images"
+                                                    : "Strain and stress under load");
+  for (const auto& [kind, drawings] : parts) {
+    for (const auto& draw : drawings)
+      draw(page);
+  }
   return page.html();
 }
 

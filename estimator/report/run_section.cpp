@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <iterator>
 #include <limits>
 
 #include "estimator/report/html_text.hpp"
@@ -24,11 +25,13 @@ constexpr size_t most_plotted_segments = 6;
 // A browser draws this many samples of a trace without delay; longer runs show every n-th.
 constexpr size_t most_chart_samples = 120'000;
 
-size_t triggers_within(const RecordedRun& run, const Segment& segment) {
+std::vector<double> segment_triggers(const RecordedRun& run, const Segment& segment) {
   constexpr double slack_s = 1e-3;
-  return static_cast<size_t>(std::count_if(run.trigger_s.begin(), run.trigger_s.end(), [&](double time_s) {
+  std::vector<double> kept;
+  std::ranges::copy_if(run.trigger_s, std::back_inserter(kept), [&](double time_s) {
     return time_s >= segment.start_s - slack_s && time_s < segment.end_s() - slack_s;
-  }));
+  });
+  return kept;
 }
 
 double interpolated(const std::vector<double>& x, const std::vector<double>& y, double at) {
@@ -77,14 +80,13 @@ void add_traces(Page& page, const RecordedRun& run) {
        .caption = "Volume that the piston was commanded to displace: steps issued times volume per step."});
 }
 
+double middle_s(const FrameBin& frame) { return (frame.window.from_s + frame.window.to_s) / 2; }
+
 Figure binned_figure(const FrameBins& bins, const Segment& segment) {
-  std::vector<double> time_s, mean, low, high;
-  for (const FrameBin& frame : bins.frames) {
-    time_s.push_back((frame.window.from_s + frame.window.to_s) / 2);
-    mean.push_back(frame.mean_kPa);
-    low.push_back(frame.mean_kPa - frame.sd_kPa);
-    high.push_back(frame.mean_kPa + frame.sd_kPa);
-  }
+  const auto time_s = numbers_of(bins.frames, middle_s);
+  const auto mean = numbers_of(bins.frames, &FrameBin::mean_kPa);
+  const auto low = numbers_of(bins.frames, [](const FrameBin& f) { return f.mean_kPa - f.sd_kPa; });
+  const auto high = numbers_of(bins.frames, [](const FrameBin& f) { return f.mean_kPa + f.sd_kPa; });
   SvgPlot plot({.x = {.label = "time after the trigger (s)", .from = 0, .to = bins.period_s},
                 .y = {.label = "pressure (kPa)"}});
   plot.band(time_s, low, high, "a", "\u00b1 1 SD over cycles");
@@ -102,7 +104,7 @@ Figure binned_figure(const FrameBins& bins, const Segment& segment) {
 Figure loop_figure(const RecordedRun& run, const FrameBins& fine, const std::vector<double>& triggers_s) {
   std::vector<double> volume_mL, pressure_kPa;
   for (const FrameBin& frame : fine.frames) {
-    const double phase_s = (frame.window.from_s + frame.window.to_s) / 2;
+    const double phase_s = middle_s(frame);
     double sum = 0;
     size_t count = 0;
     for (const double trigger : triggers_s) {
@@ -132,14 +134,6 @@ Figure loop_figure(const RecordedRun& run, const FrameBins& fine, const std::vec
           fmt::format("Segment {}: cavity pressure against volume over the mean cycle. The commanded volume "
                       "differs from the cavity's by what the hose and the fluid take up.",
                       fine.segment)};
-}
-
-std::vector<double> segment_triggers(const RecordedRun& run, const Segment& segment) {
-  std::vector<double> kept;
-  for (const double time_s : run.trigger_s) {
-    if (time_s >= segment.start_s - 1e-3 && time_s < segment.end_s() - 1e-3) kept.push_back(time_s);
-  }
-  return kept;
 }
 
 void add_bins_table(Page& page, const FrameBins& bins) {
@@ -189,7 +183,7 @@ void add_schedule(Page& page, const RecordedRun& run) {
     const Segment& segment = run.segments[i];
     rows.push_back({fmt::format("{}  {}", i, segment.waveform), chosen(segment.start_s),
                     chosen(segment.stroke_mL), chosen(segment.offset_mL), chosen(segment.period_s),
-                    std::to_string(segment.cycles), std::to_string(triggers_within(run, segment))});
+                    std::to_string(segment.cycles), std::to_string(segment_triggers(run, segment).size())});
   }
   page.table({"segment", "start (s)", "stroke (mL)", "offset (mL)", "period (s)", "cycles", "triggers"}, rows,
              "What was scheduled, and the triggers recorded in each segment.");
@@ -201,12 +195,11 @@ void add_losses(Page& page, const RecordedRun& run) {
                              gap.first_index, gap.reason));
   }
   if (run.gaps.empty()) page.paragraph("No sample is known to be missing: the run's list of gaps is empty.");
-  std::vector<std::vector<std::string>> rows;
-  for (const runfile::Event& event : run.events) {
-    rows.push_back({number(event.time_s, 5), event.level, event.code, event.text});
-  }
-  if (!rows.empty())
-    page.table({"time (s)", "level", "code", "what happened"}, rows, "Events during the run.");
+  if (run.events.empty()) return;
+  const auto row_of = [](const runfile::Event& event) -> Page::Row {
+    return {number(event.time_s, 5), event.level, event.code, event.text};
+  };
+  page.table_of(run.events, {"time (s)", "level", "code", "what happened"}, row_of, "Events during the run.");
 }
 
 }  // namespace

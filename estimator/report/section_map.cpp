@@ -44,63 +44,33 @@ Scale scale_of(const SolutionSection& section) {
   return {low[0] - spare_mm, high[1] + margin / scale, scale, (high[1] - low[1]) * scale + 2 * margin};
 }
 
-/// A path of polygons (closed) or of single lines, in whole tenths of a pixel and relative steps.
-class Path {
- public:
-  explicit Path(const Scale& scale) : scale_(scale) {}
-
-  void polygon(const FlatPoints& points) {
-    for (size_t i = 0; i + 1 < points.size(); i += 2)
-      to(i == 0 ? 'M' : 'l', points[i], points[i + 1]);
-    text_ += 'z';
+/// Polygons (closed), or single lines of two points each, in whole tenths of a pixel and relative steps.
+std::string path_of(const FlatPoints& points, bool closed, const Scale& scale) {
+  std::string text;
+  std::array<long, 2> before{};
+  for (size_t i = 0; i + 1 < points.size(); i += 2) {
+    const std::array<long, 2> at{std::lround(10 * scale.px(points[i])),
+                                 std::lround(10 * scale.py(points[i + 1]))};
+    const bool begins = closed ? i == 0 : i % 4 == 0;
+    if (begins) before = {};
+    fmt::format_to(std::back_inserter(text), "{}{:g} {:g}", begins ? 'M' : 'l',
+                   0.1 * static_cast<double>(at[0] - before[0]),
+                   0.1 * static_cast<double>(at[1] - before[1]));
+    before = at;
   }
-  void lines(const FlatPoints& points) {
-    for (size_t i = 0; i + 1 < points.size(); i += 2)
-      to(i % 4 == 0 ? 'M' : 'l', points[i], points[i + 1]);
-  }
-  [[nodiscard]] const std::string& text() const { return text_; }
-
- private:
-  void to(char command, double h_mm, double v_mm) {
-    const long x = std::lround(10 * scale_.px(h_mm));
-    const long y = std::lround(10 * scale_.py(v_mm));
-    const bool absolute = command == 'M';
-    fmt::format_to(std::back_inserter(text_), "{}{:g} {:g}", command,
-                   0.1 * static_cast<double>(absolute ? x : x - x_),
-                   0.1 * static_cast<double>(absolute ? y : y - y_));
-    x_ = x;
-    y_ = y;
-  }
-
-  const Scale& scale_;
-  std::string text_;
-  long x_ = 0, y_ = 0;
-};
+  return closed ? text + 'z' : text;
+}
 
 std::string panel(const std::vector<FlatPoints>& cells, const std::vector<double>& values,
-                  const std::array<double, 2>& range, const Scale& scale) {
-  std::vector<Path> bins(map_colours, Path(scale));
-  for (size_t i = 0; i < cells.size(); ++i) {
-    if (!std::isfinite(values[i])) continue;
-    const double fraction = std::clamp((values[i] - range[0]) / (range[1] - range[0]), 0.0, 1.0);
-    bins[std::min(map_colours - 1, static_cast<size_t>(fraction * static_cast<double>(map_colours)))].polygon(
-        cells[i]);
-  }
-  std::string result;
-  for (size_t bin = 0; bin < map_colours; ++bin) {
-    if (bins[bin].text().empty()) continue;
-    // A stroke of the same colour closes the hairlines between neighbours.
-    result += fmt::format("<path fill=\"{0}\" stroke=\"{0}\" stroke-width=\".6\" d=\"{1}\"/>",
-                          map_colour((static_cast<double>(bin) + 0.5) / static_cast<double>(map_colours)),
-                          bins[bin].text());
-  }
-  return result;
+                  const ColourScale& colours, const Scale& scale) {
+  CellPainter painter(colours);
+  for (size_t i = 0; i < cells.size(); ++i)
+    painter.add(values[i], path_of(cells[i], true, scale));
+  return painter.svg(0.6);
 }
 
 std::string lines(const FlatPoints& points, const char* style, const Scale& scale) {
-  Path path(scale);
-  path.lines(points);
-  return fmt::format("<path class=\"{}\" d=\"{}\"/>", style, path.text());
+  return fmt::format("<path class=\"{}\" d=\"{}\"/>", style, path_of(points, false, scale));
 }
 
 /// A bar of a round length under the first drawing.
@@ -123,25 +93,35 @@ std::string length_bar(const SolutionSection& section, const Scale& scale) {
 std::string section_map(const SolutionSection& section, const NamedField& field,
                         const SectionMapLabels& labels) {
   const Scale scale = scale_of(section);
-  const std::array<double, 2> range = colour_range(field.values);
+  const ColourScale colours{colour_range(field.values)};
   const double after = panel_width + panel_gap;
   const ColourBarPlace bar{bar_left, title_height, scale.height};
   std::string body =
       fmt::format("<text x=\"{}\" y=\"14\" text-anchor=\"middle\">undeformed</text>", 0.5 * panel_width);
-  body += panel(section.cells_before, field.values, range, scale);
+  body += panel(section.cells_before, field.values, colours, scale);
   body +=
       lines(section.elements_before, "element-line", scale) + lines(section.outline_before, "outline", scale);
   body +=
       fmt::format("<g transform=\"translate({} 0)\"><text x=\"{}\" y=\"14\" text-anchor=\"middle\">{}</text>",
                   after, 0.5 * panel_width, escaped(labels.after));
-  body += panel(section.cells_after, field.values, range, scale);
+  body += panel(section.cells_after, field.values, colours, scale);
   body += lines(section.elements_after, "element-line", scale) +
           lines(section.outline_after, "outline", scale) +
           lines(section.outline_before, "outline before", scale) + "</g>";
-  body += colour_bar(range, labels.bar, bar) + length_bar(section, scale);
-  return fmt::format(
-      "<svg class=\"plot\" viewBox=\"0 0 {0:.0f} {1:.0f}\" width=\"{0:.0f}\" role=\"img\">{2}</svg>",
-      bar_left + bar.width + bar.room, title_height + scale.height + foot_height, body);
+  body += colour_bar(colours, labels.bar, bar) + length_bar(section, scale);
+  return drawing(bar_left + bar.width + bar.room, title_height + scale.height + foot_height, body);
+}
+
+std::vector<Figure> section_maps(const std::vector<SolutionSection>& sections, const MapChoice& map,
+                                 const std::string& after) {
+  std::vector<Figure> row;
+  for (const SolutionSection& section : sections) {
+    const NamedField* field = find_field(section.fields, map.field);
+    if (field == nullptr || section.cells_before.empty()) continue;
+    row.push_back(
+        {section_map(section, *field, {map.bar, after}), fmt::format("{}: {}.", section.title, map.words)});
+  }
+  return row;
 }
 
 }  // namespace diastole::report

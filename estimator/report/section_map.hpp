@@ -11,6 +11,7 @@
 #include <string>
 
 #include "estimator/io/solution_file.hpp"
+#include "estimator/report/page.hpp"
 
 namespace diastole::report {
 
@@ -21,5 +22,14 @@ struct SectionMapLabels {
 
 std::string section_map(const SolutionSection& section, const NamedField& field,
                         const SectionMapLabels& labels);
+
+/// What is drawn of all sections, where they have it.
+struct MapChoice {
+  const char* field;
+  const char* bar;    ///< above the colour bar
+  const char* words;  ///< in the captions
+};
+std::vector<Figure> section_maps(const std::vector<SolutionSection>& sections, const MapChoice& map,
+                                 const std::string& after);
 
 }  // namespace diastole::report

@@ -13,11 +13,8 @@ namespace {
 
 Figure line_figure(const ShearFit& fit) {
   SvgPlot plot({.x = {.label = "ω/M (rad per N m)"}, .y = {.label = "(a⁻² − R⁻²)/8πh (1000/m³)"}});
-  std::vector<double> x, y;
-  for (const ShearPoint& point : fit.points) {
-    x.push_back(point.rotation_per_moment_rad_per_Nm);
-    y.push_back(point.shape_1000_per_m3);
-  }
+  const auto x = numbers_of(fit.points, &ShearPoint::rotation_per_moment_rad_per_Nm);
+  const auto y = numbers_of(fit.points, &ShearPoint::shape_1000_per_m3);
   const double far = std::ranges::max(x);
   const std::vector<double> ends = {0, far};
   if (fit.determined) {
@@ -68,14 +65,13 @@ void add_shear(Page& page, const ShearTest& test, const ShearFit& fit) {
   for (const std::string& remark : fit.remarks)
     page.warning(remark);
   page.figures({line_figure(fit), residual_figure(test, fit)});
-  std::vector<std::vector<std::string>> rows;
-  for (const ShearLoad& load : fit.loads) {
-    rows.push_back({number(load.moment_Nmm), std::to_string(load.rows),
-                    std::isfinite(load.se_kPa) ? with_error(load.C1_kPa, load.se_kPa) : number(load.C1_kPa),
-                    number(load.rms_deg, 2)});
-  }
-  page.table({"moment (N mm)", "rows", "C1 by itself (kPa)", "RMS (degrees)"}, rows,
-             "Each load by itself. A neo-Hookean gel gives every load the same C1.");
+  const auto row_of = [](const ShearLoad& load) -> Page::Row {
+    return {number(load.moment_Nmm), std::to_string(load.rows),
+            std::isfinite(load.se_kPa) ? with_error(load.C1_kPa, load.se_kPa) : number(load.C1_kPa),
+            number(load.rms_deg, 2)};
+  };
+  page.table_of(fit.loads, {"moment (N mm)", "rows", "C1 by itself (kPa)", "RMS (degrees)"}, row_of,
+                "Each load by itself. A neo-Hookean gel gives every load the same C1.");
 }
 
 }  // namespace diastole::report

@@ -13,45 +13,20 @@
 namespace diastole::report {
 namespace {
 
-struct MapChoice {
-  const char* field;
-  const char* words;
-  const char* bar;
-};
-
 /// What is drawn: along the fibres where there are fibres, else around the cavity.
 std::vector<MapChoice> maps_of(const SolutionRecord& record) {
   if (record.fibres) {
-    return {{"stress_ff_kPa", "Cauchy stress along the fibres", "σ ff (kPa)"},
-            {"strain_ff", "Green strain of the fibres", "E ff"},
-            {"stress_rr_kPa", "Cauchy stress across the wall", "σ rr (kPa)"}};
+    return {{"stress_ff_kPa", "σ ff (kPa)", "Cauchy stress along the fibres"},
+            {"strain_ff", "E ff", "Green strain of the fibres"},
+            {"stress_rr_kPa", "σ rr (kPa)", "Cauchy stress across the wall"}};
   }
-  return {{"stress_cc_kPa", "Cauchy stress around the cavity", "σ cc (kPa)"},
-          {"strain_cc", "Green strain around the cavity", "E cc"},
-          {"stress_rr_kPa", "Cauchy stress across the wall", "σ rr (kPa)"}};
-}
-
-const NamedField* find(const std::vector<NamedField>& fields, std::string_view name) {
-  const auto found =
-      std::find_if(fields.begin(), fields.end(), [&](const NamedField& f) { return f.name == name; });
-  return found == fields.end() ? nullptr : &*found;
+  return {{"stress_cc_kPa", "σ cc (kPa)", "Cauchy stress around the cavity"},
+          {"strain_cc", "E cc", "Green strain around the cavity"},
+          {"stress_rr_kPa", "σ rr (kPa)", "Cauchy stress across the wall"}};
 }
 
 std::string pressure_words(const SolutionRecord& record) {
   return fmt::format("at {} kPa", chosen(record.pressure_kPa));
-}
-
-void add_maps(Page& page, const SolutionRecord& record) {
-  for (const MapChoice& map : maps_of(record)) {
-    std::vector<Figure> row;
-    for (const SolutionSection& section : record.sections) {
-      const NamedField* field = find(section.fields, map.field);
-      if (field == nullptr || section.cells_before.empty()) continue;
-      row.push_back({section_map(section, *field, {map.bar, pressure_words(record)}),
-                     fmt::format("{}: {}.", section.title, map.words)});
-    }
-    page.figures(row);
-  }
 }
 
 /// Three components of strain or stress against the depth in the wall.
@@ -63,7 +38,8 @@ std::optional<Figure> profile_figure(const SolutionProfile& profile, const char*
                 .y = {.label = stress ? "Cauchy stress (kPa)" : "Green strain"}});
   constexpr std::array<const char*, 3> styles{"a", "b", "c"};
   for (size_t i = 0; i < entries.size(); ++i) {
-    const NamedField* field = find(profile.fields, fmt::format("{}_{}{}", kind, entries[i].first, unit));
+    const NamedField* field =
+        find_field(profile.fields, fmt::format("{}_{}{}", kind, entries[i].first, unit));
     if (field == nullptr) return {};
     plot.line(profile.depth_mm, field->values, styles[i], entries[i].second);
   }
@@ -94,7 +70,7 @@ void add_profiles(Page& page, const SolutionRecord& record) {
 /// What the wall's faces say about the mesh: the radial stress there should be minus the pressure on them.
 void add_traction(Page& page, const SolutionRecord& record) {
   if (record.profiles.empty()) return;
-  const NamedField* radial = find(record.profiles.front().fields, "stress_rr_kPa");
+  const NamedField* radial = find_field(record.profiles.front().fields, "stress_rr_kPa");
   if (radial == nullptr || radial->values.size() < 2) return;
   page.headline(
       "Radial stress at the inner face", fmt::format("{} kPa", number(radial->values.front(), 3)),
@@ -129,7 +105,8 @@ void add_solution(Page& page, const SolutionRecord& record) {
       "own error. Colours end at the 2nd and the 98th hundredth of the values: stress is singular where a "
       "corner is "
       "bonded to a plate.");
-  add_maps(page, record);
+  for (const MapChoice& map : maps_of(record))
+    page.figures(section_maps(record.sections, map, pressure_words(record)));
   add_profiles(page, record);
 }
 

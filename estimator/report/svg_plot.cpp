@@ -6,6 +6,7 @@
 #include <cmath>
 #include <iterator>
 #include <limits>
+#include <numeric>
 
 #include "estimator/report/html_text.hpp"
 
@@ -45,6 +46,22 @@ std::string tick_text(double value, double step) {
 }
 
 }  // namespace
+
+SvgPlot residual_histogram(std::span<const double> edges, std::span<const double> counts) {
+  SvgPlot plot({.x = {.label = "residual / its standard deviation"}, .y = {.label = "residuals"}});
+  plot.bars(edges, counts, "a", "measured");
+  std::vector<double> x, normal;
+  if (edges.size() > 1) {
+    const double all = std::accumulate(counts.begin(), counts.end(), 0.0) * (edges[1] - edges[0]);
+    constexpr int samples = 121;
+    for (int i = 0; i < samples; ++i) {
+      x.push_back(edges.front() + (edges.back() - edges.front()) * i / (samples - 1));
+      normal.push_back(all * std::exp(-x.back() * x.back() / 2) / std::sqrt(2 * M_PI));
+    }
+  }
+  plot.line(x, normal, "b", "expected of the stated noise");
+  return plot;
+}
 
 std::vector<double> ticks_over(double from, double to, int count) {
   const double raw = (to - from) / std::max(count, 1);
@@ -265,11 +282,8 @@ std::string SvgPlot::svg() const {
   std::string body = axes(placed);
   for (const Series& series : series_)
     body += drawn(series, placed) + "\n";
-  const double height = placed.top + placed.height + bottom_margin;
-  const double width = placed.left + placed.width + right_margin;
-  return fmt::format(
-      "<svg class=\"plot\" viewBox=\"0 0 {0:.0f} {1:.0f}\" width=\"{0:.0f}\" role=\"img\">{2}{3}</svg>",
-      width, height, body, legend(placed));
+  return drawing(placed.left + placed.width + right_margin, placed.top + placed.height + bottom_margin,
+                 body + legend(placed));
 }
 
 }  // namespace diastole::report

@@ -10,6 +10,7 @@
 // The axes reach over everything that was added, rounded outwards to ticks at 1, 2 or 5 times a power of ten.
 // A NaN breaks a line. Lengths are viewBox units (CSS pixels at full size).
 
+#include <functional>
 #include <optional>
 #include <span>
 #include <string>
@@ -71,6 +72,18 @@ class SvgPlot {
   PlotOptions options_;
   std::vector<Series> series_;
 };
+
+/// One coordinate of each item: a member, or what a function makes of it.
+template <class Items, class Of>
+std::vector<double> numbers_of(const Items& items, const Of& of) {
+  std::vector<double> numbers;
+  for (const auto& item : items)
+    numbers.push_back(std::invoke(of, item));
+  return numbers;
+}
+
+/// Residuals over their standard deviations as a histogram, with the bell that they should fill.
+SvgPlot residual_histogram(std::span<const double> edges, std::span<const double> counts);
 
 /// Ticks at multiples of 1, 2 or 5 x 10^k, from the last at or below `from` to the first at or above `to`;
 /// about `count` of them.

@@ -22,14 +22,13 @@ std::array<double, 2> range_of(const std::vector<double>& values) {
   return {std::min(own[0], middle - least_half), std::max(own[1], middle + least_half)};
 }
 
-std::string cell(double x, double y, double width, double height, double value,
-                 const std::array<double, 2>& range) {
+std::string cell(double x, double y, double width, double height, double value, const ColourScale& scale) {
   if (!std::isfinite(value)) {
     return fmt::format(
         "<path class=\"grid\" style=\"fill:var(--rule)\" d=\"M{:.1f} {:.1f}h{:.1f}v{:.1f}h{:.1f}z\"/>", x, y,
         width, height, -width);
   }
-  const double fraction = std::clamp((value - range[0]) / (range[1] - range[0]), 0.0, 1.0);
+  const double fraction = scale.fraction_of(value);
   std::string drawn = fmt::format("<path fill=\"{}\" d=\"M{:.1f} {:.1f}h{:.1f}v{:.1f}h{:.1f}z\"/>",
                                   map_colour(fraction), x, y, width, height, -width);
   if (width < least_cell_for_text) return drawn;
@@ -61,7 +60,7 @@ std::string axis_text(const std::array<size_t, 3>& elements, size_t layer, doubl
 
 std::string wall_map(const std::array<size_t, 3>& elements, const std::vector<double>& values,
                      const std::string& label) {
-  const std::array<double, 2> range = range_of(values);
+  const ColourScale scale{range_of(values)};
   const double width = map_width / static_cast<double>(elements[0]);
   const double height = map_height / static_cast<double>(elements[1]);
   std::string body;
@@ -71,17 +70,15 @@ std::string wall_map(const std::array<size_t, 3>& elements, const std::vector<do
       for (size_t around = 0; around < elements[0]; ++around) {
         const double value = values[(layer * elements[1] + up) * elements[0] + around];
         body += cell(left + static_cast<double>(around) * width,
-                     top + map_height - static_cast<double>(up + 1) * height, width, height, value, range);
+                     top + map_height - static_cast<double>(up + 1) * height, width, height, value, scale);
       }
     }
     body += axis_text(elements, layer, top);
   }
   const ColourBarPlace bar{left + map_width + 18, title_height, map_height};
-  body += colour_bar(range, label, bar);
+  body += colour_bar(scale, label, bar);
   const double all = title_height + static_cast<double>(elements[2]) * (map_height + gap) - gap + foot;
-  return fmt::format(
-      "<svg class=\"plot\" viewBox=\"0 0 {0:.0f} {1:.0f}\" width=\"{0:.0f}\" role=\"img\">{2}</svg>",
-      bar.left + bar.width + bar.room, all, body);
+  return drawing(bar.left + bar.width + bar.room, all, body);
 }
 
 }  // namespace diastole::report

@@ -67,9 +67,7 @@ std::string waterfall(const std::vector<explain::Step>& steps, double floor) {
       "<text class=\"label\" x=\"{}\" y=\"{}\" text-anchor=\"middle\">reduced chi-square on "
       "data that were not fitted; dashed: noise</text>",
       left + bar_room / 2, bottom + 38);
-  return fmt::format(
-      "<svg class=\"plot\" viewBox=\"0 0 {0:.0f} {1:.0f}\" width=\"{0:.0f}\" role=\"img\">{2}</svg>",
-      left + bar_room + value_room, bottom + foot, body);
+  return drawing(left + bar_room + value_room, bottom + foot, body);
 }
 
 }  // namespace diastole::report

@@ -2,10 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <numbers>
 #include <optional>
 #include <utility>
+
+#include "estimator/mesh/face_map.hpp"
 
 namespace diastole {
 namespace {
@@ -19,32 +20,6 @@ double least_bricks(const HermiteMesh& mesh) {
   return std::clamp(std::floor(std::cbrt(bricks_in_all / static_cast<double>(mesh.element_count()))), 1.0,
                     coarse_mesh);
 }
-
-/// Each face of an element: how many elements meet there. Coincident nodes count as one.
-class FaceCount {
- public:
-  explicit FaceCount(const HermiteMesh& mesh) : mesh_(mesh) {
-    for (size_t e = 0; e < mesh.element_count(); ++e) {
-      for (size_t k = 0; k < 3; ++k) {
-        for (size_t side = 0; side < 2; ++side)
-          ++count_[places_of({e, k, side})];
-      }
-    }
-  }
-  [[nodiscard]] bool outside(const ElementFace& face) const { return count_.at(places_of(face)) == 1; }
-
- private:
-  [[nodiscard]] std::array<size_t, 4> places_of(const ElementFace& face) const {
-    std::array<size_t, 4> places = face_corners(face);
-    for (size_t& place : places)
-      place = mesh_.place_of(mesh_.element(face.element)[place]);
-    std::sort(places.begin(), places.end());
-    return places;
-  }
-
-  const HermiteMesh& mesh_;
-  std::map<std::array<size_t, 4>, int> count_;
-};
 
 std::array<size_t, 3> bricks_of(const HermiteMesh& mesh, size_t element, double cell_mm) {
   std::array<double, 3> length_mm{};
@@ -149,7 +124,7 @@ class BrickGrid {
 };
 
 /// The cell's edges that lie on faces of its element join the outline or the lines between elements.
-void add_lines(const SectionCell& cell, const FaceCount& faces, BodySection& section) {
+void add_lines(const SectionCell& cell, const FaceMap& faces, BodySection& section) {
   for (size_t i = 0; i < cell.corners.size(); ++i) {
     const Xi& from = cell.corners[i];
     const Xi& to = cell.corners[(i + 1) % cell.corners.size()];
@@ -158,7 +133,7 @@ void add_lines(const SectionCell& cell, const FaceCount& faces, BodySection& sec
         const double end = static_cast<double>(side);
         if (from[k] != end || to[k] != end) continue;
         const MaterialLine line{{{cell.element, from}, {cell.element, to}}};
-        (faces.outside({cell.element, k, side}) ? section.outline : section.elements).push_back(line);
+        (faces.is_outer({cell.element, k, side}) ? section.outline : section.elements).push_back(line);
       }
     }
   }
@@ -179,7 +154,7 @@ BodySection cut_body(const HermiteMesh& mesh, const SectionPlane& plane, double 
   // Off any face that lies in the plane up to rounding, so that one side's elements are cut as a whole.
   SectionPlane shifted = plane;
   shifted.origin_mm -= 1e-6 * mesh.extent_mm() * plane.horizontal.cross(plane.vertical);
-  const FaceCount faces(mesh);
+  const FaceMap faces(mesh);
   BodySection section;
   for (size_t e = 0; e < mesh.element_count(); ++e) {
     const BrickGrid grid(mesh, shifted, e, cell_mm);

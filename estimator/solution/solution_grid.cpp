@@ -11,18 +11,6 @@
 namespace diastole {
 namespace {
 
-/// Adds an element's control values, row = control point, to an array in VTK's order.
-void append(const Eigen::MatrixXd& control, std::vector<double>& values) {
-  const auto width = static_cast<size_t>(control.cols());
-  const size_t start = values.size();
-  values.resize(start + bezier_points * width);
-  for (size_t i = 0; i < bezier_points; ++i) {
-    const size_t row = start + width * vtk_place_of(i & 3, (i >> 2) & 3, i >> 4);
-    for (size_t j = 0; j < width; ++j)
-      values[row + j] = control(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j));
-  }
-}
-
 /// What is sampled at a Gauss point, one array after the other.
 Eigen::VectorXd sampled(const PointFields& fields) {
   std::vector<double> values;
@@ -55,7 +43,7 @@ GridStep step_of(const ElasticModel& model, const SolvedFrame& frame) {
   const std::array<double, 4> places = line_rule_4().place;
   for (size_t e = 0; e < mesh.element_count(); ++e) {
     const ElementField moved = mesh.gather(e, frame.state.position_mm) - mesh.gather(e, mesh.reference());
-    append(bezier_of(moved).transpose(), displacement.values);
+    append_in_vtk_order(bezier_of(moved).transpose(), displacement.values);
     Eigen::MatrixXd samples;
     for (size_t q = 0; q < gauss_points; ++q) {
       const Eigen::VectorXd row = sampled(point_fields(system, frame.state, {e, gauss_tables().xi[q]}));
@@ -66,7 +54,7 @@ GridStep step_of(const ElasticModel& model, const SolvedFrame& frame) {
     Eigen::Index column = 0;
     for (GridArray& array : arrays) {
       const auto width = static_cast<Eigen::Index>(array.components);
-      append(control.middleCols(column, width), array.values);
+      append_in_vtk_order(control.middleCols(column, width), array.values);
       column += width;
     }
   }
@@ -83,7 +71,7 @@ BezierGrid solution_grid(const ElasticModel& model, std::span<const SolvedFrame>
   for (const LawParameter& parameter : model.law().parameters())
     grid.cell_data.push_back({std::string(parameter.name), 1, {}});
   for (size_t e = 0; e < mesh.element_count(); ++e) {
-    append(bezier_of(mesh.gather(e, mesh.reference())).transpose(), grid.points_mm);
+    append_in_vtk_order(bezier_of(mesh.gather(e, mesh.reference())).transpose(), grid.points_mm);
     grid.cell_data[0].values.push_back(static_cast<double>(e));
     for (size_t i = 0; i < model.law().parameters().size(); ++i)
       grid.cell_data[i + 1].values.push_back(model.element_parameter(i, e));

@@ -5,9 +5,9 @@
 #include <filesystem>
 #include <iostream>
 #include <memory>
-#include <nlohmann/json.hpp>
 
 #include "estimator/catheter/step_fit.hpp"
+#include "estimator/io/member_json.hpp"
 #include "estimator/io/whole_file.hpp"
 #include "estimator/report/html_text.hpp"
 #include "estimator/report/page.hpp"
@@ -16,9 +16,15 @@
 #include "tools/diastole/catheter/catheter_page.hpp"
 
 namespace diastole {
+namespace signal {
+
+DIASTOLE_MEMBERS(Estimate, value, se, ci95)
+DIASTOLE_MEMBERS(FittedStep, time_s, before_kPa, jump_kPa, f0_Hz, zeta, rms_kPa, noise_kPa)
+
+}  // namespace signal
+
 namespace {
 
-using nlohmann::ordered_json;
 using signal::CatheterResponse;
 using signal::Estimate;
 
@@ -29,31 +35,17 @@ struct CatheterOptions {
   bool force = false;
 };
 
-ordered_json as_json(const Estimate& estimate) {
-  return {{"value", estimate.value}, {"se", estimate.se}, {"ci95", estimate.ci95}};
-}
-
-ordered_json as_json(const CatheterOptions& options, const CatheterResponse& response) {
-  ordered_json steps = ordered_json::array();
-  for (const signal::FittedStep& step : response.steps) {
-    steps.push_back({{"time_s", step.time_s},
-                     {"before_kPa", step.before_kPa},
-                     {"jump_kPa", step.jump_kPa},
-                     {"f0_Hz", as_json(step.f0_Hz)},
-                     {"zeta", as_json(step.zeta)},
-                     {"rms_kPa", step.rms_kPa},
-                     {"noise_kPa", step.noise_kPa}});
-  }
-  ordered_json document{{"run", options.run.string()},
-                        {"channel", options.channel},
-                        {"f0_Hz", as_json(response.f0_Hz)},
-                        {"zeta", as_json(response.zeta)},
-                        {"minus_3dB_Hz", as_json(response.minus_3dB_Hz)},
-                        {"lag_5_percent_Hz", as_json(response.lag_limit_Hz)},
-                        {"flat_5_percent_Hz", as_json(response.flat_limit_Hz)},
-                        {"delay_s", as_json(response.delay_s)},
-                        {"steps", steps},
-                        {"remarks", response.remarks}};
+Json as_json(const CatheterOptions& options, const CatheterResponse& response) {
+  Json document{{"run", options.run.string()},
+                {"channel", options.channel},
+                {"f0_Hz", written(response.f0_Hz)},
+                {"zeta", written(response.zeta)},
+                {"minus_3dB_Hz", written(response.minus_3dB_Hz)},
+                {"lag_5_percent_Hz", written(response.lag_limit_Hz)},
+                {"flat_5_percent_Hz", written(response.flat_limit_Hz)},
+                {"delay_s", written(response.delay_s)},
+                {"steps", written(response.steps)},
+                {"remarks", response.remarks}};
   if (!options.page.empty()) document["page"] = options.page.string();
   return document;
 }
