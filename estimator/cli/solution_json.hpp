@@ -1,5 +1,5 @@
 #pragma once
-// What one equilibrium is told as in --json documents.
+// One equilibrium as --json documents hold it.
 
 #include <nlohmann/json.hpp>
 

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <vector>
 
+#include "protocol/signal/median.hpp"
+
 namespace diastole {
 namespace {
 
@@ -39,9 +41,7 @@ double core_deviation(const Eigen::VectorXd& residuals) {
   if (residuals.size() == 0) return 0;
   std::vector<double> size(static_cast<size_t>(residuals.size()));
   std::transform(residuals.begin(), residuals.end(), size.begin(), [](double r) { return std::abs(r); });
-  const auto middle = size.begin() + static_cast<std::ptrdiff_t>(size.size() / 2);
-  std::nth_element(size.begin(), middle, size.end());
-  return 1.4826 * *middle;
+  return 1.4826 * signal::median(std::move(size));
 }
 
 Eigen::Index wild_count(const Eigen::VectorXd& residuals) {

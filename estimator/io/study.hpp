@@ -111,7 +111,7 @@ struct StudyMoment {
   double time_s;
 };
 
-/// What the study tells of one of its effects: [model.parameters.ID.NAME] and [[model.moments.ID]]. Whether id and
+/// What the study states of one of its effects: [model.parameters.ID.NAME] and [[model.moments.ID]]. Whether id and
 /// names are known is decided where the model is built.
 struct StudyEffect {
   std::string id;

@@ -26,7 +26,7 @@ constexpr uint8_t bezier_hexahedron = 79;
 constexpr hsize_t compressed_from = 4096;  // rows; shorter datasets are stored as they are
 constexpr unsigned deflate_level = 4;
 
-/// Typed writing below /VTKHDF. Every failure is one of the disk, told of the file that is asked for, not of the
+/// Typed writing below /VTKHDF. Every failure is one of the disk, reported of the file that is asked for, not of the
 /// temporary one.
 class Sink {
  public:

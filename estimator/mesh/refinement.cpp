@@ -106,7 +106,7 @@ DofTies Refinement::ties(const HermiteMesh& coarse) const {
   const size_t bit = size_t{1} << direction_;
   const std::vector<size_t> hosts = hosts_of(coarse);
   DofTies ties = coarse.ties();
-  // A new dof depends on four old ones; two new dofs that depend on the same four are one. The last entry tells
+  // A new dof depends on four old ones; two new dofs that depend on the same four are one. The last entry separates
   // value (0) from derivative along the edge (1).
   std::map<std::array<size_t, 5>, size_t> known;
   for (size_t m = 0; m < midpoints_.size(); ++m) {

@@ -42,7 +42,7 @@ struct Coverage {
   std::vector<AffineMode> affine_modes;
 };
 
-/// The eight places of an element at which errors are told: (1 ∓ 1/√3)/2 in each direction, corner order.
+/// The eight places of an element at which errors are computed: (1 ∓ 1/√3)/2 in each direction, corner order.
 std::array<Xi, element_probes> probe_places();
 /// Tri-linear through the values at the probes, held to their range beyond them.
 double between_probes(const std::array<double, element_probes>& values, const Xi& xi);

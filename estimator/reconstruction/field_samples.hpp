@@ -1,5 +1,5 @@
 #pragma once
-// A field told at points, for `NAME.points.csv`, with standard errors that a fit may trust.
+// A field sampled at points, for `NAME.points.csv`, with standard errors that a fit may trust.
 //
 // A smoothed field is biased: it moves less where motion is sharp. The points are of the field smoothed twice (J. W. Tukey's
 // twicing), u + H⁻¹Gᵀ r with the residuals r, of which only the square of that bias is left. Its noise is at most 1.19 times

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "estimator/motion_residuals/tag_match.hpp"
+#include "protocol/signal/median.hpp"
 
 namespace diastole {
 namespace {
@@ -192,9 +193,7 @@ double robust_spread(std::vector<double> values) {
   if (values.empty()) return 0.0;
   for (double& value : values)
     value = std::abs(value);
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle / 0.6745;
+  return signal::median(std::move(values)) / 0.6745;
 }
 
 FrameField reconstruct_frame(const FieldForms& forms, const Measurement& measurement, int frame,

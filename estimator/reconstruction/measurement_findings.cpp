@@ -10,6 +10,7 @@
 
 #include "estimator/mesh/point_locator.hpp"
 #include "estimator/reconstruction/frame_field.hpp"
+#include "protocol/signal/median.hpp"
 
 namespace diastole {
 namespace {
@@ -207,9 +208,7 @@ void check_frames(Findings& findings, const Measurement& measurement) {
   const std::vector<size_t> rows = rows_of_frames(measurement);
   std::vector<size_t> loaded(rows.begin() + 1, rows.end());
   if (loaded.empty()) return;
-  std::nth_element(loaded.begin(), loaded.begin() + static_cast<std::ptrdiff_t>(loaded.size() / 2),
-                   loaded.end());
-  const size_t usual = loaded[loaded.size() / 2];
+  const size_t usual = signal::median(std::move(loaded));
   std::vector<int> missing, sparse;
   for (size_t frame = 1; frame < rows.size(); ++frame) {
     if (rows[frame] == 0)
@@ -217,19 +216,19 @@ void check_frames(Findings& findings, const Measurement& measurement) {
     else if (4 * rows[frame] < usual)
       sparse.push_back(static_cast<int>(frame));
   }
-  const auto tell = [&](const std::vector<int>& frames, const char* id, const char* one, const char* many,
-                        const char* remedy) {
+  const auto report = [&](const std::vector<int>& frames, const char* id, const char* one, const char* many,
+                          const char* remedy) {
     if (frames.empty()) return;
     findings.push_back({Severity::warning, id,
                         fmt::format("Frame{} {} {}.", frames.size() == 1 ? "" : "s", list_words(frames),
                                     frames.size() == 1 ? one : many),
                         "column frame", static_cast<double>(frames.size()), "frames", remedy});
   };
-  tell(missing, "missing-frames", "of the frames file has no points", "of the frames file have no points",
-       "Track those frames too, or remove their rows from the frames file and number the others anew.");
-  tell(sparse, "sparse-frames", "has less than a quarter of the points of the others",
-       "have less than a quarter of the points of the others",
-       "Check that all slices of these frames were tracked and exported.");
+  report(missing, "missing-frames", "of the frames file has no points", "of the frames file have no points",
+         "Track those frames too, or remove their rows from the frames file and number the others anew.");
+  report(sparse, "sparse-frames", "has less than a quarter of the points of the others",
+         "have less than a quarter of the points of the others",
+         "Check that all slices of these frames were tracked and exported.");
 }
 
 void check_pressures(Findings& findings, const std::vector<Frame>& frames) {

@@ -46,7 +46,7 @@ class SmoothedSystem {
 
   void set_rows(std::span<const ObservationRow> rows);
   void factorise(double lambda);
-  /// H = A + M/u², without smoothness: what the data alone tell (coverage.hpp).
+  /// H = A + M/u², without smoothness: what the data alone determine (coverage.hpp).
   void factorise_without_smoothness(double amplitude_mm);
 
   // All below belong to the last rows and the last factorisation.

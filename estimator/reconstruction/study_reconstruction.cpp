@@ -51,7 +51,7 @@ std::vector<int> loaded_frames(const Study& study, const Measurement& measuremen
   return {frames.begin(), frames.end()};
 }
 
-/// The frames in their order; or, where one λ must do for all, the most loaded one first, which tells it best.
+/// The frames in their order; or, where one λ must do for all, the most loaded one first, which determines it best.
 std::vector<int> in_order_of_work(std::vector<int> frames, const Measurement& measurement, bool quick) {
   if (!quick) return frames;
   const auto load_kPa = [&](int frame) {

@@ -138,7 +138,7 @@ void add_trace(Page& page, const Trace& trace) {
   add_heat_map(page, trace);
 }
 
-std::vector<std::array<double, 3>> lumps_mm(const Explanation& explanation) {
+std::vector<std::array<double, 3>> inclusions_mm(const Explanation& explanation) {
   std::vector<std::array<double, 3>> places;
   for (const explain::FoundEffect& effect : explanation.effects) {
     std::map<std::string, double> value;
@@ -184,7 +184,7 @@ void add_explained_traces(Page& page, const Explanation& explanation) {
 void add_explained_field(Page& page, const Explanation& explanation) {
   if (explanation.field.empty()) return;
   const std::array<double, 2> rms = rms_of(explanation.field);
-  const std::vector<std::array<double, 3>> lumps = lumps_mm(explanation);
+  const std::vector<std::array<double, 3>> inclusions = inclusions_mm(explanation);
   page.section(
       "Where in the wall",
       fmt::format(
@@ -194,8 +194,8 @@ void add_explained_field(Page& page, const Explanation& explanation) {
           "the "
           "undeformed body; holes hold too few.{}",
           explanation.field.size(), number(rms[0], 3), number(rms[1], 3),
-          lumps.empty() ? "" : " The ring is where the lump was found."));
-  for (const FieldView& view : field_views(explanation.field, lumps)) {
+          inclusions.empty() ? "" : " The ring is where the lump was found."));
+  for (const FieldView& view : field_views(explanation.field, inclusions)) {
     page.figures({{heat_map(view.before, view.after,
                             {.x = "angle about the axis (degrees)",
                              .y = view.y_label,

@@ -127,7 +127,7 @@ class Misfits {
   double window_mm_;
 };
 
-/// `place_of(row, column)` tells the middle of a cell.
+/// `place_of(row, column)` is the middle of a cell.
 template <class PlaceOf>
 void fill(FieldView& view, size_t rows, const Misfits& misfits, const PlaceOf& place_of) {
   view.before.assign(rows, std::vector<double>(turns));

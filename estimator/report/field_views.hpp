@@ -1,7 +1,7 @@
 #pragma once
 // Residuals of tags or points seen on the wall: unrolled, in layers from inside to outside, and across the axis.
 //
-// One tag tells little, the tags around a place tell together whether the motion is off there. With r_i the residuals in
+// One tag shows little, the tags around a place show together whether the motion is off there. With r_i the residuals in
 // sigmas, b_i their change by a motion u that the model lacks, and Gaussian weights w_i around the place (of a standard
 // deviation of three tenths of the wall, some 8 mm of the paper's gel),
 //

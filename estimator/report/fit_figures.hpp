@@ -1,5 +1,5 @@
 #pragma once
-// Pictures of what a fit tells of its parameters.
+// Pictures of what a fit finds of its parameters.
 
 #include <vector>
 

@@ -69,6 +69,15 @@ std::string figure_html(const std::string& body, const std::string& caption) {
 
 }  // namespace
 
+std::string standalone(std::string svg, const std::string& title) {
+  svg.insert(
+      svg.find('>') + 1,
+      fmt::format("<title>{}</title><style>{}</style><rect width=\"100%\" height=\"100%\" fill=\"white\"/>",
+                  escaped(title), embedded::page_css));
+  svg.insert(svg.find("<svg") + 4, " xmlns=\"http://www.w3.org/2000/svg\"");
+  return svg + "\n";
+}
+
 void Page::headline(const std::string& label, const std::string& value, const std::string& note) {
   headlines_ +=
       fmt::format("<div class=\"headline\"><span>{}</span><strong>{}</strong><small>{}</small></div>\n",

@@ -17,6 +17,9 @@ struct Figure {
   std::string caption;  ///< plain words; it is escaped
 };
 
+/// A drawing as a file of its own, with the page's colours; `title` is what a browser shows under the pointer.
+std::string standalone(std::string svg, const std::string& title);
+
 /// A trace against time. Both the SVG and the chart are drawn from the same numbers.
 struct TimeChart {
   struct Trace {

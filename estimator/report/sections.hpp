@@ -1,5 +1,5 @@
 #pragma once
-// What the report tells about each kind of file.
+// What the report shows of each kind of file.
 
 #include "estimator/explain/verdict/explanation.hpp"
 #include "estimator/io/fit_file.hpp"

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <iterator>
 #include <limits>
@@ -14,7 +15,7 @@ namespace diastole::report {
 namespace {
 
 constexpr double left_margin = 62, right_margin = 14, top_margin = 12, bottom_margin = 46;
-constexpr double legend_height = 24;
+constexpr double legend_height = 24, legend_row = 18;
 constexpr double letter_width = 6.4;  // mean advance of the legend's 12 px type
 
 std::vector<double> copied(std::span<const double> values) { return {values.begin(), values.end()}; }
@@ -143,7 +144,7 @@ SvgPlot::Frame SvgPlot::frame() const {
   const Interval x = x_range.drawable(), y = y_range.drawable();
   Frame frame{};
   frame.left = left_margin;
-  frame.top = top_margin + (has_legend ? legend_height : 0);
+  frame.top = has_legend ? legend_places().back()[1] + legend_height - 4 : top_margin;
   frame.width = options_.width - left_margin - right_margin;
   frame.height = options_.height - frame.top - bottom_margin;
   const auto ticks = [](const PlotAxis& axis, const Interval& range, int count) {
@@ -258,12 +259,28 @@ std::string SvgPlot::axes(const Frame& frame) const {
       frame.top + frame.height / 2, escaped(options_.y.label));
 }
 
-std::string SvgPlot::legend(const Frame& frame) const {
+std::vector<std::array<double, 2>> SvgPlot::legend_places() const {
+  std::vector<std::array<double, 2>> places;
+  double x = left_margin, y = top_margin + 4;
+  for (const Series& series : series_) {
+    const double width =
+        series.name.empty() ? 0 : 40 + letter_width * static_cast<double>(series.name.size());
+    if (x > left_margin && x + width - 18 > options_.width) {
+      x = left_margin;
+      y += legend_row;
+    }
+    places.push_back({x, y});
+    x += width;
+  }
+  return places;
+}
+
+std::string SvgPlot::legend() const {
+  const std::vector<std::array<double, 2>> places = legend_places();
   std::string result;
-  double x = frame.left;
-  const double y = top_margin + 4;
   for (const Series& series : series_) {
     if (series.name.empty()) continue;
+    const auto [x, y] = places[static_cast<size_t>(&series - series_.data())];
     const char* shape = series.kind == Kind::points  ? "dots"
                         : series.kind == Kind::line  ? "line"
                         : series.kind == Kind::marks ? "mark"
@@ -272,7 +289,6 @@ std::string SvgPlot::legend(const Frame& frame) const {
     result += fmt::format("<path class=\"{} {}\" d=\"M{:.1f} {:.1f}h{}\"/>", shape, series.style, start, y,
                           series.kind == Kind::points ? 0 : 16);
     result += fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\">{}</text>", x + 22, y + 4, escaped(series.name));
-    x += 40 + letter_width * static_cast<double>(series.name.size());
   }
   return result;
 }
@@ -283,7 +299,7 @@ std::string SvgPlot::svg() const {
   for (const Series& series : series_)
     body += drawn(series, placed) + "\n";
   return drawing(placed.left + placed.width + right_margin, placed.top + placed.height + bottom_margin,
-                 body + legend(placed));
+                 body + legend());
 }
 
 }  // namespace diastole::report

@@ -10,6 +10,7 @@
 // The axes reach over everything that was added, rounded outwards to ticks at 1, 2 or 5 times a power of ten.
 // A NaN breaks a line. Lengths are viewBox units (CSS pixels at full size).
 
+#include <array>
 #include <functional>
 #include <optional>
 #include <span>
@@ -67,7 +68,9 @@ class SvgPlot {
   [[nodiscard]] Frame frame() const;
   [[nodiscard]] static std::string drawn(const Series& series, const Frame& frame);
   [[nodiscard]] std::string axes(const Frame& frame) const;
-  [[nodiscard]] std::string legend(const Frame& frame) const;
+  /// Where each series' name stands: in as many rows as are needed.
+  [[nodiscard]] std::vector<std::array<double, 2>> legend_places() const;
+  [[nodiscard]] std::string legend() const;
 
   PlotOptions options_;
   std::vector<Series> series_;

@@ -109,9 +109,9 @@ Figure table_figure(const SavedTable& table, size_t parameter) {
       paper_mm.push_back(entry.noise_mm);
       paper.push_back((*cells)[parameter]);
     }
-    const char* look = styles[style++ % styles.size()];
-    plot.line(noise_mm, sd, look, fmt::format("{} frame{}", count, count == 1 ? "" : "s"));
-    if (!paper.empty()) plot.points(paper_mm, paper, look);
+    const char* line_style = styles[style++ % styles.size()];
+    plot.line(noise_mm, sd, line_style, fmt::format("{} frame{}", count, count == 1 ? "" : "s"));
+    if (!paper.empty()) plot.points(paper_mm, paper, line_style);
   }
   return {plot.svg(), fmt::format("{}: standard deviation of the refits in % of their mean.{}",
                                   first_known(table)->parameters[parameter].name,

@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 
+#include "protocol/signal/median.hpp"
+
 namespace diastole::rig {
 namespace {
 
@@ -131,12 +133,6 @@ ChannelNoise autoregression_of(const Autocovariance& covariance) {
   return noise;
 }
 
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 /// Mean squares of a series and of its second differences (over 6, so that white noise has two equal ones).
 struct Roughness {
   double square = 0.0;
@@ -214,7 +210,7 @@ double common_beat(const std::vector<BeatChange>& changes) {
   std::vector<double> sizes;
   for (const BeatChange& change : changes)
     sizes.push_back(std::sqrt(change.square));
-  double variance = 0.5 * std::pow(median(sizes) / 0.6745, 2);
+  double variance = 0.5 * std::pow(signal::median(sizes) / 0.6745, 2);
   for (size_t round = 0; round < rounds; ++round) {
     double sum = 0.0;
     double weight = 0.0;

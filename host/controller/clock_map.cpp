@@ -4,8 +4,12 @@
 #include <cmath>
 #include <vector>
 
+#include "protocol/signal/median.hpp"
+
 namespace diastole {
 namespace {
+
+using signal::median;
 
 constexpr size_t most_pairs_for_slopes = 200;
 constexpr double rejection_in_deviations = 4.5;
@@ -13,12 +17,6 @@ constexpr double deviation_of_normal = 1.4826;  // standard deviation / median a
 constexpr double least_span_s = 1.0;
 constexpr double largest_drift = 1e-2;  // crystals differ by 1e-4 at most; more is not a drift
 constexpr double least_uncertainty_s = 1e-6;
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 /// Median slope between pairs that lie at least half the span apart.
 double median_slope(const std::vector<ClockPair>& pairs, double span_s) {

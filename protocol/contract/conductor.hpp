@@ -18,7 +18,7 @@
 // controller and plant to until_ns (which sends serial bytes), and answers. The daemon reads its end until it
 // has serial_bytes_sent_total bytes, and only then goes on. Each of these waits ends after one second of wall
 // time at the latest. The totals count from the moment the daemon opened the serial port, when both are 0.
-// until_ns at or before the rig's present does not move time; the answer tells the present.
+// until_ns at or before the rig's present does not move time; the answer states the present.
 //
 // While the daemon waits for its instrument, time stands still, unless the answer is late or will not come. Then the
 // rig moves time on by itself, to the answer or to the end of the daemon's patience (timeout_ms of the rig file),

@@ -13,7 +13,7 @@
 //   sd_kPa     standard deviation of p_ik over the cycles (n-1); 0 if there is only one
 //   drift      slope of p_ik against the cycle's number, least squares, kPa a cycle
 // A cycle enters only if it is whole and its triggers are in time (cycles.hpp): one that is not is left out of all
-// frames, and told with its reason. Where a run has slices, only their cycles are imaged: dummy cycles and
+// frames, and reported with its reason. Where a run has slices, only their cycles are imaged: dummy cycles and
 // those between slices do not count at all.
 //
 // What delays the signal (catheter, filter) by d shows at t + d what the pressure was at t. With
@@ -74,7 +74,7 @@ struct FrameBins {
 double binned_interval_s(const RecordedRun& run, const FrameBinOptions& options);
 
 /// Throws InputError when the run has no such segment, slice or channel, the segment has no trigger, a window leaves
-/// the interval, or no whole cycle is left (the message tells why the first was excluded).
+/// the interval, or no whole cycle is left (the message says why the first was excluded).
 FrameBins bin_frames(const RecordedRun& run, const FrameBinOptions& options);
 
 }  // namespace diastole::runfile

@@ -2,7 +2,7 @@
 // When the scanner really took its frames: windows counted from the trigger, for frame_bins.hpp.
 //
 // TR times the frame's number is not when a frame was taken as soon as a sequence waits for the next trigger; the
-// images tell it (DICOM TriggerTime (0018,1060), in ms from the R-wave to the beginning of the frame's data). A frame
+// images state it (DICOM TriggerTime (0018,1060), in ms from the R-wave to the beginning of the frame's data). A frame
 // file lists it:
 //
 //   frame,trigger_time_ms,width_ms
@@ -41,7 +41,7 @@ std::vector<FrameStart> repeated_starts(size_t frames, double first_s, double re
 std::vector<FrameStart> read_frame_times(const std::filesystem::path& file);
 std::vector<FrameStart> parse_frame_times(const std::string& text, const std::string& file);
 
-/// Gives those without a width one, `width_s` if it is given, else as told above, within `interval_s`.
+/// Gives those without a width one, `width_s` if it is given, else as stated above, within `interval_s`.
 std::vector<FrameWindow> windows_of(const std::vector<FrameStart>& starts, std::optional<double> width_s,
                                     double interval_s);
 

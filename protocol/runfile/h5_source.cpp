@@ -105,7 +105,7 @@ struct H5Source::Column {
 };
 
 H5Source::H5Source(const std::filesystem::path& path) : name_(path.string()) {
-  H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);  // failures are told by fail(), not printed by the library
+  H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);  // failures are reported by fail(), not printed by the library
   if (!std::filesystem::is_regular_file(path)) {
     fail("", "cannot be opened", "Check the path and that you may read the file.");
   }

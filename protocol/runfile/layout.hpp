@@ -1,5 +1,5 @@
 #pragma once
-// The run file NAME.run.h5: every name in it and the unit that its `units` attribute tells.
+// The run file NAME.run.h5: every name in it and the unit that its `units` attribute states.
 // What the file means to a user is in docs/run-file.md; reader.hpp reads it, host/runfile writes it.
 //
 //   /                      attributes format, format_version, run_id, started_utc, producer

@@ -98,7 +98,7 @@ std::vector<Event> read_events(const H5Source& source) {
   return events;
 }
 
-/// None unless all of it is told.
+/// None unless all of it is there.
 std::optional<StreamGrid> read_grid(const H5Source& source, const std::string& group) {
   const auto attributes = source.attributes(group);
   const auto number = [&](const char* name) -> std::optional<double> {

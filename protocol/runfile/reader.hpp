@@ -13,7 +13,7 @@ namespace diastole::runfile {
 /// missing, not a run file, of a newer format_version, or breaks a rule of `check`.
 RecordedRun read_run(const std::filesystem::path& path);
 
-/// Far beyond any run, and within what arithmetic on times and counts bears without another look.
+/// Far beyond any run, and within what arithmetic on times and counts bears without another check.
 inline constexpr double longest_time_s = 1e10;
 inline constexpr double shortest_period_s = 1e-6;
 inline constexpr int64_t most_counted = 1'000'000'000'000;
@@ -31,7 +31,7 @@ class StreamCheck {
   /// `group`: "/pressure", whose time is "/pressure/time_s".
   StreamCheck(std::string file, std::string group) : file_(std::move(file)), group_(std::move(group)) {}
   void time(double time_s);
-  /// Of the row whose time was told last.
+  /// Of the row whose time was given last.
   void value(const std::string& dataset, double value) const;
 
  private:

@@ -53,7 +53,7 @@ struct Event {
   std::string text;
 };
 
-/// Where the rows of a stream were due, as the clocks tell and not as rows were counted: row k at start_s + k / rate_Hz,
+/// Where the rows of a stream were due, by the clocks and not as rows were counted: row k at start_s + k / rate_Hz,
 /// from the start of run to the end of the recording.
 struct StreamGrid {
   double start_s = 0;
@@ -64,17 +64,17 @@ struct StreamGrid {
 };
 
 struct PumpTrace {
-  std::optional<StreamGrid> grid;  ///< none: the file does not tell
+  std::optional<StreamGrid> grid;  ///< none: the file does not say
   std::vector<double> time_s;
   std::vector<double> commanded_mL;  ///< steps issued x volume per step
 };
 
 struct PressureTrace {
-  std::optional<StreamGrid> grid;  ///< none: the file does not tell
+  std::optional<StreamGrid> grid;  ///< none: the file does not say
   std::vector<double> time_s;
   /// By dataset name, "cavity_kPa" always among them; each as long as time_s, NaN where a gap is declared.
   std::map<std::string, std::vector<double>, std::less<>> channels;
-  /// What a channel's dataset tells about itself besides its unit, by channel: how it was filtered, say.
+  /// What a channel's dataset states about itself besides its unit, by channel: how it was filtered, say.
   std::map<std::string, std::map<std::string, Attribute, std::less<>>, std::less<>> notes;
 };
 

@@ -12,7 +12,7 @@
 namespace diastole::runfile {
 namespace {
 
-constexpr size_t most_remarks = 5;  // told one by one, for each segment
+constexpr size_t most_remarks = 5;  // reported one by one, for each segment
 
 StreamFacts facts_of(const RecordedRun& run, const auto& trace, std::string_view stream) {
   const std::span<const double> time_s = trace.time_s;

@@ -18,7 +18,7 @@ struct StreamFacts {
   size_t rows = 0;
   int64_t missing = 0;  ///< of them, declared in /gaps
   std::optional<int64_t>
-      expected;        ///< rows that were due by the clocks (StreamGrid); none: the file does not tell
+      expected;        ///< rows that were due by the clocks (StreamGrid); none: the file does not say
   double rate_Hz = 0;  ///< from the median spacing; 0 for fewer than two rows
   Irregularity irregularity{};  ///< no fault as long as nothing is missing (spacing.hpp)
 
@@ -57,7 +57,7 @@ struct Soundness {
 bool is_stop_on_request(std::string_view code);
 bool was_stopped_on_request(const RecordedRun& run);
 
-/// When the motion ended that the segments plan, or when it was broken off, as an event tells; 0 without segments.
+/// When the motion ended that the segments plan, or when it was broken off, as an event says; 0 without segments.
 double end_of_motion_s(const RecordedRun& run);
 
 /// Precondition: the run has passed `check`.

@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <limits>
+#include <utility>
+
+#include "protocol/signal/median.hpp"
 
 namespace diastole::runfile {
 namespace {
@@ -23,10 +26,7 @@ double median_spacing_s(std::span<const double> time_s) {
   std::vector<double> steps_s;
   for (size_t i = 1; i < time_s.size(); ++i)
     steps_s.push_back(time_s[i] - time_s[i - 1]);
-  if (steps_s.empty()) return 0;
-  const auto middle = steps_s.begin() + static_cast<std::ptrdiff_t>(steps_s.size() / 2);
-  std::nth_element(steps_s.begin(), middle, steps_s.end());
-  return *middle;
+  return steps_s.empty() ? 0.0 : signal::median(std::move(steps_s));
 }
 
 std::vector<size_t> holes_before(std::span<const double> time_s, double spacing_s) {

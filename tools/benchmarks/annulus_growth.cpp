@@ -56,7 +56,6 @@ LineChart chart_of(const std::vector<AnnulusAnswer>& answers) {
                   "log10 of the cost",
                   {3.0, -2.0},
                   {5.5, 6.0},
-                  {0.5, 1.0},
                   {}};
   for (const Growth& growth : growths) {
     ChartSeries series{growth.what, {}, false};

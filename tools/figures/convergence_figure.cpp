@@ -8,7 +8,6 @@
 #include <array>
 #include <cstdio>
 #include <ctime>
-#include <fstream>
 #include <optional>
 #include <string>
 #include <vector>
@@ -93,7 +92,6 @@ LineChart make_figure() {
                   "radial displacement (mm)",
                   {20.0, 3.0},
                   {52.0, 9.0},
-                  {5.0, 1.0},
                   {}};
   fmt::print(
       "| mesh | unknowns | P, C1 (kPa) | R 22.5 | 30 | 36.25 | 43 | 50 | ΔV | tangents + corrections | "
@@ -122,16 +120,5 @@ LineChart make_figure() {
 }  // namespace diastole
 
 int main(int argc, char** argv) {
-  if (argc != 2) {
-    std::fputs("usage: convergence_figure FIGURE.svg > TABLE.md\n", stderr);
-    return 2;
-  }
-  const std::string svg = diastole::to_svg(diastole::make_figure());
-  std::ofstream file(argv[1]);
-  file << svg;
-  if (!file.flush()) {
-    std::fprintf(stderr, "convergence_figure: %s cannot be written\n", argv[1]);
-    return 2;
-  }
-  return 0;
+  return diastole::write_figure(argc, argv, "convergence_figure", diastole::make_figure);
 }

@@ -11,26 +11,16 @@
 #include <string>
 
 #include "estimator/io/whole_file.hpp"
-#include "estimator/report/embedded.hpp"
 #include "estimator/report/fit_figures.hpp"
 #include "estimator/report/table_figure.hpp"
 
 namespace diastole {
 namespace {
 
-/// A page's drawing as a file of its own, with the page's colours.
-std::string standalone(std::string svg) {
-  const size_t inside = svg.find('>') + 1;
-  svg.insert(inside, fmt::format("<style>{}</style><rect width=\"100%\" height=\"100%\" fill=\"white\"/>",
-                                 report::embedded::page_css));
-  svg.insert(svg.find("<svg") + 4, " xmlns=\"http://www.w3.org/2000/svg\"");
-  return svg + "\n";
-}
-
 void draw(const std::string& file, const std::filesystem::path& folder) {
   const std::string text = read_whole_file(file);
   const auto write = [&](const char* name, const report::Figure& figure) {
-    write_whole_file(folder / name, standalone(figure.svg));
+    write_whole_file(folder / name, report::standalone(figure.svg, figure.caption));
     fmt::print("{}: {}\n", (folder / name).string(), figure.caption);
   };
   if (is_cells_file(text)) {

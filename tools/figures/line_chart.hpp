@@ -1,5 +1,5 @@
 #pragma once
-// A line chart as SVG text: for the figures of docs/.
+// A line chart as an SVG file: for the figures of docs/.
 
 #include <string>
 #include <vector>
@@ -14,7 +14,7 @@ struct ChartPoint {
 struct ChartSeries {
   std::string label;
   std::vector<ChartPoint> points;
-  bool markers_only = false;  ///< open circles instead of a line
+  bool markers_only = false;  ///< dots instead of a line
 };
 
 struct LineChart {
@@ -23,10 +23,13 @@ struct LineChart {
   std::string y_label;
   ChartPoint least;  ///< lower left corner of the plotted range
   ChartPoint most;   ///< upper right corner
-  ChartPoint tick;   ///< distance of the tick marks
   std::vector<ChartSeries> series;
 };
 
 std::string to_svg(const LineChart& chart);
+
+/// What a figure's program does: `make` prints the table on standard output, the chart goes to the file that is the one
+/// argument. Returns the exit code.
+int write_figure(int argc, char** argv, const char* program, LineChart (*make)());
 
 }  // namespace diastole

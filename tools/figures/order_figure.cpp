@@ -7,7 +7,6 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
-#include <fstream>
 #include <string>
 #include <vector>
 
@@ -58,7 +57,6 @@ LineChart make_figure() {
                   "log10 of the error",
                   {0.25, -6.0},
                   {1.75, 0.0},
-                  {0.25, 1.0},
                   {}};
   fmt::print("| law, pressure | mesh | unknowns |");
   for (const Measure& measure : measures)
@@ -86,16 +84,5 @@ LineChart make_figure() {
 }  // namespace diastole
 
 int main(int argc, char** argv) {
-  if (argc != 2) {
-    std::fputs("usage: order_figure FIGURE.svg > TABLE.md\n", stderr);
-    return 2;
-  }
-  const std::string svg = diastole::to_svg(diastole::make_figure());
-  std::ofstream file(argv[1]);
-  file << svg;
-  if (!file.flush()) {
-    std::fprintf(stderr, "order_figure: %s cannot be written\n", argv[1]);
-    return 2;
-  }
-  return 0;
+  return diastole::write_figure(argc, argv, "order_figure", diastole::make_figure);
 }

@@ -5,7 +5,6 @@
 #include <fmt/format.h>
 
 #include <cstdio>
-#include <fstream>
 
 #include "estimator/fe/pressure_volume.hpp"
 #include "tools/figures/line_chart.hpp"
@@ -36,7 +35,6 @@ LineChart make_figure() {
                   "pressure (kPa)",
                   {0.0, 0.0},
                   {end_mL, 2.5},
-                  {10.0, 0.5},
                   {}};
   ChartSeries closed{"closed form", {}};
   for (double volume_mL = 0.0; volume_mL <= end_mL; volume_mL += 0.5)
@@ -54,11 +52,5 @@ LineChart make_figure() {
 }  // namespace diastole
 
 int main(int argc, char** argv) {
-  if (argc != 2) {
-    std::fputs("usage: pressure_volume_figure FIGURE.svg > TABLE.md\n", stderr);
-    return 2;
-  }
-  std::ofstream file(argv[1]);
-  file << diastole::to_svg(diastole::make_figure());
-  return file.good() ? 0 : 1;
+  return diastole::write_figure(argc, argv, "pressure_volume_figure", diastole::make_figure);
 }

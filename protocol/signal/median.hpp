@@ -1,0 +1,18 @@
+#pragma once
+// The middle of some values: a location that single wild ones do not move.
+
+#include <algorithm>
+#include <cstddef>
+#include <vector>
+
+namespace diastole::signal {
+
+/// Of an even count the upper of the two in the middle. Precondition: not empty, no NaN.
+template <class Value>
+Value median(std::vector<Value> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+}  // namespace diastole::signal
