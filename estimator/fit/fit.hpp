@@ -70,7 +70,7 @@ struct EstimatedFrame {
   double se_kPa;  ///< 0 when exactly known
   size_t usable;
   size_t tags_left_out;
-  size_t tags_unfollowed;  ///< of those left out (frame_residuals.hpp)
+  size_t tags_unfollowed;  ///< of those left out (motion_residuals.hpp)
   size_t points_left_out;
   Eigen::VectorXd weighted;  ///< residuals / sigma
   Eigen::VectorXd unweighted_mm;

@@ -45,11 +45,11 @@ EstimatedFrame estimated(const JointProblem::LoadedFrame& frame, const Eigen::Ve
           .load = frame.load,
           .pressure_kPa = unknown ? q[*unknown] : frame.load.pressure_kPa,
           .se_kPa = unknown ? std::sqrt(covariance(*unknown, *unknown)) : 0.0,
-          .usable = frame.residuals.usable(),
-          .tags_left_out = frame.residuals.tags_left_out(),
-          .tags_unfollowed = frame.residuals.tags_unfollowed(),
-          .points_left_out = frame.residuals.points_left_out(),
-          .weighted = frame.residuals.weighted(),
+          .usable = frame.residuals.found().usable,
+          .tags_left_out = frame.residuals.found().tags_left_out,
+          .tags_unfollowed = frame.residuals.found().tags_unfollowed,
+          .points_left_out = frame.residuals.found().points_left_out,
+          .weighted = frame.residuals.residuals(),
           .unweighted_mm = frame.residuals.unweighted_mm(),
           .position_mm = frame.position_mm};
 }

@@ -9,7 +9,6 @@ JointProblem::JointProblem(MotionModel& model, const std::vector<EstimatedParame
                            std::optional<double> offset_sigma_kPa)
     : model_(model),
       values_(static_cast<Eigen::Index>(values.size())),
-      locator_options_(locator),
       reference_(std::make_unique<PointLocator>(model.mesh(), model.mesh().reference(), locator)) {
   std::vector<inference::Parameter> unknowns;
   std::vector<double> start;
@@ -22,26 +21,12 @@ JointProblem::JointProblem(MotionModel& model, const std::vector<EstimatedParame
     const auto scale = value.lower > 0 ? inference::Scale::logarithmic : inference::Scale::linear;
     add_unknown({value.name, {}, value.lower, value.upper, scale}, value.start);
   }
-  for (size_t number = 1; number < measurement.frames.size(); ++number) {
-    const int frame = static_cast<int>(number);
-    std::vector<TagPoint> tags;
-    for (const TagPoint& tag : measurement.tags) {
-      if (tag.frame == frame) tags.push_back(tag);
-    }
-    std::vector<ObservedPoint> points;
-    for (const ObservedPoint& point : measurement.points) {
-      if (point.frame == frame) points.push_back(point);
-    }
-    if (tags.empty() && points.empty()) continue;
-    const Frame& load = measurement.frames[number];
+  for (const int frame : loaded_frames(measurement)) {
+    const Frame& load = measurement.frames[static_cast<size_t>(frame)];
     std::optional<Eigen::Index> pressure_unknown;
     if (load.sigma_kPa > 0)
       pressure_unknown = add_unknown({fmt::format("pressure_kPa[{}]", frame)}, load.pressure_kPa);
-    frames_.push_back({frame,
-                       load,
-                       FrameResiduals(model.mesh(), *reference_, std::move(tags), std::move(points)),
-                       pressure_unknown,
-                       {}});
+    frames_.push_back({frame, load, MotionResiduals(measurement, {frame}, locator), pressure_unknown, {}});
   }
   if (!measurement.frames.empty()) {
     const Frame& rest = measurement.frames.front();
@@ -68,12 +53,12 @@ void JointProblem::set_robust(std::optional<RobustLoss> loss) {
 Eigen::VectorXd JointProblem::motion_residuals() const {
   Eigen::Index rows = 0;
   for (const LoadedFrame& frame : frames_)
-    rows += frame.residuals.rows();
+    rows += frame.residuals.size();
   Eigen::VectorXd result(rows);
   rows = 0;
   for (const LoadedFrame& frame : frames_) {
-    result.segment(rows, frame.residuals.rows()) = frame.residuals.weighted();
-    rows += frame.residuals.rows();
+    result.segment(rows, frame.residuals.size()) = frame.residuals.residuals();
+    rows += frame.residuals.size();
   }
   return result;
 }
@@ -88,7 +73,7 @@ Eigen::Index JointProblem::smooth_rows() const {
 Eigen::Index JointProblem::data_rows() const {
   Eigen::Index rows = unknowns() - values() + (fits_rest() ? 1 : 0);
   for (const LoadedFrame& frame : frames_)
-    rows += frame.residuals.rows();
+    rows += frame.residuals.size();
   return rows;
 }
 
@@ -125,7 +110,7 @@ std::optional<size_t> JointProblem::find_points(const Eigen::VectorXd& q) {
   if (!solve_frames(q)) return std::nullopt;
   size_t gained = 0;
   for (LoadedFrame& frame : frames_)
-    gained += frame.residuals.find_points(frame.position_mm, locator_options_);
+    gained += frame.residuals.find(model_.mesh(), *reference_, {&frame.position_mm, 1});
   return gained;
 }
 
@@ -143,13 +128,13 @@ std::optional<Eigen::VectorXd> JointProblem::residuals(const Eigen::VectorXd& q)
   residuals_.resize(rows());
   Eigen::Index row = 0;
   for (LoadedFrame& frame : frames_) {
-    if (!frame.residuals.evaluate(frame.position_mm)) {
+    if (!frame.residuals.follow(model_.mesh(), *reference_, {&frame.position_mm, 1})) {
       failure_ = fmt::format("frame {}: many tag points cannot be followed on the body at these values",
                              frame.number);
       return {};
     }
-    residuals_.segment(row, frame.residuals.rows()) = frame.residuals.weighted();
-    row += frame.residuals.rows();
+    residuals_.segment(row, frame.residuals.size()) = frame.residuals.residuals();
+    row += frame.residuals.size();
   }
   if (robust_) {
     for (Eigen::Index i = 0; i < row; ++i)
@@ -192,7 +177,7 @@ Eigen::MatrixXd JointProblem::plain_jacobian(const Eigen::VectorXd& q) {
     for (const NodeField& field : by.by_value)
       fields.push_back(&field);
     fields.push_back(&by.by_pressure);
-    const Eigen::MatrixXd block = frame.residuals.derivatives(fields);
+    const Eigen::MatrixXd block = frame.residuals.columns(0, model_.mesh(), fields);
     for (Eigen::Index i = 0; i < values(); ++i) {
       result.col(i).segment(row, block.rows()) = block.col(i) * space_[i].slope(q[i]);
     }
@@ -223,13 +208,13 @@ Eigen::VectorXd JointProblem::offset_column() {
   Eigen::Index row = 0, prior = motion_residuals().size();
   for (size_t slot = 0; slot < frames_.size(); ++slot) {
     const LoadedFrame& frame = frames_[slot];
-    const Eigen::Index size = frame.residuals.rows();
+    const Eigen::Index size = frame.residuals.size();
     if (frame.pressure_unknown) {
       column[prior++] = 1 / frame.load.sigma_kPa;
     } else {
       const NodeField by_pressure = model_.derivatives(slot).by_pressure;
       const NodeField* const fields[] = {&by_pressure};
-      column.segment(row, size) = -frame.residuals.derivatives(fields).col(0);
+      column.segment(row, size) = -frame.residuals.columns(0, model_.mesh(), fields).col(0);
     }
     row += size;
   }

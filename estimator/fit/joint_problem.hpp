@@ -15,7 +15,7 @@
 // With a robust loss (robust_loss.hpp) the motion's residuals enter as u(r), and the cost changes with them.
 // Parameters that vary by element may carry a smoothness prior (smoothness.hpp).
 //
-// Residual rows: frame after frame (frame_residuals.hpp), then one for each unknown pressure, those of the offset, then
+// Residual rows: frame after frame (motion_residuals.hpp), then one for each unknown pressure, those of the offset, then
 // those of the smoothness priors.
 // The points of frame 0 are not part of the problem: without load there is no information on stiffness.
 
@@ -31,7 +31,7 @@
 #include "estimator/fit/smoothness.hpp"
 #include "estimator/inference/least_squares.hpp"
 #include "estimator/io/measurement.hpp"
-#include "estimator/motion_residuals/frame_residuals.hpp"
+#include "estimator/motion_residuals/motion_residuals.hpp"
 
 namespace diastole {
 
@@ -48,7 +48,7 @@ class JointProblem : public inference::LeastSquaresProblem {
   struct LoadedFrame {
     int number;
     Frame load;
-    FrameResiduals residuals;
+    MotionResiduals residuals;  ///< of this one slot
     std::optional<Eigen::Index>
         pressure_unknown;   ///< its place in q; none when the pressure is exactly known
     NodeField position_mm;  ///< of the last successful `evaluate`
@@ -96,7 +96,7 @@ class JointProblem : public inference::LeastSquaresProblem {
   size_t give_up_lost();
 
   /// Residuals at q; nothing (and `failure`) if a frame has no equilibrium or many tags are lost there
-  /// (frame_residuals.hpp).
+  /// (motion_residuals.hpp).
   [[nodiscard]] std::optional<Eigen::VectorXd> residuals(const Eigen::VectorXd& q) override;
   /// Derivatives at q, by the model's exact sensitivities. Precondition: `residuals(q)` succeeded just
   /// before.
@@ -119,8 +119,7 @@ class JointProblem : public inference::LeastSquaresProblem {
   Eigen::Index values_;
   inference::ParameterSpace space_;
   Eigen::VectorXd start_;
-  LocatorOptions locator_options_;
-  std::unique_ptr<PointLocator> reference_;  // at a fixed address: the frames refer to it
+  std::unique_ptr<PointLocator> reference_;
   std::vector<LoadedFrame> frames_;
   std::optional<Eigen::Index> offset_unknown_;
   double offset_sigma_kPa_ = 0;

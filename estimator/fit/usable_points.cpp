@@ -22,9 +22,9 @@ namespace {
 PointShare point_share(const JointProblem& problem) {
   PointShare share;
   for (const JointProblem::LoadedFrame& frame : problem.frames()) {
-    share.usable += frame.residuals.usable();
-    share.measured +=
-        frame.residuals.usable() + frame.residuals.tags_left_out() + frame.residuals.points_left_out();
+    const FoundPoints& found = frame.residuals.found();
+    share.usable += found.usable;
+    share.measured += found.usable + found.tags_left_out + found.points_left_out;
   }
   return share;
 }
@@ -42,7 +42,7 @@ void require_half_usable(const PointShare& share, const std::string& file) {
 void require_any_usable(const JointProblem& problem, const std::string& file) {
   Eigen::Index rows = 0;
   for (const JointProblem::LoadedFrame& frame : problem.frames())
-    rows += frame.residuals.rows();
+    rows += frame.residuals.size();
   if (rows < problem.values()) refuse(point_share(problem), file);
 }
 

@@ -119,8 +119,8 @@ class Explorer {
     std::vector<FrameInformation> frames;
     Eigen::Index row = 0;
     for (const JointProblem::LoadedFrame& frame : problem.frames()) {
-      const Eigen::MatrixXd rows = jacobian.middleRows(row, frame.residuals.rows());
-      row += frame.residuals.rows();
+      const Eigen::MatrixXd rows = jacobian.middleRows(row, frame.residuals.size());
+      row += frame.residuals.size();
       const Eigen::MatrixXd by_values = rows.leftCols(problem.values());
       const Eigen::VectorXd by_pressure = rows.col(*frame.pressure_unknown);
       frames.push_back({frame.number, frame.load.pressure_kPa, sigma_kPa[static_cast<size_t>(frame.number)],

@@ -12,6 +12,9 @@
 
 namespace diastole {
 
+/// What the machine runs at once.
+inline size_t machine_threads() { return std::max(1U, std::thread::hardware_concurrency()); }
+
 /// Calls body(i) for 0 <= i < count on at most `threads` threads, the caller's included. If a body throws, no further
 /// index is begun, and the first exception is thrown to the caller once all threads are done.
 template <class Body>

@@ -70,7 +70,7 @@ class Explainer {
   void fit_base() {
     tell("fitting the base model to the tags");
     fit_both_meshes();
-    if (round_->rows().left_out() + full_->rows().left_out() > 0) {
+    if (loses_points(*round_) || loses_points(*full_)) {
       leave_out_lost_points();
       fit_both_meshes();
     }
@@ -98,12 +98,17 @@ class Explainer {
            .remedy = "Start from a stiffer gel, or check the frames' pressures."});
   }
 
+  [[nodiscard]] static bool loses_points(const FieldProblem& problem) {
+    const FoundPoints& found = problem.rows().found();
+    return found.tags_left_out + found.points_left_out > 0;
+  }
+
   /// Keeps the points that both meshes can follow, so that their residuals correspond.
   void leave_out_lost_points() {
     Measurement& measurement = field_.measurement;
     std::vector<int> seen(measurement.tags.size() + measurement.points.size(), 0);
     for (const FieldProblem* problem : {&*round_, &*full_})
-      for (const FieldRow& row : problem->rows().rows())
+      for (const ResidualRow& row : problem->rows().rows())
         if (row.component == 0) ++seen[row.source];
     const size_t tags = measurement.tags.size();
     size_t index = 0;
@@ -319,7 +324,7 @@ class Explainer {
     const double highest_kPa = std::ranges::max(base_.pressures_kPa);
     const auto rounded = [](double value, double scale) { return std::round(scale * value) / scale; };
     for (Index i = 0; i < round_->rows().size(); ++i) {
-      const FieldRow& row = round_->rows().rows()[static_cast<size_t>(i)];
+      const ResidualRow& row = round_->rows().rows()[static_cast<size_t>(i)];
       const double share = base_.pressures_kPa[row.slot] / highest_kPa;
       FieldResidual seen;
       seen.frame = round_->rows().frames()[row.slot];

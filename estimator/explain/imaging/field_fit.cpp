@@ -95,7 +95,9 @@ struct FieldProblem::Point {
 };
 
 FieldProblem::FieldProblem(const FieldCase& field, std::array<size_t, 3> elements)
-    : field_(field), solver_(elements, field.locator), rows_(field.measurement, field.locator) {
+    : field_(field),
+      solver_(elements, field.locator),
+      rows_(field.measurement, loaded_frames(field.measurement), field.locator) {
   const std::vector<double> pressures_kPa = start().pressures_kPa;
   const double highest_kPa = std::ranges::max(pressures_kPa);
   nodes_kPa_ = {highest_kPa};
@@ -162,8 +164,10 @@ bool FieldProblem::evaluate(Point& at) {
   std::vector<NodeField> seen_mm;
   for (const double pressure_kPa : at.pressures_kPa)
     seen_mm.push_back(combined(solver_.mesh().reference(), shares(pressure_kPa), displacements_mm));
-  if (rows_.size() == 0) rows_.find(solver_.mesh(), solver_.reference(), seen_mm);
-  if (!rows_.follow(solver_.mesh(), solver_.reference(), seen_mm)) return false;
+  if (rows_.size() == 0)
+    (void)rows_.find(solver_.mesh(), solver_.reference(), seen_mm);
+  else if (!rows_.follow(solver_.mesh(), solver_.reference(), seen_mm, Following::closely))
+    return false;
   at.residuals = rows_.residuals();
   at.priors = priors(at);
   at.cost = at.residuals.squaredNorm() + at.priors.squaredNorm();

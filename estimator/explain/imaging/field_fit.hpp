@@ -18,7 +18,7 @@
 #include "estimator/effects/effect.hpp"
 #include "estimator/explain/imaging/field_solver.hpp"
 #include "estimator/io/study.hpp"
-#include "estimator/motion_residuals/field_rows.hpp"
+#include "estimator/motion_residuals/motion_residuals.hpp"
 
 namespace diastole::explain {
 
@@ -103,7 +103,7 @@ class FieldProblem {
   [[nodiscard]] size_t highest_node() const { return nodes_kPa_.size() - 1; }
   /// What each node's displacement counts at a pressure.
   [[nodiscard]] std::vector<double> shares(double pressure_kPa) const;
-  [[nodiscard]] const FieldRows& rows() const { return rows_; }
+  [[nodiscard]] const MotionResiduals& rows() const { return rows_; }
   [[nodiscard]] const FieldCase& field() const { return field_; }
 
  private:
@@ -115,7 +115,7 @@ class FieldProblem {
 
   FieldCase field_;
   FieldSolver solver_;
-  FieldRows rows_;
+  MotionResiduals rows_;
   std::vector<double> nodes_kPa_;
 };
 

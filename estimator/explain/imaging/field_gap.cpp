@@ -9,17 +9,17 @@ namespace diastole::explain {
 
 using Eigen::Index;
 
-std::vector<size_t> deal_folds(const Measurement& measurement, const FieldRows& rows, size_t folds) {
+std::vector<size_t> deal_folds(const Measurement& measurement, const MotionResiduals& rows, size_t folds) {
   using Direction = std::array<long, 3>;
-  const auto direction_of = [&](const FieldRow& row) {
+  const auto direction_of = [&](const ResidualRow& row) {
     Direction direction{};
     for (size_t i = 0; i < 3; ++i)
       direction[i] = std::lround(100.0 * measurement.tags[row.source].normal[i]);
     return direction;
   };
   std::map<Direction, size_t> sizes;
-  for (const FieldRow& row : rows.rows())
-    if (row.source < measurement.tags.size()) ++sizes[direction_of(row)];
+  for (const ResidualRow& row : rows.rows())
+    if (rows.of_tag(row)) ++sizes[direction_of(row)];
   std::vector<std::pair<size_t, Direction>> largest_first;
   for (const auto& [direction, size] : sizes)
     largest_first.emplace_back(size, direction);
@@ -32,8 +32,8 @@ std::vector<size_t> deal_folds(const Measurement& measurement, const FieldRows& 
     filled[least] += size;
   }
   std::vector<size_t> result;
-  for (const FieldRow& row : rows.rows())
-    result.push_back(row.source < measurement.tags.size() ? fold_of[direction_of(row)] : row.source % folds);
+  for (const ResidualRow& row : rows.rows())
+    result.push_back(rows.of_tag(row) ? fold_of[direction_of(row)] : row.source % folds);
   return result;
 }
 

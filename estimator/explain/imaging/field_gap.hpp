@@ -15,7 +15,7 @@
 namespace diastole::explain {
 
 /// Fold of each row.
-std::vector<size_t> deal_folds(const Measurement& measurement, const FieldRows& rows, size_t folds);
+std::vector<size_t> deal_folds(const Measurement& measurement, const MotionResiduals& rows, size_t folds);
 
 /// Residuals of each row as predicted from the other folds.
 Eigen::VectorXd held_out_residuals(const FieldFit& fit, const std::vector<size_t>& folds);

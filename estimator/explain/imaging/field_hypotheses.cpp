@@ -45,7 +45,7 @@ std::vector<double> start_in_direction(FieldProblem& problem, const FieldFit& ba
   std::vector<const NodeField*> fields;
   for (const NodeField& field : slopes.model)
     fields.push_back(&field);
-  const FieldRows& rows = problem.rows();
+  const MotionResiduals& rows = problem.rows();
   Eigen::MatrixXd columns(rows.size(), directions);
   for (size_t slot = 0; slot < base.pressures_kPa.size(); ++slot) {
     const double share = base.pressures_kPa[slot] / problem.nodes_kPa()[loudest];

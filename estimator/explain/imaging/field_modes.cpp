@@ -190,7 +190,7 @@ class Builder {
     const auto count = static_cast<Index>(harmonics_.size());
     const Index motion = static_cast<Index>(courses) * driven + stiffness;
     for (Index i = 0; i < rows; ++i) {
-      const FieldRow& row = problem_.rows().rows()[static_cast<size_t>(first + i)];
+      const ResidualRow& row = problem_.rows().rows()[static_cast<size_t>(first + i)];
       const Vector3d outwards = Vector3d(row.X_mm[0], row.X_mm[1], 0.0).normalized();
       const std::array<double, 3> along{row.by_motion.dot(outwards),
                                         row.by_motion.dot(Vector3d(-outwards[1], outwards[0], 0.0)),

@@ -84,7 +84,7 @@ class Gram {
 /// What an acquisition would say of B's unknowns if A were true.
 class Outlook {
  public:
-  Outlook(const FieldCase& field, const FieldRows& rows, const ImagedModel& truth,
+  Outlook(const FieldCase& field, const MotionResiduals& rows, const ImagedModel& truth,
           const ImagedModel& adapting)
       : field_(field),
         rows_(rows),
@@ -201,7 +201,7 @@ class Outlook {
   }
 
   const FieldCase& field_;
-  const FieldRows& rows_;
+  const MotionResiduals& rows_;
   const FieldFit& a_;
   const FieldFit& b_;
   ImagedModel truth_;
@@ -246,7 +246,7 @@ std::string file_of(double taken_mL, unsigned set, const std::string& remark) {
 
 }  // namespace
 
-std::optional<NextExperiment> separating_images(const FieldCase& field, const FieldRows& rows,
+std::optional<NextExperiment> separating_images(const FieldCase& field, const MotionResiduals& rows,
                                                 const std::vector<ImagedModel>& competing) {
   if (competing.size() < 2) return {};
   std::vector<Outlook> outlooks;  // of every pair, whichever of the two is true
@@ -276,7 +276,8 @@ std::optional<NextExperiment> separating_images(const FieldCase& field, const Fi
   return next;
 }
 
-NextExperiment sharpening_images(const FieldCase& field, const FieldRows& rows, const ImagedModel& named) {
+NextExperiment sharpening_images(const FieldCase& field, const MotionResiduals& rows,
+                                 const ImagedModel& named) {
   const FieldFit& fit = named.hypothesis->fit;
   const Outlook outlook(field, rows, named, named);
   const auto distance = [&](const Eigen::MatrixXd& covariance, size_t place) {

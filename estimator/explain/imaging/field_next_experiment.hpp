@@ -25,12 +25,13 @@ struct ImagedModel {
 
 /// For models that the images cannot tell apart: the least change of the acquisition by which the least distinguishable pair
 /// parts by five sigmas, or else the best. Nothing for fewer than two.
-std::optional<NextExperiment> separating_images(const FieldCase& field, const FieldRows& rows,
+std::optional<NextExperiment> separating_images(const FieldCase& field, const MotionResiduals& rows,
                                                 const std::vector<ImagedModel>& competing);
 
 /// For a named one: what narrows its least known parameter most. predicted_separation_sigma: that parameter's distance from
 /// neutral afterwards.
-NextExperiment sharpening_images(const FieldCase& field, const FieldRows& rows, const ImagedModel& named);
+NextExperiment sharpening_images(const FieldCase& field, const MotionResiduals& rows,
+                                 const ImagedModel& named);
 
 /// For an unexplained one: the same again, turned in the scanner, and unloaded afterwards.
 NextExperiment exposing_images();

@@ -59,7 +59,7 @@ constexpr std::array<Partition, 5> partitions{{{8, 4, 2}, {4, 2, 1}, {1, 4, 2}, 
 
 }  // namespace
 
-std::vector<Misfit> misfit_regions(const FieldCase& field, const FieldRows& rows, const FieldFit& fit,
+std::vector<Misfit> misfit_regions(const FieldCase& field, const MotionResiduals& rows, const FieldFit& fit,
                                    size_t most) {
   size_t cells = 0;
   for (const Partition& partition : partitions)
@@ -68,7 +68,7 @@ std::vector<Misfit> misfit_regions(const FieldCase& field, const FieldRows& rows
   const double highest_kPa = std::ranges::max(fit.pressures_kPa);
   std::vector<size_t> tags(cells, 0);
   for (Index i = 0; i < rows.size(); ++i) {
-    const FieldRow& row = rows.rows()[static_cast<size_t>(i)];
+    const ResidualRow& row = rows.rows()[static_cast<size_t>(i)];
     const Eigen::Vector3d outwards = Eigen::Vector3d(row.X_mm[0], row.X_mm[1], 0.0).normalized();
     const Eigen::RowVector3d along(row.by_motion.dot(outwards),
                                    row.by_motion.dot(Eigen::Vector3d(-outwards[1], outwards[0], 0.0)),

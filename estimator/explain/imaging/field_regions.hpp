@@ -11,7 +11,7 @@
 namespace diastole::explain {
 
 /// The cells that are beyond chance after correction for their number, strongest first, at most `most`.
-std::vector<Misfit> misfit_regions(const FieldCase& field, const FieldRows& rows, const FieldFit& fit,
+std::vector<Misfit> misfit_regions(const FieldCase& field, const MotionResiduals& rows, const FieldFit& fit,
                                    size_t most);
 
 }  // namespace diastole::explain

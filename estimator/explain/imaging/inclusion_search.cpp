@@ -45,7 +45,7 @@ Eigen::MatrixXd responses(FieldProblem& problem, const FieldFit& base, const std
   std::vector<const NodeField*> pointers;
   for (const NodeField& field : moved)
     pointers.push_back(&field);
-  const FieldRows& rows = problem.rows();
+  const MotionResiduals& rows = problem.rows();
   Eigen::MatrixXd columns(rows.size(), static_cast<Eigen::Index>(places.size()));
   for (size_t slot = 0; slot < base.pressures_kPa.size(); ++slot) {
     columns.middleRows(rows.first(slot), rows.count(slot)) =

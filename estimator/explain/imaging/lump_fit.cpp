@@ -22,7 +22,8 @@ constexpr Index priors = 4;
 constexpr double left_by_fine_mesh = 0.45;
 
 /// The motion that a change of C1 makes grows faster than the pressure; so does that of a lump.
-std::vector<double> course_of_stiffness(const FieldFit& base, const FieldRows& rows, double highest_kPa) {
+std::vector<double> course_of_stiffness(const FieldFit& base, const MotionResiduals& rows,
+                                        double highest_kPa) {
   std::vector<double> course;
   for (size_t slot = 0; slot < base.pressures_kPa.size(); ++slot)
     course.push_back(base.jacobian.col(0).segment(rows.first(slot), rows.count(slot)).norm() /
@@ -78,7 +79,7 @@ class SeenLump {
 
   [[nodiscard]] LumpBody& body() { return body_; }
   [[nodiscard]] const PointLocator& reference() const { return reference_; }
-  [[nodiscard]] const FieldRows& rows() const { return rows_; }
+  [[nodiscard]] const MotionResiduals& rows() const { return rows_; }
 
   /// With its motion counted by a factor in each slot, the rows answering linearly; none without an equilibrium.
   [[nodiscard]] std::optional<LumpColumns> columns(const LumpValues& values,
@@ -98,7 +99,7 @@ class SeenLump {
  private:
   LumpBody body_;
   PointLocator reference_;
-  FieldRows rows_;
+  MotionResiduals rows_;
 };
 
 class LumpFit {
@@ -339,11 +340,11 @@ class LumpFit {
         }
       }
     }
-    FieldRows rows = coarse_.rows();
+    MotionResiduals rows = coarse_.rows();
     LumpColumns result(rows.size(), 1 + lump_parameters);
-    if (!rows.follow(mesh, coarse_.reference(), plain_mm)) return {};
+    if (!rows.follow(mesh, coarse_.reference(), plain_mm, Following::closely)) return {};
     result.col(0) = -rows.residuals();
-    if (!rows.follow(mesh, coarse_.reference(), lumped_mm)) return {};
+    if (!rows.follow(mesh, coarse_.reference(), lumped_mm, Following::closely)) return {};
     result.col(0) += rows.residuals();
     for (size_t slot = 0; slot < slots; ++slot) {
       std::vector<const NodeField*> pointers;

@@ -1,0 +1,299 @@
+#include "estimator/motion_residuals/motion_residuals.hpp"
+
+#include <algorithm>
+#include <optional>
+
+#include "estimator/motion_residuals/tag_match.hpp"
+#include "estimator/parallel/parallel_for.hpp"
+
+namespace diastole {
+namespace {
+
+constexpr double most_lost = 0.1;
+
+Eigen::Vector3d vector_of(const std::array<double, 3>& v) { return {v[0], v[1], v[2]}; }
+
+/// How far a point lies beyond its element in the undeformed body.
+double outside_mm(const HermiteMesh& mesh, const MaterialPoint& point) {
+  MaterialPoint nearest = point;
+  for (double& xi : nearest.xi)
+    xi = std::clamp(xi, 0.0, 1.0);
+  if (nearest.xi == point.xi) return 0;
+  return (mesh.value(mesh.reference(), point) - mesh.value(mesh.reference(), nearest)).norm();
+}
+
+/// Sets the row to a match and returns its residual.
+double put(ResidualRow& row, const HermiteMesh& mesh, const NodeField& position_mm, const TagMatch& match) {
+  row.point = match.point;
+  row.X_mm = mesh.value(mesh.reference(), match.point);
+  row.by_motion = match.by_motion / row.sigma_mm;
+  row.by_reference = -mesh.reference_gradient(position_mm, match.point).transpose() * row.by_motion;
+  return match.error_mm / row.sigma_mm;
+}
+
+/// A component of a 3-D point at its material point.
+TagMatch match_component(const ResidualRow& row, const HermiteMesh& mesh, const NodeField& position_mm,
+                         const ObservedPoint& seen, const MaterialPoint& point) {
+  const Eigen::Vector3d miss_mm = vector_of(seen.x_mm) - mesh.value(position_mm, point);
+  return {point, miss_mm[row.component], -Eigen::Vector3d::Unit(row.component)};
+}
+
+/// A field at a place, and its slope, from one set of basis values.
+struct Local {
+  Eigen::Vector3d value = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d slope = Eigen::Matrix3d::Zero();
+
+  Local(const ElementField& field, const HermiteBasis& basis) {
+    for (size_t a = 0; a < hermite_functions; ++a) {
+      const Eigen::Vector3d coefficient = field.col(static_cast<Eigen::Index>(a));
+      value += basis.value[a] * coefficient;
+      for (size_t k = 0; k < 3; ++k)
+        slope.col(static_cast<Eigen::Index>(k)) += basis.slope[k][a] * coefficient;
+    }
+  }
+};
+
+/// One step of match_tag's Newton method from where the tag was; its residual. None if the step is long or leaves the
+/// element: the whole search is due.
+std::optional<double> follow_closely(ResidualRow& row, const ElementField& reference,
+                                     const ElementField& position, const TagPoint& tag) {
+  constexpr double close_mm = 1.0;
+  constexpr double slack_xi = 0.02;
+  const HermiteBasis basis = hermite_basis(row.point.xi);
+  const Local undeformed(reference, basis);
+  const Local deformed(position, basis);
+  const Eigen::Vector3d normal = vector_of(tag.normal);
+  const Eigen::Matrix3d dx_inverse = deformed.slope.inverse();
+  const Eigen::Vector3d pulled_normal = (undeformed.slope * dx_inverse).transpose() * normal;
+  const double projection = pulled_normal.dot(normal);
+  const Eigen::Vector3d miss_mm = vector_of(tag.x_mm) - deformed.value;
+  const double error_mm =
+      (pulled_normal.dot(miss_mm) - (tag.plane_mm - normal.dot(undeformed.value))) / projection;
+  const Eigen::Vector3d xi_change = dx_inverse * (miss_mm - error_mm * normal);
+  const Eigen::Vector3d moved_mm = undeformed.slope * xi_change;
+  if (!(projection > 0.1) || !(moved_mm.norm() < close_mm)) return {};
+  Xi after = row.point.xi;
+  for (size_t k = 0; k < 3; ++k) {
+    const double before = after[k];
+    after[k] += xi_change[static_cast<Eigen::Index>(k)];
+    if (after[k] < std::min(before, -slack_xi) || after[k] > std::max(before, 1.0 + slack_xi)) return {};
+  }
+  row.point.xi = after;
+  row.X_mm = undeformed.value + moved_mm;
+  row.by_motion = -pulled_normal / (projection * row.sigma_mm);
+  row.by_reference = -(deformed.slope * undeformed.slope.inverse()).transpose() * row.by_motion;
+  return error_mm / row.sigma_mm;
+}
+
+/// All fields on one element: a row a field (zeros for none), its coefficients as ElementField holds them.
+Eigen::MatrixXd gathered(const HermiteMesh& mesh, size_t element, std::span<const NodeField* const> fields) {
+  Eigen::MatrixXd rows =
+      Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(fields.size()), 3 * hermite_functions);
+  for (size_t i = 0; i < fields.size(); ++i) {
+    if (fields[i] == nullptr) continue;
+    const ElementField field = mesh.gather(element, *fields[i]);
+    rows.row(static_cast<Eigen::Index>(i)) = Eigen::Map<const Eigen::RowVectorXd>(field.data(), field.size());
+  }
+  return rows;
+}
+
+/// direction . field of every gathered field.
+Eigen::VectorXd along(const Eigen::MatrixXd& gathered_fields, const Eigen::Vector3d& direction,
+                      const HermiteBasis& basis) {
+  ElementField weights;
+  for (size_t a = 0; a < hermite_functions; ++a)
+    weights.col(static_cast<Eigen::Index>(a)) = basis.value[a] * direction;
+  return gathered_fields * Eigen::Map<const Eigen::VectorXd>(weights.data(), weights.size());
+}
+
+}  // namespace
+
+std::vector<int> loaded_frames(const Measurement& measurement) {
+  std::vector<int> frames;
+  for (int frame = 1; frame < static_cast<int>(measurement.frames.size()); ++frame) {
+    const auto here = [frame](const auto& point) { return point.frame == frame; };
+    if (std::ranges::any_of(measurement.tags, here) || std::ranges::any_of(measurement.points, here))
+      frames.push_back(frame);
+  }
+  return frames;
+}
+
+MotionResiduals::MotionResiduals(const Measurement& measurement, std::vector<int> frames,
+                                 LocatorOptions locator)
+    : frames_(std::move(frames)),
+      tags_(measurement.tags),
+      points_(measurement.points),
+      locator_(locator),
+      given_up_(tags_.size(), false),
+      first_(frames_.size() + 1, 0) {}
+
+size_t MotionResiduals::find(const HermiteMesh& mesh, const PointLocator& reference,
+                             std::span<const NodeField> position_mm) {
+  std::vector<bool> was_usable(tags_.size() + points_.size(), false);
+  for (const ResidualRow& row : rows_)
+    was_usable[row.source] = true;
+  rows_.clear();
+  found_ = {};
+  for (size_t slot = 0; slot < frames_.size(); ++slot) {
+    find_tags(slot, mesh, reference, position_mm[slot]);
+    find_points(slot, mesh, reference, position_mm[slot]);
+    first_[slot + 1] = static_cast<Eigen::Index>(rows_.size());
+  }
+  residuals_.resize(size());
+  std::ranges::transform(rows_, residuals_.begin(), &ResidualRow::found_residual);
+  return static_cast<size_t>(std::ranges::count_if(
+      rows_, [&](const ResidualRow& row) { return of_tag(row) && !was_usable[row.source]; }));
+}
+
+void MotionResiduals::find_tags(size_t slot, const HermiteMesh& mesh, const PointLocator& reference,
+                                const NodeField& position_mm) {
+  const PointLocator deformed(mesh, position_mm, locator_);
+  std::vector<std::optional<TagMatch>> matches(tags_.size());
+  std::vector<unsigned char> on_body(tags_.size(), 0);
+  parallel_for(tags_.size(), machine_threads(), [&](size_t i) {
+    if (tags_[i].frame != frames_[slot]) return;
+    const auto guess = find_tag(deformed, tags_[i]);
+    if (!guess || (!given_up_[i] && outside_mm(mesh, *guess) > farthest_outside_mm)) return;
+    on_body[i] = 1;
+    if (!given_up_[i]) matches[i] = match_tag(mesh, reference, position_mm, tags_[i], *guess);
+  });
+  for (size_t i = 0; i < tags_.size(); ++i) {
+    if (tags_[i].frame != frames_[slot]) continue;
+    ++(matches[i] ? found_.usable : found_.tags_left_out);
+    if (!matches[i]) {
+      found_.tags_unfollowed += on_body[i];
+      continue;
+    }
+    ResidualRow& row =
+        rows_.emplace_back(ResidualRow{.slot = slot, .source = i, .sigma_mm = tags_[i].sigma_mm});
+    row.found_residual = put(row, mesh, position_mm, *matches[i]);
+  }
+}
+
+void MotionResiduals::find_points(size_t slot, const HermiteMesh& mesh, const PointLocator& reference,
+                                  const NodeField& position_mm) {
+  for (size_t i = 0; i < points_.size(); ++i) {
+    if (points_[i].frame != frames_[slot]) continue;
+    const auto place = reference.find(vector_of(points_[i].X_mm));
+    ++(place ? found_.usable : found_.points_left_out);
+    for (Eigen::Index component = 0; place && component < 3; ++component) {
+      ResidualRow& row = rows_.emplace_back(ResidualRow{
+          .slot = slot, .source = tags_.size() + i, .component = component, .sigma_mm = points_[i].sigma_mm});
+      row.found_residual =
+          put(row, mesh, position_mm, match_component(row, mesh, position_mm, points_[i], place->point));
+    }
+  }
+}
+
+bool MotionResiduals::follow(const HermiteMesh& mesh, const PointLocator& reference,
+                             std::span<const NodeField> position_mm, Following how) {
+  std::vector<ResidualRow> moved = rows_;
+  std::vector<unsigned char> lost(rows_.size(), 0);
+  Eigen::VectorXd residuals(size());
+  // Element by element, of the undeformed mesh and then of each slot's motion.
+  std::vector<std::vector<ElementField>> fields(1 + frames_.size());
+  if (how == Following::closely) {
+    for (size_t e = 0; e < mesh.element_count(); ++e) {
+      fields[0].push_back(mesh.gather(e, mesh.reference()));
+      for (size_t slot = 0; slot < frames_.size(); ++slot)
+        fields[1 + slot].push_back(mesh.gather(e, position_mm[slot]));
+    }
+  }
+  parallel_for(moved.size(), machine_threads(), [&](size_t i) {
+    ResidualRow& row = moved[i];
+    const NodeField& position = position_mm[row.slot];
+    std::optional<double> residual;
+    if (of_tag(row)) {
+      const TagPoint& tag = tags_[row.source];
+      const size_t e = row.point.element;
+      if (how == Following::closely)
+        residual = follow_closely(row, fields[0][e], fields[1 + row.slot][e], tag);
+      const auto match = residual ? std::nullopt : match_tag(mesh, reference, position, tag, row.point);
+      if (match) residual = put(row, mesh, position, *match);
+    } else {
+      const ObservedPoint& seen = points_[row.source - tags_.size()];
+      if (const auto place = reference.find(vector_of(seen.X_mm), row.point))
+        residual = put(row, mesh, position, match_component(row, mesh, position, seen, place->point));
+    }
+    residuals[static_cast<Eigen::Index>(i)] = residual.value_or(row.found_residual);
+    if (residual) return;
+    lost[i] = 1;
+    row.was_lost = true;
+    row.by_motion.setZero();
+    row.by_reference.setZero();
+  });
+  if (!few_are(lost)) return false;
+  rows_ = std::move(moved);
+  residuals_ = std::move(residuals);
+  return true;
+}
+
+bool MotionResiduals::few_are(const std::vector<unsigned char>& lost) const {
+  struct Share {
+    double lost = 0.0;
+    double all = 0.0;
+  };
+  std::vector<std::array<Share, 2>> shares(frames_.size());
+  for (size_t i = 0; i < rows_.size(); ++i) {
+    Share& share = shares[rows_[i].slot][of_tag(rows_[i]) ? 0 : 1];
+    share.lost += lost[i];
+    share.all += 1.0;
+  }
+  return std::ranges::all_of(shares, [](const auto& slot) {
+    return std::ranges::all_of(slot, [](const Share& s) { return s.lost <= most_lost * s.all; });
+  });
+}
+
+size_t MotionResiduals::give_up_lost() {
+  size_t count = 0;
+  for (const ResidualRow& row : rows_) {
+    if (!row.was_lost || !of_tag(row)) continue;
+    given_up_[row.source] = true;
+    ++count;
+  }
+  return count;
+}
+
+Eigen::VectorXd MotionResiduals::unweighted_mm() const {
+  Eigen::VectorXd result = residuals_;
+  for (size_t i = 0; i < rows_.size(); ++i)
+    result[static_cast<Eigen::Index>(i)] *= rows_[i].sigma_mm;
+  return result;
+}
+
+MotionResiduals MotionResiduals::relocated(const PointLocator& reference) const {
+  MotionResiduals other = *this;
+  parallel_for(other.rows_.size(), machine_threads(), [&](size_t i) {
+    ResidualRow& row = other.rows_[i];
+    if (const auto place = reference.find(row.X_mm)) {
+      row.point = place->point;
+      return;
+    }
+    row.point = {};
+    row.by_motion.setZero();
+    row.by_reference.setZero();
+  });
+  return other;
+}
+
+Eigen::MatrixXd MotionResiduals::columns(size_t slot, const HermiteMesh& mesh,
+                                         std::span<const NodeField* const> motion,
+                                         std::span<const NodeField* const> reference) const {
+  std::vector<Eigen::MatrixXd> by_motion(mesh.element_count());
+  std::vector<Eigen::MatrixXd> by_reference(mesh.element_count());
+  parallel_for(mesh.element_count(), machine_threads(), [&](size_t e) {
+    by_motion[e] = gathered(mesh, e, motion);
+    if (!reference.empty()) by_reference[e] = gathered(mesh, e, reference);
+  });
+  Eigen::MatrixXd result(count(slot), static_cast<Eigen::Index>(motion.size()));
+  parallel_for(static_cast<size_t>(count(slot)), machine_threads(), [&](size_t i) {
+    const ResidualRow& row = rows_[static_cast<size_t>(first_[slot]) + i];
+    const HermiteBasis basis = hermite_basis(row.point.xi);
+    Eigen::VectorXd sum = along(by_motion[row.point.element], row.by_motion, basis);
+    if (!reference.empty()) sum += along(by_reference[row.point.element], row.by_reference, basis);
+    result.row(static_cast<Eigen::Index>(i)) = sum;
+  });
+  return result;
+}
+
+}  // namespace diastole
