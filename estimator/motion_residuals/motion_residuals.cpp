@@ -296,4 +296,20 @@ Eigen::MatrixXd MotionResiduals::columns(size_t slot, const HermiteMesh& mesh,
   return result;
 }
 
+std::vector<const NodeField*> pointers_to(std::span<const NodeField> fields) {
+  std::vector<const NodeField*> pointers;
+  for (const NodeField& field : fields)
+    pointers.push_back(&field);
+  return pointers;
+}
+
+Eigen::MatrixXd MotionResiduals::columns(const HermiteMesh& mesh, std::span<const NodeField> motion,
+                                         std::span<const double> factors) const {
+  const std::vector<const NodeField*> fields = pointers_to(motion);
+  Eigen::MatrixXd result(size(), static_cast<Eigen::Index>(fields.size()));
+  for (size_t slot = 0; slot < frames_.size(); ++slot)
+    result.middleRows(first(slot), count(slot)) = factors[slot] * columns(slot, mesh, fields);
+  return result;
+}
+
 }  // namespace diastole

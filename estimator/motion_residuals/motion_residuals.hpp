@@ -57,6 +57,8 @@ enum class Following { exactly, closely };
 /// The frames after the undeformed frame 0 that have tags or points, in order.
 std::vector<int> loaded_frames(const Measurement& measurement);
 
+std::vector<const NodeField*> pointers_to(std::span<const NodeField> fields);
+
 class MotionResiduals {
  public:
   /// The slots are these frames.
@@ -88,6 +90,9 @@ class MotionResiduals {
   [[nodiscard]] Eigen::MatrixXd columns(size_t slot, const HermiteMesh& mesh,
                                         std::span<const NodeField* const> motion,
                                         std::span<const NodeField* const> reference = {}) const;
+  /// Derivatives of all residuals by fields that move each slot, times its factor.
+  [[nodiscard]] Eigen::MatrixXd columns(const HermiteMesh& mesh, std::span<const NodeField> motion,
+                                        std::span<const double> factors) const;
   /// The same rows at the same places of another undeformed mesh, for `columns` there; places outside it count nothing.
   [[nodiscard]] MotionResiduals relocated(const PointLocator& reference) const;
 

@@ -13,9 +13,10 @@
 #include "estimator/explain/imaging/field_next_experiment.hpp"
 #include "estimator/explain/imaging/field_pairs.hpp"
 #include "estimator/explain/imaging/field_regions.hpp"
+#include "estimator/explain/imaging/inclusion_fit.hpp"
 #include "estimator/explain/imaging/linear_evidence.hpp"
-#include "estimator/explain/imaging/lump_fit.hpp"
 #include "estimator/explain/verdict/chi_square.hpp"
+#include "estimator/inference/intervals.hpp"
 #include "protocol/contract/input_error.hpp"
 
 namespace diastole::explain {
@@ -32,7 +33,6 @@ constexpr double clearly_better = 6.0;  // of a rival's score
 constexpr double far_better = 1.5;      // a rival's score over the best effect's: pairs will not do either
 /// Part of an effect's gain that meshes of this size may leave as structure.
 constexpr double mesh_error = 0.01;
-constexpr double ci90 = 1.6449;
 
 struct Family {
   std::string name;
@@ -52,7 +52,7 @@ class Explainer {
       : options_(options), study_file_(std::move(name)), field_(std::move(field)) {}
 
   Explanation run() {
-    field_.alive = [this] { tell(""); };
+    field_.alive = [this] { report(""); };
     fit_base();
     fit_effects();
     judge();
@@ -63,18 +63,18 @@ class Explainer {
   }
 
  private:
-  void tell(const std::string& text) const {
+  void report(const std::string& text) const {
     if (options_.progress) options_.progress(text);
   }
 
   void fit_base() {
-    tell("fitting the base model to the tags");
+    report("fitting the base model to the tags");
     fit_both_meshes();
     if (loses_points(*round_) || loses_points(*full_)) {
       leave_out_lost_points();
       fit_both_meshes();
     }
-    tell("looking for structure in what is left");
+    report("looking for structure in what is left");
     modes_ = field_modes(*full_, full_base_.pressures_kPa);
     for (size_t i = 0; i < modes_.modes.size(); ++i) {
       const std::string& family = modes_.modes[i].family;
@@ -119,13 +119,13 @@ class Explainer {
   }
 
   void fit_effects() {
-    tell("fitting each effect");
+    report("fitting each effect");
     hypotheses_ = fit_round_effects(*round_, base_);
-    tell("searching a lump of another stiffness");
-    lattice_ = lump_lattice(*full_, full_base_);
+    report("searching an inclusion of another stiffness");
+    lattice_ = inclusion_lattice(*full_, full_base_);
     const double to_beat = std::ranges::max(hypotheses_, {}, &FieldHypothesis::score).score;
     std::ranges::move(
-        fit_inclusion(*round_, base_, search_inclusion(lattice_, field_.base, full_base_), to_beat),
+        try_inclusion(*round_, base_, search_inclusion(lattice_, field_.base, full_base_), to_beat),
         std::back_inserter(hypotheses_));
     std::ranges::stable_sort(hypotheses_, std::greater{}, &FieldHypothesis::score);
   }
@@ -155,7 +155,7 @@ class Explainer {
     if (rival_.score > far_better * single.score) return;
     if (structure_left(single.fit, mesh_error * single.gain).p_value > suspicious && !is_strained(single.fit))
       return;
-    tell("fitting pairs of effects");
+    report("fitting pairs of effects");
     std::vector<FieldHypothesis> pairs = fit_pairs(*round_, base_, hypotheses_, lattice_);
     if (pairs.empty() || pairs.front().score < single.score + clearly_better ||
         pairs.front().p_value > significant)
@@ -165,9 +165,10 @@ class Explainer {
   }
 
   void judge() {
-    tell("comparing what explains it");
+    report("comparing what explains it");
     rival_evidence_.emplace(full_base_, modes_.columns);
     rival_ = rival_evidence_->best_of(rivals_);
+    if (!settled("the base model", base_) || !settled("the base model on the full mesh", full_base_)) return;
     const Structure before = structure_left(full_base_, 0.0);
     const FieldHypothesis& single = hypotheses_.front();
     const bool effect_seen = single.p_value < significant && single.score > 0.0;
@@ -189,7 +190,16 @@ class Explainer {
       out_.summary = unexplained_summary(best, effect_seen, rivalled, after);
       return;
     }
-    name(best);
+    if (settled(best.name(), best.fit)) name(best);
+  }
+
+  /// Whether a fit's search ended where it was to end; else nothing is named.
+  [[nodiscard]] bool settled(const std::string& of, const FieldFit& fit) {
+    if (inference::is_settled(fit.termination)) return true;
+    out_.verdict = Verdict::unexplained;
+    out_.summary = fmt::format("Nothing can be named. The search of {} did not converge: {}", of,
+                               inference::sentence(fit.termination));
+    return false;
   }
 
   [[nodiscard]] std::string unexplained_summary(const FieldHypothesis& best, bool effect_seen, bool rivalled,
@@ -255,33 +265,34 @@ class Explainer {
     const auto place = std::ranges::find(choice.free, value);
     if (place == choice.free.end()) return out;
     const Index unknown = 1 + (place - choice.free.begin());
+    const inference::Parameter scale = searched(parameter);
+    const double coordinate = scale.coordinate(out.value);
     double error = std::sqrt(fit.covariance(unknown, unknown));
-    const double coordinate = to_coordinate(parameter, out.value);
-    out.ci90 = {from_coordinate(parameter, coordinate - ci90 * error),
-                from_coordinate(parameter, coordinate + ci90 * error)};
-    if (!fit.ci90.empty() && fit.ci90[value][0] < fit.ci90[value][1]) {
-      out.ci90 = fit.ci90[value];
-      error = (to_coordinate(parameter, out.ci90[1]) - to_coordinate(parameter, out.ci90[0])) / (2.0 * ci90);
-    }
-    out.standard_error = parameter.scale == SearchScale::logarithmic ? out.value * error : error;
+    out.ci90 = std::isfinite(error) ? inference::interval(scale, coordinate, inference::normal_90 * error)
+                                    : std::array{scale.lower, scale.upper};
+    const bool profiled = !fit.ci90.empty() && fit.ci90[value][0] < fit.ci90[value][1];
+    if (profiled) out.ci90 = fit.ci90[value];
+    if (profiled || !std::isfinite(error))
+      error = (scale.coordinate(out.ci90[1]) - scale.coordinate(out.ci90[0])) / (2.0 * inference::normal_90);
+    out.standard_error = inference::standard_error(scale, coordinate, error);
     return out;
   }
 
-  /// A lump's own place first; all of the specimen where no part of it stands out.
+  /// An inclusion's own place first; all of the specimen where no part of it stands out.
   void find_places() {
     out_.where = misfit_regions(field_, round_->rows(), base_, 5);
-    const bool lumped = chosen_ != nullptr && chosen_->has_inclusion();
-    if (!lumped && !out_.where.empty()) return;
+    const bool included = chosen_ != nullptr && chosen_->has_inclusion();
+    if (!included && !out_.where.empty()) return;
     const Structure before = structure_left(full_base_, 0.0);
     Misfit place;
     place.port = "field";
     place.channel = "tags";
     place.region = "all of the specimen, in proportion to the load";
-    if (lumped) {
-      const Inclusion lump = lump_of(chosen_->fit);
-      place.region =
-          fmt::format("around {:.0f} deg, z {:.0f} mm, {:.0f} mm from the axis",
-                      std::remainder(lump.theta_deg - 180.0, 360.0) + 180.0, lump.z_mm, lump.radius_mm);
+    if (included) {
+      const Inclusion inclusion = inclusion_of(chosen_->fit);
+      place.region = fmt::format("around {:.0f} deg, z {:.0f} mm, {:.0f} mm from the axis",
+                                 std::remainder(inclusion.theta_deg - 180.0, 360.0) + 180.0, inclusion.z_mm,
+                                 inclusion.radius_mm);
     }
     place.excess_chi2 = std::max(before.excess, hypotheses_.front().gain);
     place.p_value = std::min(before.p_value, hypotheses_.front().p_value);
@@ -339,15 +350,15 @@ class Explainer {
     }
   }
 
-  /// What the cavity takes at the highest pressure; not known of fits around a lump.
+  /// What the cavity takes at the highest pressure; not known of fits around an inclusion.
   [[nodiscard]] ImagedModel imaged(const FieldHypothesis& hypothesis) {
     if (hypothesis.has_inclusion()) return {&hypothesis, std::nan("")};
-    return {&hypothesis, round_->taken_mL(hypothesis.fit)};
+    return {&hypothesis, round_->volume_change_mL(hypothesis.fit)};
   }
 
   void propose() {
     if (out_.verdict == Verdict::none) return;
-    tell("designing the next experiment");
+    report("designing the next experiment");
     if (out_.verdict == Verdict::unexplained) {
       out_.next_experiment = exposing_images();
       return;
@@ -370,7 +381,7 @@ class Explainer {
   FieldModes modes_;
   std::vector<Family> families_;
   std::vector<Index> rivals_;
-  LumpLattice lattice_;
+  InclusionLattice lattice_;
   std::vector<FieldHypothesis> hypotheses_;
   std::optional<LinearEvidence> rival_evidence_;
   LinearEvidence::Choice rival_;

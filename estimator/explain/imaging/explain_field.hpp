@@ -1,11 +1,19 @@
 #pragma once
 // Where imaged motion and model disagree, and which field effect that is.
 //
-//   base fit, every effect's refit, rivals outside the library (field_modes.hpp), what is left after the best
+//   field_case           what the study says and what was measured
+//   field_solver         equilibria with field effects and their derivatives
+//   field_fit            the base model, and any choice of effects, fitted to the motion
+//   field_modes          rivals outside the library; linear_evidence: what a change of the motion would gain
+//   field_hypotheses     each effect fitted
+//   inclusion_search     the place of an inclusion; inclusion_body, inclusion_fit: its fit on a mesh of its own
+//   field_pairs          two effects, where one leaves something
+//   explain_field        the verdict
+//   field_regions        where; field_gap: what is predicted of tags not fitted; field_next_experiment: what to image next
 //
 // Verdicts: none - neither an effect nor any structure gains more than noise would (p above 1e-3 after correction for
 // how many were tried). unexplained - structure is left after the best effect, or something outside the library gains more
-// than any effect. ambiguous - other effects' scores are within 9 of the best one's; named - none is. The score is the gain
+// than any effect, or a search that the name would rest on did not converge. ambiguous - other effects' scores are within 9 of the best one's; named - none is. The score is the gain
 // of chi2, less 2 for each parameter and 2 log(number of places) for a place that was searched.
 
 #include <functional>

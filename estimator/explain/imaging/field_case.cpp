@@ -1,8 +1,10 @@
+#include "estimator/explain/imaging/field_case.hpp"
+
 #include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
-#include "estimator/explain/imaging/field_fit.hpp"
 #include "estimator/io/study_refusal.hpp"
 #include "estimator/model/affected_model.hpp"
 
@@ -47,7 +49,8 @@ FieldCase field_case(const Study& study) {
   if (study.law.parameters.front().vary == Variation::element)
     refuse(study, "law.parameters.C1_kPa.vary",
            "images are explained from a gel of one stiffness, not of one value an element",
-           "Set vary = \"whole\": a lump is then found by name, and a stiffness that varies smoothly is told "
+           "Set vary = \"whole\": an inclusion is then found by name, and a stiffness that varies smoothly "
+           "is told "
            "as something "
            "outside the library. `diastole fit` maps one value an element.");
   if (study.chamber)

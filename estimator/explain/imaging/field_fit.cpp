@@ -5,30 +5,41 @@
 #include <span>
 #include <stdexcept>
 
+#include "estimator/inference/covariance.hpp"
+#include "estimator/inference/least_squares.hpp"
+#include "estimator/mesh/node_field.hpp"
+
 namespace diastole::explain {
 namespace {
 
 using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
 
-bool logarithmic(const EffectParameter& parameter) { return parameter.scale == SearchScale::logarithmic; }
+constexpr double worth_a_step = 0.02;  // of chi2
 
-/// A size of zero is the base model itself, which has no derivative towards the effect: fits stay a little off it.
-double least(const EffectParameter& parameter) {
-  return parameter.lower == 0.0 ? 1e-4 * parameter.typical : parameter.lower;
+/// How far apart the models for a derivative lie, on each side.
+double perturbation_of(const EffectParameter& parameter) {
+  if (parameter.scale == SearchScale::logarithmic) return 1e-3;
+  return std::max(1e-3 * std::abs(parameter.typical), 1e-7);
 }
 
-double nudge_of(const EffectParameter& parameter) {
-  if (logarithmic(parameter)) return 1e-3;
-  return std::max(1e-3 * std::abs(parameter.typical), 1e-7);
+/// start + sum of shares * fields.
+NodeField combined(NodeField start, const std::vector<double>& shares, const std::vector<NodeField>& fields) {
+  for (size_t n = 0; n < shares.size(); ++n)
+    add_scaled(start, shares[n], fields[n]);
+  return start;
 }
 
 }  // namespace
 
-double to_coordinate(const EffectParameter& parameter, double value) {
-  return logarithmic(parameter) ? std::log(value) : value;
-}
-double from_coordinate(const EffectParameter& parameter, double coordinate) {
-  return logarithmic(parameter) ? std::exp(coordinate) : coordinate;
+/// A size of zero is the base model itself, which has no derivative towards the effect: fits stay a little off it.
+inference::Parameter searched(const EffectParameter& parameter) {
+  return {.name = std::string(parameter.name),
+          .unit = std::string(parameter.unit),
+          .lower = parameter.lower == 0.0 ? 1e-4 * parameter.typical : parameter.lower,
+          .upper = parameter.upper,
+          .scale = static_cast<inference::Scale>(parameter.scale)};
 }
 
 const EffectParameter& FieldChoice::parameter(size_t value) const {
@@ -38,15 +49,6 @@ const EffectParameter& FieldChoice::parameter(size_t value) const {
     value -= parameters.size();
   }
   throw std::out_of_range("the choice has fewer values");
-}
-
-size_t FieldChoice::first_of(const Effect& wanted) const {
-  size_t first = 0;
-  for (const Effect* effect : effects) {
-    if (effect == &wanted) break;
-    first += effect->field_parameters().size();
-  }
-  return first;
 }
 
 void FieldChoice::apply_to(FieldModel& model) const {
@@ -67,32 +69,169 @@ FieldChoice together(const FieldChoice& a, const FieldChoice& b) {
   return both;
 }
 
-struct FieldProblem::Point {
-  double log_C1 = 0.0;
-  FieldChoice choice;
-  std::vector<double> pressures_kPa;
-  double cost = 0.0;
-  Eigen::VectorXd residuals;
-  Eigen::VectorXd priors;
-  Eigen::MatrixXd jacobian;
+VectorXd FieldFit::all_residuals() const {
+  VectorXd all(residuals.size() + priors.size());
+  all << residuals, priors;
+  return all;
+}
 
-  [[nodiscard]] size_t unknowns() const { return 1 + choice.free.size() + pressures_kPa.size(); }
-
-  [[nodiscard]] Point moved(const Eigen::VectorXd& step, const std::array<double, 2>& C1_bounds_kPa) const {
-    Point next = *this;
-    next.log_C1 = std::clamp(log_C1 + step[0], std::log(C1_bounds_kPa[0]), std::log(C1_bounds_kPa[1]));
-    Index at = 1;
-    for (const size_t i : choice.free) {
-      const EffectParameter& parameter = choice.parameter(i);
-      const double value =
-          from_coordinate(parameter, to_coordinate(parameter, choice.values[i]) + step[at++]);
-      next.choice.values[i] = std::clamp(value, least(parameter), parameter.upper);
-    }
-    for (double& pressure_kPa : next.pressures_kPa)
-      pressure_kPa += step[at++];
-    return next;
+/// The search for one choice.
+class FieldProblem::Search final : public inference::LeastSquaresProblem {
+ public:
+  Search(FieldProblem& problem, FieldChoice choice) : problem_(problem), choice_(std::move(choice)) {
+    const auto& [lowest_kPa, highest_kPa] = problem.field_.C1_bounds_kPa;
+    std::vector<inference::Parameter> unknowns{{.name = "C1_kPa",
+                                                .lower = lowest_kPa,
+                                                .upper = highest_kPa,
+                                                .scale = inference::Scale::logarithmic}};
+    for (const size_t value : choice_.free)
+      unknowns.push_back(searched(choice_.parameter(value)));
+    unknowns.resize(unknowns.size() + problem.rows_.frames().size(), {.name = "pressure_kPa"});
+    space_ = inference::ParameterSpace(std::move(unknowns));
   }
+
+  [[nodiscard]] VectorXd coordinates(const Start& start) const {
+    std::vector<double> values{start.C1_kPa};
+    for (const size_t value : choice_.free)
+      values.push_back(choice_.values[value]);
+    values.insert(values.end(), start.pressures_kPa.begin(), start.pressures_kPa.end());
+    return space_.coordinates(values);
+  }
+
+  /// The fit there, without its numbers.
+  [[nodiscard]] FieldFit at(const VectorXd& q) const {
+    const std::vector<double> values = space_.values(q);
+    FieldFit fit;
+    fit.choice = choice_;
+    fit.C1_kPa = values.front();
+    for (size_t i = 0; i < choice_.free.size(); ++i)
+      fit.choice.values[choice_.free[i]] = values[1 + i];
+    fit.pressures_kPa.assign(values.begin() + pressures(), values.end());
+    return fit;
+  }
+
+  [[nodiscard]] const inference::ParameterSpace& space() const override { return space_; }
+  [[nodiscard]] std::string failure() const override { return "the specimen has no equilibrium there"; }
+  std::optional<VectorXd> residuals(const VectorXd& q) override;
+  MatrixXd jacobian(const VectorXd& q) override;
+
+ private:
+  /// Place of the first.
+  [[nodiscard]] Index pressures() const { return 1 + static_cast<Index>(choice_.free.size()); }
+  [[nodiscard]] VectorXd priors(const FieldFit& at) const;
+  [[nodiscard]] std::vector<FieldPerturbation> perturbations(const FieldFit& at) const;
+
+  FieldProblem& problem_;
+  FieldChoice choice_;
+  inference::ParameterSpace space_;
 };
+
+VectorXd FieldProblem::Search::priors(const FieldFit& at) const {
+  const FieldCase& field = problem_.field_;
+  std::vector<double> values;
+  for (size_t slot = 0; slot < at.pressures_kPa.size(); ++slot) {
+    const Frame& frame = field.measurement.frames[static_cast<size_t>(problem_.rows_.frames()[slot])];
+    values.push_back((at.pressures_kPa[slot] - frame.pressure_kPa) / std::max(frame.sigma_kPa, 1e-5));
+  }
+  if (field.C1_start_kPa.sigma > 0.0)
+    values.push_back((at.C1_kPa - field.C1_start_kPa.value) / field.C1_start_kPa.sigma);
+  if (field.inner_radius_mm)
+    values.push_back((problem_.model_of(at.choice).inner_radius_mm - field.inner_radius_mm->value) /
+                     field.inner_radius_mm->sigma);
+  return Eigen::Map<const VectorXd>(values.data(), static_cast<Index>(values.size()));
+}
+
+std::optional<VectorXd> FieldProblem::Search::residuals(const VectorXd& q) {
+  if (problem_.field_.alive) problem_.field_.alive();
+  FieldFit here = at(q);
+  FieldSolver& solver = problem_.solver_;
+  MotionResiduals& rows = problem_.rows_;
+  solver.set(problem_.model_of(here.choice), here.C1_kPa);
+  std::vector<NodeField> displacements_mm;
+  for (size_t node = 0; node < problem_.nodes_kPa_.size(); ++node) {
+    if (!solver.solve(node, problem_.nodes_kPa_[node])) return {};
+    displacements_mm.push_back(solver.seen_displacement_mm(node));
+  }
+  std::vector<NodeField> seen_mm;
+  for (const double pressure_kPa : here.pressures_kPa)
+    seen_mm.push_back(combined(solver.mesh().reference(), problem_.shares(pressure_kPa), displacements_mm));
+  if (rows.size() == 0) {
+    (void)rows.find(solver.mesh(), solver.reference(), seen_mm);
+  } else if (!rows.follow(solver.mesh(), solver.reference(), seen_mm, Following::closely)) {
+    return {};
+  }
+  here.residuals = rows.residuals();
+  here.priors = priors(here);
+  return here.all_residuals();
+}
+
+/// Of the model by each free parameter.
+std::vector<FieldPerturbation> FieldProblem::Search::perturbations(const FieldFit& at) const {
+  std::vector<FieldPerturbation> result;
+  for (const size_t i : choice_.free) {
+    const inference::Parameter parameter = searched(choice_.parameter(i));
+    const double h = perturbation_of(choice_.parameter(i));
+    const auto model = [&](double change) {
+      FieldChoice changed = at.choice;
+      changed.values[i] = parameter.value(parameter.coordinate(changed.values[i]) + change);
+      return problem_.model_of(changed);
+    };
+    result.push_back({model(h), model(-h), 2.0 * h});
+  }
+  return result;
+}
+
+MatrixXd FieldProblem::Search::jacobian(const VectorXd& q) {
+  const FieldFit here = at(q);
+  FieldSolver& solver = problem_.solver_;
+  const MotionResiduals& rows = problem_.rows_;
+  const std::vector<FieldPerturbation> changes = perturbations(here);
+  // Of the nodes' displacements: by C1, by the parameters, and the displacements themselves, which a pressure changes;
+  // and of the undeformed mesh.
+  std::vector<std::vector<NodeField>> by(2 + changes.size());
+  for (size_t node = 0; node < problem_.nodes_kPa_.size(); ++node) {
+    FieldSolver::Slopes slopes = solver.slopes(node, changes);
+    by[0].push_back(std::move(slopes.modulus));
+    for (size_t i = 0; i < changes.size(); ++i)
+      by[1 + i].push_back(std::move(slopes.model[i]));
+    by.back().push_back(solver.seen_displacement_mm(node));
+  }
+  std::vector<NodeField> mesh_slopes(by.size());
+  for (size_t i = 0; i < changes.size(); ++i)
+    mesh_slopes[1 + i] = solver.reference_slope(changes[i]);
+  const NodeField still(solver.mesh().reference().size(), 0.0);
+  const VectorXd priors_here = priors(here);
+  MatrixXd result = MatrixXd::Zero(rows.size() + priors_here.size(), space_.size());
+  for (size_t slot = 0; slot < here.pressures_kPa.size(); ++slot) {
+    constexpr double step_kPa = 1e-4;
+    const std::vector<double> shares = problem_.shares(here.pressures_kPa[slot]);
+    std::vector<double> rise = problem_.shares(here.pressures_kPa[slot] + step_kPa);
+    const std::vector<double> below = problem_.shares(here.pressures_kPa[slot] - step_kPa);
+    for (size_t node = 0; node < rise.size(); ++node)
+      rise[node] = (rise[node] - below[node]) / (2.0 * step_kPa);
+    std::vector<NodeField> fields;
+    for (size_t k = 0; k < by.size(); ++k)
+      fields.push_back(combined(mesh_slopes[k].empty() ? still : mesh_slopes[k],
+                                k + 1 == by.size() ? rise : shares, by[k]));
+    std::vector<const NodeField*> motion;
+    std::vector<const NodeField*> reference;
+    for (size_t k = 0; k < by.size(); ++k) {
+      motion.push_back(&fields[k]);
+      reference.push_back(mesh_slopes[k].empty() ? nullptr : &mesh_slopes[k]);
+    }
+    const MatrixXd block = rows.columns(slot, solver.mesh(), motion, reference);
+    auto here_rows = result.middleRows(rows.first(slot), rows.count(slot));
+    here_rows.leftCols(pressures()) = block.leftCols(pressures());
+    here_rows.col(0) *= here.C1_kPa;
+    here_rows.col(pressures() + static_cast<Index>(slot)) = block.rightCols<1>();
+  }
+  for (Index j = 0; j < q.size(); ++j) {
+    constexpr double h = 1e-6;
+    const VectorXd step = h * VectorXd::Unit(q.size(), j);
+    result.col(j).tail(priors_here.size()) = (priors(at(q + step)) - priors(at(q - step))) / (2.0 * h);
+  }
+  return result;
+}
 
 FieldProblem::FieldProblem(const FieldCase& field, std::array<size_t, 3> elements)
     : field_(field),
@@ -114,18 +253,6 @@ std::vector<double> FieldProblem::shares(double pressure_kPa) const {
   return result;
 }
 
-namespace {
-
-/// start + sum of shares * fields.
-NodeField combined(NodeField start, const std::vector<double>& shares, const std::vector<NodeField>& fields) {
-  for (size_t n = 0; n < shares.size(); ++n)
-    for (size_t i = 0; i < start.size(); ++i)
-      start[i] += shares[n] * fields[n][i];
-  return start;
-}
-
-}  // namespace
-
 FieldModel FieldProblem::model_of(const FieldChoice& choice) const {
   FieldModel model = field_.base;
   choice.apply_to(model);
@@ -139,153 +266,29 @@ FieldProblem::Start FieldProblem::start() const {
   return start;
 }
 
-Eigen::VectorXd FieldProblem::priors(const Point& at) const {
-  std::vector<double> values;
-  for (size_t slot = 0; slot < at.pressures_kPa.size(); ++slot) {
-    const Frame& frame = field_.measurement.frames[static_cast<size_t>(rows_.frames()[slot])];
-    values.push_back((at.pressures_kPa[slot] - frame.pressure_kPa) / std::max(frame.sigma_kPa, 1e-5));
-  }
-  if (field_.C1_start_kPa.sigma > 0.0)
-    values.push_back((std::exp(at.log_C1) - field_.C1_start_kPa.value) / field_.C1_start_kPa.sigma);
-  if (field_.inner_radius_mm)
-    values.push_back((model_of(at.choice).inner_radius_mm - field_.inner_radius_mm->value) /
-                     field_.inner_radius_mm->sigma);
-  return Eigen::Map<const Eigen::VectorXd>(values.data(), static_cast<Index>(values.size()));
-}
-
-bool FieldProblem::evaluate(Point& at) {
-  if (field_.alive) field_.alive();
-  solver_.set(model_of(at.choice), std::exp(at.log_C1));
-  std::vector<NodeField> displacements_mm;
-  for (size_t node = 0; node < nodes_kPa_.size(); ++node) {
-    if (!solver_.solve(node, nodes_kPa_[node])) return false;
-    displacements_mm.push_back(solver_.seen_displacement_mm(node));
-  }
-  std::vector<NodeField> seen_mm;
-  for (const double pressure_kPa : at.pressures_kPa)
-    seen_mm.push_back(combined(solver_.mesh().reference(), shares(pressure_kPa), displacements_mm));
-  if (rows_.size() == 0)
-    (void)rows_.find(solver_.mesh(), solver_.reference(), seen_mm);
-  else if (!rows_.follow(solver_.mesh(), solver_.reference(), seen_mm, Following::closely))
-    return false;
-  at.residuals = rows_.residuals();
-  at.priors = priors(at);
-  at.cost = at.residuals.squaredNorm() + at.priors.squaredNorm();
-  return true;
-}
-
-void FieldProblem::differentiate(Point& at) {
-  const auto unknowns = static_cast<Index>(at.unknowns());
-  at.jacobian.setZero(rows_.size() + at.priors.size(), unknowns);
-  std::vector<FieldNudge> nudges;
-  for (const size_t i : at.choice.free) {
-    const EffectParameter& parameter = at.choice.parameter(i);
-    const double h = nudge_of(parameter);
-    FieldChoice up = at.choice;
-    FieldChoice down = at.choice;
-    const double coordinate = to_coordinate(parameter, at.choice.values[i]);
-    up.values[i] = from_coordinate(parameter, coordinate + h);
-    down.values[i] = from_coordinate(parameter, coordinate - h);
-    nudges.push_back({model_of(up), model_of(down), 2.0 * h});
-  }
-  // Of the nodes' displacements: by C1, by the nudged parameters, and the displacements themselves.
-  std::vector<std::vector<NodeField>> by(2 + nudges.size());
-  for (size_t node = 0; node < nodes_kPa_.size(); ++node) {
-    FieldSolver::Slopes slopes = solver_.slopes(node, nudges);
-    by[0].push_back(std::move(slopes.modulus));
-    for (size_t i = 0; i < nudges.size(); ++i)
-      by[1 + i].push_back(std::move(slopes.model[i]));
-    by.back().push_back(solver_.seen_displacement_mm(node));
-  }
-  std::vector<NodeField> mesh_slopes{{}};
-  for (const FieldNudge& nudge : nudges)
-    mesh_slopes.push_back(solver_.reference_slope(nudge));
-  mesh_slopes.emplace_back();
-  const NodeField still(solver_.mesh().reference().size(), 0.0);
-  const Index pressures = 1 + static_cast<Index>(nudges.size());
-  for (size_t slot = 0; slot < at.pressures_kPa.size(); ++slot) {
-    constexpr double step_kPa = 1e-4;
-    std::vector<double> rise = shares(at.pressures_kPa[slot] + step_kPa);
-    const std::vector<double> below = shares(at.pressures_kPa[slot] - step_kPa);
-    for (size_t node = 0; node < rise.size(); ++node)
-      rise[node] = (rise[node] - below[node]) / (2.0 * step_kPa);
-    const std::vector<double> here = shares(at.pressures_kPa[slot]);
-    std::vector<NodeField> fields;
-    for (size_t k = 0; k < by.size(); ++k)
-      fields.push_back(
-          combined(mesh_slopes[k].empty() ? still : mesh_slopes[k], k + 1 == by.size() ? rise : here, by[k]));
-    std::vector<const NodeField*> motion;
-    std::vector<const NodeField*> reference;
-    for (size_t k = 0; k < by.size(); ++k) {
-      motion.push_back(&fields[k]);
-      reference.push_back(mesh_slopes[k].empty() ? nullptr : &mesh_slopes[k]);
-    }
-    const Eigen::MatrixXd block = rows_.columns(slot, solver_.mesh(), motion, reference);
-    at.jacobian.block(rows_.first(slot), 0, block.rows(), pressures) = block.leftCols(pressures);
-    at.jacobian.block(rows_.first(slot), 0, block.rows(), 1) *= std::exp(at.log_C1);
-    at.jacobian.block(rows_.first(slot), pressures + static_cast<Index>(slot), block.rows(), 1) =
-        block.rightCols<1>();
-  }
-  for (Index j = 0; j < unknowns; ++j) {
-    Eigen::VectorXd step = Eigen::VectorXd::Zero(unknowns);
-    step[j] = 1e-6;
-    Point up = at.moved(step, {0.0, HUGE_VAL});
-    Point down = at.moved(-step, {0.0, HUGE_VAL});
-    at.jacobian.col(j).tail(at.priors.size()) = (priors(up) - priors(down)) / 2e-6;
-  }
-}
-
-double FieldProblem::taken_mL(const FieldFit& fit) {
+double FieldProblem::volume_change_mL(const FieldFit& fit) {
   solver_.set(model_of(fit.choice), fit.C1_kPa);
   if (!solver_.solve(highest_node(), nodes_kPa_.back())) return std::nan("");
   const ElasticModel& model = solver_.elastic();
   return model.cavity_volume_mL(solver_.state(highest_node())) - model.cavity_volume_mL(model.rest_state());
 }
 
-FieldFit FieldProblem::fit(FieldChoice choice, const Start& start, const Options& options) {
-  Point best{std::log(start.C1_kPa), std::move(choice), start.pressures_kPa, 0.0, {}, {}, {}};
-  FieldFit result;
-  if (!evaluate(best)) {
-    result.choice = best.choice;
-    result.chi_square = HUGE_VAL;
-    return result;
-  }
-  double damping = 1e-4;
-  bool current = false;
-  for (int iteration = 0; iteration < options.iteration_limit && !result.converged; ++iteration) {
-    if (!current) differentiate(best);
-    current = true;
-    Eigen::VectorXd all(best.residuals.size() + best.priors.size());
-    all << best.residuals, best.priors;
-    Eigen::MatrixXd normal = best.jacobian.transpose() * best.jacobian;
-    const Eigen::VectorXd gradient = best.jacobian.transpose() * all;
-    normal.diagonal() *= 1.0 + damping;
-    const Eigen::VectorXd step = -normal.ldlt().solve(gradient);
-    Point trial = best.moved(step, field_.C1_bounds_kPa);
-    const double expected = -gradient.dot(step);
-    if (evaluate(trial) && trial.cost < best.cost) {
-      result.converged = best.cost - trial.cost < options.tolerance;
-      best = std::move(trial);
-      damping = std::max(1e-7, 0.1 * damping);
-      current = false;
-    } else {
-      result.converged = expected < options.tolerance;
-      damping *= 20.0;
-      if (damping > 1e6) break;
-    }
-  }
+FieldFit FieldProblem::fit(FieldChoice choice, const Start& start, int iteration_limit) {
+  Search search(*this, std::move(choice));
+  inference::SearchResult found = inference::minimise(
+      search, search.coordinates(start),
+      {.iteration_limit = iteration_limit, .small_gain = [](double) { return worth_a_step; }});
+  FieldFit result = search.at(found.q);
+  result.termination = found.termination;
+  result.chi_square = HUGE_VAL;
+  if (found.residuals.size() == 0) return result;
   // The rows and the solver end where the result does.
-  Point end = best;
-  (void)evaluate(end);
-  differentiate(end);
-  result.choice = end.choice;
-  result.C1_kPa = std::exp(end.log_C1);
-  result.pressures_kPa = end.pressures_kPa;
-  result.chi_square = end.cost;
-  result.covariance = (end.jacobian.transpose() * end.jacobian).inverse();
-  result.residuals = std::move(end.residuals);
-  result.jacobian = std::move(end.jacobian);
-  result.priors = std::move(end.priors);
+  const VectorXd all = search.residuals(found.q).value_or(found.residuals);
+  result.chi_square = all.squaredNorm();
+  result.residuals = all.head(rows_.size());
+  result.priors = all.tail(all.size() - rows_.size());
+  result.covariance = inference::estimate_covariance(found.jacobian).matrix;
+  result.jacobian = std::move(found.jacobian);
   return result;
 }
 

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <map>
 
+#include "estimator/explain/imaging/linear_evidence.hpp"
+
 namespace diastole::explain {
 
 using Eigen::Index;
@@ -40,9 +42,7 @@ std::vector<size_t> deal_folds(const Measurement& measurement, const MotionResid
 Eigen::VectorXd held_out_residuals(const FieldFit& fit, const std::vector<size_t>& folds) {
   const Index rows = fit.residuals.size();
   const Eigen::MatrixXd normal = fit.jacobian.transpose() * fit.jacobian;
-  Eigen::VectorXd all(rows + fit.priors.size());
-  all << fit.residuals, fit.priors;
-  const Eigen::VectorXd gradient = fit.jacobian.transpose() * all;
+  const Eigen::VectorXd gradient = fit.jacobian.transpose() * fit.all_residuals();
   Eigen::VectorXd predicted = fit.residuals;
   const size_t count = folds.empty() ? 0 : 1 + std::ranges::max(folds);
   for (size_t fold = 0; fold < count; ++fold) {
@@ -59,9 +59,8 @@ Eigen::VectorXd held_out_residuals(const FieldFit& fit, const std::vector<size_t
 
 Gap field_gap(const FieldFit& base, const FieldFit& after, const std::vector<size_t>& folds,
               const Eigen::MatrixXd& directions) {
-  const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(directions);
-  const Index rank = qr.rank();
-  const Eigen::MatrixXd basis = qr.householderQ() * Eigen::MatrixXd::Identity(directions.rows(), rank);
+  const Eigen::MatrixXd basis = orthonormal_basis(directions);
+  const Index rank = basis.cols();
   const auto reduced = [&](const FieldFit& fit) {
     return ((basis.transpose() * held_out_residuals(fit, folds)).squaredNorm() + fit.priors.squaredNorm()) /
            static_cast<double>(rank + fit.priors.size());

@@ -6,8 +6,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "estimator/explain/imaging/inclusion_fit.hpp"
 #include "estimator/explain/imaging/linear_evidence.hpp"
-#include "estimator/explain/imaging/lump_fit.hpp"
 #include "estimator/explain/verdict/chi_square.hpp"
 
 namespace diastole::explain {
@@ -30,29 +30,22 @@ std::vector<double> start_in_direction(FieldProblem& problem, const FieldFit& ba
   std::vector<double> values = effect.field_neutral(problem.field().base);
   const double typical = effect.field_parameters()[0].typical;
   const double little = typical / 300.0;
-  std::vector<FieldNudge> nudges;
+  std::vector<FieldPerturbation> perturbations;
   for (int i = 0; i < directions; ++i) {
-    FieldNudge nudge{problem.field().base, problem.field().base, 2.0 * little};
+    FieldPerturbation perturbation{problem.field().base, problem.field().base, 2.0 * little};
     values[direction.parameter] = direction.half_turn * i / directions;
     values[0] = little;
-    effect.apply_to_field(values, nudge.up);
+    effect.apply_to_field(values, perturbation.up);
     values[0] = -little;
-    effect.apply_to_field(values, nudge.down);
-    nudges.push_back(nudge);
+    effect.apply_to_field(values, perturbation.down);
+    perturbations.push_back(perturbation);
   }
   const size_t loudest = problem.highest_node();
-  const FieldSolver::Slopes slopes = problem.solver().slopes(loudest, nudges);
-  std::vector<const NodeField*> fields;
-  for (const NodeField& field : slopes.model)
-    fields.push_back(&field);
-  const MotionResiduals& rows = problem.rows();
-  Eigen::MatrixXd columns(rows.size(), directions);
-  for (size_t slot = 0; slot < base.pressures_kPa.size(); ++slot) {
-    const double share = base.pressures_kPa[slot] / problem.nodes_kPa()[loudest];
-    columns.middleRows(rows.first(slot), rows.count(slot)) =
-        share * share * rows.columns(slot, problem.solver().mesh(), fields);
-  }
-  const LinearEvidence evidence(base, columns);
+  const FieldSolver::Slopes slopes = problem.solver().slopes(loudest, perturbations);
+  std::vector<double> shares;
+  for (const double pressure_kPa : base.pressures_kPa)
+    shares.push_back(std::pow(pressure_kPa / problem.nodes_kPa()[loudest], 2));
+  const LinearEvidence evidence(base, problem.rows().columns(problem.solver().mesh(), slopes.model, shares));
   values = effect.field_neutral(problem.field().base);
   values[0] = typical;
   double best = 0.0;
@@ -119,21 +112,21 @@ std::vector<FieldHypothesis> fit_round_effects(FieldProblem& problem, const Fiel
   return result;
 }
 
-std::vector<FieldHypothesis> fit_inclusion(const FieldProblem& problem, const FieldFit& base,
+std::vector<FieldHypothesis> try_inclusion(const FieldProblem& problem, const FieldFit& base,
                                            const std::vector<InclusionGuess>& guesses, double to_beat) {
   if (guesses.front().p_value > beyond_chance) return {};
   constexpr double effective_parameters = 5.0;  // sizes are tied to one another
   constexpr double near = 20.0;
   FieldHypothesis tried{{std::string(inclusion_effect().text().id)},
-                        fit_lump(problem, base, guesses.front().inclusion, LumpEffort::once)};
+                        fit_inclusion(problem, base, guesses.front().inclusion, InclusionEffort::once)};
   const auto judge = [&] {
     tried.gain = base.chi_square - tried.fit.chi_square;
     tried.score =
-        tried.gain - 2.0 * effective_parameters - 2.0 * std::log(places_told_apart(problem.field().base));
+        tried.gain - 2.0 * effective_parameters - 2.0 * std::log(distinct_places(problem.field().base));
   };
   judge();
   if (tried.score > to_beat - near && tried.gain > 0.0) {
-    tried.fit = fit_lump(problem, base, lump_of(tried.fit), LumpEffort::fully);
+    tried.fit = fit_inclusion(problem, base, inclusion_of(tried.fit), InclusionEffort::fully);
     judge();
   }
   tried.p_value = std::min(1.0, static_cast<double>(field_effects().size()) * guesses.front().p_value);

@@ -24,9 +24,9 @@ struct FieldHypothesis {
 /// All effects that are the same all around the axis, on a mesh that is. Precondition: the solver stands at `base`.
 std::vector<FieldHypothesis> fit_round_effects(FieldProblem& problem, const FieldFit& base);
 
-/// A lump from the search's best guess; empty if that is not beyond chance. `base`: the problem's base fit. Its intervals are
+/// An inclusion from the search's best guess; empty if that is not beyond chance. `base`: the problem's base fit. Its intervals are
 /// only sought if its score comes near the one `to_beat`.
-std::vector<FieldHypothesis> fit_inclusion(const FieldProblem& problem, const FieldFit& base,
+std::vector<FieldHypothesis> try_inclusion(const FieldProblem& problem, const FieldFit& base,
                                            const std::vector<InclusionGuess>& guesses, double to_beat);
 
 }  // namespace diastole::explain

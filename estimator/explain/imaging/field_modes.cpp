@@ -7,8 +7,10 @@
 #include <cmath>
 #include <functional>
 
+#include "estimator/explain/imaging/linear_evidence.hpp"
 #include "estimator/fe/elastic_system.hpp"
 #include "estimator/fe/gauss_points.hpp"
+#include "estimator/mesh/node_field.hpp"
 
 namespace diastole::explain {
 namespace {
@@ -94,10 +96,8 @@ std::vector<double> resistance(const ElasticSystem& system, const ElasticState& 
   constexpr double step = 1e-4;
   ElasticState up = state;
   ElasticState down = state;
-  for (size_t dof = 0; dof < motion.size(); ++dof) {
-    up.position_mm[dof] += step * motion[dof];
-    down.position_mm[dof] -= step * motion[dof];
-  }
+  add_scaled(up.position_mm, step, motion);
+  add_scaled(down.position_mm, -step, motion);
   std::vector<double> result = system.residual(down).values;
   const std::vector<double> above = system.residual(up).values;
   for (size_t i = 0; i < result.size(); ++i)
@@ -174,10 +174,8 @@ class Builder {
   }
 
   void fill(size_t slot, const std::vector<NodeField>& fields, Eigen::MatrixXd& columns) const {
-    std::vector<const NodeField*> pointers;
-    for (const NodeField& field : fields)
-      pointers.push_back(&field);
-    const Eigen::MatrixXd elastic = problem_.rows().columns(slot, problem_.solver().mesh(), pointers);
+    const Eigen::MatrixXd elastic =
+        problem_.rows().columns(slot, problem_.solver().mesh(), pointers_to(fields));
     const Index first = problem_.rows().first(slot);
     const Index rows = problem_.rows().count(slot);
     constexpr Index driven = 2 * rigid_motions + 3;
@@ -191,14 +189,11 @@ class Builder {
     const Index motion = static_cast<Index>(courses) * driven + stiffness;
     for (Index i = 0; i < rows; ++i) {
       const ResidualRow& row = problem_.rows().rows()[static_cast<size_t>(first + i)];
-      const Vector3d outwards = Vector3d(row.X_mm[0], row.X_mm[1], 0.0).normalized();
-      const std::array<double, 3> along{row.by_motion.dot(outwards),
-                                        row.by_motion.dot(Vector3d(-outwards[1], outwards[0], 0.0)),
-                                        row.by_motion[2]};
+      const Eigen::RowVector3d along = by_cylindrical_motion(row);
       for (Index h = 0; h < count; ++h) {
         const double value = course_at(0, slot) * harmonics_[static_cast<size_t>(h)].value(row.X_mm);
         for (Index k = 0; k < 3; ++k)
-          columns(first + i, motion + k * count + h) = value * along[static_cast<size_t>(k)];
+          columns(first + i, motion + k * count + h) = value * along[k];
       }
     }
   }
@@ -227,8 +222,7 @@ class Builder {
     std::vector<NodeField> fields;
     for (size_t motion = 0; motion < rigid_motions; ++motion) {
       fields.push_back(std::move(responses[motion]));
-      for (size_t dof = 0; dof < fields.back().size(); ++dof)
-        fields.back()[dof] += prescribed[motion][dof];
+      add_scaled(fields.back(), 1.0, prescribed[motion]);
     }
     for (size_t motion = 0; motion < rigid_motions; ++motion)
       fields.push_back(rigid(system.mesh(), state.position_mm, motion, all));

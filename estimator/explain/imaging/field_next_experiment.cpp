@@ -151,11 +151,13 @@ class Outlook {
       if (!own) ++prior;
     }
     while (prior < b_.priors.size())
-      add_prior(0.0);  // what is known of lumps in general
-    if (imaging.volumes && std::isfinite(truth_.taken_mL) && std::isfinite(adapting_.taken_mL)) {
-      const double error_mL = volume_error * truth_.taken_mL / std::sqrt(static_cast<double>(slots_));
+      add_prior(0.0);  // what is known of inclusions in general
+    if (imaging.volumes && std::isfinite(truth_.volume_change_mL) &&
+        std::isfinite(adapting_.volume_change_mL)) {
+      const double error_mL = volume_error * truth_.volume_change_mL / std::sqrt(static_cast<double>(slots_));
       // The cavity answers to C1 about as 1 / C1.
-      gram.add_one((adapting_.taken_mL - truth_.taken_mL) / error_mL, 0, -adapting_.taken_mL / error_mL);
+      gram.add_one((adapting_.volume_change_mL - truth_.volume_change_mL) / error_mL, 0,
+                   -adapting_.volume_change_mL / error_mL);
     }
   }
 
@@ -228,14 +230,14 @@ std::string words_of(unsigned set) {
 
 constexpr unsigned every_set = 1U << changes.size();
 
-std::string file_of(double taken_mL, unsigned set, const std::string& remark) {
+std::string file_of(double volume_change_mL, unsigned set, const std::string& remark) {
   constexpr double usual_mL = 24.0;
   constexpr double period_s = 1.2;
   constexpr int cycles_a_slice = 38;
   constexpr int slices = 12;
   const Imaging imaging = imaging_of(set);
-  const double stroke_mL =
-      (std::isfinite(taken_mL) ? taken_mL : usual_mL) * (imaging.higher_frames ? higher : 1.0);
+  const double stroke_mL = (std::isfinite(volume_change_mL) ? volume_change_mL : usual_mL) *
+                           (imaging.higher_frames ? higher : 1.0);
   PlannedExperiment plan;
   plan.volumes = imaging.volumes;
   plan.stiffness = imaging.shear_test;
@@ -272,7 +274,7 @@ std::optional<NextExperiment> separating_images(const FieldCase& field, const Mo
     next.separates.push_back(model.hypothesis->name());
   next.reason = fmt::format("Image again, with {}: {} would part by {:.1f} sigmas.", words_of(best),
                             fmt::join(next.separates, ", "), best_sigma);
-  next.toml = file_of(competing.front().taken_mL, best, next.reason);
+  next.toml = file_of(competing.front().volume_change_mL, best, next.reason);
   return next;
 }
 
@@ -280,22 +282,24 @@ NextExperiment sharpening_images(const FieldCase& field, const MotionResiduals& 
                                  const ImagedModel& named) {
   const FieldFit& fit = named.hypothesis->fit;
   const Outlook outlook(field, rows, named, named);
-  const auto distance = [&](const Eigen::MatrixXd& covariance, size_t place) {
-    const size_t value = fit.choice.free[place];
-    const EffectParameter& parameter = fit.choice.parameter(value);
-    const double away = parameter.neutral == 0.0 && parameter.scale == SearchScale::logarithmic
-                            ? 1.0
-                            : to_coordinate(parameter, fit.choice.values[value]) -
-                                  to_coordinate(parameter, parameter.neutral);
-    const auto unknown = static_cast<Index>(1 + place);
-    return std::abs(away) / std::sqrt(covariance(unknown, unknown));
+  const size_t size_of_effect = fit.choice.free.front();
+  const EffectParameter& parameter = fit.choice.parameter(size_of_effect);
+  constexpr Index unknown = 1;
+  const auto distance = [&](double variance) {
+    const inference::Parameter scale = searched(parameter);
+    const double away =
+        parameter.neutral == 0.0 && parameter.scale == SearchScale::logarithmic
+            ? 1.0
+            : scale.coordinate(fit.choice.values[size_of_effect]) - scale.coordinate(parameter.neutral);
+    return std::abs(away) / std::sqrt(variance);
   };
-  constexpr size_t size_of_effect = 0;
   unsigned best = 1;
   double best_sigma = 0.0;
   for (unsigned i = 0; i < changes.size(); ++i) {
-    const Eigen::MatrixXd covariance = outlook.of(imaging_of(1U << i)).information().inverse();
-    const double sigma = distance(covariance, size_of_effect);
+    const Eigen::MatrixXd information = outlook.of(imaging_of(1U << i)).information();
+    const Eigen::VectorXd along =
+        information.ldlt().solve(Eigen::VectorXd::Unit(information.cols(), unknown));
+    const double sigma = distance(along[unknown]);
     if (sigma <= best_sigma) continue;
     best_sigma = sigma;
     best = 1U << i;
@@ -304,9 +308,9 @@ NextExperiment sharpening_images(const FieldCase& field, const MotionResiduals& 
   next.predicted_separation_sigma = best_sigma;
   next.reason =
       fmt::format("To know {} of {} better, image again with {}: {:.1f} sigmas from none instead of {:.1f}.",
-                  fit.choice.parameter(fit.choice.free[size_of_effect]).name, named.hypothesis->name(),
-                  words_of(best), best_sigma, distance(fit.covariance, size_of_effect));
-  next.toml = file_of(named.taken_mL, best, next.reason);
+                  parameter.name, named.hypothesis->name(), words_of(best), best_sigma,
+                  distance(fit.covariance(unknown, unknown)));
+  next.toml = file_of(named.volume_change_mL, best, next.reason);
   return next;
 }
 

@@ -20,7 +20,7 @@ namespace diastole::explain {
 /// A fit with what its cavity takes at the highest pressure; NaN where that is not known.
 struct ImagedModel {
   const FieldHypothesis* hypothesis;
-  double taken_mL;
+  double volume_change_mL;
 };
 
 /// For models that the images cannot tell apart: the least change of the acquisition by which the least distinguishable pair

@@ -4,16 +4,16 @@
 #include <cmath>
 #include <functional>
 
-#include "estimator/explain/imaging/lump_fit.hpp"
+#include "estimator/explain/imaging/inclusion_fit.hpp"
 #include "estimator/explain/verdict/chi_square.hpp"
 
 namespace diastole::explain {
 namespace {
 
-constexpr size_t firsts = 2;        // single effects that get partners
-constexpr size_t lumps_fitted = 2;  // effects beside which a lump is refined
+constexpr size_t firsts = 2;             // single effects that get partners
+constexpr size_t inclusions_fitted = 2;  // effects beside which an inclusion is refined
 constexpr double beyond_chance = 1e-3;
-constexpr double lump_parameters = 5.0;  // as for a lump alone: its sizes are tied to one another
+constexpr double effective_parameters = 5.0;  // as for an inclusion alone: its sizes are tied to one another
 
 double pairs_tried() {
   const auto effects = static_cast<double>(field_effects().size());
@@ -43,10 +43,10 @@ FieldHypothesis fit_both(FieldProblem& problem, const FieldFit& base, const Fiel
   return judged(std::move(fit), base, first, second, parameters, 1.0);
 }
 
-/// Lumps beside the effects for which the lattice promises most.
-std::vector<FieldHypothesis> lumps_beside(const FieldProblem& problem, const FieldFit& base,
-                                          const std::vector<const FieldHypothesis*>& others,
-                                          const LumpLattice& lattice) {
+/// Inclusions beside the effects for which the lattice promises most.
+std::vector<FieldHypothesis> inclusions_beside(const FieldProblem& problem, const FieldFit& base,
+                                               const std::vector<const FieldHypothesis*>& others,
+                                               const InclusionLattice& lattice) {
   struct Promise {
     const FieldHypothesis* other;
     InclusionGuess guess;
@@ -59,15 +59,17 @@ std::vector<FieldHypothesis> lumps_beside(const FieldProblem& problem, const Fie
     if (guess.p_value < beyond_chance) promises.push_back({other, guess, other->gain + guess.gain});
   }
   std::ranges::stable_sort(promises, std::greater{}, &Promise::gain);
-  if (promises.size() > lumps_fitted) promises.resize(lumps_fitted);
+  if (promises.size() > inclusions_fitted) promises.resize(inclusions_fitted);
   std::vector<FieldHypothesis> pairs;
   for (const Promise& promise : promises) {
-    const FieldHypothesis lump{{std::string(inclusion_effect().text().id)}, {}};
-    FieldFit fit = fit_lump(problem, promise.other->fit, promise.guess.inclusion, LumpEffort::once);
+    const FieldHypothesis inclusion{{std::string(inclusion_effect().text().id)}, {}};
+    FieldFit fit = fit_inclusion(problem, promise.other->fit, promise.guess.inclusion, InclusionEffort::once);
     if (fit.chi_square < promise.other->fit.chi_square && &promise == &promises.front())
-      fit = fit_lump(problem, promise.other->fit, lump_of(fit), LumpEffort::fully);
-    const double parameters = lump_parameters + static_cast<double>(promise.other->fit.choice.free.size());
-    pairs.push_back(judged(std::move(fit), base, *promise.other, lump, parameters, places_told_apart(body)));
+      fit = fit_inclusion(problem, promise.other->fit, inclusion_of(fit), InclusionEffort::fully);
+    const double parameters =
+        effective_parameters + static_cast<double>(promise.other->fit.choice.free.size());
+    pairs.push_back(
+        judged(std::move(fit), base, *promise.other, inclusion, parameters, distinct_places(body)));
   }
   return pairs;
 }
@@ -76,19 +78,20 @@ std::vector<FieldHypothesis> lumps_beside(const FieldProblem& problem, const Fie
 
 std::vector<FieldHypothesis> fit_pairs(FieldProblem& problem, const FieldFit& base,
                                        const std::vector<FieldHypothesis>& singles,
-                                       const LumpLattice& lattice) {
+                                       const InclusionLattice& lattice) {
   std::vector<FieldHypothesis> pairs;
-  std::vector<const FieldHypothesis*> beside_lump;
+  std::vector<const FieldHypothesis*> beside_inclusion;
   const size_t begun = std::min(firsts, singles.size());
   for (size_t a = 0; a < singles.size(); ++a) {
     if (singles[a].has_inclusion()) continue;
-    const bool lump_leads = std::any_of(singles.begin(), singles.begin() + static_cast<std::ptrdiff_t>(begun),
-                                        [](const FieldHypothesis& single) { return single.has_inclusion(); });
-    if (a < begun || lump_leads) beside_lump.push_back(&singles[a]);
+    const bool inclusion_leads =
+        std::any_of(singles.begin(), singles.begin() + static_cast<std::ptrdiff_t>(begun),
+                    [](const FieldHypothesis& single) { return single.has_inclusion(); });
+    if (a < begun || inclusion_leads) beside_inclusion.push_back(&singles[a]);
     for (size_t b = a + 1; a < begun && b < singles.size(); ++b)
       if (!singles[b].has_inclusion()) pairs.push_back(fit_both(problem, base, singles[a], singles[b]));
   }
-  std::ranges::move(lumps_beside(problem, base, beside_lump, lattice), std::back_inserter(pairs));
+  std::ranges::move(inclusions_beside(problem, base, beside_inclusion, lattice), std::back_inserter(pairs));
   std::ranges::stable_sort(pairs, std::greater{}, &FieldHypothesis::score);
   return pairs;
 }

@@ -54,7 +54,7 @@ struct Partition {
   }
 };
 
-/// Fine ones show a lump's place, rings and layers what is the same all around.
+/// Fine ones show an inclusion's place, rings and layers what is the same all around.
 constexpr std::array<Partition, 5> partitions{{{8, 4, 2}, {4, 2, 1}, {1, 4, 2}, {1, 2, 1}, {1, 1, 2}}};
 
 }  // namespace
@@ -69,10 +69,7 @@ std::vector<Misfit> misfit_regions(const FieldCase& field, const MotionResiduals
   std::vector<size_t> tags(cells, 0);
   for (Index i = 0; i < rows.size(); ++i) {
     const ResidualRow& row = rows.rows()[static_cast<size_t>(i)];
-    const Eigen::Vector3d outwards = Eigen::Vector3d(row.X_mm[0], row.X_mm[1], 0.0).normalized();
-    const Eigen::RowVector3d along(row.by_motion.dot(outwards),
-                                   row.by_motion.dot(Eigen::Vector3d(-outwards[1], outwards[0], 0.0)),
-                                   row.by_motion[2]);
+    const Eigen::RowVector3d along = by_cylindrical_motion(row);
     size_t begun = 0;
     for (const Partition& partition : partitions) {
       const size_t cell = begun + partition.cell_of(field.base, row.X_mm);

@@ -6,6 +6,7 @@
 #include "estimator/explain/imaging/stiffness_sides.hpp"
 #include "estimator/fe/elastic_system.hpp"
 #include "estimator/mesh/annulus.hpp"
+#include "estimator/mesh/node_field.hpp"
 #include "estimator/model/affected_model.hpp"
 
 namespace diastole::explain {
@@ -18,17 +19,6 @@ AnnulusShape shape_of(const FieldModel& model, const std::array<size_t, 3>& elem
   shape.height_mm = model.height_mm;
   shape.elements = elements;
   return shape;
-}
-
-void add_scaled(NodeField& field, double factor, const NodeField& direction) {
-  for (size_t i = 0; i < field.size(); ++i)
-    field[i] += factor * direction[i];
-}
-
-NodeField difference(const NodeField& a, const NodeField& b) {
-  NodeField result = a;
-  add_scaled(result, -1.0, b);
-  return result;
 }
 
 }  // namespace
@@ -97,43 +87,44 @@ std::vector<double> FieldSolver::residual_of(const FieldModel& model, const Elas
   return other->system().residual(moved).values;
 }
 
-FieldSolver::Slopes FieldSolver::slopes(size_t slot, const std::vector<FieldNudge>& nudges) {
+FieldSolver::Slopes FieldSolver::slopes(size_t slot, const std::vector<FieldPerturbation>& perturbations) {
   const ElasticState& at = state(slot);
   std::vector<std::vector<double>> right_sides(1, std::vector<double>(elastic_->dofs(), 0.0));
   elastic_->system().add_parameter_residual(at, 0, {}, right_sides.back());
   for (double& value : right_sides.back())
     value = -value;
-  for (const FieldNudge& nudge : nudges) {
-    FieldModel up = nudge.up;
-    FieldModel down = nudge.down;
+  for (const FieldPerturbation& perturbation : perturbations) {
+    FieldModel up = perturbation.up;
+    FieldModel down = perturbation.down;
     up.displacement_gain = down.displacement_gain = 1.0;
     right_sides.emplace_back(elastic_->dofs(), 0.0);
     if (up == down) continue;
     right_sides.back() = residual_of(down, at);
     add_scaled(right_sides.back(), -1.0, residual_of(up, at));
     for (double& value : right_sides.back())
-      value /= nudge.width;
+      value /= perturbation.width;
   }
   std::vector<NodeField> fields = responses(slot, std::move(right_sides));
   for (NodeField& field : fields)
     for (double& value : field)
       value *= model_.displacement_gain;
   const NodeField displacement = displacement_mm(slot);
-  for (size_t i = 0; i < nudges.size(); ++i)
+  for (size_t i = 0; i < perturbations.size(); ++i)
     add_scaled(fields[1 + i],
-               (nudges[i].up.displacement_gain - nudges[i].down.displacement_gain) / nudges[i].width,
+               (perturbations[i].up.displacement_gain - perturbations[i].down.displacement_gain) /
+                   perturbations[i].width,
                displacement);
   Slopes result{std::move(fields[0]), {}};
   std::move(fields.begin() + 1, fields.end(), std::back_inserter(result.model));
   return result;
 }
 
-NodeField FieldSolver::reference_slope(const FieldNudge& nudge) const {
-  if (nudge.up.inner_radius_mm == nudge.down.inner_radius_mm) return {};
-  NodeField slope = difference(make_annulus(shape_of(nudge.up, elements_)).reference(),
-                               make_annulus(shape_of(nudge.down, elements_)).reference());
+NodeField FieldSolver::reference_slope(const FieldPerturbation& perturbation) const {
+  if (perturbation.up.inner_radius_mm == perturbation.down.inner_radius_mm) return {};
+  NodeField slope = difference(make_annulus(shape_of(perturbation.up, elements_)).reference(),
+                               make_annulus(shape_of(perturbation.down, elements_)).reference());
   for (double& value : slope)
-    value /= nudge.width;
+    value /= perturbation.width;
   return slope;
 }
 

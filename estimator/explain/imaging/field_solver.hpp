@@ -21,7 +21,7 @@
 namespace diastole::explain {
 
 /// A direction in which the model may change, by the models on both sides of it.
-struct FieldNudge {
+struct FieldPerturbation {
   FieldModel up;
   FieldModel down;
   double width = 0.0;  ///< between them, in the parameter's coordinate
@@ -48,9 +48,9 @@ class FieldSolver {
     NodeField modulus;  ///< by C1
     std::vector<NodeField> model;
   };
-  [[nodiscard]] Slopes slopes(size_t slot, const std::vector<FieldNudge>& nudges);
-  /// Of the undeformed mesh by a nudge; empty where it stays.
-  [[nodiscard]] NodeField reference_slope(const FieldNudge& nudge) const;
+  [[nodiscard]] Slopes slopes(size_t slot, const std::vector<FieldPerturbation>& perturbations);
+  /// Of the undeformed mesh by a perturbation; empty where it stays.
+  [[nodiscard]] NodeField reference_slope(const FieldPerturbation& perturbation) const;
 
   /// K^-1 applied to each of these right-hand sides over the unknowns, as displacement fields; the tangent is that of the
   /// slot's solution.

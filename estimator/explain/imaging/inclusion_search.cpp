@@ -9,7 +9,7 @@
 namespace diastole::explain {
 namespace {
 
-constexpr double lump_mm = 10.0;
+constexpr double usual_axis_mm = 10.0;
 
 std::vector<Inclusion> lattice(const FieldModel& body) {
   constexpr int turns = 16;
@@ -24,7 +24,7 @@ std::vector<Inclusion> lattice(const FieldModel& body) {
                           .radius_mm = body.inner_radius_mm + depth * wall_mm,
                           .z_mm = 0.5 * height * body.height_mm,
                           .theta_deg = 360.0 * turn / turns,
-                          .semi_axes_mm = {lump_mm, lump_mm, lump_mm},
+                          .semi_axes_mm = {usual_axis_mm, usual_axis_mm, usual_axis_mm},
                           .edge_width_mm = 4.0});
       }
     }
@@ -40,37 +40,30 @@ Eigen::MatrixXd responses(FieldProblem& problem, const FieldFit& base, const std
     });
   }
   const size_t loudest = problem.highest_node();
-  std::vector<NodeField> moved =
-      problem.solver().responses(loudest, problem.solver().stiffness_sides(loudest, fields));
-  std::vector<const NodeField*> pointers;
-  for (const NodeField& field : moved)
-    pointers.push_back(&field);
-  const MotionResiduals& rows = problem.rows();
-  Eigen::MatrixXd columns(rows.size(), static_cast<Eigen::Index>(places.size()));
-  for (size_t slot = 0; slot < base.pressures_kPa.size(); ++slot) {
-    columns.middleRows(rows.first(slot), rows.count(slot)) =
-        base.pressures_kPa[slot] / problem.nodes_kPa()[loudest] *
-        rows.columns(slot, problem.solver().mesh(), pointers);
-  }
-  return columns;
+  std::vector<double> shares = base.pressures_kPa;
+  for (double& share : shares)
+    share /= problem.nodes_kPa()[loudest];
+  FieldSolver& solver = problem.solver();
+  return problem.rows().columns(solver.mesh(),
+                                solver.responses(loudest, solver.stiffness_sides(loudest, fields)), shares);
 }
 
 }  // namespace
 
-double places_told_apart(const FieldModel& body) {
+double distinct_places(const FieldModel& body) {
   const double volume_mm3 =
       M_PI * body.height_mm *
       (body.outer_radius_mm * body.outer_radius_mm - body.inner_radius_mm * body.inner_radius_mm);
-  return std::max(1.0, volume_mm3 / (8.0 * lump_mm * lump_mm * lump_mm));
+  return std::max(1.0, volume_mm3 / (8.0 * usual_axis_mm * usual_axis_mm * usual_axis_mm));
 }
 
-LumpLattice lump_lattice(FieldProblem& problem, const FieldFit& base) {
+InclusionLattice inclusion_lattice(FieldProblem& problem, const FieldFit& base) {
   std::vector<Inclusion> places = lattice(problem.field().base);
   Eigen::MatrixXd columns = responses(problem, base, places);
   return {std::move(places), std::move(columns)};
 }
 
-std::vector<InclusionGuess> search_inclusion(const LumpLattice& lattice, const FieldModel& body,
+std::vector<InclusionGuess> search_inclusion(const InclusionLattice& lattice, const FieldModel& body,
                                              const FieldFit& fit) {
   const std::vector<Inclusion>& places = lattice.places;
   const LinearEvidence evidence(fit, lattice.columns);
@@ -84,9 +77,9 @@ std::vector<InclusionGuess> search_inclusion(const LumpLattice& lattice, const F
     guess.gain = gain;
     guess.inclusion = places[i];
     guess.inclusion.edge_width_mm = 2.0;
-    // A lump saturates: its own strain vanishes as it stiffens.
+    // An inclusion saturates: its own strain vanishes as it stiffens.
     guess.inclusion.contrast = amount > 0.0 ? std::min(4.0, 1.0 + 1.5 * amount) : std::max(0.3, 1.0 + amount);
-    guess.p_value = std::min(1.0, places_told_apart(body) * chi_square_tail(gain, 1.0));
+    guess.p_value = std::min(1.0, distinct_places(body) * chi_square_tail(gain, 1.0));
   }
   if (best[1].gain > best[0].gain) std::swap(best[0], best[1]);
   return best;

@@ -7,34 +7,35 @@ namespace diastole::explain {
 
 using Eigen::Index;
 
+Eigen::MatrixXd orthonormal_basis(const Eigen::MatrixXd& columns) {
+  const Eigen::VectorXd lengths = columns.colwise().norm().cwiseMax(1e-300);
+  const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(columns * lengths.cwiseInverse().asDiagonal());
+  return qr.householderQ() * Eigen::MatrixXd::Identity(columns.rows(), qr.rank());
+}
+
+Eigen::RowVector3d by_cylindrical_motion(const ResidualRow& row) {
+  const Eigen::Vector3d outwards = Eigen::Vector3d(row.X_mm[0], row.X_mm[1], 0.0).normalized();
+  return {row.by_motion.dot(outwards), row.by_motion.dot(Eigen::Vector3d(-outwards[1], outwards[0], 0.0)),
+          row.by_motion[2]};
+}
+
 LinearEvidence::LinearEvidence(const FieldFit& fit, const Eigen::MatrixXd& columns) {
-  const Eigen::MatrixXd across = fit.jacobian.topRows(columns.rows()).transpose() * columns;
-  normal_ = columns.transpose() * columns - across.transpose() * fit.covariance * across;
-  Eigen::VectorXd all(fit.residuals.size() + fit.priors.size());
-  all << fit.residuals, fit.priors;
-  gradient_ = columns.transpose() * fit.residuals -
-              across.transpose() * (fit.covariance * (fit.jacobian.transpose() * all));
+  const Eigen::MatrixXd own = orthonormal_basis(fit.jacobian);
+  const Eigen::MatrixXd across = own.topRows(columns.rows()).transpose() * columns;
+  normal_ = columns.transpose() * columns - across.transpose() * across;
+  gradient_ =
+      columns.transpose() * fit.residuals - across.transpose() * (own.transpose() * fit.all_residuals());
 }
 
 LinearEvidence::Gain LinearEvidence::gain(const std::vector<Index>& chosen) const {
-  const auto count = static_cast<Index>(chosen.size());
-  Eigen::MatrixXd normal(count, count);
-  Eigen::VectorXd gradient(count);
-  Eigen::VectorXd scale(count);
-  for (Index i = 0; i < count; ++i)
-    scale[i] = 1.0 / std::sqrt(std::max(
-                         normal_(chosen[static_cast<size_t>(i)], chosen[static_cast<size_t>(i)]), 1e-300));
-  for (Index i = 0; i < count; ++i) {
-    gradient[i] = scale[i] * gradient_[chosen[static_cast<size_t>(i)]];
-    for (Index j = 0; j < count; ++j)
-      normal(i, j) =
-          scale[i] * scale[j] * normal_(chosen[static_cast<size_t>(i)], chosen[static_cast<size_t>(j)]);
-  }
+  Eigen::MatrixXd normal = normal_(chosen, chosen);
+  const Eigen::VectorXd scale = normal.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
+  normal = scale.asDiagonal() * normal * scale.asDiagonal();
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(normal);
-  const Eigen::VectorXd along = eigen.eigenvectors().transpose() * gradient;
+  const Eigen::VectorXd along = eigen.eigenvectors().transpose() * scale.cwiseProduct(gradient_(chosen));
   constexpr double independent = 1e-4;
   Gain result;
-  for (Index i = 0; i < count; ++i) {
+  for (Index i = 0; i < along.size(); ++i) {
     if (eigen.eigenvalues()[i] < independent) continue;
     result.chi_square += along[i] * along[i] / eigen.eigenvalues()[i];
     ++result.degrees;

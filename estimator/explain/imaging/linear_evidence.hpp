@@ -2,7 +2,7 @@
 // What columns beside a fit would gain: chi2 of the residuals' projection on them, the fit's own unknowns free.
 //
 // With r the residuals at the optimum, J the fit's Jacobian (priors included) and c a column, C1 and pressures answer to c,
-// so that  c' = c - J (J^T J)^-1 J^T c  is what counts, and chi2 falls by  (c' . r)^2 / |c'|^2.
+// so that  c' = c - J J^+ c  is what counts, and chi2 falls by  (c' . r)^2 / |c'|^2.
 
 #include <Eigen/Dense>
 #include <vector>
@@ -10,6 +10,12 @@
 #include "estimator/explain/imaging/field_fit.hpp"
 
 namespace diastole::explain {
+
+/// An orthonormal basis of what columns span; columns that others hold already add nothing.
+Eigen::MatrixXd orthonormal_basis(const Eigen::MatrixXd& columns);
+
+/// By how much a residual changes with a displacement outwards, around the axis and along z, at its place.
+Eigen::RowVector3d by_cylindrical_motion(const ResidualRow& row);
 
 class LinearEvidence {
  public:

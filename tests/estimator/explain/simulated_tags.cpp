@@ -97,12 +97,12 @@ Motion motion_by_solver(const SimulatedTags& wanted, std::array<size_t, 3> eleme
   return motion;
 }
 
-/// On a mesh that is fine at the lump and fits it in another way than lump_fit's.
-Motion motion_around(const SimulatedTags& wanted, const Inclusion& lump) {
+/// On a mesh that is fine at the inclusion and fits it in another way than inclusion_fit's.
+Motion motion_around(const SimulatedTags& wanted, const Inclusion& inclusion) {
   AnnulusGrid grid;
   for (const double offset_deg :
        {-150.0, -105.0, -65.0, -40.0, -24.0, -12.0, 0.0, 12.0, 24.0, 40.0, 65.0, 105.0})
-    grid.angles_deg.push_back(lump.theta_deg + offset_deg + 5.0);
+    grid.angles_deg.push_back(inclusion.theta_deg + offset_deg + 5.0);
   const FieldModel& body = wanted.truth;
   for (const double share : {-0.5, -0.42, -0.3, -0.2, -0.1, 0.0, 0.1, 0.2, 0.3, 0.42, 0.5})
     grid.heights_mm.push_back(share * body.height_mm);
@@ -110,13 +110,15 @@ Motion motion_around(const SimulatedTags& wanted, const Inclusion& lump) {
     grid.radii_mm.push_back(std::lerp(body.inner_radius_mm, body.outer_radius_mm, depth));
   ElasticOptions options;
   options.parameters = {wanted.C1_kPa};
-  options.stiffness = [lump](const Vector3d& X_mm) { return lump.stiffness({X_mm[0], X_mm[1], X_mm[2]}); };
+  options.stiffness = [inclusion](const Vector3d& X_mm) {
+    return inclusion.stiffness({X_mm[0], X_mm[1], X_mm[2]});
+  };
   ElasticModel model(make_annulus(grid), *find_law("neo-hookean"), std::move(options));
   Motion motion{model.mesh(), {}};
   Solution solution = model.solve(shares[0] * wanted.highest_kPa);
   for (const double share : shares) {
     solution = model.solve(share * wanted.highest_kPa, solution.state);
-    if (!solution.report.converged()) throw std::runtime_error("no equilibrium with the lump");
+    if (!solution.report.converged()) throw std::runtime_error("no equilibrium with the inclusion");
     motion.seen_mm.push_back(solution.state.position_mm);
   }
   return motion;

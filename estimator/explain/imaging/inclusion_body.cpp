@@ -1,4 +1,4 @@
-#include "estimator/explain/imaging/lump_body.hpp"
+#include "estimator/explain/imaging/inclusion_body.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -8,19 +8,20 @@
 #include "estimator/fe/elastic_system.hpp"
 #include "estimator/fe/kept_factor.hpp"
 #include "estimator/mesh/annulus_grid.hpp"
+#include "estimator/mesh/node_field.hpp"
 
 namespace diastole::explain {
 namespace {
 
 /// Where the last correction is smaller the equilibrium is found: a thousandth of a tag's error.
 constexpr double balanced_mm = 1e-4;
-/// By how much a lump's parameters may differ from those for which the tangent was factorised.
+/// By how much an inclusion's parameters may differ from those for which the tangent was factorised.
 constexpr double kept_ratio = 0.25;
 constexpr double kept_mm = 1.0;
 constexpr double kept_deg = 1.5;
-/// By how much of what a lump does the body may have moved since.
+/// By how much of what an inclusion does the body may have moved since.
 constexpr double kept_share = 0.3;
-/// Of the stiffness, for each Gauss point: a millimetre apart around the lump.
+/// Of the stiffness, for each Gauss point: a millimetre apart around the inclusion.
 constexpr size_t samples_a_side = 3;
 constexpr size_t samples_a_point = samples_a_side * samples_a_side * samples_a_side;
 
@@ -46,52 +47,53 @@ std::vector<double> levels_around(double half_height_mm, double centre_mm,
   return levels;
 }
 
-/// Parts of the wall around a lump's depth.
-std::vector<double> radii_around(const FieldModel& body, double centre_mm, LumpMesh mesh) {
+/// Parts of the wall around an inclusion's depth.
+std::vector<double> radii_around(const FieldModel& body, double centre_mm, InclusionMesh mesh) {
   const double inner_mm = body.inner_radius_mm;
   const double wall_mm = body.outer_radius_mm - inner_mm;
   const auto within = [&](double radius_mm, double least, double most) {
     return std::clamp(radius_mm, inner_mm + least * wall_mm, inner_mm + most * wall_mm);
   };
-  if (mesh == LumpMesh::coarse)
+  if (mesh == InclusionMesh::coarse)
     return {inner_mm, within(centre_mm - 6.0, 0.2, 0.45), within(centre_mm + 6.0, 0.55, 0.8),
             body.outer_radius_mm};
   return {inner_mm, within(centre_mm - 7.0, 0.18, 0.33), within(centre_mm, 0.42, 0.58),
           within(centre_mm + 7.0, 0.67, 0.82), body.outer_radius_mm};
 }
 
-HermiteMesh mesh_around(const FieldModel& body, const Inclusion& lump, LumpMesh mesh) {
+HermiteMesh mesh_around(const FieldModel& body, const Inclusion& inclusion, InclusionMesh mesh) {
   static constexpr std::array<double, 10> coarse_deg{-115, -70, -36, -16, 0, 16, 36, 70, 115, 180};
   static constexpr std::array<double, 12> fine_deg{-110, -65, -34, -18, -9, 0, 9, 18, 34, 65, 110, 180};
   static constexpr std::array<double, 3> coarse_mm{0, -11, 11};
   static constexpr std::array<double, 5> fine_mm{0, -6.5, 6.5, -13, 13};
-  const bool is_fine = mesh == LumpMesh::fine;
+  const bool is_fine = mesh == InclusionMesh::fine;
   AnnulusGrid grid;
   for (const double offset_deg : is_fine ? std::span<const double>(fine_deg) : coarse_deg)
-    grid.angles_deg.push_back(lump.theta_deg + offset_deg);
+    grid.angles_deg.push_back(inclusion.theta_deg + offset_deg);
   grid.heights_mm =
-      levels_around(0.5 * body.height_mm, lump.z_mm, is_fine ? std::span<const double>(fine_mm) : coarse_mm,
-                    is_fine ? 3.0 : 5.0);
-  grid.radii_mm = radii_around(body, lump.radius_mm, mesh);
+      levels_around(0.5 * body.height_mm, inclusion.z_mm,
+                    is_fine ? std::span<const double>(fine_mm) : coarse_mm, is_fine ? 3.0 : 5.0);
+  grid.radii_mm = radii_around(body, inclusion.radius_mm, mesh);
   return make_annulus(grid);
 }
 
-ElasticModel model_around(const FieldModel& body, double C1_kPa, const Inclusion& lump, LumpMesh mesh) {
+ElasticModel model_around(const FieldModel& body, double C1_kPa, const Inclusion& inclusion,
+                          InclusionMesh mesh) {
   ElasticOptions options;
   options.parameters = {C1_kPa};
-  return {mesh_around(body, lump, mesh), *find_law("neo-hookean"), std::move(options)};
+  return {mesh_around(body, inclusion, mesh), *find_law("neo-hookean"), std::move(options)};
 }
 
-const EffectParameter& parameter(size_t i) { return inclusion_effect().field_parameters()[i]; }
+inference::Parameter parameter(size_t i) { return searched(inclusion_effect().field_parameters()[i]); }
 
-/// Whether a tangent of one lump still serves for the other.
-bool alike(const LumpValues& a, const LumpValues& b) {
-  for (size_t i = 0; i < lump_parameters; ++i) {
-    const double apart = std::abs(to_coordinate(parameter(i), a[i]) - to_coordinate(parameter(i), b[i]));
-    const double most = parameter(i).scale == SearchScale::logarithmic ? kept_ratio
-                        : parameter(i).unit == "deg"                   ? kept_deg
-                                                                       : kept_mm;
-    if (apart > most) return false;
+/// Whether a tangent of one inclusion still serves for the other.
+bool alike(const InclusionValues& a, const InclusionValues& b) {
+  for (size_t i = 0; i < inclusion_parameters; ++i) {
+    const inference::Parameter of = parameter(i);
+    const double most = of.scale == inference::Scale::logarithmic ? kept_ratio
+                        : of.unit == "deg"                        ? kept_deg
+                                                                  : kept_mm;
+    if (std::abs(of.coordinate(a[i]) - of.coordinate(b[i])) > most) return false;
   }
   return true;
 }
@@ -105,22 +107,22 @@ double largest(const NodeField& field) {
 
 }  // namespace
 
-Inclusion lump_with(const LumpValues& values, const FieldModel& body) {
+Inclusion inclusion_with(const InclusionValues& values, const FieldModel& body) {
   FieldModel model = body;
   inclusion_effect().apply_to_field(values, model);
   return model.inclusion.value_or(Inclusion{.semi_axes_mm = {1.0, 1.0, 1.0}});
 }
 
-LumpBody::LumpBody(const FieldModel& body, double C1_kPa, double pressure_kPa, const Inclusion& lump,
-                   LumpMesh mesh)
-    : body_(body), model_(model_around(body, C1_kPa, lump, mesh)), samples_(samples_of(model_.mesh())) {
+InclusionBody::InclusionBody(const FieldModel& body, double C1_kPa, double pressure_kPa,
+                             const Inclusion& inclusion, InclusionMesh mesh)
+    : body_(body), model_(model_around(body, C1_kPa, inclusion, mesh)), samples_(samples_of(model_.mesh())) {
   Solution solution = model_.solve(pressure_kPa);
   if (!solution.report.converged()) return;
   state_ = solution.state;
   plain_ = std::move(solution.state);
 }
 
-std::optional<LumpBody::Addition> LumpBody::addition(const LumpValues& values, bool exact) {
+std::optional<InclusionBody::Addition> InclusionBody::addition(const InclusionValues& values, bool exact) {
   if (!plain_) return {};
   wanted_ = values;
   const GaussNumbers stiffness = stiffness_of(values);
@@ -131,13 +133,12 @@ std::optional<LumpBody::Addition> LumpBody::addition(const LumpValues& values, b
     factored_.reset();
     return {};
   }
-  Addition result{state_.position_mm, slopes(values)};
-  for (size_t dof = 0; dof < result.position_mm.size(); ++dof)
-    result.position_mm[dof] -= plain_->position_mm[dof];
+  Addition result{difference(state_.position_mm, plain_->position_mm)};
+  add_slopes(values, result);
   return result;
 }
 
-std::vector<LumpBody::Samples> LumpBody::samples_of(const HermiteMesh& mesh) {
+std::vector<InclusionBody::Samples> InclusionBody::samples_of(const HermiteMesh& mesh) {
   // Ends of the parts of [0, 1] that the four Gauss points stand for: sums of their weights.
   constexpr std::array<double, 5> ends{0.0, 0.1739274225687269, 0.5, 0.8260725774312731, 1.0};
   std::vector<Samples> result(mesh.element_count());
@@ -165,15 +166,15 @@ std::vector<LumpBody::Samples> LumpBody::samples_of(const HermiteMesh& mesh) {
   return result;
 }
 
-GaussNumbers LumpBody::stiffness_of(const LumpValues& values) const {
-  const Inclusion lump = lump_with(values, body_);
-  const double theta = lump.theta_deg * std::numbers::pi / 180.0;
-  const Eigen::Vector3d centre_mm(lump.radius_mm * std::cos(theta), lump.radius_mm * std::sin(theta),
-                                  lump.z_mm);
+GaussNumbers InclusionBody::stiffness_of(const InclusionValues& values) const {
+  const Inclusion inclusion = inclusion_with(values, body_);
+  const double theta = inclusion.theta_deg * std::numbers::pi / 180.0;
+  const Eigen::Vector3d centre_mm(inclusion.radius_mm * std::cos(theta),
+                                  inclusion.radius_mm * std::sin(theta), inclusion.z_mm);
   // Where the edge's hyperbolic tangent has ended.
-  const double longest_mm = std::ranges::max(lump.semi_axes_mm);
-  const double shortest_mm = std::ranges::min(lump.semi_axes_mm);
-  const double end_mm = longest_mm * (1.0 + 8.0 * lump.edge_width_mm / shortest_mm);
+  const double longest_mm = std::ranges::max(inclusion.semi_axes_mm);
+  const double shortest_mm = std::ranges::min(inclusion.semi_axes_mm);
+  const double end_mm = longest_mm * (1.0 + 8.0 * inclusion.edge_width_mm / shortest_mm);
   GaussNumbers numbers(samples_.size());
   for (size_t e = 0; e < samples_.size(); ++e) {
     numbers[e].fill(1.0);
@@ -182,7 +183,7 @@ GaussNumbers LumpBody::stiffness_of(const LumpValues& values) const {
       double sum = 0.0;
       for (size_t i = 0; i < samples_a_point; ++i) {
         const Eigen::Vector3d& X_mm = samples_[e].X_mm[q * samples_a_point + i];
-        sum += lump.stiffness({X_mm[0], X_mm[1], X_mm[2]});
+        sum += inclusion.stiffness({X_mm[0], X_mm[1], X_mm[2]});
       }
       numbers[e][q] = sum / samples_a_point;
     }
@@ -190,7 +191,7 @@ GaussNumbers LumpBody::stiffness_of(const LumpValues& values) const {
   return numbers;
 }
 
-bool LumpBody::factorise() {
+bool InclusionBody::factorise() {
   factored_.reset();
   if (model_.system().factorise(state_).singular) return false;
   factored_ = wanted_;
@@ -198,19 +199,19 @@ bool LumpBody::factorise() {
   return true;
 }
 
-/// Whether the body has moved little since, beside what the lump moves it.
-bool LumpBody::tangent_serves() const {
+/// Whether the body has moved little since, beside what the inclusion moves it.
+bool InclusionBody::tangent_serves() const {
   double since_mm = 0.0;
-  double by_lump_mm = 0.0;
+  double by_inclusion_mm = 0.0;
   for (size_t dof = 0; dof < factored_mm_.size(); ++dof) {
     since_mm = std::max(since_mm, std::abs(state_.position_mm[dof] - factored_mm_[dof]));
-    by_lump_mm = std::max(by_lump_mm, std::abs(state_.position_mm[dof] - plain_->position_mm[dof]));
+    by_inclusion_mm = std::max(by_inclusion_mm, std::abs(state_.position_mm[dof] - plain_->position_mm[dof]));
   }
-  return since_mm < kept_share * by_lump_mm;
+  return since_mm < kept_share * by_inclusion_mm;
 }
 
 /// Equilibrium from the last one.
-bool LumpBody::balance() {
+bool InclusionBody::balance() {
   if (!factored_ || !alike(*factored_, wanted_)) {
     if (!factorise()) return false;
   }
@@ -219,7 +220,7 @@ bool LumpBody::balance() {
   return factorise() && corrected_with_kept_factor();
 }
 
-bool LumpBody::corrected_with_kept_factor() {
+bool InclusionBody::corrected_with_kept_factor() {
   ElasticSystem& system = model_.system();
   const size_t displacements = system.equations().displacement_unknowns();
   const auto product = [&](std::span<const double> a, std::span<const double> b) {
@@ -247,16 +248,18 @@ bool LumpBody::corrected_with_kept_factor() {
   return false;
 }
 
-std::array<NodeField, lump_parameters> LumpBody::slopes(const LumpValues& values) {
+void InclusionBody::add_slopes(const InclusionValues& values, Addition& result) {
   std::vector<GaussNumbers> fields;
-  for (size_t i = 0; i < lump_parameters; ++i) {
-    const double h = parameter(i).scale == SearchScale::logarithmic ? 1e-3 : 1e-2;
-    LumpValues up = values;
-    LumpValues down = values;
-    up[i] = from_coordinate(parameter(i), to_coordinate(parameter(i), values[i]) + h);
-    down[i] = from_coordinate(parameter(i), to_coordinate(parameter(i), values[i]) - h);
-    GaussNumbers& slope = fields.emplace_back(stiffness_of(up));
-    const GaussNumbers below = stiffness_of(down);
+  for (size_t i = 0; i < inclusion_parameters; ++i) {
+    const inference::Parameter of = parameter(i);
+    const double h = of.scale == inference::Scale::logarithmic ? 1e-3 : 1e-2;
+    const auto stiffness = [&](double change) {
+      InclusionValues changed = values;
+      changed[i] = of.value(of.coordinate(values[i]) + change);
+      return stiffness_of(changed);
+    };
+    GaussNumbers& slope = fields.emplace_back(stiffness(h));
+    const GaussNumbers below = stiffness(-h);
     for (size_t e = 0; e < slope.size(); ++e)
       for (size_t q = 0; q < gauss_points; ++q)
         slope[e][q] = (slope[e][q] - below[e][q]) / (2.0 * h);
@@ -265,11 +268,9 @@ std::array<NodeField, lump_parameters> LumpBody::slopes(const LumpValues& values
   std::vector<double> sides;
   for (const std::vector<double>& side : stiffness_sides(system, state_, fields))
     sides.insert(sides.end(), side.begin(), side.end());
-  system.solve(sides, lump_parameters);
-  std::array<NodeField, lump_parameters> result;
-  for (size_t i = 0; i < lump_parameters; ++i)
-    result[i] = system.node_field(std::span(sides).subspan(i * model_.dofs(), model_.dofs()));
-  return result;
+  system.solve(sides, inclusion_parameters);
+  for (size_t i = 0; i < inclusion_parameters; ++i)
+    result[1 + i] = system.node_field(std::span(sides).subspan(i * model_.dofs(), model_.dofs()));
 }
 
 }  // namespace diastole::explain
