@@ -61,8 +61,8 @@ void print_for_people(const explain::Explanation& found, const fs::path& folder)
     fmt::print("  {}\n", effect.id);
     for (const explain::FoundParameter& parameter : effect.parameters)
       fmt::print("{}", with_units(parameter));
-    for (const explain::FoundMoment& moment : effect.moments)
-      fmt::print("    at {:.3f} s of {}\n", moment.time_s, moment.run);
+    for (const explain::FoundChangePoint& at : effect.change_points)
+      fmt::print("    at {:.3f} s of {}\n", at.time_s, at.run);
   }
   if (!found.where.empty()) fmt::print("\nWhere the model fails\n");
   for (const explain::Misfit& misfit : found.where)

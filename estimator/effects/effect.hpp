@@ -60,15 +60,15 @@ struct EffectText {
 };
 
 /// Something that happened at a moment of one run: a step of the sensor, steps lost.
-struct Occasion {
+struct ChangePoint {
   std::string run;
   double time_s = 0.0;     ///< of the run
   double session_s = 0.0;  ///< the same since the session's first run began
 };
 
-/// How many occasions an effect has; they are searched (estimator/rig_fit/moment_search.hpp). What begins at the only one
+/// How many change_points an effect has; they are searched (estimator/rig_fit/change_point_search.hpp). What begins at the only one
 /// lasts for the rest of the session, what begins at one of several for the rest of its run.
-enum class Occasions { none, one, several };
+enum class ChangePoints { none, one, several };
 
 /// Whether the fluid's motion changes, or only what the instruments show of it.
 enum class Stage { plant, sensors };
@@ -80,7 +80,7 @@ class Effect {
   [[nodiscard]] virtual const EffectText& text() const = 0;
   [[nodiscard]] virtual std::span<const EffectParameter> parameters() const = 0;
   [[nodiscard]] virtual Stage stage() const { return Stage::plant; }
-  [[nodiscard]] virtual Occasions occasions() const { return Occasions::none; }
+  [[nodiscard]] virtual ChangePoints change_points() const { return ChangePoints::none; }
   /// Whether the specimen's modulus is the same at every time, so that a test beside the session measures it too.
   [[nodiscard]] virtual bool keeps_modulus() const { return true; }
   /// Whether the specimen can have it.
@@ -91,8 +91,8 @@ class Effect {
   /// What apply needs besides the model.
   struct Context {
     const rig::SpecimenCurves& family;
-    std::span<const Occasion> occasions = {};
-    bool rough = false;  ///< specimens' neighbours may be (specimen_curves.hpp)
+    std::span<const ChangePoint> change_points = {};
+    bool low_fidelity = false;  ///< specimens' neighbours may be (specimen_curves.hpp)
   };
   /// Adds itself to the model. `values`: one a parameter. The model's curve and modulus must be set.
   virtual void apply(std::span<const double> values, const Context& context, rig::RigModel& model) const = 0;

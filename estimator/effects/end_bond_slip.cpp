@@ -38,7 +38,7 @@ class EndBondSlip final : public Effect {
   void apply(std::span<const double> values, const Context& context, rig::RigModel& model) const override {
     if (values[0] == 0.0) return;
     const double compliance_mm = values[0] * model.modulus_kPa;
-    model.curve = model.curve.plus(context.family.slipping(compliance_mm, context.rough), 1.0, 1.0)
+    model.curve = model.curve.plus(context.family.slipping(compliance_mm, context.low_fidelity), 1.0, 1.0)
                       .plus(context.family.plain(), 1.0, -1.0);
   }
   [[nodiscard]] std::span<const EffectParameter> field_parameters() const override {

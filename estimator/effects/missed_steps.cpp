@@ -38,14 +38,14 @@ class MissedSteps final : public Effect {
          {"stall_s", "s", "sd of the loss in time", 0.02, 0.004, 0.06, 0.02, SearchScale::logarithmic}}};
     return list;
   }
-  [[nodiscard]] Occasions occasions() const override { return Occasions::several; }
+  [[nodiscard]] ChangePoints change_points() const override { return ChangePoints::several; }
   void apply(std::span<const double> values, const Context& context, rig::RigModel& model) const override {
     const double lost_mL = values[0];
     const double stall_s = values[1];
-    const std::vector<Occasion> moments(context.occasions.begin(), context.occasions.end());
+    const std::vector<ChangePoint> moments(context.change_points.begin(), context.change_points.end());
     if (lost_mL == 0.0 || moments.empty()) return;
     model.drive.emplace_back([=](rig::DriveTrace& trace, const rig::RunPlace& place) {
-      for (const Occasion& moment : moments) {
+      for (const ChangePoint& moment : moments) {
         if (moment.run != place.name) continue;
         for (size_t k = 0; k < trace.volume_mL.size(); ++k) {
           const double late = (trace.time_s(k) - moment.time_s) / stall_s;

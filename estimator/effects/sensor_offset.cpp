@@ -29,10 +29,10 @@ class SensorOffset final : public Effect {
     return list;
   }
   [[nodiscard]] Stage stage() const override { return Stage::sensors; }
-  [[nodiscard]] Occasions occasions() const override { return Occasions::one; }
+  [[nodiscard]] ChangePoints change_points() const override { return ChangePoints::one; }
   void apply(std::span<const double> values, const Context& context, rig::RigModel& model) const override {
-    if (context.occasions.empty()) return;
-    const Occasion moment = context.occasions.front();
+    if (context.change_points.empty()) return;
+    const ChangePoint moment = context.change_points.front();
     const double step_kPa = 1e-3 * values[0];
     model.cavity_sensor.emplace_back([=](double pressure_kPa, double time_s, const rig::RunPlace& place) {
       return pressure_kPa + (place.started_s + time_s >= moment.session_s ? step_kPa : 0.0);

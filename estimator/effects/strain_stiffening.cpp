@@ -33,7 +33,7 @@ class StrainStiffening final : public Effect {
   }
   void apply(std::span<const double> values, const Context& context, rig::RigModel& model) const override {
     if (values[0] == 0.0) return;
-    model.curve = model.curve.plus(context.family.stiffened(values[0], context.rough), 1.0, 1.0)
+    model.curve = model.curve.plus(context.family.stiffened(values[0], context.low_fidelity), 1.0, 1.0)
                       .plus(context.family.plain(), 1.0, -1.0);
   }
   [[nodiscard]] std::span<const EffectParameter> field_parameters() const override {

@@ -64,25 +64,25 @@ std::vector<GatedVolume> volumes_of(const RecordedRun& run) {
   return volumes;
 }
 
-SessionRun take(RecordedRun&& run, const std::string& name) {
-  SessionRun taken;
+SessionRun session_run(RecordedRun&& run, const std::string& name) {
+  SessionRun read;
   const FoundMotion found = find_motion(run);
-  taken.motion_explained = found.explained;
-  taken.drive.motion = found.motion;
-  taken.drive.start_s = run.pressure.time_s.front();
-  taken.drive.end_s = run.pressure.time_s.back();
-  taken.drive.place.name = name;
-  taken.drive.place.started_s = seconds_of(run.started_utc);
-  taken.drive.place.trigger_s = run.trigger_s;
-  taken.drive.place.atmosphere_kPa = attribute(run, "atmospheric_kPa", 101.325);
-  taken.volumes = volumes_of(run);
-  taken.segments = run.segments;
+  read.motion_explained = found.explained;
+  read.drive.motion = found.motion;
+  read.drive.start_s = run.pressure.time_s.front();
+  read.drive.end_s = run.pressure.time_s.back();
+  read.drive.place.name = name;
+  read.drive.place.started_s = seconds_of(run.started_utc);
+  read.drive.place.trigger_s = run.trigger_s;
+  read.drive.place.atmosphere_kPa = attribute(run, "atmospheric_kPa", 101.325);
+  read.volumes = volumes_of(run);
+  read.segments = run.segments;
   for (const Channel channel : {Channel::cavity, Channel::pump}) {
     const auto samples = run.pressure.channels.find(name_of(channel));
-    if (samples != run.pressure.channels.end()) taken.pressure_kPa[channel] = samples->second;
+    if (samples != run.pressure.channels.end()) read.pressure_kPa[channel] = samples->second;
   }
-  taken.sample_s = std::move(run.pressure.time_s);
-  return taken;
+  read.sample_s = std::move(run.pressure.time_s);
+  return read;
 }
 
 /// What earlier runs of the session did to the specimen.
@@ -158,7 +158,7 @@ Session read_session(const Study& study) {
       }
       session.limits = limits_of(run);
     }
-    session.runs.push_back(take(std::move(run), short_name(file)));
+    session.runs.push_back(session_run(std::move(run), short_name(file)));
   }
   double first_s = std::numeric_limits<double>::infinity();
   for (const SessionRun& run : session.runs)

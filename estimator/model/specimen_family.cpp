@@ -146,7 +146,7 @@ const SpecimenCurve& SpecimenFamily::solved(const Neighbours& of, double node,
                   resolution_.stride);
 }
 
-SpecimenCurve SpecimenFamily::between(const Neighbours& of, double value, bool rough) const {
+SpecimenCurve SpecimenFamily::between(const Neighbours& of, double value, bool low_fidelity) const {
   const SpecimenCurve& here = plain();
   const SpecimenCurve& base = computed("coarse", coarse_study(), 1);
   const auto differing = [&](double node, const std::array<int, 3>& mesh, const SpecimenCurve& from) {
@@ -161,7 +161,7 @@ SpecimenCurve SpecimenFamily::between(const Neighbours& of, double value, bool r
     const SpecimenCurve one = differing(node, resolution_.coarse, base);
     sum = sum ? sum->plus(one, 1.0, weight) : one.plus(one, weight, 0.0);
   }
-  if (!rough && of.refined_at != 0.0 && resolution_.fine != resolution_.coarse) {
+  if (!low_fidelity && of.refined_at != 0.0 && resolution_.fine != resolution_.coarse) {
     const double at_mL = 0.5 * resolution_.spacing_mL * static_cast<double>(resolution_.points_inflated);
     const SpecimenCurve coarse = differing(of.refined_at, resolution_.coarse, base);
     const SpecimenCurve fine = differing(of.refined_at, resolution_.fine, here);
@@ -207,17 +207,17 @@ SpecimenFamily::Neighbours SpecimenFamily::slips() {
           }};
 }
 
-SpecimenCurve SpecimenFamily::with_inner_radius(double fraction, bool rough) const {
-  return between(radii(), fraction, rough);
+SpecimenCurve SpecimenFamily::with_inner_radius(double fraction, bool low_fidelity) const {
+  return between(radii(), fraction, low_fidelity);
 }
 
-SpecimenCurve SpecimenFamily::stiffened(double beta, bool rough) const {
-  return between(stiffenings(), beta, rough);
+SpecimenCurve SpecimenFamily::stiffened(double beta, bool low_fidelity) const {
+  return between(stiffenings(), beta, low_fidelity);
 }
 
-SpecimenCurve SpecimenFamily::slipping(double compliance_mm, bool rough) const {
+SpecimenCurve SpecimenFamily::slipping(double compliance_mm, bool low_fidelity) const {
   // In c / (c + c0) the curve is nearly straight from held to free ends.
-  return between(slips(), compliance_mm / (compliance_mm + softest_mm), rough);
+  return between(slips(), compliance_mm / (compliance_mm + softest_mm), low_fidelity);
 }
 
 }  // namespace diastole::rig

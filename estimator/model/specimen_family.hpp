@@ -43,7 +43,7 @@ class SpecimenFamily final : public SpecimenCurves {
 
   /// Of the study's own specimen and law, its parameters at their starts divided by the modulus.
   [[nodiscard]] const SpecimenCurve& plain() const override;
-  /// Begins to compute plain() and the rough neighbours beside other work, so that they are at hand when asked for. One
+  /// Begins to compute plain() and the low-fidelity neighbours beside other work, so that they are at hand when asked for. One
   /// thread: the BLAS under the solver bears no more. Stopped by the destructor, after the curve at work.
   void compute_ahead();
   /// The first parameter of the law in kPa: all of the law's moduli are scaled with it.
@@ -51,9 +51,9 @@ class SpecimenFamily final : public SpecimenCurves {
   [[nodiscard]] const StudyParameter& modulus() const;
 
   [[nodiscard]] bool has_neighbours() const override;
-  [[nodiscard]] SpecimenCurve with_inner_radius(double fraction, bool rough) const override;
-  [[nodiscard]] SpecimenCurve stiffened(double beta, bool rough) const override;
-  [[nodiscard]] SpecimenCurve slipping(double compliance_mm, bool rough) const override;
+  [[nodiscard]] SpecimenCurve with_inner_radius(double fraction, bool low_fidelity) const override;
+  [[nodiscard]] SpecimenCurve stiffened(double beta, bool low_fidelity) const override;
+  [[nodiscard]] SpecimenCurve slipping(double compliance_mm, bool low_fidelity) const override;
 
  private:
   /// Specimens that differ by one value.
@@ -78,7 +78,7 @@ class SpecimenFamily final : public SpecimenCurves {
   [[nodiscard]] SpecimenCurve combined() const;
   /// plain() and what the neighbour differs from it on the coarse mesh, at `value` by the polynomial through the nodes;
   /// what the fine mesh changes at one node is taken as a constant part of the difference.
-  [[nodiscard]] SpecimenCurve between(const Neighbours& of, double value, bool rough) const;
+  [[nodiscard]] SpecimenCurve between(const Neighbours& of, double value, bool low_fidelity) const;
   [[nodiscard]] SpecimenCurve compute(const Study& study, size_t stride) const;
 
   Study study_;

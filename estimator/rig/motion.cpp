@@ -75,7 +75,7 @@ Motion::Ideal Motion::ideal(double time_s) const {
   return {stroke.volume_mL(time_s), before + stroke.integral_mL_s(time_s), stroke.flow_mL_per_s(time_s)};
 }
 
-Motion::Moment Motion::at(double time_s) const {
+Motion::State Motion::at(double time_s) const {
   const double window_s = std::max(spread_s_, 1e-4);
   const Ideal early = ideal(time_s - 0.5 * window_s);
   const Ideal late = ideal(time_s + 0.5 * window_s);

@@ -41,12 +41,12 @@ class Motion {
   /// Strokes in order of time, each starting where the one before ended or rested.
   Motion(std::vector<Stroke> strokes, double rest_mL, double spread_s);
 
-  struct Moment {
+  struct State {
     double volume_mL = 0.0;
     double flow_mL_per_s = 0.0;
     double acceleration_mL_per_s2 = 0.0;
   };
-  [[nodiscard]] Moment at(double time_s) const;
+  [[nodiscard]] State at(double time_s) const;
   [[nodiscard]] const std::vector<Stroke>& strokes() const { return strokes_; }
   [[nodiscard]] double rest_mL() const { return rest_mL_; }
   [[nodiscard]] double spread_s() const { return spread_s_; }

@@ -86,8 +86,8 @@ std::vector<Stroke> strokes_of(const Segment& segment) {
 
 namespace {
 
-/// Monotone pieces between rests and turns, as strokes with rough times.
-std::vector<Stroke> rough_strokes(const Counted& counted) {
+/// Monotone pieces between rests and turns, as strokes with approximate times.
+std::vector<Stroke> first_strokes(const Counted& counted) {
   constexpr double rest_s = 0.15;
   std::vector<Stroke> strokes;
   size_t from = counted.first;
@@ -129,15 +129,15 @@ double square_error(const Stroke& stroke, double spread_s, const Counted& counte
 }
 
 /// Times and rounding of one stroke by Gauss-Newton on the counts; the cosine is tried too.
-Stroke fitted(const Stroke& rough, double spread_s, const Counted& whole) {
+Stroke fitted(const Stroke& first, double spread_s, const Counted& whole) {
   const double around = 0.6 * spread_s + 0.01;
   const Counted counted{whole.pump, whole.step_mL,
-                        std::max(whole.first, index_at(whole.pump, rough.start_s - around)),
-                        std::min(whole.last, index_at(whole.pump, rough.end_s + around))};
-  Stroke best = rough;
+                        std::max(whole.first, index_at(whole.pump, first.start_s - around)),
+                        std::min(whole.last, index_at(whole.pump, first.end_s + around))};
+  Stroke best = first;
   double best_error = std::numeric_limits<double>::infinity();
   for (const bool cosine : {false, true}) {
-    Stroke stroke = rough;
+    Stroke stroke = first;
     stroke.cosine = cosine;
     stroke.round = 0.2;
     stroke.start_s += 0.5 * spread_s;
@@ -151,12 +151,13 @@ Stroke fitted(const Stroke& rough, double spread_s, const Counted& whole) {
     };
     double error = square_error(stroke, spread_s, counted);
     for (int iteration = 0; iteration < 30; ++iteration) {
-      const std::array<double, 3> nudge{1e-4, 1e-4, 1e-3};
+      const std::array<double, 3> perturbation{1e-4, 1e-4, 1e-3};
       std::array<Motion, 4> motions;
       motions[0] = Motion({stroke}, stroke.from_mL, spread_s);
       for (Eigen::Index j = 0; j < 3; ++j) {
-        motions[static_cast<size_t>(j) + 1] = Motion(
-            {moved(nudge[static_cast<size_t>(j)] * Eigen::Vector3d::Unit(j))}, stroke.from_mL, spread_s);
+        motions[static_cast<size_t>(j) + 1] =
+            Motion({moved(perturbation[static_cast<size_t>(j)] * Eigen::Vector3d::Unit(j))}, stroke.from_mL,
+                   spread_s);
       }
       Eigen::Matrix3d normal = 1e-12 * Eigen::Matrix3d::Identity();
       Eigen::Vector3d gradient = Eigen::Vector3d::Zero();
@@ -165,7 +166,7 @@ Stroke fitted(const Stroke& rough, double spread_s, const Counted& whole) {
         Eigen::Vector3d row;
         for (size_t j = 0; j < 3; ++j) {
           row[static_cast<Eigen::Index>(j)] =
-              (motions[j + 1].at(counted.time_s(k)).volume_mL - value) / nudge[j];
+              (motions[j + 1].at(counted.time_s(k)).volume_mL - value) / perturbation[j];
         }
         normal += row * row.transpose();
         gradient += row * (counted.volume_mL(k) - value);
@@ -202,7 +203,7 @@ void snap(std::vector<Stroke>& strokes, const Segment& segment, double step_mL) 
 }
 
 std::vector<Stroke> fitted_strokes(const Segment& segment, double spread_s, const Counted& counted) {
-  std::vector<Stroke> strokes = rough_strokes(counted);
+  std::vector<Stroke> strokes = first_strokes(counted);
   snap(strokes, segment, counted.step_mL);
   for (Stroke& stroke : strokes)
     stroke = fitted(stroke, spread_s, counted);

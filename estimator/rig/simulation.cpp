@@ -135,10 +135,10 @@ DriveTrace sampled_motion(const RunDrive& run, double step_s) {
                    .acceleration_mL_per_s2 = {}};
   const auto count = static_cast<size_t>(std::ceil((run.end_s - run.start_s) / step_s)) + 2;
   for (size_t k = 0; k < count; ++k) {
-    const Motion::Moment moment = run.motion.at(trace.time_s(k));
-    trace.volume_mL.push_back(moment.volume_mL);
-    trace.flow_mL_per_s.push_back(moment.flow_mL_per_s);
-    trace.acceleration_mL_per_s2.push_back(moment.acceleration_mL_per_s2);
+    const Motion::State state = run.motion.at(trace.time_s(k));
+    trace.volume_mL.push_back(state.volume_mL);
+    trace.flow_mL_per_s.push_back(state.flow_mL_per_s);
+    trace.acceleration_mL_per_s2.push_back(state.acceleration_mL_per_s2);
   }
   return trace;
 }

@@ -15,13 +15,13 @@ class SpecimenCurves {
   /// Neighbours exist for a cylinder of neo-Hookean material.
   [[nodiscard]] virtual bool has_neighbours() const = 0;
 
-  // `rough`: how the neighbour differs is taken from the coarse mesh alone, which gives it within some percent at once.
+  // `low_fidelity`: how the neighbour differs is taken from the coarse mesh alone, which gives it within some percent at once.
   /// The inner radius is larger by this part, within +-0.1.
-  [[nodiscard]] virtual SpecimenCurve with_inner_radius(double fraction, bool rough) const = 0;
+  [[nodiscard]] virtual SpecimenCurve with_inner_radius(double fraction, bool low_fidelity) const = 0;
   /// W = C1/beta (exp(beta (I1 - 3)) - 1), beta in [0, 3].
-  [[nodiscard]] virtual SpecimenCurve stiffened(double beta, bool rough) const = 0;
+  [[nodiscard]] virtual SpecimenCurve stiffened(double beta, bool low_fidelity) const = 0;
   /// The plates hold the ends along the axis; across it they yield by this compliance times C1, mm.
-  [[nodiscard]] virtual SpecimenCurve slipping(double compliance_mm, bool rough) const = 0;
+  [[nodiscard]] virtual SpecimenCurve slipping(double compliance_mm, bool low_fidelity) const = 0;
 };
 
 }  // namespace diastole::rig

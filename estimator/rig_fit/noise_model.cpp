@@ -136,7 +136,7 @@ ChannelNoise autoregression_of(const Autocovariance& covariance) {
 /// Mean squares of a series and of its second differences (over 6, so that white noise has two equal ones).
 struct Roughness {
   double square = 0.0;
-  double rough = 0.0;
+  double second_difference = 0.0;
   double count = 0.0;
 
   void add(const std::vector<double>& values) {
@@ -144,12 +144,12 @@ struct Roughness {
       const double second = values[k] - 2.0 * values[k - 1] + values[k - 2];
       if (!std::isfinite(second)) continue;
       square += values[k] * values[k];
-      rough += second * second / 6.0;
+      second_difference += second * second / 6.0;
       count += 1.0;
     }
   }
   /// Of slow over fast: what transients and drift raise, and a louder noise of the same colour does not.
-  [[nodiscard]] double slowness() const { return rough > 0.0 ? square / rough : 0.0; }
+  [[nodiscard]] double slowness() const { return second_difference > 0.0 ? square / second_difference : 0.0; }
 };
 
 ChannelNoise channel_noise(const Session& session, Channel channel) {
@@ -178,7 +178,7 @@ ChannelNoise channel_noise(const Session& session, Channel channel) {
     }
   }
   if (covariance.count[0] > 100.0) return autoregression_of(covariance);
-  const double sd = whole.count > 0.0 ? std::sqrt(whole.rough / whole.count) : 0.0;
+  const double sd = whole.count > 0.0 ? std::sqrt(whole.second_difference / whole.count) : 0.0;
   return {sd, sd, {}};
 }
 
@@ -198,23 +198,23 @@ double start_of(const std::vector<double>& values, const CyclePair& pair) {
 }
 
 /// Relative change from a cycle to the next, squared, and the part of it that noise makes.
-struct BeatChange {
+struct CycleChange {
   double square = 0.0;
   double noise = 0.0;
 };
 
 /// s in E[square] = 2 s^2 + noise by weighted squares, single outliers cut.
-double common_beat(const std::vector<BeatChange>& changes) {
+double common_cycle_sd(const std::vector<CycleChange>& changes) {
   constexpr double cut = 9.0;
   constexpr size_t rounds = 30;
   std::vector<double> sizes;
-  for (const BeatChange& change : changes)
+  for (const CycleChange& change : changes)
     sizes.push_back(std::sqrt(change.square));
   double variance = 0.5 * std::pow(signal::median(sizes) / 0.6745, 2);
   for (size_t round = 0; round < rounds; ++round) {
     double sum = 0.0;
     double weight = 0.0;
-    for (const BeatChange& change : changes) {
+    for (const CycleChange& change : changes) {
       const double expected = 2.0 * variance + change.noise;
       sum += 0.5 * (std::min(change.square, cut * expected) - change.noise) / (expected * expected);
       weight += 1.0 / (expected * expected);
@@ -225,8 +225,8 @@ double common_beat(const std::vector<BeatChange>& changes) {
 }
 
 /// From successive cycles' gains: twice the variance, and what noise makes of it.
-double beat_sd(const Session& session, const NoiseModel& noise) {
-  std::vector<BeatChange> changes;
+double cycle_sd(const Session& session, const NoiseModel& noise) {
+  std::vector<CycleChange> changes;
   std::vector<double> rest;
   const ChannelNoise& channel = noise.channels.at(Channel::cavity);
   double correlation = 1.0;  // of a mean over many samples, to that of independent ones
@@ -245,7 +245,7 @@ double beat_sd(const Session& session, const NoiseModel& noise) {
     }
   }
   if (changes.size() < 4) return 0.003;  // none repeat: the middle of what pumps do
-  return common_beat(changes);
+  return common_cycle_sd(changes);
 }
 
 }  // namespace
@@ -285,7 +285,7 @@ NoiseModel estimate_noise(const Session& session) {
       present = present && run.pressure_kPa.contains(channel);
     if (present) noise.channels[channel] = channel_noise(session, channel);
   }
-  noise.beat_sd = beat_sd(session, noise);
+  noise.cycle_sd = cycle_sd(session, noise);
   return noise;
 }
 

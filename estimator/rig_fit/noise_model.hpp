@@ -5,12 +5,12 @@
 //   - each channel's noise, correlated over some samples: an autoregression (order 6) of the autocovariance at rest and
 //     of successive cycles' differences, pooled over the runs. Cycles that differ by far more slow change than the rest
 //     shows (a transient, drift) do not count;
-//   - the beat's variation: each cycle's pressures are larger or smaller by a random factor, the same in both
+//   - the cycles' variation: each cycle's pressures are larger or smaller by a random factor, the same in both
 //     channels; its sd from successive cycles' differences, so that slow changes do not count;
 //   - the gated volumes' own sigmas.
 //
 // Whitening makes residuals independent with unit variance: the autoregression's innovations, and of each cycle the
-// component along its own shape shrunk (1 / sqrt(1 + s^2 |w|^2), w the whitened shape and s the beats' sd).
+// component along its own shape shrunk (1 / sqrt(1 + s^2 |w|^2), w the whitened shape and s the cycles' sd).
 
 #include <Eigen/Dense>
 #include <map>
@@ -28,7 +28,7 @@ struct ChannelNoise {
 
 struct NoiseModel {
   std::map<Channel, ChannelNoise> channels;
-  double beat_sd = 0.0;  ///< relative
+  double cycle_sd = 0.0;  ///< relative
 };
 
 /// Precondition: at least one run with more than a second of rest or two equal cycles; else a channel's noise is the

@@ -62,12 +62,12 @@ RigProblem::RigProblem(const Session& session, const SpecimenFamily& family, con
       noise_(options.noise ? *options.noise : estimate_noise(session)) {
   set_blocks();
   for (const SessionRun& run : session.runs) {
-    motions_.push_back(sampled_motion(run.drive, step_s(Look::fine)));
-    coarse_motions_.push_back(sampled_motion(run.drive, step_s(Look::coarse)));
+    motions_.push_back(sampled_motion(run.drive, step_s(Fidelity::fine)));
+    coarse_motions_.push_back(sampled_motion(run.drive, step_s(Fidelity::coarse)));
   }
-  KnownModel varying = options.beats_of.value_or(KnownModel{{}, {family.modulus_start_kPa(), 0.0, 0.0}});
-  if (!options.beats_of) varying.values = fit_from({}, varying.values).values;
-  set_beats(varying);
+  KnownModel varying = options.variation_of.value_or(KnownModel{{}, {family.modulus_start_kPa(), 0.0, 0.0}});
+  if (!options.variation_of) varying.values = fit_from({}, varying.values).values;
+  set_cycle_variations(varying);
   base_ = fit_from({}, {varying.values.begin(), varying.values.begin() + nuisances});
 }
 
@@ -91,41 +91,41 @@ void RigProblem::set_blocks() {
   }
 }
 
-std::vector<Unknown> RigProblem::unknowns(const std::vector<Ingredient>& ingredients) const {
+std::vector<Unknown> RigProblem::unknowns(const std::vector<ModelTerm>& terms) const {
   std::vector<Unknown> list{
       {"modulus_kPa", 0.2 * family_.modulus().lower, 5.0 * family_.modulus().upper},
       {"cavity_offset_Pa", -offset_reach_Pa, offset_reach_Pa},
       {"pump_offset_Pa", -offset_reach_Pa, offset_reach_Pa},
   };
-  for (const Ingredient& ingredient : ingredients) {
-    for (const EffectParameter& parameter : ingredient.effect->parameters()) {
-      list.push_back({std::string(ingredient.effect->text().id) + "." + std::string(parameter.name),
+  for (const ModelTerm& term : terms) {
+    for (const EffectParameter& parameter : term.effect->parameters()) {
+      list.push_back({std::string(term.effect->text().id) + "." + std::string(parameter.name),
                       parameter.lower, parameter.upper});
     }
   }
   return list;
 }
 
-RigModel RigProblem::model(const std::vector<Ingredient>& ingredients, const std::vector<double>& values,
-                           bool rough) const {
+RigModel RigProblem::model(const std::vector<ModelTerm>& terms, const std::vector<double>& values,
+                           bool low_fidelity) const {
   RigModel model = session_.base;
   model.curve = family_.plain();
   model.modulus_kPa = values[0];
   model.cavity_offset_kPa = 1e-3 * values[1];
   model.pump_offset_kPa = 1e-3 * values[2];
   size_t at = nuisances;
-  for (const Ingredient& ingredient : ingredients) {
-    const size_t count = ingredient.effect->parameters().size();
-    ingredient.effect->apply({values.data() + at, count}, {family_, ingredient.occasions, rough}, model);
+  for (const ModelTerm& term : terms) {
+    const size_t count = term.effect->parameters().size();
+    term.effect->apply({values.data() + at, count}, {family_, term.change_points, low_fidelity}, model);
     at += count;
   }
   return model;
 }
 
-double RigProblem::step_s(Look look) const {
+double RigProblem::step_s(Fidelity fidelity) const {
   const double fine =
       options_.simulation.step_s * (noise_.channels.contains(Channel::pump) ? 1.0 : cavity_steps);
-  return look == Look::fine ? fine : column_steps * fine;
+  return fidelity == Fidelity::fine ? fine : column_steps * fine;
 }
 
 std::vector<size_t> RigProblem::chosen_runs(const FitRequest& request) const {
@@ -142,15 +142,15 @@ size_t RigProblem::count_rows(const FitRequest& request) const {
   return count;
 }
 
-PlantTrace RigProblem::plant(const RigModel& model, size_t run, Look steps) const {
+PlantTrace RigProblem::plant(const RigModel& model, size_t run, Fidelity steps) const {
   SimulationOptions simulation = options_.simulation;
   simulation.step_s = step_s(steps);
-  const DriveTrace& motion = (steps == Look::fine ? motions_ : coarse_motions_)[run];
+  const DriveTrace& motion = (steps == Fidelity::fine ? motions_ : coarse_motions_)[run];
   return simulate_plant(model, session_.runs[run].drive, motion, simulation);
 }
 
 void RigProblem::compare_channel(const ResidualBlock& block, Channel channel,
-                                 const std::vector<double>& predicted, Look look,
+                                 const std::vector<double>& predicted, Fidelity fidelity,
                                  Eigen::Ref<Eigen::VectorXd> out) const {
   const auto& measured = session_.runs[block.run].pressure_kPa.at(channel);
   std::vector<double> difference(measured.size());
@@ -158,21 +158,21 @@ void RigProblem::compare_channel(const ResidualBlock& block, Channel channel,
     difference[k] = measured[k] - predicted[k];
   const ChannelNoise& noise = noise_.channels.at(channel);
   const std::vector<double> white =
-      look == Look::fine ? whitened(noise, difference) : smoothed(noise, difference);
+      fidelity == Fidelity::fine ? whitened(noise, difference) : smoothed(noise, difference);
   for (size_t k = 0; k < white.size(); ++k)
     out[static_cast<Eigen::Index>(block.first + k)] = white[k];
 }
 
-void RigProblem::compare(const RigModel& model, const PlantTrace& plant, size_t run, Look look,
+void RigProblem::compare(const RigModel& model, const PlantTrace& plant, size_t run, Fidelity fidelity,
                          Eigen::Ref<Eigen::VectorXd> out) const {
   const SessionRun& recorded = session_.runs[run];
   const Prediction shown = observe(model, plant, recorded.drive.place, recorded.sample_s);
   for (const ResidualBlock& block : blocks_) {
     if (block.run != run) continue;
     if (block.channel == name_of(Channel::cavity)) {
-      compare_channel(block, Channel::cavity, shown.cavity_kPa, look, out);
+      compare_channel(block, Channel::cavity, shown.cavity_kPa, fidelity, out);
     } else if (block.channel == name_of(Channel::pump)) {
-      compare_channel(block, Channel::pump, shown.pump_kPa, look, out);
+      compare_channel(block, Channel::pump, shown.pump_kPa, fidelity, out);
     } else {
       auto row = static_cast<Eigen::Index>(block.first);
       for (const GatedVolume& volume : recorded.volumes) {
@@ -182,43 +182,43 @@ void RigProblem::compare(const RigModel& model, const PlantTrace& plant, size_t 
       }
     }
   }
-  if (look == Look::fine) shrink_beats(run, out);
+  if (fidelity == Fidelity::fine) shrink_cycle_variations(run, out);
 }
 
-Eigen::VectorXd RigProblem::residuals(const std::vector<Ingredient>& ingredients,
-                                      const std::vector<double>& values, const FitRequest& request) const {
-  const RigModel made = model(ingredients, values, request.difference);
+Eigen::VectorXd RigProblem::residuals(const std::vector<ModelTerm>& terms, const std::vector<double>& values,
+                                      const FitRequest& request) const {
+  const RigModel made = model(terms, values, request.difference);
   const std::vector<size_t> runs = chosen_runs(request);
   Eigen::VectorXd out = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(rows_));
   parallel_for(runs.size(), options_.threads, [&](size_t i) {
-    const Look steps = request.difference ? Look::coarse : request.look;
-    compare(made, plant(made, runs[i], steps), runs[i], request.look, out);
+    const Fidelity steps = request.difference ? Fidelity::coarse : request.fidelity;
+    compare(made, plant(made, runs[i], steps), runs[i], request.fidelity, out);
   });
   return out;
 }
 
-Eigen::MatrixXd RigProblem::columns(const std::vector<Ingredient>& ingredients,
-                                    const std::vector<double>& values, const FitRequest& request,
-                                    size_t first) const {
-  const auto coordinates = search_coordinates(ingredients, unknowns(ingredients));
-  const RigModel here = model(ingredients, values);
+Eigen::MatrixXd RigProblem::columns(const std::vector<ModelTerm>& terms, const std::vector<double>& values,
+                                    const FitRequest& request, size_t first) const {
+  const auto coordinates = search_coordinates(terms, unknowns(terms));
+  const RigModel here = model(terms, values);
   std::vector<RigModel> moved;
   std::vector<double> steps;
   for (size_t i = first; i < values.size(); ++i) {
     const SearchCoordinate& coordinate = coordinates[i];
     const double at = std::clamp(to_search(coordinate.scale, values[i]), coordinate.lower, coordinate.upper);
-    steps.push_back(at + coordinate.nudge > coordinate.upper ? -coordinate.nudge : coordinate.nudge);
+    steps.push_back(at + coordinate.perturbation > coordinate.upper ? -coordinate.perturbation
+                                                                    : coordinate.perturbation);
     std::vector<double> other = values;
     other[i] = from_search(coordinate.scale, at + steps.back());
-    moved.push_back(model(ingredients, other));
+    moved.push_back(model(terms, other));
   }
   const std::vector<size_t> runs = chosen_runs(request);
   const auto rows = static_cast<Eigen::Index>(rows_);
   Eigen::VectorXd there = Eigen::VectorXd::Zero(rows);
   std::vector<PlantTrace> plants(runs.size());
   parallel_for(runs.size(), options_.threads, [&](size_t i) {
-    plants[i] = plant(here, runs[i], Look::coarse);
-    compare(here, plants[i], runs[i], request.look, there);
+    plants[i] = plant(here, runs[i], Fidelity::coarse);
+    compare(here, plants[i], runs[i], request.fidelity, there);
   });
   Eigen::MatrixXd out = Eigen::MatrixXd::Zero(rows, static_cast<Eigen::Index>(moved.size()));
   parallel_for(moved.size() * runs.size(), options_.threads, [&](size_t task) {
@@ -226,8 +226,8 @@ Eigen::MatrixXd RigProblem::columns(const std::vector<Ingredient>& ingredients,
     const size_t j = task / runs.size();
     auto column = out.col(static_cast<Eigen::Index>(j));
     const bool same_plant = coordinates[first + j].sensors_only;
-    compare(moved[j], same_plant ? plants[i] : plant(moved[j], runs[i], Look::coarse), runs[i], request.look,
-            column);
+    compare(moved[j], same_plant ? plants[i] : plant(moved[j], runs[i], Fidelity::coarse), runs[i],
+            request.fidelity, column);
   });
   for (size_t j = 0; j < moved.size(); ++j) {
     auto column = out.col(static_cast<Eigen::Index>(j));
@@ -236,13 +236,13 @@ Eigen::MatrixXd RigProblem::columns(const std::vector<Ingredient>& ingredients,
   return out;
 }
 
-std::vector<Prediction> RigProblem::predictions(const std::vector<Ingredient>& ingredients,
+std::vector<Prediction> RigProblem::predictions(const std::vector<ModelTerm>& terms,
                                                 const std::vector<double>& values) const {
-  const RigModel made = model(ingredients, values);
+  const RigModel made = model(terms, values);
   std::vector<Prediction> seen(session_.runs.size());
   parallel_for(seen.size(), options_.threads, [&](size_t r) {
     const SessionRun& run = session_.runs[r];
-    seen[r] = observe(made, plant(made, r, Look::fine), run.drive.place, run.sample_s);
+    seen[r] = observe(made, plant(made, r, Fidelity::fine), run.drive.place, run.sample_s);
   });
   return seen;
 }

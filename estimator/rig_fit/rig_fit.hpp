@@ -19,9 +19,9 @@
 namespace diastole::rig {
 
 /// An effect that the model has, and the moments found for it.
-struct Ingredient {
+struct ModelTerm {
   const Effect* effect = nullptr;
-  std::vector<Occasion> occasions = {};
+  std::vector<ChangePoint> change_points = {};
 };
 
 struct Unknown {
@@ -39,7 +39,7 @@ struct ResidualBlock {
 };
 
 struct RigFit {
-  std::vector<Ingredient> ingredients;
+  std::vector<ModelTerm> terms;
   std::vector<Unknown> unknowns;
   std::vector<double> values;  ///< natural, as in `unknowns`
   std::vector<double> errors;  ///< standard errors; 0 for one held at its bound
@@ -59,30 +59,31 @@ struct RigFit {
 };
 
 /// Whitened residuals, or their means over a tenth of a second, which know no resonances and lead a search from afar.
-enum class Look { fine, coarse };
+enum class Fidelity { fine, coarse };
 
 /// What a fit compares.
 struct FitRequest {
-  Look look = Look::fine;
+  Fidelity fidelity = Fidelity::fine;
   std::vector<bool> runs = {};  ///< which of the session's runs; empty: all
-  bool difference = false;  ///< only differences of what is returned count: longer steps, rough neighbours
+  bool difference =
+      false;  ///< only differences of what is returned count: longer steps, low_fidelity neighbours
 };
 
 /// All runs, for differences.
-inline const FitRequest of_difference{.look = Look::fine, .runs = {}, .difference = true};
+inline const FitRequest for_differences{.fidelity = Fidelity::fine, .runs = {}, .difference = true};
 
 /// Effects and all unknowns' values of a fit that was made before.
 struct KnownModel {
-  std::vector<Ingredient> ingredients;
+  std::vector<ModelTerm> terms;
   std::vector<double> values;
 };
 
 struct RigFitOptions {
   size_t threads = 2;
   size_t most_iterations = 40;
-  std::optional<KnownModel> beats_of = {};  ///< whose strokes vary; else the base model's, fitted
-  std::optional<NoiseModel> noise = {};     ///< known from elsewhere; else estimated from the session
-  SimulationOptions simulation{};           ///< steps are twice as long where there is no sensor at the pump
+  std::optional<KnownModel> variation_of = {};  ///< whose strokes vary; else the base model's, fitted
+  std::optional<NoiseModel> noise = {};         ///< known from elsewhere; else estimated from the session
+  SimulationOptions simulation{};  ///< steps are twice as long where there is no sensor at the pump
 };
 
 class RigProblem {
@@ -95,60 +96,59 @@ class RigProblem {
   [[nodiscard]] const std::vector<ResidualBlock>& blocks() const { return blocks_; }
   /// The model without effects, fitted; made once.
   [[nodiscard]] const RigFit& base() const { return base_; }
-  /// From `before`'s values and, for the ingredients that follow those of `before`, from the best of several sizes and
-  /// signs of their typical ones. Precondition: `ingredients` begin with those of `before`.
-  [[nodiscard]] RigFit fit(const std::vector<Ingredient>& ingredients, const RigFit& before) const;
+  /// From `before`'s values and, for the terms that follow those of `before`, from the best of several sizes and
+  /// signs of their typical ones. Precondition: `terms` begin with those of `before`.
+  [[nodiscard]] RigFit fit(const std::vector<ModelTerm>& terms, const RigFit& before) const;
   /// The same from the base.
-  [[nodiscard]] RigFit fit(const std::vector<Ingredient>& ingredients) const {
-    return fit(ingredients, base_);
-  }
+  [[nodiscard]] RigFit fit(const std::vector<ModelTerm>& terms) const { return fit(terms, base_); }
   /// From given values only. Runs that the request leaves out are not simulated; their residuals stay zero.
-  [[nodiscard]] RigFit fit_from(const std::vector<Ingredient>& ingredients, const std::vector<double>& values,
+  [[nodiscard]] RigFit fit_from(const std::vector<ModelTerm>& terms, const std::vector<double>& values,
                                 const FitRequest& request) const;
-  [[nodiscard]] RigFit fit_from(const std::vector<Ingredient>& ingredients, const std::vector<double>& values,
-                                Look look = Look::fine) const {
-    return fit_from(ingredients, values, FitRequest{.look = look, .runs = {}});
+  [[nodiscard]] RigFit fit_from(const std::vector<ModelTerm>& terms, const std::vector<double>& values,
+                                Fidelity fidelity = Fidelity::fine) const {
+    return fit_from(terms, values, FitRequest{.fidelity = fidelity, .runs = {}});
   }
   /// Derivatives of the residuals by the unknowns' search coordinates at these values, a column each from `first` on
   /// (3: without modulus and offsets). An effect at its neutral value has columns too, except bubbles, which begin
   /// at 0.05 mL.
-  [[nodiscard]] Eigen::MatrixXd columns(const std::vector<Ingredient>& ingredients,
+  [[nodiscard]] Eigen::MatrixXd columns(const std::vector<ModelTerm>& terms,
                                         const std::vector<double>& values, const FitRequest& request = {},
                                         size_t first = 0) const;
-  [[nodiscard]] Eigen::VectorXd residuals(const std::vector<Ingredient>& ingredients,
+  [[nodiscard]] Eigen::VectorXd residuals(const std::vector<ModelTerm>& terms,
                                           const std::vector<double>& values, const FitRequest& request) const;
-  [[nodiscard]] Eigen::VectorXd residuals(const std::vector<Ingredient>& ingredients,
-                                          const std::vector<double>& values, Look look = Look::fine) const {
-    return residuals(ingredients, values, FitRequest{.look = look, .runs = {}});
+  [[nodiscard]] Eigen::VectorXd residuals(const std::vector<ModelTerm>& terms,
+                                          const std::vector<double>& values,
+                                          Fidelity fidelity = Fidelity::fine) const {
+    return residuals(terms, values, FitRequest{.fidelity = fidelity, .runs = {}});
   }
   /// What each run's instruments show by a model.
-  [[nodiscard]] std::vector<Prediction> predictions(const std::vector<Ingredient>& ingredients,
+  [[nodiscard]] std::vector<Prediction> predictions(const std::vector<ModelTerm>& terms,
                                                     const std::vector<double>& values) const;
-  [[nodiscard]] std::vector<Unknown> unknowns(const std::vector<Ingredient>& ingredients) const;
-  [[nodiscard]] RigModel model(const std::vector<Ingredient>& ingredients, const std::vector<double>& values,
-                               bool rough = false) const;
+  [[nodiscard]] std::vector<Unknown> unknowns(const std::vector<ModelTerm>& terms) const;
+  [[nodiscard]] RigModel model(const std::vector<ModelTerm>& terms, const std::vector<double>& values,
+                               bool low_fidelity = false) const;
 
  private:
-  /// With the steps of a look.
-  [[nodiscard]] PlantTrace plant(const RigModel& model, size_t run, Look steps) const;
+  /// With the steps of a fidelity.
+  [[nodiscard]] PlantTrace plant(const RigModel& model, size_t run, Fidelity steps) const;
   /// Sets one run's rows of the residuals.
-  void compare(const RigModel& model, const PlantTrace& plant, size_t run, Look look,
+  void compare(const RigModel& model, const PlantTrace& plant, size_t run, Fidelity fidelity,
                Eigen::Ref<Eigen::VectorXd> out) const;
   void compare_channel(const ResidualBlock& block, Channel channel, const std::vector<double>& predicted,
-                       Look look, Eigen::Ref<Eigen::VectorXd> out) const;
-  void shrink_beats(size_t run, Eigen::Ref<Eigen::VectorXd> residuals) const;
-  /// Seconds of a step for a look.
-  [[nodiscard]] double step_s(Look look) const;
+                       Fidelity fidelity, Eigen::Ref<Eigen::VectorXd> out) const;
+  void shrink_cycle_variations(size_t run, Eigen::Ref<Eigen::VectorXd> residuals) const;
+  /// Seconds of a step for a fidelity.
+  [[nodiscard]] double step_s(Fidelity fidelity) const;
   [[nodiscard]] std::vector<size_t> chosen_runs(const FitRequest& request) const;
   [[nodiscard]] size_t count_rows(const FitRequest& request) const;
-  /// Values from which a fit of more ingredients than `before` may start, the best first.
-  [[nodiscard]] std::vector<std::vector<double>> starts(const std::vector<Ingredient>& ingredients,
+  /// Values from which a fit of more terms than `before` may start, the best first.
+  [[nodiscard]] std::vector<std::vector<double>> starts(const std::vector<ModelTerm>& terms,
                                                         const RigFit& before, size_t& simulations) const;
   void set_blocks();
-  void set_beats(const KnownModel& of);
-  /// Whitened change of each run's channels by the strokes of a group of cycles (beats.cpp), per relative change.
-  [[nodiscard]] std::vector<std::map<Channel, std::vector<double>>> beat_shapes(const KnownModel& of,
-                                                                                size_t group) const;
+  void set_cycle_variations(const KnownModel& of);
+  /// Whitened change of each run's channels by the strokes of a group of cycles (cycle_variation.cpp), per relative change.
+  [[nodiscard]] std::vector<std::map<Channel, std::vector<double>>> variation_shapes(const KnownModel& of,
+                                                                                     size_t group) const;
 
   const Session& session_;
   const SpecimenFamily& family_;
@@ -159,14 +159,14 @@ class RigProblem {
   size_t rows_ = 0;
   std::vector<size_t> present_;  ///< rows of each block that are not missing
 
-  /// A cycle's whitened shape in all channels, of unit length, and how much of it is taken off.
-  struct Beat {
+  /// A cycle's whitened shape in all channels, of unit length, and which part of it is taken off.
+  struct CycleVariation {
     size_t run = 0;
     std::vector<CycleRows> rows;
     Eigen::VectorXd direction;
-    double taken = 0.0;
+    double shrinkage = 0.0;
   };
-  std::vector<Beat> beats_;
+  std::vector<CycleVariation> variations_;
   RigFit base_;
 };
 

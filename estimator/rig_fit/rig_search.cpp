@@ -99,13 +99,13 @@ class Search {
   VectorXd gradient_;
 };
 
-/// The ingredients' values at a size: amplitudes go from neutral (0) to typical (1) and beyond, the others are typical.
+/// The terms' values at a size: amplitudes go from neutral (0) to typical (1) and beyond, the others are typical.
 /// Empty if a bound is in the way.
-std::vector<double> sized(const Ingredient& ingredient, const RigModel& base, double size) {
-  const std::vector<double> neutral = ingredient.effect->neutral(base);
+std::vector<double> sized(const ModelTerm& term, const RigModel& base, double size) {
+  const std::vector<double> neutral = term.effect->neutral(base);
   std::vector<double> values;
   for (size_t j = 0; j < neutral.size(); ++j) {
-    const EffectParameter& parameter = ingredient.effect->parameters()[j];
+    const EffectParameter& parameter = term.effect->parameters()[j];
     const bool amplitude =
         j == 0 || (parameter.scale == SearchScale::linear && neutral[j] == 0.0 && parameter.lower == 0.0);
     const double from = to_search(parameter.scale, neutral[j]);
@@ -119,26 +119,26 @@ std::vector<double> sized(const Ingredient& ingredient, const RigModel& base, do
 
 }  // namespace
 
-std::vector<std::vector<double>> RigProblem::starts(const std::vector<Ingredient>& ingredients,
-                                                    const RigFit& before, size_t& simulations) const {
+std::vector<std::vector<double>> RigProblem::starts(const std::vector<ModelTerm>& terms, const RigFit& before,
+                                                    size_t& simulations) const {
   constexpr double far_off = 4.0;     // coarse squares a row, when even the best start is not near
   constexpr double farthest = 120.0;  // typical sizes, if no bound is nearer
-  const FitRequest coarse{.look = Look::coarse, .runs = {}};
-  const MatrixXd known = columns(before.ingredients, before.values, coarse);
+  const FitRequest coarse{.fidelity = Fidelity::coarse, .runs = {}};
+  const MatrixXd known = columns(before.terms, before.values, coarse);
   const Eigen::LDLT<MatrixXd> normal(
       MatrixXd(known.transpose() * known + 1e-9 * MatrixXd::Identity(known.cols(), known.cols())));
   simulations += static_cast<size_t>(known.cols());
-  const Search search(search_coordinates(before.ingredients, before.unknowns),
+  const Search search(search_coordinates(before.terms, before.unknowns),
                       std::vector<bool>(before.values.size(), false));
   std::vector<std::pair<double, std::vector<double>>> tried;
   const auto add = [&](double size) {
     std::vector<double> values = before.values;
-    for (size_t i = before.ingredients.size(); i < ingredients.size(); ++i) {
-      const std::vector<double> more = sized(ingredients[i], session_.base, size);
+    for (size_t i = before.terms.size(); i < terms.size(); ++i) {
+      const std::vector<double> more = sized(terms[i], session_.base, size);
       if (more.empty()) return;
       values.insert(values.end(), more.begin(), more.end());
     }
-    const VectorXd misfit = residuals(ingredients, values, coarse);
+    const VectorXd misfit = residuals(terms, values, coarse);
     ++simulations;
     if (!misfit.allFinite()) return;  // no motion at these values: the cavity is empty, say
     // What was known before follows, as far as it is linear.
@@ -168,51 +168,51 @@ std::vector<std::vector<double>> RigProblem::starts(const std::vector<Ingredient
   return values;
 }
 
-RigFit RigProblem::fit(const std::vector<Ingredient>& ingredients, const RigFit& before) const {
+RigFit RigProblem::fit(const std::vector<ModelTerm>& terms, const RigFit& before) const {
   constexpr double near =
       1.5;  // coarse squares over the first search's, beyond which a second start is tried
-  if (ingredients.size() == before.ingredients.size()) return fit_from(ingredients, before.values);
+  if (terms.size() == before.terms.size()) return fit_from(terms, before.values);
   size_t simulations = 0;
-  const auto from = starts(ingredients, before, simulations);
-  RigFit rough = fit_from(ingredients, from.front(), Look::coarse);
-  size_t iterations = rough.iterations;
-  simulations += rough.simulations;
-  const bool doubtful = rough.chi_square > near * static_cast<double>(rows_);
+  const auto from = starts(terms, before, simulations);
+  RigFit coarse = fit_from(terms, from.front(), Fidelity::coarse);
+  size_t iterations = coarse.iterations;
+  simulations += coarse.simulations;
+  const bool doubtful = coarse.chi_square > near * static_cast<double>(rows_);
   for (size_t other = 1; doubtful && other < std::min<size_t>(from.size(), 3); ++other) {
-    RigFit again = fit_from(ingredients, from[other], Look::coarse);
+    RigFit again = fit_from(terms, from[other], Fidelity::coarse);
     iterations += again.iterations;
     simulations += again.simulations;
-    if (again.chi_square < rough.chi_square) rough = std::move(again);
+    if (again.chi_square < coarse.chi_square) coarse = std::move(again);
   }
-  RigFit fine = fit_from(ingredients, rough.values, Look::fine);
+  RigFit fine = fit_from(terms, coarse.values, Fidelity::fine);
   fine.iterations += iterations;
   fine.simulations += simulations;
   return fine;
 }
 
-RigFit RigProblem::fit_from(const std::vector<Ingredient>& ingredients, const std::vector<double>& values,
+RigFit RigProblem::fit_from(const std::vector<ModelTerm>& terms, const std::vector<double>& values,
                             const FitRequest& request) const {
   RigFit fit;
-  fit.ingredients = ingredients;
-  fit.unknowns = unknowns(ingredients);
+  fit.terms = terms;
+  fit.unknowns = unknowns(terms);
   fit.count = count_rows(request);
   const auto count = static_cast<Index>(values.size());
   std::vector<bool> never(values.size(), false);
   never[2] = !noise_.channels.contains(Channel::pump);
-  const auto coordinates = search_coordinates(ingredients, fit.unknowns);
+  const auto coordinates = search_coordinates(terms, fit.unknowns);
   Search search(coordinates, never);
   const auto moving =
       static_cast<size_t>(std::count_if(coordinates.begin(), coordinates.end(),
                                         [](const auto& coordinate) { return !coordinate.sensors_only; }));
   VectorXd at = search.sought(values);
-  fit.residuals = residuals(ingredients, search.natural(at), request);
+  fit.residuals = residuals(terms, search.natural(at), request);
   fit.simulations = 1;
 
   double damping = 1e-6;
   double led_sigma = 0.0;  // since the Jacobian was last differenced
   size_t refused = 0;
   const auto difference = [&] {
-    fit.jacobian = columns(ingredients, search.natural(at), request);
+    fit.jacobian = columns(terms, search.natural(at), request);
     fit.simulations += moving + 1;
     led_sigma = 0.0;
   };
@@ -230,7 +230,7 @@ RigFit RigProblem::fit_from(const std::vector<Ingredient>& ingredients, const st
     const VectorXd next = search.clamped(at + search.step(damping));
     const VectorXd step = next - at;
     const bool sound = next.allFinite();
-    const VectorXd tried = sound ? residuals(ingredients, search.natural(next), request) : fit.residuals;
+    const VectorXd tried = sound ? residuals(terms, search.natural(next), request) : fit.residuals;
     ++fit.simulations;
     const double gain = sound ? before - tried.squaredNorm() : std::nan("");
     const double expected = search.expected_gain(step);

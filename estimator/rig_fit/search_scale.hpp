@@ -7,7 +7,7 @@
 
 namespace diastole::rig {
 
-struct Ingredient;
+struct ModelTerm;
 struct Unknown;
 
 double to_search(SearchScale scale, double natural);
@@ -19,12 +19,12 @@ struct SearchCoordinate {
   SearchScale scale = SearchScale::linear;
   double lower = 0.0;
   double upper = 0.0;
-  double nudge = 0.0;  ///< for differences
+  double perturbation = 0.0;  ///< for differences
   bool sensors_only = false;
 };
 
-/// One an unknown: the modulus, two offsets, the ingredients' parameters.
-std::vector<SearchCoordinate> search_coordinates(const std::vector<Ingredient>& ingredients,
+/// One an unknown: the modulus, two offsets, the terms' parameters.
+std::vector<SearchCoordinate> search_coordinates(const std::vector<ModelTerm>& terms,
                                                  const std::vector<Unknown>& unknowns);
 
 }  // namespace diastole::rig

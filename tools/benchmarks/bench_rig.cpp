@@ -42,28 +42,28 @@ std::string by_channel(const rig::RigProblem& problem, const rig::RigFit& fit) {
 }
 
 /// The labelled effects with their moments; empty if one is not in the library.
-std::vector<rig::Ingredient> labelled(const nlohmann::json& label, const rig::Session& session) {
-  const auto occasion = [&](const std::string& run, double time_s) {
+std::vector<rig::ModelTerm> labelled(const nlohmann::json& label, const rig::Session& session) {
+  const auto change_point = [&](const std::string& run, double time_s) {
     double started_s = 0.0;
     for (const rig::SessionRun& other : session.runs)
       if (other.drive.place.name == run) started_s = other.drive.place.started_s;
-    return Occasion{run, time_s, started_s + time_s};
+    return ChangePoint{run, time_s, started_s + time_s};
   };
-  std::vector<rig::Ingredient> list;
+  std::vector<rig::ModelTerm> list;
   for (const auto& truth : label["truth"]) {
     const Effect* effect = find_effect(truth["id"].get<std::string>());
     if (effect == nullptr) return {};
-    rig::Ingredient ingredient{effect, {}};
+    rig::ModelTerm term{effect, {}};
     const auto& parameters = truth["parameters"];
     if (parameters.contains("time_s"))
-      ingredient.occasions.push_back(
-          occasion(parameters["run"].get<std::string>(), parameters["time_s"].get<double>()));
+      term.change_points.push_back(
+          change_point(parameters["run"].get<std::string>(), parameters["time_s"].get<double>()));
     if (parameters.contains("events_s")) {
       for (const auto& [run, times] : parameters["events_s"].items())
         for (const double time_s : times)
-          ingredient.occasions.push_back(occasion(run, time_s));
+          term.change_points.push_back(change_point(run, time_s));
     }
-    list.push_back(ingredient);
+    list.push_back(term);
   }
   return list;
 }
@@ -79,14 +79,14 @@ void report(const bench::RecordedCase& recorded, const Study& study, const rig::
     kinds += fmt::format("{}{}", kinds.empty() ? "" : "+", truth["id"].get<std::string>());
   fmt::print(
       "{} {:11} {:38} d {:8.1f} base {:9.3f} |{} | C1 {:.4f}+-{:.4f} ({:.4f}) off {:.1f} {:.1f} ({:.1f}) "
-      "noise {:.1f} beat {:.2e} ({:.2e}) {:.1f} s\n",
+      "noise {:.1f} cycles {:.2e} ({:.2e}) {:.1f} s\n",
       recorded.name, label["kind"].get<std::string>(), kinds, label["d"].get<double>(),
       problem.base().reduced(), by_channel(problem, problem.base()), problem.base().values[0],
       problem.base().errors[0], label["C1_kPa"].get<double>(), problem.base().values[1],
       problem.base().values[2], label["offset_Pa"].get<double>(),
-      1e3 * noise.channels.at(rig::Channel::cavity).sd_kPa, noise.beat_sd, label["beat_sd"].get<double>(),
+      1e3 * noise.channels.at(rig::Channel::cavity).sd_kPa, noise.cycle_sd, label["cycle_sd"].get<double>(),
       seconds_since(begun));
-  const std::vector<rig::Ingredient> effects = labelled(label, session);
+  const std::vector<rig::ModelTerm> effects = labelled(label, session);
   if (effects.empty()) return;
   const auto second = std::chrono::steady_clock::now();
   const rig::RigFit fit = problem.fit(effects);

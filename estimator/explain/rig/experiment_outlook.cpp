@@ -21,13 +21,13 @@ constexpr Eigen::Index zeros = 2;           // unknowns of a new run: its sensor
 
 struct Noise {
   rig::ChannelNoise cavity, pump;
-  double volume_sd_mL, beat_sd;
+  double volume_sd_mL, cycle_sd;
 };
 
 Noise noise_of(const rig::Session& session, const rig::RigProblem& problem) {
   const auto& channels = problem.noise().channels;
   Noise noise{channels.at(Channel::cavity), channels.at(Channel::cavity), usual_volume_sd_mL,
-              std::max(problem.noise().beat_sd, 1e-4)};
+              std::max(problem.noise().cycle_sd, 1e-4)};
   if (channels.contains(Channel::pump)) {
     noise.pump = channels.at(Channel::pump);
   } else {
@@ -87,8 +87,8 @@ struct Rows {
 
 Rows rows_of(const rig::RigProblem& problem, const rig::RigFit& fit, const TrialRun& trial,
              const Noise& noise) {
-  const auto coordinates = rig::search_coordinates(fit.ingredients, fit.unknowns);
-  const rig::RigModel made = problem.model(fit.ingredients, fit.values);
+  const auto coordinates = rig::search_coordinates(fit.terms, fit.unknowns);
+  const rig::RigModel made = problem.model(fit.terms, fit.values);
   const rig::PlantTrace plant = rig::simulate_plant(made, trial.drive);
   const Seen base = seen_of(made, plant, trial);
   const auto count = static_cast<Eigen::Index>(fit.values.size());
@@ -102,10 +102,11 @@ Rows rows_of(const rig::RigProblem& problem, const rig::RigFit& fit, const Trial
     const auto k = static_cast<size_t>(i);
     const rig::SearchCoordinate& coordinate = coordinates[k];
     const double at = rig::to_search(coordinate.scale, fit.values[k]);
-    const double step = at + coordinate.nudge > coordinate.upper ? -coordinate.nudge : coordinate.nudge;
+    const double step =
+        at + coordinate.perturbation > coordinate.upper ? -coordinate.perturbation : coordinate.perturbation;
     std::vector<double> values = fit.values;
     values[k] = rig::from_search(coordinate.scale, at + step);
-    const rig::RigModel moved = problem.model(fit.ingredients, values);
+    const rig::RigModel moved = problem.model(fit.terms, values);
     const Seen other =
         seen_of(moved, coordinate.sensors_only ? plant : rig::simulate_plant(moved, trial.drive), trial);
     for (size_t c = 0; c < measured_count; ++c)
@@ -133,7 +134,7 @@ Eigen::MatrixXd known_before(const rig::RigProblem& problem, const rig::RigFit& 
   const auto count = static_cast<Eigen::Index>(fit.values.size());
   const Eigen::MatrixXd columns = fit.jacobian.cols() == count && fit.jacobian.rows() > 0
                                       ? fit.jacobian
-                                      : problem.columns(fit.ingredients, fit.values);
+                                      : problem.columns(fit.terms, fit.values);
   Eigen::MatrixXd known = Eigen::MatrixXd::Identity(count + zeros, count + zeros);
   known.topLeftCorner(count, count) = columns.transpose() * columns;
   known.topLeftCorner(count, count).diagonal().array() += ridge;
@@ -165,9 +166,9 @@ SegmentOutlook look_ahead(const rig::Session& session, const rig::RigProblem& pr
         Eigen::MatrixXd all(rows[b].K[c].rows(), rows[b].K[c].cols() + 1);
         all << rows[a].y[c] - rows[b].y[c], rows[b].K[c];
         if (c != static_cast<size_t>(Measured::volume) && all.rows() > 0) {
-          // The mean of the cycles' random sizes, known to beat_sd over the root of their number.
+          // The mean of the cycles' random sizes, known to cycle_sd over the root of their number.
           const Eigen::VectorXd& shape = rows[a].y[c];
-          const double loose = (trial.repeats + 2.0) / (noise.beat_sd * noise.beat_sd);
+          const double loose = (trial.repeats + 2.0) / (noise.cycle_sd * noise.cycle_sd);
           all -= shape * ((shape.transpose() * all) / (shape.squaredNorm() + loose));
         }
         outlook.gram[a][b][c] = all.transpose() * all;
@@ -181,7 +182,7 @@ Eigen::MatrixXd gram_beside(const rig::RigFit& truth, const rig::RigFit& adaptin
                             const SpecimenKnowledge& knowledge) {
   const auto count = static_cast<Eigen::Index>(adapting.values.size());
   Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(count + zeros + 1, count + zeros + 1);
-  const auto coordinates = rig::search_coordinates(adapting.ingredients, adapting.unknowns);
+  const auto coordinates = rig::search_coordinates(adapting.terms, adapting.unknowns);
   const auto add = [&](std::string_view unknown, double difference, double error) {
     Eigen::VectorXd row = Eigen::VectorXd::Zero(sum.cols());
     row[0] = difference / error;
@@ -208,9 +209,8 @@ Eigen::MatrixXd gram_beside(const rig::RigFit& truth, const rig::RigFit& adaptin
     }
   }
   const auto is_lasting = [](const rig::RigFit& fit) {
-    return std::ranges::all_of(fit.ingredients, [](const rig::Ingredient& ingredient) {
-      return ingredient.effect->keeps_modulus();
-    });
+    return std::ranges::all_of(fit.terms,
+                               [](const rig::ModelTerm& term) { return term.effect->keeps_modulus(); });
   };
   if (equipment[static_cast<size_t>(Measured::stiffness)] && is_lasting(truth) && is_lasting(adapting))
     add("modulus_kPa", truth.values[0] - adapting.values[0], knowledge.relative_C1_error * truth.values[0]);

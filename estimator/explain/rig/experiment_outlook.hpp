@@ -4,7 +4,7 @@
 //
 // Of two models A and B the segment's whitened residuals, if A is true, are r = W (y_A - y_B); B's unknowns adapt by
 // theta with the columns K = W dy_B/dtheta, the sensors' zeros of a new run by two more with a prior of 30 Pa, and the
-// beats' sizes are taken off along W y_A. Rows of several segments add, so that only Gram matrices [r K]' [r K] are kept,
+// cycles' sizes are taken off along W y_A. Rows of several segments add, so that only Gram matrices [r K]' [r K] are kept,
 // one a channel. The separation is what is left:
 //
 //   d^2 = r'r - g' (K'K + P)^-1 g,  g = K'r,  P: what the session's own data say of B's unknowns.

@@ -21,7 +21,8 @@ namespace {
 constexpr double discovery_rate = 0.01;
 constexpr double dominated = 0.1;  // of chi-square left by effects beside which a first search seeks no more
 constexpr size_t most_hints = 2;   // that a next experiment is designed for, beside nothing at all
-constexpr double other_beats = 0.5;  // of chi-square left by effects that change what a beat looks like, too
+constexpr double other_variation =
+    0.5;  // of chi-square left by effects that change what a cycle looks like, too
 
 std::string summary_of(const Explanation& found) {
   std::vector<std::string> ids;
@@ -59,12 +60,12 @@ std::string summary_of(const Explanation& found) {
 std::vector<Step> steps_of(const SearchResult& search) {
   std::vector<Step> steps{{"base model", search.sets.front().fit.reduced()}};
   const rig::RigFit& best = search.sets[search.best].fit;
-  for (size_t count = 1; count <= best.ingredients.size(); ++count) {
-    const std::vector<rig::Ingredient> part(best.ingredients.begin(),
-                                            best.ingredients.begin() + static_cast<std::ptrdiff_t>(count));
+  for (size_t count = 1; count <= best.terms.size(); ++count) {
+    const std::vector<rig::ModelTerm> part(best.terms.begin(),
+                                           best.terms.begin() + static_cast<std::ptrdiff_t>(count));
     for (const FittedSet& set : search.sets) {
-      if (set.fit.ingredients.size() != count) continue;
-      const bool same = std::equal(part.begin(), part.end(), set.fit.ingredients.begin(),
+      if (set.fit.terms.size() != count) continue;
+      const bool same = std::equal(part.begin(), part.end(), set.fit.terms.begin(),
                                    [](const auto& a, const auto& b) { return a.effect == b.effect; });
       if (!same) continue;
       steps.push_back({std::string(part.back().effect->text().id), set.fit.reduced()});
@@ -75,8 +76,8 @@ std::vector<Step> steps_of(const SearchResult& search) {
 }
 
 /// The effects that the study's model has already, in its order.
-std::vector<rig::Ingredient> ingredients_of(const Study& study, const rig::Session& session) {
-  std::vector<rig::Ingredient> list;
+std::vector<rig::ModelTerm> terms_of(const Study& study, const rig::Session& session) {
+  std::vector<rig::ModelTerm> list;
   for (const std::string& id : study.effects) {
     const Effect* effect = find_effect(id);
     if (effect == nullptr) {
@@ -85,16 +86,16 @@ std::vector<rig::Ingredient> ingredients_of(const Study& study, const rig::Sessi
                         .problem = fmt::format("there is no effect \"{}\"", id),
                         .remedy = "`diastole effects` lists those that are known."});
     }
-    rig::Ingredient ingredient{effect, {}};
+    rig::ModelTerm term{effect, {}};
     for (const StudyEffect& told : study.effect_values) {
       if (told.id != id) continue;
       for (const StudyMoment& moment : told.moments)
         for (const rig::SessionRun& run : session.runs)
           if (run.drive.place.name == moment.run)
-            ingredient.occasions.push_back(
+            term.change_points.push_back(
                 {moment.run, moment.time_s, run.drive.place.started_s + moment.time_s});
     }
-    list.push_back(std::move(ingredient));
+    list.push_back(std::move(term));
   }
   return list;
 }
@@ -104,7 +105,7 @@ std::vector<rig::Ingredient> ingredients_of(const Study& study, const rig::Sessi
 rig::Session without_effects(const rig::Session& session, const rig::RigProblem& problem,
                              const rig::RigFit& fit) {
   rig::Session plain = session;
-  const auto with = problem.predictions(fit.ingredients, fit.values);
+  const auto with = problem.predictions(fit.terms, fit.values);
   const auto base = problem.predictions({}, {fit.values.begin(), fit.values.begin() + 3});
   for (size_t r = 0; r < plain.runs.size(); ++r) {
     for (auto& [channel, values] : plain.runs[r].pressure_kPa) {
@@ -120,12 +121,12 @@ rig::Session without_effects(const rig::Session& session, const rig::RigProblem&
 
 bool differ(const rig::NoiseModel& a, const rig::NoiseModel& b) {
   constexpr double noise_part = 0.05;
-  constexpr double beat_part = 0.3;
-  constexpr double smallest_beat = 5e-4;
+  constexpr double cycle_part = 0.3;
+  constexpr double smallest_cycle_sd = 5e-4;
   for (const auto& [channel, noise] : a.channels)
     if (std::abs(b.channels.at(channel).innovation_kPa / noise.innovation_kPa - 1.0) > noise_part)
       return true;
-  return std::abs(a.beat_sd - b.beat_sd) > beat_part * std::max(b.beat_sd, smallest_beat);
+  return std::abs(a.cycle_sd - b.cycle_sd) > cycle_part * std::max(b.cycle_sd, smallest_cycle_sd);
 }
 
 /// The session's problem and what was found in it.
@@ -149,22 +150,22 @@ Work searched(const rig::Session& session, const rig::SpecimenFamily& family, co
   fitting.threads = options.threads;
   SearchOptions searching;
   searching.progress = options.progress;
-  searching.start = ingredients_of(study, session);
+  searching.start = terms_of(study, session);
   searching.enough = dominated;
   rig::RigProblem problem(session, family, fitting);
   SearchResult found = search(session, family, problem, searching);
   const rig::RigFit& best = found.sets[found.best].fit;
   const rig::NoiseModel noise = rig::estimate_noise(without_effects(session, problem, best));
-  const bool large = found.sets[found.best].chi_square < other_beats * found.sets.front().chi_square;
+  const bool large = found.sets[found.best].chi_square < other_variation * found.sets.front().chi_square;
   const bool hopeless = leaves_misfit(found.sets.front(), found.sets[found.best]);
-  if (!best.ingredients.empty() && !hopeless && (large || differ(problem.noise(), noise))) {
+  if (!best.terms.empty() && !hopeless && (large || differ(problem.noise(), noise))) {
     tell("fitting again with the noise that is left");
     fitting.noise = noise;
-    fitting.beats_of = rig::KnownModel{best.ingredients, best.values};
-    searching.start = best.ingredients;
+    fitting.variation_of = rig::KnownModel{best.terms, best.values};
+    searching.start = best.terms;
     searching.enough = 0.0;
     rig::RigProblem again(session, family, fitting);
-    searching.change = again.base().residuals - again.residuals(best.ingredients, best.values);
+    searching.change = again.base().residuals - again.residuals(best.terms, best.values);
     SearchResult second = search(session, family, again, searching);
     Eigen::VectorXd weights = row_weights(session, again, searching.change);
     return {std::move(again), std::move(second), std::move(weights)};
@@ -176,9 +177,9 @@ Work searched(const rig::Session& session, const rig::SpecimenFamily& family, co
 /// Of each effect found, the fit of the others alone, which the search made when it compared look-alikes.
 std::vector<const rig::RigFit*> fits_without(const SearchResult& search, const rig::RigFit& best) {
   std::vector<const rig::RigFit*> fits;
-  for (const rig::Ingredient& left_out : best.ingredients) {
+  for (const rig::ModelTerm& left_out : best.terms) {
     std::vector<std::string> others;
-    for (const rig::Ingredient& in : best.ingredients)
+    for (const rig::ModelTerm& in : best.terms)
       if (in.effect != left_out.effect) others.emplace_back(in.effect->text().id);
     std::sort(others.begin(), others.end());
     const auto made = std::find_if(search.sets.begin(), search.sets.end(),
@@ -221,7 +222,7 @@ std::optional<NextExperiment> next_experiment(const Study& study, const rig::Ses
   if (found.effects.empty()) {
     for (const auto& ids : found.ambiguous_with)
       if (const Effect* effect = ids.size() == 1 ? find_effect(ids.front()) : nullptr;
-          effect != nullptr && effect->occasions() == Occasions::none && hinted.size() < most_hints)
+          effect != nullptr && effect->change_points() == ChangePoints::none && hinted.size() < most_hints)
         hinted.push_back(work.problem.fit({{effect, {}}}));
     for (const rig::RigFit& fit : hinted)
       competing.push_back(&fit);
@@ -250,7 +251,7 @@ Explanation explain_rig(const Study& study, const ExplainOptions& options) {
   const rig::RigProblem& problem = work.problem;
   const rig::RigFit& base = problem.base();
   rig::RigFit best = work.best().fit;
-  best.jacobian = problem.columns(best.ingredients, best.values);  // at the very optimum
+  best.jacobian = problem.columns(best.terms, best.values);  // at the very optimum
 
   tell("judging");
   const auto cells = residual_cells(session, problem.blocks(), best.residuals,

@@ -18,8 +18,8 @@ constexpr double ninety = 1.645;  // standard errors of a 90 % interval's half
 
 SearchScale scale_of(const rig::RigFit& fit, size_t unknown) {
   size_t at = nuisances;
-  for (const rig::Ingredient& ingredient : fit.ingredients)
-    for (const EffectParameter& parameter : ingredient.effect->parameters())
+  for (const rig::ModelTerm& term : fit.terms)
+    for (const EffectParameter& parameter : term.effect->parameters())
       if (at++ == unknown) return parameter.scale;
   return SearchScale::linear;
 }
@@ -67,17 +67,17 @@ std::vector<double> parameter_errors(const rig::RigFit& fit, const Eigen::Vector
 std::vector<FoundEffect> found_effects(const rig::RigFit& fit, const std::vector<double>& errors) {
   std::vector<FoundEffect> effects;
   size_t at = nuisances;
-  for (const rig::Ingredient& ingredient : fit.ingredients) {
+  for (const rig::ModelTerm& term : fit.terms) {
     FoundEffect found;
-    found.id = ingredient.effect->text().id;
-    for (const EffectParameter& parameter : ingredient.effect->parameters()) {
+    found.id = term.effect->text().id;
+    for (const EffectParameter& parameter : term.effect->parameters()) {
       found.parameters.push_back(
           {std::string(parameter.name), fit.values[at], errors[at],
            interval(parameter.scale, fit.values[at], errors[at], parameter.lower, parameter.upper)});
       ++at;
     }
-    for (const Occasion& occasion : ingredient.occasions)
-      found.moments.push_back({occasion.run, occasion.time_s});
+    for (const ChangePoint& change_point : term.change_points)
+      found.change_points.push_back({change_point.run, change_point.time_s});
     effects.push_back(std::move(found));
   }
   return effects;
@@ -128,10 +128,10 @@ std::string port_at(const rig::ResidualBlock& block, const std::vector<const rig
                     const rig::RigFit& after) {
   double largest = 0.0;
   const Effect* effect = nullptr;
-  for (size_t member = 0; member < after.ingredients.size(); ++member) {
+  for (size_t member = 0; member < after.terms.size(); ++member) {
     const rig::RigFit* other = member < without.size() ? without[member] : nullptr;
-    if (after.ingredients.size() == 1) {
-      effect = after.ingredients.front().effect;
+    if (after.terms.size() == 1) {
+      effect = after.terms.front().effect;
       break;
     }
     if (other == nullptr) continue;
@@ -141,7 +141,7 @@ std::string port_at(const rig::ResidualBlock& block, const std::vector<const rig
                         after.residuals.segment(first, count).squaredNorm();
     if (rise > largest) {
       largest = rise;
-      effect = after.ingredients[member].effect;
+      effect = after.terms[member].effect;
     }
   }
   return std::string(name_of(effect != nullptr ? effect->text().port : port_of(block.channel)));
@@ -157,7 +157,7 @@ std::vector<Misfit> misfits(const rig::Session& session, const rig::RigProblem& 
   std::map<Key, std::vector<const ResidualCell*>> groups;
   std::map<std::pair<size_t, std::string>, const ResidualCell*> bands;
   for (const ResidualCell& cell : cells) {
-    if (cell.look == Look::band) {
+    if (cell.kind == CellKind::band) {
       const ResidualCell*& band = bands[{cell.run, cell.channel}];
       if (band == nullptr || cell.excess() / cell.dofs > band->excess() / band->dofs) band = &cell;
     } else {
@@ -183,7 +183,8 @@ std::vector<Misfit> misfits(const rig::Session& session, const rig::RigProblem& 
     for (const ResidualCell* cell : members) {
       misfit.p_value = std::min(misfit.p_value, cell->p_value);
       misfit.excess_chi2 = std::max(misfit.excess_chi2, 0.0);
-      if (cell->look != Look::shape && cell->look != Look::cycles) misfit.excess_chi2 += cell->excess();
+      if (cell->kind != CellKind::shape && cell->kind != CellKind::cycles)
+        misfit.excess_chi2 += cell->excess();
     }
     if (misfit.excess_chi2 == 0.0)
       for (const ResidualCell* cell : members)
@@ -220,7 +221,7 @@ std::vector<Candidate> evidence(const SearchResult& search, const Judgement& jud
     list.push_back(std::move(row));
   }
   for (const Lead& lead : search.leads) {
-    const std::string id(lead.ingredient.effect->text().id);
+    const std::string id(lead.term.effect->text().id);
     const bool fitted = std::any_of(list.begin(), list.end(), [&](const Candidate& row) {
       return row.refitted && row.ids == std::vector<std::string>{id};
     });
@@ -240,8 +241,8 @@ std::vector<Candidate> evidence(const SearchResult& search, const Judgement& jud
 std::vector<Trace> traces(const rig::Session& session, const rig::RigProblem& problem,
                           const rig::RigFit& before, const rig::RigFit& after) {
   constexpr size_t kept = 4;  // every so many samples are shown
-  const auto old = problem.predictions(before.ingredients, before.values);
-  const auto now = problem.predictions(after.ingredients, after.values);
+  const auto old = problem.predictions(before.terms, before.values);
+  const auto now = problem.predictions(after.terms, after.values);
   std::vector<Trace> list;
   for (size_t r = 0; r < session.runs.size(); ++r) {
     const rig::SessionRun& run = session.runs[r];

@@ -10,7 +10,7 @@
 
 namespace diastole::explain {
 
-/// The fit's ingredients with values and 90 % intervals. Errors hold the model's own, see parameter_errors.
+/// The fit's terms with values and 90 % intervals. Errors hold the model's own, see parameter_errors.
 std::vector<FoundEffect> found_effects(const rig::RigFit& fit, const std::vector<double>& errors);
 
 /// Standard errors in natural units of the fit's unknowns, with each square weighted: what noise and the model's

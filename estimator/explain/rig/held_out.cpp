@@ -88,8 +88,8 @@ double predicted_square(const rig::RigProblem& problem, const std::vector<Fold>&
         predicted[row] += fit.jacobian.row(row).dot(step);
     } else {
       const rig::RigFit others =
-          problem.fit_from(fit.ingredients, fit.values, {.look = rig::Look::fine, .runs = fold.others});
-      predicted = problem.residuals(fit.ingredients, others.values);
+          problem.fit_from(fit.terms, fit.values, {.fidelity = rig::Fidelity::fine, .runs = fold.others});
+      predicted = problem.residuals(fit.terms, others.values);
     }
     for (const Eigen::Index row : fold.rows)
       square += weights[row] * predicted[row] * predicted[row];

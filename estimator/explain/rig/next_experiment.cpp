@@ -22,8 +22,8 @@ constexpr size_t most_models = 3;
 
 std::string ids_of(const rig::RigFit& fit) {
   std::vector<std::string_view> ids;
-  for (const rig::Ingredient& ingredient : fit.ingredients)
-    ids.push_back(ingredient.effect->text().id);
+  for (const rig::ModelTerm& term : fit.terms)
+    ids.push_back(term.effect->text().id);
   return ids.empty() ? "no effect" : fmt::format("{}", fmt::join(ids, " + "));
 }
 
@@ -129,12 +129,12 @@ struct LeastKnown {
 };
 LeastKnown least_known(const rig::Session& session, const rig::RigFit& fit,
                        const Eigen::MatrixXd& covariance) {
-  const auto coordinates = rig::search_coordinates(fit.ingredients, fit.unknowns);
+  const auto coordinates = rig::search_coordinates(fit.terms, fit.unknowns);
   LeastKnown least;
   double worst = -1.0;
   size_t at = fit.values.size();
-  for (auto ingredient = fit.ingredients.rbegin(); ingredient != fit.ingredients.rend(); ++ingredient) {
-    const std::vector<double> neutral = ingredient->effect->neutral(session.base);
+  for (auto term = fit.terms.rbegin(); term != fit.terms.rend(); ++term) {
+    const std::vector<double> neutral = term->effect->neutral(session.base);
     at -= neutral.size();
     for (size_t j = 0; j < neutral.size(); ++j) {
       const auto scale = coordinates[at + j].scale;
@@ -196,7 +196,7 @@ std::optional<NextExperiment> separating_experiment(const ExperimentDesign& desi
 std::optional<NextExperiment> sharpening_experiment(const ExperimentDesign& design,
                                                     const rig::RigFit& named) {
   const auto segments = possible_segments(design.limits, design.session.base.hose);
-  if (segments.empty() || named.ingredients.empty()) return std::nullopt;
+  if (segments.empty() || named.terms.empty()) return std::nullopt;
   const auto outlooks = outlooks_of(design, {&named}, segments);
   const Eigen::MatrixXd known = known_before(design.problem, named);
   const Eigen::MatrixXd before = known.inverse();

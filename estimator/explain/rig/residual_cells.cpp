@@ -27,9 +27,9 @@ class ChannelView {
   void add_bands(std::vector<ResidualCell>& out) const;
 
  private:
-  [[nodiscard]] ResidualCell cell(Look look) const {
+  [[nodiscard]] ResidualCell cell(CellKind kind) const {
     ResidualCell made;
-    made.look = look;
+    made.kind = kind;
     made.run = block_.run;
     made.channel = block_.channel;
     return made;
@@ -69,11 +69,11 @@ void ChannelView::add_bins(const std::vector<rig::CycleRows>& cycles, int segmen
                            std::vector<ResidualCell>& out) const {
   const auto count = static_cast<double>(cycles.size());
   for (size_t bin = 0; bin < phase_bins; ++bin) {
-    ResidualCell scatter = cell(Look::scatter);
+    ResidualCell scatter = cell(CellKind::scatter);
     scatter.segment = segment;
     scatter.phase = {static_cast<double>(bin) / phase_bins, static_cast<double>(bin + 1) / phase_bins};
     ResidualCell shape = scatter;
-    shape.look = Look::shape;
+    shape.kind = CellKind::shape;
     const size_t length = cycles.front().last - cycles.front().first;
     for (size_t j = bin * length / phase_bins; j < (bin + 1) * length / phase_bins; ++j) {
       double sum = 0.0;
@@ -96,7 +96,7 @@ void ChannelView::add_bins(const std::vector<rig::CycleRows>& cycles, int segmen
 
 void ChannelView::add_cycles(const std::vector<rig::CycleRows>& cycles, int segment,
                              std::vector<ResidualCell>& out) const {
-  ResidualCell drift = cell(Look::cycles);
+  ResidualCell drift = cell(CellKind::cycles);
   drift.segment = segment;
   for (const rig::CycleRows& rows : cycles) {
     double sum = 0.0;
@@ -117,7 +117,7 @@ void ChannelView::add_rest(std::vector<ResidualCell>& out) const {
   for (const rig::CycleRows& rows : rig::cycles_of(run_))
     std::fill(moving.begin() + static_cast<std::ptrdiff_t>(rows.first),
               moving.begin() + static_cast<std::ptrdiff_t>(rows.last), true);
-  ResidualCell scatter = cell(Look::rest);
+  ResidualCell scatter = cell(CellKind::rest);
   ResidualCell level = scatter;
   double sum = 0.0;
   double part = 0.0;
@@ -153,7 +153,7 @@ void ChannelView::add_bands(std::vector<ResidualCell>& out) const {
   transform.fwd(spectrum, scaled);
   const double spacing_Hz = 1.0 / (run_.sample_s.back() - run_.sample_s.front());
   for (size_t band = 0; band + 1 < band_edges_Hz.size(); ++band) {
-    ResidualCell made = cell(Look::band);
+    ResidualCell made = cell(CellKind::band);
     made.band_Hz = {band_edges_Hz[band], band_edges_Hz[band + 1]};
     const auto from = static_cast<size_t>(band_edges_Hz[band] / spacing_Hz) + 1;
     const auto to = std::min(static_cast<size_t>(band_edges_Hz[band + 1] / spacing_Hz) + 1, block_.count / 2);
@@ -172,7 +172,7 @@ void ChannelView::add_bands(std::vector<ResidualCell>& out) const {
 ResidualCell volume_cell(const rig::ResidualBlock& block, const Eigen::VectorXd& residuals,
                          const Eigen::VectorXd& variance) {
   ResidualCell cell;
-  cell.look = Look::volume;
+  cell.kind = CellKind::volume;
   cell.run = block.run;
   cell.channel = block.channel;
   for (size_t k = 0; k < block.count; ++k) {

@@ -20,10 +20,10 @@
 
 namespace diastole::explain {
 
-enum class Look { scatter, shape, cycles, rest, band, volume };
+enum class CellKind { scatter, shape, cycles, rest, band, volume };
 
 struct ResidualCell {
-  Look look = Look::scatter;
+  CellKind kind = CellKind::scatter;
   size_t run = 0;
   std::string channel;
   std::optional<int> segment;

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "estimator/parallel/parallel_for.hpp"
-#include "estimator/rig_fit/moment_search.hpp"
+#include "estimator/rig_fit/change_point_search.hpp"
 #include "estimator/rig_fit/search_scale.hpp"
 
 namespace diastole::explain {
@@ -21,9 +21,9 @@ std::vector<double> trial_sizes(const Effect& effect) {
   return {0.5};
 }
 
-bool contains(const std::vector<rig::Ingredient>& ingredients, const Effect* effect) {
-  return std::any_of(ingredients.begin(), ingredients.end(),
-                     [&](const rig::Ingredient& ingredient) { return ingredient.effect == effect; });
+bool contains(const std::vector<rig::ModelTerm>& terms, const Effect* effect) {
+  return std::any_of(terms.begin(), terms.end(),
+                     [&](const rig::ModelTerm& term) { return term.effect == effect; });
 }
 
 /// The effect's values with the first parameter at `size` of the way from neutral to typical.
@@ -67,25 +67,25 @@ std::vector<double> far_sizes(const Effect& effect, const rig::RigModel& base) {
   return sizes;
 }
 
-void set_moments(Lead& lead, size_t moments, const Eigen::VectorXd& left, const rig::RigFit& current,
-                 const Eigen::VectorXd& weights) {
-  lead.parameters = lead.ingredient.effect->parameters().size() + moment_parameters * moments;
+void set_change_points(Lead& lead, size_t moments, const Eigen::VectorXd& left, const rig::RigFit& current,
+                       const Eigen::VectorXd& weights) {
+  lead.parameters = lead.term.effect->parameters().size() + change_point_parameters * moments;
   lead.gain = weights.dot(current.residuals.cwiseAbs2() - left.cwiseAbs2());
   lead.visibility = std::sqrt(std::max(lead.gain, 0.0));
 }
 
 }  // namespace
 
-void search_moments(Lead& lead, const rig::RigProblem& problem, const rig::Session& session,
-                    const rig::RigFit& current, const Eigen::VectorXd& weights) {
-  if (lead.ingredient.effect->occasions() == Occasions::none || lead.fit) return;
-  auto found = rig::find_moments(problem, session, current, *lead.ingredient.effect);
+void search_change_points(Lead& lead, const rig::RigProblem& problem, const rig::Session& session,
+                          const rig::RigFit& current, const Eigen::VectorXd& weights) {
+  if (lead.term.effect->change_points() == ChangePoints::none || lead.fit) return;
+  auto found = rig::find_change_points(problem, session, current, *lead.term.effect);
   if (!found) {
     lead.gain = 0.0;
     return;
   }
-  lead.ingredient = std::move(found->ingredient);
-  set_moments(lead, lead.ingredient.occasions.size(), found->fit.residuals, current, weights);
+  lead.term = std::move(found->term);
+  set_change_points(lead, lead.term.change_points.size(), found->fit.residuals, current, weights);
   lead.fit = std::move(found->fit);
 }
 
@@ -127,29 +127,30 @@ class Screening {
         weights_(weights),
         root_(weights.cwiseSqrt()),
         residuals_(root_.asDiagonal() * current.residuals),
-        without_(problem.residuals(current.ingredients, current.values, rig::of_difference)),
+        without_(problem.residuals(current.terms, current.values, rig::for_differences)),
         known_(basis_of(root_.asDiagonal() * current.jacobian)) {}
 
   [[nodiscard]] std::optional<Lead> lead_of(const Effect& effect) const {
-    return effect.occasions() == Occasions::none ? lead_by_size(effect) : lead_by_moments(effect);
+    return effect.change_points() == ChangePoints::none ? lead_by_size(effect)
+                                                        : lead_by_change_points(effect);
   }
 
  private:
   [[nodiscard]] Eigen::VectorXd change_by(const Effect& effect, const std::vector<double>& values) const {
-    std::vector<rig::Ingredient> ingredients = current_.ingredients;
-    ingredients.push_back({&effect, {}});
+    std::vector<rig::ModelTerm> terms = current_.terms;
+    terms.push_back({&effect, {}});
     std::vector<double> all = current_.values;
     all.insert(all.end(), values.begin(), values.end());
-    return root_.asDiagonal() * (problem_.residuals(ingredients, all, rig::of_difference) - without_);
+    return root_.asDiagonal() * (problem_.residuals(terms, all, rig::for_differences) - without_);
   }
   [[nodiscard]] Eigen::VectorXd beyond_known(const Eigen::VectorXd& change) const {
     return change - known_ * (known_.transpose() * change);
   }
-  [[nodiscard]] std::optional<Lead> lead_by_moments(const Effect& effect) const {
-    const auto promised = rig::promise_moments(problem_, session_, current_, effect);
+  [[nodiscard]] std::optional<Lead> lead_by_change_points(const Effect& effect) const {
+    const auto promised = rig::promise_change_points(problem_, session_, current_, effect);
     if (!promised) return {};
     Lead lead{{&effect, {}}};
-    set_moments(lead, promised->count, promised->residuals, current_, weights_);
+    set_change_points(lead, promised->count, promised->residuals, current_, weights_);
     return lead;
   }
   [[nodiscard]] Lead lead_by_size(const Effect& effect) const {
@@ -192,7 +193,7 @@ std::vector<Lead> screen(const rig::RigProblem& problem, const rig::SpecimenFami
   const Screening screening(problem, session, current, weights);
   std::vector<const Effect*> tried;
   for (const Effect* effect : all_effects())
-    if (!contains(current.ingredients, effect) && effect->fits(family)) tried.push_back(effect);
+    if (!contains(current.terms, effect) && effect->fits(family)) tried.push_back(effect);
   std::vector<std::optional<Lead>> found(tried.size());
   parallel_for(tried.size(), problem.threads(), [&](size_t i) {
     going_on();

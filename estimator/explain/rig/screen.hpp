@@ -8,7 +8,7 @@
 //
 //   gain = |Q^T r|^2,  Q an orthonormal basis of D with J projected out
 //
-// An effect that begins at a moment has its moments scanned (estimator/rig_fit/moment_search.hpp) and searched when it is
+// An effect that begins at a moment has its moments scanned (estimator/rig_fit/change_point_search.hpp) and searched when it is
 // tried; each counts as a parameter, and for the samples among which it was chosen.
 //
 // Finite sizes, because some effects show nothing near their neutral value (gas at the pump, a slow catheter). One that moves
@@ -25,7 +25,7 @@
 namespace diastole::explain {
 
 struct Lead {
-  rig::Ingredient ingredient;
+  rig::ModelTerm term;
   double gain = 0.0;        ///< of weighted squares; infinite gains do not exist: at most what is there
   double visibility = 0.0;  ///< of the effect at its typical size, in sigmas, the nuisances refitted
   size_t parameters = 0;
@@ -33,11 +33,11 @@ struct Lead {
 };
 
 /// Searches the moments of an effect that has them, of which `screen` only scanned. No gain is left if there are none.
-void search_moments(Lead& lead, const rig::RigProblem& problem, const rig::Session& session,
-                    const rig::RigFit& current, const Eigen::VectorXd& weights);
+void search_change_points(Lead& lead, const rig::RigProblem& problem, const rig::Session& session,
+                          const rig::RigFit& current, const Eigen::VectorXd& weights);
 
 /// What choosing a moment among a session's samples is worth in parameters.
-inline constexpr size_t moment_parameters = 3;
+inline constexpr size_t change_point_parameters = 3;
 
 /// An orthonormal basis of the columns' span; columns that depend on others are left out.
 Eigen::MatrixXd basis_of(const Eigen::MatrixXd& columns);

@@ -34,19 +34,19 @@ bool are_partners(const Effect& a, const Effect& b) {
   return names(a.text().synergies, b) || names(b.text().synergies, a);
 }
 
-std::vector<std::string> ids_of(const std::vector<rig::Ingredient>& ingredients) {
+std::vector<std::string> ids_of(const std::vector<rig::ModelTerm>& terms) {
   std::vector<std::string> ids;
-  for (const rig::Ingredient& ingredient : ingredients)
-    ids.emplace_back(ingredient.effect->text().id);
+  for (const rig::ModelTerm& term : terms)
+    ids.emplace_back(term.effect->text().id);
   std::sort(ids.begin(), ids.end());
   return ids;
 }
 
-bool has_moments(const Lead& lead) { return lead.ingredient.effect->occasions() != Occasions::none; }
+bool has_change_points(const Lead& lead) { return lead.term.effect->change_points() != ChangePoints::none; }
 
 /// The sets with one member less.
-std::vector<std::vector<rig::Ingredient>> each_left_out(const std::vector<rig::Ingredient>& set) {
-  std::vector<std::vector<rig::Ingredient>> sets(set.size(), set);
+std::vector<std::vector<rig::ModelTerm>> each_left_out(const std::vector<rig::ModelTerm>& set) {
+  std::vector<std::vector<rig::ModelTerm>> sets(set.size(), set);
   for (size_t member = 0; member < set.size(); ++member)
     sets[member].erase(sets[member].begin() + static_cast<std::ptrdiff_t>(member));
   return sets;
@@ -74,27 +74,26 @@ class Search {
     return result_.sets.size() - 1;
   }
   /// The sets' places; those that were not fitted before are fitted now, several at a time.
-  std::vector<size_t> fitted(const std::vector<std::vector<rig::Ingredient>>& sets,
-                             const rig::RigFit& before);
-  size_t fitted(const std::vector<rig::Ingredient>& set, const rig::RigFit& before) {
-    return fitted(std::vector<std::vector<rig::Ingredient>>{set}, before).front();
+  std::vector<size_t> fitted(const std::vector<std::vector<rig::ModelTerm>>& sets, const rig::RigFit& before);
+  size_t fitted(const std::vector<rig::ModelTerm>& set, const rig::RigFit& before) {
+    return fitted(std::vector<std::vector<rig::ModelTerm>>{set}, before).front();
   }
   [[nodiscard]] std::optional<size_t> place_of(const std::vector<std::string>& ids) const;
   /// chi-square with what its parameters cost, and what each further effect might only take from the model's error of
   /// the others.
   [[nodiscard]] double penalised(size_t set) const {
     const FittedSet& at = result_.sets[set];
-    if (at.fit.ingredients.empty()) return at.chi_square;
+    if (at.fit.terms.empty()) return at.chi_square;
     const double explained = std::max(result_.sets.front().chi_square - at.chi_square, 0.0);
-    const auto further = static_cast<double>(at.fit.ingredients.size() - 1);
+    const auto further = static_cast<double>(at.fit.terms.size() - 1);
     return at.chi_square + cost(at) + further * models_error * explained;
   }
   [[nodiscard]] double reduced(size_t set) const { return result_.sets[set].chi_square / weights_.sum(); }
   [[nodiscard]] static double cost(const FittedSet& set) {
     double sum = 0.0;
-    for (const rig::Ingredient& ingredient : set.fit.ingredients)
+    for (const rig::ModelTerm& term : set.fit.terms)
       sum +=
-          admission(ingredient.effect->parameters().size() + moment_parameters * ingredient.occasions.size());
+          admission(term.effect->parameters().size() + change_point_parameters * term.change_points.size());
     return sum;
   }
   /// Screening of the residuals of a set; done once.
@@ -109,18 +108,18 @@ class Search {
   std::vector<size_t> grow(size_t from);
   std::vector<size_t> with_rivals(size_t from, const std::vector<size_t>& grown);
   std::vector<size_t> with_partners(size_t from, const std::vector<size_t>& grown);
-  void begin_with(const std::vector<rig::Ingredient>& start);
+  void begin_with(const std::vector<rig::ModelTerm>& start);
   /// Whether a set may get a third effect: not if two left most of the misfit.
   [[nodiscard]] bool may_grow(size_t set) const {
     constexpr double most = 0.5;
-    return result_.sets[set].fit.ingredients.size() < 2 ||
+    return result_.sets[set].fit.terms.size() < 2 ||
            result_.sets[set].chi_square < most * result_.sets.front().chi_square;
   }
   void seek();
   void compare_alike(size_t set);
   /// Whether an effect without moments is not in the set yet and fits the specimen.
-  [[nodiscard]] bool can_join(const std::vector<rig::Ingredient>& set, const Effect& effect) const {
-    return effect.occasions() == Occasions::none && effect.fits(family_) &&
+  [[nodiscard]] bool can_join(const std::vector<rig::ModelTerm>& set, const Effect& effect) const {
+    return effect.change_points() == ChangePoints::none && effect.fits(family_) &&
            std::none_of(set.begin(), set.end(), [&](const auto& in) { return in.effect == &effect; });
   }
   /// One thread at a time; may throw.
@@ -145,7 +144,7 @@ std::optional<size_t> Search::place_of(const std::vector<std::string>& ids) cons
   return {};
 }
 
-std::vector<size_t> Search::fitted(const std::vector<std::vector<rig::Ingredient>>& sets,
+std::vector<size_t> Search::fitted(const std::vector<std::vector<rig::ModelTerm>>& sets,
                                    const rig::RigFit& before) {
   std::vector<std::optional<rig::RigFit>> fits(sets.size());
   parallel_for(sets.size(), problem_.threads(), [&](size_t i) {
@@ -166,9 +165,8 @@ std::vector<Lead>& Search::leads_beside(size_t set) {
   const auto known = leads_.find(set);
   if (known != leads_.end()) return known->second;
   const rig::RigFit& current = result_.sets[set].fit;
-  tell(current.ingredients.empty()
-           ? "screening the effects"
-           : fmt::format("screening beside {}", fmt::join(ids_of(current.ingredients), " + ")));
+  tell(current.terms.empty() ? "screening the effects"
+                             : fmt::format("screening beside {}", fmt::join(ids_of(current.terms), " + ")));
   std::vector<Lead> leads = screen(problem_, family_, session_, current, weights_, [this] { tell(""); });
   return leads_.emplace(set, std::move(leads)).first->second;
 }
@@ -177,17 +175,17 @@ std::vector<size_t> Search::tried(size_t from, const std::vector<Attempt>& attem
   const rig::RigFit current = result_.sets[from].fit;
   parallel_for(attempts.size(), problem_.threads(), [&](size_t i) {
     Lead& lead = *attempts[i].lead;
-    if (!has_moments(lead)) return;
-    tell(fmt::format("searching moments of {}", lead.ingredient.effect->text().id));
-    search_moments(lead, problem_, session_, current, weights_);
+    if (!has_change_points(lead)) return;
+    tell(fmt::format("searching moments of {}", lead.term.effect->text().id));
+    search_change_points(lead, problem_, session_, current, weights_);
   });
   std::vector<size_t> places;
-  std::vector<std::vector<rig::Ingredient>> sets;
+  std::vector<std::vector<rig::ModelTerm>> sets;
   for (const Attempt& attempt : attempts) {
     const Lead& lead = *attempt.lead;
     if (lead.gain < attempt.least_gain) continue;
-    std::vector<rig::Ingredient> set = current.ingredients;
-    set.push_back(lead.ingredient);
+    std::vector<rig::ModelTerm> set = current.terms;
+    set.push_back(lead.term);
     if (!lead.fit) {
       sets.push_back(std::move(set));
     } else {
@@ -207,11 +205,11 @@ std::vector<size_t> Search::with_rivals(size_t from, const std::vector<size_t>& 
                                         [this](size_t a, size_t b) { return penalised(a) < penalised(b); });
   if (reduced(best) < 1.0 + worth_a_partner) return {};
   const rig::RigFit current = result_.sets[from].fit;
-  const Effect& mistaken = *result_.sets[best].fit.ingredients.back().effect;
-  std::vector<std::vector<rig::Ingredient>> swapped;
+  const Effect& mistaken = *result_.sets[best].fit.terms.back().effect;
+  std::vector<std::vector<rig::ModelTerm>> swapped;
   for (const Effect* rival : all_effects()) {
-    if (!names(mistaken.text().conflicts, *rival) || !can_join(current.ingredients, *rival)) continue;
-    swapped.push_back(current.ingredients);
+    if (!names(mistaken.text().conflicts, *rival) || !can_join(current.terms, *rival)) continue;
+    swapped.push_back(current.terms);
     swapped.back().push_back({rival, {}});
   }
   std::vector<size_t> rivals = fitted(swapped, current);
@@ -226,13 +224,12 @@ std::vector<size_t> Search::with_partners(size_t from, const std::vector<size_t>
   for (const size_t set : grown) {
     const rig::RigFit one = result_.sets[set].fit;
     if (reduced(set) < 1.0 + worth_a_partner || !may_grow(set) ||
-        one.ingredients.size() >= options_.start.size() + options_.most_effects)
+        one.terms.size() >= options_.start.size() + options_.most_effects)
       continue;
-    std::vector<std::vector<rig::Ingredient>> together;
+    std::vector<std::vector<rig::ModelTerm>> together;
     for (const Effect* partner : all_effects()) {
-      if (!are_partners(*one.ingredients.back().effect, *partner) || !can_join(one.ingredients, *partner))
-        continue;
-      together.push_back(one.ingredients);
+      if (!are_partners(*one.terms.back().effect, *partner) || !can_join(one.terms, *partner)) continue;
+      together.push_back(one.terms);
       together.back().push_back({partner, {}});
     }
     for (const size_t pair : fitted(together, one))
@@ -265,7 +262,7 @@ std::vector<size_t> Search::grow(size_t from) {
          ++next) {
       const double least = admission(leads[next].parameters);
       if (leads[next].gain >= std::max(hope, least))
-        (has_moments(leads[next]) ? with_moments : sized).push_back({&leads[next], least});
+        (has_change_points(leads[next]) ? with_moments : sized).push_back({&leads[next], least});
     }
     try_all(sized);
     std::erase_if(with_moments,
@@ -283,15 +280,15 @@ std::vector<size_t> Search::grow(size_t from) {
 /// Each member of the set replaced by what looks like it, unless the screening without that member already says that
 /// it takes off much less.
 void Search::compare_alike(size_t set) {
-  const std::vector<rig::Ingredient> chosen = result_.sets[set].fit.ingredients;
+  const std::vector<rig::ModelTerm> chosen = result_.sets[set].fit.terms;
   for (const size_t without : fitted(each_left_out(chosen), problem_.base())) {
     const double drop = result_.sets[without].chi_square - result_.sets[set].chi_square;
     std::vector<Attempt> attempts;
     for (Lead& lead : leads_beside(without)) {
-      const Effect* other = lead.ingredient.effect;
+      const Effect* other = lead.term.effect;
       const bool contained = std::any_of(chosen.begin(), chosen.end(),
-                                         [&](const rig::Ingredient& in) { return in.effect == other; });
-      const double near = has_moments(lead) ? alike_by_scan : alike;
+                                         [&](const rig::ModelTerm& in) { return in.effect == other; });
+      const double near = has_change_points(lead) ? alike_by_scan : alike;
       const double least = std::max(near * drop, admission(lead.parameters)) - as_good;
       if (!contained && lead.gain >= least) attempts.push_back({&lead, least});
     }
@@ -308,7 +305,7 @@ SearchResult Search::run() {
 }
 
 /// The set, or what is better without a member that another noise has made superfluous.
-void Search::begin_with(const std::vector<rig::Ingredient>& start) {
+void Search::begin_with(const std::vector<rig::ModelTerm>& start) {
   result_.best = fitted(start, problem_.base());
   if (start.size() == 1) return;
   for (const size_t without : fitted(each_left_out(start), problem_.base()))
@@ -357,12 +354,12 @@ bool leaves_misfit(const FittedSet& base, const FittedSet& best) {
   return best.fit.reduced() > plainly && best.chi_square > hardly * base.chi_square;
 }
 
-std::vector<std::string> FittedSet::ids() const { return ids_of(fit.ingredients); }
+std::vector<std::string> FittedSet::ids() const { return ids_of(fit.terms); }
 
 size_t FittedSet::parameters() const {
   size_t count = 0;
-  for (const rig::Ingredient& ingredient : fit.ingredients)
-    count += ingredient.effect->parameters().size();
+  for (const rig::ModelTerm& term : fit.terms)
+    count += term.effect->parameters().size();
   return count;
 }
 

@@ -31,7 +31,7 @@ struct SearchOptions {
   size_t most_effects = 3;
   size_t refitted = 4;  ///< of each screening
   size_t beam = 2;
-  std::vector<rig::Ingredient> start = {};  ///< effects that the model has already
+  std::vector<rig::ModelTerm> start = {};  ///< effects that the model has already
   /// Ends once a set leaves less than this part of the base model's chi-square: what is small beside such effects is to be
   /// sought with the model's error of them and the noise without them.
   double enough = 0.0;

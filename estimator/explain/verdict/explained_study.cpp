@@ -29,8 +29,8 @@ toml::table starts_of(const FoundEffect& effect) {
 
 toml::array moments_of(const FoundEffect& effect) {
   toml::array moments;
-  for (const FoundMoment& moment : effect.moments)
-    moments.push_back(toml::table{{"run", moment.run}, {"time_s", moment.time_s}});
+  for (const FoundChangePoint& at : effect.change_points)
+    moments.push_back(toml::table{{"run", at.run}, {"time_s", at.time_s}});
   return moments;
 }
 
@@ -62,7 +62,8 @@ std::string explained_study(const Study& study, const std::filesystem::path& fol
   for (const FoundEffect& effect : effects) {
     ids.push_back(effect.id);
     subtable(model, "parameters").insert_or_assign(effect.id, starts_of(effect));
-    if (!effect.moments.empty()) subtable(model, "moments").insert_or_assign(effect.id, moments_of(effect));
+    if (!effect.change_points.empty())
+      subtable(model, "moments").insert_or_assign(effect.id, moments_of(effect));
   }
   model.insert_or_assign("effects", std::move(ids));
   std::ostringstream text;

@@ -25,8 +25,8 @@ struct FoundParameter {
   std::array<double, 2> ci90{};  ///< of the profile or, where it is symmetric, 1.645 standard errors
 };
 
-/// A moment that an effect needs: the run and the second at which steps were lost or a sensor stepped.
-struct FoundMoment {
+/// When an effect began: the run and the second at which steps were lost or a sensor stepped.
+struct FoundChangePoint {
   std::string run;
   double time_s = 0.0;
 };
@@ -34,7 +34,7 @@ struct FoundMoment {
 struct FoundEffect {
   std::string id;
   std::vector<FoundParameter> parameters;
-  std::vector<FoundMoment> moments;
+  std::vector<FoundChangePoint> change_points;
 };
 
 /// A place in the data where the base model fails beyond the noise, after correction for how many were looked at.

@@ -10,13 +10,13 @@ namespace explain {
 
 DIASTOLE_MEMBERS(FoundParameter, value, ci90, standard_error)
 
-DIASTOLE_MEMBERS(FoundMoment, run, time_s)
+DIASTOLE_MEMBERS(FoundChangePoint, run, time_s)
 
 template <class Visit, IsRecord<FoundEffect> Record>
 void each_member(Visit&& visit, Record& effect) {
   visit("id", effect.id);
   visit("parameters", by_name(effect.parameters));
-  visit("moments", effect.moments);
+  visit("moments", effect.change_points);
 }
 
 DIASTOLE_MEMBERS(Misfit, port, run, channel, segment, phase, band_Hz, region, excess_chi2, p_value)

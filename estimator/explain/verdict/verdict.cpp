@@ -19,8 +19,7 @@ std::vector<std::vector<std::string>> hinted(const std::vector<Lead>& leads) {
     if (lead.gain > chi_square_exceeded(hint_probability, static_cast<double>(lead.parameters)))
       best = std::max(best, lead.gain);
   for (const Lead& lead : leads)
-    if (best > 0.0 && lead.gain > best - as_good)
-      sets.push_back({std::string(lead.ingredient.effect->text().id)});
+    if (best > 0.0 && lead.gain > best - as_good) sets.push_back({std::string(lead.term.effect->text().id)});
   return sets;
 }
 
@@ -29,7 +28,7 @@ bool predicts(const SearchResult& search, const Gap& gap) {
   const FittedSet& best = search.sets[search.best];
   for (const double number : {search.sets.front().chi_square, best.chi_square, gap.before})
     if (!std::isfinite(number)) return false;
-  return best.fit.ingredients.empty() || gap.after <= gap.before;
+  return best.fit.terms.empty() || gap.after <= gap.before;
 }
 
 }  // namespace
@@ -46,12 +45,12 @@ Judgement judge(const SearchResult& search, std::vector<ResidualCell> left, cons
   const FittedSet& best = search.sets[search.best];
   for (size_t k = 0; k < search.sets.size(); ++k) {
     const FittedSet& other = search.sets[k];
-    if (k == search.best || other.fit.ingredients.size() > best.fit.ingredients.size()) continue;
+    if (k == search.best || other.fit.terms.size() > best.fit.terms.size()) continue;
     if (other.chi_square < best.chi_square + as_good) judgement.ambiguous_with.push_back(other.ids());
   }
   if (!judgement.left.empty() || !predicts(search, gap)) {
     judgement.verdict = Verdict::unexplained;
-  } else if (best.fit.ingredients.empty()) {
+  } else if (best.fit.terms.empty()) {
     judgement.ambiguous_with = hinted(search.leads);
     judgement.verdict = judgement.ambiguous_with.empty() ? Verdict::none : Verdict::ambiguous;
   } else {

@@ -16,8 +16,8 @@ namespace {
 
 using rig::RigModel;
 
-std::vector<Occasion> occasions_of(const Effect& effect) {
-  if (effect.occasions() == Occasions::none) return {};
+std::vector<ChangePoint> occasions_of(const Effect& effect) {
+  if (effect.change_points() == ChangePoints::none) return {};
   return {{"baseline", 3.1, 63.1}};
 }
 
@@ -40,7 +40,7 @@ class EveryEffect : public testing::TestWithParam<const Effect*> {
 
   rig::SpecimenFamily family_ = rig::gel_family();
   rig::SessionRun run_ = rig::empty_run("baseline", {0.0, "parabolic", 40.0, 1.2, 0.0, 2}, 60.0);
-  std::vector<Occasion> occasions_ = occasions_of(*GetParam());
+  std::vector<ChangePoint> occasions_ = occasions_of(*GetParam());
 };
 
 TEST_P(EveryEffect, TellsEverything) {
@@ -82,11 +82,11 @@ TEST_P(EveryEffect, ShowsWhereItIsTypical) {
 
 /// The fit's forward difference against a central one of ten times its step.
 TEST_P(EveryEffect, HasTheGradientThatTheFitTakes) {
-  const std::vector<rig::Ingredient> ingredients{{GetParam(), occasions_}};
+  const std::vector<rig::ModelTerm> terms{{GetParam(), occasions_}};
   std::vector<rig::Unknown> unknowns(3, {"", 1.0, 10.0});
   for (const EffectParameter& parameter : GetParam()->parameters())
     unknowns.push_back({std::string(parameter.name), parameter.lower, parameter.upper});
-  const auto coordinates = rig::search_coordinates(ingredients, unknowns);
+  const auto coordinates = rig::search_coordinates(terms, unknowns);
   const std::vector<double> at = typical(*GetParam());
   const rig::Prediction here = shown(&at);
   for (size_t j = 0; j < at.size(); ++j) {
@@ -96,15 +96,15 @@ TEST_P(EveryEffect, HasTheGradientThatTheFitTakes) {
       values[j] = rig::from_search(coordinate.scale, rig::to_search(coordinate.scale, at[j]) + by);
       return shown(&values);
     };
-    const rig::Prediction forward = moved(coordinate.nudge);
-    const rig::Prediction up = moved(10.0 * coordinate.nudge);
-    const rig::Prediction down = moved(-10.0 * coordinate.nudge);
+    const rig::Prediction forward = moved(coordinate.perturbation);
+    const rig::Prediction up = moved(10.0 * coordinate.perturbation);
+    const rig::Prediction down = moved(-10.0 * coordinate.perturbation);
     double difference = 0.0;
     double size = 0.0;
     for (size_t k = 0; k < here.cavity_kPa.size(); ++k) {
       for (const auto channel : {&rig::Prediction::cavity_kPa, &rig::Prediction::pump_kPa}) {
-        const double slope = ((forward.*channel)[k] - (here.*channel)[k]) / coordinate.nudge;
-        const double central = ((up.*channel)[k] - (down.*channel)[k]) / (20.0 * coordinate.nudge);
+        const double slope = ((forward.*channel)[k] - (here.*channel)[k]) / coordinate.perturbation;
+        const double central = ((up.*channel)[k] - (down.*channel)[k]) / (20.0 * coordinate.perturbation);
         difference += (slope - central) * (slope - central);
         size += central * central;
       }

@@ -10,14 +10,14 @@ namespace {
 class EveryEffect : public testing::TestWithParam<const Effect*> {
  protected:
   rig::SpecimenFamily family_ = rig::gel_family();
-  std::vector<rig::Ingredient> ingredients_{
-      {GetParam(), GetParam()->occasions() == Occasions::none
-                       ? std::vector<Occasion>{}
-                       : std::vector<Occasion>{{"baseline", 3.1, 3.1}}}};
+  std::vector<rig::ModelTerm> ingredients_{
+      {GetParam(), GetParam()->change_points() == ChangePoints::none
+                       ? std::vector<ChangePoint>{}
+                       : std::vector<ChangePoint>{{"baseline", 3.1, 3.1}}}};
 };
 
 TEST_P(EveryEffect, IsFoundAgain) {
-  rig::SessionOptions options{.ingredients = ingredients_};
+  rig::SessionOptions options{.terms = ingredients_};
   for (const EffectParameter& parameter : GetParam()->parameters())
     options.values.push_back(parameter.typical);
   options.values.front() =

@@ -9,7 +9,7 @@
 namespace diastole::explain {
 namespace {
 
-using rig::Ingredient;
+using rig::ModelTerm;
 using testing::ElementsAre;
 using testing::HasSubstr;
 
@@ -18,7 +18,7 @@ constexpr double noise_kPa = 0.12;
 /// One slow run, the cavity's pressure only: much looks alike in it.
 rig::Session slow_session(const rig::SpecimenFamily& family, const char* id, double value) {
   rig::Session session = rig::simulated_session(
-      family, {.ingredients = {{find_effect(id)}}, .values = {value}, .noise_kPa = noise_kPa});
+      family, {.terms = {{find_effect(id)}}, .values = {value}, .noise_kPa = noise_kPa});
   session.runs.erase(session.runs.begin(), session.runs.begin() + 1);
   session.runs.resize(1);
   session.runs[0].pressure_kPa.erase(rig::Channel::pump);
@@ -83,7 +83,7 @@ double found_sigma(const rig::SpecimenFamily& family, rig::Session session, cons
   for (double t = 0.0; t <= run.drive.end_s; t += 1.0 / 300.0)
     run.sample_s.push_back(t);
   const rig::RigProblem before(session, family);
-  const rig::RigModel model = before.model(truth.ingredients, truth.values);
+  const rig::RigModel model = before.model(truth.terms, truth.values);
   const rig::PlantTrace plant = rig::simulate_plant(model, run.drive);
   auto& pressure = run.pressure_kPa[rig::Channel::cavity];
   pressure = rig::observe(model, plant, run.drive.place, run.sample_s).cavity_kPa;
@@ -96,8 +96,8 @@ double found_sigma(const rig::SpecimenFamily& family, rig::Session session, cons
   }
   session.runs.push_back(run);
   const rig::RigProblem after(session, family);
-  const double gap = after.fit_from(other.ingredients, other.values).chi_square -
-                     after.fit_from(truth.ingredients, truth.values).chi_square;
+  const double gap = after.fit_from(other.terms, other.values).chi_square -
+                     after.fit_from(truth.terms, truth.values).chi_square;
   return std::sqrt(std::max(gap, 0.0));
 }
 

@@ -55,7 +55,7 @@ TEST_F(Cells, WhatRepeatsInEveryCycleIsFoundInItsPhaseThoughItIsSmall) {
   for (const ResidualCell& cell : cells)
     EXPECT_NEAR(cell.phase.value_or(std::array{0.4, 0.5})[0], 0.4, 0.01);
   EXPECT_TRUE(
-      std::any_of(cells.begin(), cells.end(), [](const auto& cell) { return cell.look == Look::shape; }));
+      std::any_of(cells.begin(), cells.end(), [](const auto& cell) { return cell.kind == CellKind::shape; }));
 }
 
 TEST_F(Cells, AToneIsFoundInItsBand) {
@@ -64,7 +64,7 @@ TEST_F(Cells, AToneIsFoundInItsBand) {
   const auto cells = found();
   ASSERT_FALSE(cells.empty());
   const auto band =
-      std::find_if(cells.begin(), cells.end(), [](const auto& cell) { return cell.look == Look::band; });
+      std::find_if(cells.begin(), cells.end(), [](const auto& cell) { return cell.kind == CellKind::band; });
   ASSERT_NE(band, cells.end());
   EXPECT_LT((*band->band_Hz)[0], 9.37);
   EXPECT_GT((*band->band_Hz)[1], 9.37);

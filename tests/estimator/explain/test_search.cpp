@@ -62,7 +62,7 @@ TEST(Verdicts, StructureThatIsLeftForbidsAName) {
   search.sets.resize(2);
   search.sets[0].chi_square = 5000.0;
   search.sets[1].chi_square = 3000.0;
-  search.sets[1].fit.ingredients = {{find_effect("hose-loss-excess"), {}}};
+  search.sets[1].fit.terms = {{find_effect("hose-loss-excess"), {}}};
   search.best = 1;
   EXPECT_EQ(judge(search, {}, better).verdict, Verdict::named);
   ResidualCell cell;
@@ -75,7 +75,7 @@ TEST(Verdicts, WhatPredictsLeftOutRunsWorseThanNothingHasNoName) {
   search.sets.resize(2);
   search.sets[0].chi_square = 5000.0;
   search.sets[1].chi_square = 3000.0;
-  search.sets[1].fit.ingredients = {{find_effect("temperature-drift"), {}}};
+  search.sets[1].fit.terms = {{find_effect("temperature-drift"), {}}};
   search.best = 1;
   EXPECT_EQ(judge(search, {}, gap_of(1.02, 1.10)).verdict, Verdict::unexplained);
   EXPECT_EQ(judge(search, {}, gap_of(1.02, std::nan(""))).verdict, Verdict::unexplained);
@@ -86,7 +86,7 @@ TEST(Verdicts, SquaresThatAreNoNumbersNameNothing) {
   search.sets.resize(2);
   search.sets[0].chi_square = std::numeric_limits<double>::infinity();
   search.sets[1].chi_square = 3000.0;
-  search.sets[1].fit.ingredients = {{find_effect("hose-compliance"), {}}};
+  search.sets[1].fit.terms = {{find_effect("hose-compliance"), {}}};
   search.best = 1;
   EXPECT_EQ(judge(search, {}, better).verdict, Verdict::unexplained);
   search.best = 0;
@@ -101,8 +101,8 @@ TEST(Verdicts, AsGoodASetOfTheSameSizeIsToldBesideIt) {
   search.sets[0].chi_square = 5000.0;
   search.sets[1].chi_square = 3000.0;
   search.sets[2].chi_square = 3004.0;
-  search.sets[1].fit.ingredients = {{find_effect("stroke-gain"), {}}};
-  search.sets[2].fit.ingredients = {{find_effect("radius-error"), {}}};
+  search.sets[1].fit.terms = {{find_effect("stroke-gain"), {}}};
+  search.sets[2].fit.terms = {{find_effect("radius-error"), {}}};
   search.best = 1;
   const Judgement judgement = judge(search, {}, better);
   EXPECT_EQ(judgement.verdict, Verdict::ambiguous);

@@ -37,7 +37,7 @@ TEST_F(SimulatedSession, WithoutAnEffectGetsNoName) {
 
 TEST_F(SimulatedSession, WithALeakIsExplainedByItAndPredictsWhatWasNotFitted) {
   const Effect* leak = find_effect("cannula-leak-cavity");
-  const SearchResult found = searched({.ingredients = {{leak, {}}}, .values = {0.15}, .seed = 5});
+  const SearchResult found = searched({.terms = {{leak, {}}}, .values = {0.15}, .seed = 5});
   const FittedSet& best = found.sets[found.best];
   EXPECT_THAT(best.ids(), ElementsAre("cannula-leak-cavity"));
   const Eigen::VectorXd weights = row_weights(session_, *problem_, {});

@@ -45,19 +45,19 @@ inline SessionRun empty_run(const std::string& name, const runfile::Segment& seg
 }
 
 struct SessionOptions {
-  std::vector<Ingredient> ingredients = {};
-  std::vector<double> values = {};  ///< of the ingredients
+  std::vector<ModelTerm> terms = {};
+  std::vector<double> values = {};  ///< of the terms
   double noise_kPa = 0.01;
-  double beat_sd = 0.0;  ///< of each cycle's stroke, relative
+  double cycle_sd = 0.0;  ///< of each cycle's stroke, relative
   unsigned seed = 1;
 };
 
 /// Each cycle's stroke larger or smaller. Precondition: two strokes a cycle, from zero and back.
-inline Motion beating(const Motion& motion, double beat_sd, std::mt19937& generator) {
+inline Motion varying(const Motion& motion, double cycle_sd, std::mt19937& generator) {
   std::normal_distribution<double> normal;
   std::vector<Stroke> strokes = motion.strokes();
   for (size_t k = 0; k + 1 < strokes.size(); k += 2) {
-    strokes[k].to_mL *= 1.0 + beat_sd * normal(generator);
+    strokes[k].to_mL *= 1.0 + cycle_sd * normal(generator);
     strokes[k + 1].from_mL = strokes[k].to_mL;
   }
   return {std::move(strokes), motion.rest_mL(), motion.spread_s()};
@@ -72,16 +72,16 @@ inline Session simulated_session(const SpecimenFamily& family, const SessionOpti
   model.curve = family.plain();
   model.modulus_kPa = 8.0;
   size_t at = 0;
-  for (const Ingredient& ingredient : options.ingredients) {
-    const size_t count = ingredient.effect->parameters().size();
-    ingredient.effect->apply({options.values.data() + at, count}, {family, ingredient.occasions}, model);
+  for (const ModelTerm& term : options.terms) {
+    const size_t count = term.effect->parameters().size();
+    term.effect->apply({options.values.data() + at, count}, {family, term.change_points}, model);
     at += count;
   }
   std::mt19937 generator(options.seed);
   std::normal_distribution<double> normal;
   for (SessionRun& run : session.runs) {
     RunDrive drive = run.drive;
-    if (options.beat_sd > 0.0) drive.motion = beating(drive.motion, options.beat_sd, generator);
+    if (options.cycle_sd > 0.0) drive.motion = varying(drive.motion, options.cycle_sd, generator);
     const PlantTrace plant = simulate_plant(model, drive);
     Prediction seen = observe(model, plant, run.drive.place, run.sample_s);
     for (auto* channel : {&seen.cavity_kPa, &seen.pump_kPa}) {

@@ -22,7 +22,7 @@ TEST(RigFit, BaseModelMeetsItsOwnNoise) {
 TEST(RigFit, AnEffectThatIsThereStandsOutAndIsFoundAgain) {
   const SpecimenFamily family = gel_family();
   const Effect* leak = find_effect("cannula-leak-cavity");
-  const Session session = simulated_session(family, {.ingredients = {{leak}}, .values = {0.1}});
+  const Session session = simulated_session(family, {.terms = {{leak}}, .values = {0.1}});
   const RigProblem problem(session, family);
   EXPECT_GT(problem.base().reduced(), 1.3);
   const RigFit fit = problem.fit({{leak}});
@@ -31,30 +31,31 @@ TEST(RigFit, AnEffectThatIsThereStandsOutAndIsFoundAgain) {
   EXPECT_LT(fit.errors[3], 0.01);
 }
 
-TEST(RigFit, BeatsOfKnownSizeLeaveTheNoise) {
+TEST(RigFit, CycleVariationOfKnownSizeLeaveTheNoise) {
   const SpecimenFamily family = gel_family();
-  constexpr double beat_sd = 0.008;
-  const Session session = simulated_session(family, {.beat_sd = beat_sd});
+  constexpr double cycle_sd = 0.008;
+  const Session session = simulated_session(family, {.cycle_sd = cycle_sd});
   NoiseModel noise = estimate_noise(simulated_session(family, {}));
-  const auto reduced_with = [&](double beats) {
-    noise.beat_sd = beats;
+  const auto reduced_with = [&](double cycle_sd) {
+    noise.cycle_sd = cycle_sd;
     return RigProblem(session, family, {.noise = noise}).base().reduced();
   };
-  EXPECT_NEAR(reduced_with(beat_sd), 1.0, 0.04);
+  EXPECT_NEAR(reduced_with(cycle_sd), 1.0, 0.04);
   EXPECT_GT(reduced_with(1e-6), 1.2);
 }
 
-TEST(RigFit, BeatsMayBeThoseOfAModelWithEffects) {
+TEST(RigFit, CycleVariationMayBeThatOfAModelWithEffects) {
   const SpecimenFamily family = gel_family();
-  constexpr double beat_sd = 0.005;
-  const std::vector<Ingredient> leaking{{find_effect("cannula-leak-cavity")}};
+  constexpr double cycle_sd = 0.005;
+  const std::vector<ModelTerm> leaking{{find_effect("cannula-leak-cavity")}};
   const Session session =
-      simulated_session(family, {.ingredients = leaking, .values = {1.5}, .beat_sd = beat_sd});
+      simulated_session(family, {.terms = leaking, .values = {1.5}, .cycle_sd = cycle_sd});
   NoiseModel noise = estimate_noise(simulated_session(family, {}));
-  noise.beat_sd = beat_sd;
+  noise.cycle_sd = cycle_sd;
   const RigProblem plain(session, family, {.noise = noise});
   const RigFit first = plain.fit(leaking);
-  const RigProblem leaky(session, family, {.beats_of = KnownModel{leaking, first.values}, .noise = noise});
+  const RigProblem leaky(session, family,
+                         {.variation_of = KnownModel{leaking, first.values}, .noise = noise});
   const RigFit second = leaky.fit_from(leaking, first.values);
   EXPECT_NEAR(second.reduced(), 1.0, 0.04);
   EXPECT_LT(second.chi_square, first.chi_square);

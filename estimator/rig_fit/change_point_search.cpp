@@ -1,4 +1,4 @@
-#include "estimator/rig_fit/moment_search.hpp"
+#include "estimator/rig_fit/change_point_search.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -17,7 +17,7 @@ using Eigen::VectorXd;
 constexpr double least_gain = 40.0;  ///< of a moment: chance finds some 20 among the samples of a session
 constexpr double least_part =
     0.001;  ///< of what is above the noise, by the first: else something else is the matter
-constexpr size_t most_moments = 12;
+constexpr size_t most_change_points = 12;
 /// How far the scan may err, which sees lasting changes and not the blow when steps are lost.
 constexpr double level_reach_s = 0.3;
 constexpr double blow_reach_s = 2.0;
@@ -29,11 +29,12 @@ struct Candidate {
   double amplitude = 0.0;
 };
 
-class MomentSearch {
+class ChangePointSearch {
  public:
-  MomentSearch(const RigProblem& problem, const Session& session, const RigFit& before, const Effect& effect)
+  ChangePointSearch(const RigProblem& problem, const Session& session, const RigFit& before,
+                    const Effect& effect)
       : problem_(problem), session_(session), fit_(before), known_(before.values.size()) {
-    fit_.ingredients.push_back({&effect, {}});
+    fit_.terms.push_back({&effect, {}});
     for (const EffectParameter& parameter : effect.parameters())
       typical_.push_back(parameter.typical);
     fit_.values.insert(fit_.values.end(), typical_.begin(), typical_.end());
@@ -43,17 +44,19 @@ class MomentSearch {
     std::sort(order_.begin(), order_.end(), [&](size_t a, size_t b) {
       return session.runs[a].drive.place.started_s < session.runs[b].drive.place.started_s;
     });
-    lasts_ = effect.occasions() == Occasions::one;
+    lasts_ = effect.change_points() == ChangePoints::one;
     set_lasting_change();
   }
 
-  std::optional<FoundMoments> run();
-  std::optional<PromisedMoments> promise();
+  std::optional<FoundChangePoints> run();
+  std::optional<PromisedChangePoints> promise();
 
  private:
-  [[nodiscard]] const std::vector<Occasion>& occasions() const { return fit_.ingredients.back().occasions; }
-  std::vector<Occasion>& occasions() { return fit_.ingredients.back().occasions; }
-  [[nodiscard]] Occasion occasion(size_t run, double time_s) const {
+  [[nodiscard]] const std::vector<ChangePoint>& change_points() const {
+    return fit_.terms.back().change_points;
+  }
+  std::vector<ChangePoint>& change_points() { return fit_.terms.back().change_points; }
+  [[nodiscard]] ChangePoint change_point(size_t run, double time_s) const {
     const RunPlace& place = session_.runs[run].drive.place;
     return {place.name, time_s, place.started_s + time_s};
   }
@@ -63,7 +66,7 @@ class MomentSearch {
   [[nodiscard]] double least(size_t moments, double excess) const {
     return std::max(least_gain, moments == 0 ? least_part * excess : 0.0);
   }
-  [[nodiscard]] size_t most() const { return lasts_ ? 1 : most_moments; }
+  [[nodiscard]] size_t most() const { return lasts_ ? 1 : most_change_points; }
   [[nodiscard]] double excess() const {
     return std::max(fit_.residuals.squaredNorm() - static_cast<double>(fit_.count), 0.0);
   }
@@ -72,7 +75,7 @@ class MomentSearch {
   [[nodiscard]] double shifted_s(const Candidate& at, double& amplitude) const;
   bool refine(int steps);
   [[nodiscard]] MatrixXd time_columns() const;
-  [[nodiscard]] size_t run_of(const Occasion& moment) const {
+  [[nodiscard]] size_t run_of(const ChangePoint& moment) const {
     for (size_t r = 0; r < session_.runs.size(); ++r)
       if (session_.runs[r].drive.place.name == moment.run) return r;
     return 0;
@@ -88,30 +91,30 @@ class MomentSearch {
   VectorXd lasting_;           ///< change of the residuals by one unit of the first parameter
 };
 
-void MomentSearch::set_lasting_change() {
-  std::vector<Ingredient> there = fit_.ingredients;
+void ChangePointSearch::set_lasting_change() {
+  std::vector<ModelTerm> there = fit_.terms;
   for (const size_t run : order_) {
-    there.back().occasions.push_back(occasion(run, session_.runs[run].sample_s.front() - 10.0));
+    there.back().change_points.push_back(change_point(run, session_.runs[run].sample_s.front() - 10.0));
     if (lasts_) break;
   }
   std::vector<double> values = fit_.values;
   values[known_] = 0.3 * typical_[0];
-  std::vector<Ingredient> known = fit_.ingredients;
+  std::vector<ModelTerm> known = fit_.terms;
   known.pop_back();
   const std::vector<double> before(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(known_));
-  lasting_ =
-      (problem_.residuals(there, values, of_difference) - problem_.residuals(known, before, of_difference)) /
-      values[known_];
+  lasting_ = (problem_.residuals(there, values, for_differences) -
+              problem_.residuals(known, before, for_differences)) /
+             values[known_];
 }
 
-Candidate MomentSearch::scan() const {
+Candidate ChangePointSearch::scan() const {
   const Index count = fit_.jacobian.cols();
   MatrixXd normal = fit_.jacobian.transpose() * fit_.jacobian;
   for (Index i = 0; i < count; ++i)
     normal(i, i) = normal(i, i) > 0.0 ? normal(i, i) * (1.0 + 1e-9) : 1.0;
   const MatrixXd inverse = normal.inverse();
   const VectorXd pulled = inverse * (fit_.jacobian.transpose() * fit_.residuals);
-  const double sign = occasions().empty() ? 0.0 : fit_.values[known_];
+  const double sign = change_points().empty() ? 0.0 : fit_.values[known_];
 
   Candidate best;
   double along = 0.0;
@@ -142,7 +145,7 @@ Candidate MomentSearch::scan() const {
   return best;
 }
 
-VectorXd MomentSearch::lasting_from(const Candidate& at) const {
+VectorXd ChangePointSearch::lasting_from(const Candidate& at) const {
   VectorXd change = VectorXd::Zero(lasting_.size());
   const auto place = std::find(order_.begin(), order_.end(), at.run);
   for (const ResidualBlock& block : problem_.blocks()) {
@@ -166,14 +169,14 @@ VectorXd step_along(const MatrixXd& known, const VectorXd& change, const VectorX
   return -normal.ldlt().solve(all.transpose() * residuals);
 }
 
-double MomentSearch::shifted_s(const Candidate& at, double& amplitude) const {
+double ChangePointSearch::shifted_s(const Candidate& at, double& amplitude) const {
   const SessionRun& run = session_.runs[at.run];
-  std::vector<Ingredient> more = fit_.ingredients;
-  more.back().occasions.push_back(occasion(at.run, run.sample_s[at.sample]));
+  std::vector<ModelTerm> more = fit_.terms;
+  more.back().change_points.push_back(change_point(at.run, run.sample_s[at.sample]));
   std::vector<double> values = fit_.values;
-  if (occasions().empty()) values[known_] = at.amplitude;
-  const VectorXd change = problem_.residuals(more, values, of_difference) -
-                          problem_.residuals(fit_.ingredients, fit_.values, of_difference);
+  if (change_points().empty()) values[known_] = at.amplitude;
+  const VectorXd change = problem_.residuals(more, values, for_differences) -
+                          problem_.residuals(fit_.terms, fit_.values, for_differences);
   // What is left when the other unknowns have given way to the change where it was found.
   const VectorXd move = step_along(fit_.jacobian, change, fit_.residuals);
   const VectorXd left = fit_.residuals + fit_.jacobian * move.head(fit_.jacobian.cols());
@@ -208,37 +211,37 @@ double MomentSearch::shifted_s(const Candidate& at, double& amplitude) const {
   return run.sample_s[at.sample] + static_cast<double>(best) * spacing_s;
 }
 
-MatrixXd MomentSearch::time_columns() const {
-  constexpr double nudge_s = 2e-4;
-  const std::vector<Occasion>& moments = fit_.ingredients.back().occasions;
+MatrixXd ChangePointSearch::time_columns() const {
+  constexpr double perturbation_s = 2e-4;
+  const std::vector<ChangePoint>& moments = fit_.terms.back().change_points;
   MatrixXd columns(fit_.residuals.size(), static_cast<Index>(moments.size()));
   for (size_t m = 0; m < moments.size(); ++m) {
-    FitRequest one = of_difference;
+    FitRequest one = for_differences;
     one.runs.assign(session_.runs.size(), false);
     one.runs[run_of(moments[m])] = true;
-    std::vector<Ingredient> moved = fit_.ingredients;
+    std::vector<ModelTerm> moved = fit_.terms;
     const auto at = [&](double by_s) {
-      moved.back().occasions[m].time_s = moments[m].time_s + by_s;
-      moved.back().occasions[m].session_s = moments[m].session_s + by_s;
+      moved.back().change_points[m].time_s = moments[m].time_s + by_s;
+      moved.back().change_points[m].session_s = moments[m].session_s + by_s;
       return problem_.residuals(moved, fit_.values, one);
     };
-    columns.col(static_cast<Index>(m)) = (at(nudge_s) - at(-nudge_s)) / (2.0 * nudge_s);
+    columns.col(static_cast<Index>(m)) = (at(perturbation_s) - at(-perturbation_s)) / (2.0 * perturbation_s);
   }
   return columns;
 }
 
 /// Values and moments together, damped until chi-square falls. Sensors that step between two samples have no slope by
 /// their moment.
-bool MomentSearch::refine(int steps) {
+bool ChangePointSearch::refine(int steps) {
   constexpr double farthest_s = 0.01;
-  const auto coordinates = search_coordinates(fit_.ingredients, problem_.unknowns(fit_.ingredients));
+  const auto coordinates = search_coordinates(fit_.terms, problem_.unknowns(fit_.terms));
   const auto values = static_cast<Index>(fit_.values.size());
   double damping = 1e-6;
   bool better = false;
   for (int step = 0; step < steps; ++step) {
     const MatrixXd times = time_columns();
     MatrixXd all(fit_.residuals.size(), values + times.cols());
-    all << problem_.columns(fit_.ingredients, fit_.values), times;
+    all << problem_.columns(fit_.terms, fit_.values), times;
     const MatrixXd normal = all.transpose() * all;
     const VectorXd gradient = all.transpose() * fit_.residuals;
     const double before = fit_.residuals.squaredNorm();
@@ -257,15 +260,15 @@ bool MomentSearch::refine(int steps) {
       }
       for (Index m = 0; m < times.cols(); ++m) {
         const double by_s = std::clamp(move[values + m], -farthest_s, farthest_s);
-        next.ingredients.back().occasions[static_cast<size_t>(m)].time_s += by_s;
-        next.ingredients.back().occasions[static_cast<size_t>(m)].session_s += by_s;
+        next.terms.back().change_points[static_cast<size_t>(m)].time_s += by_s;
+        next.terms.back().change_points[static_cast<size_t>(m)].session_s += by_s;
       }
-      next.residuals = problem_.residuals(next.ingredients, next.values);
+      next.residuals = problem_.residuals(next.terms, next.values);
       gained = before - next.residuals.squaredNorm();
       damping = gained > 0.0 ? std::max(0.1 * damping, 1e-9) : std::max(30.0 * damping, 1e-3);
       if (!(gained > 0.0)) continue;
       fit_.values = std::move(next.values);
-      fit_.ingredients = std::move(next.ingredients);
+      fit_.terms = std::move(next.terms);
       fit_.residuals = std::move(next.residuals);
       better = true;
     }
@@ -275,37 +278,37 @@ bool MomentSearch::refine(int steps) {
   return better;
 }
 
-std::optional<FoundMoments> MomentSearch::run() {
+std::optional<FoundChangePoints> ChangePointSearch::run() {
   const double at_first = fit_.residuals.squaredNorm();
   const double above_noise = excess();
-  while (occasions().size() < most()) {
+  while (change_points().size() < most()) {
     const Candidate found = scan();
-    if (found.gain < least(occasions().size(), above_noise)) break;
+    if (found.gain < least(change_points().size(), above_noise)) break;
     const RigFit kept = fit_;
     double amplitude = found.amplitude;
     const double at_s = shifted_s(found, amplitude);
-    if (occasions().empty()) fit_.values[known_] = amplitude;
-    occasions().push_back(occasion(found.run, at_s));
-    fit_.residuals = problem_.residuals(fit_.ingredients, fit_.values);
+    if (change_points().empty()) fit_.values[known_] = amplitude;
+    change_points().push_back(change_point(found.run, at_s));
+    fit_.residuals = problem_.residuals(fit_.terms, fit_.values);
     refine(3);
     if (kept.residuals.squaredNorm() - fit_.residuals.squaredNorm() < least_gain) {
       fit_ = kept;
       break;
     }
   }
-  if (occasions().empty()) return {};
+  if (change_points().empty()) return {};
   if (!lasts_) refine(6);
-  FoundMoments found;
-  found.fit = problem_.fit_from(fit_.ingredients, fit_.values);
-  found.ingredient = found.fit.ingredients.back();
+  FoundChangePoints found;
+  found.fit = problem_.fit_from(fit_.terms, fit_.values);
+  found.term = found.fit.terms.back();
   found.values.assign(found.fit.values.begin() + static_cast<std::ptrdiff_t>(known_), found.fit.values.end());
   found.gain = at_first - found.fit.chi_square;
   return found;
 }
 
-std::optional<PromisedMoments> MomentSearch::promise() {
+std::optional<PromisedChangePoints> ChangePointSearch::promise() {
   const double above_noise = excess();
-  PromisedMoments promised;
+  PromisedChangePoints promised;
   for (; promised.count < most(); ++promised.count) {
     const Candidate found = scan();
     if (found.gain < least(promised.count, above_noise)) break;
@@ -320,16 +323,16 @@ std::optional<PromisedMoments> MomentSearch::promise() {
 
 }  // namespace
 
-std::optional<PromisedMoments> promise_moments(const RigProblem& problem, const Session& session,
-                                               const RigFit& before, const Effect& effect) {
-  if (effect.occasions() == Occasions::none) return {};
-  return MomentSearch(problem, session, before, effect).promise();
+std::optional<PromisedChangePoints> promise_change_points(const RigProblem& problem, const Session& session,
+                                                          const RigFit& before, const Effect& effect) {
+  if (effect.change_points() == ChangePoints::none) return {};
+  return ChangePointSearch(problem, session, before, effect).promise();
 }
 
-std::optional<FoundMoments> find_moments(const RigProblem& problem, const Session& session,
-                                         const RigFit& before, const Effect& effect) {
-  if (effect.occasions() == Occasions::none) return {};
-  return MomentSearch(problem, session, before, effect).run();
+std::optional<FoundChangePoints> find_change_points(const RigProblem& problem, const Session& session,
+                                                    const RigFit& before, const Effect& effect) {
+  if (effect.change_points() == ChangePoints::none) return {};
+  return ChangePointSearch(problem, session, before, effect).run();
 }
 
 }  // namespace diastole::rig

@@ -77,39 +77,39 @@ Motion varied(const SessionRun& run, size_t group, double part) {
 
 }  // namespace
 
-void RigProblem::shrink_beats(size_t run, Eigen::Ref<Eigen::VectorXd> residuals) const {
-  for (const Beat& beat : beats_) {
-    if (beat.run != run) continue;
+void RigProblem::shrink_cycle_variations(size_t run, Eigen::Ref<Eigen::VectorXd> residuals) const {
+  for (const CycleVariation& variation : variations_) {
+    if (variation.run != run) continue;
     double along = 0.0;
     Eigen::Index at = 0;
-    for (const CycleRows& rows : beat.rows) {
+    for (const CycleRows& rows : variation.rows) {
       const auto count = static_cast<Eigen::Index>(rows.last - rows.first);
-      along += beat.direction.segment(at, count).dot(
+      along += variation.direction.segment(at, count).dot(
           residuals.segment(static_cast<Eigen::Index>(rows.first), count));
       at += count;
     }
     at = 0;
-    for (const CycleRows& rows : beat.rows) {
+    for (const CycleRows& rows : variation.rows) {
       const auto count = static_cast<Eigen::Index>(rows.last - rows.first);
       residuals.segment(static_cast<Eigen::Index>(rows.first), count) -=
-          beat.taken * along * beat.direction.segment(at, count);
+          variation.shrinkage * along * variation.direction.segment(at, count);
       at += count;
     }
   }
 }
 
-std::vector<std::map<Channel, std::vector<double>>> RigProblem::beat_shapes(const KnownModel& of,
-                                                                            size_t group) const {
+std::vector<std::map<Channel, std::vector<double>>> RigProblem::variation_shapes(const KnownModel& of,
+                                                                                 size_t group) const {
   constexpr double small = 0.01;
-  const RigModel plain = model(of.ingredients, of.values);
+  const RigModel plain = model(of.terms, of.values);
   std::vector<std::map<Channel, std::vector<double>>> shapes(session_.runs.size());
   parallel_for(session_.runs.size(), options_.threads, [&](size_t r) {
     const SessionRun& run = session_.runs[r];
-    const Prediction a = observe(plain, plant(plain, r, Look::fine), run.drive.place, run.sample_s);
+    const Prediction a = observe(plain, plant(plain, r, Fidelity::fine), run.drive.place, run.sample_s);
     RunDrive other = run.drive;
     other.motion = varied(run, group, small);
     SimulationOptions simulation = options_.simulation;
-    simulation.step_s = step_s(Look::fine);
+    simulation.step_s = step_s(Fidelity::fine);
     Prediction b = observe(plain, simulate_plant(plain, other, simulation), other.place, run.sample_s);
     for (size_t k = 0; k < run.sample_s.size(); ++k) {
       b.cavity_kPa[k] = (b.cavity_kPa[k] - a.cavity_kPa[k]) / small;
@@ -121,10 +121,10 @@ std::vector<std::map<Channel, std::vector<double>>> RigProblem::beat_shapes(cons
   return shapes;
 }
 
-void RigProblem::set_beats(const KnownModel& of) {
+void RigProblem::set_cycle_variations(const KnownModel& of) {
   constexpr double ringing = 0.4;  // of a cycle: how far into the next one its line rings on
   const std::array<std::vector<std::map<Channel, std::vector<double>>>, groups> shapes{
-      beat_shapes(of, 0), beat_shapes(of, 1), beat_shapes(of, ramp_group)};
+      variation_shapes(of, 0), variation_shapes(of, 1), variation_shapes(of, ramp_group)};
   for (size_t r = 0; r < session_.runs.size(); ++r) {
     const std::vector<CycleRows> cycles = cycles_of(session_.runs[r]);
     const auto lead = static_cast<size_t>(session_.runs[r].drive.motion.spread_s() / 2.0 *
@@ -138,24 +138,24 @@ void RigProblem::set_beats(const KnownModel& of) {
           group == ramp_group
               ? all
               : std::min(all, cycles[c].last + static_cast<size_t>(ringing * static_cast<double>(length)));
-      Beat beat{.run = r, .rows = {}, .direction = {}};
+      CycleVariation variation{.run = r, .rows = {}, .direction = {}};
       std::vector<double> direction;
       for (const ResidualBlock& block : blocks_) {
         if (block.run != r || block.channel == "cavity_mL") continue;
-        beat.rows.push_back({block.first + first, block.first + last});
+        variation.rows.push_back({block.first + first, block.first + last});
         const auto& shape =
             shapes[group][r].at(block.channel == name_of(Channel::cavity) ? Channel::cavity : Channel::pump);
         direction.insert(direction.end(), shape.begin() + static_cast<std::ptrdiff_t>(first),
                          shape.begin() + static_cast<std::ptrdiff_t>(last));
       }
-      beat.direction =
+      variation.direction =
           Eigen::Map<const Eigen::VectorXd>(direction.data(), static_cast<Eigen::Index>(direction.size()));
-      const double size = beat.direction.norm();
+      const double size = variation.direction.norm();
       if (size == 0.0) continue;
-      beat.direction /= size;
-      const double strength = noise_.beat_sd * size;
-      beat.taken = 1.0 - 1.0 / std::sqrt(1.0 + strength * strength);
-      beats_.push_back(std::move(beat));
+      variation.direction /= size;
+      const double strength = noise_.cycle_sd * size;
+      variation.shrinkage = 1.0 - 1.0 / std::sqrt(1.0 + strength * strength);
+      variations_.push_back(std::move(variation));
     }
   }
 }

@@ -1,5 +1,5 @@
 #pragma once
-// When did it happen? Moments of effects that begin at one (effect.hpp, Occasions): a sensor's step, steps lost.
+// When did it happen? Moments of effects that begin at one (effect.hpp, ChangePoints): a sensor's step, steps lost.
 //
 // From a moment on, the residuals hold the effect's lasting change D (of the whole run, were it there from the start).
 // For every sample as the moment the drop of chi-square is known from sums over the samples after it,
@@ -16,27 +16,27 @@
 
 namespace diastole::rig {
 
-struct FoundMoments {
-  Ingredient ingredient;       ///< with its occasions
+struct FoundChangePoints {
+  ModelTerm term;              ///< with its change_points
   std::vector<double> values;  ///< of the effect
-  RigFit fit;                  ///< of the ingredients before and this one, from which further fits may start
+  RigFit fit;                  ///< of the terms before and this one, from which further fits may start
   double gain = 0.0;           ///< of chi-square, for all moments
 };
 
 /// What the scan alone promises: moment by moment the lasting change of the size that fits best, all else linear. One
-/// simulation; `find_moments` takes some ten a moment.
-struct PromisedMoments {
+/// simulation; `find_change_points` takes some ten a moment.
+struct PromisedChangePoints {
   size_t count = 0;
   Eigen::VectorXd residuals;  ///< that would be left
 };
 
-/// None as of `find_moments`.
-std::optional<PromisedMoments> promise_moments(const RigProblem& problem, const Session& session,
-                                               const RigFit& before, const Effect& effect);
+/// None as of `find_change_points`.
+std::optional<PromisedChangePoints> promise_change_points(const RigProblem& problem, const Session& session,
+                                                          const RigFit& before, const Effect& effect);
 
-/// Added to the residuals `before` left. None if no moment gains enough, or the effect has no occasions.
+/// Added to the residuals `before` left. None if no moment gains enough, or the effect has no change points.
 /// Precondition: `before` is a fine fit of `problem` to all runs; `session` is the problem's.
-std::optional<FoundMoments> find_moments(const RigProblem& problem, const Session& session,
-                                         const RigFit& before, const Effect& effect);
+std::optional<FoundChangePoints> find_change_points(const RigProblem& problem, const Session& session,
+                                                    const RigFit& before, const Effect& effect);
 
 }  // namespace diastole::rig
