@@ -84,7 +84,7 @@ void report(const bench::RecordedCase& recorded, const Study& study, const rig::
       problem.base().reduced(), by_channel(problem, problem.base()), problem.base().values[0],
       problem.base().errors[0], label["C1_kPa"].get<double>(), problem.base().values[1],
       problem.base().values[2], label["offset_Pa"].get<double>(),
-      1e3 * noise.channels.at(rig::Channel::cavity).sd_kPa, noise.cycle_sd, label["cycle_sd"].get<double>(),
+      1e3 * noise.channels.at(rig::Channel::cavity).sd_kPa, noise.cycle_sd, label["beat_sd"].get<double>(),
       seconds_since(begun));
   const std::vector<rig::ModelTerm> effects = labelled(label, session);
   if (effects.empty()) return;
