@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "estimator/effects/field_model.hpp"
+#include "estimator/inference/parameter.hpp"
 #include "estimator/rig/rig_model.hpp"
 #include "estimator/rig/specimen_curves.hpp"
 
@@ -24,7 +25,7 @@ enum class Port { drive, specimen, sensor, clock, field };
 std::string_view name_of(Port port);
 
 /// In which coordinate a parameter is searched: where the rig's answer is nearest to linear in it.
-enum class SearchScale { linear, logarithmic, inverse_square };
+using SearchScale = inference::Scale;
 
 struct EffectParameter {
   std::string_view name;     ///< with its unit, as in the explanation: "wave_speed_m_s"

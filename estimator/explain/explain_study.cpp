@@ -39,6 +39,8 @@ Explanation merged(Explanation rig, Explanation field) {
   append(both.evidence, std::move(field.evidence));
   append(both.shifts, std::move(field.shifts));
   append(both.steps, std::move(field.steps));
+  append(both.searches, std::move(field.searches));
+  both.converged = both.converged && field.converged;
   both.field = std::move(field.field);
   both.summary = "Runs: " + both.summary + " Images: " + field.summary;
   both.seconds += field.seconds;

@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 #include <utility>
 
-#include "estimator/rig_fit/search_scale.hpp"
+#include "estimator/inference/least_squares.hpp"
+#include "estimator/rig_fit/linear_basis.hpp"
 
 namespace diastole::rig {
 namespace {
@@ -14,7 +16,8 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr double least_gain = 40.0;  ///< of a moment: chance finds some 20 among the samples of a session
+constexpr double least_gain =
+    40.0;  ///< of a change point: chance finds some 20 among the samples of a session
 constexpr double least_part =
     0.001;  ///< of what is above the noise, by the first: else something else is the matter
 constexpr size_t most_change_points = 12;
@@ -62,9 +65,9 @@ class ChangePointSearch {
   }
   void set_lasting_change();
   [[nodiscard]] Candidate scan() const;
-  /// The least gain of a next moment that counts, of what was above the noise at first.
-  [[nodiscard]] double least(size_t moments, double excess) const {
-    return std::max(least_gain, moments == 0 ? least_part * excess : 0.0);
+  /// The least gain of a next change point that counts, of what was above the noise at first.
+  [[nodiscard]] double least(size_t points, double excess) const {
+    return std::max(least_gain, points == 0 ? least_part * excess : 0.0);
   }
   [[nodiscard]] size_t most() const { return lasts_ ? 1 : most_change_points; }
   [[nodiscard]] double excess() const {
@@ -73,13 +76,7 @@ class ChangePointSearch {
   [[nodiscard]] VectorXd lasting_from(const Candidate& at) const;
   /// When the candidate happened, by the whole of its change; `amplitude` is its size then.
   [[nodiscard]] double shifted_s(const Candidate& at, double& amplitude) const;
-  bool refine(int steps);
-  [[nodiscard]] MatrixXd time_columns() const;
-  [[nodiscard]] size_t run_of(const ChangePoint& moment) const {
-    for (size_t r = 0; r < session_.runs.size(); ++r)
-      if (session_.runs[r].drive.place.name == moment.run) return r;
-    return 0;
-  }
+  void refine(int steps);
 
   const RigProblem& problem_;
   const Session& session_;
@@ -92,34 +89,28 @@ class ChangePointSearch {
 };
 
 void ChangePointSearch::set_lasting_change() {
-  std::vector<ModelTerm> there = fit_.terms;
+  KnownModel there = fit_;
+  there.values[known_] = 0.3 * typical_[0];
   for (const size_t run : order_) {
-    there.back().change_points.push_back(change_point(run, session_.runs[run].sample_s.front() - 10.0));
+    there.terms.back().change_points.push_back(change_point(run, session_.runs[run].sample_s.front() - 10.0));
     if (lasts_) break;
   }
-  std::vector<double> values = fit_.values;
-  values[known_] = 0.3 * typical_[0];
-  std::vector<ModelTerm> known = fit_.terms;
-  known.pop_back();
-  const std::vector<double> before(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(known_));
-  lasting_ = (problem_.residuals(there, values, for_differences) -
-              problem_.residuals(known, before, for_differences)) /
-             values[known_];
+  KnownModel before = fit_;
+  before.terms.pop_back();
+  before.values.resize(known_);
+  lasting_ = (problem_.residuals(there, for_differences) - problem_.residuals(before, for_differences)) /
+             there.values[known_];
 }
 
 Candidate ChangePointSearch::scan() const {
-  const Index count = fit_.jacobian.cols();
-  MatrixXd normal = fit_.jacobian.transpose() * fit_.jacobian;
-  for (Index i = 0; i < count; ++i)
-    normal(i, i) = normal(i, i) > 0.0 ? normal(i, i) * (1.0 + 1e-9) : 1.0;
-  const MatrixXd inverse = normal.inverse();
-  const VectorXd pulled = inverse * (fit_.jacobian.transpose() * fit_.residuals);
+  const MatrixXd known = basis_of(fit_.jacobian);  // what the other unknowns take up
+  const VectorXd pulled = known.transpose() * fit_.residuals;
   const double sign = change_points().empty() ? 0.0 : fit_.values[known_];
 
   Candidate best;
   double along = 0.0;
   double square = 0.0;
-  VectorXd shared = VectorXd::Zero(count);
+  VectorXd shared = VectorXd::Zero(known.cols());
   for (auto run = order_.rbegin(); run != order_.rend(); ++run) {
     if (!lasts_) {
       along = square = 0.0;
@@ -133,9 +124,9 @@ Candidate ChangePointSearch::scan() const {
         const auto row = static_cast<Index>(first + k);
         along -= lasting_[row] * fit_.residuals[row];
         square += lasting_[row] * lasting_[row];
-        shared += lasting_[row] * fit_.jacobian.row(row).transpose();
+        shared += lasting_[row] * known.row(row).transpose();
       }
-      const double free = square - shared.dot(inverse * shared);
+      const double free = square - shared.squaredNorm();
       if (free < 0.02 * square || free <= 0.0) continue;
       const double slope = along + shared.dot(pulled);
       const double gain = slope * slope / free;
@@ -163,20 +154,16 @@ VectorXd ChangePointSearch::lasting_from(const Candidate& at) const {
 VectorXd step_along(const MatrixXd& known, const VectorXd& change, const VectorXd& residuals) {
   MatrixXd all(change.size(), known.cols() + 1);
   all << known, change;
-  MatrixXd normal = all.transpose() * all;
-  for (Index i = 0; i < normal.rows(); ++i)
-    normal(i, i) = normal(i, i) > 0.0 ? normal(i, i) * (1.0 + 1e-9) : 1.0;
-  return -normal.ldlt().solve(all.transpose() * residuals);
+  return all.colPivHouseholderQr().solve(-residuals);
 }
 
 double ChangePointSearch::shifted_s(const Candidate& at, double& amplitude) const {
   const SessionRun& run = session_.runs[at.run];
-  std::vector<ModelTerm> more = fit_.terms;
-  more.back().change_points.push_back(change_point(at.run, run.sample_s[at.sample]));
-  std::vector<double> values = fit_.values;
-  if (change_points().empty()) values[known_] = at.amplitude;
-  const VectorXd change = problem_.residuals(more, values, for_differences) -
-                          problem_.residuals(fit_.terms, fit_.values, for_differences);
+  KnownModel more = fit_;
+  more.terms.back().change_points.push_back(change_point(at.run, run.sample_s[at.sample]));
+  if (change_points().empty()) more.values[known_] = at.amplitude;
+  const VectorXd change =
+      problem_.residuals(more, for_differences) - problem_.residuals(fit_, for_differences);
   // What is left when the other unknowns have given way to the change where it was found.
   const VectorXd move = step_along(fit_.jacobian, change, fit_.residuals);
   const VectorXd left = fit_.residuals + fit_.jacobian * move.head(fit_.jacobian.cols());
@@ -207,75 +194,91 @@ double ChangePointSearch::shifted_s(const Candidate& at, double& amplitude) cons
       amplitude = lasts_ ? size : along / square;
     }
   }
-  amplitude *= values[known_];
+  amplitude *= more.values[known_];
   return run.sample_s[at.sample] + static_cast<double>(best) * spacing_s;
 }
 
-MatrixXd ChangePointSearch::time_columns() const {
-  constexpr double perturbation_s = 2e-4;
-  const std::vector<ChangePoint>& moments = fit_.terms.back().change_points;
-  MatrixXd columns(fit_.residuals.size(), static_cast<Index>(moments.size()));
-  for (size_t m = 0; m < moments.size(); ++m) {
-    FitRequest one = for_differences;
-    one.runs.assign(session_.runs.size(), false);
-    one.runs[run_of(moments[m])] = true;
-    std::vector<ModelTerm> moved = fit_.terms;
-    const auto at = [&](double by_s) {
-      moved.back().change_points[m].time_s = moments[m].time_s + by_s;
-      moved.back().change_points[m].session_s = moments[m].session_s + by_s;
-      return problem_.residuals(moved, fit_.values, one);
-    };
-    columns.col(static_cast<Index>(m)) = (at(perturbation_s) - at(-perturbation_s)) / (2.0 * perturbation_s);
+/// The unknowns of a fit and the times of its last term's change points, as shifts of where they are.
+class ShiftedChangePoints : public inference::LeastSquaresProblem {
+ public:
+  ShiftedChangePoints(const RigProblem& rig, const Session& session, const KnownModel& from)
+      : rig_(rig), session_(session), from_(from) {
+    const std::vector<Unknown> unknowns = rig.unknowns(from.terms);
+    std::vector<inference::Parameter> parameters(unknowns.begin(), unknowns.end());
+    for (const ChangePoint& at : from.terms.back().change_points)
+      parameters.push_back({.name = "time of a change point of " + at.run, .unit = "s"});
+    space_ = inference::ParameterSpace(std::move(parameters));
   }
-  return columns;
-}
-
-/// Values and moments together, damped until chi-square falls. Sensors that step between two samples have no slope by
-/// their moment.
-bool ChangePointSearch::refine(int steps) {
-  constexpr double farthest_s = 0.01;
-  const auto coordinates = search_coordinates(fit_.terms, problem_.unknowns(fit_.terms));
-  const auto values = static_cast<Index>(fit_.values.size());
-  double damping = 1e-6;
-  bool better = false;
-  for (int step = 0; step < steps; ++step) {
-    const MatrixXd times = time_columns();
-    MatrixXd all(fit_.residuals.size(), values + times.cols());
-    all << problem_.columns(fit_.terms, fit_.values), times;
-    const MatrixXd normal = all.transpose() * all;
-    const VectorXd gradient = all.transpose() * fit_.residuals;
-    const double before = fit_.residuals.squaredNorm();
-    double gained = 0.0;
-    for (int tries = 0; tries < 6 && gained <= 0.0; ++tries) {
-      MatrixXd system = normal;
-      for (Index i = 0; i < system.rows(); ++i)
-        system(i, i) = system(i, i) > 0.0 ? system(i, i) * (1.0 + damping) : 1.0;
-      const VectorXd move = -system.ldlt().solve(gradient);
-      RigFit next = fit_;
-      for (Index i = 0; i < values; ++i) {
-        const auto k = static_cast<size_t>(i);
-        const SearchCoordinate& coordinate = coordinates[k];
-        const double at = to_search(coordinate.scale, fit_.values[k]) + move[i];
-        next.values[k] = from_search(coordinate.scale, std::clamp(at, coordinate.lower, coordinate.upper));
-      }
-      for (Index m = 0; m < times.cols(); ++m) {
-        const double by_s = std::clamp(move[values + m], -farthest_s, farthest_s);
-        next.terms.back().change_points[static_cast<size_t>(m)].time_s += by_s;
-        next.terms.back().change_points[static_cast<size_t>(m)].session_s += by_s;
-      }
-      next.residuals = problem_.residuals(next.terms, next.values);
-      gained = before - next.residuals.squaredNorm();
-      damping = gained > 0.0 ? std::max(0.1 * damping, 1e-9) : std::max(30.0 * damping, 1e-3);
-      if (!(gained > 0.0)) continue;
-      fit_.values = std::move(next.values);
-      fit_.terms = std::move(next.terms);
-      fit_.residuals = std::move(next.residuals);
-      better = true;
+  [[nodiscard]] const inference::ParameterSpace& space() const override { return space_; }
+  /// The model with its change points shifted.
+  [[nodiscard]] KnownModel at(const VectorXd& q) const {
+    KnownModel shifted = from_;
+    std::vector<double> values = space_.values(q);
+    const auto unknowns = values.begin() + static_cast<std::ptrdiff_t>(shifted.values.size());
+    for (size_t m = 0; m < shifted.terms.back().change_points.size(); ++m)
+      shift(shifted, m, unknowns[static_cast<std::ptrdiff_t>(m)]);
+    shifted.values.assign(values.begin(), unknowns);
+    return shifted;
+  }
+  std::optional<VectorXd> residuals(const VectorXd& q) override {
+    VectorXd found = rig_.residuals(at(q));
+    if (!found.allFinite()) return {};
+    return found;
+  }
+  MatrixXd jacobian(const VectorXd& q) override {
+    constexpr double perturbation_s = 2e-4;
+    const KnownModel here = at(q);
+    const std::vector<ChangePoint>& points = here.terms.back().change_points;
+    MatrixXd all = rig_.columns(here);
+    const Index unknowns = all.cols();
+    all.conservativeResize(Eigen::NoChange, q.size());
+    for (size_t m = 0; m < points.size(); ++m) {
+      FitRequest one = for_differences;
+      for (const SessionRun& run : session_.runs)
+        one.runs.push_back(run.drive.place.name == points[m].run);
+      const auto moved = [&](double by_s) {
+        KnownModel other = here;
+        shift(other, m, by_s);
+        return rig_.residuals(other, one);
+      };
+      all.col(unknowns + static_cast<Index>(m)) =
+          (moved(perturbation_s) - moved(-perturbation_s)) / (2.0 * perturbation_s);
     }
-    fit_.jacobian = all.leftCols(values);
-    if (gained < 0.1) break;
+    return all;
   }
-  return better;
+
+ private:
+  static void shift(KnownModel& model, size_t point, double by_s) {
+    model.terms.back().change_points[point].time_s += by_s;
+    model.terms.back().change_points[point].session_s += by_s;
+  }
+  const RigProblem& rig_;
+  const Session& session_;
+  const KnownModel& from_;
+  inference::ParameterSpace space_;
+};
+
+/// Values and change points together. Sensors that step between two samples have no slope by their change point.
+void ChangePointSearch::refine(int steps) {
+  constexpr double farthest_s = 0.01;
+  const KnownModel from = fit_;
+  ShiftedChangePoints problem(problem_, session_, from);
+  const auto unknowns = static_cast<Index>(from.values.size());
+  VectorXd start = VectorXd::Zero(problem.space().size());
+  for (Index i = 0; i < unknowns; ++i)
+    start[i] = problem.space()[i].coordinate(from.values[static_cast<size_t>(i)]);
+  inference::SearchOptions options;
+  options.iteration_limit = steps;
+  options.small_gain = [](double) { return 0.1; };
+  options.refusal_limit = 6;
+  options.first_radius = 1e6;
+  options.longest_step = VectorXd::Constant(start.size(), std::numeric_limits<double>::infinity());
+  options.longest_step.tail(start.size() - unknowns).setConstant(farthest_s);
+  inference::SearchResult found = minimise(problem, start, options);
+  if (found.termination == inference::Termination::no_solution) return;
+  static_cast<KnownModel&>(fit_) = problem.at(found.q);
+  fit_.residuals = std::move(found.residuals);
+  fit_.jacobian = found.jacobian.leftCols(unknowns);
 }
 
 std::optional<FoundChangePoints> ChangePointSearch::run() {
@@ -284,22 +287,22 @@ std::optional<FoundChangePoints> ChangePointSearch::run() {
   while (change_points().size() < most()) {
     const Candidate found = scan();
     if (found.gain < least(change_points().size(), above_noise)) break;
-    const RigFit kept = fit_;
+    RigFit kept = fit_;
     double amplitude = found.amplitude;
     const double at_s = shifted_s(found, amplitude);
     if (change_points().empty()) fit_.values[known_] = amplitude;
     change_points().push_back(change_point(found.run, at_s));
-    fit_.residuals = problem_.residuals(fit_.terms, fit_.values);
+    fit_.residuals = problem_.residuals(fit_);
     refine(3);
     if (kept.residuals.squaredNorm() - fit_.residuals.squaredNorm() < least_gain) {
-      fit_ = kept;
+      fit_ = std::move(kept);
       break;
     }
   }
   if (change_points().empty()) return {};
   if (!lasts_) refine(6);
   FoundChangePoints found;
-  found.fit = problem_.fit_from(fit_.terms, fit_.values);
+  found.fit = problem_.fit_from(fit_);
   found.term = found.fit.terms.back();
   found.values.assign(found.fit.values.begin() + static_cast<std::ptrdiff_t>(known_), found.fit.values.end());
   found.gain = at_first - found.fit.chi_square;

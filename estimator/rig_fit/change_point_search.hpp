@@ -1,13 +1,13 @@
 #pragma once
-// When did it happen? Moments of effects that begin at one (effect.hpp, ChangePoints): a sensor's step, steps lost.
+// When did it happen? Change points of effects that begin at one (effect.hpp, ChangePoints): a sensor's step, steps lost.
 //
-// From a moment on, the residuals hold the effect's lasting change D (of the whole run, were it there from the start).
-// For every sample as the moment the drop of chi-square is known from sums over the samples after it,
+// From a change point on, the residuals hold the effect's lasting change D (of the whole run, were it there from the start).
+// For every sample as the change point the drop of chi-square is known from sums over the samples after it,
 //
 //   gain(t) = (sum_{s >= t} D r)^2 / (sum_{s >= t} D^2 - what the fitted unknowns take up of it),
 //
-// a change-point scan by matched filter. The best moment is shifted to where the simulated change correlates best with
-// the residuals, and moments and all values are refined together by Gauss-Newton steps. Effects of several moments
+// a change-point scan by matched filter. The best one is shifted to where the simulated change correlates best with
+// the residuals, and change points and all values are refined together. Effects of several change points
 // go on until another one gains too little for having been chosen among so many samples.
 
 #include <optional>
@@ -20,11 +20,11 @@ struct FoundChangePoints {
   ModelTerm term;              ///< with its change_points
   std::vector<double> values;  ///< of the effect
   RigFit fit;                  ///< of the terms before and this one, from which further fits may start
-  double gain = 0.0;           ///< of chi-square, for all moments
+  double gain = 0.0;           ///< of chi-square, for all change points
 };
 
-/// What the scan alone promises: moment by moment the lasting change of the size that fits best, all else linear. One
-/// simulation; `find_change_points` takes some ten a moment.
+/// What the scan alone promises: one by one the lasting change of the size that fits best, all else linear. One
+/// simulation; `find_change_points` takes some ten for each.
 struct PromisedChangePoints {
   size_t count = 0;
   Eigen::VectorXd residuals;  ///< that would be left
@@ -34,7 +34,7 @@ struct PromisedChangePoints {
 std::optional<PromisedChangePoints> promise_change_points(const RigProblem& problem, const Session& session,
                                                           const RigFit& before, const Effect& effect);
 
-/// Added to the residuals `before` left. None if no moment gains enough, or the effect has no change points.
+/// Added to the residuals `before` left. None if no change point gains enough, or the effect has no change points.
 /// Precondition: `before` is a fine fit of `problem` to all runs; `session` is the problem's.
 std::optional<FoundChangePoints> find_change_points(const RigProblem& problem, const Session& session,
                                                     const RigFit& before, const Effect& effect);

@@ -101,7 +101,7 @@ void RigProblem::shrink_cycle_variations(size_t run, Eigen::Ref<Eigen::VectorXd>
 std::vector<std::map<Channel, std::vector<double>>> RigProblem::variation_shapes(const KnownModel& of,
                                                                                  size_t group) const {
   constexpr double small = 0.01;
-  const RigModel plain = model(of.terms, of.values);
+  const RigModel plain = model(of);
   std::vector<std::map<Channel, std::vector<double>>> shapes(session_.runs.size());
   parallel_for(session_.runs.size(), options_.threads, [&](size_t r) {
     const SessionRun& run = session_.runs[r];

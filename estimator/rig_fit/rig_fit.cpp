@@ -1,18 +1,18 @@
 #include "estimator/rig_fit/rig_fit.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <utility>
+#include <span>
 
 #include "estimator/parallel/parallel_for.hpp"
 #include "estimator/rig/sampled_signal.hpp"
-#include "estimator/rig_fit/search_scale.hpp"
 
 namespace diastole::rig {
 namespace {
 
-constexpr size_t nuisances = 3;
 constexpr double offset_reach_Pa = 2000.0;
 
 /// Mean over the cycles of what the plant's volume was at each phase.
@@ -49,6 +49,26 @@ constexpr double column_steps = 2.0;
 
 }  // namespace
 
+Unknown unknown_of(const Effect& effect, const EffectParameter& parameter) {
+  constexpr double small = 1e-3;  // of a typical size: far above rounding, far below curvature
+  Unknown unknown{{.name = fmt::format("{}.{}", effect.text().id, parameter.name),
+                   .unit = std::string(parameter.unit),
+                   .lower = parameter.lower,
+                   .upper = parameter.upper,
+                   .scale = parameter.scale}};
+  const auto [lower, upper] = unknown.coordinate_bounds();
+  const double size = std::abs(unknown.coordinate(parameter.typical) - unknown.coordinate(parameter.neutral));
+  unknown.perturbation = small * (size == 0.0 ? 0.1 * (upper - lower) : size);
+  unknown.sensors_only = effect.stage() == Stage::sensors;
+  return unknown;
+}
+
+double sized_value(const EffectParameter& parameter, double neutral, double size) {
+  const double from = inference::to_coordinate(parameter.scale, neutral);
+  const double towards = inference::to_coordinate(parameter.scale, parameter.typical);
+  return inference::from_coordinate(parameter.scale, from + size * (towards - from));
+}
+
 double RigFit::value(std::string_view name) const {
   for (size_t i = 0; i < unknowns.size(); ++i)
     if (unknowns[i].name == name) return values[i];
@@ -66,9 +86,9 @@ RigProblem::RigProblem(const Session& session, const SpecimenFamily& family, con
     coarse_motions_.push_back(sampled_motion(run.drive, step_s(Fidelity::coarse)));
   }
   KnownModel varying = options.variation_of.value_or(KnownModel{{}, {family.modulus_start_kPa(), 0.0, 0.0}});
-  if (!options.variation_of) varying.values = fit_from({}, varying.values).values;
+  if (!options.variation_of) varying = fit_from(varying);
   set_cycle_variations(varying);
-  base_ = fit_from({}, {varying.values.begin(), varying.values.begin() + nuisances});
+  base_ = fit_from({{}, {varying.values.begin(), varying.values.begin() + nuisances}});
 }
 
 void RigProblem::set_blocks() {
@@ -92,32 +112,33 @@ void RigProblem::set_blocks() {
 }
 
 std::vector<Unknown> RigProblem::unknowns(const std::vector<ModelTerm>& terms) const {
-  std::vector<Unknown> list{
-      {"modulus_kPa", 0.2 * family_.modulus().lower, 5.0 * family_.modulus().upper},
-      {"cavity_offset_Pa", -offset_reach_Pa, offset_reach_Pa},
-      {"pump_offset_Pa", -offset_reach_Pa, offset_reach_Pa},
+  const double softest_kPa = 0.2 * family_.modulus().lower;
+  const auto offset = [](const char* name) {
+    return Unknown{
+        {.name = name, .unit = "Pa", .lower = -offset_reach_Pa, .upper = offset_reach_Pa}, 1.0, true};
   };
-  for (const ModelTerm& term : terms) {
-    for (const EffectParameter& parameter : term.effect->parameters()) {
-      list.push_back({std::string(term.effect->text().id) + "." + std::string(parameter.name),
-                      parameter.lower, parameter.upper});
-    }
-  }
+  std::vector<Unknown> list{
+      {{.name = "modulus_kPa", .unit = "kPa", .lower = softest_kPa, .upper = 5.0 * family_.modulus().upper},
+       std::max(1e-3 * softest_kPa, 1e-3)},
+      offset("cavity_offset_Pa"),
+      offset("pump_offset_Pa")};
+  for (const ModelTerm& term : terms)
+    for (const EffectParameter& parameter : term.effect->parameters())
+      list.push_back(unknown_of(*term.effect, parameter));
   return list;
 }
 
-RigModel RigProblem::model(const std::vector<ModelTerm>& terms, const std::vector<double>& values,
-                           bool low_fidelity) const {
+RigModel RigProblem::model(const KnownModel& of, bool low_fidelity) const {
   RigModel model = session_.base;
   model.curve = family_.plain();
-  model.modulus_kPa = values[0];
-  model.cavity_offset_kPa = 1e-3 * values[1];
-  model.pump_offset_kPa = 1e-3 * values[2];
-  size_t at = nuisances;
-  for (const ModelTerm& term : terms) {
+  model.modulus_kPa = of.values[0];
+  model.cavity_offset_kPa = 1e-3 * of.values[1];
+  model.pump_offset_kPa = 1e-3 * of.values[2];
+  std::span<const double> values = std::span(of.values).subspan(nuisances);
+  for (const ModelTerm& term : of.terms) {
     const size_t count = term.effect->parameters().size();
-    term.effect->apply({values.data() + at, count}, {family_, term.change_points, low_fidelity}, model);
-    at += count;
+    term.effect->apply(values.first(count), {family_, term.change_points, low_fidelity}, model);
+    values = values.subspan(count);
   }
   return model;
 }
@@ -185,9 +206,8 @@ void RigProblem::compare(const RigModel& model, const PlantTrace& plant, size_t 
   if (fidelity == Fidelity::fine) shrink_cycle_variations(run, out);
 }
 
-Eigen::VectorXd RigProblem::residuals(const std::vector<ModelTerm>& terms, const std::vector<double>& values,
-                                      const FitRequest& request) const {
-  const RigModel made = model(terms, values, request.difference);
+Eigen::VectorXd RigProblem::residuals(const KnownModel& of, const FitRequest& request) const {
+  const RigModel made = model(of, request.difference);
   const std::vector<size_t> runs = chosen_runs(request);
   Eigen::VectorXd out = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(rows_));
   parallel_for(runs.size(), options_.threads, [&](size_t i) {
@@ -197,20 +217,18 @@ Eigen::VectorXd RigProblem::residuals(const std::vector<ModelTerm>& terms, const
   return out;
 }
 
-Eigen::MatrixXd RigProblem::columns(const std::vector<ModelTerm>& terms, const std::vector<double>& values,
-                                    const FitRequest& request, size_t first) const {
-  const auto coordinates = search_coordinates(terms, unknowns(terms));
-  const RigModel here = model(terms, values);
+Eigen::MatrixXd RigProblem::columns(const KnownModel& at, const FitRequest& request) const {
+  const std::vector<Unknown> list = unknowns(at.terms);
+  const RigModel here = model(at);
   std::vector<RigModel> moved;
   std::vector<double> steps;
-  for (size_t i = first; i < values.size(); ++i) {
-    const SearchCoordinate& coordinate = coordinates[i];
-    const double at = std::clamp(to_search(coordinate.scale, values[i]), coordinate.lower, coordinate.upper);
-    steps.push_back(at + coordinate.perturbation > coordinate.upper ? -coordinate.perturbation
-                                                                    : coordinate.perturbation);
-    std::vector<double> other = values;
-    other[i] = from_search(coordinate.scale, at + steps.back());
-    moved.push_back(model(terms, other));
+  for (size_t i = 0; i < list.size(); ++i) {
+    const auto [lower, upper] = list[i].coordinate_bounds();
+    const double coordinate = std::clamp(list[i].coordinate(at.values[i]), lower, upper);
+    steps.push_back(list[i].step_from(coordinate));
+    KnownModel other = at;
+    other.values[i] = list[i].value(coordinate + steps.back());
+    moved.push_back(model(other));
   }
   const std::vector<size_t> runs = chosen_runs(request);
   const auto rows = static_cast<Eigen::Index>(rows_);
@@ -225,7 +243,7 @@ Eigen::MatrixXd RigProblem::columns(const std::vector<ModelTerm>& terms, const s
     const size_t i = task % runs.size();
     const size_t j = task / runs.size();
     auto column = out.col(static_cast<Eigen::Index>(j));
-    const bool same_plant = coordinates[first + j].sensors_only;
+    const bool same_plant = list[j].sensors_only;
     compare(moved[j], same_plant ? plants[i] : plant(moved[j], runs[i], Fidelity::coarse), runs[i],
             request.fidelity, column);
   });
@@ -236,9 +254,8 @@ Eigen::MatrixXd RigProblem::columns(const std::vector<ModelTerm>& terms, const s
   return out;
 }
 
-std::vector<Prediction> RigProblem::predictions(const std::vector<ModelTerm>& terms,
-                                                const std::vector<double>& values) const {
-  const RigModel made = model(terms, values);
+std::vector<Prediction> RigProblem::predictions(const KnownModel& of) const {
+  const RigModel made = model(of);
   std::vector<Prediction> seen(session_.runs.size());
   parallel_for(seen.size(), options_.threads, [&](size_t r) {
     const SessionRun& run = session_.runs[r];

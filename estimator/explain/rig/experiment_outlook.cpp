@@ -7,7 +7,6 @@
 #include <optional>
 
 #include "estimator/rig/sampled_signal.hpp"
-#include "estimator/rig_fit/search_scale.hpp"
 
 namespace diastole::explain {
 namespace {
@@ -87,8 +86,7 @@ struct Rows {
 
 Rows rows_of(const rig::RigProblem& problem, const rig::RigFit& fit, const TrialRun& trial,
              const Noise& noise) {
-  const auto coordinates = rig::search_coordinates(fit.terms, fit.unknowns);
-  const rig::RigModel made = problem.model(fit.terms, fit.values);
+  const rig::RigModel made = problem.model(fit);
   const rig::PlantTrace plant = rig::simulate_plant(made, trial.drive);
   const Seen base = seen_of(made, plant, trial);
   const auto count = static_cast<Eigen::Index>(fit.values.size());
@@ -100,15 +98,14 @@ Rows rows_of(const rig::RigProblem& problem, const rig::RigFit& fit, const Trial
   }
   for (Eigen::Index i = 0; i < count; ++i) {
     const auto k = static_cast<size_t>(i);
-    const rig::SearchCoordinate& coordinate = coordinates[k];
-    const double at = rig::to_search(coordinate.scale, fit.values[k]);
-    const double step =
-        at + coordinate.perturbation > coordinate.upper ? -coordinate.perturbation : coordinate.perturbation;
-    std::vector<double> values = fit.values;
-    values[k] = rig::from_search(coordinate.scale, at + step);
-    const rig::RigModel moved = problem.model(fit.terms, values);
+    const rig::Unknown& unknown = fit.unknowns[k];
+    const double at = unknown.coordinate(fit.values[k]);
+    const double step = unknown.step_from(at);
+    rig::KnownModel other_values = fit;
+    other_values.values[k] = unknown.value(at + step);
+    const rig::RigModel moved = problem.model(other_values);
     const Seen other =
-        seen_of(moved, coordinate.sensors_only ? plant : rig::simulate_plant(moved, trial.drive), trial);
+        seen_of(moved, unknown.sensors_only ? plant : rig::simulate_plant(moved, trial.drive), trial);
     for (size_t c = 0; c < measured_count; ++c)
       rows.K[c].col(i) = rows_of(noise, trial, c, (other.y[c] - base.y[c]) / step);
   }
@@ -132,9 +129,8 @@ Eigen::MatrixXd SegmentOutlook::of(size_t truth, size_t adapting, const Equipmen
 Eigen::MatrixXd known_before(const rig::RigProblem& problem, const rig::RigFit& fit) {
   constexpr double ridge = 1e-6;  // far weaker than any data
   const auto count = static_cast<Eigen::Index>(fit.values.size());
-  const Eigen::MatrixXd columns = fit.jacobian.cols() == count && fit.jacobian.rows() > 0
-                                      ? fit.jacobian
-                                      : problem.columns(fit.terms, fit.values);
+  const Eigen::MatrixXd columns =
+      fit.jacobian.cols() == count && fit.jacobian.rows() > 0 ? fit.jacobian : problem.columns(fit);
   Eigen::MatrixXd known = Eigen::MatrixXd::Identity(count + zeros, count + zeros);
   known.topLeftCorner(count, count) = columns.transpose() * columns;
   known.topLeftCorner(count, count).diagonal().array() += ridge;
@@ -182,15 +178,13 @@ Eigen::MatrixXd gram_beside(const rig::RigFit& truth, const rig::RigFit& adaptin
                             const SpecimenKnowledge& knowledge) {
   const auto count = static_cast<Eigen::Index>(adapting.values.size());
   Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(count + zeros + 1, count + zeros + 1);
-  const auto coordinates = rig::search_coordinates(adapting.terms, adapting.unknowns);
   const auto add = [&](std::string_view unknown, double difference, double error) {
     Eigen::VectorXd row = Eigen::VectorXd::Zero(sum.cols());
     row[0] = difference / error;
     for (Eigen::Index i = 0; i < count; ++i) {
       const auto k = static_cast<size_t>(i);
-      if (adapting.unknowns[k].name != unknown) continue;
-      const auto scale = coordinates[k].scale;
-      row[1 + i] = rig::natural_slope(scale, rig::to_search(scale, adapting.values[k])) / error;
+      const rig::Unknown& own = adapting.unknowns[k];
+      if (own.name == unknown) row[1 + i] = own.slope(own.coordinate(adapting.values[k])) / error;
     }
     sum += row * row.transpose();
   };

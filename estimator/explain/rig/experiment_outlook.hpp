@@ -15,7 +15,7 @@
 #include <array>
 #include <vector>
 
-#include "estimator/explain/verdict/experiment_plan.hpp"
+#include "estimator/explain/rig/trial_run.hpp"
 #include "estimator/rig_fit/rig_fit.hpp"
 
 namespace diastole::explain {

@@ -1,7 +1,6 @@
 #include "estimator/explain/rig/explain_rig.hpp"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <chrono>
@@ -24,58 +23,23 @@ constexpr size_t most_hints = 2;   // that a next experiment is designed for, be
 constexpr double other_variation =
     0.5;  // of chi-square left by effects that change what a cycle looks like, too
 
-std::string summary_of(const Explanation& found) {
-  std::vector<std::string> ids;
-  for (const FoundEffect& effect : found.effects)
-    ids.push_back(effect.id);
-  const std::string set = fmt::format("{}", fmt::join(ids, " + "));
-  switch (found.verdict) {
-    case Verdict::none:
-      return "Nothing exceeds the noise: the rig's model explains these recordings.";
-    case Verdict::named:
-      return fmt::format(
-          "The model lacks {}: with it {:.0f} % of the gap on data that were not fitted is closed.", set,
-          100.0 * found.gap.closed);
-    case Verdict::ambiguous: {
-      std::string others;
-      for (const auto& other : found.ambiguous_with)
-        others += fmt::format("{}{}", others.empty() ? "" : ", ",
-                              other.empty() ? "nothing at all" : fmt::format("{}", fmt::join(other, " + ")));
-      if (found.effects.empty())
-        return fmt::format("Too weak to name and too strong to be chance: perhaps {}, perhaps nothing.",
-                           others);
-      return fmt::format("The model lacks something that these data cannot tell apart: {}, or {}.", set,
-                         others);
-    }
-    case Verdict::unexplained:
-      return found.where.empty()
-                 ? "The misfit has structure that no known effect removes."
-                 : fmt::format(
-                       "The misfit has structure that no known effect removes, most of it in {} of {}.",
-                       found.where.front().channel, found.where.front().run);
-  }
-  return "";
-}
-
 std::vector<Step> steps_of(const SearchResult& search) {
   std::vector<Step> steps{{"base model", search.sets.front().fit.reduced()}};
-  const rig::RigFit& best = search.sets[search.best].fit;
-  for (size_t count = 1; count <= best.terms.size(); ++count) {
-    const std::vector<rig::ModelTerm> part(best.terms.begin(),
-                                           best.terms.begin() + static_cast<std::ptrdiff_t>(count));
-    for (const FittedSet& set : search.sets) {
-      if (set.fit.terms.size() != count) continue;
-      const bool same = std::equal(part.begin(), part.end(), set.fit.terms.begin(),
-                                   [](const auto& a, const auto& b) { return a.effect == b.effect; });
-      if (!same) continue;
-      steps.push_back({std::string(part.back().effect->text().id), set.fit.reduced()});
-      break;
-    }
+  const auto is_effect = [](const rig::ModelTerm& a, const rig::ModelTerm& b) {
+    return a.effect == b.effect;
+  };
+  std::vector<rig::ModelTerm> part;
+  for (const rig::ModelTerm& term : search.sets[search.best].fit.terms) {
+    part.push_back(term);
+    const auto set = std::ranges::find_if(search.sets, [&](const FittedSet& other) {
+      return std::ranges::equal(part, other.fit.terms, is_effect);
+    });
+    if (set != search.sets.end()) steps.push_back({std::string(term.effect->text().id), set->fit.reduced()});
   }
   return steps;
 }
 
-/// The effects that the study's model has already, in its order.
+/// The terms of the effects that the study's model has already, in its order.
 std::vector<rig::ModelTerm> terms_of(const Study& study, const rig::Session& session) {
   std::vector<rig::ModelTerm> list;
   for (const std::string& id : study.effects) {
@@ -87,9 +51,9 @@ std::vector<rig::ModelTerm> terms_of(const Study& study, const rig::Session& ses
                         .remedy = "`diastole effects` lists those that are known."});
     }
     rig::ModelTerm term{effect, {}};
-    for (const StudyEffect& told : study.effect_values) {
-      if (told.id != id) continue;
-      for (const StudyMoment& moment : told.moments)
+    for (const StudyEffect& given : study.effect_values) {
+      if (given.id != id) continue;
+      for (const StudyMoment& moment : given.moments)
         for (const rig::SessionRun& run : session.runs)
           if (run.drive.place.name == moment.run)
             term.change_points.push_back(
@@ -105,8 +69,8 @@ std::vector<rig::ModelTerm> terms_of(const Study& study, const rig::Session& ses
 rig::Session without_effects(const rig::Session& session, const rig::RigProblem& problem,
                              const rig::RigFit& fit) {
   rig::Session plain = session;
-  const auto with = problem.predictions(fit.terms, fit.values);
-  const auto base = problem.predictions({}, {fit.values.begin(), fit.values.begin() + 3});
+  const auto with = problem.predictions(fit);
+  const auto base = problem.predictions({{}, {fit.values.begin(), fit.values.begin() + rig::nuisances}});
   for (size_t r = 0; r < plain.runs.size(); ++r) {
     for (auto& [channel, values] : plain.runs[r].pressure_kPa) {
       const bool cavity = channel == rig::Channel::cavity;
@@ -142,36 +106,34 @@ struct Work {
 /// vary otherwise with them.
 Work searched(const rig::Session& session, const rig::SpecimenFamily& family, const Study& study,
               const ExplainOptions& options) {
-  const auto tell = [&](const std::string& text) {
-    if (options.progress) options.progress(text);
-  };
-  tell("fitting the rig's model");
   rig::RigFitOptions fitting;
   fitting.threads = options.threads;
   SearchOptions searching;
   searching.progress = options.progress;
   searching.start = terms_of(study, session);
   searching.enough = dominated;
-  rig::RigProblem problem(session, family, fitting);
-  SearchResult found = search(session, family, problem, searching);
-  const rig::RigFit& best = found.sets[found.best].fit;
-  const rig::NoiseModel noise = rig::estimate_noise(without_effects(session, problem, best));
-  const bool large = found.sets[found.best].chi_square < other_variation * found.sets.front().chi_square;
-  const bool hopeless = leaves_misfit(found.sets.front(), found.sets[found.best]);
-  if (!best.terms.empty() && !hopeless && (large || differ(problem.noise(), noise))) {
-    tell("fitting again with the noise that is left");
-    fitting.noise = noise;
-    fitting.variation_of = rig::KnownModel{best.terms, best.values};
-    searching.start = best.terms;
-    searching.enough = 0.0;
-    rig::RigProblem again(session, family, fitting);
-    searching.change = again.base().residuals - again.residuals(best.terms, best.values);
-    SearchResult second = search(session, family, again, searching);
-    Eigen::VectorXd weights = row_weights(session, again, searching.change);
-    return {std::move(again), std::move(second), std::move(weights)};
-  }
-  Eigen::VectorXd weights = row_weights(session, problem, searching.change);
-  return {std::move(problem), std::move(found), std::move(weights)};
+  const auto work = [&]() -> Work {
+    rig::RigProblem problem(session, family, fitting);
+    if (fitting.variation_of)
+      searching.change = problem.base().residuals - problem.residuals(*fitting.variation_of);
+    SearchResult found = search(session, family, problem, searching);
+    Eigen::VectorXd weights = row_weights(session, problem, searching.change);
+    return {std::move(problem), std::move(found), std::move(weights)};
+  };
+  options.report("fitting the rig's model");
+  Work first = work();
+  const FittedSet& base = first.found.sets.front();
+  const rig::RigFit& best = first.best().fit;
+  if (best.terms.empty() || leaves_misfit(base, first.best())) return first;
+  const rig::NoiseModel noise = rig::estimate_noise(without_effects(session, first.problem, best));
+  const bool large = first.best().chi_square < other_variation * base.chi_square;
+  if (!large && !differ(first.problem.noise(), noise)) return first;
+  options.report("fitting again with the noise that is left");
+  fitting.noise = noise;
+  fitting.variation_of = best;
+  searching.start = best.terms;
+  searching.enough = 0.0;
+  return work();
 }
 
 /// Of each effect found, the fit of the others alone, which the search made when it compared look-alikes.
@@ -212,7 +174,7 @@ std::optional<NextExperiment> next_experiment(const Study& study, const rig::Ses
   SpecimenKnowledge knowledge;
   if (const auto* annulus = std::get_if<AnnulusSpecimen>(&study.specimen))
     knowledge.inner_radius_mm = annulus->inner_radius_mm;
-  const ExperimentDesign design{session, work.problem, ExperimentLimits::of(session), threads, knowledge};
+  const ExperimentDesign design{session, work.problem, limits_of(session), threads, knowledge};
   if (found.verdict == Verdict::unexplained && !found.where.empty())
     return exposing_experiment(design, found.where.front());
   if (found.verdict == Verdict::named) return sharpening_experiment(design, work.best().fit);
@@ -239,44 +201,41 @@ std::optional<NextExperiment> next_experiment(const Study& study, const rig::Ses
 
 Explanation explain_rig(const Study& study, const ExplainOptions& options) {
   const auto begun = std::chrono::steady_clock::now();
-  const auto tell = [&](const std::string& text) {
-    if (options.progress) options.progress(text);
-  };
-  tell("reading the runs");
+  options.report("reading the runs");
   const rig::Session session = rig::read_session(study);
-  tell("computing the specimen");
+  options.report("computing the specimen");
   rig::SpecimenFamily family(study);
   family.compute_ahead();
   const Work work = searched(session, family, study, options);
   const rig::RigProblem& problem = work.problem;
   const rig::RigFit& base = problem.base();
   rig::RigFit best = work.best().fit;
-  best.jacobian = problem.columns(best.terms, best.values);  // at the very optimum
+  best.jacobian = problem.columns(best);  // at the very optimum
 
-  tell("judging");
+  options.report("judging");
   const auto cells = residual_cells(session, problem.blocks(), best.residuals,
                                     model_variance(problem, base.residuals - best.residuals));
   std::vector<ResidualCell> left = significant(cells, discovery_rate);
   if (!is_structured(left, cells.size())) left.clear();
   const Eigen::VectorXd& weights = work.weights;
-  const Gap gap = held_out_gap(session, problem, best, weights);
-  const Judgement judgement = judge(work.found, left, gap);
-
   Explanation out;
   out.study = study.file.string();
+  out.gap = held_out_gap(session, problem, best, weights);
+  const SearchRecord record = record_of(work.found);
+  const Judgement judgement = judge(record, !left.empty(), out.gap);
   out.verdict = judgement.verdict;
-  out.gap = gap;
-  const double explained = base.chi_square - best.chi_square;
-  const std::vector<double> errors = parameter_errors(best, weights, explained);
+  out.searches = judgement.searches;
+  out.converged = is_settled(out.searches);
+  const std::vector<double> errors = parameter_errors(best, weights, base.chi_square - best.chi_square);
   if (judgement.verdict == Verdict::unexplained) {  // nothing is added, so that nothing is closed
-    out.gap.after = gap.before;
+    out.gap.after = out.gap.before;
     out.gap.closed = 0.0;
   } else {
     out.ambiguous_with = judgement.ambiguous_with;
     out.effects = found_effects(best, errors);
   }
-  if (!judgement.left.empty()) {
-    out.where = misfits(session, problem, judgement.left, {}, base);
+  if (!left.empty()) {
+    out.where = misfits(session, problem, left, {}, base);
   } else if (out.verdict != Verdict::none) {
     const auto before =
         residual_cells(session, problem.blocks(), base.residuals, model_variance(problem, {}));
@@ -286,12 +245,12 @@ Explanation explain_rig(const Study& study, const ExplainOptions& options) {
   if (const auto port = common_port(out); port && out.verdict == Verdict::ambiguous)
     for (Misfit& place : out.where)
       place.port = *port;
-  out.evidence = evidence(work.found, judgement, {});
+  out.evidence = evidence(record, judgement);
   if (!out.effects.empty())
     out.shifts = parameter_shifts(base, parameter_errors(base, weights, 0.0), best, errors);
   out.steps = steps_of(work.found);
   out.traces = traces(session, problem, base, best);
-  tell("designing the next experiment");
+  options.report("designing the next experiment");
   if (options.propose) out.next_experiment = next_experiment(study, session, work, out, options.threads);
   out.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
   out.summary = summary_of(out);

@@ -18,6 +18,10 @@ struct ExplainOptions {
   bool propose = true;  ///< a next experiment
   std::function<void(const std::string&)>
       progress;  ///< a line for people; empty text: only asks whether to go on
+
+  void report(const std::string& text) const {
+    if (progress) progress(text);
+  }
 };
 
 /// Throws InputError for runs that cannot be read; whatever `progress` throws ends the work.

@@ -1,40 +1,15 @@
 #include "estimator/explain/rig/findings.hpp"
 
-#include <fmt/format.h>
-#include <fmt/ranges.h>
-
 #include <algorithm>
 #include <cmath>
 #include <map>
 
 #include "estimator/effects/effect.hpp"
-#include "estimator/rig_fit/search_scale.hpp"
+#include "estimator/inference/covariance.hpp"
+#include "estimator/inference/intervals.hpp"
 
 namespace diastole::explain {
 namespace {
-
-constexpr size_t nuisances = 3;
-constexpr double ninety = 1.645;  // standard errors of a 90 % interval's half
-
-SearchScale scale_of(const rig::RigFit& fit, size_t unknown) {
-  size_t at = nuisances;
-  for (const rig::ModelTerm& term : fit.terms)
-    for (const EffectParameter& parameter : term.effect->parameters())
-      if (at++ == unknown) return parameter.scale;
-  return SearchScale::linear;
-}
-
-/// The interval is symmetric where the search is.
-std::array<double, 2> interval(SearchScale scale, double value, double error, double lower, double upper) {
-  const double at = rig::to_search(scale, value);
-  const double slope = rig::natural_slope(scale, at);
-  const double reach = error > 0.0 ? ninety * std::abs(error / slope) : 0.0;
-  const double search_low = std::min(rig::to_search(scale, lower), rig::to_search(scale, upper));
-  const double search_high = std::max(rig::to_search(scale, lower), rig::to_search(scale, upper));
-  const double a = rig::from_search(scale, std::clamp(at - reach, search_low, search_high));
-  const double b = rig::from_search(scale, std::clamp(at + reach, search_low, search_high));
-  return {std::min(a, b), std::max(a, b)};
-}
 
 Port port_of(std::string_view channel) { return channel == "pump_kPa" ? Port::drive : Port::specimen; }
 
@@ -45,35 +20,33 @@ std::vector<double> parameter_errors(const rig::RigFit& fit, const Eigen::Vector
   constexpr double looks_alike =
       2e-3;  // of a change: the model's error of it that its parameters can take up
   const double with_models = std::sqrt(1.0 + looks_alike * looks_alike * std::max(explained, 0.0));
-  Eigen::MatrixXd normal = fit.jacobian.transpose() * weights.asDiagonal() * fit.jacobian;
-  for (Eigen::Index i = 0; i < normal.rows(); ++i) {
-    if (fit.errors[static_cast<size_t>(i)] > 0.0) continue;
-    normal.row(i).setZero();
-    normal.col(i).setZero();
-    normal(i, i) = 1.0;
-  }
-  const Eigen::MatrixXd covariance = normal.completeOrthogonalDecomposition().pseudoInverse();
+  std::vector<bool> is_free;
+  for (const double error : fit.errors)
+    is_free.push_back(error > 0.0);
+  const Eigen::VectorXd variance =
+      inference::estimate_covariance(weights.cwiseSqrt().asDiagonal() * fit.jacobian, is_free)
+          .matrix.diagonal();
   std::vector<double> errors;
   for (size_t i = 0; i < fit.values.size(); ++i) {
-    const auto k = static_cast<Eigen::Index>(i);
-    const SearchScale scale = scale_of(fit, i);
-    const double slope = rig::natural_slope(scale, rig::to_search(scale, fit.values[i]));
-    const double noise_alone = std::abs(slope) * std::sqrt(std::max(covariance(k, k), 0.0));
-    errors.push_back(fit.errors[i] > 0.0 ? with_models * noise_alone : 0.0);
+    const double sd = with_models * std::sqrt(variance[static_cast<Eigen::Index>(i)]);
+    errors.push_back(
+        inference::standard_error(fit.unknowns[i], fit.unknowns[i].coordinate(fit.values[i]), sd));
   }
   return errors;
 }
 
 std::vector<FoundEffect> found_effects(const rig::RigFit& fit, const std::vector<double>& errors) {
   std::vector<FoundEffect> effects;
-  size_t at = nuisances;
+  size_t at = rig::nuisances;
   for (const rig::ModelTerm& term : fit.terms) {
     FoundEffect found;
     found.id = term.effect->text().id;
     for (const EffectParameter& parameter : term.effect->parameters()) {
-      found.parameters.push_back(
-          {std::string(parameter.name), fit.values[at], errors[at],
-           interval(parameter.scale, fit.values[at], errors[at], parameter.lower, parameter.upper)});
+      const rig::Unknown& unknown = fit.unknowns[at];
+      const double coordinate = unknown.coordinate(fit.values[at]);
+      const double sd = errors[at] / std::abs(unknown.slope(coordinate));
+      found.parameters.push_back({std::string(parameter.name), fit.values[at], errors[at],
+                                  inference::interval(unknown, coordinate, inference::normal_90 * sd)});
       ++at;
     }
     for (const ChangePoint& change_point : term.change_points)
@@ -88,7 +61,7 @@ std::vector<ParameterShift> parameter_shifts(const rig::RigFit& before,
                                              const rig::RigFit& after,
                                              const std::vector<double>& after_errors) {
   std::vector<ParameterShift> shifts;
-  for (size_t i = 0; i < nuisances; ++i) {
+  for (size_t i = 0; i < rig::nuisances; ++i) {
     if (before_errors[i] == 0.0 && after_errors[i] == 0.0) continue;
     const std::string name = i == 0 ? "C1_kPa" : before.unknowns[i].name;
     shifts.push_back({name, before.values[i], before_errors[i], after.values[i], after_errors[i]});
@@ -199,50 +172,21 @@ std::vector<Misfit> misfits(const rig::Session& session, const rig::RigProblem& 
   return list;
 }
 
-std::vector<Candidate> evidence(const SearchResult& search, const Judgement& judgement,
-                                const std::vector<double>& held_out_drops) {
-  std::vector<Candidate> list;
-  const FittedSet& base = search.sets.front();
-  const FittedSet& best = search.sets[search.best];
-  for (size_t k = 1; k < search.sets.size(); ++k) {
-    const FittedSet& set = search.sets[k];
-    Candidate row{set.ids(), base.chi_square - set.chi_square, true, set.parameters(), {}, ""};
-    if (k < held_out_drops.size()) row.held_out_drop = held_out_drops[k];
-    const auto& alike = judgement.ambiguous_with;
-    if (k == search.best) {
-      row.verdict = judgement.verdict == Verdict::unexplained ? "fits best, and not well enough" : "named";
-    } else if (std::find(alike.begin(), alike.end(), row.ids) != alike.end()) {
-      row.verdict = "as good";
-    } else if (set.chi_square < best.chi_square + as_good) {
-      row.verdict = "not needed: no better than the smaller set";
-    } else {
-      row.verdict = fmt::format("refuted: {:.1f} sigma worse", std::sqrt(set.chi_square - best.chi_square));
-    }
-    list.push_back(std::move(row));
-  }
-  for (const Lead& lead : search.leads) {
-    const std::string id(lead.term.effect->text().id);
-    const bool fitted = std::any_of(list.begin(), list.end(), [&](const Candidate& row) {
-      return row.refitted && row.ids == std::vector<std::string>{id};
-    });
-    if (!fitted)
-      list.push_back({{id},
-                      lead.gain,
-                      false,
-                      lead.parameters,
-                      {},
-                      lead.visibility < 3.0 ? "not visible in these data" : "screened out"});
-  }
-  std::sort(list.begin(), list.end(),
-            [](const Candidate& a, const Candidate& b) { return a.chi_square_drop > b.chi_square_drop; });
-  return list;
+SearchRecord record_of(const SearchResult& search) {
+  SearchRecord record{.sets = {}, .best = search.best, .screened = {}};
+  for (const FittedSet& set : search.sets)
+    record.sets.push_back({set.ids(), set.chi_square, set.parameters(), set.fit.termination});
+  for (const Lead& lead : search.leads)
+    record.screened.push_back(
+        {std::string(lead.term.effect->text().id), lead.gain, lead.visibility, lead.parameters});
+  return record;
 }
 
 std::vector<Trace> traces(const rig::Session& session, const rig::RigProblem& problem,
                           const rig::RigFit& before, const rig::RigFit& after) {
   constexpr size_t kept = 4;  // every so many samples are shown
-  const auto old = problem.predictions(before.terms, before.values);
-  const auto now = problem.predictions(after.terms, after.values);
+  const auto old = problem.predictions(before);
+  const auto now = problem.predictions(after);
   std::vector<Trace> list;
   for (size_t r = 0; r < session.runs.size(); ++r) {
     const rig::SessionRun& run = session.runs[r];

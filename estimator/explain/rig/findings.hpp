@@ -1,5 +1,5 @@
 #pragma once
-// The parts of an Explanation that are read off fits: effects with intervals, places, evidence, shifts, traces.
+// The parts of an Explanation that are read off fits: effects with intervals, places, shifts, traces.
 
 #include <vector>
 
@@ -30,8 +30,8 @@ std::vector<Misfit> misfits(const rig::Session& session, const rig::RigProblem& 
                             const std::vector<ResidualCell>& cells,
                             const std::vector<const rig::RigFit*>& without, const rig::RigFit& after);
 
-std::vector<Candidate> evidence(const SearchResult& search, const Judgement& judgement,
-                                const std::vector<double>& held_out_drops);
+/// What the verdict asks of a search.
+SearchRecord record_of(const SearchResult& search);
 
 std::vector<Trace> traces(const rig::Session& session, const rig::RigProblem& problem,
                           const rig::RigFit& before, const rig::RigFit& after);

@@ -88,8 +88,8 @@ double predicted_square(const rig::RigProblem& problem, const std::vector<Fold>&
         predicted[row] += fit.jacobian.row(row).dot(step);
     } else {
       const rig::RigFit others =
-          problem.fit_from(fit.terms, fit.values, {.fidelity = rig::Fidelity::fine, .runs = fold.others});
-      predicted = problem.residuals(fit.terms, others.values);
+          problem.fit_from(fit, {.fidelity = rig::Fidelity::fine, .runs = fold.others});
+      predicted = problem.residuals(others);
     }
     for (const Eigen::Index row : fold.rows)
       square += weights[row] * predicted[row] * predicted[row];

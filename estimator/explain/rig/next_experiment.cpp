@@ -9,7 +9,6 @@
 #include <limits>
 
 #include "estimator/parallel/parallel_for.hpp"
-#include "estimator/rig_fit/search_scale.hpp"
 
 namespace diastole::explain {
 namespace {
@@ -129,7 +128,6 @@ struct LeastKnown {
 };
 LeastKnown least_known(const rig::Session& session, const rig::RigFit& fit,
                        const Eigen::MatrixXd& covariance) {
-  const auto coordinates = rig::search_coordinates(fit.terms, fit.unknowns);
   LeastKnown least;
   double worst = -1.0;
   size_t at = fit.values.size();
@@ -137,9 +135,9 @@ LeastKnown least_known(const rig::Session& session, const rig::RigFit& fit,
     const std::vector<double> neutral = term->effect->neutral(session.base);
     at -= neutral.size();
     for (size_t j = 0; j < neutral.size(); ++j) {
-      const auto scale = coordinates[at + j].scale;
+      const rig::Unknown& unknown = fit.unknowns[at + j];
       const double distance =
-          std::abs(rig::to_search(scale, fit.values[at + j]) - rig::to_search(scale, neutral[j]));
+          std::abs(unknown.coordinate(fit.values[at + j]) - unknown.coordinate(neutral[j]));
       const auto row = static_cast<Eigen::Index>(at + j);
       const double unsure = std::sqrt(covariance(row, row)) / std::max(distance, 1e-12);
       if (!std::isfinite(unsure) || unsure <= worst) continue;
@@ -158,7 +156,7 @@ std::optional<NextExperiment> separating_experiment(const ExperimentDesign& desi
   const std::vector<const rig::RigFit*> models(
       competing.begin(),
       competing.begin() + static_cast<std::ptrdiff_t>(std::min(competing.size(), most_models)));
-  const auto segments = possible_segments(design.limits, design.session.base.hose);
+  const auto segments = possible_segments(design.limits);
   if (segments.empty()) return std::nullopt;
   const auto outlooks = outlooks_of(design, models, segments);
   std::vector<Eigen::MatrixXd> known;
@@ -195,16 +193,19 @@ std::optional<NextExperiment> separating_experiment(const ExperimentDesign& desi
 
 std::optional<NextExperiment> sharpening_experiment(const ExperimentDesign& design,
                                                     const rig::RigFit& named) {
-  const auto segments = possible_segments(design.limits, design.session.base.hose);
+  const auto segments = possible_segments(design.limits);
   if (segments.empty() || named.terms.empty()) return std::nullopt;
   const auto outlooks = outlooks_of(design, {&named}, segments);
   const Eigen::MatrixXd known = known_before(design.problem, named);
-  const Eigen::MatrixXd before = known.inverse();
+  const auto covariance_of = [](const Eigen::MatrixXd& information) -> Eigen::MatrixXd {
+    return information.ldlt().solve(Eigen::MatrixXd::Identity(information.rows(), information.cols()));
+  };
+  const Eigen::MatrixXd before = covariance_of(known);
   const LeastKnown target = least_known(design.session, named, before);
   const auto row = static_cast<Eigen::Index>(target.index);
   const Worth worth = [&](const std::vector<size_t>& chosen, const Equipment& equipment) {
     const Eigen::MatrixXd gram = gram_of(outlooks, chosen, 0, 0, equipment);
-    const Eigen::MatrixXd after = (gram.bottomRightCorner(known.rows(), known.cols()) + known).inverse();
+    const Eigen::MatrixXd after = covariance_of(gram.bottomRightCorner(known.rows(), known.cols()) + known);
     return std::sqrt(before(row, row) / after(row, row));
   };
   constexpr double narrow_enough = 1.5;

@@ -215,4 +215,9 @@ std::vector<ResidualCell> significant(std::vector<ResidualCell> cells, double ra
   return cells;
 }
 
+bool is_structured(const std::vector<ResidualCell>& left, size_t cells) {
+  return std::ranges::any_of(
+      left, [&](const ResidualCell& cell) { return cell.p_value * static_cast<double>(cells) < 1e-6; });
+}
+
 }  // namespace diastole::explain

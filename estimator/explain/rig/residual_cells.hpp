@@ -1,7 +1,7 @@
 #pragma once
 // Whitened residuals tested cell by cell: where does their square exceed what noise and the model's error leave?
 //
-// Five looks at each channel of each run:
+// Five kinds of cells of each channel of each run:
 //   scatter   a segment's phase bin, over all cycles: sum r^2
 //   shape     the same bin of the mean cycle: what repeats in every cycle, and averages out of the noise
 //   cycles    the means of whole cycles: drift, steps, softening
@@ -47,5 +47,9 @@ std::vector<ResidualCell> residual_cells(const rig::Session& session,
 
 /// Those beyond chance at a false discovery rate, the largest excess first.
 std::vector<ResidualCell> significant(std::vector<ResidualCell> cells, double rate);
+
+/// Whether cells that stand out are more than a known model leaves: one is beyond chance so far that the number of all
+/// cells does not matter (Holm at 1e-6).
+bool is_structured(const std::vector<ResidualCell>& left, size_t cells);
 
 }  // namespace diastole::explain

@@ -5,12 +5,11 @@
 
 #include "estimator/parallel/parallel_for.hpp"
 #include "estimator/rig_fit/change_point_search.hpp"
-#include "estimator/rig_fit/search_scale.hpp"
+#include "estimator/rig_fit/linear_basis.hpp"
 
 namespace diastole::explain {
 namespace {
 
-constexpr double dependent = 1e-6;     // of a column's size: what is left of it is rounding
 constexpr size_t further_columns = 2;  // by an effect's other parameters, at most
 
 /// Parts of the typical size at which an effect is tried: one where the answer is nearly proportional to it, more where
@@ -28,28 +27,22 @@ bool contains(const std::vector<rig::ModelTerm>& terms, const Effect* effect) {
 
 /// The effect's values with the first parameter at `size` of the way from neutral to typical.
 std::vector<double> values_at(const Effect& effect, const rig::RigModel& base, double size) {
-  std::vector<double> values = effect.neutral(base);
-  for (size_t j = 0; j < values.size(); ++j) {
-    const EffectParameter& parameter = effect.parameters()[j];
-    if (j > 0) {
-      values[j] = parameter.typical;
-      continue;
-    }
-    const double from = rig::to_search(parameter.scale, values[j]);
-    const double towards = rig::to_search(parameter.scale, parameter.typical);
-    values[j] = std::clamp(rig::from_search(parameter.scale, from + size * (towards - from)), parameter.lower,
-                           parameter.upper);
-  }
+  std::vector<double> values;
+  for (const EffectParameter& parameter : effect.parameters())
+    values.push_back(parameter.typical);
+  const EffectParameter& first = effect.parameters()[0];
+  values[0] = std::clamp(rig::sized_value(first, effect.neutral(base)[0], size), first.lower, first.upper);
   return values;
 }
 
 /// Another value of a further parameter: neutral if that is another, else some way towards the farther bound.
 double varied(const EffectParameter& parameter) {
   if (parameter.neutral != parameter.typical) return parameter.neutral;
-  const double at = rig::to_search(parameter.scale, parameter.typical);
-  const double a = rig::to_search(parameter.scale, parameter.lower);
-  const double b = rig::to_search(parameter.scale, parameter.upper);
-  return rig::from_search(parameter.scale, at + 0.3 * ((std::abs(b - at) > std::abs(a - at) ? b : a) - at));
+  const auto at = [&](double value) { return inference::to_coordinate(parameter.scale, value); };
+  const double typical = at(parameter.typical);
+  const double up = at(parameter.upper) - typical, down = at(parameter.lower) - typical;
+  return inference::from_coordinate(parameter.scale,
+                                    typical + 0.3 * (std::abs(up) > std::abs(down) ? up : down));
 }
 
 /// Sizes beyond those of `trial_sizes` up to the bound, for what moves a resonance.
@@ -57,9 +50,10 @@ std::vector<double> far_sizes(const Effect& effect, const rig::RigModel& base) {
   constexpr double ratio = 1.3;
   const EffectParameter& parameter = effect.parameters()[0];
   if (parameter.scale != SearchScale::inverse_square) return {};
-  const double from = rig::to_search(parameter.scale, effect.neutral(base)[0]);
-  const double towards = rig::to_search(parameter.scale, parameter.typical);
-  const double bound = rig::to_search(parameter.scale, towards > from ? parameter.lower : parameter.upper);
+  const auto at = [&](double value) { return inference::to_coordinate(parameter.scale, value); };
+  const double from = at(effect.neutral(base)[0]);
+  const double towards = at(parameter.typical);
+  const double bound = at(towards > from ? parameter.lower : parameter.upper);
   std::vector<double> sizes;
   for (double size = ratio * trial_sizes(effect).back(); size < (bound - from) / (towards - from);
        size *= ratio)
@@ -67,9 +61,9 @@ std::vector<double> far_sizes(const Effect& effect, const rig::RigModel& base) {
   return sizes;
 }
 
-void set_change_points(Lead& lead, size_t moments, const Eigen::VectorXd& left, const rig::RigFit& current,
+void set_change_points(Lead& lead, size_t points, const Eigen::VectorXd& left, const rig::RigFit& current,
                        const Eigen::VectorXd& weights) {
-  lead.parameters = lead.term.effect->parameters().size() + change_point_parameters * moments;
+  lead.parameters = lead.term.effect->parameters().size() + change_point_parameters * points;
   lead.gain = weights.dot(current.residuals.cwiseAbs2() - left.cwiseAbs2());
   lead.visibility = std::sqrt(std::max(lead.gain, 0.0));
 }
@@ -89,29 +83,14 @@ void search_change_points(Lead& lead, const rig::RigProblem& problem, const rig:
   lead.fit = std::move(found->fit);
 }
 
-Eigen::MatrixXd basis_of(const Eigen::MatrixXd& columns) {
-  Eigen::MatrixXd basis(columns.rows(), columns.cols());
-  Eigen::Index count = 0;
-  for (Eigen::Index c = 0; c < columns.cols(); ++c) {
-    Eigen::VectorXd column = columns.col(c);
-    const double size = column.norm();
-    if (!(size > 0.0) || !std::isfinite(size)) continue;
-    for (int again = 0; again < 2; ++again)
-      column -= basis.leftCols(count) * (basis.leftCols(count).transpose() * column);
-    if (column.norm() < dependent * size) continue;
-    basis.col(count++) = column.normalized();
-  }
-  return basis.leftCols(count);
-}
-
 double linear_gain(const Eigen::MatrixXd& basis, const Eigen::MatrixXd& columns,
                    const Eigen::VectorXd& residuals) {
   Eigen::MatrixXd free = columns;
   for (int again = 0; again < 2; ++again)
     free -= basis * (basis.transpose() * free);
   for (Eigen::Index c = 0; c < free.cols(); ++c)
-    if (free.col(c).norm() < dependent * columns.col(c).norm()) free.col(c).setZero();
-  return (basis_of(free).transpose() * residuals).squaredNorm();
+    if (free.col(c).norm() < rig::dependent * columns.col(c).norm()) free.col(c).setZero();
+  return (rig::basis_of(free).transpose() * residuals).squaredNorm();
 }
 
 namespace {
@@ -127,8 +106,8 @@ class Screening {
         weights_(weights),
         root_(weights.cwiseSqrt()),
         residuals_(root_.asDiagonal() * current.residuals),
-        without_(problem.residuals(current.terms, current.values, rig::for_differences)),
-        known_(basis_of(root_.asDiagonal() * current.jacobian)) {}
+        without_(problem.residuals(current, rig::for_differences)),
+        known_(rig::basis_of(root_.asDiagonal() * current.jacobian)) {}
 
   [[nodiscard]] std::optional<Lead> lead_of(const Effect& effect) const {
     return effect.change_points() == ChangePoints::none ? lead_by_size(effect)
@@ -137,11 +116,10 @@ class Screening {
 
  private:
   [[nodiscard]] Eigen::VectorXd change_by(const Effect& effect, const std::vector<double>& values) const {
-    std::vector<rig::ModelTerm> terms = current_.terms;
-    terms.push_back({&effect, {}});
-    std::vector<double> all = current_.values;
-    all.insert(all.end(), values.begin(), values.end());
-    return root_.asDiagonal() * (problem_.residuals(terms, all, rig::for_differences) - without_);
+    rig::KnownModel more = current_;
+    more.terms.push_back({&effect, {}});
+    more.values.insert(more.values.end(), values.begin(), values.end());
+    return root_.asDiagonal() * (problem_.residuals(more, rig::for_differences) - without_);
   }
   [[nodiscard]] Eigen::VectorXd beyond_known(const Eigen::VectorXd& change) const {
     return change - known_ * (known_.transpose() * change);

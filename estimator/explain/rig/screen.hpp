@@ -8,8 +8,8 @@
 //
 //   gain = |Q^T r|^2,  Q an orthonormal basis of D with J projected out
 //
-// An effect that begins at a moment has its moments scanned (estimator/rig_fit/change_point_search.hpp) and searched when it is
-// tried; each counts as a parameter, and for the samples among which it was chosen.
+// An effect that begins at a change point has them scanned (estimator/rig_fit/change_point_search.hpp) and searched when it
+// is tried; each counts as a parameter, and for the samples among which it was chosen.
 //
 // Finite sizes, because some effects show nothing near their neutral value (gas at the pump, a slow catheter). One that moves
 // a resonance shows the truth's likeness only near the truth: it is tried at sizes up to its bound, and what counts of
@@ -29,18 +29,15 @@ struct Lead {
   double gain = 0.0;        ///< of weighted squares; infinite gains do not exist: at most what is there
   double visibility = 0.0;  ///< of the effect at its typical size, in sigmas, the nuisances refitted
   size_t parameters = 0;
-  std::optional<rig::RigFit> fit = {};  ///< made when an effect's moments were searched
+  std::optional<rig::RigFit> fit = {};  ///< made when an effect's change points were searched
 };
 
-/// Searches the moments of an effect that has them, of which `screen` only scanned. No gain is left if there are none.
+/// Searches the change points of an effect that has them, of which `screen` only scanned. No gain is left if there are none.
 void search_change_points(Lead& lead, const rig::RigProblem& problem, const rig::Session& session,
                           const rig::RigFit& current, const Eigen::VectorXd& weights);
 
-/// What choosing a moment among a session's samples is worth in parameters.
+/// What choosing a change point among a session's samples is worth in parameters.
 inline constexpr size_t change_point_parameters = 3;
-
-/// An orthonormal basis of the columns' span; columns that depend on others are left out.
-Eigen::MatrixXd basis_of(const Eigen::MatrixXd& columns);
 
 /// What least squares over `columns` takes off beyond `basis`; all rows times sqrt(weights).
 double linear_gain(const Eigen::MatrixXd& basis, const Eigen::MatrixXd& columns,

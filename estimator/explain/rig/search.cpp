@@ -11,6 +11,7 @@
 
 #include "estimator/explain/rig/tolerance.hpp"
 #include "estimator/explain/verdict/chi_square.hpp"
+#include "estimator/explain/verdict/verdict.hpp"
 #include "estimator/parallel/parallel_for.hpp"
 
 namespace diastole::explain {
@@ -20,8 +21,8 @@ constexpr double far_behind = 4.0;      // of the best set's excess over the flo
 constexpr double at_the_floor = 0.003;  // of reduced chi-squares
 constexpr double alike =
     0.8;  // of a member's drop in chi-square: what a look-alike's linear gain reaches at least
-constexpr double alike_by_scan = 0.9;  // the same for scanned moments, whose gain is known within 5 %
-constexpr double hopeless = 0.3;       // of the best lead's gain: linear gains of large effects are rough
+constexpr double alike_by_scan = 0.9;  // the same for scanned change points, whose gain is known within 5 %
+constexpr double hopeless = 0.3;  // of the best lead's gain: linear gains of large effects are approximate
 
 constexpr double models_error = 5e-5;  // of explained squares: the model errs by 0.7 % of what effects change
 constexpr double worth_a_partner = 0.02;  // of reduced chi-square above the noise, for a synergy to be tried
@@ -102,7 +103,7 @@ class Search {
     Lead* lead;
     double least_gain;
   };
-  /// The sets with each lead added, but for those whose moments are searched and gain too little.
+  /// The sets with each lead added, but for those whose change points are searched and gain too little.
   std::vector<size_t> tried(size_t from, const std::vector<Attempt>& attempts);
   [[nodiscard]] bool worth_searching(size_t from, const Lead& lead, const std::vector<size_t>& grown) const;
   std::vector<size_t> grow(size_t from);
@@ -117,7 +118,7 @@ class Search {
   }
   void seek();
   void compare_alike(size_t set);
-  /// Whether an effect without moments is not in the set yet and fits the specimen.
+  /// Whether an effect without change points is not in the set yet and fits the specimen.
   [[nodiscard]] bool can_join(const std::vector<rig::ModelTerm>& set, const Effect& effect) const {
     return effect.change_points() == ChangePoints::none && effect.fits(family_) &&
            std::none_of(set.begin(), set.end(), [&](const auto& in) { return in.effect == &effect; });
@@ -176,7 +177,7 @@ std::vector<size_t> Search::tried(size_t from, const std::vector<Attempt>& attem
   parallel_for(attempts.size(), problem_.threads(), [&](size_t i) {
     Lead& lead = *attempts[i].lead;
     if (!has_change_points(lead)) return;
-    tell(fmt::format("searching moments of {}", lead.term.effect->text().id));
+    tell(fmt::format("searching change points of {}", lead.term.effect->text().id));
     search_change_points(lead, problem_, session_, current, weights_);
   });
   std::vector<size_t> places;
@@ -238,11 +239,11 @@ std::vector<size_t> Search::with_partners(size_t from, const std::vector<size_t>
   return pairs;
 }
 
-/// Whether a lead's moments are worth their search, which costs more than all other fits: not if what a scan promises is
+/// Whether a lead's change points are worth their search, which costs more than all other fits: not if what a scan promises is
 /// far behind what was fitted already.
 bool Search::worth_searching(size_t from, const Lead& lead, const std::vector<size_t>& grown) const {
-  constexpr double rough = 1.1;  // of the promise
-  const double promised = std::max(result_.sets[from].chi_square - rough * lead.gain, 0.0) / weights_.sum();
+  constexpr double inexact = 1.1;  // of the promise
+  const double promised = std::max(result_.sets[from].chi_square - inexact * lead.gain, 0.0) / weights_.sum();
   return std::all_of(grown.begin(), grown.end(),
                      [&](size_t set) { return worth_following(promised, reduced(set)); });
 }
@@ -257,17 +258,18 @@ std::vector<size_t> Search::grow(size_t from) {
   };
   const double hope = leads.empty() ? 0.0 : hopeless * leads.front().gain;
   for (size_t next = 0; grown.size() < options_.refitted && next < leads.size();) {
-    std::vector<Attempt> sized, with_moments;  // more follow where searched moments come to nothing
-    for (; grown.size() + sized.size() + with_moments.size() < options_.refitted && next < leads.size();
+    std::vector<Attempt> sized,
+        with_change_points;  // more follow where searched change points come to nothing
+    for (; grown.size() + sized.size() + with_change_points.size() < options_.refitted && next < leads.size();
          ++next) {
       const double least = admission(leads[next].parameters);
       if (leads[next].gain >= std::max(hope, least))
-        (has_change_points(leads[next]) ? with_moments : sized).push_back({&leads[next], least});
+        (has_change_points(leads[next]) ? with_change_points : sized).push_back({&leads[next], least});
     }
     try_all(sized);
-    std::erase_if(with_moments,
+    std::erase_if(with_change_points,
                   [&](const Attempt& attempt) { return !worth_searching(from, *attempt.lead, grown); });
-    try_all(with_moments);
+    try_all(with_change_points);
   }
   for (const size_t rival : with_rivals(from, grown))
     grown.push_back(rival);

@@ -44,9 +44,6 @@ struct SearchOptions {
 /// probability of 1e-7 a candidate.
 double admission(size_t parameters);
 
-/// Within this of the best set's squares another set fits as well (3 sigma).
-inline constexpr double as_good = 9.0;
-
 /// Whether a set is grown further beside the best one so far, by their reduced chi-squares: one that leaves four times as much
 /// above the noise is not. The best itself always is.
 bool worth_following(double reduced, double best);

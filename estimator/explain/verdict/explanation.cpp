@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <stdexcept>
 
 namespace diastole::explain {
@@ -24,6 +25,11 @@ Verdict verdict_named(std::string_view word) {
   for (const Verdict verdict : {Verdict::named, Verdict::ambiguous, Verdict::unexplained, Verdict::none})
     if (name_of(verdict) == word) return verdict;
   throw std::invalid_argument(fmt::format("\"{}\" is no verdict", word));
+}
+
+bool is_settled(const std::vector<SearchEnd>& searches) {
+  return std::ranges::all_of(
+      searches, [](const SearchEnd& search) { return inference::is_settled(search.termination); });
 }
 
 }  // namespace diastole::explain

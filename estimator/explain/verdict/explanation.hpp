@@ -8,6 +8,8 @@
 #include <string_view>
 #include <vector>
 
+#include "estimator/inference/termination.hpp"
+
 namespace diastole::explain {
 
 /// named: exactly one set of effects survives. ambiguous: these data cannot tell several sets apart. unexplained: the
@@ -107,6 +109,14 @@ struct Step {
   double reduced_chi_square = 0.0;
 };
 
+/// How the search of a fit that the verdict rests on ended.
+struct SearchEnd {
+  std::vector<std::string> effects;  ///< none: the base model's
+  inference::Termination termination = inference::Termination::converged;
+};
+/// Whether all of them did so where they were to end.
+bool is_settled(const std::vector<SearchEnd>& searches);
+
 struct NextExperiment {
   std::string toml;  ///< runnable: contracts.md section 6
   std::vector<std::string> separates;
@@ -124,6 +134,8 @@ struct Explanation {
   std::optional<NextExperiment> next_experiment;
   std::string study_after;  ///< file name beside the JSON; empty if nothing was added
   std::string summary;      ///< a few sentences for people
+  bool converged = true;    ///< all of `searches`: without, nothing is named
+  std::vector<SearchEnd> searches;
 
   std::vector<Candidate> evidence;
   std::vector<ParameterShift> shifts;

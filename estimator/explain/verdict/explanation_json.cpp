@@ -35,8 +35,10 @@ DIASTOLE_MEMBERS(Step, added, reduced_chi_square)
 
 DIASTOLE_MEMBERS(NextExperiment, toml, separates, predicted_separation_sigma, reason)
 
-DIASTOLE_MEMBERS(Explanation, study, verdict, summary, effects, ambiguous_with, where, gap, next_experiment,
-                 study_after, evidence, shifts, steps, traces, field, seconds)
+DIASTOLE_MEMBERS(SearchEnd, effects, termination)
+
+DIASTOLE_MEMBERS(Explanation, study, verdict, summary, converged, searches, effects, ambiguous_with, where,
+                 gap, next_experiment, study_after, evidence, shifts, steps, traces, field, seconds)
 
 }  // namespace explain
 
@@ -46,6 +48,18 @@ struct JsonWords<explain::Verdict> {
   static constexpr std::array all{explain::Verdict::named, explain::Verdict::ambiguous,
                                   explain::Verdict::unexplained, explain::Verdict::none};
   static constexpr auto word_of = explain::name_of;
+};
+
+template <>
+struct JsonWords<inference::Termination> {
+  using enum inference::Termination;
+  static constexpr const char* kind = "termination";
+  static constexpr std::array all{converged, on_bound, stalled, iteration_limit, interrupted, no_solution};
+  static constexpr std::array words{"converged",       "on-bound",    "stalled",
+                                    "iteration-limit", "interrupted", "no-solution"};
+  static const char* word_of(inference::Termination termination) {
+    return words[static_cast<size_t>(termination)];
+  }
 };
 
 namespace explain {

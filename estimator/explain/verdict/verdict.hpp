@@ -1,29 +1,56 @@
 #pragma once
-// From the fitted sets to a verdict.
+// From fitted sets of effects to a verdict, whatever they were fitted to.
 
 #include <string>
 #include <vector>
 
-#include "estimator/explain/rig/residual_cells.hpp"
-#include "estimator/explain/rig/search.hpp"
 #include "estimator/explain/verdict/explanation.hpp"
 
 namespace diastole::explain {
 
+/// Within this of the best set's squares another set fits as well (3 sigma).
+inline constexpr double as_good = 9.0;
+
+/// A set of effects that was fitted to all data.
+struct FittedEffects {
+  std::vector<std::string> ids;  ///< sorted; empty: the base model
+  double chi_square = 0.0;       ///< weighted
+  size_t parameters = 0;
+  inference::Termination termination = inference::Termination::converged;
+};
+
+/// An effect that was screened by the base model's residuals, fitted or not.
+struct ScreenedEffect {
+  std::string id;
+  double gain = 0.0;        ///< of chi-square, by the score test
+  double visibility = 0.0;  ///< in sigmas, at its typical size
+  size_t parameters = 0;
+};
+
+/// What a search has seen.
+struct SearchRecord {
+  std::vector<FittedEffects> sets;  ///< the base model first
+  size_t best = 0;                  ///< the set chosen
+  std::vector<ScreenedEffect> screened;
+};
+
 struct Judgement {
   Verdict verdict = Verdict::none;
   std::vector<std::vector<std::string>> ambiguous_with;
-  std::vector<ResidualCell> left;  ///< structure that remains after the chosen set
+  std::vector<SearchEnd> searches;  ///< that the verdict rests on
 };
 
 /// Evidence that is too weak to name anything and too strong to say "none" leaves all effects that could be meant beside
-/// nothing at all: ambiguous, with no effect. `left`: cells of the chosen set's residuals that stand out (residual_cells.hpp).
-/// `gap`: how base and chosen set predict what they were not fitted to. A set that predicts it worse than the base model
-/// is not named, nor is one whose squares are no numbers: unexplained.
-Judgement judge(const SearchResult& search, std::vector<ResidualCell> left, const Gap& gap);
+/// nothing at all: ambiguous, with no effect. `structure_left`: whether the chosen set's residuals are more than noise.
+/// `gap`: how base and chosen set predict what they were not fitted to. Unexplained, and nothing is named: a set that
+/// predicts it worse than the base model, one whose squares are no numbers, and one whose own search or the base model's did
+/// not settle.
+Judgement judge(const SearchRecord& search, bool structure_left, const Gap& gap);
 
-/// Whether what remains is more than a known model leaves: one cell beyond chance so far that the number of cells
-/// does not matter (Holm at 1e-6).
-bool is_structured(const std::vector<ResidualCell>& left, size_t cells);
+/// The evidence table: what became of each set and of each effect that was only screened.
+std::vector<Candidate> evidence(const SearchRecord& search, const Judgement& judgement);
+
+/// A few sentences for people; with one for each search that did not settle.
+std::string summary_of(const Explanation& found);
 
 }  // namespace diastole::explain

@@ -8,7 +8,7 @@
 #include <set>
 #include <string>
 
-#include "estimator/rig_fit/search_scale.hpp"
+#include "estimator/rig_fit/rig_fit.hpp"
 #include "tests/estimator/rig_fit/simulated_session.hpp"
 
 namespace diastole {
@@ -16,7 +16,7 @@ namespace {
 
 using rig::RigModel;
 
-std::vector<ChangePoint> occasions_of(const Effect& effect) {
+std::vector<ChangePoint> change_points_of(const Effect& effect) {
   if (effect.change_points() == ChangePoints::none) return {};
   return {{"baseline", 3.1, 63.1}};
 }
@@ -34,13 +34,13 @@ class EveryEffect : public testing::TestWithParam<const Effect*> {
     RigModel model;
     model.curve = family_.plain();
     model.modulus_kPa = 8.0;
-    if (values != nullptr) GetParam()->apply(*values, {family_, occasions_}, model);
+    if (values != nullptr) GetParam()->apply(*values, {family_, change_points_}, model);
     return rig::observe(model, rig::simulate_plant(model, run_.drive), run_.drive.place, run_.sample_s);
   }
 
   rig::SpecimenFamily family_ = rig::gel_family();
   rig::SessionRun run_ = rig::empty_run("baseline", {0.0, "parabolic", 40.0, 1.2, 0.0, 2}, 60.0);
-  std::vector<ChangePoint> occasions_ = occasions_of(*GetParam());
+  std::vector<ChangePoint> change_points_ = change_points_of(*GetParam());
 };
 
 TEST_P(EveryEffect, TellsEverything) {
@@ -82,29 +82,24 @@ TEST_P(EveryEffect, ShowsWhereItIsTypical) {
 
 /// The fit's forward difference against a central one of ten times its step.
 TEST_P(EveryEffect, HasTheGradientThatTheFitTakes) {
-  const std::vector<rig::ModelTerm> terms{{GetParam(), occasions_}};
-  std::vector<rig::Unknown> unknowns(3, {"", 1.0, 10.0});
-  for (const EffectParameter& parameter : GetParam()->parameters())
-    unknowns.push_back({std::string(parameter.name), parameter.lower, parameter.upper});
-  const auto coordinates = rig::search_coordinates(terms, unknowns);
   const std::vector<double> at = typical(*GetParam());
   const rig::Prediction here = shown(&at);
   for (size_t j = 0; j < at.size(); ++j) {
-    const rig::SearchCoordinate& coordinate = coordinates[3 + j];
+    const rig::Unknown unknown = rig::unknown_of(*GetParam(), GetParam()->parameters()[j]);
     const auto moved = [&](double by) {
       std::vector<double> values = at;
-      values[j] = rig::from_search(coordinate.scale, rig::to_search(coordinate.scale, at[j]) + by);
+      values[j] = unknown.value(unknown.coordinate(at[j]) + by);
       return shown(&values);
     };
-    const rig::Prediction forward = moved(coordinate.perturbation);
-    const rig::Prediction up = moved(10.0 * coordinate.perturbation);
-    const rig::Prediction down = moved(-10.0 * coordinate.perturbation);
+    const rig::Prediction forward = moved(unknown.perturbation);
+    const rig::Prediction up = moved(10.0 * unknown.perturbation);
+    const rig::Prediction down = moved(-10.0 * unknown.perturbation);
     double difference = 0.0;
     double size = 0.0;
     for (size_t k = 0; k < here.cavity_kPa.size(); ++k) {
       for (const auto channel : {&rig::Prediction::cavity_kPa, &rig::Prediction::pump_kPa}) {
-        const double slope = ((forward.*channel)[k] - (here.*channel)[k]) / coordinate.perturbation;
-        const double central = ((up.*channel)[k] - (down.*channel)[k]) / (20.0 * coordinate.perturbation);
+        const double slope = ((forward.*channel)[k] - (here.*channel)[k]) / unknown.perturbation;
+        const double central = ((up.*channel)[k] - (down.*channel)[k]) / (20.0 * unknown.perturbation);
         difference += (slope - central) * (slope - central);
         size += central * central;
       }

@@ -26,15 +26,14 @@ rig::Session slow_session(const rig::SpecimenFamily& family, const char* id, dou
 }
 
 TEST(ExperimentPlan, StaysWithinTheLimits) {
-  const rig::Hose hose;
-  ExperimentLimits limits;
-  const auto all = possible_segments(limits, hose);
+  ExperimentLimits limits{.inertance = rig::Hose{}.inertance()};
+  const auto all = possible_segments(limits);
   EXPECT_GE(all.size(), 12U);
   limits.largest_mL = 20.0;
-  for (const auto& segment : possible_segments(limits, hose))
+  for (const auto& segment : possible_segments(limits))
     EXPECT_LE(segment.offset_mL + segment.stroke_mL, 20.0) << words_of(segment);
-  limits.motion.acceleration_mL_s2 = 100.0;
-  const auto gentle = possible_segments(limits, hose);
+  limits.acceleration_mL_s2 = 100.0;
+  const auto gentle = possible_segments(limits);
   EXPECT_LT(gentle.size(), all.size());
   for (const auto& segment : gentle) {
     if (segment.waveform != "parabolic") continue;
@@ -43,7 +42,7 @@ TEST(ExperimentPlan, StaysWithinTheLimits) {
 }
 
 TEST(ExperimentPlan, WritesFilesThatDiastoleRunReads) {
-  PlannedExperiment plan{possible_segments({}, {}), true, true, true, true};
+  PlannedExperiment plan{possible_segments({.inertance = rig::Hose{}.inertance()}), true, true, true, true};
   const Experiment read = parse_experiment(to_toml(plan, "Separates a from b"), "next.experiment.toml");
   ASSERT_EQ(read.segments.size(), plan.segments.size());
   EXPECT_EQ(read.gate_every, 2);
@@ -83,7 +82,7 @@ double found_sigma(const rig::SpecimenFamily& family, rig::Session session, cons
   for (double t = 0.0; t <= run.drive.end_s; t += 1.0 / 300.0)
     run.sample_s.push_back(t);
   const rig::RigProblem before(session, family);
-  const rig::RigModel model = before.model(truth.terms, truth.values);
+  const rig::RigModel model = before.model(truth);
   const rig::PlantTrace plant = rig::simulate_plant(model, run.drive);
   auto& pressure = run.pressure_kPa[rig::Channel::cavity];
   pressure = rig::observe(model, plant, run.drive.place, run.sample_s).cavity_kPa;
@@ -96,8 +95,7 @@ double found_sigma(const rig::SpecimenFamily& family, rig::Session session, cons
   }
   session.runs.push_back(run);
   const rig::RigProblem after(session, family);
-  const double gap = after.fit_from(other.terms, other.values).chi_square -
-                     after.fit_from(truth.terms, truth.values).chi_square;
+  const double gap = after.fit_from(other).chi_square - after.fit_from(truth).chi_square;
   return std::sqrt(std::max(gap, 0.0));
 }
 
@@ -109,7 +107,7 @@ TEST(NextExperiment, SeparatesWhatLooksAlikeAsPredicted) {
   const rig::RigFit hose = problem.fit({{find_effect("hose-compliance")}});
   ASSERT_LT(std::abs(bubble.chi_square - hose.chi_square), 9.0) << "the session itself tells them apart";
 
-  const ExperimentDesign design{session, problem, {}};
+  const ExperimentDesign design{session, problem, limits_of(session)};
   const auto next = separating_experiment(design, {&bubble, &hose});
   ASSERT_TRUE(next.has_value());
   EXPECT_THAT(next->separates, ElementsAre("air-bubble-pump", "hose-compliance"));
@@ -144,7 +142,8 @@ TEST(NextExperiment, AnImageAtRestTellsARadiusFromSlippingEnds) {
   EXPECT_LT(apart(slip, radius), seen);          // a radius that the session only suspects gives way
   EXPECT_EQ(gram_beside(radius, slip, {true}, knowledge).norm(), 0.0);
 
-  const auto next = separating_experiment({session, problem, {}, 2, knowledge}, {&radius, &slip});
+  const auto next =
+      separating_experiment({session, problem, limits_of(session), 2, knowledge}, {&radius, &slip});
   ASSERT_TRUE(next.has_value());
   EXPECT_NO_THROW(parse_experiment(next->toml, "next.experiment.toml"));
 }
@@ -154,7 +153,7 @@ TEST(NextExperiment, NarrowsWhatIsNamed) {
   const rig::Session session = slow_session(family, "seal-leak-pump", 0.02);
   const rig::RigProblem problem(session, family);
   const rig::RigFit leak = problem.fit({{find_effect("seal-leak-pump")}});
-  const auto next = sharpening_experiment({session, problem, {}}, leak);
+  const auto next = sharpening_experiment({session, problem, limits_of(session)}, leak);
   ASSERT_TRUE(next.has_value());
   EXPECT_THAT(next->reason, HasSubstr("narrows the interval of seal-leak-pump."));
   EXPECT_GT(next->predicted_separation_sigma, 0.0);
@@ -170,14 +169,14 @@ TEST(NextExperiment, ShowsThePlaceOfWhatIsUnexplained) {
   worst.run = session.runs[0].drive.place.name + ".run.h5";
   worst.segment = 0;
   worst.excess_chi2 = 100.0;
-  const auto next = exposing_experiment({session, problem, {}}, worst);
+  const auto next = exposing_experiment({session, problem, limits_of(session)}, worst);
   ASSERT_TRUE(next.has_value());
   const Experiment read = parse_experiment(next->toml, "next.experiment.toml");
   ASSERT_EQ(read.segments.size(), 2U);
   EXPECT_EQ(read.segments[1].period_s, 2 * read.segments[0].period_s);
   EXPECT_GT(next->predicted_separation_sigma, 10.0);
   worst.run = "";
-  EXPECT_FALSE(exposing_experiment({session, problem, {}}, worst).has_value());
+  EXPECT_FALSE(exposing_experiment({session, problem, limits_of(session)}, worst).has_value());
 }
 
 }  // namespace

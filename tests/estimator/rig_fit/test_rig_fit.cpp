@@ -11,7 +11,7 @@ TEST(RigFit, BaseModelMeetsItsOwnNoise) {
   const SpecimenFamily family = gel_family();
   const Session session = simulated_session(family, {});
   const RigProblem problem(session, family);
-  EXPECT_TRUE(problem.base().converged);
+  EXPECT_EQ(problem.base().termination, inference::Termination::converged);
   EXPECT_NEAR(problem.base().reduced(), 1.0, 0.05);
   EXPECT_NEAR(problem.base().value("modulus_kPa"), 8.0, 4.0 * problem.base().errors[0]);
   EXPECT_NEAR(problem.noise().channels.at(Channel::cavity).sd_kPa, 0.01, 0.001);
@@ -54,11 +54,18 @@ TEST(RigFit, CycleVariationMayBeThatOfAModelWithEffects) {
   noise.cycle_sd = cycle_sd;
   const RigProblem plain(session, family, {.noise = noise});
   const RigFit first = plain.fit(leaking);
-  const RigProblem leaky(session, family,
-                         {.variation_of = KnownModel{leaking, first.values}, .noise = noise});
-  const RigFit second = leaky.fit_from(leaking, first.values);
+  const RigProblem leaky(session, family, {.variation_of = first, .noise = noise});
+  const RigFit second = leaky.fit_from(first);
   EXPECT_NEAR(second.reduced(), 1.0, 0.04);
   EXPECT_LT(second.chi_square, first.chi_square);
+}
+
+TEST(RigFit, ASearchThatIsCutShortSaysSo) {
+  const SpecimenFamily family = gel_family();
+  const Session session = simulated_session(family, {});
+  const RigProblem problem(session, family, {.iteration_limit = 1});
+  EXPECT_EQ(problem.fit({{find_effect("cannula-leak-cavity")}}).termination,
+            inference::Termination::iteration_limit);
 }
 
 TEST(RigFit, AMissingSampleCostsOnlyItsNeighbours) {
