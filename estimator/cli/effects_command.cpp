@@ -25,7 +25,7 @@ nlohmann::ordered_json to_json(std::span<const EffectParameter> parameters) {
 }
 
 nlohmann::ordered_json to_json(const Effect& effect) {
-  const EffectText& text = effect.text();
+  const EffectDeclaration& text = effect.text();
   nlohmann::ordered_json json = {{"id", text.id},
                                  {"title", text.title},
                                  {"port", name_of(text.port)},
@@ -54,7 +54,7 @@ void print_for_people(std::string_view title, std::span<const EffectParameter> p
 }
 
 void print_for_people(const Effect& effect) {
-  const EffectText& text = effect.text();
+  const EffectDeclaration& text = effect.text();
   fmt::print("{}: {} (port: {})\n\n", text.id, text.title, name_of(text.port));
   fmt::print("  Equations    {}\n  Source       {}\n  Looks like   {}\n  Revealed by  {}\n", text.equations,
              text.source, text.looks_like, text.revealed_by);

@@ -1,46 +1,32 @@
 // Air between piston and hose.
 
-#include <array>
-
 #include "estimator/effects/effect.hpp"
 
 namespace diastole {
 namespace {
 
-class AirBubblePump final : public Effect {
- public:
-  [[nodiscard]] const EffectText& text() const override {
-    static const EffectText text{
-        .id = "air-bubble-pump",
-        .title = "air bubble at the pump",
-        .port = Port::drive,
-        .equations = "V_piston - xi_0 = V_b (1 - (p_a / (p_a + p_pump))^(1/n)), n = 1.2.",
-        .source =
-            "Polytropic gas: bubbles of some millimetres at about a hertz lie between isothermal and "
-            "adiabatic.",
-        .looks_like =
-            "With the hose's inertance a spring: the volume in the cavity overshoots, pressures ring "
-            "at some Hz after each turn.",
-        .revealed_by = "Fast strokes and a sensor at the pump; the same stroke slowly shows almost nothing.",
-        .conflicts = {"hose-compliance"},
-        .synergies = {"hose-inertance-excess"},
-    };
-    return text;
-  }
-  [[nodiscard]] std::span<const EffectParameter> parameters() const override {
-    static constexpr std::array<EffectParameter, 1> list{
-        {{"volume_mL", "mL", "of the gas at atmospheric pressure", 0.0, 0.0, 50.0, 3.0}}};
-    return list;
-  }
-  void apply(std::span<const double> values, const Context&, rig::RigModel& model) const override {
-    model.pump_gas_mL += values[0];
-  }
-};
+void apply(std::span<const double> values, const EffectContext&, rig::RigModel& model) {
+  model.pump_gas_mL += values[0];
+}
 
 }  // namespace
 
 const Effect& air_bubble_pump_effect() {
-  static const AirBubblePump effect;
+  static const Effect effect{{
+      .id = "air-bubble-pump",
+      .title = "air bubble at the pump",
+      .port = Port::drive,
+      .equations = "V_piston - xi_0 = V_b (1 - (p_a / (p_a + p_pump))^(1/n)), n = 1.2.",
+      .source = "Polytropic gas: bubbles of some millimetres at about a hertz lie between isothermal and "
+                "adiabatic.",
+      .looks_like = "With the hose's inertance a spring: the volume in the cavity overshoots, pressures ring "
+                    "at some Hz after each turn.",
+      .revealed_by = "Fast strokes and a sensor at the pump; the same stroke slowly shows almost nothing.",
+      .conflicts = {"hose-compliance"},
+      .synergies = {"hose-inertance-excess"},
+      .parameters = {{"volume_mL", "mL", "of the gas at atmospheric pressure", 0.0, 0.0, 50.0, 3.0}},
+      .apply = apply,
+  }};
   return effect;
 }
 

@@ -1,7 +1,6 @@
 // The screw has play: the piston follows the command only when the play is taken up.
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <vector>
 
@@ -64,57 +63,41 @@ std::vector<double> smoothed(const std::vector<double>& values, const std::vecto
   return out;
 }
 
-class Backlash final : public Effect {
- public:
-  [[nodiscard]] const EffectText& text() const override {
-    static const EffectText text{
-        .id = "backlash",
-        .title = "backlash of the drive",
-        .port = Port::drive,
-        .equations =
-            "Play operator: V_piston stays until it touches an end of the gap, V_commanded - s <= V_piston "
-            "<= "
-            "V_commanded - s + backlash; each run begins with s = initial_slack_fraction backlash ahead of "
-            "the "
-            "first inflation.",
-        .source = "M. Brokate, J. Sprekels, Hysteresis and Phase Transitions (1996): the play operator.",
-        .looks_like =
-            "After each turn the pressure stands still for a moment, then jumps; the stroke is smaller by "
-            "the "
-            "play, and a sensor at the pump sees a hammer blow.",
-        .revealed_by =
-            "Strokes of different size: the volume lost is the same in all; turns at rest and in motion.",
-        .conflicts = {"stroke-gain", "missed-steps"},
-        .synergies = {},
-    };
-    return text;
-  }
-  [[nodiscard]] std::span<const EffectParameter> parameters() const override {
-    static constexpr std::array<EffectParameter, 3> list{
-        {{"backlash_mL", "mL", "play between command and piston", 0.0, 0.0, 3.0, 0.2},
-         {"initial_slack_fraction", "", "part of it that lies behind the piston when a run begins", 0.5, 0.0,
-          1.0, 0.5},
-         {"contact_s", "s", "in which a contact closes", 0.012, 0.004, 0.04, 0.012,
-          SearchScale::logarithmic}}};
-    return list;
-  }
-  void apply(std::span<const double> values, const Context&, rig::RigModel& model) const override {
-    const double backlash_mL = values[0];
-    const double slack_mL = values[0] * (1.0 - values[1]);
-    const double contact_s = -values[2] * std::expm1(-backlash_mL / least_play_mL);
-    if (backlash_mL == 0.0) return;
-    model.drive.emplace_back([=](rig::DriveTrace& trace, const rig::RunPlace&) {
-      trace.volume_mL = smoothed(taken_up(backlash_mL, slack_mL, trace),
-                                 normal_weights(std::max(contact_s / trace.step_s, 1e-3)));
-      trace.differentiate();
-    });
-  }
-};
+void apply(std::span<const double> values, const EffectContext&, rig::RigModel& model) {
+  const double backlash_mL = values[0];
+  const double slack_mL = values[0] * (1.0 - values[1]);
+  const double contact_s = -values[2] * std::expm1(-backlash_mL / least_play_mL);
+  if (backlash_mL == 0.0) return;
+  model.drive.emplace_back([=](rig::DriveTrace& trace, const rig::RunPlace&) {
+    trace.volume_mL = smoothed(taken_up(backlash_mL, slack_mL, trace),
+                               normal_weights(std::max(contact_s / trace.step_s, 1e-3)));
+    trace.differentiate();
+  });
+}
 
 }  // namespace
 
 const Effect& backlash_effect() {
-  static const Backlash effect;
+  static const Effect effect{{
+      .id = "backlash",
+      .title = "backlash of the drive",
+      .port = Port::drive,
+      .equations = "Play operator: V_piston stays until it touches an end of the gap, V_commanded - s <= "
+                   "V_piston <= V_commanded - s + backlash; each run begins with s = initial_slack_fraction "
+                   "backlash ahead of the first inflation.",
+      .source = "M. Brokate, J. Sprekels, Hysteresis and Phase Transitions (1996): the play operator.",
+      .looks_like = "After each turn the pressure stands still for a moment, then jumps; the stroke is "
+                    "smaller by the play, and a sensor at the pump sees a hammer blow.",
+      .revealed_by =
+          "Strokes of different size: the volume lost is the same in all; turns at rest and in motion.",
+      .conflicts = {"stroke-gain", "missed-steps"},
+      .parameters = {{"backlash_mL", "mL", "play between command and piston", 0.0, 0.0, 3.0, 0.2},
+                     {"initial_slack_fraction", "",
+                      "part of it that lies behind the piston when a run begins", 0.5, 0.0, 1.0, 0.5},
+                     {"contact_s", "s", "in which a contact closes", 0.012, 0.004, 0.04, 0.012,
+                      SearchScale::logarithmic}},
+      .apply = apply,
+  }};
   return effect;
 }
 

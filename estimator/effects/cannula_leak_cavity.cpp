@@ -1,48 +1,34 @@
 // Fluid leaves the cavity beside the cannula.
 
-#include <array>
-
 #include "estimator/effects/effect.hpp"
 
 namespace diastole {
 namespace {
 
-class CannulaLeakCavity final : public Effect {
- public:
-  [[nodiscard]] const EffectText& text() const override {
-    static const EffectText text{
-        .id = "cannula-leak-cavity",
-        .title = "leak at the cavity",
-        .port = Port::specimen,
-        .equations = "V_cavity' = q_hose - G p_cavity.",
-        .source = "Laminar gap flow: proportional to pressure.",
-        .looks_like =
-            "The pressure falls during a hold, the least volume sinks from cycle to cycle to a new "
-            "balance; the gated volume follows.",
-        .revealed_by =
-            "A hold at volume, and a rest after it: the pressure ends below zero by the volume lost.",
-        .conflicts = {"seal-leak-pump", "viscoelasticity"},
-        .synergies = {},
-    };
-    return text;
-  }
-  [[nodiscard]] std::span<const EffectParameter> parameters() const override {
-    static constexpr std::array<EffectParameter, 1> list{
-        {{"leak_mL_s_kPa", "mL/(s kPa)", "conductance of the gap", 0.0, 0.0, 2.0, 0.1}}};
-    return list;
-  }
-  void apply(std::span<const double> values, const Context&, rig::RigModel& model) const override {
-    const double conductance = values[0];
-    if (conductance == 0.0) return;
-    model.cavity_leaks.emplace_back(
-        [conductance](double pressure_kPa, double) { return conductance * pressure_kPa; });
-  }
-};
+void apply(std::span<const double> values, const EffectContext&, rig::RigModel& model) {
+  const double conductance = values[0];
+  if (conductance == 0.0) return;
+  model.cavity_leaks.emplace_back(
+      [conductance](double pressure_kPa, double) { return conductance * pressure_kPa; });
+}
 
 }  // namespace
 
 const Effect& cannula_leak_cavity_effect() {
-  static const CannulaLeakCavity effect;
+  static const Effect effect{{
+      .id = "cannula-leak-cavity",
+      .title = "leak at the cavity",
+      .port = Port::specimen,
+      .equations = "V_cavity' = q_hose - G p_cavity.",
+      .source = "Laminar gap flow: proportional to pressure.",
+      .looks_like = "The pressure falls during a hold, the least volume sinks from cycle to cycle to a new "
+                    "balance; the gated volume follows.",
+      .revealed_by =
+          "A hold at volume, and a rest after it: the pressure ends below zero by the volume lost.",
+      .conflicts = {"seal-leak-pump", "viscoelasticity"},
+      .parameters = {{"leak_mL_s_kPa", "mL/(s kPa)", "conductance of the gap", 0.0, 0.0, 2.0, 0.1}},
+      .apply = apply,
+  }};
   return effect;
 }
 

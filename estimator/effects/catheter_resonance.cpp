@@ -1,49 +1,37 @@
 // The catheter responds more slowly than the rig's description says.
 
-#include <array>
-
 #include "estimator/effects/effect.hpp"
 
 namespace diastole {
 namespace {
 
-class CatheterResonance final : public Effect {
- public:
-  [[nodiscard]] const EffectText& text() const override {
-    static const EffectText text{
-        .id = "catheter-resonance",
-        .title = "slow catheter",
-        .port = Port::sensor,
-        .equations = "p'' + 2 zeta w p' + w^2 p = w^2 p_cavity, w = 2 pi f0.",
-        .source = "Second-order fluid column and membrane, as a step test measures it.",
-        .looks_like =
-            "The cavity's pressure lags by zeta / (pi f0) and rings after jumps; bubbles in the "
-            "catheter do it.",
-        .revealed_by = "Fast waveforms with jumps; a step test of the catheter (diastole catheter).",
-        .conflicts = {"trigger-delay"},
-        .synergies = {},
-    };
-    return text;
-  }
-  [[nodiscard]] std::span<const EffectParameter> parameters() const override {
-    static constexpr std::array<EffectParameter, 2> list{
-        {{"f0_Hz", "Hz", "resonance", 60.0, 3.0, 200.0, 15.0, SearchScale::inverse_square},
-         {"zeta", "", "part of critical damping", 0.6, 0.05, 2.0, 0.4}}};
-    return list;
-  }
-  [[nodiscard]] Stage stage() const override { return Stage::sensors; }
-  [[nodiscard]] std::vector<double> neutral(const rig::RigModel& base) const override {
-    return {base.catheter.resonance_Hz, base.catheter.damping};
-  }
-  void apply(std::span<const double> values, const Context&, rig::RigModel& model) const override {
-    model.catheter = {values[0], values[1]};
-  }
-};
+std::vector<double> neutral(const rig::RigModel& base) {
+  return {base.catheter.resonance_Hz, base.catheter.damping};
+}
+
+void apply(std::span<const double> values, const EffectContext&, rig::RigModel& model) {
+  model.catheter = {values[0], values[1]};
+}
 
 }  // namespace
 
 const Effect& catheter_resonance_effect() {
-  static const CatheterResonance effect;
+  static const Effect effect{{
+      .id = "catheter-resonance",
+      .title = "slow catheter",
+      .port = Port::sensor,
+      .equations = "p'' + 2 zeta w p' + w^2 p = w^2 p_cavity, w = 2 pi f0.",
+      .source = "Second-order fluid column and membrane, as a step test measures it.",
+      .looks_like = "The cavity's pressure lags by zeta / (pi f0) and rings after jumps; bubbles in the "
+                    "catheter do it.",
+      .revealed_by = "Fast waveforms with jumps; a step test of the catheter (diastole catheter).",
+      .conflicts = {"trigger-delay"},
+      .parameters = {{"f0_Hz", "Hz", "resonance", 60.0, 3.0, 200.0, 15.0, SearchScale::inverse_square},
+                     {"zeta", "", "part of critical damping", 0.6, 0.05, 2.0, 0.4}},
+      .stage = Stage::sensors,
+      .neutral = neutral,
+      .apply = apply,
+  }};
   return effect;
 }
 

@@ -1,60 +1,43 @@
 // The fluid around the specimen yields only against pressure.
 
-#include <array>
-
 #include "estimator/effects/effect.hpp"
 
 namespace diastole {
 namespace {
 
-class ChamberBackPressure final : public Effect {
- public:
-  [[nodiscard]] const EffectText& text() const override {
-    static const EffectText text{
-        .id = "chamber-back-pressure",
-        .title = "back pressure of the chamber",
-        .port = Port::specimen,
-        .equations = "p_cavity = p_specimen(V) + k V.",
-        .source = "A closed chamber of stiffness k around an incompressible wall.",
-        .looks_like =
-            "The cavity seems stiffer and straighter: a part of the pressure is proportional to "
-            "volume.",
-        .revealed_by =
-            "Strokes of different size, where the specimen alone softens; the field, which moves less "
-            "than the pressure says.",
-        .conflicts = {"strain-stiffening", "radius-error", "stroke-gain"},
-        .synergies = {},
-    };
-    return text;
+void apply(std::span<const double> values, const EffectContext&, rig::RigModel& model) {
+  std::vector<rig::SpecimenCurve::Point> points = model.curve.points();
+  const double stiffness = 1e-3 * values[0] / model.modulus_kPa;
+  for (rig::SpecimenCurve::Point& point : points) {
+    point.pressure_kPa += stiffness * point.volume_mL;
+    point.stiffness_kPa_per_mL += stiffness;
   }
-  [[nodiscard]] std::span<const EffectParameter> parameters() const override {
-    static constexpr std::array<EffectParameter, 1> list{
-        {{"k_Pa_mL", "Pa/mL", "stiffness of the chamber", 0.0, 0.0, 200.0, 15.0}}};
-    return list;
-  }
-  void apply(std::span<const double> values, const Context&, rig::RigModel& model) const override {
-    std::vector<rig::SpecimenCurve::Point> points = model.curve.points();
-    const double stiffness = 1e-3 * values[0] / model.modulus_kPa;
-    for (rig::SpecimenCurve::Point& point : points) {
-      point.pressure_kPa += stiffness * point.volume_mL;
-      point.stiffness_kPa_per_mL += stiffness;
-    }
-    model.curve = rig::SpecimenCurve(std::move(points));
-  }
-  [[nodiscard]] std::span<const EffectParameter> field_parameters() const override {
-    static constexpr std::array<EffectParameter, 1> list{
-        {{"k_kPa_per_mL", "kPa/mL", "stiffness of the chamber", 0.0, 0.0, 0.2, 0.01}}};
-    return list;
-  }
-  void apply_to_field(std::span<const double> values, FieldModel& model) const override {
-    model.chamber_stiffness_kPa_per_mL = values[0];
-  }
-};
+  model.curve = rig::SpecimenCurve(std::move(points));
+}
+
+void apply_to_field(std::span<const double> values, FieldModel& model) {
+  model.chamber_stiffness_kPa_per_mL = values[0];
+}
 
 }  // namespace
 
 const Effect& chamber_back_pressure_effect() {
-  static const ChamberBackPressure effect;
+  static const Effect effect{{
+      .id = "chamber-back-pressure",
+      .title = "back pressure of the chamber",
+      .port = Port::specimen,
+      .equations = "p_cavity = p_specimen(V) + k V.",
+      .source = "A closed chamber of stiffness k around an incompressible wall.",
+      .looks_like =
+          "The cavity seems stiffer and straighter: a part of the pressure is proportional to volume.",
+      .revealed_by = "Strokes of different size, where the specimen alone softens; the field, which moves "
+                     "less than the pressure says.",
+      .conflicts = {"strain-stiffening", "radius-error", "stroke-gain"},
+      .parameters = {{"k_Pa_mL", "Pa/mL", "stiffness of the chamber", 0.0, 0.0, 200.0, 15.0}},
+      .apply = apply,
+      .field_parameters = {{"k_kPa_per_mL", "kPa/mL", "stiffness of the chamber", 0.0, 0.0, 0.2, 0.01}},
+      .apply_to_field = apply_to_field,
+  }};
   return effect;
 }
 

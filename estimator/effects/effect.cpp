@@ -24,18 +24,32 @@ std::string_view name_of(Port port) {
   return "";
 }
 
-std::vector<double> Effect::neutral(const rig::RigModel&) const {
+namespace {
+
+std::vector<double> neutral_values(std::span<const EffectParameter> parameters) {
   std::vector<double> values;
-  for (const EffectParameter& parameter : parameters())
+  for (const EffectParameter& parameter : parameters)
     values.push_back(parameter.neutral);
   return values;
 }
 
-std::vector<double> Effect::field_neutral(const FieldModel&) const {
-  std::vector<double> values;
-  for (const EffectParameter& parameter : field_parameters())
-    values.push_back(parameter.neutral);
-  return values;
+}  // namespace
+
+bool Effect::fits(const rig::SpecimenCurves& family) const {
+  return !parameters().empty() && (!declared_.needs_neighbours || family.has_neighbours());
+}
+
+std::vector<double> Effect::neutral(const rig::RigModel& base) const {
+  return declared_.neutral != nullptr ? declared_.neutral(base) : neutral_values(parameters());
+}
+
+size_t Effect::field_essentials() const {
+  return declared_.field_essentials.value_or(field_parameters().size());
+}
+
+std::vector<double> Effect::field_neutral(const FieldModel& base) const {
+  return declared_.field_neutral != nullptr ? declared_.field_neutral(base)
+                                            : neutral_values(field_parameters());
 }
 
 const std::vector<const Effect*>& all_effects() {

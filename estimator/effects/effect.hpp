@@ -3,14 +3,15 @@
 // same: an effect's parameters at their neutral values are the base model exactly, and its text is what `diastole
 // effects` shows.
 //
-// To add one: a file NAME.cpp in this folder that defines `const Effect& NAME_effect()`, and a line in
+// To add one: a file NAME.cpp in this folder that defines `const Effect& NAME_effect()`, its declaration, and a line in
 // effect_list.inc. The tests over the list then check that it is neutral, differentiable, found again in its own
-// simulated data, and silent without cause.
+// simulated data, and silent without cause; docs/effects.md is made from the declarations.
 
 #include <optional>
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "estimator/effects/field_model.hpp"
@@ -36,28 +37,7 @@ struct EffectParameter {
   double upper;
   double typical;  ///< a size worth finding: where searches start and tests simulate
   SearchScale scale = SearchScale::linear;
-  bool seen_at_rest =
-      false;  ///< the part by which the inner radius is larger: an image of the specimen at rest shows it
-};
-
-/// A parameter in images that is a direction: where its search starts is decided by what a little of the effect would gain
-/// at each of the directions of a half turn.
-struct FieldDirection {
-  size_t parameter;  ///< its place in field_parameters()
-  double half_turn;  ///< in its unit; there the effect is the same again
-};
-
-/// What effects tell about themselves; every text is shown to users.
-struct EffectText {
-  std::string_view id;     ///< "hose-compliance": kept for ever (docs/effects.md)
-  std::string_view title;  ///< a few words
-  Port port;
-  std::string_view equations;                    ///< what changes, in the model's symbols
-  std::string_view source;                       ///< where the equations are from
-  std::string_view looks_like;                   ///< in the recordings
-  std::string_view revealed_by;                  ///< the experiment that separates it from others
-  std::vector<std::string_view> conflicts = {};  ///< ids that look alike in some data
-  std::vector<std::string_view> synergies = {};  ///< ids that only show together
+  bool seen_at_rest = false;  ///< the part by which the inner radius is larger: an image at rest shows it
 };
 
 /// Something that happened at a moment of one run: a step of the sensor, steps lost.
@@ -67,59 +47,99 @@ struct ChangePoint {
   double session_s = 0.0;  ///< the same since the session's first run began
 };
 
-/// How many change_points an effect has; they are searched (estimator/rig_fit/change_point_search.hpp). What begins at the only one
-/// lasts for the rest of the session, what begins at one of several for the rest of its run.
+/// How many change points an effect has; they are searched (estimator/rig_fit/change_point_search.hpp). What begins at the
+/// only one lasts for the rest of the session, what begins at one of several for the rest of its run.
 enum class ChangePoints { none, one, several };
 
 /// Whether the fluid's motion changes, or only what the instruments show of it.
 enum class Stage { plant, sensors };
 
-class Effect {
- public:
-  virtual ~Effect() = default;
-
-  [[nodiscard]] virtual const EffectText& text() const = 0;
-  [[nodiscard]] virtual std::span<const EffectParameter> parameters() const = 0;
-  [[nodiscard]] virtual Stage stage() const { return Stage::plant; }
-  [[nodiscard]] virtual ChangePoints change_points() const { return ChangePoints::none; }
-  /// Whether the specimen's modulus is the same at every time, so that a test beside the session measures it too.
-  [[nodiscard]] virtual bool keeps_modulus() const { return true; }
-  /// Whether the specimen can have it.
-  [[nodiscard]] virtual bool fits(const rig::SpecimenCurves&) const { return true; }
-  /// The values that leave `base` as it is.
-  [[nodiscard]] virtual std::vector<double> neutral(const rig::RigModel& base) const;
-
-  /// What apply needs besides the model.
-  struct Context {
-    const rig::SpecimenCurves& family;
-    std::span<const ChangePoint> change_points = {};
-    bool low_fidelity = false;  ///< specimens' neighbours may be (specimen_curves.hpp)
-  };
-  /// Adds itself to the model. `values`: one a parameter. The model's curve and modulus must be set.
-  virtual void apply(std::span<const double> values, const Context& context, rig::RigModel& model) const = 0;
-
-  // The same effect in images of the specimen (field_model.hpp), if it shows there.
-
-  /// Empty: it does not. The first is the effect's size; those after `field_essentials` are only freed once the others
-  /// have been found.
-  [[nodiscard]] virtual std::span<const EffectParameter> field_parameters() const { return {}; }
-  [[nodiscard]] virtual size_t field_essentials() const { return field_parameters().size(); }
-  /// Whether it is an Inclusion, whose parameters are those of `stiff_inclusion.cpp` in their order: it has a place, which is
-  /// searched on a lattice. All others are the same all around the axis.
-  [[nodiscard]] virtual bool is_inclusion() const { return false; }
-  [[nodiscard]] virtual std::optional<FieldDirection> field_direction() const { return {}; }
-  /// The values that leave `base` as it is.
-  [[nodiscard]] virtual std::vector<double> field_neutral(const FieldModel& base) const;
-  /// Adds itself to the model. `values`: one for each of field_parameters().
-  virtual void apply_to_field(std::span<const double>, FieldModel&) const {}
+/// What an effect needs besides the model to be added to it.
+struct EffectContext {
+  const rig::SpecimenCurves& family;
+  std::span<const ChangePoint> change_points = {};
+  bool low_fidelity = false;  ///< specimens' neighbours may be (specimen_curves.hpp)
 };
 
-/// An effect that shows in images only: recordings of the rig cannot have it.
-class FieldEffect : public Effect {
+/// A parameter in images that is a direction: where its search starts is decided by what a little of the effect would gain
+/// in each of the directions of half a turn.
+struct FieldDirection {
+  size_t parameter;  ///< its place in field_parameters
+  double half_turn;  ///< in its unit; there the effect is the same again
+};
+
+/// Whether an effect is the same all around the specimen's axis, or an Inclusion, whose place is searched on a lattice and whose
+/// parameters are those of stiff_inclusion.cpp in their order.
+enum class FieldShape { round, inclusion };
+
+/// All that there is to say of an effect; every text is shown to users. `values` are one number a parameter, in their order.
+struct EffectDeclaration {
+  std::string_view id;     ///< "hose-compliance": kept for ever
+  std::string_view title;  ///< a few words
+  Port port;
+  std::string_view equations;                    ///< what changes, in the model's symbols
+  std::string_view source;                       ///< where the equations are from
+  std::string_view looks_like;                   ///< in the recordings
+  std::string_view revealed_by;                  ///< the experiment that separates it from others
+  std::vector<std::string_view> conflicts = {};  ///< ids that look alike in some data: tried in its place
+  std::vector<std::string_view> synergies = {};  ///< ids that only show together
+
+  // In recordings of the rig, if it shows there.
+  std::vector<EffectParameter> parameters = {};
+  ChangePoints change_points = ChangePoints::none;
+  Stage stage = Stage::plant;
+  bool keeps_modulus = true;  ///< at all times, so that a test beside the session measures the same
+  bool needs_neighbours =
+      false;  ///< only a specimen with computed neighbours can have it (specimen_curves.hpp)
+  /// The values that leave `base` as it is; without: the parameters' neutral ones.
+  std::vector<double> (*neutral)(const rig::RigModel& base) = nullptr;
+  /// The model's curve and modulus must be set.
+  void (*apply)(std::span<const double> values, const EffectContext&, rig::RigModel&) = nullptr;
+
+  // In images of the specimen (field_model.hpp), if it shows there. The first parameter is the effect's size.
+  std::vector<EffectParameter> field_parameters = {};
+  /// Parameters after so many are only freed once those have been found; without: all are free at once.
+  std::optional<size_t> field_essentials = {};
+  FieldShape field_shape = FieldShape::round;
+  std::optional<FieldDirection> field_direction = {};
+  std::vector<double> (*field_neutral)(const FieldModel& base) = nullptr;
+  void (*apply_to_field)(std::span<const double> values, FieldModel&) = nullptr;
+};
+
+/// A declared effect, as the searches ask for it.
+class Effect {
  public:
-  [[nodiscard]] std::span<const EffectParameter> parameters() const final { return {}; }
-  [[nodiscard]] bool fits(const rig::SpecimenCurves&) const final { return false; }
-  void apply(std::span<const double>, const Context&, rig::RigModel&) const final {}
+  explicit Effect(EffectDeclaration declared) : declared_(std::move(declared)) {}
+  Effect(const Effect&) = delete;
+  Effect& operator=(const Effect&) = delete;
+
+  [[nodiscard]] const EffectDeclaration& text() const { return declared_; }
+  /// Empty: it does not show in recordings of the rig.
+  [[nodiscard]] std::span<const EffectParameter> parameters() const { return declared_.parameters; }
+  [[nodiscard]] Stage stage() const { return declared_.stage; }
+  [[nodiscard]] ChangePoints change_points() const { return declared_.change_points; }
+  [[nodiscard]] bool keeps_modulus() const { return declared_.keeps_modulus; }
+  /// Whether the specimen can have it and recordings would show it.
+  [[nodiscard]] bool fits(const rig::SpecimenCurves& family) const;
+  [[nodiscard]] std::vector<double> neutral(const rig::RigModel& base) const;
+  void apply(std::span<const double> values, const EffectContext& context, rig::RigModel& model) const {
+    if (declared_.apply != nullptr) declared_.apply(values, context, model);
+  }
+
+  /// Empty: it does not show in images.
+  [[nodiscard]] std::span<const EffectParameter> field_parameters() const {
+    return declared_.field_parameters;
+  }
+  [[nodiscard]] size_t field_essentials() const;
+  [[nodiscard]] bool is_inclusion() const { return declared_.field_shape == FieldShape::inclusion; }
+  [[nodiscard]] std::optional<FieldDirection> field_direction() const { return declared_.field_direction; }
+  [[nodiscard]] std::vector<double> field_neutral(const FieldModel& base) const;
+  void apply_to_field(std::span<const double> values, FieldModel& model) const {
+    if (declared_.apply_to_field != nullptr) declared_.apply_to_field(values, model);
+  }
+
+ private:
+  EffectDeclaration declared_;
 };
 
 /// The effects of effect_list.inc, in its order. They live as long as the program.
@@ -129,7 +149,6 @@ const std::vector<const Effect*>& all_effects();
 const std::vector<const Effect*>& rig_effects();
 /// Those of them that show in images of the specimen.
 const std::vector<const Effect*>& field_effects();
-
 /// The one of them that is an inclusion.
 const Effect& inclusion_effect();
 

@@ -1,64 +1,46 @@
 // The bond between specimen and plates yields across the axis.
 
-#include <array>
-
 #include "estimator/effects/effect.hpp"
 
 namespace diastole {
 namespace {
 
-class EndBondSlip final : public Effect {
- public:
-  [[nodiscard]] const EffectText& text() const override {
-    static const EffectText text{
-        .id = "end-bond-slip",
-        .title = "slipping end bonds",
-        .port = Port::specimen,
-        .equations =
-            "At the ends u_z = 0 and traction = -u / compliance across the axis; compliance 0 is the "
-            "fixed end.",
-        .source =
-            "Spring bond (estimator/fe/spring_bond.hpp); curves by finite elements "
-            "(specimen_family.hpp).",
-        .looks_like = "The specimen seems softer, with a little less curvature.",
-        .revealed_by = "The field near the plates; gated volumes with an independent modulus.",
-        .conflicts = {"radius-error", "stroke-gain"},
-        .synergies = {},
-    };
-    return text;
-  }
-  [[nodiscard]] std::span<const EffectParameter> parameters() const override {
-    static constexpr std::array<EffectParameter, 1> list{
-        {{"bond_compliance_mm_per_kPa", "mm/kPa", "slip across the axis by traction", 0.0, 0.0, 10.0, 1.0}}};
-    return list;
-  }
-  [[nodiscard]] bool fits(const rig::SpecimenCurves& family) const override {
-    return family.has_neighbours();
-  }
-  void apply(std::span<const double> values, const Context& context, rig::RigModel& model) const override {
-    if (values[0] == 0.0) return;
-    const double compliance_mm = values[0] * model.modulus_kPa;
-    model.curve = model.curve.plus(context.family.slipping(compliance_mm, context.low_fidelity), 1.0, 1.0)
-                      .plus(context.family.plain(), 1.0, -1.0);
-  }
-  [[nodiscard]] std::span<const EffectParameter> field_parameters() const override {
-    static constexpr std::array<EffectParameter, 1> list{
-        {{"bond_stiffness_kPa_per_mm", "kPa/mm", "traction across the axis for slip; 1000 is as good as held",
-          as_good_as_held, 0.02, as_good_as_held, 1.0, SearchScale::logarithmic}}};
-    return list;
-  }
-  void apply_to_field(std::span<const double> values, FieldModel& model) const override {
-    if (values[0] < as_good_as_held) model.bond_stiffness_kPa_per_mm = values[0];
-  }
+constexpr double as_good_as_held = 1000.0;
 
- private:
-  static constexpr double as_good_as_held = 1000.0;
-};
+void apply(std::span<const double> values, const EffectContext& context, rig::RigModel& model) {
+  if (values[0] == 0.0) return;
+  const double compliance_mm = values[0] * model.modulus_kPa;
+  model.curve = model.curve.plus(context.family.slipping(compliance_mm, context.low_fidelity), 1.0, 1.0)
+                    .plus(context.family.plain(), 1.0, -1.0);
+}
+
+void apply_to_field(std::span<const double> values, FieldModel& model) {
+  if (values[0] < as_good_as_held) model.bond_stiffness_kPa_per_mm = values[0];
+}
 
 }  // namespace
 
 const Effect& end_bond_slip_effect() {
-  static const EndBondSlip effect;
+  static const Effect effect{{
+      .id = "end-bond-slip",
+      .title = "slipping end bonds",
+      .port = Port::specimen,
+      .equations = "At the ends u_z = 0 and traction = -u / compliance across the axis; compliance 0 is the "
+                   "fixed end.",
+      .source =
+          "Spring bond (estimator/fe/spring_bond.hpp); curves by finite elements (specimen_family.hpp).",
+      .looks_like = "The specimen seems softer, with a little less curvature.",
+      .revealed_by = "The field near the plates; gated volumes with an independent modulus.",
+      .conflicts = {"radius-error", "stroke-gain"},
+      .parameters = {{"bond_compliance_mm_per_kPa", "mm/kPa", "slip across the axis by traction", 0.0, 0.0,
+                      10.0, 1.0}},
+      .needs_neighbours = true,
+      .apply = apply,
+      .field_parameters = {{"bond_stiffness_kPa_per_mm", "kPa/mm",
+                            "traction across the axis for slip; 1000 is as good as held", as_good_as_held,
+                            0.02, as_good_as_held, 1.0, SearchScale::logarithmic}},
+      .apply_to_field = apply_to_field,
+  }};
   return effect;
 }
 

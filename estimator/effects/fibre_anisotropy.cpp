@@ -1,56 +1,39 @@
 // Fibres make the wall stiffer in one direction.
 
-#include <array>
-
 #include "estimator/effects/effect.hpp"
 
 namespace diastole {
 namespace {
 
-class FibreAnisotropy final : public FieldEffect {
- public:
-  [[nodiscard]] const EffectText& text() const override {
-    static const EffectText text{
-        .id = "fibre-anisotropy",
-        .title = "one family of fibres",
-        .port = Port::field,
-        .equations =
-            "W = C1 (I1 - 3) + k1/(2 k2) (exp(k2 (I4 - 1)^2) - 1), fibres at an angle to the circumference; "
-            "k2 = 0 is "
-            "k1/2 (I4 - 1)^2.",
-        .source =
-            "G. A. Holzapfel, T. C. Gasser, R. W. Ogden, J. Elast. 61 (2000) 1; "
-            "estimator/materials/fibre_reinforced.cpp.",
-        .looks_like =
-            "The wall moves less where its fibres are stretched, and between the plates it turns about the "
-            "axis if "
-            "they run obliquely.",
-        .revealed_by = "Tags in all three directions; diffusion images of the fibres.",
-        .conflicts = {"strain-stiffening"},
-        .synergies = {},
-    };
-    return text;
-  }
-  [[nodiscard]] std::span<const EffectParameter> field_parameters() const override {
-    static constexpr std::array<EffectParameter, 3> list{
-        {{"k1_kPa", "kPa", "stress of the fibres for I4 - 1", 0.0, 0.0, 60.0, 3.0},
-         {"angle_deg", "deg", "of the fibres from the circumference towards z", 0.0, -180.0, 180.0, 15.0},
-         {"k2", "", "stiffening of the fibres with (I4 - 1)^2", 0.0, 0.0, 60.0, 2.0}}};
-    return list;
-  }
-  [[nodiscard]] std::optional<FieldDirection> field_direction() const override { return {{1, 180.0}}; }
-  [[nodiscard]] size_t field_essentials() const override { return 2; }
-  void apply_to_field(std::span<const double> values, FieldModel& model) const override {
-    model.k1_kPa = values[0];
-    model.fibre_angle_deg = values[1];
-    model.k2 = values[2];
-  }
-};
+void apply_to_field(std::span<const double> values, FieldModel& model) {
+  model.k1_kPa = values[0];
+  model.fibre_angle_deg = values[1];
+  model.k2 = values[2];
+}
 
 }  // namespace
 
 const Effect& fibre_anisotropy_effect() {
-  static const FibreAnisotropy effect;
+  static const Effect effect{{
+      .id = "fibre-anisotropy",
+      .title = "one family of fibres",
+      .port = Port::field,
+      .equations = "W = C1 (I1 - 3) + k1/(2 k2) (exp(k2 (I4 - 1)^2) - 1), fibres at an angle to the "
+                   "circumference; k2 = 0 is k1/2 (I4 - 1)^2.",
+      .source = "G. A. Holzapfel, T. C. Gasser, R. W. Ogden, J. Elast. 61 (2000) 1; "
+                "estimator/materials/fibre_reinforced.cpp.",
+      .looks_like = "The wall moves less where its fibres are stretched, and between the plates it turns "
+                    "about the axis if they run obliquely.",
+      .revealed_by = "Tags in all three directions; diffusion images of the fibres.",
+      .conflicts = {"strain-stiffening"},
+      .field_parameters = {{"k1_kPa", "kPa", "stress of the fibres for I4 - 1", 0.0, 0.0, 60.0, 3.0},
+                           {"angle_deg", "deg", "of the fibres from the circumference towards z", 0.0, -180.0,
+                            180.0, 15.0},
+                           {"k2", "", "stiffening of the fibres with (I4 - 1)^2", 0.0, 0.0, 60.0, 2.0}},
+      .field_essentials = 2,
+      .field_direction = {{1, 180.0}},
+      .apply_to_field = apply_to_field,
+  }};
   return effect;
 }
 

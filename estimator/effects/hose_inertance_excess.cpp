@@ -1,44 +1,31 @@
 // The fluid between pump and cavity is heavier to move than a plain tube's.
 
-#include <array>
-
 #include "estimator/effects/effect.hpp"
 
 namespace diastole {
 namespace {
 
-class HoseInertanceExcess final : public Effect {
- public:
-  [[nodiscard]] const EffectText& text() const override {
-    static const EffectText text{
-        .id = "hose-inertance-excess",
-        .title = "excess inertance of the hose",
-        .port = Port::drive,
-        .equations = "rho L / A times the factor; the wall's compliance stays.",
-        .source = "Constrictions, a longer or narrower hose: inertance sums L / A.",
-        .looks_like =
-            "The pump's pressure follows the acceleration with a larger factor; the cavity shows "
-            "nothing as long as the hose is stiff.",
-        .revealed_by = "A sensor at the pump and fast strokes.",
-        .conflicts = {"hose-loss-excess"},
-        .synergies = {"hose-compliance", "air-bubble-pump"},
-    };
-    return text;
-  }
-  [[nodiscard]] std::span<const EffectParameter> parameters() const override {
-    static constexpr std::array<EffectParameter, 1> list{
-        {{"inertance_factor", "", "over the hose of the description", 1.0, 0.5, 3.0, 1.2}}};
-    return list;
-  }
-  void apply(std::span<const double> values, const Context&, rig::RigModel& model) const override {
-    model.hose.inertance_factor *= values[0];
-  }
-};
+void apply(std::span<const double> values, const EffectContext&, rig::RigModel& model) {
+  model.hose.inertance_factor *= values[0];
+}
 
 }  // namespace
 
 const Effect& hose_inertance_excess_effect() {
-  static const HoseInertanceExcess effect;
+  static const Effect effect{{
+      .id = "hose-inertance-excess",
+      .title = "excess inertance of the hose",
+      .port = Port::drive,
+      .equations = "rho L / A times the factor; the wall's compliance stays.",
+      .source = "Constrictions, a longer or narrower hose: inertance sums L / A.",
+      .looks_like = "The pump's pressure follows the acceleration with a larger factor; the cavity shows "
+                    "nothing as long as the hose is stiff.",
+      .revealed_by = "A sensor at the pump and fast strokes.",
+      .conflicts = {"hose-loss-excess"},
+      .synergies = {"hose-compliance", "air-bubble-pump"},
+      .parameters = {{"inertance_factor", "", "over the hose of the description", 1.0, 0.5, 3.0, 1.2}},
+      .apply = apply,
+  }};
   return effect;
 }
 

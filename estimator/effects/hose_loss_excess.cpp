@@ -1,42 +1,30 @@
 // More resistance to fast flow than entry, exit and wall friction of a plain hose.
 
-#include <array>
-
 #include "estimator/effects/effect.hpp"
 
 namespace diastole {
 namespace {
 
-class HoseLossExcess final : public Effect {
- public:
-  [[nodiscard]] const EffectText& text() const override {
-    static const EffectText text{
-        .id = "hose-loss-excess",
-        .title = "excess loss of the hose",
-        .port = Port::drive,
-        .equations = "K rho v |v| / 2 with K larger by extra_K, in the same shares at both ends.",
-        .source = "Borda-Carnot; bends, couplings, valves.",
-        .looks_like = "The pump's pressure is higher where the flow is fast, in phase with it.",
-        .revealed_by = "A sensor at the pump and strokes of different peak flow.",
-        .conflicts = {"hose-inertance-excess"},
-        .synergies = {"hose-compliance"},
-    };
-    return text;
-  }
-  [[nodiscard]] std::span<const EffectParameter> parameters() const override {
-    static constexpr std::array<EffectParameter, 1> list{
-        {{"extra_K", "", "loss coefficient added", 0.0, 0.0, 200.0, 10.0}}};
-    return list;
-  }
-  void apply(std::span<const double> values, const Context&, rig::RigModel& model) const override {
-    model.hose.loss_coefficient += values[0];
-  }
-};
+void apply(std::span<const double> values, const EffectContext&, rig::RigModel& model) {
+  model.hose.loss_coefficient += values[0];
+}
 
 }  // namespace
 
 const Effect& hose_loss_excess_effect() {
-  static const HoseLossExcess effect;
+  static const Effect effect{{
+      .id = "hose-loss-excess",
+      .title = "excess loss of the hose",
+      .port = Port::drive,
+      .equations = "K rho v |v| / 2 with K larger by extra_K, in the same shares at both ends.",
+      .source = "Borda-Carnot; bends, couplings, valves.",
+      .looks_like = "The pump's pressure is higher where the flow is fast, in phase with it.",
+      .revealed_by = "A sensor at the pump and strokes of different peak flow.",
+      .conflicts = {"hose-inertance-excess"},
+      .synergies = {"hose-compliance"},
+      .parameters = {{"extra_K", "", "loss coefficient added", 0.0, 0.0, 200.0, 10.0}},
+      .apply = apply,
+  }};
   return effect;
 }
 

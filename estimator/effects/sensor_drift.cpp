@@ -1,46 +1,33 @@
 // The cavity's transducer wanders with time, anew in each run.
 
-#include <array>
-
 #include "estimator/effects/effect.hpp"
 
 namespace diastole {
 namespace {
 
-class SensorDrift final : public Effect {
- public:
-  [[nodiscard]] const EffectText& text() const override {
-    static const EffectText text{
-        .id = "sensor-drift",
-        .title = "drift of the cavity sensor",
-        .port = Port::sensor,
-        .equations = "p_read = p + rate (t - t_run).",
-        .source = "Amplifiers are zeroed when a run begins.",
-        .looks_like = "The same slope in time in all runs, at rest too, whatever the pressure.",
-        .revealed_by = "A rest at the end of every run.",
-        .conflicts = {"temperature-drift", "sensor-offset"},
-        .synergies = {},
-    };
-    return text;
-  }
-  [[nodiscard]] std::span<const EffectParameter> parameters() const override {
-    static constexpr std::array<EffectParameter, 1> list{
-        {{"rate_Pa_s", "Pa/s", "of the reading", 0.0, -50.0, 50.0, 4.0}}};
-    return list;
-  }
-  [[nodiscard]] Stage stage() const override { return Stage::sensors; }
-  void apply(std::span<const double> values, const Context&, rig::RigModel& model) const override {
-    const double rate_kPa_s = 1e-3 * values[0];
-    model.cavity_sensor.emplace_back([rate_kPa_s](double pressure_kPa, double time_s, const rig::RunPlace&) {
-      return pressure_kPa + rate_kPa_s * time_s;
-    });
-  }
-};
+void apply(std::span<const double> values, const EffectContext&, rig::RigModel& model) {
+  const double rate_kPa_s = 1e-3 * values[0];
+  model.cavity_sensor.emplace_back([rate_kPa_s](double pressure_kPa, double time_s, const rig::RunPlace&) {
+    return pressure_kPa + rate_kPa_s * time_s;
+  });
+}
 
 }  // namespace
 
 const Effect& sensor_drift_effect() {
-  static const SensorDrift effect;
+  static const Effect effect{{
+      .id = "sensor-drift",
+      .title = "drift of the cavity sensor",
+      .port = Port::sensor,
+      .equations = "p_read = p + rate (t - t_run).",
+      .source = "Amplifiers are zeroed when a run begins.",
+      .looks_like = "The same slope in time in all runs, at rest too, whatever the pressure.",
+      .revealed_by = "A rest at the end of every run.",
+      .conflicts = {"temperature-drift", "sensor-offset"},
+      .parameters = {{"rate_Pa_s", "Pa/s", "of the reading", 0.0, -50.0, 50.0, 4.0}},
+      .stage = Stage::sensors,
+      .apply = apply,
+  }};
   return effect;
 }
 

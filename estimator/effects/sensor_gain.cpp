@@ -1,45 +1,32 @@
 // The cavity's transducer reads in another scale.
 
-#include <array>
-
 #include "estimator/effects/effect.hpp"
 
 namespace diastole {
 namespace {
 
-class SensorGain final : public Effect {
- public:
-  [[nodiscard]] const EffectText& text() const override {
-    static const EffectText text{
-        .id = "sensor-gain",
-        .title = "gain of the cavity sensor",
-        .port = Port::sensor,
-        .equations = "p_read = (1 + gain) p.",
-        .source = "Calibration.",
-        .looks_like = "All cavity pressures larger by one factor: with one sensor nearly the modulus itself.",
-        .revealed_by = "A second sensor, at the pump, during rest or slow motion.",
-        .conflicts = {"radius-error"},
-        .synergies = {},
-    };
-    return text;
-  }
-  [[nodiscard]] std::span<const EffectParameter> parameters() const override {
-    static constexpr std::array<EffectParameter, 1> list{
-        {{"gain", "", "part by which the reading exceeds the pressure", 0.0, -0.3, 0.3, 0.05}}};
-    return list;
-  }
-  [[nodiscard]] Stage stage() const override { return Stage::sensors; }
-  void apply(std::span<const double> values, const Context&, rig::RigModel& model) const override {
-    const double factor = 1.0 + values[0];
-    model.cavity_sensor.emplace_back(
-        [factor](double pressure_kPa, double, const rig::RunPlace&) { return factor * pressure_kPa; });
-  }
-};
+void apply(std::span<const double> values, const EffectContext&, rig::RigModel& model) {
+  const double factor = 1.0 + values[0];
+  model.cavity_sensor.emplace_back(
+      [factor](double pressure_kPa, double, const rig::RunPlace&) { return factor * pressure_kPa; });
+}
 
 }  // namespace
 
 const Effect& sensor_gain_effect() {
-  static const SensorGain effect;
+  static const Effect effect{{
+      .id = "sensor-gain",
+      .title = "gain of the cavity sensor",
+      .port = Port::sensor,
+      .equations = "p_read = (1 + gain) p.",
+      .source = "Calibration.",
+      .looks_like = "All cavity pressures larger by one factor: with one sensor nearly the modulus itself.",
+      .revealed_by = "A second sensor, at the pump, during rest or slow motion.",
+      .conflicts = {"radius-error"},
+      .parameters = {{"gain", "", "part by which the reading exceeds the pressure", 0.0, -0.3, 0.3, 0.05}},
+      .stage = Stage::sensors,
+      .apply = apply,
+  }};
   return effect;
 }
 

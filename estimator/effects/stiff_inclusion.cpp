@@ -21,58 +21,42 @@ double Inclusion::stiffness(const std::array<double, 3>& X_mm) const {
 
 namespace {
 
-class StiffInclusion final : public FieldEffect {
- public:
-  [[nodiscard]] const EffectText& text() const override {
-    static const EffectText text{
-        .id = "stiff-inclusion",
-        .title = "lump of another stiffness",
-        .port = Port::field,
-        .equations =
-            "C1 is larger by the factor contrast (below 1: softer) within an ellipsoid, its edge graded over "
-            "2 mm "
-            "(field_model.hpp).",
-        .source = "Geometry; J. D. Eshelby, Proc. R. Soc. A 241 (1957) 376 on what it does around it.",
-        .looks_like =
-            "Around one place the wall moves less (more, if soft) than on the opposite side, and strains "
-            "gather at its "
-            "edge.",
-        .revealed_by =
-            "Denser tags and more frames at high pressure around the place; contrast and size trade off in "
-            "few data.",
-        .conflicts = {},
-        .synergies = {},
-    };
-    return text;
-  }
-  [[nodiscard]] std::span<const EffectParameter> field_parameters() const override {
-    static constexpr auto factor = SearchScale::logarithmic;
-    static constexpr std::array<EffectParameter, 7> list{
-        {{"contrast", "", "its C1 over that around it", 1.0, 0.05, 30.0, 3.0, factor},
-         {"radius_mm", "mm", "of its centre, from the axis", 36.0, 10.0, 70.0, 36.0},
-         {"z_mm", "mm", "of its centre", 0.0, -60.0, 60.0, 5.0},
-         {"theta_deg", "deg", "of its centre", 0.0, -720.0, 720.0, 45.0},
-         {"semi_axis_radial_mm", "mm", "", 10.0, 3.0, 30.0, 10.0, factor},
-         {"semi_axis_tangential_mm", "mm", "", 10.0, 3.0, 30.0, 10.0, factor},
-         {"semi_axis_axial_mm", "mm", "", 10.0, 3.0, 30.0, 10.0, factor}}};
-    return list;
-  }
-  [[nodiscard]] bool is_inclusion() const override { return true; }
-  [[nodiscard]] size_t field_essentials() const override { return 4; }
-  void apply_to_field(std::span<const double> values, FieldModel& model) const override {
-    if (values[0] == 1.0) return;
-    model.inclusion = Inclusion{.contrast = values[0],
-                                .radius_mm = values[1],
-                                .z_mm = values[2],
-                                .theta_deg = values[3],
-                                .semi_axes_mm = {values[4], values[5], values[6]}};
-  }
-};
+void apply_to_field(std::span<const double> values, FieldModel& model) {
+  if (values[0] == 1.0) return;
+  model.inclusion = Inclusion{.contrast = values[0],
+                              .radius_mm = values[1],
+                              .z_mm = values[2],
+                              .theta_deg = values[3],
+                              .semi_axes_mm = {values[4], values[5], values[6]}};
+}
 
 }  // namespace
 
 const Effect& stiff_inclusion_effect() {
-  static const StiffInclusion effect;
+  static const Effect effect{{
+      .id = "stiff-inclusion",
+      .title = "lump of another stiffness",
+      .port = Port::field,
+      .equations = "C1 is larger by the factor contrast (below 1: softer) within an ellipsoid, its edge "
+                   "graded over 2 mm (field_model.hpp).",
+      .source = "Geometry; J. D. Eshelby, Proc. R. Soc. A 241 (1957) 376 on what it does around it.",
+      .looks_like = "Around one place the wall moves less (more, if soft) than on the opposite side, and "
+                    "strains gather at its edge.",
+      .revealed_by = "Denser tags and more frames at high pressure around the place; contrast and size trade "
+                     "off in few data.",
+      .field_parameters = {{"contrast", "", "its C1 over that around it", 1.0, 0.05, 30.0, 3.0,
+                            SearchScale::logarithmic},
+                           {"radius_mm", "mm", "of its centre, from the axis", 36.0, 10.0, 70.0, 36.0},
+                           {"z_mm", "mm", "of its centre", 0.0, -60.0, 60.0, 5.0},
+                           {"theta_deg", "deg", "of its centre", 0.0, -720.0, 720.0, 45.0},
+                           {"semi_axis_radial_mm", "mm", "", 10.0, 3.0, 30.0, 10.0, SearchScale::logarithmic},
+                           {"semi_axis_tangential_mm", "mm", "", 10.0, 3.0, 30.0, 10.0,
+                            SearchScale::logarithmic},
+                           {"semi_axis_axial_mm", "mm", "", 10.0, 3.0, 30.0, 10.0, SearchScale::logarithmic}},
+      .field_essentials = 4,
+      .field_shape = FieldShape::inclusion,
+      .apply_to_field = apply_to_field,
+  }};
   return effect;
 }
 

@@ -1,7 +1,6 @@
 // The specimen is stiffer until it has been stretched a few times (Mullins).
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <memory>
 
@@ -51,53 +50,38 @@ class Softening final : public rig::SpecimenMemory {
   double lost_;   ///< D
 };
 
-class StressSoftening final : public Effect {
- public:
-  [[nodiscard]] const EffectText& text() const override {
-    static const EffectText text{
-        .id = "stress-softening",
-        .title = "stress softening",
-        .port = Port::specimen,
-        .equations =
-            "p = p_e(V) (1 - delta D), dD/dn = (1 - exp(-V_max / V0_mL) - D) / cycles: n cycles done, V_max "
-            "the "
-            "largest volume so far; it stays for the session's later runs.",
-        .source =
-            "L. Mullins, Rubber Chem. Technol. 42 (1969) 339; the softening of a cyclic test in two "
-            "exponentials.",
-        .looks_like =
-            "The first cycles of the session's first run have higher pressures; after them nothing "
-            "changes any more.",
-        .revealed_by = "A session that begins with many equal strokes; rests do not bring it back.",
-        .conflicts = {"temperature-drift", "viscoelasticity"},
-        .synergies = {},
-    };
-    return text;
-  }
-  [[nodiscard]] std::span<const EffectParameter> parameters() const override {
-    static constexpr std::array<EffectParameter, 3> list{
-        {{"delta", "", "final part of the stiffness that is lost", 0.0, 0.0, 0.6, 0.1},
-         {"cycles", "", "in which it is lost", 2.0, 0.3, 20.0, 2.0, SearchScale::logarithmic},
-         {"V0_mL", "mL", "volume at which most of it is lost", 12.0, 1.0, 60.0, 12.0,
-          SearchScale::logarithmic}}};
-    return list;
-  }
-  [[nodiscard]] bool keeps_modulus() const override { return false; }
-  void apply(std::span<const double> values, const Context&, rig::RigModel& model) const override {
-    const double delta = values[0];
-    const double cycles = values[1];
-    const double scale_mL = values[2];
-    if (delta == 0.0) return;
-    model.memories.emplace_back([=](const rig::RunPlace& place) {
-      return std::make_unique<Softening>(delta, cycles, scale_mL, place);
-    });
-  }
-};
+void apply(std::span<const double> values, const EffectContext&, rig::RigModel& model) {
+  const double delta = values[0];
+  const double cycles = values[1];
+  const double scale_mL = values[2];
+  if (delta == 0.0) return;
+  model.memories.emplace_back([=](const rig::RunPlace& place) {
+    return std::make_unique<Softening>(delta, cycles, scale_mL, place);
+  });
+}
 
 }  // namespace
 
 const Effect& stress_softening_effect() {
-  static const StressSoftening effect;
+  static const Effect effect{{
+      .id = "stress-softening",
+      .title = "stress softening",
+      .port = Port::specimen,
+      .equations = "p = p_e(V) (1 - delta D), dD/dn = (1 - exp(-V_max / V0_mL) - D) / cycles: n cycles done, "
+                   "V_max the largest volume so far; it stays for the session's later runs.",
+      .source = "L. Mullins, Rubber Chem. Technol. 42 (1969) 339; the softening of a cyclic test in two "
+                "exponentials.",
+      .looks_like = "The first cycles of the session's first run have higher pressures; after them nothing "
+                    "changes any more.",
+      .revealed_by = "A session that begins with many equal strokes; rests do not bring it back.",
+      .conflicts = {"temperature-drift", "viscoelasticity"},
+      .parameters = {{"delta", "", "final part of the stiffness that is lost", 0.0, 0.0, 0.6, 0.1},
+                     {"cycles", "", "in which it is lost", 2.0, 0.3, 20.0, 2.0, SearchScale::logarithmic},
+                     {"V0_mL", "mL", "volume at which most of it is lost", 12.0, 1.0, 60.0, 12.0,
+                      SearchScale::logarithmic}},
+      .keeps_modulus = false,
+      .apply = apply,
+  }};
   return effect;
 }
 

@@ -1,51 +1,37 @@
 // The piston displaces more or less than the steps say.
 
-#include <array>
-
 #include "estimator/effects/effect.hpp"
 
 namespace diastole {
 namespace {
 
-class StrokeGain final : public Effect {
- public:
-  [[nodiscard]] const EffectText& text() const override {
-    static const EffectText text{
-        .id = "stroke-gain",
-        .title = "stroke gain",
-        .port = Port::drive,
-        .equations = "V_piston = (1 + gain) V_commanded.",
-        .source = "Geometry: a bore or a screw pitch that differs from the nominal one.",
-        .looks_like =
-            "All volumes and pressures larger by one factor; the specimen's curvature and the gated "
-            "volume tell it from stiffness.",
-        .revealed_by = "Gated volumes, or strokes of very different size.",
-        .conflicts = {"radius-error", "strain-stiffening", "chamber-back-pressure", "end-bond-slip",
-                      "air-bubble-cavity"},
-        .synergies = {},
-    };
-    return text;
-  }
-  [[nodiscard]] std::span<const EffectParameter> parameters() const override {
-    static constexpr std::array<EffectParameter, 1> list{
-        {{"gain", "", "part by which the displaced volume exceeds the commanded one", 0.0, -0.15, 0.15,
-          0.04}}};
-    return list;
-  }
-  void apply(std::span<const double> values, const Context&, rig::RigModel& model) const override {
-    const double factor = 1.0 + values[0];
-    model.drive.emplace_back([factor](rig::DriveTrace& trace, const rig::RunPlace&) {
-      for (auto* series : {&trace.volume_mL, &trace.flow_mL_per_s, &trace.acceleration_mL_per_s2})
-        for (double& value : *series)
-          value *= factor;
-    });
-  }
-};
+void apply(std::span<const double> values, const EffectContext&, rig::RigModel& model) {
+  const double factor = 1.0 + values[0];
+  model.drive.emplace_back([factor](rig::DriveTrace& trace, const rig::RunPlace&) {
+    for (auto* series : {&trace.volume_mL, &trace.flow_mL_per_s, &trace.acceleration_mL_per_s2})
+      for (double& value : *series)
+        value *= factor;
+  });
+}
 
 }  // namespace
 
 const Effect& stroke_gain_effect() {
-  static const StrokeGain effect;
+  static const Effect effect{{
+      .id = "stroke-gain",
+      .title = "stroke gain",
+      .port = Port::drive,
+      .equations = "V_piston = (1 + gain) V_commanded.",
+      .source = "Geometry: a bore or a screw pitch that differs from the nominal one.",
+      .looks_like = "All volumes and pressures larger by one factor; the specimen's curvature and the gated "
+                    "volume tell it from stiffness.",
+      .revealed_by = "Gated volumes, or strokes of very different size.",
+      .conflicts = {"radius-error", "strain-stiffening", "chamber-back-pressure", "end-bond-slip",
+                    "air-bubble-cavity"},
+      .parameters = {{"gain", "", "part by which the displaced volume exceeds the commanded one", 0.0, -0.15,
+                      0.15, 0.04}},
+      .apply = apply,
+  }};
   return effect;
 }
 

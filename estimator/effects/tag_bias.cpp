@@ -1,48 +1,32 @@
 // The images show displacements too large or too small.
 
-#include <array>
-
 #include "estimator/effects/effect.hpp"
 
 namespace diastole {
 namespace {
 
-class TagBias final : public FieldEffect {
- public:
-  [[nodiscard]] const EffectText& text() const override {
-    static const EffectText text{
-        .id = "tag-bias",
-        .title = "gain of the imaged displacement",
-        .port = Port::field,
-        .equations = "x_seen = X + gain (x - X).",
-        .source =
-            "Tracking that lags behind faded tags, gradients out of calibration: errors proportional to the "
-            "displacement.",
-        .looks_like =
-            "The specimen moves by one factor too far or too little at all places and pressures alike.",
-        .revealed_by =
-            "An independent modulus (a shear test); gated cavity volumes against those of the tags. With the "
-            "modulus "
-            "free it is the modulus.",
-        .conflicts = {"chamber-back-pressure", "radius-error"},
-        .synergies = {},
-    };
-    return text;
-  }
-  [[nodiscard]] std::span<const EffectParameter> field_parameters() const override {
-    static constexpr std::array<EffectParameter, 1> list{
-        {{"gain", "", "displacement as seen over the true one", 1.0, 0.7, 1.3, 0.95}}};
-    return list;
-  }
-  void apply_to_field(std::span<const double> values, FieldModel& model) const override {
-    model.displacement_gain = values[0];
-  }
-};
+void apply_to_field(std::span<const double> values, FieldModel& model) {
+  model.displacement_gain = values[0];
+}
 
 }  // namespace
 
 const Effect& tag_bias_effect() {
-  static const TagBias effect;
+  static const Effect effect{{
+      .id = "tag-bias",
+      .title = "gain of the imaged displacement",
+      .port = Port::field,
+      .equations = "x_seen = X + gain (x - X).",
+      .source = "Tracking that lags behind faded tags, gradients out of calibration: errors proportional to "
+                "the displacement.",
+      .looks_like =
+          "The specimen moves by one factor too far or too little at all places and pressures alike.",
+      .revealed_by = "An independent modulus (a shear test); gated cavity volumes against those of the tags. "
+                     "With the modulus free it is the modulus.",
+      .conflicts = {"chamber-back-pressure", "radius-error"},
+      .field_parameters = {{"gain", "", "displacement as seen over the true one", 1.0, 0.7, 1.3, 0.95}},
+      .apply_to_field = apply_to_field,
+  }};
   return effect;
 }
 

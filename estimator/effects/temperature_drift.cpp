@@ -1,6 +1,5 @@
 // The specimen's modulus changes through the session.
 
-#include <array>
 #include <cmath>
 #include <memory>
 
@@ -22,45 +21,33 @@ class Warming final : public rig::SpecimenMemory {
   double fraction_, tau_s_, started_s_;
 };
 
-class TemperatureDrift final : public Effect {
- public:
-  [[nodiscard]] const EffectText& text() const override {
-    static const EffectText text{
-        .id = "temperature-drift",
-        .title = "modulus drifting with temperature",
-        .port = Port::specimen,
-        .equations = "C1(t) = C1 (1 + fraction (1 - exp(-t / tau))), t since the session's first run began.",
-        .source = "Rubber elasticity is proportional to temperature; warming of first order.",
-        .looks_like = "All pressures scale slowly with the session's time, whichever run.",
-        .revealed_by =
-            "The same stroke at the session's beginning and end; a rest tells it from a sensor's "
-            "drift.",
-        .conflicts = {"sensor-drift", "stress-softening"},
-        .synergies = {},
-    };
-    return text;
-  }
-  [[nodiscard]] std::span<const EffectParameter> parameters() const override {
-    static constexpr std::array<EffectParameter, 2> list{
-        {{"fraction", "", "final change of the modulus", 0.0, -0.3, 0.3, 0.03},
-         {"tau_s", "s", "of the warming", 300.0, 20.0, 5000.0, 200.0, SearchScale::logarithmic}}};
-    return list;
-  }
-  [[nodiscard]] bool keeps_modulus() const override { return false; }
-  void apply(std::span<const double> values, const Context&, rig::RigModel& model) const override {
-    const double fraction = values[0];
-    const double tau_s = values[1];
-    if (fraction == 0.0) return;
-    model.memories.emplace_back([=](const rig::RunPlace& place) {
-      return std::make_unique<Warming>(fraction, tau_s, place.started_s);
-    });
-  }
-};
+void apply(std::span<const double> values, const EffectContext&, rig::RigModel& model) {
+  const double fraction = values[0];
+  const double tau_s = values[1];
+  if (fraction == 0.0) return;
+  model.memories.emplace_back([=](const rig::RunPlace& place) {
+    return std::make_unique<Warming>(fraction, tau_s, place.started_s);
+  });
+}
 
 }  // namespace
 
 const Effect& temperature_drift_effect() {
-  static const TemperatureDrift effect;
+  static const Effect effect{{
+      .id = "temperature-drift",
+      .title = "modulus drifting with temperature",
+      .port = Port::specimen,
+      .equations = "C1(t) = C1 (1 + fraction (1 - exp(-t / tau))), t since the session's first run began.",
+      .source = "Rubber elasticity is proportional to temperature; warming of first order.",
+      .looks_like = "All pressures scale slowly with the session's time, whichever run.",
+      .revealed_by =
+          "The same stroke at the session's beginning and end; a rest tells it from a sensor's drift.",
+      .conflicts = {"sensor-drift", "stress-softening"},
+      .parameters = {{"fraction", "", "final change of the modulus", 0.0, -0.3, 0.3, 0.03},
+                     {"tau_s", "s", "of the warming", 300.0, 20.0, 5000.0, 200.0, SearchScale::logarithmic}},
+      .keeps_modulus = false,
+      .apply = apply,
+  }};
   return effect;
 }
 

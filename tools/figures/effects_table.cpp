@@ -1,0 +1,7 @@
+// Prints docs/effects.md: build/release/bin/effects_table > docs/effects.md
+
+#include <iostream>
+
+#include "tools/figures/effects_page.hpp"
+
+int main() { std::cout << diastole::effects_page(); }
