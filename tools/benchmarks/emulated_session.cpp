@@ -53,9 +53,9 @@ void EmulatedSession::run_to(uint64_t time_ns) {
     speak();
     now_ns_ = std::min(time_ns, now_ns_ + slice_ns);
     const auto output = controller_.advance_to(now_ns_);
-    for (const sim_rig::PinEdge& edge : output.edges) {
-      if (edge.value == 1 && edge.pin == sim_rig::Pin::step) ++steps;
-      if (edge.value == 1 && edge.pin == sim_rig::Pin::ttl) ++triggers;
+    for (const sim_controller::PinEdge& edge : output.edges) {
+      if (edge.value == 1 && edge.pin == sim_controller::Pin::step) ++steps;
+      if (edge.value == 1 && edge.pin == sim_controller::Pin::ttl) ++triggers;
       if (on_edge) on_edge(edge);
     }
     for (const uint8_t byte : output.sent) {

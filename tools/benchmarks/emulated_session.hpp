@@ -59,7 +59,7 @@ class EmulatedSession {
   /// The line to the controller is never idle: heartbeats back to back, every eighth frame a question.
   bool flood = false;
   /// Called with every change of a pin.
-  std::function<void(const sim_rig::PinEdge&)> on_edge;
+  std::function<void(const sim_controller::PinEdge&)> on_edge;
 
   wire::State state = wire::State::unhomed;
   wire::Fault fault = wire::Fault::none;

@@ -9,7 +9,7 @@
 
 #include "host/transport/serial_port.hpp"
 #include "protocol/wire/frame.hpp"
-#include "tools/sim_rig/pty_line.hpp"
+#include "tools/sim_controller/pty_line.hpp"
 
 namespace diastole {
 
@@ -28,7 +28,7 @@ class LineTap {
   void look_at(std::span<const uint8_t> bytes, Instant at);
 
   SerialPort controller_;
-  sim_rig::PtyLine daemon_;
+  sim_controller::PtyLine daemon_;
   wire::FrameDecoder decoder_;
   std::mutex mutex_;
   std::optional<Instant> stop_;

@@ -1,19 +1,13 @@
 // link_faults: a bad serial line, on purpose. See --help.
 
 #include <fmt/format.h>
-#include <sys/signalfd.h>
 
 #include <CLI/CLI.hpp>
-#include <csignal>
-#include <iostream>
 
-#include "protocol/contract/exit_code.hpp"
-#include "protocol/contract/input_error.hpp"
 #include "tools/link_faults/proxy.hpp"
+#include "tools/program/program.hpp"
 
 namespace {
-
-using diastole::ExitCode;
 
 constexpr const char* purpose =
     R"(Puts a bad line between the controller and its host: opens the controller's serial port, offers a pseudo-terminal
@@ -53,16 +47,6 @@ void add_options(CLI::App& app, diastole::link_faults::ProxyOptions& options,
       ->check(CLI::PositiveNumber);
 }
 
-/// A descriptor that becomes readable on SIGTERM and SIGINT.
-int stop_descriptor() {
-  sigset_t signals;
-  sigemptyset(&signals);
-  sigaddset(&signals, SIGTERM);
-  sigaddset(&signals, SIGINT);
-  sigprocmask(SIG_BLOCK, &signals, nullptr);
-  return signalfd(-1, &signals, SFD_CLOEXEC);
-}
-
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -72,21 +56,10 @@ int main(int argc, char** argv) {
   diastole::link_faults::FaultRates rates;
   std::string direction = "both";
   add_options(app, options, rates, direction);
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return static_cast<int>(app.exit(error) == 0 ? ExitCode::done : ExitCode::bad_input);
-  }
-  if (direction != "to-host") options.to_controller = rates;
-  if (direction != "to-controller") options.to_host = rates;
-  try {
-    fmt::print("{}", to_text(diastole::link_faults::run_proxy(options, stop_descriptor())));
-    return static_cast<int>(ExitCode::done);
-  } catch (const diastole::InputError& error) {
-    std::cerr << "link_faults: " << error.what() << '\n';
-    return static_cast<int>(ExitCode::bad_input);
-  } catch (const diastole::HardwareError& error) {
-    std::cerr << "link_faults: " << error.what() << '\n';
-    return static_cast<int>(ExitCode::hardware_fault);
-  }
+  return diastole::run_program(app, argc, argv, [&] {
+    if (direction != "to-host") options.to_controller = rates;
+    if (direction != "to-controller") options.to_host = rates;
+    fmt::print("{}", to_text(diastole::link_faults::run_proxy(options, diastole::stop_descriptor())));
+    return diastole::ExitCode::done;
+  });
 }

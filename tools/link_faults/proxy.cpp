@@ -11,7 +11,7 @@
 
 #include "host/transport/serial_port.hpp"
 #include "protocol/contract/input_error.hpp"
-#include "tools/sim_rig/pty_line.hpp"
+#include "tools/sim_controller/pty_line.hpp"
 
 namespace diastole::link_faults {
 namespace {
@@ -79,7 +79,7 @@ class Proxy {
   const ProxyOptions& options_;
   std::chrono::steady_clock::time_point began_ = std::chrono::steady_clock::now();
   SerialPort port_;
-  sim_rig::PtyLine line_;
+  sim_controller::PtyLine line_;
   LineFaults to_controller_, to_host_;
 };
 

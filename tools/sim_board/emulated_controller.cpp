@@ -33,14 +33,14 @@ void EmulatedController::press_estop(uint64_t time_ns, bool pressed) {
   drive(wiring_.estop, pressed, time_ns);
 }
 
-void EmulatedController::hold_switch(sim_rig::Switch which, bool active) {
+void EmulatedController::hold_switch(sim_controller::Switch which, bool active) {
   const uint64_t now_ns = board_.now_ns();
   switch (which) {
-    case sim_rig::Switch::estop:
+    case sim_controller::Switch::estop:
       return press_estop(now_ns, active);
-    case sim_rig::Switch::home:
+    case sim_controller::Switch::home:
       return close_home(now_ns, active || position_ <= 0);
-    case sim_rig::Switch::far_limit:
+    case sim_controller::Switch::far_limit:
       return close_far_limit(now_ns, active || position_ >= mechanics_.far_limit_microsteps);
   }
 }
@@ -84,7 +84,7 @@ EmulatedController::Output EmulatedController::advance_to(uint64_t until_ns) {
   for (const SimBoard::PinEvent& event : board_.take_pin_events()) {
     auto edge = pin_edge(wiring_, event);
     if (!edge) continue;
-    if (edge->pin == sim_rig::Pin::fault && edge->value != 0 && !fault_numbers_.empty()) {
+    if (edge->pin == sim_controller::Pin::fault && edge->value != 0 && !fault_numbers_.empty()) {
       edge->value = fault_numbers_.front();
       fault_numbers_.pop_front();
     }

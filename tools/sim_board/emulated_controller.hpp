@@ -1,6 +1,6 @@
 #pragma once
 // The firmware's image on the emulated board, wired to the rig's switches: stands wherever the host-built
-// controller does (sim_rig::SimulatedController), and is what program sim_board runs.
+// controller does (sim_controller::SimulatedController), and is what program sim_board runs.
 //
 // The carriage's switches follow the steps made: the home switch is closed at and below 0 microsteps, the far
 // limit from Mechanics::far_limit_microsteps on, as on firmware/boards/recording.
@@ -12,7 +12,7 @@
 #include "tools/sim_board/image_file.hpp"
 #include "tools/sim_board/sim_board.hpp"
 #include "tools/sim_board/wiring.hpp"
-#include "tools/sim_rig/simulated_controller.hpp"
+#include "tools/sim_controller/simulated_controller.hpp"
 
 namespace diastole {
 
@@ -21,7 +21,7 @@ struct Mechanics {
   int64_t far_limit_microsteps = 2'000'000'000;
 };
 
-class EmulatedController final : public sim_rig::SimulatedController {
+class EmulatedController final : public sim_controller::SimulatedController {
  public:
   /// Loads the images and powers the board on. Throws InputError when they do not fit the chip.
   explicit EmulatedController(const std::vector<Image>& images, Mechanics mechanics = {},
@@ -31,7 +31,7 @@ class EmulatedController final : public sim_rig::SimulatedController {
   [[nodiscard]] uint64_t tick_zero_ns() const override;
   void receive(std::span<const uint8_t> bytes) override { board_.send(bytes); }
   Output advance_to(uint64_t until_ns) override;
-  void hold_switch(sim_rig::Switch which, bool active) override;
+  void hold_switch(sim_controller::Switch which, bool active) override;
   void set_power(bool on) override;
 
   void press_estop(uint64_t time_ns, bool pressed = true);
@@ -53,7 +53,7 @@ class EmulatedController final : public sim_rig::SimulatedController {
   uint64_t powered_ns_ = 0;
   std::deque<int32_t> fault_numbers_;  ///< of rises of FAULT that advance_to() has not handed over
   std::vector<uint8_t> sent_;
-  std::vector<sim_rig::PinEdge> edges_;
+  std::vector<sim_controller::PinEdge> edges_;
 };
 
 }  // namespace diastole

@@ -17,7 +17,7 @@ struct Image {
   std::string file;
   std::vector<ImageSegment> segments;
   uint32_t flash_bytes = 0;                  ///< what the segments occupy
-  std::optional<uint32_t> static_ram_bytes;  ///< .data and .bss with their like; an ELF file tells
+  std::optional<uint32_t> static_ram_bytes;  ///< .data and .bss with their like; an ELF file says
 };
 
 /// Reads FILE or FILE@ADDRESS (hexadecimal with 0x, or decimal). Without an address a binary goes to the

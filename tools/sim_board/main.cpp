@@ -1,16 +1,13 @@
 // sim_board: the controller's real image on an emulated STM32F405. See --help.
 
 #include <fmt/format.h>
-#include <sys/signalfd.h>
 
 #include <CLI/CLI.hpp>
-#include <csignal>
 #include <cstdio>
-#include <iostream>
 #include <nlohmann/json.hpp>
 
 #include "protocol/contract/exit_code.hpp"
-#include "protocol/contract/input_error.hpp"
+#include "tools/program/program.hpp"
 #include "tools/sim_board/session.hpp"
 
 namespace {
@@ -65,16 +62,6 @@ void add_options(CLI::App& app, diastole::SessionOptions& options, bool& report,
   app.add_flag("--json", json, "at the end, print it as one JSON document");
 }
 
-/// A descriptor that becomes readable on SIGTERM and SIGINT.
-int stop_descriptor() {
-  sigset_t signals;
-  sigemptyset(&signals);
-  sigaddset(&signals, SIGTERM);
-  sigaddset(&signals, SIGINT);
-  sigprocmask(SIG_BLOCK, &signals, nullptr);
-  return signalfd(-1, &signals, SFD_CLOEXEC);
-}
-
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -83,21 +70,10 @@ int main(int argc, char** argv) {
   diastole::SessionOptions options;
   bool report = false, json = false;
   add_options(app, options, report, json);
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return static_cast<int>(app.exit(error) == 0 ? ExitCode::done : ExitCode::bad_input);
-  }
-  try {
-    const diastole::BoardReport shown = diastole::run_session(options, stop_descriptor());
+  return diastole::run_program(app, argc, argv, [&] {
+    const diastole::BoardReport shown = diastole::run_session(options, diastole::stop_descriptor());
     if (json) fmt::print("{}\n", diastole::to_json(shown).dump(2));
     if (report) fmt::print(json ? stderr : stdout, "{}", diastole::to_text(shown));
-    return static_cast<int>(shown.board.locked_up ? ExitCode::negative : ExitCode::done);
-  } catch (const diastole::InputError& error) {
-    std::cerr << "sim_board: " << error.what() << '\n';
-    return static_cast<int>(ExitCode::bad_input);
-  } catch (const diastole::HardwareError& error) {
-    std::cerr << "sim_board: " << error.what() << '\n';
-    return static_cast<int>(ExitCode::hardware_fault);
-  }
+    return shown.board.locked_up ? ExitCode::negative : ExitCode::done;
+  });
 }

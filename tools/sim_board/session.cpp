@@ -15,8 +15,8 @@
 
 #include "protocol/contract/input_error.hpp"
 #include "tools/sim_board/emulated_controller.hpp"
-#include "tools/sim_rig/pin_trace.hpp"
-#include "tools/sim_rig/pty_line.hpp"
+#include "tools/sim_controller/pin_trace.hpp"
+#include "tools/sim_controller/pty_line.hpp"
 
 namespace diastole {
 namespace {
@@ -121,10 +121,10 @@ class Session {
       controller_.receive(line_->read());
     }
     const auto output = controller_.advance_to(until_ns);
-    for (const sim_rig::PinEdge& edge : output.edges) {
+    for (const sim_controller::PinEdge& edge : output.edges) {
       if (trace_) trace_->write(edge);
-      if (edge.pin == sim_rig::Pin::step && edge.value == 1) ++report_.steps;
-      if (edge.pin == sim_rig::Pin::ttl && edge.value == 1) ++report_.triggers;
+      if (edge.pin == sim_controller::Pin::step && edge.value == 1) ++report_.steps;
+      if (edge.pin == sim_controller::Pin::ttl && edge.value == 1) ++report_.triggers;
     }
     if (line_) line_->write(output.sent);
     restore_power();
@@ -146,8 +146,8 @@ class Session {
 
   const SessionOptions& options_;
   EmulatedController controller_;
-  std::optional<sim_rig::PinTrace> trace_;
-  std::optional<sim_rig::PtyLine> line_;
+  std::optional<sim_controller::PinTrace> trace_;
+  std::optional<sim_controller::PtyLine> line_;
   std::optional<uint64_t> dark_until_ns_;
   BoardReport report_;
 };

@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "protocol/contract/input_error.hpp"
-#include "tools/sim_board/core/chip.hpp"
+#include "tools/sim_board/chip.hpp"
 
 namespace diastole {
 namespace {

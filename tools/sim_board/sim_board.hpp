@@ -119,8 +119,7 @@ class SimBoard {
   /// Changes of pins and DAC codes since the last call, in order of time.
   std::vector<PinEvent> take_pin_events();
 
-  /// Called at each change of a pin, while it happens; may call drive(). What tells switches where a carriage
-  /// is.
+  /// Called at each change of a pin, while it happens; may call drive(). For switches that follow a carriage.
   void on_pin_change(std::function<void(Pin, bool level, uint64_t time_ns)> listener);
 
   /// Power fails in the middle of flash operation `operation` (1 is the next one); nullopt: never.

@@ -25,25 +25,25 @@ const Wiring& diastole_wiring() {
   return wiring;
 }
 
-std::optional<sim_rig::PinEdge> pin_edge(const Wiring& wiring, const board_model::PinEvent& event) {
+std::optional<sim_controller::PinEdge> pin_edge(const Wiring& wiring, const board_model::PinEvent& event) {
   if (event.dac != 0) {
     if (event.dac != wiring.rwave_dac) return std::nullopt;
-    return sim_rig::PinEdge{event.time_ns, sim_rig::Pin::rwave_uV,
-                            static_cast<int32_t>(firmware::r_wave_uV(event.value))};
+    return sim_controller::PinEdge{event.time_ns, sim_controller::Pin::rwave_uV,
+                                   static_cast<int32_t>(firmware::r_wave_uV(event.value))};
   }
   struct Named {
     const Wire& wire;
-    sim_rig::Pin name;
+    sim_controller::Pin name;
   };
-  const Named outputs[] = {{wiring.step, sim_rig::Pin::step},
-                           {wiring.dir, sim_rig::Pin::dir},
-                           {wiring.enable, sim_rig::Pin::enable},
-                           {wiring.ttl, sim_rig::Pin::ttl},
-                           {wiring.fault, sim_rig::Pin::fault}};
+  const Named outputs[] = {{wiring.step, sim_controller::Pin::step},
+                           {wiring.dir, sim_controller::Pin::dir},
+                           {wiring.enable, sim_controller::Pin::enable},
+                           {wiring.ttl, sim_controller::Pin::ttl},
+                           {wiring.fault, sim_controller::Pin::fault}};
   for (const Named& output : outputs) {
     if (output.wire.pin != event.pin) continue;
-    return sim_rig::PinEdge{event.time_ns, output.name,
-                            (event.value != 0) == output.wire.active_high ? 1 : 0};
+    return sim_controller::PinEdge{event.time_ns, output.name,
+                                   (event.value != 0) == output.wire.active_high ? 1 : 0};
   }
   return std::nullopt;
 }

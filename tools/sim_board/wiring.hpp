@@ -7,7 +7,7 @@
 #include <string_view>
 
 #include "tools/sim_board/core/pins.hpp"
-#include "tools/sim_rig/simulated_controller.hpp"
+#include "tools/sim_controller/simulated_controller.hpp"
 
 namespace diastole {
 
@@ -28,6 +28,6 @@ struct Wiring {
 const Wiring& diastole_wiring();
 
 /// The event in the terms of a pin trace; nullopt for a pin that is not in it.
-std::optional<sim_rig::PinEdge> pin_edge(const Wiring& wiring, const board_model::PinEvent& event);
+std::optional<sim_controller::PinEdge> pin_edge(const Wiring& wiring, const board_model::PinEvent& event);
 
 }  // namespace diastole

@@ -6,19 +6,14 @@
 #include <CLI/CLI.hpp>
 #include <chrono>
 #include <cmath>
-#include <csignal>
 #include <cstdio>
-#include <iostream>
 #include <numbers>
 #include <vector>
 
-#include "protocol/contract/exit_code.hpp"
-#include "protocol/contract/input_error.hpp"
+#include "tools/program/program.hpp"
 #include "tools/sim_daq/modbus_instrument.hpp"
 
 namespace {
-
-volatile std::sig_atomic_t stop_requested = 0;
 
 uint64_t monotonic_ns() {
   return static_cast<uint64_t>(std::chrono::steady_clock::now().time_since_epoch().count());
@@ -44,8 +39,10 @@ void serve(const Options& options) {
   fmt::print("{{\"modbus_host\": \"{}\", \"modbus_port\": {}}}\n", options.instrument.address,
              instrument.port());
   std::fflush(stdout);
-  while (stop_requested == 0) {
-    std::vector<pollfd> waiting;
+  const int stop = diastole::stop_descriptor();
+  std::vector<pollfd> waiting{{stop, POLLIN, 0}};
+  while (waiting.front().revents == 0) {
+    waiting.resize(1);
     for (const int fd : instrument.descriptors())
       waiting.push_back({fd, POLLIN, 0});
     ::poll(waiting.data(), waiting.size(), 200);
@@ -71,18 +68,8 @@ int main(int argc, char** argv) {
   app.add_option("--frequency-Hz", options.frequency_Hz, "frequency of the sine")->capture_default_str();
   app.add_option("--clock-error-ppm", options.instrument.clock_error_ppm, "error of the instrument's timer")
       ->capture_default_str();
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return static_cast<int>(app.exit(error) == 0 ? diastole::ExitCode::done : diastole::ExitCode::bad_input);
-  }
-  for (const int signal : {SIGTERM, SIGINT})
-    std::signal(signal, [](int) { stop_requested = 1; });
-  try {
+  return diastole::run_program(app, argc, argv, [&] {
     serve(options);
-    return static_cast<int>(diastole::ExitCode::done);
-  } catch (const diastole::HardwareError& error) {
-    std::cerr << "sim_daq: " << error.what() << '\n';
-    return static_cast<int>(diastole::ExitCode::hardware_fault);
-  }
+    return diastole::ExitCode::done;
+  });
 }

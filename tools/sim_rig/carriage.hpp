@@ -1,5 +1,5 @@
 #pragma once
-// The piston's carriage on its screw: counts the microsteps and tells the volume that the line has received.
+// The piston's carriage on its screw: counts the microsteps and returns the volume that the line has received.
 //
 //      home switch | 0 ... home ... parked ... | far end          position in microsteps from the switch
 //
@@ -9,14 +9,14 @@
 #include <cstdint>
 #include <optional>
 
+#include "tools/sim_controller/simulated_controller.hpp"
 #include "tools/sim_rig/plant/slip.hpp"
-#include "tools/sim_rig/simulated_controller.hpp"
 
 namespace diastole::sim_rig {
 
 class Carriage {
  public:
-  Carriage(double microstep_mL, SimulatedController::Places places)
+  Carriage(double microstep_mL, sim_controller::SimulatedController::Places places)
       : microstep_mL_(microstep_mL),
         home_(places.home),
         position_(places.parked),
@@ -24,7 +24,7 @@ class Carriage {
 
   /// Takes a pin change; returns the volume displaced into the line since home if this one moved it.
   /// `piston_kPa` is the load on it, under which a coupling may slip.
-  std::optional<double> take(const PinEdge& edge, double piston_kPa);
+  std::optional<double> take(const sim_controller::PinEdge& edge, double piston_kPa);
 
   /// What lies between the controller's steps and the piston.
   [[nodiscard]] Slip& slip() { return slip_; }

@@ -38,8 +38,8 @@ std::string ControlClient::order(const std::string& text) {
 
 std::optional<std::string> ControlClient::held() {
   if (!held_) {
-    if (const auto told = line(std::chrono::milliseconds(0)); told && told->starts_with("held "))
-      held_ = told->substr(5);
+    if (const auto said = line(std::chrono::milliseconds(0)); said && said->starts_with("held "))
+      held_ = said->substr(5);
   }
   return std::exchange(held_, std::nullopt);
 }

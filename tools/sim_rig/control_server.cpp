@@ -46,7 +46,7 @@ void ControlServer::service(const Obey& obey) {
     for (size_t end = 0; (end = clients_[i].inbox.find('\n')) != std::string::npos;) {
       const std::string order = clients_[i].inbox.substr(0, end);
       clients_[i].inbox.erase(0, end + 1);
-      tell(id, obey(id, order));
+      send(id, obey(id, order));
     }
     if (alive && clients_[i].inbox.size() < longest_order) {
       ++i;
@@ -57,7 +57,7 @@ void ControlServer::service(const Obey& obey) {
   }
 }
 
-void ControlServer::tell(ClientId client, const std::string& line) {
+void ControlServer::send(ClientId client, const std::string& line) {
   const std::string text = line + '\n';
   (void)::send(client, text.data(), text.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
 }

@@ -26,7 +26,7 @@ class ControlServer {
   /// Takes what has come. Never waits.
   void service(const Obey& obey);
   /// Something that a client did not ask for.
-  void tell(ClientId client, const std::string& line);
+  void send(ClientId client, const std::string& line);
   [[nodiscard]] bool connected(ClientId client) const;
 
  private:

@@ -17,25 +17,25 @@ constexpr firmware::Ticks ticks_at(uint64_t time_ns) {
                          rest_ns * firmware::kTicksPerMicrosecond / 1000};
 }
 
-Pin pin_of(firmware::Signal signal) {
+sim_controller::Pin pin_of(firmware::Signal signal) {
   switch (signal) {
     case firmware::Signal::STEP:
-      return Pin::step;
+      return sim_controller::Pin::step;
     case firmware::Signal::DIR:
-      return Pin::dir;
+      return sim_controller::Pin::dir;
     case firmware::Signal::ENABLE:
-      return Pin::enable;
+      return sim_controller::Pin::enable;
     case firmware::Signal::TTL:
-      return Pin::ttl;
+      return sim_controller::Pin::ttl;
     case firmware::Signal::RWAVE_uV:
-      return Pin::rwave_uV;
+      return sim_controller::Pin::rwave_uV;
     case firmware::Signal::FAULT:
-      return Pin::fault;
+      return sim_controller::Pin::fault;
   }
-  return Pin::fault;
+  return sim_controller::Pin::fault;
 }
 
-class HostBuiltController final : public SimulatedController {
+class HostBuiltController final : public sim_controller::SimulatedController {
  public:
   [[nodiscard]] Places places() const override {
     return {options_.board.mechanics.start_steps, 1 + int64_t{firmware::kHomeClearance_steps}};
@@ -63,7 +63,7 @@ class HostBuiltController final : public SimulatedController {
     return {sent_, edges_};
   }
 
-  void hold_switch(Switch which, bool active) override {
+  void hold_switch(sim_controller::Switch which, bool active) override {
     held_[static_cast<size_t>(which)] = active;
     apply_switches();
   }
@@ -78,16 +78,16 @@ class HostBuiltController final : public SimulatedController {
   }
 
  private:
-  void note(const PinEdge& edge, std::vector<PinEdge>& edges) {
+  void note(const sim_controller::PinEdge& edge, std::vector<sim_controller::PinEdge>& edges) {
     levels_[static_cast<size_t>(edge.pin)] = edge.value;
     edges.push_back(edge);
   }
 
   void apply_switches() {
     if (!controller_) return;
-    controller_->set_estop(held_[static_cast<size_t>(Switch::estop)]);
-    controller_->set_home(held_[static_cast<size_t>(Switch::home)]);
-    controller_->set_far_limit(held_[static_cast<size_t>(Switch::far_limit)]);
+    controller_->set_estop(held_[static_cast<size_t>(sim_controller::Switch::estop)]);
+    controller_->set_home(held_[static_cast<size_t>(sim_controller::Switch::home)]);
+    controller_->set_far_limit(held_[static_cast<size_t>(sim_controller::Switch::far_limit)]);
   }
 
   /// The pins fall, the carriage stays, what was in RAM is gone.
@@ -96,7 +96,7 @@ class HostBuiltController final : public SimulatedController {
     options_.board.memory->retained = {};
     controller_.reset();
     for (size_t pin = 0; pin < levels_.size(); ++pin) {
-      if (levels_[pin] != 0) note({now_ns_, static_cast<Pin>(pin), 0}, fallen_);
+      if (levels_[pin] != 0) note({now_ns_, static_cast<sim_controller::Pin>(pin), 0}, fallen_);
     }
   }
 
@@ -106,14 +106,14 @@ class HostBuiltController final : public SimulatedController {
   uint64_t powered_ns_ = 0;  ///< since when
   std::array<bool, 3> held_{};
   std::array<int32_t, 6> levels_{};
-  std::vector<PinEdge> fallen_;  ///< when power was cut
+  std::vector<sim_controller::PinEdge> fallen_;  ///< when power was cut
   std::vector<uint8_t> sent_;
-  std::vector<PinEdge> edges_;
+  std::vector<sim_controller::PinEdge> edges_;
 };
 
 }  // namespace
 
-std::unique_ptr<SimulatedController> make_host_built_controller() {
+std::unique_ptr<sim_controller::SimulatedController> make_host_built_controller() {
   return std::make_unique<HostBuiltController>();
 }
 

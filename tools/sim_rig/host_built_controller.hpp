@@ -3,10 +3,10 @@
 
 #include <memory>
 
-#include "tools/sim_rig/simulated_controller.hpp"
+#include "tools/sim_controller/simulated_controller.hpp"
 
 namespace diastole::sim_rig {
 
-std::unique_ptr<SimulatedController> make_host_built_controller();
+std::unique_ptr<sim_controller::SimulatedController> make_host_built_controller();
 
 }  // namespace diastole::sim_rig

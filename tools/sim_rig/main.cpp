@@ -1,18 +1,15 @@
 // sim_rig: the whole rig without hardware. See --help.
 
 #include <fmt/format.h>
-#include <sys/signalfd.h>
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
-#include <csignal>
 #include <cstdio>
 #include <fstream>
-#include <iostream>
 #include <optional>
 
-#include "protocol/contract/exit_code.hpp"
 #include "protocol/contract/input_error.hpp"
+#include "tools/program/program.hpp"
 #include "tools/sim_board/emulated_controller.hpp"
 #include "tools/sim_rig/control_client.hpp"
 #include "tools/sim_rig/faults/fault_kind.hpp"
@@ -24,8 +21,8 @@
 
 namespace {
 
-using diastole::ExitCode;
 namespace sim_rig = diastole::sim_rig;
+using diastole::sim_controller::SimulatedController;
 
 constexpr const char* purpose =
     R"(The whole rig without hardware: the pump's controller behind a pseudo-terminal, a pressure instrument behind
@@ -107,19 +104,9 @@ void add_commands(CLI::App& app, Arguments& arguments) {
       "Examples:\n  sim_rig ctl --at /tmp/rig fault on leak 3\n  sim_rig ctl --at /tmp/rig fault off leak");
 }
 
-std::unique_ptr<sim_rig::SimulatedController> make_controller(const std::string& image) {
+std::unique_ptr<SimulatedController> make_controller(const std::string& image) {
   if (image.empty()) return sim_rig::make_host_built_controller();
   return std::make_unique<diastole::EmulatedController>(std::vector{diastole::read_image(image)});
-}
-
-/// A descriptor that becomes readable on SIGTERM and SIGINT.
-int stop_descriptor() {
-  sigset_t signals;
-  sigemptyset(&signals);
-  sigaddset(&signals, SIGTERM);
-  sigaddset(&signals, SIGINT);
-  sigprocmask(SIG_BLOCK, &signals, nullptr);
-  return signalfd(-1, &signals, SFD_CLOEXEC);
 }
 
 void hide(const Arguments& arguments, sim_rig::PlantConfig& plant) {
@@ -141,7 +128,7 @@ void serve(Arguments arguments) {
   description.plant.seed = arguments.seed;
   hide(arguments, description.plant);
   arguments.server.faults = sim_rig::parse_faults(arguments.faults);
-  const int stop = stop_descriptor();
+  const int stop = diastole::stop_descriptor();
   sim_rig::Server server(description, make_controller(arguments.image), arguments.server);
   fmt::print("{}\n", server.addresses());
   std::fflush(stdout);
@@ -150,9 +137,9 @@ void serve(Arguments arguments) {
 
 void carry_out(const CLI::App& app, const Arguments& arguments) {
   if (app.got_subcommand("faults")) {
-    fmt::print("{}", sim_rig::told_faults());
+    fmt::print("{}", sim_rig::list_of_faults());
   } else if (app.got_subcommand("hidden")) {
-    fmt::print("{}", sim_rig::told_hidden());
+    fmt::print("{}", sim_rig::list_of_hidden());
   } else if (app.got_subcommand("ctl")) {
     fmt::print(
         "{}\n",
@@ -170,19 +157,8 @@ int main(int argc, char** argv) {
   Arguments arguments;
   add_options(app, arguments);
   add_commands(app, arguments);
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return static_cast<int>(app.exit(error) == 0 ? ExitCode::done : ExitCode::bad_input);
-  }
-  try {
+  return diastole::run_program(app, argc, argv, [&] {
     carry_out(app, arguments);
-    return static_cast<int>(ExitCode::done);
-  } catch (const diastole::InputError& error) {
-    std::cerr << "sim_rig: " << error.what() << '\n';
-    return static_cast<int>(ExitCode::bad_input);
-  } catch (const diastole::HardwareError& error) {
-    std::cerr << "sim_rig: " << error.what() << '\n';
-    return static_cast<int>(ExitCode::hardware_fault);
-  }
+    return diastole::ExitCode::done;
+  });
 }

@@ -7,7 +7,7 @@ constexpr double seconds(uint64_t time_ns) { return static_cast<double>(time_ns)
 
 }  // namespace
 
-Rig::Rig(const RigDescription& description, std::unique_ptr<SimulatedController> controller,
+Rig::Rig(const RigDescription& description, std::unique_ptr<sim_controller::SimulatedController> controller,
          Listeners listeners)
     : description_(description),
       controller_(std::move(controller)),
@@ -18,13 +18,13 @@ Rig::Rig(const RigDescription& description, std::unique_ptr<SimulatedController>
 void Rig::advance_to(uint64_t until_ns) {
   if (until_ns <= now_ns_) return;
   now_ns_ = until_ns;
-  const SimulatedController::Output output = controller_->advance_to(now_ns_);
-  for (const PinEdge& edge : output.edges) {
+  const sim_controller::SimulatedController::Output output = controller_->advance_to(now_ns_);
+  for (const sim_controller::PinEdge& edge : output.edges) {
     plant_.advance_to(seconds(edge.time_ns));  // the load under which this step is made
     if (const auto displaced_mL = carriage_.take(edge, plant_.pump_end_kPa())) {
       plant_.displace(seconds(edge.time_ns), *displaced_mL);
     }
-    if (edge.pin == Pin::ttl && edge.value != 0) plant_.begin_cycle();
+    if (edge.pin == sim_controller::Pin::ttl && edge.value != 0) plant_.begin_cycle();
     listeners_.edge(edge);
   }
   if (!output.sent.empty()) listeners_.sent(output.sent);

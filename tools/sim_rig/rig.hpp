@@ -6,22 +6,22 @@
 #include <memory>
 #include <span>
 
+#include "tools/sim_controller/simulated_controller.hpp"
 #include "tools/sim_rig/carriage.hpp"
 #include "tools/sim_rig/plant/plant.hpp"
 #include "tools/sim_rig/rig_description.hpp"
-#include "tools/sim_rig/simulated_controller.hpp"
 
 namespace diastole::sim_rig {
 
 class Rig {
  public:
-  /// Who is told what the controller does, while time advances.
+  /// Who hears what the controller does, while time advances.
   struct Listeners {
     std::function<void(std::span<const uint8_t>)> sent;
-    std::function<void(const PinEdge&)> edge;
+    std::function<void(const sim_controller::PinEdge&)> edge;
   };
 
-  Rig(const RigDescription& description, std::unique_ptr<SimulatedController> controller,
+  Rig(const RigDescription& description, std::unique_ptr<sim_controller::SimulatedController> controller,
       Listeners listeners);
 
   void receive(std::span<const uint8_t> bytes) { controller_->receive(bytes); }
@@ -35,13 +35,13 @@ class Rig {
   [[nodiscard]] const Plant& plant() const { return plant_; }
 
   // What can be made to go wrong from now on.
-  [[nodiscard]] SimulatedController& controller() { return *controller_; }
+  [[nodiscard]] sim_controller::SimulatedController& controller() { return *controller_; }
   [[nodiscard]] Carriage& carriage() { return carriage_; }
   [[nodiscard]] Plant& plant() { return plant_; }
 
  private:
   RigDescription description_;
-  std::unique_ptr<SimulatedController> controller_;
+  std::unique_ptr<sim_controller::SimulatedController> controller_;
   Listeners listeners_;
   Carriage carriage_;
   Plant plant_;

@@ -40,14 +40,14 @@ int64_t gained_ns(uint64_t time_ns, double ppm) {
 
 }  // namespace
 
-Server::Server(const RigDescription& description, std::unique_ptr<SimulatedController> controller,
-               const ServerOptions& options)
+Server::Server(const RigDescription& description,
+               std::unique_ptr<sim_controller::SimulatedController> controller, const ServerOptions& options)
     : options_(options),
       daq_patience_ns_(description.daq_patience_ns),
       cables_(options.link),
       rig_(description, std::move(controller),
            {.sent = [this](std::span<const uint8_t> bytes) { take_sent(bytes); },
-            .edge = [this](const PinEdge& edge) { take_edge(edge); }}),
+            .edge = [this](const sim_controller::PinEdge& edge) { take_edge(edge); }}),
       instrument_(
           instrument_config(description, options),
           {.now_ns = [this] { return rig_.now_ns(); },
@@ -93,9 +93,9 @@ void Server::run(int stop_descriptor) {
     if (!conductor_) {
       catch_up(static_cast<uint64_t>(std::chrono::nanoseconds(WallClock::now() - start).count()));
       while (const auto hold = timeline_.take_hold(run_clock_, rig_.now_ns()))
-        control_->tell(hold->client, "held " + hold->moment);
+        control_->send(hold->client, "held " + hold->moment);
     }
-    if (!conducted()) take_serial();  // otherwise with the question that tells how much was written
+    if (!conducted()) take_serial();  // otherwise with the question that says how much was written
     if (waiting[1].revents != 0) {
       if (const auto question = conductor_->receive()) conduct(*question);
     }
@@ -142,9 +142,9 @@ void Server::take_sent(std::span<const uint8_t> bytes) {
   if (cables_.to_host) cables_.line.write(bytes);
 }
 
-void Server::take_edge(const PinEdge& edge) {
-  if (edge.pin == Pin::ttl && edge.value != 0) run_clock_.trigger(edge.time_ns);
-  const bool to_scanner = edge.pin == Pin::ttl || edge.pin == Pin::rwave_uV;
+void Server::take_edge(const sim_controller::PinEdge& edge) {
+  if (edge.pin == sim_controller::Pin::ttl && edge.value != 0) run_clock_.trigger(edge.time_ns);
+  const bool to_scanner = edge.pin == sim_controller::Pin::ttl || edge.pin == sim_controller::Pin::rwave_uV;
   if (pins_ && (cables_.to_scanner || !to_scanner)) pins_->write(edge);
 }
 
@@ -186,7 +186,7 @@ sim_daq::Wait Server::let_wait(uint64_t late_ns) {
 void Server::hold_or_answer(const conductor::Advanced& answer) {
   if (const auto hold = timeline_.take_hold(run_clock_, rig_.now_ns()); hold && control_) {
     held_ = HeldAnswer{answer, hold->client};
-    control_->tell(hold->client, "held " + hold->moment);
+    control_->send(hold->client, "held " + hold->moment);
   } else {
     conductor_->answer(answer);
   }

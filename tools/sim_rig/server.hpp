@@ -6,9 +6,9 @@
 //
 //   fault on NAME [VALUE]     from now on          fault off NAME
 //   hold WHEN                 answered "ok" at once, and "held WHEN" when conducted time has come there; WHEN as
-//                             fault_schedule.hpp tells, of the run that is on or of the next; time then stands still
+//                             fault_schedule.hpp says, of the run that is on or of the next; time then stands still
 //                             until
-//   go                        or until that client is gone. With the wall clock "held" is told, but time goes on.
+//   go                        or until that client is gone. With the wall clock "held" is sent, but time goes on.
 //   state                     JSON: now_s, run_s (since the start of run, or null), faults (those that are on)
 
 #include <cstdint>
@@ -18,11 +18,11 @@
 #include <optional>
 #include <string>
 
+#include "tools/sim_controller/pin_trace.hpp"
 #include "tools/sim_daq/modbus_instrument.hpp"
 #include "tools/sim_rig/cables.hpp"
 #include "tools/sim_rig/conductor_server.hpp"
 #include "tools/sim_rig/control_server.hpp"
-#include "tools/sim_rig/pin_trace.hpp"
 #include "tools/sim_rig/playback.hpp"
 #include "tools/sim_rig/rig.hpp"
 #include "tools/sim_rig/run_clock.hpp"
@@ -44,7 +44,7 @@ struct ServerOptions {
 class Server {
  public:
   /// Opens everything. Throws InputError or HardwareError.
-  Server(const RigDescription& description, std::unique_ptr<SimulatedController> controller,
+  Server(const RigDescription& description, std::unique_ptr<sim_controller::SimulatedController> controller,
          const ServerOptions& options);
 
   /// One JSON document on one line: pty, modbus_host, modbus_port, conductor, control.
@@ -63,7 +63,7 @@ class Server {
   void advance_to(uint64_t until_ns);
   void set(const FaultKind& kind, std::optional<double> value);
   void take_sent(std::span<const uint8_t> bytes);
-  void take_edge(const PinEdge& edge);
+  void take_edge(const sim_controller::PinEdge& edge);
   void take_serial();
   [[nodiscard]] bool conducted() const { return conductor_ && conductor_->connected(); }
   void conduct(const conductor::Advance& question);
@@ -77,7 +77,7 @@ class Server {
   ServerOptions options_;
   uint64_t daq_patience_ns_;
   Cables cables_;
-  std::optional<PinTrace> pins_;
+  std::optional<sim_controller::PinTrace> pins_;
   RunClock run_clock_;
   Timeline timeline_;
   std::map<std::string_view, double> faults_on_;

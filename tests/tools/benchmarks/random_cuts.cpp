@@ -14,7 +14,7 @@
 namespace diastole::step_path_test {
 namespace {
 
-using sim_rig::Pin;
+using sim_controller::Pin;
 
 constexpr uint64_t ms = 1'000'000;
 
@@ -44,7 +44,7 @@ wire::Configure quick_to_stop_and_home() {
 class RandomCuts {
  public:
   explicit RandomCuts(uint32_t seed) : random_(seed), session_(image) {
-    session_.on_edge = [this](const sim_rig::PinEdge& edge) {
+    session_.on_edge = [this](const sim_controller::PinEdge& edge) {
       if (edge.pin != Pin::step) return;
       if (edge.value == 1)
         steps_ns_.push_back(rose_ns_ = edge.time_ns);

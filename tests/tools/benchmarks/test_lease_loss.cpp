@@ -11,7 +11,7 @@
 namespace diastole::step_path_test {
 namespace {
 
-using sim_rig::Pin;
+using sim_controller::Pin;
 
 constexpr uint64_t ms = 1'000'000;
 
@@ -45,7 +45,7 @@ class LeaseLoss : public testing::TestWithParam<Case> {
     EmulatedSession session(image);
     if (!session.prepare(GetParam().configure)) return steps;
     bool inflate = true;  // homing ends that way
-    session.on_edge = [&](const sim_rig::PinEdge& edge) {
+    session.on_edge = [&](const sim_controller::PinEdge& edge) {
       if (edge.pin == Pin::dir) inflate = edge.value == 1;
       if (edge.pin == Pin::step && edge.value == 1) steps.push_back({edge.time_ns, inflate});
     };

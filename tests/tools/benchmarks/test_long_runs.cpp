@@ -11,7 +11,7 @@
 namespace diastole::step_path_test {
 namespace {
 
-using sim_rig::Pin;
+using sim_controller::Pin;
 
 constexpr uint64_t s = 1'000'000'000;
 
@@ -29,7 +29,7 @@ TEST(LongRuns, NothingDriftsOverTenMillionSteps) {
   ASSERT_TRUE(session.ask(segment_of(trial)) && session.ask(wire::Arm::example()));
   uint64_t first_ns = 0, steps = 0, wrong = 0;
   int64_t cycles = 0;
-  session.on_edge = [&](const sim_rig::PinEdge& edge) {
+  session.on_edge = [&](const sim_controller::PinEdge& edge) {
     if (edge.value != 1) return;
     if (edge.pin == Pin::step) ++steps;
     if (edge.pin != Pin::ttl) return;
@@ -58,7 +58,7 @@ TEST(LongRuns, TriggersOfTenThousandCyclesStartWithTheirFirstStep) {
   std::vector<uint64_t> ttl_ns, first_steps_ns, waves_ns;
   uint64_t steps = 0;
   int32_t wave_uV = 0;
-  session.on_edge = [&](const sim_rig::PinEdge& edge) {
+  session.on_edge = [&](const sim_controller::PinEdge& edge) {
     if (edge.pin == Pin::ttl && edge.value == 1) ttl_ns.push_back(edge.time_ns);
     if (edge.pin == Pin::step && edge.value == 1 && steps++ % 40 == 0) first_steps_ns.push_back(edge.time_ns);
     if (edge.pin != Pin::rwave_uV) return;

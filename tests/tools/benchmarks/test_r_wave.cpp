@@ -12,7 +12,7 @@
 namespace diastole::step_path_test {
 namespace {
 
-using sim_rig::Pin;
+using sim_controller::Pin;
 
 struct Sample {
   double time_ms;  ///< from the wave's first code
@@ -32,7 +32,7 @@ std::vector<std::vector<Sample>> played_waves() {
   (void)session.ask(wire::Arm::example());
   int32_t before_uV = 0;
   uint64_t began_ns = 0;
-  session.on_edge = [&](const sim_rig::PinEdge& edge) {
+  session.on_edge = [&](const sim_controller::PinEdge& edge) {
     if (edge.pin != Pin::rwave_uV) return;
     if (before_uV == 0) {
       waves.emplace_back();

@@ -15,7 +15,7 @@ namespace diastole::step_path_test {
 namespace {
 
 using firmware::Real;
-using sim_rig::Pin;
+using sim_controller::Pin;
 
 int64_t ticks_between(uint64_t from_ns, uint64_t to_ns) {
   return std::llround((static_cast<double>(to_ns) - static_cast<double>(from_ns)) * 0.084);
@@ -32,7 +32,7 @@ Rises run(const StepRateTrial& trial) {
   if (!session.prepare(fine_stepping())) return rises;
   (void)session.ask(segment_of(trial));
   (void)session.ask(wire::Arm::example());
-  session.on_edge = [&](const sim_rig::PinEdge& edge) {
+  session.on_edge = [&](const sim_controller::PinEdge& edge) {
     if (edge.value == 1 && edge.pin == Pin::step) rises.steps_ns.push_back(edge.time_ns);
     if (edge.value == 1 && edge.pin == Pin::ttl) rises.triggers_ns.push_back(edge.time_ns);
   };

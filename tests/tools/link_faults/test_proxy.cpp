@@ -11,7 +11,7 @@
 #include "host/transport/serial_port.hpp"
 #include "protocol/contract/input_error.hpp"
 #include "tools/link_faults/proxy.hpp"
-#include "tools/sim_rig/pty_line.hpp"
+#include "tools/sim_controller/pty_line.hpp"
 
 namespace diastole::link_faults {
 namespace {
@@ -23,7 +23,7 @@ class Proxied : public testing::Test {
   void SetUp() override {
     directory = fs::temp_directory_path() / ("link_faults-" + std::to_string(::getpid()));
     fs::create_directories(directory);
-    controller = std::make_unique<sim_rig::PtyLine>(directory / "pump");
+    controller = std::make_unique<sim_controller::PtyLine>(directory / "pump");
     options.port = (directory / "pump").string();
     options.link = (directory / "bad").string();
   }
@@ -62,7 +62,7 @@ class Proxied : public testing::Test {
 
   fs::path directory;
   ProxyOptions options;
-  std::unique_ptr<sim_rig::PtyLine> controller;
+  std::unique_ptr<sim_controller::PtyLine> controller;
   std::unique_ptr<SerialPort> host;
   std::thread proxy;
   ProxyReport report;

@@ -28,7 +28,7 @@ class EmulatedDesk final : public Clock {
 
   EmulatedController controller;
   std::deque<uint8_t> to_host;
-  std::vector<sim_rig::PinEdge> edges;
+  std::vector<sim_controller::PinEdge> edges;
 };
 
 class EmulatedLine final : public ByteLine {

@@ -1,5 +1,5 @@
 #pragma once
-// A host in miniature: speaks the real protocol with whatever stands behind sim_rig::SimulatedController, in
+// A host in miniature: speaks the real protocol with whatever stands behind sim_controller::SimulatedController, in
 // that controller's time, and keeps the pin edges. The same session can so be held with the firmware built
 // for this machine and with its image on the emulated board.
 
@@ -13,7 +13,7 @@
 #include "protocol/wire/messages.hpp"
 #include "protocol/wire/reliable_link.hpp"
 #include "tools/link_faults/line_faults.hpp"
-#include "tools/sim_rig/simulated_controller.hpp"
+#include "tools/sim_controller/simulated_controller.hpp"
 
 namespace diastole::sim_board_test {
 
@@ -21,7 +21,7 @@ class MiniatureHost {
  public:
   static constexpr uint32_t lease = 0x5ea5e;
 
-  explicit MiniatureHost(sim_rig::SimulatedController& controller) : controller_(controller) {}
+  explicit MiniatureHost(sim_controller::SimulatedController& controller) : controller_(controller) {}
 
   /// Opens a session and says hello; false when nobody answers within 5 s.
   bool connect();
@@ -56,7 +56,7 @@ class MiniatureHost {
   wire::State state = wire::State::unhomed;
   wire::Fault fault = wire::Fault::none;
   std::optional<wire::RunEnded> ended;
-  std::vector<sim_rig::PinEdge> edges;
+  std::vector<sim_controller::PinEdge> edges;
   uint32_t triggers_heard = 0;
   std::vector<uint16_t> acknowledged, refused;  ///< requests, in the order of their answers
   std::vector<wire::SegmentPlanned> planned;
@@ -70,7 +70,7 @@ class MiniatureHost {
   [[nodiscard]] bool heartbeat_due();
   void hear(const wire::Received& received);
 
-  sim_rig::SimulatedController& controller_;
+  sim_controller::SimulatedController& controller_;
   wire::ReliableLink link_{wire::ReliableLink::Role::host};
   std::optional<bool> acknowledged_;  ///< the last answer
   uint64_t now_ns_ = 0, next_heartbeat_ns_ = 0;

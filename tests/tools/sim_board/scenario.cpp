@@ -7,8 +7,8 @@
 namespace diastole::sim_board_test {
 namespace {
 
-using sim_rig::Pin;
-using sim_rig::PinEdge;
+using sim_controller::Pin;
+using sim_controller::PinEdge;
 
 constexpr uint64_t ms = 1'000'000, s = 1'000 * ms;  // ns
 constexpr uint64_t rest_ns = 50 * ms;               // longer than any interval of a motion
@@ -136,7 +136,7 @@ class Holder {
 std::ostream& operator<<(std::ostream& out, const Scenario& scenario) { return out << scenario.name; }
 
 std::ostream& operator<<(std::ostream& out, const TimedEdge& edge) {
-  return out << edge.tick << ' ' << sim_rig::pin_name(edge.pin) << ' ' << edge.value;
+  return out << edge.tick << ' ' << sim_controller::pin_name(edge.pin) << ' ' << edge.value;
 }
 
 Session hold(const Scenario& scenario, ScenarioRig& rig) { return Holder(scenario, rig).hold(); }

@@ -46,7 +46,7 @@ const std::vector<Scenario>& scenarios();
 
 struct TimedEdge {
   int64_t tick;  ///< of 84 MHz, from the motion's first edge on STEP or TTL (or its stage's)
-  sim_rig::Pin pin;
+  sim_controller::Pin pin;
   int32_t value;
   bool operator==(const TimedEdge&) const = default;
 };

@@ -14,9 +14,9 @@ firmware::Ticks ticks_at(uint64_t time_ns) {
   return {static_cast<int64_t>(time_ns / 1000 * 84 + time_ns % 1000 * 84 / 1000)};
 }
 
-class RecordedRig final : public ScenarioRig, public sim_rig::SimulatedController {
+class RecordedRig final : public ScenarioRig, public sim_controller::SimulatedController {
  public:
-  sim_rig::SimulatedController& controller() override { return *this; }
+  sim_controller::SimulatedController& controller() override { return *this; }
   void set_estop(uint64_t time_ns, bool pressed) override { switches_.emplace(time_ns, Move{true, pressed}); }
   void set_far_limit(uint64_t time_ns, bool closed) override {
     switches_.emplace(time_ns, Move{false, closed});
@@ -48,18 +48,20 @@ class RecordedRig final : public ScenarioRig, public sim_rig::SimulatedControlle
     bool on;
   };
   /// Both lists of pins have the order of the pin trace's contract.
-  static sim_rig::Pin pin_of(firmware::Signal signal) { return static_cast<sim_rig::Pin>(signal); }
+  static sim_controller::Pin pin_of(firmware::Signal signal) {
+    return static_cast<sim_controller::Pin>(signal);
+  }
 
   firmware::RecordedController board_;
   std::multimap<uint64_t, Move> switches_;
   std::vector<uint8_t> sent_;
-  std::vector<sim_rig::PinEdge> edges_;
+  std::vector<sim_controller::PinEdge> edges_;
 };
 
 class EmulatedRig final : public ScenarioRig {
  public:
   explicit EmulatedRig(const std::string& image) : controller_(std::vector{read_image(image)}) {}
-  sim_rig::SimulatedController& controller() override { return controller_; }
+  sim_controller::SimulatedController& controller() override { return controller_; }
   void set_estop(uint64_t time_ns, bool pressed) override { controller_.press_estop(time_ns, pressed); }
   void set_far_limit(uint64_t time_ns, bool closed) override { controller_.close_far_limit(time_ns, closed); }
   [[nodiscard]] int64_t position_microsteps() const override { return controller_.position_microsteps(); }

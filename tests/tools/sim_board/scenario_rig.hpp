@@ -6,14 +6,14 @@
 #include <memory>
 #include <string>
 
-#include "tools/sim_rig/simulated_controller.hpp"
+#include "tools/sim_controller/simulated_controller.hpp"
 
 namespace diastole::sim_board_test {
 
 class ScenarioRig {
  public:
   virtual ~ScenarioRig() = default;
-  [[nodiscard]] virtual sim_rig::SimulatedController& controller() = 0;
+  [[nodiscard]] virtual sim_controller::SimulatedController& controller() = 0;
   /// From time_ns on, which lies ahead.
   virtual void set_estop(uint64_t time_ns, bool pressed) = 0;
   virtual void set_far_limit(uint64_t time_ns, bool closed) = 0;

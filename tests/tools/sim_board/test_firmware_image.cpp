@@ -17,8 +17,8 @@
 namespace diastole::sim_board_test {
 namespace {
 
-using sim_rig::Pin;
-using sim_rig::PinEdge;
+using sim_controller::Pin;
+using sim_controller::PinEdge;
 using ::testing::IsEmpty;
 
 constexpr uint64_t s = 1'000'000'000;  // ns
@@ -40,7 +40,7 @@ struct TimedEdge {
   bool operator==(const TimedEdge&) const = default;
 };
 std::ostream& operator<<(std::ostream& out, const TimedEdge& edge) {
-  return out << edge.tick << ' ' << sim_rig::pin_name(edge.pin) << ' ' << edge.value;
+  return out << edge.tick << ' ' << sim_controller::pin_name(edge.pin) << ' ' << edge.value;
 }
 
 std::vector<TimedEdge> in_ticks(const std::vector<PinEdge>& edges, bool r_wave) {
@@ -61,7 +61,7 @@ bool upload_heart(MiniatureHost& host) {
 }
 
 /// Homes, then runs a short program, whose waveform 0 is the heart's; the edges of the run alone.
-std::vector<PinEdge> run_session(sim_rig::SimulatedController& controller,
+std::vector<PinEdge> run_session(sim_controller::SimulatedController& controller,
                                  const std::vector<wire::AddSegment>& program) {
   MiniatureHost host(controller);
   EXPECT_TRUE(host.prepare());

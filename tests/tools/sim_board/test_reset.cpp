@@ -16,7 +16,7 @@
 namespace diastole::sim_board_test {
 namespace {
 
-using sim_rig::Pin;
+using sim_controller::Pin;
 using wire::State;
 
 constexpr uint64_t ms = 1'000'000;  // ns
@@ -122,7 +122,7 @@ TEST_P(ResetIn, IsSeenWithin200msAndLeavesTheRigSafe) {
             GetParam().power ? wire::ResetCause::power_on : wire::ResetCause::reset_pin);
 
   run_for(1'000 * ms);
-  const auto on = [](const sim_rig::PinEdge& edge) { return edge.pin != Pin::dir && edge.value != 0; };
+  const auto on = [](const sim_controller::PinEdge& edge) { return edge.pin != Pin::dir && edge.value != 0; };
   EXPECT_TRUE(std::ranges::none_of(desk->edges, on)) << "a pin went on by itself";
   EXPECT_EQ(desk->controller.position_microsteps(), position);
   EXPECT_EQ(client->status().state, State::unhomed);

@@ -12,7 +12,7 @@
 namespace diastole::sim_board_test {
 namespace {
 
-using sim_rig::Pin;
+using sim_controller::Pin;
 
 const std::string firmware = DIASTOLE_SOURCE_DIR "/build/firmware/bin/diastole-stm32f405.elf";
 

@@ -11,7 +11,7 @@ namespace {
 TEST(Carriage, VentsTheLineUntilHomingEnds) {
   Carriage carriage(0.01, ScriptedController({}).places());
   std::vector<double> told_mL;
-  for (const PinEdge& edge : home_and_inflate(100, 1000)) {
+  for (const sim_controller::PinEdge& edge : home_and_inflate(100, 1000)) {
     if (const auto displaced_mL = carriage.take(edge, 0)) told_mL.push_back(*displaced_mL);
   }
   ASSERT_EQ(told_mL.size(), 101U);
@@ -21,10 +21,10 @@ TEST(Carriage, VentsTheLineUntilHomingEnds) {
 
 TEST(Carriage, OnlyRisingStepEdgesMoveIt) {
   Carriage carriage(0.01, {.parked = 0, .home = 0});
-  carriage.take({0, Pin::dir, 1}, 0);
-  EXPECT_FALSE(carriage.take({1, Pin::step, 0}, 0));
-  EXPECT_FALSE(carriage.take({2, Pin::ttl, 1}, 0));
-  EXPECT_TRUE(carriage.take({3, Pin::step, 1}, 0));
+  carriage.take({0, sim_controller::Pin::dir, 1}, 0);
+  EXPECT_FALSE(carriage.take({1, sim_controller::Pin::step, 0}, 0));
+  EXPECT_FALSE(carriage.take({2, sim_controller::Pin::ttl, 1}, 0));
+  EXPECT_TRUE(carriage.take({3, sim_controller::Pin::step, 1}, 0));
 }
 
 }  // namespace

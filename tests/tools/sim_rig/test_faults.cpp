@@ -38,7 +38,8 @@ class Bench {
  private:
   explicit Bench(std::unique_ptr<ScriptedController> scripted)
       : controller(*scripted),
-        rig(description(), std::move(scripted), {[](std::span<const uint8_t>) {}, [](const PinEdge&) {}}) {}
+        rig(description(), std::move(scripted),
+            {[](std::span<const uint8_t>) {}, [](const sim_controller::PinEdge&) {}}) {}
 
   static RigDescription description() {
     return read_rig_description(
@@ -59,7 +60,7 @@ double with_fault_kPa(std::string_view name, uint64_t time_ns) {
 }
 double whole_kPa(uint64_t time_ns) { return Bench().advance(time_ns).cavity_kPa(); }
 
-void expect_held(std::string_view name, Switch which) {
+void expect_held(std::string_view name, sim_controller::Switch which) {
   Bench bench;
   EXPECT_TRUE(bench.set(name, true).controller.held.contains(which));
   EXPECT_FALSE(bench.set(name, false).controller.held.contains(which));
@@ -74,9 +75,9 @@ void expect_flag(std::string_view name, const std::function<bool(Bench&)>& troub
 
 const std::map<std::string_view, std::function<void()>>& traces() {
   static const std::map<std::string_view, std::function<void()>> all{
-      {"estop", [] { expect_held("estop", Switch::estop); }},
-      {"far-limit", [] { expect_held("far-limit", Switch::far_limit); }},
-      {"home-limit", [] { expect_held("home-limit", Switch::home); }},
+      {"estop", [] { expect_held("estop", sim_controller::Switch::estop); }},
+      {"far-limit", [] { expect_held("far-limit", sim_controller::Switch::far_limit); }},
+      {"home-limit", [] { expect_held("home-limit", sim_controller::Switch::home); }},
       {"power-cut", [] { expect_flag("power-cut", [](Bench& b) { return !b.controller.powered; }); }},
       {"serial-hangup",
        [] { expect_flag("serial-hangup", [](Bench& b) { return !b.cables.line.plugged_in(); }); }},
@@ -183,7 +184,7 @@ TEST(RigFaults, EveryFaultOfTheListLeavesItsTrace) {
 
 TEST(RigFaults, EveryFaultIsTold) {
   std::string told = "\n";
-  told += told_faults();
+  told += list_of_faults();
   for (const FaultKind& kind : fault_kinds()) {
     std::string line = "\n";
     line.append(kind.name).append(" ");

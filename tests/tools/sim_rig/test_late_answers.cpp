@@ -26,7 +26,7 @@ class LateAnswers : public testing::Test {
     options_.host_drift_ppm = host_drift_ppm;
     server_ = std::make_unique<Server>(
         read_rig_description(TableReader::from_text(default_rig_toml(), "the built-in rig file")),
-        std::make_unique<ScriptedController>(std::vector<PinEdge>{}), options_);
+        std::make_unique<ScriptedController>(std::vector<sim_controller::PinEdge>{}), options_);
     EXPECT_EQ(::pipe(stop_.data()), 0);
     thread_ = std::thread([this] { server_->run(stop_[0]); });
     clock_.emplace(options_.conductor.string());

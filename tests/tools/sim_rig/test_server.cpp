@@ -43,7 +43,7 @@ class TemporaryDirectory {
 /// A conducted server in a thread, with a client's ends of line and conductor.
 class Conducted {
  public:
-  explicit Conducted(std::vector<PinEdge> script, const std::vector<std::string>& faults = {},
+  explicit Conducted(std::vector<sim_controller::PinEdge> script, const std::vector<std::string>& faults = {},
                      double host_drift_ppm = 0) {
     ServerOptions options;
     options.link = directory_ / "pump";
@@ -141,7 +141,10 @@ TEST(Server, CountsStartAnewWhenThePortIsOpenedAgain) {
 }
 
 TEST(Server, PinsAreTracedInOrderWithTheirTimes) {
-  Conducted rig({{100, Pin::dir, 1}, {200, Pin::step, 1}, {300, Pin::step, 0}, {300, Pin::rwave_uV, 20000}});
+  Conducted rig({{100, sim_controller::Pin::dir, 1},
+                 {200, sim_controller::Pin::step, 1},
+                 {300, sim_controller::Pin::step, 0},
+                 {300, sim_controller::Pin::rwave_uV, 20000}});
   rig.ask(1'000'000, 0);
   rig.stop();
   EXPECT_EQ(rig.pins(), "time_ns,signal,value\n100,DIR,1\n200,STEP,1\n300,STEP,0\n300,RWAVE_uV,20000\n");
@@ -158,12 +161,12 @@ TEST(Server, AHangUpIsSeenAtTheLine) {
 }
 
 TEST(Server, ACableToTheScannerThatIsCutShowsInThePinTrace) {
-  Conducted rig({{1'000'000, Pin::ttl, 1},
-                 {2'000'000, Pin::ttl, 0},
-                 {3'000'000, Pin::ttl, 1},
-                 {3'000'000, Pin::rwave_uV, 9},
-                 {4'000'000, Pin::step, 1},
-                 {6'000'000, Pin::ttl, 0}},
+  Conducted rig({{1'000'000, sim_controller::Pin::ttl, 1},
+                 {2'000'000, sim_controller::Pin::ttl, 0},
+                 {3'000'000, sim_controller::Pin::ttl, 1},
+                 {3'000'000, sim_controller::Pin::rwave_uV, 9},
+                 {4'000'000, sim_controller::Pin::step, 1},
+                 {6'000'000, sim_controller::Pin::ttl, 0}},
                 {"gate-lost@ttl+0.0015s:off@0.005"});
   rig.ask(7'000'000, 0);
   rig.stop();
@@ -193,7 +196,7 @@ TEST(Server, ASilentLineSwallowsWhatIsSent) {
 }
 
 TEST(Server, OrdersSwitchFaultsAndHoldTheTime) {
-  Conducted rig({{1'000'000, Pin::ttl, 1}});
+  Conducted rig({{1'000'000, sim_controller::Pin::ttl, 1}});
   ControlClient control(rig.control());
   EXPECT_EQ(nlohmann::json::parse(control.order("state"))["faults"], nlohmann::json::object());
   EXPECT_THAT(control.order("fault on leak 3"), testing::HasSubstr("leak on"));
@@ -236,7 +239,7 @@ TEST(Rig, PistonMotionAppearsAsVolts) {
   const auto description =
       read_rig_description(TableReader::from_text(default_rig_toml(), "the built-in rig file"));
   Rig rig(description, std::make_unique<ScriptedController>(home_and_inflate(2567, 200'000)),
-          {.sent = [](std::span<const uint8_t>) {}, .edge = [](const PinEdge&) {}});
+          {.sent = [](std::span<const uint8_t>) {}, .edge = [](const sim_controller::PinEdge&) {}});
   rig.advance_to(30'000'000);
   EXPECT_NEAR(rig.volts(0) * description.channels[0].kPa_per_V, 0, 0.15);  // vented: noise only
   rig.advance_to(5'000'000'000);
@@ -248,7 +251,7 @@ TEST(Rig, PistonMotionAppearsAsVolts) {
 TEST(PtyLine, ALinkNeverReplacesAFile) {
   const TemporaryDirectory directory;
   std::ofstream(directory / "file") << "precious";
-  EXPECT_THROW(PtyLine(directory / "file"), InputError);
+  EXPECT_THROW(sim_controller::PtyLine(directory / "file"), InputError);
   EXPECT_TRUE(fs::is_regular_file(directory / "file"));
 }
 

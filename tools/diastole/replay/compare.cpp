@@ -153,7 +153,7 @@ void Comparer::compare_positions() {
   out_.steps_equal = out_.steps_equal && equal;
 }
 
-/// Steps of each cycle of the recording, as the positions in these rows tell them.
+/// Steps of each cycle of the recording, as the positions in these rows show them.
 std::vector<CycleSteps> cycle_steps(const RecordedRun& run, const std::vector<double>& trigger_s,
                                     double microstep_mL, const std::vector<size_t>& rows) {
   std::vector<CycleSteps> cycles(trigger_s.size());
@@ -225,7 +225,7 @@ void Comparer::compare_samples() {
       {"first sample after the start of run", fmt::format("{:.6f} s", before[0]),
        fmt::format("{:.6f} s", after[0]),
        fmt::format("start phase {:+.3f} ms; then {:.3f} us at most", 1e3 * out_.start_phase_s, 1e6 * most_s),
-       Verdict::told});
+       Verdict::reported});
 }
 
 void Comparer::compare_missing(size_t rows) {
@@ -311,7 +311,7 @@ void Comparer::compare_events() {
                               ? 0
                               : (recorded_.pressure.time_s.back() - recorded_.pressure.time_s.front()) /
                                     static_cast<double>(recorded_.pressure.time_s.size() - 1);
-  const auto told = [](const Event* event) {
+  const auto described = [](const Event* event) {
     return event == nullptr ? std::string("-") : fmt::format("{} at {:.6f} s", event->code, event->time_s);
   };
   for (size_t i = 0; i < std::max(before.size(), after.size()); ++i) {
@@ -327,18 +327,18 @@ void Comparer::compare_events() {
     const double diff_s = was != nullptr && is != nullptr ? is->time_s - was->time_s : 0;
     const bool equal =
         was != nullptr && is != nullptr && was->code == is->code && std::abs(diff_s) <= tolerance_s;
-    add("event", told(was), told(is), equal ? fmt::format("{:+.3f} us", 1e6 * diff_s) : "", equal);
+    add("event", described(was), described(is), equal ? fmt::format("{:+.3f} us", 1e6 * diff_s) : "", equal);
     if (equal) continue;
     out_.events_equal = false;
     differs_at(was != nullptr ? was->time_s : is->time_s,
-               fmt::format("event {}, and now {}", told(was), told(is)));
+               fmt::format("event {}, and now {}", described(was), described(is)));
   }
 }
 
 void Comparer::compare_end() {
   const std::string before = end_of(recorded_), after = end_of(replayed_);
   if (broke_off_) {
-    out_.lines.push_back({"end", "broken off", after, "", Verdict::told});
+    out_.lines.push_back({"end", "broken off", after, "", Verdict::reported});
     return;
   }
   add("end", before, after, "", before == after);

@@ -10,9 +10,9 @@
 //   events       faults of the controller, stops, the end: the same, in the same order; faults to 250 us (the turn of
 //                the controller's main loop that notes them), but lease_lost to a heartbeat (50 ms), whose phase is
 //                not in the file; what the host noted to one sample and the start phase
-// What may differ, and is told: where within the sampling interval the run began (the start phase), and by how much
+// What may differ, and is reported: where within the sampling interval the run began (the start phase), and by how much
 // samples came late in the recording (a busy host, a slow answer), which is not brought about. More than one spacing
-// of the samples is told with the verdict.
+// of the samples is reported with the verdict.
 //
 // Of a recording that broke off, only as much as there is.
 
@@ -24,7 +24,7 @@
 
 namespace diastole::replay {
 
-enum class Verdict { equal, differs, told };
+enum class Verdict { equal, differs, reported };
 
 struct Line {
   std::string what;

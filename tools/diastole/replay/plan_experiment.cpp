@@ -81,7 +81,7 @@ bool is_between_cycles(const RecordedRun& run, const Segment& segment) {
   return std::abs(commanded_mL(run, segment.end_s()) - commanded_mL(run, segment.start_s)) > closes_mL;
 }
 
-/// For recordings of other programs: what the table of segments tells.
+/// For recordings of other programs: what the table of segments holds.
 void write_experiment(const RecordedRun& run, ReplayPlan& plan) {
   const auto& time_s = run.pressure.time_s;
   if (run.segments.empty()) {

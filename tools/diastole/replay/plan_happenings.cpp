@@ -26,7 +26,7 @@ std::string fault_from(const char* name, double from_s, std::optional<double> un
   return text;
 }
 
-/// When the controller was last heard; what it told in the run's last moments may have got lost with it.
+/// When the controller was last heard; what it reported in the run's last moments may have got lost with it.
 double last_heard_s(const RecordedRun& run) {
   constexpr double on_the_line_s = 2e-3;
   const double position_s = run.pump.time_s.empty() ? 0 : run.pump.time_s.back();

@@ -1,10 +1,10 @@
 #pragma once
-// What a recorded run tells about how to do it again: the experiment, the rig, the clocks, and what happened on the way.
+// What a recorded run says about how to do it again: the experiment, the rig, the clocks, and what happened on the way.
 //
 // Exactly as they were: experiment, machine settings, limits (where the file holds them), the place of the piston at
 // the start, the drift of host and instrument against the controller, every missing sample, stops, the operator's
 // starts of slices, and faults of switches and cables at their time. What cannot be known from the file is assumed and
-// told in `remarks`.
+// reported in `remarks`.
 
 #include <map>
 #include <optional>
@@ -43,7 +43,7 @@ struct PlanOptions {
 /// Throws InputError that says what the file lacks.
 ReplayPlan plan_replay(const runfile::RecordedRun& run, const PlanOptions& options = {});
 
-/// What tells that something began before, at a time that the file does not hold: lease_lost, or the loss of a
+/// What shows that something began before, at a time that the file does not hold: lease_lost, or the loss of a
 /// controller that was reset.
 std::optional<runfile::Event> late_sign(const runfile::RecordedRun& run);
 

@@ -13,7 +13,7 @@ const char* name_of(Verdict verdict) {
       return "equal";
     case Verdict::differs:
       return "DIFFERS";
-    case Verdict::told:
+    case Verdict::reported:
       break;
   }
   return "-";
@@ -28,7 +28,7 @@ std::string place_of(const Difference& difference) {
 std::string as_table(const ReplayReport& report) {
   std::string text = fmt::format("{} replayed by {}: {:.1f} s in {:.1f} s\n\n", report.recorded,
                                  report.firmware, report.simulated_s, report.wall_s);
-  const Line head{"", "recorded", "replayed", "difference", Verdict::told};
+  const Line head{"", "recorded", "replayed", "difference", Verdict::reported};
   std::vector<const Line*> lines{&head};
   for (const Line& line : report.comparison.lines)
     lines.push_back(&line);
@@ -74,7 +74,7 @@ nlohmann::json as_json(const ReplayReport& report) {
                      {"recorded", line.recorded},
                      {"replayed", line.replayed},
                      {"difference", line.difference},
-                     {"verdict", line.verdict == Verdict::told    ? "told"
+                     {"verdict", line.verdict == Verdict::reported    ? "told"
                                  : line.verdict == Verdict::equal ? "equal"
                                                                   : "differs"}});
   }

@@ -24,7 +24,7 @@ std::string program_beside(const std::string& name) {
   return fs::read_symlink("/proc/self/exe").parent_path() / name;
 }
 
-/// The rig file for both programs, checked here so that its faults are told as those of input.
+/// The rig file for both programs, checked here so that its faults are reported as those of input.
 std::string rig_file(const PrivateDirectory& directory, const std::string& given) {
   const std::string path = given.empty() ? (directory / "rig.toml").string() : given;
   if (given.empty()) std::ofstream(path) << sim_rig::default_rig_toml();

@@ -2,6 +2,7 @@
 // What every peripheral of the board is to the rest of the model.
 
 #include <cstdint>
+#include <initializer_list>
 
 #include "tools/sim_board/core/clock.hpp"
 
@@ -37,5 +38,27 @@ class Device {
 constexpr uint32_t merged(uint32_t old, uint32_t value, uint32_t mask) {
   return (old & ~mask) | (value & mask);
 }
+
+/// A device whose registers mostly read back what was written; what has side effects overrides read() or write() and
+/// leaves the rest to these.
+class RegisterBlock : public Device {
+ public:
+  uint32_t read(uint32_t offset) override {
+    const uint32_t* held = word(offset);
+    return held != nullptr ? *held : 0;
+  }
+  void write(uint32_t offset, uint32_t value, uint32_t mask) override {
+    if (uint32_t* held = word(offset)) *held = merged(*held, value, mask);
+  }
+
+ protected:
+  /// Where the register at `offset` is kept; null: reads 0, and writing it has no effect.
+  virtual uint32_t* word(uint32_t offset) = 0;
+
+  /// The word at `offset` among `words`, which lie one after the other; null for a gap, or beyond the last.
+  static uint32_t* in_order(uint32_t offset, std::initializer_list<uint32_t*> words) {
+    return offset / 4 < words.size() ? words.begin()[offset / 4] : nullptr;
+  }
+};
 
 }  // namespace diastole::board_model

@@ -7,10 +7,9 @@
 #include <span>
 #include <vector>
 
-#include "tools/sim_board/peripherals/flash.hpp"
-
 namespace diastole::board_model {
 
+inline constexpr uint32_t flash_base = 0x0800'0000, flash_bytes = 0x10'0000;
 inline constexpr uint32_t sram_base = 0x2000'0000, sram_bytes = 0x2'0000;
 inline constexpr uint32_t ccm_base = 0x1000'0000, ccm_bytes = 0x1'0000;
 inline constexpr uint32_t backup_base = 0x4002'4000, backup_bytes = 0x1000;

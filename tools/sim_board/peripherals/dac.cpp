@@ -7,6 +7,8 @@ namespace {
 
 constexpr uint32_t enabled = 1, trigger_enabled = 1 << 2, dma_enabled = 1 << 12;
 constexpr uint32_t software_trigger = 7;
+/// Each channel's holding register in three forms: 12 bits right, 12 bits left, 8 bits right.
+constexpr uint32_t first_holding = 0x08, holding_registers = 0x0c, right_12 = 0, left_12 = 4;
 
 uint32_t trigger_source(uint32_t control) { return control >> 3 & 7; }
 
@@ -22,75 +24,44 @@ void Dac::reset() {
   }
 }
 
+uint32_t* Dac::word(uint32_t offset) {
+  return offset == 0x00   ? &cr_
+         : offset == 0x2c ? &channels_[0].output
+         : offset == 0x30 ? &channels_[1].output
+                          : nullptr;
+}
+
 uint32_t Dac::read(uint32_t offset) {
-  switch (offset) {
-    case 0x00:
-      return cr_;
-    case 0x08:
-      return channels_[0].holding;
-    case 0x0c:
-      return channels_[0].holding << 4;
-    case 0x10:
-      return channels_[0].holding >> 4;
-    case 0x14:
-      return channels_[1].holding;
-    case 0x18:
-      return channels_[1].holding << 4;
-    case 0x1c:
-      return channels_[1].holding >> 4;
-    case 0x20:
-      return channels_[0].holding | channels_[1].holding << 16;
-    case 0x2c:
-      return channels_[0].output;
-    case 0x30:
-      return channels_[1].output;
-    default:
-      return 0;
-  }
+  if (offset == 0x20) return channels_[0].holding | channels_[1].holding << 16;
+  if (offset < first_holding || offset >= 0x20) return RegisterBlock::read(offset);
+  const uint32_t holding = channels_[(offset - first_holding) / holding_registers].holding;
+  const uint32_t form = (offset - first_holding) % holding_registers;
+  return form == right_12 ? holding : form == left_12 ? holding << 4 : holding >> 4;
 }
 
 void Dac::write(uint32_t offset, uint32_t value, uint32_t mask) {
-  switch (offset) {
-    case 0x00:
-      cr_ = merged(cr_, value, mask);
-      for (uint32_t channel = 0; channel < 2; ++channel) {
-        if ((control(channel) & enabled) == 0) output(channel, 0, clock_.now());
-        if ((control(channel) & 0xc0) == 0) channels_[channel].triangle = 0;
-        if ((control(channel) & 0xc0) == 0x40)
-          notes_.add("DAC: noise is not modelled", clock_.ns(clock_.now()));
+  if (offset == 0x00) {
+    RegisterBlock::write(offset, value, mask);
+    for (uint32_t channel = 0; channel < 2; ++channel) {
+      if ((control(channel) & enabled) == 0) output(channel, 0, clock_.now());
+      if ((control(channel) & 0xc0) == 0) channels_[channel].triangle = 0;
+      if ((control(channel) & 0xc0) == 0x40)
+        notes_.add("DAC: noise is not modelled", clock_.ns(clock_.now()));
+    }
+  } else if (offset == 0x04) {
+    for (uint32_t channel = 0; channel < 2; ++channel) {
+      if ((value & mask) >> channel & 1 && trigger_source(control(channel)) == software_trigger) {
+        convert(channel, clock_.now());
       }
-      break;
-    case 0x04:
-      for (uint32_t channel = 0; channel < 2; ++channel) {
-        if ((value & mask) >> channel & 1 && trigger_source(control(channel)) == software_trigger) {
-          convert(channel, clock_.now());
-        }
-      }
-      break;
-    case 0x08:
-      hold(0, value & 0xfff);
-      break;
-    case 0x0c:
-      hold(0, value >> 4 & 0xfff);
-      break;
-    case 0x10:
-      hold(0, (value & 0xff) << 4);
-      break;
-    case 0x14:
-      hold(1, value & 0xfff);
-      break;
-    case 0x18:
-      hold(1, value >> 4 & 0xfff);
-      break;
-    case 0x1c:
-      hold(1, (value & 0xff) << 4);
-      break;
-    case 0x20:
-      hold(0, value & 0xfff);
-      hold(1, value >> 16 & 0xfff);
-      break;
-    default:
-      break;
+    }
+  } else if (offset < 0x20) {
+    const uint32_t form = (offset - first_holding) % holding_registers;
+    hold((offset - first_holding) / holding_registers, form == right_12  ? value & 0xfff
+                                                       : form == left_12 ? value >> 4 & 0xfff
+                                                                         : (value & 0xff) << 4);
+  } else if (offset == 0x20) {
+    hold(0, value & 0xfff);
+    hold(1, value >> 16 & 0xfff);
   }
 }
 

@@ -12,7 +12,7 @@
 
 namespace diastole::board_model {
 
-class Dac final : public Device {
+class Dac final : public RegisterBlock {
  public:
   Dac(const Clock& clock, PinLog& log, Notes& notes);
 
@@ -27,6 +27,7 @@ class Dac final : public Device {
   void timer_trigger(uint8_t number, Cycles at);
 
  private:
+  uint32_t* word(uint32_t offset) override;
   struct Channel {
     uint32_t holding = 0, output = 0;
     uint32_t triangle = 0;

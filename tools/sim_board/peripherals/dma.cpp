@@ -29,31 +29,21 @@ void Dma::reset() {
     set_line(stream);
 }
 
-uint32_t Dma::read(uint32_t offset) {
-  if (offset < 8) {
-    uint32_t flags = 0;
-    for (uint32_t i = 0; i < 4; ++i)
-      flags |= streams_[offset + i].flags << flag_shift[i];
-    return flags;
-  }
-  if (offset < first_stream_register) return 0;
+uint32_t* Dma::word(uint32_t offset) {
   const uint32_t index = (offset - first_stream_register) / stream_registers;
-  if (index >= stream_count) return 0;
-  const Stream& stream = streams_[index];
-  switch ((offset - first_stream_register) % stream_registers) {
-    case 0x00:
-      return stream.control;
-    case 0x04:
-      return stream.left;
-    case 0x08:
-      return stream.peripheral;
-    case 0x0c:
-      return stream.memory0;
-    case 0x10:
-      return stream.memory1;
-    default:
-      return stream.fifo;
-  }
+  if (offset < first_stream_register || index >= stream_count) return nullptr;
+  Stream& stream = streams_[index];
+  return in_order(
+      (offset - first_stream_register) % stream_registers,
+      {&stream.control, &stream.left, &stream.peripheral, &stream.memory0, &stream.memory1, &stream.fifo});
+}
+
+uint32_t Dma::read(uint32_t offset) {
+  if (offset >= 8) return RegisterBlock::read(offset);
+  uint32_t flags = 0;
+  for (uint32_t i = 0; i < 4; ++i)
+    flags |= streams_[offset + i].flags << flag_shift[i];
+  return flags;
 }
 
 void Dma::write(uint32_t offset, uint32_t value, uint32_t mask) {
@@ -68,36 +58,17 @@ void Dma::write(uint32_t offset, uint32_t value, uint32_t mask) {
   const uint32_t index = (offset - first_stream_register) / stream_registers;
   if (offset < first_stream_register || index >= stream_count) return;
   Stream& stream = streams_[index];
-  switch ((offset - first_stream_register) % stream_registers) {
-    case 0x00:
-      enable(stream, merged(stream.control, value, mask));
-      break;
-    case 0x04:
-      stream.left = merged(stream.left, value, mask) & 0xffff;
-      break;
-    case 0x08:
-      stream.peripheral = merged(stream.peripheral, value, mask);
-      break;
-    case 0x0c:
-      stream.memory0 = merged(stream.memory0, value, mask);
-      break;
-    case 0x10:
-      stream.memory1 = merged(stream.memory1, value, mask);
-      break;
-    default:
-      stream.fifo = merged(stream.fifo, value, mask);
-      break;
-  }
+  const bool was_on = (stream.control & enabled) != 0;
+  RegisterBlock::write(offset, value, mask);
+  stream.left &= 0xffff;
+  if (!was_on && (stream.control & enabled) != 0) start(stream);
   set_line(index);
 }
 
-void Dma::enable(Stream& stream, uint32_t control) {
-  const bool starts = (control & enabled) != 0 && (stream.control & enabled) == 0;
-  stream.control = control;
-  if (!starts) return;
+void Dma::start(Stream& stream) {
   stream.programmed = stream.left;
   stream.at = stream.memory0;
-  if ((control >> 6 & 3) == 2 || (control & 1U << 18) != 0) {
+  if ((stream.control >> 6 & 3) == 2 || (stream.control & 1U << 18) != 0) {
     notes_.add("DMA: memory to memory and double buffers are not modelled", clock_.ns(clock_.now()));
   }
 }

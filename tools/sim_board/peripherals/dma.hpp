@@ -12,7 +12,7 @@
 
 namespace diastole::board_model {
 
-class Dma final : public Device {
+class Dma final : public RegisterBlock {
  public:
   static constexpr uint32_t stream_count = 8;
 
@@ -26,6 +26,7 @@ class Dma final : public Device {
   void request(uint32_t stream, uint32_t channel);
 
  private:
+  uint32_t* word(uint32_t offset) override;
   struct Stream {
     uint32_t control = 0, peripheral = 0, memory0 = 0, memory1 = 0, fifo = 0x21;
     uint32_t left = 0;  ///< NDTR
@@ -36,7 +37,7 @@ class Dma final : public Device {
 
   void transfer(Stream& stream);
   void set_line(uint32_t stream);
-  void enable(Stream& stream, uint32_t control);
+  void start(Stream& stream);
 
   uint8_t number_;
   Bus& bus_;

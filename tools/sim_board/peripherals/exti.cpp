@@ -27,50 +27,20 @@ void Exti::edge(Pin pin, bool level) {
   set_lines();
 }
 
-uint32_t Exti::read(uint32_t offset) {
-  switch (offset) {
-    case 0x00:
-      return imr_;
-    case 0x04:
-      return emr_;
-    case 0x08:
-      return rtsr_;
-    case 0x0c:
-      return ftsr_;
-    case 0x10:
-      return swier_;
-    case 0x14:
-      return pr_;
-    default:
-      return 0;
-  }
+uint32_t* Exti::word(uint32_t offset) {
+  return in_order(offset, {&imr_, &emr_, &rtsr_, &ftsr_, &swier_, &pr_});
 }
 
 void Exti::write(uint32_t offset, uint32_t value, uint32_t mask) {
   const uint32_t bits = value & mask;
-  switch (offset) {
-    case 0x00:
-      imr_ = merged(imr_, value, mask);
-      break;
-    case 0x04:
-      emr_ = merged(emr_, value, mask);
-      break;
-    case 0x08:
-      rtsr_ = merged(rtsr_, value, mask);
-      break;
-    case 0x0c:
-      ftsr_ = merged(ftsr_, value, mask);
-      break;
-    case 0x10:
-      swier_ |= bits;
-      pr_ |= bits & imr_;
-      break;
-    case 0x14:
-      pr_ &= ~bits;
-      swier_ &= ~bits;
-      break;
-    default:
-      return;
+  if (offset == 0x10) {
+    swier_ |= bits;
+    pr_ |= bits & imr_;
+  } else if (offset == 0x14) {
+    pr_ &= ~bits;
+    swier_ &= ~bits;
+  } else {
+    RegisterBlock::write(offset, value, mask);
   }
   set_lines();
 }

@@ -33,15 +33,15 @@ class Syscfg final : public Device {
   std::array<uint32_t, 9> registers_{};
 };
 
-class Exti final : public Device {
+class Exti final : public RegisterBlock {
  public:
   Exti(const Syscfg& syscfg, PinLog& log, Nvic& nvic);
 
-  uint32_t read(uint32_t offset) override;
   void write(uint32_t offset, uint32_t value, uint32_t mask) override;
   void reset() override;
 
  private:
+  uint32_t* word(uint32_t offset) override;
   void edge(Pin pin, bool level);
   void set_lines();
 

@@ -12,13 +12,11 @@
 #include <span>
 #include <vector>
 
+#include "tools/sim_board/core/memory.hpp"
 #include "tools/sim_board/core/notes.hpp"
 #include "tools/sim_board/core/scheduler.hpp"
 
 namespace diastole::board_model {
-
-inline constexpr uint32_t flash_base = 0x0800'0000;
-inline constexpr uint32_t flash_bytes = 0x10'0000;
 
 struct Sector {
   uint32_t offset = 0, bytes = 0;

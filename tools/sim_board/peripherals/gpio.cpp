@@ -53,70 +53,25 @@ void Gpio::reset() {
   configured();
 }
 
+uint32_t* Gpio::word(uint32_t offset) {
+  return in_order(offset, {&moder_, &otyper_, &ospeedr_, &pupdr_, nullptr, &odr_, nullptr, &lckr_,
+                           &alternate_[0], &alternate_[1]});
+}
+
 uint32_t Gpio::read(uint32_t offset) {
-  switch (offset) {
-    case 0x00:
-      return moder_;
-    case 0x04:
-      return otyper_;
-    case 0x08:
-      return ospeedr_;
-    case 0x0c:
-      return pupdr_;
-    case 0x10: {
-      uint32_t levels = 0;
-      for (uint8_t number = 0; number < pins_per_port; ++number) {
-        if (mode(number) != analog && log_.level({port_, number})) levels |= 1U << number;
-      }
-      return levels;
-    }
-    case 0x14:
-      return odr_;
-    case 0x1c:
-      return lckr_;
-    case 0x20:
-      return alternate_[0];
-    case 0x24:
-      return alternate_[1];
-    default:
-      return 0;
+  if (offset != 0x10) return RegisterBlock::read(offset);
+  uint32_t levels = 0;
+  for (uint8_t number = 0; number < pins_per_port; ++number) {
+    if (mode(number) != analog && log_.level({port_, number})) levels |= 1U << number;
   }
+  return levels;
 }
 
 void Gpio::write(uint32_t offset, uint32_t value, uint32_t mask) {
-  switch (offset) {
-    case 0x00:
-      moder_ = merged(moder_, value, mask);
-      break;
-    case 0x04:
-      otyper_ = merged(otyper_, value, mask);
-      break;
-    case 0x08:
-      ospeedr_ = merged(ospeedr_, value, mask);
-      break;
-    case 0x0c:
-      pupdr_ = merged(pupdr_, value, mask);
-      break;
-    case 0x14:
-      set_output(merged(odr_, value, mask) & 0xffff);
-      return;
-    case 0x18: {
-      const uint32_t bits = value & mask;
-      set_output((odr_ & ~(bits >> 16)) | (bits & 0xffff));  // set wins over reset
-      return;
-    }
-    case 0x1c:
-      lckr_ = merged(lckr_, value, mask);
-      break;
-    case 0x20:
-      alternate_[0] = merged(alternate_[0], value, mask);
-      break;
-    case 0x24:
-      alternate_[1] = merged(alternate_[1], value, mask);
-      break;
-    default:
-      return;
-  }
+  const uint32_t bits = value & mask;
+  if (offset == 0x14) return set_output(merged(odr_, value, mask) & 0xffff);
+  if (offset == 0x18) return set_output((odr_ & ~(bits >> 16)) | (bits & 0xffff));  // set wins over reset
+  RegisterBlock::write(offset, value, mask);
   configured();
 }
 

@@ -18,7 +18,7 @@ struct TimerOutput {
 /// The timer output that alternate function `function` of `pin` selects (datasheet, table 9); timer 0: none.
 TimerOutput timer_output(Pin pin, uint32_t function);
 
-class Gpio final : public Device {
+class Gpio final : public RegisterBlock {
  public:
   Gpio(uint8_t port, const Clock& clock, PinLog& log);
 
@@ -32,6 +32,7 @@ class Gpio final : public Device {
   void timer_level(TimerOutput output, bool level, Cycles at);
 
  private:
+  uint32_t* word(uint32_t offset) override;
   [[nodiscard]] uint32_t mode(uint32_t number) const { return moder_ >> (2 * number) & 3; }
   [[nodiscard]] uint32_t function(uint32_t number) const {
     return alternate_[number / 8] >> (4 * (number % 8)) & 0xf;

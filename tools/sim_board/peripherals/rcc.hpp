@@ -1,6 +1,6 @@
 #pragma once
 // RCC: oscillators and PLL with their ready bits, the clock tree, clock gates and resets of the peripherals,
-// and the flags that tell why the last reset happened (RM0090, 7.3).
+// and the flags that show why the last reset happened (RM0090, 7.3).
 
 #include <functional>
 

@@ -1,11 +1,12 @@
 #include "tools/sim_board/peripherals/system_control.hpp"
 
+#include <algorithm>
 #include <bit>
+#include <iterator>
 
 namespace diastole::board_model {
 namespace {
 
-constexpr uint32_t block_start = 0xd00, block_end = 0xdf0;
 constexpr uint32_t usage_enable = 1 << 18, bus_enable = 1 << 17, memory_enable = 1 << 16;
 
 /// System handler priority registers hold exceptions 4 ... 15, one byte each.
@@ -70,6 +71,16 @@ void SystemControl::set_priorities(uint32_t first, uint32_t value, uint32_t mask
   }
 }
 
+uint32_t* SystemControl::word(uint32_t offset) {
+  const struct {
+    uint32_t offset, *word;
+  } places[] = {{0xd08, &vtor_},  {0xd10, &scr_},   {0xd14, &ccr_},   {0xd24, &shcsr_}, {0xd28, &cfsr_},
+                {0xd2c, &hfsr_},  {0xd34, &mmfar_}, {0xd38, &bfar_},  {0xd88, &cpacr_}, {0xdfc, &demcr_},
+                {0xf34, &fpccr_}, {0xf38, &fpcar_}, {0xf3c, &fpdscr_}};
+  const auto* found = std::ranges::find_if(places, [&](const auto& place) { return place.offset == offset; });
+  return found != std::end(places) ? found->word : nullptr;
+}
+
 uint32_t SystemControl::read(uint32_t offset) {
   const uint32_t word = (offset & 0x7f) / 4;
   if (offset >= 0x10 && offset < 0x20) return systick_.read(offset);
@@ -78,19 +89,16 @@ uint32_t SystemControl::read(uint32_t offset) {
   if (offset >= 0x200 && offset < 0x300) return bits_of(word, &Nvic::pending);
   if (offset >= 0x300 && offset < 0x400) return bits_of(word, &Nvic::is_active);
   if (offset >= 0x400 && offset < 0x400 + irq_count) return priorities(exception::first_irq + offset - 0x400);
-  if (offset >= block_start && offset < block_end) return read_block(offset);
-  switch (offset) {
-    case 0xdfc:
-      return demcr_;
-    case 0xf34:
-      return fpccr_;
-    case 0xf38:
-      return fpcar_;
-    case 0xf3c:
-      return fpdscr_;
-    default:
-      return 0;
+  if (offset == 0xd00) return 0x410f'c241;  // Cortex-M4 r0p1
+  if (offset == 0xd04) {
+    uint32_t value = nvic_.best_pending() << 12;
+    if (nvic_.pending(exception::pend_sv)) value |= 1U << 28;
+    if (nvic_.pending(exception::sys_tick)) value |= 1U << 26;
+    return value | nvic_.running();
   }
+  if (offset == 0xd0c) return 0xfa05'0000 | nvic_.priority_grouping() << 8;
+  if (offset >= 0xd18 && offset < 0xd24) return priorities(first_system_handler + offset - 0xd18);
+  return RegisterBlock::read(offset);
 }
 
 void SystemControl::write(uint32_t offset, uint32_t value, uint32_t mask) {
@@ -108,109 +116,27 @@ void SystemControl::write(uint32_t offset, uint32_t value, uint32_t mask) {
   if (offset >= 0x400 && offset < 0x400 + irq_count) {
     return set_priorities(exception::first_irq + offset - 0x400, value, mask);
   }
-  if (offset >= block_start && offset < block_end) return write_block(offset, value, mask);
-  switch (offset) {
-    case 0xdfc:
-      demcr_ = merged(demcr_, value, mask);
-      break;
-    case 0xf00:
-      if ((bits & 0x1ff) < irq_count) nvic_.set_pending(exception::first_irq + (bits & 0x1ff));
-      break;
-    case 0xf34:
-      fpccr_ = merged(fpccr_, value, mask);
-      break;
-    case 0xf38:
-      fpcar_ = merged(fpcar_, value, mask);
-      break;
-    case 0xf3c:
-      fpdscr_ = merged(fpdscr_, value, mask);
-      break;
-    default:
-      break;
-  }
-}
-
-uint32_t SystemControl::read_block(uint32_t offset) const {
-  switch (offset) {
-    case 0xd00:
-      return 0x410f'c241;  // Cortex-M4 r0p1
-    case 0xd04: {
-      uint32_t value = nvic_.best_pending() << 12;
-      if (nvic_.pending(exception::pend_sv)) value |= 1U << 28;
-      if (nvic_.pending(exception::sys_tick)) value |= 1U << 26;
-      return value | nvic_.running();
-    }
-    case 0xd08:
-      return vtor_;
-    case 0xd0c:
-      return 0xfa05'0000 | nvic_.priority_grouping() << 8;
-    case 0xd10:
-      return scr_;
-    case 0xd14:
-      return ccr_;
-    case 0xd18:
-    case 0xd1c:
-    case 0xd20:
-      return priorities(first_system_handler + offset - 0xd18);
-    case 0xd24:
-      return shcsr_;
-    case 0xd28:
-      return cfsr_;
-    case 0xd2c:
-      return hfsr_;
-    case 0xd34:
-      return mmfar_;
-    case 0xd38:
-      return bfar_;
-    case 0xd88:
-      return cpacr_;
-    default:
-      return 0;
-  }
-}
-
-void SystemControl::write_block(uint32_t offset, uint32_t value, uint32_t mask) {
+  if (offset >= 0xd18 && offset < 0xd24)
+    return set_priorities(first_system_handler + offset - 0xd18, value, mask);
   switch (offset) {
     case 0xd04:
-      write_interrupt_control(value & mask);
-      break;
+      return write_interrupt_control(bits);
     case 0xd08:
       vtor_ = merged(vtor_, value, mask) & ~0x7fU;
-      break;
+      return;
     case 0xd0c:
-      write_application_control(value & mask);
-      break;
-    case 0xd10:
-      scr_ = merged(scr_, value, mask);
-      break;
-    case 0xd14:
-      ccr_ = merged(ccr_, value, mask);
-      break;
-    case 0xd18:
-    case 0xd1c:
-    case 0xd20:
-      set_priorities(first_system_handler + offset - 0xd18, value, mask);
-      break;
-    case 0xd24:
-      shcsr_ = merged(shcsr_, value, mask);
-      break;
+      return write_application_control(bits);
     case 0xd28:
-      cfsr_ &= ~(value & mask);
-      break;
+      cfsr_ &= ~bits;
+      return;
     case 0xd2c:
-      hfsr_ &= ~(value & mask);
-      break;
-    case 0xd34:
-      mmfar_ = merged(mmfar_, value, mask);
-      break;
-    case 0xd38:
-      bfar_ = merged(bfar_, value, mask);
-      break;
-    case 0xd88:
-      cpacr_ = merged(cpacr_, value, mask);
-      break;
+      hfsr_ &= ~bits;
+      return;
+    case 0xf00:
+      if ((bits & 0x1ff) < irq_count) nvic_.set_pending(exception::first_irq + (bits & 0x1ff));
+      return;
     default:
-      break;
+      RegisterBlock::write(offset, value, mask);
   }
 }
 

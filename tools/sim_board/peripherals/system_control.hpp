@@ -18,7 +18,7 @@ inline constexpr uint32_t instruction_access = 1 << 8, precise_data = 1 << 9, im
                           invalid_return = 1 << 18, no_coprocessor = 1 << 19;
 }
 
-class SystemControl final : public Device {
+class SystemControl final : public RegisterBlock {
  public:
   SystemControl(Nvic& nvic, SysTick& systick);
 
@@ -38,8 +38,7 @@ class SystemControl final : public Device {
   [[nodiscard]] uint32_t fault_address() const { return bfar_; }
 
  private:
-  uint32_t read_block(uint32_t offset) const;
-  void write_block(uint32_t offset, uint32_t value, uint32_t mask);
+  uint32_t* word(uint32_t offset) override;
   void write_interrupt_control(uint32_t value);
   void write_application_control(uint32_t value);
   [[nodiscard]] uint32_t bits_of(uint32_t word, bool (Nvic::*test)(uint32_t) const) const;

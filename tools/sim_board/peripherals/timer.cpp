@@ -251,43 +251,15 @@ void Timer::unmodelled(const char* what) {
              clock_.ns(clock_.now()));
 }
 
+uint32_t* Timer::word(uint32_t offset) {
+  return in_order(offset, {&cr1_, &cr2_, &smcr_, &dier_, &sr_, nullptr, &ccmr_[0], &ccmr_[1], &ccer_, &count_,
+                           &prescaler_preload_, &reload_preload_, &rcr_, &channels_[0].preload,
+                           &channels_[1].preload, &channels_[2].preload, &channels_[3].preload, &bdtr_});
+}
+
 uint32_t Timer::read(uint32_t offset) {
   settle(clock_.now());
-  switch (offset) {
-    case 0x00:
-      return cr1_;
-    case 0x04:
-      return cr2_;
-    case 0x08:
-      return smcr_;
-    case 0x0c:
-      return dier_;
-    case 0x10:
-      return sr_;
-    case 0x18:
-      return ccmr_[0];
-    case 0x1c:
-      return ccmr_[1];
-    case 0x20:
-      return ccer_;
-    case 0x24:
-      return count_;
-    case 0x28:
-      return prescaler_preload_;
-    case 0x2c:
-      return reload_preload_;
-    case 0x30:
-      return rcr_;
-    case 0x34:
-    case 0x38:
-    case 0x3c:
-    case 0x40:
-      return channels_[(offset - 0x34) / 4].preload;
-    case 0x44:
-      return bdtr_;
-    default:
-      return 0;
-  }
+  return RegisterBlock::read(offset);
 }
 
 void Timer::write(uint32_t offset, uint32_t value, uint32_t mask) {
@@ -297,14 +269,8 @@ void Timer::write(uint32_t offset, uint32_t value, uint32_t mask) {
     case 0x00:
       write_control(merged(cr1_, value, mask));
       break;
-    case 0x04:
-      cr2_ = merged(cr2_, value, mask);
-      break;
     case 0x08:
       write_slave_mode(merged(smcr_, value, mask));
-      break;
-    case 0x0c:
-      dier_ = merged(dier_, value, mask);
       break;
     case 0x10:
       sr_ &= value | ~mask;
@@ -312,42 +278,25 @@ void Timer::write(uint32_t offset, uint32_t value, uint32_t mask) {
     case 0x14:
       generate(value & mask, now);
       break;
-    case 0x18:
-    case 0x1c: {
-      uint32_t& held = ccmr_[(offset - 0x18) / 4];
-      held = merged(held, value, mask);
-      apply_forced_modes(now);
-      break;
-    }
-    case 0x20:
-      ccer_ = merged(ccer_, value, mask);
-      break;
     case 0x24:
       count_ = merged(count_, value, mask) & width_mask();
       count_since_ = now;
-      break;
-    case 0x28:
-      prescaler_preload_ = merged(prescaler_preload_, value, mask) & 0xffff;
       break;
     case 0x2c:
       reload_preload_ = merged(reload_preload_, value, mask) & width_mask();
       if ((cr1_ & auto_reload_preload) == 0) reload_ = reload_preload_;
       break;
-    case 0x30:
-      rcr_ = merged(rcr_, value, mask);
-      if (rcr_ != 0) unmodelled("the repetition counter");
-      break;
     case 0x34:
     case 0x38:
     case 0x3c:
     case 0x40:
-      write_compare((offset - 0x34) / 4,
-                    merged(channels_[(offset - 0x34) / 4].preload, value, mask) & width_mask());
-      break;
-    case 0x44:
-      bdtr_ = merged(bdtr_, value, mask);
+      write_compare((offset - 0x34) / 4, merged(*word(offset), value, mask) & width_mask());
       break;
     default:
+      RegisterBlock::write(offset, value, mask);
+      if (offset == 0x18 || offset == 0x1c) apply_forced_modes(now);
+      prescaler_preload_ &= 0xffff;
+      if (offset == 0x30 && rcr_ != 0) unmodelled("the repetition counter");
       break;
   }
   set_outputs(now);

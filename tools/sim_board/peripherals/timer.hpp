@@ -17,7 +17,7 @@
 
 namespace diastole::board_model {
 
-class Timer final : public Device {
+class Timer final : public RegisterBlock {
  public:
   static constexpr uint32_t channel_count = 4;
 
@@ -52,6 +52,7 @@ class Timer final : public Device {
   [[nodiscard]] const Shape& shape() const { return shape_; }
 
  private:
+  uint32_t* word(uint32_t offset) override;
   struct Channel {
     uint32_t compare = 0;    ///< the value in force
     uint32_t preload = 0;    ///< the value in CCRx

@@ -33,58 +33,28 @@ Cycles Usart::byte_cycles() const {
   return std::max<Cycles>(bit, 1) * bits * ratio;
 }
 
+uint32_t* Usart::word(uint32_t offset) {
+  return in_order(offset, {&sr_, nullptr, &brr_, &cr1_, &cr2_, &cr3_, &gtpr_});
+}
+
 uint32_t Usart::read(uint32_t offset) {
-  switch (offset) {
-    case 0x00:
-      overrun_pending_clear_ = (sr_ & overrun) != 0;
-      return sr_;
-    case 0x04:
-      sr_ &= ~receive_full;
-      if (overrun_pending_clear_) sr_ &= ~overrun;
-      overrun_pending_clear_ = false;
-      set_line();
-      return received_;
-    case 0x08:
-      return brr_;
-    case 0x0c:
-      return cr1_;
-    case 0x10:
-      return cr2_;
-    case 0x14:
-      return cr3_;
-    case 0x18:
-      return gtpr_;
-    default:
-      return 0;
-  }
+  if (offset == 0x00) overrun_pending_clear_ = (sr_ & overrun) != 0;
+  if (offset != 0x04) return RegisterBlock::read(offset);
+  sr_ &= ~receive_full;
+  if (overrun_pending_clear_) sr_ &= ~overrun;
+  overrun_pending_clear_ = false;
+  set_line();
+  return received_;
 }
 
 void Usart::write(uint32_t offset, uint32_t value, uint32_t mask) {
-  switch (offset) {
-    case 0x00:
-      sr_ &= value | ~(mask & (receive_full | complete));
-      break;  // rc_w0
-    case 0x04:
-      start_sending(static_cast<uint8_t>(value), clock_.now());
-      break;
-    case 0x08:
-      brr_ = merged(brr_, value, mask);
-      break;
-    case 0x0c:
-      cr1_ = merged(cr1_, value, mask);
-      start_receiving(clock_.now());
-      break;
-    case 0x10:
-      cr2_ = merged(cr2_, value, mask);
-      break;
-    case 0x14:
-      cr3_ = merged(cr3_, value, mask);
-      break;
-    case 0x18:
-      gtpr_ = merged(gtpr_, value, mask);
-      break;
-    default:
-      return;
+  if (offset == 0x00) {
+    sr_ &= value | ~(mask & (receive_full | complete));  // rc_w0
+  } else if (offset == 0x04) {
+    start_sending(static_cast<uint8_t>(value), clock_.now());
+  } else {
+    RegisterBlock::write(offset, value, mask);
+    if (offset == 0x0c) start_receiving(clock_.now());
   }
   set_line();
   ask();

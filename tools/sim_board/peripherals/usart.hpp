@@ -11,7 +11,7 @@
 
 namespace diastole::board_model {
 
-class Usart final : public Device {
+class Usart final : public RegisterBlock {
  public:
   struct Shape {
     uint8_t number = 1;
@@ -38,6 +38,7 @@ class Usart final : public Device {
   [[nodiscard]] std::size_t waiting_bytes() const { return incoming_.size(); }
 
  private:
+  uint32_t* word(uint32_t offset) override;
   [[nodiscard]] Cycles byte_cycles() const;
   void start_sending(uint8_t byte, Cycles at);
   void start_receiving(Cycles at);

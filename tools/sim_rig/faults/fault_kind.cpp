@@ -45,7 +45,7 @@ const FaultKind& fault_named(std::string_view name) {
                     did_you_mean(name, known) + "`sim_rig faults` lists those that there are."});
 }
 
-std::string told_faults() {
+std::string list_of_faults() {
   std::string text;
   for (const FaultKind& kind : kinds) {
     const std::string value = kind.unit.empty() ? "" : fmt::format("{:g} {}", kind.usual, kind.unit);

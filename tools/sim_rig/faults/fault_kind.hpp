@@ -38,7 +38,7 @@ std::span<const FaultKind> fault_kinds();
 /// Throws InputError that names the nearest known fault.
 const FaultKind& fault_named(std::string_view name);
 /// One line each: name, usual value with unit, what it looks like.
-std::string told_faults();
+std::string list_of_faults();
 
 namespace faults {
 #define DIASTOLE_RIG_FAULT(function, ...) void function(RigInTrouble& rig, std::optional<double> value);

@@ -1,5 +1,5 @@
 #pragma once
-// When which fault is switched on and off, as --fault tells:
+// When which fault is switched on and off, as --fault says:
 //
 //   NAME@WHEN[/VALUE][:off@WHEN]   or   NAME@WHEN+LENGTH[/VALUE]
 //   WHEN = [ttl+|run+]SECONDS[s]   on the rig's clock; or after the first rising edge of the TTL; or after the start

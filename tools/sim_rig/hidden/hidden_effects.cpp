@@ -107,7 +107,7 @@ std::string hide(const std::vector<std::string>& ids, uint64_t seed, PlantConfig
   return json.dump(1) + "\n";
 }
 
-std::string told_hidden() {
+std::string list_of_hidden() {
   std::string text;
   for (const HiddenKind& kind : kinds)
     text += fmt::format("{:24} {}\n", kind.id, kind.port);

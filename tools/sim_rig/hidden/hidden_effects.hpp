@@ -52,6 +52,6 @@ std::span<const HiddenKind> hidden_kinds();
 std::string hide(const std::vector<std::string>& ids, uint64_t seed, PlantConfig& plant);
 
 /// One line each, for `sim_rig hidden`.
-std::string told_hidden();
+std::string list_of_hidden();
 
 }  // namespace diastole::sim_rig

@@ -1,5 +1,5 @@
 #pragma once
-// What a rig may have that its description does not tell. Neutral values leave the plant exactly as it is.
+// What a rig may have that its description does not hold. Neutral values leave the plant exactly as it is.
 
 #include <array>
 

@@ -44,7 +44,7 @@ class Plant {
   /// The controller's TTL has risen.
   void begin_cycle();
 
-  /// Moves to `time_s`; every edge up to then must have been told.
+  /// Moves to `time_s`; every edge up to then must have been handed over.
   void advance_to(double time_s);
 
   /// What the transducers show now (at the last advance_to).

@@ -1,4 +1,4 @@
-#include "tools/sim_board/core/cpu.hpp"
+#include "tools/sim_board/processor/cpu.hpp"
 
 #include <algorithm>
 #include <cstdio>

@@ -6,7 +6,6 @@
 #include <memory>
 #include <vector>
 
-#include "tools/sim_board/core/cpu.hpp"
 #include "tools/sim_board/core/world.hpp"
 #include "tools/sim_board/peripherals/dac.hpp"
 #include "tools/sim_board/peripherals/dma.hpp"
@@ -18,6 +17,7 @@
 #include "tools/sim_board/peripherals/timer.hpp"
 #include "tools/sim_board/peripherals/usart.hpp"
 #include "tools/sim_board/peripherals/watchdog.hpp"
+#include "tools/sim_board/processor/cpu.hpp"
 
 namespace diastole::board_model {
 

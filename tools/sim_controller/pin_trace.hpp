@@ -5,9 +5,9 @@
 #include <filesystem>
 #include <memory>
 
-#include "tools/sim_rig/simulated_controller.hpp"
+#include "tools/sim_controller/simulated_controller.hpp"
 
-namespace diastole::sim_rig {
+namespace diastole::sim_controller {
 
 class PinTrace {
  public:
@@ -26,4 +26,4 @@ class PinTrace {
   std::unique_ptr<std::FILE, Close> file_;
 };
 
-}  // namespace diastole::sim_rig
+}  // namespace diastole::sim_controller

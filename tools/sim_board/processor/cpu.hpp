@@ -12,12 +12,13 @@
 #include <memory>
 #include <string>
 
-#include "tools/sim_board/core/block_table.hpp"
 #include "tools/sim_board/core/bus.hpp"
 #include "tools/sim_board/core/memory.hpp"
 #include "tools/sim_board/core/nvic.hpp"
 #include "tools/sim_board/core/scheduler.hpp"
+#include "tools/sim_board/peripherals/flash.hpp"
 #include "tools/sim_board/peripherals/system_control.hpp"
+#include "tools/sim_board/processor/block_table.hpp"
 
 namespace diastole::board_model {
 

@@ -1,4 +1,4 @@
-#include "tools/sim_rig/pin_trace.hpp"
+#include "tools/sim_controller/pin_trace.hpp"
 
 #include <fmt/format.h>
 
@@ -7,7 +7,7 @@
 
 #include "protocol/contract/input_error.hpp"
 
-namespace diastole::sim_rig {
+namespace diastole::sim_controller {
 namespace {
 
 [[noreturn]] void fail(const std::filesystem::path& path, int error) {
@@ -36,4 +36,4 @@ void PinTrace::close() {
   if (failed) fail(path_, error);
 }
 
-}  // namespace diastole::sim_rig
+}  // namespace diastole::sim_controller

@@ -1,4 +1,4 @@
-#include "tools/sim_board/core/chip.hpp"
+#include "tools/sim_board/chip.hpp"
 
 #include <algorithm>
 #include <string>

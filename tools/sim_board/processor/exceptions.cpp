@@ -8,7 +8,7 @@
 #include <array>
 #include <cstdio>
 
-#include "tools/sim_board/core/cpu.hpp"
+#include "tools/sim_board/processor/cpu.hpp"
 
 namespace diastole::board_model {
 namespace {

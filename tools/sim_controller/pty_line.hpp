@@ -1,5 +1,5 @@
 #pragma once
-// The rig's end of the serial line: the master side of a pseudo-terminal that the daemon opens like a port.
+// The controller's end of the serial line: the master side of a pseudo-terminal that the daemon opens like a port.
 // Nothing here waits.
 
 #include <cstdint>
@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-namespace diastole::sim_rig {
+namespace diastole::sim_controller {
 
 class PtyLine {
  public:
@@ -55,4 +55,4 @@ class PtyLine {
   uint64_t sent_total_ = 0;
 };
 
-}  // namespace diastole::sim_rig
+}  // namespace diastole::sim_controller

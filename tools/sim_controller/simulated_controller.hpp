@@ -7,7 +7,7 @@
 #include <span>
 #include <string_view>
 
-namespace diastole::sim_rig {
+namespace diastole::sim_controller {
 
 enum class Pin : uint8_t { step, dir, enable, ttl, rwave_uV, fault };
 
@@ -73,4 +73,4 @@ class SimulatedController {
   virtual void set_power(bool /*on*/) {}
 };
 
-}  // namespace diastole::sim_rig
+}  // namespace diastole::sim_controller

@@ -1,4 +1,4 @@
-#include "tools/sim_rig/pty_line.hpp"
+#include "tools/sim_controller/pty_line.hpp"
 
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -14,7 +14,7 @@
 
 #include "protocol/contract/input_error.hpp"
 
-namespace diastole::sim_rig {
+namespace diastole::sim_controller {
 namespace {
 
 int open_master() {
@@ -131,4 +131,4 @@ void PtyLine::send_queued() {
   }
 }
 
-}  // namespace diastole::sim_rig
+}  // namespace diastole::sim_controller

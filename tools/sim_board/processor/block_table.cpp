@@ -1,4 +1,4 @@
-#include "tools/sim_board/core/block_table.hpp"
+#include "tools/sim_board/processor/block_table.hpp"
 
 #include <algorithm>
 
