@@ -33,20 +33,24 @@ TEST_P(PlantedViolation, IsFound) {
   EXPECT_EQ(found[0].included, included);
 }
 
-INSTANTIATE_TEST_SUITE_P(Rules, PlantedViolation,
-                         testing::Values(std::pair{"host/cli/run.cpp", "estimator/fe/newton.hpp"},
-                                         std::pair{"estimator/fit/fit.cpp", "host/daq/driver.hpp"},
-                                         std::pair{"estimator/fit/fit.cpp", "protocol/wire/frame.hpp"},
-                                         std::pair{"firmware/core/planner.hpp", "firmware/boards/board.hpp"},
-                                         std::pair{"firmware/core/planner.hpp", "protocol/runfile/run.hpp"},
-                                         std::pair{"protocol/wire/frame.hpp", "host/daq/driver.hpp"},
-                                         std::pair{"host/daq/driver.cpp", "tools/sim_daq/server.hpp"},
-                                         std::pair{"tools/sim_rig/plant.cpp", "tests/sim/fake.hpp"},
-                                         std::pair{"estimator/rig/hose.cpp", "tools/sim_rig/plant.hpp"},
-                                         std::pair{"tools/sim_rig/plant/gel.cpp", "estimator/fe/newton.hpp"},
-                                         std::pair{"tools/sim_rig/plant/gel.cpp",
-                                                   "tools/figures/line_chart.hpp"},
-                                         std::pair{"host/daq/driver.cpp", "../../estimator/fe/newton.hpp"}));
+INSTANTIATE_TEST_SUITE_P(
+    Rules, PlantedViolation,
+    testing::Values(std::pair{"host/cli/run.cpp", "estimator/fe/newton.hpp"},
+                    std::pair{"estimator/fit/fit.cpp", "host/daq/driver.hpp"},
+                    std::pair{"estimator/fit/fit.cpp", "protocol/wire/frame.hpp"},
+                    std::pair{"firmware/core/planner.hpp", "firmware/boards/board.hpp"},
+                    std::pair{"firmware/core/planner.hpp", "protocol/runfile/run.hpp"},
+                    std::pair{"protocol/wire/frame.hpp", "host/daq/driver.hpp"},
+                    std::pair{"host/daq/driver.cpp", "tools/sim_daq/server.hpp"},
+                    std::pair{"tools/sim_rig/plant.cpp", "tests/sim/fake.hpp"},
+                    std::pair{"estimator/rig/hose.cpp", "tools/sim_rig/plant.hpp"},
+                    std::pair{"tools/sim_rig/plant/gel.cpp", "estimator/fe/newton.hpp"},
+                    std::pair{"tools/sim_rig/plant/gel.cpp", "tools/figures/line_chart.hpp"},
+                    std::pair{"tools/sim_board/board.cpp", "tools/sim_rig/rig.hpp"},
+                    std::pair{"tools/sim_board/core/bus.hpp", "tools/sim_board/peripherals/gpio.hpp"},
+                    std::pair{"firmware/core/profiles/hold.cpp", "firmware/core/planner.hpp"},
+                    std::pair{"firmware/boards/recording/board.hpp", "firmware/boards/stm32f405/pins.hpp"},
+                    std::pair{"host/daq/driver.cpp", "../../estimator/fe/newton.hpp"}));
 
 }  // namespace
 }  // namespace diastole::layering
