@@ -29,7 +29,6 @@ class Rcc final : public Device, public Gates {
   [[nodiscard]] bool clocked(ClockGate gate) const override;
   /// Adds to the flags of RCC_CSR, which survive every reset but that of power.
   void record(ResetCause cause);
-  [[nodiscard]] uint32_t reset_flags() const { return csr_ & 0xfe00'0000; }
 
  private:
   static constexpr uint32_t register_words = 0x90 / 4;

@@ -34,8 +34,6 @@ class SystemControl final : public RegisterBlock {
 
   void record_fault(uint32_t status_bits, uint32_t address = 0);
   void record_escalation() { hfsr_ |= 1U << 30; }
-  [[nodiscard]] uint32_t configurable_fault_status() const { return cfsr_; }
-  [[nodiscard]] uint32_t fault_address() const { return bfar_; }
 
  private:
   uint32_t* word(uint32_t offset) override;

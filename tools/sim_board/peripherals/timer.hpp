@@ -59,11 +59,6 @@ class Timer final : public RegisterBlock {
     bool reference = false;  ///< OCxREF
     bool output = false;     ///< level at the pin
   };
-  /// What happens next and when, in timer counts from the present.
-  struct Next {
-    uint64_t counts = 0;
-    bool observable = false;
-  };
 
   [[nodiscard]] bool counting() const { return (cr1_ & 1) != 0 && reload_ != 0 && !external_clock(); }
   [[nodiscard]] bool external_clock() const { return (smcr_ & 7) == 7; }

@@ -57,8 +57,6 @@ class Cpu {
   [[nodiscard]] uint64_t instructions() const { return instructions_; }
   /// Cycles spent waiting for an interrupt.
   [[nodiscard]] Cycles asleep_cycles() const { return asleep_cycles_; }
-  [[nodiscard]] uint32_t program_counter() const { return pc_; }
-  [[nodiscard]] uint32_t lowest_stack() const { return lowest_stack_; }
   /// The last fault in words, empty when there was none since power-up.
   [[nodiscard]] const std::string& last_fault() const { return last_fault_; }
   /// A fault within the hard-fault handler: only a reset helps.
@@ -130,7 +128,6 @@ class Cpu {
   bool judging_ = true;  ///< the block hook decides; off while the head of a block is executed
   uint64_t instructions_ = 0;
   Cycles asleep_cycles_ = 0;
-  uint32_t lowest_stack_ = 0xffff'ffff;
   uint32_t return_magic_ = 0;
   bool interrupted_ = false, asleep_ = false, locked_up_ = false;
   std::string last_fault_;

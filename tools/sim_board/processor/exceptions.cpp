@@ -44,7 +44,6 @@ bool Cpu::stack_frame() {
   const uint32_t before = get(UC_ARM_REG_SP);
   const uint32_t frame = (before - bytes) & ~7U;
   if (parts_.memory.at(frame, bytes).empty()) return false;
-  lowest_stack_ = std::min(lowest_stack_, frame);
 
   uint32_t at = frame;
   const auto push = [&](uint32_t value) {
