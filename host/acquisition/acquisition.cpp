@@ -5,14 +5,11 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <nlohmann/json.hpp>
 
 #include "protocol/wire/wire_text.hpp"
 
 namespace diastole {
 namespace {
-
-using nlohmann::json;
 
 constexpr double ns_per_s = 1e9;
 constexpr uint64_t block_span_ns = 100'000'000;
@@ -39,14 +36,14 @@ Acquisition::Acquisition(Clock& clock, Controller& controller, SampleSource& sam
   const signal::LowPassDesign design{.rate_Hz = setup_.sample_rate_Hz};
   if (design.rate_Hz >= signal::least_rate_over_cutoff * design.cutoff_Hz) live_filter_.emplace(design);
   if (!setup_.slices.empty()) schedule_.emplace(setup_.slices);
-  tell_schedule();
+  show_schedule();
 }
 
 RunOutcome Acquisition::run(const Hooks& hooks) {
   hooks_ = hooks;
   const SampleGrid grid = samples_.start(setup_.sample_rate_Hz);
   deadline_ns_ = clock_.now_ns() + static_cast<uint64_t>(start_patience_s * ns_per_s);
-  write(RecordKind::document, json{{"record", "grid"}, {"first_due_ns", grid.first_due_ns}}.dump());
+  write(GridRecord{grid.first_due_ns});
   for (const std::string& warning : setup_.warnings)
     remark("warning", "instrument", warning);
   if (setup_.gate != nullptr) gate_.emplace(*setup_.gate);
@@ -64,7 +61,7 @@ RunOutcome Acquisition::run(const Hooks& hooks) {
   close_block();
   close_gate();
   check_count(grid.due_by(until_ns));
-  write(RecordKind::document, json{{"record", "end"}, {"until_ns", until_ns}}.dump());
+  write(EndRecord{until_ns});
   ended_ = true;
   if (!journal_.sync()) fail_journal();
   hooks_.progress(outcome_.counts);
@@ -112,27 +109,21 @@ void Acquisition::follow_schedule() {
   if (!schedule_ || schedule_->phase() != SliceTracker::Phase::waiting) return;
   if (!std::exchange(prompted_, true)) {
     remark("info", "prompt", schedule_->planned().prompt);
-    tell_schedule();
+    show_schedule();
   }
   const std::optional<size_t> ready = setup_.prompts_answered ? schedule_->slice() : hooks_.go_on();
   if (!ready) return;
   schedule_->go_on(*ready);
   prompted_ = schedule_->phase() == SliceTracker::Phase::waiting;
-  tell_schedule();
+  show_schedule();
 }
 
-void Acquisition::take_cycle(uint32_t cycle) {
+void Acquisition::on_cycle(uint32_t cycle) {
   if (!schedule_ || schedule_stops_) return;
   const SliceTracker::Turn turn = schedule_->on_trigger();
   if (turn.slice_begins) {
     const PlannedSlice& slice = schedule_->planned();
-    write(RecordKind::document, json{{"record", "slice"},
-                                     {"block", slice.block},
-                                     {"slice", slice.number},
-                                     {"cycle", cycle},
-                                     {"cycles", slice.cycles},
-                                     {"dummy_cycles", slice.dummy_cycles}}
-                                    .dump());
+    write(SliceRecord{slice.block, slice.number, cycle, slice.cycles, slice.dummy_cycles});
     remark("info", "slice",
            fmt::format("slice {} of {}: {} cycles of {}", schedule_->slice() + 1, schedule_->slices(),
                        slice.cycles, slice.block));
@@ -141,10 +132,10 @@ void Acquisition::take_cycle(uint32_t cycle) {
     schedule_stops_ = true;
     if (obeyed_ == StopRequest::none) controller_.stop_at_cycle_end();  // otherwise a stop is under way
   }
-  tell_schedule();
+  show_schedule();
 }
 
-void Acquisition::tell_schedule() {
+void Acquisition::show_schedule() {
   if (!schedule_) return;
   outcome_.counts.schedule = {schedule_->planned().block,
                               static_cast<int64_t>(schedule_->slice()),
@@ -187,27 +178,23 @@ void Acquisition::take(const Missing& missing) {
   if (setup_.live != nullptr) setup_.live->gap();
   if (live_filter_) (void)live_filter_->push(std::numeric_limits<double>::quiet_NaN());
   if (gap_ && gap_->reason != missing.reason) close_gap();
-  if (!gap_) gap_ = OpenGap{missing.first_index, 0, missing.reason};
+  if (!gap_) gap_ = GapRecord{missing.first_index, 0, missing.reason};
   gap_->count += missing.count;
   gap_remarks_.missing(clock_.now_ns(), missing.count, missing.reason);
   outcome_.counts.missing += missing.count;
-  tell_gap_in_time();
+  write_lasting_gap();
 }
 
 /// A gap that lasts goes to the journal in parts, so that a crash within it leaves its record.
-void Acquisition::tell_gap_in_time() {
+void Acquisition::write_lasting_gap() {
   const uint64_t now_ns = clock_.now_ns();
-  if (now_ns < gap_told_ns_ + gap_interval_ns) return;
-  gap_told_ns_ = now_ns;
+  if (now_ns < gap_written_ns_ + gap_interval_ns) return;
+  gap_written_ns_ = now_ns;
   close_gap();
 }
 
 void Acquisition::take(const InstrumentTime& time) {
-  write(RecordKind::document, json{{"record", "daq_clock"},
-                                   {"host_ns", time.host_ns},
-                                   {"half_round_trip_ns", time.half_round_trip_ns},
-                                   {"timer", time.timer}}
-                                  .dump());
+  write(InstrumentClockRecord{time.host_ns, time.timer, time.half_round_trip_ns});
 }
 
 void Acquisition::take(const Trouble& trouble) { remark("warning", "instrument", trouble.text); }
@@ -225,12 +212,7 @@ void Acquisition::close_gate() {
 
 void Acquisition::note(const std::vector<GateRemark>& remarks) {
   for (const GateRemark& each : remarks) {
-    write(RecordKind::document, json{{"record", "event"},
-                                     {"host_ns", each.host_ns},
-                                     {"level", each.level},
-                                     {"code", each.code},
-                                     {"text", each.text}}
-                                    .dump());
+    write(EventRecord{{}, each.host_ns, each.level, each.code, each.text});
     hooks_.remark({each.level, each.code, each.text});
   }
 }
@@ -242,59 +224,50 @@ void Acquisition::end_missing() {
 
 /// What the source accounted for against what the clock says.
 void Acquisition::check_count(uint64_t due) {
-  const uint64_t told = outcome_.counts.received + outcome_.counts.missing;
-  if (told >= due) return;
+  const uint64_t accounted = outcome_.counts.received + outcome_.counts.missing;
+  if (accounted >= due) return;
   remark("error", "samples",
-         fmt::format("{} samples were due, the instrument's driver accounted for {} only", due, told));
+         fmt::format("{} samples were due, the instrument's driver accounted for {} only", due, accounted));
 }
 
 void Acquisition::close_gap() {
-  if (!gap_) return;
-  write(
-      RecordKind::document,
-      json{{"record", "gap"}, {"first_index", gap_->first}, {"count", gap_->count}, {"reason", gap_->reason}}
-          .dump());
-  gap_.reset();
+  if (gap_) write(*std::exchange(gap_, std::nullopt));
 }
 
 void Acquisition::close_block() {
-  if (!block_.host_ns.empty()) write(RecordKind::samples, encode(block_));
+  if (!block_.host_ns.empty()) write(block_);
   block_.host_ns.clear();
   block_.value_kPa.clear();
   hooks_.progress(outcome_.counts);
 }
 
 void Acquisition::take(const ControllerEvent& event) {
-  const auto document = [this](const json& what) { write(RecordKind::document, what.dump()); };
   std::visit(
       wire::overloaded{
           [&](const ClockReading& e) {
             if (setup_.live != nullptr) setup_.live->clock(e);
-            document({{"record", "clock"},
-                      {"host_ns", e.host_ns},
-                      {"tick", e.tick},
-                      {"half_round_trip_ns", e.half_round_trip_ns}});
+            write(ClockRecord{e.host_ns, e.tick, e.half_round_trip_ns});
           },
           [&](const wire::RunStarted& e) {
             started_ = true;
             if (setup_.live != nullptr) setup_.live->run_started(e.tick);
             deadline_ns_ = clock_.now_ns() +
                            static_cast<uint64_t>((setup_.planned_duration_s + end_patience_s) * ns_per_s);
-            document({{"record", "run_started"}, {"tick", e.tick}});
+            write(RunStartedRecord{e.tick});
           },
           [&](const wire::SegmentStarted& e) {
-            document({{"record", "segment"}, {"segment", e.segment}, {"tick", e.tick}});
+            write(SegmentRecord{e.segment, e.tick});
           },
           [&](const wire::Trigger& e) {
             ++outcome_.counts.triggers;
             if (setup_.live != nullptr) setup_.live->trigger(e.tick);
-            document({{"record", "trigger"}, {"cycle", e.cycle}, {"tick", e.tick}, {"r_wave", e.r_wave}});
-            take_cycle(e.cycle);
+            write(TriggerRecord{e.cycle, e.tick, e.r_wave});
+            on_cycle(e.cycle);
           },
           [&](const wire::PositionBatch& e) {
             PositionBlock block{e.first_index, e.first_tick, e.period_ticks, {}};
             block.microsteps.assign(e.position_microsteps.begin(), e.position_microsteps.begin() + e.count);
-            write(RecordKind::positions, encode(block));
+            write(block);
           },
           [&](const wire::RunEnded& e) {
             outcome_.cycles = e.cycles;
@@ -303,13 +276,7 @@ void Acquisition::take(const ControllerEvent& event) {
                 schedule_stops_ && wire::run_end_name(e.reason) == "stopped_at_cycle_end";
             const std::string reason =
                 schedule_done ? "completed" : std::string(wire::run_end_name(e.reason));
-            document({{"record", "run_ended"},
-                      {"reason", reason},
-                      {"schedule_done", schedule_done},
-                      {"tick", e.tick},
-                      {"cycles", e.cycles},
-                      {"triggers", e.triggers},
-                      {"r_waves", e.r_waves}});
+            write(RunEndedRecord{reason, schedule_done, e.tick, e.cycles, e.triggers, e.r_waves});
             if (e.triggers != outcome_.counts.triggers) {
               remark("error", "triggers",
                      fmt::format("the controller raised {} triggers, {} were reported", e.triggers,
@@ -355,18 +322,12 @@ void Acquisition::take(const wire::Nak& refusal) {
 
 void Acquisition::remark(const std::string& level, const std::string& code, const std::string& text,
                          std::optional<uint64_t> tick) {
-  json what{{"record", "event"}, {"level", level}, {"code", code}, {"text", text}};
-  if (tick) {
-    what["tick"] = *tick;
-  } else {
-    what["host_ns"] = clock_.now_ns();
-  }
-  write(RecordKind::document, what.dump(-1, ' ', false, json::error_handler_t::replace));
+  write(EventRecord{tick, tick ? 0 : clock_.now_ns(), level, code, text});
   hooks_.remark({level, code, text});
 }
 
-void Acquisition::write(RecordKind kind, const auto& payload) {
-  if (!journal_.append(kind, payload)) fail_journal();
+void Acquisition::write(const auto& record) {
+  if (!append(journal_, record)) fail_journal();
 }
 
 void Acquisition::fail_journal() {

@@ -14,14 +14,13 @@
 #include <vector>
 
 #include "host/acquisition/gap_remarks.hpp"
-#include "host/acquisition/journal.hpp"
-#include "host/acquisition/journal_records.hpp"
 #include "host/acquisition/live_trace.hpp"
 #include "host/acquisition/sample_source.hpp"
 #include "host/acquisition/slice_tracker.hpp"
 #include "host/config/rig_config.hpp"
 #include "host/controller/controller.hpp"
 #include "host/gpio/gate_check.hpp"
+#include "host/journal/journal_records.hpp"
 #include "host/transport/clock.hpp"
 #include "protocol/signal/low_pass.hpp"
 
@@ -100,8 +99,8 @@ class Acquisition {
   void obey(StopRequest request);
   void send_stop(StopRequest request);
   void follow_schedule();
-  void take_cycle(uint32_t cycle);
-  void tell_schedule();
+  void on_cycle(uint32_t cycle);
+  void show_schedule();
   void take_samples(std::vector<SourceItem> items);
   void take(const Received& received);
   void show(uint64_t host_ns, double kPa);
@@ -113,14 +112,14 @@ class Acquisition {
   void note(const std::vector<GateRemark>& remarks);
   void end_missing();
   void close_gap();
-  void tell_gap_in_time();
+  void write_lasting_gap();
   void check_count(uint64_t due);
   void close_block();
   void take(const ControllerEvent& event);
   void take(const wire::Nak& refusal);
   void remark(const std::string& level, const std::string& code, const std::string& text,
               std::optional<uint64_t> tick = {});
-  void write(RecordKind kind, const auto& payload);
+  void write(const auto& record);
   void fail_journal();
   void end(std::string how);
   void end_after_tail(std::string how);
@@ -134,13 +133,8 @@ class Acquisition {
   Hooks hooks_;
 
   SampleBlock block_;
-  struct OpenGap {
-    uint64_t first = 0;
-    uint64_t count = 0;
-    std::string reason;
-  };
-  std::optional<OpenGap> gap_;
-  uint64_t gap_told_ns_ = 0;  ///< when part of a gap last went to the journal
+  std::optional<GapRecord> gap_;  ///< that is open
+  uint64_t gap_written_ns_ = 0;   ///< when part of a gap last went to the journal
   GapRemarks gap_remarks_;
   uint64_t deadline_ns_ = 0;
   StopRequest obeyed_ = StopRequest::none;

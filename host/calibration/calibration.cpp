@@ -122,8 +122,8 @@ std::vector<ChannelConfig> CalibrationBook::channels() const {
   return channels;
 }
 
-std::map<std::string, runfile::Attribute, std::less<>> CalibrationBook::attributes() const {
-  std::map<std::string, runfile::Attribute, std::less<>> out;
+Attributes CalibrationBook::attributes() const {
+  Attributes out;
   for (const ChannelConfig& channel : channels()) {
     out[channel.name + "_kPa_per_V"] = channel.kPa_per_V;
     out[channel.name + "_zero_V"] = channel.zero_V;

@@ -52,7 +52,7 @@ class CalibrationBook {
   [[nodiscard]] std::vector<ChannelConfig> channels() const;
   /// Of /rig in the run file: cavity_kPa_per_V, cavity_zero_V, and where they are known cavity_calibrated_utc,
   /// cavity_calibrated_by, cavity_zeroed_utc, cavity_zeroed_by.
-  [[nodiscard]] std::map<std::string, runfile::Attribute, std::less<>> attributes() const;
+  [[nodiscard]] Attributes attributes() const;
 
   /// Throw InputError for a channel that there is not, or a point that cannot be used; then nothing is changed.
   void add_point(const std::string& channel, const CalibrationPoint& point);

@@ -5,10 +5,10 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
-#include "host/acquisition/journal_store.hpp"
+#include "host/journal/journal_store.hpp"
 #include "host/cli/host_commands.hpp"
 #include "host/runfile/assemble.hpp"
-#include "host/runfile/journal_story.hpp"
+#include "host/journal/parsed_journal.hpp"
 #include "host/runfile/output_guard.hpp"
 #include "host/runfile/writer.hpp"
 #include "protocol/contract/input_error.hpp"
@@ -32,10 +32,10 @@ nlohmann::json describe(const StoredJournal& stored) {
                       {"complete", false}};
   if (stored.has_run_file) told["run_file"] = run_file_beside(stored.file).string();
   try {
-    const JournalStory story = read_story(JournalRecords(stored.file));
-    told["started_utc"] = story.begin.started_utc;
-    told["experiment"] = story.begin.experiment_file;
-    told["complete"] = story.closed;
+    const ParsedJournal parsed = parse_journal(JournalRecords(stored.file));
+    told["started_utc"] = parsed.begin.started_utc;
+    told["experiment"] = parsed.begin.experiment_file;
+    told["complete"] = parsed.closed;
   } catch (const InputError& error) {
     told["problem"] = error.fault().problem;
   }

@@ -16,6 +16,8 @@
 
 namespace diastole {
 
+using Attributes = std::map<std::string, runfile::Attribute, std::less<>>;
+
 /// What the controller must never exceed; it checks a program against them before anything moves.
 struct MotionLimits {
   double travel_mL = 7000;           ///< largest volume from home
@@ -57,9 +59,8 @@ struct DaemonConfig {
 };
 
 struct RigConfig {
-  std::string file;  ///< for messages
-  std::map<std::string, runfile::Attribute, std::less<>>
-      attributes;  ///< of /rig, volume_per_step_mL included
+  std::string file;       ///< for messages
+  Attributes attributes;  ///< of /rig, volume_per_step_mL included
   ControllerConfig controller;
   DaqConfig daq;
   std::optional<GpioConfig> gpio;

@@ -1,6 +1,7 @@
 #include "host/controller/settings_values.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <array>
@@ -11,7 +12,6 @@
 namespace diastole {
 namespace {
 
-using nlohmann::json;
 using wire::MachineSettings;
 
 struct Entry {
@@ -38,9 +38,15 @@ double shown(const Entry& entry, const MachineSettings& settings) {
   throw InputError({"controller settings", name, problem, remedy});
 }
 
-void set_name(MachineSettings& settings, const json& value) {
-  if (!value.is_string()) refuse("board_name", value.dump() + " is no text", "Give a name in quotes.");
-  const auto& text = value.get_ref<const std::string&>();
+double number_of(const runfile::Attribute& value) {
+  if (const auto* whole = std::get_if<int64_t>(&value)) return static_cast<double>(*whole);
+  return std::get<double>(value);
+}
+
+void set_name(MachineSettings& settings, const runfile::Attribute& value) {
+  if (!std::holds_alternative<std::string>(value))
+    refuse("board_name", fmt::format("{} is no text", number_of(value)), "Give a name in quotes.");
+  const auto& text = std::get<std::string>(value);
   if (text.size() > MachineSettings::kMaxNameBytes) {
     refuse("board_name", fmt::format("\"{}\" has {} bytes", text, text.size()),
            fmt::format("At most {} are kept.", MachineSettings::kMaxNameBytes));
@@ -50,10 +56,11 @@ void set_name(MachineSettings& settings, const json& value) {
   settings.board_name_size = static_cast<uint8_t>(text.size());
 }
 
-void set_number(MachineSettings& settings, const Entry& entry, const json& value) {
+void set_number(MachineSettings& settings, const Entry& entry, const runfile::Attribute& value) {
   const SettingWords& words = entry.words;
-  if (!value.is_number()) refuse(words.name, value.dump() + " is no number", "Give a number.");
-  const double asked = value.get<double>();
+  if (const auto* text = std::get_if<std::string>(&value))
+    refuse(words.name, fmt::format("\"{}\" is no number", *text), "Give a number.");
+  const double asked = number_of(value);
   if (!(asked >= words.least - 1e-9 && asked <= words.most + 1e-9)) {
     refuse(words.name, fmt::format("is {:g}; {:g} to {:g} are possible", asked, words.least, words.most),
            fmt::format("Its meaning: {}.", words.explanation));
@@ -73,12 +80,6 @@ struct Shared {
   double in_rig;
 };
 
-double number_in(const RigConfig& rig, const char* key) {
-  const auto& value = rig.attributes.at(key);
-  if (const auto* whole = std::get_if<int64_t>(&value)) return static_cast<double>(*whole);
-  return std::get<double>(value);
-}
-
 }  // namespace
 
 const std::vector<SettingWords>& setting_words() {
@@ -91,21 +92,21 @@ const std::vector<SettingWords>& setting_words() {
   return all;
 }
 
-json settings_as_json(const MachineSettings& settings) {
-  json object = json::object();
+Attributes settings_values(const MachineSettings& settings) {
+  Attributes values;
   for (const Entry& entry : entries()) {
     if (entry.words.scale == 1)
-      object[entry.words.name] = settings.*entry.value;
+      values[entry.words.name] = int64_t{settings.*entry.value};
     else  // the shortest decimal number, not the nearest product
-      object[entry.words.name] = std::stod(fmt::format("{:.10g}", shown(entry, settings)));
+      values[entry.words.name] = std::stod(fmt::format("{:.10g}", shown(entry, settings)));
   }
-  object["board_name"] =
+  values["board_name"] =
       std::string(settings.board_name.begin(), settings.board_name.begin() + settings.board_name_size);
-  return object;
+  return values;
 }
 
-void change_settings(MachineSettings& settings, const json& changes) {
-  for (const auto& [name, value] : changes.items()) {
+void change_settings(MachineSettings& settings, const Attributes& changes) {
+  for (const auto& [name, value] : changes) {
     if (name == "board_name") {
       set_name(settings, value);
       continue;
@@ -125,15 +126,16 @@ void change_settings(MachineSettings& settings, const json& changes) {
 }
 
 std::optional<InputFault> disagreement(const RigConfig& rig, const MachineSettings& settings) {
-  const json own = settings_as_json(settings);
+  const Attributes own = settings_values(settings);
+  const auto in_rig = [&](const char* key) { return number_of(rig.attributes.at(key)); };
   const std::array shared{
       Shared{"microsteps", "controller.microsteps", static_cast<double>(rig.controller.microsteps)},
-      Shared{"steps_per_rev", "rig.steps_per_rev", number_in(rig, "steps_per_rev")},
-      Shared{"bore_mm", "rig.bore_mm", number_in(rig, "bore_mm")},
-      Shared{"screw_rev_per_cm", "rig.screw_rev_per_cm", number_in(rig, "screw_rev_per_cm")},
+      Shared{"steps_per_rev", "rig.steps_per_rev", in_rig("steps_per_rev")},
+      Shared{"bore_mm", "rig.bore_mm", in_rig("bore_mm")},
+      Shared{"screw_rev_per_cm", "rig.screw_rev_per_cm", in_rig("screw_rev_per_cm")},
   };
   for (const Shared& each : shared) {
-    const double in_controller = own.at(each.setting).get<double>();
+    const double in_controller = number_of(own.at(each.setting));
     if (std::abs(each.in_rig - in_controller) <= 1e-5 * std::abs(in_controller)) continue;
     return InputFault{
         rig.file, each.place,

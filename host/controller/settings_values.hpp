@@ -1,7 +1,6 @@
 #pragma once
 // The controller's settings (protocol/wire/setting_list.inc) in the names and units that people use.
 
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 #include <vector>
@@ -23,11 +22,11 @@ struct SettingWords {
 };
 const std::vector<SettingWords>& setting_words();
 
-/// {"microsteps": 8, ..., "board_name": "..."}
-nlohmann::json settings_as_json(const wire::MachineSettings& settings);
+/// {"microsteps", 8}, ..., {"board_name", "..."}
+Attributes settings_values(const wire::MachineSettings& settings);
 
 /// Sets what `changes` names, leaving the rest. Throws InputError with name, value and what is allowed.
-void change_settings(wire::MachineSettings& settings, const nlohmann::json& changes);
+void change_settings(wire::MachineSettings& settings, const Attributes& changes);
 
 /// Where the rig file disagrees with settings that were written: both values, and the remedy. Nothing if they agree.
 std::optional<InputFault> disagreement(const RigConfig& rig, const wire::MachineSettings& settings);

@@ -7,13 +7,13 @@
 #include <chrono>
 
 #include "host/acquisition/disk_room.hpp"
-#include "host/acquisition/journal_store.hpp"
-#include "host/acquisition/part_file.hpp"
 #include "host/config/experiment_doubts.hpp"
 #include "host/controller/settings_values.hpp"
 #include "host/daemon/rig_service.hpp"
 #include "host/daemon/utc.hpp"
 #include "host/daemon/uuid.hpp"
+#include "host/journal/journal_store.hpp"
+#include "host/journal/part_file.hpp"
 #include "host/runfile/assemble.hpp"
 #include "host/runfile/writer.hpp"
 #include "protocol/contract/input_error.hpp"
@@ -40,39 +40,26 @@ class LongWork {
   ServiceManager* manager_;
 };
 
-json attributes_as_json(const std::map<std::string, runfile::Attribute, std::less<>>& attributes) {
-  json object = json::object();
-  for (const auto& [name, value] : attributes) {
-    std::visit([&, key = name](const auto& v) { object[key] = v; }, value);
-  }
-  return object;
-}
-
-json planned_segments(const Experiment& experiment, const ProgramPlan& plan) {
-  json segments = json::array();
+std::vector<runfile::Segment> planned_segments(const Experiment& experiment, const ProgramPlan& plan) {
+  std::vector<runfile::Segment> segments;
   double start_s = experiment.rest_s;
   for (size_t i = 0; i < experiment.segments.size(); ++i) {
     const ExperimentSegment& segment = experiment.segments[i];
     if (i < plan.size()) start_s = 1e-6 * static_cast<double>(plan[i].start_us);
-    segments.push_back({{"start_s", start_s},
-                        {"waveform", segment.waveform_name},
-                        {"stroke_mL", segment.stroke_mL},
-                        {"period_s", segment.period_s},
-                        {"offset_mL", segment.offset_mL},
-                        {"cycles", segment.cycles}});
-    start_s += segment.period_s * static_cast<double>(segment.cycles);
+    segments.push_back({start_s, segment.waveform_name, segment.stroke_mL, segment.period_s,
+                        segment.offset_mL, segment.cycles});
+    start_s = segments.back().end_s();
   }
   return segments;
 }
 
 /// What uploaded segments follow, by segment.
-json played_waveforms(const Experiment& experiment) {
-  json waveforms = json::array();
+std::vector<PlayedSegment> played_waveforms(const Experiment& experiment) {
+  std::vector<PlayedSegment> waveforms;
   for (size_t i = 0; i < experiment.segments.size(); ++i) {
     if (!experiment.segments[i].upload) continue;
     const ExperimentWaveform& waveform = experiment.waveforms[*experiment.segments[i].upload];
-    waveforms.push_back(
-        {{"segment", i}, {"points", waveform.points.text}, {"fraction", waveform.even.fractions()}});
+    waveforms.push_back({i, waveform.points.text, waveform.even.fractions()});
   }
   return waveforms;
 }
@@ -83,17 +70,17 @@ double duration_s(const Experiment& experiment, const ProgramPlan& plan) {
 }
 
 /// What the controller's own settings say of the rig; the volume of a step is the calibrated one.
-void add_settings(json& rig, const ControllerClient& controller) {
+void add_settings(Attributes& rig, const ControllerClient& controller) {
   const wire::SettingsReport& report = controller.settings();
-  const json own = settings_as_json(report.settings);
+  const Attributes own = settings_values(report.settings);
   for (const char* name : {"calibration_ppm", "backlash_um", "travel_mm", "full_step_rate_Hz", "board_name"})
     rig[name] = own.at(name);
-  rig["settings_record"] = report.records_written;
+  rig["settings_record"] = int64_t{report.records_written};
   rig["volume_per_step_mL"] = 1e-9 * controller.microstep_pL();
 }
 
 /// What the controller was held to.
-void add_limits(json& rig, const ControllerConfig& controller) {
+void add_limits(Attributes& rig, const ControllerConfig& controller) {
   const MotionLimits& limits = controller.limits;
   rig["limit_travel_mL"] = limits.travel_mL;
   rig["limit_flow_mL_s"] = limits.flow_mL_s;
@@ -220,33 +207,31 @@ bool RigService::begin(const RunRecord& record) {
 void RigService::write_beginning(JournalWriter& journal, const RunRecord& record,
                                  const Experiment& experiment, const ProgramPlan& plan,
                                  double sample_rate_Hz) {
-  json channels = json::array();
-  for (const ChannelConfig& channel : rig_.daq.channels)
-    channels.push_back(channel.name);
-  json rig = attributes_as_json(rig_.attributes);
-  rig.update(attributes_as_json(book_.attributes()));
-  rig["daq_rate_Hz"] = sample_rate_Hz;
-  add_settings(rig, *controller_);
-  add_limits(rig, rig_.controller);
   const TimerFacts timer = make_source(*clock_, *instrument_)->timer(sample_rate_Hz);
-  const json beginning{{"record", "begin"},
-                       {"run_id", record.run_id},
-                       {"started_utc", utc_now()},
-                       {"producer", options_.producer},
-                       {"experiment", experiment.text},
-                       {"experiment_file", experiment.file},
-                       {"sample_rate_Hz", sample_rate_Hz},
-                       {"channels", channels},
-                       {"rig", rig},
-                       {"instrument", instrument_->describe()},
-                       {"tick_rate_Hz", controller_->hello().tick_rate_Hz},
-                       {"microstep_pL", controller_->microstep_pL()},
-                       {"daq_timer_rate_Hz", std::max(1.0, timer.rate_Hz)},
-                       {"daq_timer_counts_samples", timer.counts_samples},
-                       {"segments", planned_segments(experiment, plan)},
-                       {"trigger_delay_s", 1e-3 * experiment.trigger_delay_ms},
-                       {"waveforms", played_waveforms(experiment)}};
-  if (!journal.append(RecordKind::document, beginning.dump())) {
+  BeginRecord begin{.run_id = record.run_id,
+                    .started_utc = utc_now(),
+                    .producer = options_.producer,
+                    .experiment = experiment.text,
+                    .experiment_file = experiment.file,
+                    .sample_rate_Hz = sample_rate_Hz,
+                    .channels = {},
+                    .rig = rig_.attributes,
+                    .instrument = instrument_->describe(),
+                    .tick_rate_Hz = static_cast<double>(controller_->hello().tick_rate_Hz),
+                    .microstep_pL = static_cast<double>(controller_->microstep_pL()),
+                    .daq_timer_rate_Hz = std::max(1.0, timer.rate_Hz),
+                    .daq_timer_counts_samples = timer.counts_samples,
+                    .segments = planned_segments(experiment, plan),
+                    .trigger_delay_s = 1e-3 * experiment.trigger_delay_ms,
+                    .waveforms = played_waveforms(experiment)};
+  for (const ChannelConfig& channel : rig_.daq.channels)
+    begin.channels.push_back(channel.name);
+  for (const auto& [name, value] : book_.attributes())
+    begin.rig[name] = value;
+  begin.rig["daq_rate_Hz"] = sample_rate_Hz;
+  add_settings(begin.rig, *controller_);
+  add_limits(begin.rig, rig_.controller);
+  if (!append(journal, begin)) {
     throw HardwareError(journal.path().string(), journal.problem(), "Free some space on that disk.");
   }
 }

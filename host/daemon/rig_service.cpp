@@ -9,11 +9,12 @@
 #include <chrono>
 #include <future>
 
-#include "host/acquisition/journal_store.hpp"
 #include "host/controller/black_box_text.hpp"
 #include "host/controller/settings_values.hpp"
 #include "host/daemon/json_rpc.hpp"
+#include "host/daemon/rig_json.hpp"
 #include "host/daemon/utc.hpp"
+#include "host/journal/journal_store.hpp"
 #include "host/transport/conducted_clock.hpp"
 #include "host/transport/real_time.hpp"
 #include "host/transport/serial_port.hpp"
@@ -287,9 +288,19 @@ void RigService::write_settings(SettingsChange change, Done done) {
         [this, change = std::move(change)] {
           wire::MachineSettings settings =
               change.defaults ? wire::MachineSettings{} : controller_->settings().settings;
-          change_settings(settings, change.set);
+          Attributes asked;
+          for (const auto& [name, value] : change.set.items()) {
+            if (value.is_string())
+              asked[name] = value.get<std::string>();
+            else if (value.is_number())
+              asked[name] = value.get<double>();
+            else
+              throw InputError(
+                  {"controller settings", name, value.dump() + " is no number", "Give a number."});
+          }
+          change_settings(settings, asked);
           controller_->write_settings(settings);
-          spdlog::info("settings written: {}", settings_as_json(settings).dump());
+          spdlog::info("settings written: {}", values_as_json(settings_values(settings)).dump());
           (void)do_status();
           return remember_settings();
         },
@@ -461,7 +472,7 @@ json RigService::remember_settings() {
   const wire::SettingsReport& report = controller_->settings();
   const auto& problem = controller_->settings_problem();
   json result{{"record", report.records_written},
-              {"settings", settings_as_json(report.settings)},
+              {"settings", values_as_json(settings_values(report.settings))},
               {"microstep_uL", 1e-6 * controller_->microstep_pL()},
               {"backlash_microsteps", report.backlash_microsteps},
               {"problem", problem ? json(InputError(*problem).what()) : json()}};

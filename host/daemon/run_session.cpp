@@ -5,8 +5,8 @@
 #include <filesystem>
 #include <thread>
 
-#include "host/acquisition/part_file.hpp"
 #include "host/config/experiment.hpp"
+#include "host/journal/part_file.hpp"
 #include "host/runfile/output_guard.hpp"
 #include "protocol/contract/input_error.hpp"
 

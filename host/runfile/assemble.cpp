@@ -8,8 +8,8 @@
 #include <map>
 #include <memory>
 
+#include "host/journal/parsed_journal.hpp"
 #include "host/runfile/filtered_channel.hpp"
-#include "host/runfile/journal_story.hpp"
 #include "host/runfile/pressure_rows.hpp"
 #include "host/runfile/rows_due.hpp"
 #include "host/runfile/time_axis.hpp"
@@ -29,15 +29,15 @@ constexpr double missing = std::numeric_limits<double>::quiet_NaN();
 const std::string lost_in_the_journal = "its record was lost in the journal";
 const std::string not_recorded = "not recorded";
 
-TimeAxis axis_of(const JournalStory& story, const std::string& file) {
-  if (!story.start_tick)
+TimeAxis axis_of(const ParsedJournal& parsed, const std::string& file) {
+  if (!parsed.start_tick)
     throw NothingRecorded({file, "", "ends before the run started", "There is nothing to recover."});
-  const auto fitted = fit_clock_map(story.controller_pairs);
+  const auto fitted = fit_clock_map(controller_pairs(parsed));
   if (!fitted) {
     throw NothingRecorded({file, "", "ends before the two clocks were compared, so its samples have no time",
                            "There is nothing to recover."});
   }
-  return {story, *fitted};
+  return {parsed, *fitted};
 }
 
 void declare(std::vector<runfile::Gap>& gaps, std::string_view stream, int64_t first, int64_t count,
@@ -58,11 +58,11 @@ class PumpRows {
  public:
   using Take = std::function<void(double time_s, double commanded_mL)>;
 
-  PumpRows(const JournalStory& story, const TimeAxis& axis, Take take)
+  PumpRows(const ParsedJournal& parsed, const TimeAxis& axis, Take take)
       : axis_(axis),
         take_(std::move(take)),
-        microstep_mL_(story.begin.microstep_pL * mL_per_pL),
-        grid_(position_grid(story, axis)) {}
+        microstep_mL_(parsed.begin.microstep_pL * mL_per_pL),
+        grid_(position_grid(parsed, axis)) {}
 
   void add(const PositionBlock& block) {
     if (block.first_index < rows_) return;
@@ -89,28 +89,28 @@ class PumpRows {
   uint64_t rows_ = 0;
 };
 
-void put_triggers(const JournalStory& story, const TimeAxis& axis, RecordedRun& run) {
-  run.trigger_delay_s = story.begin.trigger_delay_s;
+void put_triggers(const ParsedJournal& parsed, const TimeAxis& axis, RecordedRun& run) {
+  run.trigger_delay_s = parsed.begin.trigger_delay_s;
   int64_t next_cycle = 0;
   const auto declare_until = [&](int64_t cycle) {
     declare(run.gaps, runfile::trigger_stream, next_cycle, cycle - next_cycle, "its record was lost");
   };
-  for (const RaisedTrigger& trigger : story.triggers) {
+  for (const TriggerRecord& trigger : parsed.triggers) {
     declare_until(trigger.cycle);
     run.trigger_s.push_back(axis.of_tick(trigger.tick));
     next_cycle = trigger.cycle + 1;
   }
-  if (story.run_ended) declare_until(story.run_ended->triggers);
+  if (parsed.run_ended) declare_until(parsed.run_ended->triggers);
 }
 
 /// A segment starts when the controller said so; one that did not begin stands as far behind the last that did
 /// as it was planned.
-void put_segments(const JournalStory& story, const TimeAxis& axis, RecordedRun& run) {
+void put_segments(const ParsedJournal& parsed, const TimeAxis& axis, RecordedRun& run) {
   std::map<size_t, double> begun_s;
-  for (const SegmentStart& started : story.segment_starts)
+  for (const SegmentRecord& started : parsed.segment_starts)
     begun_s[started.segment] = axis.of_tick(started.tick);
   double late_s = 0;
-  for (const runfile::Segment& planned : story.begin.segments) {
+  for (const runfile::Segment& planned : parsed.begin.segments) {
     if (const auto begun = begun_s.find(run.segments.size()); begun != begun_s.end()) {
       late_s = begun->second - planned.start_s;
     }
@@ -118,27 +118,27 @@ void put_segments(const JournalStory& story, const TimeAxis& axis, RecordedRun& 
     run.segments.back().start_s += late_s;
   }
   // A schedule ends its one segment when the last slice is done; until then the segment had more cycles in reserve.
-  if (story.run_ended && story.run_ended->schedule_done && !run.segments.empty()) {
-    run.segments.back().cycles = story.run_ended->cycles;
+  if (parsed.run_ended && parsed.run_ended->schedule_done && !run.segments.empty()) {
+    run.segments.back().cycles = parsed.run_ended->cycles;
   }
 }
 
 /// Rows of the triggers whose cycles belong to a slice.
-void put_slices(const JournalStory& story, RecordedRun& run) {
+void put_slices(const ParsedJournal& parsed, RecordedRun& run) {
   const auto row_of = [&](int64_t cycle) {
-    const auto at = std::find_if(story.triggers.begin(), story.triggers.end(),
-                                 [&](const RaisedTrigger& trigger) { return trigger.cycle >= cycle; });
-    return at - story.triggers.begin();
+    const auto at = std::find_if(parsed.triggers.begin(), parsed.triggers.end(),
+                                 [&](const TriggerRecord& trigger) { return trigger.cycle >= cycle; });
+    return at - parsed.triggers.begin();
   };
-  for (const BegunSlice& slice : story.slices) {
+  for (const SliceRecord& slice : parsed.slices) {
     const auto first = row_of(slice.cycle);
     run.slices.push_back({slice.block, slice.slice, first, row_of(slice.cycle + slice.cycles) - first,
                           slice.cycles, slice.dummy_cycles});
   }
 }
 
-void put_waveforms(const JournalStory& story, RecordedRun& run) {
-  for (const PlayedSegment& played : story.begin.waveforms) {
+void put_waveforms(const ParsedJournal& parsed, RecordedRun& run) {
+  for (const PlayedSegment& played : parsed.begin.waveforms) {
     runfile::PlayedWaveform& waveform = run.waveforms[played.segment];
     waveform = {played.points, {}, played.fraction};
     const double intervals = static_cast<double>(waveform.fraction.size()) - 1;
@@ -147,26 +147,26 @@ void put_waveforms(const JournalStory& story, RecordedRun& run) {
   }
 }
 
-void put_events(const JournalStory& story, const TimeAxis& axis, RecordedRun& run) {
-  for (const NotedEvent& event : story.events) {
+void put_events(const ParsedJournal& parsed, const TimeAxis& axis, RecordedRun& run) {
+  for (const EventRecord& event : parsed.events) {
     const double time_s = event.tick ? axis.of_tick(*event.tick) : axis.of_host_ns(event.host_ns);
     run.events.push_back({time_s, event.level, event.code, event.text});
   }
-  if (story.run_ended && runfile::is_stop_on_request(story.run_ended->reason)) {
-    run.events.push_back({axis.of_tick(story.run_ended->tick), "info", story.run_ended->reason,
-                          fmt::format("stopped on request after {} cycles", story.run_ended->cycles)});
+  if (parsed.run_ended && runfile::is_stop_on_request(parsed.run_ended->reason)) {
+    run.events.push_back({axis.of_tick(parsed.run_ended->tick), "info", parsed.run_ended->reason,
+                          fmt::format("stopped on request after {} cycles", parsed.run_ended->cycles)});
   }
   std::stable_sort(run.events.begin(), run.events.end(),
                    [](const auto& a, const auto& b) { return a.time_s < b.time_s; });
 }
 
 /// Offsets are the other clock's reading at the start of run; a positive drift means that it runs fast.
-void put_clocks(const JournalStory& story, const TimeAxis& axis, RecordedRun& run) {
+void put_clocks(const ParsedJournal& parsed, const TimeAxis& axis, RecordedRun& run) {
   const double controller_per_host = axis.map().scale;
   run.clock = {{"host_offset_s", axis.host_at_start_s()},
                {"host_drift_ppm", (1 / controller_per_host - 1) * 1e6},
                {"host_residual_s", axis.map().residual_s}};
-  if (const auto daq = fit_clock_map(story.daq_pairs)) {
+  if (const auto daq = fit_clock_map(instrument_pairs(parsed))) {
     run.clock["daq_offset_s"] = daq->to_other_s(axis.host_at_start_s());
     run.clock["daq_drift_ppm"] = (daq->scale / controller_per_host - 1) * 1e6;
   }
@@ -187,25 +187,25 @@ struct Rows {
 };
 
 /// Throws InputError if they break a rule of runfile::check.
-Rows look_through(const JournalRecords& journal, const JournalStory& story, const TimeAxis& axis) {
+Rows look_through(const JournalRecords& journal, const ParsedJournal& parsed, const TimeAxis& axis) {
   Rows rows;
   runfile::StreamCheck pump_check(journal.file(), runfile::pump_group);
   runfile::StreamCheck pressure_check(journal.file(), runfile::pressure_group);
   const std::string* lost = &lost_in_the_journal;
-  PumpRows pump(story, axis, [&](double time_s, double commanded_mL) {
+  PumpRows pump(parsed, axis, [&](double time_s, double commanded_mL) {
     pump_check.time(time_s);
     if (std::isnan(commanded_mL))
       declare(rows.pump_gaps, runfile::pump_stream, static_cast<int64_t>(rows.pump), 1, *lost);
     ++rows.pump;
   });
-  PressureRows pressure(story, axis, [&](const PressureRow& row) {
+  PressureRows pressure(parsed, axis, [&](const PressureRow& row) {
     pressure_check.time(row.time_s);
     if (row.missing != nullptr) {
       declare(rows.pressure_gaps, runfile::pressure_stream, static_cast<int64_t>(rows.pressure), 1,
               *row.missing);
     } else {
       for (size_t c = 0; c < row.value_kPa.size(); ++c)
-        pressure_check.value(story.begin.channels[c] + "_kPa", row.value_kPa[c]);
+        pressure_check.value(parsed.begin.channels[c] + "_kPa", row.value_kPa[c]);
       ++rows.samples_received;
     }
     if (rows.pressure++ == 0) rows.first_s = row.time_s;
@@ -224,7 +224,7 @@ Rows look_through(const JournalRecords& journal, const JournalStory& story, cons
 /// What the streams need as long as they live.
 struct Source {
   JournalRecords journal;
-  JournalStory story;
+  ParsedJournal parsed;
   TimeAxis axis;
 };
 
@@ -259,7 +259,7 @@ RowStream pump_of(const std::shared_ptr<const Source>& source, const Rows& rows)
       {}};
   stream.each = [source](const RowStream::Take& take) {
     Columns columns(2, take);
-    PumpRows pump(source->story, source->axis, [&](double time_s, double commanded_mL) {
+    PumpRows pump(source->parsed, source->axis, [&](double time_s, double commanded_mL) {
       columns.put(0, time_s);
       columns.put(1, commanded_mL);
     });
@@ -271,7 +271,7 @@ RowStream pump_of(const std::shared_ptr<const Source>& source, const Rows& rows)
 }
 
 RowStream pressure_of(const std::shared_ptr<const Source>& source, const Rows& rows) {
-  const std::vector<std::string>& channels = source->story.begin.channels;
+  const std::vector<std::string>& channels = source->parsed.begin.channels;
   RowStream stream{rows.pressure, {{runfile::pressure_time, runfile::time_unit}}, {}};
   for (const std::string& channel : channels)
     stream.columns.push_back(
@@ -289,7 +289,7 @@ RowStream pressure_of(const std::shared_ptr<const Source>& source, const Rows& r
     Columns columns(count, take);
     std::optional<signal::ZeroPhaseFilter> filter;
     if (design) filter.emplace(*design, [&](double value_kPa) { columns.put(count - 1, value_kPa); });
-    PressureRows pressure(source->story, source->axis, [&](const PressureRow& row) {
+    PressureRows pressure(source->parsed, source->axis, [&](const PressureRow& row) {
       columns.put(0, row.time_s);
       for (size_t c = 0; c < row.value_kPa.size(); ++c)
         columns.put(1 + c, row.value_kPa[c]);
@@ -304,32 +304,32 @@ RowStream pressure_of(const std::shared_ptr<const Source>& source, const Rows& r
 }
 
 /// Everything but the rows.
-AssembledRun tell(const JournalRecords& journal, const JournalStory& story, const TimeAxis& axis,
-                  const Rows& rows) {
+AssembledRun without_rows(const JournalRecords& journal, const ParsedJournal& parsed, const TimeAxis& axis,
+                          const Rows& rows) {
   AssembledRun assembled{.run = {},
-                         .damage = story.damage,
+                         .damage = parsed.damage,
                          .samples_received = rows.samples_received,
                          .samples_missing = rows.pressure - rows.samples_received,
-                         .ended_in_order = story.closed && story.run_ended.has_value()};
+                         .ended_in_order = parsed.closed && parsed.run_ended.has_value()};
   RecordedRun& run = assembled.run;
   run.file = journal.file();
-  run.run_id = story.begin.run_id;
-  run.started_utc = story.begin.started_utc;
-  run.producer = story.begin.producer;
-  run.rig = story.begin.rig;
-  run.protocol_toml = story.begin.experiment;
+  run.run_id = parsed.begin.run_id;
+  run.started_utc = parsed.begin.started_utc;
+  run.producer = parsed.begin.producer;
+  run.rig = parsed.begin.rig;
+  run.protocol_toml = parsed.begin.experiment;
   run.pump.grid = rows.pump_grid;
   run.pressure.grid = rows.pressure_grid;
-  put_segments(story, axis, run);
-  put_waveforms(story, run);
+  put_segments(parsed, axis, run);
+  put_waveforms(parsed, run);
   run.gaps = rows.pump_gaps;
-  put_triggers(story, axis, run);
+  put_triggers(parsed, axis, run);
   run.gaps.insert(run.gaps.end(), rows.pressure_gaps.begin(), rows.pressure_gaps.end());
-  put_slices(story, run);
-  put_events(story, axis, run);
-  put_clocks(story, axis, run);
+  put_slices(parsed, run);
+  put_events(parsed, axis, run);
+  put_clocks(parsed, axis, run);
   if (!assembled.ended_in_order) {
-    const double last_s = story.closed ? rows.last_s : std::max(rows.last_s, last_known_s(story, axis));
+    const double last_s = parsed.closed ? rows.last_s : std::max(rows.last_s, last_known_s(parsed, axis));
     run.events.push_back({last_s, "error", "incomplete", "the recording broke off here"});
   }
   return assembled;
@@ -338,11 +338,12 @@ AssembledRun tell(const JournalRecords& journal, const JournalStory& story, cons
 }  // namespace
 
 StreamedRun stream_run(const JournalRecords& journal) {
-  JournalStory story = read_story(journal);
-  const TimeAxis axis = axis_of(story, journal.file());
-  const auto source = std::make_shared<const Source>(Source{journal, std::move(story), axis});
-  const Rows rows = look_through(journal, source->story, source->axis);
-  return {tell(journal, source->story, source->axis, rows), pump_of(source, rows), pressure_of(source, rows)};
+  ParsedJournal parsed = parse_journal(journal);
+  const TimeAxis axis = axis_of(parsed, journal.file());
+  const auto source = std::make_shared<const Source>(Source{journal, std::move(parsed), axis});
+  const Rows rows = look_through(journal, source->parsed, source->axis);
+  return {without_rows(journal, source->parsed, source->axis, rows), pump_of(source, rows),
+          pressure_of(source, rows)};
 }
 
 AssembledRun assemble_run(const JournalRecords& journal) {

@@ -10,7 +10,7 @@
 
 #include <cstdint>
 
-#include "host/acquisition/journal.hpp"
+#include "host/journal/journal.hpp"
 #include "host/runfile/row_stream.hpp"
 #include "protocol/contract/input_error.hpp"
 #include "protocol/runfile/run.hpp"

@@ -2,7 +2,7 @@
 
 #include <unistd.h>
 
-#include "host/acquisition/journal_store.hpp"
+#include "host/journal/journal_store.hpp"
 #include "protocol/contract/input_error.hpp"
 
 namespace diastole {

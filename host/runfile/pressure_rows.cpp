@@ -13,21 +13,21 @@ const std::string not_recorded = "not recorded";
 
 }  // namespace
 
-PressureRows::PressureRows(const JournalStory& story, const TimeAxis& axis, Take take)
-    : story_(story),
+PressureRows::PressureRows(const ParsedJournal& parsed, const TimeAxis& axis, Take take)
+    : journal_(parsed),
       axis_(axis),
       take_(std::move(take)),
-      spacing_s_(axis.map().scale / story.begin.sample_rate_Hz),
-      nothing_(story.begin.channels.size(), std::numeric_limits<double>::quiet_NaN()),
-      gaps_(story.gaps) {
-  std::ranges::stable_sort(gaps_, {}, &DeclaredGap::first_index);
+      spacing_s_(axis.map().scale / parsed.begin.sample_rate_Hz),
+      nothing_(parsed.begin.channels.size(), std::numeric_limits<double>::quiet_NaN()),
+      gaps_(parsed.gaps) {
+  std::ranges::stable_sort(gaps_, {}, &GapRecord::first_index);
   if (axis.instrument_counts()) {
     grid_start_s_ = axis.of_sample(0, 0);
     spacing_s_ = axis.of_sample(1, 0) - *grid_start_s_;
-  } else if (story.first_due_ns) {
-    grid_start_s_ = axis.of_host_ns(*story.first_due_ns);
+  } else if (parsed.first_due_ns) {
+    grid_start_s_ = axis.of_host_ns(*parsed.first_due_ns);
   }
-  samples_due_ = samples_due(story);
+  samples_due_ = samples_due(parsed);
   if (samples_due_ && !axis.instrument_counts()) limit_ = *samples_due_;
 }
 
@@ -50,8 +50,9 @@ void PressureRows::add(const SampleBlock& block) {
 }
 
 void PressureRows::finish() {
-  uint64_t rows = std::max(story_.sample_rows, samples_due_.value_or(0));
-  if (!story_.closed) rows = std::max(rows, rows_due_by(last_known_s(story_, axis_), due_s(0), spacing_s_));
+  uint64_t rows = std::max(journal_.sample_rows, samples_due_.value_or(0));
+  if (!journal_.closed)
+    rows = std::max(rows, rows_due_by(last_known_s(journal_, axis_), due_s(0), spacing_s_));
   for (rows = std::min(rows, limit_); next_row_ < rows; ++next_row_)
     give_missing(last_s_ ? std::max(due_s(next_row_), *last_s_ + 0.1 * spacing_s_) : due_s(next_row_));
 }
@@ -61,7 +62,7 @@ void PressureRows::give_missing(double time_s) {
   while (gap_ < gaps_.size() && gaps_[gap_].first_index + gaps_[gap_].count <= next_row_)
     ++gap_;
   const bool declared = gap_ < gaps_.size() && gaps_[gap_].first_index <= next_row_;
-  const std::string& otherwise = next_row_ < story_.sample_rows ? lost_in_the_journal : not_recorded;
+  const std::string& otherwise = next_row_ < journal_.sample_rows ? lost_in_the_journal : not_recorded;
   give({time_s, nothing_, declared ? &gaps_[gap_].reason : &otherwise});
 }
 

@@ -27,8 +27,8 @@ class PressureRows {
  public:
   using Take = std::function<void(const PressureRow&)>;
 
-  /// `story` and `axis` outlive this. Rows before the start of run are left out.
-  PressureRows(const JournalStory& story, const TimeAxis& axis, Take take);
+  /// `parsed` and `axis` outlive this. Rows before the start of run are left out.
+  PressureRows(const ParsedJournal& parsed, const TimeAxis& axis, Take take);
 
   /// In order of their index (read_blocks). Those of other channels than the journal's beginning says are left out.
   void add(const SampleBlock& block);
@@ -43,13 +43,13 @@ class PressureRows {
   void give(const PressureRow& row);
   [[nodiscard]] double due_s(uint64_t row) const;
 
-  const JournalStory& story_;
+  const ParsedJournal& journal_;
   const TimeAxis& axis_;
   Take take_;
   double spacing_s_;
-  std::vector<double> nothing_;    // the values of a missing row
-  std::vector<DeclaredGap> gaps_;  // in order
-  size_t gap_ = 0;                 // the first that ends behind the row
+  std::vector<double> nothing_;  // the values of a missing row
+  std::vector<GapRecord> gaps_;  // in order
+  size_t gap_ = 0;               // the first that ends behind the row
   std::optional<double> grid_start_s_;
   std::optional<uint64_t> samples_due_;  // closed in order: until its end
   uint64_t limit_ = most_rows;           // no row from here on

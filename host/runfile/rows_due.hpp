@@ -8,23 +8,23 @@
 #include <cstdint>
 #include <optional>
 
-#include "host/runfile/journal_story.hpp"
+#include "host/journal/parsed_journal.hpp"
 #include "host/runfile/time_axis.hpp"
 #include "protocol/runfile/run.hpp"
 
 namespace diastole {
 
 /// Seconds since the start of run; no longer than any run of these segments goes on.
-double last_known_s(const JournalStory& story, const TimeAxis& axis);
+double last_known_s(const ParsedJournal& parsed, const TimeAxis& axis);
 
 /// Rows of a grid that are due at or before `time_s`; at most `most_rows`.
 uint64_t rows_due_by(double time_s, double start_s, double spacing_s);
 
 /// Samples that were due until the recording's end, counted from sample 0; none: the journal does not tell.
-std::optional<uint64_t> samples_due(const JournalStory& story);
+std::optional<uint64_t> samples_due(const ParsedJournal& parsed);
 
 /// The positions that the controller took. None: not known, because there is no position, or because the line was lost
 /// (a closed journal without the controller's end).
-std::optional<runfile::StreamGrid> position_grid(const JournalStory& story, const TimeAxis& axis);
+std::optional<runfile::StreamGrid> position_grid(const ParsedJournal& parsed, const TimeAxis& axis);
 
 }  // namespace diastole

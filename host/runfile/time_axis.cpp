@@ -5,14 +5,39 @@ namespace {
 
 constexpr double ns_per_s = 1e9;
 
+ClockPair pair_of(const auto& clock, double other_s) {
+  return {static_cast<double>(clock.host_ns) / ns_per_s, other_s,
+          static_cast<double>(clock.half_round_trip_ns) / ns_per_s};
+}
+
 }  // namespace
 
-TimeAxis::TimeAxis(const JournalStory& story, const ClockMap& controller)
-    : tick_rate_Hz_(story.begin.tick_rate_Hz),
-      sample_rate_Hz_(story.begin.sample_rate_Hz),
-      start_tick_(*story.start_tick),
+std::vector<ClockPair> controller_pairs(const ParsedJournal& parsed) {
+  std::vector<ClockPair> pairs;
+  for (const ClockRecord& clock : parsed.controller_clock)
+    pairs.push_back(pair_of(clock, static_cast<double>(clock.tick) / parsed.begin.tick_rate_Hz));
+  return pairs;
+}
+
+std::vector<ClockPair> instrument_pairs(const ParsedJournal& parsed) {
+  constexpr double timer_span = 4294967296.0;  // it wraps at 32 bits
+  std::vector<ClockPair> pairs;
+  double last_timer = 0, turns = 0;
+  for (const InstrumentClockRecord& clock : parsed.instrument_clock) {
+    const auto timer = static_cast<double>(clock.timer);
+    if (timer < last_timer) ++turns;
+    last_timer = timer;
+    pairs.push_back(pair_of(clock, (timer + turns * timer_span) / parsed.begin.daq_timer_rate_Hz));
+  }
+  return pairs;
+}
+
+TimeAxis::TimeAxis(const ParsedJournal& parsed, const ClockMap& controller)
+    : tick_rate_Hz_(parsed.begin.tick_rate_Hz),
+      sample_rate_Hz_(parsed.begin.sample_rate_Hz),
+      start_tick_(*parsed.start_tick),
       map_(controller) {
-  if (story.begin.daq_timer_counts_samples) timer_ = fit_clock_map(story.daq_pairs);
+  if (parsed.begin.daq_timer_counts_samples) timer_ = fit_clock_map(instrument_pairs(parsed));
 }
 
 double TimeAxis::of_tick(uint64_t tick) const {

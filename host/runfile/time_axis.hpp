@@ -5,14 +5,18 @@
 #include <optional>
 
 #include "host/controller/clock_map.hpp"
-#include "host/runfile/journal_story.hpp"
+#include "host/journal/parsed_journal.hpp"
 
 namespace diastole {
 
+/// The controller's clock, in ticks over its rate, against the host's; the instrument's timer, unwrapped, likewise.
+std::vector<ClockPair> controller_pairs(const ParsedJournal& parsed);
+std::vector<ClockPair> instrument_pairs(const ParsedJournal& parsed);
+
 class TimeAxis {
  public:
-  /// Precondition: the story has a start tick.
-  TimeAxis(const JournalStory& story, const ClockMap& controller);
+  /// Precondition: the journal has a start tick.
+  TimeAxis(const ParsedJournal& parsed, const ClockMap& controller);
 
   [[nodiscard]] double of_tick(uint64_t tick) const;
   [[nodiscard]] double of_host_ns(uint64_t host_ns) const;

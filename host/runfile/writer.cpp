@@ -8,7 +8,7 @@
 #include <cstring>
 #include <span>
 
-#include "host/acquisition/part_file.hpp"
+#include "host/journal/part_file.hpp"
 #include "host/runfile/h5_sink.hpp"
 #include "host/transport/descriptor.hpp"
 #include "protocol/contract/input_error.hpp"

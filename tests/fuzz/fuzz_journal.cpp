@@ -9,9 +9,9 @@
 #include <span>
 #include <string_view>
 
-#include "host/acquisition/journal.hpp"
+#include "host/journal/journal.hpp"
+#include "host/journal/parsed_journal.hpp"
 #include "host/runfile/assemble.hpp"
-#include "host/runfile/journal_story.hpp"
 #include "protocol/contract/input_error.hpp"
 #include "protocol/runfile/reader.hpp"
 
@@ -39,15 +39,15 @@ void add(JournalContents& journal, std::string_view document) {
 void assemble(const JournalContents& journal) {
   try {
     const JournalRecords records(journal);
-    const JournalStory story = read_story(records);
-    uint64_t rows = story.sample_rows;
+    const ParsedJournal parsed = parse_journal(records);
+    uint64_t rows = parsed.sample_rows;
     double planned_s = 0;  // a journal that breaks off may have rows declared until then
-    for (const runfile::Segment& segment : story.begin.segments)
+    for (const runfile::Segment& segment : parsed.begin.segments)
       planned_s = std::max(planned_s, segment.end_s());
-    if (!(planned_s < 60 && story.begin.sample_rate_Hz <= 500)) return;
+    if (!(planned_s < 60 && parsed.begin.sample_rate_Hz <= 500)) return;
     read_blocks(records, {.positions = [&](const PositionBlock& block) {
                   rows = std::max<uint64_t>(rows, block.first_index);
-                  if (500.0 * block.period_ticks < story.begin.tick_rate_Hz) rows = rows_worth_a_try + 1;
+                  if (500.0 * block.period_ticks < parsed.begin.tick_rate_Hz) rows = rows_worth_a_try + 1;
                 }});
     if (rows > rows_worth_a_try) return;
     runfile::check(assemble_run(journal).run);
@@ -60,7 +60,7 @@ void assemble(const JournalContents& journal) {
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   const std::span<const uint8_t> bytes(data, size);
   if (size > 0 && data[0] == 0) {
-    assemble(parse_journal(bytes.subspan(1)));
+    assemble(read_journal(bytes.subspan(1)));
     return 0;
   }
   JournalContents journal;

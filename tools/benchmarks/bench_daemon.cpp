@@ -13,9 +13,9 @@
 #include <thread>
 #include <vector>
 
-#include "host/acquisition/journal.hpp"
-#include "host/acquisition/journal_records.hpp"
 #include "host/daq/driver.hpp"
+#include "host/journal/journal.hpp"
+#include "host/journal/journal_records.hpp"
 #include "protocol/contract/exit_code.hpp"
 #include "protocol/contract/input_error.hpp"
 #include "tools/benchmarks/consoles_on_bench.hpp"

@@ -6,8 +6,8 @@
 #include <random>
 #include <string>
 
-#include "host/acquisition/journal.hpp"
-#include "host/acquisition/journal_records.hpp"
+#include "host/journal/journal.hpp"
+#include "host/journal/journal_records.hpp"
 #include "protocol/contract/input_error.hpp"
 
 namespace diastole {

@@ -5,7 +5,7 @@
 #include <fstream>
 
 #include "host/acquisition/disk_room.hpp"
-#include "host/acquisition/journal_store.hpp"
+#include "host/journal/journal_store.hpp"
 #include "protocol/contract/input_error.hpp"
 #include "protocol/runfile/reader.hpp"
 #include "tests/host/acquisition/session_on_desk.hpp"

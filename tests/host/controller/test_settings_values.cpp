@@ -10,7 +10,7 @@
 namespace diastole {
 namespace {
 
-using nlohmann::json;
+using runfile::Attribute;
 using testing::AllOf;
 using testing::HasSubstr;
 
@@ -19,11 +19,11 @@ TEST(SettingsValues, AreInTheUnitsOfPeopleBothWays) {
   change_settings(settings, {{"backlash_um", 40.5}, {"screw_rev_per_cm", 6.3}, {"board_name", "MR1"}});
   EXPECT_EQ(settings.backlash_nm, 40'500);
   EXPECT_EQ(settings.screw_mrev_per_m, 630'000);
-  const json shown = settings_as_json(settings);
-  EXPECT_EQ(shown["backlash_um"], 40.5);
-  EXPECT_EQ(shown["bore_mm"], 100.0);
-  EXPECT_EQ(shown["screw_rev_per_cm"], 6.3);
-  EXPECT_EQ(shown["board_name"], "MR1");
+  const Attributes shown = settings_values(settings);
+  EXPECT_EQ(shown.at("backlash_um"), Attribute(40.5));
+  EXPECT_EQ(shown.at("bore_mm"), Attribute(100.0));
+  EXPECT_EQ(shown.at("screw_rev_per_cm"), Attribute(6.3));
+  EXPECT_EQ(shown.at("board_name"), Attribute("MR1"));
   wire::MachineSettings again;
   change_settings(again, shown);
   EXPECT_EQ(again, settings);
@@ -31,7 +31,7 @@ TEST(SettingsValues, AreInTheUnitsOfPeopleBothWays) {
 
 TEST(SettingsValues, WhatCannotBeIsRefusedByNameValueAndRange) {
   wire::MachineSettings settings;
-  const auto message = [&](const json& changes) {
+  const auto message = [&](const Attributes& changes) {
     return message_of<InputError>([&] { change_settings(settings, changes); });
   };
   EXPECT_THAT(message({{"microsteps", 300}}),

@@ -130,7 +130,7 @@ TEST_F(WrittenFile, AJournalCutAnywhereGivesASoundPrefixOrARefusal) {
   size_t most_rows = 0;
   for (size_t length = 0; length < bytes.size(); length += 61) {
     try {
-      const AssembledRun assembled = assemble_run(parse_journal(std::span(bytes).first(length)));
+      const AssembledRun assembled = assemble_run(read_journal(std::span(bytes).first(length)));
       EXPECT_NO_THROW(runfile::check(assembled.run)) << "cut at " << length;
       EXPECT_FALSE(assembled.ended_in_order);
       most_rows = std::max(most_rows, assembled.run.pressure.time_s.size());

@@ -11,10 +11,10 @@
 #include <memory>
 #include <optional>
 
-#include "host/acquisition/journal.hpp"
 #include "host/cli/session_view.hpp"
 #include "host/config/rig_config.hpp"
 #include "host/daemon/run_session.hpp"
+#include "host/journal/journal.hpp"
 #include "host/runfile/assemble.hpp"
 #include "host/runfile/output_guard.hpp"
 #include "host/runfile/writer.hpp"

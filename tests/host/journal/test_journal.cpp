@@ -1,4 +1,4 @@
-#include "host/acquisition/journal.hpp"
+#include "host/journal/journal.hpp"
 
 #include <gmock/gmock.h>
 #include <sys/resource.h>
@@ -12,8 +12,8 @@
 #include <random>
 #include <thread>
 
-#include "host/acquisition/journal_records.hpp"
-#include "host/acquisition/part_file.hpp"
+#include "host/journal/journal_records.hpp"
+#include "host/journal/part_file.hpp"
 #include "protocol/contract/input_error.hpp"
 #include "tests/host/bench/scratch.hpp"
 
@@ -44,7 +44,7 @@ struct SmallJournal {
 TEST(Journal, ReadsBackWhatWasWritten) {
   const SmallJournal small;
   ASSERT_EQ(small.bytes.size(), small.ends.back());
-  const JournalContents contents = parse_journal(small.bytes);
+  const JournalContents contents = read_journal(small.bytes);
   ASSERT_EQ(contents.records.size(), 3U);
   EXPECT_EQ(contents.records[0].kind, RecordKind::document);
   EXPECT_EQ(std::string(contents.records[0].payload.begin(), contents.records[0].payload.end()), "hello");
@@ -55,7 +55,7 @@ TEST(Journal, ReadsBackWhatWasWritten) {
 TEST(Journal, ATornTailAtEveryByteKeepsTheRecordsBefore) {
   const SmallJournal small;
   for (size_t length = 0; length <= small.bytes.size(); ++length) {
-    const JournalContents contents = parse_journal(std::span(small.bytes).first(length));
+    const JournalContents contents = read_journal(std::span(small.bytes).first(length));
     size_t whole = 0;
     while (whole < small.ends.size() && small.ends[whole] <= length)
       ++whole;
@@ -70,7 +70,7 @@ TEST(Journal, EveryFlippedBitCostsOneRecordAtMost) {
   for (size_t bit = 0; bit < 8 * small.bytes.size(); ++bit) {
     std::vector<uint8_t> damaged = small.bytes;
     damaged[bit / 8] = static_cast<uint8_t>(damaged[bit / 8] ^ (1U << (bit % 8)));
-    const JournalContents contents = parse_journal(damaged);
+    const JournalContents contents = read_journal(damaged);
     ASSERT_EQ(contents.records.size(), 2U) << "bit " << bit;
     const bool last_hit = bit / 8 >= small.ends[1];
     ASSERT_EQ(contents.records_lost, last_hit ? 0U : 1U) << "bit " << bit;
@@ -82,7 +82,7 @@ TEST(Journal, NoiseHoldsNoRecord) {
   std::vector<uint8_t> noise(100'000);
   for (uint8_t& byte : noise)
     byte = static_cast<uint8_t>(random());
-  EXPECT_TRUE(parse_journal(noise).records.empty());
+  EXPECT_TRUE(read_journal(noise).records.empty());
 }
 
 TEST(Journal, AFullDiskIsToldOnceAndWhatWasWrittenStaysReadable) {

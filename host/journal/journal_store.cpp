@@ -1,4 +1,4 @@
-#include "host/acquisition/journal_store.hpp"
+#include "host/journal/journal_store.hpp"
 
 #include <algorithm>
 #include <fstream>

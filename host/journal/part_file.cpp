@@ -1,4 +1,4 @@
-#include "host/acquisition/part_file.hpp"
+#include "host/journal/part_file.hpp"
 
 #include <fcntl.h>
 #include <fmt/format.h>

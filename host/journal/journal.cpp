@@ -1,4 +1,4 @@
-#include "host/acquisition/journal.hpp"
+#include "host/journal/journal.hpp"
 
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -12,7 +12,7 @@
 #include <cstring>
 #include <optional>
 
-#include "host/acquisition/part_file.hpp"
+#include "host/journal/part_file.hpp"
 #include "protocol/contract/input_error.hpp"
 
 namespace diastole {
@@ -58,7 +58,7 @@ class RecordFinder {
         break;
       }
       if (length && is_whole(rest, *length) && get_u32(rest, 8) >= expected_) {
-        tell(rest, *length, found);
+        hand_over(rest, *length, found);
         at += header_bytes + *length + crc_bytes;
       } else {
         ++at;
@@ -82,7 +82,7 @@ class RecordFinder {
     return bytes.size() >= header_bytes + length + crc_bytes &&
            crc32c(bytes.first(header_bytes + length)) == get_u32(bytes, header_bytes + length);
   }
-  void tell(std::span<const uint8_t> bytes, size_t length, const JournalRecords::Take& found) {
+  void hand_over(std::span<const uint8_t> bytes, size_t length, const JournalRecords::Take& found) {
     found_any_ = true;
     damage_.damaged_bytes += std::exchange(damage_.torn_tail_bytes, 0);
     record_.sequence = get_u32(bytes, 8);
@@ -237,7 +237,7 @@ JournalDamage JournalRecords::each(const Take& take) const {
   return *contents_;
 }
 
-JournalContents parse_journal(std::span<const uint8_t> bytes) {
+JournalContents read_journal(std::span<const uint8_t> bytes) {
   JournalContents contents;
   RecordFinder finder;
   (void)finder.take(bytes, true, [&](const JournalRecord& record) { contents.records.push_back(record); });

@@ -130,6 +130,6 @@ class JournalRecords {
 
 /// All of it at once. Throws as JournalRecords::each.
 JournalContents read_journal(const std::filesystem::path& path);
-JournalContents parse_journal(std::span<const uint8_t> bytes);
+JournalContents read_journal(std::span<const uint8_t> bytes);
 
 }  // namespace diastole

@@ -1,0 +1,323 @@
+#include "host/journal/journal_records.hpp"
+
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+
+namespace diastole {
+namespace {
+
+using nlohmann::json;
+
+constexpr uint64_t most_counts = uint64_t{1} << 40;
+constexpr double highest_rate_Hz = 1e12;
+
+/// Puts the fields that describe() names into an object.
+class FieldWriter {
+ public:
+  explicit FieldWriter(json& object) : object_(object) {}
+  void field(const char* name, const auto& value) { object_[name] = value; }
+  void whole(const char* name, const auto& value, uint64_t /*most*/) { object_[name] = value; }
+  void rate(const char* name, double value_Hz) { object_[name] = value_Hz; }
+  void integer(const char* name, double value, double /*least*/) { object_[name] = std::llround(value); }
+  void later(const char* name, const auto& value) { object_[name] = value; }
+  void later_whole(const char* name, const auto& value, uint64_t /*most*/) { object_[name] = value; }
+  void if_known(const char* name, const std::optional<uint64_t>& value) {
+    if (value) object_[name] = *value;
+  }
+  void attributes(const char* name, const Attributes& attributes) {
+    json& object = object_[name] = json::object();
+    for (const auto& [key, value] : attributes)
+      std::visit([&object, &at = key](const auto& v) { object[at] = v; }, value);
+  }
+  template <typename Part>
+  void parts(const char* name, std::vector<Part>& parts) {
+    json& array = object_[name] = json::array();
+    for (Part& part : parts) {
+      FieldWriter writer(array.emplace_back(json::object()));
+      describe(writer, part);
+    }
+  }
+  void later_parts(const char* name, auto& value) { parts(name, value); }
+
+ private:
+  json& object_;
+};
+
+/// Takes them out of one; throws json::exception or std::out_of_range where the object is not of that form.
+class FieldReader {
+ public:
+  explicit FieldReader(const json& object) : object_(object) {}
+  void field(const char* name, auto& value) { object_.at(name).get_to(value); }
+  /// Others of JSON's numbers would be rounded or wrapped.
+  template <typename Whole>
+  void whole(const char* name, Whole& value, uint64_t most) {
+    const json& number = object_.at(name);
+    if (!number.is_number_unsigned() || number.get<uint64_t>() > most) throw std::out_of_range(name);
+    value = static_cast<Whole>(number.get<uint64_t>());
+  }
+  void rate(const char* name, double& value_Hz) { integer(name, value_Hz, 1e-3); }
+  void integer(const char* name, double& value, double least) {
+    object_.at(name).get_to(value);
+    if (!(value >= least && value <= highest_rate_Hz)) throw std::out_of_range(name);
+  }
+  void later(const char* name, auto& value) {
+    if (object_.contains(name)) field(name, value);
+  }
+  void later_whole(const char* name, auto& value, uint64_t most) {
+    if (object_.contains(name)) whole(name, value, most);
+  }
+  void if_known(const char* name, std::optional<uint64_t>& value) {
+    if (object_.contains(name)) whole(name, value.emplace(), most_ticks);
+  }
+  /// What is neither a number nor a text is left out; so is a number that was none when it was written.
+  void attributes(const char* name, Attributes& attributes) {
+    for (const auto& [key, value] : object_.at(name).items()) {
+      if (value.is_string()) attributes[key] = value.get<std::string>();
+      if (value.is_number_integer()) attributes[key] = value.get<int64_t>();
+      if (value.is_number_float()) attributes[key] = value.get<double>();
+    }
+  }
+  template <typename Part>
+  void parts(const char* name, std::vector<Part>& parts) {
+    for (const json& object : object_.at(name)) {
+      FieldReader reader(object);
+      describe(reader, parts.emplace_back());
+    }
+  }
+  void later_parts(const char* name, auto& value) {
+    if (object_.contains(name)) parts(name, value);
+  }
+
+ private:
+  const json& object_;
+};
+
+// The fields of each kind of document: `later` ones may be absent, `whole` numbers have a bound.
+
+void describe(auto& io, runfile::Segment& segment) {
+  io.field("start_s", segment.start_s);
+  io.field("waveform", segment.waveform);
+  io.field("stroke_mL", segment.stroke_mL);
+  io.field("period_s", segment.period_s);
+  io.field("offset_mL", segment.offset_mL);
+  io.whole("cycles", segment.cycles, most_counts);
+}
+
+void describe(auto& io, PlayedSegment& played) {
+  io.whole("segment", played.segment, most_counts);
+  io.field("points", played.points);
+  io.field("fraction", played.fraction);
+}
+
+void describe(auto& io, BeginRecord& begin) {
+  io.field("run_id", begin.run_id);
+  io.field("started_utc", begin.started_utc);
+  io.field("producer", begin.producer);
+  io.field("experiment", begin.experiment);
+  io.later("experiment_file", begin.experiment_file);
+  io.rate("sample_rate_Hz", begin.sample_rate_Hz);
+  io.field("channels", begin.channels);
+  io.attributes("rig", begin.rig);
+  io.later("instrument", begin.instrument);
+  io.integer("tick_rate_Hz", begin.tick_rate_Hz, 1e-3);
+  io.integer("microstep_pL", begin.microstep_pL, 0);
+  io.rate("daq_timer_rate_Hz", begin.daq_timer_rate_Hz);
+  io.later("daq_timer_counts_samples", begin.daq_timer_counts_samples);
+  io.parts("segments", begin.segments);
+  io.later("trigger_delay_s", begin.trigger_delay_s);
+  io.later_parts("waveforms", begin.waveforms);
+}
+
+void describe(auto& io, GridRecord& grid) { io.whole("first_due_ns", grid.first_due_ns, most_ticks); }
+
+void describe(auto& io, GapRecord& gap) {
+  io.whole("first_index", gap.first_index, most_rows);
+  io.whole("count", gap.count, most_rows);
+  io.field("reason", gap.reason);
+}
+
+void describe(auto& io, ClockRecord& clock) {
+  io.whole("host_ns", clock.host_ns, most_ticks);
+  io.whole("tick", clock.tick, most_ticks);
+  io.whole("half_round_trip_ns", clock.half_round_trip_ns, most_ticks);
+}
+
+void describe(auto& io, InstrumentClockRecord& clock) {
+  io.whole("host_ns", clock.host_ns, most_ticks);
+  io.whole("timer", clock.timer, most_ticks);
+  io.whole("half_round_trip_ns", clock.half_round_trip_ns, most_ticks);
+}
+
+void describe(auto& io, RunStartedRecord& started) { io.whole("tick", started.tick, most_ticks); }
+
+void describe(auto& io, SegmentRecord& started) {
+  io.whole("segment", started.segment, most_counts);
+  io.whole("tick", started.tick, most_ticks);
+}
+
+void describe(auto& io, TriggerRecord& trigger) {
+  io.whole("cycle", trigger.cycle, most_counts);
+  io.whole("tick", trigger.tick, most_ticks);
+  io.later_whole("r_wave", trigger.r_wave, most_counts);
+}
+
+void describe(auto& io, SliceRecord& slice) {
+  io.field("block", slice.block);
+  io.whole("slice", slice.slice, most_counts);
+  io.whole("cycle", slice.cycle, most_counts);
+  io.whole("cycles", slice.cycles, most_counts);
+  io.whole("dummy_cycles", slice.dummy_cycles, most_counts);
+}
+
+void describe(auto& io, RunEndedRecord& ended) {
+  io.field("reason", ended.reason);
+  io.later("schedule_done", ended.schedule_done);
+  io.whole("tick", ended.tick, most_ticks);
+  io.whole("cycles", ended.cycles, most_counts);
+  io.whole("triggers", ended.triggers, most_counts);
+  io.later_whole("r_waves", ended.r_waves, most_counts);
+}
+
+void describe(auto& io, EventRecord& event) {
+  io.field("level", event.level);
+  io.field("code", event.code);
+  io.field("text", event.text);
+  io.if_known("tick", event.tick);
+  if (!event.tick) io.whole("host_ns", event.host_ns, most_ticks);
+}
+
+void describe(auto& io, EndRecord& end) { io.if_known("until_ns", end.until_ns); }
+
+/// The alternative of Document that is of this kind, with what the object holds.
+template <size_t Kind = 0>
+std::optional<Document> read_document(const json& object) {
+  if constexpr (Kind < std::variant_size_v<Document>) {
+    using Record = std::variant_alternative_t<Kind, Document>;
+    if (object.at("record").get_ref<const std::string&>() != Record::kind)
+      return read_document<Kind + 1>(object);
+    Record record;
+    FieldReader reader(object);
+    describe(reader, record);
+    return record;
+  }
+  return std::nullopt;
+}
+
+static_assert(std::endian::native == std::endian::little, "journals are little-endian");
+
+template <typename Value>
+void put(std::vector<uint8_t>& out, const Value& value) {
+  const auto* bytes = reinterpret_cast<const uint8_t*>(&value);
+  out.insert(out.end(), bytes, bytes + sizeof(Value));
+}
+
+template <typename Value>
+void put_all(std::vector<uint8_t>& out, const std::vector<Value>& values) {
+  const auto* bytes = reinterpret_cast<const uint8_t*>(values.data());
+  out.insert(out.end(), bytes, bytes + values.size() * sizeof(Value));
+}
+
+template <typename Value>
+Value take(std::span<const uint8_t>& in) {
+  Value value;
+  std::memcpy(&value, in.data(), sizeof(Value));
+  in = in.subspan(sizeof(Value));
+  return value;
+}
+
+template <typename Value>
+std::vector<Value> take_all(std::span<const uint8_t>& in, size_t count) {
+  std::vector<Value> values(count);
+  if (count > 0) std::memcpy(values.data(), in.data(), count * sizeof(Value));
+  in = in.subspan(count * sizeof(Value));
+  return values;
+}
+
+constexpr size_t sample_header_bytes = 16;
+constexpr size_t position_header_bytes = 20;
+
+}  // namespace
+
+std::string encode(const Document& document) {
+  return std::visit(
+      [](auto record) {
+        json object{{"record", record.kind}};
+        FieldWriter writer(object);
+        describe(writer, record);
+        return object.dump(-1, ' ', false, json::error_handler_t::replace);
+      },
+      document);
+}
+
+std::vector<uint8_t> encode(const SampleBlock& block) {
+  std::vector<uint8_t> out;
+  put(out, block.first_index);
+  put(out, static_cast<uint32_t>(block.host_ns.size()));
+  put(out, block.channels);
+  put_all(out, block.host_ns);
+  put_all(out, block.value_kPa);
+  return out;
+}
+
+std::vector<uint8_t> encode(const PositionBlock& block) {
+  std::vector<uint8_t> out;
+  put(out, block.first_index);
+  put(out, static_cast<uint32_t>(block.microsteps.size()));
+  put(out, block.first_tick);
+  put(out, block.period_ticks);
+  put_all(out, block.microsteps);
+  return out;
+}
+
+std::optional<Document> decode_document(std::span<const uint8_t> payload) {
+  const json object = json::parse(payload.begin(), payload.end(), nullptr, false);
+  try {
+    if (object.is_object()) return read_document(object);
+  } catch (const json::exception&) {
+    // whole by its CRC but not of this version's form: it shows as missing by what it leaves out
+  } catch (const std::out_of_range&) {
+  }
+  return std::nullopt;
+}
+
+std::optional<SampleBlock> decode_samples(std::span<const uint8_t> payload) {
+  if (payload.size() < sample_header_bytes) return std::nullopt;
+  SampleBlock block;
+  block.first_index = take<uint64_t>(payload);
+  const size_t samples = take<uint32_t>(payload);
+  block.channels = take<uint32_t>(payload);
+  if (payload.size() / sizeof(uint64_t) < samples ||
+      payload.size() != samples * (1 + size_t{block.channels}) * sizeof(double)) {
+    return std::nullopt;
+  }
+  block.host_ns = take_all<uint64_t>(payload, samples);
+  block.value_kPa = take_all<double>(payload, samples * block.channels);
+  return block;
+}
+
+std::optional<PositionBlock> decode_positions(std::span<const uint8_t> payload) {
+  if (payload.size() < position_header_bytes) return std::nullopt;
+  PositionBlock block;
+  block.first_index = take<uint32_t>(payload);
+  const size_t count = take<uint32_t>(payload);
+  block.first_tick = take<uint64_t>(payload);
+  block.period_ticks = take<uint32_t>(payload);
+  if (payload.size() != count * sizeof(int32_t)) return std::nullopt;
+  block.microsteps = take_all<int32_t>(payload, count);
+  return block;
+}
+
+bool append(JournalWriter& journal, const Document& document) {
+  return journal.append(RecordKind::document, encode(document));
+}
+bool append(JournalWriter& journal, const SampleBlock& block) {
+  return journal.append(RecordKind::samples, encode(block));
+}
+bool append(JournalWriter& journal, const PositionBlock& block) {
+  return journal.append(RecordKind::positions, encode(block));
+}
+
+}  // namespace diastole
