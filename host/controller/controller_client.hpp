@@ -1,6 +1,6 @@
 #pragma once
-// The controller over its serial line: opens the port, agrees on the protocol, keeps the lease, compares
-// clocks.
+// The controller over its serial line, order by order: agrees on the protocol, loads, starts, stops. The session itself
+// keeps controller_link.hpp, questions and answers requests.hpp, what is reported telemetry_intake.hpp.
 
 #include <functional>
 #include <memory>
@@ -8,10 +8,10 @@
 
 #include "host/config/experiment.hpp"
 #include "host/config/rig_config.hpp"
-#include "host/controller/controller.hpp"
+#include "host/controller/requests.hpp"
+#include "host/controller/telemetry_intake.hpp"
 #include "host/transport/clock.hpp"
 #include "protocol/contract/input_error.hpp"
-#include "protocol/wire/reliable_link.hpp"
 
 namespace diastole {
 
@@ -26,12 +26,12 @@ class ControllerClient final : public Controller {
 
   /// Opens the line, checks that both sides speak the same protocol, stops a motion that goes on (found_moving()),
   /// reads the controller's settings, and sends geometry and limits if they agree with the rig file; if not, orders
-  /// to move throw what settings_problem() tells. A faulted controller takes none before clear_fault(). Throws
+  /// to move throw settings_problem(). A faulted controller takes none before clear_fault(). Throws
   /// HardwareError with the remedy in words, InputError if a number of the rig file is beyond what the protocol can
   /// carry; it is not connected then, and no heartbeat of this client prolongs a motion.
   void connect();
   void disconnect();
-  [[nodiscard]] bool connected() const { return line_ != nullptr && hello_.has_value(); }
+  [[nodiscard]] bool connected() const { return link_.has_line() && hello_.has_value(); }
   /// What the controller was doing when connect() found it moving by nobody's order in this connection, and stopped
   /// it under control; none if it was at rest.
   [[nodiscard]] const std::optional<wire::State>& found_moving() const { return found_moving_; }
@@ -68,33 +68,19 @@ class ControllerClient final : public Controller {
   /// The last status, brought forward by the events since: state, fault, position, segment, cycle, triggers and
   /// R-waves are of now, or a batch of positions old. In a run service() asks for it twice a second: the rest is no
   /// older than that.
-  [[nodiscard]] const wire::Status& last_known() const { return last_known_; }
+  [[nodiscard]] const wire::Status& last_known() const { return telemetry_.last_known(); }
 
-  void service() override;
-  [[nodiscard]] uint64_t next_due_ns() const override;
-  std::vector<ControllerEvent> take_events() override;
+  void service() override { link_.service(); }
+  [[nodiscard]] uint64_t next_due_ns() const override { return link_.next_due_ns(); }
+  std::vector<ControllerEvent> take_events() override { return telemetry_.take_events(); }
   void start() override;
   void stop_at_cycle_end() override;
   void stop_now() override;
   void halt() override;
-  ByteLine* line() override { return line_.get(); }
+  ByteLine* line() override { return link_.line(); }
 
  private:
-  struct Answer {
-    std::optional<wire::Ack> ack;
-    std::optional<wire::Nak> nak;
-    std::optional<wire::Hello> hello;
-    std::optional<wire::Status> status;
-    std::optional<wire::SettingsReport> settings;
-    std::optional<wire::BlackBoxReport> black_box;
-  };
-
-  template <class Message>
-  uint16_t post(Message message);
-  template <class Message>
-  Answer request(Message message);
-  template <class Message>
-  void demand(Message message);
+  void take(const wire::Received& received);
   void greet();
   void read_settings();
   void stop_what_moves();
@@ -103,45 +89,23 @@ class ControllerClient final : public Controller {
   void upload(const Experiment& experiment);
   /// Throws unless the controller has settings that agree with the rig file, and the file's limits.
   void require_configuration() const;
-  void turn();
-  void receive();
-  void transmit();
-  void keep_alive();
-  void ask_time();
   void ask_status_if_due();
-  void take(const wire::TimeSync& sync);
-  template <class Message>
-  void take_answer(const Message& message);
-  void bring_forward(const ControllerEvent& event);
-  void broke(std::string reason);
-  [[noreturn]] void fail(std::string problem, std::string remedy) const;
 
   Clock& clock_;
   const RigConfig& rig_;
   OpenLine open_line_;
-  std::unique_ptr<ByteLine> line_;
-  wire::ReliableLink link_{wire::ReliableLink::Role::host};
+  ControllerLink link_;
+  Requests requests_;
+  TelemetryIntake telemetry_;
   std::optional<wire::Hello> hello_;
-  uint16_t session_ = 0;
-  uint32_t lease_id_ = 0;
   uint32_t microstep_pL_ = 0;
   double position_rate_Hz_ = 0;
   wire::SettingsReport settings_;
   std::optional<InputFault> settings_problem_;
   std::optional<wire::State> found_moving_;
   bool configured_ = false;
-  uint16_t next_request_id_ = 1;
-  uint64_t next_heartbeat_ns_ = 0;
-  uint64_t next_time_question_ns_ = 0;
   uint64_t next_status_question_ns_ = 0;
-  uint32_t time_token_ = 0;
-  uint64_t time_asked_ns_ = 0;  // 0: no question open
-  std::optional<uint16_t> awaited_;
-  uint8_t awaited_type_ = 0;
-  Answer answer_;
-  wire::Status last_known_;
   ProgramPlan plan_;
-  std::vector<ControllerEvent> events_;
 };
 
 }  // namespace diastole

@@ -1,0 +1,134 @@
+#include "host/controller/refusals.hpp"
+
+#include <fmt/format.h>
+
+#include "protocol/contract/input_error.hpp"
+#include "protocol/wire/wire_text.hpp"
+
+namespace diastole {
+namespace {
+
+struct LimitInWords {
+  double scale;  // wire's unit to the user's
+  const char* unit;
+  const char* remedy;
+};
+
+LimitInWords words_for(wire::Limit limit) {
+  switch (limit) {
+    case wire::Limit::travel:
+      return {1e-3, "mL", "Reduce stroke_mL or offset_mL."};
+    case wire::Limit::flow:
+      return {1e-3, "mL/s", "Reduce stroke_mL or lengthen period_s."};
+    case wire::Limit::acceleration:
+      return {1e-3, "mL/s2", "Reduce stroke_mL or lengthen period_s; a parabolic waveform needs least."};
+    case wire::Limit::step_rate:
+      return {1, "microsteps/s", "Reduce stroke_mL, lengthen period_s, or use fewer microsteps."};
+    case wire::Limit::pressure:
+      return {1e-3, "kPa",
+              "Reduce stroke_mL or lengthen period_s: the fluid in the hose is too hard to move."};
+    case wire::Limit::stroke_at_least:
+      return {1e-6, "mL", "Enlarge stroke_mL to at least one microstep."};
+    case wire::Limit::stopping_time:
+      return {1e-6, "s", "Reduce stroke_mL or lengthen period_s, or raise lease_ms in the rig file."};
+    case wire::Limit::ttl_width:
+      return {1e-3, "ms", "Reduce ttl_width_ms in the rig file or lengthen period_s."};
+    case wire::Limit::r_wave_spacing:
+      return {1e-6, "s", "Lengthen period_s or raise gate_every."};
+    case wire::Limit::microstep:
+      return {1, "pL", "Make bore, screw and steps in the rig file agree with the controller's settings."};
+    case wire::Limit::home:
+      return {1e-3, "mL", "Withdraw less: the home position ends the way."};
+    case wire::Limit::take_up:
+      return {
+          1e-3, "ms",
+          "Reduce stroke_mL or lengthen period_s: at each reversal the motor needs this time to take up the "
+          "backlash (diastole settings)."};
+    case wire::Limit::trigger_delay:
+      return {1e-3, "ms", "Reduce trigger_delay_ms: the TTL and the R-wave of 30 ms end within the period."};
+    case wire::Limit::none:
+      break;
+  }
+  return {1, "", "Change the program."};
+}
+
+}  // namespace
+
+void refuse_program(const Experiment& experiment, size_t segment, const wire::Nak& nak) {
+  const std::string place = fmt::format("segment[{}]", segment);
+  if (nak.refusal == wire::Refusal::limit_exceeded) {
+    const LimitInWords words = words_for(nak.limit);
+    throw InputError({experiment.file, place,
+                      fmt::format("the controller refuses it: limit {}, asked {:g} {}, allowed {:g} {}",
+                                  wire::limit_name(nak.limit), words.scale * static_cast<double>(nak.asked),
+                                  words.unit, words.scale * static_cast<double>(nak.allowed), words.unit),
+                      words.remedy});
+  }
+  if (nak.refusal == wire::Refusal::unknown_waveform) {
+    throw InputError({experiment.file, place, "this firmware has no such waveform",
+                      "Use parabolic or sinusoidal, which every firmware has, or update the firmware."});
+  }
+  if (nak.refusal == wire::Refusal::program_full) {
+    throw InputError({experiment.file, place, "is more than the controller's program holds",
+                      "Split the experiment into several runs."});
+  }
+  if (nak.refusal == wire::Refusal::waveform_unfit) {
+    throw InputError(
+        {experiment.file, place + ".points",
+         "the controller refuses its waveform: it is steeper than 4294 strokes a period (squared)",
+         "Smooth its points, or put them further apart."});
+  }
+  throw InputError({experiment.file, place,
+                    fmt::format("the controller refuses it: {}", wire::refusal_explanation(nak.refusal)),
+                    ""});
+}
+
+void refuse_jog(const wire::Nak& nak) {
+  const auto asked = static_cast<double>(nak.asked), allowed = static_cast<double>(nak.allowed);
+  switch (nak.limit) {
+    case wire::Limit::flow:
+      throw InputError({"", "--rate-mL-s",
+                        fmt::format("is {:g}, and {:g} mL/s are allowed here", 1e-3 * asked, 1e-3 * allowed),
+                        "Go slower; unhomed, the pump goes no faster than homing_flow_mL_s."});
+    case wire::Limit::travel:
+      throw InputError(
+          {"", "--mL",
+           fmt::format("would reach {:g} mL, and the travel is {:g} mL", 1e-3 * asked, 1e-3 * allowed),
+           "Go less far."});
+    case wire::Limit::home:
+      throw InputError({"", "--mL",
+                        fmt::format("would withdraw {:g} mL, and the piston stands at {:g} mL", 1e-3 * asked,
+                                    1e-3 * allowed),
+                        "Go less far; `diastole home` finds position 0."});
+    default:
+      throw InputError({"", "--mL", fmt::format("is {:g}, less than one microstep", 1e-6 * asked),
+                        fmt::format("A microstep is {:g} mL.", 1e-6 * allowed)});
+  }
+}
+
+std::string remedy_for(wire::Refusal refusal) {
+  switch (refusal) {
+    case wire::Refusal::wrong_state:
+      return "A latched fault needs `diastole clear-fault` first, an unhomed pump `diastole home`; `diastole "
+             "status` tells the state.";
+    case wire::Refusal::estop_pressed:
+      return "Make the rig safe and release the emergency stop.";
+    case wire::Refusal::malformed:
+      return "A number in the rig or experiment file is beyond what this firmware takes; restart the daemon "
+             "after "
+             "a change of the rig file.";
+    case wire::Refusal::home_switch_closed:
+      return "The piston stands on the home switch: jog the other way (a positive distance), or `diastole "
+             "home`.";
+    case wire::Refusal::settings_mismatch:
+      return "Compare the rig file with `diastole settings`.";
+    case wire::Refusal::flash_failed:
+      return "Try again; if it persists the chip's flash is worn out: replace the board.";
+    case wire::Refusal::limit_switch_closed:
+      return "Jog away from the far limit switch (a negative distance), then `diastole home`.";
+    default:
+      return "`diastole status` tells more; restart the daemon if it persists.";
+  }
+}
+
+}  // namespace diastole
