@@ -8,7 +8,7 @@
 #include <string>
 
 #include "host/config/rig_config.hpp"
-#include "host/daemon/client.hpp"
+#include "host/rpc/client.hpp"
 
 namespace diastole {
 

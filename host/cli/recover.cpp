@@ -93,7 +93,7 @@ ExitCode recover(const RecoverOptions& options, const CommandOutput& out) {
     const StreamedRun run = stream_run(JournalRecords(options.journal));
     const std::string remark = write_run(options.output, run);
     if (!remark.empty()) fmt::print(stderr, "{}\n", remark);
-    assembled = run.told;
+    assembled = run.assembled;
   } catch (const NothingRecorded& nothing) {
     return tell_nothing(nothing, out);
   }

@@ -15,7 +15,7 @@
 #include "host/cli/schedule_text.hpp"
 #include "host/cli/session_view.hpp"
 #include "host/config/experiment.hpp"
-#include "host/daemon/run_session.hpp"
+#include "host/rpc/run_session.hpp"
 #include "protocol/contract/input_error.hpp"
 
 namespace diastole {

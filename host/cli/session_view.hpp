@@ -5,7 +5,7 @@
 #include <deque>
 #include <string>
 
-#include "host/daemon/run_session.hpp"
+#include "host/rpc/run_session.hpp"
 #include "protocol/contract/exit_code.hpp"
 
 namespace diastole {

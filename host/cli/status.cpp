@@ -8,7 +8,7 @@
 
 #include "host/cli/daemon_address.hpp"
 #include "host/cli/host_commands.hpp"
-#include "host/daemon/client.hpp"
+#include "host/rpc/client.hpp"
 #include "protocol/contract/input_error.hpp"
 
 namespace diastole {

@@ -12,10 +12,10 @@
 
 #include "host/config/rig_config.hpp"
 #include "host/daemon/daemon_log.hpp"
-#include "host/daemon/rig_service.hpp"
-#include "host/daemon/rpc_session.hpp"
-#include "host/daemon/server.hpp"
-#include "host/daemon/service_manager.hpp"
+#include "host/rig/rig_service.hpp"
+#include "host/rig/service_manager.hpp"
+#include "host/rpc/rpc_session.hpp"
+#include "host/rpc/server.hpp"
 #include "host/web/console.hpp"
 
 namespace diastole {
@@ -73,12 +73,12 @@ class Ending {
 
 /// If one is wanted; `by_option`: on the command line.
 std::optional<web::ConsoleServer> open_console(const RigConfig& config, bool by_option,
-                                               const std::shared_ptr<Reception>& reception) {
+                                               const std::shared_ptr<RpcState>& rpc_state) {
   if (!config.daemon.console) return std::nullopt;
   const web::ConsoleAddress address =
       by_option ? web::parse_console_address(*config.daemon.console, "--console", "")
                 : web::parse_console_address(*config.daemon.console, config.file, "daemon.console");
-  return std::optional<web::ConsoleServer>(std::in_place, reception, address);
+  return std::optional<web::ConsoleServer>(std::in_place, rpc_state, address);
 }
 
 /// Says again and again that the server's thread is alive.
@@ -115,11 +115,11 @@ void run_daemon(const DaemonOptions& options) {
   RigService rig(config, {options.conductor, options.daq_address, options.producer, &manager});
   Ending ending(context, rig, signals, manager);
   const ServerPulse pulse(context, manager);
-  const auto reception = std::make_shared<Reception>(Reception{context, rig, policy});
-  const RpcServer server(reception, config.daemon.socket);
-  const auto console = open_console(config, options.console.has_value(), reception);
+  const auto rpc_state = std::make_shared<RpcState>(RpcState{context, rig, policy});
+  const RpcServer server(rpc_state, config.daemon.socket);
+  const auto console = open_console(config, options.console.has_value(), rpc_state);
   nlohmann::json ready{{"ready", true}, {"socket", config.daemon.socket}};
-  if (console) ready["console"] = reception->console;
+  if (console) ready["console"] = rpc_state->console;
   std::cout << ready.dump() << std::endl;
   manager.ready();
   context.run();

@@ -348,7 +348,7 @@ StreamedRun stream_run(const JournalRecords& journal) {
 
 AssembledRun assemble_run(const JournalRecords& journal) {
   StreamedRun streamed = stream_run(journal);
-  RecordedRun& run = streamed.told.run;
+  RecordedRun& run = streamed.assembled.run;
   streamed.pump.each([&](size_t column, std::span<const double> values) {
     std::vector<double>& target = column == 0 ? run.pump.time_s : run.pump.commanded_mL;
     target.insert(target.end(), values.begin(), values.end());
@@ -362,7 +362,7 @@ AssembledRun assemble_run(const JournalRecords& journal) {
   streamed.pressure.each([&](size_t column, std::span<const double> values) {
     targets[column]->insert(targets[column]->end(), values.begin(), values.end());
   });
-  return std::move(streamed.told);
+  return std::move(streamed.assembled);
 }
 
 AssembledRun assemble_run(const JournalContents& journal) { return assemble_run(JournalRecords(journal)); }

@@ -33,7 +33,7 @@ class NothingRecorded : public InputError {
 
 /// A run whose rows stay in its journal until they are written, however many they are.
 struct StreamedRun {
-  AssembledRun told;  ///< run.pump and run.pressure are empty
+  AssembledRun assembled;  ///< run.pump and run.pressure are empty
   RowStream pump;
   RowStream pressure;
 };

@@ -205,8 +205,8 @@ std::string write_run(const std::filesystem::path& path, const runfile::Recorded
 
 std::string write_run(const std::filesystem::path& path, const StreamedRun& run,
                       const FlushDirectory& flush_directory) {
-  runfile::check(run.told.run);
-  return write_content(path, {run.told.run, run.pump, run.pressure}, flush_directory);
+  runfile::check(run.assembled.run);
+  return write_content(path, {run.assembled.run, run.pump, run.pressure}, flush_directory);
 }
 
 }  // namespace diastole

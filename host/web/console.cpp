@@ -5,9 +5,9 @@
 #include <unistd.h>
 
 #include <array>
-#include <chrono>
 
-#include "host/web/hall.hpp"
+#include "host/rpc/acceptor.hpp"
+#include "host/web/server_state.hpp"
 #include "protocol/contract/input_error.hpp"
 
 namespace diastole::web {
@@ -15,39 +15,41 @@ namespace {
 
 namespace asio = boost::asio;
 using asio::ip::tcp;
-using boost::system::error_code;
 
 std::string machine_name() {
   std::array<char, 256> name{};
   return ::gethostname(name.data(), name.size() - 1) == 0 ? name.data() : "";
 }
 
-void close_all(Guests& guests) {
-  for (const auto& [number, guest] : std::exchange(guests, {}))
-    guest->close();
+void close_all(Connections& guests) {
+  for (const auto& [number, connection] : std::exchange(guests, {}))
+    connection->close();
 }
 
 }  // namespace
 
-class ConsoleServer::Listener : public std::enable_shared_from_this<Listener> {
+class ConsoleServer::Listener {
  public:
-  Listener(std::shared_ptr<Reception> reception, const ConsoleAddress& address)
-      : hall_(std::make_shared<Hall>(Hall{std::move(reception), Door(address, machine_name())})),
-        acceptor_(hall_->reception->context),
-        pause_(hall_->reception->context) {
+  Listener(std::shared_ptr<RpcState> rpc_state, const ConsoleAddress& address)
+      : state_(
+            std::make_shared<ServerState>(ServerState{std::move(rpc_state), Door(address, machine_name())})),
+        acceptor_(std::make_shared<Acceptor<tcp>>(
+            state_->rpc_state, "a browser",
+            [state = state_](tcp::socket socket) { receive_visitor(state, std::move(socket)); })) {
+    tcp::acceptor& acceptor = acceptor_->acceptor;
     const tcp::endpoint endpoint(address.address, address.port);
     try {
-      acceptor_.open(endpoint.protocol());
-      acceptor_.set_option(asio::socket_base::reuse_address(true));
-      acceptor_.bind(endpoint);
-      acceptor_.listen();
+      acceptor.open(endpoint.protocol());
+      acceptor.set_option(asio::socket_base::reuse_address(true));
+      acceptor.bind(endpoint);
+      acceptor.listen();
     } catch (const boost::system::system_error& error) {
       throw HardwareError("web console",
                           fmt::format("cannot listen at {}:{}: {}", address.address.to_string(), address.port,
                                       error.code().message()),
                           "Choose another port (--console PORT), or see who has this one (ss -ltnp).");
     }
-    if (hall_->door.reaches_beyond_this_machine()) {
+    if (state_->door.reaches_beyond_this_machine()) {
       spdlog::warn(
           "the console listens at {}, beyond this machine, and is not encrypted: whoever can read the "
           "network's traffic "
@@ -56,50 +58,29 @@ class ConsoleServer::Listener : public std::enable_shared_from_this<Listener> {
           "the other machine",
           address.address.to_string());
     }
-    hall_->reception->console = {{"control", url(ConsoleRole::control)}, {"watch", url(ConsoleRole::watch)}};
+    state_->rpc_state->console = {{"control", url(ConsoleRole::control)}, {"watch", url(ConsoleRole::watch)}};
   }
 
-  void begin() { accept(); }
+  void begin() { acceptor_->accept(); }
 
   void close() {
-    error_code ignored;
-    acceptor_.close(ignored);
-    pause_.cancel();
-    close_all(hall_->visitors);
-    close_all(hall_->consoles);
-    hall_->reception->console = nullptr;
+    acceptor_->close();
+    close_all(state_->visitors);
+    close_all(state_->consoles);
+    state_->rpc_state->console = nullptr;
   }
 
   [[nodiscard]] std::string url(ConsoleRole role) const {
-    return hall_->door.url(role, acceptor_.local_endpoint().port());
+    return state_->door.url(role, acceptor_->acceptor.local_endpoint().port());
   }
 
  private:
-  void accept() {
-    acceptor_.async_accept([self = shared_from_this()](error_code error, tcp::socket socket) {
-      if (error == asio::error::operation_aborted || !self->acceptor_.is_open()) return;
-      if (error) return self->accept_later(error);
-      receive_visitor(self->hall_, std::move(socket));
-      self->accept();
-    });
-  }
-
-  /// For want of descriptors or memory; those in use come back.
-  void accept_later(error_code error) {
-    hall_->reception->log.warn("a browser could not be accepted: " + error.message());
-    pause_.expires_after(std::chrono::milliseconds(100));
-    pause_.async_wait([self = shared_from_this()](error_code cancelled) {
-      if (!cancelled) self->accept();
-    });
-  }
-
-  std::shared_ptr<Hall> hall_;
-  tcp::acceptor acceptor_;
-  asio::steady_timer pause_;
+  std::shared_ptr<ServerState> state_;
+  std::shared_ptr<Acceptor<tcp>> acceptor_;
 };
 
-ConsoleServer::ConsoleServer(std::shared_ptr<Reception> reception, const ConsoleAddress& address)
-    : listener_(std::make_shared<Listener>(std::move(reception), address)) {
+ConsoleServer::ConsoleServer(std::shared_ptr<RpcState> rpc_state, const ConsoleAddress& address)
+    : listener_(std::make_shared<Listener>(std::move(rpc_state), address)) {
   listener_->begin();
 }
 

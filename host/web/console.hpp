@@ -10,7 +10,7 @@
 // are checked first (door.hpp). An operator signs in with a name (console.sign_in) before he gives orders.
 //
 // It runs on the server's thread, never on the one that acquires, and holds a bounded number of connections with a
-// bounded number of bytes each (hall.hpp, rpc_session.hpp).
+// bounded number of bytes each (server_state.hpp, rpc_session.hpp).
 
 #include <memory>
 #include <string>
@@ -19,7 +19,7 @@
 
 namespace diastole {
 
-struct Reception;
+struct RpcState;
 
 namespace web {
 
@@ -27,7 +27,7 @@ class ConsoleServer {
  public:
   /// Listens at `address`, and lets users at the socket ask for the addresses (console.address). Throws HardwareError
   /// if it cannot listen there.
-  ConsoleServer(std::shared_ptr<Reception> reception, const ConsoleAddress& address);
+  ConsoleServer(std::shared_ptr<RpcState> rpc_state, const ConsoleAddress& address);
   ~ConsoleServer();
 
   /// For the browser of somebody who may control, or only watch and stop; with the token.

@@ -5,7 +5,6 @@
 #include <boost/beast/core.hpp>
 #include <boost/beast/websocket.hpp>
 #include <chrono>
-#include <deque>
 
 namespace diastole::web {
 namespace {
@@ -28,11 +27,11 @@ Peer browser_at(std::string address, ConsoleRole role) {
   return peer;
 }
 
-class ConsoleSocket : public RpcSession, public Guest {
+class ConsoleSocket : public RpcSession, public Connection {
  public:
-  ConsoleSocket(std::shared_ptr<Hall> hall, tcp::socket socket, ConsoleRole role)
-      : RpcSession(hall->reception, browser_at(address_of(socket), role), SessionBounds::console_requests),
-        hall_(std::move(hall)),
+  ConsoleSocket(std::shared_ptr<ServerState> state, tcp::socket socket, ConsoleRole role)
+      : RpcSession(state->rpc_state, browser_at(address_of(socket), role), SessionBounds::console_requests),
+        state_(std::move(state)),
         stream_(std::move(socket)) {
     stream_.read_message_max(rpc::most_line_bytes);
     stream_.auto_fragment(false);
@@ -40,7 +39,7 @@ class ConsoleSocket : public RpcSession, public Guest {
   }
 
   void begin(const http::request<http::empty_body>& upgrade) {
-    hall_->consoles[number()] = self();
+    state_->consoles[number()] = self();
     const beast::string_view offered = upgrade[http::field::sec_websocket_protocol];
     if (http::token_list(offered).exists(subprotocol)) {
       stream_.set_option(websocket::stream_base::decorator([](websocket::response_type& response) {
@@ -59,7 +58,7 @@ class ConsoleSocket : public RpcSession, public Guest {
     closed_ = true;
     leave();
     beast::get_lowest_layer(stream_).close();
-    hall_->consoles.erase(number());
+    state_->consoles.erase(number());
   }
 
  private:
@@ -85,42 +84,27 @@ class ConsoleSocket : public RpcSession, public Guest {
     if (!closed_) read();
   }
 
-  void send(std::string message) override {
-    if (closed_) return;
-    outbox_bytes_ += message.size();
-    if (too_much_unread(outbox_.size(), outbox_bytes_)) return drop("does not read its answers");
-    outbox_.push_back(std::move(message));
-    if (outbox_.size() == 1) write();
-  }
+  [[nodiscard]] bool is_open() const override { return !closed_; }
 
-  void write() {
-    stream_.async_write(asio::buffer(outbox_.front()), [self = self()](error_code error, size_t) {
+  void write(const std::string& message) override {
+    stream_.async_write(asio::buffer(message), [self = self()](error_code error, size_t) {
       if (error) return self->close();
-      self->outbox_bytes_ -= self->outbox_.front().size();
-      self->outbox_.pop_front();
-      if (!self->outbox_.empty()) self->write();
+      self->written();
     });
   }
 
-  void drop(const std::string& why) {
-    reception().log.warn(fmt::format("{} {}: connection closed", in_words(peer()), why));
-    close();
-  }
-
-  std::shared_ptr<Hall> hall_;
+  std::shared_ptr<ServerState> state_;
   websocket::stream<beast::tcp_stream> stream_;
   beast::flat_buffer inbox_;
   std::optional<std::string> held_;  // read, and not yet taken
-  std::deque<std::string> outbox_;
-  size_t outbox_bytes_ = 0;
   bool closed_ = false;
 };
 
 }  // namespace
 
-void open_console(const std::shared_ptr<Hall>& hall, tcp::socket socket,
+void open_console(const std::shared_ptr<ServerState>& state, tcp::socket socket,
                   http::request<http::empty_body> upgrade, ConsoleRole role) {
-  std::make_shared<ConsoleSocket>(hall, std::move(socket), role)->begin(upgrade);
+  std::make_shared<ConsoleSocket>(state, std::move(socket), role)->begin(upgrade);
 }
 
 std::string address_of(const tcp::socket& socket) {

@@ -8,11 +8,11 @@
 #include <boost/beast/http/message.hpp>
 #include <memory>
 
-#include "host/web/hall.hpp"
+#include "host/web/server_state.hpp"
 
 namespace diastole::web {
 
-void open_console(const std::shared_ptr<Hall>& hall, boost::asio::ip::tcp::socket socket,
+void open_console(const std::shared_ptr<ServerState>& state, boost::asio::ip::tcp::socket socket,
                   boost::beast::http::request<boost::beast::http::empty_body> upgrade, ConsoleRole role);
 
 /// "127.0.0.1", or "an unknown address".

@@ -11,7 +11,7 @@
 #include <string>
 #include <string_view>
 
-#include "host/daemon/peer.hpp"
+#include "host/rpc/peer.hpp"
 
 namespace diastole::web {
 

@@ -52,7 +52,7 @@ Verdict judge(const Door& door, const Request& request, size_t consoles_open, si
   if (target == "/rpc") return judge_upgrade(door, request, consoles_open, most_consoles);
   if (target == "/role") {
     const auto role = shown_role(door, request);
-    return role ? Verdict{.told_role = role} : Verdict{.refusal = Door::wrong_token()};
+    return role ? Verdict{.asked_role = role} : Verdict{.refusal = Door::wrong_token()};
   }
   const PageFile* file = find_page_file(target);
   return file != nullptr ? Verdict{.page = file}

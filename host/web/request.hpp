@@ -26,10 +26,10 @@ Refusal no_request(const boost::beast::error_code& error);
 
 /// One of these.
 struct Verdict {
-  std::optional<Refusal> refusal{};        ///< 401: the token is not valid
-  const PageFile* page = nullptr;          ///< to be sent
-  std::optional<ConsoleRole> told_role{};  ///< to be told to who asked for /role
-  std::optional<ConsoleRole> let_in_as{};  ///< the WebSocket is to be opened
+  std::optional<Refusal> refusal{};         ///< 401: the token is not valid
+  const PageFile* page = nullptr;           ///< to be sent
+  std::optional<ConsoleRole> asked_role{};  ///< to be told to who asked for /role
+  std::optional<ConsoleRole> let_in_as{};   ///< the WebSocket is to be opened
 };
 
 /// `consoles_open`: of at most `most_consoles`.

@@ -7,8 +7,8 @@
 #include <chrono>
 
 #include "host/web/console_socket.hpp"
-#include "host/web/hall.hpp"
 #include "host/web/request.hpp"
+#include "host/web/server_state.hpp"
 
 namespace diastole::web {
 namespace {
@@ -23,18 +23,18 @@ constexpr int most_requests = 100;  // of one connection
 
 using Response = http::response<http::string_body>;
 
-class Visitor : public Guest, public std::enable_shared_from_this<Visitor> {
+class Visitor : public Connection, public std::enable_shared_from_this<Visitor> {
  public:
-  Visitor(std::shared_ptr<Hall> hall, tcp::socket socket)
-      : hall_(std::move(hall)), stream_(std::move(socket)), number_(++hall_->reception->last_number) {}
+  Visitor(std::shared_ptr<ServerState> state, tcp::socket socket)
+      : state_(std::move(state)), stream_(std::move(socket)), number_(++state_->rpc_state->last_number) {}
 
   void begin() {
-    hall_->visitors[number_] = shared_from_this();
+    state_->visitors[number_] = shared_from_this();
     read();
   }
 
   void close() override {
-    hall_->visitors.erase(number_);
+    state_->visitors.erase(number_);
     stream_.close();
   }
 
@@ -54,23 +54,24 @@ class Visitor : public Guest, public std::enable_shared_from_this<Visitor> {
     }
     if (error) return close();
     request_ = parser_->release();
-    const Verdict verdict = judge(hall_->door, request_, hall_->consoles.size(), Hall::most_consoles);
+    const Verdict verdict =
+        judge(state_->door, request_, state_->consoles.size(), ServerState::most_consoles);
     if (verdict.refusal) return refuse(*verdict.refusal);
     if (verdict.let_in_as) return open_socket(*verdict.let_in_as);
     if (verdict.page != nullptr) return reply(200, verdict.page->type, std::string(verdict.page->text));
     reply(200, "application/json",
-          *verdict.told_role == ConsoleRole::control ? R"({"role":"control"})" : R"({"role":"watch"})");
+          *verdict.asked_role == ConsoleRole::control ? R"({"role":"control"})" : R"({"role":"watch"})");
   }
 
   void open_socket(ConsoleRole role) {
-    hall_->visitors.erase(number_);
-    open_console(hall_, stream_.release_socket(), std::move(request_), role);
+    state_->visitors.erase(number_);
+    open_console(state_, stream_.release_socket(), std::move(request_), role);
   }
 
   void refuse(const Refusal& refusal) {
     if (refusal.status == 401) {
-      hall_->reception->log.warn(fmt::format("a browser at {} came to the console without a valid token",
-                                             address_of(stream_.socket())));
+      state_->rpc_state->log.warn(fmt::format("a browser at {} came to the console without a valid token",
+                                              address_of(stream_.socket())));
     }
     last_ = true;
     reply(refusal.status, "text/plain; charset=utf-8", refusal.sentence + "\n");
@@ -98,7 +99,7 @@ class Visitor : public Guest, public std::enable_shared_from_this<Visitor> {
     });
   }
 
-  std::shared_ptr<Hall> hall_;
+  std::shared_ptr<ServerState> state_;
   beast::tcp_stream stream_;
   uint64_t number_;
   beast::flat_buffer buffer_{2 * most_header_bytes};
@@ -111,14 +112,14 @@ class Visitor : public Guest, public std::enable_shared_from_this<Visitor> {
 
 }  // namespace
 
-void receive_visitor(std::shared_ptr<Hall> hall, tcp::socket socket) {
-  if (hall->visitors.size() >= Hall::most_visitors) {
-    const auto oldest = hall->visitors.begin()->second;
+void receive_visitor(std::shared_ptr<ServerState> state, tcp::socket socket) {
+  if (state->visitors.size() >= ServerState::most_visitors) {
+    const auto oldest = state->visitors.begin()->second;
     oldest->close();
   }
   error_code ignored;
-  socket.set_option(boost::asio::socket_base::send_buffer_size(Hall::kernel_bytes), ignored);
-  std::make_shared<Visitor>(std::move(hall), std::move(socket))->begin();
+  socket.set_option(boost::asio::socket_base::send_buffer_size(ServerState::kernel_bytes), ignored);
+  std::make_shared<Visitor>(std::move(state), std::move(socket))->begin();
 }
 
 }  // namespace diastole::web

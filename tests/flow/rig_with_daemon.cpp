@@ -5,7 +5,7 @@
 #include <csignal>
 #include <thread>
 
-#include "host/daemon/json_rpc.hpp"
+#include "host/rpc/json_rpc.hpp"
 #include "host/transport/unix_socket.hpp"
 
 namespace diastole::flow {

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "host/daemon/client.hpp"
+#include "host/rpc/client.hpp"
 #include "host/transport/descriptor.hpp"
 #include "tests/flow/programs.hpp"
 

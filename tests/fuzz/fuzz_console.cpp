@@ -11,7 +11,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "host/daemon/json_rpc.hpp"
+#include "host/rpc/json_rpc.hpp"
 #include "host/web/request.hpp"
 
 namespace {
@@ -57,7 +57,7 @@ void check(const web::Door& door, const web::Request& request, const std::string
   using boost::beast::http::field;
   const web::Verdict verdict = web::judge(door, request, 0, 16);
   must(1 == int(verdict.refusal.has_value()) + int(verdict.page != nullptr) +
-                int(verdict.told_role.has_value()) + int(verdict.let_in_as.has_value()));
+                int(verdict.asked_role.has_value()) + int(verdict.let_in_as.has_value()));
   if (verdict.refusal) {
     must(verdict.refusal->status >= 400 && verdict.refusal->status < 600 &&
          !verdict.refusal->sentence.empty());
@@ -70,7 +70,7 @@ void check(const web::Door& door, const web::Request& request, const std::string
     must(origin == "http://" + host || origin == "https://" + host);
   }
   if (verdict.page != nullptr) return;
-  const auto role = verdict.told_role ? verdict.told_role : verdict.let_in_as;
+  const auto role = verdict.asked_role ? verdict.asked_role : verdict.let_in_as;
   const std::string shown =
       value_of(request, field::authorization) + value_of(request, field::sec_websocket_protocol);
   must(shown.find(*role == ConsoleRole::control ? control : watch) != std::string::npos);

@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <string_view>
 
-#include "host/daemon/json_rpc.hpp"
+#include "host/rpc/json_rpc.hpp"
 #include "protocol/contract/input_error.hpp"
 
 namespace {

@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "host/daemon/client.hpp"
+#include "host/rpc/client.hpp"
 #include "tools/benchmarks/line_tap.hpp"
 #include "tools/benchmarks/process_figures.hpp"
 #include "tools/diastole/simulate/child_process.hpp"

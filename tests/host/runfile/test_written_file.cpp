@@ -73,7 +73,7 @@ TEST(FilteredChannel, IsLeftOutWhereSamplesAreTooSlowForIt) {
 TEST_F(WrittenFile, FromTheJournalsRowsIsTheSameAsFromMemory) {
   const std::filesystem::path streamed = session_->scratch / "streamed.run.h5";
   const StreamedRun run = stream_run(JournalRecords(session_->journal));
-  EXPECT_TRUE(run.told.run.pressure.time_s.empty());
+  EXPECT_TRUE(run.assembled.run.pressure.time_s.empty());
   EXPECT_EQ(write_run(streamed, run), "");
   const runfile::RecordedRun a = runfile::read_run(file()), b = runfile::read_run(streamed);
   EXPECT_EQ(a.pressure.time_s, b.pressure.time_s);

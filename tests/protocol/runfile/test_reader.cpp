@@ -40,7 +40,7 @@ TEST_P(EveryRejection, NamesTheDatasetAndTheFirstOffendingIndex) {
   write_sketch(path, sketch);
   const std::string message = refusal(path);
   EXPECT_THAT(message, HasSubstr(path.string()));
-  for (const std::string& part : GetParam().told)
+  for (const std::string& part : GetParam().assembled)
     EXPECT_THAT(message, HasSubstr(part));
 }
 

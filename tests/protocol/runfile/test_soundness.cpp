@@ -109,7 +109,7 @@ TEST_P(StreamCut, IsAFaultWithAndWithoutAGrid) {
     }
     const Soundness soundness = assess(run);
     EXPECT_THAT(soundness.problems,
-                testing::Contains(testing::AllOf(testing::StartsWith(cut.stream), HasSubstr(cut.told))));
+                testing::Contains(testing::AllOf(testing::StartsWith(cut.stream), HasSubstr(cut.assembled))));
     if (!with_grid) continue;
     EXPECT_THAT(soundness.problems, testing::Contains(HasSubstr("but 400 were due")));
   }

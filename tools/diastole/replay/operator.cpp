@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "host/daemon/client.hpp"
+#include "host/rpc/client.hpp"
 
 namespace diastole::replay {
 namespace {

@@ -13,8 +13,8 @@
 
 #include "host/cli/session_view.hpp"
 #include "host/config/rig_config.hpp"
-#include "host/daemon/run_session.hpp"
 #include "host/journal/journal.hpp"
+#include "host/rpc/run_session.hpp"
 #include "host/runfile/assemble.hpp"
 #include "host/runfile/output_guard.hpp"
 #include "host/runfile/writer.hpp"

@@ -12,7 +12,7 @@
 
 #include "host/cli/session_view.hpp"
 #include "host/config/experiment.hpp"
-#include "host/daemon/run_session.hpp"
+#include "host/rpc/run_session.hpp"
 #include "protocol/contract/input_error.hpp"
 #include "tools/diastole/simulate/simulated_rig.hpp"
 #include "tools/diastole/simulate/stop_signals.hpp"

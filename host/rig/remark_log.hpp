@@ -1,0 +1,40 @@
+#pragma once
+// The remarks of a run for those who look on. Each has a number that it keeps. When there are more than `most`, the
+// oldest go; errors and prompts go last, when they alone are more than `most`.
+
+#include <cstdint>
+#include <deque>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "host/acquisition/acquisition.hpp"
+
+namespace diastole {
+
+class RemarkLog {
+ public:
+  explicit RemarkLog(size_t most = 2000) : most_(most) {}
+
+  void add(const RunRemark& remark, const std::string& utc);
+
+  struct Entry {
+    size_t number = 0;
+    std::string utc;
+    RunRemark remark;
+  };
+  struct Page {
+    std::vector<Entry> remarks;  ///< by number
+    size_t next = 0;             ///< the first number that is not among them
+  };
+  /// Those from number `first` on that are still here, `at_most` of them.
+  [[nodiscard]] Page from(size_t first, size_t at_most) const;
+
+ private:
+  size_t most_;
+  size_t next_ = 0;
+  std::map<size_t, Entry> kept_;
+  std::deque<size_t> lasting_, passing_;  // their numbers
+};
+
+}  // namespace diastole

@@ -1,0 +1,382 @@
+#include "host/rig/rig_service.hpp"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <future>
+
+#include "host/controller/settings_values.hpp"
+#include "host/transport/conducted_clock.hpp"
+#include "host/transport/real_time.hpp"
+#include "host/transport/serial_port.hpp"
+#include "host/transport/watched_clock.hpp"
+#include "protocol/contract/input_error.hpp"
+#include "protocol/wire/wire_text.hpp"
+
+namespace diastole {
+namespace {
+
+constexpr uint64_t idle_step_ns = 20'000'000;
+constexpr std::chrono::milliseconds waiting_step{50};  // while time stands still
+constexpr uint64_t reconnect_interval_ns = 1'000'000'000;
+constexpr uint64_t homing_patience_ns = 1'800'000'000'000;
+constexpr uint64_t homing_step_ns = 10'000'000;
+constexpr int conducted_timeout_ms = 5000;  // wall time; virtual time stands still meanwhile
+
+std::unique_ptr<Clock> make_clock(const std::string& conductor, ServiceManager* manager) {
+  std::unique_ptr<Clock> clock;
+  if (conductor.empty()) {
+    clock = std::make_unique<RealClock>();
+  } else {
+    clock = std::make_unique<ConductedClock>(conductor);
+  }
+  if (manager == nullptr) return clock;
+  return std::make_unique<WatchedClock>(std::move(clock), [manager] { manager->beat(); });
+}
+
+void make_journal_dir(const std::filesystem::path& directory) {
+  std::error_code error;
+  std::filesystem::create_directories(directory, error);
+  if (error || ::access(directory.c_str(), W_OK) != 0) {
+    throw InputError({directory.string(), "", "is no directory in which journals can be written",
+                      "Make it writable, or name another (journal_dir in the rig file, or --journal-dir)."});
+  }
+}
+
+std::optional<std::string> problem_of(const ControllerClient& controller) {
+  const auto& problem = controller.settings_problem();
+  return problem ? std::optional<std::string>(InputError(*problem).what()) : std::nullopt;
+}
+
+/// A simulated rig's instrument reads as the rig file says, whatever the real one's calibration.
+CalibrationBook book_for(const RigConfig& rig, bool simulated) {
+  return {simulated ? std::filesystem::path() : std::filesystem::path(rig.file), rig.daq.channels};
+}
+
+}  // namespace
+
+RigService::RigService(RigConfig rig, const RigServiceOptions& options)
+    : rig_(std::move(rig)),
+      options_(options),
+      book_(book_for(rig_, !options.conductor.empty())),
+      clock_(make_clock(options.conductor, options.manager)) {
+  rig_.daq.channels = book_.channels();
+  controller_ = std::make_unique<ControllerClient>(*clock_, rig_, [this]() -> std::unique_ptr<ByteLine> {
+    return std::make_unique<SerialPort>(rig_.controller.port, rig_.controller.baud);
+  });
+  connect();
+  daq::OpenOptions opening{.address = options.daq_address};
+  if (clock_->stands_still()) {
+    opening.least_timeout_ms = conducted_timeout_ms;
+    opening.now_ns = [this] { return clock_->now_ns(); };
+  }
+  instrument_ = rig_.daq.open(opening);
+  if (rig_.gpio && !clock_->stands_still()) gate_ = open_gpio(*rig_.gpio);
+  make_journal_dir(rig_.daemon.journal_dir);
+  tidy_journals();
+  spdlog::info("controller at {}, instrument {}", rig_.controller.port, instrument_->describe());
+  if (const auto problem = problem_of(*controller_)) spdlog::warn("{}", *problem);
+  (void)do_status();
+  (void)remember_settings();
+  thread_ = std::jthread([this](const std::stop_token& stop) { work(stop); });
+}
+
+RigService::~RigService() {
+  end();
+  thread_.request_stop();
+  queue_.wake();
+}
+
+void RigService::work(const std::stop_token& stop) {
+  if (!clock_->stands_still()) ask_for_real_time(rig_priority);
+  while (!stop.stop_requested()) {
+    try {
+      if (auto order = queue_.next()) {
+        carry_out(std::move(*order));
+      } else if (clock_->stands_still()) {
+        if (options_.manager != nullptr) options_.manager->beat();
+        queue_.wait(stop, waiting_step);
+      } else {
+        idle_turn();
+      }
+    } catch (const std::exception& error) {
+      log_problem(error);
+    }
+  }
+}
+
+void RigService::log_problem(const std::exception& error) {
+  if (std::exchange(last_problem_, error.what()) != error.what()) spdlog::error("{}", error.what());
+}
+
+void RigService::idle_turn() {
+  reconnect_if_due();
+  controller_->service();
+  log_events();
+  clock_->sleep_until_ns(std::min(clock_->now_ns() + idle_step_ns, controller_->next_due_ns()),
+                         controller_->line());
+}
+
+void RigService::reconnect_if_due() {
+  if (controller_->connected() || clock_->now_ns() < next_reconnect_ns_) return;
+  next_reconnect_ns_ = clock_->now_ns() + reconnect_interval_ns;
+  connect();
+  last_problem_.clear();
+  spdlog::info("controller at {} is back", rig_.controller.port);
+}
+
+void RigService::connect() {
+  controller_->connect();
+  log_events();
+  if (const auto& found = controller_->found_moving()) {
+    const std::string text = fmt::format(
+        "the pump was found {} although nobody had ordered it since the connection was made, and was "
+        "stopped; "
+        "nothing of that motion was recorded",
+        wire::state_name(*found));
+    note({"warning", "found_moving", text});
+    const std::lock_guard lock(mutex_);
+    notice_ = text;
+  }
+  if (const wire::Status& status = controller_->last_known(); status.state == wire::State::faulted) {
+    spdlog::warn("fault {} is latched: {} {}", static_cast<int>(status.fault),
+                 wire::fault_explanation(status.fault), wire::fault_remedy(status.fault));
+  }
+}
+
+void RigService::log_events() {
+  for (const ControllerEvent& event : controller_->take_events()) {
+    if (const auto* broken = std::get_if<LinkBroken>(&event)) spdlog::error("{}", broken->reason);
+    if (const auto* fault = std::get_if<wire::FaultRaised>(&event)) {
+      spdlog::error("{} {}", wire::fault_explanation(fault->fault), wire::fault_remedy(fault->fault));
+    }
+  }
+}
+
+void RigService::carry_out(RigOrder order) {
+  const bool occupies = !order.activity.empty();
+  std::optional<RigAnswer> answer;
+  std::exception_ptr error;
+  try {
+    if (occupies && asked_to_stop()) refuse_to_start();
+    if (!controller_->connected()) {
+      connect();
+      if (occupies && controller_->found_moving()) {
+        throw HardwareError("rig", "the pump was found moving and was stopped (diastole status)",
+                            "See that nothing is amiss, then give the order again.");
+      }
+    }
+    if (occupies) {
+      const std::lock_guard lock(mutex_);
+      notice_.reset();
+    }
+    answer = order.act();
+    if (!answer) return;
+  } catch (...) {
+    error = std::current_exception();
+  }
+  if (occupies) queue_.leave();
+  order.done(error, answer.value_or(RigAnswer()));
+}
+
+void RigService::refuse_to_start() const {
+  throw HardwareError("rig", "stopped before the start",
+                      "Nothing moved. Give the order again when you want it.");
+}
+
+void RigService::start_run(RunOrder order, Done done) {
+  // do_run answers by itself when the run begins, long before it ends.
+  queue_.give({"loading",
+               [this, order = std::move(order), done]() -> std::optional<RigAnswer> {
+                 do_run(order, done);
+                 return std::nullopt;
+               },
+               done});
+}
+
+void RigService::home(Done done) {
+  queue_.give({"homing", [this] { return do_home(); }, std::move(done)});
+}
+
+void RigService::clear_fault(Done done) {
+  queue_.give({"clearing_fault",
+               [this] {
+                 controller_->clear_fault();
+                 return do_status();
+               },
+               std::move(done)});
+}
+
+void RigService::jog(double distance_mL, double rate_mL_s, Done done) {
+  queue_.give({"jogging", [this, distance_mL, rate_mL_s] { return do_jog(distance_mL, rate_mL_s); },
+               std::move(done)});
+}
+
+void RigService::settings(Done done) {
+  if (queue_.activity().empty())
+    return queue_.give({"", [this] { return remember_settings(); }, std::move(done)});
+  std::unique_lock lock(mutex_);
+  const SettingsReport last = last_settings_;
+  lock.unlock();
+  done(nullptr, last);
+}
+
+void RigService::write_settings(SettingsChange change, Done done) {
+  queue_.give({"writing_settings",
+               [this, change = std::move(change)] {
+                 wire::MachineSettings settings =
+                     change.defaults ? wire::MachineSettings{} : controller_->settings().settings;
+                 change_settings(settings, change.set);
+                 controller_->write_settings(settings);
+                 (void)do_status();
+                 const SettingsReport report = remember_settings();
+                 spdlog::info("settings written: record {}", report.record);
+                 return report;
+               },
+               std::move(done)});
+}
+
+void RigService::black_box(Done done) {
+  queue_.require_free();
+  const auto read = [this] {
+    return BlackBox{controller_->black_box(), static_cast<double>(controller_->hello().tick_rate_Hz)};
+  };
+  ask(black_box_askers_, read, std::move(done));
+}
+
+void RigService::status(Done done) {
+  const std::string activity = queue_.activity();
+  if (activity.empty())
+    return ask(
+        status_askers_, [this] { return do_status(); }, std::move(done));
+  std::unique_lock lock(mutex_);
+  RigStatus last = last_status_;
+  lock.unlock();
+  last.state = activity;
+  if (activity == "running" || activity == "writing") last.run_id = run_.run_id();
+  done(nullptr, last);
+}
+
+void RigService::ask(std::vector<Done>& askers, std::function<RigAnswer()> answer, Done done) {
+  {
+    const std::lock_guard lock(mutex_);
+    askers.push_back(std::move(done));
+    if (askers.size() > 1) return;
+  }
+  const auto answer_all = [this, &askers](const std::exception_ptr& error, const RigAnswer& what) {
+    std::vector<Done> all;
+    {
+      const std::lock_guard lock(mutex_);
+      all.swap(askers);
+    }
+    for (const Done& asker : all)
+      asker(error, what);
+  };
+  try {
+    queue_.give({"", std::move(answer), answer_all});
+  } catch (...) {
+    answer_all(std::current_exception(), {});
+  }
+}
+
+void RigService::note(const RunRemark& what) {
+  if (queue_.activity() == "running") return run_.note(what);  // the run's remarks are logged as they come
+  spdlog::log(what.level == "info" ? spdlog::level::info : spdlog::level::warn, "{}", what.text);
+}
+
+bool RigService::await_end_of(wire::State moving) {
+  const uint64_t end_ns = clock_->now_ns() + homing_patience_ns;
+  StopRequest obeyed = StopRequest::none;
+  for (wire::Status status = controller_->status(); status.state == moving; status = controller_->status()) {
+    (void)remember(status);
+    const StopRequest overdue = clock_->now_ns() > end_ns ? StopRequest::halt : StopRequest::none;
+    const StopRequest asked = std::max(overdue, queue_.stop_asked());
+    if (asked > obeyed) asked == StopRequest::halt ? controller_->halt() : controller_->stop_now();
+    obeyed = std::max(asked, obeyed);
+    for (const uint64_t until_ns = clock_->now_ns() + homing_step_ns; clock_->now_ns() < until_ns;) {
+      clock_->sleep_until_ns(std::min(until_ns, controller_->next_due_ns()), controller_->line());
+      controller_->service();
+    }
+  }
+  controller_->take_events();
+  return obeyed != StopRequest::none;
+}
+
+RigStatus RigService::do_home() {
+  controller_->home();
+  const bool stopped = await_end_of(wire::State::homing);
+  const RigStatus result = do_status();
+  const wire::State state = result.controller.state;
+  if (stopped && state == wire::State::unhomed) {
+    throw HardwareError("rig", "homing was stopped",
+                        "The pump does not know its place: `diastole home` again.");
+  }
+  if (state != wire::State::homed) {
+    const wire::Fault fault = result.controller.fault;
+    throw HardwareError(
+        "controller at " + rig_.controller.port,
+        fmt::format("homing ended in state {}: {}", result.state, wire::fault_explanation(fault)),
+        std::string(wire::fault_remedy(fault)));
+  }
+  return result;
+}
+
+RigStatus RigService::do_jog(double distance_mL, double rate_mL_s) {
+  const int32_t before = controller_->status().position_microsteps;
+  controller_->jog(distance_mL, rate_mL_s);
+  const bool stopped = await_end_of(wire::State::jogging);
+  const int32_t after = controller_->status().position_microsteps;
+  RigStatus result = do_status();
+  if (const wire::Fault fault = result.controller.fault; fault != wire::Fault::none) {
+    throw HardwareError("controller at " + rig_.controller.port,
+                        fmt::format("the jog ended with a fault: {}", wire::fault_explanation(fault)),
+                        std::string(wire::fault_remedy(fault)));
+  }
+  result.jog = {1e-9 * controller_->microstep_pL() * (after - before), stopped};
+  return result;
+}
+
+SettingsReport RigService::remember_settings() {
+  const wire::SettingsReport& report = controller_->settings();
+  const SettingsReport result{report.records_written, settings_values(report.settings),
+                              1e-6 * controller_->microstep_pL(), report.backlash_microsteps,
+                              problem_of(*controller_)};
+  const std::lock_guard lock(mutex_);
+  return last_settings_ = result;
+}
+
+RigStatus RigService::do_status() { return remember(controller_->status()); }
+
+RigStatus RigService::remember(const wire::Status& status) {
+  const double microstep_mL = 1e-9 * static_cast<double>(controller_->microstep_pL());
+  RigStatus result{.state = std::string(wire::state_name(status.state)),
+                   .controller = status,
+                   .firmware = controller_->hello(),
+                   .position_mL = microstep_mL * status.position_microsteps,
+                   .port = rig_.controller.port,
+                   .instrument = instrument_->describe(),
+                   .settings_problem = problem_of(*controller_),
+                   .notice = {},
+                   .journals = {}};
+  const std::lock_guard lock(mutex_);
+  result.journals = journals_;
+  result.notice = notice_;
+  return last_status_ = result;
+}
+
+void RigService::beside_the_line(const std::function<void()>& work) {
+  auto done = std::async(std::launch::async, work);
+  while (!clock_->stands_still() && done.wait_for(std::chrono::seconds(0)) != std::future_status::ready) {
+    try {
+      idle_turn();
+    } catch (const std::exception& error) {
+      log_problem(error);
+    }
+  }
+  done.get();
+}
+
+}  // namespace diastole

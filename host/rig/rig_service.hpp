@@ -1,0 +1,156 @@
+#pragma once
+// The rig behind the daemon: one thread owns controller, instrument, clock and journal, and carries out one
+// order at a time (order_queue.hpp); everybody else talks to it through this class.
+//
+// start_run, home, jog, clear_fault and the like occupy the rig from the moment they are accepted (activity: loading,
+// running, writing, homing, clearing_fault) and are refused with RigBusy while another does. A stop
+// that is asked for after an order was accepted is obeyed by it, at whatever moment: before the start, the
+// order is refused.
+
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "host/acquisition/live_trace.hpp"
+#include "host/calibration/calibration.hpp"
+#include "host/config/experiment.hpp"
+#include "host/controller/controller_client.hpp"
+#include "host/daq/instrument.hpp"
+#include "host/journal/journal.hpp"
+#include "host/rig/order_queue.hpp"
+#include "host/rig/run_monitor.hpp"
+#include "host/rig/service_manager.hpp"
+
+namespace diastole {
+
+struct RigServiceOptions {
+  std::string conductor;                   ///< socket of a simulated rig that conducts time; empty: real time
+  std::optional<std::string> daq_address;  ///< instead of the rig file's
+  std::string producer = "diastole";       ///< program and version, for run files
+  ServiceManager* manager = nullptr;       ///< learns that the rig's thread is alive; outlives the service
+};
+
+/// Average the channels at rest and keep the result in the calibration file.
+struct CalibrationOrder {
+  std::vector<std::string> channels;  ///< empty: all
+  std::optional<double> kPa;          ///< the pressure that is applied; none: call this zero
+  double seconds = 5;
+  std::string operator_name;
+};
+
+struct RunOrder {
+  Experiment experiment;
+  bool prompts_answered = false;  ///< AcquisitionSetup::prompts_answered
+};
+
+struct SettingsChange {
+  bool defaults = false;  ///< begin with the initial ones
+  Attributes set;
+};
+
+class RigService {
+ public:
+  using Done = RigDone;
+
+  /// Opens controller and instrument. Throws HardwareError if one is not there; a controller with a latched fault is:
+  /// status shows it, and clear_fault leaves it.
+  RigService(RigConfig rig, const RigServiceOptions& options);
+  /// Ends a run by a controlled stop, writes what it has, and closes everything.
+  ~RigService();
+
+  /// Loads and starts an experiment. `done` is called with RunBegun when the controller has accepted it, or with
+  /// InputError when it cannot be done, HardwareError when it was stopped before the start.
+  void start_run(RunOrder order, Done done);
+  /// RigStatus, as the next two.
+  void home(Done done);
+  void clear_fault(Done done);
+  /// Relative, inflate positive; `done` when it is at rest again.
+  void jog(double distance_mL, double rate_mL_s, Done done);
+  /// SettingsReport. While the rig is occupied, as they were last read.
+  void settings(Done done);
+  /// `done` with what settings() then answers. The pump is unhomed afterwards.
+  void write_settings(SettingsChange change, Done done);
+  /// BlackBox. Throws RigBusy while the rig is occupied; does not occupy it.
+  void black_box(Done done);
+  /// CalibrationReport. HardwareError, and nothing changed, when samples are missing, or noise or drift is too high for
+  /// rest.
+  void calibrate(CalibrationOrder order, Done done);
+  /// RigStatus. While the rig is occupied the answer comes at once, from what the controller last reported.
+  void status(Done done);
+  /// Stops what moves or is about to; without anything, `false`.
+  bool stop(StopRequest how) { return queue_.stop(how); }
+  /// Stops now and takes no more orders; what is going on comes to its end. See idle().
+  void end() { queue_.end(); }
+  /// True when nothing is going on or waiting.
+  [[nodiscard]] bool idle() const { return queue_.idle(); }
+  /// Writes to the log, and while a run is on to its events.
+  void note(const RunRemark& what);
+  /// The present or last run.
+  [[nodiscard]] RunMonitor& run() { return run_; }
+  /// Its newest pressure.
+  [[nodiscard]] const LiveTrace& live() const { return live_; }
+
+ private:
+  void work(const std::stop_token& stop);
+  void idle_turn();
+  /// Once, not once a second.
+  void log_problem(const std::exception& error);
+  /// Runs `work` on a thread of no priority; the line to the controller stays alive meanwhile.
+  void beside_the_line(const std::function<void()>& work);
+  /// One order answers all who ask until it is carried out.
+  void ask(std::vector<Done>& askers, std::function<RigAnswer()> answer, Done done);
+  void carry_out(RigOrder order);
+  void reconnect_if_due();
+  /// Connects, and reports what was found: a motion that nobody ordered and that was stopped, a latched fault.
+  void connect();
+  void log_events();
+  RigStatus do_home();
+  RigStatus do_jog(double distance_mL, double rate_mL_s);
+  /// Waits while the controller is in this state, passing on a stop; true if one was asked for.
+  bool await_end_of(wire::State moving);
+  SettingsReport remember_settings();
+  CalibrationReport do_calibrate(const CalibrationOrder& order);
+  RigStatus do_status();
+  RigStatus remember(const wire::Status& status);
+  [[nodiscard]] bool asked_to_stop() const { return queue_.stop_asked() != StopRequest::none; }
+  [[noreturn]] void refuse_to_start() const;
+  /// Throws InputError if the journals' disk cannot hold the run.
+  void check_disk(const RunPlan& plan, const daq::RatePlan& rate, int64_t most_cycles);
+  /// Removes what need not be kept (journal_store.hpp) and counts the rest.
+  void tidy_journals();
+  void do_run(const RunOrder& order, const Done& done);
+  void write_beginning(JournalWriter& journal, const RunPlan& run, const Experiment& experiment,
+                       const ProgramPlan& plan, double sample_rate_Hz);
+  RunOutcome acquire(JournalWriter& journal, const RunOrder& order, const daq::RatePlan& rate,
+                     double planned_s);
+  RunResult finish(const std::filesystem::path& journal, const RunOutcome& outcome);
+
+  RigConfig rig_;
+  RigServiceOptions options_;
+  CalibrationBook book_;  // of the rig's thread
+  std::unique_ptr<Clock> clock_;
+  std::unique_ptr<daq::Instrument> instrument_;
+  std::unique_ptr<GateInputs> gate_;  // null: the rig file has no [gpio], or the rig is simulated
+  std::unique_ptr<ControllerClient> controller_;
+  uint64_t next_reconnect_ns_ = 0;
+  std::string last_problem_;  ///< of the rig's thread between orders: logged once, not once a second
+
+  OrderQueue queue_;
+  RunMonitor run_;
+  LiveTrace live_;
+
+  mutable InheritingMutex mutex_;  // of what follows
+  std::vector<Done> status_askers_, black_box_askers_;
+  RigStatus last_status_;
+  std::optional<std::string> notice_;  ///< as in status
+  KeptJournals journals_;
+  SettingsReport last_settings_;
+
+  std::jthread thread_;  // last: it uses the members above
+};
+
+}  // namespace diastole

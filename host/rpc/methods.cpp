@@ -1,0 +1,140 @@
+#include "host/rpc/methods.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "host/rpc/json_rpc.hpp"
+#include "host/rpc/rig_json.hpp"
+#include "protocol/contract/input_error.hpp"
+
+namespace diastole {
+namespace {
+
+using nlohmann::json;
+
+constexpr size_t most_experiment_bytes = 256U << 10;
+
+/// A count in `params`, 0 without it. Of others the conversion to an unsigned integer is not defined.
+uint64_t whole_in(const json& params, const char* name) {
+  const auto found = params.find(name);
+  if (found == params.end()) return 0;
+  if (!found->is_number_unsigned()) {
+    throw rpc::Error(rpc::Code::invalid_params, fmt::format("{} must be a whole number from 0", name));
+  }
+  return found->get<uint64_t>();
+}
+
+double number_in(const json& params, const char* name) {
+  const auto found = params.find(name);
+  if (found == params.end() || !found->is_number() || !std::isfinite(found->get<double>())) {
+    throw rpc::Error(rpc::Code::invalid_params, fmt::format("{} must be a number", name));
+  }
+  return found->get<double>();
+}
+
+/// Passes the rig's answer on as JSON.
+RigDone to(Reply reply) {
+  return [reply = std::move(reply)](const std::exception_ptr& error, const RigAnswer& answer) {
+    reply(error, error ? json() : as_json(answer));
+  };
+}
+
+void rig_status(RigService& rig, const json&, const Reply& reply) { rig.status(to(reply)); }
+void rig_home(RigService& rig, const json&, const Reply& reply) { rig.home(to(reply)); }
+void rig_clear_fault(RigService& rig, const json&, const Reply& reply) { rig.clear_fault(to(reply)); }
+void rig_settings(RigService& rig, const json&, const Reply& reply) { rig.settings(to(reply)); }
+void rig_black_box(RigService& rig, const json&, const Reply& reply) { rig.black_box(to(reply)); }
+
+void rig_jog(RigService& rig, const json& params, const Reply& reply) {
+  rig.jog(number_in(params, "mL"), number_in(params, "rate_mL_s"), to(reply));
+}
+void rig_write_settings(RigService& rig, const json& params, const Reply& reply) {
+  rig.write_settings({params.value("defaults", false), settings_in(params.value("set", json::object()))},
+                     to(reply));
+}
+
+CalibrationOrder measurement_in(const json& params) {
+  CalibrationOrder order;
+  order.channels = params.value("channels", std::vector<std::string>{});
+  if (params.contains("seconds")) order.seconds = number_in(params, "seconds");
+  order.operator_name = params.value("operator", "");
+  if (!(order.seconds >= 1 && order.seconds <= 600)) {
+    throw rpc::Error(rpc::Code::invalid_params, "seconds must be 1 to 600");
+  }
+  return order;
+}
+
+void rig_zero(RigService& rig, const json& params, const Reply& reply) {
+  rig.calibrate(measurement_in(params), to(reply));
+}
+
+void rig_calibrate(RigService& rig, const json& params, const Reply& reply) {
+  CalibrationOrder order = measurement_in(params);
+  order.kPa = number_in(params, "kPa");
+  if (order.channels.size() != 1)
+    throw rpc::Error(rpc::Code::invalid_params, "channels must name one channel");
+  rig.calibrate(std::move(order), to(reply));
+}
+
+void run_start(RigService& rig, const json& params, const Reply& reply) {
+  const std::string text = params.at("experiment");
+  if (text.size() > most_experiment_bytes) {
+    throw rpc::Error(rpc::Code::invalid_params, "the experiment is too long");
+  }
+  const json points = params.value("points", json::object());
+  const auto read_points = [&](const std::string& name) -> std::string {
+    if (const auto found = points.find(name); found != points.end()) return *found;
+    throw InputError({name, "", "was not sent with the experiment", "Send its text in `points`."});
+  };
+  rig.start_run({parse_experiment(text, params.value("file", "experiment"), read_points),
+                 params.value("prompts_answered", false)},
+                to(reply));
+}
+
+void run_progress(RigService& rig, const json& params, const Reply& reply) {
+  reply(nullptr, as_json(rig.run().state(whole_in(params, "first_remark"))));
+}
+
+void run_trace(RigService& rig, const json& params, const Reply& reply) {
+  reply(nullptr, as_json(rig.live().since(params.value("run_id", ""), whole_in(params, "first_row"),
+                                          whole_in(params, "first_trigger"))));
+}
+
+void run_stop(RigService& rig, const json& params, const Reply& reply) {
+  const std::string how = params.value("how", "now");
+  if (how != "now" && how != "cycle_end" && how != "halt") {
+    throw rpc::Error(rpc::Code::invalid_params, "how must be \"cycle_end\", \"now\" or \"halt\"");
+  }
+  const StopRequest request = how == "halt"  ? StopRequest::halt
+                              : how == "now" ? StopRequest::now
+                                             : StopRequest::at_cycle_end;
+  reply(nullptr, {{"stopping", rig.stop(request)}});
+}
+
+/// Anybody's: it moves nothing, it only says which cycles are imaged, and the operator may sit at another terminal.
+void run_continue(RigService& rig, const json& params, const Reply& reply) {
+  std::optional<size_t> slice;
+  if (params.contains("slice")) slice = whole_in(params, "slice");
+  reply(nullptr, as_json(rig.run().go_on(slice)));
+}
+
+constexpr std::array all_methods{
+#define DIASTOLE_METHOD(name, access, function) Method{name, Access::access, function},
+#include "host/rpc/method_list.inc"
+#undef DIASTOLE_METHOD
+};
+
+}  // namespace
+
+std::span<const Method> methods() { return all_methods; }
+
+const Method* find_method(std::string_view name) {
+  const auto* found = std::find_if(all_methods.begin(), all_methods.end(),
+                                   [&](const Method& each) { return each.name == name; });
+  return found == all_methods.end() ? nullptr : found;
+}
+
+}  // namespace diastole

@@ -1,0 +1,205 @@
+#include "host/rpc/rig_json.hpp"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "host/controller/black_box_text.hpp"
+#include "protocol/contract/input_error.hpp"
+#include "protocol/wire/wire_text.hpp"
+
+namespace diastole {
+namespace {
+
+using nlohmann::json;
+
+json or_null(const auto& value) { return value ? json(*value) : json(); }
+
+json array_of(const auto& values, auto as_element) {
+  json array = json::array();
+  for (const auto& each : values)
+    array.push_back(as_element(each));
+  return array;
+}
+
+/// Names of the bits that are set in wire::Status::inputs; an input is active when pressed, closed or unplugged.
+json active_inputs(uint8_t bits) {
+  constexpr std::array names{"estop", "home", "far_limit"};
+  json active = json::array();
+  for (size_t i = 0; i < names.size(); ++i)
+    if ((bits >> i & 1U) != 0) active.push_back(names[i]);
+  return active;
+}
+
+json object_of(const KeptJournals& journals) {
+  return {{"directory", journals.directory},
+          {"count", journals.count},
+          {"bytes", journals.bytes},
+          {"without_run_file", journals.without_run_file},
+          {"keep_days", journals.keep_days}};
+}
+
+json object_of(const RigStatus& status) {
+  const wire::Status& controller = status.controller;
+  const wire::Fault fault = controller.fault;
+  const wire::Hello& firmware = status.firmware;
+  json object{
+      {"state", status.state},
+      {"fault", fault == wire::Fault::none ? json() : json(wire::fault_name(fault))},
+      {"fault_number", static_cast<int>(fault)},
+      {"fault_text", wire::fault_explanation(fault)},
+      {"remedy", wire::fault_remedy(fault)},
+      {"firmware",
+       fmt::format("{}.{}.{}", firmware.version_major, firmware.version_minor, firmware.version_patch)},
+      {"board", firmware.board_id},
+      {"boot_id", firmware.boot_id},
+      {"position_mL", status.position_mL},
+      {"inputs", active_inputs(controller.inputs)},
+      {"motor_powered", (controller.inputs & 8U) != 0},
+      {"segment", controller.segment},
+      {"cycles", controller.cycle},
+      {"triggers", controller.triggers},
+      {"r_waves", controller.r_waves},
+      {"steps", controller.steps},
+      {"link", {{"crc_errors", controller.crc_errors}, {"retransmissions", controller.retransmissions}}},
+      {"settings_problem", or_null(status.settings_problem)},
+      {"controller", status.port},
+      {"instrument", status.instrument},
+      {"journals", object_of(status.journals)},
+      {"notice", or_null(status.notice)}};
+  if (!status.run_id.empty()) object["run_id"] = status.run_id;
+  if (status.jog) {
+    object["jogged_mL"] = status.jog->jogged_mL;
+    object["stopped"] = status.jog->stopped;
+  }
+  return object;
+}
+
+json object_of(const SettingsReport& report) {
+  json settings = json::object();
+  for (const auto& [name, value] : report.settings)
+    std::visit([&settings, &at = name](const auto& v) { settings[at] = v; }, value);
+  return {{"record", report.record},
+          {"settings", settings},
+          {"microstep_uL", report.microstep_uL},
+          {"backlash_microsteps", report.backlash_microsteps},
+          {"problem", or_null(report.problem)}};
+}
+
+json object_of(const BlackBox& box) {
+  const auto entry = [&](const wire::BlackBoxEntry& each) -> json {
+    return {{"number", each.number},
+            {"boot", each.boot},
+            {"time_s", static_cast<double>(each.tick) / box.tick_rate_Hz},
+            {"kind", wire::noted_name(each.kind)},
+            {"text", in_words(each)}};
+  };
+  const bool since_power_on = !box.entries.empty() && box.entries.front().number == 1;
+  return {{"entries", array_of(box.entries, entry)}, {"since_power_on", since_power_on}};
+}
+
+json object_of(const CalibrationReport& report) {
+  const auto channel = [](const ChannelReading& each) -> json {
+    return {{"name", each.name},           {"samples", each.samples},     {"mean_V", each.mean_V},
+            {"noise_kPa", each.noise_kPa}, {"drift_kPa", each.drift_kPa}, {"points", each.points},
+            {"kPa_per_V", each.kPa_per_V}, {"zero_V", each.zero_V}};
+  };
+  return {{"file", report.file}, {"channels", array_of(report.channels, channel)}};
+}
+
+json object_of(const RunBegun& run) {
+  return {{"run_id", run.run_id}, {"journal", run.journal}, {"run_file", run.run_file}};
+}
+
+json object_of(const RunResult& result) {
+  if (result.run_file.empty())
+    return {{"end", result.end}, {"problem", result.problem}, {"journal", result.journal}};
+  return {{"end", result.end},           {"regular", result.regular}, {"journal", result.journal},
+          {"run_file", result.run_file}, {"cycles", result.cycles},   {"triggers", result.triggers},
+          {"samples", result.samples},   {"gaps", result.gaps},       {"errors", result.errors},
+          {"expected", result.expected}};
+}
+
+json object_of(const ScheduleProgress& schedule) {
+  return {{"block", schedule.block},
+          {"slice", schedule.slice},
+          {"slices", schedule.slices},
+          {"phase", schedule.phase},
+          {"cycles_left", schedule.cycles_left},
+          {"prompt", schedule.prompt}};
+}
+
+json object_of(const RemarkLog::Entry& entry) {
+  return {{"number", entry.number},
+          {"utc", entry.utc},
+          {"level", entry.remark.level},
+          {"code", entry.remark.code},
+          {"text", entry.remark.text}};
+}
+
+json rounded(double value) {
+  if (std::isnan(value)) return nullptr;
+  return std::round(1e4 * value) / 1e4;
+}
+
+}  // namespace
+
+json as_json(const RigAnswer& answer) {
+  return std::visit([](const auto& each) { return object_of(each); }, answer);
+}
+
+json as_json(const std::optional<RunState>& run) {
+  if (!run) return nullptr;
+  const RunProgress& progress = run->progress;
+  return {{"run_id", run->plan.run_id},
+          {"state", run->state},
+          {"planned_s", run->plan.estimate_s},
+          {"planned_cycles", run->plan.planned_cycles},
+          {"received", progress.received},
+          {"missing", progress.missing},
+          {"triggers", progress.triggers},
+          {"gate_pulses", or_null(progress.gate_pulses)},
+          {"last_kPa", progress.last_kPa},
+          {"filtered_kPa", progress.filtered_kPa},
+          {"schedule", progress.schedule ? object_of(*progress.schedule) : json()},
+          {"remarks", array_of(run->remarks.remarks, [](const auto& each) { return object_of(each); })},
+          {"next_remark", run->remarks.next},
+          {"result", run->result ? object_of(*run->result) : json()}};
+}
+
+json as_json(const LiveTrace::Excerpt& excerpt) {
+  const auto column = [&](double LiveTrace::Row::*member) {
+    return array_of(excerpt.rows, [&](const LiveTrace::Row& row) { return rounded(row.*member); });
+  };
+  return {{"run_id", excerpt.run_id},
+          {"first_row", excerpt.first_row},
+          {"time_s", column(&LiveTrace::Row::time_s)},
+          {"kPa", column(&LiveTrace::Row::kPa)},
+          {"filtered_kPa", column(&LiveTrace::Row::filtered_kPa)},
+          {"first_trigger", excerpt.first_trigger},
+          {"trigger_s", array_of(excerpt.trigger_s, rounded)}};
+}
+
+json as_json(const std::optional<ContinuedSlice>& continued) {
+  if (!continued) return {{"continued", false}};
+  return {{"continued", true}, {"slice", continued->slice}, {"prompt", continued->prompt}};
+}
+
+Attributes settings_in(const json& object) {
+  Attributes values;
+  for (const auto& [name, value] : object.items()) {
+    if (value.is_string()) {
+      values[name] = value.get<std::string>();
+    } else if (value.is_number()) {
+      values[name] = value.get<double>();
+    } else {
+      throw InputError({"controller settings", name, value.dump() + " is no number",
+                        "Give a number, or a text in quotes."});
+    }
+  }
+  return values;
+}
+
+}  // namespace diastole

@@ -1,0 +1,64 @@
+#pragma once
+// The daemon's socket: JSON-RPC 2.0, one JSON object a line (json_rpc.hpp).
+//
+//   method          params                          who           result
+//   rig.status                                      anybody       RigService::status, and who controls the rig
+//   run.progress    {first_remark}                  anybody       RigService::run_progress
+//   run.stop        {how: "cycle_end"|"now"|"halt"} anybody       {stopping}
+//   run.start       {experiment, file, points, prompts_answered}
+//                                                   controller    {run_id, journal, run_file}
+//   rig.home                                        controller    status
+//   rig.zero        {channels, seconds, operator}   controller    RigService::calibrate; no channels: all
+//   rig.calibrate   {channels: [one], kPa, seconds, operator}
+//                                                   controller    the same
+//   rig.clear_fault                                 controller    status
+//   rig.jog         {mL, rate_mL_s}                 controller    status, and jogged_mL
+//   rig.settings                                    anybody       RigService::settings
+//   rig.write_settings {set: {name: value}, defaults} controller  RigService::settings
+//   rig.black_box                                   anybody       RigService::black_box
+//   run.trace       {run_id, first_row, first_trigger}
+//                                                   anybody       {run_id, first_row, time_s, kPa, filtered_kPa,
+//                                                                  first_trigger, trigger_s}: columns, as
+//                                                                  LiveTrace::since; null: a sample is missing
+//   control.take    {take_over: who holds it}       controller    {user, uid, pid, own}, or {user, console, own}
+//   control.release                                 anybody       {}
+//   console.sign_in {name}                          consoles      {user, console}
+//   console.address                                 who may control, at the socket
+//                                                                 {control, watch}: addresses with tokens; or null
+//
+// The web console speaks the same in text messages of a WebSocket (host/web/console.hpp); these rules hold for both.
+//
+// Who may control: root, the user that runs the daemon, and the members of [daemon] control_group
+// (SO_PEERCRED, SO_PEERGROUPS); all others observe and may stop. The first connection that gives an order
+// holds the control until it releases it or closes, or until another takes it over by naming the holder
+// (control_lease.hpp); a takeover is an event of the log and of the run.
+//
+// `points` holds the text of each points file that the experiment names: {name: text}. With `prompts_answered` the
+// operator is waited for nowhere.
+//
+// No client costs the rig anything (connection.hpp): a line is bounded, and so are the answers that a client
+// leaves unread, its requests a second and the time for a line; beyond most_connections the one that has said
+// nothing for longest gives way.
+
+#include <memory>
+#include <string>
+
+namespace diastole {
+
+struct RpcState;
+
+class RpcServer {
+ public:
+  static constexpr size_t most_connections = 128;
+
+  /// Listens at `socket`; a socket left behind by a dead daemon is replaced. Throws HardwareError if another
+  /// daemon listens there or the path cannot be used.
+  RpcServer(std::shared_ptr<RpcState> rpc_state, const std::string& socket);
+  ~RpcServer();
+
+ private:
+  class Listener;
+  std::shared_ptr<Listener> listener_;
+};
+
+}  // namespace diastole
