@@ -2,11 +2,11 @@
 
 #include <algorithm>
 #include <cstdlib>
-#include <iostream>
 #include <memory>
 #include <set>
 
 #include "host/cli/bin_output.hpp"
+#include "host/cli/daemon_question.hpp"
 #include "host/cli/host_commands.hpp"
 #include "host/cli/text_file.hpp"
 #include "host/config/schedule.hpp"
@@ -134,11 +134,7 @@ ExitCode bin(BinOptions options, const CommandOutput& out) {
   if (!options.frames_csv.empty()) {
     write_text_file(options.frames_csv, frames_csv(bins, resolution_kPa(run), options.relative));
   }
-  if (out.json) {
-    std::cout << bins_as_json(options.run, bins, delay).dump(2) << '\n';
-  } else {
-    show_bins(bins, delay);
-  }
+  print(out, bins_as_json(options.run, bins, delay), [&] { show_bins(bins, delay); });
   return ExitCode::done;
 }
 

@@ -3,10 +3,10 @@
 #include <fmt/format.h>
 
 #include <cstdlib>
-#include <iostream>
 #include <memory>
+#include <nlohmann/json.hpp>
 
-#include "host/cli/daemon_address.hpp"
+#include "host/cli/daemon_question.hpp"
 #include "host/cli/host_commands.hpp"
 #include "host/rpc/client.hpp"
 
@@ -44,7 +44,7 @@ ExitCode measure(const MeasurementOptions& options, const std::string& method, j
   DaemonClient daemon = options.daemon.connect();
   const json result = daemon.call(method, params, patience);
   if (as_json) {
-    std::cout << result.dump(2) << '\n';
+    print_json(result);
     return ExitCode::done;
   }
   for (const json& channel : result.at("channels")) {

@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <cctype>
 #include <filesystem>
-#include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "host/cli/daemon_question.hpp"
 #include "host/cli/host_commands.hpp"
 #include "host/cli/text_file.hpp"
 #include "host/runfile/bids_export.hpp"
@@ -61,16 +61,13 @@ ExitCode export_run(const ExportOptions& options, const CommandOutput& out) {
   const BidsRecording recording = bids_recording(run);
   write_text_file(table, gzip(recording.table));
   write_text_file(description, recording.description.dump(2) + "\n");
-  if (out.json) {
-    const nlohmann::json document{{"run", options.run.string()},
-                                  {"table", table.string()},
-                                  {"description", description.string()},
-                                  {"columns", recording.description.at("Columns")},
-                                  {"rows", run.pressure.time_s.size()}};
-    std::cout << document.dump(2) << '\n';
-  } else {
-    fmt::print("{}\n{}\n", table.string(), description.string());
-  }
+  print(out,
+        {{"run", options.run.string()},
+         {"table", table.string()},
+         {"description", description.string()},
+         {"columns", recording.description.at("Columns")},
+         {"rows", run.pressure.time_s.size()}},
+        [&] { fmt::print("{}\n{}\n", table.string(), description.string()); });
   return ExitCode::done;
 }
 

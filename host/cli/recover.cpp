@@ -1,14 +1,14 @@
 #include <fmt/format.h>
 
 #include <filesystem>
-#include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
 
-#include "host/journal/journal_store.hpp"
+#include "host/cli/daemon_question.hpp"
 #include "host/cli/host_commands.hpp"
-#include "host/runfile/assemble.hpp"
+#include "host/journal/journal_store.hpp"
 #include "host/journal/parsed_journal.hpp"
+#include "host/runfile/assemble.hpp"
 #include "host/runfile/output_guard.hpp"
 #include "host/runfile/writer.hpp"
 #include "protocol/contract/input_error.hpp"
@@ -23,23 +23,23 @@ struct RecoverOptions {
   bool list = false;
 };
 
-/// What `diastole recover --list` tells of one journal.
+/// What `diastole recover --list` shows of one journal.
 nlohmann::json describe(const StoredJournal& stored) {
-  nlohmann::json told{{"journal", stored.file.string()},
-                      {"bytes", stored.bytes},
-                      {"run_file", nullptr},
-                      {"started_utc", nullptr},
-                      {"complete", false}};
-  if (stored.has_run_file) told["run_file"] = run_file_beside(stored.file).string();
+  nlohmann::json summary{{"journal", stored.file.string()},
+                         {"bytes", stored.bytes},
+                         {"run_file", nullptr},
+                         {"started_utc", nullptr},
+                         {"complete", false}};
+  if (stored.has_run_file) summary["run_file"] = run_file_beside(stored.file).string();
   try {
     const ParsedJournal parsed = parse_journal(JournalRecords(stored.file));
-    told["started_utc"] = parsed.begin.started_utc;
-    told["experiment"] = parsed.begin.experiment_file;
-    told["complete"] = parsed.closed;
+    summary["started_utc"] = parsed.begin.started_utc;
+    summary["experiment"] = parsed.begin.experiment_file;
+    summary["complete"] = parsed.closed;
   } catch (const InputError& error) {
-    told["problem"] = error.fault().problem;
+    summary["problem"] = error.fault().problem;
   }
-  return told;
+  return summary;
 }
 
 ExitCode list(const std::string& directory, const CommandOutput& out) {
@@ -51,7 +51,7 @@ ExitCode list(const std::string& directory, const CommandOutput& out) {
   for (const StoredJournal& stored : stored_journals(directory))
     journals.push_back(describe(stored));
   if (out.json) {
-    std::cout << nlohmann::json{{"directory", directory}, {"journals", journals}}.dump(2) << '\n';
+    print_json({{"directory", directory}, {"journals", journals}});
     return ExitCode::done;
   }
   for (const nlohmann::json& journal : journals) {
@@ -68,16 +68,10 @@ ExitCode list(const std::string& directory, const CommandOutput& out) {
   return ExitCode::done;
 }
 
-ExitCode tell_nothing(const NothingRecorded& nothing, const CommandOutput& out) {
+ExitCode report_nothing(const NothingRecorded& nothing, const CommandOutput& out) {
   fmt::print(stderr, "{}\n", nothing.what());
-  if (out.json) {
-    std::cout << nlohmann::json{{"run", nullptr},
-                                {"recovered_samples", 0},
-                                {"lost_samples", 0},
-                                {"complete", false}}
-                     .dump(2)
-              << '\n';
-  }
+  if (out.json)
+    print_json({{"run", nullptr}, {"recovered_samples", 0}, {"lost_samples", 0}, {"complete", false}});
   return ExitCode::negative;
 }
 
@@ -95,24 +89,22 @@ ExitCode recover(const RecoverOptions& options, const CommandOutput& out) {
     if (!remark.empty()) fmt::print(stderr, "{}\n", remark);
     assembled = run.assembled;
   } catch (const NothingRecorded& nothing) {
-    return tell_nothing(nothing, out);
+    return report_nothing(nothing, out);
   }
   const JournalDamage& damage = assembled.damage;
   const bool whole = assembled.ended_in_order && assembled.samples_missing == 0 && damage.records_lost == 0;
-  if (out.json) {
-    const nlohmann::json document{{"run", options.output},
-                                  {"recovered_samples", assembled.samples_received},
-                                  {"lost_samples", assembled.samples_missing},
-                                  {"lost_records", damage.records_lost},
-                                  {"torn_tail_bytes", damage.torn_tail_bytes},
-                                  {"damaged_bytes", damage.damaged_bytes},
-                                  {"complete", assembled.ended_in_order}};
-    std::cout << document.dump(2) << '\n';
-  } else {
+  const nlohmann::json document{{"run", options.output},
+                                {"recovered_samples", assembled.samples_received},
+                                {"lost_samples", assembled.samples_missing},
+                                {"lost_records", damage.records_lost},
+                                {"torn_tail_bytes", damage.torn_tail_bytes},
+                                {"damaged_bytes", damage.damaged_bytes},
+                                {"complete", assembled.ended_in_order}};
+  print(out, document, [&] {
     fmt::print("{}: {} samples recovered, {} lost{}\n", options.output, assembled.samples_received,
                assembled.samples_missing,
                assembled.ended_in_order ? "" : "; the recording broke off before the run's end");
-  }
+  });
   return whole ? ExitCode::done : ExitCode::negative;
 }
 

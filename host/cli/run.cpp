@@ -7,10 +7,10 @@
 #include <chrono>
 #include <csignal>
 #include <cstdio>
-#include <iostream>
 #include <memory>
+#include <nlohmann/json.hpp>
 
-#include "host/cli/daemon_address.hpp"
+#include "host/cli/daemon_question.hpp"
 #include "host/cli/host_commands.hpp"
 #include "host/cli/schedule_text.hpp"
 #include "host/cli/session_view.hpp"
@@ -41,18 +41,14 @@ int lines_entered() {
   return entered;
 }
 
-ExitCode show_plan(const Experiment& experiment, bool json) {
-  if (json) {
-    std::cout << plan_json(experiment).dump(2) << '\n';
-  } else {
-    fmt::print("{}", plan_words(experiment));
-  }
+ExitCode show_plan(const Experiment& experiment, const CommandOutput& out) {
+  print(out, plan_json(experiment), [&] { fmt::print("{}", plan_words(experiment)); });
   return ExitCode::done;
 }
 
 ExitCode run(RunOptions options, const CommandOutput& out) {
   const Experiment experiment = read_experiment(options.session.experiment);
-  if (options.dry_run) return show_plan(experiment, out.json);
+  if (options.dry_run) return show_plan(experiment, out);
   if (options.session.output.empty()) {
     throw InputError({"", "-o", "is missing", "Name the run file to write, for example -o session.run.h5."});
   }

@@ -1,12 +1,12 @@
 #include <fmt/format.h>
 
 #include <cmath>
-#include <iostream>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
-#include "host/cli/daemon_address.hpp"
+#include "host/cli/daemon_question.hpp"
 #include "host/cli/host_commands.hpp"
 #include "host/controller/settings_values.hpp"
 #include "host/rpc/client.hpp"
@@ -50,36 +50,33 @@ json calibration(const json& in_force, const std::vector<double>& pair_mL) {
   return std::round(1e6 * (before * measured_mL / commanded_mL - 1));
 }
 
-void show(const json& told) {
-  const json& settings = told.at("settings");
+void show(const json& report) {
+  const json& settings = report.at("settings");
   for (const SettingWords& words : setting_words())
     fmt::print("{:<18} {:<10}  {}\n", words.name, settings.at(words.name).dump(), words.explanation);
   fmt::print("{:<18} {:<10}  {}\n", "board_name", settings.at("board_name").get<std::string>(),
              "for people; goes into every run file");
   fmt::print("one microstep is {:.6f} uL; the backlash {} microsteps\n",
-             told.at("microstep_uL").get<double>(), told.at("backlash_microsteps").get<int>());
-  const int record = told.at("record");
+             report.at("microstep_uL").get<double>(), report.at("backlash_microsteps").get<int>());
+  const int record = report.at("record");
   if (record == 0)
     fmt::print(
         "none were ever written to this controller: these are the initial ones, and the rig file alone "
         "counts\n");
   else
     fmt::print("record {} in the controller's flash\n", record);
-  if (!told.at("problem").is_null()) fmt::print("\n{}\n", told.at("problem").get<std::string>());
+  if (!report.at("problem").is_null()) fmt::print("\n{}\n", report.at("problem").get<std::string>());
 }
 
 ExitCode run(const SettingsOptions& options, const CommandOutput& out) {
   DaemonClient client = options.daemon.connect();
   json changes = parse_changes(options.set);
-  json told = client.call("rig.settings");
-  if (!options.calibrate_mL.empty()) changes["calibration_ppm"] = calibration(told, options.calibrate_mL);
+  json report = client.call("rig.settings");
+  if (!options.calibrate_mL.empty()) changes["calibration_ppm"] = calibration(report, options.calibrate_mL);
   if (options.defaults || !changes.empty())
-    told = client.call("rig.write_settings", {{"set", changes}, {"defaults", options.defaults}});
-  if (out.json)
-    std::cout << told.dump(2) << '\n';
-  else
-    show(told);
-  return told.at("problem").is_null() ? ExitCode::done : ExitCode::negative;
+    report = client.call("rig.write_settings", {{"set", changes}, {"defaults", options.defaults}});
+  print(out, report, [&] { show(report); });
+  return report.at("problem").is_null() ? ExitCode::done : ExitCode::negative;
 }
 
 }  // namespace

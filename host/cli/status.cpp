@@ -1,12 +1,13 @@
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <cmath>
 #include <cstdio>
-#include <iostream>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <thread>
 
-#include "host/cli/daemon_address.hpp"
+#include "host/cli/daemon_question.hpp"
 #include "host/cli/host_commands.hpp"
 #include "host/rpc/client.hpp"
 #include "protocol/contract/input_error.hpp"
@@ -30,75 +31,59 @@ void show_journals(const nlohmann::json& journals) {
   }
 }
 
-void show_status(const nlohmann::json& status, bool as_json) {
-  if (as_json) {
-    std::cout << status.dump(2) << '\n';
-    return;
+void show_status(const nlohmann::json& status) {
+  const auto text = [&](const char* key) { return status.at(key).get<std::string>(); };
+  const auto count = [&](const char* key) { return status.at(key).get<int64_t>(); };
+  const auto known = [&](const char* key) { return status.contains(key) && !status.at(key).is_null(); };
+  fmt::print("state     {}\n", text("state"));
+  if (known("fault")) {
+    fmt::print("fault     {} {}: {}\n          {}\n", count("fault_number"), text("fault"),
+               text("fault_text"), text("remedy"));
   }
-  fmt::print("state     {}\n", status.at("state").get<std::string>());
-  if (!status.at("fault").is_null()) {
-    fmt::print("fault     {} {}: {}\n          {}\n", status.at("fault_number").get<int>(),
-               status.at("fault").get<std::string>(), status.at("fault_text").get<std::string>(),
-               status.at("remedy").get<std::string>());
-  }
-  if (const nlohmann::json notice = status.value("notice", nlohmann::json()); !notice.is_null())
-    fmt::print("notice    {}\n", notice.get<std::string>());
-  const bool known = status.at("state") != "unhomed";
+  if (known("notice")) fmt::print("notice    {}\n", text("notice"));
   fmt::print("position  {:.3f} mL{}\n", status.at("position_mL").get<double>(),
-             known ? "" : ", counted from where it was switched on or lost its place");
+             text("state") != "unhomed" ? "" : ", counted from where it was switched on or lost its place");
   fmt::print(
       "counted   {} cycles of this run; {} triggers, {} R-waves, {} steps since the controller's reset\n",
-      status.at("cycles").get<int64_t>(), status.at("triggers").get<int64_t>(),
-      status.at("r_waves").get<int64_t>(), status.at("steps").get<int64_t>());
-  if (const nlohmann::json problem = status.value("settings_problem", nlohmann::json()); !problem.is_null())
-    fmt::print("settings  {}\n", problem.get<std::string>());
-  if (const nlohmann::json control = status.value("control", nlohmann::json()); !control.is_null()) {
+      count("cycles"), count("triggers"), count("r_waves"), count("steps"));
+  if (known("settings_problem")) fmt::print("settings  {}\n", text("settings_problem"));
+  if (known("control")) {
+    const nlohmann::json& control = status.at("control");
     fmt::print("control   {} ({})\n", control.at("user").get<std::string>(),
                control.contains("console") ? "console at " + control.at("console").get<std::string>()
                                            : fmt::format("process {}", control.at("pid").get<int64_t>()));
   }
-  fmt::print("firmware  {} at {}\n", status.at("firmware").get<std::string>(),
-             status.at("controller").get<std::string>());
-  fmt::print("pressure  {}\n", status.at("instrument").get<std::string>());
-  std::string inputs;
-  for (const nlohmann::json& input : status.at("inputs"))
-    inputs += (inputs.empty() ? "" : ", ") + input.get<std::string>();
-  fmt::print("inputs    {}; motor {}\n", inputs.empty() ? "none active" : inputs + " active",
+  fmt::print("firmware  {} at {}\n", text("firmware"), text("controller"));
+  fmt::print("pressure  {}\n", text("instrument"));
+  const auto inputs = status.at("inputs").get<std::vector<std::string>>();
+  fmt::print("inputs    {}; motor {}\n",
+             inputs.empty() ? "none active" : fmt::format("{} active", fmt::join(inputs, ", ")),
              status.at("motor_powered").get<bool>() ? "powered" : "off");
-  if (const nlohmann::json journals = status.value("journals", nlohmann::json()); !journals.is_null()) {
-    show_journals(journals);
-  }
-}
-
-/// A command that asks the daemon one question and shows the rig's state.
-void add_question(CommandLine& line, const std::string& name, const std::string& purpose,
-                  const std::string& examples, const std::string& method, std::chrono::seconds patience) {
-  auto daemon = std::make_shared<DaemonAddress>();
-  CLI::App* command = line.add(name, purpose, examples);
-  daemon->add_to(*command);
-  if (method != "rig.status") daemon->add_take_over_to(*command);
-  line.on_run(command, [daemon, method, patience](const CommandOutput& out) {
-    DaemonClient client = daemon->connect();
-    show_status(client.call(method, nlohmann::json::object(), patience), out.json);
-    return ExitCode::done;
-  });
+  if (known("journals")) show_journals(status.at("journals"));
 }
 
 }  // namespace
 
 void add_status(CommandLine& line) {
-  add_question(line, "status", "the rig's state",
-               "  diastole status\n"
-               "      state, fault in plain words with its remedy, position, firmware\n"
-               "  diastole status --json --socket /run/diastole.sock",
-               "rig.status", std::chrono::seconds(30));
+  add_question(line, {.command = "status",
+                      .purpose = "the rig's state",
+                      .examples = "  diastole status\n"
+                                  "      state, fault in plain words with its remedy, position, firmware\n"
+                                  "  diastole status --json --socket /run/diastole.sock",
+                      .method = "rig.status",
+                      .show = show_status});
 }
 
 void add_home(CommandLine& line) {
-  add_question(line, "home", "find the home switch; a pump that was switched on needs it before a run",
-               "  diastole home\n"
-               "      withdraws slowly to the switch, calls that place 0 mL, and returns when done",
-               "rig.home", homing_patience);
+  add_question(
+      line, {.command = "home",
+             .purpose = "find the home switch; a pump that was switched on needs it before a run",
+             .examples = "  diastole home\n"
+                         "      withdraws slowly to the switch, calls that place 0 mL, and returns when done",
+             .method = "rig.home",
+             .show = show_status,
+             .gives_order = true,
+             .patience = homing_patience});
 }
 
 void add_clear_fault(CommandLine& line) {
@@ -117,7 +102,7 @@ void add_clear_fault(CommandLine& line) {
     const bool faulted = !status.at("fault").is_null();
     if (faulted) status = client.call("rig.clear_fault");
     if (!faulted && !out.json) fmt::print("fault     none is latched: nothing to clear\n");
-    show_status(status, out.json);
+    print(out, status, [&] { show_status(status); });
     return ExitCode::done;
   });
 }
@@ -152,7 +137,7 @@ void add_jog(CommandLine& line) {
       fmt::print("jogged    {:+.3f} mL{}\n", status.at("jogged_mL").get<double>(),
                  status.at("stopped").get<bool>() ? ", stopped on request" : "");
     }
-    show_status(status, out.json);
+    print(out, status, [&] { show_status(status); });
     return status.at("stopped").get<bool>() ? ExitCode::negative : ExitCode::done;
   });
 }
@@ -190,7 +175,7 @@ void add_stop(CommandLine& line) {
       status = client.call("rig.status");
     }
     status["stopping"] = stopping;
-    show_status(status, out.json);
+    print(out, status, [&] { show_status(status); });
     return ExitCode::done;
   });
 }

@@ -18,12 +18,15 @@ constexpr double highest_rate_Hz = 1e12;
 class FieldWriter {
  public:
   explicit FieldWriter(json& object) : object_(object) {}
-  void field(const char* name, const auto& value) { object_[name] = value; }
-  void whole(const char* name, const auto& value, uint64_t /*most*/) { object_[name] = value; }
-  void rate(const char* name, double value_Hz) { object_[name] = value_Hz; }
+  void fields() {}
+  void fields(const char* name, const auto& value, auto&... more) {
+    object_[name] = value;
+    fields(more...);
+  }
+  void whole(uint64_t /*most*/, auto&... named) { fields(named...); }
+  void later(auto&... named) { fields(named...); }
   void integer(const char* name, double value, double /*least*/) { object_[name] = std::llround(value); }
-  void later(const char* name, const auto& value) { object_[name] = value; }
-  void later_whole(const char* name, const auto& value, uint64_t /*most*/) { object_[name] = value; }
+  void rate(const char* name, double value_Hz) { object_[name] = value_Hz; }
   void if_known(const char* name, const std::optional<uint64_t>& value) {
     if (value) object_[name] = *value;
   }
@@ -40,7 +43,6 @@ class FieldWriter {
       describe(writer, part);
     }
   }
-  void later_parts(const char* name, auto& value) { parts(name, value); }
 
  private:
   json& object_;
@@ -50,27 +52,34 @@ class FieldWriter {
 class FieldReader {
  public:
   explicit FieldReader(const json& object) : object_(object) {}
-  void field(const char* name, auto& value) { object_.at(name).get_to(value); }
+  void fields() {}
+  void fields(const char* name, auto& value, auto&... more) {
+    object_.at(name).get_to(value);
+    fields(more...);
+  }
+  void whole(uint64_t /*most*/) {}
   /// Others of JSON's numbers would be rounded or wrapped.
   template <typename Whole>
-  void whole(const char* name, Whole& value, uint64_t most) {
+  void whole(uint64_t most, const char* name, Whole& value, auto&... more) {
     const json& number = object_.at(name);
     if (!number.is_number_unsigned() || number.get<uint64_t>() > most) throw std::out_of_range(name);
     value = static_cast<Whole>(number.get<uint64_t>());
+    whole(most, more...);
+  }
+  void later(const char* name, auto& value) {
+    if (!object_.contains(name)) return;
+    if constexpr (std::is_same_v<decltype(value), int64_t&>)
+      whole(most_counts, name, value);
+    else
+      fields(name, value);
   }
   void rate(const char* name, double& value_Hz) { integer(name, value_Hz, 1e-3); }
   void integer(const char* name, double& value, double least) {
     object_.at(name).get_to(value);
     if (!(value >= least && value <= highest_rate_Hz)) throw std::out_of_range(name);
   }
-  void later(const char* name, auto& value) {
-    if (object_.contains(name)) field(name, value);
-  }
-  void later_whole(const char* name, auto& value, uint64_t most) {
-    if (object_.contains(name)) whole(name, value, most);
-  }
   void if_known(const char* name, std::optional<uint64_t>& value) {
-    if (object_.contains(name)) whole(name, value.emplace(), most_ticks);
+    if (object_.contains(name)) whole(most_ticks, name, value.emplace());
   }
   /// What is neither a number nor a text is left out; so is a number that was none when it was written.
   void attributes(const char* name, Attributes& attributes) {
@@ -82,111 +91,95 @@ class FieldReader {
   }
   template <typename Part>
   void parts(const char* name, std::vector<Part>& parts) {
+    if (std::string_view(name) == added_later && !object_.contains(name)) return;
     for (const json& object : object_.at(name)) {
       FieldReader reader(object);
       describe(reader, parts.emplace_back());
     }
   }
-  void later_parts(const char* name, auto& value) {
-    if (object_.contains(name)) parts(name, value);
-  }
 
  private:
+  static constexpr std::string_view added_later = "waveforms";
   const json& object_;
 };
 
 // The fields of each kind of document: `later` ones may be absent, `whole` numbers have a bound.
 
 void describe(auto& io, runfile::Segment& segment) {
-  io.field("start_s", segment.start_s);
-  io.field("waveform", segment.waveform);
-  io.field("stroke_mL", segment.stroke_mL);
-  io.field("period_s", segment.period_s);
-  io.field("offset_mL", segment.offset_mL);
-  io.whole("cycles", segment.cycles, most_counts);
+  io.fields("start_s", segment.start_s, "waveform", segment.waveform, "stroke_mL", segment.stroke_mL,
+            "period_s", segment.period_s, "offset_mL", segment.offset_mL);
+  io.whole(most_counts, "cycles", segment.cycles);
 }
 
 void describe(auto& io, PlayedSegment& played) {
-  io.whole("segment", played.segment, most_counts);
-  io.field("points", played.points);
-  io.field("fraction", played.fraction);
+  io.whole(most_counts, "segment", played.segment);
+  io.fields("points", played.points, "fraction", played.fraction);
 }
 
 void describe(auto& io, BeginRecord& begin) {
-  io.field("run_id", begin.run_id);
-  io.field("started_utc", begin.started_utc);
-  io.field("producer", begin.producer);
-  io.field("experiment", begin.experiment);
+  io.fields("run_id", begin.run_id, "started_utc", begin.started_utc, "producer", begin.producer,
+            "experiment", begin.experiment, "channels", begin.channels);
   io.later("experiment_file", begin.experiment_file);
-  io.rate("sample_rate_Hz", begin.sample_rate_Hz);
-  io.field("channels", begin.channels);
-  io.attributes("rig", begin.rig);
   io.later("instrument", begin.instrument);
+  io.rate("sample_rate_Hz", begin.sample_rate_Hz);
+  io.attributes("rig", begin.rig);
   io.integer("tick_rate_Hz", begin.tick_rate_Hz, 1e-3);
   io.integer("microstep_pL", begin.microstep_pL, 0);
   io.rate("daq_timer_rate_Hz", begin.daq_timer_rate_Hz);
   io.later("daq_timer_counts_samples", begin.daq_timer_counts_samples);
   io.parts("segments", begin.segments);
   io.later("trigger_delay_s", begin.trigger_delay_s);
-  io.later_parts("waveforms", begin.waveforms);
+  io.parts("waveforms", begin.waveforms);
 }
 
-void describe(auto& io, GridRecord& grid) { io.whole("first_due_ns", grid.first_due_ns, most_ticks); }
+void describe(auto& io, GridRecord& grid) { io.whole(most_ticks, "first_due_ns", grid.first_due_ns); }
 
 void describe(auto& io, GapRecord& gap) {
-  io.whole("first_index", gap.first_index, most_rows);
-  io.whole("count", gap.count, most_rows);
-  io.field("reason", gap.reason);
+  io.whole(most_rows, "first_index", gap.first_index, "count", gap.count);
+  io.fields("reason", gap.reason);
 }
 
 void describe(auto& io, ClockRecord& clock) {
-  io.whole("host_ns", clock.host_ns, most_ticks);
-  io.whole("tick", clock.tick, most_ticks);
-  io.whole("half_round_trip_ns", clock.half_round_trip_ns, most_ticks);
+  io.whole(most_ticks, "host_ns", clock.host_ns, "tick", clock.tick, "half_round_trip_ns",
+           clock.half_round_trip_ns);
 }
 
 void describe(auto& io, InstrumentClockRecord& clock) {
-  io.whole("host_ns", clock.host_ns, most_ticks);
-  io.whole("timer", clock.timer, most_ticks);
-  io.whole("half_round_trip_ns", clock.half_round_trip_ns, most_ticks);
+  io.whole(most_ticks, "host_ns", clock.host_ns, "timer", clock.timer, "half_round_trip_ns",
+           clock.half_round_trip_ns);
 }
 
-void describe(auto& io, RunStartedRecord& started) { io.whole("tick", started.tick, most_ticks); }
+void describe(auto& io, RunStartedRecord& started) { io.whole(most_ticks, "tick", started.tick); }
 
 void describe(auto& io, SegmentRecord& started) {
-  io.whole("segment", started.segment, most_counts);
-  io.whole("tick", started.tick, most_ticks);
+  io.whole(most_counts, "segment", started.segment);
+  io.whole(most_ticks, "tick", started.tick);
 }
 
 void describe(auto& io, TriggerRecord& trigger) {
-  io.whole("cycle", trigger.cycle, most_counts);
-  io.whole("tick", trigger.tick, most_ticks);
-  io.later_whole("r_wave", trigger.r_wave, most_counts);
+  io.whole(most_counts, "cycle", trigger.cycle);
+  io.whole(most_ticks, "tick", trigger.tick);
+  io.later("r_wave", trigger.r_wave);
 }
 
 void describe(auto& io, SliceRecord& slice) {
-  io.field("block", slice.block);
-  io.whole("slice", slice.slice, most_counts);
-  io.whole("cycle", slice.cycle, most_counts);
-  io.whole("cycles", slice.cycles, most_counts);
-  io.whole("dummy_cycles", slice.dummy_cycles, most_counts);
+  io.fields("block", slice.block);
+  io.whole(most_counts, "slice", slice.slice, "cycle", slice.cycle, "cycles", slice.cycles, "dummy_cycles",
+           slice.dummy_cycles);
 }
 
 void describe(auto& io, RunEndedRecord& ended) {
-  io.field("reason", ended.reason);
+  io.fields("reason", ended.reason);
   io.later("schedule_done", ended.schedule_done);
-  io.whole("tick", ended.tick, most_ticks);
-  io.whole("cycles", ended.cycles, most_counts);
-  io.whole("triggers", ended.triggers, most_counts);
-  io.later_whole("r_waves", ended.r_waves, most_counts);
+  io.whole(most_ticks, "tick", ended.tick);
+  io.whole(most_counts, "cycles", ended.cycles, "triggers", ended.triggers);
+  io.later("r_waves", ended.r_waves);
 }
 
 void describe(auto& io, EventRecord& event) {
-  io.field("level", event.level);
-  io.field("code", event.code);
-  io.field("text", event.text);
+  io.fields("level", event.level, "code", event.code, "text", event.text);
   io.if_known("tick", event.tick);
-  if (!event.tick) io.whole("host_ns", event.host_ns, most_ticks);
+  if (!event.tick) io.whole(most_ticks, "host_ns", event.host_ns);
 }
 
 void describe(auto& io, EndRecord& end) { io.if_known("until_ns", end.until_ns); }
