@@ -77,7 +77,7 @@ void Acquisition::turn() {
   for (const ControllerEvent& event : controller_.take_events())
     take(event);
   take_samples(samples_.take());
-  gap_remarks_.look(clock_.now_ns());
+  gap_remarks_.update(clock_.now_ns());
   watch_gate();
   check_deadline();
   if (ended_) return;
@@ -201,7 +201,7 @@ void Acquisition::take(const Trouble& trouble) { remark("warning", "instrument",
 
 void Acquisition::watch_gate() {
   if (!gate_) return;
-  note(gate_->look(clock_.now_ns(), {outcome_.counts.triggers, stopped_by_estop_}));
+  note(gate_->check(clock_.now_ns(), {outcome_.counts.triggers, stopped_by_estop_}));
   outcome_.counts.gate_pulses = gate_->pulses();
 }
 

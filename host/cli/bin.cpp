@@ -10,6 +10,7 @@
 #include "host/cli/host_commands.hpp"
 #include "host/cli/text_file.hpp"
 #include "host/config/schedule.hpp"
+#include "host/runfile/output_guard.hpp"
 #include "protocol/contract/input_error.hpp"
 #include "protocol/runfile/reader.hpp"
 #include "protocol/runfile/signal_delay.hpp"

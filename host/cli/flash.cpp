@@ -5,10 +5,10 @@
 #include <chrono>
 #include <csignal>
 #include <cstdio>
-#include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "host/cli/daemon_question.hpp"
 #include "host/cli/host_commands.hpp"
 #include "host/flash/updater.hpp"
 #include "host/transport/serial_port.hpp"
@@ -48,7 +48,7 @@ class ProgressBar {
   uint32_t quarter_ = 0;
 };
 
-std::string told(const UpdateResult& result, const UpdateFile& file) {
+std::string summary(const UpdateResult& result, const UpdateFile& file) {
   switch (result.end) {
     case UpdateEnd::confirmed:
       return fmt::format("version {} runs and is confirmed", in_words(file.version));
@@ -96,20 +96,17 @@ ExitCode flash(FlashOptions options, const CommandOutput& out) {
   std::signal(SIGINT, SIG_DFL);
   std::signal(SIGTERM, SIG_DFL);
   const double wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
-  if (out.json) {
-    nlohmann::json document{{"image", file.file},
-                            {"version", in_words(file.version)},
-                            {"build", fmt::format("{:016x}", file.build_id)},
-                            {"result", name_of(result.end)},
-                            {"bytes", result.image_bytes},
-                            {"sent_bytes", result.sent_bytes},
-                            {"verified", result.verified},
-                            {"seconds", wall_s}};
-    document["version_before"] = result.before ? nlohmann::json(in_words(*result.before)) : nlohmann::json();
-    std::cout << document.dump(2) << '\n';
-  } else {
-    fmt::print("{} ({:.1f} s)\n", told(result, file), wall_s);
-  }
+  print(out,
+        {{"image", file.file},
+         {"version", in_words(file.version)},
+         {"build", fmt::format("{:016x}", file.build_id)},
+         {"result", name_of(result.end)},
+         {"bytes", result.image_bytes},
+         {"sent_bytes", result.sent_bytes},
+         {"verified", result.verified},
+         {"seconds", wall_s},
+         {"version_before", result.before ? nlohmann::json(in_words(*result.before)) : nlohmann::json()}},
+        [&] { fmt::print("{} ({:.1f} s)\n", summary(result, file), wall_s); });
   return result.end == UpdateEnd::stopped ? ExitCode::negative : ExitCode::done;
 }
 

@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "host/cli/daemon_question.hpp"
 #include "host/cli/host_commands.hpp"
 #include "protocol/runfile/reader.hpp"
 #include "protocol/runfile/soundness.hpp"
@@ -41,7 +41,7 @@ json stream_json(const runfile::StreamFacts& facts) {
           {"longest_step_ms", facts.irregularity.longest_ms}};
 }
 
-json attributes_json(const std::map<std::string, runfile::Attribute, std::less<>>& attributes) {
+json attributes_json(const Attributes& attributes) {
   json object = json::object();
   for (const auto& [name, value] : attributes)
     std::visit([&, key = name](const auto& v) { object[key] = v; }, value);
@@ -49,10 +49,9 @@ json attributes_json(const std::map<std::string, runfile::Attribute, std::less<>
 }
 
 /// What /rig tells about a channel's calibration: cavity_calibrated_utc of cavity_kPa, and so on.
-std::map<std::string, runfile::Attribute, std::less<>> calibration_of(const runfile::RecordedRun& run,
-                                                                      const std::string& channel) {
+Attributes calibration_of(const runfile::RecordedRun& run, const std::string& channel) {
   const std::string prefix = channel.substr(0, channel.rfind('_') + 1);
-  std::map<std::string, runfile::Attribute, std::less<>> calibration;
+  Attributes calibration;
   for (const char* fact :
        {"kPa_per_V", "zero_V", "calibrated_utc", "calibrated_by", "zeroed_utc", "zeroed_by"}) {
     if (const auto found = run.rig.find(prefix + fact); found != run.rig.end())
@@ -62,7 +61,7 @@ std::map<std::string, runfile::Attribute, std::less<>> calibration_of(const runf
 }
 
 /// Empty for a run that tells nothing of it.
-std::string calibration_words(const std::map<std::string, runfile::Attribute, std::less<>>& calibration) {
+std::string calibration_words(const Attributes& calibration) {
   if (calibration.empty()) return {};
   const auto text = [&](const char* fact) {
     const auto found = calibration.find(fact);
@@ -223,11 +222,7 @@ void add_inspect(CommandLine& line) {
   line.on_run(command, [file](const CommandOutput& out) {
     const runfile::RecordedRun run = runfile::read_run(*file);
     const runfile::Soundness soundness = runfile::assess(run);
-    if (out.json) {
-      std::cout << as_json(run, soundness).dump(2) << '\n';
-    } else {
-      show(run, soundness);
-    }
+    print(out, as_json(run, soundness), [&] { show(run, soundness); });
     return soundness.sound() ? ExitCode::done : ExitCode::negative;
   });
 }

@@ -9,8 +9,8 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
-#include <iostream>
 
+#include "host/cli/daemon_question.hpp"
 #include "host/cli/schedule_text.hpp"
 
 namespace diastole {
@@ -151,7 +151,7 @@ ExitCode report_session(const SessionResult& result, bool json) {
                                   {"cycles", result.cycles},     {"triggers", result.triggers},
                                   {"samples", result.samples},   {"gaps", result.gaps},
                                   {"expected", result.expected}, {"errors", result.errors}};
-    std::cout << document.dump(2) << '\n';
+    print_json(document);
     return exit_code_of(result);
   }
   fmt::print("{}: {} cycles, {} triggers, {} of {} samples\n", result.run, result.cycles, result.triggers,

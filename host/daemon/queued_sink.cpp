@@ -61,10 +61,10 @@ std::vector<std::string> QueuedSink::take() {
   const std::lock_guard lock(mutex_);
   std::vector<std::string> lines = std::exchange(lines_, {});
   if (const size_t count = std::exchange(left_out_, 0); count > 0) {
-    const std::string told =
+    const std::string remark =
         fmt::format("{} lines of the log were left out: they came faster than they were read", count);
     spdlog::memory_buf_t text;
-    formatter_->format(spdlog::details::log_msg("", spdlog::level::warn, told), text);
+    formatter_->format(spdlog::details::log_msg("", spdlog::level::warn, remark), text);
     lines.emplace_back(text.data(), text.size());
   }
   return lines;

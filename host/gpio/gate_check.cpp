@@ -21,7 +21,7 @@ void GateCheck::take(std::vector<GateRemark>& out, uint64_t now_ns) {
   for (const EstopChange& change : reading.estop_changes) {
     if (change.pressed) {  // also one that is released again is to be reported
       estop_since_ns_ = change.host_ns;
-      estop_told_ = false;
+      estop_reported_ = false;
     }
     out.push_back({"warning", "estop_line",
                    fmt::format("the emergency stop line shows: {}{}", change.pressed ? "pressed" : "released",
@@ -35,13 +35,13 @@ void GateCheck::take(std::vector<GateRemark>& out, uint64_t now_ns) {
   }
 }
 
-std::vector<GateRemark> GateCheck::look(uint64_t now_ns, const ControllerWitness& controller) {
+std::vector<GateRemark> GateCheck::check(uint64_t now_ns, const ControllerWitness& controller) {
   std::vector<GateRemark> out;
   take(out, now_ns);
   if (inputs_.counts_pulses() && pulses_ != controller.triggers) {
     if (!counts_differ_since_ns_) counts_differ_since_ns_ = now_ns;
-    if (!counts_told_ && now_ns - *counts_differ_since_ns_ > report_patience_ns) {
-      counts_told_ = true;
+    if (!counts_reported_ && now_ns - *counts_differ_since_ns_ > report_patience_ns) {
+      counts_reported_ = true;
       out.push_back({"error", "gate_count",
                      fmt::format("the gating line showed {} pulses, the controller reported {} triggers",
                                  pulses_, controller.triggers),
@@ -50,8 +50,9 @@ std::vector<GateRemark> GateCheck::look(uint64_t now_ns, const ControllerWitness
   } else {
     counts_differ_since_ns_.reset();
   }
-  if (estop_since_ns_ && !controller.stopped_by_estop && !estop_told_ && !awaits_estop(now_ns, controller)) {
-    estop_told_ = true;
+  if (estop_since_ns_ && !controller.stopped_by_estop && !estop_reported_ &&
+      !awaits_estop(now_ns, controller)) {
+    estop_reported_ = true;
     out.push_back({"error", "estop_unseen",
                    "the emergency stop line showed pressed, but the controller reports no emergency stop",
                    now_ns});

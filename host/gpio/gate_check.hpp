@@ -33,7 +33,7 @@ class GateCheck {
   /// From now on; what the inputs saw before is forgotten.
   explicit GateCheck(GateInputs& inputs);
 
-  [[nodiscard]] std::vector<GateRemark> look(uint64_t now_ns, const ControllerWitness& controller);
+  [[nodiscard]] std::vector<GateRemark> check(uint64_t now_ns, const ControllerWitness& controller);
   /// Whether the controller still has time to report a pressed emergency stop: the run's end waits for that, half a
   /// second at most.
   [[nodiscard]] bool awaits_estop(uint64_t now_ns, const ControllerWitness& controller) const;
@@ -54,9 +54,9 @@ class GateCheck {
   bool may_have_lost_ = false;
   bool failed_ = false;
   std::optional<uint64_t> counts_differ_since_ns_;
-  bool counts_told_ = false;
+  bool counts_reported_ = false;
   std::optional<uint64_t> estop_since_ns_;  ///< pressed last
-  bool estop_told_ = false;
+  bool estop_reported_ = false;
 };
 
 }  // namespace diastole

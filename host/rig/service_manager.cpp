@@ -19,7 +19,7 @@ constexpr std::chrono::milliseconds usual_server_interval{1000};
 
 /// One datagram to NOTIFY_SOCKET, without waiting: libsystemd's sd_notify waits while the supervisor does not read,
 /// and whoever supervises must not be able to hold up the acquisition.
-void tell(const std::string& state) {
+void notify(const std::string& state) {
   const char* path = std::getenv("NOTIFY_SOCKET");
   sockaddr_un address{};
   if (path == nullptr || std::string_view(path).size() >= sizeof(address.sun_path)) return;
@@ -51,9 +51,9 @@ int64_t ServiceManager::now_us() {
   return std::chrono::duration_cast<std::chrono::microseconds>(Clock::now().time_since_epoch()).count();
 }
 
-void ServiceManager::ready() { tell("READY=1\nSTATUS=serving"); }
-void ServiceManager::stopping() { tell("STOPPING=1\nSTATUS=stopping"); }
-void ServiceManager::status(const std::string& text) { tell("STATUS=" + text); }
+void ServiceManager::ready() { notify("READY=1\nSTATUS=serving"); }
+void ServiceManager::stopping() { notify("STOPPING=1\nSTATUS=stopping"); }
+void ServiceManager::status(const std::string& text) { notify("STATUS=" + text); }
 
 void ServiceManager::server_lives() { server_seen_us_ = now_us(); }
 
@@ -62,15 +62,15 @@ void ServiceManager::beat() {
   const int64_t now = now_us();
   if (now < next_beat_us_ || now - server_seen_us_ > interval_.count()) return;
   next_beat_us_ = now + interval_.count() / beats_an_interval;
-  tell("WATCHDOG=1");
+  notify("WATCHDOG=1");
 }
 
 void ServiceManager::allow(std::chrono::microseconds patience) {
-  if (interval_.count() > 0) tell(fmt::format("WATCHDOG_USEC={}", std::max(patience, interval_).count()));
+  if (interval_.count() > 0) notify(fmt::format("WATCHDOG_USEC={}", std::max(patience, interval_).count()));
 }
 
 void ServiceManager::allow_no_more() {
-  if (interval_.count() > 0) tell(fmt::format("WATCHDOG_USEC={}\nWATCHDOG=1", interval_.count()));
+  if (interval_.count() > 0) notify(fmt::format("WATCHDOG_USEC={}\nWATCHDOG=1", interval_.count()));
 }
 
 std::chrono::milliseconds ServiceManager::server_interval() const {

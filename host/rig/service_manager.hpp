@@ -1,6 +1,6 @@
 #pragma once
-// What the daemon tells the program that supervises it (systemd; sd_notify(3)): that it is ready, that it is
-// alive, that it stops. Without a supervisor (no NOTIFY_SOCKET) nothing is told, and nothing else changes.
+// What the daemon reports to the program that supervises it (systemd; sd_notify(3)): that it is ready, that it is
+// alive, that it stops. Without a supervisor (no NOTIFY_SOCKET) nothing is reported, and nothing else changes.
 //
 // The watchdog is fed by the acquisition loop, not by an idle thread: beat() is called wherever the loop goes
 // to sleep, and passes the word on only while the server's thread has also been heard of within the interval.

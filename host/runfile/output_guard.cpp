@@ -7,11 +7,21 @@
 
 namespace diastole {
 
+void require_new_file(const std::filesystem::path& file, bool force) {
+  if (std::filesystem::is_directory(file))
+    throw InputError({file.string(), "", "is a directory", "Name a file."});
+  if (std::filesystem::exists(file) && !force) {
+    throw InputError({file.string(), "", "exists already", "Choose another name, or --force to replace it."});
+  }
+  const std::filesystem::path directory = file.has_parent_path() ? file.parent_path() : ".";
+  if (::access(directory.c_str(), W_OK | X_OK) != 0) {
+    throw InputError({directory.string(), "", "is no directory in which you may write",
+                      "Make it (mkdir), or choose another place."});
+  }
+}
+
 void check_output(const std::filesystem::path& output, bool force,
                   const std::vector<std::filesystem::path>& inputs) {
-  if (std::filesystem::is_directory(output)) {
-    throw InputError({output.string(), "", "is a directory", "Name a file, for example session.run.h5."});
-  }
   for (const auto& input : inputs) {
     std::error_code missing;
     if (std::filesystem::equivalent(input, output, missing)) {
@@ -23,15 +33,7 @@ void check_output(const std::filesystem::path& output, bool force,
     throw InputError({output.string(), "-o", "is a journal, perhaps all there is of a run",
                       "Name another output; `diastole recover` makes a run file of it."});
   }
-  if (std::filesystem::exists(output) && !force) {
-    throw InputError(
-        {output.string(), "", "exists already", "Choose another name, or --force to replace it."});
-  }
-  const auto directory = output.has_parent_path() ? output.parent_path() : std::filesystem::path(".");
-  if (::access(directory.c_str(), W_OK | X_OK) != 0) {
-    throw InputError({directory.string(), "", "is no directory in which you may write",
-                      "Make it (mkdir), or choose another place for -o."});
-  }
+  require_new_file(output, force);
 }
 
 }  // namespace diastole

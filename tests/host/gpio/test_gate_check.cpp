@@ -44,7 +44,7 @@ TEST(GateCheck, EqualCountsAreSaidAtTheEnd) {
   GateCheck check(inputs);
   for (uint64_t cycle = 1; cycle <= 5; ++cycle) {
     inputs.pulse(1);
-    EXPECT_THAT(check.look(cycle * 1000 * ms, {cycle, false}), IsEmpty());
+    EXPECT_THAT(check.check(cycle * 1000 * ms, {cycle, false}), IsEmpty());
   }
   const auto remarks = check.close(6000 * ms, {5, false}, 5);
   ASSERT_THAT(remarks, SizeIs(1));
@@ -56,16 +56,16 @@ TEST(GateCheck, AReportMayTakeAWhileButNotForever) {
   Inputs inputs;
   GateCheck check(inputs);
   inputs.pulse(1);
-  EXPECT_THAT(check.look(1000 * ms, {0, false}), IsEmpty());
-  EXPECT_THAT(check.look(1400 * ms, {0, false}), IsEmpty());
-  EXPECT_THAT(check.look(1450 * ms, {1, false}), IsEmpty());
+  EXPECT_THAT(check.check(1000 * ms, {0, false}), IsEmpty());
+  EXPECT_THAT(check.check(1400 * ms, {0, false}), IsEmpty());
+  EXPECT_THAT(check.check(1450 * ms, {1, false}), IsEmpty());
   inputs.pulse(2);  // one more than the controller knows of
-  EXPECT_THAT(check.look(2000 * ms, {2, false}), IsEmpty());
-  const auto remarks = check.look(2501 * ms, {2, false});
+  EXPECT_THAT(check.check(2000 * ms, {2, false}), IsEmpty());
+  const auto remarks = check.check(2501 * ms, {2, false});
   ASSERT_THAT(remarks, SizeIs(1));
   EXPECT_EQ(remarks[0].level, "error");
   EXPECT_THAT(remarks[0].text, testing::AllOf(HasSubstr("3 pulses"), HasSubstr("2 triggers")));
-  EXPECT_THAT(check.look(9000 * ms, {2, false}), IsEmpty()) << "said once";
+  EXPECT_THAT(check.check(9000 * ms, {2, false}), IsEmpty()) << "said once";
 }
 
 TEST(GateCheck, AMissingPulseIsAnErrorAtTheEnd) {
@@ -84,7 +84,7 @@ TEST(GateCheck, WithoutAGatingLineNothingIsCompared) {
   Inputs inputs;
   inputs.gate = false;
   GateCheck check(inputs);
-  EXPECT_THAT(check.look(9000 * ms, {3, false}), IsEmpty());
+  EXPECT_THAT(check.check(9000 * ms, {3, false}), IsEmpty());
   EXPECT_THAT(check.close(9000 * ms, {3, false}, 3), IsEmpty());
 }
 
@@ -92,11 +92,11 @@ TEST(GateCheck, AnEmergencyStopThatTheControllerDoesNotSeeIsAnError) {
   Inputs inputs;
   GateCheck check(inputs);
   inputs.next.estop_changes = {{1000 * ms, true, true}};
-  auto remarks = check.look(1001 * ms, {});
+  auto remarks = check.check(1001 * ms, {});
   ASSERT_THAT(remarks, SizeIs(1));
   EXPECT_EQ(remarks[0].level, "warning");
   EXPECT_EQ(remarks[0].host_ns, 1000 * ms) << "the kernel's time";
-  remarks = check.look(1600 * ms, {});
+  remarks = check.check(1600 * ms, {});
   ASSERT_THAT(remarks, SizeIs(1));
   EXPECT_EQ(remarks[0].code, "estop_unseen");
 }
@@ -105,18 +105,18 @@ TEST(GateCheck, AnEmergencyStopThatTheControllerReportsIsNoDisagreement) {
   Inputs inputs;
   GateCheck check(inputs);
   inputs.next.estop_changes = {{1000 * ms, true, false}};
-  EXPECT_THAT(check.look(1001 * ms, {0, true}), SizeIs(1));
-  EXPECT_THAT(check.look(3000 * ms, {0, true}), IsEmpty());
+  EXPECT_THAT(check.check(1001 * ms, {0, true}), SizeIs(1));
+  EXPECT_THAT(check.check(3000 * ms, {0, true}), IsEmpty());
 }
 
 TEST(GateCheck, APressThatIsReleasedAtOnceIsStillToBeReported) {
   Inputs inputs;
   GateCheck check(inputs);
   inputs.next.estop_changes = {{1000 * ms, true, true}, {1020 * ms, false, true}};
-  EXPECT_THAT(check.look(1030 * ms, {}), SizeIs(2));
+  EXPECT_THAT(check.check(1030 * ms, {}), SizeIs(2));
   EXPECT_TRUE(check.awaits_estop(1400 * ms, {}));
   EXPECT_FALSE(check.awaits_estop(1400 * ms, {0, true}));
-  const auto remarks = check.look(1501 * ms, {});
+  const auto remarks = check.check(1501 * ms, {});
   ASSERT_THAT(remarks, SizeIs(1));
   EXPECT_EQ(remarks[0].code, "estop_unseen");
   EXPECT_FALSE(check.awaits_estop(1502 * ms, {}));
@@ -126,14 +126,14 @@ TEST(GateCheck, AnEdgeThatComesDuringTheLookIsNotLate) {
   Inputs inputs;
   GateCheck check(inputs);
   inputs.next.estop_changes = {{1001 * ms, true, true}};
-  EXPECT_THAT(check.look(1000 * ms, {}), SizeIs(1)) << "pressed, and nothing else";
+  EXPECT_THAT(check.check(1000 * ms, {}), SizeIs(1)) << "pressed, and nothing else";
 }
 
 TEST(GateCheck, LinesThatFailAreTold) {
   Inputs inputs;
   GateCheck check(inputs);
   inputs.next.problem = "gone";
-  const auto remarks = check.look(1 * ms, {});
+  const auto remarks = check.check(1 * ms, {});
   ASSERT_THAT(remarks, SizeIs(1));
   EXPECT_EQ(remarks[0].level, "error");
 }
