@@ -111,8 +111,8 @@ void add_effects(Page& page, const Explanation& e) {
                       fmt::format("{} to {}", number(parameter.ci90[0]), number(parameter.ci90[1])),
                       parameter.name});
     }
-    for (const FoundMoment& moment : effect.moments)
-      rows.push_back({effect.id, number(moment.time_s) + " s", "", "moment in " + moment.run});
+    for (const FoundChangePoint& point : effect.change_points)
+      rows.push_back({effect.id, number(point.time_s) + " s", "", "moment in " + point.run});
   }
   if (!rows.empty()) {
     page.table({"effect", "value", "90 % interval", "parameter"}, rows, "What was added to the model.", 3);
