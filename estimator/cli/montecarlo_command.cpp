@@ -39,8 +39,6 @@ struct MonteCarloArguments {
   size_t workers = 0;
 };
 
-int loaded_frames(const Measurement& measurement) { return static_cast<int>(measurement.frames.size()) - 1; }
-
 void set_truth(Study& study, const FitRecord& fit, const std::string& file) {
   for (StudyParameter& parameter : study.law.parameters) {
     const auto found =
@@ -179,7 +177,7 @@ ExitCode run_montecarlo(const MonteCarloArguments& arguments, const CommandOutpu
   if (plan.noise_mm.empty()) plan.noise_mm = {0.0};
   if (!arguments.grid_mm.empty())
     plan.grid = TagGrid{.stripe_mm = arguments.grid_mm[0], .pixel_mm = arguments.grid_mm[1]};
-  if (plan.frames.empty()) plan.frames = {loaded_frames(measurement)};
+  if (plan.frames.empty()) plan.frames = {static_cast<int>(measurement.frames.size()) - 1};
 
   for (const double noise_mm : plan.noise_mm) {
     if (!std::isfinite(noise_mm))
