@@ -28,7 +28,7 @@ std::string refusal(const std::filesystem::path& path) {
 struct Rejection {
   std::string name;
   std::function<void(RunSketch&)> damage;
-  std::vector<std::string> told;
+  std::vector<std::string> named;
 };
 
 class EveryRejection : public testing::TestWithParam<Rejection> {};
@@ -40,7 +40,7 @@ TEST_P(EveryRejection, NamesTheDatasetAndTheFirstOffendingIndex) {
   write_sketch(path, sketch);
   const std::string message = refusal(path);
   EXPECT_THAT(message, HasSubstr(path.string()));
-  for (const std::string& part : GetParam().assembled)
+  for (const std::string& part : GetParam().named)
     EXPECT_THAT(message, HasSubstr(part));
 }
 

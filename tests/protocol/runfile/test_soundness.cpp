@@ -89,7 +89,7 @@ void drop_rows(std::vector<double>& values, size_t first, size_t last) {
 struct Cut {
   const char* stream;
   size_t first, last;
-  const char* told;
+  const char* message;
 };
 
 class StreamCut : public testing::TestWithParam<Cut> {};
@@ -109,7 +109,7 @@ TEST_P(StreamCut, IsAFaultWithAndWithoutAGrid) {
     }
     const Soundness soundness = assess(run);
     EXPECT_THAT(soundness.problems,
-                testing::Contains(testing::AllOf(testing::StartsWith(cut.stream), HasSubstr(cut.assembled))));
+                testing::Contains(testing::AllOf(testing::StartsWith(cut.stream), HasSubstr(cut.message))));
     if (!with_grid) continue;
     EXPECT_THAT(soundness.problems, testing::Contains(HasSubstr("but 400 were due")));
   }
