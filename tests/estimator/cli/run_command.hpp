@@ -20,7 +20,7 @@ struct Outcome {
 inline Outcome run_command(std::vector<std::string> arguments) {
   CLI::App app("test", "diastole");
   CommandLine line(app);
-  add_estimator_commands(line);
+  add_estimator_commands(line, {});
   std::reverse(arguments.begin(), arguments.end());
   app.parse(arguments);
   testing::internal::CaptureStdout();

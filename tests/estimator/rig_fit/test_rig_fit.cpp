@@ -36,8 +36,8 @@ TEST(RigFit, CycleVariationOfKnownSizeLeaveTheNoise) {
   constexpr double cycle_sd = 0.008;
   const Session session = simulated_session(family, {.cycle_sd = cycle_sd});
   NoiseModel noise = estimate_noise(simulated_session(family, {}));
-  const auto reduced_with = [&](double cycle_sd) {
-    noise.cycle_sd = cycle_sd;
+  const auto reduced_with = [&](double assumed_sd) {
+    noise.cycle_sd = assumed_sd;
     return RigProblem(session, family, {.noise = noise}).base().reduced();
   };
   EXPECT_NEAR(reduced_with(cycle_sd), 1.0, 0.04);
