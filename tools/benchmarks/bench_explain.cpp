@@ -16,10 +16,10 @@
 #include <vector>
 
 #include "estimator/explain/rig/explain_rig.hpp"
-#include "tools/score/score.hpp"
 #include "estimator/explain/verdict/explanation_json.hpp"
 #include "tools/benchmarks/bench_explain_field.hpp"
 #include "tools/benchmarks/recorded_cases.hpp"
+#include "tools/score/score.hpp"
 
 namespace {
 

@@ -7,8 +7,8 @@
 #include <fstream>
 
 #include "estimator/explain/imaging/explain_field.hpp"
-#include "tools/score/truth_file.hpp"
 #include "estimator/explain/verdict/explanation_json.hpp"
+#include "tools/score/truth_file.hpp"
 
 namespace diastole::bench {
 namespace {

@@ -1,8 +1,8 @@
 #include <gmock/gmock.h>
 
-#include "tools/score/score.hpp"
 #include "estimator/explain/verdict/explanation_json.hpp"
 #include "tests/estimator/io/scratch_file.hpp"
+#include "tools/score/score.hpp"
 
 namespace diastole::explain {
 namespace {

@@ -193,7 +193,8 @@ void add_replay(CommandLine& line) {
       "  diastole replay journals/5e0c....journal -o again.run.h5\n"
       "      a run that broke off; keep what the replay recorded\n"
       "Recorded gaps, stops, emergency stops, limit switches and losses of the line happen again at their\n"
-      "time. Exit code 0: the replay is the recording; 1: it differs, and the first difference is printed with\n"
+      "time. Exit code 0: the replay is the recording; 1: it differs, and the first difference is printed "
+      "with\n"
       "time and cycle, or it was broken off; 2: the file lacks what a replay needs; 3: a program or link "
       "failed.");
   command->add_option("RUN", options->run, "run file, or a journal of the daemon")->required();

@@ -74,9 +74,9 @@ nlohmann::json as_json(const ReplayReport& report) {
                      {"recorded", line.recorded},
                      {"replayed", line.replayed},
                      {"difference", line.difference},
-                     {"verdict", line.verdict == Verdict::reported    ? "told"
-                                 : line.verdict == Verdict::equal ? "equal"
-                                                                  : "differs"}});
+                     {"verdict", line.verdict == Verdict::reported ? "told"
+                                 : line.verdict == Verdict::equal  ? "equal"
+                                                                   : "differs"}});
   }
   json first;
   if (found.first) {
