@@ -29,10 +29,10 @@ TEST(FieldCase, OneStiffnessAnElementIsRefusedWithARemedy) {
   EXPECT_THAT(refusal_of(study), testing::HasSubstr("vary = \"whole\""));
 }
 
-TEST(FieldCase, AChamberIsRefusedByTheEffectsName) {
+TEST(FieldCase, AChamberIsRefusedAsWhatAnEffectWouldBe) {
   Study study = imaged_gel();
   study.chamber = StudyChamber{};
-  EXPECT_THAT(refusal_of(study), testing::HasSubstr("chamber-back-pressure"));
+  EXPECT_THAT(refusal_of(study), testing::HasSubstr("back pressure is one of the effects"));
 }
 
 TEST(FieldCase, CompressibleGelIsRefused) {
