@@ -166,7 +166,8 @@ TEST(ExplanationReport, TellsTheWholeStory) {
     EXPECT_THAT(page, HasSubstr(text));
   EXPECT_THAT(page, Not(HasSubstr("http")));
   EXPECT_THAT(page, Not(HasSubstr("=\"nan")));
-  EXPECT_EQ(make_report(explanation_from_json(to_json(test::explained_hose()), "explanation.json")), page);
+  EXPECT_EQ(make_report(explain::explanation_from_json(to_json(test::explained_hose()), "explanation.json")),
+            page);
 }
 
 TEST(ExplanationReport, ShowsTheWallAndEscapesNames) {
