@@ -168,7 +168,7 @@ class Explainer {
     report("comparing what explains it");
     rival_evidence_.emplace(full_base_, modes_.columns);
     rival_ = rival_evidence_->best_of(rivals_);
-    if (!settled("the base model", base_) || !settled("the base model on the full mesh", full_base_)) return;
+    if (!settled(base_) || !settled(full_base_)) return;
     const Structure before = structure_left(full_base_, 0.0);
     const FieldHypothesis& single = hypotheses_.front();
     const bool effect_seen = single.p_value < significant && single.score > 0.0;
@@ -190,12 +190,19 @@ class Explainer {
       out_.summary = unexplained_summary(best, effect_seen, rivalled, after);
       return;
     }
-    if (settled(best.name(), best.fit)) name(best);
+    if (settled(best.fit)) name(best);
   }
 
-  /// Whether a fit's search ended where it was to end; else nothing is named.
-  [[nodiscard]] bool settled(const std::string& of, const FieldFit& fit) {
-    if (inference::is_settled(fit.termination)) return true;
+  /// Keeps how a fit's search ended; false, and nothing is named, unless it ended where it was to.
+  [[nodiscard]] bool settled(const FieldFit& fit) {
+    SearchEnd& search = out_.searches.emplace_back();
+    search.termination = fit.termination;
+    for (const Effect* effect : fit.choice.effects)
+      search.effects.emplace_back(effect->text().id);
+    out_.converged = is_settled(out_.searches);
+    if (out_.converged) return true;
+    const std::string of =
+        search.effects.empty() ? "the base model" : fmt::format("{}", fmt::join(search.effects, " + "));
     out_.verdict = Verdict::unexplained;
     out_.summary = fmt::format("Nothing can be named. The search of {} did not converge: {}", of,
                                inference::sentence(fit.termination));
