@@ -3,16 +3,9 @@
 #include "estimator/effects/effect.hpp"
 
 namespace diastole {
-namespace {
 
-void apply(std::span<const double> values, const EffectContext&, rig::RigModel& model) {
-  model.cavity_gas_mL += values[0];
-}
-
-}  // namespace
-
-const Effect& air_bubble_cavity_effect() {
-  static const Effect effect{{
+Effect air_bubble_cavity_effect() {
+  return {{
       .id = "air-bubble-cavity",
       .title = "air bubble in the cavity",
       .port = Port::specimen,
@@ -25,9 +18,9 @@ const Effect& air_bubble_cavity_effect() {
       .conflicts = {"stroke-gain", "radius-error", "strain-stiffening"},
       .parameters = {{"volume_mL", "mL", "of the gas at atmospheric pressure; any image shows more", 0.0, 0.0,
                       20.0, 10.0}},
-      .apply = apply,
+      .apply = [](EffectValues values, const EffectContext&,
+                  rig::RigModel& model) { model.cavity_gas_mL += values[0]; },
   }};
-  return effect;
 }
 
 }  // namespace diastole

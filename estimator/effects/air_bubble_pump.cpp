@@ -3,16 +3,9 @@
 #include "estimator/effects/effect.hpp"
 
 namespace diastole {
-namespace {
 
-void apply(std::span<const double> values, const EffectContext&, rig::RigModel& model) {
-  model.pump_gas_mL += values[0];
-}
-
-}  // namespace
-
-const Effect& air_bubble_pump_effect() {
-  static const Effect effect{{
+Effect air_bubble_pump_effect() {
+  return {{
       .id = "air-bubble-pump",
       .title = "air bubble at the pump",
       .port = Port::drive,
@@ -25,9 +18,9 @@ const Effect& air_bubble_pump_effect() {
       .conflicts = {"hose-compliance"},
       .synergies = {"hose-inertance-excess"},
       .parameters = {{"volume_mL", "mL", "of the gas at atmospheric pressure", 0.0, 0.0, 50.0, 3.0}},
-      .apply = apply,
+      .apply = [](EffectValues values, const EffectContext&,
+                  rig::RigModel& model) { model.pump_gas_mL += values[0]; },
   }};
-  return effect;
 }
 
 }  // namespace diastole

@@ -7,6 +7,7 @@
 #include "estimator/effects/effect.hpp"
 
 namespace diastole {
+
 namespace {
 
 /// Below this play contacts close sooner: a small play goes over into none.
@@ -63,22 +64,10 @@ std::vector<double> smoothed(const std::vector<double>& values, const std::vecto
   return out;
 }
 
-void apply(std::span<const double> values, const EffectContext&, rig::RigModel& model) {
-  const double backlash_mL = values[0];
-  const double slack_mL = values[0] * (1.0 - values[1]);
-  const double contact_s = -values[2] * std::expm1(-backlash_mL / least_play_mL);
-  if (backlash_mL == 0.0) return;
-  model.drive.emplace_back([=](rig::DriveTrace& trace, const rig::RunPlace&) {
-    trace.volume_mL = smoothed(taken_up(backlash_mL, slack_mL, trace),
-                               normal_weights(std::max(contact_s / trace.step_s, 1e-3)));
-    trace.differentiate();
-  });
-}
-
 }  // namespace
 
-const Effect& backlash_effect() {
-  static const Effect effect{{
+Effect backlash_effect() {
+  return {{
       .id = "backlash",
       .title = "backlash of the drive",
       .port = Port::drive,
@@ -96,9 +85,19 @@ const Effect& backlash_effect() {
                       "part of it that lies behind the piston when a run begins", 0.5, 0.0, 1.0, 0.5},
                      {"contact_s", "s", "in which a contact closes", 0.012, 0.004, 0.04, 0.012,
                       SearchScale::logarithmic}},
-      .apply = apply,
+      .apply =
+          [](EffectValues values, const EffectContext&, rig::RigModel& model) {
+            const double backlash_mL = values[0];
+            const double slack_mL = values[0] * (1.0 - values[1]);
+            const double contact_s = -values[2] * std::expm1(-backlash_mL / least_play_mL);
+            if (backlash_mL == 0.0) return;
+            model.drive.emplace_back([=](rig::DriveTrace& trace, const rig::RunPlace&) {
+              trace.volume_mL = smoothed(taken_up(backlash_mL, slack_mL, trace),
+                                         normal_weights(std::max(contact_s / trace.step_s, 1e-3)));
+              trace.differentiate();
+            });
+          },
   }};
-  return effect;
 }
 
 }  // namespace diastole

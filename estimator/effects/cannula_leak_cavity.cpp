@@ -3,19 +3,9 @@
 #include "estimator/effects/effect.hpp"
 
 namespace diastole {
-namespace {
 
-void apply(std::span<const double> values, const EffectContext&, rig::RigModel& model) {
-  const double conductance = values[0];
-  if (conductance == 0.0) return;
-  model.cavity_leaks.emplace_back(
-      [conductance](double pressure_kPa, double) { return conductance * pressure_kPa; });
-}
-
-}  // namespace
-
-const Effect& cannula_leak_cavity_effect() {
-  static const Effect effect{{
+Effect cannula_leak_cavity_effect() {
+  return {{
       .id = "cannula-leak-cavity",
       .title = "leak at the cavity",
       .port = Port::specimen,
@@ -27,9 +17,14 @@ const Effect& cannula_leak_cavity_effect() {
           "A hold at volume, and a rest after it: the pressure ends below zero by the volume lost.",
       .conflicts = {"seal-leak-pump", "viscoelasticity"},
       .parameters = {{"leak_mL_s_kPa", "mL/(s kPa)", "conductance of the gap", 0.0, 0.0, 2.0, 0.1}},
-      .apply = apply,
+      .apply =
+          [](EffectValues values, const EffectContext&, rig::RigModel& model) {
+            const double conductance = values[0];
+            if (conductance == 0.0) return;
+            model.cavity_leaks.emplace_back(
+                [conductance](double pressure_kPa, double) { return conductance * pressure_kPa; });
+          },
   }};
-  return effect;
 }
 
 }  // namespace diastole

@@ -3,20 +3,9 @@
 #include "estimator/effects/effect.hpp"
 
 namespace diastole {
-namespace {
 
-std::vector<double> neutral(const rig::RigModel& base) {
-  return {base.catheter.resonance_Hz, base.catheter.damping};
-}
-
-void apply(std::span<const double> values, const EffectContext&, rig::RigModel& model) {
-  model.catheter = {values[0], values[1]};
-}
-
-}  // namespace
-
-const Effect& catheter_resonance_effect() {
-  static const Effect effect{{
+Effect catheter_resonance_effect() {
+  return {{
       .id = "catheter-resonance",
       .title = "slow catheter",
       .port = Port::sensor,
@@ -29,10 +18,15 @@ const Effect& catheter_resonance_effect() {
       .parameters = {{"f0_Hz", "Hz", "resonance", 60.0, 3.0, 200.0, 15.0, SearchScale::inverse_square},
                      {"zeta", "", "part of critical damping", 0.6, 0.05, 2.0, 0.4}},
       .stage = Stage::sensors,
-      .neutral = neutral,
-      .apply = apply,
+      .neutral =
+          [](const rig::RigModel& base) {
+            return std::vector<double>{base.catheter.resonance_Hz, base.catheter.damping};
+          },
+      .apply =
+          [](EffectValues values, const EffectContext&, rig::RigModel& model) {
+            model.catheter = {values[0], values[1]};
+          },
   }};
-  return effect;
 }
 
 }  // namespace diastole

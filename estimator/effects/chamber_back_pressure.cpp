@@ -3,26 +3,9 @@
 #include "estimator/effects/effect.hpp"
 
 namespace diastole {
-namespace {
 
-void apply(std::span<const double> values, const EffectContext&, rig::RigModel& model) {
-  std::vector<rig::SpecimenCurve::Point> points = model.curve.points();
-  const double stiffness = 1e-3 * values[0] / model.modulus_kPa;
-  for (rig::SpecimenCurve::Point& point : points) {
-    point.pressure_kPa += stiffness * point.volume_mL;
-    point.stiffness_kPa_per_mL += stiffness;
-  }
-  model.curve = rig::SpecimenCurve(std::move(points));
-}
-
-void apply_to_field(std::span<const double> values, FieldModel& model) {
-  model.chamber_stiffness_kPa_per_mL = values[0];
-}
-
-}  // namespace
-
-const Effect& chamber_back_pressure_effect() {
-  static const Effect effect{{
+Effect chamber_back_pressure_effect() {
+  return {{
       .id = "chamber-back-pressure",
       .title = "back pressure of the chamber",
       .port = Port::specimen,
@@ -34,11 +17,20 @@ const Effect& chamber_back_pressure_effect() {
                      "less than the pressure says.",
       .conflicts = {"strain-stiffening", "radius-error", "stroke-gain"},
       .parameters = {{"k_Pa_mL", "Pa/mL", "stiffness of the chamber", 0.0, 0.0, 200.0, 15.0}},
-      .apply = apply,
+      .apply =
+          [](EffectValues values, const EffectContext&, rig::RigModel& model) {
+            std::vector<rig::SpecimenCurve::Point> points = model.curve.points();
+            const double stiffness = 1e-3 * values[0] / model.modulus_kPa;
+            for (rig::SpecimenCurve::Point& point : points) {
+              point.pressure_kPa += stiffness * point.volume_mL;
+              point.stiffness_kPa_per_mL += stiffness;
+            }
+            model.curve = rig::SpecimenCurve(std::move(points));
+          },
       .field_parameters = {{"k_kPa_per_mL", "kPa/mL", "stiffness of the chamber", 0.0, 0.0, 0.2, 0.01}},
-      .apply_to_field = apply_to_field,
+      .apply_to_field = [](EffectValues values,
+                           FieldModel& model) { model.chamber_stiffness_kPa_per_mL = values[0]; },
   }};
-  return effect;
 }
 
 }  // namespace diastole

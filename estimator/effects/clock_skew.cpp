@@ -3,16 +3,9 @@
 #include "estimator/effects/effect.hpp"
 
 namespace diastole {
-namespace {
 
-void apply(std::span<const double> values, const EffectContext&, rig::RigModel& model) {
-  model.sample_skew -= 1e-6 * values[0];
-}
-
-}  // namespace
-
-const Effect& clock_skew_effect() {
-  static const Effect effect{{
+Effect clock_skew_effect() {
+  return {{
       .id = "clock-skew",
       .title = "skew of the clocks",
       .port = Port::clock,
@@ -24,9 +17,9 @@ const Effect& clock_skew_effect() {
       .parameters = {{"ppm", "ppm", "by which the instrument counts too few seconds", 0.0, -2000.0, 2000.0,
                       200.0}},
       .stage = Stage::sensors,
-      .apply = apply,
+      .apply = [](EffectValues values, const EffectContext&,
+                  rig::RigModel& model) { model.sample_skew -= 1e-6 * values[0]; },
   }};
-  return effect;
 }
 
 }  // namespace diastole

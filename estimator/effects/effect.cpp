@@ -1,28 +1,13 @@
 #include "estimator/effects/effect.hpp"
 
 #include <algorithm>
+#include <array>
 
 namespace diastole {
 
-#define DIASTOLE_EFFECT(name) const Effect& name##_effect();
+#define DIASTOLE_EFFECT(name) Effect name##_effect();
 #include "estimator/effects/effect_list.inc"
 #undef DIASTOLE_EFFECT
-
-std::string_view name_of(Port port) {
-  switch (port) {
-    case Port::drive:
-      return "drive";
-    case Port::specimen:
-      return "specimen";
-    case Port::sensor:
-      return "sensor";
-    case Port::clock:
-      return "clock";
-    case Port::field:
-      return "field";
-  }
-  return "";
-}
 
 namespace {
 
@@ -33,7 +18,19 @@ std::vector<double> neutral_values(std::span<const EffectParameter> parameters) 
   return values;
 }
 
+std::vector<const Effect*> those_with(std::span<const EffectParameter> (Effect::*parameters)() const) {
+  std::vector<const Effect*> shown;
+  for (const Effect* effect : all_effects())
+    if (!(effect->*parameters)().empty()) shown.push_back(effect);
+  return shown;
+}
+
 }  // namespace
+
+std::string_view name_of(Port port) {
+  constexpr std::array<std::string_view, 5> names{"drive", "specimen", "sensor", "clock", "field"};
+  return names[static_cast<size_t>(port)];
+}
 
 bool Effect::fits(const rig::SpecimenCurves& family) const {
   return !parameters().empty() && (!declared_.needs_neighbours || family.has_neighbours());
@@ -43,34 +40,25 @@ std::vector<double> Effect::neutral(const rig::RigModel& base) const {
   return declared_.neutral != nullptr ? declared_.neutral(base) : neutral_values(parameters());
 }
 
-size_t Effect::field_essentials() const {
-  return declared_.field_essentials.value_or(field_parameters().size());
-}
-
 std::vector<double> Effect::field_neutral(const FieldModel& base) const {
   return declared_.field_neutral != nullptr ? declared_.field_neutral(base)
                                             : neutral_values(field_parameters());
 }
 
 const std::vector<const Effect*>& all_effects() {
-  static const std::vector<const Effect*> list{
-#define DIASTOLE_EFFECT(name) &name##_effect(),
+  static const Effect effects[] = {
+#define DIASTOLE_EFFECT(name) name##_effect(),
 #include "estimator/effects/effect_list.inc"
 #undef DIASTOLE_EFFECT
   };
+  static const std::vector<const Effect*> list = [] {
+    std::vector<const Effect*> pointers;
+    for (const Effect& effect : effects)
+      pointers.push_back(&effect);
+    return pointers;
+  }();
   return list;
 }
-
-namespace {
-
-std::vector<const Effect*> those_with(std::span<const EffectParameter> (Effect::*parameters)() const) {
-  std::vector<const Effect*> shown;
-  for (const Effect* effect : all_effects())
-    if (!(effect->*parameters)().empty()) shown.push_back(effect);
-  return shown;
-}
-
-}  // namespace
 
 const std::vector<const Effect*>& rig_effects() {
   static const std::vector<const Effect*> list = those_with(&Effect::parameters);
@@ -88,10 +76,9 @@ const Effect& inclusion_effect() {
 }
 
 const Effect* find_effect(std::string_view id) {
-  const auto& list = all_effects();
   const auto found =
-      std::find_if(list.begin(), list.end(), [&](const Effect* effect) { return effect->text().id == id; });
-  return found == list.end() ? nullptr : *found;
+      std::ranges::find(all_effects(), id, [](const Effect* effect) { return effect->text().id; });
+  return found == all_effects().end() ? nullptr : *found;
 }
 
 }  // namespace diastole

@@ -3,7 +3,7 @@
 // same: an effect's parameters at their neutral values are the base model exactly, and its text is what `diastole
 // effects` shows.
 //
-// To add one: a file NAME.cpp in this folder that defines `const Effect& NAME_effect()`, its declaration, and a line in
+// To add one: a file NAME.cpp in this folder that defines `Effect NAME_effect()`, its declaration, and a line in
 // effect_list.inc. The tests over the list then check that it is neutral, differentiable, found again in its own
 // simulated data, and silent without cause; docs/effects.md is made from the declarations.
 
@@ -72,7 +72,10 @@ struct FieldDirection {
 /// parameters are those of stiff_inclusion.cpp in their order.
 enum class FieldShape { round, inclusion };
 
-/// All that there is to say of an effect; every text is shown to users. `values` are one number a parameter, in their order.
+/// One number a parameter, in their order.
+using EffectValues = std::span<const double>;
+
+/// All that there is to say of an effect; every text is shown to users.
 struct EffectDeclaration {
   std::string_view id;     ///< "hose-compliance": kept for ever
   std::string_view title;  ///< a few words
@@ -94,7 +97,7 @@ struct EffectDeclaration {
   /// The values that leave `base` as it is; without: the parameters' neutral ones.
   std::vector<double> (*neutral)(const rig::RigModel& base) = nullptr;
   /// The model's curve and modulus must be set.
-  void (*apply)(std::span<const double> values, const EffectContext&, rig::RigModel&) = nullptr;
+  void (*apply)(EffectValues values, const EffectContext&, rig::RigModel&) = nullptr;
 
   // In images of the specimen (field_model.hpp), if it shows there. The first parameter is the effect's size.
   std::vector<EffectParameter> field_parameters = {};
@@ -103,13 +106,13 @@ struct EffectDeclaration {
   FieldShape field_shape = FieldShape::round;
   std::optional<FieldDirection> field_direction = {};
   std::vector<double> (*field_neutral)(const FieldModel& base) = nullptr;
-  void (*apply_to_field)(std::span<const double> values, FieldModel&) = nullptr;
+  void (*apply_to_field)(EffectValues values, FieldModel&) = nullptr;
 };
 
 /// A declared effect, as the searches ask for it.
 class Effect {
  public:
-  explicit Effect(EffectDeclaration declared) : declared_(std::move(declared)) {}
+  Effect(EffectDeclaration declared) : declared_(std::move(declared)) {}
   Effect(const Effect&) = delete;
   Effect& operator=(const Effect&) = delete;
 
@@ -122,7 +125,7 @@ class Effect {
   /// Whether the specimen can have it and recordings would show it.
   [[nodiscard]] bool fits(const rig::SpecimenCurves& family) const;
   [[nodiscard]] std::vector<double> neutral(const rig::RigModel& base) const;
-  void apply(std::span<const double> values, const EffectContext& context, rig::RigModel& model) const {
+  void apply(EffectValues values, const EffectContext& context, rig::RigModel& model) const {
     if (declared_.apply != nullptr) declared_.apply(values, context, model);
   }
 
@@ -130,11 +133,13 @@ class Effect {
   [[nodiscard]] std::span<const EffectParameter> field_parameters() const {
     return declared_.field_parameters;
   }
-  [[nodiscard]] size_t field_essentials() const;
+  [[nodiscard]] size_t field_essentials() const {
+    return declared_.field_essentials.value_or(field_parameters().size());
+  }
   [[nodiscard]] bool is_inclusion() const { return declared_.field_shape == FieldShape::inclusion; }
   [[nodiscard]] std::optional<FieldDirection> field_direction() const { return declared_.field_direction; }
   [[nodiscard]] std::vector<double> field_neutral(const FieldModel& base) const;
-  void apply_to_field(std::span<const double> values, FieldModel& model) const {
+  void apply_to_field(EffectValues values, FieldModel& model) const {
     if (declared_.apply_to_field != nullptr) declared_.apply_to_field(values, model);
   }
 

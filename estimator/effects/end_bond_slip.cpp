@@ -3,25 +3,11 @@
 #include "estimator/effects/effect.hpp"
 
 namespace diastole {
-namespace {
 
 constexpr double as_good_as_held = 1000.0;
 
-void apply(std::span<const double> values, const EffectContext& context, rig::RigModel& model) {
-  if (values[0] == 0.0) return;
-  const double compliance_mm = values[0] * model.modulus_kPa;
-  model.curve = model.curve.plus(context.family.slipping(compliance_mm, context.low_fidelity), 1.0, 1.0)
-                    .plus(context.family.plain(), 1.0, -1.0);
-}
-
-void apply_to_field(std::span<const double> values, FieldModel& model) {
-  if (values[0] < as_good_as_held) model.bond_stiffness_kPa_per_mm = values[0];
-}
-
-}  // namespace
-
-const Effect& end_bond_slip_effect() {
-  static const Effect effect{{
+Effect end_bond_slip_effect() {
+  return {{
       .id = "end-bond-slip",
       .title = "slipping end bonds",
       .port = Port::specimen,
@@ -35,13 +21,22 @@ const Effect& end_bond_slip_effect() {
       .parameters = {{"bond_compliance_mm_per_kPa", "mm/kPa", "slip across the axis by traction", 0.0, 0.0,
                       10.0, 1.0}},
       .needs_neighbours = true,
-      .apply = apply,
+      .apply =
+          [](EffectValues values, const EffectContext& context, rig::RigModel& model) {
+            if (values[0] == 0.0) return;
+            const double compliance_mm = values[0] * model.modulus_kPa;
+            model.curve =
+                model.curve.plus(context.family.slipping(compliance_mm, context.low_fidelity), 1.0, 1.0)
+                    .plus(context.family.plain(), 1.0, -1.0);
+          },
       .field_parameters = {{"bond_stiffness_kPa_per_mm", "kPa/mm",
                             "traction across the axis for slip; 1000 is as good as held", as_good_as_held,
                             0.02, as_good_as_held, 1.0, SearchScale::logarithmic}},
-      .apply_to_field = apply_to_field,
+      .apply_to_field =
+          [](EffectValues values, FieldModel& model) {
+            if (values[0] < as_good_as_held) model.bond_stiffness_kPa_per_mm = values[0];
+          },
   }};
-  return effect;
 }
 
 }  // namespace diastole

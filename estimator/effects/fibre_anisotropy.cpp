@@ -3,18 +3,9 @@
 #include "estimator/effects/effect.hpp"
 
 namespace diastole {
-namespace {
 
-void apply_to_field(std::span<const double> values, FieldModel& model) {
-  model.k1_kPa = values[0];
-  model.fibre_angle_deg = values[1];
-  model.k2 = values[2];
-}
-
-}  // namespace
-
-const Effect& fibre_anisotropy_effect() {
-  static const Effect effect{{
+Effect fibre_anisotropy_effect() {
+  return {{
       .id = "fibre-anisotropy",
       .title = "one family of fibres",
       .port = Port::field,
@@ -32,9 +23,13 @@ const Effect& fibre_anisotropy_effect() {
                            {"k2", "", "stiffening of the fibres with (I4 - 1)^2", 0.0, 0.0, 60.0, 2.0}},
       .field_essentials = 2,
       .field_direction = {{1, 180.0}},
-      .apply_to_field = apply_to_field,
+      .apply_to_field =
+          [](EffectValues values, FieldModel& model) {
+            model.k1_kPa = values[0];
+            model.fibre_angle_deg = values[1];
+            model.k2 = values[2];
+          },
   }};
-  return effect;
 }
 
 }  // namespace diastole

@@ -3,18 +3,9 @@
 #include "estimator/effects/effect.hpp"
 
 namespace diastole {
-namespace {
 
-std::vector<double> neutral(const rig::RigModel& base) { return {base.hose.wave_speed_m_s}; }
-
-void apply(std::span<const double> values, const EffectContext&, rig::RigModel& model) {
-  model.hose.wave_speed_m_s = values[0];
-}
-
-}  // namespace
-
-const Effect& hose_compliance_effect() {
-  static const Effect effect{{
+Effect hose_compliance_effect() {
+  return {{
       .id = "hose-compliance",
       .title = "soft hose",
       .port = Port::drive,
@@ -27,10 +18,10 @@ const Effect& hose_compliance_effect() {
       .synergies = {"hose-inertance-excess"},
       .parameters = {{"wave_speed_m_s", "m/s", "speed of pressure waves in the hose", 400.0, 8.0, 2000.0,
                       80.0, SearchScale::inverse_square}},
-      .neutral = neutral,
-      .apply = apply,
+      .neutral = [](const rig::RigModel& base) { return std::vector<double>{base.hose.wave_speed_m_s}; },
+      .apply = [](EffectValues values, const EffectContext&,
+                  rig::RigModel& model) { model.hose.wave_speed_m_s = values[0]; },
   }};
-  return effect;
 }
 
 }  // namespace diastole

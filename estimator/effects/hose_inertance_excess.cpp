@@ -3,16 +3,9 @@
 #include "estimator/effects/effect.hpp"
 
 namespace diastole {
-namespace {
 
-void apply(std::span<const double> values, const EffectContext&, rig::RigModel& model) {
-  model.hose.inertance_factor *= values[0];
-}
-
-}  // namespace
-
-const Effect& hose_inertance_excess_effect() {
-  static const Effect effect{{
+Effect hose_inertance_excess_effect() {
+  return {{
       .id = "hose-inertance-excess",
       .title = "excess inertance of the hose",
       .port = Port::drive,
@@ -24,9 +17,9 @@ const Effect& hose_inertance_excess_effect() {
       .conflicts = {"hose-loss-excess"},
       .synergies = {"hose-compliance", "air-bubble-pump"},
       .parameters = {{"inertance_factor", "", "over the hose of the description", 1.0, 0.5, 3.0, 1.2}},
-      .apply = apply,
+      .apply = [](EffectValues values, const EffectContext&,
+                  rig::RigModel& model) { model.hose.inertance_factor *= values[0]; },
   }};
-  return effect;
 }
 
 }  // namespace diastole

@@ -3,16 +3,9 @@
 #include "estimator/effects/effect.hpp"
 
 namespace diastole {
-namespace {
 
-void apply(std::span<const double> values, const EffectContext&, rig::RigModel& model) {
-  model.hose.loss_coefficient += values[0];
-}
-
-}  // namespace
-
-const Effect& hose_loss_excess_effect() {
-  static const Effect effect{{
+Effect hose_loss_excess_effect() {
+  return {{
       .id = "hose-loss-excess",
       .title = "excess loss of the hose",
       .port = Port::drive,
@@ -23,9 +16,9 @@ const Effect& hose_loss_excess_effect() {
       .conflicts = {"hose-inertance-excess"},
       .synergies = {"hose-compliance"},
       .parameters = {{"extra_K", "", "loss coefficient added", 0.0, 0.0, 200.0, 10.0}},
-      .apply = apply,
+      .apply = [](EffectValues values, const EffectContext&,
+                  rig::RigModel& model) { model.hose.loss_coefficient += values[0]; },
   }};
-  return effect;
 }
 
 }  // namespace diastole

@@ -7,11 +7,12 @@
 #include "estimator/effects/effect.hpp"
 
 namespace diastole {
+
 namespace {
 
 constexpr double reach = 6.0;  ///< of the loss, in sd
 
-void apply(std::span<const double> values, const EffectContext& context, rig::RigModel& model) {
+void apply(EffectValues values, const EffectContext& context, rig::RigModel& model) {
   const double lost_mL = values[0];
   const double stall_s = values[1];
   const std::vector<ChangePoint> moments(context.change_points.begin(), context.change_points.end());
@@ -34,8 +35,8 @@ void apply(std::span<const double> values, const EffectContext& context, rig::Ri
 
 }  // namespace
 
-const Effect& missed_steps_effect() {
-  static const Effect effect{{
+Effect missed_steps_effect() {
+  return {{
       .id = "missed-steps",
       .title = "missed steps",
       .port = Port::drive,
@@ -52,7 +53,6 @@ const Effect& missed_steps_effect() {
       .change_points = ChangePoints::several,
       .apply = apply,
   }};
-  return effect;
 }
 
 }  // namespace diastole

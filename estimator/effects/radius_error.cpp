@@ -3,22 +3,9 @@
 #include "estimator/effects/effect.hpp"
 
 namespace diastole {
-namespace {
 
-void apply(std::span<const double> values, const EffectContext& context, rig::RigModel& model) {
-  if (values[0] == 0.0) return;
-  model.curve = model.curve.plus(context.family.with_inner_radius(values[0], context.low_fidelity), 1.0, 1.0)
-                    .plus(context.family.plain(), 1.0, -1.0);
-}
-
-std::vector<double> field_neutral(const FieldModel& base) { return {base.inner_radius_mm}; }
-
-void apply_to_field(std::span<const double> values, FieldModel& model) { model.inner_radius_mm = values[0]; }
-
-}  // namespace
-
-const Effect& radius_error_effect() {
-  static const Effect effect{{
+Effect radius_error_effect() {
+  return {{
       .id = "radius-error",
       .title = "error of the inner radius",
       .port = Port::specimen,
@@ -31,13 +18,18 @@ const Effect& radius_error_effect() {
       .parameters = {{"fraction", "", "part by which the inner radius is larger; any image shows more", 0.0,
                       -0.08, 0.08, 0.04, SearchScale::linear, true}},
       .needs_neighbours = true,
-      .apply = apply,
+      .apply =
+          [](EffectValues values, const EffectContext& context, rig::RigModel& model) {
+            if (values[0] == 0.0) return;
+            model.curve =
+                model.curve.plus(context.family.with_inner_radius(values[0], context.low_fidelity), 1.0, 1.0)
+                    .plus(context.family.plain(), 1.0, -1.0);
+          },
       .field_parameters = {{"true_inner_radius_mm", "mm", "inner radius of the specimen itself", 22.5, 5.0,
                             45.0, 23.4}},
-      .field_neutral = field_neutral,
-      .apply_to_field = apply_to_field,
+      .field_neutral = [](const FieldModel& base) { return std::vector<double>{base.inner_radius_mm}; },
+      .apply_to_field = [](EffectValues values, FieldModel& model) { model.inner_radius_mm = values[0]; },
   }};
-  return effect;
 }
 
 }  // namespace diastole

@@ -3,16 +3,9 @@
 #include "estimator/effects/effect.hpp"
 
 namespace diastole {
-namespace {
 
-void apply(std::span<const double> values, const EffectContext&, rig::RigModel& model) {
-  model.pump_leak_mL_s_kPa += values[0];
-}
-
-}  // namespace
-
-const Effect& seal_leak_pump_effect() {
-  static const Effect effect{{
+Effect seal_leak_pump_effect() {
+  return {{
       .id = "seal-leak-pump",
       .title = "leak past the piston's seal",
       .port = Port::drive,
@@ -24,9 +17,9 @@ const Effect& seal_leak_pump_effect() {
                      "inertia pressure leaks too.",
       .conflicts = {"cannula-leak-cavity", "viscoelasticity"},
       .parameters = {{"leak_mL_s_kPa", "mL/(s kPa)", "conductance of the gap", 0.0, 0.0, 0.25, 0.05}},
-      .apply = apply,
+      .apply = [](EffectValues values, const EffectContext&,
+                  rig::RigModel& model) { model.pump_leak_mL_s_kPa += values[0]; },
   }};
-  return effect;
 }
 
 }  // namespace diastole

@@ -3,19 +3,9 @@
 #include "estimator/effects/effect.hpp"
 
 namespace diastole {
-namespace {
 
-void apply(std::span<const double> values, const EffectContext&, rig::RigModel& model) {
-  const double rate_kPa_s = 1e-3 * values[0];
-  model.cavity_sensor.emplace_back([rate_kPa_s](double pressure_kPa, double time_s, const rig::RunPlace&) {
-    return pressure_kPa + rate_kPa_s * time_s;
-  });
-}
-
-}  // namespace
-
-const Effect& sensor_drift_effect() {
-  static const Effect effect{{
+Effect sensor_drift_effect() {
+  return {{
       .id = "sensor-drift",
       .title = "drift of the cavity sensor",
       .port = Port::sensor,
@@ -26,9 +16,15 @@ const Effect& sensor_drift_effect() {
       .conflicts = {"temperature-drift", "sensor-offset"},
       .parameters = {{"rate_Pa_s", "Pa/s", "of the reading", 0.0, -50.0, 50.0, 4.0}},
       .stage = Stage::sensors,
-      .apply = apply,
+      .apply =
+          [](EffectValues values, const EffectContext&, rig::RigModel& model) {
+            const double rate_kPa_s = 1e-3 * values[0];
+            model.cavity_sensor.emplace_back(
+                [rate_kPa_s](double pressure_kPa, double time_s, const rig::RunPlace&) {
+                  return pressure_kPa + rate_kPa_s * time_s;
+                });
+          },
   }};
-  return effect;
 }
 
 }  // namespace diastole

@@ -3,18 +3,9 @@
 #include "estimator/effects/effect.hpp"
 
 namespace diastole {
-namespace {
 
-void apply(std::span<const double> values, const EffectContext&, rig::RigModel& model) {
-  const double factor = 1.0 + values[0];
-  model.cavity_sensor.emplace_back(
-      [factor](double pressure_kPa, double, const rig::RunPlace&) { return factor * pressure_kPa; });
-}
-
-}  // namespace
-
-const Effect& sensor_gain_effect() {
-  static const Effect effect{{
+Effect sensor_gain_effect() {
+  return {{
       .id = "sensor-gain",
       .title = "gain of the cavity sensor",
       .port = Port::sensor,
@@ -25,9 +16,14 @@ const Effect& sensor_gain_effect() {
       .conflicts = {"radius-error"},
       .parameters = {{"gain", "", "part by which the reading exceeds the pressure", 0.0, -0.3, 0.3, 0.05}},
       .stage = Stage::sensors,
-      .apply = apply,
+      .apply =
+          [](EffectValues values, const EffectContext&, rig::RigModel& model) {
+            const double factor = 1.0 + values[0];
+            model.cavity_sensor.emplace_back([factor](double pressure_kPa, double, const rig::RunPlace&) {
+              return factor * pressure_kPa;
+            });
+          },
   }};
-  return effect;
 }
 
 }  // namespace diastole

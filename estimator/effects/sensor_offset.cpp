@@ -3,21 +3,9 @@
 #include "estimator/effects/effect.hpp"
 
 namespace diastole {
-namespace {
 
-void apply(std::span<const double> values, const EffectContext& context, rig::RigModel& model) {
-  if (context.change_points.empty()) return;
-  const ChangePoint moment = context.change_points.front();
-  const double step_kPa = 1e-3 * values[0];
-  model.cavity_sensor.emplace_back([=](double pressure_kPa, double time_s, const rig::RunPlace& place) {
-    return pressure_kPa + (place.started_s + time_s >= moment.session_s ? step_kPa : 0.0);
-  });
-}
-
-}  // namespace
-
-const Effect& sensor_offset_effect() {
-  static const Effect effect{{
+Effect sensor_offset_effect() {
+  return {{
       .id = "sensor-offset",
       .title = "step of the sensor's zero",
       .port = Port::sensor,
@@ -29,9 +17,17 @@ const Effect& sensor_offset_effect() {
       .parameters = {{"step_Pa", "Pa", "after the moment", 0.0, -3000.0, 3000.0, 300.0}},
       .change_points = ChangePoints::one,
       .stage = Stage::sensors,
-      .apply = apply,
+      .apply =
+          [](EffectValues values, const EffectContext& context, rig::RigModel& model) {
+            if (context.change_points.empty()) return;
+            const ChangePoint moment = context.change_points.front();
+            const double step_kPa = 1e-3 * values[0];
+            model.cavity_sensor.emplace_back(
+                [=](double pressure_kPa, double time_s, const rig::RunPlace& place) {
+                  return pressure_kPa + (place.started_s + time_s >= moment.session_s ? step_kPa : 0.0);
+                });
+          },
   }};
-  return effect;
 }
 
 }  // namespace diastole

@@ -19,21 +19,8 @@ double Inclusion::stiffness(const std::array<double, 3>& X_mm) const {
   return 1.0 + (contrast - 1.0) * 0.5 * (1.0 - std::tanh((rho - 1.0) * mean_axis_mm / edge_width_mm));
 }
 
-namespace {
-
-void apply_to_field(std::span<const double> values, FieldModel& model) {
-  if (values[0] == 1.0) return;
-  model.inclusion = Inclusion{.contrast = values[0],
-                              .radius_mm = values[1],
-                              .z_mm = values[2],
-                              .theta_deg = values[3],
-                              .semi_axes_mm = {values[4], values[5], values[6]}};
-}
-
-}  // namespace
-
-const Effect& stiff_inclusion_effect() {
-  static const Effect effect{{
+Effect stiff_inclusion_effect() {
+  return {{
       .id = "stiff-inclusion",
       .title = "lump of another stiffness",
       .port = Port::field,
@@ -55,9 +42,16 @@ const Effect& stiff_inclusion_effect() {
                            {"semi_axis_axial_mm", "mm", "", 10.0, 3.0, 30.0, 10.0, SearchScale::logarithmic}},
       .field_essentials = 4,
       .field_shape = FieldShape::inclusion,
-      .apply_to_field = apply_to_field,
+      .apply_to_field =
+          [](EffectValues values, FieldModel& model) {
+            if (values[0] == 1.0) return;
+            model.inclusion = Inclusion{.contrast = values[0],
+                                        .radius_mm = values[1],
+                                        .z_mm = values[2],
+                                        .theta_deg = values[3],
+                                        .semi_axes_mm = {values[4], values[5], values[6]}};
+          },
   }};
-  return effect;
 }
 
 }  // namespace diastole

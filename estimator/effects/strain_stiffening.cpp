@@ -3,20 +3,9 @@
 #include "estimator/effects/effect.hpp"
 
 namespace diastole {
-namespace {
 
-void apply(std::span<const double> values, const EffectContext& context, rig::RigModel& model) {
-  if (values[0] == 0.0) return;
-  model.curve = model.curve.plus(context.family.stiffened(values[0], context.low_fidelity), 1.0, 1.0)
-                    .plus(context.family.plain(), 1.0, -1.0);
-}
-
-void apply_to_field(std::span<const double> values, FieldModel& model) { model.beta = values[0]; }
-
-}  // namespace
-
-const Effect& strain_stiffening_effect() {
-  static const Effect effect{{
+Effect strain_stiffening_effect() {
+  return {{
       .id = "strain-stiffening",
       .title = "stiffening wall",
       .port = Port::specimen,
@@ -27,11 +16,16 @@ const Effect& strain_stiffening_effect() {
       .conflicts = {"radius-error", "chamber-back-pressure", "stroke-gain"},
       .parameters = {{"beta", "", "stiffening with I1 - 3", 0.0, 0.0, 3.0, 1.0}},
       .needs_neighbours = true,
-      .apply = apply,
+      .apply =
+          [](EffectValues values, const EffectContext& context, rig::RigModel& model) {
+            if (values[0] == 0.0) return;
+            model.curve =
+                model.curve.plus(context.family.stiffened(values[0], context.low_fidelity), 1.0, 1.0)
+                    .plus(context.family.plain(), 1.0, -1.0);
+          },
       .field_parameters = {{"beta", "", "stiffening with I1 - 3", 0.0, 0.0, 40.0, 4.0}},
-      .apply_to_field = apply_to_field,
+      .apply_to_field = [](EffectValues values, FieldModel& model) { model.beta = values[0]; },
   }};
-  return effect;
 }
 
 }  // namespace diastole

@@ -7,6 +7,7 @@
 #include "estimator/effects/effect.hpp"
 
 namespace diastole {
+
 namespace {
 
 class Softening final : public rig::SpecimenMemory {
@@ -50,20 +51,10 @@ class Softening final : public rig::SpecimenMemory {
   double lost_;   ///< D
 };
 
-void apply(std::span<const double> values, const EffectContext&, rig::RigModel& model) {
-  const double delta = values[0];
-  const double cycles = values[1];
-  const double scale_mL = values[2];
-  if (delta == 0.0) return;
-  model.memories.emplace_back([=](const rig::RunPlace& place) {
-    return std::make_unique<Softening>(delta, cycles, scale_mL, place);
-  });
-}
-
 }  // namespace
 
-const Effect& stress_softening_effect() {
-  static const Effect effect{{
+Effect stress_softening_effect() {
+  return {{
       .id = "stress-softening",
       .title = "stress softening",
       .port = Port::specimen,
@@ -80,9 +71,17 @@ const Effect& stress_softening_effect() {
                      {"V0_mL", "mL", "volume at which most of it is lost", 12.0, 1.0, 60.0, 12.0,
                       SearchScale::logarithmic}},
       .keeps_modulus = false,
-      .apply = apply,
+      .apply =
+          [](EffectValues values, const EffectContext&, rig::RigModel& model) {
+            const double delta = values[0];
+            const double cycles = values[1];
+            const double scale_mL = values[2];
+            if (delta == 0.0) return;
+            model.memories.emplace_back([=](const rig::RunPlace& place) {
+              return std::make_unique<Softening>(delta, cycles, scale_mL, place);
+            });
+          },
   }};
-  return effect;
 }
 
 }  // namespace diastole

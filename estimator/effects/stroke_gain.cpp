@@ -3,21 +3,9 @@
 #include "estimator/effects/effect.hpp"
 
 namespace diastole {
-namespace {
 
-void apply(std::span<const double> values, const EffectContext&, rig::RigModel& model) {
-  const double factor = 1.0 + values[0];
-  model.drive.emplace_back([factor](rig::DriveTrace& trace, const rig::RunPlace&) {
-    for (auto* series : {&trace.volume_mL, &trace.flow_mL_per_s, &trace.acceleration_mL_per_s2})
-      for (double& value : *series)
-        value *= factor;
-  });
-}
-
-}  // namespace
-
-const Effect& stroke_gain_effect() {
-  static const Effect effect{{
+Effect stroke_gain_effect() {
+  return {{
       .id = "stroke-gain",
       .title = "stroke gain",
       .port = Port::drive,
@@ -30,9 +18,16 @@ const Effect& stroke_gain_effect() {
                     "air-bubble-cavity"},
       .parameters = {{"gain", "", "part by which the displaced volume exceeds the commanded one", 0.0, -0.15,
                       0.15, 0.04}},
-      .apply = apply,
+      .apply =
+          [](EffectValues values, const EffectContext&, rig::RigModel& model) {
+            const double factor = 1.0 + values[0];
+            model.drive.emplace_back([factor](rig::DriveTrace& trace, const rig::RunPlace&) {
+              for (auto* series : {&trace.volume_mL, &trace.flow_mL_per_s, &trace.acceleration_mL_per_s2})
+                for (double& value : *series)
+                  value *= factor;
+            });
+          },
   }};
-  return effect;
 }
 
 }  // namespace diastole

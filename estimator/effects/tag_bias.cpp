@@ -3,16 +3,9 @@
 #include "estimator/effects/effect.hpp"
 
 namespace diastole {
-namespace {
 
-void apply_to_field(std::span<const double> values, FieldModel& model) {
-  model.displacement_gain = values[0];
-}
-
-}  // namespace
-
-const Effect& tag_bias_effect() {
-  static const Effect effect{{
+Effect tag_bias_effect() {
+  return {{
       .id = "tag-bias",
       .title = "gain of the imaged displacement",
       .port = Port::field,
@@ -25,9 +18,8 @@ const Effect& tag_bias_effect() {
                      "With the modulus free it is the modulus.",
       .conflicts = {"chamber-back-pressure", "radius-error"},
       .field_parameters = {{"gain", "", "displacement as seen over the true one", 1.0, 0.7, 1.3, 0.95}},
-      .apply_to_field = apply_to_field,
+      .apply_to_field = [](EffectValues values, FieldModel& model) { model.displacement_gain = values[0]; },
   }};
-  return effect;
 }
 
 }  // namespace diastole

@@ -6,6 +6,7 @@
 #include "estimator/effects/effect.hpp"
 
 namespace diastole {
+
 namespace {
 
 class Warming final : public rig::SpecimenMemory {
@@ -21,19 +22,10 @@ class Warming final : public rig::SpecimenMemory {
   double fraction_, tau_s_, started_s_;
 };
 
-void apply(std::span<const double> values, const EffectContext&, rig::RigModel& model) {
-  const double fraction = values[0];
-  const double tau_s = values[1];
-  if (fraction == 0.0) return;
-  model.memories.emplace_back([=](const rig::RunPlace& place) {
-    return std::make_unique<Warming>(fraction, tau_s, place.started_s);
-  });
-}
-
 }  // namespace
 
-const Effect& temperature_drift_effect() {
-  static const Effect effect{{
+Effect temperature_drift_effect() {
+  return {{
       .id = "temperature-drift",
       .title = "modulus drifting with temperature",
       .port = Port::specimen,
@@ -46,9 +38,16 @@ const Effect& temperature_drift_effect() {
       .parameters = {{"fraction", "", "final change of the modulus", 0.0, -0.3, 0.3, 0.03},
                      {"tau_s", "s", "of the warming", 300.0, 20.0, 5000.0, 200.0, SearchScale::logarithmic}},
       .keeps_modulus = false,
-      .apply = apply,
+      .apply =
+          [](EffectValues values, const EffectContext&, rig::RigModel& model) {
+            const double fraction = values[0];
+            const double tau_s = values[1];
+            if (fraction == 0.0) return;
+            model.memories.emplace_back([=](const rig::RunPlace& place) {
+              return std::make_unique<Warming>(fraction, tau_s, place.started_s);
+            });
+          },
   }};
-  return effect;
 }
 
 }  // namespace diastole

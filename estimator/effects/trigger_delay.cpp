@@ -3,16 +3,9 @@
 #include "estimator/effects/effect.hpp"
 
 namespace diastole {
-namespace {
 
-void apply(std::span<const double> values, const EffectContext&, rig::RigModel& model) {
-  model.sample_delay_s += values[0];
-}
-
-}  // namespace
-
-const Effect& trigger_delay_effect() {
-  static const Effect effect{{
+Effect trigger_delay_effect() {
+  return {{
       .id = "trigger-delay",
       .title = "delay of the samples",
       .port = Port::clock,
@@ -24,9 +17,9 @@ const Effect& trigger_delay_effect() {
       .conflicts = {"catheter-resonance", "clock-skew"},
       .parameters = {{"delay_s", "s", "of the samples", 0.0, -0.2, 0.2, 0.01}},
       .stage = Stage::sensors,
-      .apply = apply,
+      .apply = [](EffectValues values, const EffectContext&,
+                  rig::RigModel& model) { model.sample_delay_s += values[0]; },
   }};
-  return effect;
 }
 
 }  // namespace diastole

@@ -7,6 +7,7 @@
 #include "estimator/effects/effect.hpp"
 
 namespace diastole {
+
 namespace {
 
 class Relaxation final : public rig::SpecimenMemory {
@@ -46,18 +47,10 @@ class Relaxation final : public rig::SpecimenMemory {
   bool begun_ = false;
 };
 
-void apply(std::span<const double> values, const EffectContext&, rig::RigModel& model) {
-  std::array<double, 3> parts{values[0], values[1], values[2]};
-  std::array<double, 3> times{values[3], values[4], values[5]};
-  if (parts == std::array<double, 3>{}) return;
-  model.memories.emplace_back(
-      [=](const rig::RunPlace&) { return std::make_unique<Relaxation>(parts, times); });
-}
-
 }  // namespace
 
-const Effect& viscoelasticity_effect() {
-  static const Effect effect{{
+Effect viscoelasticity_effect() {
+  return {{
       .id = "viscoelasticity",
       .title = "viscoelastic specimen",
       .port = Port::specimen,
@@ -74,9 +67,15 @@ const Effect& viscoelasticity_effect() {
                      {"tau_middle_s", "s", "", 1.0, 0.4, 2.5, 1.0, SearchScale::logarithmic},
                      {"tau_slow_s", "s", "", 6.0, 2.5, 60.0, 6.0, SearchScale::logarithmic}},
       .keeps_modulus = false,
-      .apply = apply,
+      .apply =
+          [](EffectValues values, const EffectContext&, rig::RigModel& model) {
+            std::array<double, 3> parts{values[0], values[1], values[2]};
+            std::array<double, 3> times{values[3], values[4], values[5]};
+            if (parts == std::array<double, 3>{}) return;
+            model.memories.emplace_back(
+                [=](const rig::RunPlace&) { return std::make_unique<Relaxation>(parts, times); });
+          },
   }};
-  return effect;
 }
 
 }  // namespace diastole

@@ -3,19 +3,9 @@
 #include "estimator/effects/effect.hpp"
 
 namespace diastole {
-namespace {
 
-void apply(std::span<const double> values, const EffectContext&, rig::RigModel& model) {
-  const double bend_per_kPa = values[0];
-  model.cavity_sensor.emplace_back([bend_per_kPa](double pressure_kPa, double, const rig::RunPlace&) {
-    return pressure_kPa * (1.0 + bend_per_kPa * pressure_kPa);
-  });
-}
-
-}  // namespace
-
-const Effect& dummy_effect() {
-  static const Effect effect{{
+Effect dummy_effect() {
+  return {{
       .id = "dummy",
       .title = "bent reading of the cavity sensor",
       .port = Port::sensor,
@@ -26,9 +16,15 @@ const Effect& dummy_effect() {
       .conflicts = {"sensor-gain"},
       .parameters = {{"bend_per_kPa", "1/kPa", "of the reading", 0.0, -0.1, 0.1, 0.02}},
       .stage = Stage::sensors,
-      .apply = apply,
+      .apply =
+          [](EffectValues values, const EffectContext&, rig::RigModel& model) {
+            const double bend_per_kPa = values[0];
+            model.cavity_sensor.emplace_back(
+                [bend_per_kPa](double pressure_kPa, double, const rig::RunPlace&) {
+                  return pressure_kPa * (1.0 + bend_per_kPa * pressure_kPa);
+                });
+          },
   }};
-  return effect;
 }
 
 }  // namespace diastole
