@@ -17,7 +17,6 @@
 #include "estimator/cli/solution_json.hpp"
 #include "estimator/cli/solution_outputs.hpp"
 #include "estimator/cli/study_options.hpp"
-#include "estimator/fe/averaged_pressure.hpp"
 #include "estimator/fe/elastic_system.hpp"
 #include "estimator/fe/point_fields.hpp"
 #include "estimator/io/measurement.hpp"

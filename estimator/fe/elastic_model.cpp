@@ -2,10 +2,8 @@
 
 #include <algorithm>
 #include <stdexcept>
-#include <thread>
 #include <utility>
 
-#include "estimator/fe/elastic_system.hpp"
 #include "estimator/fe/load_path.hpp"
 
 namespace diastole {
@@ -13,13 +11,6 @@ namespace {
 
 constexpr double mL_per_mm3 = 1e-3;
 constexpr double mJ_per_uJ = 1e-3;
-
-HeldDofs bonded_ends(const HermiteMesh& mesh) {
-  HeldDofs held = hold_nothing(mesh);
-  hold_face(mesh, mesh.faces().bottom, held);
-  hold_face(mesh, mesh.faces().top, held);
-  return held;
-}
 
 }  // namespace
 
@@ -32,51 +23,10 @@ std::vector<ParameterGroup> each_element(size_t parameter, size_t element_count)
   return groups;
 }
 
-ElasticModel::ElasticModel(HermiteMesh mesh, const Law& law, ElasticOptions options)
-    : solve_options_(std::move(options.solve)) {
-  SystemOptions system;
-  system.parameters = std::move(options.parameters);
-  system.pressure_space = options.pressure_space;
-  system.held = options.held             ? *options.held
-                : options.bonded.empty() ? bonded_ends(mesh)
-                                         : hold_nothing(mesh);
-  system.bonded = std::move(options.bonded);
-  system.chamber = options.chamber;
-  system.loaded = options.loaded ? *options.loaded : mesh.faces().inner;
-  system.material_axes = std::move(options.material_axes);
-  system.stiffness = std::move(options.stiffness);
-  system.volume_stiffness_kPa = options.volume_stiffness_kPa;
-  system.compressibility_per_kPa = options.bulk_modulus_kPa ? 1.0 / *options.bulk_modulus_kPa : 0.0;
-  system.threads = options.threads > 0 ? options.threads : std::max(1U, std::thread::hardware_concurrency());
-  system_ = std::make_unique<ElasticSystem>(std::move(mesh), law, system);
-}
-
-ElasticModel::~ElasticModel() = default;
-ElasticModel::ElasticModel(ElasticModel&&) noexcept = default;
-ElasticModel& ElasticModel::operator=(ElasticModel&&) noexcept = default;
-
-const HermiteMesh& ElasticModel::mesh() const { return system_->mesh(); }
-const Law& ElasticModel::law() const { return system_->law(); }
-size_t ElasticModel::dofs() const { return system_->equations().unknowns(); }
-size_t ElasticModel::displacement_dofs() const { return system_->equations().displacement_unknowns(); }
-size_t ElasticModel::pressure_dofs() const { return system_->equations().pressure_unknowns(); }
-ElasticSystem& ElasticModel::system() { return *system_; }
-const ElasticSystem& ElasticModel::system() const { return *system_; }
-
 void ElasticModel::set_parameter(size_t parameter, double value) {
   for (size_t e = 0; e < mesh().element_count(); ++e)
     set_element_parameter(parameter, e, value);
 }
-
-void ElasticModel::set_element_parameter(size_t parameter, size_t element, double value) {
-  system_->parameters(element)[parameter] = value;
-}
-
-double ElasticModel::element_parameter(size_t parameter, size_t element) const {
-  return std::as_const(*system_).parameters(element)[parameter];
-}
-
-ElasticState ElasticModel::rest_state() const { return system_->rest_state(); }
 
 Solution ElasticModel::solve(double pressure_kPa) { return solve(pressure_kPa, rest_state()); }
 
@@ -85,12 +35,12 @@ Solution ElasticModel::solve(double pressure_kPa, const ElasticState& start) {
 }
 
 Solution ElasticModel::solve(const Load& load, const ElasticState& start) {
-  PathResult path = follow_load(*system_, start, load, solve_options_);
+  Solution path = follow_load(*system_, start, load, solve_options_);
   judge_end(path, load, start.pressure_kPa);
-  return {std::move(path.state), std::move(path.report)};
+  return path;
 }
 
-void ElasticModel::judge_end(PathResult& path, const Load& load, double start_kPa) {
+void ElasticModel::judge_end(Solution& path, const Load& load, double start_kPa) {
   constexpr double nearly_vanished = 0.1;
   SolveReport& report = path.report;
   const bool pressure_path =

@@ -7,12 +7,13 @@
 //   if (!solution.report.converged()) ... solution.report.describe()
 //   Eigen::Vector3d x = model.mesh().value(solution.state.position_mm, {element, xi});
 //   Eigen::Matrix3d F = model.mesh().reference_gradient(solution.state.position_mm, {element, xi});
-//   double taken_mL = model.cavity_volume_mL(solution.state) - model.cavity_volume_mL(model.rest_state());
-//   model.set_parameter(0, 9.0);                              // whole body; set_element_parameter for one
-//   element solution = model.solve(3.1, solution.state);              // warm start Sensitivities by =
-//   model.sensitivities(solution.state, {whole_parameter(0)}); Eigen::Vector3d dx_dC1 =
-//   model.mesh().value(by.parameter[0], {element, xi}); Eigen::Vector3d dx_dP =
-//   model.mesh().value(by.pressure, {element, xi});
+//   double volume_change_mL =
+//       model.cavity_volume_mL(solution.state) - model.cavity_volume_mL(model.rest_state());
+//   model.set_parameter(0, 9.0);                              // whole body; set_element_parameter for one element
+//   solution = model.solve(3.1, solution.state);              // warm start
+//   Sensitivities by = model.sensitivities(solution.state, {whole_parameter(0)});
+//   Eigen::Vector3d dx_dC1 = model.mesh().value(by.parameter[0], {element, xi});
+//   Eigen::Vector3d dx_dP = model.mesh().value(by.pressure, {element, xi});
 //
 // Equations: element_mechanics.hpp, cavity_load.hpp; Newton's method: newton.hpp; load steps: load_path.hpp.
 // Units: mm, kPa, mL. A model is used by one thread at a time (it works in parallel itself).
@@ -22,36 +23,9 @@
 #include <span>
 #include <vector>
 
-#include "estimator/fe/chamber.hpp"
-#include "estimator/fe/elastic_state.hpp"
-#include "estimator/fe/element_mechanics.hpp"
-#include "estimator/fe/pressure_space.hpp"
-#include "estimator/fe/solve_report.hpp"
-#include "estimator/fe/spring_bond.hpp"
-#include "estimator/fe/supports.hpp"
-#include "estimator/materials/law.hpp"
-#include "estimator/mesh/hermite_mesh.hpp"
+#include "estimator/fe/elastic_system.hpp"
 
 namespace diastole {
-
-class ElasticSystem;
-struct PathResult;
-
-struct ElasticOptions {
-  std::vector<double> parameters{};  ///< the law's, in its order; the same in all elements
-  PressureSpace pressure_space = PressureSpace::per_element;
-  std::optional<HeldDofs> held{};  ///< default: bottom and top faces held, or nothing if some are on springs
-  std::vector<BondedFaces> bonded{};  ///< faces on springs (spring_bond.hpp)
-  std::optional<Chamber> chamber{};   ///< around the outer faces (chamber.hpp)
-  std::optional<std::vector<ElementFace>>
-      loaded{};                              ///< default: the inner faces; see fluid_surface.hpp on free rims
-  MaterialAxesField material_axes{};         ///< default: the coordinate axes
-  StiffnessField stiffness{};                ///< of incompressible material; default: 1 everywhere
-  double volume_stiffness_kPa = 0.0;         ///< kappa of element_mechanics.hpp
-  std::optional<double> bulk_modulus_kPa{};  ///< K of element_mechanics.hpp; default: incompressible
-  SolveOptions solve{};
-  size_t threads = 0;  ///< 0: as many as the machine has
-};
 
 /// A direction in parameter space: one parameter of the law, varied by the same amount in some elements.
 struct ParameterGroup {
@@ -71,32 +45,30 @@ struct Sensitivities {
   size_t negative_pivots = 0;        ///< of the tangent at this state
 };
 
-struct Solution {
-  ElasticState state;  ///< the last converged one when the report says failure
-  SolveReport report;
-};
-
 class ElasticModel {
  public:
   /// Precondition: as many parameters as the law has.
-  ElasticModel(HermiteMesh mesh, const Law& law, ElasticOptions options);
-  ~ElasticModel();
-  ElasticModel(ElasticModel&&) noexcept;
-  ElasticModel& operator=(ElasticModel&&) noexcept;
+  ElasticModel(HermiteMesh mesh, const Law& law, const ElasticOptions& options)
+      : system_(std::make_unique<ElasticSystem>(std::move(mesh), law, options)),
+        solve_options_(options.solve) {}
 
-  [[nodiscard]] const HermiteMesh& mesh() const;
-  [[nodiscard]] const Law& law() const;
+  [[nodiscard]] const HermiteMesh& mesh() const { return system_->mesh(); }
+  [[nodiscard]] const Law& law() const { return system_->law(); }
   /// Unknowns of the discrete problem: free displacement dofs plus Lagrange pressures.
-  [[nodiscard]] size_t dofs() const;
-  [[nodiscard]] size_t displacement_dofs() const;
-  [[nodiscard]] size_t pressure_dofs() const;
+  [[nodiscard]] size_t dofs() const { return system_->equations().unknowns(); }
+  [[nodiscard]] size_t displacement_dofs() const { return system_->equations().displacement_unknowns(); }
+  [[nodiscard]] size_t pressure_dofs() const { return system_->equations().pressure_unknowns(); }
 
   void set_parameter(size_t parameter, double value);
-  void set_element_parameter(size_t parameter, size_t element, double value);
-  [[nodiscard]] double element_parameter(size_t parameter, size_t element) const;
+  void set_element_parameter(size_t parameter, size_t element, double value) {
+    system_->parameters(element)[parameter] = value;
+  }
+  [[nodiscard]] double element_parameter(size_t parameter, size_t element) const {
+    return std::as_const(*system_).parameters(element)[parameter];
+  }
 
   /// Undeformed, unloaded; the Lagrange pressure balances the law's stress at rest.
-  [[nodiscard]] ElasticState rest_state() const;
+  [[nodiscard]] ElasticState rest_state() const { return system_->rest_state(); }
 
   /// Equilibrium at a cavity pressure, from rest or from an earlier state (of any pressure and parameters).
   [[nodiscard]] Solution solve(double pressure_kPa);
@@ -119,11 +91,11 @@ class ElasticModel {
   [[nodiscard]] double stored_energy_mJ(const ElasticState& state) const;
 
   /// The discrete equations themselves, for verification and for what is derived from a solution.
-  [[nodiscard]] ElasticSystem& system();
-  [[nodiscard]] const ElasticSystem& system() const;
+  [[nodiscard]] ElasticSystem& system() { return *system_; }
+  [[nodiscard]] const ElasticSystem& system() const { return *system_; }
 
  private:
-  void judge_end(PathResult& path, const Load& load, double start_kPa);
+  void judge_end(Solution& path, const Load& load, double start_kPa);
 
   std::unique_ptr<ElasticSystem> system_;
   SolveOptions solve_options_;

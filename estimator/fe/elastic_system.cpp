@@ -12,15 +12,30 @@ namespace {
 
 constexpr double mm3_per_mL = 1e3;
 
-EquationOptions equation_options(const HermiteMesh& mesh, const SystemOptions& options) {
+constexpr SymmetricTensor<double> undeformed{1.0, 1.0, 1.0, 0.0, 0.0, 0.0};
+
+HeldDofs held_by(const ElasticOptions& options, const HermiteMesh& mesh) {
+  if (options.held) return *options.held;
+  HeldDofs held = hold_nothing(mesh);
+  if (!options.bonded.empty()) return held;
+  hold_face(mesh, mesh.faces().bottom, held);
+  hold_face(mesh, mesh.faces().top, held);
+  return held;
+}
+
+const std::vector<ElementFace>& loaded_by(const ElasticOptions& options, const HermiteMesh& mesh) {
+  return options.loaded ? *options.loaded : mesh.faces().inner;
+}
+
+EquationOptions equation_options(const ElasticOptions& options, const HermiteMesh& mesh) {
   EquationOptions equations;
-  equations.compressible = options.compressibility_per_kPa > 0.0;
+  equations.compressible = options.bulk_modulus_kPa.has_value();
   if (options.chamber && options.chamber->sealed()) equations.fluids.push_back(mesh.faces().outer);
-  equations.fluids.push_back(options.loaded);
+  equations.fluids.push_back(loaded_by(options, mesh));
   return equations;
 }
 
-std::vector<ElementFace> plates_of(const SystemOptions& options) {
+std::vector<ElementFace> plates_of(const ElasticOptions& options) {
   std::vector<ElementFace> plates;
   for (const BondedFaces& bonded : options.bonded)
     plates.insert(plates.end(), bonded.faces.begin(), bonded.faces.end());
@@ -29,28 +44,26 @@ std::vector<ElementFace> plates_of(const SystemOptions& options) {
 
 /// Area vectors of a face's functions, as a field over its element.
 ElementField over_element(const ElementFace& face, const FaceField& on_face) {
-  const std::array<size_t, face_functions> functions = face_hermite_functions(face);
   ElementField field = ElementField::Zero();
-  for (size_t a = 0; a < face_functions; ++a)
-    field.col(static_cast<Eigen::Index>(functions[a])) = on_face.col(static_cast<Eigen::Index>(a));
+  field(Eigen::all, face_hermite_functions(face)) = on_face;
   return field;
 }
 
 }  // namespace
 
-ElasticSystem::ElasticSystem(HermiteMesh mesh, const Law& law, const SystemOptions& options)
+ElasticSystem::ElasticSystem(HermiteMesh mesh, const Law& law, const ElasticOptions& options)
     : mesh_(std::move(mesh)),
       law_(&law),
       count_(law.parameters().size()),
       pressures_(make_pressure_map(mesh_, options.pressure_space)),
-      held_(options.held),
-      cavity_(mesh_, options.loaded, options.held, plates_of(options)),
+      held_(held_by(options, mesh_)),
+      cavity_(mesh_, loaded_by(options, mesh_), held_, plates_of(options)),
       chamber_(options.chamber),
       material_axes_(options.material_axes),
       volume_stiffness_kPa_(options.volume_stiffness_kPa),
-      compressibility_per_kPa_(options.compressibility_per_kPa),
-      threads_(options.threads),
-      equations_(mesh_, options.held, pressures_, equation_options(mesh_, options)),
+      compressibility_per_kPa_(options.bulk_modulus_kPa ? 1.0 / *options.bulk_modulus_kPa : 0.0),
+      threads_(options.threads > 0 ? options.threads : machine_threads()),
+      equations_(mesh_, held_, pressures_, equation_options(options, mesh_)),
       skew_(equations_, cavity_.free_rim()),
       factor_(equations_, skew_) {
   for (size_t e = 0; e < mesh_.element_count(); ++e) {
@@ -58,7 +71,7 @@ ElasticSystem::ElasticSystem(HermiteMesh mesh, const Law& law, const SystemOptio
     reference_.push_back(make_reference_element(mesh_, e, options.material_axes, options.stiffness));
   }
   if (chamber_) {
-    chamber_wall_ = FluidSurface(mesh_, mesh_.faces().outer, options.held, plates_of(options));
+    chamber_wall_ = FluidSurface(mesh_, mesh_.faces().outer, held_, plates_of(options));
     undeformed_chamber_mm3_ = chamber_wall_.volume_mm3(mesh_, mesh_.reference());
   }
   for (const BondedFaces& bonded : options.bonded) {
@@ -93,7 +106,6 @@ bool ElasticSystem::on_springs(const ElementFace& face) const {
 }
 
 double ElasticSystem::rest_pressure_kPa(size_t element) const {
-  constexpr SymmetricTensor<double> undeformed{1.0, 1.0, 1.0, 0.0, 0.0, 0.0};
   return trace(law_->stress(undeformed, parameters(element))) / 3.0;
 }
 
@@ -184,26 +196,16 @@ void ElasticSystem::add_fluids(const ElasticState& state, std::span<double> resi
   }
 }
 
-ElementField ElasticSystem::spring_force(const SpringFace& spring, const NodeField& position_mm) const {
-  const size_t element = spring.face.element;
-  const ElementField displacement =
-      mesh_.gather(element, position_mm) - mesh_.gather(element, mesh_.reference());
-  const std::array<size_t, face_functions> functions = face_hermite_functions(spring.face);
-  FaceField on_face;
-  for (size_t a = 0; a < face_functions; ++a)
-    on_face.col(static_cast<Eigen::Index>(a)) = displacement.col(static_cast<Eigen::Index>(functions[a]));
-  FaceField force;
-  force.reshaped() = spring.stiffness * on_face.reshaped();
-  return over_element(spring.face, force);
-}
-
 void ElasticSystem::add_springs(const ElasticState& state, SystemResidual& total) const {
   for (const SpringFace& spring : springs_) {
     const size_t element = spring.face.element;
-    const ElementField force = spring_force(spring, state.position_mm);
-    equations_.add_force(element, force, total.values);
     const ElementField displacement =
         mesh_.gather(element, state.position_mm) - mesh_.gather(element, mesh_.reference());
+    const FaceField on_face = displacement(Eigen::all, face_hermite_functions(spring.face));
+    FaceField force_on_face;
+    force_on_face.reshaped() = spring.stiffness * on_face.reshaped();
+    const ElementField force = over_element(spring.face, force_on_face);
+    equations_.add_force(element, force, total.values);
     total.bond_energy_uJ += 0.5 * force.cwiseProduct(displacement).sum();
   }
 }
@@ -290,7 +292,6 @@ void ElasticSystem::add_parameter_residual(const ElasticState& state, size_t par
         e, element_parameter_force(reference_[e], element_state(state, e), *law_, parameters(e), parameter),
         target);
     if (compressibility_per_kPa_ == 0.0) return;
-    constexpr SymmetricTensor<double> undeformed{1.0, 1.0, 1.0, 0.0, 0.0, 0.0};
     const double rest_rise = trace(law_->stress_sensitivity(undeformed, parameters(e), parameter)) / 3.0;
     const std::array<double, corners> volume_mm3 = pressure_volume_mm3(reference_[e]);
     for (size_t m = 0; m < corners; ++m) {
@@ -318,7 +319,6 @@ FactorResult ElasticSystem::inertia(const ElasticState& state, double probing_st
 }
 
 double ElasticSystem::material_stiffness_kPa() const {
-  constexpr SymmetricTensor<double> undeformed{1.0, 1.0, 1.0, 0.0, 0.0, 0.0};
   double most = 0.0;
   for (size_t e = 0; e < mesh_.element_count(); ++e) {
     const TangentTensor tangent = law_->response(undeformed, parameters(e)).tangent;

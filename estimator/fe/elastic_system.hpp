@@ -17,7 +17,6 @@
 #include "estimator/fe/element_mechanics.hpp"
 #include "estimator/fe/equation_system.hpp"
 #include "estimator/fe/fluid_surface.hpp"
-#include "estimator/fe/rim_skew.hpp"
 #include "estimator/fe/solve_report.hpp"
 #include "estimator/fe/spring_bond.hpp"
 #include "estimator/fe/tangent_factor.hpp"
@@ -34,18 +33,26 @@ struct SystemResidual {
   std::optional<size_t> beyond_law;  ///< an element where the law has no energy
 };
 
-struct SystemOptions {
-  std::vector<double> parameters;  ///< the law's, in its order; the same in all elements
+struct ElasticOptions {
+  std::vector<double> parameters{};  ///< the law's, in its order; the same in all elements
   PressureSpace pressure_space = PressureSpace::per_element;
-  HeldDofs held;
-  std::vector<ElementFace> loaded;       ///< faces that the cavity pressure pushes on: the cavity's wall
-  std::optional<Chamber> chamber{};      ///< around the outer faces
-  std::vector<BondedFaces> bonded{};     ///< faces on springs, at plates z = const
-  MaterialAxesField material_axes;       ///< empty: the coordinate axes
-  StiffnessField stiffness{};            ///< empty: 1 everywhere
-  double volume_stiffness_kPa = 0.0;     ///< kappa of element_mechanics.hpp
-  double compressibility_per_kPa = 0.0;  ///< 1/K of element_mechanics.hpp
-  size_t threads = 1;
+  std::optional<HeldDofs> held{};  ///< default: bottom and top faces held, or nothing if some are on springs
+  std::vector<BondedFaces> bonded{};  ///< faces on springs, at plates z = const (spring_bond.hpp)
+  std::optional<Chamber> chamber{};   ///< around the outer faces (chamber.hpp)
+  /// Faces that the cavity pressure pushes on; default: the inner faces; see fluid_surface.hpp on free rims.
+  std::optional<std::vector<ElementFace>> loaded{};
+  MaterialAxesField material_axes{};         ///< default: the coordinate axes
+  StiffnessField stiffness{};                ///< of incompressible material; default: 1 everywhere
+  double volume_stiffness_kPa = 0.0;         ///< kappa of element_mechanics.hpp
+  std::optional<double> bulk_modulus_kPa{};  ///< K of element_mechanics.hpp; default: incompressible
+  SolveOptions solve{};                      ///< of ElasticModel
+  size_t threads = 0;                        ///< 0: as many as the machine has
+};
+
+/// A state and how it was reached.
+struct Solution {
+  ElasticState state;  ///< the last converged one when the report says failure
+  SolveReport report;
 };
 
 struct Stability {
@@ -63,7 +70,7 @@ struct Stability {
 
 class ElasticSystem {
  public:
-  ElasticSystem(HermiteMesh mesh, const Law& law, const SystemOptions& options);
+  ElasticSystem(HermiteMesh mesh, const Law& law, const ElasticOptions& options);
 
   [[nodiscard]] const HermiteMesh& mesh() const { return mesh_; }
   [[nodiscard]] const Law& law() const { return *law_; }
@@ -152,7 +159,6 @@ class ElasticSystem {
     ElementFace face;
     FaceTangent stiffness;
   };
-  [[nodiscard]] ElementField spring_force(const SpringFace& spring, const NodeField& position_mm) const;
 
   HermiteMesh mesh_;
   const Law* law_;

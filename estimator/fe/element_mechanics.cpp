@@ -44,6 +44,14 @@ SymmetricTensor<double> right_cauchy_green(const Matrix3d& axes) {
   return symmetric_part(axes.transpose() * axes);
 }
 
+/// Adds d2(energy)/(dg_iK dg_kL), row 3 i + K, column 3 k + L.
+void add_moduli(double* moduli_at_point, const Eigen::Matrix<double, 9, 9>& part) {
+  for (size_t row = 0; row < 9; ++row) {
+    for (size_t column = 0; column < 9; ++column)
+      moduli_at_point[modulus_index(row / 3, row % 3, column / 3, column % 3)] += part(at(row), at(column));
+  }
+}
+
 /// Adds f(i, A) D(AM, BN) f(k, B) over material indices, then turns M, N into xi: the law's part of the
 /// moduli.
 void add_material_moduli(double* moduli_at_point, const Matrix3d& f, const TangentTensor& tangent,
@@ -60,16 +68,7 @@ void add_material_moduli(double* moduli_at_point, const Matrix3d& f, const Tange
   Eigen::Matrix<double, 6, 9> in_xi;
   for (Index i = 0; i < 3; ++i)
     in_xi.middleCols<3>(3 * i) = strain.middleCols<3>(3 * i) * t.transpose();
-  const Eigen::Matrix<double, 9, 9> part = in_xi.transpose() * tangent * in_xi;
-  for (size_t i = 0; i < 3; ++i) {
-    for (size_t dk = 0; dk < 3; ++dk) {
-      for (size_t k = 0; k < 3; ++k) {
-        for (size_t dl = 0; dl < 3; ++dl) {
-          moduli_at_point[modulus_index(i, dk, k, dl)] += part(at(3 * i + dk), at(3 * k + dl));
-        }
-      }
-    }
-  }
+  add_moduli(moduli_at_point, in_xi.transpose() * tangent * in_xi);
 }
 
 /// Initial-stress part delta_ik s(K, L) and pressure part -p d(cof g)_iK/dg_kL; overwrites all moduli.
@@ -101,20 +100,6 @@ void set_geometric_moduli(double* moduli_at_point, const Matrix3d& s, double pre
 /// p - kappa (J - 1): the pressure that cof(g) sees.
 double effective_pressure(const ElementState& state, size_t q, double volume_ratio) {
   return pressure_at(state.pressure_kPa, q) - state.volume_stiffness_kPa * (volume_ratio - 1.0);
-}
-
-/// kappa w^2 / dV cof(g) x cof(g): the volume stiffness's part of the moduli.
-void add_volume_moduli(double* moduli_at_point, double factor, const Matrix3d& cofactor) {
-  for (size_t i = 0; i < 3; ++i) {
-    for (size_t dk = 0; dk < 3; ++dk) {
-      for (size_t k = 0; k < 3; ++k) {
-        for (size_t dl = 0; dl < 3; ++dl) {
-          moduli_at_point[modulus_index(i, dk, k, dl)] +=
-              factor * cofactor(at(i), at(dk)) * cofactor(at(k), at(dl));
-        }
-      }
-    }
-  }
 }
 
 }  // namespace
@@ -199,8 +184,11 @@ void element_tangent(const ReferenceElement& reference, const ElementState& stat
     if (!response.tangent.isZero(0.0))
       add_material_moduli(point, f, reference[q].volume * reference[q].stiffness * response.tangent, t);
     const double volume_stiffness_kPa = state.volume_stiffness_kPa + state.probing_stiffness_kPa;
-    if (volume_stiffness_kPa > 0.0)
-      add_volume_moduli(point, volume_stiffness_kPa * weight * weight / reference[q].volume, cofactor);
+    if (volume_stiffness_kPa > 0.0) {
+      const Eigen::Vector<double, 9> growth = cofactor.reshaped<Eigen::RowMajor>();
+      const double factor = volume_stiffness_kPa * weight * weight / reference[q].volume;
+      add_moduli(point, (factor * growth) * growth.transpose());
+    }
     volume_slopes.set(q, -weight * cofactor);
     if (state.compressibility_per_kPa > 0.0) {
       const Eigen::Map<const Eigen::Vector<double, corners>> psi(tables.trilinear[q].data());

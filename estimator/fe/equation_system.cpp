@@ -14,6 +14,22 @@ constexpr size_t triangle(size_t row) { return row * (row + 1) / 2; }
 
 }  // namespace
 
+PressureMap make_pressure_map(const HermiteMesh& mesh, PressureSpace space) {
+  PressureMap map;
+  std::map<std::pair<size_t, size_t>, size_t> unknowns;  // of an element (0 if continuous) and a place
+  for (size_t e = 0; e < mesh.element_count(); ++e) {
+    std::array<size_t, corners> unknown;
+    for (size_t c = 0; c < corners; ++c) {
+      const size_t owner = space == PressureSpace::continuous ? 0 : e;
+      const size_t place = mesh.place_of(mesh.element(e)[c]);
+      unknown[c] = unknowns.try_emplace({owner, place}, unknowns.size()).first->second;
+    }
+    map.unknown.push_back(unknown);
+  }
+  map.count = unknowns.size();
+  return map;
+}
+
 EquationSystem::EquationSystem(const HermiteMesh& mesh, const HeldDofs& held, const PressureMap& pressures,
                                const EquationOptions& options)
     : pressure_unknowns_(pressures.count) {
@@ -53,20 +69,16 @@ size_t EquationSystem::make_node_block(size_t high_node, size_t low_node) {
   const size_t start = rows_.size();
   for (size_t r = 0; r < free_dofs_[high_node]; ++r) {
     const size_t count = high_node == low_node ? r + 1 : free_dofs_[low_node];
-    for (size_t c = 0; c < count; ++c) {
-      rows_.push_back(static_cast<int>(first_equation_[high_node] + r + 1));
-      columns_.push_back(static_cast<int>(first_equation_[low_node] + c + 1));
-    }
+    for (size_t c = 0; c < count; ++c)
+      add_entry(first_equation_[high_node] + r, first_equation_[low_node] + c);
   }
   return start;
 }
 
 size_t EquationSystem::make_pressure_piece(size_t pressure, size_t node) {
   const size_t start = rows_.size();
-  for (size_t c = 0; c < free_dofs_[node]; ++c) {
-    rows_.push_back(static_cast<int>(displacement_unknowns_ + pressure + 1));
-    columns_.push_back(static_cast<int>(first_equation_[node] + c + 1));
-  }
+  for (size_t c = 0; c < free_dofs_[node]; ++c)
+    add_entry(displacement_unknowns_ + pressure, first_equation_[node] + c);
   return start;
 }
 
@@ -143,10 +155,7 @@ void EquationSystem::map_compliance(const PressureMap& pressures) {
       for (size_t n = 0; n <= m; ++n) {
         const auto [low, high] = std::minmax({pressures.unknown[e][m], pressures.unknown[e][n]});
         const auto [place, is_new] = known.try_emplace({high, low}, rows_.size());
-        if (is_new) {
-          rows_.push_back(static_cast<int>(displacement_unknowns_ + high + 1));
-          columns_.push_back(static_cast<int>(displacement_unknowns_ + low + 1));
-        }
+        if (is_new) add_entry(displacement_unknowns_ + high, displacement_unknowns_ + low);
         maps_[e].compliance[triangle(m) + n] = place->second;
       }
     }
@@ -164,12 +173,9 @@ void EquationSystem::add_fluid_row(const std::vector<ElementFace>& surface) {
   met.erase(none);
   const FluidRow& row =
       fluid_rows_.emplace_back(FluidRow{all_unknowns_++, rows_.size(), {met.begin(), met.end()}});
-  for (const size_t column : row.columns) {
-    rows_.push_back(static_cast<int>(row.unknown + 1));
-    columns_.push_back(static_cast<int>(column + 1));
-  }
-  rows_.push_back(static_cast<int>(row.unknown + 1));
-  columns_.push_back(static_cast<int>(row.unknown + 1));
+  for (const size_t column : row.columns)
+    add_entry(row.unknown, column);
+  add_entry(row.unknown, row.unknown);
 }
 
 size_t EquationSystem::entry(const ElementMap& map, size_t dof, size_t other_dof) {

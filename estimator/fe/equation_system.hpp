@@ -25,10 +25,21 @@
 
 #include "estimator/fe/element_mechanics.hpp"
 #include "estimator/fe/face_points.hpp"
-#include "estimator/fe/pressure_space.hpp"
 #include "estimator/fe/supports.hpp"
 
 namespace diastole {
+
+/// The tri-linear Lagrange pressure: eight values an element, either its own (discontinuous) or shared at the
+/// nodes. Corners that coincide on a collapsed edge share one value either way, so that the pressure is single
+/// there. docs/decisions/ has the comparison; the solver's default is the discontinuous one.
+enum class PressureSpace { per_element, continuous };
+
+struct PressureMap {
+  std::vector<std::array<size_t, corners>> unknown;  ///< unknown[e][corner]: number of the pressure value
+  size_t count = 0;
+};
+
+PressureMap make_pressure_map(const HermiteMesh& mesh, PressureSpace space);
 
 /// One fluid's row: pressure unknown `unknown`, entries entry ... over `columns` (from 0), then the diagonal's.
 struct FluidRow {
@@ -110,6 +121,11 @@ class EquationSystem {
   void colour_elements();
   void map_compliance(const PressureMap& pressures);
   void add_fluid_row(const std::vector<ElementFace>& surface);
+  /// Both counted from 0.
+  void add_entry(size_t row, size_t column) {
+    rows_.push_back(static_cast<int>(row + 1));
+    columns_.push_back(static_cast<int>(column + 1));
+  }
   size_t make_node_block(size_t high_node, size_t low_node);
   size_t make_pressure_piece(size_t pressure, size_t node);
   /// Stored entry of the local dofs 3 a + i and 3 b + k; none if either is held.

@@ -93,8 +93,8 @@ void record(SolveReport& report, const NewtonResult& attempt) {
 
 }  // namespace
 
-PathResult follow_load(ElasticSystem& system, const ElasticState& start, const Load& load,
-                       const SolveOptions& options) {
+Solution follow_load(ElasticSystem& system, const ElasticState& start, const Load& load,
+                     const SolveOptions& options) {
   constexpr size_t easy_iterations = 4;
   const auto begun = std::chrono::steady_clock::now();
   SolveReport report;

@@ -5,18 +5,12 @@
 // from the line through the last two equilibria.
 
 #include "estimator/fe/elastic_system.hpp"
-#include "estimator/fe/solve_report.hpp"
 
 namespace diastole {
 
-struct PathResult {
-  ElasticState state;  ///< the last equilibrium reached
-  SolveReport report;
-};
-
 /// `start` need not be an equilibrium (parameters may have changed since): it is brought into one first when
 /// the load stays. Precondition: start is of this system and not inverted.
-PathResult follow_load(ElasticSystem& system, const ElasticState& start, const Load& load,
-                       const SolveOptions& options);
+Solution follow_load(ElasticSystem& system, const ElasticState& start, const Load& load,
+                     const SolveOptions& options);
 
 }  // namespace diastole

@@ -50,6 +50,15 @@ struct PointFields {
 /// Precondition: the state is of this system and not inverted at the point, which is not on a collapsed edge.
 PointFields point_fields(const ElasticSystem& system, const ElasticState& state, const MaterialPoint& point);
 
+/// `state` with each corner's Lagrange pressure replaced by a mean: no equilibrium of the discrete equations, but what
+/// point_fields() and all that is drawn from it should be given.
+///
+/// An element's own pressure carries, along each direction, a weakly controlled sawtooth: one linear function repeated in
+/// all elements, which the volume of a C1 displacement hardly sees (docs/verification.md, orders of convergence). At a
+/// node where elements meet, the mean of their values is free of it, and converges with order 2. The mean is taken over
+/// elements of the same parameters only: where the material changes, its pressure jumps.
+ElasticState with_averaged_pressure(const ElasticSystem& system, const ElasticState& state);
+
 /// Components of a tensor along the columns of `axes`.
 SymmetricTensor<double> along(const Eigen::Matrix3d& axes, const Eigen::Matrix3d& tensor);
 

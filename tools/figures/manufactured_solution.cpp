@@ -4,7 +4,6 @@
 #include <cmath>
 #include <utility>
 
-#include "estimator/fe/averaged_pressure.hpp"
 #include "estimator/fe/elastic_system.hpp"
 #include "estimator/fe/point_fields.hpp"
 #include "estimator/mesh/block.hpp"
@@ -161,12 +160,13 @@ std::vector<ManufacturedCase> manufactured_cases() {
 }
 
 ManufacturedErrors solve_manufactured(const ManufacturedCase& made_up, size_t n) {
-  SystemOptions options;
+  ElasticOptions options;
   HermiteMesh mesh = make_block({{1.0, 1.0, 1.0}, {n, n, n}});
   options.parameters = made_up.parameters;
-  options.held = hold_nothing(mesh);
+  HeldDofs held = hold_nothing(mesh);
   for (const auto& face : {mesh.faces().left, mesh.faces().bottom, mesh.faces().inner})
-    hold_face(mesh, face, options.held);
+    hold_face(mesh, face, held);
+  options.held = std::move(held);
   options.material_axes = [&](const HermiteMesh& of, const MaterialPoint& point) {
     return material_axes(made_up, of.value(of.reference(), point));
   };

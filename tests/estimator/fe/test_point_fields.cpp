@@ -5,7 +5,6 @@
 
 #include <cmath>
 
-#include "estimator/fe/averaged_pressure.hpp"
 #include "estimator/fe/point_fields.hpp"
 #include "estimator/mesh/ellipsoid.hpp"
 #include "tests/estimator/fe/gel.hpp"
