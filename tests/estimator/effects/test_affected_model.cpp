@@ -42,7 +42,7 @@ Study gel_with(const Effect& effect) {
   return gel({typical.id}, {typical});
 }
 
-double taken_mL(const Study& study) {
+double volume_change_mL(const Study& study) {
   ElasticModel model = make_affected_model(study);
   const Solution solution = model.solve(2.0);
   EXPECT_TRUE(solution.report.converged()) << solution.report.describe();
@@ -53,7 +53,7 @@ class EveryImagedEffect : public testing::TestWithParam<const Effect*> {};
 
 TEST_P(EveryImagedEffect, ChangesWhatASpecimenTakesOrWhatImagesShow) {
   const Study study = gel_with(*GetParam());
-  const double change_mL = taken_mL(study) - taken_mL(gel({}));
+  const double change_mL = volume_change_mL(study) - volume_change_mL(gel({}));
   if (GetParam()->text().id == "tag-bias") {
     EXPECT_DOUBLE_EQ(displacement_gain_of(study), 0.95);
     EXPECT_EQ(change_mL, 0.0);
@@ -63,7 +63,7 @@ TEST_P(EveryImagedEffect, ChangesWhatASpecimenTakesOrWhatImagesShow) {
 }
 
 TEST_P(EveryImagedEffect, IsTheStudyItselfWhereNoValueIsStated) {
-  EXPECT_DOUBLE_EQ(taken_mL(gel({std::string(GetParam()->text().id)})), taken_mL(gel({})));
+  EXPECT_DOUBLE_EQ(volume_change_mL(gel({std::string(GetParam()->text().id)})), volume_change_mL(gel({})));
 }
 
 std::string test_name(const testing::TestParamInfo<const Effect*>& info) {
@@ -74,7 +74,7 @@ std::string test_name(const testing::TestParamInfo<const Effect*>& info) {
 INSTANTIATE_TEST_SUITE_P(List, EveryImagedEffect, testing::ValuesIn(field_effects()), test_name);
 
 TEST(AffectedModel, LeavesTheSpecimenWhereOnlyTheRigIsConcerned) {
-  EXPECT_EQ(taken_mL(gel({"hose-compliance"})), taken_mL(gel({})));
+  EXPECT_EQ(volume_change_mL(gel({"hose-compliance"})), volume_change_mL(gel({})));
 }
 
 TEST(AffectedModel, RefusesUnknownEffectsAndOtherSpecimens) {

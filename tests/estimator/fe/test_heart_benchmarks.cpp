@@ -47,7 +47,7 @@ TEST(LeftVentricle, MovesAsAnIndependentSolverSays) {
   const Measurement measurement = read_measurement(study);
   ElasticModel model = make_model(study);
   const PointLocator locator(model.mesh(), model.mesh().reference(), {.outside_xi = 0.02});
-  constexpr std::array<double, 5> taken_mL{7.162, 15.0303, 22.7853, 29.861, 36.0909};
+  constexpr std::array<double, 5> volume_change_mL{7.162, 15.0303, 22.7853, 29.861, 36.0909};
   ElasticState state = model.rest_state();
   const double rest_mL = model.cavity_volume_mL(state);
   EXPECT_NEAR(rest_mL, 67.2874, 0.02);
@@ -55,7 +55,7 @@ TEST(LeftVentricle, MovesAsAnIndependentSolverSays) {
     const Solution solution = model.solve(measurement.frames[frame].pressure_kPa, state);
     ASSERT_TRUE(solution.report.converged()) << solution.report.describe();
     state = solution.state;
-    EXPECT_NEAR((model.cavity_volume_mL(state) - rest_mL) / taken_mL[frame - 1], 1.0, 0.001);
+    EXPECT_NEAR((model.cavity_volume_mL(state) - rest_mL) / volume_change_mL[frame - 1], 1.0, 0.001);
     double sum = 0.0;
     size_t count = 0;
     for (const auto& point : measurement.points) {

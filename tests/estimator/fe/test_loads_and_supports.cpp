@@ -193,9 +193,9 @@ TEST(HeldVolume, StiffnessOfTheCavityIsTheCurvesSlope) {
   ElasticModel model = gel(6.5, {6, 3, 1});
   const Solution middle = model.solve(3.0);
   constexpr double h_kPa = 1e-3;
-  const double taken_mL = model.cavity_volume_mL(model.solve(3.0 + h_kPa, middle.state).state) -
-                          model.cavity_volume_mL(model.solve(3.0 - h_kPa, middle.state).state);
-  EXPECT_NEAR(model.cavity_stiffness_kPa_per_mL(middle.state).value(), 2 * h_kPa / taken_mL, 1e-6);
+  const double volume_change_mL = model.cavity_volume_mL(model.solve(3.0 + h_kPa, middle.state).state) -
+                                  model.cavity_volume_mL(model.solve(3.0 - h_kPa, middle.state).state);
+  EXPECT_NEAR(model.cavity_stiffness_kPa_per_mL(middle.state).value(), 2 * h_kPa / volume_change_mL, 1e-6);
 }
 
 TEST(SealedChamber, HoldsBackWhatTheSpecimenTakes) {
@@ -206,8 +206,9 @@ TEST(SealedChamber, HoldsBackWhatTheSpecimenTakes) {
   EXPECT_EQ(solution.report.negative_pivots, solution.report.pressure_unknowns);
   EXPECT_EQ(solution.report.pressure_unknowns, model.pressure_dofs() + 1);
   const double swelling_mL = 1e-3 * model.system().chamber_intake_mm3(solution.state);
-  const double taken_mL = model.cavity_volume_mL(solution.state) - model.cavity_volume_mL(model.rest_state());
-  EXPECT_NEAR(swelling_mL, taken_mL, 1e-5 * taken_mL);  // the gel keeps its volume
+  const double volume_change_mL =
+      model.cavity_volume_mL(solution.state) - model.cavity_volume_mL(model.rest_state());
+  EXPECT_NEAR(swelling_mL, volume_change_mL, 1e-5 * volume_change_mL);  // the gel keeps its volume
   EXPECT_NEAR(solution.state.chamber_pressure_kPa, swelling_mL / compliance_mL_per_kPa, 1e-8);
   // Only the difference of the two pressures deforms an incompressible body whose rims are held; what is left is the
   // error of 4x4x4 points on curved elements.
@@ -320,16 +321,16 @@ TEST(Forces, OfTheClampOfABeam) {
 
 // Nearly incompressible material becomes the incompressible one like 1/K.
 TEST(FiniteBulk, ConvergesToTheIncompressibleSolution) {
-  const auto taken_mL = [](ElasticModel model) {
+  const auto volume_change_mL = [](ElasticModel model) {
     const Solution solution = model.solve(4.0);
     EXPECT_TRUE(solution.report.converged()) << solution.report.describe();
     EXPECT_EQ(solution.report.negative_pivots, solution.report.pressure_unknowns);
     return model.cavity_volume_mL(solution.state) - model.cavity_volume_mL(model.rest_state());
   };
-  const double incompressible = taken_mL(gel(6.5, {6, 3, 1}));
+  const double incompressible = volume_change_mL(gel(6.5, {6, 3, 1}));
   std::vector<double> faults;
   for (const double bulk_kPa : {1e3, 1e4, 1e5})
-    faults.push_back(taken_mL(gel(6.5, {6, 3, 1}, {.bulk_modulus_kPa = bulk_kPa})) - incompressible);
+    faults.push_back(volume_change_mL(gel(6.5, {6, 3, 1}, {.bulk_modulus_kPa = bulk_kPa})) - incompressible);
   EXPECT_GT(faults[0], 0.0);
   EXPECT_LT(faults[0], 0.02 * incompressible);
   EXPECT_NEAR(faults[0] / faults[1], 10.0, 0.3);
