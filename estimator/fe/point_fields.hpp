@@ -4,8 +4,8 @@
 //   F = dx/dX,  J = det F,  E = 1/2 (F^T F - 1)                           Green strain
 //   sigma = 1/J F (2 dW/dC + T f0 x f0) F^T - (p - kappa (J - 1)) 1       Cauchy stress, element_mechanics.hpp
 //
-// Strain belongs to the reference configuration, and is told along its axes; Cauchy stress belongs to the
-// deformed one, and is told along axes that the deformation carries with it:
+// Strain belongs to the reference configuration, and is given along its axes; Cauchy stress belongs to the
+// deformed one, and is given along axes that the deformation carries with it:
 //
 //   axes     reference (columns)             deformed
 //   wall     c0, l0, r0  fibre_field.hpp     c along F c0; r normal to the deformed surface xi3 = const; l = r x c
@@ -22,7 +22,7 @@
 #include <vector>
 
 #include "estimator/fe/elastic_state.hpp"
-#include "estimator/materials/symmetric_tensor.hpp"
+#include "estimator/materials/law.hpp"
 #include "estimator/mesh/hermite_mesh.hpp"
 
 namespace diastole {

@@ -2,26 +2,15 @@
 
 #include <fmt/format.h>
 
+#include <array>
+
 namespace diastole {
 
 std::string_view describe(SolveReason reason) {
-  switch (reason) {
-    case SolveReason::converged:
-      return "converged";
-    case SolveReason::inverted_element:
-      return "inverted element";
-    case SolveReason::beyond_law:
-      return "strain beyond the law's limits";
-    case SolveReason::no_convergence:
-      return "no convergence";
-    case SolveReason::singular_tangent:
-      return "singular tangent";
-    case SolveReason::limit_point:
-      return "limit point";
-    case SolveReason::out_of_steps:
-      return "load-step limit reached";
-  }
-  return "unknown";
+  constexpr std::array<std::string_view, 7> words{
+      "converged",        "inverted element", "strain beyond the law's limits", "no convergence",
+      "singular tangent", "limit point",      "load-step limit reached"};
+  return words[static_cast<size_t>(reason)];
 }
 
 std::optional<bool> SolveReport::stable() const {

@@ -8,7 +8,7 @@
 #include <array>
 #include <string_view>
 
-#include "estimator/materials/exponential_rise.hpp"
+#include "estimator/materials/energy_law.hpp"
 
 namespace diastole {
 namespace {
@@ -28,9 +28,6 @@ struct Demiray {
 
 }  // namespace
 
-const Law& demiray_law() {
-  static const EnergyLaw<Demiray> law;
-  return law;
-}
+const Law& demiray_law() { return law_of<Demiray>(); }
 
 }  // namespace diastole

@@ -19,6 +19,7 @@
 
 #include <ceres/jet.h>
 #include <array>
+#include <cmath>
 #include <concepts>
 
 #include "estimator/materials/law.hpp"
@@ -51,6 +52,23 @@ double plain_value(const ceres::Jet<Inner, Count>& dual) {
   return plain_value(dual.a);
 }
 
+/// r(q; b) = (exp(b q) - 1) / b: the exponential stiffening that most tissue laws share. It starts as r = q
+/// with slope one whatever b is, and is q itself at b = 0, so that b = 0 gives the linear law back.
+///
+/// Near b q = 0 the quotient is summed as its power series, of which the first neglected term changes neither
+/// the value nor the first two derivatives by more than 1e-13 of them.
+template <class Scalar>
+Scalar exponential_rise(const Scalar& q, const Scalar& b) {
+  using std::exp;
+  constexpr double series_below = 1e-3;
+  const Scalar x = b * q;
+  if (std::abs(plain_value(x)) > series_below) return (exp(x) - constant<Scalar>(1.0)) / b;
+  Scalar series = constant<Scalar>(1.0);
+  for (const double order : {6.0, 5.0, 4.0, 3.0, 2.0})
+    series = constant<Scalar>(1.0) + x * series * constant<Scalar>(1.0 / order);
+  return q * series;
+}
+
 template <class Energy>
 class EnergyLaw final : public Law {
   static constexpr size_t count = Energy::parameters.size();
@@ -63,10 +81,7 @@ class EnergyLaw final : public Law {
   std::span<const LawParameter> parameters() const override { return Energy::parameters; }
 
   double energy(const Tensor& c, Values values) const override {
-    std::array<double, count> parameter_values;
-    for (size_t i = 0; i < count; ++i)
-      parameter_values[i] = values[i];
-    return Energy::template energy<double>(c, parameter_values);
+    return Energy::template energy<double>(c, constants<double>(values));
   }
 
   Tensor stress(const Tensor& c, Values values) const override {
@@ -108,9 +123,7 @@ class EnergyLaw final : public Law {
       dual[m].a = Inner(c[m], static_cast<int>(m));
       dual[m].v[static_cast<Eigen::Index>(m)] = Inner(1.0);
     }
-    std::array<Outer, count> parameter_values;
-    for (size_t i = 0; i < count; ++i)
-      parameter_values[i] = constant<Outer>(values[i]);
+    std::array<Outer, count> parameter_values = constants<Outer>(values);
     const Outer w = Energy::template energy<Outer>(dual, parameter_values);
     MaterialResponse result;
     for (size_t m = 0; m < 6; ++m) {
@@ -132,9 +145,7 @@ class EnergyLaw final : public Law {
       dual[m] = constant<Outer>(c[m]);
       dual[m].v[static_cast<Eigen::Index>(m)] = Inner(1.0);
     }
-    std::array<Outer, count> parameter_values;
-    for (size_t i = 0; i < count; ++i)
-      parameter_values[i] = constant<Outer>(values[i]);
+    std::array<Outer, count> parameter_values = constants<Outer>(values);
     parameter_values[parameter].a.v[0] = 1.0;
     const Outer w = Energy::template energy<Outer>(dual, parameter_values);
     Tensor result;
@@ -144,6 +155,13 @@ class EnergyLaw final : public Law {
   }
 
  private:
+  template <class Scalar>
+  static std::array<Scalar, count> constants(Values values) {
+    std::array<Scalar, count> result;
+    for (size_t i = 0; i < count; ++i)
+      result[i] = constant<Scalar>(values[i]);
+    return result;
+  }
   static constexpr double weight(size_t m) { return m < 3 ? 2.0 : 1.0; }
 
   static Tensor dual_stress(const Tensor& c, Values values) {
@@ -151,9 +169,7 @@ class EnergyLaw final : public Law {
     SymmetricTensor<Dual> dual;
     for (size_t m = 0; m < 6; ++m)
       dual[m] = Dual(c[m], static_cast<int>(m));
-    std::array<Dual, count> parameter_values;
-    for (size_t i = 0; i < count; ++i)
-      parameter_values[i] = Dual(values[i]);
+    const std::array<Dual, count> parameter_values = constants<Dual>(values);
     const Dual w = Energy::template energy<Dual>(dual, parameter_values);
     Tensor result;
     for (size_t m = 0; m < 6; ++m)
@@ -161,5 +177,12 @@ class EnergyLaw final : public Law {
     return result;
   }
 };
+
+/// The one law of an energy.
+template <class Energy>
+const Law& law_of() {
+  static const EnergyLaw<Energy> law;
+  return law;
+}
 
 }  // namespace diastole

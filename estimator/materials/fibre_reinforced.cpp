@@ -11,7 +11,7 @@
 #include <cmath>
 #include <string_view>
 
-#include "estimator/materials/exponential_rise.hpp"
+#include "estimator/materials/energy_law.hpp"
 
 namespace diastole {
 namespace {
@@ -51,9 +51,6 @@ struct FibreReinforced {
 
 }  // namespace
 
-const Law& fibre_reinforced_law() {
-  static const EnergyLaw<FibreReinforced> law;
-  return law;
-}
+const Law& fibre_reinforced_law() { return law_of<FibreReinforced>(); }
 
 }  // namespace diastole

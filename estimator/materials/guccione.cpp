@@ -108,9 +108,6 @@ struct Guccione {
 
 }  // namespace
 
-const Law& guccione_law() {
-  static const EnergyLaw<Guccione> law;
-  return law;
-}
+const Law& guccione_law() { return law_of<Guccione>(); }
 
 }  // namespace diastole

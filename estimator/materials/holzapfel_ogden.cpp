@@ -12,7 +12,7 @@
 #include <array>
 #include <string_view>
 
-#include "estimator/materials/exponential_rise.hpp"
+#include "estimator/materials/energy_law.hpp"
 
 namespace diastole {
 namespace {
@@ -44,9 +44,6 @@ struct HolzapfelOgden {
 
 }  // namespace
 
-const Law& holzapfel_ogden_law() {
-  static const EnergyLaw<HolzapfelOgden> law;
-  return law;
-}
+const Law& holzapfel_ogden_law() { return law_of<HolzapfelOgden>(); }
 
 }  // namespace diastole

@@ -28,9 +28,6 @@ struct MooneyRivlin {
 
 }  // namespace
 
-const Law& mooney_rivlin_law() {
-  static const EnergyLaw<MooneyRivlin> law;
-  return law;
-}
+const Law& mooney_rivlin_law() { return law_of<MooneyRivlin>(); }
 
 }  // namespace diastole

@@ -37,9 +37,6 @@ struct NeoHookean {
 
 }  // namespace
 
-const Law& neo_hookean_law() {
-  static const EnergyLaw<NeoHookean> law;
-  return law;
-}
+const Law& neo_hookean_law() { return law_of<NeoHookean>(); }
 
 }  // namespace diastole

@@ -92,9 +92,6 @@ struct Ogden {
 
 }  // namespace
 
-const Law& ogden_law() {
-  static const EnergyLaw<Ogden> law;
-  return law;
-}
+const Law& ogden_law() { return law_of<Ogden>(); }
 
 }  // namespace diastole

@@ -24,7 +24,7 @@ namespace {
 struct PoleZero {
   static constexpr std::string_view name = "pole-zero";
   static constexpr bool needs_axes = true;
-  // One row for each strain component, in the order of symmetric_tensor.hpp.
+  // One row for each strain component, in the order of law.hpp.
   static constexpr std::array<LawParameter, 18> parameters{
       {{"kff_kPa", "fibre stiffness", 0.0, 2.0},
        {"aff", "fibre strain limit", 0.0, 0.475},
@@ -64,9 +64,6 @@ struct PoleZero {
 
 }  // namespace
 
-const Law& pole_zero_law() {
-  static const EnergyLaw<PoleZero> law;
-  return law;
-}
+const Law& pole_zero_law() { return law_of<PoleZero>(); }
 
 }  // namespace diastole

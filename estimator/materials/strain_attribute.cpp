@@ -22,7 +22,7 @@
 #include <cmath>
 #include <string_view>
 
-#include "estimator/materials/exponential_rise.hpp"
+#include "estimator/materials/energy_law.hpp"
 
 namespace diastole {
 namespace {
@@ -57,9 +57,6 @@ struct StrainAttribute {
 
 }  // namespace
 
-const Law& strain_attribute_law() {
-  static const EnergyLaw<StrainAttribute> law;
-  return law;
-}
+const Law& strain_attribute_law() { return law_of<StrainAttribute>(); }
 
 }  // namespace diastole

@@ -23,9 +23,6 @@ struct Dummy {
 
 }  // namespace
 
-const Law& dummy_law() {
-  static const EnergyLaw<Dummy> law;
-  return law;
-}
+const Law& dummy_law() { return law_of<Dummy>(); }
 
 }  // namespace diastole
