@@ -15,9 +15,9 @@
 #include <vector>
 
 #include "estimator/effects/field_model.hpp"
-#include "estimator/inference/parameter.hpp"
+#include "estimator/inference/parameter_space.hpp"
 #include "estimator/rig/rig_model.hpp"
-#include "estimator/rig/specimen_curves.hpp"
+#include "estimator/rig/specimen_curve.hpp"
 
 namespace diastole {
 
@@ -58,7 +58,14 @@ enum class Stage { plant, sensors };
 struct EffectContext {
   const rig::SpecimenCurves& family;
   std::span<const ChangePoint> change_points = {};
-  bool low_fidelity = false;  ///< specimens' neighbours may be (specimen_curves.hpp)
+  bool low_fidelity = false;  ///< specimens' neighbours may be (specimen_curve.hpp)
+
+  /// The model's curve becomes that of a specimen with another value; 0 is the specimen itself.
+  void change_specimen(rig::RigModel& model, rig::Difference what, double value) const {
+    if (value == 0.0) return;
+    model.curve = model.curve.plus(family.neighbour(what, value, low_fidelity), 1.0, 1.0)
+                      .plus(family.plain(), 1.0, -1.0);
+  }
 };
 
 /// A parameter in images that is a direction: where its search starts is decided by what a little of the effect would gain
@@ -93,7 +100,7 @@ struct EffectDeclaration {
   Stage stage = Stage::plant;
   bool keeps_modulus = true;  ///< at all times, so that a test beside the session measures the same
   bool needs_neighbours =
-      false;  ///< only a specimen with computed neighbours can have it (specimen_curves.hpp)
+      false;  ///< only a specimen with computed neighbours can have it (specimen_curve.hpp)
   /// The values that leave `base` as it is; without: the parameters' neutral ones.
   std::vector<double> (*neutral)(const rig::RigModel& base) = nullptr;
   /// The model's curve and modulus must be set.

@@ -23,11 +23,7 @@ Effect end_bond_slip_effect() {
       .needs_neighbours = true,
       .apply =
           [](EffectValues values, const EffectContext& context, rig::RigModel& model) {
-            if (values[0] == 0.0) return;
-            const double compliance_mm = values[0] * model.modulus_kPa;
-            model.curve =
-                model.curve.plus(context.family.slipping(compliance_mm, context.low_fidelity), 1.0, 1.0)
-                    .plus(context.family.plain(), 1.0, -1.0);
+            context.change_specimen(model, rig::Difference::end_slip, values[0] * model.modulus_kPa);
           },
       .field_parameters = {{"bond_stiffness_kPa_per_mm", "kPa/mm",
                             "traction across the axis for slip; 1000 is as good as held", as_good_as_held,

@@ -20,10 +20,7 @@ Effect radius_error_effect() {
       .needs_neighbours = true,
       .apply =
           [](EffectValues values, const EffectContext& context, rig::RigModel& model) {
-            if (values[0] == 0.0) return;
-            model.curve =
-                model.curve.plus(context.family.with_inner_radius(values[0], context.low_fidelity), 1.0, 1.0)
-                    .plus(context.family.plain(), 1.0, -1.0);
+            context.change_specimen(model, rig::Difference::inner_radius, values[0]);
           },
       .field_parameters = {{"true_inner_radius_mm", "mm", "inner radius of the specimen itself", 22.5, 5.0,
                             45.0, 23.4}},

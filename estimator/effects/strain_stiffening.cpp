@@ -18,10 +18,7 @@ Effect strain_stiffening_effect() {
       .needs_neighbours = true,
       .apply =
           [](EffectValues values, const EffectContext& context, rig::RigModel& model) {
-            if (values[0] == 0.0) return;
-            model.curve =
-                model.curve.plus(context.family.stiffened(values[0], context.low_fidelity), 1.0, 1.0)
-                    .plus(context.family.plain(), 1.0, -1.0);
+            context.change_specimen(model, rig::Difference::stiffening, values[0]);
           },
       .field_parameters = {{"beta", "", "stiffening with I1 - 3", 0.0, 0.0, 40.0, 4.0}},
       .apply_to_field = [](EffectValues values, FieldModel& model) { model.beta = values[0]; },

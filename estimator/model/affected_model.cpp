@@ -71,10 +71,10 @@ FieldModel field_model_of(const Study& study) {
   for (const std::string& id : study.effects) {
     const Effect& effect = effect_of(study, id);
     std::vector<double> values = effect.field_neutral(model);
-    const auto told = std::ranges::find(study.effect_values, id, &StudyEffect::id);
-    for (size_t i = 0; told != study.effect_values.end() && i < values.size(); ++i) {
-      const auto start = told->starts.find(std::string(effect.field_parameters()[i].name));
-      if (start != told->starts.end()) values[i] = start->second;
+    const auto stated = std::ranges::find(study.effect_values, id, &StudyEffect::id);
+    for (size_t i = 0; stated != study.effect_values.end() && i < values.size(); ++i) {
+      const auto start = stated->starts.find(std::string(effect.field_parameters()[i].name));
+      if (start != stated->starts.end()) values[i] = start->second;
     }
     if (!values.empty()) effect.apply_to_field(values, model);
   }

@@ -98,10 +98,7 @@ void set_history(Session& session) {
   }
 }
 
-}  // namespace
-
-std::string_view name_of(Channel channel) { return channel == Channel::cavity ? "cavity_kPa" : "pump_kPa"; }
-
+/// The base rig that a run describes; what it does not tell is the paper's.
 RigModel base_model(const RecordedRun& run) {
   RigModel model;
   Hose& hose = model.hose;
@@ -119,8 +116,6 @@ RigModel base_model(const RecordedRun& run) {
   return model;
 }
 
-namespace {
-
 MotionLimits limits_of(const RecordedRun& run) {
   MotionLimits limits;
   limits.flow_mL_s = attribute(run, "limit_flow_mL_s", limits.flow_mL_s);
@@ -130,6 +125,8 @@ MotionLimits limits_of(const RecordedRun& run) {
 }
 
 }  // namespace
+
+std::string_view name_of(Channel channel) { return channel == Channel::cavity ? "cavity_kPa" : "pump_kPa"; }
 
 Session read_session(const Study& study) {
   if (study.data.runs.empty()) {

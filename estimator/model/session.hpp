@@ -46,7 +46,4 @@ struct Session {
 /// Throws InputError if the study names no runs, a run cannot be read, or runs are of different rigs.
 Session read_session(const Study& study);
 
-/// The base rig that a run describes; what it does not tell is the paper's.
-RigModel base_model(const runfile::RecordedRun& run);
-
 }  // namespace diastole::rig

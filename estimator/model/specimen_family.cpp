@@ -95,19 +95,17 @@ const SpecimenCurve& SpecimenFamily::computed(const std::string& name, const Stu
   return curves_.emplace(name, std::move(curve)).first->second;
 }
 
-Study SpecimenFamily::coarse_study() const {
+Study SpecimenFamily::on(const std::array<int, 3>& mesh) const {
   Study study = study_;
-  std::get<AnnulusSpecimen>(study.specimen).mesh = resolution_.coarse;
+  std::get<AnnulusSpecimen>(study.specimen).mesh = mesh;
   return study;
 }
 
 SpecimenCurve SpecimenFamily::combined() const {
   if (!std::holds_alternative<AnnulusSpecimen>(study_.specimen)) return computed("own mesh", study_, 1);
-  const SpecimenCurve& coarse = computed("coarse", coarse_study(), 1);
+  const SpecimenCurve& coarse = computed("coarse", on(resolution_.coarse), 1);
   if (resolution_.fine == resolution_.coarse) return coarse;
-  Study fine = study_;
-  std::get<AnnulusSpecimen>(fine.specimen).mesh = resolution_.fine;
-  const SpecimenCurve& solved = computed("fine", fine, resolution_.stride);
+  const SpecimenCurve& solved = computed("fine", on(resolution_.fine), resolution_.stride);
   return coarse.plus(solved.plus(coarse, 1.0, -1.0), 1.0, 1.0);
 }
 
@@ -127,11 +125,13 @@ void SpecimenFamily::compute_ahead() {
     try {
       (void)plain();
       if (!has_neighbours()) return;
-      for (const Neighbours& neighbours : {radii(), stiffenings(), slips()})
+      for (const Difference what : {Difference::inner_radius, Difference::stiffening, Difference::end_slip}) {
+        const Neighbours neighbours = of(what);
         for (const double node : neighbours.nodes) {
           if (stop.stop_requested()) return;
           if (node != 0.0) (void)solved(neighbours, node, resolution_.coarse);
         }
+      }
     } catch (const std::exception&) {  // whoever asks for the curve gets to know
     }
   });
@@ -139,8 +139,7 @@ void SpecimenFamily::compute_ahead() {
 
 const SpecimenCurve& SpecimenFamily::solved(const Neighbours& of, double node,
                                             const std::array<int, 3>& mesh) const {
-  Study study = study_;
-  std::get<AnnulusSpecimen>(study.specimen).mesh = mesh;
+  Study study = on(mesh);
   of.change(node, study);
   return computed(fmt::format("{} {} {}", of.name, node, mesh == resolution_.fine), study,
                   resolution_.stride);
@@ -148,7 +147,7 @@ const SpecimenCurve& SpecimenFamily::solved(const Neighbours& of, double node,
 
 SpecimenCurve SpecimenFamily::between(const Neighbours& of, double value, bool low_fidelity) const {
   const SpecimenCurve& here = plain();
-  const SpecimenCurve& base = computed("coarse", coarse_study(), 1);
+  const SpecimenCurve& base = computed("coarse", on(resolution_.coarse), 1);
   const auto differing = [&](double node, const std::array<int, 3>& mesh, const SpecimenCurve& from) {
     return solved(of, node, mesh).plus(from, 1.0, -1.0);
   };
@@ -171,31 +170,31 @@ SpecimenCurve SpecimenFamily::between(const Neighbours& of, double value, bool l
   return here.plus(*sum, 1.0, 1.0);
 }
 
-SpecimenFamily::Neighbours SpecimenFamily::radii() {
-  return {.name = "radius",
-          .nodes = {-0.1, -0.05, 0.0, 0.05, 0.1},
-          .refined_at = 0.0,
-          .change = [](double node, Study& study) {
-            std::get<AnnulusSpecimen>(study.specimen).inner_radius_mm *= 1.0 + node;
-          }};
-}
-
-SpecimenFamily::Neighbours SpecimenFamily::stiffenings() {
-  return {.name = "beta",
-          .nodes = {0.0, 0.75, 1.5, 3.0},
-          .refined_at = 1.5,
-          .change = [](double node, Study& study) {
-            StudyParameter stiffening = study.law.parameters.front();
-            stiffening.name = "beta";
-            stiffening.start = node;
-            stiffening.lower = 0.0;
-            stiffening.upper = 10.0;
-            study.law.name = "demiray";
-            study.law.parameters.push_back(stiffening);
-          }};
-}
-
-SpecimenFamily::Neighbours SpecimenFamily::slips() {
+SpecimenFamily::Neighbours SpecimenFamily::of(Difference what) {
+  switch (what) {
+    case Difference::inner_radius:
+      return {.name = "radius",
+              .nodes = {-0.1, -0.05, 0.0, 0.05, 0.1},
+              .refined_at = 0.0,
+              .change = [](double node, Study& study) {
+                std::get<AnnulusSpecimen>(study.specimen).inner_radius_mm *= 1.0 + node;
+              }};
+    case Difference::stiffening:
+      return {.name = "beta",
+              .nodes = {0.0, 0.75, 1.5, 3.0},
+              .refined_at = 1.5,
+              .change = [](double node, Study& study) {
+                StudyParameter stiffening = study.law.parameters.front();
+                stiffening.name = "beta";
+                stiffening.start = node;
+                stiffening.lower = 0.0;
+                stiffening.upper = 10.0;
+                study.law.name = "demiray";
+                study.law.parameters.push_back(stiffening);
+              }};
+    case Difference::end_slip:
+      break;
+  }
   return {.name = "slip",
           .nodes = {0.0, 0.25, 0.5, 0.75},
           .refined_at = 0.5,
@@ -207,17 +206,10 @@ SpecimenFamily::Neighbours SpecimenFamily::slips() {
           }};
 }
 
-SpecimenCurve SpecimenFamily::with_inner_radius(double fraction, bool low_fidelity) const {
-  return between(radii(), fraction, low_fidelity);
-}
-
-SpecimenCurve SpecimenFamily::stiffened(double beta, bool low_fidelity) const {
-  return between(stiffenings(), beta, low_fidelity);
-}
-
-SpecimenCurve SpecimenFamily::slipping(double compliance_mm, bool low_fidelity) const {
+SpecimenCurve SpecimenFamily::neighbour(Difference what, double value, bool low_fidelity) const {
   // In c / (c + c0) the curve is nearly straight from held to free ends.
-  return between(slips(), compliance_mm / (compliance_mm + softest_mm), low_fidelity);
+  const double place = what == Difference::end_slip ? value / (value + softest_mm) : value;
+  return between(of(what), place, low_fidelity);
 }
 
 }  // namespace diastole::rig

@@ -19,7 +19,7 @@
 #include <vector>
 
 #include "estimator/io/study.hpp"
-#include "estimator/rig/specimen_curves.hpp"
+#include "estimator/rig/specimen_curve.hpp"
 
 namespace diastole::rig {
 
@@ -51,9 +51,7 @@ class SpecimenFamily final : public SpecimenCurves {
   [[nodiscard]] const StudyParameter& modulus() const;
 
   [[nodiscard]] bool has_neighbours() const override;
-  [[nodiscard]] SpecimenCurve with_inner_radius(double fraction, bool low_fidelity) const override;
-  [[nodiscard]] SpecimenCurve stiffened(double beta, bool low_fidelity) const override;
-  [[nodiscard]] SpecimenCurve slipping(double compliance_mm, bool low_fidelity) const override;
+  [[nodiscard]] SpecimenCurve neighbour(Difference what, double value, bool low_fidelity) const override;
 
  private:
   /// Specimens that differ by one value.
@@ -63,17 +61,15 @@ class SpecimenFamily final : public SpecimenCurves {
     double refined_at = 0.0;  ///< a node for which the fine mesh is asked too; 0 if the coarse one is enough
     std::function<void(double, Study&)> change;
   };
-  static Neighbours radii();
-  static Neighbours stiffenings();
-  static Neighbours slips();
+  static Neighbours of(Difference what);
   /// At every `stride`-th volume; kept by its name.
   [[nodiscard]] const SpecimenCurve& computed(const std::string& name, const Study& study,
                                               size_t stride) const;
   /// A neighbour at one of its nodes.
   [[nodiscard]] const SpecimenCurve& solved(const Neighbours& of, double node,
                                             const std::array<int, 3>& mesh) const;
-  /// The study's cylinder on the coarse mesh.
-  [[nodiscard]] Study coarse_study() const;
+  /// The study's cylinder on another mesh.
+  [[nodiscard]] Study on(const std::array<int, 3>& mesh) const;
   /// What plain() returns.
   [[nodiscard]] SpecimenCurve combined() const;
   /// plain() and what the neighbour differs from it on the coarse mesh, at `value` by the polynomial through the nodes;

@@ -58,29 +58,25 @@ std::vector<double> start_values(const Study& study, const Law& law) {
   return values;
 }
 
-template <class Shape, class Kind>
-void take_elements(const Kind& specimen, Shape& shape) {
-  for (size_t i = 0; i < 3; ++i)
-    shape.elements[i] = static_cast<size_t>(specimen.mesh[i]);
+std::array<size_t, 3> counts(const std::array<int, 3>& mesh) {
+  return {static_cast<size_t>(mesh[0]), static_cast<size_t>(mesh[1]), static_cast<size_t>(mesh[2])};
 }
 
 MeshBody make_body(const MeshSpecimen& specimen) { return read_mesh_file(specimen.file); }
 
 MeshBody make_body(const AnnulusSpecimen& specimen) {
-  AnnulusShape shape;
-  shape.inner_radius_mm = specimen.inner_radius_mm;
-  shape.outer_radius_mm = specimen.outer_radius_mm;
-  shape.height_mm = specimen.height_mm;
-  take_elements(specimen, shape);
-  return {make_annulus(shape), {}};
+  return {make_annulus(AnnulusShape{.inner_radius_mm = specimen.inner_radius_mm,
+                                    .outer_radius_mm = specimen.outer_radius_mm,
+                                    .height_mm = specimen.height_mm,
+                                    .elements = counts(specimen.mesh)}),
+          {}};
 }
 
 MeshBody make_body(const EllipsoidSpecimen& specimen) {
-  EllipsoidShape shape;
-  shape.inner_axes_mm = specimen.inner_axes_mm;
-  shape.outer_axes_mm = specimen.outer_axes_mm;
-  shape.base_z_mm = specimen.base_z_mm;
-  take_elements(specimen, shape);
+  const EllipsoidShape shape{.inner_axes_mm = specimen.inner_axes_mm,
+                             .outer_axes_mm = specimen.outer_axes_mm,
+                             .base_z_mm = specimen.base_z_mm,
+                             .elements = counts(specimen.mesh)};
   return {make_ellipsoid(shape), ellipsoid_fibres(shape, specimen.fibre_endo_deg, specimen.fibre_epi_deg)};
 }
 
@@ -162,7 +158,7 @@ Chamber chamber_of(const StudyChamber& given) {
   return chamber;
 }
 
-/// What a mesh file must have, told of the study's key for it.
+/// What a mesh file must have, reported at the study's key for it.
 void require_of_mesh(const Study& study, bool fulfilled, std::string problem, std::string remedy) {
   if (!fulfilled) refuse(study, "specimen.file", std::move(problem), std::move(remedy));
 }

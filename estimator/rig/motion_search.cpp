@@ -73,19 +73,6 @@ std::vector<Stroke> named_cycle(const Segment& segment, double start_s) {
   return {};
 }
 
-}  // namespace
-
-std::vector<Stroke> strokes_of(const Segment& segment) {
-  std::vector<Stroke> strokes;
-  for (int64_t cycle = 0; cycle < segment.cycles; ++cycle) {
-    const auto one = named_cycle(segment, segment.start_s + static_cast<double>(cycle) * segment.period_s);
-    strokes.insert(strokes.end(), one.begin(), one.end());
-  }
-  return strokes;
-}
-
-namespace {
-
 /// Monotone pieces between rests and turns, as strokes with approximate times.
 std::vector<Stroke> first_strokes(const Counted& counted) {
   constexpr double rest_s = 0.15;
@@ -272,6 +259,15 @@ std::vector<Stroke> strokes_with(const std::vector<Stretch>& stretches, double s
 }
 
 }  // namespace
+
+std::vector<Stroke> strokes_of(const Segment& segment) {
+  std::vector<Stroke> strokes;
+  for (int64_t cycle = 0; cycle < segment.cycles; ++cycle) {
+    const auto one = named_cycle(segment, segment.start_s + static_cast<double>(cycle) * segment.period_s);
+    strokes.insert(strokes.end(), one.begin(), one.end());
+  }
+  return strokes;
+}
 
 FoundMotion find_motion(const RecordedRun& run) {
   const double step_mL = quantum_mL(run);

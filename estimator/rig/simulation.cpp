@@ -1,11 +1,12 @@
 #include "estimator/rig/simulation.hpp"
 
+#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <numbers>
+#include <unsupported/Eigen/MatrixFunctions>
 
-#include "estimator/rig/catheter.hpp"
 #include "estimator/rig/cavity.hpp"
-#include "estimator/rig/gas.hpp"
 #include "estimator/rig/hose_line.hpp"
 #include "estimator/rig/sampled_signal.hpp"
 
@@ -25,6 +26,31 @@ DriveTrace driven(const RigModel& model, const RunDrive& run, DriveTrace motion)
 
 /// Conductances below this are none: the resistance would be beyond what the step's matrix bears.
 constexpr double least_leak = 1e-7;
+
+/// The fluid-filled catheter with its transducer, exactly integrated for pressure that is linear between samples; from rest
+/// at the first pressure.
+std::vector<double> through_catheter(const Catheter& catheter, std::span<const double> pressure_kPa,
+                                     double step_s) {
+  const double omega = 2.0 * std::numbers::pi * catheter.resonance_Hz;
+  Eigen::Matrix4d grown = Eigen::Matrix4d::Zero();
+  grown(0, 1) = step_s;
+  grown(1, 0) = -omega * omega * step_s;
+  grown(1, 1) = -2.0 * catheter.damping * omega * step_s;
+  grown(1, 2) = omega * omega * step_s;
+  grown(2, 3) = 1.0;
+  const Eigen::Matrix4d exponential = grown.exp();
+  const Eigen::Matrix2d flow = exponential.topLeftCorner<2, 2>();
+  const Eigen::Vector2d from_end = exponential.block<2, 1>(0, 3);
+  const Eigen::Vector2d from_start = exponential.block<2, 1>(0, 2) - from_end;
+
+  std::vector<double> shown(pressure_kPa.size());
+  Eigen::Vector2d state(pressure_kPa.empty() ? 0.0 : pressure_kPa.front(), 0.0);
+  for (size_t k = 0; k < pressure_kPa.size(); ++k) {
+    if (k > 0) state = flow * state + from_start * pressure_kPa[k - 1] + from_end * pressure_kPa[k];
+    shown[k] = state[0];
+  }
+  return shown;
+}
 
 /// The loop over time; one run.
 class Plant {
@@ -126,6 +152,19 @@ PlantTrace Plant::run() {
 }
 
 }  // namespace
+
+void DriveTrace::differentiate() {
+  const size_t count = volume_mL.size();
+  const auto slope = [&](const std::vector<double>& values, size_t k) {
+    const size_t before = k > 0 ? k - 1 : 0;
+    const size_t after = k + 1 < count ? k + 1 : k;
+    return (values[after] - values[before]) / (step_s * static_cast<double>(after - before));
+  };
+  for (size_t k = 0; k < count; ++k)
+    flow_mL_per_s[k] = slope(volume_mL, k);
+  for (size_t k = 0; k < count; ++k)
+    acceleration_mL_per_s2[k] = slope(flow_mL_per_s, k);
+}
 
 DriveTrace sampled_motion(const RunDrive& run, double step_s) {
   DriveTrace trace{.start_s = run.start_s,

@@ -33,4 +33,27 @@ class SpecimenCurve {
   double per_mL_ = 1.0;
 };
 
+/// In what a neighbour of the specimen differs from it.
+enum class Difference {
+  inner_radius,  ///< larger by this part, within +-0.1
+  stiffening,    ///< W = C1/beta (exp(beta (I1 - 3)) - 1), beta in [0, 3]
+  end_slip  ///< plates hold the ends along the axis; across it they yield by this compliance times C1, mm
+};
+
+/// What the rig asks of its specimen: the curve, and those of specimens that differ from it by one value. All at a
+/// modulus of 1 kPa. SpecimenFamily (estimator/model/specimen_family.hpp) solves for them.
+class SpecimenCurves {
+ public:
+  virtual ~SpecimenCurves() = default;
+
+  /// Of the specimen itself.
+  [[nodiscard]] virtual const SpecimenCurve& plain() const = 0;
+  /// Neighbours exist for a cylinder of neo-Hookean material.
+  [[nodiscard]] virtual bool has_neighbours() const = 0;
+
+  /// Another value of one quantity. `low_fidelity`: how the neighbour differs is taken from the coarse mesh alone, which
+  /// gives it within some percent at once.
+  [[nodiscard]] virtual SpecimenCurve neighbour(Difference what, double value, bool low_fidelity) const = 0;
+};
+
 }  // namespace diastole::rig
