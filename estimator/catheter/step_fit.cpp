@@ -8,7 +8,6 @@
 
 #include "estimator/catheter/step_search.hpp"
 #include "estimator/inference/covariance.hpp"
-#include "estimator/inference/differences.hpp"
 #include "estimator/inference/intervals.hpp"
 #include "estimator/inference/least_squares.hpp"
 

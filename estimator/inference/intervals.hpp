@@ -4,7 +4,7 @@
 
 #include <array>
 
-#include "estimator/inference/parameter.hpp"
+#include "estimator/inference/parameter_space.hpp"
 
 namespace diastole::inference {
 

@@ -1,5 +1,7 @@
 #include "estimator/inference/termination.hpp"
 
+#include <array>
+
 namespace diastole::inference {
 
 bool is_settled(Termination termination) {
@@ -7,21 +9,14 @@ bool is_settled(Termination termination) {
 }
 
 std::string_view sentence(Termination termination) {
-  switch (termination) {
-    case Termination::converged:
-      return "Converged.";
-    case Termination::on_bound:
-      return "Converged with an unknown on its bound; the cost falls beyond it.";
-    case Termination::stalled:
-      return "Failed: the cost has a slope, but no step lowers it.";
-    case Termination::iteration_limit:
-      return "Stopped at the limit of iterations; the cost was still falling.";
-    case Termination::interrupted:
-      return "Stopped on request; the cost was still falling.";
-    case Termination::no_solution:
-      return "Failed: the model has no solution at the start.";
-  }
-  return "";
+  constexpr std::array<std::string_view, 6> sentences{
+      "Converged.",
+      "Converged with an unknown on its bound; the cost falls beyond it.",
+      "Failed: the cost has a slope, but no step lowers it.",
+      "Stopped at the limit of iterations; the cost was still falling.",
+      "Stopped on request; the cost was still falling.",
+      "Failed: the model has no solution at the start."};
+  return sentences[static_cast<size_t>(termination)];
 }
 
 }  // namespace diastole::inference

@@ -12,7 +12,7 @@
 #include "estimator/effects/effect.hpp"
 #include "estimator/explain/imaging/field_case.hpp"
 #include "estimator/explain/imaging/field_solver.hpp"
-#include "estimator/inference/parameter.hpp"
+#include "estimator/inference/parameter_space.hpp"
 #include "estimator/inference/termination.hpp"
 #include "estimator/motion_residuals/motion_residuals.hpp"
 

@@ -5,7 +5,7 @@
 #include <functional>
 #include <utility>
 
-#include "estimator/inference/differences.hpp"
+#include "estimator/inference/least_squares.hpp"
 
 namespace diastole::inference {
 
