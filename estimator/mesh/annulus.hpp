@@ -21,6 +21,7 @@
 
 #include <array>
 #include <cstddef>
+#include <vector>
 
 #include "estimator/mesh/hermite_mesh.hpp"
 
@@ -38,5 +39,15 @@ struct AnnulusShape {
 
 /// Precondition: 0 < inner < outer radius, height > 0, the element counts above.
 HermiteMesh make_annulus(const AnnulusShape& shape);
+
+/// A cylinder about z whose elements end where one says: finer around a place, graded anyhow. Nodal derivatives are
+/// physical (per radian-like arc, per mm), elements scale them to their size.
+struct AnnulusGrid {
+  std::vector<double> angles_deg;  ///< of the nodes around, rising, less than 360 apart; at least three
+  std::vector<double> heights_mm;  ///< rising, at least two
+  std::vector<double> radii_mm;    ///< rising, > 0, at least two
+};
+
+HermiteMesh make_annulus(const AnnulusGrid& grid);
 
 }  // namespace diastole

@@ -251,15 +251,14 @@ class MeshBuilder {
     for (const ExElement& element : elements)
       add(element, corners_of.emplace_back(), scales.emplace_back());
     const size_t kept = put_scales_into_nodes(corners_of, scales);
-    const std::vector<HermiteMesh::Corners> known = corners_of;
-    HermiteMesh mesh(reference_, std::move(corners_of), {},
-                     kept > 0 ? std::move(scales) : std::vector<HermiteMesh::Scales>{}, ties_);
+    if (kept == 0) scales.clear();
+    const HermiteMesh mesh(reference_, corners_of, {}, scales, ties_);
     for (size_t e = 0; e < elements.size(); ++e) {
       if (inside_out_at(mesh, e))
         lines_.fail(elements[e].line, "the element is left-handed or inside out",
                     "xi1, xi2, xi3 must be right-handed: exchange two of them in all elements.");
     }
-    HermiteMesh named(mesh.reference(), known, outer_faces(mesh), scales_of(mesh, kept > 0), ties_);
+    HermiteMesh named(reference_, std::move(corners_of), outer_faces(mesh), std::move(scales), ties_);
     ImportedMesh imported{{std::move(named), fibres()}, {}};
     imported.remarks.push_back(fmt::format("{} elements, {} nodes.", elements.size(), places_.size()));
     if (reference_.size() / dofs_per_node > places_.size())
@@ -405,15 +404,6 @@ class MeshBuilder {
       }
     }
     return kept;
-  }
-
-  static std::vector<HermiteMesh::Scales> scales_of(const HermiteMesh& mesh, bool any) {
-    std::vector<HermiteMesh::Scales> scales(any ? mesh.element_count() : 0);
-    for (size_t e = 0; e < scales.size(); ++e) {
-      for (size_t a = 0; a < hermite_functions; ++a)
-        scales[e][a] = mesh.scale(e, a);
-    }
-    return scales;
   }
 
   static MeshFaces outer_faces(const HermiteMesh& mesh) {

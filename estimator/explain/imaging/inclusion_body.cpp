@@ -7,7 +7,7 @@
 #include "estimator/explain/imaging/field_fit.hpp"
 #include "estimator/fe/elastic_system.hpp"
 #include "estimator/fe/kept_factor.hpp"
-#include "estimator/mesh/annulus_grid.hpp"
+#include "estimator/mesh/annulus.hpp"
 #include "estimator/mesh/node_field.hpp"
 
 namespace diastole::explain {

@@ -8,7 +8,7 @@
 
 #include "estimator/fe/elastic_system.hpp"
 #include "estimator/fe/gauss_points.hpp"
-#include "estimator/mesh/annulus_grid.hpp"
+#include "estimator/mesh/annulus.hpp"
 #include "estimator/motion_residuals/tag_match.hpp"
 
 namespace diastole::explain {
