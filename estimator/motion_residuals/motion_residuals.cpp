@@ -11,8 +11,6 @@ namespace {
 
 constexpr double most_lost = 0.1;
 
-Eigen::Vector3d vector_of(const std::array<double, 3>& v) { return {v[0], v[1], v[2]}; }
-
 /// How far a point lies beyond its element in the undeformed body.
 double outside_mm(const HermiteMesh& mesh, const MaterialPoint& point) {
   MaterialPoint nearest = point;

@@ -11,8 +11,6 @@ constexpr double tolerance_mm = 1e-9;
 constexpr double least_projection = 0.1;  // of n·F⁻¹n, which is 1 at rest
 constexpr double longest_step_mm = 8.0;   // beyond this a step says only the direction
 
-Eigen::Vector3d vector_of(const std::array<double, 3>& v) { return {v[0], v[1], v[2]}; }
-
 bool inside(const Xi& xi) {
   return std::all_of(xi.begin(), xi.end(), [](double v) { return v >= 0 && v <= 1; });
 }

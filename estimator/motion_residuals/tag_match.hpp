@@ -24,6 +24,9 @@
 
 namespace diastole {
 
+/// A place or a direction of a measurement.
+inline Eigen::Vector3d vector_of(const std::array<double, 3>& v) { return {v[0], v[1], v[2]}; }
+
 struct TagMatch {
   MaterialPoint point;  ///< X, in mesh coordinates; slightly outside the body where noise or misfit puts it
   double error_mm;      ///< s

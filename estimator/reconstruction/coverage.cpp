@@ -47,6 +47,16 @@ Eigen::MatrixXd affine_motions(const FieldForms& forms) {
   return motions;
 }
 
+/// The eight places of an element at which errors are computed.
+std::array<Xi, element_probes> probe_places() {
+  std::array<Xi, element_probes> places;
+  for (size_t p = 0; p < element_probes; ++p) {
+    for (size_t k = 0; k < 3; ++k)
+      places[p][k] = ((p >> k) & 1) != 0 ? 1.0 - low_place : low_place;
+  }
+  return places;
+}
+
 /// Shares of a motion's mean square along x, y and z.
 Eigen::Vector3d shares_along(const FieldForms& forms, const Eigen::VectorXd& q) {
   const HermiteMesh& mesh = forms.space.mesh();
@@ -108,15 +118,6 @@ void count_rows(const FrameField& field, std::vector<ElementCoverage>& elements)
 }
 
 }  // namespace
-
-std::array<Xi, element_probes> probe_places() {
-  std::array<Xi, element_probes> places;
-  for (size_t p = 0; p < element_probes; ++p) {
-    for (size_t k = 0; k < 3; ++k)
-      places[p][k] = ((p >> k) & 1) != 0 ? 1.0 - low_place : low_place;
-  }
-  return places;
-}
 
 double between_probes(const std::array<double, element_probes>& values, const Xi& xi) {
   Xi inner{};

@@ -25,7 +25,7 @@ struct ElementCoverage {
   double weakest_rows = 0.0;  ///< how many numbers' worth they know along it
   double se_mm = 0.0;         ///< of a component of u, smoothness included, RMS over the element
   double unseen = 0.0;        ///< share, mean over the element
-  std::array<double, element_probes> probe_se_mm;  ///< at probe_places()
+  std::array<double, element_probes> probe_se_mm;  ///< at (1 ∓ 1/√3)/2 in each direction, corner order
   std::array<double, element_probes> probe_unseen;
 };
 
@@ -42,8 +42,6 @@ struct Coverage {
   std::vector<AffineMode> affine_modes;
 };
 
-/// The eight places of an element at which errors are computed: (1 ∓ 1/√3)/2 in each direction, corner order.
-std::array<Xi, element_probes> probe_places();
 /// Tri-linear through the values at the probes, held to their range beyond them.
 double between_probes(const std::array<double, element_probes>& values, const Xi& xi);
 

@@ -12,7 +12,8 @@ constexpr double golden = 0.6180339887498949;
 
 }  // namespace
 
-Eigen::MatrixXd random_signs(Eigen::Index rows, Eigen::Index probes) {
+Eigen::MatrixXd random_signs(Eigen::Index rows) {
+  constexpr Eigen::Index probes = 24;
   std::mt19937_64 random(20050131);
   Eigen::MatrixXd signs(rows, probes);
   for (Eigen::Index column = 0; column < probes; ++column) {
@@ -28,18 +29,6 @@ Eigen::MatrixXd seen_signs(const SmoothedSystem& system) {
 
 double stochastic_trace(const SmoothedSystem& system, const Eigen::MatrixXd& right_sides) {
   return right_sides.cwiseProduct(system.solve(right_sides)).sum() / static_cast<double>(right_sides.cols());
-}
-
-double exact_trace(const SmoothedSystem& system) {
-  constexpr Eigen::Index at_once = 128;
-  const auto& rows = system.weighted_rows();
-  double trace = 0.0;
-  for (Eigen::Index first = 0; first < rows.rows(); first += at_once) {
-    const Eigen::Index count = std::min(at_once, rows.rows() - first);
-    const Eigen::MatrixXd right_sides = Eigen::MatrixXd(rows.middleRows(first, count)).transpose();
-    trace += right_sides.cwiseProduct(system.solve(right_sides)).sum();
-  }
-  return trace;
 }
 
 Eigen::VectorXd residual_shares(const SmoothedSystem& system, const Eigen::MatrixXd& signs) {

@@ -5,7 +5,7 @@
 //
 // tr K, the field's effective degrees of freedom, is estimated with random signs z (Hutchinson 1990):
 // E[zᵀ K z] = tr K. The same signs serve every λ, so that V is smooth; with 24 of them tr K is off by some units,
-// which N − tr K (thousands) does not feel. `exact_trace` is the sum over all rows, for small problems and tests.
+// which N − tr K (thousands) does not feel.
 
 #include <vector>
 
@@ -25,15 +25,14 @@ struct CrossValidation {
   std::vector<CrossValidationPoint> curve;  ///< in order of λ
 };
 
-/// Random signs, one column a probe; the same for the same size.
-Eigen::MatrixXd random_signs(Eigen::Index rows, Eigen::Index probes = 24);
+/// Random signs, one column for each of 24 probes; the same for the same size.
+Eigen::MatrixXd random_signs(Eigen::Index rows);
 
 /// Gᵀz: as long as the rows are the same, so is this.
 Eigen::MatrixXd seen_signs(const SmoothedSystem& system);
 
 /// Of the system's present factorisation.
 double stochastic_trace(const SmoothedSystem& system, const Eigen::MatrixXd& seen_signs);
-double exact_trace(const SmoothedSystem& system);
 /// E[(z - K z)²] of each row: the share of a measured number's variance that is left in its residual. Their sum over
 /// the rows that count, tr[(1 - K)²], is what χ² is to be compared with; it is less than N - tr K when K smooths.
 Eigen::VectorXd residual_shares(const SmoothedSystem& system, const Eigen::MatrixXd& signs);

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
+#include <tuple>
 
 #include "estimator/motion_residuals/tag_match.hpp"
 #include "protocol/signal/median.hpp"
@@ -13,9 +15,8 @@ constexpr double first_lambda = 1e3;
 constexpr int most_rounds = 12;
 constexpr int tukey_round = 1, validation_round = 2, last_validation_round = 3;
 constexpr double huber_bend = 1.345, tukey_reach = 4.685;
-constexpr double least_scale = 1.0;  // nothing is wild within its own sigmas, however good the others are
-
-Eigen::Vector3d vector_of(const std::array<double, 3>& v) { return {v[0], v[1], v[2]}; }
+constexpr double reject_sigma = 5.0;  // in units of the residuals' own spread, or of sigma if that is more
+constexpr double least_scale = 1.0;   // nothing is wild within its own sigmas, however good the others are
 
 double huber_weight(double residual) {
   return std::min(1.0, huber_bend / std::max(std::abs(residual), 1e-12));
@@ -143,7 +144,7 @@ Eigen::VectorXd first_solution(SmoothedSystem& system, std::vector<ObservationRo
 }
 
 /// Tukey's weights in their round, all or nothing after it. Returns how many rows are left out.
-size_t weigh(std::vector<ObservationRow>& rows, FrameField& field, double reject_sigma) {
+size_t weigh(std::vector<ObservationRow>& rows, FrameField& field) {
   field.scale = spread_of(field);
   size_t rejected = 0;
   for (size_t i = 0; i < rows.size(); ++i) {
@@ -216,7 +217,7 @@ FrameField reconstruct_frame(const FieldForms& forms, const Measurement& measure
       moved = first_solution(system, rows, options.robust ? options.huber_rounds : 1);
     } else {
       const size_t before = rejected;
-      if (options.robust) rejected = weigh(rows, field, options.reject_sigma);
+      if (options.robust) rejected = weigh(rows, field);
       system.set_rows(rows);
       // Again if the better field has changed its mind about wild points.
       const bool validate =
@@ -236,20 +237,15 @@ FrameField reconstruct_frame(const FieldForms& forms, const Measurement& measure
   }
   field.smoothing.lambda = lambda;
   // Residuals where the field has come to rest; which rows count is the last round's choice.
-  std::vector<bool> rejected_tags(measurement.tags.size(), false),
-      rejected_points(3 * measurement.points.size());
+  using Source = std::tuple<bool, size_t, int>;
+  std::set<Source> rejected_sources;
   for (const FieldRow& row : field.rows) {
-    if (row.of_tag) {
-      rejected_tags[row.source] = row.rejected;
-    } else {
-      rejected_points[3 * row.source + static_cast<size_t>(row.component)] = row.rejected;
-    }
+    if (row.rejected) rejected_sources.insert({row.of_tag, row.source, row.component});
   }
   std::vector<ObservationRow> rows = data.linearise(field);
   for (size_t i = 0; i < rows.size(); ++i) {
     FieldRow& row = field.rows[i];
-    row.rejected = row.of_tag ? rejected_tags[row.source]
-                              : rejected_points[3 * row.source + static_cast<size_t>(row.component)];
+    row.rejected = rejected_sources.contains({row.of_tag, row.source, row.component});
     rows[i].weight = row.rejected ? 0.0 : 1.0;
   }
   system.set_rows(rows);

@@ -16,7 +16,7 @@
 //
 // Wild points: rounds begin with Huber's weights and go on with Tukey's (iteratively re-weighted, scale from the
 // median absolute residual, so that a wrong sigma does not make every point wild). What then lies beyond
-// `reject_sigma` is left out and all else counts fully: the statistics are those of ordinary least squares again.
+// five times their spread is left out and all else counts fully: the statistics are those of ordinary least squares again.
 
 #include <functional>
 #include <memory>
@@ -32,7 +32,6 @@ namespace diastole {
 struct FrameOptions {
   std::optional<double> lambda;  ///< instead of cross-validation
   bool robust = true;            ///< leave wild points out
-  double reject_sigma = 5.0;     ///< in units of the residuals' own spread, or of sigma if that is more
   LocatorOptions locator{};      ///< how far outside the body a point may lie
   double settled_mm = 1e-3;      ///< RMS: a round that moves the body by less is the last
   double fineness = 0.1;         ///< of the search for λ, decades

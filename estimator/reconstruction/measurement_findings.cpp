@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "estimator/mesh/point_locator.hpp"
+#include "estimator/motion_residuals/tag_match.hpp"
 #include "estimator/reconstruction/frame_field.hpp"
 #include "protocol/signal/median.hpp"
 
@@ -19,8 +20,6 @@ using Eigen::Vector3d;
 using Findings = std::vector<Finding>;
 
 constexpr size_t least_rows = 30;  // fewer say nothing about a spread
-
-Vector3d vector_of(const std::array<double, 3>& v) { return {v[0], v[1], v[2]}; }
 
 struct Body {
   Vector3d centre_mm = Vector3d::Zero();
@@ -51,14 +50,13 @@ void check_lengths(Findings& findings, const std::vector<Vector3d>& places, cons
                    const char* columns) {
   if (places.empty()) return;
   // About the origin as well as about the centre: a wrong unit moves the points away from the body's centre.
-  double reach_mm = 0.0;
   std::vector<double> distances;
   for (const Vector3d& place : places)
     distances.push_back(place.norm());
   const auto most =
       distances.begin() + static_cast<std::ptrdiff_t>(0.98 * static_cast<double>(distances.size()));
   std::nth_element(distances.begin(), most, distances.end());
-  reach_mm = *most;
+  const double reach_mm = *most;
   const double expected_mm = body.reach_mm + body.centre_mm.norm();
   const double ratio = reach_mm / expected_mm;
   if (ratio > 0.4 && ratio < 2.5) return;
@@ -70,18 +68,11 @@ void check_lengths(Findings& findings, const std::vector<Vector3d>& places, cons
                   ratio,
                   "",
                   "Give coordinates in mm, in the specimen's axes."};
-  const LengthUnit* best = nullptr;
-  double nearest = std::log(1.9);
-  for (const LengthUnit& unit : length_units) {
-    const double off = std::abs(std::log(ratio * unit.in_mm));
-    if (off < nearest) {
-      nearest = off;
-      best = &unit;
-    }
-  }
-  if (best != nullptr) {
-    finding.what += fmt::format(": they seem to be in {}.", best->name);
-    finding.remedy = fmt::format("Multiply these columns by {:g}.", best->in_mm);
+  const auto off = [&](const LengthUnit& unit) { return std::abs(std::log(ratio * unit.in_mm)); };
+  const LengthUnit& best = *std::ranges::min_element(length_units, {}, off);
+  if (off(best) < std::log(1.9)) {
+    finding.what += fmt::format(": they seem to be in {}.", best.name);
+    finding.remedy = fmt::format("Multiply these columns by {:g}.", best.in_mm);
   } else {
     finding.what += ".";
   }
@@ -193,6 +184,14 @@ void check_duplicates(Findings& findings, const Measurement& measurement) {
          fmt::format("frame {}", frame), static_cast<double>(count), "rows",
          "Export the frame's own points again."});
   }
+}
+
+/// "1, 2 and 5".
+std::string list_words(const std::vector<int>& numbers) {
+  std::string words;
+  for (size_t i = 0; i < numbers.size(); ++i)
+    words += fmt::format("{}{}", i == 0 ? "" : i + 1 == numbers.size() ? " and " : ", ", numbers[i]);
+  return words;
 }
 
 std::vector<size_t> rows_of_frames(const Measurement& measurement) {
@@ -318,13 +317,6 @@ void check_wall(Findings& findings, const Measurement& measurement, const Hermit
 }
 
 }  // namespace
-
-std::string list_words(const std::vector<int>& numbers) {
-  std::string words;
-  for (size_t i = 0; i < numbers.size(); ++i)
-    words += fmt::format("{}{}", i == 0 ? "" : i + 1 == numbers.size() ? " and " : ", ", numbers[i]);
-  return words;
-}
 
 std::vector<Finding> measurement_findings(const Measurement& measurement, const HermiteMesh& mesh) {
   Findings findings;

@@ -16,7 +16,4 @@ namespace diastole {
 /// Sound data give an empty list. Precondition: at least one frame.
 std::vector<Finding> measurement_findings(const Measurement& measurement, const HermiteMesh& mesh);
 
-/// "1, 2 and 5".
-std::string list_words(const std::vector<int>& numbers);
-
 }  // namespace diastole

@@ -105,9 +105,9 @@ void check_slices(Findings& findings, const MotionEvidence& evidence) {
 void check_size(Findings& findings, const MotionEvidence& evidence) {
   constexpr double plausible = 0.2;  // of the body's extent, RMS
   for (const FrameField& field : evidence.fields) {
-    const Eigen::VectorXd q = evidence.forms.space.unknowns_of(field.displacement_mm);
-    const double rms_mm = std::sqrt(evidence.forms.quadratic.apply(evidence.forms.sobolev.mean_square, q));
-    if (rms_mm < plausible * evidence.forms.space.mesh().extent_mm()) continue;
+    const Eigen::VectorXd q = evidence.forms->space.unknowns_of(field.displacement_mm);
+    const double rms_mm = std::sqrt(evidence.forms->quadratic.apply(evidence.forms->sobolev.mean_square, q));
+    if (rms_mm < plausible * evidence.forms->space.mesh().extent_mm()) continue;
     findings.push_back(
         {Severity::error, "far-motion",
          fmt::format("The body of frame {} seems to have moved by {:.3g} mm RMS.", field.number, rms_mm),
@@ -162,6 +162,34 @@ bool check_load_order(Findings& findings, const MotionEvidence& evidence) {
     }
   }
   return true;
+}
+
+/// Pressure at which the motion would vanish, extrapolated from the frames by a parabola p(amplitude). Needs four
+/// frames; the standard error is infinite with fewer.
+struct PressureAtNoMotion {
+  double value_kPa = 0.0;
+  double se_kPa = 0.0;
+};
+
+PressureAtNoMotion pressure_at_no_motion(const std::vector<FrameField>& fields,
+                                         const std::vector<MotionAmplitude>& amplitudes) {
+  constexpr Eigen::Index terms = 3;
+  const auto rows = static_cast<Eigen::Index>(fields.size());
+  if (rows <= terms) return {0.0, std::numeric_limits<double>::infinity()};
+  const double largest_kPa = largest_pressure(fields);
+  Eigen::MatrixXd A(rows, terms);
+  Eigen::VectorXd b(rows);
+  for (Eigen::Index i = 0; i < rows; ++i) {
+    const Frame& load = fields[static_cast<size_t>(i)].load;
+    const MotionAmplitude& amplitude = amplitudes[static_cast<size_t>(i)];
+    // Half a hundredth of the largest pressure: what the parabola itself may be off.
+    const double sigma_kPa = std::hypot(load.sigma_kPa, amplitude.se * largest_kPa) + 0.005 * largest_kPa;
+    A.row(i) = Eigen::RowVector3d(1.0, amplitude.value, amplitude.value * amplitude.value) / sigma_kPa;
+    b[i] = load.pressure_kPa / sigma_kPa;
+  }
+  const Eigen::Matrix3d covariance = (A.transpose() * A).inverse();
+  const Eigen::Vector3d coefficients = covariance * (A.transpose() * b);
+  return {coefficients[0], std::sqrt(covariance(0, 0))};
 }
 
 void check_pressure_offset(Findings& findings, const MotionEvidence& evidence) {
@@ -260,27 +288,6 @@ std::vector<MotionAmplitude> motion_amplitudes(const FieldForms& forms,
   for (MotionAmplitude& amplitude : amplitudes)
     amplitude = {amplitude.value / whole, amplitude.se / whole};
   return amplitudes;
-}
-
-PressureAtNoMotion pressure_at_no_motion(const std::vector<FrameField>& fields,
-                                         const std::vector<MotionAmplitude>& amplitudes) {
-  constexpr Eigen::Index terms = 3;
-  const auto rows = static_cast<Eigen::Index>(fields.size());
-  if (rows <= terms) return {0.0, std::numeric_limits<double>::infinity()};
-  const double largest_kPa = largest_pressure(fields);
-  Eigen::MatrixXd A(rows, terms);
-  Eigen::VectorXd b(rows);
-  for (Eigen::Index i = 0; i < rows; ++i) {
-    const Frame& load = fields[static_cast<size_t>(i)].load;
-    const MotionAmplitude& amplitude = amplitudes[static_cast<size_t>(i)];
-    // Half a hundredth of the largest pressure: what the parabola itself may be off.
-    const double sigma_kPa = std::hypot(load.sigma_kPa, amplitude.se * largest_kPa) + 0.005 * largest_kPa;
-    A.row(i) = Eigen::RowVector3d(1.0, amplitude.value, amplitude.value * amplitude.value) / sigma_kPa;
-    b[i] = load.pressure_kPa / sigma_kPa;
-  }
-  const Eigen::Matrix3d covariance = (A.transpose() * A).inverse();
-  const Eigen::Vector3d coefficients = covariance * (A.transpose() * b);
-  return {coefficients[0], std::sqrt(covariance(0, 0))};
 }
 
 std::vector<FamilyFit> family_fits(const std::vector<FrameField>& fields, const TagGroups& groups,

@@ -4,6 +4,7 @@
 // ids: wild-points, not-found, sigma, tag-family, slice-offset, far-motion, no-motion, frames-disagree, motion-without-load,
 // pressure-offset, volume, unseen-motion, smoothing-edge, not-settled.
 
+#include <memory>
 #include <vector>
 
 #include "estimator/io/finding.hpp"
@@ -23,15 +24,6 @@ struct MotionAmplitude {
 std::vector<MotionAmplitude> motion_amplitudes(const FieldForms& forms,
                                                const std::vector<FrameField>& fields);
 
-/// Pressure at which the motion would vanish, extrapolated from the frames by a parabola p(amplitude). Needs four
-/// frames; the standard error is infinite with fewer.
-struct PressureAtNoMotion {
-  double value_kPa = 0.0;
-  double se_kPa = 0.0;
-};
-PressureAtNoMotion pressure_at_no_motion(const std::vector<FrameField>& fields,
-                                         const std::vector<MotionAmplitude>& amplitudes);
-
 /// χ² of one tag direction in one frame, or in all of them.
 struct FamilyFit {
   size_t family = 0;
@@ -44,16 +36,16 @@ struct FamilyFit {
 std::vector<FamilyFit> family_fits(const std::vector<FrameField>& fields, const TagGroups& groups,
                                    size_t tags);
 
-/// All that was found out about the fields of one measurement; volumes, in the order of the fields.
+/// All that was found out about the fields of one measurement.
 struct MotionEvidence {
-  const FieldForms& forms;
-  const std::vector<FrameField>& fields;
-  const TagGroups& groups;
-  const std::vector<MotionAmplitude>& amplitudes;
-  const std::vector<FamilyFit>& families;
-  const std::vector<SliceOffset>& slices;
-  const std::vector<VolumeCheck>& volumes;
-  const Coverage& coverage;  ///< of the last frame
+  std::unique_ptr<const FieldForms> forms;
+  std::vector<FrameField> fields;  ///< loaded frames with points, in order
+  TagGroups groups;
+  std::vector<MotionAmplitude> amplitudes;
+  std::vector<FamilyFit> families;
+  std::vector<SliceOffset> slices;
+  std::vector<VolumeCheck> volumes;  ///< in the order of the fields
+  Coverage coverage;                 ///< of the last frame
 };
 
 /// Sound data give an empty list.

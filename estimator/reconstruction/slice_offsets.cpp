@@ -33,7 +33,8 @@ Information information_of(const FrameField& field, const std::vector<int>& slic
 }  // namespace
 
 std::vector<SliceOffset> slice_offsets(const std::vector<FrameField>& fields, const TagGroups& groups,
-                                       std::span<const TagPoint> tags, const SliceOffsetOptions& options) {
+                                       std::span<const TagPoint> tags) {
+  constexpr double significant = 5.0, smallest_mm = 0.1, least_sigmas = 0.5;
   const auto slices = static_cast<Eigen::Index>(groups.slices.size());
   std::vector<int> slice_of_tag(tags.size(), -1);
   std::vector<SliceOffset> result;
@@ -44,7 +45,7 @@ std::vector<SliceOffset> slice_offsets(const std::vector<FrameField>& fields, co
       slice_of_tag[i] = static_cast<int>(s);
       sigma_mm += tags[i].sigma_mm / static_cast<double>(groups.slices[s].tags.size());
     }
-    least_mm.push_back(std::max(options.least_mm, options.least_sigmas * sigma_mm));
+    least_mm.push_back(std::max(smallest_mm, least_sigmas * sigma_mm));
     result.push_back({s, 0.0, std::numeric_limits<double>::infinity(), false});
   }
   if (slices == 0) return result;
@@ -68,7 +69,7 @@ std::vector<SliceOffset> slice_offsets(const std::vector<FrameField>& fields, co
             ? Eigen::MatrixXd()
             : Eigen::MatrixXd(factor.solve(Eigen::MatrixXd::Identity(chosen.rows(), chosen.cols())));
     Eigen::Index best = -1;
-    double most = options.significant;
+    double most = significant;
     for (Eigen::Index s = 0; s < slices; ++s) {
       SliceOffset& offset = result[static_cast<size_t>(s)];
       const auto found = std::find(taken.begin(), taken.end(), s);

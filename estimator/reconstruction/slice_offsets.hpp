@@ -25,15 +25,9 @@ struct SliceOffset {
   bool displaced = false;
 };
 
-struct SliceOffsetOptions {
-  double significant = 5.0;   ///< offset / se
-  double least_mm = 0.1;      ///< and at least this large
-  double least_sigmas = 0.5;  ///< and this many of the points' own sigma: the mesh's error is no displacement
-};
-
-/// One entry a slice, in their order.
+/// One entry a slice, in their order. Displaced are offsets of at least five standard errors, 0.1 mm and half of the points'
+/// own sigma: the mesh's error is no displacement.
 std::vector<SliceOffset> slice_offsets(const std::vector<FrameField>& fields, const TagGroups& groups,
-                                       std::span<const TagPoint> tags,
-                                       const SliceOffsetOptions& options = {});
+                                       std::span<const TagPoint> tags);
 
 }  // namespace diastole

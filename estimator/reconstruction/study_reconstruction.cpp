@@ -63,10 +63,8 @@ std::vector<int> in_order_of_work(std::vector<int> frames, const Measurement& me
 
 void reconstruct_frames(StudyReconstruction& result, const Measurement& measurement,
                         const std::vector<int>& frames, const ReconstructionOptions& options) {
-  FrameOptions frame_options{.lambda = options.lambda,
-                             .robust = options.robust,
-                             .reject_sigma = 5.0,
-                             .locator = locator_for(result.body->mesh)};
+  FrameOptions frame_options{
+      .lambda = options.lambda, .robust = options.robust, .locator = locator_for(result.body->mesh)};
   if (options.quick) {
     frame_options.settled_mm = quick_settled_mm;
     frame_options.fineness = quick_fineness;
@@ -101,9 +99,7 @@ void judge(StudyReconstruction& result, const Study& study, const Measurement& m
   for (const FrameField& field : result.fields)
     result.volumes.push_back(check_volume(forms, field));
   if (!options.quick) result.coverage = coverage_of(forms, result.fields.back());
-  const std::vector<Finding> found =
-      motion_findings({forms, result.fields, result.groups, result.amplitudes, result.families, result.slices,
-                       result.volumes, result.coverage});
+  const std::vector<Finding> found = motion_findings(result);
   result.findings.insert(result.findings.end(), found.begin(), found.end());
   if (!options.check_stiffness || has_error(result.findings)) return;
   if (const auto apparent = apparent_stiffness(study, forms, result.fields.back())) {

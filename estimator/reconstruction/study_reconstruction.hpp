@@ -34,16 +34,9 @@ struct ReconstructionOptions {
 };
 
 /// Without fields when the data cannot be what they say (an error among the findings of the measurement).
-struct StudyReconstruction {
+/// The coverage is empty if it was quick.
+struct StudyReconstruction : MotionEvidence {
   std::unique_ptr<const MeshBody> body;
-  std::unique_ptr<const FieldForms> forms;
-  std::vector<FrameField> fields;  ///< loaded frames with points, in order
-  TagGroups groups;
-  std::vector<MotionAmplitude> amplitudes;
-  std::vector<FamilyFit> families;
-  std::vector<SliceOffset> slices;
-  std::vector<VolumeCheck> volumes;
-  Coverage coverage;  ///< of the last frame; empty if it was quick
   std::vector<SampledFrame> samples;
   std::vector<Finding> findings;  ///< the gravest first
   double seconds = 0.0;

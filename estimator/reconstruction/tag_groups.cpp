@@ -8,6 +8,8 @@
 #include <optional>
 #include <tuple>
 
+#include "estimator/motion_residuals/tag_match.hpp"
+
 namespace diastole {
 namespace {
 
@@ -18,8 +20,6 @@ constexpr size_t most_images = 64, most_partners = 40;
 constexpr double least_share = 0.95;
 
 using Eigen::Vector3d;
-
-Vector3d vector_of(const std::array<double, 3>& v) { return {v[0], v[1], v[2]}; }
 
 std::vector<TagFamily> families_of(std::span<const TagPoint> tags) {
   std::map<std::tuple<long, long, long>, size_t> known;
