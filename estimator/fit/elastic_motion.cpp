@@ -2,17 +2,9 @@
 
 #include <cmath>
 
+#include "estimator/mesh/node_field.hpp"
+
 namespace diastole {
-namespace {
-
-void add_scaled(NodeField& field, double factor, const NodeField& direction) {
-  if (factor == 0) return;
-  for (size_t i = 0; i < field.size(); ++i)
-    field[i] += factor * direction[i];
-}
-
-}  // namespace
-
 void ElasticMotion::set_values(std::span<const double> values) {
   for (size_t i = 0; i < groups_.size(); ++i) {
     const ParameterGroup& group = groups_[i];

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "estimator/fe/elastic_model.hpp"
-#include "estimator/fit/motion_model.hpp"
+#include "estimator/fit/joint_problem.hpp"
 
 namespace diastole {
 
@@ -18,7 +18,6 @@ class ElasticMotion : public MotionModel {
       : model_(std::move(model)), groups_(std::move(groups)), displacement_gain_(displacement_gain) {}
 
   [[nodiscard]] const HermiteMesh& mesh() const override { return model_.mesh(); }
-  [[nodiscard]] size_t value_count() const override { return groups_.size(); }
   [[nodiscard]] MotionOutcome solve(size_t slot, std::span<const double> values,
                                     double pressure_kPa) override;
   [[nodiscard]] MotionDerivatives derivatives(size_t slot) override;

@@ -2,12 +2,15 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
+
 #include "protocol/contract/input_error.hpp"
 
 namespace diastole {
 
-size_t value_count(const StudyParameter& parameter, size_t elements) {
-  return parameter.vary == Variation::whole ? 1 : elements;
+double ParameterRun::se_of_mean(const Eigen::MatrixXd& covariance) const {
+  const auto start = static_cast<Eigen::Index>(first), size = static_cast<Eigen::Index>(count);
+  return std::sqrt(covariance.block(start, start, size, size).sum()) / static_cast<double>(count);
 }
 
 EstimatedParameters estimated_parameters(const Study& study, const ElasticModel& model) {
@@ -23,13 +26,13 @@ EstimatedParameters estimated_parameters(const Study& study, const ElasticModel&
     const std::vector<ParameterGroup> groups = parameter.vary == Variation::whole
                                                    ? std::vector{whole_parameter(index)}
                                                    : each_element(index, model.mesh().element_count());
+    const size_t first = estimated.values.size();
+    estimated.runs.push_back({parameter, first, groups.size()});
     const Smoothness& smoothness = parameter.smoothness;
     if (parameter.vary == Variation::element && smoothness.kind != Smoothness::Kind::none) {
       const bool given = smoothness.kind == Smoothness::Kind::given;
-      estimated.smooth.push_back(
-          {estimated.values.size(), given ? std::optional(smoothness.step) : std::nullopt});
+      estimated.smooth.push_back({first, given ? std::optional(smoothness.step) : std::nullopt});
     }
-    const size_t first = estimated.values.size();
     for (const ParameterGroup& group : groups) {
       estimated.groups.push_back(group);
       const std::string name = groups.size() == 1

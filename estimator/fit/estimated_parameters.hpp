@@ -9,17 +9,28 @@
 
 namespace diastole {
 
-/// Parallel vectors in the study's order: one entry for a whole parameter, one an element for a regional one.
+/// One parameter of the study and its run of values: one for a whole parameter, one an element for a regional one.
+struct ParameterRun {
+  StudyParameter parameter;
+  size_t first;
+  size_t count;
+
+  [[nodiscard]] double mean(const Eigen::VectorXd& values) const {
+    return values.segment(static_cast<Eigen::Index>(first), static_cast<Eigen::Index>(count)).mean();
+  }
+  /// Standard error of the mean, from the covariance of all values.
+  [[nodiscard]] double se_of_mean(const Eigen::MatrixXd& covariance) const;
+};
+
+/// Parallel vectors in the study's order, an entry a value.
 struct EstimatedParameters {
   std::vector<EstimatedParameter> values;
   std::vector<ParameterGroup> groups;  ///< which of the model's parameters each value sets
   std::vector<SmoothRegion> smooth;    ///< the regional parameters that are smooth
+  std::vector<ParameterRun> runs;      ///< of the values, one a parameter
 };
 
 /// Throws InputError when a lower bound is not a value that the law allows.
 EstimatedParameters estimated_parameters(const Study& study, const ElasticModel& model);
-
-/// How many values a parameter has.
-size_t value_count(const StudyParameter& parameter, size_t elements);
 
 }  // namespace diastole

@@ -116,7 +116,7 @@ void estimate_profiles(FitOutcome& outcome, JointProblem& problem, const Eigen::
       outcome.interrupted = "profile";
       return;
     }
-    ProfileInterval interval{place, {}, {}, ends[0].found && ends[1].found, {}, {}};
+    ProfileInterval interval{{}, place, ends[0].found && ends[1].found};
     std::vector<std::array<double, 2>> tried{{q[which], 0.0}};
     for (size_t side = 0; side < 2; ++side) {
       interval.ci95[side] = parameter.value(ends[side].coordinate);
@@ -125,15 +125,15 @@ void estimate_profiles(FitOutcome& outcome, JointProblem& problem, const Eigen::
     }
     std::sort(tried.begin(), tried.end());
     for (const auto& [coordinate, rise] : tried) {
-      interval.at.push_back(parameter.value(coordinate));
+      interval.value.push_back(parameter.value(coordinate));
       interval.cost_rise.push_back(rise);
     }
     outcome.profiles.push_back(interval);
   }
 }
 
-PosteriorOfValue summarised(const std::vector<Eigen::MatrixXd>& chains, Eigen::Index unknown,
-                            const inference::Parameter& parameter) {
+FittedPosterior summarised(const std::vector<Eigen::MatrixXd>& chains, Eigen::Index unknown,
+                           const inference::Parameter& parameter) {
   std::vector<Eigen::VectorXd> draws;
   std::vector<double> sorted;
   for (const Eigen::MatrixXd& chain : chains) {
@@ -165,10 +165,8 @@ void estimate_posterior(FitOutcome& outcome, JointProblem& problem, const Eigen:
     outcome.interrupted = "posterior";
     return;
   }
-  PosteriorOutcome result;
-  result.draws = options.posterior->chains * options.posterior->steps;
-  result.accepted = sample.accepted;
-  result.solutions = sample.solutions;
+  PosteriorOutcome result{
+      {options.posterior->chains * options.posterior->steps, sample.accepted, sample.solutions, 0}, {}};
   for (Eigen::Index i = 0; i < problem.values(); ++i)
     result.values.push_back(summarised(sample.chains, i, problem.space()[i]));
   result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();

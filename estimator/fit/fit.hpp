@@ -24,6 +24,7 @@
 #include "estimator/fit/offset_score.hpp"
 #include "estimator/fit/posterior.hpp"
 #include "estimator/inference/least_squares.hpp"
+#include "estimator/io/fit_file.hpp"
 
 namespace diastole {
 
@@ -68,22 +69,15 @@ struct EstimatedFrame {
   Frame load;
   double pressure_kPa;
   double se_kPa;  ///< 0 when exactly known
-  size_t usable;
-  size_t tags_left_out;
-  size_t tags_unfollowed;  ///< of those left out (motion_residuals.hpp)
-  size_t points_left_out;
+  FoundPoints found;
   Eigen::VectorXd weighted;  ///< residuals / sigma
   Eigen::VectorXd unweighted_mm;
   NodeField position_mm;  ///< the fitted motion
 };
 
-struct SmoothOutcome {
+/// `step90` is the step twice if it was given; with evidence `effective_values` is its mean.
+struct SmoothOutcome : FittedSmoothness {
   size_t first_value;
-  double step;
-  bool by_evidence;
-  bool none_seen;                ///< the evidence asks for no difference between elements
-  std::array<double, 2> step90;  ///< where the step lies with 90 % probability; `step` twice if it was given
-  double effective_values;  ///< how many values the data determine: 1 to their number; by evidence its mean
 };
 
 struct RobustOutcome {
@@ -96,29 +90,13 @@ struct PressureOffset {
   double se_kPa;
 };
 
-struct ProfileInterval {
-  size_t value;
-  std::array<double, 2> ci95;
-  std::array<bool, 2> at_bound;  ///< the interval ends there because the bound does
+struct ProfileInterval : FittedProfile {
+  size_t place;  ///< of the value
   bool found;
-  std::vector<double> at;         ///< values at which it was tried, rising, the estimate among them
-  std::vector<double> cost_rise;  ///< of each: how far the cost is above the least
 };
 
-struct PosteriorOfValue {
-  double mean;
-  double sd;
-  std::array<double, 2> ci95;  ///< 2.5 and 97.5 % quantiles
-  double r_hat;
-  double effective_draws;
-};
-
-struct PosteriorOutcome {
-  int draws = 0;
-  double accepted = 0;
-  long solutions = 0;  ///< equilibria
-  double seconds = 0;
-  std::vector<PosteriorOfValue> values;
+struct PosteriorOutcome : PosteriorDrawing {
+  std::vector<FittedPosterior> values;
 };
 
 struct FitOutcome {

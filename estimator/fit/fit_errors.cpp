@@ -45,10 +45,7 @@ EstimatedFrame estimated(const JointProblem::LoadedFrame& frame, const Eigen::Ve
           .load = frame.load,
           .pressure_kPa = unknown ? q[*unknown] : frame.load.pressure_kPa,
           .se_kPa = unknown ? std::sqrt(covariance(*unknown, *unknown)) : 0.0,
-          .usable = frame.residuals.found().usable,
-          .tags_left_out = frame.residuals.found().tags_left_out,
-          .tags_unfollowed = frame.residuals.found().tags_unfollowed,
-          .points_left_out = frame.residuals.found().points_left_out,
+          .found = frame.residuals.found(),
           .weighted = frame.residuals.residuals(),
           .unweighted_mm = frame.residuals.unweighted_mm(),
           .position_mm = frame.position_mm};
@@ -63,17 +60,6 @@ double step_at(const EvidenceOfStep& evidence, double share) {
   }
   return evidence.steps.back();
 }
-
-/// (a J'J + P)^-1 (b J'J + P) (a J'J + P)^-1 with J of the motion, P of the priors, a and b the means of the
-/// influence's slope and square: the covariance of an M-estimator (Huber, Robust Statistics, 1981, 7.6).
-struct RobustErrors {
-  Eigen::MatrixXd excess;  ///< (b - a) J'J, what the residuals' spread has over the curvature
-  Eigen::MatrixXd covariance;
-  Eigen::MatrixXd jacobian;      ///< whose J'J is a J'J + P
-  Eigen::VectorXd residuals;     ///< whose J'r is the cost's gradient
-  double scale;                  ///< of the motion's rows of the jacobian
-  double exact_variance_factor;  ///< b / a
-};
 
 /// Means of the influence's slope (a) and square (b) over the motion's residuals.
 struct InfluenceMeans {
@@ -91,36 +77,26 @@ InfluenceMeans influence_means(const RobustLoss& loss, const Eigen::VectorXd& re
   return means;
 }
 
-/// The least-squares problem with the gradient and the mean curvature of the robust cost.
-struct WeightedProblem {
+/// The least-squares problem with the gradient and the mean curvature of the cost: J'J is a J'J + P with J of the motion,
+/// P of the priors and a the mean slope of a robust loss' influence.
+struct LinearisedCost {
   Eigen::MatrixXd jacobian;
   Eigen::VectorXd residuals;
+  double motion_scale = 1;  ///< of the motion's rows: sqrt(a)
+  double spread = 1;        ///< b / a, b the mean square of the influence
 };
 
-WeightedProblem weighted_problem(JointProblem& problem, const Eigen::VectorXd& q, double slope) {
+LinearisedCost linearised(JointProblem& problem, const Eigen::VectorXd& q) {
+  LinearisedCost cost{problem.plain_jacobian(q), problem.residuals(q).value()};
+  if (!problem.robust()) return cost;
   const Eigen::VectorXd motion = problem.motion_residuals();
-  WeightedProblem weighted{problem.plain_jacobian(q), problem.residuals(q).value()};
-  weighted.jacobian.topRows(motion.size()) *= std::sqrt(slope);
+  const InfluenceMeans means = influence_means(*problem.robust(), motion);
+  cost.motion_scale = std::sqrt(means.slope);
+  cost.spread = means.square / means.slope;
+  cost.jacobian.topRows(motion.size()) *= cost.motion_scale;
   for (Eigen::Index i = 0; i < motion.size(); ++i)
-    weighted.residuals[i] = problem.robust()->influence(motion[i]) / std::sqrt(slope);
-  return weighted;
-}
-
-RobustErrors robust_errors(JointProblem& problem, const Eigen::VectorXd& q,
-                           const std::vector<bool>& is_free) {
-  const Eigen::VectorXd residuals = problem.motion_residuals();
-  const InfluenceMeans means = influence_means(*problem.robust(), residuals);
-  WeightedProblem weighted = weighted_problem(problem, q, means.slope);
-  RobustErrors errors;
-  errors.scale = std::sqrt(means.slope);
-  errors.jacobian = std::move(weighted.jacobian);
-  errors.residuals = std::move(weighted.residuals);
-  const Eigen::MatrixXd motion = errors.jacobian.topRows(residuals.size());
-  const Eigen::MatrixXd inverse = estimate_covariance(errors.jacobian, is_free).matrix;
-  errors.excess = (means.square / means.slope - 1) * motion.transpose() * motion;
-  errors.covariance = inverse + inverse * errors.excess * inverse;
-  errors.exact_variance_factor = means.square / means.slope;
-  return errors;
+    cost.residuals[i] = problem.robust()->influence(motion[i]) / cost.motion_scale;
+  return cost;
 }
 
 /// Normal distributions of one unknown, one a step, with the steps' weights.
@@ -179,9 +155,10 @@ Intervals estimate_smoothness(FitOutcome& outcome, JointProblem& problem, const 
   };
   for (size_t i = 0; i < options.smooth.size(); ++i) {
     const SmoothBlock& block = problem.smoothness()[i];
-    SmoothOutcome smooth{options.smooth[i].first_value, block.step,
-                         !options.smooth[i].step,       false,
-                         {block.step, block.step},      determined(at_chosen, block)};
+    const bool by_evidence = !options.smooth[i].step;
+    SmoothOutcome smooth{
+        {block.step, by_evidence, false, {block.step, block.step}, determined(at_chosen, block)},
+        options.smooth[i].first_value};
     if (smooth.by_evidence) {
       const EvidenceOfStep evidence = evidence_of_step(model, problem.smoothness(), i, is_free);
       smooth.none_seen = evidence.none_seen;
@@ -201,27 +178,13 @@ Intervals estimate_smoothness(FitOutcome& outcome, JointProblem& problem, const 
   return intervals;
 }
 
-void score_offset(FitOutcome& outcome, const JointProblem& problem, const Eigen::VectorXd& q,
-                  const LinearProblem& linear, const Eigen::VectorXd& column) {
-  if (!problem.offset_unknown()) outcome.offset_score = offset_score(problem, q, linear, column);
-}
-
 }  // namespace
 
 QuadraticModel quadratic_model(JointProblem& problem, const Eigen::VectorXd& q) {
-  Eigen::VectorXd residuals = problem.residuals(q).value();
-  Eigen::MatrixXd jacobian;
-  if (problem.robust()) {
-    const InfluenceMeans means = influence_means(*problem.robust(), problem.motion_residuals());
-    WeightedProblem weighted = weighted_problem(problem, q, means.slope);
-    jacobian = std::move(weighted.jacobian);
-    residuals = std::move(weighted.residuals);
-  } else {
-    jacobian = problem.jacobian(q);
-  }
-  jacobian.conservativeResize(problem.data_rows(), Eigen::NoChange);
-  residuals.conservativeResize(problem.data_rows());
-  return {q, jacobian.transpose() * residuals, jacobian.transpose() * jacobian};
+  LinearisedCost cost = linearised(problem, q);
+  cost.jacobian.conservativeResize(problem.data_rows(), Eigen::NoChange);
+  cost.residuals.conservativeResize(problem.data_rows());
+  return {q, cost.jacobian.transpose() * cost.residuals, cost.jacobian.transpose() * cost.jacobian};
 }
 
 Eigen::VectorXd mean_over_steps(JointProblem& problem, const Eigen::VectorXd& q, const FitOptions& options) {
@@ -246,7 +209,7 @@ Eigen::MatrixXd estimate_errors(FitOutcome& outcome, JointProblem& problem, cons
     outcome.reason = "Failed: " + problem.failure() + ".";
     return {};
   }
-  Eigen::MatrixXd jacobian = problem.jacobian(q);
+  const LinearisedCost cost = linearised(problem, q);
   const std::vector<bool> is_free = problem.space().free_unknowns(q);
   outcome.rows = problem.data_rows();
   for (Eigen::Index i = 0; i < problem.unknowns(); ++i)
@@ -254,30 +217,31 @@ Eigen::MatrixXd estimate_errors(FitOutcome& outcome, JointProblem& problem, cons
   const Eigen::VectorXd motion = problem.motion_residuals();
   outcome.chi2 =
       motion.squaredNorm() + residuals->segment(motion.size(), outcome.rows - motion.size()).squaredNorm();
-  outcome.covariance = estimate_covariance(jacobian, is_free).matrix;
-  double exact_factor = 1;
-  Eigen::VectorXd column = problem.offset_column();
+  outcome.covariance = estimate_covariance(cost.jacobian, is_free).matrix;
+  // What the residuals' spread has over the curvature makes the covariance that of an M-estimator,
+  // (a J'J + P)^-1 (b J'J + P) (a J'J + P)^-1 (Huber, Robust Statistics, 1981, 7.6).
   Eigen::MatrixXd excess = Eigen::MatrixXd::Zero(q.size(), q.size());
   if (problem.robust()) {
-    RobustErrors errors = robust_errors(problem, q, is_free);
-    outcome.covariance = std::move(errors.covariance);
-    jacobian = std::move(errors.jacobian);
-    excess = std::move(errors.excess);
-    exact_factor = errors.exact_variance_factor;
-    column.head(motion.size()) *= errors.scale;
-    score_offset(outcome, problem, q, {jacobian, errors.residuals, is_free, exact_factor}, column);
+    const Eigen::MatrixXd of_motion = cost.jacobian.topRows(motion.size());
+    excess = (cost.spread - 1) * of_motion.transpose() * of_motion;
+    const Eigen::MatrixXd inverse = outcome.covariance;
+    outcome.covariance = inverse + inverse * excess * inverse;
     outcome.robust = RobustOutcome{*problem.robust(), wild_count(motion)};
   }
-  const Eigen::MatrixXd data_jacobian = jacobian.topRows(outcome.rows);
+  const Eigen::MatrixXd data_jacobian = cost.jacobian.topRows(outcome.rows);
   outcome.unknowns = inference::effective_count(outcome.covariance, data_jacobian);
-  if (!problem.robust()) {
-    const double spread = outcome.chi2 / (static_cast<double>(outcome.rows) - outcome.unknowns);
-    score_offset(outcome, problem, q, {jacobian, *residuals, is_free, spread}, column);
+  if (!problem.offset_unknown()) {
+    Eigen::VectorXd column = problem.offset_column();
+    column.head(motion.size()) *= cost.motion_scale;
+    const double spread = problem.robust()
+                              ? cost.spread
+                              : outcome.chi2 / (static_cast<double>(outcome.rows) - outcome.unknowns);
+    outcome.offset_score = offset_score(problem, q, {cost.jacobian, cost.residuals, is_free, spread}, column);
   }
   const Intervals intervals = estimate_smoothness(outcome, problem, q, options, is_free, excess);
   Eigen::MatrixXd in_coordinates = outcome.covariance;
   const Eigen::VectorXd exact =
-      exact_factor * variances_at_exact_pressure(jacobian, is_free, problem.values());
+      cost.spread * variances_at_exact_pressure(cost.jacobian, is_free, problem.values());
   for (Eigen::Index i = 0; i < problem.values(); ++i) {
     const inference::Parameter& parameter = problem.space()[i];
     outcome.values.push_back(

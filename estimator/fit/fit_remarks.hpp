@@ -9,6 +9,11 @@
 
 namespace diastole {
 
+/// The eigen-directions of the relative covariance of the whole, positive parameters that are not on a bound, from
+/// the least certain one. `first[i]` is the place of parameter i among the fit's values. Empty for fewer than two.
+std::vector<FittedDirection> directions_of(const FitRecord& record, const FitOutcome& fit,
+                                           const std::vector<size_t>& first);
+
 std::vector<std::string> remarks_on(const FitRecord& record, const FitOutcome& fit);
 
 }  // namespace diastole

@@ -7,6 +7,8 @@
 #include <map>
 #include <tuple>
 
+#include "estimator/motion_residuals/tag_match.hpp"
+
 namespace diastole {
 namespace {
 
@@ -29,8 +31,6 @@ struct Cut {
     return std::abs(normal.dot(x_mm) - offset_mm) < slice_mm;
   }
 };
-
-Eigen::Vector3d vector_of(const std::array<double, 3>& a) { return {a[0], a[1], a[2]}; }
 
 class Drawer {
  public:

@@ -26,7 +26,6 @@
 #include <string>
 #include <vector>
 
-#include "estimator/fit/motion_model.hpp"
 #include "estimator/fit/robust_loss.hpp"
 #include "estimator/fit/smoothness.hpp"
 #include "estimator/inference/least_squares.hpp"
@@ -34,6 +33,34 @@
 #include "estimator/motion_residuals/motion_residuals.hpp"
 
 namespace diastole {
+
+struct MotionOutcome {
+  std::optional<NodeField> position_mm;  ///< empty when no equilibrium was found
+  std::string reason;                    ///< why not, as a sentence
+};
+
+struct MotionDerivatives {
+  std::vector<NodeField> by_value;  ///< dx/d(value), one for each value
+  NodeField by_pressure;            ///< dx/d(cavity pressure), mm/kPa
+};
+
+/// What the fit needs of a mechanical model: the body's motion for material values and a cavity pressure, and its
+/// derivatives. ElasticMotion (elastic_motion.hpp) is the finite-element one.
+///
+/// A motion is a node field of deformed positions over `mesh()` (mm). Each loaded frame has a slot, so that a model can
+/// start from the frame's last solution.
+class MotionModel {
+ public:
+  virtual ~MotionModel() = default;
+
+  [[nodiscard]] virtual const HermiteMesh& mesh() const = 0;
+
+  /// Equilibrium of slot's frame. Failure is an outcome.
+  [[nodiscard]] virtual MotionOutcome solve(size_t slot, std::span<const double> values,
+                                            double pressure_kPa) = 0;
+  /// At the slot's last successful `solve`.
+  [[nodiscard]] virtual MotionDerivatives derivatives(size_t slot) = 0;
+};
 
 /// A value to be estimated, in the model's order. Invariant: lower <= start <= upper, lower < upper.
 struct EstimatedParameter {

@@ -66,39 +66,34 @@ double evaluate(unsigned count, const double* values, double* gradient, void* da
   return here;
 }
 
-inference::Termination termination_of(nlopt_result result) {
+void conclude(inference::SearchResult& found, nlopt_result result, const Search& search) {
+  using inference::Termination;
+  const auto end = [&](Termination termination, std::string reason) {
+    found.termination = termination;
+    found.reason = std::move(reason);
+  };
   switch (result) {
     case NLOPT_XTOL_REACHED:
+      return end(
+          Termination::converged,
+          fmt::format("Converged: the last step changed the parameters by less than {:g} of their norm.",
+                      paper_tolerance));
     case NLOPT_SUCCESS:
     case NLOPT_FTOL_REACHED:
-      return inference::Termination::converged;
-    case NLOPT_FORCED_STOP:
-      return inference::Termination::interrupted;
-    case NLOPT_MAXEVAL_REACHED:
-      return inference::Termination::iteration_limit;
-    default:
-      return inference::Termination::stalled;
-  }
-}
-
-std::string reason_of(nlopt_result result, const Search& search) {
-  switch (result) {
-    case NLOPT_XTOL_REACHED:
-      return fmt::format("Converged: the last step changed the parameters by less than {:g} of their norm.",
-                         paper_tolerance);
-    case NLOPT_SUCCESS:
-    case NLOPT_FTOL_REACHED:
-      return "Converged: the cost's gradient vanishes.";
+      return end(Termination::converged, "Converged: the cost's gradient vanishes.");
     case NLOPT_ROUNDOFF_LIMITED:
-      return "Failed: the differences' own error hides the direction in which the cost falls.";
+      return end(Termination::stalled,
+                 "Failed: the differences' own error hides the direction in which the cost falls.");
     case NLOPT_FORCED_STOP:
-      return fmt::format("Stopped on request after {} iterations; the cost was still falling.",
-                         search.iterations);
+      return end(Termination::interrupted,
+                 fmt::format("Stopped on request after {} iterations; the cost was still falling.",
+                             search.iterations));
     case NLOPT_MAXEVAL_REACHED:
-      return fmt::format("Stopped at the limit of {} evaluations of the cost; it was still falling.",
-                         search.options.iteration_limit);
+      return end(Termination::iteration_limit,
+                 fmt::format("Stopped at the limit of {} evaluations of the cost; it was still falling.",
+                             search.options.iteration_limit));
     default:
-      return "Failed: sequential quadratic programming found no step.";
+      return end(Termination::stalled, "Failed: sequential quadratic programming found no step.");
   }
 }
 
@@ -130,8 +125,7 @@ inference::SearchResult paper_search(JointProblem& problem, const Eigen::VectorX
   found.iterations = search.iterations;
   if (search.best_q.size() == 0) return found;
   found.q = search.best_q;
-  found.termination = termination_of(result);
-  found.reason = reason_of(result, search);
+  conclude(found, result, search);
   return found;
 }
 

@@ -130,7 +130,6 @@ PosteriorSample sample_posterior(JointProblem& problem, const Eigen::VectorXd& b
     sample.chains.push_back(std::move(draws));
   }
   sample.accepted = static_cast<double>(accepted) / (static_cast<double>(options.chains) * options.steps);
-  sample.beta = beta;
   sample.solutions = problem.forward_solves() - before;
   return sample;
 }

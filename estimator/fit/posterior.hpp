@@ -31,8 +31,7 @@ struct PosteriorOptions {
 struct PosteriorSample {
   std::vector<Eigen::MatrixXd> chains;  ///< a row a step, a column an unknown
   double accepted = 0;                  ///< share of steps
-  double beta = 0;
-  long solutions = 0;  ///< equilibria solved
+  long solutions = 0;                   ///< equilibria solved
   bool interrupted = false;
 };
 

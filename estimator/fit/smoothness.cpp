@@ -3,25 +3,22 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <map>
 #include <set>
+
+#include "estimator/mesh/face_map.hpp"
 
 namespace diastole {
 namespace {
 
 constexpr int grid_points = 57;
+constexpr double least_step = 0.002, greatest_step = 2.0;
 
-struct SharedFace {
-  size_t element;
-  double area_mm2;
-};
-
-/// The places of a face's corners; empty where it is collapsed to a line.
-std::set<size_t> places_of(const HermiteMesh& mesh, const ElementFace& face) {
+/// Whether the face's corners lie on a line.
+bool is_collapsed(const HermiteMesh& mesh, const ElementFace& face) {
   std::set<size_t> places;
   for (const size_t corner : face_corners(face))
     places.insert(mesh.place_of(mesh.element(face.element)[corner]));
-  return places.size() < 3 ? std::set<size_t>{} : places;
+  return places.size() < 3;
 }
 
 double area_mm2(const HermiteMesh& mesh, const ElementFace& face) {
@@ -64,10 +61,21 @@ void drop_held(Eigen::VectorXd& vector, const std::vector<bool>& is_free) {
   }
 }
 
+/// Precision that the blocks' priors add to the unknowns.
+Eigen::MatrixXd prior_precision(const std::vector<SmoothBlock>& blocks, Eigen::Index unknowns) {
+  Eigen::MatrixXd precision = Eigen::MatrixXd::Zero(unknowns, unknowns);
+  for (const SmoothBlock& block : blocks) {
+    const Eigen::Index count = block.differences.cols();
+    precision.block(block.first, block.first, count, count) +=
+        block.differences.transpose() * block.differences / (block.step * block.step);
+  }
+  return precision;
+}
+
 }  // namespace
 
 Eigen::MatrixXd neighbour_differences(const HermiteMesh& mesh) {
-  std::map<std::set<size_t>, SharedFace> open;
+  const FaceMap faces(mesh);
   struct Pair {
     size_t one, other;
     double weight;
@@ -76,12 +84,10 @@ Eigen::MatrixXd neighbour_differences(const HermiteMesh& mesh) {
   for (size_t element = 0; element < mesh.element_count(); ++element) {
     for (size_t number = 0; number < 6; ++number) {
       const ElementFace face{element, number / 2, number % 2};
-      const std::set<size_t> places = places_of(mesh, face);
-      if (places.empty()) continue;
-      const auto [known, is_new] = open.try_emplace(places, SharedFace{element, area_mm2(mesh, face)});
-      if (is_new) continue;
-      const double apart_mm = (centre_mm(mesh, element) - centre_mm(mesh, known->second.element)).norm();
-      pairs.push_back({known->second.element, element, known->second.area_mm2 / apart_mm});
+      const ElementFace& first = faces.meeting(face).front();
+      if (first.element == element || is_collapsed(mesh, face)) continue;
+      const double apart_mm = (centre_mm(mesh, element) - centre_mm(mesh, first.element)).norm();
+      pairs.push_back({first.element, element, area_mm2(mesh, first) / apart_mm});
     }
   }
   double sum = 0;
@@ -95,16 +101,6 @@ Eigen::MatrixXd neighbour_differences(const HermiteMesh& mesh) {
     differences(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(pairs[i].other)) = -root;
   }
   return differences;
-}
-
-Eigen::MatrixXd prior_precision(const std::vector<SmoothBlock>& blocks, Eigen::Index unknowns) {
-  Eigen::MatrixXd precision = Eigen::MatrixXd::Zero(unknowns, unknowns);
-  for (const SmoothBlock& block : blocks) {
-    const Eigen::Index count = block.differences.cols();
-    precision.block(block.first, block.first, count, count) +=
-        block.differences.transpose() * block.differences / (block.step * block.step);
-  }
-  return precision;
 }
 
 EvidenceOfStep evidence_of_step(const QuadraticModel& model, const std::vector<SmoothBlock>& blocks,

@@ -13,7 +13,7 @@
 //
 // The step is the one of greatest evidence: p(data | step) with q integrated out, on the Gauss-Newton model of the
 // data (MacKay, Neural Computation 4 (1992) 415). How little the data know about the step is not dropped: the
-// values told and their covariance are integrated over it, with a flat prior on the step (Gelman, Bayesian Analysis 1
+// values reported and their covariance are integrated over it, with a flat prior on the step (Gelman, Bayesian Analysis 1
 // (2006) 515). The search itself uses the step of greatest evidence.
 
 #include <Eigen/Dense>
@@ -49,14 +49,8 @@ struct EvidenceOfStep {
   std::vector<Eigen::MatrixXd> covariance;
 };
 
-inline constexpr double least_step = 0.002;
-inline constexpr double greatest_step = 2.0;
-
 /// Evidence of the step of `blocks[which]`, the other blocks at theirs. Unknowns that are not free stay at q.
 EvidenceOfStep evidence_of_step(const QuadraticModel& model, const std::vector<SmoothBlock>& blocks,
                                 size_t which, const std::vector<bool>& is_free);
-
-/// Precision that the blocks' priors add to the unknowns.
-Eigen::MatrixXd prior_precision(const std::vector<SmoothBlock>& blocks, Eigen::Index unknowns);
 
 }  // namespace diastole

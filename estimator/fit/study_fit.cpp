@@ -11,7 +11,6 @@
 #include "estimator/fit/estimated_parameters.hpp"
 #include "estimator/fit/fit_remarks.hpp"
 #include "estimator/fit/fit_sections.hpp"
-#include "estimator/fit/identifiability.hpp"
 #include "estimator/fit/usable_points.hpp"
 #include "estimator/inference/covariance.hpp"
 #include "estimator/inference/intervals.hpp"
@@ -25,20 +24,15 @@ namespace {
 
 constexpr double outlier_sigma = 5.0;
 
-double wall_mm(const AnnulusSpecimen& annulus) { return annulus.outer_radius_mm - annulus.inner_radius_mm; }
-double wall_mm(const EllipsoidSpecimen& ellipsoid) {
-  return ellipsoid.outer_axes_mm[0] - ellipsoid.inner_axes_mm[0];
-}
+constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
 
-double element_mm(const AnnulusSpecimen& annulus) { return wall_mm(annulus) / annulus.mesh[2]; }
-double element_mm(const EllipsoidSpecimen& ellipsoid) { return wall_mm(ellipsoid) / ellipsoid.mesh[2]; }
-double element_mm(const MeshSpecimen&) {
+/// Of an element through the wall; of a mesh from a file it is not known: the least extrapolation.
+double element_mm(const Specimen& specimen) {
+  if (const auto* annulus = std::get_if<AnnulusSpecimen>(&specimen))
+    return (annulus->outer_radius_mm - annulus->inner_radius_mm) / annulus->mesh[2];
+  if (const auto* ellipsoid = std::get_if<EllipsoidSpecimen>(&specimen))
+    return (ellipsoid->outer_axes_mm[0] - ellipsoid->inner_axes_mm[0]) / ellipsoid->mesh[2];
   return 4.0 * farthest_outside_mm;
-}  // not known: the least extrapolation
-
-const char* kind_of(const Specimen& specimen) {
-  constexpr std::array<const char*, 3> kinds{"annulus", "ellipsoid", "mesh"};
-  return kinds[specimen.index()];
 }
 
 std::string data_words(const Measurement& measurement) {
@@ -46,12 +40,8 @@ std::string data_words(const Measurement& measurement) {
   return measurement.tags.empty() ? "points" : "tags and points";
 }
 
-double mean_of_values(const Eigen::VectorXd& q, size_t first, size_t count) {
-  return q.segment(static_cast<Eigen::Index>(first), static_cast<Eigen::Index>(count)).mean();
-}
-
-FittedParameter record_of(const StudyParameter& parameter, const FitOutcome& fit, size_t first,
-                          size_t count) {
+FittedParameter record_of(const ParameterRun& run, const FitOutcome& fit) {
+  const auto& [parameter, first, count] = run;
   FittedParameter result{.name = parameter.name,
                          .value = fit.values[first].value,
                          .se = fit.values[first].se,
@@ -64,10 +54,7 @@ FittedParameter record_of(const StudyParameter& parameter, const FitOutcome& fit
                          .elements = {},
                          .smoothness = {}};
   for (const SmoothOutcome& smooth : fit.smoothness) {
-    if (smooth.first_value == first) {
-      result.smoothness = FittedSmoothness{smooth.step, smooth.by_evidence, smooth.none_seen, smooth.step90,
-                                           smooth.effective_values};
-    }
+    if (smooth.first_value == first) result.smoothness = smooth;
   }
   if (parameter.vary == Variation::whole) return result;
   // Regional: the mean with its error from the joint covariance, which is far smaller than any element's own.
@@ -79,11 +66,10 @@ FittedParameter record_of(const StudyParameter& parameter, const FitOutcome& fit
     if (fit.values[i].at_lower) result.at_bound = "lower";
     if (fit.values[i].at_upper) result.at_bound = "upper";
   }
-  const auto start = static_cast<Eigen::Index>(first), size = static_cast<Eigen::Index>(count);
   result.value = sum / static_cast<double>(count);
-  result.se = std::sqrt(fit.covariance.block(start, start, size, size).sum()) / static_cast<double>(count);
+  result.se = run.se_of_mean(fit.covariance);
   // The elements on a bound have no error of their own: the mean's is that of the others.
-  if (!(result.se > 0)) result.se = std::numeric_limits<double>::quiet_NaN();
+  if (!(result.se > 0)) result.se = unknown;
   result.ci95 = {result.value - inference::normal_95 * result.se,
                  result.value + inference::normal_95 * result.se};
   return result;
@@ -93,24 +79,17 @@ FittedParameter record_of(const StudyParameter& parameter, const FitOutcome& fit
 void record_shape(FittedParameter& parameter, const FitOutcome& fit, size_t place) {
   if (!parameter.elements.empty()) return;
   for (const ProfileInterval& profile : fit.profiles) {
-    if (profile.value == place && profile.found)
-      parameter.profile = FittedProfile{profile.ci95, profile.at_bound, profile.at, profile.cost_rise};
+    if (profile.place == place && profile.found) parameter.profile = profile;
   }
-  if (fit.posterior) {
-    const PosteriorOfValue& drawn = fit.posterior->values[place];
-    parameter.posterior =
-        FittedPosterior{drawn.mean, drawn.sd, drawn.ci95, drawn.r_hat, drawn.effective_draws};
-  }
+  if (fit.posterior) parameter.posterior = fit.posterior->values[place];
 }
 
-void record_parameters(FitRecord& record, const Study& study, const FitOutcome& fit, size_t elements) {
-  size_t first = 0;
+void record_parameters(FitRecord& record, const EstimatedParameters& estimated, const FitOutcome& fit) {
   std::vector<size_t> places;
-  for (const StudyParameter& parameter : study.law.parameters) {
-    const size_t count = value_count(parameter, elements);
-    places.push_back(first);
-    record.parameters.push_back(record_of(parameter, fit, first, count));
-    first += count;
+  for (const ParameterRun& run : estimated.runs) {
+    places.push_back(run.first);
+    record.parameters.push_back(record_of(run, fit));
+    record_shape(record.parameters.back(), fit, run.first);
   }
   record.correlation.names = fit.unknown_names;
   const Eigen::MatrixXd matrix = inference::correlation(fit.covariance);
@@ -127,48 +106,33 @@ void record_parameters(FitRecord& record, const Study& study, const FitOutcome& 
         offset->value_kPa, offset->se_kPa,
         std::abs(offset->value_kPa) < 2 * offset->se_kPa ? ": consistent with none" : ""));
   }
-  for (size_t i = 0; i < record.parameters.size(); ++i)
-    record_shape(record.parameters[i], fit, places[i]);
-  if (const auto& posterior = fit.posterior) {
-    record.posterior =
-        PosteriorDrawing{posterior->draws, posterior->accepted, posterior->solutions, posterior->seconds};
-  }
+  if (fit.posterior) record.posterior = *fit.posterior;
   if (const auto& robust = fit.robust)
     record.robust = FittedRobust{robust->loss.degrees, robust->loss.scale, static_cast<size_t>(robust->wild)};
 }
 
-FitIteration record_of(const inference::SearchStep& step, const Study& study, size_t elements) {
+FitIteration record_of(const inference::SearchStep& step, const EstimatedParameters& estimated) {
   FitIteration result{step.iteration, step.cost, step.accepted, {}};
-  size_t first = 0;
-  for (const StudyParameter& parameter : study.law.parameters) {
-    const size_t count = value_count(parameter, elements);
-    result.parameters.push_back(mean_of_values(step.q, first, count));
-    first += count;
-  }
+  for (const ParameterRun& run : estimated.runs)
+    result.parameters.push_back(run.mean(step.q));
   return result;
 }
 
 /// Where each whole parameter stands among the values.
-std::vector<size_t> whole_values(const Study& study, size_t elements) {
+std::vector<size_t> whole_values(const EstimatedParameters& estimated) {
   std::vector<size_t> places;
-  size_t first = 0;
-  for (const StudyParameter& parameter : study.law.parameters) {
-    if (parameter.vary == Variation::whole) places.push_back(first);
-    first += value_count(parameter, elements);
+  for (const ParameterRun& run : estimated.runs) {
+    if (run.parameter.vary == Variation::whole) places.push_back(run.first);
   }
   return places;
 }
 
-void take_start(EstimatedParameters& estimated, const FitRecord& start, const Study& study, size_t elements) {
-  size_t first = 0;
-  for (const StudyParameter& parameter : study.law.parameters) {
-    const auto found =
-        std::find_if(start.parameters.begin(), start.parameters.end(),
-                     [&](const FittedParameter& fitted) { return fitted.name == parameter.name; });
-    const size_t count = value_count(parameter, elements);
+void take_start(EstimatedParameters& estimated, const FitRecord& start, const std::string& file) {
+  for (const auto& [parameter, first, count] : estimated.runs) {
+    const auto found = std::ranges::find(start.parameters, parameter.name, &FittedParameter::name);
     if (found == start.parameters.end() ||
         (found->elements.size() > 1 && count > 1 && found->elements.size() != count)) {
-      throw InputError({study.file.string(), fmt::format("parameter {}", parameter.name),
+      throw InputError({file, fmt::format("parameter {}", parameter.name),
                         "is not in the result to start from, or has another number of elements there",
                         "Start from a result of the same law and mesh."});
     }
@@ -177,11 +141,8 @@ void take_start(EstimatedParameters& estimated, const FitRecord& start, const St
       EstimatedParameter& own = estimated.values[first + i];
       own.start = std::clamp(value, own.lower, own.upper);
     }
-    first += count;
   }
 }
-
-constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
 
 /// What is known before the search.
 FitRecord head_of(const Study& study, const Measurement& measurement) {
@@ -189,7 +150,8 @@ FitRecord head_of(const Study& study, const Measurement& measurement) {
   record.study = study.file.string();
   record.fingerprint = study_fingerprint(study);
   record.law = study.law.name;
-  record.specimen = kind_of(study.specimen);
+  constexpr std::array<const char*, 3> kinds{"annulus", "ellipsoid", "mesh"};
+  record.specimen = kinds[study.specimen.index()];
   record.mesh = mesh_of(study.specimen);
   record.data = data_words(measurement);
   record.rms_mm = record.chi2 = record.chi2_per_dof = unknown;
@@ -199,46 +161,40 @@ FitRecord head_of(const Study& study, const Measurement& measurement) {
 
 /// Multiplies the stiffnesses at which the search begins, within their bounds; whether one changed. With all of them
 /// multiplied by a factor, a body carries the load times that factor.
-bool stiffen(EstimatedParameters& estimated, const Study& study, size_t elements) {
+bool stiffen(EstimatedParameters& estimated) {
   constexpr double factor = 3.0;
   bool changed = false;
-  size_t first = 0;
-  for (const StudyParameter& parameter : study.law.parameters) {
-    const size_t count = value_count(parameter, elements);
+  for (const auto& [parameter, first, count] : estimated.runs) {
     for (size_t i = first; parameter.name.ends_with("_kPa") && i < first + count; ++i) {
       EstimatedParameter& value = estimated.values[i];
       const double stiffer = std::clamp(factor * value.start, value.lower, value.upper);
       changed = changed || stiffer > value.start;
       value.start = std::max(value.start, stiffer);
     }
-    first += count;
   }
   return changed;
 }
 
-std::string start_words(const EstimatedParameters& estimated, const Study& study, size_t elements) {
+std::string start_words(const EstimatedParameters& estimated) {
   std::string words;
-  size_t first = 0;
-  for (const StudyParameter& parameter : study.law.parameters) {
-    if (parameter.name.ends_with("_kPa"))
-      words += fmt::format("{}{} = {:.4g}", words.empty() ? "" : ", ", parameter.name,
-                           estimated.values[first].start);
-    first += value_count(parameter, elements);
+  for (const ParameterRun& run : estimated.runs) {
+    if (run.parameter.name.ends_with("_kPa"))
+      words += fmt::format("{}{} = {:.4g}", words.empty() ? "" : ", ", run.parameter.name,
+                           estimated.values[run.first].start);
   }
   return words;
 }
 
 /// The fit, begun with a stiffer material where the start values carry no equilibrium.
-FitOutcome fit_from_where_it_stands(ElasticMotion& motion, EstimatedParameters& estimated, const Study& study,
+FitOutcome fit_from_where_it_stands(ElasticMotion& motion, EstimatedParameters& estimated,
                                     const Measurement& measurement, const FitOptions& options,
                                     FitRecord& record) {
-  const size_t elements = motion.mesh().element_count();
-  const std::string given = start_words(estimated, study, elements);
+  const std::string given = start_words(estimated);
   FitOutcome fit = fit_motion(motion, estimated.values, measurement, options);
   const auto failed_at_start = [&] { return !fit.converged() && fit.history.empty(); };
   if (!failed_at_start()) return fit;
   int solves = fit.forward_solves;
-  while (failed_at_start() && stiffen(estimated, study, elements)) {
+  while (failed_at_start() && stiffen(estimated)) {
     fit = fit_motion(motion, estimated.values, measurement, options);
     fit.forward_solves = solves += fit.forward_solves;
   }
@@ -247,33 +203,31 @@ FitOutcome fit_from_where_it_stands(ElasticMotion& motion, EstimatedParameters& 
         " Nor is there an equilibrium with {}, as stiff as the bounds allow: widen `bounds`, or see whether "
         "the "
         "pressures are in kPa and the lengths in mm.",
-        start_words(estimated, study, elements));
+        start_words(estimated));
   } else {
     record.remarks.push_back(fmt::format(
         "With the start values ({}) the body does not carry the pressures: the search began at {} instead.",
-        given, start_words(estimated, study, elements)));
+        given, start_words(estimated)));
   }
   return fit;
 }
 
 /// A result that has only got so far: values without errors.
-FitRecord checkpoint_of(FitRecord record, const inference::SearchStep& step, const Study& study,
-                        size_t elements) {
+FitRecord checkpoint_of(FitRecord record, const inference::SearchStep& step,
+                        const EstimatedParameters& estimated) {
   record.reason = fmt::format("Checkpoint after iteration {}.", step.iteration);
   record.iterations = step.iteration;
-  size_t first = 0;
-  for (const StudyParameter& parameter : study.law.parameters) {
-    const size_t count = value_count(parameter, elements);
+  for (const ParameterRun& run : estimated.runs) {
+    const auto& [parameter, first, count] = run;
     FittedParameter& reached = record.parameters.emplace_back();
     reached.name = parameter.name;
-    reached.value = mean_of_values(step.q, first, count);
+    reached.value = run.mean(step.q);
     reached.se = unknown;
     reached.ci95 = {unknown, unknown};
     reached.start = parameter.start;
     reached.bounds = {parameter.lower, parameter.upper};
     for (size_t i = 0; parameter.vary == Variation::element && i < count; ++i)
       reached.elements.push_back({step.q[static_cast<Eigen::Index>(first + i)], unknown, {unknown, unknown}});
-    first += count;
   }
   return record;
 }
@@ -289,15 +243,15 @@ void record_frames(FitRecord& record, const FitOutcome& fit) {
                              .sigma_kPa = frame.load.sigma_kPa,
                              .estimated_kPa = frame.pressure_kPa,
                              .se_kPa = frame.se_kPa,
-                             .points = frame.usable,
+                             .points = frame.found.usable,
                              .rms_mm = std::sqrt(frame.unweighted_mm.squaredNorm() / rows),
                              .chi2_per_point = frame.weighted.squaredNorm() / rows});
     squares_mm2 += frame.unweighted_mm.squaredNorm();
     record.residuals_used += static_cast<size_t>(frame.weighted.size());
     record.outliers_5sigma += static_cast<size_t>((frame.weighted.array().abs() > outlier_sigma).count());
-    tags_outside += frame.tags_left_out - frame.tags_unfollowed;
-    tags_unfollowed += frame.tags_unfollowed;
-    points_left_out += frame.points_left_out;
+    tags_outside += frame.found.tags_left_out - frame.found.tags_unfollowed;
+    tags_unfollowed += frame.found.tags_unfollowed;
+    points_left_out += frame.found.points_left_out;
   }
   record.rms_mm = std::sqrt(squares_mm2 / static_cast<double>(record.residuals_used));
   if (tags_outside > 0) {
@@ -359,8 +313,8 @@ void record_undeformed(FitRecord& record, const Measurement& measurement) {
   }
   const double count = static_cast<double>(rows);
   record.undeformed.residuals = rows;
-  record.undeformed.mean_mm = rows > 0 ? sum_mm / count : std::numeric_limits<double>::quiet_NaN();
-  record.undeformed.chi2_per_residual = rows > 0 ? chi2 / count : std::numeric_limits<double>::quiet_NaN();
+  record.undeformed.mean_mm = rows > 0 ? sum_mm / count : unknown;
+  record.undeformed.chi2_per_residual = rows > 0 ? chi2 / count : unknown;
 }
 
 }  // namespace
@@ -368,8 +322,7 @@ void record_undeformed(FitRecord& record, const Measurement& measurement) {
 // Extrapolation beyond an element, as a fraction of it: `farthest_outside_mm` through the wall, never more than an
 // element.
 LocatorOptions locator_for(const Specimen& specimen) {
-  const double size_mm = std::visit([](const auto& kind) { return element_mm(kind); }, specimen);
-  return {.outside_xi = std::clamp(farthest_outside_mm / size_mm, 0.25, 1.0)};
+  return {.outside_xi = std::clamp(farthest_outside_mm / element_mm(specimen), 0.25, 1.0)};
 }
 
 FitRecord refused_fit(const Study& study, const Measurement& measurement, std::vector<Finding> findings) {
@@ -384,12 +337,11 @@ FitRecord fit_study(const Study& study, const Measurement& measurement, const St
   const auto* annulus = std::get_if<AnnulusSpecimen>(&study.specimen);
   ElasticModel model = make_affected_model(study);
   require_cavity(study, model);
-  const size_t elements = model.mesh().element_count();
   FitRecord record = head_of(study, measurement);
   record.unknowns = model.dofs();
 
   EstimatedParameters estimated = estimated_parameters(study, model);
-  if (options.start) take_start(estimated, *options.start, study, elements);
+  if (options.start) take_start(estimated, *options.start, study.file.string());
   ElasticMotion motion(std::move(model), estimated.groups, displacement_gain_of(study));
   FitOptions fit_options;
   fit_options.file = study.file.string();
@@ -404,14 +356,13 @@ FitRecord fit_study(const Study& study, const Measurement& measurement, const St
     fit_options.smooth.clear();
     record.search = "finite differences";
   }
-  if (options.profile) fit_options.profiled = whole_values(study, elements);
+  if (options.profile) fit_options.profiled = whole_values(estimated);
   fit_options.search.iteration_limit = options.iteration_limit;
   fit_options.on_step = [&](const inference::SearchStep& step) {
-    if (options.on_iteration) options.on_iteration(record_of(step, study, elements));
-    if (options.on_checkpoint && step.accepted)
-      options.on_checkpoint(checkpoint_of(record, step, study, elements));
+    if (options.on_iteration) options.on_iteration(record_of(step, estimated));
+    if (options.on_checkpoint && step.accepted) options.on_checkpoint(checkpoint_of(record, step, estimated));
   };
-  const FitOutcome fit = fit_from_where_it_stands(motion, estimated, study, measurement, fit_options, record);
+  const FitOutcome fit = fit_from_where_it_stands(motion, estimated, measurement, fit_options, record);
 
   record.converged = fit.converged();
   record.reason = fit.reason;
@@ -419,7 +370,7 @@ FitRecord fit_study(const Study& study, const Measurement& measurement, const St
   record.forward_solves = fit.forward_solves;
   record.seconds = fit.seconds;
   for (const inference::SearchStep& step : fit.history)
-    record.history.push_back(record_of(step, study, elements));
+    record.history.push_back(record_of(step, estimated));
   record_undeformed(record, measurement);
   if (measurement.repeated_rows > 0)
     record.excluded.push_back({"rows that repeat another to the last digit", measurement.repeated_rows});
@@ -427,7 +378,7 @@ FitRecord fit_study(const Study& study, const Measurement& measurement, const St
   record.chi2 = fit.chi2;
   record.dof = static_cast<size_t>(std::max(0.0, std::round(static_cast<double>(fit.rows) - fit.unknowns)));
   record.chi2_per_dof = record.chi2 / static_cast<double>(record.dof);
-  record_parameters(record, study, fit, elements);
+  record_parameters(record, estimated, fit);
   record_frames(record, fit);
   record.residuals = histogram_of(fit);
   for (std::string& remark : remarks_on(record, fit))

@@ -33,7 +33,7 @@ LocatorOptions locator_for(const Specimen& specimen);
 /// Throws InputError for a start whose parameters are not the study's, for studies that cannot be modelled
 /// (study_model.hpp), hold no loaded point, or hardly one on the specimen (usable_points.hpp).
 /// Where the start values carry no equilibrium, the fit begins with a stiffer material and says so in a remark.
-/// Numerical trouble is told by `converged` and `reason` of the record.
+/// Numerical trouble is reported by `converged` and `reason` of the record.
 FitRecord fit_study(const Study& study, const Measurement& measurement, const StudyFitOptions& options);
 
 }  // namespace diastole

@@ -44,7 +44,6 @@ class Explorer {
       : study_(study), measurement_(std::move(measurement)), model_(make_affected_model(study)) {
     require_cavity(study_, model_);
     estimated_ = estimated_parameters(study_, model_);
-    elements_ = model_.mesh().element_count();
     // Every frame's derivative by its pressure is wanted, known exactly or not.
     for (const Frame& frame : measurement_.frames)
       stated_sigma_kPa_.push_back(frame.sigma_kPa);
@@ -91,14 +90,10 @@ class Explorer {
     const Eigen::MatrixXd covariance =
         information.ldlt().solve(Eigen::MatrixXd::Identity(information.rows(), information.cols()));
     std::vector<double> result;
-    Eigen::Index first = 0;
-    for (const StudyParameter& parameter : study_.law.parameters) {
-      const auto count = static_cast<Eigen::Index>(value_count(parameter, elements_));
-      const double variance = covariance.block(first, first, count, count).sum();
-      const bool logarithmic = parameter.lower > 0;
-      const double relative = std::sqrt(variance) / static_cast<double>(count);
-      result.push_back(100 * (logarithmic ? relative : relative / std::abs(parameter.start)));
-      first += count;
+    for (const ParameterRun& run : estimated_.runs) {
+      const double relative = run.se_of_mean(covariance);
+      const bool logarithmic = run.parameter.lower > 0;
+      result.push_back(100 * (logarithmic ? relative : relative / std::abs(run.parameter.start)));
     }
     return result;
   }
@@ -134,7 +129,6 @@ class Explorer {
   Measurement measurement_;
   ElasticModel model_;
   EstimatedParameters estimated_;
-  size_t elements_ = 0;
   std::vector<double> stated_sigma_kPa_;
   std::optional<ElasticMotion> motion_;
 };

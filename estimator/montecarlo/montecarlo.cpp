@@ -88,7 +88,6 @@ std::vector<Cell> cells_of(const MonteCarloPlan& plan) {
 }
 
 struct CellFitter::Impl {
-  Study study;
   MonteCarloPlan plan;
   EstimatedParameters estimated;
   ElasticMotion motion;
@@ -115,7 +114,7 @@ CellFitter::CellFitter(const Study& study, const Measurement& measured, const Mo
   options.smooth = estimated.smooth;
   options.robustness = Robustness::never;
   impl_ = std::make_unique<Impl>(
-      Impl{study, plan, std::move(estimated), std::move(motion), std::move(options), std::move(exact)});
+      Impl{plan, std::move(estimated), std::move(motion), std::move(options), std::move(exact)});
 }
 
 CellFitter::~CellFitter() = default;
@@ -131,20 +130,13 @@ CellResult CellFitter::fit(const Cell& cell) {
   const FitOutcome outcome = fit_motion(impl_->motion, impl_->estimated.values, measurement, impl_->options);
   CellResult result{
       cell, outcome.converged() && !outcome.values.empty(), outcome.iterations, outcome.seconds, {}, {}};
-  size_t first = 0;
-  const size_t elements = impl_->motion.mesh().element_count();
-  for (const StudyParameter& parameter : impl_->study.law.parameters) {
-    const size_t count = value_count(parameter, elements);
-    if (result.converged) {
-      const auto start = static_cast<Eigen::Index>(first), size = static_cast<Eigen::Index>(count);
-      double sum = 0;
-      for (size_t i = first; i < first + count; ++i)
-        sum += outcome.values[i].value;
-      result.value.push_back(sum / static_cast<double>(count));
-      const double variance = outcome.covariance.block(start, start, size, size).sum();
-      result.se.push_back(std::sqrt(variance) / static_cast<double>(count));
-    }
-    first += count;
+  if (!result.converged) return result;
+  for (const ParameterRun& run : impl_->estimated.runs) {
+    double sum = 0;
+    for (size_t i = run.first; i < run.first + run.count; ++i)
+      sum += outcome.values[i].value;
+    result.value.push_back(sum / static_cast<double>(run.count));
+    result.se.push_back(run.se_of_mean(outcome.covariance));
   }
   return result;
 }

@@ -129,8 +129,8 @@ TEST(Fit, PointsOffTheBodyAreLeftOutAndCounted) {
   measurement.tags.push_back(stray);
   measurement.points.push_back({1, {0, 0, 0}, {1, 0, 0}, 0.3});  // the cavity is no material
   const FitOutcome fit = fit_C1(measurement);
-  EXPECT_EQ(fit.frames.back().tags_left_out, 1U);
-  EXPECT_EQ(fit.frames.front().points_left_out, 1U);
+  EXPECT_EQ(fit.frames.back().found.tags_left_out, 1U);
+  EXPECT_EQ(fit.frames.front().found.points_left_out, 1U);
   EXPECT_NEAR(fit.values[0].value, truth_kPa, 5 * fit.values[0].se);
 }
 
@@ -148,7 +148,6 @@ TEST(Fit, StopsAtTheIterationLimitAndSaysSo) {
 class NoMotion : public MotionModel {
  public:
   [[nodiscard]] const HermiteMesh& mesh() const override { return model_.mesh(); }
-  [[nodiscard]] size_t value_count() const override { return 1; }
   [[nodiscard]] MotionOutcome solve(size_t, std::span<const double>, double) override {
     return {std::nullopt, "it bursts"};
   }

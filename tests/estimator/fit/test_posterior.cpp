@@ -71,13 +71,13 @@ TEST_F(CoarseFit, WherePosteriorAndProfileAreNormalTheyAgreeWithTheStandardError
     EXPECT_FALSE(outcome.profiles[0].at_bound[side]);
   }
   ASSERT_TRUE(outcome.posterior);
-  const PosteriorOfValue& posterior = outcome.posterior->values[0];
+  const FittedPosterior& posterior = outcome.posterior->values[0];
   EXPECT_NEAR(posterior.mean, C1.value, 0.4 * C1.se);
   EXPECT_NEAR(posterior.sd / C1.se, 1, 0.25);
   EXPECT_LT(posterior.r_hat, 1.1);
   EXPECT_GT(posterior.effective_draws, 60);
   EXPECT_GT(outcome.posterior->accepted, 0.5);
-  EXPECT_GE(outcome.posterior->solutions, 240);
+  EXPECT_GE(outcome.posterior->equilibria, 240);
 }
 
 TEST_F(CoarseFit, AProfileThatTheDataDoNotEndIsEndedByItsBound) {
