@@ -13,16 +13,14 @@
 #include <string>
 #include <vector>
 
-#include "host/acquisition/gap_remarks.hpp"
 #include "host/acquisition/live_trace.hpp"
 #include "host/acquisition/sample_source.hpp"
-#include "host/acquisition/slice_tracker.hpp"
 #include "host/config/rig_config.hpp"
+#include "host/config/schedule.hpp"
 #include "host/controller/controller.hpp"
-#include "host/gpio/gate_check.hpp"
+#include "host/gpio/gate_inputs.hpp"
 #include "host/journal/journal_records.hpp"
 #include "host/transport/clock.hpp"
-#include "protocol/signal/low_pass.hpp"
 
 namespace diastole {
 
@@ -75,80 +73,19 @@ struct AcquisitionSetup {
   bool prompts_answered = false;  ///< the operator is waited for nowhere: each prompt is answered at once
 };
 
-class Acquisition {
- public:
-  Acquisition(Clock& clock, Controller& controller, SampleSource& samples, JournalWriter& journal,
-              AcquisitionSetup setup);
-
-  struct Hooks {
-    std::function<StopRequest()> stop = [] { return StopRequest::none; };  ///< asked once a turn
-    /// The slice for which the operator has said that the scanner is ready, once; asked while one is waited for.
-    std::function<std::optional<size_t>()> go_on = [] { return std::optional<size_t>(); };
-    /// What others want in the run's events; asked once a turn.
-    std::function<std::vector<RunRemark>()> notes = [] { return std::vector<RunRemark>(); };
-    std::function<void(const RunProgress&)> progress = [](const RunProgress&) {};
-    std::function<void(const RunRemark&)> remark = [](const RunRemark&) {};
-  };
-
-  /// Starts the armed program and returns when it has ended, one way or another. When the disk takes no more
-  /// ("journal_failed"), it has the pump stopped under control and waits for that.
-  RunOutcome run(const Hooks& hooks);
-
- private:
-  void turn();
-  void obey(StopRequest request);
-  void send_stop(StopRequest request);
-  void follow_schedule();
-  void on_cycle(uint32_t cycle);
-  void show_schedule();
-  void take_samples(std::vector<SourceItem> items);
-  void take(const Received& received);
-  void show(uint64_t host_ns, double kPa);
-  void take(const Missing& missing);
-  void take(const InstrumentTime& time);
-  void take(const Trouble& trouble);
-  void watch_gate();
-  void close_gate();
-  void note(const std::vector<GateRemark>& remarks);
-  void end_missing();
-  void close_gap();
-  void write_lasting_gap();
-  void check_count(uint64_t due);
-  void close_block();
-  void take(const ControllerEvent& event);
-  void take(const wire::Nak& refusal);
-  void remark(const std::string& level, const std::string& code, const std::string& text,
-              std::optional<uint64_t> tick = {});
-  void write(const auto& record);
-  void fail_journal();
-  void end(std::string how);
-  void end_after_tail(std::string how);
-  void check_deadline();
-
-  Clock& clock_;
-  Controller& controller_;
-  SampleSource& samples_;
-  JournalWriter& journal_;
-  AcquisitionSetup setup_;
-  Hooks hooks_;
-
-  SampleBlock block_;
-  std::optional<GapRecord> gap_;  ///< that is open
-  uint64_t gap_written_ns_ = 0;   ///< when part of a gap last went to the journal
-  GapRemarks gap_remarks_;
-  uint64_t deadline_ns_ = 0;
-  StopRequest obeyed_ = StopRequest::none;
-  std::optional<GateCheck> gate_;
-  bool stopped_by_estop_ = false;
-  std::optional<uint64_t> triggers_raised_;  ///< as the controller counted, at its end
-  bool started_ = false;
-  bool ended_ = false;
-  std::optional<uint64_t> tail_until_ns_;
-  RunOutcome outcome_;
-  std::optional<signal::LowPass> live_filter_;  // of the first channel
-  std::optional<SliceTracker> schedule_;
-  bool prompted_ = false;
-  bool schedule_stops_ = false;  // the last slice is being imaged, and a stop behind it is under way
+struct AcquisitionHooks {
+  std::function<StopRequest()> stop = [] { return StopRequest::none; };  ///< asked once a turn
+  /// The slice for which the operator has said that the scanner is ready, once; asked while one is waited for.
+  std::function<std::optional<size_t>()> go_on = [] { return std::optional<size_t>(); };
+  /// What others want in the run's events; asked once a turn.
+  std::function<std::vector<RunRemark>()> notes = [] { return std::vector<RunRemark>(); };
+  std::function<void(const RunProgress&)> progress = [](const RunProgress&) {};
+  std::function<void(const RunRemark&)> remark = [](const RunRemark&) {};
 };
+
+/// Starts the armed program and returns when it has ended, one way or another. When the disk takes no more
+/// ("journal_failed"), it has the pump stopped under control and waits for that.
+RunOutcome acquire(Clock& clock, Controller& controller, SampleSource& samples, JournalWriter& journal,
+                   AcquisitionSetup setup, const AcquisitionHooks& hooks);
 
 }  // namespace diastole

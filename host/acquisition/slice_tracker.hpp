@@ -14,16 +14,28 @@ class SliceTracker {
   enum class Phase { waiting, dummy, imaging, pause, done };
 
   /// Precondition: at least one slice, each of at least one cycle.
-  explicit SliceTracker(std::vector<PlannedSlice> slices);
+  explicit SliceTracker(std::vector<PlannedSlice> slices) : slices_(std::move(slices)) { enter(0); }
 
   struct Turn {
     bool slice_begins = false;  ///< this cycle is the first that is imaged
     bool last_cycle = false;    ///< this cycle is the last of the study
   };
   /// A cycle begins.
-  Turn on_trigger();
+  Turn on_trigger() {
+    while (left_ == 0 && phase_ != Phase::waiting && phase_ != Phase::done)
+      advance();
+    if (phase_ == Phase::waiting || phase_ == Phase::done) return {};
+    --left_;
+    Turn turn;
+    turn.slice_begins = phase_ == Phase::imaging && left_ == planned().cycles - 1;
+    turn.last_cycle = phase_ == Phase::imaging && left_ == 0 && slice_ + 1 == slices_.size();
+    if (turn.last_cycle) phase_ = Phase::done;
+    return turn;
+  }
   /// The operator is ready for a slice; ignored unless it is the one that is waited for.
-  void go_on(size_t slice);
+  void go_on(size_t slice) {
+    if (phase_ == Phase::waiting && slice == slice_) phase_ = Phase::dummy;
+  }
 
   [[nodiscard]] Phase phase() const { return phase_; }
   /// The present or coming slice, of all.
@@ -31,11 +43,43 @@ class SliceTracker {
   [[nodiscard]] size_t slices() const { return slices_.size(); }
   [[nodiscard]] const PlannedSlice& planned() const { return slices_[slice_]; }
   /// Cycles that have yet to begin, but for those of waiting.
-  [[nodiscard]] int64_t cycles_left() const;
+  [[nodiscard]] int64_t cycles_left() const {
+    if (phase_ == Phase::done) return 0;
+    const PlannedSlice& now = planned();
+    int64_t left = left_;
+    if (phase_ == Phase::waiting || phase_ == Phase::dummy) left += now.cycles;
+    if (phase_ != Phase::pause) left += now.pause_cycles;
+    for (size_t later = slice_ + 1; later < slices_.size(); ++later) {
+      const PlannedSlice& planned = slices_[later];
+      left += planned.dummy_cycles + planned.cycles + planned.pause_cycles;
+    }
+    return left;
+  }
 
  private:
-  void enter(size_t slice);
-  void advance();
+  void enter(size_t slice) {
+    slice_ = slice;
+    phase_ = planned().prompt.empty() ? Phase::dummy : Phase::waiting;
+    left_ = planned().dummy_cycles;
+  }
+  void advance() {
+    switch (phase_) {
+      case Phase::dummy:
+        phase_ = Phase::imaging;
+        left_ = planned().cycles;
+        break;
+      case Phase::imaging:
+        phase_ = Phase::pause;
+        left_ = planned().pause_cycles;
+        break;
+      case Phase::pause:
+        enter(slice_ + 1);
+        break;
+      case Phase::waiting:
+      case Phase::done:
+        break;
+    }
+  }
 
   std::vector<PlannedSlice> slices_;
   size_t slice_ = 0;
@@ -43,6 +87,20 @@ class SliceTracker {
   int64_t left_ = 0;  // cycles of this phase that have yet to begin
 };
 
-std::string phase_name(SliceTracker::Phase phase);
+inline std::string phase_name(SliceTracker::Phase phase) {
+  switch (phase) {
+    case SliceTracker::Phase::waiting:
+      return "waiting";
+    case SliceTracker::Phase::dummy:
+      return "dummy";
+    case SliceTracker::Phase::imaging:
+      return "imaging";
+    case SliceTracker::Phase::pause:
+      return "pause";
+    case SliceTracker::Phase::done:
+      break;
+  }
+  return "done";
+}
 
 }  // namespace diastole

@@ -92,7 +92,7 @@ ExitCode flash(FlashOptions options, const CommandOutput& out) {
   options.update.stop_asked = [] { return interrupted != 0; };
   options.update.progress = [&bar](uint32_t held, uint32_t total) { bar.show(held, total); };
   options.update.say = [&bar](const std::string& words) { bar.say(words); };
-  const UpdateResult result = Updater(clock, line, options.port).flash(file, options.update);
+  const UpdateResult result = flash_controller(clock, line, options.port, file, options.update);
   std::signal(SIGINT, SIG_DFL);
   std::signal(SIGTERM, SIG_DFL);
   const double wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();

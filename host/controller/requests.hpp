@@ -1,13 +1,18 @@
 #pragma once
 // Requests to the controller and their answers, one at a time.
 
+#include <fmt/format.h>
+
 #include <optional>
 #include <string>
 #include <type_traits>
 #include <variant>
 
 #include "host/controller/controller_link.hpp"
+#include "host/controller/refusals.hpp"
+#include "protocol/contract/input_error.hpp"
 #include "protocol/wire/messages.hpp"
+#include "protocol/wire/wire_text.hpp"
 
 namespace diastole {
 
@@ -68,10 +73,21 @@ class Requests {
     return true;
   }
 
-  [[noreturn]] void fail(std::string problem, std::string remedy) const;
-  [[noreturn]] void refuse(const wire::Nak& nak) const;
+  [[noreturn]] void fail(std::string problem, std::string remedy) const {
+    throw HardwareError(device_, std::move(problem), std::move(remedy));
+  }
+  [[noreturn]] void refuse(const wire::Nak& nak) const {
+    const std::string limit = nak.refusal == wire::Refusal::limit_exceeded
+                                  ? fmt::format(" (limit {}, asked {}, allowed {})",
+                                                wire::limit_name(nak.limit), nak.asked, nak.allowed)
+                                  : "";
+    fail(fmt::format("refused: {}{}", wire::refusal_explanation(nak.refusal), limit),
+         remedy_for(nak.refusal));
+  }
 
  private:
+  static constexpr uint64_t answer_patience_ns = 1'000'000'000;
+
   template <class Message>
   Answer answer_to(const Message& message) {
     require_line();
@@ -80,8 +96,19 @@ class Requests {
     await();
     return answer_;
   }
-  void require_line() const;
-  void await();
+  void require_line() const {
+    if (!link_.has_line())
+      fail("is not connected", "Check cable and power; the daemon reconnects by itself.");
+  }
+  void await() {
+    const uint64_t end_ns = clock_.now_ns() + answer_patience_ns;
+    while (awaited_ && link_.has_line() && clock_.now_ns() < end_ns)
+      link_.turn();
+    if (!link_.has_line()) fail("the line broke", "Check the cable; the daemon reconnects by itself.");
+    if (!awaited_) return;
+    awaited_.reset();
+    fail("did not answer in time", "Check the cable and the baud rate.");
+  }
 
   Clock& clock_;
   ControllerLink& link_;

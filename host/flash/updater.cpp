@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "host/flash/update_link.hpp"
 #include "protocol/contract/input_error.hpp"
 #include "protocol/wire/wire_text.hpp"
 
@@ -33,216 +34,224 @@ std::string explanation(const wire::UpdateAnswer& answer) {
   return text;
 }
 
-}  // namespace
+/// One call of flash_controller.
+class Updater {
+ public:
+  Updater(Clock& clock, ByteLine& line, std::string port, const UpdateFile& file,
+          const UpdateOptions& options)
+      : link_(clock, line), port_(std::move(port)), file_(file), options_(options) {}
 
-void Updater::fail(std::string problem, std::string remedy) const {
-  throw HardwareError("controller at " + port_, std::move(problem), std::move(remedy));
-}
-
-wire::UpdateAnswer Updater::need(std::optional<wire::UpdateAnswer> answer, const char* action) const {
-  if (answer) return *answer;
-  fail(fmt::format("fell silent when it was to {}", action),
-       "Check cable and power and give the same command again: what was sent stays, and it goes on from "
-       "there.");
-}
-
-void Updater::refused(const UpdateFile& file, const wire::UpdateAnswer& answer) const {
-  using enum wire::UpdateOutcome;
-  const std::string problem = explanation(answer);
-  const std::string remedy(wire::update_outcome_remedy(answer.outcome));
-  switch (answer.outcome) {
-    case bad_header:
-    case wrong_board:
-    case wrong_slot:
-    case too_long:
-    case older_version:
-      throw InputError({file.file, "", "the controller refuses it: " + problem, remedy});
-    default:
-      fail("refused: " + problem, remedy);
+  UpdateResult flash() {
+    const Greeting found = find_controller();
+    if (!wanted(found)) return result_;
+    if (options_.dry_run) {
+      result_.end = UpdateEnd::dry_run;
+      return result_;
+    }
+    if (!found.bootloader) enter_bootloader();
+    if (!upload(image_for_free_slot())) {
+      result_.end = UpdateEnd::stopped;
+      return result_;
+    }
+    result_.verified = true;
+    options_.say("verified by the controller; starting it");
+    confirm();
+    return result_;
   }
-}
 
-std::optional<Updater::Greeting> Updater::greet(uint64_t patience_ns) {
-  if (!link_.open(patience_ns)) return {};
-  const auto hello =
-      link_.ask<wire::Hello>(wire::HelloRequest{.schema_hash = wire::kSchemaHash}, answer_patience);
-  if (!hello) return {};
-  return Greeting{*hello, hello->schema_hash == wire::kBootloaderSchema};
-}
+ private:
+  struct Greeting {
+    wire::Hello hello;
+    bool bootloader = false;
+  };
 
-Updater::Greeting Updater::find_controller(const UpdateOptions& options) {
-  if (const auto found = greet(answer_patience)) return *found;
-  options.say(
-      fmt::format("{} does not answer. Reset the controller now, or switch it off and on: for {} s its "
-                  "bootloader is called.",
-                  port_, rescue_patience / (1'000 * ms)));
-  for (uint64_t waited = 0; waited < rescue_patience; waited += 500 * ms) {
-    link_.flood_stay(400 * ms);
-    if (const auto found = greet(100 * ms)) return *found;
-    if (options.stop_asked()) break;
+  Greeting find_controller() {
+    if (const auto found = greet(answer_patience)) return *found;
+    options_.say(
+        fmt::format("{} does not answer. Reset the controller now, or switch it off and on: for {} s its "
+                    "bootloader is called.",
+                    port_, rescue_patience / (1'000 * ms)));
+    for (uint64_t waited = 0; waited < rescue_patience; waited += 500 * ms) {
+      link_.flood_stay(400 * ms);
+      if (const auto found = greet(100 * ms)) return *found;
+      if (options_.stop_asked()) break;
+    }
+    fail("does not answer, and its bootloader neither",
+         "Check cable, power and --baud; a board without this bootloader is flashed once by SWD "
+         "(docs/firmware.md).");
   }
-  fail("does not answer, and its bootloader neither",
-       "Check cable, power and --baud; a board without this bootloader is flashed once by SWD "
-       "(docs/firmware.md).");
-}
-
-bool Updater::wanted(const UpdateFile& file, const Greeting& found, const UpdateOptions& options,
-                     UpdateResult& result) {
-  if (file.board_id != found.hello.board_id) {
-    throw InputError(
-        {file.file, "board id",
-         fmt::format("is for board {}, and the controller is board {}", file.board_id, found.hello.board_id),
-         "Take the image that was built for this board."});
+  std::optional<Greeting> greet(uint64_t patience_ns) {
+    if (!link_.open(patience_ns)) return {};
+    const auto hello =
+        link_.ask<wire::Hello>(wire::HelloRequest{.schema_hash = wire::kSchemaHash}, answer_patience);
+    if (!hello) return {};
+    return Greeting{*hello, hello->schema_hash == wire::kBootloaderSchema};
   }
-  if (found.bootloader) {
-    options.say("the controller waits in its bootloader");
+  bool wanted(const Greeting& found) {
+    if (file_.board_id != found.hello.board_id) {
+      throw InputError({file_.file, "board id",
+                        fmt::format("is for board {}, and the controller is board {}", file_.board_id,
+                                    found.hello.board_id),
+                        "Take the image that was built for this board."});
+    }
+    if (found.bootloader) {
+      options_.say("the controller waits in its bootloader");
+      return true;
+    }
+    result_.before = version_of(found.hello);
+    const auto running = report_of(wire::ImageSlot::none);
+    options_.say(fmt::format("the controller runs {}, the file holds {}", in_words(*result_.before),
+                             in_words(file_.version)));
+    if (running && running->build_id == file_.build_id && running->standing == wire::ImageState::confirmed &&
+        !options_.force) {
+      result_.end = UpdateEnd::already_there;
+      result_.held_bytes = running->code_bytes;
+      result_.verified = true;
+      return false;
+    }
+    if (file_.version < *result_.before && !options_.allow_older) {
+      throw InputError({file_.file, "version",
+                        fmt::format("{} is older than {}, which the controller runs", in_words(file_.version),
+                                    in_words(*result_.before)),
+                        "Give --allow-older if that is meant."});
+    }
     return true;
   }
-  result.before = version_of(found.hello);
-  const auto running =
-      link_.ask<wire::ImageReport>(wire::ImageQuery{.slot = wire::ImageSlot::none}, answer_patience);
-  options.say(fmt::format("the controller runs {}, the file holds {}", in_words(*result.before),
-                          in_words(file.version)));
-  if (running && running->build_id == file.build_id && running->standing == wire::ImageState::confirmed &&
-      !options.force) {
-    result.end = UpdateEnd::already_there;
-    result.held_bytes = running->code_bytes;
-    result.verified = true;
-    return false;
-  }
-  if (file.version < *result.before && !options.allow_older) {
-    throw InputError({file.file, "version",
-                      fmt::format("{} is older than {}, which the controller runs", in_words(file.version),
-                                  in_words(*result.before)),
-                      "Give --allow-older if that is meant."});
-  }
-  return true;
-}
-
-void Updater::enter_bootloader() {
-  const auto answer =
-      need(link_.ask<wire::UpdateAnswer>(wire::EnterBootloader{}, answer_patience), "enter its bootloader");
-  if (answer.outcome != wire::UpdateOutcome::done)
-    fail("refused: " + explanation(answer), std::string(wire::update_outcome_remedy(answer.outcome)));
-  for (uint64_t waited = 0; waited < reset_patience; waited += 100 * ms) {
-    link_.pause(while_it_resets);
-    const auto found = greet(100 * ms);
-    if (found && found->bootloader) return;
-  }
-  fail("did not come back in its bootloader", "Reset it and give the same command again.");
-}
-
-const SlotImage& Updater::image_for_free_slot(const UpdateFile& file) {
-  const auto ask = [&](wire::ImageSlot slot) {
-    const auto report = link_.ask<wire::ImageReport>(wire::ImageQuery{.slot = slot}, answer_patience);
-    if (!report) fail("does not tell what its slots hold", "Reset it and give the same command again.");
-    return *report;
-  };
-  const wire::ImageReport free = ask(ask(wire::ImageSlot::a).free_slot);
-  const auto image = std::ranges::find_if(
-      file.images, [&](const SlotImage& each) { return each.header.link_address == free.link_address; });
-  if (image != file.images.end()) return *image;
-  throw InputError(
-      {file.file, "images",
-       fmt::format("none is linked for address 0x{:08x}, where the free slot lies", free.link_address),
-       "Take the image that was built for this board."});
-}
-
-/// Begin, data, finish. An answer that is not `done` ends it.
-wire::UpdateOutcome Updater::send_image(const SlotImage& image, const UpdateFile& file,
-                                        const UpdateOptions& options, UpdateResult& result, bool& stopped) {
-  using enum wire::UpdateOutcome;
-  wire::BeginUpdate begin;
-  begin.allow_older = options.allow_older || options.force ? 1 : 0;
-  begin.header = wire::encode(image.header);
-  const auto begun = need(link_.ask<wire::UpdateAnswer>(begin, erase_patience), "make room for the image");
-  if (begun.outcome == flash_failed) return flash_failed;
-  if (begun.outcome != done) refused(file, begun);
-  if (begun.held_bytes > 0) options.say(fmt::format("{} bytes are there already", begun.held_bytes));
-  const auto total = static_cast<uint32_t>(image.code.size());
-  result.held_bytes = begun.held_bytes;
-  // One piece at a time: while the controller writes it (up to 5 ms), it hears nothing.
-  while (result.held_bytes < total) {
-    if (options.stop_asked()) {
-      stopped = true;
-      return done;
+  void enter_bootloader() {
+    const auto answer = answer_to(wire::EnterBootloader{}, answer_patience, "enter its bootloader");
+    if (answer.outcome != wire::UpdateOutcome::done)
+      fail("refused: " + explanation(answer), std::string(wire::update_outcome_remedy(answer.outcome)));
+    for (uint64_t waited = 0; waited < reset_patience; waited += 100 * ms) {
+      link_.pause(while_it_resets);
+      const auto found = greet(100 * ms);
+      if (found && found->bootloader) return;
     }
-    wire::UpdateData data;
-    data.offset = result.held_bytes;
-    data.count = static_cast<uint8_t>(std::min<size_t>(wire::UpdateData::kMaxCount, total - data.offset));
-    std::copy_n(image.code.begin() + data.offset, data.count, data.data.begin());
-    result.sent_bytes += data.count;
-    const auto answer = need(link_.ask<wire::UpdateAnswer>(data, write_patience), "take the image");
-    if (answer.outcome == flash_failed) return flash_failed;
-    if (answer.outcome != done) refused(file, answer);
-    result.held_bytes = answer.held_bytes;
-    options.progress(result.held_bytes, total);
+    fail("did not come back in its bootloader", "Reset it and give the same command again.");
   }
-  const auto finished =
-      need(link_.ask<wire::UpdateAnswer>(wire::FinishUpdate{}, answer_patience), "verify the image");
-  if (finished.outcome == not_verified) return not_verified;
-  if (finished.outcome != done) refused(file, finished);
-  return done;
-}
+  const SlotImage& image_for_free_slot() {
+    const auto ask = [&](wire::ImageSlot slot) {
+      const auto report = report_of(slot);
+      if (!report) fail("does not tell what its slots hold", "Reset it and give the same command again.");
+      return *report;
+    };
+    const wire::ImageReport free = ask(ask(wire::ImageSlot::a).free_slot);
+    const auto image = std::ranges::find_if(
+        file_.images, [&](const SlotImage& each) { return each.header.link_address == free.link_address; });
+    if (image != file_.images.end()) return *image;
+    throw InputError(
+        {file_.file, "images",
+         fmt::format("none is linked for address 0x{:08x}, where the free slot lies", free.link_address),
+         "Take the image that was built for this board."});
+  }
+  std::optional<wire::ImageReport> report_of(wire::ImageSlot slot) {
+    return link_.ask<wire::ImageReport>(wire::ImageQuery{.slot = slot}, answer_patience);
+  }
+  /// False if it was stopped.
+  bool upload(const SlotImage& image) {
+    result_.image_bytes = static_cast<uint32_t>(image.code.size());
+    bool stopped = false;
+    wire::UpdateOutcome outcome = send_image(image, stopped);
+    if (outcome != wire::UpdateOutcome::done) {
+      // Remains of an interrupted update may not fit; the controller has dropped them.
+      options_.say("what was there does not fit; sending all of it");
+      outcome = send_image(image, stopped);
+    }
+    if (outcome != wire::UpdateOutcome::done) refused({.outcome = outcome, .value = result_.held_bytes});
+    const auto started = answer_to(wire::StartImage{}, answer_patience, "start the image");
+    if (!stopped && started.outcome != wire::UpdateOutcome::done) refused(started);
+    return !stopped;
+  }
+  /// Begin, data, finish. An answer that is not `done` ends it.
+  wire::UpdateOutcome send_image(const SlotImage& image, bool& stopped) {
+    using enum wire::UpdateOutcome;
+    wire::BeginUpdate begin;
+    begin.allow_older = options_.allow_older || options_.force ? 1 : 0;
+    begin.header = wire::encode(image.header);
+    const auto begun = answer_to(begin, erase_patience, "make room for the image");
+    if (begun.outcome == flash_failed) return flash_failed;
+    if (begun.outcome != done) refused(begun);
+    if (begun.held_bytes > 0) options_.say(fmt::format("{} bytes are there already", begun.held_bytes));
+    const auto total = static_cast<uint32_t>(image.code.size());
+    result_.held_bytes = begun.held_bytes;
+    // One piece at a time: while the controller writes it (up to 5 ms), it hears nothing.
+    while (result_.held_bytes < total) {
+      if (options_.stop_asked()) {
+        stopped = true;
+        return done;
+      }
+      wire::UpdateData data;
+      data.offset = result_.held_bytes;
+      data.count = static_cast<uint8_t>(std::min<size_t>(wire::UpdateData::kMaxCount, total - data.offset));
+      std::copy_n(image.code.begin() + data.offset, data.count, data.data.begin());
+      result_.sent_bytes += data.count;
+      const auto answer = answer_to(data, write_patience, "take the image");
+      if (answer.outcome == flash_failed) return flash_failed;
+      if (answer.outcome != done) refused(answer);
+      result_.held_bytes = answer.held_bytes;
+      options_.progress(result_.held_bytes, total);
+    }
+    const auto finished = answer_to(wire::FinishUpdate{}, answer_patience, "verify the image");
+    if (finished.outcome == not_verified) return not_verified;
+    if (finished.outcome != done) refused(finished);
+    return done;
+  }
+  void confirm() {
+    std::optional<Greeting> found;
+    for (uint64_t waited = 0; waited < reset_patience && !found; waited += 100 * ms) {
+      link_.pause(while_it_resets);
+      found = greet(100 * ms);
+    }
+    constexpr const char* remedy = "It keeps its former firmware; the image does not work on this board.";
+    if (!found) fail("does not answer with the new firmware", remedy);
+    const auto running = report_of(wire::ImageSlot::none);
+    const bool expected = !found->bootloader && version_of(found->hello) == file_.version && running &&
+                          running->build_id == file_.build_id;
+    if (!expected) {
+      fail(fmt::format("did not come up with the new firmware: it has returned to {}",
+                       found->bootloader ? "its bootloader" : in_words(version_of(found->hello))),
+           remedy);
+    }
+    const auto confirmed =
+        answer_to(wire::ConfirmImage{.build_id = file_.build_id}, answer_patience, "confirm the image");
+    if (confirmed.outcome != wire::UpdateOutcome::done) refused(confirmed);
+  }
+  wire::UpdateAnswer answer_to(const auto& request, uint64_t patience_ns, const char* action) {
+    if (const auto answer = link_.ask<wire::UpdateAnswer>(request, patience_ns)) return *answer;
+    fail(fmt::format("fell silent when it was to {}", action),
+         "Check cable and power and give the same command again: what was sent stays, and it goes on from "
+         "there.");
+  }
+  [[noreturn]] void refused(const wire::UpdateAnswer& answer) const {
+    using enum wire::UpdateOutcome;
+    const std::string problem = explanation(answer);
+    const std::string remedy(wire::update_outcome_remedy(answer.outcome));
+    switch (answer.outcome) {
+      case bad_header:
+      case wrong_board:
+      case wrong_slot:
+      case too_long:
+      case older_version:
+        throw InputError({file_.file, "", "the controller refuses it: " + problem, remedy});
+      default:
+        fail("refused: " + problem, remedy);
+    }
+  }
+  [[noreturn]] void fail(std::string problem, std::string remedy) const {
+    throw HardwareError("controller at " + port_, std::move(problem), std::move(remedy));
+  }
 
-/// False if it was stopped.
-bool Updater::upload(const SlotImage& image, const UpdateFile& file, const UpdateOptions& options,
-                     UpdateResult& result) {
-  result.image_bytes = static_cast<uint32_t>(image.code.size());
-  bool stopped = false;
-  wire::UpdateOutcome outcome = send_image(image, file, options, result, stopped);
-  if (outcome != wire::UpdateOutcome::done) {
-    // Remains of an interrupted update may not fit; the controller has dropped them.
-    options.say("what was there does not fit; sending all of it");
-    outcome = send_image(image, file, options, result, stopped);
-  }
-  if (outcome != wire::UpdateOutcome::done) refused(file, {.outcome = outcome, .value = result.held_bytes});
-  const auto started =
-      need(link_.ask<wire::UpdateAnswer>(wire::StartImage{}, answer_patience), "start the image");
-  if (!stopped && started.outcome != wire::UpdateOutcome::done) refused(file, started);
-  return !stopped;
-}
+  UpdateLink link_;
+  std::string port_;
+  const UpdateFile& file_;
+  const UpdateOptions& options_;
+  UpdateResult result_;
+};
 
-void Updater::confirm(const UpdateFile& file) {
-  std::optional<Greeting> found;
-  for (uint64_t waited = 0; waited < reset_patience && !found; waited += 100 * ms) {
-    link_.pause(while_it_resets);
-    found = greet(100 * ms);
-  }
-  constexpr const char* remedy = "It keeps its former firmware; the image does not work on this board.";
-  if (!found) fail("does not answer with the new firmware", remedy);
-  const auto running =
-      link_.ask<wire::ImageReport>(wire::ImageQuery{.slot = wire::ImageSlot::none}, answer_patience);
-  const bool expected = !found->bootloader && version_of(found->hello) == file.version && running &&
-                        running->build_id == file.build_id;
-  if (!expected) {
-    fail(fmt::format("did not come up with the new firmware: it has returned to {}",
-                     found->bootloader ? "its bootloader" : in_words(version_of(found->hello))),
-         remedy);
-  }
-  const auto confirmed =
-      need(link_.ask<wire::UpdateAnswer>(wire::ConfirmImage{.build_id = file.build_id}, answer_patience),
-           "confirm the image");
-  if (confirmed.outcome != wire::UpdateOutcome::done) refused(file, confirmed);
-}
+}  // namespace
 
-UpdateResult Updater::flash(const UpdateFile& file, const UpdateOptions& options) {
-  UpdateResult result;
-  const Greeting found = find_controller(options);
-  if (!wanted(file, found, options, result)) return result;
-  if (options.dry_run) {
-    result.end = UpdateEnd::dry_run;
-    return result;
-  }
-  if (!found.bootloader) enter_bootloader();
-  if (!upload(image_for_free_slot(file), file, options, result)) {
-    result.end = UpdateEnd::stopped;
-    return result;
-  }
-  result.verified = true;
-  options.say("verified by the controller; starting it");
-  confirm(file);
-  return result;
+UpdateResult flash_controller(Clock& clock, ByteLine& line, const std::string& port, const UpdateFile& file,
+                              const UpdateOptions& options) {
+  return Updater(clock, line, port, file, options).flash();
 }
 
 }  // namespace diastole

@@ -1,8 +1,8 @@
 #pragma once
 // Replacing the controller's firmware, from the first question to the confirmation:
 //
-//   Updater updater(clock, line, "/dev/ttyUSB0");
-//   UpdateResult result = updater.flash(read_update_file("diastole-stm32f405.image"), options);
+//   const UpdateFile file = read_update_file("diastole-stm32f405.image");
+//   UpdateResult result = flash_controller(clock, line, "/dev/ttyUSB0", file, options);
 //
 // Throws InputError if the file is not for this controller, HardwareError if the controller does not answer or does
 // not do what it should; either way it still has a firmware that starts. What was sent stays: the same call again
@@ -13,7 +13,8 @@
 #include <string>
 
 #include "host/flash/update_file.hpp"
-#include "host/flash/update_link.hpp"
+#include "host/transport/byte_line.hpp"
+#include "host/transport/clock.hpp"
 
 namespace diastole {
 
@@ -40,36 +41,8 @@ struct UpdateResult {
   bool verified = false;                        ///< read back by the controller, hash equal
 };
 
-class Updater {
- public:
-  /// `port` is for messages.
-  Updater(Clock& clock, ByteLine& line, std::string port) : link_(clock, line), port_(std::move(port)) {}
-
-  UpdateResult flash(const UpdateFile& file, const UpdateOptions& options);
-
- private:
-  struct Greeting {
-    wire::Hello hello;
-    bool bootloader = false;
-  };
-
-  Greeting find_controller(const UpdateOptions& options);
-  std::optional<Greeting> greet(uint64_t patience_ns);
-  bool wanted(const UpdateFile& file, const Greeting& found, const UpdateOptions& options,
-              UpdateResult& result);
-  void enter_bootloader();
-  const SlotImage& image_for_free_slot(const UpdateFile& file);
-  bool upload(const SlotImage& image, const UpdateFile& file, const UpdateOptions& options,
-              UpdateResult& result);
-  wire::UpdateOutcome send_image(const SlotImage& image, const UpdateFile& file, const UpdateOptions& options,
-                                 UpdateResult& result, bool& stopped);
-  void confirm(const UpdateFile& file);
-  wire::UpdateAnswer need(std::optional<wire::UpdateAnswer> answer, const char* action) const;
-  [[noreturn]] void refused(const UpdateFile& file, const wire::UpdateAnswer& answer) const;
-  [[noreturn]] void fail(std::string problem, std::string remedy) const;
-
-  UpdateLink link_;
-  std::string port_;
-};
+/// `port` is for messages.
+UpdateResult flash_controller(Clock& clock, ByteLine& line, const std::string& port, const UpdateFile& file,
+                              const UpdateOptions& options);
 
 }  // namespace diastole

@@ -6,6 +6,8 @@
 //                                         lasts longer than a report takes) and against its final count at the end
 //   emergency stop pressed      against   the controller's fault, which must follow
 
+#include <fmt/format.h>
+
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -31,15 +33,60 @@ struct ControllerWitness {
 class GateCheck {
  public:
   /// From now on; what the inputs saw before is forgotten.
-  explicit GateCheck(GateInputs& inputs);
+  explicit GateCheck(GateInputs& inputs) : inputs_(inputs) {
+    (void)inputs_.take();
+    if (inputs_.estop_pressed()) estop_since_ns_ = 0;
+  }
 
-  [[nodiscard]] std::vector<GateRemark> check(uint64_t now_ns, const ControllerWitness& controller);
+  [[nodiscard]] std::vector<GateRemark> check(uint64_t now_ns, const ControllerWitness& controller) {
+    std::vector<GateRemark> out;
+    take(out, now_ns);
+    if (inputs_.counts_pulses() && pulses_ != controller.triggers) {
+      if (!counts_differ_since_ns_) counts_differ_since_ns_ = now_ns;
+      if (!counts_reported_ && now_ns - *counts_differ_since_ns_ > report_patience_ns) {
+        counts_reported_ = true;
+        out.push_back({"error", "gate_count",
+                       fmt::format("the gating line showed {} pulses, the controller reported {} triggers",
+                                   pulses_, controller.triggers),
+                       now_ns});
+      }
+    } else {
+      counts_differ_since_ns_.reset();
+    }
+    if (estop_since_ns_ && !controller.stopped_by_estop && !estop_reported_ &&
+        !awaits_estop(now_ns, controller)) {
+      estop_reported_ = true;
+      out.push_back({"error", "estop_unseen",
+                     "the emergency stop line showed pressed, but the controller reports no emergency stop",
+                     now_ns});
+    }
+    return out;
+  }
   /// Whether the controller still has time to report a pressed emergency stop: the run's end waits for that, half a
   /// second at most.
-  [[nodiscard]] bool awaits_estop(uint64_t now_ns, const ControllerWitness& controller) const;
+  [[nodiscard]] bool awaits_estop(uint64_t now_ns, const ControllerWitness& controller) const {
+    return estop_since_ns_ && !controller.stopped_by_estop && now_ns <= *estop_since_ns_ + report_patience_ns;
+  }
   /// At the end; `triggers_raised` is the controller's own count, if it told.
   [[nodiscard]] std::vector<GateRemark> close(uint64_t now_ns, const ControllerWitness& controller,
-                                              std::optional<uint64_t> triggers_raised);
+                                              std::optional<uint64_t> triggers_raised) {
+    std::vector<GateRemark> out;
+    take(out, now_ns);
+    if (!inputs_.counts_pulses()) return out;
+    const uint64_t raised = triggers_raised.value_or(controller.triggers);
+    if (pulses_ == raised) {
+      out.push_back({"info", "gate_count",
+                     fmt::format("{} pulses on the gating line, as the controller counted", pulses_),
+                     now_ns});
+      return out;
+    }
+    out.push_back(
+        {"error", "gate_count",
+         fmt::format("the gating line showed {} pulses, the controller raised {} triggers{}", pulses_, raised,
+                     may_have_lost_ ? " (edges came faster than they could be read)" : ""),
+         now_ns});
+    return out;
+  }
 
   /// Pulses counted on the gating line; none if it is not wired to the host.
   [[nodiscard]] std::optional<uint64_t> pulses() const {
@@ -47,7 +94,31 @@ class GateCheck {
   }
 
  private:
-  void take(std::vector<GateRemark>& out, uint64_t now_ns);
+  static constexpr uint64_t report_patience_ns =
+      500'000'000;  // for the controller's report of a trigger or a fault
+
+  void take(std::vector<GateRemark>& out, uint64_t now_ns) {
+    const GateReading reading = inputs_.take();
+    pulses_ += reading.pulses;
+    may_have_lost_ = may_have_lost_ || reading.may_have_lost;
+    for (const EstopChange& change : reading.estop_changes) {
+      if (change.pressed) {  // also one that is released again is to be reported
+        estop_since_ns_ = change.host_ns;
+        estop_reported_ = false;
+      }
+      out.push_back(
+          {"warning", "estop_line",
+           fmt::format("the emergency stop line shows: {}{}", change.pressed ? "pressed" : "released",
+                       change.edge_seen ? "" : " (by its level; the edge itself was not seen)"),
+           change.host_ns});
+    }
+    if (!reading.problem.empty() && !failed_) {
+      failed_ = true;
+      out.push_back({"error", "gpio",
+                     fmt::format("{} can no longer be read: {}", inputs_.describe(), reading.problem),
+                     now_ns});
+    }
+  }
 
   GateInputs& inputs_;
   uint64_t pulses_ = 0;

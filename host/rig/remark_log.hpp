@@ -2,6 +2,7 @@
 // The remarks of a run for those who look on. Each has a number that it keeps. When there are more than `most`, the
 // oldest go; errors and prompts go last, when they alone are more than `most`.
 
+#include <algorithm>
 #include <cstdint>
 #include <deque>
 #include <map>
@@ -16,7 +17,16 @@ class RemarkLog {
  public:
   explicit RemarkLog(size_t most = 2000) : most_(most) {}
 
-  void add(const RunRemark& remark, const std::string& utc);
+  void add(const RunRemark& remark, const std::string& utc) {
+    const size_t number = next_++;
+    kept_[number] = {number, utc, remark};
+    const bool lasts = remark.level == "error" || remark.code == "prompt";
+    (lasts ? lasting_ : passing_).push_back(number);
+    if (kept_.size() <= most_) return;
+    std::deque<size_t>& from = passing_.empty() ? lasting_ : passing_;
+    kept_.erase(from.front());
+    from.pop_front();
+  }
 
   struct Entry {
     size_t number = 0;
@@ -28,7 +38,14 @@ class RemarkLog {
     size_t next = 0;             ///< the first number that is not among them
   };
   /// Those from number `first` on that are still here, `at_most` of them.
-  [[nodiscard]] Page from(size_t first, size_t at_most) const;
+  [[nodiscard]] Page from(size_t first, size_t at_most) const {
+    Page page{{}, std::max(first, next_)};
+    auto each = kept_.lower_bound(first);
+    for (; each != kept_.end() && page.remarks.size() < at_most; ++each)
+      page.remarks.push_back(each->second);
+    if (each != kept_.end()) page.next = each->first;
+    return page;
+  }
 
  private:
   size_t most_;

@@ -223,25 +223,26 @@ RunOutcome RigService::acquire(JournalWriter& journal, const RunOrder& order, co
   std::vector<std::string> warnings;
   if (!rate.warning.empty()) warnings.push_back(rate.warning);
   const auto samples = make_source(*clock_, *instrument_);
-  Acquisition acquisition(*clock_, *controller_, *samples, journal,
-                          {rate.rate_Hz, rig_.daq.channels, std::move(warnings), gate_.get(), planned_s,
-                           std::move(slices), &live_, order.prompts_answered});
-  return acquisition.run({
-      .stop = [this] { return queue_.stop_asked(); },
-      .go_on = [this] { return run_.take_go_on(); },
-      .notes = [this] { return run_.take_notes(); },
-      .progress =
-          [this](const RunProgress& progress) {
-            if (controller_->connected()) (void)remember(controller_->last_known());
-            run_.progress(progress);
-          },
-      .remark =
-          [this](const RunRemark& remark) {
-            spdlog::log(remark.level == "info" ? spdlog::level::info : spdlog::level::warn, "{}",
-                        remark.text);
-            run_.remark(remark);
-          },
-  });
+  return diastole::acquire(*clock_, *controller_, *samples, journal,
+                           {rate.rate_Hz, rig_.daq.channels, std::move(warnings), gate_.get(), planned_s,
+                            std::move(slices), &live_, order.prompts_answered},
+                           {
+                               .stop = [this] { return queue_.stop_asked(); },
+                               .go_on = [this] { return run_.take_go_on(); },
+                               .notes = [this] { return run_.take_notes(); },
+                               .progress =
+                                   [this](const RunProgress& progress) {
+                                     if (controller_->connected()) (void)remember(controller_->last_known());
+                                     run_.progress(progress);
+                                   },
+                               .remark =
+                                   [this](const RunRemark& remark) {
+                                     spdlog::log(
+                                         remark.level == "info" ? spdlog::level::info : spdlog::level::warn,
+                                         "{}", remark.text);
+                                     run_.remark(remark);
+                                   },
+                           });
 }
 
 RunResult RigService::finish(const std::filesystem::path& journal, const RunOutcome& outcome) {

@@ -2,12 +2,15 @@
 // The present or last run as those see it who look on, and what they contribute to it: notes, and the operator's word
 // that the next slice can begin. Of any thread.
 
+#include <mutex>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "host/rig/remark_log.hpp"
 #include "host/rig/rig_answers.hpp"
+#include "host/rig/utc.hpp"
 #include "host/transport/real_time.hpp"
 
 namespace diastole {
@@ -31,22 +34,66 @@ class RunMonitor {
  public:
   static constexpr size_t remarks_at_once = 200;
 
-  void begin(const RunPlan& plan);
-  void progress(const RunProgress& progress);
-  void writing();
-  void end(const RunResult& result);
-  void remark(const RunRemark& remark);
+  void begin(const RunPlan& plan) {
+    const std::lock_guard lock(mutex_);
+    run_ = Run{plan};
+    notes_.clear();
+    go_on_.reset();
+  }
+  void progress(const RunProgress& progress) {
+    const std::lock_guard lock(mutex_);
+    run_->progress = progress;
+  }
+  void writing() {
+    const std::lock_guard lock(mutex_);
+    run_->state = "writing";
+  }
+  void end(const RunResult& result) {
+    const std::lock_guard lock(mutex_);
+    run_->state = result.run_file.empty() ? "failed" : "done";
+    run_->result = result;
+  }
+  void remark(const RunRemark& remark) {
+    const std::lock_guard lock(mutex_);
+    run_->remarks.add(remark, utc_now());
+  }
   /// With remarks from number `first_remark` on; none if there was no run.
-  [[nodiscard]] std::optional<RunState> state(size_t first_remark) const;
+  [[nodiscard]] std::optional<RunState> state(size_t first_remark) const {
+    const std::lock_guard lock(mutex_);
+    if (!run_) return std::nullopt;
+    return RunState{run_->plan, run_->state, run_->progress,
+                    run_->remarks.from(first_remark, remarks_at_once), run_->result};
+  }
   /// Empty: there was none.
-  [[nodiscard]] std::string run_id() const;
+  [[nodiscard]] std::string run_id() const {
+    const std::lock_guard lock(mutex_);
+    return run_ ? run_->plan.run_id : "";
+  }
 
-  void note(const RunRemark& note);
-  std::vector<RunRemark> take_notes();
+  void note(const RunRemark& note) {
+    const std::lock_guard lock(mutex_);
+    notes_.push_back(note);
+  }
+  std::vector<RunRemark> take_notes() {
+    const std::lock_guard lock(mutex_);
+    return std::exchange(notes_, {});
+  }
   /// The operator is ready for the slice that the run waits for, or for slice number `slice` if it is that one; none:
   /// nothing waits.
-  std::optional<ContinuedSlice> go_on(std::optional<size_t> slice);
-  std::optional<size_t> take_go_on();
+  std::optional<ContinuedSlice> go_on(std::optional<size_t> slice) {
+    const std::lock_guard lock(mutex_);
+    const auto* schedule =
+        run_ && run_->state == "running" && run_->progress.schedule ? &*run_->progress.schedule : nullptr;
+    if (schedule == nullptr || schedule->phase != "waiting") return std::nullopt;
+    const auto waited_for = static_cast<size_t>(schedule->slice);
+    if (slice && *slice != waited_for) return std::nullopt;
+    go_on_ = waited_for;
+    return ContinuedSlice{waited_for, schedule->prompt};
+  }
+  std::optional<size_t> take_go_on() {
+    const std::lock_guard lock(mutex_);
+    return std::exchange(go_on_, std::nullopt);
+  }
 
  private:
   struct Run {

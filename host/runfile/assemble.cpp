@@ -32,7 +32,7 @@ const std::string not_recorded = "not recorded";
 TimeAxis axis_of(const ParsedJournal& parsed, const std::string& file) {
   if (!parsed.start_tick)
     throw NothingRecorded({file, "", "ends before the run started", "There is nothing to recover."});
-  const auto fitted = fit_clock_map(controller_pairs(parsed));
+  const auto fitted = fit_clock_map(TimeAxis::controller_pairs(parsed));
   if (!fitted) {
     throw NothingRecorded({file, "", "ends before the two clocks were compared, so its samples have no time",
                            "There is nothing to recover."});
@@ -166,7 +166,7 @@ void put_clocks(const ParsedJournal& parsed, const TimeAxis& axis, RecordedRun& 
   run.clock = {{"host_offset_s", axis.host_at_start_s()},
                {"host_drift_ppm", (1 / controller_per_host - 1) * 1e6},
                {"host_residual_s", axis.map().residual_s}};
-  if (const auto daq = fit_clock_map(instrument_pairs(parsed))) {
+  if (const auto daq = fit_clock_map(TimeAxis::instrument_pairs(parsed))) {
     run.clock["daq_offset_s"] = daq->to_other_s(axis.host_at_start_s());
     run.clock["daq_drift_ppm"] = (daq->scale / controller_per_host - 1) * 1e6;
   }

@@ -9,6 +9,7 @@
 //
 // Deterministic: equal calls give equal bytes and equal edges.
 
+#include <algorithm>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -33,7 +34,23 @@ class RecordedController {
 
   [[nodiscard]] Ticks now() const { return board_.now(); }
   /// Runs until `tick`; earlier ticks do nothing.
-  void advance_to(Ticks tick);
+  void advance_to(Ticks tick) {
+    while (true) {
+      const std::optional<Ticks> event = board_.next_event();
+      const Ticks next = event ? std::min(*event, next_turn_) : next_turn_;
+      if (next > tick) break;
+      bool inputs_changed = false;
+      const bool matched = board_.run_to(next, inputs_changed);
+      if (inputs_changed) controller_.on_inputs();
+      if (matched) controller_.on_match();
+      if (next_turn_ <= next) {
+        controller_.poll();
+        next_turn_ = next + turn_;
+      }
+    }
+    bool inputs_changed = false;
+    if (tick > board_.now()) board_.run_to(tick, inputs_changed);
+  }
 
   void feed(std::span<const std::uint8_t> bytes) { board_.receive(bytes); }
   std::vector<std::uint8_t> take_output() { return board_.take_sent(); }
@@ -55,9 +72,18 @@ class RecordedController {
   /// Whether the firmware has asked for a reset; it is not carried out.
   [[nodiscard]] RecordingBoard::Restart restart_asked() const { return board_.restart_asked(); }
 
-  void set_estop(bool pressed);
-  void set_far_limit(bool closed);
-  void set_home(bool closed);
+  void set_estop(bool pressed) {
+    board_.set_estop(pressed);
+    controller_.on_inputs();
+  }
+  void set_far_limit(bool closed) {
+    board_.set_far_limit(closed);
+    controller_.on_inputs();
+  }
+  void set_home(bool closed) {
+    board_.set_home(closed);
+    controller_.on_inputs();
+  }
   /// The main loop does not come round until then (interrupts do).
   void stall_until(Ticks tick) { next_turn_ = tick; }
 

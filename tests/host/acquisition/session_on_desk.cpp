@@ -49,13 +49,13 @@ void SessionOnDesk::run(const std::function<StopRequest()>& stop) {
   if (experiment.schedule) slices = planned_slices(*experiment.schedule);
   if (live != nullptr) live->begin("desk", experiment.sample_rate_Hz, client.hello().tick_rate_Hz);
   const auto samples = make_source(clock, instrument);
-  Acquisition acquisition(
+  outcome = acquire(
       clock, client, *samples, writer,
-      {experiment.sample_rate_Hz, rig.daq.channels, {}, gate, experiment.least_duration_s(), slices, live});
-  outcome = acquisition.run({.stop = stop,
-                             .go_on = go_on,
-                             .progress = [](const RunProgress&) {},
-                             .remark = [this](const RunRemark& remark) { remarks.push_back(remark); }});
+      {experiment.sample_rate_Hz, rig.daq.channels, {}, gate, experiment.least_duration_s(), slices, live},
+      {.stop = stop,
+       .go_on = go_on,
+       .progress = [](const RunProgress&) {},
+       .remark = [this](const RunRemark& remark) { remarks.push_back(remark); }});
 }
 
 }  // namespace diastole

@@ -31,7 +31,7 @@ struct SessionOnDesk {
   RunOutcome outcome;
 
   explicit SessionOnDesk(const std::string& experiment_text);
-  /// Connects, homes, loads, runs; `stop` as in Acquisition::Hooks.
+  /// Connects, homes, loads, runs; `stop` as in AcquisitionHooks.
   void run(const std::function<StopRequest()>& stop = [] { return StopRequest::none; });
   [[nodiscard]] AssembledRun assemble() const { return assemble_run(read_journal(journal)); }
 };

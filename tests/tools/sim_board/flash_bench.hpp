@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 
+#include "host/flash/update_link.hpp"
 #include "host/flash/updater.hpp"
 #include "protocol/contract/input_error.hpp"
 #include "tests/tools/sim_board/emulated_desk.hpp"
@@ -37,7 +38,7 @@ class FlashBench {
   explicit FlashBench(const std::string& image = factory_image) : desk(image), line_(desk) {}
 
   UpdateResult flash(const std::string& file, const UpdateOptions& options = {}) {
-    return Updater(desk, line_, "the emulated board").flash(read_update_file(file), options);
+    return flash_controller(desk, line_, "the emulated board", read_update_file(file), options);
   }
   /// What answers on the line: an application's report of itself, or a bootloader's (slot none).
   std::optional<wire::ImageReport> running() {
