@@ -1,15 +1,51 @@
 #pragma once
-// Commands that ask the daemon one question and show its answer.
+// Where a command finds the daemon; commands that ask it one question and show its answer.
 
+#include <CLI/CLI.hpp>
 #include <chrono>
+#include <filesystem>
 #include <functional>
-#include <nlohmann/json_fwd.hpp>
+#include <iostream>
+#include <memory>
+#include <nlohmann/json.hpp>
 #include <string>
 
-#include "host/cli/daemon_address.hpp"
+#include "host/config/rig_config.hpp"
+#include "host/rpc/client.hpp"
 #include "protocol/contract/command.hpp"
 
 namespace diastole {
+
+/// Where a command finds the daemon: --socket, or the socket that a rig file names, or the user's own daemon, or
+/// the system's service; and how it gets the control.
+struct DaemonAddress {
+  std::string socket;
+  std::string config;
+  std::string take_over;
+
+  void add_to(CLI::App& command) {
+    auto* socket_option = command.add_option("--socket", socket, "the daemon's socket");
+    command.add_option("--config", config, "rig file that names the socket")->excludes(socket_option);
+  }
+  /// For commands that give orders.
+  void add_take_over_to(CLI::App& command) {
+    command.add_option("--take-over", take_over,
+                       "take the control from the user (or process number) who holds it; the log tells both");
+  }
+  /// A client of the daemon, which has taken over the control if that was asked for.
+  [[nodiscard]] DaemonClient connect() const {
+    DaemonClient client(resolve());
+    if (!take_over.empty()) client.call("control.take", {{"take_over", take_over}});
+    return client;
+  }
+  [[nodiscard]] std::string resolve() const {
+    if (!socket.empty()) return socket;
+    if (!config.empty()) return read_rig(config).daemon.socket;
+    std::error_code ignored;
+    const bool own = std::filesystem::exists(default_socket(), ignored);
+    return !own && std::filesystem::exists(service_socket, ignored) ? service_socket : default_socket();
+  }
+};
 
 struct DaemonQuestion {
   std::string command;
@@ -23,11 +59,25 @@ struct DaemonQuestion {
   std::function<bool(const nlohmann::json& answer)> positive = [](const nlohmann::json&) { return true; };
 };
 
-void add_question(CommandLine& line, const DaemonQuestion& question);
-
 /// One JSON document on standard output, as --json promises.
-void print_json(const nlohmann::json& document);
+inline void print_json(const nlohmann::json& document) { std::cout << document.dump(2) << '\n'; }
 /// The same with --json; else `show()` prints for a person.
-void print(const CommandOutput& out, const nlohmann::json& document, const std::function<void()>& show);
+inline void print(const CommandOutput& out, const nlohmann::json& document,
+                  const std::function<void()>& show) {
+  out.json ? print_json(document) : show();
+}
+
+inline void add_question(CommandLine& line, const DaemonQuestion& question) {
+  auto daemon = std::make_shared<DaemonAddress>();
+  CLI::App* command = line.add(question.command, question.purpose, question.examples);
+  daemon->add_to(*command);
+  if (question.gives_order) daemon->add_take_over_to(*command);
+  line.on_run(command, [daemon, question](const CommandOutput& out) {
+    DaemonClient client = daemon->connect();
+    const nlohmann::json answer = client.call(question.method, nlohmann::json::object(), question.patience);
+    print(out, answer, [&] { question.show(answer); });
+    return question.positive(answer) ? ExitCode::done : ExitCode::negative;
+  });
+}
 
 }  // namespace diastole

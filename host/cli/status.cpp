@@ -1,3 +1,4 @@
+// What is asked of the daemon or ordered in one word: status, home, stop and the like.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -15,11 +16,13 @@
 namespace diastole {
 namespace {
 
+using nlohmann::json;
+
 constexpr std::chrono::seconds homing_patience{3600};
 constexpr int halts_asked = 20;  // until the halt's fault shows in the state
 constexpr std::chrono::milliseconds halt_interval{50};
 
-void show_journals(const nlohmann::json& journals) {
+void show_journals(const json& journals) {
   const auto days = journals.at("keep_days").get<int64_t>();
   fmt::print(
       "journals  {}, {:.1f} MB in {}; {}\n", journals.at("count").get<int64_t>(),
@@ -31,7 +34,7 @@ void show_journals(const nlohmann::json& journals) {
   }
 }
 
-void show_status(const nlohmann::json& status) {
+void show_status(const json& status) {
   const auto text = [&](const char* key) { return status.at(key).get<std::string>(); };
   const auto count = [&](const char* key) { return status.at(key).get<int64_t>(); };
   const auto known = [&](const char* key) { return status.contains(key) && !status.at(key).is_null(); };
@@ -48,7 +51,7 @@ void show_status(const nlohmann::json& status) {
       count("cycles"), count("triggers"), count("r_waves"), count("steps"));
   if (known("settings_problem")) fmt::print("settings  {}\n", text("settings_problem"));
   if (known("control")) {
-    const nlohmann::json& control = status.at("control");
+    const json& control = status.at("control");
     fmt::print("control   {} ({})\n", control.at("user").get<std::string>(),
                control.contains("console") ? "console at " + control.at("console").get<std::string>()
                                            : fmt::format("process {}", control.at("pid").get<int64_t>()));
@@ -60,6 +63,36 @@ void show_status(const nlohmann::json& status) {
              inputs.empty() ? "none active" : fmt::format("{} active", fmt::join(inputs, ", ")),
              status.at("motor_powered").get<bool>() ? "powered" : "off");
   if (known("journals")) show_journals(status.at("journals"));
+}
+
+void show_events(const json& answer) {
+  int boot = 0;
+  for (const auto& entry : answer.at("entries")) {
+    if (const int its = entry.at("boot"); its != boot) {
+      boot = its;
+      fmt::print("start {} of the controller since power-on; seconds since then\n", boot);
+    }
+    fmt::print("{:14.6f}  {}\n", entry.at("time_s").get<double>(), entry.at("text").get<std::string>());
+  }
+  if (answer.at("since_power_on").get<bool>())
+    fmt::print("This is all since power-on: what was before was lost with the power.\n");
+}
+
+void show_addresses(const json& console) {
+  if (console.is_null()) {
+    fmt::print("the daemon has no web console: start it with --console, or with `console` in [daemon]\n");
+  } else {
+    fmt::print("control   {}\nwatch     {}\n", console.at("control").get<std::string>(),
+               console.at("watch").get<std::string>());
+  }
+}
+
+bool continued(const json& answer) { return answer.at("continued"); }
+
+void show_slice(const json& answer) {
+  fmt::print("{}\n", continued(answer) ? fmt::format("slice {} begins with the next cycle",
+                                                     answer.at("slice").get<int64_t>() + 1)
+                                       : "nothing waits");
 }
 
 }  // namespace
@@ -98,7 +131,7 @@ void add_clear_fault(CommandLine& line) {
   daemon->add_take_over_to(*command);
   line.on_run(command, [daemon](const CommandOutput& out) {
     DaemonClient client = daemon->connect();
-    nlohmann::json status = client.call("rig.status");
+    json status = client.call("rig.status");
     const bool faulted = !status.at("fault").is_null();
     if (faulted) status = client.call("rig.clear_fault");
     if (!faulted && !out.json) fmt::print("fault     none is latched: nothing to clear\n");
@@ -131,7 +164,7 @@ void add_jog(CommandLine& line) {
                         "Give a distance in mL and a speed in mL/s, for example --mL 5 --rate-mL-s 10."});
     }
     DaemonClient client = options->daemon.connect();
-    const nlohmann::json status = client.call(
+    const json status = client.call(
         "rig.jog", {{"mL", options->distance_mL}, {"rate_mL_s", options->rate_mL_s}}, homing_patience);
     if (!out.json) {
       fmt::print("jogged    {:+.3f} mL{}\n", status.at("jogged_mL").get<double>(),
@@ -168,7 +201,7 @@ void add_stop(CommandLine& line) {
       fmt::print("{}\n", stopping ? "stop      asked for and accepted" : "stop      nothing was going on");
       std::fflush(stdout);
     }
-    nlohmann::json status = client.call("rig.status");
+    json status = client.call("rig.status");
     for (int asked = 1; options->halt && stopping && status.at("fault").is_null() && asked < halts_asked;
          ++asked) {
       std::this_thread::sleep_for(halt_interval);
@@ -178,6 +211,44 @@ void add_stop(CommandLine& line) {
     print(out, status, [&] { show_status(status); });
     return ExitCode::done;
   });
+}
+
+void add_black_box(CommandLine& line) {
+  add_question(line,
+               {.command = "blackbox",
+                .purpose = "the controller's last events, kept over its resets",
+                .examples = "  diastole blackbox\n"
+                            "      starts, states, faults, refusals, emergency stop, link: 160 of them, "
+                            "oldest first\n"
+                            "  diastole blackbox --json > events.json",
+                .method = "rig.black_box",
+                .show = show_events});
+}
+
+void add_console(CommandLine& line) {
+  add_question(
+      line,
+      {.command = "console",
+       .purpose = "the addresses at which a browser finds the daemon's web console",
+       .examples =
+           "  diastole console\n"
+           "      prints one address for control and one for watching and stopping; open one in a browser.\n"
+           "      Each holds a token: give it to nobody who shall not do that\n"
+           "Exit code 1: the daemon was started without --console.",
+       .method = "console.address",
+       .show = show_addresses,
+       .positive = [](const json& console) { return !console.is_null(); }});
+}
+
+void add_continue(CommandLine& line) {
+  add_question(line, {.command = "continue",
+                      .purpose = "go on with the slice for which the run waits; anybody may",
+                      .examples = "  diastole continue\n"
+                                  "      the same as Enter in the terminal of `diastole run`\n"
+                                  "Exit code 1: nothing waits.",
+                      .method = "run.continue",
+                      .show = show_slice,
+                      .positive = continued});
 }
 
 }  // namespace diastole

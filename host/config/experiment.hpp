@@ -64,4 +64,7 @@ Experiment parse_experiment(std::string_view text, const std::string& file,
 /// Points files are looked for beside the experiment.
 Experiment read_experiment(const std::string& file);
 
+/// What is allowed, and hardly meant: one sentence for each, with what may have been meant.
+std::vector<std::string> doubts_about(const Experiment& experiment);
+
 }  // namespace diastole

@@ -1,17 +1,23 @@
 #include "host/daemon/daemon.hpp"
 
+#include <fmt/format.h>
+#include <spdlog/pattern_formatter.h>
 #include <spdlog/spdlog.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/signal_set.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <chrono>
 #include <csignal>
+#include <cstdlib>
 #include <iostream>
+#include <memory>
 #include <utility>
 
 #include "host/config/rig_config.hpp"
-#include "host/daemon/daemon_log.hpp"
+#include "host/daemon/queued_sink.hpp"
 #include "host/rig/rig_service.hpp"
 #include "host/rig/service_manager.hpp"
 #include "host/rpc/rpc_session.hpp"
@@ -20,6 +26,40 @@
 
 namespace diastole {
 namespace {
+
+/// JOURNAL_STREAM holds device and inode of the stream, and a pipe put between has others.
+bool journal_reads_standard_error() {
+  const char* stream = std::getenv("JOURNAL_STREAM");
+  struct stat facts {};
+  return stream != nullptr && ::fstat(STDERR_FILENO, &facts) == 0 &&
+         fmt::format("{}:{}", facts.st_dev, facts.st_ino) == stream;
+}
+
+class JournalPriority final : public spdlog::custom_flag_formatter {
+ public:
+  void format(const spdlog::details::log_msg& message, const std::tm&, spdlog::memory_buf_t& out) override {
+    const char* priority = message.level >= spdlog::level::err    ? "<3>"
+                           : message.level == spdlog::level::warn ? "<4>"
+                           : message.level == spdlog::level::info ? "<6>"
+                                                                  : "<7>";
+    out.append(priority, priority + 3);
+  }
+  [[nodiscard]] std::unique_ptr<custom_flag_formatter> clone() const override {
+    return std::make_unique<JournalPriority>();
+  }
+};
+
+/// The daemon's log on standard error: with date and level for a person or a file, with the level as journald
+/// reads it (sd-daemon(3): "<4>text") when standard error is a stream of the journal.
+void set_up_daemon_log() {
+  const auto log = std::make_shared<spdlog::logger>("diastole", std::make_shared<QueuedSink>(STDERR_FILENO));
+  if (journal_reads_standard_error()) {
+    auto formatter = std::make_unique<spdlog::pattern_formatter>();
+    formatter->add_flag<JournalPriority>('*').set_pattern("%*%v");
+    log->set_formatter(std::move(formatter));
+  }
+  spdlog::set_default_logger(log);
+}
 
 RigConfig configured(const DaemonOptions& options) {
   RigConfig rig = read_rig(options.config);

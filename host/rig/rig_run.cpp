@@ -4,16 +4,17 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <boost/uuid/random_generator.hpp>
+#include <boost/uuid/uuid_io.hpp>
 #include <chrono>
 
 #include "host/acquisition/disk_room.hpp"
-#include "host/config/experiment_doubts.hpp"
+#include "host/config/experiment.hpp"
 #include "host/controller/settings_values.hpp"
 #include "host/journal/journal_store.hpp"
 #include "host/journal/part_file.hpp"
 #include "host/rig/rig_service.hpp"
 #include "host/rig/utc.hpp"
-#include "host/rig/uuid.hpp"
 #include "host/runfile/assemble.hpp"
 #include "host/runfile/writer.hpp"
 #include "protocol/contract/input_error.hpp"
@@ -125,7 +126,7 @@ void RigService::do_run(const RunOrder& order, const Done& done) {
   const Experiment& experiment = order.experiment;
   (void)do_status();
   const daq::RatePlan rate = instrument_->plan_rate(experiment.sample_rate_Hz);
-  RunPlan run{.run_id = new_uuid()};
+  RunPlan run{.run_id = boost::uuids::to_string(boost::uuids::random_generator()())};
   const std::filesystem::path path =
       std::filesystem::absolute(rig_.daemon.journal_dir) / (run.run_id + ".journal");
   Preparation preparation(*controller_, path);

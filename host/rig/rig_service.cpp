@@ -12,7 +12,6 @@
 #include "host/transport/conducted_clock.hpp"
 #include "host/transport/real_time.hpp"
 #include "host/transport/serial_port.hpp"
-#include "host/transport/watched_clock.hpp"
 #include "protocol/contract/input_error.hpp"
 #include "protocol/wire/wire_text.hpp"
 
@@ -25,6 +24,25 @@ constexpr uint64_t reconnect_interval_ns = 1'000'000'000;
 constexpr uint64_t homing_patience_ns = 1'800'000'000'000;
 constexpr uint64_t homing_step_ns = 10'000'000;
 constexpr int conducted_timeout_ms = 5000;  // wall time; virtual time stands still meanwhile
+
+/// Calls `on_sleep` each time its user goes to sleep: proof that a loop goes on.
+class WatchedClock final : public Clock {
+ public:
+  WatchedClock(std::unique_ptr<Clock> clock, std::function<void()> on_sleep)
+      : clock_(std::move(clock)), on_sleep_(std::move(on_sleep)) {}
+
+  [[nodiscard]] uint64_t now_ns() override { return clock_->now_ns(); }
+  void sleep_until_ns(uint64_t until_ns, ByteLine* line) override {
+    on_sleep_();
+    clock_->sleep_until_ns(until_ns, line);
+  }
+  void line_opened(ByteLine& line) override { clock_->line_opened(line); }
+  [[nodiscard]] bool stands_still() const override { return clock_->stands_still(); }
+
+ private:
+  std::unique_ptr<Clock> clock_;
+  std::function<void()> on_sleep_;
+};
 
 std::unique_ptr<Clock> make_clock(const std::string& conductor, ServiceManager* manager) {
   std::unique_ptr<Clock> clock;

@@ -4,11 +4,14 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <filesystem>
+#include <map>
+#include <optional>
 
 #include "host/rpc/acceptor.hpp"
-#include "host/rpc/connection.hpp"
+#include "host/rpc/rpc_session.hpp"
 #include "host/transport/unix_socket.hpp"
 #include "protocol/contract/input_error.hpp"
 
@@ -18,6 +21,7 @@ namespace {
 namespace asio = boost::asio;
 using asio::local::stream_protocol;
 using boost::system::error_code;
+using std::chrono::steady_clock;
 using namespace std::chrono_literals;
 
 bool somebody_listens(const std::string& socket) {
@@ -28,6 +32,118 @@ bool somebody_listens(const std::string& socket) {
     return false;
   }
 }
+
+class Connection;
+using Connections = std::map<uint64_t, std::shared_ptr<Connection>>;
+
+/// One client of the daemon's socket: lines to and fro. It can cost the rig nothing: what it sends, what waits for it
+/// and how long are bounded, and whoever goes beyond a bound is answered or dropped, and the log tells.
+class Connection : public RpcSession {
+ public:
+  /// For the rest of a line that was begun.
+  static constexpr std::chrono::seconds line_patience{10};
+
+  /// Removes itself from `all` when it closes.
+  Connection(std::shared_ptr<RpcState> rpc_state, std::shared_ptr<Connections> all,
+             stream_protocol::socket socket)
+      : RpcSession(std::move(rpc_state), peer_of(socket.native_handle()), SessionBounds::socket_requests),
+        all_(std::move(all)),
+        socket_(std::move(socket)) {}
+
+  void read() {
+    socket_.async_read_some(asio::buffer(block_), [self = self()](error_code error, size_t bytes) {
+      if (error) return self->ended_by_peer();
+      self->inbox_.append(self->block_.data(), bytes);
+      self->take_more();
+    });
+  }
+  /// Drops the connection if a half line or an unread answer has waited too long.
+  void check(Time now) {
+    if (line_begun_ && now - *line_begun_ > line_patience) {
+      drop(fmt::format("did not end its line within {} s", line_patience.count()));
+    } else if (write_begun_ && now - *write_begun_ > SessionBounds::write_patience) {
+      drop(fmt::format("has not read for {} s", SessionBounds::write_patience.count()));
+    }
+  }
+  void close() override {
+    if (!socket_.is_open()) return;
+    error_code ignored;
+    socket_.close(ignored);
+    leave();
+    all_->erase(number());
+  }
+
+ private:
+  static constexpr size_t kept_inbox_bytes = 64U << 10;
+
+  std::shared_ptr<Connection> self() { return std::static_pointer_cast<Connection>(shared_from_this()); }
+  void take_more() override {
+    while (socket_.is_open() && !no_more_input_ && take_line()) {
+    }
+  }
+  /// Answers the next line; false if none has come whole, or none may be taken now.
+  bool take_line() {
+    if (!may_take()) return false;
+    const size_t newline = inbox_.find('\n', searched_);
+    if (newline != std::string::npos) {
+      const std::string line = inbox_.substr(taken_, newline - taken_);
+      taken_ = searched_ = newline + 1;
+      line_begun_.reset();
+      answer(line);
+      return true;
+    }
+    inbox_.erase(0, std::exchange(taken_, 0));
+    searched_ = inbox_.size();
+    if (inbox_.empty() && inbox_.capacity() > kept_inbox_bytes) inbox_.shrink_to_fit();
+    if (inbox_.size() >= rpc::most_line_bytes) {
+      refuse_long_line();
+      return false;
+    }
+    if (!inbox_.empty() && !line_begun_) line_begun_ = steady_clock::now();
+    read();
+    return false;
+  }
+  void ended_by_peer() {
+    if (!socket_.is_open()) return;
+    no_more_input_ = true;
+    leave();
+    close_when_done();
+  }
+  void refuse_long_line() {
+    rpc_state().log.warn(fmt::format("{} sent a line longer than {} bytes: connection closed",
+                                     in_words(peer()), rpc::most_line_bytes));
+    const rpc::Error error(rpc::Code::invalid_request,
+                           fmt::format("a line has at most {} bytes", rpc::most_line_bytes));
+    no_more_input_ = true;
+    leave();
+    inbox_.clear();
+    send(rpc::error_line(nullptr, std::make_exception_ptr(error)));
+    close_when_done();
+  }
+  void write(const std::string& line) override {
+    write_begun_ = steady_clock::now();
+    asio::async_write(socket_, asio::buffer(line), [self = self()](error_code error, size_t) {
+      self->write_begun_.reset();
+      if (error) return self->close();
+      self->written();
+      if (self->no_more_input_) self->close_when_done();
+    });
+  }
+  [[nodiscard]] bool is_open() const override { return socket_.is_open(); }
+  void close_when_done() {
+    if (all_sent() && pending() == 0) close();
+  }
+
+  std::shared_ptr<Connections> all_;
+  stream_protocol::socket socket_;
+  std::array<char, 16384> block_{};
+  std::string inbox_;
+  size_t taken_ = 0;     // bytes of inbox_ that are answered
+  size_t searched_ = 0;  // bytes of inbox_ that hold no newline
+  bool no_more_input_ = false;
+  std::optional<Time> line_begun_;
+  std::optional<Time> write_begun_;
+};
 
 }  // namespace
 

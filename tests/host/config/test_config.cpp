@@ -5,7 +5,6 @@
 #include <sstream>
 
 #include "host/config/experiment.hpp"
-#include "host/config/experiment_doubts.hpp"
 #include "host/config/rig_config.hpp"
 #include "protocol/contract/input_error.hpp"
 #include "tests/host/bench/scratch.hpp"
