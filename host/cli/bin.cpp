@@ -9,8 +9,8 @@
 
 #include "host/cli/daemon_question.hpp"
 #include "host/cli/host_commands.hpp"
-#include "host/cli/text_file.hpp"
 #include "host/config/schedule.hpp"
+#include "host/journal/part_file.hpp"
 #include "host/runfile/output_guard.hpp"
 #include "protocol/contract/input_error.hpp"
 #include "protocol/runfile/frame_bins.hpp"

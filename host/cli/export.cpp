@@ -8,7 +8,7 @@
 
 #include "host/cli/daemon_question.hpp"
 #include "host/cli/host_commands.hpp"
-#include "host/cli/text_file.hpp"
+#include "host/journal/part_file.hpp"
 #include "host/runfile/bids_export.hpp"
 #include "host/runfile/output_guard.hpp"
 #include "protocol/contract/input_error.hpp"

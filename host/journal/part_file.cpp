@@ -11,12 +11,14 @@
 #include <chrono>
 #include <csignal>
 #include <cstdint>
+#include <fstream>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <system_error>
 
 #include "host/transport/descriptor.hpp"
+#include "protocol/contract/input_error.hpp"
 
 namespace diastole {
 namespace {
@@ -99,6 +101,20 @@ void copy_durably(const fs::path& from, const fs::path& to) {
     std::error_code ignored;
     fs::remove(part, ignored);
     throw;
+  }
+}
+
+void write_text_file(const fs::path& file, std::string_view content) {
+  const fs::path temporary = part_file_of(file);
+  std::ofstream stream(temporary, std::ios::binary);
+  stream.write(content.data(), static_cast<std::streamsize>(content.size()));
+  stream.close();
+  std::error_code error;
+  if (stream) fs::rename(temporary, file, error);
+  if (!stream || error) {
+    std::error_code ignored;
+    fs::remove(temporary, ignored);
+    throw HardwareError(file.string(), "cannot be written", "Check the disk's space and your rights there.");
   }
 }
 

@@ -3,6 +3,7 @@
 // killed leaves its own behind; the next one that writes there tidies it up.
 
 #include <filesystem>
+#include <string_view>
 
 namespace diastole {
 
@@ -17,5 +18,9 @@ void remove_leftovers(const std::filesystem::path& file);
 /// not touched. Throws std::filesystem::filesystem_error; then nothing is left behind. A `from` without a name is read
 /// through /proc/self/fd/N.
 void copy_durably(const std::filesystem::path& from, const std::filesystem::path& to);
+
+/// Replaces a file of that name by one with this content. Throws HardwareError if the disk does not take it; then nothing
+/// is left behind.
+void write_text_file(const std::filesystem::path& file, std::string_view content);
 
 }  // namespace diastole

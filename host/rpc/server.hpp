@@ -36,7 +36,7 @@
 // `points` holds the text of each points file that the experiment names: {name: text}. With `prompts_answered` the
 // operator is waited for nowhere.
 //
-// No client costs the rig anything (connection.hpp): a line is bounded, and so are the answers that a client
+// No client costs the rig anything (server.cpp): a line is bounded, and so are the answers that a client
 // leaves unread, its requests a second and the time for a line; beyond most_connections the one that has said
 // nothing for longest gives way.
 

@@ -1,4 +1,4 @@
-#include "host/web/console_socket.hpp"
+#include "host/web/server_state.hpp"
 
 #include <fmt/format.h>
 

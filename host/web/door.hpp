@@ -63,4 +63,10 @@ class Door {
 /// (it can send no other header); empty if there is none.
 std::string_view token_in(std::string_view authorization, std::string_view protocols);
 
+/// 128 bits of the kernel's randomness, as 32 hexadecimal digits. Throws HardwareError if the kernel gives none.
+std::string new_token();
+
+/// Compares in a time that tells nothing of where the two differ.
+bool same_secret(std::string_view a, std::string_view b);
+
 }  // namespace diastole::web

@@ -6,7 +6,6 @@
 #include <boost/beast/http.hpp>
 #include <chrono>
 
-#include "host/web/console_socket.hpp"
 #include "host/web/request.hpp"
 #include "host/web/server_state.hpp"
 

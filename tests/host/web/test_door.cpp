@@ -3,7 +3,6 @@
 #include <gmock/gmock.h>
 
 #include "host/web/page_files.hpp"
-#include "host/web/token.hpp"
 #include "protocol/contract/input_error.hpp"
 #include "tests/host/bench/scratch.hpp"
 
