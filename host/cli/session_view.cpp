@@ -39,7 +39,7 @@ int64_t cycles_done(const SessionProgress& progress) {
 }
 
 std::string slice_words(const SessionProgress& progress) {
-  const SessionSchedule& schedule = *progress.schedule;
+  const ScheduleProgress& schedule = *progress.schedule;
   const bool before_first_cycle = progress.triggers == 0 && schedule.phase != "waiting";
   return fmt::format("slice {} of {} ({}): {}", schedule.slice + 1, schedule.slices, schedule.block,
                      before_first_cycle ? "at rest before the first cycle" : schedule.phase);

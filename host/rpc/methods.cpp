@@ -42,12 +42,6 @@ RigDone to(Reply reply) {
   };
 }
 
-void rig_status(RigService& rig, const json&, const Reply& reply) { rig.status(to(reply)); }
-void rig_home(RigService& rig, const json&, const Reply& reply) { rig.home(to(reply)); }
-void rig_clear_fault(RigService& rig, const json&, const Reply& reply) { rig.clear_fault(to(reply)); }
-void rig_settings(RigService& rig, const json&, const Reply& reply) { rig.settings(to(reply)); }
-void rig_black_box(RigService& rig, const json&, const Reply& reply) { rig.black_box(to(reply)); }
-
 void rig_jog(RigService& rig, const json& params, const Reply& reply) {
   rig.jog(number_in(params, "mL"), number_in(params, "rate_mL_s"), to(reply));
 }
@@ -65,10 +59,6 @@ CalibrationOrder measurement_in(const json& params) {
     throw rpc::Error(rpc::Code::invalid_params, "seconds must be 1 to 600");
   }
   return order;
-}
-
-void rig_zero(RigService& rig, const json& params, const Reply& reply) {
-  rig.calibrate(measurement_in(params), to(reply));
 }
 
 void rig_calibrate(RigService& rig, const json& params, const Reply& reply) {
@@ -94,10 +84,6 @@ void run_start(RigService& rig, const json& params, const Reply& reply) {
                 to(reply));
 }
 
-void run_progress(RigService& rig, const json& params, const Reply& reply) {
-  reply(nullptr, as_json(rig.run().state(whole_in(params, "first_remark"))));
-}
-
 void run_trace(RigService& rig, const json& params, const Reply& reply) {
   reply(nullptr, as_json(rig.live().since(params.value("run_id", ""), whole_in(params, "first_row"),
                                           whole_in(params, "first_trigger"))));
@@ -121,10 +107,33 @@ void run_continue(RigService& rig, const json& params, const Reply& reply) {
   reply(nullptr, as_json(rig.run().go_on(slice)));
 }
 
+/// An order or a question that needs nothing but its name.
+template <void (RigService::*ask)(RigService::Done)>
+void plain(RigService& rig, const json&, const Reply& reply) {
+  (rig.*ask)(to(reply));
+}
+
 constexpr std::array all_methods{
-#define DIASTOLE_METHOD(name, access, function) Method{name, Access::access, function},
-#include "host/rpc/method_list.inc"
-#undef DIASTOLE_METHOD
+    Method{"rig.status", Access::anybody, plain<&RigService::status>},
+    Method{"rig.home", Access::controller, plain<&RigService::home>},
+    Method{"rig.zero", Access::controller,
+           [](RigService& rig, const json& params, const Reply& reply) {
+             rig.calibrate(measurement_in(params), to(reply));
+           }},
+    Method{"rig.calibrate", Access::controller, rig_calibrate},
+    Method{"rig.clear_fault", Access::controller, plain<&RigService::clear_fault>},
+    Method{"rig.jog", Access::controller, rig_jog},
+    Method{"rig.settings", Access::anybody, plain<&RigService::settings>},
+    Method{"rig.write_settings", Access::controller, rig_write_settings},
+    Method{"rig.black_box", Access::anybody, plain<&RigService::black_box>},
+    Method{"run.start", Access::controller, run_start},
+    Method{"run.progress", Access::anybody,
+           [](RigService& rig, const json& params, const Reply& reply) {
+             reply(nullptr, as_json(rig.run().state(whole_in(params, "first_remark"))));
+           }},
+    Method{"run.trace", Access::anybody, run_trace},
+    Method{"run.continue", Access::anybody, run_continue},
+    Method{"run.stop", Access::anybody, run_stop},
 };
 
 }  // namespace

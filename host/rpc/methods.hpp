@@ -1,5 +1,5 @@
 #pragma once
-// What can be asked of the daemon: one function a method, one line each in method_list.inc.
+// What can be asked of the daemon: one function a method, in one table.
 
 #include <exception>
 #include <functional>

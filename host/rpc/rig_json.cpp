@@ -4,13 +4,19 @@
 
 #include <array>
 #include <cmath>
-#include <nlohmann/json.hpp>
 
 #include "host/controller/black_box_text.hpp"
 #include "protocol/contract/input_error.hpp"
 #include "protocol/wire/wire_text.hpp"
 
 namespace diastole {
+
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(KeptJournals, directory, count, bytes, without_run_file, keep_days)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(ChannelReading, name, samples, mean_V, noise_kPa, drift_kPa, points,
+                                   kPa_per_V, zero_V)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(CalibrationReport, file, channels)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(RunBegun, run_id, journal, run_file)
+
 namespace {
 
 using nlohmann::json;
@@ -31,14 +37,6 @@ json active_inputs(uint8_t bits) {
   for (size_t i = 0; i < names.size(); ++i)
     if ((bits >> i & 1U) != 0) active.push_back(names[i]);
   return active;
-}
-
-json object_of(const KeptJournals& journals) {
-  return {{"directory", journals.directory},
-          {"count", journals.count},
-          {"bytes", journals.bytes},
-          {"without_run_file", journals.without_run_file},
-          {"keep_days", journals.keep_days}};
 }
 
 json object_of(const RigStatus& status) {
@@ -67,7 +65,7 @@ json object_of(const RigStatus& status) {
       {"settings_problem", or_null(status.settings_problem)},
       {"controller", status.port},
       {"instrument", status.instrument},
-      {"journals", object_of(status.journals)},
+      {"journals", status.journals},
       {"notice", or_null(status.notice)}};
   if (!status.run_id.empty()) object["run_id"] = status.run_id;
   if (status.jog) {
@@ -100,18 +98,9 @@ json object_of(const BlackBox& box) {
   return {{"entries", array_of(box.entries, entry)}, {"since_power_on", since_power_on}};
 }
 
-json object_of(const CalibrationReport& report) {
-  const auto channel = [](const ChannelReading& each) -> json {
-    return {{"name", each.name},           {"samples", each.samples},     {"mean_V", each.mean_V},
-            {"noise_kPa", each.noise_kPa}, {"drift_kPa", each.drift_kPa}, {"points", each.points},
-            {"kPa_per_V", each.kPa_per_V}, {"zero_V", each.zero_V}};
-  };
-  return {{"file", report.file}, {"channels", array_of(report.channels, channel)}};
-}
+json object_of(const CalibrationReport& report) { return report; }
 
-json object_of(const RunBegun& run) {
-  return {{"run_id", run.run_id}, {"journal", run.journal}, {"run_file", run.run_file}};
-}
+json object_of(const RunBegun& run) { return run; }
 
 json object_of(const RunResult& result) {
   if (result.run_file.empty())
@@ -120,15 +109,6 @@ json object_of(const RunResult& result) {
           {"run_file", result.run_file}, {"cycles", result.cycles},   {"triggers", result.triggers},
           {"samples", result.samples},   {"gaps", result.gaps},       {"errors", result.errors},
           {"expected", result.expected}};
-}
-
-json object_of(const ScheduleProgress& schedule) {
-  return {{"block", schedule.block},
-          {"slice", schedule.slice},
-          {"slices", schedule.slices},
-          {"phase", schedule.phase},
-          {"cycles_left", schedule.cycles_left},
-          {"prompt", schedule.prompt}};
 }
 
 json object_of(const RemarkLog::Entry& entry) {
@@ -163,7 +143,7 @@ json as_json(const std::optional<RunState>& run) {
           {"gate_pulses", or_null(progress.gate_pulses)},
           {"last_kPa", progress.last_kPa},
           {"filtered_kPa", progress.filtered_kPa},
-          {"schedule", progress.schedule ? object_of(*progress.schedule) : json()},
+          {"schedule", or_null(progress.schedule)},
           {"remarks", array_of(run->remarks.remarks, [](const auto& each) { return object_of(each); })},
           {"next_remark", run->remarks.next},
           {"result", run->result ? object_of(*run->result) : json()}};

@@ -1,7 +1,7 @@
 #pragma once
 // What the rig answers, as JSON: the form in which clients of the daemon see it (docs/daemon.md).
 
-#include <nlohmann/json_fwd.hpp>
+#include <nlohmann/json.hpp>
 #include <string>
 
 #include "host/acquisition/live_trace.hpp"
@@ -9,6 +9,8 @@
 #include "host/rig/run_monitor.hpp"
 
 namespace diastole {
+
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(ScheduleProgress, block, slice, slices, phase, cycles_left, prompt)
 
 /// RigStatus: {"state", "fault", "fault_number", "firmware", "position_mL", "notice", ...}, after a jog "jogged_mL" and
 /// "stopped" too. SettingsReport: {"record", "settings": {name: value}, "microstep_uL", "backlash_microsteps",

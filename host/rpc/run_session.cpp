@@ -7,6 +7,7 @@
 
 #include "host/config/experiment.hpp"
 #include "host/journal/part_file.hpp"
+#include "host/rpc/rig_json.hpp"
 #include "host/runfile/output_guard.hpp"
 #include "protocol/contract/input_error.hpp"
 
@@ -42,10 +43,8 @@ SessionProgress progress_of(const json& state, size_t& remarks_seen) {
                            .filtered_kPa = state.at("filtered_kPa"),
                            .schedule = {},
                            .new_remarks = {}};
-  if (const json& schedule = state.at("schedule"); !schedule.is_null()) {
-    progress.schedule = {schedule.at("block"), schedule.at("slice"),       schedule.at("slices"),
-                         schedule.at("phase"), schedule.at("cycles_left"), schedule.at("prompt")};
-  }
+  if (const json& schedule = state.at("schedule"); !schedule.is_null())
+    progress.schedule = schedule.get<ScheduleProgress>();
   for (const json& remark : state.at("remarks")) {
     if (const size_t number = remark.at("number"); number > remarks_seen) {
       progress.new_remarks.push_back(fmt::format(

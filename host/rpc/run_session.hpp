@@ -7,19 +7,10 @@
 #include <string>
 #include <vector>
 
+#include "host/acquisition/acquisition.hpp"
 #include "host/rpc/client.hpp"
 
 namespace diastole {
-
-/// Where a session with a schedule of slices is.
-struct SessionSchedule {
-  std::string block;
-  int64_t slice = 0;
-  int64_t slices = 0;
-  std::string phase;
-  int64_t cycles_left = 0;
-  std::string prompt;  ///< what the operator is waited for; empty: nothing
-};
 
 struct SessionProgress {
   double planned_s = 0;
@@ -29,7 +20,7 @@ struct SessionProgress {
   int64_t gaps = 0;
   double last_kPa = 0;
   double filtered_kPa = 0;
-  std::optional<SessionSchedule> schedule;
+  std::optional<ScheduleProgress> schedule;
   std::vector<std::string> new_remarks;  ///< since the last call: faults, gaps, stops, in plain words
 };
 

@@ -51,7 +51,7 @@ SessionProgress study_progress() {
           .gaps = 2,
           .last_kPa = 3,
           .filtered_kPa = 3.12,
-          .schedule = SessionSchedule{"tagged", 10, 25, "imaging", 864, ""},
+          .schedule = ScheduleProgress{"tagged", 10, 25, "imaging", 864, ""},
           .new_remarks = {}};
 }
 
