@@ -6,10 +6,15 @@ target_compile_options(diastole_options INTERFACE
   -Wall -Wextra -Wconversion -Wdouble-promotion -Wshadow -Wnon-virtual-dtor -Werror)
 
 # diastole_library(NAME [TOGETHER] SOURCES a.cpp ... [LIBS x ...])
-# A static library; sources are found and included by their path from the root ("protocol/wire/frame.hpp").
+# A static library, or without sources what its headers need; sources are found and included by their path from the root ("protocol/wire/frame.hpp").
 # TOGETHER: its sources are compiled six at a time, since each alone would mostly compile CLI11 or Asio anew.
 function(diastole_library name)
   cmake_parse_arguments(ARG "TOGETHER" "" "SOURCES;LIBS" ${ARGN})
+  if(NOT ARG_SOURCES)
+    add_library(${name} INTERFACE)
+    target_link_libraries(${name} INTERFACE diastole_options ${ARG_LIBS})
+    return()
+  endif()
   add_library(${name} STATIC ${ARG_SOURCES})
   set_target_properties(${name} PROPERTIES UNITY_BUILD ${ARG_TOGETHER} UNITY_BUILD_BATCH_SIZE 6)
   target_link_libraries(${name} PUBLIC diastole_options ${ARG_LIBS})

@@ -12,7 +12,6 @@
 
 #include "host/cli/daemon_question.hpp"
 #include "host/cli/host_commands.hpp"
-#include "host/cli/schedule_text.hpp"
 #include "host/cli/session_view.hpp"
 #include "host/config/experiment.hpp"
 #include "host/rpc/run_session.hpp"

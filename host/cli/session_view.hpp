@@ -1,10 +1,13 @@
 #pragma once
-// How a running session and its result are shown to a person; also for `diastole simulate`.
+// How a running session and its result are shown to a person, also for `diastole simulate`; and, before anything moves,
+// what an experiment will do and how long it takes.
 
 #include <chrono>
 #include <deque>
+#include <nlohmann/json.hpp>
 #include <string>
 
+#include "host/config/experiment.hpp"
 #include "host/rpc/run_session.hpp"
 #include "protocol/contract/exit_code.hpp"
 
@@ -48,5 +51,11 @@ std::vector<std::string> view_lines(const SessionProgress& progress, const std::
 /// `expected`. Returns the exit code that goes with it.
 ExitCode report_session(const SessionResult& result, bool json);
 ExitCode exit_code_of(const SessionResult& result);
+
+/// One line a block of the schedule (or a segment), and the whole.
+std::string plan_words(const Experiment& experiment);
+
+/// {"cycles", "estimate_s", "slices", "waits", "blocks": [...]}
+nlohmann::json plan_json(const Experiment& experiment);
 
 }  // namespace diastole

@@ -5,9 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "host/controller/refusals.hpp"
+#include "host/controller/controller_words.hpp"
 #include "host/controller/settings_values.hpp"
-#include "host/controller/version_match.hpp"
 #include "host/controller/wire_program.hpp"
 #include "protocol/wire/wire_text.hpp"
 

@@ -9,7 +9,7 @@
 #include <variant>
 
 #include "host/controller/controller_link.hpp"
-#include "host/controller/refusals.hpp"
+#include "host/controller/controller_words.hpp"
 #include "protocol/contract/input_error.hpp"
 #include "protocol/wire/messages.hpp"
 #include "protocol/wire/wire_text.hpp"

@@ -160,16 +160,6 @@ class GpioInputs final : public GateInputs {
 
 }  // namespace
 
-void GateReading::note_pulse(uint64_t host_ns) {
-  ++pulses;
-  if (pulse_ns.size() < most_kept) pulse_ns.push_back(host_ns);
-}
-
-void GateReading::note_estop(const EstopChange& change) {
-  if (estop_changes.size() == most_kept) estop_changes.pop_back();
-  estop_changes.push_back(change);
-}
-
 std::unique_ptr<GateInputs> open_gpio(const GpioConfig& config) {
   return std::make_unique<GpioInputs>(config);
 }

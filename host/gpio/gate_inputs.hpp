@@ -34,8 +34,14 @@ struct GateReading {
   std::vector<EstopChange> estop_changes;  ///< the first most_kept - 1 and the last
   std::string problem;                     ///< the lines can no longer be read
 
-  void note_pulse(uint64_t host_ns);
-  void note_estop(const EstopChange& change);
+  void note_pulse(uint64_t host_ns) {
+    ++pulses;
+    if (pulse_ns.size() < most_kept) pulse_ns.push_back(host_ns);
+  }
+  void note_estop(const EstopChange& change) {
+    if (estop_changes.size() == most_kept) estop_changes.pop_back();
+    estop_changes.push_back(change);
+  }
 };
 
 class GateInputs {

@@ -201,16 +201,21 @@ std::optional<Document> read_document(const json& object) {
 
 static_assert(std::endian::native == std::endian::little, "journals are little-endian");
 
-template <typename Value>
-void put(std::vector<uint8_t>& out, const Value& value) {
-  const auto* bytes = reinterpret_cast<const uint8_t*>(&value);
-  out.insert(out.end(), bytes, bytes + sizeof(Value));
-}
-
-template <typename Value>
-void put_all(std::vector<uint8_t>& out, const std::vector<Value>& values) {
-  const auto* bytes = reinterpret_cast<const uint8_t*>(values.data());
-  out.insert(out.end(), bytes, bytes + values.size() * sizeof(Value));
+/// Numbers, and the elements of vectors, one behind the other.
+std::vector<uint8_t> bytes_of(const auto&... parts) {
+  std::vector<uint8_t> out;
+  const auto put = [&]<typename Part>(const Part& part) {
+    const void* first = &part;
+    size_t size = sizeof part;
+    if constexpr (requires { part.data(); }) {
+      first = part.data();
+      size = part.size() * sizeof(typename Part::value_type);
+    }
+    const auto* bytes = static_cast<const uint8_t*>(first);
+    out.insert(out.end(), bytes, bytes + size);
+  };
+  (put(parts), ...);
+  return out;
 }
 
 template <typename Value>
@@ -246,23 +251,13 @@ std::string encode(const Document& document) {
 }
 
 std::vector<uint8_t> encode(const SampleBlock& block) {
-  std::vector<uint8_t> out;
-  put(out, block.first_index);
-  put(out, static_cast<uint32_t>(block.host_ns.size()));
-  put(out, block.channels);
-  put_all(out, block.host_ns);
-  put_all(out, block.value_kPa);
-  return out;
+  return bytes_of(block.first_index, static_cast<uint32_t>(block.host_ns.size()), block.channels,
+                  block.host_ns, block.value_kPa);
 }
 
 std::vector<uint8_t> encode(const PositionBlock& block) {
-  std::vector<uint8_t> out;
-  put(out, block.first_index);
-  put(out, static_cast<uint32_t>(block.microsteps.size()));
-  put(out, block.first_tick);
-  put(out, block.period_ticks);
-  put_all(out, block.microsteps);
-  return out;
+  return bytes_of(block.first_index, static_cast<uint32_t>(block.microsteps.size()), block.first_tick,
+                  block.period_ticks, block.microsteps);
 }
 
 std::optional<Document> decode_document(std::span<const uint8_t> payload) {
@@ -301,16 +296,6 @@ std::optional<PositionBlock> decode_positions(std::span<const uint8_t> payload) 
   if (payload.size() != count * sizeof(int32_t)) return std::nullopt;
   block.microsteps = take_all<int32_t>(payload, count);
   return block;
-}
-
-bool append(JournalWriter& journal, const Document& document) {
-  return journal.append(RecordKind::document, encode(document));
-}
-bool append(JournalWriter& journal, const SampleBlock& block) {
-  return journal.append(RecordKind::samples, encode(block));
-}
-bool append(JournalWriter& journal, const PositionBlock& block) {
-  return journal.append(RecordKind::positions, encode(block));
 }
 
 }  // namespace diastole

@@ -173,8 +173,14 @@ std::optional<SampleBlock> decode_samples(std::span<const uint8_t> payload);
 std::optional<PositionBlock> decode_positions(std::span<const uint8_t> payload);
 
 /// As JournalWriter::append.
-[[nodiscard]] bool append(JournalWriter& journal, const Document& document);
-[[nodiscard]] bool append(JournalWriter& journal, const SampleBlock& block);
-[[nodiscard]] bool append(JournalWriter& journal, const PositionBlock& block);
+[[nodiscard]] inline bool append(JournalWriter& journal, const Document& document) {
+  return journal.append(RecordKind::document, encode(document));
+}
+[[nodiscard]] inline bool append(JournalWriter& journal, const SampleBlock& block) {
+  return journal.append(RecordKind::samples, encode(block));
+}
+[[nodiscard]] inline bool append(JournalWriter& journal, const PositionBlock& block) {
+  return journal.append(RecordKind::positions, encode(block));
+}
 
 }  // namespace diastole

@@ -90,13 +90,11 @@ void remove_leftovers(const fs::path& file) {
   }
 }
 
-void copy_durably(const fs::path& from, const fs::path& to) {
-  const fs::path part = part_file_of(to);
+void write_whole(const fs::path& file, const std::function<void(const fs::path& part)>& write) {
+  const fs::path part = part_file_of(file);
   try {
-    copy_bytes(from, part);
-    fs::rename(part, to);
-    const Descriptor directory(::open(parent_of(to).c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
-    must(directory.valid() && ::fsync(directory.get()) == 0, "its name cannot be brought to the disk", to);
+    write(part);
+    fs::rename(part, file);
   } catch (...) {
     std::error_code ignored;
     fs::remove(part, ignored);
@@ -104,18 +102,21 @@ void copy_durably(const fs::path& from, const fs::path& to) {
   }
 }
 
-void write_text_file(const fs::path& file, std::string_view content) {
-  const fs::path temporary = part_file_of(file);
-  std::ofstream stream(temporary, std::ios::binary);
-  stream.write(content.data(), static_cast<std::streamsize>(content.size()));
-  stream.close();
-  std::error_code error;
-  if (stream) fs::rename(temporary, file, error);
-  if (!stream || error) {
-    std::error_code ignored;
-    fs::remove(temporary, ignored);
-    throw HardwareError(file.string(), "cannot be written", "Check the disk's space and your rights there.");
-  }
+void copy_durably(const fs::path& from, const fs::path& to) {
+  write_whole(to, [&](const fs::path& part) { copy_bytes(from, part); });
+  const Descriptor directory(::open(parent_of(to).c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  must(directory.valid() && ::fsync(directory.get()) == 0, "its name cannot be brought to the disk", to);
+}
+
+void write_text_file(const fs::path& file, std::string_view content) try {
+  write_whole(file, [&](const fs::path& part) {
+    std::ofstream stream(part, std::ios::binary);
+    stream.write(content.data(), static_cast<std::streamsize>(content.size()));
+    stream.close();
+    must(static_cast<bool>(stream), "cannot be written", part);
+  });
+} catch (const fs::filesystem_error&) {
+  throw HardwareError(file.string(), "cannot be written", "Check the disk's space and your rights there.");
 }
 
 }  // namespace diastole

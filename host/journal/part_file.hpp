@@ -3,6 +3,7 @@
 // killed leaves its own behind; the next one that writes there tidies it up.
 
 #include <filesystem>
+#include <functional>
 #include <string_view>
 
 namespace diastole {
@@ -13,6 +14,11 @@ std::filesystem::path part_file_of(const std::filesystem::path& file);
 /// Removes the part files that nobody writes any more: the process is gone, and for a minute nothing was written. Of
 /// `file`, or, when it is a directory, of all files in it that end with `.run.h5`.
 void remove_leftovers(const std::filesystem::path& file);
+
+/// Has `write` make the part file of `file`, and gives it its name: `file` is whole or was not touched. What `write` throws
+/// goes on to the caller, std::filesystem::filesystem_error if the name cannot be given; then nothing is left behind.
+void write_whole(const std::filesystem::path& file,
+                 const std::function<void(const std::filesystem::path& part)>& write);
 
 /// Makes `to` from the bytes of `from`, brings it to the disk and gives it its name, in this order: `to` is whole or was
 /// not touched. Throws std::filesystem::filesystem_error; then nothing is left behind. A `from` without a name is read

@@ -5,7 +5,7 @@
 #include <array>
 #include <cmath>
 
-#include "host/controller/black_box_text.hpp"
+#include "host/controller/controller_words.hpp"
 #include "protocol/contract/input_error.hpp"
 #include "protocol/wire/wire_text.hpp"
 

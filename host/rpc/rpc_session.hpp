@@ -4,6 +4,7 @@
 // a second are taken and how many may wait for the rig. A door only carries messages to and fro.
 
 #include <fmt/format.h>
+#include <spdlog/spdlog.h>
 
 #include <utility>  // before Asio, which uses std::exchange without it
 
@@ -20,9 +21,35 @@
 #include "host/rpc/json_rpc.hpp"
 #include "host/rpc/methods.hpp"
 #include "host/rpc/peer.hpp"
-#include "host/rpc/quiet_log.hpp"
 
 namespace diastole {
+
+/// Remarks that clients can provoke at will, and that must not fill the log: a few a second are written, of the
+/// others their number.
+class QuietLog {
+ public:
+  using Time = std::chrono::steady_clock::time_point;
+
+  void warn(const std::string& text, Time now = std::chrono::steady_clock::now()) {
+    if (now - second_began_ >= std::chrono::seconds(1)) {
+      if (left_out_ > 0) spdlog::warn("{} more remarks like the last ones were left out", left_out_);
+      second_began_ = now;
+      written_ = left_out_ = 0;
+    }
+    if (written_ < most_a_second) {
+      ++written_;
+      spdlog::warn("{}", text);
+    } else {
+      ++left_out_;
+    }
+  }
+
+ private:
+  static constexpr int most_a_second = 5;
+  Time second_began_{};
+  int written_ = 0;
+  int left_out_ = 0;
+};
 
 /// What all clients share; used on the server's thread only.
 struct RpcState {

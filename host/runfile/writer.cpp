@@ -7,6 +7,7 @@
 #include <cerrno>
 #include <cstring>
 #include <span>
+#include <tuple>
 
 #include "host/journal/part_file.hpp"
 #include "host/runfile/h5_sink.hpp"
@@ -19,41 +20,29 @@ namespace diastole {
 namespace {
 
 template <typename Row>
-auto column(const std::vector<Row>& rows, auto member) {
-  std::vector<std::decay_t<decltype(rows.front().*member)>> values;
-  for (const Row& row : rows)
-    values.push_back(row.*member);
-  return values;
+void write_table(H5Sink& sink, const std::vector<Row>& rows, const auto& table) {
+  std::vector<TableColumn> columns;
+  const auto put = [&]<typename Value>(const runfile::Column<Row, Value>& column) {
+    std::vector<Value> values;
+    for (const Row& row : rows)
+      values.push_back(row.*column.member);
+    columns.push_back({column.name, std::move(values)});
+  };
+  std::apply([&](const auto&... column) { (put(column), ...); }, table.columns);
+  sink.table(table.path, columns, table.units);
 }
 
 void write_protocol(H5Sink& sink, const runfile::RecordedRun& run) {
-  using runfile::Segment;
   sink.group(runfile::protocol_group);
   sink.text(runfile::protocol_toml, run.protocol_toml);
-  sink.table(runfile::protocol_segments,
-             {{"start_s", column(run.segments, &Segment::start_s)},
-              {"waveform", column(run.segments, &Segment::waveform)},
-              {"stroke_mL", column(run.segments, &Segment::stroke_mL)},
-              {"period_s", column(run.segments, &Segment::period_s)},
-              {"offset_mL", column(run.segments, &Segment::offset_mL)},
-              {"cycles", column(run.segments, &Segment::cycles)}},
-             runfile::segments_units);
+  write_table(sink, run.segments, runfile::segments_table);
   for (const auto& [segment, waveform] : run.waveforms) {
     const std::string group = fmt::format("{}/{}", runfile::waveforms_group, segment);
     sink.text(group + "/points", waveform.points);
     sink.numbers(group + "/phase", waveform.phase, "1");
     sink.numbers(group + "/fraction", waveform.fraction, "1");
   }
-  if (run.slices.empty()) return;
-  using runfile::Slice;
-  sink.table(runfile::protocol_slices,
-             {{"block", column(run.slices, &Slice::block)},
-              {"slice", column(run.slices, &Slice::number)},
-              {"first_trigger", column(run.slices, &Slice::first_trigger)},
-              {"triggers", column(run.slices, &Slice::triggers)},
-              {"cycles", column(run.slices, &Slice::cycles)},
-              {"dummy_cycles", column(run.slices, &Slice::dummy_cycles)}},
-             runfile::slices_units);
+  if (!run.slices.empty()) write_table(sink, run.slices, runfile::slices_table);
 }
 
 /// Columns that are in memory, all at once.
@@ -95,23 +84,6 @@ void write_triggers(H5Sink& sink, const runfile::RecordedRun& run) {
   }
 }
 
-void write_tables(H5Sink& sink, const runfile::RecordedRun& run) {
-  using runfile::Event;
-  using runfile::Gap;
-  sink.table(runfile::gaps_table,
-             {{"stream", column(run.gaps, &Gap::stream)},
-              {"first_index", column(run.gaps, &Gap::first_index)},
-              {"count", column(run.gaps, &Gap::count)},
-              {"reason", column(run.gaps, &Gap::reason)}},
-             runfile::gaps_units);
-  sink.table(runfile::events_table,
-             {{"time_s", column(run.events, &Event::time_s)},
-              {"level", column(run.events, &Event::level)},
-              {"code", column(run.events, &Event::code)},
-              {"text", column(run.events, &Event::text)}},
-             runfile::events_units);
-}
-
 void write_grid(H5Sink& sink, const char* group, const std::optional<runfile::StreamGrid>& grid) {
   if (!grid) return;
   sink.attribute(group, runfile::grid_start, grid->start_s);
@@ -146,7 +118,8 @@ void write_content(H5Sink& sink, const Content& content) {
   for (const auto& [name, value] : run.clock) {
     sink.scalar(fmt::format("{}/{}", runfile::clock_group, name), value, std::string(runfile::unit_of(name)));
   }
-  write_tables(sink, run);
+  write_table(sink, run.gaps, runfile::gaps_table);
+  write_table(sink, run.events, runfile::events_table);
 }
 
 void must(bool done, const std::filesystem::path& path, const char* what) {
@@ -179,18 +152,10 @@ std::string confirm_name(const std::filesystem::path& path, const FlushDirectory
 std::string write_content(const std::filesystem::path& path, const Content& content,
                           const FlushDirectory& flush_directory) {
   remove_leftovers(path);
-  const std::filesystem::path temporary = part_file_of(path);
   try {
-    write_file(temporary, path, content);
-    std::filesystem::rename(temporary, path);
+    write_whole(path, [&](const std::filesystem::path& part) { write_file(part, path, content); });
   } catch (const std::filesystem::filesystem_error& error) {
-    std::error_code ignored;
-    std::filesystem::remove(temporary, ignored);
     throw HardwareError(path.string(), error.what(), "Check that you may write there.");
-  } catch (...) {
-    std::error_code ignored;
-    std::filesystem::remove(temporary, ignored);
-    throw;
   }
   return confirm_name(path, flush_directory);
 }

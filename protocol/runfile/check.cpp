@@ -104,13 +104,14 @@ void check_segments(const RecordedRun& run) {
     const bool finite = on_the_axis(segment.start_s) && std::isfinite(segment.stroke_mL) &&
                         on_the_axis(segment.period_s) && std::isfinite(segment.offset_mL);
     if (!finite || segment.period_s < shortest_period_s || !countable(segment.cycles)) {
-      fail_at(run, protocol_segments, i,
+      fail_at(run, segments_table.path, i,
               fmt::format("has start_s {}, period_s {} and cycles {}", segment.start_s, segment.period_s,
                           segment.cycles),
               "A segment needs finite numbers, a positive period and no negative count of cycles.");
     }
     if (segment.start_s < last_s) {
-      fail_at(run, protocol_segments, i, fmt::format("starts at {} s, before the one above", segment.start_s),
+      fail_at(run, segments_table.path, i,
+              fmt::format("starts at {} s, before the one above", segment.start_s),
               "Segments must be in the order in which they ran.");
     }
     last_s = segment.start_s;
@@ -121,7 +122,7 @@ void check_gaps(const RecordedRun& run) {
   for (size_t i = 0; i < run.gaps.size(); ++i) {
     const Gap& gap = run.gaps[i];
     if (countable(gap.first_index) && countable(gap.count) && gap.count >= 1) continue;
-    fail_at(run, gaps_table, i,
+    fail_at(run, gaps_table.path, i,
             fmt::format("declares first_index {} and count {}", gap.first_index, gap.count),
             "A gap starts at 0 or later and misses at least one sample.");
   }
@@ -134,13 +135,13 @@ void check_slices(const RecordedRun& run) {
     const auto rows = std::ssize(run.trigger_s);
     const bool in_order = slice.first_trigger >= next_trigger && slice.first_trigger <= rows;
     if (!countable(slice.cycles) || !countable(slice.dummy_cycles)) {
-      fail_at(run, protocol_slices, i,
+      fail_at(run, slices_table.path, i,
               fmt::format("has cycles {} and dummy_cycles {}", slice.cycles, slice.dummy_cycles),
               "Cycles are counted from 0.");
     }
     if (!in_order || slice.triggers < 0 || slice.triggers > rows - slice.first_trigger) {
       fail_at(
-          run, protocol_slices, i,
+          run, slices_table.path, i,
           fmt::format("has triggers {} of the {} from row {} on", slice.triggers, rows, slice.first_trigger),
           "Slices follow one another, and each lies within the recorded triggers.");
     }

@@ -4,11 +4,17 @@
 //
 // Errors: every member throws InputError naming the file and the object that is missing or of the wrong kind.
 
+#include <fmt/format.h>
+
+#include <algorithm>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "protocol/contract/input_error.hpp"
 #include "protocol/runfile/h5_handle.hpp"
 #include "protocol/runfile/run.hpp"
 
@@ -16,39 +22,254 @@ namespace diastole::runfile {
 
 class H5Source {
  public:
-  explicit H5Source(const std::filesystem::path& path);
+  explicit H5Source(const std::filesystem::path& path) : name_(path.string()) {
+    H5Eset_auto2(H5E_DEFAULT, nullptr,
+                 nullptr);  // failures are reported by fail(), not printed by the library
+    if (!std::filesystem::is_regular_file(path)) {
+      fail("", "cannot be opened", "Check the path and that you may read the file.");
+    }
+    if (H5Fis_hdf5(name_.c_str()) <= 0) {
+      fail("", "is not an HDF5 file", "Give a run file (NAME.run.h5).");
+    }
+    file_ = FileHandle(H5Fopen(name_.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT));
+    if (!file_.valid()) {
+      fail("", "is an HDF5 file that cannot be read",
+           "It is truncated or still being written; if its journal exists, use `diastole recover`.");
+    }
+  }
 
-  [[nodiscard]] bool has(const std::string& path) const;
+  [[nodiscard]] bool has(const std::string& path) const {
+    for (size_t slash = path.find('/', 1); slash != std::string::npos; slash = path.find('/', slash + 1)) {
+      if (H5Lexists(file_.get(), path.substr(0, slash).c_str(), H5P_DEFAULT) <= 0) return false;
+    }
+    return H5Lexists(file_.get(), path.c_str(), H5P_DEFAULT) > 0;
+  }
   /// Names of the links directly below a group, sorted; empty if the group is absent.
-  [[nodiscard]] std::vector<std::string> children(const std::string& group) const;
+  [[nodiscard]] std::vector<std::string> children(const std::string& group) const {
+    std::vector<std::string> names;
+    if (!has(group)) return names;
+    const GroupHandle handle(H5Gopen2(file_.get(), group.c_str(), H5P_DEFAULT));
+    if (!handle.valid()) fail("group " + group, "is not a group");
+    H5Literate(handle.get(), H5_INDEX_NAME, H5_ITER_INC, nullptr, collect_name, &names);
+    return names;
+  }
 
   /// A one-dimensional dataset of numbers.
-  [[nodiscard]] std::vector<double> numbers(const std::string& path) const;
+  [[nodiscard]] std::vector<double> numbers(const std::string& path) const {
+    const DatasetHandle dataset = open_dataset(path);
+    if (!is_number(TypeHandle(H5Dget_type(dataset.get())))) {
+      fail("dataset " + path, "does not hold numbers");
+    }
+    std::vector<double> values(length(dataset, path));
+    if (!values.empty() &&
+        H5Dread(dataset.get(), H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data()) < 0) {
+      fail("dataset " + path, "cannot be read; the file is damaged");
+    }
+    return values;
+  }
   /// A dataset that holds one number, or one text.
-  [[nodiscard]] double scalar(const std::string& path) const;
-  [[nodiscard]] std::string text(const std::string& path) const;
+  [[nodiscard]] double scalar(const std::string& path) const {
+    const DatasetHandle dataset = open_dataset(path);
+    const SpaceHandle space(H5Dget_space(dataset.get()));
+    double value = 0;
+    if (!is_number(TypeHandle(H5Dget_type(dataset.get()))) ||
+        H5Sget_simple_extent_npoints(space.get()) != 1 ||
+        H5Dread(dataset.get(), H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, &value) < 0) {
+      fail("dataset " + path, "does not hold one number");
+    }
+    return value;
+  }
+  [[nodiscard]] std::string text(const std::string& path) const {
+    const DatasetHandle dataset = open_dataset(path);
+    const TypeHandle type(H5Dget_type(dataset.get()));
+    const SpaceHandle space(H5Dget_space(dataset.get()));
+    if (H5Tget_class(type.get()) != H5T_STRING || H5Sget_simple_extent_npoints(space.get()) != 1) {
+      fail("dataset " + path, "does not hold one text");
+    }
+    const auto texts = read_texts(type, space, 1, unwrapped, [&](hid_t memory, void* target) {
+      return H5Dread(dataset.get(), memory, H5S_ALL, H5S_ALL, H5P_DEFAULT, target) >= 0;
+    });
+    if (!texts) fail("dataset " + path, "cannot be read; the file is damaged");
+    return texts->front();
+  }
 
   /// All attributes of an object. Those that are neither one number nor one text are left out.
-  [[nodiscard]] std::map<std::string, Attribute, std::less<>> attributes(const std::string& object) const;
+  [[nodiscard]] std::map<std::string, Attribute, std::less<>> attributes(const std::string& object) const {
+    const ObjectHandle handle(H5Oopen(file_.get(), object.c_str(), H5P_DEFAULT));
+    if (!handle.valid())
+      fail("group " + object, "is missing", "A run file must hold it; see docs/run-file.md.");
+    std::vector<std::string> names;
+    H5Aiterate2(handle.get(), H5_INDEX_NAME, H5_ITER_INC, nullptr, collect_attribute, &names);
+    std::map<std::string, Attribute, std::less<>> values;
+    for (const std::string& name : names) {
+      const auto value = read_attribute(AttributeHandle(H5Aopen(handle.get(), name.c_str(), H5P_DEFAULT)));
+      if (value) values.emplace(name, *value);
+    }
+    return values;
+  }
 
   /// One column of a compound table.
-  [[nodiscard]] std::vector<double> column_numbers(const std::string& table, const std::string& column) const;
-  [[nodiscard]] std::vector<int64_t> column_integers(const std::string& table,
-                                                     const std::string& column) const;
-  [[nodiscard]] std::vector<std::string> column_texts(const std::string& table,
-                                                      const std::string& column) const;
+  void column(const std::string& table, const std::string& name, std::vector<double>& out) const {
+    out = read_column<double>(table, name, H5T_NATIVE_DOUBLE);
+  }
+  void column(const std::string& table, const std::string& name, std::vector<int64_t>& out) const {
+    out = read_column<int64_t>(table, name, H5T_NATIVE_INT64);
+  }
+  void column(const std::string& table, const std::string& name, std::vector<std::string>& out) const {
+    const Column opened = open_column(table, name);
+    if (H5Tget_class(opened.type.get()) != H5T_STRING) {
+      fail("dataset " + table, fmt::format("column {} does not hold texts", name));
+    }
+    if (opened.rows == 0) return out.clear();
+    const auto one_member = [&](hid_t text) {
+      TypeHandle row(H5Tcreate(H5T_COMPOUND, H5Tget_size(text)));
+      H5Tinsert(row.get(), name.c_str(), 0, text);
+      return row;
+    };
+    const SpaceHandle space(H5Dget_space(opened.table.get()));
+    auto texts = read_texts(opened.type, space, opened.rows, one_member, [&](hid_t memory, void* target) {
+      return H5Dread(opened.table.get(), memory, H5S_ALL, H5S_ALL, H5P_DEFAULT, target) >= 0;
+    });
+    if (!texts) fail("dataset " + table, "cannot be read; the file is damaged");
+    out = std::move(*texts);
+  }
 
-  [[noreturn]] void fail(const std::string& place, std::string problem, std::string remedy = {}) const;
+  [[noreturn]] void fail(const std::string& place, std::string problem, std::string remedy = {}) const {
+    throw InputError({name_, place, std::move(problem), std::move(remedy)});
+  }
   [[nodiscard]] const std::string& file() const { return name_; }
 
  private:
-  struct Column;
-  [[nodiscard]] DatasetHandle open_dataset(const std::string& path) const;
-  [[nodiscard]] size_t length(const DatasetHandle& dataset, const std::string& path) const;
-  [[nodiscard]] Column open_column(const std::string& table, const std::string& column) const;
+  // Larger claims are a damaged header, not a recording.
+  static constexpr hsize_t most_elements = hsize_t{1} << 27;
+  static constexpr size_t most_text_bytes = size_t{1} << 28;
+
+  using ReadInto = std::function<bool(hid_t memory_type, void* target)>;
+
+  /// Ends a fixed-length text at its first NUL, and drops the blanks of Fortran-style padding.
+  static std::string trimmed(const char* bytes, size_t size, H5T_str_t padding) {
+    std::string text(bytes, std::find(bytes, bytes + size, '\0'));
+    if (padding == H5T_STR_SPACEPAD) text.erase(text.find_last_not_of(' ') + 1);
+    return text;
+  }
+
+  /// Reads `count` texts whose stored type is `stored`; `wrap` turns the text type into the type to read with
+  /// (itself, or a compound with that one member).
+  static std::optional<std::vector<std::string>> read_texts(const TypeHandle& stored,
+                                                            const SpaceHandle& space, size_t count,
+                                                            const std::function<TypeHandle(hid_t)>& wrap,
+                                                            const ReadInto& read) {
+    std::vector<std::string> texts;
+    const TypeHandle memory(H5Tcopy(H5T_C_S1));
+    H5Tset_cset(memory.get(), H5Tget_cset(stored.get()));
+    if (H5Tis_variable_str(stored.get()) > 0) {
+      H5Tset_size(memory.get(), H5T_VARIABLE);
+      std::vector<char*> pointers(count, nullptr);
+      const TypeHandle type = wrap(memory.get());
+      if (!read(type.get(), pointers.data())) return std::nullopt;
+      for (const char* pointer : pointers)
+        texts.emplace_back(pointer == nullptr ? "" : pointer);
+      H5Dvlen_reclaim(type.get(), space.get(), H5P_DEFAULT, pointers.data());
+      return texts;
+    }
+    const size_t size = H5Tget_size(stored.get());
+    if (size == 0 || count > most_text_bytes / size) return std::nullopt;
+    H5Tset_size(memory.get(), size);
+    H5Tset_strpad(memory.get(), H5Tget_strpad(stored.get()));
+    std::vector<char> bytes(count * size);
+    if (!read(wrap(memory.get()).get(), bytes.data())) return std::nullopt;
+    for (size_t i = 0; i < count; ++i) {
+      texts.push_back(trimmed(bytes.data() + i * size, size, H5Tget_strpad(stored.get())));
+    }
+    return texts;
+  }
+
+  static TypeHandle unwrapped(hid_t type) { return TypeHandle(H5Tcopy(type)); }
+
+  static bool is_number(const TypeHandle& type) {
+    const H5T_class_t kind = H5Tget_class(type.get());
+    return kind == H5T_FLOAT || kind == H5T_INTEGER;
+  }
+
+  static std::optional<Attribute> read_attribute(const AttributeHandle& attribute) {
+    const TypeHandle type(H5Aget_type(attribute.get()));
+    const SpaceHandle space(H5Aget_space(attribute.get()));
+    if (H5Sget_simple_extent_npoints(space.get()) != 1) return std::nullopt;
+    const ReadInto read = [&](hid_t memory, void* target) {
+      return H5Aread(attribute.get(), memory, target) >= 0;
+    };
+    switch (H5Tget_class(type.get())) {
+      case H5T_INTEGER: {
+        int64_t value = 0;
+        return read(H5T_NATIVE_INT64, &value) ? std::optional<Attribute>(value) : std::nullopt;
+      }
+      case H5T_FLOAT: {
+        double value = 0;
+        return read(H5T_NATIVE_DOUBLE, &value) ? std::optional<Attribute>(value) : std::nullopt;
+      }
+      case H5T_STRING: {
+        const auto texts = read_texts(type, space, 1, unwrapped, read);
+        return texts ? std::optional<Attribute>(texts->front()) : std::nullopt;
+      }
+      default:
+        return std::nullopt;
+    }
+  }
+
+  static herr_t collect_name(hid_t, const char* name, const H5L_info_t*, void* names) {
+    static_cast<std::vector<std::string>*>(names)->emplace_back(name);
+    return 0;
+  }
+
+  static herr_t collect_attribute(hid_t, const char* name, const H5A_info_t*, void* names) {
+    static_cast<std::vector<std::string>*>(names)->emplace_back(name);
+    return 0;
+  }
+
+  struct Column {
+    DatasetHandle table;
+    TypeHandle type;  // the member's
+    size_t rows = 0;
+  };
+  [[nodiscard]] DatasetHandle open_dataset(const std::string& path) const {
+    if (!has(path)) fail("dataset " + path, "is missing", "A run file must hold it; see docs/run-file.md.");
+    DatasetHandle dataset(H5Dopen2(file_.get(), path.c_str(), H5P_DEFAULT));
+    if (!dataset.valid()) fail(path, "is not a dataset");
+    return dataset;
+  }
+  [[nodiscard]] size_t length(const DatasetHandle& dataset, const std::string& path) const {
+    const SpaceHandle space(H5Dget_space(dataset.get()));
+    hsize_t rows = 0;
+    if (H5Sget_simple_extent_ndims(space.get()) != 1) fail("dataset " + path, "is not one-dimensional");
+    H5Sget_simple_extent_dims(space.get(), &rows, nullptr);
+    if (rows > most_elements) fail("dataset " + path, fmt::format("claims {} rows", rows));
+    return static_cast<size_t>(rows);
+  }
+  [[nodiscard]] Column open_column(const std::string& table, const std::string& column) const {
+    Column opened{open_dataset(table), {}, 0};
+    const TypeHandle row(H5Dget_type(opened.table.get()));
+    if (H5Tget_class(row.get()) != H5T_COMPOUND) fail("dataset " + table, "is not a compound table");
+    const int member = H5Tget_member_index(row.get(), column.c_str());
+    if (member < 0) fail("dataset " + table, fmt::format("has no column {}", column));
+    opened.type = TypeHandle(H5Tget_member_type(row.get(), static_cast<unsigned>(member)));
+    opened.rows = length(opened.table, table);
+    return opened;
+  }
   template <typename Number>
   [[nodiscard]] std::vector<Number> read_column(const std::string& table, const std::string& column,
-                                                hid_t memory_type) const;
+                                                hid_t memory_type) const {
+    const Column opened = open_column(table, column);
+    if (!is_number(opened.type))
+      fail("dataset " + table, fmt::format("column {} does not hold numbers", column));
+    std::vector<Number> values(opened.rows);
+    if (values.empty()) return values;
+    const TypeHandle row(H5Tcreate(H5T_COMPOUND, sizeof(Number)));
+    H5Tinsert(row.get(), column.c_str(), 0, memory_type);
+    if (H5Dread(opened.table.get(), row.get(), H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data()) < 0) {
+      fail("dataset " + table, "cannot be read; the file is damaged");
+    }
+    return values;
+  }
 
   std::string name_;
   FileHandle file_;

@@ -24,6 +24,9 @@
 
 #include <cstdint>
 #include <string_view>
+#include <tuple>
+
+#include "protocol/runfile/run.hpp"
 
 namespace diastole::runfile {
 
@@ -33,8 +36,6 @@ inline constexpr int64_t format_version = 1;
 inline constexpr const char* rig_group = "/rig";
 inline constexpr const char* protocol_group = "/protocol";
 inline constexpr const char* protocol_toml = "/protocol/toml";
-inline constexpr const char* protocol_segments = "/protocol/segments";
-inline constexpr const char* protocol_slices = "/protocol/slices";
 inline constexpr const char* waveforms_group = "/protocol/waveforms";
 inline constexpr const char* pump_group = "/pump";
 inline constexpr const char* pump_time = "/pump/time_s";
@@ -52,8 +53,6 @@ inline constexpr const char* trigger_time = "/trigger/time_s";
 inline constexpr const char* trigger_delay = "/trigger/delay_s";
 inline constexpr const char* flow_group = "/mr/flow";
 inline constexpr const char* clock_group = "/clock";
-inline constexpr const char* gaps_table = "/gaps";
-inline constexpr const char* events_table = "/events";
 
 /// Streams as /gaps names them.
 inline constexpr std::string_view pressure_stream = "pressure";
@@ -64,12 +63,41 @@ inline constexpr const char* time_unit = "s";
 inline constexpr const char* volume_unit = "mL";
 inline constexpr const char* pressure_unit = "kPa";
 inline constexpr const char* text_unit = "text";
-inline constexpr const char* segments_units =
-    "start_s: s; waveform: text; stroke_mL: mL; period_s: s; offset_mL: mL; cycles: 1";
-inline constexpr const char* slices_units =
-    "block: text; slice: 1; first_trigger: 1; triggers: 1; cycles: 1; dummy_cycles: 1";
-inline constexpr const char* gaps_units = "stream: text; first_index: 1; count: 1; reason: text";
-inline constexpr const char* events_units = "time_s: s; level: text; code: text; text: text";
+/// A compound table: one row for each of a vector of Row.
+template <typename Row, typename Value>
+struct Column {
+  const char* name;
+  Value Row::*member;
+};
+template <typename Columns>
+struct Table {
+  const char* path;
+  const char* units;
+  Columns columns;  ///< std::tuple of Column
+};
+template <typename Columns>
+Table(const char*, const char*, Columns) -> Table<Columns>;
+template <typename Row, typename Value>
+Column(const char*, Value Row::*) -> Column<Row, Value>;
+
+inline constexpr Table segments_table{
+    "/protocol/segments", "start_s: s; waveform: text; stroke_mL: mL; period_s: s; offset_mL: mL; cycles: 1",
+    std::tuple{Column{"start_s", &Segment::start_s}, Column{"waveform", &Segment::waveform},
+               Column{"stroke_mL", &Segment::stroke_mL}, Column{"period_s", &Segment::period_s},
+               Column{"offset_mL", &Segment::offset_mL}, Column{"cycles", &Segment::cycles}}};
+inline constexpr Table slices_table{
+    "/protocol/slices", "block: text; slice: 1; first_trigger: 1; triggers: 1; cycles: 1; dummy_cycles: 1",
+    std::tuple{Column{"block", &Slice::block}, Column{"slice", &Slice::number},
+               Column{"first_trigger", &Slice::first_trigger}, Column{"triggers", &Slice::triggers},
+               Column{"cycles", &Slice::cycles}, Column{"dummy_cycles", &Slice::dummy_cycles}}};
+inline constexpr Table gaps_table{
+    "/gaps", "stream: text; first_index: 1; count: 1; reason: text",
+    std::tuple{Column{"stream", &Gap::stream}, Column{"first_index", &Gap::first_index},
+               Column{"count", &Gap::count}, Column{"reason", &Gap::reason}}};
+inline constexpr Table events_table{
+    "/events", "time_s: s; level: text; code: text; text: text",
+    std::tuple{Column{"time_s", &Event::time_s}, Column{"level", &Event::level}, Column{"code", &Event::code},
+               Column{"text", &Event::text}}};
 
 /// "mL" of "commanded_mL": the unit is what follows the last underscore; "1" if there is none.
 inline constexpr std::string_view unit_of(std::string_view name) {

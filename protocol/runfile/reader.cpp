@@ -47,55 +47,19 @@ void expect_format(const H5Source& source, const std::map<std::string, Attribute
   }
 }
 
-std::vector<Segment> read_segments(const H5Source& source) {
-  const std::string table = protocol_segments;
-  const auto start_s = source.column_numbers(table, "start_s");
-  const auto waveform = source.column_texts(table, "waveform");
-  const auto stroke_mL = source.column_numbers(table, "stroke_mL");
-  const auto period_s = source.column_numbers(table, "period_s");
-  const auto offset_mL = source.column_numbers(table, "offset_mL");
-  const auto cycles = source.column_integers(table, "cycles");
-  std::vector<Segment> segments;
-  for (size_t i = 0; i < start_s.size(); ++i) {
-    segments.push_back({start_s[i], waveform[i], stroke_mL[i], period_s[i], offset_mL[i], cycles[i]});
-  }
-  return segments;
-}
-
-std::vector<Slice> read_slices(const H5Source& source) {
-  if (!source.has(protocol_slices)) return {};
-  const auto block = source.column_texts(protocol_slices, "block");
-  const auto number = source.column_integers(protocol_slices, "slice");
-  const auto first_trigger = source.column_integers(protocol_slices, "first_trigger");
-  const auto triggers = source.column_integers(protocol_slices, "triggers");
-  const auto cycles = source.column_integers(protocol_slices, "cycles");
-  const auto dummy_cycles = source.column_integers(protocol_slices, "dummy_cycles");
-  std::vector<Slice> slices;
-  for (size_t i = 0; i < block.size(); ++i)
-    slices.push_back({block[i], number[i], first_trigger[i], triggers[i], cycles[i], dummy_cycles[i]});
-  return slices;
-}
-
-std::vector<Gap> read_gaps(const H5Source& source) {
-  const auto stream = source.column_texts(gaps_table, "stream");
-  const auto first = source.column_integers(gaps_table, "first_index");
-  const auto count = source.column_integers(gaps_table, "count");
-  const auto reason = source.column_texts(gaps_table, "reason");
-  std::vector<Gap> gaps;
-  for (size_t i = 0; i < stream.size(); ++i)
-    gaps.push_back({stream[i], first[i], count[i], reason[i]});
-  return gaps;
-}
-
-std::vector<Event> read_events(const H5Source& source) {
-  const auto time_s = source.column_numbers(events_table, "time_s");
-  const auto level = source.column_texts(events_table, "level");
-  const auto code = source.column_texts(events_table, "code");
-  const auto text = source.column_texts(events_table, "text");
-  std::vector<Event> events;
-  for (size_t i = 0; i < time_s.size(); ++i)
-    events.push_back({time_s[i], level[i], code[i], text[i]});
-  return events;
+/// The rows of a table, column by column.
+template <typename Row>
+std::vector<Row> read_table(const H5Source& source, const auto& table) {
+  std::vector<Row> rows;
+  const auto take = [&]<typename Value>(const Column<Row, Value>& column) {
+    std::vector<Value> values;
+    source.column(table.path, column.name, values);
+    rows.resize(values.size());
+    for (size_t i = 0; i < values.size(); ++i)
+      rows[i].*column.member = std::move(values[i]);
+  };
+  std::apply([&](const auto&... column) { (take(column), ...); }, table.columns);
+  return rows;
 }
 
 /// None unless all of it is there.
@@ -184,7 +148,7 @@ RecordedRun read_run(const std::filesystem::path& path) {
   run.producer = root_text(source, root, "producer");
   run.rig = source.attributes(rig_group);
   run.protocol_toml = source.text(protocol_toml);
-  run.segments = read_segments(source);
+  run.segments = read_table<Segment>(source, segments_table);
   run.waveforms = read_waveforms(source);
   run.pump = {read_grid(source, pump_group), source.numbers(pump_time), source.numbers(pump_commanded)};
   run.pressure = read_pressure(source);
@@ -192,9 +156,9 @@ RecordedRun read_run(const std::filesystem::path& path) {
   if (source.has(trigger_delay)) run.trigger_delay_s = source.scalar(trigger_delay);
   run.flow = read_flow(source);
   run.clock = read_clock(source);
-  run.slices = read_slices(source);
-  run.gaps = read_gaps(source);
-  run.events = read_events(source);
+  if (source.has(slices_table.path)) run.slices = read_table<Slice>(source, slices_table);
+  run.gaps = read_table<Gap>(source, gaps_table);
+  run.events = read_table<Event>(source, events_table);
   check(run);
   return run;
 }

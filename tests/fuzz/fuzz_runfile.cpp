@@ -222,24 +222,24 @@ void write(std::span<const uint8_t> bytes, int descriptor) {
   author.numbers(runfile::pressure_time, even(33, 0.125));
   author.numbers("/pressure/cavity_kPa", Numbers(33, 1.5));
   author.numbers(runfile::trigger_time, {0, 1, 2, 3});
-  author.table(runfile::protocol_segments, {{"start_s", Numbers{0, 2}},
-                                            {"waveform", Texts{"parabolic", "uploaded"}},
-                                            {"stroke_mL", Numbers{10, 10}},
-                                            {"period_s", Numbers{1, 1}},
-                                            {"offset_mL", Numbers{0, 0}},
-                                            {"cycles", Integers{2, 2}}});
-  author.table(runfile::protocol_slices, {{"block", Texts{"tagged", "tagged"}},
-                                          {"slice", Integers{0, 1}},
-                                          {"first_trigger", Integers{0, 2}},
-                                          {"triggers", Integers{2, 2}},
-                                          {"cycles", Integers{2, 2}},
-                                          {"dummy_cycles", Integers{0, 0}}});
-  author.table(runfile::gaps_table, {{"stream", Texts{"pressure"}},
-                                     {"first_index", Integers{3}},
-                                     {"count", Integers{1}},
-                                     {"reason", Texts{"no answer"}}});
+  author.table(runfile::segments_table.path, {{"start_s", Numbers{0, 2}},
+                                              {"waveform", Texts{"parabolic", "uploaded"}},
+                                              {"stroke_mL", Numbers{10, 10}},
+                                              {"period_s", Numbers{1, 1}},
+                                              {"offset_mL", Numbers{0, 0}},
+                                              {"cycles", Integers{2, 2}}});
+  author.table(runfile::slices_table.path, {{"block", Texts{"tagged", "tagged"}},
+                                            {"slice", Integers{0, 1}},
+                                            {"first_trigger", Integers{0, 2}},
+                                            {"triggers", Integers{2, 2}},
+                                            {"cycles", Integers{2, 2}},
+                                            {"dummy_cycles", Integers{0, 0}}});
+  author.table(runfile::gaps_table.path, {{"stream", Texts{"pressure"}},
+                                          {"first_index", Integers{3}},
+                                          {"count", Integers{1}},
+                                          {"reason", Texts{"no answer"}}});
   author.table(
-      runfile::events_table,
+      runfile::events_table.path,
       {{"time_s", Numbers{0}}, {"level", Texts{"info"}}, {"code", Texts{"x"}}, {"text", Texts{"x"}}});
   author.scalar(runfile::trigger_delay, 0.1);
   author.scalar("/clock/daq_drift_ppm", 20);

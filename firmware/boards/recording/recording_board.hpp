@@ -5,6 +5,7 @@
 //
 // Most users want RecordedController (recorded_controller.hpp), which runs the firmware on it.
 
+#include <algorithm>
 #include <cstdint>
 #include <deque>
 #include <memory>
@@ -17,12 +18,16 @@
 
 #include "firmware/boards/recording/memory_flash.hpp"
 #include "firmware/core/board.hpp"
+#include "firmware/core/r_wave.hpp"
 #include "firmware/core/units.hpp"
 
 namespace diastole::firmware {
 
 enum class Signal : std::uint8_t { STEP, DIR, ENABLE, TTL, RWAVE_uV, FAULT };
-std::string_view signal_name(Signal signal);
+inline std::string_view signal_name(Signal signal) {
+  static constexpr std::string_view kNames[] = {"STEP", "DIR", "ENABLE", "TTL", "RWAVE_uV", "FAULT"};
+  return kNames[static_cast<std::size_t>(signal)];
+}
 
 /// One change of one pin; a pin trace file (contract: `time_ns,signal,value`) is a list of these.
 struct Edge {
@@ -78,17 +83,47 @@ class RecordingBoard {
   [[nodiscard]] std::int32_t ticks_until(std::uint32_t tick) const {
     return ticks_between(lower_half(now_), tick);
   }
-  void schedule(const PulseOrder& order);
-  void schedule_trigger(std::uint32_t tick, Ticks width, bool r_wave);
+  void schedule(const PulseOrder& order) {
+    order_ = order;
+    order_due_ = whole_time(order.tick, now_);
+    const bool inflating = pins_[static_cast<std::size_t>(Signal::DIR)] != 0;
+    direction_due_.reset();
+    if (order.step && order.inflate != inflating)
+      direction_due_ = std::max(now_, order_due_ - kDirectionSetup);
+  }
+  void schedule_trigger(std::uint32_t tick, Ticks width, bool r_wave) {
+    trigger_ = Trigger{whole_time(tick, now_), width, r_wave};
+  }
   void rest() {}
-  void cancel_pulses();
+  void cancel_pulses() {
+    order_.reset();
+    trigger_.reset();
+    direction_due_.reset();
+    set_pin(Signal::TTL, 0);
+  }
   void set_motor_enabled(bool enabled) { set_pin(Signal::ENABLE, enabled); }
   void show_fault(std::uint8_t number) { set_pin(Signal::FAULT, number); }
-  [[nodiscard]] Inputs inputs() const;
+  [[nodiscard]] Inputs inputs() const {
+    return {estop_, forced_home_ || home_closed_,
+            forced_far_limit_ || load_steps_ >= options_.mechanics.far_limit_steps};
+  }
   [[nodiscard]] Identity identity() const { return options_.identity; }
-  std::optional<std::uint8_t> serial_read();
-  [[nodiscard]] std::size_t serial_room() const;
-  void serial_write(std::span<const std::uint8_t> bytes);
+  std::optional<std::uint8_t> serial_read() {
+    if (from_host_.empty()) return {};
+    const std::uint8_t byte = from_host_.front();
+    from_host_.pop_front();
+    return byte;
+  }
+  [[nodiscard]] std::size_t serial_room() const {
+    const auto waiting = static_cast<std::size_t>(std::count_if(
+        to_host_.begin(), to_host_.end(), [this](const SentByte& sent) { return sent.tick > now_; }));
+    return options_.serial_buffer_bytes - std::min(waiting, options_.serial_buffer_bytes);
+  }
+  void serial_write(std::span<const std::uint8_t> bytes) {
+    Ticks free = to_host_.empty() ? now_ : std::max(now_, to_host_.back().tick);
+    for (const std::uint8_t byte : bytes)
+      to_host_.push_back({free += byte_time(), byte});
+  }
   void feed_watchdog() {}
   BlackBox::Memory& retained() { return options_.memory->retained; }
   MemoryFlash& settings_flash() { return options_.memory->flash; }
@@ -106,10 +141,42 @@ class RecordingBoard {
   enum class Restart : std::uint8_t { none, plain, into_bootloader };
   [[nodiscard]] Restart restart_asked() const { return restart_; }
   /// The next moment at which a pin changes or an order is carried out.
-  [[nodiscard]] std::optional<Ticks> next_event() const;
+  [[nodiscard]] std::optional<Ticks> next_event() const {
+    std::optional<Ticks> next;
+    const auto consider = [&next](Ticks tick) {
+      if (!next || tick < *next) next = tick;
+    };
+    if (order_) consider(order_due_);
+    if (direction_due_) consider(*direction_due_);
+    if (trigger_) consider(trigger_->due);
+    if (!coming_.empty()) consider(coming_.top().tick);
+    return next;
+  }
   /// Moves the clock to `tick`, at most the next event, and makes the edges due then; true if an order was
   /// carried out (compare interrupt). `inputs_changed` becomes true if a switch moved (input interrupt).
-  bool run_to(Ticks tick, bool& inputs_changed);
+  bool run_to(Ticks tick, bool& inputs_changed) {
+    now_ = tick;
+    if (direction_due_ && *direction_due_ <= now_) {
+      direction_due_.reset();
+      set_pin(Signal::DIR, order_->inflate);
+    }
+    const bool matched = order_ && order_due_ <= now_;
+    if (matched) {
+      const Inputs before = inputs();
+      carry_out(*std::exchange(order_, {}));
+      const Inputs after = inputs();
+      inputs_changed = before.home != after.home || before.far_limit != after.far_limit;
+    }
+    if (trigger_ && trigger_->due <= now_) {
+      raise_trigger(trigger_->width, trigger_->r_wave);
+      trigger_.reset();
+    }
+    while (!coming_.empty() && coming_.top().tick <= now_) {
+      set_pin(coming_.top().signal, coming_.top().value);
+      coming_.pop();
+    }
+    return matched;
+  }
   void set_estop(bool pressed) { estop_ = pressed; }
   void set_far_limit(bool closed) { forced_far_limit_ = closed; }
   void set_home(bool closed) { forced_home_ = closed; }
@@ -117,7 +184,14 @@ class RecordingBoard {
     from_host_.insert(from_host_.end(), bytes.begin(), bytes.end());
   }
   /// Bytes whose last bit has left by now.
-  std::vector<std::uint8_t> take_sent();
+  std::vector<std::uint8_t> take_sent() {
+    std::vector<std::uint8_t> bytes;
+    while (!to_host_.empty() && to_host_.front().tick <= now_) {
+      bytes.push_back(to_host_.front().byte);
+      to_host_.pop_front();
+    }
+    return bytes;
+  }
   std::vector<Edge> take_edges() { return std::exchange(edges_, {}); }
   void record_edges(bool on) { recording_ = on; }
   /// Where the load is that the motor drives with play, in the same count; it is what closes the switches.
@@ -134,10 +208,38 @@ class RecordingBoard {
     std::uint8_t byte;
   };
   [[nodiscard]] Ticks byte_time() const { return {kTicksPerSecond * 10 / options_.baud}; }
-  void set_pin(Signal signal, std::int32_t value);
-  void carry_out(const PulseOrder& order);
-  void raise_trigger(Ticks width, bool r_wave);
-  void move_load();
+  void set_pin(Signal signal, std::int32_t value) {
+    std::int32_t& pin = pins_[static_cast<std::size_t>(signal)];
+    if (pin == value) return;
+    pin = value;
+    if (recording_) edges_.push_back({now_, signal, value});
+  }
+  void carry_out(const PulseOrder& order) {
+    if (order.step) {
+      set_pin(Signal::STEP, 1);
+      coming_.push({now_ + kStepPulse, Signal::STEP, 0});
+      const bool inflating = pins_[static_cast<std::size_t>(Signal::DIR)] != 0;
+      if (pins_[static_cast<std::size_t>(Signal::ENABLE)] != 0) mechanical_steps_ += inflating ? 1 : -1;
+      move_load();
+    }
+    if (order.ttl) raise_trigger(order.ttl_width, order.r_wave);
+  }
+  void raise_trigger(Ticks width, bool r_wave) {
+    set_pin(Signal::TTL, 1);
+    coming_.push({now_ + width, Signal::TTL, 0});
+    if (!r_wave) return;
+    for (std::size_t i = 0; i < kRWaveSamples; ++i)
+      coming_.push({now_ + kRWaveSamplePeriod * static_cast<std::int64_t>(i), Signal::RWAVE_uV,
+                    static_cast<std::int32_t>(r_wave_uV(kRWaveCodes[i]))});
+  }
+  /// Inflating the motor pushes it along; withdrawing, it comes along once the play is taken up.
+  void move_load() {
+    load_steps_ =
+        std::clamp(load_steps_, mechanical_steps_, mechanical_steps_ + options_.mechanics.play_steps);
+    if (load_steps_ <= 0) home_closed_ = true;
+    if (load_steps_ > options_.mechanics.home_hysteresis_steps && !options_.mechanics.home_stuck)
+      home_closed_ = false;
+  }
 
   Options options_;
   Ticks now_;

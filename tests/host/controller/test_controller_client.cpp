@@ -5,7 +5,7 @@
 #include <array>
 #include <functional>
 
-#include "host/controller/version_match.hpp"
+#include "host/controller/controller_words.hpp"
 #include "protocol/contract/input_error.hpp"
 #include "tests/host/bench/desk.hpp"
 #include "tests/host/bench/scratch.hpp"

@@ -2,8 +2,8 @@
 
 #include <gmock/gmock.h>
 
-#include "host/controller/black_box_text.hpp"
 #include "host/controller/controller_client.hpp"
+#include "host/controller/controller_words.hpp"
 #include "tests/host/bench/desk.hpp"
 #include "tests/host/bench/scratch.hpp"
 

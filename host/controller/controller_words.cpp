@@ -1,8 +1,12 @@
-#include "host/controller/refusals.hpp"
+#include "host/controller/controller_words.hpp"
 
 #include <fmt/format.h>
 
+#include <array>
+#include <string_view>
+
 #include "protocol/contract/input_error.hpp"
+#include "protocol/wire/message_type.hpp"
 #include "protocol/wire/wire_text.hpp"
 
 namespace diastole {
@@ -50,6 +54,27 @@ LimitInWords words_for(wire::Limit limit) {
       break;
   }
   return {1, "", "Change the program."};
+}
+
+std::string_view message_name(int32_t type) {
+  switch (static_cast<wire::MessageType>(type)) {
+#define DIASTOLE_MESSAGE(number, name, sender, delivery) \
+  case wire::MessageType::name:                          \
+    return #name;
+#include "protocol/wire/message_list.inc"
+#undef DIASTOLE_MESSAGE
+  }
+  return "unknown";
+}
+
+std::string_view cause_in_words(uint8_t cause) {
+  constexpr std::array<std::string_view, 5> words{"for an unknown reason", "at power-on", "by the reset pin",
+                                                  "by software", "by the watchdog"};
+  return words[cause < words.size() ? cause : 0];
+}
+
+std::string in_words(const ProgramVersion& version) {
+  return fmt::format("{}.{}.{}", version[0], version[1], version[2]);
 }
 
 }  // namespace
@@ -129,6 +154,57 @@ std::string remedy_for(wire::Refusal refusal) {
     default:
       return "`diastole status` tells more; restart the daemon if it persists.";
   }
+}
+
+std::string in_words(const wire::BlackBoxEntry& entry) {
+  switch (entry.kind) {
+    case wire::Noted::started:
+      return fmt::format("started {}", cause_in_words(entry.detail));
+    case wire::Noted::state:
+      return fmt::format("{} -> {}", wire::state_name(static_cast<wire::State>(entry.argument)),
+                         wire::state_name(static_cast<wire::State>(entry.detail)));
+    case wire::Noted::fault: {
+      const auto fault = static_cast<wire::Fault>(entry.detail);
+      return fmt::format("fault {} ({}) at {} microsteps: {}", entry.detail, wire::fault_name(fault),
+                         entry.argument, wire::fault_explanation(fault));
+    }
+    case wire::Noted::refusal:
+      return fmt::format("{} refused: {}", message_name(entry.argument),
+                         wire::refusal_explanation(static_cast<wire::Refusal>(entry.detail)));
+    case wire::Noted::estop:
+      return entry.detail != 0 ? "emergency stop pressed" : "emergency stop released";
+    case wire::Noted::link:
+      return entry.detail != 0 ? fmt::format("a host opened session {:04x}", entry.argument)
+                               : "the host has fallen silent";
+    case wire::Noted::settings:
+      return fmt::format("settings written, record {}", entry.argument);
+    case wire::Noted::nothing:
+      break;
+  }
+  return "nothing";
+}
+
+const ProgramVersion own_version{DIASTOLE_VERSION_MAJOR, DIASTOLE_VERSION_MINOR, DIASTOLE_VERSION_PATCH};
+
+std::optional<VersionMismatch> compare_versions(const wire::Hello& firmware, const ProgramVersion& program,
+                                                uint32_t program_schema, const std::string& port) {
+  if (firmware.schema_hash == program_schema) return std::nullopt;
+  const ProgramVersion found{firmware.version_major, firmware.version_minor, firmware.version_patch};
+  VersionMismatch mismatch;
+  mismatch.problem = fmt::format("its firmware {} speaks protocol {:08x}, this program {} speaks {:08x}",
+                                 in_words(found), firmware.schema_hash, in_words(program), program_schema);
+  if (found > program) {
+    mismatch.remedy = fmt::format(
+        "This program is the older one: install Diastole {0} on this computer "
+        "(apt install ./diastole_{0}_amd64.deb), then start the daemon again.",
+        in_words(found));
+  } else {
+    mismatch.remedy = fmt::format(
+        "The firmware is {}: stop the daemon and flash the one that came with this program: diastole flash "
+        "/usr/share/diastole/firmware/diastole-stm32f405.image --port {}",
+        found < program ? "the older one" : "another build of this version", port);
+  }
+  return mismatch;
 }
 
 }  // namespace diastole

@@ -1,15 +1,28 @@
 #pragma once
-// Whether this program and the firmware that it meets speak the same protocol; if not, which of the two is to be
-// updated, and how.
+// What the controller says, for people: its refusals, naming the experiment's segment or the option; the entries of its
+// black box; and, where this program and its firmware do not speak the same protocol, which of the two is to be updated,
+// and how.
 
 #include <array>
 #include <cstdint>
 #include <optional>
 #include <string>
 
+#include "host/config/experiment.hpp"
+#include "protocol/wire/black_box_messages.hpp"
+#include "protocol/wire/messages.hpp"
 #include "protocol/wire/session_messages.hpp"
 
 namespace diastole {
+
+/// Throws InputError with the limit, what was asked and what is allowed.
+[[noreturn]] void refuse_program(const Experiment& experiment, size_t segment, const wire::Nak& nak);
+/// Precondition: a limit is exceeded.
+[[noreturn]] void refuse_jog(const wire::Nak& nak);
+std::string remedy_for(wire::Refusal refusal);
+
+/// "fault 1 (estop): The emergency stop was pressed; ..."
+std::string in_words(const wire::BlackBoxEntry& entry);
 
 /// Major, minor, patch.
 using ProgramVersion = std::array<uint8_t, 3>;
