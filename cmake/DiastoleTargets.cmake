@@ -37,13 +37,23 @@ function(diastole_program name)
 endfunction()
 
 # diastole_embed(VARIABLE HEADER h.hpp NAMESPACE n FILES name=path ...)
-# Puts files into the program as string_views that the header declares; VARIABLE becomes the source that defines them.
+# Puts files into the program as string_views of the namespace; VARIABLE becomes the source that defines them. Where the
+# tree has no such header, one is made under generated/ of the build.
 function(diastole_embed variable)
   cmake_parse_arguments(ARG "" "HEADER;NAMESPACE" "FILES" ${ARGN})
   set(script ${CMAKE_SOURCE_DIR}/cmake/embed_files.cmake)
   set(output ${CMAKE_CURRENT_BINARY_DIR}/embedded.cpp)
   string(REPLACE ";" "|" pairs "${ARG_FILES}")
   list(TRANSFORM ARG_FILES REPLACE "^[^=]+=" "" OUTPUT_VARIABLE paths)
+  set(declarations "")
+  foreach(file IN LISTS ARG_FILES)
+    string(REGEX REPLACE "=.*" "" name "${file}")
+    string(APPEND declarations "extern const std::string_view ${name};\n")
+  endforeach()
+  if(NOT EXISTS ${CMAKE_SOURCE_DIR}/${ARG_HEADER})
+    file(GENERATE OUTPUT ${CMAKE_BINARY_DIR}/generated/${ARG_HEADER} CONTENT
+      "#pragma once\n#include <string_view>\nnamespace ${ARG_NAMESPACE} {\n${declarations}}\n")
+  endif()
   add_custom_command(
     OUTPUT ${output}
     COMMAND ${CMAKE_COMMAND} -DOUTPUT=${output} -DHEADER=${ARG_HEADER} -DNAMESPACE=${ARG_NAMESPACE}

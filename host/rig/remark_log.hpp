@@ -2,8 +2,11 @@
 // The remarks of a run for those who look on. Each has a number that it keeps. When there are more than `most`, the
 // oldest go; errors and prompts go last, when they alone are more than `most`.
 
+#include <fmt/chrono.h>
+
 #include <algorithm>
 #include <cstdint>
+#include <ctime>
 #include <deque>
 #include <map>
 #include <string>
@@ -12,6 +15,9 @@
 #include "host/acquisition/acquisition.hpp"
 
 namespace diastole {
+
+/// The wall clock, for people: "2026-11-21T09:04:00Z".
+inline std::string utc_now() { return fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr))); }
 
 class RemarkLog {
  public:

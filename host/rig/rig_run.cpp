@@ -14,7 +14,6 @@
 #include "host/journal/journal_store.hpp"
 #include "host/journal/part_file.hpp"
 #include "host/rig/rig_service.hpp"
-#include "host/rig/utc.hpp"
 #include "host/runfile/assemble.hpp"
 #include "host/runfile/writer.hpp"
 #include "protocol/contract/input_error.hpp"

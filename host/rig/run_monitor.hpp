@@ -10,7 +10,6 @@
 
 #include "host/rig/remark_log.hpp"
 #include "host/rig/rig_answers.hpp"
-#include "host/rig/utc.hpp"
 #include "host/transport/real_time.hpp"
 
 namespace diastole {

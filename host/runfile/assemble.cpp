@@ -9,7 +9,6 @@
 #include <memory>
 
 #include "host/journal/parsed_journal.hpp"
-#include "host/runfile/filtered_channel.hpp"
 #include "host/runfile/pressure_rows.hpp"
 #include "host/runfile/rows_due.hpp"
 #include "host/runfile/time_axis.hpp"
@@ -366,5 +365,22 @@ AssembledRun assemble_run(const JournalRecords& journal) {
 }
 
 AssembledRun assemble_run(const JournalContents& journal) { return assemble_run(JournalRecords(journal)); }
+
+std::optional<signal::LowPassDesign> filter_of(double spacing_s) {
+  if (spacing_s <= 0) return std::nullopt;
+  const signal::LowPassDesign design{.rate_Hz = 1 / spacing_s,
+                                     .passes = signal::Passes::forward_and_backward};
+  if (design.rate_Hz < signal::least_rate_over_cutoff * design.cutoff_Hz) return std::nullopt;
+  return design;
+}
+
+std::map<std::string, runfile::Attribute, std::less<>> notes_of(const signal::LowPassDesign& design) {
+  return {{"filter", std::string("Butterworth low-pass, forward and backward")},
+          {"cutoff_Hz", design.cutoff_Hz},
+          {"order", int64_t{design.order}},
+          {"passes", int64_t{2}},
+          {"rate_Hz", design.rate_Hz},
+          {"delay_s", 0.0}};
+}
 
 }  // namespace diastole

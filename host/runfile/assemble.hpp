@@ -9,11 +9,15 @@
 // run went on (rows_due.hpp): "not recorded".
 
 #include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
 
 #include "host/journal/journal.hpp"
 #include "host/runfile/row_stream.hpp"
 #include "protocol/contract/input_error.hpp"
 #include "protocol/runfile/run.hpp"
+#include "protocol/signal/low_pass.hpp"
 
 namespace diastole {
 
@@ -45,5 +49,15 @@ StreamedRun stream_run(const JournalRecords& journal);
 /// The same in memory.
 AssembledRun assemble_run(const JournalRecords& journal);
 AssembledRun assemble_run(const JournalContents& journal);
+
+// The low-passed cavity pressure, /pressure/cavity_filtered_kPa, beside the raw one: cavity_kPa at 30 Hz forward and
+// backward (zero_phase.hpp), each stretch between missing samples by itself.
+
+/// None when samples come slower than 75 Hz, too slow for that cutoff, or when there are fewer than two (spacing 0).
+std::optional<signal::LowPassDesign> filter_of(double spacing_s);
+
+/// What the dataset tells of it: `filter`, `cutoff_Hz`, `order` of a pass, `passes`, `rate_Hz` that it was designed for,
+/// and `delay_s`, which is 0.
+std::map<std::string, runfile::Attribute, std::less<>> notes_of(const signal::LowPassDesign& design);
 
 }  // namespace diastole

@@ -6,12 +6,23 @@
 #include <boost/beast/http/message.hpp>
 #include <boost/beast/http/parser.hpp>
 #include <optional>
+#include <span>
 #include <string_view>
 
 #include "host/web/door.hpp"
-#include "host/web/page_files.hpp"
 
 namespace diastole::web {
+
+/// The files of the page; the build puts them into the program (CMakeLists.txt of this folder).
+struct PageFile {
+  std::string_view path;  ///< as in a request: "/console.css"
+  std::string_view type;  ///< as in Content-Type
+  std::string_view text;
+};
+
+std::span<const PageFile> page_files();
+/// Null if there is none at this path.
+const PageFile* find_page_file(std::string_view path);
 
 using Request = boost::beast::http::request<boost::beast::http::empty_body>;
 using RequestParser = boost::beast::http::request_parser<boost::beast::http::empty_body>;

@@ -7,8 +7,8 @@
 #include <fstream>
 #include <sstream>
 
+#include "host/runfile/assemble.hpp"
 #include "host/runfile/bids_export.hpp"
-#include "host/runfile/filtered_channel.hpp"
 #include "host/runfile/writer.hpp"
 #include "protocol/runfile/layout.hpp"
 #include "protocol/runfile/reader.hpp"

@@ -6,7 +6,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "host/runfile/filtered_channel.hpp"
+#include "host/runfile/assemble.hpp"
 #include "host/runfile/writer.hpp"
 #include "protocol/contract/input_error.hpp"
 #include "protocol/runfile/reader.hpp"

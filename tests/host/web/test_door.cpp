@@ -2,7 +2,7 @@
 
 #include <gmock/gmock.h>
 
-#include "host/web/page_files.hpp"
+#include "host/web/request.hpp"
 #include "protocol/contract/input_error.hpp"
 #include "tests/host/bench/scratch.hpp"
 
