@@ -33,6 +33,8 @@ bool somebody_listens(const std::string& socket) {
   }
 }
 
+}  // namespace
+
 class Connection;
 using Connections = std::map<uint64_t, std::shared_ptr<Connection>>;
 
@@ -144,8 +146,6 @@ class Connection : public RpcSession {
   std::optional<Time> line_begun_;
   std::optional<Time> write_begun_;
 };
-
-}  // namespace
 
 class RpcServer::Listener : public std::enable_shared_from_this<Listener> {
  public:
