@@ -20,7 +20,7 @@ constexpr std::string_view svg = "image/svg+xml";
 
 namespace http = boost::beast::http;
 
-std::string_view view(boost::beast::string_view text) { return {text.data(), text.size()}; }
+std::string_view view(boost::beast::string_view field) { return {field.data(), field.size()}; }
 
 std::optional<ConsoleRole> shown_role(const Door& door, const Request& request) {
   return door.role_of(token_in(view(request[http::field::authorization]),
