@@ -139,7 +139,6 @@ const std::vector<Rule>& rules() {
        {"protocol/contract", "tools/sim_board/core", "tools/sim_board/peripherals"}},
       {"tools/sim_board", {"protocol/contract", "firmware/core", "tools/program", "tools/sim_controller"}},
       {"tools/sim_rig/plant", {}},
-      {"tools/sim_rig/hidden", {"protocol/contract", "tools/sim_rig/plant"}},
       {"tools/sim_rig",
        {"protocol", "firmware/core", "firmware/boards/recording", "host/transport", "tools/program",
         "tools/sim_board", "tools/sim_controller", "tools/sim_daq"}},

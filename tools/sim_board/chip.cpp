@@ -53,7 +53,7 @@ Chip::Chip(uint32_t crystal_Hz, uint32_t random_seed, Listeners listeners)
       cpu({clock, memory, bus, scheduler, nvic, control, flash, notes}),
       listeners_(std::move(listeners)) {
   bus.add({"RCC", 0x4002'3800, {}, &rcc});
-  bus.use_gates(rcc);
+  bus.gate_by([this](ClockGate gate) { return rcc.clocked(gate); });
   bus.add({"FLASH", 0x4002'3c00, {}, &flash});
   add_ports();
   add_timers();

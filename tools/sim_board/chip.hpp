@@ -40,12 +40,12 @@ class Chip {
   [[nodiscard]] uint64_t serial_overruns() const;
 
   Clock clock;
-  Notes notes;
+  Notes notes{clock};
   Memory memory;
   Scheduler scheduler;
   Nvic nvic{clock};
   PinLog pins{clock};
-  Bus bus{clock, notes};
+  Bus bus{notes};
 
   Rcc rcc;
   Flash flash;
@@ -56,8 +56,8 @@ class Chip {
   Exti exti{syscfg, pins, nvic};
   Dac dac{clock, pins, notes};
   Watchdog watchdog{clock, scheduler};
-  Dma dma1{1, bus, memory, nvic, clock, notes};
-  Dma dma2{2, bus, memory, nvic, clock, notes};
+  Dma dma1{1, bus, memory, nvic, notes};
+  Dma dma2{2, bus, memory, nvic, notes};
   World world;
   std::vector<std::unique_ptr<Gpio>> ports;
   std::vector<std::unique_ptr<Timer>> timers;

@@ -8,7 +8,7 @@
 #include <span>
 
 #include "protocol/wire/frame.hpp"
-#include "tools/sim_rig/faults/fault_schedule.hpp"
+#include "tools/sim_rig/fault_schedule.hpp"
 
 namespace diastole::sim_rig {
 

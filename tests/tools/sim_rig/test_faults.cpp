@@ -8,7 +8,7 @@
 
 #include "protocol/contract/input_error.hpp"
 #include "tests/tools/sim_rig/scripted_controller.hpp"
-#include "tools/sim_rig/faults/fault_kind.hpp"
+#include "tools/sim_rig/faults.hpp"
 
 namespace diastole::sim_rig {
 namespace {

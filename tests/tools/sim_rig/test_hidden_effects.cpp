@@ -7,7 +7,7 @@
 
 #include "estimator/effects/effect.hpp"
 #include "protocol/contract/input_error.hpp"
-#include "tools/sim_rig/hidden/hidden_effects.hpp"
+#include "tools/sim_rig/hidden_effects.hpp"
 
 namespace diastole::sim_rig {
 namespace {

@@ -16,7 +16,7 @@
 #include "protocol/contract/input_error.hpp"
 #include "tools/diastole/simulate/simulated_rig.hpp"
 #include "tools/diastole/simulate/stop_signals.hpp"
-#include "tools/sim_rig/hidden/hidden_effects.hpp"
+#include "tools/sim_rig/hidden_effects.hpp"
 
 namespace diastole {
 namespace {

@@ -3,10 +3,12 @@
 
 #include <array>
 #include <cstdint>
+#include <cstdio>
+#include <functional>
 #include <string>
+#include <utility>
 #include <vector>
 
-#include "tools/sim_board/core/clock.hpp"
 #include "tools/sim_board/core/device.hpp"
 #include "tools/sim_board/core/notes.hpp"
 
@@ -17,15 +19,6 @@ namespace diastole::board_model {
 struct ClockGate {
   uint32_t enable_offset = 0;  ///< 0: always clocked
   uint32_t bit = 0;
-};
-
-/// The state of the gates, owned by RCC.
-class Gates {
- public:
-  [[nodiscard]] virtual bool clocked(ClockGate gate) const = 0;
-
- protected:
-  ~Gates() = default;
 };
 
 class Bus {
@@ -39,22 +32,54 @@ class Bus {
     Device* device = nullptr;
   };
 
-  Bus(const Clock& clock, Notes& notes) : clock_(clock), notes_(notes) {}
+  explicit Bus(Notes& notes) : notes_(notes) {}
 
   /// Registers a device at `blocks` blocks of 1 KB from `base` on; its offsets count from `base`.
-  void add(Place place, uint32_t blocks = 1);
-  void use_gates(const Gates& gates) { gates_ = &gates; }
+  void add(Place place, uint32_t blocks = 1) {
+    for (uint32_t block = 0; block < blocks; ++block) {
+      by_block_[block_of(place.base) + block] = static_cast<uint32_t>(places_.size());
+    }
+    places_.push_back(std::move(place));
+  }
+  /// How the state of a gate is asked for; without it all are open.
+  void gate_by(std::function<bool(ClockGate)> clocked) { clocked_ = std::move(clocked); }
 
   /// `bytes` is 1, 2 or 4. A block that nobody models reads 0 and is noted once.
-  uint32_t read(uint32_t address, uint32_t bytes);
-  void write(uint32_t address, uint32_t value, uint32_t bytes);
+  uint32_t read(uint32_t address, uint32_t bytes) {
+    const Place* place = find(address, "read");
+    if (place == nullptr) return 0;
+    const uint32_t word = place->device->read((address - place->base) & ~3U);
+    return (word >> (8 * (address & 3))) & width_mask(bytes);
+  }
+  void write(uint32_t address, uint32_t value, uint32_t bytes) {
+    const Place* place = find(address, "write");
+    if (place == nullptr) return;
+    const uint32_t shift = 8 * (address & 3);
+    place->device->write((address - place->base) & ~3U, value << shift, width_mask(bytes) << shift);
+  }
 
-  void reset_all();
+  void reset_all() {
+    for (const Place& place : places_)
+      place.device->reset();
+  }
   /// Resets the devices whose bit is set in the RCC reset register that belongs to `enable_offset`.
-  void reset_gated(uint32_t enable_offset, uint32_t bits);
+  void reset_gated(uint32_t enable_offset, uint32_t bits) {
+    for (const Place& place : places_) {
+      if (place.gate.enable_offset == enable_offset && (bits >> place.gate.bit & 1) != 0)
+        place.device->reset();
+    }
+  }
   [[nodiscard]] const std::vector<Place>& places() const { return places_; }
 
  private:
+  static std::string hexadecimal(uint32_t value) {
+    char text[16];
+    std::snprintf(text, sizeof text, "0x%08x", value);
+    return text;
+  }
+
+  static uint32_t width_mask(uint32_t bytes) { return bytes >= 4 ? 0xffff'ffff : (1U << (8 * bytes)) - 1; }
+
   static constexpr uint32_t no_place = 0xffffffff;
 
   /// 0x4000'0000-0x5fff'ffff by block, then the private peripherals from 0xe000'0000.
@@ -62,14 +87,27 @@ class Bus {
     return address >= 0xe000'0000 ? peripheral_blocks + (address - 0xe000'0000) / block_bytes
                                   : (address - 0x4000'0000) / block_bytes;
   }
-  Place* find(uint32_t address, const char* action);
+  Place* find(uint32_t address, const char* action) {
+    const uint32_t block = block_of(address);
+    const uint32_t index = block < by_block_.size() ? by_block_[block] : no_place;
+    if (index == no_place) {
+      notes_.add(std::string(action) + " of a register that is not modelled: block at " +
+                 hexadecimal(address & ~(block_bytes - 1)));
+      return nullptr;
+    }
+    Place& place = places_[index];
+    if (place.gate.enable_offset != 0 && clocked_ && !clocked_(place.gate)) {
+      notes_.add(std::string(action) + " of " + place.name + " while its clock is off");
+      return nullptr;
+    }
+    return &place;
+  }
 
   static constexpr uint32_t peripheral_blocks = 0x2000'0000 / block_bytes;
   static constexpr uint32_t private_blocks = 0x10'0000 / block_bytes;
 
-  const Clock& clock_;
   Notes& notes_;
-  const Gates* gates_ = nullptr;
+  std::function<bool(ClockGate)> clocked_;
   std::vector<Place> places_;
   std::vector<uint32_t> by_block_ = std::vector<uint32_t>(peripheral_blocks + private_blocks, no_place);
 };

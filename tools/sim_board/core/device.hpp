@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <initializer_list>
+#include <span>
 
 #include "tools/sim_board/core/clock.hpp"
 
@@ -58,6 +59,9 @@ class RegisterBlock : public Device {
   /// The word at `offset` among `words`, which lie one after the other; null for a gap, or beyond the last.
   static uint32_t* in_order(uint32_t offset, std::initializer_list<uint32_t*> words) {
     return offset / 4 < words.size() ? words.begin()[offset / 4] : nullptr;
+  }
+  static uint32_t* in_order(uint32_t offset, std::span<uint32_t> words) {
+    return offset / 4 < words.size() ? &words[offset / 4] : nullptr;
   }
 };
 

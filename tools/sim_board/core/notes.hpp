@@ -6,6 +6,8 @@
 #include <map>
 #include <string>
 
+#include "tools/sim_board/core/clock.hpp"
+
 namespace diastole::board_model {
 
 struct Note {
@@ -15,13 +17,16 @@ struct Note {
 
 class Notes {
  public:
-  void add(const std::string& text, uint64_t time_ns) {
-    auto [place, fresh] = notes_.try_emplace(text, Note{time_ns, 0});
+  explicit Notes(const Clock& clock) : clock_(clock) {}
+
+  void add(const std::string& text) {
+    auto [place, fresh] = notes_.try_emplace(text, Note{clock_.ns(clock_.now()), 0});
     ++place->second.count;
   }
   [[nodiscard]] const std::map<std::string, Note>& all() const { return notes_; }
 
  private:
+  const Clock& clock_;
   std::map<std::string, Note> notes_;
 };
 

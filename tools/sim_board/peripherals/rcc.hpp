@@ -2,6 +2,7 @@
 // RCC: oscillators and PLL with their ready bits, the clock tree, clock gates and resets of the peripherals,
 // and the flags that show why the last reset happened (RM0090, 7.3).
 
+#include <algorithm>
 #include <functional>
 
 #include "tools/sim_board/core/bus.hpp"
@@ -17,28 +18,162 @@ enum class ResetCause : uint32_t {
   independent_watchdog = 1U << 29,
 };
 
-class Rcc final : public Device, public Gates {
+class Rcc final : public RegisterBlock {
  public:
-  Rcc(Clock& clock, Bus& bus, Scheduler& scheduler, Notes& notes, uint32_t crystal_Hz);
+  Rcc(Clock& clock, Bus& bus, Scheduler& scheduler, Notes& notes, uint32_t crystal_Hz)
+      : clock_(clock),
+        bus_(bus),
+        scheduler_(scheduler),
+        notes_(notes),
+        slot_(scheduler.add(*this)),
+        crystal_Hz_(crystal_Hz) {
+    reset();
+  }
 
-  uint32_t read(uint32_t offset) override;
-  void write(uint32_t offset, uint32_t value, uint32_t mask) override;
-  void reset() override;
-  void on_event(Cycles at) override;
+  uint32_t read(uint32_t offset) override {
+    if (offset == csr) return csr_ | (csr_ & 1) << 1;  // LSI is ready at once
+    return RegisterBlock::read(offset);
+  }
+  void write(uint32_t offset, uint32_t value, uint32_t mask) override {
+    if (word(offset) == nullptr) return;
+    const uint32_t whole = merged(read(offset), value, mask);
+    if (offset == cr) return write_control(whole);
+    if (offset == cfgr) return write_configuration(whole);
+    if (offset == csr) {
+      if (whole & remove_flags) csr_ &= 0x00ff'ffff;
+      csr_ = (csr_ & ~1U) | (whole & 1);
+      return;
+    }
+    registers_[offset / 4] = whole;
+    if (offset >= ahb1rstr && offset <= apb2rstr) bus_.reset_gated(offset + 0x20, value & mask);
+  }
+  void reset() override {
+    registers_.fill(0);
+    registers_[cr / 4] = 0x83;
+    registers_[pllcfgr / 4] = 0x2400'3010;
+    registers_[0x30 / 4] = 0x0010'0000;
+    external_ready_ = pll_ready_ = never;
+    scheduler_.set(slot_, never);
+    apply_tree();
+  }
+  void on_event(Cycles at) override {
+    if (external_ready_ <= at) {
+      registers_[cr / 4] |= hse_ready;
+      external_ready_ = never;
+    }
+    if (pll_ready_ <= at) {
+      registers_[cr / 4] |= pll_ready;
+      pll_ready_ = never;
+    }
+    scheduler_.set(slot_, std::min(external_ready_, pll_ready_));
+  }
 
-  [[nodiscard]] bool clocked(ClockGate gate) const override;
+  [[nodiscard]] bool clocked(ClockGate gate) const {
+    return gate.enable_offset == 0 || (registers_[gate.enable_offset / 4] >> gate.bit & 1) != 0;
+  }
   /// Adds to the flags of RCC_CSR, which survive every reset but that of power.
-  void record(ResetCause cause);
+  void record(ResetCause cause) {
+    const auto bits = static_cast<uint32_t>(cause);
+    if (cause == ResetCause::power) csr_ = bits | 1U << 25;
+    csr_ |= bits | static_cast<uint32_t>(ResetCause::pin);  // internal resets pull NRST low too
+  }
 
  private:
+  static constexpr uint32_t cr = 0x00, pllcfgr = 0x04, cfgr = 0x08, ahb1rstr = 0x10, apb2rstr = 0x24,
+                            csr = 0x74;
+  static constexpr uint32_t hsi_on = 1, hsi_ready = 2, hse_on = 1 << 16, hse_ready = 1 << 17,
+                            pll_on = 1 << 24, pll_ready = 1 << 25;
+  static constexpr uint32_t remove_flags = 1 << 24;
+  static constexpr uint32_t internal_Hz = 16'000'000;
+  static constexpr uint64_t crystal_start_ns = 500'000,
+                            pll_lock_ns = 100'000;  // typical, datasheet 5.3.9 and 5.3.10
+
+  /// HPRE: 0xxx undivided, then 2, 4, 8, 16, 64, 128, 256, 512.
+  static uint32_t core_divider(uint32_t code) {
+    constexpr uint32_t dividers[] = {2, 4, 8, 16, 64, 128, 256, 512};
+    return code < 8 ? 1 : dividers[code - 8];
+  }
+
+  /// PPREx: 0xx undivided, then 2, 4, 8, 16.
+  static uint32_t bus_divider(uint32_t code) { return code < 4 ? 1 : 2U << (code - 4); }
+
+  /// A timer's kernel runs at twice the bus clock unless the bus is undivided (TIMPRE = 0).
+  static uint32_t timer_ratio(uint32_t bus_ratio) { return bus_ratio == 1 ? 1 : bus_ratio / 2; }
+
   static constexpr uint32_t register_words = 0x90 / 4;
 
-  void write_control(uint32_t value);
-  void write_configuration(uint32_t value);
-  void apply_tree();
-  [[nodiscard]] uint32_t pll_Hz();
-  [[nodiscard]] uint32_t system_Hz();
-  void check_range(const char* what, uint64_t value_Hz, uint64_t least_Hz, uint64_t most_Hz);
+  uint32_t* word(uint32_t offset) override { return in_order(offset, registers_); }
+  void write_control(uint32_t value) {
+    uint32_t& held = registers_[cr / 4];
+    held = (held & (hse_ready | pll_ready | hsi_ready)) | (value & ~(hse_ready | pll_ready | hsi_ready));
+    const Cycles now = clock_.now();
+    if (!(held & hse_on)) {
+      held &= ~hse_ready;
+      external_ready_ = never;
+    } else if (!(held & hse_ready) && external_ready_ == never) {
+      external_ready_ = now + clock_.cycles_in(crystal_start_ns);
+    }
+    if (!(held & pll_on)) {
+      held &= ~pll_ready;
+      pll_ready_ = never;
+    } else if (!(held & pll_ready) && pll_ready_ == never) {
+      pll_ready_ = now + clock_.cycles_in(pll_lock_ns);
+    }
+    held = (held & hsi_on) ? held | hsi_ready : held & ~hsi_ready;
+    scheduler_.set(slot_, std::min(external_ready_, pll_ready_));
+  }
+  void write_configuration(uint32_t value) {
+    const uint32_t source = value & 3;
+    constexpr uint32_t ready_bits[] = {hsi_ready, hse_ready, pll_ready, 0};
+    uint32_t& held = registers_[cfgr / 4];
+    const bool switches = (registers_[cr / 4] & ready_bits[source]) != 0;
+    if (!switches) notes_.add("RCC_CFGR.SW asks for a clock that is not ready");
+    held = (value & ~0xcU) | (switches ? source << 2 : held & 0xc);
+    apply_tree();
+  }
+  void apply_tree() {
+    const uint32_t configuration = registers_[cfgr / 4];
+    ClockTree tree;
+    tree.core_Hz = system_Hz() / core_divider(configuration >> 4 & 0xf);
+    tree.apb1_ratio = bus_divider(configuration >> 10 & 7);
+    tree.apb2_ratio = bus_divider(configuration >> 13 & 7);
+    tree.apb1_timer_ratio = timer_ratio(tree.apb1_ratio);
+    tree.apb2_timer_ratio = timer_ratio(tree.apb2_ratio);
+    if (tree == clock_.tree()) return;
+    check_range("core clock", tree.core_Hz, 0, 168'000'000);
+    check_range("APB1", tree.core_Hz / tree.apb1_ratio, 0, 42'000'000);
+    check_range("APB2", tree.core_Hz / tree.apb2_ratio, 0, 84'000'000);
+    for (const Bus::Place& place : bus_.places())
+      place.device->before_clock_change();
+    clock_.set_tree(tree);
+    for (const Bus::Place& place : bus_.places())
+      place.device->after_clock_change();
+  }
+  [[nodiscard]] uint32_t pll_Hz() {
+    const uint32_t configuration = registers_[pllcfgr / 4];
+    const uint32_t m = std::max(configuration & 0x3f, 2U);
+    const uint32_t n = configuration >> 6 & 0x1ff;
+    const uint32_t p = 2 * ((configuration >> 16 & 3) + 1);
+    const uint32_t input = (configuration >> 22 & 1) ? crystal_Hz_ : internal_Hz;
+    check_range("PLL input", input / m, 950'000, 2'100'000);
+    check_range("PLL oscillator", uint64_t{input} / m * n, 100'000'000, 432'000'000);
+    return static_cast<uint32_t>(uint64_t{input} * n / m / p);
+  }
+  [[nodiscard]] uint32_t system_Hz() {
+    switch (registers_[cfgr / 4] >> 2 & 3) {
+      case 1:
+        return crystal_Hz_;
+      case 2:
+        return pll_Hz();
+      default:
+        return internal_Hz;
+    }
+  }
+  void check_range(const char* what, uint64_t value_Hz, uint64_t least_Hz, uint64_t most_Hz) {
+    if (value_Hz >= least_Hz && value_Hz <= most_Hz) return;
+    notes_.add(std::string(what) + " at " + std::to_string(value_Hz) + " Hz is outside the datasheet's " +
+               std::to_string(least_Hz) + " to " + std::to_string(most_Hz) + " Hz");
+  }
 
   Clock& clock_;
   Bus& bus_;

@@ -9,7 +9,7 @@
 
 namespace diastole::board_model {
 
-class Storage final : public Device {
+class Storage final : public RegisterBlock {
  public:
   /// `always_set` bits of the register at `status_offset` read 1; with `kept`, contents survive system
   /// resets.
@@ -17,17 +17,15 @@ class Storage final : public Device {
       : status_offset_(status_offset), always_set_(always_set), kept_(kept) {}
 
   uint32_t read(uint32_t offset) override {
-    return registers_[offset / 4] | (offset == status_offset_ ? always_set_ : 0);
-  }
-  void write(uint32_t offset, uint32_t value, uint32_t mask) override {
-    uint32_t& held = registers_[offset / 4];
-    held = merged(held, value, mask);
+    return RegisterBlock::read(offset) | (offset == status_offset_ ? always_set_ : 0);
   }
   void reset() override {
     if (!kept_) registers_.fill(0);
   }
 
  private:
+  uint32_t* word(uint32_t offset) override { return in_order(offset, registers_); }
+
   uint32_t status_offset_, always_set_;
   bool kept_;
   std::array<uint32_t, 256> registers_{};

@@ -4,6 +4,7 @@
 // Thumb code mixes 2- and 4-byte instructions; a first halfword of 0b11101, 0b11110 or 0b11111 in its top
 // five bits starts a long one (ARMv7-M ARM, A5.1). Counts are kept per start address.
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -33,10 +34,37 @@ class BlockTable {
   }
 
   /// Forgets blocks that may contain any of [offset, offset + length).
-  void forget(std::size_t offset, std::size_t length);
+  void forget(std::size_t offset, std::size_t length) {
+    const std::size_t from = offset > longest_block_bytes ? offset - longest_block_bytes : 0;
+    const std::size_t to = std::min(offset + length, memory_.size());
+    std::fill(blocks_.begin() + static_cast<std::ptrdiff_t>(from / 2),
+              blocks_.begin() + static_cast<std::ptrdiff_t>(to / 2), Block{});
+  }
 
  private:
-  void decode(Block& block, std::size_t offset, uint32_t bytes) const;
+  static constexpr std::size_t longest_block_bytes = 4096;  // the translator never crosses a page
+
+  static bool is_long(uint32_t first) { return (first >> 11) >= 0b11101; }
+
+  /// Coprocessor 10 or 11 is the FPU: 111x 11xx xxxx xxxx | xxxx 101x xxxx xxxx.
+  static bool is_float(uint32_t first, uint32_t second) {
+    return (first & 0xec00) == 0xec00 && (second & 0x0e00) == 0x0a00;
+  }
+
+  void decode(Block& block, std::size_t offset, uint32_t bytes) const {
+    block = {static_cast<uint16_t>(bytes), 0, Block::no_float, Block::no_float};
+    const std::size_t end = std::min(offset + bytes, memory_.size());
+    for (std::size_t at = offset; at + 1 < end;) {
+      const uint32_t first = halfword(at);
+      const bool is_wide = is_long(first) && at + 3 < memory_.size();
+      if (is_wide && block.before_float == Block::no_float && is_float(first, halfword(at + 2))) {
+        block.before_float = block.instructions;
+        block.bytes_before_float = static_cast<uint16_t>(at - offset);
+      }
+      ++block.instructions;
+      at += is_wide ? 4 : 2;
+    }
+  }
   [[nodiscard]] uint32_t halfword(std::size_t offset) const {
     return static_cast<uint32_t>(memory_[offset] | memory_[offset + 1] << 8);
   }

@@ -115,7 +115,7 @@ void Cpu::raise(uint32_t number, uint32_t status_bits, uint32_t address, const c
     char text[160];
     std::snprintf(text, sizeof text, "%s (address 0x%08x) at or after pc 0x%08x", what, address, pc_);
     last_fault_ = text;
-    parts_.notes.add("fault: " + last_fault_, parts_.clock.ns(parts_.clock.now()));
+    parts_.notes.add("fault: " + last_fault_);
   }
   const Masks held = masks();
   if (number != exception::hard_fault && parts_.control.fault_enabled(number) &&
@@ -131,7 +131,7 @@ void Cpu::raise(uint32_t number, uint32_t status_bits, uint32_t address, const c
 void Cpu::lock_up(const char* why) {
   locked_up_ = true;
   last_fault_ = std::string("lockup: ") + why;
-  parts_.notes.add(last_fault_, parts_.clock.ns(parts_.clock.now()));
+  parts_.notes.add(last_fault_);
 }
 
 }  // namespace diastole::board_model

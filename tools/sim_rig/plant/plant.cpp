@@ -34,9 +34,9 @@ Plant::Plant(const PlantConfig& config)
       pump_sensor_(with_flaws(config.pump, config.flaws.sensors, false), hose_.step_s(), 2 * config.seed + 1),
       loss_kPa_s2_per_mL2_(loss_factor(config)),
       pump_gas_{config.flaws.pump.gas_mL, gas_exponent},
-      pump_leak_{config.flaws.pump.leak_mL_s_kPa},
+      pump_leak_mL_s_kPa_(config.flaws.pump.leak_mL_s_kPa),
       cavity_flaws_(config.flaws.cavity),
-      leak_{cavity_flaws_.leak_mL_s_kPa},
+      leak_mL_s_kPa_(cavity_flaws_.leak_mL_s_kPa),
       bubble_{cavity_flaws_.gas_mL, gas_exponent} {}
 
 void Plant::begin_cycle() {
@@ -54,7 +54,7 @@ void Plant::advance_to(double time_s) {
 
 /// The leak's flow and the bubble's share are those of the step's beginning: both change little in half a millisecond.
 void Plant::take_disturbances() {
-  leaked_mL_ = leak_.flow_mL_s(cavity_kPa()) * step_s();
+  leaked_mL_ = leak_mL_s_kPa_ * cavity_kPa() * step_s();
   gel_share_ =
       1 / (1 + bubble_.compliance_mL_per_kPa(cavity_kPa()) * specimen_.stiffness_kPa_per_mL(cavity_mL_));
 }
@@ -66,7 +66,7 @@ double Plant::gel_inflow_mL(double flow_mL_s) const {
 double Plant::solve_outlet_flow_mL_s() const {
   const Characteristic line = hose_.outlet();
   const double kink_K = cavity_mL_ > cavity_flaws_.kink_above_mL ? cavity_flaws_.kink_K : 0;
-  const double loss_kPa_s2_per_mL2 = loss_kPa_s2_per_mL2_ * (minor_loss_K_ + blockage_.loss_K() + kink_K);
+  const double loss_kPa_s2_per_mL2 = loss_kPa_s2_per_mL2_ * (minor_loss_K_ + blockage_K_ + kink_K);
   double flow = outlet_flow_mL_s_;
   const double half_step_s = 0.5 * step_s() * gel_share_;
   // Newton on a strictly increasing residual that is nearly linear (the line's impedance dominates).
@@ -85,7 +85,7 @@ double Plant::solve_outlet_flow_mL_s() const {
 
 double Plant::entering_flow_mL_s() const {
   const double swallows_mL_kPa = pump_gas_.compliance_mL_per_kPa(pump_end_kPa()) / step_s();
-  const double loses = pump_leak_.conductance_mL_s_kPa;
+  const double loses = pump_leak_mL_s_kPa_;
   if (swallows_mL_kPa == 0 && loses == 0) return piston_.flow_mL_s();
   // p = line.p + z Q and Q = Q_piston - C (p - p_before) / dt - G p.
   const Characteristic line = hose_.inlet();

@@ -13,10 +13,8 @@
 #include <cstdint>
 
 #include "tools/sim_rig/plant/air_bubble.hpp"
-#include "tools/sim_rig/plant/blockage.hpp"
 #include "tools/sim_rig/plant/flaws.hpp"
 #include "tools/sim_rig/plant/hose.hpp"
-#include "tools/sim_rig/plant/leak.hpp"
 #include "tools/sim_rig/plant/piston.hpp"
 #include "tools/sim_rig/plant/screw.hpp"
 #include "tools/sim_rig/plant/sensor.hpp"
@@ -52,8 +50,12 @@ class Plant {
   [[nodiscard]] double pump_reading_kPa() const { return pump_sensor_.reading_kPa(since_step_s_); }
 
   /// What goes wrong from the next step on; neutral values make it whole again.
-  void leak(const Leak& leak) { leak_ = leak; }
-  void block(const Blockage& blockage) { blockage_ = blockage; }
+  /// At the cavity, through a cannula that does not seal: outflow in proportion to the pressure (a narrow slit, laminar);
+  /// under suction it draws in as much.
+  void leak(double conductance_mL_s_kPa) { leak_mL_s_kPa_ = conductance_mL_s_kPa; }
+  /// The hose is kinked or clamped at the cannula so that a share f > 0 of its area is left: the jet behind it loses its
+  /// speed, K = (1/f - 1)^2 on the dynamic pressure of the open bore (Borda and Carnot).
+  void block(double open_share) { blockage_K_ = (1 / open_share - 1) * (1 / open_share - 1); }
   /// It comes in, or goes, at the pressure of the moment, and moves only with what follows.
   void admit(const AirBubble& bubble) { bubble_ = bubble; }
   [[nodiscard]] Sensor& cavity_sensor() { return cavity_sensor_; }
@@ -89,10 +91,10 @@ class Plant {
   long step_count_ = 0;
   double since_step_s_ = 0;
   AirBubble pump_gas_;
-  Leak pump_leak_;
+  double pump_leak_mL_s_kPa_;
   CavityFlaws cavity_flaws_;
-  Leak leak_;
-  Blockage blockage_;
+  double leak_mL_s_kPa_;
+  double blockage_K_ = 0;
   AirBubble bubble_;
   double leaked_mL_ = 0;  // in this step
   double gel_share_ = 1;  // of a change of the cavity's volume; the bubble gives way for the rest

@@ -1,5 +1,5 @@
 #pragma once
-// The faults that the simulated rig can have, by name (fault_list.inc): how each is switched on and off, and what it
+// The faults that the simulated rig can have, by name: how each is switched on and off, and what it
 // looks like from outside.
 
 #include <optional>
@@ -22,7 +22,7 @@ struct RigInTrouble {
 
 struct FaultKind {
   std::string_view name;
-  std::string_view unit;  ///< of its value; empty: it takes none
+  std::string_view unit = {};  ///< of its value; empty: it takes none
   double least = 0;
   double most = 0;
   double usual = 0;  ///< without a value
@@ -39,11 +39,5 @@ std::span<const FaultKind> fault_kinds();
 const FaultKind& fault_named(std::string_view name);
 /// One line each: name, usual value with unit, what it looks like.
 std::string list_of_faults();
-
-namespace faults {
-#define DIASTOLE_RIG_FAULT(function, ...) void function(RigInTrouble& rig, std::optional<double> value);
-#include "tools/sim_rig/faults/fault_list.inc"
-#undef DIASTOLE_RIG_FAULT
-}  // namespace faults
 
 }  // namespace diastole::sim_rig

@@ -1,4 +1,4 @@
-#include "tools/sim_rig/faults/fault_schedule.hpp"
+#include "tools/sim_rig/fault_schedule.hpp"
 
 #include <fmt/format.h>
 

@@ -20,7 +20,7 @@ namespace diastole::sim_rig {
 /// Draws sizes and keeps what it drew.
 class Draw {
  public:
-  Draw(PlantConfig& rig, uint64_t seed) : plant(rig), random_(seed) {}
+  Draw(PlantConfig& rig, uint64_t seed) : plant(rig), flaws(rig.flaws), random_(seed) {}
 
   /// Evenly on a logarithmic scale. Precondition: 0 < low < high.
   double within(const std::string& name, double low, double high);
@@ -29,6 +29,7 @@ class Draw {
   int whole(const std::string& name, int low, int high);
 
   PlantConfig& plant;
+  Flaws& flaws;  ///< the plant's
   std::map<std::string, double> drawn;
 
  private:
@@ -44,7 +45,6 @@ struct HiddenKind {
   [[nodiscard]] bool is_outside() const { return id.starts_with("outside:"); }
 };
 
-/// All of hidden_list.inc.
 std::span<const HiddenKind> hidden_kinds();
 
 /// Puts the named effects into the rig and returns the sealed file's text. Besides ids: "none"; "outside", one of no

@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "tools/sim_rig/faults/fault_kind.hpp"
+#include "tools/sim_rig/faults.hpp"
 
 namespace diastole::sim_rig {
 
