@@ -2,8 +2,8 @@
 
 #include <poll.h>
 #include <unistd.h>
-#include <CLI/CLI.hpp>
 
+#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <csignal>
 #include <cstdio>
@@ -21,10 +21,8 @@
 #include "protocol/contract/exit_code.hpp"
 #include "protocol/contract/input_error.hpp"
 #include "protocol/contract/table_reader.hpp"
-#include "tools/diastole/catheter/catheter.hpp"
-#include "tools/diastole/replay/replay.hpp"
-#include "tools/diastole/simulate/simulate.hpp"
-#include "tools/score/score_command.hpp"
+#include "tools/diastole/commands.hpp"
+#include "tools/score/score.hpp"
 
 namespace {
 

@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <numeric>
@@ -21,7 +20,6 @@ namespace {
 
 namespace fs = std::filesystem;
 using Ids = std::vector<std::string>;
-using Cases = std::vector<const ScoredCase*>;
 
 constexpr double separable_sigma = 8.0, precise_sigma = 20.0, separated_sigma = 5.0, longest_s = 60.0;
 
@@ -161,98 +159,87 @@ struct Target {
   std::optional<double> at_most = {};
 };
 
-class Table {
- public:
-  explicit Table(const std::vector<ScoredCase>& cases) : cases_(cases) {}
-
-  [[nodiscard]] Cases those(const std::function<bool(const ScoredCase&)>& wanted) const {
-    Cases chosen;
-    for (const ScoredCase& c : cases_)
-      if (wanted(c)) chosen.push_back(&c);
-    return chosen;
-  }
-
-  ScoreRow& share(const std::string& figure, const Target& target, const Cases& cases,
-                  const std::function<bool(const ScoredCase&)>& hit) {
-    const auto hits =
-        static_cast<size_t>(std::ranges::count_if(cases, [&](const ScoredCase* c) { return hit(*c); }));
-    return share_of(figure, target, hits, cases.size());
-  }
-  ScoreRow& share_of(const std::string& figure, const Target& target, size_t hits, size_t cases) {
-    ScoreRow row;
-    row.figure = figure;
-    row.hits = hits;
-    row.cases = cases;
-    row.value = cases == 0 ? std::nan("") : static_cast<double>(hits) / static_cast<double>(cases);
-    return add(row, target);
-  }
-  ScoreRow& value(const std::string& figure, const Target& target, const std::vector<double>& values) {
-    ScoreRow row;
-    row.figure = figure;
-    row.cases = values.size();
-    row.is_share = false;
-    row.value = median(values);
-    return add(row, target);
-  }
-  std::vector<ScoreRow> rows;
-
- private:
-  ScoreRow& add(ScoreRow row, const Target& target) {
-    const auto percent = [](double part) { return fmt::format("{:g} %", 100 * part); };
-    const auto words = [&](double part) { return row.is_share ? percent(part) : fmt::format("{:g}", part); };
-    row.target = target.at_most ? fmt::format("{} to {}", words(target.bound), words(*target.at_most))
-                                : fmt::format("{} {}", target.at_least ? ">=" : "<=", words(target.bound));
-    row.met = row.cases == 0 || (target.at_least ? row.value >= target.bound : row.value <= target.bound);
-    row.met = row.met && (row.cases == 0 || !target.at_most || row.value <= *target.at_most);
-    rows.push_back(row);
-    return rows.back();
-  }
-
-  const std::vector<ScoredCase>& cases_;
-};
-
-void add_naming(Table& table) {
-  const auto of_kind = [&](TruthKind kind) {
-    return table.those([kind](const ScoredCase& c) { return c.truth.kind == kind; });
+/// The row with its target in words, and whether it is met.
+ScoreRow judged(ScoreRow row, const Target& target) {
+  const auto words = [&](double part) {
+    return row.is_share ? fmt::format("{:g} %", 100 * part) : fmt::format("{:g}", part);
   };
-  const Cases outside = of_kind(TruthKind::outside);
-  const Cases pairs = of_kind(TruthKind::pair);
-  table
-      .share("none: falsely named", {false, 0.01}, of_kind(TruthKind::none),
-             [](const ScoredCase& c) { return c.found.verdict == Verdict::named; })
-      .decisive = true;
-  table.share("single effect, separable (d >= 8): exact name", {true, 0.95},
-              table.those([](const ScoredCase& c) {
-                return c.truth.kind == TruthKind::single && !has_alternatives(c.truth) &&
-                       !(c.truth.size_sigma < separable_sigma);
-              }),
-              is_right);
-  table.share("pairs: both exact", {true, 0.80}, pairs, is_right);
-  table.share("pairs: any false name", {false, 0.05}, pairs, has_false_name);
-  table
-      .share("outside the library: abstains", {true, 0.85}, outside,
-             [](const ScoredCase& c) { return c.found.verdict == Verdict::unexplained; })
-      .decisive = true;
-  table
-      .share("outside the library: confidently wrong", {false, 0.10}, outside,
-             [](const ScoredCase& c) { return c.found.verdict == Verdict::named; })
-      .decisive = true;
-  const Cases open = table.those([](const ScoredCase& c) {
-    return c.truth.kind == TruthKind::inseparable ||
-           (c.truth.kind == TruthKind::single && has_alternatives(c.truth));
-  });
-  table.share("inseparable: truth inside the ambiguity set", {true, 0.97}, open, is_inside);
-  table.share("inseparable: proposed experiment separates it (predicted, 5 sigma)", {true, 0.97},
-              table.those([](const ScoredCase& c) { return c.found.verdict == Verdict::ambiguous; }),
-              [](const ScoredCase& c) {
-                return c.found.next_experiment &&
-                       c.found.next_experiment->predicted_separation_sigma >= separated_sigma;
-              });
+  row.target = target.at_most ? fmt::format("{} to {}", words(target.bound), words(*target.at_most))
+                              : fmt::format("{} {}", target.at_least ? ">=" : "<=", words(target.bound));
+  row.met = row.cases == 0 || ((target.at_least ? row.value >= target.bound : row.value <= target.bound) &&
+                               (!target.at_most || row.value <= *target.at_most));
+  return row;
 }
 
-void add_figures(Table& table, const std::vector<ScoredCase>& cases) {
+ScoreRow share(const char* figure, const Target& target, size_t hits, size_t cases, bool decisive = false) {
+  const double value = cases == 0 ? std::nan("") : static_cast<double>(hits) / static_cast<double>(cases);
+  return judged({.figure = figure, .value = value, .hits = hits, .cases = cases, .decisive = decisive},
+                target);
+}
+
+ScoreRow middle(const char* figure, const Target& target, const std::vector<double>& values) {
+  return judged({.figure = figure, .value = median(values), .cases = values.size(), .is_share = false},
+                target);
+}
+
+template <TruthKind kind>
+bool is_of(const ScoredCase& c) {
+  return c.truth.kind == kind;
+}
+template <Verdict verdict>
+bool answers(const ScoredCase& c) {
+  return c.found.verdict == verdict;
+}
+bool is_separable(const ScoredCase& c) {
+  return is_of<TruthKind::single>(c) && !has_alternatives(c.truth) && !(c.truth.size_sigma < separable_sigma);
+}
+bool is_open(const ScoredCase& c) {
+  return is_of<TruthKind::inseparable>(c) || (is_of<TruthKind::single>(c) && has_alternatives(c.truth));
+}
+bool will_be_separated(const ScoredCase& c) {
+  return c.found.next_experiment && c.found.next_experiment->predicted_separation_sigma >= separated_sigma;
+}
+
+/// A row that says of how many of some cases something is true.
+struct ShareFigure {
+  const char* figure;
+  Target target;
+  bool (*counts)(const ScoredCase&);
+  bool (*hits)(const ScoredCase&);
+  bool decisive = false;
+};
+constexpr ShareFigure naming[] = {
+    {"none: falsely named", {false, 0.01}, is_of<TruthKind::none>, answers<Verdict::named>, true},
+    {"single effect, separable (d >= 8): exact name", {true, 0.95}, is_separable, is_right},
+    {"pairs: both exact", {true, 0.80}, is_of<TruthKind::pair>, is_right},
+    {"pairs: any false name", {false, 0.05}, is_of<TruthKind::pair>, has_false_name},
+    {"outside the library: abstains",
+     {true, 0.85},
+     is_of<TruthKind::outside>,
+     answers<Verdict::unexplained>,
+     true},
+    {"outside the library: confidently wrong",
+     {false, 0.10},
+     is_of<TruthKind::outside>,
+     answers<Verdict::named>,
+     true},
+    {"inseparable: truth inside the ambiguity set", {true, 0.97}, is_open, is_inside},
+    {"inseparable: proposed experiment separates it (predicted, 5 sigma)",
+     {true, 0.97},
+     answers<Verdict::ambiguous>,
+     will_be_separated}};
+
+std::vector<ScoreRow> rows_of(const std::vector<ScoredCase>& cases) {
+  std::vector<ScoreRow> rows;
+  for (const ShareFigure& row : naming) {
+    const auto count = std::ranges::count_if(cases, row.counts);
+    const auto hits =
+        std::ranges::count_if(cases, [&](const auto& c) { return row.counts(c) && row.hits(c); });
+    rows.push_back(
+        share(row.figure, row.target, static_cast<size_t>(hits), static_cast<size_t>(count), row.decisive));
+  }
   std::vector<double> errors, single_gaps, pair_gaps;
-  size_t covered = 0, ports = 0, ports_right = 0;
+  size_t covered = 0, ports = 0, ports_right = 0, in_time = 0;
   for (const ScoredCase& c : cases) {
     if (is_exact(c)) {
       if (!(c.truth.size_sigma < precise_sigma)) {
@@ -263,18 +250,19 @@ void add_figures(Table& table, const std::vector<ScoredCase>& cases) {
       }
       (c.truth.kind == TruthKind::pair ? pair_gaps : single_gaps).push_back(c.found.gap.closed);
     }
+    in_time += c.found.seconds <= longest_s ? 1 : 0;
     if (const auto right = is_port_right(c)) {
       ++ports;
       ports_right += *right ? 1 : 0;
     }
   }
-  table.value("parameter error at d >= 20, median", {false, 0.10}, errors);
-  table.share_of("parameter's 90 % interval covers", {true, 0.85, 0.95}, covered, errors.size());
-  table.value("gap closed on held-out runs, single, median", {true, 0.90}, single_gaps);
-  table.value("gap closed on held-out runs, pairs, median", {true, 0.80}, pair_gaps);
-  table.share_of("port of the misfit right", {true, 0.98}, ports_right, ports);
-  table.share("time a case <= 60 s", {true, 1.0}, table.those([](const ScoredCase&) { return true; }),
-              [](const ScoredCase& c) { return c.found.seconds <= longest_s; });
+  rows.push_back(middle("parameter error at d >= 20, median", {false, 0.10}, errors));
+  rows.push_back(share("parameter's 90 % interval covers", {true, 0.85, 0.95}, covered, errors.size()));
+  rows.push_back(middle("gap closed on held-out runs, single, median", {true, 0.90}, single_gaps));
+  rows.push_back(middle("gap closed on held-out runs, pairs, median", {true, 0.80}, pair_gaps));
+  rows.push_back(share("port of the misfit right", {true, 0.98}, ports_right, ports));
+  rows.push_back(share("time a case <= 60 s", {true, 1.0}, in_time, cases.size()));
+  return rows;
 }
 
 }  // namespace
@@ -285,10 +273,7 @@ bool Score::passed() const {
 
 Score score_cases(const std::vector<ScoredCase>& cases) {
   Score score;
-  Table table(cases);
-  add_naming(table);
-  add_figures(table, cases);
-  score.rows = table.rows;
+  score.rows = rows_of(cases);
   std::map<std::pair<std::string, std::string>, Confusion> confusion;
   for (const ScoredCase& c : cases) {
     const std::string hidden = hidden_words(c.truth), answer = answer_of(c.found);
@@ -366,6 +351,13 @@ std::string to_json(const Score& score) {
         {{"hidden", cell.hidden}, {"answer", cell.answer}, {"count", cell.count}, {"right", cell.right}});
   json["missing"] = score.missing;
   return json.dump(1);
+}
+
+ExitCode print_score(const std::filesystem::path& truths, const std::filesystem::path& results,
+                     const CommandOutput& out) {
+  const Score score = score_folder(truths, results);
+  fmt::print("{}", out.json ? to_json(score) + "\n" : in_words(score));
+  return score.passed() ? ExitCode::done : ExitCode::negative;
 }
 
 }  // namespace diastole::explain

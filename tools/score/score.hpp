@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "estimator/explain/verdict/explanation.hpp"
+#include "protocol/contract/command.hpp"
 #include "tools/score/truth_file.hpp"
 
 namespace diastole::explain {
@@ -21,10 +22,10 @@ struct ScoredCase {
 
 /// One line of the table of targets.
 struct ScoreRow {
-  std::string figure;  ///< "none: falsely named"
-  std::string target;  ///< "<= 1 %"
-  double value = 0.0;  ///< NaN without cases
-  size_t hits = 0;     ///< of `cases`, where the figure is a share
+  std::string figure;       ///< "none: falsely named"
+  std::string target = {};  ///< "<= 1 %"
+  double value = 0.0;       ///< NaN without cases
+  size_t hits = 0;          ///< of `cases`, where the figure is a share
   size_t cases = 0;
   bool is_share = true;
   bool met = true;        ///< also without cases
@@ -54,5 +55,11 @@ Score score_cases(const std::vector<ScoredCase>& cases);
 /// The confusion matrix as a list and the table of targets, for people.
 std::string in_words(const Score& score);
 std::string to_json(const Score& score);
+
+// `diastole explain --score TRUTHS RESULTS`.
+
+/// Prints the score; negative if a decisive row misses its target. Throws what score_folder throws.
+ExitCode print_score(const std::filesystem::path& truths, const std::filesystem::path& results,
+                     const CommandOutput& out);
 
 }  // namespace diastole::explain

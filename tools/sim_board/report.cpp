@@ -1,10 +1,17 @@
-#include "tools/sim_board/report.hpp"
-
 #include <fmt/format.h>
 
+#include <map>
 #include <nlohmann/json.hpp>
+#include <string>
+
+#include "tools/sim_board/session.hpp"
 
 namespace diastole {
+
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(BoardStatistics, core_Hz, cycles, instructions, stack_top,
+                                   stack_used_bytes, flash_operations, serial_overruns, missed_deadlines,
+                                   locked_up)
+
 namespace {
 
 constexpr uint32_t core_exception_base = 0x8000'0000;
@@ -12,22 +19,10 @@ constexpr uint32_t flash_size = 1024 * 1024, ram_size = 128 * 1024;  // of the S
 
 std::string interrupt_name(uint32_t irq) {
   if (irq < core_exception_base) return fmt::format("IRQ {}", irq);
-  switch (irq - core_exception_base) {
-    case 3:
-      return "HardFault";
-    case 5:
-      return "BusFault";
-    case 6:
-      return "UsageFault";
-    case 11:
-      return "SVCall";
-    case 14:
-      return "PendSV";
-    case 15:
-      return "SysTick";
-    default:
-      return fmt::format("exception {}", irq - core_exception_base);
-  }
+  static const std::map<uint32_t, std::string> names{{3, "HardFault"}, {5, "BusFault"}, {6, "UsageFault"},
+                                                     {11, "SVCall"},   {14, "PendSV"},  {15, "SysTick"}};
+  const auto found = names.find(irq - core_exception_base);
+  return found != names.end() ? found->second : fmt::format("exception {}", irq - core_exception_base);
 }
 
 uint64_t flash_bytes(const BoardReport& report) {
@@ -46,22 +41,14 @@ double times_real_time(const BoardReport& report) {
 
 nlohmann::json to_json(const BoardReport& report) {
   const BoardStatistics& board = report.board;
-  nlohmann::json document = {{"simulated_seconds", board_s(report)},
-                             {"wall_seconds", report.wall_s},
-                             {"times_real_time", times_real_time(report)},
-                             {"core_Hz", board.core_Hz},
-                             {"cycles", board.cycles},
-                             {"instructions", board.instructions},
-                             {"steps", report.steps},
-                             {"triggers", report.triggers},
-                             {"flash_bytes", flash_bytes(report)},
-                             {"stack_top", board.stack_top},
-                             {"stack_used_bytes", board.stack_used_bytes},
-                             {"flash_operations", board.flash_operations},
-                             {"serial_overruns", board.serial_overruns},
-                             {"missed_deadlines", board.missed_deadlines},
-                             {"fault", board.last_fault},
-                             {"locked_up", board.locked_up}};
+  nlohmann::json document = board;
+  document.update({{"simulated_seconds", board_s(report)},
+                   {"wall_seconds", report.wall_s},
+                   {"times_real_time", times_real_time(report)},
+                   {"steps", report.steps},
+                   {"triggers", report.triggers},
+                   {"flash_bytes", flash_bytes(report)},
+                   {"fault", board.last_fault}});
   for (const Image& image : report.images) {
     nlohmann::json one = {{"file", image.file}, {"flash_bytes", image.flash_bytes}};
     if (image.static_ram_bytes) one["static_ram_bytes"] = *image.static_ram_bytes;

@@ -61,6 +61,50 @@ bool readable(int descriptor) {
   return ::poll(&state, 1, 0) > 0;
 }
 
+/// When a button is pressed or a switch is closed from outside, and when it is let go.
+struct Span {
+  double from_s = 0;
+  std::optional<double> to_s;
+};
+struct LimitAt {
+  Span span;
+  bool far = false;
+};
+
+std::optional<double> parse_time(const std::string& text) {
+  try {
+    std::size_t used = 0;
+    const double time_s = std::stod(text, &used);
+    if (used == text.size() && std::isfinite(time_s) && time_s >= 0) return time_s;
+  } catch (const std::exception&) {
+    return std::nullopt;
+  }
+  return std::nullopt;
+}
+
+/// "2.5" or "2.5..4"; throws InputError, naming `option`, for anything else.
+Span parse_span(const std::string& text, const std::string& option) {
+  const auto dots = text.find("..");
+  const auto from_s = parse_time(text.substr(0, dots));
+  if (dots == std::string::npos) {
+    if (from_s) return {*from_s, std::nullopt};
+  } else if (const auto to_s = parse_time(text.substr(dots + 2)); from_s && to_s && *to_s > *from_s) {
+    return {*from_s, *to_s};
+  }
+  throw InputError({"", option, fmt::format("'{}' is no time, nor one time and a later one", text),
+                    "Write seconds, such as 2.5 or 2.5..4."});
+}
+
+/// "2.5:home", "2.5..4:far"; throws InputError for anything else.
+LimitAt parse_limit(const std::string& text) {
+  const auto colon = text.find(':');
+  const std::string which = colon == std::string::npos ? "" : text.substr(colon + 1);
+  if (which == "home" || which == "far")
+    return {parse_span(text.substr(0, colon), "--limit-at"), which == "far"};
+  throw InputError(
+      {"", "--limit-at", fmt::format("'{}' is no time and switch", text), "Write 2.5:home or 2.5..4:far."});
+}
+
 class Session {
  public:
   Session(const SessionOptions& options, std::vector<Image> images)
@@ -153,42 +197,6 @@ class Session {
 };
 
 }  // namespace
-
-namespace {
-
-std::optional<double> parse_time(const std::string& text) {
-  try {
-    std::size_t used = 0;
-    const double time_s = std::stod(text, &used);
-    if (used == text.size() && std::isfinite(time_s) && time_s >= 0) return time_s;
-  } catch (const std::exception&) {
-    return std::nullopt;
-  }
-  return std::nullopt;
-}
-
-}  // namespace
-
-Span parse_span(const std::string& text, const std::string& option) {
-  const auto dots = text.find("..");
-  const auto from_s = parse_time(text.substr(0, dots));
-  if (dots == std::string::npos) {
-    if (from_s) return {*from_s, std::nullopt};
-  } else if (const auto to_s = parse_time(text.substr(dots + 2)); from_s && to_s && *to_s > *from_s) {
-    return {*from_s, *to_s};
-  }
-  throw InputError({"", option, fmt::format("'{}' is no time, nor one time and a later one", text),
-                    "Write seconds, such as 2.5 or 2.5..4."});
-}
-
-LimitAt parse_limit(const std::string& text) {
-  const auto colon = text.find(':');
-  const std::string which = colon == std::string::npos ? "" : text.substr(colon + 1);
-  if (which == "home" || which == "far")
-    return {parse_span(text.substr(0, colon), "--limit-at"), which == "far"};
-  throw InputError(
-      {"", "--limit-at", fmt::format("'{}' is no time and switch", text), "Write 2.5:home or 2.5..4:far."});
-}
 
 BoardReport run_session(const SessionOptions& options, int stop) {
   std::vector<Image> images;

@@ -3,28 +3,26 @@
 // that is kept in a file, power cuts.
 
 #include <cstdint>
+#include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "tools/sim_board/report.hpp"
+#include "tools/sim_board/image_file.hpp"
+#include "tools/sim_board/sim_board.hpp"
 
 namespace diastole {
 
-/// When a button is pressed or a switch is closed from outside, and when it is let go.
-struct Span {
-  double from_s = 0;
-  std::optional<double> to_s;
+/// What a run on the emulated board has shown, for a person and as JSON.
+struct BoardReport {
+  BoardStatistics board;
+  std::vector<Image> images;
+  uint64_t steps = 0, triggers = 0;
+  double wall_s = 0;
 };
-/// "2.5" or "2.5..4"; throws InputError, naming `option`, for anything else.
-Span parse_span(const std::string& text, const std::string& option);
 
-struct LimitAt {
-  Span span;
-  bool far = false;
-};
-/// "2.5:home", "2.5..4:far"; throws InputError for anything else.
-LimitAt parse_limit(const std::string& text);
+nlohmann::json to_json(const BoardReport& report);
+std::string to_text(const BoardReport& report);
 
 struct SessionOptions {
   std::vector<std::string> images;

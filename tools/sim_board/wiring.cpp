@@ -1,4 +1,4 @@
-#include "tools/sim_board/wiring.hpp"
+#include "tools/sim_board/emulated_controller.hpp"
 
 #include "firmware/core/r_wave.hpp"
 

@@ -7,11 +7,21 @@
 #include <string>
 #include <string_view>
 
+#include "tools/sim_controller/pty_line.hpp"
 #include "tools/sim_daq/modbus_instrument.hpp"
-#include "tools/sim_rig/cables.hpp"
 #include "tools/sim_rig/rig.hpp"
 
 namespace diastole::sim_rig {
+
+/// The cables that lead away from the controller, and what may be wrong with them.
+struct Cables {
+  explicit Cables(const std::filesystem::path& link) : line(link) {}
+
+  sim_controller::PtyLine line;  ///< to the host
+  bool to_host = true;           ///< whether what the controller sends gets through
+  bool from_host = true;         ///< and what the host sends
+  bool to_scanner = true;        ///< TTL and R-wave
+};
 
 /// What a fault can reach.
 struct RigInTrouble {

@@ -20,7 +20,6 @@
 
 #include "tools/sim_controller/pin_trace.hpp"
 #include "tools/sim_daq/modbus_instrument.hpp"
-#include "tools/sim_rig/cables.hpp"
 #include "tools/sim_rig/conductor_server.hpp"
 #include "tools/sim_rig/control_server.hpp"
 #include "tools/sim_rig/playback.hpp"

@@ -9,7 +9,7 @@
 #include "tests/tools/benchmarks/image.hpp"
 #include "tools/benchmarks/emulated_session.hpp"
 #include "tools/benchmarks/step_rate.hpp"
-#include "tools/sim_board/wiring.hpp"
+#include "tools/sim_board/emulated_controller.hpp"
 
 namespace diastole::step_path_test {
 namespace {

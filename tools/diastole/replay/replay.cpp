@@ -1,4 +1,4 @@
-#include "tools/diastole/replay/replay.hpp"
+#include "tools/diastole/commands.hpp"
 
 #include <fmt/format.h>
 #include <unistd.h>

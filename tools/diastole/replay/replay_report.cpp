@@ -5,6 +5,10 @@
 #include <algorithm>
 
 namespace diastole::replay {
+
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Comparison, triggers_equal, steps_equal, samples_equal, missing_equal,
+                                   pressure_equal, events_equal, max_trigger_diff_s, max_steps_diff,
+                                   max_abs_diff_kPa, tolerance_kPa, start_phase_s, max_sample_time_diff_s)
 namespace {
 
 const char* name_of(Verdict verdict) {
@@ -82,29 +86,19 @@ nlohmann::json as_json(const ReplayReport& report) {
   if (found.first) {
     first = {{"time_s", found.first->time_s}, {"cycle", found.first->cycle}, {"text", found.first->text}};
   }
-  return {{"run", report.recorded},
-          {"replayed", report.replayed.empty() ? json() : json(report.replayed)},
-          {"firmware", report.firmware},
-          {"equal", found.equal()},
-          {"triggers_equal", found.triggers_equal},
-          {"steps_equal", found.steps_equal},
-          {"samples_equal", found.samples_equal},
-          {"missing_equal", found.missing_equal},
-          {"pressure_equal", found.pressure_equal},
-          {"events_equal", found.events_equal},
-          {"max_trigger_diff_s", found.max_trigger_diff_s},
-          {"max_steps_diff", found.max_steps_diff},
-          {"max_abs_diff_kPa", found.max_abs_diff_kPa},
-          {"tolerance_kPa", found.tolerance_kPa},
-          {"start_phase_s", found.start_phase_s},
-          {"max_sample_time_diff_s", found.max_sample_time_diff_s},
-          {"sample_times_equal", found.samples_in_time()},
-          {"host_drift_ppm", report.plan.host_drift_ppm},
-          {"first_difference", first},
-          {"lines", lines},
-          {"remarks", report.plan.remarks},
-          {"simulated_seconds", report.simulated_s},
-          {"wall_seconds", report.wall_s}};
+  json document = found;
+  document.update({{"run", report.recorded},
+                   {"replayed", report.replayed.empty() ? json() : json(report.replayed)},
+                   {"firmware", report.firmware},
+                   {"equal", found.equal()},
+                   {"sample_times_equal", found.samples_in_time()},
+                   {"host_drift_ppm", report.plan.host_drift_ppm},
+                   {"first_difference", first},
+                   {"lines", lines},
+                   {"remarks", report.plan.remarks},
+                   {"simulated_seconds", report.simulated_s},
+                   {"wall_seconds", report.wall_s}});
+  return document;
 }
 
 }  // namespace diastole::replay

@@ -1,4 +1,4 @@
-#include "tools/diastole/simulate/simulate.hpp"
+#include "tools/diastole/commands.hpp"
 
 #include <fmt/format.h>
 #include <unistd.h>

@@ -9,10 +9,11 @@
 // for, so the same edges and seed give the same readings. Rest pressure is zero. It shares no code with the
 // estimator.
 
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <numbers>
 
-#include "tools/sim_rig/plant/air_bubble.hpp"
 #include "tools/sim_rig/plant/flaws.hpp"
 #include "tools/sim_rig/plant/hose.hpp"
 #include "tools/sim_rig/plant/piston.hpp"
@@ -21,6 +22,27 @@
 #include "tools/sim_rig/plant/specimen.hpp"
 
 namespace diastole::sim_rig {
+
+/// An air bubble: its volume V falls as the absolute pressure rises, at constant temperature (Boyle, n = 1) or faster
+/// than heat goes through its surface (n up to 1.4),
+///
+///   V(p) = V_rest (p_a / (p_a + p))^(1/n),   p_a = 101.325 kPa
+///
+/// so beside the gel it is a compliance of -dV/dp and takes its share of what the piston displaces.
+struct AirBubble {
+  double rest_mL = 0;  ///< at rest pressure
+  double exponent = 1;
+
+  static constexpr double atmospheric_kPa = 101.325;
+
+  /// Precondition: pressure_kPa > -atmospheric_kPa, or no bubble.
+  [[nodiscard]] double compliance_mL_per_kPa(double pressure_kPa) const {
+    if (rest_mL == 0) return 0;
+    const double absolute_kPa = atmospheric_kPa + pressure_kPa;
+    if (exponent == 1) return rest_mL * atmospheric_kPa / (absolute_kPa * absolute_kPa);
+    return rest_mL / exponent * std::pow(atmospheric_kPa / absolute_kPa, 1 / exponent) / absolute_kPa;
+  }
+};
 
 struct PlantConfig {
   HoseConfig hose;
@@ -35,15 +57,39 @@ struct PlantConfig {
 
 class Plant {
  public:
-  explicit Plant(const PlantConfig& config);
+  explicit Plant(const PlantConfig& config)
+      : minor_loss_K_(config.minor_loss_K),
+        hose_(config.hose),
+        specimen_(config.C1_kPa, config.flaws.specimen),
+        screw_(config.flaws.drive, config.seed),
+        piston_(config.piston_lag_ms, hose_.step_s()),
+        cavity_sensor_(with_flaws(config.cavity, config.flaws.sensors, true), hose_.step_s(),
+                       2 * config.seed),
+        pump_sensor_(with_flaws(config.pump, config.flaws.sensors, false), hose_.step_s(),
+                     2 * config.seed + 1),
+        loss_kPa_s2_per_mL2_(loss_factor(config)),
+        pump_gas_{config.flaws.pump.gas_mL, gas_exponent},
+        pump_leak_mL_s_kPa_(config.flaws.pump.leak_mL_s_kPa),
+        cavity_flaws_(config.flaws.cavity),
+        leak_mL_s_kPa_(cavity_flaws_.leak_mL_s_kPa),
+        bubble_{cavity_flaws_.gas_mL, gas_exponent} {}
 
   /// The controller has displaced `volume_mL` in all since `time_s` (not before the plant's present).
   void displace(double time_s, double volume_mL) { piston_.displace(time_s, screw_.follow(volume_mL)); }
   /// The controller's TTL has risen.
-  void begin_cycle();
+  void begin_cycle() {
+    screw_.begin_cycle();
+    specimen_.begin_cycle();
+    cavity_sensor_.begin_cycle();
+    pump_sensor_.begin_cycle();
+  }
 
   /// Moves to `time_s`; every edge up to then must have been handed over.
-  void advance_to(double time_s);
+  void advance_to(double time_s) {
+    while (static_cast<double>(step_count_ + 1) * step_s() <= time_s)
+      step();
+    since_step_s_ = time_s - static_cast<double>(step_count_) * step_s();
+  }
 
   /// What the transducers show now (at the last advance_to).
   [[nodiscard]] double cavity_reading_kPa() const { return cavity_sensor_.reading_kPa(since_step_s_); }
@@ -70,15 +116,81 @@ class Plant {
   [[nodiscard]] double step_s() const { return hose_.step_s(); }
 
  private:
-  void step();
-  /// The flow into the cavity at the step's end, from the hose's characteristic, cannula loss and gel.
-  [[nodiscard]] double solve_outlet_flow_mL_s() const;
-  /// What of the piston's flow enters the hose, beside gas and leak at the pump.
-  [[nodiscard]] double entering_flow_mL_s() const;
+  static double loss_factor(const PlantConfig& config) {
+    const double area_m2 = std::numbers::pi / 4 * config.hose.bore_mm * config.hose.bore_mm * 1e-6;
+    constexpr double m3_per_mL = 1e-6;
+    constexpr double kPa_per_Pa = 1e-3;
+    return 0.5 * config.hose.fluid_density_kg_m3 / (area_m2 * area_m2) * m3_per_mL * m3_per_mL * kPa_per_Pa;
+  }
 
-  void take_disturbances();
+  static constexpr double gas_exponent = 1.2;  // between constant temperature and no exchange of heat
+
+  /// The sensor with the flaws that concern it.
+  static SensorConfig with_flaws(SensorConfig sensor, const SensorFlaws& flaws, bool at_cavity) {
+    sensor.flaws = flaws;
+    if (!at_cavity) sensor.flaws.gain = sensor.flaws.step_kPa = sensor.flaws.drift_kPa_s = 0;
+    return sensor;
+  }
+
+  void step() {
+    const double cavity_before_kPa = cavity_kPa();
+    const double pump_before_kPa = pump_end_kPa();
+    piston_.advance();
+    take_disturbances();
+    const double flow_mL_s = solve_outlet_flow_mL_s();
+    hose_.advance(entering_flow_mL_s(), flow_mL_s);
+    cavity_mL_ += gel_inflow_mL(flow_mL_s);
+    outlet_flow_mL_s_ = flow_mL_s;
+    specimen_.pass(cavity_mL_, step_s());
+    ++step_count_;
+    cavity_sensor_.advance(0.5 * (cavity_before_kPa + cavity_kPa()));
+    pump_sensor_.advance(0.5 * (pump_before_kPa + pump_end_kPa()));
+  }
+  /// The flow into the cavity at the step's end, from the hose's characteristic, cannula loss and gel.
+  [[nodiscard]] double solve_outlet_flow_mL_s() const {
+    const Characteristic line = hose_.outlet();
+    const double kink_K = cavity_mL_ > cavity_flaws_.kink_above_mL ? cavity_flaws_.kink_K : 0;
+    const double loss_kPa_s2_per_mL2 = loss_kPa_s2_per_mL2_ * (minor_loss_K_ + blockage_K_ + kink_K);
+    double flow = outlet_flow_mL_s_;
+    const double half_step_s = 0.5 * step_s() * gel_share_;
+    // Newton on a strictly increasing residual that is nearly linear (the line's impedance dominates).
+    for (int iteration = 0; iteration < 20; ++iteration) {
+      const double volume_mL = cavity_mL_ + gel_inflow_mL(flow);
+      const double residual = specimen_.pressure_kPa(volume_mL) +
+                              loss_kPa_s2_per_mL2 * flow * std::abs(flow) +
+                              line.impedance_kPa_s_per_mL * flow - line.pressure_kPa;
+      const double slope = specimen_.stiffness_kPa_per_mL(volume_mL) * half_step_s +
+                           2 * loss_kPa_s2_per_mL2 * std::abs(flow) + line.impedance_kPa_s_per_mL;
+      const double change = residual / slope;
+      flow -= change;
+      if (std::abs(change) < 1e-12) break;
+    }
+    return flow;
+  }
+  /// What of the piston's flow enters the hose, beside gas and leak at the pump.
+  [[nodiscard]] double entering_flow_mL_s() const {
+    const double swallows_mL_kPa = pump_gas_.compliance_mL_per_kPa(pump_end_kPa()) / step_s();
+    const double loses = pump_leak_mL_s_kPa_;
+    if (swallows_mL_kPa == 0 && loses == 0) return piston_.flow_mL_s();
+    // p = line.p + z Q and Q = Q_piston - C (p - p_before) / dt - G p.
+    const Characteristic line = hose_.inlet();
+    const double z = line.impedance_kPa_s_per_mL;
+    const double pressure_kPa =
+        (line.pressure_kPa + z * (piston_.flow_mL_s() + swallows_mL_kPa * pump_end_kPa())) /
+        (1 + z * (swallows_mL_kPa + loses));
+    return (pressure_kPa - line.pressure_kPa) / z;
+  }
+
+  /// The leak's flow and the bubble's share are those of the step's beginning: both change little in half a millisecond.
+  void take_disturbances() {
+    leaked_mL_ = leak_mL_s_kPa_ * cavity_kPa() * step_s();
+    gel_share_ =
+        1 / (1 + bubble_.compliance_mL_per_kPa(cavity_kPa()) * specimen_.stiffness_kPa_per_mL(cavity_mL_));
+  }
   /// Volume that enters the gel in a step with this flow at its end, beside bubble and leak.
-  [[nodiscard]] double gel_inflow_mL(double flow_mL_s) const;
+  [[nodiscard]] double gel_inflow_mL(double flow_mL_s) const {
+    return gel_share_ * (0.5 * step_s() * (outlet_flow_mL_s_ + flow_mL_s) - leaked_mL_);
+  }
 
   double minor_loss_K_;
   Hose hose_;

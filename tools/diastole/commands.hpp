@@ -1,0 +1,15 @@
+#pragma once
+// The front door's own commands.
+
+#include "protocol/contract/command.hpp"
+
+namespace diastole {
+
+/// `diastole catheter`: the paper's test of catheter and transducer, from a recorded step of pressure.
+void add_catheter(CommandLine& line);
+/// `diastole replay`: a recorded run once more, through simulated instrument, the real firmware and the real daemon.
+void add_replay(CommandLine& line);
+/// `diastole simulate`: a whole session without hardware, through the real daemon.
+void add_simulate(CommandLine& line);
+
+}  // namespace diastole
