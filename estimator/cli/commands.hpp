@@ -24,6 +24,18 @@ using ExplanationScorer = std::function<ExitCode(
 /// `score` is what `diastole explain --score` runs: nothing of the estimator knows what was hidden.
 void add_explain(CommandLine& line, const ExplanationScorer& score);
 
-void add_estimator_commands(CommandLine& line, const ExplanationScorer& score);
+inline void add_estimator_commands(CommandLine& line, const ExplanationScorer& score) {
+  add_solve(line);
+  add_pressure_volume(line);
+  add_reconstruct(line);
+  add_fit(line);
+  add_montecarlo(line);
+  add_design(line);
+  add_shear(line);
+  add_report(line);
+  add_mesh(line);
+  add_effects(line);
+  add_explain(line, score);
+}
 
 }  // namespace diastole

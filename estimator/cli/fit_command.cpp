@@ -8,8 +8,8 @@
 #include <optional>
 
 #include "estimator/cli/commands.hpp"
-#include "estimator/cli/findings_text.hpp"
 #include "estimator/cli/interruption.hpp"
+#include "estimator/cli/output_files.hpp"
 #include "estimator/cli/study_options.hpp"
 #include "estimator/fit/study_fit.hpp"
 #include "estimator/io/study_fingerprint.hpp"

@@ -16,7 +16,6 @@
 #include "estimator/io/whole_file.hpp"
 #include "estimator/montecarlo/cells_file.hpp"
 #include "estimator/montecarlo/montecarlo.hpp"
-#include "estimator/montecarlo/paper_table.hpp"
 #include "estimator/montecarlo/worker_pool.hpp"
 #include "protocol/contract/input_error.hpp"
 

@@ -1,5 +1,7 @@
 #include "estimator/cli/output_files.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 
 #include "estimator/io/whole_file.hpp"
@@ -18,6 +20,13 @@ void OutputFiles::require(const std::vector<std::filesystem::path>& inputs, std:
     const auto kind = std::ranges::find(kinds, file.extension().string(), &OutputKind::ending);
     if (kind == kinds.end()) throw InputError({file.string(), "", problem, remedy});
     require_output({file, inputs, kind->mark, force});
+  }
+}
+
+void print_findings(const std::vector<Finding>& findings, std::FILE* stream) {
+  for (const Finding& finding : findings) {
+    fmt::print(stream, "{}: {} [{}]\n  {}\n", describe(finding.severity), finding.what, finding.where,
+               finding.remedy);
   }
 }
 

@@ -2,11 +2,14 @@
 // `-o FILE -o FILE ... --force`: several outputs of one command, whose endings say what is written to them.
 
 #include <CLI/CLI.hpp>
+#include <cstdio>
 #include <filesystem>
 #include <span>
 #include <string>
 #include <string_view>
 #include <vector>
+
+#include "estimator/io/finding.hpp"
 
 namespace diastole {
 
@@ -28,5 +31,10 @@ struct OutputFiles {
   void require(const std::vector<std::filesystem::path>& inputs, std::span<const OutputKind> kinds,
                const std::string& problem, const std::string& remedy) const;
 };
+
+// Findings for people.
+
+/// Two lines a finding: what and where, and the remedy.
+void print_findings(const std::vector<Finding>& findings, std::FILE* stream);
 
 }  // namespace diastole

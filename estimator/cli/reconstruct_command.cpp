@@ -8,7 +8,6 @@
 #include <optional>
 
 #include "estimator/cli/commands.hpp"
-#include "estimator/cli/findings_text.hpp"
 #include "estimator/cli/output_files.hpp"
 #include "estimator/cli/study_options.hpp"
 #include "estimator/io/measurement.hpp"

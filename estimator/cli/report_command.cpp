@@ -19,7 +19,7 @@ struct ReportArguments {
 
 ExitCode run_report(const ReportArguments& arguments, const CommandOutput& out) {
   require_output({arguments.page, arguments.files, report::page_mark, arguments.force});
-  const std::string html = report::make_report(arguments.files, {.frames = arguments.frames});
+  const std::string html = report::make_report(arguments.files, arguments.frames);
   write_whole_file(arguments.page, html);
   if (out.json) {
     nlohmann::ordered_json json = {{"page", arguments.page.string()}, {"bytes", html.size()}};

@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <array>
 #include <charconv>
 #include <cmath>
 #include <cstdio>
@@ -9,25 +10,65 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <numeric>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "estimator/cli/commands.hpp"
+#include "estimator/cli/output_files.hpp"
 #include "estimator/cli/solution_json.hpp"
-#include "estimator/cli/solution_outputs.hpp"
 #include "estimator/cli/study_options.hpp"
 #include "estimator/fe/elastic_system.hpp"
 #include "estimator/fe/point_fields.hpp"
 #include "estimator/io/measurement.hpp"
 #include "estimator/io/study.hpp"
+#include "estimator/io/whole_file.hpp"
 #include "estimator/mesh/point_locator.hpp"
 #include "estimator/model/affected_model.hpp"
 #include "estimator/model/study_model.hpp"
+#include "estimator/solution/solution_grid.hpp"
+#include "estimator/solution/solution_record.hpp"
 #include "protocol/contract/input_error.hpp"
 
 namespace diastole {
 namespace {
+
+// `diastole solve -o FILE ...`: the files a solution is written to, chosen by their endings.
+//
+//   .vtkhdf   Bezier hexahedra for ParaView (estimator/solution/solution_grid.hpp)
+//   .csv      strain and stress at the Gauss points (estimator/solution/solution_grid.hpp)
+//   .json     sections and profiles of the last frame for `diastole report` (estimator/io/solution_file.hpp)
+
+constexpr std::array kinds{vtkhdf_kind, OutputKind{".csv", "frame,time_s,pressure_kPa,element,point"},
+                           OutputKind{".json", solution_file_mark}};
+
+SolutionRecord record_of(const Study& study, const ElasticModel& model, const ElasticState& state) {
+  SolutionRecord record = solution_record(model, state);
+  record.study = study.file.string();
+  for (const StudyParameter& parameter : study.law.parameters)
+    record.parameters.emplace_back(parameter.name, parameter.start);
+  record.mesh = mesh_of(study.specimen);
+  return record;
+}
+
+/// Before the work. Throws InputError if a file has another ending, or may not be replaced.
+void require_outputs(const OutputFiles& outputs, const Study& study) {
+  outputs.require(
+      inputs_of(study), kinds, "is no kind of file that a solution is written to",
+      "End it in .vtkhdf (for ParaView), .csv (stress and strain at the Gauss points) or .json (for "
+      "`diastole report`).");
+}
+
+void write_outputs(const OutputFiles& outputs, const Study& study, const ElasticModel& model,
+                   std::span<const SolvedFrame> frames) {
+  for (const std::filesystem::path& file : outputs.files) {
+    if (file.extension() == ".vtkhdf") write_vtkhdf(file, solution_grid(model, frames));
+    if (file.extension() == ".csv") write_whole_file(file, gauss_table(model, frames));
+    if (file.extension() == ".json")
+      write_whole_file(file, to_json(record_of(study, model, frames.back().state)));
+  }
+}
 
 struct SolveArguments {
   StudyOptions study;

@@ -57,7 +57,7 @@ Explanation explain_study(const Study& study, const ExplainOptions& options) {
          .remedy = "List the session's runs: runs = [\"baseline.run.h5\"], or tags and frames."});
   }
   if (!imaged) return explain_rig(study, options);
-  Explanation field = explain_field(study, {.progress = options.progress});
+  Explanation field = explain_field(study, options.progress);
   if (study.data.runs.empty()) return field;
   return merged(explain_rig(study, options), std::move(field));
 }

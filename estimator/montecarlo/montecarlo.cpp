@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -73,6 +74,25 @@ ParameterSpread spread_of(const StudyParameter& parameter, const std::vector<dou
                  spread.mean + inference::normal_95 * spread.sd};
   return spread;
 }
+
+struct PaperRow {
+  double noise_mm;
+  int frames;
+  std::array<double, 4> sd_percent;
+};
+
+constexpr std::array<PaperRow, 12> papers_table{{{0.4, 1, {5, 4, 3, 4}},
+                                                 {0.4, 3, {1, 1, 1, 1}},
+                                                 {0.4, 5, {1, 1, 1, 1}},
+                                                 {0.8, 1, {10, 7, 7, 13}},
+                                                 {0.8, 3, {1, 2, 1, 2}},
+                                                 {0.8, 5, {2, 2, 2, 3}},
+                                                 {1.6, 1, {21, 16, 13, 22}},
+                                                 {1.6, 3, {4, 4, 7, 5}},
+                                                 {1.6, 5, {6, 4, 6, 8}},
+                                                 {3.2, 1, {57, 28, 20, 43}},
+                                                 {3.2, 3, {15, 12, 14, 20}},
+                                                 {3.2, 5, {6, 5, 9, 9}}}};
 
 }  // namespace
 
@@ -173,6 +193,14 @@ std::vector<TableEntry> table_of(const MonteCarloPlan& plan, const Study& study,
     }
   }
   return table;
+}
+
+std::optional<std::array<double, 4>> paper_sd_percent(double noise_mm, int frames) {
+  const auto found = std::find_if(papers_table.begin(), papers_table.end(), [&](const PaperRow& row) {
+    return std::abs(row.noise_mm - noise_mm) < 1e-9 && row.frames == frames;
+  });
+  if (found == papers_table.end()) return {};
+  return found->sd_percent;
 }
 
 }  // namespace diastole

@@ -3,7 +3,7 @@
 // (Augenstein et al. 2005, Table 1: noise levels by numbers of frames).
 //
 // The truth is the study's start values and its frames' measured pressures; the points are the study's own, or those
-// of a tag grid (tag_grid.hpp). A cell is one refit; cells of equal noise and number of frames make an entry of the
+// of a tag grid (synthetic_data.hpp). A cell is one refit; cells of equal noise and number of frames make an entry of the
 // table. Repeat 0 is fitted to data without noise, its size being stated nevertheless: its standard errors are the
 // Cramér–Rao bound of the design, below which no unbiased estimator's can be.
 
@@ -15,7 +15,7 @@
 
 #include "estimator/io/measurement.hpp"
 #include "estimator/io/study.hpp"
-#include "estimator/montecarlo/tag_grid.hpp"
+#include "estimator/montecarlo/synthetic_data.hpp"
 
 namespace diastole {
 
@@ -86,5 +86,11 @@ struct TableEntry {
 /// interval as a factor, as the fit does.
 std::vector<TableEntry> table_of(const MonteCarloPlan& plan, const Study& study,
                                  const std::vector<CellResult>& results);
+
+// Table 1 of Augenstein et al. (J. Biomech. Eng. 127 (2005) 148): standard deviations of C, b1, b2, b3 of the paper's Eq. 5,
+// in % of their mean, over ten refits of 3-D points with so much noise in so many frames.
+
+/// C, b1, b2, b3 for one of the table's noises (0.4, 0.8, 1.6, 3.2 mm) and numbers of frames (1, 3, 5).
+std::optional<std::array<double, 4>> paper_sd_percent(double noise_mm, int frames);
 
 }  // namespace diastole

@@ -9,7 +9,7 @@
 
 #include "estimator/fe/gauss_points.hpp"
 #include "estimator/mesh/bezier.hpp"
-#include "estimator/solution/drawn_sections.hpp"
+#include "estimator/solution/body_section.hpp"
 
 namespace diastole {
 namespace {

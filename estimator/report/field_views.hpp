@@ -14,7 +14,7 @@
 #include <vector>
 
 #include "estimator/explain/verdict/explanation.hpp"
-#include "estimator/report/heat_map.hpp"
+#include "estimator/report/explanation_drawings.hpp"
 
 namespace diastole::report {
 

@@ -127,6 +127,17 @@ void add_elements(Page& page, const ReconstructionRecord& record) {
 
 }  // namespace
 
+void add_findings(Page& page, const std::vector<Finding>& findings) {
+  for (const Finding& finding : findings) {
+    const std::string text = fmt::format("{} {} ({})", finding.what, finding.remedy, finding.where);
+    if (finding.severity == Severity::note) {
+      page.paragraph(text);
+    } else {
+      page.warning(text);
+    }
+  }
+}
+
 void add_reconstruction(Page& page, const ReconstructionRecord& record) {
   page.section(
       "Displacement from the images",

@@ -45,7 +45,7 @@ std::string explanation_title(const std::vector<explain::Explanation>& explanati
 
 }  // namespace
 
-std::string make_report(std::span<const std::filesystem::path> files, const ReportOptions& options) {
+std::string make_report(std::span<const std::filesystem::path> files, size_t frames) {
   std::map<Kind, std::vector<std::function<void(Page&)>>> parts;  // in the order of the page
   std::vector<explain::Explanation> explanations;
   const auto add = [&](Kind kind, auto read, auto draw) {
@@ -56,7 +56,7 @@ std::string make_report(std::span<const std::filesystem::path> files, const Repo
     const std::string name = file.string();
     if (is_hdf5(content)) {
       add(Kind::run, runfile::read_run(file),
-          [&](Page& page, const runfile::RecordedRun& run) { add_run(page, run, options.frames); });
+          [&](Page& page, const runfile::RecordedRun& run) { add_run(page, run, frames); });
     } else if (is_shear_test(content)) {
       add(Kind::shear_test, shear_test_from_text(content, name),
           [](Page& page, const ShearTest& test) { add_shear(page, test, fit_shear(test)); });

@@ -11,13 +11,9 @@
 
 namespace diastole::report {
 
-struct ReportOptions {
-  size_t frames = 16;  ///< image frames of a cycle
-};
-
 /// The page's HTML. Files are recognised by their content; explanations come first, then fits, then
-/// shear tests, then runs, each in the given order. Throws InputError for a file that is missing, unreadable or of no kind that the report knows.
-std::string make_report(std::span<const std::filesystem::path> files, const ReportOptions& options);
+/// shear tests, then runs, each in the given order. `frames`: image frames of a cycle. Throws InputError for a file that is missing, unreadable or of no kind that the report knows.
+std::string make_report(std::span<const std::filesystem::path> files, size_t frames = 16);
 
 /// The same page of an explanation at hand.
 std::string make_report(const explain::Explanation& explanation);

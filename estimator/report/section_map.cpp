@@ -90,8 +90,8 @@ std::string length_bar(const SolutionSection& section, const Scale& scale) {
 
 }  // namespace
 
-std::string section_map(const SolutionSection& section, const NamedField& field,
-                        const SectionMapLabels& labels) {
+std::string section_map(const SolutionSection& section, const NamedField& field, const std::string& bar_label,
+                        const std::string& after_title) {
   const Scale scale = scale_of(section);
   const ColourScale colours{colour_range(field.values)};
   const double after = panel_width + panel_gap;
@@ -103,12 +103,12 @@ std::string section_map(const SolutionSection& section, const NamedField& field,
       lines(section.elements_before, "element-line", scale) + lines(section.outline_before, "outline", scale);
   body +=
       fmt::format("<g transform=\"translate({} 0)\"><text x=\"{}\" y=\"14\" text-anchor=\"middle\">{}</text>",
-                  after, 0.5 * panel_width, escaped(labels.after));
+                  after, 0.5 * panel_width, escaped(after_title));
   body += panel(section.cells_after, field.values, colours, scale);
   body += lines(section.elements_after, "element-line", scale) +
           lines(section.outline_after, "outline", scale) +
           lines(section.outline_before, "outline before", scale) + "</g>";
-  body += colour_bar(colours, labels.bar, bar) + length_bar(section, scale);
+  body += colour_bar(colours, bar_label, bar) + length_bar(section, scale);
   return drawing(bar_left + bar.width + bar.room, title_height + scale.height + foot_height, body);
 }
 
@@ -119,7 +119,7 @@ std::vector<Figure> section_maps(const std::vector<SolutionSection>& sections, c
     const NamedField* field = find_field(section.fields, map.field);
     if (field == nullptr || section.cells_before.empty()) continue;
     row.push_back(
-        {section_map(section, *field, {map.bar, after}), fmt::format("{}: {}.", section.title, map.words)});
+        {section_map(section, *field, map.bar, after), fmt::format("{}: {}.", section.title, map.words)});
   }
   return row;
 }

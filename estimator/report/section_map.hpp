@@ -15,13 +15,9 @@
 
 namespace diastole::report {
 
-struct SectionMapLabels {
-  std::string bar;    ///< what is shown, with its unit
-  std::string after;  ///< title of the drawing under load
-};
-
-std::string section_map(const SolutionSection& section, const NamedField& field,
-                        const SectionMapLabels& labels);
+/// `bar`: what is shown, with its unit; `after`: title of the drawing under load.
+std::string section_map(const SolutionSection& section, const NamedField& field, const std::string& bar,
+                        const std::string& after);
 
 /// What is drawn of all sections, where they have it.
 struct MapChoice {

@@ -8,10 +8,10 @@
 #include <optional>
 #include <set>
 
-#include "estimator/montecarlo/paper_table.hpp"
+#include "estimator/montecarlo/montecarlo.hpp"
+#include "estimator/report/fit_figures.hpp"
 #include "estimator/report/sections.hpp"
 #include "estimator/report/svg_plot.hpp"
-#include "estimator/report/table_figure.hpp"
 
 namespace diastole::report {
 namespace {
@@ -79,8 +79,7 @@ void add_pooled(Page& page, const SavedTable& table, const std::set<int>& frames
              "The same for all noises together: geometric means of the spread divided by the noise.");
 }
 
-}  // namespace
-
+/// Whether the paper's Table 1 is of these parameters.
 bool is_papers_law(const SavedTable& table) {
   constexpr std::array<const char*, 4> names{"C_kPa", "b1", "b2", "b3"};
   const TableEntry* known = first_known(table);
@@ -88,6 +87,8 @@ bool is_papers_law(const SavedTable& table) {
          std::equal(known->parameters.begin(), known->parameters.end(), names.begin(), names.end(),
                     [](const ParameterSpread& spread, const char* name) { return spread.name == name; });
 }
+
+}  // namespace
 
 Figure table_figure(const SavedTable& table, size_t parameter) {
   constexpr std::array<const char*, 3> styles{"b", "a", "c"};

@@ -41,12 +41,14 @@ std::vector<std::vector<TraceCycle>> groups_of(const Trace& trace) {
   return groups;
 }
 
-double squares(const Trace& trace, const std::vector<TraceCycle>& cycles) {
+/// Mean of (measured - model)^2 over the cycles; negative if nothing was measured.
+double mean_square(const Trace& trace, const std::vector<double>& model,
+                   const std::vector<TraceCycle>& cycles) {
   double sum = 0.0;
   size_t count = 0;
   for (const TraceCycle& cycle : cycles) {
     for (size_t i = cycle.first; i < cycle.last; ++i) {
-      const double off = trace.measured[i] - trace.before[i];
+      const double off = trace.measured[i] - model[i];
       if (!std::isfinite(off)) continue;
       sum += off * off;
       ++count;
@@ -148,15 +150,8 @@ std::vector<TraceCycle> cycles_of(const Trace& trace) {
 }
 
 double misfit_in_noise(const Trace& trace, const std::vector<double>& model) {
-  double sum = 0.0;
-  size_t count = 0;
-  for (size_t i = 0; i < trace.measured.size(); ++i) {
-    const double off = trace.measured[i] - model[i];
-    if (!std::isfinite(off)) continue;
-    sum += off * off;
-    ++count;
-  }
-  return count == 0 ? nan_value : std::sqrt(sum / static_cast<double>(count)) / trace.noise_sd;
+  const double square = mean_square(trace, model, {{0, trace.measured.size()}});
+  return square < 0.0 ? nan_value : std::sqrt(square) / trace.noise_sd;
 }
 
 std::vector<std::vector<double>> residual_grid(const Trace& trace, const std::vector<double>& model,
@@ -173,8 +168,9 @@ std::vector<std::vector<double>> residual_grid(const Trace& trace, const std::ve
 MeanCycle worst_mean_cycle(const Trace& trace, size_t phases) {
   const auto groups = groups_of(trace);
   if (groups.empty()) return {};
-  const auto& worst = *std::ranges::max_element(
-      groups, {}, [&](const std::vector<TraceCycle>& cycles) { return squares(trace, cycles); });
+  const auto& worst = *std::ranges::max_element(groups, {}, [&](const std::vector<TraceCycle>& cycles) {
+    return mean_square(trace, trace.before, cycles);
+  });
   MeanCycle mean;
   mean.cycles = worst.size();
   mean.start_s = worst.front().start_s;

@@ -21,6 +21,7 @@
 // normalised form; it is reported as `swapped_C1_kPa`.
 
 #include <array>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -73,5 +74,23 @@ struct ShearFit {
 
 /// `test` as read_shear_test gives it. Outliers are reported, not left out.
 ShearFit fit_shear(const ShearTest& test, ShearForm form = ShearForm::normalised);
+
+// A straight line through the origin, y = slope * x, by least squares.
+
+struct OriginLine {
+  double slope;
+  double se;      ///< NaN for a single point
+  double sum_xx;  ///< sum of x^2
+  double sum_yy;  ///< sum of y^2
+  double sum_of_residuals2;
+  double dof;  ///< points - 1
+};
+
+/// At least one x is not zero; x and y are of one length.
+OriginLine line_through_origin(std::span<const double> x, std::span<const double> y);
+
+/// The intercept of the straight line with a free intercept over its standard error: Student's t with n - 2
+/// degrees of freedom if the true line passes through the origin. NaN if all x are equal or n < 3.
+double intercept_deviations(std::span<const double> x, std::span<const double> y);
 
 }  // namespace diastole

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "estimator/mesh/face_map.hpp"
+#include "estimator/mesh/point_locator.hpp"
 
 namespace diastole {
 namespace {
@@ -139,6 +140,39 @@ void add_lines(const SectionCell& cell, const FaceMap& faces, BodySection& secti
   }
 }
 
+constexpr size_t steps = 400;  // over twice the body's extent: no wall is thinner than a step in practice
+constexpr int halvings = 40;   // of a step, to find a face
+constexpr double inside_xi = 1e-6;  // how far beyond a face still counts as on it
+
+/// Between a place outside and one inside the body: the last one inside.
+double find_face(double outside, double inside, const auto& lies_inside) {
+  for (int i = 0; i < halvings; ++i) {
+    const double middle = 0.5 * (outside + inside);
+    (lies_inside(middle) ? inside : outside) = middle;
+  }
+  return inside;
+}
+
+constexpr double cells_across = 40;  // the body, in a section
+
+FlatPoints flat(const HermiteMesh& mesh, const NodeField& position_mm, const SectionPlane& plane,
+                const std::vector<MaterialPoint>& points) {
+  FlatPoints result;
+  for (const MaterialPoint& point : points) {
+    const Eigen::Vector3d place_mm = mesh.value(position_mm, point);
+    result.push_back(plane.horizontal.dot(place_mm));
+    result.push_back(plane.vertical.dot(place_mm));
+  }
+  return result;
+}
+
+std::vector<MaterialPoint> ends_of(const std::vector<MaterialLine>& lines) {
+  std::vector<MaterialPoint> points;
+  for (const MaterialLine& line : lines)
+    points.insert(points.end(), line.begin(), line.end());
+  return points;
+}
+
 }  // namespace
 
 MaterialPoint SectionCell::centre() const {
@@ -167,6 +201,72 @@ BodySection cut_body(const HermiteMesh& mesh, const SectionPlane& plane, double 
     }
   }
   return section;
+}
+
+WallProfile cross_wall(const HermiteMesh& mesh, const Eigen::Vector3d& from_mm,
+                       const Eigen::Vector3d& direction, size_t count) {
+  const PointLocator locator(mesh, mesh.reference(), {.outside_xi = inside_xi, .tolerance_mm = 1e-10});
+  const Eigen::Vector3d unit = direction.normalized();
+  const auto found = [&](double s) { return locator.find(from_mm + s * unit); };
+  const auto lies_inside = [&](double s) { return found(s).has_value(); };
+  const double step = 2.0 * mesh.extent_mm() / static_cast<double>(steps);
+  std::optional<double> first;
+  std::optional<double> last;
+  for (size_t i = 0; i <= steps; ++i) {
+    const double s = static_cast<double>(i) * step;
+    if (lies_inside(s)) {
+      if (!first) first = s;
+      last = s;
+    } else if (first) {
+      break;
+    }
+  }
+  WallProfile profile;
+  if (!first) return profile;
+  const double begin = *first == 0.0 ? 0.0 : find_face(*first - step, *first, lies_inside);
+  const double end = find_face(*last + step, *last, lies_inside);
+  for (size_t i = 0; i < count; ++i) {
+    const double depth_mm = (end - begin) * static_cast<double>(i) / static_cast<double>(count - 1);
+    const std::optional<LocatedPoint> located = found(begin + depth_mm);
+    if (!located) continue;  // a hairline between two elements
+    profile.depth_mm.push_back(depth_mm);
+    profile.points.push_back(located->point);
+  }
+  return profile;
+}
+
+std::vector<SolutionSection> drawn_sections(
+    const HermiteMesh& mesh, const NodeField& position_mm, const Eigen::Vector3d& centre_mm,
+    const std::string& height_words,
+    const std::function<std::vector<NamedField>(const std::vector<MaterialPoint>&)>& fields_at) {
+  using Eigen::Vector3d;
+  const auto drawn = [&](std::string title, const Vector3d& up, const char* vertical) {
+    const SectionPlane plane{centre_mm, Vector3d::UnitX(), up};
+    const BodySection cut = cut_body(mesh, plane, mesh.extent_mm() / cells_across);
+    const auto before = [&](const auto& points) { return flat(mesh, mesh.reference(), plane, points); };
+    const auto after = [&](const auto& points) { return flat(mesh, position_mm, plane, points); };
+    SolutionSection section;
+    section.title = std::move(title);
+    section.horizontal = "x (mm)";
+    section.vertical = vertical;
+    std::vector<MaterialPoint> centres;
+    for (const SectionCell& cell : cut.cells) {
+      std::vector<MaterialPoint> around;
+      for (const Xi& corner : cell.corners)
+        around.push_back({cell.element, corner});
+      section.cells_before.push_back(before(around));
+      section.cells_after.push_back(after(around));
+      centres.push_back(cell.centre());
+    }
+    section.outline_before = before(ends_of(cut.outline));
+    section.outline_after = after(ends_of(cut.outline));
+    section.elements_before = before(ends_of(cut.elements));
+    section.elements_after = after(ends_of(cut.elements));
+    section.fields = fields_at(centres);
+    return section;
+  };
+  return {drawn("Short axis, material of " + height_words, Vector3d::UnitY(), "y (mm)"),
+          drawn("Long axis, material of y = 0", Vector3d::UnitZ(), "z (mm)")};
 }
 
 }  // namespace diastole

@@ -7,8 +7,10 @@
 
 #include <Eigen/Dense>
 #include <array>
+#include <functional>
 #include <vector>
 
+#include "estimator/io/solution_file.hpp"
 #include "estimator/mesh/hermite_mesh.hpp"
 
 namespace diastole {
@@ -36,5 +38,25 @@ struct BodySection {
 
 /// `cell_mm` is the size that cells have at most, about; in a coarse mesh there are at least six across an element.
 BodySection cut_body(const HermiteMesh& mesh, const SectionPlane& plane, double cell_mm);
+
+// A straight line through the wall of the undeformed body, from the inner to the outer face.
+
+struct WallProfile {
+  std::vector<double> depth_mm;  ///< from the inner face, undeformed
+  std::vector<MaterialPoint> points;
+};
+
+/// The first wall that a ray meets: `count` >= 2 points, faces included. Empty if it meets none.
+WallProfile cross_wall(const HermiteMesh& mesh, const Eigen::Vector3d& from_mm,
+                       const Eigen::Vector3d& direction, size_t count);
+
+// The two sections that reports show of a body before and after a motion: across the axis z at a height, and along it.
+
+/// Both go through `centre_mm` on the axis, whose height `height_words` says. `fields_at` gives what the cells show at
+/// their centres: of each field as many values as points.
+std::vector<SolutionSection> drawn_sections(
+    const HermiteMesh& mesh, const NodeField& position_mm, const Eigen::Vector3d& centre_mm,
+    const std::string& height_words,
+    const std::function<std::vector<NamedField>(const std::vector<MaterialPoint>&)>& fields_at);
 
 }  // namespace diastole

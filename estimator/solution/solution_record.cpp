@@ -8,8 +8,7 @@
 
 #include "estimator/fe/elastic_system.hpp"
 #include "estimator/fe/point_fields.hpp"
-#include "estimator/solution/drawn_sections.hpp"
-#include "estimator/solution/wall_profile.hpp"
+#include "estimator/solution/body_section.hpp"
 
 namespace diastole {
 namespace {

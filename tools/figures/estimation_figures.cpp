@@ -12,7 +12,6 @@
 
 #include "estimator/io/whole_file.hpp"
 #include "estimator/report/fit_figures.hpp"
-#include "estimator/report/table_figure.hpp"
 
 namespace diastole {
 namespace {

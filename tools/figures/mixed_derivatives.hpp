@@ -60,23 +60,6 @@ inline Mixed sin(const Mixed& a) {
   return composed(a, {s, c, -s, -c});
 }
 
-inline Mixed cos(const Mixed& a) {
-  const double s = std::sin(a.part[0]);
-  const double c = std::cos(a.part[0]);
-  return composed(a, {c, -s, -c, s});
-}
-
-inline Mixed sqrt(const Mixed& a) {
-  const double x = a.part[0];
-  const double root = std::sqrt(x);
-  return composed(a, {root, 0.5 / root, -0.25 / (root * x), 0.375 / (root * x * x)});
-}
-
-inline Mixed reciprocal(const Mixed& a) {
-  const double r = 1.0 / a.part[0];
-  return composed(a, {r, -r * r, 2.0 * r * r * r, -6.0 * r * r * r * r});
-}
-
 /// Nodes of the deformed body, x = map({X, Y, Z}). Precondition: the mesh has no scale factors and ties.
 template <class Map>
 NodeField mapped(const HermiteMesh& mesh, const Map& map) {

@@ -7,12 +7,10 @@
 #include <chrono>
 #include <cmath>
 
-#include "estimator/explain/imaging/field_gap.hpp"
 #include "estimator/explain/imaging/field_hypotheses.hpp"
+#include "estimator/explain/imaging/field_misfit.hpp"
 #include "estimator/explain/imaging/field_modes.hpp"
 #include "estimator/explain/imaging/field_next_experiment.hpp"
-#include "estimator/explain/imaging/field_pairs.hpp"
-#include "estimator/explain/imaging/field_regions.hpp"
 #include "estimator/explain/imaging/inclusion_fit.hpp"
 #include "estimator/explain/imaging/linear_evidence.hpp"
 #include "estimator/explain/verdict/chi_square.hpp"
@@ -48,8 +46,8 @@ struct Structure {
 
 class Explainer {
  public:
-  Explainer(FieldCase field, std::string name, const FieldOptions& options)
-      : options_(options), study_file_(std::move(name)), field_(std::move(field)) {}
+  Explainer(FieldCase field, std::string name, const FieldProgress& progress)
+      : progress_(progress), study_file_(std::move(name)), field_(std::move(field)) {}
 
   Explanation run() {
     field_.alive = [this] { report(""); };
@@ -64,7 +62,7 @@ class Explainer {
 
  private:
   void report(const std::string& text) const {
-    if (options_.progress) options_.progress(text);
+    if (progress_) progress_(text);
   }
 
   void fit_base() {
@@ -378,7 +376,7 @@ class Explainer {
                                              : sharpening_images(field_, round_->rows(), models.front());
   }
 
-  FieldOptions options_;
+  FieldProgress progress_;
   std::string study_file_;
   FieldCase field_;
   std::optional<FieldProblem> round_;
@@ -398,13 +396,13 @@ class Explainer {
 
 }  // namespace
 
-Explanation explain_field(const Study& study, const FieldOptions& options) {
-  return explain_field(field_case(study), study.file.string(), options);
+Explanation explain_field(const Study& study, const FieldProgress& progress) {
+  return explain_field(field_case(study), study.file.string(), progress);
 }
 
-Explanation explain_field(FieldCase field, const std::string& name, const FieldOptions& options) {
+Explanation explain_field(FieldCase field, const std::string& name, const FieldProgress& progress) {
   const auto begun = std::chrono::steady_clock::now();
-  Explanation explanation = Explainer(std::move(field), name, options).run();
+  Explanation explanation = Explainer(std::move(field), name, progress).run();
   explanation.study = name;
   explanation.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
   return explanation;

@@ -5,11 +5,10 @@
 //   field_solver         equilibria with field effects and their derivatives
 //   field_fit            the base model, and any choice of effects, fitted to the motion
 //   field_modes          rivals outside the library; linear_evidence: what a change of the motion would gain
-//   field_hypotheses     each effect fitted
+//   field_hypotheses     each effect fitted, and two of them where one leaves something
 //   inclusion_search     the place of an inclusion; inclusion_body, inclusion_fit: its fit on a mesh of its own
-//   field_pairs          two effects, where one leaves something
 //   explain_field        the verdict
-//   field_regions        where; field_gap: what is predicted of tags not fitted; field_next_experiment: what to image next
+//   field_misfit         where, and what is predicted of tags not fitted; field_next_experiment: what to image next
 //
 // Verdicts: none - neither an effect nor any structure gains more than noise would (p above 1e-3 after correction for
 // how many were tried). unexplained - structure is left after the best effect, or something outside the library gains more
@@ -25,14 +24,12 @@
 
 namespace diastole::explain {
 
-struct FieldOptions {
-  /// Told what is being done; whatever it throws ends the work.
-  std::function<void(const std::string&)> progress;
-};
+/// Told what is being done; whatever it throws ends the work.
+using FieldProgress = std::function<void(const std::string&)>;
 
 /// Throws InputError for studies that field_case() refuses.
-Explanation explain_field(const Study& study, const FieldOptions& options = {});
+Explanation explain_field(const Study& study, const FieldProgress& progress = {});
 /// The same of what a study says; `name` stands for it in errors.
-Explanation explain_field(FieldCase field, const std::string& name, const FieldOptions& options = {});
+Explanation explain_field(FieldCase field, const std::string& name, const FieldProgress& progress = {});
 
 }  // namespace diastole::explain

@@ -112,126 +112,118 @@ class FieldProblem::Search final : public inference::LeastSquaresProblem {
 
   [[nodiscard]] const inference::ParameterSpace& space() const override { return space_; }
   [[nodiscard]] std::string failure() const override { return "the specimen has no equilibrium there"; }
-  std::optional<VectorXd> residuals(const VectorXd& q) override;
-  MatrixXd jacobian(const VectorXd& q) override;
+  std::optional<VectorXd> residuals(const VectorXd& q) override {
+    if (problem_.field_.alive) problem_.field_.alive();
+    FieldFit here = at(q);
+    FieldSolver& solver = problem_.solver_;
+    MotionResiduals& rows = problem_.rows_;
+    solver.set(problem_.model_of(here.choice), here.C1_kPa);
+    std::vector<NodeField> displacements_mm;
+    for (size_t node = 0; node < problem_.nodes_kPa_.size(); ++node) {
+      if (!solver.solve(node, problem_.nodes_kPa_[node])) return {};
+      displacements_mm.push_back(solver.seen_displacement_mm(node));
+    }
+    std::vector<NodeField> seen_mm;
+    for (const double pressure_kPa : here.pressures_kPa)
+      seen_mm.push_back(combined(solver.mesh().reference(), problem_.shares(pressure_kPa), displacements_mm));
+    if (rows.size() == 0) {
+      (void)rows.find(solver.mesh(), solver.reference(), seen_mm);
+    } else if (!rows.follow(solver.mesh(), solver.reference(), seen_mm, Following::closely)) {
+      return {};
+    }
+    here.residuals = rows.residuals();
+    here.priors = priors(here);
+    return here.all_residuals();
+  }
+  MatrixXd jacobian(const VectorXd& q) override {
+    const FieldFit here = at(q);
+    FieldSolver& solver = problem_.solver_;
+    const MotionResiduals& rows = problem_.rows_;
+    const std::vector<FieldPerturbation> changes = perturbations(here);
+    // Of the nodes' displacements: by C1, by the parameters, and the displacements themselves, which a pressure changes;
+    // and of the undeformed mesh.
+    std::vector<std::vector<NodeField>> by(2 + changes.size());
+    for (size_t node = 0; node < problem_.nodes_kPa_.size(); ++node) {
+      FieldSolver::Slopes slopes = solver.slopes(node, changes);
+      by[0].push_back(std::move(slopes.modulus));
+      for (size_t i = 0; i < changes.size(); ++i)
+        by[1 + i].push_back(std::move(slopes.model[i]));
+      by.back().push_back(solver.seen_displacement_mm(node));
+    }
+    std::vector<NodeField> mesh_slopes(by.size());
+    for (size_t i = 0; i < changes.size(); ++i)
+      mesh_slopes[1 + i] = solver.reference_slope(changes[i]);
+    const NodeField still(solver.mesh().reference().size(), 0.0);
+    const VectorXd priors_here = priors(here);
+    MatrixXd result = MatrixXd::Zero(rows.size() + priors_here.size(), space_.size());
+    for (size_t slot = 0; slot < here.pressures_kPa.size(); ++slot) {
+      constexpr double step_kPa = 1e-4;
+      const std::vector<double> shares = problem_.shares(here.pressures_kPa[slot]);
+      std::vector<double> rise = problem_.shares(here.pressures_kPa[slot] + step_kPa);
+      const std::vector<double> below = problem_.shares(here.pressures_kPa[slot] - step_kPa);
+      for (size_t node = 0; node < rise.size(); ++node)
+        rise[node] = (rise[node] - below[node]) / (2.0 * step_kPa);
+      std::vector<NodeField> fields;
+      for (size_t k = 0; k < by.size(); ++k)
+        fields.push_back(combined(mesh_slopes[k].empty() ? still : mesh_slopes[k],
+                                  k + 1 == by.size() ? rise : shares, by[k]));
+      std::vector<const NodeField*> motion;
+      std::vector<const NodeField*> reference;
+      for (size_t k = 0; k < by.size(); ++k) {
+        motion.push_back(&fields[k]);
+        reference.push_back(mesh_slopes[k].empty() ? nullptr : &mesh_slopes[k]);
+      }
+      const MatrixXd block = rows.columns(slot, solver.mesh(), motion, reference);
+      auto here_rows = result.middleRows(rows.first(slot), rows.count(slot));
+      here_rows.leftCols(pressures()) = block.leftCols(pressures());
+      here_rows.col(0) *= here.C1_kPa;
+      here_rows.col(pressures() + static_cast<Index>(slot)) = block.rightCols<1>();
+    }
+    for (Index j = 0; j < q.size(); ++j) {
+      constexpr double h = 1e-6;
+      const VectorXd step = h * VectorXd::Unit(q.size(), j);
+      result.col(j).tail(priors_here.size()) = (priors(at(q + step)) - priors(at(q - step))) / (2.0 * h);
+    }
+    return result;
+  }
 
  private:
   /// Place of the first.
   [[nodiscard]] Index pressures() const { return 1 + static_cast<Index>(choice_.free.size()); }
-  [[nodiscard]] VectorXd priors(const FieldFit& at) const;
-  [[nodiscard]] std::vector<FieldPerturbation> perturbations(const FieldFit& at) const;
+  [[nodiscard]] VectorXd priors(const FieldFit& at) const {
+    const FieldCase& field = problem_.field_;
+    std::vector<double> values;
+    for (size_t slot = 0; slot < at.pressures_kPa.size(); ++slot) {
+      const Frame& frame = field.measurement.frames[static_cast<size_t>(problem_.rows_.frames()[slot])];
+      values.push_back((at.pressures_kPa[slot] - frame.pressure_kPa) / std::max(frame.sigma_kPa, 1e-5));
+    }
+    if (field.C1_start_kPa.sigma > 0.0)
+      values.push_back((at.C1_kPa - field.C1_start_kPa.value) / field.C1_start_kPa.sigma);
+    if (field.inner_radius_mm)
+      values.push_back((problem_.model_of(at.choice).inner_radius_mm - field.inner_radius_mm->value) /
+                       field.inner_radius_mm->sigma);
+    return Eigen::Map<const VectorXd>(values.data(), static_cast<Index>(values.size()));
+  }
+  /// Of the model by each free parameter.
+  [[nodiscard]] std::vector<FieldPerturbation> perturbations(const FieldFit& at) const {
+    std::vector<FieldPerturbation> result;
+    for (const size_t i : choice_.free) {
+      const inference::Parameter parameter = searched(choice_.parameter(i));
+      const double h = perturbation_of(choice_.parameter(i));
+      const auto model = [&](double change) {
+        FieldChoice changed = at.choice;
+        changed.values[i] = parameter.value(parameter.coordinate(changed.values[i]) + change);
+        return problem_.model_of(changed);
+      };
+      result.push_back({model(h), model(-h), 2.0 * h});
+    }
+    return result;
+  }
 
   FieldProblem& problem_;
   FieldChoice choice_;
   inference::ParameterSpace space_;
 };
-
-VectorXd FieldProblem::Search::priors(const FieldFit& at) const {
-  const FieldCase& field = problem_.field_;
-  std::vector<double> values;
-  for (size_t slot = 0; slot < at.pressures_kPa.size(); ++slot) {
-    const Frame& frame = field.measurement.frames[static_cast<size_t>(problem_.rows_.frames()[slot])];
-    values.push_back((at.pressures_kPa[slot] - frame.pressure_kPa) / std::max(frame.sigma_kPa, 1e-5));
-  }
-  if (field.C1_start_kPa.sigma > 0.0)
-    values.push_back((at.C1_kPa - field.C1_start_kPa.value) / field.C1_start_kPa.sigma);
-  if (field.inner_radius_mm)
-    values.push_back((problem_.model_of(at.choice).inner_radius_mm - field.inner_radius_mm->value) /
-                     field.inner_radius_mm->sigma);
-  return Eigen::Map<const VectorXd>(values.data(), static_cast<Index>(values.size()));
-}
-
-std::optional<VectorXd> FieldProblem::Search::residuals(const VectorXd& q) {
-  if (problem_.field_.alive) problem_.field_.alive();
-  FieldFit here = at(q);
-  FieldSolver& solver = problem_.solver_;
-  MotionResiduals& rows = problem_.rows_;
-  solver.set(problem_.model_of(here.choice), here.C1_kPa);
-  std::vector<NodeField> displacements_mm;
-  for (size_t node = 0; node < problem_.nodes_kPa_.size(); ++node) {
-    if (!solver.solve(node, problem_.nodes_kPa_[node])) return {};
-    displacements_mm.push_back(solver.seen_displacement_mm(node));
-  }
-  std::vector<NodeField> seen_mm;
-  for (const double pressure_kPa : here.pressures_kPa)
-    seen_mm.push_back(combined(solver.mesh().reference(), problem_.shares(pressure_kPa), displacements_mm));
-  if (rows.size() == 0) {
-    (void)rows.find(solver.mesh(), solver.reference(), seen_mm);
-  } else if (!rows.follow(solver.mesh(), solver.reference(), seen_mm, Following::closely)) {
-    return {};
-  }
-  here.residuals = rows.residuals();
-  here.priors = priors(here);
-  return here.all_residuals();
-}
-
-/// Of the model by each free parameter.
-std::vector<FieldPerturbation> FieldProblem::Search::perturbations(const FieldFit& at) const {
-  std::vector<FieldPerturbation> result;
-  for (const size_t i : choice_.free) {
-    const inference::Parameter parameter = searched(choice_.parameter(i));
-    const double h = perturbation_of(choice_.parameter(i));
-    const auto model = [&](double change) {
-      FieldChoice changed = at.choice;
-      changed.values[i] = parameter.value(parameter.coordinate(changed.values[i]) + change);
-      return problem_.model_of(changed);
-    };
-    result.push_back({model(h), model(-h), 2.0 * h});
-  }
-  return result;
-}
-
-MatrixXd FieldProblem::Search::jacobian(const VectorXd& q) {
-  const FieldFit here = at(q);
-  FieldSolver& solver = problem_.solver_;
-  const MotionResiduals& rows = problem_.rows_;
-  const std::vector<FieldPerturbation> changes = perturbations(here);
-  // Of the nodes' displacements: by C1, by the parameters, and the displacements themselves, which a pressure changes;
-  // and of the undeformed mesh.
-  std::vector<std::vector<NodeField>> by(2 + changes.size());
-  for (size_t node = 0; node < problem_.nodes_kPa_.size(); ++node) {
-    FieldSolver::Slopes slopes = solver.slopes(node, changes);
-    by[0].push_back(std::move(slopes.modulus));
-    for (size_t i = 0; i < changes.size(); ++i)
-      by[1 + i].push_back(std::move(slopes.model[i]));
-    by.back().push_back(solver.seen_displacement_mm(node));
-  }
-  std::vector<NodeField> mesh_slopes(by.size());
-  for (size_t i = 0; i < changes.size(); ++i)
-    mesh_slopes[1 + i] = solver.reference_slope(changes[i]);
-  const NodeField still(solver.mesh().reference().size(), 0.0);
-  const VectorXd priors_here = priors(here);
-  MatrixXd result = MatrixXd::Zero(rows.size() + priors_here.size(), space_.size());
-  for (size_t slot = 0; slot < here.pressures_kPa.size(); ++slot) {
-    constexpr double step_kPa = 1e-4;
-    const std::vector<double> shares = problem_.shares(here.pressures_kPa[slot]);
-    std::vector<double> rise = problem_.shares(here.pressures_kPa[slot] + step_kPa);
-    const std::vector<double> below = problem_.shares(here.pressures_kPa[slot] - step_kPa);
-    for (size_t node = 0; node < rise.size(); ++node)
-      rise[node] = (rise[node] - below[node]) / (2.0 * step_kPa);
-    std::vector<NodeField> fields;
-    for (size_t k = 0; k < by.size(); ++k)
-      fields.push_back(combined(mesh_slopes[k].empty() ? still : mesh_slopes[k],
-                                k + 1 == by.size() ? rise : shares, by[k]));
-    std::vector<const NodeField*> motion;
-    std::vector<const NodeField*> reference;
-    for (size_t k = 0; k < by.size(); ++k) {
-      motion.push_back(&fields[k]);
-      reference.push_back(mesh_slopes[k].empty() ? nullptr : &mesh_slopes[k]);
-    }
-    const MatrixXd block = rows.columns(slot, solver.mesh(), motion, reference);
-    auto here_rows = result.middleRows(rows.first(slot), rows.count(slot));
-    here_rows.leftCols(pressures()) = block.leftCols(pressures());
-    here_rows.col(0) *= here.C1_kPa;
-    here_rows.col(pressures() + static_cast<Index>(slot)) = block.rightCols<1>();
-  }
-  for (Index j = 0; j < q.size(); ++j) {
-    constexpr double h = 1e-6;
-    const VectorXd step = h * VectorXd::Unit(q.size(), j);
-    result.col(j).tail(priors_here.size()) = (priors(at(q + step)) - priors(at(q - step))) / (2.0 * h);
-  }
-  return result;
-}
 
 FieldProblem::FieldProblem(const FieldCase& field, std::array<size_t, 3> elements)
     : field_(field),

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 
 #include "estimator/explain/imaging/inclusion_fit.hpp"
 #include "estimator/explain/imaging/linear_evidence.hpp"
@@ -13,8 +14,10 @@
 namespace diastole::explain {
 namespace {
 
-constexpr double worth_freeing = 9.0;  // gain of chi2 by which further parameters of an effect must pay
-constexpr double beyond_chance = 1e-2;
+constexpr double worth_freeing = 9.0;   // gain of chi2 by which further parameters of an effect must pay
+constexpr double suspected = 1e-2;      // p-value of a place: reason to fit an inclusion there
+constexpr double beyond_chance = 1e-3;  // the same beside another effect
+constexpr double effective_parameters = 5.0;  // of an inclusion: its sizes are tied to one another
 
 FieldChoice with_essentials(const Effect& effect, std::vector<double> values) {
   FieldChoice choice{{&effect}, std::move(values), {}};
@@ -84,6 +87,68 @@ FieldFit refit(FieldProblem& problem, FieldChoice choice, const FieldProblem::St
   return fit.chi_square - fuller.chi_square > worth_freeing ? fuller : fit;
 }
 
+constexpr size_t firsts = 2;             // single effects that get partners
+constexpr size_t inclusions_fitted = 2;  // effects beside which an inclusion is refined
+
+double pairs_tried() {
+  const auto effects = static_cast<double>(field_effects().size());
+  return 0.5 * effects * (effects - 1.0);
+}
+
+/// Gain, score and p-value of a joint fit.
+FieldHypothesis judged(FieldFit fit, const FieldFit& base, const FieldHypothesis& a, const FieldHypothesis& b,
+                       double parameters, double places) {
+  FieldHypothesis pair{{a.ids.front(), b.ids.front()}, std::move(fit)};
+  std::ranges::sort(pair.ids);
+  pair.gain = base.chi_square - pair.fit.chi_square;
+  pair.score = pair.gain - 2.0 * parameters - 2.0 * std::log(pairs_tried() * places);
+  const double alone = std::max(a.gain, b.gain);
+  const double added = parameters - 1.0;
+  pair.p_value =
+      std::min(1.0, pairs_tried() * places * chi_square_tail(std::max(0.0, pair.gain - alone), added));
+  return pair;
+}
+
+FieldHypothesis fit_both(FieldProblem& problem, const FieldFit& base, const FieldHypothesis& first,
+                         const FieldHypothesis& second) {
+  const FieldFit& start = first.fit;
+  FieldFit fit =
+      problem.fit(together(first.fit.choice, second.fit.choice), {start.C1_kPa, start.pressures_kPa});
+  const auto parameters = static_cast<double>(fit.choice.free.size());
+  return judged(std::move(fit), base, first, second, parameters, 1.0);
+}
+
+/// Inclusions beside the effects for which the lattice promises most.
+std::vector<FieldHypothesis> inclusions_beside(const FieldProblem& problem, const FieldFit& base,
+                                               const std::vector<const FieldHypothesis*>& others,
+                                               const InclusionLattice& lattice) {
+  struct Promise {
+    const FieldHypothesis* other;
+    InclusionGuess guess;
+    double gain;
+  };
+  const FieldModel& body = problem.field().base;
+  std::vector<Promise> promises;
+  for (const FieldHypothesis* other : others) {
+    const InclusionGuess guess = search_inclusion(lattice, body, other->fit).front();
+    if (guess.p_value < beyond_chance) promises.push_back({other, guess, other->gain + guess.gain});
+  }
+  std::ranges::stable_sort(promises, std::greater{}, &Promise::gain);
+  if (promises.size() > inclusions_fitted) promises.resize(inclusions_fitted);
+  std::vector<FieldHypothesis> pairs;
+  for (const Promise& promise : promises) {
+    const FieldHypothesis inclusion{{std::string(inclusion_effect().text().id)}, {}};
+    FieldFit fit = fit_inclusion(problem, promise.other->fit, promise.guess.inclusion, InclusionEffort::once);
+    if (fit.chi_square < promise.other->fit.chi_square && &promise == &promises.front())
+      fit = fit_inclusion(problem, promise.other->fit, inclusion_of(fit), InclusionEffort::fully);
+    const double parameters =
+        effective_parameters + static_cast<double>(promise.other->fit.choice.free.size());
+    pairs.push_back(
+        judged(std::move(fit), base, *promise.other, inclusion, parameters, distinct_places(body)));
+  }
+  return pairs;
+}
+
 }  // namespace
 
 std::string FieldHypothesis::name() const { return fmt::format("{}", fmt::join(ids, " + ")); }
@@ -114,8 +179,7 @@ std::vector<FieldHypothesis> fit_round_effects(FieldProblem& problem, const Fiel
 
 std::vector<FieldHypothesis> try_inclusion(const FieldProblem& problem, const FieldFit& base,
                                            const std::vector<InclusionGuess>& guesses, double to_beat) {
-  if (guesses.front().p_value > beyond_chance) return {};
-  constexpr double effective_parameters = 5.0;  // sizes are tied to one another
+  if (guesses.front().p_value > suspected) return {};
   constexpr double near = 20.0;
   FieldHypothesis tried{{std::string(inclusion_effect().text().id)},
                         fit_inclusion(problem, base, guesses.front().inclusion, InclusionEffort::once)};
@@ -131,6 +195,26 @@ std::vector<FieldHypothesis> try_inclusion(const FieldProblem& problem, const Fi
   }
   tried.p_value = std::min(1.0, static_cast<double>(field_effects().size()) * guesses.front().p_value);
   return {std::move(tried)};
+}
+
+std::vector<FieldHypothesis> fit_pairs(FieldProblem& problem, const FieldFit& base,
+                                       const std::vector<FieldHypothesis>& singles,
+                                       const InclusionLattice& lattice) {
+  std::vector<FieldHypothesis> pairs;
+  std::vector<const FieldHypothesis*> beside_inclusion;
+  const size_t begun = std::min(firsts, singles.size());
+  for (size_t a = 0; a < singles.size(); ++a) {
+    if (singles[a].has_inclusion()) continue;
+    const bool inclusion_leads =
+        std::any_of(singles.begin(), singles.begin() + static_cast<std::ptrdiff_t>(begun),
+                    [](const FieldHypothesis& single) { return single.has_inclusion(); });
+    if (a < begun || inclusion_leads) beside_inclusion.push_back(&singles[a]);
+    for (size_t b = a + 1; a < begun && b < singles.size(); ++b)
+      if (!singles[b].has_inclusion()) pairs.push_back(fit_both(problem, base, singles[a], singles[b]));
+  }
+  std::ranges::move(inclusions_beside(problem, base, beside_inclusion, lattice), std::back_inserter(pairs));
+  std::ranges::stable_sort(pairs, std::greater{}, &FieldHypothesis::score);
+  return pairs;
 }
 
 }  // namespace diastole::explain

@@ -16,6 +16,7 @@
 
 #include "estimator/effects/field_model.hpp"
 #include "estimator/fe/elastic_model.hpp"
+#include "estimator/fe/elastic_system.hpp"
 #include "estimator/mesh/point_locator.hpp"
 
 namespace diastole::explain {
@@ -76,5 +77,18 @@ class FieldSolver {
   std::unique_ptr<PointLocator> reference_;
   std::vector<std::optional<ElasticState>> states_;
 };
+
+// How forces answer to the stiffness: right-hand sides for a body's tangent.
+
+/// Numbers at the Gauss points of each element.
+using GaussNumbers = std::vector<std::array<double, gauss_points>>;
+
+/// The field's values at the Gauss points.
+GaussNumbers at_gauss_points(const HermiteMesh& mesh, const StiffnessField& field);
+
+/// - dR/dc for C1(X) (1 + c field(X)), one for each field, over the system's unknowns. Precondition: the law's first
+/// parameter is C1, and its energy proportional to it.
+std::vector<std::vector<double>> stiffness_sides(const ElasticSystem& system, const ElasticState& state,
+                                                 const std::vector<GaussNumbers>& fields);
 
 }  // namespace diastole::explain

@@ -123,7 +123,26 @@ class InclusionFit final : public inference::LeastSquaresProblem {
 
   [[nodiscard]] const inference::ParameterSpace& space() const override { return space_; }
   [[nodiscard]] std::string failure() const override { return "the inclusion has no equilibrium there"; }
-  std::optional<VectorXd> residuals(const VectorXd& q) override;
+  /// Of the rows, the base fit's priors, the inclusion's priors.
+  std::optional<VectorXd> residuals(const VectorXd& q) override {
+    if (problem_.field().alive) problem_.field().alive();
+    const std::optional<InclusionColumns> inclusion = columns(q);
+    if (!inclusion) return {};
+    const Index all = base_.jacobian.rows();
+    VectorXd result(all + priors);
+    result.head(all) = base_.all_residuals() + base_.jacobian * q.tail(base_.jacobian.cols());
+    result.head(inclusion->rows()) += inclusion->col(0);
+    jacobian_.setZero(all + priors, q.size());
+    jacobian_.topRightCorner(all, base_.jacobian.cols()) = base_.jacobian;
+    jacobian_.topLeftCorner(inclusion->rows(), parameters) = inclusion->rightCols<inclusion_parameters>();
+    for (Index axis = 0; axis < 3; ++axis) {
+      result[all + axis] = (q[4 + axis] - std::log(usual_axis_mm)) / axis_spread;
+      jacobian_(all + axis, 4 + axis) = 1.0 / axis_spread;
+    }
+    result[all + 3] = q[0] / contrast_spread;
+    jacobian_(all + 3, 0) = 1.0 / contrast_spread;
+    return result;
+  }
   Eigen::MatrixXd jacobian(const VectorXd&) override { return jacobian_; }
 
   /// Downhill from an inclusion, until a step gains less than `tolerance` of chi2; the best one so far is kept.
@@ -165,7 +184,36 @@ class InclusionFit final : public inference::LeastSquaresProblem {
   }
 
   /// The best inclusion so far; the guess, without a solution, if there is none.
-  [[nodiscard]] FieldFit result() const;
+  [[nodiscard]] FieldFit result() const {
+    FieldFit result = with_inclusion(base_, guess_);
+    if (!best_) return result;
+    const VectorXd shift = best_->q.tail(base_.jacobian.cols());
+    const auto others = static_cast<Index>(base_.choice.free.size());
+    for (Index i = 0; i < others; ++i) {
+      const size_t value = base_.choice.free[static_cast<size_t>(i)];
+      const inference::Parameter parameter = searched(base_.choice.parameter(value));
+      double& found = result.choice.values[value];
+      found = std::clamp(parameter.value(parameter.coordinate(found) + shift[1 + i]), parameter.lower,
+                         parameter.upper);
+    }
+    std::ranges::copy(values_at(best_->q),
+                      result.choice.values.begin() + static_cast<std::ptrdiff_t>(base_.choice.values.size()));
+    result.C1_kPa = base_.C1_kPa * std::exp(shift[0]);
+    for (size_t slot = 0; slot < result.pressures_kPa.size(); ++slot)
+      result.pressures_kPa[slot] += shift[1 + others + static_cast<Index>(slot)];
+    const Index rows = problem_.rows().size();
+    result.termination = best_->termination;
+    result.chi_square = best_->residuals.squaredNorm();
+    result.residuals = best_->residuals.head(rows);
+    result.priors = best_->residuals.tail(best_->residuals.size() - rows);
+    // As in other fits: log C1, the effects' parameters, the pressures.
+    const Eigen::MatrixXd& jacobian = best_->jacobian;
+    result.jacobian.resize(jacobian.rows(), jacobian.cols());
+    result.jacobian << jacobian.middleCols(parameters, 1 + others), jacobian.leftCols<parameters>(),
+        jacobian.rightCols(shift.size() - 1 - others);
+    result.covariance = inference::estimate_covariance(result.jacobian).matrix;
+    return result;
+  }
 
   /// 90 % intervals of the parameters' coordinates. Contrast, size and depth trade off against one another, not always
   /// within one valley: the others are refitted at held contrasts on both sides, until that costs 2.7 of chi2, and every
@@ -216,10 +264,111 @@ class InclusionFit final : public inference::LeastSquaresProblem {
     return values;
   }
 
-  [[nodiscard]] Profile profile_of_contrast(double gain);
-  [[nodiscard]] Intervals open_at(const SearchResult& at, double cost) const;
-  [[nodiscard]] std::optional<InclusionColumns> followed_columns(const InclusionValues& values);
-  [[nodiscard]] std::optional<InclusionColumns> columns(const VectorXd& q);
+  /// Ends at a fit that is better than the best one by more than `gain`.
+  [[nodiscard]] Profile profile_of_contrast(double gain) {
+    Profile profile{open_at(*best_, 0.0), {}};
+    Intervals& found = profile.intervals;
+    const double best_chi_square = best_->residuals.squaredNorm();
+    const double variance = inference::estimate_covariance(best_->jacobian).matrix(0, 0);
+    const double usual = std::clamp(std::sqrt(variance), 0.08, 0.6);
+    for (const double direction : {-1.0, 1.0}) {
+      VectorXd q = best_->q;
+      double cost_before = 0.0;
+      VectorXd before = q;
+      for (double away = usual; away < 6.0 * usual; away *= 1.6) {
+        q[0] = std::clamp(best_->q[0] + direction * away, space_.lower()[0], space_.upper()[0]);
+        SearchResult at = search(q, 0.2, true);
+        if (at.termination == inference::Termination::no_solution) break;
+        q = at.q;
+        const double risen = at.residuals.squaredNorm() - best_chi_square;
+        if (risen < -gain) {
+          profile.deeper = std::move(at);
+          return profile;
+        }
+        const double cost = std::max(0.0, risen);
+        if (cost >= allowed) {
+          const double part =
+              (std::sqrt(allowed) - std::sqrt(cost_before)) / (std::sqrt(cost) - std::sqrt(cost_before));
+          for (size_t i = 0; i < inclusion_parameters; ++i) {
+            const auto k = static_cast<Index>(i);
+            const double crossing = std::lerp(before[k], q[k], part);
+            widen(found[i], {crossing, crossing});
+          }
+          break;
+        }
+        widen(found, open_at(at, cost));
+        widen(found[0], {q[0], q[0]});
+        before = q;
+        cost_before = cost;
+        if (q[0] == space_.lower()[0] || q[0] == space_.upper()[0]) break;
+      }
+    }
+    return profile;
+  }
+  /// What a point of the profile leaves open for each parameter, all others but the contrast free, when it costs so much
+  /// already.
+  [[nodiscard]] Intervals open_at(const SearchResult& at, double cost) const {
+    const Eigen::MatrixXd covariance =
+        inference::estimate_covariance(at.jacobian, free_but_contrast(false)).matrix;
+    Intervals result{};
+    for (size_t i = 0; i < inclusion_parameters; ++i) {
+      const auto k = static_cast<Index>(i);
+      const double half = std::sqrt((allowed - cost) * covariance(k, k));
+      result[i] = {at.q[k] - half, at.q[k] + half};
+    }
+    return result;
+  }
+  /// On the coarse mesh: the change of the tags' own errors between the body without and with the inclusion, at the frames'
+  /// pressures (FieldProblem::shares).
+  [[nodiscard]] std::optional<InclusionColumns> followed_columns(const InclusionValues& values) {
+    const HermiteMesh& mesh = coarse_.body().mesh();
+    const size_t slots = base_.pressures_kPa.size();
+    InclusionBody::Addition nothing;
+    nothing.fill(NodeField(mesh.reference().size(), 0.0));
+    std::vector<NodeField> plain_mm(slots, mesh.reference());
+    std::vector<InclusionBody::Addition> added(slots, nothing);
+    for (size_t node = 0; node < problem_.nodes_kPa().size(); ++node) {
+      std::optional<InclusionBody> other;
+      if (node != problem_.highest_node())
+        other.emplace(problem_.field().base, base_.C1_kPa, problem_.nodes_kPa()[node], guess_,
+                      InclusionMesh::coarse);
+      InclusionBody& body = other ? *other : coarse_.body();
+      const std::optional<InclusionBody::Addition> addition = body.addition(values, true);
+      if (!addition) return {};
+      const NodeField motion_mm = difference(*body.plain_mm(), mesh.reference());
+      for (size_t slot = 0; slot < slots; ++slot) {
+        const double share = problem_.shares(base_.pressures_kPa[slot])[node];
+        add_scaled(plain_mm[slot], share, motion_mm);
+        for (size_t k = 0; k < nothing.size(); ++k)
+          add_scaled(added[slot][k], share, (*addition)[k]);
+      }
+    }
+    MotionResiduals rows = coarse_.rows();
+    InclusionColumns result(rows.size(), 1 + parameters);
+    if (!rows.follow(mesh, coarse_.reference(), plain_mm, Following::closely)) return {};
+    const VectorXd plain = rows.residuals();
+    for (size_t slot = 0; slot < slots; ++slot)
+      add_scaled(plain_mm[slot], 1.0, added[slot].front());
+    if (!rows.follow(mesh, coarse_.reference(), plain_mm, Following::closely)) return {};
+    for (size_t slot = 0; slot < slots; ++slot)
+      result.middleRows(rows.first(slot), rows.count(slot)) =
+          rows.columns(slot, mesh, pointers_to(added[slot]));
+    result.col(0) = rows.residuals() - plain;
+    return result;
+  }
+  /// Beyond a usual change of the inclusion the correction stays what it was.
+  [[nodiscard]] std::optional<InclusionColumns> columns(const VectorXd& q) {
+    std::optional<InclusionColumns> result = coarse_.columns(values_at(q), course_);
+    if (!result || correction_.size() == 0) return result;
+    result->col(0) += correction_.col(0);
+    for (Index i = 0; i < parameters; ++i) {
+      const double most = space_[i].scale == Scale::logarithmic ? 0.4 : 3.0;
+      const double away = q[i] - corrected_at_[i];
+      result->col(0) += std::clamp(away, -most, most) * correction_.col(1 + i);
+      if (std::abs(away) < most) result->col(1 + i) += correction_.col(1 + i);
+    }
+    return result;
+  }
 
   static void widen(std::array<double, 2>& interval, const std::array<double, 2>& by) {
     interval = {std::min(interval[0], by[0]), std::max(interval[1], by[1])};
@@ -242,167 +391,6 @@ class InclusionFit final : public inference::LeastSquaresProblem {
   Eigen::MatrixXd jacobian_;  ///< where `residuals` was last found
   std::optional<SearchResult> best_;
 };
-
-/// Ends at a fit that is better than the best one by more than `gain`.
-InclusionFit::Profile InclusionFit::profile_of_contrast(double gain) {
-  Profile profile{open_at(*best_, 0.0), {}};
-  Intervals& found = profile.intervals;
-  const double best_chi_square = best_->residuals.squaredNorm();
-  const double variance = inference::estimate_covariance(best_->jacobian).matrix(0, 0);
-  const double usual = std::clamp(std::sqrt(variance), 0.08, 0.6);
-  for (const double direction : {-1.0, 1.0}) {
-    VectorXd q = best_->q;
-    double cost_before = 0.0;
-    VectorXd before = q;
-    for (double away = usual; away < 6.0 * usual; away *= 1.6) {
-      q[0] = std::clamp(best_->q[0] + direction * away, space_.lower()[0], space_.upper()[0]);
-      SearchResult at = search(q, 0.2, true);
-      if (at.termination == inference::Termination::no_solution) break;
-      q = at.q;
-      const double risen = at.residuals.squaredNorm() - best_chi_square;
-      if (risen < -gain) {
-        profile.deeper = std::move(at);
-        return profile;
-      }
-      const double cost = std::max(0.0, risen);
-      if (cost >= allowed) {
-        const double part =
-            (std::sqrt(allowed) - std::sqrt(cost_before)) / (std::sqrt(cost) - std::sqrt(cost_before));
-        for (size_t i = 0; i < inclusion_parameters; ++i) {
-          const auto k = static_cast<Index>(i);
-          const double crossing = std::lerp(before[k], q[k], part);
-          widen(found[i], {crossing, crossing});
-        }
-        break;
-      }
-      widen(found, open_at(at, cost));
-      widen(found[0], {q[0], q[0]});
-      before = q;
-      cost_before = cost;
-      if (q[0] == space_.lower()[0] || q[0] == space_.upper()[0]) break;
-    }
-  }
-  return profile;
-}
-
-/// What a point of the profile leaves open for each parameter, all others but the contrast free, when it costs so much
-/// already.
-Intervals InclusionFit::open_at(const SearchResult& at, double cost) const {
-  const Eigen::MatrixXd covariance =
-      inference::estimate_covariance(at.jacobian, free_but_contrast(false)).matrix;
-  Intervals result{};
-  for (size_t i = 0; i < inclusion_parameters; ++i) {
-    const auto k = static_cast<Index>(i);
-    const double half = std::sqrt((allowed - cost) * covariance(k, k));
-    result[i] = {at.q[k] - half, at.q[k] + half};
-  }
-  return result;
-}
-
-/// On the coarse mesh: the change of the tags' own errors between the body without and with the inclusion, at the frames'
-/// pressures (FieldProblem::shares).
-std::optional<InclusionColumns> InclusionFit::followed_columns(const InclusionValues& values) {
-  const HermiteMesh& mesh = coarse_.body().mesh();
-  const size_t slots = base_.pressures_kPa.size();
-  InclusionBody::Addition nothing;
-  nothing.fill(NodeField(mesh.reference().size(), 0.0));
-  std::vector<NodeField> plain_mm(slots, mesh.reference());
-  std::vector<InclusionBody::Addition> added(slots, nothing);
-  for (size_t node = 0; node < problem_.nodes_kPa().size(); ++node) {
-    std::optional<InclusionBody> other;
-    if (node != problem_.highest_node())
-      other.emplace(problem_.field().base, base_.C1_kPa, problem_.nodes_kPa()[node], guess_,
-                    InclusionMesh::coarse);
-    InclusionBody& body = other ? *other : coarse_.body();
-    const std::optional<InclusionBody::Addition> addition = body.addition(values, true);
-    if (!addition) return {};
-    const NodeField motion_mm = difference(*body.plain_mm(), mesh.reference());
-    for (size_t slot = 0; slot < slots; ++slot) {
-      const double share = problem_.shares(base_.pressures_kPa[slot])[node];
-      add_scaled(plain_mm[slot], share, motion_mm);
-      for (size_t k = 0; k < nothing.size(); ++k)
-        add_scaled(added[slot][k], share, (*addition)[k]);
-    }
-  }
-  MotionResiduals rows = coarse_.rows();
-  InclusionColumns result(rows.size(), 1 + parameters);
-  if (!rows.follow(mesh, coarse_.reference(), plain_mm, Following::closely)) return {};
-  const VectorXd plain = rows.residuals();
-  for (size_t slot = 0; slot < slots; ++slot)
-    add_scaled(plain_mm[slot], 1.0, added[slot].front());
-  if (!rows.follow(mesh, coarse_.reference(), plain_mm, Following::closely)) return {};
-  for (size_t slot = 0; slot < slots; ++slot)
-    result.middleRows(rows.first(slot), rows.count(slot)) =
-        rows.columns(slot, mesh, pointers_to(added[slot]));
-  result.col(0) = rows.residuals() - plain;
-  return result;
-}
-
-/// Beyond a usual change of the inclusion the correction stays what it was.
-std::optional<InclusionColumns> InclusionFit::columns(const VectorXd& q) {
-  std::optional<InclusionColumns> result = coarse_.columns(values_at(q), course_);
-  if (!result || correction_.size() == 0) return result;
-  result->col(0) += correction_.col(0);
-  for (Index i = 0; i < parameters; ++i) {
-    const double most = space_[i].scale == Scale::logarithmic ? 0.4 : 3.0;
-    const double away = q[i] - corrected_at_[i];
-    result->col(0) += std::clamp(away, -most, most) * correction_.col(1 + i);
-    if (std::abs(away) < most) result->col(1 + i) += correction_.col(1 + i);
-  }
-  return result;
-}
-
-/// Of the rows, the base fit's priors, the inclusion's priors.
-std::optional<VectorXd> InclusionFit::residuals(const VectorXd& q) {
-  if (problem_.field().alive) problem_.field().alive();
-  const std::optional<InclusionColumns> inclusion = columns(q);
-  if (!inclusion) return {};
-  const Index all = base_.jacobian.rows();
-  VectorXd result(all + priors);
-  result.head(all) = base_.all_residuals() + base_.jacobian * q.tail(base_.jacobian.cols());
-  result.head(inclusion->rows()) += inclusion->col(0);
-  jacobian_.setZero(all + priors, q.size());
-  jacobian_.topRightCorner(all, base_.jacobian.cols()) = base_.jacobian;
-  jacobian_.topLeftCorner(inclusion->rows(), parameters) = inclusion->rightCols<inclusion_parameters>();
-  for (Index axis = 0; axis < 3; ++axis) {
-    result[all + axis] = (q[4 + axis] - std::log(usual_axis_mm)) / axis_spread;
-    jacobian_(all + axis, 4 + axis) = 1.0 / axis_spread;
-  }
-  result[all + 3] = q[0] / contrast_spread;
-  jacobian_(all + 3, 0) = 1.0 / contrast_spread;
-  return result;
-}
-
-FieldFit InclusionFit::result() const {
-  FieldFit result = with_inclusion(base_, guess_);
-  if (!best_) return result;
-  const VectorXd shift = best_->q.tail(base_.jacobian.cols());
-  const auto others = static_cast<Index>(base_.choice.free.size());
-  for (Index i = 0; i < others; ++i) {
-    const size_t value = base_.choice.free[static_cast<size_t>(i)];
-    const inference::Parameter parameter = searched(base_.choice.parameter(value));
-    double& found = result.choice.values[value];
-    found = std::clamp(parameter.value(parameter.coordinate(found) + shift[1 + i]), parameter.lower,
-                       parameter.upper);
-  }
-  std::ranges::copy(values_at(best_->q),
-                    result.choice.values.begin() + static_cast<std::ptrdiff_t>(base_.choice.values.size()));
-  result.C1_kPa = base_.C1_kPa * std::exp(shift[0]);
-  for (size_t slot = 0; slot < result.pressures_kPa.size(); ++slot)
-    result.pressures_kPa[slot] += shift[1 + others + static_cast<Index>(slot)];
-  const Index rows = problem_.rows().size();
-  result.termination = best_->termination;
-  result.chi_square = best_->residuals.squaredNorm();
-  result.residuals = best_->residuals.head(rows);
-  result.priors = best_->residuals.tail(best_->residuals.size() - rows);
-  // As in other fits: log C1, the effects' parameters, the pressures.
-  const Eigen::MatrixXd& jacobian = best_->jacobian;
-  result.jacobian.resize(jacobian.rows(), jacobian.cols());
-  result.jacobian << jacobian.middleCols(parameters, 1 + others), jacobian.leftCols<parameters>(),
-      jacobian.rightCols(shift.size() - 1 - others);
-  result.covariance = inference::estimate_covariance(result.jacobian).matrix;
-  return result;
-}
 
 }  // namespace
 

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
 
 #include "estimator/explain/verdict/chi_square.hpp"
 
@@ -38,6 +39,31 @@ std::string in_words(const std::vector<std::string>& ids, const char* none) {
 }
 
 }  // namespace
+
+std::string_view name_of(Verdict verdict) {
+  switch (verdict) {
+    case Verdict::named:
+      return "named";
+    case Verdict::ambiguous:
+      return "ambiguous";
+    case Verdict::unexplained:
+      return "unexplained";
+    case Verdict::none:
+      return "none";
+  }
+  return "none";
+}
+
+Verdict verdict_named(std::string_view word) {
+  for (const Verdict verdict : {Verdict::named, Verdict::ambiguous, Verdict::unexplained, Verdict::none})
+    if (name_of(verdict) == word) return verdict;
+  throw std::invalid_argument(fmt::format("\"{}\" is no verdict", word));
+}
+
+bool is_settled(const std::vector<SearchEnd>& searches) {
+  return std::ranges::all_of(
+      searches, [](const SearchEnd& search) { return inference::is_settled(search.termination); });
+}
 
 Judgement judge(const SearchRecord& search, bool structure_left, const Gap& gap) {
   Judgement judgement;

@@ -21,6 +21,23 @@
 namespace diastole {
 namespace {
 
+Mixed cos(const Mixed& a) {
+  const double s = std::sin(a.part[0]);
+  const double c = std::cos(a.part[0]);
+  return composed(a, {c, -s, -c, s});
+}
+
+Mixed sqrt(const Mixed& a) {
+  const double x = a.part[0];
+  const double root = std::sqrt(x);
+  return composed(a, {root, 0.5 / root, -0.25 / (root * x), 0.375 / (root * x * x)});
+}
+
+Mixed reciprocal(const Mixed& a) {
+  const double r = 1.0 / a.part[0];
+  return composed(a, {r, -r * r, 2.0 * r * r * r, -6.0 * r * r * r * r});
+}
+
 constexpr double c1_kPa = 6.5;
 
 struct TwistedTube {

@@ -115,7 +115,7 @@ TEST_F(Records, TheGridHoldsTheFieldAtItsCorners) {
 TEST_F(Records, TheReportShowsMapsAndFindings) {
   const test::ScratchFolder folder;
   const std::filesystem::path file = folder.write("gel.json", to_json(record_));
-  const std::string page = report::make_report(std::span(&file, 1), {});
+  const std::string page = report::make_report(std::span(&file, 1));
   EXPECT_THAT(page, HasSubstr("Displacement from tagged images"));
   EXPECT_THAT(page, HasSubstr("away from the motion of the others"));
   EXPECT_THAT(page, HasSubstr("unseen share"));

@@ -5,12 +5,11 @@
 #include <numbers>
 
 #include "estimator/explain/verdict/explanation_json.hpp"
+#include "estimator/report/explanation_drawings.hpp"
 #include "estimator/report/field_views.hpp"
-#include "estimator/report/heat_map.hpp"
 #include "estimator/report/report.hpp"
 #include "estimator/report/svg_plot.hpp"
 #include "estimator/report/trace_views.hpp"
-#include "estimator/report/waterfall.hpp"
 #include "tests/estimator/explain/synthetic_explanation.hpp"
 #include "tests/estimator/io/scratch_file.hpp"
 
@@ -156,7 +155,7 @@ TEST(LogarithmicAxis, TicksAtDecadesAndTheirParts) {
 TEST(ExplanationReport, TellsTheWholeStory) {
   const test::ScratchFolder folder;
   const auto file = folder.write("explanation.json", to_json(test::explained_hose()));
-  const std::string page = make_report(std::vector{file}, {});
+  const std::string page = make_report(std::vector{file});
   for (const char* text : {"Where model and measurement disagree: gel", "hose-compliance", "14.2 → 1.1",
                            "soft hose", "The gap, effect by effect", "Pressure against the volume",
                            "no model can go below it", "residual / noise", "8.780 ± 0.040", "−9.7 %",

@@ -98,7 +98,7 @@ TEST(FitFile, JunkIsRefusedWithItsReason) {
 
 class ReportPage : public testing::Test {
  protected:
-  std::string page(const std::vector<std::filesystem::path>& files) { return report::make_report(files, {}); }
+  std::string page(const std::vector<std::filesystem::path>& files) { return report::make_report(files); }
   std::filesystem::path fit_file() { return folder_.write("anything.txt", to_json(gel_fit())); }
   test::ScratchFolder folder_;
 };

@@ -1,6 +1,5 @@
 #include <gmock/gmock.h>
 
-#include "estimator/shear/origin_line.hpp"
 #include "estimator/shear/shear_fit.hpp"
 #include "tests/estimator/shear/synthetic_shear.hpp"
 

@@ -10,7 +10,6 @@
 #include "estimator/mesh/ellipsoid.hpp"
 #include "estimator/solution/body_section.hpp"
 #include "estimator/solution/solution_record.hpp"
-#include "estimator/solution/wall_profile.hpp"
 #include "tests/estimator/fe/gel.hpp"
 #include "tests/estimator/io/scratch_file.hpp"
 

@@ -12,7 +12,6 @@
 
 #include "estimator/fe/point_fields.hpp"
 #include "estimator/mesh/ellipsoid.hpp"
-#include "estimator/solution/gauss_table.hpp"
 #include "estimator/solution/solution_grid.hpp"
 #include "tests/estimator/fe/gel.hpp"
 #include "tests/estimator/io/scratch_file.hpp"

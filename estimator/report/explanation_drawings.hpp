@@ -9,6 +9,8 @@
 #include <string>
 #include <vector>
 
+#include "estimator/explain/verdict/explanation.hpp"
+
 namespace diastole::report {
 
 using CellGrid = std::vector<std::vector<double>>;  ///< rows from the top; NaN leaves a hole
@@ -23,5 +25,14 @@ struct HeatMapLabels {
 
 /// The scale covers 995 of 1000 cells of both grids, and at least +-2 (signed) or 0 to 2.
 std::string heat_map(const CellGrid& before, const CellGrid& after, const HeatMapLabels& labels);
+
+// The gap after each added effect as bars on a logarithmic scale, with the noise floor:
+//
+//   base model        |██████████████████████████| 14.2
+//   + hose-compliance |██|░░░░░░░░░░░░░░░░░░░░░░░| 1.1        ░ what this effect took away
+//                      ┆ 1: noise
+
+/// Precondition: `steps` is not empty; the first is the base model.
+std::string waterfall(const std::vector<explain::Step>& steps, double floor);
 
 }  // namespace diastole::report
