@@ -89,7 +89,7 @@ HermiteMesh make_annulus(const AnnulusShape& shape) {
                      grid_elements(grid), grid_faces(grid));
 }
 
-HermiteMesh make_annulus(const AnnulusGrid& grid) {
+HermiteMesh make_annulus_on(const AnnulusGrid& grid) {
   const std::array<size_t, 3> elements{grid.angles_deg.size(), grid.heights_mm.size() - 1,
                                        grid.radii_mm.size() - 1};
   std::vector<HermiteMesh::Scales> scales;

@@ -48,6 +48,6 @@ struct AnnulusGrid {
   std::vector<double> radii_mm;    ///< rising, > 0, at least two
 };
 
-HermiteMesh make_annulus(const AnnulusGrid& grid);
+HermiteMesh make_annulus_on(const AnnulusGrid& grid);
 
 }  // namespace diastole

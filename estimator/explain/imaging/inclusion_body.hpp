@@ -137,7 +137,7 @@ class InclusionBody {
         levels_around(0.5 * body.height_mm, inclusion.z_mm,
                       is_fine ? std::span<const double>(fine_mm) : coarse_mm, is_fine ? 3.0 : 5.0);
     grid.radii_mm = radii_around(body, inclusion.radius_mm, mesh);
-    return make_annulus(grid);
+    return make_annulus_on(grid);
   }
 
   static ElasticModel model_around(const FieldModel& body, double C1_kPa, const Inclusion& inclusion,

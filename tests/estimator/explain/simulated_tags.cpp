@@ -113,7 +113,7 @@ Motion motion_around(const SimulatedTags& wanted, const Inclusion& inclusion) {
   options.stiffness = [inclusion](const Vector3d& X_mm) {
     return inclusion.stiffness({X_mm[0], X_mm[1], X_mm[2]});
   };
-  ElasticModel model(make_annulus(grid), *find_law("neo-hookean"), std::move(options));
+  ElasticModel model(make_annulus_on(grid), *find_law("neo-hookean"), std::move(options));
   Motion motion{model.mesh(), {}};
   Solution solution = model.solve(shares[0] * wanted.highest_kPa);
   for (const double share : shares) {
