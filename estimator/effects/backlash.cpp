@@ -7,7 +7,6 @@
 #include "estimator/effects/effect.hpp"
 
 namespace diastole {
-
 namespace {
 
 /// Below this play contacts close sooner: a small play goes over into none.

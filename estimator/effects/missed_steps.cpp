@@ -7,7 +7,6 @@
 #include "estimator/effects/effect.hpp"
 
 namespace diastole {
-
 namespace {
 
 constexpr double reach = 6.0;  ///< of the loss, in sd

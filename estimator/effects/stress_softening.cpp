@@ -7,7 +7,6 @@
 #include "estimator/effects/effect.hpp"
 
 namespace diastole {
-
 namespace {
 
 class Softening final : public rig::SpecimenMemory {

@@ -6,7 +6,6 @@
 #include "estimator/effects/effect.hpp"
 
 namespace diastole {
-
 namespace {
 
 class Warming final : public rig::SpecimenMemory {

@@ -7,7 +7,6 @@
 #include "estimator/effects/effect.hpp"
 
 namespace diastole {
-
 namespace {
 
 class Relaxation final : public rig::SpecimenMemory {
