@@ -5,6 +5,32 @@ target_include_directories(diastole_options INTERFACE ${CMAKE_SOURCE_DIR})
 target_compile_options(diastole_options INTERFACE
   -Wall -Wextra -Wconversion -Wdouble-promotion -Wshadow -Wnon-virtual-dtor -Werror)
 
+# diastole_prelude(NAME HEADER [PACKAGES fmt::fmt ...])
+# Precompiles cmake/preludes/HEADER with the options of this folder. What is declared in this folder from here on, and in
+# those below it, begins with these headers; whoever needs one includes it all the same (preset `debug` has no preludes).
+function(diastole_prelude name header)
+  cmake_parse_arguments(ARG "" "" "PACKAGES" ${ARGN})
+  set(source ${CMAKE_CURRENT_BINARY_DIR}/${name}.cpp)
+  file(CONFIGURE OUTPUT ${source} CONTENT "// Owns precompiled headers.\n")
+  add_library(${name} OBJECT ${source})
+  target_link_libraries(${name} PRIVATE diastole_options ${ARG_PACKAGES})
+  target_precompile_headers(${name} PRIVATE "\"cmake/preludes/${header}\"")
+  set(DIASTOLE_PRELUDE ${name} PARENT_SCOPE)
+  set(DIASTOLE_PRELUDE_PACKAGES ${ARG_PACKAGES} PARENT_SCOPE)
+endfunction()
+
+# The headers that the folder's prelude precompiles are found, and seen with the same macros, by every target of the folder.
+function(diastole_use_prelude name)
+  if(DIASTOLE_PRELUDE)
+    target_precompile_headers(${name} REUSE_FROM ${DIASTOLE_PRELUDE})
+    foreach(package IN LISTS DIASTOLE_PRELUDE_PACKAGES)
+      target_compile_definitions(${name} PRIVATE $<TARGET_PROPERTY:${package},INTERFACE_COMPILE_DEFINITIONS>)
+      target_compile_options(${name} PRIVATE $<TARGET_PROPERTY:${package},INTERFACE_COMPILE_OPTIONS>)
+      target_include_directories(${name} SYSTEM PRIVATE $<TARGET_PROPERTY:${package},INTERFACE_INCLUDE_DIRECTORIES>)
+    endforeach()
+  endif()
+endfunction()
+
 # diastole_library(NAME [TOGETHER] SOURCES a.cpp ... [LIBS x ...])
 # A static library, or without sources what its headers need; sources are found and included by their path from the root ("protocol/wire/frame.hpp").
 # TOGETHER: its sources are compiled six at a time, since each alone would mostly compile CLI11 or Asio anew.
@@ -18,6 +44,7 @@ function(diastole_library name)
   add_library(${name} STATIC ${ARG_SOURCES})
   set_target_properties(${name} PROPERTIES UNITY_BUILD ${ARG_TOGETHER} UNITY_BUILD_BATCH_SIZE 6)
   target_link_libraries(${name} PUBLIC diastole_options ${ARG_LIBS})
+  diastole_use_prelude(${name})
 endfunction()
 
 # diastole_listed(VARIABLE LIST MACRO)
@@ -29,11 +56,15 @@ function(diastole_listed variable list macro)
   set(${variable} ${sources} PARENT_SCOPE)
 endfunction()
 
+# For what reads, writes and shows text or waits for devices: GCC takes a third less time for it than with -O3.
+set(DIASTOLE_TEXT_OPTIONS $<$<CONFIG:Release>:-O1>)
+
 # diastole_program(NAME SOURCES a.cpp ... [LIBS x ...])  — lands in build/<preset>/bin
 function(diastole_program name)
   cmake_parse_arguments(ARG "" "" "SOURCES;LIBS" ${ARGN})
   add_executable(${name} ${ARG_SOURCES})
   target_link_libraries(${name} PRIVATE diastole_options ${ARG_LIBS})
+  diastole_use_prelude(${name})
 endfunction()
 
 # diastole_embed(VARIABLE HEADER h.hpp NAMESPACE n FILES name=path ...)
@@ -70,7 +101,7 @@ function(diastole_test name)
   cmake_parse_arguments(ARG "SERIAL" "TIMEOUT" "SOURCES;LIBS;LABELS" ${ARGN})
   add_executable(${name} ${ARG_SOURCES})
   target_link_libraries(${name} PRIVATE diastole_options ${ARG_LIBS} GTest::gmock GTest::gtest_main)
-  target_precompile_headers(${name} REUSE_FROM test_prelude)
+  diastole_use_prelude(${name})
   set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/tests)
   target_compile_definitions(${name} PRIVATE
     DIASTOLE_SOURCE_DIR="${CMAKE_SOURCE_DIR}" DIASTOLE_BIN_DIR="${CMAKE_RUNTIME_OUTPUT_DIRECTORY}")

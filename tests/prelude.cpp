@@ -1,1 +1,0 @@
-// Owns the precompiled headers of all tests (CMakeLists.txt).
