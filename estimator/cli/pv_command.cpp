@@ -137,9 +137,9 @@ ExitCode run_pv(const PvArguments& arguments, const CommandOutput& out) {
          .problem = fmt::format("{} is no volume to go to", arguments.volume_change_mL),
          .remedy = "Give the mL that the cavity takes, for example 60; less than zero empties it."});
   }
-  constexpr std::array kinds{OutputKind{".html", report::page_mark},
-                             OutputKind{".csv", csv_header.substr(0, csv_header.size() - 1)}};
-  arguments.outputs.require({arguments.study.study}, kinds, "is neither .html nor .csv",
+  constexpr std::array outputs{OutputKind{".html", report::page_mark},
+                               OutputKind{".csv", csv_header.substr(0, csv_header.size() - 1)}};
+  arguments.outputs.require({arguments.study.study}, outputs, "is neither .html nor .csv",
                             "Name the page or the table to write, for example curve.html.");
   const Study study = read_study(arguments.study);
   ElasticModel model = make_affected_model(study, with_progress("pv"));

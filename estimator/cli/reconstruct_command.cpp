@@ -18,8 +18,9 @@
 namespace diastole {
 namespace {
 
-constexpr std::array kinds{vtkhdf_kind, OutputKind{".csv", "frame,X_mm,Y_mm,Z_mm,x_mm,y_mm,z_mm,sigma_mm"},
-                           OutputKind{".json", reconstruction_file_mark}};
+constexpr std::array output_kinds{vtkhdf_kind,
+                                  OutputKind{".csv", "frame,X_mm,Y_mm,Z_mm,x_mm,y_mm,z_mm,sigma_mm"},
+                                  OutputKind{".json", reconstruction_file_mark}};
 constexpr double patience_s = 2.0;
 
 struct ReconstructArguments {
@@ -86,7 +87,7 @@ void print_record(const ReconstructionRecord& record) {
 ExitCode run_reconstruct(const ReconstructArguments& arguments, const CommandOutput& out) {
   const Study study = read_study(arguments.study);
   arguments.outputs.require(
-      inputs_of(study), kinds, "is no kind of file that a reconstruction is written to",
+      inputs_of(study), output_kinds, "is no kind of file that a reconstruction is written to",
       "End it in .csv (points for `diastole fit`), .vtkhdf (for ParaView) or .json (for "
       "`diastole report`).");
   const ReconstructionOptions options = options_of(arguments);
