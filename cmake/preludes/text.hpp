@@ -41,6 +41,7 @@
 
 #ifndef __clang__  // which names it otherwise than the GCC that built the library
 // fmt's library holds this function; its header has every file that uses fmt::format_to compile it anew.
-extern template void fmt::detail::vformat_to<char>(
-    fmt::detail::buffer<char>&, fmt::string_view, fmt::basic_format_args<FMT_BUFFER_CONTEXT(char)>, fmt::detail::locale_ref);
+extern template void fmt::detail::vformat_to<char>(fmt::detail::buffer<char>&, fmt::string_view,
+                                                   fmt::basic_format_args<FMT_BUFFER_CONTEXT(char)>,
+                                                   fmt::detail::locale_ref);
 #endif
