@@ -16,6 +16,7 @@ function(diastole_prelude name header)
   set(source ${CMAKE_CURRENT_BINARY_DIR}/${name}.cpp)
   file(CONFIGURE OUTPUT ${source} CONTENT "// Owns precompiled headers.\n")
   add_library(${name} OBJECT ${source})
+  set_target_properties(${name} PROPERTIES UNITY_BUILD OFF)
   target_link_libraries(${name} PRIVATE diastole_options ${ARG_PACKAGES})
   target_precompile_headers(${name} PRIVATE "\"cmake/preludes/${header}\"")
   set(DIASTOLE_PRELUDE ${name} PARENT_SCOPE)
@@ -34,9 +35,13 @@ function(diastole_use_prelude name)
   endif()
 endfunction()
 
+# With CMAKE_UNITY_BUILD sources are compiled ten at a time: headers are read and templates made once, which saves half of a
+# build from nothing. On in the presets that build everything, off in `debug`, where one changed source is compiled alone.
+set(CMAKE_UNITY_BUILD_BATCH_SIZE 10)
+
 # diastole_library(NAME [TOGETHER] SOURCES a.cpp ... [LIBS x ...])
 # A static library, or without sources what its headers need; sources are found and included by their path from the root ("protocol/wire/frame.hpp").
-# TOGETHER: its sources are compiled six at a time, since each alone would mostly compile CLI11 or Asio anew.
+# TOGETHER: with every preset its sources are compiled ten at a time, since each alone would mostly compile CLI11 or Asio anew.
 function(diastole_library name)
   cmake_parse_arguments(ARG "TOGETHER" "" "SOURCES;LIBS" ${ARGN})
   if(NOT ARG_SOURCES)
@@ -45,7 +50,9 @@ function(diastole_library name)
     return()
   endif()
   add_library(${name} STATIC ${ARG_SOURCES})
-  set_target_properties(${name} PROPERTIES UNITY_BUILD ${ARG_TOGETHER} UNITY_BUILD_BATCH_SIZE 6)
+  if(ARG_TOGETHER)
+    set_target_properties(${name} PROPERTIES UNITY_BUILD ON)
+  endif()
   target_link_libraries(${name} PUBLIC diastole_options ${ARG_LIBS})
   diastole_use_prelude(${name})
 endfunction()

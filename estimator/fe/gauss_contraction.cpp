@@ -3,9 +3,9 @@
 namespace diastole {
 namespace {
 
-constexpr size_t row = 3 * 4;      // [function or point along xi1][component]
-constexpr size_t layer = 4 * row;  // [along xi2][along xi1][component]
-using Cube = std::array<double, 4 * layer>;
+constexpr size_t row_size = 3 * 4;           // [function or point along xi1][component]
+constexpr size_t layer_size = 4 * row_size;  // [along xi2][along xi1][component]
+using Cube = std::array<double, 4 * layer_size>;
 
 /// target[n] = sum over m of factor[m] source[m * stride + n]
 template <size_t Count>
@@ -41,20 +41,20 @@ const LineTables& lines() {
 void along_first(const LineTables::Table& table, const double* source, Cube& target) {
   for (size_t r = 0; r < 16; ++r) {
     for (size_t n = 0; n < 4; ++n)
-      combine<3>(&target[r * row + 3 * n], table[n], source + r * row, 3);
+      combine<3>(&target[r * row_size + 3 * n], table[n], source + r * row_size, 3);
   }
 }
 
 void along_second(const LineTables::Table& table, const Cube& source, Cube& target) {
   for (size_t l = 0; l < 4; ++l) {
     for (size_t n = 0; n < 4; ++n)
-      combine<row>(&target[l * layer + n * row], table[n], &source[l * layer], row);
+      combine<row_size>(&target[l * layer_size + n * row_size], table[n], &source[l * layer_size], row_size);
   }
 }
 
 void along_third(const LineTables::Table& table, const double* source, double* target) {
   for (size_t n = 0; n < 4; ++n)
-    combine<layer>(target + n * layer, table[n], source, layer);
+    combine<layer_size>(target + n * layer_size, table[n], source, layer_size);
 }
 
 }  // namespace

@@ -68,8 +68,8 @@ void each_member(Visit&& visit, Record& r) {
 
 namespace {
 
-constexpr RecordFormat format{"diastole-fit", "a fit result",
-                              "Give a file that `diastole fit STUDY -o FIT.json` wrote."};
+constexpr RecordFormat fit_format{"diastole-fit", "a fit result",
+                                  "Give a file that `diastole fit STUDY -o FIT.json` wrote."};
 
 /// Drawings need a hundredth of a millimetre, not seventeen digits.
 double hundredths(double value) { return std::round(value * 100) / 100; }
@@ -93,14 +93,14 @@ void require_sound(const FitRecord& record) {
 }  // namespace
 
 std::string to_json(const FitRecord& record) {
-  Json json = format.document(written(record));
+  Json json = fit_format.document(written(record));
   round_numbers(json["sections"], hundredths);
   return json.dump(1) + "\n";
 }
 
 FitRecord fit_record_from_json(std::string_view text, const std::string& file) {
   FitRecord record{};
-  format.read(text, file, [&](const Json& json) {
+  fit_format.read(text, file, [&](const Json& json) {
     read_json(json, record);
     require_sound(record);
   });

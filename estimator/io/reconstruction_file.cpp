@@ -28,8 +28,9 @@ DIASTOLE_MEMBERS(ReconstructionRecord, study, data, mesh, unknowns, smoothing, p
 
 namespace {
 
-constexpr RecordFormat format{reconstruction_file_mark, "a reconstruction",
-                              "Give a file that `diastole reconstruct STUDY -o NAME.json` wrote."};
+constexpr RecordFormat reconstruction_format{
+    reconstruction_file_mark, "a reconstruction",
+    "Give a file that `diastole reconstruct STUDY -o NAME.json` wrote."};
 
 void require_lengths(const ReconstructionRecord& record) {
   for (const CrossValidationCurve& curve : record.curves) {
@@ -47,17 +48,17 @@ void require_lengths(const ReconstructionRecord& record) {
 }  // namespace
 
 std::string to_json(const ReconstructionRecord& record, bool with_sections) {
-  Json json = format.document(written(record));
+  Json json = reconstruction_format.document(written(record));
   round_numbers(json["sections"], six_digits);
   if (!with_sections) json["sections"].clear();
   return json.dump(with_sections ? -1 : 1) + "\n";
 }
 
-bool is_reconstruction(std::string_view text) { return format.marks(text); }
+bool is_reconstruction(std::string_view text) { return reconstruction_format.marks(text); }
 
 ReconstructionRecord reconstruction_record_from_json(std::string_view text, const std::string& file) {
   ReconstructionRecord record;
-  format.read(text, file, [&](const Json& json) {
+  reconstruction_format.read(text, file, [&](const Json& json) {
     read_json(json, record);
     require_sound(record.sections);
     require_lengths(record);

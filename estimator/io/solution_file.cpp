@@ -21,23 +21,23 @@ void each_member(Visit&& visit, Record& record) {
 
 namespace {
 
-constexpr RecordFormat format{solution_file_mark, "a solution",
-                              "Give a file that `diastole solve STUDY -o NAME.json` wrote."};
+constexpr RecordFormat solution_format{solution_file_mark, "a solution",
+                                       "Give a file that `diastole solve STUDY -o NAME.json` wrote."};
 
 }  // namespace
 
 std::string to_json(const SolutionRecord& record) {
-  Json json = format.document(written(record));
+  Json json = solution_format.document(written(record));
   round_numbers(json["sections"], six_digits);
   round_numbers(json["profiles"], six_digits);
   return json.dump() + "\n";
 }
 
-bool is_solution(std::string_view text) { return format.marks(text); }
+bool is_solution(std::string_view text) { return solution_format.marks(text); }
 
 SolutionRecord solution_record_from_json(std::string_view text, const std::string& file) {
   SolutionRecord record;
-  format.read(text, file, [&](const Json& json) {
+  solution_format.read(text, file, [&](const Json& json) {
     read_json(json, record);
     require_sound(record.sections);
     for (const SolutionProfile& profile : record.profiles)

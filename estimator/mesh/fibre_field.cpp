@@ -7,7 +7,7 @@
 namespace diastole {
 namespace {
 
-constexpr double rad_per_deg = std::numbers::pi / 180.0;
+double radians(double deg) { return std::numbers::pi / 180.0 * deg; }
 
 double interpolate(const HermiteMesh& mesh, const std::vector<double>& nodal, const MaterialPoint& point) {
   const std::array<double, corners> basis = trilinear_basis(point.xi);
@@ -44,8 +44,8 @@ Eigen::Matrix3d FibreField::material_axes(const HermiteMesh& mesh, const Materia
   using Eigen::AngleAxisd;
   using Eigen::Vector3d;
   const double sheet_deg = sheet_deg_.empty() ? 0.0 : interpolate(mesh, sheet_deg_, point);
-  return wall_axes(mesh, point) * AngleAxisd(rad_per_deg * fibre_deg(mesh, point), Vector3d::UnitZ()) *
-         AngleAxisd(rad_per_deg * sheet_deg, Vector3d::UnitX());
+  return wall_axes(mesh, point) * AngleAxisd(radians(fibre_deg(mesh, point)), Vector3d::UnitZ()) *
+         AngleAxisd(radians(sheet_deg), Vector3d::UnitX());
 }
 
 }  // namespace diastole

@@ -18,7 +18,7 @@
 namespace diastole {
 namespace {
 
-constexpr std::array<const char*, 3> coordinates{"x_mm", "y_mm", "z_mm"};
+constexpr std::array<const char*, 3> coordinate_keys{"x_mm", "y_mm", "z_mm"};
 constexpr std::array<std::string_view, nodal_derivatives> derivative_names{"value", "d1",  "d2",  "d12",
                                                                            "d3",    "d13", "d23", "d123"};
 constexpr double tie_slack = 1e-9;  // of the body's extent
@@ -139,7 +139,7 @@ class MeshReader {
  private:
   void read_values(size_t node) {
     for (size_t i = 0; i < 3; ++i) {
-      const std::vector<double> values = nodes_[node].numbers(coordinates[i], nodal_derivatives);
+      const std::vector<double> values = nodes_[node].numbers(coordinate_keys[i], nodal_derivatives);
       for (size_t d = 0; d < nodal_derivatives; ++d)
         reference_[dof_of(node, d, i)] = values[d];
     }
@@ -368,7 +368,7 @@ std::string mesh_file_text(const MeshBody& body) {
       std::array<double, nodal_derivatives> values{};
       for (size_t d = 0; d < nodal_derivatives; ++d)
         values[d] = mesh.reference()[dof_of(node, d, i)];
-      fmt::format_to(out, "{} = {}\n", coordinates[i], exact_list(values));
+      fmt::format_to(out, "{} = {}\n", coordinate_keys[i], exact_list(values));
     }
     if (body.fibres) fmt::format_to(out, "fibre_deg = {}\n", exact(body.fibres->nodal_fibre_deg()[node]));
     if (body.fibres && !body.fibres->nodal_sheet_deg().empty())

@@ -15,12 +15,12 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr double outside_mm = 5.0;  // farther from the body than this a point is not the specimen's
+constexpr double farthest_outside_mm = 5.0;  // farther from the body than this a point is not the specimen's
 constexpr double quick_settled_mm = 0.05;
 constexpr double quick_fineness = 0.5;  // decades
 constexpr int quick_huber_rounds = 2;
 
-/// Extrapolation beyond an element as a fraction of the thinnest one: `outside_mm`, never more than an element.
+/// Extrapolation beyond an element as a fraction of the thinnest one: `farthest_outside_mm`, never more than an element.
 LocatorOptions locator_for(const HermiteMesh& mesh) {
   double thinnest_mm = mesh.extent_mm();
   for (size_t e = 0; e < mesh.element_count(); ++e) {
@@ -33,7 +33,7 @@ LocatorOptions locator_for(const HermiteMesh& mesh) {
       thinnest_mm = std::min(thinnest_mm, size_mm);
     }
   }
-  return {.outside_xi = std::clamp(outside_mm / std::max(thinnest_mm, 1e-3), 0.25, 1.0)};
+  return {.outside_xi = std::clamp(farthest_outside_mm / std::max(thinnest_mm, 1e-3), 0.25, 1.0)};
 }
 
 std::vector<int> loaded_frames(const Study& study, const Measurement& measurement) {

@@ -13,7 +13,7 @@ namespace diastole::report {
 namespace {
 
 constexpr double panel_width = 440, panel_height = 210, panel_gap = 20;
-constexpr double left = 58, top = 24, bottom = 44;
+constexpr double left_room = 58, top_room = 24, bottom_room = 44;
 constexpr double bar_gap = 18;
 
 std::array<double, 2> range_of(const CellGrid& before, const CellGrid& after, bool is_signed) {
@@ -78,8 +78,8 @@ std::string panel(const CellGrid& grid, const ColourScale& scale, const HeatMapL
                     panel_height / 2, escaped(labels.y));
 }
 
-constexpr double letter_width = 6.8, bar_room = 640, value_room = 70, row_height = 34, bar_height = 20,
-                 foot = 46;
+constexpr double label_letter_width = 6.8, bar_room = 640, value_room = 70, row_height = 34, bar_height = 20,
+                 bars_foot = 46;
 
 std::string name_of(const explain::Step& step, bool first) {
   return first && step.added.empty() ? "base model" : "+ " + step.added;
@@ -90,13 +90,13 @@ std::string name_of(const explain::Step& step, bool first) {
 std::string heat_map(const CellGrid& before, const CellGrid& after, const HeatMapLabels& labels) {
   const ColourScale scale{range_of(before, after, labels.is_signed),
                           labels.is_signed ? signed_colour : map_colour, 40};
-  const double second = left + panel_width + panel_gap;
-  const ColourBarPlace bar{second + panel_width + bar_gap, top, panel_height};
+  const double second = left_room + panel_width + panel_gap;
+  const ColourBarPlace bar{second + panel_width + bar_gap, top_room, panel_height};
   return drawing(
-      bar.left + bar.width + bar.room, top + panel_height + bottom,
+      bar.left + bar.width + bar.room, top_room + panel_height + bottom_room,
       fmt::format("<g transform=\"translate({0} {2})\">{3}</g><g transform=\"translate({1} {2})\">"
                   "{4}</g>{5}",
-                  left, second, top, panel(before, scale, labels, "before", true),
+                  left_room, second, top_room, panel(before, scale, labels, "before", true),
                   panel(after, scale, labels, "after", false), colour_bar(scale, labels.bar, bar)));
 }
 
@@ -109,7 +109,7 @@ std::string waterfall(const std::vector<explain::Step>& steps, double floor) {
     most = std::max(most, step.reduced_chi_square);
   }
   // Bars begin at half the floor, so that a step at the floor still has one.
-  const double bars_left = 14 + letter_width * static_cast<double>(letters);
+  const double bars_left = 14 + label_letter_width * static_cast<double>(letters);
   const double from = std::max(0.5 * least, 1e-3);
   const double to = std::max(1.15 * most, 4 * from);
   const auto px = [&](double value) {
@@ -148,7 +148,7 @@ std::string waterfall(const std::vector<explain::Step>& steps, double floor) {
       "<text class=\"label\" x=\"{}\" y=\"{}\" text-anchor=\"middle\">reduced chi-square on "
       "data that were not fitted; dashed: noise</text>",
       bars_left + bar_room / 2, bars_bottom + 38);
-  return drawing(bars_left + bar_room + value_room, bars_bottom + foot, body);
+  return drawing(bars_left + bar_room + value_room, bars_bottom + bars_foot, body);
 }
 
 }  // namespace diastole::report

@@ -14,9 +14,9 @@
 namespace diastole::report {
 namespace {
 
-constexpr double panel_width = 225, panel_gap = 16, largest_height = 400;
+constexpr double state_width = 225, state_gap = 16, largest_height = 400;
 constexpr double title_height = 24, foot_height = 30;
-constexpr double bar_left = 2 * panel_width + 2 * panel_gap;
+constexpr double bar_left = 2 * state_width + 2 * state_gap;
 
 /// Places of both states on one scale.
 struct Scale {
@@ -39,8 +39,8 @@ Scale scale_of(const SolutionSection& section) {
   if (!(low[0] < high[0] && low[1] < high[1])) return {0, 0, 1, 0};
   const double margin = 2.0;  // px, for the strokes
   const double scale =
-      std::min((panel_width - 2 * margin) / (high[0] - low[0]), largest_height / (high[1] - low[1]));
-  const double spare_mm = 0.5 * (panel_width / scale - (high[0] - low[0]));
+      std::min((state_width - 2 * margin) / (high[0] - low[0]), largest_height / (high[1] - low[1]));
+  const double spare_mm = 0.5 * (state_width / scale - (high[0] - low[0]));
   return {low[0] - spare_mm, high[1] + margin / scale, scale, (high[1] - low[1]) * scale + 2 * margin};
 }
 
@@ -75,15 +75,15 @@ std::string lines(const FlatPoints& points, const char* style, const Scale& scal
 
 /// A bar of a round length under the first drawing.
 std::string length_bar(const SolutionSection& section, const Scale& scale) {
-  const double length_mm = ticks_over(0, 0.5 * panel_width / scale.px_per_mm, 1)[1];
+  const double length_mm = ticks_over(0, 0.5 * state_width / scale.px_per_mm, 1)[1];
   const double length = length_mm * scale.px_per_mm;
-  const double x = 0.5 * (panel_width - length);
+  const double x = 0.5 * (state_width - length);
   const double y = title_height + scale.height + 10;
   return fmt::format(
       "<path class=\"ruler\" d=\"M{0:.1f} {1:.1f}v6m0 -3h{2:.1f}m0 -3v6\"/>"
       "<text x=\"{3:.1f}\" y=\"{4:.1f}\" text-anchor=\"middle\">{5} mm</text>"
       "<text x=\"{6:.1f}\" y=\"{4:.1f}\" text-anchor=\"middle\">→ {7}, ↑ {8}</text>",
-      x, y, length, x + 0.5 * length, y + 18, chosen(length_mm), 1.5 * panel_width + panel_gap,
+      x, y, length, x + 0.5 * length, y + 18, chosen(length_mm), 1.5 * state_width + state_gap,
       escaped(section.horizontal.substr(0, section.horizontal.find(' '))),
       escaped(section.vertical.substr(0, section.vertical.find(' '))));
 }
@@ -94,16 +94,16 @@ std::string section_map(const SolutionSection& section, const NamedField& field,
                         const std::string& after_title) {
   const Scale scale = scale_of(section);
   const ColourScale colours{colour_range(field.values)};
-  const double after = panel_width + panel_gap;
+  const double after = state_width + state_gap;
   const ColourBarPlace bar{bar_left, title_height, scale.height};
   std::string body =
-      fmt::format("<text x=\"{}\" y=\"14\" text-anchor=\"middle\">undeformed</text>", 0.5 * panel_width);
+      fmt::format("<text x=\"{}\" y=\"14\" text-anchor=\"middle\">undeformed</text>", 0.5 * state_width);
   body += panel(section.cells_before, field.values, colours, scale);
   body +=
       lines(section.elements_before, "element-line", scale) + lines(section.outline_before, "outline", scale);
   body +=
       fmt::format("<g transform=\"translate({} 0)\"><text x=\"{}\" y=\"14\" text-anchor=\"middle\">{}</text>",
-                  after, 0.5 * panel_width, escaped(after_title));
+                  after, 0.5 * state_width, escaped(after_title));
   body += panel(section.cells_after, field.values, colours, scale);
   body += lines(section.elements_after, "element-line", scale) +
           lines(section.outline_after, "outline", scale) +

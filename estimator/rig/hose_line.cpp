@@ -8,7 +8,7 @@ namespace diastole::rig {
 namespace {
 
 using Eigen::Index;
-constexpr double pi = std::numbers::pi;
+using std::numbers::pi;
 
 /// Gauss-Legendre quadrature on [0, 1]: exact for polynomials up to degree 2 n - 1.
 struct GaussLegendre {

@@ -7,7 +7,7 @@
 namespace diastole::rig {
 namespace {
 
-constexpr double pi = std::numbers::pi;
+using std::numbers::pi;
 
 }  // namespace
 

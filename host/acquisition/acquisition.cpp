@@ -15,7 +15,6 @@
 namespace diastole {
 namespace {
 
-constexpr double ns_per_s = 1e9;
 constexpr uint64_t block_span_ns = 100'000'000;
 constexpr uint64_t gap_interval_ns = 250'000'000;
 constexpr double start_patience_s = 2;  // for RunStarted

@@ -70,7 +70,6 @@ class BlockSource final : public SampleSource {
   }
 
  private:
-  static constexpr double ns_per_s = 1e9;
   static constexpr uint64_t patience_ns = 250'000'000;          // for a block, beyond the time that it takes
   static constexpr uint64_t clock_interval_ns = 200'000'000;    // between looks at the instrument's clock
   static constexpr uint64_t restart_interval_ns = 500'000'000;  // between attempts to start the scan

@@ -9,8 +9,6 @@
 namespace diastole {
 namespace {
 
-constexpr double ns_per_s = 1e9;
-
 std::unique_ptr<SampleSource> source_on(Clock& clock, daq::Instrument& instrument) {
   if (auto* blocks = dynamic_cast<daq::BlockInstrument*>(&instrument)) {
     return std::make_unique<BlockSource>(clock, *blocks);

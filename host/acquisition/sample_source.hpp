@@ -25,6 +25,8 @@
 
 namespace diastole {
 
+inline constexpr double ns_per_s = 1e9;
+
 /// Consecutive samples, row by row.
 struct Received {
   uint64_t first_index = 0;

@@ -8,7 +8,6 @@
 namespace diastole {
 namespace {
 
-constexpr double ns_per_s = 1e9;
 constexpr double independent_after_s = 0.05;
 
 }  // namespace

@@ -8,8 +8,6 @@
 namespace diastole {
 namespace {
 
-constexpr double ns_per_s = 1e9;
-
 /// The acquisition breaks a run off that goes on much longer than its segments.
 double longest_s(const ParsedJournal& parsed) {
   constexpr double ramps_s = 120;

@@ -38,7 +38,7 @@ NameAndPort split(std::string_view text) {
   return {text.substr(0, colon), text.substr(colon + 1)};
 }
 
-std::optional<ip::address> address_of(std::string_view text) {
+std::optional<ip::address> parsed_address(std::string_view text) {
   boost::system::error_code error;
   const ip::address address = ip::make_address(std::string(text), error);
   return error ? std::nullopt : std::optional(address);
@@ -57,7 +57,7 @@ ConsoleAddress parse_console_address(const std::string& text, const std::string&
   std::string_view port = text;
   if (text.find(':') != std::string::npos) {
     const NameAndPort parts = split(text);
-    const auto address = address_of(parts.name);
+    const auto address = parsed_address(parts.name);
     if (!address) throw refuse();
     result.address = *address;
     port = parts.port;
@@ -73,7 +73,8 @@ Door::Door(const ConsoleAddress& address, std::string machine)
 bool Door::is_own(std::string_view name) const {
   const std::string own = lower(name);
   if (own == "localhost") return true;
-  if (const auto address = address_of(own)) return reaches_beyond_this_machine() || address->is_loopback();
+  if (const auto address = parsed_address(own))
+    return reaches_beyond_this_machine() || address->is_loopback();
   if (!reaches_beyond_this_machine() || machine_.empty()) return false;
   return own == machine_ || own == machine_.substr(0, machine_.find('.'));
 }

@@ -10,10 +10,10 @@
 
 namespace {
 
-const std::string root = DIASTOLE_SOURCE_DIR;
+const std::string source_root = DIASTOLE_SOURCE_DIR;
 
 std::vector<std::string> lines_of(const std::string& file) {
-  std::ifstream stream(root + "/" + file);
+  std::ifstream stream(source_root + "/" + file);
   std::vector<std::string> lines;
   for (std::string line; std::getline(stream, line);)
     lines.push_back(line);
@@ -43,7 +43,7 @@ TEST(WiringPage, HasThePinsOfTheFirmware) {
 
 TEST(WiringPage, TheDrawingNamesThemToo) {
   std::stringstream drawing;
-  drawing << std::ifstream(root + "/docs/figures/wiring.svg").rdbuf();
+  drawing << std::ifstream(source_root + "/docs/figures/wiring.svg").rdbuf();
   for (const std::string& pin :
        pins_in("docs/wiring.md", std::regex(R"(^\| (P[A-D]\d+) \| ([^|]+?) \| ([^|]+?) \| (in|out) \|)"))) {
     const std::string name = pin.substr(0, pin.find(' '));

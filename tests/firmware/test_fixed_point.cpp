@@ -8,7 +8,7 @@
 namespace diastole::firmware {
 namespace {
 
-constexpr long double kOne = 18446744073709551616.0L;
+constexpr long double kUnit = 18446744073709551616.0L;
 
 TEST(FixedPoint, MultiplyHighIsTheUpperHalfOfTheProduct) {
   std::mt19937_64 random(1);
@@ -42,9 +42,9 @@ TEST(FixedPoint, SquareRootIsGoodTo44Bits) {
   std::mt19937_64 random(3);
   for (int i = 0; i < 200'000; ++i) {
     const Q64 x = (random() >> (random() % 60)) & ~(1ULL << 63);
-    const long double exact = std::sqrt(static_cast<long double>(x) / kOne);
-    const long double root = static_cast<long double>(square_root(x)) / kOne;
-    ASSERT_LE(std::abs(root - exact), exact * 0x1p-44L + 1 / kOne) << x;
+    const long double exact = std::sqrt(static_cast<long double>(x) / kUnit);
+    const long double root = static_cast<long double>(square_root(x)) / kUnit;
+    ASSERT_LE(std::abs(root - exact), exact * 0x1p-44L + 1 / kUnit) << x;
   }
   EXPECT_EQ(square_root(0), 0U);
   EXPECT_EQ(square_root(kHalf >> 1), kHalf);
@@ -55,17 +55,17 @@ TEST(FixedPoint, SquareRootJustBelowEveryPowerOfFourDoesNotOverflow) {
     const Q64 power = places == 0 ? 0 : Q64{1} << (64 - places);
     for (Q64 distance = places == 0 ? Q64{1} << 32 : 1; distance < (~Q64{0} >> places) / 4; distance *= 2) {
       const Q64 fraction = power - distance;
-      const long double exact = std::sqrt(static_cast<long double>(fraction) / kOne);
-      const long double root = static_cast<long double>(square_root(fraction)) / kOne;
-      ASSERT_LE(std::abs(root - exact), exact * 0x1p-44L + 1 / kOne) << fraction;
+      const long double exact = std::sqrt(static_cast<long double>(fraction) / kUnit);
+      const long double root = static_cast<long double>(square_root(fraction)) / kUnit;
+      ASSERT_LE(std::abs(root - exact), exact * 0x1p-44L + 1 / kUnit) << fraction;
     }
   }
 }
 
 TEST(FixedPoint, SquareRootNearOneDoesNotOverflow) {
   for (std::uint64_t distance = 1ULL << 32; distance < 1ULL << 60; distance *= 3) {
-    const long double exact = std::sqrt(1 - static_cast<long double>(distance) / kOne);
-    EXPECT_NEAR(static_cast<double>(static_cast<long double>(square_root(0 - distance)) / kOne),
+    const long double exact = std::sqrt(1 - static_cast<long double>(distance) / kUnit);
+    EXPECT_NEAR(static_cast<double>(static_cast<long double>(square_root(0 - distance)) / kUnit),
                 static_cast<double>(exact), 1e-12);
   }
 }

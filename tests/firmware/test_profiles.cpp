@@ -11,8 +11,6 @@
 namespace diastole::firmware {
 namespace {
 
-constexpr Real kOne = 18446744073709551616.0L;
-
 class EveryProfile : public testing::TestWithParam<NamedProfile> {};
 class EveryMovingProfile : public EveryProfile {};
 

@@ -21,8 +21,6 @@ using Real = long double;
 using wire::Refusal;
 using Rises = std::vector<std::int16_t>;
 
-constexpr Real kOne = 18446744073709551616.0L;
-
 /// Up and down at random, never below the first point, and back.
 Rises random_rises(std::mt19937& random, std::size_t count, std::int32_t most) {
   Rises rises;

@@ -12,6 +12,8 @@
 
 namespace diastole::firmware {
 
+inline constexpr long double kOne = 18446744073709551616.0L;  // of a Q64
+
 inline constexpr std::array<std::int16_t, 48> kHeartRises = {
     3358,   9422,   14508,  18616,  21745,  23897,  25071,  25267,  24484,  22789,  20679,  17630,
     13488,  8252,   3226,   2881,   2972,   2950,   2811,   2558,   4468,   9457,   12822,  14473,

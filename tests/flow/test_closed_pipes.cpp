@@ -26,9 +26,9 @@ TEST(ClosedPipe, ASimulationWhoseProgressNobodyReadsIsCarriedThrough) {
 TEST(ClosedPipe, AProgramWhoseAnswerNobodyReadsEndsQuietly) {
   const Workplace place;
   place.write("baseline.run.h5", source_text("examples/recorded-baseline.run.h5"));
-  for (const char* json : {"", " --json"}) {
+  for (const char* as_json : {"", " --json"}) {
     const Ended ended = run_line(
-        place, std::string("diastole inspect baseline.run.h5") + json + " | true; exit ${PIPESTATUS[0]}");
+        place, std::string("diastole inspect baseline.run.h5") + as_json + " | true; exit ${PIPESTATUS[0]}");
     EXPECT_EQ(ended.exit_code, 128 + SIGPIPE);
     EXPECT_THAT(ended.err, IsEmpty());
   }
@@ -37,9 +37,9 @@ TEST(ClosedPipe, AProgramWhoseAnswerNobodyReadsEndsQuietly) {
 TEST(FullDisk, AnAnswerThatWasNotWrittenIsAnError) {
   const Workplace place;
   place.write("baseline.run.h5", source_text("examples/recorded-baseline.run.h5"));
-  for (const char* json : {"", " --json"}) {
+  for (const char* as_json : {"", " --json"}) {
     const Ended ended =
-        run_line(place, std::string("diastole inspect baseline.run.h5") + json + " >/dev/full");
+        run_line(place, std::string("diastole inspect baseline.run.h5") + as_json + " >/dev/full");
     EXPECT_EQ(ended.exit_code, 2);
     EXPECT_THAT(ended.err, HasSubstr("standard output cannot be written"));
   }

@@ -22,7 +22,7 @@ sim_daq::FaultWindow window(Value value) {
 }
 
 /// A new fault is an entry here.
-constexpr std::array kinds{
+constexpr std::array known_faults{
     // Of the controller's inputs and supply.
     FaultKind{.name = "estop",
               .looks_like =
@@ -128,13 +128,13 @@ double FaultKind::value(std::optional<double> given) const {
   return given.value_or(usual);
 }
 
-std::span<const FaultKind> fault_kinds() { return kinds; }
+std::span<const FaultKind> fault_kinds() { return known_faults; }
 
 const FaultKind& fault_named(std::string_view name) {
-  const auto* found = std::ranges::find(kinds, name, &FaultKind::name);
-  if (found != kinds.end()) return *found;
+  const auto* found = std::ranges::find(known_faults, name, &FaultKind::name);
+  if (found != known_faults.end()) return *found;
   std::vector<std::string> known;
-  for (const FaultKind& kind : kinds)
+  for (const FaultKind& kind : known_faults)
     known.emplace_back(kind.name);
   throw InputError({"", "fault", fmt::format("\"{}\" is not a fault", name),
                     did_you_mean(name, known) + "`sim_rig faults` lists those that there are."});
@@ -142,7 +142,7 @@ const FaultKind& fault_named(std::string_view name) {
 
 std::string list_of_faults() {
   std::string text;
-  for (const FaultKind& kind : kinds) {
+  for (const FaultKind& kind : known_faults) {
     const std::string value = kind.unit.empty() ? "" : fmt::format("{:g} {}", kind.usual, kind.unit);
     text += fmt::format("{:<18} {:<16} {}\n", kind.name, value, kind.looks_like);
   }

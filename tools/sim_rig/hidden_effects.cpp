@@ -17,7 +17,7 @@ namespace {
 constexpr double kPa_per_Pa = 1e-3;
 
 /// A new one is an entry here. Ids are those of `diastole explain`.
-constexpr std::array kinds{
+constexpr std::array known_effects{
     HiddenKind{"stroke-gain", "drive",
                [](Draw& draw) { draw.flaws.drive.gain = draw.either_sign("gain", 0.03, 0.1); }},
     HiddenKind{"backlash", "drive",
@@ -120,10 +120,10 @@ constexpr std::array kinds{
 };
 
 const HiddenKind& kind_named(const std::string& id) {
-  const auto* found = std::ranges::find(kinds, id, &HiddenKind::id);
-  if (found != kinds.end()) return *found;
+  const auto* found = std::ranges::find(known_effects, id, &HiddenKind::id);
+  if (found != known_effects.end()) return *found;
   std::vector<std::string> known{"none", "outside", "any"};
-  for (const HiddenKind& kind : kinds)
+  for (const HiddenKind& kind : known_effects)
     known.emplace_back(kind.id);
   throw InputError({"", "option --hide", fmt::format("\"{}\" is no effect that can be hidden", id),
                     did_you_mean(id, known) + "`sim_rig hidden` lists all."});
@@ -132,7 +132,7 @@ const HiddenKind& kind_named(const std::string& id) {
 /// A seed's first choice, apart from the sizes.
 std::vector<const HiddenKind*> chosen(const std::vector<std::string>& ids, std::mt19937_64& random) {
   std::vector<const HiddenKind*> known, outside, result;
-  for (const HiddenKind& kind : kinds)
+  for (const HiddenKind& kind : known_effects)
     (kind.is_outside() ? outside : known).push_back(&kind);
   const auto one_of = [&](const auto& list) { return list[random() % list.size()]; };
   for (const std::string& id : ids) {
@@ -182,7 +182,7 @@ int Draw::whole(const std::string& name, int low, int high) {
   return value;
 }
 
-std::span<const HiddenKind> hidden_kinds() { return kinds; }
+std::span<const HiddenKind> hidden_kinds() { return known_effects; }
 
 std::string hide(const std::vector<std::string>& ids, uint64_t seed, PlantConfig& plant) {
   std::mt19937_64 random(seed);
@@ -202,7 +202,7 @@ std::string hide(const std::vector<std::string>& ids, uint64_t seed, PlantConfig
 
 std::string list_of_hidden() {
   std::string text;
-  for (const HiddenKind& kind : kinds)
+  for (const HiddenKind& kind : known_effects)
     text += fmt::format("{:24} {}\n", kind.id, kind.port);
   return text + "none, outside (one of no library), any (nothing, one, two or one of no library)\n";
 }

@@ -17,7 +17,7 @@ namespace {
 
 using Eigen::Index;
 
-constexpr double significant = 1e-3;
+constexpr double significant_there = 1e-3;
 /// By how much a coarser part must stand out more than any finer one to be the place.
 constexpr double coarser_pays = 10.0;
 
@@ -158,7 +158,7 @@ std::vector<Misfit> misfit_regions(const FieldCase& field, const MotionResiduals
       if (gain.degrees == 0) continue;
       const double p = std::min(1.0, static_cast<double>(cells) *
                                          chi_square_tail(gain.chi_square, static_cast<double>(gain.degrees)));
-      if (p > significant) continue;
+      if (p > significant_there) continue;
       Misfit misfit;
       misfit.port = "field";
       misfit.channel = "tags";

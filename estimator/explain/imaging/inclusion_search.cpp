@@ -9,7 +9,7 @@
 namespace diastole::explain {
 namespace {
 
-constexpr double usual_axis_mm = 10.0;
+constexpr double guessed_axis_mm = 10.0;
 
 std::vector<Inclusion> lattice(const FieldModel& body) {
   constexpr int turns = 16;
@@ -24,7 +24,7 @@ std::vector<Inclusion> lattice(const FieldModel& body) {
                           .radius_mm = body.inner_radius_mm + depth * wall_mm,
                           .z_mm = 0.5 * height * body.height_mm,
                           .theta_deg = 360.0 * turn / turns,
-                          .semi_axes_mm = {usual_axis_mm, usual_axis_mm, usual_axis_mm},
+                          .semi_axes_mm = {guessed_axis_mm, guessed_axis_mm, guessed_axis_mm},
                           .edge_width_mm = 4.0});
       }
     }
@@ -54,7 +54,7 @@ double distinct_places(const FieldModel& body) {
   const double volume_mm3 =
       M_PI * body.height_mm *
       (body.outer_radius_mm * body.outer_radius_mm - body.inner_radius_mm * body.inner_radius_mm);
-  return std::max(1.0, volume_mm3 / (8.0 * usual_axis_mm * usual_axis_mm * usual_axis_mm));
+  return std::max(1.0, volume_mm3 / (8.0 * guessed_axis_mm * guessed_axis_mm * guessed_axis_mm));
 }
 
 InclusionLattice inclusion_lattice(FieldProblem& problem, const FieldFit& base) {

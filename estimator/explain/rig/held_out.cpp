@@ -7,7 +7,7 @@ namespace diastole::explain {
 namespace {
 
 constexpr double linear_reach = 10.0;  // standard errors of a step that is taken for the fit
-constexpr size_t parts = 3;            // into which a run's cycles are dealt when it cannot be left out whole
+constexpr size_t dealt_parts = 3;      // into which a run's cycles are dealt when it cannot be left out whole
 constexpr double determined_by = 0.999;  // of an unknown's information from one run: no other tells about it
 
 Fold whole_run(const rig::Session& session, const rig::RigProblem& problem, size_t run) {
@@ -21,13 +21,13 @@ Fold whole_run(const rig::Session& session, const rig::RigProblem& problem, size
 }
 
 std::vector<Fold> cycles_dealt(const rig::Session& session, const rig::RigProblem& problem, size_t run) {
-  std::vector<Fold> folds(parts, Fold{session.runs[run].drive.place.name + ".run.h5", run, {}, {}});
+  std::vector<Fold> folds(dealt_parts, Fold{session.runs[run].drive.place.name + ".run.h5", run, {}, {}});
   const std::vector<rig::CycleRows> cycles = rig::cycles_of(session.runs[run]);
   for (const rig::ResidualBlock& block : problem.blocks()) {
     if (block.run != run || block.channel == "cavity_mL") continue;
     for (size_t c = 0; c < cycles.size(); ++c)
       for (size_t k = cycles[c].first; k < cycles[c].last; ++k)
-        folds[c % parts].rows.push_back(static_cast<Eigen::Index>(block.first + k));
+        folds[c % dealt_parts].rows.push_back(static_cast<Eigen::Index>(block.first + k));
   }
   std::erase_if(folds, [](const Fold& fold) { return fold.rows.empty(); });
   return folds;

@@ -14,7 +14,7 @@ namespace {
 
 constexpr double inner_mm = 22.5;
 constexpr double outer_mm = 50.0;
-constexpr double c1_kPa = 6.5;
+constexpr double tube_c1_kPa = 6.5;
 
 /// An infinitely long neo-Hookean cylinder whose inner radius has grown to a: R^2 = r^2 - c.
 struct Cylinder {
@@ -24,12 +24,12 @@ struct Cylinder {
 
   [[nodiscard]] double radial_kPa(double r) const {
     const double reference = std::sqrt(r * r - c);
-    return -2.0 * c1_kPa *
+    return -2.0 * tube_c1_kPa *
            (std::log(outer_mm * r / (reference * b_mm)) + 0.5 * c * (1.0 / (r * r) - 1.0 / (b_mm * b_mm)));
   }
   [[nodiscard]] double hoop_kPa(double r) const {
     const double stretch2 = r * r / (r * r - c);
-    return radial_kPa(r) + 2.0 * c1_kPa * (stretch2 - 1.0 / stretch2);
+    return radial_kPa(r) + 2.0 * tube_c1_kPa * (stretch2 - 1.0 / stretch2);
   }
 };
 
@@ -37,7 +37,7 @@ TEST(PointFields, OfACylinderFollowTheClosedForm) {
   const Cylinder exact{28.0};
   const double pressure_kPa = -exact.radial_kPa(exact.a_mm);
   constexpr size_t layers = 4;
-  ElasticModel model = plane_strain_slice(c1_kPa, layers);
+  ElasticModel model = plane_strain_slice(tube_c1_kPa, layers);
   const Solution solution = model.solve(pressure_kPa);
   ASSERT_TRUE(solution.report.converged());
   double hoop_force = 0.0;  // integral of sigma_cc dr
@@ -69,7 +69,7 @@ TEST(PointFields, CarryThePressureToTheWallsAsTraction) {
   constexpr double pressure_kPa = 6.0;
   std::vector<double> misses_kPa;
   for (const std::array<size_t, 3> elements : {std::array<size_t, 3>{8, 4, 1}, {8, 8, 2}}) {
-    ElasticModel model = gel(c1_kPa, elements);
+    ElasticModel model = gel(tube_c1_kPa, elements);
     const Solution solution = model.solve(pressure_kPa);
     ASSERT_TRUE(solution.report.converged());
     const auto radial_kPa = [&](size_t layer, const Xi& xi) {
@@ -92,7 +92,7 @@ TEST(PointFields, CarryThePressureToTheWallsAsTraction) {
 
 TEST(AveragedPressure, IsOneAtANodeAndBringsTheTractionCloserToTheLoad) {
   constexpr double pressure_kPa = 6.0;
-  ElasticModel model = gel(c1_kPa, {8, 8, 2});
+  ElasticModel model = gel(tube_c1_kPa, {8, 8, 2});
   const Solution solution = model.solve(pressure_kPa);
   ASSERT_TRUE(solution.report.converged());
   const ElasticState averaged = with_averaged_pressure(model.system(), solution.state);
@@ -115,9 +115,9 @@ TEST(AveragedPressure, IsOneAtANodeAndBringsTheTractionCloserToTheLoad) {
 
 // At rest each element's pressure is its own 2 C1, which no neighbour of another C1 may change.
 TEST(AveragedPressure, KeepsItsJumpWhereTheMaterialChanges) {
-  ElasticModel model = gel(c1_kPa, {6, 2, 2});
+  ElasticModel model = gel(tube_c1_kPa, {6, 2, 2});
   for (size_t e = 0; e < 12; ++e)
-    model.set_element_parameter(0, e, 2.0 * c1_kPa);
+    model.set_element_parameter(0, e, 2.0 * tube_c1_kPa);
   ElasticState state = model.solve(0.0).state;
   const std::vector<double> own = state.lagrange_pressure_kPa;
   state = with_averaged_pressure(model.system(), state);

@@ -38,7 +38,7 @@ Mixed reciprocal(const Mixed& a) {
   return composed(a, {r, -r * r, 2.0 * r * r * r, -6.0 * r * r * r * r});
 }
 
-constexpr double c1_kPa = 6.5;
+constexpr double rod_c1_kPa = 6.5;
 
 struct TwistedTube {
   double c_mm2 = 0.0;
@@ -55,15 +55,15 @@ struct TwistedTube {
   [[nodiscard]] double pressure_kPa() const {
     const double a = moved(shape.inner_radius_mm);
     const double b = moved(shape.outer_radius_mm);
-    return 2.0 * c1_kPa *
+    return 2.0 * rod_c1_kPa *
                (std::log(shape.outer_radius_mm * a / (shape.inner_radius_mm * b)) +
                 0.5 * c_mm2 * (1.0 / (a * a) - 1.0 / (b * b))) +
-           c1_kPa * tau_per_mm * tau_per_mm * (b * b - a * a);
+           rod_c1_kPa * tau_per_mm * tau_per_mm * (b * b - a * a);
   }
   [[nodiscard]] double moment_mJ() const {
     const double a = moved(shape.inner_radius_mm);
     const double b = moved(shape.outer_radius_mm);
-    return 1e-3 * std::numbers::pi * c1_kPa * tau_per_mm * (std::pow(b, 4) - std::pow(a, 4));
+    return 1e-3 * std::numbers::pi * rod_c1_kPa * tau_per_mm * (std::pow(b, 4) - std::pow(a, 4));
   }
   [[nodiscard]] Eigen::Vector3d place(const Eigen::Vector3d& from) const {
     const double radius = from.head<2>().norm();
@@ -103,7 +103,7 @@ double moment_mJ(const ElasticModel& model, const ElasticState& state, size_t le
         for (size_t m = 0; m < corners; ++m)
           p += basis[m] * state.lagrange_pressure_kPa[corners * e + m];
         const Eigen::Vector3d traction =
-            (2.0 * c1_kPa * f - p * f.determinant() * f.inverse().transpose()).col(2);
+            (2.0 * rod_c1_kPa * f - p * f.determinant() * f.inverse().transpose()).col(2);
         moment += area * mesh.value(state.position_mm, point).cross(traction)[2];
       }
     }
@@ -118,7 +118,7 @@ TEST_P(TubeTwist, MatchesTheClosedForm) {
   HermiteMesh mesh = make_annulus(tube.shape);
   const NodeField exact = tube.nodes(mesh);
   ElasticModel model(std::move(mesh), *find_law("neo-hookean"),
-                     {.parameters = {c1_kPa}, .solve = {.check_stability = true}});
+                     {.parameters = {rod_c1_kPa}, .solve = {.check_stability = true}});
   ElasticState start = model.rest_state();
   start.position_mm = exact;  // the bonded ends stay where this puts them
   const Solution solution = model.solve(tube.pressure_kPa(), shaken(model.system(), start, 0.02, 7));

@@ -6,18 +6,18 @@
 namespace diastole::inference {
 namespace {
 
-const Eigen::Vector2d start(-1.2, 1.0);
+const Eigen::Vector2d usual_start(-1.2, 1.0);
 
 TEST(Termination, Converged) {
   FunctionProblem problem({{"x"}, {"y"}}, rosenbrock);
-  const SearchResult found = minimise(problem, start, {});
+  const SearchResult found = minimise(problem, usual_start, {});
   EXPECT_EQ(found.termination, Termination::converged);
   EXPECT_THAT(found.reason, testing::StartsWith("Converged: "));
 }
 
 TEST(Termination, OnBound) {
   FunctionProblem problem({{"x", "", -2, 0.5}, {"y"}}, rosenbrock);
-  EXPECT_EQ(minimise(problem, start, {}).termination, Termination::on_bound);
+  EXPECT_EQ(minimise(problem, usual_start, {}).termination, Termination::on_bound);
 }
 
 TEST(Termination, AHeldUnknownOnItsBoundIsNoObstacle) {
@@ -43,7 +43,7 @@ TEST(Termination, Stalled) {
 
 TEST(Termination, IterationLimit) {
   FunctionProblem problem({{"x"}, {"y"}}, rosenbrock);
-  const SearchResult found = minimise(problem, start, {.iteration_limit = 5, .iterations_before = 2});
+  const SearchResult found = minimise(problem, usual_start, {.iteration_limit = 5, .iterations_before = 2});
   EXPECT_EQ(found.termination, Termination::iteration_limit);
   EXPECT_EQ(found.iterations, 3);
   EXPECT_EQ(found.reason, "Stopped at the limit of 5 iterations; the cost was still falling.");
@@ -54,7 +54,7 @@ TEST(Termination, Interrupted) {
   int asked = 0;
   SearchOptions options;
   options.interrupted = [&] { return ++asked == 3; };
-  const SearchResult found = minimise(problem, start, options);
+  const SearchResult found = minimise(problem, usual_start, options);
   EXPECT_EQ(found.termination, Termination::interrupted);
   EXPECT_EQ(found.reason, "Stopped on request after 2 iterations; the cost was still falling.");
 }
@@ -63,7 +63,7 @@ TEST(Termination, InterruptedAsHopeless) {
   FunctionProblem problem({{"x"}, {"y"}}, rosenbrock);
   SearchOptions options;
   options.hopeless = [](const SearchStep& step) { return step.iteration == 4 && step.cost > 0.1; };
-  const SearchResult found = minimise(problem, start, options);
+  const SearchResult found = minimise(problem, usual_start, options);
   EXPECT_EQ(found.termination, Termination::interrupted);
   EXPECT_EQ(found.iterations, 4);
 }

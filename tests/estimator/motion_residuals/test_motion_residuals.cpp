@@ -5,22 +5,16 @@
 #include <numbers>
 
 #include "estimator/mesh/annulus.hpp"
+#include "tests/estimator/motion_residuals/mapped_field.hpp"
 
 namespace diastole {
 namespace {
 
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
+using test::mapped;
 
 std::array<double, 3> array_of(const Vector3d& v) { return {v[0], v[1], v[2]}; }
-
-/// x = A X: a linear map of a node field is the map of each of its vectors.
-NodeField mapped(const NodeField& field, const Matrix3d& A) {
-  NodeField result(field.size());
-  for (size_t i = 0; i < field.size(); i += 3)
-    Eigen::Map<Vector3d>{&result[i]} = A * Eigen::Map<const Vector3d>{&field[i]};
-  return result;
-}
 
 HermiteMesh annulus(std::array<size_t, 3> elements) {
   AnnulusShape shape;

@@ -2,20 +2,12 @@
 
 #include "estimator/motion_residuals/tag_match.hpp"
 #include "tests/estimator/fit/synthetic.hpp"
+#include "tests/estimator/motion_residuals/mapped_field.hpp"
 
 namespace diastole {
 namespace {
 
-/// x = A X: a linear map of a node field is the map of each of its vectors.
-NodeField mapped(const NodeField& field, const Eigen::Matrix3d& A) {
-  NodeField result(field.size());
-  for (size_t i = 0; i < field.size(); i += 3) {
-    const Eigen::Vector3d v = A * Eigen::Vector3d(field[i], field[i + 1], field[i + 2]);
-    for (size_t k = 0; k < 3; ++k)
-      result[i + k] = v[static_cast<Eigen::Index>(k)];
-  }
-  return result;
-}
+using test::mapped;
 
 class TagOnSheared : public testing::Test {
  protected:

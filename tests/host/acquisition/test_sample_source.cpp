@@ -194,7 +194,7 @@ class Stalling final : public daq::PolledInstrument {
     volts[0] = 1;
     return {stall_ms == 0, "no answer"};
   }
-  void stall(int ms) { stall_ms_ = ms; }
+  void stall(int for_ms) { stall_ms_ = for_ms; }
 
  private:
   std::atomic<int> stall_ms_ = 0;

@@ -36,7 +36,7 @@ RecordedRun waves(double delay_s = 0) {
   return run;
 }
 
-std::string refusal(const std::string& text) {
+std::string refusal_of_list(const std::string& text) {
   return message_of<InputError>([&] { (void)parse_frame_times(text, "times.csv"); });
 }
 
@@ -58,14 +58,14 @@ TEST(FrameTimes, WithoutWidthReachToTheNextFrameAndNeverBeyondTheCycle) {
 }
 
 TEST(FrameTimes, FaultsAreToldWithLineAndColumn) {
-  EXPECT_THAT(refusal("frame,time\n0,1\n"), HasSubstr("line 1: names no column trigger_time_ms"));
-  EXPECT_THAT(refusal("trigger_time_ms\n10\nten\n"), HasSubstr("line 3, column trigger_time_ms"));
-  EXPECT_THAT(refusal("trigger_time_ms\n10\nnan\n"), HasSubstr("is not a number"));
-  EXPECT_THAT(refusal("trigger_time_ms\n10\n5\n"), HasSubstr("does not follow"));
-  EXPECT_THAT(refusal("trigger_time_ms,width_ms\n10,0\n"), HasSubstr("is no width"));
-  EXPECT_THAT(refusal("frame,trigger_time_ms\n1,10\n"), HasSubstr("but 0 is next"));
-  EXPECT_THAT(refusal("trigger_time_ms,width_ms\n10\n"), HasSubstr("1 cells"));
-  EXPECT_THAT(refusal("trigger_time_ms\n"), HasSubstr("lists no frame"));
+  EXPECT_THAT(refusal_of_list("frame,time\n0,1\n"), HasSubstr("line 1: names no column trigger_time_ms"));
+  EXPECT_THAT(refusal_of_list("trigger_time_ms\n10\nten\n"), HasSubstr("line 3, column trigger_time_ms"));
+  EXPECT_THAT(refusal_of_list("trigger_time_ms\n10\nnan\n"), HasSubstr("is not a number"));
+  EXPECT_THAT(refusal_of_list("trigger_time_ms\n10\n5\n"), HasSubstr("does not follow"));
+  EXPECT_THAT(refusal_of_list("trigger_time_ms,width_ms\n10,0\n"), HasSubstr("is no width"));
+  EXPECT_THAT(refusal_of_list("frame,trigger_time_ms\n1,10\n"), HasSubstr("but 0 is next"));
+  EXPECT_THAT(refusal_of_list("trigger_time_ms,width_ms\n10\n"), HasSubstr("1 cells"));
+  EXPECT_THAT(refusal_of_list("trigger_time_ms\n"), HasSubstr("lists no frame"));
   EXPECT_THAT(message_of<InputError>([] { (void)read_frame_times("no-such.csv"); }),
               HasSubstr("no-such.csv"));
 }

@@ -16,7 +16,7 @@ using testing::AllOf;
 using testing::ElementsAre;
 using testing::HasSubstr;
 
-std::string refusal(const std::filesystem::path& path) {
+std::string refusal_of_file(const std::filesystem::path& path) {
   try {
     (void)read_run(path);
   } catch (const InputError& error) {
@@ -38,7 +38,7 @@ TEST_P(EveryRejection, NamesTheDatasetAndTheFirstOffendingIndex) {
   GetParam().damage(sketch);
   const auto path = scratch_file(GetParam().name + ".run.h5");
   write_sketch(path, sketch);
-  const std::string message = refusal(path);
+  const std::string message = refusal_of_file(path);
   EXPECT_THAT(message, HasSubstr(path.string()));
   for (const std::string& part : GetParam().named)
     EXPECT_THAT(message, HasSubstr(part));
@@ -142,10 +142,11 @@ TEST_P(EitherText, FixedAndVariableLengthReadAlike) {
 INSTANTIATE_TEST_SUITE_P(Reader, EitherText, testing::Bool());
 
 TEST(Reader, AFileThatIsNoRunFileIsRefused) {
-  EXPECT_THAT(refusal("no/such.run.h5"), AllOf(HasSubstr("no/such.run.h5"), HasSubstr("cannot be opened")));
+  EXPECT_THAT(refusal_of_file("no/such.run.h5"),
+              AllOf(HasSubstr("no/such.run.h5"), HasSubstr("cannot be opened")));
   const auto text = scratch_file("text.run.h5");
   std::ofstream(text) << "not a recording\n";
-  EXPECT_THAT(refusal(text), HasSubstr("not an HDF5 file"));
+  EXPECT_THAT(refusal_of_file(text), HasSubstr("not an HDF5 file"));
 }
 
 TEST(Reader, ATruncatedFileIsRefusedAtEveryLength) {
@@ -156,7 +157,7 @@ TEST(Reader, ATruncatedFileIsRefusedAtEveryLength) {
   for (uintmax_t length = 0; length < size; length += 97) {
     std::filesystem::copy_file(whole, cut, std::filesystem::copy_options::overwrite_existing);
     std::filesystem::resize_file(cut, length);
-    EXPECT_NE(refusal(cut), "(accepted)") << "cut to " << length << " bytes";
+    EXPECT_NE(refusal_of_file(cut), "(accepted)") << "cut to " << length << " bytes";
   }
 }
 

@@ -16,8 +16,6 @@ namespace {
 
 using sim_controller::Pin;
 
-constexpr uint64_t ms = 1'000'000;
-
 enum class Input { estop, far_limit, home };
 
 wire::Fault fault_of(Input input) {

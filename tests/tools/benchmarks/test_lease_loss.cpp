@@ -13,8 +13,6 @@ namespace {
 
 using sim_controller::Pin;
 
-constexpr uint64_t ms = 1'000'000;
-
 struct Step {
   uint64_t time_ns;
   bool inflate;

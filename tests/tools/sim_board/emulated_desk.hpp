@@ -14,6 +14,8 @@
 
 namespace diastole::sim_board_test {
 
+inline constexpr uint64_t ms = 1'000'000;  // ns
+
 class EmulatedDesk final : public Clock {
  public:
   explicit EmulatedDesk(const std::string& image) : controller({read_image(image)}) {}

@@ -22,8 +22,6 @@ const std::string hanging_update = built + "tests/hanging.image";
   for (const std::string& file : {factory_image, first_update, newer_update, hanging_update}) \
     if (!std::filesystem::exists(file)) GTEST_SKIP() << "no " << file << ": build the preset `firmware` first"
 
-inline constexpr uint64_t ms = 1'000'000;  // ns
-
 /// True if the host's own reading of the slot finds an image that verifies.
 inline bool verifies(std::span<const uint8_t> flash, wire::ImageSlot slot) {
   const auto bytes = flash.subspan(slot == wire::ImageSlot::a ? 0x2'0000 : 0x4'0000, 0x2'0000);

@@ -10,6 +10,7 @@
 
 #include "tests/firmware/uploaded_waveform.hpp"
 #include "tests/firmware/uploads.hpp"
+#include "tests/tools/sim_board/built_firmware.hpp"
 #include "tests/tools/sim_board/miniature_host.hpp"
 #include "tools/sim_board/emulated_controller.hpp"
 #include "tools/sim_rig/host_built_controller.hpp"
@@ -22,7 +23,6 @@ using sim_controller::PinEdge;
 using ::testing::IsEmpty;
 
 constexpr uint64_t s = 1'000'000'000;  // ns
-const std::string firmware = DIASTOLE_SOURCE_DIR "/build/firmware/bin/diastole-stm32f405.elf";
 
 #define NEEDS_FIRMWARE()                  \
   if (!std::filesystem::exists(firmware)) \

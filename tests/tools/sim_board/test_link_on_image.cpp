@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <random>
 
+#include "tests/tools/sim_board/built_firmware.hpp"
 #include "tests/tools/sim_board/miniature_host.hpp"
 #include "tools/sim_board/emulated_controller.hpp"
 
@@ -12,7 +13,6 @@ namespace diastole::sim_board_test {
 namespace {
 
 constexpr uint64_t ms = 1'000'000;  // ns
-const std::string firmware = DIASTOLE_SOURCE_DIR "/build/firmware/bin/diastole-stm32f405.elf";
 
 link_faults::FaultRates trouble(double bit_error) {
   return {.bit_error = bit_error,

@@ -10,6 +10,7 @@
 #include "host/config/experiment.hpp"
 #include "protocol/contract/input_error.hpp"
 #include "protocol/wire/wire_text.hpp"
+#include "tests/tools/sim_board/built_firmware.hpp"
 #include "tests/tools/sim_board/emulated_desk.hpp"
 #include "tests/tools/sim_board/miniature_host.hpp"
 
@@ -18,9 +19,6 @@ namespace {
 
 using sim_controller::Pin;
 using wire::State;
-
-constexpr uint64_t ms = 1'000'000;  // ns
-const std::string firmware = DIASTOLE_SOURCE_DIR "/build/firmware/bin/diastole-stm32f405.elf";
 
 struct Case {
   State state;

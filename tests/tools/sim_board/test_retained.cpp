@@ -7,13 +7,11 @@
 #include <filesystem>
 
 #include "protocol/wire/wire_text.hpp"
+#include "tests/tools/sim_board/built_firmware.hpp"
 #include "tests/tools/sim_board/emulated_desk.hpp"
 
 namespace diastole::sim_board_test {
 namespace {
-
-constexpr uint64_t ms = 1'000'000;  // ns
-const std::string firmware = DIASTOLE_SOURCE_DIR "/build/firmware/bin/diastole-stm32f405.elf";
 
 class Retained : public testing::Test {
  protected:

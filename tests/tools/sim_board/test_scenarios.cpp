@@ -7,14 +7,13 @@
 #include <cstdlib>
 #include <filesystem>
 
+#include "tests/tools/sim_board/built_firmware.hpp"
 #include "tests/tools/sim_board/scenario.hpp"
 
 namespace diastole::sim_board_test {
 namespace {
 
 using sim_controller::Pin;
-
-const std::string firmware = DIASTOLE_SOURCE_DIR "/build/firmware/bin/diastole-stm32f405.elf";
 
 constexpr int64_t in_ticks(uint64_t time_ns) { return static_cast<int64_t>(time_ns * 84 / 1000); }
 
