@@ -26,7 +26,7 @@ double rms_difference(const HermiteMesh& mesh, const NodeField& a, const NodeFie
   return std::sqrt(sum / static_cast<double>(count));
 }
 
-class Frame : public testing::Test {
+class FieldOfAFrame : public testing::Test {
  protected:
   FrameField reconstruct(const test::TaggedOptions& options, const FrameOptions& frame = {}) {
     return reconstruct_frame(forms_, tags(options), last, frame);
@@ -41,14 +41,14 @@ class Frame : public testing::Test {
   NodeField truth_ = test::inflation(mesh_, inner_mm);
 };
 
-TEST_F(Frame, ExactTagsGiveTheMotionBack) {
+TEST_F(FieldOfAFrame, ExactTagsGiveTheMotionBack) {
   const FrameField field = reconstruct({.tags_a_frame = 2000, .noise = 0.0}, {.lambda = 1e-4});
   EXPECT_TRUE(field.converged);
   EXPECT_TRUE(field.tags_not_found.empty());
   EXPECT_LT(rms_difference(mesh_, field.displacement_mm, truth_), 2e-3);
 }
 
-TEST_F(Frame, ErrorsAreAsLargeAsStated) {
+TEST_F(FieldOfAFrame, ErrorsAreAsLargeAsStated) {
   const FrameField field = reconstruct({.tags_a_frame = 1200});
   EXPECT_TRUE(field.converged);
   EXPECT_FALSE(field.smoothing.at_edge);
@@ -78,7 +78,7 @@ TEST_F(Frame, ErrorsAreAsLargeAsStated) {
   EXPECT_LT(squares / static_cast<double>(errors_mm.size()), 1.3);
 }
 
-TEST_F(Frame, CrossValidationFindsAboutTheBestSmoothing) {
+TEST_F(FieldOfAFrame, CrossValidationFindsAboutTheBestSmoothing) {
   const double found = rms_difference(mesh_, reconstruct({.tags_a_frame = 800}).displacement_mm, truth_);
   for (const double lambda : {1e2, 1e3, 1e6, 1e7}) {
     const FrameField field = reconstruct({.tags_a_frame = 800}, {.lambda = lambda});
@@ -86,7 +86,7 @@ TEST_F(Frame, CrossValidationFindsAboutTheBestSmoothing) {
   }
 }
 
-TEST_F(Frame, WildPointsAreFoundAndLeaveTheFieldAlone) {
+TEST_F(FieldOfAFrame, WildPointsAreFoundAndLeaveTheFieldAlone) {
   const FrameField clean = reconstruct({.tags_a_frame = 1200});
   const FrameField spoilt = reconstruct({.tags_a_frame = 1200, .wild_share = 0.05});
   const auto rejected = static_cast<double>(spoilt.rows.size() - spoilt.used());
@@ -101,13 +101,13 @@ TEST_F(Frame, WildPointsAreFoundAndLeaveTheFieldAlone) {
             1.5 * rms_difference(mesh_, spoilt.displacement_mm, truth_));
 }
 
-TEST_F(Frame, AWrongSigmaDoesNotMakePointsWild) {
+TEST_F(FieldOfAFrame, AWrongSigmaDoesNotMakePointsWild) {
   const FrameField field = reconstruct({.tags_a_frame = 1200, .sigma_mm = 0.03, .noise = 10.0});
   EXPECT_EQ(field.used(), field.rows.size());
   EXPECT_NEAR(field.scale, 10.0, 1.2);
 }
 
-TEST_F(Frame, PointsGiveTheSameMotionAsTags) {
+TEST_F(FieldOfAFrame, PointsGiveTheSameMotionAsTags) {
   Measurement measurement = tags({.tags_a_frame = 1200});
   const PointLocator locator(mesh_, mesh_.reference());
   for (const TagPoint& tag : measurement.tags) {
