@@ -5,6 +5,7 @@
 
 #include <Eigen/QR>
 #include <Eigen/SVD>
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -17,12 +18,15 @@ constexpr double worth_a_word = 0.05;  // the same, in words
 
 using Eigen::Index;
 
+using Decomposition = Eigen::JacobiSVD<Eigen::MatrixXd, Eigen::NoQRPreconditioner>;
+
 /// Right singular vectors and values, by way of R: a singular value of J is one of R.
-Eigen::BDCSVD<Eigen::MatrixXd> decomposed(const Eigen::MatrixXd& columns) {
-  if (columns.rows() <= columns.cols()) return {columns, Eigen::ComputeFullV};
-  const Eigen::HouseholderQR<Eigen::MatrixXd> qr(columns);
-  const Eigen::MatrixXd R = qr.matrixQR().topRows(columns.cols()).triangularView<Eigen::Upper>();
-  return {R, Eigen::ComputeFullV};
+Decomposition decomposed(const Eigen::MatrixXd& columns) {
+  const Index rows = std::min(columns.rows(), columns.cols());
+  Eigen::MatrixXd R = Eigen::MatrixXd::Zero(columns.cols(), columns.cols());
+  R.topRows(rows) =
+      Eigen::HouseholderQR<Eigen::MatrixXd>(columns).matrixQR().topRows(rows).triangularView<Eigen::Upper>();
+  return Decomposition(R, Eigen::ComputeFullV);
 }
 
 }  // namespace
@@ -44,7 +48,7 @@ Covariance estimate_covariance(const Eigen::MatrixXd& jacobian, const std::vecto
   Eigen::VectorXd variance = Eigen::VectorXd::Zero(free_count);  // of the combinations
   Eigen::VectorXd is_unseen = Eigen::VectorXd::Zero(free_count);
   for (Index k = 0; k < free_count; ++k) {
-    const double size = k < svd.singularValues().size() ? svd.singularValues()[k] : 0.0;
+    const double size = svd.singularValues()[k];
     if (size > unseen * svd.singularValues()[0]) {
       variance[k] = 1.0 / (size * size);
       continue;
