@@ -24,7 +24,7 @@ namespace {
 using runfile::RecordedRun;
 
 constexpr double mL_per_pL = 1e-9;
-constexpr double missing = std::numeric_limits<double>::quiet_NaN();
+constexpr double no_position = std::numeric_limits<double>::quiet_NaN();
 const std::string lost_in_the_journal = "its record was lost in the journal";
 const std::string not_recorded = "not recorded";
 
@@ -52,7 +52,7 @@ void declare(std::vector<runfile::Gap>& gaps, std::string_view stream, int64_t f
   gaps.push_back({std::string(stream), first, count, reason});
 }
 
-/// The rows of /pump, in order; `missing`: no position is there.
+/// The rows of /pump, in order; `no_position` where none is known.
 class PumpRows {
  public:
   using Take = std::function<void(double time_s, double commanded_mL)>;
@@ -68,7 +68,7 @@ class PumpRows {
     const double first_s = axis_.of_tick(block.first_tick);
     const double step_s = axis_.of_tick(block.first_tick + block.period_ticks) - first_s;
     for (; rows_ < block.first_index; ++rows_)
-      take_(first_s - step_s * static_cast<double>(block.first_index - rows_), missing);
+      take_(first_s - step_s * static_cast<double>(block.first_index - rows_), no_position);
     for (size_t i = 0; i < block.microsteps.size(); ++i, ++rows_)
       take_(axis_.of_tick(block.first_tick + i * block.period_ticks), microstep_mL_ * block.microsteps[i]);
   }
@@ -76,7 +76,7 @@ class PumpRows {
   void finish() {
     if (!grid_) return;
     for (const auto due = static_cast<uint64_t>(grid_->rows()); rows_ < due; ++rows_)
-      take_(grid_->start_s + static_cast<double>(rows_) / grid_->rate_Hz, missing);
+      take_(grid_->start_s + static_cast<double>(rows_) / grid_->rate_Hz, no_position);
   }
   [[nodiscard]] const std::optional<runfile::StreamGrid>& grid() const { return grid_; }
 
