@@ -61,7 +61,8 @@ double step_at(const EvidenceOfStep& evidence, double share) {
   return evidence.steps.back();
 }
 
-/// Means of the influence's slope (a) and square (b) over the motion's residuals.
+/// Means of the influence's slope (a) and square (b) over the motion's residuals: the covariance of an M-estimator is b / a^2
+/// of a least-squares fit's (Huber, Robust Statistics, 1981, 7.6).
 struct InfluenceMeans {
   double slope = 0, square = 0;
 };

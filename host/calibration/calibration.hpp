@@ -107,7 +107,8 @@ class CalibrationBook {
     return out;
   }
 
-  /// Throw InputError for a channel that there is not, or a point that cannot be used; then nothing is changed.
+  /// Throw InputError for a channel that there is not, or a point that cannot be used (one that makes no line with the one
+  /// before); then nothing is changed.
   void add_point(const std::string& channel, const CalibrationPoint& point) {
     ChannelCalibration& found = need(channel);
     if (found.points.size() == 2) found.points.clear();
