@@ -18,6 +18,7 @@ void add_shear(CommandLine& line);
 void add_report(CommandLine& line);
 void add_mesh(CommandLine& line);
 void add_effects(CommandLine& line);
+void add_reference(CommandLine& line);
 /// Compares the explanations in a folder with what was hidden and prints how often they are right.
 using ExplanationScorer = std::function<ExitCode(
     const std::filesystem::path& truths, const std::filesystem::path& results, const CommandOutput& out)>;
@@ -35,6 +36,7 @@ inline void add_estimator_commands(CommandLine& line, const ExplanationScorer& s
   add_report(line);
   add_mesh(line);
   add_effects(line);
+  add_reference(line);
   add_explain(line, score);
 }
 

@@ -31,6 +31,7 @@ struct ExplainArguments {
   fs::path truths;
   size_t threads = 2;
   bool force = false;
+  bool strict = false;  ///< an answer that is no clear one is a failure
 };
 
 struct Interrupted {};
@@ -56,14 +57,24 @@ std::string place_of(const explain::Misfit& misfit) {
 }
 
 void print_for_people(const explain::Explanation& found, const fs::path& folder) {
-  fmt::print("{}\n\n  verdict: {}\n", found.summary, explain::name_of(found.verdict));
+  fmt::print("{}\n\n  verdict: {}{}\n", found.summary, explain::name_of(found.verdict),
+             found.confidence ? fmt::format(" (confidence {:.3g})", *found.confidence) : "");
+  if (found.model_error)
+    fmt::print("  the model's own error in the cavity: {:.1f} Pa, {:.2f} % of the range ({})\n",
+               found.model_error->rms_Pa, found.model_error->percent_of_range, found.model_error->source);
   for (const explain::FoundEffect& effect : found.effects) {
-    fmt::print("  {}\n", effect.id);
+    fmt::print("  {}{}\n", effect.id,
+               effect.size_over_model_error
+                   ? fmt::format("   {:.1f} times the model's own error", *effect.size_over_model_error)
+                   : "");
     for (const explain::FoundParameter& parameter : effect.parameters)
       fmt::print("{}", with_units(parameter));
     for (const explain::FoundChangePoint& at : effect.change_points)
       fmt::print("    at {:.3f} s of {}\n", at.time_s, at.run);
   }
+  for (const explain::Hint& hint : found.hints)
+    fmt::print("  hint: {}, {:.1f} times the model's own error: too small for a name\n", hint.id,
+               hint.size_over_model_error);
   if (!found.where.empty()) fmt::print("\nWhere the model fails\n");
   for (const explain::Misfit& misfit : found.where)
     fmt::print("{}", place_of(misfit));
@@ -141,7 +152,8 @@ ExitCode run_explain(const ExplainArguments& arguments, const CommandOutput& out
   } else {
     print_for_people(found, arguments.folder);
   }
-  return ExitCode::done;
+  const bool clear = found.verdict == explain::Verdict::named || found.verdict == explain::Verdict::none;
+  return arguments.strict && !clear ? ExitCode::negative : ExitCode::done;
 }
 
 }  // namespace
@@ -166,8 +178,13 @@ void add_explain(CommandLine& line, const ExplanationScorer& score) {
       "OUT gets report.html, explanation.json for `diastole report`, and explained.study.toml: the study "
       "with\n"
       "what was found.\n"
+      "A name needs an effect larger than the model's own error; smaller ones are hints. That error is "
+      "learnt where the\n"
+      "study names sessions in which nothing is wrong, [data] reference = [...] (diastole reference "
+      "--help).\n"
       "`diastole effects` lists the effects that are known. Exit code 0: done, whatever the verdict; 1: "
-      "interrupted; 2: unreadable input.");
+      "interrupted,\n"
+      "or with --strict ambiguous or unexplained; 2: unreadable input.");
   command
       ->add_option("STUDY", arguments->study, "study file with [data] runs; with --score the results' folder")
       ->required();
@@ -176,6 +193,7 @@ void add_explain(CommandLine& line, const ExplanationScorer& score) {
   command->add_option("--threads", arguments->threads, "simulations at a time")
       ->check(CLI::Range(1, 256))
       ->capture_default_str();
+  command->add_flag("--strict", arguments->strict, "exit with 1 if the answer is ambiguous or unexplained");
   command->add_flag("--force", arguments->force, "replace files in the folder that hold something else");
   line.on_run(command, [arguments, score](const CommandOutput& out) {
     if (!arguments->truths.empty()) return score(arguments->truths, arguments->study, out);

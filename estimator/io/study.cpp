@@ -201,6 +201,8 @@ StudyData read_data(TableReader& root, const std::filesystem::path& folder) {
   if (!table) return data;
   for (const std::string& run : table->texts_or("runs", {}))
     data.runs.push_back(folder / run);
+  for (const std::string& study : table->texts_or("reference", {}))
+    data.reference.push_back(folder / study);
   const auto path_if = [&](std::string_view key) -> std::optional<std::filesystem::path> {
     if (!table->has(key)) return std::nullopt;
     return folder / table->text(key);

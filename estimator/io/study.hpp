@@ -88,6 +88,8 @@ struct StudyLaw {
 /// Paths are resolved against the study file's folder; they need not exist until they are read.
 struct StudyData {
   std::vector<std::filesystem::path> runs;
+  std::vector<std::filesystem::path> reference =
+      {};  ///< studies of this rig with nothing wrong, or one file made of them
   std::optional<std::filesystem::path> tags;
   std::optional<std::filesystem::path> points;
   std::optional<std::filesystem::path> frames;

@@ -81,7 +81,8 @@ class SpecimenFamily final : public SpecimenCurves {
   SpecimenResolution resolution_;
   double modulus_kPa_ = 1.0;
   size_t modulus_index_ = 0;
-  mutable std::mutex solving_;  ///< held while finite elements are solved
+  static inline std::mutex
+      solving_;  ///< held while finite elements are solved: the solver below bears one at a time
   mutable std::mutex keeping_;  ///< held while curves_ or plain_ are looked at or added to
   mutable std::map<std::string, SpecimenCurve> curves_;  ///< that were solved for
   mutable std::optional<SpecimenCurve> plain_;

@@ -84,10 +84,12 @@ struct RigModel {
   double cavity_gas_mL = 0.0;  ///< at rest; beside the specimen
   double gas_exponent =
       1.2;  ///< of p V^n: bubbles at about a hertz are between isothermal (1) and adiabatic (1.4)
-  double pump_leak_mL_s_kPa = 0.0;  ///< conductance past the seal
+  double pump_leak_mL_s_kPa = 0.0;           ///< conductance past the seal
+  double drive_compliance_mL_per_kPa = 0.0;  ///< by which screw, piston and cylinder yield
   std::vector<LeakLaw> cavity_leaks;
   std::vector<MemoryMaker> memories;
   std::vector<SensorMap> cavity_sensor;
+  double volume_gain = 1.0;     ///< of gated volumes
   double sample_delay_s = 0.0;  ///< samples show what was there this much earlier
   double sample_skew = 0.0;     ///< and the DAQ's clock runs fast by this part: counts more seconds
 };

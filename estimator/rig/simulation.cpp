@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <optional>
 #include <unsupported/Eigen/MatrixFunctions>
 
 #include "estimator/rig/cavity.hpp"
@@ -26,6 +27,9 @@ DriveTrace driven(const RigModel& model, const RunDrive& run, DriveTrace motion)
 
 /// Conductances below this are none: the resistance would be beyond what the step's matrix bears.
 constexpr double least_leak = 1e-7;
+
+/// Of the drive, mL/kPa: less is rigid, a thousandth of what a hose yields.
+constexpr double least_compliance = 1e-5;
 
 /// The fluid-filled catheter with its transducer, exactly integrated for pressure that is linear between samples; from rest
 /// at the first pressure.
@@ -60,13 +64,12 @@ class Plant {
       : model_(model),
         drive_(driven(model, run, motion)),
         gas_(model.pump_gas_mL, model.gas_exponent, run.place.atmosphere_kPa),
-        line_(model.hose,
-              {.step_s = options.step_s,
-               .components = options.components,
-               .pump_stiffness = gas_.present() ? std::optional(gas_.stiffness_at_rest()) : std::nullopt,
-               .pump_resistance = !gas_.present() && model.pump_leak_mL_s_kPa > least_leak
-                                      ? std::optional(1.0 / model.pump_leak_mL_s_kPa)
-                                      : std::nullopt}),
+        line_(model.hose, {.step_s = options.step_s,
+                           .components = options.components,
+                           .pump_stiffness = pump_stiffness(),
+                           .pump_resistance = !pump_stiffness() && model.pump_leak_mL_s_kPa > least_leak
+                                                  ? std::optional(1.0 / model.pump_leak_mL_s_kPa)
+                                                  : std::nullopt}),
         cavity_(model, run.place) {}
 
   PlantTrace run();
@@ -90,6 +93,13 @@ class Plant {
   [[nodiscard]] double left_mL(size_t k) const {
     return drive_.volume_mL[k] + line_.yielded_mL() - line_.kept_mL();
   }
+  /// Of what yields before the hose: gas or, far stiffer, the drive.
+  [[nodiscard]] std::optional<double> pump_stiffness() const {
+    if (gas_.present()) return gas_.stiffness_at_rest();
+    if (model_.drive_compliance_mL_per_kPa > least_compliance)
+      return 1.0 / model_.drive_compliance_mL_per_kPa;
+    return {};
+  }
   [[nodiscard]] double loss_at_pump_kPa() const {
     return (1.0 - model_.hose.loss_at_cavity) * turning_loss_kPa(line_.entering_mL_per_s());
   }
@@ -101,6 +111,8 @@ class Plant {
     if (gas_.present()) {
       const double squeezed_mL = -line_.yielded_mL() - leaked_mL_;
       now.pump_kPa += gas_.pressure_kPa(squeezed_mL) + gas_.stiffness_at_rest() * line_.yielded_mL();
+    } else if (const auto stiffness = pump_stiffness()) {
+      now.pump_kPa -= *stiffness * leaked_mL_;
     }
     return now;
   }
@@ -108,7 +120,7 @@ class Plant {
   [[nodiscard]] double cylinder_kPa() const { return line_.pump_kPa() + loss_at_pump_kPa(); }
   /// A leak beside gas follows the pressure of the last two steps.
   void leak_beside_gas(double pressure_kPa) {
-    if (gas_.present())
+    if (pump_stiffness())
       leaked_mL_ += drive_.step_s * model_.pump_leak_mL_s_kPa * (1.5 * pressure_kPa - 0.5 * before_kPa_);
     before_kPa_ = pressure_kPa;
   }

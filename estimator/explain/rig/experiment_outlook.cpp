@@ -1,10 +1,8 @@
 #include "estimator/explain/rig/experiment_outlook.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
-#include <optional>
+#include <numbers>
 
 #include "estimator/rig/sampled_signal.hpp"
 
@@ -23,7 +21,8 @@ struct Noise {
   double volume_sd_mL, cycle_sd;
 };
 
-Noise noise_of(const rig::Session& session, const rig::RigProblem& problem) {
+Noise noise_of(const rig::SessionProblem& problem) {
+  const rig::Session& session = problem.session();
   const auto& channels = problem.noise().channels;
   Noise noise{channels.at(Channel::cavity), channels.at(Channel::cavity), usual_volume_sd_mL,
               std::max(problem.noise().cycle_sd, 1e-4)};
@@ -80,32 +79,29 @@ Eigen::VectorXd rows_of(const Noise& noise, const TrialRun& trial, size_t channe
 
 /// A model's rows and its derivatives' by channel; the last two columns are the run's zeros.
 struct Rows {
+  std::array<Eigen::VectorXd, measured_count> shown;  ///< kPa, mL
   std::array<Eigen::VectorXd, measured_count> y;
   std::array<Eigen::MatrixXd, measured_count> K;
 };
 
-Rows rows_of(const rig::RigProblem& problem, const rig::RigFit& fit, const TrialRun& trial,
+Rows rows_of(const rig::SessionProblem& problem, const FittedModel& fit, const TrialRun& trial,
              const Noise& noise) {
-  const rig::RigModel made = problem.model(fit);
+  const rig::RigModel made = problem.model(fit.model);
   const rig::PlantTrace plant = rig::simulate_plant(made, trial.drive);
   const Seen base = seen_of(made, plant, trial);
-  const auto count = static_cast<Eigen::Index>(fit.values.size());
+  const Eigen::Index count = fit.coordinates.size();
   Rows rows;
   for (size_t c = 0; c < measured_count; ++c) {
+    rows.shown[c] = base.y[c];
     rows.y[c] = rows_of(noise, trial, c, base.y[c]);
     rows.K[c].resize(base.y[c].size(), count + zeros);
     rows.K[c].rightCols(zeros).setZero();
   }
   for (Eigen::Index i = 0; i < count; ++i) {
-    const auto k = static_cast<size_t>(i);
-    const rig::Unknown& unknown = fit.unknowns[k];
-    const double at = unknown.coordinate(fit.values[k]);
-    const double step = unknown.step_from(at);
-    rig::KnownModel other_values = fit;
-    other_values.values[k] = unknown.value(at + step);
-    const rig::RigModel moved = problem.model(other_values);
-    const Seen other =
-        seen_of(moved, unknown.sensors_only ? plant : rig::simulate_plant(moved, trial.drive), trial);
+    double step = 0.0;
+    const rig::RigModel moved = problem.model(fit.moved(i, step));
+    const bool same_plant = fit.unknowns[static_cast<size_t>(i)].sensors_only;
+    const Seen other = seen_of(moved, same_plant ? plant : rig::simulate_plant(moved, trial.drive), trial);
     for (size_t c = 0; c < measured_count; ++c)
       rows.K[c].col(i) = rows_of(noise, trial, c, (other.y[c] - base.y[c]) / step);
   }
@@ -114,6 +110,34 @@ Rows rows_of(const rig::RigProblem& problem, const rig::RigFit& fit, const Trial
         rows_of(noise, trial, c, Eigen::VectorXd::Constant(base.y[c].size(), 1e-3 * zero_sd_Pa));
   }
   return rows;
+}
+
+/// What the model's own error may add in the last cycle, sds of its harmonics as columns.
+Eigen::MatrixXd error_rows(const rig::SessionProblem& problem, const TrialRun& trial, const Noise& noise,
+                           size_t channel, const Eigen::VectorXd& shown) {
+  constexpr int harmonics = 8;
+  const rig::SharePrior& prior = problem.error().prior;
+  const double share = prior.share[static_cast<size_t>(channel == 0   ? rig::ErrorGroup::cavity
+                                                       : channel == 1 ? rig::ErrorGroup::pump
+                                                                      : rig::ErrorGroup::volume)];
+  const bool volume = channel == static_cast<size_t>(Measured::volume);
+  const auto first = volume ? Eigen::Index{0} : static_cast<Eigen::Index>(trial.last_first);
+  const auto last = volume ? shown.size() : static_cast<Eigen::Index>(trial.last_end);
+  if (last <= first) return Eigen::MatrixXd::Zero(shown.size(), 0);
+  const auto cycle = shown.segment(first, last - first);
+  const double size = share * (cycle.maxCoeff() - cycle.minCoeff());
+  Eigen::MatrixXd columns = Eigen::MatrixXd::Zero(shown.size(), 2 * harmonics + 1);
+  for (Eigen::Index k = 0; k < last - first; ++k) {
+    const double turn = 2.0 * std::numbers::pi * static_cast<double>(k) / static_cast<double>(last - first);
+    for (int h = 0; h <= harmonics; ++h) {
+      const double amplitude = size / std::pow(1.0 + h, 1.5);
+      columns(first + k, h) = amplitude * std::cos(h * turn);
+      if (h > 0) columns(first + k, harmonics + h) = amplitude * std::sin(h * turn);
+    }
+  }
+  for (Eigen::Index i = 0; i < columns.cols(); ++i)
+    columns.col(i) = rows_of(noise, trial, channel, columns.col(i));
+  return columns;
 }
 
 }  // namespace
@@ -126,14 +150,50 @@ Eigen::MatrixXd SegmentOutlook::of(size_t truth, size_t adapting, const Equipmen
   return sum;
 }
 
-Eigen::MatrixXd known_before(const rig::RigProblem& problem, const rig::RigFit& fit) {
-  constexpr double ridge = 1e-6;  // far weaker than any data
-  const auto count = static_cast<Eigen::Index>(fit.values.size());
-  const Eigen::MatrixXd columns =
-      fit.jacobian.cols() == count && fit.jacobian.rows() > 0 ? fit.jacobian : problem.columns(fit);
+rig::SessionModel FittedModel::moved(Eigen::Index unknown, double& step) const {
+  const rig::Unknown& at = unknowns[static_cast<size_t>(unknown)];
+  step = at.step_from(coordinates[unknown]);
+  rig::SessionModel other = model;
+  const auto effects = static_cast<Eigen::Index>(model.values.size());
+  if (unknown < effects) {
+    other.values[static_cast<size_t>(unknown)] = at.value(coordinates[unknown] + step);
+  } else {
+    other.u[unknown - effects] += step;
+  }
+  return other;
+}
+
+FittedModel fitted_model(const rig::SessionProblem& problem, const EffectSet& set) {
+  FittedModel fit{.model = set.model,
+                  .unknowns = set.unknowns,
+                  .coordinates = {},
+                  .covariance = {},
+                  .errors = set.errors};
+  const auto effects = static_cast<Eigen::Index>(set.model.values.size());
+  const auto count = effects + static_cast<Eigen::Index>(rig::basic_nuisances);
+  const Eigen::Index first_u = set.covariance.rows() - set.model.u.size();
+  fit.coordinates.resize(count);
+  fit.covariance.resize(count, count);
+  const auto place = [&](Eigen::Index i) { return i < effects ? i : first_u + i - effects; };
+  for (Eigen::Index i = 0; i < count; ++i) {
+    if (i < effects) {
+      const auto k = static_cast<size_t>(i);
+      fit.coordinates[i] = fit.unknowns[k].coordinate(set.model.values[k]);
+    } else {
+      fit.coordinates[i] = set.model.u[i - effects];
+      const rig::Nuisance& nuisance = problem.nuisances()[static_cast<size_t>(i - effects)];
+      fit.unknowns.push_back({{.name = nuisance.name}, 0.01, nuisance.sensors_only});
+    }
+    for (Eigen::Index j = 0; j < count; ++j)
+      fit.covariance(i, j) = set.covariance(place(i), place(j));
+  }
+  return fit;
+}
+
+Eigen::MatrixXd known_before(const FittedModel& fit) {
+  const Eigen::Index count = fit.coordinates.size();
   Eigen::MatrixXd known = Eigen::MatrixXd::Identity(count + zeros, count + zeros);
-  known.topLeftCorner(count, count) = columns.transpose() * columns;
-  known.topLeftCorner(count, count).diagonal().array() += ridge;
+  known.topLeftCorner(count, count) = fit.covariance.ldlt().solve(Eigen::MatrixXd::Identity(count, count));
   return known;
 }
 
@@ -146,12 +206,12 @@ Equipment equipment_of(const rig::Session& session) {
   return equipment;
 }
 
-SegmentOutlook look_ahead(const rig::Session& session, const rig::RigProblem& problem,
-                          const std::vector<const rig::RigFit*>& models, const runfile::Segment& segment) {
-  const TrialRun trial = trial_of(segment, session);
-  const Noise noise = noise_of(session, problem);
+SegmentOutlook look_ahead(const rig::SessionProblem& problem, const std::vector<const FittedModel*>& models,
+                          const runfile::Segment& segment) {
+  const TrialRun trial = trial_of(segment, problem.session());
+  const Noise noise = noise_of(problem);
   std::vector<Rows> rows;
-  for (const rig::RigFit* fit : models)
+  for (const FittedModel* fit : models)
     rows.push_back(rows_of(problem, *fit, trial, noise));
   SegmentOutlook outlook;
   outlook.gram.resize(models.size());
@@ -167,47 +227,59 @@ SegmentOutlook look_ahead(const rig::Session& session, const rig::RigProblem& pr
           const double loose = (trial.repeats + 2.0) / (noise.cycle_sd * noise.cycle_sd);
           all -= shape * ((shape.transpose() * all) / (shape.squaredNorm() + loose));
         }
-        outlook.gram[a][b][c] = all.transpose() * all;
+        Eigen::MatrixXd& gram = outlook.gram[a][b][c];
+        gram = all.transpose() * all;
+        if (all.rows() == 0) continue;
+        const Eigen::MatrixXd error = error_rows(problem, trial, noise, c, rows[a].shown[c]);
+        if (error.cols() == 0) continue;
+        const Eigen::MatrixXd mixed = error.transpose() * all;
+        Eigen::MatrixXd own = error.transpose() * error;
+        own.diagonal().array() += 1.0;
+        gram -= mixed.transpose() * own.llt().solve(mixed);
       }
     }
   }
   return outlook;
 }
 
-Eigen::MatrixXd gram_beside(const rig::RigFit& truth, const rig::RigFit& adapting, const Equipment& equipment,
+Eigen::MatrixXd gram_beside(const rig::SessionProblem& problem, const FittedModel& truth,
+                            const FittedModel& adapting, const Equipment& equipment,
                             const SpecimenKnowledge& knowledge) {
-  const auto count = static_cast<Eigen::Index>(adapting.values.size());
+  const Eigen::Index count = adapting.coordinates.size();
+  const auto modulus = static_cast<Eigen::Index>(adapting.model.values.size());
   Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(count + zeros + 1, count + zeros + 1);
-  const auto add = [&](std::string_view unknown, double difference, double error) {
-    Eigen::VectorXd row = Eigen::VectorXd::Zero(sum.cols());
-    row[0] = difference / error;
-    for (Eigen::Index i = 0; i < count; ++i) {
-      const auto k = static_cast<size_t>(i);
-      const rig::Unknown& own = adapting.unknowns[k];
-      if (own.name == unknown) row[1 + i] = own.slope(own.coordinate(adapting.values[k])) / error;
-    }
-    sum += row * row.transpose();
-  };
   if (equipment[static_cast<size_t>(Measured::radius)] && knowledge.inner_radius_mm > 0.0) {
-    const auto value = [](const rig::RigFit& fit, const std::string& unknown) {
-      const double part = fit.value(unknown);
-      return std::isfinite(part) ? part : 0.0;
+    const auto larger = [](const FittedModel& fit, Eigen::Index* unknown) {
+      size_t at = 0;
+      for (const rig::ModelTerm& term : fit.model.terms)
+        for (const EffectParameter& parameter : term.effect->parameters()) {
+          if (parameter.seen_at_rest) {
+            if (unknown != nullptr) *unknown = static_cast<Eigen::Index>(at);
+            return fit.model.values[at];
+          }
+          ++at;
+        }
+      return 0.0;
     };
-    for (const Effect* effect : rig_effects()) {
-      for (const EffectParameter& parameter : effect->parameters()) {
-        if (!parameter.seen_at_rest) continue;
-        const std::string unknown = fmt::format("{}.{}", effect->text().id, parameter.name);
-        add(unknown, value(truth, unknown) - value(adapting, unknown),
-            knowledge.radius_error_mm / knowledge.inner_radius_mm);
-      }
-    }
+    const double error = knowledge.radius_error_mm / knowledge.inner_radius_mm;
+    Eigen::Index own = -1;
+    Eigen::VectorXd row = Eigen::VectorXd::Zero(sum.cols());
+    row[0] = (larger(truth, nullptr) - larger(adapting, &own)) / error;
+    if (own >= 0)
+      row[1 + own] = adapting.unknowns[static_cast<size_t>(own)].slope(adapting.coordinates[own]) / error;
+    sum += row * row.transpose();
   }
-  const auto is_lasting = [](const rig::RigFit& fit) {
-    return std::ranges::all_of(fit.terms,
+  const auto is_lasting = [](const FittedModel& fit) {
+    return std::ranges::all_of(fit.model.terms,
                                [](const rig::ModelTerm& term) { return term.effect->keeps_modulus(); });
   };
-  if (equipment[static_cast<size_t>(Measured::stiffness)] && is_lasting(truth) && is_lasting(adapting))
-    add("modulus_kPa", truth.values[0] - adapting.values[0], knowledge.relative_C1_error * truth.values[0]);
+  if (equipment[static_cast<size_t>(Measured::stiffness)] && is_lasting(truth) && is_lasting(adapting)) {
+    const double sd = problem.nuisances()[0].sd;
+    Eigen::VectorXd row = Eigen::VectorXd::Zero(sum.cols());
+    row[0] = sd * (truth.model.u[0] - adapting.model.u[0]) / knowledge.relative_C1_error;
+    row[1 + modulus] = sd / knowledge.relative_C1_error;
+    sum += row * row.transpose();
+  }
   return sum;
 }
 

@@ -4,7 +4,8 @@
 //
 // Of two models A and B the segment's whitened residuals, if A is true, are r = W (y_A - y_B); B's unknowns adapt by
 // theta with the columns K = W dy_B/dtheta, the sensors' zeros of a new run by two more with a prior of 30 Pa, and the
-// cycles' sizes are taken off along W y_A. Rows of several segments add, so that only Gram matrices [r K]' [r K] are kept,
+// cycles' sizes are taken off along W y_A, and what the model's own error may be in the segment (harmonics of the cycle, sizes
+// as in model_error.hpp) is taken off too. Rows of several segments add, so that only Gram matrices [r K]' [r K] are kept,
 // one a channel. The separation is what is left:
 //
 //   d^2 = r'r - g' (K'K + P)^-1 g,  g = K'r,  P: what the session's own data say of B's unknowns.
@@ -15,8 +16,8 @@
 #include <array>
 #include <vector>
 
+#include "estimator/explain/rig/effect_sets.hpp"
 #include "estimator/explain/rig/trial_run.hpp"
-#include "estimator/rig_fit/rig_fit.hpp"
 
 namespace diastole::explain {
 
@@ -34,14 +35,27 @@ struct SegmentOutlook {
   [[nodiscard]] Eigen::MatrixXd of(size_t truth, size_t adapting, const Equipment& equipment) const;
 };
 
+/// A fitted set as experiments see it: the effects' values, the modulus and the sensors' offsets; tolerances stay.
+struct FittedModel {
+  rig::SessionModel model;
+  std::vector<rig::Unknown> unknowns;  ///< the effects'; then ln modulus and offsets in sds
+  Eigen::VectorXd coordinates;
+  Eigen::MatrixXd covariance;  ///< by the session's data, whatever the tolerances are
+  std::vector<double> errors;  ///< of the effects' values
+
+  /// With one coordinate moved by its perturbation; `step`: by how much.
+  [[nodiscard]] rig::SessionModel moved(Eigen::Index unknown, double& step) const;
+};
+FittedModel fitted_model(const rig::SessionProblem& problem, const EffectSet& set);
+
 /// The information P of a fit's session about its unknowns and the new run's two zeros.
-Eigen::MatrixXd known_before(const rig::RigProblem& problem, const rig::RigFit& fit);
+Eigen::MatrixXd known_before(const FittedModel& fit);
 
 /// What the session can measure already.
 Equipment equipment_of(const rig::Session& session);
 
-SegmentOutlook look_ahead(const rig::Session& session, const rig::RigProblem& problem,
-                          const std::vector<const rig::RigFit*>& models, const runfile::Segment& segment);
+SegmentOutlook look_ahead(const rig::SessionProblem& problem, const std::vector<const FittedModel*>& models,
+                          const runfile::Segment& segment);
 
 /// How exact the measurements beside are.
 struct SpecimenKnowledge {
@@ -51,7 +65,8 @@ struct SpecimenKnowledge {
 };
 
 /// What they add to a sum of Gram matrices. C1 counts only if neither model's stiffness depends on time.
-Eigen::MatrixXd gram_beside(const rig::RigFit& truth, const rig::RigFit& adapting, const Equipment& equipment,
+Eigen::MatrixXd gram_beside(const rig::SessionProblem& problem, const FittedModel& truth,
+                            const FittedModel& adapting, const Equipment& equipment,
                             const SpecimenKnowledge& knowledge);
 
 /// d of the header, from a sum of Gram matrices.

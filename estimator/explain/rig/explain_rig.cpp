@@ -9,39 +9,17 @@
 #include <optional>
 
 #include "estimator/explain/rig/findings.hpp"
-#include "estimator/explain/rig/held_out.hpp"
 #include "estimator/explain/rig/next_experiment.hpp"
-#include "estimator/explain/rig/tolerance.hpp"
+#include "estimator/explain/rig/reference_file.hpp"
+#include "estimator/explain/rig/set_verdict.hpp"
+#include "estimator/explain/verdict/verdict.hpp"
 #include "protocol/contract/input_error.hpp"
 
 namespace diastole::explain {
 namespace {
 
-constexpr double discovery_rate = 0.01;
-constexpr double dominated = 0.1;  // of chi-square left by effects beside which a first search seeks no more
-constexpr size_t most_hints = 2;   // that a next experiment is designed for, beside nothing at all
-constexpr double other_variation =
-    0.5;  // of chi-square left by effects that change what a cycle looks like, too
-
-std::vector<Step> steps_of(const SearchResult& search) {
-  std::vector<Step> steps{{"base model", search.sets.front().fit.reduced()}};
-  const auto is_effect = [](const rig::ModelTerm& a, const rig::ModelTerm& b) {
-    return a.effect == b.effect;
-  };
-  std::vector<rig::ModelTerm> part;
-  for (const rig::ModelTerm& term : search.sets[search.best].fit.terms) {
-    part.push_back(term);
-    const auto set = std::ranges::find_if(search.sets, [&](const FittedSet& other) {
-      return std::ranges::equal(part, other.fit.terms, is_effect);
-    });
-    if (set != search.sets.end()) steps.push_back({std::string(term.effect->text().id), set->fit.reduced()});
-  }
-  return steps;
-}
-
-/// The terms of the effects that the study's model has already, in its order.
-std::vector<rig::ModelTerm> terms_of(const Study& study, const rig::Session& session) {
-  std::vector<rig::ModelTerm> list;
+/// The effects that the study's model has already, in its order, with their values.
+void take_given(const Study& study, const rig::Session& session, SetSearchOptions& options) {
   for (const std::string& id : study.effects) {
     const Effect* effect = find_effect(id);
     if (effect == nullptr) {
@@ -51,104 +29,41 @@ std::vector<rig::ModelTerm> terms_of(const Study& study, const rig::Session& ses
                         .remedy = "`diastole effects` lists those that are known."});
     }
     rig::ModelTerm term{effect, {}};
-    for (const StudyEffect& given : study.effect_values) {
-      if (given.id != id) continue;
-      for (const StudyMoment& moment : given.moments)
+    const auto given = std::ranges::find(study.effect_values, id, &StudyEffect::id);
+    for (const EffectParameter& parameter : effect->parameters()) {
+      double value = parameter.typical;
+      if (given != study.effect_values.end())
+        if (const auto start = given->starts.find(std::string(parameter.name)); start != given->starts.end())
+          value = std::clamp(start->second, parameter.lower, parameter.upper);
+      options.values.push_back(value);
+    }
+    if (given != study.effect_values.end())
+      for (const StudyMoment& moment : given->moments)
         for (const rig::SessionRun& run : session.runs)
           if (run.drive.place.name == moment.run)
             term.change_points.push_back(
                 {moment.run, moment.time_s, run.drive.place.started_s + moment.time_s});
-    }
-    list.push_back(std::move(term));
+    options.terms.push_back(std::move(term));
   }
-  return list;
 }
 
-/// The session as it would be without the effects of a fit: what the model says they do is taken off. Its cycles repeat,
-/// so that the noise can be told.
-rig::Session without_effects(const rig::Session& session, const rig::RigProblem& problem,
-                             const rig::RigFit& fit) {
-  rig::Session plain = session;
-  const auto with = problem.predictions(fit);
-  const auto base = problem.predictions({{}, {fit.values.begin(), fit.values.begin() + rig::nuisances}});
-  for (size_t r = 0; r < plain.runs.size(); ++r) {
-    for (auto& [channel, values] : plain.runs[r].pressure_kPa) {
-      const bool cavity = channel == rig::Channel::cavity;
-      const auto& now = cavity ? with[r].cavity_kPa : with[r].pump_kPa;
-      const auto& then = cavity ? base[r].cavity_kPa : base[r].pump_kPa;
-      for (size_t k = 0; k < values.size(); ++k)
-        values[k] += then[k] - now[k];
-    }
-  }
-  return plain;
+const EffectSet& plain_set(const SetSearch& search) {
+  return *std::ranges::find_if(search.sets,
+                               [&](const EffectSet& set) { return set.model.terms.size() == search.given; });
 }
 
-bool differ(const rig::NoiseModel& a, const rig::NoiseModel& b) {
-  constexpr double noise_part = 0.05;
-  constexpr double cycle_part = 0.3;
-  constexpr double smallest_cycle_sd = 5e-4;
-  for (const auto& [channel, noise] : a.channels)
-    if (std::abs(b.channels.at(channel).innovation_kPa / noise.innovation_kPa - 1.0) > noise_part)
-      return true;
-  return std::abs(a.cycle_sd - b.cycle_sd) > cycle_part * std::max(b.cycle_sd, smallest_cycle_sd);
-}
-
-/// The session's problem and what was found in it.
-struct Work {
-  rig::RigProblem problem;
-  SearchResult found;
-  Eigen::VectorXd weights;  ///< of the residuals' squares
-
-  [[nodiscard]] const FittedSet& best() const { return found.sets[found.best]; }
-};
-
-/// A first search, and a second one if the effects had spoiled the estimate of the noise or are so large that strokes
-/// vary otherwise with them.
-Work searched(const rig::Session& session, const rig::SpecimenFamily& family, const Study& study,
-              const ExplainOptions& options) {
-  rig::RigFitOptions fitting;
-  fitting.threads = options.threads;
-  SearchOptions searching;
-  searching.progress = options.progress;
-  searching.start = terms_of(study, session);
-  searching.enough = dominated;
-  const auto work = [&]() -> Work {
-    rig::RigProblem problem(session, family, fitting);
-    if (fitting.variation_of)
-      searching.change = problem.base().residuals - problem.residuals(*fitting.variation_of);
-    SearchResult found = search(session, family, problem, searching);
-    Eigen::VectorXd weights = row_weights(session, problem, searching.change);
-    return {std::move(problem), std::move(found), std::move(weights)};
+std::vector<Step> steps_of(const EffectSet& before, const EffectSet& after) {
+  const auto reduced = [&](const EffectSet& set) {
+    return set.evidence.left.cwiseAbs2().cwiseQuotient(after.evidence.variance).mean();
   };
-  options.report("fitting the rig's model");
-  Work first = work();
-  const FittedSet& base = first.found.sets.front();
-  const rig::RigFit& best = first.best().fit;
-  if (best.terms.empty() || leaves_misfit(base, first.best())) return first;
-  const rig::NoiseModel noise = rig::estimate_noise(without_effects(session, first.problem, best));
-  const bool large = first.best().chi_square < other_variation * base.chi_square;
-  if (!large && !differ(first.problem.noise(), noise)) return first;
-  options.report("fitting again with the noise that is left");
-  fitting.noise = noise;
-  fitting.variation_of = best;
-  searching.start = best.terms;
-  searching.enough = 0.0;
-  return work();
-}
-
-/// Of each effect found, the fit of the others alone, which the search made when it compared look-alikes.
-std::vector<const rig::RigFit*> fits_without(const SearchResult& search, const rig::RigFit& best) {
-  std::vector<const rig::RigFit*> fits;
-  for (const rig::ModelTerm& left_out : best.terms) {
-    std::vector<std::string> others;
-    for (const rig::ModelTerm& in : best.terms)
-      if (in.effect != left_out.effect) others.emplace_back(in.effect->text().id);
-    std::sort(others.begin(), others.end());
-    const auto made = std::find_if(search.sets.begin(), search.sets.end(),
-                                   [&](const FittedSet& set) { return set.ids() == others; });
-    fits.push_back(made == search.sets.end() ? nullptr : &made->fit);
+  std::vector<Step> steps{{"base model", reduced(before)}};
+  if (&before != &after) {
+    std::string ids;
+    for (const std::string& id : after.ids())
+      ids += (ids.empty() ? "" : " + ") + id;
+    steps.push_back({ids, reduced(after)});
   }
-  return fits;
+  return steps;
 }
 
 /// Where sets of one effect look alike, the port that most of them have, or the best one's; none if they have several
@@ -162,39 +77,46 @@ std::optional<std::string> common_port(const Explanation& found) {
   for (const FoundEffect& best : found.effects)
     vote(best.id, 3);
   for (const std::vector<std::string>& ids : found.ambiguous_with) {
-    if (ids.size() != 1) return {};
-    vote(ids.front(), 2);
+    if (ids.size() > 1) return {};
+    if (ids.size() == 1) vote(ids.front(), 2);
   }
   if (votes.empty()) return {};
   return std::ranges::max_element(votes, {}, [](const auto& port) { return port.second; })->first;
 }
 
-std::optional<NextExperiment> next_experiment(const Study& study, const rig::Session& session,
-                                              const Work& work, const Explanation& found, size_t threads) {
+std::optional<NextExperiment> next_experiment(const Study& study, const rig::SessionProblem& problem,
+                                              const SetSearch& search, const SetVerdict& verdict,
+                                              const Explanation& found) {
   SpecimenKnowledge knowledge;
   if (const auto* annulus = std::get_if<AnnulusSpecimen>(&study.specimen))
     knowledge.inner_radius_mm = annulus->inner_radius_mm;
-  const ExperimentDesign design{session, work.problem, limits_of(session), threads, knowledge};
-  if (found.verdict == Verdict::unexplained && !found.where.empty())
-    return exposing_experiment(design, found.where.front());
-  if (found.verdict == Verdict::named) return sharpening_experiment(design, work.best().fit);
-  if (found.verdict != Verdict::ambiguous) return {};
-  std::vector<const rig::RigFit*> competing{&work.best().fit};
-  std::vector<rig::RigFit> hinted;  // too weak to be fitted in the search
-  if (found.effects.empty()) {
-    for (const auto& ids : found.ambiguous_with)
-      if (const Effect* effect = ids.size() == 1 ? find_effect(ids.front()) : nullptr;
-          effect != nullptr && effect->change_points() == ChangePoints::none && hinted.size() < most_hints)
-        hinted.push_back(work.problem.fit({{effect, {}}}));
-    for (const rig::RigFit& fit : hinted)
-      competing.push_back(&fit);
-    return separating_experiment(design, competing);
+  const ExperimentDesign design{problem, limits_of(problem.session()), problem.threads(), knowledge};
+  if (found.verdict == Verdict::unexplained)
+    return found.where.empty() ? std::nullopt : exposing_experiment(design, found.where.front());
+  const EffectSet& chosen = search.sets[verdict.chosen];
+  if (found.verdict == Verdict::named) return sharpening_experiment(design, fitted_model(problem, chosen));
+  // Ambiguous sets are told apart, a hint from nothing.
+  std::vector<FittedModel> models{fitted_model(problem, chosen)};
+  for (const EffectSet& set : search.sets) {
+    const bool rival = found.verdict == Verdict::ambiguous
+                           ? std::ranges::count(found.ambiguous_with, set.ids()) > 0
+                           : !found.hints.empty() && set.ids().empty() != chosen.ids().empty();
+    if (rival && &set != &chosen) models.push_back(fitted_model(problem, set));
   }
-  for (const FittedSet& set : work.found.sets)
-    if (std::find(found.ambiguous_with.begin(), found.ambiguous_with.end(), set.ids()) !=
-        found.ambiguous_with.end())
-      competing.push_back(&set.fit);
-  return separating_experiment(design, competing);
+  std::vector<const FittedModel*> competing;
+  for (const FittedModel& model : models)
+    competing.push_back(&model);
+  return competing.size() > 1 ? separating_experiment(design, competing) : std::nullopt;
+}
+
+ModelErrorSize model_error_of(const rig::SessionProblem& problem, const EffectSet& set, bool from_reference) {
+  constexpr double moved = 1.5;  // by which a share is another than the stated one
+  const double share = set.evidence.shares[0] / problem.error().prior.share[0];
+  const double rms_kPa = error_rms(problem, set.evidence.shares, rig::Signal::cavity);
+  return {from_reference                         ? "reference"
+          : share > moved || share < 1.0 / moved ? "estimated"
+                                                 : "stated",
+          1e3 * rms_kPa, 100.0 * rms_kPa / problem.error().range[0]};
 }
 
 }  // namespace
@@ -203,55 +125,50 @@ Explanation explain_rig(const Study& study, const ExplainOptions& options) {
   const auto begun = std::chrono::steady_clock::now();
   options.report("reading the runs");
   const rig::Session session = rig::read_session(study);
-  options.report("computing the specimen");
   rig::SpecimenFamily family(study);
   family.compute_ahead();
-  const Work work = searched(session, family, study, options);
-  const rig::RigProblem& problem = work.problem;
-  const rig::RigFit& base = problem.base();
-  rig::RigFit best = work.best().fit;
-  best.jacobian = problem.columns(best);  // at the very optimum
+  rig::SessionProblem problem(session, family, options.threads);
+  const auto report = [&](std::string_view what) { options.report(std::string(what)); };
+  if (!study.data.reference.empty())
+    rig::use_reference(reference_of(study, options.threads, report), problem);
+  SetSearchOptions searching{.progress = report};
+  take_given(study, session, searching);
+  const SetSearch search = search_sets(problem, searching);
 
   options.report("judging");
-  const auto cells = residual_cells(session, problem.blocks(), best.residuals,
-                                    model_variance(problem, base.residuals - best.residuals));
-  std::vector<ResidualCell> left = significant(cells, discovery_rate);
-  if (!is_structured(left, cells.size())) left.clear();
-  const Eigen::VectorXd& weights = work.weights;
+  const bool from_reference = !study.data.reference.empty();
+  const SetVerdict verdict = judge_sets(problem, search, {from_reference});
+  const EffectSet& plain = plain_set(search);
+  const bool is_found = verdict.verdict == Verdict::named || verdict.verdict == Verdict::ambiguous;
+  const EffectSet& chosen = search.sets[verdict.chosen];
+  const EffectSet& after = is_found ? chosen : plain;
   Explanation out;
   out.study = study.file.string();
-  out.gap = held_out_gap(session, problem, best, weights);
-  const SearchRecord record = record_of(work.found);
-  const Judgement judgement = judge(record, !left.empty(), out.gap);
-  out.verdict = judgement.verdict;
-  out.searches = judgement.searches;
+  out.verdict = verdict.verdict;
+  out.confidence = verdict.confidence;
+  out.model_error = model_error_of(problem, chosen, from_reference);
+  out.hints = verdict.hints;
+  out.searches = verdict.searches;
   out.converged = is_settled(out.searches);
-  const std::vector<double> errors = parameter_errors(best, weights, base.chi_square - best.chi_square);
-  if (judgement.verdict == Verdict::unexplained) {  // nothing is added, so that nothing is closed
-    out.gap.after = out.gap.before;
-    out.gap.closed = 0.0;
-  } else {
-    out.ambiguous_with = judgement.ambiguous_with;
-    out.effects = found_effects(best, errors);
+  out.ambiguous_with = verdict.ambiguous_with;
+  if (is_found) out.effects = found_effects(chosen, verdict);
+  out.gap = held_out_gap(problem, plain, after);
+  if (is_found) {
+    out.where = misfits(problem, plain, chosen);
+    if (const auto port = common_port(out); port && out.verdict == Verdict::ambiguous)
+      for (Misfit& place : out.where)
+        place.port = *port;
+  } else if (out.verdict == Verdict::unexplained) {
+    EffectSet expected = plain;
+    expected.evidence.variance = problem.error().variance(problem.error().prior.share);
+    out.where = misfits(problem, plain, expected);
   }
-  if (!left.empty()) {
-    out.where = misfits(session, problem, left, {}, base);
-  } else if (out.verdict != Verdict::none) {
-    const auto before =
-        residual_cells(session, problem.blocks(), base.residuals, model_variance(problem, {}));
-    out.where =
-        misfits(session, problem, significant(before, discovery_rate), fits_without(work.found, best), best);
-  }
-  if (const auto port = common_port(out); port && out.verdict == Verdict::ambiguous)
-    for (Misfit& place : out.where)
-      place.port = *port;
-  out.evidence = evidence(record, judgement);
-  if (!out.effects.empty())
-    out.shifts = parameter_shifts(base, parameter_errors(base, weights, 0.0), best, errors);
-  out.steps = steps_of(work.found);
-  out.traces = traces(session, problem, base, best);
+  out.evidence = candidates(search, verdict);
+  if (!out.effects.empty()) out.shifts = parameter_shifts(problem, plain, chosen);
+  out.steps = steps_of(plain, after);
+  out.traces = traces(problem, plain, after);
   options.report("designing the next experiment");
-  if (options.propose) out.next_experiment = next_experiment(study, session, work, out, options.threads);
+  if (options.propose) out.next_experiment = next_experiment(study, problem, search, verdict, out);
   out.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
   out.summary = summary_of(out);
   return out;

@@ -2,8 +2,8 @@
 // `diastole explain` for the runs of a rig: where the rig's model and the recordings disagree, what is missing, and
 // what remains open.
 //
-//   read the session -> noise floor and base fit (rig_fit) -> cells of the residuals (where) -> screen, refit, compare
-//   (search) -> noise floor again, with what was found taken off -> held-out prediction -> verdict
+//   read the session -> features of its segments (rig_fit) -> what the rig's references tell of its tolerances and of the
+//   model's own error -> evidence of sets of effects (effect_sets) -> verdict (set_verdict) -> what people are told (findings)
 
 #include <functional>
 #include <string>

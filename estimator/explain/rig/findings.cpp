@@ -1,199 +1,241 @@
 #include "estimator/explain/rig/findings.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <numbers>
+#include <numeric>
+#include <optional>
 
-#include "estimator/effects/effect.hpp"
-#include "estimator/inference/covariance.hpp"
+#include "estimator/explain/verdict/chi_square.hpp"
 #include "estimator/inference/intervals.hpp"
 
 namespace diastole::explain {
 namespace {
 
-Port port_of(std::string_view channel) { return channel == "pump_kPa" ? Port::drive : Port::specimen; }
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+constexpr double discovery_rate = 0.01;
+
+std::string file_of(const rig::SessionRun& run) { return run.drive.place.name + ".run.h5"; }
+
+VectorXd rows_of(const rig::FeatureBlock& block, const VectorXd& all) {
+  return all.segment(static_cast<Index>(block.first), static_cast<Index>(block.features.size()));
+}
+
+/// The narrowest part of the cycle that holds most of a block's misfit.
+std::optional<std::array<double, 2>> phase_of(const rig::FeatureBlock& block, const VectorXd& left) {
+  constexpr size_t bins = 10;
+  constexpr double most = 0.7;
+  if (block.cycles < 2.0) return {};
+  const VectorXd series = block.basis * block.factor.transpose().triangularView<Eigen::Upper>().solve(left);
+  std::array<double, bins> squares{};
+  for (Index k = 0; k < series.size(); ++k) {
+    const double turns = block.cycles * static_cast<double>(k) / static_cast<double>(series.size());
+    squares[static_cast<size_t>((turns - std::floor(turns)) * bins)] += series[k] * series[k];
+  }
+  const double sum = std::accumulate(squares.begin(), squares.end(), 0.0);
+  for (size_t width = 1; width <= bins; ++width)
+    for (size_t first = 0; first + width <= bins; ++first)
+      if (std::accumulate(squares.begin() + static_cast<std::ptrdiff_t>(first),
+                          squares.begin() + static_cast<std::ptrdiff_t>(first + width), 0.0) >= most * sum)
+        return std::array{static_cast<double>(first) / bins, static_cast<double>(first + width) / bins};
+  return {};
+}
+
+/// The octave about the harmonic that holds most of a block's misfit.
+std::optional<std::array<double, 2>> band_of(const rig::FeatureBlock& block, const VectorXd& left) {
+  double largest = 0.0;
+  double frequency = 0.0;
+  for (size_t i = 0; i < block.features.size(); ++i) {
+    const rig::Feature& feature = block.features[i];
+    const double square = left[static_cast<Index>(i)] * left[static_cast<Index>(i)];
+    if (feature.harmonic == 0.0 || square <= largest) continue;
+    largest = square;
+    frequency = feature.harmonic / block.period_s * (block.cycles > 1.0 ? 1.0 : 0.5);
+  }
+  if (frequency == 0.0) return {};
+  return std::array{frequency / std::numbers::sqrt2, frequency * std::numbers::sqrt2};
+}
+
+Port port_of(const EffectSet& under, rig::Signal signal) {
+  if (under.model.terms.size() == 1) return under.model.terms.front().effect->text().port;
+  return signal == rig::Signal::pump ? Port::drive : Port::specimen;
+}
+
+/// Squares of what values fitted to all but some rows leave there.
+struct HeldOut {
+  double square = 0.0;
+  double count = 0.0;
+};
+void predict(const EffectSet& set, const std::vector<bool>& held, const VectorXd& variance, HeldOut& sum) {
+  const VectorXd target = set.target();
+  VectorXd weight = variance.cwiseInverse();
+  for (Index i = 0; i < weight.size(); ++i)
+    if (held[static_cast<size_t>(i)]) weight[i] = 0.0;
+  MatrixXd normal = set.columns.transpose() * weight.asDiagonal() * set.columns;
+  normal.diagonal().array() += 1.0;
+  const Eigen::LLT<MatrixXd> factor(normal);
+  const VectorXd w = factor.solve(set.columns.transpose() * weight.cwiseProduct(target));
+  for (Index i = 0; i < weight.size(); ++i) {
+    if (!held[static_cast<size_t>(i)]) continue;
+    const double miss = target[i] - set.columns.row(i).dot(w);
+    // What the others leave open of the prediction is no misfit.
+    const double open = set.columns.row(i).dot(factor.solve(set.columns.row(i).transpose()));
+    sum.square += miss * miss / (variance[i] + open);
+    sum.count += 1.0;
+  }
+}
 
 }  // namespace
 
-std::vector<double> parameter_errors(const rig::RigFit& fit, const Eigen::VectorXd& weights,
-                                     double explained) {
-  constexpr double looks_alike =
-      2e-3;  // of a change: the model's error of it that its parameters can take up
-  const double with_models = std::sqrt(1.0 + looks_alike * looks_alike * std::max(explained, 0.0));
-  std::vector<bool> is_free;
-  for (const double error : fit.errors)
-    is_free.push_back(error > 0.0);
-  const Eigen::VectorXd variance =
-      inference::estimate_covariance(weights.cwiseSqrt().asDiagonal() * fit.jacobian, is_free)
-          .matrix.diagonal();
-  std::vector<double> errors;
-  for (size_t i = 0; i < fit.values.size(); ++i) {
-    const double sd = with_models * std::sqrt(variance[static_cast<Eigen::Index>(i)]);
-    errors.push_back(
-        inference::standard_error(fit.unknowns[i], fit.unknowns[i].coordinate(fit.values[i]), sd));
-  }
-  return errors;
-}
-
-std::vector<FoundEffect> found_effects(const rig::RigFit& fit, const std::vector<double>& errors) {
+std::vector<FoundEffect> found_effects(const EffectSet& set, const SetVerdict& verdict) {
   std::vector<FoundEffect> effects;
-  size_t at = rig::nuisances;
-  for (const rig::ModelTerm& term : fit.terms) {
+  size_t at = 0;
+  for (size_t t = 0; t < set.model.terms.size(); ++t) {
+    const rig::ModelTerm& term = set.model.terms[t];
     FoundEffect found;
     found.id = term.effect->text().id;
+    found.size_over_model_error = verdict.size_over_error[t];
     for (const EffectParameter& parameter : term.effect->parameters()) {
-      const rig::Unknown& unknown = fit.unknowns[at];
-      const double coordinate = unknown.coordinate(fit.values[at]);
-      const double sd = errors[at] / std::abs(unknown.slope(coordinate));
-      found.parameters.push_back({std::string(parameter.name), fit.values[at], errors[at],
+      const rig::Unknown& unknown = set.unknowns[at];
+      const double coordinate = unknown.coordinate(set.model.values[at]);
+      const double sd = std::sqrt(set.covariance(static_cast<Index>(at), static_cast<Index>(at)));
+      found.parameters.push_back({std::string(parameter.name), set.model.values[at], set.errors[at],
                                   inference::interval(unknown, coordinate, inference::normal_90 * sd)});
       ++at;
     }
     for (const ChangePoint& change_point : term.change_points)
       found.change_points.push_back({change_point.run, change_point.time_s});
-    effects.push_back(std::move(found));
+    if (verdict.material[t]) effects.push_back(std::move(found));
   }
   return effects;
 }
 
-std::vector<ParameterShift> parameter_shifts(const rig::RigFit& before,
-                                             const std::vector<double>& before_errors,
-                                             const rig::RigFit& after,
-                                             const std::vector<double>& after_errors) {
+std::vector<ParameterShift> parameter_shifts(const rig::SessionProblem& problem, const EffectSet& before,
+                                             const EffectSet& after) {
+  const auto value = [&](const EffectSet& set, size_t i) {
+    const rig::Nuisance& nuisance = problem.nuisances()[i];
+    const double v = nuisance.mean + nuisance.sd * set.model.u[static_cast<Index>(i)];
+    const Index row = set.covariance.rows() - set.model.u.size() + static_cast<Index>(i);
+    const double error = nuisance.sd * std::sqrt(set.covariance(row, row));
+    return i == 0 ? std::pair(std::exp(v), std::exp(v) * error) : std::pair(v, error);
+  };
   std::vector<ParameterShift> shifts;
-  for (size_t i = 0; i < rig::nuisances; ++i) {
-    if (before_errors[i] == 0.0 && after_errors[i] == 0.0) continue;
-    const std::string name = i == 0 ? "C1_kPa" : before.unknowns[i].name;
-    shifts.push_back({name, before.values[i], before_errors[i], after.values[i], after_errors[i]});
+  for (size_t i = 0; i < rig::basic_nuisances; ++i) {
+    if (i == 2 && !problem.noise().channels.contains(rig::Channel::pump)) continue;
+    const auto [old, old_error] = value(before, i);
+    const auto [now, now_error] = value(after, i);
+    shifts.push_back(
+        {i == 0 ? "C1_kPa" : problem.nuisances()[i].name + "_Pa", old, old_error, now, now_error});
   }
   return shifts;
 }
 
-namespace {
-
-/// The widest run of phase bins that hold most of the excess.
-std::optional<std::array<double, 2>> phase_of(const std::vector<const ResidualCell*>& cells) {
-  constexpr double most = 0.7;
-  std::array<double, phase_bins> excess{};
-  double sum = 0.0;
-  for (const ResidualCell* cell : cells) {
-    if (!cell->phase) continue;
-    const auto bin = static_cast<size_t>(std::lround((*cell->phase)[0] * phase_bins));
-    excess[bin] += std::max(cell->excess(), 0.0);
-    sum += std::max(cell->excess(), 0.0);
-  }
-  if (!(sum > 0.0)) return {};
-  for (size_t width = 1; width <= phase_bins; ++width) {
-    for (size_t first = 0; first + width <= phase_bins; ++first) {
-      double part = 0.0;
-      for (size_t bin = first; bin < first + width; ++bin)
-        part += excess[bin];
-      if (part >= most * sum)
-        return std::array{static_cast<double>(first) / phase_bins,
-                          static_cast<double>(first + width) / phase_bins};
-    }
-  }
-  return {};
-}
-
-/// The effect whose leaving-out raises a block's squares most.
-std::string port_at(const rig::ResidualBlock& block, const std::vector<const rig::RigFit*>& without,
-                    const rig::RigFit& after) {
-  double largest = 0.0;
-  const Effect* effect = nullptr;
-  for (size_t member = 0; member < after.terms.size(); ++member) {
-    const rig::RigFit* other = member < without.size() ? without[member] : nullptr;
-    if (after.terms.size() == 1) {
-      effect = after.terms.front().effect;
-      break;
-    }
-    if (other == nullptr) continue;
-    const auto first = static_cast<Eigen::Index>(block.first);
-    const auto count = static_cast<Eigen::Index>(block.count);
-    const double rise = other->residuals.segment(first, count).squaredNorm() -
-                        after.residuals.segment(first, count).squaredNorm();
-    if (rise > largest) {
-      largest = rise;
-      effect = after.terms[member].effect;
-    }
-  }
-  return std::string(name_of(effect != nullptr ? effect->text().port : port_of(block.channel)));
-}
-
-}  // namespace
-
-std::vector<Misfit> misfits(const rig::Session& session, const rig::RigProblem& problem,
-                            const std::vector<ResidualCell>& cells,
-                            const std::vector<const rig::RigFit*>& without, const rig::RigFit& after) {
+std::vector<Misfit> misfits(const rig::SessionProblem& problem, const EffectSet& set,
+                            const EffectSet& under) {
   constexpr size_t most = 12;
-  using Key = std::tuple<size_t, std::string, int>;
-  std::map<Key, std::vector<const ResidualCell*>> groups;
-  std::map<std::pair<size_t, std::string>, const ResidualCell*> bands;
-  for (const ResidualCell& cell : cells) {
-    if (cell.kind == CellKind::band) {
-      const ResidualCell*& band = bands[{cell.run, cell.channel}];
-      if (band == nullptr || cell.excess() / cell.dofs > band->excess() / band->dofs) band = &cell;
-    } else {
-      groups[{cell.run, cell.channel, cell.segment.value_or(-1)}].push_back(&cell);
-    }
-  }
-  for (const auto& [place, band] : bands) {  // a band that no phase or rest tells of
-    const bool told = std::any_of(groups.begin(), groups.end(), [&, &at = place](const auto& group) {
-      return std::get<0>(group.first) == at.first && std::get<1>(group.first) == at.second;
-    });
-    if (!told) groups[{place.first, place.second, -1}].push_back(band);
-  }
   std::vector<Misfit> list;
-  for (const auto& [key, members] : groups) {
-    const auto& [run, channel, segment] = key;
+  std::vector<double> p_values;
+  for (const rig::FeatureBlock& block : problem.features().blocks()) {
+    const VectorXd left = rows_of(block, set.evidence.left);
+    const double square = left.cwiseAbs2().cwiseQuotient(rows_of(block, under.evidence.variance)).sum();
+    const auto dofs = static_cast<double>(left.size());
+    const rig::SessionRun& run = problem.session().runs[block.run];
     Misfit misfit;
-    misfit.run = session.runs[run].drive.place.name + ".run.h5";
-    misfit.channel = channel;
-    if (segment >= 0) misfit.segment = segment;
-    misfit.phase = phase_of(members);
-    if (const auto band = bands.find({run, channel}); band != bands.end())
-      misfit.band_Hz = band->second->band_Hz;
-    for (const ResidualCell* cell : members) {
-      misfit.p_value = std::min(misfit.p_value, cell->p_value);
-      misfit.excess_chi2 = std::max(misfit.excess_chi2, 0.0);
-      if (cell->kind != CellKind::shape && cell->kind != CellKind::cycles)
-        misfit.excess_chi2 += cell->excess();
-    }
-    if (misfit.excess_chi2 == 0.0)
-      for (const ResidualCell* cell : members)
-        misfit.excess_chi2 += cell->excess();
-    for (const rig::ResidualBlock& block : problem.blocks())
-      if (block.run == run && block.channel == channel) misfit.port = port_at(block, without, after);
+    misfit.port = name_of(port_of(under, block.signal));
+    misfit.run = file_of(run);
+    misfit.channel = name_of(block.signal);
+    misfit.segment = static_cast<int>(block.segment);
+    misfit.phase = phase_of(block, left);
+    misfit.band_Hz = band_of(block, left);
+    misfit.excess_chi2 = square - dofs;
+    misfit.p_value = chi_square_tail(square, dofs);
+    p_values.push_back(misfit.p_value);
     list.push_back(std::move(misfit));
   }
-  std::sort(list.begin(), list.end(),
-            [](const Misfit& a, const Misfit& b) { return a.excess_chi2 > b.excess_chi2; });
+  const double limit = discovery_limit(p_values, discovery_rate);
+  std::erase_if(list, [&](const Misfit& misfit) { return misfit.p_value > limit; });
+  std::ranges::sort(list, std::greater(), &Misfit::excess_chi2);
   list.resize(std::min(list.size(), most));
   return list;
 }
 
-SearchRecord record_of(const SearchResult& search) {
-  SearchRecord record{.sets = {}, .best = search.best, .screened = {}};
-  for (const FittedSet& set : search.sets)
-    record.sets.push_back({set.ids(), set.chi_square, set.parameters(), set.fit.termination});
-  for (const Lead& lead : search.leads)
-    record.screened.push_back(
-        {std::string(lead.term.effect->text().id), lead.gain, lead.visibility, lead.parameters});
-  return record;
+Gap held_out_gap(const rig::SessionProblem& problem, const EffectSet& before, const EffectSet& after) {
+  const auto& runs = problem.session().runs;
+  const bool by_run = runs.size() > 1;
+  std::map<std::pair<size_t, size_t>, std::vector<bool>> folds;
+  for (const rig::FeatureBlock& block : problem.features().blocks()) {
+    if (block.at_rest && !by_run) continue;
+    auto& held = folds[{block.run, by_run ? 0 : block.segment}];
+    held.resize(static_cast<size_t>(problem.features().count()), false);
+    std::fill_n(held.begin() + static_cast<std::ptrdiff_t>(block.first), block.features.size(), true);
+  }
+  Gap gap;
+  HeldOut old, now;
+  for (const auto& [place, held] : folds) {
+    predict(before, held, after.evidence.variance, old);
+    predict(after, held, after.evidence.variance, now);
+    gap.held_out.push_back(by_run ? file_of(runs[place.first])
+                                  : fmt::format("{}, segment {}", file_of(runs[place.first]), place.second));
+  }
+  if (old.count == 0.0) return gap;
+  gap.before = old.square / old.count;
+  gap.after = now.square / now.count;
+  gap.closed = gap.before > gap.floor
+                   ? std::clamp(1.0 - (gap.after - gap.floor) / (gap.before - gap.floor), 0.0, 1.0)
+                   : 0.0;
+  return gap;
 }
 
-std::vector<Trace> traces(const rig::Session& session, const rig::RigProblem& problem,
-                          const rig::RigFit& before, const rig::RigFit& after) {
+std::vector<Candidate> candidates(const SetSearch& search, const SetVerdict& verdict) {
+  std::vector<Candidate> list;
+  const auto plain = std::ranges::find_if(
+      search.sets, [&](const EffectSet& set) { return set.model.terms.size() == search.given; });
+  for (size_t k = 0; k < search.sets.size(); ++k) {
+    const EffectSet& set = search.sets[k];
+    if (&set == &*plain) continue;
+    Candidate row{
+        set.ids(), 2.0 * (set.log_posterior - plain->log_posterior), true, set.model.values.size(), {}, ""};
+    if (k == verdict.chosen) {
+      row.verdict = verdict.verdict == Verdict::unexplained ? "fits best, and not well enough"
+                    : verdict.verdict == Verdict::ambiguous ? "as good"
+                                                            : "named";
+    } else {
+      row.verdict = fmt::format("probability {:.2g}", search.probability[k]);
+    }
+    if (!inference::is_settled(set.termination)) row.verdict += "; its search did not end";
+    list.push_back(std::move(row));
+  }
+  for (const auto& promise : search.promises)
+    if (std::ranges::none_of(list,
+                             [&](const Candidate& row) { return row.ids == std::vector{promise.first}; }))
+      list.push_back({{promise.first},
+                      promise.second,
+                      false,
+                      find_effect(promise.first)->parameters().size(),
+                      {},
+                      "promises too little"});
+  return list;
+}
+
+std::vector<Trace> traces(const rig::SessionProblem& problem, const EffectSet& before,
+                          const EffectSet& after) {
   constexpr size_t kept = 4;  // every so many samples are shown
-  const auto old = problem.predictions(before);
-  const auto now = problem.predictions(after);
   std::vector<Trace> list;
-  for (size_t r = 0; r < session.runs.size(); ++r) {
-    const rig::SessionRun& run = session.runs[r];
+  for (size_t r = 0; r < problem.session().runs.size(); ++r) {
+    const rig::SessionRun& run = problem.session().runs[r];
+    const rig::Prediction old = problem.shown_in(r, before.model).pressures;
+    const rig::Prediction now = problem.shown_in(r, after.model).pressures;
     for (const auto& [channel, noise] : problem.noise().channels) {
+      if (!run.pressure_kPa.contains(channel)) continue;
       Trace trace;
-      trace.run = run.drive.place.name + ".run.h5";
-      trace.channel = name_of(channel);
+      trace.run = file_of(run);
+      trace.channel = rig::name_of(channel);
       trace.unit = "kPa";
       trace.noise_sd = noise.sd_kPa;
       trace.trigger_s = run.drive.place.trigger_s;
@@ -201,8 +243,8 @@ std::vector<Trace> traces(const rig::Session& session, const rig::RigProblem& pr
       for (size_t k = 0; k < run.sample_s.size(); k += kept) {
         trace.time_s.push_back(run.sample_s[k]);
         trace.measured.push_back(run.pressure_kPa.at(channel)[k]);
-        trace.before.push_back(cavity ? old[r].cavity_kPa[k] : old[r].pump_kPa[k]);
-        trace.after.push_back(cavity ? now[r].cavity_kPa[k] : now[r].pump_kPa[k]);
+        trace.before.push_back(cavity ? old.cavity_kPa[k] : old.pump_kPa[k]);
+        trace.after.push_back(cavity ? now.cavity_kPa[k] : now.pump_kPa[k]);
         if (cavity) trace.cavity_mL.push_back(run.drive.motion.at(run.sample_s[k]).volume_mL);
       }
       list.push_back(std::move(trace));

@@ -1,39 +1,34 @@
 #pragma once
-// The parts of an Explanation that are read off fits: effects with intervals, places, shifts, traces.
+// The parts of an Explanation that are read off fitted sets of effects: effects with intervals, places, shifts, the gap
+// on data that were not fitted, traces.
 
 #include <vector>
 
-#include "estimator/explain/rig/residual_cells.hpp"
-#include "estimator/explain/rig/search.hpp"
+#include "estimator/explain/rig/set_verdict.hpp"
 #include "estimator/explain/verdict/explanation.hpp"
-#include "estimator/explain/verdict/verdict.hpp"
 
 namespace diastole::explain {
 
-/// The fit's terms with values and 90 % intervals. Errors hold the model's own, see parameter_errors.
-std::vector<FoundEffect> found_effects(const rig::RigFit& fit, const std::vector<double>& errors);
+/// The set's material effects with values and 90 % intervals.
+std::vector<FoundEffect> found_effects(const EffectSet& set, const SetVerdict& verdict);
 
-/// Standard errors in natural units of the fit's unknowns, with each square weighted: what noise and the model's
-/// repeating error together leave open. `explained`: squares that the fit's effects take off; of a change so large the
-/// model's error is no longer small beside the noise, and a part of it looks like a change of the parameters.
-std::vector<double> parameter_errors(const rig::RigFit& fit, const Eigen::VectorXd& weights,
-                                     double explained);
+/// C1 and the sensors' offsets, without and with the set's effects.
+std::vector<ParameterShift> parameter_shifts(const rig::SessionProblem& problem, const EffectSet& before,
+                                             const EffectSet& after);
 
-std::vector<ParameterShift> parameter_shifts(const rig::RigFit& before,
-                                             const std::vector<double>& before_errors,
-                                             const rig::RigFit& after,
-                                             const std::vector<double>& after_errors);
+/// Windows of the session in which `set` leaves more than noise and the model's error of `under` allow, by false discovery
+/// rate: one a channel and segment, the worst first. Each goes to the port of the largest effect of `under` or, if it has
+/// none, to the port that the channel suggests.
+std::vector<Misfit> misfits(const rig::SessionProblem& problem, const EffectSet& set, const EffectSet& under);
 
-/// Places where `before` misses, from its cells that stand out: one a channel and segment. Each goes to the port of
-/// the effect of `after` that takes most of the misfit off there, or to the port that the channel suggests.
-std::vector<Misfit> misfits(const rig::Session& session, const rig::RigProblem& problem,
-                            const std::vector<ResidualCell>& cells,
-                            const std::vector<const rig::RigFit*>& without, const rig::RigFit& after);
+/// Reduced chi-squares on each run (of a single run: each segment) by values that were fitted to all others, over noise and
+/// the model's error of `after`.
+Gap held_out_gap(const rig::SessionProblem& problem, const EffectSet& before, const EffectSet& after);
 
-/// What the verdict asks of a search.
-SearchRecord record_of(const SearchResult& search);
+/// The evidence table.
+std::vector<Candidate> candidates(const SetSearch& search, const SetVerdict& verdict);
 
-std::vector<Trace> traces(const rig::Session& session, const rig::RigProblem& problem,
-                          const rig::RigFit& before, const rig::RigFit& after);
+std::vector<Trace> traces(const rig::SessionProblem& problem, const EffectSet& before,
+                          const EffectSet& after);
 
 }  // namespace diastole::explain

@@ -19,9 +19,9 @@ constexpr double clear_sigma = 5.0;  // beyond this nobody needs more equipment
 constexpr double bother = 1.3;       // gain that is worth connecting something
 constexpr size_t most_models = 3;
 
-std::string ids_of(const rig::RigFit& fit) {
+std::string ids_of(const FittedModel& fit) {
   std::vector<std::string_view> ids;
-  for (const rig::ModelTerm& term : fit.terms)
+  for (const rig::ModelTerm& term : fit.model.terms)
     ids.push_back(term.effect->text().id);
   return ids.empty() ? "no effect" : fmt::format("{}", fmt::join(ids, " + "));
 }
@@ -103,12 +103,11 @@ std::string plan_words(const PlannedExperiment& experiment) {
 }
 
 std::vector<SegmentOutlook> outlooks_of(const ExperimentDesign& design,
-                                        const std::vector<const rig::RigFit*>& models,
+                                        const std::vector<const FittedModel*>& models,
                                         const std::vector<runfile::Segment>& segments) {
   std::vector<SegmentOutlook> outlooks(segments.size());
-  parallel_for(segments.size(), design.threads, [&](size_t i) {
-    outlooks[i] = look_ahead(design.session, design.problem, models, segments[i]);
-  });
+  parallel_for(segments.size(), design.threads,
+               [&](size_t i) { outlooks[i] = look_ahead(design.problem, models, segments[i]); });
   return outlooks;
 }
 
@@ -126,18 +125,18 @@ struct LeastKnown {
   size_t index = 0;
   double distance = 0.0;  ///< from neutral, in the search coordinate
 };
-LeastKnown least_known(const rig::Session& session, const rig::RigFit& fit,
+LeastKnown least_known(const rig::Session& session, const FittedModel& fit,
                        const Eigen::MatrixXd& covariance) {
   LeastKnown least;
   double worst = -1.0;
-  size_t at = fit.values.size();
-  for (auto term = fit.terms.rbegin(); term != fit.terms.rend(); ++term) {
+  size_t at = fit.model.values.size();
+  for (auto term = fit.model.terms.rbegin(); term != fit.model.terms.rend(); ++term) {
     const std::vector<double> neutral = term->effect->neutral(session.base);
     at -= neutral.size();
     for (size_t j = 0; j < neutral.size(); ++j) {
       const rig::Unknown& unknown = fit.unknowns[at + j];
       const double distance =
-          std::abs(unknown.coordinate(fit.values[at + j]) - unknown.coordinate(neutral[j]));
+          std::abs(unknown.coordinate(fit.model.values[at + j]) - unknown.coordinate(neutral[j]));
       const auto row = static_cast<Eigen::Index>(at + j);
       const double unsure = std::sqrt(covariance(row, row)) / std::max(distance, 1e-12);
       if (!std::isfinite(unsure) || unsure <= worst) continue;
@@ -151,36 +150,34 @@ LeastKnown least_known(const rig::Session& session, const rig::RigFit& fit,
 }  // namespace
 
 std::optional<NextExperiment> separating_experiment(const ExperimentDesign& design,
-                                                    const std::vector<const rig::RigFit*>& competing) {
+                                                    const std::vector<const FittedModel*>& competing) {
   if (competing.size() < 2) return std::nullopt;
-  const std::vector<const rig::RigFit*> models(
+  const std::vector<const FittedModel*> models(
       competing.begin(),
       competing.begin() + static_cast<std::ptrdiff_t>(std::min(competing.size(), most_models)));
   const auto segments = possible_segments(design.limits);
   if (segments.empty()) return std::nullopt;
   const auto outlooks = outlooks_of(design, models, segments);
   std::vector<Eigen::MatrixXd> known;
-  double scatter = 1.0;  // what the models leave of the session counts as noise
-  for (const rig::RigFit* model : models) {
-    known.push_back(known_before(design.problem, *model));
-    scatter = std::max(scatter, std::sqrt(model->reduced()));
-  }
+  for (const FittedModel* model : models)
+    known.push_back(known_before(*model));
   const Worth worth = [&](const std::vector<size_t>& chosen, const Equipment& equipment) {
     double least = std::numeric_limits<double>::infinity();
     for (size_t a = 0; a < models.size(); ++a) {
       for (size_t b = 0; b < models.size(); ++b)
         if (a != b) {
-          const Eigen::MatrixXd gram = gram_of(outlooks, chosen, a, b, equipment) +
-                                       gram_beside(*models[a], *models[b], equipment, design.knowledge);
+          const Eigen::MatrixXd gram =
+              gram_of(outlooks, chosen, a, b, equipment) +
+              gram_beside(design.problem, *models[a], *models[b], equipment, design.knowledge);
           least = std::min(least, separation(gram, known[b]));
         }
     }
-    return least / scatter;
+    return least;
   };
-  const Plan plan = plan_of(design.session, segments, clear_sigma, worth);
+  const Plan plan = plan_of(design.problem.session(), segments, clear_sigma, worth);
   if (plan.experiment.segments.empty()) return std::nullopt;
   NextExperiment next;
-  for (const rig::RigFit* model : models)
+  for (const FittedModel* model : models)
     next.separates.push_back(ids_of(*model));
   next.predicted_separation_sigma = plan.worth;
   next.reason = fmt::format(
@@ -192,16 +189,16 @@ std::optional<NextExperiment> separating_experiment(const ExperimentDesign& desi
 }
 
 std::optional<NextExperiment> sharpening_experiment(const ExperimentDesign& design,
-                                                    const rig::RigFit& named) {
+                                                    const FittedModel& named) {
   const auto segments = possible_segments(design.limits);
-  if (segments.empty() || named.terms.empty()) return std::nullopt;
+  if (segments.empty() || named.model.terms.empty()) return std::nullopt;
   const auto outlooks = outlooks_of(design, {&named}, segments);
-  const Eigen::MatrixXd known = known_before(design.problem, named);
+  const Eigen::MatrixXd known = known_before(named);
   const auto covariance_of = [](const Eigen::MatrixXd& information) -> Eigen::MatrixXd {
     return information.ldlt().solve(Eigen::MatrixXd::Identity(information.rows(), information.cols()));
   };
   const Eigen::MatrixXd before = covariance_of(known);
-  const LeastKnown target = least_known(design.session, named, before);
+  const LeastKnown target = least_known(design.problem.session(), named, before);
   const auto row = static_cast<Eigen::Index>(target.index);
   const Worth worth = [&](const std::vector<size_t>& chosen, const Equipment& equipment) {
     const Eigen::MatrixXd gram = gram_of(outlooks, chosen, 0, 0, equipment);
@@ -209,14 +206,13 @@ std::optional<NextExperiment> sharpening_experiment(const ExperimentDesign& desi
     return std::sqrt(before(row, row) / after(row, row));
   };
   constexpr double narrow_enough = 1.5;
-  const Plan plan = plan_of(design.session, segments, narrow_enough, worth);
+  const Plan plan = plan_of(design.problem.session(), segments, narrow_enough, worth);
   if (plan.experiment.segments.empty()) return std::nullopt;
   const std::string& name = named.unknowns[target.index].name;
-  const double scatter = std::max(1.0, std::sqrt(named.reduced()));
   const double error = named.errors[target.index];
   NextExperiment next;
   next.separates = {ids_of(named), "no effect"};
-  next.predicted_separation_sigma = target.distance * plan.worth / std::sqrt(before(row, row)) / scatter;
+  next.predicted_separation_sigma = target.distance * plan.worth / std::sqrt(before(row, row));
   next.reason = fmt::format("{}: narrows the interval of {} most, from a standard error of {:.2g} to {:.2g}.",
                             plan_words(plan.experiment), name, error, error / plan.worth);
   next.toml = to_toml(plan.experiment, fmt::format("Narrows the interval of {}", name));
@@ -224,10 +220,10 @@ std::optional<NextExperiment> sharpening_experiment(const ExperimentDesign& desi
 }
 
 std::optional<NextExperiment> exposing_experiment(const ExperimentDesign& design, const Misfit& worst) {
-  const auto run = std::ranges::find_if(design.session.runs, [&](const rig::SessionRun& candidate) {
+  const auto run = std::ranges::find_if(design.problem.session().runs, [&](const rig::SessionRun& candidate) {
     return worst.run == candidate.drive.place.name || worst.run == candidate.drive.place.name + ".run.h5";
   });
-  if (run == design.session.runs.end() || run->segments.empty()) return std::nullopt;
+  if (run == design.problem.session().runs.end() || run->segments.empty()) return std::nullopt;
   const auto number = static_cast<size_t>(std::max(0, worst.segment.value_or(0)));
   const runfile::Segment& seen = run->segments[std::min(number, run->segments.size() - 1)];
   constexpr double seconds = 60.0;
@@ -242,7 +238,7 @@ std::optional<NextExperiment> exposing_experiment(const ExperimentDesign& design
     plan.segments.push_back(again);
   }
   if (plan.segments[0].waveform == "uploaded") return std::nullopt;
-  plan.new_pump_sensor = !equipment_of(design.session)[1];
+  plan.new_pump_sensor = !equipment_of(design.problem.session())[1];
   NextExperiment next;
   next.separates = {"unexplained in the " + worst.port, "noise"};
   next.predicted_separation_sigma =

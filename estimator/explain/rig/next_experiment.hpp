@@ -13,8 +13,7 @@
 namespace diastole::explain {
 
 struct ExperimentDesign {
-  const rig::Session& session;
-  const rig::RigProblem& problem;
+  const rig::SessionProblem& problem;
   ExperimentLimits limits;
   size_t threads = 2;
   SpecimenKnowledge knowledge = {};
@@ -24,11 +23,11 @@ struct ExperimentDesign {
 /// the two is true. Of more than three the first three are judged. Nothing for fewer than two, or if the limits allow
 /// no segment.
 std::optional<NextExperiment> separating_experiment(const ExperimentDesign& design,
-                                                    const std::vector<const rig::RigFit*>& competing);
+                                                    const std::vector<const FittedModel*>& competing);
 
 /// For a named one: what narrows the interval of its least known parameter most. predicted_separation_sigma: that parameter's
 /// distance from its neutral value afterwards.
-std::optional<NextExperiment> sharpening_experiment(const ExperimentDesign& design, const rig::RigFit& named);
+std::optional<NextExperiment> sharpening_experiment(const ExperimentDesign& design, const FittedModel& named);
 
 /// For an unexplained one: the segment at which the misfit is worst, again and longer, and once more at half the rate: what
 /// depends on time and what on phase then part. Nothing if the misfit is in no segment of a run.

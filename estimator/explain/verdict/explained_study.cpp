@@ -44,9 +44,10 @@ std::string explained_study(const Study& study, const std::filesystem::path& fol
   if (toml::table* data = root["data"].as_table()) {
     for (const char* key : {"tags", "points", "frames"})
       if (toml::node* path = data->get(key)) move_path(*path, from, folder);
-    if (toml::array* runs = (*data)["runs"].as_array())
-      for (toml::node& run : *runs)
-        move_path(run, from, folder);
+    for (const char* key : {"runs", "reference"})
+      if (toml::array* paths = (*data)[key].as_array())
+        for (toml::node& path : *paths)
+          move_path(path, from, folder);
   }
   if (root["specimen"]["kind"].value_or(std::string()) == "mesh")
     if (toml::node* mesh = root["specimen"].as_table()->get("file")) move_path(*mesh, from, folder);

@@ -37,6 +37,22 @@ struct FoundEffect {
   std::string id;
   std::vector<FoundParameter> parameters;
   std::vector<FoundChangePoint> change_points;
+  /// RMS of what it changes over that of the model's own error.
+  std::optional<double> size_over_model_error = {};
+};
+
+/// An effect that is significant and smaller than the model's own error.
+struct Hint {
+  std::string id;
+  double size_over_model_error = 0.0;
+  double probability = 0.0;
+};
+
+/// What the model gets wrong by itself, in the cavity's pressure.
+struct ModelErrorSize {
+  std::string source;  ///< "reference", "estimated" from how the waveforms predict each other, "stated"
+  double rms_Pa = 0.0;
+  double percent_of_range = 0.0;
 };
 
 /// A place in the data where the base model fails beyond the noise, after correction for how many were looked at.
@@ -127,6 +143,9 @@ struct NextExperiment {
 struct Explanation {
   std::string study;  ///< file
   Verdict verdict = Verdict::none;
+  std::optional<double> confidence;  ///< that the verdict is right
+  std::optional<ModelErrorSize> model_error;
+  std::vector<Hint> hints;
   std::vector<FoundEffect> effects;
   std::vector<std::vector<std::string>> ambiguous_with;
   std::vector<Misfit> where;

@@ -15,9 +15,14 @@ DIASTOLE_MEMBERS(FoundChangePoint, run, time_s)
 template <class Visit, IsRecord<FoundEffect> Record>
 void each_member(Visit&& visit, Record& effect) {
   visit("id", effect.id);
+  visit("size_over_model_error", effect.size_over_model_error);
   visit("parameters", by_name(effect.parameters));
   visit("moments", effect.change_points);
 }
+
+DIASTOLE_MEMBERS(Hint, id, size_over_model_error, probability)
+
+DIASTOLE_MEMBERS(ModelErrorSize, source, rms_Pa, percent_of_range)
 
 DIASTOLE_MEMBERS(Misfit, port, run, channel, segment, phase, band_Hz, region, excess_chi2, p_value)
 
@@ -37,8 +42,9 @@ DIASTOLE_MEMBERS(NextExperiment, toml, separates, predicted_separation_sigma, re
 
 DIASTOLE_MEMBERS(SearchEnd, effects, termination)
 
-DIASTOLE_MEMBERS(Explanation, study, verdict, summary, converged, searches, effects, ambiguous_with, where,
-                 gap, next_experiment, study_after, evidence, shifts, steps, traces, field, seconds)
+DIASTOLE_MEMBERS(Explanation, study, verdict, confidence, model_error, hints, summary, converged, searches,
+                 effects, ambiguous_with, where, gap, next_experiment, study_after, evidence, shifts, steps,
+                 traces, field, seconds)
 
 }  // namespace explain
 

@@ -137,6 +137,13 @@ std::string summary_of(const Explanation& found) {
     others += (others.empty() ? "" : ", ") + in_words(other, "nothing at all");
   switch (found.verdict) {
     case Verdict::none:
+      if (!found.hints.empty()) {
+        std::vector<std::string> hints;
+        for (const Hint& hint : found.hints)
+          hints.push_back(hint.id);
+        return fmt::format("Nothing exceeds the model's own error; {} is hinted at, and smaller than that.{}",
+                           in_words(hints, ""), unsettled);
+      }
       return "Nothing exceeds the noise: the rig's model explains these recordings." + unsettled;
     case Verdict::named:
       return fmt::format(

@@ -1,0 +1,297 @@
+#include "estimator/explain/rig/effect_sets.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numbers>
+#include <optional>
+#include <span>
+
+#include "estimator/explain/rig/event_scan.hpp"
+#include "estimator/explain/rig/set_fit.hpp"
+#include "estimator/rig_fit/base_fit.hpp"
+
+namespace diastole::explain {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+using rig::SessionModel;
+
+constexpr size_t singles_fitted = 6;
+constexpr size_t pairs_fitted = 4;
+constexpr size_t seconds_fitted = 3;  ///< beside the best single effect that was fitted
+/// Of 2 ln likelihood by an effect, below which its prior odds alone speak against it.
+const double least_promise = 2.0 * std::log(1.0 / effect_odds);
+constexpr double second_in_reach =
+    50.0;                       ///< nats behind the best of its size, beyond which a set is not taken again
+constexpr size_t retaken = 2;   ///< best sets of each size whose tolerances' columns are taken again at them
+constexpr double rested = 0.5;  ///< nats, by which columns taken again change nothing any more
+constexpr double least_amplitude = 0.5,
+                 most_amplitude = 2.0;  ///< of a response: beyond, another size stands for it
+
+/// Responses that together promise a gain.
+struct Promise {
+  double gain = 0.0;  ///< of 2 ln likelihood
+  std::vector<size_t> responses;
+};
+
+/// Promises are right within their sizes' spacing: what promises half of the best, or is among the first, may turn out best.
+bool is_worth_fitting(const std::vector<Promise>& sorted, size_t i, double least) {
+  constexpr size_t first = 3;
+  return sorted[i].gain > least && (i < first || sorted[i].gain > 0.5 * sorted.front().gain);
+}
+
+/// Products of what responses and misfit have beyond the nuisances, in sds.
+class Screening {
+ public:
+  Screening(const std::vector<Response>& responses, const VectorXd& misfit, const MatrixXd& columns,
+            const rig::EvidenceFit& under) {
+    const VectorXd weight = under.variance.cwiseSqrt().cwiseInverse();
+    MatrixXd all(misfit.size(), static_cast<Index>(responses.size()) + 1);
+    all.col(0) = misfit;
+    for (size_t i = 0; i < responses.size(); ++i)
+      all.col(static_cast<Index>(i) + 1) = responses[i].change;
+    all = weight.asDiagonal() * all;
+    const MatrixXd known = weight.asDiagonal() * columns;
+    const MatrixXd mixed = known.transpose() * all;
+    products_ = all.transpose() * all - mixed.transpose() * under.precision.llt().solve(mixed);
+  }
+  [[nodiscard]] double single(size_t i) const {
+    const double a = amplitude(along(i), square(i));
+    return a * (2.0 * along(i) - a * square(i));
+  }
+  [[nodiscard]] double pair(size_t i, size_t j) const {
+    const double both = products_(static_cast<Index>(i) + 1, static_cast<Index>(j) + 1);
+    double a = 1.0;
+    double b = 1.0;
+    for (int round = 0; round < 6; ++round) {  // of a box-bounded quadratic, from its middle
+      a = amplitude(along(i) - b * both, square(i));
+      b = amplitude(along(j) - a * both, square(j));
+    }
+    return 2.0 * (a * along(i) + b * along(j)) - a * a * square(i) - b * b * square(j) - 2.0 * a * b * both;
+  }
+
+ private:
+  [[nodiscard]] double along(size_t i) const { return products_(0, static_cast<Index>(i) + 1); }
+  [[nodiscard]] double square(size_t i) const {
+    return products_(static_cast<Index>(i) + 1, static_cast<Index>(i) + 1);
+  }
+  static double amplitude(double along, double square) {
+    return square > 0.0 ? std::clamp(along / square, least_amplitude, most_amplitude) : 1.0;
+  }
+  MatrixXd products_;
+};
+
+/// The best promise of each set of ids, the largest first.
+class Promises {
+ public:
+  explicit Promises(const std::vector<Response>& responses) : responses_(responses) {}
+  void add(Promise promise) {
+    std::vector<std::string_view> ids;
+    for (const size_t i : promise.responses)
+      ids.push_back(responses_[i].term.effect->text().id);
+    std::ranges::sort(ids);
+    ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
+    Promise& best = best_[ids];
+    if (promise.gain > best.gain) best = std::move(promise);
+  }
+  [[nodiscard]] std::vector<Promise> sorted() const {
+    std::vector<Promise> list;
+    for (const auto& [ids, promise] : best_)
+      if (!promise.responses.empty()) list.push_back(promise);
+    std::ranges::sort(list, std::greater(), &Promise::gain);
+    return list;
+  }
+
+ private:
+  const std::vector<Response>& responses_;
+  std::map<std::vector<std::string_view>, Promise> best_;
+};
+
+class SetsSearch {
+ public:
+  SetsSearch(const rig::SessionProblem& problem, const SetSearchOptions& options)
+      : problem_(problem), options_(options) {}
+  SetSearch run();
+
+ private:
+  void report(std::string_view what) const {
+    if (options_.progress) options_.progress(what);
+  }
+  /// Effects beyond those that every set has.
+  [[nodiscard]] size_t added(const EffectSet& set) const {
+    return set.model.terms.size() - options_.terms.size();
+  }
+  void fit(const std::vector<size_t>& responses);
+  void fit_beside_best();
+  void fit_best_again(size_t effects);
+  [[nodiscard]] bool is_fitted(const std::vector<const Effect*>& effects) const;
+  [[nodiscard]] std::vector<Promise> promises(const rig::EvidenceFit& under, bool pairs) const;
+  void sort_sets() { std::ranges::sort(sets_, std::greater(), &EffectSet::log_posterior); }
+
+  const rig::SessionProblem& problem_;
+  const SetSearchOptions& options_;
+  rig::LinearisedModel base_;  ///< the rig as declared
+  std::vector<Response> responses_;
+  std::vector<EffectSet> sets_;
+};
+
+std::vector<Promise> SetsSearch::promises(const rig::EvidenceFit& under, bool pairs) const {
+  const Screening screening(responses_, base_.target(problem_), base_.columns, under);
+  Promises best(responses_);
+  for (size_t i = 0; i < responses_.size(); ++i) {
+    if (!pairs) best.add({screening.single(i), {i}});
+    for (size_t j = i + 1; j < responses_.size(); ++j)
+      if ((responses_[i].term.effect != responses_[j].term.effect) == pairs)
+        best.add({screening.pair(i, j), {i, j}});
+  }
+  return best.sorted();
+}
+
+bool SetsSearch::is_fitted(const std::vector<const Effect*>& effects) const {
+  return std::ranges::any_of(sets_, [&](const EffectSet& set) {
+    return added(set) == effects.size() &&
+           std::ranges::all_of(
+               std::span(set.model.terms).subspan(options_.terms.size()),
+               [&](const rig::ModelTerm& term) { return std::ranges::count(effects, term.effect) > 0; });
+  });
+}
+
+void SetsSearch::fit(const std::vector<size_t>& responses) {
+  SessionModel start = base_.at;
+  std::vector<const Effect*> effects;
+  for (const size_t i : responses) {
+    const Response& response = responses_[i];
+    const auto same = std::ranges::find(effects, response.term.effect);
+    if (same == effects.end()) {
+      effects.push_back(response.term.effect);
+      start.terms.push_back(response.term);
+      start.values.insert(start.values.end(), response.values.begin(), response.values.end());
+      continue;
+    }
+    // Another variant of an effect that is in: the amplitudes that grow in it.
+    size_t at = start.values.size() - response.values.size();
+    for (size_t j = 0; j < response.values.size(); ++j, ++at)
+      if (is_amplitude(*response.term.effect, j))
+        start.values[at] = std::max(start.values[at], response.values[j]);
+  }
+  if (is_fitted(effects)) return;
+  sets_.push_back(fit_set(problem_, start, base_, problem_.error().prior.share));
+}
+
+void SetsSearch::fit_beside_best() {
+  sort_sets();
+  const auto best = std::ranges::find_if(sets_, [&](const EffectSet& set) { return added(set) == 1; });
+  if (best == sets_.end()) return;
+  const EffectSet first = *best;
+  const Screening screening(responses_, first.target(), first.columns, first.evidence);
+  Promises promised(responses_);
+  for (size_t i = 0; i < responses_.size(); ++i)
+    if (responses_[i].term.effect != first.model.terms.back().effect)
+      promised.add({screening.single(i), {i}});
+  size_t count = 0;
+  for (const Promise& promise : promised.sorted()) {
+    if (++count > seconds_fitted || promise.gain < least_promise) break;
+    const Response& response = responses_[promise.responses.front()];
+    if (is_fitted({first.model.terms.back().effect, response.term.effect})) continue;
+    SessionModel start = first.model;
+    start.terms.push_back(response.term);
+    start.values.insert(start.values.end(), response.values.begin(), response.values.end());
+    sets_.push_back(fit_set(problem_, start, first.known, first.evidence.shares));
+  }
+  for (const Effect* effect : rig_effects()) {
+    if (effect->change_points() == ChangePoints::none || effect == first.model.terms.back().effect) continue;
+    if (const auto start = scan_events(problem_, first, *effect))
+      sets_.push_back(fit_set(problem_, *start, first.known, first.evidence.shares));
+  }
+}
+
+void SetsSearch::fit_best_again(size_t effects) {
+  constexpr int most_rounds = 6;
+  sort_sets();
+  size_t count = 0;
+  double best = 0.0;
+  for (EffectSet& set : sets_) {
+    if (added(set) != effects) continue;
+    if (++count > retaken || (count > 1 && set.log_posterior < best - second_in_reach)) break;
+    for (int round = 0; round < most_rounds; ++round) {
+      rig::LinearisedModel at{.at = set.model, .there = {}, .columns = {}};
+      at.columns = problem_.nuisance_columns(at.at, at.there);
+      const double before = set.log_posterior;
+      set = fit_set(problem_, at.at, at, set.evidence.shares);
+      if (std::abs(set.log_posterior - before) < rested) break;
+    }
+    if (count == 1) best = set.log_posterior;
+  }
+  sort_sets();
+}
+
+SetSearch SetsSearch::run() {
+  report("fitting the rig's model");
+  base_ = declared_rig(problem_, {.terms = options_.terms, .values = options_.values, .u = {}});
+  sets_.push_back(fit_set(problem_, base_.at, base_, problem_.error().prior.share));
+  const EffectSet plain = sets_.front();
+  report("computing what each effect would do");
+  const rig::EvidenceFit stated =
+      fit_linear(base_.target(problem_), base_.columns, problem_.error(), problem_.error().prior.share);
+  responses_ = effect_responses(problem_, base_, stated.variance.cwiseSqrt());
+  SetSearch found;
+  found.given = options_.terms.size();
+  const rig::EvidenceFit adapted =
+      fit_linear(base_.target(problem_), base_.columns, problem_.error(), plain.evidence.shares);
+  report("fitting the effects that promise most");
+  for (const rig::EvidenceFit* under : {&stated, &adapted}) {
+    const std::vector<Promise> singles = promises(*under, false);
+    for (size_t i = 0; i < std::min(singles_fitted, singles.size()); ++i)
+      if (is_worth_fitting(singles, i, least_promise)) fit(singles[i].responses);
+    if (under == &stated)
+      for (const Promise& promise : singles)
+        found.promises.emplace_back(responses_[promise.responses.front()].term.effect->text().id,
+                                    promise.gain);
+  }
+  for (const Effect* effect : rig_effects())
+    if (effect->change_points() != ChangePoints::none)
+      if (const auto start = scan_events(problem_, plain, *effect))
+        sets_.push_back(fit_set(problem_, *start, base_, problem_.error().prior.share));
+  report("fitting the best of them again");
+  fit_best_again(1);
+  report("fitting the pairs that promise most");
+  for (const rig::EvidenceFit* under : {&stated, &adapted}) {
+    const std::vector<Promise> singles = promises(*under, false);
+    const std::vector<Promise> pairs = promises(*under, true);
+    const double least =
+        least_promise + std::max(least_promise, singles.empty() ? 0.0 : singles.front().gain);
+    for (size_t i = 0; i < std::min(pairs_fitted / 2, pairs.size()); ++i)
+      if (is_worth_fitting(pairs, i, least)) fit(pairs[i].responses);
+  }
+  fit_beside_best();
+  report("fitting the best pairs again");
+  fit_best_again(2);
+  double sum = 0.0;
+  for (const EffectSet& set : sets_)
+    sum += std::exp(set.log_posterior - sets_.front().log_posterior);
+  for (const EffectSet& set : sets_)
+    found.probability.push_back(std::exp(set.log_posterior - sets_.front().log_posterior) / sum);
+  found.sets = std::move(sets_);
+  return found;
+}
+
+}  // namespace
+
+std::vector<std::string> EffectSet::ids() const {
+  std::vector<std::string> list;
+  for (const rig::ModelTerm& term : model.terms)
+    list.emplace_back(term.effect->text().id);
+  std::ranges::sort(list);
+  return list;
+}
+
+SetSearch search_sets(const rig::SessionProblem& problem, const SetSearchOptions& options) {
+  return SetsSearch(problem, options).run();
+}
+
+}  // namespace diastole::explain

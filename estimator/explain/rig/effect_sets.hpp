@@ -1,0 +1,56 @@
+#pragma once
+// Which sets of effects a session's features speak for: every single effect and every pair by linear algebra over the
+// effects' responses, those that promise most by fits, each fit with the evidence of its set.
+//
+// The evidence of a set is the marginal likelihood of the features (model_error.hpp) over modulus, offsets, tolerances
+// and the effects' values, by Laplace's approximation about the fit. A size is as likely in any decade (its density is
+// that of a normal with the found size as sd, less what two hundredfold ranges make of it), other parameters are uniform
+// within their bounds; an effect is there in one session of forty, and as many change points are possible as there are
+// cycles.
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "estimator/explain/rig/effect_responses.hpp"
+#include "estimator/inference/termination.hpp"
+#include "estimator/rig_fit/base_fit.hpp"
+
+namespace diastole::explain {
+
+/// That a given effect is there, in a session that somebody asks about.
+inline constexpr double effect_odds = 1.0 / 40.0;
+
+struct EffectSet {
+  rig::SessionModel model;             ///< as fitted
+  std::vector<rig::Unknown> unknowns;  ///< of the effects
+  std::vector<double> errors;          ///< of the effects' values, natural
+  Eigen::MatrixXd covariance;          ///< of the effects' values' coordinates, the moments and u
+  rig::EvidenceFit evidence;
+  Eigen::VectorXd shown;       ///< features of the model
+  rig::LinearisedModel known;  ///< where the nuisances' columns were taken
+  Eigen::MatrixXd columns;     ///< of the evidence's linear unknowns: the effects', then the nuisances
+  double log_posterior = 0.0;  ///< evidence and prior
+  inference::Termination termination = inference::Termination::converged;
+
+  [[nodiscard]] std::vector<std::string> ids() const;  ///< sorted
+  /// What the evidence's linear unknowns are to explain.
+  [[nodiscard]] Eigen::VectorXd target() const { return evidence.left + columns * evidence.u; }
+};
+
+struct SetSearch {
+  std::vector<EffectSet> sets;  ///< the most probable first; one of them has no effects
+  std::vector<double> probability;
+  std::vector<std::pair<std::string, double>> promises;  ///< of single effects: the gain of 2 ln evidence
+  size_t given = 0;                                      ///< effects that every set has
+};
+
+struct SetSearchOptions {
+  std::vector<rig::ModelTerm> terms = {};  ///< that every set has
+  std::vector<double> values = {};         ///< of them, to start from
+  std::function<void(std::string_view)> progress = {};
+};
+
+SetSearch search_sets(const rig::SessionProblem& problem, const SetSearchOptions& options = {});
+
+}  // namespace diastole::explain

@@ -1,0 +1,276 @@
+#include "estimator/explain/rig/set_fit.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "estimator/inference/intervals.hpp"
+#include "estimator/inference/least_squares.hpp"
+
+namespace diastole::explain {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+using inference::ParameterSpace;
+using rig::SessionModel;
+using rig::Unknown;
+
+/// ln of a size's density, uniform in its logarithm over two decades on one side or both, relative to the normal about 0.
+constexpr double size_range = 4.6;
+constexpr double small_part = 2e-3;   ///< of a size, for derivatives
+constexpr double time_step_s = 0.02;  ///< some samples: less is as rough as they are
+constexpr double bound_u = 8.0;       ///< of a nuisance, in sds: no data move one so far
+
+/// What is searched: the effects' values, the moments, the modulus; and the nuisances, which are linear.
+class SetProblem : public inference::LeastSquaresProblem {
+ public:
+  SetProblem(const rig::SessionProblem& problem, const SessionModel& start, const rig::LinearisedModel& known)
+      : problem_(problem), start_(start), known_(known) {
+    const rig::RigModel base = problem.model({{}, {}, start.u});
+    size_t at = 0;
+    for (const rig::ModelTerm& term : start.terms) {
+      const std::vector<double> neutral = term.effect->neutral(base);
+      for (size_t j = 0; j < neutral.size(); ++j, ++at) {
+        const EffectParameter& parameter = term.effect->parameters()[j];
+        Unknown unknown = rig::unknown_of(*term.effect, parameter);
+        const auto [lower, upper] = unknown.coordinate_bounds();
+        const double from = unknown.coordinate(neutral[j]);
+        const double size = std::abs(unknown.coordinate(start.values[at]) - from);
+        const double typical = std::abs(unknown.coordinate(parameter.typical) - from);
+        unknown.perturbation = small_part * (is_amplitude(*term.effect, j) ? std::max(size, 0.3 * typical)
+                                                                           : 0.3 * (upper - lower));
+        unknowns_.push_back(unknown);
+        neutral_.push_back(is_amplitude(*term.effect, j) ? std::optional(from) : std::nullopt);
+      }
+    }
+    values_ = unknowns_.size();
+    for (const rig::ModelTerm& term : start.terms)
+      for (const ChangePoint& moment : term.change_points) {
+        Unknown unknown{
+            {.name = "moment", .unit = "s", .lower = moment.time_s - 1.0, .upper = moment.time_s + 1.0},
+            time_step_s,
+            false};
+        unknowns_.push_back(unknown);
+        neutral_.emplace_back();
+      }
+    const double u0 = start.u[0];
+    unknowns_.push_back({{.name = "modulus", .lower = u0 - 3.0, .upper = u0 + 3.0}, 2e-3, false});
+    neutral_.emplace_back();
+    std::vector<inference::Parameter> all(unknowns_.begin(), unknowns_.end());
+    for (Index i = 1; i < start.u.size(); ++i)
+      all.push_back(
+          {.name = problem.nuisances()[static_cast<size_t>(i)].name, .lower = -bound_u, .upper = bound_u});
+    space_ = ParameterSpace(std::move(all));
+  }
+
+  void set_variance(const VectorXd& variance) { weight_ = variance.cwiseSqrt().cwiseInverse(); }
+  [[nodiscard]] const ParameterSpace& space() const override { return space_; }
+  [[nodiscard]] inference::Linearisation linearisation() const override {
+    return inference::Linearisation::kept;
+  }
+  std::optional<VectorXd> residuals(const VectorXd& q) override {
+    const VectorXd& seen = shown(q);
+    if (!seen.allFinite()) return {};
+    const VectorXd u = nuisances(q);
+    VectorXd found(seen.size() + u.size());
+    found.head(seen.size()) = (problem_.measured() - seen - linear(u)).cwiseProduct(weight_);
+    found.tail(u.size()) = u;
+    return found;
+  }
+  MatrixXd jacobian(const VectorXd& q) override {
+    const MatrixXd moving = derivatives(q);
+    const Index rows = moving.rows();
+    const Index rest = known_.columns.cols() - 1;
+    MatrixXd all = MatrixXd::Zero(rows + rest + 1, searched() + rest);
+    all.topLeftCorner(rows, searched()) = -(weight_.asDiagonal() * moving);
+    all.topRightCorner(rows, rest) = -(weight_.asDiagonal() * known_.columns.rightCols(rest));
+    all(rows, searched() - 1) = 1.0;
+    all.bottomRightCorner(rest, rest).setIdentity();
+    return all;
+  }
+
+  [[nodiscard]] Index searched() const { return static_cast<Index>(unknowns_.size()); }
+  [[nodiscard]] Index effect_values() const { return static_cast<Index>(values_); }
+  [[nodiscard]] const std::vector<Unknown>& unknowns() const { return unknowns_; }
+  /// The coordinate at which an amplitude does nothing.
+  [[nodiscard]] std::optional<double> neutral(Index i) const { return neutral_[static_cast<size_t>(i)]; }
+  [[nodiscard]] VectorXd start() const {
+    VectorXd q(space_.size());
+    for (Index i = 0; i < effect_values(); ++i)
+      q[i] = unknowns_[static_cast<size_t>(i)].coordinate(start_.values[static_cast<size_t>(i)]);
+    Index at = effect_values();
+    for (const rig::ModelTerm& term : start_.terms)
+      for (const ChangePoint& moment : term.change_points)
+        q[at++] = moment.time_s;
+    q[at++] = start_.u[0];
+    q.tail(start_.u.size() - 1) = start_.u.tail(start_.u.size() - 1);
+    return space_.clamped(q);
+  }
+  [[nodiscard]] VectorXd nuisances(const VectorXd& q) const {
+    VectorXd u(start_.u.size());
+    u[0] = q[searched() - 1];
+    u.tail(u.size() - 1) = q.tail(u.size() - 1);
+    return u;
+  }
+  /// The model of a point; its linear nuisances are those of the point, or those at which the columns were taken.
+  [[nodiscard]] SessionModel model(const VectorXd& q, bool linear_ones) const {
+    SessionModel made = start_;
+    for (Index i = 0; i < effect_values(); ++i)
+      made.values[static_cast<size_t>(i)] = unknowns_[static_cast<size_t>(i)].value(q[i]);
+    Index at = effect_values();
+    for (rig::ModelTerm& term : made.terms)
+      for (ChangePoint& moment : term.change_points) {
+        moment.session_s += q[at] - moment.time_s;
+        moment.time_s = q[at++];
+      }
+    made.u = linear_ones ? nuisances(q) : known_.at.u;
+    made.u[0] = q[searched() - 1];
+    return made;
+  }
+  const VectorXd& shown(const VectorXd& q) {
+    const VectorXd now = q.head(searched());
+    if (now.size() == at_.size() && now == at_) return seen_;
+    at_ = now;
+    seen_ = problem_.shown(std::array{model(q, false)});
+    return seen_;
+  }
+  /// Of what is shown by what is searched.
+  MatrixXd derivatives(const VectorXd& q) {
+    const VectorXd here = shown(q);
+    std::vector<SessionModel> models{model(q, false)};
+    std::vector<bool> same_plant{true};
+    std::vector<double> steps;
+    for (Index i = 0; i < searched(); ++i) {
+      const Unknown& unknown = unknowns_[static_cast<size_t>(i)];
+      steps.push_back(unknown.step_from(q[i]));
+      VectorXd moved = q;
+      moved[i] += steps.back();
+      models.push_back(model(moved, false));
+      same_plant.push_back(unknown.sensors_only);
+    }
+    MatrixXd all = problem_.shown(models, same_plant);
+    MatrixXd moving(all.rows(), searched());
+    for (Index i = 0; i < searched(); ++i)
+      moving.col(i) = (all.col(i + 1) - here) / steps[static_cast<size_t>(i)];
+    return moving;
+  }
+  /// What the linear nuisances change; the modulus is not one of them.
+  [[nodiscard]] VectorXd linear(const VectorXd& u) const {
+    const Index rest = u.size() - 1;
+    return known_.columns.rightCols(rest) * (u - known_.at.u).tail(rest);
+  }
+
+ private:
+  const rig::SessionProblem& problem_;
+  const SessionModel& start_;
+  const rig::LinearisedModel& known_;
+  std::vector<Unknown> unknowns_;
+  std::vector<std::optional<double>> neutral_;
+  size_t values_ = 0;
+  ParameterSpace space_;
+  VectorXd weight_;
+  VectorXd at_, seen_;
+};
+
+/// Width of what a value may be before the data: its size, or its bounds'.
+double prior_width(const SetProblem& set, const VectorXd& q, Index i) {
+  const Unknown& unknown = set.unknowns()[static_cast<size_t>(i)];
+  const auto [lower, upper] = unknown.coordinate_bounds();
+  if (const auto neutral = set.neutral(i)) return std::max(std::abs(q[i] - *neutral), unknown.perturbation);
+  return (upper - lower) / std::sqrt(12.0);
+}
+
+double log_prior(const rig::SessionProblem& problem, const SetProblem& set, const SessionModel& model) {
+  double sum = 0.0;
+  for (const rig::ModelTerm& term : model.terms) {
+    sum += std::log(effect_odds);
+    double cycles = 0.0;
+    for (const rig::SessionRun& run : problem.session().runs)
+      cycles += static_cast<double>(run.drive.place.trigger_s.size());
+    sum -= static_cast<double>(term.change_points.size()) * std::log(std::max(cycles, 2.0));
+  }
+  for (Index i = 0; i < set.effect_values(); ++i)
+    if (const auto neutral = set.neutral(i)) {
+      const auto [lower, upper] = set.unknowns()[static_cast<size_t>(i)].coordinate_bounds();
+      const bool both_sides = lower < *neutral && *neutral < upper;
+      sum -= std::log(size_range * (both_sides ? 2.0 : 1.0) / std::sqrt(2.0 * std::numbers::pi));
+    }
+  return sum;
+}
+
+}  // namespace
+
+EffectSet fit_set(const rig::SessionProblem& problem, const SessionModel& start,
+                  const rig::LinearisedModel& known, const rig::Shares& shares) {
+  constexpr int most_rounds = 4;
+  constexpr double rested = 0.5;  // nats
+  SetProblem set(problem, start, known);
+  EffectSet out;
+  VectorXd q = set.start();
+  const Index searched = set.searched();
+  const Index linear = start.u.size() - 1;
+  MatrixXd& columns = out.columns;
+  const auto judged = [&](const MatrixXd& moving, const rig::Shares& from) {
+    columns.resize(moving.rows(), searched + linear);
+    columns.leftCols(searched) = moving;
+    columns.rightCols(linear) = known.columns.rightCols(linear);
+    for (Index i = 0; i + 1 < searched; ++i)
+      columns.col(i) *= prior_width(set, q, i);
+    const VectorXd z = problem.measured() - set.shown(q) + moving.col(searched - 1) * q[searched - 1] +
+                       known.columns.rightCols(linear) * known.at.u.tail(linear);
+    return fit_with_shares(z, columns, problem.error(), from);
+  };
+  MatrixXd moving = set.derivatives(q);
+  out.evidence = judged(moving, shares);
+  {  // the nuisances follow the start
+    VectorXd from = q;
+    from.tail(linear) = out.evidence.u.tail(linear);
+    from[searched - 1] = out.evidence.u[searched - 1];
+    q = set.space().clamped(from);
+  }
+  for (int round = 0; round < most_rounds; ++round) {
+    set.set_variance(out.evidence.variance);
+    inference::SearchOptions options;
+    options.iteration_limit = 15;
+    options.small_gain = [](double) { return 0.2; };  // a tenth of a nat
+    options.refusal_limit = 6;
+    options.first_radius = 1e4;
+    const inference::SearchResult found = minimise(set, q, options);
+    out.termination = found.termination;
+    if (found.termination == inference::Termination::no_solution) break;
+    q = found.q;
+    moving = set.derivatives(q);
+    const double before = out.evidence.log_evidence;
+    out.evidence = judged(moving, out.evidence.shares);
+    if (round > 0 && std::abs(out.evidence.log_evidence - before) < rested) break;
+  }
+  out.known = known;
+  out.model = set.model(q, true);
+  out.unknowns.assign(set.unknowns().begin(), set.unknowns().begin() + set.effect_values());
+  out.covariance = out.evidence.precision.llt().solve(
+      MatrixXd::Identity(out.evidence.precision.rows(), out.evidence.precision.cols()));
+  for (Index i = 0; i + 1 < searched; ++i) {
+    const double width = prior_width(set, q, i);
+    out.covariance.row(i) *= width;
+    out.covariance.col(i) *= width;
+  }
+  for (Index i = 0; i < set.effect_values(); ++i)
+    out.errors.push_back(inference::standard_error(set.space()[i], q[i], std::sqrt(out.covariance(i, i))));
+  out.known = known;
+  out.model = set.model(q, true);
+  out.unknowns.assign(set.unknowns().begin(), set.unknowns().begin() + set.effect_values());
+  const MatrixXd covariance = out.evidence.precision.llt().solve(
+      MatrixXd::Identity(out.evidence.precision.rows(), out.evidence.precision.cols()));
+  for (Index i = 0; i < set.effect_values(); ++i)
+    out.errors.push_back(inference::standard_error(set.space()[i], q[i],
+                                                   prior_width(set, q, i) * std::sqrt(covariance(i, i))));
+  out.shown = set.shown(q) + set.linear(out.model.u);
+  out.evidence.left = problem.measured() - out.shown;
+  out.log_posterior = out.evidence.log_evidence + log_prior(problem, set, out.model);
+  return out;
+}
+
+}  // namespace diastole::explain

@@ -1,0 +1,170 @@
+#include "estimator/explain/rig/set_verdict.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+namespace diastole::explain {
+namespace {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+using Ids = std::vector<std::string>;
+
+constexpr double name_probability = 0.9;
+constexpr double least_probability = 0.05;  ///< of a set that is told of
+constexpr double most_surprise = 2.0;       ///< sds of what is known of a share
+
+struct Sizes {
+  std::vector<double> over_error;
+  std::vector<bool> material;
+};
+
+/// Squares of features by signal, over the samples they live in.
+std::array<double, rig::signal_count> mean_squares(const rig::SessionProblem& problem,
+                                                   const VectorXd& squares) {
+  std::array<double, rig::signal_count> sums{}, rows{};
+  for (const rig::FeatureBlock& block : problem.features().blocks()) {
+    const auto s = static_cast<size_t>(block.signal);
+    sums[s] +=
+        squares.segment(static_cast<Index>(block.first), static_cast<Index>(block.features.size())).sum();
+    rows[s] += static_cast<double>(block.basis.rows());
+  }
+  for (size_t s = 0; s < sums.size(); ++s)
+    sums[s] = rows[s] > 0.0 ? sums[s] / rows[s] : 0.0;
+  return sums;
+}
+
+VectorXd error_squares(const rig::ModelError& error, const rig::Shares& shares) {
+  return error.variance(shares) - error.noise;
+}
+
+/// What a set's effects change each, over the model's error.
+Sizes sizes_of(const rig::SessionProblem& problem, const EffectSet& set, const ErrorKnowledge& known,
+               size_t given) {
+  Sizes sizes;
+  if (set.model.terms.empty()) return sizes;
+  std::vector<rig::SessionModel> models{set.model};
+  for (size_t leave = 0; leave < set.model.terms.size(); ++leave) {
+    rig::SessionModel without = set.model;
+    size_t at = 0;
+    for (size_t i = 0; i < leave; ++i)
+      at += set.model.terms[i].effect->parameters().size();
+    const auto first = without.values.begin() + static_cast<std::ptrdiff_t>(at);
+    without.values.erase(
+        first, first + static_cast<std::ptrdiff_t>(set.model.terms[leave].effect->parameters().size()));
+    without.terms.erase(without.terms.begin() + static_cast<std::ptrdiff_t>(leave));
+    models.push_back(std::move(without));
+  }
+  const Eigen::MatrixXd shown = problem.shown(models);
+  const Eigen::MatrixXd basic = set.known.columns.leftCols(rig::basic_nuisances);
+  const VectorXd weight = set.evidence.variance.cwiseInverse();
+  Eigen::MatrixXd normal = basic.transpose() * weight.asDiagonal() * basic;
+  normal.diagonal().array() += 1e-6;  // a channel that is not there has no offset
+  const auto error = mean_squares(problem, error_squares(problem.error(), set.evidence.shares));
+  for (Index i = 1; i < shown.cols(); ++i) {
+    const VectorXd change = shown.col(0) - shown.col(i);
+    const VectorXd left =
+        change - basic * normal.llt().solve(basic.transpose() * weight.cwiseProduct(change));
+    const auto size = mean_squares(problem, left.cwiseAbs2());
+    double largest = 0.0;
+    for (size_t s = 0; s < size.size(); ++s)
+      if (error[s] > 0.0) largest = std::max(largest, std::sqrt(size[s] / error[s]));
+    sizes.over_error.push_back(largest);
+    sizes.material.push_back(static_cast<size_t>(i) <= given || largest >= known.least_size());
+  }
+  // An effect's equations describe a real part to a tenth: what is smaller beside it may be its own error.
+  constexpr double right_to = 0.1;
+  const double largest = *std::ranges::max_element(sizes.over_error);
+  for (size_t i = given; i < sizes.material.size(); ++i)
+    sizes.material[i] = sizes.material[i] && sizes.over_error[i] >= right_to * largest;
+  return sizes;
+}
+
+Ids material_ids(const EffectSet& set, const Sizes& sizes) {
+  Ids ids;
+  for (size_t i = 0; i < set.model.terms.size(); ++i)
+    if (sizes.material[i]) ids.emplace_back(set.model.terms[i].effect->text().id);
+  std::ranges::sort(ids);
+  return ids;
+}
+
+}  // namespace
+
+double error_rms(const rig::SessionProblem& problem, const rig::Shares& shares, rig::Signal signal) {
+  return std::sqrt(
+      mean_squares(problem, error_squares(problem.error(), shares))[static_cast<size_t>(signal)]);
+}
+
+SetVerdict judge_sets(const rig::SessionProblem& problem, const SetSearch& search,
+                      const ErrorKnowledge& error) {
+  constexpr double told = 0.01;
+  struct Group {
+    double probability = 0.0;
+    size_t best = 0;
+  };
+  std::map<Ids, Group> groups;
+  std::vector<Sizes> sizes(search.sets.size());
+  SetVerdict out;
+  for (size_t k = 0; k < search.sets.size(); ++k) {
+    if (search.probability[k] < told) continue;
+    sizes[k] = sizes_of(problem, search.sets[k], error, search.given);
+    const Ids ids = material_ids(search.sets[k], sizes[k]);
+    const auto [group, is_new] = groups.try_emplace(ids, Group{0.0, k});
+    group->second.probability += search.probability[k];
+    for (size_t i = 0; i < sizes[k].material.size(); ++i) {
+      if (sizes[k].material[i]) continue;
+      const std::string id(search.sets[k].model.terms[i].effect->text().id);
+      auto hint = std::ranges::find(out.hints, id, &Hint::id);
+      if (hint == out.hints.end()) hint = out.hints.insert(hint, Hint{id, sizes[k].over_error[i], 0.0});
+      hint->probability += search.probability[k];
+    }
+  }
+  std::erase_if(out.hints, [](const Hint& hint) { return hint.probability < 0.5; });
+  const auto leading =
+      std::ranges::max_element(groups, {}, [](const auto& group) { return group.second.probability; });
+  out.chosen = leading->second.best;
+  if (!inference::is_settled(search.sets[out.chosen].termination)) {
+    // A name rests on a search that settled: that of its own effects alone, if the one with a hint beside them did not.
+    const auto own = std::ranges::find_if(search.sets, [&](const EffectSet& set) {
+      return set.ids() == leading->first && inference::is_settled(set.termination);
+    });
+    if (own != search.sets.end()) {
+      out.chosen = static_cast<size_t>(own - search.sets.begin());
+      sizes[out.chosen] = sizes_of(problem, *own, error, search.given);
+    }
+  }
+  const EffectSet& best = search.sets[out.chosen];
+  out.size_over_error = sizes[out.chosen].over_error;
+  out.material = sizes[out.chosen].material;
+  out.confidence = leading->second.probability;
+  const auto plain = std::ranges::find_if(
+      search.sets, [&](const EffectSet& set) { return set.model.terms.size() == search.given; });
+  out.searches.push_back({{}, plain->termination});
+  // Hints alone need no search that settled: nothing is named by it.
+  const bool is_more = leading->first.size() > search.given;
+  if (is_more) out.searches.push_back({best.ids(), best.termination});
+  const rig::Shares surprise = best.evidence.surprise(problem.error().prior);
+  const bool surprising = std::ranges::any_of(surprise, [](double sigmas) { return sigmas > most_surprise; });
+  if (surprising || !is_settled(out.searches)) {
+    out.verdict = Verdict::unexplained;
+    return out;
+  }
+  if (out.confidence >= name_probability) {
+    out.verdict = !is_more ? Verdict::none : Verdict::named;
+    return out;
+  }
+  out.verdict = Verdict::ambiguous;
+  out.confidence = 0.0;
+  for (const auto& [ids, group] : groups) {
+    if (group.probability < least_probability) continue;
+    out.confidence += group.probability;
+    if (ids == leading->first) continue;
+    out.ambiguous_with.push_back(ids);
+    const EffectSet& other = search.sets[group.best];
+    if (!other.model.terms.empty()) out.searches.push_back({other.ids(), other.termination});
+  }
+  return out;
+}
+
+}  // namespace diastole::explain

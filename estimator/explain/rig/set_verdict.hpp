@@ -1,0 +1,38 @@
+#pragma once
+// From sets of effects with their probabilities to a verdict: significant, material, settled.
+//
+// An effect is material if what it changes, modulus and offsets having followed, is larger than the model's own error in some
+// channel, and than a tenth of the set's largest. Immaterial ones are hints and named by nobody: probabilities of sets that differ by them add. A set is named
+// with a probability of nine tenths; sets that are less certain are ambiguous. Where even the best set needs a model's error
+// larger than what is known of it allows, the misfit is unexplained.
+
+#include "estimator/explain/rig/effect_sets.hpp"
+#include "estimator/explain/verdict/explanation.hpp"
+
+namespace diastole::explain {
+
+/// What is known of the model's error, and how much larger than it an effect has to be for a name.
+struct ErrorKnowledge {
+  bool from_reference = false;
+  /// The error itself is known within a factor of two (SharePrior), from references within one of 1.5.
+  [[nodiscard]] double least_size() const { return from_reference ? 1.5 : 2.0; }
+};
+
+struct SetVerdict {
+  Verdict verdict = Verdict::none;
+  double confidence = 0.0;
+  size_t chosen = 0;                    ///< of the search's sets
+  std::vector<double> size_over_error;  ///< of the chosen set's effects
+  std::vector<bool> material;           ///< which of them count
+  std::vector<std::vector<std::string>> ambiguous_with;
+  std::vector<Hint> hints;
+  std::vector<SearchEnd> searches;
+};
+
+SetVerdict judge_sets(const rig::SessionProblem& problem, const SetSearch& search,
+                      const ErrorKnowledge& error);
+
+/// RMS of the model's error in a channel, kPa or mL, at these shares; 0 where there is none.
+double error_rms(const rig::SessionProblem& problem, const rig::Shares& shares, rig::Signal signal);
+
+}  // namespace diastole::explain

@@ -1,0 +1,40 @@
+#include "estimator/rig_fit/base_fit.hpp"
+
+#include <cmath>
+#include <utility>
+
+namespace diastole::rig {
+
+LinearisedModel declared_rig(const SessionProblem& problem, SessionModel with) {
+  // Of the modulus: its square is below the model's own error.
+  constexpr double small = 0.03;
+  constexpr int most_rounds = 3;
+  LinearisedModel declared{.at = std::move(with), .there = {}, .columns = {}};
+  declared.at.u = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(problem.nuisances().size()));
+  for (int round = 0; round < most_rounds; ++round) {
+    declared.columns = problem.nuisance_columns(declared.at, declared.there);
+    const EvidenceFit fit = fit_with_shares(declared.target(problem), declared.columns, problem.error(),
+                                            problem.error().prior.share);
+    const double moved = std::abs(fit.u[0] - declared.at.u[0]) * problem.nuisances()[0].sd;
+    if (round > 0 && moved < small) break;
+    declared.at.u.head(basic_nuisances) = fit.u.head(basic_nuisances);
+  }
+  return declared;
+}
+
+LinearisedModel fitted_rig(const SessionProblem& problem, const LinearisedModel& declared) {
+  constexpr int most_rounds = 3;
+  constexpr double small = 0.5;  // sds of the priors, in all
+  LinearisedModel fitted = declared;
+  for (int round = 0; round < most_rounds; ++round) {
+    const EvidenceFit fit =
+        fit_with_shares(fitted.target(problem), fitted.columns, problem.error(), problem.error().prior.share);
+    const double moved = (fit.u - fitted.at.u).norm();
+    fitted.at.u = fit.u;
+    fitted.columns = problem.nuisance_columns(fitted.at, fitted.there);
+    if (moved < small) break;
+  }
+  return fitted;
+}
+
+}  // namespace diastole::rig

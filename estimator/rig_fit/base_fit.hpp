@@ -1,0 +1,28 @@
+#pragma once
+// The rig's model without effects, fitted to a session's features.
+
+#include "estimator/rig_fit/session_problem.hpp"
+
+namespace diastole::rig {
+
+/// A model and what features and their derivatives by the nuisances are there.
+struct LinearisedModel {
+  SessionModel at;
+  Eigen::VectorXd there;    ///< what it shows
+  Eigen::MatrixXd columns;  ///< by u
+
+  [[nodiscard]] Eigen::VectorXd misfit(const SessionProblem& problem) const {
+    return problem.measured() - there;
+  }
+  /// What is to be explained by all of u.
+  [[nodiscard]] Eigen::VectorXd target(const SessionProblem& problem) const {
+    return misfit(problem) + columns * at.u;
+  }
+};
+
+/// The rig as declared, with effects that it is known to have, and the modulus and offsets that fit.
+LinearisedModel declared_rig(const SessionProblem& problem, SessionModel with = {});
+/// From there with all nuisances, linearised again until the columns lead nowhere else.
+LinearisedModel fitted_rig(const SessionProblem& problem, const LinearisedModel& declared);
+
+}  // namespace diastole::rig

@@ -1,0 +1,230 @@
+#include "estimator/rig_fit/reference.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <utility>
+
+#include "estimator/rig_fit/base_fit.hpp"
+
+namespace diastole::rig {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+/// In sds of the tolerances' list: what a rig's parts change from day to day, and a specimen from casting to casting.
+constexpr double rig_changes = 0.1;
+constexpr double castings_differ = 0.5;
+/// Of a single reference's misfit, that comes again.
+constexpr double once_seen = 0.5;
+
+/// A reference session and its fit.
+struct Fitted {
+  Study study;
+  Session session;
+  SpecimenFamily family;
+  SessionProblem problem;
+  LinearisedModel declared, rig;
+  EvidenceFit evidence;
+
+  Fitted(Study of, size_t threads)
+      : study(std::move(of)),
+        session(read_session(study)),
+        family(study),
+        problem(session, family, threads) {}
+  void fit() {
+    declared = declared_rig(problem);
+    rig = fitted_rig(problem, declared);
+    evidence =
+        fit_with_shares(rig.target(problem), rig.columns, problem.error(), problem.error().prior.share);
+  }
+};
+
+MatrixXd inverse(const MatrixXd& positive) {
+  return positive.llt().solve(MatrixXd::Identity(positive.rows(), positive.cols()));
+}
+
+bool is_of_specimen(const Nuisance& nuisance) {
+  return nuisance.name.starts_with("gel_") || nuisance.name == "inner_radius";
+}
+
+void combine_tolerances(const std::vector<std::unique_ptr<Fitted>>& fits, Reference& out) {
+  const auto& list = fits.front()->problem.nuisances();
+  const auto count = static_cast<Index>(list.size() - basic_nuisances);
+  MatrixXd precision = MatrixXd::Identity(count, count);
+  VectorXd pull = VectorXd::Zero(count);
+  for (const auto& fit : fits) {
+    const MatrixXd own = inverse(inverse(fit->evidence.precision).bottomRightCorner(count, count));
+    precision += own - MatrixXd::Identity(count, count);
+    pull += own * fit->evidence.u.tail(count);
+  }
+  out.covariance = inverse(precision);
+  out.mean = out.covariance * pull;
+  for (Index i = 0; i < count; ++i) {
+    const Nuisance& nuisance = list[basic_nuisances + static_cast<size_t>(i)];
+    out.tolerances.push_back(nuisance.name);
+    out.covariance(i, i) += std::pow(is_of_specimen(nuisance) ? castings_differ : rig_changes, 2);
+  }
+}
+
+/// One features' difference of two references, of the segments that both hold.
+Shares differing_shares(const std::vector<std::unique_ptr<Fitted>>& fits, const Reference& known) {
+  if (fits.size() < 2) {
+    Shares shares = known.all;
+    for (double& share : shares)
+      share *= std::sqrt(1.0 - once_seen);
+    return shares;
+  }
+  std::vector<double> differences, noise, unit;
+  ModelError error;
+  for (size_t b = 1; b < fits.size(); ++b)
+    for (const FeatureBlock& block : fits[b]->problem.features().blocks())
+      for (const FeatureBlock& other : fits[b - 1]->problem.features().blocks()) {
+        if (other.key != block.key || other.features.size() != block.features.size()) continue;
+        for (size_t i = 0; i < block.features.size(); ++i) {
+          const auto row = static_cast<Index>(block.first + i);
+          const auto row_before = static_cast<Index>(other.first + i);
+          const ModelError &now = fits[b]->problem.error(), &before = fits[b - 1]->problem.error();
+          differences.push_back(fits[b]->evidence.left[row] - fits[b - 1]->evidence.left[row_before]);
+          noise.push_back(now.noise[row] + before.noise[row_before]);
+          unit.push_back(now.unit[row] + before.unit[row_before]);
+          error.group.push_back(now.group[static_cast<size_t>(row)]);
+        }
+      }
+  const auto rows = static_cast<Index>(differences.size());
+  error.noise = Eigen::Map<VectorXd>(noise.data(), rows);
+  error.unit = Eigen::Map<VectorXd>(unit.data(), rows);
+  error.prior.share = known.all;
+  for (double& share : error.prior.share)
+    share *= once_seen;
+  return fit_with_shares(Eigen::Map<VectorXd>(differences.data(), rows), MatrixXd(rows, 0), error,
+                         error.prior.share)
+      .shares;
+}
+
+}  // namespace
+
+Reference learn_reference(const std::vector<Study>& studies, size_t threads,
+                          const std::function<void(std::string_view)>& progress) {
+  const auto report = [&](const std::string& what) {
+    if (progress) progress(what);
+  };
+  Reference out;
+  std::vector<std::unique_ptr<Fitted>> fits;
+  for (const Study& study : studies) {
+    report(fmt::format("fitting the reference {}", study.file.filename().string()));
+    fits.push_back(std::make_unique<Fitted>(study, threads));
+    fits.back()->fit();
+  }
+  out.sessions = fits.size();
+  combine_tolerances(fits, out);
+  const MatrixXd root = out.covariance.llt().matrixL();
+  std::array<double, signal_count> squares{}, rows{};
+  for (const auto& fit : fits) {
+    fit->problem.set_tolerances(out.mean, root);
+    fit->fit();
+    for (size_t g = 0; g < error_groups; ++g)
+      out.all[g] += std::pow(fit->evidence.shares[g], 2) / static_cast<double>(fits.size());
+    for (const FeatureBlock& block : fit->problem.features().blocks()) {
+      const auto s = static_cast<size_t>(block.signal);
+      for (size_t i = 0; i < block.features.size(); ++i)
+        squares[s] += std::pow(fit->evidence.left[static_cast<Index>(block.first + i)], 2);
+      rows[s] += block.features.empty() ? 0.0 : block.features.front().rows;
+      out.percent_of_range[s] = std::max(out.percent_of_range[s], fit->problem.error().range[s]);
+    }
+  }
+  for (double& share : out.all)
+    share = std::sqrt(share);
+  for (size_t s = 0; s < signal_count; ++s) {
+    out.rms[s] = rows[s] > 0.0 ? std::sqrt(squares[s] / rows[s]) : 0.0;
+    out.percent_of_range[s] = rows[s] > 0.0 ? 100.0 * out.rms[s] / out.percent_of_range[s] : 0.0;
+  }
+  out.again = differing_shares(fits, out);
+  for (size_t g = 0; g < error_groups; ++g)
+    out.again[g] = std::min(out.again[g], out.all[g]);
+  // The common misfit of each segment, shrunk to what is known of it.
+  struct Sum {
+    VectorXd misfit, noise, unit;
+    std::vector<ErrorGroup> group;
+    double count = 0.0;
+  };
+  std::map<std::string, Sum> sums;
+  for (const auto& fit : fits)
+    for (const FeatureBlock& block : fit->problem.features().blocks()) {
+      const auto first = static_cast<Index>(block.first);
+      const auto count = static_cast<Index>(block.features.size());
+      Sum& sum = sums[block.key];
+      if (sum.count == 0.0) {
+        sum.misfit = sum.noise = sum.unit = VectorXd::Zero(count);
+        const auto from = fit->problem.error().group.begin() + first;
+        sum.group.assign(from, from + count);
+      } else if (sum.misfit.size() != count) {
+        continue;
+      }
+      sum.misfit += fit->evidence.left.segment(first, count);
+      sum.noise += fit->problem.error().noise.segment(first, count);
+      sum.unit += fit->problem.error().unit.segment(first, count);
+      sum.count += 1.0;
+    }
+  for (auto& [key, sum] : sums) {
+    ReferenceSegment& segment = out.segments[key];
+    segment.misfit = sum.misfit / sum.count;
+    segment.noise.resize(sum.misfit.size());
+    for (Index i = 0; i < sum.misfit.size(); ++i) {
+      const auto g = static_cast<size_t>(sum.group[static_cast<size_t>(i)]);
+      const double unit = sum.unit[i] / sum.count;
+      const double common = std::max(std::pow(out.all[g], 2) - std::pow(out.again[g], 2), 0.0) * unit;
+      const double scatter = (std::pow(out.again[g], 2) * unit + sum.noise[i] / sum.count) / sum.count;
+      const double known = common + scatter > 0.0 ? common / (common + scatter) : 0.0;
+      segment.misfit[i] *= known;
+      segment.noise[i] = common * (1.0 - known);
+    }
+  }
+  return out;
+}
+
+void use_reference(const Reference& reference, SessionProblem& problem) {
+  // Tolerances that the reference does not know keep their list's prior.
+  const auto& list = problem.nuisances();
+  const auto count = static_cast<Index>(list.size() - basic_nuisances);
+  VectorXd mean = VectorXd::Zero(count);
+  MatrixXd covariance = MatrixXd::Identity(count, count);
+  std::vector<Index> place;
+  for (const std::string& name : reference.tolerances) {
+    const auto found = std::ranges::find(list, name, &Nuisance::name);
+    place.push_back(found == list.end() ? -1 : found - list.begin() - static_cast<Index>(basic_nuisances));
+  }
+  for (size_t i = 0; i < place.size(); ++i) {
+    if (place[i] < 0) continue;
+    mean[place[i]] = reference.mean[static_cast<Index>(i)];
+    for (size_t j = 0; j < place.size(); ++j)
+      if (place[j] >= 0)
+        covariance(place[i], place[j]) = reference.covariance(static_cast<Index>(i), static_cast<Index>(j));
+  }
+  problem.set_tolerances(mean, covariance.llt().matrixL());
+  ModelError& error = problem.error();
+  error.prior.share = reference.again;
+  error.prior.down.fill(0.7);
+  VectorXd misfit = VectorXd::Zero(problem.features().count());
+  for (const FeatureBlock& block : problem.features().blocks()) {
+    const auto first = static_cast<Index>(block.first);
+    const auto rows = static_cast<Index>(block.features.size());
+    const auto found = reference.segments.find(block.key);
+    if (found != reference.segments.end() && found->second.misfit.size() == rows) {
+      misfit.segment(first, rows) = found->second.misfit;
+      error.noise.segment(first, rows) += found->second.noise;
+      continue;
+    }
+    for (Index i = first; i < first + rows; ++i) {
+      const auto g = static_cast<size_t>(error.group[static_cast<size_t>(i)]);
+      if (reference.again[g] > 0.0) error.unit[i] *= std::pow(reference.all[g] / reference.again[g], 2);
+    }
+  }
+  problem.take_off(misfit);
+}
+
+}  // namespace diastole::rig

@@ -1,0 +1,320 @@
+#include "estimator/rig_fit/segment_features.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <complex>
+#include <numbers>
+
+#include "estimator/parallel/parallel_for.hpp"
+#include "protocol/signal/median.hpp"
+
+namespace diastole::rig {
+namespace {
+
+constexpr double highest_Hz = 12.0;  ///< beyond, no pressure of a stroke has anything but noise and ringing
+constexpr size_t most_harmonics = 30;
+constexpr size_t first_harmonics = 8;
+constexpr size_t most_cosines = 120;
+constexpr double least_s = 0.5;       ///< shorter windows show nothing
+constexpr double independent = 1e-4;  ///< of a function's square that earlier ones do not hold
+
+const std::vector<double>* pressures(const Prediction& shown, Signal signal) {
+  return signal == Signal::cavity ? &shown.cavity_kPa : &shown.pump_kPa;
+}
+
+/// Noise of the mean square of a function of this frequency, over white noise of sd 1 kPa.
+double spectral_sd(const ChannelNoise& noise, double frequency_Hz, double rate_Hz) {
+  std::complex<double> response = 1.0;
+  for (size_t j = 0; j < noise.autoregression.size(); ++j)
+    response -= noise.autoregression[j] * std::polar(1.0, -2.0 * std::numbers::pi * frequency_Hz / rate_Hz *
+                                                              static_cast<double>(j + 1));
+  return noise.innovation_kPa / std::abs(response);
+}
+
+/// Functions over a window's rows, one after the other.
+class BasisMaker {
+ public:
+  BasisMaker(FeatureBlock& block, std::vector<double> turns, std::vector<bool> missing)
+      : block_(block), turns_(std::move(turns)), missing_(std::move(missing)) {}
+
+  template <class Function>
+  void add(FeatureKind kind, double harmonic, double rows, const Function& function) {
+    std::vector<double> column(turns_.size());
+    for (size_t k = 0; k < turns_.size(); ++k)
+      column[k] = missing_[k] ? 0.0 : function(turns_[k]);
+    columns_.push_back(std::move(column));
+    block_.features.push_back({kind, harmonic, rows, 0.0});
+  }
+  void finish();
+  [[nodiscard]] double rows() const { return static_cast<double>(turns_.size()); }
+
+ private:
+  FeatureBlock& block_;
+  std::vector<double> turns_;  ///< cycles since the window's start, at each row
+  std::vector<bool> missing_;
+  std::vector<std::vector<double>> columns_;
+};
+
+void BasisMaker::finish() {
+  const auto rows = static_cast<Eigen::Index>(turns_.size());
+  Eigen::MatrixXd all(rows, static_cast<Eigen::Index>(columns_.size()));
+  for (Eigen::Index j = 0; j < all.cols(); ++j)
+    all.col(j) = Eigen::Map<const Eigen::VectorXd>(columns_[static_cast<size_t>(j)].data(), rows);
+  // Cholesky's rows one by one, leaving out what depends on the ones before.
+  const Eigen::MatrixXd products = all.transpose() * all;
+  std::vector<Eigen::Index> kept;
+  std::vector<Feature> features;
+  Eigen::MatrixXd factor = Eigen::MatrixXd::Zero(all.cols(), all.cols());
+  for (Eigen::Index j = 0; j < all.cols(); ++j) {
+    const auto row = static_cast<Eigen::Index>(kept.size());
+    Eigen::VectorXd part(row);
+    for (Eigen::Index i = 0; i < row; ++i) {
+      const Eigen::Index other = kept[static_cast<size_t>(i)];
+      part[i] = (products(j, other) - factor.row(i).head(i).dot(part.head(i))) / factor(i, i);
+    }
+    const double left = products(j, j) - part.squaredNorm();
+    if (!(left > independent * products(j, j)) || products(j, j) == 0.0) continue;
+    factor.row(row).head(row) = part.transpose();
+    factor(row, row) = std::sqrt(left);
+    kept.push_back(j);
+    features.push_back(block_.features[static_cast<size_t>(j)]);
+  }
+  const auto count = static_cast<Eigen::Index>(kept.size());
+  block_.features = std::move(features);
+  block_.factor = factor.topLeftCorner(count, count);
+  block_.basis.resize(rows, count);
+  for (Eigen::Index j = 0; j < count; ++j)
+    block_.basis.col(j) = all.col(kept[static_cast<size_t>(j)]);
+}
+
+void add_harmonics(BasisMaker& basis, FeatureKind kind, size_t count, double rows, const auto& weight) {
+  for (size_t h = 0; h <= count; ++h) {
+    const double rate = 2.0 * std::numbers::pi * static_cast<double>(h);
+    basis.add(kind, static_cast<double>(h), rows, [&](double x) { return weight(x) * std::cos(rate * x); });
+    if (h > 0)
+      basis.add(kind, static_cast<double>(h), rows, [&](double x) { return weight(x) * std::sin(rate * x); });
+  }
+}
+
+/// The functions of a window of `cycles` cycles.
+void add_cycles(BasisMaker& basis, double cycles, double period_s) {
+  const auto harmonics = std::min(most_harmonics, static_cast<size_t>(highest_Hz * period_s));
+  const double all = basis.rows();
+  add_harmonics(basis, FeatureKind::repeats, harmonics, all, [](double) { return 1.0; });
+  add_harmonics(basis, FeatureKind::first, std::min(first_harmonics, harmonics), all / cycles,
+                [](double x) { return x < 1.0 ? 1.0 : 0.0; });
+  if (cycles < 3.0) return;
+  add_harmonics(basis, FeatureKind::drift, 2, all, [&](double x) { return (x - 0.5 * cycles) / cycles; });
+  for (double c = 1.0; c < cycles; ++c)
+    for (const double rate : {0.0, 2.0 * std::numbers::pi})
+      basis.add(FeatureKind::cycles, rate == 0.0 ? 0.0 : 1.0, all / cycles,
+                [&](double x) { return x >= c && x < c + 1.0 ? std::cos(rate * x) : 0.0; });
+}
+
+void add_cosines(BasisMaker& basis, double length_s) {
+  const auto count = std::min(most_cosines, static_cast<size_t>(2.0 * highest_Hz * length_s));
+  for (size_t h = 0; h <= count; ++h)
+    basis.add(FeatureKind::repeats, static_cast<double>(h), basis.rows(),
+              [&](double x) { return std::cos(std::numbers::pi * static_cast<double>(h) * x); });
+}
+
+double range_of(const std::vector<double>& values, size_t first, size_t last) {
+  double low = std::numeric_limits<double>::infinity();
+  double high = -low;
+  for (size_t k = first; k < last; ++k) {
+    if (!std::isfinite(values[k])) continue;
+    low = std::min(low, values[k]);
+    high = std::max(high, values[k]);
+  }
+  return std::max(high - low, 0.0);
+}
+
+std::string key_of(const runfile::Segment& segment, Signal signal) {
+  return fmt::format("{} {:g} mL from {:g} mL in {:g} s, {}", segment.waveform, segment.stroke_mL,
+                     segment.offset_mL, segment.period_s, name_of(signal));
+}
+
+void set_basis(FeatureBlock& block, const SessionRun& run, const std::vector<double>& values, size_t last) {
+  const runfile::Segment& segment = run.segments[block.segment];
+  std::vector<double> turns;
+  std::vector<bool> missing;
+  for (size_t k = block.first_row; k < last; ++k) {
+    turns.push_back((run.sample_s[k] - segment.start_s) / block.period_s);
+    missing.push_back(!std::isfinite(values[k]));
+  }
+  BasisMaker basis(block, std::move(turns), std::move(missing));
+  if (block.cycles > 1.0) {
+    add_cycles(basis, block.cycles, block.period_s);
+  } else {
+    add_cosines(basis, block.period_s);
+  }
+  basis.finish();
+}
+
+/// Harmonics of a gated volume's frames.
+void set_volume_basis(FeatureBlock& block, const GatedVolume& volume) {
+  constexpr size_t harmonics = 6;
+  std::vector<double> turns;
+  for (const double phase : volume.measured.phase_s)
+    turns.push_back(phase / block.period_s);
+  const size_t count = turns.size();
+  BasisMaker basis(block, std::move(turns), std::vector<bool>(count, false));
+  add_harmonics(basis, FeatureKind::repeats, std::min(harmonics, (count - 1) / 2), basis.rows(),
+                [](double) { return 1.0; });
+  basis.finish();
+}
+
+void set_noise(FeatureBlock& block, const ChannelNoise& noise, double cycle_sd, double rate_Hz) {
+  // A cycle that is larger by a part moves its level by half of that part of the range, and its cosine by as much.
+  const double cycle_change = 0.5 * cycle_sd * block.range;
+  for (Feature& feature : block.features) {
+    const double frequency = feature.harmonic / block.period_s * (block.cycles > 1.0 ? 1.0 : 0.5);
+    const double of_cycles = feature.kind == FeatureKind::repeats
+                                 ? (block.cycles > 1.0 ? feature.rows / block.cycles : 0.0)
+                                 : feature.rows;
+    const double variation = feature.harmonic <= 1.0 ? cycle_change * std::sqrt(of_cycles) : 0.0;
+    feature.noise_sd = std::hypot(spectral_sd(noise, frequency, rate_Hz), variation);
+  }
+}
+
+/// What the levels and sizes of single cycles scatter by themselves, from successive ones: a few events do not count. Noise of
+/// 1/f wanders over a segment by some twice the variance that successive cycles show.
+void raise_noise_of_cycles(FeatureBlock& block, const Eigen::VectorXd& measured) {
+  constexpr size_t enough = 6;
+  constexpr double of_normal = 1.4826;  // sd over the median size
+  for (const double harmonic : {0.0, 1.0}) {
+    std::vector<double> changes;
+    double before = 0.0;
+    size_t count = 0;
+    for (size_t i = 0; i < block.features.size(); ++i) {
+      if (block.features[i].kind != FeatureKind::cycles || block.features[i].harmonic != harmonic) continue;
+      const double now = measured[static_cast<Eigen::Index>(block.first + i)];
+      if (count++ > 0) changes.push_back(std::abs(now - before));
+      before = now;
+    }
+    if (changes.size() < enough) continue;
+    const double scatter = of_normal * signal::median(changes);
+    for (Feature& feature : block.features)
+      if (feature.kind != FeatureKind::repeats && feature.harmonic <= harmonic)
+        feature.noise_sd = std::max(feature.noise_sd, scatter);
+  }
+}
+
+}  // namespace
+
+std::string_view name_of(Signal signal) {
+  constexpr std::array<std::string_view, signal_count> names{"cavity_kPa", "pump_kPa", "cavity_mL"};
+  return names[static_cast<size_t>(signal)];
+}
+
+SegmentFeatures::SegmentFeatures(const Session& session, const NoiseModel& noise, size_t threads)
+    : session_(session) {
+  for (size_t r = 0; r < session.runs.size(); ++r) {
+    const SessionRun& run = session.runs[r];
+    const auto row_at = [&](double time_s) {
+      return static_cast<size_t>(std::ranges::lower_bound(run.sample_s, time_s - 1e-6) -
+                                 run.sample_s.begin());
+    };
+    for (size_t s = 0; s < run.segments.size(); ++s) {
+      const runfile::Segment& segment = run.segments[s];
+      FeatureBlock block{.run = r,
+                         .segment = s,
+                         .at_rest = segment.waveform == "hold",
+                         .cycles = static_cast<double>(std::max<int64_t>(segment.cycles, 1)),
+                         .period_s = segment.period_s,
+                         .key = {},
+                         .features = {},
+                         .first_row = row_at(segment.start_s),
+                         .basis = {},
+                         .factor = {}};
+      if (row_at(segment.end_s()) <= block.first_row || block.period_s * block.cycles < least_s) continue;
+      for (const Signal signal : {Signal::cavity, Signal::pump}) {
+        if (!run.pressure_kPa.contains(static_cast<Channel>(signal))) continue;
+        block.signal = signal;
+        block.key = key_of(segment, signal);
+        blocks_.push_back(block);
+      }
+    }
+    for (size_t v = 0; v < run.volumes.size(); ++v) {
+      const GatedVolume& volume = run.volumes[v];
+      if (volume.measured.phase_s.size() < 8) continue;
+      size_t s = 0;
+      while (s + 1 < run.segments.size() && volume.trigger_s.front() >= run.segments[s].end_s() - 1e-6)
+        ++s;
+      FeatureBlock block{.run = r,
+                         .segment = s,
+                         .signal = Signal::volume,
+                         .period_s = run.segments[s].period_s,
+                         .key = key_of(run.segments[s], Signal::volume),
+                         .features = {},
+                         .first_row = v,
+                         .basis = {},
+                         .factor = {}};
+      blocks_.push_back(std::move(block));
+    }
+  }
+  parallel_for(blocks_.size(), threads, [&](size_t b) {
+    FeatureBlock& block = blocks_[b];
+    const SessionRun& run = session.runs[block.run];
+    if (block.signal == Signal::volume) {
+      const GatedVolume& volume = run.volumes[block.first_row];
+      block.range = range_of(volume.measured.cavity_mL, 0, volume.measured.cavity_mL.size());
+      set_volume_basis(block, volume);
+      for (Feature& feature : block.features)
+        feature.noise_sd = volume.measured.sigma_mL.front();
+      return;
+    }
+    const auto channel = static_cast<Channel>(block.signal);
+    const std::vector<double>& values = run.pressure_kPa.at(channel);
+    const double end_s = run.segments[block.segment].end_s();
+    const auto last =
+        static_cast<size_t>(std::ranges::lower_bound(run.sample_s, end_s - 1e-6) - run.sample_s.begin());
+    block.range = range_of(values, block.first_row, last);
+    set_basis(block, run, values, last);
+    const double rate_Hz =
+        static_cast<double>(run.sample_s.size() - 1) / (run.sample_s.back() - run.sample_s.front());
+    set_noise(block, noise.channels.at(channel), noise.cycle_sd, rate_Hz);
+  });
+  for (FeatureBlock& block : blocks_) {
+    block.first = count_;
+    count_ += block.features.size();
+  }
+  measured_.resize(count());
+  for (size_t r = 0; r < session.runs.size(); ++r) {
+    const SessionRun& run = session.runs[r];
+    Shown shown;
+    for (const auto& [channel, values] : run.pressure_kPa)
+      (channel == Channel::cavity ? shown.pressures.cavity_kPa : shown.pressures.pump_kPa) = values;
+    for (const GatedVolume& volume : run.volumes)
+      shown.volumes.push_back(volume.measured.cavity_mL);
+    project(r, shown, measured_);
+  }
+  for (FeatureBlock& block : blocks_)
+    raise_noise_of_cycles(block, measured_);
+}
+
+Eigen::VectorXd SegmentFeatures::project(const FeatureBlock& block, const Eigen::VectorXd& values) {
+  const Eigen::VectorXd products = block.basis.transpose() * values;
+  return block.factor.triangularView<Eigen::Lower>().solve(products);
+}
+
+void SegmentFeatures::project(size_t run, const Shown& shown, Eigen::Ref<Eigen::VectorXd> out) const {
+  for (const FeatureBlock& block : blocks_) {
+    if (block.run != run) continue;
+    const std::vector<double>& all = block.signal == Signal::volume
+                                         ? shown.volumes[block.first_row]
+                                         : *pressures(shown.pressures, block.signal);
+    const size_t from = block.signal == Signal::volume ? 0 : block.first_row;
+    Eigen::VectorXd values(block.basis.rows());
+    for (Eigen::Index k = 0; k < values.size(); ++k) {
+      const double value = all[from + static_cast<size_t>(k)];
+      values[k] = std::isfinite(value) ? value : 0.0;
+    }
+    out.segment(static_cast<Eigen::Index>(block.first), static_cast<Eigen::Index>(block.features.size())) =
+        project(block, values);
+  }
+}
+
+}  // namespace diastole::rig

@@ -1,0 +1,83 @@
+#pragma once
+// What a session's segments show, in a few hundred numbers a channel: the level on which effects are weighed.
+//
+// Each window (a segment: cycles of one waveform, a hold, a rest) of each channel gets an orthonormal basis over its
+// samples, and a feature is the product of the channel with one of its functions, in kPa (or mL) times root samples:
+//
+//   repeats   harmonics of the cycle, up to 12 Hz: what every cycle shows; in a window of one cycle cosines of its length
+//   first     low harmonics in the first cycle alone: how the motion sets in
+//   drift     what grows from cycle to cycle in proportion to their number
+//   cycles    level and size of each cycle: steps, softening, events
+//
+// later ones freed of what earlier ones hold. The noise of a feature is that of its frequency (noise_model.hpp) and,
+// where single cycles count, their variation.
+
+#include <Eigen/Dense>
+#include <array>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "estimator/rig_fit/noise_model.hpp"
+
+namespace diastole::rig {
+
+enum class Signal : size_t { cavity, pump, volume };
+inline constexpr size_t signal_count = 3;
+std::string_view name_of(Signal signal);  ///< "cavity_kPa", "pump_kPa", "cavity_mL"
+
+enum class FeatureKind { repeats, first, drift, cycles };
+
+struct Feature {
+  FeatureKind kind = FeatureKind::repeats;
+  double harmonic = 0.0;  ///< of the cycle, or of half the window's length in a window of one
+  double rows = 0.0;      ///< samples in which it lives
+  double noise_sd = 0.0;
+};
+
+/// One window of one channel.
+struct FeatureBlock {
+  size_t run = 0;
+  size_t segment = 0;
+  Signal signal = Signal::cavity;
+  bool at_rest = false;
+  double cycles = 1.0;
+  double period_s = 0.0;
+  double range = 0.0;  ///< highest less lowest that was measured, kPa or mL
+  std::string
+      key;  ///< of its waveform: "sinusoidal 20 mL from 0 mL in 2 s, cavity_kPa"; runs of one rig share it
+  size_t first = 0;  ///< its features are [first, first + features.size()) of all
+  std::vector<Feature> features;
+
+  // Samples [first_row, first_row + basis.rows()); features are factor^-1 (basis' values).
+  size_t first_row = 0;
+  Eigen::MatrixXd basis;
+  Eigen::MatrixXd factor;  ///< lower triangle
+};
+
+/// What the instruments show of one run.
+struct Shown {
+  Prediction pressures;
+  std::vector<std::vector<double>> volumes;  ///< as SessionRun::volumes
+};
+
+class SegmentFeatures {
+ public:
+  SegmentFeatures(const Session& session, const NoiseModel& noise, size_t threads);
+
+  [[nodiscard]] const std::vector<FeatureBlock>& blocks() const { return blocks_; }
+  [[nodiscard]] Eigen::Index count() const { return static_cast<Eigen::Index>(count_); }
+  [[nodiscard]] const Eigen::VectorXd& measured() const { return measured_; }
+  /// Sets the features of one run.
+  void project(size_t run, const Shown& shown, Eigen::Ref<Eigen::VectorXd> out) const;
+  /// The same of a series of one block's rows.
+  [[nodiscard]] static Eigen::VectorXd project(const FeatureBlock& block, const Eigen::VectorXd& values);
+
+ private:
+  const Session& session_;
+  std::vector<FeatureBlock> blocks_;
+  size_t count_ = 0;
+  Eigen::VectorXd measured_;
+};
+
+}  // namespace diastole::rig

@@ -1,0 +1,147 @@
+#include "estimator/rig_fit/session_problem.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "estimator/parallel/parallel_for.hpp"
+#include "estimator/rig/sampled_signal.hpp"
+
+namespace diastole::rig {
+namespace {
+
+constexpr double modulus_sd = 0.7;       ///< of its logarithm: gels of one recipe and tissues alike
+constexpr double stated_modulus = 1.25;  ///< bounds nearer than this factor state a measured modulus
+constexpr double offset_sd_Pa = 300.0;
+constexpr size_t modulus_at = 0, cavity_offset_at = 1, pump_offset_at = 2;
+
+Nuisance modulus_of(const SpecimenFamily& family) {
+  const StudyParameter& modulus = family.modulus();
+  if (modulus.upper < stated_modulus * modulus.lower)
+    return {"modulus",
+            "ln",
+            std::log(modulus.upper / modulus.lower) / std::sqrt(12.0),
+            0.5 * std::log(modulus.upper * modulus.lower),
+            false,
+            nullptr};
+  return {"modulus", "ln", modulus_sd, std::log(family.modulus_start_kPa()), false, nullptr};
+}
+
+}  // namespace
+
+SessionProblem::SessionProblem(const Session& session, const SpecimenFamily& family, size_t threads)
+    : session_(session),
+      family_(family),
+      threads_(threads),
+      noise_(estimate_noise(session)),
+      features_(session, noise_, threads),
+      error_(model_error_of(features_)),
+      measured_(features_.measured()),
+      nuisances_{modulus_of(family),
+                 {"cavity_offset", "Pa", offset_sd_Pa, 0.0, true, nullptr},
+                 {"pump_offset", "Pa", offset_sd_Pa, 0.0, true, nullptr}} {
+  for (const Tolerance& tolerance : all_tolerances())
+    if (!tolerance.needs_neighbours || family.has_neighbours())
+      nuisances_.push_back({std::string(tolerance.name), std::string(tolerance.unit), tolerance.sd, 0.0,
+                            tolerance.sensors_only, &tolerance});
+  // Features are means: with these steps and components they err by less than a twentieth of the model's stated error, where
+  // the line rings most too.
+  simulation_ = {.step_s = noise_.channels.contains(Channel::pump) ? 1.0 / 300.0 : 1.0 / 150.0,
+                 .components = 3};
+  for (const SessionRun& run : session.runs)
+    motions_.push_back(sampled_motion(run.drive, simulation_.step_s));
+}
+
+RigModel SessionProblem::model(const SessionModel& of) const {
+  RigModel model = session_.base;
+  model.curve = family_.plain();
+  const Eigen::VectorXd offsets = tolerances(of.u);
+  const auto value = [&](size_t i) {
+    const double u = i < basic_nuisances ? of.u[static_cast<Eigen::Index>(i)]
+                                         : offsets[static_cast<Eigen::Index>(i - basic_nuisances)];
+    return nuisances_[i].mean + nuisances_[i].sd * u;
+  };
+  model.modulus_kPa = std::exp(value(modulus_at));
+  model.cavity_offset_kPa = 1e-3 * value(cavity_offset_at);
+  model.pump_offset_kPa = 1e-3 * value(pump_offset_at);
+  for (size_t i = 0; i < nuisances_.size(); ++i)
+    if (nuisances_[i].tolerance != nullptr && value(i) != 0.0)
+      nuisances_[i].tolerance->apply(value(i), {family_, {}, true}, model);
+  std::span<const double> values = of.values;
+  for (const ModelTerm& term : of.terms) {
+    const size_t count = term.effect->parameters().size();
+    term.effect->apply(values.first(count), {family_, term.change_points, true}, model);
+    values = values.subspan(count);
+  }
+  return model;
+}
+
+void SessionProblem::set_tolerances(const Eigen::VectorXd& mean, const Eigen::MatrixXd& root) {
+  mean_ = mean;
+  root_ = root;
+  for (size_t i = basic_nuisances; i < nuisances_.size(); ++i)
+    nuisances_[i].sensors_only = false;  // each is a combination of all
+}
+
+Eigen::VectorXd SessionProblem::tolerances(const Eigen::VectorXd& u) const {
+  const auto count = static_cast<Eigen::Index>(nuisances_.size() - basic_nuisances);
+  return root_.size() == 0 ? Eigen::VectorXd(u.tail(count)) : Eigen::VectorXd(mean_ + root_ * u.tail(count));
+}
+
+PlantTrace SessionProblem::plant(const RigModel& model, size_t run) const {
+  return simulate_plant(model, session_.runs[run].drive, motions_[run], simulation_);
+}
+
+Shown SessionProblem::shown_in(size_t run, const RigModel& model, const PlantTrace& plant) const {
+  const SessionRun& recorded = session_.runs[run];
+  Shown shown{observe(model, plant, recorded.drive.place, recorded.sample_s), {}};
+  for (const GatedVolume& volume : recorded.volumes) {
+    shown.volumes.emplace_back();
+    for (const double phase : volume.measured.phase_s) {
+      double sum = 0.0;
+      for (const double trigger : volume.trigger_s)
+        sum += sampled(plant.cavity_mL, (trigger + phase - plant.start_s) / plant.step_s);
+      shown.volumes.back().push_back(model.volume_gain * sum / static_cast<double>(volume.trigger_s.size()));
+    }
+  }
+  return shown;
+}
+
+Shown SessionProblem::shown_in(size_t run, const SessionModel& of) const {
+  const RigModel made = model(of);
+  return shown_in(run, made, plant(made, run));
+}
+
+Eigen::MatrixXd SessionProblem::shown(std::span<const SessionModel> models,
+                                      const std::vector<bool>& same_plant) const {
+  const size_t runs = session_.runs.size();
+  std::vector<RigModel> made;
+  for (const SessionModel& of : models)
+    made.push_back(model(of));
+  std::vector<PlantTrace> first(same_plant.empty() ? 0 : runs);
+  parallel_for(first.size(), threads_, [&](size_t r) { first[r] = plant(made.front(), r); });
+  Eigen::MatrixXd out(features_.count(), static_cast<Eigen::Index>(models.size()));
+  parallel_for(models.size() * runs, threads_, [&](size_t task) {
+    const size_t r = task % runs;
+    const size_t m = task / runs;
+    const bool kept = !same_plant.empty() && (m == 0 || same_plant[m]);
+    const Shown seen = kept ? shown_in(r, made[m], first[r]) : shown_in(r, made[m], plant(made[m], r));
+    features_.project(r, seen, out.col(static_cast<Eigen::Index>(m)));
+  });
+  return out;
+}
+
+Eigen::MatrixXd SessionProblem::nuisance_columns(const SessionModel& at, Eigen::VectorXd& there) const {
+  constexpr double step = 0.5;
+  std::vector<SessionModel> models{at};
+  std::vector<bool> same_plant{true};
+  for (size_t i = 0; i < nuisances_.size(); ++i) {
+    models.push_back(at);
+    models.back().u[static_cast<Eigen::Index>(i)] += step;
+    same_plant.push_back(nuisances_[i].sensors_only);
+  }
+  const Eigen::MatrixXd all = shown(models, same_plant);
+  there = all.col(0);
+  return (all.rightCols(all.cols() - 1).colwise() - there) / step;
+}
+
+}  // namespace diastole::rig

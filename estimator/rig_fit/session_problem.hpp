@@ -1,0 +1,82 @@
+#pragma once
+// A session as a problem in features: what a model with its tolerances and effects would show.
+
+#include <span>
+
+#include "estimator/model/specimen_family.hpp"
+#include "estimator/rig_fit/model_error.hpp"
+#include "estimator/rig_fit/rig_fit.hpp"
+#include "estimator/rig_fit/tolerance.hpp"
+
+namespace diastole::rig {
+
+/// Effects with their values, and the nuisances: modulus, sensors' offsets, tolerances, each N(0, 1) by its prior. Where a
+/// reference has told more of the tolerances, theirs are independent combinations of them.
+struct SessionModel {
+  std::vector<ModelTerm> terms;
+  std::vector<double> values;  ///< of the effects, natural
+  Eigen::VectorXd u;
+};
+
+struct Nuisance {
+  std::string name;
+  std::string unit;
+  double sd = 0.0;
+  double mean = 0.0;  ///< of the value at u = 0
+  bool sensors_only = false;
+  const Tolerance* tolerance = nullptr;  ///< none: the modulus, an offset
+};
+
+/// Those before the tolerances.
+inline constexpr size_t basic_nuisances = 3;
+
+class SessionProblem {
+ public:
+  /// `session` and `family` must outlive it.
+  SessionProblem(const Session& session, const SpecimenFamily& family, size_t threads);
+
+  [[nodiscard]] const Session& session() const { return session_; }
+  [[nodiscard]] const SpecimenFamily& family() const { return family_; }
+  [[nodiscard]] const NoiseModel& noise() const { return noise_; }
+  [[nodiscard]] const SegmentFeatures& features() const { return features_; }
+  [[nodiscard]] ModelError& error() { return error_; }
+  /// What was measured, less what is known of the rig's own misfit.
+  [[nodiscard]] const Eigen::VectorXd& measured() const { return measured_; }
+  void take_off(const Eigen::VectorXd& misfit) { measured_ -= misfit; }
+  /// The tolerances' prior, in sds of their list's: N(mean, root root').
+  void set_tolerances(const Eigen::VectorXd& mean, const Eigen::MatrixXd& root);
+  /// The tolerances of a model, in sds of their list's.
+  [[nodiscard]] Eigen::VectorXd tolerances(const Eigen::VectorXd& u) const;
+  [[nodiscard]] const ModelError& error() const { return error_; }
+  [[nodiscard]] const std::vector<Nuisance>& nuisances() const { return nuisances_; }
+  [[nodiscard]] size_t threads() const { return threads_; }
+
+  [[nodiscard]] RigModel model(const SessionModel& of) const;
+  /// Features that models would show, a column each. Those for which `same_plant` is set differ from the first one
+  /// only in what the sensors show.
+  [[nodiscard]] Eigen::MatrixXd shown(std::span<const SessionModel> models,
+                                      const std::vector<bool>& same_plant = {}) const;
+  /// Derivatives of what is shown by u, by differences of half an sd; `there`: what is shown at it.
+  [[nodiscard]] Eigen::MatrixXd nuisance_columns(const SessionModel& at, Eigen::VectorXd& there) const;
+  /// What the instruments show of one run.
+  [[nodiscard]] Shown shown_in(size_t run, const SessionModel& of) const;
+
+ private:
+  [[nodiscard]] PlantTrace plant(const RigModel& model, size_t run) const;
+  [[nodiscard]] Shown shown_in(size_t run, const RigModel& model, const PlantTrace& plant) const;
+
+  const Session& session_;
+  const SpecimenFamily& family_;
+  size_t threads_;
+  NoiseModel noise_;
+  SegmentFeatures features_;
+  ModelError error_;
+  Eigen::VectorXd measured_;
+  std::vector<Nuisance> nuisances_;
+  Eigen::VectorXd mean_;
+  Eigen::MatrixXd root_;
+  SimulationOptions simulation_;
+  std::vector<DriveTrace> motions_;
+};
+
+}  // namespace diastole::rig

@@ -1,0 +1,133 @@
+#include "estimator/rig_fit/tolerance.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+
+namespace diastole::rig {
+namespace {
+
+/// Volume that a turn of the paper's screw displaces: 10 cm bore, 6.3 turns a centimetre.
+constexpr double turn_mL = std::numbers::pi * 25.0 / 6.3;
+/// Volume at which a specimen's curve is compared with another's.
+constexpr double usual_mL = 36.0;
+
+/// The screw's error once a turn, `sine` or cosine of its angle.
+template <bool sine>
+void add_screw_error(double size_mL, const EffectContext&, RigModel& model) {
+  model.drive.emplace_back([=](DriveTrace& trace, const RunPlace&) {
+    constexpr double per_mL = 2.0 * std::numbers::pi / turn_mL;
+    for (size_t k = 0; k < trace.volume_mL.size(); ++k) {
+      const double angle = per_mL * trace.volume_mL[k];
+      const double flow = trace.flow_mL_per_s[k];
+      const double value = sine ? std::sin(angle) : 1.0 - std::cos(angle);
+      const double slope = per_mL * (sine ? std::cos(angle) : std::sin(angle));
+      const double bend = per_mL * per_mL * (sine ? -std::sin(angle) : std::cos(angle));
+      trace.volume_mL[k] += size_mL * value;
+      trace.flow_mL_per_s[k] += size_mL * slope * flow;
+      trace.acceleration_mL_per_s2[k] +=
+          size_mL * (slope * trace.acceleration_mL_per_s2[k] + bend * flow * flow);
+    }
+  });
+}
+
+/// The specimen's pressure larger by `part` of it at usual_mL, in proportion to the volume to the power.
+template <int power>
+void bend_curve(double part, const EffectContext&, RigModel& model) {
+  std::vector<SpecimenCurve::Point> points = model.curve.points();
+  for (SpecimenCurve::Point& at : points) {
+    const double x = at.volume_mL / usual_mL;
+    const double factor = part * std::pow(x, power);
+    const double slope = part * power * std::pow(x, power - 1) / usual_mL;
+    at.stiffness_kPa_per_mL += factor * at.stiffness_kPa_per_mL + slope * at.pressure_kPa;
+    at.pressure_kPa *= 1.0 + factor;
+  }
+  model.curve = SpecimenCurve(std::move(points));
+}
+
+/// A part of the pressure relaxes in this time, as the effect of that name has it.
+template <int number>
+void relax(double part, const EffectContext& context, RigModel& model) {
+  constexpr std::array times_s{0.1, 1.0, 10.0};
+  static const Effect& effect = *find_effect("viscoelasticity");
+  std::array values{0.0, 0.0, 0.0, times_s[0], times_s[1], times_s[2]};
+  values[number] = part;
+  effect.apply(values, context, model);
+}
+
+constexpr auto times = [](double& value, double logarithm) { value *= std::exp(logarithm); };
+
+constexpr std::array tolerances{
+    // Hose: cut and measured by hand; wall and losses from tables.
+    Tolerance{"hose_length", "ln", 0.005, false, false,
+              [](double x, const EffectContext&, RigModel& m) { times(m.hose.length_m, x); }},
+    Tolerance{"hose_bore", "ln", 0.01, false, false,
+              [](double x, const EffectContext&, RigModel& m) { times(m.hose.bore_mm, x); }},
+    Tolerance{"hose_wave_speed", "ln", 0.1, false, false,
+              [](double x, const EffectContext&, RigModel& m) { times(m.hose.wave_speed_m_s, x); }},
+    Tolerance{"hose_minor_loss", "ln", 0.2, false, false,
+              [](double x, const EffectContext&, RigModel& m) { times(m.hose.loss_coefficient, x); }},
+    Tolerance{"hose_loss_at_cavity", "", 0.2, false, false,
+              [](double x, const EffectContext&, RigModel& m) {
+                m.hose.loss_at_cavity = std::clamp(m.hose.loss_at_cavity + x, 0.0, 1.0);
+              }},
+    Tolerance{"hose_wall_friction", "ln", 0.3, false, false,
+              [](double x, const EffectContext&, RigModel& m) { times(m.hose.viscosity_Pa_s, x); }},
+    Tolerance{"hose_creep", "", 0.03, false, false,
+              [](double x, const EffectContext&, RigModel& m) {
+                m.hose.creep_fraction = std::max(m.hose.creep_fraction + x, 0.0);
+              }},
+    Tolerance{"hose_creep_time", "ln", 0.7, false, false,
+              [](double x, const EffectContext&, RigModel& m) { times(m.hose.creep_time_s, x); }},
+    Tolerance{"hose_wall_loss", "ln", 1.0, false, false,
+              [](double x, const EffectContext&, RigModel& m) { times(m.hose.wall_loss_s, x); }},
+    // Drive.
+    Tolerance{"drive_lag", "s", 0.0015, true, false,
+              [](double x, const EffectContext&, RigModel& m) { m.sample_delay_s += x; }},
+    Tolerance{"drive_stroke", "ln", 0.002, false, false,
+              [](double x, const EffectContext&, RigModel& m) {
+                m.drive.emplace_back([factor = std::exp(x)](DriveTrace& trace, const RunPlace&) {
+                  for (auto* values : {&trace.volume_mL, &trace.flow_mL_per_s, &trace.acceleration_mL_per_s2})
+                    for (double& value : *values)
+                      value *= factor;
+                });
+              }},
+    Tolerance{"drive_compliance", "mL/kPa", 0.0015, false, false,
+              [](double x, const EffectContext&, RigModel& m) {
+                m.drive_compliance_mL_per_kPa = std::max(m.drive_compliance_mL_per_kPa + x, 0.0);
+              }},
+    Tolerance{"screw_sine", "mL", 0.02, false, false, add_screw_error<true>},
+    Tolerance{"screw_cosine", "mL", 0.02, false, false, add_screw_error<false>},
+    // Gas, if there is any: between isothermal and adiabatic.
+    Tolerance{"gas_exponent", "", 0.07, false, false,
+              [](double x, const EffectContext&, RigModel& m) { m.gas_exponent += x; }},
+    // Specimen: no gel is quite neo-Hookean or quite elastic, no mould quite round.
+    Tolerance{"gel_curve", "at 36 mL", 0.01, false, false, bend_curve<1>},
+    Tolerance{"gel_curvature", "at 36 mL", 0.005, false, false, bend_curve<2>},
+    Tolerance{"gel_relaxation_fast", "", 0.015, false, false, relax<0>},
+    Tolerance{"gel_relaxation_middle", "", 0.015, false, false, relax<1>},
+    Tolerance{"gel_relaxation_slow", "", 0.015, false, false, relax<2>},
+    Tolerance{"inner_radius", "", 0.005, false, true,
+              [](double x, const EffectContext& context, RigModel& m) {
+                context.change_specimen(m, Difference::inner_radius, std::clamp(x, -0.1, 0.1));
+              }},
+    // Instruments.
+    Tolerance{"catheter_resonance", "ln", 0.1, true, false,
+              [](double x, const EffectContext&, RigModel& m) { times(m.catheter.resonance_Hz, x); }},
+    Tolerance{"catheter_damping", "ln", 0.15, true, false,
+              [](double x, const EffectContext&, RigModel& m) { times(m.catheter.damping, x); }},
+    Tolerance{"cavity_curvature", "at 20 kPa", 0.002, true, false,
+              [](double x, const EffectContext&, RigModel& m) {
+                m.cavity_sensor.emplace_back(
+                    [=](double p, double, const RunPlace&) { return p * (1.0 + x * p / 20.0); });
+              }},
+    Tolerance{"volume_gain", "ln", 0.015, true, false,
+              [](double x, const EffectContext&, RigModel& m) { times(m.volume_gain, x); }},
+};
+
+}  // namespace
+
+std::span<const Tolerance> all_tolerances() { return tolerances; }
+
+}  // namespace diastole::rig

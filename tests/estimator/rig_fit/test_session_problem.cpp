@@ -1,0 +1,86 @@
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <random>
+
+#include "estimator/rig_fit/base_fit.hpp"
+#include "tests/estimator/rig_fit/simulated_session.hpp"
+
+namespace diastole::rig {
+namespace {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+
+TEST(SegmentFeatures, OfNoiseAloneAreAsLargeAsTheirNoise) {
+  const SpecimenFamily family = gel_family();
+  const Session quiet = simulated_session(family, {.noise_kPa = 1e-6});
+  const Session loud = simulated_session(family, {.noise_kPa = 0.02});
+  const SegmentFeatures without(quiet, estimate_noise(quiet), 2);
+  const SegmentFeatures with(loud, estimate_noise(loud), 2);
+  ASSERT_EQ(without.count(), with.count());
+  for (const Signal signal : {Signal::cavity, Signal::pump}) {
+    double square = 0.0;
+    double count = 0.0;
+    for (const FeatureBlock& block : with.blocks()) {
+      if (block.signal != signal) continue;
+      for (size_t i = 0; i < block.features.size(); ++i) {
+        const auto row = static_cast<Index>(block.first + i);
+        square += std::pow((with.measured()[row] - without.measured()[row]) / block.features[i].noise_sd, 2);
+        count += 1.0;
+      }
+    }
+    EXPECT_GT(count, 100.0);
+    EXPECT_NEAR(square / count, 1.0, 0.35) << name_of(signal);
+  }
+}
+
+TEST(SegmentFeatures, KeepTheSquaresOfWhatTheirFunctionsHold) {
+  const SpecimenFamily family = gel_family();
+  const Session session = simulated_session(family, {});
+  const SegmentFeatures features(session, estimate_noise(session), 1);
+  const FeatureBlock& block = features.blocks().front();
+  VectorXd wave(block.basis.rows());
+  for (Index k = 0; k < wave.size(); ++k)
+    wave[k] = 3.0 + std::cos(2.0 * std::numbers::pi * block.cycles * static_cast<double>(k) /
+                             static_cast<double>(wave.size()));
+  EXPECT_NEAR(SegmentFeatures::project(block, wave).squaredNorm() / wave.squaredNorm(), 1.0, 1e-3);
+}
+
+/// Features that are noise and a model's error of this share, in both groups of the cavity.
+VectorXd errors_of(const ModelError& error, double share, unsigned seed) {
+  std::mt19937 generator(seed);
+  std::normal_distribution<double> normal;
+  VectorXd z(error.noise.size());
+  for (Index i = 0; i < z.size(); ++i)
+    z[i] = std::sqrt(error.noise[i] + share * share * error.unit[i]) * normal(generator);
+  return z;
+}
+
+TEST(ModelError, ItsShareIsFoundWithinItsPrior) {
+  const SpecimenFamily family = gel_family();
+  const Session session = simulated_session(family, {});
+  const ModelError error = model_error_of(SegmentFeatures(session, estimate_noise(session), 1));
+  const Eigen::MatrixXd none(error.noise.size(), 0);
+  for (const double share : {0.001, 0.005, 0.02}) {
+    const EvidenceFit fit = fit_with_shares(errors_of(error, share, 7), none, error, error.prior.share);
+    EXPECT_TRUE(fit.settled);
+    EXPECT_NEAR(std::log(fit.shares[0] / share), 0.0, 0.3) << share;
+    EXPECT_GE(fit.log_evidence,
+              fit_linear(errors_of(error, share, 7), none, error, error.prior.share).log_evidence);
+  }
+}
+
+TEST(SessionProblem, FindsTheModulusOfItsOwnModel) {
+  const SpecimenFamily family = gel_family();
+  const Session session = simulated_session(family, {});
+  const SessionProblem problem(session, family, 2);
+  const LinearisedModel rig = fitted_rig(problem, declared_rig(problem));
+  EXPECT_NEAR(problem.model(rig.at).modulus_kPa, 8.0, 0.1);
+  const EvidenceFit fit =
+      fit_with_shares(rig.target(problem), rig.columns, problem.error(), problem.error().prior.share);
+  EXPECT_LT(fit.surprise(problem.error().prior)[0], 1.0);
+}
+
+}  // namespace
+}  // namespace diastole::rig
