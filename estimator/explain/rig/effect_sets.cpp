@@ -131,7 +131,11 @@ class SetsSearch {
   void fit_best_again(size_t effects);
   [[nodiscard]] bool is_fitted(const std::vector<const Effect*>& effects) const;
   [[nodiscard]] std::vector<Promise> promises(const rig::EvidenceFit& under, bool pairs) const;
-  void sort_sets() { std::ranges::sort(sets_, std::greater(), &EffectSet::log_posterior); }
+  /// The most probable first; what has no solution is no set.
+  void sort_sets() {
+    std::erase_if(sets_, [](const EffectSet& set) { return !std::isfinite(set.log_posterior); });
+    std::ranges::sort(sets_, std::greater(), &EffectSet::log_posterior);
+  }
 
   const rig::SessionProblem& problem_;
   const SetSearchOptions& options_;

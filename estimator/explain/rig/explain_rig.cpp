@@ -134,6 +134,14 @@ Explanation explain_rig(const Study& study, const ExplainOptions& options) {
   SetSearchOptions searching{.progress = report};
   take_given(study, session, searching);
   const SetSearch search = search_sets(problem, searching);
+  if (std::ranges::none_of(search.sets,
+                           [&](const EffectSet& set) { return set.model.terms.size() == search.given; })) {
+    throw InputError(
+        {.file = study.file.string(),
+         .place = "data.runs",
+         .problem = "the rig's model has no solution for these runs",
+         .remedy = "Check the runs' /rig and the specimen: `diastole inspect RUN` shows what was recorded."});
+  }
 
   options.report("judging");
   const bool from_reference = !study.data.reference.empty();

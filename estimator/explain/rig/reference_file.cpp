@@ -125,7 +125,7 @@ rig::Reference reference_of(const Study& study, size_t threads,
                         .place = "data.reference",
                         .problem = fmt::format("names {} beside other references", file.filename().string()),
                         .remedy = "Name one file made by `diastole reference`, or studies only."});
-    if (std::filesystem::equivalent(file, study.file))
+    if (std::error_code missing; std::filesystem::equivalent(file, study.file, missing))
       throw InputError({.file = study.file.string(),
                         .place = "data.reference",
                         .problem = "names the study itself",
