@@ -77,6 +77,10 @@ SessionRun session_run(RecordedRun&& run, const std::string& name) {
   read.drive.place.atmosphere_kPa = attribute(run, "atmospheric_kPa", 101.325);
   read.volumes = volumes_of(run);
   read.segments = run.segments;
+  for (const runfile::Segment& segment : run.segments)
+    if (segment.cycles > 1)
+      read.drive.repetitions.push_back(
+          {segment.start_s, segment.period_s, static_cast<size_t>(segment.cycles)});
   for (const Channel channel : {Channel::cavity, Channel::pump}) {
     const auto samples = run.pressure.channels.find(name_of(channel));
     if (samples != run.pressure.channels.end()) read.pressure_kPa[channel] = samples->second;

@@ -1,12 +1,16 @@
 #include "estimator/model/specimen_family.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <array>
+#include <boost/crc.hpp>
 #include <utility>
 
 #include "estimator/fe/pressure_volume.hpp"
+#include "estimator/io/cache.hpp"
+#include "estimator/io/record_file.hpp"
 #include "estimator/model/study_model.hpp"
 #include "protocol/contract/input_error.hpp"
 
@@ -32,6 +36,60 @@ void follow(Study study, double to_mL, size_t steps, std::vector<SpecimenCurve::
   }
   for (const PressureVolumePoint& point : curve.points)
     points.push_back({point.volume_change_mL, point.pressure_kPa, point.stiffness_kPa_per_mL});
+}
+
+/// What a cylinder's curve depends on; another version of the equations makes kept ones old. Other specimens' curves are
+/// not kept.
+std::optional<std::string> key_of(const Study& study, const SpecimenResolution& resolution, size_t stride) {
+  constexpr int version = 1;
+  const auto* annulus = std::get_if<AnnulusSpecimen>(&study.specimen);
+  const bool is_plain = !study.chamber && !study.compression.bulk_modulus_kPa &&
+                        study.compression.volume_stiffness_kPa == 0.0 && study.refine == std::array<int, 3>{};
+  if (annulus == nullptr || !is_plain) return {};
+  std::string key =
+      fmt::format("{} {} {} {} {} {}", version, annulus->inner_radius_mm, annulus->outer_radius_mm,
+                  annulus->height_mm, fmt::join(annulus->mesh, "x"), annulus->ends);
+  if (const auto& springs = annulus->end_springs)
+    key += fmt::format(" {} {}", springs->normal_kPa_per_mm, springs->tangential_kPa_per_mm);
+  key += " " + study.law.name;
+  for (const StudyParameter& parameter : study.law.parameters)
+    key += fmt::format(" {} {}", parameter.name, parameter.start);
+  return key + fmt::format(" {} {} {} {}", resolution.spacing_mL, resolution.points_inflated,
+                           resolution.points_emptied, stride);
+}
+
+constexpr RecordFormat kept_format{"diastole-curve", "a specimen's curve",
+                                   "Delete it: it is computed again."};
+
+std::string file_of(const std::string& key) {
+  boost::crc_32_type crc;
+  crc.process_bytes(key.data(), key.size());
+  return fmt::format("curve-{:08x}.json", crc.checksum());
+}
+
+std::optional<SpecimenCurve> kept_curve(const std::string& key) {
+  const auto text = read_cached(file_of(key));
+  if (!text) return {};
+  std::vector<SpecimenCurve::Point> points;
+  try {
+    kept_format.read(*text, file_of(key), [&](const Json& json) {
+      if (json.at("key").get<std::string>() != key) return;
+      for (const auto& [volume_mL, pressure_kPa, stiffness] :
+           json.at("points").get<std::vector<std::array<double, 3>>>())
+        points.push_back({volume_mL, pressure_kPa, stiffness});
+    });
+  } catch (const InputError&) {  // not whole
+    return {};
+  }
+  if (points.size() < 2) return {};
+  return SpecimenCurve(std::move(points));
+}
+
+void keep_curve(const std::string& key, const SpecimenCurve& curve) {
+  Json points = Json::array();
+  for (const SpecimenCurve::Point& at : curve.points())
+    points.push_back({at.volume_mL, at.pressure_kPa, at.stiffness_kPa_per_mL});
+  write_cached(file_of(key), kept_format.document({{"key", key}, {"points", points}}).dump() + "\n");
 }
 
 bool is_modulus(const StudyParameter& parameter) { return parameter.name.ends_with("_kPa"); }
@@ -90,9 +148,15 @@ const SpecimenCurve& SpecimenFamily::computed(const std::string& name, const Stu
   if (const SpecimenCurve* curve = kept()) return *curve;
   const std::scoped_lock alone(solving_);
   if (const SpecimenCurve* curve = kept()) return *curve;  // another thread was faster
-  SpecimenCurve curve = compute(study, stride);
+  const std::optional<std::string> key = key_of(study, resolution_, stride);
+  std::optional<SpecimenCurve> curve;
+  if (key) curve = kept_curve(*key);
+  if (!curve) {
+    curve = compute(study, stride);
+    if (key) keep_curve(*key, *curve);
+  }
   const std::scoped_lock lock(keeping_);
-  return curves_.emplace(name, std::move(curve)).first->second;
+  return curves_.emplace(name, *std::move(curve)).first->second;
 }
 
 Study SpecimenFamily::on(const std::array<int, 3>& mesh) const {

@@ -1,6 +1,7 @@
 #pragma once
 // The pressure-volume curves of a study's specimen and of its neighbours: what finite elasticity says about another
-// inner radius, a stiffening law, ends that slip. All at a modulus of 1 kPa, computed once each and kept.
+// inner radius, a stiffening law, ends that slip. All at a modulus of 1 kPa, computed once each and kept, a cylinder's in
+// the user's cache too (estimator/io/cache.hpp).
 //
 // A cylinder's plain curve comes from a coarse mesh at all volumes and from a fine one at every fourth: their difference
 // is so smooth that the curve is the fine mesh's within 1e-6 of its pressure. Neighbours differ from it by what they

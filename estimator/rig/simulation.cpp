@@ -30,6 +30,9 @@ constexpr double least_leak = 1e-7;
 
 /// Of the drive, mL/kPa: less is rigid, a thousandth of what a hose yields.
 constexpr double least_compliance = 1e-5;
+/// Its resistance over its stiffness: screw and seal rub, so that it does not ring with the fluid's end at a hundred hertz,
+/// which samples would show as something slow.
+constexpr double drive_damping_s = 2e-3;
 
 /// The fluid-filled catheter with its transducer, exactly integrated for pressure that is linear between samples; from rest
 /// at the first pressure.
@@ -56,6 +59,40 @@ std::vector<double> through_catheter(const Catheter& catheter, std::span<const d
   return shown;
 }
 
+/// Cycles of the drive that are alike, in steps: from each k in [first, last) to k + length it repeats itself.
+struct RepeatedSteps {
+  size_t first = 0, last = 0, length = 0;
+};
+
+std::vector<RepeatedSteps> repeated_steps(const RunDrive& run, const DriveTrace& drive) {
+  // Far below what moves a pressure by a pascal.
+  constexpr double same_mL = 1e-6, same_mL_s = 1e-4, same_mL_s2 = 1e-2, whole = 1e-3;
+  std::vector<RepeatedSteps> list;
+  for (const Repetition& repetition : run.repetitions) {
+    const double steps = repetition.period_s / drive.step_s;
+    const auto length = static_cast<size_t>(std::lround(steps));
+    const double cycles = static_cast<double>(repetition.cycles);
+    if (length == 0 || std::abs(steps - std::round(steps)) * cycles > whole) continue;
+    const double start = std::max((repetition.start_s - drive.start_s) / drive.step_s, 0.0);
+    auto first = static_cast<size_t>(std::ceil(start));
+    const size_t end = std::min(first + length * (repetition.cycles - 1), drive.volume_mL.size());
+    const auto repeats = [&](size_t k) {
+      const auto alike = [&](const std::vector<double>& values, double same) {
+        return k + length < values.size() && std::abs(values[k + length] - values[k]) <= same;
+      };
+      return alike(drive.volume_mL, same_mL) && alike(drive.flow_mL_per_s, same_mL_s) &&
+             alike(drive.acceleration_mL_per_s2, same_mL_s2);
+    };
+    while (first < end && !repeats(first))  // how the motion sets in is spread over its first steps
+      ++first;
+    size_t last = first;
+    while (last < end && repeats(last))
+      ++last;
+    if (last > first + length) list.push_back({first, last, length});
+  }
+  return list;
+}
+
 /// The loop over time; one run.
 class Plant {
  public:
@@ -67,10 +104,9 @@ class Plant {
         line_(model.hose, {.step_s = options.step_s,
                            .components = options.components,
                            .pump_stiffness = pump_stiffness(),
-                           .pump_resistance = !pump_stiffness() && model.pump_leak_mL_s_kPa > least_leak
-                                                  ? std::optional(1.0 / model.pump_leak_mL_s_kPa)
-                                                  : std::nullopt}),
-        cavity_(model, run.place) {}
+                           .pump_resistance = pump_resistance()}),
+        cavity_(model, run.place),
+        repeated_(repeated_steps(run, drive_)) {}
 
   PlantTrace run();
   /// By how much a loss at the ends overshoots in a step if the flow were as fast as the piston makes it. Such a load is
@@ -100,11 +136,16 @@ class Plant {
       return 1.0 / model_.drive_compliance_mL_per_kPa;
     return {};
   }
+  [[nodiscard]] std::optional<double> pump_resistance() const {
+    if (!pump_stiffness() && model_.pump_leak_mL_s_kPa > least_leak) return 1.0 / model_.pump_leak_mL_s_kPa;
+    if (pump_stiffness() && !gas_.present()) return *pump_stiffness() * drive_damping_s;
+    return {};
+  }
   [[nodiscard]] double loss_at_pump_kPa() const {
     return (1.0 - model_.hose.loss_at_cavity) * turning_loss_kPa(line_.entering_mL_per_s());
   }
   [[nodiscard]] EndLoads loads(size_t k, double acceleration) {
-    cavity_kPa_ = cavity_.look(left_mL(k), drive_.time_s(k));
+    cavity_kPa_ = cavity_.look(left_mL(k), drive_.time_s(k) - copied_s_);
     EndLoads now{
         .piston_acceleration = acceleration, .pump_kPa = -loss_at_pump_kPa(), .cavity_kPa = cavity_kPa_};
     now.cavity_kPa += model_.hose.loss_at_cavity * turning_loss_kPa(line_.leaving_mL_per_s());
@@ -130,15 +171,48 @@ class Plant {
     trace.cavity_mL[k] = cavity_.specimen_mL();
   }
 
+  /// The step from which to go on as from k: cycles between are filled in.
+  [[nodiscard]] size_t beyond_repeated(PlantTrace& trace, size_t k);
+
   const RigModel& model_;
   DriveTrace drive_;
   GasPocket gas_;
   HoseLine line_;
   Cavity cavity_;
+  std::vector<RepeatedSteps> repeated_;
+  double copied_s_ = 0.0;  ///< by which the cavity's time is behind
   double leaked_mL_ = 0.0;
   double before_kPa_ = 0.0;
   double cavity_kPa_ = 0.0;
 };
+
+size_t Plant::beyond_repeated(PlantTrace& trace, size_t k) {
+  constexpr double adding_up =
+      1e-6;  // of the range, in all cycles that are not simulated: searches need smooth models
+  const auto at = std::ranges::find_if(repeated_, [&](const RepeatedSteps& steps) {
+    return k >= steps.first + 2 * steps.length && k < steps.last;
+  });
+  if (at == repeated_.end() || (k - at->first) % at->length != 0) return k;
+  const size_t length = at->length;
+  const size_t cycles = (at->last - k) / length;
+  if (cycles == 0) return k;
+  const auto has_settled = [&](const std::vector<double>& values) {
+    const auto now = values.begin() + static_cast<std::ptrdiff_t>(k);
+    const auto cycle = static_cast<std::ptrdiff_t>(length);
+    const auto [low, high] = std::minmax_element(now - cycle, now + 1);
+    const double most = adding_up * (*high - *low) / static_cast<double>(cycles);
+    return std::equal(now - cycle, now + 1, now - 2 * cycle,
+                      [&](double a, double b) { return std::abs(a - b) <= most; });
+  };
+  if (!has_settled(trace.cavity_kPa) || !has_settled(trace.pump_kPa) || !has_settled(trace.cavity_mL))
+    return k;
+  const size_t beyond = k + cycles * length;
+  for (std::vector<double>* values : {&trace.cavity_kPa, &trace.pump_kPa, &trace.cavity_mL})
+    for (size_t j = k + 1; j <= beyond; ++j)
+      (*values)[j] = (*values)[j - length];
+  copied_s_ += static_cast<double>(cycles * length) * drive_.step_s;
+  return beyond;
+}
 
 PlantTrace Plant::run() {
   const size_t count = drive_.volume_mL.size();
@@ -150,6 +224,7 @@ PlantTrace Plant::run() {
     line_.settle(now);
     cavity_.pass();
     record(trace, k, cavity_kPa_);
+    k = beyond_repeated(trace, k);
     if (k + 1 == count) break;
     leak_beside_gas(trace.pump_kPa[k]);
     // The flow's change over the step is met exactly, whatever the acceleration does within it.
@@ -176,6 +251,13 @@ void DriveTrace::differentiate() {
     flow_mL_per_s[k] = slope(volume_mL, k);
   for (size_t k = 0; k < count; ++k)
     acceleration_mL_per_s2[k] = slope(flow_mL_per_s, k);
+}
+
+double dividing_step(const RunDrive& run, double about_s) {
+  const auto length = [](const Repetition& one) { return one.period_s * static_cast<double>(one.cycles); };
+  const auto longest = std::ranges::max_element(run.repetitions, {}, length);
+  if (longest == run.repetitions.end() || !(longest->period_s > about_s)) return about_s;
+  return longest->period_s / std::ceil(longest->period_s / about_s - 1e-6);
 }
 
 DriveTrace sampled_motion(const RunDrive& run, double step_s) {

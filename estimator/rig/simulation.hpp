@@ -29,17 +29,31 @@ struct Prediction {
   std::vector<double> pump_kPa;
 };
 
+/// Cycles that follow each other with one motion.
+struct Repetition {
+  double start_s = 0.0;
+  double period_s = 0.0;
+  size_t cycles = 0;
+};
+
 /// What a run asks of the simulation.
 struct RunDrive {
   Motion motion;
   RunPlace place;
+  std::vector<Repetition> repetitions =
+      {};  ///< where cycles need not be simulated that are like the one before
   double start_s = 0.0;
   double end_s = 0.0;
 };
 
+/// A step near `about_s` that divides the cycles of the run's longest repetition.
+double dividing_step(const RunDrive& run, double about_s);
+
 /// The run's motion sampled at these steps: the same for all models.
 DriveTrace sampled_motion(const RunDrive& run, double step_s);
 
+/// Cycles of a repetition whose period is a whole number of steps are copied once one is like the one before within what
+/// could add up to 1e-6 of the pressures' range by the repetition's end.
 PlantTrace simulate_plant(const RigModel& model, const RunDrive& run, const SimulationOptions& options = {});
 /// The same with `sampled_motion(run, options.step_s)` at hand.
 PlantTrace simulate_plant(const RigModel& model, const RunDrive& run, const DriveTrace& motion,

@@ -16,8 +16,11 @@ LinearisedModel declared_rig(const SessionProblem& problem, SessionModel with) {
     const EvidenceFit fit = fit_with_shares(declared.target(problem), declared.columns, problem.error(),
                                             problem.error().prior.share);
     const double moved = std::abs(fit.u[0] - declared.at.u[0]) * problem.nuisances()[0].sd;
-    if (round > 0 && moved < small) break;
     declared.at.u.head(basic_nuisances) = fit.u.head(basic_nuisances);
+    if (moved < small) {
+      declared.there = problem.shown(std::span(&declared.at, 1));
+      break;
+    }
   }
   return declared;
 }

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
+#include <limits>
 #include <numbers>
 
 #include "estimator/parallel/parallel_for.hpp"
@@ -17,7 +18,9 @@ constexpr double highest_Hz = 12.0;  ///< beyond, no pressure of a stroke has an
 constexpr size_t most_harmonics = 30;
 constexpr size_t first_harmonics = 8;
 constexpr size_t most_cosines = 120;
+constexpr double most_groups = 48.0;  ///< of cycles whose levels are told apart
 constexpr double least_s = 0.5;       ///< shorter windows show nothing
+constexpr double forever = std::numeric_limits<double>::infinity();
 constexpr double independent = 1e-4;  ///< of a function's square that earlier ones do not hold
 
 const std::vector<double>* pressures(const Prediction& shown, Signal signal) {
@@ -33,18 +36,33 @@ double spectral_sd(const ChannelNoise& noise, double frequency_Hz, double rate_H
   return noise.innovation_kPa / std::abs(response);
 }
 
+double product(const FeatureBlock::Function& f, const FeatureBlock::Function& g) {
+  const Eigen::Index from = std::max(f.first, g.first);
+  const Eigen::Index to = std::min(f.first + f.values.size(), g.first + g.values.size());
+  if (to <= from) return 0.0;
+  return f.values.segment(from - f.first, to - from).dot(g.values.segment(from - g.first, to - from));
+}
+
 /// Functions over a window's rows, one after the other.
 class BasisMaker {
  public:
   BasisMaker(FeatureBlock& block, std::vector<double> turns, std::vector<bool> missing)
-      : block_(block), turns_(std::move(turns)), missing_(std::move(missing)) {}
+      : block_(block), turns_(std::move(turns)), missing_(std::move(missing)) {
+    block_.rows = static_cast<Eigen::Index>(turns_.size());
+  }
 
+  /// Of the turns; 0 but for those in [from, to).
   template <class Function>
-  void add(FeatureKind kind, double harmonic, double rows, const Function& function) {
-    std::vector<double> column(turns_.size());
-    for (size_t k = 0; k < turns_.size(); ++k)
-      column[k] = missing_[k] ? 0.0 : function(turns_[k]);
-    columns_.push_back(std::move(column));
+  void add(FeatureKind kind, double harmonic, double rows, const Function& function, double from = -forever,
+           double to = forever) {
+    const auto first = std::ranges::lower_bound(turns_, from) - turns_.begin();
+    const auto last = std::ranges::lower_bound(turns_, to) - turns_.begin();
+    Eigen::VectorXd values(last - first);
+    for (Eigen::Index k = 0; k < values.size(); ++k) {
+      const auto row = static_cast<size_t>(first + k);
+      values[k] = missing_[row] ? 0.0 : function(turns_[row]);
+    }
+    block_.basis.push_back({first, std::move(values)});
     block_.features.push_back({kind, harmonic, rows, 0.0});
   }
   void finish();
@@ -52,49 +70,45 @@ class BasisMaker {
 
  private:
   FeatureBlock& block_;
-  std::vector<double> turns_;  ///< cycles since the window's start, at each row
+  std::vector<double> turns_;  ///< cycles since the window's start, at each row; they increase
   std::vector<bool> missing_;
-  std::vector<std::vector<double>> columns_;
 };
 
 void BasisMaker::finish() {
-  const auto rows = static_cast<Eigen::Index>(turns_.size());
-  Eigen::MatrixXd all(rows, static_cast<Eigen::Index>(columns_.size()));
-  for (Eigen::Index j = 0; j < all.cols(); ++j)
-    all.col(j) = Eigen::Map<const Eigen::VectorXd>(columns_[static_cast<size_t>(j)].data(), rows);
   // Cholesky's rows one by one, leaving out what depends on the ones before.
-  const Eigen::MatrixXd products = all.transpose() * all;
-  std::vector<Eigen::Index> kept;
+  std::vector<FeatureBlock::Function> kept;
   std::vector<Feature> features;
-  Eigen::MatrixXd factor = Eigen::MatrixXd::Zero(all.cols(), all.cols());
-  for (Eigen::Index j = 0; j < all.cols(); ++j) {
+  const auto all = static_cast<Eigen::Index>(block_.basis.size());
+  Eigen::MatrixXd factor = Eigen::MatrixXd::Zero(all, all);
+  for (size_t j = 0; j < block_.basis.size(); ++j) {
+    FeatureBlock::Function& next = block_.basis[j];
     const auto row = static_cast<Eigen::Index>(kept.size());
     Eigen::VectorXd part(row);
-    for (Eigen::Index i = 0; i < row; ++i) {
-      const Eigen::Index other = kept[static_cast<size_t>(i)];
-      part[i] = (products(j, other) - factor.row(i).head(i).dot(part.head(i))) / factor(i, i);
-    }
-    const double left = products(j, j) - part.squaredNorm();
-    if (!(left > independent * products(j, j)) || products(j, j) == 0.0) continue;
+    for (Eigen::Index i = 0; i < row; ++i)
+      part[i] = (product(next, kept[static_cast<size_t>(i)]) - factor.row(i).head(i).dot(part.head(i))) /
+                factor(i, i);
+    const double square = next.values.squaredNorm();
+    const double left = square - part.squaredNorm();
+    if (!(left > independent * square)) continue;
     factor.row(row).head(row) = part.transpose();
     factor(row, row) = std::sqrt(left);
-    kept.push_back(j);
-    features.push_back(block_.features[static_cast<size_t>(j)]);
+    kept.push_back(std::move(next));
+    features.push_back(block_.features[j]);
   }
   const auto count = static_cast<Eigen::Index>(kept.size());
   block_.features = std::move(features);
   block_.factor = factor.topLeftCorner(count, count);
-  block_.basis.resize(rows, count);
-  for (Eigen::Index j = 0; j < count; ++j)
-    block_.basis.col(j) = all.col(kept[static_cast<size_t>(j)]);
+  block_.basis = std::move(kept);
 }
 
-void add_harmonics(BasisMaker& basis, FeatureKind kind, size_t count, double rows, const auto& weight) {
+void add_harmonics(BasisMaker& basis, FeatureKind kind, size_t count, double rows, const auto& weight,
+                   double to = forever) {
   for (size_t h = 0; h <= count; ++h) {
     const double rate = 2.0 * std::numbers::pi * static_cast<double>(h);
-    basis.add(kind, static_cast<double>(h), rows, [&](double x) { return weight(x) * std::cos(rate * x); });
-    if (h > 0)
-      basis.add(kind, static_cast<double>(h), rows, [&](double x) { return weight(x) * std::sin(rate * x); });
+    const auto cosine = [&](double x) { return weight(x) * std::cos(rate * x); };
+    const auto sine = [&](double x) { return weight(x) * std::sin(rate * x); };
+    basis.add(kind, static_cast<double>(h), rows, cosine, -forever, to);
+    if (h > 0) basis.add(kind, static_cast<double>(h), rows, sine, -forever, to);
   }
 }
 
@@ -102,15 +116,17 @@ void add_harmonics(BasisMaker& basis, FeatureKind kind, size_t count, double row
 void add_cycles(BasisMaker& basis, double cycles, double period_s) {
   const auto harmonics = std::min(most_harmonics, static_cast<size_t>(highest_Hz * period_s));
   const double all = basis.rows();
-  add_harmonics(basis, FeatureKind::repeats, harmonics, all, [](double) { return 1.0; });
-  add_harmonics(basis, FeatureKind::first, std::min(first_harmonics, harmonics), all / cycles,
-                [](double x) { return x < 1.0 ? 1.0 : 0.0; });
+  const auto alike = [](double) { return 1.0; };
+  add_harmonics(basis, FeatureKind::repeats, harmonics, all, alike);
+  add_harmonics(basis, FeatureKind::first, std::min(first_harmonics, harmonics), all / cycles, alike, 1.0);
   if (cycles < 3.0) return;
   add_harmonics(basis, FeatureKind::drift, 2, all, [&](double x) { return (x - 0.5 * cycles) / cycles; });
-  for (double c = 1.0; c < cycles; ++c)
+  const double together = std::ceil(cycles / most_groups);
+  for (double c = together > 1.0 ? 0.0 : 1.0; c < cycles; c += together)
     for (const double rate : {0.0, 2.0 * std::numbers::pi})
-      basis.add(FeatureKind::cycles, rate == 0.0 ? 0.0 : 1.0, all / cycles,
-                [&](double x) { return x >= c && x < c + 1.0 ? std::cos(rate * x) : 0.0; });
+      basis.add(
+          FeatureKind::cycles, rate == 0.0 ? 0.0 : 1.0, all / cycles * std::min(together, cycles - c),
+          [&](double x) { return std::cos(rate * x); }, c, c + together);
 }
 
 void add_cosines(BasisMaker& basis, double length_s) {
@@ -227,6 +243,7 @@ SegmentFeatures::SegmentFeatures(const Session& session, const NoiseModel& noise
                          .key = {},
                          .features = {},
                          .first_row = row_at(segment.start_s),
+                         .rows = 0,
                          .basis = {},
                          .factor = {}};
       if (row_at(segment.end_s()) <= block.first_row || block.period_s * block.cycles < least_s) continue;
@@ -250,6 +267,7 @@ SegmentFeatures::SegmentFeatures(const Session& session, const NoiseModel& noise
                          .key = key_of(run.segments[s], Signal::volume),
                          .features = {},
                          .first_row = v,
+                         .rows = 0,
                          .basis = {},
                          .factor = {}};
       blocks_.push_back(std::move(block));
@@ -296,8 +314,22 @@ SegmentFeatures::SegmentFeatures(const Session& session, const NoiseModel& noise
 }
 
 Eigen::VectorXd SegmentFeatures::project(const FeatureBlock& block, const Eigen::VectorXd& values) {
-  const Eigen::VectorXd products = block.basis.transpose() * values;
+  Eigen::VectorXd products(static_cast<Eigen::Index>(block.basis.size()));
+  for (size_t j = 0; j < block.basis.size(); ++j) {
+    const FeatureBlock::Function& function = block.basis[j];
+    products[static_cast<Eigen::Index>(j)] =
+        function.values.dot(values.segment(function.first, function.values.size()));
+  }
   return block.factor.triangularView<Eigen::Lower>().solve(products);
+}
+
+Eigen::VectorXd SegmentFeatures::series(const FeatureBlock& block, const Eigen::VectorXd& features) {
+  const Eigen::VectorXd sizes = block.factor.transpose().triangularView<Eigen::Upper>().solve(features);
+  Eigen::VectorXd values = Eigen::VectorXd::Zero(block.rows);
+  for (size_t j = 0; j < block.basis.size(); ++j)
+    values.segment(block.basis[j].first, block.basis[j].values.size()) +=
+        sizes[static_cast<Eigen::Index>(j)] * block.basis[j].values;
+  return values;
 }
 
 void SegmentFeatures::project(size_t run, const Shown& shown, Eigen::Ref<Eigen::VectorXd> out) const {
@@ -307,7 +339,7 @@ void SegmentFeatures::project(size_t run, const Shown& shown, Eigen::Ref<Eigen::
                                          ? shown.volumes[block.first_row]
                                          : *pressures(shown.pressures, block.signal);
     const size_t from = block.signal == Signal::volume ? 0 : block.first_row;
-    Eigen::VectorXd values(block.basis.rows());
+    Eigen::VectorXd values(block.rows);
     for (Eigen::Index k = 0; k < values.size(); ++k) {
       const double value = all[from + static_cast<size_t>(k)];
       values[k] = std::isfinite(value) ? value : 0.0;

@@ -7,7 +7,7 @@
 //   repeats   harmonics of the cycle, up to 12 Hz: what every cycle shows; in a window of one cycle cosines of its length
 //   first     low harmonics in the first cycle alone: how the motion sets in
 //   drift     what grows from cycle to cycle in proportion to their number
-//   cycles    level and size of each cycle: steps, softening, events
+//   cycles    level and size of each cycle, of some together in a long window: steps, softening, events
 //
 // later ones freed of what earlier ones hold. The noise of a feature is that of its frequency (noise_model.hpp) and,
 // where single cycles count, their variation.
@@ -37,6 +37,12 @@ struct Feature {
 
 /// One window of one channel.
 struct FeatureBlock {
+  /// A function over the window's rows, 0 outside of [first, first + values.size()).
+  struct Function {
+    Eigen::Index first = 0;
+    Eigen::VectorXd values;
+  };
+
   size_t run = 0;
   size_t segment = 0;
   Signal signal = Signal::cavity;
@@ -49,9 +55,10 @@ struct FeatureBlock {
   size_t first = 0;  ///< its features are [first, first + features.size()) of all
   std::vector<Feature> features;
 
-  // Samples [first_row, first_row + basis.rows()); features are factor^-1 (basis' values).
+  // Samples [first_row, first_row + rows); features are factor^-1 (basis' values).
   size_t first_row = 0;
-  Eigen::MatrixXd basis;
+  Eigen::Index rows = 0;
+  std::vector<Function> basis;
   Eigen::MatrixXd factor;  ///< lower triangle
 };
 
@@ -72,6 +79,8 @@ class SegmentFeatures {
   void project(size_t run, const Shown& shown, Eigen::Ref<Eigen::VectorXd> out) const;
   /// The same of a series of one block's rows.
   [[nodiscard]] static Eigen::VectorXd project(const FeatureBlock& block, const Eigen::VectorXd& values);
+  /// The series that has these features and nothing else.
+  [[nodiscard]] static Eigen::VectorXd series(const FeatureBlock& block, const Eigen::VectorXd& features);
 
  private:
   const Session& session_;

@@ -48,13 +48,14 @@ SessionProblem::SessionProblem(const Session& session, const SpecimenFamily& fam
   simulation_ = {.step_s = noise_.channels.contains(Channel::pump) ? 1.0 / 300.0 : 1.0 / 150.0,
                  .components = 3};
   for (const SessionRun& run : session.runs)
-    motions_.push_back(sampled_motion(run.drive, simulation_.step_s));
+    motions_.push_back(sampled_motion(run.drive, dividing_step(run.drive, simulation_.step_s)));
 }
 
-RigModel SessionProblem::model(const SessionModel& of) const {
+RigModel SessionProblem::model(const SessionModel& of) const { return model(of, tolerances(of.u)); }
+
+RigModel SessionProblem::model(const SessionModel& of, const Eigen::VectorXd& offsets) const {
   RigModel model = session_.base;
   model.curve = family_.plain();
-  const Eigen::VectorXd offsets = tolerances(of.u);
   const auto value = [&](size_t i) {
     const double u = i < basic_nuisances ? of.u[static_cast<Eigen::Index>(i)]
                                          : offsets[static_cast<Eigen::Index>(i - basic_nuisances)];
@@ -78,8 +79,6 @@ RigModel SessionProblem::model(const SessionModel& of) const {
 void SessionProblem::set_tolerances(const Eigen::VectorXd& mean, const Eigen::MatrixXd& root) {
   mean_ = mean;
   root_ = root;
-  for (size_t i = basic_nuisances; i < nuisances_.size(); ++i)
-    nuisances_[i].sensors_only = false;  // each is a combination of all
 }
 
 Eigen::VectorXd SessionProblem::tolerances(const Eigen::VectorXd& u) const {
@@ -88,7 +87,9 @@ Eigen::VectorXd SessionProblem::tolerances(const Eigen::VectorXd& u) const {
 }
 
 PlantTrace SessionProblem::plant(const RigModel& model, size_t run) const {
-  return simulate_plant(model, session_.runs[run].drive, motions_[run], simulation_);
+  SimulationOptions options = simulation_;
+  options.step_s = motions_[run].step_s;
+  return simulate_plant(model, session_.runs[run].drive, motions_[run], options);
 }
 
 Shown SessionProblem::shown_in(size_t run, const RigModel& model, const PlantTrace& plant) const {
@@ -113,14 +114,19 @@ Shown SessionProblem::shown_in(size_t run, const SessionModel& of) const {
 
 Eigen::MatrixXd SessionProblem::shown(std::span<const SessionModel> models,
                                       const std::vector<bool>& same_plant) const {
-  const size_t runs = session_.runs.size();
   std::vector<RigModel> made;
   for (const SessionModel& of : models)
     made.push_back(model(of));
+  return shown(made, same_plant);
+}
+
+Eigen::MatrixXd SessionProblem::shown(std::span<const RigModel> made,
+                                      const std::vector<bool>& same_plant) const {
+  const size_t runs = session_.runs.size();
   std::vector<PlantTrace> first(same_plant.empty() ? 0 : runs);
   parallel_for(first.size(), threads_, [&](size_t r) { first[r] = plant(made.front(), r); });
-  Eigen::MatrixXd out(features_.count(), static_cast<Eigen::Index>(models.size()));
-  parallel_for(models.size() * runs, threads_, [&](size_t task) {
+  Eigen::MatrixXd out(features_.count(), static_cast<Eigen::Index>(made.size()));
+  parallel_for(made.size() * runs, threads_, [&](size_t task) {
     const size_t r = task % runs;
     const size_t m = task / runs;
     const bool kept = !same_plant.empty() && (m == 0 || same_plant[m]);
@@ -130,18 +136,29 @@ Eigen::MatrixXd SessionProblem::shown(std::span<const SessionModel> models,
   return out;
 }
 
-Eigen::MatrixXd SessionProblem::nuisance_columns(const SessionModel& at, Eigen::VectorXd& there) const {
-  constexpr double step = 0.5;
-  std::vector<SessionModel> models{at};
+Eigen::MatrixXd SessionProblem::nuisance_columns(const SessionModel& at, Eigen::VectorXd& there,
+                                                 double part) const {
+  const auto basic = static_cast<Eigen::Index>(basic_nuisances);
+  const auto count = static_cast<Eigen::Index>(nuisances_.size());
+  // Tolerances one by one, whose combinations u may be: some change nothing but what the sensors show.
+  const Eigen::VectorXd from = tolerances(at.u);
+  Eigen::VectorXd steps = Eigen::VectorXd::Constant(count, part);
+  if (root_.size() != 0) steps.tail(count - basic) = part * root_.rowwise().norm();
+  const RigModel here = model(at);
+  std::vector<RigModel> models{here};
   std::vector<bool> same_plant{true};
-  for (size_t i = 0; i < nuisances_.size(); ++i) {
-    models.push_back(at);
-    models.back().u[static_cast<Eigen::Index>(i)] += step;
-    same_plant.push_back(nuisances_[i].sensors_only);
+  for (Eigen::Index i = 0; i < count; ++i) {
+    SessionModel moved = at;
+    Eigen::VectorXd offsets = from;
+    (i < basic ? moved.u[i] : offsets[i - basic]) += steps[i];
+    models.push_back(model(moved, offsets));
+    same_plant.push_back(nuisances_[static_cast<size_t>(i)].sensors_only);
   }
   const Eigen::MatrixXd all = shown(models, same_plant);
   there = all.col(0);
-  return (all.rightCols(all.cols() - 1).colwise() - there) / step;
+  Eigen::MatrixXd columns = (all.rightCols(count).colwise() - there) * steps.cwiseInverse().asDiagonal();
+  if (root_.size() != 0) columns.rightCols(count - basic) *= root_;
+  return columns;
 }
 
 }  // namespace diastole::rig

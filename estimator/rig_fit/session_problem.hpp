@@ -56,12 +56,18 @@ class SessionProblem {
   /// only in what the sensors show.
   [[nodiscard]] Eigen::MatrixXd shown(std::span<const SessionModel> models,
                                       const std::vector<bool>& same_plant = {}) const;
-  /// Derivatives of what is shown by u, by differences of half an sd; `there`: what is shown at it.
-  [[nodiscard]] Eigen::MatrixXd nuisance_columns(const SessionModel& at, Eigen::VectorXd& there) const;
+  /// Derivatives of what is shown by u, by differences of this part of a tolerance's sd; `there`: what is shown at it. Half
+  /// an sd stands for the range that a linear fit goes through, little for the slope there.
+  [[nodiscard]] Eigen::MatrixXd nuisance_columns(const SessionModel& at, Eigen::VectorXd& there,
+                                                 double part = 0.5) const;
   /// What the instruments show of one run.
   [[nodiscard]] Shown shown_in(size_t run, const SessionModel& of) const;
 
  private:
+  /// With these tolerances, in sds of their list's, whatever u says.
+  [[nodiscard]] RigModel model(const SessionModel& of, const Eigen::VectorXd& tolerances) const;
+  [[nodiscard]] Eigen::MatrixXd shown(std::span<const RigModel> made,
+                                      const std::vector<bool>& same_plant) const;
   [[nodiscard]] PlantTrace plant(const RigModel& model, size_t run) const;
   [[nodiscard]] Shown shown_in(size_t run, const RigModel& model, const PlantTrace& plant) const;
 

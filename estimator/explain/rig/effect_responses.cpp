@@ -51,9 +51,10 @@ std::vector<Variant> variants_of(const Effect& effect) {
   return list;
 }
 
-constexpr std::array first_sizes{0.25, 1.0, 4.0, 16.0};
-constexpr double alike = 0.9;    ///< cosine
-constexpr double visible = 3.0;  ///< sds in all: less cannot be told from nothing
+constexpr std::array first_sizes{1.0, 4.0, 16.0};
+constexpr double smaller = 0.25;  ///< of the smallest of them
+constexpr double alike = 0.9;     ///< cosine
+constexpr double visible = 3.0;   ///< sds in all: less cannot be told from nothing
 constexpr size_t halvings_everywhere = 2;
 constexpr size_t most_halvings = 6;
 constexpr size_t likely_intervals = 3;  ///< of a variant, that are halved further
@@ -81,6 +82,14 @@ struct Sized {
   Response response;
   double likeness = 0.0;  ///< cosine of its magnitudes and the misfit's
 };
+
+/// Whether changes grow with the sizes, within a tenth: an effect's own error.
+bool is_in_proportion(const Sized& one, const Sized& larger, const VectorXd& scale) {
+  constexpr double within = 0.1;
+  const VectorXd a = (larger.size / one.size * one.response.change).cwiseQuotient(scale);
+  const VectorXd b = larger.response.change.cwiseQuotient(scale);
+  return (b - a).norm() < within * a.norm();
+}
 
 }  // namespace
 
@@ -128,6 +137,24 @@ std::vector<Response> effect_responses(const rig::SessionProblem& problem, const
     for (const double size : first_sizes)
       wanted.emplace_back(v, size);
   std::vector<Sized> all = simulate(wanted);
+  // A quarter of the smallest size: in proportion to it, where four times as much is.
+  wanted.clear();
+  for (size_t i = 0, count = all.size(); i < count; ++i) {
+    if (all[i].size != first_sizes[0]) continue;
+    const auto [v, size] = std::pair(all[i].variant, smaller * first_sizes[0]);
+    if (i + 1 < count && all[i + 1].variant == v && all[i + 1].size == first_sizes[1] &&
+        is_in_proportion(all[i], all[i + 1], scale)) {
+      Sized small = all[i];
+      small.size = size;
+      small.response.values = variants[v].values(variants[v].effect->neutral(neutral_of), size);
+      small.response.change *= smaller;
+      all.push_back(std::move(small));
+    } else {
+      wanted.emplace_back(v, size);
+    }
+  }
+  std::vector<Sized> small = simulate(wanted);
+  std::ranges::move(small, std::back_inserter(all));
   for (size_t round = 0; round < most_halvings; ++round) {
     std::ranges::sort(all, {}, [](const Sized& one) { return std::pair(one.variant, one.size); });
     struct Interval {

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <numbers>
 #include <optional>
@@ -27,9 +28,8 @@ constexpr size_t seconds_fitted = 3;  ///< beside the best single effect that wa
 /// Of 2 ln likelihood by an effect, below which its prior odds alone speak against it.
 const double least_promise = 2.0 * std::log(1.0 / effect_odds);
 constexpr double second_in_reach =
-    50.0;                       ///< nats behind the best of its size, beyond which a set is not taken again
-constexpr size_t retaken = 2;   ///< best sets of each size whose tolerances' columns are taken again at them
-constexpr double rested = 0.5;  ///< nats, by which columns taken again change nothing any more
+    50.0;                      ///< nats behind the best of its size, beyond which a set is not taken again
+constexpr size_t retaken = 2;  ///< best sets of each size that are fitted with tolerances that are not linear
 constexpr double least_amplitude = 0.5,
                  most_amplitude = 2.0;  ///< of a response: beyond, another size stands for it
 
@@ -127,6 +127,12 @@ class SetsSearch {
     return set.model.terms.size() - options_.terms.size();
   }
   void fit(const std::vector<size_t>& responses);
+  [[nodiscard]] double best_posterior() const {
+    double best = -std::numeric_limits<double>::infinity();
+    for (const EffectSet& set : sets_)
+      best = std::max(best, set.log_posterior);
+    return best;
+  }
   void fit_beside_best();
   void fit_best_again(size_t effects);
   [[nodiscard]] bool is_fitted(const std::vector<const Effect*>& effects) const;
@@ -184,7 +190,7 @@ void SetsSearch::fit(const std::vector<size_t>& responses) {
         start.values[at] = std::max(start.values[at], response.values[j]);
   }
   if (is_fitted(effects)) return;
-  sets_.push_back(fit_set(problem_, start, base_, problem_.error().prior.share));
+  sets_.push_back(fit_set(problem_, start, base_, problem_.error().prior.share, best_posterior()));
 }
 
 void SetsSearch::fit_beside_best() {
@@ -205,30 +211,23 @@ void SetsSearch::fit_beside_best() {
     SessionModel start = first.model;
     start.terms.push_back(response.term);
     start.values.insert(start.values.end(), response.values.begin(), response.values.end());
-    sets_.push_back(fit_set(problem_, start, first.known, first.evidence.shares));
+    sets_.push_back(fit_set(problem_, start, first.known, first.evidence.shares, best_posterior()));
   }
   for (const Effect* effect : rig_effects()) {
     if (effect->change_points() == ChangePoints::none || effect == first.model.terms.back().effect) continue;
     if (const auto start = scan_events(problem_, first, *effect))
-      sets_.push_back(fit_set(problem_, *start, first.known, first.evidence.shares));
+      sets_.push_back(fit_set(problem_, *start, first.known, first.evidence.shares, best_posterior()));
   }
 }
 
 void SetsSearch::fit_best_again(size_t effects) {
-  constexpr int most_rounds = 6;
   sort_sets();
   size_t count = 0;
   double best = 0.0;
   for (EffectSet& set : sets_) {
     if (added(set) != effects) continue;
     if (++count > retaken || (count > 1 && set.log_posterior < best - second_in_reach)) break;
-    for (int round = 0; round < most_rounds; ++round) {
-      rig::LinearisedModel at{.at = set.model, .there = {}, .columns = {}};
-      at.columns = problem_.nuisance_columns(at.at, at.there);
-      const double before = set.log_posterior;
-      set = fit_set(problem_, at.at, at, set.evidence.shares);
-      if (std::abs(set.log_posterior - before) < rested) break;
-    }
+    set = fit_set_exactly(problem_, set);
     if (count == 1) best = set.log_posterior;
   }
   sort_sets();
@@ -260,7 +259,7 @@ SetSearch SetsSearch::run() {
   for (const Effect* effect : rig_effects())
     if (effect->change_points() != ChangePoints::none)
       if (const auto start = scan_events(problem_, plain, *effect))
-        sets_.push_back(fit_set(problem_, *start, base_, problem_.error().prior.share));
+        sets_.push_back(fit_set(problem_, *start, base_, problem_.error().prior.share, best_posterior()));
   report("fitting the best of them again");
   fit_best_again(1);
   report("fitting the pairs that promise most");

@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
+#include <functional>
 #include <map>
+#include <tuple>
+#include <utility>
 
 #include "estimator/parallel/parallel_for.hpp"
 
@@ -15,8 +17,8 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr size_t most_moments = 12;
-constexpr double spacing_s = 0.5;  ///< of the moments that are tried first
-constexpr double finest_s = 0.03;
+constexpr double spacing_s = 0.5;   ///< of the moments that are tried first
+constexpr double finest_s = 0.003;  ///< a sample
 
 struct Moment {
   size_t run = 0;
@@ -54,19 +56,10 @@ class EventScan {
     const rig::RunPlace& place = problem_.session().runs[moment.run].drive.place;
     return {place.name, moment.time_s, place.started_s + moment.time_s};
   }
-  /// Whitened change of the features from the moment on.
-  [[nodiscard]] VectorXd change(const Moment& moment) const;
-  /// A block's change from a time on.
-  [[nodiscard]] VectorXd partial(const rig::FeatureBlock& block, double time_s) const;
-  [[nodiscard]] Gain gain(const VectorXd& change) const {
-    const VectorXd mixed = known_.transpose() * change;
-    const double along = change.dot(misfit_) - mixed.dot(pulled_);
-    const double square = change.squaredNorm() - mixed.dot(factor_.solve(mixed));
-    if (!(square > 1e-6 * change.squaredNorm()) || square == 0.0) return {};
-    return {along * along / square, along / square};
-  }
-  /// The best moment beside those found, near `about` within `reach` or anywhere.
-  [[nodiscard]] std::pair<Moment, Gain> best(const VectorXd& found, const std::vector<Moment>& among) const;
+  /// Whitened, of the features from each moment on.
+  [[nodiscard]] MatrixXd changes(const std::vector<Moment>& moments) const;
+  /// Of each of the changes beside what has been found.
+  [[nodiscard]] std::vector<Gain> gains(const VectorXd& found, const MatrixXd& changes) const;
 
   const rig::SessionProblem& problem_;
   const EffectSet& before_;
@@ -97,60 +90,86 @@ void EventScan::set_lasting() {
     with.terms.back().change_points.push_back(change_point({r, runs[r].sample_s.front() - 10.0}));
     if (lasts_) break;
   }
+  std::vector<rig::Shown> there(runs.size()), here(runs.size());
+  parallel_for(2 * runs.size(), problem_.threads(), [&](size_t i) {
+    const size_t r = i / 2;
+    (i % 2 == 0 ? there : here)[r] = problem_.shown_in(r, i % 2 == 0 ? with : before_.model);
+  });
+  const auto difference = [](const std::vector<double>& a, const std::vector<double>& b) {
+    return VectorXd(Eigen::Map<const VectorXd>(a.data(), static_cast<Index>(a.size())) -
+                    Eigen::Map<const VectorXd>(b.data(), static_cast<Index>(b.size())));
+  };
   for (size_t r = 0; r < runs.size(); ++r) {
-    const rig::Shown there = problem_.shown_in(r, with);
-    const rig::Shown here = problem_.shown_in(r, before_.model);
-    const auto difference = [](const std::vector<double>& a, const std::vector<double>& b) {
-      Eigen::VectorXd values(static_cast<Index>(a.size()));
-      for (size_t k = 0; k < a.size(); ++k)
-        values[static_cast<Index>(k)] = a[k] - b[k];
-      return values;
-    };
-    lasting_[{r, rig::Signal::cavity}] = difference(there.pressures.cavity_kPa, here.pressures.cavity_kPa);
-    lasting_[{r, rig::Signal::pump}] = difference(there.pressures.pump_kPa, here.pressures.pump_kPa);
+    lasting_[{r, rig::Signal::cavity}] =
+        difference(there[r].pressures.cavity_kPa, here[r].pressures.cavity_kPa);
+    lasting_[{r, rig::Signal::pump}] = difference(there[r].pressures.pump_kPa, here[r].pressures.pump_kPa);
   }
   whole_ = VectorXd::Zero(problem_.features().count());
   for (const rig::FeatureBlock& block : problem_.features().blocks())
     if (block.signal != rig::Signal::volume)
       whole_.segment(static_cast<Index>(block.first), static_cast<Index>(block.features.size())) =
-          partial(block, -std::numeric_limits<double>::infinity());
+          rig::SegmentFeatures::project(block, lasting_.at({block.run, block.signal})
+                                                   .segment(static_cast<Index>(block.first_row), block.rows));
 }
 
-VectorXd EventScan::change(const Moment& moment) const {
-  VectorXd out = VectorXd::Zero(problem_.features().count());
+MatrixXd EventScan::changes(const std::vector<Moment>& moments) const {
+  MatrixXd out = MatrixXd::Zero(problem_.features().count(), static_cast<Index>(moments.size()));
   for (const rig::FeatureBlock& block : problem_.features().blocks()) {
+    if (block.signal == rig::Signal::volume) continue;
+    const auto& samples = problem_.session().runs[block.run].sample_s;
     const auto first_feature = static_cast<Index>(block.first);
     const auto features = static_cast<Index>(block.features.size());
-    if (block.signal == rig::Signal::volume) continue;
-    const bool here = block.run == moment.run;
-    const auto& times = problem_.session().runs[block.run].sample_s;
-    if (here ? times[block.first_row] >= moment.time_s : lasts_ && is_later(block.run, moment.run)) {
-      out.segment(first_feature, features) = whole_.segment(first_feature, features);
-      continue;
+    // What each function holds of the change from a moment's row on: sums from the end.
+    std::vector<std::pair<Index, Index>> inside;  // row, moment
+    for (size_t i = 0; i < moments.size(); ++i) {
+      const Moment& moment = moments[i];
+      const bool here = block.run == moment.run;
+      const auto row = std::ranges::lower_bound(samples, moment.time_s) - samples.begin() -
+                       static_cast<Index>(block.first_row);
+      if (here ? row <= 0 : lasts_ && is_later(block.run, moment.run))
+        out.col(static_cast<Index>(i)).segment(first_feature, features) =
+            whole_.segment(first_feature, features);
+      else if (here && row < block.rows)
+        inside.emplace_back(row, static_cast<Index>(i));
     }
-    if (!here || times[block.first_row + static_cast<size_t>(block.basis.rows()) - 1] < moment.time_s)
-      continue;
-    out.segment(first_feature, features) = partial(block, moment.time_s);
+    if (inside.empty()) continue;
+    std::ranges::sort(inside, std::greater());
+    const auto first = static_cast<Index>(block.first_row);
+    const VectorXd values = lasting_.at({block.run, block.signal}).segment(first, block.rows);
+    MatrixXd sums(features, static_cast<Index>(inside.size()));
+    parallel_for(block.basis.size(), problem_.threads(), [&](size_t j) {
+      const rig::FeatureBlock::Function& function = block.basis[j];
+      double sum = 0.0;
+      Index to = function.first + function.values.size();
+      for (size_t i = 0; i < inside.size(); ++i) {
+        const Index from = std::max(inside[i].first, function.first);
+        if (from < to) {
+          sum +=
+              function.values.segment(from - function.first, to - from).dot(values.segment(from, to - from));
+          to = from;
+        }
+        sums(static_cast<Index>(j), static_cast<Index>(i)) = sum;
+      }
+    });
+    block.factor.triangularView<Eigen::Lower>().solveInPlace(sums);
+    for (size_t i = 0; i < inside.size(); ++i)
+      out.col(inside[i].second).segment(first_feature, features) = sums.col(static_cast<Index>(i));
   }
-  return out.cwiseProduct(weight_);
+  return weight_.asDiagonal() * out;
 }
 
-VectorXd EventScan::partial(const rig::FeatureBlock& block, double time_s) const {
-  const auto& samples = problem_.session().runs[block.run].sample_s;
-  const auto first = static_cast<Index>(block.first_row);
-  VectorXd values = lasting_.at({block.run, block.signal}).segment(first, block.basis.rows());
-  const auto from = std::ranges::lower_bound(samples, time_s) - samples.begin() - first;
-  values.head(std::clamp<Index>(from, 0, values.size())).setZero();
-  return rig::SegmentFeatures::project(block, values);
-}
-
-std::pair<Moment, EventScan::Gain> EventScan::best(const VectorXd& found,
-                                                   const std::vector<Moment>& among) const {
-  std::vector<Gain> gains(among.size());
-  parallel_for(among.size(), problem_.threads(),
-               [&](size_t i) { gains[i] = gain(found + change(among[i])); });
-  const auto at = std::ranges::max_element(gains, {}, &Gain::gain);
-  return {among[static_cast<size_t>(at - gains.begin())], *at};
+std::vector<EventScan::Gain> EventScan::gains(const VectorXd& found, const MatrixXd& changes) const {
+  const MatrixXd all = changes.colwise() + found;
+  const MatrixXd mixed = known_.transpose() * all;
+  const MatrixXd solved = factor_.solve(mixed);
+  std::vector<Gain> list(static_cast<size_t>(all.cols()));
+  for (Index i = 0; i < all.cols(); ++i) {
+    const double along = all.col(i).dot(misfit_) - mixed.col(i).dot(pulled_);
+    const double norm = all.col(i).squaredNorm();
+    const double square = norm - mixed.col(i).dot(solved.col(i));
+    if (square > 1e-6 * norm) list[static_cast<size_t>(i)] = {along * along / square, along / square};
+  }
+  return list;
 }
 
 std::optional<rig::SessionModel> EventScan::run() {
@@ -160,6 +179,7 @@ std::optional<rig::SessionModel> EventScan::run() {
     for (double t = samples.front() + spacing_s; t < samples.back(); t += spacing_s)
       everywhere.push_back({r, t});
   }
+  const MatrixXd everywhere_changes = changes(everywhere);
   // Among so many independent moments chance gains 2 ln of their number; a name asks for more (set_fit.cpp).
   const double chance = 2.0 * std::log(static_cast<double>(everywhere.size()));
   const double least = 2.0 * std::log(1.0 / effect_odds);
@@ -167,17 +187,21 @@ std::optional<rig::SessionModel> EventScan::run() {
   std::vector<Moment> found;
   Gain so_far;
   while (found.size() < (lasts_ ? 1 : most_moments)) {
-    auto [moment, gained] = best(sum, everywhere);
+    const auto best = [&](const std::vector<Moment>& among, const MatrixXd& changed) {
+      const std::vector<Gain> list = gains(sum, changed);
+      const auto at = std::ranges::max_element(list, {}, &Gain::gain);
+      return std::pair(among[static_cast<size_t>(at - list.begin())], *at);
+    };
+    auto [moment, gained] = best(everywhere, everywhere_changes);
     for (double spacing = 0.5 * spacing_s; spacing > finest_s; spacing *= 0.5) {
-      const auto [finer, gained_there] =
-          best(sum, {{moment.run, moment.time_s - spacing}, moment, {moment.run, moment.time_s + spacing}});
-      moment = finer;
-      gained = gained_there;
+      const std::vector<Moment> near{
+          {moment.run, moment.time_s - spacing}, moment, {moment.run, moment.time_s + spacing}};
+      std::tie(moment, gained) = best(near, changes(near));
     }
     if (gained.gain < so_far.gain + chance + (found.empty() ? least : 0.0)) break;
     so_far = gained;
     found.push_back(moment);
-    sum += change(moment);
+    sum += changes({moment}).col(0);
   }
   if (found.empty()) return {};
   rig::SessionModel start = before_.model;

@@ -32,7 +32,7 @@ std::optional<std::array<double, 2>> phase_of(const rig::FeatureBlock& block, co
   constexpr size_t bins = 10;
   constexpr double most = 0.7;
   if (block.cycles < 2.0) return {};
-  const VectorXd series = block.basis * block.factor.transpose().triangularView<Eigen::Upper>().solve(left);
+  const VectorXd series = rig::SegmentFeatures::series(block, left);
   std::array<double, bins> squares{};
   for (Index k = 0; k < series.size(); ++k) {
     const double turns = block.cycles * static_cast<double>(k) / static_cast<double>(series.size());

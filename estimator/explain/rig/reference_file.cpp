@@ -2,9 +2,9 @@
 
 #include <fmt/format.h>
 
-#include <cstdlib>
 #include <system_error>
 
+#include "estimator/io/cache.hpp"
 #include "estimator/io/record_file.hpp"
 #include "estimator/io/study_fingerprint.hpp"
 #include "estimator/io/whole_file.hpp"
@@ -16,7 +16,7 @@ namespace {
 using Eigen::Index;
 
 /// The rules by which references are learnt: another number makes what is in caches old.
-constexpr int learning_version = 1;
+constexpr int learning_version = 2;
 
 constexpr RecordFormat format{
     "diastole-reference", "a reference of a rig",
@@ -30,14 +30,6 @@ std::vector<double> list_of(const Eigen::VectorXd& values) {
 Eigen::VectorXd vector_of(const Json& json) {
   const auto values = json.get<std::vector<double>>();
   return Eigen::Map<const Eigen::VectorXd>(values.data(), static_cast<Index>(values.size()));
-}
-
-std::filesystem::path cache_folder() {
-  if (const char* folder = std::getenv("XDG_CACHE_HOME"); folder != nullptr && *folder != '\0')
-    return std::filesystem::path(folder) / "diastole";
-  if (const char* home = std::getenv("HOME"); home != nullptr && *home != '\0')
-    return std::filesystem::path(home) / ".cache" / "diastole";
-  return {};
 }
 
 std::string fingerprint_of(const std::vector<Study>& studies) {
@@ -135,26 +127,16 @@ rig::Reference reference_of(const Study& study, size_t threads,
   for (const std::filesystem::path& file : files)
     studies.push_back(read_study(file));
   const std::string fingerprint = fingerprint_of(studies);
-  const std::filesystem::path folder = cache_folder();
-  const std::filesystem::path kept = folder / fmt::format("reference-{}.json", fingerprint);
-  std::error_code failure;
-  if (!folder.empty() && std::filesystem::is_regular_file(kept, failure)) {
+  const std::string kept = fmt::format("reference-{}.json", fingerprint);
+  if (const auto text = read_cached(kept)) {
     try {
-      return reference_from_json(read_whole_file(kept), kept.string());
+      return reference_from_json(*text, kept);
     } catch (const InputError&) {  // not whole: learnt again
     }
   }
   rig::Reference learnt = rig::learn_reference(studies, threads, progress);
   learnt.fingerprint = fingerprint;
-  if (!folder.empty()) {
-    std::filesystem::create_directories(folder, failure);
-    if (!failure) {
-      try {
-        write_whole_file(kept, to_json(learnt));
-      } catch (const InputError&) {  // without a cache it is learnt each time
-      }
-    }
-  }
+  write_cached(kept, to_json(learnt));
   return learnt;
 }
 

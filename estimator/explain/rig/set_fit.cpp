@@ -21,14 +21,19 @@ using rig::Unknown;
 /// ln of a size's density, uniform in its logarithm over two decades on one side or both, relative to the normal about 0.
 constexpr double size_range = 4.6;
 constexpr double small_part = 2e-3;   ///< of a size, for derivatives
+constexpr double slope_part = 0.02;   ///< of a tolerance's sd, for derivatives
 constexpr double time_step_s = 0.02;  ///< some samples: less is as rough as they are
 constexpr double bound_u = 8.0;       ///< of a nuisance, in sds: no data move one so far
 
-/// What is searched: the effects' values, the moments, the modulus; and the nuisances, which are linear.
+/// Whether the nuisances but the modulus follow by columns taken at a known model, or are simulated.
+enum class Nuisances { linear, simulated };
+
+/// What is searched: the effects' values, the moments, the modulus; and the other nuisances.
 class SetProblem : public inference::LeastSquaresProblem {
  public:
-  SetProblem(const rig::SessionProblem& problem, const SessionModel& start, const rig::LinearisedModel& known)
-      : problem_(problem), start_(start), known_(known) {
+  SetProblem(const rig::SessionProblem& problem, const SessionModel& start, rig::LinearisedModel known,
+             Nuisances nuisances)
+      : problem_(problem), start_(start), known_(std::move(known)), kind_(nuisances) {
     const rig::RigModel base = problem.model({{}, {}, start.u});
     size_t at = 0;
     for (const rig::ModelTerm& term : start.terms) {
@@ -72,26 +77,33 @@ class SetProblem : public inference::LeastSquaresProblem {
     return inference::Linearisation::kept;
   }
   std::optional<VectorXd> residuals(const VectorXd& q) override {
-    const VectorXd& seen = shown(q);
+    const VectorXd seen = shown(q);
     if (!seen.allFinite()) return {};
     const VectorXd u = nuisances(q);
     VectorXd found(seen.size() + u.size());
-    found.head(seen.size()) = (problem_.measured() - seen - linear(u)).cwiseProduct(weight_);
+    found.head(seen.size()) = (problem_.measured() - seen).cwiseProduct(weight_);
     found.tail(u.size()) = u;
     return found;
   }
   MatrixXd jacobian(const VectorXd& q) override {
-    const MatrixXd moving = derivatives(q);
-    const Index rows = moving.rows();
-    const Index rest = known_.columns.cols() - 1;
-    MatrixXd all = MatrixXd::Zero(rows + rest + 1, searched() + rest);
-    all.topLeftCorner(rows, searched()) = -(weight_.asDiagonal() * moving);
-    all.topRightCorner(rows, rest) = -(weight_.asDiagonal() * known_.columns.rightCols(rest));
-    all(rows, searched() - 1) = 1.0;
-    all.bottomRightCorner(rest, rest).setIdentity();
+    const MatrixXd columns = derivatives(q);
+    MatrixXd all = MatrixXd::Zero(columns.rows() + start_.u.size(), columns.cols());
+    all.topRows(columns.rows()) = -(weight_.asDiagonal() * columns);
+    all.bottomRightCorner(start_.u.size(), start_.u.size()).setIdentity();
     return all;
   }
+  /// Derivatives of what is shown, as a search had them at its end.
+  void take(const inference::SearchResult& found) {
+    derivatives_ = -(weight_.cwiseInverse().asDiagonal() * found.jacobian.topRows(weight_.size()));
+    derived_at_ = found.q;
+  }
 
+  /// Which of the unknowns are moments.
+  [[nodiscard]] std::vector<bool> moments() const {
+    std::vector<bool> list(static_cast<size_t>(space_.size()), false);
+    std::fill(list.begin() + effect_values(), list.begin() + searched() - 1, true);
+    return list;
+  }
   [[nodiscard]] Index searched() const { return static_cast<Index>(unknowns_.size()); }
   [[nodiscard]] Index effect_values() const { return static_cast<Index>(values_); }
   [[nodiscard]] const std::vector<Unknown>& unknowns() const { return unknowns_; }
@@ -115,8 +127,8 @@ class SetProblem : public inference::LeastSquaresProblem {
     u.tail(u.size() - 1) = q.tail(u.size() - 1);
     return u;
   }
-  /// The model of a point; its linear nuisances are those of the point, or those at which the columns were taken.
-  [[nodiscard]] SessionModel model(const VectorXd& q, bool linear_ones) const {
+  /// The model of a point.
+  [[nodiscard]] SessionModel model(const VectorXd& q) const {
     SessionModel made = start_;
     for (Index i = 0; i < effect_values(); ++i)
       made.values[static_cast<size_t>(i)] = unknowns_[static_cast<size_t>(i)].value(q[i]);
@@ -126,21 +138,23 @@ class SetProblem : public inference::LeastSquaresProblem {
         moment.session_s += q[at] - moment.time_s;
         moment.time_s = q[at++];
       }
-    made.u = linear_ones ? nuisances(q) : known_.at.u;
-    made.u[0] = q[searched() - 1];
+    made.u = nuisances(q);
     return made;
   }
-  const VectorXd& shown(const VectorXd& q) {
-    const VectorXd now = q.head(searched());
-    if (now.size() == at_.size() && now == at_) return seen_;
-    at_ = now;
-    seen_ = problem_.shown(std::array{model(q, false)});
-    return seen_;
+  VectorXd shown(const VectorXd& q) {
+    const VectorXd now = simulated(q);
+    if (now.size() != at_.size() || now != at_) {
+      at_ = now;
+      seen_ = problem_.shown(std::array{simulated_model(q)});
+    }
+    if (kind_ == Nuisances::simulated) return seen_;
+    return seen_ + known_.columns.rightCols(others()) * (q.tail(others()) - known_.at.u.tail(others()));
   }
-  /// Of what is shown by what is searched.
-  MatrixXd derivatives(const VectorXd& q) {
-    const VectorXd here = shown(q);
-    std::vector<SessionModel> models{model(q, false)};
+  /// Of what is shown by q.
+  const MatrixXd& derivatives(const VectorXd& q) {
+    const VectorXd now = simulated(q);
+    if (derived_at_.size() == q.size() && simulated(derived_at_) == now) return derivatives_;
+    std::vector<SessionModel> models{simulated_model(q)};
     std::vector<bool> same_plant{true};
     std::vector<double> steps;
     for (Index i = 0; i < searched(); ++i) {
@@ -148,31 +162,48 @@ class SetProblem : public inference::LeastSquaresProblem {
       steps.push_back(unknown.step_from(q[i]));
       VectorXd moved = q;
       moved[i] += steps.back();
-      models.push_back(model(moved, false));
+      models.push_back(simulated_model(moved));
       same_plant.push_back(unknown.sensors_only);
     }
-    MatrixXd all = problem_.shown(models, same_plant);
-    MatrixXd moving(all.rows(), searched());
+    const MatrixXd all = problem_.shown(models, same_plant);
+    at_ = now;
+    seen_ = all.col(0);
+    derivatives_.resize(all.rows(), q.size());
     for (Index i = 0; i < searched(); ++i)
-      moving.col(i) = (all.col(i + 1) - here) / steps[static_cast<size_t>(i)];
-    return moving;
-  }
-  /// What the linear nuisances change; the modulus is not one of them.
-  [[nodiscard]] VectorXd linear(const VectorXd& u) const {
-    const Index rest = u.size() - 1;
-    return known_.columns.rightCols(rest) * (u - known_.at.u).tail(rest);
+      derivatives_.col(i) = (all.col(i + 1) - seen_) / steps[static_cast<size_t>(i)];
+    if (kind_ == Nuisances::simulated) {
+      known_.at = model(q);
+      known_.columns = problem_.nuisance_columns(known_.at, known_.there, slope_part);
+    }
+    derivatives_.rightCols(others()) = known_.columns.rightCols(others());
+    derived_at_ = q;
+    return derivatives_;
   }
 
  private:
   const rig::SessionProblem& problem_;
+  /// What the simulation depends on.
+  [[nodiscard]] VectorXd simulated(const VectorXd& q) const {
+    return kind_ == Nuisances::simulated ? q : VectorXd(q.head(searched()));
+  }
+  [[nodiscard]] SessionModel simulated_model(const VectorXd& q) const {
+    SessionModel made = model(q);
+    if (kind_ == Nuisances::linear) made.u.tail(others()) = known_.at.u.tail(others());
+    return made;
+  }
+  /// Nuisances but the modulus.
+  [[nodiscard]] Index others() const { return start_.u.size() - 1; }
+
   const SessionModel& start_;
-  const rig::LinearisedModel& known_;
+  rig::LinearisedModel known_;
+  Nuisances kind_;
   std::vector<Unknown> unknowns_;
   std::vector<std::optional<double>> neutral_;
   size_t values_ = 0;
   ParameterSpace space_;
   VectorXd weight_;
-  VectorXd at_, seen_;
+  VectorXd at_, seen_, derived_at_;
+  MatrixXd derivatives_;
 };
 
 /// Width of what a value may be before the data: its size, or its bounds'.
@@ -201,54 +232,47 @@ double log_prior(const rig::SessionProblem& problem, const SetProblem& set, cons
   return sum;
 }
 
-}  // namespace
-
-EffectSet fit_set(const rig::SessionProblem& problem, const SessionModel& start,
-                  const rig::LinearisedModel& known, const rig::Shares& shares) {
+EffectSet search(const rig::SessionProblem& problem, SetProblem& set, const rig::LinearisedModel& known,
+                 const rig::Shares& shares, double best_so_far) {
+  constexpr double out_of_reach = 50.0;  // nats: rounds after the first bring some
   constexpr int most_rounds = 4;
   constexpr double rested = 0.5;  // nats
-  SetProblem set(problem, start, known);
   EffectSet out;
   VectorXd q = set.start();
   const Index searched = set.searched();
-  const Index linear = start.u.size() - 1;
+  const Index others = q.size() - searched;
   MatrixXd& columns = out.columns;
-  const auto judged = [&](const MatrixXd& moving, const rig::Shares& from) {
-    columns.resize(moving.rows(), searched + linear);
-    columns.leftCols(searched) = moving;
-    columns.rightCols(linear) = known.columns.rightCols(linear);
+  const auto judged = [&](const rig::Shares& from) {
+    columns = set.derivatives(q);
+    VectorXd z = problem.measured() - set.shown(q) + columns.rightCols(others + 1) * q.tail(others + 1);
     for (Index i = 0; i + 1 < searched; ++i)
       columns.col(i) *= prior_width(set, q, i);
-    const VectorXd z = problem.measured() - set.shown(q) + moving.col(searched - 1) * q[searched - 1] +
-                       known.columns.rightCols(linear) * known.at.u.tail(linear);
     return fit_with_shares(z, columns, problem.error(), from);
   };
-  MatrixXd moving = set.derivatives(q);
-  out.evidence = judged(moving, shares);
-  {  // the nuisances follow the start
-    VectorXd from = q;
-    from.tail(linear) = out.evidence.u.tail(linear);
-    from[searched - 1] = out.evidence.u[searched - 1];
-    q = set.space().clamped(from);
-  }
+  out.evidence = judged(shares);
   for (int round = 0; round < most_rounds; ++round) {
     set.set_variance(out.evidence.variance);
     inference::SearchOptions options;
     options.iteration_limit = 15;
-    options.small_gain = [](double) { return 0.2; };  // a tenth of a nat
+    options.small_gain = [](double) { return 1.0; };  // half a nat decides nothing
     options.refusal_limit = 6;
     options.first_radius = 1e4;
+    options.held = set.moments();  // event_scan.hpp: to a sample; what is shown changes by leaps with them
     const inference::SearchResult found = minimise(set, q, options);
     out.termination = found.termination;
     if (found.termination == inference::Termination::no_solution) break;
     q = found.q;
-    moving = set.derivatives(q);
+    set.take(found);
     const double before = out.evidence.log_evidence;
-    out.evidence = judged(moving, out.evidence.shares);
-    if (round > 0 && std::abs(out.evidence.log_evidence - before) < rested) break;
+    out.evidence = judged(out.evidence.shares);
+    if (std::abs(out.evidence.log_evidence - before) < rested) break;
+    if (out.evidence.log_evidence + log_prior(problem, set, set.model(q)) < best_so_far - out_of_reach) break;
   }
-  out.known = known;
-  out.model = set.model(q, true);
+  out.model = set.model(q);
+  out.shown = set.shown(q);
+  out.known = {.at = out.model, .there = out.shown, .columns = known.columns};
+  out.known.columns.col(0) = columns.col(searched - 1);
+  out.known.columns.rightCols(others) = columns.rightCols(others);
   out.unknowns.assign(set.unknowns().begin(), set.unknowns().begin() + set.effect_values());
   out.covariance = out.evidence.precision.llt().solve(
       MatrixXd::Identity(out.evidence.precision.rows(), out.evidence.precision.cols()));
@@ -259,18 +283,22 @@ EffectSet fit_set(const rig::SessionProblem& problem, const SessionModel& start,
   }
   for (Index i = 0; i < set.effect_values(); ++i)
     out.errors.push_back(inference::standard_error(set.space()[i], q[i], std::sqrt(out.covariance(i, i))));
-  out.known = known;
-  out.model = set.model(q, true);
-  out.unknowns.assign(set.unknowns().begin(), set.unknowns().begin() + set.effect_values());
-  const MatrixXd covariance = out.evidence.precision.llt().solve(
-      MatrixXd::Identity(out.evidence.precision.rows(), out.evidence.precision.cols()));
-  for (Index i = 0; i < set.effect_values(); ++i)
-    out.errors.push_back(inference::standard_error(set.space()[i], q[i],
-                                                   prior_width(set, q, i) * std::sqrt(covariance(i, i))));
-  out.shown = set.shown(q) + set.linear(out.model.u);
   out.evidence.left = problem.measured() - out.shown;
   out.log_posterior = out.evidence.log_evidence + log_prior(problem, set, out.model);
   return out;
+}
+
+}  // namespace
+
+EffectSet fit_set(const rig::SessionProblem& problem, const SessionModel& start,
+                  const rig::LinearisedModel& known, const rig::Shares& shares, double best_so_far) {
+  SetProblem set(problem, start, known, Nuisances::linear);
+  return search(problem, set, known, shares, best_so_far);
+}
+
+EffectSet fit_set_exactly(const rig::SessionProblem& problem, const EffectSet& near) {
+  SetProblem set(problem, near.model, near.known, Nuisances::simulated);
+  return search(problem, set, near.known, near.evidence.shares, near.log_posterior);
 }
 
 }  // namespace diastole::explain

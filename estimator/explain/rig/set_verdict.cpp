@@ -28,7 +28,7 @@ std::array<double, rig::signal_count> mean_squares(const rig::SessionProblem& pr
     const auto s = static_cast<size_t>(block.signal);
     sums[s] +=
         squares.segment(static_cast<Index>(block.first), static_cast<Index>(block.features.size())).sum();
-    rows[s] += static_cast<double>(block.basis.rows());
+    rows[s] += static_cast<double>(block.rows);
   }
   for (size_t s = 0; s < sums.size(); ++s)
     sums[s] = rows[s] > 0.0 ? sums[s] / rows[s] : 0.0;
