@@ -47,7 +47,7 @@ struct ChangePoint {
   double session_s = 0.0;  ///< the same since the session's first run began
 };
 
-/// How many change points an effect has; they are searched (estimator/rig_fit/change_point_search.hpp). What begins at the
+/// How many change points an effect has; they are searched (estimator/explain/rig/event_scan.hpp). What begins at the
 /// only one lasts for the rest of the session, what begins at one of several for the rest of its run.
 enum class ChangePoints { none, one, several };
 

@@ -44,6 +44,12 @@ double square(double x) { return x * x; }
 
 }  // namespace
 
+std::string_view name_of(ErrorGroup group) {
+  constexpr std::array<std::string_view, error_groups> names{"cavity", "cavity_transient", "pump",
+                                                             "pump_transient", "volume"};
+  return names[static_cast<size_t>(group)];
+}
+
 VectorXd ModelError::variance(const Shares& shares) const {
   VectorXd sum = noise;
   for (Index i = 0; i < sum.size(); ++i)

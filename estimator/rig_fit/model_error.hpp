@@ -19,6 +19,7 @@ namespace diastole::rig {
 
 enum class ErrorGroup : size_t { cavity, cavity_transient, pump, pump_transient, volume };
 inline constexpr size_t error_groups = 5;
+std::string_view name_of(ErrorGroup group);  ///< "cavity_transient"
 using Shares = std::array<double, error_groups>;
 
 struct SharePrior {

@@ -9,8 +9,7 @@
 //     channels; its sd from successive cycles' differences, so that slow changes do not count;
 //   - the gated volumes' own sigmas.
 //
-// Whitening makes residuals independent with unit variance: the autoregression's innovations, and of each cycle the
-// component along its own shape shrunk (1 / sqrt(1 + s^2 |w|^2), w the whitened shape and s the cycles' sd).
+// Whitening makes residuals independent with unit variance: the autoregression's innovations.
 
 #include <Eigen/Dense>
 #include <map>

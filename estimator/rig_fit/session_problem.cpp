@@ -65,7 +65,7 @@ RigModel SessionProblem::model(const SessionModel& of, const Eigen::VectorXd& of
   model.cavity_offset_kPa = 1e-3 * value(cavity_offset_at);
   model.pump_offset_kPa = 1e-3 * value(pump_offset_at);
   for (size_t i = 0; i < nuisances_.size(); ++i)
-    if (nuisances_[i].tolerance != nullptr && value(i) != 0.0)
+    if (nuisances_[i].tolerance != nullptr)
       nuisances_[i].tolerance->apply(value(i), {family_, {}, true}, model);
   std::span<const double> values = of.values;
   for (const ModelTerm& term : of.terms) {

@@ -5,7 +5,7 @@
 
 #include "estimator/model/specimen_family.hpp"
 #include "estimator/rig_fit/model_error.hpp"
-#include "estimator/rig_fit/rig_fit.hpp"
+#include "estimator/rig_fit/model_term.hpp"
 #include "estimator/rig_fit/tolerance.hpp"
 
 namespace diastole::rig {

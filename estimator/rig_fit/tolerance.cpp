@@ -13,9 +13,17 @@ constexpr double turn_mL = std::numbers::pi * 25.0 / 6.3;
 /// Volume at which a specimen's curve is compared with another's.
 constexpr double usual_mL = 36.0;
 
+/// The value where it is positive, and ever nearer to zero beyond: searches need no corners. They differ by less than 0.7 of
+/// `rounding`.
+double positive(double value, double rounding) {
+  const double x = value / rounding;
+  return x > 30.0 ? value : rounding * std::log1p(std::exp(x));
+}
+
 /// The screw's error once a turn, `sine` or cosine of its angle.
 template <bool sine>
 void add_screw_error(double size_mL, const EffectContext&, RigModel& model) {
+  if (size_mL == 0.0) return;
   model.drive.emplace_back([=](DriveTrace& trace, const RunPlace&) {
     constexpr double per_mL = 2.0 * std::numbers::pi / turn_mL;
     for (size_t k = 0; k < trace.volume_mL.size(); ++k) {
@@ -35,6 +43,7 @@ void add_screw_error(double size_mL, const EffectContext&, RigModel& model) {
 /// The specimen's pressure larger by `part` of it at usual_mL, in proportion to the volume to the power.
 template <int power>
 void bend_curve(double part, const EffectContext&, RigModel& model) {
+  if (part == 0.0) return;
   std::vector<SpecimenCurve::Point> points = model.curve.points();
   for (SpecimenCurve::Point& at : points) {
     const double x = at.volume_mL / usual_mL;
@@ -70,23 +79,27 @@ constexpr std::array tolerances{
               [](double x, const EffectContext&, RigModel& m) { times(m.hose.loss_coefficient, x); }},
     Tolerance{"hose_loss_at_cavity", "", 0.2, false, false,
               [](double x, const EffectContext&, RigModel& m) {
-                m.hose.loss_at_cavity = std::clamp(m.hose.loss_at_cavity + x, 0.0, 1.0);
+                constexpr double rounding = 0.02;
+                const double part = m.hose.loss_at_cavity + x;
+                m.hose.loss_at_cavity = positive(part, rounding) - positive(part - 1.0, rounding);
               }},
     Tolerance{"hose_wall_friction", "ln", 0.3, false, false,
               [](double x, const EffectContext&, RigModel& m) { times(m.hose.viscosity_Pa_s, x); }},
     Tolerance{"hose_creep", "", 0.03, false, false,
               [](double x, const EffectContext&, RigModel& m) {
-                m.hose.creep_fraction = std::max(m.hose.creep_fraction + x, 0.0);
+                m.hose.creep_fraction = positive(m.hose.creep_fraction + x, 0.005);
               }},
     Tolerance{"hose_creep_time", "ln", 0.7, false, false,
               [](double x, const EffectContext&, RigModel& m) { times(m.hose.creep_time_s, x); }},
     Tolerance{"hose_wall_loss", "ln", 1.0, false, false,
               [](double x, const EffectContext&, RigModel& m) { times(m.hose.wall_loss_s, x); }},
-    // Drive.
-    Tolerance{"drive_lag", "s", 0.0015, true, false,
+    // Drive. Its lag is that of motor and coupling, of the instrument's filter and of its scan over the channels: some
+    // milliseconds each.
+    Tolerance{"drive_lag", "s", 0.003, true, false,
               [](double x, const EffectContext&, RigModel& m) { m.sample_delay_s += x; }},
     Tolerance{"drive_stroke", "ln", 0.002, false, false,
               [](double x, const EffectContext&, RigModel& m) {
+                if (x == 0.0) return;
                 m.drive.emplace_back([factor = std::exp(x)](DriveTrace& trace, const RunPlace&) {
                   for (auto* values : {&trace.volume_mL, &trace.flow_mL_per_s, &trace.acceleration_mL_per_s2})
                     for (double& value : *values)
@@ -95,7 +108,7 @@ constexpr std::array tolerances{
               }},
     Tolerance{"drive_compliance", "mL/kPa", 0.0015, false, false,
               [](double x, const EffectContext&, RigModel& m) {
-                m.drive_compliance_mL_per_kPa = std::max(m.drive_compliance_mL_per_kPa + x, 0.0);
+                m.drive_compliance_mL_per_kPa = positive(m.drive_compliance_mL_per_kPa + x, 0.0005);
               }},
     Tolerance{"screw_sine", "mL", 0.02, false, false, add_screw_error<true>},
     Tolerance{"screw_cosine", "mL", 0.02, false, false, add_screw_error<false>},
@@ -119,6 +132,7 @@ constexpr std::array tolerances{
               [](double x, const EffectContext&, RigModel& m) { times(m.catheter.damping, x); }},
     Tolerance{"cavity_curvature", "at 20 kPa", 0.002, true, false,
               [](double x, const EffectContext&, RigModel& m) {
+                if (x == 0.0) return;
                 m.cavity_sensor.emplace_back(
                     [=](double p, double, const RunPlace&) { return p * (1.0 + x * p / 20.0); });
               }},

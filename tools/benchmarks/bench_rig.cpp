@@ -1,6 +1,6 @@
 // `tools/bench rig [folder] [case or kind ...]`: how well the rig's model fits recorded sessions (data/README.md, labels.json).
-// A row a case: reduced chi-square of the base model and of the model with the labelled effects, by channel too, the
-// effects' parameters with their errors and the truth, simulations and seconds.
+// A row a case: evidence and the model's error in per cent of the range (cavity, its transients, pump, its transients,
+// volumes), without and with the labelled effects; their parameters with errors and the truth; seconds.
 
 #include <fmt/format.h>
 
@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "estimator/rig_fit/rig_fit.hpp"
+#include "estimator/explain/rig/set_fit.hpp"
 #include "tools/benchmarks/recorded_cases.hpp"
 
 namespace {
@@ -23,22 +23,14 @@ double seconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
-/// Reduced chi-square of each channel over the runs.
-std::string by_channel(const rig::RigProblem& problem, const rig::RigFit& fit) {
-  std::string text;
-  for (const char* channel : {"cavity_kPa", "pump_kPa", "cavity_mL"}) {
-    double square = 0.0;
-    double count = 0.0;
-    for (const rig::ResidualBlock& block : problem.blocks()) {
-      if (block.channel != channel) continue;
-      square += fit.residuals
-                    .segment(static_cast<Eigen::Index>(block.first), static_cast<Eigen::Index>(block.count))
-                    .squaredNorm();
-      count += static_cast<double>(block.count);
-    }
-    text += count > 0.0 ? fmt::format(" {:7.3f}", square / count) : "       -";
-  }
-  return text;
+std::string text_of(const rig::SessionProblem& problem, const explain::EffectSet& set) {
+  std::string text = fmt::format("ln evidence {:9.1f}, model's error %:", set.evidence.log_evidence);
+  for (const double share : set.evidence.shares)
+    text += fmt::format(" {:.3f}", 100.0 * share);
+  const rig::RigModel model = problem.model(set.model);
+  return text + fmt::format(" | C1 {:.4f} off {:.1f} {:.1f}; {}", model.modulus_kPa,
+                            1e3 * model.cavity_offset_kPa, 1e3 * model.pump_offset_kPa,
+                            inference::sentence(set.termination));
 }
 
 /// The labelled effects with their moments; empty if one is not in the library.
@@ -72,29 +64,30 @@ void report(const bench::RecordedCase& recorded, const Study& study, const rig::
   const nlohmann::json& label = recorded.label;
   const auto begun = std::chrono::steady_clock::now();
   const rig::Session session = rig::read_session(study);
-  const rig::RigProblem problem(session, family);
-  const rig::NoiseModel& noise = problem.noise();
+  const rig::SessionProblem problem(session, family, 2);
+  const rig::LinearisedModel base = rig::declared_rig(problem);
+  const explain::EffectSet plain = explain::fit_set(problem, base.at, base, problem.error().prior.share);
   std::string kinds;
   for (const auto& truth : label["truth"])
     kinds += fmt::format("{}{}", kinds.empty() ? "" : "+", truth["id"].get<std::string>());
-  fmt::print(
-      "{} {:11} {:38} d {:8.1f} base {:9.3f} |{} | C1 {:.4f}+-{:.4f} ({:.4f}) off {:.1f} {:.1f} ({:.1f}) "
-      "noise {:.1f} cycles {:.2e} ({:.2e}) {:.1f} s\n",
-      recorded.name, label["kind"].get<std::string>(), kinds, label["d"].get<double>(),
-      problem.base().reduced(), by_channel(problem, problem.base()), problem.base().values[0],
-      problem.base().errors[0], label["C1_kPa"].get<double>(), problem.base().values[1],
-      problem.base().values[2], label["offset_Pa"].get<double>(),
-      1e3 * noise.channels.at(rig::Channel::cavity).sd_kPa, noise.cycle_sd, label["beat_sd"].get<double>(),
-      seconds_since(begun));
-  const std::vector<rig::ModelTerm> effects = labelled(label, session);
-  if (effects.empty()) return;
+  fmt::print("{} {:11} {:38} d {:8.1f} {} ({:.4f}, {:.1f}) noise {:.1f} cycles {:.2e} ({:.2e}) {:.1f} s\n",
+             recorded.name, label["kind"].get<std::string>(), kinds, label["d"].get<double>(),
+             text_of(problem, plain), label["C1_kPa"].get<double>(), label["offset_Pa"].get<double>(),
+             1e3 * problem.noise().channels.at(rig::Channel::cavity).sd_kPa, problem.noise().cycle_sd,
+             label["beat_sd"].get<double>(), seconds_since(begun));
+  rig::SessionModel start = base.at;
+  start.terms = labelled(label, session);
+  if (start.terms.empty()) return;
+  for (const rig::ModelTerm& term : start.terms)
+    for (const EffectParameter& parameter : term.effect->parameters())
+      start.values.push_back(parameter.typical);
   const auto second = std::chrono::steady_clock::now();
-  const rig::RigFit fit = problem.fit(effects);
-  fmt::print("    with {:9.3f} |{} | C1 {:.4f}+-{:.4f}; {} it, {} simulations, {:.1f} s\n", fit.reduced(),
-             by_channel(problem, fit), fit.values[0], fit.errors[0], fit.iterations, fit.simulations,
-             seconds_since(second));
-  for (size_t i = 3; i < fit.values.size(); ++i)
-    fmt::print("        {} = {:.6g} +- {:.2g}\n", fit.unknowns[i].name, fit.values[i], fit.errors[i]);
+  const explain::EffectSet with =
+      explain::fit_set_exactly(problem, explain::fit_set(problem, start, base, problem.error().prior.share));
+  fmt::print("    with {}; {:.1f} s\n", text_of(problem, with), seconds_since(second));
+  for (size_t i = 0; i < with.unknowns.size(); ++i)
+    fmt::print("        {} = {:.6g} +- {:.2g}\n", with.unknowns[i].name, with.model.values[i],
+               with.errors[i]);
   for (const auto& truth : label["truth"])
     fmt::print("        truth {} {}\n", truth["id"].get<std::string>(), truth["parameters"].dump());
   std::fflush(stdout);

@@ -113,10 +113,16 @@ ModelErrorSize model_error_of(const rig::SessionProblem& problem, const EffectSe
   constexpr double moved = 1.5;  // by which a share is another than the stated one
   const double share = set.evidence.shares[0] / problem.error().prior.share[0];
   const double rms_kPa = error_rms(problem, set.evidence.shares, rig::Signal::cavity);
-  return {from_reference                         ? "reference"
-          : share > moved || share < 1.0 / moved ? "estimated"
-                                                 : "stated",
-          1e3 * rms_kPa, 100.0 * rms_kPa / problem.error().range[0]};
+  ModelErrorSize size{from_reference                         ? "reference"
+                      : share > moved || share < 1.0 / moved ? "estimated"
+                                                             : "stated",
+                      1e3 * rms_kPa, 100.0 * rms_kPa / problem.error().range[0]};
+  const rig::Shares beyond = set.evidence.surprise(problem.error().prior);
+  const auto& groups = problem.error().group;
+  for (size_t g = 0; g < rig::error_groups; ++g)
+    if (std::ranges::count(groups, static_cast<rig::ErrorGroup>(g)) > 0)
+      size.parts.push_back({std::string(name_of(static_cast<rig::ErrorGroup>(g))), beyond[g]});
+  return size;
 }
 
 }  // namespace

@@ -1,6 +1,7 @@
 #include "estimator/explain/rig/set_verdict.hpp"
 
 #include <algorithm>
+#include <boost/math/distributions/normal.hpp>
 #include <cmath>
 #include <map>
 
@@ -13,7 +14,8 @@ using Ids = std::vector<std::string>;
 
 constexpr double name_probability = 0.9;
 constexpr double least_probability = 0.05;  ///< of a set that is told of
-constexpr double most_surprise = 2.0;       ///< sds of what is known of a share
+/// How seldom any part of a model's error may be as large by chance: two sds of one.
+constexpr double surprising_by_chance = 0.0228;
 
 struct Sizes {
   std::vector<double> over_error;
@@ -89,6 +91,16 @@ Ids material_ids(const EffectSet& set, const Sizes& sizes) {
   return ids;
 }
 
+/// From how many sds on the largest of the parts' shares is a surprise: each of them may be by chance.
+double least_surprise(const rig::ModelError& error) {
+  std::array<bool, rig::error_groups> present{};
+  for (const rig::ErrorGroup group : error.group)
+    present[static_cast<size_t>(group)] = true;
+  const auto parts = static_cast<double>(std::ranges::count(present, true));
+  return boost::math::quantile(
+      boost::math::complement(boost::math::normal(), surprising_by_chance / std::max(parts, 1.0)));
+}
+
 }  // namespace
 
 double error_rms(const rig::SessionProblem& problem, const rig::Shares& shares, rig::Signal signal) {
@@ -145,7 +157,9 @@ SetVerdict judge_sets(const rig::SessionProblem& problem, const SetSearch& searc
   const bool is_more = leading->first.size() > search.given;
   if (is_more) out.searches.push_back({best.ids(), best.termination});
   const rig::Shares surprise = best.evidence.surprise(problem.error().prior);
-  const bool surprising = std::ranges::any_of(surprise, [](double sigmas) { return sigmas > most_surprise; });
+  const double most_surprise = least_surprise(problem.error());
+  const bool surprising =
+      std::ranges::any_of(surprise, [&](double sigmas) { return sigmas > most_surprise; });
   if (surprising || !is_settled(out.searches)) {
     out.verdict = Verdict::unexplained;
     return out;

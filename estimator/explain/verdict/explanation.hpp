@@ -48,11 +48,18 @@ struct Hint {
   double probability = 0.0;
 };
 
+/// A part of the model's error: "cavity", "cavity_transient" (what sets in or drifts), "pump", "pump_transient", "volume".
+struct ErrorPart {
+  std::string part;
+  double beyond_expected_sd = 0.0;  ///< how much larger than expected, in sds of what is known of it
+};
+
 /// What the model gets wrong by itself, in the cavity's pressure.
 struct ModelErrorSize {
   std::string source;  ///< "reference", "estimated" from how the waveforms predict each other, "stated"
   double rms_Pa = 0.0;
   double percent_of_range = 0.0;
+  std::vector<ErrorPart> parts = {};
 };
 
 /// A place in the data where the base model fails beyond the noise, after correction for how many were looked at.

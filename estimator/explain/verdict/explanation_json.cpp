@@ -22,7 +22,8 @@ void each_member(Visit&& visit, Record& effect) {
 
 DIASTOLE_MEMBERS(Hint, id, size_over_model_error, probability)
 
-DIASTOLE_MEMBERS(ModelErrorSize, source, rms_Pa, percent_of_range)
+DIASTOLE_MEMBERS(ErrorPart, part, beyond_expected_sd)
+DIASTOLE_MEMBERS(ModelErrorSize, source, rms_Pa, percent_of_range, parts)
 
 DIASTOLE_MEMBERS(Misfit, port, run, channel, segment, phase, band_Hz, region, excess_chi2, p_value)
 

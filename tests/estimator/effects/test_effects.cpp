@@ -9,7 +9,7 @@
 #include <set>
 #include <string>
 
-#include "estimator/rig_fit/rig_fit.hpp"
+#include "estimator/rig_fit/model_term.hpp"
 #include "tests/estimator/rig_fit/simulated_session.hpp"
 #include "tools/figures/effects_page.hpp"
 

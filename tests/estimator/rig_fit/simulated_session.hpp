@@ -4,7 +4,9 @@
 #include <cmath>
 #include <random>
 
-#include "estimator/rig_fit/rig_fit.hpp"
+#include "estimator/model/specimen_family.hpp"
+#include "estimator/rig_fit/model_term.hpp"
+#include "estimator/rig_fit/noise_model.hpp"
 
 namespace diastole::rig {
 

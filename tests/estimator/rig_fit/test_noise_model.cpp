@@ -9,6 +9,14 @@
 namespace diastole::rig {
 namespace {
 
+TEST(NoiseModel, FindsTheNoiseThatWasAdded) {
+  const SpecimenFamily family = gel_family();
+  const NoiseModel noise = estimate_noise(simulated_session(family, {}));
+  EXPECT_NEAR(noise.channels.at(Channel::cavity).sd_kPa, 0.01, 0.001);
+  EXPECT_NEAR(noise.channels.at(Channel::pump).sd_kPa, 0.05, 0.008);
+  EXPECT_NEAR(noise.channels.at(Channel::cavity).autoregression.front(), 0.7, 0.06);
+}
+
 TEST(NoiseModel, ATransientThatDiesAwayOverTheCyclesIsNoNoise) {
   const SpecimenFamily family = gel_family();
   Session session = simulated_session(family, {.seed = 3});

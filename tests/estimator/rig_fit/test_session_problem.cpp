@@ -1,6 +1,8 @@
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
 #include <random>
 
 #include "estimator/rig_fit/base_fit.hpp"
@@ -40,7 +42,7 @@ TEST(SegmentFeatures, KeepTheSquaresOfWhatTheirFunctionsHold) {
   const Session session = simulated_session(family, {});
   const SegmentFeatures features(session, estimate_noise(session), 1);
   const FeatureBlock& block = features.blocks().front();
-  VectorXd wave(block.basis.rows());
+  VectorXd wave(block.rows);
   for (Index k = 0; k < wave.size(); ++k)
     wave[k] = 3.0 + std::cos(2.0 * std::numbers::pi * block.cycles * static_cast<double>(k) /
                              static_cast<double>(wave.size()));
@@ -80,6 +82,33 @@ TEST(SessionProblem, FindsTheModulusOfItsOwnModel) {
   const EvidenceFit fit =
       fit_with_shares(rig.target(problem), rig.columns, problem.error(), problem.error().prior.share);
   EXPECT_LT(fit.surprise(problem.error().prior)[0], 1.0);
+}
+
+TEST(SessionProblem, BearsAGap) {
+  const SpecimenFamily family = gel_family();
+  Session session = simulated_session(family, {});
+  for (size_t k = 700; k < 720; ++k)
+    session.runs[0].pressure_kPa[Channel::cavity][k] = std::numeric_limits<double>::quiet_NaN();
+  const SessionProblem problem(session, family, 2);
+  EXPECT_NEAR(problem.model(declared_rig(problem).at).modulus_kPa, 8.0, 0.1);
+}
+
+TEST(SimulatedPlant, CopiesCyclesThatRepeatThemselves) {
+  const SpecimenFamily family = gel_family();
+  RigModel model;
+  model.curve = family.plain();
+  SessionRun run = empty_run("baseline", {0.0, "parabolic", 40.0, 1.2, 0.0, 24}, 0.0);
+  const PlantTrace all = simulate_plant(model, run.drive);
+  run.drive.repetitions = {{1.2, 1.2, 24}};
+  const PlantTrace copied = simulate_plant(model, run.drive);
+  ASSERT_EQ(copied.cavity_kPa.size(), all.cavity_kPa.size());
+  const double range_kPa = *std::ranges::max_element(all.cavity_kPa);
+  size_t alike = 0;
+  for (size_t k = 0; k < all.cavity_kPa.size(); ++k) {
+    EXPECT_NEAR(copied.cavity_kPa[k], all.cavity_kPa[k], 1e-5 * range_kPa) << k;
+    if (k >= 720 && copied.cavity_kPa[k] == copied.cavity_kPa[k - 720]) ++alike;
+  }
+  EXPECT_GT(alike, 10 * 720);  // a cycle is 720 steps: most were copied
 }
 
 }  // namespace
