@@ -17,8 +17,9 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr size_t most_moments = 12;
-constexpr double spacing_s = 0.5;   ///< of the moments that are tried first
-constexpr double finest_s = 0.003;  ///< a sample
+constexpr double spacing_s = 0.5;     ///< of the moments that are tried first
+constexpr double finest_s = 0.003;    ///< a sample
+constexpr double worth_moving = 0.5;  ///< of 2 ln likelihood
 
 struct Moment {
   size_t run = 0;
@@ -60,6 +61,11 @@ class EventScan {
   [[nodiscard]] MatrixXd changes(const std::vector<Moment>& moments) const;
   /// Of each of the changes beside what has been found.
   [[nodiscard]] std::vector<Gain> gains(const VectorXd& found, const MatrixXd& changes) const;
+  /// The best of them.
+  [[nodiscard]] std::pair<Moment, Gain> best(const VectorXd& found, const std::vector<Moment>& among,
+                                             const MatrixXd& changes) const;
+  /// From a moment to the best one near it.
+  [[nodiscard]] std::pair<Moment, Gain> refined(const VectorXd& found, Moment moment) const;
 
   const rig::SessionProblem& problem_;
   const EffectSet& before_;
@@ -172,6 +178,24 @@ std::vector<EventScan::Gain> EventScan::gains(const VectorXd& found, const Matri
   return list;
 }
 
+std::pair<Moment, EventScan::Gain> EventScan::best(const VectorXd& found, const std::vector<Moment>& among,
+                                                   const MatrixXd& changes) const {
+  const std::vector<Gain> list = gains(found, changes);
+  const auto at = std::ranges::max_element(list, {}, &Gain::gain);
+  return {among[static_cast<size_t>(at - list.begin())], *at};
+}
+
+std::pair<Moment, EventScan::Gain> EventScan::refined(const VectorXd& found, Moment moment) const {
+  Gain gained;
+  for (double spacing = 0.5 * spacing_s; spacing > finest_s; spacing *= 0.5) {
+    std::vector<Moment> near;
+    for (const double by : {-2.0, -1.0, 0.0, 1.0, 2.0})
+      near.push_back({moment.run, moment.time_s + by * spacing});
+    std::tie(moment, gained) = best(found, near, changes(near));
+  }
+  return {moment, gained};
+}
+
 std::optional<rig::SessionModel> EventScan::run() {
   std::vector<Moment> everywhere;
   for (size_t r = 0; r < problem_.session().runs.size(); ++r) {
@@ -187,21 +211,25 @@ std::optional<rig::SessionModel> EventScan::run() {
   std::vector<Moment> found;
   Gain so_far;
   while (found.size() < (lasts_ ? 1 : most_moments)) {
-    const auto best = [&](const std::vector<Moment>& among, const MatrixXd& changed) {
-      const std::vector<Gain> list = gains(sum, changed);
-      const auto at = std::ranges::max_element(list, {}, &Gain::gain);
-      return std::pair(among[static_cast<size_t>(at - list.begin())], *at);
-    };
-    auto [moment, gained] = best(everywhere, everywhere_changes);
-    for (double spacing = 0.5 * spacing_s; spacing > finest_s; spacing *= 0.5) {
-      const std::vector<Moment> near{
-          {moment.run, moment.time_s - spacing}, moment, {moment.run, moment.time_s + spacing}};
-      std::tie(moment, gained) = best(near, changes(near));
-    }
+    auto [moment, gained] = best(sum, everywhere, everywhere_changes);
+    std::tie(moment, gained) = refined(sum, moment);
     if (gained.gain < so_far.gain + chance + (found.empty() ? least : 0.0)) break;
     so_far = gained;
     found.push_back(moment);
     sum += changes({moment}).col(0);
+    // Each again beside the others, until all rest.
+    for (bool moved = found.size() > 1; moved;) {
+      moved = false;
+      for (Moment& one : found) {
+        const VectorXd others = sum - changes({one}).col(0);
+        const auto [better, gained_there] = refined(others, one);
+        if (!(gained_there.gain > so_far.gain + worth_moving)) continue;
+        one = better;
+        so_far = gained_there;
+        sum = others + changes({one}).col(0);
+        moved = true;
+      }
+    }
   }
   if (found.empty()) return {};
   rig::SessionModel start = before_.model;

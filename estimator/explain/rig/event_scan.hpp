@@ -3,8 +3,9 @@
 // effects leaves of a session's features.
 //
 // The effect is simulated once, there from the start of each run; what it does from a moment on is taken to be that
-// change from then on. Moments are added one by one, all of one size, where they promise most, as long as each gains more
-// than its choice among so many moments may bring by chance.
+// change from then on. Features hold a cycle's level and size, so that a moment is found to within half a cycle. Moments
+// are added one by one, all of one size, where they promise most, as long as each gains more than its choice among so
+// many moments may bring by chance.
 
 #include <optional>
 

@@ -237,6 +237,7 @@ EffectSet search(const rig::SessionProblem& problem, SetProblem& set, const rig:
   constexpr double out_of_reach = 50.0;  // nats: rounds after the first bring some
   constexpr int most_rounds = 4;
   constexpr double rested = 0.5;  // nats
+  constexpr double nearly_nothing = 1e-6;
   EffectSet out;
   VectorXd q = set.start();
   const Index searched = set.searched();
@@ -253,7 +254,7 @@ EffectSet search(const rig::SessionProblem& problem, SetProblem& set, const rig:
   for (int round = 0; round < most_rounds; ++round) {
     set.set_variance(out.evidence.variance);
     inference::SearchOptions options;
-    options.iteration_limit = 15;
+    options.iteration_limit = 40;  // a bubble and its exponent go a long way along a valley
     options.small_gain = [](double) { return 1.0; };  // half a nat decides nothing
     options.refusal_limit = 6;
     options.first_radius = 1e4;
@@ -274,8 +275,10 @@ EffectSet search(const rig::SessionProblem& problem, SetProblem& set, const rig:
   out.known.columns.col(0) = columns.col(searched - 1);
   out.known.columns.rightCols(others) = columns.rightCols(others);
   out.unknowns.assign(set.unknowns().begin(), set.unknowns().begin() + set.effect_values());
-  out.covariance = out.evidence.precision.llt().solve(
-      MatrixXd::Identity(out.evidence.precision.rows(), out.evidence.precision.cols()));
+  // Errors are the data's: what the evidence takes a size to be beforehand is no measurement of it.
+  MatrixXd measured = out.evidence.precision;
+  measured.diagonal().head(searched - 1).array() -= 1.0 - nearly_nothing;
+  out.covariance = measured.ldlt().solve(MatrixXd::Identity(measured.rows(), measured.cols()));
   for (Index i = 0; i + 1 < searched; ++i) {
     const double width = prior_width(set, q, i);
     out.covariance.row(i) *= width;

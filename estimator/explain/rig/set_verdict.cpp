@@ -91,14 +91,18 @@ Ids material_ids(const EffectSet& set, const Sizes& sizes) {
   return ids;
 }
 
-/// From how many sds on the largest of the parts' shares is a surprise: each of them may be by chance.
-double least_surprise(const rig::ModelError& error) {
+/// Of the model's error in this session.
+size_t parts_of(const rig::ModelError& error) {
   std::array<bool, rig::error_groups> present{};
   for (const rig::ErrorGroup group : error.group)
     present[static_cast<size_t>(group)] = true;
-  const auto parts = static_cast<double>(std::ranges::count(present, true));
+  return static_cast<size_t>(std::ranges::count(present, true));
+}
+
+/// From how many sds on the largest of so many shares is a surprise: each of them may be by chance.
+double least_surprise(size_t parts) {
   return boost::math::quantile(
-      boost::math::complement(boost::math::normal(), surprising_by_chance / std::max(parts, 1.0)));
+      boost::math::complement(boost::math::normal(), surprising_by_chance / static_cast<double>(parts)));
 }
 
 }  // namespace
@@ -157,7 +161,8 @@ SetVerdict judge_sets(const rig::SessionProblem& problem, const SetSearch& searc
   const bool is_more = leading->first.size() > search.given;
   if (is_more) out.searches.push_back({best.ids(), best.termination});
   const rig::Shares surprise = best.evidence.surprise(problem.error().prior);
-  const double most_surprise = least_surprise(problem.error());
+  // A name bears what the parts show by chance; that nothing is wrong is not said of a misfit that one part shows so seldom.
+  const double most_surprise = least_surprise(is_more ? parts_of(problem.error()) : 1);
   const bool surprising =
       std::ranges::any_of(surprise, [&](double sigmas) { return sigmas > most_surprise; });
   if (surprising || !is_settled(out.searches)) {

@@ -12,6 +12,8 @@
 namespace diastole::explain {
 namespace {
 
+constexpr double half_a_cycle_s = 0.6;  // features hold a cycle's level and size, no more
+
 class EventScan : public testing::Test {
  protected:
   [[nodiscard]] std::optional<rig::SessionModel> scanned(const rig::Session& session, const char* id) const {
@@ -44,8 +46,8 @@ TEST_F(EventScan, FindsEachLossOfSteps) {
   std::vector<double> times{found->terms.front().change_points[0].time_s,
                             found->terms.front().change_points[1].time_s};
   std::ranges::sort(times);
-  EXPECT_NEAR(times[0], 2.9, 0.1);
-  EXPECT_NEAR(times[1], 4.37, 0.1);
+  EXPECT_NEAR(times[0], 2.9, half_a_cycle_s);
+  EXPECT_NEAR(times[1], 4.37, half_a_cycle_s);
 }
 
 TEST_F(EventScan, FindsNothingInNoise) {
