@@ -8,6 +8,8 @@
 
 namespace diastole {
 
+void add_images(CommandLine& line);
+void add_track(CommandLine& line);
 void add_solve(CommandLine& line);
 void add_pressure_volume(CommandLine& line);
 void add_fit(CommandLine& line);
@@ -26,6 +28,8 @@ using ExplanationScorer = std::function<ExitCode(
 void add_explain(CommandLine& line, const ExplanationScorer& score);
 
 inline void add_estimator_commands(CommandLine& line, const ExplanationScorer& score) {
+  add_images(line);
+  add_track(line);
   add_solve(line);
   add_pressure_volume(line);
   add_reconstruct(line);

@@ -10,7 +10,7 @@ template <>
 struct JsonWords<Severity> {
   static constexpr const char* kind = "severity";
   static constexpr std::array all{Severity::note, Severity::warning, Severity::error};
-  static constexpr auto word_of = describe;
+  static constexpr std::string_view (*word_of)(Severity) = describe;
 };
 
 DIASTOLE_MEMBERS(Finding, severity, id, what, where, number, unit, remedy)

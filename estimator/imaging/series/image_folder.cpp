@@ -1,0 +1,413 @@
+#include "estimator/imaging/series/image_folder.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <map>
+#include <mutex>
+#include <numbers>
+#include <set>
+
+#include "estimator/parallel/parallel_for.hpp"
+#include "protocol/contract/input_error.hpp"
+
+namespace diastole::imaging {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A magnitude lies on one side of its lowest value; a velocity's noise fills both sides of zero alike, unless the image is
+/// mostly still tissue, whose values are near zero.
+constexpr double one_sided = 0.5;
+
+Finding problem(Severity severity, std::string id, std::string what, std::string where, double number,
+                std::string unit, std::string remedy) {
+  return {severity, std::move(id),   std::move(what),  std::move(where),
+          number,   std::move(unit), std::move(remedy)};
+}
+
+std::vector<fs::path> files_below(const fs::path& folder) {
+  std::error_code error;
+  if (!fs::is_directory(folder, error))
+    throw InputError(
+        {folder.string(), "", "is no folder", "Name the folder that holds the scanner's export."});
+  std::vector<fs::path> files;
+  for (fs::recursive_directory_iterator at(folder, fs::directory_options::skip_permission_denied, error), end;
+       at != end; at.increment(error)) {
+    if (error) break;
+    if (at->is_regular_file(error)) files.push_back(at->path());
+  }
+  std::sort(files.begin(), files.end());
+  return files;
+}
+
+/// By its name a DICOM file, or one of the nameless kind that scanners write; README.txt, .DS_Store and the like are not.
+bool claims_to_be_dicom(const fs::path& file) {
+  std::string ending = file.extension().string();
+  std::transform(ending.begin(), ending.end(), ending.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return ending == ".dcm" || ending == ".dicom" || ending == ".ima";
+}
+
+void report_fault(const FileFault& fault, const fs::path& file, const std::string& name,
+                  std::vector<Finding>& problems) {
+  const std::string place = fault.place.empty() ? "" : fault.place + ": ";
+  switch (fault.kind) {
+    case FileFault::Kind::foreign:
+      if (claims_to_be_dicom(file))
+        problems.push_back(
+            problem(Severity::error, "foreign-file", place + fault.problem, name, 1, "", fault.remedy));
+      return;
+    case FileFault::Kind::not_mr:
+      problems.push_back(
+          problem(Severity::error, "not-mr", place + fault.problem, name, 1, "", fault.remedy));
+      return;
+    case FileFault::Kind::truncated:
+      problems.push_back(
+          problem(Severity::error, "truncated", place + fault.problem, name, 1, "", fault.remedy));
+      return;
+    case FileFault::Kind::unusable:
+      problems.push_back(
+          problem(Severity::error, "unusable", place + fault.problem, name, 1, "", fault.remedy));
+  }
+}
+
+/// Both halves of the values on either side of zero, of like extent.
+bool is_signed_about_zero(const Image& image) {
+  std::vector<float> values(image.data(), image.data() + image.size());
+  const auto quantile = [&](double share) {
+    const auto at =
+        values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
+    std::nth_element(values.begin(), at, values.end());
+    return static_cast<double>(*at);
+  };
+  const double low = quantile(0.02);
+  const double high = quantile(0.98);
+  return low < 0 && high > 0 && std::abs(low + high) < one_sided * (high - low);
+}
+
+/// Images of one series that may be one stack: what they are (magnitude or phase) and how they lie.
+struct Stack {
+  std::string uid;
+  Component component;
+  std::vector<size_t> images;
+};
+
+class Sorter {
+ public:
+  explicit Sorter(ImageFolder& folder) : folder_(folder) {}
+
+  void sort() {
+    settle_components();
+    for (Stack& stack : stacks())
+      add_series(stack);
+    std::stable_sort(folder_.series.begin(), folder_.series.end(),
+                     [](const ImageSeries& a, const ImageSeries& b) { return a.number < b.number; });
+  }
+
+ private:
+  const ImageHeader& header(size_t image) const { return folder_.images[image].header; }
+
+  void complain(Severity severity, std::string id, std::string what, size_t image, double number,
+                std::string unit, std::string remedy) {
+    folder_.problems.push_back(problem(severity, std::move(id), std::move(what), folder_.file_name(image),
+                                       number, std::move(unit), std::move(remedy)));
+  }
+
+  /// Where a series holds several kinds of picture and its headers do not say which is which, the pixels do.
+  void settle_components() {
+    std::map<std::string, std::vector<size_t>> unsaid;
+    for (size_t image = 0; image < folder_.images.size(); ++image) {
+      if (header(image).component == Component::unsaid) unsaid[header(image).series_uid].push_back(image);
+    }
+    for (const auto& [uid, images] : unsaid) {
+      std::vector<Component> found(images.size());
+      parallel_for(images.size(), machine_threads(), [&](size_t i) {
+        found[i] =
+            is_signed_about_zero(folder_.pixels({images[i]})[0]) ? Component::phase : Component::magnitude;
+      });
+      for (size_t i = 0; i < images.size(); ++i)
+        folder_.images[images[i]].header.component = found[i];
+    }
+  }
+
+  /// By series, component and orientation, in the order of their first images.
+  std::vector<Stack> stacks() {
+    std::vector<Stack> all;
+    for (size_t image = 0; image < folder_.images.size(); ++image) {
+      const auto fits = std::find_if(all.begin(), all.end(), [&](const Stack& stack) {
+        const ImageHeader& first = header(stack.images[0]);
+        return stack.uid == header(image).series_uid && stack.component == header(image).component &&
+               parallel_alike(first.plane, header(image).plane);
+      });
+      if (fits != all.end()) {
+        fits->images.push_back(image);
+      } else {
+        all.push_back({header(image).series_uid, header(image).component, {image}});
+      }
+    }
+    report_mixed(all);
+    return all;
+  }
+
+  /// A series may hold several orientations, as a localiser does. A few images that lie otherwise than a cine's many are no slice of
+  /// their own: the protocol changed, or files of two scans were mixed.
+  void report_mixed(std::vector<Stack>& all) {
+    for (const Stack& few : all) {
+      const auto many = std::find_if(all.begin(), all.end(), [&](const Stack& other) {
+        return other.uid == few.uid && other.component == few.component &&
+               other.images.size() > 2 * few.images.size();
+      });
+      if (many == all.end()) continue;
+      const SlicePlane& here = header(few.images[0]).plane;
+      const SlicePlane& there = header(many->images[0]).plane;
+      complain(Severity::error, "mixed-geometry",
+               fmt::format("another geometry than the rest of its series: {} x {} pixels of {:.4g} x {:.4g} "
+                           "mm, {}, beside {} x "
+                           "{} of {:.4g} x {:.4g} mm, {}",
+                           here.rows, here.columns, here.row_spacing_mm, here.column_spacing_mm,
+                           orientation_in_words(here), there.rows, there.columns, there.row_spacing_mm,
+                           there.column_spacing_mm, orientation_in_words(there)),
+               few.images[0], static_cast<double>(few.images.size()), "images",
+               "Export the series again, or move these images out of the folder.");
+    }
+  }
+
+  std::vector<SliceImages> slices_of(const Stack& stack) const {
+    std::vector<SliceImages> slices;
+    for (const size_t image : stack.images) {
+      const auto fits = std::find_if(slices.begin(), slices.end(), [&](const SliceImages& slice) {
+        return same_place(slice.plane, header(image).plane);
+      });
+      if (fits != slices.end()) {
+        fits->images.push_back(image);
+      } else {
+        slices.push_back({header(image).plane, {image}});
+      }
+    }
+    const Eigen::Vector3d normal = slices.front().plane.normal();
+    std::sort(slices.begin(), slices.end(), [&](const SliceImages& a, const SliceImages& b) {
+      return a.plane.origin_mm.dot(normal) < b.plane.origin_mm.dot(normal);
+    });
+    for (SliceImages& slice : slices) {
+      std::stable_sort(slice.images.begin(), slice.images.end(), [&](size_t a, size_t b) {
+        return std::pair(header(a).trigger_ms.value_or(0), header(a).instance) <
+               std::pair(header(b).trigger_ms.value_or(0), header(b).instance);
+      });
+    }
+    return slices;
+  }
+
+  void add_series(const Stack& stack) {
+    ImageSeries series;
+    const ImageHeader& first = header(stack.images[0]);
+    series.number = first.series_number;
+    series.vendor = first.vendor;
+    series.interval_ms = first.interval_ms;
+    series.velocity = first.velocity;
+    series.slices = slices_of(stack);
+    std::set<size_t> files;
+    std::set<double> b_values;
+    for (const size_t image : stack.images) {
+      files.insert(folder_.images[image].file);
+      if (header(image).diffusion) b_values.insert(header(image).diffusion->b_s_mm2);
+    }
+    series.files.assign(files.begin(), files.end());
+    series.b_s_mm2.assign(b_values.begin(), b_values.end());
+    const bool is_diffusion = b_values.size() > 1 || (b_values.size() == 1 && *b_values.begin() > 0);
+    if (is_diffusion) {
+      series.kind = SeriesKind::diffusion;
+      series.reason = fmt::format("the headers give {} b values, up to {:.0f} s/mm\u00b2", b_values.size(),
+                                  *b_values.rbegin());
+    } else {
+      number_phases(series);
+      find_kind(series);
+    }
+    folder_.series.push_back(std::move(series));
+  }
+
+  /// Phases in time; what has none, or one twice, cannot be followed.
+  void number_phases(ImageSeries& series) {
+    std::vector<double> times_ms;
+    for (const SliceImages& slice : series.slices) {
+      for (const size_t image : slice.images) {
+        if (header(image).trigger_ms) {
+          times_ms.push_back(*header(image).trigger_ms);
+        } else if (slice.images.size() > 1) {
+          complain(Severity::error, "no-trigger-time",
+                   fmt::format("TriggerTime (0018,1060) is absent: the {} images of this slice cannot be put "
+                               "in order of time",
+                               slice.images.size()),
+                   image, static_cast<double>(slice.images.size()), "images",
+                   "Export the original gated images; anonymising tools may have removed the time.");
+          return;
+        }
+      }
+    }
+    series.phases = phase_times(times_ms);
+    for (SliceImages& slice : series.slices)
+      check_slice(series, slice);
+    check_spacing_of_slices(series);
+  }
+
+  void check_slice(const ImageSeries& series, SliceImages& slice) {
+    std::vector<int> found(series.phases.times_ms.size());
+    std::vector<size_t> kept;
+    for (const size_t image : slice.images) {
+      const auto phase =
+          header(image).trigger_ms ? series.phases.index_of(*header(image).trigger_ms) : std::nullopt;
+      const bool twice = phase && found[*phase]++ > 0;
+      if (!twice) {
+        kept.push_back(image);
+      } else if (same_pixels(kept.back(), image)) {
+        complain(Severity::warning, "copy", fmt::format("a copy of {}", folder_.file_name(kept.back())),
+                 image, 1, "", "Nothing is lost: one of the two is used.");
+      } else {
+        kept.push_back(image);
+        complain(Severity::error, "slice-twice",
+                 fmt::format("phase {} at {:.0f} ms of this slice is there twice, also as {}", *phase + 1,
+                             *header(image).trigger_ms, folder_.file_name(kept[kept.size() - 2])),
+                 image, *header(image).trigger_ms, "ms",
+                 "Move the repetition that does not count out of the folder.");
+        break;
+      }
+    }
+    slice.images = kept;
+    std::string missing;
+    for (size_t phase = 0; phase < found.size(); ++phase) {
+      if (found[phase] == 0) missing += fmt::format("{}{}", missing.empty() ? "" : ", ", phase + 1);
+    }
+    if (!missing.empty())
+      complain(Severity::warning, "phase-missing",
+               fmt::format("phase {} of {} is missing in this slice", missing, found.size()), slice.images[0],
+               static_cast<double>(std::count(found.begin(), found.end(), 0)), "phases",
+               "Tracking goes across the gap. Export the series again if the scanner still has it.");
+  }
+
+  bool same_pixels(size_t a, size_t b) const {
+    const std::vector<Image> pair = {folder_.pixels({a})[0], folder_.pixels({b})[0]};
+    return (pair[0] == pair[1]).all();
+  }
+
+  /// In a stack of equal steps, a step of twice or three times the size is a slice that was lost.
+  void check_spacing_of_slices(const ImageSeries& series) {
+    std::vector<double> steps_mm;
+    for (size_t i = 1; i < series.slices.size(); ++i)
+      steps_mm.push_back((series.slices[i].plane.origin_mm - series.slices[i - 1].plane.origin_mm)
+                             .dot(series.plane().normal()));
+    if (steps_mm.size() < 2) return;
+    const double least = *std::min_element(steps_mm.begin(), steps_mm.end());
+    for (size_t i = 0; i < steps_mm.size(); ++i) {
+      if (steps_mm[i] < 1.5 * least) continue;
+      complain(Severity::warning, "slice-missing",
+               fmt::format("the next slice is {:.1f} mm away, others {:.1f} mm: slices are missing",
+                           steps_mm[i], least),
+               series.slices[i].images[0], steps_mm[i], "mm",
+               "Export the series again if they were acquired.");
+    }
+  }
+
+  void find_kind(ImageSeries& series) {
+    const SliceImages& middle = series.slices[series.slices.size() / 2];
+    const Image first = folder_.pixels({middle.images.front()})[0];
+    if (is_signed_about_zero(first)) {
+      series.kind = SeriesKind::velocity;
+      series.reason =
+          fmt::format("values lie on both sides of zero, from {:.4g} to {:.4g}{}",
+                      static_cast<double>(first.minCoeff()), static_cast<double>(first.maxCoeff()),
+                      series.velocity ? fmt::format("; velocity encoding {:.4g} cm/s by {}",
+                                                    series.velocity->venc_cm_s, series.velocity->source)
+                                      : "");
+      return;
+    }
+    for (SliceImages& slice : series.slices)
+      slice.tags = find_tag_waves(folder_.pixels({slice.images.front()})[0], slice.plane);
+    const bool several = middle.images.size() > 1;
+    if (several && !middle.tags.empty()) {
+      series.kind = SeriesKind::tagged_cine;
+      const TagWave& tag = middle.tags[0];
+      const Image last = folder_.pixels({middle.images.back()})[0];
+      series.reason = fmt::format(
+          "the first phase's spectrum has {} of {:.2f} mm, {:.0f} times its surroundings; modulation {:.0f} "
+          "%, {:.0f} % in the last phase",
+          middle.tags.size() == 1 ? "a line" : "a grid of lines", tag.spacing_mm(), tag.prominence,
+          100 * tag.modulation, 100 * modulation_at(last, middle.plane, tag.per_mm));
+      return;
+    }
+    series.kind = several ? SeriesKind::cine : SeriesKind::anatomy;
+    series.reason = several ? "several phases, and no line of tags in the spectrum" : "one image a slice";
+    if (several && header(middle.images.front()).says_tagged)
+      complain(Severity::warning, "tags-not-seen",
+               "the header says tagged (0018,9028), the image shows no tags", middle.images.front(), 1, "",
+               "Look at the first phase: were the tags switched on?");
+  }
+
+  ImageFolder& folder_;
+};
+
+}  // namespace
+
+std::vector<Image> ImageFolder::pixels(const std::vector<size_t>& chosen) const {
+  std::map<size_t, std::vector<size_t>> by_file;  // positions in `chosen`
+  for (size_t i = 0; i < chosen.size(); ++i)
+    by_file[images[chosen[i]].file].push_back(i);
+  std::vector<Image> result(chosen.size());
+  for (const auto& [file, positions] : by_file) {
+    std::vector<ImageHeader> headers;
+    for (const size_t i : positions)
+      headers.push_back(images[chosen[i]].header);
+    std::vector<Image> read = read_pixels(files[file], headers);
+    for (size_t i = 0; i < positions.size(); ++i)
+      result[positions[i]] = std::move(read[i]);
+  }
+  return result;
+}
+
+std::string ImageFolder::file_name(size_t image) const {
+  return fs::relative(files[images[image].file], folder).generic_string();
+}
+
+ImageFolder read_image_folder(const fs::path& path, const Progress& progress) {
+  ImageFolder folder;
+  folder.folder = path;
+  folder.files = files_below(path);
+  std::vector<DicomContent> contents(folder.files.size());
+  std::atomic<size_t> done = 0;
+  std::mutex reporting;
+  parallel_for(folder.files.size(), machine_threads(), [&](size_t i) {
+    contents[i] = read_headers(folder.files[i]);
+    const size_t count = ++done;
+    if (!progress || (count % 100 != 0 && count != contents.size())) return;
+    const std::scoped_lock lock(reporting);
+    progress(count, contents.size());
+  });
+  for (size_t file = 0; file < contents.size(); ++file) {
+    const DicomContent& content = contents[file];
+    if (content.fault)
+      report_fault(*content.fault, folder.files[file],
+                   fs::relative(folder.files[file], path).generic_string(), folder.problems);
+    for (const ImageHeader& header : content.images)
+      folder.images.push_back({file, header});
+  }
+  if (folder.images.empty() && folder.problems.empty())
+    throw InputError({path.string(), "", "holds no MR images in DICOM format",
+                      "Name the folder that holds the scanner's export, or export it as DICOM."});
+  Sorter(folder).sort();
+  return folder;
+}
+
+void require_sound(const ImageFolder& folder) {
+  const auto is_error = [](const Finding& finding) { return finding.severity == Severity::error; };
+  const auto first = std::find_if(folder.problems.begin(), folder.problems.end(), is_error);
+  if (first == folder.problems.end()) return;
+  const auto others = std::count_if(folder.problems.begin(), folder.problems.end(), is_error) - 1;
+  throw InputError({(folder.folder / first->where).string(), "",
+                    others == 0
+                        ? first->what
+                        : fmt::format("{} (and {} more: `diastole images` lists them)", first->what, others),
+                    first->remedy});
+}
+
+}  // namespace diastole::imaging

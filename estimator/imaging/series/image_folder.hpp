@@ -1,0 +1,36 @@
+#pragma once
+// A scanner's export as it lies on the disk: any order, any file names, several studies' worth of series.
+
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "estimator/imaging/series/image_series.hpp"
+#include "estimator/io/finding.hpp"
+
+namespace diastole::imaging {
+
+struct ImageFolder {
+  std::filesystem::path folder;
+  std::vector<std::filesystem::path> files;  ///< all that are in it
+  std::vector<ImageOfFolder> images;
+  std::vector<ImageSeries> series;  ///< by series number
+  /// An error means that the images are not what they must be; `where` names the file, relative to the folder.
+  std::vector<Finding> problems;
+
+  /// The pixels of these images, in this order. Throws InputError (file, frame) for what cannot be decoded.
+  [[nodiscard]] std::vector<Image> pixels(const std::vector<size_t>& chosen) const;
+  [[nodiscard]] std::string file_name(size_t image) const;  ///< relative to the folder
+};
+
+using Progress = std::function<void(size_t done, size_t all)>;
+
+/// Reads every header below `folder` and the pixels that the kinds need: one or two images a slice. Throws InputError if there is no
+/// such folder, or no file in it that is DICOM.
+ImageFolder read_image_folder(const std::filesystem::path& folder, const Progress& progress = {});
+
+/// Throws the first error of `problems` as an InputError that says how many there are.
+void require_sound(const ImageFolder& folder);
+
+}  // namespace diastole::imaging

@@ -1,0 +1,76 @@
+#include "estimator/imaging/series/phase_times.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace diastole::imaging {
+namespace {
+
+constexpr double same_phase = 0.25;      // of a step
+constexpr double whole_tolerance = 0.1;  // of a step
+constexpr double most_missing = 16.0;    // a longer gap is a pause of the protocol, not missing images
+constexpr double resolution_ms = 0.5;    // trigger times are written in milliseconds
+
+/// Means of groups of times no further apart than `width_ms` from the group's first.
+std::vector<double> grouped(const std::vector<double>& sorted, double width_ms) {
+  std::vector<double> means;
+  for (size_t first = 0; first < sorted.size();) {
+    size_t end = first;
+    double sum = 0;
+    while (end < sorted.size() && sorted[end] - sorted[first] <= width_ms)
+      sum += sorted[end++];
+    means.push_back(sum / static_cast<double>(end - first));
+    first = end;
+  }
+  return means;
+}
+
+double median_step(const std::vector<double>& sorted) {
+  std::vector<double> steps;
+  for (size_t i = 1; i < sorted.size(); ++i) {
+    if (sorted[i] - sorted[i - 1] > resolution_ms) steps.push_back(sorted[i] - sorted[i - 1]);
+  }
+  if (steps.empty()) return 0;
+  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
+  std::nth_element(steps.begin(), middle, steps.end());
+  return *middle;
+}
+
+}  // namespace
+
+std::optional<size_t> PhaseTimes::index_of(double trigger_ms) const {
+  if (times_ms.empty()) return std::nullopt;
+  const auto nearest = std::min_element(times_ms.begin(), times_ms.end(), [&](double a, double b) {
+    return std::abs(a - trigger_ms) < std::abs(b - trigger_ms);
+  });
+  const double step = median_step(times_ms);
+  if (times_ms.size() > 1 && std::abs(*nearest - trigger_ms) > 0.5 * step) return std::nullopt;
+  return static_cast<size_t>(nearest - times_ms.begin());
+}
+
+PhaseTimes phase_times(std::span<const double> trigger_ms) {
+  std::vector<double> sorted(trigger_ms.begin(), trigger_ms.end());
+  std::sort(sorted.begin(), sorted.end());
+  std::vector<double> means = grouped(sorted, resolution_ms);
+  means = grouped(means, same_phase * median_step(means));
+  const double step = median_step(means);
+  PhaseTimes phases;
+  for (const double time : means) {
+    if (!phases.times_ms.empty() && step > 0) {
+      const double before = phases.times_ms.back();
+      const double steps = (time - before) / step;
+      const double whole = std::round(steps);
+      if (whole >= 2 && whole <= most_missing && std::abs(steps - whole) <= whole_tolerance) {
+        for (double i = 1; i < whole; ++i) {
+          phases.times_ms.push_back(before + i * (time - before) / whole);
+          phases.present.push_back(false);
+        }
+      }
+    }
+    phases.times_ms.push_back(time);
+    phases.present.push_back(true);
+  }
+  return phases;
+}
+
+}  // namespace diastole::imaging

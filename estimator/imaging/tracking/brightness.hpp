@@ -1,0 +1,42 @@
+#pragma once
+// How bright a material is at each place of an image, and how strongly its tags modulate it: smooth fields that are fitted
+// beside the motion. In a window about each place the image is  sum_j amplitude_j(x) pattern_j(x)  with patterns such as
+// 1, cos phi, cos 2 phi.
+
+#include <Eigen/Dense>
+#include <array>
+#include <span>
+#include <vector>
+
+namespace diastole::imaging {
+
+/// Amplitudes on the nodes of a coarse grid, by least squares in Gaussian windows; between nodes bilinear. Where a window holds
+/// little, the slice's own average takes over.
+class Brightness {
+ public:
+  /// The coarse grid over a slice of this extent; windows have the standard deviation `window_mm`, nodes half of it between them.
+  Brightness(const Eigen::Vector2d& extent_mm, double window_mm, int patterns);
+
+  void clear();
+  /// One pixel: `patterns` of the given length, its weight and value.
+  void add(const Eigen::Vector2d& x_mm, std::span<const double> patterns, double weight, double value);
+  void solve();
+  /// The amplitudes at a place, written to `amplitudes`.
+  void at(const Eigen::Vector2d& x_mm, std::span<double> amplitudes) const;
+
+ private:
+  struct Corner {
+    std::array<Eigen::Index, 4> node;
+    std::array<double, 4> share;
+  };
+  [[nodiscard]] Corner corner(const Eigen::Vector2d& x_mm) const;
+
+  int patterns_;
+  double node_mm_;
+  Eigen::Index columns_;
+  Eigen::Index rows_;
+  Eigen::ArrayXXd moments_;     // products and right sides x nodes
+  Eigen::ArrayXXd amplitudes_;  // patterns x nodes
+};
+
+}  // namespace diastole::imaging

@@ -1,0 +1,396 @@
+#include "estimator/imaging/tracking/materials.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <numbers>
+
+#include "estimator/imaging/tracking/brightness.hpp"
+
+namespace diastole::imaging {
+namespace {
+
+constexpr double pi = std::numbers::pi;
+
+/// Water that is stirred loses its tags within a phase or two, tissue keeps them for its T1 of 0.3 to 1.5 s, still water for 2 s and more.
+constexpr std::array typical_T1_s = {0.1, 0.8, 3.0};
+/// Darker than a quarter of what is bright: plates, air, and the noise of both.
+constexpr double least_brightness = 0.25;
+/// A pixel that no material explains (a ghost, a fold) should not outvote its neighbours: 3 standard deviations.
+constexpr double most_cost = 9.0;
+/// Pictures of materials are smooth to about this share of their brightness.
+constexpr double smooth_share = 0.05;
+/// Each pixel is judged with its neighbours: a binomial window of this many passes has a standard deviation of one pixel.
+constexpr int pooling_passes = 2;
+
+double quantile(std::vector<double> values, double share) {
+  if (values.empty()) return 0;
+  const auto at =
+      values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
+  std::nth_element(values.begin(), at, values.end());
+  return *at;
+}
+
+/// Patterns of tags at rest whose phase is free: 1, and cosine and sine of each direction.
+size_t rest_patterns(const TagView& view, const Eigen::Vector2d& x_mm, std::span<double> patterns) {
+  size_t count = 0;
+  patterns[count++] = 1.0;
+  for (const TagWave& wave : view.waves) {
+    const double phase = 2 * pi * (wave.per_mm.dot(x_mm) - wave.offset_cycles);
+    patterns[count++] = std::cos(phase);
+    patterns[count++] = std::sin(phase);
+  }
+  return count;
+}
+
+/// The windowed mean and the modulation of one image, at every pixel of a coarser raster.
+struct Modulation {
+  std::vector<double> mean;
+  std::vector<double> share;  // of the mean
+};
+
+constexpr Eigen::Index raster = 2;  // pixels
+
+Modulation modulation_of(const TagView& view, const Image& image) {
+  const double window_mm = 0.5 / view.waves[0].per_mm.norm();
+  const size_t count = 1 + 2 * view.waves.size();
+  Brightness brightness(view.extent_mm(), window_mm, static_cast<int>(count));
+  std::array<double, 5> patterns{};
+  for (Eigen::Index row = 0; row < image.rows(); ++row) {
+    for (Eigen::Index column = 0; column < image.cols(); ++column) {
+      const Eigen::Vector2d x = view.place_mm(row, column);
+      rest_patterns(view, x, patterns);
+      brightness.add(x, std::span(patterns).first(count), 1.0, static_cast<double>(image(row, column)));
+    }
+  }
+  brightness.solve();
+  Modulation result;
+  std::array<double, 5> amplitudes{};
+  for (Eigen::Index row = 0; row < image.rows(); row += raster) {
+    for (Eigen::Index column = 0; column < image.cols(); column += raster) {
+      brightness.at(view.place_mm(row, column), std::span(amplitudes).first(count));
+      double most = 0;
+      for (size_t i = 1; i < count; i += 2)
+        most = std::max(most, std::hypot(amplitudes[i], amplitudes[i + 1]));
+      result.mean.push_back(amplitudes[0]);
+      result.share.push_back(amplitudes[0] > 0 ? std::min(1.0, most / amplitudes[0]) : 0.0);
+    }
+  }
+  return result;
+}
+
+/// Longitudinal magnetisation that the tags still hold, from the modulation r of 1 - E (1 + cos phi) / 2: E = 2 r / (1 + r).
+double left_of(double share) { return 2 * share / (1 + share); }
+
+/// How a material's tags fade over the chosen phases: E of each.
+using Fading = std::vector<double>;
+
+double square_distance(const Fading& a, const Fading& b) {
+  double sum = 0;
+  for (size_t i = 0; i < a.size(); ++i)
+    sum += (a[i] - b[i]) * (a[i] - b[i]);
+  return sum;
+}
+
+size_t nearest(const std::array<Fading, 3>& centres, const Fading& fading) {
+  size_t best = 0;
+  for (size_t i = 1; i < centres.size(); ++i) {
+    if (square_distance(centres[i], fading) < square_distance(centres[best], fading)) best = i;
+  }
+  return best;
+}
+
+/// k-means from what the typical materials do; a material that does not occur keeps its typical course.
+std::array<Fading, 3> grouped(const std::vector<Fading>& samples, const std::vector<double>& times_s) {
+  std::array<Fading, 3> centres;
+  for (size_t i = 0; i < 3; ++i) {
+    for (const double time_s : times_s)
+      centres[i].push_back(std::exp(-time_s / typical_T1_s[i]));
+  }
+  for (int step = 0; step < 20; ++step) {
+    std::array<Fading, 3> sums;
+    sums.fill(Fading(times_s.size(), 0.0));
+    std::array<double, 3> counts{};
+    for (const Fading& sample : samples) {
+      const size_t group = nearest(centres, sample);
+      for (size_t k = 0; k < sample.size(); ++k)
+        sums[group][k] += sample[k];
+      counts[group] += 1;
+    }
+    for (size_t i = 0; i < 3; ++i) {
+      for (size_t k = 0; k < times_s.size() && counts[i] > 0; ++k)
+        centres[i][k] = sums[i][k] / counts[i];
+    }
+  }
+  return centres;
+}
+
+using CostMap = Eigen::ArrayXXf;
+
+void pool(CostMap& cost) {
+  const Eigen::Index rows = cost.rows();
+  const Eigen::Index columns = cost.cols();
+  for (int pass = 0; pass < pooling_passes; ++pass) {
+    CostMap across = cost;
+    for (Eigen::Index column = 0; column < columns; ++column)
+      across.col(column) = 0.25F * cost.col(std::max<Eigen::Index>(column - 1, 0)) + 0.5F * cost.col(column) +
+                           0.25F * cost.col(std::min(column + 1, columns - 1));
+    for (Eigen::Index row = 0; row < rows; ++row)
+      cost.row(row) = 0.25F * across.row(std::max<Eigen::Index>(row - 1, 0)) + 0.5F * across.row(row) +
+                      0.25F * across.row(std::min(row + 1, rows - 1));
+  }
+}
+
+/// One pass of the squared distance transform of sampled functions (Felzenszwalb and Huttenlocher, Theory Comput. 8 (2012) 415).
+void lower_envelope(std::span<float> values, double spacing_mm, std::vector<double>& scratch) {
+  const auto count = static_cast<int>(values.size());
+  scratch.assign(values.begin(), values.end());
+  std::vector<int> vertex(values.size());
+  std::vector<double> from(values.size() + 1);
+  int last = 0;
+  const auto crossing = [&](int a, int b) {
+    const double square = spacing_mm * spacing_mm;
+    return ((scratch[static_cast<size_t>(b)] + square * b * b) -
+            (scratch[static_cast<size_t>(a)] + square * a * a)) /
+           (2 * square * (b - a));
+  };
+  from[0] = -std::numeric_limits<double>::infinity();
+  from[1] = std::numeric_limits<double>::infinity();
+  for (int q = 1; q < count; ++q) {
+    double at = crossing(vertex[static_cast<size_t>(last)], q);
+    while (at <= from[static_cast<size_t>(last)]) {
+      --last;
+      at = crossing(vertex[static_cast<size_t>(last)], q);
+    }
+    vertex[static_cast<size_t>(++last)] = q;
+    from[static_cast<size_t>(last)] = at;
+    from[static_cast<size_t>(last) + 1] = std::numeric_limits<double>::infinity();
+  }
+  int at = 0;
+  for (int q = 0; q < count; ++q) {
+    while (from[static_cast<size_t>(at) + 1] < q)
+      ++at;
+    const int v = vertex[static_cast<size_t>(at)];
+    const double step = spacing_mm * (q - v);
+    values[static_cast<size_t>(q)] = static_cast<float>(step * step + scratch[static_cast<size_t>(v)]);
+  }
+}
+
+/// The distance of every pixel to the nearest one that `is_source`, 1e4 mm if there is none.
+Eigen::ArrayXXf distance_to(const Eigen::Array<bool, Eigen::Dynamic, Eigen::Dynamic>& is_source,
+                            const SlicePlane& plane) {
+  constexpr float far_mm2 = 1e8F;
+  Eigen::ArrayXXf square =
+      is_source.select(Eigen::ArrayXXf::Zero(is_source.rows(), is_source.cols()), far_mm2);
+  std::vector<double> scratch;
+  for (Eigen::Index column = 0; column < square.cols(); ++column)
+    lower_envelope({square.col(column).data(), static_cast<size_t>(square.rows())}, plane.row_spacing_mm,
+                   scratch);
+  std::vector<float> line(static_cast<size_t>(square.cols()));
+  for (Eigen::Index row = 0; row < square.rows(); ++row) {
+    Eigen::Map<Eigen::ArrayXf> view(line.data(), square.cols());
+    view = square.row(row).transpose();
+    lower_envelope(line, plane.column_spacing_mm, scratch);
+    square.row(row) = view.transpose();
+  }
+  return square.min(far_mm2).sqrt();
+}
+
+/// Connected pixels (by sides) for which `holds`, each piece handed to `piece`.
+void each_piece(const MaterialMap& map, const std::function<bool(Material)>& holds,
+                const std::function<void(const std::vector<Eigen::Index>&)>& piece) {
+  std::vector<bool> seen(static_cast<size_t>(map.size()));
+  std::vector<Eigen::Index> members;
+  for (Eigen::Index start = 0; start < map.size(); ++start) {
+    if (seen[static_cast<size_t>(start)] || !holds(map(start))) continue;
+    members.assign(1, start);
+    seen[static_cast<size_t>(start)] = true;
+    for (size_t i = 0; i < members.size(); ++i) {
+      const Eigen::Index row = members[i] % map.rows();
+      const Eigen::Index column = members[i] / map.rows();
+      const auto visit = [&](Eigen::Index r, Eigen::Index c) {
+        if (r < 0 || c < 0 || r >= map.rows() || c >= map.cols()) return;
+        const Eigen::Index at = c * map.rows() + r;
+        if (seen[static_cast<size_t>(at)] || !holds(map(at))) return;
+        seen[static_cast<size_t>(at)] = true;
+        members.push_back(at);
+      };
+      visit(row - 1, column);
+      visit(row + 1, column);
+      visit(row, column - 1);
+      visit(row, column + 1);
+    }
+    piece(members);
+  }
+}
+
+/// A material's picture, fitted where it surely is and predicted everywhere.
+CostMap cost_of(const Image& image, const TagView& view, const Eigen::ArrayXXf& depth, double sure_mm,
+                double window_mm, size_t count,
+                const std::function<void(Eigen::Index, Eigen::Index, std::span<double>)>& patterns_at,
+                double noise) {
+  CostMap cost = CostMap::Constant(image.rows(), image.cols(), static_cast<float>(most_cost));
+  Brightness brightness(view.extent_mm(), window_mm, static_cast<int>(count));
+  std::array<double, 8> patterns{}, amplitudes{};
+  Eigen::Index pixels = 0;
+  for (Eigen::Index column = 0; column < image.cols(); ++column) {
+    for (Eigen::Index row = 0; row < image.rows(); ++row) {
+      if (static_cast<double>(depth(row, column)) < sure_mm) continue;
+      patterns_at(row, column, std::span(patterns).first(count));
+      brightness.add(view.place_mm(row, column), std::span(patterns).first(count), 1.0,
+                     static_cast<double>(image(row, column)));
+      ++pixels;
+    }
+  }
+  if (pixels < 50) return cost;
+  brightness.solve();
+  for (Eigen::Index column = 0; column < image.cols(); ++column) {
+    for (Eigen::Index row = 0; row < image.rows(); ++row) {
+      patterns_at(row, column, std::span(patterns).first(count));
+      brightness.at(view.place_mm(row, column), std::span(amplitudes).first(count));
+      double picture = 0;
+      for (size_t i = 0; i < count; ++i)
+        picture += patterns[i] * amplitudes[i];
+      const double doubt = smooth_share * amplitudes[0];
+      const double off = static_cast<double>(image(row, column)) - picture;
+      cost(row, column) =
+          static_cast<float>(std::min(most_cost, off * off / (noise * noise + doubt * doubt)));
+    }
+  }
+  return cost;
+}
+
+/// The noise's standard deviation: half differences of next neighbours but one along both directions see little of stripes and
+/// shading; their median absolute deviation sees no edges.
+double noise_of(const Image& image, const Eigen::ArrayXXf& depth) {
+  std::vector<double> off;
+  for (Eigen::Index column = 1; column + 1 < image.cols(); ++column) {
+    for (Eigen::Index row = 1; row + 1 < image.rows(); ++row) {
+      if (depth(row, column) > 0) off.push_back(static_cast<double>(image(row, column)));
+    }
+  }
+  // Air shows the Rayleigh distribution, whose median is 1.1774 times the standard deviation of a channel.
+  return quantile(off, 0.5) / 1.1774;
+}
+
+}  // namespace
+
+MaterialMap first_materials(const TagView& view) {
+  // Six phases over the cycle tell three rates of fading apart.
+  std::vector<size_t> chosen;
+  const size_t phases = view.images.size();
+  for (size_t i = 0; i < std::min<size_t>(6, phases); ++i)
+    chosen.push_back(i * (phases - 1) / std::max<size_t>(1, std::min<size_t>(6, phases) - 1));
+  std::vector<Modulation> modulations;
+  std::vector<double> times_s;
+  for (const size_t k : chosen) {
+    modulations.push_back(modulation_of(view, view.images[k]));
+    times_s.push_back(1e-3 * view.times_ms[k]);
+  }
+  const size_t nodes = modulations[0].mean.size();
+  const double bright = quantile(modulations.back().mean, 0.9);
+  std::vector<Fading> fading(nodes), samples;
+  for (size_t node = 0; node < nodes; ++node) {
+    if (modulations.back().mean[node] < least_brightness * bright) continue;
+    for (const Modulation& modulation : modulations)
+      fading[node].push_back(left_of(modulation.share[node]));
+    samples.push_back(fading[node]);
+  }
+  const std::array<Fading, 3> centres = grouped(samples, times_s);
+  static constexpr std::array materials = {Material::mixed_water, Material::tissue, Material::still_water};
+  MaterialMap map(view.plane.rows, view.plane.columns);
+  const auto nodes_a_row = static_cast<size_t>((view.plane.columns + raster - 1) / raster);
+  for (Eigen::Index column = 0; column < map.cols(); ++column) {
+    for (Eigen::Index row = 0; row < map.rows(); ++row) {
+      const Fading& here =
+          fading[static_cast<size_t>(row / raster) * nodes_a_row + static_cast<size_t>(column / raster)];
+      map(row, column) = here.empty() ? Material::nothing : materials[nearest(centres, here)];
+    }
+  }
+  const double spacing_mm = view.waves[0].spacing_mm();
+  remove_specks(map, view.plane, 4 * spacing_mm * spacing_mm);
+  return map;
+}
+
+MaterialMap refined_materials(const Image& image, const TagView& view, const MaterialMap& before,
+                              const PhasesAt& tissue, const PhasesAt& still) {
+  const TagModel model(view.waves.size());
+  const double spacing_mm = view.waves[0].spacing_mm();
+  const double sure_mm = 1.5 * view.plane.finer_spacing_mm();
+  const auto by_phases = [&](const PhasesAt& phases_at) {
+    return [&](Eigen::Index row, Eigen::Index column, std::span<double> patterns) {
+      std::array<double, 2> phases{};
+      phases_at(row, column, std::span(phases).first(view.waves.size()));
+      const TagPatterns values = model.at(std::span(phases).first(view.waves.size()));
+      std::copy(values.value.begin(), values.value.begin() + static_cast<std::ptrdiff_t>(values.count),
+                patterns.begin());
+    };
+  };
+  const auto constant = [](Eigen::Index, Eigen::Index, std::span<double> patterns) { patterns[0] = 1.0; };
+  const auto at_rest = [&](Eigen::Index row, Eigen::Index column, std::span<double> patterns) {
+    rest_patterns(view, view.place_mm(row, column), patterns);
+  };
+  const double noise = std::max(1e-6, noise_of(image, depth_mm(before, Material::nothing, view.plane)));
+  const auto cost = [&](Material material, double window_mm, size_t count, const auto& patterns_at) {
+    return cost_of(image, view, depth_mm(before, material, view.plane), sure_mm, window_mm, count,
+                   patterns_at, noise);
+  };
+  std::array<CostMap, 4> costs;
+  costs[static_cast<size_t>(Material::nothing)] = cost(Material::nothing, 2 * spacing_mm, 1, constant);
+  costs[static_cast<size_t>(Material::tissue)] =
+      cost(Material::tissue, spacing_mm, model.patterns(), by_phases(tissue));
+  costs[static_cast<size_t>(Material::still_water)] =
+      cost(Material::still_water, 2 * spacing_mm, model.patterns(), by_phases(still));
+  costs[static_cast<size_t>(Material::mixed_water)] =
+      cost(Material::mixed_water, 2 * spacing_mm, 1 + 2 * view.waves.size(), at_rest);
+  for (CostMap& each : costs)
+    pool(each);
+  // From one map to the next the edge moves by less than half a tag spacing.
+  const Eigen::ArrayXXf depth_before = depth_mm(before, Material::tissue, view.plane);
+  MaterialMap map = before;
+  for (Eigen::Index column = 0; column < map.cols(); ++column) {
+    for (Eigen::Index row = 0; row < map.rows(); ++row) {
+      const bool may_be_tissue = static_cast<double>(depth_before(row, column)) > -0.5 * spacing_mm;
+      size_t best = static_cast<size_t>(Material::nothing);
+      for (size_t i = 0; i < costs.size(); ++i) {
+        if (i == static_cast<size_t>(Material::tissue) && !may_be_tissue) continue;
+        if (costs[i](row, column) < costs[best](row, column)) best = i;
+      }
+      map(row, column) = static_cast<Material>(best);
+    }
+  }
+  remove_specks(map, view.plane, 4 * spacing_mm * spacing_mm);
+  return map;
+}
+
+Eigen::ArrayXXf depth_mm(const MaterialMap& map, Material material, const SlicePlane& plane) {
+  const Eigen::Array<bool, Eigen::Dynamic, Eigen::Dynamic> inside =
+      map.unaryExpr([material](Material here) { return here == material; });
+  const auto half = static_cast<float>(0.5 * plane.finer_spacing_mm());
+  return inside.select(distance_to(!inside, plane) - half, half - distance_to(inside, plane));
+}
+
+void remove_specks(MaterialMap& map, const SlicePlane& plane, double least_mm2) {
+  const double pixel_mm2 = plane.row_spacing_mm * plane.column_spacing_mm;
+  const auto is_small = [&](const std::vector<Eigen::Index>& piece) {
+    return static_cast<double>(piece.size()) * pixel_mm2 < least_mm2;
+  };
+  const auto is_tissue = [](Material here) { return here == Material::tissue; };
+  std::vector<Eigen::Index> specks, holes;
+  each_piece(map, is_tissue, [&](const std::vector<Eigen::Index>& piece) {
+    if (is_small(piece)) specks.insert(specks.end(), piece.begin(), piece.end());
+  });
+  for (const Eigen::Index at : specks)
+    map(at) = Material::nothing;
+  each_piece(
+      map, [&](Material here) { return !is_tissue(here); },
+      [&](const std::vector<Eigen::Index>& piece) {
+        if (is_small(piece)) holes.insert(holes.end(), piece.begin(), piece.end());
+      });
+  for (const Eigen::Index at : holes)
+    map(at) = Material::tissue;
+}
+
+}  // namespace diastole::imaging

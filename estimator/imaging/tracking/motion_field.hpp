@@ -1,0 +1,27 @@
+#pragma once
+// The motion that one direction of tags shows in a slice: w(x, t) = n . X - n . x in mm, where the material at x came from X and n is the
+// tags' normal. A tag that lay on the plane n . X = d is seen where n . x + w(x, t) = d.
+
+#include <Eigen/Dense>
+
+#include "estimator/imaging/tracking/spline_plane.hpp"
+
+namespace diastole::imaging {
+
+struct MotionField {
+  SplinePlane splines;
+  Eigen::MatrixXd modes;         ///< T x r
+  Eigen::MatrixXd coefficients;  ///< n x T
+  Eigen::MatrixXd
+      inverse_factor;  ///< of the modes' coefficients, mode by mode (n r): their covariance is its transpose times it; mm
+
+  Eigen::VectorXd left_out_mm;          ///< T: standard deviation of what the modes leave out
+  Eigen::Matrix3d rest_covariance_mm2;  ///< of the tags at rest: of (x - middle) / extent, and of the offset
+  Eigen::Vector2d middle_mm;
+  double extent_mm;
+
+  [[nodiscard]] double value_mm(size_t phase, const Eigen::Vector2d& x_mm) const;
+  [[nodiscard]] double sigma_mm(size_t phase, const Eigen::Vector2d& x_mm) const;
+};
+
+}  // namespace diastole::imaging

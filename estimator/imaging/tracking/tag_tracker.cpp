@@ -1,0 +1,476 @@
+#include "estimator/imaging/tracking/tag_tracker.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+
+#include "estimator/imaging/series/spectrum.hpp"
+#include "estimator/imaging/tracking/brightness.hpp"
+#include "estimator/imaging/tracking/motion_prior.hpp"
+
+namespace diastole::imaging {
+namespace {
+
+constexpr double two_pi = 2 * std::numbers::pi;
+
+/// Tags sample the motion once a spacing, and so tell waves of two spacings and longer: half of them is one.
+constexpr double knots_in_spacings = 2.0;
+/// Brightness varies over a tag spacing, not within it: there it is the tags' own.
+constexpr double window_in_spacings = 1.0;
+/// A pixel counts as surely tissue this far inside: a pixel's half width and the point spread of a matrix that is half filled.
+constexpr double sure_in_pixels = 1.25;
+/// Huber's limit in standard deviations: ghosts and folds are no noise.
+constexpr double huber = 3.0;
+/// Before anything is learnt: motion from phase to phase of a fifth of a spacing, alike over some spacings.
+constexpr double first_step_in_spacings = 0.2;
+constexpr double first_range_in_spacings = 4.0;
+/// Ranges to choose from by evidence: kappa = 1 / (these times the spacing).
+constexpr std::array ranges_in_spacings = {4.0, 16.0};
+/// Modes of the motion that are smaller than a two-hundredth of a pixel are no part of it.
+constexpr double negligible_in_pixels = 0.005;
+constexpr double settled_mm = 0.005;
+
+double median(std::vector<double> values) {
+  if (values.empty()) return 0;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+/// The robust standard deviation: 1.4826 times the median absolute value.
+double robust_sigma(const std::vector<double>& residuals) {
+  std::vector<double> sizes;
+  for (const double residual : residuals)
+    sizes.push_back(std::abs(residual));
+  return 1.4826 * median(std::move(sizes));
+}
+
+/// The inverse of a lower triangle in its place: halves are inverted by themselves, which needs a third of the work of solving for the
+/// identity.
+void invert_lower(Eigen::Ref<Eigen::MatrixXd> lower) {
+  const Eigen::Index count = lower.rows();
+  if (count <= 64) {
+    lower =
+        Eigen::MatrixXd(lower.triangularView<Eigen::Lower>().solve(Eigen::MatrixXd::Identity(count, count)));
+    return;
+  }
+  const Eigen::Index half = count / 2;
+  const Eigen::Index rest = count - half;
+  invert_lower(lower.topLeftCorner(half, half));
+  invert_lower(lower.bottomRightCorner(rest, rest));
+  const Eigen::MatrixXd right =
+      lower.bottomLeftCorner(rest, half) * lower.topLeftCorner(half, half).triangularView<Eigen::Lower>();
+  lower.bottomLeftCorner(rest, half).noalias() =
+      -(lower.bottomRightCorner(rest, rest).triangularView<Eigen::Lower>() * right);
+}
+
+struct Pixel {
+  Eigen::Index row, column;
+  Eigen::Vector2d x_mm;
+  SplineValues splines;
+};
+
+double spline_sum(const SplineValues& splines, const Eigen::VectorXd& coefficients) {
+  double sum = 0;
+  for (size_t i = 0; i < 16; ++i) {
+    if (splines.index[i] >= 0) sum += splines.value[i] * coefficients[splines.index[i]];
+  }
+  return sum;
+}
+
+class ViewTracker {
+ public:
+  explicit ViewTracker(const TagView& view)
+      : view_(view), waves_(view.waves), model_(view.waves.size()), spacing_mm_(view.waves[0].spacing_mm()) {}
+
+  TrackedView track(std::optional<TrackingFault>& fault) {
+    const MaterialMap first = first_materials(view_);
+    settle_waves(first);
+    if (!collect_pixels(first)) {
+      fault = TrackingFault{
+          "no tissue was found: nothing whose tags fade within a cycle and that is two spacings wide"};
+      return {};
+    }
+    follow(first);
+    fit_all_phases();
+    return result();
+  }
+
+ private:
+  [[nodiscard]] size_t directions() const { return waves_.size(); }
+  [[nodiscard]] size_t times() const { return view_.images.size(); }
+  [[nodiscard]] double sure_mm() const {
+    return sure_in_pixels * std::max(view_.plane.row_spacing_mm, view_.plane.column_spacing_mm);
+  }
+
+  void rest_phases(const Eigen::Vector2d& x_mm, std::span<double> phases) const {
+    for (size_t f = 0; f < directions(); ++f)
+      phases[f] = two_pi * (waves_[f].per_mm.dot(x_mm) - waves_[f].offset_cycles);
+  }
+
+  /// Corrects wave vectors and offsets by what does not move: still water in all phases, and tissue in the first.
+  void settle_waves(const MaterialMap& map) {
+    const Eigen::ArrayXXf water = depth_mm(map, Material::still_water, view_.plane);
+    const Eigen::ArrayXXf tissue = depth_mm(map, Material::tissue, view_.plane);
+    for (int round = 0; round < 3; ++round) {
+      std::vector<Eigen::Matrix3d> matrix(directions(), Eigen::Matrix3d::Zero());
+      std::vector<Eigen::Vector3d> vector(directions(), Eigen::Vector3d::Zero());
+      for (size_t k = 0; k < times(); ++k) {
+        add_waves(view_.images[k], water, 2.5 * sure_mm(), matrix, vector);
+        if (k == 0) add_waves(view_.images[k], tissue, 1.5 * sure_mm(), matrix, vector);
+      }
+      for (size_t f = 0; f < directions(); ++f) {
+        const Eigen::Vector3d step = matrix[f].ldlt().solve(vector[f]);
+        if (!step.allFinite()) continue;
+        const Eigen::Vector2d middle = 0.5 * view_.extent_mm();
+        waves_[f].per_mm += step.head<2>() / view_.extent_mm().norm();
+        waves_[f].offset_cycles += step.head<2>().dot(middle) / view_.extent_mm().norm() - step[2];
+      }
+      rest_matrices_ = matrix;
+    }
+    spacing_mm_ = waves_[0].spacing_mm();
+  }
+
+  void add_waves(const Image& image, const Eigen::ArrayXXf& depth, double least_mm,
+                 std::vector<Eigen::Matrix3d>& matrix, std::vector<Eigen::Vector3d>& vector) const {
+    Brightness brightness(view_.extent_mm(), window_in_spacings * spacing_mm_,
+                          static_cast<int>(model_.patterns()));
+    struct Sample {
+      Eigen::Vector2d x_mm;
+      std::array<double, 2> phases;
+      double value;
+    };
+    std::vector<Sample> samples;
+    for (Eigen::Index column = 0; column < image.cols(); ++column) {
+      for (Eigen::Index row = 0; row < image.rows(); ++row) {
+        if (static_cast<double>(depth(row, column)) < least_mm) continue;
+        Sample sample{view_.place_mm(row, column), {}, static_cast<double>(image(row, column))};
+        rest_phases(sample.x_mm, sample.phases);
+        brightness.add(sample.x_mm, model_.at(sample.phases).values(), 1.0, sample.value);
+        samples.push_back(sample);
+      }
+    }
+    if (samples.size() < 100) return;
+    brightness.solve();
+    std::vector<double> residuals;
+    std::vector<std::array<double, TagPatterns::most>> amplitudes(samples.size());
+    for (size_t i = 0; i < samples.size(); ++i)
+      residuals.push_back(samples[i].value -
+                          picture(brightness, samples[i].x_mm, samples[i].phases, amplitudes[i]));
+    const double sigma = std::max(robust_sigma(residuals), 1e-9);
+    const Eigen::Vector2d middle = 0.5 * view_.extent_mm();
+    for (size_t i = 0; i < samples.size(); ++i) {
+      const double weight = huber_weight(residuals[i], sigma) / (sigma * sigma);
+      for (size_t f = 0; f < directions(); ++f) {
+        const double slope = two_pi * model_.slope(samples[i].phases, amplitudes[i], f);
+        Eigen::Vector3d row;
+        row << slope * (samples[i].x_mm - middle) / view_.extent_mm().norm(), slope;
+        matrix[f] += weight * row * row.transpose();
+        vector[f] += weight * residuals[i] * row;
+      }
+    }
+  }
+
+  double picture(const Brightness& brightness, const Eigen::Vector2d& x_mm, std::span<const double> phases,
+                 std::array<double, TagPatterns::most>& amplitudes) const {
+    const TagPatterns patterns = model_.at(phases.first(directions()));
+    brightness.at(x_mm, std::span(amplitudes).first(patterns.count));
+    double sum = 0;
+    for (size_t j = 0; j < patterns.count; ++j)
+      sum += amplitudes[j] * patterns.value[j];
+    return sum;
+  }
+
+  static double huber_weight(double residual, double sigma) {
+    return std::min(1.0, huber * sigma / std::max(std::abs(residual), 1e-300));
+  }
+
+  /// All pixels that tissue may reach in the cycle: half a spacing around the first map and more.
+  bool collect_pixels(const MaterialMap& map) {
+    const Eigen::ArrayXXf depth = depth_mm(map, Material::tissue, view_.plane);
+    std::vector<Eigen::Vector2d> places;
+    for (Eigen::Index column = 0; column < map.cols(); ++column) {
+      for (Eigen::Index row = 0; row < map.rows(); ++row) {
+        if (static_cast<double>(depth(row, column)) < -0.75 * spacing_mm_) continue;
+        pixels_.push_back({row, column, view_.place_mm(row, column), {}});
+        places.push_back(pixels_.back().x_mm);
+      }
+    }
+    if ((map == Material::tissue).count() < 200) return false;
+    Eigen::Matrix2Xd samples(2, static_cast<Eigen::Index>(places.size()));
+    for (size_t i = 0; i < places.size(); ++i)
+      samples.col(static_cast<Eigen::Index>(i)) = places[i];
+    splines_.emplace(samples, knots_in_spacings * spacing_mm_);
+    for (Pixel& pixel : pixels_)
+      pixel.splines = splines_->at(pixel.x_mm);
+    coefficients_.assign(directions(),
+                         Eigen::MatrixXd::Zero(splines_->count(), static_cast<Eigen::Index>(times())));
+    phases_.resize(times());
+    return true;
+  }
+
+  void tracked_phases(const Pixel& pixel, size_t k, std::span<double> phases) const {
+    rest_phases(pixel.x_mm, phases);
+    for (size_t f = 0; f < directions(); ++f)
+      phases[f] += two_pi * waves_[f].per_mm.norm() *
+                   spline_sum(pixel.splines, coefficients_[f].col(static_cast<Eigen::Index>(k)));
+  }
+
+  /// The phases of a whole image, for the materials.
+  std::vector<Eigen::ArrayXXd> phase_maps(size_t k, bool at_rest) const {
+    std::vector<Eigen::ArrayXXd> maps(directions(),
+                                      Eigen::ArrayXXd::Zero(view_.plane.rows, view_.plane.columns));
+    std::array<double, 2> phases{};
+    for (Eigen::Index column = 0; column < view_.plane.columns; ++column) {
+      for (Eigen::Index row = 0; row < view_.plane.rows; ++row) {
+        rest_phases(view_.place_mm(row, column), phases);
+        for (size_t f = 0; f < directions(); ++f)
+          maps[f](row, column) = phases[f];
+      }
+    }
+    if (at_rest) return maps;
+    for (const Pixel& pixel : pixels_) {
+      tracked_phases(pixel, k, phases);
+      for (size_t f = 0; f < directions(); ++f)
+        maps[f](pixel.row, pixel.column) = phases[f];
+    }
+    return maps;
+  }
+
+  void find_edges(size_t k, const MaterialMap& before, const std::vector<Eigen::ArrayXXd>& rest) {
+    const std::vector<Eigen::ArrayXXd> tracked = phase_maps(k, false);
+    const auto at = [](const std::vector<Eigen::ArrayXXd>& maps) {
+      return [&maps](Eigen::Index row, Eigen::Index column, std::span<double> phases) {
+        for (size_t f = 0; f < maps.size(); ++f)
+          phases[f] = maps[f](row, column);
+      };
+    };
+    phases_[k].materials = refined_materials(view_.images[k], view_, before, at(tracked), at(rest));
+    phases_[k].depth_mm = depth_mm(phases_[k].materials, Material::tissue, view_.plane);
+  }
+
+  /// Phase after phase: motion, edge, motion.
+  void follow(const MaterialMap& first) {
+    first_precision_ = splines_->precision(1.0 / (first_range_in_spacings * spacing_mm_));
+    const std::vector<Eigen::ArrayXXd> rest = phase_maps(0, true);
+    for (size_t k = 0; k < times(); ++k) {
+      const auto time = static_cast<Eigen::Index>(k);
+      for (Eigen::MatrixXd& each : coefficients_) {
+        if (k == 1) each.col(time) = each.col(0);
+        // Half of the last step goes on: motion turns within a cycle.
+        if (k >= 2) each.col(time) = each.col(time - 1) + 0.5 * (each.col(time - 1) - each.col(time - 2));
+      }
+      const std::vector<Eigen::MatrixXd> expected = coefficients_;
+      phases_[k].materials = k == 0 ? first : phases_[k - 1].materials;
+      phases_[k].depth_mm = depth_mm(phases_[k].materials, Material::tissue, view_.plane);
+      fit_phase(k, expected, 4);
+      find_edges(k, phases_[k].materials, rest);
+      if (k == 0) find_edges(k, phases_[k].materials, rest);
+      fit_phase(k, expected, 4);
+    }
+  }
+
+  void fit_phase(size_t k, const std::vector<Eigen::MatrixXd>& expected, int most_rounds) {
+    const auto time = static_cast<Eigen::Index>(k);
+    const double step_mm = first_step_in_spacings * spacing_mm_;
+    const Eigen::MatrixXd prior = first_precision_ / (step_mm * step_mm);
+    for (int round = 0; round < most_rounds; ++round) {
+      double largest = 0;
+      for (size_t f = 0; f < directions(); ++f) {
+        PhaseInformation information = gather(k, f);
+        const Eigen::VectorXd now = coefficients_[f].col(time);
+        const Eigen::VectorXd step = (information.precision + prior)
+                                         .ldlt()
+                                         .solve(information.vector + prior * (expected[f].col(time) - now));
+        coefficients_[f].col(time) += step;
+        largest = std::max(largest, step.cwiseAbs().maxCoeff());
+      }
+      if (largest < settled_mm) break;
+    }
+  }
+
+  /// Gradient (in place of eta) and curvature of one direction's motion in one image, at the present motion. Brightness is fitted on the way;
+  /// residuals and slopes are kept.
+  PhaseInformation gather(size_t k, size_t f) {
+    TrackedPhase& phase = phases_[k];
+    const Image& image = view_.images[k];
+    Brightness brightness(view_.extent_mm(), window_in_spacings * spacing_mm_,
+                          static_cast<int>(model_.patterns()));
+    fitted_.clear();
+    for (const Pixel& pixel : pixels_) {
+      if (static_cast<double>(phase.depth_mm(pixel.row, pixel.column)) < sure_mm()) continue;
+      Fitted fitted{&pixel, {}, 0, 0};
+      tracked_phases(pixel, k, fitted.phases);
+      brightness.add(pixel.x_mm, model_.at(fitted.phases).values(), 1.0,
+                     static_cast<double>(image(pixel.row, pixel.column)));
+      fitted_.push_back(fitted);
+    }
+    brightness.solve();
+    std::vector<double> residuals;
+    phase.residual.setZero(image.rows(), image.cols());
+    phase.slope.resize(directions());
+    phase.slope[f].setZero(image.rows(), image.cols());
+    std::array<double, TagPatterns::most> amplitudes{};
+    for (Fitted& fitted : fitted_) {
+      const Pixel& pixel = *fitted.pixel;
+      fitted.residual = static_cast<double>(image(pixel.row, pixel.column)) -
+                        picture(brightness, pixel.x_mm, fitted.phases, amplitudes);
+      fitted.slope = two_pi * waves_[f].per_mm.norm() * model_.slope(fitted.phases, amplitudes, f);
+      residuals.push_back(fitted.residual);
+      phase.residual(pixel.row, pixel.column) = static_cast<float>(fitted.residual);
+      phase.slope[f](pixel.row, pixel.column) = static_cast<float>(fitted.slope);
+    }
+    phase.noise = std::max(robust_sigma(residuals), 1e-9);
+    phase.pixels = fitted_.size();
+    PhaseInformation information{Eigen::MatrixXd::Zero(splines_->count(), splines_->count()),
+                                 Eigen::VectorXd::Zero(splines_->count())};
+    for (const Fitted& fitted : fitted_) {
+      const double weight = huber_weight(fitted.residual, phase.noise) / (phase.noise * phase.noise);
+      const SplineValues& splines = fitted.pixel->splines;
+      const double square = weight * fitted.slope * fitted.slope;
+      const double product = weight * fitted.slope * fitted.residual;
+      for (size_t i = 0; i < 16; ++i) {
+        if (splines.index[i] < 0) continue;
+        information.vector[splines.index[i]] += product * splines.value[i];
+        const double scaled = square * splines.value[i];
+        for (size_t j = 0; j <= i; ++j) {
+          if (splines.index[j] >= 0)
+            information.precision(std::max(splines.index[i], splines.index[j]),
+                                  std::min(splines.index[i], splines.index[j])) += scaled * splines.value[j];
+        }
+      }
+    }
+    information.precision.triangularView<Eigen::StrictlyUpper>() = information.precision.transpose();
+    return information;
+  }
+
+  /// Noise power near the tags' frequency over that of white noise of the same variance: outside what the motion and the brightness can
+  /// follow, and inside half a cycle a spacing of the tags.
+  double noise_factor(size_t f) const {
+    double sum = 0, count = 0;
+    const Eigen::Vector2d extent(view_.plane.columns * view_.plane.column_spacing_mm,
+                                 view_.plane.rows * view_.plane.row_spacing_mm);
+    for (const TrackedPhase& phase : phases_) {
+      if (phase.pixels == 0) continue;
+      const float limit = static_cast<float>(huber * phase.noise);
+      const Eigen::ArrayXXf power = spectrum_of(phase.residual.min(limit).max(-limit)).abs2();
+      const double white = static_cast<double>(phase.pixels) * phase.noise * phase.noise;
+      for (Eigen::Index column = 0; column < power.cols(); ++column) {
+        for (Eigen::Index row = 0; row < power.rows(); ++row) {
+          const Eigen::Vector2d per_mm(signed_bin(column, power.cols()) / extent.x(),
+                                       signed_bin(row, power.rows()) / extent.y());
+          const double apart = (per_mm - waves_[f].per_mm).norm() * spacing_mm_;
+          if (apart < 0.4 || apart > 0.65) continue;
+          sum += static_cast<double>(power(row, column)) / white;
+          count += 1;
+        }
+      }
+    }
+    return count > 0 ? std::max(sum / count, 0.1) : 1.0;
+  }
+
+  void fit_all_phases() {
+    for (size_t f = 0; f < directions(); ++f)
+      factors_.push_back(noise_factor(f));
+    std::vector<double> kappas;
+    for (const double range : ranges_in_spacings)
+      kappas.push_back(1.0 / (range * spacing_mm_));
+    for (size_t f = 0; f < directions(); ++f) {
+      priors_.push_back(learn_motion_prior(*splines_, informations(f), coefficients_[f], kappas,
+                                           negligible_in_pixels * view_.plane.finer_spacing_mm()));
+      inverse_factors_.emplace_back();
+    }
+    for (int round = 0; round < 2; ++round) {
+      for (size_t f = 0; f < directions(); ++f)
+        fit_jointly(f, informations(f), round == 1);
+    }
+    for (size_t f = 0; f < directions(); ++f) {
+      for (size_t k = 0; k < times(); ++k)
+        (void)gather(k, f);
+    }
+  }
+
+  std::vector<PhaseInformation> informations(size_t f) {
+    std::vector<PhaseInformation> all;
+    for (size_t k = 0; k < times(); ++k) {
+      PhaseInformation here = gather(k, f);
+      here.vector += here.precision * coefficients_[f].col(static_cast<Eigen::Index>(k));
+      here.precision /= factors_[f];
+      here.vector /= factors_[f];
+      all.push_back(std::move(here));
+    }
+    return all;
+  }
+
+  void fit_jointly(size_t f, const std::vector<PhaseInformation>& informations, bool with_covariance) {
+    const MotionPrior& prior = priors_[f];
+    const Eigen::Index count = splines_->count();
+    const Eigen::Index modes = prior.modes.cols();
+    Eigen::MatrixXd precision = Eigen::MatrixXd::Zero(count * modes, count * modes);
+    Eigen::VectorXd vector = Eigen::VectorXd::Zero(count * modes);
+    for (Eigen::Index m = 0; m < modes; ++m) {
+      precision.block(m * count, m * count, count, count) = prior.place_precision;
+      for (size_t k = 0; k < informations.size(); ++k) {
+        const double share = prior.modes(static_cast<Eigen::Index>(k), m);
+        vector.segment(m * count, count) += share * informations[k].vector;
+        for (Eigen::Index o = 0; o <= m; ++o)
+          precision.block(m * count, o * count, count, count) +=
+              share * prior.modes(static_cast<Eigen::Index>(k), o) * informations[k].precision;
+      }
+    }
+    const Eigen::LLT<Eigen::MatrixXd> factor(precision);  // reads the lower triangle
+    const Eigen::VectorXd solution = factor.solve(vector);
+    coefficients_[f] =
+        Eigen::Map<const Eigen::MatrixXd>(solution.data(), count, modes) * prior.modes.transpose();
+    if (with_covariance) {
+      inverse_factors_[f] = factor.matrixL();
+      invert_lower(inverse_factors_[f]);
+    }
+  }
+
+  TrackedView result() {
+    TrackedView tracked;
+    tracked.waves = waves_;
+    for (size_t f = 0; f < directions(); ++f)
+      tracked.motion.push_back({*splines_, priors_[f].modes, coefficients_[f], std::move(inverse_factors_[f]),
+                                priors_[f].left_out_mm,
+                                spacing_mm_ * spacing_mm_ * factors_[f] * rest_matrices_[f].inverse(),
+                                0.5 * view_.extent_mm(), view_.extent_mm().norm()});
+    tracked.phases = std::move(phases_);
+    tracked.noise_factor = factors_;
+    tracked.kappa_per_mm = priors_[0].kappa_per_mm;
+    return tracked;
+  }
+
+  struct Fitted {
+    const Pixel* pixel;
+    std::array<double, 2> phases;
+    double residual;
+    double slope;
+  };
+
+  const TagView& view_;
+  std::vector<TagWave> waves_;
+  TagModel model_;
+  double spacing_mm_;
+  std::vector<Eigen::Matrix3d> rest_matrices_;
+  std::vector<Pixel> pixels_;
+  std::optional<SplinePlane> splines_;
+  Eigen::MatrixXd first_precision_;
+  std::vector<Eigen::MatrixXd> coefficients_;  // a direction: n x T
+  std::vector<TrackedPhase> phases_;
+  std::vector<Fitted> fitted_;
+  std::vector<double> factors_;
+  std::vector<MotionPrior> priors_;
+  std::vector<Eigen::MatrixXd> inverse_factors_;
+};
+
+}  // namespace
+
+TrackedView track_view(const TagView& view, std::optional<TrackingFault>& fault) {
+  fault.reset();
+  return ViewTracker(view).track(fault);
+}
+
+}  // namespace diastole::imaging

@@ -1,0 +1,48 @@
+#pragma once
+// Tags of one slice followed through the cycle.
+//
+// Image k is  sum_j amplitude_j(x) pattern_j(phi(x))  in tissue (tag_model.hpp), with  phi = 2 pi (k . x - offset + w / spacing)  and the
+// motion w of motion_field.hpp. Amplitudes are smooth fields (brightness.hpp), w a spline surface; both by least squares over
+// the pixels that are surely tissue:
+//   1. materials and the tags' planes at rest (materials.hpp);
+//   2. phase by phase from the motion of the phases before, with the tissue's edge found anew each time;
+//   3. how alike neighbours and phases are is learnt from the result (motion_prior.hpp), and all phases are fitted at once.
+// The covariance of step 3 carries the noise as it is near the tags' own frequency (what zero-filling leaves of it) and what the fit
+// leaves unexplained.
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "estimator/imaging/tracking/materials.hpp"
+#include "estimator/imaging/tracking/motion_field.hpp"
+#include "estimator/imaging/tracking/tag_view.hpp"
+
+namespace diastole::imaging {
+
+struct TrackedPhase {
+  MaterialMap materials;
+  Eigen::ArrayXXf depth_mm;  ///< of tissue
+  Eigen::ArrayXXf residual;  ///< in tissue, as far as it was fitted; 0 elsewhere
+  std::vector<Eigen::ArrayXXf>
+      slope;          ///< a direction: the image's derivative by w, 1/mm; 0 where it was not fitted
+  double noise = 0;   ///< standard deviation of the residual, robust
+  size_t pixels = 0;  ///< that were fitted
+};
+
+struct TrackedView {
+  std::vector<TagWave> waves;       ///< as refined: the tags at rest
+  std::vector<MotionField> motion;  ///< one a direction
+  std::vector<TrackedPhase> phases;
+  std::vector<double> noise_factor;  ///< a direction: noise power near the tags' frequency over the mean
+  double kappa_per_mm = 0;
+};
+
+struct TrackingFault {
+  std::string reason;  ///< "no tissue was found"
+};
+
+/// Deterministic. `fault` is set, and the result empty, where nothing can be tracked.
+TrackedView track_view(const TagView& view, std::optional<TrackingFault>& fault);
+
+}  // namespace diastole::imaging

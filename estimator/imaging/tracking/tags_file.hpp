@@ -1,0 +1,16 @@
+#pragma once
+// Tag points as NAME.tags.csv, which measurement.hpp reads.
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "estimator/imaging/tracking/tag_points.hpp"
+
+namespace diastole::imaging {
+
+inline constexpr std::string_view tags_file_header = "frame,nx,ny,nz,plane_mm,x_mm,y_mm,z_mm,sigma_mm";
+
+std::string tags_file_text(const std::vector<TagPoint>& points);
+
+}  // namespace diastole::imaging

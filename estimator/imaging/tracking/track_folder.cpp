@@ -1,0 +1,69 @@
+#include "estimator/imaging/tracking/track_folder.hpp"
+
+#include <fmt/format.h>
+
+#include <optional>
+
+#include "estimator/parallel/parallel_for.hpp"
+#include "protocol/contract/input_error.hpp"
+
+namespace diastole::imaging {
+
+std::vector<TagView> tag_views(const ImageFolder& folder) {
+  std::vector<double> times_ms;
+  for (const ImageSeries& series : folder.series) {
+    if (series.kind != SeriesKind::tagged_cine) continue;
+    for (size_t k = 0; k < series.phases.times_ms.size(); ++k) {
+      if (series.phases.present[k]) times_ms.push_back(series.phases.times_ms[k]);
+    }
+  }
+  const PhaseTimes phases = phase_times(times_ms);
+  std::vector<TagView> views;
+  for (const ImageSeries& series : folder.series) {
+    if (series.kind != SeriesKind::tagged_cine) continue;
+    for (size_t s = 0; s < series.slices.size(); ++s) {
+      const SliceImages& slice = series.slices[s];
+      if (slice.tags.empty()) continue;
+      TagView view;
+      view.plane = slice.plane;
+      view.waves = slice.tags;
+      view.images = folder.pixels(slice.images);
+      for (const size_t image : slice.images) {
+        view.times_ms.push_back(*folder.images[image].header.trigger_ms);
+        view.frames.push_back(static_cast<int>(*phases.index_of(view.times_ms.back())) + 1);
+      }
+      view.name = fmt::format("series {}, slice {}", series.number, s + 1);
+      views.push_back(std::move(view));
+    }
+  }
+  if (views.empty())
+    throw InputError({folder.folder.string(), "",
+                      "holds no tagged cine: no series has several phases with lines of tags in the first",
+                      "`diastole images` says what each series was taken for, and why."});
+  return views;
+}
+
+std::vector<TrackedSlice> track_views(std::vector<TagView> views, size_t threads,
+                                      std::vector<Finding>& problems) {
+  std::vector<std::optional<TrackingFault>> faults(views.size());
+  std::vector<TrackedSlice> slices(views.size());
+  parallel_for(views.size(), threads, [&](size_t i) {
+    slices[i].view = std::move(views[i]);
+    slices[i].tracked = track_view(slices[i].view, faults[i]);
+    if (!faults[i]) slices[i].points = tag_points(slices[i].view, slices[i].tracked);
+  });
+  std::vector<TrackedSlice> kept;
+  for (size_t i = 0; i < slices.size(); ++i) {
+    if (faults[i]) {
+      problems.push_back({Severity::warning, "not-tracked", faults[i]->reason, slices[i].view.name, 1,
+                          "slices",
+                          "Look at the images: is the specimen in the slice, and are its tags still seen in "
+                          "the middle of the cycle?"});
+    } else {
+      kept.push_back(std::move(slices[i]));
+    }
+  }
+  return kept;
+}
+
+}  // namespace diastole::imaging

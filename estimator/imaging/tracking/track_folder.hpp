@@ -1,0 +1,26 @@
+#pragma once
+// From a folder of images to tag points: every slice and direction of its tagged cines.
+
+#include <string>
+#include <vector>
+
+#include "estimator/imaging/series/image_folder.hpp"
+#include "estimator/imaging/tracking/tag_points.hpp"
+
+namespace diastole::imaging {
+
+struct TrackedSlice {
+  TagView view;
+  TrackedView tracked;
+  TagPoints points;
+};
+
+/// The tagged slices of a folder with their pixels, frames numbered by the phases of all of them together. Throws InputError if there
+/// are none.
+std::vector<TagView> tag_views(const ImageFolder& folder);
+
+/// Tracks all of them on `threads` threads. A slice in which nothing can be tracked is left out and reported in `problems`.
+std::vector<TrackedSlice> track_views(std::vector<TagView> views, size_t threads,
+                                      std::vector<Finding>& problems);
+
+}  // namespace diastole::imaging

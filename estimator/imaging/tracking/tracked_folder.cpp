@@ -1,0 +1,114 @@
+#include "estimator/imaging/tracking/tracked_folder.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "estimator/parallel/parallel_for.hpp"
+#include "protocol/contract/input_error.hpp"
+
+namespace diastole::imaging {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// The one *.pose.toml in the folder or beside it.
+std::optional<fs::path> pose_nearby(const fs::path& folder) {
+  std::vector<fs::path> found;
+  const fs::path whole = fs::absolute(folder).lexically_normal();
+  const fs::path inside = whole.has_filename() ? whole : whole.parent_path();
+  for (const fs::path& place : {inside, inside.parent_path()}) {
+    std::error_code error;
+    for (fs::directory_iterator at(place, error), end; !error && at != end; at.increment(error)) {
+      if (at->path().filename().string().ends_with(".pose.toml")) found.push_back(at->path());
+    }
+  }
+  if (found.size() != 1) return std::nullopt;
+  return found[0];
+}
+
+/// The pose that the request or the images give, and what is to be said about it.
+void settle_pose(const TrackRequest& request, TrackedFolder& tracked) {
+  if (request.coordinates == "patient") return;
+  const auto file = request.pose ? request.pose : pose_nearby(request.folder);
+  const FoundPose found = find_annulus_pose(tracked.slices);
+  tracked.outline = found.outline;
+  if (file) {
+    tracked.pose = read_pose(*file);
+    if (!found.pose) return;
+    const double apart_mm = (tracked.pose->origin_mm - found.pose->origin_mm).norm();
+    const double turned_deg =
+        std::acos(std::min(1.0, std::abs(tracked.pose->axes.col(2).dot(found.pose->axes.col(2))))) * 57.29578;
+    // The outlines are good to a fraction of a pixel, and an operator's marks to about a pixel.
+    if (apart_mm > 2 || turned_deg > 2)
+      tracked.problems.push_back(
+          {Severity::warning, "pose-beside-outline",
+           fmt::format("the pose lies {:.1f} mm and {:.1f} degrees from what the outlines show", apart_mm,
+                       turned_deg),
+           file->string(), apart_mm, "mm",
+           "Is it the pose of this session? Leave it out to use the outlines."});
+    return;
+  }
+  tracked.pose = found.pose;
+  if (tracked.pose) return;
+  if (request.coordinates == "specimen")
+    throw InputError({request.folder.string(), "", "the specimen's pose is not seen: " + found.missing,
+                      "Give it with --pose, or ask for --coords patient."});
+  tracked.problems.push_back(
+      {Severity::warning, "patient-coordinates", "the points stay in patient coordinates: " + found.missing,
+       request.folder.string(), 0, "",
+       "Give the specimen's pose with --pose NAME.pose.toml (origin_mm, x_axis, y_axis, z_axis)."});
+}
+
+}  // namespace
+
+std::vector<PhaseSummary> phase_summaries(const TrackedSlice& slice) {
+  std::vector<PhaseSummary> summaries;
+  const double pixel_mm = slice.view.plane.finer_spacing_mm();
+  for (size_t k = 0; k < slice.view.frames.size(); ++k) {
+    PhaseSummary summary{slice.view.frames[k], slice.view.times_ms[k], 0, 0, slice.tracked.phases[k].noise};
+    for (const TagPoint& point : slice.points.points) {
+      if (point.frame != summary.frame) continue;
+      ++summary.points;
+      summary.sigma_px += std::pow(point.sigma_mm / pixel_mm, 2);
+    }
+    if (summary.points > 0)
+      summary.sigma_px = std::sqrt(summary.sigma_px / static_cast<double>(summary.points));
+    summaries.push_back(summary);
+  }
+  return summaries;
+}
+
+TrackedFolder track_folder(const TrackRequest& request, const Stage& stage) {
+  const auto say = [&](const std::string& text) {
+    if (stage) stage(text);
+  };
+  say("reading the folder");
+  const ImageFolder folder = read_image_folder(request.folder);
+  require_sound(folder);
+  TrackedFolder tracked;
+  tracked.problems = folder.problems;
+  std::vector<TagView> views = tag_views(folder);
+  say(fmt::format("tracking {} slices", views.size()));
+  tracked.slices = track_views(std::move(views), machine_threads(), tracked.problems);
+  settle_pose(request, tracked);
+  double squares = 0;
+  for (const TrackedSlice& slice : tracked.slices) {
+    for (const TagPoint& point : slice.points.points) {
+      tracked.points.push_back(tracked.pose ? tracked.pose->to_specimen(point) : point);
+      squares += std::pow(point.sigma_mm / slice.view.plane.finer_spacing_mm(), 2);
+    }
+    for (const auto& [reason, count] : slice.points.dropped)
+      tracked.dropped[reason] += count;
+  }
+  if (tracked.points.empty())
+    throw InputError({request.folder.string(), "", "no tag could be followed in any slice",
+                      tracked.problems.empty() ? "Look at the images." : tracked.problems.back().what});
+  std::stable_sort(tracked.points.begin(), tracked.points.end(),
+                   [](const TagPoint& a, const TagPoint& b) { return a.frame < b.frame; });
+  tracked.rms_px = std::sqrt(squares / static_cast<double>(tracked.points.size()));
+  return tracked;
+}
+
+}  // namespace diastole::imaging
