@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <random>
 
 namespace diastole {
@@ -43,6 +44,7 @@ CrossValidation choose_lambda(SmoothedSystem& system, double fineness) {
   CrossValidation result;
   const auto score = [&](double exponent) {
     system.factorise(std::pow(10.0, exponent));
+    if (!system.factorised()) return std::numeric_limits<double>::infinity();
     const Eigen::VectorXd misfit = system.weighted_rows() * system.solution() - system.weighted_targets();
     const double trace = stochastic_trace(system, right_sides);
     const double freedom = std::max(measured - trace, 1e-3 * measured);

@@ -128,14 +128,14 @@ bool check_load_order(Findings& findings, const MotionEvidence& evidence) {
     if (share > std::max(certain * share_se, 0.1) && amplitude.value + certain * amplitude.se < 0.2 * share) {
       findings.push_back(
           {Severity::error, "no-motion",
-           fmt::format("The points of frame {} have not moved ({:.2g} of the last frame's motion), "
+           fmt::format("The points of frame {} have not moved ({:.2g} of the most loaded frame's motion), "
                        "although its pressure is {:.3g} kPa.",
                        field.number, amplitude.value, field.load.pressure_kPa),
            frame_words(field), amplitude.value, "", "Check which frame these points belong to."});
     } else if (share < certain * share_se && amplitude.value > std::max(0.15, certain * amplitude.se)) {
       findings.push_back(
           {Severity::error, "motion-without-load",
-           fmt::format("The points of frame {} have moved ({:.2g} of the last frame's motion) without "
+           fmt::format("The points of frame {} have moved ({:.2g} of the most loaded frame's motion) without "
                        "pressure ({:.3g} kPa).",
                        field.number, amplitude.value, field.load.pressure_kPa),
            frame_words(field), amplitude.value, "", "Check which pressure belongs to this frame."});
@@ -153,7 +153,7 @@ bool check_load_order(Findings& findings, const MotionEvidence& evidence) {
           {Severity::error, "frames-disagree",
            fmt::format(
                "Frame {} has more pressure than frame {} ({:.3g} against {:.3g} kPa) but moved less ({:.2g} "
-               "against {:.2g} of the last frame's motion).",
+               "against {:.2g} of the most loaded frame's motion).",
                evidence.fields[j].number, evidence.fields[i].number, high.pressure_kPa, low.pressure_kPa,
                more.value, less.value),
            "column frame of both files", high.pressure_kPa - low.pressure_kPa, "kPa",
@@ -272,18 +272,21 @@ void check_method(Findings& findings, const std::vector<FrameField>& fields) {
 std::vector<MotionAmplitude> motion_amplitudes(const FieldForms& forms,
                                                const std::vector<FrameField>& fields) {
   std::vector<MotionAmplitude> amplitudes;
-  const Eigen::VectorXd last = forms.space.unknowns_of(fields.back().displacement_mm);
+  const auto most = std::max_element(
+      fields.begin(), fields.end(),
+      [](const FrameField& a, const FrameField& b) { return a.load.pressure_kPa < b.load.pressure_kPa; });
+  const Eigen::VectorXd whole_motion = forms.space.unknowns_of(most->displacement_mm);
   for (const FrameField& field : fields) {
     const auto& rows = field.system->weighted_rows();
     Eigen::VectorXd seen = rows * forms.space.unknowns_of(field.displacement_mm);
     for (size_t i = 0; i < field.rows.size(); ++i)
       seen[static_cast<Eigen::Index>(i)] += field.rows[i].rejected ? 0.0 : field.rows[i].residual;
-    const Eigen::VectorXd expected = rows * last;
+    const Eigen::VectorXd expected = rows * whole_motion;
     const double information = std::max(expected.squaredNorm(), 1e-12);
     amplitudes.push_back(
         {expected.dot(seen) / information, std::max(field.scale, 1.0) / std::sqrt(information)});
   }
-  const double whole = amplitudes.back().value;
+  const double whole = amplitudes[static_cast<size_t>(most - fields.begin())].value;
   if (!(whole > 0.0)) return amplitudes;
   for (MotionAmplitude& amplitude : amplitudes)
     amplitude = {amplitude.value / whole, amplitude.se / whole};

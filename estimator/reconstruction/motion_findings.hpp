@@ -15,8 +15,8 @@
 namespace diastole {
 
 /// How far a frame's motion has come along that of the last one, by the measured numbers themselves: least squares of
-/// them on the last frame's field, so that smoothing, which takes more of a small motion than of a large one, does not
-/// matter. The last frame's is 1.
+/// them on the most loaded frame's field, so that smoothing, which takes more of a small motion than of a large one, does not
+/// matter. The most loaded frame's is 1.
 struct MotionAmplitude {
   double value = 0.0;
   double se = 0.0;

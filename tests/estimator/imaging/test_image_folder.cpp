@@ -1,0 +1,133 @@
+#include <gmock/gmock.h>
+
+#include <algorithm>
+#include <fstream>
+
+#include "estimator/imaging/series/image_folder.hpp"
+#include "estimator/imaging/series/views.hpp"
+#include "tests/estimator/imaging/tagged_ring.hpp"
+#include "tests/estimator/io/scratch_file.hpp"
+
+namespace diastole::imaging {
+namespace {
+
+using test::RingScan;
+using test::ScratchFolder;
+using test::write_ring;
+using testing::HasSubstr;
+
+std::vector<std::string> ids(const ImageFolder& folder) {
+  std::vector<std::string> found;
+  for (const Finding& finding : folder.problems)
+    found.push_back(finding.id);
+  return found;
+}
+
+TEST(ImageFolder, TellsATaggedCineByItsSpectrum) {
+  const ScratchFolder scratch;
+  write_ring({}, scratch.path());
+  const ImageFolder folder = read_image_folder(scratch.path());
+  ASSERT_EQ(folder.series.size(), 1U);
+  const ImageSeries& series = folder.series[0];
+  EXPECT_EQ(series.kind, SeriesKind::tagged_cine);
+  ASSERT_EQ(series.slices.size(), 1U);
+  ASSERT_EQ(series.slices[0].tags.size(), 1U);
+  EXPECT_NEAR(series.slices[0].tags[0].spacing_mm(), 5.0, 0.01);
+  EXPECT_GT(tag_normal(series.plane(), series.slices[0].tags[0]).dot(RingScan().normal()), 0.9999);
+  EXPECT_EQ(series.phases.times_ms.size(), 8U);
+  EXPECT_TRUE(folder.problems.empty());
+}
+
+TEST(ImageFolder, ACineWithoutTagsHasNone) {
+  const ScratchFolder scratch;
+  write_ring({.tagged = false}, scratch.path());
+  EXPECT_EQ(read_image_folder(scratch.path()).series.at(0).kind, SeriesKind::cine);
+}
+
+TEST(ImageFolder, NamesAMissingPhaseAndKeepsTheOthersNumbers) {
+  const ScratchFolder scratch;
+  write_ring({.missing_phase = 4}, scratch.path());
+  const ImageFolder folder = read_image_folder(scratch.path());
+  EXPECT_THAT(ids(folder), testing::ElementsAre("phase-missing"));
+  EXPECT_THAT(folder.problems[0].what, HasSubstr("phase 4 of 8"));
+  EXPECT_EQ(folder.series[0].phases.index_of(12.0 + 72 * 4), 4U);
+  EXPECT_NO_THROW(require_sound(folder));
+}
+
+TEST(ImageFolder, RefusesWhatCannotBePutInOrder) {
+  const ScratchFolder scratch;
+  write_ring({.with_times = false}, scratch.path());
+  const ImageFolder folder = read_image_folder(scratch.path());
+  EXPECT_THAT(test::message_of([&] { require_sound(folder); }), HasSubstr("TriggerTime"));
+}
+
+TEST(ImageFolder, RefusesASliceThatIsThereTwiceButNotACopy) {
+  const ScratchFolder scratch;
+  const auto files = write_ring({}, scratch.path());
+  std::filesystem::copy_file(files[2], scratch.path() / "again.dcm");
+  EXPECT_THAT(ids(read_image_folder(scratch.path())), testing::ElementsAre("copy"));
+  std::filesystem::remove(scratch.path() / "again.dcm");
+  write_ring({.phases = 8, .seed = 7}, scratch.path(), "repeated");
+  const ImageFolder folder = read_image_folder(scratch.path());
+  EXPECT_THAT(test::message_of([&] { require_sound(folder); }), HasSubstr("there twice"));
+}
+
+TEST(ImageFolder, RefusesTruncatedAndForeignFiles) {
+  const ScratchFolder scratch;
+  const auto files = write_ring({}, scratch.path());
+  std::filesystem::resize_file(files[5], 9000);
+  EXPECT_THAT(test::message_of([&] { require_sound(read_image_folder(scratch.path())); }),
+              testing::AllOf(HasSubstr("im6.dcm"), HasSubstr("ends too early")));
+  std::filesystem::remove(files[5]);
+  scratch.write("notes.dcm", "slice 3 repeated");
+  EXPECT_THAT(test::message_of([&] { require_sound(read_image_folder(scratch.path())); }),
+              HasSubstr("notes.dcm"));
+  std::filesystem::rename(scratch.path() / "notes.dcm", scratch.path() / "notes.txt");
+  EXPECT_NO_THROW(require_sound(read_image_folder(scratch.path())));
+}
+
+TEST(ImageFolder, RefusesAFewImagesThatLieOtherwise) {
+  const ScratchFolder scratch;
+  write_ring({.missing_phase = 6}, scratch.path());
+  const auto others = write_ring({.pixel_mm = 1.25}, scratch.path(), "other");
+  for (size_t i = 0; i < others.size(); ++i) {
+    if (i != 5) std::filesystem::remove(others[i]);
+  }
+  EXPECT_THAT(test::message_of([&] { require_sound(read_image_folder(scratch.path())); }),
+              HasSubstr("another geometry"));
+}
+
+TEST(ImageFolder, RefusesAnEmptyFolder) {
+  const ScratchFolder scratch;
+  EXPECT_THAT(test::message_of([&] { (void)read_image_folder(scratch.path()); }), HasSubstr("no MR images"));
+}
+
+TEST(PhaseTimes, CountsWhatIsMissingBetween) {
+  const std::vector<double> times = {12, 84, 12.4, 228, 300, 84.3};
+  const PhaseTimes phases = phase_times(times);
+  ASSERT_EQ(phases.times_ms.size(), 5U);
+  EXPECT_NEAR(phases.times_ms[2], 156, 1);
+  EXPECT_FALSE(phases.present[2]);
+  EXPECT_EQ(phases.index_of(299), 4U);
+  EXPECT_FALSE(phases.index_of(500));
+}
+
+TEST(TagWaves, TellAGridsTwoDirectionsFromItsSums) {
+  Image image(96, 96);
+  for (Eigen::Index row = 0; row < 96; ++row) {
+    for (Eigen::Index column = 0; column < 96; ++column) {
+      const double x = static_cast<double>(column), y = static_cast<double>(row);
+      image(row, column) =
+          static_cast<float>(1000 * (0.55 - 0.45 * std::cos(1.0 * x)) * (0.55 - 0.45 * std::cos(1.1 * y)));
+    }
+  }
+  SlicePlane plane;
+  plane.rows = plane.columns = 96;
+  const auto waves = find_tag_waves(image, plane);
+  ASSERT_EQ(waves.size(), 2U);
+  EXPECT_NEAR(std::max(waves[0].spacing_mm(), waves[1].spacing_mm()), 6.283, 0.02);
+  EXPECT_NEAR(std::min(waves[0].spacing_mm(), waves[1].spacing_mm()), 5.712, 0.02);
+}
+
+}  // namespace
+}  // namespace diastole::imaging

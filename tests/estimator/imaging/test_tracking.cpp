@@ -1,0 +1,140 @@
+#include <gmock/gmock.h>
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+
+#include "estimator/imaging/tracking/tags_file.hpp"
+#include "estimator/imaging/tracking/tracked_folder.hpp"
+#include "tests/estimator/imaging/tagged_ring.hpp"
+#include "tests/estimator/io/scratch_file.hpp"
+
+namespace diastole::imaging {
+namespace {
+
+using test::RingScan;
+using test::ScratchFolder;
+using testing::HasSubstr;
+
+struct Errors {
+  double rms_px = 0, normalised = 0, worst_px = 0;
+  size_t points = 0;
+};
+
+Errors errors_of(const RingScan& scan, const TrackedFolder& tracked) {
+  Errors errors;
+  for (const TagPoint& point : tracked.points) {
+    const double nearest = std::round(point.plane_mm / scan.tag_spacing_mm) * scan.tag_spacing_mm;
+    const double off_px = (scan.material_mm(point.frame, point.x_mm) - nearest) / scan.pixel_mm;
+    errors.rms_px += off_px * off_px;
+    errors.normalised += std::pow(off_px * scan.pixel_mm / point.sigma_mm, 2);
+    errors.worst_px = std::max(errors.worst_px, std::abs(off_px));
+    ++errors.points;
+  }
+  errors.rms_px = std::sqrt(errors.rms_px / static_cast<double>(errors.points));
+  errors.normalised /= static_cast<double>(errors.points);
+  return errors;
+}
+
+TEST(Tracking, FollowsARingToAFewHundredthsOfAPixelAndKnowsItsErrors) {
+  const ScratchFolder scratch;
+  const RingScan scan;
+  test::write_ring(scan, scratch.path());
+  const TrackedFolder tracked = track_folder({scratch.path(), {}, "patient"});
+  const Errors errors = errors_of(scan, tracked);
+  EXPECT_LT(errors.rms_px, 0.06);
+  EXPECT_LT(errors.worst_px, 0.5);
+  // One slice has some hundred independent errors, and they are alike from phase to phase.
+  EXPECT_GT(errors.normalised, 0.3);
+  EXPECT_LT(errors.normalised, 2.5);
+  // Lines of gel over their distance, a point about every 4 mm.
+  EXPECT_GT(errors.points, 8U * 130U);
+}
+
+TEST(Tracking, NumbersFramesByPhaseAcrossAGap) {
+  const ScratchFolder scratch;
+  const RingScan scan{.missing_phase = 5};
+  test::write_ring(scan, scratch.path());
+  const TrackedFolder tracked = track_folder({scratch.path(), {}, "patient"});
+  EXPECT_LT(errors_of(scan, tracked).rms_px, 0.08);
+  EXPECT_TRUE(std::none_of(tracked.points.begin(), tracked.points.end(),
+                           [](const TagPoint& p) { return p.frame == 5; }));
+  EXPECT_TRUE(std::any_of(tracked.points.begin(), tracked.points.end(),
+                          [](const TagPoint& p) { return p.frame == 8; }));
+}
+
+TEST(Tracking, UsesAPoseAndSaysWhatIsMissingWithoutOne) {
+  const ScratchFolder scratch;
+  const RingScan scan;
+  std::filesystem::create_directory(scratch.path() / "dicom");
+  test::write_ring(scan, scratch.path() / "dicom");
+  const TrackedFolder without = track_folder({scratch.path() / "dicom", {}, "auto"});
+  EXPECT_FALSE(without.pose);
+  EXPECT_THAT(without.problems.back().what, HasSubstr("two ends"));
+  EXPECT_THAT(test::message_of([&] {
+                (void)track_folder({scratch.path() / "dicom", {}, "specimen"});
+              }),
+              HasSubstr("--pose"));
+
+  SpecimenPose pose;
+  pose.origin_mm = {0.5, -0.25, 10};
+  scratch.write("ring.pose.toml", pose_text(pose, "annulus"));
+  const TrackedFolder with = track_folder({scratch.path() / "dicom", {}, "auto"});
+  ASSERT_TRUE(with.pose);
+  ASSERT_EQ(with.points.size(), without.points.size());
+  EXPECT_NEAR((with.points[0].x_mm + pose.origin_mm - without.points[0].x_mm).norm(), 0, 1e-9);
+  EXPECT_NEAR(with.points[0].plane_mm + with.points[0].normal.dot(pose.origin_mm), without.points[0].plane_mm,
+              1e-9);
+}
+
+TEST(Tracking, RefusesAFolderWithoutTags) {
+  const ScratchFolder scratch;
+  test::write_ring({.tagged = false}, scratch.path());
+  EXPECT_THAT(test::message_of([&] {
+                (void)track_folder({scratch.path(), {}, "patient"});
+              }),
+              HasSubstr("no tagged cine"));
+}
+
+TEST(Tracking, NoNameOfAPatientLeavesTheFiles) {
+  const ScratchFolder scratch;
+  test::write_ring({}, scratch.path());
+  const TrackedFolder tracked = track_folder({scratch.path(), {}, "patient"});
+  std::string said = tags_file_text(tracked.points);
+  for (const TrackedSlice& slice : tracked.slices)
+    said += slice.view.name;
+  for (const Finding& finding : tracked.problems)
+    said += finding.what + finding.where + finding.remedy;
+  for (const ImageSeries& series : read_image_folder(scratch.path()).series)
+    said += series.reason + series.vendor;
+  EXPECT_THAT(said, testing::Not(testing::AnyOf(HasSubstr("DOE"), HasSubstr("SECRET"), HasSubstr("1.2.3"))));
+}
+
+TEST(SpecimenPose, RefusesAxesThatAreNone) {
+  const ScratchFolder scratch;
+  const auto file =
+      scratch.write("bad.pose.toml",
+                    "origin_mm = [0.0, 0.0, 0.0]\nx_axis = [1.0, 0.0, 0.0]\ny_axis = [0.5, 1.0, 0.0]\n"
+                    "z_axis = [0.0, 0.0, 1.0]\n");
+  EXPECT_THAT(test::message_of([&] { (void)read_pose(file); }), HasSubstr("right angles"));
+}
+
+TEST(SplinePlane, PriorHasUnitVarianceAndCarriesAPlane) {
+  Eigen::Matrix2Xd samples(2, 400);
+  for (Eigen::Index i = 0; i < 400; ++i)
+    samples.col(i) = Eigen::Vector2d(static_cast<double>(i % 20), static_cast<double>(i / 20)) * 4.0;
+  const SplinePlane splines(samples, 10.0);
+  const Eigen::MatrixXd covariance = splines.precision(1.0 / 30).inverse();
+  const SplineValues values = splines.at({40, 40});
+  double variance = 0, sum = 0;
+  for (size_t i = 0; i < 16; ++i) {
+    sum += values.value[i];
+    for (size_t j = 0; j < 16; ++j)
+      variance += values.value[i] * values.value[j] * covariance(values.index[i], values.index[j]);
+  }
+  EXPECT_NEAR(sum, 1.0, 1e-12);
+  EXPECT_NEAR(variance, 1.0, 0.4);
+}
+
+}  // namespace
+}  // namespace diastole::imaging
