@@ -7,6 +7,7 @@
 
 #include "estimator/cli/commands.hpp"
 #include "estimator/cli/interruption.hpp"
+#include "estimator/cli/study_images.hpp"
 #include "estimator/explain/explain_study.hpp"
 #include "estimator/explain/verdict/explained_study.hpp"
 #include "estimator/explain/verdict/explanation_json.hpp"
@@ -110,7 +111,8 @@ ExitCode run_explain(const ExplainArguments& arguments, const CommandOutput& out
                       .problem = "is missing",
                       .remedy = "Name a folder for the result: -o out/."});
   }
-  const Study study = read_study(arguments.study);
+  Study study = read_study(arguments.study);
+  use_images(study);
   const fs::path json_file = arguments.folder / explanation_file;
   const fs::path new_study = arguments.folder / study_file;
   const fs::path page = arguments.folder / report_file;

@@ -10,6 +10,7 @@
 #include "estimator/cli/commands.hpp"
 #include "estimator/cli/interruption.hpp"
 #include "estimator/cli/output_files.hpp"
+#include "estimator/cli/study_images.hpp"
 #include "estimator/cli/study_options.hpp"
 #include "estimator/fit/study_fit.hpp"
 #include "estimator/io/study_fingerprint.hpp"
@@ -147,6 +148,7 @@ bool ended_on_bound(const FitRecord& record) {
 
 ExitCode run_fit(const FitArguments& arguments, const CommandOutput& out) {
   Study study = read_study(arguments.study);
+  use_images(study);
   if (!arguments.smooth.empty()) set_smoothness(study, arguments.smooth);
   if (arguments.output && arguments.output == arguments.checkpoint) {
     throw InputError({arguments.output->string(), "--checkpoint", "is the file of the result too",

@@ -10,6 +10,7 @@
 #include <thread>
 
 #include "estimator/cli/commands.hpp"
+#include "estimator/cli/study_images.hpp"
 #include "estimator/cli/study_options.hpp"
 #include "estimator/fit/study_fit.hpp"
 #include "estimator/io/member_json.hpp"
@@ -166,6 +167,7 @@ ExitCode run_montecarlo(const MonteCarloArguments& arguments, const CommandOutpu
   const bool leads = !world || world->rank() == 0;
   const Clock::time_point begun = Clock::now();
   Study study = read_study(arguments.study);
+  use_images(study);
   const Measurement measurement = read_measurement(study);
   choose_truth(study, measurement, arguments);
   MonteCarloPlan plan{.noise_mm = arguments.noise_mm,

@@ -9,6 +9,7 @@
 
 #include "estimator/cli/commands.hpp"
 #include "estimator/cli/output_files.hpp"
+#include "estimator/cli/study_images.hpp"
 #include "estimator/cli/study_options.hpp"
 #include "estimator/io/measurement.hpp"
 #include "estimator/io/whole_file.hpp"
@@ -85,7 +86,8 @@ void print_record(const ReconstructionRecord& record) {
 }
 
 ExitCode run_reconstruct(const ReconstructArguments& arguments, const CommandOutput& out) {
-  const Study study = read_study(arguments.study);
+  Study study = read_study(arguments.study);
+  use_images(study);
   arguments.outputs.require(
       inputs_of(study), output_kinds, "is no kind of file that a reconstruction is written to",
       "End it in .csv (points for `diastole fit`), .vtkhdf (for ParaView) or .json (for "

@@ -60,7 +60,8 @@ ExitCode run_track(const TrackArguments& arguments, const CommandOutput& out) {
   require_output({arguments.output, inputs, imaging::tags_file_header, arguments.force});
   const bool shows_progress = isatty(STDERR_FILENO) != 0;
   const imaging::TrackedFolder tracked = imaging::track_folder(
-      {arguments.folder, arguments.pose, arguments.coordinates}, [&](const std::string& stage) {
+      {.folder = arguments.folder, .pose = arguments.pose, .coordinates = arguments.coordinates},
+      [&](const std::string& stage) {
         if (shows_progress) fmt::print(stderr, "{}\n", stage);
       });
   write_whole_file(arguments.output, imaging::tags_file_text(tracked.points));

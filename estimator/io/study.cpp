@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <cmath>
 
 #include "protocol/contract/input_error.hpp"
 #include "protocol/contract/table_reader.hpp"
@@ -210,12 +211,45 @@ StudyData read_data(TableReader& root, const std::filesystem::path& folder) {
   data.tags = path_if("tags");
   data.points = path_if("points");
   data.frames = path_if("frames");
-  if ((data.tags || data.points) && !data.frames) {
-    table->fail("frames", "missing, although tags or points are given",
+  data.images = path_if("images");
+  if (data.images && (data.tags || data.points))
+    table->fail("images", "stands beside tags or points",
+                "Leave one of them out: tags are made of the images.");
+  if ((data.tags || data.points || data.images) && !data.frames) {
+    table->fail("frames", "missing, although tags, points or images are given",
                 "Name the file with each frame's pressure: frames = \"NAME.frames.csv\".");
   }
   table->finish();
   return data;
+}
+
+std::optional<StudyPose> read_pose_of_images(TableReader& root) {
+  std::optional<TableReader> images = root.table_if("images");
+  if (!images) return std::nullopt;
+  std::optional<StudyPose> pose;
+  if (std::optional<TableReader> table = images->table_if("to_specimen")) {
+    pose.emplace();
+    const auto vector = [&](std::string_view key) -> std::array<double, 3> {
+      const std::vector<double> numbers = table->numbers(key, 3);
+      return {numbers[0], numbers[1], numbers[2]};
+    };
+    pose->origin_mm = vector("origin_mm");
+    pose->axes = {vector("x_axis"), vector("y_axis"), vector("z_axis")};
+    constexpr double tolerance = 1e-3;
+    for (size_t i = 0; i < 3; ++i) {
+      for (size_t j = 0; j <= i; ++j) {
+        double product = 0;
+        for (size_t k = 0; k < 3; ++k)
+          product += pose->axes[i][k] * pose->axes[j][k];
+        if (std::abs(product - (i == j ? 1.0 : 0.0)) > tolerance)
+          table->fail("x_axis", "and y_axis, z_axis are not of length 1 and at right angles",
+                      "Give the specimen's axes in patient coordinates, with five digits or more.");
+      }
+    }
+    table->finish();
+  }
+  images->finish();
+  return pose;
 }
 
 [[noreturn]] void refuse_option(std::string_view option, std::string_view value, std::string problem,
@@ -244,6 +278,7 @@ Study read_study(const std::filesystem::path& path) {
               .effects = {},
               .refine = {}};
   study.data = read_data(root, path.parent_path());
+  study.data.to_specimen = read_pose_of_images(root);
   study.chamber = read_chamber(root);
   if (auto model = root.table_if("model")) {
     study.effects = model->texts_or("effects", {});

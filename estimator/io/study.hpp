@@ -85,6 +85,12 @@ struct StudyLaw {
   std::vector<StudyParameter> parameters;
 };
 
+/// [images.to_specimen]: x_patient = origin + X x_axis + Y y_axis + Z z_axis, in DICOM's patient coordinates.
+struct StudyPose {
+  std::array<double, 3> origin_mm;
+  std::array<std::array<double, 3>, 3> axes;  ///< x_axis, y_axis, z_axis: of length 1 and at right angles
+};
+
 /// Paths are resolved against the study file's folder; they need not exist until they are read.
 struct StudyData {
   std::vector<std::filesystem::path> runs;
@@ -93,6 +99,8 @@ struct StudyData {
   std::optional<std::filesystem::path> tags;
   std::optional<std::filesystem::path> points;
   std::optional<std::filesystem::path> frames;
+  std::optional<std::filesystem::path> images = {};  ///< a scanner's export, of which tags are made
+  std::optional<StudyPose> to_specimen = {};  ///< absent: a pose file beside the images, or their outlines
 };
 
 /// A chamber filled with fluid around the specimen (estimator/fe/chamber.hpp).

@@ -44,9 +44,11 @@ CrossValidation choose_lambda(SmoothedSystem& system, double fineness) {
   CrossValidation result;
   const auto score = [&](double exponent) {
     system.factorise(std::pow(10.0, exponent));
-    if (!system.factorised()) return std::numeric_limits<double>::infinity();
     const Eigen::VectorXd misfit = system.weighted_rows() * system.solution() - system.weighted_targets();
     const double trace = stochastic_trace(system, right_sides);
+    // What neither data nor so little smoothness hold has no solution.
+    if (!std::isfinite(misfit.squaredNorm()) || !std::isfinite(trace))
+      return std::numeric_limits<double>::infinity();
     const double freedom = std::max(measured - trace, 1e-3 * measured);
     result.curve.push_back({system.lambda(), measured * misfit.squaredNorm() / (freedom * freedom), trace});
     return result.curve.back().score;

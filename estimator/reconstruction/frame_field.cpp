@@ -190,6 +190,12 @@ double FrameField::chi2() const {
   return sum;
 }
 
+const FrameField& most_loaded(const std::vector<FrameField>& fields) {
+  return *std::max_element(fields.begin(), fields.end(), [](const FrameField& a, const FrameField& b) {
+    return a.load.pressure_kPa < b.load.pressure_kPa;
+  });
+}
+
 double robust_spread(std::vector<double> values) {
   if (values.empty()) return 0.0;
   for (double& value : values)

@@ -74,6 +74,9 @@ struct FrameField {
 FrameField reconstruct_frame(const FieldForms& forms, const Measurement& measurement, int frame,
                              const FrameOptions& options);
 
+/// Of the highest pressure: in images of a whole cycle the last frame is nearly at rest.
+const FrameField& most_loaded(const std::vector<FrameField>& fields);
+
 /// Median absolute value / 0.6745: the standard deviation of normal numbers, blind to a few wild ones.
 double robust_spread(std::vector<double> values);
 

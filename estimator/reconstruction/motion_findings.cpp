@@ -243,7 +243,7 @@ void check_coverage(Findings& findings, const Coverage& coverage) {
            "{} of the twelve shifts, turns, stretches and shears of the body are not seen to {:g} mm; what "
            "is missed is {}.",
            unseen, unseen_mm, direction),
-       "last frame", static_cast<double>(unseen), "motions",
+       "most loaded frame", static_cast<double>(unseen), "motions",
        "Add images whose tags have a normal along it; until then smoothness decides it."});
 }
 
@@ -272,10 +272,8 @@ void check_method(Findings& findings, const std::vector<FrameField>& fields) {
 std::vector<MotionAmplitude> motion_amplitudes(const FieldForms& forms,
                                                const std::vector<FrameField>& fields) {
   std::vector<MotionAmplitude> amplitudes;
-  const auto most = std::max_element(
-      fields.begin(), fields.end(),
-      [](const FrameField& a, const FrameField& b) { return a.load.pressure_kPa < b.load.pressure_kPa; });
-  const Eigen::VectorXd whole_motion = forms.space.unknowns_of(most->displacement_mm);
+  const FrameField& most = most_loaded(fields);
+  const Eigen::VectorXd whole_motion = forms.space.unknowns_of(most.displacement_mm);
   for (const FrameField& field : fields) {
     const auto& rows = field.system->weighted_rows();
     Eigen::VectorXd seen = rows * forms.space.unknowns_of(field.displacement_mm);
@@ -286,7 +284,7 @@ std::vector<MotionAmplitude> motion_amplitudes(const FieldForms& forms,
     amplitudes.push_back(
         {expected.dot(seen) / information, std::max(field.scale, 1.0) / std::sqrt(information)});
   }
-  const double whole = amplitudes[static_cast<size_t>(most - fields.begin())].value;
+  const double whole = amplitudes[static_cast<size_t>(&most - fields.data())].value;
   if (!(whole > 0.0)) return amplitudes;
   for (MotionAmplitude& amplitude : amplitudes)
     amplitude = {amplitude.value / whole, amplitude.se / whole};

@@ -14,7 +14,7 @@
 
 namespace diastole {
 
-/// How far a frame's motion has come along that of the last one, by the measured numbers themselves: least squares of
+/// How far a frame's motion has come along that of the most loaded one, by the measured numbers themselves: least squares of
 /// them on the most loaded frame's field, so that smoothing, which takes more of a small motion than of a large one, does not
 /// matter. The most loaded frame's is 1.
 struct MotionAmplitude {
@@ -45,7 +45,7 @@ struct MotionEvidence {
   std::vector<FamilyFit> families;
   std::vector<SliceOffset> slices;
   std::vector<VolumeCheck> volumes;  ///< in the order of the fields
-  Coverage coverage;                 ///< of the last frame
+  Coverage coverage;                 ///< of the most loaded frame
 };
 
 /// Sound data give an empty list.

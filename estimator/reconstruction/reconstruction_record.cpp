@@ -200,7 +200,7 @@ ReconstructionRecord reconstruction_record(const Study& study, const Measurement
   record_families(record, all);
   record_coverage(record, all);
   record_residuals(record, all);
-  record.sections = field_sections(all.body->mesh, all.fields.back(), all.coverage);
+  record.sections = field_sections(all.body->mesh, most_loaded(all.fields), all.coverage);
   return record;
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace diastole {
 namespace {
@@ -101,7 +102,12 @@ void SmoothedSystem::factorise_without_smoothness(double amplitude_mm) {
 Eigen::VectorXd SmoothedSystem::solution() const { return solve(right_side_); }
 
 Eigen::MatrixXd SmoothedSystem::solve(const Eigen::MatrixXd& right_sides) const {
-  return factor_.solve(right_sides);
+  Eigen::MatrixXd solution = factor_.solve(right_sides);
+  // Where CHOLMOD finds no solution, Eigen gives back nothing at all.
+  if (solution.rows() != right_sides.rows())
+    solution = Eigen::MatrixXd::Constant(right_sides.rows(), right_sides.cols(),
+                                         std::numeric_limits<double>::quiet_NaN());
+  return solution;
 }
 
 std::vector<double> SmoothedSystem::variances(std::span<const Functional> functionals) const {

@@ -62,8 +62,6 @@ class SmoothedSystem {
   [[nodiscard]] size_t measured() const { return measured_; }
   [[nodiscard]] const FieldForms& forms() const { return forms_; }
   [[nodiscard]] double lambda() const { return lambda_; }
-  /// Whether the last `factorise` succeeded: where neither data nor so little smoothness hold some motion, it does not.
-  [[nodiscard]] bool factorised() const { return factor_.info() == Eigen::Success; }
 
  private:
   void factorise_values(QuadraticForms::Values values);

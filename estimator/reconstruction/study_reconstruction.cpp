@@ -98,11 +98,11 @@ void judge(StudyReconstruction& result, const Study& study, const Measurement& m
   result.slices = slice_offsets(result.fields, result.groups, measurement.tags);
   for (const FrameField& field : result.fields)
     result.volumes.push_back(check_volume(forms, field));
-  if (!options.quick) result.coverage = coverage_of(forms, result.fields.back());
+  if (!options.quick) result.coverage = coverage_of(forms, most_loaded(result.fields));
   const std::vector<Finding> found = motion_findings(result);
   result.findings.insert(result.findings.end(), found.begin(), found.end());
   if (!options.check_stiffness || has_error(result.findings)) return;
-  if (const auto apparent = apparent_stiffness(study, forms, result.fields.back())) {
+  if (const auto apparent = apparent_stiffness(study, forms, most_loaded(result.fields))) {
     if (const auto finding = pressure_unit_finding(study, *apparent)) result.findings.push_back(*finding);
   }
 }

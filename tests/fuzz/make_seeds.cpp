@@ -6,6 +6,7 @@
 #include <string>
 
 #include "protocol/wire/messages.hpp"
+#include "tests/estimator/imaging/tagged_ring.hpp"
 #include "tests/fuzz/script.hpp"
 #include "tests/host/acquisition/session_on_desk.hpp"
 
@@ -175,6 +176,11 @@ void write_runfile_scripts(const std::filesystem::path& directory) {
   }
 }
 
+void write_images(const std::filesystem::path& directory) {
+  std::filesystem::create_directories(directory / "fuzz_dicom");
+  test::write_ring({.phases = 1, .pixels = 12, .pixel_mm = 8}, directory / "fuzz_dicom", "classic");
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -188,5 +194,6 @@ int main(int argc, char** argv) {
   write_http_requests(directory);
   write_journals(directory);
   write_runfile_scripts(directory);
+  write_images(directory);
   return 0;
 }

@@ -340,7 +340,7 @@ MaterialMap refined_materials(const Image& image, const TagView& view, const Mat
   std::array<CostMap, 4> costs;
   costs[static_cast<size_t>(Material::nothing)] = cost(Material::nothing, 2 * spacing_mm, 1, constant);
   costs[static_cast<size_t>(Material::tissue)] =
-      cost(Material::tissue, spacing_mm, model.patterns(), by_phases(tissue));
+      cost(Material::tissue, 2 * spacing_mm, model.patterns(), by_phases(tissue));
   costs[static_cast<size_t>(Material::still_water)] =
       cost(Material::still_water, 2 * spacing_mm, model.patterns(), by_phases(still));
   costs[static_cast<size_t>(Material::mixed_water)] =

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <random>
 
 #include "estimator/imaging/series/spectrum.hpp"
 #include "estimator/imaging/tracking/brightness.hpp"
@@ -29,6 +30,8 @@ constexpr double first_range_in_spacings = 4.0;
 constexpr std::array ranges_in_spacings = {4.0, 16.0};
 /// Modes of the motion that are smaller than a two-hundredth of a pixel are no part of it.
 constexpr double negligible_in_pixels = 0.005;
+/// A motion that begins at rest has done 2 (2 t / T)^2 of its whole after a small t: a thousandth after a hundredth of the cycle.
+constexpr double late_share = 0.02;
 constexpr double settled_mm = 0.005;
 
 double median(std::vector<double> values) {
@@ -109,15 +112,16 @@ class ViewTracker {
       phases[f] = two_pi * (waves_[f].per_mm.dot(x_mm) - waves_[f].offset_cycles);
   }
 
-  /// Corrects wave vectors and offsets by what does not move: still water in all phases, and tissue in the first.
+  /// Corrects wave vectors and offsets by tissue in the first phase; if that comes late, by still water in all phases too.
   void settle_waves(const MaterialMap& map) {
     const Eigen::ArrayXXf water = depth_mm(map, Material::still_water, view_.plane);
     const Eigen::ArrayXXf tissue = depth_mm(map, Material::tissue, view_.plane);
+    const bool is_late = view_.times_ms.front() > late_share * view_.times_ms.back();
     for (int round = 0; round < 3; ++round) {
       std::vector<Eigen::Matrix3d> matrix(directions(), Eigen::Matrix3d::Zero());
       std::vector<Eigen::Vector3d> vector(directions(), Eigen::Vector3d::Zero());
       for (size_t k = 0; k < times(); ++k) {
-        add_waves(view_.images[k], water, 2.5 * sure_mm(), matrix, vector);
+        if (is_late) add_waves(view_.images[k], water, 2.5 * sure_mm(), matrix, vector);
         if (k == 0) add_waves(view_.images[k], tissue, 1.5 * sure_mm(), matrix, vector);
       }
       for (size_t f = 0; f < directions(); ++f) {
@@ -264,21 +268,22 @@ class ViewTracker {
       const std::vector<Eigen::MatrixXd> expected = coefficients_;
       phases_[k].materials = k == 0 ? first : phases_[k - 1].materials;
       phases_[k].depth_mm = depth_mm(phases_[k].materials, Material::tissue, view_.plane);
-      fit_phase(k, expected, 4);
+      fit_phase(k, view_.images[k], expected, 4);
       find_edges(k, phases_[k].materials, rest);
       if (k == 0) find_edges(k, phases_[k].materials, rest);
-      fit_phase(k, expected, 4);
+      fit_phase(k, view_.images[k], expected, 4);
     }
   }
 
-  void fit_phase(size_t k, const std::vector<Eigen::MatrixXd>& expected, int most_rounds) {
+  void fit_phase(size_t k, const Image& image, const std::vector<Eigen::MatrixXd>& expected,
+                 int most_rounds) {
     const auto time = static_cast<Eigen::Index>(k);
     const double step_mm = first_step_in_spacings * spacing_mm_;
     const Eigen::MatrixXd prior = first_precision_ / (step_mm * step_mm);
     for (int round = 0; round < most_rounds; ++round) {
       double largest = 0;
       for (size_t f = 0; f < directions(); ++f) {
-        PhaseInformation information = gather(k, f);
+        PhaseInformation information = gather(k, f, image);
         const Eigen::VectorXd now = coefficients_[f].col(time);
         const Eigen::VectorXd step = (information.precision + prior)
                                          .ldlt()
@@ -292,9 +297,10 @@ class ViewTracker {
 
   /// Gradient (in place of eta) and curvature of one direction's motion in one image, at the present motion. Brightness is fitted on the way;
   /// residuals and slopes are kept.
-  PhaseInformation gather(size_t k, size_t f) {
+  PhaseInformation gather(size_t k, size_t f) { return gather(k, f, view_.images[k]); }
+
+  PhaseInformation gather(size_t k, size_t f, const Image& image) {
     TrackedPhase& phase = phases_[k];
-    const Image& image = view_.images[k];
     Brightness brightness(view_.extent_mm(), window_in_spacings * spacing_mm_,
                           static_cast<int>(model_.patterns()));
     fitted_.clear();
@@ -345,29 +351,56 @@ class ViewTracker {
     return information;
   }
 
-  /// Noise power near the tags' frequency over that of white noise of the same variance: outside what the motion and the brightness can
-  /// follow, and inside half a cycle a spacing of the tags.
-  double noise_factor(size_t f) const {
-    double sum = 0, count = 0;
+  /// A phase's residual power near the tags' frequency over that of white noise of the same variance: farther off than the motion can
+  /// follow, and within two thirds of a cycle a spacing of the tags.
+  double power_near_tags(const TrackedPhase& phase, size_t f) const {
     const Eigen::Vector2d extent(view_.plane.columns * view_.plane.column_spacing_mm,
                                  view_.plane.rows * view_.plane.row_spacing_mm);
-    for (const TrackedPhase& phase : phases_) {
-      if (phase.pixels == 0) continue;
-      const float limit = static_cast<float>(huber * phase.noise);
-      const Eigen::ArrayXXf power = spectrum_of(phase.residual.min(limit).max(-limit)).abs2();
-      const double white = static_cast<double>(phase.pixels) * phase.noise * phase.noise;
-      for (Eigen::Index column = 0; column < power.cols(); ++column) {
-        for (Eigen::Index row = 0; row < power.rows(); ++row) {
-          const Eigen::Vector2d per_mm(signed_bin(column, power.cols()) / extent.x(),
-                                       signed_bin(row, power.rows()) / extent.y());
-          const double apart = (per_mm - waves_[f].per_mm).norm() * spacing_mm_;
-          if (apart < 0.4 || apart > 0.65) continue;
-          sum += static_cast<double>(power(row, column)) / white;
-          count += 1;
-        }
+    const auto limit = static_cast<float>(huber * phase.noise);
+    const Eigen::ArrayXXf power = spectrum_of(phase.residual.min(limit).max(-limit)).abs2();
+    double sum = 0, count = 0;
+    for (Eigen::Index column = 0; column < power.cols(); ++column) {
+      for (Eigen::Index row = 0; row < power.rows(); ++row) {
+        const Eigen::Vector2d per_mm(signed_bin(column, power.cols()) / extent.x(),
+                                     signed_bin(row, power.rows()) / extent.y());
+        const double apart = (per_mm - waves_[f].per_mm).norm() * spacing_mm_;
+        if (apart < 0.4 || apart > 0.65) continue;
+        sum += static_cast<double>(power(row, column));
+        count += 1;
       }
     }
-    return count > 0 ? std::max(sum / count, 0.1) : 1.0;
+    return sum / (std::max(count, 1.0) * static_cast<double>(std::max<size_t>(phase.pixels, 1)) *
+                  phase.noise * phase.noise);
+  }
+
+  /// Noise power near the tags' frequency over the mean. A narrow wall blurs the spectrum, so that what the fit takes of the noise at the tags'
+  /// frequency is missing beside it too: as much as it takes of white noise that is put in the residual's place.
+  double noise_factor(size_t f) {
+    double seen = 0, counted = 0;
+    for (size_t k = 0; k < times(); ++k) {
+      if (phases_[k].pixels == 0) continue;
+      seen += power_near_tags(phases_[k], f);
+      counted += 1;
+    }
+    std::mt19937 engine(20);
+    double kept = 0, tried = 0;
+    for (const size_t k : {size_t{0}, times() / 2, times() - 1}) {
+      if (phases_[k].pixels == 0) continue;
+      std::normal_distribution<float> white(0.0F, static_cast<float>(phases_[k].noise));
+      const Image image = (view_.images[k] - phases_[k].residual).unaryExpr([&](float value) {
+        return value + white(engine);
+      });
+      const TrackedPhase before = phases_[k];
+      const std::vector<Eigen::MatrixXd> coefficients = coefficients_;
+      fit_phase(k, image, coefficients, 2);
+      (void)gather(k, f, image);
+      kept += power_near_tags(phases_[k], f);
+      tried += 1;
+      coefficients_ = coefficients;
+      phases_[k] = before;
+    }
+    return std::clamp((seen / std::max(counted, 1.0)) / std::max(kept / std::max(tried, 1.0), 0.1), 0.2,
+                      10.0);
   }
 
   void fit_all_phases() {

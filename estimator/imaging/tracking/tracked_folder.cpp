@@ -13,29 +13,14 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// The one *.pose.toml in the folder or beside it.
-std::optional<fs::path> pose_nearby(const fs::path& folder) {
-  std::vector<fs::path> found;
-  const fs::path whole = fs::absolute(folder).lexically_normal();
-  const fs::path inside = whole.has_filename() ? whole : whole.parent_path();
-  for (const fs::path& place : {inside, inside.parent_path()}) {
-    std::error_code error;
-    for (fs::directory_iterator at(place, error), end; !error && at != end; at.increment(error)) {
-      if (at->path().filename().string().ends_with(".pose.toml")) found.push_back(at->path());
-    }
-  }
-  if (found.size() != 1) return std::nullopt;
-  return found[0];
-}
-
 /// The pose that the request or the images give, and what is to be said about it.
 void settle_pose(const TrackRequest& request, TrackedFolder& tracked) {
   if (request.coordinates == "patient") return;
   const auto file = request.pose ? request.pose : pose_nearby(request.folder);
   const FoundPose found = find_annulus_pose(tracked.slices);
   tracked.outline = found.outline;
-  if (file) {
-    tracked.pose = read_pose(*file);
+  if (file || request.known_pose) {
+    tracked.pose = request.known_pose ? *request.known_pose : read_pose(*file);
     if (!found.pose) return;
     const double apart_mm = (tracked.pose->origin_mm - found.pose->origin_mm).norm();
     const double turned_deg =
@@ -46,7 +31,7 @@ void settle_pose(const TrackRequest& request, TrackedFolder& tracked) {
           {Severity::warning, "pose-beside-outline",
            fmt::format("the pose lies {:.1f} mm and {:.1f} degrees from what the outlines show", apart_mm,
                        turned_deg),
-           file->string(), apart_mm, "mm",
+           tracked.pose->source, apart_mm, "mm",
            "Is it the pose of this session? Leave it out to use the outlines."});
     return;
   }
@@ -62,6 +47,20 @@ void settle_pose(const TrackRequest& request, TrackedFolder& tracked) {
 }
 
 }  // namespace
+
+std::optional<fs::path> pose_nearby(const fs::path& folder) {
+  std::vector<fs::path> found;
+  const fs::path whole = fs::absolute(folder).lexically_normal();
+  const fs::path inside = whole.has_filename() ? whole : whole.parent_path();
+  for (const fs::path& place : {inside, inside.parent_path()}) {
+    std::error_code error;
+    for (fs::directory_iterator at(place, error), end; !error && at != end; at.increment(error)) {
+      if (at->path().filename().string().ends_with(".pose.toml")) found.push_back(at->path());
+    }
+  }
+  if (found.size() != 1) return std::nullopt;
+  return found[0];
+}
 
 std::vector<PhaseSummary> phase_summaries(const TrackedSlice& slice) {
   std::vector<PhaseSummary> summaries;

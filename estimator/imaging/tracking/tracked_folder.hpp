@@ -15,9 +15,10 @@ namespace diastole::imaging {
 
 struct TrackRequest {
   std::filesystem::path folder;
-  std::optional<std::filesystem::path>
-      pose;  ///< absent: the one *.pose.toml beside or in the folder, or what the images show
-  std::string coordinates = "auto";  ///< "specimen": a pose is demanded; "patient": none is used
+  std::optional<std::filesystem::path> pose =
+      {};  ///< absent: the one *.pose.toml beside or in the folder, or what the images show
+  std::optional<SpecimenPose> known_pose = {};  ///< comes before any file
+  std::string coordinates = "auto";             ///< "specimen": a pose is demanded; "patient": none is used
 };
 
 struct TrackedFolder {
@@ -29,6 +30,9 @@ struct TrackedFolder {
   std::vector<Finding> problems;
   double rms_px = 0;  ///< of the points' standard errors
 };
+
+/// The one *.pose.toml in the folder or beside it.
+std::optional<std::filesystem::path> pose_nearby(const std::filesystem::path& folder);
 
 struct PhaseSummary {
   int frame;

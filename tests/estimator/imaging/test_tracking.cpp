@@ -40,7 +40,7 @@ TEST(Tracking, FollowsARingToAFewHundredthsOfAPixelAndKnowsItsErrors) {
   const ScratchFolder scratch;
   const RingScan scan;
   test::write_ring(scan, scratch.path());
-  const TrackedFolder tracked = track_folder({scratch.path(), {}, "patient"});
+  const TrackedFolder tracked = track_folder({.folder = scratch.path(), .coordinates = "patient"});
   const Errors errors = errors_of(scan, tracked);
   EXPECT_LT(errors.rms_px, 0.06);
   EXPECT_LT(errors.worst_px, 0.5);
@@ -55,7 +55,7 @@ TEST(Tracking, NumbersFramesByPhaseAcrossAGap) {
   const ScratchFolder scratch;
   const RingScan scan{.missing_phase = 5};
   test::write_ring(scan, scratch.path());
-  const TrackedFolder tracked = track_folder({scratch.path(), {}, "patient"});
+  const TrackedFolder tracked = track_folder({.folder = scratch.path(), .coordinates = "patient"});
   EXPECT_LT(errors_of(scan, tracked).rms_px, 0.08);
   EXPECT_TRUE(std::none_of(tracked.points.begin(), tracked.points.end(),
                            [](const TagPoint& p) { return p.frame == 5; }));
@@ -68,18 +68,18 @@ TEST(Tracking, UsesAPoseAndSaysWhatIsMissingWithoutOne) {
   const RingScan scan;
   std::filesystem::create_directory(scratch.path() / "dicom");
   test::write_ring(scan, scratch.path() / "dicom");
-  const TrackedFolder without = track_folder({scratch.path() / "dicom", {}, "auto"});
+  const TrackedFolder without = track_folder({.folder = scratch.path() / "dicom", .coordinates = "auto"});
   EXPECT_FALSE(without.pose);
   EXPECT_THAT(without.problems.back().what, HasSubstr("two ends"));
   EXPECT_THAT(test::message_of([&] {
-                (void)track_folder({scratch.path() / "dicom", {}, "specimen"});
+                (void)track_folder({.folder = scratch.path() / "dicom", .coordinates = "specimen"});
               }),
               HasSubstr("--pose"));
 
   SpecimenPose pose;
   pose.origin_mm = {0.5, -0.25, 10};
   scratch.write("ring.pose.toml", pose_text(pose, "annulus"));
-  const TrackedFolder with = track_folder({scratch.path() / "dicom", {}, "auto"});
+  const TrackedFolder with = track_folder({.folder = scratch.path() / "dicom", .coordinates = "auto"});
   ASSERT_TRUE(with.pose);
   ASSERT_EQ(with.points.size(), without.points.size());
   EXPECT_NEAR((with.points[0].x_mm + pose.origin_mm - without.points[0].x_mm).norm(), 0, 1e-9);
@@ -90,16 +90,15 @@ TEST(Tracking, UsesAPoseAndSaysWhatIsMissingWithoutOne) {
 TEST(Tracking, RefusesAFolderWithoutTags) {
   const ScratchFolder scratch;
   test::write_ring({.tagged = false}, scratch.path());
-  EXPECT_THAT(test::message_of([&] {
-                (void)track_folder({scratch.path(), {}, "patient"});
-              }),
-              HasSubstr("no tagged cine"));
+  EXPECT_THAT(
+      test::message_of([&] { (void)track_folder({.folder = scratch.path(), .coordinates = "patient"}); }),
+      HasSubstr("no tagged cine"));
 }
 
 TEST(Tracking, NoNameOfAPatientLeavesTheFiles) {
   const ScratchFolder scratch;
   test::write_ring({}, scratch.path());
-  const TrackedFolder tracked = track_folder({scratch.path(), {}, "patient"});
+  const TrackedFolder tracked = track_folder({.folder = scratch.path(), .coordinates = "patient"});
   std::string said = tags_file_text(tracked.points);
   for (const TrackedSlice& slice : tracked.slices)
     said += slice.view.name;
