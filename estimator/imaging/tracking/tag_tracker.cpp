@@ -268,7 +268,7 @@ class ViewTracker {
       const std::vector<Eigen::MatrixXd> expected = coefficients_;
       phases_[k].materials = k == 0 ? first : phases_[k - 1].materials;
       phases_[k].depth_mm = depth_mm(phases_[k].materials, Material::tissue, view_.plane);
-      fit_phase(k, view_.images[k], expected, 4);
+      fit_phase(k, view_.images[k], expected, 2);
       find_edges(k, phases_[k].materials, rest);
       if (k == 0) find_edges(k, phases_[k].materials, rest);
       fit_phase(k, view_.images[k], expected, 4);
@@ -410,14 +410,14 @@ class ViewTracker {
     for (const double range : ranges_in_spacings)
       kappas.push_back(1.0 / (range * spacing_mm_));
     for (size_t f = 0; f < directions(); ++f) {
-      priors_.push_back(learn_motion_prior(*splines_, informations(f), coefficients_[f], kappas,
-                                           negligible_in_pixels * view_.plane.finer_spacing_mm()));
       inverse_factors_.emplace_back();
+      const std::vector<PhaseInformation> found = informations(f);
+      priors_.push_back(learn_motion_prior(*splines_, found, coefficients_[f], kappas,
+                                           negligible_in_pixels * view_.plane.finer_spacing_mm()));
+      fit_jointly(f, found, false);
     }
-    for (int round = 0; round < 2; ++round) {
-      for (size_t f = 0; f < directions(); ++f)
-        fit_jointly(f, informations(f), round == 1);
-    }
+    for (size_t f = 0; f < directions(); ++f)
+      fit_jointly(f, informations(f), true);
     for (size_t f = 0; f < directions(); ++f) {
       for (size_t k = 0; k < times(); ++k)
         (void)gather(k, f);
