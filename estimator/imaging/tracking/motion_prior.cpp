@@ -8,6 +8,8 @@ namespace {
 
 /// Each step of expectation maximisation raises the evidence; by then its gain is below a thousandth a coefficient.
 constexpr int steps = 60;
+/// The ranges are told apart long before.
+constexpr int steps_to_choose = 12;
 /// What the images know less of than a hundredth of what the prior says of a millimetre teaches nothing.
 constexpr double least_strength = 0.01;
 
@@ -95,6 +97,7 @@ MotionPrior learn_motion_prior(const SplinePlane& splines, const std::vector<Pha
   const auto times = static_cast<Eigen::Index>(phases.size());
   const double motion_mm = std::sqrt(estimates.array().square().mean());
   MotionPrior best;
+  Modes best_modes;
   double best_evidence = -std::numeric_limits<double>::infinity();
   for (const double kappa : kappas_per_mm) {
     const Eigen::MatrixXd precision = splines.precision(kappa);
@@ -107,14 +110,17 @@ MotionPrior learn_motion_prior(const SplinePlane& splines, const std::vector<Pha
                         return std::exp(-8.0 * apart * apart) + (a == b ? 1e-5 : 0.0);
                       }),
                   0};
-    for (int step = 0; step < steps; ++step)
+    for (int step = 0; step < steps_to_choose; ++step)
       learnt = expect(modes, learnt.covariance);
     if (learnt.log_evidence <= best_evidence) continue;
     best_evidence = learnt.log_evidence;
+    best_modes = modes;
     best.kappa_per_mm = kappa;
     best.place_precision = precision;
     best.time_covariance = learnt.covariance;
   }
+  for (int step = steps_to_choose; step < steps; ++step)
+    best.time_covariance = expect(best_modes, best.time_covariance).covariance;
   keep_strong_modes(best, motion_mm, negligible_mm);
   return best;
 }
