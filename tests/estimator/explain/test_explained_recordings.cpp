@@ -1,0 +1,75 @@
+// `diastole explain`, the program, on recordings of independent programs from two worlds (tests/data/rig: exact models;
+// tests/data/rig2: parts with tolerances), in which is known what was hidden.
+
+#include <gmock/gmock.h>
+
+#include <cstdio>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "tests/recorded_data.hpp"
+
+namespace diastole {
+namespace {
+
+struct Case {
+  std::string name;  ///< folder and file: "rig/case-054"
+  std::string what;  ///< "SoftHose"
+  std::vector<std::string> verdicts;
+  std::vector<std::string> effects;  ///< if it is named
+};
+
+void PrintTo(const Case& one, std::ostream* out) { *out << one.name; }
+
+nlohmann::json explained(const Case& one) {
+  const std::filesystem::path folder = test::recorded(one.name);
+  const std::filesystem::path out = std::filesystem::path(testing::TempDir()) / one.what;
+  const std::string command = "\"" DIASTOLE_BIN_DIR "/diastole\" explain \"" +
+                              (folder / (folder.filename().string() + ".study.toml")).string() + "\" -o \"" +
+                              out.string() + "\" --json 2>&1 >\"" + out.string() + ".json\"";
+  std::filesystem::remove_all(out);
+  EXPECT_EQ(std::system(command.c_str()), 0);
+  std::FILE* file = std::fopen((out.string() + ".json").c_str(), "r");
+  if (file == nullptr) return {};
+  nlohmann::json json = nlohmann::json::parse(file, nullptr, false);
+  std::fclose(file);
+  return json;
+}
+
+class ExplainedRecording : public testing::TestWithParam<Case> {};
+
+TEST_P(ExplainedRecording, GetsTheAnswerThatIsTrue) {
+  const nlohmann::json found = explained(GetParam());
+  ASSERT_TRUE(found.is_object());
+  const auto verdict = found.at("verdict").get<std::string>();
+  EXPECT_THAT(GetParam().verdicts, testing::Contains(verdict)) << found.at("summary");
+  std::vector<std::string> ids;
+  for (const auto& effect : found.at("effects"))
+    ids.push_back(effect.at("id").get<std::string>());
+  if (verdict == "named") {
+    EXPECT_THAT(ids, testing::UnorderedElementsAreArray(GetParam().effects));
+    EXPECT_GT(found.at("gap").at("closed").get<double>(), 0.0);
+    EXPECT_GE(found.at("confidence").get<double>(), 0.9);
+  } else {
+    EXPECT_THAT(ids, testing::IsEmpty());
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Worlds, ExplainedRecording,
+    testing::Values(Case{"rig/case-030", "OneRunWithNothingHidden", {"none"}, {}},
+                    Case{"rig/case-028", "NothingHidden", {"none"}, {}},
+                    Case{"rig/case-054", "SoftHose", {"named"}, {"hose-compliance"}},
+                    Case{"rig2/r2-07", "NothingHiddenInARealRig", {"none", "unexplained"}, {}},
+                    Case{"rig2/r2-06", "Leak", {"named"}, {"cannula-leak-cavity"}},
+                    Case{"rig2/r2-08", "Softening", {"named"}, {"stress-softening"}},
+                    Case{"rig2/r2-10", "Relaxation", {"named"}, {"viscoelasticity"}},
+                    Case{"rig2/r2-02", "WarmingAndDrift", {"named"}, {"temperature-drift", "sensor-drift"}},
+                    Case{"rig2/r2-09", "AWallThatNoEffectKnows", {"unexplained"}, {}},
+                    Case{"rig2/r2-03", "BackPressureThatOneRunDoesNotTell", {"none", "unexplained"}, {}}),
+    [](const auto& made) { return made.param.what; });
+
+}  // namespace
+}  // namespace diastole
