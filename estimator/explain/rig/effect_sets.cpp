@@ -227,7 +227,9 @@ void SetsSearch::fit_best_again(size_t effects) {
   for (EffectSet& set : sets_) {
     if (added(set) != effects) continue;
     if (++count > retaken || (count > 1 && set.log_posterior < best - second_in_reach)) break;
-    set = fit_set_exactly(problem_, set);
+    // Without effects tolerances may wander far after what they cannot make: then their linear fit stands.
+    EffectSet again = fit_set_exactly(problem_, set);
+    if (effects > 0 || inference::is_settled(again.termination)) set = std::move(again);
     if (count == 1) best = set.log_posterior;
   }
   sort_sets();
@@ -261,6 +263,7 @@ SetSearch SetsSearch::run() {
       if (const auto start = scan_events(problem_, plain, *effect))
         sets_.push_back(fit_set(problem_, *start, base_, problem_.error().prior.share, best_posterior()));
   report("fitting the best of them again");
+  fit_best_again(0);
   fit_best_again(1);
   report("fitting the pairs that promise most");
   for (const rig::EvidenceFit* under : {&stated, &adapted}) {

@@ -122,7 +122,8 @@ class Sorter {
     for (size_t image = 0; image < folder_.images.size(); ++image) {
       if (header(image).component == Component::unsaid) unsaid[header(image).series_uid].push_back(image);
     }
-    for (const auto& [uid, images] : unsaid) {
+    for (const auto& series : unsaid) {
+      const std::vector<size_t>& images = series.second;
       std::vector<Component> found(images.size());
       parallel_for(images.size(), machine_threads(), [&](size_t i) {
         found[i] =
