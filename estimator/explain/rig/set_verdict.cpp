@@ -13,6 +13,8 @@ using Eigen::VectorXd;
 using Ids = std::vector<std::string>;
 
 constexpr double name_probability = 0.9;
+/// Of the stated error, that any model has at least: 0.1 % of the cavity's range is the class of the best transducers.
+constexpr double best_model = 0.2;
 constexpr double least_probability = 0.05;  ///< of a set that is told of
 /// How seldom any part of a model's error may be as large by chance: two sds of one.
 constexpr double surprising_by_chance = 0.0228;
@@ -63,7 +65,10 @@ Sizes sizes_of(const rig::SessionProblem& problem, const EffectSet& set, const E
   const VectorXd weight = set.evidence.variance.cwiseInverse();
   Eigen::MatrixXd normal = basic.transpose() * weight.asDiagonal() * basic;
   normal.diagonal().array() += 1e-6;  // a channel that is not there has no offset
-  const auto error = mean_squares(problem, error_squares(problem.error(), set.evidence.shares));
+  rig::Shares shares = set.evidence.shares;
+  for (size_t g = 0; g < shares.size(); ++g)
+    shares[g] = std::max(shares[g], best_model * rig::SharePrior{}.share[g]);
+  const auto error = mean_squares(problem, error_squares(problem.error(), shares));
   for (Index i = 1; i < shown.cols(); ++i) {
     const VectorXd change = shown.col(0) - shown.col(i);
     const VectorXd left =
