@@ -258,7 +258,7 @@ EffectSet search(const rig::SessionProblem& problem, SetProblem& set, const rig:
     options.small_gain = [](double) { return 1.0; };  // half a nat decides nothing
     options.refusal_limit = 6;
     options.first_radius = 1e4;
-    options.held = set.moments();  // event_scan.hpp: to a sample; what is shown changes by leaps with them
+    options.held = set.moments();  // event_scan.hpp; what is shown changes by leaps with them
     const inference::SearchResult found = minimise(set, q, options);
     out.termination = found.termination;
     if (found.termination == inference::Termination::no_solution) break;

@@ -1,4 +1,5 @@
 #include "estimator/imaging/series/phase_times.hpp"
+#include "protocol/signal/median.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -31,9 +32,7 @@ double median_step(const std::vector<double>& sorted) {
     if (sorted[i] - sorted[i - 1] > resolution_ms) steps.push_back(sorted[i] - sorted[i - 1]);
   }
   if (steps.empty()) return 0;
-  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
-  std::nth_element(steps.begin(), middle, steps.end());
-  return *middle;
+  return signal::median(std::move(steps));
 }
 
 }  // namespace

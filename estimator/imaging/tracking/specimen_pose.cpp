@@ -8,9 +8,12 @@
 
 #include "protocol/contract/input_error.hpp"
 #include "protocol/contract/table_reader.hpp"
+#include "protocol/signal/median.hpp"
 
 namespace diastole::imaging {
 namespace {
+
+using signal::median;
 
 constexpr int rays = 72;
 /// A ring is whole: tags and noise may blur a few rays.
@@ -21,12 +24,6 @@ constexpr double most_circle_rms_mm = 1.0;
 /// Slices along the axis are at a right angle to the others to 5 degrees.
 constexpr double most_cosine_along = 0.09;
 constexpr double most_end_spread_mm = 1.0;
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 double spread(const std::vector<double>& values) {
   const double centre = median(values);

@@ -9,6 +9,7 @@
 #include "estimator/imaging/series/spectrum.hpp"
 #include "estimator/imaging/tracking/brightness.hpp"
 #include "estimator/imaging/tracking/motion_prior.hpp"
+#include "protocol/signal/median.hpp"
 
 namespace diastole::imaging {
 namespace {
@@ -34,12 +35,7 @@ constexpr double negligible_in_pixels = 0.005;
 constexpr double late_share = 0.02;
 constexpr double settled_mm = 0.005;
 
-double median(std::vector<double> values) {
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
+double median(std::vector<double> values) { return values.empty() ? 0 : signal::median(std::move(values)); }
 
 /// The robust standard deviation: 1.4826 times the median absolute value.
 double robust_sigma(const std::vector<double>& residuals) {
