@@ -5,9 +5,6 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
-#include <span>
-#include <string>
-#include <vector>
 
 #include "estimator/inference/covariance.hpp"
 #include "estimator/inference/intervals.hpp"

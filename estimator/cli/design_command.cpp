@@ -6,8 +6,10 @@
 #include <nlohmann/json.hpp>
 
 #include "estimator/cli/commands.hpp"
+#include "estimator/cli/study_images.hpp"
 #include "estimator/cli/study_options.hpp"
-#include "estimator/montecarlo/design.hpp"
+#include "estimator/montecarlo/imaging_design.hpp"
+#include "protocol/contract/input_error.hpp"
 
 namespace diastole {
 namespace {
@@ -41,9 +43,27 @@ void print_best(const DesignStudy& design) {
   }
 }
 
-ExitCode run_design(const StudyOptions& options, const CommandOutput& out) {
-  const Study study = read_study(options);
-  const DesignStudy design = explore_design(study, read_measurement(study));
+struct DesignArguments {
+  StudyOptions study;
+  bool images = false;
+  ImagingPlan plan;
+};
+
+DesignStudy explored(const DesignArguments& arguments, Study& study) {
+  if (!arguments.images) {
+    use_images(study);
+    return explore_design(study, read_measurement(study));
+  }
+  if (!study.data.frames)
+    throw InputError({study.file.string(), "table [data]",
+                      "names no frames: when images are taken is not known",
+                      "Add frames = \"NAME.frames.csv\": time and expected pressure of each phase."});
+  return explore_imaging(study, read_frames(*study.data.frames), arguments.plan);
+}
+
+ExitCode run_design(const DesignArguments& arguments, const CommandOutput& out) {
+  Study study = read_study(arguments.study);
+  const DesignStudy design = explored(arguments, study);
   if (out.json) {
     print_json(design, study);
     return ExitCode::done;
@@ -71,16 +91,34 @@ ExitCode run_design(const StudyOptions& options, const CommandOutput& out) {
 }  // namespace
 
 void add_design(CommandLine& line) {
-  auto options = std::make_shared<StudyOptions>();
-  CLI::App* command =
-      line.add("design", "which frame, pressure or tag spacing would tell a study's parameters best",
-               "  diastole design examples/phantom-a.study.toml\n"
-               "  diastole design lv.study.toml --set C_kPa=3 --set b1=11 --json\n"
-               "Predictions hold at the study's start values, or at those of --set. `region` is the size\n"
-               "of the joint confidence region as a share of the present one.");
-  add_study(*command, *options);
-  add_values(*command, *options);
-  line.on_run(command, [options](const CommandOutput& out) { return run_design(*options, out); });
+  auto arguments = std::make_shared<DesignArguments>();
+  CLI::App* command = line.add(
+      "design", "which frame, pressure, tag spacing or images would tell a study's parameters best",
+      "  diastole design examples/phantom-a.study.toml\n"
+      "  diastole design gel.study.toml --images --short-axis -15,15 --long-axis 0 --snr 15\n"
+      "  diastole design lv.study.toml --set C_kPa=3 --set b1=11 --json\n"
+      "Predictions hold at the study's start values, or at those of --set. `region` is the size\n"
+      "of the joint confidence region as a share of the present one. With --images nothing need be measured "
+      "yet:\n"
+      "the study's frames say when images are taken and at what pressure, options what they are like.");
+  add_study(*command, arguments->study);
+  add_values(*command, arguments->study);
+  ImagingPlan& plan = arguments->plan;
+  CLI::Option* images = command->add_flag("--images", arguments->images, "plan tagged images");
+  const auto of_images = [&](CLI::Option* option) { return option->needs(images); };
+  of_images(command->add_option("--short-axis", plan.short_axis_mm, "heights of slices across the axis, mm"))
+      ->delimiter(',')
+      ->expected(0, 64);
+  of_images(command->add_option("--long-axis", plan.long_axis_deg,
+                                "slices along the axis, turned so many degrees from x"))
+      ->delimiter(',')
+      ->expected(0, 64);
+  of_images(command->add_option("--tag-spacing", plan.tag_spacing_mm, "mm"))->check(CLI::PositiveNumber);
+  of_images(command->add_option("--pixel", plan.pixel_mm, "mm"))->check(CLI::PositiveNumber);
+  of_images(command->add_option("--snr", plan.snr, "signal of tissue over the noise of one channel"))
+      ->check(CLI::PositiveNumber);
+  of_images(command->add_option("--T1", plan.T1_s, "of tissue, s"))->check(CLI::PositiveNumber);
+  line.on_run(command, [arguments](const CommandOutput& out) { return run_design(*arguments, out); });
 }
 
 }  // namespace diastole

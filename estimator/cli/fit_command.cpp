@@ -28,7 +28,6 @@ struct FitArguments {
   double pressure_offset_kPa = 0;
   bool profile = false;
   int posterior_draws = 0;
-  bool paper_mode = false;
   std::filesystem::path start;
   std::optional<std::filesystem::path> checkpoint;
   bool resume = false;
@@ -180,7 +179,6 @@ ExitCode run_fit(const FitArguments& arguments, const CommandOutput& out) {
   };
   options.start = start_of(arguments, study);
   options.profile = arguments.profile;
-  options.paper_mode = arguments.paper_mode;
   if (arguments.pressure_offset_kPa > 0) options.pressure_offset_sigma_kPa = arguments.pressure_offset_kPa;
   if (arguments.posterior_draws > 0) {
     options.posterior.emplace();
@@ -258,8 +256,6 @@ void add_fit(CommandLine& line) {
       ->add_option("--posterior", arguments->posterior_draws,
                    "draw the posterior so often, from the full model: some seconds to minutes a hundred")
       ->check(CLI::Range(40, 1000000));
-  command->add_flag("--paper-mode", arguments->paper_mode,
-                    "search as the paper did: sequential quadratic programming with finite differences");
   command->add_option("--start", arguments->start, "start from an earlier result or checkpoint");
   command->add_option("--checkpoint", arguments->checkpoint, "keep what each step reached in this file");
   command->add_flag("--resume", arguments->resume, "go on from the checkpoint, if there is one")

@@ -11,7 +11,6 @@
 #include "estimator/mesh/exfile_import.hpp"
 #include "estimator/mesh/mesh_file.hpp"
 #include "estimator/model/study_model.hpp"
-#include "protocol/contract/input_error.hpp"
 
 namespace diastole {
 namespace {

@@ -7,9 +7,7 @@
 #include <iterator>
 #include <memory>
 #include <nlohmann/json.hpp>
-#include <optional>
 #include <string>
-#include <vector>
 
 #include "estimator/cli/commands.hpp"
 #include "estimator/cli/interruption.hpp"

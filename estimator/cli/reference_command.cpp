@@ -9,7 +9,6 @@
 #include "estimator/io/study.hpp"
 #include "estimator/io/study_fingerprint.hpp"
 #include "estimator/io/whole_file.hpp"
-#include "protocol/contract/input_error.hpp"
 
 namespace diastole {
 namespace {

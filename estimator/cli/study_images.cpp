@@ -3,10 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <boost/crc.hpp>
 
 #include "estimator/imaging/tracking/tags_file.hpp"
 #include "estimator/imaging/tracking/tracked_folder.hpp"
+#include "estimator/io/fingerprint.hpp"
 #include "estimator/io/whole_file.hpp"
 #include "protocol/contract/input_error.hpp"
 
@@ -14,7 +14,7 @@ namespace diastole {
 namespace {
 
 /// Another number whenever the tracker gives other points for the same images.
-constexpr int tracker_version = 1;
+constexpr int tracker_version = 2;
 
 std::optional<imaging::SpecimenPose> stated_pose(const Study& study) {
   if (!study.data.to_specimen) return std::nullopt;
@@ -27,8 +27,8 @@ std::optional<imaging::SpecimenPose> stated_pose(const Study& study) {
   return pose;
 }
 
-std::string fingerprint(const std::filesystem::path& folder,
-                        const std::optional<imaging::SpecimenPose>& pose) {
+std::string fingerprint_of(const std::filesystem::path& folder,
+                           const std::optional<imaging::SpecimenPose>& pose) {
   std::vector<std::filesystem::path> files;
   std::error_code error;
   if (!std::filesystem::is_directory(folder, error))
@@ -39,13 +39,12 @@ std::string fingerprint(const std::filesystem::path& folder,
   }
   if (const auto beside = imaging::pose_nearby(folder)) files.push_back(*beside);
   std::sort(files.begin(), files.end());
-  boost::crc_32_type crc;
-  const auto take = [&](const std::string& text) { crc.process_bytes(text.data(), text.size()); };
-  take(fmt::format("tracker {}", tracker_version));
-  if (pose) take(imaging::pose_text(*pose, ""));
+  Fingerprint fingerprint;
+  fingerprint.add(fmt::format("tracker {}", tracker_version));
+  if (pose) fingerprint.add(imaging::pose_text(*pose, ""));
   for (const std::filesystem::path& file : files)
-    take(read_whole_file(file));
-  return fmt::format("{:08x}", crc.checksum());
+    fingerprint.add(read_whole_file(file));
+  return fingerprint.text();
 }
 
 }  // namespace
@@ -57,7 +56,7 @@ void use_images(Study& study) {
   std::string name = study.file.filename().string();
   name = name.substr(0, name.find(".study.toml"));
   study.data.tags =
-      study.file.parent_path() / fmt::format("{}.images-{}.tags.csv", name, fingerprint(folder, pose));
+      study.file.parent_path() / fmt::format("{}.images-{}.tags.csv", name, fingerprint_of(folder, pose));
   if (std::filesystem::is_regular_file(*study.data.tags)) {
     fmt::print(stderr, "Tags of these images are in {}.\n", study.data.tags->string());
     return;

@@ -11,8 +11,11 @@
 #include "estimator/imaging/tracking/specimen_pose.hpp"
 #include "estimator/imaging/tracking/tags_file.hpp"
 #include "estimator/imaging/tracking/tracked_folder.hpp"
+#include "estimator/imaging/tracking/tracking_record.hpp"
 #include "estimator/io/finding_json.hpp"
 #include "estimator/io/whole_file.hpp"
+#include "estimator/report/page.hpp"
+#include "estimator/report/report.hpp"
 
 namespace diastole {
 namespace {
@@ -22,6 +25,8 @@ struct TrackArguments {
   std::filesystem::path output;
   std::optional<std::filesystem::path> pose;
   std::string coordinates = "auto";
+  std::optional<std::filesystem::path> page;
+  std::optional<std::filesystem::path> record;
   bool force = false;
 };
 
@@ -57,7 +62,9 @@ ExitCode run_track(const TrackArguments& arguments, const CommandOutput& out) {
   const auto start = std::chrono::steady_clock::now();
   std::vector<std::filesystem::path> inputs;
   if (arguments.pose) inputs.push_back(*arguments.pose);
-  require_output({arguments.output, inputs, imaging::tags_file_header, arguments.force});
+  require_output({arguments.output, inputs, imaging::tags_file_mark, arguments.force});
+  if (arguments.page) require_output({*arguments.page, inputs, report::page_mark, arguments.force});
+  if (arguments.record) require_output({*arguments.record, inputs, tracking_file_mark, arguments.force});
   const bool shows_progress = isatty(STDERR_FILENO) != 0;
   const imaging::TrackedFolder tracked = imaging::track_folder(
       {.folder = arguments.folder, .pose = arguments.pose, .coordinates = arguments.coordinates},
@@ -66,6 +73,11 @@ ExitCode run_track(const TrackArguments& arguments, const CommandOutput& out) {
       });
   write_whole_file(arguments.output, imaging::tags_file_text(tracked.points));
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  if (arguments.page || arguments.record) {
+    const TrackingRecord record = imaging::tracking_record(tracked, seconds);
+    if (arguments.page) write_whole_file(*arguments.page, report::make_report(record));
+    if (arguments.record) write_whole_file(*arguments.record, to_json(record));
+  }
   if (out.json) {
     Json json = {{"points", tracked.points.size()},
                  {"dropped", tracked.dropped},
@@ -97,6 +109,7 @@ ExitCode run_track(const TrackArguments& arguments, const CommandOutput& out) {
   print_findings(tracked.problems, stdout);
   fmt::print("In {} coordinates{}: {}\n", tracked.pose ? "the specimen's" : "patient",
              tracked.pose ? fmt::format(" ({})", tracked.pose->source) : "", arguments.output.string());
+  if (arguments.page) fmt::print("The page to look at: {}\n", arguments.page->string());
   return ExitCode::done;
 }
 
@@ -107,6 +120,7 @@ void add_track(CommandLine& line) {
   CLI::App* command = line.add(
       "track", "tag lines followed through the cycle: points with errors, from a scanner's tagged cines",
       "  diastole track dicom/ -o gel.tags.csv\n"
+      "  diastole track dicom/ -o gel.tags.csv --page gel.html\n"
       "  diastole track dicom/ -o heart.tags.csv --pose heart.pose.toml\n"
       "  diastole track dicom/ -o gel.tags.csv --coords patient --json\n"
       "Coordinates are the specimen's if its pose is given, lies beside the folder (*.pose.toml), or is seen "
@@ -119,7 +133,10 @@ void add_track(CommandLine& line) {
   command->add_option("--coords", arguments->coordinates, "coordinates of the points")
       ->check(CLI::IsMember({"auto", "specimen", "patient"}))
       ->capture_default_str();
-  command->add_flag("--force", arguments->force, "replace an output file that holds no tag points");
+  command->add_option("--page", arguments->page,
+                      "a page to look at: every slice's cine with its lines, what was left out, residuals");
+  command->add_option("--record", arguments->record, "the same as a file for `diastole report` (*.json)");
+  command->add_flag("--force", arguments->force, "replace output files that are none of track's");
   line.on_run(command, [arguments](const CommandOutput& out) { return run_track(*arguments, out); });
 }
 

@@ -1,4 +1,4 @@
-// A lump of stiffer or softer material in the wall.
+// A stiffer or softer inclusion in the wall.
 
 #include <array>
 #include <cmath>
@@ -22,7 +22,7 @@ double Inclusion::stiffness(const std::array<double, 3>& X_mm) const {
 Effect stiff_inclusion_effect() {
   return {{
       .id = "stiff-inclusion",
-      .title = "lump of another stiffness",
+      .title = "inclusion of another stiffness",
       .port = Port::field,
       .equations = "C1 is larger by the factor contrast (below 1: softer) within an ellipsoid, its edge "
                    "graded over 2 mm (field_model.hpp).",

@@ -1,6 +1,5 @@
 #include "estimator/fe/element_mechanics.hpp"
 
-#include <cmath>
 #include <utility>
 
 #include "estimator/fe/gauss_contraction.hpp"

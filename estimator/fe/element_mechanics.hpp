@@ -28,9 +28,7 @@
 #include <Eigen/Dense>
 #include <array>
 #include <functional>
-#include <memory>
 #include <span>
-#include <vector>
 
 #include "estimator/fe/gauss_points.hpp"
 #include "estimator/fe/stiffness_contraction.hpp"

@@ -1,6 +1,5 @@
 #include "estimator/fe/pressure_volume.hpp"
 
-#include <cmath>
 #include <optional>
 #include <utility>
 

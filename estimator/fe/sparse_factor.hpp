@@ -10,9 +10,7 @@
 // (MUMPS's sequential library shares its state).
 
 #include <memory>
-#include <optional>
 #include <span>
-#include <vector>
 
 namespace diastole {
 

@@ -5,7 +5,6 @@
 #include <cmath>
 
 #include "estimator/fit/fit_errors.hpp"
-#include "estimator/fit/paper_search.hpp"
 #include "estimator/fit/usable_points.hpp"
 #include "estimator/inference/profile.hpp"
 
@@ -88,7 +87,7 @@ inference::SearchResult search_from(JointProblem& problem, const Eigen::VectorXd
     outcome.history.back().iteration = static_cast<int>(outcome.history.size()) - 1;
     if (options.on_step) options.on_step(outcome.history.back());
   };
-  return options.paper_mode ? paper_search(problem, q, settings) : inference::minimise(problem, q, settings);
+  return inference::minimise(problem, q, settings);
 }
 
 bool is_interrupted(const FitOptions& options) {
@@ -173,22 +172,13 @@ void estimate_posterior(FitOutcome& outcome, JointProblem& problem, const Eigen:
   outcome.posterior = std::move(result);
 }
 
-/// The paper takes the measured pressures as exact.
-Measurement with_exact_pressures(Measurement measurement) {
-  for (Frame& frame : measurement.frames)
-    frame.sigma_kPa = 0;
-  return measurement;
-}
-
 }  // namespace
 
 FitOutcome fit_motion(MotionModel& model, const std::vector<EstimatedParameter>& parameters,
                       const Measurement& measurement, const FitOptions& options) {
   const auto begun = std::chrono::steady_clock::now();
   FitOutcome outcome;
-  JointProblem problem(model, parameters,
-                       options.paper_mode ? with_exact_pressures(measurement) : measurement, options.locator,
-                       options.pressure_offset_sigma_kPa);
+  JointProblem problem(model, parameters, measurement, options.locator, options.pressure_offset_sigma_kPa);
   Eigen::VectorXd q = problem.start();
   problem.set_smoothness(smooth_blocks(model, options));
   if (options.robustness == Robustness::always) problem.set_robust(RobustLoss::for_deviation(1));

@@ -50,7 +50,6 @@ struct FitOptions {
   std::optional<double> pressure_offset_sigma_kPa;
   std::vector<size_t> profiled;  ///< values whose profile interval is wanted (profile.hpp)
   std::optional<PosteriorOptions> posterior;
-  bool paper_mode = false;  ///< the paper's search (paper_search.hpp); no smoothness, no robust loss then
   /// Called at each iteration with values in their own units.
   std::function<void(const inference::SearchStep&)> on_step;
 };
@@ -102,15 +101,17 @@ struct PosteriorOutcome : PosteriorDrawing {
 struct FitOutcome {
   std::vector<EstimatedValue> values;
   std::vector<EstimatedFrame> frames;
-  Eigen::MatrixXd covariance;              ///< of values, unknown pressures and offset, in their own units
+  Eigen::MatrixXd covariance;              ///< of all unknowns of joint_problem.hpp, in their own units
   std::vector<std::string> unknown_names;  ///< in its order
+  std::vector<std::string> undetermined;   ///< combinations of unknowns that move no residual, in words
   std::optional<PressureOffset> pressure_offset;
   std::optional<OffsetScore> offset_score;  ///< without pressure_offset, where the data see one
   std::vector<ProfileInterval> profiles;
   std::optional<PosteriorOutcome> posterior;
   double chi2 = 0;        ///< including the pressures' priors
   Eigen::Index rows = 0;  ///< residuals, pressure priors included
-  double unknowns = 0;    ///< not counting those on a bound; smooth values as many as the data see
+  double alike = 1;  ///< by what neighbours' errors being alike widens the largest standard error of a value
+  double unknowns = 0;  ///< not counting those on a bound; smooth values as many as the data see
   std::vector<SmoothOutcome> smoothness;
   std::optional<RobustOutcome> robust;  ///< if the loss was not the normal's
   inference::Termination termination = inference::Termination::no_solution;

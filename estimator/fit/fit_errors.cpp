@@ -18,11 +18,11 @@ using inference::estimate_covariance;
 
 constexpr double not_a_number = std::numeric_limits<double>::quiet_NaN();
 
-/// Variances of the values alone, pressures held at their estimates.
-Eigen::VectorXd variances_at_exact_pressure(const Eigen::MatrixXd& jacobian, const std::vector<bool>& is_free,
-                                            Eigen::Index values) {
-  const std::vector<bool> free_values(is_free.begin(), is_free.begin() + values);
-  return estimate_covariance(jacobian.leftCols(values), free_values).matrix.diagonal();
+/// Variances of the values, pressures held at their estimates.
+Eigen::VectorXd variances_at_exact_pressure(const JointProblem& problem, const Eigen::MatrixXd& jacobian,
+                                            std::vector<bool> is_free) {
+  std::fill(is_free.begin() + problem.values(), is_free.end() - problem.plane_unknowns(), false);
+  return estimate_covariance(jacobian, is_free).matrix.diagonal().head(problem.values());
 }
 
 EstimatedValue estimated(const inference::Parameter& parameter, double q, BoundSide bound, double variance,
@@ -98,6 +98,45 @@ LinearisedCost linearised(JointProblem& problem, const Eigen::VectorXd& q) {
   for (Eigen::Index i = 0; i < motion.size(); ++i)
     cost.residuals[i] = problem.robust()->influence(motion[i]) / cost.motion_scale;
   return cost;
+}
+
+/// Variances of all unknowns when the residuals of a patch may be alike, in all frames: H^-1 (sum of g g' + P) H^-1 with the gradient g
+/// that each patch pulls with, and P of the priors (clustered covariance: Liang and Zeger, Biometrika 73 (1986) 13).
+Eigen::VectorXd variances_of_patches(const LinearisedCost& cost, const Eigen::MatrixXd& inverse,
+                                     const std::vector<int>& patches) {
+  const auto motion = static_cast<Eigen::Index>(patches.size());
+  const Eigen::MatrixXd priors = cost.jacobian.bottomRows(cost.jacobian.rows() - motion);
+  Eigen::MatrixXd middle = priors.transpose() * priors;
+  std::map<int, Eigen::VectorXd> pulls;
+  for (Eigen::Index i = 0; i < motion; ++i) {
+    const Eigen::VectorXd pull = cost.jacobian.row(i).transpose() * cost.residuals[i];
+    const int patch = patches[static_cast<size_t>(i)];
+    if (patch < 0) {
+      middle += pull * pull.transpose();
+      continue;
+    }
+    const auto [at, fresh] = pulls.try_emplace(patch, pull);
+    if (!fresh) at->second += pull;
+  }
+  for (const auto& each : pulls)
+    middle += each.second * each.second.transpose();
+  return (inverse * middle * inverse).diagonal();
+}
+
+/// Widens the values' errors where patches pull more than independent residuals would.
+void widen_for_patches(FitOutcome& outcome, const JointProblem& problem, const LinearisedCost& cost,
+                       const std::vector<bool>& is_free) {
+  const std::vector<int> patches = problem.patches();
+  if (patches.empty()) return;
+  const Eigen::VectorXd variances =
+      variances_of_patches(cost, estimate_covariance(cost.jacobian, is_free).matrix, patches);
+  for (Eigen::Index i = 0; i < problem.values(); ++i) {
+    const double ratio = variances[i] / outcome.covariance(i, i);
+    if (!(ratio > 1)) continue;
+    outcome.covariance.row(i) *= std::sqrt(ratio);
+    outcome.covariance.col(i) *= std::sqrt(ratio);
+    outcome.alike = std::max(outcome.alike, std::sqrt(ratio));
+  }
 }
 
 /// Normal distributions of one unknown, one a step, with the steps' weights.
@@ -218,7 +257,10 @@ Eigen::MatrixXd estimate_errors(FitOutcome& outcome, JointProblem& problem, cons
   const Eigen::VectorXd motion = problem.motion_residuals();
   outcome.chi2 =
       motion.squaredNorm() + residuals->segment(motion.size(), outcome.rows - motion.size()).squaredNorm();
-  outcome.covariance = estimate_covariance(cost.jacobian, is_free).matrix;
+  const inference::Covariance curvature = estimate_covariance(cost.jacobian, is_free);
+  outcome.covariance = curvature.matrix;
+  for (const Eigen::VectorXd& combination : curvature.undetermined)
+    outcome.undetermined.push_back(inference::in_words(combination, problem.space()));
   // What the residuals' spread has over the curvature makes the covariance that of an M-estimator,
   // (a J'J + P)^-1 (b J'J + P) (a J'J + P)^-1 (Huber, Robust Statistics, 1981, 7.6).
   Eigen::MatrixXd excess = Eigen::MatrixXd::Zero(q.size(), q.size());
@@ -240,9 +282,9 @@ Eigen::MatrixXd estimate_errors(FitOutcome& outcome, JointProblem& problem, cons
     outcome.offset_score = offset_score(problem, q, {cost.jacobian, cost.residuals, is_free, spread}, column);
   }
   const Intervals intervals = estimate_smoothness(outcome, problem, q, options, is_free, excess);
+  widen_for_patches(outcome, problem, cost, is_free);
   Eigen::MatrixXd in_coordinates = outcome.covariance;
-  const Eigen::VectorXd exact =
-      cost.spread * variances_at_exact_pressure(cost.jacobian, is_free, problem.values());
+  const Eigen::VectorXd exact = cost.spread * variances_at_exact_pressure(problem, cost.jacobian, is_free);
   for (Eigen::Index i = 0; i < problem.values(); ++i) {
     const inference::Parameter& parameter = problem.space()[i];
     outcome.values.push_back(

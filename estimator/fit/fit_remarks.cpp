@@ -62,6 +62,16 @@ std::string remark_on_core(const FitOutcome& fit) {
   return fmt::format("Apart from the wild ones, the residuals spread as the stated noise says ({}).", figure);
 }
 
+void add_alike(std::vector<std::string>& remarks, const FitOutcome& fit) {
+  constexpr double telling_factor = 1.2;
+  if (fit.alike < telling_factor) return;
+  remarks.push_back(
+      fmt::format("Residuals of neighbouring tags are alike, as a ghost or a fold in the images makes them: "
+                  "standard errors are {:.2g} "
+                  "times those of independent ones.",
+                  fit.alike));
+}
+
 void add_pressure_share(std::vector<std::string>& remarks, const FitRecord& record, const FitOutcome& fit) {
   if (record.parameters.size() != 1 || !record.parameters[0].elements.empty()) return;
   const EstimatedValue& value = fit.values[0];
@@ -303,6 +313,7 @@ std::vector<FittedDirection> directions_of(const FitRecord& record, const FitOut
 
 std::vector<std::string> remarks_on(const FitRecord& record, const FitOutcome& fit) {
   std::vector<std::string> remarks = {fit.robust ? remark_on_core(fit) : remark_on_misfit(record)};
+  add_alike(remarks, fit);
   add_pressure_share(remarks, record, fit);
   add_bounds(remarks, record);
   add_conditional_mean(remarks, record);
@@ -310,15 +321,12 @@ std::vector<std::string> remarks_on(const FitRecord& record, const FitOutcome& f
   add_offset(remarks, record, fit);
   add_undeformed(remarks, record);
   add_identifiability(remarks, record);
+  for (const std::string& combination : fit.undetermined)
+    remarks.push_back(
+        fmt::format("Nothing in these data changes along {}: they do not determine it.", combination));
   if (record.posterior) add_posterior(remarks, record);
   if (!fit.interrupted.empty())
     remarks.push_back(fmt::format("The {} was ended on request; the fit itself is whole.", fit.interrupted));
-  if (record.search == "finite differences") {
-    remarks.push_back(
-        "Searched as the paper did: sums of squares in mm, pressures taken as exact, derivatives by finite "
-        "differences, "
-        "tolerance 0.001. Errors are those of this estimate at exact pressures.");
-  }
   if (record.robust) {
     remarks.push_back(
         fmt::format("Fitted with Student's t instead of the normal distribution, because of {} wild "

@@ -9,7 +9,8 @@ JointProblem::JointProblem(MotionModel& model, const std::vector<EstimatedParame
                            std::optional<double> offset_sigma_kPa)
     : model_(model),
       values_(static_cast<Eigen::Index>(values.size())),
-      reference_(std::make_unique<PointLocator>(model.mesh(), model.mesh().reference(), locator)) {
+      reference_(std::make_unique<PointLocator>(model.mesh(), model.mesh().reference(), locator)),
+      planes_(measurement) {
   std::vector<inference::Parameter> unknowns;
   std::vector<double> start;
   const auto add_unknown = [&](inference::Parameter parameter, double at) {
@@ -36,6 +37,8 @@ JointProblem::JointProblem(MotionModel& model, const std::vector<EstimatedParame
     offset_sigma_kPa_ = *offset_sigma_kPa;
     offset_unknown_ = add_unknown({"pressure_offset_kPa"}, 0.0);
   }
+  for (Eigen::Index i = 0; i < planes_.unknowns(); ++i)
+    add_unknown({TagPlanes::name(i)}, 0.0);
   space_ = inference::ParameterSpace(std::move(unknowns));
   start_ = Eigen::Map<const Eigen::VectorXd>(start.data(), static_cast<Eigen::Index>(start.size()));
 }
@@ -59,6 +62,16 @@ Eigen::VectorXd JointProblem::motion_residuals() const {
   for (const LoadedFrame& frame : frames_) {
     result.segment(rows, frame.residuals.size()) = frame.residuals.residuals();
     rows += frame.residuals.size();
+  }
+  return result;
+}
+
+std::vector<int> JointProblem::patches() const {
+  std::vector<int> result;
+  if (planes_.unknowns() == 0) return result;
+  for (const LoadedFrame& frame : frames_) {
+    for (const ResidualRow& row : frame.residuals.rows())
+      result.push_back(frame.residuals.of_tag(row) ? planes_.patch(row.source) : -1);
   }
   return result;
 }
@@ -105,9 +118,17 @@ bool JointProblem::solve_frames(const Eigen::VectorXd& q) {
   return true;
 }
 
+void JointProblem::shift_planes(const Eigen::VectorXd& q) {
+  if (planes_.unknowns() == 0) return;
+  const Eigen::VectorXd by_mm = planes_.shifts_mm(q.tail(planes_.unknowns()));
+  for (LoadedFrame& frame : frames_)
+    frame.residuals.shift_planes(by_mm);
+}
+
 std::optional<size_t> JointProblem::find_points(const Eigen::VectorXd& q) {
   residuals_at_.reset();
   if (!solve_frames(q)) return std::nullopt;
+  shift_planes(q);
   size_t gained = 0;
   for (LoadedFrame& frame : frames_)
     gained += frame.residuals.find(model_.mesh(), *reference_, {&frame.position_mm, 1});
@@ -125,6 +146,7 @@ std::optional<Eigen::VectorXd> JointProblem::residuals(const Eigen::VectorXd& q)
   if (residuals_at_ && *residuals_at_ == q) return residuals_;
   residuals_at_.reset();
   if (!solve_frames(q)) return {};
+  shift_planes(q);
   residuals_.resize(rows());
   Eigen::Index row = 0;
   for (LoadedFrame& frame : frames_) {
@@ -148,6 +170,8 @@ std::optional<Eigen::VectorXd> JointProblem::residuals(const Eigen::VectorXd& q)
   if (offset_unknown_) residuals_[row++] = q[*offset_unknown_] / offset_sigma_kPa_;
   if (fits_rest())
     residuals_[row++] = (q[*offset_unknown_] - rest_reading_->pressure_kPa) / rest_reading_->sigma_kPa;
+  for (const double coefficient_mm : q.tail(planes_.unknowns()))
+    residuals_[row++] = coefficient_mm / TagPlanes::loose_mm;
   for (const SmoothBlock& block : smooth_) {
     const Eigen::Index size = block.differences.rows();
     residuals_.segment(row, size) =
@@ -169,6 +193,7 @@ Eigen::MatrixXd JointProblem::jacobian(const Eigen::VectorXd& q) {
 
 Eigen::MatrixXd JointProblem::plain_jacobian(const Eigen::VectorXd& q) {
   Eigen::MatrixXd result = Eigen::MatrixXd::Zero(rows(), unknowns());
+  const Eigen::Index first_plane = unknowns() - planes_.unknowns();
   Eigen::Index row = 0;
   for (size_t slot = 0; slot < frames_.size(); ++slot) {
     const LoadedFrame& frame = frames_[slot];
@@ -186,6 +211,12 @@ Eigen::MatrixXd JointProblem::plain_jacobian(const Eigen::VectorXd& q) {
     } else if (offset_unknown_) {
       result.col(*offset_unknown_).segment(row, block.rows()) = -block.rightCols<1>();
     }
+    for (Eigen::Index i = 0; planes_.unknowns() > 0 && i < block.rows(); ++i) {
+      const ResidualRow& tag = frame.residuals.rows()[static_cast<size_t>(i)];
+      if (!frame.residuals.of_tag(tag)) continue;
+      result.row(row + i).segment<TagPlanes::of_a_set>(first_plane + planes_.first_unknown(tag.source)) =
+          frame.residuals.by_plane(tag) * planes_.derivatives(tag.source);
+    }
     row += block.rows();
   }
   for (const LoadedFrame& frame : frames_) {
@@ -195,6 +226,8 @@ Eigen::MatrixXd JointProblem::plain_jacobian(const Eigen::VectorXd& q) {
   }
   if (offset_unknown_) result(row++, *offset_unknown_) = 1 / offset_sigma_kPa_;
   if (fits_rest()) result(row++, *offset_unknown_) = 1 / rest_reading_->sigma_kPa;
+  for (Eigen::Index i = first_plane; i < unknowns(); ++i)
+    result(row++, i) = 1 / TagPlanes::loose_mm;
   for (const SmoothBlock& block : smooth_) {
     const Eigen::Index size = block.differences.rows();
     result.block(row, block.first, size, block.differences.cols()) = block.differences / block.step;

@@ -7,7 +7,7 @@
 //   minimise  1/2 sum_frames |r_frame(values, P_frame)|^2  +  1/2 sum_frames ((P_frame - measured) / sigma)^2
 //
 // All measurements may be off by a common offset, one more unknown with a prior about zero; a pressure read in the
-// undeformed frame 0 is a measurement of it.
+// undeformed frame 0 is a measurement of it. Tag planes that were found in images are unknowns too (tag_planes.hpp).
 // A frame with sigma_kPa = 0 has an exactly known pressure (but for the offset) and no unknown. A value with a positive lower
 // bound enters as its logarithm (its error is closer to a factor than to a term); other values enter as they
 // are.
@@ -15,8 +15,8 @@
 // With a robust loss (robust_loss.hpp) the motion's residuals enter as u(r), and the cost changes with them.
 // Parameters that vary by element may carry a smoothness prior (smoothness.hpp).
 //
-// Residual rows: frame after frame (motion_residuals.hpp), then one for each unknown pressure, those of the offset, then
-// those of the smoothness priors.
+// Residual rows: frame after frame (motion_residuals.hpp), then one for each unknown pressure, those of the offset, those of the tag
+// planes, then those of the smoothness priors.
 // The points of frame 0 are not part of the problem: without load there is no information on stiffness.
 
 #include <Eigen/Dense>
@@ -28,6 +28,7 @@
 
 #include "estimator/fit/robust_loss.hpp"
 #include "estimator/fit/smoothness.hpp"
+#include "estimator/fit/tag_planes.hpp"
 #include "estimator/inference/least_squares.hpp"
 #include "estimator/io/measurement.hpp"
 #include "estimator/motion_residuals/motion_residuals.hpp"
@@ -86,7 +87,7 @@ class JointProblem : public inference::LeastSquaresProblem {
                const Measurement& measurement, LocatorOptions locator,
                std::optional<double> offset_sigma_kPa = {});
 
-  /// Values, unknown pressures, offset.
+  /// Values, unknown pressures, offset, tag planes.
   [[nodiscard]] const inference::ParameterSpace& space() const override { return space_; }
   [[nodiscard]] Eigen::Index unknowns() const { return space_.size(); }
   [[nodiscard]] Eigen::Index values() const { return values_; }
@@ -97,6 +98,12 @@ class JointProblem : public inference::LeastSquaresProblem {
   [[nodiscard]] const std::vector<LoadedFrame>& frames() const { return frames_; }
   /// Place in q of the pressures' common offset (measured less true), if there is one.
   [[nodiscard]] std::optional<Eigen::Index> offset_unknown() const { return offset_unknown_; }
+
+  /// The tag planes are the last unknowns; how many.
+  [[nodiscard]] Eigen::Index plane_unknowns() const { return planes_.unknowns(); }
+
+  /// Of each row of the motion (TagPlanes::patch); -1 for a point that is none of a tag. Empty where the planes are exactly known.
+  [[nodiscard]] std::vector<int> patches() const;
 
   /// Derivatives by an offset, for a problem without that unknown: its column of `plain_jacobian`. Precondition as
   /// there.
@@ -141,6 +148,7 @@ class JointProblem : public inference::LeastSquaresProblem {
   /// A reading at rest counts only where the offset is estimated.
   [[nodiscard]] bool fits_rest() const { return offset_unknown_ && rest_reading_; }
   bool solve_frames(const Eigen::VectorXd& q);
+  void shift_planes(const Eigen::VectorXd& q);
 
   MotionModel& model_;
   Eigen::Index values_;
@@ -151,6 +159,7 @@ class JointProblem : public inference::LeastSquaresProblem {
   std::optional<Eigen::Index> offset_unknown_;
   double offset_sigma_kPa_ = 0;
   std::optional<Frame> rest_reading_;
+  TagPlanes planes_;
   std::vector<SmoothBlock> smooth_;
   std::optional<RobustLoss> robust_;
   Eigen::VectorXd residuals_;

@@ -1,7 +1,7 @@
 #pragma once
 // Whether the data ask for a common offset of the frame pressures that the fit did not estimate.
 //
-// The offset's column joins the Jacobian at the estimate, and one Gauss-Newton step of all unknowns tells what it
+// The offset's column joins the Jacobian at the estimate, and one Gauss-Newton step of all unknowns estimates what it
 // would become (a score test: no equilibrium is solved). Its standard error is that of the joint problem, enlarged
 // where the residuals spread more than stated.
 //

@@ -347,15 +347,10 @@ FitRecord fit_study(const Study& study, const Measurement& measurement, const St
   fit_options.file = study.file.string();
   fit_options.locator = locator_for(study.specimen);
   fit_options.smooth = estimated.smooth;
-  fit_options.robustness = options.paper_mode ? Robustness::never : options.robustness;
+  fit_options.robustness = options.robustness;
   fit_options.pressure_offset_sigma_kPa = options.pressure_offset_sigma_kPa;
   fit_options.posterior = options.posterior;
-  fit_options.paper_mode = options.paper_mode;
   fit_options.search.interrupted = options.interrupted;
-  if (options.paper_mode) {
-    fit_options.smooth.clear();
-    record.search = "finite differences";
-  }
   if (options.profile) fit_options.profiled = whole_values(estimated);
   fit_options.search.iteration_limit = options.iteration_limit;
   fit_options.on_step = [&](const inference::SearchStep& step) {

@@ -16,7 +16,6 @@ struct StudyFitOptions {
   std::optional<double> pressure_offset_sigma_kPa = {};  ///< seek a common offset of the pressures
   bool profile = false;                                  ///< profile intervals of whole parameters
   std::optional<PosteriorOptions> posterior = {};
-  bool paper_mode = false;
   std::optional<FitRecord> start = {};  ///< an earlier result or a checkpoint to start from
   /// Called at each accepted step with a record that `start` can take up.
   std::function<void(const FitRecord&)> on_checkpoint = {};

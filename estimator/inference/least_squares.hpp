@@ -49,8 +49,8 @@ class LeastSquaresProblem {
   [[nodiscard]] virtual std::string failure() const { return "the model has no solution there"; }
 };
 
-/// Derivatives of residuals where a model has none of its own, by central differences of 1e-6 in each coordinate, which should be of order one. Precondition: the problem has a
-/// solution there.
+/// Derivatives of residuals where a model has none of its own, by central differences of 1e-6 in each coordinate, which
+/// should be of order one. Precondition: the problem has a solution there.
 Eigen::MatrixXd central_differences(LeastSquaresProblem& problem, const Eigen::VectorXd& q);
 
 struct SearchStep {

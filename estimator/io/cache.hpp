@@ -8,7 +8,7 @@
 
 namespace diastole {
 
-/// `file`: a plain file name that tells what it is and for which key, "reference-1a2b3c4d.json".
+/// `file`: a plain file name of what it is and for which key, "reference-1a2b3c4d.json".
 std::optional<std::string> read_cached(std::string_view file);
 /// Never fails: a folder that cannot be written keeps nothing.
 void write_cached(std::string_view file, std::string_view text);

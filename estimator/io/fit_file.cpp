@@ -62,7 +62,6 @@ void each_member(Visit&& visit, Record& r) {
   visit("robust", if_any(r.robust));
   visit("posterior", if_any(r.posterior));
   visit("pressure_offset_kPa", if_any(r.pressure_offset_kPa));
-  visit("search", may_lack(r.search));
   DIASTOLE_VISIT(visit, r, history, residuals, section_frame, sections)
 }
 

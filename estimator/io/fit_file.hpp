@@ -166,7 +166,6 @@ struct FitRecord {
   std::optional<PosteriorDrawing> posterior = {};
   /// Of all frame pressures, measured less true; if it was sought.
   std::optional<FittedOffset> pressure_offset_kPa = {};
-  std::string search = "exact sensitivities";  ///< or "finite differences": the paper's
   double rms_mm;  ///< of the unweighted residuals (a tag's along its normal; a point's three components)
   double chi2;
   size_t dof;

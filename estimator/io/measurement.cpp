@@ -3,11 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <set>
 #include <tuple>
-#include <vector>
 
 #include "estimator/io/number_table.hpp"
 #include "protocol/contract/input_error.hpp"
@@ -16,8 +14,9 @@ namespace diastole {
 namespace {
 
 constexpr std::string_view frames_columns[] = {"frame", "time_s", "pressure_kPa", "sigma_kPa"};
-constexpr std::string_view tags_columns[] = {"frame", "nx",   "ny",   "nz",      "plane_mm",
-                                             "x_mm",  "y_mm", "z_mm", "sigma_mm"};
+constexpr std::string_view tags_columns[] = {"frame", "nx",   "ny",       "nz",     "plane_mm",    "x_mm",
+                                             "y_mm",  "z_mm", "sigma_mm", "own_mm", "own_sigma_mm"};
+constexpr size_t own_columns = 2;
 constexpr std::string_view points_columns[] = {"frame", "X_mm", "Y_mm", "Z_mm",
                                                "x_mm",  "y_mm", "z_mm", "sigma_mm"};
 
@@ -131,8 +130,10 @@ std::vector<Frame> read_frames(const std::filesystem::path& path) {
   return frames;
 }
 
-std::vector<TagPoint> read_tags(const std::filesystem::path& path, int frame_count) {
-  const NumberTable table = NumberTable::from_file(path, tags_columns);
+std::vector<TagPoint> read_tags(const std::filesystem::path& path, int frame_count, bool* planes_as_seen) {
+  const NumberTable table = NumberTable::from_file(path, tags_columns, own_columns);
+  const bool has_own = table.columns() == std::size(tags_columns);
+  if (planes_as_seen != nullptr) *planes_as_seen = has_own;
   std::vector<TagPoint> tags;
   tags.reserve(table.rows());
   for (size_t row = 0; row < table.rows(); ++row) {
@@ -150,6 +151,11 @@ std::vector<TagPoint> read_tags(const std::filesystem::path& path, int frame_cou
     }
     for (double& component : tag.normal)
       component /= length;
+    if (has_own) {
+      for (size_t k = 0; k < 3; ++k)
+        tag.x_mm[k] += table.at(row, 9) * tag.normal[k];
+      tag.sigma_mm = sigma_at(table, row, 10);
+    }
     tags.push_back(tag);
   }
   return tags;
@@ -195,7 +201,7 @@ Measurement read_measurement(const Study& study) {
   measurement.frames = read_frames(*data.frames);
   const int frame_count = static_cast<int>(measurement.frames.size());
   if (data.tags) {
-    measurement.tags = read_tags(*data.tags, frame_count);
+    measurement.tags = read_tags(*data.tags, frame_count, &measurement.planes_as_seen);
     check_extent(measurement.tags, study.specimen, *data.tags);
   }
   if (data.points) {

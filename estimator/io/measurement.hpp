@@ -21,6 +21,10 @@ struct Frame {
 /// `NAME.tags.csv`: frame,nx,ny,nz,plane_mm,x_mm,y_mm,z_mm,sigma_mm. The stripe is seen at x_mm in the
 /// deformed frame; before deformation its material lay on the plane normal · X = plane_mm (Eq. 2 of the
 /// paper).
+///
+/// Two more columns, own_mm,own_sigma_mm, stand in files of tracked images: what the image says at this very place, without its
+/// neighbours and its past, is that the stripe lies own_mm farther along the normal, with an error of standard
+/// deviation own_sigma_mm that is independent of all other rows'. Such a row is read as that place with that sigma.
 struct TagPoint {
   int frame;
   std::array<double, 3> normal;  ///< unit vector
@@ -41,6 +45,8 @@ struct Measurement {
   std::vector<Frame> frames;
   std::vector<TagPoint> tags;
   std::vector<ObservedPoint> points;
+  bool planes_as_seen =
+      false;  ///< the tags' planes were found in images too (own columns), and are only as sure as those
   size_t repeated_rows =
       0;  ///< rows of the files that were left out here: the same as another, to the last digit
 };
@@ -50,7 +56,9 @@ struct Measurement {
 /// Frames must be 0, 1, 2, ... in order, times increasing, sigma >= 0, pressures within ±100 kPa.
 std::vector<Frame> read_frames(const std::filesystem::path& path);
 /// Every row's frame must exist; |normal| must be 1 to 1e-4 (it is then normalised); sigma > 0.
-std::vector<TagPoint> read_tags(const std::filesystem::path& path, int frame_count);
+/// `planes_as_seen`: whether the file has own columns.
+std::vector<TagPoint> read_tags(const std::filesystem::path& path, int frame_count,
+                                bool* planes_as_seen = nullptr);
 /// Every row's frame must exist; sigma > 0.
 std::vector<ObservedPoint> read_points(const std::filesystem::path& path, int frame_count);
 

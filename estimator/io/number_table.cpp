@@ -28,33 +28,41 @@ std::string_view take_field(std::string_view& rest) {
   return field;
 }
 
-void check_header(std::string_view line, const std::string& file, std::span<const std::string_view> columns) {
+/// How many columns the file has: all, or all but the last `optional`.
+size_t check_header(std::string_view line, const std::string& file, std::span<const std::string_view> columns,
+                    size_t optional) {
   constexpr std::string_view byte_order_mark = "\xEF\xBB\xBF";
   if (line.starts_with(byte_order_mark)) line.remove_prefix(byte_order_mark.size());
   std::string_view rest = line;
   const std::string remedy = fmt::format("The header must read: {}", fmt::join(columns, ","));
-  for (const std::string_view column : columns) {
+  size_t count = columns.size() - optional;
+  for (size_t i = 0; i < count; ++i) {
     const std::string_view found = take_field(rest);
-    if (found == column) continue;
-    throw InputError(
-        {file, "line 1", fmt::format("the header has \"{}\" where \"{}\" belongs", found, column), remedy});
+    if (found != columns[i])
+      throw InputError({file, "line 1",
+                        fmt::format("the header has \"{}\" where \"{}\" belongs", found, columns[i]),
+                        remedy});
+    const bool has_more =
+        i + 1 == count && count < columns.size() && trimmed(rest).starts_with(columns[count]);
+    if (has_more) count = columns.size();
   }
   if (!rest.empty()) {
     throw InputError({file, "line 1", fmt::format("the header has a column too many: \"{}\"", rest), remedy});
   }
+  return count;
 }
 
 }  // namespace
 
 NumberTable NumberTable::from_file(const std::filesystem::path& path,
-                                   std::span<const std::string_view> columns) {
+                                   std::span<const std::string_view> columns, size_t optional) {
   constexpr const char* remedy =
       "Check the path and that you may read the file; paths in a study are relative to the study.";
-  return from_text(read_whole_file(path, remedy), path.string(), columns);
+  return from_text(read_whole_file(path, remedy), path.string(), columns, optional);
 }
 
 NumberTable NumberTable::from_text(std::string_view text, std::string file,
-                                   std::span<const std::string_view> columns) {
+                                   std::span<const std::string_view> columns, size_t optional) {
   NumberTable table(std::move(file), columns);
   if (trimmed(text).empty()) {
     throw InputError(
@@ -69,7 +77,7 @@ NumberTable NumberTable::from_text(std::string_view text, std::string file,
     text.remove_prefix(end == std::string_view::npos ? text.size() : end + 1);
     ++line_number;
     if (line_number == 1) {
-      check_header(line, table.file_, columns);
+      table.columns_ = columns.first(check_header(line, table.file_, columns, optional));
     } else if (line.empty()) {
       if (first_blank == 0) first_blank = line_number;
     } else if (first_blank != 0) {

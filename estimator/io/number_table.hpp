@@ -13,13 +13,17 @@ namespace diastole {
 class NumberTable {
  public:
   /// `columns`: the header's names in order; they must outlive the table (string literals do).
+  /// Of the last `optional` of them a file has all or none.
   /// Throws InputError with file, line and column for a missing or empty file, another header, another number
   /// of columns, and every value that is not a finite number.
-  static NumberTable from_file(const std::filesystem::path& path, std::span<const std::string_view> columns);
+  static NumberTable from_file(const std::filesystem::path& path, std::span<const std::string_view> columns,
+                               size_t optional = 0);
   /// The same for text that is already in memory; `file` stands for it in messages.
   static NumberTable from_text(std::string_view text, std::string file,
-                               std::span<const std::string_view> columns);
+                               std::span<const std::string_view> columns, size_t optional = 0);
 
+  /// Those that the file has.
+  [[nodiscard]] size_t columns() const { return columns_.size(); }
   [[nodiscard]] size_t rows() const { return values_.size() / columns_.size(); }
   [[nodiscard]] double at(size_t row, size_t column) const { return values_[row * columns_.size() + column]; }
 

@@ -4,7 +4,6 @@
 // profiles through the wall, each with the scalar fields of docs/solutions.md. Lengths in mm, kPa.
 
 #include <algorithm>
-#include <array>
 #include <optional>
 #include <string>
 #include <string_view>

@@ -284,6 +284,13 @@ Study read_study(const std::filesystem::path& path) {
     study.effects = model->texts_or("effects", {});
     study.effect_values = read_effect_values(*model, study.effects);
     study.compression = read_compression(*model);
+    if (auto error = model->table_if("error")) {
+      for (const auto& [key, percent] : {std::pair{"cavity_percent", &study.model_error.cavity_percent},
+                                         std::pair{"pump_percent", &study.model_error.pump_percent},
+                                         std::pair{"volume_percent", &study.model_error.volume_percent}})
+        if (error->has(key)) *percent = error->number(key, {.above = 0, .at_most = 50});
+      error->finish();
+    }
     if (model->has("refine")) {
       const std::vector<int64_t> halvings =
           model->integers("refine", 3, {.at_least = 0, .at_most = most_halvings});

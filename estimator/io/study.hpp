@@ -103,6 +103,13 @@ struct StudyData {
   std::optional<StudyPose> to_specimen = {};  ///< absent: a pose file beside the images, or their outlines
 };
 
+/// [model.error]: what the rig's model gets wrong by itself, in per cent of a channel's range. Absent: rig_fit/model_error.hpp.
+struct StudyModelError {
+  std::optional<double> cavity_percent = {};
+  std::optional<double> pump_percent = {};
+  std::optional<double> volume_percent = {};
+};
+
 /// A chamber filled with fluid around the specimen (estimator/fe/chamber.hpp).
 struct StudyChamber {
   double sealing_pressure_kPa = 0.0;                 ///< in it at the specimen's undeformed shape
@@ -136,6 +143,7 @@ struct Study {
   StudyData data;
   std::vector<std::string> effects;             ///< effects that the model already includes
   std::vector<StudyEffect> effect_values = {};  ///< of some or all of them
+  StudyModelError model_error = {};
   std::optional<StudyChamber> chamber = {};
   StudyCompression compression = {};
   /// How often the specimen's elements are halved along each direction: a finer mesh of the very same body

@@ -3,8 +3,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include <boost/crc.hpp>
-
+#include "estimator/io/fingerprint.hpp"
 #include "estimator/io/whole_file.hpp"
 
 namespace diastole {
@@ -20,9 +19,7 @@ std::string study_fingerprint(const Study& study) {
     content += '\n';
     if (std::filesystem::is_regular_file(file)) content += read_whole_file(file);
   }
-  boost::crc_32_type crc;
-  crc.process_bytes(content.data(), content.size());
-  return fmt::format("{:08x}", crc.checksum());
+  return fingerprint_of(content);
 }
 
 }  // namespace diastole

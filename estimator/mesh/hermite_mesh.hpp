@@ -22,9 +22,7 @@
 #include <Eigen/Dense>
 #include <array>
 #include <cstddef>
-#include <optional>
 #include <span>
-#include <string>
 #include <utility>
 #include <vector>
 

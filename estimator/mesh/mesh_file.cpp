@@ -8,7 +8,6 @@
 #include <charconv>
 #include <cmath>
 #include <iterator>
-#include <string>
 #include <utility>
 #include <vector>
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 namespace diastole {
@@ -54,8 +55,8 @@ PointLocator::PointLocator(const HermiteMesh& mesh, std::span<const double> posi
   }
 }
 
-std::optional<LocatedPoint> PointLocator::find_in(size_t element, const Eigen::Vector3d& place_mm,
-                                                  Xi start) const {
+std::optional<LocatedPoint> PointLocator::find_in(size_t element, const Eigen::Vector3d& place_mm, Xi start,
+                                                  double outside_xi) const {
   constexpr double longest_step_xi = 0.5;
   constexpr double wander_xi = 1.0;  // an iterate may leave the element this far on its way
   Xi xi = start;
@@ -64,7 +65,7 @@ std::optional<LocatedPoint> PointLocator::find_in(size_t element, const Eigen::V
     const Eigen::Vector3d miss = place_mm - mapped.value;
     if (miss.norm() <= options_.tolerance_mm) {
       const double beyond = overshoot(xi);
-      if (beyond > options_.outside_xi) return {};
+      if (beyond > outside_xi) return {};
       return LocatedPoint{{element, xi}, beyond};
     }
     Eigen::Vector3d change = mapped.gradient.inverse() * miss;
@@ -78,11 +79,16 @@ std::optional<LocatedPoint> PointLocator::find_in(size_t element, const Eigen::V
   return {};
 }
 
+std::optional<LocatedPoint> PointLocator::find_beside(const Eigen::Vector3d& place_mm,
+                                                      const MaterialPoint& guess) const {
+  return find_in(guess.element, place_mm, guess.xi, std::numeric_limits<double>::infinity());
+}
+
 std::optional<LocatedPoint> PointLocator::find(const Eigen::Vector3d& place_mm,
                                                std::optional<MaterialPoint> guess) const {
   std::optional<LocatedPoint> best;
   const auto consider = [&](size_t element, const Xi& start) {
-    const std::optional<LocatedPoint> found = find_in(element, place_mm, start);
+    const std::optional<LocatedPoint> found = find_in(element, place_mm, start, options_.outside_xi);
     if (found && (!best || found->overshoot_xi < best->overshoot_xi)) best = found;
     return best && best->overshoot_xi == 0.0;
   };

@@ -35,6 +35,9 @@ class PointLocator {
   /// `guess` (where the point was in a slightly different configuration) is tried first.
   [[nodiscard]] std::optional<LocatedPoint> find(const Eigen::Vector3d& place_mm,
                                                  std::optional<MaterialPoint> guess = {}) const;
+  /// In the guess's element alone, extrapolated as far as Newton's method comes.
+  [[nodiscard]] std::optional<LocatedPoint> find_beside(const Eigen::Vector3d& place_mm,
+                                                        const MaterialPoint& guess) const;
 
  private:
   struct Sphere {
@@ -42,8 +45,8 @@ class PointLocator {
     double radius_mm;
   };
 
-  [[nodiscard]] std::optional<LocatedPoint> find_in(size_t element, const Eigen::Vector3d& place_mm,
-                                                    Xi start) const;
+  [[nodiscard]] std::optional<LocatedPoint> find_in(size_t element, const Eigen::Vector3d& place_mm, Xi start,
+                                                    double outside_xi) const;
 
   LocatorOptions options_;
   std::vector<ElementField> coefficients_;

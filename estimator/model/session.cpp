@@ -6,6 +6,7 @@
 #include <chrono>
 #include <limits>
 #include <sstream>
+#include <string>
 
 #include "protocol/contract/input_error.hpp"
 #include "protocol/runfile/reader.hpp"
@@ -158,6 +159,10 @@ Session read_session(const Study& study) {
                           .remedy = "1: all of it is at the cavity. Correct the rig's description."});
       }
       session.limits = limits_of(run);
+      constexpr std::string_view of_tolerance = "tolerance_";
+      for (const auto& [name, value] : run.rig)
+        if (name.starts_with(of_tolerance))
+          session.tolerance_sd[name.substr(of_tolerance.size())] = attribute(run, name, 0.0);
     }
     session.runs.push_back(session_run(std::move(run), short_name(file)));
   }

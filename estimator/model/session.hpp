@@ -3,7 +3,6 @@
 // gated volumes, and where in the session each run lies.
 
 #include <map>
-#include <string>
 #include <vector>
 
 #include "estimator/io/study.hpp"
@@ -40,7 +39,9 @@ struct MotionLimits {
 struct Session {
   std::vector<SessionRun> runs;  ///< in the study's order
   RigModel base;                 ///< of the first run's /rig; its curve is not yet set
-  MotionLimits limits;           ///< of the first run's /rig; the controller's own where it does not tell
+  std::map<std::string, double>
+      tolerance_sd;     ///< of the first run's /rig: what it states of its parts (rig_fit/tolerance.hpp)
+  MotionLimits limits;  ///< of the first run's /rig; the controller's own where it does not tell
 };
 
 /// Throws InputError if the study names no runs, a run cannot be read, or runs are of different rigs.

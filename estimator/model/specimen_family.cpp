@@ -4,12 +4,11 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <array>
-#include <boost/crc.hpp>
 #include <utility>
 
 #include "estimator/fe/pressure_volume.hpp"
 #include "estimator/io/cache.hpp"
+#include "estimator/io/fingerprint.hpp"
 #include "estimator/io/record_file.hpp"
 #include "estimator/model/study_model.hpp"
 #include "protocol/contract/input_error.hpp"
@@ -61,11 +60,7 @@ std::optional<std::string> key_of(const Study& study, const SpecimenResolution& 
 constexpr RecordFormat kept_format{"diastole-curve", "a specimen's curve",
                                    "Delete it: it is computed again."};
 
-std::string file_of(const std::string& key) {
-  boost::crc_32_type crc;
-  crc.process_bytes(key.data(), key.size());
-  return fmt::format("curve-{:08x}.json", crc.checksum());
-}
+std::string file_of(const std::string& key) { return fmt::format("curve-{}.json", fingerprint_of(key)); }
 
 std::optional<SpecimenCurve> kept_curve(const std::string& key) {
   const auto text = read_cached(file_of(key));

@@ -145,6 +145,8 @@ double log_determinant(const Eigen::MatrixXd& information) {
   return information.ldlt().vectorD().array().abs().max(1e-300).log().sum();
 }
 
+}  // namespace
+
 void require_known(const DesignStudy& design, const std::string& file) {
   for (size_t i = 0; i < design.parameters.size(); ++i) {
     if (design.se_percent[i] < most_se_percent) continue;
@@ -152,8 +154,6 @@ void require_known(const DesignStudy& design, const std::string& file) {
                       "Give frames with a load at which the body moves, or hold the parameter."});
   }
 }
-
-}  // namespace
 
 DesignStudy explore_design(const Study& study, const Measurement& measurement) {
   require_loaded_points(study, measurement);

@@ -33,4 +33,7 @@ struct DesignStudy {
 /// say nothing about a parameter.
 DesignStudy explore_design(const Study& study, const Measurement& measurement);
 
+/// Throws InputError for data that say nothing about a parameter. `file`: the study's.
+void require_known(const DesignStudy& design, const std::string& file);
+
 }  // namespace diastole

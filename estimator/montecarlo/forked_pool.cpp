@@ -14,7 +14,6 @@
 #include <cstring>
 #include <exception>
 #include <optional>
-#include <thread>
 
 #include "estimator/montecarlo/worker_pool.hpp"
 #include "protocol/contract/input_error.hpp"

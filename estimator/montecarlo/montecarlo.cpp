@@ -14,7 +14,6 @@
 #include "estimator/inference/intervals.hpp"
 #include "estimator/model/affected_model.hpp"
 #include "estimator/model/study_model.hpp"
-#include "estimator/montecarlo/synthetic_data.hpp"
 #include "protocol/contract/input_error.hpp"
 
 namespace diastole {

@@ -1,5 +1,5 @@
 #pragma once
-// How precisely a study's design tells its parameters: synthetic data with known values are refitted many times
+// How precisely a study's design determines its parameters: synthetic data with known values are refitted many times
 // (Augenstein et al. 2005, Table 1: noise levels by numbers of frames).
 //
 // The truth is the study's start values and its frames' measured pressures; the points are the study's own, or those
@@ -67,7 +67,7 @@ struct ParameterSpread {
   double truth;
   double mean;
   double sd;
-  double sd_percent;           ///< of the mean, as Table 1 tells it
+  double sd_percent;           ///< of the mean, as in Table 1
   std::array<double, 2> ci95;  ///< mean ± 1.96 sd: the paper's confidence interval
   double mean_se;              ///< what the refits say of themselves
   double coverage;             ///< share of refits whose own 95 % interval holds the truth

@@ -6,7 +6,6 @@
 #include <cmath>
 #include <set>
 
-#include "estimator/mesh/point_locator.hpp"
 #include "estimator/motion_residuals/tag_match.hpp"
 #include "protocol/contract/input_error.hpp"
 

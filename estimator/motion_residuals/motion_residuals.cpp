@@ -123,7 +123,20 @@ MotionResiduals::MotionResiduals(const Measurement& measurement, std::vector<int
       points_(measurement.points),
       locator_(locator),
       given_up_(tags_.size(), false),
-      first_(frames_.size() + 1, 0) {}
+      first_(frames_.size() + 1, 0) {
+  for (const TagPoint& tag : tags_)
+    planes_mm_.push_back(tag.plane_mm);
+}
+
+void MotionResiduals::shift_planes(const Eigen::VectorXd& by_mm) {
+  for (size_t i = 0; i < tags_.size(); ++i)
+    tags_[i].plane_mm = planes_mm_[i] + by_mm[static_cast<Eigen::Index>(i)];
+}
+
+double MotionResiduals::by_plane(const ResidualRow& row) const {
+  // The plane's material moves by dc along n, and the residual by by_reference . n dc less: by_reference is parallel to n.
+  return -row.by_reference.dot(vector_of(tags_[row.source].normal));
+}
 
 size_t MotionResiduals::find(const HermiteMesh& mesh, const PointLocator& reference,
                              std::span<const NodeField> position_mm) {

@@ -67,6 +67,10 @@ class MotionResiduals {
   [[nodiscard]] const std::vector<int>& frames() const { return frames_; }
   [[nodiscard]] bool of_tag(const ResidualRow& row) const { return row.source < tags_.size(); }
 
+  /// Moves the tags' planes by so much (one number a tag of the measurement, mm) from where the measurement has them; felt by the next
+  /// `find` or `follow`.
+  void shift_planes(const Eigen::VectorXd& by_mm);
+
   /// Looks for every point on the body in these motions, one a slot; returns how many tags became usable that were not.
   /// `reference` locates points of the undeformed mesh.
   size_t find(const HermiteMesh& mesh, const PointLocator& reference, std::span<const NodeField> position_mm);
@@ -93,6 +97,8 @@ class MotionResiduals {
   /// Derivatives of all residuals by fields that move each slot, times its factor.
   [[nodiscard]] Eigen::MatrixXd columns(const HermiteMesh& mesh, std::span<const NodeField> motion,
                                         std::span<const double> factors) const;
+  /// Derivative of a row's residual by its tag's plane_mm, 1/mm.
+  [[nodiscard]] double by_plane(const ResidualRow& row) const;
   /// The same rows at the same places of another undeformed mesh, for `columns` there; places outside it count nothing.
   [[nodiscard]] MotionResiduals relocated(const PointLocator& reference) const;
 
@@ -105,6 +111,7 @@ class MotionResiduals {
 
   std::vector<int> frames_;
   std::vector<TagPoint> tags_;
+  std::vector<double> planes_mm_;  // of the measurement
   std::vector<ObservedPoint> points_;
   LocatorOptions locator_;
   std::vector<bool> given_up_;  // of tags_

@@ -12,11 +12,15 @@ namespace diastole {
 namespace {
 
 constexpr double first_lambda = 1e3;
-constexpr int most_rounds = 12;
+constexpr int most_rounds = 24;
 constexpr int tukey_round = 1, validation_round = 2, last_validation_round = 3;
 constexpr double huber_bend = 1.345, tukey_reach = 4.685;
 constexpr double reject_sigma = 5.0;  // in units of the residuals' own spread, or of sigma if that is more
-constexpr double least_scale = 1.0;   // nothing is wild within its own sigmas, however good the others are
+/// A direction sees a third of a motion's square: no body moves much farther, RMS, than root three times what its points see. (Nor less
+/// than a pixel.) Without that limit a turn out of the tags' sight takes the place of a stretch, which it foreshortens to.
+constexpr double unseen_to_seen = 2.0, least_extent_mm = 1.0;
+constexpr int most_halvings = 10;
+constexpr double least_scale = 1.0;  // nothing is wild within its own sigmas, however good the others are
 
 double huber_weight(double residual) {
   return std::min(1.0, huber_bend / std::max(std::abs(residual), 1e-12));
@@ -126,6 +130,14 @@ std::vector<double> linear_residuals(const FieldSpace& space, const std::vector<
   return residuals;
 }
 
+/// Root mean square of the motion that the rows ask for, from rest.
+double seen_motion_mm(std::span<const ObservationRow> rows) {
+  double squares = 0.0;
+  for (const ObservationRow& row : rows)
+    squares += row.target * row.target;
+  return std::sqrt(squares / static_cast<double>(std::max<size_t>(rows.size(), 1)));
+}
+
 /// The first field: from rest, with Huber's weights, so that wild points do not tear it.
 Eigen::VectorXd first_solution(SmoothedSystem& system, std::vector<ObservationRow>& rows, int rounds) {
   Eigen::VectorXd q;
@@ -216,10 +228,16 @@ FrameField reconstruct_frame(const FieldForms& forms, const Measurement& measure
   move_to(field, space, q);
   double lambda = options.lambda.value_or(first_lambda);
   size_t rejected = 0;
+  double extent_mm = 0.0, weight_mm = 0.0;
+  const auto rms_mm = [&](const Eigen::VectorXd& field_of) {
+    return std::sqrt(forms.quadratic.apply(forms.sobolev.mean_square, field_of));
+  };
   for (; field.rounds < most_rounds && !field.converged; ++field.rounds) {
     std::vector<ObservationRow> rows = data.linearise(field);
     Eigen::VectorXd moved;
     if (field.rounds == 0) {
+      extent_mm = weight_mm = std::max(unseen_to_seen * seen_motion_mm(rows), least_extent_mm);
+      system.set_extent_of_motion(extent_mm);
       moved = first_solution(system, rows, options.robust ? options.huber_rounds : 1);
     } else {
       const size_t before = rejected;
@@ -235,7 +253,13 @@ FrameField reconstruct_frame(const FieldForms& forms, const Measurement& measure
       system.factorise(lambda);
       moved = system.solution();
     }
-    const double change_mm = std::sqrt(forms.quadratic.apply(forms.sobolev.mean_square, moved - q));
+    for (int halving = 0; halving < most_halvings && rms_mm(moved) > extent_mm; ++halving) {
+      weight_mm /= 2;
+      system.set_extent_of_motion(weight_mm);
+      system.factorise(system.lambda());
+      moved = system.solution();
+    }
+    const double change_mm = rms_mm(moved - q);
     field.converged = field.rounds >= (options.lambda ? tukey_round + 1 : last_validation_round) &&
                       change_mm < options.settled_mm;
     q = moved;

@@ -101,13 +101,18 @@ void check_slices(Findings& findings, const MotionEvidence& evidence) {
   }
 }
 
-/// A body that has gone elsewhere: the frame's axes have another origin.
+/// A body that has gone elsewhere, by what its points see of it: the frame's axes have another origin.
 void check_size(Findings& findings, const MotionEvidence& evidence) {
   constexpr double plausible = 0.2;  // of the body's extent, RMS
+  const HermiteMesh& mesh = evidence.forms->space.mesh();
   for (const FrameField& field : evidence.fields) {
-    const Eigen::VectorXd q = evidence.forms->space.unknowns_of(field.displacement_mm);
-    const double rms_mm = std::sqrt(evidence.forms->quadratic.apply(evidence.forms->sobolev.mean_square, q));
-    if (rms_mm < plausible * evidence.forms->space.mesh().extent_mm()) continue;
+    double squares = 0.0;
+    for (const FieldRow& row : field.rows)
+      squares += std::pow(row.normal.dot(mesh.value(field.displacement_mm, row.point)), 2);
+    // A direction sees a third of a motion's square, on average.
+    const double rms_mm =
+        std::sqrt(3.0 * squares / static_cast<double>(std::max<size_t>(field.rows.size(), 1)));
+    if (rms_mm < plausible * mesh.extent_mm()) continue;
     findings.push_back(
         {Severity::error, "far-motion",
          fmt::format("The body of frame {} seems to have moved by {:.3g} mm RMS.", field.number, rms_mm),

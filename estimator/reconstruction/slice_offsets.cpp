@@ -55,7 +55,7 @@ std::vector<SliceOffset> slice_offsets(const std::vector<FrameField>& fields, co
     all.S += one.S;
     all.t += one.t;
   }
-  const double least_information = 1e-9 * std::max(all.S.diagonal().maxCoeff(), 1e-300);
+  const double least_information = 1e-4 * std::max(all.S.diagonal().maxCoeff(), 1e-300);
   std::vector<Eigen::Index> taken;
   for (;;) {
     // What is left of each slice beside those taken.

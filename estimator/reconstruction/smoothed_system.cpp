@@ -7,7 +7,6 @@
 namespace diastole {
 namespace {
 
-constexpr double unbounded_mm = 1000.0;  // U of the header
 constexpr size_t solved_at_once = 128;
 
 }  // namespace
@@ -49,7 +48,7 @@ void SmoothedSystem::set_rows(std::span<const ObservationRow> rows) {
 }
 
 const Eigen::SparseMatrix<double, Eigen::RowMajor>& SmoothedSystem::weighted_rows() const {
-  if (rows_.rows() == targets_.size()) return rows_;
+  if (rows_.rows() == targets_.size() && rows_.cols() == forms_.space.unknowns()) return rows_;
   std::vector<Eigen::Triplet<double>> entries;
   entries.reserve(static_cast<size_t>(targets_.size()) * element_coefficients);
   for (size_t e = 0; e < blocks_.size(); ++e) {
@@ -85,8 +84,8 @@ void SmoothedSystem::factorise(double lambda) {
   lambda_ = lambda;
   QuadraticForms::Values values = data_;
   for (size_t i = 0; i < values.size(); ++i) {
-    values[i] +=
-        lambda * forms_.sobolev.smoothness[i] + forms_.sobolev.mean_square[i] / (unbounded_mm * unbounded_mm);
+    values[i] += lambda * forms_.sobolev.smoothness[i] +
+                 forms_.sobolev.mean_square[i] / (extent_of_motion_mm_ * extent_of_motion_mm_);
   }
   factorise_values(std::move(values));
 }

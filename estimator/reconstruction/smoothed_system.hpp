@@ -3,8 +3,8 @@
 //
 //   E(q) = Σ wᵢ (gᵢ·q − yᵢ)² / σᵢ²  +  λ S(q)  +  |u|²/U²          H = A + λ S + M/U²,  A = Σ wᵢ gᵢgᵢᵀ/σᵢ²
 //
-// The last term, U = 1000 mm RMS, is felt by nothing that data or smoothness feel; it only makes H definite when
-// no tag knows a rigid motion. H is factorised by CHOLMOD (supernodal Cholesky), its ordering found once.
+// The last term counts as one measurement of the whole body: that it has moved by 0 ± U (mm RMS). Nothing that data or smoothness feel
+// notices it; where no tag knows a rigid motion it keeps that motion within the size of what is seen. H is factorised by CHOLMOD (supernodal Cholesky), its ordering found once.
 //
 // H⁻¹ is the covariance of q if the field were drawn from the prior that λ stands for (Wahba 1983, J. R. Stat.
 // Soc. B 45:133): its standard errors hold the mean square of smoothing's own bias as well as the noise.
@@ -45,6 +45,8 @@ class SmoothedSystem {
   explicit SmoothedSystem(const FieldForms& forms);
 
   void set_rows(std::span<const ObservationRow> rows);
+  /// U, from the next factorisation on; 1000 mm at first.
+  void set_extent_of_motion(double rms_mm) { extent_of_motion_mm_ = rms_mm; }
   void factorise(double lambda);
   /// H = A + M/u², without smoothness: what the data alone determine (coverage.hpp).
   void factorise_without_smoothness(double amplitude_mm);
@@ -80,6 +82,7 @@ class SmoothedSystem {
   Eigen::VectorXd targets_;
   size_t measured_ = 0;
   double lambda_ = 0.0;
+  double extent_of_motion_mm_ = 1000.0;
   mutable Eigen::CholmodSupernodalLLT<Eigen::SparseMatrix<double>, Eigen::Lower> factor_;
   bool analysed_ = false;
 };

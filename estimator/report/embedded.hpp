@@ -7,6 +7,8 @@ namespace diastole::report::embedded {
 
 extern const std::string_view page_css;
 extern const std::string_view page_js;
+extern const std::string_view cine_css;
+extern const std::string_view cine_js;
 extern const std::string_view uplot_js;
 extern const std::string_view uplot_css;
 extern const std::string_view uplot_licence;

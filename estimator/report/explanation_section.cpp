@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 #include <map>
 #include <numbers>
 
@@ -193,11 +192,12 @@ void add_explained_field(Page& page, const Explanation& explanation) {
       fmt::format(
           "{} residuals of tags or points, in units of their own errors: {} before and {} after, where 1 is "
           "noise alone. One tag tells little: the maps show how far the motion is off on the average over a "
-          "lump's size, beside the noise of that average, again 1 where noise is all. Places are those of "
+          "inclusion's size, beside the noise of that average, again 1 where noise is all. Places are those "
+          "of "
           "the "
           "undeformed body; holes hold too few.{}",
           explanation.field.size(), number(rms[0], 3), number(rms[1], 3),
-          inclusions.empty() ? "" : " The ring is where the lump was found."));
+          inclusions.empty() ? "" : " The ring is where the inclusion was found."));
   for (const FieldView& view : field_views(explanation.field, inclusions)) {
     page.figures({{heat_map(view.before, view.after,
                             {.x = "angle about the axis (degrees)",
@@ -252,7 +252,10 @@ std::string verdict_words(const Explanation& e) {
 }
 
 void add_headlines(Page& page, const Explanation& e) {
-  page.headline("What the model lacks", verdict_words(e), verdict_note(e));
+  page.headline("What the model lacks", verdict_words(e),
+                e.confidence && e.verdict != Verdict::unexplained
+                    ? fmt::format("{}; probability {:.2f}", verdict_note(e), *e.confidence)
+                    : verdict_note(e));
   page.headline("Gap, before → after",
                 fmt::format("{} → {}", number(e.gap.before, 3), number(e.gap.after, 3)),
                 fmt::format("{} is noise; {} % closed on data that were not fitted", number(e.gap.floor, 3),
@@ -304,13 +307,17 @@ void add_effects(Page& page, const Explanation& e) {
     for (const FoundParameter& parameter : effect.parameters) {
       rows.push_back({effect.id, with_error(parameter.value, parameter.standard_error),
                       fmt::format("{} to {}", number(parameter.ci90[0]), number(parameter.ci90[1])),
+                      effect.size_over_model_error ? number(*effect.size_over_model_error, 2) : "–",
                       parameter.name});
     }
     for (const FoundChangePoint& point : effect.change_points)
-      rows.push_back({effect.id, number(point.time_s) + " s", "", "moment in " + point.run});
+      rows.push_back({effect.id, number(point.time_s) + " s", "", "", "moment in " + point.run});
   }
   if (!rows.empty()) {
-    page.table({"effect", "value", "90 % interval", "parameter"}, rows, "What was added to the model.", 3);
+    page.table({"effect", "value", "90 % interval", "size / model's error", "parameter"}, rows,
+               "What was added to the model. Its size is the RMS of what it changes, stiffness and offsets "
+               "having followed, over that of the model's own error.",
+               4);
   }
   for (const FoundEffect& effect : e.effects) {
     const Effect* known = find_effect(effect.id);
@@ -341,6 +348,60 @@ void add_shifts(Page& page, const Explanation& e) {
   }
   page.table({"parameter", "without", "with", "bias without"}, rows,
              "How far the estimates were off while the model lacked what was added.");
+}
+
+std::string channel_unit(const std::string& channel) { return channel.ends_with("_mL") ? "mL" : "Pa"; }
+
+Page::Row departure_row(const Departure& part) {
+  const std::string offset = part.unit == "ln" ? fmt::format("{:+.2g} %", 100.0 * std::expm1(part.offset))
+                                               : fmt::format("{:+.2g} {}", part.offset, part.unit);
+  return {part.part, offset, fmt::format("{:+.1f}", part.sds)};
+}
+
+/// What the model gets wrong by itself, what the rig's references left, the tolerances that the fit used, and hints.
+void add_model_error(Page& page, const Explanation& e) {
+  if (!e.model_error) return;
+  page.section("How wrong the model is by itself",
+               fmt::format("{} Pa in the cavity's pressure, {} % of its range ({}). What is smaller is no "
+                           "finding: it may be the model's own error.",
+                           number(e.model_error->rms_Pa, 2), number(e.model_error->percent_of_range, 2),
+                           e.model_error->source == "reference" ? "learnt from the rig's references"
+                           : e.model_error->source == "estimated"
+                               ? "estimated from how the waveforms predict each other"
+                               : "as stated for rigs of its kind"));
+  if (e.reference) {
+    const auto row_of = [](const ReferenceMisfit& misfit) -> Page::Row {
+      return {misfit.channel, fmt::format("{} {}", number(misfit.rms, 2), channel_unit(misfit.channel)),
+              number(misfit.percent_of_range, 2) + " %"};
+    };
+    page.table_of(
+        e.reference->channels, {"channel", "RMS misfit", "of the range"}, row_of,
+        fmt::format("What the model leaves on the rig's {} in which nothing is wrong.",
+                    e.reference->sessions == 1 ? "reference"
+                                               : std::to_string(e.reference->sessions) + " references"));
+    if (!e.reference->departures.empty())
+      page.table_of(e.reference->departures, {"part", "offset", "standard deviations"}, departure_row,
+                    "Parts of the rig that the references show to be other than declared.");
+  }
+  if (!e.hints.empty()) {
+    const auto row_of = [](const Hint& hint) -> Page::Row {
+      return {hint.id, number(hint.size_over_model_error, 2), fmt::format("{:.2f}", hint.probability)};
+    };
+    page.table_of(e.hints, {"hint", "size / model's error", "probability"}, row_of,
+                  "Significant, and not larger than what the model gets wrong by itself: no findings.");
+  }
+  if (!e.departures.empty())
+    page.table_of(e.departures, {"part", "offset", "standard deviations"}, departure_row,
+                  "What the fit takes to be other than declared, within what such parts may be.");
+  if (!e.cycle_scatter.empty()) {
+    const auto row_of = [](const CycleScatter& scatter) -> Page::Row {
+      return {scatter.channel, number(scatter.rms_Pa, 2) + " Pa", number(scatter.noise_Pa, 2) + " Pa",
+              number(scatter.percent_of_range, 2) + " %"};
+    };
+    page.table_of(e.cycle_scatter, {"channel", "beyond the noise", "noise", "of the range"}, row_of,
+                  "How equal cycles differ from each other, RMS up to 12 Hz: no model of a repeated motion "
+                  "explains it.");
+  }
 }
 
 void add_evidence(Page& page, const Explanation& e) {
@@ -385,6 +446,7 @@ void add_explanation(Page& page, const Explanation& e) {
     page.paragraph(
         fmt::format("The study with what was added is in {}; every command takes it.", e.study_after));
   add_where(page, e);
+  add_model_error(page, e);
   if (!e.steps.empty()) {
     page.section(
         "The gap, effect by effect",

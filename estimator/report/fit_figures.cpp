@@ -7,7 +7,6 @@
 #include <cmath>
 #include <numeric>
 #include <string>
-#include <vector>
 
 #include "estimator/report/colour_scale.hpp"
 #include "estimator/report/html_text.hpp"

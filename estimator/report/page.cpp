@@ -48,6 +48,13 @@ std::string static_svg(const TimeChart& chart) {
 /// To a ten-thousandth, which is more than a screen shows.
 double shortened(double value) { return std::round(value * 1e4) / 1e4; }
 
+/// "</script>" in a text would end the script.
+std::string script_safe(std::string json) {
+  for (size_t at = 0; (at = json.find('<', at)) != std::string::npos;)
+    json.replace(at, 1, "\\u003c");
+  return json;
+}
+
 std::string chart_json(const TimeChart& chart) {
   Json json{{"label", chart.y_label}, {"traces", Json::array()}};
   json["marks"] = written(chart.marks_s);
@@ -57,10 +64,7 @@ std::string chart_json(const TimeChart& chart) {
     json["data"].push_back(written(trace.y));
   }
   round_numbers(json, shortened);
-  std::string text = json.dump();
-  for (size_t at = 0; (at = text.find('<', at)) != std::string::npos;)
-    text.replace(at, 1, "\\u003c");  // "</script>" would end the script
-  return text;
+  return script_safe(json.dump());
 }
 
 std::string figure_html(const std::string& body, const std::string& caption) {
@@ -125,6 +129,14 @@ void Page::table(const Row& header, const std::vector<Row>& rows, const std::str
   body_ += figure_html(text + "</tbody></table>", caption);
 }
 
+void Page::part(const std::string& html, std::string_view css, std::string_view script,
+                const std::string& data_name, const std::string& data) {
+  body_ += html;
+  part_css_ += css;
+  part_scripts_ +=
+      fmt::format("<script>\nconst {} = {};\n{}</script>\n", data_name, script_safe(data), script);
+}
+
 void Page::listing(const std::string& title, const std::string& text) {
   body_ +=
       fmt::format("<details><summary>{}</summary><pre>{}</pre></details>\n", escaped(title), escaped(text));
@@ -136,7 +148,7 @@ std::string Page::html() const {
   text += "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n";
   text += fmt::format("<title>{}</title>\n<style>\n", escaped(title_));
   if (!charts_.empty()) text += std::string(embedded::uplot_css) + "\n";
-  text += std::string(embedded::page_css) + "</style>\n</head>\n<body>\n";
+  text += std::string(embedded::page_css) + part_css_ + "</style>\n</head>\n<body>\n";
   text += fmt::format(
       "<header><p class=\"brand\">Diastole</p><h1>{}</h1>\n<div class=\"headlines\">\n{}</div></header>\n",
       escaped(title_), headlines_);
@@ -151,6 +163,7 @@ std::string Page::html() const {
     text += script.substr(script.find('\n') + 1);
     text += std::string(embedded::page_js) + "</script>\n";
   }
+  text += part_scripts_;
   return text + "</body>\n</html>\n";
 }
 

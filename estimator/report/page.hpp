@@ -61,6 +61,9 @@ class Page {
       rows.push_back(row_of(item));
     table(header, rows, caption, words_from);
   }
+  /// A part with a style and a script of its own, which finds `data` (JSON) under that name.
+  void part(const std::string& html, std::string_view css, std::string_view script,
+            const std::string& data_name, const std::string& data);
   /// Preformatted text that unfolds on a click.
   void listing(const std::string& title, const std::string& text);
 
@@ -72,6 +75,7 @@ class Page {
   std::string body_;
   bool in_section_ = false;
   std::vector<std::string> charts_;  // JSON for page.js
+  std::string part_css_, part_scripts_;
 };
 
 }  // namespace diastole::report

@@ -1,7 +1,5 @@
 #include "estimator/report/report.hpp"
 
-#include <fmt/format.h>
-
 #include <functional>
 #include <map>
 #include <vector>
@@ -10,6 +8,7 @@
 #include "estimator/io/fit_file.hpp"
 #include "estimator/io/reconstruction_file.hpp"
 #include "estimator/io/solution_file.hpp"
+#include "estimator/io/tracking_file.hpp"
 #include "estimator/io/whole_file.hpp"
 #include "estimator/report/page.hpp"
 #include "estimator/report/sections.hpp"
@@ -20,7 +19,7 @@
 namespace diastole::report {
 namespace {
 
-enum class Kind { explanation, fit, table, reconstruction, solution, shear_test, run };
+enum class Kind { explanation, tracking, fit, table, reconstruction, solution, shear_test, run };
 
 bool is_hdf5(std::string_view content) {
   return content.starts_with(std::string_view("\x89HDF\r\n\x1a\n", 8));
@@ -76,6 +75,10 @@ std::string make_report(std::span<const std::filesystem::path> files, size_t fra
       add(Kind::explanation, explanations.back(), add_explanation);
     } else if (is_solution(content)) {
       add(Kind::solution, solution_record_from_json(content, name), add_solution);
+    } else if (is_tracking(content)) {
+      if (parts.contains(Kind::tracking))
+        throw InputError({name, "", "is a second record of tracked images", "Give one a page."});
+      add(Kind::tracking, tracking_record_from_json(content, name), add_tracking);
     } else if (is_reconstruction(content)) {
       add(Kind::reconstruction, reconstruction_record_from_json(content, name), add_reconstruction);
     } else {
@@ -84,7 +87,8 @@ std::string make_report(std::span<const std::filesystem::path> files, size_t fra
   }
   const auto count = [&](Kind kind) { return parts.contains(kind) ? parts.at(kind).size() : 0; };
   const size_t estimates = count(Kind::fit) + count(Kind::shear_test) + count(Kind::table);
-  const bool only_images = count(Kind::reconstruction) > 0 && count(Kind::solution) == 0;
+  const bool only_images =
+      count(Kind::reconstruction) + count(Kind::tracking) > 0 && count(Kind::solution) == 0;
   Page page(!explanations.empty()                   ? explanation_title(explanations)
             : estimates > 0 || count(Kind::run) > 0 ? title_of(estimates, count(Kind::run))
             : only_images                           ? "Displacement from tagged images"
@@ -93,6 +97,12 @@ std::string make_report(std::span<const std::filesystem::path> files, size_t fra
     for (const auto& draw : drawings)
       draw(page);
   }
+  return page.html();
+}
+
+std::string make_report(const TrackingRecord& record) {
+  Page page("Tags followed through the cycle");
+  add_tracking(page, record);
   return page.html();
 }
 

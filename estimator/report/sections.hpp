@@ -5,6 +5,7 @@
 #include "estimator/io/fit_file.hpp"
 #include "estimator/io/reconstruction_file.hpp"
 #include "estimator/io/solution_file.hpp"
+#include "estimator/io/tracking_file.hpp"
 #include "estimator/montecarlo/cells_file.hpp"
 #include "estimator/report/page.hpp"
 #include "estimator/shear/shear_fit.hpp"
@@ -26,6 +27,9 @@ void add_solution(Page& page, const SolutionRecord& record);
 /// What is wrong with the data, the field's frames, maps of residuals, errors, coverage and volume, cross-validation, tag
 /// directions, slices and the worst-covered elements.
 void add_reconstruction(Page& page, const ReconstructionRecord& record);
+
+/// A cine player of every slice with its lines, what was left out and why, residuals and errors by phase. Once a page.
+void add_tracking(Page& page, const TrackingRecord& record);
 
 /// Each in its severity's dress.
 void add_findings(Page& page, const std::vector<Finding>& findings);

@@ -1,7 +1,5 @@
 #include "estimator/rig/cavity.hpp"
 
-#include <cmath>
-
 namespace diastole::rig {
 
 Cavity::Cavity(const RigModel& model, const RunPlace& place)

@@ -171,15 +171,6 @@ void HoseLine::make_drag(double length_m) {
   drag_.resize(static_cast<size_t>(points));
 }
 
-void HoseLine::rest_at(double pressure_kPa) {
-  state_.setZero();
-  rate_.setZero();
-  piston_flow_ = 0.0;
-  state_[first_] = compliance_ * (1.0 + creep_) * pressure_kPa;
-  state_[2 * count_] = pressure_kPa;
-  pump_kPa_ = pressure_kPa;
-}
-
 void HoseLine::forces(const EndLoads& loads, int passes) {
   for (Index i = 0; i < count_; ++i)
     bare_[i] = cavity_shape_[i] * loads.cavity_kPa - piston_mass_[i] * loads.piston_acceleration;

@@ -53,9 +53,6 @@ class HoseLine {
  public:
   HoseLine(const Hose& hose, const LineOptions& options);
 
-  /// To rest: no flow, and the whole line at this pressure with its wall crept out.
-  void rest_at(double pressure_kPa);
-
   [[nodiscard]] double kept_mL() const { return kept(0); }
   /// y: what has entered beyond what the piston displaced.
   [[nodiscard]] double yielded_mL() const { return yields_ ? state_[0] : 0.0; }

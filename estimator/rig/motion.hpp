@@ -14,7 +14,6 @@
 // waveforms of /protocol/segments first and strokes fitted to the counts else, and W from none to 0.1 s, and accepts
 // what stays within a step everywhere; what nothing explains is smoothed, and said so.
 
-#include <string>
 #include <vector>
 
 #include "protocol/runfile/run.hpp"

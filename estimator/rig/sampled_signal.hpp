@@ -2,7 +2,6 @@
 // Values between evenly spaced samples.
 
 #include <algorithm>
-#include <cmath>
 #include <span>
 
 namespace diastole::rig {

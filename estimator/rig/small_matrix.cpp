@@ -1,6 +1,5 @@
 #include "estimator/rig/small_matrix.hpp"
 
-#include <array>
 #include <cstring>
 
 namespace diastole::rig {

@@ -2,7 +2,6 @@
 // A matrix of some ten rows that is multiplied with vectors some hundred thousand times a second.
 
 #include <Eigen/Dense>
-#include <cstddef>
 
 namespace diastole::rig {
 

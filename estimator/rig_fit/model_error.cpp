@@ -166,6 +166,8 @@ EvidenceFit fit_with_shares(const VectorXd& z, const Eigen::MatrixXd& columns, c
   constexpr double longest = 1.0;  // of a logarithm in a step
   constexpr double small = 0.01;   // nats, far below what decides anything
   Shares shares = start;
+  for (size_t g = 0; g < error_groups; ++g)
+    shares[g] = std::max(shares[g], SharePrior::least[g]);
   Curvature at;
   EvidenceFit fit = solve(z, columns, error, shares, &at);
   double part = 1.0;
@@ -173,7 +175,8 @@ EvidenceFit fit_with_shares(const VectorXd& z, const Eigen::MatrixXd& columns, c
     Shares next = shares;
     double promised = 0.0;
     for (size_t g = 0; g < error_groups; ++g) {
-      const double move = std::clamp(part * at.slope[g] / at.information[g], -longest, longest);
+      const double wanted = std::clamp(part * at.slope[g] / at.information[g], -longest, longest);
+      const double move = std::max(wanted, std::log(SharePrior::least[g] / shares[g]));
       promised += move * at.slope[g];
       next[g] *= std::exp(move);
     }

@@ -28,6 +28,8 @@ struct SharePrior {
   /// ringing that depends on every part's tolerance, of three.
   Shares up{0.7, 0.7, 1.1, 1.1, 0.7};
   Shares down{1.6, 1.6, 1.6, 1.6, 1.6};  ///< and where it is smaller: some rigs are far better than most
+  /// None is better: 0.1 % is the class of the best transducers.
+  static constexpr Shares least{0.001, 0.0006, 0.001, 0.0006, 0.001};
 };
 
 /// Variances by feature.

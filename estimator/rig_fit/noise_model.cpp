@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <complex>
+#include <numbers>
 
 #include "protocol/signal/median.hpp"
 
@@ -275,6 +277,14 @@ std::vector<double> whitened(const ChannelNoise& noise, const std::vector<double
     if (std::isfinite(innovation)) white[k] = innovation / noise.innovation_kPa;
   }
   return white;
+}
+
+double spectral_sd(const ChannelNoise& noise, double frequency_Hz, double rate_Hz) {
+  std::complex<double> response = 1.0;
+  for (size_t j = 0; j < noise.autoregression.size(); ++j)
+    response -= noise.autoregression[j] * std::polar(1.0, -2.0 * std::numbers::pi * frequency_Hz / rate_Hz *
+                                                              static_cast<double>(j + 1));
+  return noise.innovation_kPa / std::abs(response);
 }
 
 NoiseModel estimate_noise(const Session& session) {

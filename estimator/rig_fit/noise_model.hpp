@@ -34,6 +34,9 @@ struct NoiseModel {
 /// scatter of its second differences.
 NoiseModel estimate_noise(const Session& session);
 
+/// Sd of the product of the noise with a function of this frequency whose squares sum to one.
+double spectral_sd(const ChannelNoise& noise, double frequency_Hz, double rate_Hz);
+
 /// Innovations over their sd; zero where they would need a missing sample or one before the first.
 std::vector<double> whitened(const ChannelNoise& noise, const std::vector<double>& values);
 

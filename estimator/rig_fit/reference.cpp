@@ -207,7 +207,8 @@ void use_reference(const Reference& reference, SessionProblem& problem) {
   }
   problem.set_tolerances(mean, covariance.llt().matrixL());
   ModelError& error = problem.error();
-  error.prior.share = reference.again;
+  for (size_t g = 0; g < error_groups; ++g)
+    error.prior.share[g] = std::max(reference.again[g], SharePrior::least[g]);
   error.prior.down.fill(0.7);
   VectorXd misfit = VectorXd::Zero(problem.features().count());
   for (const FeatureBlock& block : problem.features().blocks()) {
@@ -221,7 +222,7 @@ void use_reference(const Reference& reference, SessionProblem& problem) {
     }
     for (Index i = first; i < first + rows; ++i) {
       const auto g = static_cast<size_t>(error.group[static_cast<size_t>(i)]);
-      if (reference.again[g] > 0.0) error.unit[i] *= std::pow(reference.all[g] / reference.again[g], 2);
+      error.unit[i] *= std::pow(std::max(reference.all[g] / error.prior.share[g], 1.0), 2);
     }
   }
   problem.take_off(misfit);

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <complex>
 #include <limits>
 #include <numbers>
 
@@ -14,7 +13,6 @@
 namespace diastole::rig {
 namespace {
 
-constexpr double highest_Hz = 12.0;  ///< beyond, no pressure of a stroke has anything but noise and ringing
 constexpr size_t most_harmonics = 30;
 constexpr size_t first_harmonics = 8;
 constexpr size_t most_cosines = 120;
@@ -25,15 +23,6 @@ constexpr double independent = 1e-4;  ///< of a function's square that earlier o
 
 const std::vector<double>* pressures(const Prediction& shown, Signal signal) {
   return signal == Signal::cavity ? &shown.cavity_kPa : &shown.pump_kPa;
-}
-
-/// Noise of the mean square of a function of this frequency, over white noise of sd 1 kPa.
-double spectral_sd(const ChannelNoise& noise, double frequency_Hz, double rate_Hz) {
-  std::complex<double> response = 1.0;
-  for (size_t j = 0; j < noise.autoregression.size(); ++j)
-    response -= noise.autoregression[j] * std::polar(1.0, -2.0 * std::numbers::pi * frequency_Hz / rate_Hz *
-                                                              static_cast<double>(j + 1));
-  return noise.innovation_kPa / std::abs(response);
 }
 
 double product(const FeatureBlock::Function& f, const FeatureBlock::Function& g) {
@@ -114,7 +103,7 @@ void add_harmonics(BasisMaker& basis, FeatureKind kind, size_t count, double row
 
 /// The functions of a window of `cycles` cycles.
 void add_cycles(BasisMaker& basis, double cycles, double period_s) {
-  const auto harmonics = std::min(most_harmonics, static_cast<size_t>(highest_Hz * period_s));
+  const auto harmonics = std::min(most_harmonics, static_cast<size_t>(highest_feature_Hz * period_s));
   const double all = basis.rows();
   const auto alike = [](double) { return 1.0; };
   add_harmonics(basis, FeatureKind::repeats, harmonics, all, alike);
@@ -130,7 +119,7 @@ void add_cycles(BasisMaker& basis, double cycles, double period_s) {
 }
 
 void add_cosines(BasisMaker& basis, double length_s) {
-  const auto count = std::min(most_cosines, static_cast<size_t>(2.0 * highest_Hz * length_s));
+  const auto count = std::min(most_cosines, static_cast<size_t>(2.0 * highest_feature_Hz * length_s));
   for (size_t h = 0; h <= count; ++h)
     basis.add(FeatureKind::repeats, static_cast<double>(h), basis.rows(),
               [&](double x) { return std::cos(std::numbers::pi * static_cast<double>(h) * x); });

@@ -26,6 +26,9 @@ enum class Signal : size_t { cavity, pump, volume };
 inline constexpr size_t signal_count = 3;
 std::string_view name_of(Signal signal);  ///< "cavity_kPa", "pump_kPa", "cavity_mL"
 
+/// Beyond, no pressure of a stroke has anything but noise and ringing.
+inline constexpr double highest_feature_Hz = 12.0;
+
 enum class FeatureKind { repeats, first, drift, cycles };
 
 struct Feature {

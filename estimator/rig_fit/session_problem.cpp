@@ -39,10 +39,13 @@ SessionProblem::SessionProblem(const Session& session, const SpecimenFamily& fam
       nuisances_{modulus_of(family),
                  {"cavity_offset", "Pa", offset_sd_Pa, 0.0, true, nullptr},
                  {"pump_offset", "Pa", offset_sd_Pa, 0.0, true, nullptr}} {
-  for (const Tolerance& tolerance : all_tolerances())
+  for (const Tolerance& tolerance : all_tolerances()) {
+    const auto stated = session.tolerance_sd.find(std::string(tolerance.name));
+    const double sd = stated == session.tolerance_sd.end() ? tolerance.sd : stated->second;
     if (!tolerance.needs_neighbours || family.has_neighbours())
-      nuisances_.push_back({std::string(tolerance.name), std::string(tolerance.unit), tolerance.sd, 0.0,
+      nuisances_.push_back({std::string(tolerance.name), std::string(tolerance.unit), sd, 0.0,
                             tolerance.sensors_only, &tolerance});
+  }
   // Features are means: with these steps and components they err by less than a twentieth of the model's stated error, where
   // the line rings most too.
   simulation_ = {.step_s = noise_.channels.contains(Channel::pump) ? 1.0 / 300.0 : 1.0 / 150.0,

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <iterator>
-#include <string>
 #include <utility>
 
 #include "estimator/fe/elastic_system.hpp"

@@ -1,6 +1,7 @@
 #include "firmware/core/black_box.hpp"
 
 #include <algorithm>
+#include <span>
 
 #include "protocol/wire/crc32.hpp"
 #include "protocol/wire/field_codec.hpp"

@@ -11,7 +11,6 @@
 
 #include <array>
 #include <cstdint>
-#include <span>
 
 #include "firmware/core/units.hpp"
 #include "protocol/wire/black_box_messages.hpp"

@@ -2,8 +2,6 @@
 // The safety state machine (drawn in protocol/wire/states.hpp): which state follows which, what is latched,
 // and whether the position is still known. Anything not listed here cannot happen.
 
-#include <cstdint>
-
 #include "protocol/wire/faults.hpp"
 #include "protocol/wire/states.hpp"
 

@@ -66,7 +66,7 @@ struct SampleGrid {
 
 /// What InstrumentTime::timer counts.
 struct TimerFacts {
-  double rate_Hz = 0;           ///< 0: the instrument tells no time
+  double rate_Hz = 0;           ///< 0: the instrument has no clock
   bool counts_samples = false;  ///< then sample k was taken when the timer read k
 };
 

@@ -30,7 +30,7 @@ struct DaemonAddress {
   /// For commands that give orders.
   void add_take_over_to(CLI::App& command) {
     command.add_option("--take-over", take_over,
-                       "take the control from the user (or process number) who holds it; the log tells both");
+                       "take the control from the user (or process number) who holds it; the log names both");
   }
   /// A client of the daemon, which has taken over the control if that was asked for.
   [[nodiscard]] DaemonClient connect() const {

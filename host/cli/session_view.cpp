@@ -176,9 +176,9 @@ ExitCode report_session(const SessionResult& result, bool json) {
              result.samples, result.expected);
   if (result.end != "completed") fmt::print("the run ended early: {}\n", result.end);
   if (result.gaps > 0)
-    fmt::print("{} samples are missing; `diastole inspect` tells where and why\n", result.gaps);
+    fmt::print("{} samples are missing; `diastole inspect` says where and why\n", result.gaps);
   if (result.errors > 0) {
-    fmt::print("{} errors were noted; `diastole inspect` tells them\n", result.errors);
+    fmt::print("{} errors were noted; `diastole inspect` lists them\n", result.errors);
   }
   return exit_code_of(result);
 }

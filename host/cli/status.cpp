@@ -124,7 +124,7 @@ void add_clear_fault(CommandLine& line) {
   CLI::App* command =
       line.add("clear-fault", "leave a latched fault, once its cause is gone",
                "  diastole status\n"
-               "      tells the fault's number, what happened and what to do about it\n"
+               "      shows the fault's number, what happened and what to do about it\n"
                "  diastole clear-fault\n"
                "      homed again if the position is still known, else unhomed: diastole home is next");
   daemon->add_to(*command);

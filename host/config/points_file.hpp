@@ -23,8 +23,8 @@ struct PointsFile {
   std::string text;                ///< as it was read
   std::vector<double> phase;       ///< from 0 to 1
   std::vector<double> fraction;    ///< of the stroke, from 0 to 1 and back to 0
-  std::optional<double> cycle_s;   ///< if the file tells times
-  std::optional<double> range_mL;  ///< if the file tells volumes
+  std::optional<double> cycle_s;   ///< if the file states times
+  std::optional<double> range_mL;  ///< if the file states volumes
 };
 
 /// Throws InputError with file, line and what to change.

@@ -72,6 +72,11 @@ void read_geometry(TableReader rig, RigConfig& config) {
   for (const char* key : optional_texts) {
     if (rig.has(key)) attributes[key] = rig.text(key);
   }
+  if (auto tolerance = rig.table_if("tolerance")) {
+    for (const auto& [part, sd] : tolerance->named_numbers({.above = 0}))
+      attributes["tolerance_" + part] = sd;
+    tolerance->finish();
+  }
   rig.finish();
   const double microsteps_per_m = 100 * screw_rev_per_cm * static_cast<double>(steps_per_rev) *
                                   static_cast<double>(config.controller.microsteps);

@@ -44,7 +44,7 @@ struct Schedule {
   [[nodiscard]] int64_t slices() const;
   /// Of all slices with dummies and pauses; what waiting takes comes on top.
   [[nodiscard]] int64_t cycles() const;
-  /// As many as the controller is told, so that no wait that is allowed runs out.
+  /// As many as the controller is asked for, so that no wait that is allowed runs out.
   [[nodiscard]] int64_t cycles_at_most() const { return cycles() + (waits() ? wait_cycles_at_most : 0); }
 };
 

@@ -100,7 +100,6 @@ std::optional<ClockMap> fit_clock_map(std::span<const ClockPair> all) {
   }
   const std::vector<ClockPair> kept = centre_and_select(pairs, map);
   refine(kept, fix_scale, map);
-  map.pairs_used = kept.size();
   map.pairs_dropped = pairs.size() - kept.size();
   return map;
 }

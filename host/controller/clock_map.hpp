@@ -12,7 +12,6 @@
 // deviations, and least squares of the rest, weighted by the inverse square of the round trip.
 
 #include <cstddef>
-#include <cstdint>
 #include <optional>
 #include <span>
 
@@ -30,7 +29,6 @@ struct ClockMap {
   double other_ref_s = 0;
   double scale = 1;
   double residual_s = 0;  ///< root mean square over the pairs used
-  size_t pairs_used = 0;
   size_t pairs_dropped = 0;
 
   [[nodiscard]] double to_other_s(double host_s) const { return other_ref_s + scale * (host_s - host_ref_s); }

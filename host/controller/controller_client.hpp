@@ -141,7 +141,7 @@ class ControllerClient final : public Controller {
     constexpr double most_mL = 50'000;
     if (!(std::abs(distance_mL) <= most_mL))
       throw InputError({"", "--mL", fmt::format("is {:g}", distance_mL),
-                        "Give a distance within the pump's travel (`diastole settings` tells it)."});
+                        "Give a distance within the pump's travel (`diastole settings` shows it)."});
     wire::Jog message;
     message.lease_id = link_.lease_id();
     message.distance_nL = std::llround(1e6 * distance_mL);

@@ -19,7 +19,7 @@ struct DaemonOptions {
 
 /// Serves until SIGINT or SIGTERM, then stops motion under control and closes. When it is ready to serve, one
 /// line appears on standard output: {"ready":true,"socket":"...","console":{"control":"http://...","watch":"http://..."}}
-/// (the latter with --console only), and a supervisor is told
+/// (the latter with --console only), and a supervisor is notified
 /// (service_manager.hpp); the log goes to standard error. Throws InputError or HardwareError when it cannot
 /// start.
 void run_daemon(const DaemonOptions& options);

@@ -13,7 +13,7 @@ namespace diastole::daq {
 class HidPort {
  public:
   virtual ~HidPort() = default;
-  /// False when the device is gone; `problem()` tells why.
+  /// False when the device is gone; `problem()` says why.
   [[nodiscard]] virtual bool write_output(std::span<const uint8_t> report) = 0;
   /// A feature report, its id (0) in front, when the device has it; empty when it had none within a second or is
   /// gone.

@@ -31,8 +31,6 @@
 #include <cstdint>
 #include <optional>
 #include <span>
-#include <string>
-#include <vector>
 
 namespace diastole::daq::usb1208ls {
 

@@ -4,7 +4,6 @@
 #include <array>
 #include <optional>
 #include <random>
-#include <string>
 #include <type_traits>
 #include <variant>
 

@@ -67,7 +67,7 @@ class GateCheck {
   [[nodiscard]] bool awaits_estop(uint64_t now_ns, const ControllerWitness& controller) const {
     return estop_since_ns_ && !controller.stopped_by_estop && now_ns <= *estop_since_ns_ + report_patience_ns;
   }
-  /// At the end; `triggers_raised` is the controller's own count, if it told.
+  /// At the end; `triggers_raised` is the controller's own count, if it reported one.
   [[nodiscard]] std::vector<GateRemark> close(uint64_t now_ns, const ControllerWitness& controller,
                                               std::optional<uint64_t> triggers_raised) {
     std::vector<GateRemark> out;

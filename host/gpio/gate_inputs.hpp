@@ -21,7 +21,7 @@ struct GpioConfig {
 struct EstopChange {
   uint64_t host_ns = 0;
   bool pressed = false;
-  bool edge_seen = true;  ///< false: only the level tells it; the edge was lost
+  bool edge_seen = true;  ///< false: only the level shows it; the edge was lost
 };
 
 /// Since the last one was taken, however long ago: a noisy line at rest fills no memory.

@@ -17,7 +17,7 @@
 // nothing more is written. The same holds when the file is no longer found under its name; if it was removed, what it
 // held is put back there first. A reader takes every
 // record whose CRC holds. It forgives a torn tail, and after damage in the middle it searches for the next
-// whole record; the sequence then tells how many are lost.
+// whole record; the sequence then shows how many are lost.
 
 #include <unistd.h>
 
@@ -57,7 +57,7 @@ class JournalWriter {
   ~JournalWriter();
 
   /// Appends one record. False if the disk did not take it whole (full, failed), or failed to flush what came
-  /// before; `problem()` then tells why, what was written before stays readable, and nothing more is written.
+  /// before; `problem()` then says why, what was written before stays readable, and nothing more is written.
   [[nodiscard]] bool append(RecordKind kind, std::span<const uint8_t> payload);
   [[nodiscard]] bool append(RecordKind kind, const std::string& text);
   /// Returns when everything is on the disk; false if it is not, now or before (`problem()`).

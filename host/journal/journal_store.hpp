@@ -6,7 +6,6 @@
 // a run file for some days after that was written, in case the file turns out to be damaged; run files for
 // ever. Nothing else in the directory is touched.
 
-#include <chrono>
 #include <cstdint>
 #include <filesystem>
 #include <vector>

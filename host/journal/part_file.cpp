@@ -10,11 +10,9 @@
 #include <charconv>
 #include <chrono>
 #include <csignal>
-#include <cstdint>
 #include <fstream>
 #include <optional>
 #include <string>
-#include <string_view>
 #include <system_error>
 
 #include "host/transport/descriptor.hpp"

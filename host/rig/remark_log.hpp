@@ -5,7 +5,6 @@
 #include <fmt/chrono.h>
 
 #include <algorithm>
-#include <cstdint>
 #include <ctime>
 #include <deque>
 #include <map>

@@ -1,6 +1,5 @@
 // A run: loading, recording, and making its file (rig_service.hpp).
 
-#include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
 #include <algorithm>

@@ -8,6 +8,7 @@
 #include <chrono>
 #include <cmath>
 #include <future>
+#include <mutex>
 
 #include "host/calibration/at_rest.hpp"
 #include "host/controller/settings_values.hpp"

@@ -38,7 +38,7 @@ class DaemonClient {
       return rpc::parse_answer(read_line(patience), id);
     } catch (const rpc::Error& error) {
       throw HardwareError("daemon at " + path_, error.what(),
-                          "`diastole status` tells what the rig is doing.");
+                          "`diastole status` says what the rig is doing.");
     }
   }
 

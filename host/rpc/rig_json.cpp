@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cmath>
+#include <string>
 
 #include "host/controller/controller_words.hpp"
 #include "protocol/contract/input_error.hpp"

@@ -2,7 +2,6 @@
 // What the rig answers, as JSON: the form in which clients of the daemon see it (docs/daemon.md).
 
 #include <nlohmann/json.hpp>
-#include <string>
 
 #include "host/acquisition/live_trace.hpp"
 #include "host/rig/rig_answers.hpp"

@@ -12,7 +12,6 @@
 #include <boost/asio.hpp>
 #include <chrono>
 #include <deque>
-#include <map>
 #include <memory>
 #include <string>
 #include <string_view>

@@ -5,14 +5,12 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <map>
 #include <memory>
 
 #include "host/journal/parsed_journal.hpp"
 #include "host/runfile/pressure_rows.hpp"
 #include "host/runfile/rows_due.hpp"
 #include "host/runfile/time_axis.hpp"
-#include "protocol/contract/input_error.hpp"
 #include "protocol/runfile/layout.hpp"
 #include "protocol/runfile/reader.hpp"
 #include "protocol/runfile/soundness.hpp"

@@ -56,7 +56,7 @@ AssembledRun assemble_run(const JournalContents& journal);
 /// None when samples come slower than 75 Hz, too slow for that cutoff, or when there are fewer than two (spacing 0).
 std::optional<signal::LowPassDesign> filter_of(double spacing_s);
 
-/// What the dataset tells of it: `filter`, `cutoff_Hz`, `order` of a pass, `passes`, `rate_Hz` that it was designed for,
+/// What the dataset states of it: `filter`, `cutoff_Hz`, `order` of a pass, `passes`, `rate_Hz` that it was designed for,
 /// and `delay_s`, which is 0.
 std::map<std::string, runfile::Attribute, std::less<>> notes_of(const signal::LowPassDesign& design);
 

@@ -2,8 +2,8 @@
 // The disk under an HDF5 file that is being written.
 //
 // The HDF5 library neither closes nor forgets a file whose disk has refused a write, and complains of it when the program
-// ends. So it is not told: from the first refusal on, what it writes stays in memory, from where it reads it back, until
-// it has closed the file. The refusal is told to whoever asks for it, who then writes no more; what the library still
+// ends. So it is not informed: from the first refusal on, what it writes stays in memory, from where it reads it back, until
+// it has closed the file. The refusal is reported to whoever asks for it, who then writes no more; what the library still
 // has to say is some megabytes of its own bookkeeping.
 
 #include <hdf5.h>

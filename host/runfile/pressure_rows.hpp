@@ -3,7 +3,7 @@
 //
 // A missing row lies evenly between its neighbours in time; before the first and after the last sample that was received
 // it lies where it was due. As the last one may have come later than the next was due, a row lies at least a tenth of
-// the spacing after the one before. How many there are is told by rows_due.hpp; an instrument that counts its samples by
+// the spacing after the one before. rows_due.hpp says how many there are; an instrument that counts its samples by
 // a clock of its own may have had more.
 
 #include <algorithm>

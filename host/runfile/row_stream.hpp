@@ -12,7 +12,7 @@
 
 namespace diastole {
 
-/// A dataset of a stream: its path in the file, its unit, and what it tells about itself besides.
+/// A dataset of a stream: its path in the file, its unit, and its other attributes.
 struct RowColumn {
   std::string path;
   std::string unit;

@@ -1,8 +1,8 @@
 #pragma once
 // How many rows each stream must have, by the clocks and not by what came.
 //
-// A run that was closed in order tells until when samples were due; the controller's end tells until when there were
-// positions. A journal that breaks off knows the last moment of which it tells anything: a position, a trigger, an event,
+// A run that was closed in order states until when samples were due; the controller's end states until when there were
+// positions. A journal that breaks off knows the last moment that it reports: a position, a trigger, an event,
 // a pair of clocks, a sample. The run went on until then at least, so what is not there up to then was not recorded.
 
 #include <cstdint>

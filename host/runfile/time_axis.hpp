@@ -30,7 +30,7 @@ class TimeAxis {
   }
   [[nodiscard]] double of_host_s(double host_s) const { return map_.to_other_s(host_s) - start_s(); }
   /// When sample k was taken: as the host noted; if the instrument's timer counts its samples, as that timer's line
-  /// against the host's clock tells, which knows nothing of blocks and how late they came.
+  /// against the host's clock gives, which knows nothing of blocks and how late they came.
   [[nodiscard]] double of_sample(uint64_t index, uint64_t host_ns) const {
     if (!timer_) return of_host_ns(host_ns);
     return of_host_s(timer_->to_host_s(static_cast<double>(index) / sample_rate_Hz_));

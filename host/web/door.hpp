@@ -35,7 +35,7 @@ struct Refusal {
 
 class Door {
  public:
-  /// New tokens; `machine`: the machine's own name, as gethostname tells it. Beyond loopback it is taken as it is and
+  /// New tokens; `machine`: the machine's own name, as gethostname returns it. Beyond loopback it is taken as it is and
   /// up to its first dot, and no other: whoever owns a domain can make MACHINE.his.domain point here.
   Door(const ConsoleAddress& address, std::string machine);
 
@@ -66,7 +66,7 @@ std::string_view token_in(std::string_view authorization, std::string_view proto
 /// 128 bits of the kernel's randomness, as 32 hexadecimal digits. Throws HardwareError if the kernel gives none.
 std::string new_token();
 
-/// Compares in a time that tells nothing of where the two differ.
+/// Compares in a time that does not depend on where the two differ.
 bool same_secret(std::string_view a, std::string_view b);
 
 }  // namespace diastole::web

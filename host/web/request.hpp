@@ -39,7 +39,7 @@ Refusal no_request(const boost::beast::error_code& error);
 struct Verdict {
   std::optional<Refusal> refusal{};         ///< 401: the token is not valid
   const PageFile* page = nullptr;           ///< to be sent
-  std::optional<ConsoleRole> asked_role{};  ///< to be told to who asked for /role
+  std::optional<ConsoleRole> asked_role{};  ///< the answer to /role
   std::optional<ConsoleRole> let_in_as{};   ///< the WebSocket is to be opened
 };
 

@@ -230,6 +230,15 @@ std::vector<TableReader> TableReader::tables(std::string_view key) {
   return blocks;
 }
 
+std::vector<std::pair<std::string, double>> TableReader::named_numbers(NumberRange range) {
+  std::vector<std::pair<std::string, double>> numbers;
+  for (const auto& [key, node] : *table_) {
+    const std::string name(key.str());
+    numbers.emplace_back(name, number(name, range));
+  }
+  return numbers;
+}
+
 std::vector<std::pair<std::string, TableReader>> TableReader::named_tables() {
   std::vector<std::pair<std::string, TableReader>> blocks;
   for (const auto& [key, node] : *table_) {

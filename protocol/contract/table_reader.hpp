@@ -66,6 +66,9 @@ class TableReader {
   /// Every sub-table with its name, for tables whose keys the user chooses (`[law.parameters.C1_kPa]`).
   std::vector<std::pair<std::string, TableReader>> named_tables();
 
+  /// Every number with its name, for tables whose keys another program knows (`[rig.tolerance]`).
+  std::vector<std::pair<std::string, double>> named_numbers(NumberRange range = {});
+
   /// Throws if the table has a key that nobody asked for.
   void finish();
 

@@ -12,7 +12,6 @@
 // squared. For it to be -3 dB at f_c all the same, each pass is designed with K / (sqrt 2 - 1)^(1/(2n)).
 // The live view filters forward only and so lags; its lag at low frequency is LowPass::delay_s.
 
-#include <cstddef>
 #include <vector>
 
 namespace diastole::signal {

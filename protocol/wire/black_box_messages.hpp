@@ -3,6 +3,8 @@
 
 #include <cstdint>
 
+#include "protocol/wire/field_codec.hpp"
+#include "protocol/wire/last_of.hpp"
 #include "protocol/wire/message_type.hpp"
 
 namespace diastole::wire {
@@ -12,7 +14,11 @@ enum class Noted : std::uint8_t {
 #include "protocol/wire/black_box_list.inc"
 };
 #undef DIASTOLE_BLACK_BOX
-inline constexpr Noted kLastNoted = Noted::settings;
+#define DIASTOLE_BLACK_BOX(number, name) Noted::name,
+inline constexpr Noted kLastNoted = last_of({
+#include "protocol/wire/black_box_list.inc"
+});
+#undef DIASTOLE_BLACK_BOX
 
 /// One event.
 ///
@@ -33,12 +39,9 @@ struct BlackBoxEntry {
   std::int32_t argument = 0;
 
   static constexpr void layout(auto& self, auto& visit) {
-    visit.field("number", self.number);
-    visit.field("boot", self.boot);
+    DIASTOLE_FIELDS(number, boot);
     visit.choice("kind", self.kind, kLastNoted);
-    visit.field("detail", self.detail);
-    visit.field("tick", self.tick);
-    visit.field("argument", self.argument);
+    DIASTOLE_FIELDS(detail, tick, argument);
   }
   constexpr bool operator==(const BlackBoxEntry&) const = default;
 };
@@ -55,10 +58,7 @@ struct ReadBlackBox {
   std::uint16_t request_id = 0;
   std::uint32_t from = 0;
 
-  static constexpr void layout(auto& self, auto& visit) {
-    visit.field("request_id", self.request_id);
-    visit.field("from", self.from);
-  }
+  static constexpr void layout(auto& self, auto& visit) { DIASTOLE_FIELDS(request_id, from); }
   static constexpr ReadBlackBox example() { return {.request_id = 0x0107, .from = 42}; }
 };
 
@@ -82,8 +82,7 @@ struct BlackBoxReport {
   BlackBoxEntry entry;
 
   static constexpr void layout(auto& self, auto& visit) {
-    visit.field("request_id", self.request_id);
-    visit.field("newest", self.newest);
+    DIASTOLE_FIELDS(request_id, newest);
     BlackBoxEntry::layout(self.entry, visit);
   }
   static constexpr BlackBoxReport example() {

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 
+#include "protocol/wire/field_codec.hpp"
 #include "protocol/wire/message_type.hpp"
 
 namespace diastole::wire {
@@ -24,10 +25,7 @@ struct LeaseRequest {
   std::uint16_t request_id = 0;
   std::uint32_t lease_id = 0;
 
-  static constexpr void layout(auto& self, auto& visit) {
-    visit.field("request_id", self.request_id);
-    visit.field("lease_id", self.lease_id);
-  }
+  static constexpr void layout(auto& self, auto& visit) { DIASTOLE_FIELDS(request_id, lease_id); }
   static constexpr LeaseRequest example() { return {example_id, 0x11223344}; }
 };
 

@@ -7,6 +7,7 @@
 //     visit.field("period_us", self.period_us, 1000U, 600'000'000U);  // inclusive bounds
 //     visit.choice("waveform", self.waveform, kLastWaveform);         // enumeration 0 … last, one byte
 //     visit.list("position_microsteps", self.count, self.values);     // count (one byte), then the values
+//     DIASTOLE_FIELDS(token, tick);                                    // fields of any value
 //   }
 //
 // Integers are little-endian, signed ones in two's complement; nothing is padded.
@@ -64,7 +65,7 @@ class FieldWriter {
 
 enum class DecodeProblem : std::uint8_t { none = 0, wrong_length, out_of_range };
 
-/// What is wrong with a payload, and in which field (counted from 0; field_name() in messages.hpp names it).
+/// What is wrong with a payload, and in which field (counted from 0 in the layout).
 struct DecodeFault {
   DecodeProblem problem = DecodeProblem::none;
   std::uint8_t field = 0;
@@ -167,31 +168,14 @@ class SchemaHasher {
   std::uint32_t hash_ = 2166136261U;
 };
 
-/// Finds the name of field number `wanted`; host-side messages use it.
-class FieldNamer {
- public:
-  explicit constexpr FieldNamer(std::uint8_t wanted) : wanted_(wanted) {}
-  template <class T>
-  constexpr void field(std::string_view name, const T&, Bound<T> = {}, Bound<T> = {}) {
-    visit(name);
-  }
-  template <class Enum>
-  constexpr void choice(std::string_view name, const Enum&, Bound<Enum>) {
-    visit(name);
-  }
-  template <class T, std::size_t N>
-  constexpr void list(std::string_view name, const std::uint8_t&, const std::array<T, N>&) {
-    visit(name);
-  }
-  [[nodiscard]] constexpr std::string_view name() const { return name_; }
-
- private:
-  constexpr void visit(std::string_view name) {
-    if (index_++ == wanted_) name_ = name;
-  }
-  std::uint8_t wanted_;
-  std::uint8_t index_ = 0;
-  std::string_view name_ = "end";
-};
+// Fields of any value one after the other, each under its own name: DIASTOLE_FIELDS(token, received_tick); in a layout.
+#define DIASTOLE_FIELDS(...) DIASTOLE_SCAN(DIASTOLE_EACH_FIELD(__VA_ARGS__))
+#define DIASTOLE_EACH_FIELD(name, ...) \
+  visit.field(#name, self.name) __VA_OPT__(; DIASTOLE_MORE_FIELDS DIASTOLE_PARENTHESES(__VA_ARGS__))
+#define DIASTOLE_MORE_FIELDS() DIASTOLE_EACH_FIELD
+#define DIASTOLE_PARENTHESES ()
+#define DIASTOLE_SCAN(...) DIASTOLE_SCAN4(DIASTOLE_SCAN4(DIASTOLE_SCAN4(DIASTOLE_SCAN4(__VA_ARGS__))))
+#define DIASTOLE_SCAN4(...) DIASTOLE_SCAN1(DIASTOLE_SCAN1(DIASTOLE_SCAN1(DIASTOLE_SCAN1(__VA_ARGS__))))
+#define DIASTOLE_SCAN1(...) __VA_ARGS__
 
 }  // namespace diastole::wire

@@ -10,10 +10,8 @@
 //     [&](const Undecodable& what) { ... }});                // unknown type, wrong length, value out of
 //     range
 
-#include <cstddef>
 #include <cstdint>
 #include <span>
-#include <string_view>
 
 #include "protocol/wire/black_box_messages.hpp"
 #include "protocol/wire/field_codec.hpp"
@@ -45,15 +43,6 @@ constexpr Result<Message, DecodeFault> decode(std::span<const std::uint8_t> payl
   Message::layout(message, reader);
   if (reader.fault().problem != DecodeProblem::none) return reader.fault();
   return message;
-}
-
-/// Name of a field by its number in DecodeFault.
-template <class Message>
-constexpr std::string_view field_name(std::uint8_t field) {
-  const Message message;
-  FieldNamer namer(field);
-  Message::layout(message, namer);
-  return namer.name();
 }
 
 namespace detail {

@@ -4,6 +4,7 @@
 #include <cstdint>
 
 #include "protocol/wire/common_requests.hpp"
+#include "protocol/wire/field_codec.hpp"
 #include "protocol/wire/message_type.hpp"
 
 namespace diastole::wire {
@@ -36,8 +37,7 @@ struct Jog {
   std::uint32_t flow_uL_per_s = 1U;
 
   static constexpr void layout(auto& self, auto& visit) {
-    visit.field("request_id", self.request_id);
-    visit.field("lease_id", self.lease_id);
+    DIASTOLE_FIELDS(request_id, lease_id);
     visit.field("distance_nL", self.distance_nL, -50'000'000'000, 50'000'000'000);
     visit.field("flow_uL_per_s", self.flow_uL_per_s, 1U, 10'000'000U);
   }

@@ -6,6 +6,7 @@
 #include <cstdint>
 
 #include "protocol/wire/common_requests.hpp"
+#include "protocol/wire/field_codec.hpp"
 #include "protocol/wire/message_type.hpp"
 #include "protocol/wire/states.hpp"
 
@@ -104,8 +105,7 @@ struct AddSegment {
     visit.field("request_id", self.request_id);
     visit.choice("waveform", self.waveform, kLastWaveform);
     visit.field("cycles", self.cycles, 1U, 10'000'000U);
-    visit.field("stroke_nL", self.stroke_nL);
-    visit.field("offset_nL", self.offset_nL);
+    DIASTOLE_FIELDS(stroke_nL, offset_nL);
     visit.field("period_us", self.period_us, 1'000U, 600'000'000U);
     visit.field("upload", self.upload);
   }
@@ -142,8 +142,7 @@ struct UploadWaveform {
   std::uint32_t crc = 0;
 
   static constexpr void layout(auto& self, auto& visit) {
-    visit.field("request_id", self.request_id);
-    visit.field("waveform", self.waveform);
+    DIASTOLE_FIELDS(request_id, waveform);
     visit.field("points", self.points, 2U, kMaxWaveformPoints);
     visit.field("crc", self.crc);
   }
@@ -172,8 +171,7 @@ struct WaveformPoints {
   std::array<std::int16_t, kMaxCount> rise{};
 
   static constexpr void layout(auto& self, auto& visit) {
-    visit.field("request_id", self.request_id);
-    visit.field("first", self.first);
+    DIASTOLE_FIELDS(request_id, first);
     visit.list("rise", self.count, self.rise);
   }
   static constexpr WaveformPoints example() {
@@ -247,14 +245,8 @@ struct SegmentPlanned {
   std::uint32_t cycle_microsteps = 0;
 
   static constexpr void layout(auto& self, auto& visit) {
-    visit.field("segment", self.segment);
-    visit.field("start_us", self.start_us);
-    visit.field("duration_us", self.duration_us);
-    visit.field("peak_flow_uL_per_s", self.peak_flow_uL_per_s);
-    visit.field("peak_acceleration_uL_per_s2", self.peak_acceleration_uL_per_s2);
-    visit.field("peak_step_rate_Hz", self.peak_step_rate_Hz);
-    visit.field("peak_pressure_Pa", self.peak_pressure_Pa);
-    visit.field("cycle_microsteps", self.cycle_microsteps);
+    DIASTOLE_FIELDS(segment, start_us, duration_us, peak_flow_uL_per_s, peak_acceleration_uL_per_s2,
+                    peak_step_rate_Hz, peak_pressure_Pa, cycle_microsteps);
   }
   static constexpr SegmentPlanned example() {
     return {.segment = 0,

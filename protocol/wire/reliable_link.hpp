@@ -1,6 +1,6 @@
 #pragma once
 // One end of the line: every sequenced message arrives exactly once, in order and unaltered, or the link is
-// told to be lost; datagrams arrive at most once. No I/O: bytes and the time are arguments, all memory is
+// reported as lost; datagrams arrive at most once. No I/O: bytes and the time are arguments, all memory is
 // inside the object (about 3.5 KB).
 //
 //   host: link.open(session, now_us);                     // any number it did not use last time

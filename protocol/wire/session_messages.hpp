@@ -4,6 +4,7 @@
 
 #include <cstdint>
 
+#include "protocol/wire/field_codec.hpp"
 #include "protocol/wire/message_type.hpp"
 #include "protocol/wire/states.hpp"
 
@@ -32,11 +33,7 @@ struct HelloRequest {
   std::uint8_t version_patch = 0;
 
   static constexpr void layout(auto& self, auto& visit) {
-    visit.field("request_id", self.request_id);
-    visit.field("schema_hash", self.schema_hash);
-    visit.field("version_major", self.version_major);
-    visit.field("version_minor", self.version_minor);
-    visit.field("version_patch", self.version_patch);
+    DIASTOLE_FIELDS(request_id, schema_hash, version_major, version_minor, version_patch);
   }
   static constexpr HelloRequest example() {
     return {.request_id = 1, .schema_hash = 0xA1B2C3D4, .version_minor = 1};
@@ -71,13 +68,7 @@ struct Hello {
   ResetCause reset_cause{};
 
   static constexpr void layout(auto& self, auto& visit) {
-    visit.field("request_id", self.request_id);
-    visit.field("schema_hash", self.schema_hash);
-    visit.field("version_major", self.version_major);
-    visit.field("version_minor", self.version_minor);
-    visit.field("version_patch", self.version_patch);
-    visit.field("board_id", self.board_id);
-    visit.field("boot_id", self.boot_id);
+    DIASTOLE_FIELDS(request_id, schema_hash, version_major, version_minor, version_patch, board_id, boot_id);
     visit.field("tick_rate_Hz", self.tick_rate_Hz, 1U, 1'000'000'000U);
     visit.choice("reset_cause", self.reset_cause, kLastResetCause);
   }
@@ -137,9 +128,7 @@ struct TimeSync {
   std::uint64_t replied_tick = 0;
 
   static constexpr void layout(auto& self, auto& visit) {
-    visit.field("token", self.token);
-    visit.field("received_tick", self.received_tick);
-    visit.field("replied_tick", self.replied_tick);
+    DIASTOLE_FIELDS(token, received_tick, replied_tick);
   }
   static constexpr TimeSync example() {
     return {.token = 77, .received_tick = 84'000'000, .replied_tick = 84'000'420};

@@ -4,6 +4,7 @@
 #include <cstdint>
 
 #include "protocol/wire/common_requests.hpp"
+#include "protocol/wire/field_codec.hpp"
 #include "protocol/wire/machine_settings.hpp"
 #include "protocol/wire/message_type.hpp"
 
@@ -77,10 +78,7 @@ struct SettingsReport {
   MachineSettings settings;
 
   static constexpr void layout(auto& self, auto& visit) {
-    visit.field("request_id", self.request_id);
-    visit.field("records_written", self.records_written);
-    visit.field("microstep_pL", self.microstep_pL);
-    visit.field("backlash_microsteps", self.backlash_microsteps);
+    DIASTOLE_FIELDS(request_id, records_written, microstep_pL, backlash_microsteps);
     MachineSettings::layout(self.settings, visit);
   }
   static constexpr SettingsReport example() {

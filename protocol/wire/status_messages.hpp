@@ -5,6 +5,7 @@
 
 #include "protocol/wire/common_requests.hpp"
 #include "protocol/wire/faults.hpp"
+#include "protocol/wire/field_codec.hpp"
 #include "protocol/wire/message_type.hpp"
 #include "protocol/wire/states.hpp"
 
@@ -30,10 +31,7 @@ struct Ack {
   std::uint16_t request_id = 0;
   std::uint8_t request_type = 0;
 
-  static constexpr void layout(auto& self, auto& visit) {
-    visit.field("request_id", self.request_id);
-    visit.field("request_type", self.request_type);
-  }
+  static constexpr void layout(auto& self, auto& visit) { DIASTOLE_FIELDS(request_id, request_type); }
   static constexpr Ack example() { return {.request_id = 4, .request_type = 0x13}; }
 };
 
@@ -60,13 +58,10 @@ struct Nak {
   std::int64_t allowed = 0;
 
   static constexpr void layout(auto& self, auto& visit) {
-    visit.field("request_id", self.request_id);
-    visit.field("request_type", self.request_type);
+    DIASTOLE_FIELDS(request_id, request_type);
     visit.choice("refusal", self.refusal, kLastRefusal);
     visit.choice("limit", self.limit, kLastLimit);
-    visit.field("segment", self.segment);
-    visit.field("asked", self.asked);
-    visit.field("allowed", self.allowed);
+    DIASTOLE_FIELDS(segment, asked, allowed);
   }
   static constexpr Nak example() {
     return {.request_id = 4,
@@ -131,20 +126,8 @@ struct Status {
     visit.choice("state", self.state, kLastState);
     visit.choice("fault", self.fault, kLastFault);
     visit.field("inputs", self.inputs, 0U, 15U);
-    visit.field("tick", self.tick);
-    visit.field("position_microsteps", self.position_microsteps);
-    visit.field("segment", self.segment);
-    visit.field("cycle", self.cycle);
-    visit.field("triggers", self.triggers);
-    visit.field("r_waves", self.r_waves);
-    visit.field("steps", self.steps);
-    visit.field("events_lost", self.events_lost);
-    visit.field("frames_received", self.frames_received);
-    visit.field("crc_errors", self.crc_errors);
-    visit.field("framing_errors", self.framing_errors);
-    visit.field("duplicates", self.duplicates);
-    visit.field("out_of_order", self.out_of_order);
-    visit.field("retransmissions", self.retransmissions);
+    DIASTOLE_FIELDS(tick, position_microsteps, segment, cycle, triggers, r_waves, steps, events_lost,
+                    frames_received, crc_errors, framing_errors, duplicates, out_of_order, retransmissions);
   }
   static constexpr Status example() {
     return {.request_id = 9,

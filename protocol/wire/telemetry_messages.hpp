@@ -6,6 +6,7 @@
 #include <cstdint>
 
 #include "protocol/wire/faults.hpp"
+#include "protocol/wire/field_codec.hpp"
 #include "protocol/wire/message_type.hpp"
 #include "protocol/wire/states.hpp"
 
@@ -49,11 +50,7 @@ struct RunStarted {
   std::uint16_t segments = 0;
   std::uint32_t cycles = 0;
 
-  static constexpr void layout(auto& self, auto& visit) {
-    visit.field("tick", self.tick);
-    visit.field("segments", self.segments);
-    visit.field("cycles", self.cycles);
-  }
+  static constexpr void layout(auto& self, auto& visit) { DIASTOLE_FIELDS(tick, segments, cycles); }
   static constexpr RunStarted example() { return {.tick = 168'000'000, .segments = 1, .cycles = 10}; }
 };
 
@@ -69,10 +66,7 @@ struct SegmentStarted {
   std::uint16_t segment = 0;
   std::uint64_t tick = 0;
 
-  static constexpr void layout(auto& self, auto& visit) {
-    visit.field("segment", self.segment);
-    visit.field("tick", self.tick);
-  }
+  static constexpr void layout(auto& self, auto& visit) { DIASTOLE_FIELDS(segment, tick); }
   static constexpr SegmentStarted example() { return {.segment = 0, .tick = 252'000'000}; }
 };
 
@@ -92,8 +86,7 @@ struct Trigger {
   std::uint8_t r_wave = 0U;
 
   static constexpr void layout(auto& self, auto& visit) {
-    visit.field("cycle", self.cycle);
-    visit.field("tick", self.tick);
+    DIASTOLE_FIELDS(cycle, tick);
     visit.field("r_wave", self.r_wave, 0U, 1U);
   }
   static constexpr Trigger example() { return {.cycle = 0, .tick = 252'352'000, .r_wave = 1}; }
@@ -121,9 +114,7 @@ struct PositionBatch {
   std::array<std::int32_t, kMaxCount> position_microsteps{};
 
   static constexpr void layout(auto& self, auto& visit) {
-    visit.field("first_index", self.first_index);
-    visit.field("first_tick", self.first_tick);
-    visit.field("period_ticks", self.period_ticks);
+    DIASTOLE_FIELDS(first_index, first_tick, period_ticks);
     visit.list("position_microsteps", self.count, self.position_microsteps);
   }
   static constexpr PositionBatch example() {
@@ -157,11 +148,7 @@ struct RunEnded {
 
   static constexpr void layout(auto& self, auto& visit) {
     visit.choice("reason", self.reason, kLastRunEnd);
-    visit.field("tick", self.tick);
-    visit.field("cycles", self.cycles);
-    visit.field("triggers", self.triggers);
-    visit.field("r_waves", self.r_waves);
-    visit.field("position_microsteps", self.position_microsteps);
+    DIASTOLE_FIELDS(tick, cycles, triggers, r_waves, position_microsteps);
   }
   static constexpr RunEnded example() {
     return {.reason = RunEnd::completed, .tick = 1'344'000'000, .cycles = 10, .triggers = 10, .r_waves = 10};
@@ -184,8 +171,7 @@ struct FaultRaised {
 
   static constexpr void layout(auto& self, auto& visit) {
     visit.choice("fault", self.fault, kLastFault);
-    visit.field("tick", self.tick);
-    visit.field("argument", self.argument);
+    DIASTOLE_FIELDS(tick, argument);
   }
   static constexpr FaultRaised example() {
     return {.fault = Fault::estop, .tick = 300'000'000, .argument = 812};

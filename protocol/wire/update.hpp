@@ -4,6 +4,8 @@
 
 #include <cstdint>
 
+#include "protocol/wire/last_of.hpp"
+
 namespace diastole::wire {
 
 enum class ImageSlot : std::uint8_t { a = 0, b = 1, none = 2 };
@@ -30,6 +32,10 @@ enum class UpdateOutcome : std::uint8_t {
 #include "protocol/wire/update_outcome_list.inc"
 };
 #undef DIASTOLE_UPDATE_OUTCOME
-inline constexpr UpdateOutcome kLastUpdateOutcome = UpdateOutcome::nothing_to_start;
+#define DIASTOLE_UPDATE_OUTCOME(number, name, explanation, remedy) UpdateOutcome::name,
+inline constexpr UpdateOutcome kLastUpdateOutcome = last_of({
+#include "protocol/wire/update_outcome_list.inc"
+});
+#undef DIASTOLE_UPDATE_OUTCOME
 
 }  // namespace diastole::wire

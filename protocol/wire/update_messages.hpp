@@ -28,6 +28,7 @@
 #include <cstdint>
 
 #include "protocol/wire/common_requests.hpp"
+#include "protocol/wire/field_codec.hpp"
 #include "protocol/wire/image_header.hpp"
 #include "protocol/wire/message_type.hpp"
 #include "protocol/wire/update.hpp"
@@ -75,10 +76,7 @@ struct ConfirmImage {
   std::uint16_t request_id = 0;
   std::uint64_t build_id = 0;
 
-  static constexpr void layout(auto& self, auto& visit) {
-    visit.field("request_id", self.request_id);
-    visit.field("build_id", self.build_id);
-  }
+  static constexpr void layout(auto& self, auto& visit) { DIASTOLE_FIELDS(request_id, build_id); }
   static constexpr ConfirmImage example() { return {.request_id = 9, .build_id = 0x1122334455667788}; }
 };
 
@@ -133,8 +131,7 @@ struct UpdateData {
   std::array<std::uint8_t, kMaxCount> data{};
 
   static constexpr void layout(auto& self, auto& visit) {
-    visit.field("request_id", self.request_id);
-    visit.field("offset", self.offset);
+    DIASTOLE_FIELDS(request_id, offset);
     visit.list("data", self.count, self.data);
   }
   static constexpr UpdateData example() {
@@ -209,13 +206,8 @@ struct ImageReport {
     visit.field("request_id", self.request_id);
     visit.choice("slot", self.slot, kLastImageSlot);
     visit.choice("standing", self.standing, kLastImageState);
-    visit.field("version_major", self.version_major);
-    visit.field("version_minor", self.version_minor);
-    visit.field("version_patch", self.version_patch);
-    visit.field("build_id", self.build_id);
-    visit.field("code_bytes", self.code_bytes);
-    visit.field("held_bytes", self.held_bytes);
-    visit.field("link_address", self.link_address);
+    DIASTOLE_FIELDS(version_major, version_minor, version_patch, build_id, code_bytes, held_bytes,
+                    link_address);
     visit.choice("free_slot", self.free_slot, kLastImageSlot);
   }
   static constexpr ImageReport example() {
@@ -250,11 +242,9 @@ struct UpdateAnswer {
   std::uint32_t value = 0;
 
   static constexpr void layout(auto& self, auto& visit) {
-    visit.field("request_id", self.request_id);
-    visit.field("request_type", self.request_type);
+    DIASTOLE_FIELDS(request_id, request_type);
     visit.choice("outcome", self.outcome, kLastUpdateOutcome);
-    visit.field("held_bytes", self.held_bytes);
-    visit.field("value", self.value);
+    DIASTOLE_FIELDS(held_bytes, value);
   }
   static constexpr UpdateAnswer example() {
     return {.request_id = 9, .request_type = 0x33, .outcome = UpdateOutcome::wrong_board, .value = 2};

@@ -2,7 +2,6 @@
 // The fault table: for every fault that host and controller must survive, how often it was tried, how often
 // everything that must hold held, and what it cost. Printed when the suite ends.
 
-#include <cstdint>
 #include <functional>
 #include <random>
 #include <string>

@@ -4,7 +4,6 @@
 
 #include <functional>
 #include <random>
-#include <variant>
 #include <vector>
 
 #include "firmware/boards/recording/recorded_controller.hpp"

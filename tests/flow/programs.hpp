@@ -2,9 +2,7 @@
 // Whole programs under test: run one to its end, or keep a session's helpers running, in a directory of one's
 // own.
 
-#include <chrono>
 #include <filesystem>
-#include <memory>
 #include <string>
 #include <vector>
 

@@ -4,7 +4,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <csignal>
 #include <functional>
 #include <ostream>
@@ -40,9 +39,48 @@ std::vector<std::string> simulate_in(const Workplace& place, const std::string& 
   return arguments;
 }
 
+/// The recorded phantom, in a scan with other options.
+std::vector<std::string> scan(const Workplace& place, const std::vector<std::string>& options) {
+  place.write("gel.frames.csv", source_text("examples/phantom-a.frames.csv"));
+  place.write("gel.study.toml",
+              with(with(source_text("examples/phantom-a.study.toml"), "tags = \"phantom-a.tags.csv\"\n", ""),
+                   "phantom-a.frames.csv", "gel.frames.csv"));
+  std::vector<std::string> arguments = {"diastole", "scan", "gel.study.toml", "-o", "scan"};
+  arguments.insert(arguments.end(), options.begin(), options.end());
+  return arguments;
+}
+
 std::vector<BadInput> table() {
   using Place = const Workplace&;
   return {
+      {"ScanWithoutRoom",
+       [](Place place) {
+         return scan(place, {"--fov", "90"});
+       },
+       2,
+       {"--fov", "90 mm", "100 mm across", "115 mm"}},
+      {"ScanOfTagsTooDense",
+       [](Place place) {
+         return scan(place, {"--tag-spacing", "1"});
+       },
+       2,
+       {"--tag-spacing", "1 mm", "three pixels", "--matrix"}},
+      {"ScanOfNothing", [](Place place) { return scan(place, {"--no-tags"}); }, 2, {"--no-tags", "--cine"}},
+      {"ScanBeyondTheModel",
+       [](Place place) {
+         return scan(place, {"--peak-kPa", "60", "--phases", "4"});
+       },
+       2,
+       {"gel.study.toml", "pressure", "--set"}},
+      {"ScanIntoAFolderInUse",
+       [](Place place) {
+         place.write("notes.txt", "precious");
+         auto arguments = scan(place, {});
+         arguments[4] = ".";
+         return arguments;
+       },
+       2,
+       {"-o", "not empty", "new folder"}},
       {"MissingFile",
        [](Place) -> std::vector<std::string> {
          return {"diastole", "simulate", "no.toml", "-o", "out.run.h5"};

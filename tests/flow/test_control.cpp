@@ -7,8 +7,6 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <csignal>
-
 #include "host/transport/unix_socket.hpp"
 #include "protocol/contract/input_error.hpp"
 #include "tests/flow/rig_with_daemon.hpp"

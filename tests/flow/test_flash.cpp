@@ -7,7 +7,6 @@
 #include <unistd.h>
 
 #include <filesystem>
-#include <fstream>
 
 #include "tests/flow/programs.hpp"
 #include "tests/host/flash/update_files.hpp"

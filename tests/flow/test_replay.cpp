@@ -6,7 +6,6 @@
 
 #include <csignal>
 #include <filesystem>
-#include <fstream>
 
 #include "host/runfile/writer.hpp"
 #include "protocol/runfile/reader.hpp"

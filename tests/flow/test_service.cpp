@@ -8,7 +8,6 @@
 #include <sys/un.h>
 
 #include <csignal>
-#include <thread>
 
 #include "tests/flow/rig_with_daemon.hpp"
 

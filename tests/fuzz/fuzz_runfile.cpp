@@ -10,7 +10,6 @@
 
 #include <fcntl.h>
 
-#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>

@@ -10,7 +10,6 @@
 // The first byte of a step counts modulo 5; a script may end anywhere.
 
 #include <algorithm>
-#include <array>
 #include <cstdint>
 #include <cstdlib>
 #include <span>

@@ -8,12 +8,12 @@
 #include <sys/mount.h>
 #include <unistd.h>
 
-#include <array>
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <stdexcept>
+#include <string>
 
 namespace diastole::vm {
 namespace {

@@ -2,7 +2,6 @@
 // A USB-1208LS on dummy_hcd, the kernel's cable from a machine to itself: its descriptors and requests are served
 // from here through FunctionFS. To the host side it is a true USB device, with the instrument's own numbers.
 
-#include <string>
 #include <thread>
 
 #include "host/transport/descriptor.hpp"

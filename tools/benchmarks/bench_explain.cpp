@@ -2,9 +2,11 @@
 // labels.json); the folder may be one of imaged motion instead (bench_explain_field.hpp). A row a case, then the table of
 // figures with their targets. Exit code 1 if a session in which nothing is hidden was given an effect, or one with an
 // effect of no library a confident name. Explanations are kept in build/explained/FOLDER/.
+// `tools/bench explain --worlds`: explain_worlds.hpp; exit code 1 if any target is missed.
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <CLI/CLI.hpp>
 
 #include <algorithm>
 #include <chrono>
@@ -18,6 +20,7 @@
 #include "estimator/explain/rig/explain_rig.hpp"
 #include "estimator/explain/verdict/explanation_json.hpp"
 #include "tools/benchmarks/bench_explain_field.hpp"
+#include "tools/benchmarks/explain_worlds.hpp"
 #include "tools/benchmarks/recorded_cases.hpp"
 #include "tools/score/score.hpp"
 
@@ -83,6 +86,21 @@ void explain_sessions(const bench::Recordings& recordings, const fs::path& kept)
 }  // namespace
 
 int main(int argc, char** argv) {
+  CLI::App app("Explains recorded sessions and counts what was right.", "tools/bench explain");
+  std::vector<std::string> words;
+  bool worlds = false;
+  const fs::path source = DIASTOLE_SOURCE_DIR;
+  bench::WorldsOptions of_worlds{.data = source / "../shared/data",
+                                 .kept = source / "build/explained/worlds"};
+  app.add_option("FOLDER", words, "with a labels.json, then names or kinds of the cases wanted");
+  app.add_flag("--worlds", worlds, "three worlds, with references and without (explain_worlds.hpp)");
+  app.add_option("--only", of_worlds.worlds, "these of the three")->check(CLI::Range(1, 3));
+  app.add_option("--rounds", of_worlds.rounds, "of world 3, 40 sessions each")->capture_default_str();
+  app.add_option("--first-round", of_worlds.first_round, "of world 3: its rig")->capture_default_str();
+  app.add_flag("--resume", of_worlds.resume, "keep what a stopped run answered");
+  CLI11_PARSE(app, argc, argv);
+  if (worlds) return bench::explain_worlds(of_worlds) ? 0 : 1;
+
   const auto recordings = bench::recordings_of(argc, argv);
   if (!recordings) return 0;
   const fs::path kept = fs::path(DIASTOLE_SOURCE_DIR) / "build/explained" /

@@ -2,6 +2,7 @@
 // against finite differences on the same problem, and the whole of its Table 1.
 //
 //   tools/bench fit                          gel estimate and sensitivities, on examples/phantom-a
+//   tools/bench fit --paper STUDY            the study's parameters by the paper's search, beside ours; nothing else
 //   tools/bench fit --table LV.study.toml --cells lv.cells.csv
 //                                            also Table 1: 4 noise levels x 3 numbers of frames x 10 refits, of the
 //                                            points that the paper's images would give; goes on after an interruption
@@ -24,6 +25,7 @@
 #include "estimator/montecarlo/montecarlo.hpp"
 #include "estimator/montecarlo/worker_pool.hpp"
 #include "protocol/contract/exit_code.hpp"
+#include "tools/benchmarks/paper_search.hpp"
 
 namespace diastole {
 namespace {
@@ -93,6 +95,38 @@ void bench_sensitivities(const Study& study, const Measurement& measurement) {
       (exact - differences).cwiseAbs().maxCoeff() / exact.cwiseAbs().maxCoeff());
 }
 
+void print_search(const char* whose, const std::vector<StudyParameter>& parameters,
+                  const std::vector<double>& values, int iterations, int equilibria, double wall_s,
+                  const std::string& reason) {
+  fmt::print("  {:<12}", whose);
+  for (size_t i = 0; i < parameters.size(); ++i)
+    fmt::print(" {} {:.5g} ", parameters[i].name, values[i]);
+  fmt::print(" {} iterations, {} equilibria, {:.1f} s wall; {}\n", iterations, equilibria, wall_s, reason);
+  std::fflush(stdout);
+}
+
+void compare_with_the_papers_search(const std::filesystem::path& file) {
+  Study study = read_study(file);
+  for (StudyParameter& parameter : study.law.parameters)
+    parameter.vary = Variation::whole;
+  const Measurement measurement = read_measurement(study);
+  const std::vector<StudyParameter>& parameters = study.law.parameters;
+  const Stopwatch own_watch;
+  const FitRecord own = fit_study(study, measurement, {});
+  std::vector<double> values;
+  for (const FittedParameter& parameter : own.parameters)
+    values.push_back(parameter.value);
+  print_search("this program:", parameters, values, own.iterations, own.forward_solves, own_watch.wall_s(),
+               own.reason);
+  ElasticModel model = make_model(study);
+  const EstimatedParameters estimated = estimated_parameters(study, model);
+  ElasticMotion motion(std::move(model), estimated.groups);
+  const Stopwatch paper_watch;
+  const PaperFit paper = fit_as_the_paper(motion, estimated.values, measurement, locator_for(study.specimen));
+  print_search("the paper:", parameters, paper.values, paper.iterations, paper.forward_solves,
+               paper_watch.wall_s(), paper.reason);
+}
+
 /// The heart's parameters as the paper found them.
 Study papers_heart(const std::filesystem::path& file) {
   Study study = read_study(file);
@@ -139,10 +173,15 @@ void bench_table(const std::filesystem::path& file, const std::filesystem::path&
 
 int run(int argc, char** argv) {
   CLI::App app("Estimation: iterations and seconds", "bench_fit");
-  std::filesystem::path table, cells = "table1.cells.csv";
+  std::filesystem::path table, cells = "table1.cells.csv", paper;
+  app.add_option("--paper", paper, "a study: its fit by the paper's search, beside ours, and nothing else");
   app.add_option("--table", table, "a ventricle's study: make the paper's Table 1 of it");
   app.add_option("--cells", cells, "keeps the table's refits")->capture_default_str();
   CLI11_PARSE(app, argc, argv);
+  if (!paper.empty()) {
+    compare_with_the_papers_search(paper);
+    return 0;
+  }
   const Study study = regional_gel();
   const Measurement measurement = read_measurement(study);
   fmt::print(

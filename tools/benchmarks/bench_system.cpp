@@ -16,7 +16,6 @@
 #include <cstdio>
 #include <functional>
 #include <limits>
-#include <memory>
 #include <vector>
 
 #include "estimator/fe/elastic_model.hpp"

@@ -5,7 +5,6 @@
 #include <boost/beast/core/buffers_to_string.hpp>
 #include <boost/beast/core/flat_buffer.hpp>
 #include <boost/beast/websocket.hpp>
-#include <chrono>
 #include <memory>
 #include <nlohmann/json.hpp>
 

@@ -9,6 +9,8 @@ namespace diastole {
 void add_catheter(CommandLine& line);
 /// `diastole replay`: a recorded run once more, through simulated instrument, the real firmware and the real daemon.
 void add_replay(CommandLine& line);
+/// `diastole scan`: a simulated scanner, DICOM of a study's motion.
+void add_scan(CommandLine& line);
 /// `diastole simulate`: a whole session without hardware, through the real daemon.
 void add_simulate(CommandLine& line);
 

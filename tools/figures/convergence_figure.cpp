@@ -10,7 +10,6 @@
 #include <ctime>
 #include <optional>
 #include <string>
-#include <vector>
 
 #include "estimator/fe/elastic_model.hpp"
 #include "estimator/mesh/annulus.hpp"

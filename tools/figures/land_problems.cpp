@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 #include <utility>
+#include <vector>
 
 #include "estimator/mesh/block.hpp"
 #include "estimator/mesh/point_locator.hpp"

@@ -4,7 +4,6 @@
 // mesh: Guccione's law, incompressible, follower pressure.
 
 #include <array>
-#include <vector>
 
 #include "estimator/fe/elastic_model.hpp"
 #include "estimator/mesh/ellipsoid.hpp"

@@ -7,7 +7,6 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
-#include <string>
 #include <vector>
 
 #include "tools/figures/line_chart.hpp"

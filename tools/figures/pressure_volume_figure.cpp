@@ -4,8 +4,6 @@
 
 #include <fmt/format.h>
 
-#include <cstdio>
-
 #include "estimator/fe/pressure_volume.hpp"
 #include "tools/figures/line_chart.hpp"
 #include "tools/figures/sphere.hpp"

@@ -43,6 +43,13 @@ HiddenEffect hidden_effect(const Json& json) {
   return effect;
 }
 
+constexpr double separable_sigma = 8.0;  // a smaller effect is in the noise
+
+EffectSize size_named(const std::string& word) {
+  if (word == "large") return EffectSize::large;
+  return word == "medium" ? EffectSize::medium : EffectSize::small;  // "between", "small", "none"
+}
+
 Truth rig_truth(const std::string& name, const Json& json) {
   Truth truth;
   truth.name = name;
@@ -50,7 +57,13 @@ Truth rig_truth(const std::string& name, const Json& json) {
   for (const Json& effect : json.at("truth"))
     truth.hidden.push_back(hidden_effect(effect));
   if (json.contains("alternatives")) json.at("alternatives").get_to(truth.alternatives);
+  if (json.contains("alternatives_without_reference"))
+    json.at("alternatives_without_reference").get_to(truth.alternatives_without_reference);
   if (json.contains("d") && json.at("d").is_number()) truth.size_sigma = json.at("d").get<double>();
+  if (truth.size_sigma < separable_sigma) truth.size = EffectSize::small;
+  if (json.contains("size")) truth.size = size_named(json.at("size").get<std::string>());
+  for (const Json& part : json.value("also_present", Json::array()))
+    if (part.value("namable", false)) truth.imperfections.push_back(hidden_effect(part));
   return truth;
 }
 
@@ -99,7 +112,7 @@ std::vector<Truth> truths_of(const fs::path& file) {
     }
     const bool fields = json.value("format", "") == "fegen-labels";
     std::vector<Truth> truths;
-    for (const auto& [name, value] : (fields ? json.at("cases") : json).items()) {
+    for (const auto& [name, value] : (json.contains("cases") ? json.at("cases") : json).items()) {
       if (!fields) {
         truths.push_back(rig_truth(name, value));
         continue;

@@ -6,6 +6,9 @@
 //
 //   {"format": "diastole-sealed", "format_version": 1, "seed": 7, "kind": "single",
 //    "truth": [{"id": "air-bubble-pump", "port": "drive", "parameters": {"volume_mL": 4.2}}]}
+//
+// Labels of rigs with imperfections ({"cases": ..., "rigs": ...}) also tell how large the effect is beside them and which of
+// them an explanation may name.
 
 #include <filesystem>
 #include <limits>
@@ -20,6 +23,9 @@ namespace diastole::explain {
 enum class TruthKind { none, single, pair, outside, inseparable };
 std::string_view name_of(TruthKind kind);
 
+/// Beside what the rig's model gets wrong by itself: five times that and more, twice, less.
+enum class EffectSize { large, medium, small };
+
 struct HiddenEffect {
   std::string id;    ///< of no library: begins with "outside:"
   std::string port;  ///< empty if the file does not say
@@ -32,6 +38,10 @@ struct Truth {
   std::vector<HiddenEffect> hidden;
   std::vector<std::vector<std::string>>
       alternatives;  ///< sets that fit these data as well; an empty set: no effect
+  std::vector<std::vector<std::string>>
+      alternatives_without_reference;       ///< and those if the rig's error is not known
+  std::vector<HiddenEffect> imperfections;  ///< of the rig, large enough to be named
+  EffectSize size = EffectSize::large;      ///< if the file does not say: small below d = 8
   double size_sigma = std::numeric_limits<double>::quiet_NaN();  ///< d; NaN if the file does not say
   std::vector<Verdict> acceptable;                               ///< if the file restricts the verdicts
 

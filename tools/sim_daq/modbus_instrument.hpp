@@ -10,8 +10,8 @@
 // All are read as holding (function 3) or as input registers (function 4); any other address is answered with
 // exception 2 (illegal data address). One request is answered from one instant.
 //
-// It does no waiting of its own: the owner waits for descriptors() to become readable, or for
-// next_reply_ns(), and calls service(). Not thread-safe.
+// It does no waiting of its own: the owner waits for descriptors() to become readable, a moment at most (replies may be
+// delayed), and calls service(). Not thread-safe.
 
 #include <arpa/inet.h>
 #include <fmt/format.h>
@@ -30,7 +30,6 @@
 #include <functional>
 #include <limits>
 #include <memory>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -143,11 +142,6 @@ class ModbusInstrument {
       delayed_.pop_front();
       if (!answer(reply.client, reply.request)) drop(reply.client);
     }
-  }
-  /// When the next delayed reply is due, on the clock of now_ns.
-  [[nodiscard]] std::optional<uint64_t> next_reply_ns() const {
-    if (delayed_.empty()) return std::nullopt;
-    return delayed_.front().due_ns;
   }
 
  private:

@@ -16,6 +16,7 @@
 #include "tools/sim_rig/faults.hpp"
 #include "tools/sim_rig/hidden_effects.hpp"
 #include "tools/sim_rig/host_built_controller.hpp"
+#include "tools/sim_rig/imperfections.hpp"
 #include "tools/sim_rig/rig_description.hpp"
 #include "tools/sim_rig/server.hpp"
 
@@ -57,6 +58,7 @@ struct Arguments {
   std::string config;
   std::string image;
   uint64_t seed = 1;
+  uint64_t rig_seed = 0;
   bool real_time = false;
   std::vector<std::string> faults;
   std::vector<std::string> hidden;
@@ -86,6 +88,9 @@ void add_options(CLI::App& app, Arguments& arguments) {
                  "with --conductor: let the daemon's clock run this much fast")
       ->check(CLI::Range(-1000.0, 1000.0));
   app.add_option("--seed", arguments.seed, "of the sensors' noise")->capture_default_str();
+  app.add_option("--rig-seed", arguments.rig_seed,
+                 "draw a rig whose parts are off by what such parts are off by; 0: as the rig file has it")
+      ->capture_default_str();
   app.add_option("--fault", arguments.faults, "make something go wrong, NAME@T; may be repeated");
   app.add_option("--hide", arguments.hidden,
                  "an effect (sim_rig hidden), none, outside or any; may be repeated");
@@ -126,6 +131,7 @@ void serve(Arguments arguments) {
       arguments.config.empty() ? TableReader::from_text(sim_rig::default_rig_toml(), "the built-in rig file")
                                : TableReader::from_file(arguments.config));
   description.plant.seed = arguments.seed;
+  sim_rig::draw_imperfections(arguments.rig_seed, description.plant);
   hide(arguments, description.plant);
   arguments.server.faults = sim_rig::parse_faults(arguments.faults);
   const int stop = diastole::stop_descriptor();

@@ -27,6 +27,7 @@ struct FieldCase {
   Measured C1_start_kPa;  ///< sigma 0: free within the bounds
   std::array<double, 2> C1_bounds_kPa{};
   std::optional<Measured> inner_radius_mm;  ///< as frame 0 shows it
+  int iteration_limit = 25;                 ///< of each fit
   std::function<void()> alive = {};  ///< called before each equilibrium of a fit; ends it by an exception
 };
 

@@ -265,11 +265,12 @@ double FieldProblem::volume_change_mL(const FieldFit& fit) {
   return model.cavity_volume_mL(solver_.state(highest_node())) - model.cavity_volume_mL(model.rest_state());
 }
 
-FieldFit FieldProblem::fit(FieldChoice choice, const Start& start, int iteration_limit) {
+FieldFit FieldProblem::fit(FieldChoice choice, const Start& start, std::optional<int> iteration_limit) {
   Search search(*this, std::move(choice));
-  inference::SearchResult found = inference::minimise(
-      search, search.coordinates(start),
-      {.iteration_limit = iteration_limit, .small_gain = [](double) { return worth_a_step; }});
+  inference::SearchResult found =
+      inference::minimise(search, search.coordinates(start),
+                          {.iteration_limit = iteration_limit.value_or(field_.iteration_limit),
+                           .small_gain = [](double) { return worth_a_step; }});
   FieldFit result = search.at(found.q);
   result.termination = found.termination;
   result.chi_square = HUGE_VAL;

@@ -7,6 +7,7 @@
 //        + ((inner radius - seen) / sigma)^2, if frame 0 shows where the wall begins
 
 #include <Eigen/Dense>
+#include <optional>
 #include <vector>
 
 #include "estimator/effects/effect.hpp"
@@ -62,7 +63,7 @@ class FieldProblem {
     std::vector<double> pressures_kPa;
   };
   /// Until no step gains more than 0.02 of chi2.
-  [[nodiscard]] FieldFit fit(FieldChoice choice, const Start& start, int iteration_limit = 25);
+  [[nodiscard]] FieldFit fit(FieldChoice choice, const Start& start, std::optional<int> iteration_limit = {});
   [[nodiscard]] Start start() const;
   /// What the cavity of a fit's specimen takes at the highest node; NaN without an equilibrium. The solver stands there
   /// afterwards, the rows stay.

@@ -2,7 +2,6 @@
 // The library's effects, each fitted to the imaged motion.
 
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include "estimator/explain/imaging/field_fit.hpp"

@@ -1,12 +1,9 @@
 #include "estimator/explain/imaging/field_solver.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <optional>
 #include <utility>
 
-#include "estimator/fe/elastic_system.hpp"
 #include "estimator/fe/gauss_contraction.hpp"
 #include "estimator/mesh/annulus.hpp"
 #include "estimator/mesh/node_field.hpp"

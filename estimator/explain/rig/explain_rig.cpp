@@ -1,6 +1,7 @@
 #include "estimator/explain/rig/explain_rig.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <chrono>
@@ -14,6 +15,7 @@
 #include "estimator/explain/rig/set_verdict.hpp"
 #include "estimator/explain/verdict/verdict.hpp"
 #include "protocol/contract/input_error.hpp"
+#include "protocol/contract/table_reader.hpp"
 
 namespace diastole::explain {
 namespace {
@@ -122,7 +124,67 @@ ModelErrorSize model_error_of(const rig::SessionProblem& problem, const EffectSe
   for (size_t g = 0; g < rig::error_groups; ++g)
     if (std::ranges::count(groups, static_cast<rig::ErrorGroup>(g)) > 0)
       size.parts.push_back({std::string(name_of(static_cast<rig::ErrorGroup>(g))), beyond[g]});
+  size.parts.push_back({"tolerances", largest_tolerance(set)});
   return size;
+}
+
+/// Of offsets in sds those of one sd and more, the largest first.
+std::vector<Departure> departures(const rig::SessionProblem& problem, const Eigen::VectorXd& offsets) {
+  std::vector<Departure> list;
+  for (size_t i = rig::basic_nuisances; i < problem.nuisances().size(); ++i) {
+    const rig::Nuisance& part = problem.nuisances()[i];
+    const double sds = offsets[static_cast<Eigen::Index>(i - rig::basic_nuisances)];
+    if (std::abs(sds) >= 1.0) list.push_back({part.name, part.sd * sds, part.unit, sds});
+  }
+  std::ranges::sort(list, std::greater(), [](const Departure& part) { return std::abs(part.sds); });
+  return list;
+}
+
+void require_known_tolerances(const rig::Session& session) {
+  std::vector<std::string> known;
+  for (const rig::Tolerance& tolerance : rig::all_tolerances())
+    known.emplace_back(tolerance.name);
+  for (const auto& [name, sd] : session.tolerance_sd)
+    if (std::ranges::count(known, name) == 0)
+      throw InputError({.file = session.runs.front().drive.place.name + ".run.h5",
+                        .place = "attribute /rig tolerance_" + name,
+                        .problem = "no part of the rig has this name",
+                        .remedy = did_you_mean(name, known) +
+                                  "Those that [rig.tolerance] of rig.toml may set are: " +
+                                  fmt::format("{}.", fmt::join(known, ", "))});
+}
+
+/// The shares that the study states; what sets in or drifts goes with what repeats.
+void state_error(const StudyModelError& stated, rig::Shares& share) {
+  using enum rig::ErrorGroup;
+  const auto state = [&](std::optional<double> percent, rig::ErrorGroup whole, rig::ErrorGroup transient) {
+    if (!percent) return;
+    const double factor = 0.01 * *percent / share[static_cast<size_t>(whole)];
+    share[static_cast<size_t>(whole)] *= factor;
+    if (transient != whole) share[static_cast<size_t>(transient)] *= factor;
+  };
+  state(stated.cavity_percent, cavity, cavity_transient);
+  state(stated.pump_percent, pump, pump_transient);
+  state(stated.volume_percent, volume, volume);
+}
+
+/// What its references say of the rig, and the problem with it.
+ReferenceSummary take_reference(const rig::Reference& reference, rig::SessionProblem& problem) {
+  rig::use_reference(reference, problem);
+  ReferenceSummary summary;
+  summary.sessions = reference.sessions;
+  for (size_t s = 0; s < rig::signal_count; ++s) {
+    if (reference.rms[s] == 0.0) continue;
+    const auto signal = static_cast<rig::Signal>(s);
+    const double scale = signal == rig::Signal::volume ? 1.0 : 1e3;
+    summary.channels.push_back(
+        {std::string(rig::name_of(signal)), scale * reference.rms[s], reference.percent_of_range[s]});
+  }
+  const auto tolerances = static_cast<Eigen::Index>(problem.nuisances().size() - rig::basic_nuisances);
+  summary.departures = departures(
+      problem, problem.tolerances(
+                   Eigen::VectorXd::Zero(tolerances + static_cast<Eigen::Index>(rig::basic_nuisances))));
+  return summary;
 }
 
 }  // namespace
@@ -131,12 +193,15 @@ Explanation explain_rig(const Study& study, const ExplainOptions& options) {
   const auto begun = std::chrono::steady_clock::now();
   options.report("reading the runs");
   const rig::Session session = rig::read_session(study);
+  require_known_tolerances(session);
   rig::SpecimenFamily family(study);
   family.compute_ahead();
   rig::SessionProblem problem(session, family, options.threads);
   const auto report = [&](std::string_view what) { options.report(std::string(what)); };
+  state_error(study.model_error, problem.error().prior.share);
+  std::optional<ReferenceSummary> reference;
   if (!study.data.reference.empty())
-    rig::use_reference(reference_of(study, options.threads, report), problem);
+    reference = take_reference(reference_of(study, options.threads, report), problem);
   SetSearchOptions searching{.progress = report};
   take_given(study, session, searching);
   const SetSearch search = search_sets(problem, searching);
@@ -161,6 +226,12 @@ Explanation explain_rig(const Study& study, const ExplainOptions& options) {
   out.verdict = verdict.verdict;
   out.confidence = verdict.confidence;
   out.model_error = model_error_of(problem, chosen, from_reference);
+  out.reference = reference;
+  out.departures = departures(problem, problem.tolerances(chosen.model.u));
+  for (const rig::CycleScatter& scatter : verdict.scatter)
+    out.cycle_scatter.push_back(
+        {std::string(rig::name_of(scatter.signal)), 1e3 * scatter.rms_kPa, 1e3 * scatter.noise_kPa,
+         100.0 * scatter.rms_kPa / problem.error().range[static_cast<size_t>(scatter.signal)]});
   out.hints = verdict.hints;
   out.searches = verdict.searches;
   out.converged = is_settled(out.searches);

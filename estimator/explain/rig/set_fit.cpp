@@ -235,7 +235,7 @@ double log_prior(const rig::SessionProblem& problem, const SetProblem& set, cons
 EffectSet search(const rig::SessionProblem& problem, SetProblem& set, const rig::LinearisedModel& known,
                  const rig::Shares& shares, double best_so_far) {
   constexpr double out_of_reach = 50.0;  // nats: rounds after the first bring some
-  constexpr int most_rounds = 4;
+  constexpr int most_rounds = 6;
   constexpr double rested = 0.5;  // nats
   constexpr double nearly_nothing = 1e-6;
   EffectSet out;
@@ -266,7 +266,12 @@ EffectSet search(const rig::SessionProblem& problem, SetProblem& set, const rig:
     set.take(found);
     const double before = out.evidence.log_evidence;
     out.evidence = judged(out.evidence.shares);
-    if (std::abs(out.evidence.log_evidence - before) < rested) break;
+    if (std::abs(out.evidence.log_evidence - before) < rested) {
+      // Forty steps that together bring less than decides anything: it has arrived.
+      if (round > 0 && found.termination == inference::Termination::iteration_limit)
+        out.termination = inference::Termination::converged;
+      break;
+    }
     if (out.evidence.log_evidence + log_prior(problem, set, set.model(q)) < best_so_far - out_of_reach) break;
   }
   out.model = set.model(q);

@@ -1,6 +1,7 @@
 #include "estimator/explain/rig/set_verdict.hpp"
 
 #include <algorithm>
+#include <boost/math/distributions/chi_squared.hpp>
 #include <boost/math/distributions/normal.hpp>
 #include <cmath>
 #include <map>
@@ -13,8 +14,6 @@ using Eigen::VectorXd;
 using Ids = std::vector<std::string>;
 
 constexpr double name_probability = 0.9;
-/// Of the stated error, that any model has at least: 0.1 % of the cavity's range is the class of the best transducers.
-constexpr double best_model = 0.2;
 constexpr double least_probability = 0.05;  ///< of a set that is told of
 /// How seldom any part of a model's error may be as large by chance: two sds of one.
 constexpr double surprising_by_chance = 0.0228;
@@ -65,10 +64,7 @@ Sizes sizes_of(const rig::SessionProblem& problem, const EffectSet& set, const E
   const VectorXd weight = set.evidence.variance.cwiseInverse();
   Eigen::MatrixXd normal = basic.transpose() * weight.asDiagonal() * basic;
   normal.diagonal().array() += 1e-6;  // a channel that is not there has no offset
-  rig::Shares shares = set.evidence.shares;
-  for (size_t g = 0; g < shares.size(); ++g)
-    shares[g] = std::max(shares[g], best_model * rig::SharePrior{}.share[g]);
-  const auto error = mean_squares(problem, error_squares(problem.error(), shares));
+  const auto error = mean_squares(problem, error_squares(problem.error(), set.evidence.shares));
   for (Index i = 1; i < shown.cols(); ++i) {
     const VectorXd change = shown.col(0) - shown.col(i);
     const VectorXd left =
@@ -104,6 +100,41 @@ size_t parts_of(const rig::ModelError& error) {
   return static_cast<size_t>(std::ranges::count(present, true));
 }
 
+/// Do equal cycles differ by more than the noise, and materially?
+bool is_irregular(const rig::SessionProblem& problem, const std::vector<rig::CycleScatter>& scatter) {
+  return std::ranges::any_of(scatter, [&](const rig::CycleScatter& channel) {
+    const auto group = channel.signal == rig::Signal::pump ? rig::ErrorGroup::pump : rig::ErrorGroup::cavity;
+    const double least_kPa = rig::SharePrior::least[static_cast<size_t>(group)] *
+                             problem.error().range[static_cast<size_t>(channel.signal)];
+    return channel.rms_kPa > std::max(least_kPa, channel.noise_kPa);
+  });
+}
+
+/// Are the parts of the rig in all further from what is declared or was learnt of them than is likely? Those that are known to
+/// an order of magnitude only, by no data sheet, may be anywhere.
+bool is_strained_in_all(const rig::SessionProblem& problem, const EffectSet& set) {
+  constexpr double guess = 0.5;  // sd of a logarithm
+  const Index count = set.model.u.size() - static_cast<Index>(rig::basic_nuisances);
+  std::vector<Index> known;
+  for (Index i = 0; i < count; ++i) {
+    const rig::Nuisance& part = problem.nuisances()[static_cast<size_t>(i) + rig::basic_nuisances];
+    if (part.unit != "ln" || part.sd < guess) known.push_back(i);
+  }
+  const VectorXd none = VectorXd::Zero(set.model.u.size());
+  const VectorXd moved = problem.tolerances(set.model.u) - problem.tolerances(none);
+  Eigen::MatrixXd root(count, count);
+  for (Index i = 0; i < count; ++i) {
+    VectorXd unit = none;
+    unit[i + static_cast<Index>(rig::basic_nuisances)] = 1.0;
+    root.col(i) = problem.tolerances(unit) - problem.tolerances(none);
+  }
+  const Eigen::MatrixXd covariance = (root * root.transpose())(known, known);
+  const VectorXd of_known = moved(known);
+  const double square = of_known.dot(covariance.llt().solve(of_known));
+  return square > boost::math::quantile(boost::math::complement(
+                      boost::math::chi_squared(static_cast<double>(known.size())), surprising_by_chance));
+}
+
 /// From how many sds on the largest of so many shares is a surprise: each of them may be by chance.
 double least_surprise(size_t parts) {
   return boost::math::quantile(
@@ -115,6 +146,11 @@ double least_surprise(size_t parts) {
 double error_rms(const rig::SessionProblem& problem, const rig::Shares& shares, rig::Signal signal) {
   return std::sqrt(
       mean_squares(problem, error_squares(problem.error(), shares))[static_cast<size_t>(signal)]);
+}
+
+double largest_tolerance(const EffectSet& set) {
+  const Index count = set.model.u.size() - static_cast<Index>(rig::basic_nuisances);
+  return count > 0 ? set.model.u.tail(count).cwiseAbs().maxCoeff() : 0.0;
 }
 
 SetVerdict judge_sets(const rig::SessionProblem& problem, const SetSearch& search,
@@ -170,7 +206,12 @@ SetVerdict judge_sets(const rig::SessionProblem& problem, const SetSearch& searc
   const double most_surprise = least_surprise(is_more ? parts_of(problem.error()) : 1);
   const bool surprising =
       std::ranges::any_of(surprise, [&](double sigmas) { return sigmas > most_surprise; });
-  if (surprising || !is_settled(out.searches)) {
+  // Each tolerance to either side; a name bears one that is far off if they are not in all.
+  const size_t tolerances = 2 * (problem.nuisances().size() - rig::basic_nuisances);
+  const bool strained =
+      is_more ? is_strained_in_all(problem, best) : largest_tolerance(best) > least_surprise(tolerances);
+  out.scatter = rig::cycle_scatter(problem, best.model);
+  if (surprising || strained || is_irregular(problem, out.scatter) || !is_settled(out.searches)) {
     out.verdict = Verdict::unexplained;
     return out;
   }

@@ -9,6 +9,7 @@
 
 #include "estimator/explain/rig/effect_sets.hpp"
 #include "estimator/explain/verdict/explanation.hpp"
+#include "estimator/rig_fit/cycle_scatter.hpp"
 
 namespace diastole::explain {
 
@@ -27,8 +28,12 @@ struct SetVerdict {
   std::vector<bool> material;           ///< which of them count
   std::vector<std::vector<std::string>> ambiguous_with;
   std::vector<Hint> hints;
+  std::vector<rig::CycleScatter> scatter = {};
   std::vector<SearchEnd> searches;
 };
+
+/// Of a set's tolerances the one furthest from its prior, in sds.
+double largest_tolerance(const EffectSet& set);
 
 SetVerdict judge_sets(const rig::SessionProblem& problem, const SetSearch& search,
                       const ErrorKnowledge& error);

@@ -10,10 +10,6 @@ double chi_square_tail(double value, double dofs) {
   return boost::math::gamma_q(0.5 * dofs, 0.5 * value);
 }
 
-double chi_square_exceeded(double probability, double dofs) {
-  return 2.0 * boost::math::gamma_q_inv(0.5 * dofs, probability);
-}
-
 double discovery_limit(std::vector<double> p_values, double rate) {
   std::sort(p_values.begin(), p_values.end());
   for (size_t k = p_values.size(); k > 0; --k) {

@@ -1,16 +1,12 @@
 #pragma once
 // Tails of the chi-square and normal laws, and which of many tests are beyond chance.
 
-#include <cstddef>
 #include <vector>
 
 namespace diastole::explain {
 
 /// Probability that a chi-square of `dofs` (> 0, need not be whole) exceeds `value`.
 double chi_square_tail(double value, double dofs);
-
-/// What a chi-square of `dofs` exceeds with `probability`.
-double chi_square_exceeded(double probability, double dofs);
 
 /// Benjamini and Hochberg, J. R. Stat. Soc. B 57 (1995) 289: the largest p-value at which the expected part of false
 /// discoveries is at most `rate`; 0 if there is none.

@@ -48,10 +48,28 @@ struct Hint {
   double probability = 0.0;
 };
 
-/// A part of the model's error: "cavity", "cavity_transient" (what sets in or drifts), "pump", "pump_transient", "volume".
+/// A part of the model's error: "cavity", "cavity_transient" (what sets in or drifts), "pump", "pump_transient", "volume";
+/// and "tolerances": the part of the rig that the fit takes to be furthest from what it may be.
 struct ErrorPart {
   std::string part;
   double beyond_expected_sd = 0.0;  ///< how much larger than expected, in sds of what is known of it
+};
+
+/// A part of the rig or the specimen that the fit takes to be other than declared, within what such parts may be.
+struct Departure {
+  std::string part;     ///< "hose_wave_speed"
+  double offset = 0.0;  ///< from what is declared
+  std::string unit;     ///< "ln": of the logarithm of a factor
+  double sds = 0.0;     ///< over the sd of such parts
+};
+
+/// How much more equal cycles differ from each other than by the noise and a common factor: what no model of repeated
+/// motion explains.
+struct CycleScatter {
+  std::string channel;  ///< "cavity_kPa"
+  double rms_Pa = 0.0;
+  double noise_Pa = 0.0;  ///< in the same band
+  double percent_of_range = 0.0;
 };
 
 /// What the model gets wrong by itself, in the cavity's pressure.
@@ -60,6 +78,18 @@ struct ModelErrorSize {
   double rms_Pa = 0.0;
   double percent_of_range = 0.0;
   std::vector<ErrorPart> parts = {};
+};
+
+/// What the rig's references leave by themselves, fitted with their own tolerances.
+struct ReferenceMisfit {
+  std::string channel;  ///< "cavity_kPa"
+  double rms = 0.0;     ///< Pa; mL of volumes
+  double percent_of_range = 0.0;
+};
+struct ReferenceSummary {
+  size_t sessions = 0;
+  std::vector<ReferenceMisfit> channels;
+  std::vector<Departure> departures;  ///< of one sd and more, the largest first
 };
 
 /// A place in the data where the base model fails beyond the noise, after correction for how many were looked at.
@@ -152,6 +182,9 @@ struct Explanation {
   Verdict verdict = Verdict::none;
   std::optional<double> confidence;  ///< that the verdict is right
   std::optional<ModelErrorSize> model_error;
+  std::optional<ReferenceSummary> reference;
+  std::vector<Departure> departures;        ///< of one sd and more, the largest first
+  std::vector<CycleScatter> cycle_scatter;  ///< of each sensor
   std::vector<Hint> hints;
   std::vector<FoundEffect> effects;
   std::vector<std::vector<std::string>> ambiguous_with;

@@ -25,6 +25,13 @@ DIASTOLE_MEMBERS(Hint, id, size_over_model_error, probability)
 DIASTOLE_MEMBERS(ErrorPart, part, beyond_expected_sd)
 DIASTOLE_MEMBERS(ModelErrorSize, source, rms_Pa, percent_of_range, parts)
 
+DIASTOLE_MEMBERS(Departure, part, offset, unit, sds)
+
+DIASTOLE_MEMBERS(CycleScatter, channel, rms_Pa, noise_Pa, percent_of_range)
+
+DIASTOLE_MEMBERS(ReferenceMisfit, channel, rms, percent_of_range)
+DIASTOLE_MEMBERS(ReferenceSummary, sessions, channels, departures)
+
 DIASTOLE_MEMBERS(Misfit, port, run, channel, segment, phase, band_Hz, region, excess_chi2, p_value)
 
 DIASTOLE_MEMBERS(Gap, before, after, floor, closed, held_out)
@@ -43,9 +50,9 @@ DIASTOLE_MEMBERS(NextExperiment, toml, separates, predicted_separation_sigma, re
 
 DIASTOLE_MEMBERS(SearchEnd, effects, termination)
 
-DIASTOLE_MEMBERS(Explanation, study, verdict, confidence, model_error, hints, summary, converged, searches,
-                 effects, ambiguous_with, where, gap, next_experiment, study_after, evidence, shifts, steps,
-                 traces, field, seconds)
+DIASTOLE_MEMBERS(Explanation, study, verdict, confidence, model_error, reference, departures, cycle_scatter,
+                 hints, summary, converged, searches, effects, ambiguous_with, where, gap, next_experiment,
+                 study_after, evidence, shifts, steps, traces, field, seconds)
 
 }  // namespace explain
 

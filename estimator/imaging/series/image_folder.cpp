@@ -88,6 +88,20 @@ bool is_signed_about_zero(const Image& image) {
   return low < 0 && high > 0 && std::abs(low + high) < one_sided * (high - low);
 }
 
+/// Whether the phases of a slice differ by no more than noise: motion makes phases that are far apart differ by more than neighbours do.
+bool is_still(const std::vector<Image>& phases) {
+  constexpr float excess =
+      1.2F;  // of a mean square over thousands of pixels, whose own spread is a few hundredths
+  if (phases.size() < 3) return false;
+  const auto square = [&](size_t a, size_t b) { return (phases[a] - phases[b]).square().mean(); };
+  float neighbours = 0, most = 0;
+  for (size_t k = 1; k < phases.size(); ++k) {
+    neighbours += square(k, k - 1) / static_cast<float>(phases.size() - 1);
+    most = std::max(most, square(k, 0));
+  }
+  return most <= excess * neighbours;
+}
+
 /// Images of one series that may be one stack: what they are (magnitude or phase) and how they lie.
 struct Stack {
   std::string uid;
@@ -105,6 +119,7 @@ class Sorter {
       add_series(stack);
     std::stable_sort(folder_.series.begin(), folder_.series.end(),
                      [](const ImageSeries& a, const ImageSeries& b) { return a.number < b.number; });
+    check_worth();
   }
 
  private:
@@ -343,6 +358,19 @@ class Sorter {
       complain(Severity::warning, "tags-not-seen",
                "the header says tagged (0018,9028), the image shows no tags", middle.images.front(), 1, "",
                "Look at the first phase: were the tags switched on?");
+  }
+
+  /// A folder in which nothing is encoded and nothing moves holds nothing to measure.
+  void check_worth() {
+    if (folder_.series.empty()) return;
+    for (const ImageSeries& series : folder_.series) {
+      const SliceImages& middle = series.slices[series.slices.size() / 2];
+      if (series.kind != SeriesKind::cine || !is_still(folder_.pixels(middle.images))) return;
+    }
+    complain(Severity::error, "nothing-to-measure",
+             "no tags: the spectra hold no lines of them, and nothing moves from phase to phase either",
+             folder_.series[0].slices[0].images[0], static_cast<double>(folder_.series.size()), "series",
+             "Export the tagged series. Were the tags switched on, and was the pump running?");
   }
 
   ImageFolder& folder_;

@@ -12,6 +12,9 @@
 namespace diastole::imaging {
 namespace {
 
+/// Of the largest piece of tissue (remove_specks).
+constexpr double least_share = 0.1;
+
 constexpr double pi = std::numbers::pi;
 
 /// Water that is stirred loses its tags within a phase or two, tissue keeps them for its T1 of 0.3 to 1.5 s, still water for 2 s and more.
@@ -378,9 +381,13 @@ void remove_specks(MaterialMap& map, const SlicePlane& plane, double least_mm2) 
     return static_cast<double>(piece.size()) * pixel_mm2 < least_mm2;
   };
   const auto is_tissue = [](Material here) { return here == Material::tissue; };
+  size_t largest = 0;
+  each_piece(map, is_tissue,
+             [&](const std::vector<Eigen::Index>& piece) { largest = std::max(largest, piece.size()); });
   std::vector<Eigen::Index> specks, holes;
   each_piece(map, is_tissue, [&](const std::vector<Eigen::Index>& piece) {
-    if (is_small(piece)) specks.insert(specks.end(), piece.begin(), piece.end());
+    if (is_small(piece) || static_cast<double>(piece.size()) < least_share * static_cast<double>(largest))
+      specks.insert(specks.end(), piece.begin(), piece.end());
   });
   for (const Eigen::Index at : specks)
     map(at) = Material::nothing;

@@ -33,7 +33,8 @@ MaterialMap refined_materials(const Image& image, const TagView& view, const Mat
 /// not of it; negative outside. The image's border is no edge of it.
 Eigen::ArrayXXf depth_mm(const MaterialMap& map, Material material, const SlicePlane& plane);
 
-/// Pieces of tissue smaller than this, and holes in it, are noise.
+/// Pieces of tissue smaller than this or than a tenth of the largest, and holes in it, are noise: a wall is one piece, or two of a like
+/// size where a slice cuts it along its axis.
 void remove_specks(MaterialMap& map, const SlicePlane& plane, double least_mm2);
 
 }  // namespace diastole::imaging

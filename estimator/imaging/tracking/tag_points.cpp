@@ -16,6 +16,19 @@ constexpr double most_excess = 3.0;
 /// What the residual still wants to move a circle's line by: five standard deviations of it, and a tenth of the spacing.
 constexpr double most_pull_in_sigmas = 5.0;
 constexpr double most_pull_in_spacings = 0.1;
+/// Huber's limit for a point's own pixels, in standard deviations, as in the fit of the motion.
+constexpr double huber = 3.0;
+/// The pixels around a point see its tag within half a spacing of where it was followed, or they see another.
+constexpr double most_own_in_spacings = 0.5;
+
+/// A place on a tracked line.
+struct Place {
+  int tag;
+  double d_mm;  // of its tag
+  Eigen::Vector2d x_mm;
+  double information = 0;  // of w, from the pixels nearest to this place, 1/mm^2
+  double gradient = 0;     // of the log likelihood there, 1/mm
+};
 
 struct Surroundings {
   double pixels = 0;
@@ -80,6 +93,7 @@ class Emitter {
     }
     const double step_mm = 0.5 * view_.plane.finer_spacing_mm();
     const double edge_mm = edge_in_pixels * view_.plane.finer_spacing_mm();
+    places_.clear();
     const int first = static_cast<int>(std::floor(low.x() / spacing_mm - wave.offset_cycles)) - 1;
     const int last = static_cast<int>(std::ceil(high.x() / spacing_mm - wave.offset_cycles)) + 1;
     for (int number = first; number <= last; ++number) {
@@ -92,25 +106,77 @@ class Emitter {
         if (x && depth_at(k, *x) >= edge_mm) {
           piece.push_back(*x);
         } else {
-          emit_piece(k, f, d_mm, piece, step_mm);
+          choose_places(f, number, piece, step_mm);
           piece.clear();
         }
       }
-      emit_piece(k, f, d_mm, piece, step_mm);
+      choose_places(f, number, piece, step_mm);
     }
+    share_pixels(k, f);
+    for (const Place& place : places_)
+      emit_point(k, f, place);
   }
 
-  void emit_piece(size_t k, size_t f, double d_mm, const std::vector<Eigen::Vector2d>& piece,
-                  double step_mm) {
+  void choose_places(size_t f, int number, const std::vector<Eigen::Vector2d>& piece, double step_mm) {
     if (piece.empty()) return;
+    const double d_mm = (number + tracked_.waves[f].offset_cycles) * tracked_.waves[f].spacing_mm();
     const double length_mm = static_cast<double>(piece.size()) * step_mm;
     const auto count =
         static_cast<size_t>(std::ceil(length_mm / (apart_in_spacings * tracked_.waves[f].spacing_mm())));
     for (size_t i = 0; i < count; ++i)
-      emit_point(k, f, d_mm, piece[(2 * i + 1) * piece.size() / (2 * count)]);
+      places_.push_back({number, d_mm, piece[(2 * i + 1) * piece.size() / (2 * count)]});
   }
 
-  void emit_point(size_t k, size_t f, double d_mm, const Eigen::Vector2d& x_mm) {
+  /// Gives each pixel that was fitted to the nearest place within a spacing: no pixel counts twice.
+  void share_pixels(size_t k, size_t f) {
+    const TrackedPhase& phase = tracked_.phases[k];
+    const double reach_mm = tracked_.waves[f].spacing_mm();
+    Eigen::ArrayXXd nearest_mm = Eigen::ArrayXXd::Constant(view_.plane.rows, view_.plane.columns, reach_mm);
+    Eigen::ArrayXXi owner = Eigen::ArrayXXi::Constant(view_.plane.rows, view_.plane.columns, -1);
+    for (size_t i = 0; i < places_.size(); ++i) {
+      each_pixel_near(places_[i].x_mm, reach_mm, [&](Eigen::Index row, Eigen::Index column, double apart_mm) {
+        if (apart_mm >= nearest_mm(row, column)) return;
+        nearest_mm(row, column) = apart_mm;
+        owner(row, column) = static_cast<int>(i);
+      });
+    }
+    for (Eigen::Index column = 0; column < owner.cols(); ++column) {
+      for (Eigen::Index row = 0; row < owner.rows(); ++row) {
+        const double slope = static_cast<double>(phase.slope[f](row, column));
+        if (owner(row, column) < 0 || slope == 0) continue;
+        const double residual = static_cast<double>(phase.residual(row, column));
+        const double weight = std::min(1.0, huber * phase.noise / std::max(std::abs(residual), 1e-300)) /
+                              (phase.noise * phase.noise * tracked_.noise_factor[f]);
+        Place& place = places_[static_cast<size_t>(owner(row, column))];
+        place.information += weight * slope * slope;
+        place.gradient += weight * slope * residual;
+      }
+    }
+  }
+
+  /// `visit(row, column, distance)` for every pixel within a distance.
+  template <class Visit>
+  void each_pixel_near(const Eigen::Vector2d& x_mm, double reach_mm, const Visit& visit) const {
+    const SlicePlane& plane = view_.plane;
+    const auto from = [&](double at_mm, double spacing_mm) {
+      return std::max<Eigen::Index>(0, static_cast<Eigen::Index>(std::ceil((at_mm - reach_mm) / spacing_mm)));
+    };
+    const auto to = [&](double at_mm, double spacing_mm, int count) {
+      return std::min<Eigen::Index>(count - 1,
+                                    static_cast<Eigen::Index>(std::floor((at_mm + reach_mm) / spacing_mm)));
+    };
+    for (Eigen::Index column = from(x_mm.x(), plane.column_spacing_mm);
+         column <= to(x_mm.x(), plane.column_spacing_mm, plane.columns); ++column) {
+      for (Eigen::Index row = from(x_mm.y(), plane.row_spacing_mm);
+           row <= to(x_mm.y(), plane.row_spacing_mm, plane.rows); ++row) {
+        const double apart_mm = (view_.place_mm(row, column) - x_mm).norm();
+        if (apart_mm <= reach_mm) visit(row, column, apart_mm);
+      }
+    }
+  }
+
+  void emit_point(size_t k, size_t f, const Place& place) {
+    const Eigen::Vector2d& x_mm = place.x_mm;
     const TagWave& wave = tracked_.waves[f];
     const double spacing_mm = wave.spacing_mm();
     const Eigen::Vector2d normal = wave.per_mm.normalized();
@@ -121,49 +187,47 @@ class Emitter {
         1 + (motion.value_mm(k, x_mm + h * normal) - motion.value_mm(k, x_mm - h * normal)) / (2 * h);
     const double sigma_mm = motion.sigma_mm(k, x_mm) / std::max(change, 0.2);
     const Surroundings around = surroundings(k, f, x_mm);
-    const auto drop = [&](const char* reason) { ++points_.dropped[reason]; };
+    const auto drop = [&](const char* reason) {
+      ++points_.dropped[reason];
+      points_.rejected.push_back({view_.frames[k], static_cast<int>(f), x_mm, reason});
+    };
     if (!(sigma_mm <= most_sigma_in_spacings * spacing_mm))
       return drop("uncertain: faded, or too little of it is seen");
     if (around.excess > most_excess) return drop("another picture lies over it: a ghost, a fold or an edge");
     if (std::abs(around.pull_mm) >
         std::max(most_pull_in_sigmas * around.pull_sigma_mm, most_pull_in_spacings * spacing_mm))
       return drop("the image is not where the line is: a jump, or motion too sharp");
+    const double own_mm = -place.gradient / std::max(place.information, 1e-300) / std::max(change, 0.2);
+    if (!(std::abs(own_mm) < most_own_in_spacings * spacing_mm))
+      return drop("the image is not where the line is: a jump, or motion too sharp");
     TagPoint point;
     point.frame = view_.frames[k];
+    point.direction = static_cast<int>(f);
+    point.tag = place.tag;
     point.normal = normal.x() * view_.plane.along_row + normal.y() * view_.plane.along_column;
-    point.plane_mm = d_mm + point.normal.dot(view_.plane.origin_mm);
+    point.plane_mm = place.d_mm + point.normal.dot(view_.plane.origin_mm);
     point.x_mm = view_.plane.at(x_mm);
     point.sigma_mm = sigma_mm;
+    // Pixels that say nothing leave the tag anywhere in its spacing.
+    point.own_mm = place.information > 0 ? own_mm : 0.0;
+    point.own_sigma_mm =
+        std::min(spacing_mm, 1.0 / std::sqrt(std::max(place.information, 1e-300)) / std::max(change, 0.2));
     points_.points.push_back(point);
   }
 
   Surroundings surroundings(size_t k, size_t f, const Eigen::Vector2d& x_mm) const {
     const TrackedPhase& phase = tracked_.phases[k];
-    const double radius_mm = tracked_.waves[f].spacing_mm();
-    const SlicePlane& plane = view_.plane;
-    const auto from = [&](double at_mm, double spacing_mm) {
-      return std::max<Eigen::Index>(0,
-                                    static_cast<Eigen::Index>(std::ceil((at_mm - radius_mm) / spacing_mm)));
-    };
-    const auto to = [&](double at_mm, double spacing_mm, int count) {
-      return std::min<Eigen::Index>(count - 1,
-                                    static_cast<Eigen::Index>(std::floor((at_mm + radius_mm) / spacing_mm)));
-    };
     double squares = 0, slopes = 0, products = 0;
     Surroundings around;
-    for (Eigen::Index c = from(x_mm.x(), plane.column_spacing_mm);
-         c <= to(x_mm.x(), plane.column_spacing_mm, plane.columns); ++c) {
-      for (Eigen::Index r = from(x_mm.y(), plane.row_spacing_mm);
-           r <= to(x_mm.y(), plane.row_spacing_mm, plane.rows); ++r) {
-        const double slope = static_cast<double>(phase.slope[f](r, c));
-        const double residual = static_cast<double>(phase.residual(r, c));
-        if (slope == 0 || (view_.place_mm(r, c) - x_mm).norm() > radius_mm) continue;
-        around.pixels += 1;
-        squares += residual * residual;
-        slopes += slope * slope;
-        products += slope * residual;
-      }
-    }
+    each_pixel_near(x_mm, tracked_.waves[f].spacing_mm(), [&](Eigen::Index row, Eigen::Index column, double) {
+      const double slope = static_cast<double>(phase.slope[f](row, column));
+      const double residual = static_cast<double>(phase.residual(row, column));
+      if (slope == 0) return;
+      around.pixels += 1;
+      squares += residual * residual;
+      slopes += slope * slope;
+      products += slope * residual;
+    });
     if (around.pixels > 0) around.excess = squares / (around.pixels * phase.noise * phase.noise);
     if (slopes > 0) {
       around.pull_mm = products / slopes;
@@ -175,6 +239,7 @@ class Emitter {
   const TagView& view_;
   const TrackedView& tracked_;
   TagPoints points_;
+  std::vector<Place> places_;  // of the phase and direction at hand
 };
 
 }  // namespace

@@ -19,6 +19,7 @@ struct TrackedSlice {
 /// are none.
 std::vector<TagView> tag_views(const ImageFolder& folder);
 
+/// Of `tracked` the motion stays, and of each phase its noise and the tissue's depth; other maps, and covariances, are let go.
 /// Tracks all of them on `threads` threads. A slice in which nothing can be tracked is left out and reported in `problems`.
 std::vector<TrackedSlice> track_views(std::vector<TagView> views, size_t threads,
                                       std::vector<Finding>& problems);

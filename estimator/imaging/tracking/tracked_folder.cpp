@@ -87,6 +87,7 @@ TrackedFolder track_folder(const TrackRequest& request, const Stage& stage) {
   const ImageFolder folder = read_image_folder(request.folder);
   require_sound(folder);
   TrackedFolder tracked;
+  tracked.folder = request.folder;
   tracked.problems = folder.problems;
   std::vector<TagView> views = tag_views(folder);
   say(fmt::format("tracking {} slices", views.size()));

@@ -22,6 +22,7 @@ struct TrackRequest {
 };
 
 struct TrackedFolder {
+  std::filesystem::path folder;
   std::vector<TrackedSlice> slices;
   std::vector<TagPoint> points;  ///< in the specimen's coordinates if there is a pose, else the patient's
   std::map<std::string, size_t> dropped;

@@ -12,7 +12,6 @@
 #include <optional>
 #include <queue>
 #include <span>
-#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -24,10 +23,6 @@
 namespace diastole::firmware {
 
 enum class Signal : std::uint8_t { STEP, DIR, ENABLE, TTL, RWAVE_uV, FAULT };
-inline std::string_view signal_name(Signal signal) {
-  static constexpr std::string_view kNames[] = {"STEP", "DIR", "ENABLE", "TTL", "RWAVE_uV", "FAULT"};
-  return kNames[static_cast<std::size_t>(signal)];
-}
 
 /// One change of one pin; a pin trace file (contract: `time_ns,signal,value`) is a list of these.
 struct Edge {

@@ -7,7 +7,6 @@
 #include <string>
 #include <vector>
 
-#include "protocol/contract/input_error.hpp"
 #include "tests/estimator/cli/run_command.hpp"
 #include "tests/estimator/io/scratch_file.hpp"
 

@@ -1,8 +1,8 @@
 #include "tests/estimator/explain/simulated_tags.hpp"
 
 #include <cmath>
-#include <memory>
 #include <numbers>
+#include <optional>
 #include <random>
 #include <stdexcept>
 

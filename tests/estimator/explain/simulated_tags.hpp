@@ -5,7 +5,6 @@
 // uses, in every frame.
 
 #include <array>
-#include <optional>
 
 #include "estimator/explain/imaging/field_fit.hpp"
 

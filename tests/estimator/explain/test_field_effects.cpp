@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "estimator/explain/imaging/explain_field.hpp"
 #include "tests/estimator/explain/simulated_field.hpp"
 
 namespace diastole::explain {

@@ -2,8 +2,6 @@
 
 #include <gmock/gmock.h>
 
-#include <filesystem>
-
 #include "estimator/explain/rig/explain_rig.hpp"
 #include "tests/recorded_data.hpp"
 

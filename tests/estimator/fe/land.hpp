@@ -3,8 +3,6 @@
 
 #include <gtest/gtest.h>
 
-#include <utility>
-
 #include "tools/figures/land_problems.hpp"
 
 namespace diastole {

@@ -2,8 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <cmath>
-
 #include "estimator/fe/kept_factor.hpp"
 
 namespace diastole {

@@ -3,8 +3,6 @@
 
 #include <gtest/gtest.h>
 
-#include <cmath>
-
 #include "estimator/fe/pressure_volume.hpp"
 #include "tests/estimator/fe/gel.hpp"
 #include "tools/figures/sphere.hpp"

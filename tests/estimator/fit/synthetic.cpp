@@ -1,6 +1,7 @@
 #include "tests/estimator/fit/synthetic.hpp"
 
 #include <cmath>
+#include <random>
 
 #include "estimator/fit/elastic_motion.hpp"
 #include "estimator/mesh/annulus.hpp"

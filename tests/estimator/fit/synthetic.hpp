@@ -1,8 +1,6 @@
 #pragma once
 // Measurements that the model itself predicts, with seeded normal noise: what the fit must give back.
 
-#include <random>
-#include <span>
 #include <vector>
 
 #include "estimator/fe/elastic_model.hpp"

@@ -111,19 +111,6 @@ TEST_F(CoarseFit, AnOffsetOfThePressuresIsSoughtAndCostsPrecision) {
   EXPECT_FALSE(without.pressure_offset);
 }
 
-TEST_F(CoarseFit, ThePapersSearchComesToTheSameValue) {
-  FitOptions paper;
-  paper.paper_mode = true;
-  paper.robustness = Robustness::never;
-  const FitOutcome slow = fit(paper, {6.0, 1.0, 15.0}, 0.3, 150, 0),
-                   quick = fit({}, {6.0, 1.0, 15.0}, 0.3, 150, 0);
-  EXPECT_TRUE(slow.converged()) << slow.reason;
-  EXPECT_NEAR(slow.values[0].value / quick.values[0].value, 1, 2e-3);
-  EXPECT_GT(slow.iterations, 1);
-  EXPECT_EQ(slow.history.size(), static_cast<size_t>(slow.iterations));
-  EXPECT_GT(slow.forward_solves, quick.forward_solves);
-}
-
 TEST_F(CoarseFit, AnInterruptionKeepsTheBestSoFar) {
   FitOptions options;
   int asked = 0;
@@ -164,17 +151,6 @@ TEST_F(CoarseFit, AnInterruptionInsideAProfileLeavesTheFit) {
   EXPECT_TRUE(profiled.profiles.empty());
   EXPECT_LE(asked, last + 4);
   EXPECT_NEAR(profiled.values[0].value, searched.values[0].value, 1e-9);
-}
-
-TEST_F(CoarseFit, ThePapersSearchCanBeInterrupted) {
-  FitOptions paper;
-  paper.paper_mode = true;
-  paper.robustness = Robustness::never;
-  int asked = 0;
-  paper.search.interrupted = [&] { return ++asked > 1; };
-  const FitOutcome outcome = fit(paper, {2.0, 1.0, 15.0}, 0.3, 40, 0);
-  EXPECT_FALSE(outcome.converged());
-  EXPECT_THAT(outcome.reason, testing::HasSubstr("Stopped on request"));
 }
 
 }  // namespace

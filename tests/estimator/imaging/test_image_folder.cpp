@@ -1,7 +1,6 @@
 #include <gmock/gmock.h>
 
 #include <algorithm>
-#include <fstream>
 
 #include "estimator/imaging/series/image_folder.hpp"
 #include "estimator/imaging/series/views.hpp"
@@ -52,6 +51,19 @@ TEST(ImageFolder, NamesAMissingPhaseAndKeepsTheOthersNumbers) {
   EXPECT_THAT(folder.problems[0].what, HasSubstr("phase 4 of 8"));
   EXPECT_EQ(folder.series[0].phases.index_of(12.0 + 72 * 4), 4U);
   EXPECT_NO_THROW(require_sound(folder));
+}
+
+TEST(ImageFolder, RefusesAnExportWithoutTagsInWhichNothingMoves) {
+  const ScratchFolder still;
+  write_ring({.most_mm2 = 0, .tagged = false}, still.path());
+  EXPECT_THAT(test::message_of([&] { require_sound(read_image_folder(still.path())); }),
+              HasSubstr("no tags"));
+  // A cine of a moving wall shows its outline, and another series may hold what this one lacks.
+  const ScratchFolder moving;
+  write_ring({.tagged = false}, moving.path());
+  EXPECT_NO_THROW(require_sound(read_image_folder(moving.path())));
+  write_ring({.series = 3}, still.path(), "tagged");
+  EXPECT_NO_THROW(require_sound(read_image_folder(still.path())));
 }
 
 TEST(ImageFolder, RefusesWhatCannotBePutInOrder) {

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 
 #include "estimator/imaging/tracking/tags_file.hpp"
 #include "estimator/imaging/tracking/tracked_folder.hpp"

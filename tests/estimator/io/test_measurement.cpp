@@ -80,8 +80,23 @@ TEST_F(MeasurementFile, HeaderAndEmptinessAreChecked) {
               HasSubstr("The header must read: frame,nx"));
   EXPECT_THAT(message_of([&] { (void)tags("frame,nx,ny,nz,plane_mm,x_mm,y_mm,z_mm,sigma_mm,more\n"); }),
               HasSubstr("a column too many: \"more\""));
+  EXPECT_THAT(message_of([&] { (void)tags("frame,nx,ny,nz,plane_mm,x_mm,y_mm,z_mm,sigma_mm,own_mm\n"); }),
+              HasSubstr("\"\" where \"own_sigma_mm\" belongs"));
   EXPECT_THAT(message_of([&] { (void)read_tags(folder_.path() / "none.csv", 3); }),
               AllOf(HasSubstr("none.csv"), HasSubstr("cannot be opened")));
+}
+
+TEST_F(MeasurementFile, TrackedTagsAreReadAsTheirOwnPixelsHaveThem) {
+  const std::string header = "frame,nx,ny,nz,plane_mm,x_mm,y_mm,z_mm,sigma_mm,own_mm,own_sigma_mm\n";
+  bool as_seen = false;
+  const auto read =
+      read_tags(folder_.write("own.csv", header + "1,0,1,0,5,24,6,0,0.02,-0.25,0.125\n"), 3, &as_seen);
+  EXPECT_TRUE(as_seen);
+  EXPECT_EQ(read[0].x_mm, (std::array<double, 3>{24, 5.75, 0}));
+  EXPECT_EQ(read[0].sigma_mm, 0.125);
+  (void)read_tags(folder_.write("plain.csv", std::string(tags_header) + "1,0,1,0,5,24,6,0,0.02\n"), 3,
+                  &as_seen);
+  EXPECT_FALSE(as_seen);
 }
 
 TEST_F(MeasurementFile, FramesMustBeContiguousIncreasingAndPlausible) {

@@ -72,6 +72,21 @@ TEST(PointLocator, ExtrapolatesSlightlyOutsideTheWallOnly) {
                    .find({51.0, 0.0, 10.0}));
 }
 
+TEST(PointLocator, StaysInTheElementOfAGuessWhereItIsAsked) {
+  const HermiteMesh mesh = make_annulus({});
+  const PointLocator locator(mesh, mesh.reference(), {.outside_xi = 0.001});
+  const MaterialPoint inside = locator.find({40.0, 1.0, 10.0}).value().point;
+  // Beyond what `find` allows, and in a neighbour's place.
+  for (const Eigen::Vector3d& place_mm :
+       {Eigen::Vector3d(56.0, 1.0, 10.0), Eigen::Vector3d(28.0, 32.0, 10.0)}) {
+    const std::optional<LocatedPoint> beside = locator.find_beside(place_mm, inside);
+    ASSERT_TRUE(beside);
+    EXPECT_EQ(beside->point.element, inside.element);
+    EXPECT_GT(beside->overshoot_xi, 0.001);
+    EXPECT_TRUE(mesh.value(mesh.reference(), beside->point).isApprox(place_mm, 1e-9));
+  }
+}
+
 TEST(PointLocator, PrefersTheInsideAtAnElementBoundary) {
   const HermiteMesh mesh = make_annulus({});
   const PointLocator locator(mesh, mesh.reference());

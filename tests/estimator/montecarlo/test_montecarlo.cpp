@@ -3,7 +3,6 @@
 #include <gmock/gmock.h>
 
 #include <cmath>
-#include <set>
 
 #include "estimator/mesh/annulus.hpp"
 #include "estimator/montecarlo/synthetic_data.hpp"

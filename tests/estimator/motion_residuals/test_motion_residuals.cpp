@@ -2,8 +2,6 @@
 
 #include <gmock/gmock.h>
 
-#include <numbers>
-
 #include "estimator/mesh/annulus.hpp"
 #include "tests/estimator/motion_residuals/mapped_field.hpp"
 

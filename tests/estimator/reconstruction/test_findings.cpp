@@ -244,6 +244,17 @@ TEST_F(Findings, AFrameInOtherAxes) {
   EXPECT_THAT(named(in_motion(spoilt), "far-motion").where, HasSubstr("frame 2"));
 }
 
+TEST_F(Findings, OneSliceOfOneDirectionIsNoReasonToRefuse) {
+  // All that a turn out of the slice does to such tags is what a stretch does.
+  Measurement sparse = sound({.tags_a_frame = 6000, .sigma_mm = 0.05});
+  std::erase_if(sparse.tags, [](const TagPoint& tag) {
+    return tag.normal[2] != 0 || tag.normal[1] < 0 || std::abs(tag.x_mm[2] - 6.0) > 1.0;
+  });
+  ASSERT_GT(sparse.tags.size(), 5U * 100U);
+  const std::vector<Finding> found = examine_measurement(small_study(), sparse);
+  EXPECT_FALSE(has_error(found)) << words(found);
+}
+
 TEST_F(Findings, PressuresInAnotherUnit) {
   Measurement spoilt = sound();
   for (Frame& frame : spoilt.frames) {

@@ -3,8 +3,6 @@
 
 #include <gtest/gtest.h>
 
-#include <cmath>
-
 #include "estimator/fit/study_fit.hpp"
 #include "estimator/reconstruction/study_reconstruction.hpp"
 #include "tests/recorded_data.hpp"

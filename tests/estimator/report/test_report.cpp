@@ -35,7 +35,6 @@ FitRecord gel_fit() {
   fit.directions = {{0.05, {{"b1", 0.8}, {"b2", -0.6}}}, {0.01, {{"b1", 0.6}, {"b2", 0.8}}}};
   fit.robust = FittedRobust{4, 0.8, 700};
   fit.pressure_offset_kPa = FittedOffset{0.02, 0.01};
-  fit.search = "finite differences";
   fit.correlation = {{"C1_kPa", "pressure_kPa[1]"}, {{1.0, 0.32}, {0.32, 1.0}}};
   fit.rms_mm = 0.79436;
   fit.chi2 = 12816.3;

@@ -22,7 +22,6 @@ Hose lossless() {
 /// Drives the pump end with a flow, keeps the far end at zero pressure; `see(time, line)` after each settled step.
 template <class Flow, class See>
 void drive(HoseLine& line, double step_s, double end_s, const Flow& flow, const See& see) {
-  line.rest_at(0.0);
   for (double t = 0.0; t < end_s; t += step_s) {
     EndLoads loads;
     loads.piston_acceleration = (flow(t + step_s) - flow(t)) / step_s;
@@ -120,7 +119,6 @@ TEST(HoseLine, SwingsAgainstAGasAsInertanceAndCompliance) {
   hose.wave_speed_m_s = 3000.0;
   const double stiffness_kPa_per_mL = 20.0;
   HoseLine line(hose, {.step_s = 1.0 / 600.0, .components = 4, .pump_stiffness = stiffness_kPa_per_mL});
-  line.rest_at(0.0);
   int crossings = 0;
   double before = 0.0;
   const double squeezed_mL = 1.0;  // the piston is put here at once
@@ -144,7 +142,6 @@ double still_swinging_mL(const Hose& hose, size_t components) {
   constexpr double rate_Hz = 1200.0;
   HoseLine line(hose,
                 {.step_s = 1.0 / rate_Hz, .components = components, .pump_stiffness = stiffness_kPa_per_mL});
-  line.rest_at(0.0);
   double largest = 0.0;
   for (int k = 0; k < 12 * static_cast<int>(rate_Hz); ++k) {
     const double part = std::min(static_cast<double>(k) / (0.1 * rate_Hz), 1.0);

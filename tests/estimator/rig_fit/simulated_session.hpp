@@ -65,9 +65,10 @@ inline Motion varying(const Motion& motion, double cycle_sd, std::mt19937& gener
   return {std::move(strokes), motion.rest_mL(), motion.spread_s()};
 }
 
-inline Session simulated_session(const SpecimenFamily& family, const SessionOptions& options) {
+inline Session simulated_session(const SpecimenFamily& family, const SessionOptions& options,
+                                 const runfile::Segment& baseline = {0.0, "parabolic", 40.0, 1.2, 0.0, 4}) {
   Session session;
-  session.runs.push_back(empty_run("baseline", {0.0, "parabolic", 40.0, 1.2, 0.0, 4}, 0.0));
+  session.runs.push_back(empty_run("baseline", baseline, 0.0));
   session.runs.push_back(empty_run("sweep", {0.0, "sinusoidal", 20.0, 1.6, 0.0, 3}, 60.0));
   session.runs.push_back(empty_run("hold", {0.0, "hold", 30.0, 6.0, 0.0, 1}, 150.0));
   RigModel model = session.base;

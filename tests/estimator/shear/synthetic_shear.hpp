@@ -2,7 +2,6 @@
 // A shear test of the paper's design: gel annulus 16 mm inner and 38 mm outer diameter, 24 mm high, 4 loads, 15
 // markers, C1 = 8.71 kPa, normal noise of one standard deviation in every rotation.
 
-#include <cmath>
 #include <numbers>
 #include <random>
 

@@ -3,7 +3,6 @@
 #include <gmock/gmock.h>
 
 #include <cmath>
-#include <set>
 
 #include "estimator/io/solution_file.hpp"
 #include "estimator/mesh/block.hpp"

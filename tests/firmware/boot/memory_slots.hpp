@@ -2,7 +2,6 @@
 // Slots and records in this machine's memory, with the flash's manners: ones become zeros, an erase makes all
 // ones, and the power can fail in the middle of any operation, which then is half done.
 
-#include <functional>
 #include <random>
 #include <vector>
 

@@ -5,7 +5,6 @@
 #include <deque>
 #include <functional>
 #include <memory>
-#include <vector>
 
 #include "firmware/boards/recording/recorded_controller.hpp"
 #include "host/config/rig_config.hpp"

@@ -2,7 +2,6 @@
 
 #include <gmock/gmock.h>
 
-#include <cmath>
 #include <random>
 
 #include "tests/host/acquisition/session_on_desk.hpp"

@@ -6,7 +6,10 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <array>
 #include <bit>
+#include <chrono>
+#include <cstdint>
 
 namespace diastole {
 namespace {

@@ -4,12 +4,8 @@
 
 #include <modbus/modbus.h>
 
-#include <array>
 #include <atomic>
-#include <chrono>
-#include <cstdint>
 #include <functional>
-#include <memory>
 #include <thread>
 
 namespace diastole {

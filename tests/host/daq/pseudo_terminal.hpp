@@ -2,7 +2,6 @@
 // Pseudo-terminals in place of serial lines: one whose far end is code, and two joined to a cable.
 
 #include <chrono>
-#include <functional>
 #include <span>
 #include <string>
 #include <thread>

@@ -2,7 +2,6 @@
 
 #include <gmock/gmock.h>
 
-#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <sstream>
@@ -12,9 +11,9 @@
 #include "host/runfile/writer.hpp"
 #include "protocol/runfile/layout.hpp"
 #include "protocol/runfile/reader.hpp"
-#include "protocol/signal/zero_phase.hpp"
 #include "tests/host/bench/scratch.hpp"
 #include "tests/host/runfile/output_of.hpp"
+#include "tests/protocol/signal/filtered_at_once.hpp"
 
 namespace diastole {
 namespace {

@@ -5,7 +5,6 @@
 #include <stdlib.h>
 
 #include <array>
-#include <thread>
 
 #include "protocol/contract/input_error.hpp"
 #include "tests/host/bench/scratch.hpp"

@@ -3,7 +3,6 @@
 
 #include <gmock/gmock.h>
 
-#include <cmath>
 #include <filesystem>
 
 #include "protocol/runfile/frame_bins.hpp"

@@ -11,6 +11,8 @@
 #include <limits>
 #include <numbers>
 
+#include "tests/protocol/signal/filtered_at_once.hpp"
+
 namespace diastole::signal {
 namespace {
 

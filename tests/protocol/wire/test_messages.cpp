@@ -120,11 +120,11 @@ TEST(Messages, ValuesOutOfRangeAreRefusedWithTheirField) {
   const auto decoded = decode<AddSegment>(encoded(segment));
   ASSERT_FALSE(decoded.ok());
   EXPECT_EQ(decoded.error().problem, DecodeProblem::out_of_range);
-  EXPECT_EQ(field_name<AddSegment>(decoded.error().field), "period_us");
+  EXPECT_EQ(decoded.error().field, 5);  // period_us
 
   segment = AddSegment::example();
-  segment.waveform = static_cast<Waveform>(7);
-  EXPECT_EQ(field_name<AddSegment>(decode<AddSegment>(encoded(segment)).error().field), "waveform");
+  segment.waveform = static_cast<Waveform>(static_cast<int>(kLastWaveform) + 1);
+  EXPECT_EQ(decode<AddSegment>(encoded(segment)).error().field, 1);  // waveform
 }
 
 TEST(Messages, PositionBatchOfEveryCount) {

@@ -4,7 +4,6 @@
 #include <random>
 #include <vector>
 
-#include "firmware/core/profiles/profile.hpp"
 #include "protocol/wire/wire_text.hpp"
 #include "tests/tools/benchmarks/image.hpp"
 #include "tools/benchmarks/emulated_session.hpp"

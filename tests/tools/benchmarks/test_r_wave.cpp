@@ -1,7 +1,6 @@
 // The R-wave as the image's DAC plays it: a triangle of 30 ms, 2.5 V at the pin, 20 mV behind the divider.
 
 #include <algorithm>
-#include <cmath>
 #include <vector>
 
 #include "firmware/core/r_wave.hpp"

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <array>
-#include <vector>
 
 #include "protocol/wire/messages.hpp"
 #include "protocol/wire/reliable_link.hpp"

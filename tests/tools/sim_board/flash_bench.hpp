@@ -7,7 +7,6 @@
 
 #include "host/flash/update_link.hpp"
 #include "host/flash/updater.hpp"
-#include "protocol/contract/input_error.hpp"
 #include "tests/tools/sim_board/emulated_desk.hpp"
 
 namespace diastole::sim_board_test {

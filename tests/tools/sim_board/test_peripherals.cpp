@@ -2,8 +2,6 @@
 
 #include <gmock/gmock.h>
 
-#include <map>
-
 #include "tests/tools/sim_board/test_image.hpp"
 
 namespace diastole {

@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <filesystem>
 
-#include "protocol/wire/wire_text.hpp"
 #include "tests/tools/sim_board/built_firmware.hpp"
 #include "tests/tools/sim_board/emulated_desk.hpp"
 

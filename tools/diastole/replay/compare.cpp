@@ -4,8 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
-#include <vector>
 
 #include "protocol/runfile/soundness.hpp"
 #include "tools/diastole/replay/replay_plan.hpp"

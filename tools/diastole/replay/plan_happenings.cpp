@@ -4,7 +4,6 @@
 #include <array>
 
 #include "protocol/runfile/soundness.hpp"
-#include "protocol/wire/wire_text.hpp"
 #include "tools/diastole/replay/replay_plan.hpp"
 
 namespace diastole::replay {

@@ -3,7 +3,6 @@
 #include <cmath>
 
 #include "host/controller/settings_values.hpp"
-#include "protocol/contract/input_error.hpp"
 #include "tools/diastole/replay/replay_plan.hpp"
 
 namespace diastole::replay {

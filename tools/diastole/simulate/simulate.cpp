@@ -26,6 +26,7 @@ namespace fs = std::filesystem;
 struct SimulateOptions {
   SessionOptions session;
   SimulatedRigOptions rig;
+  uint64_t rig_seed = 0;
   std::vector<std::string> faults;
   std::vector<std::string> hidden;
   std::optional<uint64_t> hide_seed;
@@ -126,6 +127,7 @@ SimulatedSession simulate(SimulateOptions options) {
   sim_rig::hide(options.hidden, 0, unused);  // refuses unknown ids
   const PendingFile pins(options.rig.pins, options.session.force);
   options.rig.pins = pins.path();
+  options.rig.more.insert(options.rig.more.end(), {"--rig-seed", fmt::to_string(options.rig_seed)});
   for (const std::string& fault : options.faults)
     options.rig.more.insert(options.rig.more.end(), {"--fault", fault});
   for (const std::string& id : options.hidden)
@@ -198,6 +200,10 @@ void add_simulate(CommandLine& line) {
       ->check(CLI::ExistingFile);
   command->add_option("--pins", options->rig.pins, "pin trace to write: time_ns,signal,value");
   command->add_option("--seed", options->rig.seed, "of the sensors' noise")->capture_default_str();
+  command
+      ->add_option("--rig-seed", options->rig_seed,
+                   "of the rig's own imperfections, the same for all sessions of one rig; 0: none")
+      ->capture_default_str();
   command->add_option("--config", options->rig.config, "rig file, instead of the built-in one");
   command->add_option("--fault", options->faults,
                       "make something go wrong, NAME@run+SECONDS (sim_rig faults, sim_rig --help)");

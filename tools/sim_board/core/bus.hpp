@@ -1,7 +1,6 @@
 #pragma once
 // The peripheral bus: which device answers at an address, and whether its clock is on.
 
-#include <array>
 #include <cstdint>
 #include <cstdio>
 #include <functional>

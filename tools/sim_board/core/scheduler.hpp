@@ -1,7 +1,6 @@
 #pragma once
 // When each device next wants to be called. A handful of slots, so the earliest is found by looking at all.
 
-#include <algorithm>
 #include <cstddef>
 #include <vector>
 

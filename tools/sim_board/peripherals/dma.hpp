@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
-#include <string>
 
 #include "tools/sim_board/core/bus.hpp"
 #include "tools/sim_board/core/memory.hpp"

@@ -4,7 +4,6 @@
 
 #include <array>
 #include <cstdint>
-#include <functional>
 
 #include "tools/sim_board/core/device.hpp"
 #include "tools/sim_board/core/nvic.hpp"

@@ -12,7 +12,6 @@
 #include <functional>
 #include <optional>
 #include <span>
-#include <vector>
 
 #include "tools/sim_board/core/memory.hpp"
 #include "tools/sim_board/core/notes.hpp"

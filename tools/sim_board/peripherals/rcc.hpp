@@ -3,7 +3,6 @@
 // and the flags that show why the last reset happened (RM0090, 7.3).
 
 #include <algorithm>
-#include <functional>
 
 #include "tools/sim_board/core/bus.hpp"
 #include "tools/sim_board/core/scheduler.hpp"

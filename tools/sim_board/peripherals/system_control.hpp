@@ -3,7 +3,6 @@
 // fault status, FPU access) and SysTick (ARMv7-M ARM, B3.2 to B3.4); and DWT with the cycle counter.
 
 #include <algorithm>
-#include <array>
 #include <bit>
 #include <cstdint>
 #include <functional>

@@ -10,7 +10,6 @@
 #include <array>
 #include <functional>
 #include <string>
-#include <vector>
 
 #include "tools/sim_board/core/notes.hpp"
 #include "tools/sim_board/core/nvic.hpp"

@@ -1,5 +1,5 @@
 #pragma once
-// How many instructions a translated block holds: the emulator tells a block's address and bytes only.
+// How many instructions a translated block holds: the emulator reports a block's address and bytes only.
 //
 // Thumb code mixes 2- and 4-byte instructions; a first halfword of 0b11101, 0b11110 or 0b11111 in its top
 // five bits starts a long one (ARMv7-M ARM, A5.1). Counts are kept per start address.

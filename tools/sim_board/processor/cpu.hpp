@@ -107,7 +107,7 @@ class Cpu {
   static uint64_t on_read(uc_engine*, uint64_t offset, unsigned bytes, void* self);
   static void on_write(uc_engine*, uint64_t offset, unsigned bytes, uint64_t value, void* self);
 
-  /// A mapped range of registers; Unicorn tells offsets only.
+  /// A mapped range of registers; Unicorn passes offsets only.
   struct Window {
     Cpu* cpu;
     uint32_t base, bytes;

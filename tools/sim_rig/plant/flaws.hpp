@@ -16,9 +16,11 @@ struct DriveFlaws {
   double stick_share = 0;  ///< of the turns
 };
 
-/// At the pump's outlet: gas p (V)^1.2 = const, and a leak to outside.
+/// At the pump's outlet: gas p (V)^1.2 = const, what yields in proportion to the pressure (screw, seal), and a leak to
+/// outside.
 struct PumpFlaws {
   double gas_mL = 0;
+  double compliance_mL_per_kPa = 0;
   double leak_mL_s_kPa = 0;
 };
 

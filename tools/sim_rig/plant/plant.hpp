@@ -9,8 +9,8 @@
 // for, so the same edges and seed give the same readings. Rest pressure is zero. It shares no code with the
 // estimator.
 
+#include <algorithm>
 #include <cmath>
-#include <cstddef>
 #include <cstdint>
 #include <numbers>
 
@@ -34,11 +34,12 @@ struct AirBubble {
   double exponent = 1;
 
   static constexpr double atmospheric_kPa = 101.325;
+  static constexpr double vapour_kPa =
+      2.3;  ///< of water at 20 degC: below, gas no longer follows the pressure
 
-  /// Precondition: pressure_kPa > -atmospheric_kPa, or no bubble.
   [[nodiscard]] double compliance_mL_per_kPa(double pressure_kPa) const {
     if (rest_mL == 0) return 0;
-    const double absolute_kPa = atmospheric_kPa + pressure_kPa;
+    const double absolute_kPa = std::max(atmospheric_kPa + pressure_kPa, vapour_kPa);
     if (exponent == 1) return rest_mL * atmospheric_kPa / (absolute_kPa * absolute_kPa);
     return rest_mL / exponent * std::pow(atmospheric_kPa / absolute_kPa, 1 / exponent) / absolute_kPa;
   }
@@ -69,6 +70,7 @@ class Plant {
                      2 * config.seed + 1),
         loss_kPa_s2_per_mL2_(loss_factor(config)),
         pump_gas_{config.flaws.pump.gas_mL, gas_exponent},
+        pump_compliance_mL_per_kPa_(config.flaws.pump.compliance_mL_per_kPa),
         pump_leak_mL_s_kPa_(config.flaws.pump.leak_mL_s_kPa),
         cavity_flaws_(config.flaws.cavity),
         leak_mL_s_kPa_(cavity_flaws_.leak_mL_s_kPa),
@@ -169,7 +171,8 @@ class Plant {
   }
   /// What of the piston's flow enters the hose, beside gas and leak at the pump.
   [[nodiscard]] double entering_flow_mL_s() const {
-    const double swallows_mL_kPa = pump_gas_.compliance_mL_per_kPa(pump_end_kPa()) / step_s();
+    const double swallows_mL_kPa =
+        (pump_compliance_mL_per_kPa_ + pump_gas_.compliance_mL_per_kPa(pump_end_kPa())) / step_s();
     const double loses = pump_leak_mL_s_kPa_;
     if (swallows_mL_kPa == 0 && loses == 0) return piston_.flow_mL_s();
     // p = line.p + z Q and Q = Q_piston - C (p - p_before) / dt - G p.
@@ -203,6 +206,7 @@ class Plant {
   long step_count_ = 0;
   double since_step_s_ = 0;
   AirBubble pump_gas_;
+  double pump_compliance_mL_per_kPa_;
   double pump_leak_mL_s_kPa_;
   CavityFlaws cavity_flaws_;
   double leak_mL_s_kPa_;

@@ -1,4 +1,4 @@
-#include "estimator/fit/paper_search.hpp"
+#include "tools/benchmarks/paper_search.hpp"
 
 #include <fmt/format.h>
 #include <nlopt.h>
@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <optional>
 #include <vector>
 
 namespace diastole {
@@ -97,10 +98,8 @@ void conclude(inference::SearchResult& found, nlopt_result result, const Search&
   }
 }
 
-}  // namespace
-
-inference::SearchResult paper_search(JointProblem& problem, const Eigen::VectorXd& start,
-                                     const inference::SearchOptions& options) {
+inference::SearchResult search_once(JointProblem& problem, const Eigen::VectorXd& start,
+                                    const inference::SearchOptions& options) {
   const auto count = static_cast<unsigned>(problem.values());
   std::vector<double> values, lower, upper;
   for (Eigen::Index i = 0; i < problem.values(); ++i) {
@@ -127,6 +126,38 @@ inference::SearchResult paper_search(JointProblem& problem, const Eigen::VectorX
   found.q = search.best_q;
   conclude(found, result, search);
   return found;
+}
+
+}  // namespace
+
+PaperFit fit_as_the_paper(MotionModel& model, const std::vector<EstimatedParameter>& parameters,
+                          Measurement measurement, LocatorOptions locator,
+                          const inference::SearchOptions& search) {
+  constexpr int most_searches = 8;     // while a better motion finds more usable points
+  measurement.planes_as_seen = false;  // the paper knows where the tags were
+  for (Frame& frame : measurement.frames)
+    frame.sigma_kPa = 0;
+  JointProblem problem(model, parameters, measurement, locator);
+  Eigen::VectorXd q = problem.start();
+  PaperFit fit;
+  for (int round = 0; round < most_searches; ++round) {
+    const std::optional<size_t> gained = problem.find_points(q);
+    if (gained && *gained == 0 && round > 0) break;
+    if (!gained) {
+      fit.termination = inference::Termination::no_solution;
+      fit.reason = fmt::format("Failed: {}.", problem.failure());
+      break;
+    }
+    const inference::SearchResult found = search_once(problem, q, search);
+    q = found.q;
+    fit.termination = found.termination;
+    fit.reason = found.reason;
+    fit.iterations += found.iterations;
+    if (!is_settled(found.termination)) break;
+  }
+  fit.values = problem.space().values(q);
+  fit.forward_solves = problem.forward_solves();
+  return fit;
 }
 
 }  // namespace diastole

@@ -1,0 +1,95 @@
+#include "estimator/imaging/tracking/tracking_record.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace diastole::imaging {
+namespace {
+
+/// White is brighter than all but one in two hundred pixels of the slice's images.
+constexpr double white_share = 0.995;
+
+float white_of(const TagView& view) {
+  std::vector<float> values;
+  for (const Image& image : view.images)
+    values.insert(values.end(), image.data(), image.data() + image.size());
+  const auto at =
+      values.begin() + static_cast<std::ptrdiff_t>(white_share * static_cast<double>(values.size() - 1));
+  std::nth_element(values.begin(), at, values.end());
+  return std::max(*at, 1e-6F);
+}
+
+std::string picture_of(const Image& image, float white) {
+  std::string bytes;
+  bytes.reserve(static_cast<size_t>(image.size()));
+  for (Eigen::Index row = 0; row < image.rows(); ++row) {
+    for (Eigen::Index column = 0; column < image.cols(); ++column)
+      bytes += static_cast<char>(
+          static_cast<unsigned char>(std::lround(255 * std::clamp(image(row, column) / white, 0.0F, 1.0F))));
+  }
+  return base64(bytes);
+}
+
+TrackedSliceImages slice_record(const TrackedSlice& slice, const std::vector<DroppedCount>& dropped) {
+  const SlicePlane& plane = slice.view.plane;
+  TrackedSliceImages record;
+  record.name = slice.view.name;
+  record.view = orientation_in_words(plane);
+  record.rows = plane.rows;
+  record.columns = plane.columns;
+  record.pixel_mm = {plane.column_spacing_mm, plane.row_spacing_mm};
+  for (const TagWave& wave : slice.tracked.waves)
+    record.directions.push_back(
+        {std::atan2(wave.per_mm.y(), wave.per_mm.x()) * 180 / std::numbers::pi, wave.spacing_mm()});
+  const float white = white_of(slice.view);
+  const std::vector<PhaseSummary> summaries = phase_summaries(slice);
+  for (size_t k = 0; k < slice.view.images.size(); ++k) {
+    TrackedImage image;
+    image.frame = slice.view.frames[k];
+    image.trigger_ms = slice.view.times_ms[k];
+    image.sigma_px = summaries[k].sigma_px;
+    image.residual = 100 * summaries[k].residual / static_cast<double>(white);
+    image.picture = picture_of(slice.view.images[k], white);
+    for (const TagPoint& point : slice.points.points) {
+      if (point.frame != image.frame) continue;
+      const Eigen::Vector3d from_mm = point.x_mm - plane.origin_mm;
+      for (const double number : {static_cast<double>(point.direction), static_cast<double>(point.tag),
+                                  from_mm.dot(plane.along_row) / plane.column_spacing_mm,
+                                  from_mm.dot(plane.along_column) / plane.row_spacing_mm,
+                                  point.sigma_mm / plane.finer_spacing_mm()})
+        image.points.push_back(number);
+    }
+    for (const RejectedPoint& point : slice.points.rejected) {
+      if (point.frame != image.frame) continue;
+      const auto reason = std::find_if(dropped.begin(), dropped.end(), [&](const DroppedCount& count) {
+        return count.reason == point.reason;
+      });
+      for (const double number :
+           {static_cast<double>(point.direction), static_cast<double>(reason - dropped.begin()),
+            point.x_mm.x() / plane.column_spacing_mm, point.x_mm.y() / plane.row_spacing_mm})
+        image.rejected.push_back(number);
+    }
+    record.images.push_back(std::move(image));
+  }
+  return record;
+}
+
+}  // namespace
+
+TrackingRecord tracking_record(const TrackedFolder& tracked, double seconds) {
+  TrackingRecord record;
+  record.folder = tracked.folder.string();
+  record.coordinates = tracked.pose ? "specimen" : "patient";
+  record.points = tracked.points.size();
+  record.rms_px = tracked.rms_px;
+  record.seconds = seconds;
+  for (const auto& [reason, points] : tracked.dropped)
+    record.dropped.push_back({reason, points});
+  record.findings = tracked.problems;
+  for (const TrackedSlice& slice : tracked.slices)
+    record.slices.push_back(slice_record(slice, record.dropped));
+  return record;
+}
+
+}  // namespace diastole::imaging

@@ -1,0 +1,129 @@
+// The imaging half by whole programs: what a scanner exported becomes tags, a page and a stiffness; and the page in a real browser.
+// Screenshots go to the directory that DIASTOLE_SCREENSHOTS names, if it does.
+
+#include <gmock/gmock.h>
+
+#include <cstdlib>
+#include <filesystem>
+
+#include "tests/flow/browser.hpp"
+#include "tests/flow/programs.hpp"
+#include "tests/sanitized.hpp"
+
+namespace diastole::flow {
+namespace {
+
+using nlohmann::json;
+using testing::HasSubstr;
+
+/// The example's gel phantom, C1 = 8.71 kPa.
+class ImagedGel : public testing::Test {
+ protected:
+  ImagedGel() {
+    std::filesystem::copy(std::filesystem::path(DIASTOLE_EXAMPLES) / "tagged-gel", place / "gel",
+                          std::filesystem::copy_options::recursive);
+  }
+  Workplace place;
+};
+
+TEST_F(ImagedGel, ImagesTellTheirSeries) {
+  const Ended images = run(place, {"diastole", "images", "gel/dicom", "--json"});
+  ASSERT_EQ(images.exit_code, 0) << images.err;
+  const json series = images.json().at("series");
+  ASSERT_EQ(series.size(), 4U);
+  for (const json& one : series) {
+    EXPECT_EQ(one.at("kind"), "tagged cine");
+    EXPECT_EQ(one.at("phases"), 8);
+    EXPECT_NEAR(one.at("directions")[0].at("spacing_mm").get<double>(), 5, 0.05);
+  }
+  EXPECT_THAT(series[2].at("orientation").get<std::string>(), HasSubstr("long axis, 20 degrees"));
+  EXPECT_TRUE(images.json().at("problems").empty()) << images.out;
+}
+
+TEST_F(ImagedGel, OneCommandGoesFromImagesToTheStiffness) {
+  if (sanitized) GTEST_SKIP() << "two fits of eight frames: too slow here";
+  const Ended fit = run(place, {"diastole", "fit", "gel/tagged-gel.study.toml", "--json", "-o", "fit.json"});
+  ASSERT_EQ(fit.exit_code, 0) << fit.err;
+  const json C1 = fit.json().at("parameters").at("C1_kPa");
+  EXPECT_NEAR(C1.at("value").get<double>(), 8.71, 0.01 * 8.71);
+  EXPECT_LT(C1.at("ci95")[0].get<double>(), 8.71);
+  EXPECT_GT(C1.at("ci95")[1].get<double>(), 8.71);
+  EXPECT_NEAR(fit.json().at("chi2_per_dof").get<double>(), 1, 0.1);
+  // The second time the tags are there already.
+  const Ended again = run(place, {"diastole", "fit", "gel/tagged-gel.study.toml", "--json"});
+  EXPECT_THAT(again.err, HasSubstr("Tags of these images are in"));
+  EXPECT_EQ(again.json().at("parameters"), fit.json().at("parameters"));
+
+  const Ended tracked =
+      run(place, {"diastole", "track", "gel/dicom", "-o", "gel.tags.csv", "--record", "gel.json"});
+  ASSERT_EQ(tracked.exit_code, 0) << tracked.err;
+  const Ended report = run(place, {"diastole", "report", "gel.json", "fit.json", "-o", "report.html"});
+  EXPECT_EQ(report.exit_code, 0) << report.err;
+}
+
+class TrackingInABrowser : public ImagedGel {
+ protected:
+  void SetUp() override {
+    if (Browser::program().empty())
+      GTEST_SKIP() << "this machine has no Chromium: apt install chromium-headless-shell";
+  }
+};
+
+TEST_F(TrackingInABrowser, ThePagePlaysEverySliceWithItsLines) {
+  const Ended tracked =
+      run(place, {"diastole", "track", "gel/dicom", "-o", "gel.tags.csv", "--page", "gel.html", "--json"});
+  ASSERT_EQ(tracked.exit_code, 0) << tracked.err;
+  Browser browser(place, 1280, 1400);
+  const std::string url = "file://" + (place / "gel.html").string();
+  browser.open(url);
+  browser.wait_until("document.querySelectorAll('.cine canvas').length === 4");
+  EXPECT_EQ(browser.value("cine.players.length"), 4);
+  EXPECT_EQ(browser.value("cine.players[0].slice.images.length"), 8);
+  // As many points as the command said, and each lies within its picture.
+  EXPECT_EQ(browser.value("cine.players.reduce((sum, p) => sum + p.slice.images.reduce((s, i) => s + "
+                          "i.points.length / 5, 0), 0)"),
+            tracked.json().at("points"));
+  EXPECT_EQ(browser.value("cine.players.every(p => p.slice.images.every(i => i.points.every((v, n) => n % 5 "
+                          "< 2 || n % 5 > 3 || (v > 0 && v < 96))))"),
+            true);
+  const auto picture = [&] { return browser.value("cine.players[0].canvas.toDataURL()").get<std::string>(); };
+  const std::string first = picture();
+  browser.value("(r => { r.value = 4; r.dispatchEvent(new Event('input')); })(cine.players[0].range)");
+  EXPECT_EQ(browser.value("document.querySelector('.cine-time').textContent"), "phase 5, 606 ms");
+  const std::string fifth = picture();
+  EXPECT_NE(fifth, first);
+  // Without its lines the image is grey.
+  browser.value("document.getElementById('cine-lines').click()");
+  browser.value("document.getElementById('cine-rejected').click()");
+  EXPECT_NE(picture(), fifth);
+  const std::string grey =
+      "(c => { const d = c.getContext('2d').getImageData(0, 0, c.width, c.height).data;"
+      " for (let i = 0; i < d.length; i += 4) if (d[i] !== d[i + 1] || d[i] !== d[i + 2]) return false; "
+      "return true; })(cine.players[0].canvas)";
+  EXPECT_EQ(browser.value(grey), true);
+  browser.value("document.getElementById('cine-lines').click()");
+  EXPECT_EQ(browser.value(grey), false);
+  // It plays, and stops.
+  browser.value("document.querySelector('.cine-play').click()");
+  browser.wait_until("cine.players[0].phase !== 4");
+  browser.value("document.querySelector('.cine-play').click()");
+  EXPECT_EQ(browser.value("cine.players[0].timer === undefined"), true);
+  // A point under the mouse tells its error.
+  browser.value(
+      "(p => { p.range.value = 4; p.draw(); const b = p.canvas.getBoundingClientRect(), i = p.image.points;"
+      " p.canvas.dispatchEvent(new PointerEvent('pointermove', { clientX: b.left + (i[2] + 0.5) / 96 * "
+      "b.width, clientY: b.top + (i[3] + 0.5) / 96 * b.height })); })(cine.players[0])");
+  EXPECT_THAT(browser.value("document.querySelector('.cine-at').textContent").get<std::string>(),
+              HasSubstr("px"));
+  if (const char* directory = std::getenv("DIASTOLE_SCREENSHOTS"))
+    browser.screenshot(std::string(directory) + "/track.png");
+  browser.resize(390, 800);
+  EXPECT_EQ(browser.value("document.documentElement.scrollWidth <= 390"), true)
+      << "the page is wider than a telephone";
+  EXPECT_THAT(browser.complaints(), testing::IsEmpty());
+  for (const std::string& asked : browser.requested_urls())
+    EXPECT_TRUE(asked == url || asked.starts_with("data:")) << asked;
+}
+
+}  // namespace
+}  // namespace diastole::flow

@@ -1,0 +1,267 @@
+#include "tools/benchmarks/explain_worlds.hpp"
+
+#include <unistd.h>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <Eigen/Dense>
+#include <array>
+#include <cmath>
+#include <fstream>
+#include <random>
+
+#include "estimator/explain/rig/explain_rig.hpp"
+#include "estimator/explain/verdict/explanation_json.hpp"
+#include "estimator/io/whole_file.hpp"
+#include "estimator/model/session.hpp"
+#include "tools/benchmarks/timed_process.hpp"
+#include "tools/score/score.hpp"
+#include "tools/sim_rig/hidden_effects.hpp"
+
+namespace diastole::bench {
+namespace {
+
+namespace fs = std::filesystem;
+using explain::EffectSize;
+using explain::Explanation;
+using explain::ScoredCase;
+using explain::Truth;
+
+const fs::path example = fs::path(DIASTOLE_SOURCE_DIR) / "examples/hidden-effect";
+
+struct Asked {
+  Truth truth;
+  fs::path study;
+};
+
+/// Explains a study, or reads what a stopped run answered.
+Explanation answer(const fs::path& study, const fs::path& file, bool resume) {
+  if (resume && fs::exists(file)) return explain::explanation_from_json(read_whole_file(file), file.string());
+  Explanation found = explain::explain_rig(read_study(study), {.threads = 2, .progress = {}});
+  found.traces.clear();
+  const fs::path part = file.string() + ".part";
+  std::ofstream(part) << explain::to_json(found);
+  fs::rename(part, file);
+  return found;
+}
+
+std::vector<ScoredCase> answers(const std::vector<Asked>& sessions, const fs::path& kept, bool resume) {
+  fs::create_directories(kept);
+  std::vector<ScoredCase> cases;
+  const bool terminal = isatty(STDERR_FILENO) != 0;
+  for (const Asked& session : sessions) {
+    if (terminal)
+      fmt::print(stderr, "\r{}: {} of {} \x1b[K", kept.filename().string(), cases.size() + 1,
+                 sessions.size());
+    cases.push_back({session.truth, answer(session.study, kept / (session.truth.name + ".json"), resume)});
+  }
+  if (terminal) fmt::print(stderr, "\r\x1b[K");
+  return cases;
+}
+
+/// The labelled sessions whose study NAME/NAME{ending} exists; none, and a line that says so, without labels.
+std::vector<Asked> recorded(const fs::path& folder, const std::string& ending) {
+  if (!fs::exists(folder / "labels.json")) {
+    fmt::print("skipped: no labels.json in {}\n", folder.string());
+    return {};
+  }
+  std::vector<Asked> sessions;
+  for (Truth& truth : explain::read_truths(folder)) {
+    const fs::path study = folder / truth.name / (truth.name + ending);
+    if (fs::exists(study)) sessions.push_back({std::move(truth), study});
+  }
+  return sessions;
+}
+
+bool report(const std::string& title, const std::vector<ScoredCase>& cases, const explain::Targets& targets) {
+  if (cases.empty()) return true;
+  const explain::Score score = explain::score_cases(cases, targets);
+  fmt::print("\n=== {} ({} sessions)\n{}", title, cases.size(), explain::in_words(score));
+  std::fflush(stdout);
+  return score.met();
+}
+
+// --- World 3 -----------------------------------------------------------------------------------------------------------
+
+/// The example's study of a run NAME.run.h5, with bounds of the modulus and references.
+std::string study_of(const std::string& name, std::array<double, 2> C1_kPa, const std::string& references) {
+  std::string text = read_whole_file(example / "mine.study.toml");
+  const auto replace = [&](const std::string& line, const std::string& by) {
+    const size_t at = text.find(line);
+    if (at == std::string::npos) throw std::runtime_error("the example's study has no line " + line);
+    text.replace(at, line.size(), by);
+  };
+  replace("start = 8.8\nbounds = [1.0, 20.0]",
+          fmt::format("start = {:.4f}\nbounds = [{:.4f}, {:.4f}]", 0.5 * (C1_kPa[0] + C1_kPa[1]), C1_kPa[0],
+                      C1_kPa[1]));
+  replace("runs = [\"mine.run.h5\"]", fmt::format("runs = [\"{}.run.h5\"]\n{}", name, references));
+  return text;
+}
+
+struct Simulated {
+  uint64_t rig = 1;
+  uint64_t seed = 1;
+  std::vector<std::string> hidden;
+  double C1_kPa = 8.8;
+};
+
+void write(const fs::path& file, const std::string& text) { std::ofstream(file, std::ios::binary) << text; }
+
+/// NAME.run.h5 in `folder`, and what is hidden in it sealed/NAME.sealed.json.
+void simulate(const Simulated& session, const fs::path& folder, const std::string& name) {
+  const fs::path run = folder / (name + ".run.h5");
+  if (fs::exists(run)) return;
+  fs::create_directories(folder / "sealed");
+  write(folder / (name + ".rig.toml"), read_whole_file(fs::path(DIASTOLE_SOURCE_DIR) / "examples/rig.toml") +
+                                           fmt::format("\n[simulation]\nC1_kPa = {:.4f}\n", session.C1_kPa));
+  std::vector<std::string> command{DIASTOLE_BIN_DIR "/diastole",
+                                   "simulate",
+                                   (example / "mine.experiment.toml").string(),
+                                   "-o",
+                                   name + ".run.h5",
+                                   "--config",
+                                   name + ".rig.toml",
+                                   "--rig-seed",
+                                   fmt::to_string(session.rig),
+                                   "--seed",
+                                   fmt::to_string(session.seed),
+                                   "--sealed",
+                                   "sealed/" + name + ".sealed.json"};
+  for (const std::string& id : session.hidden)
+    command.insert(command.end(), {"--hide", id});
+  const fs::path log = folder / (name + ".log");
+  if (run_timed(command, folder, log).exit_code != 0)
+    throw std::runtime_error("diastole simulate failed: " + read_whole_file(log));
+}
+
+/// Mean square of what two sessions differ by in the cavity's pressure, kPa^2; modulus and offset may follow.
+double difference_kPa2(const fs::path& one, const fs::path& other) {
+  const auto trace = [](const fs::path& study) {
+    const rig::Session session = rig::read_session(read_study(study));
+    return session.runs.front().pressure_kPa.at(rig::Channel::cavity);
+  };
+  const std::vector<double> a = trace(one), b = trace(other);
+  const auto count = static_cast<Eigen::Index>(std::min(a.size(), b.size()));
+  const Eigen::Map<const Eigen::VectorXd> seen(a.data(), count), base(b.data(), count);
+  Eigen::MatrixXd follows(count, 2);
+  follows << base, Eigen::VectorXd::Ones(count);
+  const Eigen::VectorXd change = seen - base;
+  const Eigen::VectorXd left = change - follows * follows.householderQr().solve(change);
+  return left.squaredNorm() / static_cast<double>(count);
+}
+
+/// One round: every effect once, three outside the library, six times nothing, eight pairs.
+std::vector<std::vector<std::string>> hidden_in_round(uint64_t round) {
+  std::mt19937_64 random(round);
+  std::vector<std::vector<std::string>> sets(6, {"none"});
+  std::vector<std::string> known;
+  for (const sim_rig::HiddenKind& kind : sim_rig::hidden_kinds()) {
+    sets.push_back({std::string(kind.id)});
+    if (!kind.is_outside()) known.emplace_back(kind.id);
+  }
+  for (int pair = 0; pair < 8; ++pair) {
+    const size_t first = random() % known.size(),
+                 second = (first + 1 + random() % (known.size() - 1)) % known.size();
+    sets.push_back({known[first], known[second]});
+  }
+  return sets;
+}
+
+struct World3 {
+  std::vector<ScoredCase> alone, with_reference;
+};
+
+World3 simulated_world(const WorldsOptions& options) {
+  World3 world;
+  for (uint64_t round = options.first_round; round < options.first_round + options.rounds; ++round) {
+    const fs::path folder = options.kept / fmt::format("rig-{}", round);
+    std::mt19937_64 random(1000 + round);
+    const auto casting_kPa = [&] {
+      return 8.8 * (0.9 + 0.2 * static_cast<double>(random() >> 11) * 0x1p-53);
+    };
+    uint64_t seed = 1000 * round;
+    std::string references;
+    for (const char* name : {"ref-1", "ref-2"}) {
+      const Simulated session{round, ++seed, {"none"}, casting_kPa()};
+      simulate(session, folder, name);
+      write(folder / fmt::format("{}.study.toml", name),
+            study_of(name, {0.98 * session.C1_kPa, 1.02 * session.C1_kPa}, ""));
+      references += fmt::format("{}\"{}.study.toml\"", references.empty() ? "" : ", ", name);
+    }
+    std::vector<Asked> alone, with_reference;
+    const double C1_kPa = casting_kPa();
+    for (const std::vector<std::string>& hidden : hidden_in_round(round)) {
+      const std::string name = fmt::format("r{}-{:02}", round, alone.size() + 1);
+      simulate({round, ++seed, hidden, C1_kPa}, folder, name);
+      constexpr std::array unknown_kPa{1.0, 20.0};
+      write(folder / (name + ".study.toml"), study_of(name, unknown_kPa, ""));
+      write(folder / (name + "-with-reference.study.toml"),
+            study_of(name, unknown_kPa, "reference = [" + references + "]\n"));
+      const Truth truth = explain::read_truths(folder / "sealed" / (name + ".sealed.json")).front();
+      alone.push_back({truth, folder / (name + ".study.toml")});
+      with_reference.push_back({truth, folder / (name + "-with-reference.study.toml")});
+    }
+    std::vector<ScoredCase> a = answers(alone, folder / "alone", options.resume);
+    std::vector<ScoredCase> b = answers(with_reference, folder / "with-reference", options.resume);
+    // Nothing is hidden in the first two: what they differ by is noise.
+    const double noise_kPa2 = difference_kPa2(alone[1].study, alone[0].study);
+    for (size_t k = 0; k < a.size(); ++k) {
+      const double change_kPa2 = difference_kPa2(alone[k].study, alone[0].study) - noise_kPa2;
+      // The rig's own error is what its references left.
+      const double times = 1e3 * std::sqrt(std::max(0.0, change_kPa2)) / b[k].found.model_error->rms_Pa;
+      for (ScoredCase* one : {&a[k], &b[k]})
+        one->truth.size = times >= 5   ? EffectSize::large
+                          : times >= 2 ? EffectSize::medium
+                                       : EffectSize::small;
+    }
+    std::ranges::move(a, std::back_inserter(world.alone));
+    std::ranges::move(b, std::back_inserter(world.with_reference));
+  }
+  return world;
+}
+
+}  // namespace
+
+bool explain_worlds(const WorldsOptions& options) {
+  if (!options.resume) fs::remove_all(options.kept);
+  std::vector<ScoredCase> all;
+  bool met = true;
+  const auto add = [&](const std::string& title, const std::vector<ScoredCase>& cases,
+                       const explain::Targets& targets) {
+    met = report(title, cases, targets) && met;
+    all.insert(all.end(), cases.begin(), cases.end());
+  };
+  for (const int world : options.worlds) {
+    if (world == 1)
+      add("World 1: exact model",
+          answers(recorded(options.data / "rig", ".study.toml"), options.kept / "world-1", options.resume),
+          explain::exact_model);
+    if (world == 2) {
+      add("World 2: rigs with imperfections, two references each",
+          answers(recorded(options.data / "rig2", "-with-reference.study.toml"),
+                  options.kept / "world-2-with-reference", options.resume),
+          {});
+      add("World 2, no reference",
+          answers(recorded(options.data / "rig2", ".study.toml"), options.kept / "world-2", options.resume),
+          explain::no_reference);
+    }
+    if (world == 3) {
+      const World3 own = simulated_world(options);
+      add("World 3: the project's simulated rig, two references each", own.with_reference, {});
+      add("World 3, no reference", own.alone, explain::no_reference);
+    }
+  }
+  report("All", all,
+         {.none_named = 1,
+          .large_exact = 0,
+          .medium_inside = 0,
+          .small_wrong = 1,
+          .pairs_exact = 0,
+          .pairs_false = 1,
+          .outside_named = 1,
+          .any_wrong = 1,
+          .interval = {0, 1}});
+  return met;
+}
+
+}  // namespace diastole::bench

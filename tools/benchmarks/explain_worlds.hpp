@@ -1,0 +1,29 @@
+#pragma once
+// `tools/bench explain --worlds`: explanations in three worlds that share no code with each other, with and without the
+// rig's references.
+//
+//   1  recordings of an independent program whose physics the rig's model holds exactly (../shared/data/rig)
+//   2  recordings of a second one: three rigs, each with imperfections of its own (../shared/data/rig2)
+//   3  the project's own simulated rig, `diastole simulate --rig-seed R --hide ID --hide-seed S`: rounds of 40 sessions,
+//      each with another rig, its two references, every effect once, three of no library, pairs, and nothing hidden
+
+#include <cstdint>
+#include <filesystem>
+#include <vector>
+
+namespace diastole::bench {
+
+struct WorldsOptions {
+  std::vector<int> worlds{1, 2, 3};
+  uint64_t rounds = 5;
+  uint64_t first_round = 1;
+  bool resume = false;         ///< takes sessions and answers that a stopped run left
+  std::filesystem::path data;  ///< holds rig/ and rig2/
+  std::filesystem::path kept;  ///< simulated sessions and explanations
+};
+
+/// Prints a table a world and one of all; whether all targets are met. A world whose data are absent is skipped
+/// visibly.
+bool explain_worlds(const WorldsOptions& options);
+
+}  // namespace diastole::bench

@@ -1,0 +1,286 @@
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <toml++/toml.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <filesystem>
+#include <iostream>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <random>
+#include <sstream>
+
+#include "estimator/cli/study_options.hpp"
+#include "estimator/io/measurement.hpp"
+#include "estimator/io/whole_file.hpp"
+#include "estimator/model/affected_model.hpp"
+#include "estimator/model/study_model.hpp"
+#include "protocol/contract/input_error.hpp"
+#include "tools/diastole/commands.hpp"
+#include "tools/sim_scanner/scanner.hpp"
+
+namespace diastole {
+namespace {
+
+namespace fs = std::filesystem;
+using scanner::ScanPhase;
+
+/// The paper's transducer.
+constexpr double usual_sigma_kPa = 0.02;
+
+struct ScanArguments {
+  StudyOptions study;
+  fs::path folder;
+  scanner::ScanProtocol protocol;
+  std::optional<double> peak_kPa;
+  int phases = 16;
+  double period_s = 1.2;
+  double first_s = 0.012;
+};
+
+/// The phases of the study's schedule: the loaded frames of its frames file, or a parabolic cycle up to a pressure.
+std::vector<ScanPhase> phases_of(const ScanArguments& arguments, const Study& study) {
+  std::vector<ScanPhase> phases;
+  if (arguments.peak_kPa) {
+    for (int k = 0; k < arguments.phases; ++k) {
+      const double time_s =
+          arguments.first_s + (arguments.period_s - arguments.first_s) * k / arguments.phases;
+      // The parabolic profile: constant acceleration, -constant, constant.
+      const double share =
+          2 * std::abs(time_s / arguments.period_s - std::round(time_s / arguments.period_s));
+      const double done = share < 0.5 ? 2 * share * share : 1 - 2 * (1 - share) * (1 - share);
+      phases.push_back({time_s, *arguments.peak_kPa * done});
+    }
+    return phases;
+  }
+  if (!study.data.frames)
+    throw InputError({study.file.string(), "table [data]", "names no frames: there is no pressure to scan at",
+                      "Give --peak-kPa P for a parabolic cycle, or frames = \"NAME.frames.csv\"."});
+  for (const Frame& frame : read_frames(*study.data.frames))
+    phases.push_back({frame.time_s, frame.pressure_kPa});
+  phases.erase(phases.begin());
+  if (phases.empty())
+    throw InputError({study.data.frames->string(), "", "has no frame but frame 0", "Add the loaded frames."});
+  return phases;
+}
+
+scanner::ScanPose pose_of(const Study& study) {
+  scanner::ScanPose pose;
+  if (!study.data.to_specimen) return pose;
+  for (Eigen::Index i = 0; i < 3; ++i) {
+    pose.origin_mm[i] = study.data.to_specimen->origin_mm[static_cast<size_t>(i)];
+    for (Eigen::Index k = 0; k < 3; ++k)
+      pose.axes(k, i) = study.data.to_specimen->axes[static_cast<size_t>(i)][static_cast<size_t>(k)];
+  }
+  return pose;
+}
+
+/// Before anything is computed.
+void check(const ScanArguments& arguments, const HermiteMesh& mesh) {
+  const scanner::ScanProtocol& protocol = arguments.protocol;
+  const double pixel_mm = protocol.field_of_view_mm / protocol.matrix;
+  if (protocol.tags.spacing_mm < 3 * pixel_mm)
+    throw InputError(
+        {"", "--tag-spacing",
+         fmt::format("{:g} mm is less than three pixels of {:.3g} mm", protocol.tags.spacing_mm, pixel_mm),
+         "Space the tags farther apart, or give a larger --matrix."});
+  if (!protocol.tagged && !protocol.cine)
+    throw InputError({"", "--no-tags", "leaves nothing to scan", "Ask for --cine too."});
+  if (protocol.short_axis_mm.empty() && protocol.long_axis_deg.empty())
+    throw InputError({"", "--short-axis, --long-axis", "no slice is left", "Give at least one."});
+  double radius_mm = 0;
+  for (size_t node = 0; node < mesh.node_count(); ++node)
+    radius_mm = std::max(
+        radius_mm, std::hypot(mesh.reference()[dof_of(node, 0, 0)], mesh.reference()[dof_of(node, 0, 1)]));
+  if (protocol.field_of_view_mm < 2.1 * radius_mm)
+    throw InputError({"", "--fov",
+                      fmt::format("{:g} mm does not hold a specimen of {:.3g} mm across",
+                                  protocol.field_of_view_mm, 2 * radius_mm),
+                      fmt::format("Give {:.0f} mm or more.", std::ceil(2.3 * radius_mm))});
+  std::error_code error;
+  if (fs::exists(arguments.folder, error) && !fs::is_empty(arguments.folder, error))
+    throw InputError(
+        {arguments.folder.string(), "-o", "is there already and not empty", "Name a new folder."});
+}
+
+/// The motion of all phases, each from the last.
+std::vector<NodeField> motions(const Study& study, ElasticModel& model,
+                               const std::vector<ScanPhase>& phases) {
+  std::vector<NodeField> positions;
+  ElasticState state = model.rest_state();
+  for (const ScanPhase& phase : phases) {
+    const Solution solution = model.solve(phase.pressure_kPa, state);
+    if (!solution.report.converged())
+      throw InputError({study.file.string(), fmt::format("pressure {:.3g} kPa", phase.pressure_kPa),
+                        solution.report.describe(), "Give other values with --set, or lower pressures."});
+    state = solution.state;
+    positions.push_back(state.position_mm);
+  }
+  return positions;
+}
+
+/// The study once more, with the scan as its data.
+std::string study_text(const Study& study) {
+  toml::table root = toml::parse_file(study.file.string());
+  root.insert_or_assign("data", toml::table{{"images", "dicom"}, {"frames", "scan.frames.csv"}});
+  root.erase("images");
+  if (const auto* mesh = std::get_if<MeshSpecimen>(&study.specimen))
+    root["specimen"].as_table()->insert_or_assign("mesh_file", fs::absolute(mesh->file).string());
+  std::ostringstream text;
+  text << root << '\n';
+  return text.str();
+}
+
+std::string frames_text(const std::vector<ScanPhase>& phases, unsigned seed) {
+  std::mt19937 engine(seed);
+  std::normal_distribution<double> noise_kPa(0, usual_sigma_kPa);
+  std::string text = fmt::format("frame,time_s,pressure_kPa,sigma_kPa\n0,0,0,{:g}\n", usual_sigma_kPa);
+  for (size_t k = 0; k < phases.size(); ++k)
+    text += fmt::format("{},{:.4f},{:.4f},{:g}\n", k + 1, phases[k].time_s,
+                        phases[k].pressure_kPa + noise_kPa(engine), usual_sigma_kPa);
+  return text;
+}
+
+std::string pose_text(const Study& study, const scanner::ScanPose& pose) {
+  const auto row = [](const Eigen::Vector3d& v) {
+    return fmt::format("[{:.9f}, {:.9f}, {:.9f}]", v.x(), v.y(), v.z());
+  };
+  return fmt::format(
+      "# x_patient = origin + X x_axis + Y y_axis + Z z_axis\nkind = \"{}\"\norigin_mm = {}\nx_axis = "
+      "{}\ny_axis = {}\nz_axis = {}\n",
+      std::holds_alternative<AnnulusSpecimen>(study.specimen) ? "annulus" : "ventricle", row(pose.origin_mm),
+      row(pose.axes.col(0)), row(pose.axes.col(1)), row(pose.axes.col(2)));
+}
+
+ExitCode run_scan(const ScanArguments& arguments, const CommandOutput& out) {
+  const Study study = read_study(arguments.study);
+  const std::vector<ScanPhase> phases = phases_of(arguments, study);
+  ElasticModel model = make_affected_model(study);
+  require_cavity(study, model);
+  check(arguments, model.mesh());
+  const bool shows_progress = isatty(STDERR_FILENO) != 0;
+  if (shows_progress) fmt::print(stderr, "Solving {} phases.\n", phases.size());
+  scanner::MovingBody body{&model.mesh(), {}, motions(study, model, phases), 0};
+  for (const ScanPhase& phase : phases)
+    body.times_s.push_back(phase.time_s);
+  body.period_s = arguments.peak_kPa || phases.size() < 2
+                      ? arguments.period_s
+                      : phases.back().time_s + (phases.back().time_s - phases.front().time_s) /
+                                                   static_cast<double>(phases.size() - 1);
+  // Complete or not at all.
+  const fs::path partial = arguments.folder.string() + ".partial";
+  fs::remove_all(partial);
+  fs::create_directories(partial / "dicom");
+  const scanner::ScanPose pose = pose_of(study);
+  const std::vector<scanner::ScannedSeries> series =
+      scanner::scan(body, arguments.protocol, pose, partial / "dicom", [&](size_t done, size_t all) {
+        if (shows_progress) fmt::print(stderr, "\r{} of {} images{}", done, all, done == all ? "\n" : "");
+      });
+  write_whole_file(partial / "scan.frames.csv", frames_text(phases, arguments.protocol.seed));
+  write_whole_file(partial / "scan.pose.toml", pose_text(study, pose));
+  write_whole_file(partial / "scan.study.toml", study_text(study));
+  fs::remove(arguments.folder);
+  fs::rename(partial, arguments.folder);
+  size_t files = 0;
+  for (const scanner::ScannedSeries& one : series)
+    files += one.files;
+  if (out.json) {
+    nlohmann::ordered_json json{
+        {"folder", arguments.folder.string()}, {"files", files}, {"seed", arguments.protocol.seed}};
+    json["series"] = nlohmann::ordered_json::array();
+    for (const scanner::ScannedSeries& one : series)
+      json["series"].push_back({{"number", one.number},
+                                {"kind", one.kind},
+                                {"view", one.view},
+                                {"tag_angles_deg", one.angles_deg},
+                                {"files", one.files}});
+    std::cout << json.dump(1) << '\n';
+    return ExitCode::done;
+  }
+  for (const scanner::ScannedSeries& one : series)
+    fmt::print(
+        "Series {}: {}, {}{}, {} files\n", one.number, one.kind, one.view,
+        one.angles_deg.empty() ? "" : fmt::format(", tags {:g} degrees", fmt::join(one.angles_deg, " and ")),
+        one.files);
+  fmt::print("\n{} files are in {}. What they tell:\n  diastole fit {}\n", files,
+             (arguments.folder / "dicom").string(), (arguments.folder / "scan.study.toml").string());
+  return ExitCode::done;
+}
+
+}  // namespace
+
+void add_scan(CommandLine& line) {
+  auto arguments = std::make_shared<ScanArguments>();
+  CLI::App* command = line.add(
+      "scan", "a simulated scanner: DICOM of a study's motion, to plan a scan or to close the loop",
+      "  diastole scan examples/phantom-a.study.toml --set C1_kPa=8.7 -o scan\n"
+      "  diastole fit scan/scan.study.toml\n"
+      "  diastole scan gel.study.toml --peak-kPa 3 --snr 10 --short-axis -20,0,20 --long-axis 0,90 -o trial\n"
+      "The body moves as the study's model says at its start values (or --set), through the pressures of its "
+      "frames, which\n"
+      "are the scanner's phases; --peak-kPa gives a parabolic cycle instead. Tags are laid at time 0 in the "
+      "undeformed body. FOLDER\n"
+      "gets dicom/, the pressures with noise (scan.frames.csv), the pose, and a study of them. "
+      "docs/imaging.md says what is simulated.");
+  ScanArguments& a = *arguments;
+  add_study(*command, a.study);
+  add_values(*command, a.study);
+  command->add_option("-o,--output", a.folder, "the folder to make")->required();
+  const auto positive = CLI::PositiveNumber;
+  command->add_option("--short-axis", a.protocol.short_axis_mm, "heights of slices across the axis, mm")
+      ->delimiter(',')
+      ->expected(0, 64);
+  command
+      ->add_option("--long-axis", a.protocol.long_axis_deg,
+                   "slices along the axis, turned so many degrees from x")
+      ->delimiter(',')
+      ->expected(0, 64);
+  command->add_option("--fov", a.protocol.field_of_view_mm, "field of view, mm")
+      ->check(positive)
+      ->capture_default_str();
+  command->add_option("--matrix", a.protocol.matrix, "pixels each way")
+      ->check(CLI::Range(32, 512))
+      ->capture_default_str();
+  command->add_option("--acquired", a.protocol.acquired, "share of the phase-encoding lines that is measured")
+      ->check(CLI::Range(0.3, 1.0))
+      ->capture_default_str();
+  command->add_option("--thickness", a.protocol.thickness_mm, "of a slice, mm")
+      ->check(positive)
+      ->capture_default_str();
+  command->add_option("--tag-spacing", a.protocol.tags.spacing_mm, "mm")
+      ->check(positive)
+      ->capture_default_str();
+  command
+      ->add_option("--tag-angles", a.protocol.tags.angles_deg, "of the tags' normals from the rows, degrees")
+      ->delimiter(',')
+      ->expected(1, 8);
+  command
+      ->add_option("--tag-pulses", a.protocol.tags.weights,
+                   "flip angles in proportion: 1,1 or binomial, as 1,3,3,1")
+      ->delimiter(',')
+      ->expected(2, 8)
+      ->check(positive);
+  command->add_flag("--grid", a.protocol.tags.grid, "all directions in one image");
+  command->add_option("--snr", a.protocol.snr, "signal of tissue over the noise of one channel")
+      ->check(positive)
+      ->capture_default_str();
+  command->add_option("--T1", a.protocol.T1_s, "of tissue, s")->check(positive)->capture_default_str();
+  command->add_option("--shading", a.protocol.shading, "of the coils, from corner to corner")
+      ->check(CLI::Range(0.0, 1.0))
+      ->capture_default_str();
+  command->add_flag("--cine", a.protocol.cine, "series without tags, too");
+  command->add_flag("!--no-tags", a.protocol.tagged, "no tagged series");
+  command
+      ->add_option("--peak-kPa", a.peak_kPa,
+                   "a parabolic cycle up to this pressure, instead of the study's frames")
+      ->check(positive);
+  command->add_option("--phases", a.phases, "of that cycle")->check(CLI::Range(1, 64))->capture_default_str();
+  command->add_option("--period", a.period_s, "of that cycle, s")->check(positive)->capture_default_str();
+  command->add_option("--seed", a.protocol.seed, "of the noise and of where the tags lie")
+      ->capture_default_str();
+  line.on_run(command, [arguments](const CommandOutput& out) { return run_scan(*arguments, out); });
+}
+
+}  // namespace diastole

@@ -1,0 +1,148 @@
+#include "tools/sim_scanner/slice_image.hpp"
+
+#include <fftw3.h>
+
+#include <array>
+#include <cmath>
+#include <complex>
+#include <mutex>
+#include <numbers>
+#include <random>
+
+#include "tools/sim_scanner/pulse_train.hpp"
+
+namespace diastole::scanner {
+namespace {
+
+constexpr int in_plane_samples = 3, through_samples = 6;
+constexpr double soft_edge = 0.15;         // of the thickness: where the slice's profile falls
+constexpr double water_brightness = 0.65;  // beside tissue's
+constexpr double stirred_T_s = 0.08, bath_T1_s = 2.8;
+
+using Spectrum = Eigen::ArrayXXcf;
+
+void transform(Spectrum& values, int sign) {
+  static std::mutex planning;  // the one part of FFTW that threads must not share
+  auto* data = reinterpret_cast<fftwf_complex*>(values.data());
+  std::unique_lock lock(planning);
+  fftwf_plan plan = fftwf_plan_dft_2d(static_cast<int>(values.cols()), static_cast<int>(values.rows()), data,
+                                      data, sign, FFTW_ESTIMATE);
+  lock.unlock();
+  fftwf_execute(plan);
+  lock.lock();
+  fftwf_destroy_plan(plan);
+}
+
+/// The profile across the slice, s in thicknesses from its middle.
+double profile(double s) { return 0.5 * (std::erf((s + 0.5) / soft_edge) - std::erf((s - 0.5) / soft_edge)); }
+
+class Signal {
+ public:
+  Signal(const ScanProtocol& protocol, const std::vector<TagPlane>& tags, double time_s)
+      : protocol_(protocol), tags_(tags), time_s_(time_s) {
+    for (size_t i = 0; i < table_.size(); ++i)
+      table_[i] = tagged_magnetisation(protocol.tags.weights, protocol.tags.flip_deg * std::numbers::pi / 180,
+                                       2 * std::numbers::pi * static_cast<double>(i) / table_size);
+  }
+
+  [[nodiscard]] double at(const Spot& spot, const Eigen::Vector3d& x_mm) const {
+    switch (spot.medium) {
+      case Medium::nothing:
+        return 0;
+      case Medium::tissue:
+        return recovered(tags_at(spot.X_mm), time_s_, protocol_.T1_s);
+      case Medium::cavity:
+        return water_brightness * recovered(tags_at(x_mm), time_s_, stirred_T_s);
+      case Medium::bath:
+        return water_brightness * recovered(tags_at(x_mm), time_s_, bath_T1_s);
+    }
+    return 0;
+  }
+
+ private:
+  static constexpr int table_size = 1024;
+
+  [[nodiscard]] double tags_at(const Eigen::Vector3d& X_mm) const {
+    double left = 1;
+    for (const TagPlane& tag : tags_) {
+      const double turns = (tag.normal.dot(X_mm) - tag.offset_mm) / protocol_.tags.spacing_mm;
+      const double place = table_size * (turns - std::floor(turns));
+      const auto low = static_cast<size_t>(place) % table_size;
+      const double share = place - std::floor(place);
+      left *= (1 - share) * table_[low] + share * table_[(low + 1) % table_size];
+    }
+    return left;
+  }
+
+  const ScanProtocol& protocol_;
+  const std::vector<TagPlane>& tags_;
+  double time_s_;
+  std::array<double, table_size> table_;
+};
+
+}  // namespace
+
+Picture signal_of(const SliceOfBody& body, const ScanPlane& plane, const ScanProtocol& protocol,
+                  const std::vector<TagPlane>& tags, double time_s) {
+  const Signal signal(protocol, tags, time_s);
+  const double pixel_mm = protocol.field_of_view_mm / protocol.matrix;
+  std::array<double, through_samples> offset_mm, weight;
+  double all = 0;
+  for (int s = 0; s < through_samples; ++s) {
+    const double share = ((s + 0.5) / through_samples - 0.5) * (1 + 4 * soft_edge);
+    const auto at = static_cast<size_t>(s);
+    offset_mm[at] = share * protocol.thickness_mm;
+    weight[at] = profile(share);
+    all += weight[at] * in_plane_samples * in_plane_samples;
+  }
+  Picture picture(protocol.matrix, protocol.matrix);
+  for (int row = 0; row < protocol.matrix; ++row) {
+    for (int column = 0; column < protocol.matrix; ++column) {
+      double sum = 0;
+      for (int i = 0; i < in_plane_samples * in_plane_samples; ++i) {
+        const double right_mm = pixel_mm * (column + (i % in_plane_samples + 0.5) / in_plane_samples - 0.5);
+        const double down_mm = pixel_mm * (row + (i / in_plane_samples + 0.5) / in_plane_samples - 0.5);
+        for (size_t s = 0; s < through_samples; ++s) {
+          const Spot spot = body.at({right_mm, down_mm, offset_mm[s]});
+          if (spot.medium == Medium::nothing) continue;
+          const Eigen::Vector3d x_mm = plane.first_mm + right_mm * plane.along_row +
+                                       down_mm * plane.along_column + offset_mm[s] * plane.normal();
+          sum += weight[s] * signal.at(spot, x_mm);
+        }
+      }
+      // The coils lie to one side and below: sensitivity falls by `shading` towards the other corner.
+      const double far = (row + column) / (2.0 * protocol.matrix);
+      picture(row, column) = static_cast<float>(sum / all * (1 + protocol.shading * (0.5 - far)));
+    }
+  }
+  return picture;
+}
+
+Picture acquired(const Picture& signal, const ScanProtocol& protocol, unsigned seed) {
+  Spectrum spectrum = signal.cast<std::complex<float>>();
+  transform(spectrum, FFTW_FORWARD);
+  const Eigen::Index rows = spectrum.rows();
+  const double half = 0.5 * protocol.acquired * static_cast<double>(rows);
+  std::mt19937 engine(seed);
+  const double pixels = static_cast<double>(spectrum.size());
+  std::normal_distribution<double> noise(0, std::sqrt(pixels / protocol.acquired) / protocol.snr);
+  constexpr double taper = 0.1;  // of the measured lines, at either end
+  for (Eigen::Index column = 0; column < spectrum.cols(); ++column) {
+    for (Eigen::Index row = 0; row < rows; ++row) {
+      const double line = static_cast<double>(2 * row > rows ? row - rows : row);
+      const double from_end = (half - std::abs(line)) / (taper * 2 * half);
+      if (from_end <= 0) {
+        spectrum(row, column) = 0;
+        continue;
+      }
+      const double window = from_end >= 1 ? 1 : 0.5 - 0.5 * std::cos(std::numbers::pi * from_end);
+      const std::complex<double> value =
+          std::complex<double>(spectrum(row, column)) + std::complex<double>(noise(engine), noise(engine));
+      spectrum(row, column) = std::complex<float>(window * value);
+    }
+  }
+  transform(spectrum, FFTW_BACKWARD);
+  return spectrum.abs() / static_cast<float>(pixels);
+}
+
+}  // namespace diastole::scanner
