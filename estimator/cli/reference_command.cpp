@@ -24,7 +24,7 @@ struct ReferenceArguments {
 
 struct ReferenceInterrupted {};
 
-void print_reference(const rig::Reference& reference, const std::filesystem::path& output) {
+void print_reference(const explain::Reference& reference, const std::filesystem::path& output) {
   fmt::print("{} of a rig in which nothing is wrong: what its model misses by itself\n\n",
              reference.sessions == 1 ? "One session" : fmt::format("{} sessions", reference.sessions));
   for (size_t s = 0; s < rig::signal_count; ++s) {
@@ -56,7 +56,7 @@ ExitCode run_reference(const ReferenceArguments& arguments, const CommandOutput&
   require_output({arguments.output, inputs, reference_mark, arguments.force});
   const Interruption interruption;
   try {
-    rig::Reference reference = rig::learn_reference(studies, arguments.threads, [](std::string_view what) {
+    explain::Reference reference = explain::learn_reference(studies, arguments.threads, [](std::string_view what) {
       if (Interruption::requested()) throw ReferenceInterrupted{};
       fmt::print(stderr, "reference: {}\n", what);
     });

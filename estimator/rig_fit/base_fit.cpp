@@ -25,19 +25,4 @@ LinearisedModel declared_rig(const SessionProblem& problem, SessionModel with) {
   return declared;
 }
 
-LinearisedModel fitted_rig(const SessionProblem& problem, const LinearisedModel& declared) {
-  constexpr int most_rounds = 3;
-  constexpr double small = 0.5;  // sds of the priors, in all
-  LinearisedModel fitted = declared;
-  for (int round = 0; round < most_rounds; ++round) {
-    const EvidenceFit fit =
-        fit_with_shares(fitted.target(problem), fitted.columns, problem.error(), problem.error().prior.share);
-    const double moved = (fit.u - fitted.at.u).norm();
-    fitted.at.u = fit.u;
-    fitted.columns = problem.nuisance_columns(fitted.at, fitted.there);
-    if (moved < small) break;
-  }
-  return fitted;
-}
-
 }  // namespace diastole::rig

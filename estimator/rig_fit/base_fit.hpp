@@ -22,7 +22,5 @@ struct LinearisedModel {
 
 /// The rig as declared, with effects that it is known to have, and the modulus and offsets that fit.
 LinearisedModel declared_rig(const SessionProblem& problem, SessionModel with = {});
-/// From there with all nuisances, linearised again until the columns lead nowhere else.
-LinearisedModel fitted_rig(const SessionProblem& problem, const LinearisedModel& declared);
 
 }  // namespace diastole::rig

@@ -169,8 +169,8 @@ void state_error(const StudyModelError& stated, rig::Shares& share) {
 }
 
 /// What its references say of the rig, and the problem with it.
-ReferenceSummary take_reference(const rig::Reference& reference, rig::SessionProblem& problem) {
-  rig::use_reference(reference, problem);
+ReferenceSummary take_reference(const Reference& reference, rig::SessionProblem& problem) {
+  use_reference(reference, problem);
   ReferenceSummary summary;
   summary.sessions = reference.sessions;
   for (size_t s = 0; s < rig::signal_count; ++s) {

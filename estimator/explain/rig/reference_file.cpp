@@ -16,7 +16,7 @@ namespace {
 using Eigen::Index;
 
 /// The rules by which references are learnt: another number makes what is in caches old.
-constexpr int learning_version = 4;
+constexpr int learning_version = 5;
 
 constexpr RecordFormat format{
     "diastole-reference", "a reference of a rig",
@@ -41,7 +41,7 @@ std::string fingerprint_of(const std::vector<Study>& studies) {
 
 }  // namespace
 
-std::string to_json(const rig::Reference& reference) {
+std::string to_json(const Reference& reference) {
   Json json;
   Json& channels = json["channels"] = Json::object();
   for (size_t s = 0; s < rig::signal_count; ++s) {
@@ -66,8 +66,8 @@ std::string to_json(const rig::Reference& reference) {
   return format.document(json).dump() + "\n";
 }
 
-rig::Reference reference_from_json(std::string_view text, const std::string& file) {
-  rig::Reference reference;
+Reference reference_from_json(std::string_view text, const std::string& file) {
+  Reference reference;
   format.read(text, file, [&](const Json& json) {
     for (size_t s = 0; s < rig::signal_count; ++s) {
       const std::string name(rig::name_of(static_cast<rig::Signal>(s)));
@@ -93,7 +93,7 @@ rig::Reference reference_from_json(std::string_view text, const std::string& fil
     if (reference.covariance.llt().info() != Eigen::Success)
       throw std::invalid_argument("key tolerances.covariance: is no covariance");
     for (const auto& [key, segment] : json.at("segments").items()) {
-      rig::ReferenceSegment& read = reference.segments[key];
+      ReferenceSegment& read = reference.segments[key];
       read.misfit = vector_of(segment.at("misfit"));
       read.noise = vector_of(segment.at("noise"));
       if (read.misfit.size() != read.noise.size())
@@ -103,8 +103,8 @@ rig::Reference reference_from_json(std::string_view text, const std::string& fil
   return reference;
 }
 
-rig::Reference reference_of(const Study& study, size_t threads,
-                            const std::function<void(std::string_view)>& progress) {
+Reference reference_of(const Study& study, size_t threads,
+                       const std::function<void(std::string_view)>& progress) {
   const auto& files = study.data.reference;
   const auto is_file = [](const std::filesystem::path& file) { return file.extension() == ".json"; };
   if (files.size() == 1 && is_file(files.front()))
@@ -134,7 +134,7 @@ rig::Reference reference_of(const Study& study, size_t threads,
     } catch (const InputError&) {  // not whole: learnt again
     }
   }
-  rig::Reference learnt = rig::learn_reference(studies, threads, progress);
+  Reference learnt = learn_reference(studies, threads, progress);
   learnt.fingerprint = fingerprint;
   write_cached(kept, to_json(learnt));
   return learnt;

@@ -20,8 +20,9 @@ using rig::Unknown;
 
 /// ln of a size's density, uniform in its logarithm over two decades on one side or both, relative to the normal about 0.
 constexpr double size_range = 4.6;
-constexpr double small_part = 2e-3;   ///< of a size, for derivatives
-constexpr double slope_part = 0.02;   ///< of a tolerance's sd, for derivatives
+constexpr double small_part = 2e-3;  ///< of a size, for derivatives
+constexpr double slope_part =
+    0.1;  ///< of a tolerance's sd, for derivatives: straight over it, and far above what simulations copy
 constexpr double time_step_s = 0.02;  ///< some samples: less is as rough as they are
 constexpr double bound_u = 8.0;       ///< of a nuisance, in sds: no data move one so far
 

@@ -18,6 +18,12 @@ constexpr double least_probability = 0.05;  ///< of a set that is told of
 /// How seldom any part of a model's error may be as large by chance: two sds of one.
 constexpr double surprising_by_chance = 0.0228;
 
+/// From how many sds on the largest of so many shares is a surprise: each of them may be by chance.
+double least_surprise(size_t parts) {
+  return boost::math::quantile(
+      boost::math::complement(boost::math::normal(), surprising_by_chance / static_cast<double>(parts)));
+}
+
 struct Sizes {
   std::vector<double> over_error;
   std::vector<bool> material;
@@ -40,6 +46,36 @@ std::array<double, rig::signal_count> mean_squares(const rig::SessionProblem& pr
 
 VectorXd error_squares(const rig::ModelError& error, const rig::Shares& shares) {
   return error.variance(shares) - error.noise;
+}
+
+/// Offsets of the tolerances, in sds of their list's, by u: a column each.
+Eigen::MatrixXd tolerances_by_u(const rig::SessionProblem& problem, Index unknowns) {
+  const Index count = unknowns - static_cast<Index>(rig::basic_nuisances);
+  const VectorXd none = VectorXd::Zero(unknowns);
+  Eigen::MatrixXd root(count, count);
+  for (Index i = 0; i < count; ++i) {
+    VectorXd unit = none;
+    unit[i + static_cast<Index>(rig::basic_nuisances)] = 1.0;
+    root.col(i) = problem.tolerances(unit) - problem.tolerances(none);
+  }
+  return root;
+}
+
+/// How far off the declared rig's parts would have to be to make such a change, in sds: what they leave of it counts in those
+/// of noise and model's error.
+double sds_of_tolerance(const rig::SessionProblem& problem, const EffectSet& set, const VectorXd& change) {
+  const Eigen::MatrixXd root = tolerances_by_u(problem, set.model.u.size());
+  Eigen::MatrixXd columns = set.known.columns;  // by u: now by basic nuisances and by the list's sds
+  columns.rightCols(root.cols()) =
+      root.transpose().partialPivLu().solve(columns.rightCols(root.cols()).transpose()).transpose();
+  const VectorXd weight = set.evidence.variance.cwiseInverse();
+  Eigen::MatrixXd normal = columns.transpose() * weight.asDiagonal() * columns;
+  constexpr double nearly_free = 1e-6;
+  normal.diagonal().head(rig::basic_nuisances).array() += nearly_free;
+  normal.diagonal().tail(root.cols()).array() += 1.0;
+  const VectorXd along = columns.transpose() * weight.cwiseProduct(change);
+  return std::sqrt(
+      std::max(change.dot(weight.cwiseProduct(change)) - along.dot(normal.llt().solve(along)), 0.0));
 }
 
 /// What a set's effects change each, over the model's error.
@@ -74,7 +110,9 @@ Sizes sizes_of(const rig::SessionProblem& problem, const EffectSet& set, const E
     for (size_t s = 0; s < size.size(); ++s)
       if (error[s] > 0.0) largest = std::max(largest, std::sqrt(size[s] / error[s]));
     sizes.over_error.push_back(largest);
-    sizes.material.push_back(static_cast<size_t>(i) <= given || largest >= known.least_size());
+    const double sds = sds_of_tolerance(problem, set, change);
+    sizes.material.push_back(static_cast<size_t>(i) <= given ||
+                             (largest >= known.least_size() && sds >= least_surprise(1)));
   }
   // An effect's equations describe a real part to a tenth: what is smaller beside it may be its own error.
   constexpr double right_to = 0.1;
@@ -122,12 +160,7 @@ bool is_strained_in_all(const rig::SessionProblem& problem, const EffectSet& set
   }
   const VectorXd none = VectorXd::Zero(set.model.u.size());
   const VectorXd moved = problem.tolerances(set.model.u) - problem.tolerances(none);
-  Eigen::MatrixXd root(count, count);
-  for (Index i = 0; i < count; ++i) {
-    VectorXd unit = none;
-    unit[i + static_cast<Index>(rig::basic_nuisances)] = 1.0;
-    root.col(i) = problem.tolerances(unit) - problem.tolerances(none);
-  }
+  const Eigen::MatrixXd root = tolerances_by_u(problem, set.model.u.size());
   const Eigen::MatrixXd covariance = (root * root.transpose())(known, known);
   const VectorXd of_known = moved(known);
   const double square = of_known.dot(covariance.llt().solve(of_known));
@@ -135,10 +168,22 @@ bool is_strained_in_all(const rig::SessionProblem& problem, const EffectSet& set
                       boost::math::chi_squared(static_cast<double>(known.size())), surprising_by_chance));
 }
 
-/// From how many sds on the largest of so many shares is a surprise: each of them may be by chance.
-double least_surprise(size_t parts) {
-  return boost::math::quantile(
-      boost::math::complement(boost::math::normal(), surprising_by_chance / static_cast<double>(parts)));
+bool is_surprising(const rig::SessionProblem& problem, const EffectSet& set, double most_sds) {
+  const rig::Shares surprise = set.evidence.surprise(problem.error().prior);
+  return std::ranges::any_of(surprise, [&](double sds) { return sds > most_sds; });
+}
+
+/// A name bears what the parts of the error show by chance, and one tolerance that is far off if they are not in all.
+bool bears_a_name(const rig::SessionProblem& problem, const EffectSet& set) {
+  return !is_surprising(problem, set, least_surprise(parts_of(problem.error()))) &&
+         !is_strained_in_all(problem, set);
+}
+
+/// That nothing is wrong is not said of a misfit that one part shows so seldom, nor of one tolerance so far to either side.
+bool bears_nothing_wrong(const rig::SessionProblem& problem, const EffectSet& set) {
+  const size_t tolerances = 2 * (problem.nuisances().size() - rig::basic_nuisances);
+  return inference::is_settled(set.termination) && !is_surprising(problem, set, least_surprise(1)) &&
+         largest_tolerance(set) <= least_surprise(tolerances);
 }
 
 }  // namespace
@@ -201,17 +246,11 @@ SetVerdict judge_sets(const rig::SessionProblem& problem, const SetSearch& searc
   // Hints alone need no search that settled: nothing is named by it.
   const bool is_more = leading->first.size() > search.given;
   if (is_more) out.searches.push_back({best.ids(), best.termination});
-  const rig::Shares surprise = best.evidence.surprise(problem.error().prior);
-  // A name bears what the parts show by chance; that nothing is wrong is not said of a misfit that one part shows so seldom.
-  const double most_surprise = least_surprise(is_more ? parts_of(problem.error()) : 1);
-  const bool surprising =
-      std::ranges::any_of(surprise, [&](double sigmas) { return sigmas > most_surprise; });
-  // Each tolerance to either side; a name bears one that is far off if they are not in all.
-  const size_t tolerances = 2 * (problem.nuisances().size() - rig::basic_nuisances);
-  const bool strained =
-      is_more ? is_strained_in_all(problem, best) : largest_tolerance(best) > least_surprise(tolerances);
+  // That nothing is wrong holds without the hints or with them.
+  const bool borne = is_more ? bears_a_name(problem, best)
+                             : bears_nothing_wrong(problem, *plain) || bears_nothing_wrong(problem, best);
   out.scatter = rig::cycle_scatter(problem, best.model);
-  if (surprising || strained || is_irregular(problem, out.scatter) || !is_settled(out.searches)) {
+  if (!borne || is_irregular(problem, out.scatter) || !is_settled(out.searches)) {
     out.verdict = Verdict::unexplained;
     return out;
   }

@@ -2,8 +2,9 @@
 // From sets of effects with their probabilities to a verdict: significant, material, settled.
 //
 // An effect is material if what it changes, modulus and offsets having followed, is larger than the model's own error in some
-// channel (a fifth of the stated one at least: no instrument is better), and than a tenth of the set's largest. Immaterial
-// ones are hints and named by nobody: probabilities of sets that differ by them add. A set is named with a probability of
+// channel (0.1 % of the range at least: no instrument is better) and than a tenth of the set's largest, and if parts of the
+// declared rig would have to be two sds off to do the same: what is nearer is a tolerance. Immaterial ones are hints and
+// named by nobody: probabilities of sets that differ by them add. A set is named with a probability of
 // nine tenths; sets that are less certain are ambiguous. Where even the best set needs a model's error larger than what is
 // known of it allows, the misfit is unexplained.
 

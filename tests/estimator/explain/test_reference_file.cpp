@@ -8,7 +8,7 @@ namespace diastole::explain {
 namespace {
 
 TEST(Reference, IsReadAsItWasWritten) {
-  rig::Reference reference;
+  Reference reference;
   reference.tolerances = {"hose_length", "hose_bore"};
   reference.mean = Eigen::Vector2d(0.5, -1.0);
   reference.covariance = Eigen::Matrix2d{{0.25, 0.1}, {0.1, 0.5}};
@@ -20,7 +20,7 @@ TEST(Reference, IsReadAsItWasWritten) {
   reference.percent_of_range = {0.3, 1.1, 0.0};
   reference.sessions = 2;
   reference.fingerprint = "0badcafe";
-  const rig::Reference read = reference_from_json(to_json(reference), "rig.reference.json");
+  const Reference read = reference_from_json(to_json(reference), "rig.reference.json");
   EXPECT_EQ(read.tolerances, reference.tolerances);
   EXPECT_EQ(read.covariance, reference.covariance);
   EXPECT_EQ(read.segments.at("sinusoidal").misfit, reference.segments["sinusoidal"].misfit);

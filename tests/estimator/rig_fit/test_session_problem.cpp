@@ -77,7 +77,7 @@ TEST(SessionProblem, FindsTheModulusOfItsOwnModel) {
   const SpecimenFamily family = gel_family();
   const Session session = simulated_session(family, {});
   const SessionProblem problem(session, family, 2);
-  const LinearisedModel rig = fitted_rig(problem, declared_rig(problem));
+  const LinearisedModel rig = declared_rig(problem);
   EXPECT_NEAR(problem.model(rig.at).modulus_kPa, 8.0, 0.1);
   const EvidenceFit fit =
       fit_with_shares(rig.target(problem), rig.columns, problem.error(), problem.error().prior.share);

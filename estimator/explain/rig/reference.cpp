@@ -1,20 +1,32 @@
-#include "estimator/rig_fit/reference.hpp"
+#include "estimator/explain/rig/reference.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <span>
 #include <utility>
 
+#include "estimator/explain/rig/set_fit.hpp"
 #include "estimator/rig_fit/base_fit.hpp"
 
-namespace diastole::rig {
+namespace diastole::explain {
 namespace {
 
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
+using rig::basic_nuisances;
+using rig::error_groups;
+using rig::ErrorGroup;
+using rig::FeatureBlock;
+using rig::ModelError;
+using rig::Nuisance;
+using rig::SessionProblem;
+using rig::SharePrior;
+using rig::Shares;
+using rig::signal_count;
 
 /// In sds of the tolerances' list: what a rig's parts change from day to day, and a specimen from casting to casting.
 constexpr double rig_changes = 0.1;
@@ -22,53 +34,89 @@ constexpr double castings_differ = 0.5;
 /// Of a single reference's misfit, that comes again.
 constexpr double once_seen = 0.5;
 
-/// A reference session and its fit.
-struct Fitted {
-  Study study;
-  Session session;
-  SpecimenFamily family;
-  SessionProblem problem;
-  LinearisedModel declared, rig;
-  EvidenceFit evidence;
-
-  Fitted(Study of, size_t threads)
-      : study(std::move(of)),
-        session(read_session(study)),
-        family(study),
-        problem(session, family, threads) {}
-  void fit() {
-    declared = declared_rig(problem);
-    rig = fitted_rig(problem, declared);
-    evidence =
-        fit_with_shares(rig.target(problem), rig.columns, problem.error(), problem.error().prior.share);
-  }
-};
-
 MatrixXd inverse(const MatrixXd& positive) {
   return positive.llt().solve(MatrixXd::Identity(positive.rows(), positive.cols()));
 }
+
+/// What is known of the tolerances, in sds of their list's.
+struct Knowledge {
+  VectorXd mean;
+  MatrixXd covariance;
+
+  [[nodiscard]] MatrixXd root() const { return covariance.llt().matrixL(); }
+};
+
+/// A reference session and its fit.
+struct Fitted {
+  Study study;
+  rig::Session session;
+  rig::SpecimenFamily family;
+  SessionProblem problem;
+  rig::EvidenceFit evidence;
+
+  Fitted(Study of, size_t threads)
+      : study(std::move(of)),
+        session(rig::read_session(study)),
+        family(study),
+        problem(session, family, threads) {}
+  /// With this knowledge as the prior; the search starts at these tolerances.
+  void fit(const Knowledge& before, const VectorXd& tolerances) {
+    const MatrixXd root = before.root();
+    problem.set_tolerances(before.mean, root);
+    rig::LinearisedModel start = rig::declared_rig(problem);
+    start.at.u.tail(tolerances.size()) = root.triangularView<Eigen::Lower>().solve(tolerances - before.mean);
+    start.columns = problem.nuisance_columns(start.at, start.there);
+    const EffectSet linear = fit_set(problem, start.at, start, problem.error().prior.share);
+    const EffectSet exact = fit_set_exactly(problem, linear);
+    evidence = exact.evidence;
+    std::fprintf(stderr, "REFFIT %d %d %.1f %.1f\n", (int)linear.termination, (int)exact.termination,
+                 linear.log_posterior, exact.log_posterior);
+  }
+  /// What it teaches beside what was known when it was fitted.
+  [[nodiscard]] Knowledge knowledge(const Knowledge& before) const {
+    const auto count = before.mean.size();
+    const MatrixXd root = before.root();
+    return {before.mean + root * evidence.u.tail(count),
+            root * inverse(evidence.precision).bottomRightCorner(count, count) * root.transpose()};
+  }
+};
 
 bool is_of_specimen(const Nuisance& nuisance) {
   return nuisance.name.starts_with("gel_") || nuisance.name == "inner_radius";
 }
 
-void combine_tolerances(const std::vector<std::unique_ptr<Fitted>>& fits, Reference& out) {
+/// Wider by what changes from one session to the next.
+void widen(Knowledge& known, const std::vector<Nuisance>& list) {
+  for (Index i = 0; i < known.mean.size(); ++i) {
+    const bool of_specimen = is_of_specimen(list[basic_nuisances + static_cast<size_t>(i)]);
+    known.covariance(i, i) += std::pow(of_specimen ? castings_differ : rig_changes, 2);
+  }
+}
+
+/// What all sessions teach, one after the other. Far from what is declared a search ends early: the second pass starts where
+/// the first one ended, with nothing known again.
+Knowledge learn_tolerances(const std::vector<std::unique_ptr<Fitted>>& fits,
+                           const std::function<void(const std::string&)>& report) {
+  constexpr int passes = 2;
   const auto& list = fits.front()->problem.nuisances();
   const auto count = static_cast<Index>(list.size() - basic_nuisances);
-  MatrixXd precision = MatrixXd::Identity(count, count);
-  VectorXd pull = VectorXd::Zero(count);
-  for (const auto& fit : fits) {
-    const MatrixXd own = inverse(inverse(fit->evidence.precision).bottomRightCorner(count, count));
-    precision += own - MatrixXd::Identity(count, count);
-    pull += own * fit->evidence.u.tail(count);
+  Knowledge known;
+  VectorXd start = VectorXd::Zero(count);
+  for (int pass = 0; pass < passes; ++pass) {
+    known = {VectorXd::Zero(count), MatrixXd::Identity(count, count)};
+    for (const auto& fit : fits) {
+      report(fmt::format("fitting the reference {}", fit->study.file.filename().string()));
+      fit->fit(known, start);
+      known = fit->knowledge(known);
+      for (Index i = 0; i < count; ++i)
+        std::fprintf(stderr, "REF %-22s %.2f +- %.2f\n",
+                     list[basic_nuisances + static_cast<size_t>(i)].name.c_str(), known.mean[i],
+                     std::sqrt(known.covariance(i, i)));
+      widen(known, list);
+      start = known.mean;
+    }
   }
-  out.covariance = inverse(precision);
-  out.mean = out.covariance * pull;
-  for (Index i = 0; i < count; ++i) {
-    const Nuisance& nuisance = list[basic_nuisances + static_cast<size_t>(i)];
-    out.tolerances.push_back(nuisance.name);
-    out.covariance(i, i) += std::pow(is_of_specimen(nuisance) ? castings_differ : rig_changes, 2);
-  }
+  return known;
 }
 
 /// One features' difference of two references, of the segments that both hold.
@@ -115,18 +163,18 @@ Reference learn_reference(const std::vector<Study>& studies, size_t threads,
   };
   Reference out;
   std::vector<std::unique_ptr<Fitted>> fits;
-  for (const Study& study : studies) {
-    report(fmt::format("fitting the reference {}", study.file.filename().string()));
+  for (const Study& study : studies)
     fits.push_back(std::make_unique<Fitted>(study, threads));
-    fits.back()->fit();
-  }
   out.sessions = fits.size();
-  combine_tolerances(fits, out);
-  const MatrixXd root = out.covariance.llt().matrixL();
+  const Knowledge known = learn_tolerances(fits, report);
+  for (const Nuisance& nuisance : std::span(fits.front()->problem.nuisances()).subspan(basic_nuisances))
+    out.tolerances.push_back(nuisance.name);
+  out.mean = known.mean;
+  out.covariance = known.covariance;
+  report("learning what the rig's model leaves");
   std::array<double, signal_count> squares{}, rows{};
   for (const auto& fit : fits) {
-    fit->problem.set_tolerances(out.mean, root);
-    fit->fit();
+    fit->fit(known, known.mean);
     for (size_t g = 0; g < error_groups; ++g)
       out.all[g] += std::pow(fit->evidence.shares[g], 2) / static_cast<double>(fits.size());
     for (const FeatureBlock& block : fit->problem.features().blocks()) {
@@ -179,9 +227,9 @@ Reference learn_reference(const std::vector<Study>& studies, size_t threads,
       const double unit = sum.unit[i] / sum.count;
       const double common = std::max(std::pow(out.all[g], 2) - std::pow(out.again[g], 2), 0.0) * unit;
       const double scatter = (std::pow(out.again[g], 2) * unit + sum.noise[i] / sum.count) / sum.count;
-      const double known = common + scatter > 0.0 ? common / (common + scatter) : 0.0;
-      segment.misfit[i] *= known;
-      segment.noise[i] = common * (1.0 - known);
+      const double part = common + scatter > 0.0 ? common / (common + scatter) : 0.0;
+      segment.misfit[i] *= part;
+      segment.noise[i] = common * (1.0 - part);
     }
   }
   return out;
@@ -228,4 +276,4 @@ void use_reference(const Reference& reference, SessionProblem& problem) {
   problem.take_off(misfit);
 }
 
-}  // namespace diastole::rig
+}  // namespace diastole::explain

@@ -1,7 +1,8 @@
 #pragma once
 // What sessions in which nothing is wrong tell of their rig: its tolerances, and what its model misses by itself.
 //
-//   tolerances   their joint posterior, wider by what changes from day to day and from casting to casting
+//   tolerances   their posterior of one session after the other, wider each time by what changes from day to day and from
+//                casting to casting; they are simulated in these fits, since a hose's parts trade with each other along valleys
 //   misfit       what all references leave of a segment's features in common is the rig's own: its best estimate is taken
 //                off later sessions' features of the same segments, as far as it is known
 //   shares       how large the model's error is in all (segments that no reference holds), and how much of it does not come
@@ -18,7 +19,7 @@
 
 #include "estimator/rig_fit/session_problem.hpp"
 
-namespace diastole::rig {
+namespace diastole::explain {
 
 struct ReferenceSegment {
   Eigen::VectorXd misfit;  ///< of the block's features, kPa or mL times root samples
@@ -29,11 +30,11 @@ struct Reference {
   std::vector<std::string> tolerances;  ///< names, in the order of the mean
   Eigen::VectorXd mean;                 ///< in sds of the list's priors
   Eigen::MatrixXd covariance;
-  std::map<std::string, ReferenceSegment> segments;  ///< by FeatureBlock::key
-  Shares all{};                                      ///< of the model's error without the references
-  Shares again{};                                    ///< of the part that does not repeat
-  std::array<double, signal_count> rms{};            ///< of the references' misfit, kPa or mL
-  std::array<double, signal_count> percent_of_range{};
+  std::map<std::string, ReferenceSegment> segments;  ///< by rig::FeatureBlock::key
+  rig::Shares all{};                                 ///< of the model's error without the references
+  rig::Shares again{};                               ///< of the part that does not repeat
+  std::array<double, rig::signal_count> rms{};       ///< of the references' misfit, kPa or mL
+  std::array<double, rig::signal_count> percent_of_range{};
   size_t sessions = 0;
   std::string fingerprint;  ///< of the recordings
 };
@@ -43,6 +44,6 @@ Reference learn_reference(const std::vector<Study>& studies, size_t threads,
                           const std::function<void(std::string_view)>& progress = {});
 
 /// Priors, misfit and shares of a session of that rig.
-void use_reference(const Reference& reference, SessionProblem& problem);
+void use_reference(const Reference& reference, rig::SessionProblem& problem);
 
-}  // namespace diastole::rig
+}  // namespace diastole::explain
