@@ -148,15 +148,23 @@ bool is_irregular(const rig::SessionProblem& problem, const std::vector<rig::Cyc
   });
 }
 
+/// Does an effect of the set change this part ("hose_bore" by "hose-compliance")? It is another one then than what was learnt.
+bool is_changed(const EffectSet& set, std::string_view part) {
+  return std::ranges::any_of(set.model.terms, [&](const rig::ModelTerm& term) {
+    const std::string_view id = term.effect->text().id;
+    return part.substr(0, part.find('_')) == id.substr(0, id.find('-'));
+  });
+}
+
 /// Are the parts of the rig in all further from what is declared or was learnt of them than is likely? Those that are known to
-/// an order of magnitude only, by no data sheet, may be anywhere.
+/// an order of magnitude only, by no data sheet, may be anywhere; and so may those that an effect changes.
 bool is_strained_in_all(const rig::SessionProblem& problem, const EffectSet& set) {
   constexpr double guess = 0.5;  // sd of a logarithm
   const Index count = set.model.u.size() - static_cast<Index>(rig::basic_nuisances);
   std::vector<Index> known;
   for (Index i = 0; i < count; ++i) {
     const rig::Nuisance& part = problem.nuisances()[static_cast<size_t>(i) + rig::basic_nuisances];
-    if (part.unit != "ln" || part.sd < guess) known.push_back(i);
+    if ((part.unit != "ln" || part.sd < guess) && !is_changed(set, part.name)) known.push_back(i);
   }
   const VectorXd none = VectorXd::Zero(set.model.u.size());
   const VectorXd moved = problem.tolerances(set.model.u) - problem.tolerances(none);
