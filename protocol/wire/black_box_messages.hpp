@@ -9,6 +9,8 @@
 
 namespace diastole::wire {
 
+// clang-format off
+
 #define DIASTOLE_BLACK_BOX(number, name) name = number,
 enum class Noted : std::uint8_t {
 #include "protocol/wire/black_box_list.inc"
@@ -39,26 +41,23 @@ struct BlackBoxEntry {
   std::int32_t argument = 0;
 
   static constexpr void layout(auto& self, auto& visit) {
-    DIASTOLE_FIELDS(number, boot);
+    visit.field("number", self.number);
+    visit.field("boot", self.boot);
     visit.choice("kind", self.kind, kLastNoted);
-    DIASTOLE_FIELDS(detail, tick, argument);
+    visit.field("detail", self.detail);
+    visit.field("tick", self.tick);
+    visit.field("argument", self.argument);
   }
   constexpr bool operator==(const BlackBoxEntry&) const = default;
 };
 
 // Host → controller: answer with the first entry whose number is `from` or more.
 //
-//   offset size field
-//        0    2 request_id                   chosen by the host; the answer repeats it
-//        2    4 from
-//
 // Example ReadBlackBox: 07 01 2A 00 00 00
 struct ReadBlackBox {
-  static constexpr MessageType kType = MessageType::ReadBlackBox;
-  std::uint16_t request_id = 0;
-  std::uint32_t from = 0;
-
-  static constexpr void layout(auto& self, auto& visit) { DIASTOLE_FIELDS(request_id, from); }
+  DIASTOLE_LAYOUT(ReadBlackBox,
+      (value,  0, uint16_t, request_id),  // chosen by the host; the answer repeats it
+      (value,  2, uint32_t, from))
   static constexpr ReadBlackBox example() { return {.request_id = 0x0107, .from = 42}; }
 };
 
@@ -82,12 +81,15 @@ struct BlackBoxReport {
   BlackBoxEntry entry;
 
   static constexpr void layout(auto& self, auto& visit) {
-    DIASTOLE_FIELDS(request_id, newest);
+    visit.field("request_id", self.request_id);
+    visit.field("newest", self.newest);
     BlackBoxEntry::layout(self.entry, visit);
   }
   static constexpr BlackBoxReport example() {
     return {.request_id = 0x0107, .newest = 44, .entry = {42, 2, Noted::fault, 1, 168'000'000, 300}};
   }
 };
+
+// clang-format on
 
 }  // namespace diastole::wire

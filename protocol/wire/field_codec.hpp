@@ -1,15 +1,16 @@
 #pragma once
-// A message says once, in its `layout`, which fields it has, in which order, with which range; writing,
-// reading, measuring and the schema hash are visitors of that one declaration.
+// A message says once which fields it has, at which offset, with which range; its members, and writing, reading and the
+// schema hash, which are visitors of its `layout`, follow from that table.
 //
-//   template <class Self, class Visitor>
-//   static constexpr void layout(Self& self, Visitor& visit) {
-//     visit.field("period_us", self.period_us, 1000U, 600'000'000U);  // inclusive bounds
-//     visit.choice("waveform", self.waveform, kLastWaveform);         // enumeration 0 … last, one byte
-//     visit.list("position_microsteps", self.count, self.values);     // count (one byte), then the values
-//     DIASTOLE_FIELDS(token, tick);                                    // fields of any value
-//   }
+//   struct Example {
+//     DIASTOLE_LAYOUT(Example,                                                  // kType is MessageType::Example
+//                     (value, 0, std::uint32_t, token),                         // any value
+//                     (within, 4, std::uint32_t, period_us, 1000U, 60'000U),    // inclusive bounds
+//                     (choice, 8, Waveform, waveform, kLastWaveform),           // enumeration 0 … last, one byte
+//                     (list, 9, count, std::int32_t, position_microsteps, 50))  // count (one byte), so many values
+//   };
 //
+// A member begins at 0, or at its least value where 0 is none. What a table cannot say has a `layout` of its own.
 // Integers are little-endian, signed ones in two's complement; nothing is padded.
 
 #include <array>
@@ -168,11 +169,37 @@ class SchemaHasher {
   std::uint32_t hash_ = 2166136261U;
 };
 
-// Fields of any value one after the other, each under its own name: DIASTOLE_FIELDS(token, received_tick); in a layout.
-#define DIASTOLE_FIELDS(...) DIASTOLE_SCAN(DIASTOLE_EACH_FIELD(__VA_ARGS__))
-#define DIASTOLE_EACH_FIELD(name, ...) \
-  visit.field(#name, self.name) __VA_OPT__(; DIASTOLE_MORE_FIELDS DIASTOLE_PARENTHESES(__VA_ARGS__))
-#define DIASTOLE_MORE_FIELDS() DIASTOLE_EACH_FIELD
+template <class T>
+constexpr T least_unless_0(T least, T most) {
+  return least <= T{} && most >= T{} ? T{} : least;
+}
+
+#define DIASTOLE_LAYOUT(message, ...)                                  \
+  DIASTOLE_SCAN(DIASTOLE_EACH_ROW(DIASTOLE_MEMBER, __VA_ARGS__))       \
+  static constexpr void layout(auto& self, auto& visit) {              \
+    DIASTOLE_SCAN(DIASTOLE_EACH_ROW(DIASTOLE_VISIT, __VA_ARGS__))      \
+  }                                                                    \
+  static constexpr std::size_t kOffsets[] = {                          \
+      DIASTOLE_SCAN(DIASTOLE_EACH_ROW(DIASTOLE_OFFSET, __VA_ARGS__))}; \
+  static constexpr MessageType kType = MessageType::message;
+#define DIASTOLE_MEMBER(kind, offset, ...) DIASTOLE_MEMBER_##kind(__VA_ARGS__)
+#define DIASTOLE_MEMBER_value(type, name) type name{};
+#define DIASTOLE_MEMBER_within(type, name, least, most) type name = least_unless_0<type>(least, most);
+#define DIASTOLE_MEMBER_choice(type, name, last) type name{};
+#define DIASTOLE_MEMBER_list(count, type, name, most) \
+  std::uint8_t count = 0;                             \
+  std::array<type, most> name{};
+#define DIASTOLE_VISIT(kind, offset, ...) DIASTOLE_VISIT_##kind(__VA_ARGS__)
+#define DIASTOLE_VISIT_value(type, name) visit.field(#name, self.name);
+#define DIASTOLE_VISIT_within(type, name, least, most) visit.field(#name, self.name, least, most);
+#define DIASTOLE_VISIT_choice(type, name, last) visit.choice(#name, self.name, last);
+#define DIASTOLE_VISIT_list(count, type, name, most) visit.list(#name, self.count, self.name);
+#define DIASTOLE_OFFSET(kind, offset, ...) offset,
+
+// Applies `what` to each row.
+#define DIASTOLE_EACH_ROW(what, row, ...) \
+  what row __VA_OPT__(DIASTOLE_MORE_ROWS DIASTOLE_PARENTHESES(what, __VA_ARGS__))
+#define DIASTOLE_MORE_ROWS() DIASTOLE_EACH_ROW
 #define DIASTOLE_PARENTHESES ()
 #define DIASTOLE_SCAN(...) DIASTOLE_SCAN4(DIASTOLE_SCAN4(DIASTOLE_SCAN4(DIASTOLE_SCAN4(__VA_ARGS__))))
 #define DIASTOLE_SCAN4(...) DIASTOLE_SCAN1(DIASTOLE_SCAN1(DIASTOLE_SCAN1(DIASTOLE_SCAN1(__VA_ARGS__))))

@@ -9,11 +9,9 @@
 
 namespace diastole::wire {
 
+// clang-format off
+
 // Host → controller: finds the home switch (firmware/core/homing.hpp) and calls a place beside it position 0.
-//
-//   offset size field
-//        0    2 request_id                   chosen by the host; the answer repeats it
-//        2    4 lease_id                     the lease whose heartbeats keep the motor going
 //
 // Example Home: 05 00 44 33 22 11
 using Home = LeaseRequest<MessageType::Home, 5>;
@@ -22,25 +20,13 @@ using Home = LeaseRequest<MessageType::Home, 5>;
 // StateChanged (jogging), Ack, and StateChanged when it is at rest. Unhomed it goes at most at the speed of homing; a
 // switch that closes in the direction of motion is a fault. Away from a closed switch it may always go.
 //
-//   offset size field
-//        0    2 request_id                   chosen by the host; the answer repeats it
-//        2    4 lease_id                     the lease whose heartbeats keep the motor going
-//        6    8 distance_nL                  signed, inflate positive
-//       14    4 flow_uL_per_s                speed
-//
 // Example Jog: 0A 00 44 33 22 11 C0 B4 B3 FF FF FF FF FF 88 13 00 00
 struct Jog {
-  static constexpr MessageType kType = MessageType::Jog;
-  std::uint16_t request_id = 0;
-  std::uint32_t lease_id = 0;
-  std::int64_t distance_nL = 0;
-  std::uint32_t flow_uL_per_s = 1U;
-
-  static constexpr void layout(auto& self, auto& visit) {
-    DIASTOLE_FIELDS(request_id, lease_id);
-    visit.field("distance_nL", self.distance_nL, -50'000'000'000, 50'000'000'000);
-    visit.field("flow_uL_per_s", self.flow_uL_per_s, 1U, 10'000'000U);
-  }
+  DIASTOLE_LAYOUT(Jog,
+      (value,   0, uint16_t, request_id),  // chosen by the host; the answer repeats it
+      (value,   2, uint32_t, lease_id),  // the lease whose heartbeats keep the motor going
+      (within,  6, int64_t, distance_nL, -50'000'000'000, 50'000'000'000),  // signed, inflate positive
+      (within, 14, uint32_t, flow_uL_per_s, 1U, 10'000'000U))               // speed
   static constexpr Jog example() {
     return {.request_id = 10, .lease_id = 0x11223344, .distance_nL = -5'000'000, .flow_uL_per_s = 5'000};
   }
@@ -48,43 +34,29 @@ struct Jog {
 
 // Host → controller: runs the armed program. RunStarted reports the tick of the start of run.
 //
-//   offset size field
-//        0    2 request_id                   chosen by the host; the answer repeats it
-//        2    4 lease_id                     the lease whose heartbeats keep the motor going
-//
 // Example Start: 06 00 44 33 22 11
 using Start = LeaseRequest<MessageType::Start, 6>;
 
 // Host → controller: end the run when the present cycle is complete.
-//
-//   offset size field
-//        0    2 request_id                   chosen by the host; the answer repeats it
 //
 // Example StopAtCycleEnd: 07 01
 using StopAtCycleEnd = BareRequest<MessageType::StopAtCycleEnd>;
 
 // Host → controller: decelerate to rest now, at Configure.acceleration_uL_per_s2: a run, homing, a jog.
 //
-//   offset size field
-//        0    2 request_id                   chosen by the host; the answer repeats it
-//
 // Example StopNow: 07 01
 using StopNow = BareRequest<MessageType::StopNow>;
 
 // Host → controller: cut the motor off at once. Position is lost: Fault::halted.
-//
-//   offset size field
-//        0    2 request_id                   chosen by the host; the answer repeats it
 //
 // Example Halt: 07 01
 using Halt = BareRequest<MessageType::Halt>;
 
 // Host → controller: leave the state faulted. Position is kept only after lease_lost.
 //
-//   offset size field
-//        0    2 request_id                   chosen by the host; the answer repeats it
-//
 // Example ClearFault: 07 01
 using ClearFault = BareRequest<MessageType::ClearFault>;
+
+// clang-format on
 
 }  // namespace diastole::wire

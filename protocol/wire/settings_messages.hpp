@@ -12,9 +12,6 @@ namespace diastole::wire {
 
 // Host → controller: answer with SettingsReport.
 //
-//   offset size field
-//        0    2 request_id                   chosen by the host; the answer repeats it
-//
 // Example ReadSettings: 07 01
 using ReadSettings = BareRequest<MessageType::ReadSettings>;
 
@@ -78,7 +75,10 @@ struct SettingsReport {
   MachineSettings settings;
 
   static constexpr void layout(auto& self, auto& visit) {
-    DIASTOLE_FIELDS(request_id, records_written, microstep_pL, backlash_microsteps);
+    visit.field("request_id", self.request_id);
+    visit.field("records_written", self.records_written);
+    visit.field("microstep_pL", self.microstep_pL);
+    visit.field("backlash_microsteps", self.backlash_microsteps);
     MachineSettings::layout(self.settings, visit);
   }
   static constexpr SettingsReport example() {

@@ -35,48 +35,32 @@
 
 namespace diastole::wire {
 
+// clang-format off
+
 // Host → application: reset into the bootloader. Refused unless at rest and disarmed;
 // the motor is switched off.
-//
-//   offset size field
-//        0    2 request_id                   chosen by the host; the answer repeats it
 //
 // Example EnterBootloader: 09 00
 using EnterBootloader = BareRequest<MessageType::EnterBootloader, 9>;
 
 // Host → application or bootloader: what is in a slot? Answered with ImageReport.
 //
-//   offset size field
-//        0    2 request_id                   chosen by the host; the answer repeats it
-//        2    1 slot                         none: the one that runs
-//
 // Example ImageQuery: 09 00 01
 struct ImageQuery {
-  static constexpr MessageType kType = MessageType::ImageQuery;
-  std::uint16_t request_id = 0;
-  ImageSlot slot{};
-
-  static constexpr void layout(auto& self, auto& visit) {
-    visit.field("request_id", self.request_id);
-    visit.choice("slot", self.slot, kLastImageSlot);
-  }
+  DIASTOLE_LAYOUT(ImageQuery,
+      (value,   0, uint16_t, request_id),             // chosen by the host; the answer repeats it
+      (choice,  2, ImageSlot, slot, kLastImageSlot))  // none: the one that runs
   static constexpr ImageQuery example() { return {.request_id = 9, .slot = ImageSlot::b}; }
 };
 
 // Host → application on trial: you work; from now on you are the one to start.
 // Repeated, it changes nothing.
 //
-//   offset size field
-//        0    2 request_id                   chosen by the host; the answer repeats it
-//        2    8 build_id                     of the image that the host means
-//
 // Example ConfirmImage: 09 00 88 77 66 55 44 33 22 11
 struct ConfirmImage {
-  static constexpr MessageType kType = MessageType::ConfirmImage;
-  std::uint16_t request_id = 0;
-  std::uint64_t build_id = 0;
-
-  static constexpr void layout(auto& self, auto& visit) { DIASTOLE_FIELDS(request_id, build_id); }
+  DIASTOLE_LAYOUT(ConfirmImage,
+      (value,  0, uint16_t, request_id),  // chosen by the host; the answer repeats it
+      (value,  2, uint64_t, build_id))    // of the image that the host means
   static constexpr ConfirmImage example() { return {.request_id = 9, .build_id = 0x1122334455667788}; }
 };
 
@@ -115,25 +99,13 @@ struct BeginUpdate {
 
 // Host → bootloader: the next bytes of code.
 //
-//   offset size field
-//        0    2 request_id                   chosen by the host; the answer repeats it
-//        2    4 offset                       from the first byte of code; at most what is held
-//        6    1 count                        of bytes; a multiple of 4
-//        7    n data
-//
 // Example UpdateData: 09 00 00 01 00 00 04 01 00 00 20
 struct UpdateData {
-  static constexpr MessageType kType = MessageType::UpdateData;
   static constexpr std::size_t kMaxCount = 232;
-  std::uint16_t request_id = 0;
-  std::uint32_t offset = 0;
-  std::uint8_t count = 0;
-  std::array<std::uint8_t, kMaxCount> data{};
-
-  static constexpr void layout(auto& self, auto& visit) {
-    DIASTOLE_FIELDS(request_id, offset);
-    visit.list("data", self.count, self.data);
-  }
+  DIASTOLE_LAYOUT(UpdateData,
+      (value,  0, uint16_t, request_id),             // chosen by the host; the answer repeats it
+      (value,  2, uint32_t, offset),                 // from the first byte of code; at most what is held
+      (list,   6, count, uint8_t, data, kMaxCount))  // count: of bytes; a multiple of 4
   static constexpr UpdateData example() {
     return {.request_id = 9, .offset = 256, .count = 4, .data = {1, 0, 0, 0x20}};
   }
@@ -141,16 +113,10 @@ struct UpdateData {
 
 // Host → bootloader: that was all. The image is read back and hashed; if it verifies it is the one to be tried.
 //
-//   offset size field
-//        0    2 request_id                   chosen by the host; the answer repeats it
-//
 // Example FinishUpdate: 09 00
 using FinishUpdate = BareRequest<MessageType::FinishUpdate, 9>;
 
 // Host → bootloader: reset and start what is to be started.
-//
-//   offset size field
-//        0    2 request_id                   chosen by the host; the answer repeats it
 //
 // Example StartImage: 09 00
 using StartImage = BareRequest<MessageType::StartImage, 9>;
@@ -158,58 +124,31 @@ using StartImage = BareRequest<MessageType::StartImage, 9>;
 // Host → bootloader, repeated without pause while the controller is reset by hand: a bootloader that sees one
 // within 30 ms of its start stays, whatever the slots hold. Needs no open session.
 //
-//   offset size field
-//        0    4 word                         "STAY"
-//
 // Example StayInBootloader: 53 54 41 59
 struct StayInBootloader {
-  static constexpr MessageType kType = MessageType::StayInBootloader;
   static constexpr std::uint32_t kWord = 0x59415453;
-  std::uint32_t word = kWord;
-
-  static constexpr void layout(auto& self, auto& visit) { visit.field("word", self.word, kWord, kWord); }
+  DIASTOLE_LAYOUT(StayInBootloader,
+      (within,  0, uint32_t, word, kWord, kWord))  // "STAY"
   static constexpr StayInBootloader example() { return {}; }
 };
 
 // Application or bootloader → host. The application knows its own slot only.
 //
-//   offset size field
-//        0    2 request_id                   chosen by the host; the answer repeats it
-//        2    1 slot                         none: the bootloader answers for itself
-//        3    1 standing                     update.hpp
-//        4    1 version_major                of the image; 0 if there is no header
-//        5    1 version_minor
-//        6    1 version_patch
-//        7    8 build_id
-//       15    4 code_bytes
-//       19    4 held_bytes                   of code that are there
-//       23    4 link_address                 of the slot
-//       27    1 free_slot                    where an update goes
-//
 // Example ImageReport: 09 00 01 01 00 01 00 88 77 66 55 44 33 22 11 30 75 00 00 00 04 00 00 00 00 04
 // 08 01
 struct ImageReport {
-  static constexpr MessageType kType = MessageType::ImageReport;
-  std::uint16_t request_id = 0;
-  ImageSlot slot{};
-  ImageState standing{};
-  std::uint8_t version_major = 0;
-  std::uint8_t version_minor = 0;
-  std::uint8_t version_patch = 0;
-  std::uint64_t build_id = 0;
-  std::uint32_t code_bytes = 0;
-  std::uint32_t held_bytes = 0;
-  std::uint32_t link_address = 0;
-  ImageSlot free_slot{};
-
-  static constexpr void layout(auto& self, auto& visit) {
-    visit.field("request_id", self.request_id);
-    visit.choice("slot", self.slot, kLastImageSlot);
-    visit.choice("standing", self.standing, kLastImageState);
-    DIASTOLE_FIELDS(version_major, version_minor, version_patch, build_id, code_bytes, held_bytes,
-                    link_address);
-    visit.choice("free_slot", self.free_slot, kLastImageSlot);
-  }
+  DIASTOLE_LAYOUT(ImageReport,
+      (value,   0, uint16_t, request_id),                   // chosen by the host; the answer repeats it
+      (choice,  2, ImageSlot, slot, kLastImageSlot),        // none: the bootloader answers for itself
+      (choice,  3, ImageState, standing, kLastImageState),  // update.hpp
+      (value,   4, uint8_t, version_major),                 // of the image; 0 if there is no header
+      (value,   5, uint8_t, version_minor),
+      (value,   6, uint8_t, version_patch),
+      (value,   7, uint64_t, build_id),
+      (value,  15, uint32_t, code_bytes),
+      (value,  19, uint32_t, held_bytes),                   // of code that are there
+      (value,  23, uint32_t, link_address),                 // of the slot
+      (choice, 27, ImageSlot, free_slot, kLastImageSlot))   // where an update goes
   static constexpr ImageReport example() {
     return {.request_id = 9,
             .slot = ImageSlot::b,
@@ -225,30 +164,19 @@ struct ImageReport {
 
 // Application or bootloader → host: the answer to every request of an update but ImageQuery.
 //
-//   offset size field
-//        0    2 request_id                   chosen by the host; the answer repeats it
-//        2    1 request_type                 MessageType of the request
-//        3    1 outcome                      update_outcome_list.inc
-//        4    4 held_bytes                   of code that are there
-//        8    4 value                        what the outcome speaks of
-//
 // Example UpdateAnswer: 09 00 33 05 00 00 00 00 02 00 00 00
 struct UpdateAnswer {
-  static constexpr MessageType kType = MessageType::UpdateAnswer;
-  std::uint16_t request_id = 0;
-  std::uint8_t request_type = 0;
-  UpdateOutcome outcome{};
-  std::uint32_t held_bytes = 0;
-  std::uint32_t value = 0;
-
-  static constexpr void layout(auto& self, auto& visit) {
-    DIASTOLE_FIELDS(request_id, request_type);
-    visit.choice("outcome", self.outcome, kLastUpdateOutcome);
-    DIASTOLE_FIELDS(held_bytes, value);
-  }
+  DIASTOLE_LAYOUT(UpdateAnswer,
+      (value,   0, uint16_t, request_id),                        // chosen by the host; the answer repeats it
+      (value,   2, uint8_t, request_type),                       // MessageType of the request
+      (choice,  3, UpdateOutcome, outcome, kLastUpdateOutcome),  // update_outcome_list.inc
+      (value,   4, uint32_t, held_bytes),                        // of code that are there
+      (value,   8, uint32_t, value))                             // what the outcome speaks of
   static constexpr UpdateAnswer example() {
     return {.request_id = 9, .request_type = 0x33, .outcome = UpdateOutcome::wrong_board, .value = 2};
   }
 };
+
+// clang-format on
 
 }  // namespace diastole::wire

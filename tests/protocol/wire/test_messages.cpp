@@ -108,6 +108,28 @@ TYPED_TEST(EveryMessage, RandomPayloadsAreRefusedOrReadExactly) {
   }
 }
 
+/// Where the fields of a message without list values begin.
+struct OffsetReader {
+  void field(const char*, const auto& value, auto...) { take(sizeof value); }
+  void choice(const char*, const auto&, auto) { take(1); }
+  void list(const char*, const std::uint8_t&, const auto&) { take(1); }
+  void take(std::size_t bytes) {
+    offsets.push_back(size);
+    size += bytes;
+  }
+  std::vector<std::size_t> offsets;
+  std::size_t size = 0;
+};
+
+TYPED_TEST(EveryMessage, FieldsBeginWhereItsTableSays) {
+  if constexpr (requires { TypeParam::kOffsets; }) {
+    OffsetReader read;
+    TypeParam message;
+    TypeParam::layout(message, read);
+    EXPECT_EQ(read.offsets, std::vector(std::begin(TypeParam::kOffsets), std::end(TypeParam::kOffsets)));
+  }
+}
+
 TYPED_TEST(EveryMessage, FitsItsDelivery) {
   if (delivery_of(TypeParam::kType) == Delivery::datagram) {
     EXPECT_LE(encoded(TypeParam::example()).size(), 32U);
