@@ -231,15 +231,13 @@ void add_fit(CommandLine& line) {
       "its bound, which is no estimate.");
   add_study(*command, arguments->study);
   add_values(*command, arguments->study);
-  command->add_option(
-      "--smooth", arguments->smooth,
-      "how alike neighbouring elements are, for values that vary by element: evidence (the data say "
-      "it; default), none, or the usual relative difference, as 0.05");
+  command->add_option("--smooth", arguments->smooth,
+                      "how alike neighbouring elements are, for values that vary by element: evidence (the "
+                      "data say it; default), none, or the usual relative difference, as 0.05");
   command
-      ->add_option(
-          "--robust", arguments->robust,
-          "give wild points no weight (Student's t): yes, no, or auto, when there are more than chance "
-          "explains")
+      ->add_option("--robust", arguments->robust,
+                   "give wild points no weight (Student's t): yes, no, or auto, when there are more than "
+                   "chance explains")
       ->check(CLI::IsMember({"yes", "no", "auto"}))
       ->capture_default_str();
   command
@@ -247,10 +245,9 @@ void add_fit(CommandLine& line) {
           "--pressure-offset", arguments->pressure_offset_kPa,
           "seek a common offset of all frame pressures too, about zero with this standard deviation, kPa")
       ->check(CLI::PositiveNumber);
-  command->add_flag(
-      "--unexamined", arguments->unexamined,
-      "do not look beforehand for what is wrong with the data (docs/reconstruction.md), and fit "
-      "data that cannot be what they say");
+  command->add_flag("--unexamined", arguments->unexamined,
+                    "do not look beforehand for what is wrong with the data (docs/reconstruction.md), and "
+                    "fit data that cannot be what they say");
   command->add_flag("--profile", arguments->profile, "95 % intervals from the likelihood's true shape too");
   command
       ->add_option("--posterior", arguments->posterior_draws,

@@ -150,8 +150,7 @@ void print_table(const std::vector<TableEntry>& table, const Study& study) {
     fmt::print(
         "At noise {} and {} frames: {} = {:.4g} ± {:.2g} (95 % of the refits within {:.4g} to {:.4g}; truth "
         "{:.4g}; the refits' own standard errors are {:.2g} on average, their intervals hold the truth in "
-        "{:.0f} "
-        "% of the cases).\n",
+        "{:.0f} % of the cases).\n",
         noise_words(table.front().noise_mm), table.front().frames, spread.name, spread.mean, spread.sd,
         spread.ci95[0], spread.ci95[1], spread.truth, spread.mean_se, 100 * spread.coverage);
   }
@@ -261,8 +260,8 @@ void add_montecarlo(CommandLine& line) {
   command
       ->add_option(
           "--tag-grid", arguments->grid_mm,
-          "STRIPE,PIXEL, mm, instead of the study's points: a grid of stripes so far apart in six "
-          "short-axis and six long-axis images, a 3-D point a pixel along each stripe, as in the paper")
+          "STRIPE,PIXEL, mm, instead of the study's points: a grid of stripes so far apart in six short-axis "
+          "and six long-axis images, a 3-D point a pixel along each stripe, as in the paper")
       ->delimiter(',')
       ->expected(2)
       ->check(CLI::Range(0.05, 100.0));

@@ -174,8 +174,7 @@ void add_pressure_volume(CommandLine& line) {
                "  diastole pv phantom-a.study.toml --volume-change-mL 60 -o curve.html -o curve.csv\n"
                "  diastole pv heart.study.toml --volume-change-mL 40 --steps 40 --json\n"
                "The cavity's volume is led in equal steps and its pressure found, so that the curve goes on "
-               "where the pressure "
-               "falls.\n"
+               "where the pressure falls.\n"
                "Ctrl-C ends it after the point at hand; what was found is written. Exit code 1: the curve "
                "ends early.");
   add_study(*command, arguments->study);

@@ -90,8 +90,7 @@ ExitCode run_reconstruct(const ReconstructArguments& arguments, const CommandOut
   use_images(study);
   arguments.outputs.require(
       inputs_of(study), output_kinds, "is no kind of file that a reconstruction is written to",
-      "End it in .csv (points for `diastole fit`), .vtkhdf (for ParaView) or .json (for "
-      "`diastole report`).");
+      "End it in .csv (points for `diastole fit`), .vtkhdf (for ParaView) or .json (for `diastole report`).");
   const ReconstructionOptions options = options_of(arguments);
   const Measurement measurement = read_measurement(study);
   const StudyReconstruction reconstruction = reconstruct_study(study, measurement, options);

@@ -105,10 +105,9 @@ void add_shear(CommandLine& line) {
   const std::map<std::string, ShearForm> forms = {{"normalised", ShearForm::normalised},
                                                   {"rotation", ShearForm::rotation}};
   command
-      ->add_option(
-          "--form", arguments->form,
-          "normalised: rotation per load, as in the paper; rotation: right if every rotation has the "
-          "same error")
+      ->add_option("--form", arguments->form,
+                   "normalised: rotation per load, as in the paper; rotation: right if every rotation has "
+                   "the same error")
       ->transform(CLI::CheckedTransformer(forms))
       ->option_text("normalised|rotation [normalised]");
   line.on_run(command, [arguments](const CommandOutput& out) { return run_shear(*arguments, out); });

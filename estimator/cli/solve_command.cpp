@@ -54,10 +54,9 @@ SolutionRecord record_of(const Study& study, const ElasticModel& model, const El
 
 /// Before the work. Throws InputError if a file has another ending, or may not be replaced.
 void require_outputs(const OutputFiles& outputs, const Study& study) {
-  outputs.require(
-      inputs_of(study), kinds, "is no kind of file that a solution is written to",
-      "End it in .vtkhdf (for ParaView), .csv (stress and strain at the Gauss points) or .json (for "
-      "`diastole report`).");
+  outputs.require(inputs_of(study), kinds, "is no kind of file that a solution is written to",
+                  "End it in .vtkhdf (for ParaView), .csv (stress and strain at the Gauss points) or .json "
+                  "(for `diastole report`).");
 }
 
 void write_outputs(const OutputFiles& outputs, const Study& study, const ElasticModel& model,
@@ -207,8 +206,7 @@ void print_for_people(const nlohmann::ordered_json& json) {
   }
   const std::vector<int> mesh = json["mesh"].get<std::vector<int>>();
   fmt::print(
-      "  {}{} elements, {} unknowns, {} load steps, {} Newton iterations with {} factorisations, "
-      "{:.2f} s\n",
+      "  {}{} elements, {} unknowns, {} load steps, {} Newton iterations with {} factorisations, {:.2f} s\n",
       mesh_in_words(mesh, json["elements"].get<int>()), json["elements"].get<size_t>(),
       json["dofs"].get<size_t>(), json["load_steps"].get<size_t>(), json["newton_iterations"].get<size_t>(),
       json["factorisations"].get<size_t>(), json["seconds"].get<double>());

@@ -53,8 +53,7 @@ std::string remark_on_core(const FitOutcome& fit) {
   if (core > telling_factor) {
     return fmt::format(
         "Even the residuals that are not wild are larger than the stated noise ({}): the model lacks "
-        "something, or "
-        "sigma_mm is stated too small.",
+        "something, or sigma_mm is stated too small.",
         figure);
   }
   if (core < 1 / telling_factor)
@@ -67,8 +66,7 @@ void add_alike(std::vector<std::string>& remarks, const FitOutcome& fit) {
   if (fit.alike < telling_factor) return;
   remarks.push_back(
       fmt::format("Residuals of neighbouring tags are alike, as a ghost or a fold in the images makes them: "
-                  "standard errors are {:.2g} "
-                  "times those of independent ones.",
+                  "standard errors are {:.2g} times those of independent ones.",
                   fit.alike));
 }
 
@@ -99,10 +97,10 @@ void add_conditional_mean(std::vector<std::string>& remarks, const FitRecord& re
     const auto held = std::count_if(parameter.elements.begin(), parameter.elements.end(),
                                     [](const FittedElement& element) { return std::isnan(element.se); });
     if (held == 0) continue;
-    remarks.push_back(fmt::format(
-        "The mean {} and its interval are conditional on the bound: {} of {} elements rest on it and "
-        "count as exactly known there, so that the interval is narrower than the data's own.",
-        parameter.name, held, parameter.elements.size()));
+    remarks.push_back(
+        fmt::format("The mean {} and its interval are conditional on the bound: {} of {} elements rest on it "
+                    "and count as exactly known there, so that the interval is narrower than the data's own.",
+                    parameter.name, held, parameter.elements.size()));
   }
 }
 
@@ -117,8 +115,8 @@ std::string smoothing_words(const FittedParameter& parameter) {
   }
   if (smoothness.none_seen) {
     return fmt::format(
-        "but the data show no difference between elements (neighbours alike within {:.2g} % with "
-        "95 % probability)",
+        "but the data show no difference between elements (neighbours alike within {:.2g} % with 95 % "
+        "probability)",
         100 * smoothness.step90[1]);
   }
   return fmt::format(
@@ -139,8 +137,8 @@ void add_regional(std::vector<std::string>& remarks, const FitRecord& record) {
     }
     if (count == 0) continue;
     remarks.push_back(
-        fmt::format("{} varies by element, {}: each value has a standard error of {:.2g} % on "
-                    "average, their mean one of {:.2g} %.",
+        fmt::format("{} varies by element, {}: each value has a standard error of {:.2g} % on average, their "
+                    "mean one of {:.2g} %.",
                     parameter.name, smoothing_words(parameter), 100 * relative / static_cast<double>(count),
                     100 * parameter.se / parameter.value));
   }
@@ -154,15 +152,15 @@ void add_posterior(std::vector<std::string>& remarks, const FitRecord& record) {
     worst = std::max(worst, parameter.posterior->r_hat);
     fewest = std::min(fewest, parameter.posterior->effective_draws);
   }
-  remarks.push_back(fmt::format(
-      "Posterior: {} draws from the likelihood itself, equilibria of all frames solved for each ({} "
-      "equilibria, {:.0f} "
-      "s), {:.0f} % of the steps accepted, R-hat at most {:.3f}, worth at least {:.0f} independent draws.{}",
-      record.posterior->draws, record.posterior->equilibria, record.posterior->seconds,
-      100 * record.posterior->accepted, worst, fewest,
-      worst > agreed || fewest < enough
-          ? " That is too few to trust its tails: ask for more with --posterior."
-          : ""));
+  remarks.push_back(
+      fmt::format("Posterior: {} draws from the likelihood itself, equilibria of all frames solved for each "
+                  "({} equilibria, {:.0f} s), {:.0f} % of the steps accepted, R-hat at most {:.3f}, worth at "
+                  "least {:.0f} independent draws.{}",
+                  record.posterior->draws, record.posterior->equilibria, record.posterior->seconds,
+                  100 * record.posterior->accepted, worst, fewest,
+                  worst > agreed || fewest < enough
+                      ? " That is too few to trust its tails: ask for more with --posterior."
+                      : ""));
 }
 
 /// "C1_kPa 8.9 instead of 9.8", regional values by their mean.
@@ -188,10 +186,8 @@ void add_offset(std::vector<std::string>& remarks, const FitRecord& record, cons
   if (!(deviations > telling_offset)) return;
   remarks.push_back(
       fmt::format("The pressures seem to read {:.3g} ± {:.2g} kPa too {} ({:.1f} standard deviations): with "
-                  "that the frames "
-                  "agree better, and the values would be about {}. Check the catheter's zero; "
-                  "--pressure-offset {:.2g} seeks "
-                  "the offset, and the errors then hold it.",
+                  "that the frames agree better, and the values would be about {}. Check the catheter's "
+                  "zero; --pressure-offset {:.2g} seeks the offset, and the errors then hold it.",
                   std::abs(offset.value_kPa), offset.se_kPa, offset.value_kPa > 0 ? "high" : "low",
                   deviations, values_with_offset(record, offset), 2 * std::abs(offset.value_kPa)));
 }
@@ -202,14 +198,14 @@ void add_undeformed(std::vector<std::string>& remarks, const FitRecord& record) 
       deviation(record.undeformed.chi2_per_residual, static_cast<double>(record.undeformed.residuals));
   if (off > telling_deviation) {
     remarks.push_back(fmt::format(
-        "Frame 0 contradicts the data's own frame of reference: its {} points miss their undeformed "
-        "places by more than the noise (chi2/residual = {:.2f}, mean {:+.3f} mm). Check plane_mm, "
-        "the axes, and that frame 0 is unloaded.",
+        "Frame 0 contradicts the data's own frame of reference: its {} points miss their undeformed places "
+        "by more than the noise (chi2/residual = {:.2f}, mean {:+.3f} mm). Check plane_mm, the axes, and "
+        "that frame 0 is unloaded.",
         record.undeformed.points, record.undeformed.chi2_per_residual, record.undeformed.mean_mm));
   } else {
     remarks.push_back(fmt::format(
-        "Frame 0, which is not fitted, confirms the noise: its {} points miss their undeformed places "
-        "with chi2/residual = {:.2f} and a mean of {:+.3f} mm.",
+        "Frame 0, which is not fitted, confirms the noise: its {} points miss their undeformed places with "
+        "chi2/residual = {:.2f} and a mean of {:+.3f} mm.",
         record.undeformed.points, record.undeformed.chi2_per_residual, record.undeformed.mean_mm));
   }
 }
@@ -328,16 +324,15 @@ std::vector<std::string> remarks_on(const FitRecord& record, const FitOutcome& f
   if (!fit.interrupted.empty())
     remarks.push_back(fmt::format("The {} was ended on request; the fit itself is whole.", fit.interrupted));
   if (record.robust) {
-    remarks.push_back(
-        fmt::format("Fitted with Student's t instead of the normal distribution, because of {} wild "
-                    "residuals: they hardly count, "
-                    "and errors come from the residuals' own spread. Look for mistracked points.",
-                    record.robust->wild));
-  } else if (record.outliers_5sigma > 0) {
     remarks.push_back(fmt::format(
-        "{} residuals are beyond 5 standard deviations; chance makes one in two million. Look for "
-        "mistracked points.",
-        record.outliers_5sigma));
+        "Fitted with Student's t instead of the normal distribution, because of {} wild residuals: they "
+        "hardly count, and errors come from the residuals' own spread. Look for mistracked points.",
+        record.robust->wild));
+  } else if (record.outliers_5sigma > 0) {
+    remarks.push_back(
+        fmt::format("{} residuals are beyond 5 standard deviations; chance makes one in two million. Look "
+                    "for mistracked points.",
+                    record.outliers_5sigma));
   }
   return remarks;
 }

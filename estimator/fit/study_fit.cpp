@@ -100,11 +100,11 @@ void record_parameters(FitRecord& record, const EstimatedParameters& estimated, 
   record.directions = directions_of(record, fit, places);
   if (const auto& offset = fit.pressure_offset) {
     record.pressure_offset_kPa = FittedOffset{offset->value_kPa, offset->se_kPa};
-    record.remarks.push_back(fmt::format(
-        "The pressures differ from the true ones by {:+.4f} ± {:.4f} kPa, as far as these data tell{}; the "
-        "parameters' errors hold this.",
-        offset->value_kPa, offset->se_kPa,
-        std::abs(offset->value_kPa) < 2 * offset->se_kPa ? ": consistent with none" : ""));
+    record.remarks.push_back(
+        fmt::format("The pressures differ from the true ones by {:+.4f} ± {:.4f} kPa, as far as these data "
+                    "tell{}; the parameters' errors hold this.",
+                    offset->value_kPa, offset->se_kPa,
+                    std::abs(offset->value_kPa) < 2 * offset->se_kPa ? ": consistent with none" : ""));
   }
   if (fit.posterior) record.posterior = *fit.posterior;
   if (const auto& robust = fit.robust)
@@ -201,8 +201,7 @@ FitOutcome fit_from_where_it_stands(ElasticMotion& motion, EstimatedParameters& 
   if (failed_at_start()) {
     fit.reason += fmt::format(
         " Nor is there an equilibrium with {}, as stiff as the bounds allow: widen `bounds`, or see whether "
-        "the "
-        "pressures are in kPa and the lengths in mm.",
+        "the pressures are in kPa and the lengths in mm.",
         start_words(estimated));
   } else {
     record.remarks.push_back(fmt::format(

@@ -10,11 +10,10 @@ namespace diastole {
 namespace {
 
 [[noreturn]] void refuse(const PointShare& share, const std::string& file) {
-  throw InputError(
-      {file, "measured points of the loaded frames",
-       fmt::format("only {} of {} lie on the specimen", share.usable, share.measured),
-       "Check that coordinates are in mm and in the specimen's own axes, and that its sizes and the "
-       "pressures (kPa) are right; `diastole reconstruct` tells more."});
+  throw InputError({file, "measured points of the loaded frames",
+                    fmt::format("only {} of {} lie on the specimen", share.usable, share.measured),
+                    "Check that coordinates are in mm and in the specimen's own axes, and that its sizes and "
+                    "the pressures (kPa) are right; `diastole reconstruct` tells more."});
 }
 
 }  // namespace

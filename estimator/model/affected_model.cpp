@@ -53,11 +53,10 @@ void let_ends_slip(const HermiteMesh& mesh, double stiffness_kPa_per_mm, Elastic
 void require_base(const Study& study) {
   const auto* annulus = std::get_if<AnnulusSpecimen>(&study.specimen);
   if (annulus == nullptr || annulus->ends != "fixed" || study.law.name != "neo-hookean" || study.chamber)
-    refuse(
-        study, "model.effects",
-        "effects that show in images start from neo-Hookean gel in an annulus whose ends are fixed, without "
-        "a [chamber]",
-        "Leave the list empty, or describe such a specimen.");
+    refuse(study, "model.effects",
+           "effects that show in images start from neo-Hookean gel in an annulus whose ends are fixed, "
+           "without a [chamber]",
+           "Leave the list empty, or describe such a specimen.");
 }
 
 }  // namespace

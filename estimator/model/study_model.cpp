@@ -106,14 +106,12 @@ void require_plane(const Study& study, const HermiteMesh& mesh, const char* name
       const double z_mm = mesh.value(mesh.reference(), point)[2];
       if (!plate_z_mm) plate_z_mm = z_mm;
       if (std::abs(z_mm - *plate_z_mm) <= allowed_mm) continue;
-      refuse(
-          study, "specimen.ends",
-          fmt::format(
-              "the faces {} are not in one plane across z, as the plates are that \"sprung\" ends are "
-              "glued to: element {} is at z = {:g} mm, element {} at {:g} mm",
-              name, faces.front().element, *plate_z_mm, face.element, z_mm),
-          "Turn the mesh so that its ends lie across z, name only such faces bottom and top, or hold them: "
-          "ends = \"fixed\".");
+      refuse(study, "specimen.ends",
+             fmt::format("the faces {} are not in one plane across z, as the plates are that \"sprung\" ends "
+                         "are glued to: element {} is at z = {:g} mm, element {} at {:g} mm",
+                         name, faces.front().element, *plate_z_mm, face.element, z_mm),
+             "Turn the mesh so that its ends lie across z, name only such faces bottom and top, or hold "
+             "them: ends = \"fixed\".");
     }
   }
 }
@@ -145,10 +143,9 @@ void require_axes(const Study& study, const Law& law, const MeshBody& body) {
          fmt::format("the law {} needs to know where the fibres run, and {}", law.name(),
                      from_file ? "the mesh file has no fibre_deg" : "this kind of specimen has no fibres"),
          fmt::format("{} (docs/mesh-file.md), or choose a law without fibres: {}.",
-                     from_file
-                         ? "Give all nodes of the mesh file a fibre_deg"
-                         : "Export the body by `diastole mesh export STUDY -o BODY.mesh.toml`, give all its "
-                           "nodes a fibre_deg and name it in the study",
+                     from_file ? "Give all nodes of the mesh file a fibre_deg"
+                               : "Export the body by `diastole mesh export STUDY -o BODY.mesh.toml`, give "
+                                 "all its nodes a fibre_deg and name it in the study",
                      fmt::join(isotropic, ", ")));
 }
 
@@ -164,10 +161,10 @@ void require_of_mesh(const Study& study, bool fulfilled, std::string problem, st
 }
 
 void require_ends(const Study& study, const HermiteMesh& mesh) {
-  require_of_mesh(study, !mesh.faces().bottom.empty() || !mesh.faces().top.empty(),
-                  "the mesh names no face bottom or top, so that nothing holds the body",
-                  "Name the faces that specimen.ends is to hold in the mesh file, as "
-                  "faces = [\"bottom xi2=0\"].");
+  require_of_mesh(
+      study, !mesh.faces().bottom.empty() || !mesh.faces().top.empty(),
+      "the mesh names no face bottom or top, so that nothing holds the body",
+      "Name the faces that specimen.ends is to hold in the mesh file, as faces = [\"bottom xi2=0\"].");
 }
 
 void require_chamber_wall(const Study& study, const ElasticModel& model) {
@@ -175,11 +172,10 @@ void require_chamber_wall(const Study& study, const ElasticModel& model) {
   require_of_mesh(study, !model.mesh().faces().outer.empty(),
                   "the mesh names no face outer, which the fluid in the [chamber] would push on",
                   "Name the outer wall in the mesh file, as faces = [\"outer xi3=1\"], or remove [chamber].");
-  require_of_mesh(
-      study, !model.system().chamber()->sealed() || model.system().chamber_closed(),
-      "the outer faces have a free rim, so that a sealed [chamber] has no volume",
-      "Name all of the outer wall outer and the ends that its rim lies on bottom and top, or leave "
-      "out chamber.compliance_mL_per_kPa for constant pressure around the specimen.");
+  require_of_mesh(study, !model.system().chamber()->sealed() || model.system().chamber_closed(),
+                  "the outer faces have a free rim, so that a sealed [chamber] has no volume",
+                  "Name all of the outer wall outer and the ends that its rim lies on bottom and top, or "
+                  "leave out chamber.compliance_mL_per_kPa for constant pressure around the specimen.");
 }
 
 }  // namespace

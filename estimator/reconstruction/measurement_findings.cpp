@@ -127,12 +127,11 @@ void check_sigma_range(Findings& findings, const Measurement& measurement, const
   if (most == 0.0) return;
   // Own errors are as different as the pixels that the points have.
   if (most > 100.0 * least && !measurement.planes_as_seen) {
-    findings.push_back(
-        {Severity::warning, "sigma-range",
-         fmt::format("sigma_mm goes from {:.3g} to {:.3g} mm: the sharpest points count {:.0f} times "
-                     "as much as the dullest.",
-                     least, most, (most / least) * (most / least)),
-         "column sigma_mm", most / least, "", "Check the smallest and the largest values."});
+    findings.push_back({Severity::warning, "sigma-range",
+                        fmt::format("sigma_mm goes from {:.3g} to {:.3g} mm: the sharpest points count "
+                                    "{:.0f} times as much as the dullest.",
+                                    least, most, (most / least) * (most / least)),
+                        "column sigma_mm", most / least, "", "Check the smallest and the largest values."});
   }
   if (least < 1e-3 || most > 0.2 * body.reach_mm) {
     const double value = least < 1e-3 ? least : most;

@@ -34,8 +34,8 @@ void check_points(Findings& findings, const std::vector<FrameField>& fields) {
   if (static_cast<double>(rejected) > std::max(2.0, 0.0005 * all)) {
     findings.push_back(
         {share(rejected) > 25 ? Severity::error : Severity::warning, "wild-points",
-         fmt::format("{} of {} measured numbers ({:.2g} %) lie more than five times their spread away "
-                     "from the motion of the others; they were left out.",
+         fmt::format("{} of {} measured numbers ({:.2g} %) lie more than five times their spread away from "
+                     "the motion of the others; they were left out.",
                      rejected, rows + not_found, share(rejected)),
          "rows marked as wild in the report's map", share(rejected), "%",
          "Look at those points in the images: a stripe may have been taken for its neighbour."});
@@ -131,19 +131,19 @@ bool check_load_order(Findings& findings, const MotionEvidence& evidence) {
     const double share = field.load.pressure_kPa / largest_kPa;
     const double share_se = std::max(field.load.sigma_kPa / largest_kPa, 0.01);
     if (share > std::max(certain * share_se, 0.1) && amplitude.value + certain * amplitude.se < 0.2 * share) {
-      findings.push_back(
-          {Severity::error, "no-motion",
-           fmt::format("The points of frame {} have not moved ({:.2g} of the most loaded frame's motion), "
-                       "although its pressure is {:.3g} kPa.",
-                       field.number, amplitude.value, field.load.pressure_kPa),
-           frame_words(field), amplitude.value, "", "Check which frame these points belong to."});
+      findings.push_back({Severity::error, "no-motion",
+                          fmt::format("The points of frame {} have not moved ({:.2g} of the most loaded "
+                                      "frame's motion), although its pressure is {:.3g} kPa.",
+                                      field.number, amplitude.value, field.load.pressure_kPa),
+                          frame_words(field), amplitude.value, "",
+                          "Check which frame these points belong to."});
     } else if (share < certain * share_se && amplitude.value > std::max(0.15, certain * amplitude.se)) {
-      findings.push_back(
-          {Severity::error, "motion-without-load",
-           fmt::format("The points of frame {} have moved ({:.2g} of the most loaded frame's motion) without "
-                       "pressure ({:.3g} kPa).",
-                       field.number, amplitude.value, field.load.pressure_kPa),
-           frame_words(field), amplitude.value, "", "Check which pressure belongs to this frame."});
+      findings.push_back({Severity::error, "motion-without-load",
+                          fmt::format("The points of frame {} have moved ({:.2g} of the most loaded frame's "
+                                      "motion) without pressure ({:.3g} kPa).",
+                                      field.number, amplitude.value, field.load.pressure_kPa),
+                          frame_words(field), amplitude.value, "",
+                          "Check which pressure belongs to this frame."});
     }
   }
   if (findings.size() > before) return false;
@@ -156,11 +156,10 @@ bool check_load_order(Findings& findings, const MotionEvidence& evidence) {
       if (less.value - more.value < std::max(0.03, certain * std::hypot(less.se, more.se))) continue;
       findings.push_back(
           {Severity::error, "frames-disagree",
-           fmt::format(
-               "Frame {} has more pressure than frame {} ({:.3g} against {:.3g} kPa) but moved less ({:.2g} "
-               "against {:.2g} of the most loaded frame's motion).",
-               evidence.fields[j].number, evidence.fields[i].number, high.pressure_kPa, low.pressure_kPa,
-               more.value, less.value),
+           fmt::format("Frame {} has more pressure than frame {} ({:.3g} against {:.3g} kPa) but moved less "
+                       "({:.2g} against {:.2g} of the most loaded frame's motion).",
+                       evidence.fields[j].number, evidence.fields[i].number, high.pressure_kPa,
+                       low.pressure_kPa, more.value, less.value),
            "column frame of both files", high.pressure_kPa - low.pressure_kPa, "kPa",
            "Give both files the same frame numbers."});
       return false;
@@ -206,11 +205,10 @@ void check_pressure_offset(Findings& findings, const MotionEvidence& evidence) {
       {Severity::warning, "pressure-offset",
        fmt::format("The motion vanishes at {:+.3g} ± {:.2g} kPa and not at 0.", rest.value_kPa, rest.se_kPa),
        "column pressure_kPa, loaded frames", rest.value_kPa, "kPa",
-       fmt::format(
-           "If the transducer has an offset subtract {:.3g} kPa from the loaded frames, or let the fit "
-           "find it: `diastole fit --pressure-offset {:.1g}`; if the two files number their frames "
-           "differently, number them alike.",
-           rest.value_kPa, std::abs(rest.value_kPa))});
+       fmt::format("If the transducer has an offset subtract {:.3g} kPa from the loaded frames, or let the "
+                   "fit find it: `diastole fit --pressure-offset {:.1g}`; if the two files number their "
+                   "frames differently, number them alike.",
+                   rest.value_kPa, std::abs(rest.value_kPa))});
 }
 
 void check_volumes(Findings& findings, const MotionEvidence& evidence) {
@@ -242,14 +240,12 @@ void check_coverage(Findings& findings, const Coverage& coverage) {
   const bool one_axis = along.maxCoeff(&axis) > mainly * along.sum();
   const std::string direction =
       one_axis ? fmt::format("motion along {}", "xyz"[axis]) : coverage.affine_modes.front().words;
-  findings.push_back(
-      {Severity::warning, "unseen-motion",
-       fmt::format(
-           "{} of the twelve shifts, turns, stretches and shears of the body are not seen to {:g} mm; what "
-           "is missed is {}.",
-           unseen, unseen_mm, direction),
-       "most loaded frame", static_cast<double>(unseen), "motions",
-       "Add images whose tags have a normal along it; until then smoothness decides it."});
+  findings.push_back({Severity::warning, "unseen-motion",
+                      fmt::format("{} of the twelve shifts, turns, stretches and shears of the body are not "
+                                  "seen to {:g} mm; what is missed is {}.",
+                                  unseen, unseen_mm, direction),
+                      "most loaded frame", static_cast<double>(unseen), "motions",
+                      "Add images whose tags have a normal along it; until then smoothness decides it."});
 }
 
 void check_method(Findings& findings, const std::vector<FrameField>& fields) {

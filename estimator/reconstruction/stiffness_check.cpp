@@ -87,16 +87,15 @@ std::optional<Finding> pressure_unit_finding(const Study& study, const ApparentS
   };
   if (possible(apparent.ratio)) return {};
   const std::string name = parameter.name.substr(0, parameter.name.size() - 4);
-  Finding finding{
-      Severity::error,
-      "pressure-unit",
-      fmt::format("Pressures and motion together ask for a {} of about {:.2g} kPa, far outside its bounds "
-                  "({:g} to {:g} kPa).",
-                  name, apparent.ratio * parameter.start, parameter.lower, parameter.upper),
-      "column pressure_kPa",
-      apparent.ratio * parameter.start,
-      "kPa",
-      "Check the pressures' unit and gain, the lengths' unit, and the parameter's bounds."};
+  Finding finding{Severity::error,
+                  "pressure-unit",
+                  fmt::format("Pressures and motion together ask for a {} of about {:.2g} kPa, far outside "
+                              "its bounds ({:g} to {:g} kPa).",
+                              name, apparent.ratio * parameter.start, parameter.lower, parameter.upper),
+                  "column pressure_kPa",
+                  apparent.ratio * parameter.start,
+                  "kPa",
+                  "Check the pressures' unit and gain, the lengths' unit, and the parameter's bounds."};
   std::string guesses;
   for (const PressureUnit& unit : pressure_units) {
     if (!possible(apparent.ratio / unit.a_kPa)) continue;

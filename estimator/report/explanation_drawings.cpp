@@ -94,8 +94,7 @@ std::string heat_map(const CellGrid& before, const CellGrid& after, const HeatMa
   const ColourBarPlace bar{second + panel_width + bar_gap, top_room, panel_height};
   return drawing(
       bar.left + bar.width + bar.room, top_room + panel_height + bottom_room,
-      fmt::format("<g transform=\"translate({0} {2})\">{3}</g><g transform=\"translate({1} {2})\">"
-                  "{4}</g>{5}",
+      fmt::format("<g transform=\"translate({0} {2})\">{3}</g><g transform=\"translate({1} {2})\">{4}</g>{5}",
                   left_room, second, top_room, panel(before, scale, labels, "before", true),
                   panel(after, scale, labels, "after", false), colour_bar(scale, labels.bar, bar)));
 }
@@ -138,15 +137,15 @@ std::string waterfall(const std::vector<explain::Step>& steps, double floor) {
       end = std::max(end, previous);
     }
     body += fmt::format(
-        "<rect class=\"bars {}\" x=\"{}\" y=\"{}\" width=\"{:.1f}\" height=\"{}\"/>"
-        "<text class=\"label\" x=\"{:.1f}\" y=\"{}\">{}</text>",
+        "<rect class=\"bars {}\" x=\"{}\" y=\"{}\" width=\"{:.1f}\" height=\"{}\"/><text class=\"label\" "
+        "x=\"{:.1f}\" y=\"{}\">{}</text>",
         i == 0 ? "b" : "a", bars_left, y, px(value) - bars_left, bar_height, end + 8, y + 15,
         number(value, 3));
   }
   body += fmt::format("<path class=\"mark c\" d=\"M{0:.1f} 0V{1}\"/>", px(floor), bars_bottom);
   body += fmt::format(
-      "<text class=\"label\" x=\"{}\" y=\"{}\" text-anchor=\"middle\">reduced chi-square on "
-      "data that were not fitted; dashed: noise</text>",
+      "<text class=\"label\" x=\"{}\" y=\"{}\" text-anchor=\"middle\">reduced chi-square on data that were "
+      "not fitted; dashed: noise</text>",
       bars_left + bar_room / 2, bars_bottom + 38);
   return drawing(bars_left + bar_room + value_room, bars_bottom + bars_foot, body);
 }

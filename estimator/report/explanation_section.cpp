@@ -38,10 +38,9 @@ Figure loop_figure(const Trace& trace, const MeanCycle& mean) {
   plot.line(volume_mL, closed(mean.before), "b dashed", "model before");
   plot.line(volume_mL, closed(mean.after), "c", "model after");
   plot.points(mean.cavity_mL, mean.measured, "a small", "measured");
-  return {plot.svg(),
-          fmt::format("Pressure against the volume that the specimen takes, mean of {} cycles from {} s "
-                      "of {}. Volumes are the augmented model's.",
-                      mean.cycles, number(mean.start_s, 3), named(trace))};
+  return {plot.svg(), fmt::format("Pressure against the volume that the specimen takes, mean of {} cycles "
+                                  "from {} s of {}. Volumes are the augmented model's.",
+                                  mean.cycles, number(mean.start_s, 3), named(trace))};
 }
 
 Figure cycle_figure(const Trace& trace, const MeanCycle& mean) {
@@ -59,10 +58,9 @@ Figure cycle_figure(const Trace& trace, const MeanCycle& mean) {
             "noise of one sample, ± 2 SD");
   plot.line(mean.time_s, before, "b", "before");
   plot.line(mean.time_s, after, "c", "after");
-  return {plot.svg(),
-          fmt::format("What the models miss over the same cycles of {}: what is left after is noise if "
-                      "it stays inside the band.",
-                      named(trace))};
+  return {plot.svg(), fmt::format("What the models miss over the same cycles of {}: what is left after is "
+                                  "noise if it stays inside the band.",
+                                  named(trace))};
 }
 
 /// Lines merged into bands of equal width on a logarithmic axis, by their mean power.
@@ -97,10 +95,9 @@ Figure spectrum_figure(const Trace& trace) {
     plot.line(floor.frequency_Hz, floor.density, "muted heavy", "floor: cycle against cycle");
   plot.line(before.frequency_Hz, before.density, "b", "before");
   plot.line(after.frequency_Hz, after.density, "c", "after");
-  return {plot.svg(),
-          fmt::format("In which frequencies the models miss {}. The floor is what equal cycles differ by "
-                      "among themselves; no model can go below it.",
-                      named(trace))};
+  return {plot.svg(), fmt::format("In which frequencies the models miss {}. The floor is what equal cycles "
+                                  "differ by among themselves; no model can go below it.",
+                                  named(trace))};
 }
 
 void add_heat_map(Page& page, const Trace& trace) {
@@ -113,10 +110,9 @@ void add_heat_map(Page& page, const Trace& trace) {
                   .bar = "residual / noise",
                   .x_range = {0, 1},
                   .y_range = {0, cycles}}),
-        fmt::format(
-            "Measured − model in {}, cycle by cycle, in units of the noise of one sample. Upright stripes "
-            "repeat in every cycle; what changes from top to bottom drifts or happened once.",
-            named(trace))}});
+        fmt::format("Measured − model in {}, cycle by cycle, in units of the noise of one sample. Upright "
+                    "stripes repeat in every cycle; what changes from top to bottom drifts or happened once.",
+                    named(trace))}});
 }
 
 void add_trace(Page& page, const Trace& trace) {
@@ -165,10 +161,9 @@ void add_explained_traces(Page& page, const Explanation& explanation) {
     const double misfit = misfit_in_noise(*trace, trace->before);
     return std::isfinite(misfit) ? misfit : -1.0;
   });
-  page.section(
-      "Measurement and model, before and after",
-      "Before: the base model with its best stiffness and offsets. After: with the effects that were "
-      "added. The recordings in which the base model is farthest off come first.");
+  page.section("Measurement and model, before and after",
+               "Before: the base model with its best stiffness and offsets. After: with the effects that "
+               "were added. The recordings in which the base model is farthest off come first.");
   std::vector<std::vector<std::string>> rows;
   for (const Trace* trace : traces) {
     const bool held = std::ranges::count(explanation.gap.held_out, trace->run) > 0;
@@ -189,15 +184,12 @@ void add_explained_field(Page& page, const Explanation& explanation) {
   const std::vector<std::array<double, 3>> inclusions = inclusions_mm(explanation);
   page.section(
       "Where in the wall",
-      fmt::format(
-          "{} residuals of tags or points, in units of their own errors: {} before and {} after, where 1 is "
-          "noise alone. One tag tells little: the maps show how far the motion is off on the average over a "
-          "inclusion's size, beside the noise of that average, again 1 where noise is all. Places are those "
-          "of "
-          "the "
-          "undeformed body; holes hold too few.{}",
-          explanation.field.size(), number(rms[0], 3), number(rms[1], 3),
-          inclusions.empty() ? "" : " The ring is where the inclusion was found."));
+      fmt::format("{} residuals of tags or points, in units of their own errors: {} before and {} after, "
+                  "where 1 is noise alone. One tag tells little: the maps show how far the motion is off on "
+                  "the average over a inclusion's size, beside the noise of that average, again 1 where "
+                  "noise is all. Places are those of the undeformed body; holes hold too few.{}",
+                  explanation.field.size(), number(rms[0], 3), number(rms[1], 3),
+                  inclusions.empty() ? "" : " The ring is where the inclusion was found."));
   for (const FieldView& view : field_views(explanation.field, inclusions)) {
     page.figures({{heat_map(view.before, view.after,
                             {.x = "angle about the axis (degrees)",
@@ -293,12 +285,11 @@ void add_where(Page& page, const Explanation& e) {
             misfit.run.empty() ? "–" : misfit.run,
             place_words(misfit)};
   };
-  page.table_of(
-      e.where, {"port", "excess χ²", "p", "channel", "run", "where"}, row_of,
-      "Where the base model fails beyond the noise, after correction for how many places were looked at. "
-      "Ports: "
-      "drive (command to cavity volume), specimen (volume to pressure), sensor, clock, field (displacement).",
-      3);
+  page.table_of(e.where, {"port", "excess χ²", "p", "channel", "run", "where"}, row_of,
+                "Where the base model fails beyond the noise, after correction for how many places were "
+                "looked at. Ports: drive (command to cavity volume), specimen (volume to pressure), sensor, "
+                "clock, field (displacement).",
+                3);
 }
 
 void add_effects(Page& page, const Explanation& e) {
@@ -406,12 +397,10 @@ void add_model_error(Page& page, const Explanation& e) {
 
 void add_evidence(Page& page, const Explanation& e) {
   if (e.evidence.empty()) return;
-  page.section(
-      "The evidence",
-      "Each candidate's drop of −2 log likelihood (χ²) with the stiffness and the offsets free to adapt: by "
-      "a full "
-      "refit, or by a score test where that was too small to deserve one. A true effect also predicts runs "
-      "that were not fitted.");
+  page.section("The evidence",
+               "Each candidate's drop of −2 log likelihood (χ²) with the stiffness and the offsets free to "
+               "adapt: by a full refit, or by a score test where that was too small to deserve one. A true "
+               "effect also predicts runs that were not fitted.");
   const auto row_of = [](const Candidate& candidate) -> Page::Row {
     return {set_words(candidate.ids),
             number(candidate.chi_square_drop, 4),
@@ -428,10 +417,9 @@ void add_next(Page& page, const Explanation& e) {
   if (!e.next_experiment) return;
   const NextExperiment& next = *e.next_experiment;
   page.section("What to measure next", next.reason);
-  page.paragraph(
-      fmt::format("It is predicted to separate {} by {} standard deviations after everything free has "
-                  "adapted.",
-                  fmt::join(next.separates, " from "), number(next.predicted_separation_sigma, 2)));
+  page.paragraph(fmt::format(
+      "It is predicted to separate {} by {} standard deviations after everything free has adapted.",
+      fmt::join(next.separates, " from "), number(next.predicted_separation_sigma, 2)));
   page.listing("The experiment file: save it and give it to diastole run", next.toml);
 }
 

@@ -94,10 +94,9 @@ Figure section_figure(const FitSection& section, bool tags) {
   draw(plot, section.outline_after, "a heavy", "fitted model");
   plot.points(section.observed.h_mm, section.observed.v_mm, "b small", "measured");
   const char* lines =
-      tags
-          ? "Thin lines are the tag planes: straight before, as the model bends them after; the dots are the "
-            "tag points that were tracked there."
-          : "Thin lines are a grid drawn on the material; the dots are measured points near the plane.";
+      tags ? "Thin lines are the tag planes: straight before, as the model bends them after; the dots are "
+             "the tag points that were tracked there."
+           : "Thin lines are a grid drawn on the material; the dots are measured points near the plane.";
   return {plot.svg(), section.title + ". " + lines};
 }
 
@@ -123,8 +122,7 @@ Figure pressure_figure(const FitRecord& fit) {
   plot.points(time_s, measured, "b", "measured ± SD");
   return {plot.svg(),
           "Frame pressures: the fit treats each as unknown, tied to its measurement by the stated error. A "
-          "measurement off by "
-          "more than two of its bars would deserve a look."};
+          "measurement off by more than two of its bars would deserve a look."};
 }
 
 void add_frames(Page& page, const FitRecord& fit) {

@@ -67,13 +67,12 @@ void add_frames(Page& page, const ReconstructionRecord& record) {
                     with_error(100 * (frame.volume_ratio - 1), 100 * frame.volume_ratio_se),
                     number(100 * frame.volume_error_rms, 2)});
   }
-  page.table(
-      {"frame", "pressure (kPa)", "numbers", "left out", "χ²/dof", "freedoms", "motion", "largest (mm)",
-       "error (mm)", "volume (%)", "|J − 1| (%)"},
-      rows,
-      "Motion is measured along the last frame's; freedoms are the effective number of parameters that the "
-      "field took from the data; error is the standard error of a displacement component; |J − 1| is the RMS "
-      "over the body.");
+  page.table({"frame", "pressure (kPa)", "numbers", "left out", "χ²/dof", "freedoms", "motion",
+              "largest (mm)", "error (mm)", "volume (%)", "|J − 1| (%)"},
+             rows,
+             "Motion is measured along the last frame's; freedoms are the effective number of parameters "
+             "that the field took from the data; error is the standard error of a displacement component; |J "
+             "− 1| is the RMS over the body.");
 }
 
 void add_families(Page& page, const ReconstructionRecord& record) {
@@ -142,8 +141,8 @@ void add_reconstruction(Page& page, const ReconstructionRecord& record) {
   page.section(
       "Displacement from the images",
       fmt::format(
-          "Study {}: {} on {}, smoothness weights {} and {} on first and second derivatives (length "
-          "{} mm), λ by generalised cross-validation; {:.0f} of {} modes are seen without smoothness.",
+          "Study {}: {} on {}, smoothness weights {} and {} on first and second derivatives (length {} mm), "
+          "λ by generalised cross-validation; {:.0f} of {} modes are seen without smoothness.",
           std::filesystem::path(record.study).filename().string(), record.data,
           record.mesh.empty() ? "a mesh of its own"
                               : fmt::format("{} elements", fmt::join(record.mesh, " × ")),

@@ -62,14 +62,12 @@ std::string make_report(std::span<const std::filesystem::path> files, size_t fra
     } else if (is_cells_file(content)) {
       add(Kind::table, saved_table(content, name), add_montecarlo);
     } else if (!is_json_object(content)) {
-      throw InputError(
-          {name, "",
-           "is neither a run file nor a fit result, a Monte Carlo table, an explanation, a reconstruction, a "
-           "solution or a shear test",
-           "Give files that `diastole run`, `diastole simulate`, `diastole fit -o`, `diastole explain -o`, "
-           "`diastole montecarlo --cells`, `diastole reconstruct -o NAME.json` or `diastole solve -o "
-           "NAME.json` "
-           "wrote, or the CSV that `diastole shear` reads."});
+      throw InputError({name, "",
+                        "is neither a run file nor a fit result, a Monte Carlo table, an explanation, a "
+                        "reconstruction, a solution or a shear test",
+                        "Give files that `diastole run`, `diastole simulate`, `diastole fit -o`, `diastole "
+                        "explain -o`, `diastole montecarlo --cells`, `diastole reconstruct -o NAME.json` or "
+                        "`diastole solve -o NAME.json` wrote, or the CSV that `diastole shear` reads."});
     } else if (explain::is_explanation(content)) {
       explanations.push_back(explain::explanation_from_json(content, name));
       add(Kind::explanation, explanations.back(), add_explanation);

@@ -93,11 +93,11 @@ Figure binned_figure(const FrameBins& bins, const Segment& segment) {
   plot.line(time_s, mean, "a");
   plot.points(time_s, mean, "a", "mean");
   const size_t cycles = bins.frames.empty() ? 0 : bins.frames.front().cycles;
-  return {plot.svg(),
-          fmt::format("{}: cavity pressure in {} image frames, mean and spread over {} cycles ({}, {} mL, "
-                      "{} s).",
-                      fmt::format("Segment {}", bins.segment), bins.frames.size(), cycles, segment.waveform,
-                      chosen(segment.stroke_mL), chosen(bins.period_s))};
+  return {
+      plot.svg(),
+      fmt::format("{}: cavity pressure in {} image frames, mean and spread over {} cycles ({}, {} mL, {} s).",
+                  fmt::format("Segment {}", bins.segment), bins.frames.size(), cycles, segment.waveform,
+                  chosen(segment.stroke_mL), chosen(bins.period_s))};
 }
 
 /// Pressure against volume over the mean cycle; the loop is closed by its first point.
@@ -146,14 +146,12 @@ void add_bins_table(Page& page, const FrameBins& bins) {
                     fmt::format("{:.4f}", frame.sample_sd_kPa),
                     fmt::format("{:+.5f}", frame.drift_kPa_per_cycle), std::to_string(frame.cycles)});
   }
-  page.table(
-      {"frame", "window (s)", "mean (kPa)", "SD over cycles (kPa)", "SD of samples (kPa)",
-       "drift (kPa/cycle)", "cycles"},
-      rows,
-      fmt::format(
-          "Segment {}: the pressure of each image frame. The sample SD also holds the pressure's own change "
-          "within the window.",
-          bins.segment));
+  page.table({"frame", "window (s)", "mean (kPa)", "SD over cycles (kPa)", "SD of samples (kPa)",
+              "drift (kPa/cycle)", "cycles"},
+             rows,
+             fmt::format("Segment {}: the pressure of each image frame. The sample SD also holds the "
+                         "pressure's own change within the window.",
+                         bins.segment));
   for (const runfile::ExcludedCycle& cycle : bins.excluded) {
     page.warning(fmt::format("Cycle {} at {} s is left out of the frames: {}.", cycle.cycle,
                              number(cycle.trigger_s, 5), cycle.reason));
@@ -229,10 +227,9 @@ void add_run(Page& page, const RecordedRun& run, size_t frames) {
   add_schedule(page, run);
   add_losses(page, run);
   if (!run.protocol_toml.empty()) page.listing("The experiment file as it was run", run.protocol_toml);
-  page.section(
-      "Pressure in the image frames",
-      "Gated images are built from many cycles, so a frame's load is the mean over the same window of every "
-      "cycle, counted from that cycle's own trigger.");
+  page.section("Pressure in the image frames",
+               "Gated images are built from many cycles, so a frame's load is the mean over the same window "
+               "of every cycle, counted from that cycle's own trigger.");
   add_segments(page, run, frames);
 }
 

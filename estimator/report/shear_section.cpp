@@ -23,10 +23,9 @@ Figure line_figure(const ShearFit& fit) {
   }
   plot.line(ends, std::vector<double>{0, fit.C1_kPa * far}, "b", "slope C1");
   plot.points(x, y, "a", "markers");
-  return {plot.svg(),
-          fmt::format("Eq. 1, normalised: every marker under every load on one line, whose slope is C1. "
-                      "R² = {:.4f} (about zero, as the line passes through the origin).",
-                      fit.r2)};
+  return {plot.svg(), fmt::format("Eq. 1, normalised: every marker under every load on one line, whose slope "
+                                  "is C1. R² = {:.4f} (about zero, as the line passes through the origin).",
+                                  fit.r2)};
 }
 
 Figure residual_figure(const ShearTest& test, const ShearFit& fit) {
@@ -44,10 +43,9 @@ Figure residual_figure(const ShearTest& test, const ShearFit& fit) {
             "muted");
   plot.points(radius_mm, residual_deg, "a", "markers");
   if (!wild_mm.empty()) plot.points(wild_mm, wild_deg, "b", "outliers");
-  return {plot.svg(),
-          fmt::format("What the line leaves: {} degrees RMS. A trend over the radius would speak against the "
-                      "geometry or the bond.",
-                      number(fit.rms_deg, 2))};
+  return {plot.svg(), fmt::format("What the line leaves: {} degrees RMS. A trend over the radius would speak "
+                                  "against the geometry or the bond.",
+                                  number(fit.rms_deg, 2))};
 }
 
 }  // namespace

@@ -98,12 +98,9 @@ void add_solution(Page& page, const SolutionRecord& record) {
                            record.unknowns));
   page.paragraph(
       "Sections show the material that lay in a plane, undeformed on the left and as it lies under load on "
-      "the right, the "
-      "undeformed outline in grey. Thin lines are the elements' borders; a jump of colour across one is the "
-      "mesh's "
-      "own error. Colours end at the 2nd and the 98th hundredth of the values: stress is singular where a "
-      "corner is "
-      "bonded to a plate.");
+      "the right, the undeformed outline in grey. Thin lines are the elements' borders; a jump of colour "
+      "across one is the mesh's own error. Colours end at the 2nd and the 98th hundredth of the values: "
+      "stress is singular where a corner is bonded to a plate.");
   for (const MapChoice& map : maps_of(record))
     page.figures(section_maps(record.sections, map, pressure_words(record)));
   add_profiles(page, record);

@@ -155,8 +155,8 @@ void compare_loads(ShearFit& fit, const ShearTest& test, const Pairs& pairs) {
     const double limit = student_quantile(line.dof, strong_doubt / static_cast<double>(groups.size()));
     if (!(std::abs(deviations) > limit)) continue;
     fit.remarks.push_back(fmt::format(
-        "The rows at {:.5g} N mm give {:.3f} kPa, the others {:.3f} kPa, {:.1f} standard errors of "
-        "their difference away: check that load, or the gel is not neo-Hookean.",
+        "The rows at {:.5g} N mm give {:.3f} kPa, the others {:.3f} kPa, {:.1f} standard errors of their "
+        "difference away: check that load, or the gel is not neo-Hookean.",
         moment_Nmm, kPa_per_MPa / line.slope, kPa_per_MPa / rest_line.slope, std::abs(deviations)));
   }
 }
@@ -191,11 +191,10 @@ void remark_on_the_line(ShearFit& fit, const ShearTest& test, const OriginLine& 
     const double deviations = intercept_deviations(pairs.x, pairs.y);
     const double limit = student_quantile(static_cast<double>(test.rows.size()) - 2, strong_doubt);
     if (std::abs(deviations) > limit) {
-      fit.remarks.push_back(
-          fmt::format("The line misses the origin by {:.1f} standard errors: the gel at the inner cylinder "
-                      "seems to turn. "
-                      "Check its bond, the inner radius, and that the unloaded image was unloaded.",
-                      std::abs(deviations)));
+      fit.remarks.push_back(fmt::format(
+          "The line misses the origin by {:.1f} standard errors: the gel at the inner cylinder seems to "
+          "turn. Check its bond, the inner radius, and that the unloaded image was unloaded.",
+          std::abs(deviations)));
     }
   }
   const auto other = std::ranges::find_if(
@@ -212,14 +211,13 @@ void remark_on_units(ShearFit& fit, const OriginLine& line) {
   if (fit.determined && (fit.C1_kPa < softest_kPa || fit.C1_kPa > stiffest_kPa)) {
     fit.remarks.push_back(
         fmt::format("C1 = {:.3g} kPa is no soft gel's ({:g} to {:g} kPa): check that rotations are in "
-                    "degrees, moments in N mm "
-                    "and lengths in mm.",
+                    "degrees, moments in N mm and lengths in mm.",
                     fit.C1_kPa, softest_kPa, stiffest_kPa));
   } else if (fit.rms_deg < sharpest_deg && !only_rounding(line)) {
-    fit.remarks.push_back(fmt::format(
-        "The rotations agree within {:.2g} degrees, better than markers can be tracked: check that they "
-        "are in degrees and were measured.",
-        fit.rms_deg));
+    fit.remarks.push_back(
+        fmt::format("The rotations agree within {:.2g} degrees, better than markers can be tracked: check "
+                    "that they are in degrees and were measured.",
+                    fit.rms_deg));
   }
 }
 
@@ -229,18 +227,17 @@ void remark_on_repeats(ShearFit& fit, const ShearTest& test) {
     return !seen.insert({row.moment_Nmm, row.radius_mm, row.rotation_rad}).second;
   });
   if (repeats == 0) return;
-  fit.remarks.push_back(fmt::format(
-      "{} of {} rows repeat another to the last digit and count as measurements of their own, so that the "
-      "standard error is too small: remove them.",
-      repeats, test.rows.size()));
+  fit.remarks.push_back(
+      fmt::format("{} of {} rows repeat another to the last digit and count as measurements of their own, so "
+                  "that the standard error is too small: remove them.",
+                  repeats, test.rows.size()));
 }
 
 void remark_on_outliers(ShearFit& fit) {
   for (const ShearOutlier& outlier : fit.outliers) {
     fit.remarks.push_back(
         fmt::format("Line {} of the file lies {:+.2f} degrees off the fit, {:.1f} standard errors by the "
-                    "other rows' scatter: "
-                    "look at that marker. It is counted like every other.",
+                    "other rows' scatter: look at that marker. It is counted like every other.",
                     outlier.line, outlier.residual_deg, std::abs(outlier.deviations)));
   }
 }

@@ -268,8 +268,7 @@ class Acquisition {
               if (schedule_ && !schedule_stops_ && reason == "completed") {
                 remark("error", "schedule",
                        fmt::format("the pump has made all its cycles, but slice {} of {} was not imaged: "
-                                   "waiting took more "
-                                   "than wait_cycles_at_most",
+                                   "waiting took more than wait_cycles_at_most",
                                    schedule_->slice() + 1, schedule_->slices()));
               }
               end_after_tail(reason);

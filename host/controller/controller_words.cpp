@@ -43,10 +43,9 @@ LimitInWords words_for(wire::Limit limit) {
     case wire::Limit::home:
       return {1e-3, "mL", "Withdraw less: the home position ends the way."};
     case wire::Limit::take_up:
-      return {
-          1e-3, "ms",
-          "Reduce stroke_mL or lengthen period_s: at each reversal the motor needs this time to take up the "
-          "backlash (diastole settings)."};
+      return {1e-3, "ms",
+              "Reduce stroke_mL or lengthen period_s: at each reversal the motor needs this time to take up "
+              "the backlash (diastole settings)."};
     case wire::Limit::trigger_delay:
       return {1e-3, "ms", "Reduce trigger_delay_ms: the TTL and the R-wave of 30 ms end within the period."};
     case wire::Limit::none:
@@ -139,8 +138,7 @@ std::string remedy_for(wire::Refusal refusal) {
       return "Make the rig safe and release the emergency stop.";
     case wire::Refusal::malformed:
       return "A number in the rig or experiment file is beyond what this firmware takes; restart the daemon "
-             "after "
-             "a change of the rig file.";
+             "after a change of the rig file.";
     case wire::Refusal::home_switch_closed:
       return "The piston stands on the home switch: jog the other way (a positive distance), or `diastole "
              "home`.";
@@ -194,8 +192,8 @@ std::optional<VersionMismatch> compare_versions(const wire::Hello& firmware, con
                                  in_words(found), firmware.schema_hash, in_words(program), program_schema);
   if (found > program) {
     mismatch.remedy = fmt::format(
-        "This program is the older one: install Diastole {0} on this computer "
-        "(apt install ./diastole_{0}_amd64.deb), then start the daemon again.",
+        "This program is the older one: install Diastole {0} on this computer (apt install "
+        "./diastole_{0}_amd64.deb), then start the daemon again.",
         in_words(found));
   } else {
     mismatch.remedy = fmt::format(

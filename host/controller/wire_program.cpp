@@ -65,13 +65,12 @@ double reported_rate_Hz(const Experiment& experiment, const ControllerConfig& co
   const double rate_Hz = std::clamp(experiment.sample_rate_Hz, least_Hz, most_Hz);
   const double load_baud = bits_a_byte / usable * line_load_B_s(rate_Hz, experiment);
   if (load_baud <= controller.baud) return rate_Hz;
-  throw InputError(
-      {experiment.file, "sample_rate_Hz",
-       fmt::format("with {:g} positions/s and these periods the line to the controller needs {:.0f} "
-                   "baud, and it has {}",
-                   rate_Hz, load_baud, controller.baud),
-       fmt::format("Raise baud in the rig file{}, or lengthen the shortest period_s.",
-                   rate_Hz > least_Hz ? ", lower sample_rate_Hz (to 300 at the least)" : "")});
+  throw InputError({experiment.file, "sample_rate_Hz",
+                    fmt::format("with {:g} positions/s and these periods the line to the controller needs "
+                                "{:.0f} baud, and it has {}",
+                                rate_Hz, load_baud, controller.baud),
+                    fmt::format("Raise baud in the rig file{}, or lengthen the shortest period_s.",
+                                rate_Hz > least_Hz ? ", lower sample_rate_Hz (to 300 at the least)" : "")});
 }
 
 wire::AddSegment segment_message(const Experiment& experiment, size_t index) {

@@ -85,13 +85,11 @@ class RtuLine final : public ModbusLine {
   [[nodiscard]] RatePlan plan_rate(double asked_Hz, int registers) const override {
     const double most_Hz = 1 / line_.reading_s(registers);
     if (asked_Hz <= most_Hz) return {asked_Hz, {}};
-    return {
-        asked_Hz,
-        fmt::format("a reading of {} registers takes {:.1f} ms at {} baud: the line carries {:.0f} samples "
-                    "a second, {:g} are asked for, so that some {:.0f} % will be missing. Ask for "
-                    "sample_rate_Hz = {:.0f} or less, or use Modbus TCP",
-                    registers, 1e3 * line_.reading_s(registers), line_.baud, most_Hz, asked_Hz,
-                    100 * (1 - most_Hz / asked_Hz), std::floor(most_Hz / 10) * 10)};
+    return {asked_Hz, fmt::format("a reading of {} registers takes {:.1f} ms at {} baud: the line carries "
+                                  "{:.0f} samples a second, {:g} are asked for, so that some {:.0f} % will "
+                                  "be missing. Ask for sample_rate_Hz = {:.0f} or less, or use Modbus TCP",
+                                  registers, 1e3 * line_.reading_s(registers), line_.baud, most_Hz, asked_Hz,
+                                  100 * (1 - most_Hz / asked_Hz), std::floor(most_Hz / 10) * 10)};
   }
 
   std::string ask(bool input_function, int first, std::span<uint16_t> out) override {

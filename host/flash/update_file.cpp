@@ -92,10 +92,9 @@ UpdateFile parse_update_file(const std::string& file, const std::vector<uint8_t>
 UpdateFile read_update_file(const std::string& file) {
   std::ifstream stream(file, std::ios::binary);
   if (!stream || std::filesystem::is_directory(file)) {
-    refuse(
-        file, "", "cannot be read",
-        "Give the update file, such as build/firmware/bin/diastole-stm32f405.image (cmake --preset firmware "
-        "and cmake --build --preset firmware make it).");
+    refuse(file, "", "cannot be read",
+           "Give the update file, such as build/firmware/bin/diastole-stm32f405.image (cmake --preset "
+           "firmware and cmake --build --preset firmware make it).");
   }
   return parse_update_file(file, {std::istreambuf_iterator<char>(stream), {}});
 }

@@ -162,8 +162,7 @@ void RigService::connect() {
   if (const auto& found = controller_->found_moving()) {
     const std::string text = fmt::format(
         "the pump was found {} although nobody had ordered it since the connection was made, and was "
-        "stopped; "
-        "nothing of that motion was recorded",
+        "stopped; nothing of that motion was recorded",
         wire::state_name(*found));
     note({"warning", "found_moving", text});
     const std::lock_guard lock(mutex_);
@@ -431,8 +430,7 @@ CalibrationReport RigService::do_calibrate(const CalibrationOrder& order) {
         !objection.empty()) {
       throw HardwareError(
           "channel " + channel.name, objection,
-          "Nothing was changed. Let the rig come to rest, look at transducer, tap and cable, and try "
-          "again.");
+          "Nothing was changed. Let the rig come to rest, look at transducer, tap and cable, and try again.");
     }
     const CalibrationPoint point{reading.mean_V, order.kPa.value_or(0), utc_now(), order.operator_name};
     order.kPa ? changed.add_point(channel.name, point) : changed.set_zero(channel.name, point);

@@ -87,8 +87,7 @@ json follow(DaemonClient& daemon, const SessionOptions& options, const json& beg
   } catch (const HardwareError& error) {
     throw HardwareError(
         "run", fmt::format("lost sight of the daemon: {}", error.what()),
-        fmt::format("If the daemon could end the run, it is in {}; otherwise make it of the journal: "
-                    "{}.",
+        fmt::format("If the daemon could end the run, it is in {}; otherwise make it of the journal: {}.",
                     begun.at("run_file").get<std::string>(),
                     recovery(begun.at("journal").get<std::string>(), options)));
   }

@@ -65,10 +65,9 @@ BidsRecording bids_recording(const runfile::RecordedRun& run) {
     recording.description[name] = {{"Description", describe(name)}, {"Units", "kPa"}};
   recording.description["commanded_mL"] = {{"Description", "Volume of the steps that the pump was commanded"},
                                            {"Units", "mL"}};
-  recording.description["trigger"] = {{"Description",
-                                       "1 in the sample nearest to the start of a cycle, which triggers "
-                                       "the scanner; else 0"},
-                                      {"Units", "1"}};
+  recording.description["trigger"] = {
+      {"Description", "1 in the sample nearest to the start of a cycle, which triggers the scanner; else 0"},
+      {"Units", "1"}};
   recording.description["RunID"] = run.run_id;
   recording.description["AcquisitionDateTime"] = run.started_utc;
   recording.description["SoftwareName"] = run.producer;

@@ -82,8 +82,7 @@ diastole::ExitCode run(int argc, char** argv) {
       "Exit codes: 0 done, 1 it ran but the answer is negative, 2 wrong usage or input, 3 hardware or link "
       "fault.\n"
       "With --json, standard output holds one JSON document; after exit code 2 or 3 it may be empty: the "
-      "exit "
-      "code\nand the text on standard error tell the error.");
+      "exit code\nand the text on standard error tell the error.");
   diastole::CommandLine line(app);
   diastole::add_host_commands(line);
   diastole::add_catheter(line);

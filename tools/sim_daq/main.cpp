@@ -56,8 +56,7 @@ int main(int argc, char** argv) {
   CLI::App app(
       "A simulated analog-input instrument: Modbus TCP with LabJack T-series registers\n"
       "(AIN#n as FLOAT32 at 2n, CORE_TIMER at 61520, TEST at 55100). Prints one JSON line with its address, "
-      "serves until "
-      "SIGTERM.",
+      "serves until SIGTERM.",
       "sim_daq");
   app.footer("Example:\n  sim_daq --port 5020 --amplitude-V 2 --frequency-Hz 0.8 &");
   Options options;

@@ -84,11 +84,10 @@ std::vector<FaultSwitch> parse_faults(const std::vector<std::string>& texts) {
   for (const std::string& text : texts) {
     const auto fault = split(text);
     if (!fault) {
-      throw InputError(
-          {"", "--fault", fmt::format("\"{}\" is not a fault with its time", text),
-           "Write NAME@T, NAME@T+LENGTH or NAME@T:off@T with times in seconds, /VALUE before :off if "
-           "it takes one; ttl+T counts from the first trigger, run+T from the start of run. `sim_rig "
-           "faults` lists the names."});
+      throw InputError({"", "--fault", fmt::format("\"{}\" is not a fault with its time", text),
+                        "Write NAME@T, NAME@T+LENGTH or NAME@T:off@T with times in seconds, /VALUE before "
+                        ":off if it takes one; ttl+T counts from the first trigger, run+T from the start of "
+                        "run. `sim_rig faults` lists the names."});
     }
     const FaultKind& kind = fault_named(fault->name);
     switches.push_back({&kind, fault->on, kind.value(fault->value)});

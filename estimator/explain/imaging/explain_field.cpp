@@ -176,8 +176,7 @@ class Explainer {
       out_.verdict = Verdict::none;
       out_.summary = fmt::format(
           "Nothing exceeds the noise: C1 = {:.3f} kPa explains {} tag residuals; the nearest effect, {}, "
-          "would gain "
-          "{:.1f} of chi2.",
+          "would gain {:.1f} of chi2.",
           base_.C1_kPa, base_.residuals.size(), best.name(), best.gain);
       return;
     }
@@ -234,8 +233,8 @@ class Explainer {
     }
     out_.verdict = out_.ambiguous_with.empty() ? Verdict::named : Verdict::ambiguous;
     out_.summary = fmt::format(
-        "{} explains what the base model does not: chi2 falls by {:.1f}, C1 becomes {:.3f} kPa "
-        "instead of {:.3f}.",
+        "{} explains what the base model does not: chi2 falls by {:.1f}, C1 becomes {:.3f} kPa instead of "
+        "{:.3f}.",
         best.name(), best.gain, best.fit.C1_kPa, base_.C1_kPa);
     if (!out_.ambiguous_with.empty()) {
       std::vector<std::string> ids;

@@ -50,9 +50,7 @@ FieldCase field_case(const Study& study) {
     refuse(study, "law.parameters.C1_kPa.vary",
            "images are explained from a gel of one stiffness, not of one value an element",
            "Set vary = \"whole\": an inclusion is then found by name, and a stiffness that varies smoothly "
-           "is told "
-           "as something "
-           "outside the library. `diastole fit` maps one value an element.");
+           "is told as something outside the library. `diastole fit` maps one value an element.");
   if (study.chamber)
     refuse(study, "chamber", "field effects start from a specimen in the open",
            "Leave [chamber] out: its back pressure is one of the effects.");

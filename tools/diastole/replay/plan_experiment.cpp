@@ -117,10 +117,8 @@ void write_experiment(const RecordedRun& run, ReplayPlan& plan) {
       rest_s, segments);
   plan.remarks.push_back(
       "/protocol/toml is no experiment file of this program: the experiment was made of /protocol/segments; "
-      "the "
-      "controller's own acceleration, and triggers that rise with a cycle's first step, may differ from what "
-      "was "
-      "recorded");
+      "the controller's own acceleration, and triggers that rise with a cycle's first step, may differ from "
+      "what was recorded");
 }
 
 /// Rows of /pressure a second, on the clock of the host that polls the replay's instrument.

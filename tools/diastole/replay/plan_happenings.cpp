@@ -42,8 +42,7 @@ void plan_link_loss(const RecordedRun& run, const Event& event, double onset_shi
         fault_from("power-cut", std::min(booted_s - reboot_s, last_heard_s(run)), booted_s));
     plan.remarks.emplace_back(
         "when and why the controller was reset is not in the file: its supply is cut after what was last "
-        "heard of it, "
-        "such that the host notices when it did");
+        "heard of it, such that the host notices when it did");
   } else if (says("fallen silent")) {
     plan.faults.push_back(fault_from("serial-silence", event.time_s - silence_patience_s));
   } else {

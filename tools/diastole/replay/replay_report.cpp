@@ -62,8 +62,7 @@ std::string as_table(const ReplayReport& report) {
   } else {
     text += fmt::format(
         "The replay is the recording, but for the times of samples: up to {:.3f} ms off, more than their "
-        "spacing of "
-        "{:.3f} ms. Lateness of the recording's host or instrument is not replayed.\n",
+        "spacing of {:.3f} ms. Lateness of the recording's host or instrument is not replayed.\n",
         1e3 * report.comparison.max_sample_time_diff_s, 1e3 * report.comparison.sample_spacing_s);
   }
   return text;
