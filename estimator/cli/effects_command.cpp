@@ -7,6 +7,7 @@
 #include "estimator/cli/commands.hpp"
 #include "estimator/effects/effect.hpp"
 #include "protocol/contract/input_error.hpp"
+#include "protocol/contract/named_members.hpp"
 #include "protocol/contract/table_reader.hpp"
 
 namespace diastole {
@@ -15,10 +16,7 @@ namespace {
 nlohmann::ordered_json to_json(std::span<const EffectParameter> parameters) {
   auto list = nlohmann::ordered_json::array();
   for (const EffectParameter& parameter : parameters) {
-    list.push_back({{"name", parameter.name},
-                    {"unit", parameter.unit},
-                    {"meaning", parameter.meaning},
-                    {"neutral", parameter.neutral},
+    list.push_back({DIASTOLE_NAMED(parameter, name, unit, meaning, neutral),
                     {"bounds", {parameter.lower, parameter.upper}}});
   }
   return list;
@@ -26,18 +24,11 @@ nlohmann::ordered_json to_json(std::span<const EffectParameter> parameters) {
 
 nlohmann::ordered_json to_json(const Effect& effect) {
   const EffectDeclaration& text = effect.text();
-  nlohmann::ordered_json json = {{"id", text.id},
-                                 {"title", text.title},
-                                 {"port", name_of(text.port)},
-                                 {"equations", text.equations},
-                                 {"source", text.source},
-                                 {"looks_like", text.looks_like},
-                                 {"revealed_by", text.revealed_by},
-                                 {"conflicts", text.conflicts},
-                                 {"synergies", text.synergies},
-                                 {"parameters", to_json(effect.parameters())},
-                                 {"field_parameters", to_json(effect.field_parameters())}};
-  return json;
+  return {DIASTOLE_NAMED(text, id, title),
+          {"port", name_of(text.port)},
+          DIASTOLE_NAMED(text, equations, source, looks_like, revealed_by, conflicts, synergies),
+          {"parameters", to_json(effect.parameters())},
+          {"field_parameters", to_json(effect.field_parameters())}};
 }
 
 std::string joined(const std::vector<std::string_view>& ids) {

@@ -19,6 +19,7 @@
 #include "estimator/montecarlo/montecarlo.hpp"
 #include "estimator/montecarlo/worker_pool.hpp"
 #include "protocol/contract/input_error.hpp"
+#include "protocol/contract/named_members.hpp"
 
 namespace diastole {
 
@@ -97,9 +98,7 @@ class Progress {
 
 Json from_entry(const TableEntry& entry) {
   Json json{{"noise_mm", entry.noise_mm > 0 ? Json(entry.noise_mm) : Json(nullptr)},
-            {"frames", entry.frames},
-            {"refits", entry.refits},
-            {"failed", entry.failed}};
+            DIASTOLE_NAMED(entry, frames, refits, failed)};
   json["parameters"] = written(by_name(entry.parameters));
   return json;
 }
@@ -107,9 +106,7 @@ Json from_entry(const TableEntry& entry) {
 void print_json(const std::vector<TableEntry>& table, const Study& study, const MonteCarloPlan& plan,
                 double seconds, size_t processes) {
   Json json{{"study", study.file.string()},
-            {"repeats", plan.repeats},
-            {"seed", plan.seed},
-            {"exact_pressures", plan.exact_pressures},
+            DIASTOLE_NAMED(plan, repeats, seed, exact_pressures),
             {"seconds", seconds},
             {"processes", processes}};
   json["parameters"] = from_entry(table.front())["parameters"];

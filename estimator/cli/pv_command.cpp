@@ -21,6 +21,7 @@
 #include "estimator/report/page.hpp"
 #include "estimator/report/svg_plot.hpp"
 #include "protocol/contract/input_error.hpp"
+#include "protocol/contract/named_members.hpp"
 
 namespace diastole {
 namespace {
@@ -91,19 +92,14 @@ nlohmann::ordered_json to_json(const Study& study, ElasticModel& model, const Pr
   json["dofs"] = model.dofs();
   json["points"] = nlohmann::ordered_json::array();
   for (const PressureVolumePoint& point : curve.points) {
-    json["points"].push_back({{"volume_change_mL", point.volume_change_mL},
-                              {"pressure_kPa", point.pressure_kPa},
-                              {"stiffness_kPa_per_mL", point.stiffness_kPa_per_mL},
-                              {"stored_energy_mJ", point.stored_energy_mJ},
-                              {"stable_at_volume", point.stable_at_volume},
+    json["points"].push_back({DIASTOLE_NAMED(point, volume_change_mL, pressure_kPa, stiffness_kPa_per_mL,
+                                             stored_energy_mJ, stable_at_volume),
                               {"stable_at_pressure", stable_at_pressure(point)},
-                              {"newton_iterations", point.newton_iterations}});
+                              DIASTOLE_NAMED(point, newton_iterations)});
   }
   json["limit_points"] = nlohmann::ordered_json::array();
-  for (const LimitPoint& limit : curve.limits) {
-    json["limit_points"].push_back(
-        {{"volume_change_mL", limit.volume_change_mL}, {"pressure_kPa", limit.pressure_kPa}});
-  }
+  for (const LimitPoint& limit : curve.limits)
+    json["limit_points"].push_back({DIASTOLE_NAMED(limit, volume_change_mL, pressure_kPa)});
   json["work_mJ"] = curve.work_mJ();
   add_equilibrium(json["end"], model, curve.state);
   json["seconds"] = seconds;

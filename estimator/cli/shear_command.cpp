@@ -10,6 +10,7 @@
 #include "estimator/report/page.hpp"
 #include "estimator/report/sections.hpp"
 #include "estimator/shear/shear_fit.hpp"
+#include "protocol/contract/named_members.hpp"
 
 namespace diastole {
 
@@ -26,20 +27,14 @@ struct ShearArguments {
 };
 
 std::string to_json(const ShearTest& test, const ShearFit& fit, ShearForm form) {
-  const Json json = {{"C1_kPa", fit.C1_kPa},
-                     {"se_kPa", fit.se_kPa},
-                     {"ci95_kPa", fit.ci95_kPa},
-                     {"r2", fit.r2},
+  const Json json = {DIASTOLE_NAMED(fit, C1_kPa, se_kPa, ci95_kPa, r2),
                      {"r2_kind", "uncentred: 1 - SSE / sum of squares about zero"},
-                     {"r2_about_mean", fit.r2_about_mean},
-                     {"swapped_C1_kPa", fit.swapped_C1_kPa},
-                     {"determined", fit.determined},
+                     DIASTOLE_NAMED(fit, r2_about_mean, swapped_C1_kPa, determined),
                      {"rows", test.rows.size()},
                      {"dof", fit.dof},
                      {"load", test.load},
                      {"form", form == ShearForm::normalised ? "normalised" : "rotation"},
-                     {"rms_deg", fit.rms_deg},
-                     {"largest_shear", fit.largest_shear},
+                     DIASTOLE_NAMED(fit, rms_deg, largest_shear),
                      {"loads", written(fit.loads)},
                      {"outliers", written(fit.outliers)},
                      {"remarks", fit.remarks}};

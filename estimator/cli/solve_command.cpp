@@ -30,6 +30,7 @@
 #include "estimator/solution/solution_grid.hpp"
 #include "estimator/solution/solution_record.hpp"
 #include "protocol/contract/input_error.hpp"
+#include "protocol/contract/named_members.hpp"
 
 namespace diastole {
 namespace {
@@ -149,11 +150,8 @@ nlohmann::ordered_json as_json(const Study& study, ElasticModel& model, const So
   json["mesh"] = mesh_of(study.specimen);
   json["elements"] = model.mesh().element_count();
   json["dofs"] = model.dofs();
-  json["load_steps"] = report.load_steps;
-  json["newton_iterations"] = report.newton_iterations;
-  json["factorisations"] = report.factorisations;
-  json["negative_pivots"] = report.negative_pivots;
-  json["pressure_unknowns"] = report.pressure_unknowns;
+  json.update({DIASTOLE_NAMED(report, load_steps, newton_iterations, factorisations, negative_pivots,
+                              pressure_unknowns)});
   json["unstable_motions"] = nullptr;
   if (report.unstable_motions) json["unstable_motions"] = *report.unstable_motions;
   json["stable"] = nullptr;

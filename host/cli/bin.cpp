@@ -13,6 +13,7 @@
 #include "host/journal/part_file.hpp"
 #include "host/runfile/output_guard.hpp"
 #include "protocol/contract/input_error.hpp"
+#include "protocol/contract/named_members.hpp"
 #include "protocol/runfile/frame_bins.hpp"
 #include "protocol/runfile/reader.hpp"
 #include "protocol/runfile/signal_delay.hpp"
@@ -136,27 +137,17 @@ json bins_as_json(const std::string& run, const runfile::FrameBins& bins, const 
   for (size_t k = 0; k < bins.frames.size(); ++k) {
     const runfile::FrameBin& bin = bins.frames[k];
     frames.push_back({{"frame", k},
-                      {"from_s", bin.window.from_s},
-                      {"to_s", bin.window.to_s},
-                      {"mean_kPa", bin.mean_kPa},
-                      {"sd_kPa", bin.sd_kPa},
-                      {"sample_sd_kPa", bin.sample_sd_kPa},
-                      {"drift_kPa_per_cycle", bin.drift_kPa_per_cycle},
-                      {"drift_se_kPa_per_cycle", bin.drift_se_kPa_per_cycle},
-                      {"cycles", bin.cycles},
-                      {"samples", bin.samples}});
+                      DIASTOLE_NAMED(bin.window, from_s, to_s),
+                      DIASTOLE_NAMED(bin, mean_kPa, sd_kPa, sample_sd_kPa, drift_kPa_per_cycle,
+                                     drift_se_kPa_per_cycle, cycles, samples)});
   }
   json excluded = json::array();
   for (const runfile::ExcludedCycle& cycle : bins.excluded)
-    excluded.push_back({{"cycle", cycle.cycle}, {"trigger_s", cycle.trigger_s}, {"reason", cycle.reason}});
+    excluded.push_back({DIASTOLE_NAMED(cycle, cycle, trigger_s, reason)});
   return {{"run", run},
-          {"segment", bins.segment},
-          {"period_s", bins.period_s},
-          {"interval_s", bins.interval_s},
+          DIASTOLE_NAMED(bins, segment, period_s, interval_s, scheduled_cycles, triggers),
           {"delay_removed_s", delay.delay_s},
           {"delay_source", delay.source},
-          {"scheduled_cycles", bins.scheduled_cycles},
-          {"triggers", bins.triggers},
           {"frames", frames},
           {"excluded", excluded}};
 }

@@ -7,6 +7,7 @@
 
 #include "host/cli/daemon_question.hpp"
 #include "host/cli/host_commands.hpp"
+#include "protocol/contract/named_members.hpp"
 #include "protocol/runfile/reader.hpp"
 #include "protocol/runfile/soundness.hpp"
 
@@ -32,11 +33,9 @@ Range range_of(const std::vector<double>& values) {
 }
 
 json stream_json(const runfile::StreamFacts& facts) {
-  return {{"rows", facts.rows},
+  return {DIASTOLE_NAMED(facts, rows, missing, rate_Hz),
           {"samples", facts.rows - static_cast<size_t>(facts.missing)},
-          {"missing", facts.missing},
           {"expected", facts.expected ? json(*facts.expected) : json()},
-          {"rate_Hz", facts.rate_Hz},
           {"irregular_steps", facts.irregularity.steps},
           {"longest_step_ms", facts.irregularity.longest_ms}};
 }
@@ -81,28 +80,18 @@ std::string calibration_words(const Attributes& calibration) {
 json slices_json(const runfile::RecordedRun& run) {
   json slices = json::array();
   for (const runfile::Slice& slice : run.slices) {
-    slices.push_back({{"block", slice.block},
-                      {"slice", slice.number},
-                      {"first_trigger", slice.first_trigger},
-                      {"triggers", slice.triggers},
-                      {"cycles", slice.cycles},
-                      {"dummy_cycles", slice.dummy_cycles}});
+    slices.push_back({{"slice", slice.number},
+                      DIASTOLE_NAMED(slice, block, first_trigger, triggers, cycles, dummy_cycles)});
   }
   return slices;
 }
 
 json as_json(const runfile::RecordedRun& run, const runfile::Soundness& soundness) {
   json document{{"run", run.file},
-                {"run_id", run.run_id},
-                {"started_utc", run.started_utc},
-                {"producer", run.producer},
-                {"duration_s", soundness.duration_s},
-                {"scheduled_cycles", soundness.scheduled_cycles},
+                DIASTOLE_NAMED(run, run_id, started_utc, producer, clock),
+                DIASTOLE_NAMED(soundness, duration_s, scheduled_cycles, problems, stopped_on_request),
                 {"triggers", run.trigger_s.size()},
-                {"trigger_faults",
-                 {{"missing", soundness.triggers.missing},
-                  {"extra", soundness.triggers.extra},
-                  {"non_periodic", soundness.triggers.non_periodic}}},
+                {"trigger_faults", {DIASTOLE_NAMED(soundness.triggers, missing, extra, non_periodic)}},
                 {"slices", slices_json(run)},
                 {"samples", soundness.pressure.rows - static_cast<size_t>(soundness.pressure.missing)},
                 {"pressure", stream_json(soundness.pressure)},
@@ -110,9 +99,6 @@ json as_json(const runfile::RecordedRun& run, const runfile::Soundness& soundnes
                 {"gaps", soundness.pressure.missing + soundness.pump.missing + run.missing("trigger")},
                 {"gap_records", run.gaps.size()},
                 {"events", run.events.size()},
-                {"clock", run.clock},
-                {"problems", soundness.problems},
-                {"stopped_on_request", soundness.stopped_on_request},
                 {"sound", soundness.sound()}};
   document["channels"] = json::object();
   for (const auto& [name, values_kPa] : run.pressure.channels) {
@@ -126,12 +112,8 @@ json as_json(const runfile::RecordedRun& run, const runfile::Soundness& soundnes
   }
   document["segments"] = json::array();
   for (const runfile::Segment& segment : run.segments) {
-    document["segments"].push_back({{"start_s", segment.start_s},
-                                    {"waveform", segment.waveform},
-                                    {"stroke_mL", segment.stroke_mL},
-                                    {"period_s", segment.period_s},
-                                    {"offset_mL", segment.offset_mL},
-                                    {"cycles", segment.cycles}});
+    document["segments"].push_back(
+        {DIASTOLE_NAMED(segment, start_s, waveform, stroke_mL, period_s, offset_mL, cycles)});
   }
   document["flow_segments"] = json::array();
   for (const auto& [segment, flow] : run.flow)

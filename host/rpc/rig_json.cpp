@@ -8,6 +8,7 @@
 
 #include "host/controller/controller_words.hpp"
 #include "protocol/contract/input_error.hpp"
+#include "protocol/contract/named_members.hpp"
 #include "protocol/wire/wire_text.hpp"
 
 namespace diastole {
@@ -44,30 +45,23 @@ json object_of(const RigStatus& status) {
   const wire::Status& controller = status.controller;
   const wire::Fault fault = controller.fault;
   const wire::Hello& firmware = status.firmware;
-  json object{
-      {"state", status.state},
-      {"fault", fault == wire::Fault::none ? json() : json(wire::fault_name(fault))},
-      {"fault_number", static_cast<int>(fault)},
-      {"fault_text", wire::fault_explanation(fault)},
-      {"remedy", wire::fault_remedy(fault)},
-      {"firmware",
-       fmt::format("{}.{}.{}", firmware.version_major, firmware.version_minor, firmware.version_patch)},
-      {"board", firmware.board_id},
-      {"boot_id", firmware.boot_id},
-      {"position_mL", status.position_mL},
-      {"inputs", active_inputs(controller.inputs)},
-      {"motor_powered", (controller.inputs & 8U) != 0},
-      {"segment", controller.segment},
-      {"cycles", controller.cycle},
-      {"triggers", controller.triggers},
-      {"r_waves", controller.r_waves},
-      {"steps", controller.steps},
-      {"link", {{"crc_errors", controller.crc_errors}, {"retransmissions", controller.retransmissions}}},
-      {"settings_problem", or_null(status.settings_problem)},
-      {"controller", status.port},
-      {"instrument", status.instrument},
-      {"journals", status.journals},
-      {"notice", or_null(status.notice)}};
+  json object{DIASTOLE_NAMED(status, state, position_mL, instrument, journals),
+              {"fault", fault == wire::Fault::none ? json() : json(wire::fault_name(fault))},
+              {"fault_number", static_cast<int>(fault)},
+              {"fault_text", wire::fault_explanation(fault)},
+              {"remedy", wire::fault_remedy(fault)},
+              {"firmware", fmt::format("{}.{}.{}", firmware.version_major, firmware.version_minor,
+                                       firmware.version_patch)},
+              {"board", firmware.board_id},
+              {"boot_id", firmware.boot_id},
+              {"inputs", active_inputs(controller.inputs)},
+              {"motor_powered", (controller.inputs & 8U) != 0},
+              DIASTOLE_NAMED(controller, segment, triggers, r_waves, steps),
+              {"cycles", controller.cycle},
+              {"link", {DIASTOLE_NAMED(controller, crc_errors, retransmissions)}},
+              {"settings_problem", or_null(status.settings_problem)},
+              {"controller", status.port},
+              {"notice", or_null(status.notice)}};
   if (!status.run_id.empty()) object["run_id"] = status.run_id;
   if (status.jog) {
     object["jogged_mL"] = status.jog->jogged_mL;
@@ -80,17 +74,14 @@ json object_of(const SettingsReport& report) {
   json settings = json::object();
   for (const auto& [name, value] : report.settings)
     std::visit([&settings, &at = name](const auto& v) { settings[at] = v; }, value);
-  return {{"record", report.record},
+  return {DIASTOLE_NAMED(report, record, microstep_uL, backlash_microsteps),
           {"settings", settings},
-          {"microstep_uL", report.microstep_uL},
-          {"backlash_microsteps", report.backlash_microsteps},
           {"problem", or_null(report.problem)}};
 }
 
 json object_of(const BlackBox& box) {
   const auto entry = [&](const wire::BlackBoxEntry& each) -> json {
-    return {{"number", each.number},
-            {"boot", each.boot},
+    return {DIASTOLE_NAMED(each, number, boot),
             {"time_s", static_cast<double>(each.tick) / box.tick_rate_Hz},
             {"kind", wire::noted_name(each.kind)},
             {"text", in_words(each)}};
@@ -104,20 +95,13 @@ json object_of(const CalibrationReport& report) { return report; }
 json object_of(const RunBegun& run) { return run; }
 
 json object_of(const RunResult& result) {
-  if (result.run_file.empty())
-    return {{"end", result.end}, {"problem", result.problem}, {"journal", result.journal}};
-  return {{"end", result.end},           {"regular", result.regular}, {"journal", result.journal},
-          {"run_file", result.run_file}, {"cycles", result.cycles},   {"triggers", result.triggers},
-          {"samples", result.samples},   {"gaps", result.gaps},       {"errors", result.errors},
-          {"expected", result.expected}};
+  if (result.run_file.empty()) return {DIASTOLE_NAMED(result, end, problem, journal)};
+  return {DIASTOLE_NAMED(result, end, regular, journal, run_file, cycles, triggers, samples, gaps, errors,
+                         expected)};
 }
 
 json object_of(const RemarkLog::Entry& entry) {
-  return {{"number", entry.number},
-          {"utc", entry.utc},
-          {"level", entry.remark.level},
-          {"code", entry.remark.code},
-          {"text", entry.remark.text}};
+  return {DIASTOLE_NAMED(entry, number, utc), DIASTOLE_NAMED(entry.remark, level, code, text)};
 }
 
 json rounded(double value) {
@@ -138,12 +122,8 @@ json as_json(const std::optional<RunState>& run) {
           {"state", run->state},
           {"planned_s", run->plan.estimate_s},
           {"planned_cycles", run->plan.planned_cycles},
-          {"received", progress.received},
-          {"missing", progress.missing},
-          {"triggers", progress.triggers},
+          DIASTOLE_NAMED(progress, received, missing, triggers, last_kPa, filtered_kPa),
           {"gate_pulses", or_null(progress.gate_pulses)},
-          {"last_kPa", progress.last_kPa},
-          {"filtered_kPa", progress.filtered_kPa},
           {"schedule", or_null(progress.schedule)},
           {"remarks", array_of(run->remarks.remarks, [](const auto& each) { return object_of(each); })},
           {"next_remark", run->remarks.next},
@@ -154,18 +134,16 @@ json as_json(const LiveTrace::Excerpt& excerpt) {
   const auto column = [&](double LiveTrace::Row::*member) {
     return array_of(excerpt.rows, [&](const LiveTrace::Row& row) { return rounded(row.*member); });
   };
-  return {{"run_id", excerpt.run_id},
-          {"first_row", excerpt.first_row},
+  return {DIASTOLE_NAMED(excerpt, run_id, first_row, first_trigger),
           {"time_s", column(&LiveTrace::Row::time_s)},
           {"kPa", column(&LiveTrace::Row::kPa)},
           {"filtered_kPa", column(&LiveTrace::Row::filtered_kPa)},
-          {"first_trigger", excerpt.first_trigger},
           {"trigger_s", array_of(excerpt.trigger_s, rounded)}};
 }
 
 json as_json(const std::optional<ContinuedSlice>& continued) {
   if (!continued) return {{"continued", false}};
-  return {{"continued", true}, {"slice", continued->slice}, {"prompt", continued->prompt}};
+  return {{"continued", true}, DIASTOLE_NAMED(*continued, slice, prompt)};
 }
 
 Attributes settings_in(const json& object) {

@@ -16,6 +16,7 @@
 #include "estimator/explain/verdict/explanation_json.hpp"
 #include "estimator/io/whole_file.hpp"
 #include "protocol/contract/input_error.hpp"
+#include "protocol/contract/named_members.hpp"
 
 namespace diastole::explain {
 namespace {
@@ -462,10 +463,8 @@ std::string to_json(const Score& score) {
   json["passed"] = score.passed();
   json["rows"] = nlohmann::ordered_json::array();
   for (const ScoreRow& row : score.rows) {
-    nlohmann::ordered_json line = {{"figure", row.figure}, {"target", row.target},
-                                   {"value", nullptr},     {"cases", row.cases},
-                                   {"met", row.met},       {"decisive", row.decisive}};
-    if (std::isfinite(row.value)) line["value"] = row.value;
+    nlohmann::ordered_json line = {DIASTOLE_NAMED(row, figure, target, value, cases, met, decisive)};
+    if (!std::isfinite(row.value)) line["value"] = nullptr;
     if (row.is_share) {
       line["hits"] = row.hits;
       line["interval95"] = row.interval;
@@ -474,12 +473,10 @@ std::string to_json(const Score& score) {
   }
   json["confusion"] = nlohmann::ordered_json::array();
   for (const Confusion& cell : score.confusion)
-    json["confusion"].push_back(
-        {{"hidden", cell.hidden}, {"answer", cell.answer}, {"count", cell.count}, {"right", cell.right}});
+    json["confusion"].push_back({DIASTOLE_NAMED(cell, hidden, answer, count, right)});
   json["reliability"] = nlohmann::ordered_json::array();
   for (const Reliability& bin : score.reliability)
-    json["reliability"].push_back(
-        {{"said", bin.said}, {"mean", bin.mean}, {"right", bin.right}, {"cases", bin.cases}});
+    json["reliability"].push_back({DIASTOLE_NAMED(bin, said, mean, right, cases)});
   json["missing"] = score.missing;
   return json.dump(1);
 }

@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
+#include "protocol/contract/named_members.hpp"
 #include "tools/sim_board/session.hpp"
 
 namespace diastole {
@@ -56,18 +57,17 @@ nlohmann::json to_json(const BoardReport& report) {
   }
   document["interrupts"] = nlohmann::json::array();
   for (const InterruptStatistics& interrupt : board.interrupts) {
-    document["interrupts"].push_back({{"name", interrupt_name(interrupt.irq)},
-                                      {"count", interrupt.count},
-                                      {"worst_instructions", interrupt.worst_instructions},
-                                      {"worst_latency_cycles", interrupt.worst_latency_cycles}});
+    document["interrupts"].push_back(
+        {{"name", interrupt_name(interrupt.irq)},
+         DIASTOLE_NAMED(interrupt, count, worst_instructions, worst_latency_cycles)});
   }
   document["resets"] = nlohmann::json::array();
   for (const BoardReset& reset : board.resets) {
-    document["resets"].push_back({{"time_ns", reset.time_ns}, {"cause", reset.cause}});
+    document["resets"].push_back({DIASTOLE_NAMED(reset, time_ns, cause)});
   }
   document["notes"] = nlohmann::json::array();
   for (const auto& [text, note] : board.notes) {
-    document["notes"].push_back({{"text", text}, {"first_ns", note.first_ns}, {"count", note.count}});
+    document["notes"].push_back({{"text", text}, DIASTOLE_NAMED(note, first_ns, count)});
   }
   return document;
 }

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 
+#include "protocol/contract/named_members.hpp"
+
 namespace diastole::replay {
 
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Comparison, triggers_equal, steps_equal, samples_equal, missing_equal,
@@ -73,18 +75,13 @@ nlohmann::json as_json(const ReplayReport& report) {
   const Comparison& found = report.comparison;
   json lines = json::array();
   for (const Line& line : found.lines) {
-    lines.push_back({{"what", line.what},
-                     {"recorded", line.recorded},
-                     {"replayed", line.replayed},
-                     {"difference", line.difference},
+    lines.push_back({DIASTOLE_NAMED(line, what, recorded, replayed, difference),
                      {"verdict", line.verdict == Verdict::reported ? "told"
                                  : line.verdict == Verdict::equal  ? "equal"
                                                                    : "differs"}});
   }
   json first;
-  if (found.first) {
-    first = {{"time_s", found.first->time_s}, {"cycle", found.first->cycle}, {"text", found.first->text}};
-  }
+  if (found.first) first = {DIASTOLE_NAMED(*found.first, time_s, cycle, text)};
   json document = found;
   document.update({{"run", report.recorded},
                    {"replayed", report.replayed.empty() ? json() : json(report.replayed)},
