@@ -106,10 +106,7 @@ struct MadeFolder {
 
 ExitCode run_explain(const ExplainArguments& arguments, const CommandOutput& out) {
   if (arguments.folder.empty()) {
-    throw InputError({.file = "",
-                      .place = "option -o",
-                      .problem = "is missing",
-                      .remedy = "Name a folder for the result: -o out/."});
+    throw InputError({"", "option -o", "is missing", "Name a folder for the result: -o out/."});
   }
   Study study = read_study(arguments.study);
   use_images(study);
@@ -120,10 +117,9 @@ ExitCode run_explain(const ExplainArguments& arguments, const CommandOutput& out
   MadeFolder folder;
   if (fs::create_directories(arguments.folder, error)) folder.made = arguments.folder;
   if (error) {
-    throw InputError({.file = arguments.folder.string(),
-                      .place = "-o",
-                      .problem = fmt::format("the folder cannot be made: {}", error.message()),
-                      .remedy = "Name a folder that you may write."});
+    throw InputError({arguments.folder.string(), "-o",
+                      fmt::format("the folder cannot be made: {}", error.message()),
+                      "Name a folder that you may write."});
   }
   require_output({json_file, inputs_of(study), explain::explanation_file_mark, arguments.force});
   require_output({new_study, inputs_of(study), study_mark, arguments.force});

@@ -125,11 +125,9 @@ void print_for_people(const PressureVolumeCurve& curve) {
 ExitCode run_pv(const PvArguments& arguments, const CommandOutput& out) {
   const Clock::time_point begun = Clock::now();
   if (!std::isfinite(arguments.volume_change_mL) || arguments.volume_change_mL == 0.0) {
-    throw InputError(
-        {.file = "",
-         .place = "--volume-change-mL",
-         .problem = fmt::format("{} is no volume to go to", arguments.volume_change_mL),
-         .remedy = "Give the mL that the cavity takes, for example 60; less than zero empties it."});
+    throw InputError({"", "--volume-change-mL",
+                      fmt::format("{} is no volume to go to", arguments.volume_change_mL),
+                      "Give the mL that the cavity takes, for example 60; less than zero empties it."});
   }
   constexpr std::array outputs{OutputKind{".html", report::page_mark},
                                OutputKind{".csv", csv_header.substr(0, csv_header.size() - 1)}};

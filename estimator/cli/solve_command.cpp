@@ -86,8 +86,7 @@ struct Probe {
 };
 
 [[noreturn]] void refuse_probe(const std::string& text, std::string problem, std::string remedy) {
-  throw InputError(
-      {.file = "", .place = "--probe " + text, .problem = std::move(problem), .remedy = std::move(remedy)});
+  throw InputError({"", "--probe " + text, std::move(problem), std::move(remedy)});
 }
 
 Eigen::Vector3d parse_place(const std::string& text) {
@@ -214,12 +213,9 @@ void print_for_people(const nlohmann::ordered_json& json) {
 
 void require_one_load(const SolveArguments& arguments) {
   const auto refuse = [](std::string place, std::string problem) {
-    throw InputError(
-        {.file = "",
-         .place = std::move(place),
-         .problem = std::move(problem),
-         .remedy = "Give a pressure, for example --pressure-kPa 6, or the volume that the cavity takes, "
-                   "--volume-change-mL 24, or --frames for all of the study's frames."});
+    throw InputError({"", std::move(place), std::move(problem),
+                      "Give a pressure, for example --pressure-kPa 6, or the volume that the cavity takes, "
+                      "--volume-change-mL 24, or --frames for all of the study's frames."});
   };
   const bool pressure = arguments.pressure_kPa.has_value();
   const bool volume = arguments.volume_change_mL.has_value();
@@ -236,10 +232,7 @@ void require_one_load(const SolveArguments& arguments) {
 void require_fibres_for_tension(const SolveArguments& arguments, const ElasticModel& model) {
   const double tension_kPa = arguments.fibre_tension_kPa;
   const auto refuse = [](std::string problem, std::string remedy) {
-    throw InputError({.file = "",
-                      .place = "--fibre-tension-kPa",
-                      .problem = std::move(problem),
-                      .remedy = std::move(remedy)});
+    throw InputError({"", "--fibre-tension-kPa", std::move(problem), std::move(remedy)});
   };
   if (!std::isfinite(tension_kPa) || tension_kPa < 0.0)
     refuse(fmt::format("{} is not a tension", tension_kPa), "Give zero or more, for example 60.");
@@ -274,10 +267,9 @@ std::vector<TimedLoad> loads_of(const SolveArguments& arguments, const Study& st
 
 void require_frames(const SolveArguments& arguments, const Study& study) {
   if (!arguments.frames || study.data.frames) return;
-  throw InputError({.file = study.file.string(),
-                    .place = "key data.frames",
-                    .problem = "missing, although --frames asks for the frames' pressures",
-                    .remedy = "Name the file with each frame's pressure: frames = \"NAME.frames.csv\"."});
+  throw InputError({study.file.string(), "key data.frames",
+                    "missing, although --frames asks for the frames' pressures",
+                    "Name the file with each frame's pressure: frames = \"NAME.frames.csv\"."});
 }
 
 /// Each load from the state of the one before; ends at the first that has no equilibrium.

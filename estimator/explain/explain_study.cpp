@@ -50,11 +50,9 @@ Explanation merged(Explanation rig, Explanation field) {
 Explanation explain_study(const Study& study, const ExplainOptions& options) {
   const bool imaged = study.data.tags || study.data.points;
   if (study.data.runs.empty() && !imaged) {
-    throw InputError(
-        {.file = study.file.string(),
-         .place = "data",
-         .problem = "names no run files, no tags and no points, so that there is nothing to explain",
-         .remedy = "List the session's runs: runs = [\"baseline.run.h5\"], or tags and frames."});
+    throw InputError({study.file.string(), "data",
+                      "names no run files, no tags and no points, so that there is nothing to explain",
+                      "List the session's runs: runs = [\"baseline.run.h5\"], or tags and frames."});
   }
   if (!imaged) return explain_rig(study, options);
   Explanation field = explain_field(study, options.progress);

@@ -254,10 +254,7 @@ std::optional<StudyPose> read_pose_of_images(TableReader& root) {
 
 [[noreturn]] void refuse_option(std::string_view option, std::string_view value, std::string problem,
                                 std::string remedy) {
-  throw InputError({.file = "",
-                    .place = fmt::format("{} {}", option, value),
-                    .problem = std::move(problem),
-                    .remedy = std::move(remedy)});
+  throw InputError({"", fmt::format("{} {}", option, value), std::move(problem), std::move(remedy)});
 }
 
 template <typename Number>

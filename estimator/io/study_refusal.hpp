@@ -12,10 +12,7 @@ namespace diastole {
 /// Throws InputError at a key of the study's file: "law.name", "model.effects".
 [[noreturn]] inline void refuse(const Study& study, const std::string& key, std::string problem,
                                 std::string remedy) {
-  throw InputError({.file = study.file.string(),
-                    .place = "key " + key,
-                    .problem = std::move(problem),
-                    .remedy = std::move(remedy)});
+  throw InputError({study.file.string(), "key " + key, std::move(problem), std::move(remedy)});
 }
 
 }  // namespace diastole

@@ -135,28 +135,22 @@ std::string_view name_of(Channel channel) { return channel == Channel::cavity ? 
 
 Session read_session(const Study& study) {
   if (study.data.runs.empty()) {
-    throw InputError(
-        {.file = study.file.string(),
-         .place = "data.runs",
-         .problem = "names no run files",
-         .remedy = "List the runs to compare with the rig's model: runs = [\"baseline.run.h5\"]."});
+    throw InputError({study.file.string(), "data.runs", "names no run files",
+                      "List the runs to compare with the rig's model: runs = [\"baseline.run.h5\"]."});
   }
   Session session;
   for (const std::filesystem::path& file : study.data.runs) {
     RecordedRun run = runfile::read_run(file);
     if (run.pump.time_s.size() < 2 || run.pressure.time_s.size() < 2) {
-      throw InputError({.file = file.string(),
-                        .place = "dataset /pump/commanded_mL",
-                        .problem = "the run holds no motion or no pressures",
-                        .remedy = "Take the run off the study's list."});
+      throw InputError({file.string(), "dataset /pump/commanded_mL",
+                        "the run holds no motion or no pressures", "Take the run off the study's list."});
     }
     if (session.runs.empty()) {
       session.base = base_model(run);
       if (const double part = session.base.hose.loss_at_cavity; !(part >= 0.0 && part <= 1.0)) {
-        throw InputError({.file = file.string(),
-                          .place = "attribute /rig hose_loss_at_cavity",
-                          .problem = fmt::format("is {}, and a part of a loss is between 0 and 1", part),
-                          .remedy = "1: all of it is at the cavity. Correct the rig's description."});
+        throw InputError({file.string(), "attribute /rig hose_loss_at_cavity",
+                          fmt::format("is {}, and a part of a loss is between 0 and 1", part),
+                          "1: all of it is at the cavity. Correct the rig's description."});
       }
       session.limits = limits_of(run);
       constexpr std::string_view of_tolerance = "tolerance_";

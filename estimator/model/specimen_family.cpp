@@ -27,11 +27,10 @@ void follow(Study study, double to_mL, size_t steps, std::vector<SpecimenCurve::
   const PressureVolumeCurve curve =
       pressure_volume_curve(model, {.volume_change_mL = to_mL, .steps = steps, .judge_stability = false});
   if (!curve.last.converged()) {
-    throw InputError({.file = study.file.string(),
-                      .place = "specimen",
-                      .problem = fmt::format("its pressure-volume curve ends before {} mL: {}", to_mL,
-                                             curve.last.describe()),
-                      .remedy = "Check it with `diastole pv`; another mesh may help."});
+    throw InputError(
+        {study.file.string(), "specimen",
+         fmt::format("its pressure-volume curve ends before {} mL: {}", to_mL, curve.last.describe()),
+         "Check it with `diastole pv`; another mesh may help."});
   }
   for (const PressureVolumePoint& point : curve.points)
     points.push_back({point.volume_change_mL, point.pressure_kPa, point.stiffness_kPa_per_mL});
@@ -98,11 +97,9 @@ SpecimenFamily::SpecimenFamily(Study study, const SpecimenResolution& resolution
   while (modulus_index_ < parameters.size() && !is_modulus(parameters[modulus_index_]))
     ++modulus_index_;
   if (modulus_index_ == parameters.size()) {
-    throw InputError(
-        {.file = study_.file.string(),
-         .place = "law",
-         .problem = fmt::format("{} has no modulus in kPa that could be sought", study_.law.name),
-         .remedy = "Use a law whose first parameter is a stiffness, such as neo-hookean."});
+    throw InputError({study_.file.string(), "law",
+                      fmt::format("{} has no modulus in kPa that could be sought", study_.law.name),
+                      "Use a law whose first parameter is a stiffness, such as neo-hookean."});
   }
   modulus_kPa_ = parameters[modulus_index_].start;
   for (StudyParameter& parameter : parameters)

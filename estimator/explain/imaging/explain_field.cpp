@@ -90,10 +90,9 @@ class Explainer {
     full_base_ = full_->fit({}, {base_.C1_kPa, base_.pressures_kPa});
     if (!std::isfinite(base_.chi_square) || !std::isfinite(full_base_.chi_square))
       throw InputError(
-          {.file = study_file_,
-           .place = "law.parameters.C1_kPa",
-           .problem = fmt::format("the base model has no equilibrium at {:g} kPa", field_.C1_start_kPa.value),
-           .remedy = "Start from a stiffer gel, or check the frames' pressures."});
+          {study_file_, "law.parameters.C1_kPa",
+           fmt::format("the base model has no equilibrium at {:g} kPa", field_.C1_start_kPa.value),
+           "Start from a stiffer gel, or check the frames' pressures."});
   }
 
   [[nodiscard]] static bool loses_points(const FieldProblem& problem) {
