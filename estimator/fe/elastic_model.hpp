@@ -56,7 +56,6 @@ class ElasticModel {
   [[nodiscard]] const Law& law() const { return system_->law(); }
   /// Unknowns of the discrete problem: free displacement dofs plus Lagrange pressures.
   [[nodiscard]] size_t dofs() const { return system_->equations().unknowns(); }
-  [[nodiscard]] size_t displacement_dofs() const { return system_->equations().displacement_unknowns(); }
   [[nodiscard]] size_t pressure_dofs() const { return system_->equations().pressure_unknowns(); }
 
   void set_parameter(size_t parameter, double value);

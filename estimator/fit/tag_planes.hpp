@@ -12,7 +12,6 @@
 // and the frames decide: what stays the same under all loads is no deformation.
 
 #include <Eigen/Dense>
-#include <array>
 #include <string>
 #include <vector>
 

@@ -1,7 +1,6 @@
 #include "estimator/mesh/point_locator.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
 #include <utility>
 

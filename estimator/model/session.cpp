@@ -68,7 +68,6 @@ std::vector<GatedVolume> volumes_of(const RecordedRun& run) {
 SessionRun session_run(RecordedRun&& run, const std::string& name) {
   SessionRun read;
   const FoundMotion found = find_motion(run);
-  read.motion_explained = found.explained;
   read.drive.motion = found.motion;
   read.drive.start_s = run.pressure.time_s.front();
   read.drive.end_s = run.pressure.time_s.back();

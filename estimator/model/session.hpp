@@ -22,7 +22,6 @@ struct GatedVolume {
 
 struct SessionRun {
   RunDrive drive;  ///< place.name is the file's name before ".run.h5"
-  bool motion_explained = true;
   std::vector<runfile::Segment> segments;
   std::vector<double> sample_s;
   std::map<Channel, std::vector<double>> pressure_kPa;  ///< NaN where a gap is declared

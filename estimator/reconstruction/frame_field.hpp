@@ -18,7 +18,6 @@
 // median absolute residual, so that a wrong sigma does not make every point wild). What then lies beyond
 // five times their spread is left out and all else counts fully: the statistics are those of ordinary least squares again.
 
-#include <functional>
 #include <memory>
 #include <optional>
 #include <vector>

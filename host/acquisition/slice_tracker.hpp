@@ -1,6 +1,7 @@
 #pragma once
 // Follows a schedule of slices (host/config/schedule.hpp) cycle by cycle, while the pump goes on.
 
+#include <array>
 #include <cstddef>
 #include <string>
 #include <vector>
@@ -88,19 +89,8 @@ class SliceTracker {
 };
 
 inline std::string phase_name(SliceTracker::Phase phase) {
-  switch (phase) {
-    case SliceTracker::Phase::waiting:
-      return "waiting";
-    case SliceTracker::Phase::dummy:
-      return "dummy";
-    case SliceTracker::Phase::imaging:
-      return "imaging";
-    case SliceTracker::Phase::pause:
-      return "pause";
-    case SliceTracker::Phase::done:
-      break;
-  }
-  return "done";
+  constexpr std::array names{"waiting", "dummy", "imaging", "pause", "done"};
+  return names[static_cast<size_t>(phase)];
 }
 
 }  // namespace diastole

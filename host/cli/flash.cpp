@@ -2,6 +2,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <csignal>
 #include <cstdio>
@@ -67,17 +68,8 @@ std::string summary(const UpdateResult& result, const UpdateFile& file) {
 }
 
 const char* name_of(UpdateEnd end) {
-  switch (end) {
-    case UpdateEnd::confirmed:
-      return "confirmed";
-    case UpdateEnd::already_there:
-      return "already_there";
-    case UpdateEnd::dry_run:
-      return "dry_run";
-    case UpdateEnd::stopped:
-      return "stopped";
-  }
-  return "";
+  constexpr std::array names{"confirmed", "already_there", "dry_run", "stopped"};
+  return names[static_cast<size_t>(end)];
 }
 
 ExitCode flash(FlashOptions options, const CommandOutput& out) {

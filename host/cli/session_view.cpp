@@ -11,6 +11,7 @@
 #include <cstdio>
 
 #include "host/cli/daemon_question.hpp"
+#include "protocol/contract/named_members.hpp"
 
 namespace diastole {
 namespace {
@@ -165,11 +166,7 @@ ExitCode exit_code_of(const SessionResult& result) {
 
 ExitCode report_session(const SessionResult& result, bool json) {
   if (json) {
-    const nlohmann::json document{{"run", result.run},           {"end", result.end},
-                                  {"cycles", result.cycles},     {"triggers", result.triggers},
-                                  {"samples", result.samples},   {"gaps", result.gaps},
-                                  {"expected", result.expected}, {"errors", result.errors}};
-    print_json(document);
+    print_json({DIASTOLE_NAMED(result, run, end, cycles, triggers, samples, gaps, expected, errors)});
     return exit_code_of(result);
   }
   fmt::print("{}: {} cycles, {} triggers, {} of {} samples\n", result.run, result.cycles, result.triggers,
@@ -204,10 +201,8 @@ nlohmann::json plan_json(const Experiment& experiment) {
   nlohmann::json blocks = nlohmann::json::array();
   if (experiment.schedule) {
     for (const ScheduleBlock& block : experiment.schedule->blocks) {
-      blocks.push_back({{"name", block.name},
-                        {"slices", block.slices},
-                        {"cycles_per_slice", block.cycles_per_slice},
-                        {"waits", !block.prompt.empty()}});
+      blocks.push_back(
+          {DIASTOLE_NAMED(block, name, slices, cycles_per_slice), {"waits", !block.prompt.empty()}});
     }
   }
   return {{"experiment", experiment.file},

@@ -12,6 +12,8 @@
 // Registers hold 16 bits, the more significant one of a pair first. Preset "labjack-t": AIN#n is a float32 at
 // register 2n, CORE_TIMER counts 40 MHz at 61520 and wraps at 32 bits, register pair 55100 reads 0x00112233.
 
+#include <modbus/modbus.h>
+
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -50,6 +52,15 @@ struct RegisterMap {
 /// Reads what this page describes; the keys of the line (host, port, baud, ...) are the driver's own. Throws
 /// InputError, also when one request cannot carry all channels.
 RegisterMap read_register_map(TableReader& daq, std::vector<TableReader>& channels);
+
+/// Closed and freed with its owner.
+struct FreeModbus {
+  void operator()(modbus_t* context) const {
+    modbus_close(context);
+    modbus_free(context);
+  }
+};
+using ModbusContext = std::unique_ptr<modbus_t, FreeModbus>;
 
 /// One request and its answer, over whatever line.
 class ModbusLine {

@@ -60,13 +60,6 @@ struct SerialLine {
   }
 };
 
-struct FreeModbus {
-  void operator()(modbus_t* context) const {
-    modbus_close(context);
-    modbus_free(context);
-  }
-};
-
 class RtuLine final : public ModbusLine {
  public:
   RtuLine(SerialLine line, int unit) : line_(std::move(line)), unit_(unit) {
@@ -136,7 +129,7 @@ class RtuLine final : public ModbusLine {
 
   SerialLine line_;
   int unit_;
-  std::unique_ptr<modbus_t, FreeModbus> context_;
+  ModbusContext context_;
   std::optional<std::string> settling_;  ///< why the line must fall silent first
   SteadyClock::time_point quiet_since_;
 };

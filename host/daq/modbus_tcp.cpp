@@ -34,13 +34,6 @@ struct TcpAddress {
   int timeout_ms = 20;
 };
 
-struct FreeModbus {
-  void operator()(modbus_t* context) const {
-    modbus_close(context);
-    modbus_free(context);
-  }
-};
-
 /// The numeric addresses of a host. Throws HardwareError if it has none.
 std::vector<std::string> addresses_of(const std::string& host) {
   addrinfo hints{};
@@ -150,7 +143,7 @@ class TcpLine final : public ModbusLine {
   int wall_patience_ms_;
   std::function<uint64_t()> now_ns_;  // simulated; stands still in real time
   std::string address_;
-  std::unique_ptr<modbus_t, FreeModbus> context_;
+  ModbusContext context_;
 };
 
 /// Splits "host:port".

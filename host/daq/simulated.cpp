@@ -9,11 +9,11 @@
 // instrument.
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <numbers>
 
 #include "host/daq/driver.hpp"
+#include "host/transport/clock.hpp"
 #include "protocol/contract/input_error.hpp"
 
 namespace diastole::daq {
@@ -78,10 +78,6 @@ class Simulated final : public BlockInstrument {
   uint64_t next_ = 0;
 };
 
-uint64_t monotonic_ns() {
-  return static_cast<uint64_t>(std::chrono::steady_clock::now().time_since_epoch().count());
-}
-
 OpenInstrument configure(TableReader& /*daq*/, std::vector<TableReader>& channels) {
   std::vector<int64_t> inputs;
   for (TableReader& channel : channels)
@@ -91,7 +87,8 @@ OpenInstrument configure(TableReader& /*daq*/, std::vector<TableReader>& channel
       throw InputError({"", "--daq " + *options.address, "means nothing to the driver \"simulated\"",
                         "Leave it out, or name the instrument's driver in [daq] of the rig file."});
     }
-    return std::make_unique<Simulated>(inputs, options.now_ns ? options.now_ns : monotonic_ns);
+    return std::make_unique<Simulated>(
+        inputs, options.now_ns ? options.now_ns : [] { return RealClock().now_ns(); });
   };
 }
 

@@ -13,6 +13,7 @@
 #include <thread>
 #include <utility>
 
+#include "host/transport/clock.hpp"
 #include "host/transport/real_time.hpp"
 #include "protocol/contract/input_error.hpp"
 
@@ -26,12 +27,6 @@ constexpr const char* consumer = "diastole";
 
 uint64_t ns_of(const timespec& time) {
   return static_cast<uint64_t>(time.tv_sec) * ns_per_s + static_cast<uint64_t>(time.tv_nsec);
-}
-
-uint64_t monotonic_ns() {
-  timespec now{};
-  clock_gettime(CLOCK_MONOTONIC, &now);
-  return ns_of(now);
 }
 
 struct CloseChip {
@@ -134,7 +129,7 @@ class GpioInputs final : public GateInputs {
     if (level < 0 || (level == 1) == pressed_) return;
     pollfd state{descriptor(estop_), POLLIN, 0};
     if (::poll(&state, 1, 0) > 0) return;
-    note_estop({monotonic_ns(), level == 1, false});
+    note_estop({RealClock().now_ns(), level == 1, false});
   }
 
   void note_estop(const EstopChange& change) {

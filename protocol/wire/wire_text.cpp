@@ -67,7 +67,6 @@ std::string_view fault_remedy(Fault fault) { return words_of(kFaults, fault).rem
 std::string_view refusal_name(Refusal refusal) { return words_of(kRefusals, refusal).name; }
 std::string_view refusal_explanation(Refusal refusal) { return words_of(kRefusals, refusal).explanation; }
 std::string_view limit_name(Limit limit) { return words_of(kLimits, limit).name; }
-std::string_view limit_unit(Limit limit) { return words_of(kLimits, limit).explanation; }
 std::string_view state_name(State state) { return words_of(kStates, state).name; }
 std::string_view waveform_name(Waveform waveform) { return words_of(kWaveforms, waveform).name; }
 std::string_view noted_name(Noted kind) { return words_of(kNoted, kind).name; }

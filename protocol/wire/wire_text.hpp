@@ -16,8 +16,6 @@ std::string_view fault_remedy(Fault fault);
 std::string_view refusal_name(Refusal refusal);
 std::string_view refusal_explanation(Refusal refusal);
 std::string_view limit_name(Limit limit);
-/// The unit of Nak's `asked` and `allowed` for this limit.
-std::string_view limit_unit(Limit limit);
 std::string_view state_name(State state);
 std::string_view waveform_name(Waveform waveform);
 std::string_view run_end_name(RunEnd reason);

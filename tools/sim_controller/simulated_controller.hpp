@@ -3,6 +3,8 @@
 // its own time. Whatever runs the firmware (built for this machine, or its image in an emulator) stands
 // behind this.
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <string_view>
@@ -13,21 +15,8 @@ enum class Pin : uint8_t { step, dir, enable, ttl, rwave_uV, fault };
 
 /// The name in a pin trace: "STEP", "RWAVE_uV", ...
 constexpr std::string_view pin_name(Pin pin) {
-  switch (pin) {
-    case Pin::step:
-      return "STEP";
-    case Pin::dir:
-      return "DIR";
-    case Pin::enable:
-      return "ENABLE";
-    case Pin::ttl:
-      return "TTL";
-    case Pin::rwave_uV:
-      return "RWAVE_uV";
-    case Pin::fault:
-      return "FAULT";
-  }
-  return "";
+  constexpr std::array<std::string_view, 6> names{"STEP", "DIR", "ENABLE", "TTL", "RWAVE_uV", "FAULT"};
+  return names[static_cast<std::size_t>(pin)];
 }
 
 /// One change of one pin; the time is the board's, from its reset.

@@ -17,23 +17,9 @@ constexpr firmware::Ticks ticks_at(uint64_t time_ns) {
                          rest_ns * firmware::kTicksPerMicrosecond / 1000};
 }
 
-sim_controller::Pin pin_of(firmware::Signal signal) {
-  switch (signal) {
-    case firmware::Signal::STEP:
-      return sim_controller::Pin::step;
-    case firmware::Signal::DIR:
-      return sim_controller::Pin::dir;
-    case firmware::Signal::ENABLE:
-      return sim_controller::Pin::enable;
-    case firmware::Signal::TTL:
-      return sim_controller::Pin::ttl;
-    case firmware::Signal::RWAVE_uV:
-      return sim_controller::Pin::rwave_uV;
-    case firmware::Signal::FAULT:
-      return sim_controller::Pin::fault;
-  }
-  return sim_controller::Pin::fault;
-}
+/// Both count the pins in the same order.
+sim_controller::Pin pin_of(firmware::Signal signal) { return static_cast<sim_controller::Pin>(signal); }
+static_assert(static_cast<int>(firmware::Signal::FAULT) == static_cast<int>(sim_controller::Pin::fault));
 
 class HostBuiltController final : public sim_controller::SimulatedController {
  public:

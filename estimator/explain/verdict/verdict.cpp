@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <array>
 #include <stdexcept>
 
 namespace diastole::explain {
@@ -16,17 +17,8 @@ std::string in_words(const std::vector<std::string>& ids, const char* none) {
 }  // namespace
 
 std::string_view name_of(Verdict verdict) {
-  switch (verdict) {
-    case Verdict::named:
-      return "named";
-    case Verdict::ambiguous:
-      return "ambiguous";
-    case Verdict::unexplained:
-      return "unexplained";
-    case Verdict::none:
-      return "none";
-  }
-  return "none";
+  constexpr std::array<std::string_view, 4> names{"named", "ambiguous", "unexplained", "none"};
+  return names[static_cast<size_t>(verdict)];
 }
 
 Verdict verdict_named(std::string_view word) {

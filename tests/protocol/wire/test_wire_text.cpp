@@ -55,7 +55,7 @@ TEST(WireText, EveryFaultIsExplainedWithARemedy) {
 
 TEST(WireText, UnknownNumbersHaveWordsToo) {
   EXPECT_EQ(fault_name(static_cast<Fault>(200)), "unknown");
-  EXPECT_EQ(limit_unit(Limit::flow), "uL/s");
+  EXPECT_EQ(limit_name(Limit::flow), "flow");
   EXPECT_EQ(state_name(State::faulted), "faulted");
 }
 

@@ -1,7 +1,6 @@
 #include "tools/sim_board/processor/cpu.hpp"
 
 #include <algorithm>
-#include <cstdio>
 
 #include "protocol/contract/input_error.hpp"
 
