@@ -343,27 +343,6 @@ StreamedRun stream_run(const JournalRecords& journal) {
           pressure_of(source, rows)};
 }
 
-AssembledRun assemble_run(const JournalRecords& journal) {
-  StreamedRun streamed = stream_run(journal);
-  RecordedRun& run = streamed.assembled.run;
-  streamed.pump.each([&](size_t column, std::span<const double> values) {
-    std::vector<double>& target = column == 0 ? run.pump.time_s : run.pump.commanded_mL;
-    target.insert(target.end(), values.begin(), values.end());
-  });
-  std::vector<std::vector<double>*> targets;
-  for (const RowColumn& column : streamed.pressure.columns) {
-    const std::string name = column.path.substr(column.path.rfind('/') + 1);
-    targets.push_back(targets.empty() ? &run.pressure.time_s : &run.pressure.channels[name]);
-    if (!column.notes.empty()) run.pressure.notes[name] = column.notes;
-  }
-  streamed.pressure.each([&](size_t column, std::span<const double> values) {
-    targets[column]->insert(targets[column]->end(), values.begin(), values.end());
-  });
-  return std::move(streamed.assembled);
-}
-
-AssembledRun assemble_run(const JournalContents& journal) { return assemble_run(JournalRecords(journal)); }
-
 std::optional<signal::LowPassDesign> filter_of(double spacing_s) {
   if (spacing_s <= 0) return std::nullopt;
   const signal::LowPassDesign design{.rate_Hz = 1 / spacing_s,

@@ -46,10 +46,6 @@ struct StreamedRun {
 /// journal's file must stay as it is until the streams were read.
 StreamedRun stream_run(const JournalRecords& journal);
 
-/// The same in memory.
-AssembledRun assemble_run(const JournalRecords& journal);
-AssembledRun assemble_run(const JournalContents& journal);
-
 // The low-passed cavity pressure, /pressure/cavity_filtered_kPa, beside the raw one: cavity_kPa at 30 Hz forward and
 // backward (zero_phase.hpp), each stretch between missing samples by itself.
 

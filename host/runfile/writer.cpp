@@ -44,34 +44,6 @@ void write_protocol(H5Sink& sink, const runfile::RecordedRun& run) {
   if (!run.slices.empty()) write_table(sink, run.slices, runfile::slices_table);
 }
 
-/// Columns that are in memory, all at once.
-RowStream stream_of(std::vector<RowColumn> columns, std::vector<std::span<const double>> values) {
-  RowStream stream{values.front().size(), std::move(columns), {}};
-  stream.each = [values = std::move(values)](const RowStream::Take& take) {
-    for (size_t column = 0; column < values.size(); ++column)
-      take(column, values[column]);
-  };
-  return stream;
-}
-
-RowStream stream_of(const runfile::PumpTrace& pump) {
-  return stream_of(
-      {{runfile::pump_time, runfile::time_unit}, {runfile::pump_commanded, runfile::volume_unit}},
-      {pump.time_s, pump.commanded_mL});
-}
-
-RowStream stream_of(const runfile::PressureTrace& pressure) {
-  std::vector<RowColumn> columns{{runfile::pressure_time, runfile::time_unit}};
-  std::vector<std::span<const double>> values{pressure.time_s};
-  for (const auto& [name, values_kPa] : pressure.channels) {
-    columns.push_back({fmt::format("{}/{}", runfile::pressure_group, name), runfile::pressure_unit});
-    if (const auto notes = pressure.notes.find(name); notes != pressure.notes.end())
-      columns.back().notes = notes->second;
-    values.emplace_back(values_kPa);
-  }
-  return stream_of(std::move(columns), std::move(values));
-}
-
 void write_triggers(H5Sink& sink, const runfile::RecordedRun& run) {
   sink.numbers(runfile::trigger_time, run.trigger_s, runfile::time_unit);
   if (run.trigger_delay_s > 0) sink.scalar(runfile::trigger_delay, run.trigger_delay_s, runfile::time_unit);
@@ -160,12 +132,6 @@ std::string write_content(const std::filesystem::path& path, const Content& cont
 }
 
 }  // namespace
-
-std::string write_run(const std::filesystem::path& path, const runfile::RecordedRun& run,
-                      const FlushDirectory& flush_directory) {
-  runfile::check(run);
-  return write_content(path, {run, stream_of(run.pump), stream_of(run.pressure)}, flush_directory);
-}
 
 std::string write_run(const std::filesystem::path& path, const StreamedRun& run,
                       const FlushDirectory& flush_directory) {

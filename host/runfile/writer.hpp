@@ -10,7 +10,6 @@
 #include <string>
 
 #include "host/runfile/assemble.hpp"
-#include "protocol/runfile/run.hpp"
 
 namespace diastole {
 
@@ -20,8 +19,6 @@ using FlushDirectory = std::function<int(int descriptor)>;
 /// Replaces a file of that name. Throws InputError if the run breaks a rule of runfile::check, and
 /// HardwareError if the disk does not take the file; then nothing is left behind. Returns what is to be told of a file
 /// that is whole all the same: that the disk has not confirmed its name. Empty: nothing.
-std::string write_run(const std::filesystem::path& path, const runfile::RecordedRun& run,
-                      const FlushDirectory& flush_directory = ::fsync);
 std::string write_run(const std::filesystem::path& path, const StreamedRun& run,
                       const FlushDirectory& flush_directory = ::fsync);
 

@@ -7,9 +7,9 @@
 #include <csignal>
 #include <filesystem>
 
-#include "host/runfile/writer.hpp"
 #include "protocol/runfile/reader.hpp"
 #include "tests/flow/rig_with_daemon.hpp"
+#include "tests/host/bench/run_in_memory.hpp"
 #include "tools/diastole/replay/operator.hpp"
 
 namespace diastole::flow {

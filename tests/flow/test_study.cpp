@@ -4,9 +4,9 @@
 
 #include <cmath>
 
-#include "host/runfile/writer.hpp"
 #include "protocol/signal/step_response.hpp"
 #include "tests/flow/programs.hpp"
+#include "tests/host/bench/run_in_memory.hpp"
 #include "tests/sanitized.hpp"
 #include "tools/benchmarks/long_journal.hpp"
 #include "tools/benchmarks/timed_process.hpp"

@@ -11,9 +11,9 @@
 
 #include "host/journal/journal.hpp"
 #include "host/journal/parsed_journal.hpp"
-#include "host/runfile/assemble.hpp"
 #include "protocol/contract/input_error.hpp"
 #include "protocol/runfile/reader.hpp"
+#include "tests/host/bench/run_in_memory.hpp"
 
 namespace {
 

@@ -7,8 +7,8 @@
 
 #include "host/acquisition/acquisition.hpp"
 #include "host/controller/controller_client.hpp"
-#include "host/runfile/assemble.hpp"
 #include "tests/host/bench/desk.hpp"
+#include "tests/host/bench/run_in_memory.hpp"
 #include "tests/host/bench/scratch.hpp"
 
 namespace diastole {

@@ -8,9 +8,9 @@
 
 #include "host/runfile/assemble.hpp"
 #include "host/runfile/bids_export.hpp"
-#include "host/runfile/writer.hpp"
 #include "protocol/runfile/layout.hpp"
 #include "protocol/runfile/reader.hpp"
+#include "tests/host/bench/run_in_memory.hpp"
 #include "tests/host/bench/scratch.hpp"
 #include "tests/host/runfile/output_of.hpp"
 #include "tests/protocol/signal/filtered_at_once.hpp"

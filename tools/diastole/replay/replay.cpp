@@ -14,6 +14,7 @@
 #include "host/cli/session_view.hpp"
 #include "host/config/rig_config.hpp"
 #include "host/journal/journal.hpp"
+#include "host/journal/part_file.hpp"
 #include "host/rpc/run_session.hpp"
 #include "host/runfile/assemble.hpp"
 #include "host/runfile/output_guard.hpp"
@@ -35,6 +36,8 @@ using runfile::RecordedRun;
 constexpr double quiet_s = 2;     ///< of wall time, before progress is shown
 constexpr int most_attempts = 3;  ///< at what began unseen
 constexpr double jog_rate_mL_s = 5;
+constexpr const char* replayed_file = "replayed.run.h5";
+constexpr const char* closest_file = "closest.run.h5";
 
 struct ReplayOptions {
   std::string run;
@@ -53,8 +56,10 @@ struct Recording {
 
 Recording read_recording(const ReplayOptions& options, const PrivateDirectory& directory) {
   if (!options.run.ends_with(".journal")) return {runfile::read_run(options.run), options.run};
-  Recording recording{assemble_run(JournalRecords(options.run)).run, directory / "recovered.run.h5"};
-  write_run(recording.file, recording.run);
+  const fs::path file = directory / "recovered.run.h5";
+  write_run(file, stream_run(JournalRecords(options.run)));
+  Recording recording{runfile::read_run(file), file};
+  recording.run.file = options.run;
   return recording;
 }
 
@@ -103,7 +108,7 @@ std::optional<RecordedRun> replay_once(const ReplayOptions& options, const repla
   const auto started = std::chrono::steady_clock::now();
   SessionOptions session;
   session.experiment = write_experiment(plan, directory);
-  session.output = directory / "replayed.run.h5";
+  session.output = directory / replayed_file;
   session.force = true;  // of a first attempt
   session.poll_ms = 5;
   session.stops_asked = [&] {
@@ -153,12 +158,19 @@ std::optional<RecordedRun> replay_closest(const ReplayOptions& options, const Re
       report.comparison = replay::compare(recording.run, *replayed);
       report.plan = std::move(plan);
       closest = std::move(replayed);
+      fs::rename(directory / replayed_file, directory / closest_file);
     }
     // What did not recur shows no better moment.
     if (!late_s || *late_s == 0 || report.comparison.equal()) break;
     plan_options.onset_shift_s -= *late_s;
   }
   return closest;
+}
+
+void keep_closest(const PrivateDirectory& directory, const std::string& output) try {
+  copy_durably(directory / closest_file, output);
+} catch (const fs::filesystem_error& error) {
+  throw HardwareError(output, error.what(), "Check that you may write there.");
 }
 
 /// None when the user has broken it off.
@@ -174,7 +186,7 @@ std::optional<replay::ReplayReport> replay_run(const ReplayOptions& options) {
   if (!replayed) return std::nullopt;
   report.firmware = fmt::format("{} {}", options.image.empty() ? "the firmware's host build" : options.image,
                                 report.firmware);
-  if (!options.output.empty()) write_run(options.output, *replayed);
+  if (!options.output.empty()) keep_closest(directory, options.output);
   if (!replayed->pressure.time_s.empty()) report.simulated_s = replayed->pressure.time_s.back();
   report.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - started).count();
   return report;
