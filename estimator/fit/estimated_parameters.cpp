@@ -13,6 +13,13 @@ double ParameterRun::se_of_mean(const Eigen::MatrixXd& covariance) const {
   return std::sqrt(covariance.block(start, start, size, size).sum()) / static_cast<double>(count);
 }
 
+std::vector<double> EstimatedParameters::starts() const {
+  std::vector<double> starts;
+  for (const EstimatedParameter& value : values)
+    starts.push_back(value.start);
+  return starts;
+}
+
 EstimatedParameters estimated_parameters(const Study& study, const ElasticModel& model) {
   EstimatedParameters estimated;
   for (const StudyParameter& parameter : study.law.parameters) {

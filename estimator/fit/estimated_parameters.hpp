@@ -28,6 +28,8 @@ struct EstimatedParameters {
   std::vector<ParameterGroup> groups;  ///< which of the model's parameters each value sets
   std::vector<SmoothRegion> smooth;    ///< the regional parameters that are smooth
   std::vector<ParameterRun> runs;      ///< of the values, one a parameter
+
+  [[nodiscard]] std::vector<double> starts() const;
 };
 
 /// Throws InputError when a lower bound is not a value that the law allows.

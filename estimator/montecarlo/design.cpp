@@ -59,9 +59,7 @@ class Explorer {
     Measurement design;
     design.frames = {measurement_.frames.front()};
     std::vector<NodeField> motions(1);
-    std::vector<double> values;
-    for (const EstimatedParameter& value : estimated_.values)
-      values.push_back(value.start);
+    const std::vector<double> values = estimated_.starts();
     for (const double share : new_frames) {
       const double pressure_kPa = share * highest.pressure_kPa;
       MotionOutcome outcome = motion_->solve(0, values, pressure_kPa);

@@ -138,9 +138,7 @@ class Predictor {
   }
 
   [[nodiscard]] std::vector<double> se_percent(const ImagingPlan& plan, const std::vector<Frame>& frames) {
-    std::vector<double> values;
-    for (const EstimatedParameter& value : estimated_.values)
-      values.push_back(value.start);
+    const std::vector<double> values = estimated_.starts();
     std::vector<NodeField> motions(1);
     for (size_t k = 1; k < frames.size(); ++k) {
       MotionOutcome outcome = motion_->solve(k - 1, values, frames[k].pressure_kPa);

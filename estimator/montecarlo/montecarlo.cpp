@@ -23,9 +23,7 @@ constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
 
 std::vector<NodeField> true_motions(const Study& study, ElasticMotion& motion,
                                     const EstimatedParameters& estimated, const Measurement& design) {
-  std::vector<double> values;
-  for (const EstimatedParameter& value : estimated.values)
-    values.push_back(value.start);
+  const std::vector<double> values = estimated.starts();
   std::vector<NodeField> motions(design.frames.size());
   for (size_t number = 1; number < design.frames.size(); ++number) {
     const double pressure_kPa = design.frames[number].pressure_kPa;

@@ -4,8 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <set>
 
+#include "estimator/motion_residuals/motion_residuals.hpp"
 #include "estimator/motion_residuals/tag_match.hpp"
 #include "protocol/contract/input_error.hpp"
 
@@ -118,13 +118,7 @@ Measurement with_noise(const Measurement& exact, std::span<const int> frames, co
 }
 
 std::vector<int> spread_frames(const Measurement& measurement, int count) {
-  std::set<int> with_points;
-  for (const TagPoint& tag : measurement.tags)
-    with_points.insert(tag.frame);
-  for (const ObservedPoint& point : measurement.points)
-    with_points.insert(point.frame);
-  with_points.erase(0);
-  std::vector<int> frames(with_points.begin(), with_points.end());
+  std::vector<int> frames = loaded_frames(measurement);
   const int available = static_cast<int>(frames.size());
   if (count < 1 || count > available) {
     throw InputError({"", fmt::format("--frames {}", count),

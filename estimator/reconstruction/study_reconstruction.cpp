@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <set>
 
 #include "estimator/model/study_model.hpp"
+#include "estimator/motion_residuals/motion_residuals.hpp"
 #include "estimator/reconstruction/measurement_findings.hpp"
 #include "estimator/reconstruction/stiffness_check.hpp"
 #include "protocol/contract/input_error.hpp"
@@ -15,7 +15,6 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr double farthest_outside_mm = 5.0;  // farther from the body than this a point is not the specimen's
 constexpr double quick_settled_mm = 0.05;
 constexpr double quick_fineness = 0.5;  // decades
 constexpr int quick_huber_rounds = 2;
@@ -34,21 +33,6 @@ LocatorOptions locator_for(const HermiteMesh& mesh) {
     }
   }
   return {.outside_xi = std::clamp(farthest_outside_mm / std::max(thinnest_mm, 1e-3), 0.25, 1.0)};
-}
-
-std::vector<int> loaded_frames(const Study& study, const Measurement& measurement) {
-  std::set<int> frames;
-  for (const TagPoint& tag : measurement.tags)
-    frames.insert(tag.frame);
-  for (const ObservedPoint& point : measurement.points)
-    frames.insert(point.frame);
-  frames.erase(0);
-  if (frames.empty()) {
-    throw InputError({study.file.string(), "table [data]",
-                      "every measured point is of frame 0, the undeformed state",
-                      "Give points of loaded frames: only they have moved."});
-  }
-  return {frames.begin(), frames.end()};
 }
 
 /// The frames in their order; or, where one λ must do for all, the most loaded one first, which determines it best.
@@ -112,7 +96,12 @@ void judge(StudyReconstruction& result, const Study& study, const Measurement& m
 StudyReconstruction reconstruct_study(const Study& study, const Measurement& measurement,
                                       const ReconstructionOptions& options) {
   const Clock::time_point begun = Clock::now();
-  const std::vector<int> frames = loaded_frames(study, measurement);
+  const std::vector<int> frames = loaded_frames(measurement);
+  if (frames.empty()) {
+    throw InputError({study.file.string(), "table [data]",
+                      "every measured point is of frame 0, the undeformed state",
+                      "Give points of loaded frames: only they have moved."});
+  }
   StudyReconstruction result;
   result.body = std::make_unique<const MeshBody>(study_body(study));
   result.findings = measurement_findings(measurement, result.body->mesh);

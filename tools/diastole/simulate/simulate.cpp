@@ -12,8 +12,10 @@
 
 #include "host/cli/session_view.hpp"
 #include "host/config/experiment.hpp"
+#include "host/journal/part_file.hpp"
 #include "host/rpc/run_session.hpp"
 #include "protocol/contract/input_error.hpp"
+#include "protocol/contract/named_members.hpp"
 #include "tools/diastole/simulate/simulated_rig.hpp"
 #include "tools/diastole/simulate/stop_signals.hpp"
 #include "tools/sim_rig/hidden_effects.hpp"
@@ -93,9 +95,7 @@ class PendingFile {
   PendingFile(const PendingFile&) = delete;
   PendingFile& operator=(const PendingFile&) = delete;
 
-  [[nodiscard]] std::string path() const {
-    return name_.empty() ? "" : fmt::format("{}.{}.part", name_, ::getpid());
-  }
+  [[nodiscard]] std::string path() const { return name_.empty() ? "" : part_file_of(name_).string(); }
   void complete() const {
     if (!name_.empty()) fs::rename(path(), name_);
   }
@@ -159,13 +159,7 @@ ExitCode report(const SimulatedSession& session, bool json) {
     fmt::print("{:.1f} s simulated in {:.2f} s\n", session.simulated_s, session.wall_s);
     return code;
   }
-  const nlohmann::json document{{"run", result.run},
-                                {"end", result.end},
-                                {"cycles", result.cycles},
-                                {"triggers", result.triggers},
-                                {"samples", result.samples},
-                                {"gaps", result.gaps},
-                                {"expected", result.expected},
+  const nlohmann::json document{DIASTOLE_NAMED(result, run, end, cycles, triggers, samples, gaps, expected),
                                 {"simulated_seconds", session.simulated_s},
                                 {"wall_seconds", session.wall_s}};
   std::cout << document.dump(2) << '\n';

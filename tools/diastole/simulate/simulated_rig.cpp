@@ -64,18 +64,9 @@ SimulatedRig::SimulatedRig(const PrivateDirectory& directory, const SimulatedRig
 
   const std::string daq = fmt::format("{}:{}", addresses.at("modbus_host").get<std::string>(),
                                       addresses.at("modbus_port").get<int>());
-  std::vector<std::string> daemon{fs::read_symlink("/proc/self/exe"),
-                                  "daemon",
-                                  "--config",
-                                  config,
-                                  "--port",
-                                  line,
-                                  "--daq",
-                                  daq,
-                                  "--socket",
-                                  socket(),
-                                  "--journal-dir",
-                                  directory / "journals"};
+  std::vector<std::string> daemon{fs::read_symlink("/proc/self/exe"), "daemon", "--config", config};
+  daemon.insert(daemon.end(), {"--port", line, "--daq", daq, "--socket", socket()});
+  daemon.insert(daemon.end(), {"--journal-dir", directory / "journals"});
   if (!options.real_time) daemon.insert(daemon.end(), {"--conductor", conductor});
   daemon_ = std::make_unique<ChildProcess>(daemon, directory / "daemon.log");
   daemon_->first_line(start_patience);
