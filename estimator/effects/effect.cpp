@@ -7,7 +7,6 @@ namespace diastole {
 
 #define DIASTOLE_EFFECT(name) Effect name##_effect();
 #include "estimator/effects/effect_list.inc"
-#undef DIASTOLE_EFFECT
 
 namespace {
 
@@ -49,7 +48,6 @@ const std::vector<const Effect*>& all_effects() {
   static const Effect effects[] = {
 #define DIASTOLE_EFFECT(name) name##_effect(),
 #include "estimator/effects/effect_list.inc"
-#undef DIASTOLE_EFFECT
   };
   static const std::vector<const Effect*> list = [] {
     std::vector<const Effect*> pointers;

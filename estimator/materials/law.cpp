@@ -4,7 +4,6 @@ namespace diastole {
 
 #define DIASTOLE_LAW(name) const Law& name##_law();
 #include "estimator/materials/material_list.inc"
-#undef DIASTOLE_LAW
 
 size_t Law::parameter_index(std::string_view parameter) const {
   size_t index = 0;
@@ -17,7 +16,6 @@ const std::vector<const Law*>& all_laws() {
   static const std::vector<const Law*> laws{
 #define DIASTOLE_LAW(name) &name##_law(),
 #include "estimator/materials/material_list.inc"
-#undef DIASTOLE_LAW
   };
   return laws;
 }

@@ -7,13 +7,11 @@ namespace diastole {
 
 #define DIASTOLE_HOST_COMMAND(add) void add(CommandLine& line);
 #include "host/cli/command_list.inc"
-#undef DIASTOLE_HOST_COMMAND
 
 /// All of them, in the order in which a session uses them.
 inline void add_host_commands(CommandLine& line) {
 #define DIASTOLE_HOST_COMMAND(add) add(line);
 #include "host/cli/command_list.inc"
-#undef DIASTOLE_HOST_COMMAND
 }
 
 }  // namespace diastole

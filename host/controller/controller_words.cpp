@@ -60,7 +60,6 @@ std::string_view message_name(int32_t type) {
   case wire::MessageType::name:                          \
     return #name;
 #include "protocol/wire/message_list.inc"
-#undef DIASTOLE_MESSAGE
   }
   return "unknown";
 }

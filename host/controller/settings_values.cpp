@@ -25,7 +25,6 @@ const std::vector<Entry>& entries() {
   Entry{{wire::Setting::name, shown, scale, (least) * (scale), (most) * (scale), explanation}, \
         &MachineSettings::name},
 #include "protocol/wire/setting_list.inc"
-#undef DIASTOLE_SETTING
   };
   return all;
 }

@@ -8,7 +8,6 @@ namespace {
 constexpr std::array known{
 #define DIASTOLE_DAQ_DRIVER(name) &name##_driver,
 #include "host/daq/driver_list.inc"
-#undef DIASTOLE_DAQ_DRIVER
 };
 
 }  // namespace

@@ -53,7 +53,6 @@ struct Driver {
 
 #define DIASTOLE_DAQ_DRIVER(name) extern const Driver name##_driver;
 #include "host/daq/driver_list.inc"
-#undef DIASTOLE_DAQ_DRIVER
 
 std::span<const Driver* const> drivers();
 

@@ -15,12 +15,10 @@ namespace diastole::wire {
 enum class Noted : std::uint8_t {
 #include "protocol/wire/black_box_list.inc"
 };
-#undef DIASTOLE_BLACK_BOX
 #define DIASTOLE_BLACK_BOX(number, name) Noted::name,
 inline constexpr Noted kLastNoted = last_of({
 #include "protocol/wire/black_box_list.inc"
 });
-#undef DIASTOLE_BLACK_BOX
 
 /// One event.
 ///

@@ -11,33 +11,27 @@ namespace diastole::wire {
 enum class Fault : std::uint8_t {
 #include "protocol/wire/fault_list.inc"
 };
-#undef DIASTOLE_FAULT
 #define DIASTOLE_FAULT(number, name, explanation, remedy) Fault::name,
 inline constexpr Fault kLastFault = last_of({
 #include "protocol/wire/fault_list.inc"
 });
-#undef DIASTOLE_FAULT
 
 #define DIASTOLE_REFUSAL(number, name, explanation) name = number,
 enum class Refusal : std::uint8_t {
 #include "protocol/wire/refusal_list.inc"
 };
-#undef DIASTOLE_REFUSAL
 #define DIASTOLE_REFUSAL(number, name, explanation) Refusal::name,
 inline constexpr Refusal kLastRefusal = last_of({
 #include "protocol/wire/refusal_list.inc"
 });
-#undef DIASTOLE_REFUSAL
 
 #define DIASTOLE_LIMIT(number, name, unit) name = number,
 enum class Limit : std::uint8_t {
 #include "protocol/wire/limit_list.inc"
 };
-#undef DIASTOLE_LIMIT
 #define DIASTOLE_LIMIT(number, name, unit) Limit::name,
 inline constexpr Limit kLastLimit = last_of({
 #include "protocol/wire/limit_list.inc"
 });
-#undef DIASTOLE_LIMIT
 
 }  // namespace diastole::wire

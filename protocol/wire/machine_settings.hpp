@@ -11,7 +11,6 @@ namespace diastole::wire {
 enum class Setting : std::uint8_t {
 #define DIASTOLE_SETTING(number, name, least, initial, most, shown, scale, explanation) name = number,
 #include "protocol/wire/setting_list.inc"
-#undef DIASTOLE_SETTING
 };
 
 struct MachineSettings {
@@ -20,7 +19,6 @@ struct MachineSettings {
 #define DIASTOLE_SETTING(number, name, least, initial, most, shown, scale, explanation) \
   std::int32_t name = initial;
 #include "protocol/wire/setting_list.inc"
-#undef DIASTOLE_SETTING
   std::uint8_t board_name_size = 0;
   std::array<std::uint8_t, kMaxNameBytes> board_name{};  ///< UTF-8, for people
 
@@ -29,7 +27,6 @@ struct MachineSettings {
 #define DIASTOLE_SETTING(number, name, least, initial, most, shown, scale, explanation) \
   visit.field(#name, self.name);
 #include "protocol/wire/setting_list.inc"
-#undef DIASTOLE_SETTING
     visit.list("board_name", self.board_name_size, self.board_name);
   }
   constexpr bool operator==(const MachineSettings&) const = default;
@@ -49,7 +46,6 @@ constexpr SettingOutOfRange out_of_range(const MachineSettings& settings) {
   if (settings.name < (least)) return {true, Setting::name, settings.name, least};      \
   if (settings.name > (most)) return {true, Setting::name, settings.name, most};
 #include "protocol/wire/setting_list.inc"
-#undef DIASTOLE_SETTING
   return {};
 }
 

@@ -8,7 +8,6 @@ namespace diastole::wire {
 enum class MessageType : std::uint8_t {
 #define DIASTOLE_MESSAGE(number, name, sender, delivery) name = number,
 #include "protocol/wire/message_list.inc"
-#undef DIASTOLE_MESSAGE
 };
 
 enum class Sender : std::uint8_t { host, controller };
@@ -20,7 +19,6 @@ constexpr Delivery delivery_of(MessageType type) {
   case MessageType::name:                                \
     return Delivery::delivery;
 #include "protocol/wire/message_list.inc"
-#undef DIASTOLE_MESSAGE
   }
   return Delivery::sequenced;
 }
@@ -39,7 +37,6 @@ constexpr Sender sender_of(MessageType type) {
   case MessageType::name:                                \
     return Sender::sender;
 #include "protocol/wire/message_list.inc"
-#undef DIASTOLE_MESSAGE
   }
   return Sender::host;
 }

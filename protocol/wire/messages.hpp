@@ -56,7 +56,6 @@ consteval std::uint32_t schema_hash() {
     name::layout(message, hash);                          \
   }
 #include "protocol/wire/message_list.inc"
-#undef DIASTOLE_MESSAGE
   return hash.value();
 }
 }  // namespace detail
@@ -87,7 +86,6 @@ constexpr void visit(std::uint8_t type, std::span<const std::uint8_t> payload, H
     }                                                      \
     break;
 #include "protocol/wire/message_list.inc"
-#undef DIASTOLE_MESSAGE
   }
   handler(Undecodable{type, false, {}});
 }

@@ -21,12 +21,10 @@ namespace diastole::wire {
 enum class State : std::uint8_t {
 #include "protocol/wire/state_list.inc"
 };
-#undef DIASTOLE_STATE
 #define DIASTOLE_STATE(number, name) State::name,
 inline constexpr State kLastState = last_of({
 #include "protocol/wire/state_list.inc"
 });
-#undef DIASTOLE_STATE
 
 #define DIASTOLE_WAVEFORM(number, name) name = number,
 enum class Waveform : std::uint8_t {
@@ -41,12 +39,10 @@ inline constexpr Waveform kLastWaveform = last_of({
 enum class RunEnd : std::uint8_t {
 #include "protocol/wire/run_end_list.inc"
 };
-#undef DIASTOLE_RUN_END
 #define DIASTOLE_RUN_END(number, name) RunEnd::name,
 inline constexpr RunEnd kLastRunEnd = last_of({
 #include "protocol/wire/run_end_list.inc"
 });
-#undef DIASTOLE_RUN_END
 
 enum class ResetCause : std::uint8_t { unknown = 0, power_on = 1, reset_pin = 2, software = 3, watchdog = 4 };
 inline constexpr ResetCause kLastResetCause = ResetCause::watchdog;

@@ -31,11 +31,9 @@ inline constexpr ImageState kLastImageState = ImageState::unrecorded;
 enum class UpdateOutcome : std::uint8_t {
 #include "protocol/wire/update_outcome_list.inc"
 };
-#undef DIASTOLE_UPDATE_OUTCOME
 #define DIASTOLE_UPDATE_OUTCOME(number, name, explanation, remedy) UpdateOutcome::name,
 inline constexpr UpdateOutcome kLastUpdateOutcome = last_of({
 #include "protocol/wire/update_outcome_list.inc"
 });
-#undef DIASTOLE_UPDATE_OUTCOME
 
 }  // namespace diastole::wire

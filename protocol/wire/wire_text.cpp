@@ -13,22 +13,18 @@ struct Words {
 constexpr Words kFaults[] = {
 #define DIASTOLE_FAULT(number, name, explanation, remedy) {#name, explanation, remedy},
 #include "protocol/wire/fault_list.inc"
-#undef DIASTOLE_FAULT
 };
 constexpr Words kRefusals[] = {
 #define DIASTOLE_REFUSAL(number, name, explanation) {#name, explanation, {}},
 #include "protocol/wire/refusal_list.inc"
-#undef DIASTOLE_REFUSAL
 };
 constexpr Words kLimits[] = {
 #define DIASTOLE_LIMIT(number, name, unit) {#name, unit, {}},
 #include "protocol/wire/limit_list.inc"
-#undef DIASTOLE_LIMIT
 };
 constexpr Words kStates[] = {
 #define DIASTOLE_STATE(number, name) {#name, {}, {}},
 #include "protocol/wire/state_list.inc"
-#undef DIASTOLE_STATE
 };
 constexpr Words kWaveforms[] = {
 #define DIASTOLE_WAVEFORM(number, name) {#name, {}, {}},
@@ -37,18 +33,15 @@ constexpr Words kWaveforms[] = {
 constexpr Words kRunEnds[] = {
 #define DIASTOLE_RUN_END(number, name) {#name, {}, {}},
 #include "protocol/wire/run_end_list.inc"
-#undef DIASTOLE_RUN_END
 };
 
 constexpr Words kUpdateOutcomes[] = {
 #define DIASTOLE_UPDATE_OUTCOME(number, name, explanation, remedy) {#name, explanation, remedy},
 #include "protocol/wire/update_outcome_list.inc"
-#undef DIASTOLE_UPDATE_OUTCOME
 };
 constexpr Words kNoted[] = {
 #define DIASTOLE_BLACK_BOX(number, name) {#name, {}, {}},
 #include "protocol/wire/black_box_list.inc"
-#undef DIASTOLE_BLACK_BOX
 };
 
 template <class Enum, std::size_t N>

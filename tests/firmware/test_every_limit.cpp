@@ -179,7 +179,6 @@ std::vector<Limit> every_limit() {
 #define DIASTOLE_LIMIT(number, name, unit) \
   if (Limit::name != Limit::none) limits.push_back(Limit::name);
 #include "protocol/wire/limit_list.inc"
-#undef DIASTOLE_LIMIT
   return limits;
 }
 INSTANTIATE_TEST_SUITE_P(Limits, EveryLimit, testing::ValuesIn(every_limit()),

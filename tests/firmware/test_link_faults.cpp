@@ -165,7 +165,6 @@ TEST(HostileLine, EveryCutRequestIsRefused) {
       EXPECT_TRUE(refused(wire::MessageType::name, whole.first(size))) << #name << " of " << size; \
   }
 #include "protocol/wire/message_list.inc"
-#undef DIASTOLE_MESSAGE
   EXPECT_EQ(bench.state(), State::homed);
 }
 

@@ -190,7 +190,6 @@ TEST(MachineSettings, EverySettingIsBoundedOnBothSides) {
     EXPECT_EQ(outside.allowed, above ? (most) : (least)) << #name;                      \
   }
 #include "protocol/wire/setting_list.inc"
-#undef DIASTOLE_SETTING
 }
 
 }  // namespace

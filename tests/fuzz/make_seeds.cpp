@@ -188,7 +188,6 @@ int main(int argc, char** argv) {
   const std::filesystem::path directory = argv[1];
 #define DIASTOLE_MESSAGE(number, name, sender, delivery) write_example<wire::name>(directory, #name);
 #include "protocol/wire/message_list.inc"
-#undef DIASTOLE_MESSAGE
   write_sessions(directory);
   write_rpc_lines(directory);
   write_http_requests(directory);

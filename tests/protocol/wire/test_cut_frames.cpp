@@ -30,7 +30,6 @@ std::vector<Example> examples() {
     all.push_back({#name, MessageType::name, Bytes(bytes.begin(), bytes.end())}); \
   }
 #include "protocol/wire/message_list.inc"
-#undef DIASTOLE_MESSAGE
   return all;
 }
 

@@ -54,7 +54,6 @@ testing::Types<Messages...> without_first(testing::Types<void, Messages...>);
 using AllMessages = decltype(without_first(std::declval<testing::Types<void
 #define DIASTOLE_MESSAGE(number, name, sender, delivery) , name
 #include "protocol/wire/message_list.inc"
-#undef DIASTOLE_MESSAGE
                                                                        >>()));
 TYPED_TEST_SUITE(EveryMessage, AllMessages);
 
@@ -64,7 +63,6 @@ TYPED_TEST(EveryMessage, ExampleEncodesToTheBytesInItsHeader) {
 #define DIASTOLE_MESSAGE(number, name, sender, delivery) \
   if (TypeParam::kType == MessageType::name) return #name;
 #include "protocol/wire/message_list.inc"
-#undef DIASTOLE_MESSAGE
     return "";
   }();
   const std::string wanted = "Example " + name + ":" + hex(encoded(TypeParam::example()));

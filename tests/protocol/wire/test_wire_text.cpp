@@ -12,22 +12,18 @@ TEST(WireText, ListsAreNumberedFromZeroWithoutHoles) {
   int next = 0;
 #define DIASTOLE_FAULT(number, name, explanation, remedy) EXPECT_EQ(number, next++) << #name;
 #include "protocol/wire/fault_list.inc"
-#undef DIASTOLE_FAULT
   EXPECT_EQ(next - 1, static_cast<int>(kLastFault));
   next = 0;
 #define DIASTOLE_REFUSAL(number, name, explanation) EXPECT_EQ(number, next++) << #name;
 #include "protocol/wire/refusal_list.inc"
-#undef DIASTOLE_REFUSAL
   EXPECT_EQ(next - 1, static_cast<int>(kLastRefusal));
   next = 0;
 #define DIASTOLE_LIMIT(number, name, unit) EXPECT_EQ(number, next++) << #name;
 #include "protocol/wire/limit_list.inc"
-#undef DIASTOLE_LIMIT
   EXPECT_EQ(next - 1, static_cast<int>(kLastLimit));
   next = 0;
 #define DIASTOLE_STATE(number, name) EXPECT_EQ(number, next++) << #name;
 #include "protocol/wire/state_list.inc"
-#undef DIASTOLE_STATE
   EXPECT_EQ(next - 1, static_cast<int>(kLastState));
   next = 0;
 #define DIASTOLE_WAVEFORM(number, name) EXPECT_EQ(number, next++) << #name;
@@ -36,7 +32,6 @@ TEST(WireText, ListsAreNumberedFromZeroWithoutHoles) {
   next = 0;
 #define DIASTOLE_RUN_END(number, name) EXPECT_EQ(number, next++) << #name;
 #include "protocol/wire/run_end_list.inc"
-#undef DIASTOLE_RUN_END
   EXPECT_EQ(next - 1, static_cast<int>(kLastRunEnd));
 }
 

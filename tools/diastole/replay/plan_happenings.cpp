@@ -111,7 +111,6 @@ bool is_controller_fault(const std::string& code) {
   static constexpr std::array names{
 #define DIASTOLE_FAULT(number, name, explanation, remedy) std::string_view(#name),
 #include "protocol/wire/fault_list.inc"
-#undef DIASTOLE_FAULT
   };
   return code != "none" && std::ranges::find(names, code) != names.end();
 }
