@@ -5,8 +5,6 @@
 
 #include <cerrno>
 #include <cstring>
-#include <span>
-#include <tuple>
 
 #include "host/journal/part_file.hpp"
 #include "host/runfile/h5_sink.hpp"

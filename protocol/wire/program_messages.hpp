@@ -1,7 +1,6 @@
 #pragma once
 // What is to be run and within which limits. The whole program lies on the controller before motion begins.
 
-#include <array>
 #include <cstddef>
 #include <cstdint>
 

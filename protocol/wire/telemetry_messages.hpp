@@ -1,7 +1,6 @@
 #pragma once
 // What happened, in the order in which it happened. All of it is sequenced: none of it may be lost.
 
-#include <array>
 #include <cstddef>
 #include <cstdint>
 

@@ -23,7 +23,6 @@
 //   ConfirmImage                      →
 //                                     ←    UpdateAnswer
 
-#include <array>
 #include <cstddef>
 #include <cstdint>
 

@@ -2,7 +2,6 @@
 
 #include "firmware/boards/stm32f405/clocks.hpp"
 #include "firmware/boards/stm32f405/pins.hpp"
-#include "firmware/boards/stm32f405/registers.hpp"
 
 namespace diastole::stm32 {
 
