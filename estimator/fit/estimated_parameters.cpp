@@ -20,6 +20,16 @@ std::vector<double> EstimatedParameters::starts() const {
   return starts;
 }
 
+std::vector<double> EstimatedParameters::se_percent(const Eigen::MatrixXd& covariance) const {
+  std::vector<double> result;
+  for (const ParameterRun& run : runs) {
+    const double se = run.se_of_mean(covariance);
+    const bool relative = run.parameter.lower > 0;  // its coordinate is the logarithm
+    result.push_back(100 * (relative ? se : se / std::abs(run.parameter.start)));
+  }
+  return result;
+}
+
 EstimatedParameters estimated_parameters(const Study& study, const ElasticModel& model) {
   EstimatedParameters estimated;
   for (const StudyParameter& parameter : study.law.parameters) {

@@ -30,6 +30,8 @@ struct EstimatedParameters {
   std::vector<ParameterRun> runs;      ///< of the values, one a parameter
 
   [[nodiscard]] std::vector<double> starts() const;
+  /// Standard errors of the parameters' means, in % of the start values. `covariance`: of the values' coordinates.
+  [[nodiscard]] std::vector<double> se_percent(const Eigen::MatrixXd& covariance) const;
 };
 
 /// Throws InputError when a lower bound is not a value that the law allows.

@@ -87,13 +87,7 @@ class Explorer {
   [[nodiscard]] std::vector<double> se_percent(const Eigen::MatrixXd& information) const {
     const Eigen::MatrixXd covariance =
         information.ldlt().solve(Eigen::MatrixXd::Identity(information.rows(), information.cols()));
-    std::vector<double> result;
-    for (const ParameterRun& run : estimated_.runs) {
-      const double relative = run.se_of_mean(covariance);
-      const bool logarithmic = run.parameter.lower > 0;
-      result.push_back(100 * (logarithmic ? relative : relative / std::abs(run.parameter.start)));
-    }
-    return result;
+    return estimated_.se_percent(covariance);
   }
 
  private:
@@ -145,26 +139,25 @@ double log_determinant(const Eigen::MatrixXd& information) {
 
 }  // namespace
 
-void require_known(const DesignStudy& design, const std::string& file) {
-  for (size_t i = 0; i < design.parameters.size(); ++i) {
-    if (design.se_percent[i] < most_se_percent) continue;
-    throw InputError({file, "table [data]", fmt::format("says nothing about {}", design.parameters[i]),
+DesignStudy::DesignStudy(const Study& study, std::vector<double> now) : se_percent(std::move(now)) {
+  for (const StudyParameter& parameter : study.law.parameters) {
+    parameters.push_back(parameter.name);
+    values.push_back(parameter.start);
+    if (se_percent[parameters.size() - 1] < most_se_percent) continue;
+    throw InputError({study.file.string(), "table [data]",
+                      fmt::format("says nothing about {}", parameter.name),
                       "Give frames with a load at which the body moves, or hold the parameter."});
   }
 }
+
+void DesignStudy::rank() { std::ranges::stable_sort(options, {}, &DesignOption::volume); }
 
 DesignStudy explore_design(const Study& study, const Measurement& measurement) {
   require_loaded_points(study, measurement);
   Explorer explorer(study, measurement);
   const std::vector<FrameInformation> frames = explorer.present();
   const Eigen::MatrixXd now = total(frames);
-  DesignStudy result;
-  for (const StudyParameter& parameter : study.law.parameters) {
-    result.parameters.push_back(parameter.name);
-    result.values.push_back(parameter.start);
-  }
-  result.se_percent = explorer.se_percent(now);
-  require_known(result, study.file.string());
+  DesignStudy result(study, explorer.se_percent(now));
   const auto add = [&](std::string change, const Eigen::MatrixXd& information) {
     result.options.push_back({std::move(change), explorer.se_percent(information),
                               std::exp(0.5 * (log_determinant(now) - log_determinant(information)))});
@@ -185,8 +178,7 @@ DesignStudy explore_design(const Study& study, const Measurement& measurement) {
   });
   for (const FrameInformation& frame : explorer.at_new_pressures(*highest))
     add(fmt::format("one more frame at {:.3g} kPa", frame.pressure_kPa), now + frame.marginal());
-  std::stable_sort(result.options.begin(), result.options.end(),
-                   [](const DesignOption& a, const DesignOption& b) { return a.volume < b.volume; });
+  result.rank();
   return result;
 }
 

@@ -26,14 +26,15 @@ struct DesignStudy {
   std::vector<std::string> parameters;
   std::vector<double> values;
   std::vector<double> se_percent;     ///< now
-  std::vector<DesignOption> options;  ///< the one that shrinks the region most first
+  std::vector<DesignOption> options;  ///< the one that shrinks the region most first, once ranked
+
+  /// At the study's start values. Throws InputError for data that say nothing about a parameter.
+  DesignStudy(const Study& study, std::vector<double> se_percent);
+  void rank();
 };
 
 /// At the study's start values. Throws InputError without equilibrium there, without loaded points on the specimen, and for data that
 /// say nothing about a parameter.
 DesignStudy explore_design(const Study& study, const Measurement& measurement);
-
-/// Throws InputError for data that say nothing about a parameter. `file`: the study's.
-void require_known(const DesignStudy& design, const std::string& file);
 
 }  // namespace diastole

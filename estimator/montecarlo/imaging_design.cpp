@@ -160,12 +160,7 @@ class Predictor {
       throw InputError({study_.file.string(), "", fmt::format("cannot be solved: {}", problem.failure()),
                         "Give other values with --set."});
     const Eigen::MatrixXd covariance = inference::estimate_covariance(problem.jacobian(q)).matrix;
-    std::vector<double> result;
-    for (const ParameterRun& run : estimated_.runs) {
-      const double relative = run.se_of_mean(covariance);
-      result.push_back(100 * (run.parameter.lower > 0 ? relative : relative / std::abs(run.parameter.start)));
-    }
-    return result;
+    return estimated_.se_percent(covariance);
   }
 
  private:
@@ -211,21 +206,14 @@ Measurement planned_tags(const HermiteMesh& mesh, const ImagingPlan& plan, const
 
 DesignStudy explore_imaging(const Study& study, const std::vector<Frame>& frames, const ImagingPlan& plan) {
   Predictor predictor(study);
-  DesignStudy result;
-  for (const StudyParameter& parameter : study.law.parameters) {
-    result.parameters.push_back(parameter.name);
-    result.values.push_back(parameter.start);
-  }
-  result.se_percent = predictor.se_percent(plan, frames);
-  require_known(result, study.file.string());
+  DesignStudy result(study, predictor.se_percent(plan, frames));
   for (Change& change : changes_of(plan, frames)) {
     DesignOption option{std::move(change.words), predictor.se_percent(change.plan, change.frames), 1.0};
     for (size_t i = 0; i < option.se_percent.size(); ++i)
       option.volume *= option.se_percent[i] / result.se_percent[i];
     result.options.push_back(std::move(option));
   }
-  std::stable_sort(result.options.begin(), result.options.end(),
-                   [](const DesignOption& a, const DesignOption& b) { return a.volume < b.volume; });
+  result.rank();
   return result;
 }
 
