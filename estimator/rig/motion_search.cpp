@@ -1,10 +1,11 @@
 #include <Eigen/Dense>
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdlib>
 #include <limits>
+#include <optional>
 
+#include "estimator/inference/least_squares.hpp"
 #include "estimator/rig/motion.hpp"
 
 namespace diastole::rig {
@@ -37,7 +38,8 @@ size_t index_at(const PumpTrace& pump, double time_s) {
 
 double quantum_mL(const RecordedRun& run) {
   const auto found = run.rig.find("volume_per_step_mL");
-  if (found != run.rig.end() && std::holds_alternative<double>(found->second))
+  if (found != run.rig.end() && std::holds_alternative<double>(found->second) &&
+      std::get<double>(found->second) > 0)
     return std::get<double>(found->second);
   double least = std::numeric_limits<double>::infinity();
   for (size_t k = 1; k < run.pump.commanded_mL.size(); ++k) {
@@ -105,75 +107,56 @@ std::vector<Stroke> first_strokes(const Counted& counted) {
   return strokes;
 }
 
-double square_error(const Stroke& stroke, double spread_s, const Counted& counted) {
-  const Motion motion({stroke}, stroke.from_mL, spread_s);
-  double sum = 0.0;
-  for (size_t k = counted.first; k < counted.last; ++k) {
-    const double error = motion.at(counted.time_s(k)).volume_mL - counted.volume_mL(k);
-    sum += error * error;
-  }
-  return sum;
-}
+/// How far a stroke is from the counts, in steps, by its start and end in s and its rounding.
+class StrokeMisfit final : public inference::LeastSquaresProblem {
+ public:
+  StrokeMisfit(const Stroke& stroke, double spread_s, const Counted& counted)
+      : stroke_(stroke), spread_s_(spread_s), counted_(counted) {}
 
-/// Times and rounding of one stroke by Gauss-Newton on the counts; the cosine is tried too.
+  [[nodiscard]] const inference::ParameterSpace& space() const override { return space_; }
+  std::optional<Eigen::VectorXd> residuals(const Eigen::VectorXd& q) override {
+    const Motion motion({stroke_at(q)}, stroke_.from_mL, spread_s_);
+    Eigen::VectorXd steps(static_cast<Eigen::Index>(counted_.last - counted_.first));
+    for (size_t k = counted_.first; k < counted_.last; ++k)
+      steps[static_cast<Eigen::Index>(k - counted_.first)] =
+          (motion.at(counted_.time_s(k)).volume_mL - counted_.volume_mL(k)) / counted_.step_mL;
+    return steps;
+  }
+  Eigen::MatrixXd jacobian(const Eigen::VectorXd& q) override {
+    return inference::central_differences(*this, q);
+  }
+  [[nodiscard]] Stroke stroke_at(const Eigen::VectorXd& q) const {
+    Stroke stroke = stroke_;
+    stroke.start_s = q[0];
+    stroke.end_s = std::max(q[1], q[0] + 1e-3);
+    stroke.round = std::min(q[2], 0.5);
+    return stroke;
+  }
+
+ private:
+  inference::ParameterSpace space_{{{"start_s"}, {"end_s"}, {"round", "", 0.01, 0.5}}};
+  Stroke stroke_;
+  double spread_s_;
+  Counted counted_;
+};
+
+/// Times and rounding of one stroke by least squares on the counts; the cosine is tried too.
 Stroke fitted(const Stroke& first, double spread_s, const Counted& whole) {
   const double around = 0.6 * spread_s + 0.01;
   const Counted counted{whole.pump, whole.step_mL,
                         std::max(whole.first, index_at(whole.pump, first.start_s - around)),
                         std::min(whole.last, index_at(whole.pump, first.end_s + around))};
+  const Eigen::Vector3d start(first.start_s + 0.5 * spread_s, first.end_s - 0.5 * spread_s, 0.2);
   Stroke best = first;
-  double best_error = std::numeric_limits<double>::infinity();
+  double least = std::numeric_limits<double>::infinity();
   for (const bool cosine : {false, true}) {
-    Stroke stroke = first;
-    stroke.cosine = cosine;
-    stroke.round = 0.2;
-    stroke.start_s += 0.5 * spread_s;
-    stroke.end_s -= 0.5 * spread_s;
-    const auto moved = [&](const Eigen::Vector3d& by) {
-      Stroke other = stroke;
-      other.start_s += by[0];
-      other.end_s = std::max(other.end_s + by[1], other.start_s + 1e-3);
-      other.round = std::clamp(other.round + by[2], 0.01, 0.5);
-      return other;
-    };
-    double error = square_error(stroke, spread_s, counted);
-    for (int iteration = 0; iteration < 30; ++iteration) {
-      const std::array<double, 3> perturbation{1e-4, 1e-4, 1e-3};
-      std::array<Motion, 4> motions;
-      motions[0] = Motion({stroke}, stroke.from_mL, spread_s);
-      for (Eigen::Index j = 0; j < 3; ++j) {
-        motions[static_cast<size_t>(j) + 1] =
-            Motion({moved(perturbation[static_cast<size_t>(j)] * Eigen::Vector3d::Unit(j))}, stroke.from_mL,
-                   spread_s);
-      }
-      Eigen::Matrix3d normal = 1e-12 * Eigen::Matrix3d::Identity();
-      Eigen::Vector3d gradient = Eigen::Vector3d::Zero();
-      for (size_t k = counted.first; k < counted.last; ++k) {
-        const double value = motions[0].at(counted.time_s(k)).volume_mL;
-        Eigen::Vector3d row;
-        for (size_t j = 0; j < 3; ++j) {
-          row[static_cast<Eigen::Index>(j)] =
-              (motions[j + 1].at(counted.time_s(k)).volume_mL - value) / perturbation[j];
-        }
-        normal += row * row.transpose();
-        gradient += row * (counted.volume_mL(k) - value);
-      }
-      const Eigen::Vector3d step = normal.ldlt().solve(gradient);
-      double part = 1.0;
-      Stroke next = moved(step);
-      double next_error = square_error(next, spread_s, counted);
-      while (next_error > error && part > 0.01) {
-        part *= 0.5;
-        next = moved(part * step);
-        next_error = square_error(next, spread_s, counted);
-      }
-      if (next_error >= error * (1.0 - 1e-9)) break;
-      stroke = next;
-      error = next_error;
-    }
-    if (error < best_error) {
-      best_error = error;
-      best = stroke;
+    Stroke shape = first;
+    shape.cosine = cosine;
+    StrokeMisfit misfit(shape, spread_s, counted);
+    const inference::SearchResult found = inference::minimise(misfit, start, {.iteration_limit = 30});
+    if (found.cost() < least) {
+      least = found.cost();
+      best = misfit.stroke_at(found.q);
     }
   }
   return best;

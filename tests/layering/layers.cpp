@@ -90,7 +90,7 @@ const std::vector<Rule>& rules() {
       {"estimator/inference", {"protocol/contract"}},
       {"estimator/mesh", {"protocol/contract"}},
       {"estimator/io", {"protocol/contract", "protocol/runfile"}},
-      {"estimator/rig", {"protocol/runfile"}},
+      {"estimator/rig", {"protocol/runfile", "estimator/inference"}},
       {"estimator/fe", {"estimator/materials", "estimator/mesh", "estimator/parallel"}},
       {"estimator/effects", {"estimator/inference", "estimator/rig"}},
       {"estimator/model",
