@@ -68,8 +68,10 @@ inline RowStream stream_of(const runfile::PressureTrace& pressure) {
 inline std::string write_run(const std::filesystem::path& path, const runfile::RecordedRun& run,
                              const FlushDirectory& flush_directory = ::fsync) {
   runfile::check(run);
-  StreamedRun streamed{{}, stream_of(run.pump), stream_of(run.pressure)};
+  StreamedRun streamed;
   streamed.assembled.run = run;
+  streamed.pump = stream_of(run.pump);
+  streamed.pressure = stream_of(run.pressure);
   return write_run(path, streamed, flush_directory);
 }
 
