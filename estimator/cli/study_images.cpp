@@ -38,6 +38,8 @@ std::string fingerprint_of(const std::filesystem::path& folder,
     if (entry.is_regular_file()) files.push_back(entry.path());
   }
   if (const auto beside = imaging::pose_nearby(folder)) files.push_back(*beside);
+  if (const auto edits = imaging::edits_beside(folder); std::filesystem::exists(edits, error))
+    files.push_back(edits);
   std::sort(files.begin(), files.end());
   Fingerprint fingerprint;
   fingerprint.add(fmt::format("tracker {}", tracker_version));

@@ -25,6 +25,7 @@ struct TrackArguments {
   std::filesystem::path output;
   std::optional<std::filesystem::path> pose;
   std::string coordinates = "auto";
+  std::optional<std::filesystem::path> edits;
   std::optional<std::filesystem::path> page;
   std::optional<std::filesystem::path> record;
   bool force = false;
@@ -62,15 +63,18 @@ ExitCode run_track(const TrackArguments& arguments, const CommandOutput& out) {
   const auto start = std::chrono::steady_clock::now();
   std::vector<std::filesystem::path> inputs;
   if (arguments.pose) inputs.push_back(*arguments.pose);
+  const imaging::TrackRequest request{.folder = arguments.folder,
+                                      .pose = arguments.pose,
+                                      .coordinates = arguments.coordinates,
+                                      .edits = arguments.edits};
+  inputs.push_back(imaging::edits_file(request));
   require_output({arguments.output, inputs, imaging::tags_file_mark, arguments.force});
   if (arguments.page) require_output({*arguments.page, inputs, report::page_mark, arguments.force});
   if (arguments.record) require_output({*arguments.record, inputs, tracking_file_mark, arguments.force});
   const bool shows_progress = isatty(STDERR_FILENO) != 0;
-  const imaging::TrackedFolder tracked = imaging::track_folder(
-      {.folder = arguments.folder, .pose = arguments.pose, .coordinates = arguments.coordinates},
-      [&](const std::string& stage) {
-        if (shows_progress) fmt::print(stderr, "{}\n", stage);
-      });
+  const imaging::TrackedFolder tracked = imaging::track_folder(request, [&](const std::string& stage) {
+    if (shows_progress) fmt::print(stderr, "{}\n", stage);
+  });
   write_whole_file(arguments.output, imaging::tags_file_text(tracked.points));
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   if (arguments.page || arguments.record) {
@@ -85,6 +89,10 @@ ExitCode run_track(const TrackArguments& arguments, const CommandOutput& out) {
                  {"coordinates", tracked.pose ? "specimen" : "patient"},
                  {"seconds", seconds},
                  {"problems", written(tracked.problems)}};
+    if (tracked.edits)
+      json["edits"] = {{"file", tracked.edits->file.string()},
+                       {"applied", tracked.edits->counts},
+                       {"undone", tracked.edits->undone}};
     if (tracked.pose) json["to_specimen"] = pose_json(*tracked.pose);
     if (tracked.outline)
       json["outline"] = {{"inner_radius_mm", tracked.outline->inner_radius_mm},
@@ -102,6 +110,10 @@ ExitCode run_track(const TrackArguments& arguments, const CommandOutput& out) {
              tracked.rms_px, seconds);
   for (const auto& [reason, count] : tracked.dropped)
     fmt::print("{} dropped: {}\n", count, reason);
+  if (tracked.edits) {
+    for (const auto& [action, count] : tracked.edits->counts)
+      fmt::print("By hand: {} of action {}, from {}\n", count, action, tracked.edits->file.string());
+  }
   if (tracked.outline)
     fmt::print("Outlines: inner radius {:.1f} mm, outer {:.1f} mm, height {:.1f} mm\n",
                tracked.outline->inner_radius_mm, tracked.outline->outer_radius_mm,
@@ -123,6 +135,9 @@ void add_track(CommandLine& line) {
       "  diastole track dicom/ -o gel.tags.csv --page gel.html\n"
       "  diastole track dicom/ -o heart.tags.csv --pose heart.pose.toml\n"
       "  diastole track dicom/ -o gel.tags.csv --coords patient --json\n"
+      "What was put right by hand stands in FOLDER.edits.jsonl and is done again each time: `diastole desk "
+      "FOLDER` "
+      "writes it, or you.\n"
       "Coordinates are the specimen's if its pose is given, lies beside the folder (*.pose.toml), or is seen "
       "in the images (an annulus\n"
       "with its two ends); otherwise the scanner's. docs/imaging.md says more.");
@@ -133,6 +148,8 @@ void add_track(CommandLine& line) {
   command->add_option("--coords", arguments->coordinates, "coordinates of the points")
       ->check(CLI::IsMember({"auto", "specimen", "patient"}))
       ->capture_default_str();
+  command->add_option("--edits", arguments->edits,
+                      "what was put right by hand (*.edits.jsonl) [FOLDER.edits.jsonl beside the folder]");
   command->add_option("--page", arguments->page,
                       "a page to look at: every slice's cine with its lines, what was left out, residuals");
   command->add_option("--record", arguments->record, "the same as a file for `diastole report` (*.json)");

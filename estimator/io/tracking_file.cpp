@@ -8,10 +8,18 @@
 namespace diastole {
 
 DIASTOLE_MEMBERS(TrackedDirection, angle_deg, spacing_mm)
-DIASTOLE_MEMBERS(TrackedImage, frame, trigger_ms, sigma_px, residual, picture, points, rejected)
+template <class Visit, IsRecord<TrackedImage> Record>
+void each_member(Visit&& visit, Record& record) {
+  DIASTOLE_VISIT(visit, record, frame, trigger_ms, sigma_px, residual, picture, points, rejected)
+  visit("outlines", if_any(record.outlines));
+}
 DIASTOLE_MEMBERS(TrackedSliceImages, name, view, rows, columns, pixel_mm, directions, images)
 DIASTOLE_MEMBERS(DroppedCount, reason, points)
-DIASTOLE_MEMBERS(TrackingRecord, folder, coordinates, points, rms_px, seconds, dropped, findings, slices)
+template <class Visit, IsRecord<TrackingRecord> Record>
+void each_member(Visit&& visit, Record& record) {
+  DIASTOLE_VISIT(visit, record, folder, coordinates, points, rms_px, seconds, dropped, findings, slices)
+  visit("edits", if_any(record.edits));
+}
 
 namespace {
 
@@ -27,6 +35,9 @@ void require_whole(const TrackingRecord& record) {
         throw std::invalid_argument("a picture has not as many pixels as its slice");
       if (image.points.size() % 5 != 0 || image.rejected.size() % 4 != 0)
         throw std::invalid_argument("a list of points is not whole");
+      for (const std::vector<double>& outline : image.outlines) {
+        if (outline.size() % 2 != 0) throw std::invalid_argument("an outline is not whole");
+      }
     }
   }
 }

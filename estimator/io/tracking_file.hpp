@@ -3,6 +3,7 @@
 // (JSON, format "diastole-tracking").
 
 #include <array>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -27,6 +28,7 @@ struct TrackedImage {
   std::string picture;           ///< 8 bits a pixel, row by row, base64
   std::vector<double> points;    ///< five numbers each: direction, tag, column, row, sigma in pixels
   std::vector<double> rejected;  ///< four numbers each: direction, reason, column, row
+  std::vector<std::vector<double>> outlines = {};  ///< of tissue, closed: column, row, column, row, ...
 };
 
 struct TrackedSliceImages {
@@ -49,6 +51,7 @@ struct TrackingRecord {
   size_t points = 0;
   double rms_px = 0;
   double seconds = 0;
+  std::optional<size_t> edits = {};   ///< manual choices that were applied
   std::vector<DroppedCount> dropped;  ///< a rejected point's reason counts here
   std::vector<Finding> findings;
   std::vector<TrackedSliceImages> slices;

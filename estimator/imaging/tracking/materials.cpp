@@ -56,13 +56,15 @@ struct Modulation {
 
 constexpr Eigen::Index raster = 2;  // pixels
 
-Modulation modulation_of(const TagView& view, const Image& image) {
+Modulation modulation_of(const TagView& view, size_t k) {
+  const Image& image = view.images[k];
   const double window_mm = 0.5 / view.waves[0].per_mm.norm();
   const size_t count = 1 + 2 * view.waves.size();
   Brightness brightness(view.extent_mm(), window_mm, static_cast<int>(count));
   std::array<double, 5> patterns{};
   for (Eigen::Index row = 0; row < image.rows(); ++row) {
     for (Eigen::Index column = 0; column < image.cols(); ++column) {
+      if (view.is_masked(k, row, column)) continue;
       const Eigen::Vector2d x = view.place_mm(row, column);
       rest_patterns(view, x, patterns);
       brightness.add(x, std::span(patterns).first(count), 1.0, static_cast<double>(image(row, column)));
@@ -230,17 +232,18 @@ void each_piece(const MaterialMap& map, const std::function<bool(Material)>& hol
 }
 
 /// A material's picture, fitted where it surely is and predicted everywhere.
-CostMap cost_of(const Image& image, const TagView& view, const Eigen::ArrayXXf& depth, double sure_mm,
-                double window_mm, size_t count,
+CostMap cost_of(size_t k, const TagView& view, const Eigen::ArrayXXf& depth, double sure_mm, double window_mm,
+                size_t count,
                 const std::function<void(Eigen::Index, Eigen::Index, std::span<double>)>& patterns_at,
                 double noise) {
+  const Image& image = view.images[k];
   CostMap cost = CostMap::Constant(image.rows(), image.cols(), static_cast<float>(most_cost));
   Brightness brightness(view.extent_mm(), window_mm, static_cast<int>(count));
   std::array<double, 8> patterns{}, amplitudes{};
   Eigen::Index pixels = 0;
   for (Eigen::Index column = 0; column < image.cols(); ++column) {
     for (Eigen::Index row = 0; row < image.rows(); ++row) {
-      if (static_cast<double>(depth(row, column)) < sure_mm) continue;
+      if (static_cast<double>(depth(row, column)) < sure_mm || view.is_masked(k, row, column)) continue;
       patterns_at(row, column, std::span(patterns).first(count));
       brightness.add(view.place_mm(row, column), std::span(patterns).first(count), 1.0,
                      static_cast<double>(image(row, column)));
@@ -289,7 +292,7 @@ MaterialMap first_materials(const TagView& view) {
   std::vector<Modulation> modulations;
   std::vector<double> times_s;
   for (const size_t k : chosen) {
-    modulations.push_back(modulation_of(view, view.images[k]));
+    modulations.push_back(modulation_of(view, k));
     times_s.push_back(1e-3 * view.times_ms[k]);
   }
   const size_t nodes = modulations[0].mean.size();
@@ -317,7 +320,7 @@ MaterialMap first_materials(const TagView& view) {
   return map;
 }
 
-MaterialMap refined_materials(const Image& image, const TagView& view, const MaterialMap& before,
+MaterialMap refined_materials(size_t k, const TagView& view, const MaterialMap& before,
                               const PhasesAt& tissue, const PhasesAt& still) {
   const TagModel model(view.waves.size());
   const double spacing_mm = view.waves[0].spacing_mm();
@@ -335,10 +338,11 @@ MaterialMap refined_materials(const Image& image, const TagView& view, const Mat
   const auto at_rest = [&](Eigen::Index row, Eigen::Index column, std::span<double> patterns) {
     rest_patterns(view, view.place_mm(row, column), patterns);
   };
-  const double noise = std::max(1e-6, noise_of(image, depth_mm(before, Material::nothing, view.plane)));
+  const double noise =
+      std::max(1e-6, noise_of(view.images[k], depth_mm(before, Material::nothing, view.plane)));
   const auto cost = [&](Material material, double window_mm, size_t count, const auto& patterns_at) {
-    return cost_of(image, view, depth_mm(before, material, view.plane), sure_mm, window_mm, count,
-                   patterns_at, noise);
+    return cost_of(k, view, depth_mm(before, material, view.plane), sure_mm, window_mm, count, patterns_at,
+                   noise);
   };
   std::array<CostMap, 4> costs;
   costs[static_cast<size_t>(Material::nothing)] = cost(Material::nothing, 2 * spacing_mm, 1, constant);
@@ -355,6 +359,7 @@ MaterialMap refined_materials(const Image& image, const TagView& view, const Mat
   MaterialMap map = before;
   for (Eigen::Index column = 0; column < map.cols(); ++column) {
     for (Eigen::Index row = 0; row < map.rows(); ++row) {
+      if (view.is_masked(k, row, column)) continue;
       const bool may_be_tissue = static_cast<double>(depth_before(row, column)) > -0.5 * spacing_mm;
       size_t best = static_cast<size_t>(Material::nothing);
       for (size_t i = 0; i < costs.size(); ++i) {
@@ -366,6 +371,24 @@ MaterialMap refined_materials(const Image& image, const TagView& view, const Mat
   }
   remove_specks(map, view.plane, 4 * spacing_mm * spacing_mm);
   return map;
+}
+
+void draw_contours(const PhaseEdits& edits, MaterialMap& map) {
+  if (!edits.within_inner && !edits.within_outer) return;
+  for (Eigen::Index at = 0; at < map.size(); ++at) {
+    Material& here = map(at);
+    const bool is_tissue = here == Material::tissue;
+    const bool is_cavity = here == Material::mixed_water;
+    const bool in_wall = edits.within_outer ? (*edits.within_outer)(at) && (edits.within_inner || !is_cavity)
+                                            : is_tissue || is_cavity;
+    if (edits.within_inner && (*edits.within_inner)(at)) {
+      if (is_tissue) here = Material::mixed_water;
+    } else if (in_wall) {
+      here = Material::tissue;
+    } else if (is_tissue) {
+      here = Material::nothing;
+    }
+  }
 }
 
 Eigen::ArrayXXf depth_mm(const MaterialMap& map, Material material, const SlicePlane& plane) {

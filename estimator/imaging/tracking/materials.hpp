@@ -24,10 +24,15 @@ MaterialMap first_materials(const TagView& view);
 /// The phases of the tags at a pixel, one a direction, as tracked so far.
 using PhasesAt = std::function<void(Eigen::Index row, Eigen::Index column, std::span<double> phases_rad)>;
 
-/// The map of one image, from that of a phase nearby: each pixel goes to the material whose picture, fitted in smooth windows
+/// The map of image k, from that of a phase nearby: each pixel goes to the material whose picture, fitted in smooth windows
 /// and carried across the boundary, explains it and its neighbours best. `tissue` are the tracked phases, `still` those of the tags at rest.
-MaterialMap refined_materials(const Image& image, const TagView& view, const MaterialMap& before,
+/// Masked pixels stay what they were before.
+MaterialMap refined_materials(size_t k, const TagView& view, const MaterialMap& before,
                               const PhasesAt& tissue, const PhasesAt& still);
+
+/// Tissue is what lies within a drawn outer contour and outside a drawn inner one. Of one contour alone the other edge stays as it
+/// was found: an outer one leaves the cavity (water that mixes), an inner one the outside.
+void draw_contours(const PhaseEdits& edits, MaterialMap& map);
 
 /// Distance in mm from each pixel's centre to the edge of the material, which lies half a pixel before the nearest centre that is
 /// not of it; negative outside. The image's border is no edge of it.

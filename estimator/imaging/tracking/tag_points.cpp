@@ -191,6 +191,9 @@ class Emitter {
       ++points_.dropped[reason];
       points_.rejected.push_back({view_.frames[k], static_cast<int>(f), x_mm, reason});
     };
+    if (view_.is_masked(k, std::lround(x_mm.y() / view_.plane.row_spacing_mm),
+                        std::lround(x_mm.x() / view_.plane.column_spacing_mm)))
+      return drop("masked by hand");
     if (!(sigma_mm <= most_sigma_in_spacings * spacing_mm))
       return drop("uncertain: faded, or too little of it is seen");
     if (around.excess > most_excess) return drop("another picture lies over it: a ghost, a fold or an edge");

@@ -34,6 +34,10 @@ constexpr double negligible_in_pixels = 0.005;
 /// A motion that begins at rest has done 2 (2 t / T)^2 of its whole after a small t: a thousandth after a hundredth of the cycle.
 constexpr double late_share = 0.02;
 constexpr double settled_mm = 0.005;
+/// A person sets a point on a line to half a pixel.
+constexpr double seen_in_pixels = 0.5;
+/// How far around a place that a person saw the start of a search may be led: ranges to choose from, in spacings.
+constexpr std::array led_ranges_in_spacings = {1.0, 2.0, 4.0};
 
 double median(std::vector<double> values) { return values.empty() ? 0 : signal::median(std::move(values)); }
 
@@ -70,6 +74,12 @@ struct Pixel {
   SplineValues splines;
 };
 
+/// The motion at a place where a person saw a tag.
+struct SeenMotion {
+  SplineValues splines;
+  double w_mm;
+};
+
 double spline_sum(const SplineValues& splines, const Eigen::VectorXd& coefficients) {
   double sum = 0;
   for (size_t i = 0; i < 16; ++i) {
@@ -84,7 +94,8 @@ class ViewTracker {
       : view_(view), waves_(view.waves), model_(view.waves.size()), spacing_mm_(view.waves[0].spacing_mm()) {}
 
   TrackedView track(std::optional<TrackingFault>& fault) {
-    const MaterialMap first = first_materials(view_);
+    MaterialMap first = first_materials(view_);
+    if (!view_.edits.empty()) draw_contours(view_.edits[0], first);
     settle_waves(first);
     if (!collect_pixels(first)) {
       fault = TrackingFault{
@@ -117,8 +128,8 @@ class ViewTracker {
       std::vector<Eigen::Matrix3d> matrix(directions(), Eigen::Matrix3d::Zero());
       std::vector<Eigen::Vector3d> vector(directions(), Eigen::Vector3d::Zero());
       for (size_t k = 0; k < times(); ++k) {
-        if (is_late) add_waves(view_.images[k], water, 2.5 * sure_mm(), matrix, vector);
-        if (k == 0) add_waves(view_.images[k], tissue, 1.5 * sure_mm(), matrix, vector);
+        if (is_late) add_waves(k, water, 2.5 * sure_mm(), matrix, vector);
+        if (k == 0) add_waves(k, tissue, 1.5 * sure_mm(), matrix, vector);
       }
       for (size_t f = 0; f < directions(); ++f) {
         const Eigen::Vector3d step = matrix[f].ldlt().solve(vector[f]);
@@ -132,8 +143,9 @@ class ViewTracker {
     spacing_mm_ = waves_[0].spacing_mm();
   }
 
-  void add_waves(const Image& image, const Eigen::ArrayXXf& depth, double least_mm,
+  void add_waves(size_t k, const Eigen::ArrayXXf& depth, double least_mm,
                  std::vector<Eigen::Matrix3d>& matrix, std::vector<Eigen::Vector3d>& vector) const {
+    const Image& image = view_.images[k];
     Brightness brightness(view_.extent_mm(), window_in_spacings * spacing_mm_,
                           static_cast<int>(model_.patterns()));
     struct Sample {
@@ -144,7 +156,7 @@ class ViewTracker {
     std::vector<Sample> samples;
     for (Eigen::Index column = 0; column < image.cols(); ++column) {
       for (Eigen::Index row = 0; row < image.rows(); ++row) {
-        if (static_cast<double>(depth(row, column)) < least_mm) continue;
+        if (static_cast<double>(depth(row, column)) < least_mm || view_.is_masked(k, row, column)) continue;
         Sample sample{view_.place_mm(row, column), {}, static_cast<double>(image(row, column))};
         rest_phases(sample.x_mm, sample.phases);
         brightness.add(sample.x_mm, model_.at(sample.phases).values(), 1.0, sample.value);
@@ -186,13 +198,18 @@ class ViewTracker {
     return std::min(1.0, huber * sigma / std::max(std::abs(residual), 1e-300));
   }
 
-  /// All pixels that tissue may reach in the cycle: half a spacing around the first map and more.
+  /// All pixels that tissue may reach in the cycle: half a spacing around the first map and more, and what is within drawn contours.
   bool collect_pixels(const MaterialMap& map) {
     const Eigen::ArrayXXf depth = depth_mm(map, Material::tissue, view_.plane);
+    const auto is_drawn = [&](Eigen::Index row, Eigen::Index column) {
+      return std::any_of(view_.edits.begin(), view_.edits.end(), [&](const PhaseEdits& edits) {
+        return edits.within_outer && (*edits.within_outer)(row, column);
+      });
+    };
     std::vector<Eigen::Vector2d> places;
     for (Eigen::Index column = 0; column < map.cols(); ++column) {
       for (Eigen::Index row = 0; row < map.rows(); ++row) {
-        if (static_cast<double>(depth(row, column)) < -0.75 * spacing_mm_) continue;
+        if (static_cast<double>(depth(row, column)) < -0.75 * spacing_mm_ && !is_drawn(row, column)) continue;
         pixels_.push_back({row, column, view_.place_mm(row, column), {}});
         places.push_back(pixels_.back().x_mm);
       }
@@ -207,7 +224,44 @@ class ViewTracker {
     coefficients_.assign(directions(),
                          Eigen::MatrixXd::Zero(splines_->count(), static_cast<Eigen::Index>(times())));
     phases_.resize(times());
+    collect_seen();
     return true;
+  }
+
+  void collect_seen() {
+    seen_.assign(times(), std::vector<std::vector<SeenMotion>>(directions()));
+    for (size_t k = 0; k < view_.edits.size(); ++k) {
+      for (const SeenTag& seen : view_.edits[k].seen) {
+        const TagWave& wave = waves_[static_cast<size_t>(seen.direction)];
+        const double d_mm = (seen.tag + wave.offset_cycles) * wave.spacing_mm();
+        seen_[k][static_cast<size_t>(seen.direction)].push_back(
+            {splines_->at(seen.x_mm), d_mm - wave.per_mm.normalized().dot(seen.x_mm)});
+      }
+    }
+  }
+
+  [[nodiscard]] bool is_led(size_t k) const {
+    return std::any_of(seen_[k].begin(), seen_[k].end(), [](const auto& seen) { return !seen.empty(); });
+  }
+
+  /// What a person saw, as information on the coefficients.
+  [[nodiscard]] PhaseInformation information_of(const std::vector<SeenMotion>& all) const {
+    const Eigen::Index count = splines_->count();
+    PhaseInformation information{Eigen::MatrixXd::Zero(count, count), Eigen::VectorXd::Zero(count)};
+    const double sigma_mm = seen_in_pixels * view_.plane.finer_spacing_mm();
+    for (const SeenMotion& seen : all) {
+      for (size_t i = 0; i < 16; ++i) {
+        if (seen.splines.index[i] < 0) continue;
+        const double value = seen.splines.value[i] / (sigma_mm * sigma_mm);
+        information.vector[seen.splines.index[i]] += value * seen.w_mm;
+        for (size_t j = 0; j < 16; ++j) {
+          if (seen.splines.index[j] >= 0)
+            information.precision(seen.splines.index[i], seen.splines.index[j]) +=
+                value * seen.splines.value[j];
+        }
+      }
+    }
+    return information;
   }
 
   void tracked_phases(const Pixel& pixel, size_t k, std::span<double> phases) const {
@@ -246,7 +300,12 @@ class ViewTracker {
           phases[f] = maps[f](row, column);
       };
     };
-    phases_[k].materials = refined_materials(view_.images[k], view_, before, at(tracked), at(rest));
+    set_materials(k, refined_materials(k, view_, before, at(tracked), at(rest)));
+  }
+
+  void set_materials(size_t k, MaterialMap map) {
+    if (!view_.edits.empty()) draw_contours(view_.edits[k], map);
+    phases_[k].materials = std::move(map);
     phases_[k].depth_mm = depth_mm(phases_[k].materials, Material::tissue, view_.plane);
   }
 
@@ -262,13 +321,131 @@ class ViewTracker {
         if (k >= 2) each.col(time) = each.col(time - 1) + 0.5 * (each.col(time - 1) - each.col(time - 2));
       }
       const std::vector<Eigen::MatrixXd> expected = coefficients_;
-      phases_[k].materials = k == 0 ? first : phases_[k - 1].materials;
-      phases_[k].depth_mm = depth_mm(phases_[k].materials, Material::tissue, view_.plane);
-      fit_phase(k, view_.images[k], expected, 2);
-      find_edges(k, phases_[k].materials, rest);
-      if (k == 0) find_edges(k, phases_[k].materials, rest);
-      fit_phase(k, view_.images[k], expected, 4);
+      set_materials(k, k == 0 ? first : phases_[k - 1].materials);
+      if (is_led(k)) {
+        lead(k, expected);
+      } else {
+        fit_phase(k, view_.images[k], expected, 2);
+      }
+      find_edges(k, MaterialMap(phases_[k].materials), rest);
+      if (k == 0) find_edges(k, MaterialMap(phases_[k].materials), rest);
+      fit_phase(k, view_.images[k], is_led(k) ? coefficients_ : expected, 4);
+      if (is_led(k)) put_right_before(k, rest);
     }
+  }
+
+  /// Searches once more from starts that go through what a person saw, and less and less far around it; keeps the end that explains
+  /// image, person and expectation best. A line that jumped to the next stripe fits its own surroundings as well as the right one, and
+  /// no search leads out of there.
+  void lead(size_t k, const std::vector<Eigen::MatrixXd>& expected) {
+    const auto time = static_cast<Eigen::Index>(k);
+    const double step_mm = first_step_in_spacings * spacing_mm_;
+    std::vector<Eigen::MatrixXd> best;
+    double least = 0, noise = 0;
+    for (const double range : led_ranges_in_spacings) {
+      const Eigen::MatrixXd prior = splines_->precision(1.0 / (range * spacing_mm_)) / (step_mm * step_mm);
+      coefficients_ = expected;
+      for (size_t f = 0; f < directions(); ++f) {
+        const PhaseInformation seen = information_of(seen_[k][f]);
+        coefficients_[f].col(time) =
+            (seen.precision + prior).ldlt().solve(seen.vector + prior * expected[f].col(time));
+      }
+      const std::vector<Eigen::MatrixXd> start = coefficients_;
+      fit_phase(k, view_.images[k], start, 4);
+      (void)gather(k, 0);
+      if (best.empty()) noise = phases_[k].noise;
+      double cost = image_cost(noise) + step_cost(coefficients_, k, expected, k);
+      for (size_t f = 0; f < directions(); ++f)
+        cost += seen_cost(k, f);
+      if (!best.empty() && cost >= least) continue;
+      least = cost;
+      best = coefficients_;
+    }
+    coefficients_ = std::move(best);
+  }
+
+  /// A line that a person puts right in phase k jumped there or in a phase before. Goes back from k, and takes what is found so from
+  /// the phase on at which image and steps from phase to phase together cost least.
+  void put_right_before(size_t k, const std::vector<Eigen::ArrayXXd>& rest) {
+    const std::vector<Eigen::MatrixXd> right = coefficients_;
+    std::vector<Eigen::MatrixXd> back = right;
+    double gain = 0, most = 0;  // in cost, over no change
+    size_t from = k;
+    for (size_t j = k; j-- > 0 && !is_led(j);) {
+      const auto time = static_cast<Eigen::Index>(j);
+      coefficients_ = right;
+      (void)gather(j, 0);
+      const double noise = phases_[j].noise;
+      const TrackedPhase before = phases_[j];
+      const double cost = image_cost(noise) + step_cost(right, j, right, j + 1);
+      coefficients_ = back;
+      double apart_mm = 0;
+      for (size_t f = 0; f < directions(); ++f) {
+        coefficients_[f].col(time) = back[f].col(time + 1);
+        if (j + 2 <= k) coefficients_[f].col(time) += 0.5 * (back[f].col(time + 1) - back[f].col(time + 2));
+      }
+      const std::vector<Eigen::MatrixXd> start = coefficients_;
+      fit_phase(j, view_.images[j], start, 4);
+      (void)gather(j, 0);
+      back = coefficients_;
+      for (size_t f = 0; f < directions(); ++f)
+        apart_mm = std::max(apart_mm, (back[f].col(time) - right[f].col(time)).cwiseAbs().maxCoeff());
+      gain += cost - image_cost(noise) - step_cost(back, j, back, j + 1);
+      phases_[j] = before;
+      // The step across which the two ways meet; before the first phase is rest.
+      const std::vector<Eigen::MatrixXd> rested(directions(), Eigen::MatrixXd::Zero(splines_->count(), 1));
+      const std::vector<Eigen::MatrixXd>& earlier = j == 0 ? rested : right;
+      const size_t then = j == 0 ? 0 : j - 1;
+      const double met = step_cost(earlier, then, right, j) - step_cost(earlier, then, back, j);
+      if (gain + met > most) {
+        most = gain + met;
+        from = j;
+      }
+      if (apart_mm < first_step_in_spacings * spacing_mm_) break;
+    }
+    coefficients_ = right;
+    for (size_t j = from; j < k; ++j) {
+      for (size_t f = 0; f < directions(); ++f)
+        coefficients_[f].col(static_cast<Eigen::Index>(j)) = back[f].col(static_cast<Eigen::Index>(j));
+    }
+    for (size_t j = from; j < k; ++j) {
+      find_edges(j, MaterialMap(phases_[j].materials), rest);
+      fit_phase(j, view_.images[j], coefficients_, 4);
+    }
+  }
+
+  /// Minus the log likelihood of an image at the motion gathered last, with Huber's loss.
+  [[nodiscard]] double image_cost(double noise) const {
+    double sum = 0;
+    for (const Fitted& fitted : fitted_) {
+      const double off = std::abs(fitted.residual) / noise;
+      sum += off < huber ? 0.5 * off * off : huber * (off - 0.5 * huber);
+    }
+    return sum;
+  }
+
+  /// Minus the log prior density of the step between two phases.
+  [[nodiscard]] double step_cost(const std::vector<Eigen::MatrixXd>& a, size_t k_a,
+                                 const std::vector<Eigen::MatrixXd>& b, size_t k_b) const {
+    const double step_mm = first_step_in_spacings * spacing_mm_;
+    double sum = 0;
+    for (size_t f = 0; f < directions(); ++f) {
+      const Eigen::VectorXd step =
+          a[f].col(static_cast<Eigen::Index>(k_a)) - b[f].col(static_cast<Eigen::Index>(k_b));
+      sum += 0.5 * step.dot(first_precision_ * step) / (step_mm * step_mm);
+    }
+    return sum;
+  }
+
+  [[nodiscard]] double seen_cost(size_t k, size_t f) const {
+    const double sigma_mm = seen_in_pixels * view_.plane.finer_spacing_mm();
+    double sum = 0;
+    for (const SeenMotion& seen : seen_[k][f])
+      sum += 0.5 * std::pow((spline_sum(seen.splines, coefficients_[f].col(static_cast<Eigen::Index>(k))) -
+                             seen.w_mm) /
+                                sigma_mm,
+                            2);
+    return sum;
   }
 
   void fit_phase(size_t k, const Image& image, const std::vector<Eigen::MatrixXd>& expected,
@@ -281,6 +458,11 @@ class ViewTracker {
       for (size_t f = 0; f < directions(); ++f) {
         PhaseInformation information = gather(k, f, image);
         const Eigen::VectorXd now = coefficients_[f].col(time);
+        if (!seen_[k][f].empty()) {
+          const PhaseInformation seen = information_of(seen_[k][f]);
+          information.precision += seen.precision;
+          information.vector += seen.vector - seen.precision * now;
+        }
         const Eigen::VectorXd step = (information.precision + prior)
                                          .ldlt()
                                          .solve(information.vector + prior * (expected[f].col(time) - now));
@@ -301,7 +483,9 @@ class ViewTracker {
                           static_cast<int>(model_.patterns()));
     fitted_.clear();
     for (const Pixel& pixel : pixels_) {
-      if (static_cast<double>(phase.depth_mm(pixel.row, pixel.column)) < sure_mm()) continue;
+      if (static_cast<double>(phase.depth_mm(pixel.row, pixel.column)) < sure_mm() ||
+          view_.is_masked(k, pixel.row, pixel.column))
+        continue;
       Fitted fitted{&pixel, {}, 0, 0};
       tracked_phases(pixel, k, fitted.phases);
       brightness.add(pixel.x_mm, model_.at(fitted.phases).values(), 1.0,
@@ -427,6 +611,11 @@ class ViewTracker {
       here.vector += here.precision * coefficients_[f].col(static_cast<Eigen::Index>(k));
       here.precision /= factors_[f];
       here.vector /= factors_[f];
+      if (!seen_[k][f].empty()) {
+        const PhaseInformation seen = information_of(seen_[k][f]);
+        here.precision += seen.precision;
+        here.vector += seen.vector;
+      }
       all.push_back(std::move(here));
     }
     return all;
@@ -489,6 +678,7 @@ class ViewTracker {
   Eigen::MatrixXd first_precision_;
   std::vector<Eigen::MatrixXd> coefficients_;  // a direction: n x T
   std::vector<TrackedPhase> phases_;
+  std::vector<std::vector<std::vector<SeenMotion>>> seen_;  // a phase and direction
   std::vector<Fitted> fitted_;
   std::vector<double> factors_;
   std::vector<MotionPrior> priors_;

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <map>
+#include <mutex>
 #include <optional>
 
 #include "estimator/parallel/parallel_for.hpp"
@@ -19,8 +21,11 @@ std::vector<TagView> tag_views(const ImageFolder& folder) {
   }
   const PhaseTimes phases = phase_times(times_ms);
   std::vector<TagView> views;
+  std::map<int, size_t> slices_before;  // of the same number: a series may hold several orientations
   for (const ImageSeries& series : folder.series) {
     if (series.kind != SeriesKind::tagged_cine) continue;
+    const size_t before = slices_before[series.number];
+    slices_before[series.number] += series.slices.size();
     for (size_t s = 0; s < series.slices.size(); ++s) {
       const SliceImages& slice = series.slices[s];
       if (slice.tags.empty()) continue;
@@ -32,7 +37,7 @@ std::vector<TagView> tag_views(const ImageFolder& folder) {
         view.times_ms.push_back(*folder.images[image].header.trigger_ms);
         view.frames.push_back(static_cast<int>(*phases.index_of(view.times_ms.back())) + 1);
       }
-      view.name = fmt::format("series {}, slice {}", series.number, s + 1);
+      view.name = fmt::format("series {}, slice {}", series.number, before + s + 1);
       views.push_back(std::move(view));
     }
   }
@@ -59,15 +64,23 @@ void keep_results(TrackedView& tracked) {
 }  // namespace
 
 std::vector<TrackedSlice> track_views(std::vector<TagView> views, size_t threads,
-                                      std::vector<Finding>& problems) {
+                                      std::vector<Finding>& problems, const SlicesDone& progress) {
   std::vector<std::optional<TrackingFault>> faults(views.size());
   std::vector<TrackedSlice> slices(views.size());
+  std::mutex reporting;
+  size_t done = 0;
+  const auto report = [&] {
+    const std::scoped_lock lock(reporting);
+    if (progress) progress(++done, slices.size());
+  };
   parallel_for(views.size(), threads, [&](size_t i) {
     slices[i].view = std::move(views[i]);
     slices[i].tracked = track_view(slices[i].view, faults[i]);
-    if (faults[i]) return;
-    slices[i].points = tag_points(slices[i].view, slices[i].tracked);
-    keep_results(slices[i].tracked);
+    if (!faults[i]) {
+      slices[i].points = tag_points(slices[i].view, slices[i].tracked);
+      keep_results(slices[i].tracked);
+    }
+    report();
   });
   std::vector<TrackedSlice> kept;
   for (size_t i = 0; i < slices.size(); ++i) {

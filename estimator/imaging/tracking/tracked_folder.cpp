@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "estimator/io/whole_file.hpp"
 #include "estimator/parallel/parallel_for.hpp"
 #include "protocol/contract/input_error.hpp"
 
@@ -79,19 +80,29 @@ std::vector<PhaseSummary> phase_summaries(const TrackedSlice& slice) {
   return summaries;
 }
 
-TrackedFolder track_folder(const TrackRequest& request, const Stage& stage) {
-  const auto say = [&](const std::string& text) {
-    if (stage) stage(text);
-  };
-  say("reading the folder");
-  const ImageFolder folder = read_image_folder(request.folder);
-  require_sound(folder);
+fs::path edits_file(const TrackRequest& request) {
+  return request.edits.value_or(edits_beside(request.folder));
+}
+
+ManualEdits use_edits(const TrackRequest& request, std::vector<TagView>& views) {
+  const fs::path file = edits_file(request);
+  std::error_code error;
+  ManualEdits edits{file, {}, 0};
+  if (request.edits || fs::exists(file, error))
+    edits = parse_edits(read_whole_file(file, "Manual choices are a file of JSON lines (docs/imaging.md)."),
+                        file);
+  apply_edits(edits, views);
+  return edits;
+}
+
+TrackedFolder gathered(const TrackRequest& request, const ManualEdits& edits,
+                       std::vector<TrackedSlice> slices, std::vector<Finding> problems) {
   TrackedFolder tracked;
   tracked.folder = request.folder;
-  tracked.problems = folder.problems;
-  std::vector<TagView> views = tag_views(folder);
-  say(fmt::format("tracking {} slices", views.size()));
-  tracked.slices = track_views(std::move(views), machine_threads(), tracked.problems);
+  tracked.problems = std::move(problems);
+  tracked.slices = std::move(slices);
+  if (!edits.standing.empty() || edits.undone > 0)
+    tracked.edits = AppliedEdits{edits.file, counts_of(edits), edits.undone};
   settle_pose(request, tracked);
   double squares = 0;
   for (const TrackedSlice& slice : tracked.slices) {
@@ -109,6 +120,23 @@ TrackedFolder track_folder(const TrackRequest& request, const Stage& stage) {
                    [](const TagPoint& a, const TagPoint& b) { return a.frame < b.frame; });
   tracked.rms_px = std::sqrt(squares / static_cast<double>(tracked.points.size()));
   return tracked;
+}
+
+TrackedFolder track_folder(const TrackRequest& request, const Stage& stage) {
+  const auto say = [&](const std::string& text) {
+    if (stage) stage(text);
+  };
+  say("reading the folder");
+  const ImageFolder folder = read_image_folder(request.folder);
+  require_sound(folder);
+  std::vector<Finding> problems = folder.problems;
+  std::vector<TagView> views = tag_views(folder);
+  const ManualEdits edits = use_edits(request, views);
+  if (!edits.standing.empty())
+    say(fmt::format("{} manual choices of {}", edits.standing.size(), edits.file.string()));
+  say(fmt::format("tracking {} slices", views.size()));
+  std::vector<TrackedSlice> slices = track_views(std::move(views), machine_threads(), problems);
+  return gathered(request, edits, std::move(slices), std::move(problems));
 }
 
 }  // namespace diastole::imaging

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "estimator/imaging/series/views.hpp"
+#include "estimator/imaging/tracking/manual_edits.hpp"
 #include "estimator/imaging/tracking/specimen_pose.hpp"
 
 namespace diastole::imaging {
@@ -19,6 +20,14 @@ struct TrackRequest {
       {};  ///< absent: the one *.pose.toml beside or in the folder, or what the images show
   std::optional<SpecimenPose> known_pose = {};  ///< comes before any file
   std::string coordinates = "auto";             ///< "specimen": a pose is demanded; "patient": none is used
+  std::optional<std::filesystem::path> edits =
+      {};  ///< manual choices; absent: those beside the folder, if there are any
+};
+
+struct AppliedEdits {
+  std::filesystem::path file;
+  std::map<std::string, size_t> counts;  ///< by action
+  size_t undone = 0;
 };
 
 struct TrackedFolder {
@@ -28,6 +37,7 @@ struct TrackedFolder {
   std::map<std::string, size_t> dropped;
   std::optional<SpecimenPose> pose;
   std::optional<AnnulusOutline> outline;
+  std::optional<AppliedEdits> edits;
   std::vector<Finding> problems;
   double rms_px = 0;  ///< of the points' standard errors
 };
@@ -46,7 +56,17 @@ std::vector<PhaseSummary> phase_summaries(const TrackedSlice& slice);
 
 using Stage = std::function<void(const std::string& stage)>;
 
-/// Throws InputError for a folder that is not sound, without tags, or of which nothing could be tracked.
+/// The file of manual choices that a request means, whether or not it is there.
+std::filesystem::path edits_file(const TrackRequest& request);
+/// Its choices, none if it is not there and was not named; set in the views. Throws InputError.
+ManualEdits use_edits(const TrackRequest& request, std::vector<TagView>& views);
+
+/// Points and pose of slices that are tracked. Throws InputError if no point is left, or a demanded pose is not seen.
+TrackedFolder gathered(const TrackRequest& request, const ManualEdits& edits,
+                       std::vector<TrackedSlice> slices, std::vector<Finding> problems);
+
+/// Throws InputError for a folder that is not sound, without tags, or of which nothing could be tracked, and for manual choices that do
+/// not fit it.
 TrackedFolder track_folder(const TrackRequest& request, const Stage& stage = {});
 
 }  // namespace diastole::imaging

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "estimator/imaging/tracking/outline.hpp"
+
 namespace diastole::imaging {
 namespace {
 
@@ -70,6 +72,11 @@ TrackedSliceImages slice_record(const TrackedSlice& slice, const std::vector<Dro
             point.x_mm.x() / plane.column_spacing_mm, point.x_mm.y() / plane.row_spacing_mm})
         image.rejected.push_back(number);
     }
+    for (const auto& outline : outlines_px(slice.tracked.phases[k].depth_mm)) {
+      std::vector<double>& numbers = image.outlines.emplace_back();
+      for (const Eigen::Vector2d& point : outline)
+        numbers.insert(numbers.end(), {point.x(), point.y()});
+    }
     record.images.push_back(std::move(image));
   }
   return record;
@@ -84,6 +91,11 @@ TrackingRecord tracking_record(const TrackedFolder& tracked, double seconds) {
   record.points = tracked.points.size();
   record.rms_px = tracked.rms_px;
   record.seconds = seconds;
+  if (tracked.edits) {
+    record.edits = 0;
+    for (const auto& [action, count] : tracked.edits->counts)
+      *record.edits += count;
+  }
   for (const auto& [reason, points] : tracked.dropped)
     record.dropped.push_back({reason, points});
   record.findings = tracked.problems;

@@ -68,6 +68,21 @@ TEST_F(StudyImages, AreTrackedAnewForOtherImagesOrAnotherPose) {
   EXPECT_EQ(tracked(), 3U);
 }
 
+TEST_F(StudyImages, AreTrackedAnewForOtherManualChoices) {
+  const fs::path first = tags();
+  const auto choice = [&](const std::string& phase) {
+    scratch_.write("dicom.edits.jsonl", R"({"slice": "series 2, slice 1", "phase": )" + phase +
+                                            R"(, "action": "mask", "points": [[60, 60], [95, 60], [95, 95]]})"
+                                            "\n");
+    return tags();
+  };
+  const fs::path masked = choice("3");
+  EXPECT_NE(masked, first);
+  EXPECT_NE(choice("4"), masked);
+  EXPECT_EQ(choice("3"), masked);
+  EXPECT_EQ(tracked(), 3U);
+}
+
 TEST_F(StudyImages, AFolderThatIsNotThereIsRefusedBeforeAnythingIsWritten) {
   study_.data.images = scratch_.path() / "no such folder";
   EXPECT_THAT(test::message_of([&] { (void)tags(); }), testing::HasSubstr("no such folder"));

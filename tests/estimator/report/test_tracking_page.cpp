@@ -23,9 +23,15 @@ TrackingRecord two_phases() {
   slice.columns = 3;
   slice.pixel_mm = {1, 1};
   slice.directions = {{45, 5}};
-  slice.images = {
-      {1, 12, 0.015, 4.2, base64("abcdef"), {0, 7, 0.5, 1, 0.015, 0, 7, 1.5, 0, 0.0151}, {0, 0, 2, 1}},
-      {2, 84, 0.025, 4.4, base64("ABCDEF"), {0, 7, 0.75, 1, 0.025}, {}}};
+  slice.images = {{1,
+                   12,
+                   0.015,
+                   4.2,
+                   base64("abcdef"),
+                   {0, 7, 0.5, 1, 0.015, 0, 7, 1.5, 0, 0.0151},
+                   {0, 0, 2, 1},
+                   {{0, 0, 2, 0, 1, 1}}},
+                  {2, 84, 0.025, 4.4, base64("ABCDEF"), {0, 7, 0.75, 1, 0.025}, {}}};
   record.slices = {slice};
   return record;
 }
@@ -46,6 +52,10 @@ TEST(TrackingFile, IsReadAsItWasWritten) {
   torn.slices[0].images[1].points.pop_back();
   EXPECT_THAT(test::message_of([&] { (void)tracking_record_from_json(to_json(torn), "t.json"); }),
               HasSubstr("list of points"));
+  torn = two_phases();
+  torn.slices[0].images[0].outlines[0].pop_back();
+  EXPECT_THAT(test::message_of([&] { (void)tracking_record_from_json(to_json(torn), "t.json"); }),
+              HasSubstr("outline"));
   torn = two_phases();
   torn.slices[0].rows = 3;
   EXPECT_THAT(test::message_of([&] { (void)tracking_record_from_json(to_json(torn), "t.json"); }),

@@ -1,0 +1,13 @@
+#pragma once
+// The edge of tissue as closed curves, to be drawn and to be put right.
+
+#include <Eigen/Dense>
+#include <vector>
+
+namespace diastole::imaging {
+
+/// The curves depth = 0 of a depth map (materials.hpp), closed, in pixels (column, row); the image's border closes what leaves it.
+/// Simplified to half a pixel (Douglas and Peucker, Cartographica 10 (1973) 112).
+std::vector<std::vector<Eigen::Vector2d>> outlines_px(const Eigen::ArrayXXf& depth_mm);
+
+}  // namespace diastole::imaging
