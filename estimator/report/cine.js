@@ -1,5 +1,6 @@
 // Cine players of tracked slices: images with their lines in the colour of the standard error, phase by phase.
-const cine = (() => {
+const cineShown = { lines: true, rejected: true, outlines: true };
+const cinePlayers = (tracking) => {
   // From blue to orange, all bright enough for a dark image.
   const stops = ["#2f9bff", "#25c5e8", "#3fe0b0", "#a4ee5b", "#ffe94a", "#ffc53d", "#ff9d2e", "#ff7a1f", "#ff7a1f"].map((c) =>
     [1, 3, 5].map((i) => parseInt(c.slice(i, i + 2), 16)));
@@ -9,7 +10,7 @@ const cine = (() => {
   };
   const sigmas = tracking.slices.flatMap((s) => s.images.flatMap((image) => image.points.filter((_, i) => i % 5 === 4))).sort((a, b) => a - b);
   const most = sigmas.length ? Math.max(sigmas[Math.floor(0.98 * (sigmas.length - 1))], 1e-3) : 1;
-  const shown = { lines: true, rejected: true };
+  const shown = cineShown;
   const players = [];
 
   const bytes = (text) => Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
@@ -77,11 +78,27 @@ const cine = (() => {
       const context = this.canvas.getContext("2d"), image = this.image;
       context.imageSmoothingEnabled = false;
       context.drawImage(bitmap(this.slice, image), 0, 0, this.canvas.width, this.canvas.height);
+      if (shown.outlines) this.drawOutlines(context, image);
       if (shown.lines) this.drawLines(context, image);
       if (shown.rejected) this.drawRejected(context, image);
       for (const overlay of this.overlays) overlay(context);
       this.holder.querySelector(".cine-time").textContent = `phase ${image.frame}, ${image.trigger_ms.toFixed(0)} ms`;
       this.holder.querySelector(".cine-mark")?.setAttribute("x", this.chartX(this.phase) - 2);
+    }
+    path(context, points) {
+      context.beginPath();
+      for (let i = 0; i < points.length; i += 2) context.lineTo(...this.xy(points[i], points[i + 1]));
+      context.closePath();
+    }
+    drawOutlines(context, image) {
+      context.strokeStyle = "#ffffffb0";
+      context.lineWidth = Math.max(1, 0.2 * this.scale);
+      context.setLineDash([this.scale, this.scale]);
+      for (const outline of image.outlines ?? []) {
+        this.path(context, outline);
+        context.stroke();
+      }
+      context.setLineDash([]);
     }
     drawLines(context, image) {
       context.lineWidth = Math.max(2, 0.5 * this.scale);
@@ -138,8 +155,10 @@ const cine = (() => {
   }
 
   for (const holder of document.querySelectorAll(".cine")) players.push(new Player(holder));
-  for (const name of ["lines", "rejected"]) {
-    document.getElementById(`cine-${name}`).addEventListener("change", (event) => {
+  for (const name of ["lines", "rejected", "outlines"]) {
+    const box = document.getElementById(`cine-${name}`);
+    box.checked = shown[name];
+    box.addEventListener("change", (event) => {
       shown[name] = event.target.checked;
       players.forEach((player) => player.draw());
     });
@@ -150,5 +169,5 @@ const cine = (() => {
     legend.fillRect(i, 0, 1, 10);
   }
   document.querySelector(".cine-most").textContent = `${most.toPrecision(2)} px`;
-  return { players };
-})();
+  return { players, lines };
+};

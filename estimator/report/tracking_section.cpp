@@ -1,7 +1,9 @@
 #include <fmt/format.h>
 
+#include <array>
 #include <filesystem>
 
+#include "estimator/report/cine.hpp"
 #include "estimator/report/embedded.hpp"
 #include "estimator/report/html_text.hpp"
 #include "estimator/report/sections.hpp"
@@ -29,6 +31,27 @@ std::string player(const TrackedSliceImages& slice, size_t number) {
 
 }  // namespace
 
+std::string cine_players(const TrackingRecord& record) {
+  std::string html =
+      "<div class=\"cine-tools\"><label><input type=\"checkbox\" id=\"cine-lines\" checked> lines</label>"
+      "<label><input type=\"checkbox\" id=\"cine-rejected\" checked> left out</label>"
+      "<label><input type=\"checkbox\" id=\"cine-outlines\" checked> outlines</label>"
+      "<span class=\"cine-legend\"><span>0</span><canvas width=\"160\" height=\"10\"></canvas><span "
+      "class=\"cine-most\"></span></span></div>\n"
+      "<noscript><p class=\"warning\">The player needs JavaScript; the table below does "
+      "not.</p></noscript>\n<div class=\"cines\">\n";
+  for (size_t i = 0; i < record.slices.size(); ++i)
+    html += player(record.slices[i], i);
+  return html + "</div>\n";
+}
+
+std::span<const PageAsset> cine_assets() {
+  static const std::array assets{PageAsset{"/page.css", "text/css", embedded::page_css},
+                                 PageAsset{"/cine.css", "text/css", embedded::cine_css},
+                                 PageAsset{"/cine.js", "text/javascript", embedded::cine_js}};
+  return assets;
+}
+
 void add_tracking(Page& page, const TrackingRecord& record) {
   page.headline(
       "Tag points", fmt::format("{}", record.points),
@@ -37,24 +60,18 @@ void add_tracking(Page& page, const TrackingRecord& record) {
   for (const DroppedCount& count : record.dropped)
     dropped += count.points;
   page.headline("Left out", fmt::format("{}", dropped), "places on the lines that cannot be trusted");
+  if (record.edits) page.headline("By hand", fmt::format("{}", *record.edits), "choices that were replayed");
   page.section(
       "Images and tags",
       fmt::format(
           "{}: {} slices and directions, {} phases. Lines are the tags as followed, in the colour of their "
-          "standard error; crosses are places that were left out.",
+          "standard error; crosses are places that were left out; dashed is the tissue's edge as found.",
           std::filesystem::path(record.folder).lexically_normal().generic_string(), record.slices.size(),
           phases_of(record)));
   add_findings(page, record.findings);
-  std::string html =
-      "<div class=\"cine-tools\"><label><input type=\"checkbox\" id=\"cine-lines\" checked> lines</label>"
-      "<label><input type=\"checkbox\" id=\"cine-rejected\" checked> left out</label>"
-      "<span class=\"cine-legend\"><span>0</span><canvas width=\"160\" height=\"10\"></canvas><span "
-      "class=\"cine-most\"></span></span></div>\n"
-      "<noscript><p class=\"warning\">The player needs JavaScript; the table below does "
-      "not.</p></noscript>\n<div class=\"cines\">\n";
-  for (size_t i = 0; i < record.slices.size(); ++i)
-    html += player(record.slices[i], i);
-  page.part(html + "</div>\n", embedded::cine_css, embedded::cine_js, "tracking", to_json(record));
+  page.part(cine_players(record), embedded::cine_css,
+            std::string(embedded::cine_js) + "const cine = cinePlayers(tracking);\n", "tracking",
+            to_json(record));
   page.table_of(
       record.dropped, {"left out because", "places"},
       [](const DroppedCount& count) -> Page::Row {

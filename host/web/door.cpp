@@ -84,12 +84,12 @@ std::optional<Refusal> Door::check_place(std::string_view host,
   if (!is_own(split(host).name)) {
     return Refusal{
         403,
-        "This console answers to an address (http://127.0.0.1:8600) or this machine's own name only, not to "
-        "whatever name points to it. Open the address that the daemon printed."};
+        "This page answers to an address (http://127.0.0.1:8600) or this machine's own name only, not to "
+        "whatever name points to it. Open the address that was printed."};
   }
   const std::string own = lower(host);
   if (origin && lower(*origin) != "http://" + own && lower(*origin) != "https://" + own) {
-    return Refusal{403, "A page of another site asked for the rig's console, and was refused."};
+    return Refusal{403, "A page of another site asked, and was refused."};
   }
   return std::nullopt;
 }

@@ -176,6 +176,21 @@ void Browser::press(const std::string& key) {
     command("Input.dispatchKeyEvent", {{"type", type}, {"key", key}, {"code", key}});
 }
 
+void Browser::drag(const std::vector<std::array<double, 2>>& path) {
+  const auto mouse = [&](const char* type, const std::array<double, 2>& at, int buttons) {
+    command("Input.dispatchMouseEvent", {{"type", type},
+                                         {"x", at[0]},
+                                         {"y", at[1]},
+                                         {"button", "left"},
+                                         {"buttons", buttons},
+                                         {"clickCount", 1}});
+  };
+  mouse("mousePressed", path.front(), 1);
+  for (size_t i = 1; i < path.size(); ++i)
+    mouse("mouseMoved", path[i], 1);
+  mouse("mouseReleased", path.back(), 0);
+}
+
 void Browser::choose_files(const std::string& selector, const std::vector<std::string>& files) {
   const json object =
       command("Runtime.evaluate", {{"expression", "document.querySelector('" + selector + "')"}});

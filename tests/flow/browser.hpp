@@ -1,6 +1,7 @@
 #pragma once
 // A headless Chromium, driven through the pipe of its DevTools protocol: no driver program, no port.
 
+#include <array>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
@@ -27,6 +28,8 @@ class Browser {
   void wait_until(const std::string& expression);
   /// Presses and releases a key, as a person at the keyboard.
   void press(const std::string& key);
+  /// Presses the mouse at the first of these places of the window, moves it through the others and lets go.
+  void drag(const std::vector<std::array<double, 2>>& path);
   /// Chooses files in a file field.
   void choose_files(const std::string& selector, const std::vector<std::string>& files);
   void screenshot(const std::string& file);

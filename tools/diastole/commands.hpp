@@ -7,6 +7,8 @@ namespace diastole {
 
 /// `diastole catheter`: the paper's test of catheter and transducer, from a recorded step of pressure.
 void add_catheter(CommandLine& line);
+/// `diastole desk`: look at and correct tracking and contours in a browser.
+void add_desk(CommandLine& line);
 /// `diastole replay`: a recorded run once more, through simulated instrument, the real firmware and the real daemon.
 void add_replay(CommandLine& line);
 /// `diastole scan`: a simulated scanner, DICOM of a study's motion.

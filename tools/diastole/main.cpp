@@ -89,6 +89,7 @@ diastole::ExitCode run(int argc, char** argv) {
   diastole::add_simulate(line);
   diastole::add_replay(line);
   diastole::add_scan(line);
+  diastole::add_desk(line);
   diastole::add_estimator_commands(line, diastole::explain::print_score);
   if (argc < 2) {
     std::cerr << app.help();

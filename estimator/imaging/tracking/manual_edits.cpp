@@ -94,8 +94,9 @@ class EditLine {
   Json json_;
 };
 
-ManualEdit edit_of(const EditLine& line, EditAction action, size_t number) {
+ManualEdit edit_of(const EditLine& line, EditAction action, size_t number, const std::string& text) {
   ManualEdit edit;
+  edit.text = text;
   edit.file_line = number;
   edit.action = action;
   edit.slice =
@@ -314,7 +315,8 @@ ManualEdits parse_edits(std::string_view text, const std::filesystem::path& file
     } else if (known == action_names.end()) {
       line.refuse(fmt::format("action \"{}\" is unknown", action), remedy);
     } else {
-      edits.standing.push_back(edit_of(line, static_cast<EditAction>(known - action_names.begin()), number));
+      edits.standing.push_back(
+          edit_of(line, static_cast<EditAction>(known - action_names.begin()), number, one));
     }
   }
   return edits;

@@ -24,6 +24,7 @@ struct ManualEdit {
   int tag = 0;                        ///< number of a line's tag
   bool is_outer = false;              ///< of a contour
   std::vector<Eigen::Vector2d> points_px;
+  std::string text;  ///< the line itself
 };
 
 struct ManualEdits {

@@ -1,0 +1,215 @@
+// The desk by its whole program: its door, and its page in a real browser. Screenshots go to the directory that DIASTOLE_SCREENSHOTS
+// names, if it does.
+
+#include <gmock/gmock.h>
+
+#include <csignal>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+
+#include "tests/flow/browser.hpp"
+#include "tests/flow/programs.hpp"
+#include "tests/flow/web_client.hpp"
+
+namespace diastole::flow {
+namespace {
+
+using nlohmann::json;
+using testing::HasSubstr;
+using Path = std::vector<std::array<double, 2>>;
+
+class Desk : public testing::Test {
+ protected:
+  Desk() {
+    std::filesystem::copy(std::filesystem::path(DIASTOLE_EXAMPLES) / "tagged-gel", place / "gel",
+                          std::filesystem::copy_options::recursive);
+  }
+  void begin(std::vector<std::string> more = {}) {
+    std::vector<std::string> arguments = {"diastole", "desk", "gel/dicom", "--no-browser", "--json"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    desk = std::make_unique<Program>(place, arguments);
+    ASSERT_TRUE(desk->wait_for_text("edits")) << desk->err();
+    url = json::parse(desk->out())["url"];
+    port = std::stoi(url.substr(url.find(':', 7) + 1));
+    token = url.substr(url.find("token=") + 6);
+  }
+  WebAnswer post(const std::string& path, const std::string& body, const std::string& with_token) const {
+    WebClient client(port);
+    client.send("POST " + path + " HTTP/1.1\r\nHost: 127.0.0.1:" + std::to_string(port) +
+                "\r\nAuthorization: Bearer " + with_token +
+                "\r\nContent-Length: " + std::to_string(body.size()) + "\r\n\r\n" + body);
+    return client.read_answer();
+  }
+  /// The lines of the edits file.
+  std::vector<json> choices() const {
+    std::vector<json> lines;
+    std::ifstream file(place / "gel/dicom.edits.jsonl");
+    for (std::string line; std::getline(file, line);)
+      lines.push_back(json::parse(line));
+    return lines;
+  }
+
+  Workplace place;
+  std::unique_ptr<Program> desk;
+  std::string url, token;
+  int port = 0;
+};
+
+const std::string mask =
+    R"({"slice": "series 2, slice 1", "phase": 2, "action": "mask", "points": [[60, 40], [80, 40], [80, 60]]})";
+
+TEST_F(Desk, LetsInOnlyThisMachineWithItsTokenAndWritesNothingElse) {
+  begin();
+  EXPECT_EQ(WebClient(port).get("/").status, 200);
+  EXPECT_EQ(WebClient(port).get("/state").status, 401);
+  EXPECT_EQ(WebClient(port).get("/state", {"Authorization: Bearer " + token}).status, 200);
+  EXPECT_EQ(WebClient(port).get("/state", {"Authorization: Bearer " + token}, "evil.example").status, 403);
+  EXPECT_EQ(
+      WebClient(port).get("/state", {"Authorization: Bearer " + token, "Origin: http://evil.example"}).status,
+      403);
+  EXPECT_EQ(WebClient(port).get("/../gel/dicom.edits.jsonl").status, 401);
+  EXPECT_EQ(post("/edits", mask, "wrong").status, 401);
+  EXPECT_EQ(post("/track", "", "wrong").status, 401);
+  EXPECT_EQ(post("/edits", std::string(2 << 20, 'x'), token).status, 0) << "longer than any choice";
+  for (const std::string bad :
+       {"{", "[]", "{\"action\": \"mask\"}",
+        R"({"slice": "series 2, slice 1", "phase": 99, "action": "mask", "points": [[1,1],[2,1],[2,2]]})"}) {
+    const WebAnswer refused = post("/edits", bad, token);
+    EXPECT_EQ(refused.status, 422) << bad;
+    EXPECT_THAT(refused.body, HasSubstr("dicom.edits.jsonl")) << bad;
+  }
+  EXPECT_FALSE(std::filesystem::exists(place / "gel/dicom.edits.jsonl"))
+      << "what does not fit is not written";
+  const WebAnswer taken = post("/edits", mask, token);
+  EXPECT_EQ(taken.status, 200);
+  EXPECT_EQ(json::parse(taken.body)["edits"].size(), 1U);
+  EXPECT_EQ(choices().size(), 1U);
+  // What a person writes meanwhile counts too.
+  std::ofstream(place / "gel/dicom.edits.jsonl", std::ios::app) << mask;
+  EXPECT_EQ(json::parse(post("/edits", mask, token).body)["edits"].size(), 3U);
+  EXPECT_EQ(choices().size(), 3U);
+  desk->signal(SIGINT);
+  EXPECT_EQ(desk->wait().exit_code, 0);
+  EXPECT_EQ(choices().size(), 3U);
+}
+
+TEST_F(Desk, RefusesWhatTrackRefuses) {
+  place.write("gel/dicom.edits.jsonl", "{\"action\": \"undo\"}\n");
+  const Ended undone = run(place, {"diastole", "desk", "gel/dicom", "--no-browser"});
+  EXPECT_EQ(undone.exit_code, 2);
+  EXPECT_THAT(undone.err, HasSubstr("dicom.edits.jsonl: line 1: nothing is left to undo"));
+  const Ended none = run(place, {"diastole", "desk", "gel/none", "--no-browser"});
+  EXPECT_EQ(none.exit_code, 2);
+  EXPECT_THAT(none.err, HasSubstr("gel/none"));
+}
+
+class DeskInABrowser : public Desk {
+ protected:
+  void SetUp() override {
+    if (Browser::program().empty())
+      GTEST_SKIP() << "this machine has no Chromium: apt install chromium-headless-shell";
+    begin({"-o", "gel.tags.csv"});
+    browser = std::make_unique<Browser>(place, 1280, 1100);
+    browser->open(url);
+    browser->wait_until("desk.players.length === 4");
+  }
+  void click(const std::string& selector) {
+    browser->value("document.querySelector('" + selector + "').click()");
+  }
+  /// Places of a picture in the window.
+  Path in_window(int player, const Path& places_px) {
+    browser->value("desk.players[" + std::to_string(player) + "].canvas.scrollIntoView({block: 'center'})");
+    const json box = browser->value("(b => [b.left, b.top, b.width, b.height])(desk.players[" +
+                                    std::to_string(player) + "].canvas.getBoundingClientRect())");
+    Path path;
+    for (const auto& [column, row] : places_px)
+      path.push_back({box[0].get<double>() + (column + 0.5) / 96 * box[2].get<double>(),
+                      box[1].get<double>() + (row + 0.5) / 96 * box[3].get<double>()});
+    return path;
+  }
+  void wait_for_choices(size_t count) {
+    browser->wait_until("desk.edits.length === " + std::to_string(count));
+  }
+  void screenshot(const std::string& name) {
+    if (const char* directory = std::getenv("DIASTOLE_SCREENSHOTS"))
+      browser->screenshot(std::string(directory) + "/" + name);
+  }
+  std::unique_ptr<Browser> browser;
+};
+
+TEST_F(DeskInABrowser, WhatIsDrawnIsInTheFileAtOnceAndTrackedAgain) {
+  EXPECT_EQ(browser->value("location.hash"), "") << "the token is taken out of sight";
+  browser->wait_until("desk.state.tracking === false");
+  EXPECT_TRUE(std::filesystem::exists(place / "gel.tags.csv"));
+  browser->value("(p => { p.range.value = 4; p.draw(); })(desk.players[0])");
+
+  // A line is pulled by a pixel and a half.
+  click("[data-tool=line]");
+  const json point = browser->value("(i => [i.points[1], i.points[2], i.points[3]])(desk.players[0].image)");
+  const double column = point[1], row = point[2];
+  browser->drag(in_window(0, {{column, row}, {column + 0.5, row}, {column + 1.5, row}}));
+  wait_for_choices(1);
+  ASSERT_EQ(choices().size(), 1U);
+  const json line = choices()[0];
+  EXPECT_EQ(line["action"], "line");
+  EXPECT_EQ(line["slice"], browser->value("desk.players[0].slice.name"));
+  EXPECT_EQ(line["phase"], 5);
+  EXPECT_EQ(line["direction"], 1);
+  EXPECT_EQ(line["tag"], point[0]);
+  EXPECT_THAT(line["points"].dump(), HasSubstr(json(std::round(100 * (column + 1.5)) / 100).dump()));
+
+  // A region is masked in all phases, and the outer edge pulled.
+  click("[data-tool=mask]");
+  click("#all-phases");
+  browser->drag(in_window(0, {{55, 20}, {60, 18}, {70, 20}, {75, 30}, {66, 34}, {56, 30}}));
+  wait_for_choices(2);
+  EXPECT_EQ(choices()[1]["phase"], "all");
+  click("[data-tool=outer]");
+  const json edge = browser->value("desk.players[0].image.outlines[0].slice(0, 2)");
+  const double toward = edge[0].get<double>() < 48 ? 2 : -2;
+  browser->drag(in_window(0, {{edge[0], edge[1]}, {edge[0].get<double>() + toward, edge[1]}}));
+  wait_for_choices(3);
+  EXPECT_EQ(choices()[2]["contour"], "outer");
+  EXPECT_GT(choices()[2]["points"].size(), 8U);
+  screenshot("desk.png");
+
+  // Undo takes back the last, and the list any; the file says so.
+  click("#undo");
+  wait_for_choices(2);
+  EXPECT_EQ(choices()[3], (json{{"action", "undo"}}));
+  click("#choices li button");
+  wait_for_choices(1);
+  EXPECT_EQ(choices()[4], (json{{"action", "undo"}, {"line", 1}}));
+
+  const json before = browser->value("desk.players[0].image.points.length");
+  browser->wait_until("!document.getElementById('track').disabled");
+  click("#track");
+  browser->wait_until("desk.state.version === 2 && !desk.state.tracking && desk.state.changed === 0");
+  browser->wait_until("desk.players[0].image.points.length !== " + before.dump());
+  EXPECT_EQ(browser->value("desk.players[0].phase"), 4) << "the picture stays where it was";
+  const Ended track = run(place, {"diastole", "track", "gel/dicom", "-o", "again.tags.csv", "--json"});
+  ASSERT_EQ(track.exit_code, 0) << track.err;
+  EXPECT_EQ(track.json()["edits"]["applied"], (json{{"mask", 1}}));
+  EXPECT_EQ(track.json()["edits"]["undone"], 2);
+  EXPECT_GT(track.json()["dropped"]["masked by hand"], 0);
+  const auto text = [&](const std::string& name) {
+    std::ostringstream all;
+    all << std::ifstream(place / name).rdbuf();
+    return all.str();
+  };
+  EXPECT_EQ(text("gel.tags.csv"), text("again.tags.csv")) << "the desk tracks as `track` does";
+
+  EXPECT_THAT(browser->complaints(), testing::IsEmpty());
+  const std::string base = url.substr(0, url.find('#'));
+  for (const std::string& asked : browser->requested_urls())
+    EXPECT_THAT(asked, testing::StartsWith(base));
+  browser->resize(390, 800);
+  EXPECT_EQ(browser->value("document.documentElement.scrollWidth <= 390"), true) << "wider than a telephone";
+  ::kill(desk->pid(), SIGTERM);
+  browser->wait_until("document.getElementById('problem').textContent.includes('stands in the file')");
+}
+
+}  // namespace
+}  // namespace diastole::flow

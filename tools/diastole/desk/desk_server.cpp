@@ -1,0 +1,211 @@
+#include "tools/diastole/desk/desk_server.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <boost/asio.hpp>
+#include <boost/beast/core.hpp>
+#include <boost/beast/http.hpp>
+#include <chrono>
+#include <csignal>
+
+#include "estimator/report/cine.hpp"
+#include "host/web/door.hpp"
+#include "host/web/request.hpp"
+#include "protocol/contract/input_error.hpp"
+#include "tools/diastole/desk/embedded.hpp"
+
+namespace diastole::desk {
+namespace {
+
+namespace asio = boost::asio;
+namespace beast = boost::beast;
+namespace http = beast::http;
+using asio::ip::tcp;
+using beast::error_code;
+using nlohmann::json;
+
+constexpr std::chrono::seconds patience{10};
+constexpr uint64_t most_body_bytes = 1 << 20;  // a choice of some ten thousand points
+constexpr size_t most_connections = 32;
+
+using Request = http::request<http::string_body>;
+using Response = http::response<http::string_body>;
+
+std::string_view view(beast::string_view field) { return {field.data(), field.size()}; }
+
+struct Answer {
+  int status = 200;
+  std::string type = "application/json";
+  std::string body = {};
+};
+
+Answer refused(int status, const std::string& sentence) {
+  return {status, "text/plain; charset=utf-8", sentence + "\n"};
+}
+
+const report::PageAsset* find_asset(std::string_view path) {
+  static const std::array own{
+      report::PageAsset{"/", "text/html; charset=utf-8", embedded::desk_html},
+      report::PageAsset{"/desk.js", "text/javascript", embedded::desk_js},
+      report::PageAsset{"/desk.css", "text/css", embedded::desk_css},
+      report::PageAsset{"/icon.svg", "image/svg+xml", web::find_page_file("/icon.svg")->text}};
+  for (const std::span<const report::PageAsset> assets :
+       {std::span<const report::PageAsset>(own), report::cine_assets()}) {
+    const auto found = std::ranges::find(assets, path, &report::PageAsset::path);
+    if (found != assets.end()) return &*found;
+  }
+  return nullptr;
+}
+
+/// What becomes of requests.
+class Desk {
+ public:
+  Desk(DeskSession& session, web::Door door) : session_(session), door_(std::move(door)) {}
+
+  [[nodiscard]] const web::Door& door() const { return door_; }
+
+  Answer answer(const Request& request) {
+    const auto origin = request.find(http::field::origin);
+    if (const auto refusal =
+            door_.check_place(view(request[http::field::host]),
+                              origin == request.end() ? std::nullopt : std::optional(view(origin->value()))))
+      return refused(refusal->status, refusal->sentence);
+    const std::string_view all = view(request.target());
+    const std::string_view path = all.substr(0, all.find('?'));
+    const bool is_get = request.method() == http::verb::get;
+    if (const report::PageAsset* asset = is_get ? find_asset(path) : nullptr)
+      return {200, std::string(asset->type), std::string(asset->text)};
+    if (door_.role_of(web::token_in(view(request[http::field::authorization]), {})) != ConsoleRole::control)
+      return refused(
+          401, "The token in this address is not valid: open the address that `diastole desk` printed.");
+    if (is_get && path == "/tracking") {
+      const auto tracking = session_.tracking();
+      return tracking ? Answer{200, "application/json", *tracking}
+                      : refused(503, "The first tracking is at work.");
+    }
+    if (is_get && path == "/state") return state();
+    if (request.method() == http::verb::post && path == "/track") {
+      session_.track();
+      return state();
+    }
+    if (request.method() == http::verb::post && path == "/edits") {
+      try {
+        session_.append(request.body());
+      } catch (const InputError& error) {
+        return refused(422, error.what());
+      }
+      return state();
+    }
+    return refused(404, "There is no such thing here. The desk is at /.");
+  }
+
+ private:
+  [[nodiscard]] Answer state() const {
+    json state = session_.state();
+    state["edits"] = session_.edits();
+    return {200, "application/json", state.dump()};
+  }
+
+  DeskSession& session_;
+  web::Door door_;
+};
+
+class Connection : public std::enable_shared_from_this<Connection> {
+ public:
+  Connection(Desk& desk, size_t& count, tcp::socket socket)
+      : desk_(desk), count_(count), stream_(std::move(socket)) {
+    ++count_;
+  }
+  ~Connection() { --count_; }
+  Connection(const Connection&) = delete;
+  Connection& operator=(const Connection&) = delete;
+
+  void read() {
+    parser_.emplace();
+    parser_->header_limit(web::most_header_bytes);
+    parser_->body_limit(most_body_bytes);
+    stream_.expires_after(patience);
+    http::async_read(stream_, buffer_, *parser_, [self = shared_from_this()](error_code error, size_t) {
+      if (!error) self->reply(self->desk_.answer(self->parser_->get()));
+    });
+  }
+
+ private:
+  void reply(Answer answer) {
+    response_ = Response(static_cast<http::status>(answer.status), 11);
+    response_.set(http::field::content_type, answer.type);
+    response_.set(http::field::cache_control, "no-store");
+    response_.set("X-Content-Type-Options", "nosniff");
+    response_.set("Referrer-Policy", "no-referrer");
+    response_.set("Cross-Origin-Resource-Policy", "same-origin");
+    response_.set(
+        "Content-Security-Policy",
+        "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; img-src 'self'; "
+        "base-uri 'none'; form-action 'none'; frame-ancestors 'none'");
+    response_.keep_alive(parser_->get().keep_alive());
+    response_.body() = std::move(answer.body);
+    response_.prepare_payload();
+    stream_.expires_after(patience);
+    http::async_write(stream_, response_, [self = shared_from_this()](error_code error, size_t) {
+      if (!error && self->response_.keep_alive()) self->read();
+    });
+  }
+
+  Desk& desk_;
+  size_t& count_;
+  beast::tcp_stream stream_;
+  beast::flat_buffer buffer_;
+  std::optional<http::request_parser<http::string_body>> parser_;
+  Response response_;
+};
+
+}  // namespace
+
+struct DeskServer::Impl {
+  Impl(DeskSession& session, uint16_t port)
+      : desk(session, web::Door({asio::ip::address_v4::loopback(), port}, "")), acceptor(context) {
+    const tcp::endpoint endpoint(asio::ip::address_v4::loopback(), port);
+    try {
+      acceptor.open(endpoint.protocol());
+      acceptor.set_option(asio::socket_base::reuse_address(true));
+      acceptor.bind(endpoint);
+      acceptor.listen();
+    } catch (const boost::system::system_error& error) {
+      throw HardwareError("desk",
+                          fmt::format("cannot listen at 127.0.0.1:{}: {}", port, error.code().message()),
+                          "Choose another port (--port), or see who has this one (ss -ltnp).");
+    }
+  }
+
+  void accept() {
+    acceptor.async_accept([this](error_code error, tcp::socket socket) {
+      if (error == asio::error::operation_aborted) return;
+      if (!error && connections < most_connections)
+        std::make_shared<Connection>(desk, connections, std::move(socket))->read();
+      accept();
+    });
+  }
+
+  Desk desk;
+  size_t connections = 0;  // outlives the context's, which count it down
+  asio::io_context context{1};
+  tcp::acceptor acceptor;
+};
+
+DeskServer::DeskServer(DeskSession& session, uint16_t port) : impl_(std::make_unique<Impl>(session, port)) {}
+DeskServer::~DeskServer() = default;
+
+std::string DeskServer::url() const {
+  return impl_->desk.door().url(ConsoleRole::control, impl_->acceptor.local_endpoint().port());
+}
+
+void DeskServer::run() {
+  asio::signal_set signals(impl_->context, SIGINT, SIGTERM);
+  signals.async_wait([this](error_code, int) { impl_->context.stop(); });
+  impl_->accept();
+  impl_->context.run();
+}
+
+}  // namespace diastole::desk
