@@ -3,13 +3,14 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <span>
 #include <utility>
 
 namespace diastole::imaging {
 namespace {
 
-constexpr double tolerance_px = 0.5;
+/// Pixels make steps of a slanting edge; over three of them they are gone.
+constexpr double smoothed_px = 3.0;
+constexpr double apart_px = 3.0;
 
 using Curve = std::vector<Eigen::Vector2d>;
 /// An edge of the grid of pixel centres: of (column, row), to its right neighbour or to the one below.
@@ -82,39 +83,40 @@ class EdgeWalk {
   std::map<GridEdge, GridEdge> next_;
 };
 
-void keep_corners(std::span<const Eigen::Vector2d> points, Curve& kept) {
-  const Eigen::Vector2d along = points.back() - points.front();
-  const double length = along.norm();
-  double most = tolerance_px;
-  size_t farthest = 0;
-  for (size_t i = 1; i + 1 < points.size(); ++i) {
-    const Eigen::Vector2d from = points[i] - points.front();
-    const double off =
-        length > 0 ? std::abs(along.x() * from.y() - along.y() * from.x()) / length : from.norm();
-    if (off > most) {
-      most = off;
-      farthest = i;
-    }
+/// The means over `smoothed_px` of a closed curve, at places evenly `apart_px` apart.
+Curve smoothed(const Curve& curve) {
+  std::vector<double> along{0.0};
+  for (size_t i = 0; i < curve.size(); ++i)
+    along.push_back(along.back() + (curve[(i + 1) % curve.size()] - curve[i]).norm());
+  const double length = along.back();
+  const auto at = [&](double s) -> Eigen::Vector2d {
+    s -= length * std::floor(s / length);
+    const auto next =
+        static_cast<size_t>(std::upper_bound(along.begin(), along.end() - 1, s) - along.begin());
+    const double share = (s - along[next - 1]) / std::max(along[next] - along[next - 1], 1e-12);
+    return curve[next - 1] + share * (curve[next % curve.size()] - curve[next - 1]);
+  };
+  Curve result;
+  const auto count = static_cast<size_t>(std::round(length / apart_px));
+  for (size_t i = 0; i < count; ++i) {
+    const double s = length * static_cast<double>(i) / static_cast<double>(count);
+    constexpr int samples = 12;
+    Eigen::Vector2d sum(0, 0);
+    for (int k = 0; k < samples; ++k)
+      sum += at(s + smoothed_px * ((k + 0.5) / samples - 0.5));
+    result.push_back(sum / samples);
   }
-  if (farthest == 0) {
-    kept.push_back(points.front());
-    return;
-  }
-  keep_corners(points.first(farthest + 1), kept);
-  keep_corners(points.subspan(farthest), kept);
+  return result;
 }
 
 }  // namespace
 
 std::vector<Curve> outlines_px(const Eigen::ArrayXXf& depth_mm) {
-  std::vector<Curve> simplified;
-  for (Curve& curve : EdgeWalk(depth_mm).curves()) {
-    curve.push_back(curve.front());
-    Curve kept;
-    keep_corners(curve, kept);
-    if (kept.size() >= 3) simplified.push_back(std::move(kept));
+  std::vector<Curve> curves;
+  for (const Curve& curve : EdgeWalk(depth_mm).curves()) {
+    if (Curve one = smoothed(curve); one.size() >= 3) curves.push_back(std::move(one));
   }
-  return simplified;
+  return curves;
 }
 
 }  // namespace diastole::imaging

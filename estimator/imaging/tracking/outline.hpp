@@ -6,8 +6,8 @@
 
 namespace diastole::imaging {
 
-/// The curves depth = 0 of a depth map (materials.hpp), closed, in pixels (column, row); the image's border closes what leaves it.
-/// Simplified to half a pixel (Douglas and Peucker, Cartographica 10 (1973) 112).
+/// The curves depth = 0 of a depth map (materials.hpp), closed, in pixels (column, row), smoothed over three pixels; the image's border
+/// closes what leaves it.
 std::vector<std::vector<Eigen::Vector2d>> outlines_px(const Eigen::ArrayXXf& depth_mm);
 
 }  // namespace diastole::imaging

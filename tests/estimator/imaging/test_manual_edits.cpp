@@ -7,6 +7,7 @@
 #include <set>
 
 #include "estimator/imaging/tracking/manual_edits.hpp"
+#include "estimator/imaging/tracking/outline.hpp"
 #include "estimator/imaging/tracking/tags_file.hpp"
 #include "estimator/imaging/tracking/tracked_folder.hpp"
 #include "tests/estimator/imaging/tagged_ring.hpp"
@@ -269,6 +270,26 @@ TEST(ManualEdits, RefusesWhatDoesNotFitWithFileLineValueAndRemedy) {
         (void)track_folder({.folder = ring.folder(), .coordinates = "patient", .edits = "none.edits.jsonl"});
       }),
       HasSubstr("none.edits.jsonl"));
+}
+
+TEST(Outlines, AreClosedCurvesOfARingsEdges) {
+  Eigen::ArrayXXf depth(64, 80);
+  for (Eigen::Index column = 0; column < depth.cols(); ++column) {
+    for (Eigen::Index row = 0; row < depth.rows(); ++row) {
+      const double radius = std::hypot(static_cast<double>(column) - 40, static_cast<double>(row) - 32);
+      depth(row, column) = static_cast<float>(std::min(24 - radius, radius - 10));
+    }
+  }
+  const auto curves = outlines_px(depth);
+  ASSERT_EQ(curves.size(), 2U);
+  for (const Points& curve : curves) {
+    const double radius = (curve[0] - Eigen::Vector2d(40, 32)).norm() > 17 ? 24 : 10;
+    EXPECT_NEAR(static_cast<double>(curve.size()), 2 * std::numbers::pi * radius / 3, 1);
+    for (const Eigen::Vector2d& point : curve)
+      EXPECT_NEAR((point - Eigen::Vector2d(40, 32)).norm(), radius, 0.15);
+  }
+  EXPECT_EQ(outlines_px(Eigen::ArrayXXf::Constant(20, 20, 1.0F)).size(), 1U) << "closed by the border";
+  EXPECT_TRUE(outlines_px(Eigen::ArrayXXf::Constant(20, 20, -1.0F)).empty());
 }
 
 TEST(ManualEdits, StandBesideTheFolder) {

@@ -121,6 +121,11 @@ const desk = (() => {
     context.beginPath();
     context.arc(x, y, 0.6 * player.scale, 0, 7);
     context.fill();
+    context.save();
+    context.strokeStyle = "#000000a0";
+    context.lineWidth = 1.5;
+    context.stroke();
+    context.restore();
   });
   const colours = { outer: "#8dff9e", inner: "#ffd84a", mask: "#ff5a4d", line: "#ffffff" };
   const overlay = (player) => (context) => {
