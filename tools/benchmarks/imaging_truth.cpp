@@ -146,13 +146,13 @@ ImagingTruth read_imaging_truth(const std::filesystem::path& path) {
   truth.R_mm = by_phase(file.numbers("/motion/R_mm"), phases);
   truth.Z_mm = by_phase(file.numbers("/motion/Z_mm"), phases);
   truth.twist_rad = by_phase(file.numbers("/motion/T_rad"), phases);
-  const std::vector<double> X_mm = file.numbers("/grid/X_mm");
+  const std::vector<double> X_mm = file.numbers("/grid/X_mm");  // patient coordinates, as the points'
   for (size_t i = 0; 3 * i < X_mm.size(); ++i)
-    truth.grid.X_mm.push_back(vector_at(X_mm, i));
+    truth.grid.X_mm.push_back(truth.axes.transpose() * (vector_at(X_mm, i) - truth.origin_mm));
   for (const std::vector<double>& u_mm : by_phase(file.numbers("/grid/u_mm"), phases)) {
     truth.grid.u_mm.emplace_back();
     for (size_t i = 0; 3 * i < u_mm.size(); ++i)
-      truth.grid.u_mm.back().push_back(vector_at(u_mm, i));
+      truth.grid.u_mm.back().push_back(truth.axes.transpose() * vector_at(u_mm, i));
   }
   return truth;
 }

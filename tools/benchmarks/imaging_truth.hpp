@@ -39,7 +39,7 @@ struct ImagingTruth {
   [[nodiscard]] Eigen::Vector3d material_mm(size_t phase, const Eigen::Vector3d& x_mm) const;
   /// How deep in the wall a material point lies; negative outside. The gel is 22.5 to 50 mm by 85 mm, the ventricle that of the paper's Eq. 5.
   [[nodiscard]] double depth_mm(const Eigen::Vector3d& X_mm) const;
-  /// Displacements at material points: `first` X, `second` u; what grid/ holds.
+  /// Displacements at material points, in the specimen's axes: what grid/ holds.
   struct Displacements {
     std::vector<Eigen::Vector3d> X_mm;
     std::vector<std::vector<Eigen::Vector3d>> u_mm;  ///< a phase
