@@ -62,15 +62,17 @@ std::vector<std::filesystem::path> write_ring(const RingScan& scan, const std::f
   std::vector<std::filesystem::path> files;
   for (int phase = 1; phase <= scan.phases; ++phase) {
     std::vector<Uint16> pixels;
-    for (int row = 0; row < scan.pixels; ++row) {
+    const int rows = static_cast<int>(std::lround(scan.pixels / scan.stretch));
+    const double row_mm = scan.pixel_mm * scan.stretch;
+    for (int row = 0; row < rows; ++row) {
       for (int column = 0; column < scan.pixels; ++column) {
         double sum = 0;
         for (int i = 0; i < samples * samples; ++i) {
           const Eigen::Vector2d within((i % samples + 0.5) / samples - 0.5,
                                        (i / samples + 0.5) / samples - 0.5);
-          const Eigen::Vector2d x =
-              scan.origin_mm.head<2>() + scan.pixel_mm * (Eigen::Vector2d(column, row) + within);
-          sum += brightness(scan, phase, x) / (samples * samples);
+          const Eigen::Vector3d x = scan.origin_mm + scan.pixel_mm * (column + within.x()) * scan.along_row +
+                                    row_mm * (row + within.y()) * scan.along_column;
+          sum += brightness(scan, phase, x.head<2>()) / (samples * samples);
         }
         const double real = sum + noise(engine);
         const double imaginary = noise(engine);
@@ -80,7 +82,7 @@ std::vector<std::filesystem::path> write_ring(const RingScan& scan, const std::f
     if (phase == scan.missing_phase) continue;
     DcmFileFormat file;
     DcmDataset& data = *file.getDataset();
-    const std::string series_uid = fmt::format("1.2.3.{}", scan.series);
+    const std::string series_uid = fmt::format("{}.{}", scan.uid, scan.series);
     put(data, DCM_SOPClassUID, UID_MRImageStorage);
     put(data, DCM_SOPInstanceUID, fmt::format("{}.{}", series_uid, phase));
     put(data, DCM_SeriesInstanceUID, series_uid);
@@ -97,11 +99,13 @@ std::vector<std::filesystem::path> write_ring(const RingScan& scan, const std::f
     if (scan.with_times) put(data, DCM_TriggerTime, fmt::format("{}", scan.time_ms(phase)));
     put(data, DCM_ImagePositionPatient,
         fmt::format("{}\\{}\\{}", scan.origin_mm.x(), scan.origin_mm.y(), scan.origin_mm.z()));
-    put(data, DCM_ImageOrientationPatient, "1\\0\\0\\0\\1\\0");
-    put(data, DCM_PixelSpacing, fmt::format("{}\\{}", scan.pixel_mm, scan.pixel_mm));
+    put(data, DCM_ImageOrientationPatient,
+        fmt::format("{}\\{}\\{}\\{}\\{}\\{}", scan.along_row.x(), scan.along_row.y(), scan.along_row.z(),
+                    scan.along_column.x(), scan.along_column.y(), scan.along_column.z()));
+    put(data, DCM_PixelSpacing, fmt::format("{}\\{}", row_mm, scan.pixel_mm));
     put(data, DCM_PhotometricInterpretation, "MONOCHROME2");
     for (const auto& [tag, value] : {std::pair(DCM_SamplesPerPixel, 1),
-                                     {DCM_Rows, scan.pixels},
+                                     {DCM_Rows, rows},
                                      {DCM_Columns, scan.pixels},
                                      {DCM_BitsAllocated, 16},
                                      {DCM_BitsStored, 12},

@@ -23,6 +23,10 @@ struct RingScan {
   bool with_times = true;
   int series = 2;
   Eigen::Vector3d origin_mm{-47.5, -47.5, 12.0};  ///< of the first pixel
+  Eigen::Vector3d along_row{1, 0, 0};             ///< in the plane z = 12, as is the other
+  Eigen::Vector3d along_column{0, 1, 0};
+  double stretch = 1.0;       ///< rows lie so many times as far apart as columns, and are fewer
+  std::string uid = "1.2.3";  ///< what the instances' UIDs begin with
   unsigned seed = 1;
 
   static constexpr double inner_mm = 18, outer_mm = 38, water_mm = 46;

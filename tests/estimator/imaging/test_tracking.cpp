@@ -23,7 +23,9 @@ struct Errors {
 Errors errors_of(const RingScan& scan, const TrackedFolder& tracked) {
   Errors errors;
   for (const TagPoint& point : tracked.points) {
-    const double nearest = std::round(point.plane_mm / scan.tag_spacing_mm) * scan.tag_spacing_mm;
+    // A normal's sign is free.
+    const double plane_mm = point.normal.dot(scan.normal()) < 0 ? -point.plane_mm : point.plane_mm;
+    const double nearest = std::round(plane_mm / scan.tag_spacing_mm) * scan.tag_spacing_mm;
     const double off_px = (scan.material_mm(point.frame, point.x_mm) - nearest) / scan.pixel_mm;
     errors.rms_px += off_px * off_px;
     errors.normalised += std::pow(off_px * scan.pixel_mm / point.sigma_mm, 2);
@@ -48,6 +50,25 @@ TEST(Tracking, FollowsARingToAFewHundredthsOfAPixelAndKnowsItsErrors) {
   EXPECT_LT(errors.normalised, 2.5);
   // Lines of gel over their distance, a point about every 4 mm.
   EXPECT_GT(errors.points, 8U * 130U);
+}
+
+TEST(Tracking, FollowsMirroredTurnedAndStretchedImagesAsWell) {
+  const Eigen::Vector3d x(1, 0, 0), y(0, 1, 0);
+  const std::vector<RingScan> scans = {
+      {.origin_mm = {47.5, -47.5, 12}, .along_row = -x},                     // mirrored
+      {.along_row = y, .along_column = x},                                   // rows and columns exchanged
+      {.origin_mm = {47.5, 47.5, 12}, .along_row = -x, .along_column = -y},  // turned upside down
+      {.stretch = 1.3},
+      {.tag_angle_deg = 0, .origin_mm = {47.5, -47.5, 12}, .along_row = -x, .stretch = 1.3}};
+  for (size_t i = 0; i < scans.size(); ++i) {
+    const ScratchFolder scratch;
+    test::write_ring(scans[i], scratch.path());
+    const TrackedFolder tracked = track_folder({.folder = scratch.path(), .coordinates = "patient"});
+    const Errors errors = errors_of(scans[i], tracked);
+    EXPECT_LT(errors.rms_px, 0.06) << i;
+    EXPECT_LT(errors.worst_px, 0.5) << i;
+    EXPECT_GT(errors.points, 8U * 130U) << i;
+  }
 }
 
 TEST(Tracking, NumbersFramesByPhaseAcrossAGap) {
