@@ -33,10 +33,10 @@ Json direction_json(const SlicePlane& plane, const TagWave& tag) {
 
 Json series_json(const ImageFolder& folder, const ImageSeries& series) {
   const SlicePlane& plane = series.plane();
-  const SliceImages& middle = series.slices[series.slices.size() / 2];
+  const SliceImages& clearest = series.clearest();
   Json directions = Json::array();
-  for (const TagWave& tag : middle.tags)
-    directions.push_back(direction_json(middle.plane, tag));
+  for (const TagWave& tag : clearest.tags)
+    directions.push_back(direction_json(clearest.plane, tag));
   Json json = {{"kind", describe(series.kind)},
                {"reason", series.reason},
                {"number", series.number},
@@ -67,7 +67,7 @@ void print_series(const ImageFolder& folder, const ImageSeries& series) {
   if (series.phases.times_ms.size() > 1)
     fmt::print("  trigger times {:.0f} to {:.0f} ms\n", series.phases.times_ms.front(),
                series.phases.times_ms.back());
-  for (const TagWave& tag : series.slices[series.slices.size() / 2].tags) {
+  for (const TagWave& tag : series.clearest().tags) {
     const Eigen::Vector3d normal = tag_normal(series.plane(), tag);
     fmt::print("  tags every {:.2f} mm, normal ({:.3f}, {:.3f}, {:.3f})\n", tag.spacing_mm(), normal.x(),
                normal.y(), normal.z());

@@ -61,6 +61,20 @@ TEST_F(ImagedGel, OneCommandGoesFromImagesToTheStiffness) {
   EXPECT_EQ(report.exit_code, 0) << report.err;
 }
 
+TEST_F(ImagedGel, ASliceThatReachesBeyondTheEndIsTold) {
+  const Ended scan = run(
+      place, {"diastole", "scan", std::string(DIASTOLE_EXAMPLES) + "/phantom-a.study.toml", "-o", "end",
+              "--matrix", "64", "--short-axis=0,41", "--long-axis", "0", "--phases", "4", "--peak-kPa", "2"});
+  ASSERT_EQ(scan.exit_code, 0) << scan.err;
+  const Ended track = run(place, {"diastole", "track", "end/dicom", "-o", "end.tags.csv", "--json"});
+  ASSERT_EQ(track.exit_code, 0) << track.err;
+  std::vector<std::string> slices;
+  for (const json& problem : track.json().at("problems")) {
+    if (problem.at("id") == "slice-at-end") slices.push_back(problem.at("where"));
+  }
+  EXPECT_THAT(slices, testing::ElementsAre("series 2, slice 2", "series 3, slice 2"));
+}
+
 class TrackingInABrowser : public ImagedGel {
  protected:
   void SetUp() override {

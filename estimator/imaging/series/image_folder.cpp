@@ -341,15 +341,22 @@ class Sorter {
     for (SliceImages& slice : series.slices)
       slice.tags = find_tag_waves(folder_.pixels({slice.images.front()})[0], slice.plane);
     const bool several = middle.images.size() > 1;
-    if (several && !middle.tags.empty()) {
+    const SliceImages& clearest = series.clearest();
+    if (several && !clearest.tags.empty()) {
       series.kind = SeriesKind::tagged_cine;
-      const TagWave& tag = middle.tags[0];
-      const Image last = folder_.pixels({middle.images.back()})[0];
+      const TagWave& tag = clearest.tags[0];
+      const Image last = folder_.pixels({clearest.images.back()})[0];
+      for (const SliceImages& slice : series.slices) {
+        if (slice.tags.empty())
+          complain(Severity::warning, "slice-without-tags",
+                   "no tags are seen in this slice of a tagged series", slice.images.front(), 1, "slices",
+                   "Nothing is tracked in it. Does it lie beyond the specimen's end?");
+      }
       series.reason = fmt::format(
           "the first phase's spectrum has {} of {:.2f} mm, {:.0f} times its surroundings; modulation {:.0f} "
           "%, {:.0f} % in the last phase",
-          middle.tags.size() == 1 ? "a line" : "a grid of lines", tag.spacing_mm(), tag.prominence,
-          100 * tag.modulation, 100 * modulation_at(last, middle.plane, tag.per_mm));
+          clearest.tags.size() == 1 ? "a line" : "a grid of lines", tag.spacing_mm(), tag.prominence,
+          100 * tag.modulation, 100 * modulation_at(last, clearest.plane, tag.per_mm));
       return;
     }
     series.kind = several ? SeriesKind::cine : SeriesKind::anatomy;

@@ -18,4 +18,15 @@ std::string describe(SeriesKind kind) {
   return "anatomy";
 }
 
+const SliceImages& ImageSeries::clearest() const {
+  const auto prominence = [](const SliceImages& slice) {
+    return slice.tags.empty() ? 0.0 : slice.tags[0].prominence;
+  };
+  const SliceImages* best = &slices[slices.size() / 2];
+  for (const SliceImages& slice : slices) {
+    if (prominence(slice) > prominence(*best)) best = &slice;
+  }
+  return *best;
+}
+
 }  // namespace diastole::imaging

@@ -40,6 +40,8 @@ struct ImageSeries {
   std::string vendor;
 
   [[nodiscard]] const SlicePlane& plane() const { return slices.front().plane; }
+  /// The slice whose tags stand out most; of equals, such as those without, the middle one.
+  [[nodiscard]] const SliceImages& clearest() const;
 };
 
 }  // namespace diastole::imaging

@@ -47,6 +47,30 @@ void settle_pose(const TrackRequest& request, TrackedFolder& tracked) {
        "Give the specimen's pose with --pose NAME.pose.toml (origin_mm, x_axis, y_axis, z_axis)."});
 }
 
+/// A slice that reaches beyond the specimen's end shows the mean motion of what is in it, which is not that of its middle.
+void find_slices_at_ends(TrackedFolder& tracked) {
+  if (!tracked.pose || !tracked.outline) return;
+  const Eigen::Vector3d axis = tracked.pose->axes.col(2);
+  for (const TrackedSlice& slice : tracked.slices) {
+    const SlicePlane& plane = slice.view.plane;
+    const double cosine = std::abs(plane.normal().dot(axis));
+    if (cosine < 0.9) continue;  // along the axis
+    const double height_mm =
+        std::abs((plane.at(0.5 * slice.view.extent_mm()) - tracked.pose->origin_mm).dot(plane.normal())) /
+        cosine;
+    const double beyond_mm = height_mm + 0.5 * plane.thickness_mm - 0.5 * tracked.outline->height_mm;
+    if (beyond_mm <= slice.view.plane.finer_spacing_mm()) continue;  // outlines are good to a pixel
+    tracked.problems.push_back(
+        {Severity::warning, "slice-at-end",
+         fmt::format(
+             "the slice is {:.1f} mm thick and reaches {:.1f} mm beyond the specimen's end: its tags move as "
+             "what is left within does",
+             plane.thickness_mm, beyond_mm),
+         slice.view.name, beyond_mm, "mm",
+         "Mask it in all phases (docs/imaging.md, put right by hand), or leave its files out."});
+  }
+}
+
 }  // namespace
 
 std::optional<fs::path> pose_nearby(const fs::path& folder) {
@@ -104,6 +128,7 @@ TrackedFolder gathered(const TrackRequest& request, const ManualEdits& edits,
   if (!edits.standing.empty() || edits.undone > 0)
     tracked.edits = AppliedEdits{edits.file, counts_of(edits), edits.undone};
   settle_pose(request, tracked);
+  find_slices_at_ends(tracked);
   double squares = 0;
   for (const TrackedSlice& slice : tracked.slices) {
     for (const TagPoint& point : slice.points.points) {
