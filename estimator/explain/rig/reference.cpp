@@ -67,17 +67,19 @@ struct Fitted {
     start.at.u.tail(tolerances.size()) = root.triangularView<Eigen::Lower>().solve(tolerances - before.mean);
     start.columns = problem.nuisance_columns(start.at, start.there);
     const EffectSet linear = fit_set(problem, start.at, start, problem.error().prior.share);
-    const EffectSet exact = fit_set_exactly(problem, linear);
-    evidence = exact.evidence;
-    std::fprintf(stderr, "REFFIT %d %d %.1f %.1f\n", (int)linear.termination, (int)exact.termination,
-                 linear.log_posterior, exact.log_posterior);
+    evidence = fit_set_exactly(problem, linear).evidence;
   }
-  /// What it teaches beside what was known when it was fitted.
-  [[nodiscard]] Knowledge knowledge(const Knowledge& before) const {
+  /// What is known after it as one of so many references. What the model misses is the rig's own and comes again: all of
+  /// them together know the tolerances no better than one does, so each counts for its part.
+  [[nodiscard]] Knowledge knowledge(const Knowledge& before, size_t references) const {
     const auto count = before.mean.size();
     const MatrixXd root = before.root();
-    return {before.mean + root * evidence.u.tail(count),
-            root * inverse(evidence.precision).bottomRightCorner(count, count) * root.transpose()};
+    const MatrixXd own = inverse(inverse(evidence.precision).bottomRightCorner(count, count));
+    const MatrixXd unity = MatrixXd::Identity(count, count);
+    const double part = 1.0 / static_cast<double>(references);
+    const MatrixXd covariance = inverse(unity + part * (own - unity));
+    return {before.mean + root * covariance * (part * own * evidence.u.tail(count)),
+            root * covariance * root.transpose()};
   }
 };
 
@@ -107,11 +109,7 @@ Knowledge learn_tolerances(const std::vector<std::unique_ptr<Fitted>>& fits,
     for (const auto& fit : fits) {
       report(fmt::format("fitting the reference {}", fit->study.file.filename().string()));
       fit->fit(known, start);
-      known = fit->knowledge(known);
-      for (Index i = 0; i < count; ++i)
-        std::fprintf(stderr, "REF %-22s %.2f +- %.2f\n",
-                     list[basic_nuisances + static_cast<size_t>(i)].name.c_str(), known.mean[i],
-                     std::sqrt(known.covariance(i, i)));
+      known = fit->knowledge(known, fits.size());
       widen(known, list);
       start = known.mean;
     }
