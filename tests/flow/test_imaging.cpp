@@ -62,9 +62,9 @@ TEST_F(ImagedGel, OneCommandGoesFromImagesToTheStiffness) {
 }
 
 TEST_F(ImagedGel, ASliceThatReachesBeyondTheEndIsTold) {
-  const Ended scan = run(
-      place, {"diastole", "scan", std::string(DIASTOLE_EXAMPLES) + "/phantom-a.study.toml", "-o", "end",
-              "--matrix", "64", "--short-axis=0,41", "--long-axis", "0", "--phases", "4", "--peak-kPa", "2"});
+  const Ended scan =
+      run(place, {"diastole", "scan", std::string(DIASTOLE_EXAMPLES) + "/phantom-a.study.toml", "-o", "end",
+                  "--short-axis=0,41", "--long-axis", "0", "--phases", "4", "--peak-kPa", "2"});
   ASSERT_EQ(scan.exit_code, 0) << scan.err;
   const Ended track = run(place, {"diastole", "track", "end/dicom", "-o", "end.tags.csv", "--json"});
   ASSERT_EQ(track.exit_code, 0) << track.err;

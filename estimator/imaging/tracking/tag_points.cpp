@@ -185,7 +185,8 @@ class Emitter {
     const double h = 0.1 * spacing_mm;
     const double change =
         1 + (motion.value_mm(k, x_mm + h * normal) - motion.value_mm(k, x_mm - h * normal)) / (2 * h);
-    const double sigma_mm = motion.sigma_mm(k, x_mm) / std::max(change, 0.2);
+    const double ghost_mm = ghost_sigma_mm(k, f, x_mm);
+    const double sigma_mm = std::hypot(motion.sigma_mm(k, x_mm), ghost_mm) / std::max(change, 0.2);
     const Surroundings around = surroundings(k, f, x_mm);
     const auto drop = [&](const char* reason) {
       ++points_.dropped[reason];
@@ -214,8 +215,32 @@ class Emitter {
     // Pixels that say nothing leave the tag anywhere in its spacing.
     point.own_mm = place.information > 0 ? own_mm : 0.0;
     point.own_sigma_mm =
-        std::min(spacing_mm, 1.0 / std::sqrt(std::max(place.information, 1e-300)) / std::max(change, 0.2));
+        std::min(spacing_mm, std::hypot(1.0 / std::sqrt(std::max(place.information, 1e-300)), ghost_mm) /
+                                 std::max(change, 0.2));
     points_.points.push_back(point);
+  }
+
+  /// What ghosts move a tag by: the shift that a ghost's picture asks of the pixels around. Its phase against the picture is not known,
+  /// and half of its power is in phase on average.
+  double ghost_sigma_mm(size_t k, size_t f, const Eigen::Vector2d& x_mm) const {
+    double variance = 0;
+    for (const Ghost& ghost : tracked_.ghosts) {
+      double count = 0, slopes = 0, overs = 0, squares = 0, products = 0;
+      each_pixel_near(x_mm, tracked_.waves[f].spacing_mm(),
+                      [&](Eigen::Index row, Eigen::Index column, double) {
+                        const double slope = static_cast<double>(tracked_.phases[k].slope[f](row, column));
+                        if (slope == 0) return;
+                        const double over = ghost.over(view_.images[k], row, column);
+                        count += 1;
+                        slopes += slope;
+                        overs += over;
+                        squares += slope * slope;
+                        products += slope * over;
+                      });
+      // Of a ghost's mean over the circle the brightness takes account.
+      if (squares > 0) variance += 0.5 * std::pow((products - slopes * overs / count) / squares, 2);
+    }
+    return std::sqrt(variance);
   }
 
   Surroundings surroundings(size_t k, size_t f, const Eigen::Vector2d& x_mm) const {

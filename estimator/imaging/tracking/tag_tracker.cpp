@@ -655,6 +655,13 @@ class ViewTracker {
                                 priors_[f].left_out_mm,
                                 spacing_mm_ * spacing_mm_ * factors_[f] * rest_matrices_[f].inverse(),
                                 0.5 * view_.extent_mm(), view_.extent_mm().norm()});
+    std::vector<const MaterialMap*> maps;
+    std::vector<double> noise;
+    for (const TrackedPhase& phase : phases_) {
+      maps.push_back(&phase.materials);
+      noise.push_back(phase.noise);
+    }
+    tracked.ghosts = find_ghosts(view_, maps, noise);
     tracked.phases = std::move(phases_);
     tracked.noise_factor = factors_;
     tracked.kappa_per_mm = priors_[0].kappa_per_mm;

@@ -14,6 +14,7 @@
 #include <string>
 #include <vector>
 
+#include "estimator/imaging/tracking/ghost.hpp"
 #include "estimator/imaging/tracking/materials.hpp"
 #include "estimator/imaging/tracking/motion_field.hpp"
 #include "estimator/imaging/tracking/tag_view.hpp"
@@ -36,6 +37,7 @@ struct TrackedView {
   std::vector<TrackedPhase> phases;
   std::vector<double> noise_factor;  ///< a direction: noise power near the tags' frequency over the mean
   double kappa_per_mm = 0;
+  std::vector<Ghost> ghosts;
 };
 
 struct TrackingFault {

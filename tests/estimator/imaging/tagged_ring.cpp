@@ -61,7 +61,7 @@ std::vector<std::filesystem::path> write_ring(const RingScan& scan, const std::f
   std::normal_distribution<double> noise(0, scan.noise);
   std::vector<std::filesystem::path> files;
   for (int phase = 1; phase <= scan.phases; ++phase) {
-    std::vector<Uint16> pixels;
+    std::vector<double> picture;
     const int rows = static_cast<int>(std::lround(scan.pixels / scan.stretch));
     const double row_mm = scan.pixel_mm * scan.stretch;
     for (int row = 0; row < rows; ++row) {
@@ -74,10 +74,17 @@ std::vector<std::filesystem::path> write_ring(const RingScan& scan, const std::f
                                     row_mm * (row + within.y()) * scan.along_column;
           sum += brightness(scan, phase, x.head<2>()) / (samples * samples);
         }
-        const double real = sum + noise(engine);
-        const double imaginary = noise(engine);
-        pixels.push_back(static_cast<Uint16>(std::lround(std::hypot(real, imaginary))));
+        picture.push_back(sum);
       }
+    }
+    std::vector<Uint16> pixels;
+    for (size_t i = 0; i < picture.size(); ++i) {
+      const auto shift = static_cast<size_t>(scan.ghost_rows * scan.pixels);
+      const double ghost =
+          shift > 0 ? scan.ghost_share * picture[(i + picture.size() - shift) % picture.size()] : 0.0;
+      const double real = picture[i] + ghost + noise(engine);
+      const double imaginary = noise(engine);
+      pixels.push_back(static_cast<Uint16>(std::lround(std::hypot(real, imaginary))));
     }
     if (phase == scan.missing_phase) continue;
     DcmFileFormat file;

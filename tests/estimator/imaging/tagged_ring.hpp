@@ -19,6 +19,8 @@ struct RingScan {
   double noise = 40.0;          ///< of a channel; gel is 1000
   double most_mm2 = 90.0;       ///< c at its largest
   bool tagged = true;
+  int ghost_rows = 0;                  ///< a copy of the picture, so many rows below
+  double ghost_share = 0.06;           ///< of its brightness
   std::optional<int> missing_phase{};  ///< from 1
   bool with_times = true;
   int series = 2;

@@ -52,6 +52,27 @@ TEST(Tracking, FollowsARingToAFewHundredthsOfAPixelAndKnowsItsErrors) {
   EXPECT_GT(errors.points, 8U * 130U);
 }
 
+TEST(Tracking, AGhostIsFoundInTheAirAndCountsInTheErrors) {
+  const ScratchFolder scratch;
+  const RingScan scan{.noise = 20, .ghost_rows = 21};
+  test::write_ring(scan, scratch.path());
+  const TrackedFolder tracked = track_folder({.folder = scratch.path(), .coordinates = "patient"});
+  const std::vector<Ghost>& ghosts = tracked.slices.at(0).tracked.ghosts;
+  ASSERT_FALSE(ghosts.empty());
+  EXPECT_TRUE(ghosts[0].down);
+  EXPECT_EQ(ghosts[0].shift, 21);
+  EXPECT_NEAR(ghosts[0].share, scan.ghost_share, 0.02);
+  // It is in phase here, which nobody knows: twice the power that is reckoned with.
+  const Errors errors = errors_of(scan, tracked);
+  EXPECT_GT(errors.normalised, 0.3);
+  EXPECT_LT(errors.normalised, 3.0);
+  const ScratchFolder clean;
+  test::write_ring({.noise = 20}, clean.path());
+  const TrackedFolder without = track_folder({.folder = clean.path(), .coordinates = "patient"});
+  EXPECT_TRUE(without.slices.at(0).tracked.ghosts.empty());
+  EXPECT_GT(tracked.rms_px, 1.2 * without.rms_px);
+}
+
 TEST(Tracking, FollowsMirroredTurnedAndStretchedImagesAsWell) {
   const Eigen::Vector3d x(1, 0, 0), y(0, 1, 0);
   const std::vector<RingScan> scans = {

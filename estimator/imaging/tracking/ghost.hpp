@@ -1,0 +1,30 @@
+#pragma once
+// Ghosts: weaker copies of the picture, shifted along the phase encoding, that anything which differs from line group to line group
+// leaves in a segmented acquisition. They lie over tissue as they lie over air, and there they are seen.
+
+#include <vector>
+
+#include "estimator/imaging/tracking/materials.hpp"
+
+namespace diastole::imaging {
+
+struct Ghost {
+  bool down;           ///< shifted along a column, else along a row
+  Eigen::Index shift;  ///< in pixels, cyclic
+  double share;        ///< of the picture's brightness
+
+  /// What it lays over a pixel, but for its sign.
+  [[nodiscard]] double over(const Image& image, Eigen::Index row, Eigen::Index column) const {
+    const Eigen::Index from_row = down ? (row - shift + image.rows()) % image.rows() : row;
+    const Eigen::Index from_column = down ? column : (column - shift + image.cols()) % image.cols();
+    return share * static_cast<double>(image(from_row, from_column));
+  }
+};
+
+/// In air the mean square of an image is that of its noise and of what lies over it: it is regressed on the squares of the shifted
+/// picture, all phases together, and a shift counts that explains it six standard errors better than none. `noise`: a phase's standard
+/// deviation of a channel.
+std::vector<Ghost> find_ghosts(const TagView& view, const std::vector<const MaterialMap*>& maps,
+                               const std::vector<double>& noise);
+
+}  // namespace diastole::imaging
