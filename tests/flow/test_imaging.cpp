@@ -62,9 +62,11 @@ TEST_F(ImagedGel, OneCommandGoesFromImagesToTheStiffness) {
 }
 
 TEST_F(ImagedGel, ASliceThatReachesBeyondTheEndIsTold) {
+  if (sanitized) GTEST_SKIP() << "ten slices of ten phases: too slow here";
   const Ended scan =
       run(place, {"diastole", "scan", std::string(DIASTOLE_EXAMPLES) + "/phantom-a.study.toml", "-o", "end",
-                  "--short-axis=0,41", "--long-axis", "0", "--phases", "4", "--peak-kPa", "2"});
+                  "--set", "C1_kPa=8.71", "--matrix", "96", "--snr", "20", "--short-axis=-40,0,41",
+                  "--long-axis", "0,90", "--peak-kPa", "3", "--phases", "10"});
   ASSERT_EQ(scan.exit_code, 0) << scan.err;
   const Ended track = run(place, {"diastole", "track", "end/dicom", "-o", "end.tags.csv", "--json"});
   ASSERT_EQ(track.exit_code, 0) << track.err;
@@ -72,7 +74,8 @@ TEST_F(ImagedGel, ASliceThatReachesBeyondTheEndIsTold) {
   for (const json& problem : track.json().at("problems")) {
     if (problem.at("id") == "slice-at-end") slices.push_back(problem.at("where"));
   }
-  EXPECT_THAT(slices, testing::ElementsAre("series 2, slice 2", "series 3, slice 2"));
+  EXPECT_THAT(slices, testing::ElementsAre("series 2, slice 1", "series 2, slice 3", "series 3, slice 1",
+                                           "series 3, slice 3"));
 }
 
 class TrackingInABrowser : public ImagedGel {
