@@ -56,10 +56,11 @@ ExitCode run_reference(const ReferenceArguments& arguments, const CommandOutput&
   require_output({arguments.output, inputs, reference_mark, arguments.force});
   const Interruption interruption;
   try {
-    explain::Reference reference = explain::learn_reference(studies, arguments.threads, [](std::string_view what) {
-      if (Interruption::requested()) throw ReferenceInterrupted{};
-      fmt::print(stderr, "reference: {}\n", what);
-    });
+    explain::Reference reference =
+        explain::learn_reference(studies, arguments.threads, [](std::string_view what) {
+          if (Interruption::requested()) throw ReferenceInterrupted{};
+          fmt::print(stderr, "reference: {}\n", what);
+        });
     reference.fingerprint = fingerprints;
     const std::string text = explain::to_json(reference);
     write_whole_file(arguments.output, text);
