@@ -10,6 +10,7 @@ namespace diastole {
 
 void add_images(CommandLine& line);
 void add_track(CommandLine& line);
+void add_flow(CommandLine& line);
 void add_solve(CommandLine& line);
 void add_pressure_volume(CommandLine& line);
 void add_fit(CommandLine& line);
@@ -30,6 +31,7 @@ void add_explain(CommandLine& line, const ExplanationScorer& score);
 inline void add_estimator_commands(CommandLine& line, const ExplanationScorer& score) {
   add_images(line);
   add_track(line);
+  add_flow(line);
   add_solve(line);
   add_pressure_volume(line);
   add_reconstruct(line);

@@ -42,6 +42,7 @@ struct ImageHeader {
   std::optional<DiffusionEncoding> diffusion;
   double slope = 1.0;
   double intercept = 0.0;
+  std::string rescale_units;  ///< (0028,1054): "cm/s", "US"; empty where it is absent
   std::string vendor;  ///< "Siemens", "GE", "Philips", "Canon", or "unknown"
 };
 

@@ -1,0 +1,152 @@
+#include "estimator/imaging/flow/pressure_volume_loop.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <string_view>
+
+#include "estimator/io/number_table.hpp"
+#include "protocol/contract/input_error.hpp"
+#include "protocol/runfile/frame_bins.hpp"
+#include "protocol/runfile/signal_delay.hpp"
+#include "protocol/runfile/spacing.hpp"
+#include "protocol/signal/median.hpp"
+
+namespace diastole::imaging {
+namespace {
+
+/// Of the cycle: chords of so many points leave out less than a half of a percent of a loop's area.
+constexpr size_t most_windows = 64;
+constexpr double samples_a_window = 2;
+/// Scanner and pump count the same cycle with clocks of their own; the pump's may also be known to a millisecond only.
+constexpr double same_period = 0.01;
+/// Slower than this share of its peak, the flow is about to turn and dp/dV is 0/0.
+constexpr double least_flow_share = 0.2;
+
+double resolution_kPa(const runfile::RecordedRun& run) {
+  const auto found = run.rig.find("cavity_resolution_kPa");
+  const auto* value = found == run.rig.end() ? nullptr : std::get_if<double>(&found->second);
+  return value == nullptr ? 0 : *value;
+}
+
+double sigma_of_mean(const runfile::FrameBin& bin, double resolution_kPa) {
+  const double spread = bin.cycles > 1 ? bin.sd_kPa * bin.sd_kPa / static_cast<double>(bin.cycles)
+                                       : bin.sample_sd_kPa * bin.sample_sd_kPa;
+  return std::sqrt(spread + resolution_kPa * resolution_kPa / 12);
+}
+
+int64_t cycles_in(double interval_s, double period_s, const runfile::RecordedRun& run, const std::string& source) {
+  const double cycles = interval_s / period_s;
+  const double whole = std::max(1.0, std::round(cycles));
+  if (std::abs(cycles / whole - 1) > same_period)
+    throw InputError({run.file, "",
+                      fmt::format("cycles of {:.4g} s do not fit the images' {:.4g} s ({})", period_s, interval_s, source),
+                      "Give the run of the phase-contrast scan, its segment with --segment, or --period."});
+  return static_cast<int64_t>(whole);
+}
+
+/// Work = sum of p (Q - mean Q) over even times, exact for harmonics; its error from both curves'.
+ValueWithError work_of(const PeriodicCurve& flow, const PeriodicCurve& pressure) {
+  const auto times = static_cast<Eigen::Index>(2 * std::max(flow.coefficients.size(), pressure.coefficients.size()));
+  Eigen::VectorXd by_flow = Eigen::VectorXd::Zero(flow.coefficients.size());
+  Eigen::VectorXd by_pressure = Eigen::VectorXd::Zero(pressure.coefficients.size());
+  const double step_s = flow.period_s / static_cast<double>(times);
+  for (Eigen::Index i = 0; i < times; ++i) {
+    const double t = step_s * static_cast<double>(i);
+    Eigen::VectorXd flow_row = flow.value_row(t);
+    flow_row[0] = 0;
+    const Eigen::VectorXd pressure_row = pressure.value_row(t);
+    by_flow += step_s * pressure.of(pressure_row) * flow_row;
+    by_pressure += step_s * flow.of(flow_row) * pressure_row;
+  }
+  return {flow.of(by_flow), std::hypot(flow.sigma_of(by_flow), pressure.sigma_of(by_pressure))};
+}
+
+}  // namespace
+
+runfile::RecordedRun run_of_tables(const std::filesystem::path& pressure, const std::filesystem::path& trigger) {
+  static constexpr std::array<std::string_view, 2> pressure_columns{"time_s", "cavity_kPa"};
+  static constexpr std::array<std::string_view, 1> trigger_columns{"time_s"};
+  const NumberTable samples = NumberTable::from_file(pressure, pressure_columns);
+  const NumberTable edges = NumberTable::from_file(trigger, trigger_columns);
+  runfile::RecordedRun run;
+  run.file = pressure.string();
+  for (size_t row = 0; row < samples.rows(); ++row) {
+    run.pressure.time_s.push_back(samples.at(row, 0));
+    run.pressure.channels["cavity_kPa"].push_back(samples.at(row, 1));
+    if (row > 0 && !(samples.at(row, 0) > samples.at(row - 1, 0)))
+      samples.fail(row, 0, "does not increase", "Sort the samples by time.");
+  }
+  for (size_t row = 0; row < edges.rows(); ++row) {
+    run.trigger_s.push_back(edges.at(row, 0));
+    if (row > 0 && !(edges.at(row, 0) > edges.at(row - 1, 0)))
+      edges.fail(row, 0, "does not increase", "Sort the triggers by time.");
+  }
+  if (run.trigger_s.size() < 2 || run.pressure.time_s.size() < 2)
+    throw InputError({edges.file(), "",
+                      fmt::format("{} triggers and {} samples are no cycle", run.trigger_s.size(), run.pressure.time_s.size()),
+                      "Give the pressure and the triggers of at least one whole cycle."});
+  std::vector<double> periods;
+  for (size_t i = 1; i < run.trigger_s.size(); ++i)
+    periods.push_back(run.trigger_s[i] - run.trigger_s[i - 1]);
+  runfile::Segment segment;
+  segment.start_s = run.trigger_s.front();
+  segment.waveform = "uploaded";
+  segment.period_s = signal::median(std::move(periods));
+  segment.cycles = static_cast<int64_t>(run.trigger_s.size());
+  run.segments = {segment};
+  return run;
+}
+
+PressureVolumeLoop pressure_volume_loop(const FlowMeasurement& flow, const runfile::RecordedRun& run,
+                                        std::optional<size_t> segment) {
+  runfile::FrameBinOptions how;
+  how.segment = segment;
+  PressureVolumeLoop loop;
+  loop.source = run.file;
+  loop.gate_every = how.gate_every =
+      cycles_in(flow.interval_s(), runfile::binned_interval_s(run, how), run, flow.scan.interval_source);
+  loop.delay_s = how.delay_s = runfile::signal_delay(run, how.channel).total_s();
+  const double interval_s = runfile::binned_interval_s(run, how);
+  const double samples = interval_s / runfile::median_spacing_s(run.pressure.time_s);
+  how.frames = std::clamp<size_t>(static_cast<size_t>(samples / samples_a_window), 8, most_windows);
+  const runfile::FrameBins bins = runfile::bin_frames(run, how);
+  loop.segment = bins.segment;
+  loop.cycles = bins.frames.front().cycles;
+
+  const auto count = static_cast<Eigen::Index>(bins.frames.size());
+  Eigen::VectorXd time(count), mean(count), variance(count);
+  for (Eigen::Index i = 0; i < count; ++i) {
+    const runfile::FrameBin& bin = bins.frames[static_cast<size_t>(i)];
+    time[i] = 0.5 * (bin.window.from_s + bin.window.to_s) * flow.interval_s() / interval_s;
+    mean[i] = bin.mean_kPa;
+    variance[i] = std::pow(sigma_of_mean(bin, resolution_kPa(run)), 2);
+  }
+  // A few cycles' own spread may by chance be nothing.
+  variance = variance.cwiseMax(0.1 * variance.mean() + 1e-12);
+  const PeriodicCurve pressure = periodic_curve(time, mean, variance.asDiagonal(), flow.interval_s());
+  double peak = 0;
+  for (Eigen::Index i = 0; i < count; ++i)
+    peak = std::max(peak, std::abs(flow.flow.of(flow.flow.value_row(time[i]))));
+  for (Eigen::Index i = 0; i < count; ++i) {
+    LoopPoint point;
+    point.phase_s = time[i];
+    const Eigen::VectorXd volume_row = flow.flow.integral_row(time[i]), flow_row = flow.flow.value_row(time[i]);
+    point.volume_mL = {flow.flow.of(volume_row), flow.flow.sigma_of(volume_row)};
+    point.pressure_kPa = {mean[i], std::sqrt(variance[i])};
+    const double rate = flow.flow.of(flow_row);
+    if (std::abs(rate) > least_flow_share * peak) {
+      const Eigen::VectorXd slope_row = pressure.slope_row(time[i]);
+      const double stiffness = pressure.of(slope_row) / rate;
+      point.stiffness_kPa_per_mL = {stiffness, std::hypot(pressure.sigma_of(slope_row) / rate,
+                                                          stiffness * flow.flow.sigma_of(flow_row) / rate)};
+    }
+    loop.points.push_back(point);
+  }
+  loop.work_mJ = work_of(flow.flow, pressure);
+  return loop;
+}
+
+}  // namespace diastole::imaging
