@@ -42,6 +42,8 @@ void require_whole(const TrackingRecord& record) {
   }
 }
 
+constexpr std::string_view letters = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+
 /// To a thousandth of a pixel.
 double thousandth(double value) { return std::round(value * 1e3) / 1e3; }
 
@@ -65,7 +67,6 @@ TrackingRecord tracking_record_from_json(std::string_view text, const std::strin
 }
 
 std::string base64(std::string_view bytes) {
-  constexpr std::string_view letters = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
   std::string text;
   text.reserve(4 * ((bytes.size() + 2) / 3));
   for (size_t at = 0; at < bytes.size(); at += 3) {
@@ -76,6 +77,22 @@ std::string base64(std::string_view bytes) {
       text += at + i > bytes.size() ? '=' : letters[block >> (18 - 6 * i) & 63U];
   }
   return text;
+}
+
+std::string bytes_of_base64(std::string_view text) {
+  std::string bytes;
+  unsigned block = 0;
+  int bits = 0;
+  for (const char letter : text) {
+    const size_t value = letters.find(letter);
+    if (value == std::string_view::npos) break;
+    block = block << 6U | static_cast<unsigned>(value);
+    bits += 6;
+    if (bits < 8) continue;
+    bits -= 8;
+    bytes += static_cast<char>(static_cast<unsigned char>(block >> static_cast<unsigned>(bits) & 255U));
+  }
+  return bytes;
 }
 
 }  // namespace diastole

@@ -65,5 +65,7 @@ TrackingRecord tracking_record_from_json(std::string_view text, const std::strin
 
 /// Base64 (RFC 4648, section 4).
 std::string base64(std::string_view bytes);
+/// And back; what is no such text ends it.
+std::string bytes_of_base64(std::string_view text);
 
 }  // namespace diastole

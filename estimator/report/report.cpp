@@ -6,6 +6,7 @@
 
 #include "estimator/explain/verdict/explanation_json.hpp"
 #include "estimator/io/fit_file.hpp"
+#include "estimator/io/flow_file.hpp"
 #include "estimator/io/reconstruction_file.hpp"
 #include "estimator/io/solution_file.hpp"
 #include "estimator/io/tracking_file.hpp"
@@ -19,7 +20,7 @@
 namespace diastole::report {
 namespace {
 
-enum class Kind { explanation, tracking, fit, table, reconstruction, solution, shear_test, run };
+enum class Kind { explanation, tracking, flow, fit, table, reconstruction, solution, shear_test, run };
 
 bool is_hdf5(std::string_view content) {
   return content.starts_with(std::string_view("\x89HDF\r\n\x1a\n", 8));
@@ -29,6 +30,8 @@ bool is_json_object(const std::string& content) {
   const size_t first = content.find_first_not_of(" \t\r\n");
   return first != std::string::npos && content[first] == '{';
 }
+
+constexpr const char* flow_title = "Flow and volume over the cycle";
 
 std::string title_of(size_t estimates, size_t runs) {
   if (estimates == 0) return runs == 1 ? "A pump session" : "Pump sessions";
@@ -77,6 +80,8 @@ std::string make_report(std::span<const std::filesystem::path> files, size_t fra
       if (parts.contains(Kind::tracking))
         throw InputError({name, "", "is a second record of tracked images", "Give one a page."});
       add(Kind::tracking, tracking_record_from_json(content, name), add_tracking);
+    } else if (is_flow(content)) {
+      add(Kind::flow, flow_record_from_json(content, name), add_flow);
     } else if (is_reconstruction(content)) {
       add(Kind::reconstruction, reconstruction_record_from_json(content, name), add_reconstruction);
     } else {
@@ -90,6 +95,7 @@ std::string make_report(std::span<const std::filesystem::path> files, size_t fra
   Page page(!explanations.empty()                   ? explanation_title(explanations)
             : estimates > 0 || count(Kind::run) > 0 ? title_of(estimates, count(Kind::run))
             : only_images                           ? "Displacement from tagged images"
+            : count(Kind::flow) > 0                 ? flow_title
                                                     : "Strain and stress under load");
   for (const auto& [kind, drawings] : parts) {
     for (const auto& draw : drawings)
@@ -101,6 +107,12 @@ std::string make_report(std::span<const std::filesystem::path> files, size_t fra
 std::string make_report(const TrackingRecord& record) {
   Page page("Tags followed through the cycle");
   add_tracking(page, record);
+  return page.html();
+}
+
+std::string make_report(const FlowRecord& record) {
+  Page page(flow_title);
+  add_flow(page, record);
   return page.html();
 }
 

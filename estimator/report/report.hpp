@@ -8,16 +8,20 @@
 #include <string>
 
 #include "estimator/explain/verdict/explanation.hpp"
+#include "estimator/io/flow_file.hpp"
 #include "estimator/io/tracking_file.hpp"
 
 namespace diastole::report {
 
-/// The page's HTML. Files are recognised by their content; explanations come first, then tracked images, fits,
+/// The page's HTML. Files are recognised by their content; explanations come first, then tracked images, flows, fits,
 /// shear tests, then runs, each in the given order. `frames`: image frames of a cycle. Throws InputError for a file that is missing, unreadable or of no kind that the report knows.
 std::string make_report(std::span<const std::filesystem::path> files, size_t frames = 16);
 
 /// The same page of tracked images at hand.
 std::string make_report(const TrackingRecord& record);
+
+/// The same page of a flow at hand.
+std::string make_report(const FlowRecord& record);
 
 /// The same page of an explanation at hand.
 std::string make_report(const explain::Explanation& explanation);

@@ -3,6 +3,7 @@
 
 #include "estimator/explain/verdict/explanation.hpp"
 #include "estimator/io/fit_file.hpp"
+#include "estimator/io/flow_file.hpp"
 #include "estimator/io/reconstruction_file.hpp"
 #include "estimator/io/solution_file.hpp"
 #include "estimator/io/tracking_file.hpp"
@@ -30,6 +31,9 @@ void add_reconstruction(Page& page, const ReconstructionRecord& record);
 
 /// A cine player of every slice with its lines, what was left out and why, residuals and errors by phase. Once a page.
 void add_tracking(Page& page, const TrackingRecord& record);
+
+/// Flow and volume over the cycle, the pressure-volume loop with its stiffness, the images with the lumen's outline.
+void add_flow(Page& page, const FlowRecord& flow);
 
 /// Each in its severity's dress.
 void add_findings(Page& page, const std::vector<Finding>& findings);

@@ -261,11 +261,10 @@ ImageHeader header_of(DcmItem& dataset, int frame, const SlicePlane& plane, cons
   header.slope = slope != 0 ? slope : 1.0;
   header.intercept =
       items.number_in(DCM_PixelValueTransformationSequence, DCM_RescaleIntercept).value_or(0.0);
-  header.rescale_units =
-      items
-          .find(DCM_PixelValueTransformationSequence,
-                [](DcmItem& item) { return text(item, DCM_RescaleType); })
-          .value_or("");
+  header.rescale_units = items
+                             .find(DCM_PixelValueTransformationSequence,
+                                   [](DcmItem& item) { return text(item, DCM_RescaleType); })
+                             .value_or("");
   return header;
 }
 

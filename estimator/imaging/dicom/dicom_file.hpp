@@ -43,7 +43,7 @@ struct ImageHeader {
   double slope = 1.0;
   double intercept = 0.0;
   std::string rescale_units;  ///< (0028,1054): "cm/s", "US"; empty where it is absent
-  std::string vendor;  ///< "Siemens", "GE", "Philips", "Canon", or "unknown"
+  std::string vendor;         ///< "Siemens", "GE", "Philips", "Canon", or "unknown"
 };
 
 /// What is wrong with a file as a whole, in the words of an InputFault.

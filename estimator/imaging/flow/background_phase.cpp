@@ -22,7 +22,7 @@ Eigen::VectorXd monomials(double x, double y, int order) {
 }
 
 struct StillPixel {
-  double x, y;         // from the lumen, over the scale
+  double x, y;           // from the lumen, over the scale
   double phase, weight;  // the weight is one over the variance of the mean over the cycle
 };
 
@@ -103,11 +103,10 @@ BackgroundPhase background_phase(const MotionMap& map,
       if (!still(row, column)) continue;
       const double signal =
           static_cast<double>(map.mean_magnitude(row, column)) / map.noise.magnitude_times_phase;
-      pixels.push_back(
-          {(static_cast<double>(column) - lumen.x()) / best.scale_px,
-           (static_cast<double>(row) - lumen.y()) / best.scale_px,
-           middle + within_half_turn(static_cast<double>(map.mean_phase(row, column)) - middle),
-           signal * signal * static_cast<double>(map.phases)});
+      pixels.push_back({(static_cast<double>(column) - lumen.x()) / best.scale_px,
+                        (static_cast<double>(row) - lumen.y()) / best.scale_px,
+                        middle + within_half_turn(static_cast<double>(map.mean_phase(row, column)) - middle),
+                        signal * signal * static_cast<double>(map.phases)});
     }
   }
   best.pixels = pixels.size();

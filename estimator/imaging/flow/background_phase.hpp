@@ -9,14 +9,15 @@
 namespace diastole::imaging {
 
 struct BackgroundPhase {
-  int order = 0;                      ///< of the polynomial; -1: there is no still material, and nothing is taken off
-  size_t pixels = 0;                  ///< of still material
-  double reduced_chi_square = 0;      ///< what the polynomial leaves, over the noise
-  double at_lumen_rad = 0;            ///< its value at the origin
-  double sigma_rad = 0;               ///< standard error of that: noise, and what is left over an area as large as the lumen
-  Eigen::Vector2d origin = {0, 0};    ///< of the polynomial, column and row
+  int order = 0;      ///< of the polynomial; -1: there is no still material, and nothing is taken off
+  size_t pixels = 0;  ///< of still material
+  double reduced_chi_square = 0;  ///< what the polynomial leaves, over the noise
+  double at_lumen_rad = 0;        ///< its value at the origin
+  double sigma_rad =
+      0;  ///< standard error of that: noise, and what is left over an area as large as the lumen
+  Eigen::Vector2d origin = {0, 0};  ///< of the polynomial, column and row
   double scale_px = 1;
-  Eigen::VectorXd coefficients;       ///< 1, x, y, x^2, xy, y^2, ... of (place - origin) / scale
+  Eigen::VectorXd coefficients;  ///< 1, x, y, x^2, xy, y^2, ... of (place - origin) / scale
 
   [[nodiscard]] double at(double column, double row) const;
 };

@@ -17,9 +17,9 @@ std::string loop_file_text(const PressureVolumeLoop& loop) {
   for (const LoopPoint& point : loop.points) {
     text += fmt::format("{:.6f},{:.6f},{:.6f},{:.6f},{:.6f},", point.phase_s, point.volume_mL.value,
                         point.volume_mL.sigma, point.pressure_kPa.value, point.pressure_kPa.sigma);
-    text += point.stiffness_kPa_per_mL
-                ? fmt::format("{:.7f},{:.7f}\n", point.stiffness_kPa_per_mL->value, point.stiffness_kPa_per_mL->sigma)
-                : std::string(",\n");
+    text += point.stiffness_kPa_per_mL ? fmt::format("{:.7f},{:.7f}\n", point.stiffness_kPa_per_mL->value,
+                                                     point.stiffness_kPa_per_mL->sigma)
+                                       : std::string(",\n");
   }
   return text;
 }

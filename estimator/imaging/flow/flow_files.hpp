@@ -12,9 +12,11 @@
 
 namespace diastole::imaging {
 
-inline constexpr std::string_view flow_file_mark = "phase_s,flow_mL_s,flow_sigma_mL_s,volume_mL,volume_sigma_mL";
+inline constexpr std::string_view flow_file_mark =
+    "phase_s,flow_mL_s,flow_sigma_mL_s,volume_mL,volume_sigma_mL";
 inline constexpr std::string_view loop_file_mark =
-    "phase_s,volume_mL,volume_sigma_mL,pressure_kPa,pressure_sigma_kPa,stiffness_kPa_per_mL,stiffness_sigma_kPa_per_mL";
+    "phase_s,volume_mL,volume_sigma_mL,pressure_kPa,pressure_sigma_kPa,stiffness_kPa_per_mL,stiffness_sigma_"
+    "kPa_per_mL";
 
 std::string flow_file_text(const FlowMeasurement& flow);
 std::string loop_file_text(const PressureVolumeLoop& loop);

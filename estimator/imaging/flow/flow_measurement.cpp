@@ -31,19 +31,22 @@ Finding finding(Severity severity, std::string id, std::string what, const std::
 const MovingRegion& chosen_region(const std::vector<MovingRegion>& regions, const FlowRequest& request,
                                   const std::string& folder, const std::string& name) {
   if (regions.empty() || (!request.centre_px && regions[0].radius_px < least_radius_px))
-    throw InputError({folder, name,
-                      "no lumen is found: nowhere do pixels with signal change their phase over the cycle",
-                      "Was the pump running, and does the slice cross the tube? If a lumen is to be seen, give "
-                      "its centre with --centre COLUMN,ROW (pixels from 0)."});
+    throw InputError(
+        {folder, name, "no lumen is found: nowhere do pixels with signal change their phase over the cycle",
+         "Was the pump running, and does the slice cross the tube? If a lumen is to be seen, give "
+         "its centre with --centre COLUMN,ROW (pixels from 0)."});
   if (!request.centre_px) return regions[0];
   const auto nearest = std::min_element(regions.begin(), regions.end(), [&](const auto& a, const auto& b) {
-    return (a.centre - *request.centre_px).norm() / a.radius_px < (b.centre - *request.centre_px).norm() / b.radius_px;
+    return (a.centre - *request.centre_px).norm() / a.radius_px <
+           (b.centre - *request.centre_px).norm() / b.radius_px;
   });
-  if ((nearest->centre - *request.centre_px).norm() > nearest->radius_px || nearest->radius_px < least_radius_px)
-    throw InputError({folder, fmt::format("--centre {:g},{:g}", request.centre_px->x(), request.centre_px->y()),
-                      fmt::format("nothing moves there; the nearest lumen of {} is at column {:.0f}, row {:.0f}",
-                                  regions.size(), nearest->centre.x(), nearest->centre.y()),
-                      "Give a place within it."});
+  if ((nearest->centre - *request.centre_px).norm() > nearest->radius_px ||
+      nearest->radius_px < least_radius_px)
+    throw InputError(
+        {folder, fmt::format("--centre {:g},{:g}", request.centre_px->x(), request.centre_px->y()),
+         fmt::format("nothing moves there; the nearest lumen of {} is at column {:.0f}, row {:.0f}",
+                     regions.size(), nearest->centre.x(), nearest->centre.y()),
+         "Give a place within it."});
   return *nearest;
 }
 
@@ -51,7 +54,8 @@ double mean_over_ring(const Image& image, const Eigen::Vector2d& centre, double 
   std::vector<double> values;
   for (Eigen::Index column = 0; column < image.cols(); ++column) {
     for (Eigen::Index row = 0; row < image.rows(); ++row) {
-      const double apart = std::hypot(static_cast<double>(column) - centre.x(), static_cast<double>(row) - centre.y());
+      const double apart =
+          std::hypot(static_cast<double>(column) - centre.x(), static_cast<double>(row) - centre.y());
       if (apart >= from_px && apart < to_px) values.push_back(static_cast<double>(image(row, column)));
     }
   }
@@ -64,7 +68,8 @@ LumenScene first_scene(const SlicePlane& plane, const MotionMap& map, const Movi
                        const std::vector<Eigen::Vector2i>& core) {
   LumenScene scene;
   const double pixel_mm = std::sqrt(plane.column_spacing_mm * plane.row_spacing_mm);
-  scene.shape.centre_mm = {region.centre.x() * plane.column_spacing_mm, region.centre.y() * plane.row_spacing_mm};
+  scene.shape.centre_mm = {region.centre.x() * plane.column_spacing_mm,
+                           region.centre.y() * plane.row_spacing_mm};
   scene.shape.radius_mm = region.radius_px * pixel_mm;
   const Image& mean = map.mean_magnitude;
   const double radius = region.radius_px;
@@ -80,8 +85,8 @@ LumenScene first_scene(const SlicePlane& plane, const MotionMap& map, const Movi
   for (double out = darkest_px; out < darkest_px + reach_px; out += 1)
     beyond = std::max(beyond, mean_over_ring(mean, region.centre, radius + out, radius + out + 2));
   double wall_px = darkest_px;
-  while (wall_px < darkest_px + reach_px &&
-         mean_over_ring(mean, region.centre, radius + wall_px, radius + wall_px + 1) < 0.5 * (darkest + beyond))
+  while (wall_px < darkest_px + reach_px && mean_over_ring(mean, region.centre, radius + wall_px,
+                                                           radius + wall_px + 1) < 0.5 * (darkest + beyond))
     wall_px += 0.5;
   const bool is_dark_outside = beyond < 4 * map.noise.magnitude_times_phase;
   scene.shape.wall_mm = pixel_mm * (is_dark_outside ? 3.0 : std::max(0.0, wall_px));
@@ -95,7 +100,8 @@ LumenScene first_scene(const SlicePlane& plane, const MotionMap& map, const Movi
     rows.row(k) << 1, std::abs(phi), phi * phi;
     bright[k] = 0;
     for (const Eigen::Vector2i& at : core)
-      bright[k] += static_cast<double>(magnitude[static_cast<size_t>(k)](at.y(), at.x())) / static_cast<double>(core.size());
+      bright[k] += static_cast<double>(magnitude[static_cast<size_t>(k)](at.y(), at.x())) /
+                   static_cast<double>(core.size());
   }
   // Ridged by a tenth of the brightness at a radian: few phases, or all of one speed, do not tell three numbers.
   Eigen::Matrix3d normal = rows.transpose() * rows;
@@ -110,25 +116,28 @@ std::vector<Image> without_background(const PhaseContrast& scan, const Backgroun
     for (Eigen::Index row = 0; row < phases[0].rows(); ++row) {
       const double phase = background.at(static_cast<double>(column), static_cast<double>(row));
       for (Image& image : phases)
-        image(row, column) = static_cast<float>(within_half_turn(static_cast<double>(image(row, column)) - phase));
+        image(row, column) =
+            static_cast<float>(within_half_turn(static_cast<double>(image(row, column)) - phase));
     }
   }
   return phases;
 }
 
-void require_turns_told(const FlowMeasurement& flow, const UnwrappedCycle& cycle, const std::vector<double>& gap,
-                        const std::string& folder) {
+void require_turns_told(const FlowMeasurement& flow, const UnwrappedCycle& cycle,
+                        const std::vector<double>& gap, const std::string& folder) {
   constexpr double half_turn = std::numbers::pi;
   const size_t count = cycle.phase_rad.size();
   for (size_t k = 0; k < count; ++k) {
-    const double before = std::abs(cycle.phase_rad[k] - cycle.phase_rad[(k + count - 1) % count]) / gap[(k + count - 1) % count];
+    const double before = std::abs(cycle.phase_rad[k] - cycle.phase_rad[(k + count - 1) % count]) /
+                          gap[(k + count - 1) % count];
     const double after = std::abs(cycle.phase_rad[(k + 1) % count] - cycle.phase_rad[k]) / gap[k];
     if (std::max(before, after) < sure_step * half_turn || flow.lumen.turn_margin[k] > sure_margin) continue;
     throw InputError(
         {folder, fmt::format("{}, phase at {:.0f} ms", flow.scan.name, 1e3 * flow.scan.time_s[k]),
-         fmt::format("the velocity changes by {:.0f} cm/s from phase to phase at a venc of {:.4g} cm/s: its whole "
-                     "turns cannot be told, neither by time nor by the profile across the lumen",
-                     std::max(before, after) * flow.scan.cm_s_per_radian(), flow.scan.venc_cm_s),
+         fmt::format(
+             "the velocity changes by {:.0f} cm/s from phase to phase at a venc of {:.4g} cm/s: its whole "
+             "turns cannot be told, neither by time nor by the profile across the lumen",
+             std::max(before, after) * flow.scan.cm_s_per_radian(), flow.scan.venc_cm_s),
          "Image with a larger venc or more phases."});
   }
 }
@@ -149,7 +158,8 @@ std::vector<double> gaps_of(const PhaseContrast& scan) {
 /// Volumes of the whole interval on even times; their extremes are the stroke.
 void join_cycle(FlowMeasurement& flow, const FlowRequest& request) {
   const PhaseContrast& scan = flow.scan;
-  const Eigen::VectorXd time = Eigen::Map<const Eigen::VectorXd>(scan.time_s.data(), static_cast<Eigen::Index>(scan.phases()));
+  const Eigen::VectorXd time =
+      Eigen::Map<const Eigen::VectorXd>(scan.time_s.data(), static_cast<Eigen::Index>(scan.phases()));
   flow.flow = periodic_curve(time, flow.lumen.flow_mL_s, flow.lumen.covariance, scan.interval_s);
   const Eigen::VectorXd whole = flow.flow.integral_row(scan.interval_s);
   flow.closure_mL = {flow.flow.of(whole), flow.flow.sigma_of(whole)};
@@ -169,11 +179,21 @@ void join_cycle(FlowMeasurement& flow, const FlowRequest& request) {
       highest_s = t;
     }
   }
-  flow.stroke_mL = {highest - lowest,
-                    flow.flow.sigma_of(flow.flow.integral_row(highest_s) - flow.flow.integral_row(lowest_s))};
+  flow.least_s = lowest_s;
+  flow.stroke_mL = flow.volume_at(highest_s);
 }
 
 }  // namespace
+
+ValueWithError FlowMeasurement::flow_at(double time_s) const {
+  const Eigen::VectorXd row = flow.value_row(time_s);
+  return {flow.of(row), flow.sigma_of(row)};
+}
+
+ValueWithError FlowMeasurement::volume_at(double time_s) const {
+  const Eigen::VectorXd row = flow.integral_row(time_s) - flow.integral_row(least_s);
+  return {flow.of(row), flow.sigma_of(row)};
+}
 
 FlowMeasurement measure_flow(PhaseContrast scan, const FlowRequest& request, const std::string& folder) {
   FlowMeasurement flow;
@@ -187,39 +207,47 @@ FlowMeasurement measure_flow(PhaseContrast scan, const FlowRequest& request, con
     flow.findings.push_back(finding(
         Severity::warning, "other-lumen",
         fmt::format("fluid moves also around column {:.0f}, row {:.0f}", other.centre.x(), other.centre.y()),
-        flow.scan.name, other.radius_px, "px", "If that is the tube, give --centre with this column and row."));
+        flow.scan.name, other.radius_px, "px",
+        "If that is the tube, give --centre with this column and row."));
   }
 
   flow.background.order = -1;
   if (request.remove_background)
-    flow.background = background_phase(map, still_pixels(map, regions, clear_px), region.centre, region.radius_px);
+    flow.background =
+        background_phase(map, still_pixels(map, regions, clear_px), region.centre, region.radius_px);
   if (flow.background.order < 0)
-    flow.findings.push_back(finding(
-        Severity::warning, "background-unknown",
-        request.remove_background ? "there is no still material around the lumen: the background phase is not known"
-                                  : "the background phase was left, as asked for",
-        flow.scan.name, static_cast<double>(flow.background.pixels), "pixels",
-        "A block of still gel around the tube shows the background; --close takes off what a cycle does not return."));
+    flow.findings.push_back(
+        finding(Severity::warning, "background-unknown",
+                request.remove_background
+                    ? "there is no still material around the lumen: the background phase is not known"
+                    : "the background phase was left, as asked for",
+                flow.scan.name, static_cast<double>(flow.background.pixels), "pixels",
+                "A block of still gel around the tube shows the background; --close takes off what a cycle "
+                "does not return."));
 
   LumenData data{plane, flow.scan.magnitude, without_background(flow.scan, flow.background), map.noise,
                  flow.scan.cm_s_per_radian()};
   std::vector<Eigen::Vector2i> core;
   for (const Eigen::Vector2i& at : region.pixels)
-    if ((at.cast<double>() - region.centre).norm() < std::max(1.5, 0.6 * region.radius_px)) core.push_back(at);
+    if ((at.cast<double>() - region.centre).norm() < std::max(1.5, 0.6 * region.radius_px))
+      core.push_back(at);
   std::vector<double> core_phase;
   for (size_t k = 0; k < flow.scan.phases(); ++k) {
     std::complex<double> sum = 0;
     for (const Eigen::Vector2i& at : core)
-      sum += std::polar(static_cast<double>(data.magnitude[k](at.y(), at.x())), static_cast<double>(data.phase_rad[k](at.y(), at.x())));
+      sum += std::polar(static_cast<double>(data.magnitude[k](at.y(), at.x())),
+                        static_cast<double>(data.phase_rad[k](at.y(), at.x())));
     core_phase.push_back(std::arg(sum));
   }
   const std::vector<double> gap = gaps_of(flow.scan);
   const UnwrappedCycle cycle = unwrapped(core_phase, gap);
-  flow.lumen = fit_lumen(data, first_scene(plane, map, region, data.magnitude, cycle.phase_rad, core), cycle.phase_rad);
+  flow.lumen = fit_lumen(data, first_scene(plane, map, region, data.magnitude, cycle.phase_rad, core),
+                         cycle.phase_rad);
   require_turns_told(flow, cycle, gap, folder);
 
   // An error of the background is the same in all phases.
-  const double background_mL_s = flow.background.sigma_rad * flow.scan.cm_s_per_radian() * 0.01 * flow.lumen.area_mm2;
+  const double background_mL_s =
+      flow.background.sigma_rad * flow.scan.cm_s_per_radian() * 0.01 * flow.lumen.area_mm2;
   flow.lumen.covariance.array() += background_mL_s * background_mL_s;
   join_cycle(flow, request);
   for (size_t k = 0; k < flow.scan.phases(); ++k) {
@@ -227,14 +255,11 @@ FlowMeasurement measure_flow(PhaseContrast scan, const FlowRequest& request, con
     phase.phase_s = flow.scan.time_s[k];
     const auto at = static_cast<Eigen::Index>(k);
     phase.flow_mL_s = {flow.lumen.flow_mL_s[at], std::sqrt(flow.lumen.covariance(at, at))};
-    if (request.close) {
-      const Eigen::VectorXd row = flow.flow.value_row(phase.phase_s);
-      phase.flow_mL_s = {flow.flow.of(row), flow.flow.sigma_of(row)};
-    }
-    const Eigen::VectorXd row = flow.flow.integral_row(phase.phase_s);
-    phase.volume_mL = {flow.flow.of(row), flow.flow.sigma_of(row)};
+    if (request.close) phase.flow_mL_s = flow.flow_at(phase.phase_s);
+    phase.volume_mL = flow.volume_at(phase.phase_s);
     phase.core_cm_s = flow.lumen.core_cm_s[k];
-    phase.turns = static_cast<int>(std::lround((phase.core_cm_s / flow.scan.cm_s_per_radian() - core_phase[k]) / (2 * std::numbers::pi)));
+    phase.turns = static_cast<int>(std::lround(
+        (phase.core_cm_s / flow.scan.cm_s_per_radian() - core_phase[k]) / (2 * std::numbers::pi)));
     flow.unwrapped += phase.turns != 0 ? 1U : 0U;
     flow.phases.push_back(phase);
   }

@@ -13,9 +13,10 @@
 namespace diastole::imaging {
 
 struct FlowRequest {
-  std::optional<Eigen::Vector2d> centre_px = {};  ///< column and row of a lumen, where the largest is not the one
+  std::optional<Eigen::Vector2d> centre_px =
+      {};  ///< column and row of a lumen, where the largest is not the one
   bool remove_background = true;
-  bool close = false;                             ///< correct the flow so that the cycle returns
+  bool close = false;  ///< correct the flow so that the cycle returns
 };
 
 struct ValueWithError {
@@ -24,7 +25,7 @@ struct ValueWithError {
 
 struct PhaseFlow {
   double phase_s = 0;
-  ValueWithError flow_mL_s, volume_mL;  ///< volume since the trigger
+  ValueWithError flow_mL_s, volume_mL;  ///< volume above the cycle's least
   double core_cm_s = 0;                 ///< of the fastest fluid
   int turns = 0;                        ///< put back to it
 };
@@ -34,14 +35,18 @@ struct FlowMeasurement {
   LumenFit lumen;
   BackgroundPhase background;
   std::vector<PhaseFlow> phases;
-  PeriodicCurve flow;      ///< mL/s over the interval
+  PeriodicCurve flow;  ///< mL/s over the interval
+  double least_s = 0;  ///< when the volume is least
   ValueWithError stroke_mL;
   ValueWithError closure_mL;  ///< what a cycle does not return, before any correction
   bool is_closed = false;
-  size_t unwrapped = 0;       ///< phases to which turns were put back
+  size_t unwrapped = 0;  ///< phases to which turns were put back
   std::vector<Finding> findings;
 
   [[nodiscard]] double interval_s() const { return scan.interval_s; }
+  [[nodiscard]] ValueWithError flow_at(double time_s) const;
+  /// Above the least.
+  [[nodiscard]] ValueWithError volume_at(double time_s) const;
 };
 
 /// Throws InputError with a remedy if no lumen is found or its turns cannot be told.

@@ -26,8 +26,8 @@ constexpr double turn = 2 * std::numbers::pi;
 Eigen::VectorXd difference_steps(const LumenScene& scene, double pixel_mm) {
   Eigen::VectorXd steps(LumenScene::size);
   const double bright = std::max(scene.brightness.fluid[0], scene.brightness.still);
-  steps << 0.03 * pixel_mm, 0.03 * pixel_mm, 0.03 * pixel_mm, 0.003, 0.003, 0.03 * pixel_mm, 0.01 * bright, 1e-4,
-      1e-4, 0.01 * bright, 0.01 * bright, 0.01 * bright;
+  steps << 0.03 * pixel_mm, 0.03 * pixel_mm, 0.03 * pixel_mm, 0.003, 0.003, 0.03 * pixel_mm, 0.01 * bright,
+      1e-4, 1e-4, 0.01 * bright, 0.01 * bright, 0.01 * bright;
   return steps;
 }
 
@@ -35,8 +35,8 @@ Eigen::VectorXd difference_steps(const LumenScene& scene, double pixel_mm) {
 Eigen::VectorXd prior_sd(const LumenScene& scene, double pixel_mm) {
   Eigen::VectorXd sd(LumenScene::size);
   const double bright = std::max(scene.brightness.fluid[0], scene.brightness.still);
-  sd << 10 * pixel_mm, 10 * pixel_mm, 10 * pixel_mm, 0.3, 0.3, 5 * pixel_mm, bright, 0.02, 0.02, bright, bright,
-      bright;
+  sd << 10 * pixel_mm, 10 * pixel_mm, 10 * pixel_mm, 0.3, 0.3, 5 * pixel_mm, bright, 0.02, 0.02, bright,
+      bright, bright;
   return sd;
 }
 
@@ -70,9 +70,8 @@ class Fitter {
   void start_profiles(const std::vector<double>& core_rad) {
     profiles_.resize(phases());
     const LumenGrid grid = model_.grid(scene_.shape);
-    parallel_for(phases(), machine_threads(), [&](size_t k) {
-      profiles_[k] = settled_profile(k, core_rad[k], grid, shapes_[k]).first;
-    });
+    parallel_for(phases(), machine_threads(),
+                 [&](size_t k) { profiles_[k] = settled_profile(k, core_rad[k], grid, shapes_[k]).first; });
   }
 
   /// Gauss-Newton over everything.
@@ -110,7 +109,8 @@ class Fitter {
     double pull = 0, freedom = 0;
     for (size_t k = 0; k < phases(); ++k) {
       const Eigen::MatrixXd solved = normals_[k].own.ldlt().solve(normals_[k].between);
-      const Eigen::MatrixXd left = (normals_[k].scene - normals_[k].between.transpose() * solved).topLeftCorner(3, 3);
+      const Eigen::MatrixXd left =
+          (normals_[k].scene - normals_[k].between.transpose() * solved).topLeftCorner(3, 3);
       const Eigen::VectorXd right =
           (normals_[k].scene_right - solved.transpose() * normals_[k].own_right).head(3);
       pull += right.dot(left.ldlt().solve(right));
@@ -132,7 +132,8 @@ class Fitter {
       if (std::abs(core) < sure_rad) return;
       const LumenGrid grid = model_.grid(shapes_[k]);
       const double own = compared(k, grid, profiles_[k], nullptr).second;
-      const auto [profile, chi_square] = settled_profile(k, core - std::copysign(turn, core), grid, shapes_[k]);
+      const auto [profile, chi_square] =
+          settled_profile(k, core - std::copysign(turn, core), grid, shapes_[k]);
       margin[k] = (chi_square - own) / reduced;
       if (chi_square < own) better[k] = profile;
     });
@@ -172,7 +173,9 @@ class Fitter {
       if (k == 0 || moves_) {
         integrals_by_shape.clear();
         for (Eigen::Index i = 0; i < LumenScene::shape_size; ++i)
-          integrals_by_shape.push_back((model_.integrals_mm2(model_.grid(shifted_shape(shapes_[k], i, steps[i]))) - integrals) / steps[i]);
+          integrals_by_shape.push_back(
+              (model_.integrals_mm2(model_.grid(shifted_shape(shapes_[k], i, steps[i]))) - integrals) /
+              steps[i]);
       }
       Eigen::VectorXd direct = Eigen::VectorXd::Zero(LumenScene::size);
       for (Eigen::Index i = 0; i < LumenScene::shape_size; ++i)
@@ -210,7 +213,8 @@ class Fitter {
     return std::max(1.0, used_ - static_cast<double>(phases()) * static_cast<double>(model_.profile_size()));
   }
   [[nodiscard]] Eigen::ArrayXXd window(const Image& image) const {
-    return image.block(model_.first_row(), model_.first_column(), model_.rows(), model_.columns()).cast<double>();
+    return image.block(model_.first_row(), model_.first_column(), model_.rows(), model_.columns())
+        .cast<double>();
   }
   [[nodiscard]] double core_rad(size_t k) const { return profiles_[k][model_.profile_size() - 3]; }
 
@@ -239,11 +243,13 @@ class Fitter {
     return {left, left.squaredNorm()};
   }
   /// A derivative of phases and magnitudes, weighted as residuals are.
-  [[nodiscard]] Eigen::VectorXd weighted(size_t k, const Eigen::ArrayXXd& phase, const Eigen::ArrayXXd& magnitude) const {
+  [[nodiscard]] Eigen::VectorXd weighted(size_t k, const Eigen::ArrayXXd& phase,
+                                         const Eigen::ArrayXXd& magnitude) const {
     const Eigen::Index pixels = counts_.size();
     Eigen::VectorXd column(2 * pixels);
     for (Eigen::Index i = 0; i < pixels; ++i) {
-      column[i] = counts_.data()[i] * magnitude_[k].data()[i] / data_.noise.magnitude_times_phase * phase.data()[i];
+      column[i] =
+          counts_.data()[i] * magnitude_[k].data()[i] / data_.noise.magnitude_times_phase * phase.data()[i];
       column[pixels + i] = counts_.data()[i] / data_.noise.magnitude * magnitude.data()[i];
     }
     return column;
@@ -255,10 +261,13 @@ class Fitter {
     return columns;
   }
   /// Keeps knots that no pixel sees from running away.
-  static void hold(Eigen::MatrixXd& normal) { normal.diagonal().array() += 1e-6 * normal.trace() / static_cast<double>(normal.rows()); }
+  static void hold(Eigen::MatrixXd& normal) {
+    normal.diagonal().array() += 1e-6 * normal.trace() / static_cast<double>(normal.rows());
+  }
 
   /// The profile alone, from a plug of that velocity, with the scene as it is.
-  [[nodiscard]] std::pair<Eigen::VectorXd, double> settled_profile(size_t k, double core, const LumenGrid& grid,
+  [[nodiscard]] std::pair<Eigen::VectorXd, double> settled_profile(size_t k, double core,
+                                                                   const LumenGrid& grid,
                                                                    const LumenShape&) const {
     Eigen::VectorXd profile = Eigen::VectorXd::Constant(model_.profile_size(), core);
     profile.tail(2).setZero();
@@ -303,7 +312,8 @@ class Fitter {
       chi_square_ += normal.chi_square;
     return chi_square_;
   }
-  [[nodiscard]] std::vector<LumenGrid> grids_around(const LumenShape& shape, const Eigen::VectorXd& steps) const {
+  [[nodiscard]] std::vector<LumenGrid> grids_around(const LumenShape& shape,
+                                                    const Eigen::VectorXd& steps) const {
     std::vector<LumenGrid> grids{model_.grid(shape)};
     for (Eigen::Index i = 0; i < LumenScene::shape_size; ++i)
       grids.push_back(model_.grid(shifted_shape(shape, i, steps[i])));
@@ -321,9 +331,10 @@ class Fitter {
       vector[i] += steps[i];
       const LumenImage there = model_.image(is_shape ? grids[static_cast<size_t>(i) + 1] : grids[0],
                                             LumenScene::from(vector).brightness, encoding_, profiles_[k]);
-      scene.col(i) = weighted(
-          k, (there.phase_rad - image.phase_rad).unaryExpr([](double x) { return within_half_turn(x); }) / steps[i],
-          (there.magnitude - image.magnitude) / steps[i]);
+      scene.col(i) = weighted(k, (there.phase_rad - image.phase_rad).unaryExpr([](double x) {
+        return within_half_turn(x);
+      }) / steps[i],
+                              (there.magnitude - image.magnitude) / steps[i]);
     }
     Eigen::MatrixXd own = profile_columns(k, slopes);
     if (moves_) {
@@ -358,7 +369,8 @@ class Fitter {
       own.push_back(phase.own.ldlt().solve(phase.own_right - phase.between * step));
     return {step, own};
   }
-  void advance(const Eigen::VectorXd& scene_step, const std::vector<Eigen::VectorXd>& own_steps, double share) {
+  void advance(const Eigen::VectorXd& scene_step, const std::vector<Eigen::VectorXd>& own_steps,
+               double share) {
     Eigen::VectorXd vector = scene_.vector() + share * scene_step;
     vector[5] = std::max(0.0, vector[5]);
     vector[2] = std::max(pixel_mm_, vector[2]);

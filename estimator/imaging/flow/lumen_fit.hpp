@@ -30,11 +30,11 @@ struct LumenFit {
   std::vector<Eigen::VectorXd> profiles;  ///< of each phase, radians
   std::vector<LumenShape> shapes;         ///< of each phase: one and the same unless it moves
   bool moves = false;
-  double movement_mm = 0;                 ///< of the centre over the cycle, RMS
+  double movement_mm = 0;  ///< of the centre over the cycle, RMS
   double area_mm2 = 0;
-  std::vector<double> core_cm_s;          ///< the fastest of each phase's profile
+  std::vector<double> core_cm_s;  ///< the fastest of each phase's profile
   Eigen::VectorXd flow_mL_s;
-  Eigen::MatrixXd covariance;             ///< of the flow: noise and what the scene is uncertain by
+  Eigen::MatrixXd covariance;  ///< of the flow: noise and what the scene is uncertain by
   /// Chi-square of the best fit with a turn more or less of the core over this one's, in units of its own; small where the images do not tell the turn.
   std::vector<double> turn_margin;
 };

@@ -25,7 +25,9 @@ class ProfileSpline {
     at_.insert(at_.begin(), 0.0);
     const auto n = static_cast<Eigen::Index>(at_.size());
     Eigen::MatrixXd bend = Eigen::MatrixXd::Zero(n, n), slope = Eigen::MatrixXd::Zero(n, n);
-    const auto step = [&](Eigen::Index i) { return at_[static_cast<size_t>(i) + 1] - at_[static_cast<size_t>(i)]; };
+    const auto step = [&](Eigen::Index i) {
+      return at_[static_cast<size_t>(i) + 1] - at_[static_cast<size_t>(i)];
+    };
     bend(0, 0) = 1;
     for (Eigen::Index i = 1; i + 1 < n; ++i) {
       bend(i, i - 1) = step(i - 1);
@@ -50,8 +52,9 @@ class ProfileSpline {
     const double a = (at_[static_cast<size_t>(i) + 1] - depth) / h;
     const double b = 1 - a;
     for (Eigen::Index j = 0; j < result.size(); ++j)
-      result[j] = static_cast<float>((j + 1 == i ? a : 0.0) + (j == i ? b : 0.0) +
-                                     ((a * a * a - a) * second_(i, j + 1) + (b * b * b - b) * second_(i + 1, j + 1)) * h * h / 6);
+      result[j] = static_cast<float>(
+          (j + 1 == i ? a : 0.0) + (j == i ? b : 0.0) +
+          ((a * a * a - a) * second_(i, j + 1) + (b * b * b - b) * second_(i + 1, j + 1)) * h * h / 6);
   }
 
  private:
@@ -71,8 +74,8 @@ double LumenShape::edge_mm(double angle) const {
 
 Eigen::VectorXd LumenScene::vector() const {
   Eigen::VectorXd all(size);
-  all << shape.centre_mm, shape.radius_mm, shape.ellipse_cos, shape.ellipse_sin, shape.wall_mm, brightness.still,
-      brightness.slope_per_mm, brightness.fluid;
+  all << shape.centre_mm, shape.radius_mm, shape.ellipse_cos, shape.ellipse_sin, shape.wall_mm,
+      brightness.still, brightness.slope_per_mm, brightness.fluid;
   return all;
 }
 
@@ -85,7 +88,8 @@ std::vector<double> profile_knots_mm(double radius_mm, double pixel_mm) {
   // Half pixels at the edge, where the velocity rises over a pixel or two, then ever wider.
   std::vector<double> knots;
   const double last = 0.9 * radius_mm;
-  for (double depth_px = 0.5, step = 0.5; depth_px * pixel_mm < last - 0.5 * step * pixel_mm; depth_px += step) {
+  for (double depth_px = 0.5, step = 0.5; depth_px * pixel_mm < last - 0.5 * step * pixel_mm;
+       depth_px += step) {
     knots.push_back(depth_px * pixel_mm);
     if (depth_px > 1.2) step *= 1.4;
   }
@@ -98,8 +102,8 @@ LumenModel::LumenModel(const SlicePlane& plane, const LumenShape& about)
       knots_mm_(profile_knots_mm(about.radius_mm, plane.finer_spacing_mm())),
       middle_mm_(about.centre_mm) {
   const double stretch = 1 + std::hypot(about.ellipse_cos, about.ellipse_sin);
-  const auto prepare = [&](double centre_mm, double spacing_mm, int count, int& first, Eigen::VectorXd& fine_mm,
-                           Eigen::MatrixXf& kernel) {
+  const auto prepare = [&](double centre_mm, double spacing_mm, int count, int& first,
+                           Eigen::VectorXd& fine_mm, Eigen::MatrixXf& kernel) {
     const double reach_mm = about.radius_mm * stretch + margin_px * spacing_mm;
     first = std::max(0, static_cast<int>(std::floor((centre_mm - reach_mm) / spacing_mm)));
     const int last = std::min(count - 1, static_cast<int>(std::ceil((centre_mm + reach_mm) / spacing_mm)));
@@ -129,11 +133,13 @@ LumenGrid LumenModel::grid(const LumenShape& shape) const {
   Eigen::VectorXf values(knots);
   for (Eigen::Index column = 0; column < columns; ++column) {
     for (Eigen::Index row = 0; row < rows; ++row) {
-      const Eigen::Vector2d from(fine_x_mm_[column] - shape.centre_mm.x(), fine_y_mm_[row] - shape.centre_mm.y());
+      const Eigen::Vector2d from(fine_x_mm_[column] - shape.centre_mm.x(),
+                                 fine_y_mm_[row] - shape.centre_mm.y());
       const double radius = from.norm(), angle = std::atan2(from.y(), from.x());
       const double edge = shape.edge_mm(angle);
       // The edge's slant against the circle shortens the way to it.
-      const double slant = 2 * (-shape.ellipse_cos * std::sin(2 * angle) + shape.ellipse_sin * std::cos(2 * angle));
+      const double slant =
+          2 * (-shape.ellipse_cos * std::sin(2 * angle) + shape.ellipse_sin * std::cos(2 * angle));
       const double depth = (edge - radius) / std::sqrt(1 + slant * slant);
       const double inside = std::clamp(depth / cell_mm + 0.5, 0.0, 1.0);
       grid.outside(row, column) =
@@ -182,7 +188,8 @@ LumenImage LumenModel::image(const LumenGrid& grid, const Brightness& brightness
   const Eigen::MatrixXf fixed = encoding == Encoding::separate ? level(rho + rest) : Eigen::MatrixXf();
   LumenImage image{Eigen::ArrayXXd(rows(), columns()), Eigen::ArrayXXd(rows(), columns())};
   const auto complex_at = [&](const Signal& signal, Eigen::Index i) {
-    return std::complex<double>(static_cast<double>(signal.real.data()[i]), static_cast<double>(signal.imaginary.data()[i]));
+    return std::complex<double>(static_cast<double>(signal.real.data()[i]),
+                                static_cast<double>(signal.imaginary.data()[i]));
   };
   for (Eigen::Index column = 0; column < columns(); ++column) {
     for (Eigen::Index row = 0; row < rows(); ++row) {
@@ -204,13 +211,15 @@ LumenImage LumenModel::image(const LumenGrid& grid, const Brightness& brightness
   const Eigen::ArrayXXf real_slope = rho_slope * cosine - share * rho * sine;
   const Eigen::ArrayXXf imaginary_slope = rho_slope * sine + share * rho * cosine;
   for (const Eigen::MatrixXf& function : grid.basis) {
-    const Signal change{seen((real_slope * function.array()).matrix()), seen((imaginary_slope * function.array()).matrix())};
+    const Signal change{seen((real_slope * function.array()).matrix()),
+                        seen((imaginary_slope * function.array()).matrix())};
     const Eigen::MatrixXf fixed_change =
         encoding == Encoding::separate ? seen((rho_slope * function.array()).matrix()) : Eigen::MatrixXf();
     LumenImage slope{Eigen::ArrayXXd(rows(), columns()), Eigen::ArrayXXd(rows(), columns())};
     for (Eigen::Index i = 0; i < slope.phase_rad.size(); ++i) {
       const std::complex<double> z = complex_at(moved, i);
-      const std::complex<double> turned = std::conj(z) * complex_at(change, i) / std::max(std::norm(z), 1e-12);
+      const std::complex<double> turned =
+          std::conj(z) * complex_at(change, i) / std::max(std::norm(z), 1e-12);
       const double shade = shading(brightness, i % rows(), i / rows());
       if (encoding == Encoding::separate) {
         const double sign = fixed.data()[i] < 0.0F ? -1.0 : 1.0;

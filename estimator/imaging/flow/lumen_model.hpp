@@ -30,8 +30,8 @@ struct LumenShape {
 
 struct Brightness {
   double still = 0;
-  Eigen::Vector2d slope_per_mm = {0, 0};         ///< of the coils' shading, relative
-  Eigen::Vector3d fluid = {0, 0, 0};             ///< a, b, c
+  Eigen::Vector2d slope_per_mm = {0, 0};  ///< of the coils' shading, relative
+  Eigen::Vector3d fluid = {0, 0, 0};      ///< a, b, c
 };
 
 enum class Encoding { separate, balanced };
@@ -77,7 +77,8 @@ class LumenModel {
   [[nodiscard]] LumenGrid grid(const LumenShape& shape) const;
   /// Its derivatives by the profile's coefficients are appended if `slopes` is given.
   [[nodiscard]] LumenImage image(const LumenGrid& grid, const Brightness& brightness, Encoding encoding,
-                                 const Eigen::VectorXd& profile, std::vector<LumenImage>* slopes = nullptr) const;
+                                 const Eigen::VectorXd& profile,
+                                 std::vector<LumenImage>* slopes = nullptr) const;
   /// Integral of each profile function over the lumen, mm^2.
   [[nodiscard]] Eigen::VectorXd integrals_mm2(const LumenGrid& grid) const;
   [[nodiscard]] double area_mm2(const LumenGrid& grid) const;

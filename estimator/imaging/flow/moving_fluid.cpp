@@ -90,8 +90,7 @@ std::vector<MovingRegion> moving_regions(const MotionMap& map) {
   const Eigen::Index rows = map.activity.rows(), columns = map.activity.cols();
   Eigen::Array<bool, Eigen::Dynamic, Eigen::Dynamic> open(rows, columns);
   for (Eigen::Index i = 0; i < map.activity.size(); ++i)
-    open.data()[i] =
-        map.has_signal(i) && static_cast<double>(map.activity.data()[i]) > map.moving_from();
+    open.data()[i] = map.has_signal(i) && static_cast<double>(map.activity.data()[i]) > map.moving_from();
   std::vector<MovingRegion> regions;
   for (Eigen::Index column = 0; column < columns; ++column) {
     for (Eigen::Index row = 0; row < rows; ++row) {
@@ -105,8 +104,8 @@ std::vector<MovingRegion> moving_regions(const MotionMap& map) {
         waiting.pop_back();
         region.pixels.push_back(at);
         sum += at.cast<double>();
-        for (const Eigen::Vector2i& way : {Eigen::Vector2i(1, 0), Eigen::Vector2i(-1, 0),
-                                           Eigen::Vector2i(0, 1), Eigen::Vector2i(0, -1)}) {
+        for (const Eigen::Vector2i& way :
+             {Eigen::Vector2i(1, 0), Eigen::Vector2i(-1, 0), Eigen::Vector2i(0, 1), Eigen::Vector2i(0, -1)}) {
           const Eigen::Vector2i next = at + way;
           if (next.x() < 0 || next.y() < 0 || next.x() >= columns || next.y() >= rows) continue;
           if (!open(next.y(), next.x())) continue;
@@ -132,19 +131,21 @@ Eigen::Array<bool, Eigen::Dynamic, Eigen::Dynamic> still_pixels(const MotionMap&
   const Eigen::Index rows = map.activity.rows(), columns = map.activity.cols();
   Eigen::Array<bool, Eigen::Dynamic, Eigen::Dynamic> still(rows, columns);
   for (Eigen::Index i = 0; i < map.activity.size(); ++i)
-    still.data()[i] =
-        map.has_signal(i) && static_cast<double>(map.activity.data()[i]) < map.still_below();
+    still.data()[i] = map.has_signal(i) && static_cast<double>(map.activity.data()[i]) < map.still_below();
   // Where a neighbour has no signal the pixel is an edge, which rings.
   const auto bright = still;
   for (Eigen::Index column = 0; column < columns; ++column)
     for (Eigen::Index row = 0; row < rows; ++row)
-      for (Eigen::Index c = std::max<Eigen::Index>(0, column - 1); c <= std::min(columns - 1, column + 1); ++c)
+      for (Eigen::Index c = std::max<Eigen::Index>(0, column - 1); c <= std::min(columns - 1, column + 1);
+           ++c)
         for (Eigen::Index r = std::max<Eigen::Index>(0, row - 1); r <= std::min(rows - 1, row + 1); ++r)
           still(row, column) = still(row, column) && (bright(r, c) || map.has_signal(r + c * rows));
   for (const MovingRegion& region : regions) {
     for (const Eigen::Vector2i& at : region.pixels) {
-      for (Eigen::Index c = std::max(0, at.x() - clear_px); c <= std::min<Eigen::Index>(columns - 1, at.x() + clear_px); ++c)
-        for (Eigen::Index r = std::max(0, at.y() - clear_px); r <= std::min<Eigen::Index>(rows - 1, at.y() + clear_px); ++r)
+      for (Eigen::Index c = std::max(0, at.x() - clear_px);
+           c <= std::min<Eigen::Index>(columns - 1, at.x() + clear_px); ++c)
+        for (Eigen::Index r = std::max(0, at.y() - clear_px);
+             r <= std::min<Eigen::Index>(rows - 1, at.y() + clear_px); ++r)
           still(r, c) = false;
     }
   }

@@ -19,7 +19,7 @@ struct MotionMap {
   PhaseNoise noise;
   Image mean_magnitude;
   Image mean_phase;  ///< weighted by the magnitude
-  Image activity;    ///< mean square of magnitude x (phase - mean phase) over its noise; 1 where nothing moves
+  Image activity;  ///< mean square of magnitude x (phase - mean phase) over its noise; 1 where nothing moves
   size_t phases = 0;
 
   [[nodiscard]] bool has_signal(Eigen::Index pixel) const;

@@ -44,8 +44,8 @@ struct Regression {
   Eigen::MatrixXd covariance;
 };
 
-Regression regressed(const Eigen::MatrixXd& design, const Eigen::VectorXd& values, const Eigen::MatrixXd& errors,
-                     const Eigen::VectorXd& prior, bool in_full) {
+Regression regressed(const Eigen::MatrixXd& design, const Eigen::VectorXd& values,
+                     const Eigen::MatrixXd& errors, const Eigen::VectorXd& prior, bool in_full) {
   const Eigen::MatrixXd spread = prior.asDiagonal() * design.transpose();
   const Eigen::MatrixXd total = design * spread + errors;
   const Eigen::LLT<Eigen::MatrixXd> factor(total);
@@ -103,7 +103,8 @@ PeriodicCurve periodic_curve(const Eigen::VectorXd& time_s, const Eigen::VectorX
       curve.smoothness = smoothness;
     }
   }
-  const Regression chosen = regressed(design, values, covariance, best_size * best_size * prior_of(size, curve.smoothness), true);
+  const Regression chosen =
+      regressed(design, values, covariance, best_size * best_size * prior_of(size, curve.smoothness), true);
   curve.coefficients = chosen.coefficients;
   curve.covariance = chosen.covariance;
   return curve;

@@ -25,7 +25,8 @@ struct PeriodicCurve {
 };
 
 /// Preconditions: as many times as values, all within one period of each other; a covariance that is positive definite.
-PeriodicCurve periodic_curve(const Eigen::VectorXd& time_s, const Eigen::VectorXd& values, const Eigen::MatrixXd& covariance, double period_s);
+PeriodicCurve periodic_curve(const Eigen::VectorXd& time_s, const Eigen::VectorXd& values,
+                             const Eigen::MatrixXd& covariance, double period_s);
 
 /// The same curve, given that the mean over a period is zero: of all curves that the errors allow the likeliest that closes.
 PeriodicCurve closed(const PeriodicCurve& curve);

@@ -40,9 +40,10 @@ const ImageSeries& velocity_series(const ImageFolder& folder, const PhaseContras
     refuse(name, fmt::format("--series {}", *request.series), "is no velocity series of this folder",
            "`diastole images` lists them.");
   if (found.empty())
-    refuse(name, "", "holds no velocity series: no image has values on both sides of zero",
-           "Export the phase-contrast series with its phase (or velocity) images; `diastole images` says what "
-           "is there.");
+    refuse(
+        name, "", "holds no velocity series: no image has values on both sides of zero",
+        "Export the phase-contrast series with its phase (or velocity) images; `diastole images` says what "
+        "is there.");
   if (found.size() > 1)
     refuse(name, "", fmt::format("holds {} velocity series, numbers {}", found.size(), numbers_of(found)),
            "Choose the one that encodes flow through the slice, for example --series " +
@@ -120,7 +121,8 @@ void require_phases(const ImageFolder& folder, const ImageSeries& series, const 
   std::string missing;
   for (size_t k = 0; k < there.size(); ++k)
     if (!there[k])
-      missing += fmt::format("{}{} ({:.0f} ms)", missing.empty() ? "" : ", ", k + 1, series.phases.times_ms[k]);
+      missing +=
+          fmt::format("{}{} ({:.0f} ms)", missing.empty() ? "" : ", ", k + 1, series.phases.times_ms[k]);
   if (!missing.empty() && !bridge_gaps)
     refuse((folder.folder / file).string(), "(0018,1060)",
            fmt::format("phase {} of {} is missing", missing, there.size()),
@@ -148,8 +150,8 @@ PhaseContrast phase_contrast(const ImageFolder& folder, const PhaseContrastReque
   scan.phase_rad = folder.pixels(slice.images);
   const std::string file = (folder.folder / folder.file_name(slice.images[0])).string();
   const VelocityScale scale =
-      velocity_scale(folder.images[slice.images[0]].header,
-                     full_scale_in_air(scan.phase_rad, scan.magnitude), request.venc_cm_s, file);
+      velocity_scale(folder.images[slice.images[0]].header, full_scale_in_air(scan.phase_rad, scan.magnitude),
+                     request.venc_cm_s, file);
   scan.venc_cm_s = scale.venc_cm_s;
   scan.venc_source = scale.source;
   for (Image& image : scan.phase_rad)

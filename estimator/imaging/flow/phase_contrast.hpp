@@ -10,11 +10,11 @@
 namespace diastole::imaging {
 
 struct PhaseContrastRequest {
-  std::optional<double> venc_cm_s = {};  ///< instead of the headers'
-  std::optional<int> series = {};        ///< SeriesNumber of the velocities, where there are several
-  std::optional<size_t> slice = {};      ///< from 1, where the series has several
-  std::optional<double> interval_s = {}; ///< after which the flow repeats, instead of the headers'
-  bool bridge_gaps = false;              ///< go across phases that are missing
+  std::optional<double> venc_cm_s = {};   ///< instead of the headers'
+  std::optional<int> series = {};         ///< SeriesNumber of the velocities, where there are several
+  std::optional<size_t> slice = {};       ///< from 1, where the series has several
+  std::optional<double> interval_s = {};  ///< after which the flow repeats, instead of the headers'
+  bool bridge_gaps = false;               ///< go across phases that are missing
 };
 
 struct PhaseContrast {

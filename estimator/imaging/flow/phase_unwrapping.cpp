@@ -29,7 +29,8 @@ UnwrappedCycle unwrapped(const std::vector<double>& phase_rad, const std::vector
   for (size_t k = 1; k < count; ++k) {
     for (int state = 0; state < states; ++state) {
       for (int last = 0; last < states; ++last) {
-        const double sum = total[k - 1][static_cast<size_t>(last)] + cost(k - 1, value(k - 1, last), value(k, state));
+        const double sum =
+            total[k - 1][static_cast<size_t>(last)] + cost(k - 1, value(k - 1, last), value(k, state));
         if (sum >= total[k][static_cast<size_t>(state)]) continue;
         total[k][static_cast<size_t>(state)] = sum;
         before[k][static_cast<size_t>(state)] = last;
@@ -58,8 +59,8 @@ UnwrappedCycle unwrapped(const std::vector<double>& phase_rad, const std::vector
     best.phase_rad.push_back(phase_rad[k] + turn * best.turns[k]);
   }
   for (size_t k = 0; k < count; ++k)
-    best.largest_step_rad = std::max(
-        best.largest_step_rad, std::abs(best.phase_rad[(k + 1) % count] - best.phase_rad[k]) / gap[k]);
+    best.largest_step_rad = std::max(best.largest_step_rad,
+                                     std::abs(best.phase_rad[(k + 1) % count] - best.phase_rad[k]) / gap[k]);
   return best;
 }
 

@@ -37,19 +37,22 @@ double sigma_of_mean(const runfile::FrameBin& bin, double resolution_kPa) {
   return std::sqrt(spread + resolution_kPa * resolution_kPa / 12);
 }
 
-int64_t cycles_in(double interval_s, double period_s, const runfile::RecordedRun& run, const std::string& source) {
+int64_t cycles_in(double interval_s, double period_s, const runfile::RecordedRun& run,
+                  const std::string& source) {
   const double cycles = interval_s / period_s;
   const double whole = std::max(1.0, std::round(cycles));
   if (std::abs(cycles / whole - 1) > same_period)
-    throw InputError({run.file, "",
-                      fmt::format("cycles of {:.4g} s do not fit the images' {:.4g} s ({})", period_s, interval_s, source),
-                      "Give the run of the phase-contrast scan, its segment with --segment, or --period."});
+    throw InputError(
+        {run.file, "",
+         fmt::format("cycles of {:.4g} s do not fit the images' {:.4g} s ({})", period_s, interval_s, source),
+         "Give the run of the phase-contrast scan, its segment with --segment, or --period."});
   return static_cast<int64_t>(whole);
 }
 
 /// Work = sum of p (Q - mean Q) over even times, exact for harmonics; its error from both curves'.
 ValueWithError work_of(const PeriodicCurve& flow, const PeriodicCurve& pressure) {
-  const auto times = static_cast<Eigen::Index>(2 * std::max(flow.coefficients.size(), pressure.coefficients.size()));
+  const auto times =
+      static_cast<Eigen::Index>(2 * std::max(flow.coefficients.size(), pressure.coefficients.size()));
   Eigen::VectorXd by_flow = Eigen::VectorXd::Zero(flow.coefficients.size());
   Eigen::VectorXd by_pressure = Eigen::VectorXd::Zero(pressure.coefficients.size());
   const double step_s = flow.period_s / static_cast<double>(times);
@@ -66,7 +69,8 @@ ValueWithError work_of(const PeriodicCurve& flow, const PeriodicCurve& pressure)
 
 }  // namespace
 
-runfile::RecordedRun run_of_tables(const std::filesystem::path& pressure, const std::filesystem::path& trigger) {
+runfile::RecordedRun run_of_tables(const std::filesystem::path& pressure,
+                                   const std::filesystem::path& trigger) {
   static constexpr std::array<std::string_view, 2> pressure_columns{"time_s", "cavity_kPa"};
   static constexpr std::array<std::string_view, 1> trigger_columns{"time_s"};
   const NumberTable samples = NumberTable::from_file(pressure, pressure_columns);
@@ -86,7 +90,8 @@ runfile::RecordedRun run_of_tables(const std::filesystem::path& pressure, const 
   }
   if (run.trigger_s.size() < 2 || run.pressure.time_s.size() < 2)
     throw InputError({edges.file(), "",
-                      fmt::format("{} triggers and {} samples are no cycle", run.trigger_s.size(), run.pressure.time_s.size()),
+                      fmt::format("{} triggers and {} samples are no cycle", run.trigger_s.size(),
+                                  run.pressure.time_s.size()),
                       "Give the pressure and the triggers of at least one whole cycle."});
   std::vector<double> periods;
   for (size_t i = 1; i < run.trigger_s.size(); ++i)
@@ -129,19 +134,18 @@ PressureVolumeLoop pressure_volume_loop(const FlowMeasurement& flow, const runfi
   const PeriodicCurve pressure = periodic_curve(time, mean, variance.asDiagonal(), flow.interval_s());
   double peak = 0;
   for (Eigen::Index i = 0; i < count; ++i)
-    peak = std::max(peak, std::abs(flow.flow.of(flow.flow.value_row(time[i]))));
+    peak = std::max(peak, std::abs(flow.flow_at(time[i]).value));
   for (Eigen::Index i = 0; i < count; ++i) {
     LoopPoint point;
     point.phase_s = time[i];
-    const Eigen::VectorXd volume_row = flow.flow.integral_row(time[i]), flow_row = flow.flow.value_row(time[i]);
-    point.volume_mL = {flow.flow.of(volume_row), flow.flow.sigma_of(volume_row)};
+    point.volume_mL = flow.volume_at(time[i]);
     point.pressure_kPa = {mean[i], std::sqrt(variance[i])};
-    const double rate = flow.flow.of(flow_row);
-    if (std::abs(rate) > least_flow_share * peak) {
+    const ValueWithError rate = flow.flow_at(time[i]);
+    if (std::abs(rate.value) > least_flow_share * peak) {
       const Eigen::VectorXd slope_row = pressure.slope_row(time[i]);
-      const double stiffness = pressure.of(slope_row) / rate;
-      point.stiffness_kPa_per_mL = {stiffness, std::hypot(pressure.sigma_of(slope_row) / rate,
-                                                          stiffness * flow.flow.sigma_of(flow_row) / rate)};
+      const double stiffness = pressure.of(slope_row) / rate.value;
+      point.stiffness_kPa_per_mL = {
+          stiffness, std::hypot(pressure.sigma_of(slope_row), stiffness * rate.sigma) / std::abs(rate.value)};
     }
     loop.points.push_back(point);
   }

@@ -20,7 +20,8 @@ struct LoopPoint {
 struct PressureVolumeLoop {
   std::string source;  ///< the run file, or the pressure's CSV
   std::vector<LoopPoint> points;
-  ValueWithError work_mJ;  ///< integral of p dV once around, what a cycle does not return spread evenly over it
+  ValueWithError
+      work_mJ;  ///< integral of p dV once around, what a cycle does not return spread evenly over it
   size_t segment = 0;
   int64_t gate_every = 1;  ///< cycles of the pump in the images' interval
   size_t cycles = 0;       ///< that the pressure is the mean of
@@ -28,7 +29,8 @@ struct PressureVolumeLoop {
 };
 
 /// A pressure trace `time_s,cavity_kPa` and its triggers `time_s` as a run of one segment. Throws InputError.
-runfile::RecordedRun run_of_tables(const std::filesystem::path& pressure, const std::filesystem::path& trigger);
+runfile::RecordedRun run_of_tables(const std::filesystem::path& pressure,
+                                   const std::filesystem::path& trigger);
 
 /// `segment`: default the first with triggers. Throws InputError if the images' interval is no whole number of the segment's periods, or as bin_frames does.
 PressureVolumeLoop pressure_volume_loop(const FlowMeasurement& flow, const runfile::RecordedRun& run,

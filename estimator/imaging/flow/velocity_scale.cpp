@@ -93,11 +93,10 @@ VelocityScale velocity_scale(const ImageHeader& header, std::optional<double> fu
   // Parts of a full scale: the intercept brings the stored 0 to its lower end.
   const std::optional<double> end = header.intercept < 0 ? std::optional(-header.intercept) : full_scale;
   if (!end)
-    throw InputError(
-        {file, "(0028,1052), (0028,1053), (0028,1054)",
-         fmt::format("the values have no unit, and the intercept {:g} does not tell the scale",
-                     header.intercept),
-         "Export the series with its rescale slope, intercept and type."});
+    throw InputError({file, "(0028,1052), (0028,1053), (0028,1054)",
+                      fmt::format("the values have no unit, and the intercept {:g} does not tell the scale",
+                                  header.intercept),
+                      "Export the series with its rescale slope, intercept and type."});
   if (full_scale && std::abs(*full_scale / *end - 1) > agreement)
     throw InputError(
         {file, "(0028,1052)",
