@@ -11,6 +11,50 @@
 #include "protocol/contract/input_error.hpp"
 
 namespace diastole::scanner {
+namespace {
+
+/// Stored number = (value - intercept) / slope.
+struct Storage {
+  double slope = 1e-3, intercept = 0;
+  double least = 0, most = 4095;
+  bool is_signed = false;
+  std::string units = {};  ///< RescaleType; none: no rescaling is written
+};
+
+Storage storage_of(const ImageLabel& label) {
+  if (!label.velocity || !label.velocity->is_velocity) return {};
+  const double venc = label.velocity->venc_cm_s;
+  switch (label.velocity->maker) {
+    case Maker::siemens:
+      return {2.0, -4096, 0, 4095, false, "US"};
+    case Maker::philips:
+      return {2 * venc / 4095, -venc, 0, 4095, false, "cm/s"};
+    case Maker::ge:
+      return {0.1, 0, -32768, 32767, true, "cm/s"};
+  }
+  return {};
+}
+
+/// What one half turn is in stored values after slope and intercept.
+double half_turn_of(const ImageLabel& label) {
+  if (!label.velocity || !label.velocity->is_velocity) return 1;
+  return label.velocity->maker == Maker::siemens ? 4096 : label.velocity->venc_cm_s;
+}
+
+const char* manufacturer_of(const ImageLabel& label) {
+  if (!label.velocity) return "Diastole scan";
+  switch (label.velocity->maker) {
+    case Maker::siemens:
+      return "SIEMENS";
+    case Maker::philips:
+      return "Philips";
+    case Maker::ge:
+      return "GE";
+  }
+  return "";
+}
+
+}  // namespace
 
 void write_dicom(const std::filesystem::path& path, const Picture& picture, const ImageLabel& label) {
   DcmFileFormat file;
@@ -26,8 +70,20 @@ void write_dicom(const std::filesystem::path& path, const Picture& picture, cons
   put(DCM_StudyInstanceUID, label.study_uid);
   put(DCM_SeriesInstanceUID, label.series_uid);
   put(DCM_Modality, "MR");
-  put(DCM_Manufacturer, "Diastole scan");
-  put(DCM_ImageType, "ORIGINAL\\PRIMARY\\M");
+  const Storage storage = storage_of(label);
+  put(DCM_Manufacturer, manufacturer_of(label));
+  // One maker leaves it to the pixels to tell which image is which.
+  const bool is_untold = label.velocity && label.velocity->maker == Maker::ge;
+  put(DCM_ImageType, is_untold               ? "ORIGINAL\\PRIMARY\\OTHER"
+                     : storage.units.empty() ? "ORIGINAL\\PRIMARY\\M"
+                                             : "ORIGINAL\\PRIMARY\\P");
+  if (label.velocity && label.velocity->says_venc && label.velocity->maker == Maker::siemens)
+    put(DCM_SequenceName, fmt::format("*fl2d1_v{:.0f}in", label.velocity->venc_cm_s));
+  if (!storage.units.empty()) {
+    put(DCM_RescaleIntercept, fmt::format("{:.8g}", storage.intercept));
+    put(DCM_RescaleSlope, fmt::format("{:.10g}", storage.slope));
+    put(DCM_RescaleType, storage.units);
+  }
   put(DCM_ScanningSequence, "GR");
   put(DCM_PatientName, "");
   put(DCM_PatientID, "");
@@ -41,16 +97,22 @@ void write_dicom(const std::filesystem::path& path, const Picture& picture, cons
   put(DCM_PixelSpacing, fmt::format("{:.6f}\\{:.6f}", label.pixel_mm, label.pixel_mm));
   put(DCM_PhotometricInterpretation, "MONOCHROME2");
   const std::vector<std::pair<DcmTagKey, Eigen::Index>> numbers = {
-      {DCM_SamplesPerPixel, 1},    {DCM_Rows, picture.rows()}, {DCM_Columns, picture.cols()},
-      {DCM_BitsAllocated, 16},     {DCM_BitsStored, 12},       {DCM_HighBit, 11},
-      {DCM_PixelRepresentation, 0}};
+      {DCM_SamplesPerPixel, 1},
+      {DCM_Rows, picture.rows()},
+      {DCM_Columns, picture.cols()},
+      {DCM_BitsAllocated, 16},
+      {DCM_BitsStored, storage.is_signed ? 16 : 12},
+      {DCM_HighBit, storage.is_signed ? 15 : 11},
+      {DCM_PixelRepresentation, storage.is_signed ? 1 : 0}};
   for (const auto& [tag, value] : numbers)
     data.putAndInsertUint16(tag, static_cast<Uint16>(value));
   std::vector<Uint16> pixels;
   for (Eigen::Index row = 0; row < picture.rows(); ++row) {
     for (Eigen::Index column = 0; column < picture.cols(); ++column)
-      pixels.push_back(static_cast<Uint16>(
-          std::lround(std::clamp(1000 * static_cast<double>(picture(row, column)), 0.0, 4095.0))));
+      pixels.push_back(static_cast<Uint16>(std::lround(
+          std::clamp((static_cast<double>(picture(row, column)) * half_turn_of(label) - storage.intercept) /
+                         storage.slope,
+                     storage.least, storage.most))));
   }
   data.putAndInsertUint16Array(DCM_PixelData, pixels.data(), pixels.size());
   const OFCondition saved = file.saveFile(path.c_str(), EXS_LittleEndianExplicit);

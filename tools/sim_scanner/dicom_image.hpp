@@ -3,11 +3,22 @@
 
 #include <Eigen/Dense>
 #include <filesystem>
+#include <optional>
 #include <string>
 
 #include "tools/sim_scanner/slice_image.hpp"
 
 namespace diastole::scanner {
+
+/// How a maker stores velocities: parts of the full scale with the venc in the sequence's name, cm/s from the lower end on, or signed steps of 0.1 cm/s.
+enum class Maker { siemens, philips, ge };
+
+struct VelocityLabel {
+  Maker maker = Maker::siemens;
+  double venc_cm_s = 0;
+  bool says_venc = true;
+  bool is_velocity = false;  ///< else the magnitude that belongs to it
+};
 
 struct ImageLabel {
   std::string study_uid, series_uid, image_uid;
@@ -18,9 +29,10 @@ struct ImageLabel {
   Eigen::Vector3d first_mm, along_row, along_column;  ///< patient coordinates
   double pixel_mm;
   double thickness_mm;
+  std::optional<VelocityLabel> velocity = {};
 };
 
-/// Tissue of brightness 1 is written as 1000. No name, no identity. Throws InputError if the file cannot be written.
+/// Tissue of brightness 1 is written as 1000; a velocity picture holds half turns, -1 to 1. No name, no identity. Throws InputError if the file cannot be written.
 void write_dicom(const std::filesystem::path& file, const Picture& picture, const ImageLabel& label);
 
 }  // namespace diastole::scanner

@@ -1,14 +1,12 @@
 #include "tools/sim_scanner/slice_image.hpp"
 
-#include <fftw3.h>
-
 #include <array>
 #include <cmath>
 #include <complex>
-#include <mutex>
 #include <numbers>
 #include <random>
 
+#include "tools/sim_scanner/fourier.hpp"
 #include "tools/sim_scanner/pulse_train.hpp"
 
 namespace diastole::scanner {
@@ -18,20 +16,6 @@ constexpr int in_plane_samples = 3, through_samples = 6;
 constexpr double soft_edge = 0.15;         // of the thickness: where the slice's profile falls
 constexpr double water_brightness = 0.65;  // beside tissue's
 constexpr double stirred_T_s = 0.08, bath_T1_s = 2.8;
-
-using Spectrum = Eigen::ArrayXXcf;
-
-void transform(Spectrum& values, int sign) {
-  static std::mutex planning;  // the one part of FFTW that threads must not share
-  auto* data = reinterpret_cast<fftwf_complex*>(values.data());
-  std::unique_lock lock(planning);
-  fftwf_plan plan = fftwf_plan_dft_2d(static_cast<int>(values.cols()), static_cast<int>(values.rows()), data,
-                                      data, sign, FFTW_ESTIMATE);
-  lock.unlock();
-  fftwf_execute(plan);
-  lock.lock();
-  fftwf_destroy_plan(plan);
-}
 
 /// The profile across the slice, s in thicknesses from its middle.
 double profile(double s) { return 0.5 * (std::erf((s + 0.5) / soft_edge) - std::erf((s - 0.5) / soft_edge)); }
@@ -120,7 +104,7 @@ Picture signal_of(const SliceOfBody& body, const ScanPlane& plane, const ScanPro
 
 Picture acquired(const Picture& signal, const ScanProtocol& protocol, unsigned seed) {
   Spectrum spectrum = signal.cast<std::complex<float>>();
-  transform(spectrum, FFTW_FORWARD);
+  transform(spectrum, -1);
   const Eigen::Index rows = spectrum.rows();
   const double half = 0.5 * protocol.acquired * static_cast<double>(rows);
   std::mt19937 engine(seed);
@@ -129,7 +113,7 @@ Picture acquired(const Picture& signal, const ScanProtocol& protocol, unsigned s
   constexpr double taper = 0.1;  // of the measured lines, at either end
   for (Eigen::Index column = 0; column < spectrum.cols(); ++column) {
     for (Eigen::Index row = 0; row < rows; ++row) {
-      const double line = static_cast<double>(2 * row > rows ? row - rows : row);
+      const double line = signed_line(row, rows);
       const double from_end = (half - std::abs(line)) / (taper * 2 * half);
       if (from_end <= 0) {
         spectrum(row, column) = 0;
@@ -141,7 +125,7 @@ Picture acquired(const Picture& signal, const ScanProtocol& protocol, unsigned s
       spectrum(row, column) = std::complex<float>(window * value);
     }
   }
-  transform(spectrum, FFTW_BACKWARD);
+  transform(spectrum, +1);
   return spectrum.abs() / static_cast<float>(pixels);
 }
 

@@ -50,7 +50,10 @@ struct PhaseNormal {
 class Fitter {
  public:
   Fitter(const LumenData& data, const LumenScene& start, Encoding encoding)
-      : data_(data), model_(data.plane, start.shape), scene_(start), encoding_(encoding) {
+      : data_(data),
+        model_(data.plane, start.shape, data.measured_share),
+        scene_(start),
+        encoding_(encoding) {
     pixel_mm_ = data.plane.finer_spacing_mm();
     prior_sd_ = prior_sd(start, pixel_mm_);
     prior_mean_ = start.vector();
@@ -71,12 +74,12 @@ class Fitter {
     profiles_.resize(phases());
     const LumenGrid grid = model_.grid(scene_.shape);
     parallel_for(phases(), machine_threads(),
-                 [&](size_t k) { profiles_[k] = settled_profile(k, core_rad[k], grid, shapes_[k]).first; });
+                 [&](size_t k) { profiles_[k] = settled_profile(k, core_rad[k], grid).first; });
   }
 
   /// Gauss-Newton over everything.
   bool run() {
-    double before = linearise();
+    double before = linearise(), last = 0;
     for (int iteration = 0; iteration < most_iterations; ++iteration) {
       const State kept{scene_, profiles_, shapes_};
       const auto [scene_step, own_steps] = newton_step();
@@ -95,13 +98,14 @@ class Fitter {
         profiles_ = kept.profiles;
         shapes_ = kept.shapes;
         linearise();
-        return false;
+        return now - before < by_chance();
       }
       linearise();
       if (before - now < settled) return true;
+      last = before - now;
       before = now;
     }
-    return false;
+    return last < by_chance();
   }
 
   /// Whether phases pull the lumen away from the common place by more than noise does. Then they get places of their own.
@@ -132,8 +136,7 @@ class Fitter {
       if (std::abs(core) < sure_rad) return;
       const LumenGrid grid = model_.grid(shapes_[k]);
       const double own = compared(k, grid, profiles_[k], nullptr).second;
-      const auto [profile, chi_square] =
-          settled_profile(k, core - std::copysign(turn, core), grid, shapes_[k]);
+      const auto [profile, chi_square] = settled_profile(k, core - std::copysign(turn, core), grid);
       margin[k] = (chi_square - own) / reduced;
       if (chi_square < own) better[k] = profile;
     });
@@ -188,16 +191,25 @@ class Fitter {
       own_variance[at] = by_own.dot(factor.solve(by_own));
       by_scene.row(at) = (direct - normals_[k].between.transpose() * factor.solve(by_own)).transpose();
       fit.core_cm_s.push_back(data_.cm_s_per_radian * core_rad(k));
+      fit.phase_chi_square.push_back(normals_[k].chi_square * static_cast<double>(phases()) / freedom_left());
     }
     fit.covariance = by_scene * scene_covariance * by_scene.transpose();
     fit.covariance += own_variance.asDiagonal();
-    fit.covariance *= std::max(1.0, fit.reduced_chi_square) * mL_s_per_rad_mm2 * mL_s_per_rad_mm2;
+    // Zeros in the spectrum bring pixels, but no more measurements.
+    fit.covariance *= std::max(1.0, fit.reduced_chi_square) / data_.measured_share.prod() * mL_s_per_rad_mm2 *
+                      mL_s_per_rad_mm2;
     Eigen::Vector2d mean = Eigen::Vector2d::Zero();
     for (const LumenShape& shape : shapes_)
       mean += shape.centre_mm / static_cast<double>(phases());
     for (const LumenShape& shape : shapes_)
       fit.movement_mm += (shape.centre_mm - mean).squaredNorm() / static_cast<double>(phases());
     fit.movement_mm = std::sqrt(fit.movement_mm);
+    if (moves_) {
+      fit.scene.shape.centre_mm = mean;
+      fit.scene.shape.radius_mm = 0;
+      for (const LumenShape& shape : shapes_)
+        fit.scene.shape.radius_mm += shape.radius_mm / static_cast<double>(phases());
+    }
     return fit;
   }
 
@@ -212,6 +224,8 @@ class Fitter {
   [[nodiscard]] double freedom_left() const {
     return std::max(1.0, used_ - static_cast<double>(phases()) * static_cast<double>(model_.profile_size()));
   }
+  /// A tenth of what chi-square differs by from one noise to another.
+  [[nodiscard]] double by_chance() const { return 0.1 * std::sqrt(2 * freedom_left()); }
   [[nodiscard]] Eigen::ArrayXXd window(const Image& image) const {
     return image.block(model_.first_row(), model_.first_column(), model_.rows(), model_.columns())
         .cast<double>();
@@ -265,12 +279,21 @@ class Fitter {
     normal.diagonal().array() += 1e-6 * normal.trace() / static_cast<double>(normal.rows());
   }
 
-  /// The profile alone, from a plug of that velocity, with the scene as it is.
+  /// The profile alone, with the scene as it is, from boundary layers of several widths: where the velocity wraps within one, a start on the wrong side of
+  /// a wrap stays there.
   [[nodiscard]] std::pair<Eigen::VectorXd, double> settled_profile(size_t k, double core,
-                                                                   const LumenGrid& grid,
-                                                                   const LumenShape&) const {
-    Eigen::VectorXd profile = Eigen::VectorXd::Constant(model_.profile_size(), core);
-    profile.tail(2).setZero();
+                                                                   const LumenGrid& grid) const {
+    std::pair<Eigen::VectorXd, double> best = settled_from(k, core, 0, grid);
+    if (std::abs(core) < sure_rad) return best;
+    for (const double layer_px : {0.5, 1.0, 2.0}) {
+      auto other = settled_from(k, core, layer_px * pixel_mm_, grid);
+      if (other.second < best.second) best = std::move(other);
+    }
+    return best;
+  }
+  [[nodiscard]] std::pair<Eigen::VectorXd, double> settled_from(size_t k, double core, double layer_mm,
+                                                                const LumenGrid& grid) const {
+    Eigen::VectorXd profile = model_.layer_profile(core, layer_mm);
     double least = std::numeric_limits<double>::infinity();
     for (int iteration = 0; iteration < 6; ++iteration) {
       std::vector<LumenImage> slopes;

@@ -19,6 +19,7 @@ struct LumenData {
   std::vector<Image> magnitude;
   std::vector<Image> phase_rad;  ///< background taken off
   PhaseNoise noise;
+  Eigen::Vector2d measured_share = {1, 1};  ///< of the spectrum's lines, along rows and along columns
   double cm_s_per_radian = 0;
 };
 
@@ -27,6 +28,7 @@ struct LumenFit {
   Encoding encoding = Encoding::separate;
   bool converged = false;
   double reduced_chi_square = 0;
+  std::vector<double> phase_chi_square;   ///< of each phase, reduced
   std::vector<Eigen::VectorXd> profiles;  ///< of each phase, radians
   std::vector<LumenShape> shapes;         ///< of each phase: one and the same unless it moves
   bool moves = false;

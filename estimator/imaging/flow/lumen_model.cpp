@@ -12,6 +12,8 @@ namespace {
 constexpr int cells_a_pixel = 5;
 /// Pixels beyond the edge that are compared: where its ringing has fallen to a hundredth.
 constexpr double margin_px = 4;
+/// Of an ellipse's edge, as one over its square: twelve times as long as wide.
+constexpr double least_square = 0.01;
 
 double sinc(double x) {
   const double angle = std::numbers::pi * x;
@@ -69,7 +71,16 @@ struct Signal {
 }  // namespace
 
 double LumenShape::edge_mm(double angle) const {
-  return radius_mm * (1 + ellipse_cos * std::cos(2 * angle) + ellipse_sin * std::sin(2 * angle));
+  return radius_mm / std::sqrt(std::max(least_square, 1 - 2 * longer(angle)));
+}
+
+double LumenShape::slant(double angle) const {
+  const double change = 2 * (ellipse_sin * std::cos(2 * angle) - ellipse_cos * std::sin(2 * angle));
+  return change / std::max(least_square, 1 - 2 * longer(angle));
+}
+
+double LumenShape::longer(double angle) const {
+  return ellipse_cos * std::cos(2 * angle) + ellipse_sin * std::sin(2 * angle);
 }
 
 Eigen::VectorXd LumenScene::vector() const {
@@ -97,17 +108,19 @@ std::vector<double> profile_knots_mm(double radius_mm, double pixel_mm) {
   return knots;
 }
 
-LumenModel::LumenModel(const SlicePlane& plane, const LumenShape& about)
+LumenModel::LumenModel(const SlicePlane& plane, const LumenShape& about,
+                       const Eigen::Vector2d& measured_share)
     : spacing_mm_(plane.column_spacing_mm, plane.row_spacing_mm),
       knots_mm_(profile_knots_mm(about.radius_mm, plane.finer_spacing_mm())),
       middle_mm_(about.centre_mm) {
-  const double stretch = 1 + std::hypot(about.ellipse_cos, about.ellipse_sin);
-  const auto prepare = [&](double centre_mm, double spacing_mm, int count, int& first,
+  // Room for a tube that is cut at 45 degrees.
+  const double stretch = 1.2 + std::hypot(about.ellipse_cos, about.ellipse_sin);
+  const auto prepare = [&](double centre_mm, double spacing_mm, int count, double share, int& first,
                            Eigen::VectorXd& fine_mm, Eigen::MatrixXf& kernel) {
     const double reach_mm = about.radius_mm * stretch + margin_px * spacing_mm;
     first = std::max(0, static_cast<int>(std::floor((centre_mm - reach_mm) / spacing_mm)));
     const int last = std::min(count - 1, static_cast<int>(std::ceil((centre_mm + reach_mm) / spacing_mm)));
-    const double object_mm = about.radius_mm * stretch + about.wall_mm + 2 * spacing_mm;
+    const double object_mm = (about.radius_mm + about.wall_mm) * stretch + 2 * spacing_mm;
     const auto fine = static_cast<Eigen::Index>(std::ceil(2 * object_mm / spacing_mm)) * cells_a_pixel;
     const double step_mm = spacing_mm / cells_a_pixel;
     const double start_mm = centre_mm - 0.5 * step_mm * static_cast<double>(fine - 1);
@@ -116,10 +129,21 @@ LumenModel::LumenModel(const SlicePlane& plane, const LumenShape& about)
     for (Eigen::Index pixel = 0; pixel < kernel.rows(); ++pixel)
       for (Eigen::Index cell = 0; cell < fine; ++cell)
         kernel(pixel, cell) = static_cast<float>(
-            sinc(static_cast<double>(first + pixel) - fine_mm[cell] / spacing_mm) / cells_a_pixel);
+            share * sinc(share * (static_cast<double>(first + pixel) - fine_mm[cell] / spacing_mm)) /
+            cells_a_pixel);
   };
-  prepare(about.centre_mm.x(), spacing_mm_.x(), plane.columns, first_column_, fine_x_mm_, along_row_);
-  prepare(about.centre_mm.y(), spacing_mm_.y(), plane.rows, first_row_, fine_y_mm_, along_column_);
+  prepare(about.centre_mm.x(), spacing_mm_.x(), plane.columns, measured_share.x(), first_column_, fine_x_mm_,
+          along_row_);
+  prepare(about.centre_mm.y(), spacing_mm_.y(), plane.rows, measured_share.y(), first_row_, fine_y_mm_,
+          along_column_);
+}
+
+Eigen::VectorXd LumenModel::layer_profile(double core, double layer_mm) const {
+  Eigen::VectorXd profile = Eigen::VectorXd::Zero(profile_size());
+  for (size_t j = 0; j < knots_mm_.size(); ++j)
+    profile[static_cast<Eigen::Index>(j)] =
+        core * (layer_mm > 0 ? 1 - std::exp(-knots_mm_[j] / layer_mm) : 1.0);
+  return profile;
 }
 
 LumenGrid LumenModel::grid(const LumenShape& shape) const {
@@ -138,18 +162,18 @@ LumenGrid LumenModel::grid(const LumenShape& shape) const {
       const double radius = from.norm(), angle = std::atan2(from.y(), from.x());
       const double edge = shape.edge_mm(angle);
       // The edge's slant against the circle shortens the way to it.
-      const double slant =
-          2 * (-shape.ellipse_cos * std::sin(2 * angle) + shape.ellipse_sin * std::cos(2 * angle));
-      const double depth = (edge - radius) / std::sqrt(1 + slant * slant);
+      const double depth = (edge - radius) / std::hypot(1.0, shape.slant(angle));
       const double inside = std::clamp(depth / cell_mm + 0.5, 0.0, 1.0);
-      grid.outside(row, column) =
-          static_cast<float>(std::clamp((radius - edge - shape.wall_mm) / cell_mm + 0.5, 0.0, 1.0));
+      grid.outside(row, column) = static_cast<float>(
+          std::clamp((radius - edge * (1 + shape.wall_mm / shape.radius_mm)) / cell_mm + 0.5, 0.0, 1.0));
       if (inside <= 0) continue;
       grid.inside(row, column) = static_cast<float>(inside);
-      spline.values(depth, values);
+      // The layers of a round tube that is cut slantwise are ellipses of one shape.
+      const double layer = shape.radius_mm * (1 - radius / edge);
+      spline.values(layer, values);
       for (Eigen::Index j = 0; j < knots; ++j)
         grid.basis[static_cast<size_t>(j)](row, column) = values[j];
-      const double rise = std::clamp(depth / knots_mm_[std::min<size_t>(2, knots_mm_.size() - 1)], 0.0, 1.0);
+      const double rise = std::clamp(layer / knots_mm_[std::min<size_t>(2, knots_mm_.size() - 1)], 0.0, 1.0);
       for (Eigen::Index axis = 0; axis < 2; ++axis)
         grid.basis[static_cast<size_t>(knots + axis)](row, column) =
             static_cast<float>(rise * from[axis] / shape.radius_mm);

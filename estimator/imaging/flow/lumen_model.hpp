@@ -2,13 +2,13 @@
 // The image that a scanner makes of fluid in a lumen, its wall, and still material around: a model for partial volume at the edge.
 //
 //                 outside: still material, brightness `still`
-//        .-----------------------.    radius + wall
+//        .-----------------------.    as the edge, larger by wall / radius
 //       /  wall: no signal        \ .
-//      |   .-------------------.   |  radius (1 + e_c cos 2 theta + e_s sin 2 theta)
-//      |  |  depth d inwards   |   |  velocity sum_j c_j B_j(d), zero at the edge
+//      |   .-------------------.   |  edge: radius / sqrt(1 - 2 e_c cos 2 theta - 2 e_s sin 2 theta), an ellipse
+//      |  |  depth d inwards   |   |  velocity sum_j c_j B_j(d), zero at the edge; d = radius (1 - r / edge)
 //
 // A pixel's complex signal is the object's spectrum cut to the acquired matrix: with x' in mm over a fine grid,
-//   z(x) = sum over x' of rho(x') exp(i k phi(x')) sinc((x - x') / spacing)
+//   z(x) = sum over x' of rho(x') exp(i k phi(x')) share sinc(share (x - x') / spacing)
 // rho is the brightness, phi = pi v / venc. An image that encodes velocity (k = 1) is compared with one that does not (k = 0), or two that encode half of it to either side (k = +-1/2):
 // phase = arg z_1 - arg z_0, magnitude = the mean of the two. So fast and slow fluid, and fluid and wall, mix as they do in a scanner. Fluid that flows in is brighter: rho = a + b |phi| + c phi^2.
 
@@ -26,6 +26,10 @@ struct LumenShape {
   double wall_mm = 0;
 
   [[nodiscard]] double edge_mm(double angle) const;  ///< from the centre
+  [[nodiscard]] double slant(double angle) const;    ///< d(ln edge)/d(angle)
+
+ private:
+  [[nodiscard]] double longer(double angle) const;
 };
 
 struct Brightness {
@@ -66,7 +70,8 @@ struct LumenImage {
 class LumenModel {
  public:
   /// A window of the slice around a lumen of about that shape.
-  LumenModel(const SlicePlane& plane, const LumenShape& about);
+  /// `measured_share`: of the spectrum's lines, along rows and along columns.
+  LumenModel(const SlicePlane& plane, const LumenShape& about, const Eigen::Vector2d& measured_share);
 
   [[nodiscard]] int first_column() const { return first_column_; }
   [[nodiscard]] int first_row() const { return first_row_; }
@@ -74,6 +79,8 @@ class LumenModel {
   [[nodiscard]] Eigen::Index rows() const { return along_column_.rows(); }
   [[nodiscard]] Eigen::Index profile_size() const { return static_cast<Eigen::Index>(knots_mm_.size()) + 2; }
 
+  /// A core with a boundary layer of that width, exponential; 0: none.
+  [[nodiscard]] Eigen::VectorXd layer_profile(double core, double layer_mm) const;
   [[nodiscard]] LumenGrid grid(const LumenShape& shape) const;
   /// Its derivatives by the profile's coefficients are appended if `slopes` is given.
   [[nodiscard]] LumenImage image(const LumenGrid& grid, const Brightness& brightness, Encoding encoding,

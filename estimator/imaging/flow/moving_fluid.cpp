@@ -1,8 +1,10 @@
 #include "estimator/imaging/flow/moving_fluid.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <complex>
+#include <limits>
 #include <numbers>
 
 #include "protocol/signal/median.hpp"
@@ -84,6 +86,51 @@ MotionMap motion_map(const PhaseContrast& scan) {
   const double variance = map.noise.magnitude_times_phase * map.noise.magnitude_times_phase;
   if (variance > 0) map.activity /= static_cast<float>(variance);
   return map;
+}
+
+Eigen::Vector2d measured_share(const PhaseContrast& scan, const MotionMap& map,
+                               const Eigen::Array<bool, Eigen::Dynamic, Eigen::Dynamic>& still) {
+  constexpr int lags = 3;
+  // So many pairs tell a correlation to a hundredth.
+  constexpr double least_pairs = 1e4;
+  Eigen::Vector2d shares(1, 1);
+  const Eigen::Index rows = still.rows(), columns = still.cols();
+  const auto noise = [&](size_t k, Eigen::Index row, Eigen::Index column) {
+    return static_cast<double>(scan.magnitude[k](row, column)) *
+           within_half_turn(static_cast<double>(scan.phase_rad[k](row, column)) -
+                            static_cast<double>(map.mean_phase(row, column)));
+  };
+  for (Eigen::Index axis = 0; axis < 2; ++axis) {
+    std::array<double, lags + 1> products{}, pairs{};
+    for (size_t k = 0; k < scan.phases(); ++k) {
+      for (Eigen::Index column = 0; column < columns; ++column) {
+        for (Eigen::Index row = 0; row < rows; ++row) {
+          if (!still(row, column)) continue;
+          const double here = noise(k, row, column);
+          for (Eigen::Index lag = 0; lag <= lags; ++lag) {
+            const Eigen::Index r = row + (axis == 1 ? lag : 0), c = column + (axis == 0 ? lag : 0);
+            if (r >= rows || c >= columns || !still(r, c)) continue;
+            products[static_cast<size_t>(lag)] += here * noise(k, r, c);
+            pairs[static_cast<size_t>(lag)] += 1;
+          }
+        }
+      }
+    }
+    if (pairs[lags] < least_pairs || !(products[0] > 0)) continue;
+    double least = std::numeric_limits<double>::infinity();
+    for (double share = 0.3; share <= 1.0 + 1e-9; share += 0.005) {
+      double squares = 0;
+      for (size_t lag = 1; lag <= lags; ++lag) {
+        const double angle = std::numbers::pi * share * static_cast<double>(lag);
+        const double alike = products[lag] / pairs[lag] / (products[0] / pairs[0]);
+        squares += std::pow(alike - std::sin(angle) / angle, 2);
+      }
+      if (squares >= least) continue;
+      least = squares;
+      shares[axis] = share;
+    }
+  }
+  return shares;
 }
 
 std::vector<MovingRegion> moving_regions(const MotionMap& map) {
