@@ -1,0 +1,226 @@
+// Phase contrast of simulated Womersley flow (tools/sim_scanner, which shares no physics with the reader) back to flow, volume and loop.
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <filesystem>
+#include <numbers>
+
+#include "estimator/imaging/flow/flow_session.hpp"
+#include "tests/estimator/io/scratch_file.hpp"
+#include "tools/sim_scanner/phase_contrast_scan.hpp"
+
+namespace diastole::imaging {
+namespace {
+
+using scanner::FlowPhantom;
+using scanner::PhaseContrastProtocol;
+using test::ScratchFolder;
+using testing::AllOf;
+using testing::HasSubstr;
+
+/// A small field of view: a tube of 12 mm, its wall and a ring of still gel.
+PhaseContrastProtocol small() { return {.matrix = 64, .phases = 12}; }
+FlowPhantom phantom() { return {.block_radius_mm = 18}; }
+
+FlowMeasurement measured(const FlowPhantom& flow, const PhaseContrastProtocol& protocol,
+                         const PhaseContrastRequest& scan = {}, const FlowRequest& request = {}) {
+  const ScratchFolder scratch;
+  scanner::scan_flow(flow, protocol, scratch.path());
+  const ImageFolder folder = read_image_folder(scratch.path());
+  require_sound(folder);
+  return measure_flow(phase_contrast(folder, scan), request, scratch.path().string());
+}
+
+std::string refusal(const FlowPhantom& flow, const PhaseContrastProtocol& protocol,
+                    const PhaseContrastRequest& scan = {}) {
+  return test::message_of([&] { (void)measured(flow, protocol, scan); });
+}
+
+double peak_mL_s(const FlowPhantom& flow) {
+  double peak = 0;
+  for (int i = 0; i < 400; ++i)
+    peak = std::max(peak, std::abs(flow.flow_mL_s(flow.period_s * i / 400)));
+  return peak;
+}
+
+double stroke_mL(const FlowPhantom& flow) {
+  double least = 0, most = 0;
+  for (int i = 0; i < 4000; ++i) {
+    const double volume = flow.volume_mL(flow.period_s * i / 4000);
+    least = std::min(least, volume);
+    most = std::max(most, volume);
+  }
+  return most - least;
+}
+
+/// Sum of squares of the phases' errors over their sigmas.
+double chi_square(const FlowMeasurement& flow, const FlowPhantom& truth) {
+  double sum = 0;
+  for (const PhaseFlow& phase : flow.phases)
+    sum += std::pow((phase.flow_mL_s.value - truth.flow_mL_s(phase.phase_s)) / phase.flow_mL_s.sigma, 2);
+  return sum;
+}
+
+void expect_true(const FlowMeasurement& flow, const FlowPhantom& truth) {
+  for (const PhaseFlow& phase : flow.phases)
+    EXPECT_NEAR(phase.flow_mL_s.value, truth.flow_mL_s(phase.phase_s), 0.01 * peak_mL_s(truth))
+        << phase.phase_s;
+  EXPECT_NEAR(flow.stroke_mL.value, stroke_mL(truth), 0.01 * stroke_mL(truth));
+  EXPECT_NEAR(flow.stroke_mL.value, stroke_mL(truth), 3 * flow.stroke_mL.sigma);
+  // The chance of more is below one in ten thousand.
+  EXPECT_LT(chi_square(flow, truth), 40);
+}
+
+TEST(Flow, IsMeasuredWithinAPercentAndItsErrorsAreTrue) {
+  const FlowMeasurement flow = measured(phantom(), small());
+  expect_true(flow, phantom());
+  EXPECT_GT(chi_square(flow, phantom()), 2);
+  EXPECT_NEAR(flow.lumen.scene.shape.radius_mm, 6, 0.03);
+  EXPECT_NEAR(flow.lumen.reduced_chi_square, 1, 0.15);
+  EXPECT_LT(std::abs(flow.closure_mL.value), 3 * flow.closure_mL.sigma);
+  EXPECT_EQ(flow.unwrapped, 0U);
+  EXPECT_FALSE(flow.lumen.moves);
+  // A straight background was laid: 0.8 cm/s in the middle, less towards the tube.
+  EXPECT_EQ(flow.background.order, 1);
+  const double at_tube = 0.8 + 2.0 * 1.3 / 50 - 1.5 * -2.1 / 50;
+  EXPECT_NEAR(flow.background.at_lumen_rad * flow.scan.cm_s_per_radian(), at_tube, 0.05);
+  EXPECT_LT(flow.background.sigma_rad * flow.scan.cm_s_per_radian(), 0.1);
+}
+
+TEST(Flow, TurnsArePutBackAtAnSnrOf15) {
+  PhaseContrastProtocol protocol = small();
+  protocol.phases = 16;
+  protocol.venc_cm_s = 48;  // the peak is 65
+  protocol.snr = 15;
+  const FlowMeasurement flow = measured(phantom(), protocol);
+  EXPECT_GT(flow.unwrapped, 3U);
+  expect_true(flow, phantom());
+}
+
+TEST(Flow, EachMakersValuesMeanTheSame) {
+  for (const scanner::Maker maker : {scanner::Maker::philips, scanner::Maker::ge}) {
+    PhaseContrastProtocol protocol = small();
+    protocol.maker = maker;
+    const FlowMeasurement flow = measured(phantom(), protocol);
+    expect_true(flow, phantom());
+    EXPECT_NEAR(flow.scan.venc_cm_s, 100, 0.2);
+    EXPECT_THAT(flow.scan.venc_source,
+                HasSubstr(maker == scanner::Maker::ge ? "noise in air" : "RescaleIntercept"));
+  }
+}
+
+TEST(Flow, IsPositiveAlongTheNormalOfATiltedSlice) {
+  PhaseContrastProtocol protocol = small();
+  protocol.along_row = Eigen::Vector3d(0.8, 0.36, 0.48);
+  protocol.along_column = Eigen::Vector3d(-0.6, 0.48, 0.64);
+  protocol.tilt_deg = 20;
+  const FlowMeasurement flow = measured(phantom(), protocol);
+  expect_true(flow, phantom());
+  EXPECT_NEAR(flow.lumen.area_mm2, 36 * std::numbers::pi / std::cos(20 * std::numbers::pi / 180), 0.01 * 120);
+}
+
+TEST(Flow, FollowsATubeThatShakes) {
+  PhaseContrastProtocol protocol = small();
+  protocol.wobble_mm = 0.6;
+  const FlowMeasurement flow = measured(phantom(), protocol);
+  EXPECT_TRUE(flow.lumen.moves);
+  EXPECT_NEAR(flow.lumen.movement_mm, 0.36, 0.05);
+  expect_true(flow, phantom());
+}
+
+TEST(Flow, SpectraFilledUpWithZerosAndBalancedEncodingsAreFound) {
+  PhaseContrastProtocol protocol = small();
+  protocol.acquired = 0.75;
+  protocol.is_balanced = true;
+  protocol.venc_cm_s = 70;
+  const FlowMeasurement flow = measured(phantom(), protocol);
+  EXPECT_EQ(flow.lumen.encoding, Encoding::balanced);
+  EXPECT_NEAR(flow.lumen.reduced_chi_square, 1, 0.25);
+  expect_true(flow, phantom());
+}
+
+TEST(Flow, ALeakIsToldAndClosingIsAskedFor) {
+  FlowPhantom leaking = phantom();
+  leaking.steady_mL_s = 2.0;
+  const FlowMeasurement open = measured(leaking, small());
+  EXPECT_NEAR(open.closure_mL.value, 2.4, 3 * open.closure_mL.sigma);
+  const FlowMeasurement shut = measured(leaking, small(), {}, {.close = true});
+  EXPECT_NEAR(shut.closure_mL.value, open.closure_mL.value, 1e-9);
+  EXPECT_NEAR(shut.volume_at(shut.interval_s()).value, shut.volume_at(0).value, 1e-6);
+  EXPECT_NEAR(shut.stroke_mL.value, stroke_mL(phantom()), 0.01 * 20);
+}
+
+TEST(Flow, WhatCannotBeMeasuredIsRefusedWithTagAndRemedy) {
+  PhaseContrastProtocol protocol = small();
+  protocol.says_venc = false;
+  EXPECT_THAT(refusal(phantom(), protocol), AllOf(HasSubstr("(0018,9197)"), HasSubstr("--venc")));
+  const FlowMeasurement told = measured(phantom(), protocol, {.venc_cm_s = 100.0});
+  EXPECT_EQ(told.scan.venc_source, "--venc");
+  expect_true(told, phantom());
+
+  protocol = small();
+  protocol.has_magnitude = false;
+  EXPECT_THAT(refusal(phantom(), protocol), AllOf(HasSubstr("no magnitude"), HasSubstr("Export")));
+
+  protocol = small();
+  protocol.missing_phase = 5;
+  EXPECT_THAT(refusal(phantom(), protocol), AllOf(HasSubstr("phase 5"), HasSubstr("--bridge-gaps")));
+  const FlowMeasurement bridged = measured(phantom(), protocol, {.bridge_gaps = true});
+  EXPECT_EQ(bridged.phases.size(), 11U);
+  EXPECT_NEAR(bridged.stroke_mL.value, stroke_mL(phantom()), 3 * bridged.stroke_mL.sigma);
+
+  FlowPhantom still = phantom();
+  still.stroke_mL = 0;
+  EXPECT_THAT(refusal(still, small()), AllOf(HasSubstr("no lumen"), HasSubstr("--centre")));
+
+  FlowPhantom fast = phantom();
+  fast.stroke_mL = 120;  // 390 cm/s
+  protocol = small();
+  protocol.venc_cm_s = 60;
+  EXPECT_THAT(refusal(fast, protocol),
+              AllOf(HasSubstr("wraps beyond recovery"), HasSubstr("venc above the peak")));
+}
+
+TEST(PressureVolumeLoop, ItsAreaIsTheWork) {
+  const ScratchFolder scratch;
+  std::filesystem::create_directory(scratch.path() / "dicom");
+  scanner::scan_flow(phantom(), small(), scratch.path() / "dicom");
+  // p = 0.1 V + 0.004 Q: the second term encloses an area, the first none.
+  std::string pressure = "time_s,cavity_kPa\n", trigger = "time_s\n";
+  for (int i = 0; i < 1500; ++i) {
+    const double t = i / 300.0;
+    pressure +=
+        fmt::format("{:.5f},{:.6f}\n", t, 0.1 * phantom().volume_mL(t) + 0.004 * phantom().flow_mL_s(t));
+  }
+  for (int i = 0; i < 4; ++i)
+    trigger += fmt::format("{:.5f}\n", 1.2 * i);
+  FlowSessionRequest request;
+  request.folder = scratch.path() / "dicom";
+  request.pressure = scratch.write("p.csv", pressure);
+  request.trigger = scratch.write("t.csv", trigger);
+  const FlowSession session = measure_session(request);
+  double work_mJ = 0;
+  for (int i = 0; i < 2000; ++i)
+    work_mJ += 1.2 / 2000 * 0.004 * std::pow(phantom().flow_mL_s(1.2 * i / 2000), 2);
+  ASSERT_TRUE(session.loop);
+  EXPECT_NEAR(session.loop->work_mJ.value, work_mJ, 0.02 * work_mJ);
+  EXPECT_NEAR(session.loop->work_mJ.value, work_mJ, 4 * session.loop->work_mJ.sigma);
+  size_t known = 0;
+  for (const LoopPoint& point : session.loop->points) {
+    if (!point.stiffness_kPa_per_mL || point.phase_s < 0.1 || point.phase_s > 0.28) continue;
+    // On the constant acceleration dQ/dt = 16 S / T^2 adds to dp/dV.
+    const double expected = 0.1 + 0.004 * 16 * 20 / 1.44 / phantom().flow_mL_s(point.phase_s);
+    EXPECT_NEAR(point.stiffness_kPa_per_mL->value, expected, 0.1 * expected);
+    ++known;
+  }
+  EXPECT_GT(known, 5U);
+  // What the page shows is read back as it was written.
+  const FlowRecord record = flow_record(session);
+  EXPECT_EQ(to_json(flow_record_from_json(to_json(record), "x")), to_json(record));
+  EXPECT_EQ(record.images.size(), 12U);
+}
+
+}  // namespace
+}  // namespace diastole::imaging
