@@ -251,6 +251,8 @@ ImageHeader header_of(DcmItem& dataset, int frame, const SlicePlane& plane, cons
   if (!header.trigger_ms) header.trigger_ms = number(dataset, DCM_TriggerTime);
   header.interval_ms = items.number_in(DCM_CardiacSynchronizationSequence, DCM_RRIntervalTimeNominal);
   if (!header.interval_ms) header.interval_ms = number(dataset, DCM_NominalInterval);
+  if (const auto announced = number(dataset, DCM_CardiacNumberOfImages))
+    header.phases_announced = static_cast<int>(std::clamp(*announced, 0.0, 1e6));
   header.component = component_of(items);
   const auto tagging =
       items.find(DCM_MRModifierSequence, [](DcmItem& item) { return text(item, DCM_Tagging); });

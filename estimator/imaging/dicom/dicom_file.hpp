@@ -34,8 +34,9 @@ struct ImageHeader {
   int series_number = 0;
   int instance = 0;
   SlicePlane plane;
-  std::optional<double> trigger_ms;   ///< (0018,1060), or (0020,9153) of an enhanced image
-  std::optional<double> interval_ms;  ///< the cycle: (0018,1062), or (0020,9251)
+  std::optional<double> trigger_ms;     ///< (0018,1060), or (0020,9153) of an enhanced image
+  std::optional<double> interval_ms;    ///< the cycle: (0018,1062), or (0020,9251)
+  std::optional<int> phases_announced;  ///< (0018,1090)
   Component component = Component::unsaid;
   bool says_tagged = false;  ///< (0018,9028)
   std::optional<VelocityEncoding> velocity;

@@ -25,8 +25,8 @@ constexpr double sure_margin = 9.2;
 
 /// Uncorrected backgrounds of 12 scanners were 0.4 to 4.9 cm/s (J. Cardiovasc. Magn. Reson. 12 (2010) 5).
 constexpr double usual_background_cm_s = 2.0;
-/// A phase with wraps whose chi-square is so many times that of phases without has more of them than were found.
-constexpr double worst_wrapped = 3.0;
+/// A fast phase whose chi-square is so many times that of the best, and no small one, has more wraps than were found.
+constexpr double worst_wrapped = 3.0, worst_chi_square = 4.0;
 
 Finding finding(Severity severity, std::string id, std::string what, const std::string& where, double number,
                 std::string unit, std::string remedy) {
@@ -149,27 +149,24 @@ void require_turns_told(const FlowMeasurement& flow, const std::string& folder) 
   const size_t count = flow.scan.phases();
   const std::vector<double> gap = gaps_of(flow.scan);
   const std::vector<double>& core = flow.lumen.core_cm_s;
-  std::vector<double> unwrapped;
-  for (size_t k = 0; k < count; ++k)
-    if (std::abs(core[k]) < 0.5 * flow.scan.venc_cm_s) unwrapped.push_back(flow.lumen.phase_chi_square[k]);
-  const double usual = std::max(1.0, unwrapped.empty() ? 1.0 : signal::median(unwrapped));
+  const double best =
+      *std::min_element(flow.lumen.phase_chi_square.begin(), flow.lumen.phase_chi_square.end());
   for (size_t k = 0; k < count; ++k) {
     if (std::abs(core[k]) < 0.5 * flow.scan.venc_cm_s) continue;
     const size_t last = (k + count - 1) % count;
     const double step = std::max(std::abs(core[k] - core[last]) / gap[last],
                                  std::abs(core[(k + 1) % count] - core[k]) / gap[k]);
     const bool told = step < sure_step * half_turn * cm_s || flow.lumen.turn_margin[k] > sure_margin;
-    if (told && flow.lumen.phase_chi_square[k] < worst_wrapped * usual) continue;
+    if (told && flow.lumen.phase_chi_square[k] < std::max(worst_chi_square, worst_wrapped * best)) continue;
     throw InputError(
         {folder, fmt::format("{}, phase at {:.0f} ms", flow.scan.name, 1e3 * flow.scan.time_s[k]),
          fmt::format(
              "at a venc of {:.4g} cm/s the velocity wraps beyond recovery: it changes by {:.0f} cm/s from "
-             "phase to "
-             "phase, and chi-square of the profile across the lumen is {:.1f} beside {:.1f} without wraps",
-             flow.scan.venc_cm_s, step, flow.lumen.phase_chi_square[k], usual),
-         fmt::format(
-             "Image with a venc above the peak velocity ({:.0f} cm/s or more here), or with more phases.",
-             *std::max_element(core.begin(), core.end()))});
+             "phase to phase, and chi-square of the profile across the lumen is {:.1f} beside {:.1f} of the "
+             "best "
+             "phase",
+             flow.scan.venc_cm_s, step, flow.lumen.phase_chi_square[k], best),
+         "Image with a venc above the peak velocity, or with more phases."});
   }
 }
 

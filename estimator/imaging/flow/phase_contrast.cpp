@@ -123,9 +123,14 @@ void require_phases(const ImageFolder& folder, const ImageSeries& series, const 
     if (!there[k])
       missing +=
           fmt::format("{}{} ({:.0f} ms)", missing.empty() ? "" : ", ", k + 1, series.phases.times_ms[k]);
+  // At the ends of the cycle only the header knows.
+  const auto announced = folder.images[slice.images[0]].header.phases_announced;
+  if (missing.empty() && announced && *announced > static_cast<int>(slice.images.size()))
+    missing = fmt::format("{} to {}, or as many before the first,", slice.images.size() + 1, *announced);
   if (!missing.empty() && !bridge_gaps)
-    refuse((folder.folder / file).string(), "(0018,1060)",
-           fmt::format("phase {} of {} is missing", missing, there.size()),
+    refuse((folder.folder / file).string(), "(0018,1060), (0018,1090)",
+           fmt::format("phase {} of {} is missing", missing,
+                       std::max<size_t>(there.size(), static_cast<size_t>(announced.value_or(0)))),
            "Export the series again; or --bridge-gaps goes across, with the larger error that this costs.");
 }
 

@@ -11,8 +11,10 @@
 namespace diastole::imaging {
 namespace {
 
-/// Air is darker than this share of the bright pixels, at any SNR at which a phase can be measured.
-constexpr double air_share = 0.2;
+/// So many of an image's pixels at least are air if a scale can be read from it.
+constexpr double dark_share = 0.02;
+/// The mean of a cycle's noise differs from pixel to pixel by a sixth or less: no pixel of noise is so much brighter than another.
+constexpr double noise_spread = 1.5;
 /// Of so many values evenly spread over an interval, the largest lies within a hundredth of its end but for one time in 10^4.
 constexpr size_t least_air_pixels = 1000;
 /// The mean of |x| over an even spread is half the end, with a standard error below 0.01 for that many.
@@ -37,10 +39,12 @@ std::optional<double> full_scale_in_air(const std::vector<Image>& velocity,
   Image mean = Image::Zero(magnitude[0].rows(), magnitude[0].cols());
   for (const Image& image : magnitude)
     mean += image / static_cast<float>(magnitude.size());
-  std::vector<float> bright(mean.data(), mean.data() + mean.size());
-  const auto high = bright.begin() + static_cast<std::ptrdiff_t>(0.95 * static_cast<double>(bright.size()));
-  std::nth_element(bright.begin(), high, bright.end());
-  const auto threshold = static_cast<float>(air_share) * *high;
+  // The darkest pixels have noise alone; what rings from an edge is brighter.
+  std::vector<float> sorted(mean.data(), mean.data() + mean.size());
+  const auto dark =
+      sorted.begin() + static_cast<std::ptrdiff_t>(dark_share * static_cast<double>(sorted.size()));
+  std::nth_element(sorted.begin(), dark, sorted.end());
+  const auto threshold = static_cast<float>(noise_spread) * *dark;
   size_t count = 0, zeros = 0;
   double sum = 0, most = 0;
   for (const Image& image : velocity) {

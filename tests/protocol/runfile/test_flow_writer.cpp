@@ -27,9 +27,9 @@ class FlowWriter : public testing::Test {
     fs::permissions(run, fs::perms::owner_write, fs::perm_options::add);
   }
   ~FlowWriter() override { fs::remove_all(folder); }
-  [[nodiscard]] std::string message(size_t segment, const FlowVolume& volume, bool replace) const {
+  [[nodiscard]] std::string message(size_t segment, const FlowVolume& given, bool replace) const {
     try {
-      store_flow(run, segment, volume, replace);
+      store_flow(run, segment, given, replace);
     } catch (const InputError& error) {
       return error.what();
     }
