@@ -174,10 +174,12 @@ TEST(Flow, WhatCannotBeMeasuredIsRefusedWithTagAndRemedy) {
   FlowPhantom still = phantom();
   still.stroke_mL = 0;
   EXPECT_THAT(refusal(still, small()), AllOf(HasSubstr("no lumen"), HasSubstr("--centre")));
+}
 
+TEST(Flow, WrapsBeyondRecoveryAreRefused) {
   FlowPhantom fast = phantom();
   fast.stroke_mL = 120;  // 390 cm/s
-  protocol = small();
+  PhaseContrastProtocol protocol = small();
   protocol.venc_cm_s = 60;
   EXPECT_THAT(refusal(fast, protocol),
               AllOf(HasSubstr("wraps beyond recovery"), HasSubstr("venc above the peak")));
