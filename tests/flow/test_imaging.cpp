@@ -70,8 +70,9 @@ TEST_F(ImagedGel, ASliceThatReachesBeyondTheEndIsTold) {
   ASSERT_EQ(scan.exit_code, 0) << scan.err;
   const Ended track = run(place, {"diastole", "track", "end/dicom", "-o", "end.tags.csv", "--json"});
   ASSERT_EQ(track.exit_code, 0) << track.err;
+  const json problems = track.json().at("problems");
   std::vector<std::string> slices;
-  for (const json& problem : track.json().at("problems")) {
+  for (const json& problem : problems) {
     if (problem.at("id") == "slice-at-end") slices.push_back(problem.at("where"));
   }
   EXPECT_THAT(slices, testing::ElementsAre("series 2, slice 1", "series 2, slice 3", "series 3, slice 1",
