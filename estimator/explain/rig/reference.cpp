@@ -69,17 +69,12 @@ struct Fitted {
     const EffectSet linear = fit_set(problem, start.at, start, problem.error().prior.share);
     evidence = fit_set_exactly(problem, linear).evidence;
   }
-  /// What is known after it as one of so many references. What the model misses is the rig's own and comes again: all of
-  /// them together know the tolerances no better than one does, so each counts for its part.
-  [[nodiscard]] Knowledge knowledge(const Knowledge& before, size_t references) const {
+  /// What is known after it.
+  [[nodiscard]] Knowledge knowledge(const Knowledge& before) const {
     const auto count = before.mean.size();
     const MatrixXd root = before.root();
-    const MatrixXd own = inverse(inverse(evidence.precision).bottomRightCorner(count, count));
-    const MatrixXd unity = MatrixXd::Identity(count, count);
-    const double part = 1.0 / static_cast<double>(references);
-    const MatrixXd covariance = inverse(unity + part * (own - unity));
-    return {before.mean + root * covariance * (part * own * evidence.u.tail(count)),
-            root * covariance * root.transpose()};
+    return {before.mean + root * evidence.u.tail(count),
+            root * inverse(evidence.precision).bottomRightCorner(count, count) * root.transpose()};
   }
 };
 
@@ -109,7 +104,7 @@ Knowledge learn_tolerances(const std::vector<std::unique_ptr<Fitted>>& fits,
     for (const auto& fit : fits) {
       report(fmt::format("fitting the reference {}", fit->study.file.filename().string()));
       fit->fit(known, start);
-      known = fit->knowledge(known, fits.size());
+      known = fit->knowledge(known);
       widen(known, list);
       start = known.mean;
     }

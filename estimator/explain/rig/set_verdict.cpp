@@ -14,6 +14,7 @@ using Eigen::VectorXd;
 using Ids = std::vector<std::string>;
 
 constexpr double name_probability = 0.9;
+constexpr double right_to = 0.1;            ///< an effect's equations, of a real part
 constexpr double least_probability = 0.05;  ///< of a set that is told of
 /// How seldom any part of a model's error may be as large by chance: two sds of one.
 constexpr double surprising_by_chance = 0.0228;
@@ -61,9 +62,8 @@ Eigen::MatrixXd tolerances_by_u(const rig::SessionProblem& problem, Index unknow
   return root;
 }
 
-/// How far off the declared rig's parts would have to be to make such a change, in sds: what they leave of it counts in those
-/// of noise and model's error.
-double sds_of_tolerance(const rig::SessionProblem& problem, const EffectSet& set, const VectorXd& change) {
+/// Do parts of the declared rig that are less than a surprise off, in all, make the same change?
+bool is_tolerance(const rig::SessionProblem& problem, const EffectSet& set, const VectorXd& change) {
   const Eigen::MatrixXd root = tolerances_by_u(problem, set.model.u.size());
   Eigen::MatrixXd columns = set.known.columns;  // by u: now by basic nuisances and by the list's sds
   columns.rightCols(root.cols()) =
@@ -73,9 +73,10 @@ double sds_of_tolerance(const rig::SessionProblem& problem, const EffectSet& set
   constexpr double nearly_free = 1e-6;
   normal.diagonal().head(rig::basic_nuisances).array() += nearly_free;
   normal.diagonal().tail(root.cols()).array() += 1.0;
-  const VectorXd along = columns.transpose() * weight.cwiseProduct(change);
-  return std::sqrt(
-      std::max(change.dot(weight.cwiseProduct(change)) - along.dot(normal.llt().solve(along)), 0.0));
+  const VectorXd parts = normal.llt().solve(columns.transpose() * weight.cwiseProduct(change));
+  const VectorXd left = change - columns * parts;
+  return parts.tail(root.cols()).norm() < least_surprise(1) &&
+         left.cwiseAbs2().dot(weight) < right_to * right_to * change.cwiseAbs2().dot(weight);
 }
 
 /// What a set's effects change each, over the model's error.
@@ -110,12 +111,10 @@ Sizes sizes_of(const rig::SessionProblem& problem, const EffectSet& set, const E
     for (size_t s = 0; s < size.size(); ++s)
       if (error[s] > 0.0) largest = std::max(largest, std::sqrt(size[s] / error[s]));
     sizes.over_error.push_back(largest);
-    const double sds = sds_of_tolerance(problem, set, change);
     sizes.material.push_back(static_cast<size_t>(i) <= given ||
-                             (largest >= known.least_size() && sds >= least_surprise(1)));
+                             (largest >= known.least_size() && !is_tolerance(problem, set, change)));
   }
-  // An effect's equations describe a real part to a tenth: what is smaller beside it may be its own error.
-  constexpr double right_to = 0.1;
+  // What is smaller beside it may be its own error.
   const double largest = *std::ranges::max_element(sizes.over_error);
   for (size_t i = given; i < sizes.material.size(); ++i)
     sizes.material[i] = sizes.material[i] && sizes.over_error[i] >= right_to * largest;
