@@ -172,7 +172,7 @@ void add_explain(CommandLine& line, const ExplanationScorer& score) {
       "  named        one set of effects explains the misfit; its parameters come with 90 % intervals\n"
       "  ambiguous    these data cannot tell several sets apart\n"
       "  unexplained  the misfit has structure that no known effect removes; where it sits is reported\n"
-      "  none         nothing exceeds the noise\n"
+      "  none         nothing exceeds the model's own error\n"
       "OUT gets report.html, explanation.json for `diastole report`, and explained.study.toml: the study "
       "with\n"
       "what was found.\n"

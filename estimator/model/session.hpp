@@ -43,7 +43,7 @@ struct Session {
   MotionLimits limits;  ///< of the first run's /rig; the controller's own where it does not tell
 };
 
-/// Throws InputError if the study names no runs, a run cannot be read, or runs are of different rigs.
+/// Throws InputError if the study names no runs or a run cannot be read.
 Session read_session(const Study& study);
 
 }  // namespace diastole::rig

@@ -120,18 +120,6 @@ RemovedDelay delay_asked(const BinOptions& options, const runfile::RecordedRun& 
   return {s_per_ms * delay_ms, "given"};
 }
 
-double resolution_kPa(const runfile::RecordedRun& run) {
-  const auto found = run.rig.find("cavity_resolution_kPa");
-  const auto* value = found == run.rig.end() ? nullptr : std::get_if<double>(&found->second);
-  return value == nullptr ? 0 : *value;
-}
-
-double variance_of_mean(const runfile::FrameBin& bin, double resolution_kPa) {
-  const double spread = bin.cycles > 1 ? bin.sd_kPa * bin.sd_kPa / static_cast<double>(bin.cycles)
-                                       : bin.sample_sd_kPa * bin.sample_sd_kPa;
-  return spread + resolution_kPa * resolution_kPa / 12;
-}
-
 json bins_as_json(const std::string& run, const runfile::FrameBins& bins, const RemovedDelay& delay) {
   json frames = json::array();
   for (size_t k = 0; k < bins.frames.size(); ++k) {
@@ -175,8 +163,8 @@ std::string frames_csv(const runfile::FrameBins& bins, double resolution_kPa, bo
   for (size_t k = 0; k < bins.frames.size(); ++k) {
     const runfile::FrameBin& bin = bins.frames[k];
     const bool difference = relative && k > 0;
-    const double variance =
-        variance_of_mean(bin, resolution_kPa) + (difference ? variance_of_mean(first, resolution_kPa) : 0);
+    const double variance = runfile::variance_of_mean(bin, resolution_kPa) +
+                            (difference ? runfile::variance_of_mean(first, resolution_kPa) : 0);
     csv += fmt::format("{},{:.6f},{:.6f},{:.6f}\n", k, (bin.window.from_s + bin.window.to_s) / 2,
                        bin.mean_kPa - (relative ? first.mean_kPa : 0), std::sqrt(variance));
   }
@@ -201,7 +189,8 @@ ExitCode bin(BinOptions options, const CommandOutput& out) {
   for (const runfile::ExcludedCycle& cycle : bins.excluded)
     fmt::print(stderr, "cycle {} at {:.3f} s is left out: {}\n", cycle.cycle, cycle.trigger_s, cycle.reason);
   if (!options.frames_csv.empty()) {
-    write_text_file(options.frames_csv, frames_csv(bins, resolution_kPa(run), options.relative));
+    write_text_file(options.frames_csv,
+                    frames_csv(bins, runfile::cavity_resolution_kPa(run), options.relative));
   }
   print(out, bins_as_json(options.run, bins, delay), [&] { show_bins(bins, delay); });
   return ExitCode::done;

@@ -267,4 +267,16 @@ FrameBins bin_frames(const RecordedRun& run, const FrameBinOptions& options) {
   return bins;
 }
 
+double cavity_resolution_kPa(const RecordedRun& run) {
+  const auto found = run.rig.find("cavity_resolution_kPa");
+  const auto* value = found == run.rig.end() ? nullptr : std::get_if<double>(&found->second);
+  return value == nullptr ? 0 : *value;
+}
+
+double variance_of_mean(const FrameBin& bin, double resolution_kPa) {
+  const double spread = bin.cycles > 1 ? bin.sd_kPa * bin.sd_kPa / static_cast<double>(bin.cycles)
+                                       : bin.sample_sd_kPa * bin.sample_sd_kPa;
+  return spread + resolution_kPa * resolution_kPa / 12;
+}
+
 }  // namespace diastole::runfile

@@ -77,4 +77,9 @@ double binned_interval_s(const RecordedRun& run, const FrameBinOptions& options)
 /// the interval, or no whole cycle is left (the message says why the first was excluded).
 FrameBins bin_frames(const RecordedRun& run, const FrameBinOptions& options);
 
+/// A step of the converter behind the cavity's pressure; 0 if the run does not tell.
+double cavity_resolution_kPa(const RecordedRun& run);
+/// Of a frame's mean, kPa^2: over the cycles (of one cycle: of its samples), and a step of the converter.
+double variance_of_mean(const FrameBin& bin, double resolution_kPa);
+
 }  // namespace diastole::runfile

@@ -169,7 +169,9 @@ void state_error(const StudyModelError& stated, rig::Shares& share) {
 }
 
 /// What its references say of the rig, and the problem with it.
-ReferenceSummary take_reference(const Reference& reference, rig::SessionProblem& problem) {
+ReferenceSummary take_reference(const Study& study, const Reference& reference,
+                                rig::SessionProblem& problem) {
+  require_rig_of(reference, problem.session(), study);
   use_reference(reference, problem);
   ReferenceSummary summary;
   summary.sessions = reference.sessions;
@@ -201,7 +203,7 @@ Explanation explain_rig(const Study& study, const ExplainOptions& options) {
   state_error(study.model_error, problem.error().prior.share);
   std::optional<ReferenceSummary> reference;
   if (!study.data.reference.empty())
-    reference = take_reference(reference_of(study, options.threads, report), problem);
+    reference = take_reference(study, reference_of(study, options.threads, report), problem);
   SetSearchOptions searching{.progress = report};
   take_given(study, session, searching);
   const SetSearch search = search_sets(problem, searching);

@@ -10,6 +10,7 @@
 
 #include "estimator/explain/rig/set_fit.hpp"
 #include "estimator/rig_fit/base_fit.hpp"
+#include "protocol/contract/input_error.hpp"
 
 namespace diastole::explain {
 namespace {
@@ -149,6 +150,19 @@ Shares differing_shares(const std::vector<std::unique_ptr<Fitted>>& fits, const 
 
 }  // namespace
 
+void require_rig_of(const Reference& reference, const rig::Session& session, const Study& study) {
+  const rig::Hose& hose = session.base.hose;
+  if (reference.hose_length_m == 0.0 ||
+      (hose.length_m == reference.hose_length_m && hose.bore_mm == reference.hose_bore_mm))
+    return;
+  throw InputError(
+      {.file = study.file.string(),
+       .place = "attributes /rig hose_length_m, hose_bore_mm of its runs",
+       .problem = fmt::format("are {:g} m and {:g} mm, and those of the reference {:g} m and {:g} mm",
+                              hose.length_m, hose.bore_mm, reference.hose_length_m, reference.hose_bore_mm),
+       .remedy = "A reference is a session of the same rig: name one, or leave [data] reference out."});
+}
+
 Reference learn_reference(const std::vector<Study>& studies, size_t threads,
                           const std::function<void(std::string_view)>& progress) {
   const auto report = [&](const std::string& what) {
@@ -159,6 +173,10 @@ Reference learn_reference(const std::vector<Study>& studies, size_t threads,
   for (const Study& study : studies)
     fits.push_back(std::make_unique<Fitted>(study, threads));
   out.sessions = fits.size();
+  out.hose_length_m = fits.front()->session.base.hose.length_m;
+  out.hose_bore_mm = fits.front()->session.base.hose.bore_mm;
+  for (const auto& fit : fits)
+    require_rig_of(out, fit->session, fit->study);
   const Knowledge known = learn_tolerances(fits, report);
   for (const Nuisance& nuisance : std::span(fits.front()->problem.nuisances()).subspan(basic_nuisances))
     out.tolerances.push_back(nuisance.name);

@@ -35,11 +35,16 @@ struct Reference {
   rig::Shares again{};                               ///< of the part that does not repeat
   std::array<double, rig::signal_count> rms{};       ///< of the references' misfit, kPa or mL
   std::array<double, rig::signal_count> percent_of_range{};
+  double hose_length_m = 0.0, hose_bore_mm = 0.0;  ///< as the rig declares; 0: not kept
   size_t sessions = 0;
   std::string fingerprint;  ///< of the recordings
 };
 
-/// Fits the rig's model to each study's session. Throws InputError as read_session and SpecimenFamily do.
+/// Throws InputError if the hose that the study's rig declares is not that of the reference: it is another rig.
+void require_rig_of(const Reference& reference, const rig::Session& session, const Study& study);
+
+/// Fits the rig's model to each study's session. Throws InputError as read_session and SpecimenFamily do, and for studies of
+/// different rigs.
 Reference learn_reference(const std::vector<Study>& studies, size_t threads,
                           const std::function<void(std::string_view)>& progress = {});
 

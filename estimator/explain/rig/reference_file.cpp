@@ -16,7 +16,7 @@ namespace {
 using Eigen::Index;
 
 /// The rules by which references are learnt: another number makes what is in caches old.
-constexpr int learning_version = 5;
+constexpr int learning_version = 7;
 
 constexpr RecordFormat format{
     "diastole-reference", "a reference of a rig",
@@ -56,6 +56,7 @@ std::string to_json(const Reference& reference) {
   }
   json["fingerprint"] = reference.fingerprint;
   json["sessions"] = reference.sessions;
+  json["rig"] = {{"hose_length_m", reference.hose_length_m}, {"hose_bore_mm", reference.hose_bore_mm}};
   json["shares"] = {{"all", reference.all}, {"again", reference.again}};
   json["tolerances"] = {{"names", reference.tolerances},
                         {"mean", list_of(reference.mean)},
@@ -80,6 +81,10 @@ Reference reference_from_json(std::string_view text, const std::string& file) {
     }
     reference.fingerprint = json.at("fingerprint").get<std::string>();
     reference.sessions = json.at("sessions").get<size_t>();
+    if (json.contains("rig")) {
+      reference.hose_length_m = json.at("rig").at("hose_length_m").get<double>();
+      reference.hose_bore_mm = json.at("rig").at("hose_bore_mm").get<double>();
+    }
     reference.all = json.at("shares").at("all").get<rig::Shares>();
     reference.again = json.at("shares").at("again").get<rig::Shares>();
     const Json& tolerances = json.at("tolerances");

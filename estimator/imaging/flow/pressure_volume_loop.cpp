@@ -25,18 +25,6 @@ constexpr double same_period = 0.01;
 /// Slower than this share of its peak, the flow is about to turn and dp/dV is 0/0.
 constexpr double least_flow_share = 0.2;
 
-double resolution_kPa(const runfile::RecordedRun& run) {
-  const auto found = run.rig.find("cavity_resolution_kPa");
-  const auto* value = found == run.rig.end() ? nullptr : std::get_if<double>(&found->second);
-  return value == nullptr ? 0 : *value;
-}
-
-double sigma_of_mean(const runfile::FrameBin& bin, double resolution_kPa) {
-  const double spread = bin.cycles > 1 ? bin.sd_kPa * bin.sd_kPa / static_cast<double>(bin.cycles)
-                                       : bin.sample_sd_kPa * bin.sample_sd_kPa;
-  return std::sqrt(spread + resolution_kPa * resolution_kPa / 12);
-}
-
 int64_t cycles_in(double interval_s, double period_s, const runfile::RecordedRun& run,
                   const std::string& source) {
   const double cycles = interval_s / period_s;
@@ -127,7 +115,7 @@ PressureVolumeLoop pressure_volume_loop(const FlowMeasurement& flow, const runfi
     const runfile::FrameBin& bin = bins.frames[static_cast<size_t>(i)];
     time[i] = 0.5 * (bin.window.from_s + bin.window.to_s) * flow.interval_s() / interval_s;
     mean[i] = bin.mean_kPa;
-    variance[i] = std::pow(sigma_of_mean(bin, resolution_kPa(run)), 2);
+    variance[i] = runfile::variance_of_mean(bin, runfile::cavity_resolution_kPa(run));
   }
   // A few cycles' own spread may by chance be nothing.
   variance = variance.cwiseMax(0.1 * variance.mean() + 1e-12);

@@ -29,6 +29,28 @@ TEST(Reference, IsReadAsItWasWritten) {
   EXPECT_EQ(read.fingerprint, "0badcafe");
 }
 
+TEST(Reference, OfAnotherRigIsRefusedWithBothHoses) {
+  Reference reference;
+  reference.covariance.resize(0, 0);
+  reference.hose_length_m = 4.7;
+  reference.hose_bore_mm = 14.0;
+  reference = reference_from_json(to_json(reference), "rig.reference.json");
+  Study study;
+  study.file = "today.study.toml";
+  rig::Session session;
+  session.base.hose.length_m = 4.7;
+  session.base.hose.bore_mm = 14.0;
+  EXPECT_NO_THROW(require_rig_of(reference, session, study));
+  session.base.hose.length_m = 5.3;
+  try {
+    require_rig_of(reference, session, study);
+    ADD_FAILURE() << "another rig's reference was taken";
+  } catch (const InputError& error) {
+    EXPECT_THAT(error.what(), testing::AllOf(testing::HasSubstr("today.study.toml"),
+                                             testing::HasSubstr("5.3 m"), testing::HasSubstr("4.7 m")));
+  }
+}
+
 TEST(Reference, ThatIsNoneIsRefusedWithItsFile) {
   for (const char* text :
        {"", "{}", R"({"format": "diastole-reference", "format_version": 1, "channels": {}})"}) {
