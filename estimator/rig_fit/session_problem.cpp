@@ -46,6 +46,8 @@ SessionProblem::SessionProblem(const Session& session, const SpecimenFamily& fam
       nuisances_.push_back({std::string(tolerance.name), std::string(tolerance.unit), sd, 0.0,
                             tolerance.sensors_only, &tolerance});
   }
+  const auto tolerances = static_cast<Eigen::Index>(nuisances_.size() - basic_nuisances);
+  prior_ = {Eigen::VectorXd::Zero(tolerances), Eigen::MatrixXd::Identity(tolerances, tolerances)};
   // Features are means: with these steps and components they err by less than a twentieth of the model's stated error, where
   // the line rings most too.
   simulation_ = {.step_s = noise_.channels.contains(Channel::pump) ? 1.0 / 300.0 : 1.0 / 150.0,
@@ -54,7 +56,7 @@ SessionProblem::SessionProblem(const Session& session, const SpecimenFamily& fam
     motions_.push_back(sampled_motion(run.drive, dividing_step(run.drive, simulation_.step_s)));
 }
 
-RigModel SessionProblem::model(const SessionModel& of) const { return model(of, tolerances(of.u)); }
+RigModel SessionProblem::model(const SessionModel& of) const { return model(of, tolerances(of)); }
 
 RigModel SessionProblem::model(const SessionModel& of, const Eigen::VectorXd& offsets) const {
   RigModel model = session_.base;
@@ -77,16 +79,6 @@ RigModel SessionProblem::model(const SessionModel& of, const Eigen::VectorXd& of
     values = values.subspan(count);
   }
   return model;
-}
-
-void SessionProblem::set_tolerances(const Eigen::VectorXd& mean, const Eigen::MatrixXd& root) {
-  mean_ = mean;
-  root_ = root;
-}
-
-Eigen::VectorXd SessionProblem::tolerances(const Eigen::VectorXd& u) const {
-  const auto count = static_cast<Eigen::Index>(nuisances_.size() - basic_nuisances);
-  return root_.size() == 0 ? Eigen::VectorXd(u.tail(count)) : Eigen::VectorXd(mean_ + root_ * u.tail(count));
 }
 
 PlantTrace SessionProblem::plant(const RigModel& model, size_t run) const {
@@ -144,9 +136,10 @@ Eigen::MatrixXd SessionProblem::nuisance_columns(const SessionModel& at, Eigen::
   const auto basic = static_cast<Eigen::Index>(basic_nuisances);
   const auto count = static_cast<Eigen::Index>(nuisances_.size());
   // Tolerances one by one, whose combinations u may be: some change nothing but what the sensors show.
-  const Eigen::VectorXd from = tolerances(at.u);
+  const Eigen::VectorXd from = tolerances(at);
+  const Eigen::MatrixXd& root = prior(at).root;
   Eigen::VectorXd steps = Eigen::VectorXd::Constant(count, part);
-  if (root_.size() != 0) steps.tail(count - basic) = part * root_.rowwise().norm();
+  steps.tail(count - basic) = part * root.rowwise().norm();
   const RigModel here = model(at);
   std::vector<RigModel> models{here};
   std::vector<bool> same_plant{true};
@@ -160,7 +153,7 @@ Eigen::MatrixXd SessionProblem::nuisance_columns(const SessionModel& at, Eigen::
   const Eigen::MatrixXd all = shown(models, same_plant);
   there = all.col(0);
   Eigen::MatrixXd columns = (all.rightCols(count).colwise() - there) * steps.cwiseInverse().asDiagonal();
-  if (root_.size() != 0) columns.rightCols(count - basic) *= root_;
+  columns.rightCols(count - basic) *= root;
   return columns;
 }
 

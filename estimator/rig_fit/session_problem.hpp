@@ -1,6 +1,7 @@
 #pragma once
 // A session as a problem in features: what a model with its tolerances and effects would show.
 
+#include <memory>
 #include <span>
 
 #include "estimator/model/specimen_family.hpp"
@@ -10,12 +11,19 @@
 
 namespace diastole::rig {
 
+/// Of the tolerances, in sds of their list's: N(mean, root root').
+struct TolerancePrior {
+  Eigen::VectorXd mean;
+  Eigen::MatrixXd root;
+};
+
 /// Effects with their values, and the nuisances: modulus, sensors' offsets, tolerances, each N(0, 1) by its prior. Where a
 /// reference has told more of the tolerances, theirs are independent combinations of them.
 struct SessionModel {
   std::vector<ModelTerm> terms;
   std::vector<double> values;  ///< of the effects, natural
   Eigen::VectorXd u;
+  std::shared_ptr<const TolerancePrior> prior = {};  ///< where it is not the problem's
 };
 
 struct Nuisance {
@@ -43,10 +51,15 @@ class SessionProblem {
   /// What was measured, less what is known of the rig's own misfit.
   [[nodiscard]] const Eigen::VectorXd& measured() const { return measured_; }
   void take_off(const Eigen::VectorXd& misfit) { measured_ -= misfit; }
-  /// The tolerances' prior, in sds of their list's: N(mean, root root').
-  void set_tolerances(const Eigen::VectorXd& mean, const Eigen::MatrixXd& root);
+  void set_tolerances(TolerancePrior prior) { prior_ = std::move(prior); }
+  /// Of a model's tolerances.
+  [[nodiscard]] const TolerancePrior& prior(const SessionModel& of) const {
+    return of.prior ? *of.prior : prior_;
+  }
   /// The tolerances of a model, in sds of their list's.
-  [[nodiscard]] Eigen::VectorXd tolerances(const Eigen::VectorXd& u) const;
+  [[nodiscard]] Eigen::VectorXd tolerances(const SessionModel& of) const {
+    return prior(of).mean + prior(of).root * of.u.tail(prior(of).mean.size());
+  }
   [[nodiscard]] const ModelError& error() const { return error_; }
   [[nodiscard]] const std::vector<Nuisance>& nuisances() const { return nuisances_; }
   [[nodiscard]] size_t threads() const { return threads_; }
@@ -79,8 +92,7 @@ class SessionProblem {
   ModelError error_;
   Eigen::VectorXd measured_;
   std::vector<Nuisance> nuisances_;
-  Eigen::VectorXd mean_;
-  Eigen::MatrixXd root_;
+  TolerancePrior prior_;  ///< the list's, if no reference says more
   SimulationOptions simulation_;
   std::vector<DriveTrace> motions_;
 };

@@ -10,6 +10,7 @@
 #include <optional>
 #include <span>
 
+#include "estimator/explain/rig/changed_parts.hpp"
 #include "estimator/explain/rig/event_scan.hpp"
 #include "estimator/explain/rig/set_fit.hpp"
 #include "estimator/rig_fit/base_fit.hpp"
@@ -127,6 +128,11 @@ class SetsSearch {
     return set.model.terms.size() - options_.terms.size();
   }
   void fit(const std::vector<size_t>& responses);
+  /// From `start`, near a model that is known.
+  void fit(const SessionModel& start, const rig::LinearisedModel& known, const rig::Shares& shares) {
+    const FreedStart free = free_changed_parts(problem_, start, known);
+    sets_.push_back(fit_set(problem_, free.start, free.known, shares, best_posterior()));
+  }
   [[nodiscard]] double best_posterior() const {
     double best = -std::numeric_limits<double>::infinity();
     for (const EffectSet& set : sets_)
@@ -190,7 +196,7 @@ void SetsSearch::fit(const std::vector<size_t>& responses) {
         start.values[at] = std::max(start.values[at], response.values[j]);
   }
   if (is_fitted(effects)) return;
-  sets_.push_back(fit_set(problem_, start, base_, problem_.error().prior.share, best_posterior()));
+  fit(start, base_, problem_.error().prior.share);
 }
 
 void SetsSearch::fit_beside_best() {
@@ -211,12 +217,12 @@ void SetsSearch::fit_beside_best() {
     SessionModel start = first.model;
     start.terms.push_back(response.term);
     start.values.insert(start.values.end(), response.values.begin(), response.values.end());
-    sets_.push_back(fit_set(problem_, start, first.known, first.evidence.shares, best_posterior()));
+    fit(start, first.known, first.evidence.shares);
   }
   for (const Effect* effect : rig_effects()) {
     if (effect->change_points() == ChangePoints::none || effect == first.model.terms.back().effect) continue;
     if (const auto start = scan_events(problem_, first, *effect))
-      sets_.push_back(fit_set(problem_, *start, first.known, first.evidence.shares, best_posterior()));
+      fit(*start, first.known, first.evidence.shares);
   }
 }
 
@@ -261,7 +267,7 @@ SetSearch SetsSearch::run() {
   for (const Effect* effect : rig_effects())
     if (effect->change_points() != ChangePoints::none)
       if (const auto start = scan_events(problem_, plain, *effect))
-        sets_.push_back(fit_set(problem_, *start, base_, problem_.error().prior.share, best_posterior()));
+        fit(*start, base_, problem_.error().prior.share);
   report("fitting the best of them again");
   fit_best_again(0);
   fit_best_again(1);

@@ -182,10 +182,7 @@ ReferenceSummary take_reference(const Study& study, const Reference& reference,
     summary.channels.push_back(
         {std::string(rig::name_of(signal)), scale * reference.rms[s], reference.percent_of_range[s]});
   }
-  const auto tolerances = static_cast<Eigen::Index>(problem.nuisances().size() - rig::basic_nuisances);
-  summary.departures = departures(
-      problem, problem.tolerances(
-                   Eigen::VectorXd::Zero(tolerances + static_cast<Eigen::Index>(rig::basic_nuisances))));
+  summary.departures = departures(problem, problem.prior({}).mean);
   return summary;
 }
 
@@ -229,7 +226,7 @@ Explanation explain_rig(const Study& study, const ExplainOptions& options) {
   out.confidence = verdict.confidence;
   out.model_error = model_error_of(problem, chosen, from_reference);
   out.reference = reference;
-  out.departures = departures(problem, problem.tolerances(chosen.model.u));
+  out.departures = departures(problem, problem.tolerances(chosen.model));
   for (const rig::CycleScatter& scatter : verdict.scatter)
     out.cycle_scatter.push_back(
         {std::string(rig::name_of(scatter.signal)), 1e3 * scatter.rms_kPa, 1e3 * scatter.noise_kPa,

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <map>
 
+#include "estimator/explain/rig/changed_parts.hpp"
+
 namespace diastole::explain {
 namespace {
 
@@ -28,6 +30,7 @@ double least_surprise(size_t parts) {
 struct Sizes {
   std::vector<double> over_error;
   std::vector<bool> material;
+  VectorXd changed;  ///< squares of what all of them change
 };
 
 /// Squares of features by signal, over the samples they live in.
@@ -49,22 +52,9 @@ VectorXd error_squares(const rig::ModelError& error, const rig::Shares& shares) 
   return error.variance(shares) - error.noise;
 }
 
-/// Offsets of the tolerances, in sds of their list's, by u: a column each.
-Eigen::MatrixXd tolerances_by_u(const rig::SessionProblem& problem, Index unknowns) {
-  const Index count = unknowns - static_cast<Index>(rig::basic_nuisances);
-  const VectorXd none = VectorXd::Zero(unknowns);
-  Eigen::MatrixXd root(count, count);
-  for (Index i = 0; i < count; ++i) {
-    VectorXd unit = none;
-    unit[i + static_cast<Index>(rig::basic_nuisances)] = 1.0;
-    root.col(i) = problem.tolerances(unit) - problem.tolerances(none);
-  }
-  return root;
-}
-
 /// Do parts of the declared rig that are less than a surprise off, in all, make the same change?
 bool is_tolerance(const rig::SessionProblem& problem, const EffectSet& set, const VectorXd& change) {
-  const Eigen::MatrixXd root = tolerances_by_u(problem, set.model.u.size());
+  const Eigen::MatrixXd& root = problem.prior(set.model).root;
   Eigen::MatrixXd columns = set.known.columns;  // by u: now by basic nuisances and by the list's sds
   columns.rightCols(root.cols()) =
       root.transpose().partialPivLu().solve(columns.rightCols(root.cols()).transpose()).transpose();
@@ -102,10 +92,12 @@ Sizes sizes_of(const rig::SessionProblem& problem, const EffectSet& set, const E
   Eigen::MatrixXd normal = basic.transpose() * weight.asDiagonal() * basic;
   normal.diagonal().array() += 1e-6;  // a channel that is not there has no offset
   const auto error = mean_squares(problem, error_squares(problem.error(), set.evidence.shares));
+  sizes.changed = VectorXd::Zero(shown.rows());
   for (Index i = 1; i < shown.cols(); ++i) {
     const VectorXd change = shown.col(0) - shown.col(i);
     const VectorXd left =
         change - basic * normal.llt().solve(basic.transpose() * weight.cwiseProduct(change));
+    sizes.changed += left.cwiseAbs2();
     const auto size = mean_squares(problem, left.cwiseAbs2());
     double largest = 0.0;
     for (size_t s = 0; s < size.size(); ++s)
@@ -147,27 +139,18 @@ bool is_irregular(const rig::SessionProblem& problem, const std::vector<rig::Cyc
   });
 }
 
-/// Does an effect of the set change this part ("hose_bore" by "hose-compliance")? It is another one then than what was learnt.
-bool is_changed(const EffectSet& set, std::string_view part) {
-  return std::ranges::any_of(set.model.terms, [&](const rig::ModelTerm& term) {
-    const std::string_view id = term.effect->text().id;
-    return part.substr(0, part.find('_')) == id.substr(0, id.find('-'));
-  });
-}
-
 /// Are the parts of the rig in all further from what is declared or was learnt of them than is likely? Those that are known to
 /// an order of magnitude only, by no data sheet, may be anywhere; and so may those that an effect changes.
-bool is_strained_in_all(const rig::SessionProblem& problem, const EffectSet& set) {
+bool is_strained_in_all(const rig::SessionProblem& problem, const EffectSet& set, const VectorXd& u) {
   constexpr double guess = 0.5;  // sd of a logarithm
-  const Index count = set.model.u.size() - static_cast<Index>(rig::basic_nuisances);
+  const Index count = u.size() - static_cast<Index>(rig::basic_nuisances);
   std::vector<Index> known;
   for (Index i = 0; i < count; ++i) {
     const rig::Nuisance& part = problem.nuisances()[static_cast<size_t>(i) + rig::basic_nuisances];
-    if ((part.unit != "ln" || part.sd < guess) && !is_changed(set, part.name)) known.push_back(i);
+    if ((part.unit != "ln" || part.sd < guess) && !is_changed(set.model, part.name)) known.push_back(i);
   }
-  const VectorXd none = VectorXd::Zero(set.model.u.size());
-  const VectorXd moved = problem.tolerances(set.model.u) - problem.tolerances(none);
-  const Eigen::MatrixXd root = tolerances_by_u(problem, set.model.u.size());
+  const Eigen::MatrixXd& root = problem.prior(set.model).root;
+  const VectorXd moved = root * u.tail(count);
   const Eigen::MatrixXd covariance = (root * root.transpose())(known, known);
   const VectorXd of_known = moved(known);
   const double square = of_known.dot(covariance.llt().solve(of_known));
@@ -175,21 +158,25 @@ bool is_strained_in_all(const rig::SessionProblem& problem, const EffectSet& set
                       boost::math::chi_squared(static_cast<double>(known.size())), surprising_by_chance));
 }
 
-bool is_surprising(const rig::SessionProblem& problem, const EffectSet& set, double most_sds) {
-  const rig::Shares surprise = set.evidence.surprise(problem.error().prior);
+bool is_surprising(const rig::SessionProblem& problem, const rig::EvidenceFit& evidence, double most_sds) {
+  const rig::Shares surprise = evidence.surprise(problem.error().prior);
   return std::ranges::any_of(surprise, [&](double sds) { return sds > most_sds; });
 }
 
-/// A name bears what the parts of the error show by chance, and one tolerance that is far off if they are not in all.
-bool bears_a_name(const rig::SessionProblem& problem, const EffectSet& set) {
-  return !is_surprising(problem, set, least_surprise(parts_of(problem.error()))) &&
-         !is_strained_in_all(problem, set);
+/// A name bears what the parts of the error show by chance, and one tolerance that is far off if they are not in all; what its
+/// effects change may be wrong to the part that equations of real parts are.
+bool bears_a_name(const rig::SessionProblem& problem, const EffectSet& set, const Sizes& sizes) {
+  rig::ModelError error = problem.error();
+  error.noise += right_to * right_to * sizes.changed;
+  const rig::EvidenceFit again = fit_with_shares(set.target(), set.columns, error, set.evidence.shares);
+  return !is_surprising(problem, again, least_surprise(parts_of(error))) &&
+         !is_strained_in_all(problem, set, again.u.tail(set.model.u.size()));
 }
 
 /// That nothing is wrong is not said of a misfit that one part shows so seldom, nor of one tolerance so far to either side.
 bool bears_nothing_wrong(const rig::SessionProblem& problem, const EffectSet& set) {
   const size_t tolerances = 2 * (problem.nuisances().size() - rig::basic_nuisances);
-  return inference::is_settled(set.termination) && !is_surprising(problem, set, least_surprise(1)) &&
+  return inference::is_settled(set.termination) && !is_surprising(problem, set.evidence, least_surprise(1)) &&
          largest_tolerance(set) <= least_surprise(tolerances);
 }
 
@@ -254,7 +241,7 @@ SetVerdict judge_sets(const rig::SessionProblem& problem, const SetSearch& searc
   const bool is_more = leading->first.size() > search.given;
   if (is_more) out.searches.push_back({best.ids(), best.termination});
   // That nothing is wrong holds without the hints or with them.
-  const bool borne = is_more ? bears_a_name(problem, best)
+  const bool borne = is_more ? bears_a_name(problem, best, sizes[out.chosen])
                              : bears_nothing_wrong(problem, *plain) || bears_nothing_wrong(problem, best);
   out.scatter = rig::cycle_scatter(problem, best.model);
   if (!borne || is_irregular(problem, out.scatter) || !is_settled(out.searches)) {
