@@ -173,11 +173,19 @@ bool bears_a_name(const rig::SessionProblem& problem, const EffectSet& set, cons
          !is_strained_in_all(problem, set, again.u.tail(set.model.u.size()));
 }
 
-/// That nothing is wrong is not said of a misfit that one part shows so seldom, nor of one tolerance so far to either side.
+/// That nothing is wrong is not said of a misfit that one part shows so seldom, nor of one tolerance so far to either side,
+/// nor of both as seldom together (Fisher 1925: minus two ln of their product is chi-square on four).
 bool bears_nothing_wrong(const rig::SessionProblem& problem, const EffectSet& set) {
-  const size_t tolerances = 2 * (problem.nuisances().size() - rig::basic_nuisances);
-  return inference::is_settled(set.termination) && !is_surprising(problem, set.evidence, least_surprise(1)) &&
-         largest_tolerance(set) <= least_surprise(tolerances);
+  const auto beyond = [](double sds) {
+    return boost::math::cdf(boost::math::complement(boost::math::normal(), sds));
+  };
+  const double misfit = beyond(std::ranges::max(set.evidence.surprise(problem.error().prior)));
+  const auto tolerances = static_cast<double>(problem.nuisances().size() - rig::basic_nuisances);
+  const double strain = -std::expm1(tolerances * std::log1p(-2.0 * beyond(largest_tolerance(set))));
+  const double product = misfit * strain;
+  const double together = product > 0.0 ? product * (1.0 - std::log(product)) : 0.0;
+  return inference::is_settled(set.termination) &&
+         std::min({misfit, strain, together}) > surprising_by_chance;
 }
 
 }  // namespace
