@@ -12,7 +12,7 @@
 #include "protocol/runfile/reader.hpp"
 #include "tests/faults/fault_table.hpp"
 #include "tests/host/acquisition/session_on_desk.hpp"
-#include "tests/tools/link_faults/campaign.hpp"
+#include "tests/link_faults/campaign.hpp"
 
 namespace diastole::faults {
 namespace {

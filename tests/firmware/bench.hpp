@@ -9,7 +9,7 @@
 #include "firmware/boards/recording/recorded_controller.hpp"
 #include "protocol/wire/messages.hpp"
 #include "protocol/wire/reliable_link.hpp"
-#include "tools/link_faults/line_faults.hpp"
+#include "tests/link_faults/line_faults.hpp"
 
 namespace diastole::firmware {
 

@@ -152,7 +152,6 @@ const std::vector<Rule>& rules() {
       {"tools/sim_rig",
        {"protocol", "firmware/core", "firmware/boards/recording", "host/transport", "tools/program",
         "tools/sim_board", "tools/sim_controller", "tools/sim_daq"}},
-      {"tools/link_faults", {"protocol/contract", "host/transport", "tools/program", "tools/sim_controller"}},
       {"tools/sim_scanner", {"protocol/contract", "estimator/mesh", "estimator/parallel"}},
       {"tools/diastole/scan",
        {"protocol/contract", "estimator/cli", "estimator/fe", "estimator/io", "estimator/mesh",
@@ -165,7 +164,8 @@ const std::vector<Rule>& rules() {
       {"tools/diastole/replay",
        {"protocol", "host", "tools/diastole/commands.hpp", "tools/diastole/simulate", "tools/sim_rig"}},
       {"tools/diastole/catheter", {"protocol", "estimator", "tools/diastole/commands.hpp"}},
-      {"tools/figures", {"protocol/contract", "estimator"}},
+      {"tools/benchmarks/verification", {"protocol/contract", "estimator"}},
+      {"tools/effects_page", {"estimator/effects"}},
       {"tools", {"protocol", "firmware", "host", "estimator"}},
       {"tests", {"protocol", "firmware", "host", "estimator", "tools"}},
   };

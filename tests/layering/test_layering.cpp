@@ -52,7 +52,7 @@ INSTANTIATE_TEST_SUITE_P(
                     std::pair{"tools/sim_rig/plant.cpp", "tests/sim/fake.hpp"},
                     std::pair{"estimator/rig/hose.cpp", "tools/sim_rig/plant.hpp"},
                     std::pair{"tools/sim_rig/plant/gel.cpp", "estimator/fe/newton.hpp"},
-                    std::pair{"tools/sim_rig/plant/gel.cpp", "tools/figures/line_chart.hpp"},
+                    std::pair{"tools/sim_rig/plant/gel.cpp", "tools/benchmarks/step_rate.hpp"},
                     std::pair{"tools/sim_board/board.cpp", "tools/sim_rig/rig.hpp"},
                     std::pair{"tools/sim_board/core/bus.hpp", "tools/sim_board/peripherals/gpio.hpp"},
                     std::pair{"firmware/core/profiles/hold.cpp", "firmware/core/planner.hpp"},

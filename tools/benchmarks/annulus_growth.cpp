@@ -10,7 +10,7 @@
 #include <stdexcept>
 #include <vector>
 
-#include "tools/figures/line_chart.hpp"
+#include "tools/benchmarks/verification/line_chart.hpp"
 
 namespace diastole {
 namespace {

@@ -1,5 +1,5 @@
 #pragma once
-// The orders that the made-up solutions of tools/figures/manufactured_solution.hpp must converge with.
+// The orders that the made-up solutions of tools/benchmarks/verification/manufactured_solution.hpp must converge with.
 //
 // Tri-cubic displacement alone has order 4 in L2 and 3 in H1, which it shows where the pressure's space holds the
 // exact pressure. A curved pressure is met to order 2 by tri-linear functions and takes the displacement along: 3 and
@@ -9,7 +9,7 @@
 
 #include <gtest/gtest.h>
 
-#include "tools/figures/manufactured_solution.hpp"
+#include "tools/benchmarks/verification/manufactured_solution.hpp"
 
 namespace diastole {
 

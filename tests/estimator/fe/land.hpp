@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "tools/figures/land_problems.hpp"
+#include "tools/benchmarks/verification/land_problems.hpp"
 
 namespace diastole {
 

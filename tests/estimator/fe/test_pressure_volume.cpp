@@ -5,7 +5,7 @@
 
 #include "estimator/fe/pressure_volume.hpp"
 #include "tests/estimator/fe/gel.hpp"
-#include "tools/figures/sphere.hpp"
+#include "tools/benchmarks/verification/sphere.hpp"
 
 namespace diastole {
 namespace {

@@ -16,7 +16,7 @@
 #include <string>
 
 #include "tests/estimator/fe/gel.hpp"
-#include "tools/figures/mixed_derivatives.hpp"
+#include "tools/benchmarks/verification/mixed_derivatives.hpp"
 
 namespace diastole {
 namespace {

@@ -11,7 +11,7 @@
 
 #include "protocol/wire/messages.hpp"
 #include "protocol/wire/reliable_link.hpp"
-#include "tools/link_faults/line_faults.hpp"
+#include "tests/link_faults/line_faults.hpp"
 #include "tools/sim_controller/simulated_controller.hpp"
 
 namespace diastole::sim_board_test {

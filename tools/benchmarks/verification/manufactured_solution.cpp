@@ -1,4 +1,4 @@
-#include "tools/figures/manufactured_solution.hpp"
+#include "tools/benchmarks/verification/manufactured_solution.hpp"
 
 #include <array>
 #include <cmath>
@@ -7,7 +7,7 @@
 #include "estimator/fe/elastic_system.hpp"
 #include "estimator/fe/point_fields.hpp"
 #include "estimator/mesh/block.hpp"
-#include "tools/figures/mixed_derivatives.hpp"
+#include "tools/benchmarks/verification/mixed_derivatives.hpp"
 
 namespace diastole {
 namespace {

@@ -4,7 +4,7 @@
 
 #include <CLI/CLI.hpp>
 
-#include "tools/link_faults/proxy.hpp"
+#include "tests/link_faults/proxy.hpp"
 #include "tools/program/program.hpp"
 
 namespace {

@@ -9,8 +9,8 @@
 #include <cstdio>
 #include <vector>
 
-#include "tools/figures/line_chart.hpp"
-#include "tools/figures/manufactured_solution.hpp"
+#include "tools/benchmarks/verification/line_chart.hpp"
+#include "tools/benchmarks/verification/manufactured_solution.hpp"
 
 namespace diastole {
 namespace {

@@ -10,7 +10,7 @@
 
 #include "host/transport/serial_port.hpp"
 #include "protocol/contract/input_error.hpp"
-#include "tools/link_faults/proxy.hpp"
+#include "tests/link_faults/proxy.hpp"
 #include "tools/sim_controller/pty_line.hpp"
 
 namespace diastole::link_faults {

@@ -1,4 +1,4 @@
-#include "tools/figures/land_problems.hpp"
+#include "tools/benchmarks/verification/land_problems.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -5,8 +5,8 @@
 #include <fmt/format.h>
 
 #include "estimator/fe/pressure_volume.hpp"
-#include "tools/figures/line_chart.hpp"
-#include "tools/figures/sphere.hpp"
+#include "tools/benchmarks/verification/line_chart.hpp"
+#include "tools/benchmarks/verification/sphere.hpp"
 
 namespace diastole {
 namespace {

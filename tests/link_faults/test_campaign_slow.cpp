@@ -1,6 +1,6 @@
 #include <gtest/gtest.h>
 
-#include "tests/tools/link_faults/every_rate.hpp"
+#include "tests/link_faults/every_rate.hpp"
 
 namespace diastole::link_faults {
 namespace {

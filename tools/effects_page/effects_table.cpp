@@ -2,6 +2,6 @@
 
 #include <iostream>
 
-#include "tools/figures/effects_page.hpp"
+#include "tools/effects_page/effects_page.hpp"
 
 int main() { std::cout << diastole::effects_page(); }

@@ -1,4 +1,4 @@
-#include "tools/link_faults/line_faults.hpp"
+#include "tests/link_faults/line_faults.hpp"
 
 #include <gtest/gtest.h>
 

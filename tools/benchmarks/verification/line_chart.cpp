@@ -1,4 +1,4 @@
-#include "tools/figures/line_chart.hpp"
+#include "tools/benchmarks/verification/line_chart.hpp"
 
 #include <fmt/format.h>
 

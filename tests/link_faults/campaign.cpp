@@ -1,4 +1,4 @@
-#include "tests/tools/link_faults/campaign.hpp"
+#include "tests/link_faults/campaign.hpp"
 
 #include <fmt/format.h>
 

@@ -5,7 +5,7 @@
 #include <optional>
 #include <string>
 
-#include "tools/link_faults/line_faults.hpp"
+#include "tests/link_faults/line_faults.hpp"
 
 namespace diastole::link_faults {
 

@@ -1,4 +1,4 @@
-#include "tests/tools/link_faults/every_rate.hpp"
+#include "tests/link_faults/every_rate.hpp"
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>

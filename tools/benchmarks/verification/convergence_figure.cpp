@@ -14,7 +14,7 @@
 #include "estimator/fe/elastic_model.hpp"
 #include "estimator/mesh/annulus.hpp"
 #include "estimator/mesh/point_locator.hpp"
-#include "tools/figures/line_chart.hpp"
+#include "tools/benchmarks/verification/line_chart.hpp"
 
 namespace diastole {
 namespace {

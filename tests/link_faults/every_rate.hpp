@@ -2,7 +2,7 @@
 // The campaign at bit error rates from 1e-5 to 1e-2, with lost bytes and lost, repeated, overtaken and cut-off
 // frames beside it.
 
-#include "tests/tools/link_faults/campaign.hpp"
+#include "tests/link_faults/campaign.hpp"
 
 namespace diastole::link_faults {
 

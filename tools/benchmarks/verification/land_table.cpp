@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "tools/figures/land_problems.hpp"
+#include "tools/benchmarks/verification/land_problems.hpp"
 
 namespace diastole {
 namespace {

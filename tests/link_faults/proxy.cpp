@@ -1,4 +1,4 @@
-#include "tools/link_faults/proxy.hpp"
+#include "tests/link_faults/proxy.hpp"
 
 #include <fmt/format.h>
 #include <poll.h>
