@@ -165,7 +165,6 @@ const std::vector<Rule>& rules() {
        {"protocol", "host", "tools/diastole/commands.hpp", "tools/diastole/simulate", "tools/sim_rig"}},
       {"tools/diastole/catheter", {"protocol", "estimator", "tools/diastole/commands.hpp"}},
       {"tools/benchmarks/verification", {"protocol/contract", "estimator"}},
-      {"tools/effects_page", {"estimator/effects"}},
       {"tools", {"protocol", "firmware", "host", "estimator"}},
       {"tests", {"protocol", "firmware", "host", "estimator", "tools"}},
   };

@@ -11,7 +11,7 @@
 
 #include "estimator/rig_fit/model_term.hpp"
 #include "tests/estimator/rig_fit/simulated_session.hpp"
-#include "tools/effects_page/effects_page.hpp"
+#include "tools/benchmarks/verification/effects_page.hpp"
 
 namespace diastole {
 namespace {

@@ -2,6 +2,6 @@
 
 #include <iostream>
 
-#include "tools/effects_page/effects_page.hpp"
+#include "tools/benchmarks/verification/effects_page.hpp"
 
 int main() { std::cout << diastole::effects_page(); }

@@ -1,4 +1,4 @@
-#include "tools/effects_page/effects_page.hpp"
+#include "tools/benchmarks/verification/effects_page.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
