@@ -1,58 +1,9 @@
 // The specimen relaxes.
 
-#include <array>
-#include <cmath>
-#include <memory>
-
 #include "estimator/effects/effect.hpp"
+#include "estimator/rig/relaxation.hpp"
 
 namespace diastole {
-namespace {
-
-class Relaxation final : public rig::SpecimenMemory {
- public:
-  Relaxation(const std::array<double, 3>& parts, const std::array<double, 3>& times) {
-    for (size_t i = 0; i < parts.size(); ++i)
-      if (parts[i] != 0.0) modes_[count_++] = {.part = parts[i], .time_s = times[i]};
-  }
-  [[nodiscard]] double look(double elastic_kPa, double, double time_s) const override {
-    double pressure = elastic_kPa;
-    for (size_t i = 0; i < count_; ++i)
-      pressure -= modes_[i].part * (elastic_kPa - history(modes_[i], elastic_kPa, time_s));
-    return pressure;
-  }
-  void pass(double elastic_kPa, double, double time_s) override {
-    for (size_t i = 0; i < count_; ++i)
-      modes_[i].history_kPa = history(modes_[i], elastic_kPa, time_s);
-    elastic_kPa_ = elastic_kPa;
-    time_s_ = time_s;
-    begun_ = true;
-  }
-
- private:
-  struct Mode {
-    double part = 0.0, time_s = 1.0;
-    double history_kPa = 0.0;
-    mutable double decay_at = 0.0, decay = 1.0;
-  };
-  /// h_i after a change that is linear in time.
-  [[nodiscard]] double history(const Mode& mode, double elastic_kPa, double time_s) const {
-    if (!begun_) return elastic_kPa;
-    const double x = (time_s - time_s_) / mode.time_s;
-    if (x <= 0.0) return mode.history_kPa;
-    if (std::abs(x - mode.decay_at) > 1e-9 * x) {  // steps differ by rounding
-      mode.decay_at = x;
-      mode.decay = std::exp(-x);
-    }
-    return mode.decay * mode.history_kPa + (elastic_kPa - elastic_kPa_) * (1.0 - mode.decay) / x;
-  }
-  std::array<Mode, 3> modes_{};
-  size_t count_ = 0;
-  double elastic_kPa_ = 0.0, time_s_ = 0.0;
-  bool begun_ = false;
-};
-
-}  // namespace
 
 Effect viscoelasticity_effect() {
   return {{
@@ -74,11 +25,8 @@ Effect viscoelasticity_effect() {
       .keeps_modulus = false,
       .apply =
           [](EffectValues values, const EffectContext&, rig::RigModel& model) {
-            std::array<double, 3> parts{values[0], values[1], values[2]};
-            std::array<double, 3> times{values[3], values[4], values[5]};
-            if (parts == std::array<double, 3>{}) return;
-            model.memories.emplace_back(
-                [=](const rig::RunPlace&) { return std::make_unique<Relaxation>(parts, times); });
+            rig::add_relaxation(model,
+                                {{values[0], values[3]}, {values[1], values[4]}, {values[2], values[5]}});
           },
   }};
 }

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "estimator/rig/relaxation.hpp"
+
 namespace diastole::rig {
 namespace {
 
@@ -55,14 +57,11 @@ void bend_curve(double part, const EffectContext&, RigModel& model) {
   model.curve = SpecimenCurve(std::move(points));
 }
 
-/// A part of the pressure relaxes in this time, as the effect of that name has it.
-template <int number>
-void relax(double part, const EffectContext& context, RigModel& model) {
+/// A part of the pressure relaxes within tenths of seconds, seconds or longer.
+template <int decade>
+void relax(double part, const EffectContext&, RigModel& model) {
   constexpr std::array times_s{0.1, 1.0, 10.0};
-  static const Effect& effect = *find_effect("viscoelasticity");
-  std::array values{0.0, 0.0, 0.0, times_s[0], times_s[1], times_s[2]};
-  values[number] = part;
-  effect.apply(values, context, model);
+  add_relaxation(model, {{part, times_s[decade]}});
 }
 
 constexpr auto times = [](double& value, double logarithm) { value *= std::exp(logarithm); };
