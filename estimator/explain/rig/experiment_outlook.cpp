@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "estimator/inference/information.hpp"
 #include "estimator/rig/sampled_signal.hpp"
 
 namespace diastole::explain {
@@ -193,7 +194,7 @@ FittedModel fitted_model(const rig::SessionProblem& problem, const EffectSet& se
 Eigen::MatrixXd known_before(const FittedModel& fit) {
   const Eigen::Index count = fit.coordinates.size();
   Eigen::MatrixXd known = Eigen::MatrixXd::Identity(count + zeros, count + zeros);
-  known.topLeftCorner(count, count) = fit.covariance.ldlt().solve(Eigen::MatrixXd::Identity(count, count));
+  known.topLeftCorner(count, count) = inference::information_of_covariance(fit.covariance);
   return known;
 }
 

@@ -8,6 +8,7 @@
 #include <functional>
 #include <limits>
 
+#include "estimator/inference/information.hpp"
 #include "estimator/parallel/parallel_for.hpp"
 
 namespace diastole::explain {
@@ -194,16 +195,14 @@ std::optional<NextExperiment> sharpening_experiment(const ExperimentDesign& desi
   if (segments.empty() || named.model.terms.empty()) return std::nullopt;
   const auto outlooks = outlooks_of(design, {&named}, segments);
   const Eigen::MatrixXd known = known_before(named);
-  const auto covariance_of = [](const Eigen::MatrixXd& information) -> Eigen::MatrixXd {
-    return information.ldlt().solve(Eigen::MatrixXd::Identity(information.rows(), information.cols()));
-  };
-  const Eigen::MatrixXd before = covariance_of(known);
+  const Eigen::MatrixXd before = inference::covariance_of_information(known).matrix;
   const LeastKnown target = least_known(design.problem.session(), named, before);
   const auto row = static_cast<Eigen::Index>(target.index);
   const Worth worth = [&](const std::vector<size_t>& chosen, const Equipment& equipment) {
     const Eigen::MatrixXd gram = gram_of(outlooks, chosen, 0, 0, equipment);
-    const Eigen::MatrixXd after = covariance_of(gram.bottomRightCorner(known.rows(), known.cols()) + known);
-    return std::sqrt(before(row, row) / after(row, row));
+    const inference::Covariance after =
+        inference::covariance_of_information(gram.bottomRightCorner(known.rows(), known.cols()) + known);
+    return std::sqrt(before(row, row) / after.matrix(row, row));
   };
   constexpr double narrow_enough = 1.5;
   const Plan plan = plan_of(design.problem.session(), segments, narrow_enough, worth);

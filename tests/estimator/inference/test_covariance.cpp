@@ -1,4 +1,4 @@
-#include "estimator/inference/covariance.hpp"
+#include "estimator/inference/information.hpp"
 
 namespace diastole::inference {
 namespace {
@@ -72,6 +72,30 @@ TEST(Covariance, LeavesOutWhatIsNotFree) {
   EXPECT_EQ(found.matrix(0, 0), 0.0);
   EXPECT_NEAR(found.matrix(1, 1), 1 / columns.col(1).squaredNorm(), 1e-14);
   EXPECT_EQ(estimate_covariance(columns, {false, false}).matrix, Eigen::Matrix2d::Zero());
+}
+
+TEST(Covariance, OfInformationIsThatOfItsJacobian) {
+  const Eigen::Vector3d units(1e-4, 1, 1e4);
+  const Eigen::MatrixXd columns = some_columns(20, 3) * units.asDiagonal();
+  const Covariance found = covariance_of_information(columns.transpose() * columns);
+  EXPECT_TRUE(found.undetermined.empty());
+  EXPECT_TRUE(found.matrix.isApprox(estimate_covariance(columns).matrix, 1e-9));
+  EXPECT_TRUE(information_of_covariance(found.matrix).isApprox(columns.transpose() * columns, 1e-9));
+}
+
+TEST(Covariance, OfInformationThatLacksACombination) {
+  Eigen::MatrixXd columns = some_columns(20, 3);
+  columns.col(1) = 2 * columns.col(0);
+  const Covariance found = covariance_of_information(columns.transpose() * columns);
+  ASSERT_EQ(found.undetermined.size(), 1U);
+  EXPECT_LT((found.undetermined[0] - Eigen::Vector3d(1, -0.5, 0)).norm(), 1e-6);
+  EXPECT_TRUE(std::isinf(found.matrix(0, 0)));
+  EXPECT_TRUE(std::isinf(found.matrix(1, 1)));
+  EXPECT_NEAR(found.matrix(2, 2), estimate_covariance(columns).matrix(2, 2), 1e-9);
+  // Nothing is known of the two by themselves.
+  const Eigen::MatrixXd information = information_of_covariance(found.matrix);
+  EXPECT_EQ(information.topLeftCorner(2, 3), Eigen::MatrixXd::Zero(2, 3));
+  EXPECT_NEAR(information(2, 2), 1 / found.matrix(2, 2), 1e-9);
 }
 
 TEST(Covariance, CountsWhatTheDataDetermine) {
