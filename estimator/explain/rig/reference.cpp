@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "estimator/explain/rig/set_fit.hpp"
+#include "estimator/inference/information.hpp"
 #include "estimator/rig_fit/base_fit.hpp"
 #include "protocol/contract/input_error.hpp"
 
@@ -34,10 +35,6 @@ constexpr double rig_changes = 0.1;
 constexpr double castings_differ = 0.5;
 /// Of a single reference's misfit, that comes again.
 constexpr double once_seen = 0.5;
-
-MatrixXd inverse(const MatrixXd& positive) {
-  return positive.llt().solve(MatrixXd::Identity(positive.rows(), positive.cols()));
-}
 
 /// What is known of the tolerances, in sds of their list's.
 struct Knowledge {
@@ -74,8 +71,11 @@ struct Fitted {
   [[nodiscard]] Knowledge knowledge(const Knowledge& before) const {
     const auto count = before.mean.size();
     const MatrixXd root = before.root();
-    return {before.mean + root * evidence.u.tail(count),
-            root * inverse(evidence.precision).bottomRightCorner(count, count) * root.transpose()};
+    return {
+        before.mean + root * evidence.u.tail(count),
+        root *
+            inference::covariance_of_information(evidence.precision).matrix.bottomRightCorner(count, count) *
+            root.transpose()};
   }
 };
 

@@ -1,10 +1,10 @@
 #include "estimator/explain/rig/set_fit.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
+#include "estimator/inference/information.hpp"
 #include "estimator/inference/intervals.hpp"
 #include "estimator/inference/least_squares.hpp"
 
@@ -284,7 +284,7 @@ EffectSet search(const rig::SessionProblem& problem, SetProblem& set, const rig:
   // Errors are the data's: what the evidence takes a size to be beforehand is no measurement of it.
   MatrixXd measured = out.evidence.precision;
   measured.diagonal().head(searched - 1).array() -= 1.0 - nearly_nothing;
-  out.covariance = measured.ldlt().solve(MatrixXd::Identity(measured.rows(), measured.cols()));
+  out.covariance = inference::covariance_of_information(measured).matrix;
   for (Index i = 0; i + 1 < searched; ++i) {
     const double width = prior_width(set, q, i);
     out.covariance.row(i) *= width;
