@@ -333,7 +333,6 @@ FitRecord refused_fit(const Study& study, const Measurement& measurement, std::v
 
 FitRecord fit_study(const Study& study, const Measurement& measurement, const StudyFitOptions& options) {
   require_loaded_points(study, measurement);
-  const auto* annulus = std::get_if<AnnulusSpecimen>(&study.specimen);
   ElasticModel model = make_affected_model(study);
   require_cavity(study, model);
   FitRecord record = head_of(study, measurement);
@@ -378,9 +377,8 @@ FitRecord fit_study(const Study& study, const Measurement& measurement, const St
   for (std::string& remark : remarks_on(record, fit))
     record.remarks.push_back(std::move(remark));
   record.section_frame = fit.frames.back().number;
-  if (annulus != nullptr) {
-    record.sections = draw_sections(*annulus, motion.mesh(), fit.frames.back(), measurement);
-  }
+  if (std::holds_alternative<AnnulusSpecimen>(study.specimen))
+    record.sections = draw_sections(motion.mesh(), fit.frames.back(), measurement);
   return record;
 }
 

@@ -139,16 +139,7 @@ class ResidualMap {
   std::vector<double> squares_;
 };
 
-double middle_height_mm(const HermiteMesh& mesh) {
-  double low = mesh.reference()[dof_of(0, 0, 2)], high = low;
-  for (size_t node = 0; node < mesh.node_count(); ++node) {
-    low = std::min(low, mesh.reference()[dof_of(node, 0, 2)]);
-    high = std::max(high, mesh.reference()[dof_of(node, 0, 2)]);
-  }
-  return 0.5 * (low + high);
-}
-
-/// Of the last frame, across the axis at the body's middle height and along it.
+/// Of the last frame, across the axis and along it.
 std::vector<SolutionSection> field_sections(const HermiteMesh& mesh, const FrameField& field,
                                             const Coverage& coverage) {
   const ResidualMap residuals(mesh, field);
@@ -167,9 +158,7 @@ std::vector<SolutionSection> field_sections(const HermiteMesh& mesh, const Frame
     }
     return fields;
   };
-  const double height_mm = middle_height_mm(mesh);
-  return drawn_sections(mesh, field.position_mm, {0.0, 0.0, height_mm},
-                        fmt::format("z = {:.4g} mm", height_mm), fields_at);
+  return drawn_sections(mesh, field.position_mm, fields_at);
 }
 
 }  // namespace

@@ -1,7 +1,10 @@
 #include "estimator/solution/body_section.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <optional>
 #include <utility>
 
@@ -37,16 +40,30 @@ std::array<size_t, 3> bricks_of(const HermiteMesh& mesh, size_t element, double 
   return bricks;
 }
 
+/// Where a function that is linear from `start` to `end` changes its sign.
+std::optional<Xi> zero_between(const Xi& start, double low, const Xi& end, double high) {
+  if ((low < 0.0) == (high < 0.0)) return {};
+  Xi xi{};
+  for (size_t k = 0; k < 3; ++k)  // exact where they agree: whether xi lies on a face is asked later
+    xi[k] = start[k] == end[k] ? start[k] : std::lerp(start[k], end[k], low / (low - high));
+  return xi;
+}
+
 /// One element's grid of bricks with the signed distances of its corners from the plane.
 class BrickGrid {
  public:
-  BrickGrid(const HermiteMesh& mesh, const SectionPlane& plane, size_t element, double cell_mm)
-      : mesh_(mesh), plane_(plane), element_(element), bricks_(bricks_of(mesh, element, cell_mm)) {
+  BrickGrid(const HermiteMesh& mesh, const NodeField& position_mm, const SectionPlane& plane, size_t element,
+            double cell_mm)
+      : mesh_(mesh),
+        position_mm_(position_mm),
+        plane_(plane),
+        element_(element),
+        bricks_(bricks_of(mesh, element, cell_mm)) {
     const Eigen::Vector3d normal = plane.horizontal.cross(plane.vertical);
     for (size_t i3 = 0; i3 <= bricks_[2]; ++i3) {
       for (size_t i2 = 0; i2 <= bricks_[1]; ++i2) {
         for (size_t i1 = 0; i1 <= bricks_[0]; ++i1) {
-          const Eigen::Vector3d place_mm = mesh.value(mesh.reference(), {element, xi_at({i1, i2, i3})});
+          const Eigen::Vector3d place_mm = mesh.value(position_mm, {element, xi_at({i1, i2, i3})});
           distance_mm_.push_back(normal.dot(place_mm - plane.origin_mm));
         }
       }
@@ -62,7 +79,8 @@ class BrickGrid {
       for (size_t k = 0; k < 3; ++k) {
         const size_t other = corner | (size_t{1} << k);
         if (other == corner) continue;
-        if (const std::optional<Xi> xi = crossing(at(brick, corner), at(brick, other)))
+        const std::array<size_t, 3> from = at(brick, corner), to = at(brick, other);
+        if (const auto xi = zero_between(xi_at(from), distance_at(from), xi_at(to), distance_at(to)))
           corners_xi.push_back(*xi);
       }
     }
@@ -86,26 +104,12 @@ class BrickGrid {
   [[nodiscard]] double distance_at(const std::array<size_t, 3>& i) const {
     return distance_mm_[i[0] + (bricks_[0] + 1) * (i[1] + (bricks_[1] + 1) * i[2])];
   }
-  [[nodiscard]] std::optional<Xi> crossing(const std::array<size_t, 3>& from,
-                                           const std::array<size_t, 3>& to) const {
-    const double low = distance_at(from);
-    const double high = distance_at(to);
-    if ((low < 0.0) == (high < 0.0)) return {};
-    const double fraction = low / (low - high);
-    const Xi start = xi_at(from);
-    const Xi end = xi_at(to);
-    Xi xi{};
-    for (size_t k = 0; k < 3;
-         ++k)  // exact where start and end agree: whether xi lies on a face is asked later
-      xi[k] = start[k] == end[k] ? start[k] : std::lerp(start[k], end[k], fraction);
-    return xi;
-  }
   void sort_around(std::vector<Xi>& corners_xi) const {
     std::vector<std::pair<double, Xi>> around;
     std::vector<Eigen::Vector2d> flat;
     Eigen::Vector2d centre = Eigen::Vector2d::Zero();
     for (const Xi& xi : corners_xi) {
-      const Eigen::Vector3d place_mm = mesh_.value(mesh_.reference(), {element_, xi}) - plane_.origin_mm;
+      const Eigen::Vector3d place_mm = mesh_.value(position_mm_, {element_, xi}) - plane_.origin_mm;
       flat.emplace_back(plane_.horizontal.dot(place_mm), plane_.vertical.dot(place_mm));
       centre += flat.back() / static_cast<double>(corners_xi.size());
     }
@@ -117,6 +121,7 @@ class BrickGrid {
   }
 
   const HermiteMesh& mesh_;
+  const NodeField& position_mm_;
   const SectionPlane& plane_;
   size_t element_;
   std::array<size_t, 3> bricks_;
@@ -183,14 +188,15 @@ MaterialPoint SectionCell::centre() const {
   return {element, mean};
 }
 
-BodySection cut_body(const HermiteMesh& mesh, const SectionPlane& plane, double cell_mm) {
+BodySection cut_body(const HermiteMesh& mesh, const NodeField& position_mm, const SectionPlane& plane,
+                     double cell_mm) {
   // Off any face that lies in the plane up to rounding, so that one side's elements are cut as a whole.
   SectionPlane shifted = plane;
   shifted.origin_mm -= 1e-6 * mesh.extent_mm() * plane.horizontal.cross(plane.vertical);
   const FaceMap faces(mesh);
   BodySection section;
   for (size_t e = 0; e < mesh.element_count(); ++e) {
-    const BrickGrid grid(mesh, shifted, e, cell_mm);
+    const BrickGrid grid(mesh, position_mm, shifted, e, cell_mm);
     const auto [n1, n2, n3] = grid.bricks();
     for (size_t brick = 0; brick < n1 * n2 * n3; ++brick) {
       SectionCell cell{e, grid.cut({brick % n1, brick / n1 % n2, brick / (n1 * n2)})};
@@ -200,6 +206,25 @@ BodySection cut_body(const HermiteMesh& mesh, const SectionPlane& plane, double 
     }
   }
   return section;
+}
+
+std::vector<MaterialLine> level_lines(const BodySection& section,
+                                      const std::function<double(const MaterialPoint&)>& function) {
+  std::vector<MaterialLine> lines;
+  for (const SectionCell& cell : section.cells) {
+    std::vector<MaterialPoint> ends;
+    Xi before = cell.corners.back();
+    double value_before = function({cell.element, before});
+    for (const Xi& corner : cell.corners) {
+      const double value = function({cell.element, corner});
+      if (const auto xi = zero_between(before, value_before, corner, value))
+        ends.push_back({cell.element, *xi});
+      before = corner;
+      value_before = value;
+    }
+    if (ends.size() == 2) lines.push_back({ends[0], ends[1]});
+  }
+  return lines;
 }
 
 WallProfile cross_wall(const HermiteMesh& mesh, const Eigen::Vector3d& from_mm,
@@ -234,14 +259,36 @@ WallProfile cross_wall(const HermiteMesh& mesh, const Eigen::Vector3d& from_mm,
   return profile;
 }
 
+Eigen::Vector3d middle_of(const HermiteMesh& mesh) {
+  double low = std::numeric_limits<double>::infinity();
+  double high = -low;
+  const auto cover = [&](size_t node) {
+    low = std::min(low, mesh.reference()[dof_of(node, 0, 2)]);
+    high = std::max(high, mesh.reference()[dof_of(node, 0, 2)]);
+  };
+  for (const ElementFace& face : mesh.faces().inner) {
+    for (const size_t corner : face_corners(face))
+      cover(mesh.element(face.element)[corner]);
+  }
+  if (mesh.faces().inner.empty()) {
+    for (size_t node = 0; node < mesh.node_count(); ++node)
+      cover(node);
+  }
+  return {0.0, 0.0, 0.5 * (low + high)};
+}
+
+std::string height_words(const Eigen::Vector3d& place_mm) {
+  return fmt::format("z = {}{:.4g} mm", place_mm[2] < 0 ? "\u2212" : "", std::abs(place_mm[2]));
+}
+
 std::vector<SolutionSection> drawn_sections(
-    const HermiteMesh& mesh, const NodeField& position_mm, const Eigen::Vector3d& centre_mm,
-    const std::string& height_words,
+    const HermiteMesh& mesh, const NodeField& position_mm,
     const std::function<std::vector<NamedField>(const std::vector<MaterialPoint>&)>& fields_at) {
   using Eigen::Vector3d;
+  const Vector3d centre_mm = middle_of(mesh);
   const auto drawn = [&](std::string title, const Vector3d& up, const char* vertical) {
     const SectionPlane plane{centre_mm, Vector3d::UnitX(), up};
-    const BodySection cut = cut_body(mesh, plane, mesh.extent_mm() / cells_across);
+    const BodySection cut = cut_body(mesh, mesh.reference(), plane, mesh.extent_mm() / cells_across);
     const auto before = [&](const auto& points) { return flat(mesh, mesh.reference(), plane, points); };
     const auto after = [&](const auto& points) { return flat(mesh, position_mm, plane, points); };
     SolutionSection section;
@@ -264,7 +311,7 @@ std::vector<SolutionSection> drawn_sections(
     section.fields = fields_at(centres);
     return section;
   };
-  return {drawn("Short axis, material of " + height_words, Vector3d::UnitY(), "y (mm)"),
+  return {drawn("Short axis, material of " + height_words(centre_mm), Vector3d::UnitY(), "y (mm)"),
           drawn("Long axis, material of y = 0", Vector3d::UnitZ(), "z (mm)")};
 }
 

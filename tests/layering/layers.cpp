@@ -112,7 +112,7 @@ const std::vector<Rule>& rules() {
       {"estimator/catheter", {"protocol/signal", "estimator/inference"}},
       {"estimator/fit",
        {"protocol/contract", "protocol/signal", "estimator/fe", "estimator/inference", "estimator/io",
-        "estimator/mesh", "estimator/model", "estimator/motion_residuals"}},
+        "estimator/mesh", "estimator/model", "estimator/motion_residuals", "estimator/solution"}},
       {"estimator/reconstruction",
        {"protocol/contract", "protocol/signal", "estimator/fe", "estimator/io", "estimator/mesh",
         "estimator/model", "estimator/motion_residuals", "estimator/solution"}},

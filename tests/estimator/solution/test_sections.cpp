@@ -44,14 +44,14 @@ double length_mm(const HermiteMesh& mesh, const std::vector<MaterialLine>& lines
 TEST(BodySection, OfTheGelHasItsAreaAndOutline) {
   const HermiteMesh mesh = make_annulus({});
   const SectionPlane across{Vector3d::Zero(), Vector3d::UnitX(), Vector3d::UnitY()};
-  const BodySection ring = cut_body(mesh, across, 2.0);
+  const BodySection ring = cut_body(mesh, mesh.reference(), across, 2.0);
   const double ring_mm2 = M_PI * (50.0 * 50.0 - 22.5 * 22.5);
   EXPECT_NEAR(area_mm2(mesh, across, ring), ring_mm2, 1e-3 * ring_mm2);
   EXPECT_NEAR(length_mm(mesh, ring.outline), 2.0 * M_PI * 72.5, 0.2);
   EXPECT_NEAR(length_mm(mesh, ring.elements), 2.0 * 8 * 27.5, 0.1) << "eight borders, seen from both sides";
 
   const SectionPlane along{Vector3d::Zero(), Vector3d::UnitX(), Vector3d::UnitZ()};
-  const BodySection walls = cut_body(mesh, along, 2.0);
+  const BodySection walls = cut_body(mesh, mesh.reference(), along, 2.0);
   EXPECT_NEAR(area_mm2(mesh, along, walls), 2.0 * 27.5 * 85.0, 0.1) << "the plane is a face of elements";
   EXPECT_NEAR(length_mm(mesh, walls.outline), 4.0 * (27.5 + 85.0), 0.1);
 }
@@ -60,7 +60,7 @@ TEST(BodySection, OfAVentricleIsWholeAtTheApex) {
   const EllipsoidShape shape;
   const HermiteMesh mesh = make_ellipsoid(shape);
   const SectionPlane along{Vector3d::Zero(), Vector3d::UnitX(), Vector3d::UnitZ()};
-  const BodySection section = cut_body(mesh, along, 1.0);
+  const BodySection section = cut_body(mesh, mesh.reference(), along, 1.0);
   // Half ellipses of semi-axes (a, c) cut at z: a (z sqrt(c^2 - z^2) / c + c asin(z / c) + c pi / 2).
   const auto below = [](double a, double c, double z) {
     return a * (z * std::sqrt(c * c - z * z) / c + c * std::asin(z / c) + 0.5 * M_PI * c);
