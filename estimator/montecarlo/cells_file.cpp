@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <boost/algorithm/string/split.hpp>
 #include <charconv>
 #include <cmath>
 #include <sstream>
@@ -35,18 +36,6 @@ std::string heading_of(const Study& study, const MonteCarloPlan& plan) {
   return first + "\n" + second + "\n";
 }
 
-std::vector<std::string> split(const std::string& row) {
-  std::vector<std::string> cells(1);
-  for (const char c : row) {
-    if (c == ',') {
-      cells.emplace_back();
-    } else {
-      cells.back() += c;
-    }
-  }
-  return cells;
-}
-
 template <class Number>
 Number parsed(const std::string& text) {
   Number value{};
@@ -70,7 +59,8 @@ std::string row_of(const CellResult& result, size_t parameters) {
 }
 
 CellResult result_of(const std::string& row, size_t parameters) {
-  const std::vector<std::string> cells = split(row);
+  std::vector<std::string> cells;
+  boost::split(cells, row, [](char c) { return c == ','; });
   if (cells.size() != fixed_columns + 2 * parameters) throw std::invalid_argument("wrong number of columns");
   CellResult result{{parsed<double>(cells[0]), parsed<int>(cells[1]), parsed<int>(cells[2])},
                     parsed<int>(cells[3]) != 0,

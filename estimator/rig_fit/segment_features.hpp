@@ -13,8 +13,6 @@
 // where single cycles count, their variation.
 
 #include <Eigen/Dense>
-#include <array>
-#include <optional>
 #include <string>
 #include <vector>
 

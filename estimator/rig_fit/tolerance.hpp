@@ -7,7 +7,6 @@
 
 #include <span>
 #include <string_view>
-#include <vector>
 
 #include "estimator/effects/effect.hpp"
 #include "estimator/rig/rig_model.hpp"

@@ -4,7 +4,6 @@
 #include <cctype>
 #include <filesystem>
 #include <memory>
-#include <nlohmann/json.hpp>
 
 #include "host/cli/daemon_question.hpp"
 #include "host/cli/host_commands.hpp"

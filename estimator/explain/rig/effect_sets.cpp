@@ -1,13 +1,9 @@
 #include "estimator/explain/rig/effect_sets.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <map>
-#include <numbers>
-#include <optional>
 #include <span>
 
 #include "estimator/explain/rig/changed_parts.hpp"

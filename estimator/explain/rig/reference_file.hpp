@@ -1,10 +1,8 @@
 #pragma once
 // rig.reference.json: what `diastole reference` learnt of a rig, so that explanations need not learn it again.
 
-#include <filesystem>
 #include <functional>
 #include <string>
-#include <vector>
 
 #include "estimator/explain/rig/reference.hpp"
 #include "estimator/io/study.hpp"
