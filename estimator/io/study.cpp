@@ -79,7 +79,8 @@ EllipsoidSpecimen read_ellipsoid(TableReader& table) {
 
 MeshSpecimen read_mesh_specimen(TableReader& table, const std::filesystem::path& folder) {
   MeshSpecimen mesh{};
-  mesh.file = folder / table.text("file");
+  // Both words were given to it: a fitted ventricle's mesh is named mesh_file, any other body's file.
+  mesh.file = folder / table.text(table.has("mesh_file") ? "mesh_file" : "file");
   read_ends(table, mesh);
   return mesh;
 }

@@ -1,0 +1,208 @@
+#include "estimator/imaging/geometry/guide_points.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <map>
+#include <optional>
+#include <set>
+
+#include "estimator/io/whole_file.hpp"
+#include "protocol/contract/input_error.hpp"
+
+namespace diastole::imaging {
+namespace {
+
+constexpr std::array<std::pair<std::string_view, GuideSurface>, 5> surface_names{
+    {{"endo", GuideSurface::endo},
+     {"epi", GuideSurface::epi},
+     {"base", GuideSurface::base},
+     {"apex_endo", GuideSurface::apex_endo},
+     {"apex_epi", GuideSurface::apex_epi}}};
+
+/// biv-me's contours that bound the left ventricle. The septum's right side is the left ventricle's outer wall.
+constexpr std::array<std::pair<std::string_view, GuideSurface>, 9> gpfile_contours{
+    {{"SAX_LV_ENDOCARDIAL", GuideSurface::endo},
+     {"LAX_LV_ENDOCARDIAL", GuideSurface::endo},
+     {"SAX_LV_EPICARDIAL", GuideSurface::epi},
+     {"LAX_LV_EPICARDIAL", GuideSurface::epi},
+     {"SAX_RV_SEPTUM", GuideSurface::epi},
+     {"LAX_RV_SEPTUM", GuideSurface::epi},
+     {"MITRAL_VALVE", GuideSurface::base},
+     {"APEX_ENDO_POINT", GuideSurface::apex_endo},
+     {"APEX_POINT", GuideSurface::apex_epi}}};
+
+constexpr const char* csv_remedy =
+    "A row is phase,slice,surface,x_mm,y_mm,z_mm,sigma_mm, like 0,sa03,endo,-36.279,-1.137,-70.868,0.5.";
+constexpr const char* gpfile_remedy =
+    "A row is x y z contour-type sliceID weight frame, like -36.3 -1.1 -70.9 SAX_LV_ENDOCARDIAL 3 1 0.";
+
+struct Line {
+  std::string_view file;
+  size_t number;
+  const char* remedy;
+
+  [[noreturn]] void fail(std::string_view column, const std::string& problem) const {
+    throw InputError({std::string(file),
+                      fmt::format("line {}{}{}", number, column.empty() ? "" : ", column ", column), problem,
+                      remedy});
+  }
+  [[nodiscard]] double number_in(std::string_view text, std::string_view column) const {
+    double value = 0;
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+    if (error != std::errc{} || end != text.data() + text.size() || !std::isfinite(value))
+      fail(column, fmt::format("\"{}\" is not a number", text));
+    return value;
+  }
+  [[nodiscard]] int count_in(std::string_view text, std::string_view column) const {
+    const double value = number_in(text, column);
+    constexpr double most = 100000;  // phases of a cine: a number beyond is another column
+    if (value < 0 || value > most || value != std::floor(value))
+      fail(column, fmt::format("{} is not a whole number from 0 on", text));
+    return static_cast<int>(value);
+  }
+};
+
+std::vector<std::string_view> split(std::string_view line, std::string_view separators, bool joins) {
+  std::vector<std::string_view> fields;
+  while (true) {
+    const size_t end = line.find_first_of(separators);
+    const std::string_view field = line.substr(0, end);
+    if (!joins || !field.empty()) fields.push_back(field);
+    if (end == std::string_view::npos) return fields;
+    line.remove_prefix(end + 1);
+  }
+}
+
+/// Rows with the file's own numbers of phases, gathered and then put in order.
+class Gatherer {
+ public:
+  explicit Gatherer(const std::string& file) { guide_.file = file; }
+
+  void add(int phase, std::string_view slice, GuideSurface surface, const Eigen::Vector3d& place_mm,
+           double sigma_mm) {
+    const auto known = std::find(guide_.slices.begin(), guide_.slices.end(), slice);
+    const auto index = static_cast<size_t>(known - guide_.slices.begin());
+    if (known == guide_.slices.end()) guide_.slices.emplace_back(slice);
+    numbers_.insert(phase);
+    rows_.push_back(phase);
+    guide_.points.push_back({0, index, surface, place_mm, sigma_mm});
+  }
+  void leave_out(std::string_view contour) { ++left_out_[std::string(contour)]; }
+
+  GuidePoints done() {
+    guide_.phases.assign(numbers_.begin(), numbers_.end());
+    for (size_t i = 0; i < rows_.size(); ++i)
+      guide_.points[i].phase = static_cast<size_t>(
+          std::lower_bound(guide_.phases.begin(), guide_.phases.end(), rows_[i]) - guide_.phases.begin());
+    for (const auto& [contour, count] : left_out_)
+      guide_.findings.push_back(
+          {Severity::note, "other-contour",
+           fmt::format("{} points of {} bound no left ventricle and are left out", count, contour),
+           guide_.file, static_cast<double>(count), "", ""});
+    if (guide_.points.empty())
+      throw InputError({guide_.file, "", "holds no guide points of a left ventricle",
+                        "Give points of the surfaces endo, epi and base."});
+    return guide_;
+  }
+
+ private:
+  GuidePoints guide_;
+  std::set<int> numbers_;
+  std::vector<int> rows_;
+  std::map<std::string, size_t> left_out_;
+};
+
+void add_csv_row(Gatherer& gatherer, const Line& line, std::string_view text) {
+  const std::vector<std::string_view> fields = split(text, ",", false);
+  if (fields.size() != 7) line.fail("", fmt::format("has {} columns instead of 7", fields.size()));
+  const auto* surface = std::find_if(surface_names.begin(), surface_names.end(),
+                                     [&](const auto& name) { return name.first == fields[2]; });
+  if (surface == surface_names.end())
+    line.fail("surface", fmt::format("\"{}\" is none of endo, epi, base, apex_endo, apex_epi", fields[2]));
+  if (fields[1].empty()) line.fail("slice", "is empty");
+  const double sigma_mm = line.number_in(fields[6], "sigma_mm");
+  if (!(sigma_mm > 0)) line.fail("sigma_mm", fmt::format("{} is not above 0", fields[6]));
+  gatherer.add(line.count_in(fields[0], "phase"), fields[1], surface->second,
+               {line.number_in(fields[3], "x_mm"), line.number_in(fields[4], "y_mm"),
+                line.number_in(fields[5], "z_mm")},
+               sigma_mm);
+}
+
+void add_gpfile_row(Gatherer& gatherer, const Line& line, std::string_view text, double sigma_mm) {
+  const std::vector<std::string_view> fields = split(text, " \t", true);
+  if (fields.size() != 6 && fields.size() != 7)
+    line.fail("", fmt::format("has {} columns instead of 7", fields.size()));
+  const Eigen::Vector3d place_mm(line.number_in(fields[0], "x"), line.number_in(fields[1], "y"),
+                                 line.number_in(fields[2], "z"));
+  const int frame = line.count_in(fields.back(), "frame");
+  const double weight = fields.size() == 7 ? line.number_in(fields[5], "weight") : 1.0;
+  if (weight < 0) line.fail("weight", fmt::format("{} is negative", fields[5]));
+  const auto* contour = std::find_if(gpfile_contours.begin(), gpfile_contours.end(),
+                                     [&](const auto& name) { return name.first == fields[3]; });
+  if (contour == gpfile_contours.end() || weight == 0) {
+    gatherer.leave_out(weight == 0 ? "weight 0" : fields[3]);
+    return;
+  }
+  // A weight multiplies a point's square in the sum of squares.
+  gatherer.add(frame, fields[4], contour->second, place_mm, sigma_mm / std::sqrt(weight));
+}
+
+}  // namespace
+
+std::string_view name_of(GuideSurface surface) {
+  return std::find_if(surface_names.begin(), surface_names.end(),
+                      [&](const auto& name) { return name.second == surface; })
+      ->first;
+}
+
+GuidePoints guide_points_from_text(std::string_view text, const std::string& file, double gpfile_sigma_mm) {
+  Gatherer gatherer(file);
+  std::optional<bool> is_csv;
+  size_t number = 0;
+  while (!text.empty()) {
+    const size_t end = text.find('\n');
+    std::string_view row = text.substr(0, end);
+    text.remove_prefix(end == std::string_view::npos ? text.size() : end + 1);
+    ++number;
+    if (row.ends_with('\r')) row.remove_suffix(1);
+    if (row.find_first_not_of(" \t") == std::string_view::npos) continue;
+    if (!is_csv) {
+      is_csv = row == guide_file_mark;
+      if (*is_csv) continue;
+      const std::vector<std::string_view> fields = split(row, " \t", true);
+      const bool is_header = fields.size() >= 6 && fields[0] == "x" && fields[1] == "y" && fields[2] == "z";
+      if (is_header) continue;
+      if (fields.size() < 6)
+        throw InputError(
+            {file, fmt::format("line {}", number), fmt::format("\"{}\" is no header of guide points", row),
+             fmt::format("The first line is {} or, in a GPFile, x y z contour-type sliceID weight frame.",
+                         guide_file_mark)});
+    }
+    if (*is_csv) {
+      add_csv_row(gatherer, {file, number, csv_remedy}, row);
+    } else {
+      add_gpfile_row(gatherer, {file, number, gpfile_remedy}, row, gpfile_sigma_mm);
+    }
+  }
+  return gatherer.done();
+}
+
+GuidePoints read_guide_points(const std::filesystem::path& path) {
+  return guide_points_from_text(
+      read_whole_file(path, "Give a table of guide points (*.guide.csv) or biv-me's GPFile."), path.string());
+}
+
+std::string guide_file_text(const GuidePoints& guide) {
+  std::string text = std::string(guide_file_mark) + "\n";
+  for (const GuidePoint& point : guide.points)
+    text += fmt::format("{},{},{},{:.3f},{:.3f},{:.3f},{:g}\n", guide.phases[point.phase],
+                        guide.slices[point.slice], name_of(point.surface), point.place_mm.x(),
+                        point.place_mm.y(), point.place_mm.z(), point.sigma_mm);
+  return text;
+}
+
+}  // namespace diastole::imaging

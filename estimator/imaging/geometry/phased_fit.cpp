@@ -1,0 +1,68 @@
+#include "estimator/imaging/geometry/phased_fit.hpp"
+
+namespace diastole::imaging {
+
+PhasedFit::PhasedFit(std::vector<PhaseEquations> equations) {
+  for (PhaseEquations& e : equations) {
+    Phase phase;
+    phase.cc = e.common.transpose() * e.common;
+    phase.cd = e.common.transpose() * e.departure;
+    phase.dd = e.departure.transpose() * e.departure;
+    phase.cy = e.common.transpose() * e.y;
+    phase.dy = e.departure.transpose() * e.y;
+    phase.yy = e.y.squaredNorm();
+    rows_ += e.y.size();
+    phases_.push_back(std::move(phase));
+  }
+}
+
+void PhasedFit::solve(const PhasedPrior& prior) {
+  const double weight = 1 / prior.noise_variance;
+  const Eigen::VectorXd common_precision = prior.common_variance.cwiseInverse();
+  const Eigen::VectorXd departure_precision = prior.departure_variance.cwiseInverse();
+  const Eigen::Index departures = departure_precision.size();
+  Eigen::MatrixXd information = common_precision.asDiagonal();
+  Eigen::VectorXd right = Eigen::VectorXd::Zero(common_precision.size());
+  for (Phase& phase : phases_) {
+    Eigen::MatrixXd own = weight * phase.dd;
+    own.diagonal() += departure_precision;
+    phase.inverse = own.llt().solve(Eigen::MatrixXd::Identity(departures, departures));
+    phase.gain = weight * phase.inverse * phase.cd.transpose();
+    information += weight * (phase.cc - phase.cd * phase.gain);
+    right += weight * (phase.cy - phase.gain.transpose() * phase.dy);
+  }
+  common_covariance_ =
+      information.llt().solve(Eigen::MatrixXd::Identity(information.rows(), information.cols()));
+  common_ = common_covariance_ * right;
+
+  departure_squares_ = Eigen::VectorXd::Zero(departures);
+  double squares = 0;
+  // Of each unknown the data determine the share 1 - posterior / prior variance.
+  double determined =
+      static_cast<double>(common_.size()) - common_covariance_.diagonal().dot(common_precision);
+  for (Phase& phase : phases_) {
+    phase.departure = weight * phase.inverse * phase.dy - phase.gain * common_;
+    const Eigen::VectorXd variance =
+        phase.inverse.diagonal() + (phase.gain * common_covariance_).cwiseProduct(phase.gain).rowwise().sum();
+    departure_squares_ += phase.departure.cwiseAbs2() + variance;
+    determined += static_cast<double>(departures) - variance.dot(departure_precision);
+    squares += phase.yy - 2 * (phase.cy.dot(common_) + phase.dy.dot(phase.departure)) +
+               common_.dot(phase.cc * common_) + phase.departure.dot(phase.dd * phase.departure) +
+               2 * common_.dot(phase.cd * phase.departure);
+  }
+  noise_square_ = squares + prior.noise_variance * determined;
+}
+
+Eigen::VectorXd PhasedFit::square_of_common() const {
+  return common_.cwiseAbs2() + common_covariance_.diagonal();
+}
+
+Eigen::MatrixXd PhasedFit::covariance(size_t phase, const Eigen::MatrixXd& of_common,
+                                      const Eigen::MatrixXd& of_departure) const {
+  const Phase& p = phases_[phase];
+  const Eigen::MatrixXd by_common = of_common - of_departure * p.gain;
+  return of_departure * p.inverse * of_departure.transpose() +
+         by_common * common_covariance_ * by_common.transpose();
+}
+
+}  // namespace diastole::imaging

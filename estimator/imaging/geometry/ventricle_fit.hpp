@@ -1,0 +1,63 @@
+#pragma once
+// A ventricle's walls and base plane in every phase, from guide points.
+//
+// Walls: lambda(mu, theta) = sum of spherical harmonics (prolate_frame.hpp, wall_harmonics.hpp) for the middle of the wall
+// and for its thickness. The coefficients of a phase are those that all phases have in common plus a departure; of both the
+// variance falls with the degree l as a power, (l (l + 1) / 2)^-s, and amplitude and power are those of the largest
+// evidence. So is the error of a click, as a factor on the file's sigmas. The base is a plane, likewise common plus departure.
+//
+// A point's residual is its distance from the wall along the normal; a click has errors in its image's plane only, and those
+// count by the share of the normal that lies in the plane.
+//
+// Breath holds: short-axis slices may be displaced in their planes, the same in all phases, by amounts whose variance is
+// estimated, too. Long-axis slices define the reference; without two of them the mean displacement is not known and is zero.
+//
+// Points farther than three sigmas from their wall pull with constant force (Huber), those beyond five are named.
+
+#include <string>
+#include <vector>
+
+#include "estimator/imaging/geometry/guide_points.hpp"
+#include "estimator/imaging/geometry/guide_slices.hpp"
+#include "estimator/imaging/geometry/prolate_frame.hpp"
+
+namespace diastole::imaging {
+
+struct VentricleOptions {
+  bool estimate_shifts = true;
+  std::vector<std::string> reference_slices = {};  ///< held in place; empty: the long-axis slices
+};
+
+/// Both walls and the base of one phase.
+struct VentricleWalls {
+  int phase = 0;                      ///< the file's number
+  Eigen::VectorXd middle, thickness;  ///< harmonics of lambda
+  Eigen::Vector3d base;               ///< plane z = b0 + b1 x + b2 y in the frame's axes
+  Eigen::MatrixXd covariance;         ///< of middle, thickness and base, in this order
+  double rms_mm = 0;                  ///< of the points' distances from their walls
+  size_t points = 0;
+};
+
+struct SliceShift {
+  std::string slice;
+  bool is_reference = false;
+  Eigen::Vector3d shift_mm = Eigen::Vector3d::Zero();  ///< the slice was seen displaced by this; patient axes
+  double sigma_mm = 0;                                 ///< of each of its two components in the plane
+};
+
+struct VentricleFit {
+  ProlateFrame frame;
+  std::vector<VentricleWalls> phases;
+  std::vector<SliceShift> shifts;
+  double rms_mm = 0;
+  double noise_factor = 1;     ///< on the sigmas of the file
+  double shift_spread_mm = 0;  ///< standard deviation of a component of the shifts, by evidence
+  int iterations = 0;
+  bool converged = false;
+  std::vector<Finding> findings;
+};
+
+/// Throws InputError where the points do not make a ventricle.
+VentricleFit fit_ventricle(const GuidePoints& guide, const VentricleOptions& options = {});
+
+}  // namespace diastole::imaging
