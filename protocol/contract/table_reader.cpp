@@ -71,6 +71,16 @@ bool within(double value, const NumberRange& range) {
 
 }  // namespace
 
+std::string PlacedText::place(size_t offset) const {
+  size_t at_line = line;
+  size_t at_column = column;
+  for (size_t i = 0; i < std::min(offset, text.size()); ++i) {
+    at_column = text[i] == '\n' ? 1 : at_column + 1;
+    at_line += text[i] == '\n' ? 1 : 0;
+  }
+  return fmt::format("line {}, column {}, key {}", at_line, at_column, key);
+}
+
 std::string did_you_mean(std::string_view word, const std::vector<std::string>& known) {
   const std::string* nearest = nullptr;
   size_t least = word.size() / 2 + 1;
@@ -133,6 +143,8 @@ int64_t TableReader::expect_format(std::string_view name, int64_t newest) {
 
 bool TableReader::has(std::string_view key) { return find(key) != nullptr; }
 
+bool TableReader::has_text(std::string_view key) { return has(key) && table_->get(key)->is_string(); }
+
 double TableReader::number(std::string_view key, NumberRange range) {
   return checked_number(key, need(key, "a number"), range);
 }
@@ -157,6 +169,27 @@ std::string TableReader::text(std::string_view key) {
 
 std::string TableReader::text_or(std::string_view key, std::string fallback) {
   return has(key) ? text(key) : std::move(fallback);
+}
+
+PlacedText TableReader::placed_text(std::string_view key) {
+  PlacedText placed{.text = text(key), .file = file_, .key = dotted(key)};
+  const toml::source_region& source = table_->get(key)->source();
+  const auto breaks = static_cast<size_t>(std::ranges::count(placed.text, '\n'));
+  const size_t lines = source.end.line - source.begin.line;
+  const size_t width = source.end.column - source.begin.column;
+  // Three quotes stand before a text that is longer by four than with one; a line break behind them is none of its own.
+  const bool in_three = lines > 0 || width >= placed.text.size() + 6;
+  placed.line = source.begin.line + (lines > breaks ? 1 : 0);
+  placed.column = lines > breaks ? 1 : source.begin.column + (in_three ? 3 : 1);
+  return placed;
+}
+
+std::vector<std::pair<std::string, PlacedText>> TableReader::named_texts() {
+  std::vector<std::pair<std::string, PlacedText>> texts;
+  for (const auto& [key, node] : *table_)
+    texts.emplace_back(key.str(), placed_text(key.str()));
+  std::ranges::sort(texts, {}, [](const auto& one) { return std::pair(one.second.line, one.second.column); });
+  return texts;
 }
 
 std::string TableReader::choice(std::string_view key, const std::vector<std::string>& allowed) {

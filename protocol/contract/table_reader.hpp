@@ -25,6 +25,18 @@
 
 namespace diastole {
 
+/// A text with its place in the file, for what is read further: a formula.
+struct PlacedText {
+  std::string text;
+  std::string file = {};
+  std::string key = {};  ///< dotted
+  size_t line = 1;       ///< of the text's first character
+  size_t column = 1;
+
+  /// "line 12, column 17, key equations.q_hose" of the character at this offset.
+  [[nodiscard]] std::string place(size_t offset) const;
+};
+
 /// Open or closed bounds of a number; NaN is never accepted.
 struct NumberRange {
   double above = -std::numeric_limits<double>::infinity();     ///< value > above
@@ -49,8 +61,13 @@ class TableReader {
   double number_or(std::string_view key, double fallback, NumberRange range = {});
   int64_t integer(std::string_view key, NumberRange range = {});
   int64_t integer_or(std::string_view key, int64_t fallback, NumberRange range = {});
+  /// Whether the key holds a text, where it may hold a number too.
+  [[nodiscard]] bool has_text(std::string_view key);
   std::string text(std::string_view key);
   std::string text_or(std::string_view key, std::string fallback);
+  PlacedText placed_text(std::string_view key);
+  /// Every text with its name, in the order of the file, for tables whose keys are checked by whoever asks.
+  std::vector<std::pair<std::string, PlacedText>> named_texts();
   /// A text that must be one of `allowed`; the message lists them and names the nearest.
   std::string choice(std::string_view key, const std::vector<std::string>& allowed);
   bool flag_or(std::string_view key, bool fallback);
