@@ -21,8 +21,9 @@ Effect cannula_leak_cavity_effect() {
           [](EffectValues values, const EffectContext&, rig::RigModel& model) {
             const double conductance = values[0];
             if (conductance == 0.0) return;
-            model.cavity_leaks.emplace_back(
-                [conductance](double pressure_kPa, double) { return conductance * pressure_kPa; });
+            model.cavity_leaks.emplace_back([conductance](const rig::RunPlace&) {
+              return [conductance](double pressure_kPa, double) { return conductance * pressure_kPa; };
+            });
           },
   }};
 }

@@ -7,6 +7,7 @@
 // effect_list.inc. The tests over the list then check that it is neutral, differentiable, found again in its own
 // simulated data, and silent without cause; docs/effects.md is made from the declarations.
 
+#include <functional>
 #include <optional>
 #include <span>
 #include <string>
@@ -102,9 +103,9 @@ struct EffectDeclaration {
   bool needs_neighbours =
       false;  ///< only a specimen with computed neighbours can have it (specimen_curve.hpp)
   /// The values that leave `base` as it is; without: the parameters' neutral ones.
-  std::vector<double> (*neutral)(const rig::RigModel& base) = nullptr;
+  std::function<std::vector<double>(const rig::RigModel& base)> neutral = nullptr;
   /// The model's curve and modulus must be set.
-  void (*apply)(EffectValues values, const EffectContext&, rig::RigModel&) = nullptr;
+  std::function<void(EffectValues values, const EffectContext&, rig::RigModel&)> apply = nullptr;
 
   // In images of the specimen (field_model.hpp), if it shows there. The first parameter is the effect's size.
   std::vector<EffectParameter> field_parameters = {};

@@ -19,10 +19,11 @@ Effect sensor_drift_effect() {
       .apply =
           [](EffectValues values, const EffectContext&, rig::RigModel& model) {
             const double rate_kPa_s = 1e-3 * values[0];
-            model.cavity_sensor.emplace_back(
-                [rate_kPa_s](double pressure_kPa, double time_s, const rig::RunPlace&) {
-                  return pressure_kPa + rate_kPa_s * time_s;
-                });
+            model.cavity_sensor.emplace_back([rate_kPa_s](const rig::RunPlace&) {
+              return [rate_kPa_s](double pressure_kPa, double time_s) {
+                return pressure_kPa + rate_kPa_s * time_s;
+              };
+            });
           },
   }};
 }

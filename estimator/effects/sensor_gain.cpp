@@ -19,8 +19,8 @@ Effect sensor_gain_effect() {
       .apply =
           [](EffectValues values, const EffectContext&, rig::RigModel& model) {
             const double factor = 1.0 + values[0];
-            model.cavity_sensor.emplace_back([factor](double pressure_kPa, double, const rig::RunPlace&) {
-              return factor * pressure_kPa;
+            model.cavity_sensor.emplace_back([factor](const rig::RunPlace&) {
+              return [factor](double pressure_kPa, double) { return factor * pressure_kPa; };
             });
           },
   }};

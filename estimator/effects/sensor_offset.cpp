@@ -22,10 +22,11 @@ Effect sensor_offset_effect() {
             if (context.change_points.empty()) return;
             const ChangePoint moment = context.change_points.front();
             const double step_kPa = 1e-3 * values[0];
-            model.cavity_sensor.emplace_back(
-                [=](double pressure_kPa, double time_s, const rig::RunPlace& place) {
-                  return pressure_kPa + (place.started_s + time_s >= moment.session_s ? step_kPa : 0.0);
-                });
+            model.cavity_sensor.emplace_back([=](const rig::RunPlace& place) {
+              return [=, started_s = place.started_s](double pressure_kPa, double time_s) {
+                return pressure_kPa + (started_s + time_s >= moment.session_s ? step_kPa : 0.0);
+              };
+            });
           },
   }};
 }

@@ -35,14 +35,7 @@ class Softening final : public rig::SpecimenMemory {
     return lost_ -
            std::expm1((count_ - count) / cycles_) * (final_part(std::max(largest_mL_, volume_mL)) - lost_);
   }
-  /// Cycles begun, with the running one in part.
-  [[nodiscard]] double done(double time_s) const {
-    const auto& starts = place_.trigger_s;
-    const auto after = std::upper_bound(starts.begin(), starts.end(), time_s);
-    const auto count = place_.cycles_before + static_cast<double>(after - starts.begin());
-    if (after == starts.begin() || after == starts.end()) return count;
-    return count - 1.0 + (time_s - *(after - 1)) / (*after - *(after - 1));
-  }
+  [[nodiscard]] double done(double time_s) const { return rig::cycle_at(place_, time_s).done; }
   double delta_, cycles_, scale_mL_;
   rig::RunPlace place_;
   double largest_mL_;

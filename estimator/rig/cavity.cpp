@@ -6,6 +6,8 @@ Cavity::Cavity(const RigModel& model, const RunPlace& place)
     : model_(model), gas_(model.cavity_gas_mL, model.gas_exponent, place.atmosphere_kPa) {
   for (const MemoryMaker& make : model.memories)
     memories_.push_back(make(place));
+  for (const LeakMaker& make : model.cavity_leaks)
+    leaks_.push_back(make(place));
 }
 
 double Cavity::pressure_kPa(double specimen_mL, double time_s) {
@@ -44,7 +46,7 @@ double Cavity::look(double arrived_mL, double time_s) {
 void Cavity::pass() {
   if (begun_) lost_mL_ += leak_mL_per_s_ * (time_s_ - passed_s_);
   leak_mL_per_s_ = 0.0;
-  for (const LeakLaw& leak : model_.cavity_leaks)
+  for (const LeakLaw& leak : leaks_)
     leak_mL_per_s_ += leak(pressure_kPa_, time_s_);
   double pressure = elastic_kPa_;
   for (const auto& memory : memories_) {

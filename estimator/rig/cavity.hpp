@@ -50,6 +50,7 @@ class Cavity {
   const RigModel& model_;
   GasPocket gas_;
   std::vector<std::unique_ptr<SpecimenMemory>> memories_;
+  std::vector<LeakLaw> leaks_;
   // As just looked at.
   double specimen_mL_ = 0.0;
   double elastic_kPa_ = 0.0;

@@ -56,7 +56,8 @@ class HoseLine {
   [[nodiscard]] double kept_mL() const { return kept(0); }
   /// y: what has entered beyond what the piston displaced.
   [[nodiscard]] double yielded_mL() const { return yields_ ? state_[0] : 0.0; }
-  [[nodiscard]] double entering_mL_per_s() const { return piston_flow_ + (yields_ ? state_[count_] : 0.0); }
+  [[nodiscard]] double yielding_mL_per_s() const { return yields_ ? state_[count_] : 0.0; }
+  [[nodiscard]] double entering_mL_per_s() const { return piston_flow_ + yielding_mL_per_s(); }
   [[nodiscard]] double leaving_mL_per_s() const { return entering_mL_per_s() - kept(count_); }
 
   /// The balance at the state at hand under these loads: pump_kPa() and the forces.

@@ -45,8 +45,17 @@ struct RunPlace {
   double atmosphere_kPa = 101.325;
 };
 
-/// A branch from which volume flows away at a node's pressure: leaks. mL/s by kPa and time.
+/// Cycles of a session at a time of one of its runs.
+struct CyclePlace {
+  double done = 0.0;        ///< begun, the running one in part; whole where it is not known when it ends
+  double phase = 0.0;       ///< part of the running one, 0 where none runs
+  double rate_per_s = 0.0;  ///< at which it passes
+};
+CyclePlace cycle_at(const RunPlace& place, double time_s);
+
+/// A branch from which volume flows away at a node's pressure: leaks. mL/s by kPa and time; one lives for one run.
 using LeakLaw = std::function<double(double pressure_kPa, double time_s)>;
+using LeakMaker = std::function<LeakLaw(const RunPlace&)>;
 
 /// Pressure of the specimen by its elastic pressure and volume; may keep a state, so that one lives for one run.
 /// `look` must not change the state; `pass` goes on to `time_s` and does.
@@ -65,8 +74,12 @@ struct Catheter {
   double damping = 0.6;
 };
 
-/// A change of a measured pressure by time: kPa read if kPa are there.
-using SensorMap = std::function<double(double pressure_kPa, double time_s, const RunPlace&)>;
+/// A change of a measured pressure by time: kPa read if kPa are there; one lives for one run.
+using SensorMap = std::function<double(double pressure_kPa, double time_s)>;
+using SensorMapMaker = std::function<SensorMap(const RunPlace&)>;
+/// The same of a sensor with a memory, along evenly spaced times.
+using SensorTraceMap =
+    std::function<void(std::vector<double>& pressure_kPa, double start_s, double step_s, const RunPlace&)>;
 
 struct RigModel {
   Hose hose;
@@ -86,9 +99,12 @@ struct RigModel {
       1.2;  ///< of p V^n: bubbles at about a hertz are between isothermal (1) and adiabatic (1.4)
   double pump_leak_mL_s_kPa = 0.0;           ///< conductance past the seal
   double drive_compliance_mL_per_kPa = 0.0;  ///< by which screw, piston and cylinder yield
-  std::vector<LeakLaw> cavity_leaks;
+  /// What leaks past the seal beyond that conductance, which must be positive where there is any.
+  std::vector<LeakMaker> pump_leaks;
+  std::vector<LeakMaker> cavity_leaks;
   std::vector<MemoryMaker> memories;
-  std::vector<SensorMap> cavity_sensor;
+  std::vector<SensorTraceMap> cavity_traces;  ///< behind the catheter, before the maps
+  std::vector<SensorMapMaker> cavity_sensor;
   double volume_gain = 1.0;     ///< of gated volumes
   double sample_delay_s = 0.0;  ///< samples show what was there this much earlier
   double sample_skew = 0.0;     ///< and the DAQ's clock runs fast by this part: counts more seconds

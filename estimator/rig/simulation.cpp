@@ -101,6 +101,7 @@ class Plant {
       : model_(model),
         drive_(driven(model, run, motion)),
         gas_(model.pump_gas_mL, model.gas_exponent, run.place.atmosphere_kPa),
+        leaks_(made(model.pump_leaks, run.place)),
         line_(model.hose, {.step_s = options.step_s,
                            .components = options.components,
                            .pump_stiffness = pump_stiffness(),
@@ -154,15 +155,62 @@ class Plant {
       now.pump_kPa += gas_.pressure_kPa(squeezed_mL) + gas_.stiffness_at_rest() * line_.yielded_mL();
     } else if (const auto stiffness = pump_stiffness()) {
       now.pump_kPa -= *stiffness * leaked_mL_;
+    } else if (!leaks_.empty() && pump_resistance()) {
+      const double lost_mL_s = -line_.yielding_mL_per_s();
+      now.pump_kPa += behind_leaks(lost_mL_s, drive_.time_s(k) - copied_s_) - *pump_resistance() * lost_mL_s;
     }
     return now;
   }
   /// The pressure in the cylinder, where the pump's sensor is.
   [[nodiscard]] double cylinder_kPa() const { return line_.pump_kPa() + loss_at_pump_kPa(); }
+  static std::vector<LeakLaw> made(const std::vector<LeakMaker>& makers, const RunPlace& place) {
+    std::vector<LeakLaw> leaks;
+    for (const LeakMaker& make : makers)
+      leaks.push_back(make(place));
+    return leaks;
+  }
+  /// Past the seal, by how much it differs from the conductance.
+  [[nodiscard]] double lost_beyond(double pressure_kPa, double time_s) const {
+    double flow = 0.0;
+    for (const LeakLaw& leak : leaks_)
+      flow += leak(pressure_kPa, time_s);
+    return flow;
+  }
+  /// The pressure at which so much leaks: between the conductance's and none, where all leaks grow with pressure. Regula
+  /// falsi (Illinois).
+  [[nodiscard]] double behind_leaks(double lost_mL_s, double time_s) const {
+    const auto excess = [&](double pressure_kPa) {
+      return model_.pump_leak_mL_s_kPa * pressure_kPa + lost_beyond(pressure_kPa, time_s) - lost_mL_s;
+    };
+    double a = 0.0;
+    double b = lost_mL_s / model_.pump_leak_mL_s_kPa;
+    double at_a = excess(a);
+    double at_b = excess(b);
+    constexpr double close = 1e-13;
+    for (int doubling = 0; doubling < 8 && at_a * at_b > 0.0; ++doubling)
+      at_b = excess(b *= 2.0);
+    for (int step = 0; step < 60 && std::abs(at_b) > close * (std::abs(lost_mL_s) + 1e-9); ++step) {
+      const double next = b - at_b * (b - a) / (at_b - at_a);
+      const double at_next = excess(next);
+      if (at_next * at_b < 0.0) {
+        a = b;
+        at_a = at_b;
+      } else {
+        at_a *= 0.5;
+      }
+      b = next;
+      at_b = at_next;
+      if (!std::isfinite(b)) break;
+    }
+    return b;
+  }
   /// A leak beside gas follows the pressure of the last two steps.
-  void leak_beside_gas(double pressure_kPa) {
-    if (pump_stiffness())
+  void leak_beside_gas(double pressure_kPa, double time_s) {
+    if (pump_stiffness()) {
       leaked_mL_ += drive_.step_s * model_.pump_leak_mL_s_kPa * (1.5 * pressure_kPa - 0.5 * before_kPa_);
+      leaked_mL_ +=
+          drive_.step_s * (1.5 * lost_beyond(pressure_kPa, time_s) - 0.5 * lost_beyond(before_kPa_, time_s));
+    }
     before_kPa_ = pressure_kPa;
   }
   void record(PlantTrace& trace, size_t k, double cavity_kPa) const {
@@ -177,6 +225,7 @@ class Plant {
   const RigModel& model_;
   DriveTrace drive_;
   GasPocket gas_;
+  std::vector<LeakLaw> leaks_;
   HoseLine line_;
   Cavity cavity_;
   std::vector<RepeatedSteps> repeated_;
@@ -226,7 +275,7 @@ PlantTrace Plant::run() {
     record(trace, k, cavity_kPa_);
     k = beyond_repeated(trace, k);
     if (k + 1 == count) break;
-    leak_beside_gas(trace.pump_kPa[k]);
+    leak_beside_gas(trace.pump_kPa[k], drive_.time_s(k) - copied_s_);
     // The flow's change over the step is met exactly, whatever the acceleration does within it.
     const double flow_then = drive_.flow_mL_per_s[k + 1];
     const double rise = drive_.acceleration_mL_per_s2[k + 1] - drive_.acceleration_mL_per_s2[k];
@@ -251,6 +300,20 @@ void DriveTrace::differentiate() {
     flow_mL_per_s[k] = slope(volume_mL, k);
   for (size_t k = 0; k < count; ++k)
     acceleration_mL_per_s2[k] = slope(flow_mL_per_s, k);
+}
+
+CyclePlace cycle_at(const RunPlace& place, double time_s) {
+  const auto& starts = place.trigger_s;
+  const auto after = std::upper_bound(starts.begin(), starts.end(), time_s);
+  const auto begun = static_cast<double>(after - starts.begin());
+  CyclePlace at{.done = place.cycles_before + begun};
+  if (after == starts.begin() || starts.size() < 2) return at;
+  const bool is_last = after == starts.end();  // it lasts as long as the one before
+  const double period_s = is_last ? *(after - 1) - *(after - 2) : *after - *(after - 1);
+  const double phase = (time_s - *(after - 1)) / period_s;
+  if (!is_last) at.done += phase - 1.0;
+  if (phase < 1.0) at.phase = phase, at.rate_per_s = 1.0 / period_s;
+  return at;
 }
 
 double dividing_step(const RunDrive& run, double about_s) {
@@ -298,7 +361,12 @@ PlantTrace simulate_plant(const RigModel& model, const RunDrive& run, const Driv
 
 Prediction observe(const RigModel& model, const PlantTrace& plant, const RunPlace& place,
                    std::span<const double> sample_s) {
-  const std::vector<double> catheter = through_catheter(model.catheter, plant.cavity_kPa, plant.step_s);
+  std::vector<double> catheter = through_catheter(model.catheter, plant.cavity_kPa, plant.step_s);
+  for (const SensorTraceMap& map : model.cavity_traces)
+    map(catheter, plant.start_s, plant.step_s, place);
+  std::vector<SensorMap> maps;
+  for (const SensorMapMaker& make : model.cavity_sensor)
+    maps.push_back(make(place));
   Prediction seen;
   seen.cavity_kPa.reserve(sample_s.size());
   seen.pump_kPa.reserve(sample_s.size());
@@ -306,8 +374,8 @@ Prediction observe(const RigModel& model, const PlantTrace& plant, const RunPlac
     const double shown_s = time_s * (1.0 - model.sample_skew) - model.sample_delay_s;
     const double place_on_grid = (shown_s - plant.start_s) / plant.step_s;
     double cavity = sampled(catheter, place_on_grid);
-    for (const SensorMap& map : model.cavity_sensor)
-      cavity = map(cavity, time_s, place);
+    for (const SensorMap& map : maps)
+      cavity = map(cavity, time_s);
     seen.cavity_kPa.push_back(cavity + model.cavity_offset_kPa);
     seen.pump_kPa.push_back(sampled(plant.pump_kPa, place_on_grid) + model.pump_offset_kPa);
   }

@@ -136,8 +136,9 @@ constexpr std::array tolerances{
     Tolerance{"cavity_curvature", "at 20 kPa", 0.002, true, false,
               [](double x, const EffectContext&, RigModel& m) {
                 if (x == 0.0) return;
-                m.cavity_sensor.emplace_back(
-                    [=](double p, double, const RunPlace&) { return p * (1.0 + x * p / 20.0); });
+                m.cavity_sensor.emplace_back([=](const RunPlace&) {
+                  return [=](double p, double) { return p * (1.0 + x * p / 20.0); };
+                });
               }},
     Tolerance{"volume_gain", "ln", 0.015, true, false,
               [](double x, const EffectContext&, RigModel& m) { times(m.volume_gain, x); }},

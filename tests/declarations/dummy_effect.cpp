@@ -19,10 +19,11 @@ Effect dummy_effect() {
       .apply =
           [](EffectValues values, const EffectContext&, rig::RigModel& model) {
             const double bend_per_kPa = values[0];
-            model.cavity_sensor.emplace_back(
-                [bend_per_kPa](double pressure_kPa, double, const rig::RunPlace&) {
-                  return pressure_kPa * (1.0 + bend_per_kPa * pressure_kPa);
-                });
+            model.cavity_sensor.emplace_back([bend_per_kPa](const rig::RunPlace&) {
+              return [bend_per_kPa](double pressure_kPa, double) {
+                return pressure_kPa * (1.0 + bend_per_kPa * pressure_kPa);
+              };
+            });
           },
   }};
 }

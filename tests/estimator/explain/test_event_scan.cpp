@@ -7,7 +7,7 @@
 #include <algorithm>
 
 #include "estimator/explain/rig/set_fit.hpp"
-#include "tests/estimator/rig_fit/simulated_session.hpp"
+#include "estimator/rig_fit/simulated_session.hpp"
 
 namespace diastole::explain {
 namespace {

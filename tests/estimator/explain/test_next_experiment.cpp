@@ -4,8 +4,8 @@
 
 #include "estimator/explain/rig/next_experiment.hpp"
 #include "estimator/explain/rig/set_fit.hpp"
+#include "estimator/rig_fit/simulated_session.hpp"
 #include "host/config/experiment.hpp"
-#include "tests/estimator/rig_fit/simulated_session.hpp"
 
 namespace diastole::explain {
 namespace {

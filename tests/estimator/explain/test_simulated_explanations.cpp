@@ -7,7 +7,7 @@
 
 #include "estimator/effects/effect.hpp"
 #include "estimator/explain/rig/findings.hpp"
-#include "tests/estimator/rig_fit/simulated_session.hpp"
+#include "estimator/rig_fit/simulated_session.hpp"
 
 namespace diastole::explain {
 namespace {

@@ -92,7 +92,9 @@ TEST(Simulation, ASlowLineConvergesInComponents) {
 TEST(Simulation, ALeakEmptiesTheCavityAsResistanceAndCompliance) {
   RigModel model = straight_model();
   const double conductance = 1.0;  // mL/(s kPa)
-  model.cavity_leaks.emplace_back([=](double pressure_kPa, double) { return conductance * pressure_kPa; });
+  model.cavity_leaks.emplace_back([=](const RunPlace&) {
+    return [=](double pressure_kPa, double) { return conductance * pressure_kPa; };
+  });
   const PlantTrace trace = simulate_plant(model, ramp(30.0, 15.0));
   const size_t early = static_cast<size_t>(4.0 / trace.step_s);
   const size_t late = static_cast<size_t>(12.0 / trace.step_s);

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "tests/estimator/rig_fit/simulated_session.hpp"
+#include "estimator/rig_fit/simulated_session.hpp"
 
 namespace diastole::rig {
 namespace {

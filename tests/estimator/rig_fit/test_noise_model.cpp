@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "tests/estimator/rig_fit/simulated_session.hpp"
+#include "estimator/rig_fit/simulated_session.hpp"
 
 namespace diastole::rig {
 namespace {

@@ -6,7 +6,7 @@
 #include <random>
 
 #include "estimator/rig_fit/base_fit.hpp"
-#include "tests/estimator/rig_fit/simulated_session.hpp"
+#include "estimator/rig_fit/simulated_session.hpp"
 
 namespace diastole::rig {
 namespace {

@@ -1,0 +1,266 @@
+// Effects of files: those of examples/effects that express a built-in one give its pressures, and what a file may not say is
+// refused with its place.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <numbers>
+
+#include "estimator/effects/effect_library.hpp"
+#include "estimator/effects/file_effect.hpp"
+#include "estimator/rig/simulation.hpp"
+#include "protocol/contract/input_error.hpp"
+
+namespace diastole {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A curve that bends; no neighbours.
+class BentCurve final : public rig::SpecimenCurves {
+ public:
+  BentCurve() {
+    std::vector<rig::SpecimenCurve::Point> points;
+    for (double volume = -20.0; volume <= 80.0; volume += 4.0)
+      points.push_back({volume, 0.02 * volume - 6e-5 * volume * volume, 0.02 - 1.2e-4 * volume});
+    curve_ = rig::SpecimenCurve(points);
+  }
+  [[nodiscard]] const rig::SpecimenCurve& plain() const override { return curve_; }
+  [[nodiscard]] bool has_neighbours() const override { return false; }
+  [[nodiscard]] rig::SpecimenCurve neighbour(rig::Difference, double, bool) const override { return curve_; }
+
+ private:
+  rig::SpecimenCurve curve_;
+};
+
+rig::RunDrive three_strokes() {
+  rig::RunDrive run;
+  std::vector<rig::Stroke> strokes;
+  for (double start_s = 1.0; start_s < 4.0; start_s += 1.2) {
+    strokes.push_back({start_s, start_s + 0.6, 0.0, 40.0});
+    strokes.push_back({start_s + 0.6, start_s + 1.2, 40.0, 0.0});
+    run.place.trigger_s.push_back(start_s);
+  }
+  run.motion = rig::Motion(strokes, 0.0, 0.05);
+  run.place.name = "baseline";
+  run.place.started_s = 60.0;
+  run.end_s = 5.5;
+  return run;
+}
+
+rig::Prediction shown(const Effect* effect, const std::vector<double>& values) {
+  static const BentCurve family;
+  static const rig::RunDrive run = three_strokes();
+  rig::RigModel model;
+  model.curve = family.plain();
+  model.modulus_kPa = 8.0;
+  std::vector<ChangePoint> moments;
+  if (effect != nullptr && effect->change_points() != ChangePoints::none)
+    moments = {{"baseline", 2.3, 62.3}, {"other", 1.0, 1.0}};
+  if (effect != nullptr) effect->apply(values, {family, moments}, model);
+  std::vector<double> sample_s;
+  for (double time_s = 0.0; time_s < run.end_s; time_s += 1.0 / 300.0)
+    sample_s.push_back(time_s);
+  return rig::observe(model, rig::simulate_plant(model, run), run.place, sample_s);
+}
+
+double largest_difference(const rig::Prediction& a, const rig::Prediction& b) {
+  double difference = 0.0;
+  double size = 0.0;
+  for (const auto channel : {&rig::Prediction::cavity_kPa, &rig::Prediction::pump_kPa}) {
+    for (size_t k = 0; k < (a.*channel).size(); ++k) {
+      difference = std::max(difference, std::abs((a.*channel)[k] - (b.*channel)[k]));
+      size = std::max(size, std::abs((a.*channel)[k]));
+    }
+  }
+  return difference / size;
+}
+
+std::vector<std::string> ids_of_examples() {
+  std::vector<std::string> ids;
+  for (const auto& entry : fs::directory_iterator(DIASTOLE_SOURCE_DIR "/examples/effects")) {
+    const std::string name = entry.path().filename();
+    const std::string id = name.substr(0, name.find(".effect.toml"));
+    if (find_effect(id) != nullptr) ids.push_back(id);
+  }
+  std::ranges::sort(ids);
+  return ids;
+}
+
+fs::path file_of(const std::string& id) {
+  return fs::path(DIASTOLE_SOURCE_DIR "/examples/effects") / (id + ".effect.toml");
+}
+
+class BuiltInAsFile : public testing::TestWithParam<std::string> {
+ protected:
+  const Effect& built_in_ = *find_effect(GetParam());
+  std::shared_ptr<const Effect> file_ = read_effect(file_of(GetParam()));
+};
+
+TEST_P(BuiltInAsFile, DeclaresTheSame) {
+  EXPECT_EQ(file_->text().id, built_in_.text().id);
+  EXPECT_EQ(file_->text().port, built_in_.text().port);
+  EXPECT_EQ(file_->stage(), built_in_.stage());
+  EXPECT_EQ(file_->change_points(), built_in_.change_points());
+  EXPECT_EQ(file_->keeps_modulus(), built_in_.keeps_modulus());
+  EXPECT_EQ(file_->neutral({}), built_in_.neutral({}));
+  ASSERT_EQ(file_->parameters().size(), built_in_.parameters().size());
+  for (size_t j = 0; j < file_->parameters().size(); ++j) {
+    const EffectParameter& a = file_->parameters()[j];
+    const EffectParameter& b = built_in_.parameters()[j];
+    EXPECT_EQ(std::tie(a.neutral, a.lower, a.upper, a.typical, a.scale),
+              std::tie(b.neutral, b.lower, b.upper, b.typical, b.scale))
+        << a.name;
+  }
+}
+
+TEST_P(BuiltInAsFile, GivesThePressuresOfTheBuiltInOne) {
+  std::vector<double> typical, large;
+  for (const EffectParameter& parameter : built_in_.parameters()) {
+    typical.push_back(parameter.typical);
+    large.push_back(0.5 * (parameter.typical + parameter.upper));
+  }
+  const rig::Prediction base = shown(nullptr, {});
+  for (const auto& values : {typical, large}) {
+    const rig::Prediction expected = shown(&built_in_, values);
+    EXPECT_LE(largest_difference(shown(file_.get(), values), expected), 1e-9);
+    EXPECT_GT(largest_difference(base, expected), 1e-5);
+  }
+}
+
+TEST_P(BuiltInAsFile, IsTheBaseModelExactlyWhereNeutral) {
+  const rig::Prediction base = shown(nullptr, {});
+  const rig::Prediction same = shown(file_.get(), file_->neutral({}));
+  EXPECT_EQ(same.cavity_kPa, base.cavity_kPa);
+  EXPECT_EQ(same.pump_kPa, base.pump_kPa);
+}
+
+INSTANTIATE_TEST_SUITE_P(Examples, BuiltInAsFile, testing::ValuesIn(ids_of_examples()),
+                         [](const auto& example) {
+                           std::string name = example.param;
+                           std::erase(name, '-');
+                           return name;
+                         });
+
+TEST(FileEffects, ExpressTwelveBuiltInOnesOrMore) { EXPECT_GE(ids_of_examples().size(), 12U); }
+
+constexpr std::string_view heading = R"toml(format = "diastole-effect"
+version = 1
+id = "mine"
+title = "mine"
+port = "%port%"
+[[parameter]]
+name = "G"
+unit = "mL/(s kPa)"
+neutral = 0.0
+bounds = [0.0, 1.0]
+)toml";
+
+std::shared_ptr<const Effect> effect_with(const std::string& port, const std::string& rest) {
+  std::string text(heading);
+  text.replace(text.find("%port%"), 6, port);
+  return make_file_effect(effect_files::read_effect_text(text + rest, "mine.effect.toml"));
+}
+
+InputFault fault_of(const std::string& port, const std::string& rest) {
+  try {
+    effect_with(port, rest);
+  } catch (const InputError& error) {
+    return error.fault();
+  }
+  ADD_FAILURE() << rest << " is read";
+  return {};
+}
+
+TEST(FileEffects, RefuseAPressureAddedToAVolumeWithItsPlace) {
+  const InputFault fault = fault_of("specimen", "[equations]\np = \"p + V\"\n");
+  EXPECT_EQ(fault.file, "mine.effect.toml");
+  EXPECT_EQ(fault.place, "line 12, column 8, key equations.p");
+  EXPECT_EQ(fault.problem, "adds kPa and mL");
+}
+
+TEST(FileEffects, RefuseWhatNoRigCanDo) {
+  for (const auto& [port, rest] :
+       {std::pair{"drive", "[equations]\nq_hose = \"2 * q_piston - G * p_pump\"\n"},
+        std::pair{"drive", "[equations]\nq_hose = \"q_piston - G * p\"\n"},
+        std::pair{"drive", "[equations]\np_seen = \"p\"\n"},
+        std::pair{"drive", "[equations]\nc_hose = \"c_hose + t * 1 [m/s^2]\"\n"},
+        std::pair{"drive", "[equations]\nx = \"G\"\n"},
+        std::pair{"clock", "[equations]\nt_seen = \"t * t / 1 [s]\"\n"},
+        std::pair{"sensor", "[equations]\np_seen = \"p + t_since * 1 [kPa/s]\"\n"},
+        std::pair{"specimen", "[equations]\np = \"p\"\nq_cavity = \"q_hose\"\n"},
+        std::pair{"specimen",
+                  "[[state]]\nname = \"z\"\nunit = \"kPa\"\nrate = \"p\"\n[equations]\np = \"p - z\"\n"},
+        std::pair{"specimen",
+                  "[[state]]\nname = \"V\"\nunit = \"kPa\"\nrate = \"p\"\n[equations]\np = \"p\"\n"}})
+    EXPECT_FALSE(fault_of(port, rest).remedy.empty()) << rest;
+}
+
+TEST(FileEffects, LoseMoreThroughALeakThatOpens) {
+  const auto straight = effect_with("drive", "[equations]\nq_hose = \"q_piston - G * p_pump\"\n");
+  const auto bent = effect_with(
+      "drive", "[equations]\nq_hose = \"q_piston - G * p_pump * (1 + 1e-9 * p_pump^2 / 1 [kPa^2])\"\n");
+  const auto open = effect_with(
+      "drive", "[equations]\nq_hose = \"q_piston - G * p_pump * (1 + p_pump^2 / 100 [kPa^2])\"\n");
+  const auto valve =
+      effect_with("drive", "[equations]\nq_hose = \"q_piston - G * p_pump * abs(p_pump) / 10 [kPa]\"\n");
+  const rig::Prediction base = shown(nullptr, {});
+  // A leak that hardly bends goes the way of those that do, and ends where the straight one does.
+  EXPECT_LE(largest_difference(shown(bent.get(), {0.05}), shown(straight.get(), {0.05})), 1e-6);
+  EXPECT_GT(largest_difference(shown(open.get(), {0.05}), base),
+            1.1 * largest_difference(shown(straight.get(), {0.05}), base));
+  const rig::Prediction of_valve = shown(valve.get(), {0.05});
+  EXPECT_TRUE(std::ranges::all_of(of_valve.cavity_kPa, [](double p) { return std::isfinite(p); }));
+  EXPECT_GT(largest_difference(of_valve, base), 1e-3);
+}
+
+TEST(FileEffects, IntegrateStatesOfADriveAndASensor) {
+  // A sensor of first order: what lags by tau, within the step, is what came tau before.
+  const auto lag = effect_with("sensor", R"toml([[state]]
+name = "z"
+unit = "kPa"
+initial = "p"
+rate = "(p - z) / (0.01 [s] + G * 1 [s^2 kPa/mL])"
+[equations]
+p_seen = "z"
+)toml");
+  const rig::Prediction base = shown(nullptr, {});
+  const rig::Prediction late = shown(lag.get(), {0.0});
+  double difference = 0.0;
+  for (size_t k = 3; k < base.cavity_kPa.size(); ++k)
+    difference = std::max(difference, std::abs(late.cavity_kPa[k] - base.cavity_kPa[k - 3]));
+  EXPECT_LT(difference, 0.02 * *std::ranges::max_element(base.cavity_kPa));
+}
+
+TEST(EffectLibrary, PutsAFilesEffectInPlaceOfTheBuiltInOneOfItsId) {
+  EffectLibrary library;
+  const size_t count = library.all().size();
+  const auto own = read_effect(file_of("seal-leak-pump"));
+  library.add(own);
+  EXPECT_EQ(library.all().size(), count);
+  EXPECT_EQ(library.find("seal-leak-pump"), own.get());
+  library.add(read_effect(file_of("my-seal")));
+  EXPECT_EQ(library.all().size(), count + 1);
+  EXPECT_EQ(find_effect("my-seal"), nullptr);
+}
+
+/// What a page of constants says is what the model has.
+TEST(FileEffects, SeeTheConstantsOfTheModel) {
+  for (size_t i = effect_files::index_of(effect_files::first_constant); i < effect_files::quantity_count;
+       ++i) {
+    const auto& quantity = effect_files::quantities[i];
+    const std::string port(effect_files::port_of(static_cast<effect_files::In>(i)));
+    const auto effect = make_file_effect(effect_files::read_effect_text(
+        "format = \"diastole-effect\"\nversion = 1\nid = \"c\"\ntitle = \"c\"\nport = \"" + port +
+            "\"\n[[parameter]]\nname = \"x\"\nunit = \"" + std::string(quantity.unit) + "\"\nneutral = \"" +
+            std::string(quantity.name) + "\"\nbounds = [-1e6, 1e6]\n[equations]\n" +
+            std::string(quantity.name) + " = \"x\"\n",
+        "c.effect.toml"));
+    EXPECT_EQ(effect->neutral({}).front(), quantity.usual) << quantity.name;
+  }
+}
+
+}  // namespace
+}  // namespace diastole
