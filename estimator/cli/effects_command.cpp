@@ -1,11 +1,14 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
 
 #include "estimator/cli/commands.hpp"
-#include "estimator/effects/effect.hpp"
+#include "estimator/cli/interruption.hpp"
+#include "estimator/effects/file_effect.hpp"
+#include "estimator/explain/rig/effect_trial.hpp"
 #include "protocol/contract/input_error.hpp"
 #include "protocol/contract/named_members.hpp"
 #include "protocol/contract/table_reader.hpp"
@@ -55,6 +58,8 @@ void print_for_people(const Effect& effect) {
   print_for_people("Parameters in images", effect.field_parameters());
 }
 
+struct Interrupted {};
+
 const Effect& known(const std::string& id) {
   if (const Effect* effect = find_effect(id)) return *effect;
   std::vector<std::string> ids;
@@ -64,7 +69,39 @@ const Effect& known(const std::string& id) {
                     did_you_mean(id, ids) + "`diastole effects` lists them."});
 }
 
-ExitCode run_effects(const std::string& id, const CommandOutput& out) {
+bool is_file(const std::string& id) { return id.ends_with(".toml") || id.find('/') != std::string::npos; }
+
+/// A file's effect with the checks that every effect must pass.
+ExitCode check_file(const std::string& file, size_t threads, const CommandOutput& out) {
+  const std::shared_ptr<const Effect> effect = read_effect(file);
+  if (!out.json) print_for_people(*effect);
+  const Interruption interruption;
+  std::vector<explain::EffectCheck> checks;
+  try {
+    checks = explain::EffectTrial(*effect, threads).all([](const std::string& what) {
+      if (Interruption::requested()) throw Interrupted{};
+      fmt::print(stderr, "effects: trying {}\n", what);
+    });
+  } catch (const Interrupted&) {
+    std::cerr << "diastole effects: interrupted\n";
+    return ExitCode::negative;
+  }
+  if (out.json) {
+    nlohmann::ordered_json json;
+    json["effects"].push_back(to_json(*effect));
+    for (const explain::EffectCheck& check : checks)
+      json["checks"].push_back({DIASTOLE_NAMED(check, name, passed, detail)});
+    std::cout << json.dump(1) << '\n';
+  } else {
+    fmt::print("\n  Checks\n");
+    for (const explain::EffectCheck& check : checks)
+      fmt::print("    {:<22}{:<8}{}\n", check.name, check.passed ? "passed" : "FAILED", check.detail);
+  }
+  return std::ranges::all_of(checks, &explain::EffectCheck::passed) ? ExitCode::done : ExitCode::negative;
+}
+
+ExitCode run_effects(const std::string& id, size_t threads, const CommandOutput& out) {
+  if (is_file(id)) return check_file(id, threads, out);
   std::vector<const Effect*> chosen = all_effects();
   if (!id.empty()) chosen = {&known(id)};
   if (out.json) {
@@ -85,13 +122,25 @@ ExitCode run_effects(const std::string& id, const CommandOutput& out) {
 
 void add_effects(CommandLine& line) {
   auto id = std::make_shared<std::string>();
+  auto threads = std::make_shared<size_t>(2);
   CLI::App* command = line.add(
-      "effects", "what a real rig may have that the model has not: the effects that are known",
+      "effects", "what a real rig may have that the model has not: the effects that are known, and your own",
       "  diastole effects\n  diastole effects hose-compliance\n  diastole effects --json\n"
+      "  diastole effects my-seal.effect.toml     a hypothesis of your own: printed and checked\n"
       "Without ID all are listed; with it, equations, parameters, what it looks like and which experiment "
-      "reveals it.");
-  command->add_option("ID", *id, "an effect, for example hose-compliance");
-  line.on_run(command, [id](const CommandOutput& out) { return run_effects(*id, out); });
+      "reveals it.\n"
+      "A file's formulas are read with their units; then it is tried as every effect is: neutral value, "
+      "bounds, "
+      "derivatives,\n"
+      "found again in simulated data, silent without cause. Exit code 1: a check failed; 2: the file is "
+      "none. "
+      "`diastole\n"
+      "explain --with FILE` lets it compete. docs/effects-as-files.md tells how such a file is written.");
+  command->add_option("ID", *id, "an effect, for example hose-compliance, or a file NAME.effect.toml");
+  command->add_option("--threads", *threads, "simulations at a time")
+      ->check(CLI::Range(1, 256))
+      ->capture_default_str();
+  line.on_run(command, [id, threads](const CommandOutput& out) { return run_effects(*id, *threads, out); });
 }
 
 }  // namespace diastole

@@ -4,6 +4,7 @@
 #include <iostream>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "estimator/cli/commands.hpp"
 #include "estimator/cli/interruption.hpp"
@@ -12,6 +13,7 @@
 #include "estimator/explain/verdict/explained_study.hpp"
 #include "estimator/explain/verdict/explanation_json.hpp"
 #include "estimator/io/whole_file.hpp"
+#include "estimator/model/study_effects.hpp"
 #include "estimator/report/page.hpp"
 #include "estimator/report/report.hpp"
 #include "protocol/contract/input_error.hpp"
@@ -30,6 +32,7 @@ struct ExplainArguments {
   fs::path study;  ///< or, with `truths`, the folder of explanations
   fs::path folder;
   fs::path truths;
+  std::vector<fs::path> with;  ///< the user's own effects
   size_t threads = 2;
   bool force = false;
   bool strict = false;  ///< an answer that is no clear one is a failure
@@ -110,6 +113,8 @@ ExitCode run_explain(const ExplainArguments& arguments, const CommandOutput& out
   }
   Study study = read_study(arguments.study);
   use_images(study);
+  study.effect_files.insert(study.effect_files.end(), arguments.with.begin(), arguments.with.end());
+  effects_known_to(study);  // refuses what is no effect before the folder is made
   const fs::path json_file = arguments.folder / explanation_file;
   const fs::path new_study = arguments.folder / study_file;
   const fs::path page = arguments.folder / report_file;
@@ -163,6 +168,8 @@ void add_explain(CommandLine& line, const ExplanationScorer& score) {
       "  diastole explain case.study.toml -o out/\n"
       "  diastole explain case.study.toml -o out/ --json\n"
       "  diastole explain out/explained.study.toml -o further/     what is missing beside what was found\n"
+      "  diastole explain case.study.toml --with my-seal.effect.toml -o out/     a hypothesis of your own "
+      "beside those that are known\n"
       "  diastole explain --score sealed/ results/                 right how often? "
       "results/NAME/explanation.json\n"
       "      against sealed/NAME.sealed.json (diastole simulate --hide) or a labels.json; exit code 1: false "
@@ -180,13 +187,19 @@ void add_explain(CommandLine& line, const ExplanationScorer& score) {
       "learnt where the\n"
       "study names sessions in which nothing is wrong, [data] reference = [...] (diastole reference "
       "--help).\n"
-      "`diastole effects` lists the effects that are known. Exit code 0: done, whatever the verdict; 1: "
+      "`diastole effects` lists the effects that are known; `diastole effects FILE` checks one of yours. "
+      "Exit code 0: done, whatever the verdict; 1: "
       "interrupted,\n"
       "or with --strict ambiguous or unexplained; 2: unreadable input.");
   command
       ->add_option("STUDY", arguments->study, "study file with [data] runs; with --score the results' folder")
       ->required();
   command->add_option("-o,--output", arguments->folder, "folder for the result; made if it is not there");
+  command
+      ->add_option("--with", arguments->with,
+                   "effects of your own, NAME.effect.toml, that compete with those that are known")
+      ->expected(1, CLI::detail::expected_max_vector_size)
+      ->check(CLI::ExistingFile);
   command->add_option("--score", arguments->truths, "compare explanations with what was hidden");
   command->add_option("--threads", arguments->threads, "simulations at a time")
       ->check(CLI::Range(1, 256))

@@ -130,10 +130,17 @@ StudyParameter read_parameter(const std::string& name, TableReader& table) {
   return parameter;
 }
 
-StudyLaw read_law(TableReader& root) {
+StudyLaw read_law(TableReader& root, const std::filesystem::path& folder) {
   TableReader table = root.table("law");
   StudyLaw law;
-  law.name = table.text("name");
+  if (table.has("file")) {
+    law.file = folder / table.text("file");
+    law.name = law.file->string();
+    if (table.has("name"))
+      table.fail("name", "stands beside file", "Leave one of them out: the file is the law.");
+  } else {
+    law.name = table.text("name");
+  }
   TableReader parameters = table.table("parameters");
   for (auto& [name, parameter] : parameters.named_tables()) {
     law.parameters.push_back(read_parameter(name, parameter));
@@ -271,7 +278,7 @@ Study read_study(const std::filesystem::path& path) {
   root.expect_format("diastole-study", 1);
   Study study{.file = path,
               .specimen = read_specimen(root, path.parent_path()),
-              .law = read_law(root),
+              .law = read_law(root, path.parent_path()),
               .data = {},
               .effects = {},
               .refine = {}};
@@ -281,6 +288,8 @@ Study read_study(const std::filesystem::path& path) {
   if (auto model = root.table_if("model")) {
     study.effects = model->texts_or("effects", {});
     study.effect_values = read_effect_values(*model, study.effects);
+    for (const std::string& file : model->texts_or("effect_files", {}))
+      study.effect_files.push_back(path.parent_path() / file);
     study.compression = read_compression(*model);
     if (auto error = model->table_if("error")) {
       for (const auto& [key, percent] : {std::pair{"cavity_percent", &study.model_error.cavity_percent},
@@ -304,6 +313,8 @@ Study read_study(const std::filesystem::path& path) {
 std::vector<std::filesystem::path> inputs_of(const Study& study) {
   std::vector<std::filesystem::path> inputs = study.data.runs;
   inputs.push_back(study.file);
+  inputs.insert(inputs.end(), study.effect_files.begin(), study.effect_files.end());
+  if (study.law.file) inputs.push_back(*study.law.file);
   if (const auto* mesh = std::get_if<MeshSpecimen>(&study.specimen)) inputs.push_back(mesh->file);
   for (const auto& data : {study.data.tags, study.data.points, study.data.frames}) {
     if (data) inputs.push_back(*data);

@@ -81,8 +81,9 @@ struct StudyParameter {
 };
 
 struct StudyLaw {
-  std::string name;  ///< "neo-hookean"; whether it is known is decided where the model is built
+  std::string name;  ///< "neo-hookean"; whether it is known is decided where the model is built. The path if `file` is given
   std::vector<StudyParameter> parameters;
+  std::optional<std::filesystem::path> file = {};  ///< the user's own law (estimator/materials/file_law.hpp)
 };
 
 /// [images.to_specimen]: x_patient = origin + X x_axis + Y y_axis + Z z_axis, in DICOM's patient coordinates.
@@ -143,6 +144,7 @@ struct Study {
   StudyData data;
   std::vector<std::string> effects;             ///< effects that the model already includes
   std::vector<StudyEffect> effect_values = {};  ///< of some or all of them
+  std::vector<std::filesystem::path> effect_files = {};  ///< the user's own effects, beside those that are built in
   StudyModelError model_error = {};
   std::optional<StudyChamber> chamber = {};
   StudyCompression compression = {};

@@ -6,22 +6,18 @@
 #include <cmath>
 #include <numbers>
 
-#include "estimator/effects/effect.hpp"
 #include "estimator/io/study_refusal.hpp"
+#include "estimator/model/study_effects.hpp"
 #include "estimator/model/study_model.hpp"
 
 namespace diastole {
 namespace {
 
-const Effect& effect_of(const Study& study, const std::string& id) {
-  if (const Effect* effect = find_effect(id)) return *effect;
-  refuse(study, "model.effects", fmt::format("there is no effect \"{}\"", id),
-         "`diastole effects` lists those that are known.");
-}
-
 bool shows_in_images(const Study& study) {
-  return std::ranges::any_of(
-      study.effects, [&](const std::string& id) { return !effect_of(study, id).field_parameters().empty(); });
+  const EffectLibrary library = effects_known_to(study);
+  return std::ranges::any_of(study.effects, [&](const std::string& id) {
+    return !effect_named(library, study, id).field_parameters().empty();
+  });
 }
 
 /// Fibres on cylinders about z, at an angle from the circumference towards z.
@@ -67,8 +63,9 @@ FieldModel field_model_of(const Study& study) {
   model.inner_radius_mm = annulus.inner_radius_mm;
   model.outer_radius_mm = annulus.outer_radius_mm;
   model.height_mm = annulus.height_mm;
+  const EffectLibrary library = effects_known_to(study);
   for (const std::string& id : study.effects) {
-    const Effect& effect = effect_of(study, id);
+    const Effect& effect = effect_named(library, study, id);
     std::vector<double> values = effect.field_neutral(model);
     const auto stated = std::ranges::find(study.effect_values, id, &StudyEffect::id);
     for (size_t i = 0; stated != study.effect_values.end() && i < values.size(); ++i) {

@@ -8,6 +8,7 @@
 #include <sstream>
 #include <string>
 
+#include "estimator/model/study_effects.hpp"
 #include "protocol/contract/input_error.hpp"
 #include "protocol/runfile/reader.hpp"
 
@@ -138,6 +139,7 @@ Session read_session(const Study& study) {
                       "List the runs to compare with the rig's model: runs = [\"baseline.run.h5\"]."});
   }
   Session session;
+  session.effects = effects_known_to(study);
   for (const std::filesystem::path& file : study.data.runs) {
     RecordedRun run = runfile::read_run(file);
     if (run.pump.time_s.size() < 2 || run.pressure.time_s.size() < 2) {

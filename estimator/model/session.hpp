@@ -5,6 +5,7 @@
 #include <map>
 #include <vector>
 
+#include "estimator/effects/effect_library.hpp"
 #include "estimator/io/study.hpp"
 #include "estimator/rig/simulation.hpp"
 #include "protocol/runfile/run.hpp"
@@ -40,6 +41,7 @@ struct Session {
   RigModel base;                 ///< of the first run's /rig; its curve is not yet set
   std::map<std::string, double>
       tolerance_sd;     ///< of the first run's /rig: what it states of its parts (rig_fit/tolerance.hpp)
+  EffectLibrary effects = {};  ///< that may be in it
   MotionLimits limits;  ///< of the first run's /rig; the controller's own where it does not tell
 };
 

@@ -43,7 +43,7 @@ std::optional<std::string> key_of(const Study& study, const SpecimenResolution& 
   const auto* annulus = std::get_if<AnnulusSpecimen>(&study.specimen);
   const bool is_plain = !study.chamber && !study.compression.bulk_modulus_kPa &&
                         study.compression.volume_stiffness_kPa == 0.0 && study.refine == std::array<int, 3>{};
-  if (annulus == nullptr || !is_plain) return {};
+  if (annulus == nullptr || !is_plain || study.law.file) return {};
   std::string key =
       fmt::format("{} {} {} {} {} {}", version, annulus->inner_radius_mm, annulus->outer_radius_mm,
                   annulus->height_mm, fmt::join(annulus->mesh, "x"), annulus->ends);

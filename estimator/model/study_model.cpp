@@ -13,6 +13,7 @@
 
 #include "estimator/fe/elastic_system.hpp"
 #include "estimator/io/study_refusal.hpp"
+#include "estimator/materials/file_law.hpp"
 #include "estimator/mesh/annulus.hpp"
 #include "estimator/mesh/ellipsoid.hpp"
 #include "estimator/mesh/refinement.hpp"
@@ -22,6 +23,7 @@ namespace diastole {
 namespace {
 
 const Law& law_of(const Study& study) {
+  if (study.law.file) return law_of_file(*study.law.file);
   if (const Law* law = find_law(study.law.name)) return *law;
   std::vector<std::string> known;
   for (const Law* law : all_laws())

@@ -102,7 +102,7 @@ std::vector<Response> effect_responses(const rig::SessionProblem& problem, const
                                        const VectorXd& scale) {
   const SessionModel& base = known.at;
   std::vector<Variant> variants;
-  for (const Effect* effect : rig_effects())
+  for (const Effect* effect : problem.session().effects.of_rig())
     if (effect->fits(problem.family()) && effect->change_points() == ChangePoints::none &&
         std::ranges::none_of(base.terms, [&](const ModelTerm& in) { return in.effect == effect; }))
       std::ranges::copy(variants_of(*effect), std::back_inserter(variants));

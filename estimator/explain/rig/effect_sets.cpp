@@ -215,7 +215,7 @@ void SetsSearch::fit_beside_best() {
     start.values.insert(start.values.end(), response.values.begin(), response.values.end());
     fit(start, first.known, first.evidence.shares);
   }
-  for (const Effect* effect : rig_effects()) {
+  for (const Effect* effect : problem_.session().effects.of_rig()) {
     if (effect->change_points() == ChangePoints::none || effect == first.model.terms.back().effect) continue;
     if (const auto start = scan_events(problem_, first, *effect))
       fit(*start, first.known, first.evidence.shares);
@@ -260,7 +260,7 @@ SetSearch SetsSearch::run() {
         found.promises.emplace_back(responses_[promise.responses.front()].term.effect->text().id,
                                     promise.gain);
   }
-  for (const Effect* effect : rig_effects())
+  for (const Effect* effect : problem_.session().effects.of_rig())
     if (effect->change_points() != ChangePoints::none)
       if (const auto start = scan_events(problem_, plain, *effect))
         fit(*start, base_, problem_.error().prior.share);

@@ -14,6 +14,7 @@
 #include "estimator/explain/rig/reference_file.hpp"
 #include "estimator/explain/rig/set_verdict.hpp"
 #include "estimator/explain/verdict/verdict.hpp"
+#include "estimator/model/study_effects.hpp"
 #include "protocol/contract/input_error.hpp"
 #include "protocol/contract/table_reader.hpp"
 
@@ -23,13 +24,7 @@ namespace {
 /// The effects that the study's model has already, in its order, with their values.
 void take_given(const Study& study, const rig::Session& session, SetSearchOptions& options) {
   for (const std::string& id : study.effects) {
-    const Effect* effect = find_effect(id);
-    if (effect == nullptr) {
-      throw InputError({.file = study.file.string(),
-                        .place = "model.effects",
-                        .problem = fmt::format("there is no effect \"{}\"", id),
-                        .remedy = "`diastole effects` lists those that are known."});
-    }
+    const Effect* effect = &effect_named(session.effects, study, id);
     rig::ModelTerm term{effect, {}};
     const auto given = std::ranges::find(study.effect_values, id, &StudyEffect::id);
     for (const EffectParameter& parameter : effect->parameters()) {
@@ -70,10 +65,10 @@ std::vector<Step> steps_of(const EffectSet& before, const EffectSet& after) {
 
 /// Where sets of one effect look alike, the port that most of them have, or the best one's; none if they have several
 /// effects.
-std::optional<std::string> common_port(const Explanation& found) {
+std::optional<std::string> common_port(const EffectLibrary& library, const Explanation& found) {
   std::map<std::string, size_t> votes;
   const auto vote = [&](const std::string& id, size_t weight) {
-    votes[std::string(name_of(find_effect(id)->text().port))] += weight;
+    votes[std::string(name_of(library.find(id)->text().port))] += weight;
   };
   if (found.effects.size() > 1) return {};
   for (const FoundEffect& best : found.effects)
@@ -239,7 +234,7 @@ Explanation explain_rig(const Study& study, const ExplainOptions& options) {
   out.gap = held_out_gap(problem, plain, after);
   if (is_found) {
     out.where = misfits(problem, plain, chosen);
-    if (const auto port = common_port(out); port && out.verdict == Verdict::ambiguous)
+    if (const auto port = common_port(session.effects, out); port && out.verdict == Verdict::ambiguous)
       for (Misfit& place : out.where)
         place.port = *port;
   } else if (out.verdict == Verdict::unexplained) {
@@ -247,7 +242,7 @@ Explanation explain_rig(const Study& study, const ExplainOptions& options) {
     expected.evidence.variance = problem.error().variance(problem.error().prior.share);
     out.where = misfits(problem, plain, expected);
   }
-  out.evidence = candidates(search, verdict);
+  out.evidence = candidates(session.effects, search, verdict);
   if (!out.effects.empty()) out.shifts = parameter_shifts(problem, plain, chosen);
   out.steps = steps_of(plain, after);
   out.traces = traces(problem, plain, after);

@@ -192,7 +192,7 @@ Gap held_out_gap(const rig::SessionProblem& problem, const EffectSet& before, co
   return gap;
 }
 
-std::vector<Candidate> candidates(const SetSearch& search, const SetVerdict& verdict) {
+std::vector<Candidate> candidates(const EffectLibrary& known, const SetSearch& search, const SetVerdict& verdict) {
   std::vector<Candidate> list;
   const auto plain = std::ranges::find_if(
       search.sets, [&](const EffectSet& set) { return set.model.terms.size() == search.given; });
@@ -217,7 +217,7 @@ std::vector<Candidate> candidates(const SetSearch& search, const SetVerdict& ver
       list.push_back({{promise.first},
                       promise.second,
                       false,
-                      find_effect(promise.first)->parameters().size(),
+                      known.find(promise.first)->parameters().size(),
                       {},
                       "promises too little"});
   return list;

@@ -51,6 +51,8 @@ std::string explained_study(const Study& study, const std::filesystem::path& fol
   }
   if (root["specimen"]["kind"].value_or(std::string()) == "mesh")
     if (toml::node* mesh = root["specimen"].as_table()->get("file")) move_path(*mesh, from, folder);
+  if (toml::table* law = root["law"].as_table())
+    if (toml::node* file = law->get("file")) move_path(*file, from, folder);
   for (const ParameterShift& shift : starts) {
     if (toml::table* parameter = root["law"]["parameters"][shift.name].as_table()) {
       const double lower = (*parameter)["bounds"][0].value_or(shift.after);
@@ -59,6 +61,15 @@ std::string explained_study(const Study& study, const std::filesystem::path& fol
     }
   }
   toml::table& model = subtable(root, "model");
+  if (!study.effect_files.empty()) {
+    toml::array files;
+    for (const std::filesystem::path& file : study.effect_files) {
+      toml::value<std::string> text(std::filesystem::absolute(file).string());
+      move_path(text, "/", folder);
+      files.push_back(std::move(text));
+    }
+    model.insert_or_assign("effect_files", std::move(files));
+  }
   toml::array ids;
   for (const FoundEffect& effect : effects) {
     ids.push_back(effect.id);

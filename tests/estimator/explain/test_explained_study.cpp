@@ -33,6 +33,22 @@ TEST(ExplainedStudy, IsReadBackWithWhatWasFound) {
             std::filesystem::weakly_canonical(study.data.runs.at(0)));
 }
 
+TEST(ExplainedStudy, CarriesTheUsersFiles) {
+  test::ScratchFolder folder;
+  Study study = read_study(folder.write("gel.study.toml", gel + "effect_files = [\"mine.effect.toml\"]\n"));
+  const auto& root = study.file.parent_path();
+  study.effect_files.push_back(root / "with" / "other.effect.toml");  // as by explain --with
+  const auto out = root / "out";
+  std::filesystem::create_directories(out);
+  const Study again = read_study(folder.write("out/explained.study.toml",
+                                              explained_study(study, out, {{"mine", {{"G", 0.1}}, {}}}, {})));
+  ASSERT_EQ(again.effect_files.size(), 2U);
+  for (size_t i = 0; i < 2; ++i)
+    EXPECT_EQ(std::filesystem::weakly_canonical(again.effect_files[i]),
+              std::filesystem::weakly_canonical(study.effect_files[i]));
+  EXPECT_THAT(again.effects, ElementsAre("mine"));
+}
+
 TEST(ExplainedStudy, ATableOfAnEffectThatIsNotListedIsRefused) {
   test::ScratchFolder folder;
   const std::string stray = gel + "[model.parameters.hose-compliance.wave_speed_m_s]\nstart = 46.0\n";

@@ -1,0 +1,39 @@
+#include "estimator/model/study_effects.hpp"
+
+#include <fmt/format.h>
+
+#include <map>
+
+#include "estimator/effects/file_effect.hpp"
+#include "estimator/io/study_refusal.hpp"
+#include "protocol/contract/table_reader.hpp"
+
+namespace diastole {
+
+EffectLibrary effects_known_to(const Study& study) {
+  EffectLibrary library;
+  std::map<std::string, std::filesystem::path, std::less<>> read;
+  for (const std::filesystem::path& file : study.effect_files) {
+    std::shared_ptr<const Effect> effect = read_effect(file);
+    const std::string id(effect->text().id);
+    if (const auto [first, is_new] = read.emplace(id, file); !is_new && first->second != file)
+      refuse(study, "model.effect_files",
+             fmt::format("{} and {} both declare {}", first->second.string(), file.string(), id),
+             "Give one of them another id.");
+    library.add(std::move(effect));
+  }
+  return library;
+}
+
+const Effect& effect_named(const EffectLibrary& library, const Study& study, const std::string& id) {
+  if (const Effect* effect = library.find(id)) return *effect;
+  std::vector<std::string> ids;
+  for (const Effect* effect : library.all())
+    ids.emplace_back(effect->text().id);
+  refuse(study, "model.effects", fmt::format("there is no effect \"{}\"", id),
+         did_you_mean(id, ids) +
+             "`diastole effects` lists those that are known; effect_files = [\"NAME.effect.toml\"] adds your "
+             "own.");
+}
+
+}  // namespace diastole

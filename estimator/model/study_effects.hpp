@@ -1,0 +1,15 @@
+#pragma once
+// The effects that a study can have: the built-in ones and those of its [model] effect_files.
+
+#include "estimator/effects/effect_library.hpp"
+#include "estimator/io/study.hpp"
+
+namespace diastole {
+
+/// Throws InputError for a file that is no effect, or two of one id.
+EffectLibrary effects_known_to(const Study& study);
+
+/// One of a library by its id; throws InputError at model.effects of the study's file.
+const Effect& effect_named(const EffectLibrary& library, const Study& study, const std::string& id);
+
+}  // namespace diastole
