@@ -9,6 +9,7 @@
 
 #include "protocol/contract/input_error.hpp"
 #include "protocol/contract/table_reader.hpp"
+#include "tools/sim_rig/hidden_file.hpp"
 
 namespace diastole::sim_rig {
 
@@ -125,8 +126,9 @@ const HiddenKind& kind_named(const std::string& id) {
   std::vector<std::string> known{"none", "outside", "any"};
   for (const HiddenKind& kind : known_effects)
     known.emplace_back(kind.id);
-  throw InputError({"", "option --hide", fmt::format("\"{}\" is no effect that can be hidden", id),
-                    did_you_mean(id, known) + "`sim_rig hidden` lists all."});
+  throw InputError(
+      {"", "option --hide", fmt::format("\"{}\" is no effect that can be hidden", id),
+       did_you_mean(id, known) + "`sim_rig hidden` lists all; a file of your own ends in .effect.toml."});
 }
 
 /// A seed's first choice, apart from the sizes.
@@ -136,7 +138,7 @@ std::vector<const HiddenKind*> chosen(const std::vector<std::string>& ids, std::
     (kind.is_outside() ? outside : known).push_back(&kind);
   const auto one_of = [&](const auto& list) { return list[random() % list.size()]; };
   for (const std::string& id : ids) {
-    if (id == "none") continue;
+    if (id == "none" || is_effect_file(id)) continue;
     if (id == "outside") {
       result.push_back(one_of(outside));
     } else if (id == "any") {
@@ -197,6 +199,13 @@ std::string hide(const std::vector<std::string>& ids, uint64_t seed, PlantConfig
     kind->put(draw);
     json["truth"].push_back({{"id", kind->id}, {"port", kind->port}, {"parameters", draw.drawn}});
   }
+  for (const std::string& id : ids) {
+    if (!is_effect_file(id)) continue;
+    Draw draw(plant, random());
+    const HiddenFile file = hide_file(id, draw);
+    json["truth"].push_back({{"id", file.id}, {"port", file.port}, {"parameters", draw.drawn}});
+    json["kind"] = json["truth"].size() == 1 ? "single" : put.empty() ? "pair" : json["kind"];
+  }
   return json.dump(1) + "\n";
 }
 
@@ -204,7 +213,9 @@ std::string list_of_hidden() {
   std::string text;
   for (const HiddenKind& kind : known_effects)
     text += fmt::format("{:24} {}\n", kind.id, kind.port);
-  return text + "none, outside (one of no library), any (nothing, one, two or one of no library)\n";
+  return text +
+         "none, outside (one of no library), any (nothing, one, two or one of no library), or a file "
+         "NAME.effect.toml\n";
 }
 
 }  // namespace diastole::sim_rig

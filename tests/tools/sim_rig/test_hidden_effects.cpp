@@ -143,5 +143,42 @@ TEST(HiddenEffects, AnUnknownOneIsRefusedWithTheNearest) {
   }
 }
 
+std::string example(const std::string& id) {
+  return DIASTOLE_SOURCE_DIR "/examples/effects/" + id + ".effect.toml";
+}
+
+/// A built-in effect hidden from its file does what hiding it by its id does at the size that was drawn.
+TEST(HiddenFiles, DoWhatTheirEffectsDo) {
+  for (const auto& [id, set] :
+       {std::pair{"stroke-gain", +[](Flaws&flaws, double size) { flaws.drive.gain = size; }},
+        std::pair{"seal-leak-pump", +[](Flaws&flaws, double size) { flaws.pump.leak_mL_s_kPa = size; }},
+        std::pair{"cannula-leak-cavity",
+                  +[](Flaws&flaws, double size) { flaws.cavity.leak_mL_s_kPa = size; }},
+        std::pair{"chamber-back-pressure",
+                  +[](Flaws&flaws, double size) { flaws.specimen.chamber_kPa_mL = 1e-3 * size; }},
+        std::pair{"air-bubble-pump", +[](Flaws&flaws, double size) { flaws.pump.gas_mL = size; }},
+        std::pair{"sensor-gain", +[](Flaws&flaws, double size) { flaws.sensors.gain = size; }}}) {
+    PlantConfig by_file = quiet_rig();
+    const auto sealed = nlohmann::json::parse(hide({example(id)}, 3, by_file));
+    EXPECT_EQ(sealed["kind"], "single");
+    EXPECT_EQ(sealed["truth"][0]["id"], id);
+    PlantConfig by_id = quiet_rig();
+    set(by_id.flaws, sealed["truth"][0]["parameters"].begin().value().get<double>());
+    const Session expected = session_of(by_id);
+    const double effect_kPa =
+        farthest(session_of(quiet_rig()).cavity_reading_kPa, expected.cavity_reading_kPa);
+    EXPECT_GT(effect_kPa, 0.005) << id;
+    EXPECT_LT(farthest(session_of(by_file).cavity_reading_kPa, expected.cavity_reading_kPa),
+              0.01 * effect_kPa)
+        << id;
+  }
+}
+
+TEST(HiddenFiles, AreRefusedWhereThePlantHasNoPort) {
+  PlantConfig rig = quiet_rig();
+  for (const char* id : {"viscoelasticity", "missed-steps", "trigger-delay"})
+    EXPECT_THROW(hide({example(id)}, 1, rig), InputError) << id;
+}
+
 }  // namespace
 }  // namespace diastole::sim_rig

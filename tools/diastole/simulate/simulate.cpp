@@ -19,6 +19,7 @@
 #include "tools/diastole/simulate/simulated_rig.hpp"
 #include "tools/diastole/simulate/stop_signals.hpp"
 #include "tools/sim_rig/hidden_effects.hpp"
+#include "tools/sim_rig/hidden_file.hpp"
 
 namespace diastole {
 namespace {
@@ -131,7 +132,8 @@ SimulatedSession simulate(SimulateOptions options) {
   for (const std::string& fault : options.faults)
     options.rig.more.insert(options.rig.more.end(), {"--fault", fault});
   for (const std::string& id : options.hidden)
-    options.rig.more.insert(options.rig.more.end(), {"--hide", id});
+    options.rig.more.insert(options.rig.more.end(),
+                            {"--hide", sim_rig::is_effect_file(id) ? fs::absolute(id).string() : id});
   if (options.hide_seed)
     options.rig.more.insert(options.rig.more.end(), {"--hide-seed", fmt::to_string(*options.hide_seed)});
   if (!options.sealed.empty()) options.rig.more.insert(options.rig.more.end(), {"--sealed", options.sealed});
@@ -202,7 +204,8 @@ void add_simulate(CommandLine& line) {
   command->add_option("--fault", options->faults,
                       "make something go wrong, NAME@run+SECONDS (sim_rig faults, sim_rig --help)");
   command->add_option("--hide", options->hidden,
-                      "hide an effect (sim_rig hidden), none, outside or any; may be repeated");
+                      "hide an effect (sim_rig hidden), one of a file NAME.effect.toml, none, outside or "
+                      "any; may be repeated");
   command->add_option(
       "--hide-seed", options->hide_seed,
       "of the hidden effects' sizes, the same for all runs of a session; if not given, that of the noise");

@@ -2,6 +2,7 @@
 // What a rig may have that its description does not hold. Neutral values leave the plant exactly as it is.
 
 #include <array>
+#include <functional>
 
 namespace diastole::sim_rig {
 
@@ -58,7 +59,18 @@ struct SensorFlaws {
   double hum_Hz = 0;
 };
 
+/// Laws of somebody's own, from a file (hidden_file.hpp); empty: none. Times since the first cycle.
+struct OwnLaws {
+  std::function<double(double volume_mL, double time_s)> piston_mL =
+      {};  ///< displaced if the steps command so much
+  std::function<double(double pressure_kPa, double time_s)> pump_leak_mL_s = {};
+  std::function<double(double pressure_kPa, double time_s)> cavity_leak_mL_s = {};
+  std::function<double(double pressure_kPa, double volume_mL, double time_s)> specimen_kPa = {};
+  std::function<double(double pressure_kPa, double time_s)> seen_kPa = {};  ///< by the cavity's sensor
+};
+
 struct Flaws {
+  OwnLaws own{};
   DriveFlaws drive{};
   PumpFlaws pump{};
   CavityFlaws cavity{};

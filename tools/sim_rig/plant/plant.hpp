@@ -61,25 +61,28 @@ class Plant {
   explicit Plant(const PlantConfig& config)
       : minor_loss_K_(config.minor_loss_K),
         hose_(config.hose),
-        specimen_(config.C1_kPa, config.flaws.specimen),
+        specimen_(config.C1_kPa, config.flaws.specimen, config.flaws.own),
         screw_(config.flaws.drive, config.seed),
         piston_(config.piston_lag_ms, hose_.step_s()),
-        cavity_sensor_(with_flaws(config.cavity, config.flaws.sensors, true), hose_.step_s(),
-                       2 * config.seed),
-        pump_sensor_(with_flaws(config.pump, config.flaws.sensors, false), hose_.step_s(),
-                     2 * config.seed + 1),
+        cavity_sensor_(with_flaws(config.cavity, config.flaws, true), hose_.step_s(), 2 * config.seed),
+        pump_sensor_(with_flaws(config.pump, config.flaws, false), hose_.step_s(), 2 * config.seed + 1),
         loss_kPa_s2_per_mL2_(loss_factor(config)),
         pump_gas_{config.flaws.pump.gas_mL, gas_exponent},
         pump_compliance_mL_per_kPa_(config.flaws.pump.compliance_mL_per_kPa),
         pump_leak_mL_s_kPa_(config.flaws.pump.leak_mL_s_kPa),
+        own_(config.flaws.own),
         cavity_flaws_(config.flaws.cavity),
         leak_mL_s_kPa_(cavity_flaws_.leak_mL_s_kPa),
         bubble_{cavity_flaws_.gas_mL, gas_exponent} {}
 
   /// The controller has displaced `volume_mL` in all since `time_s` (not before the plant's present).
-  void displace(double time_s, double volume_mL) { piston_.displace(time_s, screw_.follow(volume_mL)); }
+  void displace(double time_s, double volume_mL) {
+    const double piston_mL = own_.piston_mL ? own_.piston_mL(volume_mL, since_first_cycle_s()) : volume_mL;
+    piston_.displace(time_s, screw_.follow(piston_mL));
+  }
   /// The controller's TTL has risen.
   void begin_cycle() {
+    if (first_cycle_step_ < 0) first_cycle_step_ = step_count_;
     screw_.begin_cycle();
     specimen_.begin_cycle();
     cavity_sensor_.begin_cycle();
@@ -128,8 +131,9 @@ class Plant {
   static constexpr double gas_exponent = 1.2;  // between constant temperature and no exchange of heat
 
   /// The sensor with the flaws that concern it.
-  static SensorConfig with_flaws(SensorConfig sensor, const SensorFlaws& flaws, bool at_cavity) {
-    sensor.flaws = flaws;
+  static SensorConfig with_flaws(SensorConfig sensor, const Flaws& flaws, bool at_cavity) {
+    sensor.flaws = flaws.sensors;
+    if (at_cavity) sensor.own_kPa = flaws.own.seen_kPa;
     if (!at_cavity) sensor.flaws.gain = sensor.flaws.step_kPa = sensor.flaws.drift_kPa_s = 0;
     return sensor;
   }
@@ -174,19 +178,40 @@ class Plant {
     const double swallows_mL_kPa =
         (pump_compliance_mL_per_kPa_ + pump_gas_.compliance_mL_per_kPa(pump_end_kPa())) / step_s();
     const double loses = pump_leak_mL_s_kPa_;
-    if (swallows_mL_kPa == 0 && loses == 0) return piston_.flow_mL_s();
+    if (swallows_mL_kPa == 0 && loses == 0 && !own_.pump_leak_mL_s) return piston_.flow_mL_s();
     // p = line.p + z Q and Q = Q_piston - C (p - p_before) / dt - G p.
     const Characteristic line = hose_.inlet();
     const double z = line.impedance_kPa_s_per_mL;
-    const double pressure_kPa =
-        (line.pressure_kPa + z * (piston_.flow_mL_s() + swallows_mL_kPa * pump_end_kPa())) /
-        (1 + z * (swallows_mL_kPa + loses));
+    const double without_kPa =
+        line.pressure_kPa + z * (piston_.flow_mL_s() + swallows_mL_kPa * pump_end_kPa());
+    const double share = 1 + z * (swallows_mL_kPa + loses);
+    double pressure_kPa = without_kPa / share;
+    if (own_.pump_leak_mL_s) pressure_kPa = behind_own_leak_kPa(without_kPa, share, z);
     return (pressure_kPa - line.pressure_kPa) / z;
+  }
+  /// share p + z L(p) = without, by Newton's method with differences: L grows with p.
+  [[nodiscard]] double behind_own_leak_kPa(double without_kPa, double share, double z) const {
+    constexpr double small_kPa = 1e-4;
+    const auto excess = [&](double p) {
+      return share * p + z * own_.pump_leak_mL_s(p, since_first_cycle_s()) - without_kPa;
+    };
+    double p = pump_end_kPa();
+    for (int iteration = 0; iteration < 30; ++iteration) {
+      const double change = 2 * small_kPa * excess(p) / (excess(p + small_kPa) - excess(p - small_kPa));
+      p -= change;
+      if (std::abs(change) < 1e-9) break;
+    }
+    return p;
+  }
+  [[nodiscard]] double since_first_cycle_s() const {
+    return first_cycle_step_ < 0 ? 0 : static_cast<double>(step_count_ - first_cycle_step_) * step_s();
   }
 
   /// The leak's flow and the bubble's share are those of the step's beginning: both change little in half a millisecond.
   void take_disturbances() {
     leaked_mL_ = leak_mL_s_kPa_ * cavity_kPa() * step_s();
+    if (own_.cavity_leak_mL_s)
+      leaked_mL_ += own_.cavity_leak_mL_s(cavity_kPa(), since_first_cycle_s()) * step_s();
     gel_share_ =
         1 / (1 + bubble_.compliance_mL_per_kPa(cavity_kPa()) * specimen_.stiffness_kPa_per_mL(cavity_mL_));
   }
@@ -208,6 +233,8 @@ class Plant {
   AirBubble pump_gas_;
   double pump_compliance_mL_per_kPa_;
   double pump_leak_mL_s_kPa_;
+  OwnLaws own_;
+  long first_cycle_step_ = -1;
   CavityFlaws cavity_flaws_;
   double leak_mL_s_kPa_;
   double blockage_K_ = 0;

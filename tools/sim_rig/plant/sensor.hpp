@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdint>
 #include <deque>
+#include <functional>
 #include <numbers>
 #include <random>
 
@@ -23,6 +24,7 @@ struct SensorConfig {
   double range_kPa = 20;             ///< the converter spans -range to +range, and clips there
   int bits = 12;                     ///< 0: no steps
   SensorFlaws flaws{};
+  std::function<double(double pressure_kPa, double time_s)> own_kPa = {};  ///< of a law of somebody's own
 };
 
 class Sensor {
@@ -59,8 +61,9 @@ class Sensor {
   /// The reading `since_step_s` after the last step, carried on along the response's own slope.
   [[nodiscard]] double reading_kPa(double since_step_s) const {
     const double late_s = config_.flaws.delay_s + 1e-6 * config_.flaws.lag_ppm * since_first_cycle_s_;
-    const double analog = line_kPa(late_s - since_step_s) * (1 + config_.flaws.gain) + config_.offset_kPa +
-                          noise_kPa_ + error_kPa_ + flaw_kPa();
+    double shown_kPa = line_kPa(late_s - since_step_s) * (1 + config_.flaws.gain);
+    if (config_.own_kPa) shown_kPa = config_.own_kPa(shown_kPa, since_first_cycle_s_);
+    const double analog = shown_kPa + config_.offset_kPa + noise_kPa_ + error_kPa_ + flaw_kPa();
     const double clipped = std::clamp(analog, -config_.range_kPa, config_.range_kPa);
     if (config_.bits == 0) return clipped;
     const double step_kPa = std::ldexp(config_.range_kPa, 1 - config_.bits);

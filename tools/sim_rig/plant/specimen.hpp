@@ -16,17 +16,22 @@ namespace diastole::sim_rig {
 
 class Specimen {
  public:
-  Specimen(double C1_kPa, const SpecimenFlaws& flaws)
-      : flaws_(flaws), gel_(C1_kPa, {flaws.inner_radius_part, flaws.stiffening, flaws.bond_left}) {}
+  Specimen(double C1_kPa, const SpecimenFlaws& flaws, const OwnLaws& own = {})
+      : flaws_(flaws),
+        own_(own),
+        gel_(C1_kPa, {flaws.inner_radius_part, flaws.stiffening, flaws.bond_left}) {}
 
   [[nodiscard]] double pressure_kPa(double inflation_mL) const {
     double pressure = scale_ * gel_.pressure_kPa(inflation_mL) + flaws_.chamber_kPa_mL * inflation_mL;
     for (size_t i = 0; i < relaxed_kPa_.size(); ++i)
       pressure -= flaws_.relaxing[i] * relaxed_kPa_[i];
-    return pressure;
+    return own_.specimen_kPa ? own_.specimen_kPa(pressure, inflation_mL, since_first_cycle_s_) : pressure;
   }
   /// dp/dV at once, kPa/mL.
   [[nodiscard]] double stiffness_kPa_per_mL(double inflation_mL) const {
+    constexpr double small_mL = 1e-3;
+    if (own_.specimen_kPa)
+      return (pressure_kPa(inflation_mL + small_mL) - pressure_kPa(inflation_mL - small_mL)) / (2 * small_mL);
     return scale_ * gel_.stiffness_kPa_per_mL(inflation_mL) + flaws_.chamber_kPa_mL;
   }
 
@@ -47,6 +52,7 @@ class Specimen {
 
  private:
   SpecimenFlaws flaws_;
+  OwnLaws own_;
   GelAnnulus gel_;
   int cycle_ = 0;
   double since_first_cycle_s_ = 0;
