@@ -15,6 +15,7 @@
 #include "tools/sim_board/peripherals/exti.hpp"
 #include "tools/sim_board/peripherals/flash.hpp"
 #include "tools/sim_board/peripherals/gpio.hpp"
+#include "tools/sim_board/peripherals/power.hpp"
 #include "tools/sim_board/peripherals/rcc.hpp"
 #include "tools/sim_board/peripherals/storage.hpp"
 #include "tools/sim_board/peripherals/timer.hpp"
@@ -34,8 +35,8 @@ class Chip {
     std::function<void(uint32_t offset, uint32_t bytes)> flash_changed;
   };
 
-  Chip(uint32_t crystal_Hz, uint32_t random_seed, Listeners listeners)
-      : rcc(clock, bus, scheduler, notes, crystal_Hz),
+  Chip(uint32_t crystal_Hz, uint32_t random_seed, uint32_t device_id, Listeners listeners)
+      : rcc(clock, bus, scheduler, nvic, notes, crystal_Hz),
         flash(memory.flash(), clock, scheduler, notes),
         world(clock, scheduler,
               [this](Pin pin, bool level, Cycles at) { ports[pin.port]->drive(pin.number, level, at); }),
@@ -47,7 +48,7 @@ class Chip {
     add_ports();
     add_timers();
     add_usarts();
-    add_others(random_seed);
+    add_others(random_seed, device_id);
     flash.listen({[this](uint32_t offset, uint32_t bytes) {
                     cpu.forget_code(offset, bytes);
                     listeners_.flash_changed(offset, bytes);
@@ -91,6 +92,7 @@ class Chip {
   Dwt dwt{clock};
   Syscfg syscfg;
   Exti exti{syscfg, pins, nvic};
+  Power power;
   Dac dac{clock, pins, notes};
   Watchdog watchdog{clock, scheduler};
   Dma dma1{1, bus, memory, nvic, notes};
@@ -157,7 +159,9 @@ class Chip {
                port->timer_level({number, channel}, level, at);
            },
            [this, number](Cycles at) { trigger_output(number, at); },
-           [this, number](uint8_t channel, Cycles late_by) { listeners_.missed(number, channel, late_by); }});
+           [this, number](uint8_t channel, Cycles late_by) { listeners_.missed(number, channel, late_by); },
+           number == 11 ? std::function<double()>([this] { return rcc.cycles_per_divided_crystal(); })
+                        : std::function<double()>()});
       bus.add({"TIM" + std::to_string(number),
                place.base,
                {place.shape.on_apb2 ? apb2 : apb1, place.gate_bit},
@@ -176,7 +180,7 @@ class Chip {
       usarts.push_back(std::move(usart));
     }
   }
-  void add_others(uint32_t random_seed) {
+  void add_others(uint32_t random_seed, uint32_t device_id) {
     bus.add({"SYSCFG", 0x4001'3800, {apb2, 14}, &syscfg});
     bus.add({"EXTI", 0x4001'3c00, {}, &exti});
     bus.add({"DAC", 0x4000'7400, {apb1, 29}, &dac});
@@ -190,9 +194,9 @@ class Chip {
       bus.add({name, base, gate, device.get()});
       others_.push_back(std::move(device));
     };
-    other("PWR", 0x4000'7000, {apb1, 28}, std::make_unique<Storage>(4, 1U << 14));
+    bus.add({"PWR", 0x4000'7000, {apb1, 28}, &power});
     other("RTC", 0x4000'2800, {apb1, 28}, std::make_unique<Storage>(0, 0, true));
-    other("DBGMCU", 0xe004'2000, {}, std::make_unique<Storage>(0, 0x1007'6413));
+    other("DBGMCU", 0xe004'2000, {}, std::make_unique<Storage>(0, device_id));
     other("RNG", 0x5006'0800, {ahb2, 6}, std::make_unique<RandomNumbers>(random_seed));
   }
   void trigger_output(uint8_t timer, Cycles at) {

@@ -34,7 +34,7 @@ constexpr uint32_t core_exception_base = 0x8000'0000;
 struct SimBoard::Board {
   explicit Board(const SimBoardOptions& options)
       : chip(
-            options.crystal_Hz, options.random_seed,
+            options.crystal_Hz, options.random_seed, options.device_id,
             {[this](uint8_t byte, Cycles at) {
                sent.push_back({chip.clock.ns(at), byte});
              },
@@ -49,7 +49,9 @@ struct SimBoard::Board {
              },
              [this](uint32_t offset, uint32_t bytes) {
                if (flash_listener) flash_listener(offset, bytes);
-             }}) {}
+             }}) {
+    if (options.cell_seed) chip.flash.doubt_cells(*options.cell_seed);
+  }
 
   void note_missed(uint8_t timer, uint8_t channel, Cycles late_by) {
     ++missed;
@@ -90,7 +92,7 @@ struct SimBoard::Board {
   std::function<void(uint32_t, uint32_t)> flash_listener;
   uint64_t missed = 0;
   std::optional<ResetCause> requested;
-  bool powered = false, power_fails = false;
+  bool powered = false, power_fails = false, browned_out = false;
   board_model::Chip chip;
 };
 
@@ -119,8 +121,36 @@ void SimBoard::power_on() {
   if (std::exchange(board_->powered, true)) return;
   board_->power_fails = false;
   board_->chip.memory.forget_ram();
+  board_->chip.flash.read_marginal_cells();
   board_->reset(ResetCause::power);
 }
+
+void SimBoard::set_supply_mV(uint32_t supply_mV) {
+  constexpr uint32_t ram_keeps_mV = 1700;
+  Board& board = *board_;
+  board.chip.power.set_supply_mV(supply_mV);
+  board.chip.flash.set_supply_mV(supply_mV);
+  if (board.powered && supply_mV < board.chip.flash.brown_out_mV()) {
+    power_off();
+    board.browned_out = true;
+  }
+  if (!board.browned_out) return;
+  if (supply_mV < ram_keeps_mV) board.chip.memory.forget_ram();
+  if (supply_mV < board.chip.flash.brown_out_mV()) return;
+  board.browned_out = false;
+  board.powered = true;
+  board.power_fails = false;
+  board.chip.flash.read_marginal_cells();
+  board.reset(ResetCause::power);
+}
+
+std::size_t SimBoard::marginal_words() const { return board_->chip.flash.marginal_words(); }
+
+uint32_t SimBoard::option_bytes() const { return board_->chip.flash.option_bytes(); }
+
+uint32_t SimBoard::flash_access_control() const { return board_->chip.flash.read(0); }
+
+void SimBoard::fail_crystal() { board_->chip.rcc.fail_crystal(); }
 
 void SimBoard::power_off() {
   board_->powered = false;

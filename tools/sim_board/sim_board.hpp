@@ -27,8 +27,11 @@
 namespace diastole {
 
 struct SimBoardOptions {
-  uint32_t crystal_Hz = 8'000'000;  ///< Olimex STM32-H405: 8 MHz, Feather F405: 12 MHz
-  uint32_t random_seed = 1;         ///< of the chip's random number generator
+  uint32_t crystal_Hz = 8'000'000;   ///< Olimex STM32-H405: 8 MHz, Feather F405: 12 MHz; 0: it never starts
+  uint32_t random_seed = 1;          ///< of the chip's random number generator
+  uint32_t device_id = 0x1007'6413;  ///< DBGMCU_IDCODE: revision Y; 0x2000'6411 is revision A
+  std::optional<uint32_t>
+      cell_seed{};  ///< power cuts leave arbitrary bits and marginal cells, drawn from this
 };
 
 /// A byte that left through the board's serial port; the time is the end of its stop bit.
@@ -124,6 +127,18 @@ class SimBoard {
 
   /// Power fails in the middle of flash operation `operation` (1 is the next one); nullopt: never.
   void cut_power_at_flash_operation(std::optional<uint64_t> operation);
+
+  /// The supply from now on. Below the brown-out threshold of the option bytes (1.7 V without one) the chip is held in
+  /// reset, outputs off, until it is above again; below 1.7 V RAM forgets. Flash operations below 2.7 V leave marginal cells.
+  void set_supply_mV(uint32_t supply_mV);
+  /// Words of flash with cells that each power-up reads anew.
+  [[nodiscard]] std::size_t marginal_words() const;
+  /// The user option bytes as OPTCR shows them, bits 2 to 27.
+  [[nodiscard]] uint32_t option_bytes() const;
+  /// FLASH_ACR: wait states, caches, prefetch.
+  [[nodiscard]] uint32_t flash_access_control() const;
+  /// The crystal stops for good.
+  void fail_crystal();
 
   /// Called after each operation on the flash with the bytes that it changed, counted from the start of flash.
   void on_flash_change(std::function<void(uint32_t offset, uint32_t bytes)> listener);

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <deque>
+#include <functional>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -17,19 +19,35 @@ inline constexpr uint64_t ms = 1'000'000;  // ns
 
 class EmulatedDesk final : public Clock {
  public:
-  explicit EmulatedDesk(const std::string& image) : controller({read_image(image)}) {}
+  explicit EmulatedDesk(const std::string& image, SimBoardOptions options = {})
+      : controller({read_image(image)}, {}, options) {}
+
+  /// Something that happens to the board at a time to come, while it runs.
+  void at(uint64_t time_ns, std::function<void()> happens) { plans_.emplace(time_ns, std::move(happens)); }
 
   [[nodiscard]] uint64_t now_ns() override { return controller.board().now_ns(); }
   [[nodiscard]] bool stands_still() const override { return true; }
   void sleep_until_ns(uint64_t until_ns, ByteLine*) override {
-    const auto output = controller.advance_to(until_ns);
-    to_host.insert(to_host.end(), output.sent.begin(), output.sent.end());
-    edges.insert(edges.end(), output.edges.begin(), output.edges.end());
+    while (!plans_.empty() && plans_.begin()->first <= until_ns) {
+      const auto plan = plans_.extract(plans_.begin());
+      advance(plan.key());
+      plan.mapped()();
+    }
+    advance(until_ns);
   }
 
   EmulatedController controller;
   std::deque<uint8_t> to_host;
   std::vector<sim_controller::PinEdge> edges;
+
+ private:
+  void advance(uint64_t until_ns) {
+    const auto output = controller.advance_to(until_ns);
+    to_host.insert(to_host.end(), output.sent.begin(), output.sent.end());
+    edges.insert(edges.end(), output.edges.begin(), output.edges.end());
+  }
+
+  std::multimap<uint64_t, std::function<void()>> plans_;
 };
 
 class EmulatedLine final : public ByteLine {

@@ -5,12 +5,19 @@
 // Sectors: 0-3 16 KB, 4 64 KB, 5-11 128 KB. Operations are counted from the last power-up; one that the power
 // cut hits is left half done: a word keeps every second bit that should have fallen, an erase clears the
 // first half.
+//
+// Cells that were written below 2.7 V (32 bits at a time need that much), and with doubt_cells() those of an operation that
+// the power cut hit, are marginal: each power-up reads them anew, a one or a zero, until the sector is erased or the word
+// written as it should be. With doubt_cells() an arbitrary part of a word's bits has fallen, and an erase may leave its
+// sector reading blank. Option bytes (OPTCR) are kept as flash is, and count from the next reset on.
 
 #include <algorithm>
 #include <cstdint>
 #include <cstring>
 #include <functional>
+#include <map>
 #include <optional>
+#include <random>
 #include <span>
 
 #include "tools/sim_board/core/memory.hpp"
@@ -25,7 +32,6 @@ class Flash final : public RegisterBlock {
       : memory_(memory), clock_(clock), scheduler_(scheduler), notes_(notes), slot_(scheduler.add(*this)) {}
 
   uint32_t read(uint32_t offset) override {
-    if (offset == 0x14) return 0x0fff'aaed;
     return RegisterBlock::read(offset) | (offset == 0x0c && busy_ ? busy_flag : 0);
   }
   void write(uint32_t offset, uint32_t value, uint32_t mask) override {
@@ -40,8 +46,14 @@ class Flash final : public RegisterBlock {
       case 0x0c:
         sr_ &= ~(value & mask);
         break;
+      case 0x08:
+        write_option_key(value);
+        break;
       case 0x10:
         write_control(merged(cr_, value, mask));
+        break;
+      case 0x14:
+        write_options(merged(optcr_, value, mask));
         break;
       default:
         break;
@@ -50,7 +62,9 @@ class Flash final : public RegisterBlock {
   void reset() override {
     acr_ = sr_ = 0;
     cr_ = locked;
-    first_key_ = key_fault_ = busy_ = false;
+    first_key_ = key_fault_ = busy_ = first_option_key_ = false;
+    optcr_ = options_ | option_lock;
+    loaded_options_ = options_;
     scheduler_.set(slot_, never);
   }
   void on_event(Cycles) override {
@@ -77,12 +91,21 @@ class Flash final : public RegisterBlock {
       sr_ |= alignment_error;
       return;
     }
+    if (is_protected(offset)) {
+      sr_ |= protection_error;
+      return;
+    }
     const bool whole = begin_operation(program_ns);
     uint32_t old = 0;
     std::memcpy(&old, &memory_[offset], bytes);
     const uint32_t falling = old & ~value;
-    const uint32_t left = whole ? old & value : old & ~(falling & 0x5555'5555);
+    const uint32_t fallen = doubting_ ? static_cast<uint32_t>(random_()) : 0x5555'5555U;
+    const uint32_t left = whole ? old & value : old & ~(falling & fallen);
     std::memcpy(&memory_[offset], &left, bytes);
+    if (supply_mV_ < least_supply_mV || (!whole && doubting_))
+      marginal_[offset] |= falling;
+    else
+      marginal_.erase(offset);
     changed(offset, bytes);
     if (!whole && listeners_.power_cut) listeners_.power_cut();
   }
@@ -95,6 +118,31 @@ class Flash final : public RegisterBlock {
   void cut_power_at(std::optional<uint64_t> operation) {
     cut_at_ = operation ? std::optional(operations_ + *operation) : std::nullopt;
   }
+
+  /// The voltage that operations have, and what a power cut leaves drawn from `seed`.
+  void set_supply_mV(uint32_t supply_mV) { supply_mV_ = supply_mV; }
+  void doubt_cells(uint32_t seed) {
+    doubting_ = true;
+    random_.seed(seed);
+  }
+  /// Power-up: marginal cells read anew.
+  void read_marginal_cells() {
+    for (const auto& [offset, bits] : marginal_) {
+      uint32_t word = 0;
+      std::memcpy(&word, &memory_[offset], 4);
+      const auto drawn = static_cast<uint32_t>(random_());
+      word = (word & ~bits) | (drawn & bits);
+      std::memcpy(&memory_[offset], &word, 4);
+      changed(offset, 4);
+    }
+  }
+  [[nodiscard]] std::size_t marginal_words() const { return marginal_.size(); }
+  /// Below it the brown-out reset holds the chip, as the options say that counted since the last reset.
+  [[nodiscard]] uint32_t brown_out_mV() const {
+    constexpr uint32_t levels_mV[] = {2700, 2400, 2100, 1700};  // BOR level 3, 2, 1, off: power-on reset
+    return levels_mV[loaded_options_ >> 2 & 3];
+  }
+  [[nodiscard]] uint32_t option_bytes() const { return options_; }
 
   struct Listeners {
     std::function<void(uint32_t offset, uint32_t bytes)> changed;  ///< contents: translations must go
@@ -116,6 +164,9 @@ class Flash final : public RegisterBlock {
 
   static constexpr uint32_t locked = 0x8000'0000, start = 1 << 16, mass_erase = 1 << 2, sector_erase = 1 << 1,
                             program = 1;
+  static constexpr uint32_t option_lock = 1, option_start = 2, option_bits = 0x0fff'ffec;
+  static constexpr uint32_t least_supply_mV = 2700;  // of x32, datasheet table 39
+  static constexpr uint32_t protection_error = 1 << 4;
   static constexpr uint32_t busy_flag = 1 << 16, end_of_operation = 1, parallelism_error = 1 << 6,
                             sequence_error = 1 << 7, alignment_error = 1 << 5;
 
@@ -128,7 +179,30 @@ class Flash final : public RegisterBlock {
     return bytes == 0x4000 ? erase_16k_ns : bytes == 0x1'0000 ? erase_64k_ns : erase_128k_ns;
   }
 
-  uint32_t* word(uint32_t offset) override { return in_order(offset, {&acr_, nullptr, nullptr, &sr_, &cr_}); }
+  uint32_t* word(uint32_t offset) override {
+    return in_order(offset, {&acr_, nullptr, nullptr, &sr_, &cr_, &optcr_});
+  }
+  [[nodiscard]] bool is_protected(uint32_t offset) const {
+    const uint32_t number = offset < 0x1'0000   ? offset / 0x4000
+                            : offset < 0x2'0000 ? 4
+                                                : 4 + offset / 0x2'0000;
+    return (loaded_options_ >> (16 + number) & 1) == 0;
+  }
+  void write_option_key(uint32_t key) {
+    if (first_option_key_ && key == 0x4c5d'6e7f) optcr_ &= ~option_lock;
+    first_option_key_ = key == 0x0819'2a3b;
+  }
+  void write_options(uint32_t value) {
+    if (optcr_ & option_lock) return;
+    optcr_ = value & (option_bits | option_lock);
+    if ((value & option_start) == 0) return;
+    if (busy_) return notes_.add("option bytes written while flash is busy");
+    if (supply_mV_ < least_supply_mV) notes_.add("option bytes written below 2.7 V");
+    if (begin_operation(program_ns))
+      options_ = value & option_bits;
+    else if (listeners_.power_cut)
+      listeners_.power_cut();
+  }
   void write_key(uint32_t key) {
     if (!first_key_ && key == 0x4567'0123) {
       first_key_ = true;
@@ -154,9 +228,19 @@ class Flash final : public RegisterBlock {
     erase(first, bytes, erase_ns(bytes));
   }
   void erase(uint32_t first, uint32_t bytes, uint64_t duration_ns) {
+    if (is_protected(first)) {
+      sr_ |= protection_error;
+      return;
+    }
     const bool whole = begin_operation(duration_ns);
-    const uint32_t done = whole ? bytes : bytes / 2;
+    const uint32_t done = whole || (doubting_ && random_() % 2 == 0) ? bytes : bytes / 2;
     std::fill_n(memory_.begin() + first, done, uint8_t{0xff});
+    marginal_.erase(marginal_.lower_bound(first), marginal_.lower_bound(first + bytes));
+    if (supply_mV_ < least_supply_mV || (!whole && doubting_)) {
+      constexpr uint32_t words_a_weak_bit = 16;
+      for (uint32_t at = first; at < first + bytes; at += 4 * words_a_weak_bit)
+        marginal_[at + 4 * static_cast<uint32_t>(random_() % words_a_weak_bit)] = 1U << random_() % 32;
+    }
     changed(first, bytes);
     if (!whole && listeners_.power_cut) listeners_.power_cut();
   }
@@ -183,7 +267,13 @@ class Flash final : public RegisterBlock {
   Notes& notes_;
   Scheduler::Slot slot_;
   Listeners listeners_;
-  uint32_t acr_ = 0, sr_ = 0, cr_ = 0x8000'0000;
+  uint32_t acr_ = 0, sr_ = 0, cr_ = 0x8000'0000, optcr_ = 0x0fff'aaed;
+  uint32_t options_ = 0x0fff'aaec;         ///< as they leave the factory: no brown-out reset, no protection
+  uint32_t loaded_options_ = 0x0fff'aaec;  ///< as they were at the last reset
+  uint32_t supply_mV_ = 3300;
+  std::map<uint32_t, uint32_t> marginal_;  ///< bits by the offset of their word
+  bool doubting_ = false, first_option_key_ = false;
+  std::mt19937 random_{405};
   bool first_key_ = false, key_fault_ = false;
   bool busy_ = false;
   Cycles busy_until_ = 0;

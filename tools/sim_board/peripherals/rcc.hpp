@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "tools/sim_board/core/bus.hpp"
+#include "tools/sim_board/core/nvic.hpp"
 #include "tools/sim_board/core/scheduler.hpp"
 
 namespace diastole::board_model {
@@ -19,10 +20,12 @@ enum class ResetCause : uint32_t {
 
 class Rcc final : public RegisterBlock {
  public:
-  Rcc(Clock& clock, Bus& bus, Scheduler& scheduler, Notes& notes, uint32_t crystal_Hz)
+  /// A crystal of 0 Hz never starts.
+  Rcc(Clock& clock, Bus& bus, Scheduler& scheduler, Nvic& nvic, Notes& notes, uint32_t crystal_Hz)
       : clock_(clock),
         bus_(bus),
         scheduler_(scheduler),
+        nvic_(nvic),
         notes_(notes),
         slot_(scheduler.add(*this)),
         crystal_Hz_(crystal_Hz) {
@@ -35,6 +38,10 @@ class Rcc final : public RegisterBlock {
   }
   void write(uint32_t offset, uint32_t value, uint32_t mask) override {
     if (word(offset) == nullptr) return;
+    if (offset == cir) {
+      if ((value & mask) >> 23 & 1) registers_[cir / 4] &= ~security_flag;
+      return;
+    }
     const uint32_t whole = merged(read(offset), value, mask);
     if (offset == cr) return write_control(whole);
     if (offset == cfgr) return write_configuration(whole);
@@ -51,6 +58,8 @@ class Rcc final : public RegisterBlock {
     registers_[cr / 4] = 0x83;
     registers_[pllcfgr / 4] = 0x2400'3010;
     registers_[0x30 / 4] = 0x0010'0000;
+    for (const auto [offset, value] : low_power_resets)
+      registers_[offset / 4] = value;
     external_ready_ = pll_ready_ = never;
     scheduler_.set(slot_, never);
     apply_tree();
@@ -67,6 +76,31 @@ class Rcc final : public RegisterBlock {
     scheduler_.set(slot_, std::min(external_ready_, pll_ready_));
   }
 
+  /// The crystal stops, for good. With the clock security system on (CR.CSSON) the core goes on with the internal
+  /// oscillator, in its NMI.
+  void fail_crystal() {
+    crystal_Hz_ = 0;
+    uint32_t& held = registers_[cr / 4];
+    const bool in_use = (held & hse_ready) != 0;
+    held &= ~hse_ready;
+    external_ready_ = never;
+    if (!in_use) return;
+    if ((held & security_on) == 0)
+      return notes_.add("the crystal failed and nobody watched: the core stands still");
+    held &= ~(hse_on | security_on);
+    if ((registers_[pllcfgr / 4] >> 22 & 1) != 0) held &= ~(pll_on | pll_ready);
+    registers_[cir / 4] |= security_flag;
+    registers_[cfgr / 4] &= ~0xfU;
+    apply_tree();
+    nvic_.set_pending(exception::nmi);
+  }
+  /// Cycles of the core between two edges of the crystal's clock for the RTC (CFGR.RTCPRE), which TIM11 can capture; 0: none.
+  [[nodiscard]] double cycles_per_divided_crystal() const {
+    const uint32_t divider = registers_[cfgr / 4] >> 16 & 0x1f;
+    if (divider < 2 || (registers_[cr / 4] & hse_ready) == 0) return 0;
+    return static_cast<double>(clock_.tree().core_Hz) * divider / crystal_Hz_;
+  }
+
   [[nodiscard]] bool clocked(ClockGate gate) const {
     return gate.enable_offset == 0 || (registers_[gate.enable_offset / 4] >> gate.bit & 1) != 0;
   }
@@ -78,8 +112,14 @@ class Rcc final : public RegisterBlock {
   }
 
  private:
-  static constexpr uint32_t cr = 0x00, pllcfgr = 0x04, cfgr = 0x08, ahb1rstr = 0x10, apb2rstr = 0x24,
-                            csr = 0x74;
+  struct Reset {
+    uint32_t offset, value;
+  };
+  static constexpr Reset low_power_resets[] = {{0x50, 0x7e67'91ff}, {0x54, 0xf1},        {0x58, 0x1},
+                                               {0x60, 0x36fe'c9ff}, {0x64, 0x0007'5f33}, {0x84, 0x2000'3000}};
+  static constexpr uint32_t security_on = 1 << 19, security_flag = 1 << 7;
+  static constexpr uint32_t cr = 0x00, pllcfgr = 0x04, cfgr = 0x08, cir = 0x0c, ahb1rstr = 0x10,
+                            apb2rstr = 0x24, csr = 0x74;
   static constexpr uint32_t hsi_on = 1, hsi_ready = 2, hse_on = 1 << 16, hse_ready = 1 << 17,
                             pll_on = 1 << 24, pll_ready = 1 << 25;
   static constexpr uint32_t remove_flags = 1 << 24;
@@ -109,7 +149,7 @@ class Rcc final : public RegisterBlock {
     if (!(held & hse_on)) {
       held &= ~hse_ready;
       external_ready_ = never;
-    } else if (!(held & hse_ready) && external_ready_ == never) {
+    } else if (!(held & hse_ready) && external_ready_ == never && crystal_Hz_ != 0) {
       external_ready_ = now + clock_.cycles_in(crystal_start_ns);
     }
     if (!(held & pll_on)) {
@@ -177,6 +217,7 @@ class Rcc final : public RegisterBlock {
   Clock& clock_;
   Bus& bus_;
   Scheduler& scheduler_;
+  Nvic& nvic_;
   Notes& notes_;
   Scheduler::Slot slot_;
   uint32_t crystal_Hz_;

@@ -1,12 +1,15 @@
 #pragma once
 // The system control space at 0xe000'e000: NVIC registers, system control block (vector table, reset request,
-// fault status, FPU access) and SysTick (ARMv7-M ARM, B3.2 to B3.4); and DWT with the cycle counter.
+// fault status, FPU access, memory protection) and SysTick (ARMv7-M ARM, B3.2 to B3.5); and DWT with the cycle counter.
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cstdint>
 #include <functional>
 #include <iterator>
+#include <utility>
+#include <vector>
 
 #include "tools/sim_board/core/nvic.hpp"
 #include "tools/sim_board/core/scheduler.hpp"
@@ -82,9 +85,10 @@ class SysTick final : public Device {
 
 /// Bits of the configurable fault status register.
 namespace fault_status {
-inline constexpr uint32_t instruction_access = 1 << 8, precise_data = 1 << 9, imprecise_data = 1 << 10,
-                          address_valid = 1 << 15, undefined_instruction = 1 << 16, invalid_state = 1 << 17,
-                          invalid_return = 1 << 18, no_coprocessor = 1 << 19;
+inline constexpr uint32_t execute_denied = 1 << 0, data_denied = 1 << 1, stacking_denied = 1 << 4,
+                          denied_address_valid = 1 << 7, instruction_access = 1 << 8, precise_data = 1 << 9,
+                          imprecise_data = 1 << 10, address_valid = 1 << 15, undefined_instruction = 1 << 16,
+                          invalid_state = 1 << 17, invalid_return = 1 << 18, no_coprocessor = 1 << 19;
 }
 
 class SystemControl final : public RegisterBlock {
@@ -109,6 +113,9 @@ class SystemControl final : public RegisterBlock {
     }
     if (offset == 0xd0c) return 0xfa05'0000 | nvic_.priority_grouping() << 8;
     if (offset >= 0xd18 && offset < 0xd24) return priorities(first_system_handler + offset - 0xd18);
+    if (offset == 0xd90) return protection_regions << 8;
+    if (offset == 0xd9c) return regions_[region_ % protection_regions].base | region_;
+    if (offset == 0xda0) return regions_[region_ % protection_regions].attributes;
     return RegisterBlock::read(offset);
   }
   void write(uint32_t offset, uint32_t value, uint32_t mask) override {
@@ -142,6 +149,16 @@ class SystemControl final : public RegisterBlock {
       case 0xd2c:
         hfsr_ &= ~bits;
         return;
+      case 0xd9c:
+        if ((value & 1U << 4) != 0) region_ = value & 0xf;
+        regions_[region_ % protection_regions].base = value & ~0x1fU;
+        return protection_changed();
+      case 0xda0:
+        regions_[region_ % protection_regions].attributes = value;
+        return protection_changed();
+      case 0xd94:
+        RegisterBlock::write(offset, value, mask);
+        return protection_changed();
       case 0xf00:
         if ((bits & 0x1ff) < irq_count) nvic_.set_pending(exception::first_irq + (bits & 0x1ff));
         return;
@@ -153,11 +170,31 @@ class SystemControl final : public RegisterBlock {
     vtor_ = scr_ = shcsr_ = cfsr_ = hfsr_ = mmfar_ = bfar_ = cpacr_ = 0;
     ccr_ = 0x200;
     fpccr_ = 0xc000'0000;
-    fpcar_ = fpdscr_ = demcr_ = 0;
+    fpcar_ = fpdscr_ = demcr_ = mpu_control_ = region_ = 0;
+    regions_.fill({});
+    protection_changed();
     systick_.reset();
   }
 
   [[nodiscard]] uint32_t vector_table() const { return vtor_; }
+  /// A region of the memory protection unit that counts; of overlapping ones the later in the list does.
+  struct ProtectedRegion {
+    uint32_t base = 0, bytes = 0;
+    bool denied = false;  ///< neither read nor written
+    bool never_executed = false;
+  };
+  [[nodiscard]] std::vector<ProtectedRegion> protected_regions() const {
+    std::vector<ProtectedRegion> found;
+    if ((mpu_control_ & 1) == 0) return found;
+    for (const Region& region : regions_) {
+      if ((region.attributes & 1) == 0) continue;
+      const uint32_t bytes = 2U << (region.attributes >> 1 & 0x1f);
+      found.push_back(
+          {region.base, bytes, (region.attributes >> 24 & 7) == 0, (region.attributes >> 28 & 1) != 0});
+    }
+    return found;
+  }
+  void on_protection_change(std::function<void()> listener) { protection_listener_ = std::move(listener); }
   [[nodiscard]] bool fpu_enabled() const { return (cpacr_ >> 20 & 0xf) == 0xf; }
   [[nodiscard]] bool sleep_on_exit() const { return (scr_ & 2) != 0; }
   [[nodiscard]] bool fault_enabled(uint32_t number) const {
@@ -177,6 +214,7 @@ class SystemControl final : public RegisterBlock {
   void record_fault(uint32_t status_bits, uint32_t address = 0) {
     cfsr_ |= status_bits;
     if (status_bits & fault_status::address_valid) bfar_ = address;
+    if (status_bits & fault_status::denied_address_valid) mmfar_ = address;
   }
   void record_escalation() { hfsr_ |= 1U << 30; }
 
@@ -189,9 +227,10 @@ class SystemControl final : public RegisterBlock {
   uint32_t* word(uint32_t offset) override {
     const struct {
       uint32_t offset, *word;
-    } places[] = {{0xd08, &vtor_},  {0xd10, &scr_},   {0xd14, &ccr_},   {0xd24, &shcsr_}, {0xd28, &cfsr_},
-                  {0xd2c, &hfsr_},  {0xd34, &mmfar_}, {0xd38, &bfar_},  {0xd88, &cpacr_}, {0xdfc, &demcr_},
-                  {0xf34, &fpccr_}, {0xf38, &fpcar_}, {0xf3c, &fpdscr_}};
+    } places[] = {{0xd08, &vtor_},  {0xd10, &scr_},         {0xd14, &ccr_},    {0xd24, &shcsr_},
+                  {0xd28, &cfsr_},  {0xd2c, &hfsr_},        {0xd34, &mmfar_},  {0xd38, &bfar_},
+                  {0xd88, &cpacr_}, {0xd94, &mpu_control_}, {0xd98, &region_}, {0xdfc, &demcr_},
+                  {0xf34, &fpccr_}, {0xf38, &fpcar_},       {0xf3c, &fpdscr_}};
     const auto* found =
         std::ranges::find_if(places, [&](const auto& place) { return place.offset == offset; });
     return found != std::end(places) ? found->word : nullptr;
@@ -235,9 +274,19 @@ class SystemControl final : public RegisterBlock {
     }
   }
 
+  static constexpr uint32_t protection_regions = 8;
+  struct Region {
+    uint32_t base = 0, attributes = 0;
+  };
+  void protection_changed() {
+    if (protection_listener_) protection_listener_();
+  }
+
   Nvic& nvic_;
   SysTick& systick_;
-  std::function<void()> reset_request_;
+  std::function<void()> reset_request_, protection_listener_;
+  std::array<Region, protection_regions> regions_{};
+  uint32_t mpu_control_ = 0, region_ = 0;
   uint32_t vtor_ = 0, scr_ = 0, ccr_ = 0x200, shcsr_ = 0, cfsr_ = 0, hfsr_ = 0, mmfar_ = 0, bfar_ = 0,
            cpacr_ = 0;
   uint32_t fpccr_ = 0xc000'0000, fpcar_ = 0, fpdscr_ = 0, demcr_ = 0;

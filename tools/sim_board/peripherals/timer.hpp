@@ -1,13 +1,15 @@
 #pragma once
 // Timers TIM1 ... TIM14: up-counting with prescaler and auto-reload, compare channels with their output
 // modes, preload registers, update generation, one-pulse mode, trigger output and the slave modes reset,
-// trigger and external clock 1 (RM0090, 17-19).
+// trigger and external clock 1 (RM0090, 17-19). Capture: of the internal trigger (CCxS = 3), and of TIM11's channel 1 from
+// the crystal (TIM11_OR).
 //
 // The counter is a function of time. Whatever happens at a count (update, compare match) is worked out in
 // order when time reaches it or when a register is looked at, so edges are exact to the timer's clock.
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <functional>
 #include <string>
 
@@ -35,6 +37,8 @@ class Timer final : public RegisterBlock {
     std::function<void(Cycles at)> trigger_output;
     /// A compare value was written that the counter has already passed: the edge comes a whole turn late.
     std::function<void(uint8_t channel, Cycles late_by)> missed;
+    /// TIM11 only: core cycles between edges of the divided crystal, 0 without.
+    std::function<double()> crystal_edges = {};
   };
 
   Timer(Shape shape, const Clock& clock, Scheduler& scheduler, Nvic& nvic, Notes& notes)
@@ -50,6 +54,9 @@ class Timer final : public RegisterBlock {
 
   uint32_t read(uint32_t offset) override {
     settle(clock_.now());
+    capture_crystal(clock_.now());
+    const bool reads_capture = offset >= 0x34 && offset <= 0x40 && input((offset - 0x34) / 4) != 0;
+    if (reads_capture) sr_ &= ~compare_flag((offset - 0x34) / 4);
     return RegisterBlock::read(offset);
   }
   void write(uint32_t offset, uint32_t value, uint32_t mask) override {
@@ -94,7 +101,7 @@ class Timer final : public RegisterBlock {
     ask();
   }
   void reset() override {
-    cr1_ = cr2_ = smcr_ = dier_ = sr_ = ccer_ = bdtr_ = rcr_ = 0;
+    cr1_ = cr2_ = smcr_ = dier_ = sr_ = ccer_ = bdtr_ = rcr_ = dcr_ = dmar_ = or_ = 0;
     ccmr_.fill(0);
     prescaler_ = prescaler_preload_ = 0;
     reload_ = reload_preload_ = width_mask();
@@ -118,8 +125,12 @@ class Timer final : public RegisterBlock {
   /// A trigger from another timer on internal trigger input `input` (0 ... 3).
   void internal_trigger(uint32_t input, Cycles at) {
     const uint32_t mode = smcr_ & 7;
-    if (mode == 0 || (smcr_ >> 4 & 7) != input) return;
+    if ((smcr_ >> 4 & 7) != input) return;
     settle(at);
+    for (uint32_t channel = 0; channel < channel_count; ++channel) {
+      if (this->input(channel) == from_trigger && (ccer_ >> (4 * channel) & 1) != 0) capture(channel, count_);
+    }
+    if (mode == 0) return set_lines();
     switch (mode) {
       case slave_reset:
         generate(update_flag, at);
@@ -161,9 +172,27 @@ class Timer final : public RegisterBlock {
   enum SlaveMode : uint32_t { slave_reset = 4, slave_trigger = 6, slave_clock = 7 };
 
   uint32_t* word(uint32_t offset) override {
-    return in_order(offset, {&cr1_, &cr2_, &smcr_, &dier_, &sr_, nullptr, &ccmr_[0], &ccmr_[1], &ccer_,
-                             &count_, &prescaler_preload_, &reload_preload_, &rcr_, &channels_[0].preload,
-                             &channels_[1].preload, &channels_[2].preload, &channels_[3].preload, &bdtr_});
+    return in_order(offset, {&cr1_,
+                             &cr2_,
+                             &smcr_,
+                             &dier_,
+                             &sr_,
+                             nullptr,
+                             &ccmr_[0],
+                             &ccmr_[1],
+                             &ccer_,
+                             &count_,
+                             &prescaler_preload_,
+                             &reload_preload_,
+                             &rcr_,
+                             &channels_[0].preload,
+                             &channels_[1].preload,
+                             &channels_[2].preload,
+                             &channels_[3].preload,
+                             &bdtr_,
+                             &dcr_,
+                             &dmar_,
+                             &or_});
   }
   struct Channel {
     uint32_t compare = 0;    ///< the value in force
@@ -184,6 +213,28 @@ class Timer final : public RegisterBlock {
   [[nodiscard]] uint32_t output_mode(uint32_t channel) const {
     const uint32_t half = ccmr_[channel / 2] >> (8 * (channel % 2));
     return (half & 3) != 0 ? uint32_t{frozen} : half >> 4 & 7;  // CCxS: an input never drives the pin
+  }
+  static constexpr uint32_t from_own_pin = 1, from_trigger = 3;
+  /// CCxS: 0 for an output.
+  [[nodiscard]] uint32_t input(uint32_t channel) const {
+    return ccmr_[channel / 2] >> (8 * (channel % 2)) & 3;
+  }
+  void capture(uint32_t channel, uint32_t count) {
+    if ((sr_ & compare_flag(channel)) != 0) sr_ |= compare_flag(channel) << 8;  // overcapture
+    sr_ |= compare_flag(channel);
+    channels_[channel].compare = channels_[channel].preload = count & width_mask();
+  }
+  /// The latest edge of the divided crystal by now, every eighth with IC1PSC = 3 and so on.
+  void capture_crystal(Cycles now) {
+    if (or_ != 2 || input(0) != from_own_pin || (ccer_ & 1) == 0 || !counting() || !wiring_.crystal_edges)
+      return;
+    const double spacing = wiring_.crystal_edges() * (1U << (ccmr_[0] >> 2 & 3));
+    if (spacing <= 0) return;
+    const auto edges = static_cast<uint64_t>(static_cast<double>(now - counting_since_) / spacing);
+    if (edges == captured_edges_) return;
+    captured_edges_ = edges;
+    capture(0, static_cast<uint32_t>(std::llround(static_cast<double>(edges) * spacing) /
+                                     static_cast<int64_t>(cycles_per_count())));
   }
   [[nodiscard]] bool preloaded(uint32_t channel) const {
     return (ccmr_[channel / 2] >> (8 * (channel % 2)) & 8) != 0;
@@ -246,7 +297,7 @@ class Timer final : public RegisterBlock {
   }
   void happen(Cycles at) {
     for (uint32_t channel = 0; channel < channel_count; ++channel) {
-      if (channels_[channel].compare == count_) match(channel, at);
+      if (channels_[channel].compare == count_ && input(channel) == 0) match(channel, at);
     }
   }
   void update_event(Cycles at, bool by_overflow) {
@@ -339,7 +390,10 @@ class Timer final : public RegisterBlock {
     if ((value & 0x70) != 0) unmodelled("counting down or centre-aligned");
     const bool starts = (value & 1) != 0 && (cr1_ & 1) == 0;
     cr1_ = value;
-    if (starts) count_since_ = clock_.now();
+    if (starts) {
+      count_since_ = counting_since_ = clock_.now();
+      captured_edges_ = 0;
+    }
     if (starts && trigger_mode() == on_enable && wiring_.trigger_output) wiring_.trigger_output(clock_.now());
   }
   void generate(uint32_t bits, Cycles at) {
@@ -380,7 +434,10 @@ class Timer final : public RegisterBlock {
   Scheduler::Slot slot_;
   Wiring wiring_;
 
-  uint32_t cr1_ = 0, cr2_ = 0, smcr_ = 0, dier_ = 0, sr_ = 0, ccer_ = 0, bdtr_ = 0, rcr_ = 0;
+  uint32_t cr1_ = 0, cr2_ = 0, smcr_ = 0, dier_ = 0, sr_ = 0, ccer_ = 0, bdtr_ = 0, rcr_ = 0, dcr_ = 0,
+           dmar_ = 0, or_ = 0;
+  uint64_t captured_edges_ = 0;
+  Cycles counting_since_ = 0;
   std::array<uint32_t, 2> ccmr_{};
   uint32_t prescaler_ = 0, prescaler_preload_ = 0;
   uint32_t reload_ = 0, reload_preload_ = 0;

@@ -36,6 +36,7 @@ Cpu::Cpu(CpuParts parts)
       sram_blocks_(parts.memory.sram()) {
   map_memory();
   add_hooks();
+  parts_.control.on_protection_change([this] { protection_changed(); });
 }
 
 Cpu::~Cpu() = default;
@@ -75,7 +76,35 @@ void Cpu::add_hooks() {
   };
   hook(UC_HOOK_BLOCK, &Cpu::on_block);
   hook(UC_HOOK_INTR, &Cpu::on_interrupt);
-  hook(UC_HOOK_MEM_UNMAPPED | UC_HOOK_MEM_WRITE_PROT | UC_HOOK_MEM_FETCH_PROT, &Cpu::on_bad_access);
+  hook(UC_HOOK_MEM_UNMAPPED | UC_HOOK_MEM_WRITE_PROT | UC_HOOK_MEM_FETCH_PROT | UC_HOOK_MEM_READ_PROT,
+       &Cpu::on_bad_access);
+}
+
+void Cpu::protection_changed() { protection_stale_ = true; }
+
+/// The emulator protects pages of 4 KB. SRAM is as the regions say; elsewhere they are not modelled.
+void Cpu::apply_protection() {
+  protection_stale_ = false;
+  constexpr uint32_t page = 0x1000;
+  check(uc_mem_protect(engine_.get(), sram_base, sram_bytes, UC_PROT_ALL), "protect memory");
+  regions_ = parts_.control.protected_regions();
+  for (const auto& region : regions_) {
+    if (region.base % page != 0 || region.bytes % page != 0 || region.base - sram_base >= sram_bytes ||
+        region.bytes > sram_bytes) {
+      parts_.notes.add("a protected region outside SRAM or of less than a page is not modelled");
+      continue;
+    }
+    const uint32_t rights = region.denied           ? uint32_t{UC_PROT_NONE}
+                            : region.never_executed ? uint32_t{UC_PROT_READ | UC_PROT_WRITE}
+                                                    : uint32_t{UC_PROT_ALL};
+    check(uc_mem_protect(engine_.get(), region.base, region.bytes, rights), "protect memory");
+  }
+}
+
+bool Cpu::denied(uint32_t address, uint32_t bytes) const {
+  return std::ranges::any_of(regions_, [&](const auto& region) {
+    return region.denied && address < region.base + region.bytes && address + bytes > region.base;
+  });
 }
 
 uint32_t Cpu::get(int reg) {
@@ -144,6 +173,7 @@ void Cpu::block(uint64_t address, uint32_t bytes) {
   pc_ = static_cast<uint32_t>(address);
   at_boundary_ = true;
   if (stop_ != Stop::none) return stop(stop_);
+  if (protection_stale_) return stop(Stop::protection_changed);
   if (pc_ >= first_return_magic) {
     return_magic_ = pc_ | 1;
     return stop(Stop::exception_return);
@@ -193,6 +223,16 @@ bool Cpu::on_bad_access(uc_engine*, uc_mem_type type, uint64_t address, int byte
                         void* self) {
   Cpu& cpu = *static_cast<Cpu*>(self);
   const auto where = static_cast<uint32_t>(address);
+  const bool in_ram = where - sram_base < sram_bytes;
+  if (in_ram && (type == UC_MEM_WRITE_PROT || type == UC_MEM_READ_PROT || type == UC_MEM_FETCH_PROT)) {
+    const bool executes = type == UC_MEM_FETCH_PROT;
+    cpu.fault_ = {exception::mem_manage,
+                  executes ? fault_status::execute_denied
+                           : fault_status::data_denied | fault_status::denied_address_valid,
+                  where, executes ? "execution from RAM that the MPU denies" : "access that the MPU denies"};
+    if (cpu.stop_ == Stop::none) cpu.stop_ = Stop::fault;
+    return false;
+  }
   switch (type) {
     case UC_MEM_WRITE_PROT:
       if (where - flash_base < flash_bytes || where < flash_bytes) {
@@ -259,6 +299,7 @@ void Cpu::idle(Cycles limit) {
 }
 
 void Cpu::execute() {
+  if (protection_stale_) apply_protection();
   stop_ = Stop::none;
   at_boundary_ = false;
   const uc_err result = uc_emu_start(engine_.get(), pc_ | 1, 0, 0, 0);
@@ -272,6 +313,7 @@ void Cpu::sort_out(uc_err result) {
     case Stop::limit:
     case Stop::interrupted:
     case Stop::exception:
+    case Stop::protection_changed:
       return;
     case Stop::exception_return:
       return exception_return(return_magic_);

@@ -72,7 +72,8 @@ class Cpu {
     exception_return,
     supervisor_call,
     fault,
-    float_disabled
+    float_disabled,
+    protection_changed
   };
 
   struct EngineCloser {
@@ -90,11 +91,17 @@ class Cpu {
   void idle(Cycles limit);
 
   void enter(uint32_t number, bool chained);
-  bool stack_frame();
+  enum class Stacked { done, denied, no_memory };
+  Stacked stack_frame();
   void exception_return(uint32_t magic);
   bool unstack_frame(uint32_t magic);
   void raise(uint32_t number, uint32_t status_bits, uint32_t address, const char* what);
   void lock_up(const char* why);
+
+  /// The memory protection unit has other regions: they count from the next block on.
+  void protection_changed();
+  void apply_protection();
+  [[nodiscard]] bool denied(uint32_t address, uint32_t bytes) const;
 
   [[nodiscard]] Masks masks();
   [[nodiscard]] uint32_t get(int reg);
@@ -119,6 +126,8 @@ class Cpu {
   BlockTable flash_blocks_, sram_blocks_;
   std::vector<uint8_t> return_page_;
 
+  std::vector<SystemControl::ProtectedRegion> regions_;
+  bool protection_stale_ = false;
   Cycles limit_ = 0;
   Stop stop_ = Stop::none;
   bool at_boundary_ = false;  ///< stopped ahead of the block at pc_

@@ -25,7 +25,16 @@ constexpr std::array<int, 6> stacked{UC_ARM_REG_R0, UC_ARM_REG_R1,  UC_ARM_REG_R
 }  // namespace
 
 void Cpu::enter(uint32_t number, bool chained) {
-  if (!chained && !stack_frame()) return lock_up("stacking failed: the stack pointer is outside RAM");
+  const Stacked stacked_frame = chained ? Stacked::done : stack_frame();
+  if (stacked_frame == Stacked::no_memory)
+    return lock_up("stacking failed: the stack pointer is outside RAM");
+  if (stacked_frame == Stacked::denied) {
+    // A derived fault (B1.5.7): the frame is not there, and the fault of stacking it is what is taken.
+    parts_.control.record_fault(fault_status::stacking_denied);
+    if (number != exception::mem_manage && number != exception::hard_fault)
+      number =
+          parts_.control.fault_enabled(exception::mem_manage) ? exception::mem_manage : exception::hard_fault;
+  }
   const auto vector = parts_.memory.word(parts_.control.vector_table() + 4 * number);
   parts_.clock.set_now(parts_.clock.now() + (chained ? chain_cycles : entry_cycles));
   parts_.nvic.enter(number, instructions_);
@@ -35,19 +44,20 @@ void Cpu::enter(uint32_t number, bool chained) {
   pc_ = *vector & ~1U;
 }
 
-/// Pushes the frame and sets return_magic_; false when the stack is not in memory.
-bool Cpu::stack_frame() {
+/// Pushes the frame and sets return_magic_. Denied: the stack pointer has moved, nothing is written.
+Cpu::Stacked Cpu::stack_frame() {
   const uint32_t control = get(UC_ARM_REG_CONTROL);
   const bool thread = parts_.nvic.running() == 0;
   const bool with_float = (control & float_active) != 0;
   const uint32_t bytes = with_float ? float_frame_bytes : basic_frame_bytes;
   const uint32_t before = get(UC_ARM_REG_SP);
   const uint32_t frame = (before - bytes) & ~7U;
-  if (parts_.memory.at(frame, bytes).empty()) return false;
+  if (parts_.memory.at(frame, bytes).empty()) return Stacked::no_memory;
 
+  const bool refused = denied(frame, bytes);
   uint32_t at = frame;
   const auto push = [&](uint32_t value) {
-    parts_.memory.set_word(at, value);
+    if (!refused) parts_.memory.set_word(at, value);
     at += 4;
   };
   for (const int reg : stacked)
@@ -63,7 +73,7 @@ bool Cpu::stack_frame() {
   set(UC_ARM_REG_SP, frame);
   return_magic_ = 0xffff'ffe1 | (with_float ? 0 : magic_basic_frame) | (thread ? magic_thread : 0) |
                   (thread && (control & stack_select) != 0 ? magic_process_stack : 0);
-  return true;
+  return refused ? Stacked::denied : Stacked::done;
 }
 
 void Cpu::exception_return(uint32_t magic) {
