@@ -105,6 +105,8 @@ json as_json(const runfile::RecordedRun& run, const runfile::Soundness& soundnes
     const Range range = range_of(values_kPa);
     document["channels"][name] = {{"min_kPa", range.any() ? json(range.least) : json()},
                                   {"max_kPa", range.any() ? json(range.most) : json()}};
+    if (const auto saturated = soundness.saturated.find(name); saturated != soundness.saturated.end())
+      document["channels"][name]["saturated"] = saturated->second;
     if (const auto notes = run.pressure.notes.find(name); notes != run.pressure.notes.end())
       document["channels"][name]["notes"] = attributes_json(notes->second);
     if (const auto calibration = calibration_of(run, name); !calibration.empty())

@@ -8,6 +8,7 @@
 
 #include "protocol/runfile/cycles.hpp"
 #include "protocol/runfile/layout.hpp"
+#include "protocol/signal/saturation.hpp"
 
 namespace diastole::runfile {
 namespace {
@@ -112,6 +113,25 @@ void check_clocks(const RecordedRun& run, Soundness& soundness) {
   }
 }
 
+/// What was measured, not what was made of it by a filter.
+void look_for_saturation(const RecordedRun& run, Soundness& soundness) {
+  for (const auto& [name, values_kPa] : run.pressure.channels) {
+    if (name.ends_with("_filtered_kPa")) continue;
+    signal::SaturationWatch watch;
+    for (const double value_kPa : values_kPa)
+      watch.push(value_kPa);
+    soundness.saturated[name] = watch.samples();
+    for (const signal::Saturated& end : {watch.least(), watch.most()}) {
+      if (end.samples == 0) continue;
+      soundness.problems.push_back(
+          fmt::format("pressure/{}: {} samples in {} stretches stand at {:.3f} kPa, where the instrument's "
+                      "range ends: the "
+                      "pressure was beyond it",
+                      name, end.samples, end.runs, end.value));
+    }
+  }
+}
+
 }  // namespace
 
 bool is_stop_on_request(std::string_view code) {
@@ -161,6 +181,7 @@ Soundness assess(const RecordedRun& run) {
   check_triggers_outside(run, soundness);
   check_slices(run, soundness);
   check_clocks(run, soundness);
+  look_for_saturation(run, soundness);
   for (const Event& event : run.events) {
     if (event.level == "error") {
       problems.push_back(fmt::format("at {:.3f} s: {}: {}", event.time_s, event.code, event.text));

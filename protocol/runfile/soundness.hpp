@@ -1,9 +1,10 @@
 #pragma once
 // Whether a run can be trusted, and if not why not, each reason with its place: samples that are missing, declared or
 // not, streams that do not reach from the start of run to its end, or have not as many rows as were due, triggers that are missing, extra or out of time (cycles.hpp), slices that are not complete, clocks that cannot
-// be, faults.
+// be, samples at the end of the instrument's range (saturation.hpp), faults.
 
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -48,6 +49,8 @@ struct Soundness {
   int64_t scheduled_holds = 0;      ///< cycles of waveform "hold", which may be triggered or not
   bool stopped_on_request = false;  ///< somebody ended it early, in order: fewer triggers are no fault
   TriggerCounts triggers{};
+  std::map<std::string, int64_t>
+      saturated;  ///< samples at the end of the instrument's range, by channel; all channels
   std::vector<std::string> problems;  ///< "place: what is wrong there"; empty if the run is sound
 
   [[nodiscard]] bool sound() const { return problems.empty(); }

@@ -2,7 +2,10 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
+#include <cmath>
 #include <random>
+#include <vector>
 
 #include "protocol/runfile/layout.hpp"
 #include "protocol/runfile/reader.hpp"
@@ -185,6 +188,58 @@ TEST(Soundness, ARunOfDeclaredGapsAloneSaysThatNoPressureWasRecorded) {
     value_kPa = std::nan("");
   run.gaps = {{"pressure", 0, 400, "no answer"}};
   EXPECT_THAT(assess(run).problems, testing::Contains(HasSubstr("no pressure was recorded")));
+}
+
+/// A sine of `amplitude_kPa` at 2 Hz, in codes of 1/100 kPa, as an instrument that ends at ± 100 kPa shows it.
+std::vector<double> measured(double amplitude_kPa, double noise_kPa = 0.02) {
+  std::mt19937 random(17);
+  std::normal_distribution<double> noise(0, noise_kPa);
+  std::vector<double> values_kPa;
+  for (int i = 0; i < 400; ++i) {
+    const double value_kPa = amplitude_kPa * std::sin(2 * 3.14159265 * 0.02 * i) + noise(random);
+    values_kPa.push_back(std::clamp(std::round(100 * value_kPa) / 100, -100.0, 100.0));
+  }
+  return values_kPa;
+}
+
+TEST(Saturation, IsCountedByChannelAndMakesARunUnsound) {
+  RecordedRun run = regular_run();
+  run.pressure.channels["cavity_kPa"] = measured(60);
+  run.pressure.channels["pump_kPa"] = measured(127);
+  run.pressure.channels["pump_filtered_kPa"] = measured(127);
+  const Soundness soundness = assess(run);
+  EXPECT_EQ(soundness.saturated.at("cavity_kPa"), 0);
+  const auto& pump_kPa = run.pressure.channels["pump_kPa"];
+  const auto at_the_end =
+      std::ranges::count_if(pump_kPa, [](double value) { return std::abs(value) == 100; });
+  EXPECT_GT(at_the_end, 100);
+  EXPECT_EQ(soundness.saturated.at("pump_kPa"), at_the_end);
+  EXPECT_FALSE(soundness.saturated.contains("pump_filtered_kPa"));
+  EXPECT_THAT(soundness.problems,
+              testing::ElementsAre(HasSubstr("pressure/pump_kPa: "), HasSubstr("100.000 kPa")));
+}
+
+TEST(Saturation, IsNotASignalThatRestsAtItsExtreme) {
+  RecordedRun run = regular_run();
+  auto& cavity_kPa = run.pressure.channels["cavity_kPa"];
+  cavity_kPa = measured(60);
+  std::fill_n(cavity_kPa.begin(), 100, cavity_kPa[100]);  // before the motion
+  std::mt19937 random(3);
+  for (int i = 300; i < 400; ++i)
+    cavity_kPa[static_cast<size_t>(i)] =
+        -61.0 + 0.01 * static_cast<double>(random() % 2);  // flickers at the bottom
+  EXPECT_EQ(assess(run).saturated.at("cavity_kPa"), 0);
+  for (double& value_kPa : cavity_kPa)
+    value_kPa = 3;
+  EXPECT_EQ(assess(run).saturated.at("cavity_kPa"), 0);
+}
+
+TEST(Saturation, IsNotAnInstrumentOfCoarseCodes) {
+  for (const double amplitude_kPa : {0.03, 0.3, 3.0, 30.0}) {
+    RecordedRun run = regular_run();
+    run.pressure.channels["cavity_kPa"] = measured(amplitude_kPa, 0.01);
+    EXPECT_EQ(assess(run).saturated.at("cavity_kPa"), 0) << amplitude_kPa;
+  }
 }
 
 }  // namespace
