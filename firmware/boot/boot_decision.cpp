@@ -14,8 +14,8 @@ struct LastEvent {
   int age = 0;  ///< number of the record: the greater, the younger
 };
 
-ImageState state_of(const SlotFacts& slot, BootEvent last) {
-  if (!slot.has_header) return ImageState::empty;
+ImageState state_of(const SlotFacts& slot, BootEvent last, bool half_erased) {
+  if (!slot.has_header || half_erased) return ImageState::empty;
   if (!slot.verified) return ImageState::incomplete;
   switch (last) {
     case BootEvent::installed:
@@ -25,6 +25,8 @@ ImageState state_of(const SlotFacts& slot, BootEvent last) {
     case BootEvent::confirmed:
       return ImageState::confirmed;
     case BootEvent::none:
+    case BootEvent::erase_begun:
+    case BootEvent::erased:
       break;
   }
   return ImageState::unrecorded;
@@ -39,12 +41,20 @@ BootDecision decide(std::span<const std::uint8_t> records, const std::array<Slot
   int age = 0;
   for_each_record(records, [&](const BootRecord& record) {
     const auto index = static_cast<std::size_t>(record.slot);
-    if (slots[index].has_header && slots[index].tag == record.tag) last[index] = {record.event, ++age};
+    if (!of_slot(record.event) && slots[index].has_header && slots[index].tag == record.tag)
+      last[index] = {record.event, ++age};
   });
 
+  // Only the slot that is not the last one to start is ever erased; a record that says otherwise outlived, in a sector of
+  // records whose own erase was cut off, those that came after it.
+  const auto half_erased = [&](std::size_t i) {
+    const std::size_t other = 1 - i;
+    return erase_interrupted(records, slot_of(i)) && slots[other].verified &&
+           !erase_interrupted(records, slot_of(other));
+  };
   BootDecision decision;
   for (std::size_t i = 0; i < slots.size(); ++i)
-    decision.state[i] = state_of(slots[i], last[i].event);
+    decision.state[i] = state_of(slots[i], last[i].event, half_erased(i));
   const auto youngest = [&](ImageState wanted) {
     ImageSlot found = ImageSlot::none;
     int found_age = -1;

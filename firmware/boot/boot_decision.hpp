@@ -8,7 +8,8 @@
 //   4. one that was tried and not confirmed: only if there is no other at all
 //   5. none: the bootloader stays
 //
-// Only verified images count. An update always goes to the slot that 2 to 4 would not start, so a working
+// A slot whose erase was begun and not ended counts as empty, whatever it reads, if the other one verifies. Only verified
+// images count. An update always goes to the slot that 2 to 4 would not start, so a working
 // image is never overwritten by one that has not proved itself.
 
 #include <array>

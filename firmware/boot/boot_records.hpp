@@ -6,7 +6,8 @@
 //        0    2 magic     "BR"
 //        2    1 event     BootEvent
 //        3    1 slot      wire::ImageSlot, a or b
-//        4    8 tag       first bytes of the image's SHA-256: an event concerns this image only
+//        4    8 tag       first bytes of the image's SHA-256: an event concerns this image only; zeros for the
+//                         events of a slot
 //       12    4 crc       CRC-32 of bytes 0 ... 11
 //
 //   Example: slot A, whose SHA-256 begins 01 02 03 04 05 06 07 08, is confirmed
@@ -33,7 +34,15 @@ enum class BootEvent : std::uint8_t {
   installed = 1,  ///< verified and to be tried at the next start
   tried = 2,      ///< about to be started on trial
   confirmed = 3,  ///< a host has seen it work
+  // Of the slot, whatever it holds:
+  erase_begun = 4,  ///< not to be trusted until `erased`, however its cells read
+  erased = 5,
 };
+inline constexpr BootEvent kLastBootEvent = BootEvent::erased;
+
+constexpr bool of_slot(BootEvent event) {
+  return event == BootEvent::erase_begun || event == BootEvent::erased;
+}
 
 using ImageTag = std::array<std::uint8_t, 8>;
 
@@ -63,7 +72,8 @@ constexpr RecordBytes encode(const BootRecord& record) {
 
 /// Nothing if the cell is empty or torn.
 constexpr std::optional<BootRecord> decode_record(std::span<const std::uint8_t, kRecordBytes> bytes) {
-  if (bytes[0] != 'B' || bytes[1] != 'R' || bytes[2] < 1 || bytes[2] > 3 || bytes[3] > 1 ||
+  if (bytes[0] != 'B' || bytes[1] != 'R' || bytes[2] < 1 ||
+      bytes[2] > static_cast<std::uint8_t>(kLastBootEvent) || bytes[3] > 1 ||
       wire::detail::get_little<std::uint32_t>(bytes.subspan(12)) != wire::crc32(bytes.first(12)))
     return {};
   BootRecord record{static_cast<BootEvent>(bytes[2]), static_cast<wire::ImageSlot>(bytes[3]), {}};
@@ -88,6 +98,20 @@ template <class Visitor>
 constexpr void for_each_record(std::span<const std::uint8_t> sector, Visitor&& visit) {
   for (; sector.size() >= kRecordBytes; sector = sector.subspan(kRecordBytes))
     if (const auto record = decode_record(sector.first<kRecordBytes>())) visit(*record);
+}
+
+/// The last event of the slot itself, whatever was in it; none if there is none.
+constexpr BootEvent last_of_slot(std::span<const std::uint8_t> sector, wire::ImageSlot slot) {
+  BootEvent last = BootEvent::none;
+  for_each_record(sector, [&](const BootRecord& record) {
+    if (record.slot == slot) last = record.event;
+  });
+  return of_slot(last) ? last : BootEvent::none;
+}
+
+/// Whether an erase of the slot was begun and not ended.
+constexpr bool erase_interrupted(std::span<const std::uint8_t> sector, wire::ImageSlot slot) {
+  return last_of_slot(sector, slot) == BootEvent::erase_begun;
 }
 
 }  // namespace diastole::boot

@@ -21,6 +21,8 @@ concept SlotStore = requires(S& store, const S& fixed, wire::ImageSlot slot, std
   { fixed.slot_address(slot) } -> std::same_as<std::uint32_t>;
   { fixed.slot(slot) } -> std::same_as<std::span<const std::uint8_t>>;
   { fixed.records() } -> std::same_as<std::span<const std::uint8_t>>;
+  /// Whether the supply is high enough to erase and write.
+  { fixed.supply_sound() } -> std::same_as<bool>;
   { store.erase_slot(slot) } -> std::same_as<bool>;
   { store.erase_records() } -> std::same_as<bool>;
   { store.write_slot(slot, offset, bytes) } -> std::same_as<bool>;

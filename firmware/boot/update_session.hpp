@@ -1,6 +1,7 @@
 #pragma once
 // An update as the bootloader carries it out: begin, data in order, finish. Whatever interrupts it, the slot
-// shows how far it came: the header says of which image, the last written word how much.
+// shows how far it came: the header says of which image, the last written word how much. An erase that was cut off leaves
+// cells that read as erased and are not, so its beginning and its end are recorded: in between the slot is erased again.
 
 #include <optional>
 
@@ -37,6 +38,9 @@ class UpdateSession {
     return {outcome, value};
   }
   [[nodiscard]] UpdateReply judge(const wire::ImageHeader& header, bool allow_older) const;
+  [[nodiscard]] bool still_erased() const {
+    return last_of_slot(store_.records(), slot_) == BootEvent::erased && is_erased(store_.slot(slot_));
+  }
   bool make_room(const wire::ImageHeader& header);
   bool compact_records(const BootDecision& decision);
 
@@ -72,7 +76,8 @@ UpdateReply UpdateSession<S>::begin(const wire::BeginUpdate& request) {
   slot_ = decide(store_).free;
   const UpdateReply judged = judge(*header, request.allow_older != 0);
   if (judged.outcome != done) return refuse(judged.outcome, judged.value);
-  if (header_in(store_.slot(slot_)) == header) {
+  if (!store_.supply_sound()) return refuse(supply_low);
+  if (header_in(store_.slot(slot_)) == header && !erase_interrupted(store_.records(), slot_)) {
     held_ = held_code(store_.slot(slot_), header->code_bytes);
   } else if (!make_room(*header)) {
     return refuse(flash_failed, 0);
@@ -83,8 +88,15 @@ UpdateReply UpdateSession<S>::begin(const wire::BeginUpdate& request) {
 
 template <SlotStore S>
 bool UpdateSession<S>::make_room(const wire::ImageHeader& header) {
-  if (!is_erased(store_.slot(slot_)) && !store_.erase_slot(slot_)) return false;
-  if (records_left(store_.records()) < kRecordsNeeded && !compact_records(decide(store_))) return false;
+  // A sector of records whose own erase was cut off has no whole record at its beginning, which is written last.
+  const bool records_sound = decode_record(store_.records().template first<kRecordBytes>()).has_value();
+  if (!still_erased()) {
+    (void)append(store_, {BootEvent::erase_begun, slot_, {}});
+    if (!store_.erase_slot(slot_)) return false;
+    (void)append(store_, {BootEvent::erased, slot_, {}});
+  }
+  const bool compacted = !records_sound || records_left(store_.records()) < kRecordsNeeded;
+  if (compacted && !compact_records(decide(store_))) return false;
   return store_.write_slot(slot_, 0, wire::encode(header));
 }
 
@@ -104,6 +116,7 @@ UpdateReply UpdateSession<S>::add(const wire::UpdateData& data) {
   using enum wire::UpdateOutcome;
   if (!image_) return {not_begun, 0};
   if (data.count == 0 || data.count % 4 != 0) return {malformed, 0};
+  if (!store_.supply_sound()) return {supply_low, 0};
   if (data.offset != held_ || data.count > image_->code_bytes - held_) return {wrong_offset, held_};
   if (!store_.write_slot(slot_, wire::kImageHeaderArea + held_, std::span(data.data).first(data.count))) {
     (void)store_.write_slot(slot_, 0, std::array<std::uint8_t, 4>{});
@@ -127,6 +140,7 @@ UpdateReply UpdateSession<S>::finish() {
   }
   const BootDecision decision = decide(store_);
   if (decision.state[static_cast<std::size_t>(slot_)] == wire::ImageState::installed) return {};
+  if (!store_.supply_sound()) return {supply_low, 0};
   if (!append(store_, {BootEvent::installed, slot_, facts.tag})) return refuse(flash_failed, 0);
   return {};
 }

@@ -58,6 +58,11 @@ void BlackBox::note(wire::Noted kind, std::uint8_t detail, std::int32_t argument
   newest_ = last_.number;
 }
 
+void BlackBox::note_crash(const CrashRecord& crash, Ticks now) {
+  for (std::size_t i = 0; i < crash.values.size(); ++i)
+    note(wire::Noted::crash, static_cast<std::uint8_t>(i), static_cast<std::int32_t>(crash.values[i]), now);
+}
+
 wire::BlackBoxEntry BlackBox::first_from(std::uint32_t from) const {
   const std::uint32_t oldest = newest_ >= kEntries ? newest_ - kEntries + 1 : 1;
   for (std::uint32_t number = std::max(from, oldest); number <= newest_; ++number) {

@@ -12,6 +12,7 @@
 #include <array>
 #include <cstdint>
 
+#include "firmware/core/crash_record.hpp"
 #include "firmware/core/units.hpp"
 #include "protocol/wire/black_box_messages.hpp"
 #include "protocol/wire/states.hpp"
@@ -31,6 +32,9 @@ class BlackBox {
 
   /// What is equal to the last note is noted once.
   void note(wire::Noted kind, std::uint8_t detail, std::int32_t argument, Ticks now);
+
+  /// One entry a register.
+  void note_crash(const CrashRecord& crash, Ticks now);
 
   [[nodiscard]] std::uint32_t newest() const { return newest_; }
   /// The first entry whose number is `from` or more; number 0 if there is none.

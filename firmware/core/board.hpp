@@ -9,6 +9,8 @@
 #include <span>
 
 #include "firmware/core/black_box.hpp"
+#include "firmware/core/crash_record.hpp"
+#include "firmware/core/r_wave.hpp"
 #include "firmware/core/units.hpp"
 #include "protocol/wire/image_header.hpp"
 #include "protocol/wire/states.hpp"
@@ -62,11 +64,16 @@ concept Board = requires(B& board, const B& fixed, const PulseOrder& order,
   /// TTL rises at a tick less than 25 s ahead, without an order, and falls a width later; with or without the R-wave.
   /// Precondition: the TTL before has fallen, its R-wave is over, and the next order is none with a TTL.
   {board.schedule_trigger(std::uint32_t{}, Ticks{}, true)};
+  /// When the TTL that was ordered for this tick rose, by what saw the pin and not by the order; nothing if it did not.
+  /// Asked once, from the tick on until the next TTL is ordered.
+  { fixed.ttl_rise(std::uint32_t{}) } -> std::same_as<std::optional<std::uint32_t>>;
   /// No order follows the one carried out: no edge until the next schedule().
   {board.rest()};
   /// STEP and TTL do not rise from this moment on; a STEP that is high falls in time, the TTL at once. Callable
   /// from any interrupt.
   {board.cancel_pulses()};
+  /// From now on; at rest only.
+  {board.use_signals(SignalSettings{})};
   {board.set_motor_enabled(true)};
   {board.show_fault(std::uint8_t{})};
   /// The board calls Controller::on_inputs() when one of them changes.
@@ -77,8 +84,14 @@ concept Board = requires(B& board, const B& fixed, const PulseOrder& order,
   /// Precondition: bytes.size() <= serial_room().
   {board.serial_write(bytes)};
   {board.feed_watchdog()};
+  /// Whether the clock runs from the crystal that its rate comes from.
+  { fixed.clock_sound() } -> std::same_as<bool>;
+  /// Whether flash may be erased and programmed at the present supply.
+  { fixed.supply_sound() } -> std::same_as<bool>;
   /// Memory that outlives a reset, though not a loss of power; arbitrary then.
   { board.retained() } -> std::same_as<BlackBox::Memory&>;
+  /// Of the processor fault that ended the start before, once.
+  { board.take_crash() } -> std::same_as<std::optional<CrashRecord>>;
   /// Where settings are kept (settings_store.hpp); writing there may hold everything up for a second.
   { board.settings_flash() } -> std::same_as<typename B::SettingsFlash&>;
   { fixed.running_image() } -> std::same_as<RunningImage>;

@@ -60,6 +60,8 @@ class Controller {
     begun_ = true;
     const Identity identity = board_.identity();
     black_box_.begin(identity.reset_cause, identity.boot_id, board_.now());
+    if (const auto crash = board_.take_crash()) black_box_.note_crash(*crash, board_.now());
+    if (!board_.clock_sound()) motion_.stay_faulted(wire::Fault::clock);
   }
   void note_link() {
     const bool open = link_.state() == wire::ReliableLink::State::open &&

@@ -130,6 +130,8 @@ class Dispatch {
                            static_cast<std::uint16_t>(outside.setting), outside.asked, outside.allowed});
     } else if (!motion_.safety().at_rest()) {
       conclude(request, wire::Refusal::wrong_state);
+    } else if (!board_.supply_sound()) {
+      conclude(request, wire::Refusal::supply_low);
     } else if (!store_.write(request.settings)) {
       conclude(request, wire::Refusal::flash_failed);
     } else {

@@ -31,6 +31,7 @@ class ImageTrial {
     if (image.build_id != build_id) return wire::UpdateOutcome::other_image;
     if (image.state == wire::ImageState::confirmed) return wire::UpdateOutcome::done;
     if (!at_rest_and_disarmed()) return wire::UpdateOutcome::not_at_rest;
+    if (!board_.supply_sound()) return wire::UpdateOutcome::supply_low;
     if (!board_.confirm_image()) return wire::UpdateOutcome::flash_failed;
     trial_ends_.reset();
     return wire::UpdateOutcome::done;

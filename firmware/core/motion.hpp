@@ -46,6 +46,7 @@ class Motion {
   /// Settings from flash. The position is forgotten too: its unit may have changed.
   void use(const wire::MachineSettings& machine, bool written) {
     store_.use(machine, written);
+    board_.use_signals(SignalSettings(machine));
     if (safety_.at_rest()) become(wire::State::unhomed);
   }
   wire::Refusal clear_program() {
@@ -150,6 +151,7 @@ class Motion {
   wire::Refusal clear_fault() {
     if (safety_.state() != wire::State::faulted) return wire::Refusal::wrong_state;
     if (board_.inputs().estop) return wire::Refusal::estop_pressed;
+    if (stays_faulted_) return wire::Refusal::wrong_state;
     const wire::State before = safety_.state();
     safety_.clear();
     board_.show_fault(static_cast<std::uint8_t>(wire::Fault::none));
@@ -160,6 +162,11 @@ class Motion {
   void let_go() {
     safety_.forget_position();
     set_motor_enabled(false);
+  }
+  /// Latches what only another start can clear: nothing moves until then. Precondition: at rest.
+  void stay_faulted(wire::Fault fault) {
+    stays_faulted_ = true;
+    latch(fault);
   }
   void heartbeat(std::uint32_t lease_id) { lease_.heartbeat(lease_id, board_.now()); }
 
@@ -358,6 +365,7 @@ class Motion {
   std::uint32_t events_lost_ = 0;
   bool motor_enabled_ = false;
   bool estop_seen_ = false;
+  bool stays_faulted_ = false;
 };
 
 }  // namespace diastole::firmware

@@ -64,7 +64,8 @@ SegmentPeaks segment_peaks(const Segment& segment, const Settings& settings) {
       divide_up(divide_up(stroke_nL * peak_acceleration_millionths, period_us) * 1000, period_us);
   peaks.step_rate_Hz = divide_up(peaks.flow_uL_per_s * 1'000'000, limits.microstep_pL);
   peaks.pressure_Pa =
-      divide_up(divide_up(peaks.acceleration_uL_per_s2 * limits.inertance_kg_per_m4, 1'000'000), 1000);
+      divide_up(divide_up(peaks.acceleration_uL_per_s2 * limits.inertance_kg_per_m4, 1'000'000), 1000) +
+      settings.losses_Pa(peaks.flow_uL_per_s) + limits.cavity_Pa;
   peaks.stopping_us = stopping_us(peaks.flow_uL_per_s, settings);
   if (segment.moves()) peaks.cycle_steps = settings.steps_of_nL(segment.stroke_nL);
   return peaks;
@@ -106,10 +107,11 @@ Check check_segment(const Segment& segment, const Program& program, const Settin
     if (check.asked > check.allowed) return check;
   if (segment.moves() && peaks.cycle_steps.count == 0)
     return {wire::Limit::stroke_at_least, segment.stroke_nL, divide_up(limits.microstep_pL, 1000)};
-  if (r_wave_spacing_us <= kRWave_us) return {wire::Limit::r_wave_spacing, r_wave_spacing_us, kRWave_us + 1};
+  if (r_wave_spacing_us <= program.r_wave_us)
+    return {wire::Limit::r_wave_spacing, r_wave_spacing_us, program.r_wave_us + 1};
   if (program.trigger_delay_us > 0) {
     const std::uint64_t taken_us =
-        std::max(program.ttl_width_us, kRWave_us) + first_step_us(segment, settings);
+        std::max(program.ttl_width_us, program.r_wave_us) + first_step_us(segment, settings);
     const std::uint64_t most_us = segment.period_us > taken_us ? segment.period_us - taken_us : 0;
     const bool possible =
         program.trigger_delay_us >= kLeastTriggerDelay_us && most_us >= kLeastTriggerDelay_us;

@@ -3,9 +3,10 @@
 // normalised peaks are v and a (profile.hpp):
 //
 //   flow = v S/T     acceleration = a S/T²     step rate = flow / microstep
-//   pressure = inertance · acceleration        stopping time = flow / allowed acceleration
+//   pressure = inertance · acceleration + losses(flow) + cavity        stopping time = flow / allowed acceleration
 //
-// all rounded up. A delayed trigger must be over, TTL and R-wave, one period after the cycle's beginning: then it
+// all rounded up; losses as message Configure has them. Flow and acceleration have their peaks at the same moment in a
+// parabola and in a flank's end, and at different ones elsewhere, where their sum is more than ever comes. A delayed trigger must be over, TTL and R-wave, one period after the cycle's beginning: then it
 // belongs to its cycle, and a run ends behind its last trigger. A hold has no peaks and may have any stroke. The ramps between segments are planned within the limits and need no check.
 
 #include <cstdint>
@@ -53,9 +54,6 @@ inline constexpr std::uint32_t kLeastTriggerDelay_us = 100;
 
 /// From the beginning of a cycle to its first step, rounded up. Precondition: the stroke is a microstep at least.
 std::uint64_t first_step_us(const Segment& segment, const Settings& settings);
-
-/// The R-wave's length, and so the least distance of two.
-inline constexpr std::uint32_t kRWave_us = 30'000;
 
 /// The longest stopping time of the program's segments and ramps, or the first limit that it exceeds.
 wire::Result<Ticks, PlanRefusal> check_program(const Program& program, const Settings& settings);

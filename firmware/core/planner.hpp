@@ -33,6 +33,7 @@ struct MotionEvent {
     kRunStart = 32,      ///< run time zero; no step
     kSegmentStart = 64,  ///< first cycle of the next segment begins; no step
     kEnd = 128,          ///< everything planned has been done; no step
+    kTriggerLost = 512,  ///< reported instead of a trigger whose TTL was not seen to rise
     kBacklash = 256,     ///< a step that takes up play: the motor moves, the load does not
   };
   Ticks tick;

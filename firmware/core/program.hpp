@@ -31,6 +31,7 @@ struct Program {
   std::uint16_t gate_every = 1;
   std::uint32_t rest_us = 0;
   std::uint32_t ttl_width_us = 0;
+  std::uint32_t r_wave_us = 30'000;  ///< the R-wave's length, and so the least distance of two
   std::uint32_t trigger_delay_us = 0;
   std::uint32_t position_period_ticks = 0;
 };
@@ -42,7 +43,7 @@ inline constexpr std::uint32_t kHeartbeatGrace_us = 150'000;
 class Settings {
  public:
   Settings() = default;
-  explicit Settings(const wire::Configure& configure) : configure_(configure) {}
+  explicit Settings(const wire::Configure& configure);
 
   [[nodiscard]] const wire::Configure& limits() const { return configure_; }
   /// Volume in whole microsteps, rounded to the nearest.
@@ -66,9 +67,12 @@ class Settings {
     const std::uint64_t rate = steps_per_s(allowed_acceleration_uL_per_s2());
     return rate > 0 ? rate : 1;
   }
-  /// Largest speed that both the flow and the step rate limit allow, in microsteps per second, at least 1.
+  /// Pressure lost to friction and at the hose's ends at a steady flow, rounded up, 4e9 at most (message Configure).
+  [[nodiscard]] std::uint32_t losses_Pa(std::uint64_t flow_uL_per_s) const;
+  /// Largest speed that the flow, the step rate and, by losses and cavity alone, the pressure limit allow, in microsteps per
+  /// second, at least 1.
   [[nodiscard]] std::uint64_t allowed_steps_per_s() const {
-    const std::uint64_t by_flow = steps_per_s(configure_.flow_uL_per_s);
+    const std::uint64_t by_flow = steps_per_s(allowed_flow_uL_per_s_);
     const std::uint64_t least = by_flow < configure_.step_rate_Hz ? by_flow : configure_.step_rate_Hz;
     return least > 0 ? least : 1;
   }
@@ -97,6 +101,7 @@ class Settings {
 
  private:
   wire::Configure configure_;
+  std::uint32_t allowed_flow_uL_per_s_ = 0;
 };
 
 }  // namespace diastole::firmware

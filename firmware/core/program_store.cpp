@@ -8,6 +8,7 @@ void ProgramStore::use(const wire::MachineSettings& machine, bool written) {
   backlash_steps_ = written ? wire::backlash_microsteps(machine) : 0;
   configured_ = false;
   program_.size = 0;
+  program_.r_wave_us = static_cast<std::uint32_t>(machine.r_wave_us);
 }
 
 PlanRefusal ProgramStore::configure(const wire::Configure& configure) {

@@ -24,6 +24,7 @@ void RunRecord::begin(Ticks start, const MotionCounters& before) {
   start_ = start;
   triggers_before_ = before.triggers;
   r_waves_before_ = before.r_waves;
+  triggers_lost_before_ = before.triggers_lost;
   reason_ = wire::RunEnd::completed;
   segment_ = 0;
 }
@@ -42,9 +43,11 @@ void RunRecord::take(const MotionReport& report, const Program& program) {
     segment_ = next_segment_++;
     outbox_.put(wire::SegmentStarted{segment_, tick});
   }
-  if ((report.flags & MotionEvent::kCycleStart) != 0) {
+  const bool lost = (report.flags & MotionEvent::kTriggerLost) != 0;
+  if (lost || (report.flags & MotionEvent::kCycleStart) != 0) {
     const bool r_wave = (report.flags & MotionEvent::kRWave) != 0;
-    outbox_.put(wire::Trigger{next_cycle_++, tick, static_cast<std::uint8_t>(r_wave)});
+    outbox_.put(wire::Trigger{next_cycle_++, tick, static_cast<std::uint8_t>(r_wave),
+                              static_cast<std::uint8_t>(!lost)});
   }
 }
 
@@ -54,7 +57,8 @@ void RunRecord::end(Ticks tick, const MotionCounters& after) {
                             after.cycles_done,
                             after.triggers - triggers_before_,
                             after.r_waves - r_waves_before_,
-                            after.position.count};
+                            after.position.count,
+                            after.triggers_lost - triggers_lost_before_};
 }
 
 bool RunRecord::send_end() {

@@ -44,7 +44,7 @@ class RunRecord {
   std::uint16_t next_segment_ = 0;
   std::uint32_t next_cycle_ = 0;
   std::uint32_t triggers_before_ = 0;
-  std::uint32_t r_waves_before_ = 0;
+  std::uint32_t r_waves_before_ = 0, triggers_lost_before_ = 0;
   wire::RunEnd reason_ = wire::RunEnd::completed;
   std::optional<wire::RunEnded> end_due_;
 };

@@ -17,7 +17,7 @@ struct Head {
 
   template <class Self, class Visitor>
   static constexpr void layout(Self& self, Visitor& visit) {
-    visit.field("magic", self.magic, SettingsRecord::kMagic, SettingsRecord::kMagic);
+    visit.field("magic", self.magic);
     visit.field("number", self.number, 1U);
     visit.field("body_bytes", self.body_bytes, std::uint16_t{1}, std::uint16_t{kCrcAt - kHeadBytes});
   }
@@ -66,8 +66,13 @@ std::optional<SettingsRecord> decode_record(std::span<const std::uint8_t> slot) 
   Crc crc;
   SettingsRecord record;
   if (!get(head, slot.first(kHeadBytes)) || !get(crc, slot.last(4))) return {};
+  const bool first_layout = head.magic == SettingsRecord::kFirstMagic;
+  if (!first_layout && head.magic != SettingsRecord::kMagic) return {};
   if (crc.value != wire::crc32(slot.first(kCrcAt))) return {};
-  if (!get(record.settings, slot.subspan(kHeadBytes, head.body_bytes))) return {};
+  wire::FieldReader body(slot.subspan(kHeadBytes, head.body_bytes));
+  wire::MachineSettings::layout(record.settings, body,
+                                first_layout ? SettingsRecord::kFirstSettings : SettingsRecord::kSettings);
+  if (body.fault().problem != wire::DecodeProblem::none) return {};
   if (wire::out_of_range(record.settings).found) return {};
   record.number = head.number;
   return record;

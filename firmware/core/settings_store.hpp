@@ -5,7 +5,7 @@
 //   sector 1  | record 3 | record 4 | …             older; erased when sector 0 is full
 //
 //   slot (kSlotBytes)   offset size
-//                            0    4 kMagic
+//                            0    4 kMagic; kFirstMagic: without the settings that came later, which then are initial
 //                            4    4 number       counts up; the highest valid record is in force
 //                            8    2 body_bytes
 //                           10    n body         wire::MachineSettings
@@ -36,7 +36,9 @@ namespace diastole::firmware {
 
 struct SettingsRecord {
   static constexpr std::size_t kSlotBytes = 128;
-  static constexpr std::uint32_t kMagic = 0x5445'5344;  // "DSET"
+  static constexpr std::uint32_t kMagic = 0x3253'5344;       // "DSS2"
+  static constexpr std::uint32_t kFirstMagic = 0x5445'5344;  // "DSET"
+  static constexpr int kSettings = 256, kFirstSettings = 8;
   using Slot = std::array<std::uint8_t, kSlotBytes>;
 
   std::uint32_t number = 0;

@@ -7,6 +7,7 @@
 
 #include <atomic>
 #include <cstdint>
+#include <utility>
 
 #include "firmware/core/board.hpp"
 #include "firmware/core/planner.hpp"
@@ -24,7 +25,8 @@ struct MotionCounters {
   Steps position;           ///< of the load, as commanded
   Steps motor_beside_load;  ///< the motor stands at the sum: less by the play while withdrawing
   std::uint64_t steps = 0;
-  std::uint32_t triggers = 0;  ///< since reset
+  std::uint32_t triggers = 0;       ///< seen to rise since reset
+  std::uint32_t triggers_lost = 0;  ///< due and not seen
   std::uint32_t r_waves = 0;
   std::uint32_t cycles_begun = 0;  ///< in this run
   std::uint32_t cycles_done = 0;
@@ -210,26 +212,38 @@ class StepEngine {
       board_.schedule_trigger(trigger_.tick, ttl_width_, trigger_.has(MotionEvent::kRWave));
       return report({event.tick, static_cast<std::uint16_t>(event.flags & ~kTrigger)});
     }
-    count_trigger(event);
-    report(event);
+    report_trigger(event);
   }
 
-  void count_trigger(const Queued& event) {
-    if (event.has(MotionEvent::kCycleStart)) ++counters_.triggers;
-    if (event.has(MotionEvent::kRWave)) ++counters_.r_waves;
+  /// The event, with its TTL counted if the board saw it rise, and then at that tick; else with its loss. One that rose as
+  /// ordered goes with the rest of the event, as most do.
+  [[gnu::noinline]] void report_trigger(const Queued& event) {
+    if (!event.has(MotionEvent::kCycleStart)) return report(event);
+    const auto rise = board_.ttl_rise(event.tick);
+    if (rise) {
+      ++counters_.triggers;
+      if (event.has(MotionEvent::kRWave)) ++counters_.r_waves;
+      if (*rise == event.tick) return report(event);
+    } else {
+      ++counters_.triggers_lost;
+    }
+    report({event.tick, static_cast<std::uint16_t>(event.flags & ~kTrigger)});
+    if (rise)
+      report({*rise, static_cast<std::uint16_t>(event.flags & kTrigger)});
+    else
+      report({event.tick, MotionEvent::kTriggerLost});
   }
 
   /// The delayed trigger counts and is reported once it has risen.
   void settle_trigger(std::uint32_t now) {
     if (trigger_.flags == 0 || ticks_between(trigger_.tick, now) < 0) return;
-    count_trigger(trigger_);
-    report(trigger_);
-    trigger_ = {};
+    report_trigger(std::exchange(trigger_, {}));
   }
 
   void report(const Queued& event) {
-    constexpr std::uint16_t kReported =
-        MotionEvent::kCycleStart | MotionEvent::kRunStart | MotionEvent::kSegmentStart | MotionEvent::kEnd;
+    constexpr std::uint16_t kReported = MotionEvent::kCycleStart | MotionEvent::kTriggerLost |
+                                        MotionEvent::kRunStart | MotionEvent::kSegmentStart |
+                                        MotionEvent::kEnd;
     if ((event.flags & kReported) == 0) return;
     if (!reports_.push({whole_time(event.tick, board_.now()), event.flags})) ++lost_;
   }

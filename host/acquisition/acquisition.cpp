@@ -9,6 +9,7 @@
 #include "host/acquisition/slice_tracker.hpp"
 #include "host/gpio/gate_check.hpp"
 #include "protocol/signal/low_pass.hpp"
+#include "protocol/signal/saturation.hpp"
 #include "protocol/wire/wire_text.hpp"
 
 namespace diastole {
@@ -35,6 +36,7 @@ class Acquisition {
           hooks_.remark({"warning", code, text});
         }) {
     block_.channels = static_cast<uint32_t>(setup_.channels.size());
+    saturation_.resize(setup_.channels.size());
     const signal::LowPassDesign design{.rate_Hz = setup_.sample_rate_Hz};
     if (design.rate_Hz >= signal::least_rate_over_cutoff * design.cutoff_Hz) live_filter_.emplace(design);
     if (!setup_.slices.empty()) schedule_.emplace(setup_.slices);
@@ -62,6 +64,7 @@ class Acquisition {
     gap_remarks_.close(clock_.now_ns());
     close_block();
     close_gate();
+    close_saturation();
     check_count(grid.due_by(until_ns));
     write(EndRecord{until_ns});
     ended_ = true;
@@ -155,11 +158,38 @@ class Acquisition {
     for (size_t i = 0; i < received.volts.size(); ++i) {
       const ChannelConfig& channel = setup_.channels[i % channels];
       block_.value_kPa.push_back((received.volts[i] - channel.zero_V) * channel.kPa_per_V);
+      saturation_[i % channels].watch.push(block_.value_kPa.back());
       if (i % channels == 0) show(received.host_ns[i / channels], block_.value_kPa.back());
     }
     outcome_.counts.received += received.host_ns.size();
+    watch_saturation();
     outcome_.counts.last_kPa = block_.value_kPa[block_.value_kPa.size() - channels];
     if (block_.host_ns.back() - block_.host_ns.front() >= block_span_ns) close_block();
+  }
+  /// Tells of the first one at once, of their number at the end.
+  void watch_saturation() {
+    const uint64_t before = outcome_.counts.saturated;
+    outcome_.counts.saturated = 0;
+    for (size_t i = 0; i < saturation_.size(); ++i) {
+      const signal::SaturationWatch& watch = saturation_[i].watch;
+      outcome_.counts.saturated += static_cast<uint64_t>(watch.samples());
+      if (watch.samples() == 0 || std::exchange(saturation_[i].told, true)) continue;
+      remark(
+          "warning", "saturated",
+          fmt::format(
+              "{} stands at {:.3f} kPa: the instrument's range ends there, and the pressure was beyond it",
+              setup_.channels[i].name, watch.most().samples > 0 ? watch.most().value : watch.least().value));
+    }
+    if (outcome_.counts.saturated != before) hooks_.progress(outcome_.counts);
+  }
+  void close_saturation() {
+    for (size_t i = 0; i < saturation_.size(); ++i) {
+      const int64_t samples = saturation_[i].watch.samples();
+      if (samples == 0) continue;
+      remark("error", "saturated",
+             fmt::format("{} samples of {} stand at the end of the instrument's range", samples,
+                         setup_.channels[i].name));
+    }
   }
   void show(uint64_t host_ns, double kPa) {
     if (live_filter_) outcome_.counts.filtered_kPa = live_filter_->push(kPa);
@@ -242,6 +272,12 @@ class Acquisition {
               write(SegmentRecord{e.segment, e.tick});
             },
             [&](const wire::Trigger& e) {
+              if (e.seen == 0) {
+                remark("error", "trigger_lost",
+                       fmt::format("the controller did not see the TTL of cycle {} rise", e.cycle), e.tick);
+                on_cycle(e.cycle);
+                return;
+              }
               ++outcome_.counts.triggers;
               if (setup_.live != nullptr) setup_.live->trigger(e.tick);
               write(TriggerRecord{e.cycle, e.tick, e.r_wave});
@@ -355,6 +391,11 @@ class Acquisition {
   GapRemarks gap_remarks_;
   uint64_t deadline_ns_ = 0;
   StopRequest obeyed_ = StopRequest::none;
+  struct ChannelSaturation {
+    signal::SaturationWatch watch;
+    bool told = false;
+  };
+  std::vector<ChannelSaturation> saturation_;  ///< by channel
   std::optional<GateCheck> gate_;
   bool stopped_by_estop_ = false;
   std::optional<uint64_t> triggers_raised_;  ///< as the controller counted, at its end

@@ -48,6 +48,7 @@ struct RunProgress {
   uint64_t missing = 0;
   uint64_t triggers = 0;
   std::optional<uint64_t> gate_pulses;  ///< that the host itself counted on the gating line
+  uint64_t saturated = 0;               ///< values at the end of the instrument's range, all channels
   double last_kPa = 0;                  ///< of the first channel
   double filtered_kPa = 0;              ///< the same, low-passed forward, some 13 ms late (low_pass.hpp)
   std::optional<ScheduleProgress> schedule;

@@ -6,10 +6,13 @@
 #include <cstdio>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
 #include <thread>
 
 #include "host/cli/daemon_question.hpp"
 #include "host/cli/host_commands.hpp"
+#include "host/flash/elf_symbols.hpp"
 #include "host/rpc/client.hpp"
 #include "protocol/contract/input_error.hpp"
 
@@ -63,6 +66,17 @@ void show_status(const json& status) {
              inputs.empty() ? "none active" : fmt::format("{} active", fmt::join(inputs, ", ")),
              status.at("motor_powered").get<bool>() ? "powered" : "off");
   if (known("journals")) show_journals(status.at("journals"));
+}
+
+/// Adds to the program counter and the return address of each crash the function that they lie in.
+void name_places(json& answer, const ElfSymbols& symbols) {
+  for (json& entry : answer.at("entries")) {
+    const std::string which = entry.value("register", "");
+    if (which != "pc" && which != "lr") continue;
+    const auto name = symbols.name_at(entry.at("value").get<uint32_t>());
+    entry["symbol"] = name ? json(*name) : json();
+    if (name) entry["text"] = fmt::format("{} in {}", entry.at("text").get<std::string>(), *name);
+  }
 }
 
 void show_events(const json& answer) {
@@ -214,15 +228,30 @@ void add_stop(CommandLine& line) {
 }
 
 void add_black_box(CommandLine& line) {
-  add_question(line,
-               {.command = "blackbox",
-                .purpose = "the controller's last events, kept over its resets",
-                .examples = "  diastole blackbox\n"
-                            "      starts, states, faults, refusals, emergency stop, link: 160 of them, "
-                            "oldest first\n"
-                            "  diastole blackbox --json > events.json",
-                .method = "rig.black_box",
-                .show = show_events});
+  struct BlackBoxOptions {
+    DaemonAddress daemon;
+    std::string elf;
+  };
+  auto options = std::make_shared<BlackBoxOptions>();
+  CLI::App* command = line.add(
+      "blackbox", "the controller's last events, kept over its resets",
+      "  diastole blackbox\n"
+      "      starts, states, faults, refusals, emergency stop, link: 160 of them, oldest first; and the\n"
+      "      registers of a processor fault that ended the start before\n"
+      "  diastole blackbox --elf build/firmware/bin/diastole-stm32f405.elf\n"
+      "      the same, and in which function of that firmware the fault came\n"
+      "  diastole blackbox --json > events.json");
+  options->daemon.add_to(*command);
+  command->add_option("--elf", options->elf, "the firmware's ELF file: names the places of processor faults");
+  line.on_run(command, [options](const CommandOutput& out) {
+    std::optional<ElfSymbols> symbols;
+    if (!options->elf.empty()) symbols.emplace(options->elf);
+    DaemonClient client(options->daemon.resolve());
+    json answer = client.call("rig.black_box");
+    if (symbols) name_places(answer, *symbols);
+    print(out, answer, [&] { show_events(answer); });
+    return ExitCode::done;
+  });
 }
 
 void add_console(CommandLine& line) {

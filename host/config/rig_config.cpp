@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdlib>
 #include <numbers>
 
@@ -19,6 +20,19 @@ constexpr std::array optional_numbers{
 constexpr std::array optional_texts{"name", "site", "operator", "specimen"};
 
 double disc_area_m2(double diameter_mm) { return std::numbers::pi / 4 * diameter_mm * diameter_mm * 1e-6; }
+
+/// White, Fluid Mechanics, 6.4 and 6.6, for a smooth pipe.
+HoseLosses losses_of(double length_m, double bore_mm, double density_kg_m3, double viscosity_Pa_s,
+                     double minor_loss_K) {
+  constexpr double flow_m3_s = 1e-3;
+  const double bore_m = 1e-3 * bore_mm;
+  const double speed_m_s = flow_m3_s / disc_area_m2(bore_mm);
+  const double dynamic_Pa = density_kg_m3 * speed_m_s * speed_m_s / 2;
+  const double reynolds = density_kg_m3 * speed_m_s * bore_m / viscosity_Pa_s;
+  const double lengths = length_m / bore_m;
+  return {64 / reynolds * lengths * dynamic_Pa, 0.3164 / std::pow(reynolds, 0.25) * lengths * dynamic_Pa,
+          minor_loss_K * dynamic_Pa};
+}
 
 /// The controller counts microsteps with a sign in 32 bits, their volume in whole picolitres, and the hose's
 /// inertance in whole kg/m4; what does not fit would switch a limit off.
@@ -82,6 +96,13 @@ void read_geometry(TableReader rig, RigConfig& config) {
                                   static_cast<double>(config.controller.microsteps);
   config.microstep_mL = 1e6 * disc_area_m2(bore_mm) / microsteps_per_m;
   config.hose_inertance_kg_m4 = density_kg_m3 * hose_length_m / disc_area_m2(hose_bore_mm);
+  // Water at 20 °C, and a hose that opens sharply at both ends (0.5 + 1), unless the file says otherwise.
+  const auto given_or = [&](const char* key, double usual) {
+    const auto found = attributes.find(key);
+    return found == attributes.end() ? usual : std::get<double>(found->second);
+  };
+  config.hose_losses = losses_of(hose_length_m, hose_bore_mm, density_kg_m3,
+                                 given_or("fluid_viscosity_Pa_s", 0.001), given_or("hose_minor_loss_K", 1.5));
   attributes["volume_per_step_mL"] = config.microstep_mL;
   check_geometry(rig, config);
 }
@@ -95,6 +116,7 @@ MotionLimits read_limits(TableReader table) {
   limits.step_rate_Hz =
       table.number_or("step_rate_Hz", limits.step_rate_Hz, {.at_least = 1, .at_most = 400'000});
   limits.pressure_kPa = table.number_or("pressure_kPa", limits.pressure_kPa, {.above = 0, .at_most = 10'000});
+  limits.cavity_kPa = table.number_or("cavity_kPa", limits.cavity_kPa, {.at_least = 0, .at_most = 10'000});
   limits.homing_flow_mL_s =
       table.number_or("homing_flow_mL_s", limits.homing_flow_mL_s, {.above = 0, .at_most = 10'000});
   table.finish();

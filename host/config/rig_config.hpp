@@ -24,7 +24,8 @@ struct MotionLimits {
   double flow_mL_s = 1860;           ///< the motor's 30 kHz in full steps
   double acceleration_mL_s2 = 1700;  ///< also the deceleration of a controlled stop
   double step_rate_Hz = 240'000;     ///< in microsteps
-  double pressure_kPa = 79.3;        ///< at the piston, from accelerating the fluid in the hose
+  double pressure_kPa = 79.3;        ///< at the piston: inertia, friction and losses in the hose, cavity
+  double cavity_kPa = 6;             ///< what the specimen holds against the piston at most
   double homing_flow_mL_s = 5;
 };
 
@@ -58,6 +59,13 @@ struct DaemonConfig {
   std::string control_group;  ///< whose members may control the rig beside root and the daemon's user
 };
 
+/// What a steady flow of 1 L/s through the hose costs; friction is the larger of the first two (message Configure).
+struct HoseLosses {
+  double laminar_Pa = 0;    ///< Hagen-Poiseuille, in proportion to the flow
+  double turbulent_Pa = 0;  ///< Blasius, with its power 1.75
+  double minor_Pa = 0;      ///< hose_minor_loss_K at ends and bends, with its square
+};
+
 struct RigConfig {
   std::string file;       ///< for messages
   Attributes attributes;  ///< of /rig, volume_per_step_mL included
@@ -67,6 +75,7 @@ struct RigConfig {
   DaemonConfig daemon;
   double microstep_mL = 0;          ///< bore area / (screw x steps x microsteps)
   double hose_inertance_kg_m4 = 0;  ///< density x length / bore area
+  HoseLosses hose_losses;
 };
 
 /// Throws InputError with file, line and key; also when a microstep or the hose's inertance, as they follow

@@ -29,7 +29,8 @@ LimitInWords words_for(wire::Limit limit) {
       return {1, "microsteps/s", "Reduce stroke_mL, lengthen period_s, or use fewer microsteps."};
     case wire::Limit::pressure:
       return {1e-3, "kPa",
-              "Reduce stroke_mL or lengthen period_s: the fluid in the hose is too hard to move."};
+              "Reduce stroke_mL or lengthen period_s: the hose's inertia, friction and end losses and the "
+              "cavity together are more than the motor pushes."};
     case wire::Limit::stroke_at_least:
       return {1e-6, "mL", "Enlarge stroke_mL to at least one microstep."};
     case wire::Limit::stopping_time:
@@ -47,7 +48,7 @@ LimitInWords words_for(wire::Limit limit) {
               "Reduce stroke_mL or lengthen period_s: at each reversal the motor needs this time to take up "
               "the backlash (diastole settings)."};
     case wire::Limit::trigger_delay:
-      return {1e-3, "ms", "Reduce trigger_delay_ms: the TTL and the R-wave of 30 ms end within the period."};
+      return {1e-3, "ms", "Reduce trigger_delay_ms: the TTL and the R-wave end within the period."};
     case wire::Limit::none:
       break;
   }
@@ -143,6 +144,8 @@ std::string remedy_for(wire::Refusal refusal) {
              "home`.";
     case wire::Refusal::settings_mismatch:
       return "Compare the rig file with `diastole settings`.";
+    case wire::Refusal::supply_low:
+      return "Measure the board's 3.3 V and mend its supply, then try again.";
     case wire::Refusal::flash_failed:
       return "Try again; if it persists the chip's flash is worn out: replace the board.";
     case wire::Refusal::limit_switch_closed:
@@ -174,6 +177,13 @@ std::string in_words(const wire::BlackBoxEntry& entry) {
                                : "the host has fallen silent";
     case wire::Noted::settings:
       return fmt::format("settings written, record {}", entry.argument);
+    case wire::Noted::crash: {
+      const auto value = static_cast<uint32_t>(entry.argument);
+      const auto which = static_cast<wire::CrashRegister>(entry.detail);
+      const bool decimal = which == wire::CrashRegister::exception || which == wire::CrashRegister::cycles;
+      return decimal ? fmt::format("crash before: {} {}", wire::crash_register_name(which), value)
+                     : fmt::format("crash before: {} 0x{:08x}", wire::crash_register_name(which), value);
+    }
     case wire::Noted::nothing:
       break;
   }

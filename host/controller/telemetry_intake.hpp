@@ -20,7 +20,7 @@ class TelemetryIntake {
             [&](const wire::SegmentStarted& started) { last_known_.segment = started.segment; },
             [&](const wire::Trigger& trigger) {
               if (!is_news(trigger.tick)) return;
-              ++last_known_.triggers;
+              last_known_.triggers += trigger.seen;
               last_known_.r_waves += trigger.r_wave;
               last_known_.cycle = trigger.cycle + 1;
             },

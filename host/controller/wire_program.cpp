@@ -52,6 +52,15 @@ wire::Configure configuration(const RigConfig& rig, uint32_t microstep_pL) {
   message.pressure_Pa = limit("pressure_kPa", 1e3 * limits.pressure_kPa, "Pa", 10'000'000);
   message.inertance_kg_per_m4 =
       whole({rig.file, "rig, inertance of the hose", rig.hose_inertance_kg_m4, "kg/m4", 1});
+  const auto loss = [&](const char* what, double pressure_Pa) {
+    return whole({rig.file, std::string("rig, the hose's ") + what + " at 1 L/s", pressure_Pa, "Pa", 0,
+                  1'000'000'000});
+  };
+  message.laminar_Pa = loss("laminar friction", rig.hose_losses.laminar_Pa);
+  message.turbulent_Pa = loss("turbulent friction", rig.hose_losses.turbulent_Pa);
+  message.minor_Pa = loss("minor losses", rig.hose_losses.minor_Pa);
+  message.cavity_Pa =
+      whole({rig.file, "controller.limits.cavity_kPa", 1e3 * limits.cavity_kPa, "Pa", 0, 10'000'000});
   message.lease_us = static_cast<uint32_t>(rig.controller.lease_ms * 1000);
   message.homing_flow_uL_per_s = limit("homing_flow_mL_s", 1e3 * limits.homing_flow_mL_s, "uL/s", 10'000'000);
   return message;

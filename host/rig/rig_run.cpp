@@ -84,6 +84,7 @@ void add_limits(Attributes& rig, const ControllerConfig& controller) {
   rig["limit_acceleration_mL_s2"] = limits.acceleration_mL_s2;
   rig["limit_step_rate_Hz"] = limits.step_rate_Hz;
   rig["limit_pressure_kPa"] = limits.pressure_kPa;
+  rig["limit_cavity_kPa"] = limits.cavity_kPa;
   rig["lease_ms"] = controller.lease_ms;
 }
 

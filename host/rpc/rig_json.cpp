@@ -81,10 +81,15 @@ json object_of(const SettingsReport& report) {
 
 json object_of(const BlackBox& box) {
   const auto entry = [&](const wire::BlackBoxEntry& each) -> json {
-    return {DIASTOLE_NAMED(each, number, boot),
-            {"time_s", static_cast<double>(each.tick) / box.tick_rate_Hz},
-            {"kind", wire::noted_name(each.kind)},
-            {"text", in_words(each)}};
+    json found{DIASTOLE_NAMED(each, number, boot),
+               {"time_s", static_cast<double>(each.tick) / box.tick_rate_Hz},
+               {"kind", wire::noted_name(each.kind)},
+               {"text", in_words(each)}};
+    if (each.kind == wire::Noted::crash) {
+      found["register"] = wire::crash_register_name(static_cast<wire::CrashRegister>(each.detail));
+      found["value"] = static_cast<uint32_t>(each.argument);
+    }
+    return found;
   };
   const bool since_power_on = !box.entries.empty() && box.entries.front().number == 1;
   return {{"entries", array_of(box.entries, entry)}, {"since_power_on", since_power_on}};
@@ -122,7 +127,7 @@ json as_json(const std::optional<RunState>& run) {
           {"state", run->state},
           {"planned_s", run->plan.estimate_s},
           {"planned_cycles", run->plan.planned_cycles},
-          DIASTOLE_NAMED(progress, received, missing, triggers, last_kPa, filtered_kPa),
+          DIASTOLE_NAMED(progress, received, missing, saturated, triggers, last_kPa, filtered_kPa),
           {"gate_pulses", or_null(progress.gate_pulses)},
           {"schedule", or_null(progress.schedule)},
           {"remarks", array_of(run->remarks.remarks, [](const auto& each) { return object_of(each); })},

@@ -1,6 +1,7 @@
 #pragma once
 // The black box: the controller's last events, kept over a reset.
 
+#include <cstddef>
 #include <cstdint>
 
 #include "protocol/wire/field_codec.hpp"
@@ -20,6 +21,15 @@ inline constexpr Noted kLastNoted = last_of({
 #include "protocol/wire/black_box_list.inc"
 });
 
+#define DIASTOLE_CRASH_REGISTER(number, name) name = number,
+enum class CrashRegister : std::uint8_t {
+#include "protocol/wire/crash_register_list.inc"
+};
+#define DIASTOLE_CRASH_REGISTER(number, name) CrashRegister::name,
+inline constexpr std::size_t kCrashRegisters = 1 + static_cast<std::size_t>(last_of({
+#include "protocol/wire/crash_register_list.inc"
+}));
+
 /// One event.
 ///
 ///   kind      detail                      argument
@@ -30,6 +40,8 @@ inline constexpr Noted kLastNoted = last_of({
 ///   estop     1 pressed, 0 released       0
 ///   link      1 opened, 0 lost            session
 ///   settings  0                           number of the record written
+///   crash     CrashRegister               its value when the processor fault came that ended the start before: one
+///                                         entry a register, in order, behind the `started` of the start after it
 struct BlackBoxEntry {
   std::uint32_t number = 0;  ///< counts up over resets, from 1
   std::uint16_t boot = 0;    ///< starts since the memory lost its power, from 1

@@ -22,10 +22,11 @@ struct MachineSettings {
   std::uint8_t board_name_size = 0;
   std::array<std::uint8_t, kMaxNameBytes> board_name{};  ///< UTF-8, for people
 
-  /// Its fields as part of a message or record, in the order of setting_list.inc, the name last.
-  static constexpr void layout(auto& self, auto& visit) {
+  /// Its fields as part of a message or record, in the order of setting_list.inc, the name last. Of a record that an
+  /// older firmware wrote only the settings below `known`, which it knew.
+  static constexpr void layout(auto& self, auto& visit, int known = 256) {
 #define DIASTOLE_SETTING(number, name, least, initial, most, shown, scale, explanation) \
-  visit.field(#name, self.name);
+  if ((number) < known) visit.field(#name, self.name);
 #include "protocol/wire/setting_list.inc"
     visit.list("board_name", self.board_name_size, self.board_name);
   }

@@ -14,12 +14,15 @@ namespace diastole::wire {
 // clang-format off
 
 // Host → controller: geometry and limits; allowed while nothing moves; clears the program. The commanded
-// volume is position times microstep_pL, exactly. Pressure is what accelerates the fluid in the hose,
-// inertance times volume acceleration: 1e-9 inertance_kg_per_m4 acceleration_uL_per_s2, in Pa; friction
-// and the specimen come on top.
+// volume is position times microstep_pL, exactly. The pressure at the piston is at most, in Pa, with the flow q in L/s,
+//
+//   1e-9 inertance_kg_per_m4 acceleration_uL_per_s2        what accelerates the fluid in the hose
+//   + max(laminar_Pa q, turbulent_Pa q^1.75)               friction: Hagen-Poiseuille, Blasius
+//   + minor_Pa q^2                                         losses at the hose's ends and bends
+//   + cavity_Pa                                            what the specimen holds against it
 //
 // Example Configure: 02 00 21 E4 76 00 C0 CF 6A 00 A0 61 1C 00 A0 F0 19 00 80 A9 03 00 C4 35 01 00 00 63
-//   9F 02 20 A1 07 00 88 13 00 00
+//   9F 02 20 A1 07 00 88 13 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00
 struct Configure {
   DIASTOLE_LAYOUT(Configure,
       (value,   0, uint16_t, request_id),  // chosen by the host; the answer repeats it
@@ -32,7 +35,11 @@ struct Configure {
       (within, 22, uint32_t, pressure_Pa, 1U, 10'000'000U),                // limit
       (value,  26, uint32_t, inertance_kg_per_m4),  // of the hose; 0 switches the pressure limit off
       (within, 30, uint32_t, lease_us, 100'000U, 5'000'000U),  // last heartbeat to standstill at most
-      (within, 34, uint32_t, homing_flow_uL_per_s, 1U, 10'000'000U))       // speed of homing
+      (within, 34, uint32_t, homing_flow_uL_per_s, 1U, 10'000'000U),       // speed of homing
+      (within, 38, uint32_t, laminar_Pa, 0U, 1'000'000'000U),              // at 1 L/s
+      (within, 42, uint32_t, turbulent_Pa, 0U, 1'000'000'000U),            // at 1 L/s
+      (within, 46, uint32_t, minor_Pa, 0U, 1'000'000'000U),                // at 1 L/s
+      (within, 50, uint32_t, cavity_Pa, 0U, 10'000'000U))
   static constexpr Configure example() {
     return {.request_id = 2,
             .microstep_pL = 7'791'649,

@@ -29,11 +29,14 @@ using ReadSettings = BareRequest<MessageType::ReadSettings>;
 //       22    4 backlash_nm                  play of the lead screw
 //       26    4 travel_um                    the furthest from home
 //       30    4 full_step_rate_Hz            limit of motor and driver
-//       34    1 board_name_size              0 … 20
-//       35    n board_name                   UTF-8
+//       34    4 ttl_active_low               polarity of the TTL
+//       38    4 r_wave_uV                    height at the scanner's input
+//       42    4 r_wave_us                    length
+//       46    1 board_name_size              0 … 20
+//       47    n board_name                   UTF-8
 //
 // Example WriteSettings: 08 00 10 00 00 00 C8 00 00 00 A0 86 01 00 F0 9C 09 00 24 FA FF FF 50 C3 00 00 A0 BB
-//   0D 00 30 75 00 00 04 72 69 67 41
+//   0D 00 30 75 00 00 00 00 00 00 20 4E 00 00 30 75 00 00 04 72 69 67 41
 struct WriteSettings {
   static constexpr MessageType kType = MessageType::WriteSettings;
   std::uint16_t request_id = 0;
@@ -65,7 +68,8 @@ struct WriteSettings {
 //       14    n settings                     as in WriteSettings, from microsteps on
 //
 // Example SettingsReport: 07 01 03 00 00 00 21 E4 76 00 32 00 00 00 08 00 00 00 C8 00 00 00 A0 86 01 00 F0 9C
-//   09 00 00 00 00 00 50 C3 00 00 A0 BB 0D 00 30 75 00 00 04 72 69 67 41
+//   09 00 00 00 00 00 50 C3 00 00 A0 BB 0D 00 30 75 00 00 00 00 00 00 20 4E 00 00 30 75 00 00 04 72
+//   69 67 41
 struct SettingsReport {
   static constexpr MessageType kType = MessageType::SettingsReport;
   std::uint16_t request_id = 0;

@@ -48,15 +48,17 @@ struct SegmentStarted {
 };
 
 // Controller → host: the TTL rose, with the first step of a cycle or, in a hold, at the cycle's time, or
-// Arm.trigger_delay_us after that.
+// Arm.trigger_delay_us after that. Or it should have and was not seen to.
 //
-// Example Trigger: 00 00 00 00 00 96 0A 0F 00 00 00 00 01
+// Example Trigger: 00 00 00 00 00 96 0A 0F 00 00 00 00 01 01
 struct Trigger {
   DIASTOLE_LAYOUT(Trigger,
       (value,   0, uint32_t, cycle),          // from 0, over the whole run
       (value,   4, uint64_t, tick),           // of the rising edge
-      (within, 12, uint8_t, r_wave, 0U, 1U))  // 1 if the R-wave was played
-  static constexpr Trigger example() { return {.cycle = 0, .tick = 252'352'000, .r_wave = 1}; }
+      (within, 12, uint8_t, r_wave, 0U, 1U),  // 1 if the R-wave was played
+      // 1 if the board saw the pin rise at this tick; 0: it was due at this tick and was lost
+      (within, 13, uint8_t, seen, 0U, 1U))
+  static constexpr Trigger example() { return {.cycle = 0, .tick = 252'352'000, .r_wave = 1, .seen = 1}; }
 };
 
 // Controller → host: positions at first_tick + i period_ticks; first_index continues the batch before. A
@@ -82,15 +84,16 @@ struct PositionBatch {
 
 // Controller → host: the motor is at rest and every position and trigger of the run has been sent.
 //
-// Example RunEnded: 00 00 D0 1B 50 00 00 00 00 0A 00 00 00 0A 00 00 00 0A 00 00 00 00 00 00 00
+// Example RunEnded: 00 00 D0 1B 50 00 00 00 00 0A 00 00 00 0A 00 00 00 0A 00 00 00 00 00 00 00 00 00 00 00
 struct RunEnded {
   DIASTOLE_LAYOUT(RunEnded,
       (choice,  0, RunEnd, reason, kLastRunEnd),   // run_end_list.inc
       (value,   1, uint64_t, tick),                // of standstill
       (value,   9, uint32_t, cycles),              // completed
-      (value,  13, uint32_t, triggers),            // of this run
+      (value,  13, uint32_t, triggers),            // of this run, as the board saw them rise
       (value,  17, uint32_t, r_waves),             // of this run
-      (value,  21, int32_t, position_microsteps))
+      (value,  21, int32_t, position_microsteps),
+      (value,  25, uint32_t, triggers_lost))       // of this run: due, and not seen to rise
   static constexpr RunEnded example() {
     return {.reason = RunEnd::completed, .tick = 1'344'000'000, .cycles = 10, .triggers = 10, .r_waves = 10};
   }

@@ -43,6 +43,10 @@ constexpr Words kNoted[] = {
 #define DIASTOLE_BLACK_BOX(number, name) {#name, {}, {}},
 #include "protocol/wire/black_box_list.inc"
 };
+constexpr Words kCrashRegisterNames[] = {
+#define DIASTOLE_CRASH_REGISTER(number, name) {#name, {}, {}},
+#include "protocol/wire/crash_register_list.inc"
+};
 
 template <class Enum, std::size_t N>
 const Words& words_of(const Words (&table)[N], Enum number) {
@@ -63,6 +67,9 @@ std::string_view limit_name(Limit limit) { return words_of(kLimits, limit).name;
 std::string_view state_name(State state) { return words_of(kStates, state).name; }
 std::string_view waveform_name(Waveform waveform) { return words_of(kWaveforms, waveform).name; }
 std::string_view noted_name(Noted kind) { return words_of(kNoted, kind).name; }
+std::string_view crash_register_name(CrashRegister which) {
+  return words_of(kCrashRegisterNames, which).name;
+}
 std::string_view run_end_name(RunEnd reason) { return words_of(kRunEnds, reason).name; }
 std::string_view update_outcome_explanation(UpdateOutcome outcome) {
   return words_of(kUpdateOutcomes, outcome).explanation;

@@ -20,6 +20,7 @@ std::string_view state_name(State state);
 std::string_view waveform_name(Waveform waveform);
 std::string_view run_end_name(RunEnd reason);
 std::string_view noted_name(Noted kind);
+std::string_view crash_register_name(CrashRegister which);
 /// "{}" in it stands for UpdateAnswer.value.
 std::string_view update_outcome_explanation(UpdateOutcome outcome);
 std::string_view update_outcome_remedy(UpdateOutcome outcome);

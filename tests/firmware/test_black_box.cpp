@@ -116,5 +116,35 @@ TEST(BlackBox, NotesAHostThatFallsSilent) {
   EXPECT_EQ(bench.heard.black_box.back().newest, 4U) << "started, opened, lost, opened";
 }
 
+TEST(BlackBox, TellsTheRegistersOfACrashOnceBehindTheStart) {
+  RecordedController::Options options;
+  options.board.identity.reset_cause = ResetCause::watchdog;
+  CrashRecord crash;
+  for (std::size_t i = 0; i < crash.values.size(); ++i)
+    crash.values[i] = 0x8000'0000U + static_cast<std::uint32_t>(i);
+  options.board.memory->crash = crash;
+  Bench bench(options);
+  bench.connect();
+  const auto told = [&bench] {
+    std::vector<BlackBoxEntry> entries;
+    for (std::uint32_t from = 1;; from = entries.back().number + 1) {
+      const std::size_t before = bench.heard.black_box.size();
+      bench.request(wire::ReadBlackBox{0, from});
+      bench.run_until([&] { return bench.heard.black_box.size() > before; }, microseconds(3'000'000));
+      if (bench.heard.black_box.back().entry.number == 0) return entries;
+      entries.push_back(bench.heard.black_box.back().entry);
+    }
+  };
+  const auto entries = told();
+  ASSERT_GT(entries.size(), wire::kCrashRegisters);
+  EXPECT_EQ(entries[0].kind, Noted::started);
+  for (std::size_t i = 0; i < wire::kCrashRegisters; ++i) {
+    EXPECT_EQ(entries[1 + i].kind, Noted::crash);
+    EXPECT_EQ(entries[1 + i].detail, i);
+    EXPECT_EQ(static_cast<std::uint32_t>(entries[1 + i].argument), crash.values[i]);
+  }
+  EXPECT_FALSE(options.board.memory->crash.has_value()) << "it is told once";
+}
+
 }  // namespace
 }  // namespace diastole::firmware

@@ -1,5 +1,7 @@
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "firmware/core/plan_check.hpp"
 #include "tests/firmware/every_profile.hpp"
 
@@ -136,6 +138,45 @@ TEST(PlanCheck, EmptyProgramAndMissingWaveform) {
   Segment uploaded = kPaper;
   uploaded.waveform = Waveform::uploaded;
   EXPECT_EQ(refusal_of(uploaded).refusal, Refusal::waveform_missing);
+}
+
+/// The rig's hose, 5 m of 12 mm, with water: 64/Re and Blasius for 1 L/s, K = 1.5 at its ends, and a cavity at 6 kPa.
+wire::Configure with_losses() {
+  wire::Configure configure = wire::Configure::example();
+  configure.laminar_Pa = 9'824;
+  configure.turbulent_Pa = 285'500;
+  configure.minor_Pa = 58'640;
+  configure.cavity_Pa = 6'000;
+  return configure;
+}
+
+TEST(PlanCheck, FrictionEndLossesAndTheCavityCountTowardsThePressure) {
+  const Segment hard{Waveform::parabolic, 10, 200'000'000, 0, 1'400'000};
+  EXPECT_EQ(refusal_of(hard).refusal, Refusal::none) << "inertia alone: 72 of 79.3 kPa";
+  const PlanRefusal refusal = refusal_of(hard, with_losses());
+  EXPECT_EQ(refusal.refusal, Refusal::limit_exceeded);
+  EXPECT_EQ(refusal.limit, Limit::pressure);
+  // 571 mL/s: 72 kPa inertia, 107 kPa friction, 19 kPa end losses, 6 kPa cavity.
+  EXPECT_NEAR(static_cast<double>(refusal.asked), 72e3 + 107.3e3 + 19.1e3 + 6e3, 500);
+  EXPECT_EQ(refusal.allowed, 79'300);
+  EXPECT_EQ(refusal_of(kPaper, with_losses()).refusal, Refusal::none);
+}
+
+TEST(PlanCheck, LossesAreThoseOfTheLargerFrictionRoundedUp) {
+  const Settings settings(with_losses());
+  EXPECT_EQ(settings.losses_Pa(0), 0U);
+  for (const std::uint32_t flow_uL_per_s : {10U, 1'000U, 20'000U, 133'334U, 571'429U, 1'860'000U}) {
+    const double q = 1e-6 * flow_uL_per_s;
+    const double expected = std::max(9'824 * q, 285'500 * std::pow(q, 1.75)) + 58'640 * q * q;
+    EXPECT_NEAR(settings.losses_Pa(flow_uL_per_s), expected, 1 + 1e-5 * expected) << flow_uL_per_s;
+  }
+}
+
+TEST(PlanCheck, RampsAndHandsKeepWithinTheFlowThatTheLossesAllow) {
+  const Settings settings(with_losses());
+  const double allowed_uL_per_s = static_cast<double>(settings.allowed_steps_per_s()) * 7.791649;
+  EXPECT_NEAR(settings.losses_Pa(static_cast<std::uint64_t>(allowed_uL_per_s)) + 6'000.0, 79'300, 10);
+  EXPECT_LT(settings.ramp_steps_per_s(), Settings(wire::Configure::example()).ramp_steps_per_s());
 }
 
 }  // namespace

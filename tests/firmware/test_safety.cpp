@@ -289,5 +289,19 @@ TEST(Status, TellsStateInputsAndCounters) {
   EXPECT_EQ(status.crc_errors, 0U);
 }
 
+TEST(Safety, WithoutItsCrystalNothingMovesUntilTheNextStart) {
+  RecordedController::Options options;
+  options.board.clock_sound = false;
+  Bench bench(options);
+  bench.connect();
+  EXPECT_EQ(bench.state(), wire::State::faulted);
+  bench.request(wire::StatusRequest{});
+  ASSERT_TRUE(bench.run_until([&] { return !bench.heard.statuses.empty(); }, microseconds(1'000'000)));
+  EXPECT_EQ(bench.heard.statuses.back().fault, wire::Fault::clock);
+  EXPECT_FALSE(bench.ask(wire::ClearFault{}));
+  EXPECT_FALSE(bench.ask(wire::Home{0, Bench::kLease}));
+  EXPECT_EQ(bench.state(), wire::State::faulted);
+}
+
 }  // namespace
 }  // namespace diastole::firmware

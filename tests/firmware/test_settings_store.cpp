@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "firmware/core/settings_store.hpp"
+#include "protocol/wire/crc32.hpp"
 
 namespace diastole::firmware {
 namespace {
@@ -156,6 +157,30 @@ TEST(SettingsStore, NoAlteredRecordIsBelieved) {
   wire::MachineSettings wild;
   wild.microsteps = 0;
   EXPECT_FALSE(decode_record(encode_record({7, wild})));
+}
+
+/// As firmware 0.1.0 wrote it: eight settings and the name.
+TEST(SettingsStore, ARecordOfTheFirstLayoutIsReadAndTheLaterSettingsAreInitial) {
+  wire::MachineSettings settings;
+  settings.microsteps = 16;
+  settings.backlash_nm = 40'000;
+  settings.board_name_size = 2;
+  settings.board_name = {'M', 'R'};
+  const SettingsRecord::Slot now = encode_record({7, settings});
+  constexpr std::size_t body = 10, known = 8 * 4, later = 3 * 4;
+  SettingsRecord::Slot first;
+  first.fill(0xFF);
+  const std::array<std::uint8_t, body> head{'D', 'S', 'E', 'T', 7, 0, 0, 0, known + 3, 0};
+  std::ranges::copy(head, first.begin());
+  std::copy_n(now.begin() + body, known, first.begin() + body);
+  std::copy_n(now.begin() + body + known + later, 3, first.begin() + body + known);
+  const std::uint32_t crc = wire::crc32(std::span(first).first(first.size() - 4));
+  for (std::size_t i = 0; i < 4; ++i)
+    first[first.size() - 4 + i] = static_cast<std::uint8_t>(crc >> (8 * i));
+  const auto read = decode_record(first);
+  ASSERT_TRUE(read);
+  EXPECT_EQ(read->number, 7U);
+  EXPECT_EQ(read->settings, settings);
 }
 
 TEST(MachineSettings, TheNominalMicrostepIsThePapers) {

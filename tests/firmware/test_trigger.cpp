@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <map>
 #include <vector>
 
@@ -19,19 +20,31 @@ std::vector<Edge> edges_of(const std::vector<Edge>& all, Signal signal) {
   return some;
 }
 
-TEST(RWave, IsATriangleOf30msAnd20mV) {
-  EXPECT_EQ((kRWaveSamplePeriod * static_cast<std::int64_t>(kRWaveSamples)).count,
-            microseconds(30'000).count);
+class RWave : public testing::TestWithParam<std::uint32_t> {};
+
+TEST_P(RWave, IsATriangleOfTheHeightAsked) {
+  const std::uint32_t peak_uV = GetParam();
+  const RWaveCodes codes = r_wave_codes(peak_uV);
   const std::size_t peak = kRWaveSamples / 2 - 1;
-  EXPECT_NEAR(r_wave_uV(kRWaveCodes[peak]), kRWavePeak_uV, 400);
-  EXPECT_EQ(kRWaveCodes.back(), 0);
-  EXPECT_LE(kRWaveCodes[peak], kDacFullScale);
+  EXPECT_NEAR(r_wave_uV(codes[peak]), peak_uV, 0.02 * peak_uV);
+  EXPECT_EQ(codes.back(), 0);
+  EXPECT_LE(codes[peak], kDacFullScale);
+  constexpr double code_uV = double{kDacFullScale_uV} / kDacFullScale / kRWaveDivider;
   for (std::size_t i = 0; i < kRWaveSamples; ++i) {
     const double height = static_cast<double>(i <= peak ? i + 1 : kRWaveSamples - 1 - i) / 150;
-    EXPECT_NEAR(r_wave_uV(kRWaveCodes[i]), height * kRWavePeak_uV, 0.02 * kRWavePeak_uV) << i;
+    EXPECT_NEAR(r_wave_uV(codes[i]), height * peak_uV, code_uV) << i;
   }
   for (std::size_t i = 1; i <= peak; ++i)
-    EXPECT_EQ(kRWaveCodes[peak - i], kRWaveCodes[peak + i]);
+    EXPECT_EQ(codes[peak - i], codes[peak + i]);
+}
+
+INSTANTIATE_TEST_SUITE_P(Heights, RWave, testing::Values(1'000U, 20'000U, 26'000U));
+
+TEST(RWaveLength, IsThatOfTheSettingsToATickASample) {
+  EXPECT_EQ(r_wave_sample_period(30'000), microseconds(100));
+  for (const std::uint32_t length_us : {10'000U, 30'000U, 60'000U, 12'345U})
+    EXPECT_NEAR(static_cast<double>((r_wave_sample_period(length_us) * std::int64_t{kRWaveSamples}).count),
+                84.0 * length_us, kRWaveSamples / 2.0);
 }
 
 TEST(Trigger, TtlAndRWaveStartWithTheFirstStepOfEachCycle) {
@@ -277,6 +290,72 @@ TEST(Pins, DirectionIsSetUpBeforeTheStepAndPulsesHaveTheirWidth) {
     }
   }
   EXPECT_GT(steps, 3U * 2 * 2567);
+}
+
+/// A TTL that does not rise is not counted, and its loss is told; with a delay too.
+TEST(Trigger, ThatIsNotSeenToRiseIsLostAndNotCounted) {
+  for (const std::uint32_t delay_us : {0U, 150'000U}) {
+    RecordedController::Options options;
+    options.board.triggers_until_broken = 4;
+    Bench bench(options);
+    bench.prepare();
+    bench.add_segment(Waveform::parabolic, 10, 20'000'000, 1'000'000);
+    wire::Arm arm = wire::Arm::example();
+    arm.trigger_delay_us = delay_us;
+    bench.run_program(arm);
+    ASSERT_EQ(bench.heard.ended.size(), 1U) << delay_us;
+    EXPECT_EQ(bench.heard.ended[0].triggers, 3U) << delay_us;
+    EXPECT_EQ(bench.heard.ended[0].triggers_lost, 7U) << delay_us;
+    EXPECT_EQ(bench.heard.ended[0].r_waves, 3U) << delay_us;
+    ASSERT_EQ(bench.heard.triggers.size(), 10U) << delay_us;
+    for (std::uint32_t cycle = 0; cycle < 10; ++cycle) {
+      EXPECT_EQ(bench.heard.triggers[cycle].cycle, cycle);
+      EXPECT_EQ(bench.heard.triggers[cycle].seen, cycle < 3 ? 1 : 0) << cycle;
+    }
+  }
+}
+
+/// Polarity, height and length come from the settings in flash.
+TEST(Trigger, LooksAsTheSettingsSay) {
+  Bench bench;
+  bench.connect();
+  wire::WriteSettings write;
+  write.settings.ttl_active_low = 1;
+  write.settings.r_wave_uV = 10'000;
+  write.settings.r_wave_us = 60'000;
+  ASSERT_TRUE(bench.ask(write));
+  bench.prepare();
+  bench.add_segment(Waveform::parabolic, 3, 20'000'000, 1'000'000);
+  bench.rig.take_edges();
+  bench.run_program();
+  const auto edges = bench.rig.take_edges();
+  const auto ttl = edges_of(edges, Signal::TTL);
+  ASSERT_EQ(ttl.size(), 6U);
+  for (std::size_t i = 0; i < ttl.size(); ++i)
+    EXPECT_EQ(ttl[i].value, i % 2 == 0 ? 0 : 1) << "rests high, falls at the trigger";
+  const auto wave = edges_of(edges, Signal::RWAVE_uV);
+  ASSERT_FALSE(wave.empty());
+  EXPECT_NEAR(std::ranges::max(wave, {}, &Edge::value).value, 10'000, 200);
+  EXPECT_EQ((wave[299].tick - wave[0].tick).count, (r_wave_sample_period(60'000) * 299).count);
+  EXPECT_EQ(wave[0].tick, ttl[0].tick);
+
+  write.settings.r_wave_uV = 27'000;
+  EXPECT_FALSE(bench.ask(write));
+  EXPECT_EQ(bench.heard.naks.back().refusal, wire::Refusal::setting_out_of_range);
+  EXPECT_EQ(bench.heard.naks.back().allowed, 26'000);
+}
+
+TEST(Trigger, RWavesOfSixtyMillisecondsNeedMoreRoom) {
+  Bench bench;
+  bench.connect();
+  wire::WriteSettings write;
+  write.settings.r_wave_us = 60'000;
+  ASSERT_TRUE(bench.ask(write));
+  bench.prepare();
+  bench.add_segment(Waveform::parabolic, 3, 100'000, 50'000);
+  EXPECT_FALSE(bench.ask(wire::Arm::example()));
+  EXPECT_EQ(bench.heard.naks.back().limit, wire::Limit::r_wave_spacing);
+  EXPECT_EQ(bench.heard.naks.back().allowed, 60'001);
 }
 
 }  // namespace

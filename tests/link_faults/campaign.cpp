@@ -55,7 +55,7 @@ void make_report(std::uint32_t number, Message& message) {
     return put(message, batch);
   }
   put(message,
-      wire::Trigger{number, std::uint64_t{number} * 84'000'000, static_cast<std::uint8_t>(number % 2)});
+      wire::Trigger{number, std::uint64_t{number} * 84'000'000, static_cast<std::uint8_t>(number % 2), 1});
 }
 
 /// One end: sends messages in order, expects the other's in order.

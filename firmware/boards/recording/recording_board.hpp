@@ -53,6 +53,7 @@ class RecordingBoard {
   struct Memory {
     MemoryFlash flash;
     BlackBox::Memory retained{};
+    std::optional<CrashRecord> crash;  ///< of the start before
   };
   struct Options {
     Identity identity{1, 0x0000B007, wire::ResetCause::power_on};
@@ -60,6 +61,9 @@ class RecordingBoard {
     RunningImage image;
     std::uint32_t baud = 460'800;
     std::size_t serial_buffer_bytes = 2048;
+    std::uint32_t triggers_until_broken = 0;  ///< from that one on the TTL does not rise; 0: it always does
+    bool clock_sound = true;
+    bool supply_sound = true;
     std::shared_ptr<Memory> memory = std::make_shared<Memory>();
   };
   struct InterruptLock {
@@ -89,12 +93,21 @@ class RecordingBoard {
   void schedule_trigger(std::uint32_t tick, Ticks width, bool r_wave) {
     trigger_ = Trigger{whole_time(tick, now_), width, r_wave};
   }
+  [[nodiscard]] std::optional<std::uint32_t> ttl_rise(std::uint32_t tick) const {
+    if (!ttl_rose_ || ticks_between(tick, *ttl_rose_) < 0) return {};
+    return ttl_rose_;
+  }
+  void use_signals(const SignalSettings& signals) {
+    signals_ = signals;
+    r_wave_codes_ = r_wave_codes(signals.r_wave_uV);
+    set_ttl(false);
+  }
   void rest() {}
   void cancel_pulses() {
     order_.reset();
     trigger_.reset();
     direction_due_.reset();
-    set_pin(Signal::TTL, 0);
+    set_ttl(false);
   }
   void set_motor_enabled(bool enabled) { set_pin(Signal::ENABLE, enabled); }
   void show_fault(std::uint8_t number) { set_pin(Signal::FAULT, number); }
@@ -120,6 +133,9 @@ class RecordingBoard {
       to_host_.push_back({free += byte_time(), byte});
   }
   void feed_watchdog() {}
+  [[nodiscard]] bool clock_sound() const { return options_.clock_sound; }
+  [[nodiscard]] bool supply_sound() const { return options_.supply_sound; }
+  std::optional<CrashRecord> take_crash() { return std::exchange(options_.memory->crash, {}); }
   BlackBox::Memory& retained() { return options_.memory->retained; }
   MemoryFlash& settings_flash() { return options_.memory->flash; }
   [[nodiscard]] RunningImage running_image() const { return options_.image; }
@@ -209,6 +225,7 @@ class RecordingBoard {
     pin = value;
     if (recording_) edges_.push_back({now_, signal, value});
   }
+  void set_ttl(bool active) { set_pin(Signal::TTL, active != signals_.ttl_active_low ? 1 : 0); }
   void carry_out(const PulseOrder& order) {
     if (order.step) {
       set_pin(Signal::STEP, 1);
@@ -220,12 +237,16 @@ class RecordingBoard {
     if (order.ttl) raise_trigger(order.ttl_width, order.r_wave);
   }
   void raise_trigger(Ticks width, bool r_wave) {
-    set_pin(Signal::TTL, 1);
-    coming_.push({now_ + width, Signal::TTL, 0});
+    ttl_rose_.reset();
+    if (options_.triggers_until_broken > 0 && --options_.triggers_until_broken == 0) ttl_broken_ = true;
+    if (ttl_broken_) return;
+    ttl_rose_ = lower_half(now_);
+    set_ttl(true);
+    coming_.push({now_ + width, Signal::TTL, signals_.ttl_active_low ? 1 : 0});
     if (!r_wave) return;
     for (std::size_t i = 0; i < kRWaveSamples; ++i)
-      coming_.push({now_ + kRWaveSamplePeriod * static_cast<std::int64_t>(i), Signal::RWAVE_uV,
-                    static_cast<std::int32_t>(r_wave_uV(kRWaveCodes[i]))});
+      coming_.push({now_ + r_wave_sample_period(signals_.r_wave_us) * static_cast<std::int64_t>(i),
+                    Signal::RWAVE_uV, static_cast<std::int32_t>(r_wave_uV(r_wave_codes_[i]))});
   }
   /// Inflating the motor pushes it along; withdrawing, it comes along once the play is taken up.
   void move_load() {
@@ -241,6 +262,10 @@ class RecordingBoard {
   std::optional<PulseOrder> order_;
   Ticks order_due_;
   std::optional<Ticks> direction_due_;
+  std::optional<std::uint32_t> ttl_rose_;
+  bool ttl_broken_ = false;
+  SignalSettings signals_;
+  RWaveCodes r_wave_codes_ = r_wave_codes(SignalSettings().r_wave_uV);
   struct Trigger {
     Ticks due;
     Ticks width;

@@ -7,11 +7,17 @@ namespace diastole::stm32 {
 
 namespace {
 
+/// The first number after RNGEN is not to be used (RM0090 24.3.1); nor any that came with a seed or clock error.
 std::uint32_t random_number() {
-  constexpr std::uint32_t kEnable = 1U << 2, kReady = 1U << 0;
+  constexpr std::uint32_t kEnable = 1U << 2, kReady = 1U << 0, kErrors = 3U << 1;
   rng().CR.write(kEnable);
-  for (int wait = 0; wait < 10'000; ++wait)
-    if ((rng().SR.read() & kReady) != 0) return rng().DR.read();
+  int numbers = 0;
+  for (int wait = 0; wait < 10'000; ++wait) {
+    const std::uint32_t status = rng().SR.read();
+    if ((status & kReady) == 0) continue;
+    const std::uint32_t number = rng().DR.read();
+    if (++numbers > 1 && (status & kErrors) == 0) return number;
+  }
   return 0;
 }
 
@@ -20,9 +26,10 @@ std::uint32_t random_number() {
 wire::ResetCause take_reset_cause() {
   const std::uint32_t flags = rcc().CSR.read();
   rcc().CSR.set(1U << 24);
+  // Power-on first: the bootloader's reset for new option bytes comes before anybody has read the flags.
+  if ((flags & 1U << 27) != 0) return wire::ResetCause::power_on;
   if ((flags & (1U << 29 | 1U << 30)) != 0) return wire::ResetCause::watchdog;
   if ((flags & 1U << 28) != 0) return wire::ResetCause::software;
-  if ((flags & 1U << 27) != 0) return wire::ResetCause::power_on;
   if ((flags & 1U << 26) != 0) return wire::ResetCause::reset_pin;
   return wire::ResetCause::unknown;
 }

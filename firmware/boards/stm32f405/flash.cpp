@@ -1,6 +1,7 @@
 #include "firmware/boards/stm32f405/flash.hpp"
 
 #include "firmware/boards/stm32f405/registers.hpp"
+#include "firmware/boards/stm32f405/supply.hpp"
 
 namespace diastole::stm32 {
 
@@ -50,6 +51,7 @@ volatile std::uint32_t& word_at(std::uint32_t address) {
 }  // namespace
 
 FlashFault erase(const FlashSector& sector) {
+  if (!supply_suffices()) return FlashFault::supply_low;
   {
     const std::uint32_t control = kSectorErase | sector.number << 3;
     const Unlocked unlocked(control);
@@ -70,6 +72,7 @@ FlashFault program(std::uint32_t address, std::span<const std::uint32_t> words) 
       at += 4;
       if (place == word) continue;
       if ((place & word) != word) return FlashFault::not_erased;
+      if (!supply_suffices()) return FlashFault::supply_low;
       place = word;
       if (!Unlocked::done()) return FlashFault::refused;
     }

@@ -6,6 +6,8 @@
 // go on: an edge that is already scheduled happens, nothing follows it. Only at rest, and a sector's erase
 // only while the watchdog's period is longer than that.
 //
+// Before each operation the supply is asked for: what is begun below 2.7 V leaves cells that read now so, now so.
+//
 // Programming turns ones into zeros; only an erase turns zeros into ones. When power fails in the middle of
 // either, what it was writing is undefined: keep a checksum with everything.
 
@@ -21,6 +23,7 @@ enum class FlashFault : std::uint8_t {
   not_erased,  ///< a zero would have to become a one: erase the sector first
   refused,     ///< the interface set an error flag (write protection, sequence, alignment)
   not_taken,   ///< it reads back otherwise
+  supply_low,  ///< below what the flash needs (supply.hpp): nothing was begun
 };
 
 /// Makes every byte of the sector 0xFF.

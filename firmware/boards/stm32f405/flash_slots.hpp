@@ -3,6 +3,7 @@
 
 #include "firmware/boards/stm32f405/boot_identity.hpp"
 #include "firmware/boards/stm32f405/flash.hpp"
+#include "firmware/boards/stm32f405/supply.hpp"
 #include "firmware/boot/slot_store.hpp"
 
 namespace diastole::stm32 {
@@ -19,6 +20,7 @@ class FlashSlots {
     return bytes_of(sector_of(slot));
   }
   [[nodiscard]] std::span<const std::uint8_t> records() const { return bytes_of(kRecordSector); }
+  [[nodiscard]] bool supply_sound() const { return supply_suffices(); }
   bool erase_slot(wire::ImageSlot slot) { return erase(sector_of(slot)) == FlashFault::none; }
   bool erase_records() { return erase(kRecordSector) == FlashFault::none; }
   bool write_slot(wire::ImageSlot slot, std::size_t offset, std::span<const std::uint8_t> bytes) {

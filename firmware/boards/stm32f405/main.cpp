@@ -1,5 +1,6 @@
 // The application: the controller on the STM32F405.
 
+#include "firmware/boards/stm32f405/crash.hpp"
 #include "firmware/boards/stm32f405/pins.hpp"
 #include "firmware/boards/stm32f405/registers.hpp"
 #include "firmware/boards/stm32f405/step_path.hpp"
@@ -32,11 +33,14 @@ void DMA1_Stream5_IRQHandler() { board.r_wave_interrupt(); }
 
 void SysTick_Handler() { board.millisecond_interrupt(); }
 
-/// A processor fault or an interrupt that nobody enabled: motor off, and the watchdog starts anew.
-void Stray_Handler() {
+/// A processor fault, the crystal's failure, or an interrupt that nobody enabled: motor off, what is known of it kept, and
+/// the watchdog starts anew.
+void Stray_Handler(const std::uint32_t* frame) {
+  asm volatile("cpsid i" ::: "memory");
   diastole::stm32::gpio_b().BSRR.write(diastole::stm32::kEnablePin << 16);
-  diastole::stm32::tim2().CCER.write(0);
+  diastole::stm32::tim2().CCMR1.write(4U << 12);  // the TTL at rest, whichever level that is
   diastole::stm32::tim3().CCER.write(0);
+  diastole::stm32::keep_crash(frame);
   for (;;) {
   }
 }

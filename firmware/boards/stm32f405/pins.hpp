@@ -21,6 +21,7 @@
 
 namespace diastole::stm32 {
 
+inline constexpr std::uint32_t kTtlPin = 1U << 1;
 inline constexpr std::uint32_t kDirPin = 1U << 2;
 inline constexpr std::uint32_t kEnablePin = 1U << 0;
 inline constexpr std::uint32_t kFaultPin = 1U << 1;

@@ -18,7 +18,7 @@ void set_ttl_mode(Mode mode) { tim2().CCMR1.change(7U << 12, mode << 12); }
 void set_direction_mode(Mode mode) { tim2().CCMR2.change(7U << 4, mode << 4); }
 
 /// Flags are cleared by writing 0; writing 1 leaves them.
-void clear_flag(std::uint32_t flag) { tim2().SR.write(~flag); }
+void clear_flag(std::uint32_t flag) { tim2().SR.write(kTimerFlags & ~flag); }
 
 bool has_passed(std::uint32_t tick) { return static_cast<std::int32_t>(tim2().CNT.read() - tick) >= 0; }
 
@@ -29,7 +29,7 @@ void PulseTimer::start() {
   tim2().ARR.write(0xFFFF'FFFFU);
   set_ttl_mode(kLow);
   set_direction_mode(kLow);
-  tim2().CCER.write(1U << 4 | 1U << 8);
+  use(ttl_active_low_);
   tim2().EGR.write(1);
   clear_flag(kUpdate);
   tim2().DIER.write(kUpdate);
@@ -40,6 +40,13 @@ void PulseTimer::start() {
   tim2().CR2.write(5U << 4);  // TRGO = OC2REF, which the R-wave follows
   enable_interrupt(kTim2, 1);
 }
+
+void PulseTimer::use(bool ttl_active_low) {
+  ttl_active_low_ = ttl_active_low;
+  tim2().CCER.write(1U << 4 | 1U << 8 | (ttl_active_low ? 1U << 5 : 0U));
+}
+
+bool PulseTimer::ttl_is_active() const { return ((gpio_a().IDR.read() & kTtlPin) != 0) != ttl_active_low_; }
 
 Ticks PulseTimer::now() const {
   while (true) {
@@ -62,10 +69,25 @@ void PulseTimer::set_direction(bool inflate, std::uint32_t step_tick) {
 void PulseTimer::raise_ttl(std::uint32_t tick, Ticks width) {
   ttl_width_ = firmware::lower_half(width);
   ttl_rising_ = true;
+  ttl_seen_active_ = false;
   tim2().CCR2.write(tick);
   clear_flag(kCompare2);
   set_ttl_mode(kActiveOnMatch);
+  if (has_passed(tick) && (tim2().SR.read() & kCompare2) == 0) {
+    // The match has been missed: a late trigger, told as such, is better than none that is counted.
+    set_ttl_mode(kHigh);
+    tim2().CCR2.write(tim2().CNT.read());
+    tim2().EGR.write(kCompare2);
+  }
   tim2().DIER.set(kCompare2);
+}
+
+std::optional<std::uint32_t> PulseTimer::ttl_rise(std::uint32_t tick) const {
+  const bool active = ttl_rising_ ? ttl_is_active() : ttl_seen_active_;
+  const std::uint32_t captured = steps_.captured_trigger();
+  const std::int32_t late = firmware::ticks_between(tick, captured);
+  if (!active || late < 0) return {};
+  return late <= kSynchroniser ? tick : captured;
 }
 
 void PulseTimer::cancel() {
@@ -83,6 +105,7 @@ void PulseTimer::ttl_interrupt() {
     return;
   }
   ttl_rising_ = false;
+  ttl_seen_active_ = ttl_is_active();
   const std::uint32_t fall = tim2().CCR2.read() + ttl_width_;
   tim2().CCR2.write(fall);
   set_ttl_mode(kInactiveOnMatch);

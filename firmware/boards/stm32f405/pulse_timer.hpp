@@ -11,6 +11,7 @@
 
 #include <atomic>
 #include <cstdint>
+#include <optional>
 
 #include "firmware/boards/stm32f405/step_timer.hpp"
 #include "firmware/core/board.hpp"
@@ -20,6 +21,8 @@ namespace diastole::stm32 {
 class PulseTimer {
  public:
   void start();
+  /// Polarity of the TTL. Precondition: it is at rest.
+  void use(bool ttl_active_low);
   [[nodiscard]] firmware::Ticks now() const;
   [[nodiscard]] std::int32_t ticks_until(std::uint32_t tick) const {
     return firmware::ticks_between(tim2().CNT.read(), tick);
@@ -30,8 +33,11 @@ class PulseTimer {
     if (order.ttl) raise_ttl(order.tick, order.ttl_width);
     if (order.step && order.inflate != inflate_) set_direction(order.inflate, order.tick);
   }
-  /// Precondition: the TTL before has fallen.
+  /// A tick that has passed raises it at once. Precondition: the TTL before has fallen.
   void raise_ttl(std::uint32_t tick, firmware::Ticks width);
+  /// When the TTL ordered for `tick` rose: as captured, and if the pin was seen active. One that rose as ordered is captured
+  /// within kSynchroniser and has risen at `tick`.
+  [[nodiscard]] std::optional<std::uint32_t> ttl_rise(std::uint32_t tick) const;
   void rest() { steps_.rest(); }
   void cancel();
   /// TIM2's interrupt: the counter has wrapped, or the TTL is to fall.
@@ -41,10 +47,15 @@ class PulseTimer {
   void set_direction(bool inflate, std::uint32_t step_tick);
   void ttl_interrupt();
 
+  /// Ticks from a timer's trigger output to a capture by another, with room: 2 or 3 (RM0090 18.3.15).
+  static constexpr std::int32_t kSynchroniser = 6;
   StepTimer steps_;
   std::atomic<std::uint32_t> wraps_{0};
   bool ttl_rising_ = false;
+  bool ttl_seen_active_ = false;  ///< of the pin, in the interrupt of its rise
   bool inflate_ = false;
+  bool ttl_active_low_ = false;
+  [[nodiscard]] bool ttl_is_active() const;
   std::uint32_t ttl_width_ = 0;
 };
 

@@ -1,25 +1,15 @@
 #include "firmware/boards/stm32f405/r_wave_player.hpp"
 
-#include <array>
+#include <algorithm>
 
 #include "firmware/boards/stm32f405/registers.hpp"
 #include "firmware/core/r_wave.hpp"
 
 namespace diastole::stm32 {
 
-using firmware::kRWaveCodes;
-using firmware::kRWaveSamplePeriod;
 using firmware::kRWaveSamples;
 
 namespace {
-
-/// The DAC holds one code in advance, so the transfer that ends the wave brings one 0 more.
-constexpr std::array<std::uint16_t, kRWaveSamples> kFollowing = [] {
-  std::array<std::uint16_t, kRWaveSamples> codes{};
-  for (std::size_t i = 1; i < kRWaveSamples; ++i)
-    codes[i - 1] = kRWaveCodes[i];
-  return codes;
-}();
 
 constexpr std::uint32_t kStreamEnable = 1U << 0;
 constexpr std::uint32_t kDacDma = 1U << 12, kDacUnderrun = 1U << 13;
@@ -35,14 +25,20 @@ void RWavePlayer::start() {
   dac().DHR12R1.write(0);
   dac().CR.write(kEnable | kBufferOff | kTriggerEnable | kFromTim4 | kDacDma);
   tim4().PSC.write(0);
-  tim4().ARR.write(static_cast<std::uint32_t>(kRWaveSamplePeriod.count - 1));
+  tim4().ARR.write(reload_);
   tim4().CR2.write(2U << 4);   // TRGO = update
   tim4().SMCR.write(1U << 4);  // ITR1 = TIM2's TRGO, slave mode off
   enable_interrupt(kDma1Stream5, 3);
 }
 
+void RWavePlayer::use(const firmware::SignalSettings& signals) {
+  const firmware::RWaveCodes codes = firmware::r_wave_codes(signals.r_wave_uV);
+  std::ranges::copy(codes, codes_.begin());
+  reload_ = static_cast<std::uint32_t>(firmware::r_wave_sample_period(signals.r_wave_us).count - 1);
+}
+
 void RWavePlayer::arm() {
-  constexpr std::uint32_t kDacRequest = 7U << 25, kHalfWords = 1U << 11 | 1U << 13, kIncrement = 1U << 10,
+  constexpr std::uint32_t kDacRequest = 7U << 25, kWords = 2U << 11 | 2U << 13, kIncrement = 1U << 10,
                           kToPeripheral = 1U << 6, kCompleteInterrupt = 1U << 4;
   DmaStream& stream = dma1().stream[5];
   stream.CR.write(0);
@@ -54,12 +50,13 @@ void RWavePlayer::arm() {
   dac().SR.write(kDacUnderrun);
   dac().CR.set(kDacDma);
   stream.PAR.write(reinterpret_cast<std::uintptr_t>(&dac().DHR12R1));
-  stream.M0AR.write(reinterpret_cast<std::uintptr_t>(kFollowing.data()));
-  stream.NDTR.write(kFollowing.size());
-  dac().DHR12R1.write(kRWaveCodes[0]);
-  stream.CR.write(kDacRequest | kHalfWords | kIncrement | kToPeripheral | kCompleteInterrupt | kStreamEnable);
+  stream.M0AR.write(reinterpret_cast<std::uintptr_t>(&codes_[1]));
+  stream.NDTR.write(kRWaveSamples);
+  dac().DHR12R1.write(codes_[0]);
+  stream.CR.write(kDacRequest | kWords | kIncrement | kToPeripheral | kCompleteInterrupt | kStreamEnable);
   // The first update, and with it the first code, comes one tick after the trigger.
-  tim4().CNT.write(static_cast<std::uint32_t>(kRWaveSamplePeriod.count - 1));
+  tim4().ARR.write(reload_);
+  tim4().CNT.write(reload_);
   tim4().SMCR.change(7U, kTriggerMode);
 }
 

@@ -27,9 +27,13 @@ struct Rcc {  // RM0090 7.3
 static_assert(offsetof(Rcc, AHB1ENR) == 0x30 && offsetof(Rcc, CSR) == 0x74);
 
 struct FlashInterface {  // 3.9
-  Register ACR, KEYR, OPTKEYR, SR, CR;
+  Register ACR, KEYR, OPTKEYR, SR, CR, OPTCR;
 };
-static_assert(offsetof(FlashInterface, CR) == 0x10);
+static_assert(offsetof(FlashInterface, OPTCR) == 0x14);
+
+struct Power {  // 5.4
+  Register CR, CSR;
+};
 
 struct Gpio {  // 8.4
   Register MODER, OTYPER, OSPEEDR, PUPDR, IDR, ODR, BSRR, LCKR, AFR[2];
@@ -38,9 +42,12 @@ static_assert(offsetof(Gpio, AFR) == 0x20);
 
 struct Timer {  // 18.4
   Register CR1, CR2, SMCR, DIER, SR, EGR, CCMR1, CCMR2, CCER, CNT, PSC, ARR, reserved0, CCR1, CCR2, CCR3,
-      CCR4;
+      CCR4, BDTR, DCR, DMAR, OR;
 };
-static_assert(offsetof(Timer, CCR1) == 0x34);
+static_assert(offsetof(Timer, CCR1) == 0x34 && offsetof(Timer, OR) == 0x50);
+
+/// The flags of Timer::SR that there are: written as 1 they stay, as 0 they go; the bits between them are reserved.
+inline constexpr std::uint32_t kTimerFlags = 0x1E5F;
 
 struct Usart {  // 30.6
   Register SR, DR, BRR, CR1, CR2, CR3, GTPR;
@@ -88,7 +95,20 @@ struct Nvic {  // PM0214 4.3
 static_assert(offsetof(Nvic, IPR) == 0x300);
 
 struct SystemControl {  // PM0214 4.4
-  Register CPUID, ICSR, VTOR, AIRCR;
+  Register CPUID, ICSR, VTOR, AIRCR, SCR, CCR, SHPR[3], SHCSR, CFSR, HFSR, DFSR, MMFAR, BFAR;
+};
+static_assert(offsetof(SystemControl, BFAR) == 0x38);
+
+struct MemoryProtection {  // PM0214 4.2
+  Register TYPE, CTRL, RNR, RBAR, RASR;
+};
+
+struct Debug {  // RM0090 38.16
+  Register IDCODE, CR, APB1_FZ, APB2_FZ;
+};
+
+struct CycleCounter {  // ARMv7-M ARM C1.8
+  Register CTRL, CYCCNT;
 };
 
 template <class Peripheral>
@@ -98,6 +118,7 @@ Peripheral& at(std::uintptr_t address) {
 
 inline Rcc& rcc() { return at<Rcc>(0x4002'3800); }
 inline FlashInterface& flash() { return at<FlashInterface>(0x4002'3C00); }
+inline Power& power() { return at<Power>(0x4000'7000); }
 inline Gpio& gpio_a() { return at<Gpio>(0x4002'0000); }
 inline Gpio& gpio_b() { return at<Gpio>(0x4002'0400); }
 inline Gpio& gpio_c() { return at<Gpio>(0x4002'0800); }
@@ -105,6 +126,7 @@ inline Timer& tim2() { return at<Timer>(0x4000'0000); }
 inline Timer& tim3() { return at<Timer>(0x4000'0400); }
 inline Timer& tim4() { return at<Timer>(0x4000'0800); }
 inline Timer& tim5() { return at<Timer>(0x4000'0C00); }
+inline Timer& tim11() { return at<Timer>(0x4001'4800); }
 inline Usart& usart3() { return at<Usart>(0x4000'4800); }
 inline Dac& dac() { return at<Dac>(0x4000'7400); }
 inline Dma& dma1() { return at<Dma>(0x4002'6000); }
@@ -114,6 +136,11 @@ inline Iwdg& iwdg() { return at<Iwdg>(0x4000'3000); }
 inline Rng& rng() { return at<Rng>(0x5006'0800); }
 inline SysTick& systick() { return at<SysTick>(0xE000'E010); }
 inline SystemControl& system_control() { return at<SystemControl>(0xE000'ED00); }
+inline MemoryProtection& mpu() { return at<MemoryProtection>(0xE000'ED90); }
+inline Debug& debug() { return at<Debug>(0xE004'2000); }
+inline CycleCounter& cycle_counter() { return at<CycleCounter>(0xE000'1000); }
+/// DEMCR, ARMv7-M ARM C1.6.5.
+inline Register& debug_monitor() { return at<Register>(0xE000'EDFC); }
 inline Nvic& nvic() { return at<Nvic>(0xE000'E100); }
 
 /// Interrupt numbers, RM0090 table 62.

@@ -1,7 +1,9 @@
-// From reset to main(): floating-point unit, data, constructors; and the vector table.
+// From reset to main(): floating-point unit, data, memory protection, constructors; and the vector table.
 
 #include <cstddef>
 #include <cstdint>
+
+#include "firmware/boards/stm32f405/memory_guard.hpp"
 
 extern "C" {
 extern std::uint32_t __data_load, __data_start, __data_end, __bss_start, __bss_end, __stack_top;
@@ -9,17 +11,28 @@ extern void (*const __init_array_start[])();
 extern void (*const __init_array_end[])();
 
 int main();
-void Stray_Handler();
+/// A program's own: a processor fault, or an interrupt that nobody enabled. `frame` is the stack pointer at which the core
+/// has left the registers, or meant to; nothing that it stacks may be relied on. Does not return.
+[[noreturn]] void Stray_Handler(const std::uint32_t* frame);
 [[noreturn]] void Reset_Handler();
 [[noreturn]] void start();
 
+/// Begins the stack anew, for it may be the stack that is broken.
+[[gnu::naked]] void Stray_Entry() noexcept {
+  asm volatile(
+      "mov r0, sp          \n"
+      "ldr r1, =__stack_top \n"
+      "mov sp, r1          \n"
+      "b Stray_Handler     \n");
+}
+
 // A program defines the handlers of the interrupts that it enables.
-[[gnu::weak]] void TIM2_IRQHandler() { Stray_Handler(); }
-[[gnu::weak]] void TIM5_IRQHandler() { Stray_Handler(); }
-[[gnu::weak]] void USART3_IRQHandler() { Stray_Handler(); }
-[[gnu::weak]] void DMA1_Stream5_IRQHandler() { Stray_Handler(); }
-[[gnu::weak]] void EXTI_IRQHandler() { Stray_Handler(); }
-[[gnu::weak]] void SysTick_Handler() { Stray_Handler(); }
+[[gnu::weak, gnu::alias("Stray_Entry")]] void TIM2_IRQHandler() noexcept;
+[[gnu::weak, gnu::alias("Stray_Entry")]] void TIM5_IRQHandler() noexcept;
+[[gnu::weak, gnu::alias("Stray_Entry")]] void USART3_IRQHandler() noexcept;
+[[gnu::weak, gnu::alias("Stray_Entry")]] void DMA1_Stream5_IRQHandler() noexcept;
+[[gnu::weak, gnu::alias("Stray_Entry")]] void EXTI_IRQHandler() noexcept;
+[[gnu::weak, gnu::alias("Stray_Entry")]] void SysTick_Handler() noexcept;
 
 /// Nothing may use a floating-point register before the unit is on, not even a prologue; hence no C++ here.
 /// CPACR (0xE000ED88): full access to coprocessors 10 and 11.
@@ -40,6 +53,7 @@ void start() {
     *to++ = *from++;
   for (std::uint32_t* to = &__bss_start; to < &__bss_end;)
     *to++ = 0;
+  diastole::stm32::guard_memory();
   for (auto constructor = __init_array_start; constructor < __init_array_end; ++constructor)
     (*constructor)();
   main();
@@ -68,7 +82,7 @@ constexpr std::size_t of_interrupt(std::size_t number) { return 15 + number; }
 constexpr VectorTable make_vectors() {
   VectorTable table{&__stack_top, {}};
   for (Vector& handler : table.handlers)
-    handler = Stray_Handler;
+    handler = Stray_Entry;
   table.handlers[0] = Reset_Handler;
   table.handlers[14] = SysTick_Handler;
   table.handlers[of_interrupt(6)] = EXTI_IRQHandler;

@@ -26,12 +26,17 @@ class StepTimer {
   void let_go() {
     while ((tim5().CR1.read() & kCounting) == 0) {
     }
-    tim5().SMCR.write(0);
+    tim5().SMCR.write(kFromTim2);
+    tim5().CCMR1.write(kCaptureTrigger);
+    tim5().CCER.write(1U << 4);
   }
+  /// When the last TTL rose, on the count that both timers share. TIM5's channel 2 captures its internal trigger, TIM2's TRGO,
+  /// which is the reference that the pin follows (18.3.5; TRC). The synchroniser makes it some ticks late.
+  [[nodiscard]] std::uint32_t captured_trigger() const { return tim5().CCR2.read(); }
 
   /// Compare event at `tick`, with a pulse on STEP or without.
   void schedule(std::uint32_t tick, bool step) {
-    tim5().SR.write(~kCompare);
+    tim5().SR.write(kTimerFlags & ~kCompare);
     tim5().CCR1.write(tick - kPulseDelay);
     tim3().SMCR.write(step ? kStartedByTim5 : kFromTim5);
     tim5().DIER.write(kCompare);
@@ -40,12 +45,14 @@ class StepTimer {
   void rest() {
     tim3().SMCR.write(kFromTim5);
     tim5().DIER.write(0);
-    tim5().SR.write(~kCompare);
+    tim5().SR.write(kTimerFlags & ~kCompare);
   }
 
  private:
   static constexpr std::uint32_t kPulseDelay = 1;
   static constexpr std::uint32_t kCompare = 1U << 1, kCounting = 1U << 0;
+  static constexpr std::uint32_t kFromTim2 = 0U << 4;        ///< TS = ITR0, slave mode off
+  static constexpr std::uint32_t kCaptureTrigger = 3U << 8;  ///< CC2S = TRC
   /// TS = ITR2, and so for ever: it may not change while SMS is on, or an edge is seen that is none (18.4.3).
   static constexpr std::uint32_t kFromTim5 = 2U << 4;
   static constexpr std::uint32_t kStartedByTim5 = kFromTim5 | 6U;  ///< SMS: trigger mode

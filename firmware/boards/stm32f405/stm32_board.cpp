@@ -4,8 +4,10 @@
 
 #include "firmware/boards/stm32f405/boot_identity.hpp"
 #include "firmware/boards/stm32f405/clocks.hpp"
+#include "firmware/boards/stm32f405/crash.hpp"
 #include "firmware/boards/stm32f405/pins.hpp"
 #include "firmware/boards/stm32f405/registers.hpp"
+#include "firmware/boards/stm32f405/supply.hpp"
 #include "firmware/boards/stm32f405/watchdog.hpp"
 
 namespace diastole::stm32 {
@@ -21,17 +23,29 @@ namespace {
 }  // namespace
 
 void Stm32Board::start() {
-  start_clocks();
+  start_cycle_counter();
+  clock_sound_ = start_clocks() == ClockSource::crystal;
+  start_supply_detector();
   identity_ = read_identity();
   shown_fault = 0;
   configure_pins();
   timer_.start();
   r_wave_.start();
+  started_ = true;
+  if (signals_) use_signals(*signals_);
   serial_.start();
   for (const Interrupt input : {kExti0, kExti1, kExti2})
     enable_interrupt(input, 1);
   start_systick();
   start_watchdog(WatchdogPeriod::strict);
+}
+
+/// Settings are read before the clocks run: they count from start() on.
+void Stm32Board::use_signals(const firmware::SignalSettings& signals) {
+  signals_ = signals;
+  if (!started_) return;
+  timer_.use(signals.ttl_active_low);
+  r_wave_.use(signals);
 }
 
 void Stm32Board::prepare_r_wave(bool play) {
@@ -61,6 +75,10 @@ firmware::Inputs Stm32Board::inputs() const {
 }
 
 firmware::BlackBox::Memory& Stm32Board::retained() { return retained_memory; }
+
+std::optional<firmware::CrashRecord> Stm32Board::take_crash() { return stm32::take_crash(); }
+
+bool Stm32Board::supply_sound() const { return supply_suffices(); }
 
 void Stm32Board::feed_watchdog() { stm32::feed_watchdog(); }
 

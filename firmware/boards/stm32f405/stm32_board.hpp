@@ -41,6 +41,7 @@ class Stm32Board {
   /// Clocks, pins, timers, serial port, watchdog (250 ms). Call before anything else.
   void start();
 
+  void use_signals(const firmware::SignalSettings& signals);
   [[nodiscard]] firmware::Ticks now() const { return timer_.now(); }
   [[nodiscard]] std::int32_t ticks_until(std::uint32_t tick) const { return timer_.ticks_until(tick); }
   void schedule(const firmware::PulseOrder& order) {
@@ -50,6 +51,9 @@ class Stm32Board {
   void schedule_trigger(std::uint32_t tick, firmware::Ticks width, bool r_wave) {
     prepare_r_wave(r_wave);
     timer_.raise_ttl(tick, width);
+  }
+  [[nodiscard]] std::optional<std::uint32_t> ttl_rise(std::uint32_t tick) const {
+    return timer_.ttl_rise(tick);
   }
   void rest() { timer_.rest(); }
   void cancel_pulses();
@@ -61,7 +65,10 @@ class Stm32Board {
   [[nodiscard]] std::size_t serial_room() const { return serial_.room(); }
   void serial_write(std::span<const std::uint8_t> bytes) { serial_.write(bytes); }
   void feed_watchdog();
+  [[nodiscard]] bool clock_sound() const { return clock_sound_; }
+  [[nodiscard]] bool supply_sound() const;
   firmware::BlackBox::Memory& retained();
+  std::optional<firmware::CrashRecord> take_crash();
   SettingsFlash& settings_flash() { return settings_flash_; }
   [[nodiscard]] firmware::RunningImage running_image() const { return stm32::running_image(); }
   bool confirm_image() { return confirm_running_image(); }
@@ -87,6 +94,8 @@ class Stm32Board {
   SerialPort serial_;
   SettingsFlash settings_flash_;
   firmware::Identity identity_;
+  std::optional<firmware::SignalSettings> signals_;  ///< nothing, so that the board has no initial data
+  bool clock_sound_ = false, started_ = false;
   std::atomic<bool> turn_due_{false};
 };
 

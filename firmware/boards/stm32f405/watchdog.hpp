@@ -28,7 +28,9 @@ inline void set_watchdog(WatchdogPeriod period) {
   feed_watchdog();
 }
 
+/// It stands still while a debugger has stopped the core (DBG_IWDG_STOP, RM0090 38.16.4).
 inline void start_watchdog(WatchdogPeriod period) {
+  debug().APB1_FZ.set(1U << 12);
   iwdg().KR.write(0xCCCC);
   set_watchdog(period);
 }

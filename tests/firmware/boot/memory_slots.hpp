@@ -1,6 +1,7 @@
 #pragma once
 // Slots and records in this machine's memory, with the flash's manners: ones become zeros, an erase makes all
-// ones, and the power can fail in the middle of any operation, which then is half done.
+// ones, and the power can fail in the middle of any operation, which then is half done. A sector whose erase was cut off
+// keeps weak cells until it is erased to the end: some of its ones later read as zeros (let_weak_cells_fall).
 
 #include <random>
 #include <vector>
@@ -26,8 +27,9 @@ class MemorySlots {
   }
   [[nodiscard]] std::span<const std::uint8_t> slot(ImageSlot slot) const { return slots_[index(slot)]; }
   [[nodiscard]] std::span<const std::uint8_t> records() const { return records_; }
-  bool erase_slot(ImageSlot slot) { return erase(slots_[index(slot)]); }
-  bool erase_records() { return erase(records_); }
+  [[nodiscard]] bool supply_sound() const { return supply_sound_; }
+  bool erase_slot(ImageSlot slot) { return erase(slots_[index(slot)], weak_[index(slot)]); }
+  bool erase_records() { return erase(records_, weak_[2]); }
   bool write_slot(ImageSlot slot, std::size_t offset, std::span<const std::uint8_t> bytes) {
     return write(slots_[index(slot)], offset, bytes);
   }
@@ -41,6 +43,20 @@ class MemorySlots {
     cut_at_ = operations_ + operation;
     random_.seed(seed);
   }
+  /// Every erase that is cut off leaves its sector reading blank.
+  void cut_erases_late() { late_ = true; }
+  /// Weak cells that hold a one read as zeros from now on, one in a thousand.
+  void let_weak_cells_fall() {
+    const auto fall = [this](Bytes& sector, bool weak) {
+      if (!weak) return;
+      for (std::uint8_t& byte : sector)
+        if (random_() % 125 == 0) byte = static_cast<std::uint8_t>(byte & ~(1U << random_() % 8));
+    };
+    for (std::size_t i = 0; i < 2; ++i)
+      fall(slots_[i], weak_[i]);
+    fall(records_, weak_[2]);
+  }
+  void set_supply_sound(bool sound) { supply_sound_ = sound; }
   void never_cut_power() { cut_at_ = 0; }
   [[nodiscard]] std::uint64_t operations() const { return operations_; }
   std::vector<std::uint8_t>& bytes(ImageSlot slot) { return slots_[index(slot)]; }
@@ -51,10 +67,12 @@ class MemorySlots {
   static std::size_t index(ImageSlot slot) { return static_cast<std::size_t>(slot); }
   bool cut_now() { return ++operations_ == cut_at_; }
 
-  bool erase(Bytes& sector) {
-    if (cut_now()) {
+  bool erase(Bytes& sector, bool& weak) {
+    weak = cut_now();
+    if (weak) {
       // Some stretch of it is erased, the rest as it was.
-      const std::size_t from = random_() % sector.size(), to = from + random_() % (sector.size() - from);
+      const std::size_t from = late_ ? 0 : random_() % sector.size(),
+                        to = late_ ? sector.size() : from + random_() % (sector.size() - from);
       std::fill(sector.begin() + static_cast<std::ptrdiff_t>(from),
                 sector.begin() + static_cast<std::ptrdiff_t>(to), std::uint8_t{0xFF});
       throw PowerCut{};
@@ -82,6 +100,8 @@ class MemorySlots {
 
   std::array<Bytes, 2> slots_;
   Bytes records_;
+  std::array<bool, 3> weak_{};  ///< slots, records
+  bool late_ = false, supply_sound_ = true;
   std::uint64_t operations_ = 0, cut_at_ = 0;
   std::mt19937 random_;
 };

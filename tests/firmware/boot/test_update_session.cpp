@@ -157,6 +157,60 @@ TEST(UpdateSession, AnotherImageStartsAnew) {
   EXPECT_EQ(sent_bytes, other.code.size());
 }
 
+/// What an update that is cut off in the middle of its erases, at each of its first operations, leaves behind.
+TEST(UpdateSession, ErasesASlotAgainThatMerelyReadsBlank) {
+  const TestImage newer = make_image(60'000, {0, 1, 1}, 12);
+  int weak_slots = 0;
+  for (std::uint64_t cut = 1; cut <= 12; ++cut) {
+    MemorySlots slots = factory_new();
+    ASSERT_EQ(install(slots, make_image(4096, {0, 1, 1}, 11)), UpdateOutcome::done);
+    (void)start(slots);  // tried, and never confirmed
+    slots.cut_erases_late();
+    slots.cut_power_at(cut, static_cast<std::uint32_t>(cut));
+    ASSERT_THROW((void)install(slots, newer), PowerCut);
+    slots.never_cut_power();
+    weak_slots += boot::is_erased(slots.slot(ImageSlot::b)) ? 1 : 0;
+    EXPECT_EQ(decide(slots).start, ImageSlot::a) << cut;
+    ASSERT_EQ(install(slots, newer), UpdateOutcome::done) << cut;
+    slots.let_weak_cells_fall();
+    EXPECT_TRUE(inspect(slots, ImageSlot::b).verified) << "cells that were never wholly erased, cut " << cut;
+  }
+  EXPECT_GE(weak_slots, 1) << "no cut hit the erase";
+}
+
+TEST(UpdateSession, AHalfErasedSlotIsNotResumedThoughItsHeaderStands) {
+  const TestImage held = make_image(4096, {0, 1, 1}, 13);
+  MemorySlots slots = factory_new();
+  ASSERT_EQ(install(slots, held), UpdateOutcome::done);
+  // The erase for another image began, and what stood there reads as before.
+  ASSERT_TRUE(append(slots, {BootEvent::erase_begun, ImageSlot::b, {}}));
+  EXPECT_EQ(decide(slots).state[1], ImageState::empty);
+  EXPECT_EQ(decide(slots).start, ImageSlot::a);
+  std::size_t sent_bytes = 0;
+  ASSERT_EQ(install(slots, held, &sent_bytes), UpdateOutcome::done);
+  EXPECT_EQ(sent_bytes, held.code.size());
+}
+
+TEST(UpdateSession, TouchesNoFlashWhileTheSupplyIsLow) {
+  MemorySlots slots = factory_new();
+  const TestImage newer = make_image(512, {0, 1, 1}, 14);
+  UpdateSession session(slots);
+  slots.set_supply_sound(false);
+  const std::uint64_t before = slots.operations();
+  EXPECT_EQ(session.begin(begin_of(newer.header[1])).outcome, UpdateOutcome::supply_low);
+  EXPECT_EQ(slots.operations(), before);
+  slots.set_supply_sound(true);
+  ASSERT_EQ(session.begin(begin_of(newer.header[1])).outcome, UpdateOutcome::done);
+  slots.set_supply_sound(false);
+  const std::uint64_t begun = slots.operations();
+  wire::UpdateData data;
+  data.count = 4;
+  EXPECT_EQ(session.add(data).outcome, UpdateOutcome::supply_low);
+  EXPECT_EQ(slots.operations(), begun);
+  slots.set_supply_sound(true);
+  ASSERT_EQ(install(slots, newer), UpdateOutcome::done) << "nothing was lost";
+}
+
 TEST(UpdateSession, ManyUpdatesOutliveTheRecordSector) {
   MemorySlots slots = factory_new(old_image, 64 * boot::kRecordBytes);
   for (std::uint32_t round = 0; round < 200; ++round) {

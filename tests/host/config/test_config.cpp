@@ -34,6 +34,10 @@ TEST(RigConfig, TheExampleGivesThePapersPump) {
   const RigConfig rig = rig_from(example("rig.toml"));
   EXPECT_NEAR(rig.microstep_mL, 7.7916e-3, 1e-6);
   EXPECT_NEAR(rig.hose_inertance_kg_m4, 4.44e7, 1e5);
+  // 1 L/s: 8.84 m/s, Re 1.07e5 at 1005 kg/m3; f 0.0175 over 417 bores, K 1.5.
+  EXPECT_NEAR(rig.hose_losses.turbulent_Pa, 0.3164 / std::pow(1.066e5, 0.25) * 416.7 * 39.29e3, 3e3);
+  EXPECT_NEAR(rig.hose_losses.minor_Pa, 1.5 * 39.29e3, 300);
+  EXPECT_EQ(rig.controller.limits.cavity_kPa, 6);
   EXPECT_EQ(rig.daq.channels.at(0).name, "cavity");
   EXPECT_EQ(std::get<int64_t>(rig.attributes.at("microsteps")), 8);
 }

@@ -99,9 +99,13 @@ TEST(Flashing, GoesOnAfterAnInterruption) {
 TEST(Flashing, ADryRunChangesNothing) {
   NEEDS_UPDATE_IMAGES();
   FlashBench bench;
+  ASSERT_EQ(bench.runs(), "0.1.0 confirmed");
+  const BoardStatistics before = bench.board().statistics();
+  EXPECT_EQ(before.flash_operations, 1U) << "the option bytes, once in a chip's life";
+  EXPECT_EQ(before.resets.size(), 3U) << "for them, and the bootloader's two passes";
   EXPECT_EQ(bench.flash(newer_update, {.dry_run = true}).end, UpdateEnd::dry_run);
-  EXPECT_EQ(bench.board().statistics().flash_operations, 0U);
-  EXPECT_EQ(bench.board().statistics().resets.size(), 2U) << "the bootloader's two passes";
+  EXPECT_EQ(bench.board().statistics().flash_operations, before.flash_operations);
+  EXPECT_EQ(bench.board().statistics().resets.size(), before.resets.size());
 }
 
 TEST(Flashing, ADeadApplicationIsReplacedThroughTheWindowAfterAReset) {

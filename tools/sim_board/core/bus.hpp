@@ -1,5 +1,6 @@
 #pragma once
-// The peripheral bus: which device answers at an address, and whether its clock is on.
+// The peripheral bus: which device answers at an address, whether its clock is on, and what the vendor's description says
+// to the access.
 
 #include <cstdint>
 #include <cstdio>
@@ -10,6 +11,7 @@
 
 #include "tools/sim_board/core/device.hpp"
 #include "tools/sim_board/core/notes.hpp"
+#include "tools/sim_board/core/register_facts.hpp"
 
 namespace diastole::board_model {
 
@@ -47,12 +49,14 @@ class Bus {
   uint32_t read(uint32_t address, uint32_t bytes) {
     const Place* place = find(address, "read");
     if (place == nullptr) return 0;
+    if (auto wrong = judge_.read(address, bytes)) notes_.add(*wrong);
     const uint32_t word = place->device->read((address - place->base) & ~3U);
     return (word >> (8 * (address & 3))) & width_mask(bytes);
   }
   void write(uint32_t address, uint32_t value, uint32_t bytes) {
     const Place* place = find(address, "write");
     if (place == nullptr) return;
+    if (auto wrong = judge_.write(address, value, bytes)) notes_.add(*wrong);
     const uint32_t shift = 8 * (address & 3);
     place->device->write((address - place->base) & ~3U, value << shift, width_mask(bytes) << shift);
   }
@@ -106,6 +110,7 @@ class Bus {
   static constexpr uint32_t private_blocks = 0x10'0000 / block_bytes;
 
   Notes& notes_;
+  RegisterJudge judge_;
   std::function<bool(ClockGate)> clocked_;
   std::vector<Place> places_;
   std::vector<uint32_t> by_block_ = std::vector<uint32_t>(peripheral_blocks + private_blocks, no_place);

@@ -41,7 +41,8 @@ class Gpio final : public RegisterBlock {
   void reset() override {
     moder_ = mode_after_reset(port_);
     pupdr_ = pulls_after_reset(port_);
-    otyper_ = ospeedr_ = odr_ = lckr_ = 0;
+    ospeedr_ = port_ == 0 ? 0x0c00'0000 : port_ == 1 ? 0xc0 : 0;  // the debug pins
+    otyper_ = odr_ = lckr_ = 0;
     alternate_.fill(0);
     configured();
   }

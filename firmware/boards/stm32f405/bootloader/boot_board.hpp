@@ -9,7 +9,7 @@ namespace diastole::stm32 {
 
 class BootBoard : public FlashSlots {
  public:
-  /// Clocks, outputs off, serial port, a clock of milliseconds.
+  /// Clocks, outputs off, option bytes as they must be, serial port, a clock of milliseconds.
   void start(std::uint32_t starts);
 
   [[nodiscard]] std::uint64_t now_us() const { return std::uint64_t{milliseconds_} * 1000; }

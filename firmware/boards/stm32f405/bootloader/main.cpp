@@ -41,7 +41,7 @@ void USART3_IRQHandler() { board.serial_interrupt(); }
 void SysTick_Handler() { board.tick(); }
 
 /// A processor fault or an interrupt that nobody enabled: start anew.
-void Stray_Handler() { reset(); }
+void Stray_Handler(const std::uint32_t*) { reset(); }
 
 int main() {
   HandOver hand_over = read_hand_over().value_or(HandOver{});

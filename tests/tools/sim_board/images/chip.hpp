@@ -42,7 +42,7 @@ inline void clock_168_MHz() {
   rcc.cr |= 1 << 16;
   while (!(rcc.cr & 1 << 17)) {
   }
-  rcc.pllcfgr = 8 | 336 << 6 | 0 << 16 | 1 << 22 | 7 << 24;
+  rcc.pllcfgr = 8 | 336 << 6 | 0 << 16 | 1 << 22 | 7 << 24 | 2 << 28;
   rcc.cr |= 1 << 24;
   while (!(rcc.cr & 1 << 25)) {
   }

@@ -8,7 +8,7 @@ constexpr uint32_t half_period_ticks = 84'000'000 / 60'000;
 }
 
 extern "C" void tim3_irq() {
-  tim3.sr = ~2U;
+  tim3.sr = 0x1e5f & ~2U;
   tim3.ccr[0] = tim3.ccr[0] + half_period_ticks;
   seen[0] = seen[0] + 1;
 }
