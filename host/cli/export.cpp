@@ -1,15 +1,20 @@
+#include <fmt/chrono.h>
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cctype>
+#include <ctime>
 #include <filesystem>
 #include <memory>
+#include <nlohmann/json.hpp>
+#include <set>
 
 #include "host/cli/daemon_question.hpp"
 #include "host/cli/host_commands.hpp"
 #include "host/journal/part_file.hpp"
 #include "host/runfile/bids_export.hpp"
 #include "host/runfile/output_guard.hpp"
+#include "host/runfile/ro_crate.hpp"
 #include "protocol/contract/input_error.hpp"
 #include "protocol/runfile/reader.hpp"
 
@@ -17,12 +22,16 @@ namespace diastole {
 namespace {
 
 namespace fs = std::filesystem;
+using nlohmann::json;
 
 struct ExportOptions {
-  fs::path run;
-  fs::path directory;
+  std::vector<fs::path> runs;
+  fs::path bids;
   std::string subject = "01";
   std::string task;
+  fs::path crate;
+  std::vector<fs::path> also;
+  std::string license;
   bool force = false;
 };
 
@@ -44,30 +53,134 @@ std::string task_of(const fs::path& run) {
   return task.empty() ? "run" : task;
 }
 
-ExitCode export_run(const ExportOptions& options, const CommandOutput& out) {
-  const std::string task = options.task.empty() ? task_of(options.run) : label("--task", options.task);
+void make_folder(const fs::path& folder) {
+  std::error_code error;
+  fs::create_directories(folder, error);
+}
+
+/// One run's table and description, which are not there yet.
+struct BidsFiles {
+  fs::path table;
+  fs::path description;
+};
+
+BidsFiles bids_files(const ExportOptions& options, const runfile::RecordedRun& run) {
+  const std::string task = options.task.empty() ? task_of(run.file) : label("--task", options.task);
   const fs::path stem =
-      options.directory / fmt::format("sub-{}_task-{}_physio", label("--subject", options.subject), task);
-  const fs::path table = stem.string() + ".tsv.gz", description = stem.string() + ".json";
-  const runfile::RecordedRun run = runfile::read_run(options.run);
+      options.bids / fmt::format("sub-{}_task-{}_physio", label("--subject", options.subject), task);
+  BidsFiles files{stem.string() + ".tsv.gz", stem.string() + ".json"};
   if (run.pressure.time_s.size() < 2) {
     throw InputError({run.file, "dataset /pressure/time_s", "holds fewer than two samples",
                       "There is nothing to export."});
   }
-  std::error_code error;
-  fs::create_directories(options.directory, error);
-  require_new_file(table, options.force);
-  require_new_file(description, options.force);
+  require_new_file(files.table, options.force);
+  require_new_file(files.description, options.force);
+  return files;
+}
+
+json write_bids(const BidsFiles& files, const runfile::RecordedRun& run) {
   const BidsRecording recording = bids_recording(run);
-  write_text_file(table, gzip(recording.table));
-  write_text_file(description, recording.description.dump(2) + "\n");
-  print(out,
-        {{"run", options.run.string()},
-         {"table", table.string()},
-         {"description", description.string()},
-         {"columns", recording.description.at("Columns")},
-         {"rows", run.pressure.time_s.size()}},
-        [&] { fmt::print("{}\n{}\n", table.string(), description.string()); });
+  write_text_file(files.table, gzip(recording.table));
+  write_text_file(files.description, recording.description.dump(2) + "\n");
+  return {{"run", run.file},
+          {"table", files.table.string()},
+          {"description", files.description.string()},
+          {"columns", recording.description.at("Columns")},
+          {"rows", run.pressure.time_s.size()}};
+}
+
+constexpr const char* metadata_file = "ro-crate-metadata.json";
+
+/// The names that files get in the crate. Throws InputError if two would have the same, or one is there already.
+std::vector<fs::path> crated_names(const ExportOptions& options) {
+  std::vector<fs::path> names{metadata_file};
+  for (const fs::path& run : options.runs) {
+    names.push_back(run.filename());
+    names.push_back(run.stem().stem().string() + ".experiment.toml");
+  }
+  for (const fs::path& file : options.also) {
+    std::error_code missing;
+    if (!fs::exists(file, missing))
+      throw InputError({file.string(), "--also", "is not there", "Name a file or a folder."});
+    names.push_back((file.filename().empty() ? file.parent_path() : file).filename());
+  }
+  std::set<fs::path> taken;
+  for (const fs::path& name : names) {
+    if (!taken.insert(name).second)
+      throw InputError({name.string(), "", "is the name of two files of the crate", "Rename one of them."});
+    std::error_code missing;
+    if (!options.force && fs::exists(options.crate / name, missing))
+      throw InputError({(options.crate / name).string(), "", "exists already",
+                        "Choose another folder, or --force to replace it."});
+  }
+  return names;
+}
+
+fs::path write_crate(const ExportOptions& options, const std::vector<runfile::RecordedRun>& runs) {
+  Crate crate{.title = fmt::format("Diastole session of {}", runs.front().started_utc),
+              .published_utc = fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr))),
+              .runs = {},
+              .others = {}};
+  if (!options.license.empty()) crate.license = options.license;
+  for (size_t i = 0; i < runs.size(); ++i) {
+    const fs::path& file = options.runs[i];
+    crate.runs.push_back({file.filename().string(), file.stem().stem().string() + ".experiment.toml", runs[i],
+                          runfile::read_session(file)});
+    copy_durably(file, options.crate / crate.runs.back().name);
+    write_text_file(options.crate / crate.runs.back().experiment, runs[i].protocol_toml);
+  }
+  for (const fs::path& file : options.also) {
+    const bool is_folder = fs::is_directory(file);
+    const std::string name = (file.filename().empty() ? file.parent_path() : file).filename().string();
+    if (is_folder) {
+      fs::copy(file, options.crate / name,
+               fs::copy_options::recursive | fs::copy_options::overwrite_existing);
+    } else {
+      copy_durably(file, options.crate / name);
+    }
+    crate.others.push_back({is_folder ? name + "/" : name, name});
+  }
+  // Last: a folder without it is no crate.
+  write_text_file(options.crate / metadata_file, ro_crate(crate, options.crate).dump(2) + "\n");
+  return options.crate / metadata_file;
+}
+
+ExitCode export_runs(const ExportOptions& options, const CommandOutput& out) {
+  if (options.bids.empty() && options.crate.empty())
+    throw InputError(
+        {"", "export", "nothing to export to", "Give --bids FOLDER, --ro-crate FOLDER or both."});
+  if (options.runs.size() > 1 && !options.task.empty())
+    throw InputError(
+        {"", "--task", "is one label for several runs", "Leave it out: each run gets its file's name."});
+  std::vector<runfile::RecordedRun> runs;
+  for (const fs::path& file : options.runs)
+    runs.push_back(runfile::read_run(file));
+  std::vector<BidsFiles> files;
+  if (!options.bids.empty()) {
+    make_folder(options.bids);
+    for (const runfile::RecordedRun& run : runs)
+      files.push_back(bids_files(options, run));
+  }
+  if (!options.crate.empty()) {
+    make_folder(options.crate);
+    (void)crated_names(options);
+  }
+  json document{{"bids", json::array()}, {"ro_crate", nullptr}};
+  for (size_t i = 0; i < files.size(); ++i)
+    document["bids"].push_back(write_bids(files[i], runs[i]));
+  try {
+    if (!options.crate.empty()) document["ro_crate"] = write_crate(options, runs).string();
+  } catch (const fs::filesystem_error& error) {
+    throw HardwareError(options.crate.string(), error.what(),
+                        "Check the space on the disk and that you may write there.");
+  }
+  // A single run's table, as it was told before there were crates.
+  if (files.size() == 1) document.update(document["bids"].front());
+  print(out, document, [&] {
+    for (const BidsFiles& each : files)
+      fmt::print("{}\n{}\n", each.table.string(), each.description.string());
+    if (!options.crate.empty()) fmt::print("{}\n", document["ro_crate"].get<std::string>());
+  });
   return ExitCode::done;
 }
 
@@ -76,16 +189,23 @@ ExitCode export_run(const ExportOptions& options, const CommandOutput& out) {
 void add_export(CommandLine& line) {
   auto options = std::make_shared<ExportOptions>();
   CLI::App* command = line.add(
-      "export", "a run as a BIDS physiological recording",
+      "export", "runs as BIDS physiological recordings, or a session as an RO-Crate",
       "  diastole export gel.run.h5 --bids study/sub-01/func --subject 01 --task gel\n"
       "      writes sub-01_task-gel_physio.tsv.gz and .json into that directory: pressures, commanded\n"
-      "      volume and triggers, one row a sample; what is missing is n/a");
-  command->add_option("RUN", options->run, "run file")->required();
-  command->add_option("--bids", options->directory, "directory to write into; made if absent")->required();
+      "      volume and triggers, one row a sample; what is missing is n/a\n"
+      "  diastole export gel.run.h5 sweep.run.h5 --also gel.fit.json --also dicom/ --ro-crate gel-7\n"
+      "      a folder with copies of all and ro-crate-metadata.json (JSON-LD): what each file is, when, by\n"
+      "      whom and with what it was made, the rig's properties, specimen and notes");
+  command->add_option("RUN", options->runs, "run files")->required();
+  command->add_option("--bids", options->bids, "directory to write into; made if absent");
   command->add_option("--subject", options->subject, "BIDS subject label")->capture_default_str();
   command->add_option("--task", options->task, "BIDS task label; default: the run file's name");
+  command->add_option("--ro-crate", options->crate, "directory of the crate; made if absent");
+  command->add_option("--also", options->also,
+                      "a file or folder that goes into the crate, too; may be repeated");
+  command->add_option("--license", options->license, "address of the crate's licence, as an SPDX page");
   command->add_flag("--force", options->force, "replace files that exist");
-  line.on_run(command, [options](const CommandOutput& out) { return export_run(*options, out); });
+  line.on_run(command, [options](const CommandOutput& out) { return export_runs(*options, out); });
 }
 
 }  // namespace diastole

@@ -7,6 +7,7 @@
 
 #include "host/cli/daemon_question.hpp"
 #include "host/cli/host_commands.hpp"
+#include "host/cli/session_facts.hpp"
 #include "protocol/contract/named_members.hpp"
 #include "protocol/runfile/reader.hpp"
 #include "protocol/runfile/soundness.hpp"
@@ -99,6 +100,7 @@ json as_json(const runfile::RecordedRun& run, const runfile::Soundness& soundnes
                 {"gaps", soundness.pressure.missing + soundness.pump.missing + run.missing("trigger")},
                 {"gap_records", run.gaps.size()},
                 {"events", run.events.size()},
+                {"session", session_json(runfile::read_session(run.file))},
                 {"sound", soundness.sound()}};
   document["channels"] = json::object();
   for (const auto& [name, values_kPa] : run.pressure.channels) {
@@ -168,6 +170,7 @@ void show_triggers(const runfile::RecordedRun& run, const runfile::Soundness& so
 
 void show(const runfile::RecordedRun& run, const runfile::Soundness& soundness) {
   fmt::print("{}\n  run {} of {}, by {}\n", run.file, run.run_id, run.started_utc, run.producer);
+  fmt::print("{}", session_words(runfile::read_session(run.file)));
   for (size_t i = 0; i < run.segments.size(); ++i) {
     const runfile::Segment& s = run.segments[i];
     fmt::print("  segment {}: {} x {} of {:g} mL in {:g} s from {:.3f} s, offset {:g} mL{}\n", i, s.cycles,

@@ -6,11 +6,13 @@
 #include <array>
 #include <csignal>
 #include <cstdio>
+#include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
 
 #include "host/cli/daemon_question.hpp"
 #include "host/cli/host_commands.hpp"
+#include "host/cli/session_facts.hpp"
 #include "host/cli/session_view.hpp"
 #include "host/config/experiment.hpp"
 #include "host/rpc/run_session.hpp"
@@ -25,6 +27,7 @@ struct RunOptions {
   SessionOptions session;
   DaemonAddress daemon;
   bool dry_run = false;
+  bool asks = true;
 };
 
 /// How many lines were entered since the last question; never waits.
@@ -51,6 +54,8 @@ ExitCode run(RunOptions options, const CommandOutput& out) {
     throw InputError({"", "-o", "is missing", "Name the run file to write, for example -o session.run.h5."});
   }
   DaemonClient daemon = options.daemon.connect();
+  if (options.asks && isatty(STDIN_FILENO) != 0 && isatty(STDERR_FILENO) != 0)
+    ask_for(options.session.facts, std::cin, stderr);
   fmt::print(stderr, "{}", plan_words(experiment));
   SessionView view(isatty(STDERR_FILENO) != 0);
   if (isatty(STDIN_FILENO) != 0) {
@@ -82,12 +87,19 @@ void add_run(CommandLine& line) {
       "  diastole run gel.experiment.toml -o gel.run.h5 --json > gel.json\n"
       "  diastole run study.experiment.toml --dry-run\n"
       "      what it will do and how long it takes; nothing moves, and no daemon is needed\n"
+      "  diastole run gel.experiment.toml -o gel.run.h5 --specimen gel-7 --operator Jo --room-temperature-C "
+      "21.5\n"
+      "      kept in the run file, and found again by `diastole runs specimen=gel-7`; in a terminal it asks "
+      "for\n"
+      "      what is not given, and Enter leaves it open\n"
       "A study with prompts goes on when you press Enter, or with `diastole continue` from anywhere.\n"
       "Exit code 1: samples are missing; 3: a fault or a broken link ended the run.");
   command->add_option("EXPERIMENT", options->session.experiment, "experiment file (.toml)")->required();
   command->add_option("-o,--output", options->session.output, "run file to write");
   command->add_flag("--dry-run", options->dry_run, "only tell what would be done");
   command->add_flag("--force", options->session.force, "replace the run file if it exists");
+  add_facts_to(*command, options->session.facts);
+  command->add_flag("!--no-questions", options->asks, "ask for no facts of the session");
   options->daemon.add_to(*command);
   options->daemon.add_take_over_to(*command);
   line.on_run(command, [options](const CommandOutput& out) { return run(*options, out); });

@@ -1,5 +1,7 @@
 #include "host/journal/journal_records.hpp"
 
+#include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <cstring>
@@ -83,6 +85,7 @@ class FieldReader {
   }
   /// What is neither a number nor a text is left out; so is a number that was none when it was written.
   void attributes(const char* name, Attributes& attributes) {
+    if (lacks(name)) return;
     for (const auto& [key, value] : object_.at(name).items()) {
       if (value.is_string()) attributes[key] = value.get<std::string>();
       if (value.is_number_integer()) attributes[key] = value.get<int64_t>();
@@ -91,7 +94,7 @@ class FieldReader {
   }
   template <typename Part>
   void parts(const char* name, std::vector<Part>& parts) {
-    if (std::string_view(name) == added_later && !object_.contains(name)) return;
+    if (lacks(name)) return;
     for (const json& object : object_.at(name)) {
       FieldReader reader(object);
       describe(reader, parts.emplace_back());
@@ -99,7 +102,10 @@ class FieldReader {
   }
 
  private:
-  static constexpr std::string_view added_later = "waveforms";
+  static constexpr std::array<std::string_view, 3> added_later{"waveforms", "session", "notes"};
+  [[nodiscard]] bool lacks(const char* name) const {
+    return std::ranges::find(added_later, name) != added_later.end() && !object_.contains(name);
+  }
   const json& object_;
 };
 
@@ -116,6 +122,10 @@ void describe(auto& io, PlayedSegment& played) {
   io.fields("points", played.points, "fraction", played.fraction);
 }
 
+void describe(auto& io, runfile::SessionNote& note) {
+  io.fields("written_utc", note.written_utc, "author", note.author, "text", note.text);
+}
+
 void describe(auto& io, BeginRecord& begin) {
   io.fields("run_id", begin.run_id, "started_utc", begin.started_utc, "producer", begin.producer,
             "experiment", begin.experiment, "channels", begin.channels);
@@ -130,6 +140,8 @@ void describe(auto& io, BeginRecord& begin) {
   io.parts("segments", begin.segments);
   io.later("trigger_delay_s", begin.trigger_delay_s);
   io.parts("waveforms", begin.waveforms);
+  io.attributes("session", begin.session.facts);
+  io.parts("notes", begin.session.notes);
 }
 
 void describe(auto& io, GridRecord& grid) { io.whole(most_ticks, "first_due_ns", grid.first_due_ns); }

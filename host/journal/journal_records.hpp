@@ -24,6 +24,7 @@
 
 #include "host/journal/journal.hpp"
 #include "protocol/runfile/run.hpp"
+#include "protocol/runfile/session.hpp"
 
 namespace diastole {
 
@@ -59,6 +60,7 @@ struct BeginRecord {
   std::vector<runfile::Segment> segments;  ///< as planned
   double trigger_delay_s = 0;
   std::vector<PlayedSegment> waveforms;
+  runfile::Session session;  ///< as it was known at the start
 };
 
 struct GridRecord {

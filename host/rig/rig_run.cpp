@@ -16,6 +16,7 @@
 #include "host/runfile/assemble.hpp"
 #include "host/runfile/writer.hpp"
 #include "protocol/contract/input_error.hpp"
+#include "protocol/runfile/layout.hpp"
 
 namespace diastole {
 namespace {
@@ -135,7 +136,7 @@ void RigService::do_run(const RunOrder& order, const Done& done) {
   run.planned_cycles = experiment.planned_cycles();
   check_disk(run, rate, experiment.cycles());
   JournalWriter journal(path);
-  write_beginning(journal, run, experiment, plan, rate.rate_Hz);
+  write_beginning(journal, run, order, plan, rate.rate_Hz);
   live_.begin(run.run_id, rate.rate_Hz, controller_->hello().tick_rate_Hz);
   if (!queue_.begin("running", [&] { run_.begin(run); })) refuse_to_start();
   preparation.begun();
@@ -185,8 +186,9 @@ void RigService::tidy_journals() {
                keep_days};
 }
 
-void RigService::write_beginning(JournalWriter& journal, const RunPlan& run, const Experiment& experiment,
+void RigService::write_beginning(JournalWriter& journal, const RunPlan& run, const RunOrder& order,
                                  const ProgramPlan& plan, double sample_rate_Hz) {
+  const Experiment& experiment = order.experiment;
   const TimerFacts timer = make_source(*clock_, *instrument_)->timer(sample_rate_Hz);
   BeginRecord begin{.run_id = run.run_id,
                     .started_utc = utc_now(),
@@ -203,7 +205,12 @@ void RigService::write_beginning(JournalWriter& journal, const RunPlan& run, con
                     .daq_timer_counts_samples = timer.counts_samples,
                     .segments = planned_segments(experiment, plan),
                     .trigger_delay_s = 1e-3 * experiment.trigger_delay_ms,
-                    .waveforms = played_waveforms(experiment)};
+                    .waveforms = played_waveforms(experiment),
+                    .session = order.session};
+  for (runfile::SessionNote& note : begin.session.notes) {
+    if (note.author.empty()) note.author = begin.session.text(runfile::operator_fact);
+    if (note.written_utc.empty()) note.written_utc = begin.started_utc;
+  }
   for (const ChannelConfig& channel : rig_.daq.channels)
     begin.channels.push_back(channel.name);
   for (const auto& [name, value] : book_.attributes())

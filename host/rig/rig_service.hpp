@@ -23,6 +23,7 @@
 #include "host/rig/order_queue.hpp"
 #include "host/rig/run_monitor.hpp"
 #include "host/rig/service_manager.hpp"
+#include "protocol/runfile/session.hpp"
 
 namespace diastole {
 
@@ -44,6 +45,7 @@ struct CalibrationOrder {
 struct RunOrder {
   Experiment experiment;
   bool prompts_answered = false;  ///< AcquisitionSetup::prompts_answered
+  runfile::Session session = {};  ///< a note without author or time is the operator's, of the run's start
 };
 
 struct SettingsChange {
@@ -122,7 +124,7 @@ class RigService {
   /// Removes what need not be kept (journal_store.hpp) and counts the rest.
   void tidy_journals();
   void do_run(const RunOrder& order, const Done& done);
-  void write_beginning(JournalWriter& journal, const RunPlan& run, const Experiment& experiment,
+  void write_beginning(JournalWriter& journal, const RunPlan& run, const RunOrder& order,
                        const ProgramPlan& plan, double sample_rate_Hz);
   RunOutcome acquire(JournalWriter& journal, const RunOrder& order, const daq::RatePlan& rate,
                      double planned_s);

@@ -9,6 +9,7 @@
 #include "host/rpc/json_rpc.hpp"
 #include "host/rpc/rig_json.hpp"
 #include "protocol/contract/input_error.hpp"
+#include "protocol/runfile/layout.hpp"
 
 namespace diastole {
 namespace {
@@ -16,6 +17,7 @@ namespace {
 using nlohmann::json;
 
 constexpr size_t most_experiment_bytes = 256U << 10;
+constexpr size_t most_fact_bytes = 4096;
 
 /// A count in `params`, 0 without it. Of others the conversion to an unsigned integer is not defined.
 uint64_t whole_in(const json& params, const char* name) {
@@ -69,6 +71,34 @@ void rig_calibrate(RigService& rig, const json& params, const Reply& reply) {
   rig.calibrate(std::move(order), to(reply));
 }
 
+std::string short_text(const json& value, const std::string& name) {
+  if (!value.is_string() || value.get_ref<const std::string&>().size() > most_fact_bytes) {
+    throw rpc::Error(rpc::Code::invalid_params,
+                     fmt::format("session: {} must be a text of at most {} bytes", name, most_fact_bytes));
+  }
+  return value;
+}
+
+/// "session": {"specimen": "gel-7", "operator": "...", "room_temperature_C": 21.5, "notes": ["..."]}
+runfile::Session session_in(const json& params) {
+  runfile::Session session;
+  const auto object = params.find("session");
+  if (object == params.end()) return session;
+  for (const auto& [name, value] : object->items()) {
+    if (name == runfile::specimen_fact || name == runfile::operator_fact) {
+      session.facts[name] = short_text(value, name);
+    } else if (name == runfile::room_temperature_fact) {
+      session.facts[name] = number_in(*object, runfile::room_temperature_fact);
+    } else if (name == "notes") {
+      for (const json& note : value)
+        session.notes.push_back({"", "", short_text(note, "a note")});
+    } else {
+      throw rpc::Error(rpc::Code::invalid_params, "session: nothing is known of \"" + name + "\"");
+    }
+  }
+  return session;
+}
+
 void run_start(RigService& rig, const json& params, const Reply& reply) {
   const std::string text = params.at("experiment");
   if (text.size() > most_experiment_bytes) {
@@ -80,7 +110,7 @@ void run_start(RigService& rig, const json& params, const Reply& reply) {
     throw InputError({name, "", "was not sent with the experiment", "Send its text in `points`."});
   };
   rig.start_run({parse_experiment(text, params.value("file", "experiment"), read_points),
-                 params.value("prompts_answered", false)},
+                 params.value("prompts_answered", false), session_in(params)},
                 to(reply));
 }
 

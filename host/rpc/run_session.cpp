@@ -10,6 +10,7 @@
 #include "host/rpc/rig_json.hpp"
 #include "host/runfile/output_guard.hpp"
 #include "protocol/contract/input_error.hpp"
+#include "protocol/runfile/layout.hpp"
 
 namespace diastole {
 namespace {
@@ -25,6 +26,15 @@ void deliver(const std::filesystem::path& from, const std::filesystem::path& to)
     throw HardwareError(to.string(), error.what(),
                         "The run is safe in " + from.string() + "; copy it from there.");
   }
+}
+
+json facts_json(const SessionFacts& facts) {
+  json object = json::object();
+  if (!facts.specimen.empty()) object[runfile::specimen_fact] = facts.specimen;
+  if (!facts.operator_name.empty()) object[runfile::operator_fact] = facts.operator_name;
+  if (facts.room_temperature_C) object[runfile::room_temperature_fact] = *facts.room_temperature_C;
+  if (!facts.notes.empty()) object["notes"] = facts.notes;
+  return object;
 }
 
 /// The command that makes the run file that was wanted.
@@ -104,7 +114,8 @@ SessionResult run_session(DaemonClient& daemon, const SessionOptions& options) {
   const json begun = daemon.call("run.start", {{"experiment", experiment.text},
                                                {"file", experiment.file},
                                                {"points", points},
-                                               {"prompts_answered", options.prompts_answered}});
+                                               {"prompts_answered", options.prompts_answered},
+                                               {"session", facts_json(options.facts)}});
   const json result = follow(daemon, options, begun);
   if (!result.contains("run_file")) {
     throw HardwareError(

@@ -24,11 +24,20 @@ struct SessionProgress {
   std::vector<std::string> new_remarks;  ///< since the last call: faults, gaps, stops, in plain words
 };
 
+/// What is told of the session and kept in the run file's /session; empty: not told.
+struct SessionFacts {
+  std::string specimen;
+  std::string operator_name;
+  std::optional<double> room_temperature_C;
+  std::vector<std::string> notes;
+};
+
 struct SessionOptions {
   std::string experiment;  ///< file
   std::string output;      ///< run file
   bool force = false;      ///< replace an existing output
-  int poll_ms = 100;       ///< between questions for progress
+  SessionFacts facts = {};
+  int poll_ms = 100;  ///< between questions for progress
   std::function<void(const SessionProgress&)> progress = [](const SessionProgress&) {};
   /// Whether the operator has said since the last question that he is ready; asked with every question for progress.
   std::function<bool()> ready = [] { return false; };

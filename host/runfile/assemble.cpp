@@ -304,6 +304,7 @@ RowStream pressure_of(const std::shared_ptr<const Source>& source, const Rows& r
 AssembledRun without_rows(const JournalRecords& journal, const ParsedJournal& parsed, const TimeAxis& axis,
                           const Rows& rows) {
   AssembledRun assembled{.run = {},
+                         .session = parsed.begin.session,
                          .damage = parsed.damage,
                          .samples_received = rows.samples_received,
                          .samples_missing = rows.pressure - rows.samples_received,

@@ -17,12 +17,14 @@
 #include "host/runfile/row_stream.hpp"
 #include "protocol/contract/input_error.hpp"
 #include "protocol/runfile/run.hpp"
+#include "protocol/runfile/session.hpp"
 #include "protocol/signal/low_pass.hpp"
 
 namespace diastole {
 
 struct AssembledRun {
   runfile::RecordedRun run;
+  runfile::Session session;
   JournalDamage damage;
   uint64_t samples_received = 0;  ///< rows of /pressure with values
   uint64_t samples_missing = 0;   ///< rows declared in /gaps

@@ -11,6 +11,7 @@
 #include "host/transport/descriptor.hpp"
 #include "protocol/contract/input_error.hpp"
 #include "protocol/runfile/layout.hpp"
+#include "protocol/runfile/note_writer.hpp"
 #include "protocol/runfile/reader.hpp"
 
 namespace diastole {
@@ -60,9 +61,23 @@ void write_grid(H5Sink& sink, const char* group, const std::optional<runfile::St
   sink.attribute(group, runfile::grid_rate, grid->rate_Hz);
 }
 
+void write_session(H5Sink& sink, const runfile::Session& session) {
+  if (session.empty()) return;
+  sink.group(runfile::session_group);
+  for (const auto& [name, value] : session.facts)
+    sink.attribute(runfile::session_group, name, value);
+  for (size_t i = 0; i < session.notes.size(); ++i) {
+    const std::string note = runfile::note_path(i + 1);
+    sink.text(note, session.notes[i].text);
+    sink.attribute(note, runfile::note_written, session.notes[i].written_utc);
+    sink.attribute(note, runfile::note_author, session.notes[i].author);
+  }
+}
+
 /// What a file holds: `run` without its rows, and these.
 struct Content {
   const runfile::RecordedRun& run;
+  const runfile::Session& session;
   const RowStream& pump;
   const RowStream& pressure;
 };
@@ -87,6 +102,7 @@ void write_content(H5Sink& sink, const Content& content) {
   for (const auto& [name, value] : run.clock) {
     sink.scalar(fmt::format("{}/{}", runfile::clock_group, name), value, std::string(runfile::unit_of(name)));
   }
+  write_session(sink, content.session);
   write_table(sink, run.gaps, runfile::gaps_table);
   write_table(sink, run.events, runfile::events_table);
 }
@@ -134,7 +150,8 @@ std::string write_content(const std::filesystem::path& path, const Content& cont
 std::string write_run(const std::filesystem::path& path, const StreamedRun& run,
                       const FlushDirectory& flush_directory) {
   runfile::check(run.assembled.run);
-  return write_content(path, {run.assembled.run, run.pump, run.pressure}, flush_directory);
+  return write_content(path, {run.assembled.run, run.assembled.session, run.pump, run.pressure},
+                       flush_directory);
 }
 
 }  // namespace diastole

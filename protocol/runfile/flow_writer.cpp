@@ -1,12 +1,11 @@
 #include "protocol/runfile/flow_writer.hpp"
 
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <string_view>
 
 #include "protocol/contract/input_error.hpp"
+#include "protocol/runfile/amended_file.hpp"
 #include "protocol/runfile/h5_handle.hpp"
 #include "protocol/runfile/layout.hpp"
 #include "protocol/runfile/reader.hpp"
@@ -15,15 +14,6 @@ namespace diastole::runfile {
 namespace {
 
 namespace fs = std::filesystem;
-
-/// Removed unless it has become the file itself.
-struct Beside {
-  fs::path path;
-  ~Beside() {
-    std::error_code ignored;
-    fs::remove(path, ignored);
-  }
-};
 
 bool write_numbers(hid_t group, std::string_view name, const std::vector<double>& values) {
   const hsize_t size = values.size();
@@ -42,26 +32,14 @@ bool write_numbers(hid_t group, std::string_view name, const std::vector<double>
   return attribute.valid() && H5Awrite(attribute.get(), type.get(), unit.data()) >= 0;
 }
 
-bool write_group(const fs::path& file, const std::string& name, bool is_there, const FlowVolume& volume) {
-  const FileHandle opened(H5Fopen(file.c_str(), H5F_ACC_RDWR, H5P_DEFAULT));
-  if (!opened.valid()) return false;
-  if (is_there && H5Ldelete(opened.get(), name.c_str(), H5P_DEFAULT) < 0) return false;
+bool write_group(hid_t file, const std::string& name, bool is_there, const FlowVolume& volume) {
+  if (is_there && H5Ldelete(file, name.c_str(), H5P_DEFAULT) < 0) return false;
   const PropertyHandle with_parents(H5Pcreate(H5P_LINK_CREATE));
   H5Pset_create_intermediate_group(with_parents.get(), 1);
-  const GroupHandle group(
-      H5Gcreate2(opened.get(), name.c_str(), with_parents.get(), H5P_DEFAULT, H5P_DEFAULT));
+  const GroupHandle group(H5Gcreate2(file, name.c_str(), with_parents.get(), H5P_DEFAULT, H5P_DEFAULT));
   return group.valid() && write_numbers(group.get(), "phase_s", volume.phase_s) &&
          write_numbers(group.get(), "cavity_mL", volume.cavity_mL) &&
-         write_numbers(group.get(), "sigma_mL", volume.sigma_mL) &&
-         H5Fflush(opened.get(), H5F_SCOPE_GLOBAL) >= 0;
-}
-
-bool is_on_disk(const fs::path& file) {
-  const int descriptor = ::open(file.c_str(), O_RDONLY | O_CLOEXEC);
-  if (descriptor < 0) return false;
-  const bool synced = ::fsync(descriptor) == 0;
-  ::close(descriptor);
-  return synced;
+         write_numbers(group.get(), "sigma_mL", volume.sigma_mL);
 }
 
 }  // namespace
@@ -79,17 +57,7 @@ void store_flow(const fs::path& path, size_t segment, const FlowVolume& volume, 
         {run.file, "group " + name, "holds a measured volume already", "Give --force to replace it."});
   run.flow[segment] = volume;
   check(run);
-  const Beside beside{path.string() + ".flow-partial"};
-  std::error_code error;
-  fs::copy_file(path, beside.path, fs::copy_options::overwrite_existing, error);
-  if (!error && write_group(beside.path, name, is_there, volume) && is_on_disk(beside.path)) {
-    (void)read_run(beside.path);
-    fs::rename(beside.path, path, error);
-    if (!error) return;
-  }
-  throw InputError({run.file, "group " + name,
-                    "cannot be written" + (error ? ": " + error.message() : std::string()),
-                    "Check that file and folder may be changed, and the space on their disk."});
+  amend_run(path, "group " + name, [&](hid_t file) { return write_group(file, name, is_there, volume); });
 }
 
 }  // namespace diastole::runfile

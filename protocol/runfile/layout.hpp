@@ -15,6 +15,9 @@
 //   |-- trigger            time_s[k], optionally delay_s (scalar)
 //   |-- mr/flow/<segment>  optional: phase_s[f], cavity_mL[f], sigma_mL[f]; segments count from 0
 //   |-- clock              optional: scalars such as daq_offset_s, daq_drift_ppm
+//   |-- session            optional: attributes specimen, operator, room_temperature_C
+//   |   `-- notes/<number> optional: one text a note, numbered from 0001 as they were written; attributes written_utc,
+//   |                      author
 //   |-- gaps               table stream, first_index, count, reason; empty says that nothing is missing
 //   `-- events             table time_s, level, code, text
 //
@@ -53,6 +56,15 @@ inline constexpr const char* trigger_time = "/trigger/time_s";
 inline constexpr const char* trigger_delay = "/trigger/delay_s";
 inline constexpr const char* flow_group = "/mr/flow";
 inline constexpr const char* clock_group = "/clock";
+inline constexpr const char* session_group = "/session";
+inline constexpr const char* session_notes = "/session/notes";
+/// Attributes of a note.
+inline constexpr const char* note_written = "written_utc";
+inline constexpr const char* note_author = "author";
+/// Attributes of /session.
+inline constexpr const char* specimen_fact = "specimen";
+inline constexpr const char* operator_fact = "operator";
+inline constexpr const char* room_temperature_fact = "room_temperature_C";
 
 /// Streams as /gaps names them.
 inline constexpr std::string_view pressure_stream = "pressure";

@@ -26,12 +26,14 @@ const std::vector<std::pair<Document, std::string>> golden{
                  .daq_timer_counts_samples = false,
                  .segments = {{0.1, "uploaded", 10, 0.8, 0, 2}},
                  .trigger_delay_s = 0.05,
-                 .waveforms = {{0, "phase,fraction", {0, 1, 0}}}},
+                 .waveforms = {{0, "phase,fraction", {0, 1, 0}}},
+                 .session = {{{"specimen", "gel-7"}}, {{"2026-01-02T03:04:05Z", "Jo", "new hose"}}}},
      R"({"channels":["cavity"],"daq_timer_counts_samples":false,"daq_timer_rate_Hz":40000000.0,)"
      R"("experiment":"text","experiment_file":"e.toml","instrument":"simulated","microstep_pL":7791649,)"
+     R"("notes":[{"author":"Jo","text":"new hose","written_utc":"2026-01-02T03:04:05Z"}],)"
      R"("producer":"test","record":"begin","rig":{"bore_mm":100.0,"microsteps":8,"specimen":"gel"},)"
      R"("run_id":"id","sample_rate_Hz":300.0,"segments":[{"cycles":2,"offset_mL":0.0,"period_s":0.8,)"
-     R"("start_s":0.1,"stroke_mL":10.0,"waveform":"uploaded"}],"started_utc":"2026-01-02T03:04:05Z",)"
+     R"("start_s":0.1,"stroke_mL":10.0,"waveform":"uploaded"}],"session":{"specimen":"gel-7"},"started_utc":"2026-01-02T03:04:05Z",)"
      R"("tick_rate_Hz":84000000,"trigger_delay_s":0.05,"waveforms":[{"fraction":[0.0,1.0,0.0],)"
      R"("points":"phase,fraction","segment":0}]})"},
     {GridRecord{7}, R"({"first_due_ns":7,"record":"grid"})"},
@@ -67,6 +69,10 @@ TEST(Documents, WithoutAFieldThatWasAddedLaterAreRead) {
   EXPECT_TRUE(decoded(R"({"record":"end"})"));
   EXPECT_TRUE(decoded(R"({"record":"trigger","cycle":1,"tick":5})"));
   EXPECT_TRUE(decoded(R"({"record":"run_ended","reason":"completed","tick":9,"cycles":2,"triggers":2})"));
+  EXPECT_TRUE(decoded(
+      R"({"record":"begin","run_id":"id","started_utc":"","producer":"","experiment":"","channels":["cavity"],)"
+      R"("sample_rate_Hz":300.0,"rig":{},"tick_rate_Hz":84000000,"microstep_pL":1,"daq_timer_rate_Hz":40000000,)"
+      R"("segments":[]})"));
 }
 
 TEST(Documents, OfNoFormOfOursAreNone) {

@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "host/cli/session_facts.hpp"
 #include "host/cli/session_view.hpp"
 #include "host/config/experiment.hpp"
 #include "host/journal/part_file.hpp"
@@ -210,6 +211,7 @@ void add_simulate(CommandLine& line) {
       "--hide-seed", options->hide_seed,
       "of the hidden effects' sizes, the same for all runs of a session; if not given, that of the noise");
   command->add_option("--sealed", options->sealed, "file for what is hidden; the run file does not tell");
+  add_facts_to(*command, options->session.facts);
   command->add_flag("--real-time", options->rig.real_time, "as slow as the real thing");
   command->add_flag("--force", options->session.force, "replace files that exist");
   line.on_run(command, [options](const CommandOutput& out) { return report(simulate(*options), out.json); });
