@@ -4,11 +4,11 @@
 #include <filesystem>
 #include <system_error>
 
+#include "estimator/io/cache_folder.hpp"
 #include "estimator/io/whole_file.hpp"
 #include "protocol/contract/input_error.hpp"
 
 namespace diastole {
-namespace {
 
 std::filesystem::path cache_folder() {
   if (const char* folder = std::getenv("XDG_CACHE_HOME"); folder != nullptr && *folder != '\0')
@@ -17,8 +17,6 @@ std::filesystem::path cache_folder() {
     return std::filesystem::path(home) / ".cache" / "diastole";
   return {};
 }
-
-}  // namespace
 
 std::optional<std::string> read_cached(std::string_view file) {
   const std::filesystem::path folder = cache_folder();

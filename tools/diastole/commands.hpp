@@ -7,10 +7,14 @@ namespace diastole {
 
 /// `diastole catheter`: the paper's test of catheter and transducer, from a recorded step of pressure.
 void add_catheter(CommandLine& line);
+/// `diastole compare`: what tells runs apart.
+void add_compare(CommandLine& line);
 /// `diastole desk`: look at and correct tracking and contours in a browser.
 void add_desk(CommandLine& line);
 /// `diastole replay`: a recorded run once more, through simulated instrument, the real firmware and the real daemon.
 void add_replay(CommandLine& line);
+/// `diastole runs`: a catalogue of runs and of what was made of them.
+void add_runs(CommandLine& line);
 /// `diastole scan`: a simulated scanner, DICOM of a study's motion.
 void add_scan(CommandLine& line);
 /// `diastole simulate`: a whole session without hardware, through the real daemon.

@@ -85,6 +85,8 @@ diastole::ExitCode run(int argc, char** argv) {
       "exit code\nand the text on standard error tell the error.");
   diastole::CommandLine line(app);
   diastole::add_host_commands(line);
+  diastole::add_runs(line);
+  diastole::add_compare(line);
   diastole::add_catheter(line);
   diastole::add_simulate(line);
   diastole::add_replay(line);

@@ -1,0 +1,124 @@
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <iostream>
+#include <memory>
+
+#include "estimator/io/member_json.hpp"
+#include "estimator/io/whole_file.hpp"
+#include "estimator/report/html_text.hpp"
+#include "estimator/report/page.hpp"
+#include "protocol/contract/input_error.hpp"
+#include "protocol/runfile/reader.hpp"
+#include "tools/diastole/commands.hpp"
+#include "tools/diastole/compare/comparison.hpp"
+
+namespace diastole {
+namespace comparison {
+
+DIASTOLE_MEMBERS(Difference, group, place, values)
+DIASTOLE_MEMBERS(MeanCycle, run, cycles, mean_kPa, sd_kPa, error_kPa)
+
+template <class Visit, IsRecord<Departure> Record>
+void each_member(Visit&& visit, Record& departure) {
+  DIASTOLE_VISIT(visit, departure, run, offset_Pa, gain, rms_Pa, worst_Pa, worst_phase, worst_in_errors,
+                 limit_in_errors)
+  const bool beyond_noise = departure.beyond_noise();
+  visit("beyond_noise", beyond_noise);
+}
+
+DIASTOLE_MEMBERS(Overlay, segment, channel, period_s, phase, cycles, departures)
+
+template <class Visit, IsRecord<Comparison> Record>
+void each_member(Visit&& visit, Record& comparison) {
+  visit("runs", comparison.files);
+  DIASTOLE_VISIT(visit, comparison, differences, overlays, remarks)
+  const bool beyond_noise = comparison.beyond_noise();
+  visit("beyond_noise", beyond_noise);
+}
+
+}  // namespace comparison
+
+namespace {
+
+using comparison::Comparison;
+
+struct CompareOptions {
+  std::vector<std::filesystem::path> runs;
+  std::filesystem::path page;
+  size_t parts = 40;
+  bool force = false;
+};
+
+void show(const Comparison& found) {
+  for (size_t i = 0; i < found.files.size(); ++i)
+    fmt::print("[{}] {}\n", i, found.files[i]);
+  std::string group;
+  for (const comparison::Difference& difference : found.differences) {
+    if (difference.group != group) fmt::print("{}\n", group = difference.group);
+    fmt::print("  {:28}", difference.place);
+    for (const std::string& value : difference.values)
+      fmt::print("  {}", value.empty() ? "-" : value);
+    fmt::print("\n");
+  }
+  if (found.differences.empty()) fmt::print("session, protocol, rig and calibration are the same\n");
+  for (const comparison::Overlay& overlay : found.overlays) {
+    for (const comparison::Departure& departure : overlay.departures) {
+      fmt::print(
+          "segment {} {}: [{}] {} [0]: offset {} Pa, gain {}, rms {} Pa; worst {} Pa at phase {:.2f}, {} "
+          "errors of {} allowed\n",
+          overlay.segment, overlay.channel, departure.run,
+          departure.beyond_noise() ? "differs from" : "agrees with", report::number(departure.offset_Pa, 3),
+          report::number(departure.gain, 5), report::number(departure.rms_Pa, 3),
+          report::number(departure.worst_Pa, 3), departure.worst_phase,
+          report::number(departure.worst_in_errors, 3), report::number(departure.limit_in_errors, 3));
+    }
+  }
+  for (const std::string& remark : found.remarks)
+    fmt::print("{}\n", remark);
+}
+
+ExitCode compare_runs(const CompareOptions& options, const CommandOutput& out) {
+  if (options.runs.size() < 2)
+    throw InputError({"", "RUN", "one run cannot be compared", "Give two run files or more."});
+  if (!options.page.empty()) require_output({options.page, options.runs, report::page_mark, options.force});
+  std::vector<runfile::RecordedRun> runs;
+  std::vector<runfile::Session> sessions;
+  for (const auto& file : options.runs) {
+    runs.push_back(runfile::read_run(file));
+    sessions.push_back(runfile::read_session(file));
+  }
+  const Comparison found = comparison::compare(runs, sessions, options.parts);
+  if (!options.page.empty()) write_whole_file(options.page, comparison::comparison_page(found));
+  if (out.json) {
+    Json document = written(found);
+    document["page"] = options.page.empty() ? Json() : Json(options.page.string());
+    std::cout << document.dump(2) << '\n';
+    return ExitCode::done;
+  }
+  show(found);
+  if (!options.page.empty()) fmt::print("The plots are in {}\n", options.page.string());
+  return ExitCode::done;
+}
+
+}  // namespace
+
+void add_compare(CommandLine& line) {
+  auto options = std::make_shared<CompareOptions>();
+  CLI::App* command = line.add(
+      "compare", "what tells runs apart: session, protocol, rig, calibration, and pressure against noise",
+      "  diastole compare monday.run.h5 tuesday.run.h5\n"
+      "  diastole compare monday.run.h5 tuesday.run.h5 wednesday.run.h5 -o compared.html\n"
+      "      each against the first, with the mean cycles, their differences and the bands of noise\n"
+      "Only segments with the same motion are tested; those of another are shown all the same.");
+  command->add_option("RUN", options->runs, "run files, the first is what the others are compared with")
+      ->required();
+  command->add_option("-o,--output", options->page, "HTML page with plots to write");
+  command->add_option("--parts", options->parts, "into which a cycle is divided")
+      ->check(CLI::Range(4, 1000))
+      ->capture_default_str();
+  command->add_flag("--force", options->force, "replace an output file that is no report");
+  line.on_run(command, [options](const CommandOutput& out) { return compare_runs(*options, out); });
+}
+
+}  // namespace diastole

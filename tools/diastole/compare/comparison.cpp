@@ -1,0 +1,241 @@
+#include "tools/diastole/compare/comparison.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <numeric>
+#include <set>
+
+#include "estimator/inference/intervals.hpp"
+#include "protocol/contract/input_error.hpp"
+#include "protocol/runfile/frame_bins.hpp"
+#include "protocol/runfile/layout.hpp"
+
+namespace diastole::comparison {
+namespace {
+
+using runfile::RecordedRun;
+using runfile::Segment;
+
+constexpr double false_alarm = 0.01;
+
+std::string in_words(const runfile::Attribute& value) {
+  return std::visit([](const auto& v) { return fmt::format("{}", v); }, value);
+}
+
+/// Adds a difference unless all values are equal.
+void add(Comparison& comparison, const std::string& group, const std::string& place,
+         std::vector<std::string> values) {
+  const bool same =
+      std::ranges::all_of(values, [&](const std::string& value) { return value == values.front(); });
+  if (!same) comparison.differences.push_back({group, place, std::move(values)});
+}
+
+using Facts = std::map<std::string, runfile::Attribute, std::less<>>;
+
+void add_facts(Comparison& comparison, const std::vector<const Facts*>& facts,
+               const std::function<std::string(const std::string&)>& group_of) {
+  std::set<std::string> names;
+  for (const Facts* of_run : facts)
+    for (const auto& [name, value] : *of_run)
+      names.insert(name);
+  for (const std::string& name : names) {
+    std::vector<std::string> values;
+    for (const Facts* of_run : facts) {
+      const auto found = of_run->find(name);
+      values.push_back(found == of_run->end() ? "" : in_words(found->second));
+    }
+    add(comparison, group_of(name), name, std::move(values));
+  }
+}
+
+/// What `diastole calibrate` and `diastole zero` determine of a channel.
+bool is_calibration(const std::string& name) {
+  return std::ranges::any_of(
+      std::array{"_kPa_per_V", "_zero_V", "_calibrated_utc", "_calibrated_by", "_zeroed_utc", "_zeroed_by"},
+      [&](const char* ending) { return name.ends_with(ending); });
+}
+
+void add_protocol(Comparison& comparison, const std::vector<RecordedRun>& runs) {
+  const auto add_of_runs = [&](const std::string& place, const auto& value_of) {
+    std::vector<std::string> values;
+    for (const RecordedRun& run : runs)
+      values.push_back(value_of(run));
+    add(comparison, "protocol", place, std::move(values));
+  };
+  add_of_runs("segments", [](const RecordedRun& run) { return fmt::format("{}", run.segments.size()); });
+  size_t most = 0;
+  for (const RecordedRun& run : runs)
+    most = std::max(most, run.segments.size());
+  for (size_t i = 0; i < most; ++i) {
+    const auto add_member = [&](const char* name, const auto& member) {
+      add_of_runs(fmt::format("segment {} {}", i, name), [&](const RecordedRun& run) {
+        return i < run.segments.size() ? fmt::format("{}", run.segments[i].*member) : std::string();
+      });
+    };
+    add_member("waveform", &Segment::waveform);
+    add_member("stroke_mL", &Segment::stroke_mL);
+    add_member("period_s", &Segment::period_s);
+    add_member("offset_mL", &Segment::offset_mL);
+    add_member("cycles", &Segment::cycles);
+  }
+  add_of_runs("trigger delay_s",
+              [](const RecordedRun& run) { return fmt::format("{}", run.trigger_delay_s); });
+  add_of_runs("slices", [](const RecordedRun& run) { return fmt::format("{}", run.slices.size()); });
+}
+
+MeanCycle mean_cycle(const RecordedRun& run, size_t number, const runfile::FrameBinOptions& options) {
+  const runfile::FrameBins bins = runfile::bin_frames(run, options);
+  const double resolution_kPa =
+      options.channel == runfile::cavity_channel ? runfile::cavity_resolution_kPa(run) : 0;
+  MeanCycle cycle{.run = number, .cycles = 0, .mean_kPa = {}, .sd_kPa = {}, .error_kPa = {}};
+  for (const runfile::FrameBin& bin : bins.frames) {
+    cycle.cycles = std::max(cycle.cycles, bin.cycles);
+    cycle.mean_kPa.push_back(bin.mean_kPa);
+    cycle.sd_kPa.push_back(bin.sd_kPa);
+    cycle.error_kPa.push_back(std::sqrt(runfile::variance_of_mean(bin, resolution_kPa)));
+  }
+  return cycle;
+}
+
+/// Volumes are whole steps of some µL: equal motions are equal to the digit that the experiment states.
+bool same_motion(const RecordedRun& a, const RecordedRun& b, size_t segment) {
+  if (segment >= a.segments.size() || segment >= b.segments.size()) return false;
+  const Segment &x = a.segments[segment], &y = b.segments[segment];
+  return x.waveform == y.waveform && x.stroke_mL == y.stroke_mL && x.period_s == y.period_s &&
+         x.offset_mL == y.offset_mL;
+}
+
+/// Slope of b over a; 1 where a does not move.
+double slope(const std::vector<double>& a, const std::vector<double>& b) {
+  const auto count = static_cast<double>(a.size());
+  const double mean_a = std::accumulate(a.begin(), a.end(), 0.0) / count;
+  const double mean_b = std::accumulate(b.begin(), b.end(), 0.0) / count;
+  double both = 0, own = 0;
+  for (size_t i = 0; i < a.size(); ++i) {
+    both += (a[i] - mean_a) * (b[i] - mean_b);
+    own += (a[i] - mean_a) * (a[i] - mean_a);
+  }
+  return own > 0 ? both / own : 1;
+}
+
+/// Degrees of freedom of a difference of two means with these variances, each from so many cycles (Welch, Biometrika 34 (1947) 28).
+double welch_dof(double variance_a, size_t cycles_a, double variance_b, size_t cycles_b) {
+  const double sum = variance_a + variance_b;
+  return sum * sum /
+         (variance_a * variance_a / static_cast<double>(cycles_a - 1) +
+          variance_b * variance_b / static_cast<double>(cycles_b - 1));
+}
+
+/// Precondition: both have two cycles or more.
+Departure departure_of(const MeanCycle& first, const MeanCycle& other, const std::vector<double>& phase,
+                       double probability) {
+  Departure departure{.run = other.run};
+  const auto parts = static_cast<double>(phase.size());
+  double worst_share = -1;
+  for (size_t i = 0; i < phase.size(); ++i) {
+    const double difference_Pa = 1e3 * (other.mean_kPa[i] - first.mean_kPa[i]);
+    departure.offset_Pa += difference_Pa / parts;
+    departure.rms_Pa += difference_Pa * difference_Pa / parts;
+    const double variance_a = std::pow(first.error_kPa[i], 2), variance_b = std::pow(other.error_kPa[i], 2);
+    if (!(variance_a > 0 && variance_b > 0)) continue;
+    const double in_errors = std::abs(difference_Pa) / (1e3 * std::sqrt(variance_a + variance_b));
+    const double limit = inference::student_quantile(
+        welch_dof(variance_a, first.cycles, variance_b, other.cycles), probability);
+    if (in_errors / limit <= worst_share) continue;
+    worst_share = in_errors / limit;
+    departure.worst_Pa = difference_Pa;
+    departure.worst_phase = phase[i];
+    departure.worst_in_errors = in_errors;
+    departure.limit_in_errors = limit;
+  }
+  departure.rms_Pa = std::sqrt(departure.rms_Pa);
+  departure.gain = slope(first.mean_kPa, other.mean_kPa);
+  return departure;
+}
+
+std::vector<std::string> channels_of(const std::vector<RecordedRun>& runs) {
+  std::vector<std::string> channels;
+  for (const auto& [name, values] : runs.front().pressure.channels) {
+    const bool everywhere = std::ranges::all_of(runs, [&, channel = name](const RecordedRun& run) {
+      return run.pressure.channels.contains(channel);
+    });
+    if (everywhere && name != runfile::cavity_filtered_channel) channels.push_back(name);
+  }
+  return channels;
+}
+
+Overlay overlay_of(const std::vector<RecordedRun>& runs, size_t segment, const std::string& channel,
+                   size_t parts, std::vector<std::string>& remarks) {
+  Overlay overlay{
+      .segment = segment, .channel = channel, .period_s = runs.front().segments[segment].period_s};
+  for (size_t i = 0; i < parts; ++i)
+    overlay.phase.push_back((static_cast<double>(i) + 0.5) / static_cast<double>(parts));
+  for (size_t number = 0; number < runs.size(); ++number) {
+    if (segment >= runs[number].segments.size()) continue;
+    try {
+      overlay.cycles.push_back(
+          mean_cycle(runs[number], number, {.frames = parts, .segment = segment, .channel = channel}));
+    } catch (const InputError& error) {
+      remarks.push_back(fmt::format("{}: segment {}: {}", runs[number].file, segment, error.fault().problem));
+    }
+  }
+  return overlay;
+}
+
+bool can_be_tested(const Overlay& overlay, const MeanCycle& cycle, const std::vector<RecordedRun>& runs) {
+  return cycle.run != 0 && cycle.cycles > 1 && same_motion(runs.front(), runs[cycle.run], overlay.segment);
+}
+
+}  // namespace
+
+bool Comparison::beyond_noise() const {
+  return std::ranges::any_of(overlays, [](const Overlay& overlay) {
+    return std::ranges::any_of(overlay.departures, &Departure::beyond_noise);
+  });
+}
+
+Comparison compare(const std::vector<RecordedRun>& runs, const std::vector<runfile::Session>& sessions,
+                   size_t parts) {
+  Comparison comparison;
+  std::vector<const Facts*> of_sessions, of_rigs;
+  for (const RecordedRun& run : runs) {
+    comparison.files.push_back(run.file);
+    of_rigs.push_back(&run.rig);
+  }
+  for (const runfile::Session& session : sessions)
+    of_sessions.push_back(&session.facts);
+  add_facts(comparison, of_sessions, [](const std::string&) { return "session"; });
+  add_protocol(comparison, runs);
+  add_facts(comparison, of_rigs,
+            [](const std::string& name) { return is_calibration(name) ? "calibration" : "rig"; });
+  for (size_t segment = 0; segment < runs.front().segments.size(); ++segment) {
+    if (runs.front().segments[segment].waveform == "hold") continue;
+    for (const std::string& channel : channels_of(runs))
+      comparison.overlays.push_back(overlay_of(runs, segment, channel, parts, comparison.remarks));
+  }
+  size_t tests = 0;
+  for (const Overlay& overlay : comparison.overlays)
+    for (const MeanCycle& cycle : overlay.cycles)
+      tests += can_be_tested(overlay, cycle, runs) ? parts : 0;
+  for (Overlay& overlay : comparison.overlays) {
+    if (overlay.cycles.empty() || overlay.cycles.front().run != 0 || overlay.cycles.front().cycles < 2)
+      continue;
+    for (const MeanCycle& cycle : overlay.cycles) {
+      if (can_be_tested(overlay, cycle, runs)) {
+        overlay.departures.push_back(departure_of(overlay.cycles.front(), cycle, overlay.phase,
+                                                  false_alarm / static_cast<double>(tests)));
+      } else if (cycle.run != 0 && overlay.channel == runfile::cavity_channel) {
+        comparison.remarks.push_back(fmt::format("{}: segment {}: {}", runs[cycle.run].file, overlay.segment,
+                                                 cycle.cycles > 1
+                                                     ? "another motion than in the first run: not tested"
+                                                     : "one cycle tells nothing of its noise: not tested"));
+      }
+    }
+  }
+  return comparison;
+}
+
+}  // namespace diastole::comparison
