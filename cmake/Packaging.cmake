@@ -1,6 +1,6 @@
 # The Debian package: `cmake --preset release && cmake --build --preset release && cpack --config
 # build/release/CPackConfig.cmake` makes build/release/diastole_VERSION_ARCH.deb, with the images of
-# build/firmware if the preset `firmware` has been built.
+# build/firmware if the preset `firmware` has been built, and python3-diastole_VERSION_all.deb beside it.
 
 set(DIASTOLE_FIRMWARE_IMAGES ${CMAKE_SOURCE_DIR}/build/firmware/bin CACHE PATH "Images that the package carries")
 set(packaging ${CMAKE_SOURCE_DIR}/packaging)
@@ -43,6 +43,7 @@ install(DIRECTORY ${DIASTOLE_FIRMWARE_IMAGES}/ DESTINATION share/diastole/firmwa
 install(FILES README.md ${staged}/copyright DESTINATION share/doc/diastole)
 install(DIRECTORY docs/ DESTINATION share/doc/diastole/docs FILES_MATCHING PATTERN "*.md" PATTERN "*.svg" PATTERN "*.png")
 install(DIRECTORY examples DESTINATION share/doc/diastole)
+install(FILES ${packaging}/diastole.completion DESTINATION share/bash-completion/completions RENAME diastole)
 install(CODE "
   set(root \"\$ENV{DESTDIR}\${CMAKE_INSTALL_PREFIX}/share\")
   file(MAKE_DIRECTORY \"\${root}/man/man1\")
@@ -51,6 +52,8 @@ install(CODE "
                             \"${CMAKE_RUNTIME_OUTPUT_DIRECTORY}/\${program}\"
                             \"\${root}/man/man1/\${program}.1.gz\" COMMAND_ERROR_IS_FATAL ANY)
   endforeach()
+  execute_process(COMMAND ${packaging}/command_pages ${PROJECT_VERSION}
+                          \"${CMAKE_RUNTIME_OUTPUT_DIRECTORY}/diastole\" \"\${root}/man/man1\" COMMAND_ERROR_IS_FATAL ANY)
   execute_process(COMMAND gzip -9nc ${packaging}/changelog
                   OUTPUT_FILE \"\${root}/doc/diastole/changelog.gz\" COMMAND_ERROR_IS_FATAL ANY)")
 
@@ -75,4 +78,6 @@ set(CPACK_DEBIAN_PACKAGE_RECOMMENDS "systemd, udev")
 set(CPACK_DEBIAN_PACKAGE_CONTROL_EXTRA
   ${packaging}/postinst ${packaging}/prerm ${packaging}/postrm ${packaging}/conffiles)
 set(CPACK_DEBIAN_PACKAGE_CONTROL_STRICT_PERMISSION ON)
+set(CPACK_DIASTOLE_SOURCE_DIR ${CMAKE_SOURCE_DIR})
+set(CPACK_POST_BUILD_SCRIPTS ${CMAKE_SOURCE_DIR}/cmake/python_package.cmake)
 include(CPack)

@@ -10,7 +10,7 @@ mkdir "$work/tests"
 ln -s "$source_dir/examples" "$work/examples"
 ln -s "$source_dir/tests/data" "$work/tests/data"
 cd "$work"
-export PATH="$bin_dir:$PATH"
+export PATH="$bin_dir:$PATH" XDG_CACHE_HOME="$work/cache"
 
 count=0
 while IFS= read -r command; do

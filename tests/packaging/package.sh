@@ -12,6 +12,8 @@ fail() { echo "FAILED: $*" >&2; exit 1; }
 package=$(ls "$place"/diastole_*.deb)
 dpkg-deb -x "$package" "$place/root"
 dpkg-deb -e "$package" "$place/control"
+python_package=$(ls "$place"/python3-diastole_*_all.deb) || fail "there is no package python3-diastole"
+dpkg-deb -x "$python_package" "$place/python"
 
 for file in usr/bin/diastole usr/bin/sim_rig etc/diastole/rig.toml usr/lib/systemd/system/diastole-daemon.service \
   usr/lib/udev/rules.d/60-diastole.rules usr/lib/sysusers.d/diastole.conf usr/share/man/man1/diastole.1.gz \
@@ -26,6 +28,22 @@ else
   echo "no firmware image was built: the package carries none (cmake --build --preset firmware)"
 fi
 grep -qx /etc/diastole/rig.toml "$place/control/conffiles" || fail "the rig file is no conffile"
+
+# Every command has its manual page, and bash completes it.
+"$place/root/usr/bin/diastole" --help |
+  awk '/^Subcommands:/ {inside = 1; next} /^[^ ]/ {inside = 0} inside && /^  [^ ]/ {print $1}' >"$place/commands"
+completed=$(PATH="$place/root/usr/bin:$PATH" bash -c "source '$place/root/usr/share/bash-completion/completions/diastole'
+  COMP_WORDS=(diastole '') COMP_CWORD=1 && _diastole diastole && printf '%s\n' \"\${COMPREPLY[@]}\"")
+while read -r command; do
+  [[ -s $place/root/usr/share/man/man1/diastole-$command.1.gz ]] || fail "there is no manual page diastole-$command"
+  grep -qx -- "$command" <<<"$completed" || fail "bash does not complete $command"
+done <"$place/commands"
+[[ $(wc -l <"$place/commands") -gt 30 ]] || fail "diastole --help lists too few commands"
+
+# The Python package finds the installed program.
+read_back="import diastole; print(diastole.results.Fit.__name__, diastole.call('effects')['effects'][0]['id'])"
+DIASTOLE=$place/root/usr/bin/diastole PYTHONPATH=$place/python/usr/lib/python3/dist-packages \
+  /usr/bin/python3 -B -c "$read_back" || fail "the Python package cannot be used"
 
 # The installed program, on the installed files.
 diastole=$place/root/usr/bin/diastole

@@ -1,0 +1,108 @@
+"""Run files: HDF5, read with h5py; and the catalogue over them."""
+
+from __future__ import annotations
+
+import os
+import pathlib
+from dataclasses import dataclass
+from typing import Any, Union
+
+import h5py  # type: ignore[import]
+import numpy as np
+import numpy.typing as npt
+
+from diastole import results
+from diastole.program import call, options
+
+Path = Union[str, "os.PathLike[str]"]
+Column = npt.NDArray[np.float64]
+
+
+def _text(value: Any) -> str:
+    return value.decode() if isinstance(value, bytes) else str(value)
+
+
+@dataclass(frozen=True)
+class Note:
+    """What somebody wrote about a run."""
+
+    written_utc: str
+    author: str
+    text: str
+
+
+class Run:
+    """One run file (docs/run-file.md). Columns are read when they are asked for; missing samples are NaN."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = pathlib.Path(path)
+        with h5py.File(self.path, "r") as file:
+            if _text(file.attrs.get("format", "")) != "diastole-run":
+                raise ValueError(f"{self.path}: is no run file of Diastole")
+            self.run_id, self.started_utc, self.producer = (_text(file.attrs[n]) for n in ("run_id", "started_utc", "producer"))
+            self.rig: dict[str, Any] = self._attributes(file["rig"])
+            self.session: dict[str, Any] = self._attributes(file["session"]) if "session" in file else {}
+            self.notes = [Note(_text(n.attrs["written_utc"]), _text(n.attrs["author"]), _text(n[()]))
+                          for n in (file["session/notes"].values() if "session/notes" in file else ())]
+            self.experiment = _text(file["protocol/toml"][()])
+            self.segments = [{name: _text(row[name]) if isinstance(row[name], bytes) else row[name].item() for name in row.dtype.names}
+                             for row in file["protocol/segments"][:]]
+            self.channels = sorted(name for name in file["pressure"] if name.endswith("_kPa"))
+
+    @staticmethod
+    def _attributes(group: Any) -> dict[str, Any]:
+        return {name: _text(v) if isinstance(v, (bytes, str)) else v.item() for name, v in group.attrs.items()}
+
+    def column(self, dataset: str) -> Column:
+        """Any dataset of numbers, by its path: "pump/commanded_mL"."""
+        with h5py.File(self.path, "r") as file:
+            return np.asarray(file[dataset][:], dtype=np.float64)
+
+    @property
+    def time_s(self) -> Column:
+        return self.column("pressure/time_s")
+
+    @property
+    def cavity_kPa(self) -> Column:
+        return self.column("pressure/cavity_kPa")
+
+    @property
+    def trigger_s(self) -> Column:
+        return self.column("trigger/time_s")
+
+    def volume_mL(self) -> Column:
+        """The commanded volume at the pressure's times."""
+        return np.interp(self.time_s, self.column("pump/time_s"), self.column("pump/commanded_mL"))
+
+    def inspect(self) -> results.Inspection:
+        return results.Inspection.from_json(call("inspect", self.path))
+
+    def frames(self, frames: int = 16, **more: Any) -> results.FrameBins:
+        """Pressure averaged into image frames; options as `diastole bin` has them."""
+        return results.FrameBins.from_json(call("bin", self.path, *options(frames=frames, **more)))
+
+    def note(self, text: str, author: str | None = None) -> None:
+        call("note", self.path, text, *options(author=author))
+        self.notes = Run(self.path).notes
+
+    def _repr_html_(self) -> str:
+        from diastole import pictures
+
+        return pictures.of_run(self)
+
+
+def simulate(experiment: Path, output: Path, **more: Any) -> Run:
+    """A session on the simulated rig; options as `diastole simulate` has them: specimen="gel-7", seed=7, force=True."""
+    call("simulate", experiment, "-o", output, *options(**more))
+    return Run(output)
+
+
+def runs(folder: Path = ".", *words: str, **more: Any) -> list[results.CatalogueEntry]:
+    """What `diastole runs` finds: runs("sessions", "specimen=gel-7", "since=2026-11")."""
+    return results.Catalogue.from_json(call("runs", folder, *words, *options(**more))).entries
+
+
+def compare(*files: Path | Run, **more: Any) -> results.Comparison:
+    """What tells runs apart; the first is what the others are compared with."""
+    paths = [file.path if isinstance(file, Run) else file for file in files]
+    return results.Comparison.from_json(call("compare", *paths, *options(**more)))

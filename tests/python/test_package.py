@@ -1,0 +1,168 @@
+#!/usr/bin/python3
+"""The Python package against the programs: test_package.py SOURCE_FOLDER BIN_FOLDER."""
+
+import json
+import math
+import os
+import pathlib
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+
+source, programs = pathlib.Path(sys.argv.pop(1)).resolve(), pathlib.Path(sys.argv.pop(1)).resolve()
+os.environ["DIASTOLE"] = str(programs / "diastole")
+sys.path.insert(0, str(source / "python"))
+
+import diastole  # noqa: E402
+import diastole.classes  # noqa: E402
+
+from diastole.record import Record  # noqa: E402
+
+EXPERIMENT = """format = "diastole-experiment"
+version = 1
+[[segment]]
+waveform = "parabolic"
+stroke_mL = 40
+period_s = 0.6
+cycles = 4
+"""
+
+
+class InAFolder(unittest.TestCase):
+    def setUp(self):
+        self.work = tempfile.TemporaryDirectory()
+        self.addCleanup(self.work.cleanup)
+        self.folder = pathlib.Path(self.work.name)
+        os.environ["XDG_CACHE_HOME"] = f"{self.work.name}/cache"
+        (self.folder / "e.toml").write_text(EXPERIMENT)
+
+
+class Runs(InAFolder):
+    def test_a_run_is_simulated_read_noted_and_found(self):
+        run = diastole.simulate(self.folder / "e.toml", self.folder / "a.run.h5", specimen="gel 7", operator="Jo",
+                                room_temperature_C=21.5, note=["first"])
+        self.assertEqual((run.session["specimen"], run.session["room_temperature_C"]), ("gel 7", 21.5))
+        self.assertEqual([(note.author, note.text) for note in run.notes], [("Jo", "first")])
+        self.assertEqual(len(run.trigger_s), 4)
+        self.assertEqual(len(run.time_s), len(run.cavity_kPa))
+        self.assertAlmostEqual(run.volume_mL().max(), 40, delta=0.1)
+        run.note("the second", author="Ann")
+        self.assertEqual([note.author for note in run.notes], ["Jo", "Ann"])
+        self.assertTrue(run.inspect().sound)
+        self.assertEqual(run.inspect().session.notes[1].text, "the second")
+        self.assertEqual([frame.cycles for frame in run.frames(4).frames], [3] * 4)
+        found = diastole.runs(self.folder, "specimen=gel 7")
+        self.assertEqual([(each.path, each.cycles, each.sound) for each in found], [("a.run.h5", 4, True)])
+        self.assertIn("<svg", run._repr_html_())
+        same = diastole.compare(run, self.folder / "a.run.h5")
+        self.assertFalse(same.beyond_noise)
+        self.assertIn("<svg", same._repr_html_())
+
+    def test_what_is_no_run_is_refused(self):
+        with self.assertRaises(OSError):
+            diastole.Run(self.folder / "e.toml")
+        with self.assertRaises(diastole.DiastoleError) as refused:
+            diastole.simulate(self.folder / "missing.toml", self.folder / "a.run.h5")
+        self.assertEqual(refused.exception.code, 2)
+        self.assertIn("missing.toml", str(refused.exception))
+
+
+class Studies(InAFolder):
+    def test_a_solution_and_a_fit(self):
+        study = diastole.Study(source / "examples/phantom-a-points.study.toml")
+        solution = study.solve(pressure_kPa=3.1, mesh="2,2,1", set={"C1_kPa": 8.8}, probe=[(22.5, 0, 0)])
+        self.assertGreater(solution.cavity_volume_change_mL, 15)
+        self.assertGreater(solution.probes[0].displacement_mm[0], 1)
+        fit = study.fit(mesh="2,2,1")
+        self.assertTrue(fit.converged)
+        self.assertTrue(fit.parameters["C1_kPa"].ci95[0] < fit.parameters["C1_kPa"].value < fit.parameters["C1_kPa"].ci95[1])
+        self.assertIn("C1_kPa", fit._repr_html_())
+        self.assertIn("neo-hookean", study._repr_html_())
+
+    def test_documents_of_another_form_are_refused_with_their_place(self):
+        with self.assertRaisesRegex(TypeError, r"Fit\.parameters\.C1_kPa\.value"):
+            members = {shape.name: None for shape in diastole.classes.shapes()["Fit"].members}
+            diastole.results.Fit.from_json({**members, "format": "", "format_version": 1, "study": "", "specimen": "", "law": "", "data": "",
+                                            "parameters": {"C1_kPa": {"value": "8.8"}}})
+        with self.assertRaisesRegex(TypeError, "lacks"):
+            diastole.results.Fit.from_json({})
+        self.assertTrue(issubclass(diastole.results.Fit, Record))
+
+
+class AtARig(InAFolder):
+    """A simulated rig with a daemon of conducted time."""
+
+    def setUp(self):
+        super().setUp()
+        os.symlink(source / "examples", self.folder / "examples")
+        self.programs = []
+        said = self.start("}", "sim_rig", "--link", "pump", "--config", "examples/rig.toml", "--conductor", "time")
+        port = json.loads(said[said.index("{"):])["modbus_port"]
+        self.start("ready", "diastole", "daemon", "--config", "examples/rig.toml", "--port", "pump", "--daq", f"127.0.0.1:{port}",
+                   "--socket", "socket", "--journal-dir", "journals", "--conductor", "time")
+
+    def start(self, until, name, *words):
+        program = subprocess.Popen([programs / name, *words], cwd=self.folder, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+        self.programs.insert(0, program)
+        said = ""
+        while until not in said:
+            line = program.stdout.readline()
+            self.assertTrue(line, f"{name} ended: {said}")
+            said += line
+        return said
+
+    def tearDown(self):
+        for program in self.programs:
+            program.send_signal(signal.SIGTERM)
+            program.communicate()
+
+    def test_a_session_with_live_samples(self):
+        with diastole.Rig(self.folder / "socket") as rig:
+            self.assertEqual(rig.status()["state"], "unhomed")
+            self.assertEqual(rig.home()["state"], "homed")
+            rig.start(self.folder / "e.toml", specimen="gel-8", notes=["live"])
+            samples = list(rig.live(interval_s=0.01))
+            run_file = rig.progress()["result"]["run_file"]
+            run = diastole.Run(run_file)
+            self.assertGreater(len(samples), 300)
+            self.assertTrue(all(a.time_s < b.time_s for a, b in zip(samples, samples[1:])))
+            largest = max(sample.kPa for sample in samples if math.isfinite(sample.kPa))
+            self.assertAlmostEqual(largest, float(max(run.cavity_kPa)), delta=0.2)
+            self.assertEqual((run.session["specimen"], run.notes[0].text), ("gel-8", "live"))
+            again = rig.run(self.folder / "e.toml", self.folder / "again.run.h5", operator="Jo")
+            self.assertEqual((again.session["operator"], len(again.trigger_s)), ("Jo", 4))
+            with self.assertRaises(FileExistsError):
+                rig.run(self.folder / "e.toml", self.folder / "again.run.h5")
+            with self.assertRaises(diastole.DiastoleError):
+                rig.call("run.start", experiment="nonsense", file="x")
+
+    def test_nobody_listens(self):
+        with self.assertRaises(diastole.DiastoleError) as refused:
+            diastole.Rig(self.folder / "no-socket")
+        self.assertEqual(refused.exception.code, 3)
+
+
+class Overhead(InAFolder):
+    def test_a_call_costs_little_beyond_the_program(self):
+        """50 ms at most, the least of some, so that other work does not count."""
+        run = diastole.simulate(self.folder / "e.toml", self.folder / "a.run.h5")
+        line = [os.environ["DIASTOLE"], "inspect", str(run.path), "--json"]
+
+        def least_s(work):
+            took = []
+            for _ in range(7):
+                began = time.perf_counter()
+                work()
+                took.append(time.perf_counter() - began)
+            return min(took)
+
+        beyond_s = least_s(run.inspect) - least_s(lambda: subprocess.run(line, capture_output=True, check=True))
+        print(f"{1e3 * beyond_s:.1f} ms beyond the program's own time")
+        self.assertLess(beyond_s, 0.050)
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,145 @@
+"""Makes every command say its --json document, on small inputs, and hands them on: `for command, document in documents(...)`."""
+
+import json
+import os
+import pathlib
+import shutil
+import signal
+import subprocess
+
+import h5py
+import numpy as np
+
+SLOW = {"explain", "reference"}  # fits of whole sessions
+
+
+class Place:
+    """A folder of its own in which commands run, as a newcomer's would."""
+
+    def __init__(self, folder, programs, source):
+        self.folder, self.programs = pathlib.Path(folder), pathlib.Path(programs)
+        os.symlink(pathlib.Path(source) / "examples", self.folder / "examples")
+        (self.folder / "tests").mkdir()
+        os.symlink(pathlib.Path(source) / "tests/data", self.folder / "tests/data")
+        self.environment = dict(os.environ, XDG_CACHE_HOME=str(self.folder / "cache"))
+
+    def run(self, line, codes=(0,)):
+        """The document of `diastole LINE --json`."""
+        arguments = [str(self.programs / "diastole"), *line.split(), "--json"]
+        ended = subprocess.run(arguments, cwd=self.folder, env=self.environment, capture_output=True, text=True)
+        assert ended.returncode in codes, f"diastole {line}: exit code {ended.returncode}\n{ended.stderr}"
+        return json.loads(ended.stdout)
+
+    def start(self, *arguments, until):
+        """A program that goes on; returns it with what it said, once that holds `until`."""
+        program = subprocess.Popen([str(self.programs / arguments[0]), *arguments[1:]], cwd=self.folder,
+                                   env=self.environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+        said = ""
+        while until not in said:
+            line = program.stdout.readline()
+            assert line, f"{arguments[0]} ended: {said}"
+            said += line
+        return program, said
+
+
+def make_pop_test(source, target):
+    """A run whose pressure is a step through a catheter of 25 Hz, damping ratio 0.3, for `diastole catheter`."""
+    shutil.copy(source, target)
+    f0_Hz, zeta = 25.0, 0.3
+    with h5py.File(target, "r+") as run:
+        time_s = run["pressure/time_s"][:]
+        since_s = time_s - time_s[len(time_s) // 2] - 1e-4
+        fast, slow = 2 * np.pi * f0_Hz * np.sqrt(1 - zeta**2), 2 * np.pi * f0_Hz * zeta
+        ringing = np.exp(-slow * since_s.clip(0)) * (np.cos(fast * since_s) + slow / fast * np.sin(fast * since_s))
+        noise_kPa = 0.002 * np.random.default_rng(1).standard_normal(len(time_s))
+        run["pressure/cavity_kPa"][:] = noise_kPa + np.where(since_s > 0, 5 * (1 - ringing), 0)
+        if "cavity_filtered_kPa" in run["pressure"]:
+            del run["pressure/cavity_filtered_kPa"]
+
+
+def of_files(place):
+    """Commands that read and write files."""
+    gel = "examples/phantom-a.study.toml"
+    points = "examples/phantom-a-points.study.toml --mesh 4,2,1"
+    said = "--specimen gel-7 --operator Jo --room-temperature-C 21.5"
+    yield "simulate", place.run(f"simulate examples/gel.experiment.toml -o gel.run.h5 {said} --note first")
+    yield "simulate", place.run("simulate examples/gel.experiment.toml -o other.run.h5 --seed 7")
+    yield "inspect", place.run("inspect gel.run.h5")
+    yield "inspect", place.run("inspect examples/paper-gap/paper-gap.run.h5", (0, 1))
+    yield "note", place.run("note gel.run.h5 warm")
+    yield "note", place.run("note other.run.h5")
+    yield "bin", place.run("bin gel.run.h5 --frames 8")
+    yield "export", place.run("export gel.run.h5 --bids bids")
+    yield "export", place.run("export gel.run.h5 --ro-crate crate --bids crate")
+    yield "compare", place.run("compare gel.run.h5 other.run.h5 -o compared.html")
+    yield "compare", place.run("compare gel.run.h5 examples/paper-gap/paper-gap.run.h5")
+    yield "replay", place.run("replay gel.run.h5", (0, 1))
+    make_pop_test(place.folder / "other.run.h5", place.folder / "pop.run.h5")
+    yield "catheter", place.run("catheter pop.run.h5 -o catheter.html")
+    yield "solve", place.run(f"solve {gel} --mesh 4,2,1 --pressure-kPa 3.1 --probe 22.5,0,0")
+    yield "solve", place.run(f"solve {gel} --mesh 4,2,1 --frames")
+    yield "pv", place.run(f"pv {gel} --mesh 4,2,1 --volume-change-mL 20 --steps 3")
+    yield "fit", place.run(f"fit {points} -o points.fit.json")
+    yield "fit", place.run(f"fit {gel} --mesh 4,2,1 --pressure-offset 0.1")
+    yield "montecarlo", place.run(f"montecarlo {points} --set C1_kPa=8.71 --noise 0.8 --frames 1 --repeats 3")
+    yield "design", place.run(f"design {points}")
+    yield "design", place.run(f"design {gel} --images --snr 15 --mesh 4,2,1")
+    yield "shear", place.run("shear examples/shear-test.csv -o shear.html")
+    yield "report", place.run("report gel.run.h5 points.fit.json -o gel.html")
+    yield "mesh", place.run("mesh export examples/lv-clean.study.toml -o lv.mesh.toml")
+    yield "effects", place.run("effects")
+    yield "effects", place.run("effects hose-compliance")
+    yield "reconstruct", place.run("reconstruct examples/phantom-a.study.toml --mesh 4,2,1 -o gel.points.csv")
+    yield "images", place.run("images examples/tagged-gel/dicom")
+    yield "track", place.run("track examples/tagged-gel/dicom -o gel.tags.csv")
+    yield "scan", place.run(f"scan {gel} --mesh 4,2,1 --set C1_kPa=8.71 -o trial --matrix 48 --phases 3 --peak-kPa 3 --tag-spacing 12")
+    yield "runs", place.run("runs . kind=run")
+    yield "runs", place.run("runs . kind=fit -o runs.html")
+    yield "doctor", place.run("doctor --latency-s 0.2", (0, 1))
+
+
+def of_sessions(place):
+    """Commands that take minutes."""
+    study = "tests/data/rig/case-030/case-030.study.toml"
+    yield "reference", place.run(f"reference {study} -o rig.reference.json")
+    yield "fit", place.run("fit examples/phantom-a-points.study.toml --mesh 4,2,1 --profile --posterior 40")
+    yield "explain", place.run(f"explain {study} -o explained", (0, 1))
+
+
+def of_daemon(place):
+    """Commands that speak with the daemon, at a simulated rig."""
+    rig, said = place.start("sim_rig", "--link", "pump", "--config", "examples/rig.toml", "--control", "control",
+                            "--conductor", "time", until="}")
+    port = json.loads(said[said.index("{"):])["modbus_port"]
+    daemon, _ = place.start("diastole", "daemon", "--config", "examples/rig.toml", "--port", "pump", "--daq",
+                            f"127.0.0.1:{port}", "--socket", "socket", "--journal-dir", "journals", "--conductor", "time",
+                            "--console", "0", until="ready")
+    at = "--socket socket"
+    try:
+        yield "status", place.run(f"status {at}")
+        yield "home", place.run(f"home {at}")
+        yield "jog", place.run(f"jog --mL 1 {at}")
+        yield "zero", place.run(f"zero --seconds 1 --operator Jo {at}")
+        yield "calibrate", place.run(f"calibrate cavity --kPa 0 --seconds 1 --operator Jo {at}")
+        yield "settings", place.run(f"settings {at}")
+        yield "run", place.run("run examples/gel.experiment.toml --dry-run")
+        yield "run", place.run(f"run examples/gel.experiment.toml -o daemon.run.h5 --specimen gel-8 {at}")
+        yield "stop", place.run(f"stop {at}", (0, 1))
+        yield "continue", place.run(f"continue {at}", (0, 1))
+        yield "clear-fault", place.run(f"clear-fault {at}")
+        yield "blackbox", place.run(f"blackbox {at}")
+        yield "console", place.run(f"console {at}")
+    finally:
+        for program in (daemon, rig):
+            program.send_signal(signal.SIGTERM)
+            program.communicate()
+    yield "recover", place.run("recover --list journals")
+    journal = next((place.folder / "journals").glob("*.journal"))
+    yield "recover", place.run(f"recover {journal} -o recovered.run.h5", (0, 1))
+
+
+def documents(place, slow=False):
+    for group in (of_files, of_daemon, *((of_sessions,) if slow else ())):
+        for command, document in group(place):
+            if document is not None:
+                yield command, document
