@@ -1,7 +1,9 @@
 #include "firmware/boards/stm32f405/crash.hpp"
 
+#include <array>
 #include <cstddef>
 #include <span>
+#include <type_traits>
 
 #include "firmware/boards/stm32f405/memory_map.hpp"
 #include "firmware/boards/stm32f405/registers.hpp"
@@ -15,11 +17,13 @@ namespace {
 
 constexpr std::uint32_t kMark = 0xC4A5'4001;
 
+/// Plain words: what has a constructor would be begun anew at each start.
 struct Kept {
   std::uint32_t mark;
-  firmware::CrashRecord record;
+  std::array<std::uint32_t, wire::kCrashRegisters> values;
   std::uint32_t crc;
 };
+static_assert(std::is_trivially_default_constructible_v<Kept>);
 
 /// Not written at start-up.
 [[gnu::section(".retained")]] Kept kept;
@@ -40,8 +44,7 @@ bool was_stacked(const std::uint32_t* frame, std::uint32_t cfsr) {
 
 void keep_crash(const std::uint32_t* frame) {
   using enum wire::CrashRegister;
-  firmware::CrashRecord& record = kept.record;
-  record = {};
+  firmware::CrashRecord record;
   constexpr std::uint32_t kActive = 0x1FF;
   record[exception] = system_control().ICSR.read() & kActive;
   record[cfsr] = system_control().CFSR.read();
@@ -55,14 +58,14 @@ void keep_crash(const std::uint32_t* frame) {
     for (const wire::CrashRegister which : kFrame)
       record[which] = *frame++;
   }
-  kept.mark = kMark;
-  kept.crc = crc_of(record);
+  kept = {kMark, record.values, crc_of(record)};
 }
 
 std::optional<firmware::CrashRecord> take_crash() {
-  if (kept.mark != kMark || kept.crc != crc_of(kept.record)) return {};
+  const firmware::CrashRecord record{kept.values};
+  if (kept.mark != kMark || kept.crc != crc_of(record)) return {};
   kept.mark = 0;
-  return kept.record;
+  return record;
 }
 
 void start_cycle_counter() {

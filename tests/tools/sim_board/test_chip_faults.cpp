@@ -155,6 +155,44 @@ TEST_F(ChipFaults, ACrystalThatFailsStopsTheMotorAtOnceAndIsTold) {
   EXPECT_FALSE(board().level(diastole_wiring().enable.pin));
   connect(1'500);
   EXPECT_EQ(client->status().fault, wire::Fault::clock);
+  EXPECT_EQ(crash()[wire::CrashRegister::exception], 2U) << "NMI: clock security";
+}
+
+TEST_F(ChipFaults, AProcessorFaultIsKeptThroughTheResetWithItsPlace) {
+  power();
+  connect();
+  patch("USART3_IRQHandler", {0xde00});  // udf
+  crash_in_the_serial_interrupt();
+  auto registers = crash();
+  ASSERT_EQ(registers.size(), wire::kCrashRegisters);
+  EXPECT_EQ(registers[wire::CrashRegister::exception], 6U) << "usage fault";
+  EXPECT_EQ(registers[wire::CrashRegister::cfsr], 1U << 16) << "undefined instruction";
+  EXPECT_EQ(ElfSymbols(elf).name_at(registers[wire::CrashRegister::pc]).value_or(""), "USART3_IRQHandler");
+  EXPECT_GT(registers[wire::CrashRegister::cycles], 1'000'000U);
+}
+
+TEST_F(ChipFaults, AStackThatRunsOverMeetsItsGuard) {
+  power();
+  connect();
+  patch("USART3_IRQHandler", {0xb4ff, 0xe7fd});  // push {r0-r7}; and again
+  crash_in_the_serial_interrupt();
+  auto registers = crash();
+  EXPECT_EQ(registers[wire::CrashRegister::exception], 4U) << "MemManage";
+  EXPECT_EQ(registers[wire::CrashRegister::cfsr] & 0x92U, 0x92U)
+      << "denied, at an address, not stacked either";
+  EXPECT_EQ(registers[wire::CrashRegister::mmfar] & ~0xfffU, 0x2001'c000U);
+  EXPECT_EQ(registers[wire::CrashRegister::pc], 0U) << "nothing was stacked, nothing is made up";
+}
+
+TEST_F(ChipFaults, AJumpIntoRamExecutesNothing) {
+  power();
+  connect();
+  patch("USART3_IRQHandler",
+        {0xf240, 0x1001, 0xf2c2, 0x0000, 0x4780});  // movw r0, #0x101; movt r0, #0x2000; blx r0
+  crash_in_the_serial_interrupt();
+  auto registers = crash();
+  EXPECT_EQ(registers[wire::CrashRegister::exception], 4U) << "MemManage";
+  EXPECT_EQ(registers[wire::CrashRegister::cfsr] & 1U, 1U) << "execution denied";
 }
 
 TEST_F(ChipFaults, RevisionADoesNotPrefetch) {
