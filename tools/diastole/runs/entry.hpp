@@ -10,8 +10,8 @@
 namespace diastole::catalogue {
 
 struct Entry {
-  std::string path;  ///< from the catalogued folder
-  std::string kind;  ///< run, fit, explanation, images
+  std::string path;       ///< from the catalogued folder
+  std::string kind;       ///< run, fit, explanation, images
   std::string date = {};  ///< ISO 8601, UTC: a run's start; of other files when they were last written
   std::string specimen = {};
   std::string operator_name = {};
