@@ -58,7 +58,7 @@ void print_for_people(const Effect& effect) {
   print_for_people("Parameters in images", effect.field_parameters());
 }
 
-struct Interrupted {};
+struct TrialInterrupted {};
 
 const Effect& known(const std::string& id) {
   if (const Effect* effect = find_effect(id)) return *effect;
@@ -79,10 +79,10 @@ ExitCode check_file(const std::string& file, size_t threads, const CommandOutput
   std::vector<explain::EffectCheck> checks;
   try {
     checks = explain::EffectTrial(*effect, threads).all([](const std::string& what) {
-      if (Interruption::requested()) throw Interrupted{};
+      if (Interruption::requested()) throw TrialInterrupted{};
       fmt::print(stderr, "effects: trying {}\n", what);
     });
-  } catch (const Interrupted&) {
+  } catch (const TrialInterrupted&) {
     std::cerr << "diastole effects: interrupted\n";
     return ExitCode::negative;
   }
