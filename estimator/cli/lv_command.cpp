@@ -9,10 +9,14 @@
 
 #include "estimator/cli/commands.hpp"
 #include "estimator/cli/output_files.hpp"
+#include "estimator/imaging/geometry/cine_points.hpp"
 #include "estimator/imaging/geometry/ventricle_files.hpp"
+#include "estimator/imaging/geometry/ventricle_record.hpp"
 #include "estimator/imaging/geometry/ventricle_session.hpp"
 #include "estimator/io/finding_json.hpp"
 #include "estimator/io/whole_file.hpp"
+#include "estimator/report/page.hpp"
+#include "estimator/report/report.hpp"
 #include "protocol/contract/input_error.hpp"
 
 namespace diastole {
@@ -26,7 +30,7 @@ struct VentricleArguments {
   std::vector<size_t> elements;
   std::vector<double> fibre_deg;
   bool keep_slices = false;
-  std::optional<fs::path> surface, volumes;
+  std::optional<fs::path> surface, volumes, page, guide;
   bool force = false;
 };
 
@@ -167,6 +171,8 @@ imaging::VentricleRequest checked_request(const VentricleArguments& arguments) {
     require_output({*arguments.surface, inputs, imaging::surface_file_mark, arguments.force});
   if (arguments.volumes)
     require_output({*arguments.volumes, inputs, imaging::volume_file_mark, arguments.force});
+  if (arguments.guide) require_output({*arguments.guide, inputs, imaging::guide_file_mark, arguments.force});
+  if (arguments.page) require_output({*arguments.page, inputs, report::page_mark, arguments.force});
   return request;
 }
 
@@ -174,14 +180,19 @@ ExitCode run_ventricle(const VentricleArguments& arguments, const CommandOutput&
   const auto start = std::chrono::steady_clock::now();
   const bool shows_progress = isatty(STDERR_FILENO) != 0;
   const imaging::VentricleRequest request = checked_request(arguments);
-  const imaging::GuidePoints guide = imaging::read_guide_points(request.guide);
-  const imaging::VentricleSession session =
-      imaging::measure_ventricle(request, guide, [&](const std::string& stage) {
-        if (shows_progress) fmt::print(stderr, "{}\n", stage);
-      });
+  const auto tell = [&](const std::string& stage) {
+    if (shows_progress) fmt::print(stderr, "{}\n", stage);
+  };
+  const imaging::GuidePoints guide = fs::is_directory(request.guide)
+                                         ? imaging::cine_guide_points(request.guide, tell)
+                                         : imaging::read_guide_points(request.guide);
+  const imaging::VentricleSession session = imaging::measure_ventricle(request, guide, tell);
   write_whole_file(arguments.output, mesh_file_text(session.body));
+  if (arguments.guide) write_whole_file(*arguments.guide, imaging::guide_file_text(guide));
   if (arguments.surface) write_whole_file(*arguments.surface, imaging::surface_file_text(session));
   if (arguments.volumes) write_whole_file(*arguments.volumes, imaging::volume_file_text(session));
+  if (arguments.page)
+    write_whole_file(*arguments.page, report::make_report(imaging::ventricle_record(session, guide)));
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   if (out.json) {
     std::cout << to_json(session, arguments.output, seconds).dump(1) << '\n';
@@ -189,8 +200,10 @@ ExitCode run_ventricle(const VentricleArguments& arguments, const CommandOutput&
   }
   print_ventricle(session, seconds);
   fmt::print("The mesh is in {}\n", arguments.output.string());
+  if (arguments.guide) fmt::print("The points, to look at and to edit: {}\n", arguments.guide->string());
   if (arguments.surface) fmt::print("Points of its surfaces: {}\n", arguments.surface->string());
   if (arguments.volumes) fmt::print("Volumes: {}\n", arguments.volumes->string());
+  if (arguments.page) fmt::print("The page to look at: {}\n", arguments.page->string());
   return ExitCode::done;
 }
 
@@ -201,13 +214,19 @@ void add_ventricle(CommandLine& line) {
   CLI::App* command = line.add(
       "lv", "a ventricle's mesh, volumes and wall thickness from guide points or contours in its images",
       "  diastole lv heart.guide.csv -o heart.mesh\n"
-      "  diastole lv heart.guide.csv -o heart.mesh --volumes heart.volumes.csv --surface heart.surface.csv\n"
+      "  diastole lv heart.guide.csv -o heart.mesh --volumes heart.volumes.csv --page heart.html\n"
       "  diastole lv heart.guide.csv -o systole.mesh --phase 6 --mesh 12,6,2\n"
       "  diastole lv GPFile.txt -o heart.mesh --fibre-deg 60,-60 --json\n"
+      "  diastole lv dicom/ -o heart.mesh --guide heart.guide.csv\n"
+      "      the same from points that are found in cine images; edit them, and give them instead of the "
+      "folder\n"
       "A study uses the mesh with kind = \"fitted-lv\" and mesh_file = \"heart.mesh\".\n"
       "docs/lv.md says what the points are, and how slices of different breath holds are put together.");
   VentricleArguments& a = *arguments;
-  command->add_option("GUIDE", a.request.guide, "guide points (*.guide.csv, or biv-me's GPFile)")->required();
+  command
+      ->add_option("GUIDE", a.request.guide,
+                   "guide points (*.guide.csv, or biv-me's GPFile), or a folder of cine images")
+      ->required();
   command->add_option("-o,--output", a.output, "the mesh of one phase (*.mesh)")->required();
   command
       ->add_option("--phase", a.request.phase, "the mesh's phase, as the file numbers it; default: the first")
@@ -220,8 +239,12 @@ void add_ventricle(CommandLine& line) {
                    "fibre angle at the endocardium and at the epicardium, for laws with fibres")
       ->delimiter(',')
       ->expected(2);
+  command->add_option("--guide", a.guide,
+                      "the guide points as they are used, those found in a folder too (*.guide.csv)");
   command->add_option("--surface", a.surface, "points of the surfaces in all phases (*.csv)");
   command->add_option("--volumes", a.volumes, "volumes and wall thickness in all phases (*.csv)");
+  command->add_option("--page", a.page,
+                      "a page to look at: sections with the points, volumes, thickness, slices");
   auto* reference = command
                         ->add_option("--reference", a.request.fit.reference_slices,
                                      "slices that are where they belong; default: the long-axis ones")

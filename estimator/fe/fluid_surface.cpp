@@ -61,6 +61,37 @@ void for_edge_functions(const FaceEdge& edge, const Visit& visit) {
   }
 }
 
+/// What the lid over a rim in one plane adds to the wall's half flux of (x, y, 0), which is the volume if lids lie across z: the
+/// wall's third of the flux of x - p, p on the plane, counts all of it. Zero where the rim lies across z, or in no one plane.
+double lid_volume_mm3(const HermiteMesh& mesh, const std::vector<ElementFace>& faces,
+                      const std::vector<Eigen::Vector3d>& rim) {
+  if (rim.size() < 3) return 0;
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();
+  for (const Eigen::Vector3d& x : rim)
+    centre += x / static_cast<double>(rim.size());
+  Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
+  for (const Eigen::Vector3d& x : rim)
+    spread += (x - centre) * (x - centre).transpose();
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(spread);
+  const double slack_mm = 1e-6 * mesh.extent_mm();
+  const Eigen::Vector3d normal = axes.eigenvectors().col(0);
+  double off_plane_mm = 0, off_level_mm = 0;
+  for (const Eigen::Vector3d& x : rim) {
+    off_plane_mm = std::max(off_plane_mm, std::abs(normal.dot(x - centre)));
+    off_level_mm = std::max(off_level_mm, std::abs(x.z() - centre.z()));
+  }
+  if (off_plane_mm > slack_mm || off_level_mm <= slack_mm) return 0;
+  double whole = 0, without_lid = 0;
+  for (const ElementFace& face : faces) {
+    const ElementField reference = mesh.gather(face.element, mesh.reference());
+    without_lid += face_volume_mm3(face, reference);
+    for_each_face_point(face, reference, [&](const FacePoint& point) {
+      whole += point.weight * (point.position - centre).dot(point.normal()) / 3;
+    });
+  }
+  return whole - without_lid;
+}
+
 }  // namespace
 
 double FluidFace::volume_mm3(const ElementField& position_mm) const {
@@ -96,13 +127,20 @@ FluidSurface::FluidSurface(const HermiteMesh& mesh, const std::vector<ElementFac
                            const HeldDofs& held, std::span<const ElementFace> plates) {
   const std::map<Ends, size_t> inside = count_edges(mesh, faces);
   const std::map<Ends, size_t> at_plates = count_edges(mesh, plates);
+  std::vector<Eigen::Vector3d> held_rim;
   for (const ElementFace& face : faces) {
     FluidFace& added = faces_.emplace_back(FluidFace{face});
     for (size_t number = 0; number < 4; ++number) {
       const FaceEdge edge{face, number};
       const Ends ends = ends_of(mesh, edge);
       const bool rim = ends.first != ends.second && inside.at(ends) == 1;
-      if (!rim || harmless(mesh, edge, held)) continue;
+      if (!rim) continue;
+      if (harmless(mesh, edge, held)) {
+        for (const size_t node : {ends.first, ends.second})
+          held_rim.emplace_back(mesh.reference()[dof_of(node, 0, 0)], mesh.reference()[dof_of(node, 0, 1)],
+                                mesh.reference()[dof_of(node, 0, 2)]);
+        continue;
+      }
       if (at_plates.contains(ends)) {
         added.gaps.push_back({edge, mesh.reference()[dof_of(ends.first, 0, 2)]});
       } else {
@@ -110,10 +148,11 @@ FluidSurface::FluidSurface(const HermiteMesh& mesh, const std::vector<ElementFac
       }
     }
   }
+  if (closed()) lid_mm3_ = lid_volume_mm3(mesh, faces, held_rim);
 }
 
 double FluidSurface::volume_mm3(const HermiteMesh& mesh, const NodeField& position_mm) const {
-  double volume = 0.0;
+  double volume = lid_mm3_;
   for (const FluidFace& face : faces_)
     volume += face.volume_mm3(mesh.gather(face.face.element, position_mm));
   return volume;

@@ -7,7 +7,8 @@
 //
 //   at a plate       the rim cannot leave the plane z = h of a plate, or the gap that opens is counted
 //                    (face_edge.hpp): V is the exact volume between wall and plates, the tangent is symmetric
-//   held             no two components of the rim's motion are free: likewise
+//   held             no two components of the rim's motion are free: likewise; the lid of a held rim in one oblique
+//                    plane (a ventricle in patient coordinates) has a constant share of the volume
 //   free             the force is p times the integral of n over the wall alone; it has no potential, and the
 //                    tangent has a skew part along the rim (face_edge.hpp)
 //
@@ -58,6 +59,7 @@ class FluidSurface {
  private:
   std::vector<FluidFace> faces_;
   std::vector<FaceEdge> free_rim_;
+  double lid_mm3_ = 0;
 };
 
 }  // namespace diastole

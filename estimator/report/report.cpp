@@ -116,6 +116,12 @@ std::string make_report(const FlowRecord& record) {
   return page.html();
 }
 
+std::string make_report(const VentricleRecord& record) {
+  Page page("A ventricle's walls and volumes");
+  add_ventricle(page, record);
+  return page.html();
+}
+
 std::string make_report(const explain::Explanation& explanation) {
   Page page(explanation_title({explanation}));
   add_explanation(page, explanation);

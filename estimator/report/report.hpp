@@ -10,6 +10,7 @@
 #include "estimator/explain/verdict/explanation.hpp"
 #include "estimator/io/flow_file.hpp"
 #include "estimator/io/tracking_file.hpp"
+#include "estimator/io/ventricle_record.hpp"
 
 namespace diastole::report {
 
@@ -22,6 +23,9 @@ std::string make_report(const TrackingRecord& record);
 
 /// The same page of a flow at hand.
 std::string make_report(const FlowRecord& record);
+
+/// The page of a fitted ventricle.
+std::string make_report(const VentricleRecord& record);
 
 /// The same page of an explanation at hand.
 std::string make_report(const explain::Explanation& explanation);

@@ -7,6 +7,7 @@
 #include "estimator/io/reconstruction_file.hpp"
 #include "estimator/io/solution_file.hpp"
 #include "estimator/io/tracking_file.hpp"
+#include "estimator/io/ventricle_record.hpp"
 #include "estimator/montecarlo/cells_file.hpp"
 #include "estimator/report/page.hpp"
 #include "estimator/shear/shear_fit.hpp"
@@ -34,6 +35,9 @@ void add_tracking(Page& page, const TrackingRecord& record);
 
 /// Flow and volume over the cycle, the pressure-volume loop with its stiffness, the images with the lumen's outline.
 void add_flow(Page& page, const FlowRecord& flow);
+
+/// Sections with the points that were set, volumes and wall thickness over the cycle, displaced slices.
+void add_ventricle(Page& page, const VentricleRecord& heart);
 
 /// Each in its severity's dress.
 void add_findings(Page& page, const std::vector<Finding>& findings);
