@@ -86,6 +86,7 @@ def of_files(place):
     yield "design", place.run(f"design {gel} --images --snr 15 --mesh 4,2,1")
     yield "shear", place.run("shear examples/shear-test.csv -o shear.html")
     yield "report", place.run("report gel.run.h5 points.fit.json -o gel.html")
+    yield "lv", place.run("lv examples/ventricle.guide.csv -o heart.mesh --fibre-deg 60,-60")
     yield "mesh", place.run("mesh export examples/lv-clean.study.toml -o lv.mesh.toml")
     yield "effects", place.run("effects")
     yield "effects", place.run("effects hose-compliance")
