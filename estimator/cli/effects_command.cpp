@@ -58,7 +58,7 @@ void print_for_people(const Effect& effect) {
   print_for_people("Parameters in images", effect.field_parameters());
 }
 
-struct TrialInterrupted {};
+struct StoppedTrial {};
 
 const Effect& known(const std::string& id) {
   if (const Effect* effect = find_effect(id)) return *effect;
@@ -79,10 +79,10 @@ ExitCode check_file(const std::string& file, size_t threads, const CommandOutput
   std::vector<explain::EffectCheck> checks;
   try {
     checks = explain::EffectTrial(*effect, threads).all([](const std::string& what) {
-      if (Interruption::requested()) throw TrialInterrupted{};
+      if (Interruption::requested()) throw StoppedTrial{};
       fmt::print(stderr, "effects: trying {}\n", what);
     });
-  } catch (const TrialInterrupted&) {
+  } catch (const StoppedTrial&) {
     std::cerr << "diastole effects: interrupted\n";
     return ExitCode::negative;
   }

@@ -9,7 +9,7 @@
 namespace diastole {
 namespace {
 
-constexpr double reach = 6.0;  ///< of the loss, in sd
+constexpr double reach = 8.0;  ///< of the loss, in sd: beyond, numbers see none of it
 
 void apply(EffectValues values, const EffectContext& context, rig::RigModel& model) {
   const double lost_mL = values[0];

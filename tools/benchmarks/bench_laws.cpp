@@ -16,7 +16,7 @@ namespace {
 using diastole::Law;
 using Tensor = diastole::SymmetricTensor<double>;
 
-constexpr size_t evaluations = 200'000;
+constexpr size_t evaluations = 20'000;
 
 /// Nanoseconds a call; `evaluate` gives a number that keeps the work from being optimised away.
 template <class Evaluate>

@@ -12,17 +12,17 @@
 namespace diastole::explain {
 namespace {
 
-constexpr std::array pressures{&rig::Prediction::cavity_kPa, &rig::Prediction::pump_kPa};
+constexpr std::array shown_pressures{&rig::Prediction::cavity_kPa, &rig::Prediction::pump_kPa};
 
 bool is_finite(const rig::Prediction& shown) {
-  return std::ranges::all_of(pressures, [&](const auto channel) {
+  return std::ranges::all_of(shown_pressures, [&](const auto channel) {
     return std::ranges::all_of(shown.*channel, [](double value) { return std::isfinite(value); });
   });
 }
 
 double largest_difference_kPa(const rig::Prediction& a, const rig::Prediction& b) {
   double largest = 0.0;
-  for (const auto channel : pressures)
+  for (const auto channel : shown_pressures)
     for (size_t k = 0; k < (a.*channel).size(); ++k)
       largest = std::max(largest, std::abs((a.*channel)[k] - (b.*channel)[k]));
   return largest;
@@ -133,7 +133,7 @@ EffectCheck EffectTrial::differentiable() const {
     const rig::Prediction down = moved(-wider * unknown.perturbation);
     double difference = 0.0;
     double size = 0.0;
-    for (const auto channel : pressures)
+    for (const auto channel : shown_pressures)
       for (size_t k = 0; k < (here.*channel).size(); ++k) {
         const double slope = ((forward.*channel)[k] - (here.*channel)[k]) / unknown.perturbation;
         const double central = ((up.*channel)[k] - (down.*channel)[k]) / (2.0 * wider * unknown.perturbation);
