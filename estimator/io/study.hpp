@@ -81,7 +81,7 @@ struct StudyParameter {
 };
 
 struct StudyLaw {
-  std::string name;  ///< "neo-hookean"; whether it is known is decided where the model is built. The path if `file` is given
+  std::string name;  ///< "neo-hookean", known or not where the model is built; its path if `file` is given
   std::vector<StudyParameter> parameters;
   std::optional<std::filesystem::path> file = {};  ///< the user's own law (estimator/materials/file_law.hpp)
 };
@@ -142,9 +142,9 @@ struct Study {
   Specimen specimen;
   StudyLaw law;
   StudyData data;
-  std::vector<std::string> effects;             ///< effects that the model already includes
-  std::vector<StudyEffect> effect_values = {};  ///< of some or all of them
-  std::vector<std::filesystem::path> effect_files = {};  ///< the user's own effects, beside those that are built in
+  std::vector<std::string> effects;                      ///< effects that the model already includes
+  std::vector<StudyEffect> effect_values = {};           ///< of some or all of them
+  std::vector<std::filesystem::path> effect_files = {};  ///< the user's own effects
   StudyModelError model_error = {};
   std::optional<StudyChamber> chamber = {};
   StudyCompression compression = {};

@@ -40,9 +40,9 @@ struct Session {
   std::vector<SessionRun> runs;  ///< in the study's order
   RigModel base;                 ///< of the first run's /rig; its curve is not yet set
   std::map<std::string, double>
-      tolerance_sd;     ///< of the first run's /rig: what it states of its parts (rig_fit/tolerance.hpp)
+      tolerance_sd;  ///< of the first run's /rig: what it states of its parts (rig_fit/tolerance.hpp)
   EffectLibrary effects = {};  ///< that may be in it
-  MotionLimits limits;  ///< of the first run's /rig; the controller's own where it does not tell
+  MotionLimits limits;         ///< of the first run's /rig; the controller's own where it does not tell
 };
 
 /// Throws InputError if the study names no runs or a run cannot be read.

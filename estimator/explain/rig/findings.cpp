@@ -192,7 +192,8 @@ Gap held_out_gap(const rig::SessionProblem& problem, const EffectSet& before, co
   return gap;
 }
 
-std::vector<Candidate> candidates(const EffectLibrary& known, const SetSearch& search, const SetVerdict& verdict) {
+std::vector<Candidate> candidates(const EffectLibrary& known, const SetSearch& search,
+                                  const SetVerdict& verdict) {
   std::vector<Candidate> list;
   const auto plain = std::ranges::find_if(
       search.sets, [&](const EffectSet& set) { return set.model.terms.size() == search.given; });

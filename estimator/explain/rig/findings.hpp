@@ -26,7 +26,8 @@ std::vector<Misfit> misfits(const rig::SessionProblem& problem, const EffectSet&
 Gap held_out_gap(const rig::SessionProblem& problem, const EffectSet& before, const EffectSet& after);
 
 /// The evidence table.
-std::vector<Candidate> candidates(const EffectLibrary& known, const SetSearch& search, const SetVerdict& verdict);
+std::vector<Candidate> candidates(const EffectLibrary& known, const SetSearch& search,
+                                  const SetVerdict& verdict);
 
 std::vector<Trace> traces(const rig::SessionProblem& problem, const EffectSet& before,
                           const EffectSet& after);

@@ -17,12 +17,12 @@ using scanner::VentriclePhantom;
 using testing::AllOf;
 using testing::HasSubstr;
 
-std::string guide_of(const VentriclePhantom& heart) { return scanner::click(heart, {.phases = 3}).guide_csv; }
+std::string guide_of(const VentriclePhantom& of) { return scanner::click(of, {.phases = 3}).guide_csv; }
 
 TEST(LvCommand, MakesAMeshThatAStudySolves) {
   const test::ScratchFolder folder;
-  const VentriclePhantom heart = VentriclePhantom::random(5);
-  const std::string guide = folder.write("heart.guide.csv", guide_of(heart)).string();
+  const VentriclePhantom phantom = VentriclePhantom::random(5);
+  const std::string guide = folder.write("heart.guide.csv", guide_of(phantom)).string();
   const auto in_folder = [&](const char* name) { return (folder.path() / name).string(); };
   const nlohmann::json told = nlohmann::json::parse(
       test::run_command({"lv", guide, "-o", in_folder("heart.mesh"), "--mesh", "6,3,1", "--fibre-deg",
@@ -35,7 +35,7 @@ TEST(LvCommand, MakesAMeshThatAStudySolves) {
   EXPECT_EQ(told["largest_phase"], 0);
   EXPECT_GT(told["least_jacobian"].get<double>(), 0.5);
   const double cavity_mL = told["cavity_mL"].get<double>();
-  EXPECT_NEAR(cavity_mL, heart.cavity_mL(0), 0.03 * heart.cavity_mL(0));
+  EXPECT_NEAR(cavity_mL, phantom.cavity_mL(0), 0.03 * phantom.cavity_mL(0));
   for (const auto& shift : told["slice_shifts_mm"])
     EXPECT_EQ(shift["reference"].get<bool>(), shift["slice"].get<std::string>().starts_with("la"));
   EXPECT_THAT(read_whole_file(in_folder("volumes.csv")), testing::StartsWith("phase,cavity_volume_mL,"));

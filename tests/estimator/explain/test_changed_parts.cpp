@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "tests/estimator/rig_fit/simulated_session.hpp"
+#include "estimator/rig_fit/simulated_session.hpp"
 
 namespace diastole::explain {
 namespace {
