@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <cstdint>
+#include <initializer_list>
 #include <limits>
 
 namespace diastole::signal {
@@ -17,8 +18,8 @@ struct Saturated {
 
 class SaturationWatch {
  public:
-  /// Two equal samples happen at the top of every wave of a coarse instrument.
-  static constexpr int64_t kLeastRun = 3;
+  /// Some equal samples happen at the extreme of a long recording's noise, where it is a few codes; six hardly ever do.
+  static constexpr int64_t kLeastRun = 6;
   /// A signal at rest flickers between neighbouring codes; one that is cut off has been moving on.
   static constexpr double kLeastStep_codes = 4;
   /// ... and by this part of what the signal spans: values that are not codes have no smallest step.

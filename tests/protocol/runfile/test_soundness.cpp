@@ -190,13 +190,14 @@ TEST(Soundness, ARunOfDeclaredGapsAloneSaysThatNoPressureWasRecorded) {
   EXPECT_THAT(assess(run).problems, testing::Contains(HasSubstr("no pressure was recorded")));
 }
 
-/// A sine of `amplitude_kPa` at 2 Hz, in codes of 1/100 kPa, as an instrument that ends at ± 100 kPa shows it.
+/// Rest, then a sine of `amplitude_kPa` at 2 Hz, in codes of 1/100 kPa, as an instrument that ends at ± 100 kPa shows it.
 std::vector<double> measured(double amplitude_kPa, double noise_kPa = 0.02) {
   std::mt19937 random(17);
   std::normal_distribution<double> noise(0, noise_kPa);
   std::vector<double> values_kPa;
   for (int i = 0; i < 400; ++i) {
-    const double value_kPa = amplitude_kPa * std::sin(2 * 3.14159265 * 0.02 * i) + noise(random);
+    const double value_kPa =
+        amplitude_kPa * std::sin(2 * 3.14159265 * 0.02 * std::max(i - 100, 0)) + noise(random);
     values_kPa.push_back(std::clamp(std::round(100 * value_kPa) / 100, -100.0, 100.0));
   }
   return values_kPa;

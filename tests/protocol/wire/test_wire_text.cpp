@@ -42,7 +42,8 @@ TEST(WireText, EveryFaultIsExplainedWithARemedy) {
     EXPECT_GT(fault_explanation(fault).size(), 5U);
     EXPECT_GT(fault_remedy(fault).size(), 5U);
     const bool clears = fault_remedy(fault).find("`diastole clear-fault`") != std::string_view::npos;
-    EXPECT_EQ(clears, fault != Fault::none) << fault_name(fault);
+    // The crystal is looked at once, when the controller starts.
+    EXPECT_EQ(clears, fault != Fault::none && fault != Fault::clock) << fault_name(fault);
     explanations.emplace(fault_explanation(fault));
   }
   EXPECT_EQ(explanations.size(), static_cast<std::size_t>(kLastFault) + 1);
