@@ -151,7 +151,7 @@ const std::vector<Rule>& rules() {
       {"tools/program", {"protocol/contract"}},
       {"tools/sim_controller", {"protocol/contract"}},
       {"tools/sim_daq", {"protocol/contract", "tools/program"}},
-      {"tools/sim_board/core", {}},
+      {"tools/sim_board/core", {"tools/sim_board/facts"}},
       {"tools/sim_board/peripherals", {"tools/sim_board/core"}},
       {"tools/sim_board/processor",
        {"protocol/contract", "tools/sim_board/core", "tools/sim_board/peripherals"}},

@@ -23,8 +23,9 @@ struct VentriclePhantom {
   double base_mm = 15;
   double base_fall_mm = 6;  ///< of the base, at the end of the beat's contraction
   Eigen::Vector2d base_tilt{0.05, -0.03};
-  std::array<Eigen::Vector2d, 3> waves{};  ///< (p, q) of n = 1, 2, 3
-  double shortening = 0.2;                 ///< of the endocardium across
+  std::array<Eigen::Vector2d, 3> waves{Eigen::Vector2d::Zero(), Eigen::Vector2d::Zero(),
+                                       Eigen::Vector2d::Zero()};  ///< (p, q) of n = 1, 2, 3
+  double shortening = 0.2;                                        ///< of the endocardium across
   Eigen::Matrix3d axes = Eigen::Matrix3d::Identity();
   Eigen::Vector3d origin_mm = Eigen::Vector3d::Zero();
 

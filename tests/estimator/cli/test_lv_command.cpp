@@ -17,17 +17,19 @@ using scanner::VentriclePhantom;
 using testing::AllOf;
 using testing::HasSubstr;
 
-std::string guide_of(const VentriclePhantom& of) { return scanner::click(of, {.phases = 3}).guide_csv; }
+std::string guide_of(const VentriclePhantom& ventricle) {
+  return scanner::click(ventricle, {.phases = 3}).guide_csv;
+}
 
 TEST(LvCommand, MakesAMeshThatAStudySolves) {
   const test::ScratchFolder folder;
-  const VentriclePhantom phantom = VentriclePhantom::random(5);
-  const std::string guide = folder.write("heart.guide.csv", guide_of(phantom)).string();
+  const VentriclePhantom ventricle = VentriclePhantom::random(5);
+  const std::string guide = folder.write("ventricle.guide.csv", guide_of(ventricle)).string();
   const auto in_folder = [&](const char* name) { return (folder.path() / name).string(); };
   const nlohmann::json told = nlohmann::json::parse(
-      test::run_command({"lv", guide, "-o", in_folder("heart.mesh"), "--mesh", "6,3,1", "--fibre-deg",
+      test::run_command({"lv", guide, "-o", in_folder("ventricle.mesh"), "--mesh", "6,3,1", "--fibre-deg",
                          "60,-60", "--volumes", in_folder("volumes.csv"), "--surface",
-                         in_folder("surface.csv"), "--page", in_folder("heart.html"), "--json"})
+                         in_folder("surface.csv"), "--page", in_folder("ventricle.html"), "--json"})
           .output);
   EXPECT_EQ(told["elements"], 18);
   EXPECT_EQ(told["node_sigma_mm"].size(), 48U);
@@ -35,19 +37,19 @@ TEST(LvCommand, MakesAMeshThatAStudySolves) {
   EXPECT_EQ(told["largest_phase"], 0);
   EXPECT_GT(told["least_jacobian"].get<double>(), 0.5);
   const double cavity_mL = told["cavity_mL"].get<double>();
-  EXPECT_NEAR(cavity_mL, phantom.cavity_mL(0), 0.03 * phantom.cavity_mL(0));
+  EXPECT_NEAR(cavity_mL, ventricle.cavity_mL(0), 0.03 * ventricle.cavity_mL(0));
   for (const auto& shift : told["slice_shifts_mm"])
     EXPECT_EQ(shift["reference"].get<bool>(), shift["slice"].get<std::string>().starts_with("la"));
   EXPECT_THAT(read_whole_file(in_folder("volumes.csv")), testing::StartsWith("phase,cavity_volume_mL,"));
   EXPECT_THAT(read_whole_file(in_folder("surface.csv")),
               AllOf(testing::StartsWith("phase,surface,x_mm,y_mm,z_mm\n"), HasSubstr("\n2,epi,")));
-  EXPECT_THAT(read_whole_file(in_folder("heart.html")),
+  EXPECT_THAT(read_whole_file(in_folder("ventricle.html")),
               AllOf(HasSubstr("Over the cycle"), HasSubstr("Slice la0")));
 
   const std::string study = folder
-                                .write("heart.study.toml",
+                                .write("ventricle.study.toml",
                                        "format = \"diastole-study\"\nversion = 1\n[specimen]\nkind = "
-                                       "\"fitted-lv\"\nmesh_file = \"heart.mesh\"\n"
+                                       "\"fitted-lv\"\nmesh_file = \"ventricle.mesh\"\n"
                                        "ends = \"fixed\"\n[law]\nname = \"guccione\"\n"
                                        "[law.parameters.C_kPa]\nstart = 2.0\nbounds = [1.0, 15.0]\n"
                                        "[law.parameters.b1]\nstart = 8.0\nbounds = [1.0, 15.0]\n"
@@ -65,11 +67,11 @@ TEST(LvCommand, MakesAMeshThatAStudySolves) {
 
 TEST(LvCommand, RefusesWithAReasonAndLeavesNothing) {
   const test::ScratchFolder folder;
-  const std::string guide = folder.write("heart.guide.csv", guide_of({})).string();
+  const std::string guide = folder.write("ventricle.guide.csv", guide_of({})).string();
   const std::string bad =
       folder.write("bad.guide.csv", "phase,slice,surface,x_mm,y_mm,z_mm,sigma_mm\n0,sa00,endo,1,two,3,0.5\n")
           .string();
-  const std::string mesh = (folder.path() / "heart.mesh").string();
+  const std::string mesh = (folder.path() / "ventricle.mesh").string();
   const auto refusal = [&](std::vector<std::string> arguments) {
     arguments.insert(arguments.begin(), "lv");
     return test::message_of([&] { (void)test::run_command(arguments); });
@@ -77,7 +79,7 @@ TEST(LvCommand, RefusesWithAReasonAndLeavesNothing) {
   EXPECT_THAT(refusal({bad, "-o", mesh}), AllOf(HasSubstr("bad.guide.csv: line 2, column y_mm"),
                                                 HasSubstr("\"two\""), HasSubstr("A row is")));
   EXPECT_THAT(refusal({(folder.path() / "none.csv").string(), "-o", mesh}), HasSubstr("none.csv"));
-  EXPECT_THAT(refusal({guide, "-o", guide}), HasSubstr("heart.guide.csv"));
+  EXPECT_THAT(refusal({guide, "-o", guide}), HasSubstr("ventricle.guide.csv"));
   EXPECT_THAT(refusal({guide, "-o", mesh, "--mesh", "2,2,1"}),
               AllOf(HasSubstr("--mesh"), HasSubstr("2,2,1")));
   EXPECT_THAT(refusal({guide, "-o", mesh, "--phase", "9"}),
