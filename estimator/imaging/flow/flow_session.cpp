@@ -18,7 +18,7 @@ namespace {
 constexpr int curve_points = 240;
 constexpr int outline_points = 72;
 /// Around the lumen, so that wall and still material are seen.
-constexpr int margin_px = 8;
+constexpr int cut_margin_px = 8;
 
 template <class Value>
 std::string picture_of(Eigen::Index rows, Eigen::Index columns, const Value& share_at) {
@@ -37,8 +37,8 @@ void add_images(FlowRecord& record, const FlowMeasurement& flow) {
   const LumenShape& shape = flow.lumen.shapes[0];
   const Eigen::Vector2d centre = shape.centre_mm.cwiseQuotient(pixel_mm);
   const auto window = [&](double middle, double radius, int count) {
-    const int first = std::clamp(static_cast<int>(middle - radius) - margin_px, 0, count - 1);
-    const int last = std::clamp(static_cast<int>(middle + radius) + margin_px, first, count - 1);
+    const int first = std::clamp(static_cast<int>(middle - radius) - cut_margin_px, 0, count - 1);
+    const int last = std::clamp(static_cast<int>(middle + radius) + cut_margin_px, first, count - 1);
     return std::pair(first, last - first + 1);
   };
   const auto [first_column, columns] = window(centre.x(), shape.radius_mm / pixel_mm.x(), plane.columns);

@@ -20,7 +20,6 @@ constexpr double least_magnitude = 4.0;
 constexpr double movement_z = 4.0;
 /// A core slower than a quarter turn is beyond doubt.
 constexpr double sure_rad = 0.5 * std::numbers::pi;
-constexpr double turn = 2 * std::numbers::pi;
 
 /// Of the scene, by which its derivatives are taken.
 Eigen::VectorXd difference_steps(const LumenScene& scene, double pixel_mm) {

@@ -2,6 +2,7 @@
 // Where a phase-contrast cine shows moving fluid and where still material: by how a pixel's phase changes over the cycle, against its noise.
 
 #include <Eigen/Dense>
+#include <numbers>
 #include <vector>
 
 #include "estimator/imaging/flow/phase_contrast.hpp"
@@ -28,6 +29,7 @@ struct MotionMap {
   [[nodiscard]] double still_below() const;
 };
 
+inline constexpr double turn = 2 * std::numbers::pi;
 /// Radians brought within half a turn of zero.
 double within_half_turn(double radians);
 

@@ -3,7 +3,8 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
-#include <numbers>
+
+#include "estimator/imaging/flow/moving_fluid.hpp"
 
 namespace diastole::imaging {
 namespace {
@@ -11,7 +12,6 @@ namespace {
 /// More turns than this in either direction would be a venc of a seventh of the peak.
 constexpr int most_turns = 3;
 constexpr int states = 2 * most_turns + 1;
-constexpr double turn = 2 * std::numbers::pi;
 
 }  // namespace
 

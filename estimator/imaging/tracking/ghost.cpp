@@ -12,7 +12,7 @@ constexpr double least_score = 6.0;
 /// What is brighter is no air with a ghost but another picture.
 constexpr double dark_in_sigmas = 6.0;
 /// An edge leaks over some pixels.
-constexpr double sure_in_pixels = 3.0;
+constexpr double inside_in_pixels = 3.0;
 constexpr Eigen::Index least_shift = 8;
 constexpr size_t most_ghosts = 4;
 
@@ -44,7 +44,7 @@ std::vector<Ghost> find_ghosts(const TagView& view, const std::vector<const Mate
     for (Eigen::Index column = 0; column < depth.cols(); ++column) {
       for (Eigen::Index row = 0; row < depth.rows(); ++row) {
         const double value = static_cast<double>(view.images[k](row, column)) / noise[k];
-        if (static_cast<double>(depth(row, column)) < sure_in_pixels * view.plane.finer_spacing_mm() ||
+        if (static_cast<double>(depth(row, column)) < inside_in_pixels * view.plane.finer_spacing_mm() ||
             value > dark_in_sigmas || view.is_masked(k, row, column))
           continue;
         air.push_back({k, row, column, value * value});

@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "estimator/imaging/tracking/robust_weight.hpp"
+
 namespace diastole::imaging {
 namespace {
 
@@ -16,8 +18,6 @@ constexpr double most_excess = 3.0;
 /// What the residual still wants to move a circle's line by: five standard deviations of it, and a tenth of the spacing.
 constexpr double most_pull_in_sigmas = 5.0;
 constexpr double most_pull_in_spacings = 0.1;
-/// Huber's limit for a point's own pixels, in standard deviations, as in the fit of the motion.
-constexpr double huber = 3.0;
 /// The pixels around a point see its tag within half a spacing of where it was followed, or they see another.
 constexpr double most_own_in_spacings = 0.5;
 
@@ -145,8 +145,8 @@ class Emitter {
         const double slope = static_cast<double>(phase.slope[f](row, column));
         if (owner(row, column) < 0 || slope == 0) continue;
         const double residual = static_cast<double>(phase.residual(row, column));
-        const double weight = std::min(1.0, huber * phase.noise / std::max(std::abs(residual), 1e-300)) /
-                              (phase.noise * phase.noise * tracked_.noise_factor[f]);
+        const double weight =
+            huber_weight(residual, phase.noise) / (phase.noise * phase.noise * tracked_.noise_factor[f]);
         Place& place = places_[static_cast<size_t>(owner(row, column))];
         place.information += weight * slope * slope;
         place.gradient += weight * slope * residual;

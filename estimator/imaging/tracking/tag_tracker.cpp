@@ -9,6 +9,7 @@
 #include "estimator/imaging/series/spectrum.hpp"
 #include "estimator/imaging/tracking/brightness.hpp"
 #include "estimator/imaging/tracking/motion_prior.hpp"
+#include "estimator/imaging/tracking/robust_weight.hpp"
 #include "protocol/signal/median.hpp"
 
 namespace diastole::imaging {
@@ -22,8 +23,6 @@ constexpr double knots_in_spacings = 2.0;
 constexpr double window_in_spacings = 1.0;
 /// A pixel counts as surely tissue this far inside: a pixel's half width and the point spread of a matrix that is half filled.
 constexpr double sure_in_pixels = 1.25;
-/// Huber's limit in standard deviations: ghosts and folds are no noise.
-constexpr double huber = 3.0;
 /// Before anything is learnt: motion from phase to phase of a fifth of a spacing, alike over some spacings.
 constexpr double first_step_in_spacings = 0.2;
 constexpr double first_range_in_spacings = 4.0;
@@ -192,10 +191,6 @@ class ViewTracker {
     for (size_t j = 0; j < patterns.count; ++j)
       sum += amplitudes[j] * patterns.value[j];
     return sum;
-  }
-
-  static double huber_weight(double residual, double sigma) {
-    return std::min(1.0, huber * sigma / std::max(std::abs(residual), 1e-300));
   }
 
   /// All pixels that tissue may reach in the cycle: half a spacing around the first map and more, and what is within drawn contours.
@@ -419,7 +414,7 @@ class ViewTracker {
     double sum = 0;
     for (const Fitted& fitted : fitted_) {
       const double off = std::abs(fitted.residual) / noise;
-      sum += off < huber ? 0.5 * off * off : huber * (off - 0.5 * huber);
+      sum += off < huber_limit ? 0.5 * off * off : huber_limit * (off - 0.5 * huber_limit);
     }
     return sum;
   }
@@ -536,7 +531,7 @@ class ViewTracker {
   double power_near_tags(const TrackedPhase& phase, size_t f) const {
     const Eigen::Vector2d extent(view_.plane.columns * view_.plane.column_spacing_mm,
                                  view_.plane.rows * view_.plane.row_spacing_mm);
-    const auto limit = static_cast<float>(huber * phase.noise);
+    const auto limit = static_cast<float>(huber_limit * phase.noise);
     const Eigen::ArrayXXf power = spectrum_of(phase.residual.min(limit).max(-limit)).abs2();
     double sum = 0, count = 0;
     for (Eigen::Index column = 0; column < power.cols(); ++column) {
