@@ -16,8 +16,9 @@ namespace {
 
 /// A line whose first resonance is slower than this has twice the components: strokes move its higher ones, too.
 constexpr double slow_quarter_wave_Hz = 3.0;
-/// A gas at the pump is not linear: its steps are this many times shorter.
-constexpr double gas_steps = 2.0;
+/// A gas at the pump is not linear: its steps are this many times shorter. So are those of a leak that grows with pressure, which the line
+/// takes for its conductance at rest and a load.
+constexpr double gas_steps = 2.0, leak_steps = 4.0;
 
 DriveTrace driven(const RigModel& model, const RunDrive& run, DriveTrace motion) {
   for (const auto& change : model.drive)
@@ -102,6 +103,7 @@ class Plant {
         drive_(driven(model, run, motion)),
         gas_(model.pump_gas_mL, model.gas_exponent, run.place.atmosphere_kPa),
         leaks_(made(model.pump_leaks, run.place)),
+        drive_yields_(!gas_.present() && model.drive_compliance_mL_per_kPa > least_compliance),
         line_(model.hose, {.step_s = options.step_s,
                            .components = options.components,
                            .pump_stiffness = pump_stiffness(),
@@ -133,13 +135,13 @@ class Plant {
   /// Of what yields before the hose: gas or, far stiffer, the drive.
   [[nodiscard]] std::optional<double> pump_stiffness() const {
     if (gas_.present()) return gas_.stiffness_at_rest();
-    if (model_.drive_compliance_mL_per_kPa > least_compliance)
-      return 1.0 / model_.drive_compliance_mL_per_kPa;
+    if (drive_yields_)
+      return 1.0 / (model_.drive_compliance_mL_per_kPa + model_.pump_leak_mL_s_kPa * leak_time_s());
     return {};
   }
   [[nodiscard]] std::optional<double> pump_resistance() const {
-    if (!pump_stiffness() && model_.pump_leak_mL_s_kPa > least_leak) return 1.0 / model_.pump_leak_mL_s_kPa;
-    if (pump_stiffness() && !gas_.present()) return *pump_stiffness() * drive_damping_s;
+    if (drive_yields_) return *pump_stiffness() * drive_damping_s;
+    if (!gas_.present() && model_.pump_leak_mL_s_kPa > least_leak) return 1.0 / model_.pump_leak_mL_s_kPa;
     return {};
   }
   [[nodiscard]] double loss_at_pump_kPa() const {
@@ -153,11 +155,19 @@ class Plant {
     if (gas_.present()) {
       const double squeezed_mL = -line_.yielded_mL() - leaked_mL_;
       now.pump_kPa += gas_.pressure_kPa(squeezed_mL) + gas_.stiffness_at_rest() * line_.yielded_mL();
-    } else if (const auto stiffness = pump_stiffness()) {
-      now.pump_kPa -= *stiffness * leaked_mL_;
+    } else if (drive_yields_) {
+      // p C = e + tau e', e' = -y' - q(p): with the leak q met by the trapezoid over the step.
+      const double squeezed_mL =
+          -line_.yielded_mL() - leaked_mL_ - drive_damping_s * line_.yielding_mL_per_s();
+      now.pump_kPa -= *pump_stiffness() * leaked_mL_;
+      if (!leaks_.empty())
+        now.pump_kPa += behind_leaks(squeezed_mL, model_.drive_compliance_mL_per_kPa, leak_time_s(),
+                                     drive_.time_s(k) - copied_s_) -
+                        *pump_stiffness() * squeezed_mL;
     } else if (!leaks_.empty() && pump_resistance()) {
       const double lost_mL_s = -line_.yielding_mL_per_s();
-      now.pump_kPa += behind_leaks(lost_mL_s, drive_.time_s(k) - copied_s_) - *pump_resistance() * lost_mL_s;
+      now.pump_kPa +=
+          behind_leaks(lost_mL_s, 0.0, 1.0, drive_.time_s(k) - copied_s_) - *pump_resistance() * lost_mL_s;
     }
     return now;
   }
@@ -176,20 +186,23 @@ class Plant {
       flow += leak(pressure_kPa, time_s);
     return flow;
   }
-  /// The pressure at which so much leaks: between the conductance's and none, where all leaks grow with pressure. Regula
-  /// falsi (Illinois).
-  [[nodiscard]] double behind_leaks(double lost_mL_s, double time_s) const {
+  /// How long a leak past a drive that yields has acted at the end of a step, beside the drive's damping.
+  [[nodiscard]] double leak_time_s() const { return drive_damping_s + 0.5 * drive_.step_s; }
+  /// The pressure p of compliance p + duration q(p) = lost, q what leaks: between the conductance's and none, where all leaks grow
+  /// with pressure. Regula falsi (Illinois).
+  [[nodiscard]] double behind_leaks(double lost, double compliance, double duration, double time_s) const {
+    const double linear = compliance + duration * model_.pump_leak_mL_s_kPa;
     const auto excess = [&](double pressure_kPa) {
-      return model_.pump_leak_mL_s_kPa * pressure_kPa + lost_beyond(pressure_kPa, time_s) - lost_mL_s;
+      return linear * pressure_kPa + duration * lost_beyond(pressure_kPa, time_s) - lost;
     };
     double a = 0.0;
-    double b = lost_mL_s / model_.pump_leak_mL_s_kPa;
+    double b = lost / linear;
     double at_a = excess(a);
     double at_b = excess(b);
     constexpr double close = 1e-13;
     for (int doubling = 0; doubling < 8 && at_a * at_b > 0.0; ++doubling)
       at_b = excess(b *= 2.0);
-    for (int step = 0; step < 60 && std::abs(at_b) > close * (std::abs(lost_mL_s) + 1e-9); ++step) {
+    for (int step = 0; step < 60 && std::abs(at_b) > close * (std::abs(lost) + 1e-9); ++step) {
       const double next = b - at_b * (b - a) / (at_b - at_a);
       const double at_next = excess(next);
       if (at_next * at_b < 0.0) {
@@ -204,14 +217,12 @@ class Plant {
     }
     return b;
   }
-  /// A leak beside gas follows the pressure of the last two steps.
-  void leak_beside_gas(double pressure_kPa, double time_s) {
-    if (pump_stiffness()) {
-      leaked_mL_ += drive_.step_s * model_.pump_leak_mL_s_kPa * (1.5 * pressure_kPa - 0.5 * before_kPa_);
-      leaked_mL_ +=
-          drive_.step_s * (1.5 * lost_beyond(pressure_kPa, time_s) - 0.5 * lost_beyond(before_kPa_, time_s));
-    }
-    before_kPa_ = pressure_kPa;
+  /// What leaks beside gas follows the pressure of the last two steps; past a drive that yields the step's end met its half.
+  void leak(double pressure_kPa, double time_s) {
+    const double leaks_mL_s = model_.pump_leak_mL_s_kPa * pressure_kPa + lost_beyond(pressure_kPa, time_s);
+    if (gas_.present()) leaked_mL_ += drive_.step_s * (1.5 * leaks_mL_s - 0.5 * leaked_before_mL_s_);
+    if (drive_yields_) leaked_mL_ += drive_.step_s * leaks_mL_s;
+    leaked_before_mL_s_ = leaks_mL_s;
   }
   void record(PlantTrace& trace, size_t k, double cavity_kPa) const {
     trace.pump_kPa[k] = cylinder_kPa();
@@ -226,12 +237,13 @@ class Plant {
   DriveTrace drive_;
   GasPocket gas_;
   std::vector<LeakLaw> leaks_;
+  bool drive_yields_;
   HoseLine line_;
   Cavity cavity_;
   std::vector<RepeatedSteps> repeated_;
   double copied_s_ = 0.0;  ///< by which the cavity's time is behind
   double leaked_mL_ = 0.0;
-  double before_kPa_ = 0.0;
+  double leaked_before_mL_s_ = 0.0;
   double cavity_kPa_ = 0.0;
 };
 
@@ -275,7 +287,7 @@ PlantTrace Plant::run() {
     record(trace, k, cavity_kPa_);
     k = beyond_repeated(trace, k);
     if (k + 1 == count) break;
-    leak_beside_gas(trace.pump_kPa[k], drive_.time_s(k) - copied_s_);
+    leak(trace.pump_kPa[k], drive_.time_s(k) - copied_s_);
     // The flow's change over the step is met exactly, whatever the acceleration does within it.
     const double flow_then = drive_.flow_mL_per_s[k + 1];
     const double rise = drive_.acceleration_mL_per_s2[k + 1] - drive_.acceleration_mL_per_s2[k];
@@ -348,8 +360,9 @@ PlantTrace simulate_plant(const RigModel& model, const RunDrive& run, const Driv
   constexpr double most_overshoot = 3.0;
   SimulationOptions finer = options;
   finer.components *= model.hose.wave_speed_m_s < slow_quarter_wave_Hz * 4.0 * model.hose.length_m ? 2 : 1;
-  double times_finer = gas_steps;
-  if (model.pump_gas_mL == 0.0) {
+  double times_finer =
+      std::max(model.pump_gas_mL != 0.0 ? gas_steps : 1.0, model.pump_leaks.empty() ? 1.0 : leak_steps);
+  if (times_finer == 1.0) {
     Plant plant(model, run, motion, finer);
     const double overshoot = plant.loss_overshoot();
     if (!(overshoot > most_overshoot)) return plant.run();

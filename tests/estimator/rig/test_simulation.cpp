@@ -102,6 +102,45 @@ TEST(Simulation, ALeakEmptiesTheCavityAsResistanceAndCompliance) {
   EXPECT_NEAR(trace.cavity_kPa[late] / trace.cavity_kPa[early], std::exp(-8.0 / time_s), 2e-3);
 }
 
+double pump_rms_kPa(const PlantTrace& a, const PlantTrace& b, size_t steps_of_b) {
+  double square = 0.0;
+  for (size_t k = 0; k + 2 < a.pump_kPa.size(); ++k)
+    square += std::pow(a.pump_kPa[k] - b.pump_kPa[steps_of_b * k], 2);
+  return std::sqrt(square / static_cast<double>(a.pump_kPa.size()));
+}
+
+/// A leak past the seal; it opens with pressure if `bend` is not 0.
+RigModel leaking_model(double bend) {
+  constexpr double conductance = 0.04;  // mL/(s kPa)
+  RigModel model = straight_model();
+  model.pump_leak_mL_s_kPa = conductance;
+  if (bend != 0.0)
+    model.pump_leaks.emplace_back([=](const RunPlace&) {
+      return [=](double p, double) { return conductance * bend * p * std::abs(p) / 10.0; };
+    });
+  return model;
+}
+
+TEST(Simulation, ADriveThatHardlyYieldsLeaksAsARigidOne) {
+  RigModel model = leaking_model(0.0);
+  const PlantTrace rigid = simulate_plant(model, cycles(2));
+  model.drive_compliance_mL_per_kPa = 1.1e-5;
+  EXPECT_LT(pump_rms_kPa(simulate_plant(model, cycles(2)), rigid, 1),
+            0.1);  // of +-50 kPa, a third of it by the ringing that it changes without a leak, too
+}
+
+TEST(Simulation, ALeakPastAYieldingDriveConvergesInStep) {
+  for (const double bend : {0.0, 1.0}) {
+    RigModel model = leaking_model(bend);
+    model.drive_compliance_mL_per_kPa = 0.00035;
+    const PlantTrace fine = simulate_plant(model, cycles(2), {.step_s = 1.0 / 4800.0});
+    const double coarse_kPa = pump_rms_kPa(simulate_plant(model, cycles(2)), fine, 8);
+    const double half_kPa = pump_rms_kPa(simulate_plant(model, cycles(2), {.step_s = 1.0 / 1200.0}), fine, 4);
+    EXPECT_LT(coarse_kPa, 0.2) << bend;  // of +-50 kPa
+    EXPECT_LT(half_kPa, 0.4 * coarse_kPa) << bend;
+  }
+}
+
 TEST(Simulation, GasConvergesInStep) {
   RigModel model = straight_model();
   model.pump_gas_mL = 1.0;
