@@ -43,7 +43,7 @@ class Chip {
         cpu({clock, memory, bus, scheduler, nvic, control, flash, notes}),
         listeners_(std::move(listeners)) {
     bus.add({"RCC", 0x4002'3800, {}, &rcc});
-    bus.gate_by([this](ClockGate gate) { return rcc.clocked(gate); });
+    bus.gate_by([this](ClockGate gate) { return rcc.clock_of(gate); });
     bus.add({"FLASH", 0x4002'3c00, {}, &flash});
     add_ports();
     add_timers();

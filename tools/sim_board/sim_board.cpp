@@ -150,6 +150,13 @@ uint32_t SimBoard::option_bytes() const { return board_->chip.flash.option_bytes
 
 uint32_t SimBoard::flash_access_control() const { return board_->chip.flash.read(0); }
 
+void SimBoard::hold_core(bool held) {
+  constexpr uint32_t apb1_freeze = 0xe004'2008, watchdog_stops = 1U << 12;
+  board_model::Chip& chip = board_->chip;
+  chip.cpu.hold(held);
+  chip.watchdog.hold(held && (chip.bus.read(apb1_freeze, 4) & watchdog_stops) != 0);
+}
+
 void SimBoard::fail_crystal() { board_->chip.rcc.fail_crystal(); }
 
 void SimBoard::power_off() {

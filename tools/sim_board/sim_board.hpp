@@ -139,6 +139,8 @@ class SimBoard {
   [[nodiscard]] uint32_t flash_access_control() const;
   /// The crystal stops for good.
   void fail_crystal();
+  /// A debugger stops the core, or lets it go on. The peripherals run on, but for a watchdog that the firmware has bound to it.
+  void hold_core(bool held);
 
   /// Called after each operation on the flash with the bytes that it changed, counted from the start of flash.
   void on_flash_change(std::function<void(uint32_t offset, uint32_t bytes)> listener);

@@ -32,7 +32,7 @@ bool crystal_is_ours() {
                           kCaptureEighth = 1U | 3U << 2, kEnable = 1U, kCount = 1U;
   constexpr std::uint32_t kExpected = 16 * 16 * 8 / kCrystal_MHz, kTolerance = kExpected * 15 / 100;
   rcc().CFGR.write(kDividedBy16);
-  rcc().APB2ENR.set(kTim11Clock);
+  enable_clocks(rcc().APB2ENR, kTim11Clock);
   tim11().ARR.write(0xFFFF);
   tim11().OR.write(kFromCrystal);
   tim11().CCMR1.write(kCaptureEighth);
@@ -49,7 +49,7 @@ bool crystal_is_ours() {
   return counted >= kExpected - kTolerance && counted <= kExpected + kTolerance;
 }
 
-/// Revision A calls itself a 0x411 and must not prefetch (ES0182 2.1.1 and 2.1.4).
+/// Revision A calls itself a 0x411 and must not prefetch (errata sheet ES0182, 2.2.1 and 2.2.2).
 bool may_prefetch() {
   constexpr std::uint32_t kDeviceId = 0xFFF;
   return (debug().IDCODE.read() & kDeviceId) != 0x411;
@@ -80,10 +80,10 @@ ClockSource start_clocks() {
   rcc().CFGR.write(5U << 10 | 4U << 13 | 2U);
   while ((rcc().CFGR.read() & 0xCU) != 0x8U) {
   }
-  rcc().AHB1ENR.set(1U << 0 | 1U << 1 | 1U << 2 | 1U << 21);  // GPIOA, GPIOB, GPIOC, DMA1
-  rcc().AHB2ENR.set(1U << 6);                                 // RNG
-  rcc().APB1ENR.set(0xFU | 1U << 18 | 1U << 28 | 1U << 29);   // TIM2 … TIM5, USART3, PWR, DAC
-  rcc().APB2ENR.set(1U << 14);                                // SYSCFG
+  enable_clocks(rcc().AHB1ENR, 1U << 0 | 1U << 1 | 1U << 2 | 1U << 21);  // GPIOA, GPIOB, GPIOC, DMA1
+  enable_clocks(rcc().AHB2ENR, 1U << 6);                                 // RNG
+  enable_clocks(rcc().APB1ENR, 0xFU | 1U << 18 | 1U << 28 | 1U << 29);   // TIM2 … TIM5, USART3, PWR, DAC
+  enable_clocks(rcc().APB2ENR, 1U << 14);                                // SYSCFG
   return from_crystal ? ClockSource::crystal : ClockSource::internal;
 }
 

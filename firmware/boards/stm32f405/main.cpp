@@ -13,25 +13,50 @@ namespace {
 diastole::stm32::Stm32Board board;
 diastole::firmware::Controller<diastole::stm32::Stm32Board> controller(board);
 
+/// What a handler has stored reaches its peripheral before the handler returns. Else the core may clear one interrupt's pending
+/// state and run another one's handler in its place (Arm 838869, errata sheet ES0182 2.1.3).
+struct StoresBeforeReturn {
+  StoresBeforeReturn() = default;
+  StoresBeforeReturn(const StoresBeforeReturn&) = delete;
+  StoresBeforeReturn& operator=(const StoresBeforeReturn&) = delete;
+  ~StoresBeforeReturn() { asm volatile("dsb" ::: "memory"); }
+};
+
 }  // namespace
 
 extern "C" {
 
 /// A step: the compare event has started its pulse.
-void TIM5_IRQHandler() { controller.on_match(); }
+void TIM5_IRQHandler() {
+  const StoresBeforeReturn stores;
+  controller.on_match();
+}
 
-void TIM2_IRQHandler() { board.timer_interrupt(); }
+void TIM2_IRQHandler() {
+  const StoresBeforeReturn stores;
+  board.timer_interrupt();
+}
 
 void EXTI_IRQHandler() {
+  const StoresBeforeReturn stores;
   board.input_interrupt();
   controller.on_inputs();
 }
 
-void USART3_IRQHandler() { board.serial_interrupt(); }
+void USART3_IRQHandler() {
+  const StoresBeforeReturn stores;
+  board.serial_interrupt();
+}
 
-void DMA1_Stream5_IRQHandler() { board.r_wave_interrupt(); }
+void DMA1_Stream5_IRQHandler() {
+  const StoresBeforeReturn stores;
+  board.r_wave_interrupt();
+}
 
-void SysTick_Handler() { board.millisecond_interrupt(); }
+void SysTick_Handler() {
+  const StoresBeforeReturn stores;
+  board.millisecond_interrupt();
+}
 
 /// A processor fault, the crystal's failure, or an interrupt that nobody enabled: motor off, what is known of it kept, and
 /// the watchdog starts anew.

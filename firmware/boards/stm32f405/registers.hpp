@@ -20,6 +20,13 @@ class Register {
   volatile std::uint32_t value_;
 };
 
+/// Sets bits of one of RCC's enable registers and reads them back: a peripheral may not answer in the cycles after its clock
+/// was enabled (errata sheet ES0182, 2.2.13).
+inline void enable_clocks(Register& enable, std::uint32_t bits) {
+  enable.set(bits);
+  (void)enable.read();
+}
+
 struct Rcc {  // RM0090 7.3
   Register CR, PLLCFGR, CFGR, CIR, AHB1RSTR, AHB2RSTR, AHB3RSTR, reserved0, APB1RSTR, APB2RSTR, reserved1[2];
   Register AHB1ENR, AHB2ENR, AHB3ENR, reserved2, APB1ENR, APB2ENR, reserved3[11], CSR;

@@ -32,7 +32,8 @@ inline bool verifies(std::span<const uint8_t> flash, wire::ImageSlot slot) {
 
 class FlashBench {
  public:
-  explicit FlashBench(const std::string& image = factory_image) : desk(image), line_(desk) {}
+  explicit FlashBench(const std::string& image = factory_image, SimBoardOptions options = {})
+      : desk(image, options), line_(desk) {}
 
   UpdateResult flash(const std::string& file, const UpdateOptions& options = {}) {
     return flash_controller(desk, line_, "the emulated board", read_update_file(file), options);

@@ -17,7 +17,7 @@ void MiniatureHost::hear(const wire::Received& received) {
                           [&](const wire::SegmentPlanned& message) { planned.push_back(message); },
                           [&](const wire::StateChanged& message) { state = message.to; },
                           [&](const wire::FaultRaised& message) { fault = message.fault; },
-                          [&](const wire::Trigger&) { ++triggers_heard; },
+                          [&](const wire::Trigger& message) { triggers.push_back(message); },
                           [&](const wire::RunEnded& message) { ended = message; },
                           [&](const auto&) {},
                       });

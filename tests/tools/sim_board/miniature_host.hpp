@@ -56,7 +56,7 @@ class MiniatureHost {
   wire::Fault fault = wire::Fault::none;
   std::optional<wire::RunEnded> ended;
   std::vector<sim_controller::PinEdge> edges;
-  uint32_t triggers_heard = 0;
+  std::vector<wire::Trigger> triggers;
   std::vector<uint16_t> acknowledged, refused;  ///< requests, in the order of their answers
   std::vector<wire::SegmentPlanned> planned;
   link_faults::LineFaults to_controller{{}, 1}, to_host{{}, 2};

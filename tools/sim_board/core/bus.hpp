@@ -22,6 +22,12 @@ struct ClockGate {
   uint32_t bit = 0;
 };
 
+enum class ClockState {
+  off,
+  coming_up,  ///< enabled so shortly before that the peripheral may not answer yet (errata sheet ES0182, 2.2.13)
+  on,
+};
+
 class Bus {
  public:
   static constexpr uint32_t block_bytes = 0x400;
@@ -43,7 +49,7 @@ class Bus {
     places_.push_back(std::move(place));
   }
   /// How the state of a gate is asked for; without it all are open.
-  void gate_by(std::function<bool(ClockGate)> clocked) { clocked_ = std::move(clocked); }
+  void gate_by(std::function<ClockState(ClockGate)> clock_of) { clock_of_ = std::move(clock_of); }
 
   /// `bytes` is 1, 2 or 4. A block that nobody models reads 0 and is noted once.
   uint32_t read(uint32_t address, uint32_t bytes) {
@@ -99,10 +105,14 @@ class Bus {
       return nullptr;
     }
     Place& place = places_[index];
-    if (place.gate.enable_offset != 0 && clocked_ && !clocked_(place.gate)) {
+    if (place.gate.enable_offset == 0 || !clock_of_) return &place;
+    const ClockState clock = clock_of_(place.gate);
+    if (clock == ClockState::off) {
       notes_.add(std::string(action) + " of " + place.name + " while its clock is off");
       return nullptr;
     }
+    if (clock == ClockState::coming_up)
+      notes_.add(std::string(action) + " of " + place.name + " before its clock has come up");
     return &place;
   }
 
@@ -111,7 +121,7 @@ class Bus {
 
   Notes& notes_;
   RegisterJudge judge_;
-  std::function<bool(ClockGate)> clocked_;
+  std::function<ClockState(ClockGate)> clock_of_;
   std::vector<Place> places_;
   std::vector<uint32_t> by_block_ = std::vector<uint32_t>(peripheral_blocks + private_blocks, no_place);
 };

@@ -34,6 +34,7 @@ class Rcc final : public RegisterBlock {
 
   uint32_t read(uint32_t offset) override {
     if (offset == csr) return csr_ | (csr_ & 1) << 1;  // LSI is ready at once
+    if (is_enable(offset)) enabled_lately(offset).bits = 0;
     return RegisterBlock::read(offset);
   }
   void write(uint32_t offset, uint32_t value, uint32_t mask) override {
@@ -50,6 +51,7 @@ class Rcc final : public RegisterBlock {
       csr_ = (csr_ & ~1U) | (whole & 1);
       return;
     }
+    if (is_enable(offset)) enabled_lately(offset) = {whole & ~registers_[offset / 4], clock_.now()};
     registers_[offset / 4] = whole;
     if (offset >= ahb1rstr && offset <= apb2rstr) bus_.reset_gated(offset + 0x20, value & mask);
   }
@@ -61,6 +63,7 @@ class Rcc final : public RegisterBlock {
     for (const auto [offset, value] : low_power_resets)
       registers_[offset / 4] = value;
     external_ready_ = pll_ready_ = never;
+    enabled_lately_.fill({});
     scheduler_.set(slot_, never);
     apply_tree();
   }
@@ -101,8 +104,15 @@ class Rcc final : public RegisterBlock {
     return static_cast<double>(clock_.tree().core_Hz) * divider / crystal_Hz_;
   }
 
-  [[nodiscard]] bool clocked(ClockGate gate) const {
-    return gate.enable_offset == 0 || (registers_[gate.enable_offset / 4] >> gate.bit & 1) != 0;
+  /// A clock has come up once its enable register has been read, or after as many cycles as the errata sheet says (ES0182,
+  /// 2.2.13). Time is that of a block of instructions: within the block that enables it, only the reading counts.
+  [[nodiscard]] ClockState clock_of(ClockGate gate) const {
+    if (gate.enable_offset == 0) return ClockState::on;
+    if ((registers_[gate.enable_offset / 4] >> gate.bit & 1) == 0) return ClockState::off;
+    const EnabledLately& lately = enabled_lately_[(gate.enable_offset - ahb1enr) / 4];
+    const bool comes_up =
+        (lately.bits >> gate.bit & 1) != 0 && clock_.now() < lately.at + enable_delay(gate.enable_offset);
+    return comes_up ? ClockState::coming_up : ClockState::on;
   }
   /// Adds to the flags of RCC_CSR, which survive every reset but that of power.
   void record(ResetCause cause) {
@@ -119,7 +129,7 @@ class Rcc final : public RegisterBlock {
                                                {0x60, 0x36fe'c9ff}, {0x64, 0x0007'5f33}, {0x84, 0x2000'3000}};
   static constexpr uint32_t security_on = 1 << 19, security_flag = 1 << 7;
   static constexpr uint32_t cr = 0x00, pllcfgr = 0x04, cfgr = 0x08, cir = 0x0c, ahb1rstr = 0x10,
-                            apb2rstr = 0x24, csr = 0x74;
+                            apb2rstr = 0x24, ahb1enr = 0x30, apb1enr = 0x40, apb2enr = 0x44, csr = 0x74;
   static constexpr uint32_t hsi_on = 1, hsi_ready = 2, hse_on = 1 << 16, hse_ready = 1 << 17,
                             pll_on = 1 << 24, pll_ready = 1 << 25;
   static constexpr uint32_t remove_flags = 1 << 24;
@@ -138,6 +148,18 @@ class Rcc final : public RegisterBlock {
 
   /// A timer's kernel runs at twice the bus clock unless the bus is undivided (TIMPRE = 0).
   static uint32_t timer_ratio(uint32_t bus_ratio) { return bus_ratio == 1 ? 1 : bus_ratio / 2; }
+
+  struct EnabledLately {
+    uint32_t bits = 0;  ///< set at `at`, and the register not read since
+    Cycles at = 0;
+  };
+  static bool is_enable(uint32_t offset) { return offset >= ahb1enr && offset <= apb2enr; }
+  EnabledLately& enabled_lately(uint32_t offset) { return enabled_lately_[(offset - ahb1enr) / 4]; }
+  [[nodiscard]] Cycles enable_delay(uint32_t offset) const {
+    return offset == apb1enr   ? 1 + clock_.tree().apb1_ratio
+           : offset == apb2enr ? 1 + clock_.tree().apb2_ratio
+                               : 2;
+  }
 
   static constexpr uint32_t register_words = 0x90 / 4;
 
@@ -222,6 +244,7 @@ class Rcc final : public RegisterBlock {
   Scheduler::Slot slot_;
   uint32_t crystal_Hz_;
   std::array<uint32_t, register_words> registers_{};
+  std::array<EnabledLately, (apb2enr - ahb1enr) / 4 + 1> enabled_lately_{};
   uint32_t csr_ = 0;
   Cycles external_ready_ = never, pll_ready_ = never;
 };

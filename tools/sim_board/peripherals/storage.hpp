@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <utility>
 
 #include "tools/sim_board/core/device.hpp"
 
@@ -31,7 +32,8 @@ class Storage final : public RegisterBlock {
   std::array<uint32_t, 256> registers_{};
 };
 
-/// RNG: always ready, the same numbers in every run that starts from the same seed; resets do not rewind it.
+/// RNG: always ready, the same numbers in every run that starts from the same seed; resets do not rewind it. The first number
+/// after RNGEN, which is not to be used (RM0090 24.3.1), is the same on every chip.
 class RandomNumbers final : public Device {
  public:
   explicit RandomNumbers(uint32_t seed) : state_(seed != 0 ? seed : 1) {}
@@ -40,19 +42,24 @@ class RandomNumbers final : public Device {
     if (offset == 0x00) return control_;
     if (offset == 0x04) return (control_ & 4) != 0 ? 1 : 0;
     if (offset != 0x08) return 0;
+    if (std::exchange(first_, false)) return 0x5555'5555;
     state_ ^= state_ << 13;
     state_ ^= state_ >> 17;
     state_ ^= state_ << 5;
     return state_;
   }
   void write(uint32_t offset, uint32_t value, uint32_t mask) override {
-    if (offset == 0x00) control_ = merged(control_, value, mask);
+    if (offset != 0x00) return;
+    const bool was_enabled = (control_ & 4) != 0;
+    control_ = merged(control_, value, mask);
+    if (!was_enabled && (control_ & 4) != 0) first_ = true;
   }
   void reset() override { control_ = 0; }
 
  private:
   uint32_t state_;
   uint32_t control_ = 0;
+  bool first_ = false;
 };
 
 }  // namespace diastole::board_model

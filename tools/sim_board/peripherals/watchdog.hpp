@@ -37,6 +37,15 @@ class Watchdog final : public RegisterBlock {
   }
   void after_clock_change() override { ask(); }
 
+  /// Stands still while `held`: the core is stopped by a debugger and DBGMCU_APB1_FZ says so (RM0090 38.16.4).
+  void hold(bool held) {
+    if (held == held_) return;
+    const uint64_t now_ns = clock_.ns(clock_.now());
+    held_ = held;
+    bites_at_ns_ = held ? bites_at_ns_ - std::min(bites_at_ns_, now_ns) : bites_at_ns_ + now_ns;
+    ask();
+  }
+
   void on_bite(std::function<void()> bite) { bite_ = std::move(bite); }
 
  private:
@@ -50,15 +59,15 @@ class Watchdog final : public RegisterBlock {
     bites_at_ns_ = clock_.ns(clock_.now()) + (uint64_t{reload_} + 1) * divider * tick_ns;
     ask();
   }
-  void ask() { scheduler_.set(slot_, running_ ? clock_.cycle_at(bites_at_ns_) : never); }
+  void ask() { scheduler_.set(slot_, running_ && !held_ ? clock_.cycle_at(bites_at_ns_) : never); }
 
   const Clock& clock_;
   Scheduler& scheduler_;
   Scheduler::Slot slot_;
   std::function<void()> bite_;
   uint32_t prescaler_ = 0, reload_ = 0xfff;
-  bool unlocked_ = false, running_ = false;
-  uint64_t bites_at_ns_ = 0;
+  bool unlocked_ = false, running_ = false, held_ = false;
+  uint64_t bites_at_ns_ = 0;  ///< while held: what was left
 };
 
 }  // namespace diastole::board_model

@@ -272,7 +272,7 @@ void Cpu::on_write(uc_engine*, uint64_t offset, unsigned bytes, uint64_t value, 
 void Cpu::run_until(Cycles limit) {
   limit_ = limit;
   while (!interrupted_ && parts_.clock.now() < limit) {
-    if (locked_up_ || asleep_) {
+    if (locked_up_ || asleep_ || held_) {
       idle(limit);
       continue;
     }
@@ -287,7 +287,7 @@ void Cpu::run_until(Cycles limit) {
 void Cpu::idle(Cycles limit) {
   Clock& clock = parts_.clock;
   while (!interrupted_ && clock.now() < limit) {
-    if (asleep_ && parts_.nvic.best_pending() != 0 && parts_.nvic.wakes(masks())) {
+    if (asleep_ && !held_ && parts_.nvic.best_pending() != 0 && parts_.nvic.wakes(masks())) {
       asleep_ = false;
       return;
     }

@@ -60,6 +60,8 @@ class Cpu {
   /// The last fault in words, empty when there was none since power-up.
   [[nodiscard]] const std::string& last_fault() const { return last_fault_; }
   /// A fault within the hard-fault handler: only a reset helps.
+  /// Executes nothing while held; time goes on.
+  void hold(bool held) { held_ = held; }
   [[nodiscard]] bool locked_up() const { return locked_up_; }
   [[nodiscard]] bool asleep() const { return asleep_; }
 
@@ -138,7 +140,7 @@ class Cpu {
   uint64_t instructions_ = 0;
   Cycles asleep_cycles_ = 0;
   uint32_t return_magic_ = 0;
-  bool interrupted_ = false, asleep_ = false, locked_up_ = false;
+  bool interrupted_ = false, asleep_ = false, locked_up_ = false, held_ = false;
   std::string last_fault_;
   struct {
     uint32_t number = 0, status = 0, address = 0;

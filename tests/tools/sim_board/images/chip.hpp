@@ -24,6 +24,12 @@ extern struct Usart { volatile uint32_t sr, dr, brr, cr1; } usart1;
 extern struct Dac { volatile uint32_t cr, swtrigr, dhr12r1; } dac;
 extern struct Iwdg { volatile uint32_t kr, pr, rlr; } iwdg;
 
+/// And reads them back: they need some cycles to come up.
+inline void enable_clocks(volatile uint32_t& enable, uint32_t bits) {
+  enable = enable | bits;
+  [[maybe_unused]] const uint32_t read_back = enable;
+}
+
 inline void enable_irq(uint32_t irq, uint8_t priority) {
   reinterpret_cast<volatile uint8_t*>(0xe000e400)[irq] = priority;
   at(0xe000e100 + 4 * (irq / 32)) = 1U << (irq % 32);

@@ -16,7 +16,7 @@ extern "C" void usart1_irq() {
 
 extern "C" void image() {
   clock_168_MHz();
-  rcc.apb2enr |= 1 << 4;
+  enable_clocks(rcc.apb2enr, 1 << 4);
   usart1.brr = 729;
   usart1.cr1 = 1 << 13 | 1 << 5 | 1 << 3 | 1 << 2;
   enable_irq(37, 0x20);

@@ -9,8 +9,8 @@ extern "C" void exti0() {
 }
 
 extern "C" void image() {
-  rcc.ahb1enr |= 3;
-  rcc.apb2enr |= 1 << 14;
+  enable_clocks(rcc.ahb1enr, 3);
+  enable_clocks(rcc.apb2enr, 1 << 14);
   gpioa.moder |= 1 << 2;
   gpioa.bsrr = 1 << 1;
   gpiob.pupdr = (gpiob.pupdr & ~3U) | 1;

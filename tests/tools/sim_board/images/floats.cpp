@@ -18,7 +18,7 @@ extern "C" void tim2_irq() {
 
 extern "C" void image() {
   enable_fpu();
-  rcc.apb1enr |= 1;
+  enable_clocks(rcc.apb1enr, 1);
   tim2.arr = 200;
   tim2.dier = 1;
   enable_irq(28, 0x10);

@@ -6,7 +6,7 @@ extern "C" void image() {
   seen[0] = rcc.csr;
   clock_168_MHz();
   seen[1] = rcc.cfgr;
-  rcc.ahb1enr |= 1;
+  enable_clocks(rcc.ahb1enr, 1);
   gpioa.moder |= 1 << 2;
   gpioa.bsrr = 1 << 1;
   seen[2] = 1;

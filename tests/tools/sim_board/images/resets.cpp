@@ -4,7 +4,7 @@
 #include "tests/tools/sim_board/images/chip.hpp"
 
 extern "C" void image() {
-  rcc.apb1enr |= 1 << 28;
+  enable_clocks(rcc.apb1enr, 1 << 28);
   volatile uint32_t& starts = at(0x40002850);
   const uint32_t flags = rcc.csr;
   starts = starts + 1;

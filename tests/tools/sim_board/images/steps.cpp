@@ -15,8 +15,8 @@ extern "C" void tim3_irq() {
 
 extern "C" void image() {
   clock_168_MHz();
-  rcc.ahb1enr |= 1;
-  rcc.apb1enr |= 2;
+  enable_clocks(rcc.ahb1enr, 1);
+  enable_clocks(rcc.apb1enr, 2);
   gpioa.moder = (gpioa.moder & ~(3U << 12)) | 2 << 12;
   gpioa.afr[0] = 2 << 24;
   tim3.arr = 0xffff;

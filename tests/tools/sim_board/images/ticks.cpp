@@ -11,7 +11,7 @@ extern "C" void sv_call() { seen[1] = seen[1] + 1; }
 extern "C" void pend_sv() { seen[2] = seen[2] + 1; }
 
 extern "C" void image() {
-  rcc.ahb1enr |= 1;
+  enable_clocks(rcc.ahb1enr, 1);
   gpioa.moder |= 1 << 2;
   asm volatile("svc #0");
   at(0xe000e014) = 15999;

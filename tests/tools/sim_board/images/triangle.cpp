@@ -15,7 +15,7 @@ extern "C" void tim6_irq() {
 
 extern "C" void image() {
   clock_168_MHz();
-  rcc.apb1enr |= 1 << 29 | 1 << 4;
+  enable_clocks(rcc.apb1enr, 1 << 29 | 1 << 4);
   dac.cr = 1 | 1 << 2;
   tim6.psc = 83;
   tim6.arr = 99;
