@@ -3,9 +3,9 @@
 #include <unistd.h>
 
 #include <fstream>
-#include <iterator>
 #include <system_error>
 
+#include "protocol/contract/bounded_file.hpp"
 #include "protocol/contract/input_error.hpp"
 
 namespace diastole {
@@ -59,11 +59,7 @@ void require_output(const OutputFile& output) {
 }
 
 std::string read_whole_file(const fs::path& path, const std::string& remedy) {
-  std::ifstream stream(path, std::ios::binary);
-  if (!stream || fs::is_directory(path)) {
-    throw InputError({path.string(), "", "cannot be opened", remedy});
-  }
-  return {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
+  return read_bounded_file(path, most_data_bytes, remedy);
 }
 
 }  // namespace diastole

@@ -4,9 +4,8 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <fstream>
-#include <sstream>
 
+#include "protocol/contract/bounded_file.hpp"
 #include "protocol/contract/input_error.hpp"
 #include "protocol/contract/table_reader.hpp"
 #include "protocol/wire/program_messages.hpp"
@@ -110,16 +109,6 @@ class SegmentReader {
   std::vector<TableReader> tables_;
 };
 
-std::string text_of(const std::filesystem::path& file) {
-  std::ifstream stream(file);
-  std::stringstream text;
-  if (!stream || !(text << stream.rdbuf())) {
-    throw InputError(
-        {file.string(), "", "cannot be opened", "Check the path and that you may read the file."});
-  }
-  return text.str();
-}
-
 /// The schedule tells how many cycles its one segment has.
 void put_schedule(const TableReader& root, TableReader table, Experiment& experiment) {
   ExperimentSegment& segment = experiment.segments.front();
@@ -182,8 +171,9 @@ Experiment parse_experiment(std::string_view text, const std::string& file, cons
 
 Experiment read_experiment(const std::string& file) {
   const std::filesystem::path folder = std::filesystem::path(file).parent_path();
-  return parse_experiment(text_of(file), file,
-                          [&](const std::string& name) { return text_of(folder / name); });
+  return parse_experiment(read_bounded_file(file, most_settings_bytes), file, [&](const std::string& name) {
+    return read_bounded_file(folder / name, most_table_bytes);
+  });
 }
 
 std::vector<std::string> doubts_about(const Experiment& experiment) {

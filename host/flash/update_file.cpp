@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
-#include <iterator>
 #include <span>
 
+#include "protocol/contract/bounded_file.hpp"
 #include "protocol/contract/input_error.hpp"
 #include "protocol/wire/update_file.hpp"
 
@@ -96,7 +96,9 @@ UpdateFile read_update_file(const std::string& file) {
            "Give the update file, such as build/firmware/bin/diastole-stm32f405.image (cmake --preset "
            "firmware and cmake --build --preset firmware make it).");
   }
-  return parse_update_file(file, {std::istreambuf_iterator<char>(stream), {}});
+  // Two images of 128 KB each, with their headers.
+  const std::string content = read_bounded_file(file, megabyte);
+  return parse_update_file(file, {content.begin(), content.end()});
 }
 
 std::string in_words(wire::FirmwareVersion version) {

@@ -6,10 +6,9 @@
 #include <algorithm>
 #include <cctype>
 #include <cmath>
-#include <fstream>
 #include <numeric>
-#include <sstream>
 
+#include "protocol/contract/bounded_file.hpp"
 #include "protocol/contract/input_error.hpp"
 
 namespace diastole {
@@ -99,20 +98,14 @@ TableReader::TableReader(std::shared_ptr<const toml::table> document, const toml
     : document_(std::move(document)), table_(table), file_(std::move(file)), path_(std::move(path)) {}
 
 TableReader TableReader::from_file(const std::filesystem::path& path) {
-  std::ifstream stream(path);
-  if (!stream || std::filesystem::is_directory(path)) {
-    throw InputError(
-        {path.string(), "", "cannot be opened", "Check the path and that you may read the file."});
-  }
-  std::stringstream text;
-  text << stream.rdbuf();
-  if (text.view().starts_with("\x89HDF")) {
+  const std::string text = read_bounded_file(path, most_settings_bytes);
+  if (text.starts_with("\x89HDF")) {
     throw InputError(
         {path.string(), "", "is an HDF5 file such as a run file, but a TOML file is expected here",
          "Give the TOML file that belongs here; a study (NAME.study.toml) names its run files under "
          "[data] runs."});
   }
-  return from_text(text.str(), path.string());
+  return from_text(text, path.string());
 }
 
 TableReader TableReader::from_text(std::string_view text, std::string name) {

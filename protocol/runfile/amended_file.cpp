@@ -6,6 +6,7 @@
 
 #include "protocol/contract/input_error.hpp"
 #include "protocol/runfile/h5_handle.hpp"
+#include "protocol/runfile/h5_source.hpp"
 #include "protocol/runfile/reader.hpp"
 
 namespace diastole::runfile {
@@ -55,6 +56,7 @@ bool is_on_disk(const fs::path& file) {
 }  // namespace
 
 void amend_run(const fs::path& path, const std::string& place, const std::function<bool(hid_t)>& change) {
+  (void)H5Source(path);  // none of its links leads to another file, which would be changed then
   const FolderLock lock(path.has_parent_path() ? path.parent_path() : ".");
   const Beside beside{path.string() + ".amended-partial"};
   std::error_code error;

@@ -4,9 +4,9 @@
 
 #include <algorithm>
 #include <charconv>
-#include <fstream>
 #include <sstream>
 
+#include "protocol/contract/bounded_file.hpp"
 #include "protocol/contract/input_error.hpp"
 
 namespace diastole::runfile {
@@ -99,13 +99,7 @@ std::vector<FrameStart> repeated_starts(size_t frames, double first_s, double re
 }
 
 std::vector<FrameStart> read_frame_times(const std::filesystem::path& file) {
-  std::ifstream stream(file);
-  std::stringstream text;
-  if (!stream || std::filesystem::is_directory(file) || !(text << stream.rdbuf())) {
-    throw InputError(
-        {file.string(), "", "cannot be opened", "Check the path and that you may read the file."});
-  }
-  return parse_frame_times(text.str(), file.string());
+  return parse_frame_times(read_bounded_file(file, most_table_bytes), file.string());
 }
 
 std::vector<FrameStart> parse_frame_times(const std::string& text, const std::string& file) {

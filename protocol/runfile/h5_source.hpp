@@ -2,12 +2,16 @@
 // Typed reading from an open HDF5 file. Numbers of any width are converted by HDF5 itself; texts may be of
 // fixed or variable length, in datasets, attributes and table columns alike.
 //
+// A file may come from anywhere. What it claims is held against what it has before memory is taken: no link leads out of it, no
+// dataset's values lie in another file, no dataset has more rows than its bytes can hold, and no plug-in is loaded to read it.
+//
 // Errors: every member throws InputError naming the file and the object that is missing or of the wrong kind.
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cstdint>
+#include <cstdlib>
 #include <filesystem>
 #include <functional>
 #include <optional>
@@ -31,11 +35,14 @@ class H5Source {
     if (H5Fis_hdf5(name_.c_str()) <= 0) {
       fail("", "is not an HDF5 file", "Give a run file (NAME.run.h5).");
     }
+    H5PLset_loading_state(0);  // filters and links that only a plug-in knows are not for run files
     file_ = FileHandle(H5Fopen(name_.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT));
     if (!file_.valid()) {
       fail("", "is an HDF5 file that cannot be read",
            "It is truncated or still being written; if its journal exists, use `diastole recover`.");
     }
+    bytes_ = std::filesystem::file_size(path);
+    expect_own_links();
   }
 
   [[nodiscard]] bool has(const std::string& path) const {
@@ -87,7 +94,7 @@ class H5Source {
       fail("dataset " + path, "does not hold one text");
     }
     const auto texts = read_texts(type, space, 1, unwrapped, [&](hid_t memory, void* target) {
-      return H5Dread(dataset.get(), memory, H5S_ALL, H5S_ALL, H5P_DEFAULT, target) >= 0;
+      return read_with_texts(dataset, memory, target, path);
     });
     if (!texts) fail("dataset " + path, "cannot be read; the file is damaged");
     return texts->front();
@@ -101,9 +108,14 @@ class H5Source {
     std::vector<std::string> names;
     H5Aiterate2(handle.get(), H5_INDEX_NAME, H5_ITER_INC, nullptr, collect_attribute, &names);
     std::map<std::string, Attribute, std::less<>> values;
+    uint64_t text_bytes = 0;
     for (const std::string& name : names) {
       const auto value = read_attribute(AttributeHandle(H5Aopen(handle.get(), name.c_str(), H5P_DEFAULT)));
-      if (value) values.emplace(name, *value);
+      if (!value) continue;
+      if (const auto* text = std::get_if<std::string>(&*value)) text_bytes += text->size();
+      if (text_bytes > bytes_)
+        fail("group " + object, "has attributes with more text than the file has bytes", tampered);
+      values.emplace(name, *value);
     }
     return values;
   }
@@ -128,7 +140,7 @@ class H5Source {
     };
     const SpaceHandle space(H5Dget_space(opened.table.get()));
     auto texts = read_texts(opened.type, space, opened.rows, one_member, [&](hid_t memory, void* target) {
-      return H5Dread(opened.table.get(), memory, H5S_ALL, H5S_ALL, H5P_DEFAULT, target) >= 0;
+      return read_with_texts(opened.table, memory, target, table);
     });
     if (!texts) fail("dataset " + table, "cannot be read; the file is damaged");
     out = std::move(*texts);
@@ -143,6 +155,10 @@ class H5Source {
   // Larger claims are a damaged header, not a recording.
   static constexpr hsize_t most_elements = hsize_t{1} << 27;
   static constexpr size_t most_text_bytes = size_t{1} << 28;
+  /// Deflate makes 1032 bytes of one at best (zlib's technical notes), and a chunk of a few bytes has its ends besides.
+  static constexpr uint64_t most_inflation = 1100;
+  static constexpr const char* tampered =
+      "It was damaged or made to do harm; nothing of it was read. Give the file that the daemon wrote.";
 
   using ReadInto = std::function<bool(hid_t memory_type, void* target)>;
 
@@ -191,10 +207,11 @@ class H5Source {
     return kind == H5T_FLOAT || kind == H5T_INTEGER;
   }
 
-  static std::optional<Attribute> read_attribute(const AttributeHandle& attribute) {
+  [[nodiscard]] std::optional<Attribute> read_attribute(const AttributeHandle& attribute) const {
     const TypeHandle type(H5Aget_type(attribute.get()));
     const SpaceHandle space(H5Aget_space(attribute.get()));
-    if (H5Sget_simple_extent_npoints(space.get()) != 1) return std::nullopt;
+    if (H5Sget_simple_extent_npoints(space.get()) != 1 || H5Tget_size(type.get()) > bytes_)
+      return std::nullopt;
     const ReadInto read = [&](hid_t memory, void* target) {
       return H5Aread(attribute.get(), memory, target) >= 0;
     };
@@ -226,6 +243,73 @@ class H5Source {
     return 0;
   }
 
+  /// Hard and soft links only: an external one, or one of a class of its own, leads to what another file or a plug-in says.
+  void expect_own_links() const {
+    std::string foreign;
+    const auto look = [](hid_t, const char* name, const H5L_info_t* link, void* found) -> herr_t {
+      if (link->type == H5L_TYPE_HARD || link->type == H5L_TYPE_SOFT) return 0;
+      *static_cast<std::string*>(found) = name;
+      return 1;
+    };
+    const herr_t ended = H5Lvisit(file_.get(), H5_INDEX_NAME, H5_ITER_NATIVE, look, &foreign);
+    if (ended > 0) fail("link /" + foreign, "leads out of the file, which no run file's does", tampered);
+    if (ended < 0) fail("", "has groups that cannot be read; the file is damaged");
+  }
+  /// The values lie in this file, and are no more than its bytes can hold.
+  void expect_own_values(const DatasetHandle& dataset, const std::string& path) const {
+    const PropertyHandle made(H5Dget_create_plist(dataset.get()));
+    const H5D_layout_t layout = H5Pget_layout(made.get());
+    if (layout == H5D_VIRTUAL || H5Pget_external_count(made.get()) > 0)
+      fail("dataset " + path, "takes its values from another file, which no run file's does", tampered);
+    const TypeHandle type(H5Dget_type(dataset.get()));
+    const SpaceHandle space(H5Dget_space(dataset.get()));
+    const auto values =
+        static_cast<uint64_t>(std::max<hssize_t>(H5Sget_simple_extent_npoints(space.get()), 0));
+    const uint64_t value_bytes = std::max<uint64_t>(H5Tget_size(type.get()), 1);
+    const uint64_t stored_bytes = std::min<uint64_t>(H5Dget_storage_size(dataset.get()), bytes_);
+    const uint64_t most_bytes =
+        H5Pget_nfilters(made.get()) > 0 ? most_inflation * stored_bytes : stored_bytes;
+    if (values > most_bytes / value_bytes)
+      fail("dataset " + path,
+           fmt::format("claims {} values of {} bytes each, and the file holds {} bytes of them", values,
+                       value_bytes, stored_bytes),
+           tampered);
+  }
+  /// Memory for texts of variable length. They are stored without compression: together they take no more of it than the file has
+  /// bytes, unless many rows share one.
+  struct TextMemory {
+    uint64_t left = 0;
+    bool exhausted = false;
+    std::vector<void*> taken = {};
+
+    static void* take(size_t bytes, void* self) {
+      auto& memory = *static_cast<TextMemory*>(self);
+      memory.exhausted |= bytes > memory.left;
+      if (memory.exhausted) return nullptr;
+      memory.left -= bytes;
+      memory.taken.push_back(std::malloc(bytes));
+      return memory.taken.back();
+    }
+    static void give(void* bytes, void* self) {
+      std::erase(static_cast<TextMemory*>(self)->taken, bytes);
+      std::free(bytes);
+    }
+  };
+  /// False if the values cannot be read. What is read with it belongs to the caller, as after H5Dread.
+  [[nodiscard]] bool read_with_texts(const DatasetHandle& dataset, hid_t memory_type, void* target,
+                                     const std::string& path) const {
+    TextMemory memory{.left = bytes_};
+    const PropertyHandle transfer(H5Pcreate(H5P_DATASET_XFER));
+    H5Pset_vlen_mem_manager(transfer.get(), TextMemory::take, &memory, TextMemory::give, &memory);
+    if (H5Dread(dataset.get(), memory_type, H5S_ALL, H5S_ALL, transfer.get(), target) >= 0) return true;
+    for (void* each : memory.taken)
+      std::free(each);
+    if (memory.exhausted)
+      fail("dataset " + path, fmt::format("has texts of more than the {} bytes of its file", bytes_),
+           tampered);
+    return false;
+  }
+
   struct Column {
     DatasetHandle table;
     TypeHandle type;  // the member's
@@ -235,6 +319,7 @@ class H5Source {
     if (!has(path)) fail("dataset " + path, "is missing", "A run file must hold it; see docs/run-file.md.");
     DatasetHandle dataset(H5Dopen2(file_.get(), path.c_str(), H5P_DEFAULT));
     if (!dataset.valid()) fail(path, "is not a dataset");
+    expect_own_values(dataset, path);
     return dataset;
   }
   [[nodiscard]] size_t length(const DatasetHandle& dataset, const std::string& path) const {
@@ -273,6 +358,7 @@ class H5Source {
 
   std::string name_;
   FileHandle file_;
+  uint64_t bytes_ = 0;  ///< of the file
 };
 
 }  // namespace diastole::runfile

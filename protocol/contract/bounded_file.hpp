@@ -1,0 +1,23 @@
+#pragma once
+// Files of a person's, read whole: never more of one than such a file has.
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+
+namespace diastole {
+
+inline constexpr uint64_t megabyte = 1'000'000;
+/// Rig, experiment, study, effect and law files: some kilobytes, written by hand.
+inline constexpr uint64_t most_settings_bytes = 4 * megabyte;
+/// Tables that stand beside them: waveforms' points, frame times.
+inline constexpr uint64_t most_table_bytes = 32 * megabyte;
+/// Tags, guide points, records in JSON, choices, images: what programs write. A record with fields has some 20 MB.
+inline constexpr uint64_t most_data_bytes = 512 * megabyte;
+
+/// The whole file. Throws InputError with its name: missing, a folder or unreadable (with `remedy`), or longer than `most_bytes`,
+/// which is told before memory is taken.
+std::string read_bounded_file(const std::filesystem::path& path, uint64_t most_bytes,
+                              const std::string& remedy = "Check the path and that you may read the file.");
+
+}  // namespace diastole

@@ -1,0 +1,171 @@
+"""Run files that somebody has tampered with: each is refused with its place, in little memory, and touches no other file.
+
+hostile_run_files.py DIASTOLE SOURCE_DIR
+"""
+
+import pathlib
+import resource
+import shutil
+import subprocess
+import sys
+import tempfile
+
+import h5py
+import numpy as np
+
+MOST_MEMORY = 600 << 20  # of address space: program, libraries and what a run of seconds needs
+HUGE = 100_000_000
+
+
+def external_link(run, place):
+    with h5py.File(place / "other.h5", "w") as other:
+        other["secret"] = np.arange(1000.0)
+    del run["trigger/time_s"]
+    run["trigger/time_s"] = h5py.ExternalLink("other.h5", "/secret")
+    return "link /trigger/time_s"
+
+
+def external_group(run, place):
+    with h5py.File(place / "other.h5", "w") as other:
+        other.create_group("elsewhere")
+    run["flow"] = h5py.ExternalLink("other.h5", "/elsewhere")
+    return "link /flow"
+
+
+def user_defined_link(run, place):
+    """A link of a class that nobody has registered; the library's own number for an external one is overwritten."""
+    run["zz"] = h5py.ExternalLink("name-to-be-found-again.h5", "/x")
+    return "groups that cannot be read"
+
+
+def external_storage(run, place):
+    (place / "passwords.raw").write_bytes(bytes(8 * 1000))
+    del run["pump/time_s"]
+    run.create_dataset("pump/time_s", (1000,), "f8", external=[(str(place / "passwords.raw"), 0, h5py.h5f.UNLIMITED)])
+    return "dataset /pump/time_s"
+
+
+def virtual_dataset(run, place):
+    with h5py.File(place / "other.h5", "w") as other:
+        other["secret"] = np.arange(1000.0)
+    layout = h5py.VirtualLayout((1000,), "f8")
+    layout[:] = h5py.VirtualSource("other.h5", "secret", (1000,))
+    del run["pump/time_s"]
+    run.create_virtual_dataset("pump/time_s", layout)
+    return "dataset /pump/time_s"
+
+
+def rows_that_are_not_there(run, place):
+    del run["pressure/time_s"]
+    run.create_dataset("pressure/time_s", (HUGE,), "f8")
+    return "dataset /pressure/time_s"
+
+
+def chunks_that_are_not_there(run, place):
+    del run["pressure/time_s"]
+    run.create_dataset("pressure/time_s", (HUGE,), "f8", chunks=(4096,), compression="gzip", shuffle=True)
+    return "dataset /pressure/time_s"
+
+
+def table_that_is_not_there(run, place):
+    row = run["events"].dtype
+    del run["events"]
+    run.create_dataset("events", (HUGE // 10,), row, chunks=(4096,))
+    return "dataset /events"
+
+
+def one_text_many_times(run, place):
+    """Variable-length texts that all point at the same megabyte."""
+    del run["gaps"]
+    texts = h5py.string_dtype()
+    rows = 4000
+    data = run.create_dataset("gaps", (rows,), [("stream", texts), ("first_index", "i8"), ("count", "i8"), ("reason", texts)])
+    big = "x" * (1 << 20)
+    data[0] = (big, 0, 1, big)
+    run.flush()
+    return "dataset /gaps"
+
+
+def text_of_a_fixed_length(run, place):
+    del run["protocol/toml"]
+    run.create_dataset("protocol/toml", (), "S268000000")
+    return "dataset /protocol/toml"
+
+
+
+def set_of_numbers_in_two_dimensions(run, place):
+    del run["trigger/time_s"]
+    run.create_dataset("trigger/time_s", (1 << 20, 1 << 20), "f8", chunks=(64, 64))
+    return "dataset /trigger/time_s"
+
+
+def a_type_of_its_own(run, place):
+    del run["pump/commanded_mL"]
+    run.create_dataset("pump/commanded_mL", (10,), h5py.opaque_dtype(np.dtype("V8")))
+    return "dataset /pump/commanded_mL"
+
+
+def after(file, tampered):
+    """What h5py itself cannot write, put into the finished file's bytes."""
+    content = file.read_bytes()
+    if tampered is user_defined_link:
+        # In a link message the link's class stands before its character set and its name: an external one's is 64; 200 is free.
+        name = content.rfind(b"zz", 0, content.find(b"name-to-be-found-again.h5"))
+        kind = content.rfind(b"\x40", name - 4, name)
+        if name < 0 or kind < 0:
+            return False
+        content = content[:kind] + bytes([200]) + content[kind + 1:]
+    if tampered is one_text_many_times:
+        with h5py.File(file, "r") as run:
+            data = run["gaps"]
+            begin, bytes_all, rows = data.id.get_offset(), data.id.get_storage_size(), data.shape[0]
+        one = content[begin:begin + bytes_all // rows]
+        content = content[:begin] + one * rows + content[begin + bytes_all:]
+    file.write_bytes(content)
+    return True
+
+
+HOSTILE = [external_link, external_group, user_defined_link, external_storage, virtual_dataset, rows_that_are_not_there,
+           chunks_that_are_not_there, table_that_is_not_there, one_text_many_times, text_of_a_fixed_length,
+           set_of_numbers_in_two_dimensions, a_type_of_its_own]
+
+
+def limited():
+    resource.setrlimit(resource.RLIMIT_AS, (MOST_MEMORY, MOST_MEMORY))
+
+
+def main():
+    diastole, source = str(pathlib.Path(sys.argv[1]).resolve()), pathlib.Path(sys.argv[2]).resolve()
+    place = pathlib.Path(tempfile.mkdtemp(prefix="diastole-hostile-"))
+    try:
+        sound = place / "sound.run.h5"
+        subprocess.run([diastole, "simulate", str(source / "examples/gel.experiment.toml"), "-o", str(sound)], check=True,
+                       cwd=place, capture_output=True)
+        sane = subprocess.run([diastole, "inspect", str(sound)], cwd=place, capture_output=True, text=True,
+                              preexec_fn=limited)
+        assert sane.returncode == 0, f"the run itself is not read in {MOST_MEMORY >> 20} MB: {sane.stderr}"
+        failures = []
+        for tampered in HOSTILE:
+            file = place / "hostile.run.h5"
+            shutil.copy(sound, file)
+            with h5py.File(file, "r+") as run:
+                expected = tampered(run, place)
+            if not after(file, tampered):
+                failures.append(f"{tampered.__name__}: this test could not make it")
+                continue
+            for command in (["inspect", str(file)], ["note", str(file), "a word"]):
+                before = file.read_bytes()
+                ended = subprocess.run([diastole, *command], cwd=place, capture_output=True, text=True, preexec_fn=limited,
+                                       timeout=60)
+                if ended.returncode != 2 or expected not in ended.stderr:
+                    failures.append(f"{tampered.__name__}, {command[0]}: exit code {ended.returncode}, "
+                                    f"expected 2 and '{expected}'; said: {ended.stderr.strip()[:300]}")
+                if file.read_bytes() != before:
+                    failures.append(f"{tampered.__name__}, {command[0]}: the file was changed")
+        print(f"{len(HOSTILE)} hostile files")
+        sys.exit("\n".join(failures) if failures else 0)
+    finally:
+        shutil.rmtree(place)
+
+
+main()
