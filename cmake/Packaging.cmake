@@ -40,7 +40,15 @@ install(FILES ${packaging}/sysusers.conf DESTINATION lib/sysusers.d RENAME diast
 install(FILES ${staged}/rig.toml DESTINATION /etc/diastole)
 install(DIRECTORY ${DIASTOLE_FIRMWARE_IMAGES}/ DESTINATION share/diastole/firmware OPTIONAL
         FILES_MATCHING PATTERN "*.bin" PATTERN "*.hex" PATTERN "*.image")
-install(FILES README.md ${staged}/copyright DESTINATION share/doc/diastole)
+# What the programs are made of, of which versions: libraries that they load, headers that were compiled in.
+set(materials ${CMAKE_BINARY_DIR}/diastole.cdx.json)
+add_custom_command(OUTPUT ${materials}
+  COMMAND /usr/bin/python3 -B ${packaging}/bill_of_materials --version ${PROJECT_VERSION} --build ${CMAKE_BINARY_DIR}
+          --vendored ${CMAKE_SOURCE_DIR}/third_party -o ${materials} $<TARGET_FILE:diastole> $<TARGET_FILE:sim_rig>
+  DEPENDS diastole sim_rig ${packaging}/bill_of_materials COMMENT "Bill of materials" VERBATIM)
+add_custom_target(bill_of_materials ALL DEPENDS ${materials})
+
+install(FILES README.md ${staged}/copyright ${materials} DESTINATION share/doc/diastole)
 install(DIRECTORY docs/ DESTINATION share/doc/diastole/docs FILES_MATCHING PATTERN "*.md" PATTERN "*.svg" PATTERN "*.png")
 install(DIRECTORY examples DESTINATION share/doc/diastole)
 install(FILES ${packaging}/diastole.completion DESTINATION share/bash-completion/completions RENAME diastole)

@@ -8,6 +8,7 @@
 #include "host/cli/daemon_question.hpp"
 #include "host/cli/host_commands.hpp"
 #include "host/doctor/machine_checks.hpp"
+#include "host/doctor/udev_rules.hpp"
 #include "protocol/contract/named_members.hpp"
 
 namespace diastole {
@@ -18,6 +19,7 @@ volatile std::sig_atomic_t measuring_ended = 0;
 struct DoctorOptions {
   std::filesystem::path config;
   double latency_s = 5;
+  bool udev_rules = false;
 };
 
 const char* state_word(MachineCheck::State state) {
@@ -38,9 +40,21 @@ void show(const MachineCheck& check) {
   std::fflush(stdout);
 }
 
+/// For the devices that the rig file names and that are there.
+ExitCode print_udev_rules(const RigConfig& rig, const CommandOutput& out) {
+  const std::vector<std::string> rules = udev_rules(rig);
+  print(out, {{"udev_rules", rules}}, [&] {
+    fmt::print("# The devices of {}, for nobody but the daemon (docs/daemon.md).\n", rig.file);
+    for (const std::string& rule : rules)
+      fmt::print("{}\n", rule);
+  });
+  return ExitCode::done;
+}
+
 ExitCode doctor(const DoctorOptions& options, const CommandOutput& out) {
   std::optional<RigConfig> rig;
   if (!options.config.empty()) rig = read_rig(options.config);
+  if (options.udev_rules) return print_udev_rules(*rig, out);
   std::vector<MachineCheck> checks = check_machine(rig);
   if (!out.json)
     for (const MachineCheck& check : checks)
@@ -82,8 +96,14 @@ void add_doctor(CommandLine& line) {
       "      kernel wakes a thread, measured for 5 s\n"
       "  diastole doctor --config rig.toml\n"
       "      the port, the lines, the instrument and the folder that the rig file names; nothing moves\n"
+      "  diastole doctor --config rig.toml --udev-rules | sudo tee /etc/udev/rules.d/61-diastole-rig.rules\n"
+      "      a rule that gives that controller and those lines to the daemon's group, and no others\n"
       "Exit code 1: something lacks. Simulations, fits and explanations need none of it.");
-  command->add_option("--config", options->config, "rig file (.toml)");
+  auto* config = command->add_option("--config", options->config, "rig file (.toml)");
+  command
+      ->add_flag("--udev-rules", options->udev_rules,
+                 "print udev rules for the rig file's devices, and no more")
+      ->needs(config);
   command->add_option("--latency-s", options->latency_s, "how long to measure")
       ->check(CLI::Range(0.1, 600.0))
       ->capture_default_str();

@@ -7,6 +7,7 @@
 #include <array>
 #include <cmath>
 #include <cstdlib>
+#include <filesystem>
 #include <numbers>
 
 namespace diastole {
@@ -220,10 +221,25 @@ DaemonConfig read_daemon(std::optional<TableReader> table) {
 }  // namespace
 
 std::string default_socket() {
-  if (const char* runtime = std::getenv("XDG_RUNTIME_DIR"); runtime != nullptr && *runtime != '\0') {
-    return std::string(runtime) + "/diastole.sock";
-  }
-  return fmt::format("/tmp/diastole-{}.sock", getuid());
+  const auto told = [](const char* name) {
+    const char* value = std::getenv(name);
+    return std::string(value != nullptr ? value : "");
+  };
+  std::error_code ignored;
+  if (const std::string runtime = told("XDG_RUNTIME_DIR"); !runtime.empty())
+    return runtime + "/diastole.sock";
+  if (::geteuid() == 0) return "/run/diastole.sock";
+  const std::string runtime = fmt::format("/run/user/{}", ::geteuid());
+  if (std::filesystem::is_directory(runtime, ignored)) return runtime + "/diastole.sock";
+  const std::string state = told("XDG_STATE_HOME");
+  return (state.empty() ? told("HOME") + "/.local/state" : state) + "/diastole/daemon.sock";
+}
+
+void make_default_socket_folder() {
+  const std::filesystem::path folder = std::filesystem::path(default_socket()).parent_path();
+  std::error_code failed;  // then the socket cannot be made, which is told
+  if (std::filesystem::create_directories(folder, failed))
+    std::filesystem::permissions(folder, std::filesystem::perms::owner_all, failed);
 }
 
 RigConfig read_rig(const std::filesystem::path& path) { return read_rig(TableReader::from_file(path)); }

@@ -83,8 +83,11 @@ struct RigConfig {
 RigConfig read_rig(const std::filesystem::path& path);
 RigConfig read_rig(TableReader root);
 
-/// $XDG_RUNTIME_DIR/diastole.sock, or /tmp/diastole-UID.sock.
+/// Of a daemon that is no service, in a directory of the user's own: $XDG_RUNTIME_DIR/diastole.sock, root's
+/// /run/diastole.sock, /run/user/UID/diastole.sock, or $XDG_STATE_HOME/diastole/daemon.sock (~/.local/state).
 std::string default_socket();
+/// Makes the directory of the last of them, for nobody else.
+void make_default_socket_folder();
 /// Where the daemon serves that runs as a service of the system (packaging/).
 inline constexpr const char* service_socket = "/run/diastole/daemon.sock";
 

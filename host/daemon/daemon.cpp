@@ -156,6 +156,7 @@ void run_daemon(const DaemonOptions& options) {
   Ending ending(context, rig, signals, manager);
   const ServerPulse pulse(context, manager);
   const auto rpc_state = std::make_shared<RpcState>(RpcState{context, rig, policy});
+  if (config.daemon.socket == default_socket()) make_default_socket_folder();
   const RpcServer server(rpc_state, config.daemon.socket);
   const auto console = open_console(config, options.console.has_value(), rpc_state);
   nlohmann::json ready{{"ready", true}, {"socket", config.daemon.socket}};

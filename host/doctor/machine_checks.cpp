@@ -21,6 +21,7 @@
 #include <ctime>
 #include <thread>
 
+#include "host/doctor/udev_rules.hpp"
 #include "host/transport/descriptor.hpp"
 #include "host/transport/real_time.hpp"
 #include "protocol/contract/input_error.hpp"
@@ -32,7 +33,7 @@ namespace fs = std::filesystem;
 using State = MachineCheck::State;
 
 constexpr const char* rules_file = "60-diastole.rules";
-constexpr const char* own_group = "diastole";
+constexpr const char* own_group = device_group;
 
 MachineCheck good(std::string name, std::string found) {
   return {std::move(name), State::good, std::move(found), ""};
@@ -64,7 +65,12 @@ std::string user_name() {
 }
 
 std::string remedy_for_access() {
-  return fmt::format("sudo usermod -aG {} {}, then log in anew.", own_group, user_name());
+  return fmt::format(
+      "Give it to the group {}: diastole doctor --config rig.toml --udev-rules | sudo tee "
+      "/etc/udev/rules.d/61-diastole-rig.rules; and run the daemon as the service, which is in that group, "
+      "or "
+      "sudo usermod -aG {} {} and log in anew.",
+      own_group, own_group, user_name());
 }
 
 MachineCheck check_port(const std::optional<RigConfig>& rig) {

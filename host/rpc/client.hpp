@@ -11,6 +11,7 @@
 #include <string>
 
 #include "host/rpc/json_rpc.hpp"
+#include "host/rpc/peer.hpp"
 #include "host/transport/descriptor.hpp"
 #include "host/transport/unix_socket.hpp"
 #include "protocol/contract/input_error.hpp"
@@ -19,8 +20,10 @@ namespace diastole {
 
 class DaemonClient {
  public:
-  /// Connects. Throws HardwareError if no daemon listens there.
-  explicit DaemonClient(const std::string& socket) : path_(socket), socket_(connect_unix_socket(socket)) {}
+  /// Connects. Throws HardwareError if no daemon listens there, or one that may not serve this user (peer.hpp).
+  explicit DaemonClient(const std::string& socket) : path_(socket), socket_(connect_unix_socket(socket)) {
+    expect_daemon(socket_.get(), socket);
+  }
 
   /// One request, one answer. Throws InputError or HardwareError as the daemon raised it, HardwareError if
   /// the daemon is gone, silent for longer than `patience`, or refuses.

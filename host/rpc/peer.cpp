@@ -4,6 +4,7 @@
 #include <grp.h>
 #include <pwd.h>
 #include <sys/socket.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -34,6 +35,18 @@ std::vector<gid_t> supplementary_groups(int socket) {
   return groups;
 }
 
+/// What the path goes through, links among it, belongs to root or `uid`, and nobody else may put anything in it.
+bool only_writable_by(uid_t uid, std::filesystem::path path) {
+  while (path != path.root_path()) {
+    path = path.parent_path();
+    struct stat facts {};
+    if (::lstat(path.c_str(), &facts) != 0) return false;
+    if (facts.st_uid != 0 && facts.st_uid != uid) return false;
+    if (!S_ISLNK(facts.st_mode) && (facts.st_mode & (S_IWGRP | S_IWOTH)) != 0) return false;
+  }
+  return true;
+}
+
 }  // namespace
 
 Peer peer_of(int socket) {
@@ -44,6 +57,35 @@ Peer peer_of(int socket) {
   Peer peer{credentials.uid, credentials.pid, supplementary_groups(socket), user_name(credentials.uid)};
   peer.groups.push_back(credentials.gid);
   return peer;
+}
+
+bool may_serve(uid_t uid, const std::filesystem::path& socket) {
+  if (uid == 0 || uid == ::geteuid()) return true;
+  std::error_code lost;
+  const std::filesystem::path named = std::filesystem::absolute(socket, lost).lexically_normal();
+  const std::filesystem::path real = std::filesystem::canonical(named, lost);
+  return !lost && only_writable_by(uid, named) && only_writable_by(uid, real);
+}
+
+void expect_daemon(int socket, const std::string& path) {
+  const Peer daemon = peer_of(socket);
+  if (may_serve(daemon.uid, path)) return;
+  throw HardwareError(
+      path,
+      fmt::format("whoever listens at this socket runs as {}, and not only root and {} can put a "
+                  "socket there: it need not be the rig's daemon",
+                  daemon.user, daemon.user),
+      "Name the daemon's own socket with --socket or --config; it lies in a directory that only "
+      "the daemon's user writes in, as /run/diastole is.");
+}
+
+void expect_own_place(const std::string& path) {
+  const std::string folder = std::filesystem::absolute(path).parent_path().string();
+  struct stat facts {};
+  if (::stat(folder.c_str(), &facts) != 0 || (facts.st_mode & S_IWOTH) == 0) return;
+  throw HardwareError(
+      path, fmt::format("every user may write in {}, and could stand there in the daemon's place", folder),
+      "Choose a `socket` in a directory of the daemon's own ([daemon] in the rig file, or --socket).");
 }
 
 std::string in_words(const Peer& peer) {

@@ -4,6 +4,7 @@
 
 #include <sys/types.h>
 
+#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
@@ -25,6 +26,18 @@ struct Peer {
 
 /// Of a connected socket. Never throws: what cannot be found out stays unknown, and may do nothing.
 Peer peer_of(int socket);
+
+/// Whether a client may take whom it meets at `socket` for its daemon: `uid` is root or the client's own user, or nobody but
+/// root and that user can put a socket there – it owns the socket's directory, and on the way to it there is no directory that
+/// others may write in. So the system's service is known, and a path in a person's home; a stranger's socket in /tmp is not.
+bool may_serve(uid_t uid, const std::filesystem::path& socket);
+
+/// Of a client that has connected to `path`: throws HardwareError if whoever listens there may not serve it.
+void expect_daemon(int socket, const std::string& path);
+
+/// Of a daemon that is to listen at `path`: throws HardwareError if other users may write in its directory, and so could stand
+/// there in the daemon's place.
+void expect_own_place(const std::string& path);
 
 /// "anna (process 1234)", "anna (console at 127.0.0.1)".
 std::string in_words(const Peer& peer);

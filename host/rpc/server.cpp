@@ -11,6 +11,7 @@
 #include <optional>
 
 #include "host/rpc/acceptor.hpp"
+#include "host/rpc/peer.hpp"
 #include "host/rpc/rpc_session.hpp"
 #include "host/transport/unix_socket.hpp"
 #include "protocol/contract/input_error.hpp"
@@ -155,6 +156,7 @@ class RpcServer::Listener : public std::enable_shared_from_this<Listener> {
             rpc_state, "a connection",
             [this, rpc_state](stream_protocol::socket socket) { take(rpc_state, std::move(socket)); })),
         sweep_(rpc_state->context) {
+    expect_own_place(path_);
     if (std::filesystem::exists(path_) && somebody_listens(path_)) {
       throw HardwareError(path_, "another daemon listens at this socket",
                           "Stop it, or choose another `socket` in [daemon].");

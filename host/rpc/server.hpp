@@ -52,7 +52,7 @@ class RpcServer {
   static constexpr size_t most_connections = 128;
 
   /// Listens at `socket`; a socket left behind by a dead daemon is replaced. Throws HardwareError if another
-  /// daemon listens there or the path cannot be used.
+  /// daemon listens there, the path cannot be used, or every user may write in its directory.
   RpcServer(std::shared_ptr<RpcState> rpc_state, const std::string& socket);
   ~RpcServer();
 

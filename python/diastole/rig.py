@@ -7,6 +7,8 @@ import os
 import pathlib
 import shutil
 import socket
+import stat
+import struct
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -31,8 +33,28 @@ class Sample:
 def default_socket() -> str:
     """The user's own daemon, else the system's service."""
     runtime = os.environ.get("XDG_RUNTIME_DIR")
-    own = f"{runtime}/diastole.sock" if runtime else f"/tmp/diastole-{os.getuid()}.sock"
+    if runtime:
+        own = f"{runtime}/diastole.sock"
+    elif os.geteuid() == 0:
+        own = "/run/diastole.sock"
+    elif os.path.isdir(f"/run/user/{os.geteuid()}"):
+        own = f"/run/user/{os.geteuid()}/diastole.sock"
+    else:
+        state = os.environ.get("XDG_STATE_HOME") or os.path.expanduser("~/.local/state")
+        own = f"{state}/diastole/daemon.sock"
     return SERVICE if not os.path.exists(own) and os.path.exists(SERVICE) else own
+
+
+def _may_serve(uid: int, path: str) -> bool:
+    """Root or this user, or nobody but root and `uid` can put a socket there (host/rpc/peer.hpp)."""
+    if uid in (0, os.geteuid()):
+        return True
+    named = pathlib.Path(os.path.abspath(path))
+    for fact in [folder.lstat() for each in (named, named.resolve()) for folder in each.parents]:
+        others_write = not stat.S_ISLNK(fact.st_mode) and fact.st_mode & 0o022
+        if others_write or fact.st_uid not in (0, uid):
+            return False
+    return True
 
 
 class Rig:
@@ -47,6 +69,11 @@ class Rig:
         except OSError as error:
             self._socket.close()
             raise DiastoleError(3, f"{self.path}: no daemon listens there ({error.strerror})") from error
+        credentials = self._socket.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, struct.calcsize("3i"))
+        uid = struct.unpack("3i", credentials)[1]
+        if not _may_serve(uid, self.path):
+            self._socket.close()
+            raise DiastoleError(3, f"{self.path}: user {uid} listens there, and others could: not taken for the daemon")
         self._lines = self._socket.makefile("r", encoding="utf-8")
         self._number = 0
 

@@ -11,6 +11,7 @@ import sys
 import tempfile
 import time
 import unittest
+import unittest.mock
 
 source, programs = pathlib.Path(sys.argv.pop(1)).resolve(), pathlib.Path(sys.argv.pop(1)).resolve()
 os.environ["DIASTOLE"] = str(programs / "diastole")
@@ -18,6 +19,7 @@ sys.path.insert(0, str(source / "python"))
 
 import diastole  # noqa: E402
 import diastole.classes  # noqa: E402
+import diastole.rig  # noqa: E402
 
 from diastole.record import Record  # noqa: E402
 
@@ -144,6 +146,21 @@ class AtARig(InAFolder):
         with self.assertRaises(diastole.DiastoleError) as refused:
             diastole.Rig(self.folder / "no-socket")
         self.assertEqual(refused.exception.code, 3)
+
+
+class Daemons(InAFolder):
+    def test_one_of_another_user_is_not_taken_where_others_can_put_a_socket(self):
+        stranger = os.geteuid() + 1
+        place = pathlib.Path(tempfile.mkdtemp())  # below /tmp, where everybody may write
+        try:
+            self.assertFalse(diastole.rig._may_serve(stranger, f"{place}/daemon.sock"))
+            self.assertTrue(diastole.rig._may_serve(os.geteuid(), f"{place}/daemon.sock"))
+            self.assertTrue(diastole.rig._may_serve(0, f"{place}/daemon.sock"))
+        finally:
+            place.rmdir()
+        with unittest.mock.patch.dict(os.environ):
+            os.environ.pop("XDG_RUNTIME_DIR", None)
+            self.assertFalse(diastole.rig.default_socket().startswith("/tmp/"))
 
 
 class Overhead(InAFolder):

@@ -97,6 +97,9 @@ def of_files(place):
     yield "runs", place.run("runs . kind=run")
     yield "runs", place.run("runs . kind=fit -o runs.html")
     yield "doctor", place.run("doctor --latency-s 0.2", (0, 1))
+    rig = (place.folder / "examples/rig.toml").read_text().replace('"/dev/ttyACM0"', '"/dev/null"')
+    (place.folder / "null.rig.toml").write_text(rig)
+    yield "doctor", place.run("doctor --config null.rig.toml --udev-rules")
 
 
 def of_sessions(place):
