@@ -1,0 +1,154 @@
+// Faults of the chip itself, with the image that is flashed in the emulator: with the full counts only. (The quick tests of the
+// same things: test_chip_faults.)
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <filesystem>
+
+#include "protocol/contract/input_error.hpp"
+#include "tests/faults/fault_table.hpp"
+#include "tests/sanitized.hpp"
+#include "tests/tools/sim_board/chip_bench.hpp"
+#include "tests/tools/sim_board/flash_bench.hpp"
+#include "tests/tools/sim_board/late_trigger.hpp"
+
+namespace diastole::faults {
+namespace {
+
+using namespace sim_board_test;
+
+#define NEEDS_FULL_COUNTS_ON_CHIP()                                                                       \
+  if (trials(0, 1) == 0 || sanitized) GTEST_SKIP() << "with the full counts only (DIASTOLE_FAULTS=full)"; \
+  if (!std::filesystem::exists(sim_board_test::firmware))                                                 \
+  GTEST_SKIP() << "no " << sim_board_test::firmware << ": build the preset `firmware` first"
+
+uint64_t random_ns(std::mt19937& random, double from_ms, double to_ms) {
+  return static_cast<uint64_t>(1e6 * between(random, from_ms, to_ms));
+}
+
+TEST(Faults, BrownOut) {
+  NEEDS_FULL_COUNTS_ON_CHIP();
+  int refused = 0;
+  const int tried = trials(0, 100);
+  const int survived = survivors(tried, [&](int, std::mt19937& random) {
+    ChipBench bench({.cell_seed = static_cast<uint32_t>(random())});
+    bench.connect();
+    bench.client.write_settings(ChipBench::numbered(1));
+    const uint64_t dip_ns = bench.desk.now_ns() + random_ns(random, 0, 30);
+    // From what the voltage detector tells, through the brown-out reset, to where RAM forgets.
+    const auto low_mV = static_cast<uint32_t>(between(random, 1'000, 2'840));
+    bench.desk.at(dip_ns, [&bench, low_mV] { bench.board().set_supply_mV(low_mV); });
+    bench.desk.at(dip_ns + random_ns(random, 1, 20), [&bench] { bench.board().set_supply_mV(3'300); });
+    bool whole = true;
+    try {
+      bench.client.write_settings(ChipBench::numbered(2));
+    } catch (const HardwareError&) {
+      whole = false;
+      ++refused;
+    }
+    bench.connect(1'000);
+    const int32_t held = bench.client.settings().settings.backlash_nm;
+    return (held == 2 || (!whole && held == 1)) && bench.board().marginal_words() == 0;
+  });
+  add_to_table({"supply dips", "to 1.0 … 2.84 V while settings are written", tried, survived,
+                fmt::format("old settings or new, no word half written; {} refused", refused)});
+}
+
+TEST(Faults, CutErase) {
+  NEEDS_FULL_COUNTS_ON_CHIP();
+  NEEDS_UPDATE_IMAGES();
+  const int tried = trials(0, 40);
+  const int survived = survivors(tried, [&](int, std::mt19937& random) {
+    FlashBench bench(factory_image, {.cell_seed = static_cast<uint32_t>(random())});
+    if (bench.runs() != "0.1.0 confirmed") return false;
+    if (!bench.flash(newer_update).verified)
+      return false;  // slot B holds something, so that it must be erased
+    bench.power_cycle();
+    if (!bench.flash(first_update, {.allow_older = true}).verified) return false;
+    bench.power_cycle();
+    // The record of the erase and the erase itself are the first operations of the update.
+    bench.board().cut_power_at_flash_operation(1 + random() % 6);
+    try {
+      (void)bench.flash(newer_update);
+      return false;
+    } catch (const HardwareError&) {
+    }
+    bench.board().cut_power_at_flash_operation({});
+    bench.power_cycle();
+    const auto running = bench.running();
+    if (!running || running->slot == wire::ImageSlot::none) return false;
+    if (!verifies(bench.board().flash(), running->slot)) return false;
+    return bench.flash(newer_update).verified && bench.board().marginal_words() == 0;
+  });
+  add_to_table({"erase cut off", "power lost at its record or in it, cells arbitrary", tried, survived,
+                "starts; the slot is erased again and takes the image"});
+}
+
+TEST(Faults, ProcessorFault) {
+  NEEDS_FULL_COUNTS_ON_CHIP();
+  constexpr std::array<const char*, 3> handlers{"USART3_IRQHandler", "SysTick_Handler", "TIM5_IRQHandler"};
+  const int tried = trials(0, 60);
+  const int survived = survivors(tried, [&](int k, std::mt19937& random) {
+    ChipBench bench;
+    bench.connect();
+    bench.client.home();
+    bench.pass(random_ns(random, 50, 400));
+    if (!bench.motor_is_on()) return false;
+    const std::string function = handlers.at(static_cast<size_t>(k) % handlers.size());
+    bench.patch(function, {0xde00});  // udf
+    bench.board().send(std::vector<uint8_t>{0});
+    bench.pass(5 * ms);
+    const bool off = !bench.motor_is_on();
+    bench.restore();
+    bench.connect(1'500);
+    auto registers = bench.crash();
+    return off && registers[wire::CrashRegister::cfsr] == 1U << 16 &&
+           bench.symbols.name_at(registers[wire::CrashRegister::pc]).value_or("") == function;
+  });
+  add_to_table({"processor fault", "an undefined instruction in a handler, homing", tried, survived,
+                "motor off within 5 ms; the black box names the function"});
+}
+
+TEST(Faults, LateTrigger) {
+  NEEDS_FULL_COUNTS_ON_CHIP();
+  int late = 0;
+  const int tried = trials(0, 60);
+  const int survived = survivors(tried, [&](int, std::mt19937& random) {
+    const HeldTriggers found = run_with_held_core(random_ns(random, 0, 0.2), random_ns(random, 0.001, 0.6));
+    if (found.rises_ns.size() == HeldTriggers::cycles && found.late_ns() > 0) ++late;
+    return found.told() && found.rises_ns.size() == HeldTriggers::cycles;
+  });
+  EXPECT_GT(late, tried / 4);
+  add_to_table({"late trigger", "the core held up to 0.6 ms about it", tried, survived,
+                fmt::format("{} late, each told with the time at its pin", late)});
+}
+
+TEST(Faults, CrystalFails) {
+  NEEDS_FULL_COUNTS_ON_CHIP();
+  uint64_t slowest_ns = 0;
+  const int tried = trials(0, 60);
+  const int survived = survivors(tried, [&](int, std::mt19937& random) {
+    ChipBench bench;
+    bench.connect();
+    bench.client.home();
+    bench.pass(random_ns(random, 50, 400));
+    if (!bench.motor_is_on()) return false;
+    const uint64_t failed_ns = bench.desk.now_ns();
+    bench.board().fail_crystal();
+    while (bench.motor_is_on() && bench.desk.now_ns() < failed_ns + 100'000)
+      bench.pass(1'000);
+    slowest_ns = std::max(slowest_ns, bench.desk.now_ns() - failed_ns);
+    const bool off = !bench.motor_is_on();
+    bench.connect(1'500);
+    return off && bench.client.status().fault == wire::Fault::clock;
+  });
+  EXPECT_LE(slowest_ns, 10'000U);
+  add_to_table({"crystal fails", "at random moments of homing", tried, survived,
+                fmt::format("motor off within {} us; fault 10 after it", slowest_ns / 1000)});
+}
+
+}  // namespace
+}  // namespace diastole::faults
