@@ -137,8 +137,9 @@ std::map<std::string, double, std::less<>> read_clock(const H5Source& source) {
 
 }  // namespace
 
-RecordedRun read_run(const std::filesystem::path& path) {
-  const H5Source source(path);
+RecordedRun read_run(const std::filesystem::path& path) { return read_run(H5Source(path)); }
+
+RecordedRun read_run(const H5Source& source) {
   const auto root = source.attributes("/");
   expect_format(source, root);
   RecordedRun run;

@@ -9,9 +9,13 @@
 
 namespace diastole::runfile {
 
+class H5Source;
+
 /// Reads a whole run. Throws InputError that names the dataset and the first offending index when the file is
 /// missing, not a run file, of a newer format_version, or breaks a rule of `check`.
 RecordedRun read_run(const std::filesystem::path& path);
+/// The same of a file that is open (h5_source.hpp).
+RecordedRun read_run(const H5Source& source);
 
 /// Far beyond any run, and within what arithmetic on times and counts bears without another check.
 inline constexpr double longest_time_s = 1e10;

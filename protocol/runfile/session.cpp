@@ -7,8 +7,9 @@
 
 namespace diastole::runfile {
 
-Session read_session(const std::filesystem::path& path) {
-  const H5Source source(path);
+Session read_session(const std::filesystem::path& path) { return read_session(H5Source(path)); }
+
+Session read_session(const H5Source& source) {
   Session session;
   if (!source.has(session_group)) return session;
   session.facts = source.attributes(session_group);

@@ -13,6 +13,8 @@
 
 namespace diastole::runfile {
 
+class H5Source;
+
 /// What somebody wrote about a run, at its start or at any time afterwards.
 struct SessionNote {
   std::string written_utc;  ///< ISO 8601
@@ -45,5 +47,7 @@ struct Session {
 /// Empty for a run of which nobody said anything. Throws InputError for what is no HDF5 file, or holds another kind of thing there;
 /// nothing else of the file is read.
 Session read_session(const std::filesystem::path& path);
+/// The same of a file that is open (h5_source.hpp).
+Session read_session(const H5Source& source);
 
 }  // namespace diastole::runfile

@@ -18,6 +18,7 @@
 #include "estimator/io/fit_file.hpp"
 #include "estimator/io/whole_file.hpp"
 #include "protocol/contract/input_error.hpp"
+#include "protocol/runfile/h5_source.hpp"
 #include "protocol/runfile/layout.hpp"
 #include "protocol/runfile/reader.hpp"
 #include "protocol/runfile/session.hpp"
@@ -66,9 +67,10 @@ std::vector<float> envelope(const std::vector<double>& values_kPa) {
 }
 
 void read_run_into(Entry& entry, const fs::path& file) {
-  const runfile::RecordedRun run = runfile::read_run(file);
+  const runfile::H5Source source(file);
+  const runfile::RecordedRun run = runfile::read_run(source);
   const runfile::Soundness soundness = runfile::assess(run);
-  const runfile::Session session = runfile::read_session(file);
+  const runfile::Session session = runfile::read_session(source);
   entry.date = run.started_utc;
   entry.specimen = session.text(runfile::specimen_fact);
   entry.operator_name = session.text(runfile::operator_fact);
