@@ -19,6 +19,7 @@ void add_reconstruct(CommandLine& line);
 void add_montecarlo(CommandLine& line);
 void add_design(CommandLine& line);
 void add_shear(CommandLine& line);
+void add_law(CommandLine& line);
 void add_report(CommandLine& line);
 void add_mesh(CommandLine& line);
 void add_effects(CommandLine& line);
@@ -41,6 +42,7 @@ inline void add_estimator_commands(CommandLine& line, const ExplanationScorer& s
   add_montecarlo(line);
   add_design(line);
   add_shear(line);
+  add_law(line);
   add_report(line);
   add_mesh(line);
   add_effects(line);

@@ -13,6 +13,11 @@
 #include "estimator/shear/shear_fit.hpp"
 #include "protocol/runfile/run.hpp"
 
+namespace diastole {
+struct BenchTest;
+struct LawComparison;
+}  // namespace diastole
+
 namespace diastole::report {
 
 /// Pressure trace with triggers, commanded volume, pressure binned into `frames` image frames with its spread
@@ -48,6 +53,9 @@ void add_montecarlo(Page& page, const SavedTable& table);
 
 /// C1 of a rotational shear test, Eq. 1's two sides with the line, the residuals, each load by itself.
 void add_shear(Page& page, const ShearTest& test, const ShearFit& fit);
+
+/// Laws compared (estimator/law_fit), the preferred one's parameters, and each bench test's curves.
+void add_laws(Page& page, const std::vector<BenchTest>& tests, const LawComparison& comparison);
 
 /// What the model lacks in words, with its parameters, the places of the misfit, the gap effect by effect, recordings and
 /// wall before and after, all candidates' evidence and the next experiment.

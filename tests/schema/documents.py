@@ -85,6 +85,9 @@ def of_files(place):
     yield "design", place.run(f"design {points}")
     yield "design", place.run(f"design {gel} --images --snr 15 --mesh 4,2,1")
     yield "shear", place.run("shear examples/shear-test.csv -o shear.html")
+    yield "law", place.run("law examples/bench-tests/uniaxial.csv examples/bench-tests/tube.csv examples/bench-tests/biaxial.csv "
+                           "--law neo-hookean --law mooney-rivlin --law examples/laws/mooney-rivlin.law.toml -o law.html")
+    yield "law", place.run("law examples/shear-test.csv --law mooney-rivlin", (1,))
     yield "report", place.run("report gel.run.h5 points.fit.json -o gel.html")
     yield "lv", place.run("lv examples/ventricle.guide.csv -o heart.mesh --fibre-deg 60,-60")
     yield "mesh", place.run("mesh export examples/lv-clean.study.toml -o lv.mesh.toml")
