@@ -7,11 +7,9 @@
 #include <algorithm>
 #include <cerrno>
 #include <cmath>
-#include <vector>
 
 #include "protocol/contract/input_error.hpp"
 #include "protocol/runfile/reader.hpp"
-#include "protocol/runfile/soundness.hpp"
 #include "tests/faults/fault_table.hpp"
 #include "tests/host/acquisition/session_on_desk.hpp"
 #include "tests/link_faults/campaign.hpp"
@@ -210,38 +208,6 @@ TEST(Faults, DiskFull) {
   });
   add_to_table({"disk full", "no room left at random offsets", tried, survived,
                 fmt::format("journal readable to its last whole record ({} at least)", fewest)});
-}
-
-TEST(Faults, SaturatedInstrument) {
-  int64_t cut_off = 0;
-  const int tried = trials(20, 200);
-  const int survived = survivors(tried, [&](int, std::mt19937& random) {
-    SessionOnDesk session(short_session);
-    // 12 bits over 10 V, a pulsation of 1 V every 0.79 s, and an end of the range somewhere within it.
-    constexpr double code_V = 10.0 / 4096;
-    constexpr int64_t longest_run = 120;  // half a pulsation at 300 Hz
-    const double end_V = between(random, 0.5, 1.4);
-    const double phase = between(random, 0, 6.28);
-    session.instrument.converter = [&](double) {
-      const double volts = 0.5 + std::sin(phase + 8e-9 * static_cast<double>(session.desk.now_ns));
-      return code_V * std::floor(std::min(volts, end_V) / code_V);
-    };
-    session.run();
-    const AssembledRun assembled = session.assemble();
-    const auto counted = static_cast<int64_t>(session.outcome.counts.saturated);
-    cut_off += counted;
-    const bool told = std::any_of(session.remarks.begin(), session.remarks.end(),
-                                  [](const RunRemark& remark) { return remark.code == "saturated"; });
-    const std::vector<double>& values = assembled.run.pressure.channels.at("cavity_kPa");
-    const double greatest = *std::max_element(values.begin(), values.end());
-    const auto at_end = static_cast<int64_t>(std::count(values.begin(), values.end(), greatest));
-    const runfile::Soundness soundness = runfile::assess(assembled.run);
-    // A run of them that the recording begins or ends in is not counted.
-    return told && counted == soundness.saturated.at("cavity_kPa") && counted <= at_end &&
-           counted + 2 * longest_run >= at_end && counted >= at_end / 3 && !soundness.sound();
-  });
-  add_to_table({"instrument at its end", "pulsation cut off at 0 to 90 % of its height", tried, survived,
-                fmt::format("{} samples counted, told in the run and by inspect", cut_off)});
 }
 
 TEST(Faults, BadLine) {

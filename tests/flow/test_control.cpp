@@ -84,7 +84,9 @@ TEST(Control, TheCommandTakesOverAndStatusTellsWho) {
 TEST(Control, AStrangerObservesAndStopsAndDoesNothingElse) {
   if (::geteuid() != 0) GTEST_SKIP() << "only root can become another user";
   RigWithDaemon rig(RigWithDaemon::Time::conducted);
-  std::filesystem::permissions(rig.place.path(), std::filesystem::perms::all);
+  using std::filesystem::perms;
+  const perms of_others = perms::group_read | perms::group_exec | perms::others_read | perms::others_exec;
+  std::filesystem::permissions(rig.place.path(), perms::owner_all | of_others);
   rig.start_daemon();
   auto own = rig.client();
   own.call("rig.home");
