@@ -1,0 +1,21 @@
+# What makes a mistake in the programs harder to use: checked copies, guarded stacks, tables that are read-only before the first
+# line runs, code at addresses of its own. In release and package; the sanitizers have checks of their own. A test looks for
+# each in the finished programs (tests/packaging/hardened.py).
+if(NOT CMAKE_BUILD_TYPE STREQUAL "Release")
+  return()
+endif()
+include(CheckCXXCompilerFlag)
+
+add_compile_options(-U_FORTIFY_SOURCE -D_FORTIFY_SOURCE=3 -fstack-protector-strong -fPIE)
+foreach(option
+    -fstack-clash-protection
+    -fcf-protection              # x86: indirect branches and returns go where they may (CET)
+    -mbranch-protection=standard # Arm: the same
+  )
+  string(MAKE_C_IDENTIFIER "takes${option}" takes)
+  check_cxx_compiler_flag(${option} ${takes})
+  if(${takes})
+    add_compile_options(${option})
+  endif()
+endforeach()
+add_link_options("$<$<STREQUAL:$<TARGET_PROPERTY:TYPE>,EXECUTABLE>:-pie>" -Wl,-z,relro -Wl,-z,now -Wl,-z,noexecstack)
