@@ -88,6 +88,10 @@ def of_files(place):
     yield "law", place.run("law examples/bench-tests/uniaxial.csv examples/bench-tests/tube.csv examples/bench-tests/biaxial.csv "
                            "--law neo-hookean --law mooney-rivlin --law examples/laws/mooney-rivlin.law.toml -o law.html")
     yield "law", place.run("law examples/shear-test.csv --law mooney-rivlin", (1,))
+    (place.folder / "gels.batch.toml").write_text('format = "diastole-batch"\nversion = 1\noutput = "results"\n[[job]]\ncommand = "fit"\n'
+                                                  'inputs = ["examples/phantom-a-points.study.toml", "gel.run.h5"]\narguments = ["--mesh", "4,2,1"]\n')
+    yield "batch", place.run("batch gels.batch.toml -o batch.html", (1,))
+    yield "batch", place.run("batch gels.batch.toml --slurm gels.sh")
     yield "report", place.run("report gel.run.h5 points.fit.json -o gel.html")
     yield "lv", place.run("lv examples/ventricle.guide.csv -o heart.mesh --fibre-deg 60,-60")
     yield "mesh", place.run("mesh export examples/lv-clean.study.toml -o lv.mesh.toml")

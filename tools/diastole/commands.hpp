@@ -5,6 +5,8 @@
 
 namespace diastole {
 
+/// `diastole batch`: fit, explain, montecarlo or track on many studies.
+void add_batch(CommandLine& line);
 /// `diastole catheter`: the paper's test of catheter and transducer, from a recorded step of pressure.
 void add_catheter(CommandLine& line);
 /// `diastole compare`: what tells runs apart.

@@ -86,6 +86,7 @@ diastole::ExitCode run(int argc, char** argv) {
   diastole::CommandLine line(app);
   diastole::add_host_commands(line);
   diastole::add_runs(line);
+  diastole::add_batch(line);
   diastole::add_compare(line);
   diastole::add_catheter(line);
   diastole::add_simulate(line);
