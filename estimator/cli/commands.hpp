@@ -12,6 +12,7 @@ void add_images(CommandLine& line);
 void add_track(CommandLine& line);
 void add_flow(CommandLine& line);
 void add_ventricle(CommandLine& line);
+void add_fibres(CommandLine& line);
 void add_solve(CommandLine& line);
 void add_pressure_volume(CommandLine& line);
 void add_fit(CommandLine& line);
@@ -35,6 +36,7 @@ inline void add_estimator_commands(CommandLine& line, const ExplanationScorer& s
   add_track(line);
   add_flow(line);
   add_ventricle(line);
+  add_fibres(line);
   add_solve(line);
   add_pressure_volume(line);
   add_reconstruct(line);

@@ -70,8 +70,13 @@ EllipsoidSpecimen read_ellipsoid(TableReader& table) {
     table.fail("base_z_mm", fmt::format("{} does not cut the inner wall", ellipsoid.base_z_mm),
                fmt::format("Choose it between -{0} and {0}, the inner semi-axis along z.", inner[1]));
   }
-  ellipsoid.fibre_endo_deg = table.number("fibre_endo_deg", {.at_least = -180, .at_most = 180});
-  ellipsoid.fibre_epi_deg = table.number("fibre_epi_deg", {.at_least = -180, .at_most = 180});
+  for (const auto& [key, angle_deg] : {std::pair{"fibre_endo_deg", &ellipsoid.fibre_endo_deg},
+                                       std::pair{"fibre_epi_deg", &ellipsoid.fibre_epi_deg}}) {
+    if (!table.has("fibres"))
+      *angle_deg = table.number(key, {.at_least = -180, .at_most = 180});
+    else if (table.has(key))
+      table.fail(key, "stands beside measured fibres", "Leave one of them out: fibres replaces the angles.");
+  }
   ellipsoid.mesh = read_mesh(table);
   read_ends(table, ellipsoid);
   return ellipsoid;
@@ -85,7 +90,8 @@ MeshSpecimen read_mesh_specimen(TableReader& table, const std::filesystem::path&
   return mesh;
 }
 
-Specimen read_specimen(TableReader& root, const std::filesystem::path& folder) {
+Specimen read_specimen(TableReader& root, const std::filesystem::path& folder,
+                       std::optional<std::filesystem::path>& fibres) {
   TableReader table = root.table("specimen");
   const std::string kind = table.choice("kind", {"annulus", "ellipsoid", "mesh", "fitted-lv"});
   Specimen specimen;
@@ -96,6 +102,7 @@ Specimen read_specimen(TableReader& root, const std::filesystem::path& folder) {
   } else {
     specimen = read_annulus(table);
   }
+  if (table.has("fibres")) fibres = folder / table.text("fibres");
   table.finish();
   return specimen;
 }
@@ -276,12 +283,15 @@ bool parse_whole(std::string_view text, Number& value) {
 Study read_study(const std::filesystem::path& path) {
   TableReader root = TableReader::from_file(path);
   root.expect_format("diastole-study", 1);
+  std::optional<std::filesystem::path> fibres;
   Study study{.file = path,
-              .specimen = read_specimen(root, path.parent_path()),
+              .specimen = read_specimen(root, path.parent_path(), fibres),
+              .fibres = {},
               .law = read_law(root, path.parent_path()),
               .data = {},
               .effects = {},
               .refine = {}};
+  study.fibres = fibres;
   study.data = read_data(root, path.parent_path());
   study.data.to_specimen = read_pose_of_images(root);
   study.chamber = read_chamber(root);
@@ -316,7 +326,7 @@ std::vector<std::filesystem::path> inputs_of(const Study& study) {
   inputs.insert(inputs.end(), study.effect_files.begin(), study.effect_files.end());
   if (study.law.file) inputs.push_back(*study.law.file);
   if (const auto* mesh = std::get_if<MeshSpecimen>(&study.specimen)) inputs.push_back(mesh->file);
-  for (const auto& data : {study.data.tags, study.data.points, study.data.frames}) {
+  for (const auto& data : {study.fibres, study.data.tags, study.data.points, study.data.frames}) {
     if (data) inputs.push_back(*data);
   }
   return inputs;

@@ -38,7 +38,7 @@ struct EllipsoidSpecimen {
   std::array<double, 2> inner_axes_mm;  ///< semi-axes across z and along z
   std::array<double, 2> outer_axes_mm;
   double base_z_mm;
-  double fibre_endo_deg;
+  double fibre_endo_deg;  ///< 0 where the study has measured fibres instead
   double fibre_epi_deg;
   std::array<int, 3> mesh;                  ///< elements: circumferential, longitudinal, transmural
   std::string ends;                         ///< "fixed", or "sprung"
@@ -140,6 +140,8 @@ struct StudyEffect {
 struct Study {
   std::filesystem::path file;
   Specimen specimen;
+  /// Measured fibre directions at points, in the images' coordinates (estimator/io/fibre_points.hpp): they replace those of the specimen.
+  std::optional<std::filesystem::path> fibres = {};
   StudyLaw law;
   StudyData data;
   std::vector<std::string> effects;                      ///< effects that the model already includes

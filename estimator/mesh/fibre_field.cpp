@@ -28,12 +28,17 @@ Eigen::Matrix3d wall_axes(const HermiteMesh& mesh, const MaterialPoint& point) {
   return axes;
 }
 
-FibreField::FibreField(std::vector<double> fibre_deg, std::vector<double> sheet_deg)
-    : fibre_deg_(std::move(fibre_deg)), sheet_deg_(std::move(sheet_deg)) {}
+FibreField::FibreField(std::vector<double> fibre_deg, std::vector<double> sheet_deg,
+                       std::vector<double> transverse_deg)
+    : fibre_deg_(std::move(fibre_deg)),
+      sheet_deg_(std::move(sheet_deg)),
+      transverse_deg_(std::move(transverse_deg)) {}
 
 FibreField FibreField::prolonged(const Refinement& refinement) const {
-  return FibreField(refinement.prolonged_corners(fibre_deg_),
-                    sheet_deg_.empty() ? sheet_deg_ : refinement.prolonged_corners(sheet_deg_));
+  const auto finer = [&](const std::vector<double>& nodal) {
+    return nodal.empty() ? nodal : refinement.prolonged_corners(nodal);
+  };
+  return FibreField(finer(fibre_deg_), finer(sheet_deg_), finer(transverse_deg_));
 }
 
 double FibreField::fibre_deg(const HermiteMesh& mesh, const MaterialPoint& point) const {
@@ -44,7 +49,9 @@ Eigen::Matrix3d FibreField::material_axes(const HermiteMesh& mesh, const Materia
   using Eigen::AngleAxisd;
   using Eigen::Vector3d;
   const double sheet_deg = sheet_deg_.empty() ? 0.0 : interpolate(mesh, sheet_deg_, point);
+  const double transverse_deg = transverse_deg_.empty() ? 0.0 : interpolate(mesh, transverse_deg_, point);
   return wall_axes(mesh, point) * AngleAxisd(radians(fibre_deg(mesh, point)), Vector3d::UnitZ()) *
+         AngleAxisd(radians(-transverse_deg), Vector3d::UnitY()) *
          AngleAxisd(radians(sheet_deg), Vector3d::UnitX());
 }
 

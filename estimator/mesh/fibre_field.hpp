@@ -11,6 +11,8 @@
 //
 // The material axes are (f, s, r), or, with a sheet angle beta, (f, cos(beta) s + sin(beta) r,
 // -sin(beta) s + cos(beta) r): beta = 90 makes the second axis, the sheet of orthotropic laws, transmural.
+// With a transverse angle gamma the fibre leaves the surface, f = cos(gamma) (cos(alpha) e_c + sin(alpha) e_l) +
+// sin(gamma) r, and r above becomes f x s.
 
 #include <Eigen/Dense>
 #include <vector>
@@ -25,12 +27,14 @@ Eigen::Matrix3d wall_axes(const HermiteMesh& mesh, const MaterialPoint& point);
 
 class FibreField {
  public:
-  /// One angle a node of the mesh that it will be used with; `sheet_deg` may be empty (0 everywhere).
-  explicit FibreField(std::vector<double> fibre_deg, std::vector<double> sheet_deg = {});
+  /// One angle a node of the mesh that it will be used with; `sheet_deg` and `transverse_deg` may be empty (0 everywhere).
+  explicit FibreField(std::vector<double> fibre_deg, std::vector<double> sheet_deg = {},
+                      std::vector<double> transverse_deg = {});
 
   [[nodiscard]] const std::vector<double>& nodal_fibre_deg() const { return fibre_deg_; }
   /// Empty if it is 0 everywhere.
   [[nodiscard]] const std::vector<double>& nodal_sheet_deg() const { return sheet_deg_; }
+  [[nodiscard]] const std::vector<double>& nodal_transverse_deg() const { return transverse_deg_; }
   [[nodiscard]] double fibre_deg(const HermiteMesh& mesh, const MaterialPoint& point) const;
   /// The same directions over the finer mesh.
   [[nodiscard]] FibreField prolonged(const Refinement& refinement) const;
@@ -40,6 +44,7 @@ class FibreField {
  private:
   std::vector<double> fibre_deg_;
   std::vector<double> sheet_deg_;
+  std::vector<double> transverse_deg_;
 };
 
 }  // namespace diastole

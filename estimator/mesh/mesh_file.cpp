@@ -233,7 +233,9 @@ class MeshReader {
   std::optional<FibreField> read_fibres() {
     std::vector<double> fibre_deg;
     std::vector<double> sheet_deg;
-    for (const auto& [key, list] : {std::pair("fibre_deg", &fibre_deg), std::pair("sheet_deg", &sheet_deg)}) {
+    std::vector<double> transverse_deg;
+    for (const auto& [key, list] : {std::pair("fibre_deg", &fibre_deg), std::pair("sheet_deg", &sheet_deg),
+                                    std::pair("transverse_deg", &transverse_deg)}) {
       const bool wanted = nodes_.front().has(key);
       for (TableReader& table : nodes_) {
         if (table.has(key) != wanted) {
@@ -245,10 +247,12 @@ class MeshReader {
         if (wanted) list->push_back(table.number(key, {.at_least = -360, .at_most = 360}));
       }
     }
-    if (fibre_deg.empty() && !sheet_deg.empty())
-      nodes_.front().fail("sheet_deg", "is given without fibre_deg", "Give both.");
+    for (const auto& [key, list] :
+         {std::pair("sheet_deg", &sheet_deg), std::pair("transverse_deg", &transverse_deg)})
+      if (fibre_deg.empty() && !list->empty())
+        nodes_.front().fail(key, "is given without fibre_deg", "Give both.");
     if (fibre_deg.empty()) return {};
-    return FibreField(std::move(fibre_deg), std::move(sheet_deg));
+    return FibreField(std::move(fibre_deg), std::move(sheet_deg), std::move(transverse_deg));
   }
 
   void require_all_used(const std::vector<HermiteMesh::Corners>& corners_of) {
@@ -372,6 +376,8 @@ std::string mesh_file_text(const MeshBody& body) {
     if (body.fibres) fmt::format_to(out, "fibre_deg = {}\n", exact(body.fibres->nodal_fibre_deg()[node]));
     if (body.fibres && !body.fibres->nodal_sheet_deg().empty())
       fmt::format_to(out, "sheet_deg = {}\n", exact(body.fibres->nodal_sheet_deg()[node]));
+    if (body.fibres && !body.fibres->nodal_transverse_deg().empty())
+      fmt::format_to(out, "transverse_deg = {}\n", exact(body.fibres->nodal_transverse_deg()[node]));
     if (!ties.zero[node].empty()) fmt::format_to(out, "zero = {}\n", quoted_list(ties.zero[node]));
     if (!ties.shares[node].empty()) fmt::format_to(out, "shares = {}\n", quoted_list(ties.shares[node]));
   }

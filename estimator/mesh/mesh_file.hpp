@@ -5,7 +5,7 @@
 //
 //   [[node]]  # 1                                                    numbered from 1 in the file's order
 //   x_mm = [value, d1, d2, d12, d3, d13, d23, d123]                  likewise y_mm, z_mm
-//   fibre_deg = 60.0     sheet_deg = 0.0                             optional; for all nodes or for none
+//   fibre_deg = 60.0     sheet_deg = 0.0   transverse_deg = 0.0      optional; for all nodes or for none
 //   zero = ["d1", "d13"]                                             optional: zero in every field (collapsed edge)
 //   shares = ["value 3", "d3 3"]                                     optional: the same as node 3's, in every field
 //   [[element]]  # 1

@@ -12,10 +12,12 @@
 #include <vector>
 
 #include "estimator/fe/elastic_system.hpp"
+#include "estimator/io/fibre_points.hpp"
 #include "estimator/io/study_refusal.hpp"
 #include "estimator/materials/file_law.hpp"
 #include "estimator/mesh/annulus.hpp"
 #include "estimator/mesh/ellipsoid.hpp"
+#include "estimator/mesh/fibres_through_points.hpp"
 #include "estimator/mesh/refinement.hpp"
 #include "protocol/contract/table_reader.hpp"
 
@@ -92,6 +94,23 @@ MeshBody refined(MeshBody body, const std::array<int, 3>& halvings) {
     }
   }
   return body;
+}
+
+/// Measured fibres in place of assumed ones. Without [images.to_specimen] the points are in the specimen's own axes.
+FibreField measured_fibres(const Study& study, const HermiteMesh& mesh) {
+  const Placement to_images = placement_of(study);
+  std::vector<FibrePoint> points;
+  for (const FibrePointRow& row : read_fibre_points(*study.fibres)) {
+    const Eigen::Vector3d place(row.place_mm.data()), direction(row.direction.data());
+    points.push_back({to_images.back(place), to_images.rotation.transpose() * direction, row.sigma_deg});
+  }
+  try {
+    FibresThroughPoints through = fibres_through_points(mesh, points);
+    return std::move(through.fibres);
+  } catch (const std::invalid_argument& error) {
+    refuse(study, "specimen.fibres", fmt::format("{}: {}", study.fibres->string(), error.what()),
+           "The file has patient coordinates: [images.to_specimen] says where the specimen lies in them.");
+  }
 }
 
 /// The springs' plates are rigid, plane and across z, and the gaps along a wall's rim are counted from them.
@@ -185,10 +204,22 @@ void require_chamber_wall(const Study& study, const ElasticModel& model) {
 MeshBody study_body(const Study& study) {
   MeshBody body = std::visit([](const auto& specimen) { return make_body(specimen); }, study.specimen);
   try {
-    return refined(std::move(body), study.refine);
+    body = refined(std::move(body), study.refine);
   } catch (const std::invalid_argument& error) {
     refuse(study, "model.refine", error.what(), "Leave the mesh as the file has it.");
   }
+  if (study.fibres) body.fibres = measured_fibres(study, body.mesh);
+  return body;
+}
+
+Placement placement_of(const Study& study) {
+  Placement placement;
+  if (!study.data.to_specimen) return placement;
+  placement.origin_mm = Eigen::Vector3d(study.data.to_specimen->origin_mm.data());
+  for (size_t axis = 0; axis < 3; ++axis)
+    placement.rotation.col(static_cast<Eigen::Index>(axis)) =
+        Eigen::Vector3d(study.data.to_specimen->axes[axis].data());
+  return placement;
 }
 
 ElasticModel make_model(const Study& study, SolveOptions options) {

@@ -4,12 +4,16 @@
 #include "estimator/fe/elastic_model.hpp"
 #include "estimator/io/study.hpp"
 #include "estimator/mesh/mesh_file.hpp"
+#include "estimator/mesh/placed_mesh.hpp"
 
 namespace diastole {
 
-/// The specimen's mesh, refined as the study says, and its fibres. Throws InputError if a mesh file is wrong or
-/// cannot be refined.
+/// The specimen's mesh, refined as the study says, and its fibres: those that the study has measured, if any. Throws InputError if a mesh
+/// file is wrong or cannot be refined, or if measured fibres are not in the mesh.
 MeshBody study_body(const Study& study);
+
+/// From the specimen's axes to the images': [images.to_specimen]; nothing moves without it.
+Placement placement_of(const Study& study);
 
 /// Parameters take their `start`. Throws InputError if the law is unknown, if the study lacks one of its
 /// parameters or has one that it does not know, if a start lies outside what the law allows, or if it names

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "estimator/explain/verdict/explanation_json.hpp"
+#include "estimator/io/fibres_file.hpp"
 #include "estimator/io/fit_file.hpp"
 #include "estimator/io/flow_file.hpp"
 #include "estimator/io/reconstruction_file.hpp"
@@ -20,7 +21,18 @@
 namespace diastole::report {
 namespace {
 
-enum class Kind { explanation, tracking, flow, fit, table, reconstruction, solution, shear_test, run };
+enum class Kind {
+  explanation,
+  tracking,
+  flow,
+  fibres,
+  fit,
+  table,
+  reconstruction,
+  solution,
+  shear_test,
+  run
+};
 
 bool is_hdf5(std::string_view content) {
   return content.starts_with(std::string_view("\x89HDF\r\n\x1a\n", 8));
@@ -32,6 +44,7 @@ bool is_json_object(const std::string& content) {
 }
 
 constexpr const char* flow_title = "Flow and volume over the cycle";
+constexpr const char* fibres_title = "Fibres from diffusion";
 
 std::string title_of(size_t estimates, size_t runs) {
   if (estimates == 0) return runs == 1 ? "A pump session" : "Pump sessions";
@@ -82,6 +95,8 @@ std::string make_report(std::span<const std::filesystem::path> files, size_t fra
       add(Kind::tracking, tracking_record_from_json(content, name), add_tracking);
     } else if (is_flow(content)) {
       add(Kind::flow, flow_record_from_json(content, name), add_flow);
+    } else if (is_fibres(content)) {
+      add(Kind::fibres, fibres_record_from_json(content, name), add_fibres);
     } else if (is_reconstruction(content)) {
       add(Kind::reconstruction, reconstruction_record_from_json(content, name), add_reconstruction);
     } else {
@@ -96,6 +111,7 @@ std::string make_report(std::span<const std::filesystem::path> files, size_t fra
             : estimates > 0 || count(Kind::run) > 0 ? title_of(estimates, count(Kind::run))
             : only_images                           ? "Displacement from tagged images"
             : count(Kind::flow) > 0                 ? flow_title
+            : count(Kind::fibres) > 0               ? fibres_title
                                                     : "Strain and stress under load");
   for (const auto& [kind, drawings] : parts) {
     for (const auto& draw : drawings)
@@ -119,6 +135,12 @@ std::string make_report(const FlowRecord& record) {
 std::string make_report(const VentricleRecord& record) {
   Page page("A ventricle's walls and volumes");
   add_ventricle(page, record);
+  return page.html();
+}
+
+std::string make_report(const FibresRecord& record) {
+  Page page(fibres_title);
+  add_fibres(page, record);
   return page.html();
 }
 

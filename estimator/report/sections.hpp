@@ -2,6 +2,7 @@
 // What the report shows of each kind of file.
 
 #include "estimator/explain/verdict/explanation.hpp"
+#include "estimator/io/fibres_file.hpp"
 #include "estimator/io/fit_file.hpp"
 #include "estimator/io/flow_file.hpp"
 #include "estimator/io/reconstruction_file.hpp"
@@ -43,6 +44,9 @@ void add_flow(Page& page, const FlowRecord& flow);
 
 /// Sections with the points that were set, volumes and wall thickness over the cycle, displaced slices.
 void add_ventricle(Page& page, const VentricleRecord& heart);
+
+/// Tensors in figures, the check of the gradients' axes, the helix through the wall, fibres of three layers, pictures of all slices.
+void add_fibres(Page& page, const FibresRecord& fibres);
 
 /// Each in its severity's dress.
 void add_findings(Page& page, const std::vector<Finding>& findings);

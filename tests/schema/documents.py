@@ -5,6 +5,7 @@ import os
 import pathlib
 import shutil
 import signal
+import struct
 import subprocess
 
 import h5py
@@ -57,6 +58,35 @@ def make_pop_test(source, target):
             del run["pressure/cavity_filtered_kPa"]
 
 
+def make_diffusion(folder, axes):
+    """NIfTI around a ventricle, its fibres around its axis, b 1000 in twelve directions, for `diastole fibres`."""
+    folder.mkdir()
+    size, step_mm = (28, 28, 16), np.array([3.0, 3.0, 6.0])
+    turn = np.array([axes["x"], axes["y"], axes["z_apex_to_base"]]).T
+    first_mm = axes["origin_mm"] - turn @ (step_mm * size / 2)
+    place = np.stack(np.meshgrid(*map(np.arange, size), indexing="ij"), -1) * step_mm - step_mm * size / 2
+    fibre = np.cross([0, 0, 1], place) @ turn.T
+    fibre /= np.linalg.norm(fibre, axis=-1, keepdims=True) + 1e-9
+    z, around = (np.arange(12) + 0.5) / 12, 2.399963 * np.arange(12)
+    towards = np.stack([np.sqrt(1 - z**2) * np.cos(around), np.sqrt(1 - z**2) * np.sin(around), z], -1)
+    signals = [np.full(size, 1000.0)] + [1000 * np.exp(-0.8 - 0.5 * (fibre @ g) ** 2) for g in towards]
+    signals = np.stack(signals, -1) + 30 * np.random.default_rng(1).standard_normal((*size, 13))
+    to_ras = np.diag([-1.0, -1.0, 1.0])
+    header = bytearray(352)
+    struct.pack_into("<i", header, 0, 348)
+    struct.pack_into("<8h", header, 40, 4, *size, 13, 1, 1, 1)
+    struct.pack_into("<2h", header, 70, 16, 32)  # float
+    struct.pack_into("<8f", header, 76, 1, *step_mm, 1, 0, 0, 0)
+    struct.pack_into("<2f", header, 108, 352, 1)
+    struct.pack_into("<2h", header, 252, 0, 1)  # sform
+    struct.pack_into("<12f", header, 280, *np.column_stack([to_ras @ turn * step_mm, to_ras @ first_mm]).ravel())
+    header[344:347] = b"n+1"
+    (folder / "dwi.nii").write_bytes(bytes(header) + signals.astype("<f4").tobytes(order="F"))
+    image = towards @ turn * [-1, 1, 1]  # FSL's convention for right-handed axes
+    (folder / "dwi.bval").write_text("0" + " 1000" * 12)
+    (folder / "dwi.bvec").write_text("\n".join("0 " + " ".join(map(str, row)) for row in image.T))
+
+
 def of_files(place):
     """Commands that read and write files."""
     gel = "examples/phantom-a.study.toml"
@@ -93,7 +123,11 @@ def of_files(place):
     yield "batch", place.run("batch gels.batch.toml -o batch.html", (1,))
     yield "batch", place.run("batch gels.batch.toml --slurm gels.sh")
     yield "report", place.run("report gel.run.h5 points.fit.json -o gel.html")
-    yield "lv", place.run("lv examples/ventricle.guide.csv -o heart.mesh --fibre-deg 60,-60")
+    heart = place.run("lv examples/ventricle.guide.csv -o heart.mesh --fibre-deg 60,-60")
+    yield "lv", heart
+    make_diffusion(place.folder / "nifti", heart["heart_axes"])
+    yield "fibres", place.run("fibres nifti --mesh heart.mesh -o heart.fibres.csv")
+    yield "fibres", place.run("fibres nifti --tensors tensors.csv")
     yield "mesh", place.run("mesh export examples/lv-clean.study.toml -o lv.mesh.toml")
     yield "effects", place.run("effects")
     yield "effects", place.run("effects hose-compliance")

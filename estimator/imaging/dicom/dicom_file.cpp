@@ -177,29 +177,98 @@ std::optional<VelocityEncoding> velocity_of(const FrameItems& items, const std::
   return std::nullopt;
 }
 
+/// The bytes of a private value that arrived without its type (UN, or in an implicit transfer syntax).
+std::optional<std::string> untyped(DcmItem& item, const DcmTagKey& tag) {
+  DcmElement* element = nullptr;
+  if (item.findAndGetElement(tag, element).bad() || dynamic_cast<DcmOtherByteOtherWord*>(element) == nullptr)
+    return std::nullopt;
+  Uint8* bytes = nullptr;
+  if (element->getUint8Array(bytes).bad() || bytes == nullptr) return std::nullopt;
+  return std::string(bytes, bytes + element->getLength());
+}
+
+/// A private decimal text (IS, DS), typed or not.
+std::optional<double> private_text_number(DcmItem& item, const DcmTagKey& tag) {
+  const auto bytes = untyped(item, tag);
+  if (!bytes) return number(item, tag);
+  char* end = nullptr;
+  const double value = std::strtod(bytes->c_str(), &end);
+  return end != bytes->c_str() && std::isfinite(value) ? std::optional(value) : std::nullopt;
+}
+
+/// `count` private doubles (FD), typed or not.
+std::optional<std::vector<double>> private_doubles(DcmItem& item, const DcmTagKey& tag, size_t count) {
+  std::vector<double> values(count);
+  if (const auto bytes = untyped(item, tag)) {
+    if (bytes->size() < count * sizeof(double)) return std::nullopt;
+    std::memcpy(values.data(), bytes->data(), count * sizeof(double));
+  } else {
+    for (size_t i = 0; i < count; ++i) {
+      const auto value = number(item, tag, static_cast<unsigned long>(i));
+      if (!value) return std::nullopt;
+      values[i] = *value;
+    }
+  }
+  for (const double value : values)
+    if (!std::isfinite(value)) return std::nullopt;
+  return values;
+}
+
+/// xx, xy, xz, yy, yz, zz.
+Eigen::Matrix3d symmetric(const std::vector<double>& upper) {
+  Eigen::Matrix3d matrix;
+  matrix << upper[0], upper[1], upper[2], upper[1], upper[3], upper[4], upper[2], upper[4], upper[5];
+  return matrix;
+}
+
+/// (0018,9601) in the item or, as some write it, its members without the sequence.
+std::optional<Eigen::Matrix3d> standard_b_matrix(DcmItem& item) {
+  DcmItem* inside = nullptr;
+  DcmItem& holder =
+      item.findAndGetSequenceItem(DCM_DiffusionBMatrixSequence, inside).good() && inside ? *inside : item;
+  std::vector<double> upper;
+  for (const DcmTagKey& tag : {DCM_DiffusionBValueXX, DCM_DiffusionBValueXY, DCM_DiffusionBValueXZ,
+                               DCM_DiffusionBValueYY, DCM_DiffusionBValueYZ, DCM_DiffusionBValueZZ}) {
+    const auto value = number(holder, tag);
+    if (!value) return std::nullopt;
+    upper.push_back(*value);
+  }
+  return symmetric(upper);
+}
+
+std::optional<Eigen::Vector3d> standard_direction(DcmItem& item) {
+  DcmItem* inside = nullptr;
+  if (item.findAndGetSequenceItem(DCM_DiffusionGradientDirectionSequence, inside).good() && inside)
+    return vector3(*inside, DCM_DiffusionGradientOrientation);
+  return vector3(item, DCM_DiffusionGradientOrientation);
+}
+
 std::optional<DiffusionEncoding> diffusion_of(const FrameItems& items, const std::string& vendor) {
   DcmItem& data = items.dataset();
   auto b = items.number_in(DCM_MRDiffusionSequence, DCM_DiffusionBValue);
-  if (!b && vendor == "Siemens") b = number(data, DcmTagKey(0x0019, 0x100c));
+  if (!b && vendor == "Siemens") b = private_text_number(data, DcmTagKey(0x0019, 0x100c));
   if (!b && vendor == "Philips") b = number(data, DcmTagKey(0x2001, 0x1003));
   if (!b && vendor == "GE") {
     b = number(data, DcmTagKey(0x0043, 0x1039));
     if (b) b = std::fmod(*b, 1e6);  // GE adds 1e9 to those of a multi-shell protocol
   }
+  auto direction = items.find(DCM_MRDiffusionSequence, standard_direction);
+  auto matrix = items.find(DCM_MRDiffusionSequence, standard_b_matrix);
+  if (vendor == "Siemens") {
+    if (const auto g = private_doubles(data, DcmTagKey(0x0019, 0x100e), 3); g && !direction)
+      direction = Eigen::Vector3d((*g)[0], (*g)[1], (*g)[2]);
+    if (const auto upper = private_doubles(data, DcmTagKey(0x0019, 0x1027), 6); upper && !matrix)
+      matrix = symmetric(*upper);
+  }
+  if (!b && matrix) b = matrix->trace();
   if (!b || *b < 0) return std::nullopt;
-  auto direction = items.find(DCM_MRDiffusionSequence, [](DcmItem& item) -> std::optional<Eigen::Vector3d> {
-    DcmItem* inside = nullptr;
-    if (item.findAndGetSequenceItem(DCM_DiffusionGradientDirectionSequence, inside).good() && inside)
-      return vector3(*inside, DCM_DiffusionGradientOrientation);
-    return vector3(item, DCM_DiffusionGradientOrientation);
-  });
-  if (!direction && vendor == "Siemens") direction = vector3(data, DcmTagKey(0x0019, 0x100e));
-  if (direction && direction->norm() > 0.1) {
+  constexpr double least_length = 0.1;  // scanners write (0,0,0) where they mean none
+  if (direction && direction->norm() > least_length) {
     direction->normalize();
   } else {
     direction.reset();
   }
-  return DiffusionEncoding{*b, direction};
+  return DiffusionEncoding{*b, direction, matrix};
 }
 
 FileFault unusable(std::string place, std::string problem, std::string remedy) {
@@ -379,6 +448,13 @@ float decoded(const PixelLayout& layout, const uint8_t* bytes, size_t index) {
 }
 
 }  // namespace
+
+std::optional<Eigen::Matrix3d> DiffusionEncoding::weighting() const {
+  if (b_matrix) return b_matrix;
+  if (direction) return Eigen::Matrix3d(b_s_mm2 * *direction * direction->transpose());
+  if (b_s_mm2 == 0) return Eigen::Matrix3d::Zero();
+  return std::nullopt;
+}
 
 DicomContent read_headers(const std::filesystem::path& file) {
   DicomContent content;

@@ -23,8 +23,13 @@ struct VelocityEncoding {
 };
 
 struct DiffusionEncoding {
-  double b_s_mm2;
+  double b_s_mm2;                            ///< the trace of the b-matrix where the header has nothing else
   std::optional<Eigen::Vector3d> direction;  ///< unit, patient axes
+  /// s/mm², patient axes: (0018,9602) to (0018,9607), or Siemens (0019,1027). Holds what imaging gradients add.
+  std::optional<Eigen::Matrix3d> b_matrix;
+
+  /// The b-matrix, or b g gᵀ; zero for b = 0; nothing if b > 0 and no direction is known, as of trace images.
+  [[nodiscard]] std::optional<Eigen::Matrix3d> weighting() const;
 };
 
 /// One image, which is one frame of a file.
