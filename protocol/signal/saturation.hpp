@@ -1,6 +1,7 @@
 #pragma once
 // Samples that stand at the end of an instrument's range: a run of equal values at the signal's extreme, entered and left in
-// steps that a signal coming to rest does not make. One value at a time, without storage, so that the daemon counts while it
+// steps that a signal coming to rest does not make. The range's end cuts the step that meets it short: of the last two before
+// the run and of the first two after it the longer one counts. One value at a time, without storage, so that the daemon counts while it
 // records and `inspect` counts the same afterwards.
 
 #include <cmath>
@@ -27,8 +28,12 @@ class SaturationWatch {
 
   /// NaN: the sample is missing.
   void push(double value) {
+    const double step = std::abs(value - last_);  // NaN at a gap and after it: no step
+    if (step > 0 && step < code_) code_ = step;
+    if (left_.samples > 0) end_run(std::fmax(left_by_, step));
     if (std::isnan(value)) {
       run_ = 0;
+      step_ = 0;
       last_ = value;
       return;
     }
@@ -36,11 +41,14 @@ class SaturationWatch {
       ++run_;
       return;
     }
-    const double step = std::abs(value - last_);  // NaN after a gap: no step
-    if (step > 0 && step < code_) code_ = step;
-    if (run_ >= kLeastRun) end_run(step);
+    if (run_ >= kLeastRun && !std::isnan(step)) {
+      left_ = {last_, run_, 1};
+      left_by_ = step;
+      left_entered_by_ = entered_by_;
+    }
+    entered_by_ = std::fmax(step, run_ == 1 ? step_ : 0.0);
+    step_ = step;
     run_ = 1;
-    entered_by_ = step;
     last_ = value;
     if (value > most_.value) most_ = {value, 0, 0};
     if (value < least_.value) least_ = {value, 0, 0};
@@ -54,20 +62,24 @@ class SaturationWatch {
  private:
   void end_run(double left_by) {
     const double enough = std::fmax(kLeastStep_codes * code_, kLeastStep_part * (most_.value - least_.value));
-    if (!(entered_by_ >= enough && left_by >= enough)) return;
     for (Saturated* end : {&most_, &least_}) {
-      if (last_ != end->value) continue;
-      end->samples += run_;
+      if (left_.value != end->value || left_entered_by_ < enough || left_by < enough) continue;
+      end->samples += left_.samples;
       ++end->runs;
     }
+    left_.samples = 0;
   }
 
   static constexpr double kInfinite = std::numeric_limits<double>::infinity();
   Saturated most_{-kInfinite, 0, 0}, least_{kInfinite, 0, 0};
   double code_ = kInfinite;  ///< smallest step so far
   double last_ = std::numeric_limits<double>::quiet_NaN();
-  double entered_by_ = 0;
-  int64_t run_ = 0;  ///< equal values up to the last one
+  double step_ = 0;        ///< to the last value
+  double entered_by_ = 0;  ///< the run of equal values up to the last one
+  int64_t run_ = 0;
+  Saturated left_;  ///< a run that the last value has left: the next one tells by what steps
+  double left_by_ = 0;
+  double left_entered_by_ = 0;
 };
 
 }  // namespace diastole::signal

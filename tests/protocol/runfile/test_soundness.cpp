@@ -4,11 +4,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <random>
 #include <vector>
 
 #include "protocol/runfile/layout.hpp"
 #include "protocol/runfile/reader.hpp"
+#include "protocol/signal/saturation.hpp"
 #include "tests/protocol/runfile/broken_runs.hpp"
 
 namespace diastole::runfile {
@@ -218,6 +220,29 @@ TEST(Saturation, IsCountedByChannelAndMakesARunUnsound) {
   EXPECT_FALSE(soundness.saturated.contains("pump_filtered_kPa"));
   EXPECT_THAT(soundness.problems,
               testing::ElementsAre(HasSubstr("pressure/pump_kPa: "), HasSubstr("100.000 kPa")));
+}
+
+/// Just beyond the end a wave rises by half a kilopascal a sample, of which the end leaves whatever part: by the last step alone,
+/// two peaks in three would be missed.
+TEST(Saturation, IsSeenWhereverTheEndCutsTheLastStep) {
+  constexpr int starts = 50;
+  constexpr double samples = 400.0;
+  for (int start = 0; start < starts; ++start) {
+    signal::SaturationWatch watch;
+    std::mt19937 random(static_cast<unsigned>(start));
+    for (const double at_rest_kPa : {0.0, 0.01, 0.0})
+      watch.push(at_rest_kPa);
+    int64_t at_the_end = 0;
+    for (int i = 0; i < 2 * static_cast<int>(samples); ++i) {
+      const double turn = (i + static_cast<double>(start) / starts) / samples;
+      const double value_kPa = (std::round(10500.0 * std::sin(2.0 * std::numbers::pi * turn)) +
+                                static_cast<double>(random() % 3)) /
+                               100.0;
+      watch.push(std::clamp(value_kPa, -100.0, 100.0));
+      if (std::abs(value_kPa) >= 100.0) ++at_the_end;
+    }
+    EXPECT_EQ(watch.samples(), at_the_end) << start;
+  }
 }
 
 TEST(Saturation, IsNotASignalThatRestsAtItsExtreme) {
