@@ -338,7 +338,8 @@ class H5Source {
     const TypeHandle row(H5Dget_type(table.get()));
     const SpaceHandle space(H5Dget_space(table.get()));
     const auto rows = static_cast<hsize_t>(std::max<hssize_t>(1, H5Sget_simple_extent_npoints(space.get())));
-    const hsize_t row_bytes = std::max<hsize_t>(1, H5Tget_size(row.get()));
+    // A text of variable length takes 16 bytes there, of which its type owns to 8.
+    const hsize_t row_bytes = 2 * std::max<hsize_t>(1, H5Tget_size(row.get()));
     if (rows < usual_bytes / row_bytes)
       H5Pset_buffer(transfer.get(), static_cast<size_t>(rows * row_bytes), nullptr, nullptr);
     return transfer;
