@@ -207,8 +207,10 @@ TEST(FileEffects, LoseMoreThroughALeakThatOpens) {
   const auto valve =
       effect_with("drive", "[equations]\nq_hose = \"q_piston - G * p_pump * abs(p_pump) / 10 [kPa]\"\n");
   const rig::Prediction base = shown(nullptr, {});
-  // A leak that hardly bends goes the way of those that do, and ends where the straight one does.
-  EXPECT_LE(largest_difference(shown(bent.get(), {0.05}), shown(straight.get(), {0.05})), 1e-6);
+  // A leak that hardly bends goes the way of those that do, in steps a fourth as long, and ends where the straight one does: within
+  // what its steps are converged to (test_simulation.cpp).
+  constexpr double converged_kPa = 5e-4;
+  EXPECT_LE(largest_difference(shown(bent.get(), {0.05}), shown(straight.get(), {0.05})), converged_kPa);
   EXPECT_GT(largest_difference(shown(open.get(), {0.05}), base),
             1.1 * largest_difference(shown(straight.get(), {0.05}), base));
   const rig::Prediction of_valve = shown(valve.get(), {0.05});
