@@ -19,3 +19,5 @@ foreach(option
   endif()
 endforeach()
 add_link_options("$<$<STREQUAL:$<TARGET_PROPERTY:TYPE>,EXECUTABLE>:-pie>" -Wl,-z,relro -Wl,-z,now -Wl,-z,noexecstack)
+# No folder to look for libraries in: CMake's list of them ends with an empty one, which is wherever the program is started.
+set(CMAKE_SKIP_RPATH ON)
