@@ -81,8 +81,8 @@ TEST_F(UdevRules, TellAnAdapterWithoutOneByItsSocket) {
 }
 
 TEST_F(UdevRules, TakeNoTextFromADeviceThatCouldBeARule) {
-  for (const std::string text :
-       {R"(1", RUN+="/bin/sh)", "A*", "A 1", "A\t1", "{x}", "$env", std::string(65, 'A').c_str()}) {
+  for (const std::string& text : std::vector<std::string>{R"(1", RUN+="/bin/sh)", "A*", "A 1", "A\t1", "{x}",
+                                                          "$env", std::string(65, 'A')}) {
     serial_number(text);
     EXPECT_THAT(rules("ttyUSB7").at(0), AllOf(HasSubstr(R"(KERNELS=="1-2")"), Not(HasSubstr(text)))) << text;
   }
