@@ -8,6 +8,7 @@
 
 #include "estimator/cli/commands.hpp"
 #include "estimator/cli/output_files.hpp"
+#include "estimator/cli/page_and_record.hpp"
 #include "estimator/imaging/diffusion/fibre_grid.hpp"
 #include "estimator/imaging/diffusion/fibre_session.hpp"
 #include "estimator/io/finding_json.hpp"
@@ -170,15 +171,12 @@ ExitCode run_fibres(const FibresArguments& arguments, const CommandOutput& out) 
   if (arguments.output) write_whole_file(*arguments.output, fibre_points_text(session.rows));
   if (arguments.tensors) write_whole_file(*arguments.tensors, imaging::tensor_file_text(session.tensors));
   if (arguments.grid) write_vtkhdf(*arguments.grid, imaging::fibre_grid(*session.field));
-  if (arguments.page || arguments.record) {
-    const FibresRecord record = imaging::fibres_record(session);
-    if (arguments.page) write_whole_file(*arguments.page, report::make_report(record));
-    if (arguments.record) write_whole_file(*arguments.record, diastole::to_json(record));
-  }
+  write_page_and_record(arguments.page, arguments.record, [&] { return imaging::fibres_record(session); });
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  const ExitCode end = session.field && !session.field->converged ? ExitCode::negative : ExitCode::done;
   if (out.json) {
     std::cout << to_json(session, seconds).dump(1) << '\n';
-    return ExitCode::done;
+    return end;
   }
   print_for_people(session, seconds);
   if (arguments.output)
@@ -187,7 +185,7 @@ ExitCode run_fibres(const FibresArguments& arguments, const CommandOutput& out) 
   if (arguments.tensors) fmt::print("Tensors: {}\n", arguments.tensors->string());
   if (arguments.grid) fmt::print("For ParaView: {}\n", arguments.grid->string());
   if (arguments.page) fmt::print("The page to look at: {}\n", arguments.page->string());
-  return ExitCode::done;
+  return end;
 }
 
 }  // namespace

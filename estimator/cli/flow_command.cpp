@@ -8,6 +8,7 @@
 
 #include "estimator/cli/commands.hpp"
 #include "estimator/cli/output_files.hpp"
+#include "estimator/cli/page_and_record.hpp"
 #include "estimator/imaging/flow/flow_files.hpp"
 #include "estimator/imaging/flow/flow_session.hpp"
 #include "estimator/io/finding_json.hpp"
@@ -167,11 +168,7 @@ ExitCode run_flow(const FlowArguments& arguments, const CommandOutput& out) {
   if (request.run && !arguments.leave_run) imaging::store_in_run(session, *request.run, arguments.force);
   write_whole_file(arguments.output, imaging::flow_file_text(session.flow));
   if (arguments.loop) write_whole_file(*arguments.loop, imaging::loop_file_text(*session.loop));
-  if (arguments.page || arguments.record) {
-    const FlowRecord record = imaging::flow_record(session);
-    if (arguments.page) write_whole_file(*arguments.page, report::make_report(record));
-    if (arguments.record) write_whole_file(*arguments.record, diastole::to_json(record));
-  }
+  write_page_and_record(arguments.page, arguments.record, [&] { return imaging::flow_record(session); });
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   if (out.json) {
     std::cout << to_json(session, seconds).dump(1) << '\n';

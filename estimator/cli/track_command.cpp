@@ -8,6 +8,7 @@
 
 #include "estimator/cli/commands.hpp"
 #include "estimator/cli/output_files.hpp"
+#include "estimator/cli/page_and_record.hpp"
 #include "estimator/imaging/tracking/specimen_pose.hpp"
 #include "estimator/imaging/tracking/tags_file.hpp"
 #include "estimator/imaging/tracking/tracked_folder.hpp"
@@ -77,11 +78,8 @@ ExitCode run_track(const TrackArguments& arguments, const CommandOutput& out) {
   });
   write_whole_file(arguments.output, imaging::tags_file_text(tracked.points));
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  if (arguments.page || arguments.record) {
-    const TrackingRecord record = imaging::tracking_record(tracked, seconds);
-    if (arguments.page) write_whole_file(*arguments.page, report::make_report(record));
-    if (arguments.record) write_whole_file(*arguments.record, to_json(record));
-  }
+  write_page_and_record(arguments.page, arguments.record,
+                        [&] { return imaging::tracking_record(tracked, seconds); });
   if (out.json) {
     Json json = {{"points", tracked.points.size()},
                  {"dropped", tracked.dropped},

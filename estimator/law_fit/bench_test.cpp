@@ -36,9 +36,12 @@ const TestKind& kind_of(std::string_view text, const std::string& file) {
   std::vector<std::string> known;
   for (const TestKind& kind : test_kinds())
     known.push_back(fmt::format("\n  {:<17} {}", kind.name, fmt::join(kind.columns, ",")));
-  throw InputError({file, "line 1",
-                    fmt::format("the column \"{}\" begins the header of no bench test", first),
-                    fmt::format("The header must be one of:{}", fmt::join(known, ""))});
+  throw InputError(
+      {file, "line 1", fmt::format("the column \"{}\" begins the header of no bench test", first),
+       fmt::format(
+           "{}The header must be one of:{}",
+           first.find(';') != first.npos ? "Columns are separated by commas, and decimals have points. " : "",
+           fmt::join(known, ""))});
 }
 
 /// Those of the kind that the header names, and where the fibre lies.

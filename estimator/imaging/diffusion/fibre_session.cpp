@@ -12,19 +12,12 @@
 #include "estimator/mesh/point_locator.hpp"
 #include "estimator/parallel/parallel_for.hpp"
 #include "protocol/contract/input_error.hpp"
+#include "protocol/signal/quantile.hpp"
 
 namespace diastole::imaging {
 namespace {
 
-double quantile(std::vector<double> values, double share) {
-  if (values.empty()) return 0;
-  const auto at =
-      values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), at, values.end());
-  return *at;
-}
-
-double middle_of(std::vector<double> values) { return quantile(std::move(values), 0.5); }
+double middle_of(std::vector<double> values) { return signal::quantile(std::move(values), 0.5); }
 
 /// What noise of this covariance makes of an isotropic tensor: the mean square deviator is the deviator's variance.
 double fa_of_noise(const VoxelTensor& voxel, double md) {
@@ -210,8 +203,8 @@ void add_course(FibresRecord& record, const FibreEstimate& field) {
       if (std::abs(field.lattice.depth[node] - depth) < 1e-6) helix.push_back(field.nodes[node].helix_deg);
     record.depth.push_back(depth);
     record.helix_deg.push_back(middle_of(helix));
-    record.helix_low_deg.push_back(quantile(helix, 0.1));
-    record.helix_high_deg.push_back(quantile(helix, 0.9));
+    record.helix_low_deg.push_back(signal::quantile(helix, 0.1));
+    record.helix_high_deg.push_back(signal::quantile(helix, 0.9));
   }
 }
 

@@ -8,6 +8,7 @@
 #include <numbers>
 
 #include "estimator/imaging/tracking/brightness.hpp"
+#include "protocol/signal/quantile.hpp"
 
 namespace diastole::imaging {
 namespace {
@@ -27,14 +28,6 @@ constexpr double most_cost = 9.0;
 constexpr double smooth_share = 0.05;
 /// Each pixel is judged with its neighbours: a binomial window of this many passes has a standard deviation of one pixel.
 constexpr int pooling_passes = 2;
-
-double quantile(std::vector<double> values, double share) {
-  if (values.empty()) return 0;
-  const auto at =
-      values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), at, values.end());
-  return *at;
-}
 
 /// Patterns of tags at rest whose phase is free: 1, and cosine and sine of each direction.
 size_t rest_patterns(const TagView& view, const Eigen::Vector2d& x_mm, std::span<double> patterns) {
@@ -278,7 +271,7 @@ double noise_of(const Image& image, const Eigen::ArrayXXf& depth) {
     }
   }
   // Air shows the Rayleigh distribution, whose median is 1.1774 times the standard deviation of a channel.
-  return quantile(off, 0.5) / 1.1774;
+  return signal::quantile(off, 0.5) / 1.1774;
 }
 
 }  // namespace
@@ -296,7 +289,7 @@ MaterialMap first_materials(const TagView& view) {
     times_s.push_back(1e-3 * view.times_ms[k]);
   }
   const size_t nodes = modulations[0].mean.size();
-  const double bright = quantile(modulations.back().mean, 0.9);
+  const double bright = signal::quantile(modulations.back().mean, 0.9);
   std::vector<Fading> fading(nodes), samples;
   for (size_t node = 0; node < nodes; ++node) {
     if (modulations.back().mean[node] < least_brightness * bright) continue;
