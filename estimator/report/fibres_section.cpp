@@ -25,8 +25,8 @@ std::string layer_drawing(const FibreLayerRecord& layer) {
   if (layer.x_mm.empty()) return drawing(1, 1, "");
   const auto [left, right] = std::minmax_element(layer.x_mm.begin(), layer.x_mm.end());
   const auto [low, high] = std::minmax_element(layer.y_mm.begin(), layer.y_mm.end());
-  const auto x = [&](double mm) { return margin + per_mm * (mm - *left); };
-  const auto y = [&](double mm) { return margin + per_mm * (*high - mm); };
+  const auto x = [from = *left](double mm) { return margin + per_mm * (mm - from); };
+  const auto y = [from = *high](double mm) { return margin + per_mm * (from - mm); };
   std::string body;
   for (size_t i = 0; i < layer.x_mm.size(); ++i) {
     const double dx = half_mm * layer.along_x[i], dy = half_mm * layer.along_y[i];
