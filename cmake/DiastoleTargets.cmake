@@ -3,7 +3,7 @@
 add_library(diastole_options INTERFACE)
 target_include_directories(diastole_options INTERFACE ${CMAKE_SOURCE_DIR})
 target_compile_options(diastole_options INTERFACE
-  -Wall -Wextra -Wconversion -Wdouble-promotion -Wshadow -Wnon-virtual-dtor -Werror)
+  -Wall -Wextra -Wconversion -Wdouble-promotion -Wshadow $<$<COMPILE_LANGUAGE:CXX>:-Wnon-virtual-dtor> -Werror)
 # GCC 12 takes std::string's short form for an overrun where it inlines a move of one.
 target_compile_options(diastole_options INTERFACE
   "$<$<AND:$<CONFIG:Release>,$<CXX_COMPILER_ID:GNU>>:-Wno-array-bounds;-Wno-stringop-overflow;-Wno-restrict>")

@@ -16,6 +16,7 @@ struct LastEvent {
 
 ImageState state_of(const SlotFacts& slot, BootEvent last, bool half_erased) {
   if (!slot.has_header || half_erased) return ImageState::empty;
+  if (slot.refused) return ImageState::refused;
   if (!slot.verified) return ImageState::incomplete;
   switch (last) {
     case BootEvent::installed:
@@ -27,6 +28,7 @@ ImageState state_of(const SlotFacts& slot, BootEvent last, bool half_erased) {
     case BootEvent::none:
     case BootEvent::erase_begun:
     case BootEvent::erased:
+    case BootEvent::raised:
       break;
   }
   return ImageState::unrecorded;
@@ -41,7 +43,8 @@ BootDecision decide(std::span<const std::uint8_t> records, const std::array<Slot
   int age = 0;
   for_each_record(records, [&](const BootRecord& record) {
     const auto index = static_cast<std::size_t>(record.slot);
-    if (!of_slot(record.event) && slots[index].has_header && slots[index].tag == record.tag)
+    if (!of_slot(record.event) && record.event != BootEvent::raised && slots[index].has_header &&
+        slots[index].tag == record.tag)
       last[index] = {record.event, ++age};
   });
 

@@ -10,7 +10,7 @@
 //
 // A slot whose erase was begun and not ended counts as empty, whatever it reads, if the other one verifies. Only verified
 // images count. An update always goes to the slot that 2 to 4 would not start, so a working
-// image is never overwritten by one that has not proved itself.
+// image is never overwritten by one that has not proved itself. What is refused for its signature counts as not verified.
 
 #include <array>
 #include <cstdint>
@@ -24,6 +24,7 @@ struct SlotFacts {
   bool has_header = false;
   bool verified = false;  ///< the code matches the header's SHA-256, board and link address
   ImageTag tag{};         ///< of the header
+  bool refused = false;   ///< whole, but nobody vouches for it (slot_store.hpp); then not `verified`
 };
 
 struct BootDecision {

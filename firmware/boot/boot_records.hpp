@@ -7,7 +7,7 @@
 //        2    1 event     BootEvent
 //        3    1 slot      wire::ImageSlot, a or b
 //        4    8 tag       first bytes of the image's SHA-256: an event concerns this image only; zeros for the
-//                         events of a slot
+//                         events of a slot; for `raised` the counter, 32 bits, and zeros
 //       12    4 crc       CRC-32 of bytes 0 ... 11
 //
 //   Example: slot A, whose SHA-256 begins 01 02 03 04 05 06 07 08, is confirmed
@@ -37,8 +37,10 @@ enum class BootEvent : std::uint8_t {
   // Of the slot, whatever it holds:
   erase_begun = 4,  ///< not to be trusted until `erased`, however its cells read
   erased = 5,
+  // Of the board:
+  raised = 6,  ///< the rollback counter is this (image_signature.hpp); it never falls
 };
-inline constexpr BootEvent kLastBootEvent = BootEvent::erased;
+inline constexpr BootEvent kLastBootEvent = BootEvent::raised;
 
 constexpr bool of_slot(BootEvent event) {
   return event == BootEvent::erase_begun || event == BootEvent::erased;
@@ -49,6 +51,12 @@ using ImageTag = std::array<std::uint8_t, 8>;
 constexpr ImageTag tag_of(const wire::ImageHeader& header) {
   ImageTag tag{};
   std::copy_n(header.sha256.begin(), tag.size(), tag.begin());
+  return tag;
+}
+
+constexpr ImageTag tag_of_counter(std::uint32_t counter) {
+  ImageTag tag{};
+  wire::detail::put_little(std::span(tag), counter);
   return tag;
 }
 
@@ -104,9 +112,19 @@ constexpr void for_each_record(std::span<const std::uint8_t> sector, Visitor&& v
 constexpr BootEvent last_of_slot(std::span<const std::uint8_t> sector, wire::ImageSlot slot) {
   BootEvent last = BootEvent::none;
   for_each_record(sector, [&](const BootRecord& record) {
-    if (record.slot == slot) last = record.event;
+    if (record.slot == slot && record.event != BootEvent::raised) last = record.event;
   });
   return of_slot(last) ? last : BootEvent::none;
+}
+
+/// The highest rollback counter that is recorded; 0 if none is.
+constexpr std::uint32_t recorded_counter(std::span<const std::uint8_t> sector) {
+  std::uint32_t highest = 0;
+  for_each_record(sector, [&](const BootRecord& record) {
+    if (record.event == BootEvent::raised)
+      highest = std::max(highest, wire::detail::get_little<std::uint32_t>(record.tag));
+  });
+  return highest;
 }
 
 /// Whether an erase of the slot was begun and not ended.

@@ -36,7 +36,7 @@ inline constexpr std::uint64_t kStayWindow_us = 30'000;
 /// After this silence of the line a bootloader with something to start starts it.
 inline constexpr std::uint64_t kPatience_us = 30'000'000;
 /// Of the bootloader itself, as Hello reports it.
-inline constexpr wire::FirmwareVersion kBootloaderVersion{1, 0, 0};
+inline constexpr wire::FirmwareVersion kBootloaderVersion{1, 1, 0};
 
 template <BootHardware H>
 class Bootloader {
@@ -85,18 +85,23 @@ Start Bootloader<H>::run(bool asked_to_stay) {
     }
     return {};
   }
-  if (!decision.trial) return {decision.start, false};
+  if (!decision.trial) {
+    record_counter(hardware_, decision);
+    return {decision.start, false};
+  }
   const SlotFacts facts = inspect(hardware_, decision.start);
   if (append(hardware_, {BootEvent::tried, decision.start, facts.tag})) return {decision.start, true};
   return {decision.keep != wire::ImageSlot::none ? decision.keep : decision.start, false};
 }
 
+/// What has come while the images were judged counts too.
 template <BootHardware H>
 bool Bootloader<H>::stay_requested(std::uint64_t until_us) {
   wire::FrameDecoder decoder;
-  while (hardware_.now_us() < until_us) {
+  for (;;) {
     const auto byte = hardware_.serial_read();
     if (!byte) {
+      if (hardware_.now_us() >= until_us) return false;
       hardware_.idle();
       continue;
     }
@@ -108,7 +113,6 @@ bool Bootloader<H>::stay_requested(std::uint64_t until_us) {
         wire::decode<wire::StayInBootloader>(frame.payload).ok())
       return true;
   }
-  return false;
 }
 
 template <BootHardware H>

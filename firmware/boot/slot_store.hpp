@@ -9,6 +9,8 @@
 #include <span>
 
 #include "firmware/boot/boot_decision.hpp"
+#include "protocol/signing/ed25519.hpp"
+#include "protocol/wire/image_signature.hpp"
 
 namespace diastole::boot {
 
@@ -21,6 +23,8 @@ concept SlotStore = requires(S& store, const S& fixed, wire::ImageSlot slot, std
   { fixed.slot_address(slot) } -> std::same_as<std::uint32_t>;
   { fixed.slot(slot) } -> std::same_as<std::span<const std::uint8_t>>;
   { fixed.records() } -> std::same_as<std::span<const std::uint8_t>>;
+  /// The public key of who may sign images; all 0xFF: anybody's image is taken.
+  { fixed.signing_key() } -> std::same_as<std::span<const std::uint8_t, 32>>;
   /// Whether the supply is high enough to erase and write.
   { fixed.supply_sound() } -> std::same_as<bool>;
   { store.erase_slot(slot) } -> std::same_as<bool>;
@@ -32,6 +36,11 @@ concept SlotStore = requires(S& store, const S& fixed, wire::ImageSlot slot, std
 /// The header in front of a slot's code, if there is a whole one.
 inline std::optional<wire::ImageHeader> header_in(std::span<const std::uint8_t> slot) {
   return wire::decode_image_header(slot.first<wire::kImageHeaderBytes>());
+}
+
+/// The header with its signature.
+inline wire::SignedHeader signed_header_in(std::span<const std::uint8_t> slot) {
+  return slot.first<wire::kSignedHeaderBytes>();
 }
 
 /// What speaks against an image in this slot, whatever its code holds.
@@ -54,13 +63,57 @@ SlotFacts inspect(const S& store, wire::ImageSlot slot) {
   if (fits(*header, store.board_id(), store.slot_address(slot), bytes.size()) != wire::UpdateOutcome::done)
     return facts;
   const auto code = bytes.subspan(wire::kImageHeaderArea, header->code_bytes);
-  facts.verified = wire::digest_of(*header, code) == header->sha256;
+  facts.verified = wire::digest_of(bytes.first<wire::kImageHeaderBytes>(), code) == header->sha256;
   return facts;
 }
 
+inline bool is_erased(std::span<const std::uint8_t> bytes) {
+  std::uint8_t all = 0xFF;  // std::all_of is thrice as long in the bootloader
+  for (const std::uint8_t byte : bytes)
+    all &= byte;
+  return all == 0xFF;
+}
+
+/// Whether the board takes an image with this header from who signed it, whatever its code holds; 14 million cycles.
+template <SlotStore S>
+wire::UpdateOutcome vouched_for(const S& store, wire::SignedHeader header, std::uint32_t counter) {
+  if (is_erased(store.signing_key())) return wire::UpdateOutcome::done;
+  if (!wire::has_signature_block(header) || is_erased(wire::signature_part(header)))
+    return wire::UpdateOutcome::not_signed;
+  if (!signing::signature_holds(store.signing_key(), wire::signed_part(header), wire::signature_part(header)))
+    return wire::UpdateOutcome::wrong_signature;
+  return wire::counter_of(header) < counter ? wire::UpdateOutcome::rolled_back : wire::UpdateOutcome::done;
+}
+
+/// Judges by signature only what would be started or kept, so that a start costs one check.
 template <SlotStore S>
 BootDecision decide(const S& store) {
-  return decide(store.records(), {inspect(store, wire::ImageSlot::a), inspect(store, wire::ImageSlot::b)});
+  std::array<SlotFacts, 2> facts{inspect(store, wire::ImageSlot::a), inspect(store, wire::ImageSlot::b)};
+  const std::uint32_t counter = recorded_counter(store.records());
+  std::array<bool, 2> judged{};
+  for (;;) {
+    const BootDecision decision = decide(store.records(), facts);
+    bool changed = false;
+    for (const wire::ImageSlot slot : {decision.start, decision.keep}) {
+      const auto index = static_cast<std::size_t>(slot);
+      if (slot == wire::ImageSlot::none || judged[index]) continue;
+      judged[index] = true;
+      if (vouched_for(store, signed_header_in(store.slot(slot)), counter) == wire::UpdateOutcome::done)
+        continue;
+      facts[index].verified = false;
+      facts[index].refused = changed = true;
+    }
+    if (!changed) return decision;
+  }
+}
+
+/// The highest rollback counter that is known: what is recorded, and that of the image that would be kept. So it outlives the
+/// moment in which the records are erased.
+template <SlotStore S>
+std::uint32_t rollback_counter(const S& store, const BootDecision& decision) {
+  const std::uint32_t recorded = recorded_counter(store.records());
+  if (decision.keep == wire::ImageSlot::none || is_erased(store.signing_key())) return recorded;
+  return std::max(recorded, wire::counter_of(signed_header_in(store.slot(decision.keep))));
 }
 
 /// Appends a record; false if there is no room or the flash did not take it.
@@ -71,6 +124,16 @@ bool append(S& store, const BootRecord& record) {
   return store.write_record(offset, encode(record));
 }
 
+/// At a start: a confirmed image's rollback counter is the board's from now on.
+template <SlotStore S>
+void record_counter(S& store, const BootDecision& decision) {
+  const wire::ImageState state = decision.state[static_cast<std::size_t>(decision.start)];
+  if (state != wire::ImageState::confirmed || !store.supply_sound()) return;
+  const std::uint32_t counter = rollback_counter(store, decision);
+  if (counter > recorded_counter(store.records()))
+    (void)append(store, {BootEvent::raised, decision.start, tag_of_counter(counter)});
+}
+
 /// Bytes of code that an interrupted update surely left in a slot: code is written in order, so everything
 /// before the last word that is not erased; that word itself may be half written.
 inline std::uint32_t held_code(std::span<const std::uint8_t> slot, std::uint32_t code_bytes) {
@@ -79,10 +142,6 @@ inline std::uint32_t held_code(std::span<const std::uint8_t> slot, std::uint32_t
   while (end > 0 && code[end - 1] == 0xFF)
     --end;
   return end == 0 ? 0 : static_cast<std::uint32_t>((end - 1) / 4 * 4);
-}
-
-inline bool is_erased(std::span<const std::uint8_t> bytes) {
-  return std::all_of(bytes.begin(), bytes.end(), [](std::uint8_t byte) { return byte == 0xFF; });
 }
 
 }  // namespace diastole::boot

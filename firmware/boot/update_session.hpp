@@ -32,16 +32,18 @@ class UpdateSession {
  private:
   /// Fewer free records than this, and the sector is erased while nothing depends on it.
   static constexpr std::size_t kRecordsNeeded = 16;
+  static constexpr std::size_t kRecordsOfAnUpdate = 4;  ///< installed, tried, confirmed, raised
 
   UpdateReply refuse(wire::UpdateOutcome outcome, std::uint32_t value = 0) {
     image_.reset();
     return {outcome, value};
   }
   [[nodiscard]] UpdateReply judge(const wire::ImageHeader& header, bool allow_older) const;
+  [[nodiscard]] UpdateReply judge_signature(wire::SignedHeader header, const BootDecision& decision) const;
   [[nodiscard]] bool still_erased() const {
     return last_of_slot(store_.records(), slot_) == BootEvent::erased && is_erased(store_.slot(slot_));
   }
-  bool make_room(const wire::ImageHeader& header);
+  bool make_room(const wire::BeginUpdate& request);
   bool compact_records(const BootDecision& decision);
 
   S& store_;
@@ -67,19 +69,31 @@ UpdateReply UpdateSession<S>::judge(const wire::ImageHeader& header, bool allow_
 }
 
 template <SlotStore S>
+UpdateReply UpdateSession<S>::judge_signature(wire::SignedHeader header, const BootDecision& decision) const {
+  const std::uint32_t counter = rollback_counter(store_, decision);
+  const wire::UpdateOutcome outcome = vouched_for(store_, header, counter);
+  return {outcome, outcome == wire::UpdateOutcome::rolled_back ? counter : 0};
+}
+
+template <SlotStore S>
 UpdateReply UpdateSession<S>::begin(const wire::BeginUpdate& request) {
   using enum wire::UpdateOutcome;
   held_ = 0;
-  if (request.header_bytes != wire::kImageHeaderBytes) return refuse(malformed);
-  const auto header = wire::decode_image_header(request.header);
+  if (request.header_bytes != wire::kImageHeaderBytes && request.header_bytes != request.header.size())
+    return refuse(malformed);
+  const wire::SignedHeader sent(request.header);
+  const auto header = wire::decode_image_header(sent.first<wire::kImageHeaderBytes>());
   if (!header) return refuse(bad_header);
-  slot_ = decide(store_).free;
-  const UpdateReply judged = judge(*header, request.allow_older != 0);
+  const BootDecision decision = decide(store_);
+  slot_ = decision.free;
+  UpdateReply judged = judge(*header, request.allow_older != 0);
+  if (judged.outcome == done) judged = judge_signature(sent, decision);
   if (judged.outcome != done) return refuse(judged.outcome, judged.value);
   if (!store_.supply_sound()) return refuse(supply_low);
-  if (header_in(store_.slot(slot_)) == header && !erase_interrupted(store_.records(), slot_)) {
+  if (std::equal(sent.begin(), sent.begin() + request.header_bytes, store_.slot(slot_).begin()) &&
+      !erase_interrupted(store_.records(), slot_)) {
     held_ = held_code(store_.slot(slot_), header->code_bytes);
-  } else if (!make_room(*header)) {
+  } else if (!make_room(request)) {
     return refuse(flash_failed, 0);
   }
   image_ = header;
@@ -87,7 +101,7 @@ UpdateReply UpdateSession<S>::begin(const wire::BeginUpdate& request) {
 }
 
 template <SlotStore S>
-bool UpdateSession<S>::make_room(const wire::ImageHeader& header) {
+bool UpdateSession<S>::make_room(const wire::BeginUpdate& request) {
   // A sector of records whose own erase was cut off has no whole record at its beginning, which is written last.
   const bool records_sound = decode_record(store_.records().template first<kRecordBytes>()).has_value();
   if (!still_erased()) {
@@ -97,15 +111,24 @@ bool UpdateSession<S>::make_room(const wire::ImageHeader& header) {
   }
   const bool compacted = !records_sound || records_left(store_.records()) < kRecordsNeeded;
   if (compacted && !compact_records(decide(store_))) return false;
-  return store_.write_slot(slot_, 0, wire::encode(header));
+  // The header last: where there is one, its signature is whole.
+  const std::span sent = std::span(request.header).first(request.header_bytes);
+  return store_.write_slot(slot_, wire::kImageSignatureAt, sent.subspan(wire::kImageSignatureAt)) &&
+         store_.write_slot(slot_, 0, sent.first(wire::kImageHeaderBytes));
 }
 
 /// Precondition: the free slot is erased. Then only one image is left to start, whatever the records say: they
-/// may be lost in the middle of this.
+/// may be lost in the middle of this. Its signature holds the rollback counter meanwhile; without such an image a counter
+/// is not erased, but the last cells are used up.
 template <SlotStore S>
 bool UpdateSession<S>::compact_records(const BootDecision& decision) {
+  const std::uint32_t counter = rollback_counter(store_, decision);
+  if (decision.keep == wire::ImageSlot::none) {
+    if (counter > 0) return records_left(store_.records()) >= kRecordsOfAnUpdate;
+    return store_.erase_records();
+  }
   if (!store_.erase_records()) return false;
-  if (decision.keep == wire::ImageSlot::none) return true;
+  if (counter > 0 && !append(store_, {BootEvent::raised, slot_, tag_of_counter(counter)})) return false;
   if (decision.state[static_cast<std::size_t>(decision.keep)] != wire::ImageState::confirmed) return true;
   const auto header = header_in(store_.slot(decision.keep));
   return append(store_, {BootEvent::confirmed, decision.keep, tag_of(*header)});

@@ -95,6 +95,8 @@ concept Board = requires(B& board, const B& fixed, const PulseOrder& order,
   /// Where settings are kept (settings_store.hpp); writing there may hold everything up for a second.
   { board.settings_flash() } -> std::same_as<typename B::SettingsFlash&>;
   { fixed.running_image() } -> std::same_as<RunningImage>;
+  /// Whether the bootloader has no key, and so anybody's firmware is taken.
+  { fixed.takes_unsigned_firmware() } -> std::same_as<bool>;
   /// Makes the running image the one to start from now on; at rest only. False: the flash did not take it.
   { board.confirm_image() } -> std::same_as<bool>;
   /// Resets, into the bootloader if asked. Outputs must be safe.

@@ -106,6 +106,7 @@ class Dispatch {
     status.duplicates = link.duplicates;
     status.out_of_order = link.out_of_order;
     status.retransmissions = link.retransmissions;
+    status.takes_unsigned_firmware = board_.takes_unsigned_firmware() ? 1 : 0;
     answer(status);
   }
   void handle(const wire::ReadSettings& request) {

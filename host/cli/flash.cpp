@@ -8,11 +8,14 @@
 #include <cstdio>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "host/cli/daemon_question.hpp"
 #include "host/cli/host_commands.hpp"
 #include "host/flash/updater.hpp"
 #include "host/transport/serial_port.hpp"
+#include "protocol/contract/input_error.hpp"
+#include "protocol/signing/signing_key.hpp"
 
 namespace diastole {
 namespace {
@@ -24,6 +27,9 @@ struct FlashOptions {
   std::string port;
   unsigned baud = 460'800;
   UpdateOptions update;
+  std::string new_key;
+  std::string sign;
+  std::optional<uint32_t> counter;
 };
 
 /// A bar that renews itself on a terminal, a line each quarter otherwise. On standard error.
@@ -102,6 +108,35 @@ ExitCode flash(FlashOptions options, const CommandOutput& out) {
   return result.end == UpdateEnd::stopped ? ExitCode::negative : ExitCode::done;
 }
 
+ExitCode make_key(const FlashOptions& options, const CommandOutput& out) {
+  try {
+    (void)signing::make_key_file(options.new_key);
+  } catch (const std::runtime_error& problem) {
+    throw InputError({"", "--new-key", problem.what(), ""});
+  }
+  print(out, {{"result", "key_made"}, {"key", options.new_key}}, [&] {
+    fmt::print(
+        "made {}: whoever has it can make firmware for your controllers, and without it they are flashed by "
+        "SWD "
+        "only. Keep a copy in a safe place, and build with -DDIASTOLE_SIGNING_KEY={}\n",
+        options.new_key, options.new_key);
+  });
+  return ExitCode::done;
+}
+
+ExitCode sign_image(const FlashOptions& options, const CommandOutput& out) {
+  const UpdateFile file = sign_update_file(options.image, options.sign, options.counter);
+  const uint32_t counter = file.images.front().signature.counter;
+  print(out,
+        {{"result", "signed"},
+         {"image", file.file},
+         {"version", in_words(file.version)},
+         {"build", fmt::format("{:016x}", file.build_id)},
+         {"counter", counter}},
+        [&] { fmt::print("{} is signed, rollback counter {}\n", file.file, counter); });
+  return ExitCode::done;
+}
+
 }  // namespace
 
 void add_flash(CommandLine& line) {
@@ -113,18 +148,36 @@ void add_flash(CommandLine& line) {
       "      trial and confirms it; whatever goes wrong, the controller keeps what it ran\n"
       "  diastole flash diastole-stm32f405.image --port /dev/ttyUSB0 --dry-run\n"
       "      compares versions and changes nothing\n"
+      "  diastole flash --new-key our-laboratory.pem\n"
+      "      makes the key that firmware is signed with (-DDIASTOLE_SIGNING_KEY=FILE of the firmware's "
+      "build)\n"
+      "  diastole flash --sign our-laboratory.pem diastole-stm32f405.image --counter 3\n"
+      "      signs an update file; a controller that has confirmed it takes none below 3 any more\n"
       "Stop the daemon first: it has the port. Interrupted (Ctrl-C, cable, power), the same command goes\n"
       "on where it stopped. A controller that does not answer is caught in its bootloader while you reset\n"
       "it. Exit code 1: stopped by Ctrl-C; 2: the file is not for this controller; 3: it does not answer,\n"
       "or came back with its former firmware.");
-  command->add_option("IMAGE", options->image, "update file (.image)")->required();
-  command->add_option("--port", options->port, "the controller's serial port")->required();
+  auto* image = command->add_option("IMAGE", options->image, "update file (.image)");
+  auto* port = command->add_option("--port", options->port, "the controller's serial port");
   command->add_option("--baud", options->baud, "its rate")->capture_default_str();
   command->add_flag("--allow-older", options->update.allow_older,
                     "also an older version than the one that runs");
   command->add_flag("--force", options->update.force, "also what it already runs, or an older version");
   command->add_flag("--dry-run", options->update.dry_run, "say what would be done");
+  auto* sign = command->add_option("--sign", options->sign, "sign IMAGE in place with this key file");
+  command->add_option("--counter", options->counter, "its rollback counter")->needs(sign);
+  sign->needs(image)->excludes(port);
+  command->add_option("--new-key", options->new_key, "make a key file")
+      ->excludes(sign)
+      ->excludes(port)
+      ->excludes(image);
   line.on_run(command, [options](const CommandOutput& out) {
+    if (!options->new_key.empty()) return make_key(*options, out);
+    if (!options->sign.empty()) return sign_image(*options, out);
+    if (options->image.empty() || options->port.empty()) {
+      throw InputError({"", options->image.empty() ? "IMAGE" : "--port", "is missing",
+                        "Say which image goes to which port: diastole flash IMAGE --port /dev/ttyUSB0."});
+    }
     options->update.allow_older = options->update.allow_older || options->update.force;
     return flash(*options, out);
   });

@@ -60,6 +60,10 @@ void show_status(const json& status) {
                                            : fmt::format("process {}", control.at("pid").get<int64_t>()));
   }
   fmt::print("firmware  {} at {}\n", text("firmware"), text("controller"));
+  if (status.at("takes_unsigned_firmware").get<bool>())
+    fmt::print(
+        "          NOT LOCKED: this controller has no key and takes firmware from anybody who reaches its "
+        "serial line\n");
   fmt::print("pressure  {}\n", text("instrument"));
   const auto inputs = status.at("inputs").get<std::vector<std::string>>();
   fmt::print("inputs    {}; motor {}\n",

@@ -9,6 +9,7 @@
 
 #include "protocol/contract/bounded_file.hpp"
 #include "protocol/contract/input_error.hpp"
+#include "protocol/signing/signing_key.hpp"
 #include "protocol/wire/update_file.hpp"
 
 namespace diastole {
@@ -33,7 +34,8 @@ void check_frame(const std::string& file, Bytes bytes) {
     refuse(file, "offset 8",
            fmt::format("is an update file of version {}, and this program knows {}", version,
                        wire::kUpdateFileVersion),
-           "Update the host programs.");
+           version < wire::kUpdateFileVersion ? "Build it again (cmake --build --preset firmware)."
+                                              : "Update the host programs.");
   }
   const auto size = get_little<uint32_t>(bytes.subspan(12));
   if (size != bytes.size() || size < wire::kUpdateFileHeadBytes + sizeof(wire::Digest)) {
@@ -52,6 +54,10 @@ SlotImage take_image(const std::string& file, Bytes& rest, size_t index) {
   const auto header = wire::decode_image_header(rest.first<wire::kImageHeaderBytes>());
   if (!header) refuse(file, place, "has a damaged header");
   rest = rest.subspan(wire::kImageHeaderBytes);
+  if (rest.size() < wire::kImageSignatureBytes) refuse(file, place, "has no signature block");
+  const auto signature = wire::decode_image_signature(rest.first<wire::kImageSignatureBytes>());
+  if (!signature) refuse(file, place, "has a damaged signature block");
+  rest = rest.subspan(wire::kImageSignatureBytes);
   if (rest.size() < header->code_bytes) {
     refuse(file, place,
            fmt::format("should have {} bytes of code and has {}", header->code_bytes, rest.size()));
@@ -61,7 +67,28 @@ SlotImage take_image(const std::string& file, Bytes& rest, size_t index) {
   if (wire::digest_of(*header, code) != header->sha256) {
     refuse(file, place, "is damaged: its SHA-256 does not match");
   }
-  return {*header, {code.begin(), code.end()}};
+  return {*header, *signature, {code.begin(), code.end()}};
+}
+
+std::vector<uint8_t> bytes_of(const UpdateFile& update) {
+  std::vector<uint8_t> bytes;
+  const auto add = [&bytes](const auto& more) { bytes.insert(bytes.end(), more.begin(), more.end()); };
+  std::array<uint8_t, wire::kUpdateFileHeadBytes> head{};
+  std::ranges::copy(wire::kUpdateFileMagic, head.begin());
+  size_t size = head.size() + sizeof(wire::Digest);
+  for (const SlotImage& image : update.images)
+    size += wire::kSignedHeaderBytes + image.code.size();
+  wire::detail::put_little(std::span(head).subspan(8, 2), wire::kUpdateFileVersion);
+  wire::detail::put_little(std::span(head).subspan(10, 2), static_cast<uint16_t>(update.images.size()));
+  wire::detail::put_little(std::span(head).subspan(12, 4), static_cast<uint32_t>(size));
+  add(head);
+  for (const SlotImage& image : update.images) {
+    add(wire::encode(image.header));
+    add(wire::encode(image.signature));
+    add(image.code);
+  }
+  add(wire::sha256(bytes));
+  return bytes;
 }
 
 }  // namespace
@@ -99,6 +126,32 @@ UpdateFile read_update_file(const std::string& file) {
   // Two images of 128 KB each, with their headers.
   const std::string content = read_bounded_file(file, megabyte);
   return parse_update_file(file, {content.begin(), content.end()});
+}
+
+UpdateFile sign_update_file(const std::string& file, const std::string& key_file,
+                            std::optional<uint32_t> counter) {
+  UpdateFile update = read_update_file(file);
+  signing::SecretKey key{};
+  try {
+    key = signing::read_key_file(key_file);
+  } catch (const std::runtime_error& problem) {
+    throw InputError({"", "--sign", problem.what(), ""});
+  }
+  for (SlotImage& image : update.images) {
+    wire::ImageSignature& signature = image.signature;
+    signature.counter = counter.value_or(signature.counter);
+    signature.signature =
+        signing::sign(key, wire::signed_bytes(wire::encode(image.header), signature.counter));
+  }
+  const std::vector<uint8_t> bytes = bytes_of(update);
+  const std::string part = file + ".part";
+  std::ofstream stream(part, std::ios::binary | std::ios::trunc);
+  stream.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+  std::error_code failed;
+  if (stream.flush()) std::filesystem::rename(part, file, failed);
+  if (stream && !failed) return update;
+  std::filesystem::remove(part, failed);
+  refuse(file, "", "cannot be written", "Sign a copy in a folder of yours.");
 }
 
 std::string in_words(wire::FirmwareVersion version) {

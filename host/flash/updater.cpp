@@ -18,6 +18,8 @@ constexpr uint64_t write_patience = 8'000 * ms;
 constexpr uint64_t reset_patience = 4'000 * ms;
 constexpr uint64_t rescue_patience = 15'000 * ms;
 constexpr uint64_t while_it_resets = 60 * ms;
+/// Bootloaders of before take a bare header.
+constexpr wire::FirmwareVersion signing_since{1, 1, 0};
 
 wire::FirmwareVersion version_of(const wire::Hello& hello) {
   return {hello.version_major, hello.version_minor, hello.version_patch};
@@ -48,7 +50,9 @@ class Updater {
       result_.end = UpdateEnd::dry_run;
       return result_;
     }
-    if (!found.bootloader) enter_bootloader();
+    bootloader_ = version_of(found.bootloader ? found.hello : enter_bootloader());
+    if (bootloader_ < signing_since)
+      options_.say("its bootloader knows no signatures: flash the new one by SWD (docs/firmware.md)");
     if (!upload(image_for_free_slot())) {
       result_.end = UpdateEnd::stopped;
       return result_;
@@ -117,14 +121,14 @@ class Updater {
     }
     return true;
   }
-  void enter_bootloader() {
+  wire::Hello enter_bootloader() {
     const auto answer = answer_to(wire::EnterBootloader{}, answer_patience, "enter its bootloader");
     if (answer.outcome != wire::UpdateOutcome::done)
       fail("refused: " + explanation(answer), std::string(wire::update_outcome_remedy(answer.outcome)));
     for (uint64_t waited = 0; waited < reset_patience; waited += 100 * ms) {
       link_.pause(while_it_resets);
       const auto found = greet(100 * ms);
-      if (found && found->bootloader) return;
+      if (found && found->bootloader) return found->hello;
     }
     fail("did not come back in its bootloader", "Reset it and give the same command again.");
   }
@@ -166,7 +170,11 @@ class Updater {
     using enum wire::UpdateOutcome;
     wire::BeginUpdate begin;
     begin.allow_older = options_.allow_older || options_.force ? 1 : 0;
-    begin.header = wire::encode(image.header);
+    std::ranges::copy(wire::encode(image.header), begin.header.begin());
+    if (bootloader_ >= signing_since) {
+      begin.header_bytes = wire::kSignedHeaderBytes;
+      std::ranges::copy(wire::encode(image.signature), begin.header.begin() + wire::kImageSignatureAt);
+    }
     const auto begun = answer_to(begin, erase_patience, "make room for the image");
     if (begun.outcome == flash_failed) return flash_failed;
     if (begun.outcome != done) refused(begun);
@@ -231,6 +239,9 @@ class Updater {
       case wrong_slot:
       case too_long:
       case older_version:
+      case not_signed:
+      case wrong_signature:
+      case rolled_back:
         throw InputError({file_.file, "", "the controller refuses it: " + problem, remedy});
       default:
         fail("refused: " + problem, remedy);
@@ -245,6 +256,7 @@ class Updater {
   const UpdateFile& file_;
   const UpdateOptions& options_;
   UpdateResult result_;
+  wire::FirmwareVersion bootloader_;
 };
 
 }  // namespace

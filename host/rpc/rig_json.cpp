@@ -52,6 +52,7 @@ json object_of(const RigStatus& status) {
               {"remedy", wire::fault_remedy(fault)},
               {"firmware", fmt::format("{}.{}.{}", firmware.version_major, firmware.version_minor,
                                        firmware.version_patch)},
+              {"takes_unsigned_firmware", controller.takes_unsigned_firmware != 0},
               {"board", firmware.board_id},
               {"boot_id", firmware.boot_id},
               {"inputs", active_inputs(controller.inputs)},

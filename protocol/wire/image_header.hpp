@@ -121,13 +121,16 @@ constexpr std::optional<ImageHeader> decode_image_header(
   return header;
 }
 
-/// What ImageHeader::sha256 must be for this code.
-inline Digest digest_of(const ImageHeader& header, std::span<const std::uint8_t> code) {
-  const ImageHeaderBytes bytes = encode(header);
+/// What ImageHeader::sha256 must be for this code behind this header.
+inline Digest digest_of(std::span<const std::uint8_t, kImageHeaderBytes> header,
+                        std::span<const std::uint8_t> code) {
   Sha256 hash;
-  hash.add(std::span(bytes).first(detail::kHashedHeaderBytes));
+  hash.add(header.first(detail::kHashedHeaderBytes));
   hash.add(code);
   return hash.digest();
+}
+inline Digest digest_of(const ImageHeader& header, std::span<const std::uint8_t> code) {
+  return digest_of(encode(header), code);
 }
 
 }  // namespace diastole::wire

@@ -56,7 +56,7 @@ struct Nak {
 //
 // Example Status: 09 00 04 00 08 00 7A 03 0A 00 00 00 00 FE FF FF FF 00 00 03 00 00 00 03 00 00 00 02 00
 //   00 00 54 78 00 00 00 00 00 00 00 00 00 00 28 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00
-//   00 00 00 00
+//   00 00 00 00 00
 struct Status {
   DIASTOLE_LAYOUT(Status,
       (value,   0, uint16_t, request_id),          // chosen by the host; the answer repeats it
@@ -77,7 +77,8 @@ struct Status {
       (value,  51, uint32_t, framing_errors),
       (value,  55, uint32_t, duplicates),
       (value,  59, uint32_t, out_of_order),
-      (value,  63, uint32_t, retransmissions))
+      (value,  63, uint32_t, retransmissions),
+      (within, 67, uint8_t, takes_unsigned_firmware, 0U, 1U))  // 1: the bootloader has no key
   static constexpr Status example() {
     return {.request_id = 9,
             .state = State::running,

@@ -24,8 +24,10 @@ enum class ImageState : std::uint8_t {
   confirmed = 4,   ///< a host has seen it work
   failed = 5,      ///< was on trial and not confirmed
   unrecorded = 6,  ///< verified, but nobody knows whether it works: written past the bootloader
+  refused =
+      7,  ///< whole, but not signed with the bootloader's key, or below its rollback counter; never started
 };
-inline constexpr ImageState kLastImageState = ImageState::unrecorded;
+inline constexpr ImageState kLastImageState = ImageState::refused;
 
 #define DIASTOLE_UPDATE_OUTCOME(number, name, explanation, remedy) name = number,
 enum class UpdateOutcome : std::uint8_t {

@@ -4,11 +4,12 @@
 //
 //   offset        size  field
 //        0           8  magic        "DIASTOLE"
-//        8           2  file_version 1
+//        8           2  file_version 2
 //       10           2  images       2
 //       12           4  file_bytes   length of the whole file
 //       16               the images, slot A's first; each:
 //                   64  header       image_header.hpp
+//                   72  signature    image_signature.hpp; not in files of version 1, which are not signed
 //           code_bytes  code         padded by its linker to a multiple of 4
 //     last          32  sha256       of everything before
 //
@@ -21,7 +22,7 @@
 namespace diastole::wire {
 
 inline constexpr std::array<std::uint8_t, 8> kUpdateFileMagic{'D', 'I', 'A', 'S', 'T', 'O', 'L', 'E'};
-inline constexpr std::uint16_t kUpdateFileVersion = 1;
+inline constexpr std::uint16_t kUpdateFileVersion = 2;
 inline constexpr std::uint16_t kUpdateFileImages = 2;
 inline constexpr std::size_t kUpdateFileHeadBytes = 16;
 

@@ -11,7 +11,7 @@
 //   open, ImageQuery (a), (b)         →                             bootloader
 //                                     ←    ImageReport, ImageReport
 //   BeginUpdate                       →
-//                                     ←    UpdateAnswer (held)      erases if need be
+//                                     ←    UpdateAnswer (held)      judges header and signature, erases if need be
 //   UpdateData (from held on) …       →
 //                                     ←    UpdateAnswer (held) …
 //   FinishUpdate                      →
@@ -28,7 +28,7 @@
 
 #include "protocol/wire/common_requests.hpp"
 #include "protocol/wire/field_codec.hpp"
-#include "protocol/wire/image_header.hpp"
+#include "protocol/wire/image_signature.hpp"
 #include "protocol/wire/message_type.hpp"
 #include "protocol/wire/update.hpp"
 
@@ -64,13 +64,14 @@ struct ConfirmImage {
 };
 
 // Host → bootloader: an image for the free slot. If the slot holds the beginning of this very image, it is kept
-// and the answer says how many bytes of code are there; otherwise the sector is erased, which takes 1 to 2 s.
+// and the answer says how many bytes of code are there; otherwise the sector is erased, which takes 1 to 2 s. A header
+// without a signature is what bootloaders before 1.1.0 take, and those without a key still do.
 //
 //   offset size field
 //        0    2 request_id                   chosen by the host; the answer repeats it
 //        2    1 allow_older                  1: also one older than the confirmed one
-//        3    1 header_bytes                 64
-//        4   64 header                       image_header.hpp
+//        3    1 header_bytes                 64, or 136 with the signature
+//        4  136 header                       image_header.hpp, image_signature.hpp
 //
 // Example BeginUpdate: 09 00 00 40 44 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00
 // 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00
@@ -80,7 +81,7 @@ struct BeginUpdate {
   std::uint16_t request_id = 0;
   std::uint8_t allow_older = 0;
   std::uint8_t header_bytes = kImageHeaderBytes;
-  ImageHeaderBytes header{};
+  std::array<std::uint8_t, kSignedHeaderBytes> header{};
 
   static constexpr void layout(auto& self, auto& visit) {
     visit.field("request_id", self.request_id);

@@ -50,6 +50,7 @@ void check_file(const fs::path& root, const fs::path& path, std::vector<Violatio
 const std::vector<Rule>& rules() {
   static const std::vector<Rule> list{
       {"protocol/wire", {}},
+      {"protocol/signing", {"protocol/wire"}},
       {"protocol/contract", {}},
       {"protocol/signal", {"protocol/contract"}},
       {"protocol/runfile", {"protocol/contract", "protocol/signal"}},
@@ -60,7 +61,7 @@ const std::vector<Rule>& rules() {
       {"firmware/boards/stm32f405/bootloader",
        {"protocol/wire", "firmware/boards/stm32f405", "firmware/boot"}},
       {"firmware/boards/stm32f405", {"protocol/wire", "firmware/core", "firmware/boot"}},
-      {"firmware/boot", {"protocol/wire"}},
+      {"firmware/boot", {"protocol/signing", "protocol/wire"}},
       {"host/transport", {"protocol"}},
       {"host/journal", {"protocol", "host/transport"}},
       {"host/daq", {"protocol", "host/transport"}},

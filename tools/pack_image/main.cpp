@@ -1,10 +1,14 @@
 // pack_image: makes of the application's two links what is flashed. The firmware's build runs it; it is compiled
 // for this machine by that build itself and uses nothing but protocol/wire.
 //
-//   pack_image VERSION BOARD_ID ADDRESS_A CODE_A ADDRESS_B CODE_B OUT
+//   pack_image VERSION BOARD_ID ADDRESS_A CODE_A ADDRESS_B CODE_B OUT KEY COUNTER
 //
 // writes OUT.image (protocol/wire/update_file.hpp), OUT.header (slot A's header area) and OUT.record (the record
-// that slot A is confirmed, for images that come by SWD).
+// that slot A is confirmed, for images that come by SWD), signed with the key in file KEY; KEY `none` does not sign.
+//
+//   pack_image --public-key KEY OUT [--make]
+//
+// writes the 32 bytes that the bootloader checks signatures with, all 0xFF for `none`; --make makes KEY if there is none.
 
 #include <cstdio>
 #include <cstdlib>
@@ -15,6 +19,8 @@
 #include <vector>
 
 #include "firmware/boot/boot_records.hpp"
+#include "protocol/signing/signing_key.hpp"
+#include "protocol/wire/image_signature.hpp"
 #include "protocol/wire/update_file.hpp"
 
 namespace {
@@ -73,18 +79,29 @@ wire::ImageHeader make_header(wire::ImageHeader header, const char* address, con
   return header;
 }
 
-Bytes update_file(const wire::ImageHeader& a, const Bytes& code_a, const wire::ImageHeader& b,
-                  const Bytes& code_b) {
+/// Header and signature, as they stand before the code in file and slot.
+Bytes signed_header(const wire::ImageHeader& header, const std::string& key, std::uint32_t counter) {
+  Bytes bytes;
+  add(bytes, wire::encode(header));
+  wire::ImageSignature signature{.counter = counter};
+  if (key != "none")
+    signature.signature =
+        signing::sign(signing::read_key_file(key), wire::signed_bytes(wire::encode(header), counter));
+  add(bytes, wire::encode(signature));
+  return bytes;
+}
+
+Bytes update_file(const Bytes& header_a, const Bytes& code_a, const Bytes& header_b, const Bytes& code_b) {
   Bytes file;
   add(file, wire::kUpdateFileMagic);
   add_number(file, wire::kUpdateFileVersion);
   add_number(file, wire::kUpdateFileImages);
-  const std::size_t size = wire::kUpdateFileHeadBytes + 2 * wire::kImageHeaderBytes + code_a.size() +
+  const std::size_t size = wire::kUpdateFileHeadBytes + header_a.size() + code_a.size() + header_b.size() +
                            code_b.size() + sizeof(wire::Digest);
   add_number(file, static_cast<std::uint32_t>(size));
-  add(file, wire::encode(a));
+  add(file, header_a);
   add(file, code_a);
-  add(file, wire::encode(b));
+  add(file, header_b);
   add(file, code_b);
   add(file, wire::sha256(file));
   return file;
@@ -98,10 +115,10 @@ void pack(char** argument) {
   common.build_id = build_id(code_a, code_b);
   const wire::ImageHeader a = make_header(common, argument[3], code_a);
   const wire::ImageHeader b = make_header(common, argument[5], code_b);
-  const std::string out = argument[7];
-  write(out + ".image", update_file(a, code_a, b, code_b));
-  Bytes area;
-  add(area, wire::encode(a));
+  const std::string out = argument[7], key = argument[8];
+  const auto counter = static_cast<std::uint32_t>(std::strtoul(argument[9], nullptr, 0));
+  Bytes area = signed_header(a, key, counter);
+  write(out + ".image", update_file(area, code_a, signed_header(b, key, counter), code_b));
   area.resize(wire::kImageHeaderArea, 0xFF);
   write(out + ".header", area);
   Bytes record;
@@ -109,15 +126,36 @@ void pack(char** argument) {
   write(out + ".record", record);
 }
 
+void write_public_key(const std::string& key, const std::string& out, bool make) {
+  Bytes bytes(sizeof(signing::PublicKey), 0xFF);
+  if (key != "none") {
+    const bool missing = !std::ifstream(key);
+    const signing::SecretKey secret =
+        missing && make ? signing::make_key_file(key) : signing::read_key_file(key);
+    if (missing)
+      std::printf(
+          "A key to sign firmware with was made: %s. Keep a copy outside of the build folder, and build with "
+          "it "
+          "(-DDIASTOLE_SIGNING_KEY=FILE): a controller takes firmware of this key only.\n",
+          key.c_str());
+    const signing::PublicKey open = signing::public_key_of(secret);
+    bytes.assign(open.begin(), open.end());
+  }
+  write(out, bytes);
+}
+
 }  // namespace
 
 int main(int count, char** argument) {
-  if (count != 8) {
-    std::fputs("usage: pack_image VERSION BOARD_ID ADDRESS_A CODE_A ADDRESS_B CODE_B OUT\n", stderr);
-    return 2;
-  }
+  const std::string first = count > 1 ? argument[1] : "";
   try {
-    pack(argument);
+    if (count == 10)
+      pack(argument);
+    else if ((count == 4 || count == 5) && first == "--public-key")
+      write_public_key(argument[2], argument[3], count == 5);
+    else
+      throw std::runtime_error(
+          "usage: pack_image VERSION BOARD_ID ADDRESS_A CODE_A ADDRESS_B CODE_B OUT KEY COUNTER");
     return 0;
   } catch (const std::exception& error) {
     std::fprintf(stderr, "pack_image: %s\n", error.what());

@@ -139,6 +139,7 @@ class RecordingBoard {
   BlackBox::Memory& retained() { return options_.memory->retained; }
   MemoryFlash& settings_flash() { return options_.memory->flash; }
   [[nodiscard]] RunningImage running_image() const { return options_.image; }
+  [[nodiscard]] bool takes_unsigned_firmware() const { return false; }  // it takes none
   bool confirm_image() {
     options_.image.state = wire::ImageState::confirmed;
     return true;

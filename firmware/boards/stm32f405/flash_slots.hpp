@@ -20,6 +20,9 @@ class FlashSlots {
     return bytes_of(sector_of(slot));
   }
   [[nodiscard]] std::span<const std::uint8_t> records() const { return bytes_of(kRecordSector); }
+  [[nodiscard]] std::span<const std::uint8_t, 32> signing_key() const {
+    return bytes_of(kBootloaderSector).subspan<kSigningKeyAddress - kBootloaderSector.address, 32>();
+  }
   [[nodiscard]] bool supply_sound() const { return supply_suffices(); }
   bool erase_slot(wire::ImageSlot slot) { return erase(sector_of(slot)) == FlashFault::none; }
   bool erase_records() { return erase(kRecordSector) == FlashFault::none; }

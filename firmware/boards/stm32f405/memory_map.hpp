@@ -2,7 +2,7 @@
 // Who owns which part of the STM32F405's memory. stm32f405.ld repeats these numbers for the linker.
 //
 //   sector  address      size
-//     0     0x0800'0000   16 KB  bootloader
+//     0     0x0800'0000   16 KB  bootloader; its last 32 bytes are the public key that images are signed with
 //     1     0x0800'4000   16 KB  the bootloader's records: which slot is on trial, which is confirmed
 //     2, 3  0x0800'8000   2 x 16 KB  settings
 //     4     0x0801'0000   64 KB  free
@@ -27,6 +27,8 @@ struct FlashSector {
 };
 
 inline constexpr FlashSector kBootloaderSector{0, 0x0800'0000, 0x4000};
+/// Ed25519; all 0xFF if the laboratory wants none. Written with the bootloader, whose sector is write-protected then.
+inline constexpr std::uint32_t kSigningKeyAddress = 0x0800'3FE0;
 inline constexpr FlashSector kRecordSector{1, 0x0800'4000, 0x4000};
 inline constexpr std::array<FlashSector, 2> kSettingsSectors{
     {{2, 0x0800'8000, 0x4000}, {3, 0x0800'C000, 0x4000}}};

@@ -38,6 +38,8 @@ firmware::RunningImage running_image() {
   return image;
 }
 
+bool takes_unsigned_firmware() { return boot::is_erased(FlashSlots().signing_key()); }
+
 bool confirm_running_image() {
   FlashSlots slots;
   const wire::ImageSlot slot = own_slot();

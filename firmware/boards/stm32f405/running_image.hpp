@@ -8,6 +8,9 @@ namespace diastole::stm32 {
 /// From this slot's header and the bootloader's hand-over.
 firmware::RunningImage running_image();
 
+/// Whether the bootloader was built without a key.
+bool takes_unsigned_firmware();
+
 /// Records that this image is the one to start from now on. Stalls the core for 0.1 ms.
 bool confirm_running_image();
 

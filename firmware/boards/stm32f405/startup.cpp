@@ -74,7 +74,7 @@ using Vector = void (*)();
 
 struct VectorTable {
   const void* stack_top;
-  Vector handlers[15 + 82];
+  Vector handlers[15 + DIASTOLE_INTERRUPTS];
 };
 
 constexpr std::size_t of_interrupt(std::size_t number) { return 15 + number; }
@@ -91,7 +91,7 @@ constexpr VectorTable make_vectors() {
   table.handlers[of_interrupt(16)] = DMA1_Stream5_IRQHandler;
   table.handlers[of_interrupt(28)] = TIM2_IRQHandler;
   table.handlers[of_interrupt(39)] = USART3_IRQHandler;
-  table.handlers[of_interrupt(50)] = TIM5_IRQHandler;
+  if (DIASTOLE_INTERRUPTS > 50) table.handlers[of_interrupt(50)] = TIM5_IRQHandler;
   return table;
 }
 

@@ -71,6 +71,7 @@ class Stm32Board {
   std::optional<firmware::CrashRecord> take_crash();
   SettingsFlash& settings_flash() { return settings_flash_; }
   [[nodiscard]] firmware::RunningImage running_image() const { return stm32::running_image(); }
+  [[nodiscard]] bool takes_unsigned_firmware() const { return stm32::takes_unsigned_firmware(); }
   bool confirm_image() { return confirm_running_image(); }
   void restart(bool into_bootloader) { stm32::restart(into_bootloader); }
 

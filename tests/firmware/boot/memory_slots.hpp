@@ -27,6 +27,9 @@ class MemorySlots {
   }
   [[nodiscard]] std::span<const std::uint8_t> slot(ImageSlot slot) const { return slots_[index(slot)]; }
   [[nodiscard]] std::span<const std::uint8_t> records() const { return records_; }
+  [[nodiscard]] std::span<const std::uint8_t, 32> signing_key() const { return key_; }
+  /// From now on only images signed with its secret are taken.
+  void lock(const signing::PublicKey& key) { key_ = key; }
   [[nodiscard]] bool supply_sound() const { return supply_sound_; }
   bool erase_slot(ImageSlot slot) { return erase(slots_[index(slot)], weak_[index(slot)]); }
   bool erase_records() { return erase(records_, weak_[2]); }
@@ -98,6 +101,13 @@ class MemorySlots {
     return true;
   }
 
+  static constexpr signing::PublicKey no_key() {
+    signing::PublicKey key{};
+    key.fill(0xFF);
+    return key;
+  }
+
+  signing::PublicKey key_ = no_key();
   std::array<Bytes, 2> slots_;
   Bytes records_;
   std::array<bool, 3> weak_{};  ///< slots, records
@@ -110,11 +120,12 @@ class MemorySlots {
 struct TestImage {
   std::vector<std::uint8_t> code;
   std::array<wire::ImageHeader, 2> header;
+  std::array<std::optional<wire::ImageSignature>, 2> signature = {};
 };
 
 inline TestImage make_image(std::size_t code_bytes, wire::FirmwareVersion version, std::uint32_t seed) {
   std::mt19937 random(seed);
-  TestImage image{std::vector<std::uint8_t>(code_bytes), {}};
+  TestImage image{std::vector<std::uint8_t>(code_bytes), {}, {}};
   for (auto& byte : image.code)
     byte = random() % 4 == 0 ? std::uint8_t{0xFF} : static_cast<std::uint8_t>(random());
   for (const ImageSlot slot : {ImageSlot::a, ImageSlot::b}) {
@@ -129,12 +140,25 @@ inline TestImage make_image(std::size_t code_bytes, wire::FirmwareVersion versio
   return image;
 }
 
+/// The same image, vouched for.
+inline TestImage signed_by(TestImage image, const signing::SecretKey& key, std::uint32_t counter) {
+  for (std::size_t i = 0; i < 2; ++i) {
+    const wire::SignedBytes message = wire::signed_bytes(wire::encode(image.header[i]), counter);
+    image.signature[i] = wire::ImageSignature{counter, signing::sign(key, message)};
+  }
+  return image;
+}
+
 /// Puts an image into a slot as a programmer's cable would, without any record.
 inline void put(MemorySlots& slots, ImageSlot slot, const TestImage& image) {
   const auto header = wire::encode(image.header[static_cast<std::size_t>(slot)]);
   auto& bytes = slots.bytes(slot);
   std::fill(bytes.begin(), bytes.end(), std::uint8_t{0xFF});
   std::copy(header.begin(), header.end(), bytes.begin());
+  if (const auto& signature = image.signature[static_cast<std::size_t>(slot)]) {
+    const auto block = wire::encode(*signature);
+    std::copy(block.begin(), block.end(), bytes.begin() + wire::kImageSignatureAt);
+  }
   std::copy(image.code.begin(), image.code.end(), bytes.begin() + wire::kImageHeaderArea);
 }
 

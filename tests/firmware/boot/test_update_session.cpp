@@ -4,66 +4,10 @@
 
 #include <gtest/gtest.h>
 
-#include "tests/firmware/boot/memory_slots.hpp"
+#include "tests/firmware/boot/update_bench.hpp"
 
 namespace diastole::boot_test {
 namespace {
-
-using boot::append;
-using boot::BootEvent;
-using boot::decide;
-using boot::inspect;
-using boot::UpdateSession;
-using wire::ImageState;
-using wire::UpdateOutcome;
-
-const TestImage old_image = make_image(2048, {0, 1, 0}, 1);
-
-/// A board that left the factory: slot A confirmed.
-MemorySlots factory_new(const TestImage& image = old_image, std::size_t record_bytes = 0x4000) {
-  MemorySlots slots(0x2'0000, record_bytes);
-  put(slots, ImageSlot::a, image);
-  EXPECT_TRUE(append(slots, {BootEvent::confirmed, ImageSlot::a, tag(image, ImageSlot::a)}));
-  return slots;
-}
-
-wire::BeginUpdate begin_of(const wire::ImageHeader& header, bool allow_older = false) {
-  wire::BeginUpdate begin;
-  begin.allow_older = allow_older ? 1 : 0;
-  begin.header = wire::encode(header);
-  return begin;
-}
-
-/// What a host does, as far as the bootloader sees it.
-UpdateOutcome install(MemorySlots& slots, const TestImage& image, std::size_t* sent_bytes = nullptr) {
-  UpdateSession session(slots);
-  const ImageSlot free = decide(slots).free;
-  const auto begun = session.begin(begin_of(image.header[static_cast<std::size_t>(free)]));
-  if (begun.outcome != UpdateOutcome::done) return begun.outcome;
-  while (session.held_bytes() < image.code.size()) {
-    wire::UpdateData data;
-    data.offset = session.held_bytes();
-    data.count = static_cast<std::uint8_t>(
-        std::min(wire::UpdateData::kMaxCount, image.code.size() - session.held_bytes()));
-    std::copy_n(image.code.begin() + data.offset, data.count, data.data.begin());
-    if (sent_bytes != nullptr) *sent_bytes += data.count;
-    const auto added = session.add(data);
-    if (added.outcome != UpdateOutcome::done) return added.outcome;
-  }
-  return session.finish().outcome;
-}
-
-/// What the bootloader does at a start, and the application when a host confirms it.
-boot::BootDecision start(MemorySlots& slots) {
-  const auto decision = decide(slots);
-  if (decision.trial) {
-    EXPECT_TRUE(append(slots, {BootEvent::tried, decision.start, inspect(slots, decision.start).tag}));
-  }
-  return decision;
-}
-void confirm(MemorySlots& slots, ImageSlot slot) {
-  EXPECT_TRUE(append(slots, {BootEvent::confirmed, slot, inspect(slots, slot).tag}));
-}
 
 TEST(UpdateSession, InstallsTriesAndConfirms) {
   MemorySlots slots = factory_new();

@@ -4,7 +4,7 @@
 #include <random>
 #include <vector>
 
-#include "protocol/wire/image_header.hpp"
+#include "protocol/wire/image_signature.hpp"
 #include "protocol/wire/update_file.hpp"
 
 namespace diastole::flash_test {
@@ -13,6 +13,7 @@ struct FileRecipe {
   uint16_t board_id = 2;
   wire::FirmwareVersion version;
   size_t code_bytes = 64;
+  wire::ImageSignature signature = {};
 };
 
 inline std::vector<uint8_t> make_update_file(const FileRecipe& recipe) {
@@ -23,7 +24,7 @@ inline std::vector<uint8_t> make_update_file(const FileRecipe& recipe) {
   };
   add_number(wire::kUpdateFileVersion, 2);
   add_number(2, 2);
-  add_number(wire::kUpdateFileHeadBytes + 2 * (wire::kImageHeaderBytes + recipe.code_bytes) + 32, 4);
+  add_number(wire::kUpdateFileHeadBytes + 2 * (wire::kSignedHeaderBytes + recipe.code_bytes) + 32, 4);
   std::mt19937 random(17);
   for (const uint32_t address : {0x0802'0000U, 0x0804'0000U}) {
     std::vector<uint8_t> code(recipe.code_bytes);
@@ -38,6 +39,8 @@ inline std::vector<uint8_t> make_update_file(const FileRecipe& recipe) {
     header.sha256 = wire::digest_of(header, code);
     const auto encoded = wire::encode(header);
     file.insert(file.end(), encoded.begin(), encoded.end());
+    const auto signature = wire::encode(recipe.signature);
+    file.insert(file.end(), signature.begin(), signature.end());
     file.insert(file.end(), code.begin(), code.end());
   }
   const auto digest = wire::sha256(file);

@@ -12,6 +12,11 @@ namespace {
 using namespace diastole;
 using namespace diastole::stm32;
 
+asm(".section .signing_key,\"a\",%progbits\n"
+    ".incbin \"" DIASTOLE_PUBLIC_KEY
+    "\"\n"
+    ".previous\n");
+
 BootBoard board;
 boot::Bootloader<BootBoard> bootloader(board);
 
