@@ -83,51 +83,61 @@ void f25519_select(uint8_t *dst,
 		dst[i] = zero[i] ^ (mask & (one[i] ^ zero[i]));
 }
 
-void f25519_add(uint8_t *r, const uint8_t *a, const uint8_t *b)
+/* Diastole, from here to f25519_sub, and f25519_mul__distinct: by words of 32
+ * bits instead of bytes (see README.md). Results are below 2^255 + 2^12.
+ */
+static uint32_t f25519_word(const uint8_t *x)
 {
-	uint16_t c = 0;
+	return x[0] | (uint32_t)x[1] << 8 | (uint32_t)x[2] << 16 |
+	       (uint32_t)x[3] << 24;
+}
+
+/* r = x + high 2^256, reduced with 2^255 = 19 mod p */
+static void f25519_fold(uint8_t *r, const uint32_t *x, uint32_t high)
+{
+	uint64_t c = (high * 2 + (x[7] >> 31)) * 19;
 	int i;
 
-	/* Add */
-	for (i = 0; i < F25519_SIZE; i++) {
-		c >>= 8;
-		c += ((uint16_t)a[i]) + ((uint16_t)b[i]);
-		r[i] = c;
-	}
+	for (i = 0; i < 8; i++) {
+		uint32_t word;
 
-	/* Reduce with 2^255 = 19 mod p */
-	r[31] &= 127;
-	c = (c >> 7) * 19;
-
-	for (i = 0; i < F25519_SIZE; i++) {
-		c += r[i];
-		r[i] = c;
-		c >>= 8;
+		c += i < 7 ? x[i] : x[i] & 0x7fffffff;
+		word = (uint32_t)c;
+		r[4 * i] = (uint8_t)word;
+		r[4 * i + 1] = (uint8_t)(word >> 8);
+		r[4 * i + 2] = (uint8_t)(word >> 16);
+		r[4 * i + 3] = (uint8_t)(word >> 24);
+		c >>= 32;
 	}
+}
+
+void f25519_add(uint8_t *r, const uint8_t *a, const uint8_t *b)
+{
+	uint32_t sum[8];
+	uint64_t c = 0;
+	int i;
+
+	for (i = 0; i < 8; i++) {
+		c += (uint64_t)f25519_word(a + 4 * i) + f25519_word(b + 4 * i);
+		sum[i] = (uint32_t)c;
+		c >>= 32;
+	}
+	f25519_fold(r, sum, (uint32_t)c);
 }
 
 void f25519_sub(uint8_t *r, const uint8_t *a, const uint8_t *b)
 {
-	uint32_t c = 0;
+	uint32_t difference[8];
+	int64_t c = -37; /* a + 2p - b, 2p being 2^256 - 38 */
 	int i;
 
-	/* Calculate a + 2p - b, to avoid underflow */
-	c = 218;
-	for (i = 0; i + 1 < F25519_SIZE; i++) {
-		c += 65280 + ((uint32_t)a[i]) - ((uint32_t)b[i]);
-		r[i] = c;
-		c >>= 8;
+	for (i = 0; i < 8; i++) {
+		c += (int64_t)f25519_word(a + 4 * i) + 0xffffffff -
+		     f25519_word(b + 4 * i);
+		difference[i] = (uint32_t)c;
+		c >>= 32;
 	}
-
-	c += ((uint32_t)a[31]) - ((uint32_t)b[31]);
-	r[31] = c & 127;
-	c = (c >> 7) * 19;
-
-	for (i = 0; i < F25519_SIZE; i++) {
-		c += r[i];
-		r[i] = c;
-		c >>= 8;
-	}
+	f25519_fold(r, difference, (uint32_t)c);
 }
 
 void f25519_neg(uint8_t *r, const uint8_t *a)
@@ -154,18 +164,42 @@ void f25519_neg(uint8_t *r, const uint8_t *a)
 	}
 }
 
-static uint32_t f25519_word(const uint8_t *x)
+/* to[0 ... 8] = a y[0 ... 7] + to[0 ... 7] */
+static inline void f25519_add_row(uint32_t *to, uint32_t a, const uint32_t *y)
 {
-	return x[0] | (uint32_t)x[1] << 8 | (uint32_t)x[2] << 16 |
-	       (uint32_t)x[3] << 24;
+#ifdef __ARM_FEATURE_DSP
+	const uint32_t *const end = y + 8;
+	uint32_t carry = 0;
+	uint32_t low;
+	uint32_t b;
+
+	__asm__ volatile(
+		"1: ldr %0, [%2], #4  \n"
+		"   ldr %1, [%3]      \n"
+		"   umaal %1, %4, %5, %0 \n"
+		"   str %1, [%3], #4  \n"
+		"   cmp %2, %6        \n"
+		"   bne 1b            \n"
+		: "=&r"(b), "=&r"(low), "+r"(y), "+r"(to), "+r"(carry)
+		: "r"(a), "r"(end)
+		: "cc", "memory");
+	*to = carry;
+#else
+	uint64_t sum = 0;
+	int j;
+
+	for (j = 0; j < 8; j++) {
+		sum += (uint64_t)a * y[j] + to[j];
+		to[j] = (uint32_t)sum;
+		sum >>= 32;
+	}
+	to[8] = (uint32_t)sum;
+#endif
 }
 
-/* Diastole: by words of 32 bits instead of bytes (see README.md). The result
- * is below 2^255 + 2^12, as it was.
- */
 void f25519_mul__distinct(uint8_t *r, const uint8_t *a, const uint8_t *b)
 {
-	uint32_t product[16] = {0};
+	uint32_t product[16];
 	uint32_t x[8];
 	uint32_t y[8];
 	uint64_t c;
@@ -174,19 +208,11 @@ void f25519_mul__distinct(uint8_t *r, const uint8_t *a, const uint8_t *b)
 	for (i = 0; i < 8; i++) {
 		x[i] = f25519_word(a + 4 * i);
 		y[i] = f25519_word(b + 4 * i);
+		product[i] = 0;
 	}
 
-	for (i = 0; i < 8; i++) {
-		int j;
-
-		c = 0;
-		for (j = 0; j < 8; j++) {
-			c += (uint64_t)x[i] * y[j] + product[i + j];
-			product[i + j] = (uint32_t)c;
-			c >>= 32;
-		}
-		product[i + 8] = (uint32_t)c;
-	}
+	for (i = 0; i < 8; i++)
+		f25519_add_row(product + i, x[i], y);
 
 	/* Reduce with 2^256 = 38 mod p, then with 2^255 = 19 mod p */
 	c = 0;
@@ -195,19 +221,7 @@ void f25519_mul__distinct(uint8_t *r, const uint8_t *a, const uint8_t *b)
 		product[i] = (uint32_t)c;
 		c >>= 32;
 	}
-	c = (c * 2 + (product[7] >> 31)) * 19;
-	product[7] &= 0x7fffffff;
-	for (i = 0; i < 8; i++) {
-		uint32_t word;
-
-		c += product[i];
-		word = (uint32_t)c;
-		r[4 * i] = (uint8_t)word;
-		r[4 * i + 1] = (uint8_t)(word >> 8);
-		r[4 * i + 2] = (uint8_t)(word >> 16);
-		r[4 * i + 3] = (uint8_t)(word >> 24);
-		c >>= 32;
-	}
+	f25519_fold(r, product, (uint32_t)c);
 }
 
 void f25519_mul(uint8_t *r, const uint8_t *a, const uint8_t *b)

@@ -36,16 +36,19 @@ class FlashBench {
       : desk(image, options), line_(desk) {}
 
   UpdateResult flash(const std::string& file, const UpdateOptions& options = {}) {
-    return flash_controller(desk, line_, "the emulated board", read_update_file(file), options);
+    return flash(read_update_file(file), options);
+  }
+  UpdateResult flash(const UpdateFile& file, const UpdateOptions& options = {}) {
+    return flash_controller(desk, line_, "the emulated board", file, options);
   }
   /// What answers on the line: an application's report of itself, or a bootloader's (slot none).
   std::optional<wire::ImageReport> running() {
     UpdateLink link(desk, line_);
     link.pause(35 * ms);  // a bootloader listens for one word only
-    for (int attempt = 0; attempt < 5; ++attempt) {
+    for (int attempt = 0; attempt < 8; ++attempt) {
       if (!link.open(60 * ms)) continue;
       const auto report =
-          link.ask<wire::ImageReport>(wire::ImageQuery{.slot = wire::ImageSlot::none}, 100 * ms);
+          link.ask<wire::ImageReport>(wire::ImageQuery{.slot = wire::ImageSlot::none}, 300 * ms);
       if (report) return report;
     }
     return {};

@@ -1,0 +1,91 @@
+// Signatures on the emulated board: what the image's bootloader refuses, and how long it takes to check.
+
+#include <gmock/gmock.h>
+
+#include "protocol/signing/signing_key.hpp"
+#include "tests/tools/sim_board/flash_bench.hpp"
+
+namespace diastole::sim_board_test {
+namespace {
+
+using ::testing::HasSubstr;
+
+constexpr uint32_t key_address = 0x0800'3FE0;
+const std::string key_file = built + "signing-key.pem";
+
+#define NEEDS_KEY()      \
+  NEEDS_UPDATE_IMAGES(); \
+  if (!std::filesystem::exists(key_file)) GTEST_SKIP() << "the firmware was not built with a key of its own"
+
+UpdateFile signed_with(UpdateFile file, const signing::SecretKey& key, uint32_t counter) {
+  for (SlotImage& image : file.images)
+    image.signature = {counter, signing::sign(key, wire::signed_bytes(wire::encode(image.header), counter))};
+  return file;
+}
+
+std::string refusal(FlashBench& bench, const UpdateFile& file) {
+  try {
+    (void)bench.flash(file, {.allow_older = true});
+    return "";
+  } catch (const InputError& error) {
+    return error.what();
+  }
+}
+
+TEST(SignedFlashing, RefusesWhatTheKeyDoesNotVouchFor) {
+  NEEDS_KEY();
+  FlashBench bench;
+  UpdateFile file = read_update_file(newer_update);
+  for (SlotImage& image : file.images)
+    image.signature = {};
+  EXPECT_THAT(refusal(bench, file), HasSubstr("is not signed"));
+  EXPECT_THAT(refusal(bench, signed_with(file, {1, 2, 3}, 0)), HasSubstr("signed with another key"));
+  bench.power_cycle();
+  EXPECT_EQ(bench.runs(), "0.1.0 confirmed");
+}
+
+TEST(SignedFlashing, NeverGoesBelowTheCounterThatItHasConfirmed) {
+  NEEDS_KEY();
+  FlashBench bench;
+  const auto key = signing::read_key_file(key_file);
+  ASSERT_EQ(bench.flash(signed_with(read_update_file(newer_update), key, 7)).end, UpdateEnd::confirmed);
+  EXPECT_THAT(refusal(bench, read_update_file(first_update)), HasSubstr("counter is below 7"));
+  bench.power_cycle();
+  EXPECT_EQ(bench.runs(), "0.1.1 confirmed");
+}
+
+/// From power-on to the reset with which the bootloader enters the application, in ms.
+double decision_ms(FlashBench& bench) {
+  const size_t before = bench.board().statistics().resets.size();
+  bench.power_cycle();
+  (void)bench.running();
+  const auto resets = bench.board().statistics().resets;
+  EXPECT_EQ(resets.at(before + 1).cause, "software");
+  return 1e-6 * static_cast<double>(resets.at(before + 1).time_ns - resets.at(before).time_ns);
+}
+
+TEST(SignedFlashing, AStartChecksOneSignature) {
+  NEEDS_KEY();
+  FlashBench bench;
+  ASSERT_EQ(bench.runs(), "0.1.0 confirmed");
+  const double with_key = decision_ms(bench);
+  bench.board().power_off();
+  const std::array<uint8_t, 32> no_key = [] {
+    std::array<uint8_t, 32> erased{};
+    erased.fill(0xff);
+    return erased;
+  }();
+  bench.board().load(no_key, key_address);
+  const double without = decision_ms(bench);
+  std::printf("a start takes %.1f ms with a key, %.1f ms without\n", with_key, without);
+  EXPECT_LT(without, 35);
+  EXPECT_LT(with_key, 110) << "a host is to see a reset within 200 ms";
+  EXPECT_GT(with_key, without);
+  UpdateFile unsigned_file = read_update_file(newer_update);
+  for (SlotImage& image : unsigned_file.images)
+    image.signature = {};
+  EXPECT_EQ(bench.flash(unsigned_file).end, UpdateEnd::confirmed);
+}
+
+}  // namespace
+}  // namespace diastole::sim_board_test
