@@ -55,6 +55,42 @@ void print_rates(const std::string& image) {
   }
 }
 
+/// The even part of a trapezoid and the dearest profile, by how well the flash's caches do.
+void print_wait_states(const std::string& image) {
+  using diastole::board_model::FlashTiming;
+  struct Case {
+    const char* name;
+    FlashTiming timing;
+  };
+  constexpr Case cases[] = {{"all in the caches", FlashTiming::hits},
+                            {"caches as in the manual", FlashTiming::cached},
+                            {"no cache, no prefetch", FlashTiming::misses}};
+  fmt::print("\n{:<52}{:>9}{:>15}{:>10}\n", "5 wait states", "steps/s", "cycles a step", "asleep");
+  for (const Waveform waveform : {Waveform::trapezoidal, Waveform::sinusoidal}) {
+    for (const double rate_Hz : {100e3, 200e3}) {
+      for (const bool flood : {false, true}) {
+        for (const Case& each : cases) {
+          StepRateTrial trial{.waveform = waveform,
+                              .peak_rate_Hz = rate_Hz,
+                              .period_s = 1.0,
+                              .flood = flood,
+                              .timing = each.timing};
+          if (waveform == Waveform::sinusoidal) trial.from = 0.2, trial.to = 0.3;
+          const StepRateFigures figures = measure(image, trial);
+          const bool held = figures.problem.empty();
+          fmt::print("{:<52}{:>9.0f}{:>15}{:>10}  {}\n",
+                     fmt::format("{}, line {}, {}", diastole::wire::waveform_name(waveform),
+                                 flood ? "flooded" : "quiet", each.name),
+                     rate_Hz, held ? fmt::format("{:.0f}", figures.cycles) : "-",
+                     held ? fmt::format("{:.0f} %", 100 * figures.headroom) : "-",
+                     held ? "all steps in time" : figures.problem);
+          std::fflush(stdout);
+        }
+      }
+    }
+  }
+}
+
 void print_interrupts(const std::string& image) {
   const StepRateFigures figures = diastole::measure_interrupts(image);
   fmt::print("\n{:<30}{:>14}{:>22}\n", "interrupt at worst", "instructions", "latency, cycles");
@@ -77,6 +113,7 @@ int main(int argc, char** argv) {
   try {
     print_waveforms(image);
     print_rates(image);
+    print_wait_states(image);
     print_interrupts(image);
     return 0;
   } catch (const diastole::InputError& error) {

@@ -12,7 +12,8 @@ constexpr std::size_t flood_bytes = 60;
 
 }  // namespace
 
-EmulatedSession::EmulatedSession(const std::string& image) : controller_(std::vector{read_image(image)}) {}
+EmulatedSession::EmulatedSession(const std::string& image, board_model::FlashTiming timing)
+    : controller_(std::vector{read_image(image)}, {}, {.flash_timing = timing}) {}
 
 void EmulatedSession::hear(const wire::Received& received) {
   wire::visit_message(received.type, received.payload,

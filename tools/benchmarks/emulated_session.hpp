@@ -24,7 +24,8 @@ class EmulatedSession {
   static constexpr uint32_t lease = 0x5ea5e;
 
   /// Powers the board on. Throws InputError when the image cannot be read.
-  explicit EmulatedSession(const std::string& image);
+  explicit EmulatedSession(const std::string& image,
+                           board_model::FlashTiming timing = board_model::FlashTiming::hits);
 
   /// Connects, configures and homes; true when homed.
   bool prepare(const wire::Configure& configure);

@@ -120,7 +120,7 @@ wire::AddSegment segment_of(const StepRateTrial& trial) {
 
 StepRateFigures measure(const std::string& image, const StepRateTrial& trial) {
   StepRateFigures figures;
-  EmulatedSession session(image);
+  EmulatedSession session(image, trial.timing);
   if (!session.prepare(fine_stepping())) {
     figures.problem = "not homed";
     return figures;
@@ -150,6 +150,7 @@ StepRateFigures measure(const std::string& image, const StepRateTrial& trial) {
   const auto steps = static_cast<double>(std::max<uint64_t>(figures.steps, 1));
   const auto cycles = static_cast<double>(std::max<uint64_t>(spent.cycles, 1));
   figures.instructions = static_cast<double>(spent.instructions) / steps;
+  figures.cycles = static_cast<double>(spent.cycles - spent.asleep_cycles) / steps;
   figures.headroom = static_cast<double>(spent.asleep_cycles) / cycles;
   figures.rate_Hz = steps * figures.board.core_Hz / cycles;
   return figures;

@@ -15,7 +15,8 @@ struct StepRateTrial {
   double peak_rate_Hz = 200'000;
   double period_s = 2.0;
   uint32_t cycles = 1;
-  bool flood = false;  ///< the serial line is busy all the time
+  bool flood = false;                                                ///< the serial line is busy all the time
+  board_model::FlashTiming timing = board_model::FlashTiming::hits;  ///< of the flash's wait states
   /// The part of each cycle that is measured, in phases: around the peak rate.
   double from = 0.05, to = 0.2;
 };
@@ -27,6 +28,7 @@ struct StepRateFigures {
   double rate_Hz = 0;       ///< steps made over the measured part
   uint64_t steps = 0;       ///< in the measured part
   double instructions = 0;  ///< of a step, all in: planning, queue, interrupt, telemetry, link
+  double cycles = 0;        ///< the same with the waits for the flash
   double headroom = 0;      ///< part of the time that the core slept
   BoardStatistics board;    ///< of the whole session
 

@@ -35,12 +35,12 @@ class Chip {
     std::function<void(uint32_t offset, uint32_t bytes)> flash_changed;
   };
 
-  Chip(uint32_t crystal_Hz, uint32_t random_seed, uint32_t device_id, Listeners listeners)
+  Chip(uint32_t crystal_Hz, uint32_t random_seed, uint32_t device_id, FlashTiming timing, Listeners listeners)
       : rcc(clock, bus, scheduler, nvic, notes, crystal_Hz),
         flash(memory.flash(), clock, scheduler, notes),
         world(clock, scheduler,
               [this](Pin pin, bool level, Cycles at) { ports[pin.port]->drive(pin.number, level, at); }),
-        cpu({clock, memory, bus, scheduler, nvic, control, flash, notes}),
+        cpu({clock, memory, bus, scheduler, nvic, control, flash, notes}, timing),
         listeners_(std::move(listeners)) {
     bus.add({"RCC", 0x4002'3800, {}, &rcc});
     bus.gate_by([this](ClockGate gate) { return rcc.clock_of(gate); });

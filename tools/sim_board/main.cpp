@@ -58,6 +58,16 @@ void add_options(CLI::App& app, diastole::SessionOptions& options, bool& report,
   app.add_option("--crystal-Hz", options.crystal_Hz,
                  "the board's crystal (Olimex H405 8 MHz, Feather F405 12 MHz)")
       ->capture_default_str();
+  using diastole::board_model::FlashTiming;
+  app.add_option(
+         "--wait-states", options.flash_timing,
+         "what the flash's wait states cost: hits (nothing, as if all were cached), cached, or misses "
+         "(every line and every read waits)")
+      ->transform(CLI::CheckedTransformer(
+          std::map<std::string, FlashTiming>{
+              {"hits", FlashTiming::hits}, {"cached", FlashTiming::cached}, {"misses", FlashTiming::misses}},
+          CLI::ignore_case))
+      ->default_str("hits");
   app.add_flag("--report", report, "at the end, print what the run has shown");
   app.add_flag("--json", json, "at the end, print it as one JSON document");
 }

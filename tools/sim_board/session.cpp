@@ -108,7 +108,8 @@ LimitAt parse_limit(const std::string& text) {
 class Session {
  public:
   Session(const SessionOptions& options, std::vector<Image> images)
-      : options_(options), controller_(images, {}, {.crystal_Hz = options.crystal_Hz}) {
+      : options_(options),
+        controller_(images, {}, {.crystal_Hz = options.crystal_Hz, .flash_timing = options.flash_timing}) {
     report_.images = std::move(images);
     if (!options.pins.empty()) trace_.emplace(options.pins);
     if (!options.link.empty()) line_.emplace(options.link);

@@ -32,6 +32,7 @@ struct SessionOptions {
   std::vector<std::string> estop_at, limit_at;
   std::optional<uint64_t> power_cut;
   uint32_t crystal_Hz = 8'000'000;
+  board_model::FlashTiming flash_timing = board_model::FlashTiming::hits;
 };
 
 /// Runs until the time is over or `stop` (a descriptor) becomes readable. Prints one JSON line with the

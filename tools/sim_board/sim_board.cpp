@@ -34,7 +34,7 @@ constexpr uint32_t core_exception_base = 0x8000'0000;
 struct SimBoard::Board {
   explicit Board(const SimBoardOptions& options)
       : chip(
-            options.crystal_Hz, options.random_seed, options.device_id,
+            options.crystal_Hz, options.random_seed, options.device_id, options.flash_timing,
             {[this](uint8_t byte, Cycles at) {
                sent.push_back({chip.clock.ns(at), byte});
              },
@@ -249,6 +249,7 @@ BoardStatistics SimBoard::statistics() const {
   found.time_ns = now_ns();
   found.cycles = chip.clock.now();
   found.instructions = chip.cpu.instructions();
+  found.flash_wait_cycles = chip.cpu.flash_wait_cycles();
   found.asleep_cycles = chip.cpu.asleep_cycles();
   found.core_Hz = chip.clock.tree().core_Hz;
   found.stack_top = chip.memory.word(0).value_or(0);

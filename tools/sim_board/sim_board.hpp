@@ -23,6 +23,7 @@
 
 #include "tools/sim_board/core/notes.hpp"
 #include "tools/sim_board/core/pins.hpp"
+#include "tools/sim_board/processor/flash_access.hpp"
 
 namespace diastole {
 
@@ -30,6 +31,7 @@ struct SimBoardOptions {
   uint32_t crystal_Hz = 8'000'000;   ///< Olimex STM32-H405: 8 MHz, Feather F405: 12 MHz; 0: it never starts
   uint32_t random_seed = 1;          ///< of the chip's random number generator
   uint32_t device_id = 0x1007'6413;  ///< DBGMCU_IDCODE: revision Y; 0x2000'6411 is revision A
+  board_model::FlashTiming flash_timing = board_model::FlashTiming::hits;  ///< of wait states
   std::optional<uint32_t>
       cell_seed{};  ///< power cuts leave arbitrary bits and marginal cells, drawn from this
 };
@@ -63,7 +65,8 @@ struct BoardStatistics {
   uint64_t time_ns = 0;
   uint64_t cycles = 0;
   uint64_t instructions = 0;
-  uint64_t asleep_cycles = 0;  ///< in WFI, waiting for an interrupt
+  uint64_t flash_wait_cycles = 0;  ///< see processor/flash_access.hpp
+  uint64_t asleep_cycles = 0;      ///< in WFI, waiting for an interrupt
   uint32_t core_Hz = 0;
   uint32_t stack_top = 0;         ///< initial stack pointer
   uint32_t stack_used_bytes = 0;  ///< deepest word touched below stack_top since power-up

@@ -31,6 +31,24 @@ TEST(StepRate, TheHighestRateThatCanBeConfiguredIsSustained) {
   EXPECT_GE(figures.headroom, 0.05);
 }
 
+TEST(StepRate, TwoHundredThousandStepsASecondHoldWithTheWaitStatesThatTheCachesLeave) {
+  NEEDS_IMAGE();
+  const StepRateTrial trial{.period_s = 0.4, .flood = true, .timing = board_model::FlashTiming::cached};
+  const StepRateFigures cached = measure(image, trial);
+  EXPECT_EQ(cached.problem, "");
+  EXPECT_GE(cached.headroom, 0.3);
+  EXPECT_GT(cached.cycles, cached.instructions);
+  EXPECT_GT(cached.board.flash_wait_cycles, 0U);
+}
+
+TEST(StepRate, WithoutCachesTheQueueRunsDryWhichIsAFaultAndNoLateEdge) {
+  NEEDS_IMAGE();
+  const StepRateFigures figures =
+      measure(image, {.period_s = 0.4, .flood = true, .timing = board_model::FlashTiming::misses});
+  EXPECT_EQ(figures.problem, "step_underrun");
+  EXPECT_EQ(figures.board.missed_deadlines, 0U);
+}
+
 class EveryWaveform : public testing::TestWithParam<Waveform> {};
 
 TEST_P(EveryWaveform, IsPlannedInTimeAt200kHz) {

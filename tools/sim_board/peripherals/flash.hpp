@@ -110,6 +110,8 @@ class Flash final : public RegisterBlock {
     if (!whole && listeners_.power_cut) listeners_.power_cut();
   }
 
+  /// FLASH_ACR.
+  [[nodiscard]] uint32_t access_control() const { return acr_; }
   /// End of the operation in progress; 0 when idle. Code in flash stalls until then.
   [[nodiscard]] Cycles busy_until() const { return busy_ ? busy_until_ : 0; }
 

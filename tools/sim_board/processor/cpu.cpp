@@ -29,11 +29,12 @@ uc_engine* open_engine() {
 
 }  // namespace
 
-Cpu::Cpu(CpuParts parts)
+Cpu::Cpu(CpuParts parts, FlashTiming timing)
     : parts_(parts),
       engine_(open_engine()),
       flash_blocks_(parts.memory.flash()),
-      sram_blocks_(parts.memory.sram()) {
+      sram_blocks_(parts.memory.sram()),
+      flash_access_(timing) {
   map_memory();
   add_hooks();
   parts_.control.on_protection_change([this] { protection_changed(); });
@@ -78,6 +79,11 @@ void Cpu::add_hooks() {
   hook(UC_HOOK_INTR, &Cpu::on_interrupt);
   hook(UC_HOOK_MEM_UNMAPPED | UC_HOOK_MEM_WRITE_PROT | UC_HOOK_MEM_FETCH_PROT | UC_HOOK_MEM_READ_PROT,
        &Cpu::on_bad_access);
+  if (!flash_access_.counts()) return;
+  uc_hook handle = 0;
+  check(uc_hook_add(engine_.get(), &handle, UC_HOOK_MEM_READ, reinterpret_cast<void*>(&Cpu::on_flash_read),
+                    this, uint64_t{flash_base}, uint64_t{flash_base + flash_bytes - 1}),
+        "add a hook");
 }
 
 void Cpu::protection_changed() { protection_stale_ = true; }
@@ -157,9 +163,11 @@ void Cpu::stop(Stop reason) {
 }
 
 void Cpu::finish_block() {
-  parts_.clock.set_now(parts_.clock.now() + pending_instructions_);
+  parts_.clock.set_now(parts_.clock.now() + pending_instructions_ + pending_waits_);
   instructions_ += pending_instructions_;
+  flash_wait_cycles_ += pending_waits_;
   pending_instructions_ = 0;
+  pending_waits_ = 0;
 }
 
 void Cpu::on_block(uc_engine*, uint64_t address, uint32_t bytes, void* self) {
@@ -193,7 +201,16 @@ void Cpu::block(uint64_t address, uint32_t bytes) {
     return stop(Stop::float_disabled);
   }
   pending_instructions_ = found.instructions;
+  if (in_flash && flash_access_.counts()) {
+    flash_access_.set_control(parts_.flash.access_control());
+    pending_waits_ = flash_access_.block(pc_ - flash_base, bytes, found.instructions);
+  }
   at_boundary_ = false;
+}
+
+void Cpu::on_flash_read(uc_engine*, uc_mem_type, uint64_t address, int, int64_t, void* self) {
+  Cpu& cpu = *static_cast<Cpu*>(self);
+  cpu.pending_waits_ += cpu.flash_access_.read(static_cast<uint32_t>(address) - flash_base);
 }
 
 void Cpu::on_interrupt(uc_engine*, uint32_t number, void* self) {

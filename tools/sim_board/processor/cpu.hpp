@@ -2,7 +2,7 @@
 // The Cortex-M4: Unicorn translates and executes the instructions; exceptions, sleep, time and the checks
 // that Unicorn leaves out are done here.
 //
-// One instruction is one cycle. Code runs block by block (up to the next branch, and never over a page); at
+// One instruction is one cycle, and what flash_access.hpp says of the flash's wait states comes on top. Code runs block by block (up to the next branch, and never over a page); at
 // each block's start time is brought up to date, events that are due happen, and an exception may be taken. A
 // register access therefore happens at the time of its block's start and an exception is taken up to a block
 // late; what timers do is exact. Stacking costs 12 cycles, unstacking 10, tail-chaining 6.
@@ -19,6 +19,7 @@
 #include "tools/sim_board/peripherals/flash.hpp"
 #include "tools/sim_board/peripherals/system_control.hpp"
 #include "tools/sim_board/processor/block_table.hpp"
+#include "tools/sim_board/processor/flash_access.hpp"
 
 namespace diastole::board_model {
 
@@ -36,7 +37,7 @@ struct CpuParts {
 
 class Cpu {
  public:
-  explicit Cpu(CpuParts parts);
+  Cpu(CpuParts parts, FlashTiming timing);
   ~Cpu();
   Cpu(const Cpu&) = delete;
   Cpu& operator=(const Cpu&) = delete;
@@ -55,6 +56,8 @@ class Cpu {
   void forget_code(uint32_t offset, uint32_t bytes);
 
   [[nodiscard]] uint64_t instructions() const { return instructions_; }
+  /// Cycles spent waiting for the flash.
+  [[nodiscard]] Cycles flash_wait_cycles() const { return flash_wait_cycles_; }
   /// Cycles spent waiting for an interrupt.
   [[nodiscard]] Cycles asleep_cycles() const { return asleep_cycles_; }
   /// The last fault in words, empty when there was none since power-up.
@@ -113,6 +116,7 @@ class Cpu {
   static void on_interrupt(uc_engine*, uint32_t number, void* self);
   static bool on_bad_access(uc_engine*, uc_mem_type type, uint64_t address, int bytes, int64_t value,
                             void* self);
+  static void on_flash_read(uc_engine*, uc_mem_type, uint64_t address, int bytes, int64_t value, void* self);
   static uint64_t on_read(uc_engine*, uint64_t offset, unsigned bytes, void* self);
   static void on_write(uc_engine*, uint64_t offset, unsigned bytes, uint64_t value, void* self);
 
@@ -126,6 +130,8 @@ class Cpu {
   std::unique_ptr<uc_engine, EngineCloser> engine_;
   std::vector<Window> windows_;
   BlockTable flash_blocks_, sram_blocks_;
+  FlashAccess flash_access_;
+  Cycles pending_waits_ = 0, flash_wait_cycles_ = 0;
   std::vector<uint8_t> return_page_;
 
   std::vector<SystemControl::ProtectedRegion> regions_;
