@@ -157,6 +157,7 @@ void SimBoard::hold_core(bool held) {
   chip.watchdog.hold(held && (chip.bus.read(apb1_freeze, 4) & watchdog_stops) != 0);
 }
 
+void SimBoard::stick_dma(uint32_t stream) { board_->chip.dma1.stick(stream); }
 void SimBoard::fail_crystal() { board_->chip.rcc.fail_crystal(); }
 
 void SimBoard::power_off() {
@@ -198,6 +199,12 @@ void SimBoard::send(std::span<const uint8_t> bytes) {
   if (port == nullptr) return;
   for (const uint8_t byte : bytes)
     port->receive(byte);
+}
+
+void SimBoard::send_unframed(std::span<const uint8_t> bytes) {
+  if (board_model::Usart* port = board_->chip.serial())
+    for (const uint8_t byte : bytes)
+      port->receive(byte, false);
 }
 
 std::vector<SentByte> SimBoard::take_sent() { return std::exchange(board_->sent, {}); }

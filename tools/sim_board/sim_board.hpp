@@ -114,6 +114,8 @@ class SimBoard {
   /// Bytes for the board's serial port: back to back from now on, at the rate the firmware set; lost while
   /// the firmware does not listen.
   void send(std::span<const uint8_t> bytes);
+  /// The same, disturbed so that their stop bits are low: a framing error each.
+  void send_unframed(std::span<const uint8_t> bytes);
   /// What left through the serial port since the last call.
   std::vector<SentByte> take_sent();
   /// Bytes given to send() that have not reached the receiver yet.
@@ -140,6 +142,8 @@ class SimBoard {
   [[nodiscard]] uint32_t option_bytes() const;
   /// FLASH_ACR: wait states, caches, prefetch.
   [[nodiscard]] uint32_t flash_access_control() const;
+  /// From now on the stream of DMA1 brings nothing and cannot be switched off, until a reset.
+  void stick_dma(uint32_t stream);
   /// The crystal stops for good.
   void fail_crystal();
   /// A debugger stops the core, or lets it go on. The peripherals run on, but for a watchdog that the firmware has bound to it.

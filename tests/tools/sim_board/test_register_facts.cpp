@@ -34,6 +34,7 @@ class Facts : public testing::Test {
   Chip chip{8'000'000,
             1,
             0x1007'6413,
+            board_model::FlashTiming::hits,
             {[](uint8_t, board_model::Cycles) {}, [](uint8_t, uint8_t, board_model::Cycles) {},
              [](board_model::ResetCause) {}, [] {}, [](uint32_t, uint32_t) {}}};
 };

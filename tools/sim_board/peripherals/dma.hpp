@@ -41,6 +41,7 @@ class Dma final : public RegisterBlock {
     Stream& stream = streams_[index];
     const bool was_on = (stream.control & enabled) != 0;
     RegisterBlock::write(offset, value, mask);
+    if (stream.stuck && was_on) stream.control |= enabled;
     stream.left &= 0xffff;
     if (!was_on && (stream.control & enabled) != 0) start(stream);
     set_line(index);
@@ -51,10 +52,15 @@ class Dma final : public RegisterBlock {
       set_line(stream);
   }
 
+  /// The stream carries nothing any more and keeps its enable bit: what a transfer that never ends looks like.
+  void stick(uint32_t index) { streams_[index].stuck = true; }
+
   /// A peripheral wired to `channel` of `stream` asks for one item.
   void request(uint32_t index, uint32_t channel) {
     Stream& stream = streams_[index];
-    if ((stream.control & enabled) == 0 || stream.control >> 25 != channel || stream.left == 0) return;
+    if ((stream.control & enabled) == 0 || stream.control >> 25 != channel || stream.left == 0 ||
+        stream.stuck)
+      return;
     transfer(stream);
     set_line(index);
   }
@@ -84,7 +90,8 @@ class Dma final : public RegisterBlock {
     uint32_t control = 0, peripheral = 0, memory0 = 0, memory1 = 0, fifo = 0x21;
     uint32_t left = 0;  ///< NDTR
     uint32_t programmed = 0;
-    uint32_t at = 0;     ///< next memory address
+    uint32_t at = 0;  ///< next memory address
+    bool stuck = false;
     uint32_t flags = 0;  ///< bit 0 FEIF, 2 DMEIF, 3 TEIF, 4 HTIF, 5 TCIF
   };
 

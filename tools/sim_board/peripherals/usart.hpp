@@ -28,7 +28,7 @@ class Usart final : public RegisterBlock {
   uint32_t read(uint32_t offset) override {
     if (offset == 0x00) overrun_pending_clear_ = (sr_ & overrun) != 0;
     if (offset != 0x04) return RegisterBlock::read(offset);
-    sr_ &= ~receive_full;
+    sr_ &= ~(receive_full | noise | framing_error);
     if (overrun_pending_clear_) sr_ &= ~overrun;
     overrun_pending_clear_ = false;
     set_line();
@@ -75,8 +75,8 @@ class Usart final : public RegisterBlock {
         sr_ |= overrun;
         ++overruns_;
       } else {
-        received_ = incoming_.front();
-        sr_ |= receive_full;
+        received_ = incoming_.front().value;
+        sr_ |= receive_full | (incoming_.front().framed ? 0 : noise | framing_error);
       }
       incoming_.pop_front();
       start_receiving(at);
@@ -86,9 +86,10 @@ class Usart final : public RegisterBlock {
   }
   void after_clock_change() override { ask(); }
 
-  /// A byte starts on the line towards the board as soon as the line is free.
-  void receive(uint8_t byte) {
-    incoming_.push_back(byte);
+  /// A byte starts on the line towards the board as soon as the line is free; not `framed`: what stands where its stop bit
+  /// should be is low.
+  void receive(uint8_t byte, bool framed = true) {
+    incoming_.push_back({byte, framed});
     start_receiving(clock_.now());
     ask();
   }
@@ -101,8 +102,12 @@ class Usart final : public RegisterBlock {
   [[nodiscard]] std::size_t waiting_bytes() const { return incoming_.size(); }
 
  private:
-  static constexpr uint32_t overrun = 1 << 3, receive_full = 1 << 5, complete = 1 << 6,
-                            transmit_empty = 1 << 7;
+  struct LineByte {
+    uint8_t value = 0;
+    bool framed = true;
+  };
+  static constexpr uint32_t framing_error = 1 << 1, noise = 1 << 2, overrun = 1 << 3, receive_full = 1 << 5,
+                            complete = 1 << 6, transmit_empty = 1 << 7;
   static constexpr uint32_t enable = 1 << 13, transmitter = 1 << 3, receiver = 1 << 2, oversample_8 = 1 << 15,
                             nine_bits = 1 << 12;
 
@@ -149,7 +154,7 @@ class Usart final : public RegisterBlock {
   Nvic& nvic_;
   Scheduler::Slot slot_;
   std::function<void(uint8_t, Cycles)> sent_;
-  std::deque<uint8_t> incoming_;
+  std::deque<LineByte> incoming_;
 
   uint32_t sr_ = 0xc0, brr_ = 0, cr1_ = 0, cr2_ = 0, cr3_ = 0, gtpr_ = 0;
   uint8_t received_ = 0, shifting_ = 0, next_ = 0;

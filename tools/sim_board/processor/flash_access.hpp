@@ -97,7 +97,7 @@ class FlashAccess {
 
   FlashTiming timing_;
   uint32_t control_ = 0;
-  uint32_t next_offset_ = 0, last_line_ = 0;
+  uint32_t next_offset_ = ~0U, last_line_ = ~0U;
   LineCache instructions_{64}, data_{8};
 };
 
