@@ -78,6 +78,8 @@ class ElasticSystem {
   [[nodiscard]] const PressureMap& pressures() const { return pressures_; }
   [[nodiscard]] const MaterialAxesField& material_axes() const { return material_axes_; }
   [[nodiscard]] double volume_stiffness_kPa() const { return volume_stiffness_kPa_; }
+  /// 1/K; 0 for incompressible material.
+  [[nodiscard]] double compressibility_per_kPa() const { return compressibility_per_kPa_; }
   [[nodiscard]] std::span<double> parameters(size_t element) {
     return {&parameters_[element * count_], count_};
   }
@@ -105,6 +107,8 @@ class ElasticSystem {
     return equations_.unknowns(state.held_volume_mm3.has_value()) - equations_.displacement_unknowns();
   }
 
+  /// What an element sees of a state.
+  [[nodiscard]] ElementState element_state(const ElasticState& state, size_t element) const;
   [[nodiscard]] SystemResidual residual(const ElasticState& state) const;
   /// Values of the stored entries of equations(), at a state: the symmetric part of the tangent. A probing stiffness
   /// (element_mechanics.hpp) resists changes of volume that the Lagrange pressures do not see.
@@ -142,7 +146,6 @@ class ElasticSystem {
   [[nodiscard]] NodeField node_field(std::span<const double> unknowns) const;
 
  private:
-  [[nodiscard]] ElementState element_state(const ElasticState& state, size_t element) const;
   [[nodiscard]] double rest_pressure_kPa(size_t element) const;
   /// The largest over the elements: pressure at rest and stiffness against stretch there.
   [[nodiscard]] double material_stiffness_kPa() const;

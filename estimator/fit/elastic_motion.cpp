@@ -5,16 +5,28 @@
 #include "estimator/mesh/node_field.hpp"
 
 namespace diastole {
-void ElasticMotion::set_values(std::span<const double> values) {
-  for (size_t i = 0; i < groups_.size(); ++i) {
-    const ParameterGroup& group = groups_[i];
+
+void ElasticMotion::set_values(ElasticModel& model, const std::vector<ParameterGroup>& groups,
+                               std::span<const double> values) {
+  for (size_t i = 0; i < groups.size(); ++i) {
+    const ParameterGroup& group = groups[i];
     if (group.elements.empty()) {
-      model_.set_parameter(group.parameter, values[i]);
+      model.set_parameter(group.parameter, values[i]);
     } else {
       for (const size_t element : group.elements)
-        model_.set_element_parameter(group.parameter, element, values[i]);
+        model.set_element_parameter(group.parameter, element, values[i]);
     }
   }
+}
+
+std::optional<std::string> ElasticMotion::set_values(std::span<const double> values) {
+  set_values(model_, groups_, values);
+  return {};
+}
+
+MotionDerivatives ElasticMotion::derivatives_at(const ElasticState& state) {
+  Sensitivities by = model_.sensitivities(state, groups_);
+  return {std::move(by.parameter), std::move(by.pressure)};
 }
 
 // The slot itself, or on its first use the solved one of the nearest pressure.
@@ -44,11 +56,11 @@ Solution ElasticMotion::solve_from(const Slot* start, std::span<const double> va
     Solution solution = model_.solve(pressure_kPa, start->state);
     if (solution.report.converged()) return solution;
   }
-  return model_.solve(pressure_kPa);
+  return model_.solve(pressure_kPa, first_state());
 }
 
 MotionOutcome ElasticMotion::solve(size_t slot, std::span<const double> values, double pressure_kPa) {
-  set_values(values);
+  if (std::optional<std::string> reason = set_values(values)) return {std::nullopt, *std::move(reason)};
   Solution solution = solve_from(nearest(slot, pressure_kPa), values, pressure_kPa);
   if (!solution.report.converged()) return {std::nullopt, solution.report.describe()};
   if (slots_.size() <= slot) slots_.resize(slot + 1);
@@ -62,9 +74,8 @@ MotionOutcome ElasticMotion::solve(size_t slot, std::span<const double> values, 
 MotionDerivatives ElasticMotion::derivatives(size_t slot) {
   Slot& solved = slots_.at(slot).value();
   if (!solved.derivatives) {
-    set_values(solved.values);
-    Sensitivities by = model_.sensitivities(solved.state, groups_);
-    solved.derivatives = MotionDerivatives{std::move(by.parameter), std::move(by.pressure)};
+    (void)set_values(solved.values);
+    solved.derivatives = derivatives_at(solved.state);
   }
   MotionDerivatives seen = *solved.derivatives;
   if (displacement_gain_ == 1.0) return seen;

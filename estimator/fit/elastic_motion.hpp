@@ -3,6 +3,7 @@
 // one, and every frame starts from its own last equilibrium, moved along the exact sensitivities.
 
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "estimator/fe/elastic_model.hpp"
@@ -24,6 +25,19 @@ class ElasticMotion : public MotionModel {
 
   [[nodiscard]] const ElasticModel& model() const { return model_; }
 
+ protected:
+  /// Makes the model that of these values; why not, if there is none.
+  virtual std::optional<std::string> set_values(std::span<const double> values);
+  /// At an equilibrium of the model as it stands; of the motion itself, not of what images show.
+  virtual MotionDerivatives derivatives_at(const ElasticState& state);
+  /// Where a frame begins that has no earlier solution.
+  [[nodiscard]] virtual ElasticState first_state() const { return model_.rest_state(); }
+
+  [[nodiscard]] ElasticModel& model() { return model_; }
+  [[nodiscard]] const std::vector<ParameterGroup>& groups() const { return groups_; }
+  static void set_values(ElasticModel& model, const std::vector<ParameterGroup>& groups,
+                         std::span<const double> values);
+
  private:
   struct Slot {
     std::vector<double> values;
@@ -31,7 +45,6 @@ class ElasticMotion : public MotionModel {
     std::optional<MotionDerivatives> derivatives;  // at `values` and the state's pressure
   };
 
-  void set_values(std::span<const double> values);
   [[nodiscard]] const Slot* nearest(size_t slot, double pressure_kPa) const;
   [[nodiscard]] Solution solve_from(const Slot* start, std::span<const double> values, double pressure_kPa);
 

@@ -10,6 +10,7 @@ JointProblem::JointProblem(MotionModel& model, const std::vector<EstimatedParame
     : model_(model),
       values_(static_cast<Eigen::Index>(values.size())),
       reference_(std::make_unique<PointLocator>(model.mesh(), model.mesh().reference(), locator)),
+      imaged_(model.imaged_load()),
       planes_(measurement) {
   std::vector<inference::Parameter> unknowns;
   std::vector<double> start;
@@ -29,7 +30,9 @@ JointProblem::JointProblem(MotionModel& model, const std::vector<EstimatedParame
       pressure_unknown = add_unknown({fmt::format("pressure_kPa[{}]", frame)}, load.pressure_kPa);
     frames_.push_back({frame, load, MotionResiduals(measurement, {frame}, locator), pressure_unknown, {}});
   }
-  if (!measurement.frames.empty()) {
+  if (imaged_ && imaged_->sigma_kPa > 0)
+    imaged_unknown_ = add_unknown({"imaged_at_kPa"}, imaged_->pressure_kPa);
+  if (!measurement.frames.empty() && !imaged_) {
     const Frame& rest = measurement.frames.front();
     if (rest.pressure_kPa != 0 && rest.sigma_kPa > 0) rest_reading_ = rest;
   }
@@ -99,11 +102,17 @@ double JointProblem::pressure_at(const LoadedFrame& frame, const Eigen::VectorXd
   return frame.load.pressure_kPa - offset_at(q);
 }
 
+double JointProblem::imaged_pressure_at(const Eigen::VectorXd& q) const {
+  if (imaged_unknown_) return q[*imaged_unknown_];
+  return imaged_->pressure_kPa - offset_at(q);
+}
+
 bool JointProblem::solve_frames(const Eigen::VectorXd& q) {
   if (solved_at_ && *solved_at_ == q) return true;
   solved_at_.reset();
   std::vector<double> values = space_.values(q);
   values.resize(static_cast<size_t>(values_));
+  if (imaged_) model_.set_imaged_pressure(imaged_pressure_at(q));
   for (size_t slot = 0; slot < frames_.size(); ++slot) {
     LoadedFrame& frame = frames_[slot];
     ++forward_solves_;
@@ -167,6 +176,8 @@ std::optional<Eigen::VectorXd> JointProblem::residuals(const Eigen::VectorXd& q)
     residuals_[row++] =
         (q[*frame.pressure_unknown] + offset_at(q) - frame.load.pressure_kPa) / frame.load.sigma_kPa;
   }
+  if (imaged_unknown_)
+    residuals_[row++] = (q[*imaged_unknown_] + offset_at(q) - imaged_->pressure_kPa) / imaged_->sigma_kPa;
   if (offset_unknown_) residuals_[row++] = q[*offset_unknown_] / offset_sigma_kPa_;
   if (fits_rest())
     residuals_[row++] = (q[*offset_unknown_] - rest_reading_->pressure_kPa) / rest_reading_->sigma_kPa;
@@ -202,14 +213,21 @@ Eigen::MatrixXd JointProblem::plain_jacobian(const Eigen::VectorXd& q) {
     for (const NodeField& field : by.by_value)
       fields.push_back(&field);
     fields.push_back(&by.by_pressure);
+    if (imaged_) fields.push_back(&by.by_imaged_pressure);
     const Eigen::MatrixXd block = frame.residuals.columns(0, model_.mesh(), fields);
+    const Eigen::VectorXd by_pressure = block.col(values());
     for (Eigen::Index i = 0; i < values(); ++i) {
       result.col(i).segment(row, block.rows()) = block.col(i) * space_[i].slope(q[i]);
     }
     if (frame.pressure_unknown) {
-      result.col(*frame.pressure_unknown).segment(row, block.rows()) = block.rightCols<1>();
+      result.col(*frame.pressure_unknown).segment(row, block.rows()) = by_pressure;
     } else if (offset_unknown_) {
-      result.col(*offset_unknown_).segment(row, block.rows()) = -block.rightCols<1>();
+      result.col(*offset_unknown_).segment(row, block.rows()) = -by_pressure;
+    }
+    if (imaged_unknown_) {
+      result.col(*imaged_unknown_).segment(row, block.rows()) = block.rightCols<1>();
+    } else if (imaged_ && offset_unknown_) {
+      result.col(*offset_unknown_).segment(row, block.rows()) -= block.rightCols<1>();
     }
     for (Eigen::Index i = 0; planes_.unknowns() > 0 && i < block.rows(); ++i) {
       const ResidualRow& tag = frame.residuals.rows()[static_cast<size_t>(i)];
@@ -223,6 +241,10 @@ Eigen::MatrixXd JointProblem::plain_jacobian(const Eigen::VectorXd& q) {
     if (!frame.pressure_unknown) continue;
     if (offset_unknown_) result(row, *offset_unknown_) = 1 / frame.load.sigma_kPa;
     result(row++, *frame.pressure_unknown) = 1 / frame.load.sigma_kPa;
+  }
+  if (imaged_unknown_) {
+    if (offset_unknown_) result(row, *offset_unknown_) = 1 / imaged_->sigma_kPa;
+    result(row++, *imaged_unknown_) = 1 / imaged_->sigma_kPa;
   }
   if (offset_unknown_) result(row++, *offset_unknown_) = 1 / offset_sigma_kPa_;
   if (fits_rest()) result(row++, *offset_unknown_) = 1 / rest_reading_->sigma_kPa;
@@ -242,15 +264,18 @@ Eigen::VectorXd JointProblem::offset_column() {
   for (size_t slot = 0; slot < frames_.size(); ++slot) {
     const LoadedFrame& frame = frames_[slot];
     const Eigen::Index size = frame.residuals.size();
-    if (frame.pressure_unknown) {
-      column[prior++] = 1 / frame.load.sigma_kPa;
-    } else {
-      const NodeField by_pressure = model_.derivatives(slot).by_pressure;
-      const NodeField* const fields[] = {&by_pressure};
-      column.segment(row, size) = -frame.residuals.columns(0, model_.mesh(), fields).col(0);
+    const bool by_imaged = imaged_ && !imaged_unknown_;
+    if (frame.pressure_unknown) column[prior++] = 1 / frame.load.sigma_kPa;
+    if (!frame.pressure_unknown || by_imaged) {
+      const MotionDerivatives by = model_.derivatives(slot);
+      std::vector<const NodeField*> fields;
+      if (!frame.pressure_unknown) fields.push_back(&by.by_pressure);
+      if (by_imaged) fields.push_back(&by.by_imaged_pressure);
+      column.segment(row, size) = -frame.residuals.columns(0, model_.mesh(), fields).rowwise().sum();
     }
     row += size;
   }
+  if (imaged_unknown_) column[prior] = 1 / imaged_->sigma_kPa;
   return column;
 }
 

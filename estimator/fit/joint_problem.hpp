@@ -8,6 +8,8 @@
 //
 // All measurements may be off by a common offset, one more unknown with a prior about zero; a pressure read in the
 // undeformed frame 0 is a measurement of it. Tag planes that were found in images are unknowns too (tag_planes.hpp).
+// Where the body's shape was imaged under load (MotionModel::imaged_load), the pressure then is an unknown as a frame's is; frame 0 is
+// that shape, and its reading says nothing of the offset.
 // A frame with sigma_kPa = 0 has an exactly known pressure (but for the offset) and no unknown. A value with a positive lower
 // bound enters as its logarithm (its error is closer to a factor than to a term); other values enter as they
 // are.
@@ -15,7 +17,7 @@
 // With a robust loss (robust_loss.hpp) the motion's residuals enter as u(r), and the cost changes with them.
 // Parameters that vary by element may carry a smoothness prior (smoothness.hpp).
 //
-// Residual rows: frame after frame (motion_residuals.hpp), then one for each unknown pressure, those of the offset, those of the tag
+// Residual rows: frame after frame (motion_residuals.hpp), then one for each unknown pressure, that of the imaged shape last, those of the offset, those of the tag
 // planes, then those of the smoothness priors.
 // The points of frame 0 are not part of the problem: without load there is no information on stiffness.
 
@@ -43,6 +45,7 @@ struct MotionOutcome {
 struct MotionDerivatives {
   std::vector<NodeField> by_value;  ///< dx/d(value), one for each value
   NodeField by_pressure;            ///< dx/d(cavity pressure), mm/kPa
+  NodeField by_imaged_pressure{};   ///< dx/d(imaged_load's pressure); empty for a model that has none
 };
 
 /// What the fit needs of a mechanical model: the body's motion for material values and a cavity pressure, and its
@@ -55,6 +58,11 @@ class MotionModel {
   virtual ~MotionModel() = default;
 
   [[nodiscard]] virtual const HermiteMesh& mesh() const = 0;
+
+  /// The pressure at which `mesh()` was imaged, as measured, if the motion depends on it: one more unknown with a prior. `solve`
+  /// takes it at the pressure last set.
+  [[nodiscard]] virtual std::optional<ImagedLoad> imaged_load() const { return {}; }
+  virtual void set_imaged_pressure(double /*pressure_kPa*/) {}
 
   /// Equilibrium of slot's frame. Failure is an outcome.
   [[nodiscard]] virtual MotionOutcome solve(size_t slot, std::span<const double> values,
@@ -98,6 +106,9 @@ class JointProblem : public inference::LeastSquaresProblem {
   [[nodiscard]] const std::vector<LoadedFrame>& frames() const { return frames_; }
   /// Place in q of the pressures' common offset (measured less true), if there is one.
   [[nodiscard]] std::optional<Eigen::Index> offset_unknown() const { return offset_unknown_; }
+
+  /// Place in q of the pressure at which the shape was imaged, if it is not exactly known.
+  [[nodiscard]] std::optional<Eigen::Index> imaged_unknown() const { return imaged_unknown_; }
 
   /// The tag planes are the last unknowns; how many.
   [[nodiscard]] Eigen::Index plane_unknowns() const { return planes_.unknowns(); }
@@ -143,6 +154,7 @@ class JointProblem : public inference::LeastSquaresProblem {
 
  private:
   [[nodiscard]] double offset_at(const Eigen::VectorXd& q) const;
+  [[nodiscard]] double imaged_pressure_at(const Eigen::VectorXd& q) const;
   [[nodiscard]] double pressure_at(const LoadedFrame& frame, const Eigen::VectorXd& q) const;
   [[nodiscard]] Eigen::Index smooth_rows() const;
   /// A reading at rest counts only where the offset is estimated.
@@ -156,6 +168,8 @@ class JointProblem : public inference::LeastSquaresProblem {
   Eigen::VectorXd start_;
   std::unique_ptr<PointLocator> reference_;
   std::vector<LoadedFrame> frames_;
+  std::optional<ImagedLoad> imaged_;
+  std::optional<Eigen::Index> imaged_unknown_;
   std::optional<Eigen::Index> offset_unknown_;
   double offset_sigma_kPa_ = 0;
   std::optional<Frame> rest_reading_;

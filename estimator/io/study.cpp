@@ -90,21 +90,39 @@ MeshSpecimen read_mesh_specimen(TableReader& table, const std::filesystem::path&
   return mesh;
 }
 
-Specimen read_specimen(TableReader& root, const std::filesystem::path& folder,
-                       std::optional<std::filesystem::path>& fibres) {
+std::optional<ImagedLoad> read_imaged_load(TableReader& table) {
+  if (!table.has("imaged_at_kPa")) {
+    if (table.has("imaged_at_sigma_kPa"))
+      table.fail("imaged_at_sigma_kPa", "stands without imaged_at_kPa",
+                 "Give the pressure at which the shape was imaged too, or leave it out.");
+    return {};
+  }
+  return ImagedLoad{table.number("imaged_at_kPa", {.at_least = -100, .at_most = 100}),
+                    table.number_or("imaged_at_sigma_kPa", 0.0, {.at_least = 0})};
+}
+
+/// What [specimen] says besides its kind.
+struct SpecimenTable {
+  Specimen specimen;
+  std::optional<std::filesystem::path> fibres;
+  std::optional<ImagedLoad> imaged_at;
+};
+
+SpecimenTable read_specimen(TableReader& root, const std::filesystem::path& folder) {
   TableReader table = root.table("specimen");
   const std::string kind = table.choice("kind", {"annulus", "ellipsoid", "mesh", "fitted-lv"});
-  Specimen specimen;
+  SpecimenTable read;
   if (kind == "mesh" || kind == "fitted-lv") {
-    specimen = read_mesh_specimen(table, folder);
+    read.specimen = read_mesh_specimen(table, folder);
   } else if (kind == "ellipsoid") {
-    specimen = read_ellipsoid(table);
+    read.specimen = read_ellipsoid(table);
   } else {
-    specimen = read_annulus(table);
+    read.specimen = read_annulus(table);
   }
-  if (table.has("fibres")) fibres = folder / table.text("fibres");
+  if (table.has("fibres")) read.fibres = folder / table.text("fibres");
+  read.imaged_at = read_imaged_load(table);
   table.finish();
-  return specimen;
+  return read;
 }
 
 StudyParameter read_parameter(const std::string& name, TableReader& table) {
@@ -283,15 +301,15 @@ bool parse_whole(std::string_view text, Number& value) {
 Study read_study(const std::filesystem::path& path) {
   TableReader root = TableReader::from_file(path);
   root.expect_format("diastole-study", 1);
-  std::optional<std::filesystem::path> fibres;
+  SpecimenTable specimen = read_specimen(root, path.parent_path());
   Study study{.file = path,
-              .specimen = read_specimen(root, path.parent_path(), fibres),
-              .fibres = {},
+              .specimen = std::move(specimen.specimen),
+              .fibres = std::move(specimen.fibres),
+              .imaged_at = specimen.imaged_at,
               .law = read_law(root, path.parent_path()),
               .data = {},
               .effects = {},
               .refine = {}};
-  study.fibres = fibres;
   study.data = read_data(root, path.parent_path());
   study.data.to_specimen = read_pose_of_images(root);
   study.chamber = read_chamber(root);

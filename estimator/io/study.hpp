@@ -52,6 +52,12 @@ struct MeshSpecimen {
   std::optional<EndSprings> end_springs{};  ///< given if the ends are sprung
 };
 
+/// The specimen's shape is that of an image, in which a cavity pressure already pressed on it: imaged_at_kPa, imaged_at_sigma_kPa.
+struct ImagedLoad {
+  double pressure_kPa;
+  double sigma_kPa = 0.0;  ///< standard deviation of the measured pressure; 0: exactly known
+};
+
 /// One alternative per `specimen.kind`; a new kind adds its struct here and its reader in study.cpp.
 using Specimen = std::variant<AnnulusSpecimen, EllipsoidSpecimen, MeshSpecimen>;
 
@@ -142,6 +148,7 @@ struct Study {
   Specimen specimen;
   /// Measured fibre directions at points, in the images' coordinates (estimator/io/fibre_points.hpp): they replace those of the specimen.
   std::optional<std::filesystem::path> fibres = {};
+  std::optional<ImagedLoad> imaged_at = {};  ///< absent: the specimen's shape is free of stress
   StudyLaw law;
   StudyData data;
   std::vector<std::string> effects;                      ///< effects that the model already includes

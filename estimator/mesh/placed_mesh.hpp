@@ -1,5 +1,5 @@
 #pragma once
-// A mesh carried elsewhere by a rigid motion: from a specimen's axes to a scanner's, and back.
+// A mesh carried elsewhere: by a rigid motion, from a specimen's axes to a scanner's and back, or to other nodal positions.
 
 #include <Eigen/Dense>
 
@@ -19,6 +19,9 @@ struct Placement {
     return rotation.transpose() * (x_mm - origin_mm);
   }
 };
+
+/// Elements, faces, scale factors and ties of `mesh`, over other nodal positions. Precondition: they keep to the ties.
+HermiteMesh with_reference(const HermiteMesh& mesh, NodeField reference_mm);
 
 HermiteMesh placed(const HermiteMesh& mesh, const Placement& placement);
 

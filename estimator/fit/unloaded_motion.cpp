@@ -1,0 +1,63 @@
+#include "estimator/fit/unloaded_motion.hpp"
+
+#include <algorithm>
+#include <stdexcept>
+#include <utility>
+
+namespace diastole {
+
+UnloadedMotion::UnloadedMotion(ElasticModel imaged, std::vector<ParameterGroup> groups, ImagedLoad load)
+    : ElasticMotion(on_unloaded(imaged.system(), imaged.mesh().reference()), std::move(groups)),
+      imaged_(std::move(imaged)),
+      load_(load),
+      pressure_kPa_(load.pressure_kPa),
+      inverse_(imaged_.system()) {}
+
+std::optional<std::string> UnloadedMotion::set_values(std::span<const double> values) {
+  if (shape_ && std::ranges::equal(values, values_) && shape_->imaged.pressure_kPa == pressure_kPa_) return {};
+  ElasticMotion::set_values(imaged_, groups(), values);
+  UnloadedShape found = inverse_.solve(pressure_kPa_, shape_ ? &*shape_ : nullptr);
+  if (!found.report.converged() && shape_) found = inverse_.solve(pressure_kPa_);
+  if (!found.report.converged()) return found.report.describe();
+  shape_ = std::move(found);
+  values_.assign(values.begin(), values.end());
+  shape_derivatives_.reset();
+  model() = on_unloaded(imaged_.system(), shape_->reference_mm);
+  return {};
+}
+
+MotionDerivatives UnloadedMotion::derivatives_at(const ElasticState& state) {
+  if (!shape_derivatives_) shape_derivatives_ = inverse_.derivatives(*shape_, groups());
+  ElasticSystem& system = model().system();
+  const size_t unknowns = system.equations().unknowns(), count = groups().size();
+  std::vector<NodeField> shapes = shape_derivatives_->by_parameter;
+  shapes.push_back(shape_derivatives_->by_pressure);
+  // Columns: values, imaged pressure, cavity pressure.
+  std::vector<double> right_sides((count + 2) * unknowns, 0.0);
+  inverse_.add_reference_residual(shape_->reference_mm, state, shapes, right_sides);
+  for (size_t g = 0; g < count; ++g)
+    system.add_parameter_residual(state, groups()[g].parameter, groups()[g].elements,
+                                  std::span(right_sides).subspan(g * unknowns, unknowns));
+  for (double& value : right_sides)
+    value = -value;
+  std::ranges::copy(system.cavity_area(state), right_sides.end() - static_cast<std::ptrdiff_t>(unknowns));
+  if (system.factorise(state).singular)
+    throw std::domain_error("an equilibrium with a singular tangent has no derivatives");
+  system.solve(right_sides, count + 2);
+  const auto column = [&](size_t number) {
+    return system.node_field(std::span(right_sides).subspan(number * unknowns, unknowns));
+  };
+  MotionDerivatives by;
+  for (size_t g = 0; g < count; ++g)
+    by.by_value.push_back(column(g));
+  by.by_imaged_pressure = column(count);
+  by.by_pressure = column(count + 1);
+  return by;
+}
+
+UnloadReturn UnloadedMotion::inflated_again() {
+  ElasticModel again = on_unloaded(imaged_.system(), shape_->reference_mm, {.check_stability = true});
+  return inflate_again(again, imaged_.mesh(), shape_->imaged.pressure_kPa);
+}
+
+}  // namespace diastole
