@@ -15,6 +15,7 @@
 #include "estimator/fit/study_fit.hpp"
 #include "estimator/io/study_fingerprint.hpp"
 #include "estimator/io/whole_file.hpp"
+#include "estimator/model/unloaded_model.hpp"
 #include "estimator/reconstruction/study_reconstruction.hpp"
 #include "protocol/contract/input_error.hpp"
 
@@ -85,6 +86,14 @@ void print_record(const FitRecord& record) {
                frame.estimated_kPa, frame.se_kPa, frame.points, frame.rms_mm);
   }
   fmt::print("\n");
+  if (const auto& unloaded = record.unloaded) {
+    fmt::print(
+        "The shape was imaged at {:.4f} \u00b1 {:.4f} kPa; without load the cavity holds {:.3f} mL instead "
+        "of "
+        "{:.3f}, and {:.4f} kPa bring the image back to {:.4f} mm.\n",
+        unloaded->estimated_kPa, unloaded->se_kPa, unloaded->cavity_unloaded_mL, unloaded->cavity_imaged_mL,
+        unloaded->estimated_kPa, unloaded->return_mm);
+  }
   for (const std::string& remark : record.remarks)
     fmt::print("{}\n", remark);
   for (const Exclusion& exclusion : record.excluded)
@@ -156,6 +165,11 @@ ExitCode run_fit(const FitArguments& arguments, const CommandOutput& out) {
   if (arguments.output) {
     require_output({*arguments.output, inputs_of(study), fit_file_mark, arguments.force});
   }
+  if (arguments.study.unload) {
+    (void)imaged_load_of(study);
+  } else {
+    remark_on_imaged_load(study, "fit");
+  }
   const Measurement measurement = read_measurement(study);
   fmt::print(stderr, "Fitting {} in {} frames.\n",
              measurement.tags.empty() ? fmt::format("{} 3-D points", measurement.points.size())
@@ -177,6 +191,7 @@ ExitCode run_fit(const FitArguments& arguments, const CommandOutput& out) {
     fmt::print(stderr, "  iteration {:>2}  cost {}{}{}\n", step.iteration, cost, values,
                step.accepted ? "" : "  (step refused)");
   };
+  options.unload = arguments.study.unload;
   options.start = start_of(arguments, study);
   options.profile = arguments.profile;
   if (arguments.pressure_offset_kPa > 0) options.pressure_offset_sigma_kPa = arguments.pressure_offset_kPa;
@@ -227,10 +242,12 @@ void add_fit(CommandLine& line) {
       "  diastole fit examples/phantom-a.study.toml\n"
       "  diastole fit examples/phantom-a.study.toml -o fit.json\n"
       "  diastole fit examples/phantom-a.study.toml --set C1_kPa=12 --mesh 8,8,2 --json\n"
+      "  diastole fit examples/imaged-ventricle.study.toml --unload\n"
       "Exit code 1: the data cannot be what they say, the search did not converge, or a parameter ended on\n"
       "its bound, which is no estimate.");
   add_study(*command, arguments->study);
   add_values(*command, arguments->study);
+  add_unloading(*command, arguments->study);
   command->add_option("--smooth", arguments->smooth,
                       "how alike neighbouring elements are, for values that vary by element: evidence (the "
                       "data say it; default), none, or the usual relative difference, as 0.05");

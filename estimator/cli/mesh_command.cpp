@@ -11,6 +11,7 @@
 #include "estimator/mesh/exfile_import.hpp"
 #include "estimator/mesh/mesh_file.hpp"
 #include "estimator/model/study_model.hpp"
+#include "estimator/model/unloaded_model.hpp"
 
 namespace diastole {
 namespace {
@@ -20,6 +21,7 @@ struct MeshArguments {
   std::filesystem::path output;
   std::string unit = "mm";
   bool force = false;
+  bool unload = false;
 };
 
 double mm_per_unit(const std::string& unit) { return unit == "m" ? 1000.0 : unit == "cm" ? 10.0 : 1.0; }
@@ -52,9 +54,29 @@ ExitCode run_import(const MeshArguments& arguments, const CommandOutput& out) {
   return write_mesh(arguments, imported.body, imported.remarks, out);
 }
 
+/// Of a shape that was imaged under load, the one without.
+ExitCode export_unloaded(const MeshArguments& arguments, const Study& study, const CommandOutput& out) {
+  const UnloadedModel unloaded = unload(study);
+  if (!unloaded.returned()) {
+    fmt::print(stderr, "diastole mesh: {}\n", unloaded.describe());
+    return ExitCode::negative;
+  }
+  const UnloadedBody found = unloaded_body(unloaded);
+  std::vector<std::string> remarks{fmt::format(
+      "{} elements, {} nodes; {:g} kPa bring the image back to {:.2g} mm.", found.body.mesh.element_count(),
+      found.body.mesh.node_count(), study.imaged_at->pressure_kPa, unloaded.back.farthest_mm)};
+  if (found.body.fibres)
+    remarks.push_back(
+        fmt::format("Fibres carried with the material; as angles at the nodes they are {:.2g} degrees off "
+                    "(root mean square).",
+                    found.fibre_rms_deg));
+  return write_mesh(arguments, found.body, remarks, out);
+}
+
 ExitCode run_export(const MeshArguments& arguments, const CommandOutput& out) {
   const Study study = read_study(arguments.inputs[0]);
   require_output({arguments.output, inputs_of(study), mesh_file_mark, arguments.force});
+  if (arguments.unload) return export_unloaded(arguments, study, out);
   const MeshBody body = study_body(study);
   return write_mesh(
       arguments, body,
@@ -90,6 +112,9 @@ void add_mesh(CommandLine& line) {
   CLI::App* from_study =
       command->add_subcommand("export", "the mesh of a study's specimen, refined as the study says");
   from_study->add_option("STUDY", written->inputs, "study file (*.study.toml)")->required()->expected(1);
+  from_study->add_flag(
+      "--unload", written->unload,
+      "the shape without the load under which the study's was imaged (imaged_at_kPa), at the start values");
   add_output(*from_study, *written);
   line.on_run(from_study, [written](const CommandOutput& out) { return run_export(*written, out); });
 }

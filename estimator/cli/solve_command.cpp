@@ -19,6 +19,7 @@
 #include "estimator/cli/output_files.hpp"
 #include "estimator/cli/solution_json.hpp"
 #include "estimator/cli/study_options.hpp"
+#include "estimator/cli/unloading_output.hpp"
 #include "estimator/fe/elastic_system.hpp"
 #include "estimator/fe/point_fields.hpp"
 #include "estimator/io/measurement.hpp"
@@ -81,7 +82,7 @@ struct SolveArguments {
 };
 
 struct Probe {
-  Eigen::Vector3d place_mm;
+  Eigen::Vector3d place_mm;  ///< in the study's shape, imaged or free of stress
   MaterialPoint point;
 };
 
@@ -319,28 +320,43 @@ ExitCode run_solve(const SolveArguments& arguments, const CommandOutput& out) {
   require_outputs(arguments.outputs, study);
   SolveOptions options = with_progress("solve");
   options.check_stability = true;
-  ElasticModel model = make_affected_model(study, std::move(options));
+  std::optional<UnloadedModel> unloaded;
+  std::optional<ElasticModel> as_given;
+  if (arguments.study.unload) {
+    unloaded = unload(study, options);
+  } else {
+    remark_on_imaged_load(study, "solve");
+    as_given = make_affected_model(study, std::move(options));
+  }
+  ElasticModel& model = unloaded ? unloaded->model : *as_given;
   require_fibres_for_tension(arguments, model);
   remark_on_size(model.mesh(), "solve");
   const std::vector<TimedLoad> loads = loads_of(arguments, study, model);
-  const std::vector<Probe> probes = locate_probes(model.mesh(), arguments.probes);
+  const std::vector<Probe> probes =
+      locate_probes(unloaded ? unloaded->imaged.mesh() : model.mesh(), arguments.probes);
+  const bool whole = !unloaded || unloaded->returned();
 
   std::vector<SolvedFrame> solved;
-  const Solution solution = solve_all(model, loads, solved);
+  const Solution solution = whole ? solve_all(model, loads, solved) : Solution{model.rest_state(), {}};
+  const bool done = whole && solution.report.converged();
   nlohmann::ordered_json json = as_json(study, model, solution, probes, seconds_since(begun));
-  if (solution.report.converged()) {
+  if (unloaded) json["unloaded"] = unloading_json(*unloaded);
+  if (!whole) json["reason"] = "no shape without load";
+  if (done) {
     write_outputs(arguments.outputs, study, model, solved);
     for (const std::filesystem::path& file : arguments.outputs.files)
       json["files"].push_back(file.string());
   }
   if (arguments.frames) json["frames"] = frames_json(model, solved);
-  report_failure_or_instability(arguments, solution.report);
+  if (whole) report_failure_or_instability(arguments, solution.report);
+  if (!whole) fmt::print(stderr, "diastole solve: {}\n", unloaded->describe());
   if (out.json) {
     std::cout << json.dump(1) << '\n';
-  } else if (solution.report.converged()) {
+  } else if (done) {
+    if (unloaded) print_unloading(json["unloaded"], study.imaged_at->pressure_kPa);
     print_for_people(json);
   }
-  return solution.report.converged() ? ExitCode::done : ExitCode::negative;
+  return done ? ExitCode::done : ExitCode::negative;
 }
 
 }  // namespace
@@ -355,11 +371,13 @@ void add_solve(CommandLine& line) {
       "  diastole solve phantom-a.study.toml --volume-change-mL 24\n"
       "  diastole solve lv-clean.study.toml --pressure-kPa 2 --fibre-tension-kPa 10\n"
       "  diastole solve phantom-a.study.toml --frames -o gel.vtkhdf\n"
+      "  diastole solve imaged-ventricle.study.toml --unload --pressure-kPa 2\n"
       "A parameter has its `start` value unless --set gives another.\n"
       "Exit code 1: no equilibrium was found; the message says where the solver stopped and why.");
   add_study(*command, arguments->study);
   add_values(*command, arguments->study);
   add_refinement(*command, arguments->study);
+  add_unloading(*command, arguments->study);
   command->add_option("--pressure-kPa", arguments->pressure_kPa, "cavity pressure above the outside");
   command->add_option("--volume-change-mL", arguments->volume_change_mL,
                       "volume that the cavity takes, instead of its pressure");
@@ -370,7 +388,7 @@ void add_solve(CommandLine& line) {
                     "solve for all frames of the study instead, one after the other");
   command
       ->add_option("--probe", arguments->probes,
-                   "X,Y,Z of a material point in mm, undeformed; may be repeated")
+                   "X,Y,Z of a material point in mm, in the shape of the study; may be repeated")
       ->allow_extra_args(false);
   arguments->outputs.add_options(
       *command, "a .vtkhdf file for ParaView, a .csv of stress and strain, or a .json for the report");

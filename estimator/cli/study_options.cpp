@@ -21,6 +21,21 @@ void add_refinement(CLI::App& command, StudyOptions& options) {
                      "how often to halve them around, along, through, keeping the body exactly, as 0,1,1");
 }
 
+void add_unloading(CLI::App& command, StudyOptions& options) {
+  command.add_flag(
+      "--unload", options.unload,
+      "the study's shape was imaged under load (imaged_at_kPa): find the shape without it first");
+}
+
+void remark_on_imaged_load(const Study& study, std::string_view command) {
+  if (!study.imaged_at) return;
+  fmt::print(stderr,
+             "diastole {}: the shape was imaged at {:g} kPa, and is taken as free of stress here; --unload "
+             "of solve, fit "
+             "and mesh export finds the one that is.\n",
+             command, study.imaged_at->pressure_kPa);
+}
+
 Study read_study(const StudyOptions& options) {
   Study study = read_study(options.study);
   for (const std::string& start : options.starts)

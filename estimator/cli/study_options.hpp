@@ -18,12 +18,15 @@ struct StudyOptions {
   std::vector<std::string> starts;
   std::string mesh;
   std::string refine;
+  bool unload = false;
 };
 
-/// These add STUDY and --mesh; --set; --refine. `options` must live until the command has run.
+/// These add STUDY and --mesh; --set; --refine; --unload. `options` must live until the command has run.
 void add_study(CLI::App& command, StudyOptions& options);
 void add_values(CLI::App& command, StudyOptions& options);
 void add_refinement(CLI::App& command, StudyOptions& options);
+
+void add_unloading(CLI::App& command, StudyOptions& options);
 
 /// The study with its replaced values. Throws InputError.
 Study read_study(const StudyOptions& options);
@@ -35,6 +38,9 @@ using Clock = std::chrono::steady_clock;
 inline double seconds_since(Clock::time_point begun) {
   return std::chrono::duration<double>(Clock::now() - begun).count();
 }
+
+/// States on standard error, in the name of a command, that a shape that was imaged under load is taken as free of it.
+void remark_on_imaged_load(const Study& study, std::string_view command);
 
 /// A line on standard error for Newton's iterations, one a second at most, once the work has lasted longer than people like
 /// to wait. `command` begins the line.

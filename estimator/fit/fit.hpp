@@ -84,6 +84,11 @@ struct RobustOutcome {
   Eigen::Index wild;  ///< residuals beyond five standard deviations of the core
 };
 
+struct EstimatedPressure {
+  double value_kPa;
+  double se_kPa;  ///< 0 when exactly known, up to an offset
+};
+
 struct PressureOffset {
   double value_kPa;  ///< measured less true
   double se_kPa;
@@ -105,6 +110,8 @@ struct FitOutcome {
   std::vector<std::string> unknown_names;  ///< in its order
   std::vector<std::string> undetermined;   ///< combinations of unknowns that move no residual, in words
   std::optional<PressureOffset> pressure_offset;
+  /// At which the shape was imaged, if it was under load.
+  std::optional<EstimatedPressure> imaged_pressure;
   std::optional<OffsetScore> offset_score;  ///< without pressure_offset, where the data see one
   std::vector<ProfileInterval> profiles;
   std::optional<PosteriorOutcome> posterior;

@@ -299,6 +299,11 @@ Eigen::MatrixXd estimate_errors(FitOutcome& outcome, JointProblem& problem, cons
   }
   if (const auto offset = problem.offset_unknown())
     outcome.pressure_offset = PressureOffset{q[*offset], std::sqrt(outcome.covariance(*offset, *offset))};
+  if (problem.was_imaged_loaded()) {
+    const auto unknown = problem.imaged_unknown();
+    outcome.imaged_pressure = EstimatedPressure{
+        problem.imaged_pressure_at(q), unknown ? std::sqrt(outcome.covariance(*unknown, *unknown)) : 0.0};
+  }
   for (const JointProblem::LoadedFrame& frame : problem.frames()) {
     outcome.frames.push_back(estimated(frame, q, outcome.covariance));
     if (outcome.pressure_offset && !frame.pressure_unknown)

@@ -109,6 +109,9 @@ class JointProblem : public inference::LeastSquaresProblem {
 
   /// Place in q of the pressure at which the shape was imaged, if it is not exactly known.
   [[nodiscard]] std::optional<Eigen::Index> imaged_unknown() const { return imaged_unknown_; }
+  /// That pressure. Precondition: the shape was imaged under load.
+  [[nodiscard]] double imaged_pressure_at(const Eigen::VectorXd& q) const;
+  [[nodiscard]] bool was_imaged_loaded() const { return imaged_.has_value(); }
 
   /// The tag planes are the last unknowns; how many.
   [[nodiscard]] Eigen::Index plane_unknowns() const { return planes_.unknowns(); }
@@ -154,7 +157,6 @@ class JointProblem : public inference::LeastSquaresProblem {
 
  private:
   [[nodiscard]] double offset_at(const Eigen::VectorXd& q) const;
-  [[nodiscard]] double imaged_pressure_at(const Eigen::VectorXd& q) const;
   [[nodiscard]] double pressure_at(const LoadedFrame& frame, const Eigen::VectorXd& q) const;
   [[nodiscard]] Eigen::Index smooth_rows() const;
   /// A reading at rest counts only where the offset is estimated.

@@ -6,17 +6,20 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <memory>
 
 #include "estimator/fit/elastic_motion.hpp"
 #include "estimator/fit/estimated_parameters.hpp"
 #include "estimator/fit/fit_remarks.hpp"
 #include "estimator/fit/fit_sections.hpp"
+#include "estimator/fit/unloaded_motion.hpp"
 #include "estimator/fit/usable_points.hpp"
 #include "estimator/inference/covariance.hpp"
 #include "estimator/inference/intervals.hpp"
 #include "estimator/io/study_fingerprint.hpp"
 #include "estimator/model/affected_model.hpp"
 #include "estimator/model/study_model.hpp"
+#include "estimator/model/unloaded_model.hpp"
 #include "protocol/contract/input_error.hpp"
 
 namespace diastole {
@@ -186,7 +189,7 @@ std::string start_words(const EstimatedParameters& estimated) {
 }
 
 /// The fit, begun with a stiffer material where the start values carry no equilibrium.
-FitOutcome fit_from_where_it_stands(ElasticMotion& motion, EstimatedParameters& estimated,
+FitOutcome fit_from_where_it_stands(MotionModel& motion, EstimatedParameters& estimated,
                                     const Measurement& measurement, const FitOptions& options,
                                     FitRecord& record) {
   const std::string given = start_words(estimated);
@@ -316,6 +319,27 @@ void record_undeformed(FitRecord& record, const Measurement& measurement) {
   record.undeformed.chi2_per_residual = rows > 0 ? chi2 / count : unknown;
 }
 
+/// The body without load at the estimate, and whether the load brings the image back.
+void record_unloading(FitRecord& record, UnloadedMotion& motion, const FitOutcome& fit) {
+  std::vector<double> values;
+  for (const EstimatedValue& value : fit.values)
+    values.push_back(value.value);
+  const ImagedLoad measured = motion.imaged_load().value();
+  const EstimatedPressure pressure = fit.imaged_pressure.value();
+  const auto again = motion.inflated_again(values, pressure.value_kPa);
+  if (!again) return;
+  const bool returned = again->back.report.converged() && again->back.report.stable() != false;
+  record.unloaded = FittedUnloading{
+      measured.pressure_kPa,   measured.sigma_kPa,        pressure.value_kPa,      pressure.se_kPa,
+      again->cavity_imaged_mL, again->cavity_unloaded_mL, again->back.farthest_mm, returned};
+  if (!returned) {
+    record.remarks.push_back(fmt::format(
+        "The body without load does not come back to its image: {}. These parameters and the pressure "
+        "of the image do not belong together.",
+        again->back.report.describe()));
+  }
+}
+
 }  // namespace
 
 // Extrapolation beyond an element, as a fraction of it: `farthest_outside_mm` through the wall, never more than an
@@ -340,7 +364,16 @@ FitRecord fit_study(const Study& study, const Measurement& measurement, const St
 
   EstimatedParameters estimated = estimated_parameters(study, model);
   if (options.start) take_start(estimated, *options.start, study.file.string());
-  ElasticMotion motion(std::move(model), estimated.groups, displacement_gain_of(study));
+  std::unique_ptr<ElasticMotion> body;
+  UnloadedMotion* unloaded = nullptr;
+  if (options.unload) {
+    auto found = std::make_unique<UnloadedMotion>(std::move(model), estimated.groups, imaged_load_of(study));
+    unloaded = found.get();
+    body = std::move(found);
+  } else {
+    body = std::make_unique<ElasticMotion>(std::move(model), estimated.groups, displacement_gain_of(study));
+  }
+  ElasticMotion& motion = *body;
   FitOptions fit_options;
   fit_options.file = study.file.string();
   fit_options.locator = locator_for(study.specimen);
@@ -373,6 +406,7 @@ FitRecord fit_study(const Study& study, const Measurement& measurement, const St
   record.chi2_per_dof = record.chi2 / static_cast<double>(record.dof);
   record_parameters(record, estimated, fit);
   record_frames(record, fit);
+  if (unloaded != nullptr) record_unloading(record, *unloaded, fit);
   record.residuals = histogram_of(fit);
   for (std::string& remark : remarks_on(record, fit))
     record.remarks.push_back(std::move(remark));

@@ -14,7 +14,9 @@ struct StudyFitOptions {
   int iteration_limit = 50;
   Robustness robustness = Robustness::if_needed;
   std::optional<double> pressure_offset_sigma_kPa = {};  ///< seek a common offset of the pressures
-  bool profile = false;                                  ///< profile intervals of whole parameters
+  /// The study's shape is that of an image under load (imaged_at_kPa): the body without it is found with the parameters.
+  bool unload = false;
+  bool profile = false;  ///< profile intervals of whole parameters
   std::optional<PosteriorOptions> posterior = {};
   std::optional<FitRecord> start = {};  ///< an earlier result or a checkpoint to start from
   /// Called at each accepted step with a record that `start` can take up.

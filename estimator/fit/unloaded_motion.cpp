@@ -1,6 +1,7 @@
 #include "estimator/fit/unloaded_motion.hpp"
 
 #include <algorithm>
+#include <limits>
 #include <stdexcept>
 #include <utility>
 
@@ -14,7 +15,8 @@ UnloadedMotion::UnloadedMotion(ElasticModel imaged, std::vector<ParameterGroup> 
       inverse_(imaged_.system()) {}
 
 std::optional<std::string> UnloadedMotion::set_values(std::span<const double> values) {
-  if (shape_ && std::ranges::equal(values, values_) && shape_->imaged.pressure_kPa == pressure_kPa_) return {};
+  if (shape_ && std::ranges::equal(values, values_) && shape_->imaged.pressure_kPa == pressure_kPa_)
+    return {};
   ElasticMotion::set_values(imaged_, groups(), values);
   UnloadedShape found = inverse_.solve(pressure_kPa_, shape_ ? &*shape_ : nullptr);
   if (!found.report.converged() && shape_) found = inverse_.solve(pressure_kPa_);
@@ -55,9 +57,17 @@ MotionDerivatives UnloadedMotion::derivatives_at(const ElasticState& state) {
   return by;
 }
 
-UnloadReturn UnloadedMotion::inflated_again() {
+std::optional<UnloadedMotion::Again> UnloadedMotion::inflated_again(std::span<const double> values,
+                                                                    double imaged_pressure_kPa) {
+  set_imaged_pressure(imaged_pressure_kPa);
+  if (set_values(values)) return {};
   ElasticModel again = on_unloaded(imaged_.system(), shape_->reference_mm, {.check_stability = true});
-  return inflate_again(again, imaged_.mesh(), shape_->imaged.pressure_kPa);
+  const auto volume_mL = [](const ElasticModel& body) {
+    return body.system().cavity_closed() ? body.cavity_volume_mL(body.rest_state())
+                                         : std::numeric_limits<double>::quiet_NaN();
+  };
+  const double unloaded_mL = volume_mL(again);
+  return Again{volume_mL(imaged_), unloaded_mL, inflate_again(again, imaged_.mesh(), imaged_pressure_kPa)};
 }
 
 }  // namespace diastole

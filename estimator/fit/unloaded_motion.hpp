@@ -22,11 +22,15 @@ class UnloadedMotion : public ElasticMotion {
   [[nodiscard]] std::optional<ImagedLoad> imaged_load() const override { return load_; }
   void set_imaged_pressure(double pressure_kPa) override { pressure_kPa_ = pressure_kPa; }
 
-  /// Of the last values that were solved for.
-  [[nodiscard]] const UnloadedShape& shape() const { return shape_.value(); }
-  [[nodiscard]] const ElasticModel& imaged() const { return imaged_; }
-  /// The unloaded body from rest to the imaged pressure.
-  [[nodiscard]] UnloadReturn inflated_again();
+  /// The unloaded body of these values, inflated from rest to the pressure of the image.
+  struct Again {
+    double cavity_imaged_mL;  ///< NaN where the cavity is open
+    double cavity_unloaded_mL;
+    UnloadReturn back;
+  };
+  /// None where there is no such body.
+  [[nodiscard]] std::optional<Again> inflated_again(std::span<const double> values,
+                                                    double imaged_pressure_kPa);
 
  protected:
   std::optional<std::string> set_values(std::span<const double> values) override;

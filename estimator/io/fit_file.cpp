@@ -17,6 +17,8 @@ DIASTOLE_MEMBERS(FittedFrame, frame, time_s, measured_kPa, sigma_kPa, estimated_
 DIASTOLE_MEMBERS(FitIteration, iteration, cost, accepted, parameters)
 DIASTOLE_MEMBERS(FittedRobust, degrees, scale, wild)
 DIASTOLE_MEMBERS(FittedOffset, value, se)
+DIASTOLE_MEMBERS(FittedUnloading, imaged_at_kPa, sigma_kPa, estimated_kPa, se_kPa, cavity_imaged_mL,
+                 cavity_unloaded_mL, return_mm, returned)
 DIASTOLE_MEMBERS(Exclusion, reason, points)
 DIASTOLE_MEMBERS(Correlation, names, matrix)
 DIASTOLE_MEMBERS(ResidualHistogram, edges, counts)
@@ -62,6 +64,7 @@ void each_member(Visit&& visit, Record& r) {
   visit("robust", if_any(r.robust));
   visit("posterior", if_any(r.posterior));
   visit("pressure_offset_kPa", if_any(r.pressure_offset_kPa));
+  visit("unloaded", if_any(r.unloaded));
   DIASTOLE_VISIT(visit, r, history, residuals, section_frame, sections)
 }
 

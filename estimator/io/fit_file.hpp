@@ -108,6 +108,18 @@ struct FittedOffset {
   double se;
 };
 
+/// Of a fit of a shape that was imaged under load: that load, and the shape without it at the estimate.
+struct FittedUnloading {
+  double imaged_at_kPa;  ///< as measured
+  double sigma_kPa;
+  double estimated_kPa;
+  double se_kPa;              ///< 0 when exactly known
+  double cavity_imaged_mL;    ///< NaN where the cavity is open
+  double cavity_unloaded_mL;  ///< the same
+  double return_mm;  ///< farthest place from the image after inflating the unloaded shape to estimated_kPa
+  bool returned;     ///< that pressure was reached, and is stable as far as this is known
+};
+
 /// How frame 0, which is not fitted, agrees with the undeformed body.
 struct UndeformedCheck {
   size_t points;
@@ -166,6 +178,7 @@ struct FitRecord {
   std::optional<PosteriorDrawing> posterior = {};
   /// Of all frame pressures, measured less true; if it was sought.
   std::optional<FittedOffset> pressure_offset_kPa = {};
+  std::optional<FittedUnloading> unloaded = {};
   double rms_mm;  ///< of the unweighted residuals (a tag's along its normal; a point's three components)
   double chi2;
   size_t dof;

@@ -13,13 +13,6 @@
 namespace diastole {
 namespace {
 
-bool shows_in_images(const Study& study) {
-  const EffectLibrary library = effects_known_to(study);
-  return std::ranges::any_of(study.effects, [&](const std::string& id) {
-    return !effect_named(library, study, id).field_parameters().empty();
-  });
-}
-
 /// Fibres on cylinders about z, at an angle from the circumference towards z.
 MaterialAxesField helical_axes(double angle_deg) {
   const double angle = angle_deg * std::numbers::pi / 180.0;
@@ -56,6 +49,13 @@ void require_base(const Study& study) {
 }
 
 }  // namespace
+
+bool shows_in_images(const Study& study) {
+  const EffectLibrary library = effects_known_to(study);
+  return std::ranges::any_of(study.effects, [&](const std::string& id) {
+    return !effect_named(library, study, id).field_parameters().empty();
+  });
+}
 
 FieldModel field_model_of(const Study& study) {
   const auto& annulus = std::get<AnnulusSpecimen>(study.specimen);

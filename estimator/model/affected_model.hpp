@@ -22,6 +22,9 @@ FieldElasticity elasticity_of(const FieldModel& model, const HermiteMesh& mesh, 
 /// them: they start from a neo-Hookean annulus with held ends and no [chamber].
 ElasticModel make_affected_model(const Study& study, SolveOptions options = {});
 
+/// Whether one of the study's effects does.
+bool shows_in_images(const Study& study);
+
 /// Displacement as imaged over the true one: 1 unless the study has `tag-bias`.
 double displacement_gain_of(const Study& study);
 

@@ -35,7 +35,8 @@ const StudyParameter* stiffness_parameter(const Study& study) {
 
 std::optional<ApparentStiffness> apparent_stiffness(const Study& study, const FieldForms& forms,
                                                     const FrameField& field) {
-  if (stiffness_parameter(study) == nullptr || !(field.load.pressure_kPa > 0)) return {};
+  // The pressure moved a body that was loaded before, by how much depends on the law: nothing to compare with.
+  if (study.imaged_at || stiffness_parameter(study) == nullptr || !(field.load.pressure_kPa > 0)) return {};
   ElasticModel model = make_affected_model(study);
   const double gain = displacement_gain_of(study);
   const Eigen::VectorXd seen = forms.space.unknowns_of(field.displacement_mm);

@@ -105,6 +105,8 @@ StudyReconstruction reconstruct_study(const Study& study, const Measurement& mea
   StudyReconstruction result;
   result.body = std::make_unique<const MeshBody>(study_body(study));
   result.findings = measurement_findings(measurement, result.body->mesh);
+  if (study.imaged_at)
+    std::erase_if(result.findings, [](const Finding& f) { return f.id == "pressure-at-rest"; });
   if (!has_error(result.findings)) {
     result.forms = std::make_unique<const FieldForms>(result.body->mesh, options.smoothing);
     reconstruct_frames(result, measurement, frames, options);
