@@ -242,7 +242,7 @@ void add_fit(CommandLine& line) {
       "  diastole fit examples/phantom-a.study.toml\n"
       "  diastole fit examples/phantom-a.study.toml -o fit.json\n"
       "  diastole fit examples/phantom-a.study.toml --set C1_kPa=12 --mesh 8,8,2 --json\n"
-      "  diastole fit examples/imaged-ventricle.study.toml --unload\n"
+      "  diastole fit heart.study.toml --unload\n"
       "Exit code 1: the data cannot be what they say, the search did not converge, or a parameter ended on\n"
       "its bound, which is no estimate.");
   add_study(*command, arguments->study);

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "estimator/cli/commands.hpp"
+#include "estimator/cli/grid_commands.hpp"
 #include "estimator/io/whole_file.hpp"
 #include "estimator/mesh/exfile_import.hpp"
 #include "estimator/mesh/mesh_file.hpp"
@@ -23,8 +24,6 @@ struct MeshArguments {
   bool force = false;
   bool unload = false;
 };
-
-double mm_per_unit(const std::string& unit) { return unit == "m" ? 1000.0 : unit == "cm" ? 10.0 : 1.0; }
 
 ExitCode write_mesh(const MeshArguments& arguments, const MeshBody& body,
                     const std::vector<std::string>& remarks, const CommandOutput& out) {
@@ -92,10 +91,15 @@ void add_output(CLI::App& command, MeshArguments& arguments) {
 }  // namespace
 
 void add_mesh(CommandLine& line) {
-  CLI::App* command = line.add("mesh", "mesh files: from exnode and exelem files, or of a study's specimen",
-                               "  diastole mesh import heart.exnode heart.exelem -o heart.mesh.toml\n"
-                               "  diastole mesh export phantom-a.study.toml -o gel.mesh.toml\n"
-                               "A study uses one with kind = \"mesh\" and file = \"heart.mesh.toml\".");
+  CLI::App* command = line.add(
+      "mesh", "mesh files: from exnode and exelem files, of a study's specimen; points from other grids",
+      "  diastole mesh import heart.exnode heart.exelem -o heart.mesh.toml\n"
+      "  diastole mesh export phantom-a.study.toml -o gel.mesh.toml\n"
+      "  diastole mesh export examples/imaged-ventricle.study.toml --unload -o unloaded.mesh.toml\n"
+      "  diastole mesh points theirs.xdmf --sigma-mm 0.3 -o theirs.points.csv --frames theirs.frames.csv\n"
+      "  diastole mesh surface theirs.msh --endo inside --epi outside --base base --sigma-mm 0.5 -o "
+      "theirs.guide.csv\n"
+      "A study uses one with kind = \"mesh\" and file = \"heart.mesh.toml\".");
   command->require_subcommand(1);
 
   auto import = std::make_shared<MeshArguments>();
@@ -117,6 +121,7 @@ void add_mesh(CommandLine& line) {
       "the shape without the load under which the study's was imaged (imaged_at_kPa), at the start values");
   add_output(*from_study, *written);
   line.on_run(from_study, [written](const CommandOutput& out) { return run_export(*written, out); });
+  add_grid_commands(*command, line);
 }
 
 }  // namespace diastole

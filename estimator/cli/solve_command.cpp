@@ -16,60 +16,23 @@
 #include <vector>
 
 #include "estimator/cli/commands.hpp"
-#include "estimator/cli/output_files.hpp"
 #include "estimator/cli/solution_json.hpp"
+#include "estimator/cli/solution_outputs.hpp"
 #include "estimator/cli/study_options.hpp"
 #include "estimator/cli/unloading_output.hpp"
 #include "estimator/fe/elastic_system.hpp"
 #include "estimator/fe/point_fields.hpp"
 #include "estimator/io/measurement.hpp"
 #include "estimator/io/study.hpp"
-#include "estimator/io/whole_file.hpp"
 #include "estimator/mesh/point_locator.hpp"
 #include "estimator/model/affected_model.hpp"
 #include "estimator/model/study_model.hpp"
 #include "estimator/solution/solution_grid.hpp"
-#include "estimator/solution/solution_record.hpp"
 #include "protocol/contract/input_error.hpp"
 #include "protocol/contract/named_members.hpp"
 
 namespace diastole {
 namespace {
-
-// `diastole solve -o FILE ...`: the files a solution is written to, chosen by their endings.
-//
-//   .vtkhdf   Bezier hexahedra for ParaView (estimator/solution/solution_grid.hpp)
-//   .csv      strain and stress at the Gauss points (estimator/solution/solution_grid.hpp)
-//   .json     sections and profiles of the last frame for `diastole report` (estimator/io/solution_file.hpp)
-
-constexpr std::array kinds{vtkhdf_kind, OutputKind{".csv", "frame,time_s,pressure_kPa,element,point"},
-                           OutputKind{".json", solution_file_mark}};
-
-SolutionRecord record_of(const Study& study, const ElasticModel& model, const ElasticState& state) {
-  SolutionRecord record = solution_record(model, state);
-  record.study = study.file.string();
-  for (const StudyParameter& parameter : study.law.parameters)
-    record.parameters.emplace_back(parameter.name, parameter.start);
-  record.mesh = mesh_of(study.specimen);
-  return record;
-}
-
-/// Before the work. Throws InputError if a file has another ending, or may not be replaced.
-void require_outputs(const OutputFiles& outputs, const Study& study) {
-  outputs.require(inputs_of(study), kinds, "is no kind of file that a solution is written to",
-                  "End it in .vtkhdf (for ParaView), .csv (stress and strain at the Gauss points) or .json "
-                  "(for `diastole report`).");
-}
-
-void write_outputs(const OutputFiles& outputs, const Study& study, const ElasticModel& model,
-                   std::span<const SolvedFrame> frames) {
-  for (const std::filesystem::path& file : outputs.files) {
-    if (file.extension() == ".vtkhdf") write_vtkhdf(file, solution_grid(model, frames));
-    if (file.extension() == ".csv") write_whole_file(file, gauss_table(model, frames));
-    if (file.extension() == ".json")
-      write_whole_file(file, to_json(record_of(study, model, frames.back().state)));
-  }
-}
 
 struct SolveArguments {
   StudyOptions study;
@@ -78,7 +41,7 @@ struct SolveArguments {
   double fibre_tension_kPa = 0.0;
   bool frames = false;
   std::vector<std::string> probes;
-  OutputFiles outputs;
+  SolutionOutputs outputs;
 };
 
 struct Probe {
@@ -317,7 +280,7 @@ ExitCode run_solve(const SolveArguments& arguments, const CommandOutput& out) {
   require_one_load(arguments);
   const Study study = read_study(arguments.study);
   require_frames(arguments, study);
-  require_outputs(arguments.outputs, study);
+  arguments.outputs.require(study, arguments.frames);
   SolveOptions options = with_progress("solve");
   options.check_stability = true;
   std::optional<UnloadedModel> unloaded;
@@ -343,8 +306,8 @@ ExitCode run_solve(const SolveArguments& arguments, const CommandOutput& out) {
   if (unloaded) json["unloaded"] = unloading_json(*unloaded);
   if (!whole) json["reason"] = "no shape without load";
   if (done) {
-    write_outputs(arguments.outputs, study, model, solved);
-    for (const std::filesystem::path& file : arguments.outputs.files)
+    arguments.outputs.write(study, model, solved);
+    for (const std::filesystem::path& file : arguments.outputs.files.files)
       json["files"].push_back(file.string());
   }
   if (arguments.frames) json["frames"] = frames_json(model, solved);
@@ -370,8 +333,9 @@ void add_solve(CommandLine& line) {
       "  diastole solve phantom-a.study.toml --pressure-kPa 6 --mesh 8,8,4 -o gel.vtkhdf -o gel.csv\n"
       "  diastole solve phantom-a.study.toml --volume-change-mL 24\n"
       "  diastole solve lv-clean.study.toml --pressure-kPa 2 --fibre-tension-kPa 10\n"
-      "  diastole solve phantom-a.study.toml --frames -o gel.vtkhdf\n"
-      "  diastole solve imaged-ventricle.study.toml --unload --pressure-kPa 2\n"
+      "  diastole solve phantom-a.study.toml --frames -o gel.vtkhdf -o gel.xdmf\n"
+      "  diastole solve phantom-a.study.toml --pressure-kPa 3.1 -o gel.feb --cells 4,4,4\n"
+      "  diastole solve examples/imaged-ventricle.study.toml --unload --pressure-kPa 2\n"
       "A parameter has its `start` value unless --set gives another.\n"
       "Exit code 1: no equilibrium was found; the message says where the solver stopped and why.");
   add_study(*command, arguments->study);
@@ -390,8 +354,7 @@ void add_solve(CommandLine& line) {
       ->add_option("--probe", arguments->probes,
                    "X,Y,Z of a material point in mm, in the shape of the study; may be repeated")
       ->allow_extra_args(false);
-  arguments->outputs.add_options(
-      *command, "a .vtkhdf file for ParaView, a .csv of stress and strain, or a .json for the report");
+  arguments->outputs.add_options(*command);
   line.on_run(command, [arguments](const CommandOutput& out) { return run_solve(*arguments, out); });
 }
 

@@ -13,8 +13,37 @@
 namespace diastole {
 namespace {
 
-/// What is sampled at a Gauss point, one array after the other.
-Eigen::VectorXd sampled(const PointFields& fields) {
+GridStep step_of(const ElasticModel& model, const SolvedFrame& frame) {
+  const HermiteMesh& mesh = model.mesh();
+  const ElasticSystem& system = model.system();
+  GridArray displacement{"displacement_mm", 3, {}};
+  std::vector<GridArray> arrays = sampled_arrays(static_cast<bool>(system.material_axes()));
+  const std::array<double, 4> places = line_rule_4().place;
+  for (size_t e = 0; e < mesh.element_count(); ++e) {
+    const ElementField moved = mesh.gather(e, frame.state.position_mm) - mesh.gather(e, mesh.reference());
+    append_in_vtk_order(bezier_of(moved).transpose(), displacement.values);
+    Eigen::MatrixXd samples;
+    for (size_t q = 0; q < gauss_points; ++q) {
+      const Eigen::VectorXd row =
+          sampled_fields(point_fields(system, frame.state, {e, gauss_tables().xi[q]}));
+      if (q == 0) samples.resize(gauss_points, row.size());
+      samples.row(static_cast<Eigen::Index>(q)) = row;
+    }
+    const Eigen::MatrixXd control = bezier_through(places, samples);
+    Eigen::Index column = 0;
+    for (GridArray& array : arrays) {
+      const auto width = static_cast<Eigen::Index>(array.components);
+      append_in_vtk_order(control.middleCols(column, width), array.values);
+      column += width;
+    }
+  }
+  arrays.insert(arrays.begin(), std::move(displacement));
+  return {frame.time_s, std::move(arrays), {{"pressure_kPa", 1, {frame.state.pressure_kPa}}}};
+}
+
+}  // namespace
+
+Eigen::VectorXd sampled_fields(const PointFields& fields) {
   std::vector<double> values;
   for (const Eigen::Matrix3d& tensor : {fields.stress_kPa, fields.green_strain}) {
     const SymmetricTensor<double> entries = symmetric_part(tensor);
@@ -36,35 +65,6 @@ std::vector<GridArray> sampled_arrays(bool fibres) {
     arrays.push_back({std::move(name), 1, {}});
   return arrays;
 }
-
-GridStep step_of(const ElasticModel& model, const SolvedFrame& frame) {
-  const HermiteMesh& mesh = model.mesh();
-  const ElasticSystem& system = model.system();
-  GridArray displacement{"displacement_mm", 3, {}};
-  std::vector<GridArray> arrays = sampled_arrays(static_cast<bool>(system.material_axes()));
-  const std::array<double, 4> places = line_rule_4().place;
-  for (size_t e = 0; e < mesh.element_count(); ++e) {
-    const ElementField moved = mesh.gather(e, frame.state.position_mm) - mesh.gather(e, mesh.reference());
-    append_in_vtk_order(bezier_of(moved).transpose(), displacement.values);
-    Eigen::MatrixXd samples;
-    for (size_t q = 0; q < gauss_points; ++q) {
-      const Eigen::VectorXd row = sampled(point_fields(system, frame.state, {e, gauss_tables().xi[q]}));
-      if (q == 0) samples.resize(gauss_points, row.size());
-      samples.row(static_cast<Eigen::Index>(q)) = row;
-    }
-    const Eigen::MatrixXd control = bezier_through(places, samples);
-    Eigen::Index column = 0;
-    for (GridArray& array : arrays) {
-      const auto width = static_cast<Eigen::Index>(array.components);
-      append_in_vtk_order(control.middleCols(column, width), array.values);
-      column += width;
-    }
-  }
-  arrays.insert(arrays.begin(), std::move(displacement));
-  return {frame.time_s, std::move(arrays), {{"pressure_kPa", 1, {frame.state.pressure_kPa}}}};
-}
-
-}  // namespace
 
 BezierGrid solution_grid(const ElasticModel& model, std::span<const SolvedFrame> frames) {
   const HermiteMesh& mesh = model.mesh();

@@ -11,6 +11,7 @@
 #include <string>
 
 #include "estimator/fe/elastic_model.hpp"
+#include "estimator/fe/point_fields.hpp"
 #include "estimator/io/vtkhdf_file.hpp"
 
 namespace diastole {
@@ -19,6 +20,10 @@ struct SolvedFrame {
   double time_s = 0.0;
   ElasticState state;  ///< stresses are best drawn from with_averaged_pressure()
 };
+
+/// The arrays that are sampled at a point beside its displacement, empty, and their numbers there, one array after the other.
+std::vector<GridArray> sampled_arrays(bool fibres);
+Eigen::VectorXd sampled_fields(const PointFields& fields);
 
 /// Precondition: at least one frame; states are this model's.
 BezierGrid solution_grid(const ElasticModel& model, std::span<const SolvedFrame> frames);
