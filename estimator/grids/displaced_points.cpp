@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <cmath>
 #include <iterator>
 #include <set>
 
@@ -60,7 +61,14 @@ DisplacedPoints displaced_points(const FieldGrid& grid, const DisplacementChoice
   result.frames_csv = "frame,time_s,pressure_kPa,sigma_kPa\n";
   const double first_s = grid.steps.front().time_s;
   const GridArray& first = displacement_of(grid.steps.front(), choice, file);
-  const bool at_rest = std::ranges::all_of(first.values, [](double v) { return v == 0.0; });
+  constexpr double rounding = 1e-9;  // of the largest coordinate
+  const auto largest = [](const std::vector<double>& values) {
+    double most = 0.0;
+    for (const double value : values)
+      most = std::max(most, std::abs(value));
+    return most;
+  };
+  const bool at_rest = largest(first.values) <= rounding * largest(grid.points);
   if (!at_rest)
     fmt::format_to(std::back_inserter(result.frames_csv), "0,{},0,0\n", first_s > 0.0 ? 0.0 : first_s - 1.0);
   bool pressures = true;

@@ -2,7 +2,7 @@
 // Grids of plain cells with fields at their points, as other laboratories' programs write and read them. Data, not bodies: points and
 // surfaces to fit our mesh to, displacements to fit a law to.
 //
-//   cell        corners, in the order that VTK, XDMF and Gmsh share        its faces look outwards
+//   cell        corners, in the order of XDMF and Gmsh, and of VTK but for its wedge        faces_of() look outwards
 //   tetra       3             hexahedron    7----6          wedge    5
 //              /|\                         /|   /|                  /|\      .
 //             0-+-2                       4----5 |                 3-+-4

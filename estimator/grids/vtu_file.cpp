@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <array>
 #include <sstream>
 #include <stdexcept>
 
@@ -30,6 +31,13 @@ VtuEncoding cut_appended(std::string& text) {
   encoding.appended = text.substr(from + 1, end - from - 1);
   text.erase(from, end - from);
   return encoding;
+}
+
+/// Where VTK keeps a wedge's corners: its triangle 0 1 2 looks outwards (vtkWedge). Its own inverse.
+constexpr std::array<size_t, 6> wedge_order{0, 2, 1, 3, 5, 4};
+
+size_t place_in_vtk(CellShape shape, size_t corner) {
+  return shape == CellShape::wedge ? wedge_order[corner] : corner;
 }
 
 class VtuReader {
@@ -101,7 +109,7 @@ class VtuReader {
         refuse(file_, fmt::format("cell {}", c), "has too few points");
       GridCell& cell = grid.cells.emplace_back(GridCell{kind->shape, {}});
       for (size_t i = 0; i < corner_count(kind->shape); ++i) {
-        const double point = connectivity[static_cast<size_t>(from) + i];
+        const double point = connectivity[static_cast<size_t>(from) + place_in_vtk(kind->shape, i)];
         if (!(point >= 0)) refuse(file_, fmt::format("cell {}", c), fmt::format("names point {}", point));
         cell.points.push_back(static_cast<size_t>(point));
       }
@@ -156,7 +164,8 @@ std::string vtu_text(const FieldGrid& grid, const GridStep& step) {
   add_array(piece.append_child("Points"), "Float64", {"Points", 3, grid.points});
   GridArray connectivity{"connectivity", 1, {}}, offsets{"offsets", 1, {}}, types{"types", 1, {}};
   for (const GridCell& cell : grid.cells) {
-    connectivity.values.insert(connectivity.values.end(), cell.points.begin(), cell.points.end());
+    for (size_t i = 0; i < cell.points.size(); ++i)
+      connectivity.values.push_back(static_cast<double>(cell.points[place_in_vtk(cell.shape, i)]));
     offsets.values.push_back(static_cast<double>(connectivity.values.size()));
     types.values.push_back(std::ranges::find(cell_kinds(), cell.shape, &CellKind::shape)->vtk);
   }

@@ -190,7 +190,7 @@ FebMaterial febio_material(const ElasticSystem& system) {
 std::vector<GridCell> HexahedralMesh::faces(const ElementFace& face) const {
   constexpr std::array<std::array<size_t, 2>, 3> number{
       {{5, 3}, {2, 4}, {0, 1}}};  // among faces_of(hexahedron)
-  const std::vector<size_t>& around = faces_of(CellShape::hexahedron)[number[face.direction][face.side]];
+  const std::vector<size_t> around = faces_of(CellShape::hexahedron)[number[face.direction][face.side]];
   std::vector<GridCell> found;
   each_cell(sampling, [&](const std::array<size_t, 3>& cell) {
     if (cell[face.direction] != face.side * (sampling[face.direction] - 1)) return;

@@ -73,7 +73,7 @@ TEST(UnloadCommand, IsRefusedWhereTheLoadIsNotKnown) {
     return test::message_of([&] { test::run_command({"solve", study, "--unload", "--pressure-kPa", "1"}); });
   };
   EXPECT_THAT(message(""), HasSubstr("specimen.imaged_at_kPa"));
-  EXPECT_THAT(message("imaged_at_sigma_kPa = 0.1\n"), HasSubstr("imaged_at_kPa too"));
+  EXPECT_THAT(message("imaged_at_sigma_kPa = 0.1\n"), HasSubstr("stands without imaged_at_kPa"));
   EXPECT_THAT(message("imaged_at_kpa = 1.2\n"), HasSubstr("imaged_at_kPa"));
   EXPECT_THAT(message("imaged_at_kPa = 1.2\n[chamber]\n"), HasSubstr("chamber"));
 }

@@ -53,8 +53,8 @@ def the_gel(folder):
     (block,) = mesh.cells
     assert block.type == "hexahedron" and len(block.data) == 12 * 36
     each = volumes(mesh.points, block.data)
-    whole = np.pi * (50**2 - 22.5**2) * 85
-    assert each.min() > 0 and abs(each.sum() / whole - 1) < 0.02, (each.min(), each.sum() / whole)
+    whole = 9 * np.sin(2 * np.pi / 18) * (50**2 - 22.5**2) * 85  # of 18 corners around
+    assert each.min() > 0 and abs(each.sum() / whole - 1) < 1e-3, (each.min(), each.sum() / whole)
     assert len(mesh.points) == 18 * 9 * 4, "points that elements share are one"
     at = np.argmin(np.linalg.norm(mesh.points - [22.5, 0, 0], axis=1))
     assert np.allclose(mesh.point_data["displacement_mm"][at], solved["probes"][0]["displacement_mm"], atol=1e-9)
@@ -97,9 +97,9 @@ def the_ventricle(folder):
     said("solve", SOURCE / "examples/lv-clean.study.toml", "--mesh", "6,3,1", "--pressure-kPa", 0.4, "-o", feb, "-o", vtu,
          "--cells", "2,2,2")
     mesh = meshio.read(vtu)
-    assert sorted(block.type for block in mesh.cells) == ["hexahedron", "wedge"]
+    assert {block.type for block in mesh.cells} == {"hexahedron", "wedge"}
     for block in mesh.cells:
-        assert volumes(mesh.points, block.data).min() > 0
+        assert volumes(mesh.points, block.data).min() > 0, (block.type, volumes(mesh.points, block.data))
     document = xml.parse(feb).getroot()
     material = {child.tag: float(child.text) for child in document.find("Material/material")}
     assert material["E1"] == material["c"] * 26.7 and material["G12"] == material["c"] * 14.7 / 2
@@ -143,7 +143,7 @@ def their_grids(folder):
         with open(folder / "t.guide.csv") as file:
             surfaces = [row["surface"] for row in csv.DictReader(file)]
         assert surfaces == ["endo"] * 4 + ["epi"] * 4, name
-    del mesh.cell_data["physical"]
+    mesh = meshio.Mesh(points, cells[:1], point_data={"u": u})
     for version in ("gmsh22", "gmsh"):
         meshio.write(folder / "theirs.msh", mesh, file_format=version, binary=False)
         said("mesh", "points", folder / "theirs.msh", "--sigma-mm", 0.2, "-o", folder / "t.points.csv", "--force")
