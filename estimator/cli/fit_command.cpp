@@ -27,6 +27,7 @@ struct FitArguments {
   std::string smooth;
   std::string robust = "auto";
   double pressure_offset_kPa = 0;
+  double fibre_sigma_deg = 0, geometry_sigma_mm = 0;
   bool profile = false;
   int posterior_draws = 0;
   std::filesystem::path start;
@@ -73,10 +74,23 @@ void print_shapes(const FitRecord& record) {
   }
 }
 
+/// Of whole parameters, where the errors of fibres or walls were stated.
+void print_shares(const FitRecord& record) {
+  for (const FittedParameter& parameter : record.parameters) {
+    const auto& shares = parameter.variance_shares;
+    if (!shares || (shares->fibres == 0 && shares->geometry == 0)) continue;
+    fmt::print(
+        "{}: variance {:.0f} % from the images, {:.0f} % pressures, {:.0f} % fibres, {:.0f} % geometry\n",
+        parameter.name, 100 * shares->images, 100 * shares->pressures, 100 * shares->fibres,
+        100 * shares->geometry);
+  }
+}
+
 void print_record(const FitRecord& record) {
   if (record.parameters.empty()) return;  // the search did not even begin: its reason says why
   for (const FittedParameter& parameter : record.parameters)
     print_parameter(parameter);
+  print_shares(record);
   print_shapes(record);
   fmt::print("\nResiduals {:.3f} mm RMS over {} residuals of the {}; chi2/dof {:.3f}\n\n", record.rms_mm,
              record.residuals_used, record.data, record.chi2_per_dof);
@@ -192,6 +206,8 @@ ExitCode run_fit(const FitArguments& arguments, const CommandOutput& out) {
                step.accepted ? "" : "  (step refused)");
   };
   options.unload = arguments.study.unload;
+  options.fibre_sigma_deg = arguments.fibre_sigma_deg;
+  options.geometry_sigma_mm = arguments.geometry_sigma_mm;
   options.start = start_of(arguments, study);
   options.profile = arguments.profile;
   if (arguments.pressure_offset_kPa > 0) options.pressure_offset_sigma_kPa = arguments.pressure_offset_kPa;
@@ -262,6 +278,14 @@ void add_fit(CommandLine& line) {
           "--pressure-offset", arguments->pressure_offset_kPa,
           "seek a common offset of all frame pressures too, about zero with this standard deviation, kPa")
       ->check(CLI::PositiveNumber);
+  command
+      ->add_option("--fibre-sigma-deg", arguments->fibre_sigma_deg,
+                   "fibres may be off by a common angle of this standard deviation: the errors then hold it")
+      ->check(CLI::Range(0.0, 45.0));
+  command
+      ->add_option("--geometry-sigma-mm", arguments->geometry_sigma_mm,
+                   "the walls may lie off their places by as much: likewise")
+      ->check(CLI::Range(0.0, 10.0));
   command->add_flag("--unexamined", arguments->unexamined,
                     "do not look beforehand for what is wrong with the data (docs/reconstruction.md), and "
                     "fit data that cannot be what they say");

@@ -315,21 +315,27 @@ void InverseDesign::add_reference_residual(const NodeField& reference_mm, const 
   }
 }
 
-ElasticModel on_unloaded(const ElasticSystem& imaged, NodeField reference_mm, SolveOptions solve) {
+ElasticModel alike(const ElasticSystem& system, HermiteMesh mesh, MaterialAxesField axes,
+                   SolveOptions solve) {
   ElasticOptions options;
-  const std::span<const double> first = imaged.parameters(0);
+  const std::span<const double> first = system.parameters(0);
   options.parameters.assign(first.begin(), first.end());
-  options.held = imaged.held();
-  options.material_axes = carried_back(imaged.mesh(), imaged.material_axes());
-  options.volume_stiffness_kPa = imaged.volume_stiffness_kPa();
-  if (imaged.compressibility_per_kPa() > 0.0)
-    options.bulk_modulus_kPa = 1.0 / imaged.compressibility_per_kPa();
+  options.held = system.held();
+  options.material_axes = std::move(axes);
+  options.volume_stiffness_kPa = system.volume_stiffness_kPa();
+  if (system.compressibility_per_kPa() > 0.0)
+    options.bulk_modulus_kPa = 1.0 / system.compressibility_per_kPa();
   options.solve = std::move(solve);
-  ElasticModel model(with_reference(imaged.mesh(), std::move(reference_mm)), imaged.law(), options);
-  for (size_t e = 0; e < imaged.mesh().element_count(); ++e)
+  ElasticModel model(std::move(mesh), system.law(), options);
+  for (size_t e = 0; e < system.mesh().element_count(); ++e)
     for (size_t i = 0; i < first.size(); ++i)
-      model.set_element_parameter(i, e, imaged.parameters(e)[i]);
+      model.set_element_parameter(i, e, system.parameters(e)[i]);
   return model;
+}
+
+ElasticModel on_unloaded(const ElasticSystem& imaged, NodeField reference_mm, SolveOptions solve) {
+  return alike(imaged, with_reference(imaged.mesh(), std::move(reference_mm)),
+               carried_back(imaged.mesh(), imaged.material_axes()), std::move(solve));
 }
 
 UnloadReturn inflate_again(ElasticModel& unloaded, const HermiteMesh& imaged, double pressure_kPa) {

@@ -80,6 +80,10 @@ class InverseDesign {
   std::optional<SparseFactor> factor_;
 };
 
+/// A model of the same law, parameters and supports on another body or with other fibres. Not for springs, chambers, a varying stiffness.
+ElasticModel alike(const ElasticSystem& system, HermiteMesh mesh, MaterialAxesField axes,
+                   SolveOptions options = {});
+
 /// The model of the unloaded body: the imaged one's law, parameters and supports, fibres carried back.
 ElasticModel on_unloaded(const ElasticSystem& imaged, NodeField reference_mm, SolveOptions options = {});
 

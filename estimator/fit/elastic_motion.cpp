@@ -85,4 +85,11 @@ MotionDerivatives ElasticMotion::derivatives(size_t slot) {
   return seen;
 }
 
+std::vector<ConsideredMotion> ElasticMotion::considered(size_t slot) {
+  if (considered_.empty()) return {};
+  const Slot& solved = slots_.at(slot).value();
+  (void)set_values(solved.values);
+  return considered_motions(model_, solved.state, considered_);
+}
+
 }  // namespace diastole

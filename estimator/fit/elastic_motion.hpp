@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "estimator/fe/elastic_model.hpp"
+#include "estimator/fit/considered_errors.hpp"
 #include "estimator/fit/joint_problem.hpp"
 
 namespace diastole {
@@ -22,6 +23,10 @@ class ElasticMotion : public MotionModel {
   [[nodiscard]] MotionOutcome solve(size_t slot, std::span<const double> values,
                                     double pressure_kPa) override;
   [[nodiscard]] MotionDerivatives derivatives(size_t slot) override;
+  [[nodiscard]] std::vector<ConsideredMotion> considered(size_t slot) override;
+
+  /// Precondition: images show the displacement itself.
+  void consider(std::vector<ConsideredError> errors) { considered_ = std::move(errors); }
 
   [[nodiscard]] const ElasticModel& model() const { return model_; }
 
@@ -33,7 +38,7 @@ class ElasticMotion : public MotionModel {
   /// Where a frame begins that has no earlier solution.
   [[nodiscard]] virtual ElasticState first_state() const { return model_.rest_state(); }
 
-  [[nodiscard]] ElasticModel& model() { return model_; }
+  [[nodiscard]] ElasticModel& changed_model() { return model_; }
   [[nodiscard]] const std::vector<ParameterGroup>& groups() const { return groups_; }
   static void set_values(ElasticModel& model, const std::vector<ParameterGroup>& groups,
                          std::span<const double> values);
@@ -51,6 +56,7 @@ class ElasticMotion : public MotionModel {
   ElasticModel model_;
   std::vector<ParameterGroup> groups_;
   double displacement_gain_;
+  std::vector<ConsideredError> considered_;
   std::vector<std::optional<Slot>> slots_;
 };
 

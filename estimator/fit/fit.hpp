@@ -54,6 +54,9 @@ struct FitOptions {
   std::function<void(const inference::SearchStep&)> on_step;
 };
 
+/// Where the variance of an estimate comes from; they add up to 1. Of values that vary by element, without what their smoothness adds.
+using VarianceShares = FittedVarianceShares;
+
 struct EstimatedValue {
   double value;
   double se;                   ///< NaN on a bound
@@ -61,6 +64,7 @@ struct EstimatedValue {
   double se_exact_pressure;    ///< what `se` would be if the frame pressures were exactly known
   bool at_lower;
   bool at_upper;
+  std::optional<VarianceShares> shares = {};  ///< none on a bound
 };
 
 struct EstimatedFrame {

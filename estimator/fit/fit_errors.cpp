@@ -218,6 +218,23 @@ Intervals estimate_smoothness(FitOutcome& outcome, JointProblem& problem, const 
   return intervals;
 }
 
+/// Adds what the considered errors make the estimate follow: dq = - H^-1 J' c for the change c of the residuals that one standard
+/// deviation makes. Returns the variances that each source adds.
+std::map<std::string, Eigen::VectorXd> consider_errors(FitOutcome& outcome, JointProblem& problem,
+                                                       const LinearisedCost& cost,
+                                                       const Eigen::MatrixXd& inverse) {
+  std::map<std::string, Eigen::VectorXd> added;
+  const Eigen::Index motion = problem.motion_residuals().size();
+  for (JointProblem::ConsideredColumn& error : problem.considered_columns()) {
+    error.column.head(motion) *= cost.motion_scale;
+    const Eigen::VectorXd change = -inverse * (cost.jacobian.transpose() * error.column);
+    outcome.covariance += change * change.transpose();
+    auto [of_source, is_new] = added.try_emplace(error.source, Eigen::VectorXd::Zero(change.size()));
+    of_source->second += change.cwiseAbs2();
+  }
+  return added;
+}
+
 }  // namespace
 
 QuadraticModel quadratic_model(JointProblem& problem, const Eigen::VectorXd& q) {
@@ -283,12 +300,25 @@ Eigen::MatrixXd estimate_errors(FitOutcome& outcome, JointProblem& problem, cons
   }
   const Intervals intervals = estimate_smoothness(outcome, problem, q, options, is_free, excess);
   widen_for_patches(outcome, problem, cost, is_free);
+  const Eigen::VectorXd of_data = outcome.covariance.diagonal();
+  const std::map<std::string, Eigen::VectorXd> added =
+      consider_errors(outcome, problem, cost, curvature.matrix);
   Eigen::MatrixXd in_coordinates = outcome.covariance;
   const Eigen::VectorXd exact = cost.spread * variances_at_exact_pressure(problem, cost.jacobian, is_free);
   for (Eigen::Index i = 0; i < problem.values(); ++i) {
     const inference::Parameter& parameter = problem.space()[i];
     outcome.values.push_back(
         estimated(parameter, q[i], problem.space().bound_under(q, i), outcome.covariance(i, i), exact[i]));
+    if (outcome.covariance(i, i) > 0 && std::isfinite(outcome.values.back().se)) {
+      const auto share = [&](const char* source) {
+        const auto found = added.find(source);
+        return found == added.end() ? 0.0 : found->second[i] / outcome.covariance(i, i);
+      };
+      const double data = of_data[i] / outcome.covariance(i, i);
+      const double images = std::min(data, exact[i] / outcome.covariance(i, i));
+      outcome.values.back().shares =
+          VarianceShares{images, data - images, share("fibres"), share("geometry")};
+    }
     if (const auto found = intervals.find(i); found != intervals.end()) {
       for (size_t side = 0; side < 2; ++side)
         outcome.values.back().ci95[side] = parameter.value(found->second[side]);

@@ -258,6 +258,24 @@ Eigen::MatrixXd JointProblem::plain_jacobian(const Eigen::VectorXd& q) {
   return result;
 }
 
+std::vector<JointProblem::ConsideredColumn> JointProblem::considered_columns() {
+  std::vector<ConsideredColumn> result;
+  Eigen::Index row = 0;
+  for (size_t slot = 0; slot < frames_.size(); ++slot) {
+    const LoadedFrame& frame = frames_[slot];
+    const std::vector<ConsideredMotion> motions = model_.considered(slot);
+    for (size_t i = 0; i < motions.size(); ++i) {
+      if (slot == 0) result.push_back({motions[i].source, Eigen::VectorXd::Zero(rows())});
+      const NodeField* const motion[] = {&motions[i].by_motion};
+      const NodeField* const reference[] = {&motions[i].by_reference};
+      result[i].column.segment(row, frame.residuals.size()) =
+          frame.residuals.columns(0, model_.mesh(), motion, reference).col(0);
+    }
+    row += frame.residuals.size();
+  }
+  return result;
+}
+
 Eigen::VectorXd JointProblem::offset_column() {
   Eigen::VectorXd column = Eigen::VectorXd::Zero(rows());
   Eigen::Index row = 0, prior = motion_residuals().size();

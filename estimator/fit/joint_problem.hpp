@@ -48,6 +48,13 @@ struct MotionDerivatives {
   NodeField by_imaged_pressure{};   ///< dx/d(imaged_load's pressure); empty for a model that has none
 };
 
+/// What one standard deviation of an error that is no unknown does to a frame (considered_errors.hpp).
+struct ConsideredMotion {
+  std::string source;
+  NodeField by_motion;     ///< of the deformed positions, mm
+  NodeField by_reference;  ///< of the undeformed ones
+};
+
 /// What the fit needs of a mechanical model: the body's motion for material values and a cavity pressure, and its
 /// derivatives. ElasticMotion (elastic_motion.hpp) is the finite-element one.
 ///
@@ -69,6 +76,8 @@ class MotionModel {
                                             double pressure_kPa) = 0;
   /// At the slot's last successful `solve`.
   [[nodiscard]] virtual MotionDerivatives derivatives(size_t slot) = 0;
+  /// Of each such error, in the same order for all slots; likewise.
+  [[nodiscard]] virtual std::vector<ConsideredMotion> considered(size_t /*slot*/) { return {}; }
 };
 
 /// A value to be estimated, in the model's order. Invariant: lower <= start <= upper, lower < upper.
@@ -118,6 +127,13 @@ class JointProblem : public inference::LeastSquaresProblem {
 
   /// Of each row of the motion (TagPlanes::patch); -1 for a point that is none of a tag. Empty where the planes are exactly known.
   [[nodiscard]] std::vector<int> patches() const;
+
+  /// What one standard deviation of each considered error changes in the residuals: a column over the rows. Precondition: as for jacobian.
+  struct ConsideredColumn {
+    std::string source;
+    Eigen::VectorXd column;
+  };
+  [[nodiscard]] std::vector<ConsideredColumn> considered_columns();
 
   /// Derivatives by an offset, for a problem without that unknown: its column of `plain_jacobian`. Precondition as
   /// there.

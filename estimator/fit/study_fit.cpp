@@ -84,6 +84,7 @@ void record_shape(FittedParameter& parameter, const FitOutcome& fit, size_t plac
   for (const ProfileInterval& profile : fit.profiles) {
     if (profile.place == place && profile.found) parameter.profile = profile;
   }
+  parameter.variance_shares = fit.values[place].shares;
   if (fit.posterior) parameter.posterior = fit.posterior->values[place];
 }
 
@@ -340,6 +341,25 @@ void record_unloading(FitRecord& record, UnloadedMotion& motion, const FitOutcom
   }
 }
 
+/// The errors of fibres and walls that were stated. Throws InputError where they cannot be followed.
+std::vector<ConsideredError> considered_by(const Study& study, const ElasticModel& model,
+                                           const StudyFitOptions& options) {
+  if (options.fibre_sigma_deg == 0.0 && options.geometry_sigma_mm == 0.0) return {};
+  if (options.unload)
+    throw InputError({study.file.string(), "--unload",
+                      "stands beside errors of fibres or walls, which are followed in a body "
+                      "that is free of stress in its image only",
+                      "Leave out --fibre-sigma-deg and --geometry-sigma-mm."});
+  require_plain(study, "errors of fibres and walls are followed");
+  if (options.fibre_sigma_deg > 0.0 && !model.system().material_axes())
+    throw InputError({study.file.string(), "--fibre-sigma-deg", "is given for a body without fibres",
+                      "Leave it out, or give the specimen fibres."});
+  std::vector<ConsideredError> errors = fibre_errors(model, options.fibre_sigma_deg);
+  for (ConsideredError& error : geometry_errors(model, options.geometry_sigma_mm))
+    errors.push_back(std::move(error));
+  return errors;
+}
+
 }  // namespace
 
 // Extrapolation beyond an element, as a fraction of it: `farthest_outside_mm` through the wall, never more than an
@@ -374,6 +394,7 @@ FitRecord fit_study(const Study& study, const Measurement& measurement, const St
     body = std::make_unique<ElasticMotion>(std::move(model), estimated.groups, displacement_gain_of(study));
   }
   ElasticMotion& motion = *body;
+  motion.consider(considered_by(study, motion.model(), options));
   FitOptions fit_options;
   fit_options.file = study.file.string();
   fit_options.locator = locator_for(study.specimen);

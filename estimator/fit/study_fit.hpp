@@ -16,6 +16,9 @@ struct StudyFitOptions {
   std::optional<double> pressure_offset_sigma_kPa = {};  ///< seek a common offset of the pressures
   /// The study's shape is that of an image under load (imaged_at_kPa): the body without it is found with the parameters.
   bool unload = false;
+  /// Standard deviations of errors that the whole body has alike (considered_errors.hpp); the estimate's errors then hold them.
+  double fibre_sigma_deg = 0.0;
+  double geometry_sigma_mm = 0.0;
   bool profile = false;  ///< profile intervals of whole parameters
   std::optional<PosteriorOptions> posterior = {};
   std::optional<FitRecord> start = {};  ///< an earlier result or a checkpoint to start from

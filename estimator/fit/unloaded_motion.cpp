@@ -24,13 +24,13 @@ std::optional<std::string> UnloadedMotion::set_values(std::span<const double> va
   shape_ = std::move(found);
   values_.assign(values.begin(), values.end());
   shape_derivatives_.reset();
-  model() = on_unloaded(imaged_.system(), shape_->reference_mm);
+  changed_model() = on_unloaded(imaged_.system(), shape_->reference_mm);
   return {};
 }
 
 MotionDerivatives UnloadedMotion::derivatives_at(const ElasticState& state) {
   if (!shape_derivatives_) shape_derivatives_ = inverse_.derivatives(*shape_, groups());
-  ElasticSystem& system = model().system();
+  ElasticSystem& system = changed_model().system();
   const size_t unknowns = system.equations().unknowns(), count = groups().size();
   std::vector<NodeField> shapes = shape_derivatives_->by_parameter;
   shapes.push_back(shape_derivatives_->by_pressure);

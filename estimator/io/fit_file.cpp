@@ -17,6 +17,7 @@ DIASTOLE_MEMBERS(FittedFrame, frame, time_s, measured_kPa, sigma_kPa, estimated_
 DIASTOLE_MEMBERS(FitIteration, iteration, cost, accepted, parameters)
 DIASTOLE_MEMBERS(FittedRobust, degrees, scale, wild)
 DIASTOLE_MEMBERS(FittedOffset, value, se)
+DIASTOLE_MEMBERS(FittedVarianceShares, images, pressures, fibres, geometry)
 DIASTOLE_MEMBERS(FittedUnloading, imaged_at_kPa, sigma_kPa, estimated_kPa, se_kPa, cavity_imaged_mL,
                  cavity_unloaded_mL, return_mm, returned)
 DIASTOLE_MEMBERS(Exclusion, reason, points)
@@ -41,6 +42,7 @@ void each_member(Visit&& visit, Record& parameter) {
   visit("smoothness", if_any(parameter.smoothness));
   visit("profile", if_any(parameter.profile));
   visit("posterior", if_any(parameter.posterior));
+  visit("variance_shares", if_any(parameter.variance_shares));
 }
 
 template <class Visit, IsRecord<FittedDirection> Record>

@@ -56,6 +56,14 @@ struct PosteriorDrawing {
   double seconds;
 };
 
+/// Where a parameter's variance comes from; the shares add up to 1.
+struct FittedVarianceShares {
+  double images;     ///< the tags' or points' own errors
+  double pressures;  ///< frames', the imaged shape's, and an offset that was sought
+  double fibres;     ///< --fibre-sigma-deg
+  double geometry;   ///< --geometry-sigma-mm
+};
+
 struct FittedParameter {
   std::string name;  ///< with its unit
   double value;      ///< of a regional parameter: the mean over the elements
@@ -66,8 +74,9 @@ struct FittedParameter {
   std::string at_bound;                 ///< "", "lower" or "upper"
   std::vector<FittedElement> elements;  ///< empty unless the parameter varies by element
   std::optional<FittedSmoothness> smoothness = {};
-  std::optional<FittedProfile> profile = {};      ///< of a whole parameter, if asked for
-  std::optional<FittedPosterior> posterior = {};  ///< the same
+  std::optional<FittedProfile> profile = {};                 ///< of a whole parameter, if asked for
+  std::optional<FittedPosterior> posterior = {};             ///< the same
+  std::optional<FittedVarianceShares> variance_shares = {};  ///< of a whole parameter that has an error
 };
 
 struct FittedFrame {

@@ -68,27 +68,23 @@ FibreField nodal_angles(const HermiteMesh& mesh, const MaterialAxesField& axes) 
 
 }  // namespace
 
+void require_plain(const Study& study, std::string_view purpose) {
+  const auto refused = [&](const char* key, const char* what, const char* remedy) {
+    refuse(study, key, fmt::format("{} known from the undeformed body alone, but {}", what, purpose), remedy);
+  };
+  const bool on_springs =
+      std::visit([](const auto& specimen) { return specimen.end_springs.has_value(); }, study.specimen);
+  if (on_springs) refused("specimen.ends", "springs at the ends are", "Hold the ends: ends = \"fixed\".");
+  if (study.chamber) refused("chamber", "the fluid around the specimen is", "Leave [chamber] out.");
+  if (shows_in_images(study)) refused("model.effects", "effects that show in images are", "Leave them out.");
+}
+
 ImagedLoad imaged_load_of(const Study& study) {
   if (!study.imaged_at) {
     refuse(study, "specimen.imaged_at_kPa", "missing, although --unload asks for the shape without load",
            "Give the cavity pressure at which the shape was imaged: imaged_at_kPa = 1.2.");
   }
-  const bool on_springs =
-      std::visit([](const auto& specimen) { return specimen.end_springs.has_value(); }, study.specimen);
-  if (on_springs) {
-    refuse(study, "specimen.ends", "springs at the ends are known from the undeformed body, which is sought",
-           "Hold the ends for --unload: ends = \"fixed\".");
-  }
-  if (study.chamber) {
-    refuse(study, "chamber",
-           "the fluid around the specimen is known from the undeformed body, which is sought",
-           "Leave [chamber] out for --unload.");
-  }
-  if (shows_in_images(study)) {
-    refuse(study, "model.effects",
-           "effects that show in images are known from the undeformed body, which is sought",
-           "Leave them out for --unload.");
-  }
+  require_plain(study, "the undeformed body is sought");
   return *study.imaged_at;
 }
 

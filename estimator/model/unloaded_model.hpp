@@ -2,12 +2,18 @@
 // A study whose shape was imaged under load ([specimen] imaged_at_kPa), without that load: what `--unload` does.
 
 #include <optional>
+#include <string>
+#include <string_view>
 
 #include "estimator/fe/unloaded_shape.hpp"
 #include "estimator/io/study.hpp"
 #include "estimator/mesh/mesh_file.hpp"
 
 namespace diastole {
+
+/// Throws InputError if the study's body is more than material between held ends: springs at them, fluid in a chamber, effects that show in
+/// images. `purpose` ends the sentence "... but PURPOSE".
+void require_plain(const Study& study, std::string_view purpose);
 
 /// The load at which the study's shape was imaged. Throws InputError if the study does not say it, or if its specimen cannot be
 /// unloaded: ends on springs and fluid in a chamber are known from the undeformed body alone, as are effects that show in images.
