@@ -260,6 +260,7 @@ class Solution(Record):
     seconds: float
     probes: list[Probe]
     frames: list[SolvedFrame] | None = ...
+    unloaded: Unloading | None = ...
 
 @dataclass(frozen=True)
 class Forces(Record):
@@ -282,6 +283,19 @@ class SolvedFrame(Record):
     time_s: float
     pressure_kPa: float
     cavity_volume_change_mL: float
+
+@dataclass(frozen=True)
+class Unloading(Record):
+    """The shape without load of one that was imaged under it; null where it is not known."""
+
+    reason: str
+    reached_pressure_kPa: float
+    load_steps: int
+    iterations: int
+    returned: bool
+    cavity_imaged_mL: float | None = ...
+    cavity_unloaded_mL: float | None = ...
+    return_mm: float | None = ...
 
 @dataclass(frozen=True)
 class Fit(Record):
@@ -322,6 +336,7 @@ class Fit(Record):
     posterior: PosteriorDrawing | None = ...
     pressure_offset_kPa: FittedOffset | None = ...
     robust: FittedRobust | None = ...
+    unloaded: FittedUnloading | None = ...
 
 @dataclass(frozen=True)
 class FittedParameter(Record):
@@ -337,6 +352,7 @@ class FittedParameter(Record):
     posterior: FittedPosterior | None = ...
     elements: list[FittedElement] | None = ...
     smoothness: FittedSmoothness | None = ...
+    variance_shares: FittedVarianceShares | None = ...
 
 @dataclass(frozen=True)
 class FittedProfile(Record):
@@ -372,6 +388,15 @@ class FittedSmoothness(Record):
     none_seen: bool
     step90: list[float | None]
     effective_values: float
+
+@dataclass(frozen=True)
+class FittedVarianceShares(Record):
+    """Where a parameter's variance comes from."""
+
+    images: float
+    pressures: float
+    fibres: float
+    geometry: float
 
 @dataclass(frozen=True)
 class Finding(Record):
@@ -472,6 +497,19 @@ class FittedRobust(Record):
     degrees: float
     scale: float
     wild: int
+
+@dataclass(frozen=True)
+class FittedUnloading(Record):
+    """The load at which the shape was imaged, and the shape without it."""
+
+    imaged_at_kPa: float
+    sigma_kPa: float
+    estimated_kPa: float
+    se_kPa: float
+    return_mm: float
+    returned: bool
+    cavity_imaged_mL: float | None = ...
+    cavity_unloaded_mL: float | None = ...
 
 @dataclass(frozen=True)
 class Explanation(Record):
