@@ -172,4 +172,27 @@ Session read_session(const Study& study) {
   return session;
 }
 
+std::vector<StatedEffect> stated_effects(const Study& study, const Session& session) {
+  std::vector<StatedEffect> list;
+  for (const std::string& id : study.effects) {
+    StatedEffect& stated = list.emplace_back();
+    stated.effect = &effect_named(session.effects, study, id);
+    const auto given = std::ranges::find(study.effect_values, id, &StudyEffect::id);
+    for (const EffectParameter& parameter : stated.effect->parameters()) {
+      double value = parameter.typical;
+      if (given != study.effect_values.end())
+        if (const auto start = given->starts.find(std::string(parameter.name)); start != given->starts.end())
+          value = std::clamp(start->second, parameter.lower, parameter.upper);
+      stated.values.push_back(value);
+    }
+    if (given == study.effect_values.end()) continue;
+    for (const StudyMoment& moment : given->moments)
+      for (const SessionRun& run : session.runs)
+        if (run.drive.place.name == moment.run)
+          stated.change_points.push_back(
+              {moment.run, moment.time_s, run.drive.place.started_s + moment.time_s});
+  }
+  return list;
+}
+
 }  // namespace diastole::rig

@@ -48,4 +48,13 @@ struct Session {
 /// Throws InputError if the study names no runs or a run cannot be read.
 Session read_session(const Study& study);
 
+/// An effect that the study's model has already: its values, bounded, and its moments in the session's runs.
+struct StatedEffect {
+  const Effect* effect = nullptr;
+  std::vector<double> values;
+  std::vector<ChangePoint> change_points;
+};
+/// In the study's order; where it states no value the typical one. Throws InputError for an unknown effect.
+std::vector<StatedEffect> stated_effects(const Study& study, const Session& session);
+
 }  // namespace diastole::rig

@@ -343,7 +343,8 @@ DriveTrace sampled_motion(const RunDrive& run, double step_s) {
                    .acceleration_mL_per_s2 = {}};
   const auto count = static_cast<size_t>(std::ceil((run.end_s - run.start_s) / step_s)) + 2;
   for (size_t k = 0; k < count; ++k) {
-    const Motion::State state = run.motion.at(trace.time_s(k));
+    const double time_s = trace.time_s(k);
+    const Motion::State state = run.waveform ? run.waveform(time_s) : run.motion.at(time_s);
     trace.volume_mL.push_back(state.volume_mL);
     trace.flow_mL_per_s.push_back(state.flow_mL_per_s);
     trace.acceleration_mL_per_s2.push_back(state.acceleration_mL_per_s2);

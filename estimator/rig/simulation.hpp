@@ -1,6 +1,7 @@
 #pragma once
 // Runs the rig's model along a run's motion.
 
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -44,6 +45,8 @@ struct RunDrive {
       {};  ///< where cycles need not be simulated that are like the one before
   double start_s = 0.0;
   double end_s = 0.0;
+  std::function<Motion::State(double time_s)> waveform =
+      {};  ///< instead of `motion`, where that is no chain of strokes
 };
 
 /// A step near `about_s` that divides the cycles of the run's longest repetition.

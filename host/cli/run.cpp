@@ -13,6 +13,7 @@
 #include "host/cli/daemon_question.hpp"
 #include "host/cli/host_commands.hpp"
 #include "host/cli/session_facts.hpp"
+#include "host/cli/session_series.hpp"
 #include "host/cli/session_view.hpp"
 #include "host/config/experiment.hpp"
 #include "host/rpc/run_session.hpp"
@@ -47,19 +48,12 @@ ExitCode show_plan(const Experiment& experiment, const CommandOutput& out) {
   return ExitCode::done;
 }
 
-ExitCode run(RunOptions options, const CommandOutput& out) {
-  const Experiment experiment = read_experiment(options.session.experiment);
-  if (options.dry_run) return show_plan(experiment, out);
-  if (options.session.output.empty()) {
-    throw InputError({"", "-o", "is missing", "Name the run file to write, for example -o session.run.h5."});
-  }
-  DaemonClient daemon = options.daemon.connect();
-  if (options.asks && isatty(STDIN_FILENO) != 0 && isatty(STDERR_FILENO) != 0)
-    ask_for(options.session.facts, std::cin, stderr);
-  fmt::print(stderr, "{}", plan_words(experiment));
+/// One session, shown as it goes.
+SessionResult acquire(DaemonClient& daemon, SessionOptions session) {
+  fmt::print(stderr, "{}", plan_words(read_experiment(session.experiment)));
   SessionView view(isatty(STDERR_FILENO) != 0);
   if (isatty(STDIN_FILENO) != 0) {
-    options.session.ready = [&view] {
+    session.ready = [&view] {
       const int lines = lines_entered();
       view.entered(lines);
       return lines > 0;
@@ -67,17 +61,42 @@ ExitCode run(RunOptions options, const CommandOutput& out) {
   }
   interrupts = 0;
   std::signal(SIGINT, [](int) { interrupts = interrupts + 1; });
-  options.session.stops_asked = [] { return static_cast<int>(interrupts); };
-  options.session.progress = [&view](const SessionProgress& progress) { view.show(progress); };
-  const SessionResult result = run_session(daemon, options.session);
+  session.stops_asked = [] { return static_cast<int>(interrupts); };
+  session.progress = [&view](const SessionProgress& progress) { view.show(progress); };
+  SessionResult result = run_session(daemon, session);
   std::signal(SIGINT, SIG_DFL);
   view.finish();
-  return report_session(result, out.json);
+  return result;
+}
+
+ExitCode run(RunOptions options, SessionSeries& series, const CommandOutput& out) {
+  if (series.asked() != options.session.experiment.empty()) {
+    throw InputError({"", "EXPERIMENT", series.asked() ? "is not asked for beside --shape" : "is missing",
+                      "Give an experiment file, or --shape TARGET.csv --study STUDY."});
+  }
+  if (options.dry_run && !series.asked()) return show_plan(read_experiment(options.session.experiment), out);
+  if (options.session.output.empty()) {
+    throw InputError({"", "-o", "is missing", "Name the run file to write, for example -o session.run.h5."});
+  }
+  if (!series.asked())
+    (void)read_experiment(options.session.experiment);  // refuses before the daemon is asked
+  DaemonClient daemon = options.daemon.connect();
+  if (options.asks && isatty(STDIN_FILENO) != 0 && isatty(STDERR_FILENO) != 0)
+    ask_for(options.session.facts, std::cin, stderr);
+  if (!series.asked()) return report_session(acquire(daemon, options.session), out.json);
+  return series.carry_out(
+      options.session.output, options.session.force,
+      [&](const std::string& experiment, const std::string& run_file) {
+        options.session.experiment = experiment;
+        options.session.output = run_file;
+        return acquire(daemon, options.session);
+      },
+      out);
 }
 
 }  // namespace
 
-void add_run(CommandLine& line) {
+void add_run(CommandLine& line, std::shared_ptr<SessionSeries> series) {
   auto options = std::make_shared<RunOptions>();
   CLI::App* command = line.add(
       "run", "acquire a session through the daemon",
@@ -92,9 +111,13 @@ void add_run(CommandLine& line) {
       "      kept in the run file, and found again by `diastole runs specimen=gel-7`; in a terminal it asks "
       "for\n"
       "      what is not given, and Enter leaves it open\n"
+      "  diastole run --shape ventricle.csv --study explained.study.toml --iterations 4 -o followed.run.h5\n"
+      "      up to four sessions, followed.1.run.h5 and so on, in which the pump learns the drive by which "
+      "the\n"
+      "      specimen follows the curve (diastole shape); the controller checks each before anything moves\n"
       "A study with prompts goes on when you press Enter, or with `diastole continue` from anywhere.\n"
       "Exit code 1: samples are missing; 3: a fault or a broken link ended the run.");
-  command->add_option("EXPERIMENT", options->session.experiment, "experiment file (.toml)")->required();
+  command->add_option("EXPERIMENT", options->session.experiment, "experiment file (.toml)");
   command->add_option("-o,--output", options->session.output, "run file to write");
   command->add_flag("--dry-run", options->dry_run, "only tell what would be done");
   command->add_flag("--force", options->session.force, "replace the run file if it exists");
@@ -102,7 +125,8 @@ void add_run(CommandLine& line) {
   command->add_flag("!--no-questions", options->asks, "ask for no facts of the session");
   options->daemon.add_to(*command);
   options->daemon.add_take_over_to(*command);
-  line.on_run(command, [options](const CommandOutput& out) { return run(*options, out); });
+  series->add_options(*command);
+  line.on_run(command, [options, series](const CommandOutput& out) { return run(*options, *series, out); });
 }
 
 }  // namespace diastole

@@ -104,6 +104,9 @@ def of_files(place):
     yield "compare", place.run("compare gel.run.h5 other.run.h5 -o compared.html")
     yield "compare", place.run("compare gel.run.h5 examples/paper-gap/paper-gap.run.h5")
     yield "replay", place.run("replay gel.run.h5", (0, 1))
+    wanted = "examples/shape/ventricle.csv --study examples/shape/gel.study.toml --cycles 9"
+    yield "shape", place.run(f"shape {wanted} -o drive.csv --page drive.html")
+    yield "shape", place.run(f"simulate --shape {wanted} --iterations 1 -o followed.run.h5 --gated-volume 0.1")
     make_pop_test(place.folder / "other.run.h5", place.folder / "pop.run.h5")
     yield "catheter", place.run("catheter pop.run.h5 -o catheter.html")
     yield "solve", place.run(f"solve {gel} --mesh 4,2,1 --pressure-kPa 3.1 --probe 22.5,0,0")

@@ -84,12 +84,13 @@ diastole::ExitCode run(int argc, char** argv) {
       "With --json, standard output holds one JSON document; after exit code 2 or 3 it may be empty: the "
       "exit code\nand the text on standard error tell the error.");
   diastole::CommandLine line(app);
-  diastole::add_host_commands(line);
+  diastole::add_host_commands(line, diastole::make_shape_series());
   diastole::add_runs(line);
   diastole::add_batch(line);
   diastole::add_compare(line);
   diastole::add_catheter(line);
-  diastole::add_simulate(line);
+  diastole::add_simulate(line, diastole::make_shape_series());
+  diastole::add_shape(line);
   diastole::add_replay(line);
   diastole::add_scan(line);
   diastole::add_desk(line);

@@ -82,6 +82,8 @@ void add_options(CLI::App& app, Arguments& arguments) {
   app.add_flag("--real-time", arguments.real_time, "follow the wall clock (the default without --conductor)")
       ->excludes(conductor);
   app.add_option("--pins", arguments.server.pins, "write every change of a pin: time_ns,signal,value");
+  app.add_option("--volume", arguments.server.volume,
+                 "write the cavity's true volume between triggers: trigger,since_s,cavity_mL");
   app.add_option("--control", arguments.server.control, "take orders (sim_rig ctl) at this socket");
   app.add_option("--play", arguments.server.play, "let the instrument show this recorded run's pressure");
   app.add_option("--host-drift-ppm", arguments.server.host_drift_ppm,

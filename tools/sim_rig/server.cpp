@@ -62,6 +62,7 @@ Server::Server(const RigDescription& description,
   timeline_.plan(options.faults);
   if (!options.play.empty()) playback_.emplace(options.play, description.channels);
   if (!options.pins.empty()) pins_.emplace(options.pins);
+  if (!options.volume.empty()) volume_.emplace(options.volume);
   if (!options.conductor.empty()) conductor_.emplace(options.conductor);
   if (!options.control.empty()) control_.emplace(options.control);
 }
@@ -126,6 +127,7 @@ void Server::advance_to(uint64_t until_ns) {
       set(*due->what.kind, due->what.value);
     }
     rig_.advance_to(next_ns);
+    if (volume_) volume_->take(rig_.now_ns(), rig_.plant().cavity_mL());
     if (next_ns >= until_ns) return;
   }
 }
@@ -144,6 +146,7 @@ void Server::take_sent(std::span<const uint8_t> bytes) {
 
 void Server::take_edge(const sim_controller::PinEdge& edge) {
   if (edge.pin == sim_controller::Pin::ttl && edge.value != 0) run_clock_.trigger(edge.time_ns);
+  if (volume_ && edge.pin == sim_controller::Pin::ttl && edge.value != 0) volume_->begin_cycle(edge.time_ns);
   const bool to_scanner = edge.pin == sim_controller::Pin::ttl || edge.pin == sim_controller::Pin::rwave_uV;
   if (pins_ && (cables_.to_scanner || !to_scanner)) pins_->write(edge);
 }

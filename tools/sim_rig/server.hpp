@@ -26,6 +26,7 @@
 #include "tools/sim_rig/rig.hpp"
 #include "tools/sim_rig/run_clock.hpp"
 #include "tools/sim_rig/timeline.hpp"
+#include "tools/sim_rig/volume_trace.hpp"
 
 namespace diastole::sim_rig {
 
@@ -34,6 +35,7 @@ struct ServerOptions {
   std::filesystem::path conductor;  ///< socket; empty: time follows the wall clock
   std::filesystem::path control;    ///< socket; empty: none
   std::filesystem::path pins;       ///< pin trace; empty: none
+  std::filesystem::path volume;     ///< trace of the cavity's true volume; empty: none
   std::filesystem::path play;       ///< recorded run whose pressure the instrument shows; empty: the plant's
   uint16_t modbus_port = 0;         ///< 0: any free one
   double host_drift_ppm = 0;        ///< by which a conducted host's clock runs fast
@@ -77,6 +79,7 @@ class Server {
   uint64_t daq_patience_ns_;
   Cables cables_;
   std::optional<sim_controller::PinTrace> pins_;
+  std::optional<VolumeTrace> volume_;
   RunClock run_clock_;
   Timeline timeline_;
   std::map<std::string_view, double> faults_on_;

@@ -23,24 +23,9 @@ namespace {
 
 /// The effects that the study's model has already, in its order, with their values.
 void take_given(const Study& study, const rig::Session& session, SetSearchOptions& options) {
-  for (const std::string& id : study.effects) {
-    const Effect* effect = &effect_named(session.effects, study, id);
-    rig::ModelTerm term{effect, {}};
-    const auto given = std::ranges::find(study.effect_values, id, &StudyEffect::id);
-    for (const EffectParameter& parameter : effect->parameters()) {
-      double value = parameter.typical;
-      if (given != study.effect_values.end())
-        if (const auto start = given->starts.find(std::string(parameter.name)); start != given->starts.end())
-          value = std::clamp(start->second, parameter.lower, parameter.upper);
-      options.values.push_back(value);
-    }
-    if (given != study.effect_values.end())
-      for (const StudyMoment& moment : given->moments)
-        for (const rig::SessionRun& run : session.runs)
-          if (run.drive.place.name == moment.run)
-            term.change_points.push_back(
-                {moment.run, moment.time_s, run.drive.place.started_s + moment.time_s});
-    options.terms.push_back(std::move(term));
+  for (rig::StatedEffect& stated : rig::stated_effects(study, session)) {
+    options.values.insert(options.values.end(), stated.values.begin(), stated.values.end());
+    options.terms.push_back({stated.effect, std::move(stated.change_points)});
   }
 }
 

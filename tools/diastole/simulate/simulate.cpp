@@ -11,12 +11,14 @@
 #include <optional>
 
 #include "host/cli/session_facts.hpp"
+#include "host/cli/session_series.hpp"
 #include "host/cli/session_view.hpp"
 #include "host/config/experiment.hpp"
 #include "host/journal/part_file.hpp"
 #include "host/rpc/run_session.hpp"
 #include "protocol/contract/input_error.hpp"
 #include "protocol/contract/named_members.hpp"
+#include "tools/diastole/simulate/gated_volume.hpp"
 #include "tools/diastole/simulate/simulated_rig.hpp"
 #include "tools/diastole/simulate/stop_signals.hpp"
 #include "tools/sim_rig/hidden_effects.hpp"
@@ -35,6 +37,7 @@ struct SimulateOptions {
   std::vector<std::string> hidden;
   std::optional<uint64_t> hide_seed;
   std::string sealed;
+  std::optional<double> gated_sd_mL;
 };
 
 struct SimulatedSession {
@@ -106,10 +109,8 @@ class PendingFile {
   std::string name_;
 };
 
-/// Homes the pump and runs the session; when no run file can be delivered the journal stays in `directory`.
-SessionResult run_in(PrivateDirectory& directory, const SimulatedRig& rig, const SessionOptions& options) {
-  DaemonClient daemon(rig.socket());
-  daemon.call("rig.home");
+/// Runs a session; when no run file can be delivered the journal stays in `directory`.
+SessionResult run_in(PrivateDirectory& directory, DaemonClient& daemon, const SessionOptions& options) {
   try {
     return run_session(daemon, options);
   } catch (const HardwareError&) {
@@ -121,34 +122,69 @@ SessionResult run_in(PrivateDirectory& directory, const SimulatedRig& rig, const
   }
 }
 
+/// What the rig's program is started with.
+SimulatedRigOptions rig_options(const SimulateOptions& options, const fs::path& volume) {
+  SimulatedRigOptions rig = options.rig;
+  const auto add = [&rig](std::initializer_list<std::string> words) {
+    rig.more.insert(rig.more.end(), words.begin(), words.end());
+  };
+  add({"--rig-seed", fmt::to_string(options.rig_seed)});
+  for (const std::string& fault : options.faults)
+    add({"--fault", fault});
+  for (const std::string& id : options.hidden)
+    add({"--hide", sim_rig::is_effect_file(id) ? fs::absolute(id).string() : id});
+  if (options.hide_seed) add({"--hide-seed", fmt::to_string(*options.hide_seed)});
+  if (!options.sealed.empty()) add({"--sealed", options.sealed});
+  if (options.gated_sd_mL) add({"--volume", volume.string()});
+  return rig;
+}
+
+/// The rig, homed, for one session or several.
+class Simulation {
+ public:
+  explicit Simulation(SimulateOptions options)
+      : options_(std::move(options)),
+        view_(isatty(STDERR_FILENO) != 0),
+        rig_(directory_, rig_options(options_, directory_ / "volume.csv")),
+        daemon_(rig_.socket()) {
+    options_.session.stops_asked = [this] { return signals_.asked(); };
+    options_.session.prompts_answered = true;  // nobody is waited for in a simulation
+    options_.session.progress = [this](const SessionProgress& progress) { view_.show(progress); };
+    daemon_.call("rig.home");
+  }
+
+  SessionResult acquire(const std::string& experiment, const std::string& run) {
+    options_.session.experiment = experiment;
+    options_.session.output = run;
+    SessionResult result = run_in(directory_, daemon_, options_.session);
+    view_.finish();
+    if (options_.gated_sd_mL)
+      store_gated_volume(run, directory_ / "volume.csv", triggers_,
+                         {*options_.gated_sd_mL, options_.rig.seed});
+    triggers_ += static_cast<size_t>(result.triggers);
+    return result;
+  }
+  void stop() { rig_.stop(); }
+
+ private:
+  SimulateOptions options_;
+  const StopSignals signals_;
+  SessionView view_;
+  PrivateDirectory directory_;
+  SimulatedRig rig_;
+  DaemonClient daemon_;
+  size_t triggers_ = 0;  ///< of the sessions so far
+};
+
 SimulatedSession simulate(SimulateOptions options) {
   const auto started = std::chrono::steady_clock::now();
   const Experiment experiment = read_experiment(options.session.experiment);
   check_outputs(options);
-  sim_rig::PlantConfig unused;
-  sim_rig::hide(options.hidden, 0, unused);  // refuses unknown ids
   const PendingFile pins(options.rig.pins, options.session.force);
   options.rig.pins = pins.path();
-  options.rig.more.insert(options.rig.more.end(), {"--rig-seed", fmt::to_string(options.rig_seed)});
-  for (const std::string& fault : options.faults)
-    options.rig.more.insert(options.rig.more.end(), {"--fault", fault});
-  for (const std::string& id : options.hidden)
-    options.rig.more.insert(options.rig.more.end(),
-                            {"--hide", sim_rig::is_effect_file(id) ? fs::absolute(id).string() : id});
-  if (options.hide_seed)
-    options.rig.more.insert(options.rig.more.end(), {"--hide-seed", fmt::to_string(*options.hide_seed)});
-  if (!options.sealed.empty()) options.rig.more.insert(options.rig.more.end(), {"--sealed", options.sealed});
-  const StopSignals signals;
-  SessionView view(isatty(STDERR_FILENO) != 0);
-  options.session.stops_asked = [&signals] { return signals.asked(); };
-  options.session.prompts_answered = true;  // nobody is waited for in a simulation
-  options.session.progress = [&view](const SessionProgress& progress) { view.show(progress); };
-
-  PrivateDirectory directory;
-  SimulatedRig rig(directory, options.rig);
-  SimulatedSession session{run_in(directory, rig, options.session), 0, 0};
-  view.finish();
-  rig.stop();
+  Simulation simulation(options);
+  SimulatedSession session{simulation.acquire(options.session.experiment, options.session.output), 0, 0};
+  simulation.stop();
   pins.complete();
   session.simulated_s = static_cast<double>(session.result.expected) / experiment.sample_rate_Hz;
   session.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - started).count();
@@ -169,9 +205,38 @@ ExitCode report(const SimulatedSession& session, bool json) {
   return exit_code_of(result);
 }
 
+/// One rig for all sessions, as a laboratory has.
+ExitCode simulate_series(const SimulateOptions& options, SessionSeries& series, const CommandOutput& out) {
+  check_outputs(options);
+  if (!options.rig.pins.empty()) {
+    throw InputError({"", "option --pins", "is for one session", "Leave it out beside --shape."});
+  }
+  std::optional<Simulation> simulation;  // started when the first drive is known
+  const ExitCode code = series.carry_out(
+      options.session.output, options.session.force,
+      [&](const std::string& experiment, const std::string& run) {
+        if (!simulation) simulation.emplace(options);
+        return simulation->acquire(experiment, run);
+      },
+      out);
+  if (simulation) simulation->stop();
+  return code;
+}
+
+ExitCode simulate_as_asked(const SimulateOptions& options, SessionSeries& series, const CommandOutput& out) {
+  sim_rig::PlantConfig unused;
+  sim_rig::hide(options.hidden, 0, unused);  // refuses unknown ids
+  if (series.asked() != options.session.experiment.empty()) {
+    throw InputError({"", "EXPERIMENT", series.asked() ? "is not asked for beside --shape" : "is missing",
+                      "Give an experiment file, or --shape TARGET.csv --study STUDY."});
+  }
+  if (series.asked()) return simulate_series(options, series, out);
+  return report(simulate(options), out.json);
+}
+
 }  // namespace
 
-void add_simulate(CommandLine& line) {
+void add_simulate(CommandLine& line, std::shared_ptr<SessionSeries> series) {
   auto options = std::make_shared<SimulateOptions>();
   options->session.poll_ms = 20;
   CLI::App* command = line.add(
@@ -187,9 +252,13 @@ void add_simulate(CommandLine& line) {
       "  diastole simulate gel.experiment.toml -o mine.run.h5 --hide any --hide-seed 7 --sealed "
       "mine.sealed.json\n"
       "      a rig in which something is hidden (sim_rig hidden), for diastole explain to find\n"
+      "  diastole simulate --shape examples/shape/ventricle.csv --study gel.study.toml -o followed.run.h5 "
+      "--hide "
+      "backlash --gated-volume 0.1\n"
+      "      sessions in which the pump learns the drive for a curve (diastole shape), with gated volumes\n"
       "The same seed gives the same run. Ctrl-C once stops at the end of the cycle, twice at once; what\n"
       "was recorded is kept. Exit code 1: samples are missing; 3: a fault ended the run.");
-  command->add_option("EXPERIMENT", options->session.experiment, "experiment file (.toml)")->required();
+  command->add_option("EXPERIMENT", options->session.experiment, "experiment file (.toml)");
   command->add_option("-o,--output", options->session.output, "run file to write")->required();
   command
       ->add_option("--image", options->rig.image,
@@ -211,10 +280,17 @@ void add_simulate(CommandLine& line) {
       "--hide-seed", options->hide_seed,
       "of the hidden effects' sizes, the same for all runs of a session; if not given, that of the noise");
   command->add_option("--sealed", options->sealed, "file for what is hidden; the run file does not tell");
+  command
+      ->add_option("--gated-volume", options->gated_sd_mL,
+                   "also measure the cavity's volume as gated imaging does (/mr/flow), with this sd in mL")
+      ->check(CLI::Range(1e-3, 100.0));
   add_facts_to(*command, options->session.facts);
   command->add_flag("--real-time", options->rig.real_time, "as slow as the real thing");
   command->add_flag("--force", options->session.force, "replace files that exist");
-  line.on_run(command, [options](const CommandOutput& out) { return report(simulate(*options), out.json); });
+  series->add_options(*command);
+  line.on_run(command, [options, series](const CommandOutput& out) {
+    return simulate_as_asked(*options, *series, out);
+  });
 }
 
 }  // namespace diastole

@@ -1,0 +1,144 @@
+// A drive is learned on the simulated rig's plant, which shares no code with the model that learns.
+
+#include <filesystem>
+#include <fstream>
+
+#include "protocol/contract/input_error.hpp"
+#include "tests/tools/diastole/shape_loop.hpp"
+#include "tools/diastole/shape/drive_file.hpp"
+#include "tools/diastole/shape/pump.hpp"
+#include "tools/diastole/shape/wanted_curve.hpp"
+
+namespace diastole::shaping {
+namespace {
+
+TEST(Shape, TheModelAloneFollowsOnARigThatIsAsDescribedButForTheMotorsLag) {
+  constexpr double lag_s = 0.0046;  // of motor and coupling, and the plant's step (docs/hidden-effects.md)
+  PlantForShape rig({}, plan);
+  PeriodicCurve wanted = ventricle();
+  const DriveModel model = gel_model();
+  const PlantRun run = rig.play(model.inverse(wanted, harmonics_needed(wanted, 1e-3, 24)));
+  EXPECT_LE(true_nrmse(run, wanted), 0.02);
+  for (Eigen::Index k = 1; k <= wanted.harmonics(); ++k)
+    wanted.c[k] *= std::polar(1.0, -2.0 * M_PI * wanted.frequency_Hz(k) * lag_s);
+  EXPECT_LE(true_nrmse(run, wanted), 0.004);
+}
+
+TEST(Shape, PressureTeachesTheDriveWithFiveHiddenEffects) {
+  PlantForShape rig(with_effects({}), plan);
+  expect_followed(learned(rig, ventricle(), 3));
+}
+
+TEST(Shape, ALeakThatOpensInARunEndsLearning) {
+  sim_rig::PlantConfig weak;
+  weak.flaws.drive.gain = -0.06;
+  PlantForShape rig(weak, plan);
+  const Loop loop = learned(rig, ventricle(), 4, {}, 2);
+  ASSERT_EQ(loop.runs.size(), 2U);
+  EXPECT_EQ(loop.lesson.ending, Ending::changed);
+  EXPECT_TRUE(loop.runs.back().changed_in_cycle);
+  EXPECT_EQ(loop.lesson.best, 0U);
+  EXPECT_LE(loop.lesson.drive_mL.range(), loop.runs.front().drive_mL.range() * (1.0 + 1e-9))
+      << "it pushed harder";
+}
+
+TEST(Shape, TheNearestDriveKeepsWithinItsBounds) {
+  const PeriodicCurve wanted = ventricle().with(16);
+  const DriveBounds bounds{.most_mL = 100.0, .flow_mL_s = 90.0, .acceleration_mL_s2 = [](double flow) {
+                             return 1200.0 - 5.0 * flow;
+                           }};
+  ASSERT_FALSE(within(wanted, bounds));
+  const Eigen::MatrixXd slope = Eigen::MatrixXd::Identity(33, 33);
+  const PeriodicCurve nearest = nearest_within(wanted, slope, bounds);
+  const auto largest = [&](const PeriodicCurve& curve, int order) {
+    double most = 0.0;
+    for (const double value : curve.at_even(512, order))
+      most = std::max(most, std::abs(value));
+    return most;
+  };
+  EXPECT_LE(largest(nearest, 1), 90.0 * 1.005);
+  EXPECT_LE(largest(nearest, 2), bounds.acceleration_mL_s2(largest(nearest, 1)) * 1.01);
+  // The best of its kind: no mixture with the wanted curve and no other size of it is nearer within the bounds.
+  const double off = rms_between(nearest, wanted);
+  for (double part = 0.02; part < 1.0; part += 0.02) {
+    PeriodicCurve smaller = wanted;
+    smaller.c.tail(16) *= part;
+    EXPECT_FALSE(within(smaller, bounds) && rms_between(smaller, wanted) < off);
+    PeriodicCurve mixed{wanted.period_s, part * wanted.c + (1.0 - part) * nearest.c};
+    EXPECT_FALSE(largest(mixed, 1) < 89.0 &&
+                 largest(mixed, 2) < bounds.acceleration_mL_s2(largest(mixed, 1)) * 0.98);
+  }
+}
+
+RigConfig rig_with(const std::string& limits) {
+  const std::filesystem::path file = std::filesystem::path(DIASTOLE_SOURCE_DIR) / "examples/rig.toml";
+  std::ifstream stream(file);
+  std::string text((std::istreambuf_iterator<char>(stream)), {});
+  const std::string daq = "[daq]";
+  text.replace(text.find(daq), daq.size(), "[controller.limits]\n" + limits + "\n[daq]");
+  return read_rig(TableReader::from_text(text, file.string()));
+}
+
+TEST(Pump, ADriveWithinTheLimitsStaysAndBeginsAtItsLeast) {
+  const Pump pump(rig_with(""));
+  PeriodicCurve drive = ventricle().with(16);
+  drive.c[0] += 1.0;
+  const PeriodicCurve nearest = pump.nearest(drive, Eigen::MatrixXd::Identity(33, 33));
+  EXPECT_LT(rms_between(nearest, drive), 1e-12);
+  const PlannedCycle cycle = pump.planned(drive);
+  EXPECT_EQ(cycle.refusal, "");
+  EXPECT_NEAR(cycle.stroke_mL, drive.range(), 0.01 * drive.range());
+  EXPECT_NEAR(cycle.offset_mL, drive.at(drive.least_at_s()), 1e-6);
+  const size_t points = cycle.fraction.size() - 1;
+  for (size_t j = 0; j < points; ++j) {
+    const double on_curve_s =
+        -cycle.lead_s + drive.period_s * static_cast<double>(j) / static_cast<double>(points);
+    EXPECT_NEAR(cycle.offset_mL + cycle.stroke_mL * cycle.fraction[j], drive.at(on_curve_s),
+                2e-3 * drive.range());
+  }
+  EXPECT_GT(cycle.trigger_delay_ms + std::abs(cycle.trigger_late_ms), 0.0);
+}
+
+TEST(Pump, ADriveBeyondTheLimitsBecomesOneThatTheControllerAccepts) {
+  for (const auto& [limits, name] :
+       {std::pair{"acceleration_mL_s2 = 900", "acceleration"}, std::pair{"flow_mL_s = 80", "flow"},
+        std::pair{"pressure_kPa = 30", "pressure"}}) {
+    SCOPED_TRACE(limits);
+    const Pump pump(rig_with(limits));
+    PeriodicCurve drive = ventricle().with(16);
+    drive.c[0] += 1.0;
+    EXPECT_EQ(pump.planned(drive).refusal, name);
+    const PlannedCycle cycle = pump.planned(pump.nearest(drive, Eigen::MatrixXd::Identity(33, 33)));
+    EXPECT_EQ(cycle.refusal, "");
+    const auto use = std::ranges::find(cycle.limits, name, &LimitUse::limit);
+    EXPECT_GT(use->share(), 0.8);
+    EXPECT_LE(use->share(), 1.0);
+  }
+}
+
+TEST(WantedCurve, ReadsTheExampleAndRefusesWhatDoesNotSayHowLargeItIs) {
+  const std::filesystem::path examples = std::filesystem::path(DIASTOLE_SOURCE_DIR) / "examples";
+  const WantedCurve wanted = read_wanted_curve({.file = examples / "shape/ventricle.csv"});
+  EXPECT_DOUBLE_EQ(wanted.curve.period_s, 1.2);
+  EXPECT_NEAR(wanted.curve.range(), 24.0, 0.05);
+  EXPECT_FALSE(wanted.is_pressure);
+  EXPECT_THROW((void)read_wanted_curve({.file = examples / "heart.csv"}), InputError);
+  const WantedCurve sized =
+      read_wanted_curve({.file = examples / "heart.csv", .period_s = 1.5, .stroke_mL = 16.0});
+  EXPECT_NEAR(sized.curve.range(), 16.0, 0.1);
+}
+
+TEST(DriveFile, ARunKnowsWhereTheWantedCurveBegins) {
+  const Pump pump(rig_with(""));
+  PeriodicCurve drive = ventricle().with(16);
+  drive.c[0] += 1.0;
+  const PlannedCycle cycle = pump.planned(drive);
+  const std::string points = points_text(cycle, "ventricle.csv");
+  runfile::RecordedRun run = PlantForShape({}, plan).play(drive).run;
+  run.waveforms.at(0) = {points, {}, cycle.fraction};
+  const GatedRun gated = gated_run(run, gel_model(), period_s, 16);
+  EXPECT_LT(rms_between(gated.drive_mL, drive), 2e-3 * drive.range());
+}
+
+}  // namespace
+}  // namespace diastole::shaping

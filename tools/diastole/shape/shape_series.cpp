@@ -1,0 +1,142 @@
+// `run --shape` and `simulate --shape`: a session, what it teaches, the next one.
+
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <iostream>
+#include <memory>
+
+#include "estimator/io/whole_file.hpp"
+#include "estimator/report/page.hpp"
+#include "host/cli/session_series.hpp"
+#include "host/cli/session_view.hpp"
+#include "host/runfile/output_guard.hpp"
+#include "protocol/contract/input_error.hpp"
+#include "tools/diastole/commands.hpp"
+#include "tools/diastole/shape/drive_file.hpp"
+#include "tools/diastole/shape/shape_options.hpp"
+
+namespace diastole {
+namespace shaping {
+
+void add_request_to(CLI::App& command, ShapeRequest& request) {
+  command.add_option("--study", request.study,
+                     "study of rig and specimen, as `explain` wrote it (.study.toml)");
+  command.add_option("--rig", request.rig,
+                     "rig file whose limits hold, instead of those of the study's first run");
+  command.add_option("--period-s", request.wanted.period_s, "of a curve that is given by phase");
+  command.add_option("--stroke-mL", request.wanted.stroke_mL, "of a curve that is given by fraction");
+  command
+      .add_option("--least", request.wanted.least,
+                  "what the curve's lowest point stands for: mL since rest, or kPa")
+      ->capture_default_str();
+  command.add_option("--cycles", request.plan.cycles, "of a run, the first three of which set in")
+      ->capture_default_str();
+}
+
+namespace {
+
+namespace fs = std::filesystem;
+
+/// followed.run.h5 -> followed.2 and an ending.
+fs::path numbered(const fs::path& output, size_t number, const std::string& ending) {
+  std::string name = output.filename().string();
+  constexpr std::string_view of_runs = ".run.h5";
+  if (name.ends_with(of_runs)) name.resize(name.size() - of_runs.size());
+  return output.parent_path() / (number > 0 ? fmt::format("{}.{}{}", name, number, ending) : name + ending);
+}
+
+class ShapeSeries final : public SessionSeries {
+ public:
+  void add_options(CLI::App& command) override {
+    command.add_option("--shape", request_.wanted.file,
+                       "curve that the specimen is to follow (diastole shape), instead of an experiment");
+    add_request_to(command, request_);
+    command.add_option("--iterations", iterations_, "sessions at the most")
+        ->check(CLI::Range(1, 20))
+        ->capture_default_str();
+    command.add_option("--page", page_, "HTML page with the plots of each iteration");
+  }
+  [[nodiscard]] bool asked() const override { return !request_.wanted.file.empty(); }
+  ExitCode carry_out(const std::string& output, bool force, const Acquire& acquire,
+                     const CommandOutput& out) override;
+
+ private:
+  void check_outputs(const fs::path& output, bool force) const;
+  /// A session with this drive.
+  SessionResult run_once(const Shaping& shaping, const fs::path& output, const Acquire& acquire);
+
+  ShapeRequest request_;
+  size_t iterations_ = 4;
+  fs::path page_;
+  std::vector<fs::path> runs_;
+};
+
+void ShapeSeries::check_outputs(const fs::path& output, bool force) const {
+  if (request_.study.empty())
+    throw InputError({"", "option --study", "is missing", "Name the study of rig and specimen."});
+  const std::vector<fs::path> inputs{request_.wanted.file, request_.study};
+  for (size_t i = 1; i <= iterations_; ++i) {
+    check_output(numbered(output, i, ".run.h5").string(), force, {});
+    for (const char* ending : {".csv", ".experiment.toml"})
+      require_output({numbered(output, i, ending), inputs, "diastole shape", force});
+  }
+  if (!page_.empty()) require_output({page_, inputs, report::page_mark, force});
+}
+
+SessionResult ShapeSeries::run_once(const Shaping& shaping, const fs::path& output, const Acquire& acquire) {
+  const size_t number = runs_.size() + 1;
+  const fs::path drive = numbered(output, number, ".csv"),
+                 experiment = numbered(output, number, ".experiment.toml");
+  const fs::path run = numbered(output, number, ".run.h5");
+  write_whole_file(drive, points_text(shaping.cycle, request_.wanted.file.filename().string()));
+  write_whole_file(experiment, experiment_text(shaping.cycle, request_.plan, drive.filename().string()));
+  SessionResult result = acquire(experiment.string(), run.string());
+  runs_.push_back(run);
+  return result;
+}
+
+ExitCode ShapeSeries::carry_out(const std::string& output, bool force, const Acquire& acquire,
+                                const CommandOutput& out) {
+  check_outputs(output, force);
+  fmt::print(stderr, "Solving the specimen and inverting the rig's model.\n");
+  const Shaper shaper(request_);
+  Shaping shaping = shaper.after({});
+  std::string end;
+  ExitCode code = ExitCode::done;
+  while (runs_.size() < iterations_ && shaping.lesson.ending == Ending::none) {
+    const SessionResult result = run_once(shaping, output, acquire);
+    code = exit_code_of(result);
+    if (!result.regular || result.end != "completed") {
+      end = result.end;
+      break;
+    }
+    shaping = shaper.after(runs_);
+    if (!out.json) fmt::print("{}\n", shaping_words(shaping));
+  }
+  if (shaping.lesson.ending == Ending::changed) code = ExitCode::negative;
+  if (!page_.empty()) write_whole_file(page_, shaping_page(shaping, shaper.wanted_mL(), shaper.target()));
+  if (!end.empty())
+    fmt::print(stderr, "The last session did not end as planned ({}): learning stops.\n", end);
+  if (out.json) {
+    Json document = shaping_json(shaping);
+    document["runs"] = Json::array();
+    for (const fs::path& run : runs_)
+      document["runs"].push_back(run.string());
+    const auto best = [&](const char* ending) {
+      return shaping.lesson.best ? Json(numbered(output, *shaping.lesson.best + 1, ending).string()) : Json();
+    };
+    document["drive"] = best(".csv");
+    document["experiment"] = best(".experiment.toml");
+    document["page"] = page_.empty() ? Json() : Json(page_.string());
+    std::cout << document.dump(2) << '\n';
+  }
+  return code;
+}
+
+}  // namespace
+}  // namespace shaping
+
+std::shared_ptr<SessionSeries> make_shape_series() { return std::make_shared<shaping::ShapeSeries>(); }
+
+}  // namespace diastole
