@@ -14,7 +14,7 @@ namespace diastole {
 namespace {
 
 /// Another number whenever the tracker gives other points for the same images.
-constexpr int tracker_version = 2;
+constexpr int tracker_version = 3;
 
 std::optional<imaging::SpecimenPose> stated_pose(const Study& study) {
   if (!study.data.to_specimen) return std::nullopt;

@@ -58,7 +58,7 @@ std::vector<Ghost> find_ghosts(const TagView& view, const std::vector<const Mate
     for (const bool down : {false, true}) {
       const Eigen::Index extent = down ? view.images[0].rows() : view.images[0].cols();
       for (Eigen::Index shift = least_shift; shift <= extent - least_shift; ++shift) {
-        const Ghost whole{down, shift, 1.0};
+        const Ghost whole{.down = down, .shift = shift, .share = 1.0};
         Sums sums;
         for (const AirPixel& pixel : air) {
           const double over =
@@ -73,7 +73,7 @@ std::vector<Ghost> find_ghosts(const TagView& view, const std::vector<const Mate
         const double score = slope / std::sqrt(std::max(yy - slope * xy, 1e-300) / (sums.count - 2) / xx);
         if (score <= highest) continue;
         highest = score;
-        best = Ghost{down, shift, std::sqrt(slope)};
+        best = Ghost{.down = down, .shift = shift, .share = std::sqrt(slope)};
       }
     }
     if (!best) break;

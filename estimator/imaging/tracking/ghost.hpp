@@ -2,6 +2,8 @@
 // Ghosts: weaker copies of the picture, shifted along the phase encoding, that anything which differs from line group to line group
 // leaves in a segmented acquisition. They lie over tissue as they lie over air, and there they are seen.
 
+#include <cmath>
+#include <numbers>
 #include <vector>
 
 #include "estimator/imaging/tracking/materials.hpp"
@@ -12,8 +14,11 @@ struct Ghost {
   bool down;           ///< shifted along a column, else along a row
   Eigen::Index shift;  ///< in pixels, cyclic
   double share;        ///< of the picture's brightness
+  /// The part of `share` that is in phase with what it lies over, and its standard deviation. Unknown, half the power is.
+  double in_phase = 0;
+  double in_phase_sigma = share * std::numbers::sqrt2 / 2;
 
-  /// What it lays over a pixel, but for its sign.
+  /// What it lays over a pixel, but for its phase.
   [[nodiscard]] double over(const Image& image, Eigen::Index row, Eigen::Index column) const {
     const Eigen::Index from_row = down ? (row - shift + image.rows()) % image.rows() : row;
     const Eigen::Index from_column = down ? column : (column - shift + image.cols()) % image.cols();

@@ -16,7 +16,7 @@ namespace {
 
 using Json = nlohmann::json;
 
-constexpr std::array action_names = {"line", "mask", "contour"};
+constexpr std::array action_names = {"line", "mask", "contour", "height"};
 
 /// One line of the file and what is wrong with it.
 class EditLine {
@@ -63,6 +63,14 @@ class EditLine {
     if (!value.is_number_integer() || std::abs(value.get<double>()) > 1e6)
       refuse(fmt::format("\"{}\" is {}, which is no whole number in reach", key, shown(key)), remedy);
     return value.get<int>();
+  }
+
+  [[nodiscard]] double number(const char* key, const char* remedy) const {
+    if (!has(key)) refuse(fmt::format("\"{}\" is missing", key), remedy);
+    const Json& value = json_.at(key);
+    if (!value.is_number() || std::abs(value.get<double>()) > 1e6)
+      refuse(fmt::format("\"{}\" is {}, which is no number in reach", key, shown(key)), remedy);
+    return value.get<double>();
   }
 
   [[nodiscard]] std::vector<Eigen::Vector2d> points(size_t least) const {
@@ -127,7 +135,13 @@ ManualEdit edit_of(const EditLine& line, EditAction action, size_t number, const
         line.refuse(fmt::format("contour \"{}\" is unknown", which), remedy);
       edit.is_outer = which == "outer";
       edit.points_px = line.points(3);
+      break;
     }
+    case EditAction::height:
+      line.allow({"action", "slice", "height_mm"});
+      edit.height_mm = line.number(
+          "height_mm",
+          "It is how far the slice lies over the specimen's mid-height, in mm; 0 if it lies there.");
   }
   return edit;
 }
@@ -178,6 +192,10 @@ class Application {
 
   void to(std::vector<TagView>& views) const {
     TagView& view = view_of(views);
+    if (edit_.action == EditAction::height) {
+      view.height_mm = edit_.height_mm;
+      return;
+    }
     require_inside(view.plane);
     if (edit_.action == EditAction::line) return see_tag(view, phase_of(view));
     const PixelMask mask = inside(edit_.points_px, view.plane);
@@ -307,7 +325,7 @@ ManualEdits parse_edits(std::string_view text, const std::filesystem::path& file
     if (one.find_first_not_of(" \t\r") == std::string::npos) continue;
     EditLine line(edits.file, number);
     line.parse(one);
-    const char* remedy = "An action is line, mask, contour or undo.";
+    const char* remedy = "An action is line, mask, contour, height or undo.";
     const std::string action = line.text("action", remedy);
     const auto known = std::find(action_names.begin(), action_names.end(), action);
     if (action == "undo") {
@@ -323,8 +341,10 @@ ManualEdits parse_edits(std::string_view text, const std::filesystem::path& file
 }
 
 void apply_edits(const ManualEdits& edits, std::vector<TagView>& views) {
-  for (TagView& view : views)
+  for (TagView& view : views) {
     view.edits.assign(view.images.size(), {});
+    view.height_mm.reset();
+  }
   for (const ManualEdit& edit : edits.standing)
     Application(edits, edit).to(views);
 }

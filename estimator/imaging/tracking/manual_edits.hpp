@@ -13,7 +13,7 @@
 
 namespace diastole::imaging {
 
-enum class EditAction { line, mask, contour };
+enum class EditAction { line, mask, contour, height };
 
 struct ManualEdit {
   size_t file_line = 0;  ///< from 1
@@ -24,7 +24,8 @@ struct ManualEdit {
   int tag = 0;                        ///< number of a line's tag
   bool is_outer = false;              ///< of a contour
   std::vector<Eigen::Vector2d> points_px;
-  std::string text;  ///< the line itself
+  double height_mm = 0;  ///< of a slice across the axis, over the specimen's mid-height
+  std::string text;      ///< the line itself
 };
 
 struct ManualEdits {
@@ -43,7 +44,7 @@ ManualEdits parse_edits(std::string_view text, const std::filesystem::path& file
 /// point outside the image.
 void apply_edits(const ManualEdits& edits, std::vector<TagView>& views);
 
-/// How many of each action stand: "line", "mask", "contour".
+/// How many of each action stand: "line", "mask", "contour", "height".
 std::map<std::string, size_t> counts_of(const ManualEdits& edits);
 
 }  // namespace diastole::imaging

@@ -184,6 +184,45 @@ Eigen::Matrix3d axes_about(Eigen::Vector3d axis) {
   return axes;
 }
 
+/// How far along the axis from the origin mid-height lies by what a person said of slices; nothing if of none, a message in `missing` if
+/// that does not fit.
+std::optional<double> given_mid_height_mm(const std::vector<TrackedSlice>& slices,
+                                          const Eigen::Vector3d& origin_mm, const Eigen::Vector3d& axis,
+                                          std::string& missing) {
+  std::vector<double> heights;
+  for (const TrackedSlice& slice : slices) {
+    const TagView& view = slice.view;
+    if (!view.height_mm) continue;
+    const double cosine = view.plane.normal().dot(axis);
+    if (std::abs(cosine) < std::sqrt(1 - most_cosine_along * most_cosine_along)) {
+      missing = fmt::format("{}, whose height is given, does not lie across the axis", view.name);
+      return std::nullopt;
+    }
+    heights.push_back((view.plane.origin_mm - origin_mm).dot(view.plane.normal()) / cosine - *view.height_mm);
+  }
+  if (heights.empty()) return std::nullopt;
+  const auto [least, most] = std::minmax_element(heights.begin(), heights.end());
+  if (*most - *least > most_end_spread_mm) {
+    missing =
+        fmt::format("the heights given for slices put mid-height at places {:.1f} mm apart", *most - *least);
+    return std::nullopt;
+  }
+  return 0.5 * (*least + *most);
+}
+
+constexpr const char* give_pose =
+    "Give the specimen's pose with --pose NAME.pose.toml (origin_mm, x_axis, y_axis, z_axis).";
+
+/// What to write where rings show the axis but nothing shows mid-height.
+std::string give_height(const RingSlice& ring) {
+  return fmt::format(
+      "Say how far a slice lies over mid-height: the line {{\"slice\": \"{}\", \"action\": \"height\", "
+      "\"height_mm\": 0}} in FOLDER.edits.jsonl, beside the folder, says that it lies there. Or give the "
+      "pose "
+      "with --pose NAME.pose.toml (origin_mm, x_axis, y_axis, z_axis).",
+      ring.view->name);
+}
+
 }  // namespace
 
 TagPoint SpecimenPose::to_specimen(const TagPoint& patient) const {
@@ -229,6 +268,7 @@ std::string pose_text(const SpecimenPose& pose, const std::string& kind) {
 
 FoundPose find_annulus_pose(const std::vector<TrackedSlice>& slices) {
   FoundPose found;
+  found.remedy = give_pose;
   std::vector<RingSlice> rings;
   for (const TrackedSlice& slice : slices) {
     const auto ring = ring_slice(slice);
@@ -254,12 +294,20 @@ FoundPose find_annulus_pose(const std::vector<TrackedSlice>& slices) {
     return found;
   }
   const Eigen::Matrix3d axes = axes_about(rings[0].view->plane.normal());
+  found.remedy = give_height(rings[0]);
+  const auto given = given_mid_height_mm(slices, centre, axes.col(2), found.missing);
+  if (!found.missing.empty()) return found;
   Ends ends;
   for (const TrackedSlice& slice : slices) {
     const Eigen::Vector3d normal = slice.view.plane.normal();
     const double beside_mm = std::abs((centre - slice.view.plane.origin_mm).dot(normal));
     if (std::abs(normal.dot(axes.col(2))) < most_cosine_along && beside_mm < 0.5 * median(inner))
       add_ends(slice, centre, axes.col(2), median(inner), median(outer), ends);
+  }
+  if (given) {
+    found.pose = SpecimenPose{centre + *given * axes.col(2), axes,
+                              fmt::format("outlines: {} rings; mid-height as given by hand", rings.size())};
+    return found;
   }
   if (ends.low_mm.size() < 10) {
     found.missing = "no slice along the axis shows the specimen's two ends, between which mid-height lies";

@@ -36,10 +36,12 @@ struct FoundPose {
   std::optional<SpecimenPose> pose;
   std::optional<AnnulusOutline> outline;  ///< where there is a pose
   std::string missing;                    ///< why there is none
+  std::string remedy;                     ///< what to give, then
 };
 
 /// An annulus's pose from its outlines: the axis along the normal of slices that show a ring, through the middle of its circles, which do
-/// not move as it inflates; mid-height between the ends that slices along the axis show. A turn about the axis changes nothing of an
+/// not move as it inflates; mid-height where a person gave a ring's height over it (TagView::height_mm), or else between the ends that
+/// slices along the axis show. A turn about the axis changes nothing of an
 /// annulus: x points as near to patient x (or y) as it can.
 FoundPose find_annulus_pose(const std::vector<TrackedSlice>& slices);
 

@@ -52,13 +52,16 @@ SplineValues SplinePlane::at(const Eigen::Vector2d& x_mm) const {
   return values;
 }
 
-double SplinePlane::value(const Eigen::VectorXd& coefficients, const Eigen::Vector2d& x_mm) const {
-  const SplineValues values = at(x_mm);
+double spline_sum(const SplineValues& splines, const Eigen::VectorXd& coefficients) {
   double sum = 0;
   for (size_t i = 0; i < 16; ++i) {
-    if (values.index[i] >= 0) sum += values.value[i] * coefficients[values.index[i]];
+    if (splines.index[i] >= 0) sum += splines.value[i] * coefficients[splines.index[i]];
   }
   return sum;
+}
+
+double SplinePlane::value(const Eigen::VectorXd& coefficients, const Eigen::Vector2d& x_mm) const {
+  return spline_sum(at(x_mm), coefficients);
 }
 
 std::optional<std::array<int, 16>> SplinePlane::cell(int column, int row) const {

@@ -13,6 +13,7 @@ struct SplineValues {
   std::array<int, 16> index;  ///< -1 for a spline that is left out
   std::array<double, 16> value;
 };
+double spline_sum(const SplineValues& splines, const Eigen::VectorXd& coefficients);
 
 /// w(x) = sum of coefficient i times spline i; x in mm within the slice. Splines that no sample touches are left out.
 class SplinePlane {

@@ -220,8 +220,7 @@ class Emitter {
     points_.points.push_back(point);
   }
 
-  /// What ghosts move a tag by: the shift that a ghost's picture asks of the pixels around. Its phase against the picture is not known,
-  /// and half of its power is in phase on average.
+  /// What is not known of ghosts moves a tag by the shift that their picture asks of the pixels around.
   double ghost_sigma_mm(size_t k, size_t f, const Eigen::Vector2d& x_mm) const {
     double variance = 0;
     for (const Ghost& ghost : tracked_.ghosts) {
@@ -238,7 +237,9 @@ class Emitter {
                         products += slope * over;
                       });
       // Of a ghost's mean over the circle the brightness takes account.
-      if (squares > 0) variance += 0.5 * std::pow((products - slopes * overs / count) / squares, 2);
+      if (squares > 0)
+        variance +=
+            std::pow(ghost.in_phase_sigma / ghost.share * (products - slopes * overs / count) / squares, 2);
     }
     return std::sqrt(variance);
   }

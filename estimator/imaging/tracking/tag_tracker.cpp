@@ -8,6 +8,7 @@
 
 #include "estimator/imaging/series/spectrum.hpp"
 #include "estimator/imaging/tracking/brightness.hpp"
+#include "estimator/imaging/tracking/ghost_phase.hpp"
 #include "estimator/imaging/tracking/motion_prior.hpp"
 #include "estimator/imaging/tracking/robust_weight.hpp"
 #include "protocol/signal/median.hpp"
@@ -78,14 +79,6 @@ struct SeenMotion {
   SplineValues splines;
   double w_mm;
 };
-
-double spline_sum(const SplineValues& splines, const Eigen::VectorXd& coefficients) {
-  double sum = 0;
-  for (size_t i = 0; i < 16; ++i) {
-    if (splines.index[i] >= 0) sum += splines.value[i] * coefficients[splines.index[i]];
-  }
-  return sum;
-}
 
 class ViewTracker {
  public:
@@ -650,13 +643,6 @@ class ViewTracker {
                                 priors_[f].left_out_mm,
                                 spacing_mm_ * spacing_mm_ * factors_[f] * rest_matrices_[f].inverse(),
                                 0.5 * view_.extent_mm(), view_.extent_mm().norm()});
-    std::vector<const MaterialMap*> maps;
-    std::vector<double> noise;
-    for (const TrackedPhase& phase : phases_) {
-      maps.push_back(&phase.materials);
-      noise.push_back(phase.noise);
-    }
-    tracked.ghosts = find_ghosts(view_, maps, noise);
     tracked.phases = std::move(phases_);
     tracked.noise_factor = factors_;
     tracked.kappa_per_mm = priors_[0].kappa_per_mm;
@@ -691,7 +677,22 @@ class ViewTracker {
 
 TrackedView track_view(const TagView& view, std::optional<TrackingFault>& fault) {
   fault.reset();
-  return ViewTracker(view).track(fault);
+  TrackedView tracked = ViewTracker(view).track(fault);
+  if (fault) return tracked;
+  std::vector<const MaterialMap*> maps;
+  std::vector<double> noise;
+  for (const TrackedPhase& phase : tracked.phases) {
+    maps.push_back(&phase.materials);
+    noise.push_back(phase.noise);
+  }
+  std::vector<Ghost> ghosts = find_ghosts(view, maps, noise);
+  if (ghosts.empty()) return tracked;
+  for (Ghost& ghost : ghosts)
+    measure_in_phase(view, tracked, ghost);
+  const TagView clean = without_ghosts(view, tracked, ghosts);
+  tracked = ViewTracker(clean).track(fault);
+  tracked.ghosts = std::move(ghosts);
+  return tracked;
 }
 
 }  // namespace diastole::imaging

@@ -28,12 +28,13 @@ struct PhaseEdits {
 
 struct TagView {
   SlicePlane plane;
-  std::vector<Image> images;           ///< of the phases that there are, in order of time
-  std::vector<double> times_ms;        ///< since the tags were made
-  std::vector<int> frames;             ///< phase numbers, from 1
-  std::vector<TagWave> waves;          ///< of the first image: one direction, or two of a grid
-  std::string name;                    ///< "series 2, slice 1"
-  std::vector<PhaseEdits> edits = {};  ///< one an image, or none at all
+  std::vector<Image> images;             ///< of the phases that there are, in order of time
+  std::vector<double> times_ms;          ///< since the tags were made
+  std::vector<int> frames;               ///< phase numbers, from 1
+  std::vector<TagWave> waves;            ///< of the first image: one direction, or two of a grid
+  std::string name;                      ///< "series 2, slice 1"
+  std::vector<PhaseEdits> edits = {};    ///< one an image, or none at all
+  std::optional<double> height_mm = {};  ///< over the specimen's mid-height, as a person knows it
 
   [[nodiscard]] Eigen::Vector2d place_mm(Eigen::Index row, Eigen::Index column) const {
     return {static_cast<double>(column) * plane.column_spacing_mm,

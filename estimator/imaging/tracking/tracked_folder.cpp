@@ -40,11 +40,10 @@ void settle_pose(const TrackRequest& request, TrackedFolder& tracked) {
   if (tracked.pose) return;
   if (request.coordinates == "specimen")
     throw InputError({request.folder.string(), "", "the specimen's pose is not seen: " + found.missing,
-                      "Give it with --pose, or ask for --coords patient."});
-  tracked.problems.push_back(
-      {Severity::warning, "patient-coordinates", "the points stay in patient coordinates: " + found.missing,
-       request.folder.string(), 0, "",
-       "Give the specimen's pose with --pose NAME.pose.toml (origin_mm, x_axis, y_axis, z_axis)."});
+                      found.remedy + " Or ask for --coords patient."});
+  tracked.problems.push_back({Severity::warning, "patient-coordinates",
+                              "the points stay in patient coordinates: " + found.missing,
+                              request.folder.string(), 0, "", found.remedy});
 }
 
 /// A slice that reaches beyond the specimen's end shows the mean motion of what is in it, which is not that of its middle.

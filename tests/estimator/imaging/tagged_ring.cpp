@@ -82,8 +82,8 @@ std::vector<std::filesystem::path> write_ring(const RingScan& scan, const std::f
       const auto shift = static_cast<size_t>(scan.ghost_rows * scan.pixels);
       const double ghost =
           shift > 0 ? scan.ghost_share * picture[(i + picture.size() - shift) % picture.size()] : 0.0;
-      const double real = picture[i] + ghost + noise(engine);
-      const double imaginary = noise(engine);
+      const double real = picture[i] + ghost * std::cos(scan.ghost_turn_rad) + noise(engine);
+      const double imaginary = ghost * std::sin(scan.ghost_turn_rad) + noise(engine);
       pixels.push_back(static_cast<Uint16>(std::lround(std::hypot(real, imaginary))));
     }
     if (phase == scan.missing_phase) continue;

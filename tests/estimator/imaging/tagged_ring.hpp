@@ -21,6 +21,7 @@ struct RingScan {
   bool tagged = true;
   int ghost_rows = 0;                  ///< a copy of the picture, so many rows below
   double ghost_share = 0.06;           ///< of its brightness
+  double ghost_turn_rad = 0;           ///< its phase against the picture
   std::optional<int> missing_phase{};  ///< from 1
   bool with_times = true;
   int series = 2;

@@ -233,7 +233,7 @@ TEST(ManualEdits, RefusesWhatDoesNotFitWithFileLineValueAndRemedy) {
       {"{\"action\": \"mask\"", {"no JSON", "delete"}},
       {"[1, 2]", {"no JSON object"}},
       {"{\"slice\": 3}", {"\"action\" is missing", "undo"}},
-      {"{\"action\": \"drag\"}", {"\"drag\"", "line, mask, contour or undo"}},
+      {"{\"action\": \"drag\"}", {"\"drag\"", "line, mask, contour, height or undo"}},
       {"{\"action\": \"mask\", \"phase\": 1}", {"\"slice\" is missing"}},
       {R"({"action": "mask", "slice": "series 2, slice 9", "phase": 1, "points": [[1,1],[5,1],[5,5]]})",
        {"series 2, slice 9", "Did you mean", "series 2, slice 1"}},
@@ -256,6 +256,8 @@ TEST(ManualEdits, RefusesWhatDoesNotFitWithFileLineValueAndRemedy) {
       {"{" + slice + R"("action": "line", "phase": 1, "tag": 400, "points": [[1,1]]})", {"tag 400", "Tags"}},
       {"{" + slice + R"("action": "line", "phase": 1, "tag": 4, "direction": 2, "points": [[1,1]]})",
        {"direction 2", "numbered from 1"}},
+      {"{" + slice + R"("action": "height", "height_mm": "middle"})", {"\"middle\"", "mid-height"}},
+      {"{" + slice + R"("action": "height"})", {"\"height_mm\" is missing", "mid-height"}},
       {"{\"action\": \"undo\", \"line\": 2}", {"line 2", "undone"}},
       {"{\"action\": \"undo\"}\n{\"action\": \"undo\"}", {"nothing is left"}}};
   for (const auto& [line, words] : bad) {

@@ -31,6 +31,7 @@ const desk = (() => {
   // ---- what stands ----
   const here = (player, edit) => edit.slice === player.slice.name && (edit.phase === "all" || edit.phase === player.image.frame);
   const words = (edit) => {
+    if (edit.action === "height") return `${edit.slice} lies ${edit.height_mm} mm over mid-height`;
     const what = { line: () => `line of tag ${edit.tag}`, mask: () => "mask", contour: () => `${edit.contour} edge` }[edit.action]();
     return `${edit.slice}, ${edit.phase === "all" ? "all phases" : `phase ${edit.phase}`}: ${what}, ${edit.points.length} points`;
   };
