@@ -126,13 +126,41 @@ void take_off_motion(const SplinePlane& splines, const Eigen::ArrayXXf& slope, s
   }
 }
 
-/// What one quadrant in one phase says.
+/// An estimate, and its variance.
 struct Say {
   double share, variance;
 };
+using Says = std::array<std::vector<Say>, quadrants>;  // of each phase
 
-void add_says(const TagView& view, const TrackedView& tracked, size_t k, const Ghost& ghost,
-              std::vector<Say>& says) {
+struct Pooled {
+  double mean = 0, variance = 0;
+  double spread = 0;  ///< how much more than their variances the estimates differ
+};
+
+/// The weighted mean; estimates may differ by more than their variances (DerSimonian, Laird, Control. Clin. Trials 7 (1986) 177).
+Pooled pooled(const std::vector<Say>& says) {
+  double weight = 0, sum = 0, squares = 0, spread = 0;
+  for (const Say& say : says) {
+    weight += 1 / say.variance;
+    sum += say.share / say.variance;
+    squares += 1 / (say.variance * say.variance);
+  }
+  for (const Say& say : says)
+    spread += (say.share - sum / weight) * (say.share - sum / weight) / say.variance;
+  Pooled all;
+  const double freedom = static_cast<double>(says.size()) - 1;
+  if (freedom > 0) all.spread = std::max(0.0, (spread - freedom) / (weight - squares / weight));
+  double inverse = 0;
+  for (const Say& say : says) {
+    inverse += 1 / (say.variance + all.spread);
+    all.mean += say.share / (say.variance + all.spread);
+  }
+  all.mean /= inverse;
+  all.variance = 1 / inverse;
+  return all;
+}
+
+void add_says(const TagView& view, const TrackedView& tracked, size_t k, const Ghost& ghost, Says& says) {
   std::vector<Over> pixels = fitted_pixels(view, tracked, k, ghost);
   if (pixels.empty()) return;
   const double spacing_mm = tracked.waves[0].spacing_mm();
@@ -157,39 +185,33 @@ void add_says(const TagView& view, const TrackedView& tracked, size_t k, const G
   for (size_t quadrant = 0; quadrant < quadrants; ++quadrant) {
     const double edges = squares[quadrant] - noises[quadrant];
     if (edges > 0)
-      says.push_back({products[quadrant] / edges, noise * noise * squares[quadrant] / (edges * edges)});
+      says[quadrant].push_back(
+          {products[quadrant] / edges, noise * noise * squares[quadrant] / (edges * edges)});
   }
 }
 
 }  // namespace
 
 void measure_in_phase(const TagView& view, const TrackedView& tracked, Ghost& ghost) {
-  std::vector<Say> says;
+  Says says;
   for (size_t k = 0; k < view.images.size(); ++k)
     add_says(view, tracked, k, ghost, says);
-  double weight = 0, sum = 0, weights_squared = 0, spread = 0;
-  for (const Say& say : says) {
-    weight += 1 / say.variance;
-    sum += say.share / say.variance;
-    weights_squared += 1 / (say.variance * say.variance);
+  std::vector<Say> each;
+  for (const std::vector<Say>& quadrant : says) {
+    if (quadrant.size() < 2) continue;
+    const Pooled phases = pooled(quadrant);
+    each.push_back({phases.mean, phases.variance});
   }
-  if (says.size() < 2) return;
-  for (const Say& say : says)
-    spread += (say.share - sum / weight) * (say.share - sum / weight) / say.variance;
-  const double differing =
-      std::max(0.0, (spread - static_cast<double>(says.size() - 1)) / (weight - weights_squared / weight));
-  double all = 0, mean = 0;
-  for (const Say& say : says) {
-    all += 1 / (say.variance + differing);
-    mean += say.share / (say.variance + differing);
-  }
-  mean = std::clamp(mean / all, -ghost.share, ghost.share);
+  if (each.size() < 2) return;
+  const Pooled all = pooled(each);
+  const double mean = std::clamp(all.mean, -ghost.share, ghost.share);
+  const double variance = all.variance + all.spread;
   // The phase may be any at first.
   double likely = 0, first = 0, second = 0;
   constexpr int steps = 360;
   for (int step = 0; step < steps; ++step) {
     const double in_phase = ghost.share * std::cos(std::numbers::pi * (step + 0.5) / steps);
-    const double weight_here = std::exp(-0.5 * (in_phase - mean) * (in_phase - mean) / (1 / all + differing));
+    const double weight_here = std::exp(-0.5 * (in_phase - mean) * (in_phase - mean) / variance);
     likely += weight_here;
     first += weight_here * in_phase;
     second += weight_here * in_phase * in_phase;

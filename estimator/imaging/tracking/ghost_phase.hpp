@@ -9,9 +9,8 @@
 
 namespace diastole::imaging {
 
-/// Sets `ghost.in_phase` and its standard deviation, from the residuals of `tracked` in all phases: the mean over quadrants and phases,
-/// which may differ by more than their errors (DerSimonian, Laird, Control. Clin. Trials 7 (1986) 177), where any phase is as likely
-/// before.
+/// Sets `ghost.in_phase` and its standard deviation, from the images and what `tracked` left of them. It is the same in all phases, and the
+/// phase may be any before; quadrants may differ by more than the scatter of their phases.
 void measure_in_phase(const TagView& view, const TrackedView& tracked, Ghost& ghost);
 
 /// The images as they would be without the ghosts, in and around the tissue; elsewhere, where noise is all that is left, as they are.

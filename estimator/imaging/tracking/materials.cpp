@@ -180,12 +180,20 @@ void lower_envelope(std::span<float> values, double spacing_mm, std::vector<doub
 Eigen::ArrayXXf distance_to(const Eigen::Array<bool, Eigen::Dynamic, Eigen::Dynamic>& is_source,
                             const SlicePlane& plane) {
   constexpr float far_mm2 = 1e8F;
-  Eigen::ArrayXXf square =
-      is_source.select(Eigen::ArrayXXf::Zero(is_source.rows(), is_source.cols()), far_mm2);
+  Eigen::ArrayXXf square(is_source.rows(), is_source.cols());
+  const auto step_mm = static_cast<float>(plane.row_spacing_mm);
+  for (Eigen::Index column = 0; column < square.cols(); ++column) {
+    float apart_mm = 1e4F;
+    for (Eigen::Index row = 0; row < square.rows(); ++row) {
+      apart_mm = is_source(row, column) ? 0.0F : apart_mm + step_mm;
+      square(row, column) = apart_mm;
+    }
+    for (Eigen::Index row = square.rows(); row-- > 0;) {
+      apart_mm = std::min(square(row, column), apart_mm + step_mm);
+      square(row, column) = std::min(apart_mm * apart_mm, far_mm2);
+    }
+  }
   std::vector<double> scratch;
-  for (Eigen::Index column = 0; column < square.cols(); ++column)
-    lower_envelope({square.col(column).data(), static_cast<size_t>(square.rows())}, plane.row_spacing_mm,
-                   scratch);
   std::vector<float> line(static_cast<size_t>(square.cols()));
   for (Eigen::Index row = 0; row < square.rows(); ++row) {
     Eigen::Map<Eigen::ArrayXf> view(line.data(), square.cols());
@@ -274,6 +282,15 @@ double noise_of(const Image& image, const Eigen::ArrayXXf& depth) {
   return signal::quantile(off, 0.5) / 1.1774;
 }
 
+Eigen::Array<bool, Eigen::Dynamic, Eigen::Dynamic> where(const MaterialMap& map, Material material) {
+  return map.unaryExpr([material](Material here) { return here == material; });
+}
+
+/// `depth_mm` within the material; outside, just negative.
+Eigen::ArrayXXf depth_within_mm(const MaterialMap& map, Material material, const SlicePlane& plane) {
+  return distance_to(!where(map, material), plane) - static_cast<float>(0.5 * plane.finer_spacing_mm());
+}
+
 }  // namespace
 
 MaterialMap first_materials(const TagView& view) {
@@ -334,8 +351,8 @@ MaterialMap refined_materials(size_t k, const TagView& view, const MaterialMap& 
   const double noise =
       std::max(1e-6, noise_of(view.images[k], depth_mm(before, Material::nothing, view.plane)));
   const auto cost = [&](Material material, double window_mm, size_t count, const auto& patterns_at) {
-    return cost_of(k, view, depth_mm(before, material, view.plane), sure_mm, window_mm, count, patterns_at,
-                   noise);
+    return cost_of(k, view, depth_within_mm(before, material, view.plane), sure_mm, window_mm, count,
+                   patterns_at, noise);
   };
   std::array<CostMap, 4> costs;
   costs[static_cast<size_t>(Material::nothing)] = cost(Material::nothing, 2 * spacing_mm, 1, constant);
@@ -385,8 +402,7 @@ void draw_contours(const PhaseEdits& edits, MaterialMap& map) {
 }
 
 Eigen::ArrayXXf depth_mm(const MaterialMap& map, Material material, const SlicePlane& plane) {
-  const Eigen::Array<bool, Eigen::Dynamic, Eigen::Dynamic> inside =
-      map.unaryExpr([material](Material here) { return here == material; });
+  const Eigen::Array<bool, Eigen::Dynamic, Eigen::Dynamic> inside = where(map, material);
   const auto half = static_cast<float>(0.5 * plane.finer_spacing_mm());
   return inside.select(distance_to(!inside, plane) - half, half - distance_to(inside, plane));
 }

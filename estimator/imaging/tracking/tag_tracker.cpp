@@ -8,6 +8,7 @@
 
 #include "estimator/imaging/series/spectrum.hpp"
 #include "estimator/imaging/tracking/brightness.hpp"
+#include "estimator/imaging/tracking/edge_excess.hpp"
 #include "estimator/imaging/tracking/ghost_phase.hpp"
 #include "estimator/imaging/tracking/motion_prior.hpp"
 #include "estimator/imaging/tracking/robust_weight.hpp"
@@ -29,8 +30,8 @@ constexpr double first_step_in_spacings = 0.2;
 constexpr double first_range_in_spacings = 4.0;
 /// Ranges to choose from by evidence: kappa = 1 / (these times the spacing).
 constexpr std::array ranges_in_spacings = {4.0, 16.0};
-/// Modes of the motion that are smaller than a two-hundredth of a pixel are no part of it.
-constexpr double negligible_in_pixels = 0.005;
+/// Modes of the motion that are smaller than a four-hundredth of a pixel are no part of it.
+constexpr double negligible_in_pixels = 0.0025;
 /// A motion that begins at rest has done 2 (2 t / T)^2 of its whole after a small t: a thousandth after a hundredth of the cycle.
 constexpr double late_share = 0.02;
 constexpr double settled_mm = 0.005;
@@ -500,7 +501,10 @@ class ViewTracker {
     PhaseInformation information{Eigen::MatrixXd::Zero(splines_->count(), splines_->count()),
                                  Eigen::VectorXd::Zero(splines_->count())};
     for (const Fitted& fitted : fitted_) {
-      const double weight = huber_weight(fitted.residual, phase.noise) / (phase.noise * phase.noise);
+      const double beside_noise =
+          edge_excess_.at(static_cast<double>(phase.depth_mm(fitted.pixel->row, fitted.pixel->column)));
+      const double weight =
+          huber_weight(fitted.residual, phase.noise) / (phase.noise * phase.noise * beside_noise);
       const SplineValues& splines = fitted.pixel->splines;
       const double square = weight * fitted.slope * fitted.slope;
       const double product = weight * fitted.slope * fitted.residual;
@@ -572,6 +576,7 @@ class ViewTracker {
   }
 
   void fit_all_phases() {
+    edge_excess_ = EdgeExcess(phases_, view_.plane.finer_spacing_mm());
     for (size_t f = 0; f < directions(); ++f)
       factors_.push_back(noise_factor(f));
     std::vector<double> kappas;
@@ -666,6 +671,7 @@ class ViewTracker {
   Eigen::MatrixXd first_precision_;
   std::vector<Eigen::MatrixXd> coefficients_;  // a direction: n x T
   std::vector<TrackedPhase> phases_;
+  EdgeExcess edge_excess_;                                  // before all phases are fitted together: none
   std::vector<std::vector<std::vector<SeenMotion>>> seen_;  // a phase and direction
   std::vector<Fitted> fitted_;
   std::vector<double> factors_;
