@@ -15,13 +15,17 @@ constexpr size_t quadrants = 4;
 /// Residuals of twice the noise's variance over a circle of a spacing are a fold or an edge, and no ghost: it is weaker than noise.
 constexpr double most_around = 2.0;
 
+/// Of the noise's variance in a channel what the magnitude has where there is nothing but noise (Rayleigh).
+constexpr double dark_variance = 2 - std::numbers::pi / 2;
+
 /// A pixel that was fitted.
 struct Over {
   Eigen::Index row, column;
   std::array<double, 2> phases_rad;
   SplineValues splines;
-  double ghost;  // the shifted picture, then what is left of it
-  double image;  // and of the image
+  double ghost;           // the shifted picture, then what is left of it
+  double image;           // and of the image
+  double ghost_variance;  // of the noise in the shifted picture
 };
 
 /// Pixels within `reach_mm` of one around which the residuals are too large.
@@ -56,6 +60,10 @@ std::vector<Over> fitted_pixels(const TagView& view, const TrackedView& tracked,
                                 const Ghost& ghost) {
   const TrackedPhase& phase = tracked.phases[k];
   const PixelMask spoilt = spoilt_pixels(view, phase, tracked.waves[0].spacing_mm());
+  const Image variance = phase.materials.unaryExpr([&](Material material) {
+    return static_cast<float>(phase.noise * phase.noise *
+                              (material == Material::nothing ? dark_variance : 1));
+  });
   std::vector<Over> pixels;
   for (Eigen::Index column = 0; column < phase.residual.cols(); ++column) {
     for (Eigen::Index row = 0; row < phase.residual.rows(); ++row) {
@@ -66,7 +74,8 @@ std::vector<Over> fitted_pixels(const TagView& view, const TrackedView& tracked,
                  {},
                  tracked.motion[0].splines.at(x_mm),
                  ghost.over(view.images[k], row, column) / ghost.share,
-                 static_cast<double>(view.images[k](row, column))};
+                 static_cast<double>(view.images[k](row, column)),
+                 ghost.over(variance, row, column) / ghost.share};
       for (size_t f = 0; f < tracked.waves.size(); ++f) {
         const TagWave& wave = tracked.waves[f];
         pixel.phases_rad[f] =
@@ -179,7 +188,7 @@ void add_says(const TagView& view, const TrackedView& tracked, size_t k, const G
     const size_t quadrant = (x_mm.x() > middle.x() ? 1U : 0U) + (x_mm.y() > middle.y() ? 2U : 0U);
     // The shifted picture has noise of its own, which is none of the ghost's edges.
     squares[quadrant] += pixel.ghost * pixel.ghost;
-    noises[quadrant] += noise * noise;
+    noises[quadrant] += pixel.ghost_variance;
     products[quadrant] += huber_weight(pixel.image, noise) * pixel.image * pixel.ghost;
   }
   for (size_t quadrant = 0; quadrant < quadrants; ++quadrant) {
