@@ -13,6 +13,7 @@ namespace diastole {
 namespace {
 
 constexpr size_t most_bytes = size_t{1} << 32;
+constexpr size_t most_unpacked = 1032;  // of a byte: zlib's best
 
 /// Groups of four characters, each up to three bytes; a block that ends in '=' may be followed by another.
 std::string from_base64(std::string_view text) {
@@ -75,6 +76,8 @@ std::string unpacked(std::string_view bytes, const VtuEncoding& encoding) {
     if (rest.size() < sizes[i]) throw std::invalid_argument("the data are shorter than their header says");
     uLongf length = i + 1 == blocks && last_size > 0 ? last_size : block_size;
     if (whole.size() + length > most_bytes) throw std::invalid_argument("the data are too long");
+    if (length > most_unpacked * (sizes[i] + 1))
+      throw std::invalid_argument("a block claims more than zlib can have packed into it");
     std::string block(length, '\0');
     if (uncompress(reinterpret_cast<Bytef*>(block.data()), &length,
                    reinterpret_cast<const Bytef*>(rest.data()), static_cast<uLong>(sizes[i])) != Z_OK)

@@ -130,7 +130,7 @@ class XdmfReader {
       const std::string place = fmt::format("Topology, cell {}", grid.cells.size());
       auto kind = named;
       if (mixed) {
-        kind = std::ranges::find(cell_kinds(), static_cast<int>(data[at]), &CellKind::xdmf);
+        kind = std::ranges::find_if(cell_kinds(), [&](const CellKind& one) { return one.xdmf == data[at]; });
         if (kind == cell_kinds().end())
           refuse(place, fmt::format("cells of type {} are not known", data[at]));
         at += kind->xdmf <= 2 ? 2 : 1;  // points and lines say how many there are
