@@ -6,6 +6,7 @@
 #include <chrono>
 #include <csignal>
 #include <cstdio>
+#include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -117,9 +118,8 @@ ExitCode make_key(const FlashOptions& options, const CommandOutput& out) {
   print(out, {{"result", "key_made"}, {"key", options.new_key}}, [&] {
     fmt::print(
         "made {}: whoever has it can make firmware for your controllers, and without it they are flashed by "
-        "SWD "
-        "only. Keep a copy in a safe place, and build with -DDIASTOLE_SIGNING_KEY={}\n",
-        options.new_key, options.new_key);
+        "SWD only. Keep a copy in a safe place, and build with -DDIASTOLE_SIGNING_KEY={}\n",
+        options.new_key, std::filesystem::absolute(options.new_key).string());
   });
   return ExitCode::done;
 }
@@ -163,12 +163,13 @@ void add_flash(CommandLine& line) {
   command->add_flag("--allow-older", options->update.allow_older,
                     "also an older version than the one that runs");
   command->add_flag("--force", options->update.force, "also what it already runs, or an older version");
-  command->add_flag("--dry-run", options->update.dry_run, "say what would be done");
+  auto* dry_run = command->add_flag("--dry-run", options->update.dry_run, "say what would be done");
   auto* sign = command->add_option("--sign", options->sign, "sign IMAGE in place with this key file");
   command->add_option("--counter", options->counter, "its rollback counter")->needs(sign);
-  sign->needs(image)->excludes(port);
+  sign->needs(image)->excludes(port)->excludes(dry_run);
   command->add_option("--new-key", options->new_key, "make a key file")
       ->excludes(sign)
+      ->excludes(dry_run)
       ->excludes(port)
       ->excludes(image);
   line.on_run(command, [options](const CommandOutput& out) {

@@ -10,12 +10,15 @@
 //
 // writes the 32 bytes that the bootloader checks signatures with, all 0xFF for `none`; --make makes KEY if there is none.
 
+#include <charconv>
+#include <cstdint>
 #include <cstdio>
 #include <cstdlib>
 #include <fstream>
 #include <iterator>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "firmware/boot/boot_records.hpp"
@@ -61,6 +64,15 @@ wire::FirmwareVersion parse_version(const std::string& text) {
     throw std::runtime_error(text + " is no version (1.2.3)");
   return {static_cast<std::uint8_t>(major), static_cast<std::uint8_t>(minor),
           static_cast<std::uint8_t>(patch)};
+}
+
+/// Digits only: of a counter that is misread upwards no later image would ever be taken.
+std::uint32_t parse_counter(std::string_view text) {
+  std::uint32_t counter = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), counter);
+  if (error != std::errc{} || end != text.data() + text.size())
+    throw std::runtime_error(std::string(text) + " is no rollback counter (0, 1, 2, ... 4294967295)");
+  return counter;
 }
 
 /// The first half of a hash over both codes, so that the two images of one build have the same.
@@ -116,7 +128,7 @@ void pack(char** argument) {
   const wire::ImageHeader a = make_header(common, argument[3], code_a);
   const wire::ImageHeader b = make_header(common, argument[5], code_b);
   const std::string out = argument[7], key = argument[8];
-  const auto counter = static_cast<std::uint32_t>(std::strtoul(argument[9], nullptr, 0));
+  const std::uint32_t counter = parse_counter(argument[9]);
   Bytes area = signed_header(a, key, counter);
   write(out + ".image", update_file(area, code_a, signed_header(b, key, counter), code_b));
   area.resize(wire::kImageHeaderArea, 0xFF);
