@@ -71,6 +71,39 @@ TEST(FlashCommand, InstallsOverTheLineInterruptedOrNot) {
   EXPECT_EQ(board.wait().exit_code, 0);
 }
 
+TEST(FlashCommand, MakesAKeyAndSignsWithIt) {
+  Workplace workplace;
+  const std::string image = write_update(workplace, "built.image", {.version = {1, 0, 0}});
+  const std::string key = (workplace / "key.pem").string();
+  const Ended made = run(workplace, {"diastole", "flash", "--new-key", key, "--json"});
+  ASSERT_EQ(made.exit_code, 0) << made.err;
+  EXPECT_EQ(made.json().at("result"), "key_made");
+  using std::filesystem::perms;
+  EXPECT_EQ(std::filesystem::status(key).permissions(), perms::owner_read | perms::owner_write);
+  const Ended again = run(workplace, {"diastole", "flash", "--new-key", key});
+  EXPECT_EQ(again.exit_code, 2);
+  EXPECT_THAT(again.err, HasSubstr("never overwritten"));
+
+  for (const int counter : {3, 4}) {
+    const Ended signed_image = run(workplace, {"diastole", "flash", "--sign", key, image, "--counter",
+                                               std::to_string(counter), "--json"});
+    ASSERT_EQ(signed_image.exit_code, 0) << signed_image.err;
+    EXPECT_EQ(signed_image.json().at("result"), "signed");
+    EXPECT_EQ(signed_image.json().at("counter"), counter);
+  }
+  EXPECT_EQ(run(workplace, {"diastole", "flash", "--sign", key, image, "--json"}).json().at("counter"), 4)
+      << "kept where none is given";
+
+  const std::string other = workplace.write("other.pem", "no key");
+  std::filesystem::permissions(other, perms::owner_read | perms::owner_write);
+  EXPECT_THAT(run(workplace, {"diastole", "flash", "--sign", other, image}).err,
+              HasSubstr("is no Ed25519 key"));
+  std::filesystem::permissions(other, perms::group_read, std::filesystem::perm_options::add);
+  EXPECT_THAT(run(workplace, {"diastole", "flash", "--sign", other, image}).err, HasSubstr("chmod 600"));
+  EXPECT_EQ(run(workplace, {"diastole", "flash", image}).exit_code, 2) << "no port";
+  EXPECT_EQ(run(workplace, {"diastole", "flash", "--sign", key}).exit_code, 2) << "no image";
+}
+
 TEST(FlashCommand, SaysWhatIsWrongWithFileOrPort) {
   Workplace workplace;
   const std::string good = write_update(workplace, "good.image", {.version = {1, 0, 0}});
