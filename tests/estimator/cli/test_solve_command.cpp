@@ -124,7 +124,7 @@ TEST_F(SolveCommand, WritesTheFilesThatAreAskedFor) {
   EXPECT_GT(std::filesystem::file_size(table), 0);
   EXPECT_EQ(nlohmann::json::parse(std::ifstream(record))["parameters"]["C1_kPa"], 6.5);
   EXPECT_EQ(run(arguments).code, ExitCode::done) << "earlier results are replaced";
-  EXPECT_THAT(refusal({"--pressure-kPa", "2", "-o", "gel.vtu"}),
+  EXPECT_THAT(refusal({"--pressure-kPa", "2", "-o", "gel.stl"}),
               testing::HasSubstr(".vtkhdf (for ParaView)"));
   std::ofstream(table) << "a table of mine";
   EXPECT_THAT(refusal(arguments), testing::HasSubstr("gel.csv"));
