@@ -151,7 +151,25 @@ def their_grids(folder):
         assert np.allclose([[row[f"{a}_mm"] for a in "xyz"] for row in rows], points + u, atol=1e-12), version
 
 
+def their_walls(folder):
+    """An ellipsoid's walls in their file become our mesh, with the cavity's true volume."""
+    points, tags = [], []
+    for tag, across, along in ((1, 21, 51), (2, 30, 60)):
+        for z in np.linspace(-0.97 * along, 14.5, 14):
+            radius = across * np.sqrt(1 - (z / along) ** 2)
+            points += [(radius * np.cos(t), radius * np.sin(t), z) for t in np.linspace(0, 2 * np.pi, 16, endpoint=False)]
+            tags += [tag] * 16
+    points += [(24 * np.cos(t), 24 * np.sin(t), 15) for t in np.linspace(0, 2 * np.pi, 12, endpoint=False)]
+    tags += [3] * 12
+    cells = [("vertex", np.arange(len(points))[:, None])]
+    meshio.write(folder / "walls.vtu", meshio.Mesh(np.array(points), cells, cell_data={"physical": [np.array(tags)]}))
+    said("mesh", "surface", folder / "walls.vtu", "--endo", 1, "--epi", 2, "--base", 3, "--sigma-mm", 0.2, "-o", folder / "walls.guide.csv")
+    fitted = said("lv", folder / "walls.guide.csv", "--keep-slices", "-o", folder / "walls.mesh.toml")
+    true_mL = np.pi * 21**2 * ((15 + 51) - (15**3 + 51**3) / (3 * 51**2)) / 1000
+    assert abs(fitted["cavity_mL"] / true_mL - 1) < 0.002, (fitted["cavity_mL"], true_mL)
+
+
 with tempfile.TemporaryDirectory() as scratch:
-    for task in (the_gel, the_ventricle, their_grids):
+    for task in (the_gel, the_ventricle, their_grids, their_walls):
         task(pathlib.Path(scratch))
         print(f"{task.__name__}: passed")
