@@ -14,8 +14,8 @@ class SliceTracker {
  public:
   enum class Phase { waiting, dummy, imaging, pause, done };
 
-  /// Precondition: at least one slice, each of at least one cycle.
-  explicit SliceTracker(std::vector<PlannedSlice> slices) : slices_(std::move(slices)) { enter(0); }
+  /// Precondition: at least one slice that is not done, each of at least one cycle.
+  explicit SliceTracker(std::vector<PlannedSlice> slices) : slices_(std::move(slices)) { enter(next_due(0)); }
 
   struct Turn {
     bool slice_begins = false;  ///< this cycle is the first that is imaged
@@ -29,7 +29,7 @@ class SliceTracker {
     --left_;
     Turn turn;
     turn.slice_begins = phase_ == Phase::imaging && left_ == planned().cycles - 1;
-    turn.last_cycle = phase_ == Phase::imaging && left_ == 0 && slice_ + 1 == slices_.size();
+    turn.last_cycle = phase_ == Phase::imaging && left_ == 0 && next_due(slice_ + 1) == slices_.size();
     if (turn.last_cycle) phase_ = Phase::done;
     return turn;
   }
@@ -50,7 +50,7 @@ class SliceTracker {
     int64_t left = left_;
     if (phase_ == Phase::waiting || phase_ == Phase::dummy) left += now.cycles;
     if (phase_ != Phase::pause) left += now.pause_cycles;
-    for (size_t later = slice_ + 1; later < slices_.size(); ++later) {
+    for (size_t later = next_due(slice_ + 1); later < slices_.size(); later = next_due(later + 1)) {
       const PlannedSlice& planned = slices_[later];
       left += planned.dummy_cycles + planned.cycles + planned.pause_cycles;
     }
@@ -58,6 +58,11 @@ class SliceTracker {
   }
 
  private:
+  [[nodiscard]] size_t next_due(size_t slice) const {
+    while (slice < slices_.size() && slices_[slice].done)
+      ++slice;
+    return slice;
+  }
   void enter(size_t slice) {
     slice_ = slice;
     phase_ = planned().prompt.empty() ? Phase::dummy : Phase::waiting;
@@ -74,7 +79,7 @@ class SliceTracker {
         left_ = planned().pause_cycles;
         break;
       case Phase::pause:
-        enter(slice_ + 1);
+        enter(next_due(slice_ + 1));
         break;
       case Phase::waiting:
       case Phase::done:

@@ -50,7 +50,7 @@ ExitCode show_plan(const Experiment& experiment, const CommandOutput& out) {
 
 /// One session, shown as it goes.
 SessionResult acquire(DaemonClient& daemon, SessionOptions session) {
-  fmt::print(stderr, "{}", plan_words(read_experiment(session.experiment)));
+  if (!session.resume) fmt::print(stderr, "{}", plan_words(read_experiment(session.experiment)));
   SessionView view(isatty(STDERR_FILENO) != 0);
   if (isatty(STDIN_FILENO) != 0) {
     session.ready = [&view] {
@@ -74,7 +74,10 @@ ExitCode run(RunOptions options, SessionSeries& series, const CommandOutput& out
     throw InputError({"", "EXPERIMENT", series.asked() ? "is not asked for beside --shape" : "is missing",
                       "Give an experiment file, or --shape TARGET.csv --study STUDY."});
   }
-  if (options.dry_run && !series.asked()) return show_plan(read_experiment(options.session.experiment), out);
+  if (options.dry_run && series.asked()) {
+    throw InputError({"", "--dry-run", "is not for --shape", "See the drive first: diastole shape TARGET.csv."});
+  }
+  if (options.dry_run) return show_plan(read_experiment(options.session.experiment), out);
   if (options.session.output.empty()) {
     throw InputError({"", "-o", "is missing", "Name the run file to write, for example -o session.run.h5."});
   }
@@ -89,7 +92,9 @@ ExitCode run(RunOptions options, SessionSeries& series, const CommandOutput& out
       [&](const std::string& experiment, const std::string& run_file) {
         options.session.experiment = experiment;
         options.session.output = run_file;
-        return acquire(daemon, options.session);
+        SessionResult result = acquire(daemon, options.session);
+        if (interrupts > 0 && result.end == "completed") result.end = "stopped by Ctrl-C";
+        return result;
       },
       out);
 }
@@ -115,11 +120,18 @@ void add_run(CommandLine& line, std::shared_ptr<SessionSeries> series) {
       "      up to four sessions, followed.1.run.h5 and so on, in which the pump learns the drive by which "
       "the\n"
       "      specimen follows the curve (diastole shape); the controller checks each before anything moves\n"
+      "  diastole run study.experiment.toml -o study-2.run.h5 --resume\n"
+      "      goes on with a study that broke off, by a crash, a fault or a stop: slices that were imaged "
+      "whole\n"
+      "      are left out; nothing moves before this command. The part before is a run file of its own\n"
       "A study with prompts goes on when you press Enter, or with `diastole continue` from anywhere.\n"
       "Exit code 1: samples are missing; 3: a fault or a broken link ended the run.");
   command->add_option("EXPERIMENT", options->session.experiment, "experiment file (.toml)");
   command->add_option("-o,--output", options->session.output, "run file to write");
-  command->add_flag("--dry-run", options->dry_run, "only tell what would be done");
+  CLI::Option* dry_run = command->add_flag("--dry-run", options->dry_run, "only tell what would be done");
+  command
+      ->add_flag("--resume", options->session.resume, "go on with the first slice that was not imaged whole")
+      ->excludes(dry_run);
   command->add_flag("--force", options->session.force, "replace the run file if it exists");
   add_facts_to(*command, options->session.facts);
   command->add_flag("!--no-questions", options->asks, "ask for no facts of the session");

@@ -176,6 +176,11 @@ Experiment read_experiment(const std::string& file) {
   });
 }
 
+void leave_out(Experiment& study, std::set<int64_t> done) {
+  study.schedule->done = std::move(done);
+  study.segments.front().cycles = study.schedule->cycles_at_most();
+}
+
 std::vector<std::string> doubts_about(const Experiment& experiment) {
   constexpr double least_usual_stroke_mL = 1, mL_per_L = 1000;
   std::vector<std::string> doubts;

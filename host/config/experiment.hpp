@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <functional>
 #include <optional>
+#include <set>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -63,6 +64,9 @@ Experiment parse_experiment(std::string_view text, const std::string& file,
                             const ReadPoints& read_points = {});
 /// Points files are looked for beside the experiment.
 Experiment read_experiment(const std::string& file);
+
+/// Leaves these slices out of a study, of which others are still due.
+void leave_out(Experiment& study, std::set<int64_t> done);
 
 /// What is allowed, and hardly meant: one sentence for each, with what may have been meant.
 std::vector<std::string> doubts_about(const Experiment& experiment);

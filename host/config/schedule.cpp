@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <iterator>
+#include <utility>
 
 namespace diastole {
 namespace {
@@ -50,10 +52,19 @@ ScheduleBlock read_block(TableReader table, double period_s) {
   return block;
 }
 
+/// Of a block whose first slice has that number of all.
+int64_t slices_due(const ScheduleBlock& block, int64_t first, const std::set<int64_t>& done) {
+  return block.slices - std::distance(done.lower_bound(first), done.lower_bound(first + block.slices));
+}
+
 }  // namespace
 
 bool Schedule::waits() const {
-  return std::ranges::any_of(blocks, [](const ScheduleBlock& block) { return !block.prompt.empty(); });
+  int64_t first = 0;
+  return std::ranges::any_of(blocks, [&](const ScheduleBlock& block) {
+    const bool due = slices_due(block, std::exchange(first, first + block.slices), done) > 0;
+    return due && !block.prompt.empty();
+  });
 }
 
 int64_t Schedule::slices() const {
@@ -64,10 +75,13 @@ int64_t Schedule::slices() const {
 }
 
 int64_t Schedule::cycles() const {
-  int64_t total = (slices() - 1) * pause_cycles;
-  for (const ScheduleBlock& block : blocks)
-    total += block.slices * (dummy_cycles + block.cycles_per_slice);
-  return total;
+  int64_t total = 0, due = 0, first = 0;
+  for (const ScheduleBlock& block : blocks) {
+    const int64_t due_here = slices_due(block, std::exchange(first, first + block.slices), done);
+    total += due_here * (dummy_cycles + block.cycles_per_slice);
+    due += due_here;
+  }
+  return total + std::max<int64_t>(0, due - 1) * pause_cycles;
 }
 
 std::vector<PlannedSlice> planned_slices(const Schedule& schedule) {
@@ -75,10 +89,12 @@ std::vector<PlannedSlice> planned_slices(const Schedule& schedule) {
   for (const ScheduleBlock& block : schedule.blocks) {
     for (int64_t number = 0; number < block.slices; ++number) {
       slices.push_back({block.name, number, schedule.dummy_cycles, block.cycles_per_slice,
-                        schedule.pause_cycles, block.prompt});
+                        schedule.pause_cycles, block.prompt, schedule.done.contains(std::ssize(slices))});
     }
   }
-  slices.back().pause_cycles = 0;
+  const auto last_due =
+      std::find_if(slices.rbegin(), slices.rend(), [](const auto& slice) { return !slice.done; });
+  if (last_due != slices.rend()) last_due->pause_cycles = 0;
   return slices;
 }
 

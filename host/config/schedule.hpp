@@ -7,9 +7,12 @@
 //
 // A block with a prompt waits before each of its slices for the operator, who sets the scanner; the pump cycles
 // meanwhile, up to wait_cycles_at_most cycles in all. At the end of the last slice the run ends by itself.
+//
+// A session that broke off goes on in another run, which leaves out the slices that are `done`.
 
 #include <cstdint>
 #include <optional>
+#include <set>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -39,10 +42,12 @@ struct Schedule {
   int64_t pause_cycles = 0;  ///< after each slice but the last
   int64_t wait_cycles_at_most = 0;
   std::vector<ScheduleBlock> blocks;
+  std::set<int64_t> done = {};  ///< slices, of all, that earlier runs of the session have imaged; of no file
 
   [[nodiscard]] bool waits() const;
+  /// Of the whole session.
   [[nodiscard]] int64_t slices() const;
-  /// Of all slices with dummies and pauses; what waiting takes comes on top.
+  /// Of all slices that are not done, with dummies and pauses; what waiting takes comes on top.
   [[nodiscard]] int64_t cycles() const;
   /// As many as the controller is asked for, so that no wait that is allowed runs out.
   [[nodiscard]] int64_t cycles_at_most() const { return cycles() + (waits() ? wait_cycles_at_most : 0); }
@@ -55,9 +60,10 @@ struct PlannedSlice {
   int64_t cycles = 0;
   int64_t pause_cycles = 0;
   std::string prompt;
+  bool done = false;
 };
 
-/// One after the other.
+/// One after the other, those that are done among them.
 std::vector<PlannedSlice> planned_slices(const Schedule& schedule);
 
 /// `period_s` of the cycles. A block gives cycles_per_slice, or lines, lines_per_segment and averages, of which

@@ -10,6 +10,7 @@
 #include <cerrno>
 #include <chrono>
 #include <cstring>
+#include <fstream>
 #include <optional>
 
 #include "host/journal/part_file.hpp"
@@ -251,6 +252,21 @@ JournalContents read_journal(const std::filesystem::path& path) {
       scan(path, [&](const JournalRecord& record) { contents.records.push_back(record); });
   contents.file = path.string();
   return contents;
+}
+
+std::optional<JournalRecord> first_record(const std::filesystem::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  std::vector<uint8_t> bytes(header_bytes);
+  const auto read = [&](size_t from) {
+    const auto count = static_cast<std::streamsize>(bytes.size() - from);
+    return static_cast<bool>(file.read(reinterpret_cast<char*>(bytes.data() + from), count));
+  };
+  if (!read(0) || get_u32(bytes, 4) > most_payload_bytes) return std::nullopt;
+  bytes.resize(header_bytes + get_u32(bytes, 4) + crc_bytes);
+  if (!read(header_bytes)) return std::nullopt;
+  JournalContents contents = read_journal(std::span<const uint8_t>(bytes));
+  if (contents.records.empty()) return std::nullopt;
+  return std::move(contents.records.front());
 }
 
 }  // namespace diastole

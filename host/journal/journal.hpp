@@ -132,4 +132,7 @@ class JournalRecords {
 JournalContents read_journal(const std::filesystem::path& path);
 JournalContents read_journal(std::span<const uint8_t> bytes);
 
+/// The first record of a journal, without reading on; none if the file does not begin with a whole one.
+std::optional<JournalRecord> first_record(const std::filesystem::path& path);
+
 }  // namespace diastole

@@ -75,6 +75,13 @@ class FieldReader {
     else
       fields(name, value);
   }
+  void later(const char* name, std::vector<uint64_t>& values) {
+    if (!object_.contains(name)) return;
+    for (const json& number : object_.at(name)) {
+      if (!number.is_number_unsigned() || number.get<uint64_t>() > most_counts) throw std::out_of_range(name);
+      values.push_back(number.get<uint64_t>());
+    }
+  }
   void rate(const char* name, double& value_Hz) { integer(name, value_Hz, 1e-3); }
   void integer(const char* name, double& value, double least) {
     object_.at(name).get_to(value);
@@ -142,6 +149,8 @@ void describe(auto& io, BeginRecord& begin) {
   io.parts("waveforms", begin.waveforms);
   io.attributes("session", begin.session.facts);
   io.parts("notes", begin.session.notes);
+  io.later("resumes", begin.resumes);
+  io.later("slices_done", begin.slices_done);
 }
 
 void describe(auto& io, GridRecord& grid) { io.whole(most_ticks, "first_due_ns", grid.first_due_ns); }

@@ -60,7 +60,9 @@ struct BeginRecord {
   std::vector<runfile::Segment> segments;  ///< as planned
   double trigger_delay_s = 0;
   std::vector<PlayedSegment> waveforms;
-  runfile::Session session;  ///< as it was known at the start
+  runfile::Session session;           ///< as it was known at the start
+  std::string resumes;                ///< the run_id of the run whose session goes on here
+  std::vector<uint64_t> slices_done;  ///< slices, of all, that the session had imaged before
 };
 
 struct GridRecord {

@@ -72,6 +72,14 @@ class BlockReader {
 
 }  // namespace
 
+std::optional<BeginRecord> read_begin(const std::filesystem::path& journal) {
+  const auto record = first_record(journal);
+  if (!record || record->kind != RecordKind::document) return std::nullopt;
+  auto document = decode_document(record->payload);
+  auto* begin = document ? std::get_if<BeginRecord>(&*document) : nullptr;
+  return begin == nullptr ? std::nullopt : std::optional(std::move(*begin));
+}
+
 ParsedJournal parse_journal(const JournalRecords& journal) {
   ParsedJournal parsed;
   Sorter sort{parsed};

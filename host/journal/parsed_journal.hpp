@@ -38,6 +38,9 @@ struct ParsedJournal {
   JournalDamage damage;
 };
 
+/// What the journal begins with, without reading on; none if that is not whole.
+std::optional<BeginRecord> read_begin(const std::filesystem::path& journal);
+
 /// Throws InputError when the journal has no beginning, and as JournalRecords::each.
 ParsedJournal parse_journal(const JournalRecords& journal);
 

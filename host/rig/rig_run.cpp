@@ -122,8 +122,34 @@ class Preparation {
 
 }  // namespace
 
-void RigService::do_run(const RunOrder& order, const Done& done) {
-  const Experiment& experiment = order.experiment;
+SessionSoFar RigService::resume(Experiment& study) {
+  if (!study.schedule) {
+    throw InputError({study.file, "schedule", "is missing: nothing says where this experiment could go on",
+                      "Run it from its beginning, without --resume."});
+  }
+  std::optional<SessionSoFar> session;
+  const LongWork reading(options_.manager);
+  beside_the_line([&] { session = last_session(rig_.daemon.journal_dir, study.text, *study.schedule); });
+  if (!session) {
+    throw InputError(
+        {study.file, "",
+         fmt::format("has no session to resume: no journal in {} is of it", rig_.daemon.journal_dir.string()),
+         "The file must be as it was run, to the letter; without --resume a session begins."});
+  }
+  if (std::ssize(session->done) == study.schedule->slices()) {
+    throw InputError({study.file, "",
+                      fmt::format("has nothing left to do: all {} slices of the session of {} are imaged",
+                                  session->done.size(), session->started_utc),
+                      "Without --resume a new session begins."});
+  }
+  leave_out(study, session->done);
+  return *session;
+}
+
+void RigService::do_run(RunOrder order, const Done& done) {
+  Experiment& experiment = order.experiment;
+  std::optional<SessionSoFar> before;
+  if (order.resume) before = resume(experiment);
   (void)do_status();
   const daq::RatePlan rate = instrument_->plan_rate(experiment.sample_rate_Hz);
   RunPlan run{.run_id = boost::uuids::to_string(boost::uuids::random_generator()())};
@@ -136,12 +162,17 @@ void RigService::do_run(const RunOrder& order, const Done& done) {
   run.planned_cycles = experiment.planned_cycles();
   check_disk(run, rate, experiment.cycles());
   JournalWriter journal(path);
-  write_beginning(journal, run, order, plan, rate.rate_Hz);
+  write_beginning(journal, run, order, plan, rate.rate_Hz, before);
   live_.begin(run.run_id, rate.rate_Hz, controller_->hello().tick_rate_Hz);
   if (!queue_.begin("running", [&] { run_.begin(run); })) refuse_to_start();
   preparation.begun();
   for (const std::string& doubt : doubts_about(experiment))
     note({"warning", "experiment", doubt});
+  if (before) {
+    note({"info", "resumed",
+          fmt::format("the session of run {} ({}) goes on: {} of its {} slices are imaged", before->run_id,
+                      before->started_utc, before->done.size(), experiment.schedule->slices())});
+  }
   spdlog::info("run {} begins: {} cycles, {:.1f} s", run.run_id, run.planned_cycles, run.planned_s);
   done(nullptr, RunBegun{run.run_id, path.string(), run_file_beside(path).string()});
   RunResult result;
@@ -187,7 +218,8 @@ void RigService::tidy_journals() {
 }
 
 void RigService::write_beginning(JournalWriter& journal, const RunPlan& run, const RunOrder& order,
-                                 const ProgramPlan& plan, double sample_rate_Hz) {
+                                 const ProgramPlan& plan, double sample_rate_Hz,
+                                 const std::optional<SessionSoFar>& before) {
   const Experiment& experiment = order.experiment;
   const TimerFacts timer = make_source(*clock_, *instrument_)->timer(sample_rate_Hz);
   BeginRecord begin{.run_id = run.run_id,
@@ -206,7 +238,10 @@ void RigService::write_beginning(JournalWriter& journal, const RunPlan& run, con
                     .segments = planned_segments(experiment, plan),
                     .trigger_delay_s = 1e-3 * experiment.trigger_delay_ms,
                     .waveforms = played_waveforms(experiment),
-                    .session = order.session};
+                    .session = order.session,
+                    .resumes = before ? before->run_id : "",
+                    .slices_done = {}};
+  if (before) begin.slices_done.assign(before->done.begin(), before->done.end());
   for (runfile::SessionNote& note : begin.session.notes) {
     if (note.author.empty()) note.author = begin.session.text(runfile::operator_fact);
     if (note.written_utc.empty()) note.written_utc = begin.started_utc;

@@ -217,8 +217,8 @@ void RigService::refuse_to_start() const {
 void RigService::start_run(RunOrder order, Done done) {
   // do_run answers by itself when the run begins, long before it ends.
   queue_.give({"loading",
-               [this, order = std::move(order), done]() -> std::optional<RigAnswer> {
-                 do_run(order, done);
+               [this, order = std::move(order), done]() mutable -> std::optional<RigAnswer> {
+                 do_run(std::move(order), done);
                  return std::nullopt;
                },
                done});

@@ -23,6 +23,7 @@
 #include "host/rig/order_queue.hpp"
 #include "host/rig/run_monitor.hpp"
 #include "host/rig/service_manager.hpp"
+#include "host/rig/session_so_far.hpp"
 #include "protocol/runfile/session.hpp"
 
 namespace diastole {
@@ -45,6 +46,7 @@ struct CalibrationOrder {
 struct RunOrder {
   Experiment experiment;
   bool prompts_answered = false;  ///< AcquisitionSetup::prompts_answered
+  bool resume = false;            ///< the last session of this experiment goes on with what is not done
   runfile::Session session = {};  ///< a note without author or time is the operator's, of the run's start
 };
 
@@ -63,7 +65,7 @@ class RigService {
   /// Ends a run by a controlled stop, writes what it has, and closes everything.
   ~RigService();
 
-  /// Loads and starts an experiment. `done` is called with RunBegun when the controller has accepted it, or with
+  /// Loads and starts an experiment, or what is left of its last session. `done` is called with RunBegun when the controller has accepted it, or with
   /// InputError when it cannot be done, HardwareError when it was stopped before the start.
   void start_run(RunOrder order, Done done);
   /// RigStatus, as the next two.
@@ -123,9 +125,12 @@ class RigService {
   void check_disk(const RunPlan& plan, const daq::RatePlan& rate, int64_t most_cycles);
   /// Removes what need not be kept (journal_store.hpp) and counts the rest.
   void tidy_journals();
-  void do_run(const RunOrder& order, const Done& done);
+  void do_run(RunOrder order, const Done& done);
+  /// Leaves out what the last session of this experiment has done. Throws InputError if there is none, or nothing is left.
+  SessionSoFar resume(Experiment& study);
   void write_beginning(JournalWriter& journal, const RunPlan& run, const RunOrder& order,
-                       const ProgramPlan& plan, double sample_rate_Hz);
+                       const ProgramPlan& plan, double sample_rate_Hz,
+                       const std::optional<SessionSoFar>& before);
   RunOutcome acquire(JournalWriter& journal, const RunOrder& order, const daq::RatePlan& rate,
                      double planned_s);
   RunResult finish(const std::filesystem::path& journal, const RunOutcome& outcome);

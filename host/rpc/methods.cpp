@@ -110,7 +110,7 @@ void run_start(RigService& rig, const json& params, const Reply& reply) {
     throw InputError({name, "", "was not sent with the experiment", "Send its text in `points`."});
   };
   rig.start_run({parse_experiment(text, params.value("file", "experiment"), read_points),
-                 params.value("prompts_answered", false), session_in(params)},
+                 params.value("prompts_answered", false), params.value("resume", false), session_in(params)},
                 to(reply));
 }
 

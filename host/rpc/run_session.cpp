@@ -91,15 +91,16 @@ json follow_to_end(DaemonClient& daemon, const SessionOptions& options) {
 }
 
 /// The same; when the daemon is lost on the way, says where the run is: `begun` is its answer to run.start.
-json follow(DaemonClient& daemon, const SessionOptions& options, const json& begun) {
+json follow(DaemonClient& daemon, const SessionOptions& options, const json& begun, bool in_slices) {
   try {
     return follow_to_end(daemon, options);
   } catch (const HardwareError& error) {
     throw HardwareError(
         "run", fmt::format("lost sight of the daemon: {}", error.what()),
-        fmt::format("If the daemon could end the run, it is in {}; otherwise make it of the journal: {}.",
+        fmt::format("If the daemon could end the run, it is in {}; otherwise make it of the journal: {}.{}",
                     begun.at("run_file").get<std::string>(),
-                    recovery(begun.at("journal").get<std::string>(), options)));
+                    recovery(begun.at("journal").get<std::string>(), options),
+                    in_slices ? " `diastole run --resume` goes on with the next slice." : ""));
   }
 }
 
@@ -115,8 +116,9 @@ SessionResult run_session(DaemonClient& daemon, const SessionOptions& options) {
                                                {"file", experiment.file},
                                                {"points", points},
                                                {"prompts_answered", options.prompts_answered},
+                                               {"resume", options.resume},
                                                {"session", facts_json(options.facts)}});
-  const json result = follow(daemon, options, begun);
+  const json result = follow(daemon, options, begun, experiment.schedule.has_value());
   if (!result.contains("run_file")) {
     throw HardwareError(
         "run", result.value("problem", "no run file could be made"),

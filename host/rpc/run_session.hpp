@@ -36,6 +36,7 @@ struct SessionOptions {
   std::string experiment;  ///< file
   std::string output;      ///< run file
   bool force = false;      ///< replace an existing output
+  bool resume = false;     ///< the daemon's last session of this experiment goes on
   SessionFacts facts = {};
   int poll_ms = 100;  ///< between questions for progress
   std::function<void(const SessionProgress&)> progress = [](const SessionProgress&) {};

@@ -5,7 +5,7 @@
 //   rig.status                                      anybody       RigService::status, and who controls the rig
 //   run.progress    {first_remark}                  anybody       RigService::run_progress
 //   run.stop        {how: "cycle_end"|"now"|"halt"} anybody       {stopping}
-//   run.start       {experiment, file, points, prompts_answered}
+//   run.start       {experiment, file, points, prompts_answered, resume}
 //                                                   controller    {run_id, journal, run_file}
 //   rig.home                                        controller    status
 //   rig.zero        {channels, seconds, operator}   controller    RigService::calibrate; no channels: all
@@ -34,7 +34,8 @@
 // (control_lease.hpp); a takeover is an event of the log and of the run.
 //
 // `points` holds the text of each points file that the experiment names: {name: text}. With `prompts_answered` the
-// operator is waited for nowhere.
+// operator is waited for nowhere. With `resume` the last session of this experiment goes on with the first slice that was not
+// imaged whole (session_so_far.hpp).
 //
 // No client costs the rig anything (server.cpp): a line is bounded, and so are the answers that a client
 // leaves unread, its requests a second and the time for a line; beyond most_connections the one that has said

@@ -6,6 +6,7 @@
 
 #include "protocol/signal/step_response.hpp"
 #include "tests/flow/programs.hpp"
+#include "tests/flow/rig_with_daemon.hpp"
 #include "tests/host/bench/run_in_memory.hpp"
 #include "tests/sanitized.hpp"
 #include "tools/benchmarks/long_journal.hpp"
@@ -111,6 +112,44 @@ TEST(Study, BecomesSlicesFramesAndABidsRecording) {
   EXPECT_TRUE(std::filesystem::exists(workplace / "bids/sub-03_task-study_physio.tsv.gz"));
   EXPECT_EQ(run_line(workplace, "gzip -cd bids/*.tsv.gz | wc -l").out,
             std::to_string(exported.json().at("rows").get<int>()) + "\n");
+}
+
+TEST(Study, GoesOnWithTheNextSliceWhenItWasStopped) {
+  RigWithDaemon rig(RigWithDaemon::Time::conducted);
+  rig.start_daemon();
+  const std::string study = with(study_toml, "prompt = \"Set the next slice.\"\n", "");
+  rig.place.write("study.experiment.toml", study);
+  const auto resume = [&] {
+    return run(rig.place, {"diastole", "run", "study.experiment.toml", "-o", "rest.run.h5", "--resume",
+                           "--socket", rig.path("socket"), "--json"});
+  };
+  auto client = rig.client();
+  home(client);
+  const Ended too_early = resume();
+  EXPECT_EQ(too_early.exit_code, 2);
+  EXPECT_THAT(too_early.err, HasSubstr("has no session to resume"));
+
+  client.call("run.start", {{"experiment", study}, {"file", "study.experiment.toml"}});
+  json progress;
+  do {
+    progress = client.call("run.progress");
+    if (progress["schedule"]["slice"] == 1 && progress["schedule"]["phase"] == "imaging")
+      client.call("run.stop");
+  } while (progress["state"] == "running" || progress["state"] == "writing");
+  EXPECT_EQ(progress["result"]["end"], "stopped_now");
+  client.call("control.release");
+
+  const Ended rest = resume();
+  ASSERT_EQ(rest.exit_code, 0) << rest.err;
+  EXPECT_THAT(rest.err, HasSubstr("goes on: 1 of its 3 slices are imaged"));
+  EXPECT_THAT(rest.err, HasSubstr("slice 2 of 3: 4 cycles of tagged"));
+  EXPECT_EQ(rest.json().at("triggers"), 2 + 4 + 1 + 2 + 4);
+  const json slices = run(rig.place, {"diastole", "inspect", "rest.run.h5", "--json"}).json().at("slices");
+  ASSERT_EQ(slices.size(), 2U);
+  EXPECT_EQ(slices[0].at("slice"), 1);
+  EXPECT_EQ(slices[1].at("block"), "flow");
+  std::filesystem::remove(rig.place / "rest.run.h5");
+  EXPECT_THAT(resume().err, HasSubstr("nothing left to do: all 3 slices"));
 }
 
 TEST(RunFile, OfALongJournalTakesNoMoreMemoryThanThatOfAShortOne) {

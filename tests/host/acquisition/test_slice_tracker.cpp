@@ -58,6 +58,25 @@ TEST(SliceTracker, WaitsForTheOperatorBeforeEachSlice) {
   EXPECT_EQ(cycles_of(tracker, 5), "ddIiL");
 }
 
+TEST(SliceTracker, LeavesOutWhatIsDone) {
+  Schedule schedule = two_slices();
+  schedule.blocks.push_back({"flow", 1, 2, ""});
+  schedule.done = {0, 2};
+  EXPECT_EQ(schedule.cycles(), 5);
+  SliceTracker tracker(planned_slices(schedule));
+  EXPECT_EQ(tracker.slice(), 1U);
+  EXPECT_EQ(tracker.slices(), 3U);
+  EXPECT_EQ(tracker.cycles_left(), 5);
+  EXPECT_EQ(cycles_of(tracker, 5), "ddIiL");
+  EXPECT_EQ(tracker.cycles_left(), 0);
+
+  schedule.done = {1};
+  EXPECT_EQ(schedule.cycles(), 10);
+  SliceTracker around(planned_slices(schedule));
+  EXPECT_EQ(around.cycles_left(), 10);
+  EXPECT_EQ(cycles_of(around, 10), "ddIiipddIL");
+}
+
 TEST(SliceTracker, OneCycleIsAStudy) {
   SliceTracker tracker(planned_slices({.blocks = {{"one", 1, 1, ""}}}));
   const SliceTracker::Turn turn = tracker.on_trigger();

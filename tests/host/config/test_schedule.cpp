@@ -44,6 +44,21 @@ TEST(Schedule, WithoutPromptsReservesNoCycles) {
   EXPECT_EQ(experiment.planned_cycles(), experiment.cycles());
 }
 
+TEST(Schedule, WithoutWhatIsDoneReservesTheRest) {
+  Experiment experiment = study(
+      "dummy_cycles = 3\npause_cycles = 5\nwait_cycles_at_most = 100\n[[schedule.block]]\nname = "
+      "\"a\"\nslices = "
+      "2\ncycles_per_slice = 4\nprompt = \"Set it.\"\n[[schedule.block]]\nname = \"b\"\ncycles_per_slice = "
+      "9\n");
+  EXPECT_EQ(experiment.cycles(), 2 * (3 + 4) + (3 + 9) + 2 * 5 + 100);
+  leave_out(experiment, {0});
+  EXPECT_EQ(experiment.cycles(), (3 + 4) + (3 + 9) + 5 + 100);
+  leave_out(experiment, {0, 1});
+  EXPECT_FALSE(experiment.schedule->waits());
+  EXPECT_EQ(experiment.cycles(), 3 + 9);
+  EXPECT_EQ(experiment.planned_cycles(), 3 + 9);
+}
+
 TEST(Schedule, LongerThanTheCycleIsRefused) {
   const std::string frames =
       "[[schedule.block]]\nname = \"a\"\ncycles_per_slice = 38\nframes = 16\ntr_ms = 188\n";
