@@ -173,7 +173,8 @@ std::string frames_csv(const runfile::FrameBins& bins, double resolution_kPa, bo
 
 ExitCode bin(BinOptions options, const CommandOutput& out) {
   if (!options.frames_csv.empty()) require_new_file(options.frames_csv, options.force);
-  const runfile::RecordedRun run = runfile::read_run(options.run);
+  const runfile::RunFile file = runfile::open_run(options.run);
+  const runfile::RecordedRun& run = file.run;
   take_from_schedule(options, run);
   runfile::FrameBinOptions how{.frames = options.frames.value_or(default_frames),
                                .segment = options.segment,
@@ -185,7 +186,7 @@ ExitCode bin(BinOptions options, const CommandOutput& out) {
   if (options.real_windows()) {
     how.windows = windows_asked(options, runfile::binned_interval_s(run, how));
   }
-  const runfile::FrameBins bins = runfile::bin_frames(run, how);
+  const runfile::FrameBins bins = runfile::bin_frames(run, file.rows, how);
   for (const runfile::ExcludedCycle& cycle : bins.excluded)
     fmt::print(stderr, "cycle {} at {:.3f} s is left out: {}\n", cycle.cycle, cycle.trigger_s, cycle.reason);
   if (!options.frames_csv.empty()) {

@@ -1,7 +1,5 @@
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <cmath>
 #include <memory>
 #include <nlohmann/json.hpp>
 
@@ -16,22 +14,6 @@ namespace diastole {
 namespace {
 
 using nlohmann::json;
-
-struct Range {
-  double least = HUGE_VAL;
-  double most = -HUGE_VAL;
-  [[nodiscard]] bool any() const { return least <= most; }
-};
-
-Range range_of(const std::vector<double>& values) {
-  Range range;
-  for (const double value : values) {
-    if (std::isnan(value)) continue;
-    range.least = std::min(range.least, value);
-    range.most = std::max(range.most, value);
-  }
-  return range;
-}
 
 json stream_json(const runfile::StreamFacts& facts) {
   return {DIASTOLE_NAMED(facts, rows, missing, rate_Hz),
@@ -103,8 +85,7 @@ json as_json(const runfile::RecordedRun& run, const runfile::Soundness& soundnes
                 {"session", session_json(runfile::read_session(run.file))},
                 {"sound", soundness.sound()}};
   document["channels"] = json::object();
-  for (const auto& [name, values_kPa] : run.pressure.channels) {
-    const Range range = range_of(values_kPa);
+  for (const auto& [name, range] : soundness.ranges) {
     document["channels"][name] = {{"min_kPa", range.any() ? json(range.least) : json()},
                                   {"max_kPa", range.any() ? json(range.most) : json()}};
     if (const auto saturated = soundness.saturated.find(name); saturated != soundness.saturated.end())
@@ -138,9 +119,8 @@ std::string in_words(const runfile::StreamFacts& facts) {
   return words;
 }
 
-void show_channels(const runfile::RecordedRun& run) {
-  for (const auto& [name, values_kPa] : run.pressure.channels) {
-    const Range range = range_of(values_kPa);
+void show_channels(const runfile::RecordedRun& run, const runfile::Soundness& soundness) {
+  for (const auto& [name, range] : soundness.ranges) {
     fmt::print("    {}: {}\n", name,
                range.any() ? fmt::format("{:.3f} to {:.3f} kPa", range.least, range.most) : "no sample");
     if (const std::string words = calibration_words(calibration_of(run, name)); !words.empty())
@@ -178,7 +158,7 @@ void show(const runfile::RecordedRun& run, const runfile::Soundness& soundness) 
                run.flow.contains(i) ? ", with phase-contrast volumes" : "");
   }
   fmt::print("  pressure: {}\n", in_words(soundness.pressure));
-  show_channels(run);
+  show_channels(run, soundness);
   fmt::print("  pump: {}\n", in_words(soundness.pump));
   show_triggers(run, soundness);
   show_slices(run);
@@ -207,9 +187,9 @@ void add_inspect(CommandLine& line) {
                "Exit code 1: the file is whole, but the run is not sound (gaps, triggers, faults).");
   command->add_option("RUN", *file, "run file")->required();
   line.on_run(command, [file](const CommandOutput& out) {
-    const runfile::RecordedRun run = runfile::read_run(*file);
-    const runfile::Soundness soundness = runfile::assess(run);
-    print(out, as_json(run, soundness), [&] { show(run, soundness); });
+    const auto [run, rows] = runfile::open_run(*file);
+    const runfile::Soundness soundness = runfile::assess(run, rows);
+    print(out, as_json(run, soundness), [&, &known = run] { show(known, soundness); });
     return soundness.sound() ? ExitCode::done : ExitCode::negative;
   });
 }

@@ -63,17 +63,22 @@ std::vector<bool> declared_missing(const RecordedRun& run, std::string_view data
   return missing;
 }
 
-void check_values(const RecordedRun& run, const std::string& dataset, std::span<const double> values) {
+void check_values(const RecordedRun& run, const std::string& dataset, const Series& values) {
   const std::vector<bool> missing = declared_missing(run, dataset, values.size());
-  for (size_t i = 0; i < values.size(); ++i) {
-    if (std::isfinite(values[i]) || (std::isnan(values[i]) && missing[i])) continue;
-    fail_undeclared(run.file, dataset, i, values[i]);
-  }
+  values.each_block([&](size_t first, std::span<const double> block) {
+    for (size_t i = 0; i < block.size(); ++i) {
+      if (std::isfinite(block[i]) || (std::isnan(block[i]) && missing[first + i])) continue;
+      fail_undeclared(run.file, dataset, first + i, block[i]);
+    }
+  });
 }
 
-void check_times(const RecordedRun& run, const std::string& dataset, std::span<const double> times_s) {
-  for (size_t i = 0; i < times_s.size(); ++i)
-    check_time(run.file, dataset, i, times_s[i], i == 0 ? 0 : times_s[i - 1]);
+void check_times(const RecordedRun& run, const std::string& dataset, const Series& times_s) {
+  double last_s = 0;
+  times_s.each_block([&](size_t first, std::span<const double> block) {
+    for (size_t i = 0; i < block.size(); last_s = block[i++])
+      check_time(run.file, dataset, first + i, block[i], last_s);
+  });
 }
 
 void check_length(const RecordedRun& run, const std::string& dataset, size_t rows, const std::string& of,
@@ -81,6 +86,16 @@ void check_length(const RecordedRun& run, const std::string& dataset, size_t row
   if (rows == expected) return;
   fail_at(run, dataset, std::min(rows, expected), fmt::format("has {} rows, {} has {}", rows, of, expected),
           "Datasets of one stream must be equally long.");
+}
+
+void check_stream(const RecordedRun& run, const std::string& group, const StreamRows& rows) {
+  const std::string times = group + "/time_s";
+  check_times(run, times, rows.time_s);
+  for (const auto& [name, values] : rows.values) {
+    const std::string dataset = fmt::format("{}/{}", group, name);
+    check_length(run, dataset, values.size(), times, rows.time_s.size());
+    check_values(run, dataset, values);
+  }
 }
 
 void check_grid(const RecordedRun& run, const std::string& group, const std::optional<StreamGrid>& grid) {
@@ -161,7 +176,9 @@ void StreamCheck::value(const std::string& dataset, double value) const {
   if (!std::isfinite(value)) fail_undeclared(file_, fmt::format("{}/{}", group_, dataset), rows_ - 1, value);
 }
 
-void check(const RecordedRun& run) {
+void check(const RecordedRun& run) { check(run, rows_of(run)); }
+
+void check(const RecordedRun& run, const RunRows& rows) {
   check_gaps(run);
   check_segments(run);
   for (const auto& [segment, waveform] : run.waveforms) {
@@ -172,15 +189,8 @@ void check(const RecordedRun& run) {
   }
   check_grid(run, pump_group, run.pump.grid);
   check_grid(run, pressure_group, run.pressure.grid);
-  check_times(run, pump_time, run.pump.time_s);
-  check_length(run, pump_commanded, run.pump.commanded_mL.size(), pump_time, run.pump.time_s.size());
-  check_values(run, pump_commanded, run.pump.commanded_mL);
-  check_times(run, pressure_time, run.pressure.time_s);
-  for (const auto& [name, values_kPa] : run.pressure.channels) {
-    const std::string dataset = fmt::format("{}/{}", pressure_group, name);
-    check_length(run, dataset, values_kPa.size(), pressure_time, run.pressure.time_s.size());
-    check_values(run, dataset, values_kPa);
-  }
+  check_stream(run, pump_group, rows.pump);
+  check_stream(run, pressure_group, rows.pressure);
   check_times(run, trigger_time, run.trigger_s);
   if (!on_the_axis(run.trigger_delay_s)) {
     fail_at(run, trigger_delay, 0, fmt::format("is {}", run.trigger_delay_s), "It is a time in seconds.");

@@ -16,16 +16,16 @@ namespace {
 
 constexpr double time_tolerance_s = 1e-6;  // a sample on a window's edge belongs to the window it opens
 
-struct Samples {
-  std::span<const double> time_s;
-  std::span<const double> value_kPa;
-  double spacing_s = 0;  // median
-  std::vector<size_t> holes_before;
+/// The samples of one frame in one cycle.
+struct FrameSamples {
+  size_t count = 0;
+  double mean_kPa = 0;
+  double squares = 0;  ///< of what each is from that mean
 };
 
-/// The mean pressures of one cycle, frame by frame, or why it cannot be used.
-struct CycleMeans {
-  std::vector<double> mean_kPa;
+/// What one cycle holds, frame by frame, or why it cannot be used.
+struct CycleFrames {
+  std::vector<FrameSamples> frames;
   std::string exclusion;
   bool frame_without_sample = false;
 };
@@ -35,13 +35,57 @@ struct CycleMeans {
   throw InputError({run.file, place, std::move(problem), std::move(remedy)});
 }
 
-/// Rows with from_s <= time < to_s.
-std::pair<size_t, size_t> rows_within(const Samples& samples, double from_s, double to_s) {
-  const auto& time_s = samples.time_s;
-  const auto first = std::lower_bound(time_s.begin(), time_s.end(), from_s - time_tolerance_s);
-  const auto last = std::lower_bound(first, time_s.end(), to_s - time_tolerance_s);
-  return {static_cast<size_t>(first - time_s.begin()), static_cast<size_t>(last - time_s.begin())};
-}
+struct Samples {
+  size_t first = 0;  ///< row of the run
+  std::span<const double> time_s;
+  std::span<const double> value_kPa;
+
+  /// Those with from_s <= time < to_s.
+  [[nodiscard]] Samples within(double from_s, double to_s) const {
+    const auto begin = std::lower_bound(time_s.begin(), time_s.end(), from_s - time_tolerance_s);
+    const auto end = std::lower_bound(begin, time_s.end(), to_s - time_tolerance_s);
+    const auto at = static_cast<size_t>(begin - time_s.begin()), count = static_cast<size_t>(end - begin);
+    return {first + at, time_s.subspan(at, count), value_kPa.subspan(at, count)};
+  }
+};
+
+/// Goes through a channel's samples forward, with those of one window in memory.
+class SamplesInOrder {
+ public:
+  SamplesInOrder(const StreamRows& rows, const Series& value_kPa) : rows_(rows), value_kPa_(value_kPa) {}
+
+  /// Samples with from_s <= time < to_s; `from_s` is not less than before. They live until the next call.
+  Samples within(double from_s, double to_s) {
+    const auto gone =
+        std::lower_bound(time_s_.begin(), time_s_.end(), from_s - time_tolerance_s) - time_s_.begin();
+    time_s_.erase(time_s_.begin(), time_s_.begin() + gone);
+    values_kPa_.erase(values_kPa_.begin(), values_kPa_.begin() + gone);
+    first_ += static_cast<size_t>(gone);
+    while (first_ + time_s_.size() < size() && (time_s_.empty() || time_s_.back() < to_s))
+      load(from_s);
+    return Samples{first_, time_s_, values_kPa_}.within(from_s, to_s);
+  }
+  [[nodiscard]] size_t size() const { return rows_.time_s.size(); }
+  [[nodiscard]] const Spacing& spacing() const { return rows_.spacing(); }
+
+ private:
+  void load(double from_s) {
+    const size_t first = first_ + time_s_.size(), count = std::min(Series::block_rows, size() - first);
+    const auto time_s = rows_.time_s.rows(first, count, memory_);
+    const auto earlier =
+        std::lower_bound(time_s.begin(), time_s.end(), from_s - time_tolerance_s) - time_s.begin();
+    const auto skipped = time_s_.empty() ? static_cast<size_t>(earlier) : 0;
+    time_s_.insert(time_s_.end(), time_s.begin() + static_cast<std::ptrdiff_t>(skipped), time_s.end());
+    first_ += skipped;
+    const auto values_kPa = value_kPa_.rows(first + skipped, count - skipped, memory_);
+    values_kPa_.insert(values_kPa_.end(), values_kPa.begin(), values_kPa.end());
+  }
+
+  const StreamRows& rows_;
+  const Series& value_kPa_;
+  size_t first_ = 0;  // row of time_s_.front()
+  std::vector<double> time_s_, values_kPa_, memory_;
+};
 
 bool in_slices(const RecordedRun& run, std::optional<size_t> only, size_t row) {
   for (size_t i = 0; i < run.slices.size(); ++i) {
@@ -99,42 +143,47 @@ void check_windows(const RecordedRun& run, const std::vector<FrameWindow>& windo
   }
 }
 
-/// Why the cycle from trigger_s to end_s is not whole; empty if it is.
-std::string why_not_whole(const Samples& samples, double trigger_s, double end_s) {
-  const auto [first, last] = rows_within(samples, trigger_s, end_s);
-  const double reach_s = reach_spacings * samples.spacing_s;
-  if (first == last) return "no pressure was recorded in it";
-  if (first == 0 && samples.time_s[first] - trigger_s > reach_s) return "the recording starts within it";
-  if (last == samples.time_s.size() && end_s - samples.time_s[last - 1] > reach_s) {
+/// Why the cycle from trigger_s to end_s, which has these samples, is not whole; empty if it is.
+std::string why_not_whole(const Samples& cycle, const SamplesInOrder& all, double trigger_s, double end_s) {
+  const double spacing_s = all.spacing().median_s, reach_s = reach_spacings * spacing_s;
+  if (cycle.time_s.empty()) return "no pressure was recorded in it";
+  if (cycle.first == 0 && cycle.time_s.front() - trigger_s > reach_s) return "the recording starts within it";
+  if (cycle.first + cycle.time_s.size() == all.size() && end_s - cycle.time_s.back() > reach_s)
     return "the recording ends within it";
+  for (size_t i = 0; i < cycle.value_kPa.size(); ++i) {
+    if (std::isnan(cycle.value_kPa[i])) return fmt::format("sample {} is missing", cycle.first + i);
   }
-  for (size_t i = first; i < last; ++i) {
-    if (std::isnan(samples.value_kPa[i])) return fmt::format("sample {} is missing", i);
-  }
-  for (const size_t hole : samples.holes_before) {
-    const double before_s = samples.time_s[hole - 1];
-    const double after_s = samples.time_s[hole];
-    if (before_s + samples.spacing_s >= end_s || after_s - samples.spacing_s < trigger_s) continue;
-    return fmt::format("{:.1f} ms without a sample before sample {}", 1e3 * (after_s - before_s), hole);
+  for (const Hole& hole : all.spacing().holes) {
+    if (hole.before_s + spacing_s >= end_s || hole.after_s - spacing_s < trigger_s) continue;
+    return fmt::format("{:.1f} ms without a sample before sample {}", 1e3 * (hole.after_s - hole.before_s),
+                       hole.row);
   }
   return {};
 }
 
+FrameSamples frame_of(std::span<const double> value_kPa) {
+  FrameSamples frame{.count = value_kPa.size()};
+  frame.mean_kPa =
+      std::accumulate(value_kPa.begin(), value_kPa.end(), 0.0) / static_cast<double>(value_kPa.size());
+  for (const double value : value_kPa)
+    frame.squares += (value - frame.mean_kPa) * (value - frame.mean_kPa);
+  return frame;
+}
+
 /// `windows` and `interval_s` count from `from_s`: the trigger, and the signal's delay behind it.
-CycleMeans means_of_cycle(const Samples& samples, const std::vector<FrameWindow>& windows, double from_s,
-                          double interval_s) {
-  CycleMeans cycle{{}, why_not_whole(samples, from_s, from_s + interval_s)};
+CycleFrames frames_of_cycle(SamplesInOrder& all, const std::vector<FrameWindow>& windows, double from_s,
+                            double interval_s) {
+  const Samples samples = all.within(from_s, from_s + interval_s);
+  CycleFrames cycle{{}, why_not_whole(samples, all, from_s, from_s + interval_s)};
   if (!cycle.exclusion.empty()) return cycle;
   for (size_t k = 0; k < windows.size(); ++k) {
-    const auto [first, last] = rows_within(samples, from_s + windows[k].from_s, from_s + windows[k].to_s);
-    if (first == last) {
+    const Samples frame = samples.within(from_s + windows[k].from_s, from_s + windows[k].to_s);
+    if (frame.time_s.empty()) {
       cycle.exclusion = fmt::format("no sample falls into frame {}", k);
       cycle.frame_without_sample = true;
       return cycle;
     }
-    const auto values = samples.value_kPa.subspan(first, last - first);
-    cycle.mean_kPa.push_back(std::accumulate(values.begin(), values.end(), 0.0) /
-                             static_cast<double>(values.size()));
+    cycle.frames.push_back(frame_of(frame.value_kPa));
   }
   return cycle;
 }
@@ -152,32 +201,28 @@ std::string irregular_interval(const SegmentTriggers& segment, size_t i, int64_t
 
 struct UsedCycle {
   double number;  // within the segment
-  double from_s;  // the trigger, and the signal's delay behind it
-  std::vector<double> mean_kPa;
+  std::vector<FrameSamples> frames;
 };
 
-FrameBin summarise(const Samples& samples, const FrameWindow& window, size_t k,
-                   const std::vector<UsedCycle>& cycles) {
+FrameBin summarise(const FrameWindow& window, size_t k, const std::vector<UsedCycle>& cycles) {
   const auto n = static_cast<double>(cycles.size());
   FrameBin bin{.window = window, .cycles = cycles.size()};
   double number_mean = 0;
   for (const UsedCycle& cycle : cycles) {
-    bin.mean_kPa += cycle.mean_kPa[k] / n;
+    bin.mean_kPa += cycle.frames[k].mean_kPa / n;
     number_mean += cycle.number / n;
   }
   double squares = 0, products = 0, numbers = 0, sample_squares = 0, sample_sum = 0;
   for (const UsedCycle& cycle : cycles) {
-    const double deviation = cycle.mean_kPa[k] - bin.mean_kPa;
+    const FrameSamples& frame = cycle.frames[k];
+    const auto samples = static_cast<double>(frame.count);
+    const double deviation = frame.mean_kPa - bin.mean_kPa;
     squares += deviation * deviation;
     products += (cycle.number - number_mean) * deviation;
     numbers += (cycle.number - number_mean) * (cycle.number - number_mean);
-    const auto [first, last] = rows_within(samples, cycle.from_s + window.from_s, cycle.from_s + window.to_s);
-    for (size_t i = first; i < last; ++i) {
-      const double from_mean = samples.value_kPa[i] - bin.mean_kPa;
-      sample_sum += from_mean;
-      sample_squares += from_mean * from_mean;
-    }
-    bin.samples += last - first;
+    sample_sum += samples * deviation;
+    sample_squares += frame.squares + samples * deviation * deviation;
+    bin.samples += frame.count;
   }
   const auto count = static_cast<double>(bin.samples);
   bin.sd_kPa = n > 1 ? std::sqrt(squares / (n - 1)) : 0;
@@ -218,8 +263,12 @@ double binned_interval_s(const RecordedRun& run, const FrameBinOptions& options)
 }
 
 FrameBins bin_frames(const RecordedRun& run, const FrameBinOptions& options) {
-  const auto channel = run.pressure.channels.find(options.channel);
-  if (channel == run.pressure.channels.end()) {
+  return bin_frames(run, rows_of(run), options);
+}
+
+FrameBins bin_frames(const RecordedRun& run, const RunRows& rows, const FrameBinOptions& options) {
+  const auto channel = rows.pressure.values.find(options.channel);
+  if (channel == rows.pressure.values.end()) {
     fail(run, fmt::format("dataset /pressure/{}", options.channel), "is not in this run",
          "`diastole inspect` lists the channels.");
   }
@@ -234,9 +283,7 @@ FrameBins bin_frames(const RecordedRun& run, const FrameBinOptions& options) {
       options.windows.empty() ? equal_windows(options.frames, bins.interval_s) : options.windows;
   check_windows(run, windows, bins.interval_s);
 
-  const double spacing_s = median_spacing_s(run.pressure.time_s);
-  const Samples samples{run.pressure.time_s, channel->second, spacing_s,
-                        holes_before(run.pressure.time_s, spacing_s)};
+  SamplesInOrder samples(rows.pressure, channel->second);
   const int64_t cycles_before = cycles_before_segment(run, bins.segment);
   std::vector<UsedCycle> used;
   bool frames_too_short = false;
@@ -244,10 +291,10 @@ FrameBins bin_frames(const RecordedRun& run, const FrameBinOptions& options) {
     const CycleTrigger& trigger = segment.triggers[i];
     if ((cycles_before + trigger.cycle) % options.gate_every != 0) continue;
     const double from_s = trigger.time_s + options.delay_s;
-    CycleMeans cycle = means_of_cycle(samples, windows, from_s, bins.interval_s);
+    CycleFrames cycle = frames_of_cycle(samples, windows, from_s, bins.interval_s);
     if (cycle.exclusion.empty()) cycle.exclusion = irregular_interval(segment, i, options.gate_every);
     if (cycle.exclusion.empty()) {
-      used.push_back({static_cast<double>(trigger.cycle), from_s, std::move(cycle.mean_kPa)});
+      used.push_back({static_cast<double>(trigger.cycle), std::move(cycle.frames)});
     } else {
       frames_too_short = frames_too_short || cycle.frame_without_sample;
       bins.excluded.push_back({i, trigger.time_s, std::move(cycle.exclusion)});
@@ -258,11 +305,12 @@ FrameBins bin_frames(const RecordedRun& run, const FrameBinOptions& options) {
          bins.excluded.empty()
              ? "has no gated cycle"
              : fmt::format("has no whole cycle; the first: {}", bins.excluded.front().reason),
-         frames_too_short ? fmt::format("Ask for fewer frames: samples are {:.2f} ms apart.", 1e3 * spacing_s)
+         frames_too_short ? fmt::format("Ask for fewer frames: samples are {:.2f} ms apart.",
+                                        1e3 * samples.spacing().median_s)
                           : "Record again, or choose another segment.");
   }
   for (size_t k = 0; k < windows.size(); ++k) {
-    bins.frames.push_back(summarise(samples, windows[k], k, used));
+    bins.frames.push_back(summarise(windows[k], k, used));
   }
   return bins;
 }

@@ -29,6 +29,7 @@
 
 #include "protocol/runfile/frame_times.hpp"
 #include "protocol/runfile/run.hpp"
+#include "protocol/runfile/stream_rows.hpp"
 
 namespace diastole::runfile {
 
@@ -76,6 +77,8 @@ double binned_interval_s(const RecordedRun& run, const FrameBinOptions& options)
 /// Throws InputError when the run has no such segment, slice or channel, the segment has no trigger, a window leaves
 /// the interval, or no whole cycle is left (the message says why the first was excluded).
 FrameBins bin_frames(const RecordedRun& run, const FrameBinOptions& options);
+/// The same of a run without rows, and these: no more of them than a cycle's are in memory at a time.
+FrameBins bin_frames(const RecordedRun& run, const RunRows& rows, const FrameBinOptions& options);
 
 /// A step of the converter behind the cavity's pressure; 0 if the run does not tell.
 double cavity_resolution_kPa(const RecordedRun& run);

@@ -14,13 +14,16 @@
 #include <cstdlib>
 #include <filesystem>
 #include <functional>
+#include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "protocol/contract/input_error.hpp"
 #include "protocol/runfile/h5_handle.hpp"
 #include "protocol/runfile/run.hpp"
+#include "protocol/runfile/series.hpp"
 
 namespace diastole::runfile {
 
@@ -73,6 +76,22 @@ class H5Source {
       fail("dataset " + path, "cannot be read; the file is damaged");
     }
     return values;
+  }
+  /// The same, read when it is asked for; stays readable without this object.
+  [[nodiscard]] Series series(const std::string& path) const {
+    const auto dataset = std::make_shared<const DatasetHandle>(open_in_chunks(path));
+    if (!is_number(TypeHandle(H5Dget_type(dataset->get())))) fail("dataset " + path, "does not hold numbers");
+    const auto read = [dataset, path, name = name_](size_t first, std::span<double> values) {
+      const hsize_t from = first, count = values.size();
+      const SpaceHandle stored(H5Dget_space(dataset->get()));
+      const SpaceHandle memory(H5Screate_simple(1, &count, nullptr));
+      if (H5Sselect_hyperslab(stored.get(), H5S_SELECT_SET, &from, nullptr, &count, nullptr) < 0 ||
+          H5Dread(dataset->get(), H5T_NATIVE_DOUBLE, memory.get(), stored.get(), H5P_DEFAULT, values.data()) <
+              0) {
+        throw InputError({name, "dataset " + path, "cannot be read; the file is damaged", ""});
+      }
+    };
+    return {length(*dataset, path), read};
   }
   /// A dataset that holds one number, or one text.
   [[nodiscard]] double scalar(const std::string& path) const {
@@ -321,6 +340,19 @@ class H5Source {
     if (!dataset.valid()) fail(path, "is not a dataset");
     expect_own_values(dataset, path);
     return dataset;
+  }
+  /// With a cache of two chunks, so that one is unpacked once by whoever reads on.
+  [[nodiscard]] DatasetHandle open_in_chunks(const std::string& path) const {
+    DatasetHandle dataset = open_dataset(path);
+    const PropertyHandle made(H5Dget_create_plist(dataset.get()));
+    hsize_t rows = 0;
+    if (H5Pget_layout(made.get()) != H5D_CHUNKED || H5Pget_chunk(made.get(), 1, &rows) != 1) return dataset;
+    const TypeHandle type(H5Dget_type(dataset.get()));
+    constexpr size_t slots = 13;  // a prime, as the library asks
+    const PropertyHandle access(H5Pcreate(H5P_DATASET_ACCESS));
+    dataset = DatasetHandle();  // one that is open would keep its cache
+    H5Pset_chunk_cache(access.get(), slots, 2 * static_cast<size_t>(rows) * H5Tget_size(type.get()), 1);
+    return DatasetHandle(H5Dopen2(file_.get(), path.c_str(), access.get()));
   }
   [[nodiscard]] size_t length(const DatasetHandle& dataset, const std::string& path) const {
     const SpaceHandle space(H5Dget_space(dataset.get()));

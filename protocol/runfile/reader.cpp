@@ -77,14 +77,14 @@ std::optional<StreamGrid> read_grid(const H5Source& source, const std::string& g
   return StreamGrid{*start_s, *end_s, *rate_Hz};
 }
 
-PressureTrace read_pressure(const H5Source& source) {
+/// Without rows.
+PressureTrace read_channels(const H5Source& source) {
   PressureTrace pressure;
   pressure.grid = read_grid(source, pressure_group);
-  pressure.time_s = source.numbers(pressure_time);
   for (const std::string& name : source.children(pressure_group)) {
     if (unit_of(name) != pressure_unit) continue;
     const std::string dataset = fmt::format("{}/{}", pressure_group, name);
-    pressure.channels[name] = source.numbers(dataset);
+    pressure.channels[name];
     auto notes = source.attributes(dataset);
     notes.erase("units");
     if (!notes.empty()) pressure.notes[name] = std::move(notes);
@@ -135,11 +135,7 @@ std::map<std::string, double, std::less<>> read_clock(const H5Source& source) {
   return clock;
 }
 
-}  // namespace
-
-RecordedRun read_run(const std::filesystem::path& path) { return read_run(H5Source(path)); }
-
-RecordedRun read_run(const H5Source& source) {
+RecordedRun read_without_rows(const H5Source& source) {
   const auto root = source.attributes("/");
   expect_format(source, root);
   RecordedRun run;
@@ -151,8 +147,8 @@ RecordedRun read_run(const H5Source& source) {
   run.protocol_toml = source.text(protocol_toml);
   run.segments = read_table<Segment>(source, segments_table);
   run.waveforms = read_waveforms(source);
-  run.pump = {read_grid(source, pump_group), source.numbers(pump_time), source.numbers(pump_commanded)};
-  run.pressure = read_pressure(source);
+  run.pump.grid = read_grid(source, pump_group);
+  run.pressure = read_channels(source);
   run.trigger_s = source.numbers(trigger_time);
   if (source.has(trigger_delay)) run.trigger_delay_s = source.scalar(trigger_delay);
   run.flow = read_flow(source);
@@ -160,8 +156,34 @@ RecordedRun read_run(const H5Source& source) {
   if (source.has(slices_table.path)) run.slices = read_table<Slice>(source, slices_table);
   run.gaps = read_table<Gap>(source, gaps_table);
   run.events = read_table<Event>(source, events_table);
+  return run;
+}
+
+}  // namespace
+
+RecordedRun read_run(const std::filesystem::path& path) { return read_run(H5Source(path)); }
+
+RecordedRun read_run(const H5Source& source) {
+  RecordedRun run = read_without_rows(source);
+  run.pump.time_s = source.numbers(pump_time);
+  run.pump.commanded_mL = source.numbers(pump_commanded);
+  run.pressure.time_s = source.numbers(pressure_time);
+  for (auto& [name, values_kPa] : run.pressure.channels)
+    values_kPa = source.numbers(fmt::format("{}/{}", pressure_group, name));
   check(run);
   return run;
+}
+
+RunFile open_run(const std::filesystem::path& path) {
+  const H5Source source(path);
+  RunFile file{read_without_rows(source), {}};
+  file.rows.pump.time_s = source.series(pump_time);
+  file.rows.pump.values["commanded_mL"] = source.series(pump_commanded);
+  file.rows.pressure.time_s = source.series(pressure_time);
+  for (const auto& [name, none] : file.run.pressure.channels)
+    file.rows.pressure.values[name] = source.series(fmt::format("{}/{}", pressure_group, name));
+  check(file.run, file.rows);
+  return file;
 }
 
 }  // namespace diastole::runfile

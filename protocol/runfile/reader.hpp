@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "protocol/runfile/run.hpp"
+#include "protocol/runfile/stream_rows.hpp"
 
 namespace diastole::runfile {
 
@@ -17,6 +18,16 @@ RecordedRun read_run(const std::filesystem::path& path);
 /// The same of a file that is open (h5_source.hpp).
 RecordedRun read_run(const H5Source& source);
 
+/// A run whose rows stay in its file, however many they are.
+struct RunFile {
+  RecordedRun
+      run;  ///< without rows: run.pump and run.pressure hold what is known of them, and the channels' names
+  RunRows rows;
+};
+
+/// Throws as read_run; goes through all rows once.
+RunFile open_run(const std::filesystem::path& path);
+
 /// Far beyond any run, and within what arithmetic on times and counts bears without another check.
 inline constexpr double longest_time_s = 1e10;
 inline constexpr double shortest_period_s = 1e-6;
@@ -27,6 +38,8 @@ inline constexpr int64_t most_counted = 1'000'000'000'000;
 /// slices in order within the triggers, no negative counts and none beyond most_counted.
 /// Throws InputError with run.file as the file.
 void check(const RecordedRun& run);
+/// The same of a run without rows, and these.
+void check(const RecordedRun& run, const RunRows& rows);
 
 /// The rules of `check` for a stream that is not in memory as a whole, row by row; the row must have a value. Throws as
 /// `check` does.

@@ -15,48 +15,46 @@ namespace {
 
 constexpr size_t most_remarks = 5;  // reported one by one, for each segment
 
-StreamFacts facts_of(const RecordedRun& run, const auto& trace, std::string_view stream) {
-  const std::span<const double> time_s = trace.time_s;
+StreamFacts facts_of(const RecordedRun& run, const std::optional<StreamGrid>& grid, const StreamRows& rows,
+                     std::string_view stream) {
   StreamFacts facts;
-  facts.rows = time_s.size();
-  if (trace.grid) facts.expected = trace.grid->rows();
+  facts.rows = rows.time_s.size();
+  if (grid) facts.expected = grid->rows();
   for (const Gap& gap : run.gaps) {
     if (gap.stream.starts_with(stream)) facts.missing += gap.count;
   }
-  const double spacing_s = median_spacing_s(time_s);
-  if (spacing_s > 0) facts.rate_Hz = 1 / spacing_s;
-  facts.irregularity = irregularity_of(time_s, spacing_s);
+  if (rows.spacing().median_s > 0) facts.rate_Hz = 1 / rows.spacing().median_s;
+  facts.irregularity = rows.spacing().irregularity;
   return facts;
 }
 
-void look_for_holes(std::span<const double> time_s, std::string_view stream,
-                    std::vector<std::string>& problems) {
-  const std::vector<size_t> holes = holes_before(time_s, median_spacing_s(time_s));
+void look_for_holes(const StreamRows& rows, std::string_view stream, std::vector<std::string>& problems) {
+  const std::vector<Hole>& holes = rows.spacing().holes;
   if (holes.empty()) return;
-  const size_t first = holes.front();
+  const Hole& first = holes.front();
   problems.push_back(fmt::format(
       "{}: {:.1f} ms without a sample before index {}, not declared as a gap{}", stream,
-      1e3 * (time_s[first] - time_s[first - 1]), first,
+      1e3 * (first.after_s - first.before_s), first.row,
       holes.size() > 1 ? fmt::format(", and {} more such holes", holes.size() - 1) : std::string()));
 }
 
 /// A stream must reach from the start of run to its end, and have the rows that were due.
-void look_at_ends(const StreamFacts& facts, std::span<const double> time_s, std::string_view stream,
-                  double end_s, std::vector<std::string>& problems) {
-  if (facts.expected && *facts.expected != std::ssize(time_s)) {
+void look_at_ends(const StreamFacts& facts, const Spacing& spacing, std::string_view stream, double end_s,
+                  std::vector<std::string>& problems) {
+  if (facts.expected && *facts.expected != static_cast<int64_t>(facts.rows)) {
     problems.push_back(
-        fmt::format("{}: {} rows, but {} were due by the clocks", stream, time_s.size(), *facts.expected));
+        fmt::format("{}: {} rows, but {} were due by the clocks", stream, facts.rows, *facts.expected));
   }
-  if (time_s.empty() || facts.rate_Hz <= 0) return;
+  if (facts.rows == 0 || facts.rate_Hz <= 0) return;
   const double reach_s = reach_spacings / facts.rate_Hz;
-  if (time_s.front() > reach_s) {
+  if (spacing.first_s > reach_s) {
     problems.push_back(fmt::format("{}: {:.3f} s without a sample before index 0, not declared as a gap",
-                                   stream, time_s.front()));
+                                   stream, spacing.first_s));
   }
-  if (time_s.back() < end_s - reach_s) {
+  if (spacing.last_s < end_s - reach_s) {
     problems.push_back(
         fmt::format("{}: ends at {:.3f} s, the run at {:.3f} s; what is between is not declared as a gap",
-                    stream, time_s.back(), end_s));
+                    stream, spacing.last_s, end_s));
   }
 }
 
@@ -113,13 +111,16 @@ void check_clocks(const RecordedRun& run, Soundness& soundness) {
   }
 }
 
-/// What was measured, not what was made of it by a filter.
-void look_for_saturation(const RecordedRun& run, Soundness& soundness) {
-  for (const auto& [name, values_kPa] : run.pressure.channels) {
-    if (name.ends_with("_filtered_kPa")) continue;
+/// The ends of the instrument's range are looked for in what was measured, not in what was made of it by a filter.
+void look_at_values(const StreamRows& rows, Soundness& soundness) {
+  for (const auto& [name, values_kPa] : rows.values) {
     signal::SaturationWatch watch;
-    for (const double value_kPa : values_kPa)
-      watch.push(value_kPa);
+    values_kPa.each_block([&](size_t, std::span<const double> block) {
+      for (const double value_kPa : block)
+        watch.push(value_kPa);
+    });
+    soundness.ranges[name] = {watch.least().value, watch.most().value};
+    if (name.ends_with("_filtered_kPa")) continue;
     soundness.saturated[name] = watch.samples();
     for (const signal::Saturated& end : {watch.least(), watch.most()}) {
       if (end.samples == 0) continue;
@@ -152,27 +153,29 @@ double end_of_motion_s(const RecordedRun& run) {
   return end_s;
 }
 
-Soundness assess(const RecordedRun& run) {
+Soundness assess(const RecordedRun& run) { return assess(run, rows_of(run)); }
+
+Soundness assess(const RecordedRun& run, const RunRows& rows) {
   Soundness soundness;
   auto& problems = soundness.problems;
-  soundness.pressure = facts_of(run, run.pressure, pressure_stream);
-  soundness.pump = facts_of(run, run.pump, pump_stream);
+  const Spacing& pressure = rows.pressure.spacing();
+  soundness.pressure = facts_of(run, run.pressure.grid, rows.pressure, pressure_stream);
+  soundness.pump = facts_of(run, run.pump.grid, rows.pump, pump_stream);
   if (!soundness.pressure.any()) problems.emplace_back("no pressure was recorded");
-  if (run.pump.time_s.empty()) problems.emplace_back("no position of the pump was recorded");
-  if (!run.pressure.time_s.empty()) {
-    soundness.duration_s = run.pressure.time_s.back() - run.pressure.time_s.front();
-  }
+  if (soundness.pump.rows == 0) problems.emplace_back("no position of the pump was recorded");
+  soundness.duration_s = pressure.last_s - pressure.first_s;
   for (const Gap& gap : run.gaps) {
     problems.push_back(fmt::format("{}: {} missing from index {} on: {}", gap.stream, gap.count,
                                    gap.first_index, gap.reason));
   }
   soundness.stopped_on_request = was_stopped_on_request(run);
-  look_for_holes(run.pressure.time_s, pressure_stream, problems);
-  look_for_holes(run.pump.time_s, pump_stream, problems);
+  look_for_holes(rows.pressure, pressure_stream, problems);
+  look_for_holes(rows.pump, pump_stream, problems);
   const double end_s = end_of_motion_s(run);
   const double period_s = run.segments.empty() ? 0 : run.segments.back().period_s;
-  look_at_ends(soundness.pressure, run.pressure.time_s, pressure_stream, end_s, problems);
-  look_at_ends(soundness.pump, run.pump.time_s, pump_stream, end_s - last_step_periods * period_s, problems);
+  look_at_ends(soundness.pressure, pressure, pressure_stream, end_s, problems);
+  look_at_ends(soundness.pump, rows.pump.spacing(), pump_stream, end_s - last_step_periods * period_s,
+               problems);
   for (size_t i = 0; i < run.segments.size(); ++i) {
     const Segment& segment = run.segments[i];
     (segment.waveform == "hold" ? soundness.scheduled_holds : soundness.scheduled_cycles) += segment.cycles;
@@ -181,7 +184,7 @@ Soundness assess(const RecordedRun& run) {
   check_triggers_outside(run, soundness);
   check_slices(run, soundness);
   check_clocks(run, soundness);
-  look_for_saturation(run, soundness);
+  look_at_values(rows.pressure, soundness);
   for (const Event& event : run.events) {
     if (event.level == "error") {
       problems.push_back(fmt::format("at {:.3f} s: {}: {}", event.time_s, event.code, event.text));

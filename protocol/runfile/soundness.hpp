@@ -12,6 +12,7 @@
 
 #include "protocol/runfile/run.hpp"
 #include "protocol/runfile/spacing.hpp"
+#include "protocol/runfile/stream_rows.hpp"
 
 namespace diastole::runfile {
 
@@ -24,6 +25,13 @@ struct StreamFacts {
   Irregularity irregularity{};  ///< no fault as long as nothing is missing (spacing.hpp)
 
   [[nodiscard]] bool any() const { return missing < static_cast<int64_t>(rows); }
+};
+
+/// Of a channel's samples; without any, least > most.
+struct Range {
+  double least = 0;
+  double most = 0;
+  [[nodiscard]] bool any() const { return least <= most; }
 };
 
 /// Triggers of all segments against their schedule.
@@ -51,7 +59,8 @@ struct Soundness {
   TriggerCounts triggers{};
   std::map<std::string, int64_t>
       saturated;  ///< samples at the end of the instrument's range, by channel; all channels
-  std::vector<std::string> problems;  ///< "place: what is wrong there"; empty if the run is sound
+  std::map<std::string, Range> ranges;  ///< by channel
+  std::vector<std::string> problems;    ///< "place: what is wrong there"; empty if the run is sound
 
   [[nodiscard]] bool sound() const { return problems.empty(); }
 };
@@ -65,5 +74,7 @@ double end_of_motion_s(const RecordedRun& run);
 
 /// Precondition: the run has passed `check`.
 Soundness assess(const RecordedRun& run);
+/// The same of a run without rows, and these.
+Soundness assess(const RecordedRun& run, const RunRows& rows);
 
 }  // namespace diastole::runfile

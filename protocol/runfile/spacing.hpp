@@ -15,8 +15,9 @@
 // the up to eight rows before (since the last hole) by hole_spacings or more.
 
 #include <cstddef>
-#include <span>
 #include <vector>
+
+#include "protocol/runfile/series.hpp"
 
 namespace diastole::runfile {
 
@@ -27,17 +28,27 @@ inline constexpr double irregular_spacings = 1.6;
 /// The first row after a moment, or the last before it, may be this far from it with nothing missing.
 inline constexpr double reach_spacings = 2;
 
-/// Median step; 0 for fewer than two rows.
-double median_spacing_s(std::span<const double> time_s);
-
-/// The rows before which a row is absent that nothing declares. Times must increase strictly.
-std::vector<size_t> holes_before(std::span<const double> time_s, double spacing_s);
+/// A row before `row` is absent that nothing declares.
+struct Hole {
+  size_t row = 0;
+  double before_s = 0;  ///< time of the row before
+  double after_s = 0;   ///< of `row`
+};
 
 struct Irregularity {
   size_t steps = 0;       ///< longer than irregular_spacings
   double longest_ms = 0;  ///< of all steps
 };
 
-Irregularity irregularity_of(std::span<const double> time_s, double spacing_s);
+struct Spacing {
+  double median_s = 0;  ///< 0 for fewer than two rows
+  double first_s = 0;   ///< time of the first row
+  double last_s = 0;
+  Irregularity irregularity;
+  std::vector<Hole> holes;
+};
+
+/// Times must increase strictly. The median of more than a million steps is that of a million of them, evenly spread.
+Spacing spacing_of(const Series& time_s);
 
 }  // namespace diastole::runfile

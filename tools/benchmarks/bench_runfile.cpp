@@ -1,5 +1,5 @@
-// What making a run file of a journal costs, by the journal's length: time and memory of `diastole recover`, which goes
-// the daemon's way.
+// What making a run file of a journal and reading it costs, by the run's length: time and memory of `diastole recover`, which
+// goes the daemon's way, and of `inspect`, `bin` and `compare`.
 //
 //   tools/bench runfile [--seconds N ...] [--channels N] [--rate-hz R] [--program DIASTOLE] [--directory DIR]
 
@@ -21,23 +21,38 @@ namespace fs = std::filesystem;
 
 double megabytes(const fs::path& file) { return 1e-6 * static_cast<double>(fs::file_size(file)); }
 
+constexpr double most_MB = 64;
+
+/// False if a command failed or took more memory than it may.
 bool measure(const fs::path& directory, const JournalLoad& load, const std::string& program) {
   const fs::path journal = directory / "long.journal", run = directory / "long.run.h5";
   write_long_journal(journal, load);
-  const ProcessCost figures = run_timed({program, "recover", journal.string(), "-o", run.string()}, directory,
-                                        directory / "recover.log");
-  fmt::print("{:>8} {:>12.1f} {:>12.1f} {:>10.2f} {:>12.1f}\n", load.seconds, megabytes(journal),
-             figures.exit_code == 0 ? megabytes(run) : 0, figures.processor_s, figures.peak_MB);
-  std::fflush(stdout);
+  bool whole = true;
+  const auto cost = [&](const std::vector<std::string>& command) {
+    const ProcessCost figures = run_timed(command, directory, directory / "log");
+    const double journal_MB = fs::exists(journal) ? megabytes(journal) : 0;
+    fmt::print("{:>8} {:>8} {:>12.1f} {:>12.1f} {:>10.2f} {:>12.1f}\n", load.seconds, command[1], journal_MB,
+               fs::exists(run) ? megabytes(run) : 0, figures.processor_s, figures.peak_MB);
+    std::fflush(stdout);
+    whole = whole && figures.exit_code == 0 && figures.peak_MB <= most_MB;
+  };
+  cost({program, "recover", journal, "-o", run});
   fs::remove(journal);
+  if (!whole) return false;
+  cost({program, "inspect", run, "--json"});
+  cost({program, "bin", run, "--frames", "16", "--json"});
+  cost({program, "compare", run, run, "--json"});
   fs::remove(run);
-  return figures.exit_code == 0;
+  return whole;
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app("What making a run file of a journal costs.", "bench_runfile");
+  CLI::App app(
+      "What making a run file of a journal and reading it costs; exit code 1: more than 64 MB of memory, or "
+      "a command failed.",
+      "bench_runfile");
   JournalLoad load;
   std::vector<int> seconds{5, 20, 80};
   std::string program = fs::read_symlink("/proc/self/exe").parent_path() / "diastole";
@@ -52,8 +67,8 @@ int main(int argc, char** argv) {
     std::string pattern = fs::absolute(directory) / "bench-runfile-XXXXXX";
     if (::mkdtemp(pattern.data()) == nullptr)
       throw InputError({pattern, "", "no directory can be made there", "Name another with --directory."});
-    fmt::print("{} channels at {:g} Hz\n{:>8} {:>12} {:>12} {:>10} {:>12}\n", load.channels, load.rate_Hz,
-               "run, s", "journal, MB", "run file, MB", "CPU, s", "memory, MB");
+    fmt::print("{} channels at {:g} Hz\n{:>8} {:>8} {:>12} {:>12} {:>10} {:>12}\n", load.channels,
+               load.rate_Hz, "run, s", "command", "journal, MB", "run file, MB", "CPU, s", "memory, MB");
     bool whole = true;
     for (const int each : seconds) {
       load.seconds = each;

@@ -37,7 +37,7 @@ json beginning(const JournalLoad& load) {
           {"daq_timer_rate_Hz", 1.0},
           {"segments",
            {{{"start_s", 0.0},
-             {"waveform", "hold"},
+             {"waveform", "parabolic"},
              {"stroke_mL", 0.0},
              {"period_s", 1.0},
              {"offset_mL", 0.0},

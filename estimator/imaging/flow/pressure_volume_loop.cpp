@@ -103,7 +103,7 @@ PressureVolumeLoop pressure_volume_loop(const FlowMeasurement& flow, const runfi
       cycles_in(flow.interval_s(), runfile::binned_interval_s(run, how), run, flow.scan.interval_source);
   loop.delay_s = how.delay_s = runfile::signal_delay(run, how.channel).total_s();
   const double interval_s = runfile::binned_interval_s(run, how);
-  const double samples = interval_s / runfile::median_spacing_s(run.pressure.time_s);
+  const double samples = interval_s / runfile::spacing_of(run.pressure.time_s).median_s;
   how.frames = std::clamp<size_t>(static_cast<size_t>(samples / samples_a_window), 8, most_windows);
   const runfile::FrameBins bins = runfile::bin_frames(run, how);
   loop.segment = bins.segment;

@@ -27,13 +27,15 @@ const std::vector<std::pair<Document, std::string>> golden{
                  .segments = {{0.1, "uploaded", 10, 0.8, 0, 2}},
                  .trigger_delay_s = 0.05,
                  .waveforms = {{0, "phase,fraction", {0, 1, 0}}},
-                 .session = {{{"specimen", "gel-7"}}, {{"2026-01-02T03:04:05Z", "Jo", "new hose"}}}},
+                 .session = {{{"specimen", "gel-7"}}, {{"2026-01-02T03:04:05Z", "Jo", "new hose"}}},
+                 .resumes = "id-before",
+                 .slices_done = {0, 2}},
      R"({"channels":["cavity"],"daq_timer_counts_samples":false,"daq_timer_rate_Hz":40000000.0,)"
      R"("experiment":"text","experiment_file":"e.toml","instrument":"simulated","microstep_pL":7791649,)"
      R"("notes":[{"author":"Jo","text":"new hose","written_utc":"2026-01-02T03:04:05Z"}],)"
      R"("producer":"test","record":"begin","rig":{"bore_mm":100.0,"microsteps":8,"specimen":"gel"},)"
-     R"("run_id":"id","sample_rate_Hz":300.0,"segments":[{"cycles":2,"offset_mL":0.0,"period_s":0.8,)"
-     R"("start_s":0.1,"stroke_mL":10.0,"waveform":"uploaded"}],"session":{"specimen":"gel-7"},"started_utc":"2026-01-02T03:04:05Z",)"
+     R"("resumes":"id-before","run_id":"id","sample_rate_Hz":300.0,"segments":[{"cycles":2,"offset_mL":0.0,"period_s":0.8,)"
+     R"("start_s":0.1,"stroke_mL":10.0,"waveform":"uploaded"}],"session":{"specimen":"gel-7"},"slices_done":[0,2],"started_utc":"2026-01-02T03:04:05Z",)"
      R"("tick_rate_Hz":84000000,"trigger_delay_s":0.05,"waveforms":[{"fraction":[0.0,1.0,0.0],)"
      R"("points":"phase,fraction","segment":0}]})"},
     {GridRecord{7}, R"({"first_due_ns":7,"record":"grid"})"},
@@ -76,9 +78,12 @@ TEST(Documents, WithoutAFieldThatWasAddedLaterAreRead) {
 }
 
 TEST(Documents, OfNoFormOfOursAreNone) {
-  for (const char* text : {R"({"record":"trigger","cycle":1})", R"({"record":"trigger","cycle":-1,"tick":5})",
-                           R"({"record":"clock","host_ns":1.5,"tick":2,"half_round_trip_ns":3})",
-                           R"({"record":"other"})", R"({"record":7})", R"([1])", "{", ""})
+  for (
+      const char* text :
+      {R"({"record":"trigger","cycle":1})", R"({"record":"trigger","cycle":-1,"tick":5})",
+       R"({"record":"clock","host_ns":1.5,"tick":2,"half_round_trip_ns":3})",
+       R"({"record":"begin","run_id":"id","started_utc":"","producer":"","experiment":"","channels":["cavity"],"sample_rate_Hz":300.0,"rig":{},"tick_rate_Hz":84000000,"microstep_pL":1,"daq_timer_rate_Hz":40000000,"segments":[],"slices_done":[-1]})",
+       R"({"record":"other"})", R"({"record":7})", R"([1])", "{", ""})
     EXPECT_FALSE(decoded(text)) << text;
 }
 

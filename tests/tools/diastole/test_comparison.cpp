@@ -36,7 +36,10 @@ RecordedRun recorded(unsigned seed, double gain = 1, double offset_kPa = 0, doub
 }
 
 Comparison compared(const std::vector<RecordedRun>& runs) {
-  return compare(runs, std::vector<runfile::Session>(runs.size()), 40);
+  std::vector<runfile::RunFile> opened;
+  for (const RecordedRun& run : runs)
+    opened.push_back({run, runfile::rows_of(run)});
+  return compare(opened, std::vector<runfile::Session>(runs.size()), 40);
 }
 
 TEST(RunComparison, EqualRunsWithOtherNoiseAgreeAsOftenAsIsPromised) {

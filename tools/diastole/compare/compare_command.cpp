@@ -82,10 +82,10 @@ ExitCode compare_runs(const CompareOptions& options, const CommandOutput& out) {
   if (options.runs.size() < 2)
     throw InputError({"", "RUN", "one run cannot be compared", "Give two run files or more."});
   if (!options.page.empty()) require_output({options.page, options.runs, report::page_mark, options.force});
-  std::vector<runfile::RecordedRun> runs;
+  std::vector<runfile::RunFile> runs;
   std::vector<runfile::Session> sessions;
   for (const auto& file : options.runs) {
-    runs.push_back(runfile::read_run(file));
+    runs.push_back(runfile::open_run(file));
     sessions.push_back(runfile::read_session(file));
   }
   const Comparison found = comparison::compare(runs, sessions, options.parts);

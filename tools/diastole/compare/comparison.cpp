@@ -17,6 +17,7 @@ namespace diastole::comparison {
 namespace {
 
 using runfile::RecordedRun;
+using runfile::RunFile;
 using runfile::Segment;
 
 constexpr double false_alarm = 0.01;
@@ -58,17 +59,17 @@ bool is_calibration(const std::string& name) {
       [&](const char* ending) { return name.ends_with(ending); });
 }
 
-void add_protocol(Comparison& comparison, const std::vector<RecordedRun>& runs) {
+void add_protocol(Comparison& comparison, const std::vector<RunFile>& runs) {
   const auto add_of_runs = [&](const std::string& place, const auto& value_of) {
     std::vector<std::string> values;
-    for (const RecordedRun& run : runs)
-      values.push_back(value_of(run));
+    for (const RunFile& file : runs)
+      values.push_back(value_of(file.run));
     add(comparison, "protocol", place, std::move(values));
   };
   add_of_runs("segments", [](const RecordedRun& run) { return fmt::format("{}", run.segments.size()); });
   size_t most = 0;
-  for (const RecordedRun& run : runs)
-    most = std::max(most, run.segments.size());
+  for (const RunFile& file : runs)
+    most = std::max(most, file.run.segments.size());
   for (size_t i = 0; i < most; ++i) {
     const auto add_member = [&](const char* name, const auto& member) {
       add_of_runs(fmt::format("segment {} {}", i, name), [&](const RecordedRun& run) {
@@ -86,10 +87,10 @@ void add_protocol(Comparison& comparison, const std::vector<RecordedRun>& runs) 
   add_of_runs("slices", [](const RecordedRun& run) { return fmt::format("{}", run.slices.size()); });
 }
 
-MeanCycle mean_cycle(const RecordedRun& run, size_t number, const runfile::FrameBinOptions& options) {
-  const runfile::FrameBins bins = runfile::bin_frames(run, options);
+MeanCycle mean_cycle(const RunFile& file, size_t number, const runfile::FrameBinOptions& options) {
+  const runfile::FrameBins bins = runfile::bin_frames(file.run, file.rows, options);
   const double resolution_kPa =
-      options.channel == runfile::cavity_channel ? runfile::cavity_resolution_kPa(run) : 0;
+      options.channel == runfile::cavity_channel ? runfile::cavity_resolution_kPa(file.run) : 0;
   MeanCycle cycle{.run = number, .cycles = 0, .mean_kPa = {}, .sd_kPa = {}, .error_kPa = {}};
   for (const runfile::FrameBin& bin : bins.frames) {
     cycle.cycles = std::max(cycle.cycles, bin.cycles);
@@ -156,37 +157,39 @@ Departure departure_of(const MeanCycle& first, const MeanCycle& other, const std
   return departure;
 }
 
-std::vector<std::string> channels_of(const std::vector<RecordedRun>& runs) {
+std::vector<std::string> channels_of(const std::vector<RunFile>& runs) {
   std::vector<std::string> channels;
-  for (const auto& [name, values] : runs.front().pressure.channels) {
-    const bool everywhere = std::ranges::all_of(runs, [&, channel = name](const RecordedRun& run) {
-      return run.pressure.channels.contains(channel);
+  for (const auto& [name, values] : runs.front().rows.pressure.values) {
+    const bool everywhere = std::ranges::all_of(runs, [&, channel = name](const RunFile& file) {
+      return file.rows.pressure.values.contains(channel);
     });
     if (everywhere && name != runfile::cavity_filtered_channel) channels.push_back(name);
   }
   return channels;
 }
 
-Overlay overlay_of(const std::vector<RecordedRun>& runs, size_t segment, const std::string& channel,
-                   size_t parts, std::vector<std::string>& remarks) {
+Overlay overlay_of(const std::vector<RunFile>& runs, size_t segment, const std::string& channel, size_t parts,
+                   std::vector<std::string>& remarks) {
   Overlay overlay{
-      .segment = segment, .channel = channel, .period_s = runs.front().segments[segment].period_s};
+      .segment = segment, .channel = channel, .period_s = runs.front().run.segments[segment].period_s};
   for (size_t i = 0; i < parts; ++i)
     overlay.phase.push_back((static_cast<double>(i) + 0.5) / static_cast<double>(parts));
   for (size_t number = 0; number < runs.size(); ++number) {
-    if (segment >= runs[number].segments.size()) continue;
+    if (segment >= runs[number].run.segments.size()) continue;
     try {
       overlay.cycles.push_back(
           mean_cycle(runs[number], number, {.frames = parts, .segment = segment, .channel = channel}));
     } catch (const InputError& error) {
-      remarks.push_back(fmt::format("{}: segment {}: {}", runs[number].file, segment, error.fault().problem));
+      remarks.push_back(
+          fmt::format("{}: segment {}: {}", runs[number].run.file, segment, error.fault().problem));
     }
   }
   return overlay;
 }
 
-bool can_be_tested(const Overlay& overlay, const MeanCycle& cycle, const std::vector<RecordedRun>& runs) {
-  return cycle.run != 0 && cycle.cycles > 1 && same_motion(runs.front(), runs[cycle.run], overlay.segment);
+bool can_be_tested(const Overlay& overlay, const MeanCycle& cycle, const std::vector<RunFile>& runs) {
+  return cycle.run != 0 && cycle.cycles > 1 &&
+         same_motion(runs.front().run, runs[cycle.run].run, overlay.segment);
 }
 
 }  // namespace
@@ -197,13 +200,13 @@ bool Comparison::beyond_noise() const {
   });
 }
 
-Comparison compare(const std::vector<RecordedRun>& runs, const std::vector<runfile::Session>& sessions,
+Comparison compare(const std::vector<RunFile>& runs, const std::vector<runfile::Session>& sessions,
                    size_t parts) {
   Comparison comparison;
   std::vector<const Facts*> of_sessions, of_rigs;
-  for (const RecordedRun& run : runs) {
-    comparison.files.push_back(run.file);
-    of_rigs.push_back(&run.rig);
+  for (const RunFile& file : runs) {
+    comparison.files.push_back(file.run.file);
+    of_rigs.push_back(&file.run.rig);
   }
   for (const runfile::Session& session : sessions)
     of_sessions.push_back(&session.facts);
@@ -211,8 +214,8 @@ Comparison compare(const std::vector<RecordedRun>& runs, const std::vector<runfi
   add_protocol(comparison, runs);
   add_facts(comparison, of_rigs,
             [](const std::string& name) { return is_calibration(name) ? "calibration" : "rig"; });
-  for (size_t segment = 0; segment < runs.front().segments.size(); ++segment) {
-    if (runs.front().segments[segment].waveform == "hold") continue;
+  for (size_t segment = 0; segment < runs.front().run.segments.size(); ++segment) {
+    if (runs.front().run.segments[segment].waveform == "hold") continue;
     for (const std::string& channel : channels_of(runs))
       comparison.overlays.push_back(overlay_of(runs, segment, channel, parts, comparison.remarks));
   }
@@ -228,10 +231,10 @@ Comparison compare(const std::vector<RecordedRun>& runs, const std::vector<runfi
         overlay.departures.push_back(departure_of(overlay.cycles.front(), cycle, overlay.phase,
                                                   false_alarm / static_cast<double>(tests)));
       } else if (cycle.run != 0 && overlay.channel == runfile::cavity_channel) {
-        comparison.remarks.push_back(fmt::format("{}: segment {}: {}", runs[cycle.run].file, overlay.segment,
-                                                 cycle.cycles > 1
-                                                     ? "another motion than in the first run: not tested"
-                                                     : "one cycle tells nothing of its noise: not tested"));
+        comparison.remarks.push_back(
+            fmt::format("{}: segment {}: {}", runs[cycle.run].run.file, overlay.segment,
+                        cycle.cycles > 1 ? "another motion than in the first run: not tested"
+                                         : "one cycle tells nothing of its noise: not tested"));
       }
     }
   }

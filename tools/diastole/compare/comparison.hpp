@@ -14,7 +14,7 @@
 #include <string>
 #include <vector>
 
-#include "protocol/runfile/run.hpp"
+#include "protocol/runfile/reader.hpp"
 #include "protocol/runfile/session.hpp"
 
 namespace diastole::comparison {
@@ -67,8 +67,8 @@ struct Comparison {
 };
 
 /// `sessions` of the same runs; `parts` of the period. Precondition: two or more runs.
-Comparison compare(const std::vector<runfile::RecordedRun>& runs,
-                   const std::vector<runfile::Session>& sessions, size_t parts);
+Comparison compare(const std::vector<runfile::RunFile>& runs, const std::vector<runfile::Session>& sessions,
+                   size_t parts);
 
 /// Self-contained, with the mean cycles and their differences, each with its band of noise.
 std::string comparison_page(const Comparison& comparison);
