@@ -7,6 +7,7 @@
 #include <array>
 #include <atomic>
 #include <cerrno>
+#include <chrono>
 #include <cstring>
 #include <ctime>
 #include <mutex>
@@ -22,6 +23,7 @@ namespace {
 
 constexpr int kernel_buffer_events = 16;
 constexpr int look_interval_ms = 20;
+constexpr std::chrono::milliseconds flood_pause{1};
 constexpr uint64_t ns_per_s = 1'000'000'000;
 constexpr const char* consumer = "diastole";
 
@@ -89,6 +91,7 @@ class GpioInputs final : public GateInputs {
       }
       if ((states[0].revents & POLLIN) != 0 && !take_pulses()) return;
       if ((states[1].revents & POLLIN) != 0 && !take_estop_edges()) return;
+      if (std::exchange(flooded_, false)) std::this_thread::sleep_for(flood_pause);
       if (is_broken(states[0].revents) || is_broken(states[1].revents)) {
         return fail("the kernel has taken the line away");
       }
@@ -108,7 +111,8 @@ class GpioInputs final : public GateInputs {
     const std::lock_guard lock(mutex_);
     for (int i = 0; i < count; ++i)
       seen_.note_pulse(ns_of(events[static_cast<size_t>(i)].ts));
-    if (count == kernel_buffer_events) seen_.may_have_lost = true;
+    flooded_ = count == kernel_buffer_events;
+    seen_.may_have_lost = seen_.may_have_lost || flooded_;
     return true;
   }
 
@@ -116,6 +120,7 @@ class GpioInputs final : public GateInputs {
     Events events{};
     const int count = gpiod_line_event_read_multiple(estop_, events.data(), events.size());
     if (count < 0) return fail(std::strerror(errno)), false;
+    flooded_ = flooded_ || count == kernel_buffer_events;
     for (int i = 0; i < count; ++i) {
       const gpiod_line_event& event = events[static_cast<size_t>(i)];
       note_estop({ns_of(event.ts), event.event_type == GPIOD_LINE_EVENT_RISING_EDGE, true});
@@ -148,6 +153,7 @@ class GpioInputs final : public GateInputs {
   gpiod_line* gate_ = nullptr;   // of chip_
   gpiod_line* estop_ = nullptr;  // of chip_
   std::atomic<bool> pressed_ = false;
+  bool flooded_ = false;  // of the thread: a whole buffer of edges was there
   InheritingMutex mutex_;
   GateReading seen_;
   std::jthread thread_;  // last: it uses the members above

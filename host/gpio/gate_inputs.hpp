@@ -31,7 +31,8 @@ struct GateReading {
   uint64_t pulses = 0;                     ///< rising edges of the gating line
   std::vector<uint64_t> pulse_ns;          ///< when the first `most_kept` of them came, in order
   bool may_have_lost = false;              ///< the kernel's buffer was found full: more pulses may have come
-  std::vector<EstopChange> estop_changes;  ///< the first most_kept - 1 and the last
+  uint64_t estop_edges = 0;                ///< changes of the emergency stop line
+  std::vector<EstopChange> estop_changes;  ///< the first most_kept - 1 of them and the last
   std::string problem;                     ///< the lines can no longer be read
 
   void note_pulse(uint64_t host_ns) {
@@ -39,6 +40,7 @@ struct GateReading {
     if (pulse_ns.size() < most_kept) pulse_ns.push_back(host_ns);
   }
   void note_estop(const EstopChange& change) {
+    ++estop_edges;
     if (estop_changes.size() == most_kept) estop_changes.pop_back();
     estop_changes.push_back(change);
   }
@@ -57,7 +59,8 @@ class GateInputs {
 };
 
 /// Through libgpiod. A thread of its own reads the edges as they come, as the kernel keeps no more than 16 a line and
-/// drops what follows without a sign, and looks at the emergency stop's level 50 times a second. Throws
+/// drops what follows without a sign, and looks at the emergency stop's level 50 times a second. Of a line that fills the kernel's
+/// buffer it reads 16,000 edges a second at most, so that a loose wire costs no processor. Throws
 /// HardwareError when chip or line is absent, forbidden or in use.
 std::unique_ptr<GateInputs> open_gpio(const GpioConfig& config);
 

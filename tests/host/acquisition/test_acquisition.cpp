@@ -422,7 +422,7 @@ class LateEstop final : public GateInputs {
   GateReading take() override {
     GateReading reading;
     if (session_.instrument.readings > 570 && !std::exchange(pressed_, true))
-      reading.estop_changes = {{session_.desk.now_ns, true, true}};
+      reading.note_estop({session_.desk.now_ns, true, true});
     return reading;
   }
 

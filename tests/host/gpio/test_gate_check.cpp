@@ -91,7 +91,7 @@ TEST(GateCheck, WithoutAGatingLineNothingIsCompared) {
 TEST(GateCheck, AnEmergencyStopThatTheControllerDoesNotSeeIsAnError) {
   Inputs inputs;
   GateCheck check(inputs);
-  inputs.next.estop_changes = {{1000 * ms, true, true}};
+  inputs.next.note_estop({1000 * ms, true, true});
   auto remarks = check.check(1001 * ms, {});
   ASSERT_THAT(remarks, SizeIs(1));
   EXPECT_EQ(remarks[0].level, "warning");
@@ -104,7 +104,7 @@ TEST(GateCheck, AnEmergencyStopThatTheControllerDoesNotSeeIsAnError) {
 TEST(GateCheck, AnEmergencyStopThatTheControllerReportsIsNoDisagreement) {
   Inputs inputs;
   GateCheck check(inputs);
-  inputs.next.estop_changes = {{1000 * ms, true, false}};
+  inputs.next.note_estop({1000 * ms, true, false});
   EXPECT_THAT(check.check(1001 * ms, {0, true}), SizeIs(1));
   EXPECT_THAT(check.check(3000 * ms, {0, true}), IsEmpty());
 }
@@ -112,7 +112,8 @@ TEST(GateCheck, AnEmergencyStopThatTheControllerReportsIsNoDisagreement) {
 TEST(GateCheck, APressThatIsReleasedAtOnceIsStillToBeReported) {
   Inputs inputs;
   GateCheck check(inputs);
-  inputs.next.estop_changes = {{1000 * ms, true, true}, {1020 * ms, false, true}};
+  inputs.next.note_estop({1000 * ms, true, true});
+  inputs.next.note_estop({1020 * ms, false, true});
   EXPECT_THAT(check.check(1030 * ms, {}), SizeIs(2));
   EXPECT_TRUE(check.awaits_estop(1400 * ms, {}));
   EXPECT_FALSE(check.awaits_estop(1400 * ms, {0, true}));
@@ -125,8 +126,50 @@ TEST(GateCheck, APressThatIsReleasedAtOnceIsStillToBeReported) {
 TEST(GateCheck, AnEdgeThatComesDuringTheLookIsNotLate) {
   Inputs inputs;
   GateCheck check(inputs);
-  inputs.next.estop_changes = {{1001 * ms, true, true}};
+  inputs.next.note_estop({1001 * ms, true, true});
   EXPECT_THAT(check.check(1000 * ms, {}), SizeIs(1)) << "pressed, and nothing else";
+}
+
+TEST(GateCheck, ALineThatBouncesAtRestIsCountedAndSaidOnce) {
+  Inputs inputs;
+  GateCheck check(inputs);
+  std::vector<GateRemark> remarks;
+  uint64_t now_ns = 1000 * ms;
+  for (int turn = 0; turn < 60'000;
+       ++turn, now_ns += ms) {  // a minute, ten edges a millisecond, and no trigger
+    for (uint64_t edge = 0; edge < 10; ++edge)
+      inputs.next.note_pulse(now_ns + edge * ms / 10);
+    for (const GateRemark& each : check.check(now_ns, {}))
+      remarks.push_back(each);
+  }
+  for (const GateRemark& each : check.close(now_ns, {}, 0))
+    remarks.push_back(each);
+  ASSERT_THAT(remarks, SizeIs(2)) << "when it lasts, and at the end";
+  EXPECT_EQ(check.pulses(), 600'000U);
+  EXPECT_THAT(remarks[0].text, HasSubstr("the line bounces"));
+  EXPECT_THAT(remarks[1].text,
+              HasSubstr("showed 600000 pulses, the controller raised 0 triggers (599999 of"));
+}
+
+TEST(GateCheck, AnEmergencyStopLineThatChattersFillsNoJournal) {
+  Inputs inputs;
+  GateCheck check(inputs);
+  size_t remarks = 0, estop_unseen = 0;
+  std::string last;
+  uint64_t now_ns = 1000 * ms;
+  for (int turn = 0; turn < 60'000; ++turn, now_ns += ms) {
+    for (uint64_t edge = 0; edge < 10; ++edge)
+      inputs.next.note_estop({now_ns + edge, edge % 2 == 0, true});
+    for (const GateRemark& each : check.check(now_ns, {0, true})) {
+      ++remarks;
+      estop_unseen += each.code == "estop_unseen" ? 1 : 0;
+      last = each.text;
+    }
+  }
+  EXPECT_LE(remarks, 60U * 9 + 9);
+  EXPECT_GE(remarks, 60U * 9 - 9);
+  EXPECT_EQ(estop_unseen, 0U);
+  EXPECT_THAT(check.close(now_ns, {0, true}, 0).front().text, HasSubstr("the emergency stop line changed"));
 }
 
 TEST(GateCheck, LinesThatFailAreTold) {
