@@ -102,6 +102,8 @@ void show_addresses(const json& console) {
   } else {
     fmt::print("control   {}\nwatch     {}\n", console.at("control").get<std::string>(),
                console.at("watch").get<std::string>());
+    if (console.contains("fingerprint"))
+      fmt::print("certificate, SHA-256   {}\n", console.at("fingerprint").get<std::string>());
   }
 }
 

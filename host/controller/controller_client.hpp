@@ -43,8 +43,8 @@ class ControllerClient final : public Controller {
                       [this] { ask_status_if_due(); }}),
         requests_(clock, link_, rig.controller.port) {}
 
-  /// Opens the line, checks that both sides speak the same protocol, stops a motion that goes on (found_moving()),
-  /// reads the controller's settings, and sends geometry and limits if they agree with the rig file; if not, orders
+  /// Opens the line, checks that both sides speak the same protocol, stops a motion that goes on (found_moving()), takes
+  /// out a program that waits armed, reads the controller's settings, and sends geometry and limits if they agree with the rig file; if not, orders
   /// to move throw settings_problem(). A faulted controller takes none before clear_fault(). Throws
   /// HardwareError with the remedy in words, InputError if a number of the rig file is beyond what the protocol can
   /// carry; it is not connected then, and no heartbeat of this client prolongs a motion.
@@ -239,6 +239,7 @@ class ControllerClient final : public Controller {
   void stop_what_moves() {
     found_moving_.reset();
     const wire::State found = status().state;
+    if (found == wire::State::armed) unload();  // by a host that went away before it started
     if (!moves(found)) return;
     found_moving_ = found;
     stop_now();

@@ -12,6 +12,7 @@
 #include <chrono>
 #include <csignal>
 #include <cstdlib>
+#include <filesystem>
 #include <iostream>
 #include <memory>
 #include <utility>
@@ -118,7 +119,9 @@ std::optional<web::ConsoleServer> open_console(const RigConfig& config, bool by_
   const web::ConsoleAddress address =
       by_option ? web::parse_console_address(*config.daemon.console, "--console", "")
                 : web::parse_console_address(*config.daemon.console, config.file, "daemon.console");
-  return std::optional<web::ConsoleServer>(std::in_place, rpc_state, address);
+  return std::optional<web::ConsoleServer>(
+      std::in_place, rpc_state, address,
+      std::filesystem::absolute(config.daemon.journal_dir) / "console-certificate.pem");
 }
 
 /// Says again and again that the server's thread is alive.

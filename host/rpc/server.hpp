@@ -24,7 +24,8 @@
 //   control.release                                 anybody       {}
 //   console.sign_in {name}                          consoles      {user, console}
 //   console.address                                 who may control, at the socket
-//                                                                 {control, watch}: addresses with tokens; or null
+//                                                                 {control, watch}: addresses with tokens, and the
+//                                                                 fingerprint of an encrypted console; or null
 //
 // The web console speaks the same in text messages of a WebSocket (host/web/console.hpp); these rules hold for both.
 //

@@ -7,6 +7,7 @@
 #include <array>
 
 #include "host/rpc/acceptor.hpp"
+#include "host/web/certificate.hpp"
 #include "host/web/server_state.hpp"
 #include "protocol/contract/input_error.hpp"
 
@@ -30,9 +31,10 @@ void close_all(Connections& guests) {
 
 class ConsoleServer::Listener {
  public:
-  Listener(std::shared_ptr<RpcState> rpc_state, const ConsoleAddress& address)
-      : state_(
-            std::make_shared<ServerState>(ServerState{std::move(rpc_state), Door(address, machine_name())})),
+  Listener(std::shared_ptr<RpcState> rpc_state, const ConsoleAddress& address,
+           const std::filesystem::path& certificate)
+      : state_(std::make_shared<ServerState>(
+            ServerState{std::move(rpc_state), Door(address, machine_name()), std::nullopt})),
         acceptor_(std::make_shared<Acceptor<tcp>>(
             state_->rpc_state, "a browser",
             [state = state_](tcp::socket socket) { receive_visitor(state, std::move(socket)); })) {
@@ -49,16 +51,10 @@ class ConsoleServer::Listener {
                                       error.code().message()),
                           "Choose another port (--console PORT), or see who has this one (ss -ltnp).");
     }
-    if (state_->door.reaches_beyond_this_machine()) {
-      spdlog::warn(
-          "the console listens at {}, beyond this machine, and is not encrypted: whoever can read the "
-          "network's traffic "
-          "can read the token and control the rig. Safer: --console PORT here, and ssh -L "
-          "PORT:127.0.0.1:PORT from "
-          "the other machine",
-          address.address.to_string());
-    }
-    state_->rpc_state->console = {{"control", url(ConsoleRole::control)}, {"watch", url(ConsoleRole::watch)}};
+    nlohmann::json& console = state_->rpc_state->console;
+    if (state_->door.reaches_beyond_this_machine()) encrypt(certificate);
+    console["control"] = url(ConsoleRole::control);
+    console["watch"] = url(ConsoleRole::watch);
   }
 
   void begin() { acceptor_->accept(); }
@@ -75,12 +71,31 @@ class ConsoleServer::Listener {
   }
 
  private:
+  void encrypt(const std::filesystem::path& certificate) {
+    using asio::ssl::context;
+    const std::string fingerprint = certificate_fingerprint(certificate, machine_name());
+    context& tls = state_->tls.emplace(context::tls_server);
+    tls.set_options(context::default_workarounds | context::no_tlsv1 | context::no_tlsv1_1);
+    try {
+      tls.use_certificate_chain_file(certificate.string());
+      tls.use_private_key_file(certificate.string(), context::pem);
+    } catch (const boost::system::system_error& error) {
+      throw HardwareError(certificate.string(), "cannot be used: " + error.code().message(),
+                          "Remove it: another is made at the next start.");
+    }
+    state_->rpc_state->console["fingerprint"] = fingerprint;
+    spdlog::info(
+        "the console listens beyond this machine, encrypted; SHA-256 fingerprint of its certificate: {}",
+        fingerprint);
+  }
+
   std::shared_ptr<ServerState> state_;
   std::shared_ptr<Acceptor<tcp>> acceptor_;
 };
 
-ConsoleServer::ConsoleServer(std::shared_ptr<RpcState> rpc_state, const ConsoleAddress& address)
-    : listener_(std::make_shared<Listener>(std::move(rpc_state), address)) {
+ConsoleServer::ConsoleServer(std::shared_ptr<RpcState> rpc_state, const ConsoleAddress& address,
+                             const std::filesystem::path& certificate)
+    : listener_(std::make_shared<Listener>(std::move(rpc_state), address, certificate)) {
   listener_->begin();
 }
 

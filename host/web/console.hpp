@@ -9,9 +9,12 @@
 // The token comes as "Authorization: Bearer TOKEN" or as the WebSocket's sub-protocol "token.TOKEN"; Host and Origin
 // are checked first (door.hpp). An operator signs in with a name (console.sign_in) before he gives orders.
 //
+// From another machine all this comes encrypted (console_stream.hpp); plain HTTP is refused with a sentence.
+//
 // It runs on the server's thread, never on the one that acquires, and holds a bounded number of connections with a
 // bounded number of bytes each (server_state.hpp, rpc_session.hpp).
 
+#include <filesystem>
 #include <memory>
 #include <string>
 
@@ -25,9 +28,10 @@ namespace web {
 
 class ConsoleServer {
  public:
-  /// Listens at `address`, and lets users at the socket ask for the addresses (console.address). Throws HardwareError
-  /// if it cannot listen there.
-  ConsoleServer(std::shared_ptr<RpcState> rpc_state, const ConsoleAddress& address);
+  /// Listens at `address`, and lets users at the socket ask for the addresses (console.address). Beyond this machine it speaks TLS
+  /// only, with `certificate` (certificate.hpp). Throws HardwareError if it cannot listen there, or has no certificate.
+  ConsoleServer(std::shared_ptr<RpcState> rpc_state, const ConsoleAddress& address,
+                const std::filesystem::path& certificate);
   ~ConsoleServer();
 
   /// For the browser of somebody who may control, or only watch and stop; with the token.

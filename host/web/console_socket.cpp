@@ -29,10 +29,12 @@ Peer browser_at(std::string address, ConsoleRole role) {
 
 class ConsoleSocket : public RpcSession, public Connection {
  public:
-  ConsoleSocket(std::shared_ptr<ServerState> state, tcp::socket socket, ConsoleRole role)
-      : RpcSession(state->rpc_state, browser_at(address_of(socket), role), SessionBounds::console_requests),
+  ConsoleSocket(std::shared_ptr<ServerState> state, ConsoleStream stream, ConsoleRole role)
+      : RpcSession(state->rpc_state, browser_at(address_of(stream.tcp().socket()), role),
+                   SessionBounds::console_requests),
         state_(std::move(state)),
-        stream_(std::move(socket)) {
+        stream_(std::move(stream)) {
+    stream_.next_layer().tcp().expires_never();  // the WebSocket has timeouts of its own
     stream_.read_message_max(rpc::most_line_bytes);
     stream_.auto_fragment(false);
     stream_.set_option(websocket::stream_base::timeout{handshake_patience, silence_patience, true});
@@ -57,7 +59,7 @@ class ConsoleSocket : public RpcSession, public Connection {
     if (closed_) return;
     closed_ = true;
     leave();
-    beast::get_lowest_layer(stream_).close();
+    stream_.next_layer().close();
     state_->consoles.erase(number());
   }
 
@@ -94,7 +96,7 @@ class ConsoleSocket : public RpcSession, public Connection {
   }
 
   std::shared_ptr<ServerState> state_;
-  websocket::stream<beast::tcp_stream> stream_;
+  websocket::stream<ConsoleStream> stream_;
   beast::flat_buffer inbox_;
   std::optional<std::string> held_;  // read, and not yet taken
   bool closed_ = false;
@@ -102,9 +104,9 @@ class ConsoleSocket : public RpcSession, public Connection {
 
 }  // namespace
 
-void open_console(const std::shared_ptr<ServerState>& state, tcp::socket socket,
+void open_console(const std::shared_ptr<ServerState>& state, ConsoleStream stream,
                   http::request<http::empty_body> upgrade, ConsoleRole role) {
-  std::make_shared<ConsoleSocket>(state, std::move(socket), role)->begin(upgrade);
+  std::make_shared<ConsoleSocket>(state, std::move(stream), role)->begin(upgrade);
 }
 
 std::string address_of(const tcp::socket& socket) {

@@ -114,7 +114,7 @@ std::string Door::url(ConsoleRole role, uint16_t port) const {
   } else if (address_.address.is_v6()) {
     name = "[" + name + "]";
   }
-  return fmt::format("http://{}:{}/#token={}", name, port,
+  return fmt::format("{}://{}:{}/#token={}", reaches_beyond_this_machine() ? "https" : "http", name, port,
                      role == ConsoleRole::control ? control_token_ : watch_token_);
 }
 

@@ -46,7 +46,7 @@ class Door {
   [[nodiscard]] std::optional<ConsoleRole> role_of(std::string_view token) const;
   [[nodiscard]] static Refusal wrong_token();
 
-  /// "http://127.0.0.1:8600/#token=..."; the browser keeps what follows # to itself. `port`: the one that was given.
+  /// "http://127.0.0.1:8600/#token=...", https beyond this machine; the browser keeps what follows # to itself. `port`: the one that was given.
   [[nodiscard]] std::string url(ConsoleRole role, uint16_t port) const;
   [[nodiscard]] bool reaches_beyond_this_machine() const { return !address_.address.is_loopback(); }
 

@@ -6,9 +6,11 @@
 #include <boost/beast/http/message.hpp>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "host/rpc/rpc_session.hpp"
+#include "host/web/console_stream.hpp"
 #include "host/web/door.hpp"
 
 namespace diastole::web {
@@ -31,6 +33,7 @@ struct ServerState {
 
   std::shared_ptr<RpcState> rpc_state;
   Door door;
+  std::optional<boost::asio::ssl::context> tls;  ///< none: only this machine reaches the console
   Connections visitors{};
   Connections consoles{};
 };
@@ -42,7 +45,7 @@ void receive_visitor(std::shared_ptr<ServerState> state, boost::asio::ip::tcp::s
 /// One browser that has shown its token: JSON-RPC 2.0 in text messages of a WebSocket, at most rpc::most_line_bytes
 /// each, by the rules of rpc_session.hpp. A browser that answers no ping for some seconds is gone, and its control
 /// with it.
-void open_console(const std::shared_ptr<ServerState>& state, boost::asio::ip::tcp::socket socket,
+void open_console(const std::shared_ptr<ServerState>& state, ConsoleStream stream,
                   boost::beast::http::request<boost::beast::http::empty_body> upgrade, ConsoleRole role);
 
 /// "127.0.0.1", or "an unknown address".

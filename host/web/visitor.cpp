@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <boost/asio/write.hpp>
 #include <boost/beast/core.hpp>
 #include <boost/beast/http.hpp>
 #include <chrono>
@@ -25,11 +26,18 @@ using Response = http::response<http::string_body>;
 class Visitor : public Connection, public std::enable_shared_from_this<Visitor> {
  public:
   Visitor(std::shared_ptr<ServerState> state, tcp::socket socket)
-      : state_(std::move(state)), stream_(std::move(socket)), number_(++state_->rpc_state->last_number) {}
+      : state_(std::move(state)),
+        stream_(std::move(socket), state_->tls ? &*state_->tls : nullptr),
+        number_(++state_->rpc_state->last_number) {}
 
   void begin() {
     state_->visitors[number_] = shared_from_this();
-    read();
+    if (!stream_.encrypted()) return read();
+    stream_.tcp().expires_after(request_patience);
+    stream_.async_handshake([self = shared_from_this()](error_code error) {
+      if (!error) return self->read();
+      ERR_GET_REASON(error.value()) == SSL_R_HTTP_REQUEST ? self->refuse_plain() : self->close();
+    });
   }
 
   void close() override {
@@ -38,10 +46,19 @@ class Visitor : public Connection, public std::enable_shared_from_this<Visitor> 
   }
 
  private:
+  /// To whoever speaks HTTP without encryption: beyond this machine a token in it could be read by others.
+  void refuse_plain() {
+    constexpr std::string_view answer =
+        "HTTP/1.1 400 Bad Request\r\nContent-Type: text/plain; charset=utf-8\r\nConnection: close\r\n\r\n"
+        "This console is reached by https:// only: open the address that the daemon printed.\n";
+    boost::asio::async_write(stream_.tcp(), boost::asio::buffer(answer),
+                             [self = shared_from_this()](error_code, size_t) { self->close(); });
+  }
+
   void read() {
     parser_.emplace();
     set_bounds(*parser_);
-    stream_.expires_after(request_patience);
+    stream_.tcp().expires_after(request_patience);
     http::async_read(stream_, buffer_, *parser_,
                      [self = shared_from_this()](error_code error, size_t) { self->take(error); });
   }
@@ -64,13 +81,13 @@ class Visitor : public Connection, public std::enable_shared_from_this<Visitor> 
 
   void open_socket(ConsoleRole role) {
     state_->visitors.erase(number_);
-    open_console(state_, stream_.release_socket(), std::move(request_), role);
+    open_console(state_, std::move(stream_), std::move(request_), role);
   }
 
   void refuse(const Refusal& refusal) {
     if (refusal.status == 401) {
       state_->rpc_state->log.warn(fmt::format("a browser at {} came to the console without a valid token",
-                                              address_of(stream_.socket())));
+                                              address_of(stream_.tcp().socket())));
     }
     last_ = true;
     reply(refusal.status, "text/plain; charset=utf-8", refusal.sentence + "\n");
@@ -91,7 +108,7 @@ class Visitor : public Connection, public std::enable_shared_from_this<Visitor> 
     response_.keep_alive(!last_);
     response_.body() = std::move(body);
     response_.prepare_payload();
-    stream_.expires_after(request_patience);
+    stream_.tcp().expires_after(request_patience);
     http::async_write(stream_, response_, [self = shared_from_this()](error_code error, size_t) {
       if (error || self->last_) return self->close();
       self->read();
@@ -99,7 +116,7 @@ class Visitor : public Connection, public std::enable_shared_from_this<Visitor> 
   }
 
   std::shared_ptr<ServerState> state_;
-  beast::tcp_stream stream_;
+  ConsoleStream stream_;
   uint64_t number_;
   beast::flat_buffer buffer_{2 * most_header_bytes};
   std::optional<RequestParser> parser_;

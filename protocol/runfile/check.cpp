@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <span>
 
 #include "protocol/contract/input_error.hpp"
@@ -64,10 +65,14 @@ std::vector<bool> declared_missing(const RecordedRun& run, std::string_view data
 }
 
 void check_values(const RecordedRun& run, const std::string& dataset, const Series& values) {
-  const std::vector<bool> missing = declared_missing(run, dataset, values.size());
+  std::optional<std::vector<bool>> missing;  // made if there is need of it
+  const auto declared = [&](size_t row) {
+    if (!missing) missing = declared_missing(run, dataset, values.size());
+    return (*missing)[row];
+  };
   values.each_block([&](size_t first, std::span<const double> block) {
     for (size_t i = 0; i < block.size(); ++i) {
-      if (std::isfinite(block[i]) || (std::isnan(block[i]) && missing[first + i])) continue;
+      if (std::isfinite(block[i]) || (std::isnan(block[i]) && declared(first + i))) continue;
       fail_undeclared(run.file, dataset, first + i, block[i]);
     }
   });

@@ -13,12 +13,13 @@ namespace {
 constexpr size_t rows_around = 8;
 constexpr double hole_spacings_before_last = 1.1;  // the last row has none after it to tell late from shifted
 
-constexpr size_t most_median_steps = size_t{1} << 20;
+constexpr size_t most_median_steps = size_t{1} << 17;
 
 double median_step_s(const Series& time_s) {
   if (time_s.size() < 2) return 0;
   const size_t stride = (time_s.size() - 2) / most_median_steps + 1;
   std::vector<double> steps_s;
+  steps_s.reserve((time_s.size() - 2) / stride + 1);
   double last_s = 0;
   time_s.each_block([&](size_t first, std::span<const double> block) {
     for (size_t i = 0; i < block.size(); last_s = block[i++])

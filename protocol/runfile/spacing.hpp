@@ -48,7 +48,7 @@ struct Spacing {
   std::vector<Hole> holes;
 };
 
-/// Times must increase strictly. The median of more than a million steps is that of a million of them, evenly spread.
+/// Times must increase strictly. The median of more than 131,072 steps is that of as many of them at most, evenly spread.
 Spacing spacing_of(const Series& time_s);
 
 }  // namespace diastole::runfile

@@ -102,6 +102,12 @@ void Browser::resize(int width, int height) {
           {{"width", width}, {"height", height}, {"deviceScaleFactor", 1}, {"mobile", false}});
 }
 
+void Browser::pause(int seconds) const {
+  ::kill(-processes_.leader, SIGSTOP);
+  std::this_thread::sleep_for(std::chrono::seconds(seconds));
+  ::kill(-processes_.leader, SIGCONT);
+}
+
 void Browser::close() {
   ::kill(-processes_.leader, SIGKILL);
   siginfo_t ended{};

@@ -22,6 +22,8 @@ class Browser {
   void resize(int width, int height);
   /// Ends it; whatever is asked of it afterwards throws std::runtime_error.
   void close();
+  /// All of its processes stand still for so long, as on a computer that sleeps.
+  void pause(int seconds) const;
   /// The value of a JavaScript expression; a failed expectation and null if it throws.
   nlohmann::json value(const std::string& expression);
   /// Waits until the expression is true; a failed expectation after a minute.

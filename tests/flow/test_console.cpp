@@ -5,6 +5,11 @@
 #include <pwd.h>
 #include <unistd.h>
 
+#include <atomic>
+#include <csignal>
+#include <filesystem>
+#include <thread>
+
 #include "protocol/contract/input_error.hpp"
 #include "tests/flow/rig_with_daemon.hpp"
 #include "tests/flow/web_client.hpp"
@@ -245,6 +250,73 @@ TEST(Console, TheCommandTellsTheAddressesToWhoMayControl) {
   EXPECT_EQ(told.exit_code, 0) << told.err;
   EXPECT_THAT(told.out, AllOf(HasSubstr("/#token=" + rig.control), HasSubstr("/#token=" + rig.watch)));
   EXPECT_EQ(code_in(rig.console("anna")->call("console.address")), -32005);
+}
+
+TEST(Console, BeyondThisMachineItIsEncryptedAndKnownByItsFingerprint) {
+  RigWithDaemon rig(RigWithDaemon::Time::conducted);
+  rig.daemon_options = {"--console", "0.0.0.0:0"};
+  std::string fingerprint;
+  for (int start = 0; start < 2; ++start) {
+    rig.start_daemon();
+    const json console = json::parse(rig.daemon->out())["console"];
+    const std::string url = console["control"];
+    EXPECT_THAT(url, testing::StartsWith("https://"));
+    if (start == 0) fingerprint = console["fingerprint"];
+    EXPECT_EQ(console["fingerprint"], fingerprint) << "another certificate at the second start";
+    EXPECT_THAT(rig.daemon->err(), HasSubstr(fingerprint));
+    const std::string port = url.substr(url.rfind(':') + 1, url.find("/#") - url.rfind(':') - 1);
+    const Ended browser =
+        run(rig.place,
+            {"/usr/bin/python3", "-B", std::string(DIASTOLE_SOURCE_DIR) + "/tests/flow/console_over_tls.py",
+             port, url.substr(url.find("token=") + 6), fingerprint});
+    EXPECT_EQ(browser.exit_code, 0) << browser.err;
+    EXPECT_THAT(browser.out, HasSubstr("\"state\":\"unhomed\""));
+    EXPECT_THAT(run(rig.place, {"diastole", "console", "--socket", rig.path("socket")}).out,
+                HasSubstr(fingerprint));
+    rig.daemon->signal(SIGTERM);
+    EXPECT_EQ(rig.daemon->wait().exit_code, 0);
+    rig.daemon.reset();
+  }
+  const auto file = std::filesystem::status(rig.place / "journals/console-certificate.pem");
+  EXPECT_EQ(file.permissions() & std::filesystem::perms::all,
+            std::filesystem::perms::owner_read | std::filesystem::perms::owner_write);
+}
+
+TEST(Console, ObserversWhoReadTheBlackBoxDisturbNobody) {
+  RigWithConsole rig;
+  auto anna = rig.console("anna");
+  EXPECT_EQ(anna->call("rig.home")["result"]["state"], "homed");
+  std::atomic<bool> over = false;
+  std::atomic<int> read = 0, refused = 0;
+  std::vector<std::jthread> observers;
+  for (int i = 0; i < 4; ++i) {
+    observers.emplace_back([&] {
+      auto client = rig.client();
+      while (!over) {
+        try {
+          read += client.call("rig.black_box").contains("entries") ? 1 : 0;
+        } catch (const HardwareError&) {
+          ++refused;  // while a run is on
+        }
+        std::this_thread::sleep_for(std::chrono::milliseconds(5));
+      }
+    });
+  }
+  while (read < 4)
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  const auto asked = std::chrono::steady_clock::now();
+  EXPECT_TRUE(anna->call("run.start", many_segments()).contains("result"));
+  EXPECT_LT(std::chrono::steady_clock::now() - asked, std::chrono::seconds(20));
+  json progress;
+  do {
+    progress = anna->call("run.progress")["result"];
+  } while (progress["state"] == "running" || progress["state"] == "writing");
+  over = true;
+  observers.clear();
+  EXPECT_EQ(progress["state"], "done");
+  EXPECT_EQ(progress["missing"], 0);
+  EXPECT_EQ(progress["triggers"], 60);
+  EXPECT_GT(refused, 0);
 }
 
 TEST(Console, WithoutTheOptionThereIsNone) {

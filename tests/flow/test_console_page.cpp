@@ -165,6 +165,37 @@ TEST_F(ConsolePage, APageThatTheBrowserLetsSleepKeepsItsConnectionAndItsControl)
   EXPECT_EQ(connections, 1U);
 }
 
+TEST_F(ConsolePage, WhoLosesTheControlIsTold) {
+  begin();
+  wait_for("state", "Not homed");
+  click("take");
+  fill_in("name", "anna");
+  click("name-now");
+  wait_for("control-text", "control: you");
+  click("release");
+  wait_for("control-text", "control: free");
+  EXPECT_EQ(browser->value("document.getElementById('problem-dialog').open"), false) << "let go by herself";
+  click("take");
+  wait_for("control-text", "control: you");
+  DaemonClient other = rig->client();
+  other.call("control.take", {{"take_over", "anna"}});
+  wait_for("problem-title", "You no longer control the rig");
+  EXPECT_EQ(browser->value("document.getElementById('problem-dialog').open"), true);
+}
+
+TEST_F(ConsolePage, ABrowserThatSleptLongerThanThePingsLastIsToldThatItLostTheControl) {
+  begin();
+  wait_for("state", "Not homed");
+  click("take");
+  fill_in("name", "anna");
+  click("name-now");
+  wait_for("control-text", "control: you");
+  browser->pause(12);
+  EXPECT_TRUE(rig->client().call("rig.status")["control"].is_null()) << "the control ended with the connection";
+  wait_for("problem-title", "You no longer control the rig");
+  wait_for("control-text", "control: free");
+}
+
 TEST_F(ConsolePage, WhatTheDaemonCannotTellIsShownAsUnknown) {
   begin();
   wait_for("control-text", "control: free");

@@ -36,6 +36,7 @@ const choice = new ExperimentChoice();
 let name = sessionStorage.getItem(keptName) ?? "";
 let status = null, progress = null, heardAt_ms = -Infinity, problem = "", nextRemark = 0, shownRun = "", behind = false;
 let lookedAt_ms = performance.now(), wokeAt_ms = 0;
+let controlled = false; // when the daemon was last heard
 const daemon = new Daemon(takeToken(), { heard, changed });
 
 const text = (id, words) => { if (by(id).textContent !== words) by(id).textContent = words; };
@@ -196,6 +197,18 @@ function showCounters() {
     + (status.journals ? ` · ${plural(status.journals.count, "journal")} in ${status.journals.directory}` : ""));
 }
 
+/// Who held the control and has it no more is told, however long the page was not looked at: it ends with the connection, as when
+/// the computer slept, or another has taken it over.
+function showLoss(control, holder) {
+  if (status.problem) return; // unknown
+  if (controlled && !control?.own) {
+    showProblem("You no longer control the rig", new Error(control
+      ? `${holder} has taken the control over.`
+      : "The connection was broken, and the control ended with it. Take it again if you need it."));
+  }
+  controlled = Boolean(control?.own);
+}
+
 function showControl() {
   const control = status.control;
   const holder = !control ? (status.problem ? "unknown" : "") : control.own ? "you" : `${control.user} (${control.console ? "console at " + control.console : "process " + control.pid})`;
@@ -203,6 +216,7 @@ function showControl() {
     : `${name ? name + " · " : ""}control: ${holder || "free"}`);
   by("take").hidden = daemon.role === "watch" || Boolean(control?.own);
   by("release").hidden = !control?.own;
+  showLoss(control, holder);
 }
 
 function showEvents() {
@@ -282,7 +296,7 @@ function flash(words) {
 order("home", "The pump was not homed", "rig.home");
 order("clear", "The fault was not cleared", "rig.clear_fault");
 order("take", "The control was not granted", "control.take");
-by("release").addEventListener("click", () => daemon.call("control.release"));
+by("release").addEventListener("click", () => daemon.call("control.release").then(() => { controlled = false; }));
 by("stop").addEventListener("click", () => stop("now"));
 by("stop-cycle").addEventListener("click", () => stop("cycle_end"));
 by("halt").addEventListener("click", () => by("halt-dialog").showModal());

@@ -67,6 +67,16 @@ TEST_F(ClientOnDesk, AProgramIsPlannedAndArmed) {
   EXPECT_EQ(client.status().state, wire::State::armed);
 }
 
+TEST_F(ClientOnDesk, AProgramThatAHostLeftArmedIsTakenOutByTheNext) {
+  client.connect();
+  home();
+  client.load(parse_experiment(gel, "gel.experiment.toml"));
+  client.disconnect();
+  client.connect();
+  EXPECT_EQ(client.status().state, wire::State::homed);
+  EXPECT_FALSE(client.found_moving());
+}
+
 TEST_F(ClientOnDesk, AnImpossibleProfileNamesSegmentLimitAskedAndAllowed) {
   client.connect();
   home();

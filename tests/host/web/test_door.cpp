@@ -57,7 +57,7 @@ TEST(ConsoleDoor, BeyondThisMachineItsAddressesAndItsOwnNameAreOurs) {
   EXPECT_TRUE(comes_in(qualified, "rigpc:8600"));
   for (const char* strange : {"rigpc.lab:8600", "rigpc.evil.example:8600", "lab.example:8600"})
     EXPECT_FALSE(comes_in(qualified, strange)) << strange;
-  EXPECT_THAT(door.url(ConsoleRole::control, 8600), testing::StartsWith("http://rigpc:8600/#token="));
+  EXPECT_THAT(door.url(ConsoleRole::control, 8600), testing::StartsWith("https://rigpc:8600/#token="));
 }
 
 TEST(ConsoleDoor, APageOfAnotherSiteIsRefused) {
