@@ -191,7 +191,8 @@ TEST_F(ConsolePage, ABrowserThatSleptLongerThanThePingsLastIsToldThatItLostTheCo
   click("name-now");
   wait_for("control-text", "control: you");
   browser->pause(12);
-  EXPECT_TRUE(rig->client().call("rig.status")["control"].is_null()) << "the control ended with the connection";
+  EXPECT_TRUE(rig->client().call("rig.status")["control"].is_null())
+      << "the control ended with the connection";
   wait_for("problem-title", "You no longer control the rig");
   wait_for("control-text", "control: free");
 }

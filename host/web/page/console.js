@@ -36,7 +36,7 @@ const choice = new ExperimentChoice();
 let name = sessionStorage.getItem(keptName) ?? "";
 let status = null, progress = null, heardAt_ms = -Infinity, problem = "", nextRemark = 0, shownRun = "", behind = false;
 let lookedAt_ms = performance.now(), wokeAt_ms = 0;
-let controlled = false; // when the daemon was last heard
+let controlled = false, letGo = false; // when the daemon was last heard; by this page's own wish
 const daemon = new Daemon(takeToken(), { heard, changed });
 
 const text = (id, words) => { if (by(id).textContent !== words) by(id).textContent = words; };
@@ -201,12 +201,13 @@ function showCounters() {
 /// the computer slept, or another has taken it over.
 function showLoss(control, holder) {
   if (status.problem) return; // unknown
-  if (controlled && !control?.own) {
+  if (controlled && !control?.own && !letGo) {
     showProblem("You no longer control the rig", new Error(control
       ? `${holder} has taken the control over.`
       : "The connection was broken, and the control ended with it. Take it again if you need it."));
   }
   controlled = Boolean(control?.own);
+  letGo = letGo && controlled;
 }
 
 function showControl() {
@@ -296,7 +297,7 @@ function flash(words) {
 order("home", "The pump was not homed", "rig.home");
 order("clear", "The fault was not cleared", "rig.clear_fault");
 order("take", "The control was not granted", "control.take");
-by("release").addEventListener("click", () => daemon.call("control.release").then(() => { controlled = false; }));
+by("release").addEventListener("click", () => { letGo = true; daemon.call("control.release"); });
 by("stop").addEventListener("click", () => stop("now"));
 by("stop-cycle").addEventListener("click", () => stop("cycle_end"));
 by("halt").addEventListener("click", () => by("halt-dialog").showModal());
