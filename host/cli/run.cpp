@@ -74,8 +74,9 @@ ExitCode run(RunOptions options, SessionSeries& series, const CommandOutput& out
     throw InputError({"", "EXPERIMENT", series.asked() ? "is not asked for beside --shape" : "is missing",
                       "Give an experiment file, or --shape TARGET.csv --study STUDY."});
   }
-  if (options.dry_run && series.asked()) {
-    throw InputError({"", "--dry-run", "is not for --shape", "See the drive first: diastole shape TARGET.csv."});
+  if (series.asked() && (options.dry_run || options.session.resume)) {
+    throw InputError({"", options.dry_run ? "--dry-run" : "--resume", "is not for --shape",
+                      "See the drive first by `diastole shape TARGET.csv --study STUDY -o drive.csv`."});
   }
   if (options.dry_run) return show_plan(read_experiment(options.session.experiment), out);
   if (options.session.output.empty()) {
