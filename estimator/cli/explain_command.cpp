@@ -1,4 +1,5 @@
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <filesystem>
 #include <iostream>
@@ -26,6 +27,8 @@ namespace fs = std::filesystem;
 constexpr std::string_view explanation_file = "explanation.json";
 constexpr std::string_view study_file = "explained.study.toml";
 constexpr std::string_view report_file = "report.html";
+constexpr std::string_view learned_file = "learned.effect.toml";
+constexpr std::string_view learned_mark = "# Learnt by diastole explain";
 constexpr std::string_view study_mark = "# Written by diastole explain";
 
 struct ExplainArguments {
@@ -35,6 +38,7 @@ struct ExplainArguments {
   std::vector<fs::path> with;  ///< the user's own effects
   size_t threads = 2;
   bool force = false;
+  bool learn = false;   ///< a term even where the verdict is not unexplained
   bool strict = false;  ///< an answer that is no clear one is a failure
 };
 
@@ -58,6 +62,22 @@ std::string place_of(const explain::Misfit& misfit) {
   if (misfit.phase) text += fmt::format(", phase {:.1f} to {:.1f}", (*misfit.phase)[0], (*misfit.phase)[1]);
   if (misfit.band_Hz) text += fmt::format(", {:g} to {:g} Hz", (*misfit.band_Hz)[0], (*misfit.band_Hz)[1]);
   return text + fmt::format(": {:.0f} above the noise\n", misfit.excess_chi2);
+}
+
+void print_learned(const explain::LearnedTerm& term) {
+  fmt::print("\nLearnt, a suggestion: at the port {}, {} by {}\n", term.port, term.sets,
+             fmt::join(term.variables, " and "));
+  for (const std::string& reading : term.readings)
+    fmt::print("  {}\n", reading);
+  if (!term.closed_form.empty()) fmt::print("  within its band: {}\n", term.closed_form);
+  fmt::print("  reduced chi-square on waveforms that were not fitted: {:.3g} without, {:.3g} with it\n",
+             term.gap.before, term.gap.after);
+  for (const explain::ParameterShift& shift : term.shifts)
+    fmt::print("  {:<18} {:.4f} +- {:.4f} without, {:.4f} +- {:.4f} with it\n", shift.name, shift.before,
+               shift.before_error, shift.after, shift.after_error);
+  for (const explain::LearnedRival& rival : term.rivals)
+    fmt::print("  as good: at the port {}, {} by {}\n", rival.port, rival.sets,
+               fmt::join(rival.variables, " and "));
 }
 
 void print_for_people(const explain::Explanation& found, const fs::path& folder) {
@@ -89,9 +109,11 @@ void print_for_people(const explain::Explanation& found, const fs::path& folder)
   for (const explain::ParameterShift& shift : found.shifts)
     fmt::print("  {:<18} {:.4f} +- {:.4f} without, {:.4f} +- {:.4f} with what was found\n", shift.name,
                shift.before, shift.before_error, shift.after, shift.after_error);
+  if (found.learned) print_learned(*found.learned);
   if (found.next_experiment) fmt::print("\nNext: {}\n", found.next_experiment->reason);
-  fmt::print("\nIn {}: {}, {}{}\n", folder.string(), explanation_file, report_file,
-             found.study_after.empty() ? "" : fmt::format(", {}", found.study_after));
+  fmt::print("\nIn {}: {}, {}{}{}\n", folder.string(), explanation_file, report_file,
+             found.study_after.empty() ? "" : fmt::format(", {}", found.study_after),
+             found.learned ? fmt::format(", {}", learned_file) : "");
 }
 
 /// A folder that was made for results: gone again if nothing was written into it.
@@ -118,6 +140,7 @@ ExitCode run_explain(const ExplainArguments& arguments, const CommandOutput& out
   const fs::path json_file = arguments.folder / explanation_file;
   const fs::path new_study = arguments.folder / study_file;
   const fs::path page = arguments.folder / report_file;
+  const fs::path learned = arguments.folder / learned_file;
   std::error_code error;
   MadeFolder folder;
   if (fs::create_directories(arguments.folder, error)) folder.made = arguments.folder;
@@ -129,11 +152,14 @@ ExitCode run_explain(const ExplainArguments& arguments, const CommandOutput& out
   require_output({json_file, inputs_of(study), explain::explanation_file_mark, arguments.force});
   require_output({new_study, inputs_of(study), study_mark, arguments.force});
   require_output({page, inputs_of(study), report::page_mark, arguments.force});
+  require_output({learned, inputs_of(study), learned_mark, arguments.force});
   const Interruption interruption;
   explain::Explanation found;
   try {
-    found = explain::explain_study(
-        study, {.threads = arguments.threads, .propose = true, .progress = print_progress});
+    found = explain::explain_study(study, {.threads = arguments.threads,
+                                           .propose = true,
+                                           .learn = arguments.learn,
+                                           .progress = print_progress});
   } catch (const Interrupted&) {
     std::cerr << "diastole explain: interrupted; nothing was written\n";
     return ExitCode::negative;
@@ -145,6 +171,12 @@ ExitCode run_explain(const ExplainArguments& arguments, const CommandOutput& out
                          explain::explained_study(study, arguments.folder, found.effects, found.shifts));
   } else {
     fs::remove(new_study, error);  // of an earlier explanation
+  }
+  if (found.learned) {
+    found.learned->effect_file = learned_file;
+    write_whole_file(learned, fmt::format("{}: a suggestion.\n{}", learned_mark, found.learned->toml));
+  } else {
+    fs::remove(learned, error);
   }
   write_whole_file(json_file, explain::to_json(found));
   write_whole_file(page, report::make_report(found));
@@ -170,6 +202,9 @@ void add_explain(CommandLine& line, const ExplanationScorer& score) {
       "  diastole explain out/explained.study.toml -o further/     what is missing beside what was found\n"
       "  diastole explain case.study.toml --with my-seal.effect.toml -o out/     a hypothesis of your own "
       "beside those that are known\n"
+      "  diastole explain case.study.toml --learn -o out/      a law that no effect of the library is, "
+      "learnt at "
+      "one port\n"
       "  diastole explain --score sealed/ results/                 right how often? "
       "results/NAME/explanation.json\n"
       "      against sealed/NAME.sealed.json (diastole simulate --hide) or a labels.json; exit code 1: false "
@@ -182,7 +217,10 @@ void add_explain(CommandLine& line, const ExplanationScorer& score) {
       "  none         nothing exceeds the model's own error\n"
       "OUT gets report.html, explanation.json for `diastole report`, and explained.study.toml: the study "
       "with\n"
-      "what was found.\n"
+      "what was found; where the verdict is unexplained and a law at one port predicts waveforms that it was "
+      "not "
+      "fitted to,\n"
+      "learned.effect.toml: a suggestion that --with takes once it is read and named.\n"
       "A name needs an effect larger than the model's own error; smaller ones are hints. That error is "
       "learnt where the\n"
       "study names sessions in which nothing is wrong, [data] reference = [...] (diastole reference "
@@ -204,6 +242,9 @@ void add_explain(CommandLine& line, const ExplanationScorer& score) {
   command->add_option("--threads", arguments->threads, "simulations at a time")
       ->check(CLI::Range(1, 256))
       ->capture_default_str();
+  command->add_flag(
+      "--learn", arguments->learn,
+      "learn a law beside what is found, whatever the verdict; without it only where that is unexplained");
   command->add_flag("--strict", arguments->strict, "exit with 1 if the answer is ambiguous or unexplained");
   command->add_flag("--force", arguments->force, "replace files in the folder that hold something else");
   line.on_run(command, [arguments, score](const CommandOutput& out) {

@@ -211,7 +211,8 @@ class Reader {
     }
     table.finish();
     if (effect_.laws.empty() || effect_.laws.front().sets == Out::t_seen ||
-        effect_.laws.front().sets == Out::q_hose || effect_.laws.front().sets == Out::q_cavity)
+        effect_.laws.front().sets == Out::q_hose || effect_.laws.front().sets == Out::p_pump ||
+        effect_.laws.front().sets == Out::q_cavity)
       table.fail("name", "states belong to an effect that sets V_piston, p or p_seen",
                  "Set one of these, or write the effect without states.");
     require_inputs(effect_.laws.front().sets, state.rate, rate);
@@ -293,6 +294,7 @@ class Reader {
         fail(text, "is not " + std::string(what), "Correct the formula.");
     };
     if (law == Out::q_hose) require_slope(In::q_piston, "q_piston less something");
+    if (law == Out::p_pump) require_slope(In::p_pump, "p_pump and something");
     if (law == Out::q_cavity) require_slope(In::q_hose, "q_hose less something");
     if (law != Out::t_seen) return;
     const NodeId rate = effect_.graph.derivative(node, index_of(In::t));

@@ -79,7 +79,7 @@ inline constexpr std::array<QuantityText, quantity_count> quantities{
      {"V", "mL", "volume that the specimen has taken"},
      {"dV", "mL/s", "its rate"},
      {"V_max", "mL", "the largest so far in the session"},
-     {"q_hose", "mL/s", "flow out of the hose"},
+     {"q_hose", "mL/s", "flow through the hose"},
      {"p_cavity", "kPa", "pressure in the cavity"},
      {"c_hose", "m/s", "speed of pressure waves in the hose", 400.0},
      {"L_hose", "m", "length of the hose", 5.0},
@@ -100,8 +100,8 @@ inline constexpr std::array<QuantityText, quantity_count> quantities{
      {"volume_gain", "1", "of gated volumes", 1.0}}};
 
 /// What an effect may set besides the rig's constants.
-enum class Out { V_piston, q_hose, p, q_cavity, p_seen, t_seen };
-inline constexpr size_t law_count = 6;
+enum class Out { V_piston, q_hose, p_pump, p, q_cavity, p_seen, t_seen };
+inline constexpr size_t law_count = 7;
 
 struct LawText {
   std::string_view name;
@@ -114,6 +114,7 @@ struct LawText {
 namespace inputs_of {
 inline constexpr std::array V_piston{In::V_command, In::q_command, In::a_command};
 inline constexpr std::array q_hose{In::q_piston, In::p_pump};
+inline constexpr std::array p_pump{In::p_pump, In::q_hose, In::V};
 inline constexpr std::array p{In::p, In::V, In::dV, In::V_max};
 inline constexpr std::array q_cavity{In::q_hose, In::p_cavity};
 inline constexpr std::array p_seen{In::p};
@@ -123,6 +124,8 @@ inline constexpr std::array p_seen{In::p};
 inline constexpr std::array<LawText, law_count> laws{
     {{"V_piston", "mL", "drive", "volume that the piston displaces", inputs_of::V_piston},
      {"q_hose", "mL/s", "drive", "flow into the hose: q_piston less a leak", inputs_of::q_hose},
+     {"p_pump", "kPa", "drive", "pressure in the cylinder: p_pump and what is lost into the hose",
+      inputs_of::p_pump},
      {"p", "kPa", "specimen", "pressure of the specimen", inputs_of::p},
      {"q_cavity", "mL/s", "specimen", "flow into the specimen: q_hose less a leak", inputs_of::q_cavity},
      {"p_seen", "kPa", "sensor", "what the cavity's sensor shows", inputs_of::p_seen},

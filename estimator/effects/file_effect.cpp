@@ -256,6 +256,20 @@ void add_pump_leak(Bound bound, rig::RigModel& model) {
   model.pump_leaks.push_back(leak_of(bound, In::p_pump, opens ? 0.0 : rest[1]));
 }
 
+/// What is lost into the hose, as one law of a run.
+rig::LossMaker loss_of(const Bound& bound) {
+  return [=](const rig::RunPlace& place) -> rig::LossLaw {
+    if (!bound.concerns(place)) return [](double, double, double) { return 0.0; };
+    return [here = Bound(bound), place](double flow_mL_per_s, double volume_mL, double time_s) mutable {
+      here.set_time(time_s, place);
+      here[In::p_pump] = 0.0;
+      here[In::q_hose] = flow_mL_per_s;
+      here[In::V] = volume_mL;
+      return here.laws->law(here.inputs.data());
+    };
+  };
+}
+
 void add_law(const Bound& bound, rig::RigModel& model) {
   switch (bound.laws->file.laws.front().sets) {
     case Out::V_piston:
@@ -265,6 +279,9 @@ void add_law(const Bound& bound, rig::RigModel& model) {
       break;
     case Out::q_hose:
       add_pump_leak(bound, model);
+      break;
+    case Out::p_pump:
+      model.pump_losses.push_back(loss_of(bound));
       break;
     case Out::p:
       model.memories.emplace_back(

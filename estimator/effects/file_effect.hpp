@@ -7,6 +7,7 @@
 //   q_hose     a leak past the seal: its conductance at rest belongs to the hose's linear end, the rest is a load there. A
 //              leak that has none at rest gets a hundredth of what it has at 10 kPa: the pressure before a valve that
 //              shuts is not known
+//   p_pump     a loss of pressure at the pump's end of the hose
 //   p          the specimen's memory
 //   q_cavity   a leak at the cavity
 //   p_seen     the cavity's sensor

@@ -413,6 +413,39 @@ void add_evidence(Page& page, const Explanation& e) {
                 row_of, "All candidates that were looked at.", 4);
 }
 
+/// The learned law's curve with its band.
+void add_learned(Page& page, const Explanation& e) {
+  if (!e.learned) return;
+  const LearnedTerm& term = *e.learned;
+  page.section(
+      "A law that was learnt",
+      fmt::format("A suggestion, no finding: at the port {}, {} depends on {} as drawn. Fitted on some "
+                  "waveforms it predicts the others: the gap there goes from {} to {} ({} % closed).",
+                  term.port, term.sets, fmt::join(term.variables, " and "), number(term.gap.before, 3),
+                  number(term.gap.after, 3), number(100 * term.gap.closed, 3)));
+  const auto at = [](size_t i) { return [i](const std::array<double, 2>& pair) { return pair[i]; }; };
+  const std::vector<double> x = numbers_of(term.curve, at(0));
+  SvgPlot plot({.x = {.label = fmt::format("{} ({})", term.variables.front(), term.variable_unit)},
+                .y = {.label = fmt::format("the law ({})", term.unit)}});
+  plot.band(x, numbers_of(term.band, at(0)), numbers_of(term.band, at(1)), "c", "90 % band");
+  plot.line(x, numbers_of(term.curve, at(1)), "c", "learnt");
+  page.figures(
+      {{plot.svg(), fmt::format("What {} gets more or less, by {}.{}", term.sets, term.variables.front(),
+                                term.closed_form.empty() ? "" : " Within the band: " + term.closed_form)}});
+  for (const std::string& reading : term.readings)
+    page.paragraph("Perhaps: " + reading + ".");
+  for (const LearnedRival& rival : term.rivals)
+    page.warning(fmt::format("As good on these waveforms: at the port {}, {} by {}.", rival.port, rival.sets,
+                             fmt::join(rival.variables, " and ")));
+  const auto row_of = [](const ParameterShift& shift) -> Page::Row {
+    return {shift.name, with_error(shift.before, shift.before_error),
+            with_error(shift.after, shift.after_error)};
+  };
+  page.table_of(term.shifts, {"parameter", "without", "with"}, row_of,
+                "What the law does to the estimates: a free curve takes part of what the modulus was, and "
+                "widens its error.");
+}
+
 void add_next(Page& page, const Explanation& e) {
   if (!e.next_experiment) return;
   const NextExperiment& next = *e.next_experiment;
@@ -448,6 +481,7 @@ void add_explanation(Page& page, const Explanation& e) {
   add_explained_traces(page, e);
   add_explained_field(page, e);
   add_evidence(page, e);
+  add_learned(page, e);
   add_next(page, e);
 }
 

@@ -57,6 +57,11 @@ CyclePlace cycle_at(const RunPlace& place, double time_s);
 using LeakLaw = std::function<double(double pressure_kPa, double time_s)>;
 using LeakMaker = std::function<LeakLaw(const RunPlace&)>;
 
+/// Pressure lost on the way from the cylinder into the hose, kPa by the flow into it and the volume that the specimen holds;
+/// one lives for one run.
+using LossLaw = std::function<double(double flow_mL_per_s, double volume_mL, double time_s)>;
+using LossMaker = std::function<LossLaw(const RunPlace&)>;
+
 /// Pressure of the specimen by its elastic pressure and volume; may keep a state, so that one lives for one run.
 /// `look` must not change the state; `pass` goes on to `time_s` and does.
 class SpecimenMemory {
@@ -101,6 +106,7 @@ struct RigModel {
   double drive_compliance_mL_per_kPa = 0.0;  ///< by which screw, piston and cylinder yield
   /// What leaks past the seal beyond that conductance, which must be positive where there is any.
   std::vector<LeakMaker> pump_leaks;
+  std::vector<LossMaker> pump_losses;
   std::vector<LeakMaker> cavity_leaks;
   std::vector<MemoryMaker> memories;
   std::vector<SensorTraceMap> cavity_traces;  ///< behind the catheter, before the maps

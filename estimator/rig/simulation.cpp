@@ -103,6 +103,7 @@ class Plant {
         drive_(driven(model, run, motion)),
         gas_(model.pump_gas_mL, model.gas_exponent, run.place.atmosphere_kPa),
         leaks_(made(model.pump_leaks, run.place)),
+        losses_(made(model.pump_losses, run.place)),
         drive_yields_(!gas_.present() && model.drive_compliance_mL_per_kPa > least_compliance),
         line_(model.hose, {.step_s = options.step_s,
                            .components = options.components,
@@ -120,11 +121,31 @@ class Plant {
       fastest = std::max(fastest, std::abs(flow));
     const Hose& hose = model_.hose;
     const double area = hose.area_mm2();
-    const double resistance = 1e-3 * hose.loss_coefficient * hose.density_kg_m3 * fastest / (area * area);
+    const double turning = 1e-3 * hose.loss_coefficient * hose.density_kg_m3 * fastest / (area * area);
+    const double resistance = turning + steepest_loss_kPa_s_per_mL(fastest);
     return resistance * line_.outflow_by_suction() * drive_.step_s;
   }
 
  private:
+  /// Of the laws of loss at the pump, up to this flow either way.
+  [[nodiscard]] double steepest_loss_kPa_s_per_mL(double fastest_mL_per_s) const {
+    constexpr int parts = 32;
+    const double step = fastest_mL_per_s / parts;
+    if (losses_.empty() || step == 0.0) return 0.0;
+    double steepest = 0.0;
+    for (const double volume_mL : {0.0, std::ranges::max(drive_.volume_mL)})
+      for (int i = -parts; i < parts; ++i)
+        steepest = std::max(
+            steepest,
+            std::abs(lost_kPa((i + 1) * step, volume_mL, 0.0) - lost_kPa(i * step, volume_mL, 0.0)) / step);
+    return steepest;
+  }
+  [[nodiscard]] double lost_kPa(double flow_mL_per_s, double volume_mL, double time_s) const {
+    double loss = 0.0;
+    for (const LossLaw& law : losses_)
+      loss += law(flow_mL_per_s, volume_mL, time_s);
+    return loss;
+  }
   [[nodiscard]] double turning_loss_kPa(double flow_mL_per_s) const {
     const double speed = flow_mL_per_s / model_.hose.area_mm2();
     return 0.5e-3 * model_.hose.loss_coefficient * model_.hose.density_kg_m3 * speed * std::abs(speed);
@@ -144,13 +165,15 @@ class Plant {
     if (!gas_.present() && model_.pump_leak_mL_s_kPa > least_leak) return 1.0 / model_.pump_leak_mL_s_kPa;
     return {};
   }
-  [[nodiscard]] double loss_at_pump_kPa() const {
-    return (1.0 - model_.hose.loss_at_cavity) * turning_loss_kPa(line_.entering_mL_per_s());
+  [[nodiscard]] double loss_at_pump_kPa(size_t k) const {
+    const double flow = line_.entering_mL_per_s();
+    return (1.0 - model_.hose.loss_at_cavity) * turning_loss_kPa(flow) +
+           lost_kPa(flow, cavity_.specimen_mL(), drive_.time_s(k) - copied_s_);
   }
   [[nodiscard]] EndLoads loads(size_t k, double acceleration) {
     cavity_kPa_ = cavity_.look(left_mL(k), drive_.time_s(k) - copied_s_);
     EndLoads now{
-        .piston_acceleration = acceleration, .pump_kPa = -loss_at_pump_kPa(), .cavity_kPa = cavity_kPa_};
+        .piston_acceleration = acceleration, .pump_kPa = -loss_at_pump_kPa(k), .cavity_kPa = cavity_kPa_};
     now.cavity_kPa += model_.hose.loss_at_cavity * turning_loss_kPa(line_.leaving_mL_per_s());
     if (gas_.present()) {
       const double squeezed_mL = -line_.yielded_mL() - leaked_mL_;
@@ -172,12 +195,14 @@ class Plant {
     return now;
   }
   /// The pressure in the cylinder, where the pump's sensor is.
-  [[nodiscard]] double cylinder_kPa() const { return line_.pump_kPa() + loss_at_pump_kPa(); }
-  static std::vector<LeakLaw> made(const std::vector<LeakMaker>& makers, const RunPlace& place) {
-    std::vector<LeakLaw> leaks;
-    for (const LeakMaker& make : makers)
-      leaks.push_back(make(place));
-    return leaks;
+  [[nodiscard]] double cylinder_kPa(size_t k) const { return line_.pump_kPa() + loss_at_pump_kPa(k); }
+  template <class Law>
+  static std::vector<Law> made(const std::vector<std::function<Law(const RunPlace&)>>& makers,
+                               const RunPlace& place) {
+    std::vector<Law> laws;
+    for (const auto& make : makers)
+      laws.push_back(make(place));
+    return laws;
   }
   /// Past the seal, by how much it differs from the conductance.
   [[nodiscard]] double lost_beyond(double pressure_kPa, double time_s) const {
@@ -225,7 +250,7 @@ class Plant {
     leaked_before_mL_s_ = leaks_mL_s;
   }
   void record(PlantTrace& trace, size_t k, double cavity_kPa) const {
-    trace.pump_kPa[k] = cylinder_kPa();
+    trace.pump_kPa[k] = cylinder_kPa(k);
     trace.cavity_kPa[k] = cavity_kPa;
     trace.cavity_mL[k] = cavity_.specimen_mL();
   }
@@ -237,6 +262,7 @@ class Plant {
   DriveTrace drive_;
   GasPocket gas_;
   std::vector<LeakLaw> leaks_;
+  std::vector<LossLaw> losses_;
   bool drive_yields_;
   HoseLine line_;
   Cavity cavity_;

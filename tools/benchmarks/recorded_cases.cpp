@@ -24,7 +24,8 @@ std::optional<Recordings> recordings_of(int argc, char** argv) {
 }
 
 void visit_cases(const Recordings& recordings, const std::function<void(const RecordedCase&)>& visit) {
-  for (const auto& [name, label] : recordings.labels.items()) {
+  const auto& labels = recordings.labels;
+  for (const auto& [name, label] : (labels.contains("cases") ? labels["cases"] : labels).items()) {
     const std::string& id = name;
     const std::string kind = label["kind"];
     const bool chosen = recordings.wanted.empty() ||

@@ -115,6 +115,8 @@ void put_law(EffectFile& file, std::vector<double> inputs, OwnLaws& own) {
         return law.at(time_s, {{In::p, pressure_kPa}});
       };
       break;
+    case Out::p_pump:
+      refuse(file, "a loss at the pump");
     case Out::t_seen:
       refuse(file, "another clock");
   }

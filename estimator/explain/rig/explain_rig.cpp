@@ -10,6 +10,7 @@
 #include <optional>
 
 #include "estimator/explain/rig/findings.hpp"
+#include "estimator/explain/rig/learned_term.hpp"
 #include "estimator/explain/rig/next_experiment.hpp"
 #include "estimator/explain/rig/reference_file.hpp"
 #include "estimator/explain/rig/set_verdict.hpp"
@@ -231,6 +232,8 @@ Explanation explain_rig(const Study& study, const ExplainOptions& options) {
   if (!out.effects.empty()) out.shifts = parameter_shifts(problem, plain, chosen);
   out.steps = steps_of(plain, after);
   out.traces = traces(problem, plain, after);
+  if (options.learn || out.verdict == Verdict::unexplained)
+    out.learned = learn_term(problem, after, {from_reference}, report);
   options.report("designing the next experiment");
   if (options.propose) out.next_experiment = next_experiment(study, problem, search, verdict, out);
   out.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();

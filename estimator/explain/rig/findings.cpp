@@ -165,23 +165,31 @@ std::vector<Misfit> misfits(const rig::SessionProblem& problem, const EffectSet&
   return list;
 }
 
-Gap held_out_gap(const rig::SessionProblem& problem, const EffectSet& before, const EffectSet& after) {
+std::vector<Fold> folds_of(const rig::SessionProblem& problem) {
   const auto& runs = problem.session().runs;
   const bool by_run = runs.size() > 1;
-  std::map<std::pair<size_t, size_t>, std::vector<bool>> folds;
+  std::map<std::pair<size_t, size_t>, Fold> folds;
   for (const rig::FeatureBlock& block : problem.features().blocks()) {
     if (block.at_rest && !by_run) continue;
-    auto& held = folds[{block.run, by_run ? 0 : block.segment}];
-    held.resize(static_cast<size_t>(problem.features().count()), false);
-    std::fill_n(held.begin() + static_cast<std::ptrdiff_t>(block.first), block.features.size(), true);
+    Fold& fold = folds[{block.run, by_run ? 0 : block.segment}];
+    fold.name = by_run ? file_of(runs[block.run])
+                       : fmt::format("{}, segment {}", file_of(runs[block.run]), block.segment);
+    fold.held.resize(static_cast<size_t>(problem.features().count()), false);
+    std::fill_n(fold.held.begin() + static_cast<std::ptrdiff_t>(block.first), block.features.size(), true);
   }
+  std::vector<Fold> list;
+  for (auto& [place, fold] : folds)
+    list.push_back(std::move(fold));
+  return list;
+}
+
+Gap held_out_gap(const rig::SessionProblem& problem, const EffectSet& before, const EffectSet& after) {
   Gap gap;
   HeldOut old, now;
-  for (const auto& [place, held] : folds) {
-    predict(before, held, after.evidence.variance, old);
-    predict(after, held, after.evidence.variance, now);
-    gap.held_out.push_back(by_run ? file_of(runs[place.first])
-                                  : fmt::format("{}, segment {}", file_of(runs[place.first]), place.second));
+  for (const Fold& fold : folds_of(problem)) {
+    predict(before, fold.held, after.evidence.variance, old);
+    predict(after, fold.held, after.evidence.variance, now);
+    gap.held_out.push_back(fold.name);
   }
   if (old.count == 0.0) return gap;
   gap.before = old.square / old.count;

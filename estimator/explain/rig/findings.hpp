@@ -21,6 +21,14 @@ std::vector<ParameterShift> parameter_shifts(const rig::SessionProblem& problem,
 /// none, to the port that the channel suggests.
 std::vector<Misfit> misfits(const rig::SessionProblem& problem, const EffectSet& set, const EffectSet& under);
 
+/// Features that are predicted from all others.
+struct Fold {
+  std::string name;
+  std::vector<bool> held;
+};
+/// Of each run; of a single run of each segment.
+std::vector<Fold> folds_of(const rig::SessionProblem& problem);
+
 /// Reduced chi-squares on each run (of a single run: each segment) by values that were fitted to all others, over noise and
 /// the model's error of `after`.
 Gap held_out_gap(const rig::SessionProblem& problem, const EffectSet& before, const EffectSet& after);

@@ -69,6 +69,25 @@ bool is_tolerance(const rig::SessionProblem& problem, const EffectSet& set, cons
          left.cwiseAbs2().dot(weight) < right_to * right_to * change.cwiseAbs2().dot(weight);
 }
 
+}  // namespace
+
+ChangeSize size_of_change(const rig::SessionProblem& problem, const EffectSet& set, const VectorXd& change) {
+  const Eigen::MatrixXd basic = set.known.columns.leftCols(rig::basic_nuisances);
+  const VectorXd weight = set.evidence.variance.cwiseInverse();
+  Eigen::MatrixXd normal = basic.transpose() * weight.asDiagonal() * basic;
+  normal.diagonal().array() += 1e-6;  // a channel that is not there has no offset
+  const VectorXd left = change - basic * normal.llt().solve(basic.transpose() * weight.cwiseProduct(change));
+  const auto error = mean_squares(problem, error_squares(problem.error(), set.evidence.shares));
+  const auto size = mean_squares(problem, left.cwiseAbs2());
+  ChangeSize found{
+      .squares = left.cwiseAbs2(), .over_error = 0.0, .is_tolerance = is_tolerance(problem, set, change)};
+  for (size_t s = 0; s < size.size(); ++s)
+    if (error[s] > 0.0) found.over_error = std::max(found.over_error, std::sqrt(size[s] / error[s]));
+  return found;
+}
+
+namespace {
+
 /// What a set's effects change each, over the model's error.
 Sizes sizes_of(const rig::SessionProblem& problem, const EffectSet& set, const ErrorKnowledge& known,
                size_t given) {
@@ -87,24 +106,13 @@ Sizes sizes_of(const rig::SessionProblem& problem, const EffectSet& set, const E
     models.push_back(std::move(without));
   }
   const Eigen::MatrixXd shown = problem.shown(models);
-  const Eigen::MatrixXd basic = set.known.columns.leftCols(rig::basic_nuisances);
-  const VectorXd weight = set.evidence.variance.cwiseInverse();
-  Eigen::MatrixXd normal = basic.transpose() * weight.asDiagonal() * basic;
-  normal.diagonal().array() += 1e-6;  // a channel that is not there has no offset
-  const auto error = mean_squares(problem, error_squares(problem.error(), set.evidence.shares));
   sizes.changed = VectorXd::Zero(shown.rows());
   for (Index i = 1; i < shown.cols(); ++i) {
-    const VectorXd change = shown.col(0) - shown.col(i);
-    const VectorXd left =
-        change - basic * normal.llt().solve(basic.transpose() * weight.cwiseProduct(change));
-    sizes.changed += left.cwiseAbs2();
-    const auto size = mean_squares(problem, left.cwiseAbs2());
-    double largest = 0.0;
-    for (size_t s = 0; s < size.size(); ++s)
-      if (error[s] > 0.0) largest = std::max(largest, std::sqrt(size[s] / error[s]));
-    sizes.over_error.push_back(largest);
+    const ChangeSize size = size_of_change(problem, set, shown.col(0) - shown.col(i));
+    sizes.changed += size.squares;
+    sizes.over_error.push_back(size.over_error);
     sizes.material.push_back(static_cast<size_t>(i) <= given ||
-                             (largest >= known.least_size() && !is_tolerance(problem, set, change)));
+                             (size.over_error >= known.least_size() && !size.is_tolerance));
   }
   // What is smaller beside it may be its own error.
   const double largest = *std::ranges::max_element(sizes.over_error);

@@ -36,6 +36,15 @@ struct SetVerdict {
 /// Of a set's tolerances the one furthest from its prior, in sds.
 double largest_tolerance(const EffectSet& set);
 
+/// A change of the features beside a set: modulus and offsets follow.
+struct ChangeSize {
+  Eigen::VectorXd squares;    ///< of what they leave
+  double over_error = 0.0;    ///< RMS over the model's error, the largest of the channels
+  bool is_tolerance = false;  ///< parts of the declared rig, two sds off in all, make the same
+};
+ChangeSize size_of_change(const rig::SessionProblem& problem, const EffectSet& set,
+                          const Eigen::VectorXd& change);
+
 SetVerdict judge_sets(const rig::SessionProblem& problem, const SetSearch& search,
                       const ErrorKnowledge& error);
 

@@ -170,6 +170,32 @@ struct SearchEnd {
 /// Whether all of them did so where they were to end.
 bool is_settled(const std::vector<SearchEnd>& searches);
 
+/// A law at another port that predicts as well as the learned one.
+struct LearnedRival {
+  std::string port;
+  std::string sets;
+  std::vector<std::string> variables;
+};
+
+/// A law that the library lacks, learnt at one port: a suggestion for a person to read and to name, no verdict.
+struct LearnedTerm {
+  std::string port;                    ///< "drive"
+  std::string sets;                    ///< what the law makes, as in an effect file: "p_pump"
+  std::vector<std::string> variables;  ///< of the law, the curve's first
+  std::string variable_unit;
+  std::string unit;                          ///< of the curve
+  std::vector<std::array<double, 2>> curve;  ///< variable, value
+  std::vector<std::array<double, 2>> band;   ///< 90 % of it at each point
+  std::string closed_form;             ///< the simplest formula inside the band; empty: none of those tried
+  Gap gap;                             ///< without it and with it, on waveforms that were not fitted
+  double held_out_gain = 0.0;          ///< ln of the mean likelihood ratio there
+  std::vector<std::string> readings;   ///< what it looks like, in words: suggestions
+  std::vector<ParameterShift> shifts;  ///< C1 and offsets without it and with it
+  std::vector<LearnedRival> rivals;    ///< that these waveforms cannot tell from it
+  std::string effect_file;             ///< beside the JSON
+  std::string toml;                    ///< the file's text
+};
+
 struct NextExperiment {
   std::string toml;  ///< runnable: contracts.md section 6
   std::vector<std::string> separates;
@@ -190,6 +216,7 @@ struct Explanation {
   std::vector<std::vector<std::string>> ambiguous_with;
   std::vector<Misfit> where;
   Gap gap;
+  std::optional<LearnedTerm> learned;
   std::optional<NextExperiment> next_experiment;
   std::string study_after;  ///< file name beside the JSON; empty if nothing was added
   std::string summary;      ///< a few sentences for people

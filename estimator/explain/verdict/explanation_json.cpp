@@ -40,6 +40,10 @@ DIASTOLE_MEMBERS(Candidate, ids, chi_square_drop, refitted, parameters, held_out
 
 DIASTOLE_MEMBERS(ParameterShift, name, before, before_error, after, after_error)
 
+DIASTOLE_MEMBERS(LearnedRival, port, sets, variables)
+DIASTOLE_MEMBERS(LearnedTerm, port, sets, variables, variable_unit, unit, curve, band, closed_form, gap,
+                 held_out_gain, readings, shifts, rivals, effect_file, toml)
+
 DIASTOLE_MEMBERS(Trace, run, channel, unit, noise_sd, time_s, measured, before, after, cavity_mL, trigger_s)
 
 DIASTOLE_MEMBERS(FieldResidual, place_mm, frame, before, after, per_mm)
@@ -51,7 +55,7 @@ DIASTOLE_MEMBERS(NextExperiment, toml, separates, predicted_separation_sigma, re
 DIASTOLE_MEMBERS(SearchEnd, effects, termination)
 
 DIASTOLE_MEMBERS(Explanation, study, verdict, confidence, model_error, reference, departures, cycle_scatter,
-                 hints, summary, converged, searches, effects, ambiguous_with, where, gap, next_experiment,
+                 hints, summary, converged, searches, effects, ambiguous_with, where, gap, learned, next_experiment,
                  study_after, evidence, shifts, steps, traces, field, seconds)
 
 }  // namespace explain

@@ -32,7 +32,9 @@ bool is_settled(const std::vector<SearchEnd>& searches) {
       searches, [](const SearchEnd& search) { return inference::is_settled(search.termination); });
 }
 
-std::string summary_of(const Explanation& found) {
+namespace {
+
+std::string verdict_sentence(const Explanation& found) {
   std::vector<std::string> ids;
   for (const FoundEffect& effect : found.effects)
     ids.push_back(effect.id);
@@ -74,6 +76,20 @@ std::string summary_of(const Explanation& found) {
                        found.where.front().channel, found.where.front().run);
   }
   return "";
+}
+
+}  // namespace
+
+std::string summary_of(const Explanation& found) {
+  std::string summary = verdict_sentence(found);
+  if (found.learned)
+    summary += fmt::format(
+        " A law that was learnt at the port {}, {} by {}, closes {:.0f} % of the gap on waveforms that were "
+        "not "
+        "fitted: a suggestion, to be read and named.",
+        found.learned->port, found.learned->sets, fmt::join(found.learned->variables, " and "),
+        100.0 * found.learned->gap.closed);
+  return summary;
 }
 
 }  // namespace diastole::explain

@@ -1,0 +1,307 @@
+#include "estimator/explain/rig/learned_term.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "estimator/explain/rig/findings.hpp"
+#include "estimator/explain/rig/frozen_leak.hpp"
+#include "estimator/explain/rig/law_fit.hpp"
+#include "estimator/explain/rig/law_readings.hpp"
+#include "estimator/inference/information.hpp"
+#include "estimator/inference/intervals.hpp"
+
+namespace diastole::explain {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+using rig::SessionModel;
+
+constexpr double false_proposals = 0.01;  ///< of sessions in which nothing is missing, at most
+constexpr size_t laws_refined = 3;
+constexpr double worth_refining = 0.5;  ///< of the best law's gain
+constexpr double least_closed = 0.5;
+constexpr double as_good = 3.0;  ///< nats: one in twenty
+
+/// A law as a candidate: its knots and what its curve's values do.
+struct LawCandidate {
+  const PortLaw* law;
+  std::vector<double> knots;
+  double scale;
+  CurvePrior prior;
+  LawProblem problem;
+  LawFit fit;
+  SessionModel at;            ///< where the problem is linearised, without the law
+  VectorXd values;            ///< of the curve there
+  double gain = 0.0;          ///< nats, of all data
+  std::vector<double> gains;  ///< of each fold
+};
+
+class LawSearch {
+ public:
+  LawSearch(const rig::SessionProblem& problem, const EffectSet& set)
+      : problem_(problem), set_(set), ranges_(variable_ranges(problem, set.model)) {}
+
+  std::vector<LawCandidate> run(const std::vector<Fold>& folds);
+  [[nodiscard]] const rig::EvidenceFit& without() const { return without_; }
+  /// Values at all knots.
+  [[nodiscard]] static std::vector<double> at_knots(const LawCandidate& law, const VectorXd& free);
+  [[nodiscard]] VectorXd shown_with(const LawCandidate& law, const SessionModel& at,
+                                    const VectorXd& free) const {
+    return shown(law, at, {free}).col(1);
+  }
+
+ private:
+  [[nodiscard]] Index nuisances() const { return set_.model.u.size(); }
+  /// Features of a model and of the same with curves of these values.
+  [[nodiscard]] MatrixXd shown(const LawCandidate& law, const SessionModel& at,
+                               const std::vector<VectorXd>& curves) const;
+  void linearise(LawCandidate& law, const SessionModel& at, const VectorXd& values,
+                 const MatrixXd& known) const;
+  void refine(LawCandidate& law) const;
+  void judge(LawCandidate& law, const std::vector<Fold>& folds) const;
+
+  const rig::SessionProblem& problem_;
+  const EffectSet& set_;
+  VariableRanges ranges_;
+  LawProblem base_;  ///< without a law
+  rig::EvidenceFit without_;
+};
+
+std::vector<double> LawSearch::at_knots(const LawCandidate& law, const VectorXd& free) {
+  std::vector<double> values(law.knots.size(), 0.0);
+  for (size_t i = 0; i < law.prior.free_knots().size(); ++i)
+    values[law.prior.free_knots()[i]] = free[static_cast<Index>(i)];
+  return values;
+}
+
+MatrixXd LawSearch::shown(const LawCandidate& law, const SessionModel& at,
+                          const std::vector<VectorXd>& curves) const {
+  std::vector<std::shared_ptr<const Effect>> effects;
+  std::vector<SessionModel> models{at};
+  // About no leak, a small one need not be solved for.
+  const bool is_frozen = law.law->sets == "q_hose" && curves.size() > 1 && curves.front().isZero();
+  const auto frozen = is_frozen ? std::optional<FrozenLeak>(std::in_place, problem_, at) : std::nullopt;
+  for (const VectorXd& curve : curves) {
+    const std::vector<double> values = at_knots(law, curve);
+    effects.push_back(is_frozen ? frozen->of(law.knots, values)
+                                : effect_of_text(tabulated_law(*law.law, law.knots, values)));
+    models.push_back(at);
+    models.back().terms.push_back({effects.back().get(), {}});
+    models.back().values.push_back(1.0);
+  }
+  std::vector<bool> same_plant(models.size(), law.law->port == Port::sensor);
+  return problem_.shown(models, same_plant);
+}
+
+void LawSearch::linearise(LawCandidate& law, const SessionModel& at, const VectorXd& values,
+                          const MatrixXd& known) const {
+  constexpr double small_part = 0.01;  // of the scale: far above what simulations copy
+  // Increments where the law is made of such: what falls with the distance is hard to solve for.
+  MatrixXd moves = law.prior.increments();
+  if (moves.cols() == 0) moves = MatrixXd::Identity(values.size(), values.size());
+  std::vector<VectorXd> curves{values};
+  for (Index k = 0; k < values.size(); ++k)
+    curves.push_back(values + small_part * law.scale * moves.col(k));
+  const MatrixXd all = shown(law, at, curves);
+  law.at = at;
+  law.values = values;
+  law.problem.known = known;
+  law.problem.responses =
+      (all.rightCols(values.size()).colwise() - all.col(1)) / (small_part * law.scale) * moves.inverse();
+  law.problem.target =
+      problem_.measured() - all.col(1) + law.problem.responses * values + known.rightCols(nuisances()) * at.u;
+}
+
+void LawSearch::refine(LawCandidate& law) const {
+  constexpr int most_rounds = 4;
+  constexpr double straight = 0.1;       // of the error's variance, in the mean
+  constexpr double far = 1.0;            // sds of nuisances
+  constexpr double least_modulus = 0.2;  // times what it was, in a step
+  for (int round = 0; round < most_rounds; ++round) {
+    const VectorXd weight = law.fit.evidence.variance.cwiseInverse();
+    const auto cost = [&](const VectorXd& left, const VectorXd& u) {
+      return left.cwiseAbs2().dot(weight) + u.squaredNorm();
+    };
+    SessionModel at = law.at;
+    VectorXd values = law.fit.values;
+    at.u = law.fit.evidence.u.tail(nuisances());
+    // Pressures are in proportion to the modulus, whose logarithm u[0] is.
+    const double sd = problem_.nuisances().front().sd;
+    at.u[0] = law.at.u[0] + std::log(std::max(1.0 + sd * (at.u[0] - law.at.u[0]), least_modulus)) / sd;
+    const VectorXd linear = law.problem.target - law.problem.responses * values -
+                            law.problem.known.rightCols(nuisances()) * law.fit.evidence.u.tail(nuisances());
+    const double before = cost(law.problem.target - law.problem.responses * law.values -
+                                   law.problem.known.rightCols(nuisances()) * law.at.u,
+                               law.at.u);
+    VectorXd left;
+    bool is_better = false;
+    for (int halving = 0; halving < 4 && !is_better; ++halving) {
+      if (halving > 0) {
+        at.u = 0.5 * (at.u + law.at.u);
+        values = 0.5 * (values + law.values);
+      }
+      left = problem_.measured() - shown_with(law, at, values);
+      is_better = left.allFinite() && cost(left, at.u) < before;
+    }
+    if (!is_better) return;
+    if ((left - linear).cwiseAbs2().cwiseProduct(weight).mean() < straight) break;
+    MatrixXd known = law.problem.known;
+    if ((at.u - law.at.u).norm() > far) {
+      SessionModel with = at;
+      const auto effect = effect_of_text(tabulated_law(*law.law, law.knots, at_knots(law, values)));
+      with.terms.push_back({effect.get(), {}});
+      with.values.push_back(1.0);
+      VectorXd there;
+      known.rightCols(nuisances()) = problem_.nuisance_columns(with, there);
+    }
+    const LawCandidate last = law;
+    linearise(law, at, values, known);
+    if (!law.problem.responses.allFinite()) {
+      law = last;
+      return;
+    }
+    law.fit = fit_law(law.problem, problem_.error(), law.prior, law.fit);
+  }
+}
+
+/// ln density of the rows that are held out, given the others, by the others' shares.
+double held_out_density(const LawProblem& problem, const MatrixXd& columns, const rig::ModelError& error,
+                        const std::vector<Index>& fitted, const rig::Shares& shares) {
+  const VectorXd target = problem.target(fitted);
+  return fit_linear(problem.target, columns, error, shares).log_evidence -
+         fit_linear(target, columns(fitted, Eigen::all), error_of_rows(error, fitted), shares).log_evidence;
+}
+
+void LawSearch::judge(LawCandidate& law, const std::vector<Fold>& folds) const {
+  for (const Fold& fold : folds) {
+    std::vector<Index> fitted;
+    for (size_t i = 0; i < fold.held.size(); ++i)
+      if (!fold.held[i]) fitted.push_back(static_cast<Index>(i));
+    const rig::ModelError error = error_of_rows(problem_.error(), fitted);
+    const LawProblem base = base_.rows(fitted);
+    const rig::EvidenceFit plain = fit_with_shares(base.target, base.known, error, without_.shares);
+    const LawFit with = fit_law(law.problem.rows(fitted), error, law.prior, law.fit);
+    MatrixXd columns(law.problem.known.rows(), with.root.cols() + law.problem.known.cols());
+    columns << law.problem.responses * with.root, law.problem.known;
+    law.gains.push_back(
+        held_out_density(law.problem, columns, problem_.error(), fitted, with.evidence.shares) -
+        held_out_density(base_, base_.known, problem_.error(), fitted, plain.shares));
+  }
+}
+
+std::vector<LawCandidate> LawSearch::run(const std::vector<Fold>& folds) {
+  base_.known = set_.columns;
+  base_.target = problem_.measured() - problem_.shown(std::span(&set_.model, 1)) +
+                 base_.known.rightCols(nuisances()) * set_.model.u;
+  without_ = fit_with_shares(base_.target, base_.known, problem_.error(), set_.evidence.shares);
+  std::vector<LawCandidate> laws;
+  for (const PortLaw& law : port_laws()) {
+    if (!is_seen(law, problem_)) continue;
+    const std::vector<double> knots = curve_knots(ranges_.at(law.of));
+    const double scale = curve_scale(law, problem_, ranges_);
+    LawCandidate& made = laws.emplace_back(
+        LawCandidate{&law, knots, scale, CurvePrior(law.shape, knots, scale), {}, {}, {}, {}, 0.0, {}});
+    linearise(made, set_.model, VectorXd::Zero(static_cast<Index>(made.prior.free_knots().size())),
+              base_.known);
+    made.fit.evidence.shares = without_.shares;
+    made.fit = fit_law(made.problem, problem_.error(), made.prior, made.fit);
+    made.gain = made.fit.evidence.log_evidence - without_.log_evidence;
+  }
+  std::ranges::sort(laws, std::greater(), &LawCandidate::gain);
+  const double least = std::max(std::log(1.0 / false_proposals), worth_refining * laws.front().gain);
+  std::erase_if(laws, [&](const LawCandidate& law) { return law.gain < least; });
+  if (laws.size() > laws_refined) laws.erase(laws.begin() + laws_refined, laws.end());
+  for (LawCandidate& law : laws) {
+    refine(law);
+    judge(law, folds);
+    law.gain = 0.0;
+    for (const double gain : law.gains)
+      law.gain += gain;
+  }
+  std::ranges::sort(laws, std::greater(), &LawCandidate::gain);
+  return laws;
+}
+
+/// ln of the mean of what e to these is.
+double log_mean(const std::vector<double>& logarithms) {
+  const double largest = std::ranges::max(logarithms);
+  double sum = 0.0;
+  for (const double logarithm : logarithms)
+    sum += std::exp(logarithm - largest);
+  return largest + std::log(sum / static_cast<double>(logarithms.size()));
+}
+
+bool predicts_better(const std::vector<double>& gains, size_t laws) {
+  const auto better = std::ranges::count_if(gains, [](double gain) { return gain > 0.0; });
+  return 2 * static_cast<size_t>(better) > gains.size() &&
+         log_mean(gains) > std::log(static_cast<double>(laws) / false_proposals);
+}
+
+/// The set with the law's curve as linear unknowns.
+EffectSet set_with(const EffectSet& set, const LawCandidate& law) {
+  EffectSet with = set;
+  with.evidence = law.fit.evidence;
+  with.model.u = law.fit.evidence.u.tail(set.model.u.size());
+  with.columns.resize(law.problem.known.rows(), law.fit.root.cols() + law.problem.known.cols());
+  with.columns << law.problem.responses * law.fit.root, law.problem.known;
+  with.known.columns = law.problem.known.rightCols(set.model.u.size());
+  with.covariance = inference::covariance_of_information(law.fit.evidence.precision).matrix;
+  return with;
+}
+
+}  // namespace
+
+std::optional<LearnedTerm> learn_term(const rig::SessionProblem& problem, const EffectSet& set,
+                                      const ErrorKnowledge& known,
+                                      const std::function<void(std::string_view)>& progress) {
+  const std::vector<Fold> folds = folds_of(problem);
+  if (folds.size() < 2) return {};
+  if (progress) progress("learning what no known effect explains");
+  LawSearch search(problem, set);
+  const std::vector<LawCandidate> laws = search.run(folds);
+  if (laws.empty()) return {};
+  const LawCandidate& best = laws.front();
+  const EffectSet with = set_with(set, best);
+  const VectorXd none = VectorXd::Zero(best.values.size());
+  const ChangeSize size = size_of_change(
+      problem, with,
+      search.shown_with(best, with.model, best.fit.values) - search.shown_with(best, with.model, none));
+  EffectSet before = set;
+  before.evidence = search.without();
+  EffectSet stated = with;
+  stated.evidence.variance = problem.error().variance(problem.error().prior.share);
+  const Gap gap = held_out_gap(problem, before, stated);
+  const bool proposed = predicts_better(best.gains, port_laws().size()) &&
+                        size.over_error >= known.least_size() && !size.is_tolerance &&
+                        gap.closed >= least_closed;
+  if (!proposed) return {};
+  LearnedTerm term;
+  term.port = name_of(best.law->port);
+  term.sets = best.law->sets;
+  term.variables = best.law->variables;
+  term.variable_unit = best.law->of_unit;
+  term.unit = best.law->unit;
+  const std::vector<double> values = search.at_knots(best, best.fit.values);
+  const std::vector<double> sds = search.at_knots(best, best.fit.sd);
+  for (size_t k = 0; k < best.knots.size(); ++k) {
+    const double half = inference::normal_90 * sds[k];
+    term.curve.push_back({best.knots[k], values[k]});
+    term.band.push_back({values[k] - half, values[k] + half});
+    if (best.law->shape != CurveShape::passive && best.law->shape != CurveShape::resisting) continue;
+    auto& [lower, upper] = term.band.back();
+    (best.knots[k] < 0.0 ? upper : lower) = best.knots[k] < 0.0 ? std::min(upper, 0.0) : std::max(lower, 0.0);
+  }
+  term.gap = gap;
+  term.held_out_gain = log_mean(best.gains);
+  term.shifts = parameter_shifts(problem, before, with);
+  for (const LawCandidate& other : laws)
+    if (&other != &best && other.gain > best.gain - as_good)
+      term.rivals.push_back(
+          {std::string(name_of(other.law->port)), std::string(other.law->sets), other.law->variables});
+  read_law(*best.law, term);
+  return term;
+}
+
+}  // namespace diastole::explain

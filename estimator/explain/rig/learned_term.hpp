@@ -1,0 +1,30 @@
+#pragma once
+// A learned term, where the library ends: the law at a port (port_law.hpp) that predicts waveforms it was not fitted to.
+//
+// Each law's curve is fitted (law_fit.hpp) beside all nuisances; those that promise most are linearised again where they
+// fit. Then each run in turn (of a single run: each segment) is predicted from the others, with sizes, smoothness and the
+// model's error of those others. What a law gains there is the logarithm of a likelihood ratio, whose mean over data in
+// which nothing is missing is one whatever was fitted before: an e-value. Their mean over the runs is one too, however they
+// hang together, and by Markov's inequality J/alpha is exceeded by the best of J laws in a part alpha of such sessions at
+// most (Vovk and Wang 2021). The model without the law has its own error, which grows to what the other runs show: a law has
+// to do better than a smooth discrepancy of any size. A law is proposed if
+//
+//   - that mean is larger than J/alpha, alpha one in a hundred, and most of the runs gain,
+//   - what it changes is as large as an effect has to be for a name, and no tolerance (set_verdict.hpp),
+//   - it closes half of the gap on what was not fitted: what leaves more is not the law.
+
+#include <functional>
+#include <optional>
+#include <string_view>
+
+#include "estimator/explain/rig/set_verdict.hpp"
+#include "estimator/explain/verdict/explanation.hpp"
+
+namespace diastole::explain {
+
+/// Beside the effects of `set`. Nothing where no law is proposed, or where there is no other waveform to judge it on.
+std::optional<LearnedTerm> learn_term(const rig::SessionProblem& problem, const EffectSet& set,
+                                      const ErrorKnowledge& known,
+                                      const std::function<void(std::string_view)>& progress = {});
+
+}  // namespace diastole::explain

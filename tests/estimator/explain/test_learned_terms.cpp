@@ -1,0 +1,99 @@
+// Sessions of the rig's model with a law that the library lacks, and without: what is learnt of them.
+
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <functional>
+#include <optional>
+
+#include "estimator/effect_files/effect_file.hpp"
+#include "estimator/explain/rig/effect_trial.hpp"
+#include "estimator/explain/rig/learned_term.hpp"
+#include "estimator/explain/rig/port_law.hpp"
+#include "estimator/explain/rig/set_fit.hpp"
+#include "estimator/rig_fit/simulated_session.hpp"
+
+namespace diastole::explain {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+/// An effect of one parameter `a`, hidden at 1.
+std::shared_ptr<const Effect> hidden(const std::string& port, const std::string& equation) {
+  return effect_of_text(
+      "format = \"diastole-effect\"\nversion = 1\nid = \"hidden\"\ntitle = \"hidden\"\nport = \"" + port +
+      "\"\n[[parameter]]\nname = \"a\"\nneutral = 0.0\nbounds = [0.0, 2.0]\n[equations]\n" + equation + "\n");
+}
+
+class LearnedTerms : public testing::Test {
+ protected:
+  std::optional<LearnedTerm> learnt(const std::shared_ptr<const Effect>& effect, unsigned seed) {
+    rig::SessionOptions options{.seed = seed};
+    if (effect) {
+      options.terms = {{effect.get(), {}}};
+      options.values = {1.0};
+    }
+    const rig::Session session = rig::simulated_session(family_, options);
+    const rig::SessionProblem problem(session, family_, 2);
+    const rig::LinearisedModel base = rig::declared_rig(problem);
+    const EffectSet plain =
+        fit_set_exactly(problem, fit_set(problem, base.at, base, problem.error().prior.share));
+    return learn_term(problem, plain, {});
+  }
+  /// In how many of the curve's points its band holds the truth.
+  static double part_inside(const LearnedTerm& term, const std::function<double(double)>& truth) {
+    double inside = 0.0;
+    for (size_t k = 0; k < term.curve.size(); ++k) {
+      const double value = truth(term.curve[k][0]);
+      if (term.band[k][0] <= value && value <= term.band[k][1]) inside += 1.0;
+    }
+    return inside / static_cast<double>(term.curve.size());
+  }
+  rig::SpecimenFamily family_ = rig::gel_family();
+};
+
+TEST_F(LearnedTerms, AreNotProposedWhereNothingIsMissing) {
+  for (const unsigned seed : {11U, 12U})
+    EXPECT_FALSE(learnt(nullptr, seed).has_value()) << seed;
+}
+
+TEST_F(LearnedTerms, FindAFlapAtThePumpAndPredictOtherWaveforms) {
+  const auto term =
+      learnt(hidden("drive", "p_pump = \"p_pump + a * 20 [kPa] * max(q_hose / 100 [mL/s], 0)^2\""), 21);
+  ASSERT_TRUE(term.has_value());
+  EXPECT_EQ(term->port, "drive");
+  EXPECT_EQ(term->sets, "p_pump");
+  EXPECT_THAT(term->variables, ElementsAre("q_hose"));
+  EXPECT_GT(term->gap.closed, 0.7);
+  EXPECT_GE(part_inside(*term, [](double q) { return 20.0 * std::pow(std::max(q / 100.0, 0.0), 2); }), 0.9);
+  EXPECT_THAT(term->readings.front(), HasSubstr("looks like"));
+}
+
+TEST_F(LearnedTerms, FindFrictionOfTheSpecimen) {
+  const auto term = learnt(hidden("specimen", "p = \"p + a * 0.6 [kPa] * tanh(dV / 20 [mL/s])\""), 22);
+  ASSERT_TRUE(term.has_value());
+  EXPECT_EQ(term->port, "specimen");
+  EXPECT_EQ(term->sets, "p");
+  EXPECT_EQ(term->variables.front(), "dV");
+  EXPECT_GT(term->gap.closed, 0.7);
+  EXPECT_GE(part_inside(*term, [](double dV) { return 0.6 * std::tanh(dV / 20.0); }), 0.9);
+}
+
+TEST_F(LearnedTerms, FindACouplingThatSlipsAndWriteAFileThatSaysSo) {
+  const auto term = learnt(hidden("drive",
+                                  "q_hose = \"q_piston - a * 0.2 [mL/(s kPa)] * (max(p_pump - 5 [kPa], 0 "
+                                  "[kPa]) - max(-p_pump - 5 [kPa], 0 [kPa]))\""),
+                           23);
+  ASSERT_TRUE(term.has_value());
+  EXPECT_EQ(term->sets, "q_hose");
+  EXPECT_GT(term->gap.closed, 0.7);
+  const auto effect = effect_of_text(term->toml);
+  EXPECT_EQ(effect->text().port, Port::drive);
+  const EffectTrial trial(*effect);
+  for (const EffectCheck& check : {trial.declared(), trial.neutral(), trial.shows(), trial.bounded()})
+    EXPECT_TRUE(check.passed) << check.name << ": " << check.detail;
+}
+
+}  // namespace
+}  // namespace diastole::explain
