@@ -532,6 +532,7 @@ class Explanation(Record):
     ambiguous_with: list[list[str]]
     where: list[Misfit]
     gap: Gap
+    learned: LearnedTerm | None
     next_experiment: NextExperiment | None
     study_after: str
     evidence: list[Candidate]
@@ -645,6 +646,44 @@ class Gap(Record):
     held_out: list[str]
 
 @dataclass(frozen=True)
+class LearnedTerm(Record):
+    """A law that the library lacks, learnt at one port: a suggestion, no verdict."""
+
+    port: str
+    sets: str
+    variables: list[str]
+    variable_unit: str
+    unit: str
+    curve: list[list[float | None]]
+    band: list[list[float | None]]
+    closed_form: str
+    gap: Gap
+    held_out_gain: float | None
+    readings: list[str]
+    shifts: list[ParameterShift]
+    rivals: list[LearnedRival]
+    effect_file: str
+    toml: str
+
+@dataclass(frozen=True)
+class ParameterShift(Record):
+    """A parameter before and after the effects were added."""
+
+    name: str
+    before: float | None
+    before_error: float | None
+    after: float | None
+    after_error: float | None
+
+@dataclass(frozen=True)
+class LearnedRival(Record):
+    """A law at another port that predicts as well."""
+
+    port: str
+    sets: str
+    variables: list[str]
+
+@dataclass(frozen=True)
 class NextExperiment(Record):
     """A runnable experiment file that separates what is left."""
 
@@ -663,16 +702,6 @@ class Candidate(Record):
     parameters: int
     held_out_drop: float | None
     verdict: str
-
-@dataclass(frozen=True)
-class ParameterShift(Record):
-    """A parameter before and after the effects were added."""
-
-    name: str
-    before: float | None
-    before_error: float | None
-    after: float | None
-    after_error: float | None
 
 @dataclass(frozen=True)
 class Step(Record):

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <optional>
 
 namespace diastole::explain {
 namespace {
@@ -62,6 +61,55 @@ std::vector<Index> present_increments(const LawProblem& problem, const rig::Evid
   for (Index i = 0; i < found.size(); ++i)
     if (found[i] > 0.0) present.push_back(i);
   return present;
+}
+
+MatrixXd root_of(const CurvePrior& prior, const LawFit& fit) {
+  return prior.covariance(fit.size_value(), fit.roughness_value()).llt().matrixL();
+}
+
+rig::EvidenceFit fitted(const LawProblem& problem, const rig::ModelError& error, const MatrixXd& root,
+                        const rig::Shares& shares) {
+  return fit_with_shares(problem.target, side_by_side(problem.responses * root, problem.known), error,
+                         shares);
+}
+
+/// Size and roughness of the largest evidence, step by step from those of `near`, and the fit of any shape.
+LawFit fit_of_any_shape(const LawProblem& problem, const rig::ModelError& error, const CurvePrior& prior,
+                        const LawFit& near) {
+  // An error as large as the misfit and a curve that makes the misfit are two maxima: searched from both.
+  LawFit best = near;
+  best.root = root_of(prior, near);
+  best.evidence = fitted(problem, error, best.root, near.evidence.shares);
+  if (rig::EvidenceFit small = fitted(problem, error, best.root, error.prior.share);
+      small.log_evidence > best.evidence.log_evidence)
+    best.evidence = std::move(small);
+  std::map<std::pair<size_t, size_t>, bool> tried{{{near.size, near.roughness}, true}};
+  for (bool moved = true; moved;) {
+    moved = false;
+    for (const auto& [by_size, by_roughness] : {std::pair{1, 0}, {-1, 0}, {0, 1}, {0, -1}}) {
+      LawFit there = best;
+      there.size += static_cast<size_t>(by_size);  // beyond the first: beyond the last
+      there.roughness += static_cast<size_t>(by_roughness);
+      if (there.size >= CurvePrior::sizes.size() || there.roughness >= CurvePrior::roughnesses.size() ||
+          !tried.try_emplace({there.size, there.roughness}, true).second)
+        continue;
+      there.root = root_of(prior, there);
+      there.evidence = fitted(problem, error, there.root, best.evidence.shares);
+      if (there.evidence.log_evidence <= best.evidence.log_evidence) continue;
+      best = std::move(there);
+      moved = true;
+    }
+  }
+  return best;
+}
+
+/// Of the curve's values, with what it may do between the knots.
+VectorXd spread_of(const LawFit& fit, const CurvePrior& prior) {
+  const Index count = fit.root.cols();
+  const MatrixXd posterior =
+      fit.evidence.precision.llt().solve(MatrixXd::Identity(fit.evidence.precision.rows(), count));
+  const VectorXd square = (fit.root * posterior.topRows(count) * fit.root.transpose()).diagonal();
+  return (square.array() + prior.between_knots(fit.size_value(), fit.roughness_value())).sqrt();
 }
 
 }  // namespace
@@ -127,56 +175,15 @@ MatrixXd CurvePrior::covariance(double size, double roughness) const {
 
 LawFit fit_law(const LawProblem& problem, const rig::ModelError& error, const CurvePrior& prior,
                const LawFit& near) {
-  const auto root_of = [&](size_t size, size_t roughness) -> MatrixXd {
-    return prior.covariance(CurvePrior::sizes[size], CurvePrior::roughnesses[roughness]).llt().matrixL();
-  };
-  const auto fitted = [&](const MatrixXd& root, const rig::Shares& shares) {
-    return fit_with_shares(problem.target, side_by_side(problem.responses * root, problem.known), error,
-                           shares);
-  };
-  // An error as large as the misfit and a curve that makes the misfit are two maxima: searched from both.
-  LawFit best = near;
-  best.evidence = fitted(root_of(near.size, near.roughness), near.evidence.shares);
-  if (rig::EvidenceFit small = fitted(root_of(near.size, near.roughness), error.prior.share);
-      small.log_evidence > best.evidence.log_evidence)
-    best.evidence = std::move(small);
-  std::map<std::pair<size_t, size_t>, bool> tried{{{near.size, near.roughness}, true}};
-  for (bool moved = true; moved;) {
-    moved = false;
-    for (const auto& [by_size, by_roughness] : {std::pair{1, 0}, {-1, 0}, {0, 1}, {0, -1}}) {
-      const size_t size = best.size + static_cast<size_t>(by_size);  // beyond the first: beyond the last
-      const size_t roughness = best.roughness + static_cast<size_t>(by_roughness);
-      if (size >= CurvePrior::sizes.size() || roughness >= CurvePrior::roughnesses.size() ||
-          !tried.try_emplace({size, roughness}, true).second)
-        continue;
-      rig::EvidenceFit there = fitted(root_of(size, roughness), best.evidence.shares);
-      if (there.log_evidence <= best.evidence.log_evidence) continue;
-      best.size = size;
-      best.roughness = roughness;
-      best.evidence = std::move(there);
-      moved = true;
-    }
-  }
-  const MatrixXd covariance =
-      prior.covariance(CurvePrior::sizes[best.size], CurvePrior::roughnesses[best.roughness]);
-  const Eigen::LLT<MatrixXd> factor(covariance);
-  best.root = factor.matrixL();
-  const auto spread = [&] {
-    const Index count = best.root.cols();
-    const MatrixXd posterior =
-        best.evidence.precision.llt().solve(MatrixXd::Identity(best.evidence.precision.rows(), count));
-    return VectorXd((best.root * posterior.topRows(count) * best.root.transpose()).diagonal().cwiseSqrt());
-  };
-  best.sd = (spread().array().square() +
-             prior.between_knots(CurvePrior::sizes[best.size], CurvePrior::roughnesses[best.roughness]))
-                .sqrt();
+  LawFit best = fit_of_any_shape(problem, error, prior, near);
+  best.sd = spread_of(best, prior);
   if (const MatrixXd& increments = prior.increments(); increments.cols() > 0) {
-    const rig::EvidenceFit any = best.evidence;
-    const std::vector<Index> present = present_increments(problem, any, best.root, increments);
+    const std::vector<Index> present = present_increments(problem, best.evidence, best.root, increments);
     const MatrixXd kept = increments(Eigen::all, present);
-    const Eigen::LLT<MatrixXd> information(kept.transpose() * factor.solve(kept));
+    const MatrixXd known = best.root.triangularView<Eigen::Lower>().solve(kept);
+    const Eigen::LLT<MatrixXd> information(known.transpose() * known);
     best.root = information.matrixL().solve(kept.transpose()).transpose();
-    best.evidence = fitted(best.root, any.shares);
+    best.evidence = fitted(problem, error, best.root, best.evidence.shares);
   }
   best.values = best.root * best.evidence.u.head(best.root.cols());
   return best;

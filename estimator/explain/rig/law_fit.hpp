@@ -58,6 +58,9 @@ struct LawFit {
   Eigen::VectorXd sd;      ///< of the values, whatever the shape
   rig::EvidenceFit evidence;
   size_t size = 4, roughness = 2;  ///< of the prior's lists
+
+  [[nodiscard]] double size_value() const { return CurvePrior::sizes[size]; }
+  [[nodiscard]] double roughness_value() const { return CurvePrior::roughnesses[roughness]; }
 };
 /// With size and roughness of the largest evidence about those of `near`.
 LawFit fit_law(const LawProblem& problem, const rig::ModelError& error, const CurvePrior& prior,

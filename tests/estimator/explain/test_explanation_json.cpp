@@ -50,6 +50,23 @@ TEST(ExplanationJson, HasTheKeysOfTheContract) {
   EXPECT_EQ(json.at("study_after"), "explained.study.toml");
 }
 
+TEST(ExplanationJson, KeepsALearnedTerm) {
+  Explanation explanation = explained_hose();
+  EXPECT_TRUE(nlohmann::json::parse(to_json(explanation)).at("learned").is_null());
+  LearnedTerm& term = explanation.learned.emplace();
+  term.port = "drive";
+  term.variables = {"q_hose"};
+  term.curve = {{0.0, 0.0}, {50.0, 3.0}};
+  term.band = {{0.0, 0.0}, {2.5, 3.5}};
+  const auto json = nlohmann::json::parse(to_json(explanation));
+  for (const char* key : {"port", "variables", "curve", "band", "gap", "readings", "effect_file"})
+    EXPECT_TRUE(json.at("learned").contains(key)) << key;
+  EXPECT_EQ(json.at("learned").at("band"), nlohmann::json::parse("[[0.0, 0.0], [2.5, 3.5]]"));
+  const Explanation again = explanation_from_json(to_json(explanation), "e.json");
+  ASSERT_TRUE(again.learned.has_value());
+  EXPECT_EQ(again.learned->curve, explanation.learned->curve);
+}
+
 TEST(ExplanationJson, TakesADocumentOfTheContractsKeysOnly) {
   const Explanation explanation = explanation_from_json(
       R"({"verdict": "unexplained", "effects": [{"id": "sensor-gain", "parameters": {"gain": {"value": 0.9, "ci90": [0.8, 1.0]}}}],

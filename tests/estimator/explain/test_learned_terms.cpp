@@ -26,6 +26,9 @@ std::shared_ptr<const Effect> hidden(const std::string& port, const std::string&
       "\"\n[[parameter]]\nname = \"a\"\nneutral = 0.0\nbounds = [0.0, 2.0]\n[equations]\n" + equation + "\n");
 }
 
+/// Of eleven points that are outside once in ten, more than two are so in one session of eleven.
+constexpr double least_inside = 9.0 / 11.0;
+
 class LearnedTerms : public testing::Test {
  protected:
   std::optional<LearnedTerm> learnt(const std::shared_ptr<const Effect>& effect, unsigned seed) {
@@ -66,8 +69,8 @@ TEST_F(LearnedTerms, FindAFlapAtThePumpAndPredictOtherWaveforms) {
   EXPECT_EQ(term->sets, "p_pump");
   EXPECT_THAT(term->variables, ElementsAre("q_hose"));
   EXPECT_GT(term->gap.closed, 0.7);
-  EXPECT_GE(part_inside(*term, [](double q) { return 20.0 * std::pow(std::max(q / 100.0, 0.0), 2); }), 0.9);
-  EXPECT_THAT(term->readings.front(), HasSubstr("looks like"));
+  EXPECT_GE(part_inside(*term, [](double q) { return 20.0 * std::pow(std::max(q / 100.0, 0.0), 2); }),
+            least_inside);
 }
 
 TEST_F(LearnedTerms, FindFrictionOfTheSpecimen) {
@@ -77,19 +80,20 @@ TEST_F(LearnedTerms, FindFrictionOfTheSpecimen) {
   EXPECT_EQ(term->sets, "p");
   EXPECT_EQ(term->variables.front(), "dV");
   EXPECT_GT(term->gap.closed, 0.7);
-  EXPECT_GE(part_inside(*term, [](double dV) { return 0.6 * std::tanh(dV / 20.0); }), 0.9);
+  EXPECT_GE(part_inside(*term, [](double dV) { return 0.6 * std::tanh(dV / 20.0); }), least_inside);
+  EXPECT_THAT(term->readings.front(), HasSubstr("friction"));
 }
 
-TEST_F(LearnedTerms, FindACouplingThatSlipsAndWriteAFileThatSaysSo) {
-  const auto term = learnt(hidden("drive",
-                                  "q_hose = \"q_piston - a * 0.2 [mL/(s kPa)] * (max(p_pump - 5 [kPa], 0 "
-                                  "[kPa]) - max(-p_pump - 5 [kPa], 0 [kPa]))\""),
-                           23);
+/// What the specimen rests on while it is small: its pressure is lower by as much once it is off.
+TEST_F(LearnedTerms, FindAContactAndWriteAFileThatSaysSo) {
+  const auto term =
+      learnt(hidden("specimen", "p = \"p - a * 1 [kPa] * min(max(V, 0 [mL]), 8 [mL]) / 8 [mL]\""), 23);
   ASSERT_TRUE(term.has_value());
-  EXPECT_EQ(term->sets, "q_hose");
+  EXPECT_EQ(term->port, "specimen");
+  EXPECT_THAT(term->variables, ElementsAre("V"));
   EXPECT_GT(term->gap.closed, 0.7);
   const auto effect = effect_of_text(term->toml);
-  EXPECT_EQ(effect->text().port, Port::drive);
+  EXPECT_EQ(effect->text().port, Port::specimen);
   const EffectTrial trial(*effect);
   for (const EffectCheck& check : {trial.declared(), trial.neutral(), trial.shows(), trial.bounded()})
     EXPECT_TRUE(check.passed) << check.name << ": " << check.detail;
