@@ -42,10 +42,11 @@ install(DIRECTORY ${DIASTOLE_FIRMWARE_IMAGES}/ DESTINATION share/diastole/firmwa
         FILES_MATCHING PATTERN "*.bin" PATTERN "*.hex" PATTERN "*.image")
 # What the programs are made of, of which versions: libraries that they load, headers that were compiled in.
 set(materials ${CMAKE_BINARY_DIR}/diastole.cdx.json)
+file(GLOB vendored_pages CONFIGURE_DEPENDS ${CMAKE_SOURCE_DIR}/third_party/*/README.md)
 add_custom_command(OUTPUT ${materials}
   COMMAND /usr/bin/python3 -B ${packaging}/bill_of_materials --version ${PROJECT_VERSION} --build ${CMAKE_BINARY_DIR}
           --vendored ${CMAKE_SOURCE_DIR}/third_party -o ${materials} $<TARGET_FILE:diastole> $<TARGET_FILE:sim_rig>
-  DEPENDS diastole sim_rig ${packaging}/bill_of_materials COMMENT "Bill of materials" VERBATIM)
+  DEPENDS diastole sim_rig ${packaging}/bill_of_materials ${vendored_pages} COMMENT "Bill of materials" VERBATIM)
 add_custom_target(bill_of_materials ALL DEPENDS ${materials})
 
 install(FILES README.md ${staged}/copyright ${materials} DESTINATION share/doc/diastole)
