@@ -51,7 +51,7 @@ TEST(ExplanationJson, HasTheKeysOfTheContract) {
 }
 
 TEST(ExplanationJson, KeepsALearnedTerm) {
-  Explanation explanation = explained_hose();
+  Explanation explanation = test::explained_hose();
   EXPECT_TRUE(nlohmann::json::parse(to_json(explanation)).at("learned").is_null());
   LearnedTerm& term = explanation.learned.emplace();
   term.port = "drive";
