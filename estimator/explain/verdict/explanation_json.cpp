@@ -55,8 +55,8 @@ DIASTOLE_MEMBERS(NextExperiment, toml, separates, predicted_separation_sigma, re
 DIASTOLE_MEMBERS(SearchEnd, effects, termination)
 
 DIASTOLE_MEMBERS(Explanation, study, verdict, confidence, model_error, reference, departures, cycle_scatter,
-                 hints, summary, converged, searches, effects, ambiguous_with, where, gap, learned, next_experiment,
-                 study_after, evidence, shifts, steps, traces, field, seconds)
+                 hints, summary, converged, searches, effects, ambiguous_with, where, gap, learned,
+                 next_experiment, study_after, evidence, shifts, steps, traces, field, seconds)
 
 }  // namespace explain
 
