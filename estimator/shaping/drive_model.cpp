@@ -108,8 +108,7 @@ ModelResponse DriveModel::response(const PeriodicCurve& drive_mL, Eigen::Index h
   run.waveform = [&drive](double time_s) { return drive.at(time_s); };
   const rig::PlantTrace trace =
       rig::simulate_plant(model_, run, {.step_s = rig::dividing_step(run, about_step_s), .components = 3});
-  ModelResponse shown{mean_cycle(trace.cavity_mL, trace, drive, plan_, harmonics),
-                      mean_cycle(trace.cavity_kPa, trace, drive, plan_, harmonics)};
+  ModelResponse shown{.cavity_mL = mean_cycle(trace.cavity_mL, trace, drive, plan_, harmonics)};
   const auto ringing =
       static_cast<std::ptrdiff_t>(0.5 * settled_s / trace.step_s);  // mean over the rest's second half
   shown.left_mL = std::accumulate(trace.cavity_mL.end() - ringing, trace.cavity_mL.end(), 0.0) /
@@ -134,13 +133,13 @@ Eigen::MatrixXd DriveModel::jacobian(const PeriodicCurve& drive_mL) const {
   return columns;
 }
 
-PeriodicCurve DriveModel::inverse(const PeriodicCurve& cavity_mL, Eigen::Index harmonics,
-                                  double* left_mL) const {
+PeriodicCurve DriveModel::inverse(const PeriodicCurve& cavity_mL, const PeriodicCurve& start) const {
   constexpr int most_rounds = 16, most_linearisations = 4;
   constexpr double close = 2e-4, quick = 0.5;  // of the range; of the error before
   const double period_s = cavity_mL.period_s;
+  const Eigen::Index harmonics = start.harmonics();
   const Eigen::VectorXd wanted = numbers_of(cavity_mL.with(harmonics));
-  Eigen::VectorXd best = wanted, drive = wanted, step = Eigen::VectorXd::Zero(wanted.size());
+  Eigen::VectorXd best = numbers_of(start), drive = best, step = Eigen::VectorXd::Zero(wanted.size());
   double least = std::numeric_limits<double>::infinity(), share = 1.0;
   Eigen::PartialPivLU<Eigen::MatrixXd> slope(jacobian(curve_of(drive, period_s)));
   int linearisations = 1;
@@ -165,7 +164,6 @@ PeriodicCurve DriveModel::inverse(const PeriodicCurve& cavity_mL, Eigen::Index h
     }
     drive = best + share * step;
   }
-  if (left_mL != nullptr) *left_mL = least;
   return curve_of(best, period_s);
 }
 

@@ -22,8 +22,7 @@ struct CyclePlan {
 
 struct ModelResponse {
   PeriodicCurve cavity_mL;  ///< taken by the specimen since rest
-  PeriodicCurve cavity_kPa;
-  double left_mL = 0.0;  ///< in the specimen when the piston is home again; below 0: what has leaked away
+  double left_mL = 0.0;     ///< in the specimen when the piston is home again; below 0: what has leaked away
 };
 
 /// An effect of the plant that runs can teach, with its present values.
@@ -45,9 +44,8 @@ class DriveModel {
   [[nodiscard]] ModelResponse response(const PeriodicCurve& drive_mL, Eigen::Index harmonics) const;
   /// Derivatives of the volume by the drive, both as numbers_of(): so many rows as columns.
   [[nodiscard]] Eigen::MatrixXd jacobian(const PeriodicCurve& drive_mL) const;
-  /// The drive with so many harmonics whose modelled volume is this curve's, and how far from it is left (rms, mL).
-  [[nodiscard]] PeriodicCurve inverse(const PeriodicCurve& cavity_mL, Eigen::Index harmonics,
-                                      double* left_mL = nullptr) const;
+  /// The drive whose modelled volume is this curve's, with the harmonics of `start`, from which it is sought; the nearest that was found.
+  [[nodiscard]] PeriodicCurve inverse(const PeriodicCurve& cavity_mL, const PeriodicCurve& start) const;
 
   [[nodiscard]] const rig::RigModel& model() const { return model_; }
   [[nodiscard]] const rig::RunPlace& place() const { return place_; }

@@ -251,6 +251,13 @@ void take_flow(const RecordedRun& run, const runfile::FlowVolume& flow, const Cy
 
 }  // namespace
 
+PeriodicCurve drive_from_rest(const DriveModel& model, const GatedRun& run, bool is_first) {
+  PeriodicCurve drive = run.drive_mL;
+  if (!is_first)
+    drive.c[0] += run.cavity_mL.curve.c[0].real() - model.response(drive, 1).cavity_mL.c[0].real();
+  return drive;
+}
+
 std::string lead_line(double lead_s) { return fmt::format("{}{:.6f}\n", lead_mark, lead_s); }
 
 GatedRun gated_run(const RecordedRun& run, const DriveModel& model, double period_s, Eigen::Index harmonics,

@@ -24,6 +24,10 @@ struct GatedRun {
   std::optional<size_t> changed_in_cycle = {};
 };
 
+/// The drive by which a specimen at rest would do what this run's did, which began otherwise filled: a level at the beginning is as good as
+/// one of the piston. The first of several runs begins at rest.
+PeriodicCurve drive_from_rest(const DriveModel& model, const GatedRun& run, bool is_first);
+
 /// The comment of a points file by which a run knows how long after a cycle's beginning the wanted curve begins.
 std::string lead_line(double lead_s);
 

@@ -16,6 +16,7 @@ using Complex = std::complex<double>;
 
 constexpr double gain_prior_sd = 0.1;
 constexpr double shift_prior_part = 0.005;  // of the wanted range
+constexpr double model_part = 0.4;  // of that, by which the model may err from run to run: 0.2 % of the range
 constexpr double most_growth = 2.0;  ///< of a drive's range over the first one's: beyond it something leaks
 constexpr double surprise_allowed = 0.05;  ///< of the range, beside what was meant to change
 
@@ -34,7 +35,7 @@ Posterior posterior(const std::vector<Complex>& modelled, const std::vector<Comp
   Eigen::Vector2cd right(information(0, 0), 0.0);
   for (size_t i = 0; i < seen.size(); ++i) {
     if (!std::isfinite(sigma[i])) continue;
-    const double weight = 1.0 / (sigma[i] * sigma[i] + 1e-4 * shift_sd * shift_sd);
+    const double weight = 1.0 / (sigma[i] * sigma[i] + model_part * model_part * shift_sd * shift_sd);
     const Eigen::Vector2cd row(modelled[i], 1.0);
     information += weight * row.conjugate() * row.transpose();
     right += weight * row.conjugate() * seen[i];
@@ -47,8 +48,9 @@ Posterior posterior(const std::vector<Complex>& modelled, const std::vector<Comp
 struct Evidence {
   const PeriodicCurve& wanted_mL;
   const std::vector<GatedRun>& runs;
-  DriveModel model;  ///< as the runs have corrected it
-  std::vector<PeriodicCurve> modelled_mL;
+  DriveModel model;                         ///< as the runs have corrected it
+  std::vector<PeriodicCurve> from_rest_mL;  ///< drives (drive_from_rest)
+  std::vector<PeriodicCurve> modelled_mL;   ///< volumes with them
   double range_mL;
 
   /// From the first `count` runs.
@@ -173,23 +175,19 @@ PeriodicCurve wanted_of_model(const Evidence& evidence, size_t best, Eigen::Inde
   return wanted;
 }
 
-/// By how much the specimen is filled when the next run begins: as the last one began, and what that one left. A level at
-/// the beginning is as good as one of the piston.
+/// By how much the specimen is filled when the next run begins: as the last one began, and what that one left.
 double next_beginning_mL(const Evidence& evidence) {
   const size_t last = evidence.runs.size() - 1;
-  PeriodicCurve drive = evidence.runs[last].drive_mL;
-  const double began_mL =
-      evidence.runs[last].cavity_mL.curve.c[0].real() - evidence.modelled_mL[last].c[0].real();
-  drive.c[0] += began_mL;
-  return began_mL + evidence.model.response(drive, 1).left_mL;
+  const double began_mL = evidence.from_rest_mL[last].c[0].real() - evidence.runs[last].drive_mL.c[0].real();
+  return began_mL + evidence.model.response(evidence.from_rest_mL[last], 1).left_mL;
 }
 
-/// The step from the best run towards the wanted curve.
+/// The step from the best run towards the wanted curve, of drives from rest.
 Eigen::VectorXcd step_from(const Evidence& evidence, size_t best, const std::vector<Posterior>& known,
                            Eigen::Index harmonics) {
-  const PeriodicCurve drive = evidence.model.inverse(wanted_of_model(evidence, best, harmonics), harmonics);
-  Eigen::VectorXcd step = drive.c - evidence.runs[best].drive_mL.with(harmonics).c;
-  step[0] -= next_beginning_mL(evidence);
+  const PeriodicCurve from = evidence.from_rest_mL[best].with(harmonics);
+  const PeriodicCurve drive = evidence.model.inverse(wanted_of_model(evidence, best, harmonics), from);
+  Eigen::VectorXcd step = drive.c - from.c;
   for (Eigen::Index k = 1; k <= harmonics; ++k) {
     const Posterior& here = known[static_cast<size_t>(k)];
     step[k] *= std::conj(here.gain) / (std::norm(here.gain) + here.gain_sd * here.gain_sd);
@@ -212,16 +210,20 @@ void plan_next(const Evidence& evidence, const PeriodicCurve& first_mL, const Bo
   constexpr double worth_while = 0.9;
   const Eigen::Index harmonics = first_mL.harmonics();
   const std::vector<Posterior> known = evidence.posteriors(lesson.iterations.size(), harmonics);
-  const PeriodicCurve from = lesson.iterations[*lesson.best].drive_mL.with(harmonics);
+  const PeriodicCurve from = evidence.from_rest_mL[*lesson.best].with(harmonics);
+  const double beginning_mL = next_beginning_mL(evidence);
   Eigen::VectorXcd step = step_from(evidence, *lesson.best, known, harmonics);
   if (*lesson.best + 1 < lesson.iterations.size()) step *= 0.5;  // the last one went too far
   step = guarded(from, step, most_growth * first_mL.range(), lesson);
   const Eigen::MatrixXd slope = evidence.model.jacobian(from);
-  const PeriodicCurve asked{from.period_s, from.c + step};
+  PeriodicCurve asked{from.period_s, from.c + step};
+  asked.c[0] -= beginning_mL;
   lesson.drive_mL = bound(asked, slope);
   lesson.bounded = lesson.bounded || rms_between(asked, lesson.drive_mL) > 1e-6 * evidence.range_mL;
+  PeriodicCurve next = lesson.drive_mL;
+  next.c[0] += beginning_mL;
   const Eigen::Index seen = evidence.runs[*lesson.best].cavity_mL.curve.harmonics();
-  lesson.expected_mL = evidence.model.response(lesson.drive_mL, seen).cavity_mL;
+  lesson.expected_mL = evidence.model.response(next, seen).cavity_mL;
   lesson.expected_mL.c +=
       evidence.runs[*lesson.best].cavity_mL.curve.c - evidence.modelled_mL[*lesson.best].c;
   const double left = evidence.part(
@@ -255,10 +257,11 @@ Lesson learn(const DriveModel& model, const PeriodicCurve& wanted_mL, const Peri
              const std::vector<GatedRun>& runs, const Bound& bound) {
   const Eigen::Index harmonics = first_mL.harmonics();
   Lesson lesson;
-  Evidence evidence{wanted_mL, runs, fitted_model(model, runs, wanted_mL.range()), {}, wanted_mL.range()};
+  Evidence evidence{wanted_mL, runs, fitted_model(model, runs, wanted_mL.range()), {}, {}, wanted_mL.range()};
   for (const GatedRun& run : runs) {
+    evidence.from_rest_mL.push_back(drive_from_rest(evidence.model, run, &run == &runs.front()));
     evidence.modelled_mL.push_back(
-        evidence.model.response(run.drive_mL, run.cavity_mL.curve.harmonics()).cavity_mL);
+        evidence.model.response(evidence.from_rest_mL.back(), run.cavity_mL.curve.harmonics()).cavity_mL);
   }
   for (const LearnableEffect& one : evidence.model.effects())
     for (size_t i = 0; i < one.values.size(); ++i)

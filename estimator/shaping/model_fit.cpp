@@ -164,7 +164,11 @@ DriveModel fitted_model(const DriveModel& model, const std::vector<GatedRun>& ru
   options.small_gain = [](double chi_square) { return std::max(0.05, 1e-3 * chi_square); };
   std::optional<Eigen::VectorXd> best;
   for (size_t count = 1; count <= runs.size(); ++count) {  // each run goes on from where the ones before led
-    ModelFit problem(model, std::span(runs).first(count), range_mL);
+    std::vector<GatedRun> from_rest(runs.begin(), runs.begin() + static_cast<std::ptrdiff_t>(count));
+    const DriveModel so_far = best ? model.with_values(space_of(model).values(*best)) : model;
+    for (GatedRun& run : from_rest)
+      run.drive_mL = drive_from_rest(so_far, run, &run == &from_rest.front());
+    ModelFit problem(model, from_rest, range_mL);
     double least = std::numeric_limits<double>::infinity();
     const auto search_from = [&](const Eigen::VectorXd& start) {
       const inference::SearchResult found = inference::minimise(problem, start, options);

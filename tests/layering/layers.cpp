@@ -181,7 +181,7 @@ const std::vector<Rule>& rules() {
        {"protocol/contract", "estimator/imaging", "estimator/io", "estimator/parallel", "estimator/report",
         "host/web", "tools/diastole/commands.hpp"}},
       {"tools/diastole/simulate",
-       {"protocol/contract", "host", "tools/diastole/commands.hpp", "tools/sim_rig"}},
+       {"protocol/contract", "protocol/runfile", "host", "tools/diastole/commands.hpp", "tools/sim_rig"}},
       {"tools/diastole/replay",
        {"protocol", "host", "tools/diastole/commands.hpp", "tools/diastole/simulate", "tools/sim_rig"}},
       {"tools/diastole/shape",

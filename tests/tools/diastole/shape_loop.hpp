@@ -82,7 +82,7 @@ inline Loop learned(PlantForShape& rig, const PeriodicCurve& wanted, size_t iter
   constexpr double middle_s = 9.0;
   const DriveModel model = gel_model();
   const Eigen::Index harmonics = harmonics_needed(wanted, 1e-3, 24);
-  const PeriodicCurve first = model.inverse(wanted, harmonics);
+  const PeriodicCurve first = model.inverse(wanted, wanted.with(harmonics));
   Loop loop;
   loop.lesson = learn(model, wanted, first, {}, free_pump);
   while (loop.runs.size() < iterations && loop.lesson.ending == Ending::none) {
@@ -101,7 +101,7 @@ inline void expect_followed(const Loop& loop) {
   std::cout << "true NRMSE of each run, %:";
   for (const double nrmse : loop.nrmse)
     std::cout << ' ' << std::round(1e4 * nrmse) / 100.0;
-  std::cout << '\n';
+  std::cout << "; " << in_words(loop.lesson.ending) << " " << loop.lesson.reason << '\n';
   ASSERT_GE(loop.nrmse.size(), 2U);
   EXPECT_GT(loop.nrmse.front(), 0.05) << "there is nothing to learn";
   const size_t within = std::min<size_t>(loop.nrmse.size(), 3);

@@ -17,7 +17,7 @@ TEST(Shape, TheModelAloneFollowsOnARigThatIsAsDescribedButForTheMotorsLag) {
   PlantForShape rig({}, plan);
   PeriodicCurve wanted = ventricle();
   const DriveModel model = gel_model();
-  const PlantRun run = rig.play(model.inverse(wanted, harmonics_needed(wanted, 1e-3, 24)));
+  const PlantRun run = rig.play(model.inverse(wanted, wanted.with(harmonics_needed(wanted, 1e-3, 24))));
   EXPECT_LE(true_nrmse(run, wanted), 0.02);
   for (Eigen::Index k = 1; k <= wanted.harmonics(); ++k)
     wanted.c[k] *= std::polar(1.0, -2.0 * M_PI * wanted.frequency_Hz(k) * lag_s);

@@ -12,23 +12,19 @@ constexpr FiveEffects rigs[] = {
     {.wave_speed_m_s = 45.0, .gas_mL = 15.0, .leak_mL_s_kPa = 0.1, .backlash_mL = 0.15, .gain = 0.04},
 };
 
-TEST(ShapeInFull, GatedVolumesTeachTheDriveWithFiveHiddenEffects) {
-  uint64_t seed = 1;
-  for (const FiveEffects& sizes : rigs) {
-    SCOPED_TRACE(sizes.wave_speed_m_s);
-    PlantForShape rig(with_effects(sizes, seed++), plan);
-    expect_followed(learned(rig, ventricle(), 4, 0.1));
-  }
+class ShapeInFull : public testing::TestWithParam<size_t> {};
+
+TEST_P(ShapeInFull, GatedVolumesTeachTheDriveWithFiveHiddenEffects) {
+  PlantForShape rig(with_effects(rigs[GetParam()], 1 + GetParam()), plan);
+  expect_followed(learned(rig, ventricle(), 4, 0.1));
 }
 
-TEST(ShapeInFull, PressureTeachesTheDriveWithFiveHiddenEffects) {
-  uint64_t seed = 11;
-  for (const FiveEffects& sizes : rigs) {
-    SCOPED_TRACE(sizes.wave_speed_m_s);
-    PlantForShape rig(with_effects(sizes, seed++), plan);
-    expect_followed(learned(rig, ventricle(), 4));
-  }
+TEST_P(ShapeInFull, PressureTeachesTheDriveWithFiveHiddenEffects) {
+  PlantForShape rig(with_effects(rigs[GetParam()], 11 + GetParam()), plan);
+  expect_followed(learned(rig, ventricle(), 4));
 }
+
+INSTANTIATE_TEST_SUITE_P(Rigs, ShapeInFull, testing::Range(size_t{0}, std::size(rigs)));
 
 }  // namespace
 }  // namespace diastole::shaping

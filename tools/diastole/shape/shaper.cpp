@@ -58,7 +58,7 @@ Shaper::Shaper(const ShapeRequest& request)
     : request_(request), model_(model_of(request, wanted_of(request))), pump_(rig_of(request)) {
   const WantedCurve wanted = wanted_of(request);
   wanted_mL_ = wanted.is_pressure ? specimen_volume(model_, wanted.curve, fine) : wanted.curve;
-  const PeriodicCurve free = model_.inverse(wanted_mL_, harmonics_of(wanted_mL_));
+  const PeriodicCurve free = model_.inverse(wanted_mL_, wanted_mL_.with(harmonics_of(wanted_mL_)));
   first_mL_ = pump_.nearest(free, model_.jacobian(free));
   first_is_bounded_ = rms_between(free, first_mL_) > 1e-6 * wanted_mL_.range();
 }
@@ -82,8 +82,10 @@ Shaping Shaper::after(const std::vector<std::filesystem::path>& runs) const {
   shaping.binding_limit = binding_of(shaping);
   PeriodicCurve expected = shaping.lesson.expected_mL;
   expected.c[0] = wanted_mL_.c[0];
-  shaping.nrmse = shaping.lesson.best ? shaping.lesson.iterations[*shaping.lesson.best].nrmse
-                                      : rms_between(expected, wanted_mL_) / wanted_mL_.range();
+  const std::vector<Iteration>& runs_so_far = shaping.lesson.iterations;
+  shaping.nrmse = rms_between(expected, wanted_mL_) / wanted_mL_.range();
+  if (!runs_so_far.empty())
+    shaping.nrmse = runs_so_far[shaping.lesson.best.value_or(runs_so_far.size() - 1)].nrmse;
   return shaping;
 }
 

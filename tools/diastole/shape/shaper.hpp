@@ -23,7 +23,7 @@ struct Shaping {
   Lesson lesson;
   PlannedCycle cycle;         ///< of lesson.drive_mL
   std::string binding_limit;  ///< that holds the drive back; empty: none
-  double nrmse = 0.0;         ///< of the best run; before any, as the model expects
+  double nrmse = 0.0;  ///< of the best run, or the last if none counts; before any, as the model expects
 };
 
 class Shaper {

@@ -1,0 +1,98 @@
+// The specimen follows a curve, by whole programs: docs/shape.md.
+
+#include <gmock/gmock.h>
+
+#include <filesystem>
+
+#include "tests/flow/rig_with_daemon.hpp"
+
+namespace diastole::flow {
+namespace {
+
+using nlohmann::json;
+using testing::HasSubstr;
+
+const std::filesystem::path example = std::filesystem::path(DIASTOLE_SOURCE_DIR) / "examples/shape";
+
+std::vector<std::string> shaped(std::vector<std::string> words, const std::string& cycles = "9") {
+  for (const std::string& word : {std::string("--study"), (example / "gel.study.toml").string(),
+                                  std::string("--cycles"), cycles, std::string("--json")})
+    words.push_back(word);
+  return words;
+}
+
+const std::string wanted = (example / "ventricle.csv").string();
+
+TEST(ShapeFlow, LearnsOnTheSimulatedRigAndKeepsTheBest) {
+  const Workplace place;
+  const Ended ended =
+      run(place, shaped({"diastole", "simulate", "--shape", wanted, "-o", "followed.run.h5", "--iterations",
+                         "2", "--gated-volume", "0.05", "--hide", "stroke-gain", "--page", "followed.html"}));
+  ASSERT_EQ(ended.exit_code, 0) << ended.err;
+  const json found = ended.json();
+  ASSERT_EQ(found.at("iterations").size(), 2U);
+  EXPECT_GT(found["iterations"][0].at("nrmse"), 0.01);
+  EXPECT_LT(found["iterations"][1].at("nrmse"), 0.01);
+  EXPECT_EQ(found["iterations"][1].at("source"), "gated volume");
+  EXPECT_EQ(found.at("best"), 1);
+  EXPECT_EQ(found.at("drive"), "followed.2.csv");
+  EXPECT_TRUE(std::filesystem::exists(place / "followed.html"));
+  // The same by files.
+  const Ended after = run(place, shaped({"diastole", "shape", wanted, "-o", "next.csv", "--after",
+                                         "followed.1.run.h5", "followed.2.run.h5"}));
+  ASSERT_EQ(after.exit_code, 0) << after.err;
+  EXPECT_EQ(after.json().at("nrmse"), found.at("nrmse"));
+}
+
+TEST(ShapeFlow, StopsWhenTheSpecimenBeginsToLeakInARun) {
+  const Workplace place;
+  const Ended ended = run(
+      place, shaped({"diastole", "simulate", "--shape", wanted, "-o", "leak.run.h5", "--fault", "leak@run+9"},
+                    "12"));
+  EXPECT_EQ(ended.exit_code, 1) << ended.err;
+  const json found = ended.json();
+  EXPECT_EQ(found.at("ending"), "changed");
+  EXPECT_EQ(found.at("runs").size(), 1U) << "it went on pushing";
+  EXPECT_TRUE(found.at("drive").is_null());
+  const Ended after =
+      run(place, shaped({"diastole", "shape", wanted, "-o", "next.csv", "--after", "leak.1.run.h5"}));
+  EXPECT_EQ(after.exit_code, 1);
+  EXPECT_FALSE(std::filesystem::exists(place / "next.csv"));
+}
+
+TEST(ShapeFlow, RunsThroughTheDaemon) {
+  RigWithDaemon rig(RigWithDaemon::Time::conducted);
+  rig.start_daemon();
+  {
+    DaemonClient client = rig.client();
+    home(client);
+  }
+  const Ended ended = run(rig.place, shaped({"diastole", "run", "--shape", wanted, "--iterations", "1", "-o",
+                                             "live.run.h5", "--socket", rig.path("socket")}));
+  ASSERT_EQ(ended.exit_code, 0) << ended.err;
+  EXPECT_EQ(ended.json().at("iterations").size(), 1U);
+  EXPECT_TRUE(std::filesystem::exists(rig.place / "live.1.run.h5"));
+}
+
+TEST(ShapeFlow, RefusesWhatCannotBe) {
+  const Workplace place;
+  place.write("high.csv", "time_s,volume_mL\n0,5\n0.5,7\n0.8,1\n1.2,5\n");
+  const Ended high = run(place, shaped({"diastole", "shape", "high.csv", "-o", "drive.csv"}));
+  EXPECT_EQ(high.exit_code, 2);
+  EXPECT_THAT(high.err, HasSubstr("high.csv: line 4"));
+  const Ended nothing = run(place, {"diastole", "run", "-o", "x.run.h5"});
+  EXPECT_EQ(nothing.exit_code, 2);
+  EXPECT_THAT(nothing.err, HasSubstr("--shape"));
+  const Ended no_study = run(place, {"diastole", "simulate", "--shape", wanted, "-o", "x.run.h5"});
+  EXPECT_EQ(no_study.exit_code, 2);
+  EXPECT_THAT(no_study.err, HasSubstr("--study"));
+  const Ended other =
+      run(place, shaped({"diastole", "shape", wanted, "-o", "drive.csv", "--after",
+                         std::string(DIASTOLE_SOURCE_DIR) + "/examples/recorded-baseline.run.h5"}));
+  EXPECT_EQ(other.exit_code, 2);
+  EXPECT_THAT(other.err, HasSubstr("/protocol/segments"));
+  EXPECT_FALSE(std::filesystem::exists(place / "drive.csv"));
+}
+
+}  // namespace
+}  // namespace diastole::flow
