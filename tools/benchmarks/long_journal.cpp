@@ -55,6 +55,7 @@ class LongJournal {
     put({{"record", "run_started"}, {"tick", 0}});
     for (int second = 0; second < load_.seconds; ++second)
       write_second(static_cast<uint64_t>(second));
+    write_positions(static_cast<uint64_t>(load_.seconds), 1);  // where the pump came to rest
     put({{"record", "run_ended"},
          {"reason", "completed"},
          {"tick", tick_rate_Hz * static_cast<uint64_t>(load_.seconds)},
@@ -64,18 +65,21 @@ class LongJournal {
   }
 
  private:
+  void write_positions(uint64_t second, uint32_t count) {
+    PositionBlock positions{static_cast<uint32_t>(second) * positions_per_s,
+                            second * tick_rate_Hz,
+                            static_cast<uint32_t>(tick_rate_Hz / positions_per_s),
+                            {}};
+    positions.microsteps.assign(count, 0);
+    append(RecordKind::positions, encode(positions));
+  }
   void write_second(uint64_t second) {
     put({{"record", "clock"},
          {"host_ns", second * ns_per_s},
          {"tick", second * tick_rate_Hz},
          {"half_round_trip_ns", 1000}});
     put({{"record", "trigger"}, {"cycle", second}, {"tick", second * tick_rate_Hz}});
-    PositionBlock positions{static_cast<uint32_t>(second) * positions_per_s,
-                            second * tick_rate_Hz,
-                            static_cast<uint32_t>(tick_rate_Hz / positions_per_s),
-                            {}};
-    positions.microsteps.assign(positions_per_s, 0);
-    append(RecordKind::positions, encode(positions));
+    write_positions(second, positions_per_s);
     const auto rows = static_cast<uint64_t>(load_.rate_Hz / blocks_per_s);
     for (uint64_t block = 0; block < blocks_per_s; ++block) {
       SampleBlock samples{
