@@ -35,11 +35,12 @@ RecordedRun recorded(unsigned seed, double gain = 1, double offset_kPa = 0, doub
   return run;
 }
 
-Comparison compared(const std::vector<RecordedRun>& runs) {
+Comparison compared(const std::vector<RecordedRun>& runs, std::vector<runfile::Session> sessions = {}) {
   std::vector<runfile::RunFile> opened;
   for (const RecordedRun& run : runs)
     opened.push_back({run, runfile::rows_of(run)});
-  return compare(opened, std::vector<runfile::Session>(runs.size()), 40);
+  sessions.resize(runs.size());
+  return compare(opened, sessions, 40);
 }
 
 TEST(RunComparison, EqualRunsWithOtherNoiseAgreeAsOftenAsIsPromised) {
@@ -66,7 +67,7 @@ TEST(RunComparison, WhatWasSetOtherwiseIsNamedAndAnotherMotionIsNotTested) {
   other.rig["cavity_kPa_per_V"] = 4.1;
   runfile::Session session;
   session.facts["specimen"] = std::string("gel-7");
-  const Comparison found = compare({recorded(1), other}, {{}, session}, 40);
+  const Comparison found = compared({recorded(1), other}, {{}, session});
   std::string words;
   for (const Difference& difference : found.differences)
     words += difference.group + ": " + difference.place + " " + difference.values[0] + "|" +
