@@ -101,6 +101,11 @@ Pressures behind_catheter(const RecordedRun& run, const DriveModel& model, std::
     refuse_run(run, "/pressure/cavity_kPa", "is behind a sensor with a memory, which cannot be undone",
                "Measure the volume: add /mr/flow to the run (diastole flow --run).");
   }
+  if (run.pump.time_s.empty()) {
+    refuse_run(run, "/pump/time_s",
+               "holds no position of the pump, so that no rest is known before the motion",
+               "Record the pump's position of each run.");
+  }
   std::vector<rig::SensorMap> maps;
   for (const rig::SensorMapMaker& make : model.model().cavity_sensor)
     maps.push_back(make(model.place()));

@@ -18,6 +18,8 @@ constexpr double gain_prior_sd = 0.1;
 constexpr double shift_prior_part = 0.005;  // of the wanted range
 constexpr double model_part = 0.4;  // of that, by which the model may err from run to run: 0.2 % of the range
 constexpr double most_growth = 2.0;  ///< of a drive's range over the first one's: beyond it something leaks
+constexpr double most_rise =
+    0.25;  ///< of a drive's least volume over the first one's, in ranges of the first
 constexpr double surprise_allowed = 0.05;  ///< of the range, beside what was meant to change
 
 /// Posterior of c and d of one harmonic.
@@ -205,6 +207,27 @@ Eigen::VectorXcd guarded(const PeriodicCurve& from, Eigen::VectorXcd step, doubl
   return Eigen::VectorXcd::Zero(step.size());
 }
 
+double greatest_mL(const PeriodicCurve& drive) { return drive.at(drive.least_at_s()) + drive.range(); }
+
+/// Nor does its level rise far: a leak that goes on, or a transducer's zero that drifts, asks for more in each run.
+/// Beyond twice the first drive's greatest volume learning ends.
+void guard_level(const PeriodicCurve& first_mL, PeriodicCurve& asked_mL, Lesson& lesson) {
+  const double greatest = greatest_mL(asked_mL), most = most_growth * greatest_mL(first_mL);
+  if (greatest > most) {
+    lesson.ending = Ending::changed;
+    lesson.reason = fmt::format(
+        "the next drive would reach {:.1f} mL, and the first one reached {:.1f} mL: something leaks, or the "
+        "transducer's zero drifts",
+        greatest, greatest_mL(first_mL));
+    return;
+  }
+  const double rise_mL = asked_mL.at(asked_mL.least_at_s()) - first_mL.at(first_mL.least_at_s());
+  const double beyond_mL = rise_mL - most_rise * first_mL.range();
+  if (beyond_mL <= 0.0) return;
+  lesson.bounded = lesson.guarded = true;
+  asked_mL.c[0] -= beyond_mL;
+}
+
 /// The next drive, and whether what it promises is worth a run.
 void plan_next(const Evidence& evidence, const PeriodicCurve& first_mL, const Bound& bound, Lesson& lesson) {
   constexpr double worth_while = 0.9;
@@ -218,6 +241,8 @@ void plan_next(const Evidence& evidence, const PeriodicCurve& first_mL, const Bo
   const Eigen::MatrixXd slope = evidence.model.jacobian(from);
   PeriodicCurve asked{from.period_s, from.c + step};
   asked.c[0] -= beginning_mL;
+  guard_level(first_mL, asked, lesson);
+  if (lesson.ending != Ending::none) return;
   lesson.drive_mL = bound(asked, slope);
   lesson.bounded = lesson.bounded || rms_between(asked, lesson.drive_mL) > 1e-6 * evidence.range_mL;
   PeriodicCurve next = lesson.drive_mL;

@@ -10,7 +10,7 @@
 // s the sd of c: an uncertain gain makes a small step. w = max(0, 1 - sigma^2/|Y_b - M|^2) (J. S. Lim, A. V. Oppenheim, Proc. IEEE 67
 // (1979) 1586) leaves to noise what is noise. A harmonic's error is expected to shrink by s / sqrt(|c|^2 + s^2) < 1: learning converges
 // monotonically as long as runs do as well, which is what is looked at. The level is apart: a pump that repeats itself cannot hold it
-// against a leak, so the next run begins lower by what the last one lost.
+// against a leak, so the next drive begins higher by what the last run lost, up to a quarter of the range.
 
 #include <functional>
 #include <optional>
@@ -27,7 +27,8 @@ struct Iteration {
   double nrmse = 0.0;           ///< root mean square error about the mean, over the wanted range
   double floor = 0.0;           ///< of it, what noise alone makes
   double level_error_mL = 0.0;  ///< mean volume less the wanted one
-  double surprise = 0.0;        ///< root mean square of what came less what was expected, over the range
+  double surprise = 0.0;        ///< root mean square of what came less what was expected, over the range;
+                                ///< the model is that of all runs, this one included
   PeriodicCurve drive_mL = {}, cavity_mL = {};
 };
 

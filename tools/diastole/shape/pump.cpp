@@ -67,7 +67,7 @@ DriveBounds Pump::bounds(double share) const {
   const double flow_mL_s = std::min({1e-3 * limits.flow_uL_per_s, microstep_mL * limits.step_rate_Hz,
                                      1e-6 * settings_.allowed_stopping_us() * braking_mL_s2});
   return {.least_mL = 0.0,
-          .most_mL = 1e-3 * limits.travel_uL,
+          .most_mL = share * 1e-3 * limits.travel_uL,
           .flow_mL_s = share * flow_mL_s,
           .acceleration_mL_s2 = [this, share](double flow) {
             const wire::Configure& allowed = settings_.limits();

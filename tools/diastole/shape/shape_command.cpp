@@ -43,6 +43,7 @@ ExitCode shape(const ShapeOptions& options, const CommandOutput& out) {
   const Shaping shaping = shaper.after(options.runs);
   const bool changed = shaping.lesson.ending == shaping::Ending::changed;
   if (!changed) {
+    fs::remove(experiment);  // which would play other points
     write_whole_file(options.drive, points_text(shaping.cycle, shaper.target()));
     write_whole_file(experiment,
                      experiment_text(shaping.cycle, shaper.plan(), options.drive.filename().string()));

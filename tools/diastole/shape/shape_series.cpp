@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <iostream>
 #include <memory>
@@ -38,6 +39,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr size_t most_iterations = 20;
+
 /// followed.run.h5 -> followed.2 and an ending.
 fs::path numbered(const fs::path& output, size_t number, const std::string& ending) {
   std::string name = output.filename().string();
@@ -53,7 +56,7 @@ class ShapeSeries final : public SessionSeries {
                        "curve that the specimen is to follow (diastole shape), instead of an experiment");
     add_request_to(command, request_);
     command.add_option("--iterations", iterations_, "sessions at the most")
-        ->check(CLI::Range(1, 20))
+        ->check(CLI::Range(size_t{1}, most_iterations))
         ->capture_default_str();
     command.add_option("--page", page_, "HTML page with the plots of each iteration");
   }
@@ -63,6 +66,7 @@ class ShapeSeries final : public SessionSeries {
 
  private:
   void check_outputs(const fs::path& output, bool force) const;
+  static void remove_earlier(const fs::path& output);
   /// A session with this drive.
   SessionResult run_once(const Shaping& shaping, const fs::path& output, const Acquire& acquire);
 
@@ -72,16 +76,30 @@ class ShapeSeries final : public SessionSeries {
   std::vector<fs::path> runs_;
 };
 
+/// What went wrong in a session that ended by itself.
+std::string faults_of(const SessionResult& result) {
+  return fmt::format("{} errors noted, {} samples missing, {} triggers in {} cycles", result.errors,
+                     result.gaps, result.triggers, result.cycles);
+}
+
 void ShapeSeries::check_outputs(const fs::path& output, bool force) const {
   if (request_.study.empty())
     throw InputError({"", "option --study", "is missing", "Name the study of rig and specimen."});
-  const std::vector<fs::path> inputs{request_.wanted.file, request_.study};
-  for (size_t i = 1; i <= iterations_; ++i) {
-    check_output(numbered(output, i, ".run.h5").string(), force, {});
+  std::vector<fs::path> inputs{request_.wanted.file, request_.study};
+  std::ranges::copy(read_study(request_.study).data.runs, std::back_inserter(inputs));
+  for (size_t i = 1; i <= (force ? most_iterations : iterations_); ++i) {
+    check_output(numbered(output, i, ".run.h5").string(), force, inputs);
     for (const char* ending : {".csv", ".experiment.toml"})
       require_output({numbered(output, i, ending), inputs, "diastole shape", force});
   }
   if (!page_.empty()) require_output({page_, inputs, report::page_mark, force});
+}
+
+/// Precondition: check_outputs() with force. Of a longer series before this one nothing stays that looks like this one's.
+void ShapeSeries::remove_earlier(const fs::path& output) {
+  for (size_t i = 1; i <= most_iterations; ++i)
+    for (const char* ending : {".experiment.toml", ".csv", ".run.h5"})
+      fs::remove(numbered(output, i, ending));
 }
 
 SessionResult ShapeSeries::run_once(const Shaping& shaping, const fs::path& output, const Acquire& acquire) {
@@ -89,6 +107,7 @@ SessionResult ShapeSeries::run_once(const Shaping& shaping, const fs::path& outp
   const fs::path drive = numbered(output, number, ".csv"),
                  experiment = numbered(output, number, ".experiment.toml");
   const fs::path run = numbered(output, number, ".run.h5");
+  fs::remove(experiment);  // which would play other points
   write_whole_file(drive, points_text(shaping.cycle, request_.wanted.file.filename().string()));
   write_whole_file(experiment, experiment_text(shaping.cycle, request_.plan, drive.filename().string()));
   SessionResult result = acquire(experiment.string(), run.string());
@@ -102,19 +121,19 @@ ExitCode ShapeSeries::carry_out(const std::string& output, bool force, const Acq
   fmt::print(stderr, "Solving the specimen and inverting the rig's model.\n");
   const Shaper shaper(request_);
   Shaping shaping = shaper.after({});
+  if (force) remove_earlier(output);
   std::string end;
   ExitCode code = ExitCode::done;
   while (runs_.size() < iterations_ && shaping.lesson.ending == Ending::none) {
     const SessionResult result = run_once(shaping, output, acquire);
     code = exit_code_of(result);
-    if (!result.regular || result.end != "completed") {
-      end = result.end;
-      break;
-    }
+    if (!result.regular || result.end != "completed") end = result.end;
+    if (end.empty() && code != ExitCode::done) end = faults_of(result);
+    if (!end.empty()) break;
     shaping = shaper.after(runs_);
     if (!out.json) fmt::print("{}\n", shaping_words(shaping));
   }
-  if (shaping.lesson.ending == Ending::changed) code = ExitCode::negative;
+  if (shaping.lesson.ending == Ending::changed) code = std::max(code, ExitCode::negative);
   if (!page_.empty()) write_whole_file(page_, shaping_page(shaping, shaper.wanted_mL(), shaper.target()));
   if (!end.empty())
     fmt::print(stderr, "The last session did not end as planned ({}): learning stops.\n", end);

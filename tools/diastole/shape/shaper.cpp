@@ -45,7 +45,7 @@ Eigen::Index harmonics_of(const PeriodicCurve& wanted_mL) {
 
 /// What of the limits holds a drive that is held back.
 std::string binding_of(const Shaping& shaping) {
-  if (!shaping.lesson.bounded) return "";
+  if (!shaping.lesson.bounded || shaping.cycle.limits.empty()) return "";
   if (shaping.lesson.guarded) return "growth";
   const auto tightest = std::ranges::max_element(shaping.cycle.limits, {}, &LimitUse::share);
   constexpr double nearly = 0.9;  // the curve between the points turns harder than the drive
@@ -78,7 +78,7 @@ Shaping Shaper::after(const std::vector<std::filesystem::path>& runs) const {
                   .cycle = {},
                   .binding_limit = {}};
   if (gated.empty()) shaping.lesson.bounded = first_is_bounded_;
-  shaping.cycle = pump_.planned(shaping.lesson.drive_mL);
+  plan_cycle(shaping);
   shaping.binding_limit = binding_of(shaping);
   PeriodicCurve expected = shaping.lesson.expected_mL;
   expected.c[0] = wanted_mL_.c[0];
@@ -87,6 +87,25 @@ Shaping Shaper::after(const std::vector<std::filesystem::path>& runs) const {
   if (!runs_so_far.empty())
     shaping.nrmse = runs_so_far[shaping.lesson.best.value_or(runs_so_far.size() - 1)].nrmse;
   return shaping;
+}
+
+void Shaper::plan_cycle(Shaping& shaping) const {
+  Lesson& lesson = shaping.lesson;
+  shaping.cycle = pump_.planned(lesson.drive_mL);
+  if (shaping.cycle.refusal.empty() || lesson.ending == Ending::changed) return;
+  // A drive that was run, read back from its points, may be a rounding beyond a limit that it had reached.
+  lesson.drive_mL = pump_.nearest(lesson.drive_mL, model_.jacobian(lesson.drive_mL));
+  shaping.cycle = pump_.planned(lesson.drive_mL);
+  const std::string& limit = shaping.cycle.refusal;
+  if (limit.empty()) return;
+  const auto use = std::ranges::find(shaping.cycle.limits, limit, &LimitUse::limit);
+  throw InputError(
+      {request_.wanted.file.string(), "drive",
+       use == shaping.cycle.limits.end()
+           ? fmt::format("the controller would refuse it: {}", limit)
+           : fmt::format("the controller would refuse it: {} is {:.6g} {}, and {:.6g} are allowed", limit,
+                         use->asked, use->unit, use->allowed),
+       "Want a smaller range or a longer period, or give a rig with other limits (--rig)."});
 }
 
 Json shaping_json(const Shaping& shaping) {

@@ -38,6 +38,9 @@ class Shaper {
   [[nodiscard]] std::string target() const { return request_.wanted.file.filename().string(); }
 
  private:
+  /// The lesson's drive as the pump plays it. Throws InputError if the controller would refuse it.
+  void plan_cycle(Shaping& shaping) const;
+
   ShapeRequest request_;
   DriveModel model_;
   Pump pump_;

@@ -1,5 +1,7 @@
 #include "tools/diastole/simulate/gated_volume.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <fstream>
 #include <random>
@@ -40,23 +42,32 @@ double volume_at(const std::vector<VolumeRow>& cycle, double since_s) {
 
 }  // namespace
 
-void store_gated_volume(const std::string& run, const std::filesystem::path& trace, size_t triggers_before,
-                        const GatedNoise& noise) {
+std::string store_gated_volume(const std::string& run, const std::filesystem::path& trace,
+                               size_t triggers_before, const GatedNoise& noise) {
   const runfile::RecordedRun recorded = runfile::read_run(run);
-  if (recorded.segments.empty()) return;
-  const runfile::Segment& segment = recorded.segments.front();
-  const auto begun = static_cast<size_t>(std::ranges::count_if(recorded.trigger_s, [&](double time_s) {
-    return time_s < segment.end_s() + recorded.trigger_delay_s;
-  }));
-  if (begun < least_cycles) return;
+  const auto moving = std::ranges::find_if(
+      recorded.segments, [](const runfile::Segment& one) { return one.waveform != "hold"; });
+  if (moving == recorded.segments.end()) return "no gated volume: no segment moves";
+  const runfile::Segment& segment = *moving;
+  const auto triggers_until = [&](double end_s) {
+    return static_cast<size_t>(std::ranges::lower_bound(recorded.trigger_s, end_s) -
+                               recorded.trigger_s.begin());
+  };
+  const size_t earlier = triggers_until(segment.start_s),
+               begun = triggers_until(segment.end_s() + recorded.trigger_delay_s) - earlier;
+  if (begun < least_cycles) {
+    return fmt::format("no gated volume: the segment that moves has {} cycles, and it takes {}", begun,
+                       least_cycles);
+  }
   std::vector<double> sum_mL(phases, 0.0);
   const std::vector<VolumeRow> rows = rows_of(trace);
-  const size_t first = triggers_before + dummy_cycles,
-               last = triggers_before + begun - 1;  // the last may be cut off
+  const size_t first = triggers_before + earlier + dummy_cycles,
+               last = triggers_before + earlier + begun - 1;  // the last may be cut off
   for (size_t trigger = first; trigger < last; ++trigger) {
     const auto [from, to] = std::ranges::equal_range(rows, trigger, {}, &VolumeRow::trigger);
     const std::vector<VolumeRow> cycle(from, to);
-    if (cycle.empty()) return;
+    if (cycle.empty())
+      return fmt::format("no gated volume: the rig has not written cycle {}", trigger - triggers_before + 1);
     for (size_t j = 0; j < phases; ++j)
       sum_mL[j] += volume_at(cycle, segment.period_s * (static_cast<double>(j) + 0.5) / phases);
   }
@@ -68,7 +79,8 @@ void store_gated_volume(const std::string& run, const std::filesystem::path& tra
     flow.cavity_mL.push_back(sum_mL[j] / static_cast<double>(last - first) + scatter(random));
     flow.sigma_mL.push_back(noise.sd_mL);
   }
-  runfile::store_flow(run, 0, flow, true);
+  runfile::store_flow(run, static_cast<size_t>(moving - recorded.segments.begin()), flow, true);
+  return {};
 }
 
 }  // namespace diastole

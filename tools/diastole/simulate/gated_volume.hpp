@@ -13,9 +13,10 @@ struct GatedNoise {
   uint64_t seed = 1;
 };
 
-/// Adds the volume of the run's first segment, its first cycles left out as dummies. `triggers_before`: of the rig's earlier runs.
-/// Nothing if the run has fewer than six cycles. Throws InputError if the run cannot be written.
-void store_gated_volume(const std::string& run, const std::filesystem::path& trace, size_t triggers_before,
-                        const GatedNoise& noise);
+/// Adds the volume of the run's first segment that moves, its first cycles left out as dummies. `triggers_before`: of the rig's
+/// earlier runs. Returns a remark if nothing could be added, as to fewer than six cycles. Throws InputError if the run cannot be
+/// written.
+[[nodiscard]] std::string store_gated_volume(const std::string& run, const std::filesystem::path& trace,
+                                             size_t triggers_before, const GatedNoise& noise);
 
 }  // namespace diastole

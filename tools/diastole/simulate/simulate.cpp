@@ -158,9 +158,11 @@ class Simulation {
     options_.session.output = run;
     SessionResult result = run_in(directory_, daemon_, options_.session);
     view_.finish();
-    if (options_.gated_sd_mL)
-      store_gated_volume(run, directory_ / "volume.csv", triggers_,
-                         {*options_.gated_sd_mL, options_.rig.seed});
+    if (options_.gated_sd_mL) {
+      const std::string remark = store_gated_volume(run, directory_ / "volume.csv", triggers_,
+                                                    {*options_.gated_sd_mL, options_.rig.seed});
+      if (!remark.empty()) fmt::print(stderr, "{}: {}\n", run, remark);
+    }
     triggers_ += static_cast<size_t>(result.triggers);
     return result;
   }
