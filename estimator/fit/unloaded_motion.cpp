@@ -20,7 +20,10 @@ std::optional<std::string> UnloadedMotion::set_values(std::span<const double> va
   ElasticMotion::set_values(imaged_, groups(), values);
   UnloadedShape found = inverse_.solve(pressure_kPa_, shape_ ? &*shape_ : nullptr);
   if (!found.report.converged() && shape_) found = inverse_.solve(pressure_kPa_);
-  if (!found.report.converged()) return found.report.describe();
+  if (!found.report.converged()) {
+    if (shape_) ElasticMotion::set_values(imaged_, groups(), values_);  // those of shape_ again
+    return found.report.describe();
+  }
   shape_ = std::move(found);
   values_.assign(values.begin(), values.end());
   shape_derivatives_.reset();

@@ -87,6 +87,30 @@ TEST(UnloadedFit, DerivativesAreTotalOnes) {
   EXPECT_LT(farthest_mm, 1e-6);
 }
 
+TEST(UnloadedFit, ARefusedTrialLeavesNothingBehind) {
+  const EllipsoidShape shape{.elements = {4, 2, 1}};
+  const std::vector<double> good{3.0, 11.09}, too_soft{0.001, 1.0};
+  const auto after = [&](const std::vector<std::vector<double>>& trials) {
+    UnloadedMotion motion(ventricle(shape, {60.0, -60.0}, {3.0, 11.09, 1.76, 10.0}),
+                          {whole_parameter(0), whole_parameter(1)}, {0.6});
+    for (const std::vector<double>& trial : trials)
+      EXPECT_EQ(motion.solve(0, trial, 1.2).position_mm.has_value(), trial == good);
+    return motion.derivatives(0);
+  };
+  const MotionDerivatives alone = after({good}), with_refused = after({good, too_soft, good});
+  const auto apart = [](const NodeField& a, const NodeField& b) {
+    double difference = 0.0, largest = 0.0;
+    for (size_t i = 0; i < a.size(); ++i) {
+      difference = std::max(difference, std::abs(a[i] - b[i]));
+      largest = std::max(largest, std::abs(a[i]));
+    }
+    return difference / largest;
+  };
+  for (size_t i = 0; i < good.size(); ++i)
+    EXPECT_LT(apart(alone.by_value[i], with_refused.by_value[i]), 1e-6) << i;
+  EXPECT_LT(apart(alone.by_imaged_pressure, with_refused.by_imaged_pressure), 1e-6);
+}
+
 TEST(UnloadedFit, FindsTheStiffnessThatIgnoringTheLoadMisses) {
   const Measurement measurement = seen_from_the_image({0.5, 3.5, 5.0}, 0.3, 0.01);
   const std::vector<EstimatedParameter> C1{{6.0, 1.0, 30.0, "C1_kPa"}};
