@@ -237,7 +237,11 @@ UnloadedShape InverseDesign::solve(double pressure_kPa, const UnloadedShape* sta
   const double from_kPa = last.imaged.pressure_kPa;
   constexpr double least_fraction = 1.0 / 64.0;  // of the pressure: what stalls there stalls for good
   double reached = 0.0, fraction = 1.0;
-  while (true) {
+  for (size_t tried = 0; true; ++tried) {
+    if (tried == options.load_step_limit) {
+      report.reason = SolveReason::out_of_steps;
+      break;
+    }
     const double next = std::min(1.0, reached + fraction);
     UnloadedShape guess = last;
     guess.imaged.pressure_kPa = std::lerp(from_kPa, pressure_kPa, next);
@@ -258,9 +262,8 @@ UnloadedShape InverseDesign::solve(double pressure_kPa, const UnloadedShape* sta
       continue;
     }
     fraction *= 0.5;
-    const bool no_way = pressure_kPa == from_kPa || fraction < least_fraction;
-    if (no_way || report.iterations > options.load_step_limit) {
-      report.reason = no_way ? attempted.reason : SolveReason::out_of_steps;
+    if (pressure_kPa == from_kPa || fraction < least_fraction) {
+      report.reason = attempted.reason;
       report.folded = attempted.folded;
       report.beyond_law = attempted.beyond_law;
       break;

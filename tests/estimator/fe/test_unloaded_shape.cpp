@@ -171,5 +171,16 @@ TEST(UnloadedShape, SaysWhenThereIsNone) {
       << shape.report.describe();
 }
 
+TEST(UnloadedShape, LoadStepsAreLimitedAndNotIterations) {
+  const ElasticModel imaged = gel(1.0, {5, 2, 1});
+  InverseDesign inverse(imaged.system());
+  const UnloadedShape whole = inverse.solve(60.0, nullptr, {.load_step_limit = 30});
+  EXPECT_GT(whole.report.iterations, 30U);
+  EXPECT_EQ(whole.report.reason, SolveReason::inverted_element);
+  const UnloadedShape cut = inverse.solve(60.0, nullptr, {.load_step_limit = 3});
+  EXPECT_EQ(cut.report.reason, SolveReason::out_of_steps);
+  EXPECT_LE(cut.report.load_steps, 3U);
+}
+
 }  // namespace
 }  // namespace diastole
