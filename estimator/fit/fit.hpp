@@ -54,7 +54,8 @@ struct FitOptions {
   std::function<void(const inference::SearchStep&)> on_step;
 };
 
-/// Where the variance of an estimate comes from; they add up to 1. Of values that vary by element, without what their smoothness adds.
+/// Where the variance of an estimate comes from; they add up to 1. What smoothness and residuals that are alike add is shared by
+/// images and pressures as their variance is without it.
 using VarianceShares = FittedVarianceShares;
 
 struct EstimatedValue {

@@ -18,11 +18,13 @@ using inference::estimate_covariance;
 
 constexpr double not_a_number = std::numeric_limits<double>::quiet_NaN();
 
-/// Variances of the values, pressures held at their estimates.
+/// Variances of the values, pressures held at their estimates; `excess` as in estimate_errors.
 Eigen::VectorXd variances_at_exact_pressure(const JointProblem& problem, const Eigen::MatrixXd& jacobian,
-                                            std::vector<bool> is_free) {
+                                            std::vector<bool> is_free, const Eigen::MatrixXd& excess) {
   std::fill(is_free.begin() + problem.values(), is_free.end() - problem.plane_unknowns(), false);
-  return estimate_covariance(jacobian, is_free).matrix.diagonal().head(problem.values());
+  Eigen::MatrixXd inverse = estimate_covariance(jacobian, is_free).matrix;
+  if (problem.robust()) inverse += (inverse * excess * inverse).eval();
+  return inverse.diagonal().head(problem.values());
 }
 
 EstimatedValue estimated(const inference::Parameter& parameter, double q, BoundSide bound, double variance,
@@ -298,26 +300,28 @@ Eigen::MatrixXd estimate_errors(FitOutcome& outcome, JointProblem& problem, cons
                               : outcome.chi2 / (static_cast<double>(outcome.rows) - outcome.unknowns);
     outcome.offset_score = offset_score(problem, q, {cost.jacobian, cost.residuals, is_free, spread}, column);
   }
+  // Smoothness and patches widen what is known with the pressures and without them alike.
+  const Eigen::VectorXd exact = variances_at_exact_pressure(problem, cost.jacobian, is_free, excess);
+  const Eigen::VectorXd of_pressures =
+      1.0 - exact.cwiseQuotient(outcome.covariance.diagonal().head(exact.size())).array().min(1.0);
   const Intervals intervals = estimate_smoothness(outcome, problem, q, options, is_free, excess);
   widen_for_patches(outcome, problem, cost, is_free);
   const Eigen::VectorXd of_data = outcome.covariance.diagonal();
   const std::map<std::string, Eigen::VectorXd> added =
       consider_errors(outcome, problem, cost, curvature.matrix);
   Eigen::MatrixXd in_coordinates = outcome.covariance;
-  const Eigen::VectorXd exact = cost.spread * variances_at_exact_pressure(problem, cost.jacobian, is_free);
   for (Eigen::Index i = 0; i < problem.values(); ++i) {
     const inference::Parameter& parameter = problem.space()[i];
-    outcome.values.push_back(
-        estimated(parameter, q[i], problem.space().bound_under(q, i), outcome.covariance(i, i), exact[i]));
-    if (outcome.covariance(i, i) > 0 && std::isfinite(outcome.values.back().se)) {
+    const double variance = outcome.covariance(i, i), pressures = of_pressures[i] * of_data[i];
+    outcome.values.push_back(estimated(parameter, q[i], problem.space().bound_under(q, i), variance,
+                                       std::isfinite(variance) ? variance - pressures : exact[i]));
+    if (variance > 0 && std::isfinite(outcome.values.back().se)) {
       const auto share = [&](const char* source) {
         const auto found = added.find(source);
-        return found == added.end() ? 0.0 : found->second[i] / outcome.covariance(i, i);
+        return found == added.end() ? 0.0 : found->second[i] / variance;
       };
-      const double data = of_data[i] / outcome.covariance(i, i);
-      const double images = std::min(data, exact[i] / outcome.covariance(i, i));
-      outcome.values.back().shares =
-          VarianceShares{images, data - images, share("fibres"), share("geometry")};
+      outcome.values.back().shares = VarianceShares{(of_data[i] - pressures) / variance, pressures / variance,
+                                                    share("fibres"), share("geometry")};
     }
     if (const auto found = intervals.find(i); found != intervals.end()) {
       for (size_t side = 0; side < 2; ++side)

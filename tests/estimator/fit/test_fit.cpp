@@ -106,6 +106,32 @@ TEST(Fit, ThePressuresErrorWidensTheIntervalAsTheorySays) {
   }
 }
 
+TEST(Fit, ThePressuresShareIsWhatExactOnesWouldTakeAway) {
+  SyntheticOptions options{.sigma_kPa = 0.1, .noise = 0};
+  const EstimatedValue with = fit_C1(measured(options)).values[0];
+  options.sigma_kPa = 0;
+  const EstimatedValue exact = fit_C1(measured(options)).values[0];
+  ASSERT_TRUE(with.shares && exact.shares);
+  EXPECT_GT(with.shares->pressures, 0.2);
+  EXPECT_NEAR(with.shares->pressures, 1 - std::pow(exact.se / with.se, 2), 1e-3);
+  EXPECT_NEAR(exact.shares->pressures, 0, 1e-9);
+}
+
+TEST(Fit, ResidualsThatAreAlikeAreNotThePressures) {
+  Measurement measurement = measured({.tags_a_frame = 300, .sigma_kPa = 0});
+  for (TagPoint& tag : measurement.tags) {  // a plane's tags are off together, otherwise in each frame
+    for (size_t k = 0; k < 3; ++k)
+      tag.x_mm[k] += 0.4 * tag.normal[k] * std::cos(3.0 * tag.plane_mm + 2.0 * tag.frame);
+  }
+  measurement.planes_as_seen = true;
+  const FitOutcome fit = fit_C1(measurement);
+  EXPECT_GT(fit.alike, 1.2);
+  ASSERT_TRUE(fit.values[0].shares);
+  EXPECT_NEAR(fit.values[0].shares->pressures, 0, 1e-9);
+  EXPECT_NEAR(fit.values[0].shares->images, 1, 1e-9);
+  EXPECT_NEAR(fit.values[0].se_exact_pressure / fit.values[0].se, 1, 1e-9);
+}
+
 TEST(Fit, AnExactPressureIsNotAnUnknown) {
   const FitOutcome fit = fit_C1(measured({.sigma_kPa = 0}));
   EXPECT_EQ(fit.covariance.rows(), 1);

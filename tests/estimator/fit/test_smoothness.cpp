@@ -74,11 +74,11 @@ class RegionalGel : public testing::Test {
   static double truth(size_t element, double amplitude) {
     return 8.7 * (1 + amplitude * std::cos(M_PI / 2 * static_cast<double>(element % 4)));
   }
-  static Measurement measured(double amplitude, unsigned seed) {
+  static Measurement measured(double amplitude, unsigned seed, double sigma_kPa = 0.02) {
     ElasticModel gel = test::coarse_gel(8.7);
     for (size_t e = 0; e < elements; ++e)
       gel.set_element_parameter(0, e, truth(e, amplitude));
-    return test::synthetic(gel, {.tags_a_frame = 250, .sigma_mm = 0.4, .seed = seed});
+    return test::synthetic(gel, {.tags_a_frame = 250, .sigma_mm = 0.4, .sigma_kPa = sigma_kPa, .seed = seed});
   }
   static FitOutcome fit(const Measurement& measurement, std::optional<SmoothRegion> smooth,
                         Robustness robustness = Robustness::if_needed) {
@@ -162,6 +162,14 @@ TEST_F(RegionalGel, ARobustLossChangesItsErrorsAsItDoesWithoutSmoothing) {
   EXPECT_GT(free, 0.95);
   EXPECT_NEAR(given, free, 0.05);
   EXPECT_NEAR(by_evidence, free, 0.08);
+}
+
+TEST_F(RegionalGel, WhatTheSmoothnessAddsIsNotThePressures) {
+  const FitOutcome outcome = fit(measured(0.08, 1, 0), SmoothRegion{0, {}});
+  for (const EstimatedValue& value : outcome.values) {
+    ASSERT_TRUE(value.shares);
+    EXPECT_NEAR(value.shares->pressures, 0, 1e-9);
+  }
 }
 
 TEST_F(RegionalGel, AGivenStepIsKept) {
