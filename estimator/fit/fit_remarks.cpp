@@ -73,12 +73,11 @@ void add_alike(std::vector<std::string>& remarks, const FitOutcome& fit) {
 void add_pressure_share(std::vector<std::string>& remarks, const FitRecord& record, const FitOutcome& fit) {
   if (record.parameters.size() != 1 || !record.parameters[0].elements.empty()) return;
   const EstimatedValue& value = fit.values[0];
-  if (!(value.se > 0)) return;
-  const double share = 1 - std::pow(value.se_exact_pressure / value.se, 2);
+  if (!value.shares) return;
   remarks.push_back(
       fmt::format("{:.0f} % of the variance of {} comes from the error of the measured pressures; with exact "
                   "pressures its standard error would be {:.3g}.",
-                  100 * share, record.parameters[0].name, value.se_exact_pressure));
+                  100 * value.shares->pressures, record.parameters[0].name, value.se_exact_pressure));
 }
 
 void add_bounds(std::vector<std::string>& remarks, const FitRecord& record) {

@@ -14,6 +14,7 @@ using test::message_of;
 using testing::AllOf;
 using testing::Contains;
 using testing::HasSubstr;
+using testing::StartsWith;
 
 std::filesystem::path example(const char* name) {
   return std::filesystem::path(DIASTOLE_SOURCE_DIR) / "examples" / name;
@@ -83,6 +84,19 @@ TEST_F(CoarseStudy, NoiseThatIsStatedTooSmallOrTooLargeIsSaid) {
   for (TagPoint& tag : measurement_.tags)
     tag.sigma_mm *= 4;
   EXPECT_THAT(fit().remarks, Contains(HasSubstr("smaller than the stated noise")));
+}
+
+TEST_F(CoarseStudy, ErrorsOfTheWallsAreNotBlamedOnThePressures) {
+  for (Frame& frame : measurement_.frames)
+    frame.sigma_kPa = 0;
+  StudyFitOptions options;
+  options.geometry_sigma_mm = 0.5;
+  const FitRecord record = fit_study(study_, measurement_, options);
+  ASSERT_TRUE(record.parameters[0].variance_shares);
+  EXPECT_GT(record.parameters[0].variance_shares->geometry, 0.2);
+  EXPECT_THAT(record.remarks,
+              Contains(AllOf(StartsWith("0 % of the variance of C1_kPa"),
+                             HasSubstr(fmt::format("would be {:.3g}", record.parameters[0].se)))));
 }
 
 TEST_F(CoarseStudy, OutliersAreCountedAndSaid) {
