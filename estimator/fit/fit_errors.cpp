@@ -305,6 +305,7 @@ Eigen::MatrixXd estimate_errors(FitOutcome& outcome, JointProblem& problem, cons
   const Eigen::VectorXd of_pressures =
       1.0 - exact.cwiseQuotient(outcome.covariance.diagonal().head(exact.size())).array().min(1.0);
   const Intervals intervals = estimate_smoothness(outcome, problem, q, options, is_free, excess);
+  const Eigen::VectorXd of_smoothness = outcome.covariance.diagonal();
   widen_for_patches(outcome, problem, cost, is_free);
   const Eigen::VectorXd of_data = outcome.covariance.diagonal();
   const std::map<std::string, Eigen::VectorXd> added =
@@ -324,8 +325,9 @@ Eigen::MatrixXd estimate_errors(FitOutcome& outcome, JointProblem& problem, cons
                                                     share("fibres"), share("geometry")};
     }
     if (const auto found = intervals.find(i); found != intervals.end()) {
-      for (size_t side = 0; side < 2; ++side)
-        outcome.values.back().ci95[side] = parameter.value(found->second[side]);
+      const auto [low, high] = found->second;  // without what patches and considered errors add
+      outcome.values.back().ci95 =
+          interval(parameter, (low + high) / 2, (high - low) / 2 * std::sqrt(variance / of_smoothness[i]));
     }
     const double slope = parameter.slope(q[i]);
     outcome.covariance.row(i) *= slope;

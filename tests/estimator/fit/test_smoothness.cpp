@@ -81,8 +81,9 @@ class RegionalGel : public testing::Test {
     return test::synthetic(gel, {.tags_a_frame = 250, .sigma_mm = 0.4, .sigma_kPa = sigma_kPa, .seed = seed});
   }
   static FitOutcome fit(const Measurement& measurement, std::optional<SmoothRegion> smooth,
-                        Robustness robustness = Robustness::if_needed) {
+                        Robustness robustness = Robustness::if_needed, double geometry_sigma_mm = 0) {
     ElasticMotion motion(test::coarse_gel(6), each_element(0, elements));
+    motion.consider(geometry_errors(motion.model(), geometry_sigma_mm));
     FitOptions options;
     options.robustness = robustness;
     if (smooth) options.smooth = {*smooth};
@@ -169,6 +170,19 @@ TEST_F(RegionalGel, WhatTheSmoothnessAddsIsNotThePressures) {
   for (const EstimatedValue& value : outcome.values) {
     ASSERT_TRUE(value.shares);
     EXPECT_NEAR(value.shares->pressures, 0, 1e-9);
+  }
+}
+
+TEST_F(RegionalGel, IntervalsByEvidenceHoldTheErrorsOfTheWalls) {
+  const Measurement measurement = measured(0.08, 1);
+  const FitOutcome without = fit(measurement, SmoothRegion{0, {}}),
+                   with = fit(measurement, SmoothRegion{0, {}}, Robustness::if_needed, 0.5);
+  for (size_t e = 0; e < elements; ++e) {
+    const auto width = [&](const FitOutcome& of) {
+      return std::log(of.values[e].ci95[1] / of.values[e].ci95[0]);
+    };
+    EXPECT_GT(with.values[e].se, 1.02 * without.values[e].se);
+    EXPECT_NEAR(width(with) / width(without), with.values[e].se / without.values[e].se, 1e-6);
   }
 }
 
