@@ -12,6 +12,7 @@
 #include "estimator/cli/output_files.hpp"
 #include "estimator/cli/study_images.hpp"
 #include "estimator/cli/study_options.hpp"
+#include "estimator/cli/unloading_output.hpp"
 #include "estimator/fit/study_fit.hpp"
 #include "estimator/io/study_fingerprint.hpp"
 #include "estimator/io/whole_file.hpp"
@@ -100,14 +101,7 @@ void print_record(const FitRecord& record) {
                frame.estimated_kPa, frame.se_kPa, frame.points, frame.rms_mm);
   }
   fmt::print("\n");
-  if (const auto& unloaded = record.unloaded) {
-    fmt::print(
-        "The shape was imaged at {:.4f} \u00b1 {:.4f} kPa; without load the cavity holds {:.3f} mL instead "
-        "of "
-        "{:.3f}, and {:.4f} kPa bring the image back to {:.4f} mm.\n",
-        unloaded->estimated_kPa, unloaded->se_kPa, unloaded->cavity_unloaded_mL, unloaded->cavity_imaged_mL,
-        unloaded->estimated_kPa, unloaded->return_mm);
-  }
+  if (record.unloaded) fmt::print("{}\n", unloading_sentence(*record.unloaded));
   for (const std::string& remark : record.remarks)
     fmt::print("{}\n", remark);
   for (const Exclusion& exclusion : record.excluded)
@@ -246,7 +240,8 @@ ExitCode run_fit(const FitArguments& arguments, const CommandOutput& out) {
     print_record(record);
     if (arguments.output) fmt::print("\nThe result is in {}\n", arguments.output->string());
   }
-  return record.converged && !ended_on_bound(record) ? ExitCode::done : ExitCode::negative;
+  const bool returned = !arguments.study.unload || (record.unloaded && record.unloaded->returned);
+  return record.converged && !ended_on_bound(record) && returned ? ExitCode::done : ExitCode::negative;
 }
 
 }  // namespace
@@ -259,8 +254,8 @@ void add_fit(CommandLine& line) {
       "  diastole fit examples/phantom-a.study.toml -o fit.json\n"
       "  diastole fit examples/phantom-a.study.toml --set C1_kPa=12 --mesh 8,8,2 --json\n"
       "  diastole fit heart.study.toml --unload\n"
-      "Exit code 1: the data cannot be what they say, the search did not converge, or a parameter ended on\n"
-      "its bound, which is no estimate.");
+      "Exit code 1: the data cannot be what they say, the search did not converge, a parameter ended on its\n"
+      "bound, which is no estimate, or with --unload the load does not bring the image back.");
   add_study(*command, arguments->study);
   add_values(*command, arguments->study);
   add_unloading(*command, arguments->study);

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
 #include <string>
 
 namespace diastole {
@@ -33,6 +34,20 @@ void print_unloading(const nlohmann::ordered_json& json, double imaged_at_kPa) {
                json["cavity_imaged_mL"].get<double>());
   }
   fmt::print(" the body comes back to its image within {:.2g} mm.\n", json["return_mm"].get<double>());
+}
+
+std::string unloading_sentence(const FittedUnloading& unloaded) {
+  std::string words = fmt::format("The shape was imaged at {:.4f} \u00b1 {:.4f} kPa", unloaded.estimated_kPa,
+                                  unloaded.se_kPa);
+  if (std::isfinite(unloaded.cavity_unloaded_mL)) {
+    words += fmt::format("; without load the cavity holds {:.3f} mL instead of {:.3f}",
+                         unloaded.cavity_unloaded_mL, unloaded.cavity_imaged_mL);
+  }
+  if (unloaded.returned) {
+    words += fmt::format("; {:.4f} kPa bring the image back to {:.2g} mm", unloaded.estimated_kPa,
+                         unloaded.return_mm);
+  }
+  return words + ".";
 }
 
 }  // namespace diastole

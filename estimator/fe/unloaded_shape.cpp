@@ -341,6 +341,11 @@ ElasticModel on_unloaded(const ElasticSystem& imaged, NodeField reference_mm, So
                carried_back(imaged.mesh(), imaged.material_axes()), std::move(solve));
 }
 
+bool UnloadReturn::returned(const HermiteMesh& imaged) const {
+  constexpr double allowed = 1e-4;  // of the extent
+  return report.converged() && report.stable() != false && farthest_mm < allowed * imaged.extent_mm();
+}
+
 UnloadReturn inflate_again(ElasticModel& unloaded, const HermiteMesh& imaged, double pressure_kPa) {
   const Solution solution = unloaded.solve(pressure_kPa);
   UnloadReturn result{solution.report};

@@ -92,6 +92,9 @@ struct UnloadReturn {
   SolveReport report;
   double farthest_mm =
       0.0;  ///< from the imaged positions, over 27 places an element; of the state that was reached
+
+  /// Whether the load brings the image back: to 1e-4 of the body's extent, in an equilibrium that is stable as far as this is known.
+  [[nodiscard]] bool returned(const HermiteMesh& imaged) const;
 };
 UnloadReturn inflate_again(ElasticModel& unloaded, const HermiteMesh& imaged, double pressure_kPa);
 

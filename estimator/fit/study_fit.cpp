@@ -328,16 +328,22 @@ void record_unloading(FitRecord& record, UnloadedMotion& motion, const FitOutcom
   const ImagedLoad measured = motion.imaged_load().value();
   const EstimatedPressure pressure = fit.imaged_pressure.value();
   const auto again = motion.inflated_again(values, pressure.value_kPa);
-  if (!again) return;
-  const bool returned = again->back.report.converged() && again->back.report.stable() != false;
+  if (!again) {
+    record.remarks.push_back(fmt::format(
+        "No shape without load is found at the estimate ({:.4g} kPa in the image). These parameters and the "
+        "pressure of the image do not belong together.",
+        pressure.value_kPa));
+    return;
+  }
+  const bool returned = again->back.returned(motion.mesh());
   record.unloaded = FittedUnloading{
       measured.pressure_kPa,   measured.sigma_kPa,        pressure.value_kPa,      pressure.se_kPa,
       again->cavity_imaged_mL, again->cavity_unloaded_mL, again->back.farthest_mm, returned};
   if (!returned) {
     record.remarks.push_back(fmt::format(
-        "The body without load does not come back to its image: {}. These parameters and the pressure "
-        "of the image do not belong together.",
-        again->back.report.describe()));
+        "The body without load does not come back to its image: {}, {:.3g} mm off. These parameters and the "
+        "pressure of the image do not belong together.",
+        again->back.report.describe(), again->back.farthest_mm));
   }
 }
 

@@ -88,11 +88,7 @@ ImagedLoad imaged_load_of(const Study& study) {
   return *study.imaged_at;
 }
 
-bool UnloadedModel::returned() const {
-  constexpr double allowed = 1e-4;  // of the extent
-  return shape.report.converged() && back.report.converged() && back.report.stable() != false &&
-         back.farthest_mm < allowed * imaged.mesh().extent_mm();
-}
+bool UnloadedModel::returned() const { return shape.report.converged() && back.returned(imaged.mesh()); }
 
 std::string UnloadedModel::describe() const {
   if (!shape.report.converged() || returned()) return shape.report.describe();

@@ -25,7 +25,7 @@ struct UnloadedModel {
   ElasticModel model;      ///< of the unloaded body; of the imaged one where there is none
   UnloadReturn back = {};  ///< from the unloaded shape to the imaged pressure
 
-  /// Whether there is such a shape, and the load brings the image back: to 1e-4 of the body's extent, in a stable equilibrium.
+  /// Whether there is such a shape, and the load brings the image back (UnloadReturn::returned).
   [[nodiscard]] bool returned() const;
   /// A sentence on how that ended.
   [[nodiscard]] std::string describe() const;

@@ -4,6 +4,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "estimator/cli/unloading_output.hpp"
 #include "tests/estimator/cli/run_command.hpp"
 #include "tests/estimator/io/scratch_file.hpp"
 
@@ -11,6 +12,7 @@ namespace diastole {
 namespace {
 
 using testing::HasSubstr;
+using testing::Not;
 
 std::string imaged_ventricle(const std::string& more, const std::string& C_kPa = "3.0") {
   return "format = \"diastole-study\"\nversion = 1\n[specimen]\nkind = \"ellipsoid\"\n"
@@ -64,6 +66,14 @@ TEST(UnloadCommand, SaysWhenThereIsNoSuchShape) {
   EXPECT_EQ(solved["reason"], "no shape without load");
   EXPECT_FALSE(solved["unloaded"]["returned"]);
   EXPECT_LT(solved["unloaded"]["reached_pressure_kPa"].get<double>(), 30.0);
+}
+
+TEST(UnloadCommand, AFitSaysThatTheImageComesBackOnlyWhereItDoes) {
+  FittedUnloading unloaded{1.2, 0.05, 1.21, 0.04, 60.0, 50.0, 2e-9, true};
+  EXPECT_THAT(unloading_sentence(unloaded), HasSubstr("bring the image back to 2e-09 mm"));
+  unloaded.returned = false;
+  unloaded.return_mm = 7.0;
+  EXPECT_THAT(unloading_sentence(unloaded), Not(HasSubstr("back")));
 }
 
 TEST(UnloadCommand, IsRefusedWhereTheLoadIsNotKnown) {

@@ -127,7 +127,7 @@ TEST(UnloadedFit, FindsTheStiffnessThatIgnoringTheLoadMisses) {
   const auto again =
       unloaded.inflated_again(std::vector{fit.values[0].value}, fit.imaged_pressure->value_kPa);
   ASSERT_TRUE(again);
-  EXPECT_LT(again->back.farthest_mm, 0.02);
+  EXPECT_TRUE(again->back.returned(unloaded.mesh()));
   EXPECT_LT(again->cavity_unloaded_mL, again->cavity_imaged_mL - 5.0);
 
   ElasticMotion ignoring(imaged_gel(6.0), {whole_parameter(0)});
@@ -135,6 +135,18 @@ TEST(UnloadedFit, FindsTheStiffnessThatIgnoringTheLoadMisses) {
   EXPECT_GT(wrong.chi2, 1.5 * fit.chi2);
   ASSERT_TRUE(wrong.converged()) << wrong.reason;
   EXPECT_GT(std::abs(wrong.values[0].value - true_C1_kPa), 10 * wrong.values[0].se);
+}
+
+/// An equilibrium that is reached and stable, but is not the image.
+TEST(UnloadedFit, AnEquilibriumElsewhereIsNoReturn) {
+  const ElasticModel imaged = imaged_gel(true_C1_kPa);
+  const UnloadedShape shape = InverseDesign(imaged.system()).solve(imaged_kPa);
+  ElasticModel unloaded = on_unloaded(imaged.system(), shape.reference_mm, {.check_stability = true});
+  EXPECT_TRUE(inflate_again(unloaded, imaged.mesh(), imaged_kPa).returned(imaged.mesh()));
+  const UnloadReturn elsewhere = inflate_again(unloaded, imaged.mesh(), 0.9 * imaged_kPa);
+  EXPECT_TRUE(elsewhere.report.converged());
+  EXPECT_NE(elsewhere.report.stable(), std::optional(false));
+  EXPECT_FALSE(elsewhere.returned(imaged.mesh()));
 }
 
 /// A frame at the pressure of the image knows nothing: values move neither the image nor it.
