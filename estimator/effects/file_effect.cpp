@@ -238,18 +238,36 @@ rig::LeakMaker leak_of(const Bound& bound, In pressure, double without_mL_s_kPa)
   };
 }
 
+/// The law's conductance (mL/s/kPa) at the lowest pressure at which it is no small part of its largest: a relief valve is nothing
+/// until it opens, what happens later is nothing at first. Pressures are those that a cylinder may see.
+double usual_conductance(Bound bound, double least_part) {
+  std::vector<double> conductances;
+  for (const double pressure_kPa : {10.0, 20.0, 40.0, 80.0, 160.0}) {
+    double& largest = conductances.emplace_back(0.0);
+    for (const double time_s : {0.0, 1.0, 10.0, 100.0}) {
+      for (const In time : {In::t, In::t_session, In::t_since, In::cycle})
+        bound[time] = time_s;
+      for (const double signed_kPa : {pressure_kPa, -std::min(pressure_kPa, 80.0)}) {  // 101 are a vacuum
+        bound[In::p_pump] = signed_kPa;
+        const double conductance = std::abs(bound.laws->law(bound.inputs.data()) / signed_kPa);
+        if (std::isfinite(conductance)) largest = std::max(largest, conductance);
+      }
+    }
+  }
+  const double least = least_part * std::ranges::max(conductances);
+  return *std::ranges::find_if(conductances, [&](double at) { return at >= least; });
+}
+
 void add_pump_leak(Bound bound, rig::RigModel& model) {
-  constexpr double usual_kPa = 10.0;
   constexpr double least_part = 0.01;
   std::array<double, 2> rest{};  // what is lost, the conductance
   bound[In::p_pump] = 0.0;
   bound.laws->at_rest.run(bound.inputs.data(), rest.data());
-  if (bound.laws->is_linear) {
+  if (bound.laws->is_linear && rest[1] >= 0.0) {
     model.pump_leak_mL_s_kPa += rest[1];
     return;
   }
-  bound[In::p_pump] = usual_kPa;
-  const double usual = bound.laws->law(bound.inputs.data()) / usual_kPa;
+  const double usual = usual_conductance(bound, least_part);
   if (rest[1] == 0.0 && usual == 0.0) return;
   const bool opens = rest[1] < least_part * usual;
   model.pump_leak_mL_s_kPa += opens ? least_part * usual : rest[1];

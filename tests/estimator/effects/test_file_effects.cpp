@@ -218,6 +218,41 @@ TEST(FileEffects, LoseMoreThroughALeakThatOpens) {
   EXPECT_GT(largest_difference(of_valve, base), 1e-3);
 }
 
+/// Nothing is lost up to 15 kPa, nor by the second before the first moment.
+TEST(FileEffects, KeepALeakThatIsNothingWhileItIsClosed) {
+  const BentCurve family;
+  rig::RunPlace place;
+  for (const std::string lost : {"G * max(p_pump - 15 [kPa], 0 [kPa])", "G * min(p_pump + 15 [kPa], 0 [kPa])",
+                                 "G * p_pump * min(max(t - 0.5 [s], 0 [s]) / 1 [s], 1)"}) {
+    const auto effect = effect_with("drive", "[equations]\nq_hose = \"q_piston - " + lost + "\"\n");
+    rig::RigModel model;
+    effect->apply(std::vector{0.05}, {family, {}}, model);
+    ASSERT_EQ(model.pump_leaks.size(), 1U) << lost;
+    EXPECT_GT(model.pump_leak_mL_s_kPa, 0.0) << lost;
+    EXPECT_LT(model.pump_leak_mL_s_kPa, 0.01 * 0.05 + 1e-12) << lost;  // as if it never closed quite
+    const double open_kPa = lost.find("min(p_pump") != std::string::npos ? -25.0 : 25.0;
+    EXPECT_GE(std::abs(model.pump_leaks.front()(place)(open_kPa, 2.0)), 0.05 * 10.0 - 1e-12) << lost;
+    rig::RigModel neutral;
+    effect->apply(std::vector{0.0}, {family, {}}, neutral);
+    EXPECT_TRUE(neutral.pump_leaks.empty()) << lost;
+  }
+  const auto relief =
+      effect_with("drive", "[equations]\nq_hose = \"q_piston - G * max(p_pump - 15 [kPa], 0 [kPa])\"\n");
+  const rig::Prediction base = shown(nullptr, {});
+  ASSERT_GT(std::ranges::max(base.pump_kPa), 16.0);
+  EXPECT_GT(largest_difference(shown(relief.get(), {0.2}), base), 1e-3);
+}
+
+/// A conductance that would be negative, beside which there is no pressure to go by, is none to step by.
+TEST(FileEffects, StepByNoNegativeConductance) {
+  const BentCurve family;
+  const auto source = effect_with("drive", "[equations]\nq_hose = \"q_piston + G * p_pump\"\n");
+  rig::RigModel model;
+  source->apply(std::vector{0.05}, {family, {}}, model);
+  EXPECT_GT(model.pump_leak_mL_s_kPa, 0.0);
+  EXPECT_EQ(model.pump_leaks.size(), 1U);
+}
+
 TEST(FileEffects, IntegrateStatesOfADriveAndASensor) {
   // A sensor of first order: what lags by tau, within the step, is what came tau before.
   const auto lag = effect_with("sensor", R"toml([[state]]
