@@ -13,6 +13,7 @@
 #include "estimator/explain/explain_study.hpp"
 #include "estimator/explain/verdict/explained_study.hpp"
 #include "estimator/explain/verdict/explanation_json.hpp"
+#include "estimator/explain/verdict/learned_file.hpp"
 #include "estimator/io/whole_file.hpp"
 #include "estimator/model/study_effects.hpp"
 #include "estimator/report/page.hpp"
@@ -28,7 +29,6 @@ constexpr std::string_view explanation_file = "explanation.json";
 constexpr std::string_view study_file = "explained.study.toml";
 constexpr std::string_view report_file = "report.html";
 constexpr std::string_view learned_file = "learned.effect.toml";
-constexpr std::string_view learned_mark = "# Learnt by diastole explain";
 constexpr std::string_view study_mark = "# Written by diastole explain";
 
 struct ExplainArguments {
@@ -152,7 +152,7 @@ ExitCode run_explain(const ExplainArguments& arguments, const CommandOutput& out
   require_output({json_file, inputs_of(study), explain::explanation_file_mark, arguments.force});
   require_output({new_study, inputs_of(study), study_mark, arguments.force});
   require_output({page, inputs_of(study), report::page_mark, arguments.force});
-  require_output({learned, inputs_of(study), learned_mark, arguments.force});
+  explain::require_learned_file(learned, inputs_of(study), arguments.force);
   const Interruption interruption;
   explain::Explanation found;
   try {
@@ -174,9 +174,9 @@ ExitCode run_explain(const ExplainArguments& arguments, const CommandOutput& out
   }
   if (found.learned) {
     found.learned->effect_file = learned_file;
-    write_whole_file(learned, fmt::format("{}: a suggestion.\n{}", learned_mark, found.learned->toml));
+    explain::write_learned_file(learned, found.learned->toml);
   } else {
-    fs::remove(learned, error);
+    explain::remove_learned_file(learned);
   }
   write_whole_file(json_file, explain::to_json(found));
   write_whole_file(page, report::make_report(found));
