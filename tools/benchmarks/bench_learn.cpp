@@ -16,6 +16,7 @@
 #include "estimator/explain/rig/reference_file.hpp"
 #include "estimator/explain/rig/set_fit.hpp"
 #include "tools/benchmarks/recorded_cases.hpp"
+#include "tools/score/score.hpp"
 
 namespace {
 
@@ -45,20 +46,38 @@ std::optional<explain::LearnedTerm> learnt(const std::filesystem::path& file) {
   return explain::learn_term(problem, fitted_plain(problem), {has_reference});
 }
 
+/// How often a law was proposed.
+struct Proposals {
+  size_t laws = 0, cases = 0;
+
+  void add(bool proposed) {
+    laws += proposed ? 1 : 0;
+    ++cases;
+  }
+  void print(std::string_view where) const {
+    const auto [low, high] = explain::clopper_pearson(laws, cases);
+    fmt::print("a law where {}: {} of {} (95 %: {:.0f} to {:.0f} %)\n", where, laws, cases, 100.0 * low,
+               100.0 * high);
+  }
+};
+
 }  // namespace
 
 int main(int argc, char** argv) {
   const auto recordings = bench::recordings_of(argc, argv);
   if (!recordings) return 0;
+  Proposals of_none, of_outside;
   bench::visit_cases(*recordings, [&](const bench::RecordedCase& recorded) {
     const auto begun = std::chrono::steady_clock::now();
     std::filesystem::path study = recorded.study;
     const auto with_reference = study.parent_path() / (recorded.name + "-with-reference.study.toml");
     if (std::filesystem::exists(with_reference)) study = with_reference;
     const auto term = learnt(study);
+    const std::string kind = recorded.label["kind"];
+    if (kind == "none") of_none.add(term.has_value());
+    if (kind == "outside") of_outside.add(term.has_value());
     const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
-    fmt::print("{} {:11} {:38} {:5.1f} s -> ", recorded.name, recorded.label["kind"].get<std::string>(),
-               hidden_in(recorded.label), seconds);
+    fmt::print("{} {:11} {:38} {:5.1f} s -> ", recorded.name, kind, hidden_in(recorded.label), seconds);
     if (!term) {
       fmt::print("nothing\n");
     } else {
@@ -76,4 +95,6 @@ int main(int argc, char** argv) {
     }
     std::fflush(stdout);
   });
+  of_none.print("nothing is hidden");
+  of_outside.print("something of no library is hidden");
 }
