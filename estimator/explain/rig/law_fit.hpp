@@ -9,7 +9,8 @@
 //
 // m and M the smaller and the larger distance from rest, X the largest. Size and roughness are where the evidence is
 // largest, as are the shares of the model's error. A curve that must not fall with the distance, or not be negative, is made
-// of increments that are positive or nothing (an active set): those that are nothing are no unknowns.
+// of increments that are positive or nothing (an active set): those that are nothing are no unknowns. That holds at the knots
+// alone: between them the spline may bend the other way, as far as knots that close let it.
 
 #include <Eigen/Dense>
 #include <vector>

@@ -194,6 +194,9 @@ void read_law(const PortLaw& law, LearnedTerm& term) {
     parameters.push_back(
         {"b", std::string(law.of_unit), found->b * X, 0.02 * X, X, found->b * X, "where it bends"});
   term.closed_form = formula;
+  for (const LawParameter& parameter : parameters)
+    term.closed_form +=
+        fmt::format(", {} = {}", parameter.name, with_unit(parameter.typical, parameter.unit));
   term.toml = formula_law(law, law.behind.empty() ? formula : "(" + formula + ")", parameters, text);
 }
 

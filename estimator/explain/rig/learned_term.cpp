@@ -1,5 +1,7 @@
 #include "estimator/explain/rig/learned_term.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -38,10 +40,12 @@ struct LawCandidate {
   std::vector<double> gains;  ///< of each fold
 };
 
+using Progress = std::function<void(std::string_view)>;
+
 class LawSearch {
  public:
-  LawSearch(const rig::SessionProblem& problem, const EffectSet& set)
-      : problem_(problem), set_(set), ranges_(variable_ranges(problem, set.model)) {}
+  LawSearch(const rig::SessionProblem& problem, const EffectSet& set, const Progress& progress)
+      : problem_(problem), set_(set), progress_(progress), ranges_(variable_ranges(problem, set.model)) {}
 
   std::vector<LawCandidate> run(const std::vector<Fold>& folds);
   [[nodiscard]] const rig::EvidenceFit& without() const { return without_; }
@@ -54,16 +58,25 @@ class LawSearch {
 
  private:
   [[nodiscard]] Index nuisances() const { return set_.model.u.size(); }
+  /// Whoever listens may end the search by what it throws.
+  void report(const std::string& what = {}) const {
+    if (progress_) progress_(what);
+  }
+  [[nodiscard]] double gain_of(const LawCandidate& law) const {
+    return law.fit.evidence.log_evidence - without_.log_evidence;
+  }
   /// Features of a model and of the same with curves of these values.
   [[nodiscard]] MatrixXd shown(const LawCandidate& law, const SessionModel& at,
                                const std::vector<VectorXd>& curves) const;
   void linearise(LawCandidate& law, const SessionModel& at, const VectorXd& values,
                  const MatrixXd& known) const;
-  void refine(LawCandidate& law) const;
+  /// Ends early where the law falls behind one that gains this much.
+  void refine(LawCandidate& law, double best_gain) const;
   void judge(LawCandidate& law, const std::vector<Fold>& folds) const;
 
   const rig::SessionProblem& problem_;
   const EffectSet& set_;
+  const Progress& progress_;
   VariableRanges ranges_;
   LawProblem base_;  ///< without a law
   rig::EvidenceFit without_;
@@ -91,8 +104,16 @@ MatrixXd LawSearch::shown(const LawCandidate& law, const SessionModel& at,
     models.back().terms.push_back({effects.back().get(), {}});
     models.back().values.push_back(1.0);
   }
-  std::vector<bool> same_plant(models.size(), law.law->port == Port::sensor);
-  return problem_.shown(models, same_plant);
+  if (law.law->port == Port::sensor) return problem_.shown(models, std::vector<bool>(models.size(), true));
+  // Not all at once: a leak that is solved for takes long, and Ctrl-C is seen in between.
+  constexpr size_t at_once = 2;
+  MatrixXd all(problem_.features().count(), static_cast<Index>(models.size()));
+  for (size_t first = 0; first < models.size(); first += at_once) {
+    const std::span some = std::span(models).subspan(first, std::min(at_once, models.size() - first));
+    all.middleCols(static_cast<Index>(first), static_cast<Index>(some.size())) = problem_.shown(some);
+    report();
+  }
+  return all;
 }
 
 void LawSearch::linearise(LawCandidate& law, const SessionModel& at, const VectorXd& values,
@@ -114,12 +135,13 @@ void LawSearch::linearise(LawCandidate& law, const SessionModel& at, const Vecto
       problem_.measured() - all.col(1) + law.problem.responses * values + known.rightCols(nuisances()) * at.u;
 }
 
-void LawSearch::refine(LawCandidate& law) const {
+void LawSearch::refine(LawCandidate& law, double best_gain) const {
   constexpr int most_rounds = 4;
   constexpr double straight = 0.1;       // of the error's variance, in the mean
   constexpr double far = 1.0;            // sds of nuisances
   constexpr double least_modulus = 0.2;  // times what it was, in a step
   for (int round = 0; round < most_rounds; ++round) {
+    report();
     const VectorXd weight = law.fit.evidence.variance.cwiseInverse();
     const auto cost = [&](const VectorXd& left, const VectorXd& u) {
       return left.cwiseAbs2().dot(weight) + u.squaredNorm();
@@ -163,6 +185,7 @@ void LawSearch::refine(LawCandidate& law) const {
       return;
     }
     law.fit = fit_law(law.problem, problem_.error(), law.prior, law.fit);
+    if (gain_of(law) < worth_refining * best_gain) return;
   }
 }
 
@@ -182,6 +205,7 @@ void LawSearch::judge(LawCandidate& law, const std::vector<Fold>& folds) const {
     const rig::ModelError error = error_of_rows(problem_.error(), fitted);
     const LawProblem base = base_.rows(fitted);
     const rig::EvidenceFit plain = fit_with_shares(base.target, base.known, error, without_.shares);
+    report();
     const LawFit with = fit_law(law.problem.rows(fitted), error, law.prior, law.fit);
     MatrixXd columns(law.problem.known.rows(), with.root.cols() + law.problem.known.cols());
     columns << law.problem.responses * with.root, law.problem.known;
@@ -199,6 +223,7 @@ std::vector<LawCandidate> LawSearch::run(const std::vector<Fold>& folds) {
   std::vector<LawCandidate> laws;
   for (const PortLaw& law : port_laws()) {
     if (!is_seen(law, problem_)) continue;
+    report();
     const std::vector<double> knots = curve_knots(ranges_.at(law.of));
     const double scale = curve_scale(law, problem_, ranges_);
     LawCandidate& made = laws.emplace_back(
@@ -207,14 +232,17 @@ std::vector<LawCandidate> LawSearch::run(const std::vector<Fold>& folds) {
               base_.known);
     made.fit.evidence.shares = without_.shares;
     made.fit = fit_law(made.problem, problem_.error(), made.prior, made.fit);
-    made.gain = made.fit.evidence.log_evidence - without_.log_evidence;
+    made.gain = gain_of(made);
   }
   std::ranges::sort(laws, std::greater(), &LawCandidate::gain);
   const double least = std::max(std::log(1.0 / false_proposals), worth_refining * laws.front().gain);
   std::erase_if(laws, [&](const LawCandidate& law) { return law.gain < least; });
   if (laws.size() > laws_refined) laws.erase(laws.begin() + laws_refined, laws.end());
+  double best_gain = 0.0;
   for (LawCandidate& law : laws) {
-    refine(law);
+    report(fmt::format("learning {} by {}", law.law->sets, law.law->of));
+    refine(law, best_gain);
+    best_gain = std::max(best_gain, gain_of(law));
     judge(law, folds);
     law.gain = 0.0;
     for (const double gain : law.gains)
@@ -251,17 +279,38 @@ EffectSet set_with(const EffectSet& set, const LawCandidate& law) {
   return with;
 }
 
+/// What is missing for the best law to be proposed; empty: nothing.
+std::string shortcoming(const std::vector<double>& gains, const ChangeSize& size, const Gap& gap,
+                        const ErrorKnowledge& known) {
+  if (!predicts_better(gains, port_laws().size()))
+    return "does not predict waveforms better that it was not fitted to, beyond what chance does";
+  if (size.is_tolerance) return "changes no more than the rig's tolerances may";
+  if (size.over_error < known.least_size())
+    return fmt::format("changes {:.2g} times the model's own error; {:.2g} make a finding", size.over_error,
+                       known.least_size());
+  if (gap.closed < least_closed)
+    return fmt::format(
+        "closes {:.0f} % of the gap on waveforms that it was not fitted to; {:.0f} % are asked",
+        100.0 * gap.closed, 100.0 * least_closed);
+  return {};
+}
+
 }  // namespace
 
 std::optional<LearnedTerm> learn_term(const rig::SessionProblem& problem, const EffectSet& set,
                                       const ErrorKnowledge& known,
                                       const std::function<void(std::string_view)>& progress) {
+  const auto none_because = [&](const std::string& reason) -> std::optional<LearnedTerm> {
+    if (progress) progress("no law is learnt: " + reason);
+    return {};
+  };
   const std::vector<Fold> folds = folds_of(problem);
-  if (folds.size() < 2) return {};
+  if (folds.size() < 2) return none_because("there is one waveform only, and no other to judge a law on");
   if (progress) progress("learning what no known effect explains");
-  LawSearch search(problem, set);
+  LawSearch search(problem, set, progress);
   const std::vector<LawCandidate> laws = search.run(folds);
-  if (laws.empty()) return {};
+  if (laws.empty())
+    return none_because("with none of the laws at a port are these recordings a hundred times as likely");
   const LawCandidate& best = laws.front();
   const EffectSet with = set_with(set, best);
   const VectorXd none = VectorXd::Zero(best.values.size());
@@ -273,10 +322,8 @@ std::optional<LearnedTerm> learn_term(const rig::SessionProblem& problem, const 
   EffectSet stated = with;
   stated.evidence.variance = problem.error().variance(problem.error().prior.share);
   const Gap gap = held_out_gap(problem, before, stated);
-  const bool proposed = predicts_better(best.gains, port_laws().size()) &&
-                        size.over_error >= known.least_size() && !size.is_tolerance &&
-                        gap.closed >= least_closed;
-  if (!proposed) return {};
+  if (const std::string lacks = shortcoming(best.gains, size, gap, known); !lacks.empty())
+    return none_because(fmt::format("the best, {} by {}, {}", best.law->sets, best.law->of, lacks));
   LearnedTerm term;
   term.port = name_of(best.law->port);
   term.sets = best.law->sets;

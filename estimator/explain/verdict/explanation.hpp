@@ -186,8 +186,8 @@ struct LearnedTerm {
   std::string unit;                          ///< of the curve
   std::vector<std::array<double, 2>> curve;  ///< variable, value
   std::vector<std::array<double, 2>> band;   ///< 90 % of it at each point
-  std::string closed_form;             ///< the simplest formula inside the band; empty: none of those tried
-  Gap gap;                             ///< without it and with it, on waveforms that were not fitted
+  std::string closed_form;  ///< the simplest formula inside the band, with values; empty: none of those tried
+  Gap gap;                  ///< without it and with it, on waveforms that were not fitted
   double held_out_gain = 0.0;          ///< ln of the mean likelihood ratio there
   std::vector<std::string> readings;   ///< what it looks like, in words: suggestions
   std::vector<ParameterShift> shifts;  ///< C1 and offsets without it and with it

@@ -8,6 +8,7 @@
 
 #include "estimator/effect_files/effect_file.hpp"
 #include "estimator/explain/rig/effect_trial.hpp"
+#include "estimator/explain/rig/law_readings.hpp"
 #include "estimator/explain/rig/learned_term.hpp"
 #include "estimator/explain/rig/port_law.hpp"
 #include "estimator/explain/rig/set_fit.hpp"
@@ -31,6 +32,7 @@ constexpr double least_inside = 9.0 / 11.0;
 
 class LearnedTerms : public testing::Test {
  protected:
+  struct Ended {};
   std::optional<LearnedTerm> learnt(const std::shared_ptr<const Effect>& effect, unsigned seed) {
     rig::SessionOptions options{.seed = seed};
     if (effect) {
@@ -42,7 +44,11 @@ class LearnedTerms : public testing::Test {
     const rig::LinearisedModel base = rig::declared_rig(problem);
     const EffectSet plain =
         fit_set_exactly(problem, fit_set(problem, base.at, base, problem.error().prior.share));
-    return learn_term(problem, plain, {});
+    return learn_term(problem, plain, {}, [this](std::string_view what) {
+      ++asked_;
+      if (asked_ == ends_at_) throw Ended{};
+      if (!what.empty()) said_ = what;
+    });
   }
   /// In how many of the curve's points its band holds the truth.
   static double part_inside(const LearnedTerm& term, const std::function<double(double)>& truth) {
@@ -54,11 +60,23 @@ class LearnedTerms : public testing::Test {
     return inside / static_cast<double>(term.curve.size());
   }
   rig::SpecimenFamily family_ = rig::gel_family();
+  std::string said_;  ///< last
+  size_t asked_ = 0;
+  size_t ends_at_ = 0;
 };
 
 TEST_F(LearnedTerms, AreNotProposedWhereNothingIsMissing) {
-  for (const unsigned seed : {11U, 12U})
+  for (const unsigned seed : {11U, 12U}) {
     EXPECT_FALSE(learnt(nullptr, seed).has_value()) << seed;
+    EXPECT_THAT(said_, HasSubstr("no law is learnt: ")) << seed;
+  }
+}
+
+/// As on Ctrl-C: somewhere among the simulations of the first laws.
+TEST_F(LearnedTerms, EndWhereSomebodyAsksFor) {
+  ends_at_ = 9;
+  EXPECT_THROW(learnt(nullptr, 11), Ended);
+  EXPECT_EQ(asked_, ends_at_);
 }
 
 TEST_F(LearnedTerms, FindAFlapAtThePumpAndPredictOtherWaveforms) {
@@ -97,6 +115,19 @@ TEST_F(LearnedTerms, FindAContactAndWriteAFileThatSaysSo) {
   const EffectTrial trial(*effect);
   for (const EffectCheck& check : {trial.declared(), trial.neutral(), trial.shows(), trial.bounded()})
     EXPECT_TRUE(check.passed) << check.name << ": " << check.detail;
+}
+
+TEST(LawReadings, GiveAFormulaWithItsValues) {
+  LearnedTerm term;
+  for (double q = -100.0; q <= 100.0; q += 20.0) {
+    const double lost = 4.0 * std::tanh(q / 25.0);
+    term.curve.push_back({q, lost});
+    term.band.push_back({lost - 0.01 * std::abs(lost), lost + 0.01 * std::abs(lost)});
+  }
+  const PortLaw& law = port_laws().front();
+  ASSERT_EQ(law.of, "q_hose");
+  read_law(law, term);
+  EXPECT_EQ(term.closed_form, "a * tanh(q_hose / b), a = 4 [kPa], b = 25 [mL/s]");
 }
 
 }  // namespace
