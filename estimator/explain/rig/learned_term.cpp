@@ -141,7 +141,7 @@ void LawSearch::refine(LawCandidate& law, double best_gain) const {
   constexpr double far = 1.0;            // sds of nuisances
   constexpr double least_modulus = 0.2;  // times what it was, in a step
   for (int round = 0; round < most_rounds; ++round) {
-    report();
+    report(fmt::format("learning {} by {}, round {}", law.law->sets, law.law->of, round + 1));
     const VectorXd weight = law.fit.evidence.variance.cwiseInverse();
     const auto cost = [&](const VectorXd& left, const VectorXd& u) {
       return left.cwiseAbs2().dot(weight) + u.squaredNorm();
@@ -240,7 +240,6 @@ std::vector<LawCandidate> LawSearch::run(const std::vector<Fold>& folds) {
   if (laws.size() > laws_refined) laws.erase(laws.begin() + laws_refined, laws.end());
   double best_gain = 0.0;
   for (LawCandidate& law : laws) {
-    report(fmt::format("learning {} by {}", law.law->sets, law.law->of));
     refine(law, best_gain);
     best_gain = std::max(best_gain, gain_of(law));
     judge(law, folds);
