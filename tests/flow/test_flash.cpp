@@ -94,7 +94,8 @@ TEST(FlashCommand, MakesAKeyAndSignsWithIt) {
   EXPECT_EQ(run(workplace, {"diastole", "flash", "--sign", key, image, "--json"}).json().at("counter"), 4)
       << "kept where none is given";
 
-  const std::string other = workplace.write("other.pem", "no key");
+  workplace.write("other.pem", "no key");
+  const std::string other = (workplace / "other.pem").string();
   std::filesystem::permissions(other, perms::owner_read | perms::owner_write);
   EXPECT_THAT(run(workplace, {"diastole", "flash", "--sign", other, image}).err,
               HasSubstr("is no Ed25519 key"));

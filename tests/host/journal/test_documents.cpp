@@ -33,8 +33,8 @@ const std::vector<std::pair<Document, std::string>> golden{
      R"({"channels":["cavity"],"daq_timer_counts_samples":false,"daq_timer_rate_Hz":40000000.0,)"
      R"("experiment":"text","experiment_file":"e.toml","instrument":"simulated","microstep_pL":7791649,)"
      R"("notes":[{"author":"Jo","text":"new hose","written_utc":"2026-01-02T03:04:05Z"}],)"
-     R"("producer":"test","record":"begin","rig":{"bore_mm":100.0,"microsteps":8,"specimen":"gel"},)"
-     R"("resumes":"id-before","run_id":"id","sample_rate_Hz":300.0,"segments":[{"cycles":2,"offset_mL":0.0,"period_s":0.8,)"
+     R"("producer":"test","record":"begin","resumes":"id-before","rig":{"bore_mm":100.0,"microsteps":8,"specimen":"gel"},)"
+     R"("run_id":"id","sample_rate_Hz":300.0,"segments":[{"cycles":2,"offset_mL":0.0,"period_s":0.8,)"
      R"("start_s":0.1,"stroke_mL":10.0,"waveform":"uploaded"}],"session":{"specimen":"gel-7"},"slices_done":[0,2],"started_utc":"2026-01-02T03:04:05Z",)"
      R"("tick_rate_Hz":84000000,"trigger_delay_s":0.05,"waveforms":[{"fraction":[0.0,1.0,0.0],)"
      R"("points":"phase,fraction","segment":0}]})"},
