@@ -36,7 +36,8 @@ class Visitor : public Connection, public std::enable_shared_from_this<Visitor> 
     stream_.tcp().expires_after(request_patience);
     stream_.async_handshake([self = shared_from_this()](error_code error) {
       if (!error) return self->read();
-      ERR_GET_REASON(error.value()) == SSL_R_HTTP_REQUEST ? self->refuse_plain() : self->close();
+      const int reason = ERR_GET_REASON(static_cast<unsigned long>(error.value()));
+      reason == SSL_R_HTTP_REQUEST ? self->refuse_plain() : self->close();
     });
   }
 
