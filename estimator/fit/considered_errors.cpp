@@ -17,15 +17,6 @@ using Eigen::Vector3d;
 
 constexpr double radians = std::numbers::pi / 180.0;
 
-/// Of a wall at a place: 0 inside, 1 outside.
-double depth_at(const HermiteMesh& mesh, const std::vector<double>& depths, const MaterialPoint& point) {
-  const std::array<double, corners> basis = trilinear_basis(point.xi);
-  double depth = 0.0;
-  for (size_t c = 0; c < corners; ++c)
-    depth += basis[c] * depths[mesh.element(point.element)[c]];
-  return depth;
-}
-
 /// Where the wall has a direction: beside a collapsed edge.
 Vector3d normal_at(const HermiteMesh& mesh, MaterialPoint point) {
   constexpr double least_relative_volume = 1e-6, beside = 0.02;
@@ -48,10 +39,10 @@ ConsideredError turned_fibres(const ElasticModel& model, double sigma_deg, Turn 
             const MaterialAxesField turned = [depths, turn, amount_deg, axes = of.system().material_axes()](
                                                  const HermiteMesh& mesh, const MaterialPoint& point) {
               const MaterialAxes untouched = axes(mesh, point);
-              return MaterialAxes(
-                  turn(wall_axes(mesh, point), untouched, depth_at(mesh, depths, point), radians * amount_deg)
-                      .toRotationMatrix() *
-                  untouched);
+              return MaterialAxes(turn(wall_axes(mesh, point), untouched, between_nodes(mesh, depths, point),
+                                       radians * amount_deg)
+                                      .toRotationMatrix() *
+                                  untouched);
             };
             return alike(of.system(), of.mesh(), turned);
           },
@@ -63,7 +54,7 @@ NodeField along_normals(const HermiteMesh& mesh, const std::function<double(doub
   constexpr double step = 1e-3;
   const std::vector<double> depths = NodalLines(mesh).depths();
   const auto value = [&](const MaterialPoint& point) {
-    return Vector3d(weight(depth_at(mesh, depths, point)) * normal_at(mesh, point));
+    return Vector3d(weight(between_nodes(mesh, depths, point)) * normal_at(mesh, point));
   };
   NodeField sum(mesh.reference().size(), 0.0);
   std::vector<double> meeting(mesh.node_count(), 0.0);

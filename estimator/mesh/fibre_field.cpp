@@ -4,18 +4,12 @@
 #include <numbers>
 #include <utility>
 
+#include "estimator/mesh/nodal_lines.hpp"
+
 namespace diastole {
 namespace {
 
 double radians(double deg) { return std::numbers::pi / 180.0 * deg; }
-
-double interpolate(const HermiteMesh& mesh, const std::vector<double>& nodal, const MaterialPoint& point) {
-  const std::array<double, corners> basis = trilinear_basis(point.xi);
-  double sum = 0.0;
-  for (size_t c = 0; c < corners; ++c)
-    sum += basis[c] * nodal[mesh.element(point.element)[c]];
-  return sum;
-}
 
 }  // namespace
 
@@ -42,14 +36,14 @@ FibreField FibreField::prolonged(const Refinement& refinement) const {
 }
 
 double FibreField::fibre_deg(const HermiteMesh& mesh, const MaterialPoint& point) const {
-  return interpolate(mesh, fibre_deg_, point);
+  return between_nodes(mesh, fibre_deg_, point);
 }
 
 Eigen::Matrix3d FibreField::material_axes(const HermiteMesh& mesh, const MaterialPoint& point) const {
   using Eigen::AngleAxisd;
   using Eigen::Vector3d;
-  const double sheet_deg = sheet_deg_.empty() ? 0.0 : interpolate(mesh, sheet_deg_, point);
-  const double transverse_deg = transverse_deg_.empty() ? 0.0 : interpolate(mesh, transverse_deg_, point);
+  const double sheet_deg = sheet_deg_.empty() ? 0.0 : between_nodes(mesh, sheet_deg_, point);
+  const double transverse_deg = transverse_deg_.empty() ? 0.0 : between_nodes(mesh, transverse_deg_, point);
   return wall_axes(mesh, point) * AngleAxisd(radians(fibre_deg(mesh, point)), Vector3d::UnitZ()) *
          AngleAxisd(radians(-transverse_deg), Vector3d::UnitY()) *
          AngleAxisd(radians(sheet_deg), Vector3d::UnitX());

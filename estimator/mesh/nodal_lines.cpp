@@ -51,4 +51,12 @@ std::vector<double> NodalLines::depths() const {
   return depths;
 }
 
+double between_nodes(const HermiteMesh& mesh, const std::vector<double>& nodal, const MaterialPoint& point) {
+  const std::array<double, corners> basis = trilinear_basis(point.xi);
+  double sum = 0.0;
+  for (size_t c = 0; c < corners; ++c)
+    sum += basis[c] * nodal[mesh.element(point.element)[c]];
+  return sum;
+}
+
 }  // namespace diastole

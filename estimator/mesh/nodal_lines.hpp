@@ -33,4 +33,7 @@ class NodalLines {
   std::array<std::vector<size_t>, 3> after_, before_;
 };
 
+/// A value of each node between them, trilinear.
+double between_nodes(const HermiteMesh& mesh, const std::vector<double>& nodal, const MaterialPoint& point);
+
 }  // namespace diastole

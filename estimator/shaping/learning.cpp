@@ -149,7 +149,7 @@ bool at_floor(const Iteration& best, Eigen::Index harmonics) {
   return best.nrmse <= best.floor * std::sqrt(1.0 + 2.0 * scatter);
 }
 
-void tell_harmonics(const Evidence& evidence, const std::vector<Posterior>& known, Lesson& lesson) {
+void describe_harmonics(const Evidence& evidence, const std::vector<Posterior>& known, Lesson& lesson) {
   const size_t runs = lesson.iterations.size();
   for (size_t i = 0; i < known.size(); ++i) {
     const auto k = static_cast<Eigen::Index>(i);
@@ -293,7 +293,7 @@ Lesson learn(const DriveModel& model, const PeriodicCurve& wanted_mL, const Peri
       lesson.model.push_back(
           {std::string(one.effect->text().id), std::string(one.effect->parameters()[i].name), one.values[i]});
   judge(evidence, harmonics, lesson);
-  tell_harmonics(evidence, evidence.posteriors(lesson.iterations.size(), harmonics), lesson);
+  describe_harmonics(evidence, evidence.posteriors(lesson.iterations.size(), harmonics), lesson);
   if (!lesson.best) {
     lesson.drive_mL = first_mL;
     lesson.expected_mL = model.response(first_mL, 2 * harmonics).cavity_mL;

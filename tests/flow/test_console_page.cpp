@@ -48,6 +48,14 @@ class ConsolePage : public testing::Test {
     browser->wait_until("document.getElementById('" + id + "').textContent.includes(" + json(text).dump() +
                         ")");
   }
+  void begin_in_control() {
+    begin();
+    wait_for("state", "Not homed");
+    click("take");
+    fill_in("name", "anna");
+    click("name-now");
+    wait_for("control-text", "control: you");
+  }
   std::string text_of(const std::string& id) {
     return browser->value("document.getElementById('" + id + "').textContent");
   }
@@ -146,12 +154,7 @@ TEST_F(ConsolePage, AStopThatNobodyConfirmsSaysSoAtOnceWhateverIsShown) {
 }
 
 TEST_F(ConsolePage, APageThatTheBrowserLetsSleepKeepsItsConnectionAndItsControl) {
-  begin();
-  wait_for("state", "Not homed");
-  click("take");
-  fill_in("name", "anna");
-  click("name-now");
-  wait_for("control-text", "control: you");
+  begin_in_control();
   // Its timers come a minute late, at a moment when an answer is still on its way.
   ::kill(rig->daemon->pid(), SIGSTOP);
   browser->value("{ const now = performance.now.bind(performance); performance.now = () => now() + 60000; }");
@@ -166,12 +169,7 @@ TEST_F(ConsolePage, APageThatTheBrowserLetsSleepKeepsItsConnectionAndItsControl)
 }
 
 TEST_F(ConsolePage, WhoLosesTheControlIsTold) {
-  begin();
-  wait_for("state", "Not homed");
-  click("take");
-  fill_in("name", "anna");
-  click("name-now");
-  wait_for("control-text", "control: you");
+  begin_in_control();
   click("release");
   wait_for("control-text", "control: free");
   EXPECT_EQ(browser->value("document.getElementById('problem-dialog').open"), false) << "let go by herself";
@@ -184,12 +182,7 @@ TEST_F(ConsolePage, WhoLosesTheControlIsTold) {
 }
 
 TEST_F(ConsolePage, ABrowserThatSleptLongerThanThePingsLastIsToldThatItLostTheControl) {
-  begin();
-  wait_for("state", "Not homed");
-  click("take");
-  fill_in("name", "anna");
-  click("name-now");
-  wait_for("control-text", "control: you");
+  begin_in_control();
   browser->pause(12);
   EXPECT_TRUE(rig->client().call("rig.status")["control"].is_null())
       << "the control ended with the connection";

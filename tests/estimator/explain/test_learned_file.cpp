@@ -5,6 +5,7 @@
 #include "estimator/explain/verdict/learned_file.hpp"
 #include "estimator/io/whole_file.hpp"
 #include "protocol/contract/input_error.hpp"
+#include "tests/estimator/io/scratch_file.hpp"
 
 namespace diastole::explain {
 namespace {
@@ -13,14 +14,11 @@ namespace fs = std::filesystem;
 
 class LearnedFile : public testing::Test {
  protected:
-  void SetUp() override {
-    fs::remove(path_);
-    write_learned_file(path_, "id = \"learned\"\n");
-  }
-  void TearDown() override { fs::remove(path_); }
+  void SetUp() override { write_learned_file(path_, "id = \"learned\"\n"); }
   void add(const std::string& text) const { std::ofstream(path_, std::ios::app) << text; }
 
-  fs::path path_ = fs::path(testing::TempDir()) / "test-learned-file.effect.toml";
+  test::ScratchFolder folder_;
+  fs::path path_ = folder_.path() / "learned.effect.toml";
 };
 
 TEST_F(LearnedFile, IsReplacedAndRemovedWhileNobodyTouchedIt) {

@@ -5,10 +5,12 @@
 #include <openssl/evp.h>
 #include <openssl/pem.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include <filesystem>
 #include <fstream>
 #include <memory>
+#include <string>
 
 namespace diastole::signing {
 namespace {
@@ -21,7 +23,8 @@ class SigningKey : public ::testing::Test {
   SigningKey() { std::filesystem::create_directories(folder_); }
   ~SigningKey() override { std::filesystem::remove_all(folder_); }
 
-  const std::filesystem::path folder_ = std::filesystem::path(::testing::TempDir()) / "diastole-signing-key";
+  const std::filesystem::path folder_ =
+      std::filesystem::path(::testing::TempDir()) / ("diastole-signing-key-" + std::to_string(::getpid()));
   const std::string file_ = folder_ / "key.pem";
 
   static std::string refusal(const std::string& file) {

@@ -4,6 +4,7 @@
 #include <fstream>
 
 #include "protocol/contract/input_error.hpp"
+#include "tests/estimator/io/scratch_file.hpp"
 #include "tests/tools/diastole/shape_loop.hpp"
 #include "tools/diastole/shape/drive_file.hpp"
 #include "tools/diastole/shape/pump.hpp"
@@ -158,7 +159,8 @@ TEST(WantedCurve, ReadsTheExampleAndRefusesWhatDoesNotSayHowLargeItIs) {
 }
 
 TEST(WantedCurve, APressureIsWhatTheColumnsAreNamedAndNotACommentOfIt) {
-  const std::filesystem::path file = std::filesystem::path(testing::TempDir()) / "wanted.csv";
+  const test::ScratchFolder folder;
+  const std::filesystem::path file = folder.path() / "wanted.csv";
   const auto read = [&](const std::string& text) {
     std::ofstream(file) << text;
     return read_wanted_curve({.file = file});

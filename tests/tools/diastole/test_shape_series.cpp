@@ -11,6 +11,7 @@
 #include "host/config/even_waveform.hpp"
 #include "host/config/experiment.hpp"
 #include "protocol/contract/input_error.hpp"
+#include "tests/estimator/io/scratch_file.hpp"
 #include "tests/host/bench/run_in_memory.hpp"
 #include "tests/tools/diastole/shape_loop.hpp"
 #include "tools/diastole/commands.hpp"
@@ -22,14 +23,8 @@ namespace fs = std::filesystem;
 
 class ShapeSeriesTest : public testing::Test {
  protected:
-  ShapeSeriesTest() {
-    fs::remove_all(folder_);
-    fs::create_directories(folder_);
-  }
-  ~ShapeSeriesTest() override { fs::remove_all(folder_); }
-
-  [[nodiscard]] fs::path output() const { return folder_ / "followed.run.h5"; }
-  [[nodiscard]] fs::path at(const std::string& name) const { return folder_ / name; }
+  [[nodiscard]] fs::path output() const { return folder_.path() / "followed.run.h5"; }
+  [[nodiscard]] fs::path at(const std::string& name) const { return folder_.path() / name; }
 
   ExitCode carry_out(size_t iterations, bool force, const SessionSeries::Acquire& acquire) {
     const fs::path example = fs::path(DIASTOLE_SOURCE_DIR) / "examples/shape";
@@ -77,7 +72,7 @@ class ShapeSeriesTest : public testing::Test {
   std::string printed_, remarks_;
 
  private:
-  fs::path folder_ = fs::path(testing::TempDir()) / "shape_series";
+  test::ScratchFolder folder_;
   PlantForShape plant_{with_effects({}), {.rest_s = 1.0, .cycles = 9, .settling = 3}};
 };
 
