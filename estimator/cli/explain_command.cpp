@@ -42,10 +42,8 @@ struct ExplainArguments {
   bool strict = false;  ///< an answer that is no clear one is a failure
 };
 
-struct Interrupted {};
-
 void print_progress(const std::string& text) {
-  if (Interruption::requested()) throw Interrupted{};
+  if (Interruption::requested()) throw explain::Interrupted{};
   if (!text.empty()) fmt::print(stderr, "explain: {}\n", text);
 }
 
@@ -110,6 +108,7 @@ void print_for_people(const explain::Explanation& found, const fs::path& folder)
     fmt::print("  {:<18} {:.4f} +- {:.4f} without, {:.4f} +- {:.4f} with what was found\n", shift.name,
                shift.before, shift.before_error, shift.after, shift.after_error);
   if (found.learned) print_learned(*found.learned);
+  if (!found.not_learned.empty()) fmt::print("\nNo law was learnt: {}.\n", found.not_learned);
   if (found.next_experiment) fmt::print("\nNext: {}\n", found.next_experiment->reason);
   fmt::print("\nIn {}: {}, {}{}{}\n", folder.string(), explanation_file, report_file,
              found.study_after.empty() ? "" : fmt::format(", {}", found.study_after),
@@ -160,7 +159,7 @@ ExitCode run_explain(const ExplainArguments& arguments, const CommandOutput& out
                                            .propose = true,
                                            .learn = arguments.learn,
                                            .progress = print_progress});
-  } catch (const Interrupted&) {
+  } catch (const explain::Interrupted&) {
     std::cerr << "diastole explain: interrupted; nothing was written\n";
     return ExitCode::negative;
   }
@@ -227,7 +226,8 @@ void add_explain(CommandLine& line, const ExplanationScorer& score) {
       "--help).\n"
       "`diastole effects` lists the effects that are known; `diastole effects FILE` checks one of yours. "
       "Exit code 0: done, whatever the verdict; 1: "
-      "interrupted,\n"
+      "interrupted\n"
+      "before there was one,\n"
       "or with --strict ambiguous or unexplained; 2: unreadable input.");
   command
       ->add_option("STUDY", arguments->study, "study file with [data] runs; with --score the results' folder")

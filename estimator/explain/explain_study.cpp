@@ -57,7 +57,7 @@ Explanation explain_study(const Study& study, const ExplainOptions& options) {
   if (!imaged) return explain_rig(study, options);
   Explanation field = explain_field(study, options.progress);
   if (study.data.runs.empty()) {
-    if (options.learn) options.report("no law is learnt: that takes runs, and the study has images only");
+    if (options.learn) field.not_learned = "that takes runs, and the study has images only";
     return field;
   }
   return merged(explain_rig(study, options), std::move(field));

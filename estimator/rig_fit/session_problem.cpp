@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
 #include "estimator/parallel/parallel_for.hpp"
 #include "estimator/rig/sampled_signal.hpp"
@@ -131,30 +132,57 @@ Eigen::MatrixXd SessionProblem::shown(std::span<const RigModel> made,
   return out;
 }
 
-Eigen::MatrixXd SessionProblem::nuisance_columns(const SessionModel& at, Eigen::VectorXd& there,
-                                                 double part) const {
-  const auto basic = static_cast<Eigen::Index>(basic_nuisances);
-  const auto count = static_cast<Eigen::Index>(nuisances_.size());
-  // Tolerances one by one, whose combinations u may be: some change nothing but what the sensors show.
+Eigen::VectorXd SessionProblem::nuisance_steps(const SessionModel& at, double part) const {
+  Eigen::VectorXd steps = Eigen::VectorXd::Constant(static_cast<Eigen::Index>(nuisances_.size()), part);
+  steps.tail(prior(at).root.rows()) = part * prior(at).root.rowwise().norm();
+  return steps;
+}
+
+std::vector<RigModel> SessionProblem::stepped(const SessionModel& at, const Eigen::VectorXd& steps) const {
+  constexpr auto basic = static_cast<Eigen::Index>(basic_nuisances);
   const Eigen::VectorXd from = tolerances(at);
-  const Eigen::MatrixXd& root = prior(at).root;
-  Eigen::VectorXd steps = Eigen::VectorXd::Constant(count, part);
-  steps.tail(count - basic) = part * root.rowwise().norm();
-  const RigModel here = model(at);
-  std::vector<RigModel> models{here};
-  std::vector<bool> same_plant{true};
-  for (Eigen::Index i = 0; i < count; ++i) {
+  std::vector<RigModel> models;
+  for (Eigen::Index i = 0; i < steps.size(); ++i) {
     SessionModel moved = at;
     Eigen::VectorXd offsets = from;
     (i < basic ? moved.u[i] : offsets[i - basic]) += steps[i];
     models.push_back(model(moved, offsets));
-    same_plant.push_back(nuisances_[static_cast<size_t>(i)].sensors_only);
   }
+  return models;
+}
+
+Eigen::MatrixXd SessionProblem::by_u(const SessionModel& at, Eigen::MatrixXd by_steps) const {
+  const Eigen::MatrixXd& root = prior(at).root;
+  by_steps.rightCols(root.cols()) *= root;
+  return by_steps;
+}
+
+// Tolerances are moved one by one, of which u may be combinations: some change nothing but what the sensors show.
+
+Eigen::MatrixXd SessionProblem::nuisance_columns(const SessionModel& at, Eigen::VectorXd& there) const {
+  const Eigen::VectorXd steps = nuisance_steps(at, 0.5);
+  std::vector<RigModel> models = stepped(at, steps);
+  models.insert(models.begin(), model(at));
+  std::vector<bool> same_plant{true};
+  for (const Nuisance& nuisance : nuisances_)
+    same_plant.push_back(nuisance.sensors_only);
   const Eigen::MatrixXd all = shown(models, same_plant);
   there = all.col(0);
-  Eigen::MatrixXd columns = (all.rightCols(count).colwise() - there) * steps.cwiseInverse().asDiagonal();
-  columns.rightCols(count - basic) *= root;
-  return columns;
+  return by_u(at, (all.rightCols(steps.size()).colwise() - there) * steps.cwiseInverse().asDiagonal());
+}
+
+Eigen::MatrixXd SessionProblem::nuisance_slopes(const SessionModel& at) const {
+  const Eigen::VectorXd steps = nuisance_steps(at, 0.005);
+  std::vector<RigModel> models = stepped(at, steps);
+  std::ranges::move(stepped(at, -steps), std::back_inserter(models));
+  models.insert(models.begin(), model(at));
+  std::vector<bool> same_plant{true};
+  for (int side = 0; side < 2; ++side)
+    for (const Nuisance& nuisance : nuisances_)
+      same_plant.push_back(nuisance.sensors_only);
+  const Eigen::MatrixXd all = shown(models, same_plant);
+  return by_u(at, (all.middleCols(1, steps.size()) - all.rightCols(steps.size())) *
+                      (2.0 * steps).cwiseInverse().asDiagonal());
 }
 
 }  // namespace diastole::rig

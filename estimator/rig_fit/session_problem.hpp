@@ -69,14 +69,22 @@ class SessionProblem {
   /// only in what the sensors show.
   [[nodiscard]] Eigen::MatrixXd shown(std::span<const SessionModel> models,
                                       const std::vector<bool>& same_plant = {}) const;
-  /// Derivatives of what is shown by u, by differences of this part of a tolerance's sd; `there`: what is shown at it. Half
-  /// an sd stands for the range that a linear fit goes through, little for the slope there.
-  [[nodiscard]] Eigen::MatrixXd nuisance_columns(const SessionModel& at, Eigen::VectorXd& there,
-                                                 double part = 0.5) const;
+  /// How what is shown changes with u, by differences of half a tolerance's sd: the range that a linear fit goes through.
+  /// `there`: what is shown at it.
+  [[nodiscard]] Eigen::MatrixXd nuisance_columns(const SessionModel& at, Eigen::VectorXd& there) const;
+  /// Derivatives of what is shown by u, by central differences of a two hundredth of a tolerance's sd: data of a hundred thousand
+  /// samples know one to a hundredth, and slopes over more are no search's.
+  [[nodiscard]] Eigen::MatrixXd nuisance_slopes(const SessionModel& at) const;
   /// What the instruments show of one run.
   [[nodiscard]] Shown shown_in(size_t run, const SessionModel& of) const;
 
  private:
+  /// Steps of this part of an sd, of u's first and of the tolerances one by one.
+  [[nodiscard]] Eigen::VectorXd nuisance_steps(const SessionModel& at, double part) const;
+  /// The model with each of the steps taken for itself.
+  [[nodiscard]] std::vector<RigModel> stepped(const SessionModel& at, const Eigen::VectorXd& steps) const;
+  /// Of derivatives by the steps, those by u.
+  [[nodiscard]] Eigen::MatrixXd by_u(const SessionModel& at, Eigen::MatrixXd by_steps) const;
   /// With these tolerances, in sds of their list's, whatever u says.
   [[nodiscard]] RigModel model(const SessionModel& of, const Eigen::VectorXd& tolerances) const;
   [[nodiscard]] Eigen::MatrixXd shown(std::span<const RigModel> made,

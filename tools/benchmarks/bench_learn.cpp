@@ -43,7 +43,7 @@ std::optional<explain::LearnedTerm> learnt(const std::filesystem::path& file) {
   rig::SessionProblem problem(session, family, 2);
   const bool has_reference = !study.data.reference.empty();
   if (has_reference) explain::use_reference(explain::reference_of(study, 2, {}), problem);
-  return explain::learn_term(problem, fitted_plain(problem), {has_reference});
+  return explain::learn_term(problem, fitted_plain(problem), {has_reference}).term;
 }
 
 /// How often a law was proposed.

@@ -136,6 +136,7 @@ class SetsSearch {
     return best;
   }
   void fit_beside_best();
+  void fit_from_better_part(const std::vector<size_t>& responses);
   void fit_best_again(size_t effects);
   [[nodiscard]] bool is_fitted(const std::vector<const Effect*>& effects) const;
   [[nodiscard]] std::vector<Promise> promises(const rig::EvidenceFit& under, bool pairs) const;
@@ -193,6 +194,33 @@ void SetsSearch::fit(const std::vector<size_t>& responses) {
   }
   if (is_fitted(effects)) return;
   fit(start, base_, problem_.error().prior.share);
+  if (effects.size() == 2) fit_from_better_part(responses);
+}
+
+/// A pair that explains less than one of its effects alone has lost its way: it is searched again from that one.
+void SetsSearch::fit_from_better_part(const std::vector<size_t>& responses) {
+  const EffectSet& pair = sets_.back();
+  const EffectSet* better = nullptr;
+  size_t other = 0;
+  for (const EffectSet& set : sets_) {
+    if (added(set) != 1 || set.evidence.log_evidence <= (better ? *better : pair).evidence.log_evidence)
+      continue;
+    const bool is_first = set.model.terms.back().effect == responses_[responses.front()].term.effect;
+    const bool is_last = set.model.terms.back().effect == responses_[responses.back()].term.effect;
+    if (!is_first && !is_last) continue;
+    better = &set;
+    other = is_first ? responses.back() : responses.front();
+  }
+  if (better == nullptr) return;
+  const rig::LinearisedModel known = better->known;
+  const rig::Shares shares = better->evidence.shares;
+  SessionModel start = better->model;
+  start.terms.push_back(responses_[other].term);
+  start.values.insert(start.values.end(), responses_[other].values.begin(), responses_[other].values.end());
+  fit(start, known, shares);
+  EffectSet again = std::move(sets_.back());
+  sets_.pop_back();
+  if (again.log_posterior > sets_.back().log_posterior) sets_.back() = std::move(again);
 }
 
 void SetsSearch::fit_beside_best() {

@@ -193,14 +193,26 @@ EffectCheck EffectTrial::found_again() const {
   const EffectSet found = fitted_with(problem);
   const double off = std::abs(found.model.values[0] - options.values[0]);
   const bool is_near = off <= 5.0 * found.errors[0] + 0.02 * std::abs(options.values[0]);
-  // Parameters that these data cannot tell apart may lie anywhere, if together they do what the hidden ones do.
+  // Parameters that these data cannot tell apart may lie anywhere, if together they do what the hidden ones do, or if these
+  // data are as likely with them: a bubble that a softer specimen stands for as well.
   const rig::Prediction hidden = shown(options.values);
   const double differs = distance_kPa(shown(found.model.values), hidden) / distance_kPa(shown({}), hidden);
   const bool does_the_same = differs <= 0.1;  // as right as an effect's equations are taken to be
-  return {"found again", (inference::is_settled(found.termination) && is_near) || does_the_same,
-          fmt::format("{} {:.4g} as {:.4g} +- {:.2g}, what it changes to {:.1f} %; {}",
+  constexpr double half_a_nat = 0.5;          // decides nothing
+  const rig::LinearisedModel base = rig::declared_rig(problem);
+  rig::SessionModel truth = base.at;
+  truth.terms = options.terms;
+  truth.values = options.values;
+  const EffectSet at_truth =
+      fit_set_exactly(problem, fit_set(problem, truth, base, problem.error().prior.share));
+  const bool is_as_likely = found.log_posterior >= at_truth.log_posterior - half_a_nat;
+  return {"found again",
+          (inference::is_settled(found.termination) && (is_near || is_as_likely)) || does_the_same,
+          fmt::format("{} {:.4g} as {:.4g} +- {:.2g}, what it changes to {:.1f} %, ln likelihood beside a "
+                      "search from there {:+.1f}; {}",
                       effect_.parameters()[0].name, options.values[0], found.model.values[0], found.errors[0],
-                      100.0 * differs, inference::sentence(found.termination))};
+                      100.0 * differs, found.log_posterior - at_truth.log_posterior,
+                      inference::sentence(found.termination))};
 }
 
 EffectCheck EffectTrial::silent() const {

@@ -232,12 +232,20 @@ Explanation explain_rig(const Study& study, const ExplainOptions& options) {
   if (!out.effects.empty()) out.shifts = parameter_shifts(problem, plain, chosen);
   out.steps = steps_of(plain, after);
   out.traces = traces(problem, plain, after);
-  if (options.learn || out.verdict == Verdict::unexplained)
-    out.learned = learn_term(problem, after, {from_reference}, report);
-  options.report("designing the next experiment");
-  if (options.propose) out.next_experiment = next_experiment(study, problem, search, verdict, out);
+  try {
+    if (options.learn || out.verdict == Verdict::unexplained) {
+      out.not_learned = "it was interrupted";
+      Learning learning = learn_term(problem, after, {from_reference}, report);
+      out.learned = std::move(learning.term);
+      out.not_learned = std::move(learning.lacks);
+    }
+    options.report("designing the next experiment");
+    if (options.propose) out.next_experiment = next_experiment(study, problem, search, verdict, out);
+  } catch (const Interrupted&) {
+    out.summary = "Interrupted after the verdict. ";
+  }
   out.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
-  out.summary = summary_of(out);
+  out.summary += summary_of(out);
   return out;
 }
 

@@ -13,6 +13,9 @@
 
 namespace diastole::explain {
 
+/// What `progress` throws to end the work. Once there is a verdict it is returned, with what was found until then.
+struct Interrupted {};
+
 struct ExplainOptions {
   size_t threads = 2;
   bool propose = true;  ///< a next experiment
@@ -25,7 +28,7 @@ struct ExplainOptions {
   }
 };
 
-/// Throws InputError for runs that cannot be read; whatever `progress` throws ends the work.
+/// Throws InputError for runs that cannot be read, and Interrupted before there is a verdict.
 Explanation explain_rig(const Study& study, const ExplainOptions& options);
 
 }  // namespace diastole::explain

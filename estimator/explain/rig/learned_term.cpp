@@ -296,20 +296,15 @@ std::string shortcoming(const std::vector<double>& gains, const ChangeSize& size
 
 }  // namespace
 
-std::optional<LearnedTerm> learn_term(const rig::SessionProblem& problem, const EffectSet& set,
-                                      const ErrorKnowledge& known,
-                                      const std::function<void(std::string_view)>& progress) {
-  const auto none_because = [&](const std::string& reason) -> std::optional<LearnedTerm> {
-    if (progress) progress("no law is learnt: " + reason);
-    return {};
-  };
+Learning learn_term(const rig::SessionProblem& problem, const EffectSet& set, const ErrorKnowledge& known,
+                    const std::function<void(std::string_view)>& progress) {
   const std::vector<Fold> folds = folds_of(problem);
-  if (folds.size() < 2) return none_because("there is one waveform only, and no other to judge a law on");
+  if (folds.size() < 2) return {{}, "there is one waveform only, and no other to judge a law on"};
   if (progress) progress("learning what no known effect explains");
   LawSearch search(problem, set, progress);
   const std::vector<LawCandidate> laws = search.run(folds);
   if (laws.empty())
-    return none_because("with none of the laws at a port are these recordings a hundred times as likely");
+    return {{}, "with none of the laws at a port are these recordings a hundred times as likely"};
   const LawCandidate& best = laws.front();
   const EffectSet with = set_with(set, best);
   const VectorXd none = VectorXd::Zero(best.values.size());
@@ -322,7 +317,7 @@ std::optional<LearnedTerm> learn_term(const rig::SessionProblem& problem, const 
   stated.evidence.variance = problem.error().variance(problem.error().prior.share);
   const Gap gap = held_out_gap(problem, before, stated);
   if (const std::string lacks = shortcoming(best.gains, size, gap, known); !lacks.empty())
-    return none_because(fmt::format("the best, {} by {}, {}", best.law->sets, best.law->of, lacks));
+    return {{}, fmt::format("the best, {} by {}, {}", best.law->sets, best.law->of, lacks)};
   LearnedTerm term;
   term.port = name_of(best.law->port);
   term.sets = best.law->sets;
@@ -347,7 +342,7 @@ std::optional<LearnedTerm> learn_term(const rig::SessionProblem& problem, const 
       term.rivals.push_back(
           {std::string(name_of(other.law->port)), std::string(other.law->sets), other.law->variables});
   read_law(*best.law, term);
-  return term;
+  return {std::move(term), {}};
 }
 
 }  // namespace diastole::explain

@@ -19,6 +19,7 @@
 
 #include <functional>
 #include <optional>
+#include <string>
 #include <string_view>
 
 #include "estimator/explain/rig/set_verdict.hpp"
@@ -26,10 +27,15 @@
 
 namespace diastole::explain {
 
-/// Beside the effects of `set`. Nothing where no law is proposed, or where there is no other waveform to judge it on: `progress`
-/// then gets the reason. It is called with what is done, and with nothing every few simulations; what it throws ends the search.
-std::optional<LearnedTerm> learn_term(const rig::SessionProblem& problem, const EffectSet& set,
-                                      const ErrorKnowledge& known,
-                                      const std::function<void(std::string_view)>& progress = {});
+struct Learning {
+  std::optional<LearnedTerm>
+      term;  ///< nothing where no law is proposed, or where there is no other waveform to judge it on
+  std::string lacks;  ///< why there is none: "the best, p_pump by q_hose, closes 30 % ..."
+};
+
+/// Beside the effects of `set`. `progress` is called with what is done, and with nothing every few simulations; what it throws
+/// ends the search.
+Learning learn_term(const rig::SessionProblem& problem, const EffectSet& set, const ErrorKnowledge& known,
+                    const std::function<void(std::string_view)>& progress = {});
 
 }  // namespace diastole::explain

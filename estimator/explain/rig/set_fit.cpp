@@ -20,9 +20,7 @@ using rig::Unknown;
 
 /// ln of a size's density, uniform in its logarithm over two decades on one side or both, relative to the normal about 0.
 constexpr double size_range = 4.6;
-constexpr double small_part = 2e-3;  ///< of a size, for derivatives
-constexpr double slope_part =
-    0.1;  ///< of a tolerance's sd, for derivatives: straight over it, and far above what simulations copy
+constexpr double small_part = 5e-4;  ///< of a size, for derivatives: a tenth of how well large ones are known
 constexpr double time_step_s = 0.02;  ///< some samples: less is as rough as they are
 constexpr double bound_u = 8.0;       ///< of a nuisance, in sds: no data move one so far
 
@@ -174,7 +172,8 @@ class SetProblem : public inference::LeastSquaresProblem {
       derivatives_.col(i) = (all.col(i + 1) - seen_) / steps[static_cast<size_t>(i)];
     if (kind_ == Nuisances::simulated) {
       known_.at = model(q);
-      known_.columns = problem_.nuisance_columns(known_.at, known_.there, slope_part);
+      known_.there = seen_;
+      known_.columns = problem_.nuisance_slopes(known_.at);
     }
     derivatives_.rightCols(others()) = known_.columns.rightCols(others());
     derived_at_ = q;
@@ -257,7 +256,8 @@ EffectSet search(const rig::SessionProblem& problem, SetProblem& set, const rig:
     inference::SearchOptions options;
     options.iteration_limit = 40;  // a bubble and its exponent go a long way along a valley
     options.small_gain = [](double) { return 1.0; };  // half a nat decides nothing
-    options.refusal_limit = 6;
+    options.refusal_limit =
+        12;  // divide the largest radius, 1e16, by 2^78: before, a step may still be a whole one
     options.first_radius = 1e4;
     options.held = set.moments();  // event_scan.hpp; what is shown changes by leaps with them
     const inference::SearchResult found = minimise(set, q, options);

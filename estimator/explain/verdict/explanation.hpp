@@ -217,6 +217,7 @@ struct Explanation {
   std::vector<Misfit> where;
   Gap gap;
   std::optional<LearnedTerm> learned;
+  std::string not_learned;  ///< why no law is proposed where one was looked for
   std::optional<NextExperiment> next_experiment;
   std::string study_after;  ///< file name beside the JSON; empty if nothing was added
   std::string summary;      ///< a few sentences for people

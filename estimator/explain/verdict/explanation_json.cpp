@@ -56,7 +56,7 @@ DIASTOLE_MEMBERS(SearchEnd, effects, termination)
 
 DIASTOLE_MEMBERS(Explanation, study, verdict, confidence, model_error, reference, departures, cycle_scatter,
                  hints, summary, converged, searches, effects, ambiguous_with, where, gap, learned,
-                 next_experiment, study_after, evidence, shifts, steps, traces, field, seconds)
+                 not_learned, next_experiment, study_after, evidence, shifts, steps, traces, field, seconds)
 
 }  // namespace explain
 

@@ -19,6 +19,8 @@ namespace {
 
 using testing::ElementsAre;
 using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::Not;
 
 /// An effect of one parameter `a`, hidden at 1.
 std::shared_ptr<const Effect> hidden(const std::string& port, const std::string& equation) {
@@ -44,11 +46,12 @@ class LearnedTerms : public testing::Test {
     const rig::LinearisedModel base = rig::declared_rig(problem);
     const EffectSet plain =
         fit_set_exactly(problem, fit_set(problem, base.at, base, problem.error().prior.share));
-    return learn_term(problem, plain, {}, [this](std::string_view what) {
+    Learning learning = learn_term(problem, plain, {}, [this](std::string_view) {
       ++asked_;
       if (asked_ == ends_at_) throw Ended{};
-      if (!what.empty()) said_ = what;
     });
+    lacks_ = std::move(learning.lacks);
+    return std::move(learning.term);
   }
   /// In how many of the curve's points its band holds the truth.
   static double part_inside(const LearnedTerm& term, const std::function<double(double)>& truth) {
@@ -60,7 +63,7 @@ class LearnedTerms : public testing::Test {
     return inside / static_cast<double>(term.curve.size());
   }
   rig::SpecimenFamily family_ = rig::gel_family();
-  std::string said_;  ///< last
+  std::string lacks_;
   size_t asked_ = 0;
   size_t ends_at_ = 0;
 };
@@ -68,7 +71,7 @@ class LearnedTerms : public testing::Test {
 TEST_F(LearnedTerms, AreNotProposedWhereNothingIsMissing) {
   for (const unsigned seed : {11U, 12U}) {
     EXPECT_FALSE(learnt(nullptr, seed).has_value()) << seed;
-    EXPECT_THAT(said_, HasSubstr("no law is learnt: ")) << seed;
+    EXPECT_THAT(lacks_, Not(IsEmpty())) << seed;
   }
 }
 
