@@ -92,6 +92,54 @@ TEST(Documents, EveryBareSourcePathExists) {
   }
 }
 
+// The tree at the head of ARCHITECTURE.md names each room; tests/ mirrors the others.
+TEST(Documents, TheTreeInTheArchitectureNamesEveryFolder) {
+  const std::string text = text_of(root / "ARCHITECTURE.md");
+  const size_t begin = text.find("```\n"), end = text.find("```\n", begin + 1);
+  ASSERT_NE(end, std::string::npos);
+  const std::string tree = text.substr(begin, end - begin);
+  const auto names = [&](const std::string& folder) {
+    return std::regex_search(tree, std::regex("\\b" + folder + "\\b"));
+  };
+  std::vector<fs::path> rooms{root};
+  for (const char* room : {"protocol", "firmware", "firmware/core", "host", "estimator", "estimator/explain",
+                           "estimator/imaging", "tools", "tools/sim_board"}) {
+    rooms.push_back(root / room);
+  }
+  for (const fs::path& room : rooms) {
+    for (const auto& entry : fs::directory_iterator(room)) {
+      const std::string name = entry.path().filename();
+      if (!entry.is_directory() || name.starts_with('.') || name == "build") continue;
+      EXPECT_TRUE(names(name)) << fs::relative(entry.path(), root) << " is not in ARCHITECTURE.md's tree";
+    }
+  }
+}
+
+// A comment may send the reader to another header only if there is one: beside the file, or anywhere by the end of its path.
+TEST(Documents, EveryHeaderThatACommentNamesExists) {
+  static const std::regex header(R"(//[^\n]*?([\w./-]+\.hpp))");
+  std::string headers;
+  std::vector<fs::path> sources;
+  for (const char* room : {"protocol", "firmware", "host", "estimator", "tools", "tests"}) {
+    for (const auto& entry : fs::recursive_directory_iterator(root / room)) {
+      const fs::path extension = entry.path().extension();
+      if (extension == ".hpp") headers += "/" + fs::relative(entry.path(), root).generic_string() + "\n";
+      if (extension == ".hpp" || extension == ".cpp" || extension == ".inc") sources.push_back(entry.path());
+    }
+  }
+  int named = 0;
+  for (const fs::path& source : sources) {
+    const std::string text = text_of(source);
+    for (std::sregex_iterator match(text.begin(), text.end(), header), end; match != end; ++match) {
+      const std::string name = (*match)[1];
+      EXPECT_NE(headers.find("/" + name + "\n"), std::string::npos)
+          << fs::relative(source, root) << " names " << name << ", which does not exist";
+      ++named;
+    }
+  }
+  EXPECT_GT(named, 0);
+}
+
 TEST(Documents, EveryDecisionHasItsOwnNumber) {
   static const std::regex name(R"((\d{4})-[a-z0-9-]+\.md)");
   std::map<std::string, std::string> by_number;

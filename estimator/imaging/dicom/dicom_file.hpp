@@ -14,7 +14,7 @@ namespace diastole::imaging {
 
 using Image = Eigen::ArrayXXf;  ///< rows x columns, after the rescale slope and intercept
 
-/// What the header says the pixels are; the pixels themselves have the last word (series_kind.hpp).
+/// What the header says the pixels are; the pixels themselves have the last word (estimator/imaging/series/image_folder.hpp).
 enum class Component { unsaid, magnitude, phase };
 
 struct VelocityEncoding {
