@@ -3,7 +3,7 @@
 //
 //   tools/bench system [--rounds N]     least times of N rounds, taken in turn
 //
-// The figures are in docs/decisions/0012.
+// The figures are in docs/decisions/0012-newton-and-factorisation.md.
 
 #include <fmt/format.h>
 
