@@ -52,7 +52,6 @@ enum class In : size_t {
 constexpr size_t index_of(In in) { return static_cast<size_t>(in); }
 inline constexpr size_t quantity_count = index_of(In::count);
 inline constexpr In first_constant = In::c_hose;
-constexpr bool is_constant(In in) { return in >= first_constant; }
 
 struct QuantityText {
   std::string_view name;

@@ -47,12 +47,6 @@ Eigen::Vector3d tag_normal(const SlicePlane& plane, const TagWave& tag) {
   return (tag.per_mm.x() * plane.along_row + tag.per_mm.y() * plane.along_column).normalized();
 }
 
-std::optional<Eigen::Vector3d> common_axis(const ImageFolder& folder) {
-  const ImageSeries* series = short_axis(folder);
-  if (series == nullptr) return std::nullopt;
-  return series->plane().normal();
-}
-
 std::string view_in_words(const ImageFolder& folder, const ImageSeries& series) {
   const std::string anatomical = orientation_in_words(series.plane());
   const ImageSeries* reference = short_axis(folder);

@@ -10,10 +10,6 @@ namespace diastole::imaging {
 /// Unit normal of the tag planes, which are orthogonal to the slice: the stripes' direction of change within it.
 Eigen::Vector3d tag_normal(const SlicePlane& plane, const TagWave& tag);
 
-/// The normal that slices of other planes have in common a right angle to: that of the short-axis slices, if planes cross.
-/// Nothing where all slices are parallel.
-std::optional<Eigen::Vector3d> common_axis(const ImageFolder& folder);
-
 /// "short axis (transverse)", "long axis, 30 degrees (coronal, tilted 3 degrees)", or the anatomical plane alone where all slices are
 /// parallel. The angle is measured about the axis from the short axis's rows.
 std::string view_in_words(const ImageFolder& folder, const ImageSeries& series);
