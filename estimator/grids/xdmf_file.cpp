@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <pugixml.hpp>
@@ -298,23 +297,15 @@ FieldGrid read_xdmf(const std::string& path) {
 
 void write_xdmf(const std::filesystem::path& path, const FieldGrid& grid) {
   const std::filesystem::path numbers = numbers_beside(path);
-  const std::filesystem::path temporary = fmt::format("{}.{}.part", numbers.string(), ::getpid());
-  std::error_code failed;
-  try {
-    pugi::xml_document document;
-    XdmfWriter writer(numbers, temporary);
+  pugi::xml_document document;
+  write_whole_file(numbers, [&](const std::filesystem::path& unfinished) {
+    XdmfWriter writer(numbers, unfinished);
     fill(document, writer, grid);
     writer.close();
-    std::filesystem::rename(temporary, numbers, failed);
-    if (failed)
-      throw InputError({numbers.string(), "", failed.message(), "Choose another path for the file."});
-    std::ostringstream text;
-    document.save(text, " ");
-    write_whole_file(path, text.str());
-  } catch (...) {
-    std::filesystem::remove(temporary, failed);
-    throw;
-  }
+  });
+  std::ostringstream text;
+  document.save(text, " ");
+  write_whole_file(path, text.str());
 }
 
 }  // namespace diastole

@@ -1,12 +1,10 @@
 #include "estimator/io/vtkhdf_file.hpp"
 
-#include <fmt/format.h>
-#include <unistd.h>
-
 #include <cstdint>
 #include <numeric>
 #include <utility>
 
+#include "estimator/io/whole_file.hpp"
 #include "protocol/contract/input_error.hpp"
 #include "protocol/runfile/h5_handle.hpp"
 
@@ -176,16 +174,7 @@ void write_all(const std::filesystem::path& temporary, const std::filesystem::pa
 }  // namespace
 
 void write_vtkhdf(const std::filesystem::path& path, const BezierGrid& grid) {
-  const std::filesystem::path temporary = fmt::format("{}.{}.part", path.string(), ::getpid());
-  std::error_code failed;
-  try {
-    write_all(temporary, path, grid);
-    std::filesystem::rename(temporary, path, failed);
-    if (failed) throw InputError({path.string(), "", failed.message(), "Choose another path for the file."});
-  } catch (...) {
-    std::filesystem::remove(temporary, failed);
-    throw;
-  }
+  write_whole_file(path, [&](const std::filesystem::path& unfinished) { write_all(unfinished, path, grid); });
 }
 
 }  // namespace diastole

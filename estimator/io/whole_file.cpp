@@ -26,17 +26,26 @@ bool starts_with_mark(const fs::path& path, std::string_view mark) {
 
 }  // namespace
 
-void write_whole_file(const fs::path& path, std::string_view content) {
+void write_whole_file(const fs::path& path, const std::function<void(const fs::path& unfinished)>& write) {
   const fs::path unfinished = path.string() + "." + std::to_string(::getpid()) + ".part";
-  std::ofstream stream(unfinished, std::ios::binary);
-  stream << content;
-  stream.close();
   std::error_code error;
-  if (stream) fs::rename(unfinished, path, error);
-  if (!stream || error) {
+  try {
+    write(unfinished);
+    fs::rename(unfinished, path, error);
+    if (error) cannot_be_written(path);
+  } catch (...) {
     fs::remove(unfinished, error);
-    cannot_be_written(path);
+    throw;
   }
+}
+
+void write_whole_file(const fs::path& path, std::string_view content) {
+  write_whole_file(path, [&](const fs::path& unfinished) {
+    std::ofstream stream(unfinished, std::ios::binary);
+    stream << content;
+    stream.close();
+    if (!stream) cannot_be_written(path);
+  });
 }
 
 void require_output(const OutputFile& output) {

@@ -2,6 +2,7 @@
 // Files that are written whole or not at all, and read whole.
 
 #include <filesystem>
+#include <functional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -11,6 +12,9 @@ namespace diastole {
 /// Writes under a temporary name beside `path`, then renames. Throws InputError if it cannot; nothing remains
 /// then.
 void write_whole_file(const std::filesystem::path& path, std::string_view content);
+/// Has `write` do it, which throws what it likes if it cannot.
+void write_whole_file(const std::filesystem::path& path,
+                      const std::function<void(const std::filesystem::path& unfinished)>& write);
 
 struct OutputFile {
   std::filesystem::path path;
