@@ -18,7 +18,6 @@ namespace {
 
 using runfile::DatasetHandle;
 using runfile::FileHandle;
-using runfile::PropertyHandle;
 using runfile::SpaceHandle;
 
 constexpr hsize_t most_numbers = hsize_t{1} << 29;
@@ -192,11 +191,8 @@ class XdmfWriter {
     std::vector<hsize_t> shape{array.values.size() / array.components};
     if (array.components > 1) shape.push_back(array.components);
     const SpaceHandle space(H5Screate_simple(static_cast<int>(shape.size()), shape.data(), nullptr));
-    const PropertyHandle links(H5Pcreate(H5P_LINK_CREATE));
-    H5Pset_create_intermediate_group(links.get(), 1);
-    const DatasetHandle set(H5Dcreate2(file_.get(), path.c_str(),
-                                       whole_numbers ? H5T_STD_I64LE : H5T_IEEE_F64LE, space.get(),
-                                       links.get(), H5P_DEFAULT, H5P_DEFAULT));
+    const DatasetHandle set =
+        runfile::create_dataset(file_.get(), path, whole_numbers ? H5T_STD_I64LE : H5T_IEEE_F64LE, space);
     must(set.valid() &&
          H5Dwrite(set.get(), H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, array.values.data()) >= 0);
     pugi::xml_node node = parent.append_child("DataItem");

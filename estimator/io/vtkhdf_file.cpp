@@ -2,7 +2,6 @@
 
 #include <cstdint>
 #include <numeric>
-#include <utility>
 
 #include "estimator/io/whole_file.hpp"
 #include "protocol/contract/input_error.hpp"
@@ -15,14 +14,12 @@ using runfile::AttributeHandle;
 using runfile::DatasetHandle;
 using runfile::FileHandle;
 using runfile::ObjectHandle;
-using runfile::PropertyHandle;
 using runfile::SpaceHandle;
 using runfile::TypeHandle;
 
 constexpr size_t points_a_cell = 64;
 constexpr uint8_t bezier_hexahedron = 79;
 constexpr hsize_t compressed_from = 4096;  // rows; shorter datasets are stored as they are
-constexpr unsigned deflate_level = 4;
 
 /// Typed writing below /VTKHDF. Every failure is one of the disk, reported of the file that is asked for, not of the
 /// temporary one.
@@ -36,19 +33,10 @@ class Sink {
   }
 
   void rows(const std::string& path, hid_t stored, hid_t given, const void* values,
-            std::vector<hsize_t> shape) {
+            const std::vector<hsize_t>& shape) {
     const SpaceHandle space(H5Screate_simple(static_cast<int>(shape.size()), shape.data(), nullptr));
-    const PropertyHandle links(H5Pcreate(H5P_LINK_CREATE));
-    H5Pset_create_intermediate_group(links.get(), 1);
-    const PropertyHandle layout(H5Pcreate(H5P_DATASET_CREATE));
-    if (shape[0] >= compressed_from) {
-      shape[0] = compressed_from;
-      H5Pset_chunk(layout.get(), static_cast<int>(shape.size()), shape.data());
-      H5Pset_shuffle(layout.get());
-      H5Pset_deflate(layout.get(), deflate_level);
-    }
-    const DatasetHandle dataset(
-        H5Dcreate2(file_.get(), path.c_str(), stored, space.get(), links.get(), layout.get(), H5P_DEFAULT));
+    const DatasetHandle dataset = runfile::create_dataset(file_.get(), path, stored, space,
+                                                          shape[0] >= compressed_from ? compressed_from : 0);
     must(dataset.valid() && H5Dwrite(dataset.get(), given, H5S_ALL, H5S_ALL, H5P_DEFAULT, values) >= 0);
   }
   void whole_numbers(const std::string& path, const std::vector<int64_t>& values) {
@@ -57,7 +45,7 @@ class Sink {
   void numbers(const std::string& path, const std::vector<double>& values, size_t components) {
     std::vector<hsize_t> shape{values.size() / components};
     if (components > 1) shape.push_back(components);
-    rows(path, H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, values.data(), std::move(shape));
+    rows(path, H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, values.data(), shape);
   }
 
   void whole_attribute(const std::string& object, const char* name, const std::vector<int64_t>& values) {

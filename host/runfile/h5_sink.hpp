@@ -128,7 +128,6 @@ class H5Sink {
 
  private:
   static constexpr hsize_t chunk_rows = 4096;
-  static constexpr unsigned deflate_level = 4;
 
   static runfile::TypeHandle text_type(size_t size) {
     runfile::TypeHandle type(H5Tcopy(H5T_C_S1));
@@ -168,17 +167,8 @@ class H5Sink {
 
   runfile::DatasetHandle create(const std::string& path, hid_t type, const runfile::SpaceHandle& space,
                                 bool compressed, const std::string& units) {
-    const runfile::PropertyHandle links(H5Pcreate(H5P_LINK_CREATE));
-    H5Pset_create_intermediate_group(links.get(), 1);
-    const runfile::PropertyHandle layout(H5Pcreate(H5P_DATASET_CREATE));
-    if (compressed) {
-      const hsize_t rows = chunk_rows;
-      H5Pset_chunk(layout.get(), 1, &rows);
-      H5Pset_shuffle(layout.get());
-      H5Pset_deflate(layout.get(), deflate_level);
-    }
-    runfile::DatasetHandle dataset(
-        H5Dcreate2(file_.get(), path.c_str(), type, space.get(), links.get(), layout.get(), H5P_DEFAULT));
+    runfile::DatasetHandle dataset =
+        runfile::create_dataset(file_.get(), path, type, space, compressed ? chunk_rows : 0);
     must(dataset.valid(), "dataset " + path);
     attribute_on(dataset.get(), "units", units);
     return dataset;

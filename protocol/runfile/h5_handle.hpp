@@ -4,7 +4,9 @@
 
 #include <hdf5.h>
 
+#include <string>
 #include <utility>
+#include <vector>
 
 namespace diastole::runfile {
 
@@ -40,5 +42,24 @@ using AttributeHandle = Handle<H5Aclose>;
 using SpaceHandle = Handle<H5Sclose>;
 using TypeHandle = Handle<H5Tclose>;
 using PropertyHandle = Handle<H5Pclose>;
+
+/// A new dataset and the groups on the way to it; with `chunk_rows`, deflated in blocks of so many rows.
+inline DatasetHandle create_dataset(hid_t file, const std::string& path, hid_t type, const SpaceHandle& space,
+                                    hsize_t chunk_rows = 0) {
+  const PropertyHandle links(H5Pcreate(H5P_LINK_CREATE));
+  H5Pset_create_intermediate_group(links.get(), 1);
+  const PropertyHandle layout(H5Pcreate(H5P_DATASET_CREATE));
+  if (chunk_rows > 0) {
+    const int rank = H5Sget_simple_extent_ndims(space.get());
+    std::vector<hsize_t> chunk(static_cast<size_t>(rank));
+    H5Sget_simple_extent_dims(space.get(), chunk.data(), nullptr);
+    chunk[0] = chunk_rows;
+    H5Pset_chunk(layout.get(), rank, chunk.data());
+    H5Pset_shuffle(layout.get());
+    H5Pset_deflate(layout.get(), 4);
+  }
+  return DatasetHandle(
+      H5Dcreate2(file, path.c_str(), type, space.get(), links.get(), layout.get(), H5P_DEFAULT));
+}
 
 }  // namespace diastole::runfile

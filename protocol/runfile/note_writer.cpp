@@ -38,12 +38,9 @@ size_t free_number(hid_t file) {
 }
 
 bool write_note(hid_t file, const SessionNote& note) {
-  const PropertyHandle with_parents(H5Pcreate(H5P_LINK_CREATE));
-  H5Pset_create_intermediate_group(with_parents.get(), 1);
   const TypeHandle type = text_type();
   const SpaceHandle scalar(H5Screate(H5S_SCALAR));
-  const DatasetHandle dataset(H5Dcreate2(file, note_path(free_number(file)).c_str(), type.get(), scalar.get(),
-                                         with_parents.get(), H5P_DEFAULT, H5P_DEFAULT));
+  const DatasetHandle dataset = create_dataset(file, note_path(free_number(file)), type.get(), scalar);
   const char* text = note.text.c_str();
   return dataset.valid() && H5Dwrite(dataset.get(), type.get(), H5S_ALL, H5S_ALL, H5P_DEFAULT, &text) >= 0 &&
          write_attribute(dataset.get(), "units", text_unit) &&
