@@ -2,8 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
-#include <charconv>
 #include <stdexcept>
 
 #include "estimator/grids/vtu_file.hpp"
@@ -12,6 +12,7 @@
 #include "estimator/solution/hexahedral_grid.hpp"
 #include "estimator/solution/solution_record.hpp"
 #include "protocol/contract/input_error.hpp"
+#include "protocol/contract/text.hpp"
 
 namespace diastole {
 namespace {
@@ -34,18 +35,11 @@ SolutionRecord record_of(const Study& study, const ElasticModel& model, const El
 
 Sampling sampling_of(const std::string& text) {
   constexpr size_t most = 32;
-  Sampling sampling{};
-  const char* at = text.data();
-  const char* const end = at + text.size();
-  for (size_t k = 0; k < 3; ++k) {
-    const auto [next, error] = std::from_chars(at, end, sampling[k]);
-    const bool separated = k < 2 ? next != end && *next == ',' : next == end;
-    if (error != std::errc{} || !separated || sampling[k] < 1 || sampling[k] > most)
-      throw InputError({"", "--cells " + text, fmt::format("is not three whole numbers from 1 to {}", most),
-                        "Write cells an element around, along and through the wall, as --cells 4,4,4."});
-    at = next + 1;
-  }
-  return sampling;
+  const auto sampling = parse_numbers<size_t, 3>(text);
+  if (!sampling || std::ranges::min(*sampling) < 1 || std::ranges::max(*sampling) > most)
+    throw InputError({"", "--cells " + text, fmt::format("is not three whole numbers from 1 to {}", most),
+                      "Write cells an element around, along and through the wall, as --cells 4,4,4."});
+  return *sampling;
 }
 
 std::string febio_text(const std::string& file, const ElasticModel& model,

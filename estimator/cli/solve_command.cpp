@@ -1,8 +1,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include <array>
-#include <charconv>
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <functional>
@@ -30,6 +29,7 @@
 #include "estimator/solution/solution_grid.hpp"
 #include "protocol/contract/input_error.hpp"
 #include "protocol/contract/named_members.hpp"
+#include "protocol/contract/text.hpp"
 
 namespace diastole {
 namespace {
@@ -54,19 +54,11 @@ struct Probe {
 }
 
 Eigen::Vector3d parse_place(const std::string& text) {
-  Eigen::Vector3d place;
-  const char* from = text.data();
-  const char* const end = text.data() + text.size();
-  for (Eigen::Index i = 0; i < 3; ++i) {
-    const auto [stopped, error] = std::from_chars(from, end, place[i]);
-    const bool separated = i < 2 ? stopped != end && *stopped == ',' : stopped == end;
-    if (error != std::errc{} || !separated || !std::isfinite(place[i])) {
-      refuse_probe(text, "is not three numbers X,Y,Z",
-                   "Write millimetres without spaces, as --probe 22.5,0,0.");
-    }
-    from = stopped + 1;
-  }
-  return place;
+  const auto place = parse_numbers<double, 3>(text);
+  if (!place || !std::ranges::all_of(*place, [](double x) { return std::isfinite(x); }))
+    refuse_probe(text, "is not three numbers X,Y,Z",
+                 "Write millimetres without spaces, as --probe 22.5,0,0.");
+  return Eigen::Vector3d(place->data());
 }
 
 std::vector<Probe> locate_probes(const HermiteMesh& mesh, const std::vector<std::string>& texts) {

@@ -4,12 +4,12 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <iterator>
 #include <set>
 
 #include "protocol/contract/input_error.hpp"
+#include "protocol/contract/text.hpp"
 
 namespace diastole {
 namespace {
@@ -39,9 +39,7 @@ const GridArray& displacement_of(const GridStep& step, const DisplacementChoice&
 
 double tag_value(const FieldGrid& grid, const SurfaceChoice& choice, const std::string& file) {
   if (const auto named = grid.tag_names.find(choice.tag); named != grid.tag_names.end()) return named->second;
-  double value = 0.0;
-  const auto [end, error] = std::from_chars(choice.tag.data(), choice.tag.data() + choice.tag.size(), value);
-  if (error == std::errc{} && end == choice.tag.data() + choice.tag.size()) return value;
+  if (const auto number = parse_number<double>(choice.tag)) return *number;
   std::vector<std::string> known;
   for (const auto& [name, number] : grid.tag_names)
     known.push_back(name);

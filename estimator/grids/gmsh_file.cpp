@@ -3,13 +3,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
 #include <string_view>
 #include <unordered_map>
 #include <utility>
 
 #include "estimator/io/whole_file.hpp"
 #include "protocol/contract/input_error.hpp"
+#include "protocol/contract/text.hpp"
 
 namespace diastole {
 namespace {
@@ -39,11 +39,9 @@ class Words {
   template <class Number>
   Number number() {
     const std::string_view text = word();
-    Number value{};
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-    if (error != std::errc{} || end != text.data() + text.size())
-      fail(fmt::format("\"{}\" is no number", text));
-    return value;
+    const auto value = parse_number<Number>(text);
+    if (!value) fail(fmt::format("\"{}\" is no number", text));
+    return *value;
   }
   /// A count of things that each take two characters at least.
   size_t count() {

@@ -11,6 +11,7 @@
 #include "estimator/grids/vtu_data.hpp"
 #include "estimator/io/whole_file.hpp"
 #include "protocol/contract/input_error.hpp"
+#include "protocol/contract/text.hpp"
 #include "protocol/runfile/h5_handle.hpp"
 
 namespace diastole {
@@ -21,14 +22,6 @@ using runfile::FileHandle;
 using runfile::SpaceHandle;
 
 constexpr hsize_t most_numbers = hsize_t{1} << 29;
-
-std::string trimmed(std::string_view text) {
-  while (!text.empty() && text.front() <= ' ')
-    text.remove_prefix(1);
-  while (!text.empty() && text.back() <= ' ')
-    text.remove_suffix(1);
-  return std::string(text);
-}
 
 class XdmfReader {
  public:
@@ -73,7 +66,7 @@ class XdmfReader {
   std::vector<double> numbers(const pugi::xml_node& item, const std::string& place) {
     if (!item) refuse(place, "has no DataItem");
     const std::string_view format = item.attribute("Format").as_string("XML");
-    const std::string text = trimmed(item.text().as_string());
+    const std::string text(trimmed(item.text().as_string()));
     if (format == "XML") {
       try {
         return numbers_of_text(text);

@@ -3,23 +3,14 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include <charconv>
 #include <cmath>
 
 #include "estimator/io/whole_file.hpp"
 #include "protocol/contract/input_error.hpp"
+#include "protocol/contract/text.hpp"
 
 namespace diastole {
 namespace {
-
-std::string_view trimmed(std::string_view text) {
-  const auto is_space = [](char c) { return c == ' ' || c == '\t' || c == '\r'; };
-  while (!text.empty() && is_space(text.front()))
-    text.remove_prefix(1);
-  while (!text.empty() && is_space(text.back()))
-    text.remove_suffix(1);
-  return text;
-}
 
 std::string_view take_field(std::string_view& rest) {
   const size_t comma = rest.find(',');
@@ -102,15 +93,13 @@ void NumberTable::parse_row(std::string_view line, size_t line_number) {
                         fmt::format("Columns are {}.", fmt::join(columns_, ","))});
     }
     const std::string_view field = take_field(rest);
-    double value = 0;
-    const auto [end, error] = std::from_chars(field.data(), field.data() + field.size(), value);
-    if (field.empty() || error != std::errc{} || end != field.data() + field.size() ||
-        !std::isfinite(value)) {
+    const auto value = parse_number<double>(field);
+    if (!value || !std::isfinite(*value)) {
       throw InputError({file_, fmt::format("line {}, column {}", line_number, columns_[column]),
                         fmt::format("\"{}\" is not a finite number", field),
                         "Write a decimal number with a point, or leave the row out if it was not measured."});
     }
-    values_.push_back(value);
+    values_.push_back(*value);
   }
   if (!rest.empty() || line.ends_with(',')) {
     throw InputError({file_, fmt::format("line {}", line_number),

@@ -4,11 +4,11 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 
 #include "protocol/contract/input_error.hpp"
 #include "protocol/contract/table_reader.hpp"
+#include "protocol/contract/text.hpp"
 
 namespace diastole {
 namespace {
@@ -290,12 +290,6 @@ std::optional<StudyPose> read_pose_of_images(TableReader& root) {
   throw InputError({"", fmt::format("{} {}", option, value), std::move(problem), std::move(remedy)});
 }
 
-template <typename Number>
-bool parse_whole(std::string_view text, Number& value) {
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  return error == std::errc{} && end == text.data() + text.size();
-}
-
 }  // namespace
 
 Study read_study(const std::filesystem::path& path) {
@@ -352,8 +346,8 @@ std::vector<std::filesystem::path> inputs_of(const Study& study) {
 
 void set_start(Study& study, std::string_view assignment) {
   const size_t equals = assignment.find('=');
-  double value = 0;
-  if (equals == std::string_view::npos || !parse_whole(assignment.substr(equals + 1), value)) {
+  const auto value = parse_number<double>(assignment.substr(equals + 1));
+  if (equals == std::string_view::npos || !value) {
     refuse_option("--set", assignment, "is not NAME=NUMBER", "Write for example --set C1_kPa=7.5.");
   }
   const std::string_view name = assignment.substr(0, equals);
@@ -361,12 +355,12 @@ void set_start(Study& study, std::string_view assignment) {
   for (StudyParameter& parameter : study.law.parameters) {
     known.push_back(parameter.name);
     if (parameter.name != name) continue;
-    if (!(value >= parameter.lower && value <= parameter.upper)) {
+    if (!(*value >= parameter.lower && *value <= parameter.upper)) {
       refuse_option("--set", assignment,
                     fmt::format("lies outside the bounds [{}, {}]", parameter.lower, parameter.upper),
                     "Choose a value inside, or widen `bounds` in the study.");
     }
-    parameter.start = value;
+    parameter.start = *value;
     return;
   }
   refuse_option("--set", assignment, fmt::format("\"{}\" is not a parameter of the study", name),
@@ -379,7 +373,8 @@ void set_smoothness(Study& study, std::string_view choice) {
     smoothness.kind = Smoothness::Kind::none;
   } else if (choice != "evidence") {
     smoothness.kind = Smoothness::Kind::given;
-    if (!parse_whole(choice, smoothness.step) || !(smoothness.step > 0)) {
+    smoothness.step = parse_number<double>(choice).value_or(0.0);
+    if (!(smoothness.step > 0)) {
       refuse_option("--smooth", choice, "is neither evidence, none nor a positive number",
                     "Give the usual relative difference between neighbouring elements, as --smooth 0.05.");
     }
@@ -404,18 +399,11 @@ namespace {
 
 /// "8,8,4" as three whole numbers.
 std::array<int, 3> three_counts(std::string_view option, std::string_view text, std::string_view example) {
-  std::array<int, 3> counts{};
-  std::string_view rest = text;
-  for (size_t axis = 0; axis < 3; ++axis) {
-    const size_t comma = rest.find(',');
-    const bool last = axis == 2;
-    if ((comma == std::string_view::npos) != last || !parse_whole(rest.substr(0, comma), counts[axis])) {
-      refuse_option(option, text, "is not three whole numbers",
-                    fmt::format("Write for example {} {}.", option, example));
-    }
-    if (!last) rest.remove_prefix(comma + 1);
-  }
-  return counts;
+  const auto counts = parse_numbers<int, 3>(text);
+  if (!counts)
+    refuse_option(option, text, "is not three whole numbers",
+                  fmt::format("Write for example {} {}.", option, example));
+  return *counts;
 }
 
 }  // namespace

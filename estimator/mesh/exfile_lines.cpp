@@ -7,17 +7,12 @@
 #include <utility>
 
 #include "protocol/contract/input_error.hpp"
+#include "protocol/contract/text.hpp"
 
 namespace diastole {
 namespace {
 
 constexpr std::string_view blanks = " \t\r";
-
-std::string_view trimmed(std::string_view text) {
-  const size_t first = text.find_first_not_of(blanks);
-  if (first == std::string_view::npos) return {};
-  return text.substr(first, text.find_last_not_of(blanks) + 1 - first);
-}
 
 bool is_allowed(double value) { return std::isfinite(value); }
 bool is_allowed(size_t value) { return value <= largest_whole_number; }

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <boost/algorithm/string/split.hpp>
-#include <charconv>
 #include <cmath>
 #include <sstream>
 #include <stdexcept>
@@ -12,6 +11,7 @@
 #include "estimator/io/study_fingerprint.hpp"
 #include "estimator/io/whole_file.hpp"
 #include "protocol/contract/input_error.hpp"
+#include "protocol/contract/text.hpp"
 
 namespace diastole {
 namespace {
@@ -38,11 +38,9 @@ std::string heading_of(const Study& study, const MonteCarloPlan& plan) {
 
 template <class Number>
 Number parsed(const std::string& text) {
-  Number value{};
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc{} || end != text.data() + text.size())
-    throw std::invalid_argument("\"" + text + "\"");
-  return value;
+  const auto value = parse_number<Number>(text);
+  if (!value) throw std::invalid_argument("\"" + text + "\"");
+  return *value;
 }
 
 }  // namespace

@@ -5,12 +5,11 @@
 #include <pwd.h>
 #include <unistd.h>
 
-#include <algorithm>
-#include <charconv>
 #include <optional>
 #include <vector>
 
 #include "protocol/contract/named_members.hpp"
+#include "protocol/contract/text.hpp"
 #include "protocol/runfile/layout.hpp"
 
 namespace diastole {
@@ -19,14 +18,6 @@ namespace {
 /// Of rooms in which people work.
 constexpr double coldest_C = -10, warmest_C = 60;
 
-std::string trimmed(std::string text) {
-  const auto is_blank = [](unsigned char c) { return std::isspace(c) != 0; };
-  text.erase(text.begin(), std::ranges::find_if_not(text, is_blank));
-  while (!text.empty() && is_blank(static_cast<unsigned char>(text.back())))
-    text.pop_back();
-  return text;
-}
-
 /// None if nobody answers any more.
 std::optional<std::string> answer_to(const std::string& question, std::istream& answers,
                                      std::FILE* questions) {
@@ -34,17 +25,15 @@ std::optional<std::string> answer_to(const std::string& question, std::istream& 
   std::fflush(questions);
   std::string answer;
   if (!std::getline(answers, answer)) return std::nullopt;
-  return trimmed(answer);
+  return std::string(trimmed(answer));
 }
 
 void ask_for_temperature(std::optional<double>& temperature_C, std::istream& answers, std::FILE* questions) {
   while (!temperature_C) {
     const auto answer = answer_to("room temperature (C)", answers, questions);
     if (!answer || answer->empty()) return;
-    double value_C = 0;
-    const char* end = answer->data() + answer->size();
-    const auto [stopped, error] = std::from_chars(answer->data(), end, value_C);
-    if (error == std::errc() && stopped == end && value_C >= coldest_C && value_C <= warmest_C) {
+    const auto value_C = parse_number<double>(*answer);
+    if (value_C && *value_C >= coldest_C && *value_C <= warmest_C) {
       temperature_C = value_C;
     } else {
       fmt::print(questions, "  a number from {} to {}, as 21.5; or Enter\n", coldest_C, warmest_C);

@@ -3,22 +3,16 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 
 #include "protocol/contract/input_error.hpp"
+#include "protocol/contract/text.hpp"
 
 namespace diastole {
 namespace {
 
 constexpr size_t most_bytes = 384U << 10;
 constexpr double closure = 1e-4;  // of the range
-
-std::string_view trimmed(std::string_view text) {
-  const auto first = text.find_first_not_of(" \t\r");
-  if (first == std::string_view::npos) return {};
-  return text.substr(first, text.find_last_not_of(" \t\r") - first + 1);
-}
 
 /// The rows of the table with the lines they stand in.
 class PointsReader {
@@ -73,12 +67,10 @@ class PointsReader {
     second_name = right;
   }
   [[nodiscard]] double number(size_t line, std::string_view word) const {
-    double value = 0;
-    const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
-    if (error != std::errc{} || end != word.data() + word.size() || !std::isfinite(value)) {
+    const auto value = parse_number<double>(word);
+    if (!value || !std::isfinite(*value))
       fail(line, fmt::format("\"{}\" is no number", word), "Use a decimal point.");
-    }
-    return value;
+    return *value;
   }
 
   const std::string& file_;

@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
-#include <charconv>
 #include <chrono>
 #include <csignal>
 #include <fstream>
@@ -17,6 +16,7 @@
 
 #include "host/transport/descriptor.hpp"
 #include "protocol/contract/input_error.hpp"
+#include "protocol/contract/text.hpp"
 
 namespace diastole {
 namespace {
@@ -37,11 +37,9 @@ std::optional<PartName> part_name(const std::string& name) {
   const std::string_view stem = std::string_view(name).substr(0, name.size() - ending.size());
   const size_t dot = stem.rfind('.');
   if (dot == std::string_view::npos) return std::nullopt;
-  PartName part{std::string(stem.substr(0, dot)), 0};
-  const char* end = stem.data() + stem.size();
-  const auto [behind, error] = std::from_chars(stem.data() + dot + 1, end, part.process);
-  if (error != std::errc() || behind != end || part.process <= 0) return std::nullopt;
-  return part;
+  const auto process = parse_number<pid_t>(stem.substr(dot + 1));
+  if (!process || *process <= 0) return std::nullopt;
+  return PartName{std::string(stem.substr(0, dot)), *process};
 }
 
 bool is_gone(pid_t process) { return ::kill(process, 0) != 0 && errno == ESRCH; }

@@ -5,9 +5,9 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 
 #include "protocol/contract/input_error.hpp"
+#include "protocol/contract/text.hpp"
 
 namespace diastole::web {
 namespace {
@@ -62,8 +62,9 @@ ConsoleAddress parse_console_address(const std::string& text, const std::string&
     result.address = *address;
     port = parts.port;
   }
-  const auto [end, error] = std::from_chars(port.data(), port.data() + port.size(), result.port);
-  if (error != std::errc() || end != port.data() + port.size()) throw refuse();
+  const auto number = parse_number<uint16_t>(port);
+  if (!number) throw refuse();
+  result.port = *number;
   return result;
 }
 

@@ -3,11 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
 #include <sstream>
 
 #include "protocol/contract/bounded_file.hpp"
 #include "protocol/contract/input_error.hpp"
+#include "protocol/contract/text.hpp"
 
 namespace diastole::runfile {
 namespace {
@@ -18,9 +18,7 @@ std::vector<std::string> cells_of(const std::string& line) {
   std::vector<std::string> cells;
   std::stringstream stream(line);
   for (std::string cell; std::getline(stream, cell, ',');) {
-    const size_t first = cell.find_first_not_of(" \t\r");
-    const size_t last = cell.find_last_not_of(" \t\r");
-    cells.push_back(first == std::string::npos ? "" : cell.substr(first, last - first + 1));
+    cells.emplace_back(trimmed(cell));
   }
   return cells;
 }
@@ -40,10 +38,8 @@ class Row {
     const auto found = std::ranges::find(names_, column);
     if (found == names_.end()) return std::nullopt;
     const std::string& cell = cells_[static_cast<size_t>(found - names_.begin())];
-    double value = 0;
-    const char* end = cell.data() + cell.size();
-    const auto [rest, error] = std::from_chars(cell.data(), end, value);
-    if (error != std::errc() || rest != end || !(value > -1e9 && value < 1e9)) {
+    const auto value = parse_number<double>(cell);
+    if (!value || !(*value > -1e9 && *value < 1e9)) {
       fail(column, fmt::format("\"{}\" is not a number", cell),
            "Give milliseconds from the trigger, like 70.5.");
     }
@@ -113,7 +109,7 @@ std::vector<FrameStart> parse_frame_times(const std::string& text, const std::st
   }
   std::vector<FrameStart> starts;
   for (size_t number = 2; std::getline(stream, line); ++number) {
-    if (line.find_first_not_of(" \t\r") == std::string::npos) continue;
+    if (trimmed(line).empty()) continue;
     starts.push_back(start_of(Row(file, number, names, line), starts));
   }
   if (starts.empty()) throw InputError({file, "", "lists no frame", "Write one frame a line."});

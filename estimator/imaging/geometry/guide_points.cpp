@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
 #include <map>
 #include <optional>
@@ -12,6 +11,7 @@
 
 #include "estimator/io/whole_file.hpp"
 #include "protocol/contract/input_error.hpp"
+#include "protocol/contract/text.hpp"
 
 namespace diastole::imaging {
 namespace {
@@ -51,11 +51,9 @@ struct Line {
                       remedy});
   }
   [[nodiscard]] double number_in(std::string_view text, std::string_view column) const {
-    double value = 0;
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-    if (error != std::errc{} || end != text.data() + text.size() || !std::isfinite(value))
-      fail(column, fmt::format("\"{}\" is not a number", text));
-    return value;
+    const auto value = parse_number<double>(text);
+    if (!value || !std::isfinite(*value)) fail(column, fmt::format("\"{}\" is not a number", text));
+    return *value;
   }
   [[nodiscard]] int count_in(std::string_view text, std::string_view column) const {
     const double value = number_in(text, column);

@@ -6,11 +6,11 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
-#include <charconv>
 #include <string_view>
 
 #include "protocol/contract/input_error.hpp"
 #include "protocol/contract/table_reader.hpp"
+#include "protocol/contract/text.hpp"
 
 namespace diastole::catalogue {
 namespace {
@@ -88,13 +88,10 @@ void add_text(const Word& word, std::string_view column, bool contained, Conditi
 }
 
 void add_number(const Word& word, std::string_view column, Condition& condition) {
-  double value = 0;
-  const char* end = word.value.data() + word.value.size();
-  const auto [stopped, error] = std::from_chars(word.value.data(), end, value);
-  if (error != std::errc() || stopped != end)
-    refuse(word, fmt::format("\"{}\" is no number", word.value), fmt::format("As {}<9.5.", column));
+  const auto value = parse_number<double>(word.value);
+  if (!value) refuse(word, fmt::format("\"{}\" is no number", word.value), fmt::format("As {}<9.5.", column));
   condition.sql += fmt::format(R"( and "{}" {} ?)", column, word.sign);
-  condition.values.emplace_back(value);
+  condition.values.emplace_back(*value);
 }
 
 void add_yes_or_no(const Word& word, std::string_view column, Condition& condition) {

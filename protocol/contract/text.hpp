@@ -1,0 +1,42 @@
+#pragma once
+// Words of a text that somebody wrote: without the blanks around them, and as numbers.
+
+#include <array>
+#include <charconv>
+#include <cstddef>
+#include <optional>
+#include <string_view>
+
+namespace diastole {
+
+inline std::string_view trimmed(std::string_view text) {
+  constexpr std::string_view blanks = " \t\r\n";
+  const size_t first = text.find_first_not_of(blanks);
+  if (first == std::string_view::npos) return {};
+  return text.substr(first, text.find_last_not_of(blanks) - first + 1);
+}
+
+/// The number that the whole of `text` is; "nan" and "inf" are numbers too.
+template <class Number>
+std::optional<Number> parse_number(std::string_view text) {
+  Number value{};
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc{} || end != text.data() + text.size()) return std::nullopt;
+  return value;
+}
+
+/// "1,2,3": exactly `count` numbers between commas.
+template <class Number, size_t count>
+std::optional<std::array<Number, count>> parse_numbers(std::string_view text) {
+  std::array<Number, count> values{};
+  for (size_t i = 0; i < count; ++i) {
+    const size_t comma = text.find(',');
+    const auto value = parse_number<Number>(text.substr(0, comma));
+    if (!value || (comma == std::string_view::npos) != (i + 1 == count)) return std::nullopt;
+    values[i] = *value;
+    text.remove_prefix(i + 1 == count ? text.size() : comma + 1);
+  }
+  return values;
+}
+
+}  // namespace diastole
