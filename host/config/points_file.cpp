@@ -17,7 +17,7 @@ constexpr double closure = 1e-4;  // of the range
 /// The rows of the table with the lines they stand in.
 class PointsReader {
  public:
-  PointsReader(std::string_view text, const std::string& file) : file_(file) {
+  PointsReader(std::string_view text, const std::string& file, PointsOf of) : file_(file), of_(of) {
     if (text.size() > most_bytes) {
       fail(1, fmt::format("has {} bytes, and at most {} are taken", text.size(), most_bytes),
            "Give fewer points: the controller holds 4096.");
@@ -59,9 +59,12 @@ class PointsReader {
     lines.push_back(line);
   }
   void take_names(size_t line, std::string_view left, std::string_view right) {
-    if ((left != "phase" && left != "time_s") || (right != "fraction" && right != "volume_mL")) {
+    const bool pressure = of_ == PointsOf::volume_or_pressure;
+    if ((left != "phase" && left != "time_s") ||
+        (right != "fraction" && right != "volume_mL" && !(pressure && right == "pressure_kPa"))) {
       fail(line, fmt::format("names the columns \"{}\" and \"{}\"", left, right),
-           "The first is phase or time_s, the second fraction or volume_mL.");
+           fmt::format("The first is phase or time_s, the second fraction{} or {}.",
+                       pressure ? ", volume_mL" : "", pressure ? "pressure_kPa" : "volume_mL"));
     }
     first_name = left;
     second_name = right;
@@ -74,6 +77,7 @@ class PointsReader {
   }
 
   const std::string& file_;
+  PointsOf of_;
 };
 
 /// The first column as phases.
@@ -125,8 +129,8 @@ std::vector<double> fractions(const PointsReader& rows, double least, double ran
 
 }  // namespace
 
-PointsFile parse_points(std::string_view text, const std::string& file) {
-  const PointsReader rows(text, file);
+PointsFile parse_points(std::string_view text, const std::string& file, PointsOf of) {
+  const PointsReader rows(text, file, of);
   PointsFile points;
   points.file = file;
   points.text = std::string(text);
@@ -145,6 +149,7 @@ PointsFile parse_points(std::string_view text, const std::string& file) {
   }
   if (rows.first_name == "time_s") points.cycle_s = rows.first.back();
   if (rows.second_name == "volume_mL") points.range_mL = range;
+  if (rows.second_name == "pressure_kPa") points.range_kPa = range;
   return points;
 }
 

@@ -19,15 +19,19 @@
 namespace diastole {
 
 struct PointsFile {
-  std::string file;                ///< for messages
-  std::string text;                ///< as it was read
-  std::vector<double> phase;       ///< from 0 to 1
-  std::vector<double> fraction;    ///< of the stroke, from 0 to 1 and back to 0
-  std::optional<double> cycle_s;   ///< if the file states times
-  std::optional<double> range_mL;  ///< if the file states volumes
+  std::string file;                 ///< for messages
+  std::string text;                 ///< as it was read
+  std::vector<double> phase;        ///< from 0 to 1
+  std::vector<double> fraction;     ///< of the stroke, from 0 to 1 and back to 0
+  std::optional<double> cycle_s;    ///< if the file states times
+  std::optional<double> range_mL;   ///< if the file states volumes
+  std::optional<double> range_kPa;  ///< if it states pressures
 };
 
+/// What the second column may state beside fractions.
+enum class PointsOf { volume, volume_or_pressure };
+
 /// Throws InputError with file, line and what to change.
-PointsFile parse_points(std::string_view text, const std::string& file);
+PointsFile parse_points(std::string_view text, const std::string& file, PointsOf of = PointsOf::volume);
 
 }  // namespace diastole
