@@ -66,6 +66,16 @@ const PageFile* find_page_file(std::string_view path) {
   return found == files.end() ? nullptr : &*found;
 }
 
+void set_page_headers(http::fields& response) {
+  response.set(http::field::cache_control, "no-store");
+  response.set("X-Content-Type-Options", "nosniff");
+  response.set("Referrer-Policy", "no-referrer");
+  response.set("Cross-Origin-Resource-Policy", "same-origin");
+  response.set("Content-Security-Policy",
+               "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; img-src 'self'; "
+               "font-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'");
+}
+
 void set_bounds(RequestParser& parser) {
   parser.header_limit(most_header_bytes);
   parser.body_limit(uint64_t{0});

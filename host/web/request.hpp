@@ -32,6 +32,9 @@ inline constexpr uint32_t most_header_bytes = 8192;
 /// Sets the bounds of a request: most_header_bytes, no body.
 void set_bounds(RequestParser& parser);
 
+/// Of every answer: nothing is kept, and a page has what is of its own origin alone.
+void set_page_headers(boost::beast::http::fields& response);
+
 /// What cannot be parsed.
 Refusal no_request(const boost::beast::error_code& error);
 

@@ -98,14 +98,7 @@ class Visitor : public Connection, public std::enable_shared_from_this<Visitor> 
     last_ = last_ || !request_.keep_alive() || ++answered_ >= most_requests;
     response_ = Response(static_cast<http::status>(status), 11);
     response_.set(http::field::content_type, beast::string_view(type.data(), type.size()));
-    response_.set(http::field::cache_control, "no-store");
-    response_.set("X-Content-Type-Options", "nosniff");
-    response_.set("Referrer-Policy", "no-referrer");
-    response_.set("Cross-Origin-Resource-Policy", "same-origin");
-    response_.set("Content-Security-Policy",
-                  "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; img-src "
-                  "'self'; font-src 'self'; "
-                  "base-uri 'none'; form-action 'none'; frame-ancestors 'none'");
+    set_page_headers(response_);
     response_.keep_alive(!last_);
     response_.body() = std::move(body);
     response_.prepare_payload();

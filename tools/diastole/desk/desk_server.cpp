@@ -136,14 +136,7 @@ class Connection : public std::enable_shared_from_this<Connection> {
   void reply(Answer answer) {
     response_ = Response(static_cast<http::status>(answer.status), 11);
     response_.set(http::field::content_type, answer.type);
-    response_.set(http::field::cache_control, "no-store");
-    response_.set("X-Content-Type-Options", "nosniff");
-    response_.set("Referrer-Policy", "no-referrer");
-    response_.set("Cross-Origin-Resource-Policy", "same-origin");
-    response_.set(
-        "Content-Security-Policy",
-        "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; img-src 'self'; "
-        "base-uri 'none'; form-action 'none'; frame-ancestors 'none'");
+    web::set_page_headers(response_);
     response_.keep_alive(parser_->get().keep_alive());
     response_.body() = std::move(answer.body);
     response_.prepare_payload();
