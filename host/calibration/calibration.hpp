@@ -32,6 +32,7 @@
 #include "host/config/rig_config.hpp"
 #include "host/transport/descriptor.hpp"
 #include "protocol/contract/input_error.hpp"
+#include "protocol/contract/text.hpp"
 
 namespace diastole {
 
@@ -133,7 +134,7 @@ class CalibrationBook {
         "format = \"diastole-calibration\"\nversion = 1\n";
     for (const auto& [name, found] : found_) {
       if (found.points.empty() && !found.zero) continue;
-      text += fmt::format("\n[channel.{}]\n", quoted(name));
+      text += fmt::format("\n[channel.{}]\n", toml_text(name));
       if (!found.points.empty()) {
         text += "points = [\n";
         for (const CalibrationPoint& point : found.points)
@@ -160,15 +161,6 @@ class CalibrationBook {
   static constexpr double least_part_of_nominal =
       0.1;  // of the span that the rig file's kPa_per_V lets expect
 
-  static std::string quoted(const std::string& text) {
-    std::string out = "\"";
-    for (const char c : text) {
-      if (c == '"' || c == '\\') out.push_back('\\');
-      if (static_cast<unsigned char>(c) >= 0x20) out.push_back(c);
-    }
-    return out + "\"";
-  }
-
   static CalibrationPoint read_point(TableReader table, bool with_kPa) {
     CalibrationPoint point;
     point.volts = table.number("volts");
@@ -181,8 +173,8 @@ class CalibrationBook {
 
   static std::string in_toml(const CalibrationPoint& point, bool with_kPa) {
     return fmt::format("{{ volts = {:.9}, {}utc = {}, operator = {} }}", point.volts,
-                       with_kPa ? fmt::format("kPa = {:.9}, ", point.kPa) : "", quoted(point.utc),
-                       quoted(point.operator_name));
+                       with_kPa ? fmt::format("kPa = {:.9}, ", point.kPa) : "", toml_text(point.utc),
+                       toml_text(point.operator_name));
   }
 
   static double slope_of(const ChannelCalibration& found) {

@@ -1,10 +1,11 @@
 #pragma once
-// Words of a text that somebody wrote: without the blanks around them, and as numbers.
+// Words of a text that somebody wrote: without the blanks around them, as numbers, and quoted for a file.
 
 #include <array>
 #include <charconv>
 #include <cstddef>
 #include <optional>
+#include <string>
 #include <string_view>
 
 namespace diastole {
@@ -37,6 +38,16 @@ std::optional<std::array<Number, count>> parse_numbers(std::string_view text) {
     text.remove_prefix(i + 1 == count ? text.size() : comma + 1);
   }
   return values;
+}
+
+/// As a basic string of TOML, without control characters.
+inline std::string toml_text(std::string_view text) {
+  std::string out = "\"";
+  for (const char c : text) {
+    if (c == '"' || c == '\\') out.push_back('\\');
+    if (static_cast<unsigned char>(c) >= 0x20) out.push_back(c);
+  }
+  return out + "\"";
 }
 
 }  // namespace diastole

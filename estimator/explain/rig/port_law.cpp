@@ -9,21 +9,12 @@
 #include "estimator/effect_files/effect_file.hpp"
 #include "estimator/effects/file_effect.hpp"
 #include "estimator/rig/simulation.hpp"
+#include "protocol/contract/text.hpp"
 
 namespace diastole::explain {
 namespace {
 
 using enum CurveShape;
-
-/// "\"" in TOML's basic strings.
-std::string toml_text(std::string_view text) {
-  std::string out = "\"";
-  for (const char c : text) {
-    if (c == '"' || c == '\\') out += '\\';
-    out += c;
-  }
-  return out + "\"";
-}
 
 std::string parameter_text(const LawParameter& parameter) {
   return fmt::format(
