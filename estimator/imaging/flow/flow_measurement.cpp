@@ -28,11 +28,6 @@ constexpr double usual_background_cm_s = 2.0;
 /// A fast phase whose chi-square is so many times that of the best, and no small one, has more wraps than were found.
 constexpr double worst_wrapped = 3.0, worst_chi_square = 4.0;
 
-Finding finding(Severity severity, std::string id, std::string what, const std::string& where, double number,
-                std::string unit, std::string remedy) {
-  return {severity, std::move(id), std::move(what), where, number, std::move(unit), std::move(remedy)};
-}
-
 const MovingRegion& chosen_region(const std::vector<MovingRegion>& regions, const FlowRequest& request,
                                   const std::string& folder, const std::string& name) {
   if (regions.empty() || (!request.centre_px && regions[0].radius_px < least_radius_px))
@@ -219,11 +214,11 @@ FlowMeasurement measure_flow(PhaseContrast scan, const FlowRequest& request, con
   const MovingRegion& region = chosen_region(regions, request, folder, flow.scan.name);
   for (const MovingRegion& other : regions) {
     if (&other == &region || other.radius_px < 0.5 * region.radius_px) continue;
-    flow.findings.push_back(finding(
-        Severity::warning, "other-lumen",
-        fmt::format("fluid moves also around column {:.0f}, row {:.0f}", other.centre.x(), other.centre.y()),
-        flow.scan.name, other.radius_px, "px",
-        "If that is the tube, give --centre with this column and row."));
+    flow.findings.push_back(
+        {Severity::warning, "other-lumen",
+         fmt::format("fluid moves also around column {:.0f}, row {:.0f}", other.centre.x(), other.centre.y()),
+         flow.scan.name, other.radius_px, "px",
+         "If that is the tube, give --centre with this column and row."});
   }
 
   const auto still = still_pixels(map, regions, clear_px);
@@ -232,13 +227,13 @@ FlowMeasurement measure_flow(PhaseContrast scan, const FlowRequest& request, con
     flow.background = background_phase(map, still, region.centre, region.radius_px);
   if (flow.background.order < 0)
     flow.findings.push_back(
-        finding(Severity::warning, "background-unknown",
-                request.remove_background
-                    ? "there is no still material around the lumen: the background phase is not known"
-                    : "the background phase was left, as asked for",
-                flow.scan.name, static_cast<double>(flow.background.pixels), "pixels",
-                "A block of still gel around the tube shows the background; --close takes off what a cycle "
-                "does not return."));
+        {Severity::warning, "background-unknown",
+         request.remove_background
+             ? "there is no still material around the lumen: the background phase is not known"
+             : "the background phase was left, as asked for",
+         flow.scan.name, static_cast<double>(flow.background.pixels), "pixels",
+         "A block of still gel around the tube shows the background; --close takes off what a cycle "
+         "does not return."});
 
   LumenData data{plane,
                  flow.scan.magnitude,
@@ -284,9 +279,9 @@ FlowMeasurement measure_flow(PhaseContrast scan, const FlowRequest& request, con
     flow.phases.push_back(phase);
   }
   if (!flow.lumen.converged)
-    flow.findings.push_back(finding(Severity::warning, "lumen-fit", "the fit of the lumen has not settled",
-                                    flow.scan.name, flow.lumen.reduced_chi_square, "",
-                                    "Look at the outline on the page; --centre may start it elsewhere."));
+    flow.findings.push_back({Severity::warning, "lumen-fit", "the fit of the lumen has not settled",
+                             flow.scan.name, flow.lumen.reduced_chi_square, "",
+                             "Look at the outline on the page; --centre may start it elsewhere."});
   return flow;
 }
 

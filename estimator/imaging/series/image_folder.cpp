@@ -22,12 +22,6 @@ namespace fs = std::filesystem;
 /// mostly still tissue, whose values are near zero.
 constexpr double one_sided = 0.5;
 
-Finding problem(Severity severity, std::string id, std::string what, std::string where, double number,
-                std::string unit, std::string remedy) {
-  return {severity, std::move(id),   std::move(what),  std::move(where),
-          number,   std::move(unit), std::move(remedy)};
-}
-
 std::vector<fs::path> files_below(const fs::path& folder) {
   std::error_code error;
   if (!fs::is_directory(folder, error))
@@ -58,19 +52,16 @@ void report_fault(const FileFault& fault, const fs::path& file, const std::strin
     case FileFault::Kind::foreign:
       if (claims_to_be_dicom(file))
         problems.push_back(
-            problem(Severity::error, "foreign-file", place + fault.problem, name, 1, "", fault.remedy));
+            {Severity::error, "foreign-file", place + fault.problem, name, 1, "", fault.remedy});
       return;
     case FileFault::Kind::not_mr:
-      problems.push_back(
-          problem(Severity::error, "not-mr", place + fault.problem, name, 1, "", fault.remedy));
+      problems.push_back({Severity::error, "not-mr", place + fault.problem, name, 1, "", fault.remedy});
       return;
     case FileFault::Kind::truncated:
-      problems.push_back(
-          problem(Severity::error, "truncated", place + fault.problem, name, 1, "", fault.remedy));
+      problems.push_back({Severity::error, "truncated", place + fault.problem, name, 1, "", fault.remedy});
       return;
     case FileFault::Kind::unusable:
-      problems.push_back(
-          problem(Severity::error, "unusable", place + fault.problem, name, 1, "", fault.remedy));
+      problems.push_back({Severity::error, "unusable", place + fault.problem, name, 1, "", fault.remedy});
   }
 }
 
@@ -127,8 +118,8 @@ class Sorter {
 
   void complain(Severity severity, std::string id, std::string what, size_t image, double number,
                 std::string unit, std::string remedy) {
-    folder_.problems.push_back(problem(severity, std::move(id), std::move(what), folder_.file_name(image),
-                                       number, std::move(unit), std::move(remedy)));
+    folder_.problems.push_back({severity, std::move(id), std::move(what), folder_.file_name(image), number,
+                                std::move(unit), std::move(remedy)});
   }
 
   /// Where a series holds several kinds of picture and its headers do not say which is which, the pixels do.
