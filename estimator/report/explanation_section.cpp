@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "estimator/effects/effect.hpp"
+#include "estimator/explain/verdict/verdict.hpp"
 #include "estimator/report/explanation_drawings.hpp"
 #include "estimator/report/field_views.hpp"
 #include "estimator/report/html_text.hpp"
@@ -203,17 +204,6 @@ void add_explained_field(Page& page, const Explanation& explanation) {
   }
 }
 
-std::string set_words(const std::vector<std::string>& ids) {
-  return ids.empty() ? "nothing" : fmt::format("{}", fmt::join(ids, " + "));
-}
-
-std::vector<std::string> ids_of(const std::vector<FoundEffect>& effects) {
-  std::vector<std::string> ids;
-  for (const FoundEffect& effect : effects)
-    ids.push_back(effect.id);
-  return ids;
-}
-
 std::string verdict_note(const Explanation& e) {
   switch (e.verdict) {
     case Verdict::named:
@@ -229,7 +219,7 @@ std::string verdict_note(const Explanation& e) {
 }
 
 std::string verdict_words(const Explanation& e) {
-  const std::string found = set_words(ids_of(e.effects));
+  const std::string found = words_of(ids_of(e.effects), "nothing");
   switch (e.verdict) {
     case Verdict::named:
       return found;
@@ -318,7 +308,7 @@ void add_effects(Page& page, const Explanation& e) {
   if (!e.ambiguous_with.empty()) {
     std::vector<std::string> sets;
     for (const auto& ids : e.ambiguous_with)
-      sets.push_back(set_words(ids));
+      sets.push_back(words_of(ids, "nothing"));
     page.warning(
         fmt::format("As good on these data: {}. Do not report the one above as found before an experiment "
                     "has told them apart.",
@@ -402,7 +392,7 @@ void add_evidence(Page& page, const Explanation& e) {
                "adapt: by a full refit, or by a score test where that was too small to deserve one. A true "
                "effect also predicts runs that were not fitted.");
   const auto row_of = [](const Candidate& candidate) -> Page::Row {
-    return {set_words(candidate.ids),
+    return {words_of(candidate.ids, "nothing"),
             number(candidate.chi_square_drop, 4),
             std::to_string(candidate.parameters),
             candidate.held_out_drop ? number(*candidate.held_out_drop, 4) : "–",

@@ -8,13 +8,17 @@
 #include <stdexcept>
 
 namespace diastole::explain {
-namespace {
 
-std::string in_words(const std::vector<std::string>& ids, const char* none) {
-  return ids.empty() ? none : fmt::format("{}", fmt::join(ids, " + "));
+std::vector<std::string> ids_of(const std::vector<FoundEffect>& effects) {
+  std::vector<std::string> ids;
+  for (const FoundEffect& effect : effects)
+    ids.push_back(effect.id);
+  return ids;
 }
 
-}  // namespace
+std::string words_of(const std::vector<std::string>& ids, const char* none) {
+  return ids.empty() ? none : fmt::format("{}", fmt::join(ids, " + "));
+}
 
 std::string_view name_of(Verdict verdict) {
   constexpr std::array<std::string_view, 4> names{"named", "ambiguous", "unexplained", "none"};
@@ -35,18 +39,16 @@ bool is_settled(const std::vector<SearchEnd>& searches) {
 namespace {
 
 std::string verdict_sentence(const Explanation& found) {
-  std::vector<std::string> ids;
-  for (const FoundEffect& effect : found.effects)
-    ids.push_back(effect.id);
+  const std::vector<std::string> ids = ids_of(found.effects);
   std::string unsettled;
   for (const SearchEnd& search : found.searches)
     if (!inference::is_settled(search.termination))
       unsettled +=
-          fmt::format(" The search of {} did not converge: {}", in_words(search.effects, "the base model"),
+          fmt::format(" The search of {} did not converge: {}", words_of(search.effects, "the base model"),
                       inference::sentence(search.termination));
   std::string others;
   for (const auto& other : found.ambiguous_with)
-    others += (others.empty() ? "" : ", ") + in_words(other, "nothing at all");
+    others += (others.empty() ? "" : ", ") + words_of(other, "nothing at all");
   switch (found.verdict) {
     case Verdict::none:
       if (!found.hints.empty()) {
@@ -54,19 +56,19 @@ std::string verdict_sentence(const Explanation& found) {
         for (const Hint& hint : found.hints)
           hints.push_back(hint.id);
         return fmt::format("Nothing exceeds the model's own error; {} is hinted at, and smaller than that.{}",
-                           in_words(hints, ""), unsettled);
+                           words_of(hints, ""), unsettled);
       }
       return "Nothing exceeds the noise: the rig's model explains these recordings." + unsettled;
     case Verdict::named:
       return fmt::format(
           "The model lacks {}: with it {:.0f} % of the gap on data that were not fitted is closed.",
-          in_words(ids, ""), 100.0 * found.gap.closed);
+          words_of(ids, ""), 100.0 * found.gap.closed);
     case Verdict::ambiguous:
       if (ids.empty())
         return fmt::format("Too weak to name and too strong to be chance: perhaps {}, perhaps nothing.{}",
                            others, unsettled);
       return fmt::format("The model lacks something that these data cannot tell apart: {}, or {}.{}",
-                         in_words(ids, ""), others, unsettled);
+                         words_of(ids, ""), others, unsettled);
     case Verdict::unexplained:
       if (!unsettled.empty()) return "Nothing can be named." + unsettled;
       return found.where.empty()

@@ -2,10 +2,15 @@
 // A verdict in words.
 
 #include <string>
+#include <vector>
 
 #include "estimator/explain/verdict/explanation.hpp"
 
 namespace diastole::explain {
+
+std::vector<std::string> ids_of(const std::vector<FoundEffect>& effects);
+/// "hose-compliance + backlash"; `none` where there is no id.
+std::string words_of(const std::vector<std::string>& ids, const char* none);
 
 /// A few sentences for people; with one for each search that did not settle.
 std::string summary_of(const Explanation& found);
