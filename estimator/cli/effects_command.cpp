@@ -135,7 +135,7 @@ void add_effects(CommandLine& line) {
       "found again in simulated data, silent without cause. Exit code 1: a check failed; 2: the file is "
       "none. "
       "`diastole\n"
-      "explain --with FILE` lets it compete. docs/effects-as-files.md tells how such a file is written.");
+      "explain --with FILE` lets it compete. docs/effects-as-files.md says how such a file is written.");
   command->add_option("ID", *id, "an effect, for example hose-compliance, or a file NAME.effect.toml");
   command->add_option("--threads", *threads, "simulations at a time")
       ->check(CLI::Range(1, 256))

@@ -229,7 +229,7 @@ void add_law(CommandLine& line) {
       "  diastole law examples/bench-tests/uniaxial.csv --law neo-hookean\n"
       "  diastole law examples/bench-tests/*.csv -o laws.html\n"
       "  diastole law examples/bench-tests/*.csv --law mooney-rivlin --law my-law.law.toml --json\n\n"
-      "DATA.csv, one row a reading; the header tells the test:\n"
+      "DATA.csv, one row a reading; the header names the test:\n"
       "  stretch,nominal_kPa                                            uniaxial\n"
       "  planar_stretch,nominal_kPa                                     a wide strip\n"
       "  stretch_1,stretch_2,nominal_1_kPa,nominal_2_kPa                biaxial\n"

@@ -180,13 +180,13 @@ ExitCode run_ventricle(const VentricleArguments& arguments, const CommandOutput&
   const auto start = std::chrono::steady_clock::now();
   const bool shows_progress = isatty(STDERR_FILENO) != 0;
   const imaging::VentricleRequest request = checked_request(arguments);
-  const auto tell = [&](const std::string& stage) {
+  const auto report_stage = [&](const std::string& stage) {
     if (shows_progress) fmt::print(stderr, "{}\n", stage);
   };
   const imaging::GuidePoints guide = fs::is_directory(request.guide)
-                                         ? imaging::cine_guide_points(request.guide, tell)
+                                         ? imaging::cine_guide_points(request.guide, report_stage)
                                          : imaging::read_guide_points(request.guide);
-  const imaging::VentricleSession session = imaging::measure_ventricle(request, guide, tell);
+  const imaging::VentricleSession session = imaging::measure_ventricle(request, guide, report_stage);
   write_whole_file(arguments.output, mesh_file_text(session.body));
   if (arguments.guide) write_whole_file(*arguments.guide, imaging::guide_file_text(guide));
   if (arguments.surface) write_whole_file(*arguments.surface, imaging::surface_file_text(session));

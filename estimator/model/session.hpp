@@ -42,7 +42,7 @@ struct Session {
   std::map<std::string, double>
       tolerance_sd;  ///< of the first run's /rig: what it states of its parts (rig_fit/tolerance.hpp)
   EffectLibrary effects = {};  ///< that may be in it
-  MotionLimits limits;         ///< of the first run's /rig; the controller's own where it does not tell
+  MotionLimits limits;         ///< of the first run's /rig; the controller's own where it states none
 };
 
 /// Throws InputError if the study names no runs or a run cannot be read.

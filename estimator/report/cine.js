@@ -57,7 +57,7 @@ const cinePlayers = (tracking) => {
       this.overlays = [];
       this.range.addEventListener("input", () => this.draw());
       this.button.addEventListener("click", () => this.play(this.timer === undefined));
-      this.canvas.addEventListener("pointermove", (event) => this.tell(event));
+      this.canvas.addEventListener("pointermove", (event) => this.showNearest(event));
       this.draw();
       this.chart();
     }
@@ -132,7 +132,7 @@ const cinePlayers = (tracking) => {
       }
       context.stroke();
     }
-    tell(event) {
+    showNearest(event) {
       const at = this.place(event), image = this.image;
       let nearest, least = 3;
       const consider = (column, row, words) => {

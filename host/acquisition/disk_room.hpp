@@ -25,7 +25,7 @@ struct DiskRoom {
 /// What the run's journal and the run file beside it come to, a tenth and some room for events included.
 DiskRoom room_for(const RunSize& run);
 
-/// Throws InputError, telling what is needed and what is free, if the directory's disk cannot hold the run.
+/// Throws InputError that states what is needed and what is free, if the directory's disk cannot hold the run.
 void check_room(const std::filesystem::path& directory, const RunSize& run);
 
 }  // namespace diastole

@@ -214,7 +214,7 @@ void add_bin(CommandLine& line) {
       "  diastole bin study.run.h5 --slice 3 --frames-csv slice3.frames.csv\n"
       "      the frames that the run's own schedule plans for that slice\n"
       "  diastole bin gel.run.h5 --window 0.00:0.06 --window 0.10:0.16\n"
-      "The delay of catheter and filter is removed from real windows, as far as the run tells it; equal\n"
+      "The delay of catheter and filter is removed from real windows, as far as the run states it; equal\n"
       "frames are counted from the trigger as they are, unless --delay-ms is given. A cycle with a missing\n"
       "sample, or whose triggers are not in time, is left out and told; dummy cycles never count.");
   command->add_option("RUN", options->run, "run file")->required();

@@ -16,7 +16,7 @@ void add_daemon(CommandLine& line) {
                "  diastole daemon --config rig.toml --port /dev/ttyUSB1\n"
                "      the same rig, with the controller at another port\n"
                "  diastole daemon --config rig.toml --console\n"
-               "      with a page for the browser as well; `diastole console` tells its address");
+               "      with a page for the browser as well; `diastole console` prints its address");
   command->add_option("--config", options->config, "rig file")->required();
   command->add_option("--port", options->port, "controller's serial port, instead of the rig file's");
   command->add_option("--daq", options->daq_address, "instrument's HOST:PORT, instead of the rig file's");

@@ -45,7 +45,7 @@ nlohmann::json describe(const StoredJournal& stored) {
 ExitCode list(const std::string& directory, const CommandOutput& out) {
   if (!std::filesystem::is_directory(directory)) {
     throw InputError(
-        {directory, "", "is no directory", "Name the daemon's journal_dir; `diastole status` tells it."});
+        {directory, "", "is no directory", "Name the daemon's journal_dir; `diastole status` prints it."});
   }
   nlohmann::json journals = nlohmann::json::array();
   for (const StoredJournal& stored : stored_journals(directory))

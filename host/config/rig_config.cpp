@@ -221,18 +221,18 @@ DaemonConfig read_daemon(std::optional<TableReader> table) {
 }  // namespace
 
 std::string default_socket() {
-  const auto told = [](const char* name) {
+  const auto environment = [](const char* name) {
     const char* value = std::getenv(name);
     return std::string(value != nullptr ? value : "");
   };
   std::error_code ignored;
-  if (const std::string runtime = told("XDG_RUNTIME_DIR"); !runtime.empty())
+  if (const std::string runtime = environment("XDG_RUNTIME_DIR"); !runtime.empty())
     return runtime + "/diastole.sock";
   if (::geteuid() == 0) return "/run/diastole.sock";
   const std::string runtime = fmt::format("/run/user/{}", ::geteuid());
   if (std::filesystem::is_directory(runtime, ignored)) return runtime + "/diastole.sock";
-  const std::string state = told("XDG_STATE_HOME");
-  return (state.empty() ? told("HOME") + "/.local/state" : state) + "/diastole/daemon.sock";
+  const std::string state = environment("XDG_STATE_HOME");
+  return (state.empty() ? environment("HOME") + "/.local/state" : state) + "/diastole/daemon.sock";
 }
 
 void make_default_socket_folder() {

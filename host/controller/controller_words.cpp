@@ -133,7 +133,7 @@ std::string remedy_for(wire::Refusal refusal) {
   switch (refusal) {
     case wire::Refusal::wrong_state:
       return "A latched fault needs `diastole clear-fault` first, an unhomed pump `diastole home`; `diastole "
-             "status` tells the state.";
+             "status` prints the state.";
     case wire::Refusal::estop_pressed:
       return "Make the rig safe and release the emergency stop.";
     case wire::Refusal::malformed:
@@ -151,7 +151,7 @@ std::string remedy_for(wire::Refusal refusal) {
     case wire::Refusal::limit_switch_closed:
       return "Jog away from the far limit switch (a negative distance), then `diastole home`.";
     default:
-      return "`diastole status` tells more; restart the daemon if it persists.";
+      return "`diastole status` reports more; restart the daemon if it persists.";
   }
 }
 

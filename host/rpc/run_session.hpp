@@ -24,7 +24,7 @@ struct SessionProgress {
   std::vector<std::string> new_remarks;  ///< since the last call: faults, gaps, stops, in plain words
 };
 
-/// What is told of the session and kept in the run file's /session; empty: not told.
+/// What is stated of the session and kept in the run file's /session; empty: not stated.
 struct SessionFacts {
   std::string specimen;
   std::string operator_name;

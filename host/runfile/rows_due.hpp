@@ -20,7 +20,7 @@ double last_known_s(const ParsedJournal& parsed, const TimeAxis& axis);
 /// Rows of a grid that are due at or before `time_s`; at most `most_rows`.
 uint64_t rows_due_by(double time_s, double start_s, double spacing_s);
 
-/// Samples that were due until the recording's end, counted from sample 0; none: the journal does not tell.
+/// Samples that were due until the recording's end, counted from sample 0; none: the journal does not state them.
 std::optional<uint64_t> samples_due(const ParsedJournal& parsed);
 
 /// The positions that the controller took. None: not known, because there is no position, or because the line was lost

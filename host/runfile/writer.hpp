@@ -17,7 +17,7 @@ namespace diastole {
 using FlushDirectory = std::function<int(int descriptor)>;
 
 /// Replaces a file of that name. Throws InputError if the run breaks a rule of runfile::check, and
-/// HardwareError if the disk does not take the file; then nothing is left behind. Returns what is to be told of a file
+/// HardwareError if the disk does not take the file; then nothing is left behind. Returns what is to be said of a file
 /// that is whole all the same: that the disk has not confirmed its name. Empty: nothing.
 std::string write_run(const std::filesystem::path& path, const StreamedRun& run,
                       const FlushDirectory& flush_directory = ::fsync);

@@ -22,8 +22,8 @@ std::string machine_name() {
   return ::gethostname(name.data(), name.size() - 1) == 0 ? name.data() : "";
 }
 
-void close_all(Connections& guests) {
-  for (const auto& [number, connection] : std::exchange(guests, {}))
+void close_all(Connections& connections) {
+  for (const auto& [number, connection] : std::exchange(connections, {}))
     connection->close();
 }
 

@@ -105,7 +105,7 @@ std::optional<ConsoleRole> Door::role_of(std::string_view token) const {
 Refusal Door::wrong_token() {
   return {401,
           "The token in this address is not valid. The daemon makes a new one each time it starts: open the "
-          "address that it printed, or the one that `diastole console` tells."};
+          "address that it printed, or the one that `diastole console` prints."};
 }
 
 std::string Door::url(ConsoleRole role, uint16_t port) const {

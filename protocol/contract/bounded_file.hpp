@@ -16,7 +16,7 @@ inline constexpr uint64_t most_table_bytes = 32 * megabyte;
 inline constexpr uint64_t most_data_bytes = 512 * megabyte;
 
 /// The whole file. Throws InputError with its name: missing, a folder or unreadable (with `remedy`), or longer than `most_bytes`,
-/// which is told before memory is taken.
+/// which is found before memory is taken.
 std::string read_bounded_file(const std::filesystem::path& path, uint64_t most_bytes,
                               const std::string& remedy = "Check the path and that you may read the file.");
 

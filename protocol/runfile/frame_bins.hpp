@@ -80,7 +80,7 @@ FrameBins bin_frames(const RecordedRun& run, const FrameBinOptions& options);
 /// The same of a run without rows, and these: no more of them than a cycle's are in memory at a time.
 FrameBins bin_frames(const RecordedRun& run, const RunRows& rows, const FrameBinOptions& options);
 
-/// A step of the converter behind the cavity's pressure; 0 if the run does not tell.
+/// A step of the converter behind the cavity's pressure; 0 if the run does not state it.
 double cavity_resolution_kPa(const RecordedRun& run);
 /// Of a frame's mean, kPa^2: over the cycles (of one cycle: of its samples), and a step of the converter.
 double variance_of_mean(const FrameBin& bin, double resolution_kPa);

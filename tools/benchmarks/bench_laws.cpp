@@ -39,7 +39,7 @@ Times times_of(const Law& law) {
   std::vector<double> values;
   for (const diastole::LawParameter& parameter : law.parameters())
     values.push_back(parameter.typical);
-  const auto at = [](double nudge) { return Tensor{1.21 + nudge, 0.93, 1.06, 0.11, -0.07, 0.05}; };
+  const auto at = [](double step) { return Tensor{1.21 + step, 0.93, 1.06, 0.11, -0.07, 0.05}; };
   return {time_ns([&](double n) { return law.response(at(n), values).tangent(0, 0); }),
           time_ns([&](double n) { return law.dual_response(at(n), values).tangent(0, 0); }),
           time_ns([&](double n) { return law.stress(at(n), values)[0]; })};

@@ -41,7 +41,7 @@ class EffectTrial {
   /// A search prefers the model without it in data that were made without.
   [[nodiscard]] EffectCheck silent() const;
 
-  /// All of them in this order; `progress` is told each one's name.
+  /// All of them in this order; `progress` gets each one's name.
   [[nodiscard]] std::vector<EffectCheck> all(const std::function<void(const std::string&)>& progress) const;
 
  private:

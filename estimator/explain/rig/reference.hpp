@@ -1,5 +1,5 @@
 #pragma once
-// What sessions in which nothing is wrong tell of their rig: its tolerances, and what its model misses by itself.
+// What sessions in which nothing is wrong show of their rig: its tolerances, and what its model misses by itself.
 //
 //   tolerances   their posterior of one session after the other, wider each time by what changes from day to day and from
 //                casting to casting; they are simulated in these fits, since a hose's parts trade with each other along valleys

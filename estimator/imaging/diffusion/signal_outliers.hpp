@@ -14,7 +14,7 @@ struct SignalOutlier {
   double gain = 1;  ///< its signal over that predicted
 };
 
-/// Takes the outliers out of the series, the worst of a slice first, and tells of each volume in `findings`. What cannot be predicted - the only b = 0
+/// Takes the outliers out of the series, the worst of a slice first, and reports each volume in `findings`. What cannot be predicted - the only b = 0
 /// image of a slice, six directions of one b value - is not judged. Throws InputError if more than a third of a slice's images would go.
 std::vector<SignalOutlier> remove_outliers(DiffusionSeries& series, const std::string& folder);
 

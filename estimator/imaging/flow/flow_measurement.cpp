@@ -138,7 +138,7 @@ std::vector<double> gaps_of(const PhaseContrast& scan) {
 
 /// Whole turns are told by the course over the cycle or by the profile across the lumen, which goes to zero at the wall; and the images must look as the
 /// fit says.
-void require_turns_told(const FlowMeasurement& flow, const std::string& folder) {
+void require_known_turns(const FlowMeasurement& flow, const std::string& folder) {
   constexpr double half_turn = std::numbers::pi;
   const double cm_s = flow.scan.cm_s_per_radian();
   const size_t count = flow.scan.phases();
@@ -256,7 +256,7 @@ FlowMeasurement measure_flow(PhaseContrast scan, const FlowRequest& request, con
   const UnwrappedCycle cycle = unwrapped(core_phase, gaps_of(flow.scan));
   flow.lumen = fit_lumen(data, first_scene(plane, map, region, data.magnitude, cycle.phase_rad, core),
                          cycle.phase_rad);
-  require_turns_told(flow, folder);
+  require_known_turns(flow, folder);
 
   // An error of the background is the same in all phases.
   const double background_cm_s = flow.background.order < 0

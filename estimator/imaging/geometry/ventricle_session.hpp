@@ -43,7 +43,7 @@ struct VentricleSession {
   [[nodiscard]] double ejection_sigma() const;
 };
 
-/// Throws InputError where the points do not make a ventricle, or a phase's wall is folded. `on_stage` is told what is done.
+/// Throws InputError where the points do not make a ventricle, or a phase's wall is folded. `on_stage` gets what is done.
 VentricleSession measure_ventricle(const VentricleRequest& request, const GuidePoints& guide,
                                    const std::function<void(const std::string&)>& on_stage = {});
 

@@ -1,7 +1,7 @@
 // The page: asks the daemon some times a second, shows what it says, and passes on orders.
 
 import { Daemon, Refused, codes, takeToken } from "./daemon.js";
-import { ExperimentChoice, askName, askTakeover, by, showProblem, tell } from "./dialogs.js";
+import { ExperimentChoice, askName, askTakeover, by, showProblem, describeError } from "./dialogs.js";
 import { Trace } from "./trace.js";
 
 const keptName = "diastole-name";
@@ -309,7 +309,7 @@ by("start-now").addEventListener("click", async () => {
   try {
     if (await withControl("run.start", choice.order)) by("start-dialog").close();
   } catch (error) {
-    tell(by("start-problem"), error);
+    describeError(by("start-problem"), error);
   }
   by("start-now").disabled = false;
 });

@@ -9,7 +9,7 @@ for (const button of document.querySelectorAll("[data-close]")) {
 }
 
 /// Fills `box` with what is wrong, where, and what to do about it.
-export function tell(box, error) {
+export function describeError(box, error) {
   box.replaceChildren();
   const line = (kind, text) => {
     const paragraph = document.createElement("p");
@@ -31,7 +31,7 @@ export function tell(box, error) {
 
 export function showProblem(title, error) {
   by("problem-title").textContent = title;
-  tell(by("problem-text"), error);
+  describeError(by("problem-text"), error);
   if (!by("problem-dialog").open) by("problem-dialog").showModal();
 }
 
@@ -48,7 +48,7 @@ function ask(dialog, field, problem, act) {
         await act(field.value.trim());
         finish(true);
       } catch (error) {
-        tell(problem, error);
+        describeError(problem, error);
       }
     };
     const finish = (result) => {

@@ -49,11 +49,11 @@ double stiffening_pressure(double inflation_mL, double inner_mm, double beta) {
 PlaneStrain plane_strain(double inflation_mL, const GelShape& shape) {
   const double inner_mm = inner_radius_mm * (1 + shape.inner_radius_part);
   if (shape.stiffening == 0) return plane_strain(inflation_mL, inner_mm);
-  constexpr double nudge_mL = 0.01;
+  constexpr double step_mL = 0.01;
   const auto at = [&](double volume_mL) {
     return stiffening_pressure(volume_mL, inner_mm, shape.stiffening);
   };
-  return {at(inflation_mL), (at(inflation_mL + nudge_mL) - at(inflation_mL - nudge_mL)) / (2 * nudge_mL)};
+  return {at(inflation_mL), (at(inflation_mL + step_mL) - at(inflation_mL - step_mL)) / (2 * step_mL)};
 }
 
 struct Point {
