@@ -3,7 +3,7 @@
 // catheter's tip bursts).
 //
 // A step is a change between two quiet levels, most of it within 60 ms. Each is fitted by least squares with
-//   p(t) = p0 + dp s(t - t0; f0, zeta)      (step_response.hpp)
+//   p(t) = p0 + dp s(t - t0; f0, zeta)      (protocol/signal/step_response.hpp)
 // over its surroundings. The noise of a transducer is correlated, so the covariance is
 //   (J'J)^-1 J' G J (J'J)^-1,   G_ij = g_|i-j|,
 // with the autocovariance g of what the fit leaves (tapered to nothing over 20 samples). Several steps are averaged by

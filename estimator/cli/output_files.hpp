@@ -15,7 +15,7 @@ namespace diastole {
 
 struct OutputKind {
   std::string_view ending;  ///< ".csv"
-  std::string_view mark;    ///< of an earlier result, which is replaced (whole_file.hpp)
+  std::string_view mark;    ///< of an earlier result, which is replaced (estimator/io/whole_file.hpp)
 };
 
 inline constexpr OutputKind vtkhdf_kind{".vtkhdf", "HDF\r\n"};

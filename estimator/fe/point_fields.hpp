@@ -8,7 +8,7 @@
 // deformed one, and is given along axes that the deformation carries with it:
 //
 //   axes     reference (columns)             deformed
-//   wall     c0, l0, r0  fibre_field.hpp     c along F c0; r normal to the deformed surface xi3 = const; l = r x c
+//   wall     c0, l0, r0  estimator/mesh/fibre_field.hpp     c along F c0; r normal to the deformed surface xi3 = const; l = r x c
 //   fibre    f0, s0, n0  material axes       f along F f0; n normal to F f0 and F s0; s = n x f
 //
 // so that sigma_rr at a free or pressed face is minus the pressure on it, and sigma_ff is the stress along the

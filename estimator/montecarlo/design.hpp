@@ -5,7 +5,7 @@
 //   I_f = J_f' J_f over (values, P_f),  J_f the weighted residuals' derivatives;  P_f adds 1/sigma_f² to its own entry;
 //   the information on the values is the sum over frames of I_f with P_f eliminated.
 //
-// Predicted standard errors are those of the joint fit (fit.hpp) without smoothness. Points of a frame that does not
+// Predicted standard errors are those of the joint fit (estimator/fit/fit.hpp) without smoothness. Points of a frame that does not
 // exist yet are those of the frame with the highest pressure, carried along by the model.
 
 #include <string>

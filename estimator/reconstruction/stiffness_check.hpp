@@ -16,7 +16,7 @@ struct ApparentStiffness {
 };
 
 /// Of the last loaded field. Empty when the model has no equilibrium anywhere near, or nothing moved.
-/// Throws InputError for studies that cannot be modelled (study_model.hpp). Some seconds on large meshes.
+/// Throws InputError for studies that cannot be modelled (estimator/model/study_model.hpp). Some seconds on large meshes.
 std::optional<ApparentStiffness> apparent_stiffness(const Study& study, const FieldForms& forms,
                                                     const FrameField& field);
 

@@ -7,7 +7,7 @@
 namespace diastole {
 namespace {
 
-constexpr double record_bytes = 20;  // header and CRC of journal.hpp
+constexpr double record_bytes = 20;  // header and CRC of host/journal/journal.hpp
 constexpr double number_bytes = 8;
 constexpr double margin = 1.1;
 constexpr double events_bytes = 128e3;

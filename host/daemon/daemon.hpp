@@ -13,14 +13,14 @@ struct DaemonOptions {
   std::optional<std::string> daq_address;
   std::optional<std::string> socket;
   std::optional<std::string> journal_dir;
-  std::optional<std::string> console;  ///< [ADDRESS:]PORT of the web console (web/door.hpp)
+  std::optional<std::string> console;  ///< [ADDRESS:]PORT of the web console (host/web/door.hpp)
   std::string producer;                ///< "diastole 0.1.0"
 };
 
 /// Serves until SIGINT or SIGTERM, then stops motion under control and closes. When it is ready to serve, one
 /// line appears on standard output: {"ready":true,"socket":"...","console":{"control":"http://...","watch":"http://..."}}
 /// (the latter with --console only), and a supervisor is notified
-/// (service_manager.hpp); the log goes to standard error. Throws InputError or HardwareError when it cannot
+/// (host/rig/service_manager.hpp); the log goes to standard error. Throws InputError or HardwareError when it cannot
 /// start.
 void run_daemon(const DaemonOptions& options);
 

@@ -123,7 +123,7 @@ class RigService {
   [[noreturn]] void refuse_to_start() const;
   /// Throws InputError if the journals' disk cannot hold the run.
   void check_disk(const RunPlan& plan, const daq::RatePlan& rate, int64_t most_cycles);
-  /// Removes what need not be kept (journal_store.hpp) and counts the rest.
+  /// Removes what need not be kept (host/journal/journal_store.hpp) and counts the rest.
   void tidy_journals();
   void do_run(RunOrder order, const Done& done);
   /// Leaves out what the last session of this experiment has done. Throws InputError if there is none, or nothing is left.

@@ -36,7 +36,7 @@
 //
 // `points` holds the text of each points file that the experiment names: {name: text}. With `prompts_answered` the
 // operator is waited for nowhere. With `resume` the last session of this experiment goes on with the first slice that was not
-// imaged whole (session_so_far.hpp).
+// imaged whole (host/rig/session_so_far.hpp).
 //
 // No client costs the rig anything (server.cpp): a line is bounded, and so are the answers that a client
 // leaves unread, its requests a second and the time for a line; beyond most_connections the one that has said

@@ -2,7 +2,7 @@
 // A run from its journal: at the end of every run, and for `diastole recover` after a crash, by the same way.
 //
 // The time axis is the controller's clock, in seconds since the tick of RunStarted. Samples carry host times,
-// which the fitted clock map (clock_map.hpp) brings onto it. What was sampled before the start of run
+// which the fitted clock map (host/controller/clock_map.hpp) brings onto it. What was sampled before the start of run
 // is cut off. A missing sample keeps its row: its time lies evenly between its neighbours', or is the one at
 // which it was due if there is no sample before or none after it; its values are NaN, and /gaps declares it.
 // Samples whose record was damaged are declared so, too; so is what a journal that broke off does not hold although the
@@ -49,7 +49,7 @@ struct StreamedRun {
 StreamedRun stream_run(const JournalRecords& journal);
 
 // The low-passed cavity pressure, /pressure/cavity_filtered_kPa, beside the raw one: cavity_kPa at 30 Hz forward and
-// backward (zero_phase.hpp), each stretch between missing samples by itself.
+// backward (protocol/signal/zero_phase.hpp), each stretch between missing samples by itself.
 
 /// None when samples come slower than 75 Hz, too slow for that cutoff, or when there are fewer than two (spacing 0).
 std::optional<signal::LowPassDesign> filter_of(double spacing_s);

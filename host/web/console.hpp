@@ -4,7 +4,7 @@
 //   GET /, /console.css, ...   the page, from this program itself; anybody may have it, it holds no secret
 //   GET /role                  {"role": "control"|"watch"}, as the token says; 401 without a valid one
 //   GET /rpc                   with a token: a WebSocket that speaks JSON-RPC 2.0, one object a text message, with the
-//                              methods of server.hpp by the rules of rpc_session.hpp
+//                              methods of host/rpc/server.hpp by the rules of host/rpc/rpc_session.hpp
 //
 // The token comes as "Authorization: Bearer TOKEN" or as the WebSocket's sub-protocol "token.TOKEN"; Host and Origin
 // are checked first (door.hpp). An operator signs in with a name (console.sign_in) before he gives orders.
@@ -12,7 +12,7 @@
 // From another machine all this comes encrypted (console_stream.hpp); plain HTTP is refused with a sentence.
 //
 // It runs on the server's thread, never on the one that acquires, and holds a bounded number of connections with a
-// bounded number of bytes each (server_state.hpp, rpc_session.hpp).
+// bounded number of bytes each (server_state.hpp, host/rpc/rpc_session.hpp).
 
 #include <filesystem>
 #include <memory>

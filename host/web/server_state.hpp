@@ -43,7 +43,7 @@ struct ServerState {
 void receive_visitor(std::shared_ptr<ServerState> state, boost::asio::ip::tcp::socket socket);
 
 /// One browser that has shown its token: JSON-RPC 2.0 in text messages of a WebSocket, at most rpc::most_line_bytes
-/// each, by the rules of rpc_session.hpp. A browser that answers no ping for some seconds is gone, and its control
+/// each, by the rules of host/rpc/rpc_session.hpp. A browser that answers no ping for some seconds is gone, and its control
 /// with it.
 void open_console(const std::shared_ptr<ServerState>& state, ConsoleStream stream,
                   boost::beast::http::request<boost::beast::http::empty_body> upgrade, ConsoleRole role);

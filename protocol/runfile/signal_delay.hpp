@@ -1,7 +1,7 @@
 #pragma once
 // How late a recorded pressure is, from what the run states about its catheter and its filter.
 //
-// A catheter of natural frequency f0 and damping ratio zeta (step_response.hpp) delays what is slow against f0 by
+// A catheter of natural frequency f0 and damping ratio zeta (protocol/signal/step_response.hpp) delays what is slow against f0 by
 // zeta / (pi f0); a channel that was low-passed states its own delay in its note `delay_s`.
 
 #include <string_view>

@@ -26,7 +26,7 @@ inline const UploadedWaveform& heart_waveform() {
   return kHeart;
 }
 
-/// y at a phase: the limited three-point slopes and the cubic in Hermite's form (knot_cubic.hpp has the powers).
+/// y at a phase: the limited three-point slopes and the cubic in Hermite's form (firmware/core/uploaded/knot_cubic.hpp has the powers).
 inline long double uploaded_volume(std::span<const std::int16_t> rises, long double phase) {
   using Real = long double;
   const auto count = static_cast<std::int64_t>(rises.size());

@@ -5,7 +5,7 @@
 // Of two models A and B the segment's whitened residuals, if A is true, are r = W (y_A - y_B); B's unknowns adapt by
 // theta with the columns K = W dy_B/dtheta, the sensors' zeros of a new run by two more with a prior of 30 Pa, and the
 // cycles' sizes are taken off along W y_A, and what the model's own error may be in the segment (harmonics of the cycle, sizes
-// as in model_error.hpp) is taken off too. Rows of several segments add, so that only Gram matrices [r K]' [r K] are kept,
+// as in estimator/rig_fit/model_error.hpp) is taken off too. Rows of several segments add, so that only Gram matrices [r K]' [r K] are kept,
 // one a channel. The separation is what is left:
 //
 //   d^2 = r'r - g' (K'K + P)^-1 g,  g = K'r,  P: what the session's own data say of B's unknowns.

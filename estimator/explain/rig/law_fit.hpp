@@ -1,6 +1,6 @@
 #pragma once
 // A curve of a law as a smoothing spline: its values at knots are linear unknowns of a session's features, beside the
-// nuisances (model_error.hpp).
+// nuisances (estimator/rig_fit/model_error.hpp).
 //
 // Before the data a curve is the Bayesian cubic smoothing spline (Wahba 1978): straight through nothing at rest, and an
 // integrated Wiener process on each side of it,

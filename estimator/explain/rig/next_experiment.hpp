@@ -1,5 +1,5 @@
 #pragma once
-// Which experiment to run next, from a lattice of what the rig can do (experiment_plan.hpp) and what each would tell
+// Which experiment to run next, from a lattice of what the rig can do (estimator/explain/verdict/experiment_plan.hpp) and what each would tell
 // (experiment_outlook.hpp): up to three segments in one file, with the equipment that the session had; with a
 // transducer at the pump end, gated volumes, an image at rest or a shear test in addition only where nothing else
 // separates.

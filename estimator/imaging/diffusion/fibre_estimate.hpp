@@ -1,5 +1,5 @@
 #pragma once
-// A ventricle's fibre field from its diffusion tensors. In wall coordinates e_c, e_l, r (fibre_field.hpp) a tensor's deviator is
+// A ventricle's fibre field from its diffusion tensors. In wall coordinates e_c, e_l, r (estimator/mesh/fibre_field.hpp) a tensor's deviator is
 //
 //   M = A (ffᵀ - 1/3) + B1 (ccᵀ - nnᵀ) + B2 (cnᵀ + ncᵀ)      f = cos γ (cos α e_c + sin α e_l) + sin γ r     helix α, transverse γ
 //                                                           c = -sin α e_c + cos α e_l,  n = f x c

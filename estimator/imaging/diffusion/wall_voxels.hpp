@@ -26,7 +26,7 @@ struct WallSample {
   double share = 0;  ///< of what the voxel holds of the wall
   size_t element = 0;
   std::array<double, corners> basis{};  ///< tri-linear
-  Eigen::Matrix3d axes;                 ///< columns e_c, e_l, r (fibre_field.hpp), patient
+  Eigen::Matrix3d axes;                 ///< columns e_c, e_l, r (estimator/mesh/fibre_field.hpp), patient
 };
 
 struct WallVoxel {

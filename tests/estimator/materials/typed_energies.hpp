@@ -3,7 +3,7 @@
 // differentiated numerically: what closed-form tests compare the laws with. A law without its energy here fails its
 // tests with a message that says so.
 //
-// C is given in the law's material axes (law.hpp).
+// C is given in the law's material axes (estimator/materials/law.hpp).
 
 #include <Eigen/Dense>
 #include <Eigen/Eigenvalues>

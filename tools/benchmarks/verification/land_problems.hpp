@@ -17,7 +17,7 @@ struct LandBeam {
   size_t unknowns = 0;
   size_t pressure_unknowns = 0;
 };
-/// `grading` towards the clamped face (block.hpp).
+/// `grading` towards the clamped face (estimator/mesh/block.hpp).
 LandBeam land_beam(std::array<size_t, 3> elements, double grading = 0.8);
 
 /// The body of problems 2 and 3.

@@ -40,7 +40,7 @@ struct ManufacturedErrors {
   double displacement_L2_mm = 0.0;
   double displacement_H1 = 0.0;
   double pressure_L2_kPa = 0.0;
-  double averaged_pressure_L2_kPa = 0.0;  ///< point_fields.hpp
+  double averaged_pressure_L2_kPa = 0.0;  ///< estimator/fe/point_fields.hpp
   double stress_L2_kPa = 0.0;             ///< Cauchy stress with that pressure
 };
 

@@ -39,7 +39,7 @@ class DeskSession {
   void track();
   /// {"tracking", "done", "of", "version", "problem", "changed"}: changed slices are tracked with other choices than those that stand.
   [[nodiscard]] nlohmann::json state() const;
-  /// {"html", "record"} of cine.hpp as JSON, or nothing before the first tracking has ended.
+  /// {"html", "record"} of estimator/report/cine.hpp as JSON, or nothing before the first tracking has ended.
   [[nodiscard]] std::shared_ptr<const std::string> tracking() const;
 
  private:

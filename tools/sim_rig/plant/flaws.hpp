@@ -59,7 +59,7 @@ struct SensorFlaws {
   double hum_Hz = 0;
 };
 
-/// Laws of somebody's own, from a file (hidden_file.hpp); empty: none. Times since the first cycle.
+/// Laws of somebody's own, from a file (tools/sim_rig/hidden_file.hpp); empty: none. Times since the first cycle.
 struct OwnLaws {
   std::function<double(double volume_mL, double time_s)> piston_mL =
       {};  ///< displaced if the steps command so much
