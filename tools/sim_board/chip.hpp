@@ -4,12 +4,15 @@
 #include <algorithm>
 #include <array>
 #include <functional>
+#include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "tools/sim_board/core/world.hpp"
+#include "tools/sim_board/peripherals/adc.hpp"
 #include "tools/sim_board/peripherals/dac.hpp"
 #include "tools/sim_board/peripherals/dma.hpp"
 #include "tools/sim_board/peripherals/exti.hpp"
@@ -94,10 +97,13 @@ class Chip {
   Exti exti{syscfg, pins, nvic};
   Power power;
   Dac dac{clock, pins, notes};
+  Adc adc{clock, scheduler, notes};
   Watchdog watchdog{clock, scheduler};
   Dma dma1{1, bus, memory, nvic, notes};
   Dma dma2{2, bus, memory, nvic, notes};
   World world;
+  std::map<uint32_t, std::function<double(uint64_t time_ns)>>
+      analog;  ///< volts by pin index; others have none
   std::vector<std::unique_ptr<Gpio>> ports;
   std::vector<std::unique_ptr<Timer>> timers;
   std::vector<std::unique_ptr<Usart>> usarts;
@@ -159,6 +165,10 @@ class Chip {
                port->timer_level({number, channel}, level, at);
            },
            [this, number](Cycles at) { trigger_output(number, at); },
+           [this, number](uint8_t channel, bool input, Cycles at) {
+             for (const auto& port : ports)
+               port->timer_direction({number, channel}, input, at);
+           },
            [this, number](uint8_t channel, Cycles late_by) { listeners_.missed(number, channel, late_by); },
            number == 11 ? std::function<double()>([this] { return rcc.cycles_per_divided_crystal(); })
                         : std::function<double()>()});
@@ -168,6 +178,11 @@ class Chip {
                timer.get()});
       timers.push_back(std::move(timer));
     }
+    pins.on_change([this](Pin pin, bool level, Cycles at) {
+      const TimerOutput to = ports[pin.port]->timer_of(pin.number);
+      for (const auto& timer : timers)
+        if (timer->shape().number == to.timer) timer->pin_edge(to.channel - 1U, level, at);
+    });
   }
   void add_usarts() {
     for (const UsartPlace& place : usart_places) {
@@ -184,6 +199,8 @@ class Chip {
     bus.add({"SYSCFG", 0x4001'3800, {apb2, 14}, &syscfg});
     bus.add({"EXTI", 0x4001'3c00, {}, &exti});
     bus.add({"DAC", 0x4000'7400, {apb1, 29}, &dac});
+    bus.add({"ADC1", 0x4001'2000, {apb2, 8}, &adc});
+    adc.wire([this](uint32_t channel, Cycles at) { return analog_input(channel, at); });
     bus.add({"DMA1", 0x4002'6000, {ahb1, 21}, &dma1});
     bus.add({"DMA2", 0x4002'6400, {ahb1, 22}, &dma2});
     dac.on_dma_request([this](uint32_t channel) { dma1.request(5 + channel, 7); });
@@ -198,6 +215,16 @@ class Chip {
     other("RTC", 0x4000'2800, {apb1, 28}, std::make_unique<Storage>(0, 0, true));
     other("DBGMCU", 0xe004'2000, {}, std::make_unique<Storage>(0, device_id));
     other("RNG", 0x5006'0800, {ahb2, 6}, std::make_unique<RandomNumbers>(random_seed));
+  }
+  /// Channels 0 to 15 of ADC1 (datasheet table 7).
+  [[nodiscard]] std::optional<double> analog_input(uint32_t channel, Cycles at) const {
+    constexpr Pin pins_of[] = {{0, 0}, {0, 1}, {0, 2}, {0, 3}, {0, 4}, {0, 5}, {0, 6}, {0, 7},
+                               {1, 0}, {1, 1}, {2, 0}, {2, 1}, {2, 2}, {2, 3}, {2, 4}, {2, 5}};
+    if (channel >= std::size(pins_of)) return {};
+    const Pin pin = pins_of[channel];
+    if (!ports[pin.port]->is_analog(pin.number)) return {};
+    const auto driven = analog.find(pin.index());
+    return driven == analog.end() ? 0 : driven->second(clock.ns(at));
   }
   void trigger_output(uint8_t timer, Cycles at) {
     dac.timer_trigger(timer, at);

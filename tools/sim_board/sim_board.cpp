@@ -92,6 +92,7 @@ struct SimBoard::Board {
   std::function<void(uint32_t, uint32_t)> flash_listener;
   uint64_t missed = 0;
   std::optional<ResetCause> requested;
+  double supply_V = 3.3;
   bool powered = false, power_fails = false, browned_out = false;
   board_model::Chip chip;
 };
@@ -130,6 +131,8 @@ void SimBoard::set_supply_mV(uint32_t supply_mV) {
   Board& board = *board_;
   board.chip.power.set_supply_mV(supply_mV);
   board.chip.flash.set_supply_mV(supply_mV);
+  board.chip.adc.set_supply_mV(supply_mV);
+  board.supply_V = 1e-3 * supply_mV;
   if (board.powered && supply_mV < board.chip.flash.brown_out_mV()) {
     power_off();
     board.browned_out = true;
@@ -218,6 +221,15 @@ void SimBoard::drive(Pin pin, bool level, uint64_t time_ns) { board_->chip.world
 
 bool SimBoard::level(Pin pin) const { return board_->chip.pins.level(pin); }
 
+void SimBoard::drive_analog(Pin pin, std::function<double(uint64_t)> volts) {
+  board_->chip.analog[pin.index()] = std::move(volts);
+}
+
+double SimBoard::dac_V(uint8_t channel, uint64_t time_ns) const {
+  const board_model::Chip& chip = board_->chip;
+  return board_->supply_V * chip.dac.share_at(channel - 1U, chip.clock.cycle_at(time_ns));
+}
+
 std::vector<SimBoard::PinEvent> SimBoard::take_pin_events() { return board_->chip.pins.take(); }
 
 void SimBoard::on_pin_change(std::function<void(Pin, bool, uint64_t)> listener) {
@@ -240,6 +252,8 @@ void SimBoard::on_missed_deadline(std::function<void(const MissedDeadline&)> lis
 }
 
 std::optional<uint32_t> SimBoard::word(uint32_t address) const { return board_->chip.memory.word(address); }
+
+uint32_t SimBoard::peripheral_word(uint32_t address) { return board_->chip.bus.read(address, 4); }
 
 uint32_t SimBoard::timer_count(uint8_t number) const {
   constexpr uint32_t counter = 0x24;

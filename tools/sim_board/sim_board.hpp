@@ -124,6 +124,10 @@ class SimBoard {
   /// Drives a pin from outside from `time_ns` on. Undriven inputs follow their pull-up, else they are low.
   void drive(Pin pin, bool level, uint64_t time_ns);
   [[nodiscard]] bool level(Pin pin) const;
+  /// Volts on a pin from outside, as the converter sees them when it asks. Others have 0 V.
+  void drive_analog(Pin pin, std::function<double(uint64_t time_ns)> volts);
+  /// The output of DAC channel 1 or 2, at a moment between the change before last and now.
+  [[nodiscard]] double dac_V(uint8_t channel, uint64_t time_ns) const;
   /// Changes of pins and DAC codes since the last call, in order of time.
   std::vector<PinEvent> take_pin_events();
 
@@ -156,6 +160,8 @@ class SimBoard {
 
   /// A word of memory, nullopt outside it; how tests and reports look at the firmware's variables.
   [[nodiscard]] std::optional<uint32_t> word(uint32_t address) const;
+  /// A register of a peripheral, read as the core would; its clock is on.
+  [[nodiscard]] uint32_t peripheral_word(uint32_t address);
   /// The counter of timer TIMn now. Precondition: the chip has it.
   [[nodiscard]] uint32_t timer_count(uint8_t number) const;
   [[nodiscard]] BoardStatistics statistics() const;

@@ -1,9 +1,11 @@
 #pragma once
 // DAC: two 12-bit channels, holding registers, triggers by timer, EXTI line 9 or software, and the triangle
-// generator (RM0090, 14). Each change of an output code is logged.
+// generator (RM0090, 14). Each change of an output code is logged; as a voltage it settles exponentially, to a code in the 3 µs
+// that the datasheet calls typical.
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <functional>
 
@@ -59,6 +61,18 @@ class Dac final : public RegisterBlock {
   /// Called with the channel (0, 1) when a conversion wants its next code from DMA.
   void on_dma_request(std::function<void(uint32_t)> request) { dma_request_ = std::move(request); }
 
+  /// The output as a share of full scale, at a moment since the change before last.
+  [[nodiscard]] double share_at(uint32_t channel, Cycles at) const {
+    const Channel& held = channels_[channel];
+    const bool new_code = at >= held.changed;
+    const uint32_t code = new_code ? held.output : held.before;
+    if (!new_code) return code / 4095.0;
+    const double settling_ns = 3'000 / std::log(4096.0);
+    const double passed_ns = static_cast<double>(clock_.ns(at) - clock_.ns(held.changed));
+    const double gap = (static_cast<double>(held.before) - code) * std::exp(-passed_ns / settling_ns);
+    return (code + gap) / 4095.0;
+  }
+
   /// The trigger output of timer `number` fired.
   void timer_trigger(uint8_t number, Cycles at) {
     constexpr uint8_t timer_of_source[] = {6, 8, 7, 5, 2, 4, 0, 0};
@@ -82,7 +96,8 @@ class Dac final : public RegisterBlock {
                             : nullptr;
   }
   struct Channel {
-    uint32_t holding = 0, output = 0;
+    uint32_t holding = 0, output = 0, before = 0;  ///< `before`: the output until `changed`
+    Cycles changed = 0;
     uint32_t triangle = 0;
     bool falls = false;
   };
@@ -115,6 +130,8 @@ class Dac final : public RegisterBlock {
     Channel& held = channels_[channel];
     if ((control(channel) & enabled) == 0) code = 0;
     if (held.output == code) return;
+    held.before = held.output;
+    held.changed = at;
     held.output = code;
     log_.log_dac(static_cast<uint8_t>(channel + 1), static_cast<uint16_t>(code), at);
   }

@@ -11,7 +11,7 @@
 
 namespace diastole::board_model {
 
-/// Where an alternate-function pin gets its level: a timer output (TIM1 ... TIM14, channel 1 ... 4).
+/// Where an alternate-function pin gets its level, or brings it: a timer's channel (TIM1 ... TIM14, channel 1 ... 4).
 struct TimerOutput {
   uint8_t timer = 0, channel = 0;
 };
@@ -52,13 +52,18 @@ class Gpio final : public RegisterBlock {
     driven_[number] = level ? 1 : 0;
     update(number, at);
   }
+  /// A timer's channel takes its pin's level, or gives it again.
+  void timer_direction(TimerOutput of, bool is_input, Cycles at) {
+    timer_inputs_[of.timer][of.channel] = is_input;
+    update_those_of(of, at);
+  }
+  /// The timer channel that the pin leads to, by its alternate function; timer 0: none.
+  [[nodiscard]] TimerOutput timer_of(uint8_t number) const { return sources_[number]; }
+  [[nodiscard]] bool is_analog(uint8_t number) const { return mode(number) == analog; }
   /// A timer output changed to `level`.
   void timer_level(TimerOutput from, bool level, Cycles at) {
     timer_levels_[from.timer][from.channel] = level;
-    for (uint8_t number = 0; number < pins_per_port; ++number) {
-      const TimerOutput source = sources_[number];
-      if (source.timer == from.timer && source.channel == from.channel) update(number, at);
-    }
+    update_those_of(from, at);
   }
 
  private:
@@ -114,10 +119,17 @@ class Gpio final : public RegisterBlock {
       }
       case alternate: {
         const TimerOutput source = sources_[number];
-        return source.timer == 0 ? rest : timer_levels_[source.timer][source.channel];
+        const bool gives = source.timer != 0 && !timer_inputs_[source.timer][source.channel];
+        return gives ? timer_levels_[source.timer][source.channel] : rest;
       }
       default:
         return rest;
+    }
+  }
+  void update_those_of(TimerOutput channel, Cycles at) {
+    for (uint8_t number = 0; number < pins_per_port; ++number) {
+      const TimerOutput source = sources_[number];
+      if (source.timer == channel.timer && source.channel == channel.channel) update(number, at);
     }
   }
   void update(uint32_t number, Cycles at) {
@@ -143,9 +155,9 @@ class Gpio final : public RegisterBlock {
   PinLog& log_;
   uint32_t moder_ = 0, otyper_ = 0, ospeedr_ = 0, pupdr_ = 0, odr_ = 0, lckr_ = 0;
   std::array<uint32_t, 2> alternate_{};
-  std::array<int8_t, pins_per_port> driven_{};          ///< -1: not driven from outside
-  std::array<TimerOutput, pins_per_port> sources_{};    ///< of pins in alternate mode
-  std::array<std::array<bool, 5>, 15> timer_levels_{};  ///< by timer and channel number
+  std::array<int8_t, pins_per_port> driven_{};                           ///< -1: not driven from outside
+  std::array<TimerOutput, pins_per_port> sources_{};                     ///< of pins in alternate mode
+  std::array<std::array<bool, 5>, 15> timer_levels_{}, timer_inputs_{};  ///< by timer and channel number
 };
 
 }  // namespace diastole::board_model

@@ -1,8 +1,8 @@
 #pragma once
 // Timers TIM1 ... TIM14: up-counting with prescaler and auto-reload, compare channels with their output
 // modes, preload registers, update generation, one-pulse mode, trigger output and the slave modes reset,
-// trigger and external clock 1 (RM0090, 17-19). Capture: of the internal trigger (CCxS = 3), and of TIM11's channel 1 from
-// the crystal (TIM11_OR).
+// trigger and external clock 1, by an internal trigger or the timer's own second input (RM0090, 17-19). Capture: of a channel's
+// own pin (CCxS = 1), of the internal trigger (CCxS = 3), and of TIM11's channel 1 from the crystal (TIM11_OR).
 //
 // The counter is a function of time. Whatever happens at a count (update, compare match) is worked out in
 // order when time reaches it or when a register is looked at, so edges are exact to the timer's clock.
@@ -12,6 +12,7 @@
 #include <cmath>
 #include <functional>
 #include <string>
+#include <utility>
 
 #include "tools/sim_board/core/notes.hpp"
 #include "tools/sim_board/core/nvic.hpp"
@@ -35,6 +36,8 @@ class Timer final : public RegisterBlock {
   struct Wiring {
     std::function<void(uint8_t channel, bool level, Cycles at)> output;
     std::function<void(Cycles at)> trigger_output;
+    /// A channel becomes an input (CCxS), or an output again.
+    std::function<void(uint8_t channel, bool input, Cycles at)> direction;
     /// A compare value was written that the counter has already passed: the edge comes a whole turn late.
     std::function<void(uint8_t channel, Cycles late_by)> missed;
     /// TIM11 only: core cycles between edges of the divided crystal, 0 without.
@@ -91,7 +94,7 @@ class Timer final : public RegisterBlock {
         break;
       default:
         RegisterBlock::write(offset, value, mask);
-        if (offset == 0x18 || offset == 0x1c) apply_forced_modes(now);
+        if (offset == 0x18 || offset == 0x1c) set_directions(now), apply_forced_modes(now);
         prescaler_preload_ &= 0xffff;
         if (offset == 0x30 && rcr_ != 0) unmodelled("the repetition counter");
         break;
@@ -111,6 +114,7 @@ class Timer final : public RegisterBlock {
       channel.compare = channel.preload = 0;
       channel.reference = false;
     }
+    set_directions(clock_.now());
     set_outputs(clock_.now());
     set_lines();
     ask();
@@ -146,6 +150,18 @@ class Timer final : public RegisterBlock {
         break;
     }
     sr_ |= trigger_flag;
+    set_lines();
+    ask();
+  }
+  /// An edge at the pin of channel `channel` (0 ... 3), with the alternate function that leads to it.
+  void pin_edge(uint32_t channel, bool rises, Cycles at) {
+    const uint32_t enable = ccer_ >> (4 * channel);
+    if (rises == ((enable >> 1 & 1) != 0) || or_ != 0) return;  // CCxP
+    settle(at);
+    if (input(channel) == from_own_pin && (enable & 1) != 0) capture(channel, count_);
+    constexpr uint32_t second_input = 6;
+    if (channel == 1 && external_clock() && (smcr_ >> 4 & 7) == second_input && (cr1_ & 1) != 0)
+      advance_count(1, at);
     set_lines();
     ask();
   }
@@ -199,6 +215,7 @@ class Timer final : public RegisterBlock {
     uint32_t preload = 0;    ///< the value in CCRx
     bool reference = false;  ///< OCxREF
     bool output = false;     ///< level at the pin
+    bool is_input = false;   ///< CCxS
   };
 
   [[nodiscard]] bool counting() const { return (cr1_ & 1) != 0 && reload_ != 0 && !external_clock(); }
@@ -352,10 +369,18 @@ class Timer final : public RegisterBlock {
     for (uint32_t index = 0; index < channel_count; ++index) {
       Channel& channel = channels_[index];
       const uint32_t enable = ccer_ >> (4 * index);
-      const bool level = main_output && (enable & 1) != 0 && channel.reference != ((enable >> 1 & 1) != 0);
+      const bool level = main_output && (enable & 1) != 0 && input(index) == 0 &&
+                         channel.reference != ((enable >> 1 & 1) != 0);
       if (level == channel.output) continue;
       channel.output = level;
       if (wiring_.output) wiring_.output(static_cast<uint8_t>(index + 1), level, at);
+    }
+  }
+  void set_directions(Cycles at) {
+    for (uint32_t index = 0; index < channel_count; ++index) {
+      const bool is_input = input(index) != 0;
+      if (std::exchange(channels_[index].is_input, is_input) != is_input && wiring_.direction)
+        wiring_.direction(static_cast<uint8_t>(index + 1), is_input, at);
     }
   }
   void apply_forced_modes(Cycles at) {
