@@ -107,8 +107,8 @@ BootDecision decide(const S& store) {
   }
 }
 
-/// The highest rollback counter that is known: what is recorded, and that of the image that would be kept. So it outlives the
-/// moment in which the records are erased.
+/// Below this nothing is taken: what is recorded, and the counter of the image that would be kept, whatever is recorded of it.
+/// So it outlives the moment in which the records are erased.
 template <SlotStore S>
 std::uint32_t rollback_counter(const S& store, const BootDecision& decision) {
   const std::uint32_t recorded = recorded_counter(store.records());

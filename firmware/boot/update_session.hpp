@@ -118,20 +118,19 @@ bool UpdateSession<S>::make_room(const wire::BeginUpdate& request) {
 }
 
 /// Precondition: the free slot is erased. Then only one image is left to start, whatever the records say: they
-/// may be lost in the middle of this. Its signature holds the rollback counter meanwhile; without such an image a counter
-/// is not erased, but the last cells are used up.
+/// may be lost in the middle of this. Its signature holds the rollback counter meanwhile, and if it is confirmed until the next
+/// start records it; without such an image a counter is not erased, but the last cells are used up.
 template <SlotStore S>
 bool UpdateSession<S>::compact_records(const BootDecision& decision) {
-  const std::uint32_t counter = rollback_counter(store_, decision);
-  if (decision.keep == wire::ImageSlot::none) {
-    if (counter > 0) return records_left(store_.records()) >= kRecordsOfAnUpdate;
-    return store_.erase_records();
-  }
+  const std::uint32_t counter = recorded_counter(store_.records());
+  if (decision.keep == wire::ImageSlot::none && counter > 0)
+    return records_left(store_.records()) >= kRecordsOfAnUpdate;
   if (!store_.erase_records()) return false;
-  if (counter > 0 && !append(store_, {BootEvent::raised, slot_, tag_of_counter(counter)})) return false;
-  if (decision.state[static_cast<std::size_t>(decision.keep)] != wire::ImageState::confirmed) return true;
-  const auto header = header_in(store_.slot(decision.keep));
-  return append(store_, {BootEvent::confirmed, decision.keep, tag_of(*header)});
+  if (decision.keep != wire::ImageSlot::none &&
+      decision.state[static_cast<std::size_t>(decision.keep)] == wire::ImageState::confirmed)
+    return append(store_,
+                  {BootEvent::confirmed, decision.keep, tag_of(*header_in(store_.slot(decision.keep)))});
+  return counter == 0 || append(store_, {BootEvent::raised, slot_, tag_of_counter(counter)});
 }
 
 template <SlotStore S>

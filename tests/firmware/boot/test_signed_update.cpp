@@ -153,5 +153,35 @@ TEST(RollbackCounter, OutlivesAPowerCutAtEveryOperationOfItsUpdate) {
   EXPECT_GT(cuts, 80U);
 }
 
+/// The confirmed image of 5 was replaced by SWD, past the bootloader, by one of 9 that nobody has confirmed; and the next
+/// update writes the nearly full records anew.
+TEST(RollbackCounter, IsNotRecordedOfAnImageThatNobodyHasConfirmed) {
+  MemorySlots slots = locked_board(24 * boot::kRecordBytes);
+  (void)start(slots);
+  ASSERT_EQ(boot::recorded_counter(slots.records()), 5U);
+  const auto replace = [&](std::uint32_t counter) {
+    ASSERT_TRUE(slots.erase_slot(ImageSlot::a));
+    put(slots, ImageSlot::a, image_of({0, 1, 0}, counter, 20));
+  };
+  replace(9);
+  while (boot::records_left(slots.records()) > 15)
+    ASSERT_TRUE(append(slots, {BootEvent::erased, ImageSlot::b, {}}));
+  EXPECT_EQ(install(slots, image_of({0, 1, 1}, 8, 21)), UpdateOutcome::rolled_back) << "while it is kept";
+  ASSERT_EQ(install(slots, image_of({0, 1, 1}, 9, 22)), UpdateOutcome::done);
+  ASSERT_GT(boot::records_left(slots.records()), 20U) << "not written anew";
+  EXPECT_EQ(boot::recorded_counter(slots.records()), 5U);
+  EXPECT_TRUE(start(slots).trial);
+  EXPECT_EQ(boot::recorded_counter(slots.records()), 5U) << "nor on trial";
+  EXPECT_EQ(start(slots).keep, ImageSlot::a) << "nobody has confirmed that one either";
+  EXPECT_EQ(boot::recorded_counter(slots.records()), 5U);
+  replace(6);
+  EXPECT_EQ(start(slots).start, ImageSlot::a) << "the laboratory goes back by SWD";
+  EXPECT_EQ(install(slots, image_of({0, 1, 1}, 6, 23)), UpdateOutcome::done);
+  (void)start(slots);
+  confirm(slots, ImageSlot::b);
+  (void)start(slots);
+  EXPECT_EQ(boot::recorded_counter(slots.records()), 6U);
+}
+
 }  // namespace
 }  // namespace diastole::boot_test
