@@ -13,6 +13,7 @@
 #include "firmware/core/r_wave.hpp"
 #include "firmware/core/units.hpp"
 #include "protocol/wire/image_header.hpp"
+#include "protocol/wire/self_test_messages.hpp"
 #include "protocol/wire/states.hpp"
 #include "protocol/wire/update.hpp"
 
@@ -99,6 +100,9 @@ concept Board = requires(B& board, const B& fixed, const PulseOrder& order,
   { fixed.takes_unsigned_firmware() } -> std::same_as<bool>;
   /// Makes the running image the one to start from now on; at rest only. False: the flash did not take it.
   { board.confirm_image() } -> std::same_as<bool>;
+  /// One measurement over loop-back wires, without answering the line for up to 50 ms; pins, position and counters are
+  /// afterwards as before. Precondition: nothing moves or is scheduled, and the motor has no current.
+  { board.self_test(wire::SelfTest{}) } -> std::same_as<wire::SelfTestReport>;
   /// Resets, into the bootloader if asked. Outputs must be safe.
   {board.restart(true)};
   /// Interrupts that call the core are held off while one of these lives.

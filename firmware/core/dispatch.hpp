@@ -160,6 +160,13 @@ class Dispatch {
     report.free_slot = image.slot == wire::ImageSlot::a ? wire::ImageSlot::b : wire::ImageSlot::a;
     answer(report);
   }
+  void handle(const wire::SelfTest& request) {
+    const wire::Refusal refusal = motion_.self_test_refusal();
+    if (refusal != wire::Refusal::none) return conclude(request, refusal);
+    wire::SelfTestReport report = board_.self_test(request);
+    report.request_id = request.request_id;
+    answer(report);
+  }
   void handle(const wire::Configure& request) { conclude(request, motion_.configure(request)); }
   void handle(const wire::ClearProgram& request) { conclude(request, motion_.clear_program()); }
   void handle(const wire::AddSegment& request) { conclude(request, motion_.add_segment(request)); }

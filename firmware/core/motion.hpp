@@ -168,6 +168,14 @@ class Motion {
     stays_faulted_ = true;
     latch(fault);
   }
+  /// What forbids pulses that nothing may follow: a motion, a program that waits for its start, a motor with current.
+  [[nodiscard]] wire::Refusal self_test_refusal() const {
+    const wire::State state = safety_.state();
+    if ((state != wire::State::unhomed && state != wire::State::homed && state != wire::State::faulted) ||
+        fault_pending() || run_.end_due())
+      return wire::Refusal::wrong_state;
+    return motor_enabled_ ? wire::Refusal::motor_powered : wire::Refusal::none;
+  }
   void heartbeat(std::uint32_t lease_id) { lease_.heartbeat(lease_id, board_.now()); }
 
   /// One turn of the main loop: faults, lease, homing, refilling the queue, reports.

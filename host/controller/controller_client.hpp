@@ -102,6 +102,12 @@ class ControllerClient final : public Controller {
     }
   }
 
+  /// One measurement over loop-back wires (self_test.hpp). Throws HardwareError if the controller may not now.
+  wire::SelfTestReport self_test(wire::SelfTestItem item, uint16_t argument = 0) {
+    return requests_.ask<wire::SelfTestReport>(wire::SelfTest{.item = item, .argument = argument},
+                                               "does not report what it measured");
+  }
+
   /// Loads and checks a whole program; afterwards the controller is armed, and will report positions at the
   /// sample rate, but no slower than 300 Hz and no faster than 1000 Hz. A program beyond a limit throws
   /// InputError naming the experiment's segment, the limit, what was asked and what is allowed; so does one
@@ -194,6 +200,7 @@ class ControllerClient final : public Controller {
                             [&](const wire::Ack& m) { requests_.take(m); },
                             [&](const wire::SettingsReport& m) { requests_.take(m); },
                             [&](const wire::BlackBoxReport& m) { requests_.take(m); },
+                            [&](const wire::SelfTestReport& m) { requests_.take(m); },
                             [&](const wire::Nak& m) {
                               if (!requests_.take(m)) telemetry_.take(m);
                             },

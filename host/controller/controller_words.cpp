@@ -146,6 +146,10 @@ std::string remedy_for(wire::Refusal refusal) {
       return "Compare the rig file with `diastole settings`.";
     case wire::Refusal::supply_low:
       return "Measure the board's 3.3 V and mend its supply, then try again.";
+    case wire::Refusal::motor_powered:
+      return "Reset the controller, which takes the motor's current away and forgets the position; then try "
+             "again before "
+             "anything moves.";
     case wire::Refusal::flash_failed:
       return "Try again; if it persists the chip's flash is worn out: replace the board.";
     case wire::Refusal::limit_switch_closed:

@@ -19,7 +19,7 @@ namespace diastole {
 class Requests {
  public:
   using Answer = std::variant<wire::Ack, wire::Nak, wire::Hello, wire::Status, wire::SettingsReport,
-                              wire::BlackBoxReport>;
+                              wire::BlackBoxReport, wire::SelfTestReport>;
 
   /// `port` is for messages; clock and link outlive this.
   Requests(Clock& clock, ControllerLink& link, const std::string& port)
@@ -46,12 +46,13 @@ class Requests {
   void demand(const Message& message) {
     if (const auto nak = refusal_of(message)) refuse(*nak);
   }
-  /// The answer of this type; throws HardwareError that says `problem` if another comes.
+  /// The answer of this type; throws HardwareError with the refusal in words, or that says `problem` if another comes.
   template <class Reply, class Message>
   Reply ask(const Message& message, const char* problem,
             const char* remedy = "Restart the daemon if it persists.") {
     const Answer answer = answer_to(message);
     if (const auto* reply = std::get_if<Reply>(&answer)) return *reply;
+    if (const auto* nak = std::get_if<wire::Nak>(&answer)) refuse(*nak);
     fail(problem, remedy);
   }
 

@@ -19,6 +19,7 @@
 #include "protocol/wire/motion_messages.hpp"
 #include "protocol/wire/program_messages.hpp"
 #include "protocol/wire/result.hpp"
+#include "protocol/wire/self_test_messages.hpp"
 #include "protocol/wire/session_messages.hpp"
 #include "protocol/wire/settings_messages.hpp"
 #include "protocol/wire/status_messages.hpp"

@@ -144,6 +144,14 @@ class RecordingBoard {
     options_.image.state = wire::ImageState::confirmed;
     return true;
   }
+  /// No wire leads back to this board.
+  [[nodiscard]] wire::SelfTestReport self_test(const wire::SelfTest& request) const {
+    wire::SelfTestReport report;
+    report.item = request.item;
+    report.argument = request.argument;
+    report.ttl_late_ticks = report.step_late_ticks = report.r_wave_late_ticks = wire::kNotSeen;
+    return report;
+  }
   void restart(bool into_bootloader) {
     restart_ = into_bootloader ? Restart::into_bootloader : Restart::plain;
   }

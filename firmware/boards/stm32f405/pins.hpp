@@ -15,6 +15,8 @@
 //   PC1   home       EXTI1              in      pull-up: open contact (high) = closed on the piston
 //   PC2   far limit  EXTI2              in      pull-up: as home
 //
+// PA3, PA5 and PC3 are left as after reset, but for a self-test's measurements (loop_back.hpp).
+//
 // Switches are normally closed to ground, so that a broken wire reads as pressed.
 
 #include <cstdint>

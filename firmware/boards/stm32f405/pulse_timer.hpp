@@ -33,6 +33,9 @@ class PulseTimer {
     if (order.ttl) raise_ttl(order.tick, order.ttl_width);
     if (order.step && order.inflate != inflate_) set_direction(order.inflate, order.tick);
   }
+  /// A STEP in the direction that DIR has. TIM5's interrupt may be held off: step_done() says the same.
+  void step(std::uint32_t tick) { steps_.schedule(tick, true); }
+  [[nodiscard]] static bool step_done() { return StepTimer::matched(); }
   /// A tick that has passed raises it at once. Precondition: the TTL before has fallen.
   void raise_ttl(std::uint32_t tick, firmware::Ticks width);
   /// When the TTL ordered for `tick` rose: as captured, and if the pin was seen active. One that rose as ordered is captured

@@ -60,6 +60,24 @@ void RWavePlayer::arm() {
   tim4().SMCR.change(7U, kTriggerMode);
 }
 
+void RWavePlayer::arm_with(std::uint16_t first_code) {
+  arm();
+  dac().DHR12R1.write(first_code);
+}
+
+void RWavePlayer::hold(std::uint16_t code) {
+  interrupt();
+  DmaStream& stream = dma1().stream[5];
+  stream.CR.write(0);
+  while ((stream.CR.read() & kStreamEnable) != 0) {
+  }
+  dma1().HIFCR.write(kStream5Flags);
+  dac().CR.clear(kDacDma);  // no request stays behind (errata sheet ES0182, 2.5.1)
+  dac().DHR12R1.write(code);
+  tim4().EGR.write(1);  // TRGO, which moves the code to the output
+  dac().CR.set(kDacDma);
+}
+
 void RWavePlayer::disarm() { tim4().SMCR.change(7U, 0); }
 
 void RWavePlayer::interrupt() {

@@ -18,6 +18,10 @@ class RWavePlayer {
   void arm();
   /// A rise of the TTL starts nothing; a wave that is being played goes on to its end.
   void disarm();
+  /// As arm(), but the wave begins with this code.
+  void arm_with(std::uint16_t first_code);
+  /// The output goes to this code and stays there, wave or not; arm() and the next wave begin as ever.
+  void hold(std::uint16_t code);
   /// DMA1 stream 5: the wave is over.
   void interrupt();
 

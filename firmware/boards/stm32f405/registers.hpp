@@ -65,6 +65,15 @@ struct Dac {  // 14.5
 };
 static_assert(offsetof(Dac, SR) == 0x34);
 
+struct Adc {  // 13.13
+  Register SR, CR1, CR2, SMPR[2], JOFR[4], HTR, LTR, SQR[3], JSQR, JDR[4], DR;
+};
+static_assert(offsetof(Adc, DR) == 0x4C);
+
+struct AdcCommon {  // 13.13.15
+  Register CSR, CCR;
+};
+
 struct DmaStream {
   Register CR, NDTR, PAR, M0AR, M1AR, FCR;
 };
@@ -133,9 +142,12 @@ inline Timer& tim2() { return at<Timer>(0x4000'0000); }
 inline Timer& tim3() { return at<Timer>(0x4000'0400); }
 inline Timer& tim4() { return at<Timer>(0x4000'0800); }
 inline Timer& tim5() { return at<Timer>(0x4000'0C00); }
+inline Timer& tim9() { return at<Timer>(0x4001'4000); }
 inline Timer& tim11() { return at<Timer>(0x4001'4800); }
 inline Usart& usart3() { return at<Usart>(0x4000'4800); }
 inline Dac& dac() { return at<Dac>(0x4000'7400); }
+inline Adc& adc1() { return at<Adc>(0x4001'2000); }
+inline AdcCommon& adc_common() { return at<AdcCommon>(0x4001'2300); }
 inline Dma& dma1() { return at<Dma>(0x4002'6000); }
 inline Exti& exti() { return at<Exti>(0x4001'3C00); }
 inline Syscfg& syscfg() { return at<Syscfg>(0x4001'3800); }
@@ -166,5 +178,23 @@ inline void enable_interrupt(Interrupt number, std::uint8_t priority) {
   nvic().IPR[number] = static_cast<std::uint8_t>(priority << 4);
   nvic().ISER[number / 32].write(1U << (number % 32));
 }
+
+/// While one of these lives the interrupt is not served, and what asked for it meanwhile is forgotten. It was enabled before.
+class InterruptHeld {
+ public:
+  explicit InterruptHeld(Interrupt number) : number_(number) {
+    nvic().ICER[number / 32].write(1U << (number % 32));
+    asm volatile("dsb \n isb" ::: "memory");
+  }
+  ~InterruptHeld() {
+    nvic().ICPR[number_ / 32].write(1U << (number_ % 32));
+    nvic().ISER[number_ / 32].write(1U << (number_ % 32));
+  }
+  InterruptHeld(const InterruptHeld&) = delete;
+  InterruptHeld& operator=(const InterruptHeld&) = delete;
+
+ private:
+  Interrupt number_;
+};
 
 }  // namespace diastole::stm32

@@ -41,6 +41,8 @@ class StepTimer {
     tim3().SMCR.write(step ? kStartedByTim5 : kFromTim5);
     tim5().DIER.write(kCompare);
   }
+  /// Whether the compare event that was scheduled has come.
+  [[nodiscard]] static bool matched() { return (tim5().SR.read() & kCompare) != 0; }
   /// No compare event has a consequence; a pulse that has begun ends in time.
   void rest() {
     tim3().SMCR.write(kFromTim5);

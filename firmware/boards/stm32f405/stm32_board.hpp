@@ -12,6 +12,7 @@
 #include <optional>
 #include <span>
 
+#include "firmware/boards/stm32f405/loop_back.hpp"
 #include "firmware/boards/stm32f405/pulse_timer.hpp"
 #include "firmware/boards/stm32f405/r_wave_player.hpp"
 #include "firmware/boards/stm32f405/running_image.hpp"
@@ -73,6 +74,10 @@ class Stm32Board {
   [[nodiscard]] firmware::RunningImage running_image() const { return stm32::running_image(); }
   [[nodiscard]] bool takes_unsigned_firmware() const { return stm32::takes_unsigned_firmware(); }
   bool confirm_image() { return confirm_running_image(); }
+  wire::SelfTestReport self_test(const wire::SelfTest& request) {
+    const bool ttl_active_low = signals_ && signals_->ttl_active_low;
+    return LoopBack(timer_, r_wave_).measure(request.item, request.argument, ttl_active_low);
+  }
   void restart(bool into_bootloader) { stm32::restart(into_bootloader); }
 
   /// Main loop: until a turn is due.

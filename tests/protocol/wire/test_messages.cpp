@@ -24,8 +24,8 @@ Bytes encoded(const Message& message) {
 /// Every message header, with comment marks and line breaks made one blank.
 std::string header_text() {
   std::string text;
-  for (const char* name :
-       {"session", "program", "motion", "status", "telemetry", "settings", "black_box", "update"}) {
+  for (const char* name : {"session", "program", "motion", "status", "telemetry", "settings", "black_box",
+                           "self_test", "update"}) {
     std::ifstream file(std::string(DIASTOLE_SOURCE_DIR "/protocol/wire/") + name + "_messages.hpp");
     text += std::string(std::istreambuf_iterator<char>(file), {});
   }
