@@ -44,6 +44,38 @@ TEST(SignedFlashing, RefusesWhatTheKeyDoesNotVouchFor) {
   EXPECT_EQ(bench.runs(), "0.1.0 confirmed");
 }
 
+/// On the chip the curve's multiplication is other code than on this machine. Each of these is judged by the bootloader itself.
+TEST(SignedFlashing, RefusesSignaturesThatAreNearlyRight) {
+  NEEDS_KEY();
+  FlashBench bench;
+  const UpdateFile good = signed_with(read_update_file(newer_update), signing::read_key_file(key_file), 0);
+  const auto refusal_with = [&](auto&& change) {
+    UpdateFile file = good;
+    for (SlotImage& image : file.images)
+      change(image.signature.signature);
+    return refusal(bench, file);
+  };
+  const auto wrong = HasSubstr("signed with another key");
+  for (const size_t bit : {0U, 255U, 256U, 507U})
+    EXPECT_THAT(refusal_with([bit](auto& bytes) { bytes[bit / 8] ^= static_cast<uint8_t>(1U << bit % 8); }),
+                wrong)
+        << bit;
+  EXPECT_THAT(refusal_with([](auto& bytes) {  // S + L
+                constexpr uint8_t order[] = {0xed, 0xd3, 0xf5, 0x5c, 0x1a, 0x63, 0x12, 0x58,
+                                             0xd6, 0x9c, 0xf7, 0xa2, 0xde, 0xf9, 0xde, 0x14};
+                unsigned carry = 0;
+                for (size_t i = 0; i < 32; ++i, carry >>= 8) {
+                  carry += bytes[32 + i] + (i < 16 ? order[i] : i == 31 ? 0x10U : 0U);
+                  bytes[32 + i] = static_cast<uint8_t>(carry & 0xff);
+                }
+              }),
+              wrong);
+  for (const uint8_t first : std::initializer_list<uint8_t>{0, 1})  // points of order 4 and 1 for R, S = 0
+    EXPECT_THAT(refusal_with([first](auto& bytes) { bytes.fill(0), bytes[0] = first; }), wrong);
+  EXPECT_EQ(refusal(bench, good), "");
+  EXPECT_EQ(bench.runs(), "0.1.1 confirmed");
+}
+
 TEST(SignedFlashing, NeverGoesBelowTheCounterThatItHasConfirmed) {
   NEEDS_KEY();
   FlashBench bench;
