@@ -12,6 +12,7 @@
 
 #include "host/acquisition/acquisition.hpp"
 #include "host/config/rig_config.hpp"
+#include "host/controller/self_test.hpp"
 #include "protocol/wire/messages.hpp"
 
 namespace diastole {
@@ -78,6 +79,10 @@ struct CalibrationReport {
   std::vector<ChannelReading> channels;
 };
 
+struct SelfTestResult {
+  std::vector<SelfTestCheck> checks;
+};
+
 /// Where a run that begins is written, and what is made of it at the end.
 struct RunBegun {
   std::string run_id;
@@ -85,7 +90,8 @@ struct RunBegun {
   std::string run_file;
 };
 
-using RigAnswer = std::variant<RigStatus, SettingsReport, BlackBox, CalibrationReport, RunBegun>;
+using RigAnswer =
+    std::variant<RigStatus, SettingsReport, BlackBox, CalibrationReport, RunBegun, SelfTestResult>;
 /// Called once on the rig's thread: with an error, or with an answer.
 using RigDone = std::function<void(const std::exception_ptr& error, const RigAnswer& answer)>;
 

@@ -406,6 +406,40 @@ void RigService::beside_the_line(const std::function<void()>& work) {
   done.get();
 }
 
+void RigService::self_test(double seconds, Done done) {
+  queue_.give({"self_testing", [this, seconds] { return do_self_test(seconds); }, std::move(done)});
+}
+
+SelfTestResult RigService::do_self_test(double seconds) {
+  using enum wire::SelfTestItem;
+  SelfTestReadings readings;
+  readings.tick_rate_Hz = static_cast<double>(controller_->hello().tick_rate_Hz);
+  controller_->take_events();
+  readings.supply = controller_->self_test(supply);
+  for (const uint16_t code : self_test_codes)
+    readings.levels.push_back(controller_->self_test(level, code));
+  for (int i = 0; i < self_test_pulses; ++i)
+    readings.pulses.push_back(controller_->self_test(pulse));
+  readings.steps = controller_->self_test(steps, self_test_steps);
+  const uint64_t end_ns = clock_->now_ns() + static_cast<uint64_t>(1e9 * seconds);
+  while (clock_->now_ns() < end_ns) {
+    if (asked_to_stop()) throw HardwareError("rig", "the self-test was stopped", "Nothing moved.");
+    clock_->sleep_until_ns(std::min(end_ns, controller_->next_due_ns()), controller_->line());
+    controller_->service();
+    for (const ControllerEvent& event : controller_->take_events()) {
+      if (const auto* broken = std::get_if<LinkBroken>(&event))
+        throw HardwareError("controller at " + rig_.controller.port, broken->reason,
+                            "Check the cable, then try again.");
+      if (const auto* reading = std::get_if<ClockReading>(&event))
+        readings.clock.push_back({1e-9 * static_cast<double>(reading->host_ns),
+                                  static_cast<double>(reading->tick) / readings.tick_rate_Hz,
+                                  1e-9 * static_cast<double>(reading->half_round_trip_ns)});
+    }
+  }
+  (void)do_status();
+  return {judge(readings)};
+}
+
 void RigService::calibrate(CalibrationOrder order, Done done) {
   queue_.give({order.kPa ? "calibrating" : "zeroing",
                [this, order = std::move(order)] { return do_calibrate(order); }, std::move(done)});

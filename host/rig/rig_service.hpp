@@ -79,6 +79,9 @@ class RigService {
   void write_settings(SettingsChange change, Done done);
   /// BlackBox. Throws RigBusy while the rig is occupied; does not occupy it.
   void black_box(Done done);
+  /// SelfTestResult: the controller's measurements over loop-back wires, and the clocks compared for so long. HardwareError if
+  /// its motor is powered.
+  void self_test(double seconds, Done done);
   /// CalibrationReport. HardwareError, and nothing changed, when samples are missing, or noise or drift is too high for
   /// rest.
   void calibrate(CalibrationOrder order, Done done);
@@ -116,6 +119,7 @@ class RigService {
   /// Waits while the controller is in this state, passing on a stop; true if one was asked for.
   bool await_end_of(wire::State moving);
   SettingsReport remember_settings();
+  SelfTestResult do_self_test(double seconds);
   CalibrationReport do_calibrate(const CalibrationOrder& order);
   RigStatus do_status();
   RigStatus remember(const wire::Status& status);

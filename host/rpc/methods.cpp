@@ -52,6 +52,13 @@ void rig_write_settings(RigService& rig, const json& params, const Reply& reply)
                      to(reply));
 }
 
+void rig_self_test(RigService& rig, const json& params, const Reply& reply) {
+  const double seconds = params.contains("seconds") ? number_in(params, "seconds") : 10;
+  if (!(seconds >= 2 && seconds <= 600))
+    throw rpc::Error(rpc::Code::invalid_params, "seconds must be 2 to 600");
+  rig.self_test(seconds, to(reply));
+}
+
 CalibrationOrder measurement_in(const json& params) {
   CalibrationOrder order;
   order.channels = params.value("channels", std::vector<std::string>{});
@@ -155,6 +162,7 @@ constexpr std::array all_methods{
     Method{"rig.jog", Access::controller, rig_jog},
     Method{"rig.settings", Access::anybody, plain<&RigService::settings>},
     Method{"rig.write_settings", Access::controller, rig_write_settings},
+    Method{"rig.self_test", Access::controller, rig_self_test},
     Method{"rig.black_box", Access::anybody, plain<&RigService::black_box>},
     Method{"run.start", Access::controller, run_start},
     Method{"run.progress", Access::anybody,

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <string>
@@ -97,6 +98,16 @@ json object_of(const BlackBox& box) {
 }
 
 json object_of(const CalibrationReport& report) { return report; }
+
+json object_of(const SelfTestResult& result) {
+  const auto check = [](const SelfTestCheck& each) -> json {
+    return {DIASTOLE_NAMED(each, name, what, least, most, unit, remedy),
+            {"measured", or_null(each.measured)},
+            {"passed", each.passed()}};
+  };
+  return {{"passed", std::ranges::all_of(result.checks, &SelfTestCheck::passed)},
+          {"checks", array_of(result.checks, check)}};
+}
 
 json object_of(const RunBegun& run) { return run; }
 

@@ -15,7 +15,8 @@ NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(ScheduleProgress, block, slice, slices, phase
 /// "stopped" too. SettingsReport: {"record", "settings": {name: value}, "microstep_uL", "backlash_microsteps",
 /// "problem"}. BlackBox: {"entries": [{"number", "boot", "time_s", "kind", "text"}], "since_power_on"}.
 /// CalibrationReport: {"file", "channels": [{"name", "samples", "mean_V", ...}]}. RunBegun: {"run_id", "journal",
-/// "run_file"}.
+/// "run_file"}. SelfTestResult: {"passed", "checks": [{"name", "what", "passed", "measured" (null: nothing seen), "least", "most",
+/// "unit", "remedy"}]}.
 nlohmann::json as_json(const RigAnswer& answer);
 
 /// {"run_id", "state": running|writing|done|failed, "planned_s", "planned_cycles", "received", "missing", "triggers",

@@ -13,6 +13,7 @@
 //                                                   controller    the same
 //   rig.clear_fault                                 controller    status
 //   rig.jog         {mL, rate_mL_s}                 controller    status, and jogged_mL
+//   rig.self_test   {seconds}                       controller    {passed, checks}: RigService::self_test
 //   rig.settings                                    anybody       RigService::settings
 //   rig.write_settings {set: {name: value}, defaults} controller  RigService::settings
 //   rig.black_box                                   anybody       RigService::black_box

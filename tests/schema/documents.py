@@ -169,6 +169,7 @@ def of_daemon(place):
     at = "--socket socket"
     try:
         yield "status", place.run(f"status {at}")
+        yield "selftest", place.run(f"selftest --seconds 2 {at}", (1,))  # no wires there, nothing moved yet
         yield "home", place.run(f"home {at}")
         yield "jog", place.run(f"jog --mL 1 {at}")
         yield "zero", place.run(f"zero --seconds 1 --operator Jo {at}")

@@ -52,6 +52,7 @@ void add_options(CLI::App& app, diastole::SessionOptions& options, bool& report,
       "press the e-stop at this time in seconds, or from one to another: 2.5 or 2.5..4; may be repeated");
   app.add_option("--limit-at", options.limit_at,
                  "close a limit switch: 2.5:home, 2.5:far or 2.5..4:far; may be repeated");
+  app.add_flag("--loop-back", options.loop_back, "put the wires of `diastole selftest` on");
   app.add_option("--power-cut", options.power_cut,
                  "cut the power in the middle of flash operation N (1 is the first)")
       ->check(CLI::PositiveNumber);

@@ -15,6 +15,7 @@
 
 #include "protocol/contract/input_error.hpp"
 #include "tools/sim_board/emulated_controller.hpp"
+#include "tools/sim_board/loop_back.hpp"
 #include "tools/sim_controller/pin_trace.hpp"
 #include "tools/sim_controller/pty_line.hpp"
 
@@ -117,6 +118,7 @@ class Session {
       restore_flash(controller_.board(), options.flash);
       controller_.board().power_cycle();
     }
+    if (options.loop_back) connect_loop_back(controller_.board(), {});
     move_switches();
     controller_.board().cut_power_at_flash_operation(options.power_cut);
   }

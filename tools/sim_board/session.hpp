@@ -30,6 +30,7 @@ struct SessionOptions {
   bool real_time = false;
   std::optional<double> seconds;
   std::vector<std::string> estop_at, limit_at;
+  bool loop_back = false;  ///< the wires of a self-test are on
   std::optional<uint64_t> power_cut;
   uint32_t crystal_Hz = 8'000'000;
   board_model::FlashTiming flash_timing = board_model::FlashTiming::hits;

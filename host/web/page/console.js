@@ -25,6 +25,7 @@ const stateWords = {
   loading: ["Loading", "The controller checks the experiment."],
   writing: ["Writing", "The run has ended; its file is being written."],
   clearing_fault: ["Clearing", "The fault is being cleared."],
+  self_testing: ["Self-test", "The controller measures its own outputs."],
   zeroing: ["Zeroing", "The pressure channels are averaged at rest."],
   calibrating: ["Measuring", "The pressure channels are averaged at rest."],
 };
