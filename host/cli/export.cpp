@@ -16,6 +16,7 @@
 #include "host/runfile/output_guard.hpp"
 #include "host/runfile/ro_crate.hpp"
 #include "protocol/contract/input_error.hpp"
+#include "protocol/contract/waiting_line.hpp"
 #include "protocol/runfile/reader.hpp"
 
 namespace diastole {
@@ -79,6 +80,7 @@ BidsFiles bids_files(const ExportOptions& options, const runfile::RecordedRun& r
 }
 
 json write_bids(const BidsFiles& files, const runfile::RecordedRun& run) {
+  const WaitingLine waiting("writing " + files.table.string());
   const BidsRecording recording = bids_recording(run);
   write_text_file(files.table, gzip(recording.table));
   write_text_file(files.description, recording.description.dump(2) + "\n");
@@ -117,6 +119,7 @@ std::vector<fs::path> crated_names(const ExportOptions& options) {
 }
 
 fs::path write_crate(const ExportOptions& options, const std::vector<runfile::RecordedRun>& runs) {
+  const WaitingLine waiting("writing " + options.crate.string());
   Crate crate{.title = fmt::format("Diastole session of {}", runs.front().started_utc),
               .published_utc = fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr))),
               .runs = {},
@@ -153,8 +156,10 @@ ExitCode export_runs(const ExportOptions& options, const CommandOutput& out) {
     throw InputError(
         {"", "--task", "is one label for several runs", "Leave it out: each run gets its file's name."});
   std::vector<runfile::RecordedRun> runs;
-  for (const fs::path& file : options.runs)
+  for (const fs::path& file : options.runs) {
+    const WaitingLine waiting("reading " + file.string());
     runs.push_back(runfile::read_run(file));
+  }
   std::vector<BidsFiles> files;
   if (!options.bids.empty()) {
     make_folder(options.bids);

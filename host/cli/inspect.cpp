@@ -2,11 +2,13 @@
 
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "host/cli/daemon_question.hpp"
 #include "host/cli/host_commands.hpp"
 #include "host/cli/session_facts.hpp"
 #include "protocol/contract/named_members.hpp"
+#include "protocol/contract/waiting_line.hpp"
 #include "protocol/runfile/reader.hpp"
 #include "protocol/runfile/soundness.hpp"
 
@@ -187,8 +189,10 @@ void add_inspect(CommandLine& line) {
                "Exit code 1: the file is whole, but the run is not sound (gaps, triggers, faults).");
   command->add_option("RUN", *file, "run file")->required();
   line.on_run(command, [file](const CommandOutput& out) {
+    std::optional<WaitingLine> waiting(std::in_place, "reading " + *file);
     const auto [run, rows] = runfile::open_run(*file);
     const runfile::Soundness soundness = runfile::assess(run, rows);
+    waiting.reset();
     print(out, as_json(run, soundness), [&, &known = run] { show(known, soundness); });
     return soundness.sound() ? ExitCode::done : ExitCode::negative;
   });

@@ -3,12 +3,14 @@
 #include <filesystem>
 #include <iostream>
 #include <memory>
+#include <optional>
 
 #include "estimator/io/member_json.hpp"
 #include "estimator/io/whole_file.hpp"
 #include "estimator/report/html_text.hpp"
 #include "estimator/report/page.hpp"
 #include "protocol/contract/input_error.hpp"
+#include "protocol/contract/waiting_line.hpp"
 #include "protocol/runfile/reader.hpp"
 #include "tools/diastole/commands.hpp"
 #include "tools/diastole/compare/comparison.hpp"
@@ -82,6 +84,7 @@ ExitCode compare_runs(const CompareOptions& options, const CommandOutput& out) {
   if (options.runs.size() < 2)
     throw InputError({"", "RUN", "one run cannot be compared", "Give two run files or more."});
   if (!options.page.empty()) require_output({options.page, options.runs, report::page_mark, options.force});
+  std::optional<WaitingLine> waiting(std::in_place, fmt::format("comparing {} runs", options.runs.size()));
   std::vector<runfile::RunFile> runs;
   std::vector<runfile::Session> sessions;
   for (const auto& file : options.runs) {
@@ -90,6 +93,7 @@ ExitCode compare_runs(const CompareOptions& options, const CommandOutput& out) {
   }
   const Comparison found = comparison::compare(runs, sessions, options.parts);
   if (!options.page.empty()) write_whole_file(options.page, comparison::comparison_page(found));
+  waiting.reset();
   if (out.json) {
     Json document = written(found);
     document["page"] = options.page.empty() ? Json() : Json(options.page.string());
