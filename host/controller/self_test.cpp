@@ -54,9 +54,10 @@ std::optional<double> seen(int32_t ticks) {
   return ticks == wire::kNotSeen ? std::nullopt : std::optional<double>(ticks);
 }
 
-std::optional<double> furthest(const std::optional<Range>& range) {
+/// The end of the range that is nearer to its limit, or further beyond it.
+std::optional<double> worst(const std::optional<Range>& range, double least, double most) {
   if (!range) return {};
-  return std::abs(range->least) > std::abs(range->most) ? range->least : range->most;
+  return range->least - least < most - range->most ? range->least : range->most;
 }
 
 std::optional<double> width(const std::optional<Range>& range) {
@@ -104,7 +105,8 @@ class Judge {
     const auto ttl = range_of(readings_.pulses, [](const auto& pulse) { return seen(pulse.ttl_late_ticks); });
     const char* const late =
         "Nothing but a wire may lie between PA1 and PA5; with that, the chip's timers are not as described.";
-    add_ticks("ttl_late", "TTL after its tick", furthest(ttl), 0, most_ttl_late_ticks, ttl ? late : ttl_wire);
+    add_ticks("ttl_late", "TTL after its tick", worst(ttl, 0, most_ttl_late_ticks), 0, most_ttl_late_ticks,
+              ttl ? late : ttl_wire);
     add_ticks("ttl_jitter", "TTL's jitter", width(ttl), 0, most_jitter_ticks,
               ttl ? "The TTL is not moved by the timer alone: do not use this board." : ttl_wire);
     const auto skew = range_of(readings_.pulses, [](const auto& pulse) -> std::optional<double> {
@@ -112,14 +114,16 @@ class Judge {
       return step && its_ttl ? std::optional(*step - *its_ttl) : std::nullopt;
     });
     const char* const no_skew = "Both wires are needed: PA6 to PA3 and PA1 to PA5.";
-    add_ticks("step_skew", "STEP after TTL", furthest(skew), least_skew_ticks, most_skew_ticks,
+    add_ticks("step_skew", "STEP after TTL", worst(skew, least_skew_ticks, most_skew_ticks), least_skew_ticks,
+              most_skew_ticks,
               skew ? "Make both wires alike; if it stays constant, put it into kPulseDelay of the firmware."
                    : no_skew);
     add_ticks("step_jitter", "its jitter", width(skew), 0, 2 * most_jitter_ticks,
               skew ? "STEP is not moved by the timer alone: do not use this board." : no_skew);
     const auto r_wave =
         range_of(readings_.pulses, [](const auto& pulse) { return seen(pulse.r_wave_late_ticks); });
-    add({"r_wave_late", "R-wave after its tick", scaled(furthest(r_wave), 1e-3 * tick_ns_), 0,
+    add({"r_wave_late", "R-wave after its tick",
+         scaled(worst(r_wave, 0, 1e3 * most_r_wave_late_us / tick_ns_), 1e-3 * tick_ns_), 0,
          most_r_wave_late_us, "us",
          r_wave ? "Take capacitors off the wire between PA4 and PC3; measure in front of the divider."
                 : r_wave_wire});
