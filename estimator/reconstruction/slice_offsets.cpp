@@ -10,6 +10,8 @@ namespace {
 struct Information {
   Eigen::MatrixXd S;
   Eigen::VectorXd t;
+  Eigen::VectorXd
+      of_tags;  ///< what each slice's tags would know of its offset in a body whose motion is known: the diagonal of C'C
 };
 
 Information information_of(const FrameField& field, const std::vector<int>& slice_of_tag,
@@ -27,14 +29,15 @@ Information information_of(const FrameField& field, const std::vector<int>& slic
   }
   // K is made of the rows as the system has them, weighted by 1/sigma without the scale; both scales cancel in K.
   const Eigen::MatrixXd seen = field.system->weighted_rows().transpose() * C;
-  return {C.transpose() * C - seen.transpose() * field.system->solve(seen), C.transpose() * residual};
+  const Eigen::MatrixXd all = C.transpose() * C;
+  return {all - seen.transpose() * field.system->solve(seen), C.transpose() * residual, all.diagonal()};
 }
 
 }  // namespace
 
 std::vector<SliceOffset> slice_offsets(const std::vector<FrameField>& fields, const TagGroups& groups,
                                        std::span<const TagPoint> tags) {
-  constexpr double significant = 5.0, smallest_mm = 0.1, least_sigmas = 0.5;
+  constexpr double significant = 5.0, smallest_mm = 0.1, least_sigmas = 0.5, least_left = 1e-4;
   const auto slices = static_cast<Eigen::Index>(groups.slices.size());
   std::vector<int> slice_of_tag(tags.size(), -1);
   std::vector<SliceOffset> result;
@@ -49,13 +52,14 @@ std::vector<SliceOffset> slice_offsets(const std::vector<FrameField>& fields, co
     result.push_back({s, 0.0, std::numeric_limits<double>::infinity(), false});
   }
   if (slices == 0) return result;
-  Information all{Eigen::MatrixXd::Zero(slices, slices), Eigen::VectorXd::Zero(slices)};
+  Information all{Eigen::MatrixXd::Zero(slices, slices), Eigen::VectorXd::Zero(slices),
+                  Eigen::VectorXd::Zero(slices)};
   for (const FrameField& field : fields) {
     const Information one = information_of(field, slice_of_tag, slices);
     all.S += one.S;
     all.t += one.t;
+    all.of_tags += one.of_tags;
   }
-  const double least_information = 1e-4 * std::max(all.S.diagonal().maxCoeff(), 1e-300);
   std::vector<Eigen::Index> taken;
   for (;;) {
     // What is left of each slice beside those taken.
@@ -84,10 +88,11 @@ std::vector<SliceOffset> slice_offsets(const std::vector<FrameField>& fields, co
         information -= column.dot(factor.solve(column));
         pull -= column.dot(offsets);
       }
-      if (!(information > least_information)) continue;
+      const double left = information / all.of_tags[s];  // of the offset, beside the field that bends to it
+      if (!(left > least_left)) continue;
       offset = {static_cast<size_t>(s), pull / information, 1.0 / std::sqrt(information), false};
       const double significance = std::abs(offset.offset_mm) / offset.se_mm;
-      if (significance > most && std::abs(offset.offset_mm) > least_mm[static_cast<size_t>(s)]) {
+      if (significance > most && std::abs(offset.offset_mm) * left > least_mm[static_cast<size_t>(s)]) {
         most = significance;
         best = s;
       }

@@ -9,7 +9,9 @@
 // misplaced in all of them alike. Slices are taken up one by one, the most significant first, the others then judged
 // beside those found, because the field bends its neighbours' residuals as well.
 //
-// Offsets along n of all slices that a rigid shift of the body would make alike cannot be seen; none is invented.
+// Offsets along n of all slices that a rigid shift of the body would make alike cannot be seen; none is invented. An offset is told by
+// what the field leaves of it, the share S / C'C: a field that takes up nearly all of it leaves the mesh's error and unfinished rounds,
+// and dividing these by a small S would make a large offset of them.
 
 #include <vector>
 
@@ -25,8 +27,8 @@ struct SliceOffset {
   bool displaced = false;
 };
 
-/// One entry a slice, in their order. Displaced are offsets of at least five standard errors, 0.1 mm and half of the points'
-/// own sigma: the mesh's error is no displacement.
+/// One entry a slice, in their order. Displaced are offsets of at least five standard errors that leave at least 0.1 mm and half of the points'
+/// own sigma in the residuals: the mesh's error is no displacement.
 std::vector<SliceOffset> slice_offsets(const std::vector<FrameField>& fields, const TagGroups& groups,
                                        std::span<const TagPoint> tags);
 

@@ -9,6 +9,7 @@
 #include <random>
 
 #include "estimator/reconstruction/measurement_findings.hpp"
+#include "estimator/reconstruction/slice_offsets.hpp"
 #include "estimator/reconstruction/study_reconstruction.hpp"
 #include "tests/estimator/reconstruction/tagged_motion.hpp"
 
@@ -203,6 +204,25 @@ TEST_F(Findings, AMisplacedSlice) {
   EXPECT_THAT(finding.what, HasSubstr("(0.71, 0.71, 0)"));
   EXPECT_EQ(
       std::count_if(found.begin(), found.end(), [](const Finding& f) { return f.id == "slice-offset"; }), 1);
+}
+
+/// The only image's offset is a shift of the body, which the field makes as well. What else its residuals have in common is no displacement.
+TEST_F(Findings, TheOnlyImageHasNoneToBeMisplacedAgainst) {
+  Measurement lone = sound({.tags_a_frame = 4000});
+  std::erase_if(lone.tags,
+                [](const TagPoint& tag) { return tag.normal[2] != 0 || std::abs(tag.x_mm[2] - 6.0) > 1.0; });
+  const TagGroups groups = group_tags(lone.tags);
+  ASSERT_EQ(groups.slices.size(), 2U);
+  const HermiteMesh mesh = test::small_gel();
+  const FieldForms forms(mesh, {});
+  std::vector<FrameField> fields;
+  fields.push_back(reconstruct_frame(forms, lone, 4, {.lambda = 1e4}));
+  for (FieldRow& row : fields[0].rows)
+    row.residual += 0.08 / row.sigma_mm;
+  for (const SliceOffset& slice : slice_offsets(fields, groups, lone.tags)) {
+    EXPECT_FALSE(slice.displaced) << slice.offset_mm << " +- " << slice.se_mm;
+    EXPECT_GT(std::abs(slice.offset_mm), 5 * slice.se_mm) << "it is not for lack of significance";
+  }
 }
 
 TEST_F(Findings, OneDirectionTrackedWorse) {
