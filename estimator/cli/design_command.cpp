@@ -52,17 +52,18 @@ struct DesignArguments {
 DesignStudy explored(const DesignArguments& arguments, Study& study) {
   if (!arguments.images) {
     use_images(study);
-    return explore_design(study, read_measurement(study));
+    return explore_design(study, read_measurement(study), arguments.study.unload);
   }
   if (!study.data.frames)
     throw InputError({study.file.string(), "table [data]",
                       "names no frames: when images are taken is not known",
                       "Add frames = \"NAME.frames.csv\": time and expected pressure of each phase."});
-  return explore_imaging(study, read_frames(*study.data.frames), arguments.plan);
+  return explore_imaging(study, read_frames(*study.data.frames), arguments.plan, arguments.study.unload);
 }
 
 ExitCode run_design(const DesignArguments& arguments, const CommandOutput& out) {
   Study study = read_study(arguments.study);
+  if (!arguments.study.unload) remark_on_imaged_load(study, "design");
   const DesignStudy design = explored(arguments, study);
   if (out.json) {
     print_json(design, study);
@@ -103,6 +104,7 @@ void add_design(CommandLine& line) {
       "the study's frames say when images are taken and at what pressure, options what they are like.");
   add_study(*command, arguments->study);
   add_values(*command, arguments->study);
+  add_unloading(*command, arguments->study);
   ImagingPlan& plan = arguments->plan;
   CLI::Option* images = command->add_flag("--images", arguments->images, "plan tagged images");
   const auto of_images = [&](CLI::Option* option) { return option->needs(images); };

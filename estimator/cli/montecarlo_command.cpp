@@ -59,7 +59,9 @@ void choose_truth(Study& study, const Measurement& measurement, const MonteCarlo
     set_truth(study, fit_record_from_json(read_whole_file(arguments.at), arguments.at.string()),
               arguments.at.string());
   } else if (arguments.study.starts.empty()) {
-    const FitRecord fit = fit_study(study, measurement, {});
+    StudyFitOptions options;
+    options.unload = arguments.study.unload;
+    const FitRecord fit = fit_study(study, measurement, options);
     if (!fit.converged || fit.parameters.empty()) {
       throw InputError({study.file.string(), "", fmt::format("cannot be fitted: {}", fit.reason),
                         "Give the true values with --set NAME=NUMBER."});
@@ -163,6 +165,7 @@ ExitCode run_montecarlo(const MonteCarloArguments& arguments, const CommandOutpu
   const bool leads = !world || world->rank() == 0;
   const Clock::time_point begun = Clock::now();
   Study study = read_study(arguments.study);
+  if (leads && !arguments.study.unload) remark_on_imaged_load(study, "montecarlo");
   use_images(study);
   const Measurement measurement = read_measurement(study);
   choose_truth(study, measurement, arguments);
@@ -170,7 +173,8 @@ ExitCode run_montecarlo(const MonteCarloArguments& arguments, const CommandOutpu
                       .frames = arguments.frames,
                       .repeats = arguments.repeats,
                       .exact_pressures = arguments.exact_pressures,
-                      .seed = arguments.seed};
+                      .seed = arguments.seed,
+                      .unload = arguments.study.unload};
   if (plan.noise_mm.empty()) plan.noise_mm = {0.0};
   if (!arguments.grid_mm.empty())
     plan.grid = TagGrid{.stripe_mm = arguments.grid_mm[0], .pixel_mm = arguments.grid_mm[1]};
@@ -246,6 +250,7 @@ void add_montecarlo(CommandLine& line) {
       "goes on after an interruption. Under mpirun or srun the refits are spread over the ranks.");
   add_study(*command, arguments->study);
   add_values(*command, arguments->study);
+  add_unloading(*command, arguments->study);
   command
       ->add_option("--noise", arguments->noise_mm,
                    "standard deviations of the points, mm; default: as stated")

@@ -31,8 +31,7 @@ void remark_on_imaged_load(const Study& study, std::string_view command) {
   if (!study.imaged_at) return;
   fmt::print(stderr,
              "diastole {}: the shape was imaged at {:g} kPa, and is taken as free of stress here; --unload "
-             "of solve, fit "
-             "and mesh export finds the one that is.\n",
+             "of solve, fit, montecarlo, design and mesh export finds the one that is.\n",
              command, study.imaged_at->pressure_kPa);
 }
 

@@ -8,10 +8,10 @@
 #include <limits>
 #include <memory>
 
-#include "estimator/fit/elastic_motion.hpp"
 #include "estimator/fit/estimated_parameters.hpp"
 #include "estimator/fit/fit_remarks.hpp"
 #include "estimator/fit/fit_sections.hpp"
+#include "estimator/fit/study_motion.hpp"
 #include "estimator/fit/unloaded_motion.hpp"
 #include "estimator/fit/usable_points.hpp"
 #include "estimator/inference/covariance.hpp"
@@ -390,15 +390,8 @@ FitRecord fit_study(const Study& study, const Measurement& measurement, const St
 
   EstimatedParameters estimated = estimated_parameters(study, model);
   if (options.start) take_start(estimated, *options.start, study.file.string());
-  std::unique_ptr<ElasticMotion> body;
-  UnloadedMotion* unloaded = nullptr;
-  if (options.unload) {
-    auto found = std::make_unique<UnloadedMotion>(std::move(model), estimated.groups, imaged_load_of(study));
-    unloaded = found.get();
-    body = std::move(found);
-  } else {
-    body = std::make_unique<ElasticMotion>(std::move(model), estimated.groups, displacement_gain_of(study));
-  }
+  const std::unique_ptr<ElasticMotion> body =
+      study_motion(study, std::move(model), estimated.groups, options.unload);
   ElasticMotion& motion = *body;
   motion.consider(considered_by(study, motion.model(), options));
   FitOptions fit_options;
@@ -433,7 +426,7 @@ FitRecord fit_study(const Study& study, const Measurement& measurement, const St
   record.chi2_per_dof = record.chi2 / static_cast<double>(record.dof);
   record_parameters(record, estimated, fit);
   record_frames(record, fit);
-  if (unloaded != nullptr) record_unloading(record, *unloaded, fit);
+  if (auto* unloaded = dynamic_cast<UnloadedMotion*>(body.get())) record_unloading(record, *unloaded, fit);
   record.residuals = histogram_of(fit);
   for (std::string& remark : remarks_on(record, fit))
     record.remarks.push_back(std::move(remark));

@@ -20,6 +20,8 @@ class UnloadedMotion : public ElasticMotion {
 
   [[nodiscard]] const HermiteMesh& mesh() const override { return imaged_.mesh(); }
   [[nodiscard]] std::optional<ImagedLoad> imaged_load() const override { return load_; }
+  /// Another measurement of that load.
+  void set_imaged_load(ImagedLoad measured) { load_ = measured; }
   void set_imaged_pressure(double pressure_kPa) override { pressure_kPa_ = pressure_kPa; }
 
   /// The unloaded body of these values, inflated from rest to the pressure of the image.

@@ -10,6 +10,7 @@
 #include "estimator/io/cache.hpp"
 #include "estimator/io/fingerprint.hpp"
 #include "estimator/io/record_file.hpp"
+#include "estimator/io/study_refusal.hpp"
 #include "estimator/model/study_model.hpp"
 #include "protocol/contract/input_error.hpp"
 
@@ -92,6 +93,7 @@ bool is_modulus(const StudyParameter& parameter) { return parameter.name.ends_wi
 
 SpecimenFamily::SpecimenFamily(Study study, const SpecimenResolution& resolution)
     : study_(std::move(study)), resolution_(resolution) {
+  require_shape_without_load(study_, "pressure-volume curves");
   study_.effects.clear();
   std::vector<StudyParameter>& parameters = study_.law.parameters;
   while (modulus_index_ < parameters.size() && !is_modulus(parameters[modulus_index_]))

@@ -18,6 +18,8 @@ namespace {
 
 constexpr size_t fixed_columns = 6;
 
+std::string body_words(const MonteCarloPlan& plan) { return plan.unload ? "+unloaded" : ""; }
+
 std::string grid_words(const MonteCarloPlan& plan) {
   if (!plan.grid) return "";
   return fmt::format("+{}-{}-{}-{}", plan.grid->stripe_mm, plan.grid->pixel_mm, plan.grid->short_axis_images,
@@ -25,9 +27,9 @@ std::string grid_words(const MonteCarloPlan& plan) {
 }
 
 std::string heading_of(const Study& study, const MonteCarloPlan& plan) {
-  std::string first =
-      fmt::format("{}{}#{}{} seed={} exact_pressures={:d}", cells_file_mark, study.file.filename().string(),
-                  study_fingerprint(study), grid_words(plan), plan.seed, plan.exact_pressures);
+  std::string first = fmt::format("{}{}#{}{}{} seed={} exact_pressures={:d}", cells_file_mark,
+                                  study.file.filename().string(), study_fingerprint(study), body_words(plan),
+                                  grid_words(plan), plan.seed, plan.exact_pressures);
   std::string second = "noise_mm,frames,repeat,converged,iterations,seconds";
   for (const StudyParameter& parameter : study.law.parameters) {
     first += fmt::format(" {}={:.10g}", parameter.name, parameter.start);

@@ -4,10 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 
-#include "estimator/fit/elastic_motion.hpp"
 #include "estimator/fit/estimated_parameters.hpp"
 #include "estimator/fit/study_fit.hpp"
+#include "estimator/fit/study_motion.hpp"
 #include "estimator/fit/usable_points.hpp"
 #include "estimator/model/affected_model.hpp"
 #include "estimator/model/study_model.hpp"
@@ -20,7 +21,8 @@ namespace {
 constexpr double most_se_percent = 1e4;  // a hundred times its value: nothing is known about a parameter
 constexpr double new_frames[] = {0.25, 0.5, 0.75, 1.0, 1.25, 1.5};  // of the highest pressure so far
 
-/// What one frame tells, its pressure not yet eliminated.
+/// What one frame tells, its pressure not yet eliminated. "Values" are the parameters', and last the pressure of an image under load that is
+/// not exactly known.
 struct FrameInformation {
   int number;
   double pressure_kPa;
@@ -29,7 +31,7 @@ struct FrameInformation {
   Eigen::VectorXd by_both;
   double by_pressure;
 
-  /// Of the values alone, with `points` times the points and the pressure's error `error` times as large.
+  /// Without its pressure, with `points` times the points and the pressure's error `error` times as large.
   [[nodiscard]] Eigen::MatrixXd marginal(double points = 1, double error = 1) const {
     const double sigma = error * sigma_kPa;
     if (!(sigma > 0)) return points * by_values;
@@ -40,14 +42,14 @@ struct FrameInformation {
 
 class Explorer {
  public:
-  Explorer(const Study& study, Measurement measurement)
+  Explorer(const Study& study, Measurement measurement, bool unload)
       : study_(study), measurement_(std::move(measurement)), model_(make_affected_model(study)) {
     require_cavity(study_, model_);
     estimated_ = estimated_parameters(study_, model_);
     // Every frame's derivative by its pressure is wanted, known exactly or not.
     for (const Frame& frame : measurement_.frames)
       stated_sigma_kPa_.push_back(frame.sigma_kPa);
-    motion_.emplace(std::move(model_), estimated_.groups, displacement_gain_of(study));
+    motion_ = study_motion(study, std::move(model_), estimated_.groups, unload);
   }
 
   [[nodiscard]] std::vector<FrameInformation> present() {
@@ -83,6 +85,17 @@ class Explorer {
     return information_of(exact, std::vector<double>(design.frames.size(), highest.sigma_kPa));
   }
 
+  /// Of the parameters' values, from all frames together; `error` as in FrameInformation::marginal.
+  [[nodiscard]] Eigen::MatrixXd of_parameters(const Eigen::MatrixXd& all, double error = 1) const {
+    const auto values = static_cast<Eigen::Index>(estimated_.values.size());
+    Eigen::MatrixXd information = all.topLeftCorner(values, values);
+    const double sigma_kPa = all.rows() > values ? error * motion_->imaged_load().value().sigma_kPa : 0.0;
+    if (!(sigma_kPa > 0)) return information;
+    const Eigen::VectorXd by_both = all.col(values).head(values);
+    information -= by_both * by_both.transpose() / (all(values, values) + 1 / (sigma_kPa * sigma_kPa));
+    return information;
+  }
+
   /// Relative standard errors of the study's parameters, in %.
   [[nodiscard]] std::vector<double> se_percent(const Eigen::MatrixXd& information) const {
     const Eigen::MatrixXd covariance =
@@ -108,7 +121,11 @@ class Explorer {
     for (const JointProblem::LoadedFrame& frame : problem.frames()) {
       const Eigen::MatrixXd rows = jacobian.middleRows(row, frame.residuals.size());
       row += frame.residuals.size();
-      const Eigen::MatrixXd by_values = rows.leftCols(problem.values());
+      Eigen::MatrixXd by_values = rows.leftCols(problem.values());
+      if (const auto imaged = problem.imaged_unknown()) {
+        by_values.conservativeResize(Eigen::NoChange, by_values.cols() + 1);
+        by_values.rightCols<1>() = rows.col(*imaged);
+      }
       const Eigen::VectorXd by_pressure = rows.col(*frame.pressure_unknown);
       frames.push_back({frame.number, frame.load.pressure_kPa, sigma_kPa[static_cast<size_t>(frame.number)],
                         by_values.transpose() * by_values, by_values.transpose() * by_pressure,
@@ -122,7 +139,7 @@ class Explorer {
   ElasticModel model_;
   EstimatedParameters estimated_;
   std::vector<double> stated_sigma_kPa_;
-  std::optional<ElasticMotion> motion_;
+  std::unique_ptr<ElasticMotion> motion_;
 };
 
 Eigen::MatrixXd total(const std::vector<FrameInformation>& frames, double points = 1, double error = 1) {
@@ -152,32 +169,33 @@ DesignStudy::DesignStudy(const Study& study, std::vector<double> now) : se_perce
 
 void DesignStudy::rank() { std::ranges::stable_sort(options, {}, &DesignOption::volume); }
 
-DesignStudy explore_design(const Study& study, const Measurement& measurement) {
+DesignStudy explore_design(const Study& study, const Measurement& measurement, bool unload) {
   require_loaded_points(study, measurement);
-  Explorer explorer(study, measurement);
+  Explorer explorer(study, measurement, unload);
   const std::vector<FrameInformation> frames = explorer.present();
-  const Eigen::MatrixXd now = total(frames);
+  const Eigen::MatrixXd present = total(frames), now = explorer.of_parameters(present);
   DesignStudy result(study, explorer.se_percent(now));
-  const auto add = [&](std::string change, const Eigen::MatrixXd& information) {
+  const auto add = [&](std::string change, const Eigen::MatrixXd& all, double error = 1) {
+    const Eigen::MatrixXd information = explorer.of_parameters(all, error);
     result.options.push_back({std::move(change), explorer.se_percent(information),
                               std::exp(0.5 * (log_determinant(now) - log_determinant(information)))});
   };
   add("half the tag spacing (twice the points in every frame)", total(frames, 2));
   add("half the points' noise", total(frames, 4));
-  add("pressures measured twice as exactly", total(frames, 1, 0.5));
-  add("pressures known exactly", total(frames, 1, 0));
+  add("pressures measured twice as exactly", total(frames, 1, 0.5), 0.5);
+  add("pressures known exactly", total(frames, 1, 0), 0);
   for (const FrameInformation& frame : frames) {
     add(fmt::format("frame {} ({:.3g} kPa) imaged twice", frame.number, frame.pressure_kPa),
-        now - frame.marginal() + frame.marginal(2));
+        present - frame.marginal() + frame.marginal(2));
     if (frames.size() > 1)
       add(fmt::format("without frame {} ({:.3g} kPa)", frame.number, frame.pressure_kPa),
-          now - frame.marginal());
+          present - frame.marginal());
   }
   const auto highest = std::max_element(frames.begin(), frames.end(), [](const auto& a, const auto& b) {
     return a.pressure_kPa < b.pressure_kPa;
   });
   for (const FrameInformation& frame : explorer.at_new_pressures(*highest))
-    add(fmt::format("one more frame at {:.3g} kPa", frame.pressure_kPa), now + frame.marginal());
+    add(fmt::format("one more frame at {:.3g} kPa", frame.pressure_kPa), present + frame.marginal());
   result.rank();
   return result;
 }

@@ -5,6 +5,9 @@
 //   I_f = J_f' J_f over (values, P_f),  J_f the weighted residuals' derivatives;  P_f adds 1/sigma_f² to its own entry;
 //   the information on the values is the sum over frames of I_f with P_f eliminated.
 //
+// `unload`: the study's shape was imaged under load, and the fit finds the one without (estimator/fit/study_fit.hpp). The pressure of
+// the image is then shared by all frames, and is eliminated last, as a frame's is.
+//
 // Predicted standard errors are those of the joint fit (estimator/fit/fit.hpp) without smoothness. Points of a frame that does not
 // exist yet are those of the frame with the highest pressure, carried along by the model.
 
@@ -35,6 +38,6 @@ struct DesignStudy {
 
 /// At the study's start values. Throws InputError without equilibrium there, without loaded points on the specimen, and for data that
 /// say nothing about a parameter.
-DesignStudy explore_design(const Study& study, const Measurement& measurement);
+DesignStudy explore_design(const Study& study, const Measurement& measurement, bool unload = false);
 
 }  // namespace diastole

@@ -4,11 +4,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 #include <numbers>
 
-#include "estimator/fit/elastic_motion.hpp"
 #include "estimator/fit/estimated_parameters.hpp"
 #include "estimator/fit/study_fit.hpp"
+#include "estimator/fit/study_motion.hpp"
+#include "estimator/fit/unloaded_motion.hpp"
 #include "estimator/inference/covariance.hpp"
 #include "estimator/mesh/point_locator.hpp"
 #include "estimator/model/affected_model.hpp"
@@ -70,6 +72,7 @@ struct Change {
   std::string words;
   ImagingPlan plan;
   std::vector<Frame> frames;
+  double pressure_error = 1;  ///< of all pressures, times the stated one
 };
 
 /// Every second frame, the highest pressure's among them; or one more between any two.
@@ -121,23 +124,26 @@ std::vector<Change> changes_of(const ImagingPlan& plan, const std::vector<Frame>
   });
   if (frames.size() > 3) add("half the phases", [&](Change& change) { change.frames = thinned(frames); });
   add("twice the phases", [&](Change& change) { change.frames = doubled(frames); });
-  add("pressures measured twice as exactly", [&](Change& change) {
-    for (Frame& frame : change.frames)
-      frame.sigma_kPa /= 2;
-  });
+  add("pressures measured twice as exactly", [&](Change& change) { change.pressure_error = 0.5; });
   return changes;
 }
 
 class Predictor {
  public:
-  explicit Predictor(const Study& study) : study_(study) {
+  Predictor(const Study& study, bool unload) : study_(study) {
     ElasticModel model = make_affected_model(study);
     require_cavity(study, model);
     estimated_ = estimated_parameters(study, model);
-    motion_.emplace(std::move(model), estimated_.groups, displacement_gain_of(study));
+    motion_ = study_motion(study, std::move(model), estimated_.groups, unload);
+    imaged_ = motion_->imaged_load();
   }
 
-  [[nodiscard]] std::vector<double> se_percent(const ImagingPlan& plan, const std::vector<Frame>& frames) {
+  [[nodiscard]] std::vector<double> se_percent(const ImagingPlan& plan, std::vector<Frame> frames,
+                                               double pressure_error = 1) {
+    for (Frame& frame : frames)
+      frame.sigma_kPa *= pressure_error;
+    if (auto* unloaded = dynamic_cast<UnloadedMotion*>(motion_.get()))
+      unloaded->set_imaged_load({imaged_->pressure_kPa, pressure_error * imaged_->sigma_kPa});
     const std::vector<double> values = estimated_.starts();
     std::vector<NodeField> motions(1);
     for (size_t k = 1; k < frames.size(); ++k) {
@@ -166,7 +172,8 @@ class Predictor {
  private:
   const Study& study_;
   EstimatedParameters estimated_;
-  std::optional<ElasticMotion> motion_;
+  std::unique_ptr<ElasticMotion> motion_;
+  std::optional<ImagedLoad> imaged_;
 };
 
 }  // namespace
@@ -204,11 +211,13 @@ Measurement planned_tags(const HermiteMesh& mesh, const ImagingPlan& plan, const
   return measurement;
 }
 
-DesignStudy explore_imaging(const Study& study, const std::vector<Frame>& frames, const ImagingPlan& plan) {
-  Predictor predictor(study);
+DesignStudy explore_imaging(const Study& study, const std::vector<Frame>& frames, const ImagingPlan& plan,
+                            bool unload) {
+  Predictor predictor(study, unload);
   DesignStudy result(study, predictor.se_percent(plan, frames));
   for (Change& change : changes_of(plan, frames)) {
-    DesignOption option{std::move(change.words), predictor.se_percent(change.plan, change.frames), 1.0};
+    DesignOption option{std::move(change.words),
+                        predictor.se_percent(change.plan, change.frames, change.pressure_error), 1.0};
     for (size_t i = 0; i < option.se_percent.size(); ++i)
       option.volume *= option.se_percent[i] / result.se_percent[i];
     result.options.push_back(std::move(option));

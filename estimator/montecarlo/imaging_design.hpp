@@ -30,6 +30,8 @@ Measurement planned_tags(const HermiteMesh& mesh, const ImagingPlan& plan, const
 
 /// Predicted standard errors at the study's start values, and what changes of the plan would make them. Frames: the study's, with
 /// their times and pressures. Throws InputError without equilibrium there, and for a plan that sees nothing of a parameter.
-DesignStudy explore_imaging(const Study& study, const std::vector<Frame>& frames, const ImagingPlan& plan);
+/// `unload`: as explore_design's; the tags are then laid in the shape of the image.
+DesignStudy explore_imaging(const Study& study, const std::vector<Frame>& frames, const ImagingPlan& plan,
+                            bool unload = false);
 
 }  // namespace diastole

@@ -6,10 +6,11 @@
 #include <cmath>
 #include <limits>
 
-#include "estimator/fit/elastic_motion.hpp"
 #include "estimator/fit/estimated_parameters.hpp"
 #include "estimator/fit/fit.hpp"
 #include "estimator/fit/study_fit.hpp"
+#include "estimator/fit/study_motion.hpp"
+#include "estimator/fit/unloaded_motion.hpp"
 #include "estimator/fit/usable_points.hpp"
 #include "estimator/inference/intervals.hpp"
 #include "estimator/model/affected_model.hpp"
@@ -43,6 +44,13 @@ std::mt19937_64 generator_of(const Cell& cell, unsigned seed) {
   std::seed_seq sequence{seed, static_cast<unsigned>(std::lround(cell.noise_mm * 1e6)),
                          static_cast<unsigned>(cell.frames), static_cast<unsigned>(cell.repeat)};
   return std::mt19937_64(sequence);
+}
+
+ImagedLoad read_with_noise(ImagedLoad load, const NoiseOptions& options, std::mt19937_64& generator) {
+  if (options.exact_pressures) return {load.pressure_kPa, 0};
+  std::normal_distribution<double> normal;
+  load.pressure_kPa += options.share * load.sigma_kPa * normal(generator);
+  return load;
 }
 
 double mean(const std::vector<double>& values) {
@@ -107,7 +115,8 @@ std::vector<Cell> cells_of(const MonteCarloPlan& plan) {
 struct CellFitter::Impl {
   MonteCarloPlan plan;
   EstimatedParameters estimated;
-  ElasticMotion motion;
+  std::unique_ptr<ElasticMotion> motion;
+  std::optional<ImagedLoad> imaged;  ///< the true one, if there is one
   FitOptions options;
   Measurement exact;
 };
@@ -120,10 +129,12 @@ CellFitter::CellFitter(const Study& study, const Measurement& measured, const Mo
     (void)spread_frames(design, frames);
   require_cavity(study, model);
   EstimatedParameters estimated = estimated_parameters(study, model);
-  ElasticMotion motion(std::move(model), estimated.groups, displacement_gain_of(study));
+  std::unique_ptr<ElasticMotion> motion =
+      study_motion(study, std::move(model), estimated.groups, plan.unload);
+  const std::optional<ImagedLoad> imaged = motion->imaged_load();
   const LocatorOptions locator = locator_for(study.specimen);
   Measurement exact =
-      exact_measurement(motion.mesh(), design, true_motions(study, motion, estimated, design), locator);
+      exact_measurement(motion->mesh(), design, true_motions(study, *motion, estimated, design), locator);
   require_half_usable({loaded_points(exact), loaded_points(design)}, study.file.string());
   FitOptions options;
   options.file = study.file.string();
@@ -131,7 +142,7 @@ CellFitter::CellFitter(const Study& study, const Measurement& measured, const Mo
   options.smooth = estimated.smooth;
   options.robustness = Robustness::never;
   impl_ = std::make_unique<Impl>(
-      Impl{plan, std::move(estimated), std::move(motion), std::move(options), std::move(exact)});
+      Impl{plan, std::move(estimated), std::move(motion), imaged, std::move(options), std::move(exact)});
 }
 
 CellFitter::~CellFitter() = default;
@@ -141,10 +152,11 @@ size_t CellFitter::points() const { return impl_->exact.tags.size() + impl_->exa
 CellResult CellFitter::fit(const Cell& cell) {
   std::mt19937_64 generator = generator_of(cell, impl_->plan.seed);
   const std::vector<int> frames = spread_frames(impl_->exact, cell.frames);
-  const Measurement measurement =
-      with_noise(impl_->exact, frames,
-                 {cell.noise_mm, impl_->plan.exact_pressures, cell.repeat == 0 ? 0.0 : 1.0}, generator);
-  const FitOutcome outcome = fit_motion(impl_->motion, impl_->estimated.values, measurement, impl_->options);
+  const NoiseOptions noise{cell.noise_mm, impl_->plan.exact_pressures, cell.repeat == 0 ? 0.0 : 1.0};
+  const Measurement measurement = with_noise(impl_->exact, frames, noise, generator);
+  if (auto* unloaded = dynamic_cast<UnloadedMotion*>(impl_->motion.get()))
+    unloaded->set_imaged_load(read_with_noise(impl_->imaged.value(), noise, generator));
+  const FitOutcome outcome = fit_motion(*impl_->motion, impl_->estimated.values, measurement, impl_->options);
   CellResult result{
       cell, outcome.converged() && !outcome.values.empty(), outcome.iterations, outcome.seconds, {}, {}};
   if (!result.converged) return result;

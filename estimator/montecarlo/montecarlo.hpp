@@ -3,9 +3,10 @@
 // (Augenstein et al. 2005, Table 1: noise levels by numbers of frames).
 //
 // The truth is the study's start values and its frames' measured pressures; the points are the study's own, or those
-// of a tag grid (synthetic_data.hpp). A cell is one refit; cells of equal noise and number of frames make an entry of the
-// table. Repeat 0 is fitted to data without noise, its size being stated nevertheless: its standard errors are the
-// Cramér–Rao bound of the design, below which no unbiased estimator's can be.
+// of a tag grid (synthetic_data.hpp). With `unload` it is a body whose shape was imaged at the study's imaged_at_kPa, and each refit
+// finds the shape without load from a reading of that pressure with an error of its own. A cell is one refit; cells of equal noise
+// and number of frames make an entry of the table. Repeat 0 is fitted to data without noise, its size being stated nevertheless: its
+// standard errors are the Cramér–Rao bound of the design, below which no unbiased estimator's can be.
 
 #include <array>
 #include <memory>
@@ -25,6 +26,7 @@ struct MonteCarloPlan {
   int repeats = 10;
   bool exact_pressures = false;
   unsigned seed = 1;
+  bool unload = false;               ///< as the fit's (study_fit.hpp)
   std::optional<TagGrid> grid = {};  ///< instead of the study's own points
 };
 

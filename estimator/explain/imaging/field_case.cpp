@@ -40,6 +40,7 @@ FieldCase field_case(const Study& study) {
   if (annulus == nullptr)
     refuse(study, "specimen.kind", "images of this kind of specimen cannot be explained",
            "`diastole explain` knows field effects of an annulus; `diastole fit` fits any specimen.");
+  require_shape_without_load(study, "field effects");
   if (annulus->ends != "fixed")
     refuse(study, "specimen.ends", "field effects start from held ends", "Set ends = \"fixed\".");
   if (study.law.name != "neo-hookean")

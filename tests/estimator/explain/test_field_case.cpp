@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 
 #include "estimator/explain/imaging/field_fit.hpp"
+#include "estimator/model/specimen_family.hpp"
 #include "tests/estimator/io/scratch_file.hpp"
 
 namespace diastole::explain {
@@ -33,6 +34,16 @@ TEST(FieldCase, AChamberIsRefusedAsWhatAnEffectWouldBe) {
   Study study = imaged_gel();
   study.chamber = StudyChamber{};
   EXPECT_THAT(refusal_of(study), testing::HasSubstr("back pressure is one of the effects"));
+}
+
+TEST(FieldCase, AShapeThatWasImagedUnderLoadIsRefusedForImagesAndRuns) {
+  Study study = imaged_gel();
+  study.imaged_at = ImagedLoad{1.0, 0.05};
+  for (const std::string& refusal :
+       {refusal_of(study), test::message_of([&] { (void)rig::SpecimenFamily(study); })}) {
+    EXPECT_THAT(refusal, testing::HasSubstr("specimen.imaged_at_kPa"));
+    EXPECT_THAT(refusal, testing::HasSubstr("mesh export"));
+  }
 }
 
 TEST(FieldCase, CompressibleGelIsRefused) {

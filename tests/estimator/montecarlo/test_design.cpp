@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "estimator/montecarlo/montecarlo.hpp"
 #include "tests/estimator/io/scratch_file.hpp"
 
 namespace diastole {
@@ -57,6 +58,28 @@ TEST_F(GelDesign, PredictionsAreWhatTheoryAndEachOtherSay) {
   EXPECT_LT(option(design, "one more frame at 4.5 kPa").se_percent[0], again);
   for (const DesignOption& change : design.options)
     EXPECT_NEAR(change.volume, change.se_percent[0] / design.se_percent[0], 1e-6) << change.change;
+}
+
+/// What is predicted of a shape that was imaged under load is what a fit of such data says of itself.
+TEST_F(GelDesign, AnImagedLoadIsEliminatedAsTheFitDoes) {
+  study_.imaged_at = ImagedLoad{1.8, 0.1};
+  measurement_.frames[1].pressure_kPa = 2.4;
+  for (ObservedPoint& point : measurement_.points)
+    point.sigma_mm = 0.25;
+  const DesignStudy design = explore_design(study_, measurement_, true);
+  MonteCarloPlan plan{.frames = {2}, .repeats = 2, .unload = true};
+  const auto bound_percent = [&] {
+    return 100 * CellFitter(study_, measurement_, plan).fit({0, 2, 0}).se[0] / 8.71;
+  };
+  EXPECT_NEAR(design.se_percent[0], bound_percent(), 0.02 * design.se_percent[0]);
+  plan.exact_pressures = true;
+  const double exact = option(design, "pressures known exactly").se_percent[0];
+  EXPECT_NEAR(exact, bound_percent(), 0.02 * exact);
+  EXPECT_LT(exact, 0.8 * design.se_percent[0]);
+  EXPECT_GT(std::abs(explore_design(study_, measurement_).se_percent[0] / design.se_percent[0] - 1), 0.05);
+  study_.imaged_at.reset();
+  EXPECT_THAT(test::message_of([&] { (void)explore_design(study_, measurement_, true); }),
+              testing::HasSubstr("imaged_at_kPa"));
 }
 
 TEST_F(GelDesign, TheBestChangeStandsFirst) {

@@ -106,6 +106,32 @@ TEST_F(CoarseGel, TheSpreadIsWhatTheStandardErrorsSay) {
   }
 }
 
+/// The shape that 2 kPa made, and one frame at 3 kPa: the stiffness follows the difference of the two pressures.
+TEST_F(CoarseGel, AShapeThatWasImagedUnderLoadIsUnloadedInEachRefit) {
+  study_.imaged_at = ImagedLoad{2.0, 0.05};
+  const auto entry = [&](bool unload, bool exact_pressures, int repeats) {
+    const MonteCarloPlan plan{.noise_mm = {0.1},
+                              .frames = {1},
+                              .repeats = repeats,
+                              .exact_pressures = exact_pressures,
+                              .unload = unload};
+    CellFitter fitter(study_, design_, plan);
+    std::vector<CellResult> results;
+    for (const Cell& cell : cells_of(plan))
+      results.push_back(fitter.fit(cell));
+    return table_of(plan, study_, results).at(0);
+  };
+  const TableEntry unloaded = entry(true, false, 8);
+  ASSERT_EQ(unloaded.refits, 8);
+  const ParameterSpread& C1 = unloaded.parameters[0];
+  EXPECT_NEAR(C1.mean, 8.71, 3.3 * C1.mean_se / std::sqrt(8));
+  // 0.1 % tails of chi-square with 7 freedoms.
+  EXPECT_GT(C1.sd / C1.mean_se, std::sqrt(0.60 / 7));
+  EXPECT_LT(C1.sd / C1.mean_se, std::sqrt(24.3 / 7));
+  EXPECT_GT(C1.bound, 1.5 * entry(true, true, 2).parameters[0].bound);
+  EXPECT_LT(entry(false, false, 2).parameters[0].bound, 0.7 * C1.bound);
+}
+
 TEST_F(CoarseGel, RepeatZeroHasNoNoiseAndTellsTheBound) {
   const MonteCarloPlan plan{.noise_mm = {0.1}, .frames = {2}, .repeats = 2};
   CellFitter fitter(study_, design_, plan);

@@ -156,6 +156,7 @@ std::string pose_text(const Study& study, const scanner::ScanPose& pose) {
 
 ExitCode run_scan(const ScanArguments& arguments, const CommandOutput& out) {
   const Study study = read_study(arguments.study);
+  remark_on_imaged_load(study, "scan");
   const std::vector<ScanPhase> phases = phases_of(arguments, study);
   ElasticModel model = make_affected_model(study);
   require_cavity(study, model);
