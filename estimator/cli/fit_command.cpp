@@ -29,6 +29,7 @@ struct FitArguments {
   std::string robust = "auto";
   double pressure_offset_kPa = 0;
   double fibre_sigma_deg = 0, geometry_sigma_mm = 0;
+  std::optional<std::filesystem::path> energy;
   bool profile = false;
   int posterior_draws = 0;
   std::filesystem::path start;
@@ -102,6 +103,10 @@ void print_record(const FitRecord& record) {
   }
   fmt::print("\n");
   if (record.unloaded) fmt::print("{}\n", unloading_sentence(*record.unloaded));
+  if (record.energy)
+    fmt::print(
+        "Up to frame {} the pressure did a work of {:.3f} \u00b1 {:.3f} mJ; the wall has stored {:.3f} mJ.\n",
+        record.energy->frame, record.energy->work_mJ, record.energy->sigma_mJ, record.energy->stored_mJ);
   for (const std::string& remark : record.remarks)
     fmt::print("{}\n", remark);
   for (const Exclusion& exclusion : record.excluded)
@@ -203,6 +208,7 @@ ExitCode run_fit(const FitArguments& arguments, const CommandOutput& out) {
   options.fibre_sigma_deg = arguments.fibre_sigma_deg;
   options.geometry_sigma_mm = arguments.geometry_sigma_mm;
   options.start = start_of(arguments, study);
+  options.work_loop = arguments.energy;
   options.profile = arguments.profile;
   if (arguments.pressure_offset_kPa > 0) options.pressure_offset_sigma_kPa = arguments.pressure_offset_kPa;
   if (arguments.posterior_draws > 0) {
@@ -254,6 +260,7 @@ void add_fit(CommandLine& line) {
       "  diastole fit examples/phantom-a.study.toml -o fit.json\n"
       "  diastole fit examples/phantom-a.study.toml --set C1_kPa=12 --mesh 8,8,2 --json\n"
       "  diastole fit heart.study.toml --unload\n"
+      "  diastole fit heart.study.toml --energy heart.loop.csv\n"
       "Exit code 1: the data cannot be what they say, the search did not converge, a parameter ended on its\n"
       "bound, which is no estimate, or with --unload the load does not bring the image back.");
   add_study(*command, arguments->study);
@@ -281,6 +288,10 @@ void add_fit(CommandLine& line) {
       ->add_option("--geometry-sigma-mm", arguments->geometry_sigma_mm,
                    "the walls may lie off their places by as much: likewise")
       ->check(CLI::Range(0.0, 10.0));
+  command->add_option(
+      "--energy", arguments->energy,
+      "the work that the pressure has done is what the wall stores: a loop of pressure against volume from "
+      "`diastole flow --loop`, as one more equation (docs/heart.md)");
   command->add_flag("--unexamined", arguments->unexamined,
                     "do not look beforehand for what is wrong with the data (docs/reconstruction.md), and "
                     "fit data that cannot be what they say");

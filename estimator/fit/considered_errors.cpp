@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "estimator/fe/unloaded_shape.hpp"
+#include "estimator/fit/constrained_energy.hpp"
 #include "estimator/mesh/nodal_lines.hpp"
 #include "estimator/mesh/node_field.hpp"
 #include "estimator/mesh/placed_mesh.hpp"
@@ -136,11 +137,14 @@ std::vector<ConsideredMotion> considered_motions(ElasticModel& model, const Elas
   const HeldDofs& held = model.system().held();
   std::vector<double> right_sides;
   for (const ConsideredError& error : errors) {
+    ConsideredMotion& motion = motions.emplace_back();
     const auto residual_at = [&](double amount) {
       ElasticState moved = state;
       for (size_t dof = 0; dof < error.shape.size(); ++dof)
         if (held[dof]) moved.position_mm[dof] += amount * error.shape[dof];
-      return error.with(model, amount).system().residual(moved).values;
+      const ElasticModel with = error.with(model, amount);
+      motion.stored_energy_mJ += std::copysign(0.5 / step, amount) * constrained_energy_mJ(with, moved);
+      return with.system().residual(moved).values;
     };
     const std::vector<double> above = residual_at(step * error.sigma),
                               below = residual_at(-step * error.sigma);
@@ -152,9 +156,10 @@ std::vector<ConsideredMotion> considered_motions(ElasticModel& model, const Elas
   model.system().solve(right_sides, errors.size());
   const size_t unknowns = right_sides.size() / errors.size();
   for (size_t i = 0; i < errors.size(); ++i) {
-    ConsideredMotion& motion = motions.emplace_back();
+    ConsideredMotion& motion = motions[i];
     motion.source = errors[i].source;
     motion.by_motion = model.system().node_field(std::span(right_sides).subspan(i * unknowns, unknowns));
+    motion.stored_energy_mJ += pressure_work_mJ(model, state, motion.by_motion);
     motion.by_reference.assign(motion.by_motion.size(), 0.0);
     if (errors[i].shape.empty()) continue;
     add_scaled(motion.by_reference, errors[i].sigma, errors[i].shape);

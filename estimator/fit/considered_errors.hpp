@@ -10,6 +10,8 @@
 //
 // With r the residual of the equations, which depends on the amount m through axes or undeformed shape X, and dX/dm at held dofs,
 //   K dx/dm = - dr/dm      dr/dm by central differences of the residual
+//
+// What the body has stored since rest changes as constrained_energy.hpp says.
 
 #include <functional>
 #include <string>

@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "estimator/fit/constrained_energy.hpp"
 #include "estimator/mesh/node_field.hpp"
 
 namespace diastole {
@@ -83,6 +84,39 @@ MotionDerivatives ElasticMotion::derivatives(size_t slot) {
     add_scaled(field, displacement_gain_ - 1.0, NodeField(field));
   add_scaled(seen.by_pressure, displacement_gain_ - 1.0, NodeField(seen.by_pressure));
   return seen;
+}
+
+double ElasticMotion::stored_energy_mJ(size_t slot) {
+  const Slot& solved = slots_.at(slot).value();
+  (void)set_values(solved.values);
+  return stored_at(solved.state);
+}
+
+EnergyDerivatives ElasticMotion::energy_derivatives(size_t slot) {
+  (void)derivatives(slot);
+  const Slot& solved = slots_.at(slot).value();
+  (void)set_values(solved.values);
+  return energy_derivatives_at(solved.state, solved.values, *solved.derivatives);
+}
+
+EnergyDerivatives ElasticMotion::energy_derivatives_at(const ElasticState& state,
+                                                       std::span<const double> values,
+                                                       const MotionDerivatives& by) {
+  EnergyDerivatives result;
+  for (size_t i = 0; i < values.size(); ++i) {
+    std::vector<double> changed(values.begin(), values.end());
+    const double change = step_of(values[i]);
+    const auto stored_mJ = [&](double value) {
+      changed[i] = value;
+      set_values(model_, groups_, changed);
+      return stored_at(state);
+    };
+    result.by_value.push_back((stored_mJ(values[i] + change) - stored_mJ(values[i] - change)) / (2 * change) +
+                              pressure_work_mJ(model_, state, by.by_value[i]));
+  }
+  set_values(model_, groups_, values);
+  result.by_pressure = pressure_work_mJ(model_, state, by.by_pressure);
+  return result;
 }
 
 std::vector<ConsideredMotion> ElasticMotion::considered(size_t slot) {

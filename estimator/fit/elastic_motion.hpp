@@ -2,6 +2,7 @@
 // The finite-element model as the fit's motion model: values go to the law's parameters of all elements or of
 // one, and every frame starts from its own last equilibrium, moved along the exact sensitivities.
 
+#include <cmath>
 #include <optional>
 #include <string>
 #include <vector>
@@ -24,6 +25,9 @@ class ElasticMotion : public MotionModel {
                                     double pressure_kPa) override;
   [[nodiscard]] MotionDerivatives derivatives(size_t slot) override;
   [[nodiscard]] std::vector<ConsideredMotion> considered(size_t slot) override;
+  /// constrained_energy.hpp.
+  [[nodiscard]] EnergyDerivatives energy_derivatives(size_t slot) override;
+  [[nodiscard]] double stored_energy_mJ(size_t slot) override;
 
   /// Precondition: images show the displacement itself.
   void consider(std::vector<ConsideredError> errors) { considered_ = std::move(errors); }
@@ -35,6 +39,14 @@ class ElasticMotion : public MotionModel {
   virtual std::optional<std::string> set_values(std::span<const double> values);
   /// At an equilibrium of the model as it stands; of the motion itself, not of what images show.
   virtual MotionDerivatives derivatives_at(const ElasticState& state);
+  /// At an equilibrium of the model as it stands: stored since frame 0, and its derivatives, those of the motion being given.
+  [[nodiscard]] virtual double stored_at(const ElasticState& state) const {
+    return model_.stored_energy_mJ(state) - model_.stored_energy_mJ(model_.rest_state());
+  }
+  virtual EnergyDerivatives energy_derivatives_at(const ElasticState& state, std::span<const double> values,
+                                                  const MotionDerivatives& by);
+  /// For differences by a value, on each side.
+  static double step_of(double value) { return value != 0 ? 1e-4 * std::abs(value) : 1e-4; }
   /// Where a frame begins that has no earlier solution.
   [[nodiscard]] virtual ElasticState first_state() const { return model_.rest_state(); }
 

@@ -179,6 +179,7 @@ FitOutcome fit_motion(MotionModel& model, const std::vector<EstimatedParameter>&
   const auto begun = std::chrono::steady_clock::now();
   FitOutcome outcome;
   JointProblem problem(model, parameters, measurement, options.locator, options.pressure_offset_sigma_kPa);
+  problem.set_work(options.work);
   Eigen::VectorXd q = problem.start();
   problem.set_smoothness(smooth_blocks(model, options));
   if (options.robustness == Robustness::always) problem.set_robust(RobustLoss::for_deviation(1));

@@ -48,6 +48,8 @@ struct FitOptions {
   Robustness robustness = Robustness::if_needed;
   /// All frame pressures may be off by one and the same unknown amount, 0 with this standard deviation.
   std::optional<double> pressure_offset_sigma_kPa;
+  /// One more residual (work_energy.hpp). Precondition: the motion has an energy.
+  std::optional<MeasuredWork> work;
   std::vector<size_t> profiled;  ///< values whose profile interval is wanted (profile.hpp)
   std::optional<PosteriorOptions> posterior;
   /// Called at each iteration with values in their own units.
@@ -118,6 +120,7 @@ struct FitOutcome {
   /// At which the shape was imaged, if it was under load.
   std::optional<EstimatedPressure> imaged_pressure;
   std::optional<OffsetScore> offset_score;  ///< without pressure_offset, where the data see one
+  std::optional<double> stored_energy_mJ;   ///< since frame 0, at the frame of FitOptions::work
   std::vector<ProfileInterval> profiles;
   std::optional<PosteriorOutcome> posterior;
   double chi2 = 0;        ///< including the pressures' priors

@@ -340,6 +340,7 @@ Eigen::MatrixXd estimate_errors(FitOutcome& outcome, JointProblem& problem, cons
     outcome.imaged_pressure = EstimatedPressure{
         problem.imaged_pressure_at(q), unknown ? std::sqrt(outcome.covariance(*unknown, *unknown)) : 0.0};
   }
+  if (problem.work()) outcome.stored_energy_mJ = problem.stored_energy_mJ();
   for (const JointProblem::LoadedFrame& frame : problem.frames()) {
     outcome.frames.push_back(estimated(frame, q, outcome.covariance));
     if (outcome.pressure_offset && !frame.pressure_unknown)

@@ -2,7 +2,15 @@
 
 #include <fmt/format.h>
 
+#include <stdexcept>
+
 namespace diastole {
+
+double MotionModel::stored_energy_mJ(size_t) { throw std::logic_error("a model without an energy"); }
+
+EnergyDerivatives MotionModel::energy_derivatives(size_t) {
+  throw std::logic_error("a model without an energy");
+}
 
 JointProblem::JointProblem(MotionModel& model, const std::vector<EstimatedParameter>& values,
                            const Measurement& measurement, LocatorOptions locator,
@@ -46,6 +54,18 @@ JointProblem::JointProblem(MotionModel& model, const std::vector<EstimatedParame
   start_ = Eigen::Map<const Eigen::VectorXd>(start.data(), static_cast<Eigen::Index>(start.size()));
 }
 
+void JointProblem::set_work(std::optional<MeasuredWork> work) {
+  work_ = work;
+  residuals_at_.reset();
+}
+
+size_t JointProblem::work_slot() const {
+  size_t slot = 0;
+  while (frames_.at(slot).number != work_->frame)
+    ++slot;
+  return slot;
+}
+
 void JointProblem::set_smoothness(std::vector<SmoothBlock> blocks) {
   smooth_ = std::move(blocks);
   residuals_at_.reset();
@@ -87,7 +107,7 @@ Eigen::Index JointProblem::smooth_rows() const {
 }
 
 Eigen::Index JointProblem::data_rows() const {
-  Eigen::Index rows = unknowns() - values() + (fits_rest() ? 1 : 0);
+  Eigen::Index rows = unknowns() - values() + (fits_rest() ? 1 : 0) + (work_ ? 1 : 0);
   for (const LoadedFrame& frame : frames_)
     rows += frame.residuals.size();
   return rows;
@@ -183,6 +203,9 @@ std::optional<Eigen::VectorXd> JointProblem::residuals(const Eigen::VectorXd& q)
     residuals_[row++] = (q[*offset_unknown_] - rest_reading_->pressure_kPa) / rest_reading_->sigma_kPa;
   for (const double coefficient_mm : q.tail(planes_.unknowns()))
     residuals_[row++] = coefficient_mm / TagPlanes::loose_mm;
+  if (work_)
+    residuals_[row++] =
+        (stored_energy_mJ() + offset_at(q) * work_->volume_change_mL - work_->work_mJ) / work_->sigma_mJ;
   for (const SmoothBlock& block : smooth_) {
     const Eigen::Index size = block.differences.rows();
     residuals_.segment(row, size) =
@@ -250,12 +273,33 @@ Eigen::MatrixXd JointProblem::plain_jacobian(const Eigen::VectorXd& q) {
   if (fits_rest()) result(row++, *offset_unknown_) = 1 / rest_reading_->sigma_kPa;
   for (Eigen::Index i = first_plane; i < unknowns(); ++i)
     result(row++, i) = 1 / TagPlanes::loose_mm;
+  if (work_) result.row(row++) = work_derivatives(q);
   for (const SmoothBlock& block : smooth_) {
     const Eigen::Index size = block.differences.rows();
     result.block(row, block.first, size, block.differences.cols()) = block.differences / block.step;
     row += size;
   }
   return result;
+}
+
+Eigen::RowVectorXd JointProblem::work_derivatives(const Eigen::VectorXd& q) {
+  Eigen::RowVectorXd row = Eigen::RowVectorXd::Zero(unknowns());
+  const size_t slot = work_slot();
+  const EnergyDerivatives stored = model_.energy_derivatives(slot);
+  for (Eigen::Index i = 0; i < values(); ++i)
+    row[i] = stored.by_value[static_cast<size_t>(i)] * space_[i].slope(q[i]);
+  if (offset_unknown_) row[*offset_unknown_] = work_->volume_change_mL;
+  if (const auto pressure = frames_[slot].pressure_unknown) {
+    row[*pressure] = stored.by_pressure;
+  } else if (offset_unknown_) {
+    row[*offset_unknown_] -= stored.by_pressure;
+  }
+  if (imaged_unknown_) {
+    row[*imaged_unknown_] = stored.by_imaged_pressure;
+  } else if (imaged_ && offset_unknown_) {
+    row[*offset_unknown_] -= stored.by_imaged_pressure;
+  }
+  return row / work_->sigma_mJ;
 }
 
 std::vector<JointProblem::ConsideredColumn> JointProblem::considered_columns() {
@@ -270,6 +314,8 @@ std::vector<JointProblem::ConsideredColumn> JointProblem::considered_columns() {
       const NodeField* const reference[] = {&motions[i].by_reference};
       result[i].column.segment(row, frame.residuals.size()) =
           frame.residuals.columns(0, model_.mesh(), motion, reference).col(0);
+      if (work_ && frame.number == work_->frame)
+        result[i].column[work_row()] = motions[i].stored_energy_mJ / work_->sigma_mJ;
     }
     row += frame.residuals.size();
   }
@@ -294,6 +340,13 @@ Eigen::VectorXd JointProblem::offset_column() {
     row += size;
   }
   if (imaged_unknown_) column[prior] = 1 / imaged_->sigma_kPa;
+  if (work_) {
+    const EnergyDerivatives stored = model_.energy_derivatives(work_slot());
+    double change_mJ = work_->volume_change_mL;
+    if (!frames_[work_slot()].pressure_unknown) change_mJ -= stored.by_pressure;
+    if (imaged_ && !imaged_unknown_) change_mJ -= stored.by_imaged_pressure;
+    column[work_row()] = change_mJ / work_->sigma_mJ;
+  }
   return column;
 }
 

@@ -17,8 +17,10 @@
 // With a robust loss (robust_loss.hpp) the motion's residuals enter as u(r), and the cost changes with them.
 // Parameters that vary by element may carry a smoothness prior (smoothness.hpp).
 //
+// A measured work of the pressure (work_energy.hpp) is one more residual, (U(x) - U(X) + offset dV - W) / sigma, U by the model.
+//
 // Residual rows: frame after frame (motion_residuals.hpp), then one for each unknown pressure, that of the imaged shape last, those of the offset, those of the tag
-// planes, then those of the smoothness priors.
+// planes, that of the work, then those of the smoothness priors.
 // The points of frame 0 are not part of the problem: without load there is no information on stiffness.
 
 #include <Eigen/Dense>
@@ -31,6 +33,7 @@
 #include "estimator/fit/robust_loss.hpp"
 #include "estimator/fit/smoothness.hpp"
 #include "estimator/fit/tag_planes.hpp"
+#include "estimator/fit/work_energy.hpp"
 #include "estimator/inference/least_squares.hpp"
 #include "estimator/io/measurement.hpp"
 #include "estimator/motion_residuals/motion_residuals.hpp"
@@ -51,8 +54,16 @@ struct MotionDerivatives {
 /// What one standard deviation of an error that is no unknown does to a frame (considered_errors.hpp).
 struct ConsideredMotion {
   std::string source;
-  NodeField by_motion;     ///< of the deformed positions, mm
-  NodeField by_reference;  ///< of the undeformed ones
+  NodeField by_motion;          ///< of the deformed positions, mm
+  NodeField by_reference;       ///< of the undeformed ones
+  double stored_energy_mJ = 0;  ///< of what is stored since frame 0
+};
+
+/// Total derivatives of what the body has stored since frame 0, mJ.
+struct EnergyDerivatives {
+  std::vector<double> by_value;
+  double by_pressure = 0;
+  double by_imaged_pressure = 0;
 };
 
 /// What the fit needs of a mechanical model: the body's motion for material values and a cavity pressure, and its
@@ -76,6 +87,9 @@ class MotionModel {
                                             double pressure_kPa) = 0;
   /// At the slot's last successful `solve`.
   [[nodiscard]] virtual MotionDerivatives derivatives(size_t slot) = 0;
+  /// What the body has stored since frame 0, and its derivatives; likewise. Throw std::logic_error in a model that has no energy.
+  [[nodiscard]] virtual double stored_energy_mJ(size_t slot);
+  [[nodiscard]] virtual EnergyDerivatives energy_derivatives(size_t slot);
   /// Of each such error, in the same order for all slots; likewise.
   [[nodiscard]] virtual std::vector<ConsideredMotion> considered(size_t /*slot*/) { return {}; }
 };
@@ -141,6 +155,12 @@ class JointProblem : public inference::LeastSquaresProblem {
   /// The load of frame 0 where it was measured: a sigma, and a pressure other than exactly 0.
   [[nodiscard]] const std::optional<Frame>& rest_reading() const { return rest_reading_; }
 
+  /// A work that was measured; none at first. Changes `rows`. Precondition: it is of a frame of the problem, and the model has an energy.
+  void set_work(std::optional<MeasuredWork> work);
+  [[nodiscard]] const std::optional<MeasuredWork>& work() const { return work_; }
+  /// What the model's body has stored then. Precondition: there is a work, and `residuals` succeeded.
+  [[nodiscard]] double stored_energy_mJ() { return model_.stored_energy_mJ(work_slot()); }
+
   /// The priors of smooth blocks of values; none at first. Changes `rows`.
   void set_smoothness(std::vector<SmoothBlock> blocks);
   [[nodiscard]] const std::vector<SmoothBlock>& smoothness() const { return smooth_; }
@@ -178,6 +198,10 @@ class JointProblem : public inference::LeastSquaresProblem {
   /// A reading at rest counts only where the offset is estimated.
   [[nodiscard]] bool fits_rest() const { return offset_unknown_ && rest_reading_; }
   bool solve_frames(const Eigen::VectorXd& q);
+  [[nodiscard]] size_t work_slot() const;
+  /// d(work's residual)/dq, and its row.
+  [[nodiscard]] Eigen::RowVectorXd work_derivatives(const Eigen::VectorXd& q);
+  [[nodiscard]] Eigen::Index work_row() const { return data_rows() - 1; }
   void shift_planes(const Eigen::VectorXd& q);
 
   MotionModel& model_;
@@ -192,6 +216,7 @@ class JointProblem : public inference::LeastSquaresProblem {
   double offset_sigma_kPa_ = 0;
   std::optional<Frame> rest_reading_;
   TagPlanes planes_;
+  std::optional<MeasuredWork> work_;
   std::vector<SmoothBlock> smooth_;
   std::optional<RobustLoss> robust_;
   Eigen::VectorXd residuals_;

@@ -5,6 +5,9 @@
 #include <stdexcept>
 #include <utility>
 
+#include "estimator/fit/constrained_energy.hpp"
+#include "estimator/mesh/node_field.hpp"
+
 namespace diastole {
 
 UnloadedMotion::UnloadedMotion(ElasticModel imaged, std::vector<ParameterGroup> groups, ImagedLoad load)
@@ -58,6 +61,41 @@ MotionDerivatives UnloadedMotion::derivatives_at(const ElasticState& state) {
   by.by_imaged_pressure = column(count);
   by.by_pressure = column(count + 1);
   return by;
+}
+
+double UnloadedMotion::stored_at(const ElasticState& state) const {
+  return model().stored_energy_mJ(state) - model().stored_energy_mJ(shape_->imaged);
+}
+
+EnergyDerivatives UnloadedMotion::energy_derivatives_at(const ElasticState& state,
+                                                        std::span<const double> values,
+                                                        const MotionDerivatives& by) {
+  const auto stored_mJ = [&](std::span<const double> at, double amount, const NodeField& along) {
+    ElasticMotion::set_values(imaged_, groups(), at);
+    NodeField shape_mm = shape_->reference_mm;
+    add_scaled(shape_mm, amount, along);
+    const ElasticModel body = on_unloaded(imaged_.system(), std::move(shape_mm));
+    return constrained_energy_mJ(body, state) - constrained_energy_mJ(body, shape_->imaged);
+  };
+  if (!shape_derivatives_) shape_derivatives_ = inverse_.derivatives(*shape_, groups());
+  EnergyDerivatives result;
+  for (size_t i = 0; i < values.size(); ++i) {
+    std::vector<double> above(values.begin(), values.end()), below = above;
+    const double change = step_of(values[i]);
+    above[i] += change;
+    below[i] -= change;
+    const NodeField& along = shape_derivatives_->by_parameter[i];
+    result.by_value.push_back((stored_mJ(above, change, along) - stored_mJ(below, -change, along)) /
+                                  (2 * change) +
+                              pressure_work_mJ(model(), state, by.by_value[i]));
+  }
+  const double change_kPa = step_of(pressure_kPa_);
+  const NodeField& along = shape_derivatives_->by_pressure;
+  result.by_imaged_pressure =
+      (stored_mJ(values, change_kPa, along) - stored_mJ(values, -change_kPa, along)) / (2 * change_kPa) +
+      pressure_work_mJ(model(), state, by.by_imaged_pressure);
+  result.by_pressure = pressure_work_mJ(model(), state, by.by_pressure);
+  return result;
 }
 
 std::optional<UnloadedMotion::Again> UnloadedMotion::inflated_again(std::span<const double> values,

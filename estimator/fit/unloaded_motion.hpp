@@ -6,7 +6,7 @@
 //
 //   dx/dv = dx/dv|X + dx/dX dX/dv        dx/dP0 = dx/dX dX/dP0        K dx = - (dr/dv + dr/dX dX/dv)
 //
-// exactly, K being the tangent at the frame.
+// exactly, K being the tangent at the frame. What is stored counts from the image, frame 0.
 
 #include "estimator/fe/unloaded_shape.hpp"
 #include "estimator/fit/elastic_motion.hpp"
@@ -37,6 +37,10 @@ class UnloadedMotion : public ElasticMotion {
  protected:
   std::optional<std::string> set_values(std::span<const double> values) override;
   MotionDerivatives derivatives_at(const ElasticState& state) override;
+  [[nodiscard]] double stored_at(const ElasticState& state) const override;
+  /// By differences along the shape's own derivatives.
+  EnergyDerivatives energy_derivatives_at(const ElasticState& state, std::span<const double> values,
+                                          const MotionDerivatives& by) override;
   [[nodiscard]] ElasticState first_state() const override { return shape_->imaged; }
 
  private:

@@ -20,6 +20,7 @@ DIASTOLE_MEMBERS(FittedOffset, value, se)
 DIASTOLE_MEMBERS(FittedVarianceShares, images, pressures, fibres, geometry)
 DIASTOLE_MEMBERS(FittedUnloading, imaged_at_kPa, sigma_kPa, estimated_kPa, se_kPa, cavity_imaged_mL,
                  cavity_unloaded_mL, return_mm, returned)
+DIASTOLE_MEMBERS(FittedEnergy, frame, work_mJ, sigma_mJ, stored_mJ)
 DIASTOLE_MEMBERS(Exclusion, reason, points)
 DIASTOLE_MEMBERS(Correlation, names, matrix)
 DIASTOLE_MEMBERS(ResidualHistogram, edges, counts)
@@ -67,6 +68,7 @@ void each_member(Visit&& visit, Record& r) {
   visit("posterior", if_any(r.posterior));
   visit("pressure_offset_kPa", if_any(r.pressure_offset_kPa));
   visit("unloaded", if_any(r.unloaded));
+  visit("energy", if_any(r.energy));
   DIASTOLE_VISIT(visit, r, history, residuals, section_frame, sections)
 }
 

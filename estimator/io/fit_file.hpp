@@ -129,6 +129,14 @@ struct FittedUnloading {
   bool returned;     ///< that pressure was reached, and is stable as far as this is known
 };
 
+/// The work-energy equation of a fit that used it (estimator/fit/work_energy.hpp).
+struct FittedEnergy {
+  int frame;       ///< the most loaded one
+  double work_mJ;  ///< of the pressure since frame 0, as measured
+  double sigma_mJ;
+  double stored_mJ;  ///< in the wall, at the estimate
+};
+
 /// How frame 0, which is not fitted, agrees with the undeformed body.
 struct UndeformedCheck {
   size_t points;
@@ -188,6 +196,7 @@ struct FitRecord {
   /// Of all frame pressures, measured less true; if it was sought.
   std::optional<FittedOffset> pressure_offset_kPa = {};
   std::optional<FittedUnloading> unloaded = {};
+  std::optional<FittedEnergy> energy = {};
   double rms_mm;  ///< of the unweighted residuals (a tag's along its normal; a point's three components)
   double chi2;
   size_t dof;

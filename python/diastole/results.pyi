@@ -336,6 +336,7 @@ class Fit(Record):
     posterior: PosteriorDrawing | None = ...
     pressure_offset_kPa: FittedOffset | None = ...
     robust: FittedRobust | None = ...
+    energy: FittedEnergy | None = ...
     unloaded: FittedUnloading | None = ...
 
 @dataclass(frozen=True)
@@ -497,6 +498,15 @@ class FittedRobust(Record):
     degrees: float
     scale: float
     wild: int
+
+@dataclass(frozen=True)
+class FittedEnergy(Record):
+    """The pressure's work as measured, and what the wall has stored at the estimate."""
+
+    frame: int
+    work_mJ: float
+    sigma_mJ: float
+    stored_mJ: float
 
 @dataclass(frozen=True)
 class FittedUnloading(Record):
