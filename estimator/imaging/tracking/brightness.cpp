@@ -11,6 +11,8 @@ namespace {
 /// The slice's own average counts like a hundredth of a full window: nothing beside one, all in an empty one.
 constexpr double share_of_window = 0.01;
 constexpr double nodes_per_window = 2.0;
+/// A constant, and cosine and sine of two directions.
+constexpr int most_patterns = 5;
 
 }  // namespace
 
@@ -63,27 +65,33 @@ void Brightness::solve() {
     bell.push_back(std::exp(-0.5 * static_cast<double>(i * i) / (sigma * sigma)));
   const double nodes_in_window = 2 * std::numbers::pi * sigma * sigma;
   const Eigen::ArrayXd all = share_of_window * nodes_in_window * moments_.rowwise().mean();
+  // Whole rows of nodes at once, shifted against each other.
   Eigen::ArrayXXd along_rows = Eigen::ArrayXXd::Zero(moments_.rows(), moments_.cols());
   for (Eigen::Index row = 0; row < rows_; ++row) {
-    for (Eigen::Index column = 0; column < columns_; ++column) {
-      for (Eigen::Index i = std::max(-reach, -column); i <= std::min(reach, columns_ - 1 - column); ++i)
-        along_rows.col(row * columns_ + column) +=
-            bell[static_cast<size_t>(i + reach)] * moments_.col(row * columns_ + column + i);
+    for (Eigen::Index i = -reach; i <= reach; ++i) {
+      const Eigen::Index length = columns_ - std::abs(i);
+      if (length <= 0) continue;
+      along_rows.middleCols(row * columns_ + std::max<Eigen::Index>(0, -i), length) +=
+          bell[static_cast<size_t>(i + reach)] *
+          moments_.middleCols(row * columns_ + std::max<Eigen::Index>(0, i), length);
     }
   }
+  using Small = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, most_patterns, most_patterns>;
+  Small matrix(patterns_, patterns_);
+  Eigen::ArrayXXd sums(moments_.rows(), columns_);
   for (Eigen::Index row = 0; row < rows_; ++row) {
+    sums.colwise() = all;
+    for (Eigen::Index i = std::max(-reach, -row); i <= std::min(reach, rows_ - 1 - row); ++i)
+      sums += bell[static_cast<size_t>(i + reach)] * along_rows.middleCols((row + i) * columns_, columns_);
     for (Eigen::Index column = 0; column < columns_; ++column) {
-      Eigen::ArrayXd sum = all;
-      for (Eigen::Index i = std::max(-reach, -row); i <= std::min(reach, rows_ - 1 - row); ++i)
-        sum += bell[static_cast<size_t>(i + reach)] * along_rows.col((row + i) * columns_ + column);
-      Eigen::MatrixXd matrix(patterns_, patterns_);
       Eigen::Index at = 0;
       for (int i = 0; i < patterns_; ++i) {
         for (int j = 0; j <= i; ++j)
-          matrix(i, j) = matrix(j, i) = sum[at++];
+          matrix(i, j) = matrix(j, i) = sums(at++, column);
       }
       matrix.diagonal().array() += 1e-9 * matrix.trace() + 1e-300;
-      amplitudes_.col(row * columns_ + column) = matrix.ldlt().solve(sum.tail(patterns_).matrix()).array();
+      amplitudes_.col(row * columns_ + column) =
+          Eigen::LDLT<Small>(matrix).solve(sums.col(column).tail(patterns_).matrix()).array();
     }
   }
 }

@@ -119,9 +119,9 @@ void take_off_motion(const SplinePlane& splines, const Eigen::ArrayXXf& slope, s
     const SplineValues& at = pixel.splines;
     for (size_t i = 0; i < 16; ++i) {
       if (at.index[i] < 0) continue;
-      right.row(at.index[i]) += here * at.value[i] * Eigen::RowVector2d(pixel.ghost, pixel.image);
+      right.row(at.index[i]) += here * at.value(i) * Eigen::RowVector2d(pixel.ghost, pixel.image);
       for (size_t j = 0; j < 16; ++j) {
-        if (at.index[j] >= 0) matrix(at.index[i], at.index[j]) += here * here * at.value[i] * at.value[j];
+        if (at.index[j] >= 0) matrix(at.index[i], at.index[j]) += here * here * at.value(i) * at.value(j);
       }
     }
   }

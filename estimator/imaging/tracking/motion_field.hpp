@@ -21,7 +21,11 @@ struct MotionField {
   double extent_mm;
 
   [[nodiscard]] double value_mm(size_t phase, const Eigen::Vector2d& x_mm) const;
-  [[nodiscard]] double sigma_mm(size_t phase, const Eigen::Vector2d& x_mm) const;
+  /// F of the covariance F' F of a phase's coefficients: (n r) x n, lower trapezoid.
+  [[nodiscard]] Eigen::MatrixXd phase_factor(size_t phase) const;
+  /// `factor`: of the same phase.
+  [[nodiscard]] double sigma_mm(size_t phase, const Eigen::MatrixXd& factor,
+                                const Eigen::Vector2d& x_mm) const;
 };
 
 }  // namespace diastole::imaging

@@ -9,15 +9,9 @@
 #include <Eigen/Dense>
 #include <vector>
 
-#include "estimator/imaging/tracking/spline_plane.hpp"
+#include "estimator/imaging/tracking/phase_information.hpp"
 
 namespace diastole::imaging {
-
-/// What the images of one phase say of the coefficients: exp(eta . c - c . H c / 2).
-struct PhaseInformation {
-  Eigen::MatrixXd precision;  ///< H, 1/mm^2
-  Eigen::VectorXd vector;     ///< eta, 1/mm
-};
 
 struct MotionPrior {
   double kappa_per_mm = 0;

@@ -42,25 +42,27 @@ SplineValues SplinePlane::at(const Eigen::Vector2d& x_mm) const {
   const Eigen::Vector2d cell = (x_mm - first_mm_) / spacing_mm_;
   const int column = static_cast<int>(std::floor(cell.x()));
   const int row = static_cast<int>(std::floor(cell.y()));
-  const auto across = cubic(cell.x() - column);
-  const auto down = cubic(cell.y() - row);
-  SplineValues values{};
-  for (size_t i = 0; i < 16; ++i) {
+  SplineValues values{{}, cubic(cell.x() - column), cubic(cell.y() - row)};
+  for (size_t i = 0; i < 16; ++i)
     values.index[i] = number(column + static_cast<int>(i % 4), row + static_cast<int>(i / 4));
-    values.value[i] = across[i % 4] * down[i / 4];
-  }
   return values;
 }
 
-double spline_sum(const SplineValues& splines, const Eigen::VectorXd& coefficients) {
+double spline_sum(const SplineValues& splines, const Eigen::Ref<const Eigen::VectorXd>& coefficients) {
   double sum = 0;
-  for (size_t i = 0; i < 16; ++i) {
-    if (splines.index[i] >= 0) sum += splines.value[i] * coefficients[splines.index[i]];
+  for (size_t down = 0; down < 4; ++down) {
+    double row = 0;
+    for (size_t across = 0; across < 4; ++across) {
+      const int index = splines.index[4 * down + across];
+      if (index >= 0) row += splines.across[across] * coefficients[index];
+    }
+    sum += splines.down[down] * row;
   }
   return sum;
 }
 
-double SplinePlane::value(const Eigen::VectorXd& coefficients, const Eigen::Vector2d& x_mm) const {
+double SplinePlane::value(const Eigen::Ref<const Eigen::VectorXd>& coefficients,
+                          const Eigen::Vector2d& x_mm) const {
   return spline_sum(at(x_mm), coefficients);
 }
 

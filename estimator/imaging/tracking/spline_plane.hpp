@@ -8,12 +8,15 @@
 
 namespace diastole::imaging {
 
-/// The 16 splines that are not zero at a point.
+/// The 16 splines that are not zero at a point, four across by four down.
 struct SplineValues {
   std::array<int, 16> index;  ///< -1 for a spline that is left out
-  std::array<double, 16> value;
+  std::array<double, 4> across;
+  std::array<double, 4> down;
+
+  [[nodiscard]] double value(size_t i) const { return across[i % 4] * down[i / 4]; }
 };
-double spline_sum(const SplineValues& splines, const Eigen::VectorXd& coefficients);
+double spline_sum(const SplineValues& splines, const Eigen::Ref<const Eigen::VectorXd>& coefficients);
 
 /// w(x) = sum of coefficient i times spline i; x in mm within the slice. Splines that no sample touches are left out.
 class SplinePlane {
@@ -23,7 +26,8 @@ class SplinePlane {
 
   [[nodiscard]] int count() const { return count_; }
   [[nodiscard]] SplineValues at(const Eigen::Vector2d& x_mm) const;
-  [[nodiscard]] double value(const Eigen::VectorXd& coefficients, const Eigen::Vector2d& x_mm) const;
+  [[nodiscard]] double value(const Eigen::Ref<const Eigen::VectorXd>& coefficients,
+                             const Eigen::Vector2d& x_mm) const;
 
   /// The precision of a Whittle-Matern field of the range sqrt(8) / kappa (Lindgren, Rue, Lindstrom, J. R. Stat. Soc. B 73 (2011)
   /// 423) on the grid of coefficients: R = (kappa^2 h^2 + L)^2 with the grid's graph Laplacian L, which leaves the border free, scaled so

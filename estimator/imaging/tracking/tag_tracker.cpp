@@ -235,22 +235,11 @@ class ViewTracker {
 
   /// What a person saw, as information on the coefficients.
   [[nodiscard]] PhaseInformation information_of(const std::vector<SeenMotion>& all) const {
-    const Eigen::Index count = splines_->count();
-    PhaseInformation information{Eigen::MatrixXd::Zero(count, count), Eigen::VectorXd::Zero(count)};
     const double sigma_mm = seen_in_pixels * view_.plane.finer_spacing_mm();
-    for (const SeenMotion& seen : all) {
-      for (size_t i = 0; i < 16; ++i) {
-        if (seen.splines.index[i] < 0) continue;
-        const double value = seen.splines.value[i] / (sigma_mm * sigma_mm);
-        information.vector[seen.splines.index[i]] += value * seen.w_mm;
-        for (size_t j = 0; j < 16; ++j) {
-          if (seen.splines.index[j] >= 0)
-            information.precision(seen.splines.index[i], seen.splines.index[j]) +=
-                value * seen.splines.value[j];
-        }
-      }
-    }
-    return information;
+    PhaseInformationSum sum(splines_->count());
+    for (const SeenMotion& seen : all)
+      sum.add(seen.splines, 1 / (sigma_mm * sigma_mm), seen.w_mm / (sigma_mm * sigma_mm));
+    return sum.take();
   }
 
   void tracked_phases(const Pixel& pixel, size_t k, std::span<double> phases) const {
@@ -341,7 +330,7 @@ class ViewTracker {
       }
       const std::vector<Eigen::MatrixXd> start = coefficients_;
       fit_phase(k, view_.images[k], start, 4);
-      (void)gather(k, 0);
+      explain(k);
       if (best.empty()) noise = phases_[k].noise;
       double cost = image_cost(noise) + step_cost(coefficients_, k, expected, k);
       for (size_t f = 0; f < directions(); ++f)
@@ -363,7 +352,7 @@ class ViewTracker {
     for (size_t j = k; j-- > 0 && !is_led(j);) {
       const auto time = static_cast<Eigen::Index>(j);
       coefficients_ = right;
-      (void)gather(j, 0);
+      explain(j);
       const double noise = phases_[j].noise;
       const TrackedPhase before = phases_[j];
       const double cost = image_cost(noise) + step_cost(right, j, right, j + 1);
@@ -375,7 +364,7 @@ class ViewTracker {
       }
       const std::vector<Eigen::MatrixXd> start = coefficients_;
       fit_phase(j, view_.images[j], start, 4);
-      (void)gather(j, 0);
+      explain(j);
       back = coefficients_;
       for (size_t f = 0; f < directions(); ++f)
         apart_mm = std::max(apart_mm, (back[f].col(time) - right[f].col(time)).cwiseAbs().maxCoeff());
@@ -403,7 +392,7 @@ class ViewTracker {
     }
   }
 
-  /// Minus the log likelihood of an image at the motion gathered last, with Huber's loss.
+  /// Minus the log likelihood of an image at the motion that it was explained with last, with Huber's loss.
   [[nodiscard]] double image_cost(double noise) const {
     double sum = 0;
     for (const Fitted& fitted : fitted_) {
@@ -445,7 +434,8 @@ class ViewTracker {
     for (int round = 0; round < most_rounds; ++round) {
       double largest = 0;
       for (size_t f = 0; f < directions(); ++f) {
-        PhaseInformation information = gather(k, f, image);
+        explain(k, image);
+        PhaseInformation information = information_in(k, f);
         const Eigen::VectorXd now = coefficients_[f].col(time);
         if (!seen_[k][f].empty()) {
           const PhaseInformation seen = information_of(seen_[k][f]);
@@ -453,7 +443,7 @@ class ViewTracker {
           information.vector += seen.vector - seen.precision * now;
         }
         const Eigen::VectorXd step = (information.precision + prior)
-                                         .ldlt()
+                                         .llt()
                                          .solve(information.vector + prior * (expected[f].col(time) - now));
         coefficients_[f].col(time) += step;
         largest = std::max(largest, step.cwiseAbs().maxCoeff());
@@ -462,11 +452,8 @@ class ViewTracker {
     }
   }
 
-  /// Gradient (in place of eta) and curvature of one direction's motion in one image, at the present motion. Brightness is fitted on the way;
-  /// residuals and slopes are kept.
-  PhaseInformation gather(size_t k, size_t f) { return gather(k, f, view_.images[k]); }
-
-  PhaseInformation gather(size_t k, size_t f, const Image& image) {
+  /// Fits an image's brightness at the present motion. Residuals and slopes are kept.
+  void explain(size_t k, const Image& image) {
     TrackedPhase& phase = phases_[k];
     Brightness brightness(view_.extent_mm(), window_in_spacings * spacing_mm_,
                           static_cast<int>(model_.patterns()));
@@ -475,7 +462,7 @@ class ViewTracker {
       if (static_cast<double>(phase.depth_mm(pixel.row, pixel.column)) < sure_mm() ||
           view_.is_masked(k, pixel.row, pixel.column))
         continue;
-      Fitted fitted{&pixel, {}, 0, 0};
+      Fitted fitted{&pixel, {}, 0, {}};
       tracked_phases(pixel, k, fitted.phases);
       brightness.add(pixel.x_mm, model_.at(fitted.phases).values(), 1.0,
                      static_cast<double>(image(pixel.row, pixel.column)));
@@ -484,43 +471,38 @@ class ViewTracker {
     brightness.solve();
     std::vector<double> residuals;
     phase.residual.setZero(image.rows(), image.cols());
-    phase.slope.resize(directions());
-    phase.slope[f].setZero(image.rows(), image.cols());
+    phase.slope.assign(directions(), Eigen::ArrayXXf::Zero(image.rows(), image.cols()));
     std::array<double, TagPatterns::most> amplitudes{};
     for (Fitted& fitted : fitted_) {
       const Pixel& pixel = *fitted.pixel;
       fitted.residual = static_cast<double>(image(pixel.row, pixel.column)) -
                         picture(brightness, pixel.x_mm, fitted.phases, amplitudes);
-      fitted.slope = two_pi * waves_[f].per_mm.norm() * model_.slope(fitted.phases, amplitudes, f);
       residuals.push_back(fitted.residual);
       phase.residual(pixel.row, pixel.column) = static_cast<float>(fitted.residual);
-      phase.slope[f](pixel.row, pixel.column) = static_cast<float>(fitted.slope);
+      for (size_t f = 0; f < directions(); ++f) {
+        fitted.slope[f] = two_pi * waves_[f].per_mm.norm() * model_.slope(fitted.phases, amplitudes, f);
+        phase.slope[f](pixel.row, pixel.column) = static_cast<float>(fitted.slope[f]);
+      }
     }
     phase.noise = std::max(robust_sigma(residuals), 1e-9);
     phase.pixels = fitted_.size();
-    PhaseInformation information{Eigen::MatrixXd::Zero(splines_->count(), splines_->count()),
-                                 Eigen::VectorXd::Zero(splines_->count())};
+  }
+
+  void explain(size_t k) { explain(k, view_.images[k]); }
+
+  /// Gradient (in place of eta) and curvature of one direction's motion in the image explained last, at the motion that it was explained with.
+  [[nodiscard]] PhaseInformation information_in(size_t k, size_t f) const {
+    const TrackedPhase& phase = phases_[k];
+    PhaseInformationSum sum(splines_->count());
     for (const Fitted& fitted : fitted_) {
       const double beside_noise =
           edge_excess_.at(static_cast<double>(phase.depth_mm(fitted.pixel->row, fitted.pixel->column)));
       const double weight =
           huber_weight(fitted.residual, phase.noise) / (phase.noise * phase.noise * beside_noise);
-      const SplineValues& splines = fitted.pixel->splines;
-      const double square = weight * fitted.slope * fitted.slope;
-      const double product = weight * fitted.slope * fitted.residual;
-      for (size_t i = 0; i < 16; ++i) {
-        if (splines.index[i] < 0) continue;
-        information.vector[splines.index[i]] += product * splines.value[i];
-        const double scaled = square * splines.value[i];
-        for (size_t j = 0; j <= i; ++j) {
-          if (splines.index[j] >= 0)
-            information.precision(std::max(splines.index[i], splines.index[j]),
-                                  std::min(splines.index[i], splines.index[j])) += scaled * splines.value[j];
-        }
-      }
+      sum.add(fitted.pixel->splines, weight * fitted.slope[f] * fitted.slope[f],
+              weight * fitted.slope[f] * fitted.residual);
     }
-    information.precision.triangularView<Eigen::StrictlyUpper>() = information.precision.transpose();
-    return information;
+    return sum.take();
   }
 
   /// A phase's residual power near the tags' frequency over that of white noise of the same variance: farther off than the motion can
@@ -565,7 +547,7 @@ class ViewTracker {
       const TrackedPhase before = phases_[k];
       const std::vector<Eigen::MatrixXd> coefficients = coefficients_;
       fit_phase(k, image, coefficients, 2);
-      (void)gather(k, f, image);
+      explain(k, image);
       kept += power_near_tags(phases_[k], f);
       tried += 1;
       coefficients_ = coefficients;
@@ -591,16 +573,15 @@ class ViewTracker {
     }
     for (size_t f = 0; f < directions(); ++f)
       fit_jointly(f, informations(f), true);
-    for (size_t f = 0; f < directions(); ++f) {
-      for (size_t k = 0; k < times(); ++k)
-        (void)gather(k, f);
-    }
+    for (size_t k = 0; k < times(); ++k)
+      explain(k);
   }
 
   std::vector<PhaseInformation> informations(size_t f) {
     std::vector<PhaseInformation> all;
     for (size_t k = 0; k < times(); ++k) {
-      PhaseInformation here = gather(k, f);
+      explain(k);
+      PhaseInformation here = information_in(k, f);
       here.vector += here.precision * coefficients_[f].col(static_cast<Eigen::Index>(k));
       here.precision /= factors_[f];
       here.vector /= factors_[f];
@@ -658,7 +639,7 @@ class ViewTracker {
     const Pixel* pixel;
     std::array<double, 2> phases;
     double residual;
-    double slope;
+    std::array<double, 2> slope;  // a direction
   };
 
   const TagView& view_;

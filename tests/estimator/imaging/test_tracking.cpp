@@ -185,9 +185,9 @@ TEST(SplinePlane, PriorHasUnitVarianceAndCarriesAPlane) {
   const SplineValues values = splines.at({40, 40});
   double variance = 0, sum = 0;
   for (size_t i = 0; i < 16; ++i) {
-    sum += values.value[i];
+    sum += values.value(i);
     for (size_t j = 0; j < 16; ++j)
-      variance += values.value[i] * values.value[j] * covariance(values.index[i], values.index[j]);
+      variance += values.value(i) * values.value[j] * covariance(values.index[i], values.index[j]);
   }
   EXPECT_NEAR(sum, 1.0, 1e-12);
   EXPECT_NEAR(variance, 1.0, 0.4);
