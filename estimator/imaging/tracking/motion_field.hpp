@@ -4,28 +4,21 @@
 
 #include <Eigen/Dense>
 
-#include "estimator/imaging/tracking/spline_plane.hpp"
+#include "estimator/imaging/tracking/joint_motion.hpp"
 
 namespace diastole::imaging {
 
 struct MotionField {
   SplinePlane splines;
-  Eigen::MatrixXd modes;         ///< T x r
-  Eigen::MatrixXd coefficients;  ///< n x T
-  Eigen::MatrixXd
-      inverse_factor;  ///< of the modes' coefficients, mode by mode (n r): their covariance is its transpose times it; mm
-
-  Eigen::VectorXd left_out_mm;          ///< T: standard deviation of what the modes leave out
+  Eigen::MatrixXd coefficients;         ///< n x T
+  JointCovariance covariance;           ///< of them
   Eigen::Matrix3d rest_covariance_mm2;  ///< of the tags at rest: of (x - middle) / extent, and of the offset
   Eigen::Vector2d middle_mm;
   double extent_mm;
 
   [[nodiscard]] double value_mm(size_t phase, const Eigen::Vector2d& x_mm) const;
-  /// F of the covariance F' F of a phase's coefficients: (n r) x n, lower trapezoid.
-  [[nodiscard]] Eigen::MatrixXd phase_factor(size_t phase) const;
-  /// `factor`: of the same phase.
-  [[nodiscard]] double sigma_mm(size_t phase, const Eigen::MatrixXd& factor,
-                                const Eigen::Vector2d& x_mm) const;
+  /// `factor`: the covariance's, of the same phase.
+  [[nodiscard]] double sigma_mm(const Eigen::MatrixXd& factor, const Eigen::Vector2d& x_mm) const;
 };
 
 }  // namespace diastole::imaging

@@ -6,122 +6,143 @@
 namespace diastole::imaging {
 namespace {
 
-/// Each step of expectation maximisation raises the evidence; by then its gain is below a thousandth a coefficient.
-constexpr int steps = 60;
+/// A step of expectation maximisation that raises the log evidence by less has found nothing more.
+constexpr double settled_gain = 0.01;
+constexpr int most_steps = 1000;
 /// The ranges are told apart long before.
 constexpr int steps_to_choose = 12;
 /// What the images know less of than a hundredth of what the prior says of a millimetre teaches nothing.
 constexpr double least_strength = 0.01;
+/// A phase without a tag that is seen, beside the mean phase.
+constexpr double least_weight = 1e-12;
 
-/// The phases' information in the splines' common eigenmodes: V' R V = 1, V' mean(H) V = diag(strength).
-struct Modes {
-  Eigen::VectorXd strength;  // n
-  Eigen::MatrixXd vector;    // n x T: V' eta
-  Eigen::VectorXd weight;    // T: how much each phase knows, relative to the mean
+/// The phases' information in the splines' common eigenmodes, phases weighed by how much they know: y_i ~ N(0, K + 1 / strength_i) with
+/// K = W^1/2 K_time W^1/2.
+struct CommonModes {
+  Eigen::MatrixXd places;    // V
+  Eigen::VectorXd strength;  // of the last of them, which the images know something of
+  Eigen::MatrixXd seen;      // theirs, a row each: strength_i y_i
+  Eigen::VectorXd weight;    // T: the diagonal of W, 1 in the mean
 };
 
-Modes common_modes(const Eigen::MatrixXd& place_precision, const std::vector<PhaseInformation>& phases,
-                   const Eigen::MatrixXd& estimates) {
+CommonModes common_modes(const Eigen::MatrixXd& place_precision, const std::vector<PhaseInformation>& phases,
+                         const Eigen::MatrixXd& estimates) {
   const auto count = place_precision.rows();
   const auto times = static_cast<Eigen::Index>(phases.size());
-  Modes modes;
+  CommonModes modes;
   modes.weight.resize(times);
   Eigen::MatrixXd mean = Eigen::MatrixXd::Zero(count, count);
+  Eigen::MatrixXd gradient(count, times);
   for (Eigen::Index k = 0; k < times; ++k) {
-    modes.weight[k] = phases[static_cast<size_t>(k)].precision.trace();
-    mean += phases[static_cast<size_t>(k)].precision;
+    const PhaseInformation& phase = phases[static_cast<size_t>(k)];
+    modes.weight[k] = phase.precision.trace();
+    mean += phase.precision / static_cast<double>(times);
+    gradient.col(k) = phase.vector - phase.precision * estimates.col(k);
   }
-  mean /= static_cast<double>(times);
   modes.weight /= std::max(modes.weight.mean(), 1e-300);
   const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd> solver(mean, place_precision);
-  const Eigen::Index seen = (solver.eigenvalues().array() > least_strength).count();
-  modes.strength = solver.eigenvalues().tail(seen);
-  // Each phase is taken to know the same modes, all of them better or worse: its estimate, as sure as that.
-  modes.vector = modes.strength.asDiagonal() *
-                 (solver.eigenvectors().rightCols(seen).transpose() * place_precision * estimates) *
-                 modes.weight.asDiagonal();
+  modes.places = solver.eigenvectors();
+  const Eigen::Index known =
+      std::max<Eigen::Index>(1, (solver.eigenvalues().array() > least_strength).count());
+  modes.strength = solver.eigenvalues().tail(known);
+  // Each phase is taken to know the same modes, all of them better or worse; so near the estimate, where what it truly knows is the gradient.
+  const Eigen::MatrixXd places = modes.places.rightCols(known);
+  const Eigen::VectorXd root = modes.weight.cwiseMax(least_weight).cwiseSqrt();
+  modes.seen =
+      modes.strength.asDiagonal() * (places.transpose() * place_precision * estimates) * root.asDiagonal();
+  modes.seen += places.transpose() * gradient * root.cwiseInverse().asDiagonal();
   return modes;
 }
 
-struct Learnt {
-  Eigen::MatrixXd covariance;
+/// K = vectors diag(variances) vectors'.
+struct TimeCovariance {
+  Eigen::MatrixXd vectors;
+  Eigen::VectorXd variances;
   double log_evidence;
 };
 
-/// One step: the expected second moment of the modes given `covariance`, and the evidence of `covariance`.
-Learnt expect(const Modes& modes, const Eigen::MatrixXd& covariance) {
-  const Eigen::Index times = covariance.rows();
-  Eigen::MatrixXd moment = Eigen::MatrixXd::Zero(times, times);
-  double log_evidence = 0;
-  for (Eigen::Index i = 0; i < modes.strength.size(); ++i) {
-    const Eigen::VectorXd known = (modes.strength[i] * modes.weight).cwiseSqrt();
-    // With D = diag(known^2): posterior = K - K d (1 + d K d)^-1 d K.
-    const Eigen::MatrixXd scaled = known.asDiagonal() * covariance;
-    Eigen::MatrixXd inner = scaled * known.asDiagonal();
-    inner.diagonal().array() += 1.0;
-    const Eigen::LLT<Eigen::MatrixXd> factor(inner);
-    const Eigen::MatrixXd half = factor.matrixL().solve(scaled);
-    const Eigen::MatrixXd posterior = covariance - half.transpose() * half;
-    const Eigen::VectorXd mean = posterior * modes.vector.row(i).transpose();
-    moment += posterior + mean * mean.transpose();
-    const Eigen::MatrixXd lower = factor.matrixL();
-    log_evidence += 0.5 * modes.vector.row(i).dot(mean) - lower.diagonal().array().log().sum();
-  }
-  moment /= static_cast<double>(modes.strength.size());
-  return {0.5 * (moment + moment.transpose()), log_evidence};
+TimeCovariance decomposed(const Eigen::MatrixXd& covariance) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(covariance);
+  return {solver.eigenvectors(), solver.eigenvalues().cwiseMax(0.0), 0};
 }
 
-/// The modes of K without those whose share of the motion, which is `motion_mm` (root mean square), is negligible; what each phase
-/// loses by that goes to the prior's `left_out_mm`.
-void keep_strong_modes(MotionPrior& prior, double motion_mm, double negligible_mm) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(prior.time_covariance);
-  const Eigen::VectorXd variances = solver.eigenvalues().cwiseMax(0.0);
-  const double mm2_per_unit = motion_mm * motion_mm / std::max(prior.time_covariance.trace(), 1e-300);
-  Eigen::Index left_out = 0;
-  while (left_out + 1 < variances.size() &&
-         variances[left_out] * mm2_per_unit < negligible_mm * negligible_mm)
-    ++left_out;
-  const Eigen::Index kept = variances.size() - left_out;
-  prior.modes = solver.eigenvectors().rightCols(kept) * variances.tail(kept).cwiseSqrt().asDiagonal();
-  const Eigen::MatrixXd lost =
-      solver.eigenvectors().leftCols(left_out) * variances.head(left_out).cwiseSqrt().asDiagonal();
-  prior.left_out_mm =
-      (mm2_per_unit * static_cast<double>(variances.size()) * lost.rowwise().squaredNorm()).cwiseSqrt();
+/// One step: the expected second moment of the modes, and the evidence of the covariance before.
+TimeCovariance expect(const CommonModes& modes, const TimeCovariance& before) {
+  const Eigen::ArrayXXd seen = modes.seen * before.vectors;  // n x T
+  const Eigen::ArrayXXd gain = (modes.strength * before.variances.transpose()).array() + 1.0;
+  const Eigen::ArrayXXd share =
+      (1.0 / gain).rowwise() * before.variances.transpose().array();  // posterior variance
+  const Eigen::MatrixXd mean = seen * share;
+  Eigen::MatrixXd moment = mean.transpose() * mean;
+  moment.diagonal() += share.colwise().sum().matrix();
+  const double log_evidence = 0.5 * ((seen * mean.array()).sum() - gain.log().sum());
+  TimeCovariance next = decomposed(before.vectors * (moment / static_cast<double>(modes.strength.size())) *
+                                   before.vectors.transpose());
+  next.log_evidence = log_evidence;
+  return next;
+}
+
+/// The mean of a variance over what its likelihood leaves, any standard deviation as likely as any other (Gelman, Bayesian Anal. 1 (2006)
+/// 515). The likeliest value of what is hardly seen is often none at all, and would be stated as certainty. `seen` and
+/// `strength`: of each place; `likeliest`: where the likelihood is highest.
+double expected_variance(const Eigen::ArrayXd& seen, const Eigen::ArrayXd& strength, double likeliest) {
+  const auto log_likelihood = [&](double sigma) {
+    const Eigen::ArrayXd gain = 1.0 + strength * (sigma * sigma);
+    return 0.5 * (seen.square() * (sigma * sigma) / gain - gain.log()).sum();
+  };
+  const double top = log_likelihood(std::sqrt(likeliest));
+  constexpr double negligible = -12;  // e^-12 of the highest
+  double high = std::max(std::sqrt(likeliest), 1e-6);
+  while (log_likelihood(high) - top > negligible && high < 1e3)
+    high *= 1.5;
+  constexpr int steps = 200;
+  double sum = 0, squares = 0;
+  for (int step = 0; step < steps; ++step) {
+    const double sigma = high * (step + 0.5) / steps;
+    const double likelihood = std::exp(log_likelihood(sigma) - top);
+    sum += likelihood;
+    squares += likelihood * sigma * sigma;
+  }
+  return squares / sum;
 }
 
 }  // namespace
 
 MotionPrior learn_motion_prior(const SplinePlane& splines, const std::vector<PhaseInformation>& phases,
-                               const Eigen::MatrixXd& estimates, const std::vector<double>& kappas_per_mm,
-                               double negligible_mm) {
+                               const Eigen::MatrixXd& estimates, const std::vector<double>& kappas_per_mm) {
   const auto times = static_cast<Eigen::Index>(phases.size());
-  const double motion_mm = std::sqrt(estimates.array().square().mean());
   MotionPrior best;
-  Modes best_modes;
+  CommonModes modes;
+  TimeCovariance covariance;
   double best_evidence = -std::numeric_limits<double>::infinity();
   for (const double kappa : kappas_per_mm) {
-    const Eigen::MatrixXd precision = splines.precision(kappa);
-    const Modes modes = common_modes(precision, phases, estimates);
+    CommonModes tried = common_modes(splines.precision(kappa), phases, estimates);
     // The start: a millimetre of motion, alike over a quarter of the phases.
-    Learnt learnt{Eigen::MatrixXd::NullaryExpr(
-                      times, times,
-                      [times](Eigen::Index a, Eigen::Index b) {
-                        const double apart = static_cast<double>(a - b) / static_cast<double>(times);
-                        return std::exp(-8.0 * apart * apart) + (a == b ? 1e-5 : 0.0);
-                      }),
-                  0};
+    TimeCovariance learnt =
+        decomposed(Eigen::MatrixXd::NullaryExpr(times, times, [&](Eigen::Index a, Eigen::Index b) {
+          const double apart = static_cast<double>(a - b) / static_cast<double>(times);
+          return std::sqrt(tried.weight[a] * tried.weight[b]) *
+                 (std::exp(-8.0 * apart * apart) + (a == b ? 1e-5 : 0.0));
+        }));
     for (int step = 0; step < steps_to_choose; ++step)
-      learnt = expect(modes, learnt.covariance);
+      learnt = expect(tried, learnt);
     if (learnt.log_evidence <= best_evidence) continue;
     best_evidence = learnt.log_evidence;
-    best_modes = modes;
+    modes = std::move(tried);
+    covariance = std::move(learnt);
     best.kappa_per_mm = kappa;
-    best.place_precision = precision;
-    best.time_covariance = learnt.covariance;
   }
-  for (int step = steps_to_choose; step < steps; ++step)
-    best.time_covariance = expect(best_modes, best.time_covariance).covariance;
-  keep_strong_modes(best, motion_mm, negligible_mm);
+  for (int step = steps_to_choose; step < most_steps; ++step) {
+    const double before = covariance.log_evidence;
+    covariance = expect(modes, covariance);
+    if (covariance.log_evidence - before < settled_gain) break;
+  }
+  const Eigen::ArrayXXd seen = modes.seen * covariance.vectors;
+  for (Eigen::Index m = 0; m < times; ++m)
+    covariance.variances[m] = expected_variance(seen.col(m), modes.strength.array(), covariance.variances[m]);
+  best.places = modes.places;
+  best.times = modes.weight.cwiseMax(least_weight).cwiseSqrt().cwiseInverse().asDiagonal() *
+               covariance.vectors * covariance.variances.cwiseSqrt().asDiagonal();
   return best;
 }
 

@@ -113,7 +113,7 @@ class Emitter {
       choose_places(f, number, piece, step_mm);
     }
     share_pixels(k, f);
-    factor_ = tracked_.motion[f].phase_factor(k);
+    factor_ = tracked_.motion[f].covariance.phase_factor(k);
     for (const Place& place : places_)
       emit_point(k, f, place);
   }
@@ -187,9 +187,9 @@ class Emitter {
     const double change =
         1 + (motion.value_mm(k, x_mm + h * normal) - motion.value_mm(k, x_mm - h * normal)) / (2 * h);
     const double ghost_mm = ghost_sigma_mm(k, f, x_mm);
-    const double sigma_mm = std::hypot(motion.sigma_mm(k, factor_, x_mm), ghost_mm,
-                                       through_plane_mm(motion, k, x_mm, spacing_mm)) /
-                            std::max(change, 0.2);
+    const double sigma_mm =
+        std::hypot(motion.sigma_mm(factor_, x_mm), ghost_mm, through_plane_mm(motion, k, x_mm, spacing_mm)) /
+        std::max(change, 0.2);
     const Surroundings around = surroundings(k, f, x_mm);
     const auto drop = [&](const char* reason) {
       ++points_.dropped[reason];

@@ -10,7 +10,7 @@
 #include "estimator/imaging/tracking/brightness.hpp"
 #include "estimator/imaging/tracking/edge_excess.hpp"
 #include "estimator/imaging/tracking/ghost_phase.hpp"
-#include "estimator/imaging/tracking/motion_prior.hpp"
+#include "estimator/imaging/tracking/joint_motion.hpp"
 #include "estimator/imaging/tracking/robust_weight.hpp"
 #include "protocol/signal/median.hpp"
 
@@ -30,8 +30,6 @@ constexpr double first_step_in_spacings = 0.2;
 constexpr double first_range_in_spacings = 4.0;
 /// Ranges to choose from by evidence: kappa = 1 / (these times the spacing).
 constexpr std::array ranges_in_spacings = {4.0, 16.0};
-/// Modes of the motion that are smaller than a four-hundredth of a pixel are no part of it.
-constexpr double negligible_in_pixels = 0.0025;
 /// A motion that begins at rest has done 2 (2 t / T)^2 of its whole after a small t: a thousandth after a hundredth of the cycle.
 constexpr double late_share = 0.02;
 constexpr double settled_mm = 0.005;
@@ -48,25 +46,6 @@ double robust_sigma(const std::vector<double>& residuals) {
   for (const double residual : residuals)
     sizes.push_back(std::abs(residual));
   return 1.4826 * median(std::move(sizes));
-}
-
-/// The inverse of a lower triangle in its place: halves are inverted by themselves, which needs a third of the work of solving for the
-/// identity.
-void invert_lower(Eigen::Ref<Eigen::MatrixXd> lower) {
-  const Eigen::Index count = lower.rows();
-  if (count <= 64) {
-    lower =
-        Eigen::MatrixXd(lower.triangularView<Eigen::Lower>().solve(Eigen::MatrixXd::Identity(count, count)));
-    return;
-  }
-  const Eigen::Index half = count / 2;
-  const Eigen::Index rest = count - half;
-  invert_lower(lower.topLeftCorner(half, half));
-  invert_lower(lower.bottomRightCorner(rest, rest));
-  const Eigen::MatrixXd right =
-      lower.bottomLeftCorner(rest, half) * lower.topLeftCorner(half, half).triangularView<Eigen::Lower>();
-  lower.bottomLeftCorner(rest, half).noalias() =
-      -(lower.bottomRightCorner(rest, rest).triangularView<Eigen::Lower>() * right);
 }
 
 struct Pixel {
@@ -564,15 +543,18 @@ class ViewTracker {
     std::vector<double> kappas;
     for (const double range : ranges_in_spacings)
       kappas.push_back(1.0 / (range * spacing_mm_));
-    for (size_t f = 0; f < directions(); ++f) {
-      inverse_factors_.emplace_back();
-      const std::vector<PhaseInformation> found = informations(f);
-      priors_.push_back(learn_motion_prior(*splines_, found, coefficients_[f], kappas,
-                                           negligible_in_pixels * view_.plane.finer_spacing_mm()));
-      fit_jointly(f, found, false);
+    // The prior is learnt from estimates phase by phase first, and then from its own.
+    std::vector<MotionPrior> priors(directions());
+    joint_.resize(directions());
+    for (const bool last : {false, true}) {
+      for (size_t f = 0; f < directions(); ++f) {
+        const std::vector<PhaseInformation> found = informations(f);
+        priors[f] = learn_motion_prior(*splines_, found, coefficients_[f], kappas);
+        joint_[f] = fit_jointly(priors[f], found, last);
+        coefficients_[f] = joint_[f].coefficients;
+      }
     }
-    for (size_t f = 0; f < directions(); ++f)
-      fit_jointly(f, informations(f), true);
+    kappa_per_mm_ = priors[0].kappa_per_mm;
     for (size_t k = 0; k < times(); ++k)
       explain(k);
   }
@@ -595,43 +577,16 @@ class ViewTracker {
     return all;
   }
 
-  void fit_jointly(size_t f, const std::vector<PhaseInformation>& informations, bool with_covariance) {
-    const MotionPrior& prior = priors_[f];
-    const Eigen::Index count = splines_->count();
-    const Eigen::Index modes = prior.modes.cols();
-    Eigen::MatrixXd precision = Eigen::MatrixXd::Zero(count * modes, count * modes);
-    Eigen::VectorXd vector = Eigen::VectorXd::Zero(count * modes);
-    for (Eigen::Index m = 0; m < modes; ++m) {
-      precision.block(m * count, m * count, count, count) = prior.place_precision;
-      for (size_t k = 0; k < informations.size(); ++k) {
-        const double share = prior.modes(static_cast<Eigen::Index>(k), m);
-        vector.segment(m * count, count) += share * informations[k].vector;
-        for (Eigen::Index o = 0; o <= m; ++o)
-          precision.block(m * count, o * count, count, count) +=
-              share * prior.modes(static_cast<Eigen::Index>(k), o) * informations[k].precision;
-      }
-    }
-    const Eigen::LLT<Eigen::MatrixXd> factor(precision);  // reads the lower triangle
-    const Eigen::VectorXd solution = factor.solve(vector);
-    coefficients_[f] =
-        Eigen::Map<const Eigen::MatrixXd>(solution.data(), count, modes) * prior.modes.transpose();
-    if (with_covariance) {
-      inverse_factors_[f] = factor.matrixL();
-      invert_lower(inverse_factors_[f]);
-    }
-  }
-
   TrackedView result() {
     TrackedView tracked;
     tracked.waves = waves_;
     for (size_t f = 0; f < directions(); ++f)
-      tracked.motion.push_back({*splines_, priors_[f].modes, coefficients_[f], std::move(inverse_factors_[f]),
-                                priors_[f].left_out_mm,
+      tracked.motion.push_back({*splines_, std::move(joint_[f].coefficients), std::move(joint_[f].covariance),
                                 spacing_mm_ * spacing_mm_ * factors_[f] * rest_matrices_[f].inverse(),
                                 0.5 * view_.extent_mm(), view_.extent_mm().norm()});
     tracked.phases = std::move(phases_);
     tracked.noise_factor = factors_;
-    tracked.kappa_per_mm = priors_[0].kappa_per_mm;
+    tracked.kappa_per_mm = kappa_per_mm_;
     return tracked;
   }
 
@@ -656,8 +611,8 @@ class ViewTracker {
   std::vector<std::vector<std::vector<SeenMotion>>> seen_;  // a phase and direction
   std::vector<Fitted> fitted_;
   std::vector<double> factors_;
-  std::vector<MotionPrior> priors_;
-  std::vector<Eigen::MatrixXd> inverse_factors_;
+  double kappa_per_mm_ = 0;
+  std::vector<JointMotion> joint_;
 };
 
 }  // namespace

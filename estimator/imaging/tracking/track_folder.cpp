@@ -58,7 +58,7 @@ void keep_results(TrackedView& tracked) {
     phase.slope.clear();
   }
   for (MotionField& motion : tracked.motion)
-    motion.inverse_factor.resize(0, 0);
+    motion.covariance = {};
 }
 
 }  // namespace
