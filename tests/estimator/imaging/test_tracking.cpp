@@ -187,7 +187,7 @@ TEST(SplinePlane, PriorHasUnitVarianceAndCarriesAPlane) {
   for (size_t i = 0; i < 16; ++i) {
     sum += values.value(i);
     for (size_t j = 0; j < 16; ++j)
-      variance += values.value(i) * values.value[j] * covariance(values.index[i], values.index[j]);
+      variance += values.value(i) * values.value(j) * covariance(values.index[i], values.index[j]);
   }
   EXPECT_NEAR(sum, 1.0, 1e-12);
   EXPECT_NEAR(variance, 1.0, 0.4);
