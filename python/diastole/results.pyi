@@ -542,6 +542,7 @@ class Explanation(Record):
     ambiguous_with: list[list[str]]
     where: list[Misfit]
     gap: Gap
+    not_learned: str
     learned: LearnedTerm | None
     next_experiment: NextExperiment | None
     study_after: str
