@@ -7,7 +7,7 @@ place=$(mktemp -d)
 trap 'rm -rf "$place"' EXIT
 fail() { echo "FAILED: $*" >&2; exit 1; }
 
-(cd "$place" && cpack --config "$build_dir/CPackConfig.cmake" -B "$place" >cpack.log 2>&1) ||
+(cd "$place" && cpack --config "$build_dir/CPackConfig.cmake" -B "$place" -D CPACK_DEBIAN_COMPRESSION_TYPE=gzip >cpack.log 2>&1) ||
   { cat "$place/cpack.log"; fail "cpack"; }
 package=$(ls "$place"/diastole_*.deb)
 dpkg-deb -x "$package" "$place/root"

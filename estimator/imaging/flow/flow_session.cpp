@@ -64,9 +64,8 @@ void add_images(FlowRecord& record, const FlowMeasurement& flow) {
     const LumenShape& here = flow.lumen.shapes[k];
     for (int i = 0; i < outline_points; ++i) {
       const double angle = 2 * std::numbers::pi * i / outline_points;
-      const Eigen::Vector2d place =
-          (here.centre_mm + here.edge_mm(angle) * Eigen::Vector2d(std::cos(angle), std::sin(angle)))
-              .cwiseQuotient(pixel_mm);
+      const Eigen::Vector2d towards(std::cos(angle), std::sin(angle));
+      const Eigen::Vector2d place = (here.centre_mm + here.edge_mm(towards) * towards).cwiseQuotient(pixel_mm);
       image.outline.push_back(place.x() - first_column);
       image.outline.push_back(place.y() - first_row);
     }

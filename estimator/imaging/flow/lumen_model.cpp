@@ -64,23 +64,33 @@ class ProfileSpline {
   Eigen::MatrixXd second_;  // second derivatives at the knots by the values there
 };
 
+struct CosineAndSine {
+  double cosine, sine;
+};
+
+/// Of twice the angle of a unit vector.
+CosineAndSine doubled(const Eigen::Vector2d& unit) {
+  return {unit.x() * unit.x() - unit.y() * unit.y(), 2 * unit.x() * unit.y()};
+}
+
 struct Signal {
   Eigen::MatrixXf real, imaginary;
 };
 
 }  // namespace
 
-double LumenShape::edge_mm(double angle) const {
-  return radius_mm / std::sqrt(std::max(least_square, 1 - 2 * longer(angle)));
+double LumenShape::edge_mm(const Eigen::Vector2d& towards) const {
+  return radius_mm / std::sqrt(std::max(least_square, 1 - 2 * longer(towards)));
 }
 
-double LumenShape::slant(double angle) const {
-  const double change = 2 * (ellipse_sin * std::cos(2 * angle) - ellipse_cos * std::sin(2 * angle));
-  return change / std::max(least_square, 1 - 2 * longer(angle));
+double LumenShape::slant(const Eigen::Vector2d& towards) const {
+  const auto [cosine, sine] = doubled(towards);
+  return 2 * (ellipse_sin * cosine - ellipse_cos * sine) / std::max(least_square, 1 - 2 * longer(towards));
 }
 
-double LumenShape::longer(double angle) const {
-  return ellipse_cos * std::cos(2 * angle) + ellipse_sin * std::sin(2 * angle);
+double LumenShape::longer(const Eigen::Vector2d& towards) const {
+  const auto [cosine, sine] = doubled(towards);
+  return ellipse_cos * cosine + ellipse_sin * sine;
 }
 
 Eigen::VectorXd LumenScene::vector() const {
@@ -159,10 +169,11 @@ LumenGrid LumenModel::grid(const LumenShape& shape) const {
     for (Eigen::Index row = 0; row < rows; ++row) {
       const Eigen::Vector2d from(fine_x_mm_[column] - shape.centre_mm.x(),
                                  fine_y_mm_[row] - shape.centre_mm.y());
-      const double radius = from.norm(), angle = std::atan2(from.y(), from.x());
-      const double edge = shape.edge_mm(angle);
+      const double radius = from.norm();
+      const Eigen::Vector2d towards = radius > 0 ? Eigen::Vector2d(from / radius) : Eigen::Vector2d::UnitX();
+      const double edge = shape.edge_mm(towards), slant = shape.slant(towards);
       // The edge's slant against the circle shortens the way to it.
-      const double depth = (edge - radius) / std::hypot(1.0, shape.slant(angle));
+      const double depth = (edge - radius) / std::sqrt(1 + slant * slant);
       const double inside = std::clamp(depth / cell_mm + 0.5, 0.0, 1.0);
       grid.outside(row, column) = static_cast<float>(
           std::clamp((radius - edge * (1 + shape.wall_mm / shape.radius_mm)) / cell_mm + 0.5, 0.0, 1.0));

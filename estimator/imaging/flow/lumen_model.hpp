@@ -25,11 +25,13 @@ struct LumenShape {
   double ellipse_cos = 0, ellipse_sin = 0;
   double wall_mm = 0;
 
-  [[nodiscard]] double edge_mm(double angle) const;  ///< from the centre
-  [[nodiscard]] double slant(double angle) const;    ///< d(ln edge)/d(angle)
+  /// From the centre along a unit vector.
+  [[nodiscard]] double edge_mm(const Eigen::Vector2d& towards) const;
+  /// d(ln edge)/d(angle) there.
+  [[nodiscard]] double slant(const Eigen::Vector2d& towards) const;
 
  private:
-  [[nodiscard]] double longer(double angle) const;
+  [[nodiscard]] double longer(const Eigen::Vector2d& towards) const;
 };
 
 struct Brightness {

@@ -18,7 +18,7 @@ constexpr bool every = true;
 constexpr size_t recoveries = 60, second_cuts = 60;
 #else
 constexpr bool every = false;
-constexpr size_t recoveries = 4, second_cuts = 3;
+constexpr size_t recoveries = 3, second_cuts = 2;
 #endif
 
 struct Score {
@@ -45,9 +45,9 @@ void start(FlashBench& bench, const std::vector<uint8_t>& flash, size_t cut, Sco
 std::set<size_t> chosen(size_t operations) {
   std::set<size_t> cuts;
   for (size_t cut = 1; cut <= operations; ++cut)
-    if (every || cut <= 8 || cut + 16 > operations) cuts.insert(cut);
+    if (every || cut <= 4 || cut + 8 > operations) cuts.insert(cut);
   std::mt19937 random(2026);
-  for (int i = 0; i < 16; ++i)
+  for (int i = 0; i < 8; ++i)
     cuts.insert(1 + random() % operations);
   return cuts;
 }
