@@ -203,9 +203,11 @@ FitOutcome fit_motion(MotionModel& model, const std::vector<EstimatedParameter>&
     outcome.termination = found.termination;
     outcome.reason = std::move(found.reason);
     outcome.iterations += found.iterations;
-    // Tags that come and go from trial to trial make the cost jump: without them it goes on.
-    again = found.termination == Termination::stalled && problem.give_up_lost() > 0;
-    if (!outcome.converged() && !again) break;
+    const bool stalled = found.termination == Termination::stalled;
+    // Tags that come and go from trial to trial make the cost jump: without them it goes on. So do wild ones that change
+    // sides: under a loss that hardly feels them it goes on, too, if the residuals ask for one.
+    again = stalled && problem.give_up_lost() > 0;
+    if (!outcome.converged() && !stalled) break;
   }
   if (outcome.converged()) require_half_usable(point_share(problem), options.file);
   if (!outcome.history.empty()) {
