@@ -1,5 +1,6 @@
 #include "estimator/report/report.hpp"
 
+#include <fstream>
 #include <functional>
 #include <map>
 #include <vector>
@@ -34,8 +35,12 @@ enum class Kind {
   run
 };
 
-bool is_hdf5(std::string_view content) {
-  return content.starts_with(std::string_view("\x89HDF\r\n\x1a\n", 8));
+/// A run of an hour is not read for it.
+bool is_hdf5(const std::filesystem::path& file) {
+  constexpr std::string_view signature("\x89HDF\r\n\x1a\n", 8);
+  std::string head(signature.size(), '\0');
+  std::ifstream(file, std::ios::binary).read(head.data(), static_cast<std::streamsize>(head.size()));
+  return head == signature;
 }
 
 bool is_json_object(const std::string& content) {
@@ -67,12 +72,14 @@ std::string make_report(std::span<const std::filesystem::path> files, size_t fra
     parts[kind].emplace_back([read = std::move(read), draw](Page& page) { draw(page, read); });
   };
   for (const std::filesystem::path& file : files) {
+    if (is_hdf5(file)) {
+      add(Kind::run, runfile::open_run(file),
+          [&](Page& page, const runfile::RunFile& run) { add_run(page, run, frames); });
+      continue;
+    }
     const std::string content = read_whole_file(file);
     const std::string name = file.string();
-    if (is_hdf5(content)) {
-      add(Kind::run, runfile::read_run(file),
-          [&](Page& page, const runfile::RecordedRun& run) { add_run(page, run, frames); });
-    } else if (is_shear_test(content)) {
+    if (is_shear_test(content)) {
       add(Kind::shear_test, shear_test_from_text(content, name),
           [](Page& page, const ShearTest& test) { add_shear(page, test, fit_shear(test)); });
     } else if (is_cells_file(content)) {

@@ -5,11 +5,13 @@
 #include <filesystem>
 #include <iterator>
 #include <limits>
+#include <span>
 
 #include "estimator/report/html_text.hpp"
 #include "estimator/report/sections.hpp"
 #include "estimator/report/svg_plot.hpp"
 #include "protocol/contract/input_error.hpp"
+#include "protocol/runfile/commanded_volume.hpp"
 #include "protocol/runfile/frame_bins.hpp"
 
 namespace diastole::report {
@@ -18,12 +20,14 @@ namespace {
 using runfile::FrameBin;
 using runfile::FrameBins;
 using runfile::RecordedRun;
+using runfile::RunFile;
 using runfile::Segment;
 
 constexpr size_t loop_frames = 60;  // windows of a pressure-volume loop
 constexpr size_t most_plotted_segments = 6;
 // A browser draws this many samples of a trace without delay; longer runs show every n-th.
 constexpr size_t most_chart_samples = 120'000;
+constexpr size_t most_page_samples = 3 * most_chart_samples;  // ... and a page of that many all its traces
 
 std::vector<double> segment_triggers(const RecordedRun& run, const Segment& segment) {
   constexpr double slack_s = 1e-3;
@@ -34,19 +38,12 @@ std::vector<double> segment_triggers(const RecordedRun& run, const Segment& segm
   return kept;
 }
 
-double interpolated(const std::vector<double>& x, const std::vector<double>& y, double at) {
-  const auto upper = std::lower_bound(x.begin(), x.end(), at);
-  if (upper == x.begin() || upper == x.end()) return std::numeric_limits<double>::quiet_NaN();
-  const auto i = static_cast<size_t>(upper - x.begin());
-  const double t = (at - x[i - 1]) / (x[i] - x[i - 1]);
-  return y[i - 1] + t * (y[i] - y[i - 1]);
-}
-
-template <typename Values>
-std::vector<double> every_nth(const Values& values, size_t step) {
+std::vector<double> every_nth(const runfile::Series& values, size_t step) {
   std::vector<double> kept;
-  for (size_t i = 0; i < values.size(); i += step)
-    kept.push_back(values[i]);
+  values.each_block([&](size_t first, std::span<const double> block) {
+    for (size_t i = (step - first % step) % step; i < block.size(); i += step)
+      kept.push_back(block[i]);
+  });
   return kept;
 }
 
@@ -57,13 +54,15 @@ std::string channel_words(const std::string& dataset) {
   return dataset;
 }
 
-void add_traces(Page& page, const RecordedRun& run) {
-  const size_t step = 1 + run.pressure.time_s.size() / most_chart_samples;
+void add_traces(Page& page, const RunFile& file) {
+  const auto& [run, rows] = file;
+  const size_t shown = std::min(most_chart_samples, most_page_samples / rows.pressure.values.size());
+  const size_t step = 1 + rows.pressure.time_s.size() / shown;
   const std::string thinned = step == 1 ? "" : fmt::format(" Every {}th sample is drawn.", step);
   const char* style = "a";
-  for (const auto& [dataset, values] : run.pressure.channels) {
+  for (const auto& [dataset, values] : rows.pressure.values) {
     page.time_chart(
-        {.time_s = every_nth(run.pressure.time_s, step),
+        {.time_s = every_nth(rows.pressure.time_s, step),
          .traces = {{"pressure (kPa)", style, every_nth(values, step)}},
          .y_label = "pressure (kPa)",
          .marks_s = run.trigger_s,
@@ -71,10 +70,10 @@ void add_traces(Page& page, const RecordedRun& run) {
                                 channel_words(dataset), thinned)});
     style = dataset == "cavity_kPa" ? "c" : style;
   }
-  const size_t pump_step = 1 + run.pump.time_s.size() / most_chart_samples;
+  const size_t pump_step = 1 + rows.pump.time_s.size() / most_chart_samples;
   page.time_chart(
-      {.time_s = every_nth(run.pump.time_s, pump_step),
-       .traces = {{"volume (mL)", "b", every_nth(run.pump.commanded_mL, pump_step)}},
+      {.time_s = every_nth(rows.pump.time_s, pump_step),
+       .traces = {{"volume (mL)", "b", every_nth(rows.pump.values.at("commanded_mL"), pump_step)}},
        .y_label = "volume (mL)",
        .marks_s = run.trigger_s,
        .caption = "Volume that the piston was commanded to displace: steps issued times volume per step."});
@@ -100,23 +99,29 @@ Figure binned_figure(const FrameBins& bins, const Segment& segment) {
                   chosen(segment.stroke_mL), chosen(bins.period_s))};
 }
 
-/// Pressure against volume over the mean cycle; the loop is closed by its first point.
-Figure loop_figure(const RecordedRun& run, const FrameBins& fine, const std::vector<double>& triggers_s) {
-  std::vector<double> volume_mL, pressure_kPa;
-  for (const FrameBin& frame : fine.frames) {
-    const double phase_s = middle_s(frame);
-    double sum = 0;
-    size_t count = 0;
-    for (const double trigger : triggers_s) {
-      const double value = interpolated(run.pump.time_s, run.pump.commanded_mL, trigger + phase_s);
+/// Of each frame's middle, over the cycles that begin with these triggers; NaN where none has a volume.
+std::vector<double> mean_volume_mL(const runfile::StreamRows& pump, const FrameBins& bins,
+                                   const std::vector<double>& triggers_s) {
+  std::vector<double> sum(bins.frames.size()), count(bins.frames.size());
+  runfile::CommandedVolume volume(pump);
+  for (const double trigger_s : triggers_s) {
+    for (size_t k = 0; k < bins.frames.size(); ++k) {
+      const double value = volume.at(trigger_s + middle_s(bins.frames[k]));
       if (!std::isfinite(value)) continue;
-      sum += value;
-      ++count;
+      sum[k] += value;
+      ++count[k];
     }
-    volume_mL.push_back(count == 0 ? std::numeric_limits<double>::quiet_NaN()
-                                   : sum / static_cast<double>(count));
-    pressure_kPa.push_back(frame.mean_kPa);
   }
+  for (size_t k = 0; k < sum.size(); ++k)
+    sum[k] /= count[k];
+  return sum;
+}
+
+/// Pressure against volume over the mean cycle; the loop is closed by its first point.
+Figure loop_figure(const RunFile& file, const FrameBins& fine, const std::vector<double>& triggers_s) {
+  const RecordedRun& run = file.run;
+  std::vector<double> volume_mL = mean_volume_mL(file.rows.pump, fine, triggers_s);
+  std::vector<double> pressure_kPa = numbers_of(fine.frames, &FrameBin::mean_kPa);
   volume_mL.push_back(volume_mL.front());
   pressure_kPa.push_back(pressure_kPa.front());
   SvgPlot plot({.x = {.label = "volume (mL)"}, .y = {.label = "pressure (kPa)"}});
@@ -158,15 +163,16 @@ void add_bins_table(Page& page, const FrameBins& bins) {
   }
 }
 
-void add_segments(Page& page, const RecordedRun& run, size_t frames) {
+void add_segments(Page& page, const RunFile& file, size_t frames) {
+  const auto& [run, rows] = file;
   size_t plotted = 0;
   for (size_t i = 0; i < run.segments.size() && plotted < most_plotted_segments; ++i) {
     const std::vector<double> triggers_s = segment_triggers(run, run.segments[i]);
     if (triggers_s.empty() || run.segments[i].stroke_mL == 0) continue;
     try {
-      const FrameBins bins = bin_frames(run, {.frames = frames, .segment = i});
-      const FrameBins fine = bin_frames(run, {.frames = loop_frames, .segment = i});
-      page.figures({binned_figure(bins, run.segments[i]), loop_figure(run, fine, triggers_s)});
+      const FrameBins bins = bin_frames(run, rows, {.frames = frames, .segment = i});
+      const FrameBins fine = bin_frames(run, rows, {.frames = loop_frames, .segment = i});
+      page.figures({binned_figure(bins, run.segments[i]), loop_figure(file, fine, triggers_s)});
       if (plotted == 0) add_bins_table(page, bins);
       ++plotted;
     } catch (const InputError& error) {
@@ -202,35 +208,37 @@ void add_losses(Page& page, const RecordedRun& run) {
 
 }  // namespace
 
-void add_run(Page& page, const RecordedRun& run, size_t frames) {
+void add_run(Page& page, const RunFile& file, size_t frames) {
+  const auto& [run, rows] = file;
   int64_t missing = 0;
   for (const runfile::Gap& gap : run.gaps)
     missing += gap.count;
-  const double duration_s =
-      run.pressure.time_s.empty() ? 0 : run.pressure.time_s.back() - run.pressure.time_s.front();
-  const double rate_Hz =
-      duration_s > 0 ? static_cast<double>(run.pressure.time_s.size() - 1) / duration_s : 0;
-  const std::vector<double>& cavity = run.pressure.channels.at("cavity_kPa");
+  const runfile::Spacing& spacing = rows.pressure.spacing();
+  const size_t samples = rows.pressure.time_s.size();
+  const double duration_s = samples == 0 ? 0 : spacing.last_s - spacing.first_s;
+  const double rate_Hz = duration_s > 0 ? static_cast<double>(samples - 1) / duration_s : 0;
   double peak_kPa = std::numeric_limits<double>::quiet_NaN();
-  for (const double value : cavity)
-    peak_kPa = std::fmax(peak_kPa, value);
+  rows.pressure.values.at("cavity_kPa").each_block([&](size_t, std::span<const double> block) {
+    for (const double value : block)
+      peak_kPa = std::fmax(peak_kPa, value);
+  });
 
   page.headline(
       "Session", fmt::format("{} triggers", run.trigger_s.size()),
       fmt::format("over {} s; cavity pressure up to {} kPa", number(duration_s, 3), number(peak_kPa, 3)));
   page.headline("Samples", missing == 0 ? "none missing" : fmt::format("{} missing", missing),
-                fmt::format("of {}, {} a second", run.pressure.time_s.size(), number(rate_Hz, 3)));
+                fmt::format("of {}, {} a second", samples, number(rate_Hz, 3)));
 
   page.section("The session", fmt::format("Recorded {} by {}; run {} in {}.", run.started_utc, run.producer,
                                           run.run_id, std::filesystem::path(run.file).filename().string()));
-  add_traces(page, run);
+  add_traces(page, file);
   add_schedule(page, run);
   add_losses(page, run);
   if (!run.protocol_toml.empty()) page.listing("The experiment file as it was run", run.protocol_toml);
   page.section("Pressure in the image frames",
                "Gated images are built from many cycles, so a frame's load is the mean over the same window "
                "of every cycle, counted from that cycle's own trigger.");
-  add_segments(page, run, frames);
+  add_segments(page, file, frames);
 }
 
 }  // namespace diastole::report

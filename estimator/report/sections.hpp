@@ -12,7 +12,7 @@
 #include "estimator/montecarlo/cells_file.hpp"
 #include "estimator/report/page.hpp"
 #include "estimator/shear/shear_fit.hpp"
-#include "protocol/runfile/run.hpp"
+#include "protocol/runfile/reader.hpp"
 
 namespace diastole {
 struct BenchTest;
@@ -23,7 +23,7 @@ namespace diastole::report {
 
 /// Pressure trace with triggers, commanded volume, pressure binned into `frames` image frames with its spread
 /// over the cycles, pressure-volume loops, the schedule and what is missing.
-void add_run(Page& page, const runfile::RecordedRun& run, size_t frames);
+void add_run(Page& page, const runfile::RunFile& file, size_t frames);
 
 /// The parameters with their intervals, the specimen before and after, pressures, residuals, how the fit
 /// ended.

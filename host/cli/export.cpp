@@ -65,12 +65,13 @@ struct BidsFiles {
   fs::path description;
 };
 
-BidsFiles bids_files(const ExportOptions& options, const runfile::RecordedRun& run) {
+BidsFiles bids_files(const ExportOptions& options, const runfile::RunFile& file) {
+  const auto& [run, rows] = file;
   const std::string task = options.task.empty() ? task_of(run.file) : label("--task", options.task);
   const fs::path stem =
       options.bids / fmt::format("sub-{}_task-{}_physio", label("--subject", options.subject), task);
   BidsFiles files{stem.string() + ".tsv.gz", stem.string() + ".json"};
-  if (run.pressure.time_s.size() < 2) {
+  if (rows.pressure.time_s.size() < 2) {
     throw InputError({run.file, "dataset /pressure/time_s", "holds fewer than two samples",
                       "There is nothing to export."});
   }
@@ -79,16 +80,16 @@ BidsFiles bids_files(const ExportOptions& options, const runfile::RecordedRun& r
   return files;
 }
 
-json write_bids(const BidsFiles& files, const runfile::RecordedRun& run) {
+json write_bids(const BidsFiles& files, const runfile::RunFile& file) {
   const WaitingLine waiting("writing " + files.table.string());
-  const BidsRecording recording = bids_recording(run);
-  write_text_file(files.table, gzip(recording.table));
-  write_text_file(files.description, recording.description.dump(2) + "\n");
-  return {{"run", run.file},
+  const nlohmann::ordered_json description = bids_description(file);
+  write_bids_table(file, files.table);
+  write_text_file(files.description, description.dump(2) + "\n");
+  return {{"run", file.run.file},
           {"table", files.table.string()},
           {"description", files.description.string()},
-          {"columns", recording.description.at("Columns")},
-          {"rows", run.pressure.time_s.size()}};
+          {"columns", description.at("Columns")},
+          {"rows", file.rows.pressure.time_s.size()}};
 }
 
 constexpr const char* metadata_file = "ro-crate-metadata.json";
@@ -118,19 +119,19 @@ std::vector<fs::path> crated_names(const ExportOptions& options) {
   return names;
 }
 
-fs::path write_crate(const ExportOptions& options, const std::vector<runfile::RecordedRun>& runs) {
+fs::path write_crate(const ExportOptions& options, const std::vector<runfile::RunFile>& runs) {
   const WaitingLine waiting("writing " + options.crate.string());
-  Crate crate{.title = fmt::format("Diastole session of {}", runs.front().started_utc),
+  Crate crate{.title = fmt::format("Diastole session of {}", runs.front().run.started_utc),
               .published_utc = fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr))),
               .runs = {},
               .others = {}};
   if (!options.license.empty()) crate.license = options.license;
   for (size_t i = 0; i < runs.size(); ++i) {
     const fs::path& file = options.runs[i];
-    crate.runs.push_back({file.filename().string(), file.stem().stem().string() + ".experiment.toml", runs[i],
-                          runfile::read_session(file)});
+    crate.runs.push_back({file.filename().string(), file.stem().stem().string() + ".experiment.toml",
+                          runs[i].run, runfile::read_session(file)});
     copy_durably(file, options.crate / crate.runs.back().name);
-    write_text_file(options.crate / crate.runs.back().experiment, runs[i].protocol_toml);
+    write_text_file(options.crate / crate.runs.back().experiment, runs[i].run.protocol_toml);
   }
   for (const fs::path& file : options.also) {
     const bool is_folder = fs::is_directory(file);
@@ -155,15 +156,15 @@ ExitCode export_runs(const ExportOptions& options, const CommandOutput& out) {
   if (options.runs.size() > 1 && !options.task.empty())
     throw InputError(
         {"", "--task", "is one label for several runs", "Leave it out: each run gets its file's name."});
-  std::vector<runfile::RecordedRun> runs;
+  std::vector<runfile::RunFile> runs;
   for (const fs::path& file : options.runs) {
     const WaitingLine waiting("reading " + file.string());
-    runs.push_back(runfile::read_run(file));
+    runs.push_back(runfile::open_run(file));
   }
   std::vector<BidsFiles> files;
   if (!options.bids.empty()) {
     make_folder(options.bids);
-    for (const runfile::RecordedRun& run : runs)
+    for (const runfile::RunFile& run : runs)
       files.push_back(bids_files(options, run));
   }
   if (!options.crate.empty()) {

@@ -26,7 +26,7 @@ ExitCode note(const NoteOptions& options, const CommandOutput& out) {
                          {fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr))),
                           options.author.empty() ? own_user_name() : options.author, options.text});
   }
-  const runfile::RecordedRun run = runfile::read_run(options.run);  // refuses what is no run
+  const runfile::RecordedRun run = runfile::open_run(options.run).run;  // refuses what is no run
   const runfile::Session session = runfile::read_session(options.run);
   const nlohmann::json document{{"run", run.file}, {"session", session_json(session)}};
   print(out, document, [&] {

@@ -3,12 +3,16 @@
 #include <fmt/format.h>
 #include <zlib.h>
 
-#include <algorithm>
 #include <cmath>
 #include <limits>
+#include <memory>
 #include <span>
-#include <stdexcept>
+#include <utility>
+#include <vector>
 
+#include "host/journal/part_file.hpp"
+#include "protocol/contract/input_error.hpp"
+#include "protocol/runfile/commanded_volume.hpp"
 #include "protocol/runfile/layout.hpp"
 
 namespace diastole {
@@ -24,80 +28,91 @@ std::string describe(const std::string& channel) {
   return "Pressure, channel " + channel;
 }
 
-/// Commanded volume at a time, NaN outside the trace or beside a missing position.
-double volume_at(const runfile::PumpTrace& pump, double time_s) {
-  const auto after = std::ranges::lower_bound(pump.time_s, time_s);
-  const auto row = static_cast<size_t>(after - pump.time_s.begin());
-  if (after == pump.time_s.end() || (row == 0 && *after != time_s))
-    return std::numeric_limits<double>::quiet_NaN();
-  if (*after == time_s) return pump.commanded_mL[row];
-  const double part = (time_s - pump.time_s[row - 1]) / (*after - pump.time_s[row - 1]);
-  return std::lerp(pump.commanded_mL[row - 1], pump.commanded_mL[row], part);
-}
-
-std::vector<int> trigger_column(const std::vector<double>& trigger_s, std::span<const double> time_s) {
-  std::vector<int> column(time_s.size(), 0);
-  for (const double t : trigger_s) {
-    auto row = static_cast<size_t>(std::ranges::lower_bound(time_s, t) - time_s.begin());
-    if (row == time_s.size() || (row > 0 && t - time_s[row - 1] < time_s[row] - t)) --row;
-    column[row] = 1;
-  }
-  return column;
+/// The row nearest to each trigger, ascending.
+std::vector<size_t> trigger_rows(const std::vector<double>& trigger_s, const runfile::Series& time_s) {
+  std::vector<size_t> nearest;
+  double before_s = -std::numeric_limits<double>::infinity();
+  time_s.each_block([&](size_t first, std::span<const double> block) {
+    for (size_t i = 0; i < block.size(); ++i) {
+      const double here_s = std::exchange(before_s, block[i]);
+      for (; nearest.size() < trigger_s.size() && trigger_s[nearest.size()] <= block[i];) {
+        const double t = trigger_s[nearest.size()];
+        nearest.push_back(t - here_s < block[i] - t ? first + i - 1 : first + i);
+      }
+    }
+  });
+  nearest.resize(trigger_s.size(), time_s.size() - 1);
+  return nearest;
 }
 
 std::string cell(double value) { return std::isnan(value) ? "n/a" : fmt::format("{:.6g}", value); }
 
 }  // namespace
 
-BidsRecording bids_recording(const runfile::RecordedRun& run) {
-  const std::vector<double>& time_s = run.pressure.time_s;
-  const double rate_Hz = static_cast<double>(time_s.size() - 1) / (time_s.back() - time_s.front());
+nlohmann::ordered_json bids_description(const runfile::RunFile& file) {
+  const auto& [run, rows] = file;
+  const runfile::Spacing& spacing = rows.pressure.spacing();
+  const double rate_Hz =
+      static_cast<double>(rows.pressure.time_s.size() - 1) / (spacing.last_s - spacing.first_s);
   const double zero_s = run.trigger_s.empty() ? 0 : run.trigger_s.front();
   ordered_json columns = ordered_json::array();
-  BidsRecording recording;
-  recording.description = {{"SamplingFrequency", rate_Hz}, {"StartTime", time_s.front() - zero_s}};
-  for (const auto& [name, values] : run.pressure.channels)
+  ordered_json description{{"SamplingFrequency", rate_Hz}, {"StartTime", spacing.first_s - zero_s}};
+  for (const auto& [name, values] : rows.pressure.values)
     columns.push_back(name);
   columns.push_back("commanded_mL");
   columns.push_back("trigger");
-  recording.description["Columns"] = columns;
-  for (const auto& [name, values] : run.pressure.channels)
-    recording.description[name] = {{"Description", describe(name)}, {"Units", "kPa"}};
-  recording.description["commanded_mL"] = {{"Description", "Volume of the steps that the pump was commanded"},
-                                           {"Units", "mL"}};
-  recording.description["trigger"] = {
+  description["Columns"] = columns;
+  for (const auto& [name, values] : rows.pressure.values)
+    description[name] = {{"Description", describe(name)}, {"Units", "kPa"}};
+  description["commanded_mL"] = {{"Description", "Volume of the steps that the pump was commanded"},
+                                 {"Units", "mL"}};
+  description["trigger"] = {
       {"Description", "1 in the sample nearest to the start of a cycle, which triggers the scanner; else 0"},
       {"Units", "1"}};
-  recording.description["RunID"] = run.run_id;
-  recording.description["AcquisitionDateTime"] = run.started_utc;
-  recording.description["SoftwareName"] = run.producer;
-
-  const std::vector<int> triggers = trigger_column(run.trigger_s, time_s);
-  for (size_t i = 0; i < time_s.size(); ++i) {
-    for (const auto& [name, values] : run.pressure.channels)
-      recording.table += cell(values[i]) + '\t';
-    recording.table += fmt::format("{}\t{}\n", cell(volume_at(run.pump, time_s[i])), triggers[i]);
-  }
-  return recording;
+  description["RunID"] = run.run_id;
+  description["AcquisitionDateTime"] = run.started_utc;
+  description["SoftwareName"] = run.producer;
+  return description;
 }
 
-std::string gzip(const std::string& content) {
-  constexpr int gzip_window_bits = 15 + 16;
-  z_stream stream{};
-  if (deflateInit2(&stream, Z_DEFAULT_COMPRESSION, Z_DEFLATED, gzip_window_bits, 8, Z_DEFAULT_STRATEGY) !=
-      Z_OK) {
-    throw std::runtime_error("zlib cannot be started");
-  }
-  std::string packed(deflateBound(&stream, content.size()), '\0');
-  stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(content.data()));
-  stream.avail_in = static_cast<uInt>(content.size());
-  stream.next_out = reinterpret_cast<Bytef*>(packed.data());
-  stream.avail_out = static_cast<uInt>(packed.size());
-  const int result = deflate(&stream, Z_FINISH);
-  packed.resize(stream.total_out);
-  deflateEnd(&stream);
-  if (result != Z_STREAM_END) throw std::runtime_error("zlib cannot pack the table");
-  return packed;
+void bids_table(const runfile::RunFile& file, const std::function<void(std::string_view)>& take) {
+  const runfile::StreamRows& pressure = file.rows.pressure;
+  const std::vector<size_t> triggers = trigger_rows(file.run.trigger_s, pressure.time_s);
+  auto trigger = triggers.begin();
+  runfile::CommandedVolume volume(file.rows.pump);
+  std::vector<std::vector<double>> memory(pressure.values.size());
+  std::string text;
+  pressure.time_s.each_block([&](size_t first, std::span<const double> time_s) {
+    std::vector<std::span<const double>> channels;
+    for (const auto& [name, values] : pressure.values)
+      channels.push_back(values.rows(first, time_s.size(), memory[channels.size()]));
+    text.clear();
+    for (size_t i = 0; i < time_s.size(); ++i) {
+      for (const auto& channel : channels)
+        text += cell(channel[i]) + '\t';
+      const bool is_trigger = trigger != triggers.end() && *trigger == first + i;
+      while (trigger != triggers.end() && *trigger == first + i)
+        ++trigger;
+      text += fmt::format("{}\t{:d}\n", cell(volume.at(time_s[i])), is_trigger);
+    }
+    take(text);
+  });
+}
+
+void write_bids_table(const runfile::RunFile& file, const std::filesystem::path& table) {
+  const auto must = [&](bool done) {
+    if (!done)
+      throw HardwareError(table.string(), "cannot be written",
+                          "Check the disk's space and your rights there.");
+  };
+  write_whole(table, [&](const std::filesystem::path& part) {
+    const std::unique_ptr<gzFile_s, int (*)(gzFile)> opened(gzopen(part.c_str(), "wb"), gzclose);
+    must(opened != nullptr);
+    bids_table(file, [&](std::string_view text) {
+      must(gzwrite(opened.get(), text.data(), static_cast<unsigned>(text.size())) > 0);
+    });
+    must(gzflush(opened.get(), Z_FINISH) == Z_OK);
+  });
 }
 
 }  // namespace diastole

@@ -7,22 +7,23 @@
 // sample's time, straight between two positions), trigger (1 in the row nearest to a rising edge, else 0). A value
 // that is missing is "n/a".
 
+#include <filesystem>
+#include <functional>
 #include <nlohmann/json.hpp>
-#include <string>
+#include <string_view>
 
-#include "protocol/runfile/run.hpp"
+#include "protocol/runfile/reader.hpp"
 
 namespace diastole {
 
-struct BidsRecording {
-  nlohmann::ordered_json description;
-  std::string table;  ///< tab-separated
-};
+/// Precondition, here and below: the run holds at least two pressure rows.
+nlohmann::ordered_json bids_description(const runfile::RunFile& file);
 
-/// Precondition: the run holds at least two pressure rows.
-BidsRecording bids_recording(const runfile::RecordedRun& run);
+/// Hands over the table, tab-separated, some rows at a time.
+void bids_table(const runfile::RunFile& file, const std::function<void(std::string_view)>& take);
 
-/// The bytes of a gzip file with this content, always the same.
-std::string gzip(const std::string& content);
+/// The same as a gzip file, in which equal tables are equal bytes. Throws HardwareError if the disk does not take it; then
+/// nothing is left behind.
+void write_bids_table(const runfile::RunFile& file, const std::filesystem::path& table);
 
 }  // namespace diastole

@@ -62,7 +62,7 @@ void amend_run(const fs::path& path, const std::string& place, const std::functi
   std::error_code error;
   fs::copy_file(path, beside.path, fs::copy_options::overwrite_existing, error);
   if (!error && change_file(beside.path, change) && is_on_disk(beside.path)) {
-    (void)read_run(beside.path);
+    (void)open_run(beside.path);
     fs::rename(beside.path, path, error);
     if (!error) return;
   }

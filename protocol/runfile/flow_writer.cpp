@@ -45,7 +45,7 @@ bool write_group(hid_t file, const std::string& name, bool is_there, const FlowV
 }  // namespace
 
 void store_flow(const fs::path& path, size_t segment, const FlowVolume& volume, bool replace) {
-  RecordedRun run = read_run(path);
+  auto [run, rows] = open_run(path);
   const std::string name = fmt::format("{}/{}", flow_group, segment);
   if (segment >= run.segments.size())
     throw InputError({run.file, "group " + name,
@@ -56,7 +56,7 @@ void store_flow(const fs::path& path, size_t segment, const FlowVolume& volume, 
     throw InputError(
         {run.file, "group " + name, "holds a measured volume already", "Give --force to replace it."});
   run.flow[segment] = volume;
-  check(run);
+  check(run, rows);
   amend_run(path, "group " + name, [&](hid_t file) { return write_group(file, name, is_there, volume); });
 }
 

@@ -55,7 +55,7 @@ std::string note_path(size_t number) { return fmt::format("{}/{:04}", session_no
 void append_note(const std::filesystem::path& run, const SessionNote& note) {
   if (note.text.find_first_not_of(" \t\n") == std::string::npos)
     throw InputError({run.string(), "note", "has no text", "Say what is to be remembered."});
-  (void)read_run(run);
+  (void)open_run(run);
   amend_run(run, fmt::format("group {}", session_notes), [&](hid_t file) { return write_note(file, note); });
 }
 

@@ -161,9 +161,8 @@ RecordedRun read_without_rows(const H5Source& source) {
 
 }  // namespace
 
-RecordedRun read_run(const std::filesystem::path& path) { return read_run(H5Source(path)); }
-
-RecordedRun read_run(const H5Source& source) {
+RecordedRun read_run(const std::filesystem::path& path) {
+  const H5Source source(path);
   RecordedRun run = read_without_rows(source);
   run.pump.time_s = source.numbers(pump_time);
   run.pump.commanded_mL = source.numbers(pump_commanded);
@@ -174,8 +173,9 @@ RecordedRun read_run(const H5Source& source) {
   return run;
 }
 
-RunFile open_run(const std::filesystem::path& path) {
-  const H5Source source(path);
+RunFile open_run(const std::filesystem::path& path) { return open_run(H5Source(path)); }
+
+RunFile open_run(const H5Source& source) {
   RunFile file{read_without_rows(source), {}};
   file.rows.pump.time_s = source.series(pump_time);
   file.rows.pump.values["commanded_mL"] = source.series(pump_commanded);

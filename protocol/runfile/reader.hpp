@@ -15,8 +15,6 @@ class H5Source;
 /// Reads a whole run. Throws InputError that names the dataset and the first offending index when the file is
 /// missing, not a run file, of a newer format_version, or breaks a rule of `check`.
 RecordedRun read_run(const std::filesystem::path& path);
-/// The same of a file that is open (h5_source.hpp).
-RecordedRun read_run(const H5Source& source);
 
 /// A run whose rows stay in its file, however many they are.
 struct RunFile {
@@ -27,6 +25,8 @@ struct RunFile {
 
 /// Throws as read_run; goes through all rows once.
 RunFile open_run(const std::filesystem::path& path);
+/// The same of a file that is open (h5_source.hpp).
+RunFile open_run(const H5Source& source);
 
 /// Far beyond any run, and within what arithmetic on times and counts bears without another check.
 inline constexpr double longest_time_s = 1e10;

@@ -1,5 +1,5 @@
 // What making a run file of a journal and reading it costs, by the run's length: time and memory of `diastole recover`, which
-// goes the daemon's way, and of `inspect`, `bin` and `compare`.
+// goes the daemon's way, and of what reads it.
 //
 //   tools/bench runfile [--seconds N ...] [--channels N] [--rate-hz R] [--program DIASTOLE] [--directory DIR]
 
@@ -42,7 +42,12 @@ bool measure(const fs::path& directory, const JournalLoad& load, const std::stri
   cost({program, "inspect", run, "--json"});
   cost({program, "bin", run, "--frames", "16", "--json"});
   cost({program, "compare", run, run, "--json"});
+  cost({program, "report", run, "-o", directory / "long.html"});
+  cost({program, "note", run, "a note"});
+  cost({program, "runs", directory, "kind=run"});
+  cost({program, "export", run, "--bids", directory / "bids"});
   fs::remove(run);
+  fs::remove_all(directory / "bids");
   return whole;
 }
 

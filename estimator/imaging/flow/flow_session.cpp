@@ -65,7 +65,8 @@ void add_images(FlowRecord& record, const FlowMeasurement& flow) {
     for (int i = 0; i < outline_points; ++i) {
       const double angle = 2 * std::numbers::pi * i / outline_points;
       const Eigen::Vector2d towards(std::cos(angle), std::sin(angle));
-      const Eigen::Vector2d place = (here.centre_mm + here.edge_mm(towards) * towards).cwiseQuotient(pixel_mm);
+      const Eigen::Vector2d place =
+          (here.centre_mm + here.edge_mm(towards) * towards).cwiseQuotient(pixel_mm);
       image.outline.push_back(place.x() - first_column);
       image.outline.push_back(place.y() - first_row);
     }
@@ -82,9 +83,13 @@ FlowSession measure_session(const FlowSessionRequest& request, const Stage& stag
   FlowSession session;
   session.folder = request.folder.string();
   // A run that cannot be read is told before the images are.
-  std::optional<runfile::RecordedRun> run;
-  if (request.run) run = runfile::read_run(*request.run);
-  if (request.pressure) run = run_of_tables(*request.pressure, *request.trigger);
+  std::optional<runfile::RunFile> run;
+  if (request.run) run = runfile::open_run(*request.run);
+  std::optional<runfile::RecordedRun> tables;
+  if (request.pressure) {
+    tables = run_of_tables(*request.pressure, *request.trigger);
+    run = {*tables, runfile::rows_of(*tables)};
+  }
   say("Reading images.");
   const ImageFolder folder = read_image_folder(request.folder);
   require_sound(folder);
@@ -99,7 +104,7 @@ FlowSession measure_session(const FlowSessionRequest& request, const Stage& stag
 
 void store_in_run(const FlowSession& session, const std::filesystem::path& run, bool replace) {
   const size_t segment = session.loop->segment;
-  const double offset_mL = runfile::read_run(run).segments.at(segment).offset_mL;
+  const double offset_mL = runfile::open_run(run).run.segments.at(segment).offset_mL;
   runfile::FlowVolume volume;
   for (const PhaseFlow& phase : session.flow.phases) {
     volume.phase_s.push_back(phase.phase_s);

@@ -11,7 +11,6 @@
 #include "protocol/contract/input_error.hpp"
 #include "protocol/runfile/frame_bins.hpp"
 #include "protocol/runfile/signal_delay.hpp"
-#include "protocol/runfile/spacing.hpp"
 #include "protocol/signal/median.hpp"
 
 namespace diastole::imaging {
@@ -93,8 +92,9 @@ runfile::RecordedRun run_of_tables(const std::filesystem::path& pressure,
   return run;
 }
 
-PressureVolumeLoop pressure_volume_loop(const FlowMeasurement& flow, const runfile::RecordedRun& run,
+PressureVolumeLoop pressure_volume_loop(const FlowMeasurement& flow, const runfile::RunFile& file,
                                         std::optional<size_t> segment) {
+  const runfile::RecordedRun& run = file.run;
   runfile::FrameBinOptions how;
   how.segment = segment;
   PressureVolumeLoop loop;
@@ -103,9 +103,9 @@ PressureVolumeLoop pressure_volume_loop(const FlowMeasurement& flow, const runfi
       cycles_in(flow.interval_s(), runfile::binned_interval_s(run, how), run, flow.scan.interval_source);
   loop.delay_s = how.delay_s = runfile::signal_delay(run, how.channel).total_s();
   const double interval_s = runfile::binned_interval_s(run, how);
-  const double samples = interval_s / runfile::spacing_of(run.pressure.time_s).median_s;
+  const double samples = interval_s / file.rows.pressure.spacing().median_s;
   how.frames = std::clamp<size_t>(static_cast<size_t>(samples / samples_a_window), 8, most_windows);
-  const runfile::FrameBins bins = runfile::bin_frames(run, how);
+  const runfile::FrameBins bins = runfile::bin_frames(run, file.rows, how);
   loop.segment = bins.segment;
   loop.cycles = bins.frames.front().cycles;
 

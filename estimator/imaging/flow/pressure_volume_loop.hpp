@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "estimator/imaging/flow/flow_measurement.hpp"
-#include "protocol/runfile/run.hpp"
+#include "protocol/runfile/reader.hpp"
 
 namespace diastole::imaging {
 
@@ -33,7 +33,7 @@ runfile::RecordedRun run_of_tables(const std::filesystem::path& pressure,
                                    const std::filesystem::path& trigger);
 
 /// `segment`: default the first with triggers. Throws InputError if the images' interval is no whole number of the segment's periods, or as bin_frames does.
-PressureVolumeLoop pressure_volume_loop(const FlowMeasurement& flow, const runfile::RecordedRun& run,
+PressureVolumeLoop pressure_volume_loop(const FlowMeasurement& flow, const runfile::RunFile& file,
                                         std::optional<size_t> segment);
 
 }  // namespace diastole::imaging

@@ -46,10 +46,11 @@ TEST(BidsExport, IsReadByAnIndependentReader) {
   const Scratch scratch("bids");
   const runfile::RecordedRun run = recording_with_a_gap();
   write_run(scratch / "gel.run.h5", run);
-  const BidsRecording recording = bids_recording(run);
-  EXPECT_LT(recording.description.at("StartTime").get<double>(), 0);
-  write(scratch / "gel_physio.tsv.gz", gzip(recording.table));
-  write(scratch / "gel_physio.json", recording.description.dump());
+  const runfile::RunFile file = runfile::open_run(scratch / "gel.run.h5");
+  const nlohmann::ordered_json description = bids_description(file);
+  EXPECT_LT(description.at("StartTime").get<double>(), 0);
+  write_bids_table(file, scratch / "gel_physio.tsv.gz");
+  write(scratch / "gel_physio.json", description.dump());
   const Output output =
       output_of("/usr/bin/python3 " + (source_dir / "tests/host/runfile/read_bids.py").string() + " " +
                 (scratch / "gel.run.h5").string() + " " + (scratch / "gel_physio").string());

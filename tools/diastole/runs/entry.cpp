@@ -12,6 +12,7 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <set>
+#include <span>
 #include <string_view>
 
 #include "estimator/explain/verdict/explanation_json.hpp"
@@ -51,25 +52,26 @@ std::string protocol_words(const std::vector<runfile::Segment>& segments) {
 }
 
 /// Least and largest of each part; a part without a sample has NaN.
-std::vector<float> envelope(const std::vector<double>& values_kPa) {
+std::vector<float> envelope(const runfile::Series& values_kPa) {
   const size_t parts = std::min(trace_parts, values_kPa.size());
-  std::vector<float> pairs;
-  for (size_t part = 0; part < parts; ++part) {
-    double least = std::numeric_limits<double>::quiet_NaN(), most = least;
-    for (size_t i = part * values_kPa.size() / parts; i < (part + 1) * values_kPa.size() / parts; ++i) {
-      least = std::fmin(least, values_kPa[i]);
-      most = std::fmax(most, values_kPa[i]);
+  std::vector<float> pairs(2 * parts, std::numeric_limits<float>::quiet_NaN());
+  size_t part = 0;
+  values_kPa.each_block([&](size_t first, std::span<const double> block) {
+    for (size_t i = 0; i < block.size(); ++i) {
+      while ((part + 1) * values_kPa.size() / parts <= first + i)
+        ++part;
+      const auto value_kPa = static_cast<float>(block[i]);
+      pairs[2 * part] = std::fmin(pairs[2 * part], value_kPa);
+      pairs[2 * part + 1] = std::fmax(pairs[2 * part + 1], value_kPa);
     }
-    pairs.push_back(static_cast<float>(least));
-    pairs.push_back(static_cast<float>(most));
-  }
+  });
   return pairs;
 }
 
 void read_run_into(Entry& entry, const fs::path& file) {
   const runfile::H5Source source(file);
-  const runfile::RecordedRun run = runfile::read_run(source);
-  const runfile::Soundness soundness = runfile::assess(run);
+  const auto [run, rows] = runfile::open_run(source);
+  const runfile::Soundness soundness = runfile::assess(run, rows);
   const runfile::Session session = runfile::read_session(source);
   entry.date = run.started_utc;
   entry.specimen = session.text(runfile::specimen_fact);
@@ -82,15 +84,10 @@ void read_run_into(Entry& entry, const fs::path& file) {
   if (!soundness.sound()) entry.problem = soundness.problems.front();
   for (const runfile::SessionNote& note : session.notes)
     entry.notes += (entry.notes.empty() ? "" : "\n") + note.text;
-  const auto filtered = run.pressure.channels.find(runfile::cavity_filtered_channel);
-  const auto& shown_kPa = filtered != run.pressure.channels.end()
-                              ? filtered->second
-                              : run.pressure.channels.at(runfile::cavity_channel);
-  entry.trace = envelope(shown_kPa);
-  double peak_kPa = -std::numeric_limits<double>::infinity();
-  for (const double value_kPa : shown_kPa)
-    if (value_kPa > peak_kPa) peak_kPa = value_kPa;
-  if (std::isfinite(peak_kPa)) entry.peak_kPa = peak_kPa;
+  const bool is_filtered = rows.pressure.values.contains(runfile::cavity_filtered_channel);
+  const std::string shown = is_filtered ? runfile::cavity_filtered_channel : runfile::cavity_channel;
+  entry.trace = envelope(rows.pressure.values.at(shown));
+  if (const runfile::Range& range = soundness.ranges.at(shown); range.any()) entry.peak_kPa = range.most;
 }
 
 /// A record without its bulk.
