@@ -112,6 +112,7 @@ void Page::time_chart(const TimeChart& chart) {
       fmt::format("<div class=\"chart\" data-chart=\"{}\">{}</div>", charts_.size(), static_svg(chart));
   body_ += figure_html(holder, chart.caption);
   charts_.push_back(chart_json(chart));
+  charts_.back().shrink_to_fit();
 }
 
 void Page::table(const Row& header, const std::vector<Row>& rows, const std::string& caption,
@@ -152,11 +153,17 @@ std::string Page::html() const {
   text += fmt::format(
       "<header><p class=\"brand\">Diastole</p><h1>{}</h1>\n<div class=\"headlines\">\n{}</div></header>\n",
       escaped(title_), headlines_);
-  text += "<main>\n" + body_ + (in_section_ ? "</section>\n" : "") + "</main>\n";
+  size_t bulk = body_.size() + part_scripts_.size();
+  for (const std::string& chart : charts_)
+    bulk += chart.size();
+  text.reserve(text.size() + bulk + embedded::uplot_js.size() + embedded::page_js.size() + 10'000);
+  text += "<main>\n";
+  text += body_;
+  text += in_section_ ? "</section>\n</main>\n" : "</main>\n";
   if (!charts_.empty()) {
     text += "<script>\nconst charts = [";
     for (const std::string& chart : charts_)
-      text += chart + ",\n";
+      text.append(chart).append(",\n");
     text += fmt::format("];\n/*\n{}\n*/\n", embedded::uplot_licence);
     // The script's own first line is a banner with an address; the licence above says the same without one.
     const std::string_view script = embedded::uplot_js;
@@ -164,7 +171,8 @@ std::string Page::html() const {
     text += std::string(embedded::page_js) + "</script>\n";
   }
   text += part_scripts_;
-  return text + "</body>\n</html>\n";
+  text += "</body>\n</html>\n";
+  return text;
 }
 
 }  // namespace diastole::report

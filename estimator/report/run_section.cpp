@@ -27,7 +27,7 @@ constexpr size_t loop_frames = 60;  // windows of a pressure-volume loop
 constexpr size_t most_plotted_segments = 6;
 // A browser draws this many samples of a trace without delay; longer runs show every n-th.
 constexpr size_t most_chart_samples = 120'000;
-constexpr size_t most_page_samples = 3 * most_chart_samples;  // ... and a page of that many all its traces
+constexpr size_t most_page_samples = 2 * most_chart_samples;  // ... and a page of that many all its traces
 
 std::vector<double> segment_triggers(const RecordedRun& run, const Segment& segment) {
   constexpr double slack_s = 1e-3;
@@ -56,7 +56,7 @@ std::string channel_words(const std::string& dataset) {
 
 void add_traces(Page& page, const RunFile& file) {
   const auto& [run, rows] = file;
-  const size_t shown = std::min(most_chart_samples, most_page_samples / rows.pressure.values.size());
+  const size_t shown = std::min(most_chart_samples, most_page_samples / (rows.pressure.values.size() + 1));
   const size_t step = 1 + rows.pressure.time_s.size() / shown;
   const std::string thinned = step == 1 ? "" : fmt::format(" Every {}th sample is drawn.", step);
   const char* style = "a";
@@ -70,7 +70,7 @@ void add_traces(Page& page, const RunFile& file) {
                                 channel_words(dataset), thinned)});
     style = dataset == "cavity_kPa" ? "c" : style;
   }
-  const size_t pump_step = 1 + rows.pump.time_s.size() / most_chart_samples;
+  const size_t pump_step = 1 + rows.pump.time_s.size() / shown;
   page.time_chart(
       {.time_s = every_nth(rows.pump.time_s, pump_step),
        .traces = {{"volume (mL)", "b", every_nth(rows.pump.values.at("commanded_mL"), pump_step)}},
