@@ -4,6 +4,8 @@
 #include <limits>
 #include <numeric>
 
+#include "estimator/mesh/local_field.hpp"
+
 namespace diastole {
 
 HermiteMesh::HermiteMesh(NodeField reference, std::vector<Corners> elements, MeshFaces faces,
@@ -43,19 +45,11 @@ ElementField HermiteMesh::gather(size_t e, std::span<const double> field) const 
 }
 
 Eigen::Vector3d HermiteMesh::value(std::span<const double> field, const MaterialPoint& point) const {
-  const HermiteBasis basis = hermite_basis(point.xi);
-  return gather(point.element, field) * Eigen::Map<const Eigen::Vector<double, 64>>(basis.value.data());
+  return local_value(gather(point.element, field), point.xi);
 }
 
 Eigen::Matrix3d HermiteMesh::xi_gradient(std::span<const double> field, const MaterialPoint& point) const {
-  const HermiteBasis basis = hermite_basis(point.xi);
-  const ElementField local = gather(point.element, field);
-  Eigen::Matrix3d gradient;
-  for (size_t k = 0; k < 3; ++k) {
-    gradient.col(static_cast<Eigen::Index>(k)) =
-        local * Eigen::Map<const Eigen::Vector<double, 64>>(basis.slope[k].data());
-  }
-  return gradient;
+  return local_field(gather(point.element, field), point.xi).slope;
 }
 
 Eigen::Matrix3d HermiteMesh::reference_gradient(std::span<const double> field,

@@ -4,6 +4,8 @@
 #include <limits>
 #include <utility>
 
+#include "estimator/mesh/local_field.hpp"
+
 namespace diastole {
 namespace {
 
@@ -17,38 +19,21 @@ double overshoot(const Xi& xi) {
   return most < inside_slack_xi ? 0.0 : most;
 }
 
-struct Mapped {
-  Eigen::Vector3d value;
-  Eigen::Matrix3d gradient;
-};
-
-Mapped map_element(const ElementField& coefficients, const Xi& xi) {
-  const HermiteBasis basis = hermite_basis(xi);
-  Mapped mapped;
-  mapped.value = coefficients * Eigen::Map<const Eigen::Vector<double, 64>>(basis.value.data());
-  for (size_t k = 0; k < 3; ++k) {
-    mapped.gradient.col(static_cast<Eigen::Index>(k)) =
-        coefficients * Eigen::Map<const Eigen::Vector<double, 64>>(basis.slope[k].data());
-  }
-  return mapped;
-}
-
 }  // namespace
 
 PointLocator::PointLocator(const HermiteMesh& mesh, std::span<const double> positions_mm,
                            LocatorOptions options)
-    : options_(options) {
+    : options_(options), elements_(element_fields(mesh, positions_mm)) {
   constexpr double margin = 1.1;  // cubic edges bulge beyond the sampled places
   for (size_t e = 0; e < mesh.element_count(); ++e) {
-    coefficients_.push_back(mesh.gather(e, positions_mm));
-    const Eigen::Vector3d centre = map_element(coefficients_[e], {0.5, 0.5, 0.5}).value;
+    const Eigen::Vector3d centre = local_value(elements_[e], {0.5, 0.5, 0.5});
     const double low = -options.outside_xi;
     const double high = 1.0 + options.outside_xi;
     double radius = 0.0;
     for (size_t sample = 0; sample < 27; ++sample) {
       const auto place = [&](size_t digit) { return digit == 0 ? low : digit == 1 ? 0.5 : high; };
       const Xi xi{place(sample % 3), place(sample / 3 % 3), place(sample / 9)};
-      radius = std::max(radius, (map_element(coefficients_[e], xi).value - centre).norm());
+      radius = std::max(radius, (local_value(elements_[e], xi) - centre).norm());
     }
     spheres_.push_back({centre, margin * radius});
   }
@@ -60,14 +45,14 @@ std::optional<LocatedPoint> PointLocator::find_in(size_t element, const Eigen::V
   constexpr double wander_xi = 1.0;  // an iterate may leave the element this far on its way
   Xi xi = start;
   for (int step = 0; step < newton_steps; ++step) {
-    const Mapped mapped = map_element(coefficients_[element], xi);
-    const Eigen::Vector3d miss = place_mm - mapped.value;
+    const LocalField here = local_field(elements_[element], xi);
+    const Eigen::Vector3d miss = place_mm - here.value;
     if (miss.norm() <= options_.tolerance_mm) {
       const double beyond = overshoot(xi);
       if (beyond > outside_xi) return {};
       return LocatedPoint{{element, xi}, beyond};
     }
-    Eigen::Vector3d change = mapped.gradient.inverse() * miss;
+    Eigen::Vector3d change = here.slope.inverse() * miss;
     if (!change.allFinite()) return {};
     const double longest = change.cwiseAbs().maxCoeff();
     if (longest > longest_step_xi) change *= longest_step_xi / longest;

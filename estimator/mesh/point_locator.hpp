@@ -39,6 +39,9 @@ class PointLocator {
   [[nodiscard]] std::optional<LocatedPoint> find_beside(const Eigen::Vector3d& place_mm,
                                                         const MaterialPoint& guess) const;
 
+  /// The located configuration, element by element.
+  [[nodiscard]] std::span<const ElementField> elements() const { return elements_; }
+
  private:
   struct Sphere {
     Eigen::Vector3d centre_mm;
@@ -49,7 +52,7 @@ class PointLocator {
                                                     double outside_xi) const;
 
   LocatorOptions options_;
-  std::vector<ElementField> coefficients_;
+  std::vector<ElementField> elements_;
   std::vector<Sphere> spheres_;
 };
 

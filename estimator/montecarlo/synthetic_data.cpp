@@ -68,7 +68,7 @@ Measurement exact_measurement(const HermiteMesh& mesh, const Measurement& design
       if (tag.frame != frame) continue;
       const auto guess = find_tag(deformed, tag);
       if (!guess) continue;
-      const auto match = match_tag(mesh, reference, position_mm[number], tag, *guess);
+      const auto match = match_tag(reference, deformed.elements(), tag, *guess);
       if (!match) continue;
       TagPoint& placed = exact.tags.emplace_back(tag);
       placed.x_mm = array_of(vector_of(tag.x_mm) - match->error_mm * vector_of(tag.normal));

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <optional>
 
+#include "estimator/mesh/local_field.hpp"
 #include "estimator/motion_residuals/tag_match.hpp"
 #include "estimator/parallel/parallel_for.hpp"
 
@@ -21,35 +22,34 @@ double outside_mm(const HermiteMesh& mesh, const MaterialPoint& point) {
 }
 
 /// Sets the row to a match and returns its residual.
-double put(ResidualRow& row, const HermiteMesh& mesh, const NodeField& position_mm, const TagMatch& match) {
+double put(ResidualRow& row, const TagMatch& match) {
   row.point = match.point;
-  row.X_mm = mesh.value(mesh.reference(), match.point);
+  row.X_mm = match.X_mm;
   row.by_motion = match.by_motion / row.sigma_mm;
-  row.by_reference = -mesh.reference_gradient(position_mm, match.point).transpose() * row.by_motion;
+  row.by_reference = match.by_reference / row.sigma_mm;
   return match.error_mm / row.sigma_mm;
 }
 
-/// A component of a 3-D point at its material point.
-TagMatch match_component(const ResidualRow& row, const HermiteMesh& mesh, const NodeField& position_mm,
-                         const ObservedPoint& seen, const MaterialPoint& point) {
-  const Eigen::Vector3d miss_mm = vector_of(seen.x_mm) - mesh.value(position_mm, point);
-  return {point, miss_mm[row.component], -Eigen::Vector3d::Unit(row.component)};
+/// Sets the three rows of a 3-D point to its place on the body and returns their residuals.
+Eigen::Vector3d put(std::span<ResidualRow, 3> rows, const ObservedPoint& seen, const MaterialPoint& point,
+                    const ElementField& reference, const ElementField& position) {
+  const LocalField undeformed = local_field(reference, point.xi);
+  const LocalField deformed = local_field(position, point.xi);
+  const Eigen::Matrix3d F = deformed.slope * undeformed.slope.inverse();
+  for (ResidualRow& row : rows) {
+    row.point = point;
+    row.X_mm = undeformed.value;
+    row.by_motion = -Eigen::Vector3d::Unit(row.component) / row.sigma_mm;
+    row.by_reference = F.row(row.component).transpose() / row.sigma_mm;
+  }
+  return (vector_of(seen.x_mm) - deformed.value) / rows[0].sigma_mm;
 }
 
-/// A field at a place, and its slope, from one set of basis values.
-struct Local {
-  Eigen::Vector3d value = Eigen::Vector3d::Zero();
-  Eigen::Matrix3d slope = Eigen::Matrix3d::Zero();
-
-  Local(const ElementField& field, const HermiteBasis& basis) {
-    for (size_t a = 0; a < hermite_functions; ++a) {
-      const Eigen::Vector3d coefficient = field.col(static_cast<Eigen::Index>(a));
-      value += basis.value[a] * coefficient;
-      for (size_t k = 0; k < 3; ++k)
-        slope.col(static_cast<Eigen::Index>(k)) += basis.slope[k][a] * coefficient;
-    }
-  }
-};
+void put_lost(ResidualRow& row) {
+  row.was_lost = true;
+  row.by_motion.setZero();
+  row.by_reference.setZero();
+}
 
 /// One step of match_tag's Newton method from where the tag was; its residual. None if the step is long or leaves the
 /// element: the whole search is due.
@@ -57,9 +57,8 @@ std::optional<double> follow_closely(ResidualRow& row, const ElementField& refer
                                      const ElementField& position, const TagPoint& tag) {
   constexpr double close_mm = 1.0;
   constexpr double slack_xi = 0.02;
-  const HermiteBasis basis = hermite_basis(row.point.xi);
-  const Local undeformed(reference, basis);
-  const Local deformed(position, basis);
+  const LocalField undeformed = local_field(reference, row.point.xi);
+  const LocalField deformed = local_field(position, row.point.xi);
   const Eigen::Vector3d normal = vector_of(tag.normal);
   const Eigen::Matrix3d dx_inverse = deformed.slope.inverse();
   const Eigen::Vector3d pulled_normal = (undeformed.slope * dx_inverse).transpose() * normal;
@@ -79,7 +78,7 @@ std::optional<double> follow_closely(ResidualRow& row, const ElementField& refer
   row.point.xi = after;
   row.X_mm = undeformed.value + moved_mm;
   row.by_motion = -pulled_normal / (projection * row.sigma_mm);
-  row.by_reference = -(deformed.slope * undeformed.slope.inverse()).transpose() * row.by_motion;
+  row.by_reference = normal / (projection * row.sigma_mm);
   return error_mm / row.sigma_mm;
 }
 
@@ -97,10 +96,10 @@ Eigen::MatrixXd gathered(const HermiteMesh& mesh, size_t element, std::span<cons
 
 /// direction . field of every gathered field.
 Eigen::VectorXd along(const Eigen::MatrixXd& gathered_fields, const Eigen::Vector3d& direction,
-                      const HermiteBasis& basis) {
+                      const std::array<double, hermite_functions>& basis) {
   ElementField weights;
   for (size_t a = 0; a < hermite_functions; ++a)
-    weights.col(static_cast<Eigen::Index>(a)) = basis.value[a] * direction;
+    weights.col(static_cast<Eigen::Index>(a)) = basis[a] * direction;
   return gathered_fields * Eigen::Map<const Eigen::VectorXd>(weights.data(), weights.size());
 }
 
@@ -166,7 +165,7 @@ void MotionResiduals::find_tags(size_t slot, const HermiteMesh& mesh, const Poin
     const auto guess = find_tag(deformed, tags_[i]);
     if (!guess || (!given_up_[i] && outside_mm(mesh, *guess) > farthest_outside_mm)) return;
     on_body[i] = 1;
-    if (!given_up_[i]) matches[i] = match_tag(mesh, reference, position_mm, tags_[i], *guess);
+    if (!given_up_[i]) matches[i] = match_tag(reference, deformed.elements(), tags_[i], *guess);
   });
   for (size_t i = 0; i < tags_.size(); ++i) {
     if (tags_[i].frame != frames_[slot]) continue;
@@ -177,22 +176,30 @@ void MotionResiduals::find_tags(size_t slot, const HermiteMesh& mesh, const Poin
     }
     ResidualRow& row =
         rows_.emplace_back(ResidualRow{.slot = slot, .source = i, .sigma_mm = tags_[i].sigma_mm});
-    row.found_residual = put(row, mesh, position_mm, *matches[i]);
+    row.found_residual = put(row, *matches[i]);
   }
 }
 
 void MotionResiduals::find_points(size_t slot, const HermiteMesh& mesh, const PointLocator& reference,
                                   const NodeField& position_mm) {
+  const std::vector<ElementField> deformed = element_fields(mesh, position_mm);
   for (size_t i = 0; i < points_.size(); ++i) {
     if (points_[i].frame != frames_[slot]) continue;
     const auto place = reference.find(vector_of(points_[i].X_mm));
     ++(place ? found_.usable : found_.points_left_out);
-    for (Eigen::Index component = 0; place && component < 3; ++component) {
-      ResidualRow& row = rows_.emplace_back(ResidualRow{
-          .slot = slot, .source = tags_.size() + i, .component = component, .sigma_mm = points_[i].sigma_mm});
-      row.found_residual =
-          put(row, mesh, position_mm, match_component(row, mesh, position_mm, points_[i], place->point));
-    }
+    if (!place) continue;
+    const size_t e = place->point.element;
+    const size_t first = rows_.size();
+    for (Eigen::Index component = 0; component < 3; ++component)
+      rows_.push_back({.slot = slot,
+                       .source = tags_.size() + i,
+                       .component = component,
+                       .sigma_mm = points_[i].sigma_mm});
+    const std::span<ResidualRow, 3> rows(&rows_[first], 3);
+    const Eigen::Vector3d residuals =
+        put(rows, points_[i], place->point, reference.elements()[e], deformed[e]);
+    for (ResidualRow& row : rows)
+      row.found_residual = residuals[row.component];
   }
 }
 
@@ -201,37 +208,43 @@ bool MotionResiduals::follow(const HermiteMesh& mesh, const PointLocator& refere
   std::vector<ResidualRow> moved = rows_;
   std::vector<unsigned char> lost(rows_.size(), 0);
   Eigen::VectorXd residuals(size());
-  // Element by element, of the undeformed mesh and then of each slot's motion.
-  std::vector<std::vector<ElementField>> fields(1 + frames_.size());
-  if (how == Following::closely) {
-    for (size_t e = 0; e < mesh.element_count(); ++e) {
-      fields[0].push_back(mesh.gather(e, mesh.reference()));
-      for (size_t slot = 0; slot < frames_.size(); ++slot)
-        fields[1 + slot].push_back(mesh.gather(e, position_mm[slot]));
-    }
-  }
-  parallel_for(moved.size(), machine_threads(), [&](size_t i) {
-    ResidualRow& row = moved[i];
-    const NodeField& position = position_mm[row.slot];
+  std::vector<std::vector<ElementField>> deformed;  // of each slot
+  for (size_t slot = 0; slot < frames_.size(); ++slot)
+    deformed.push_back(element_fields(mesh, position_mm[slot]));
+  const auto follow_tag = [&](ResidualRow& row) {
+    const std::span<const ElementField> position = deformed[row.slot];
+    const TagPoint& tag = tags_[row.source];
+    const size_t e = row.point.element;
     std::optional<double> residual;
+    if (how == Following::closely) residual = follow_closely(row, reference.elements()[e], position[e], tag);
+    const auto match = residual ? std::nullopt : match_tag(reference, position, tag, row.point);
+    if (match) residual = put(row, *match);
+    return residual;
+  };
+  const auto follow_point = [&](std::span<ResidualRow, 3> rows) {
+    const ObservedPoint& seen = points_[rows[0].source - tags_.size()];
+    const auto place = reference.find(vector_of(seen.X_mm), rows[0].point);
+    if (!place) return std::optional<Eigen::Vector3d>();
+    const size_t e = place->point.element;
+    return std::optional(put(rows, seen, place->point, reference.elements()[e], deformed[rows[0].slot][e]));
+  };
+  parallel_for(moved.size(), machine_threads(), [&](size_t i) {
+    const auto at = static_cast<Eigen::Index>(i);
+    ResidualRow& row = moved[i];
     if (of_tag(row)) {
-      const TagPoint& tag = tags_[row.source];
-      const size_t e = row.point.element;
-      if (how == Following::closely)
-        residual = follow_closely(row, fields[0][e], fields[1 + row.slot][e], tag);
-      const auto match = residual ? std::nullopt : match_tag(mesh, reference, position, tag, row.point);
-      if (match) residual = put(row, mesh, position, *match);
-    } else {
-      const ObservedPoint& seen = points_[row.source - tags_.size()];
-      if (const auto place = reference.find(vector_of(seen.X_mm), row.point))
-        residual = put(row, mesh, position, match_component(row, mesh, position, seen, place->point));
+      const std::optional<double> residual = follow_tag(row);
+      lost[i] = !residual;
+      residuals[at] = residual.value_or(row.found_residual);
+      if (lost[i] != 0) put_lost(row);
+    } else if (row.component == 0) {  // its two other components follow
+      const auto three = follow_point(std::span<ResidualRow, 3>(&row, 3));
+      for (size_t k = 0; k < 3; ++k) {
+        lost[i + k] = !three;
+        residuals[at + static_cast<Eigen::Index>(k)] =
+            three ? (*three)[static_cast<Eigen::Index>(k)] : moved[i + k].found_residual;
+        if (!three) put_lost(moved[i + k]);
+      }
     }
-    residuals[static_cast<Eigen::Index>(i)] = residual.value_or(row.found_residual);
-    if (residual) return;
-    lost[i] = 1;
-    row.was_lost = true;
-    row.by_motion.setZero();
-    row.by_reference.setZero();
   });
   if (!few_are(lost)) return false;
   rows_ = std::move(moved);
@@ -299,7 +312,7 @@ Eigen::MatrixXd MotionResiduals::columns(size_t slot, const HermiteMesh& mesh,
   Eigen::MatrixXd result(count(slot), static_cast<Eigen::Index>(motion.size()));
   parallel_for(static_cast<size_t>(count(slot)), machine_threads(), [&](size_t i) {
     const ResidualRow& row = rows_[static_cast<size_t>(first_[slot]) + i];
-    const HermiteBasis basis = hermite_basis(row.point.xi);
+    const std::array<double, hermite_functions> basis = hermite_basis_values(row.point.xi);
     Eigen::VectorXd sum = along(by_motion[row.point.element], row.by_motion, basis);
     if (!reference.empty()) sum += along(by_reference[row.point.element], row.by_reference, basis);
     result.row(static_cast<Eigen::Index>(i)) = sum;

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "estimator/mesh/local_field.hpp"
+
 namespace diastole {
 namespace {
 
@@ -25,18 +27,17 @@ std::optional<MaterialPoint> find_tag(const PointLocator& deformed, const TagPoi
   return {};
 }
 
-std::optional<TagMatch> match_tag(const HermiteMesh& mesh, const PointLocator& reference,
-                                  std::span<const double> position_mm, const TagPoint& tag,
-                                  const MaterialPoint& guess) {
+std::optional<TagMatch> match_tag(const PointLocator& reference, std::span<const ElementField> deformed,
+                                  const TagPoint& tag, const MaterialPoint& guess) {
   const Eigen::Vector3d normal = vector_of(tag.normal);
   const Eigen::Vector3d seen_mm = vector_of(tag.x_mm);
   MaterialPoint point = guess;
   double error_mm = 0;
   for (int step = 0; step < newton_steps; ++step) {
-    const Eigen::Vector3d X_mm = mesh.value(mesh.reference(), point);
-    const Eigen::Matrix3d dX = mesh.xi_gradient(mesh.reference(), point);
-    const Eigen::Matrix3d dx_inverse = mesh.xi_gradient(position_mm, point).inverse();
-    const Eigen::Vector3d miss_mm = seen_mm - mesh.value(position_mm, point) - error_mm * normal;
+    const auto [X_mm, dX] = local_field(reference.elements()[point.element], point.xi);
+    const auto [x_mm, dx] = local_field(deformed[point.element], point.xi);
+    const Eigen::Matrix3d dx_inverse = dx.inverse();
+    const Eigen::Vector3d miss_mm = seen_mm - x_mm - error_mm * normal;
     const double plane_miss_mm = tag.plane_mm - normal.dot(X_mm);
     const Eigen::Vector3d pulled_normal = (dX * dx_inverse).transpose() * normal;  // F⁻ᵀ n
     const double projection = pulled_normal.dot(normal);
@@ -46,7 +47,7 @@ std::optional<TagMatch> match_tag(const HermiteMesh& mesh, const PointLocator& r
     Eigen::Vector3d xi_change = dx_inverse * (miss_mm - error_change_mm * normal);
     const double length_mm = (dX * xi_change).norm();
     if (length_mm + std::abs(error_change_mm) < tolerance_mm) {
-      return TagMatch{point, error_mm, -pulled_normal / projection};
+      return TagMatch{point, error_mm, -pulled_normal / projection, X_mm, normal / projection};
     }
     const double damping = std::min(1.0, longest_step_mm / length_mm);
     error_mm += damping * error_change_mm;

@@ -30,17 +30,19 @@ inline Eigen::Vector3d vector_of(const std::array<double, 3>& v) { return {v[0],
 struct TagMatch {
   MaterialPoint point;  ///< X, in mesh coordinates; slightly outside the body where noise or misfit puts it
   double error_mm;      ///< s
-  Eigen::Vector3d by_motion;  ///< ds/dx at the point: ds = by_motion · du
+  Eigen::Vector3d by_motion;     ///< ds/dx at the point: ds = by_motion · du
+  Eigen::Vector3d X_mm;          ///< the point's undeformed place
+  Eigen::Vector3d by_reference;  ///< - F^T by_motion = n / (n·F⁻¹n)
 };
 
 /// Where to start the search for a tag point: its seen place in the motion that `deformed` locates, or places on its
 /// line of error when noise has put it where the mesh cannot be extrapolated to. Empty when all are outside.
 std::optional<MaterialPoint> find_tag(const PointLocator& deformed, const TagPoint& tag);
 
-/// `reference` locates points of the undeformed mesh. `guess` is where the point was for a similar motion.
+/// `reference` locates points of the undeformed mesh; `deformed` are the deformed positions, element by element
+/// (local_field.hpp). `guess` is where the point was for a similar motion.
 /// Empty when the search leaves the body, or when the plane is so sheared that n·F⁻¹n < 0.1.
-std::optional<TagMatch> match_tag(const HermiteMesh& mesh, const PointLocator& reference,
-                                  std::span<const double> position_mm, const TagPoint& tag,
-                                  const MaterialPoint& guess);
+std::optional<TagMatch> match_tag(const PointLocator& reference, std::span<const ElementField> deformed,
+                                  const TagPoint& tag, const MaterialPoint& guess);
 
 }  // namespace diastole

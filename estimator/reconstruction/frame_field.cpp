@@ -63,7 +63,7 @@ class FrameData {
       const TagPoint& tag = measurement_.tags[i];
       const auto guess = find_tag(deformed, tag);
       const auto match =
-          guess ? match_tag(mesh_, reference_, field.position_mm, tag, *guess) : std::optional<TagMatch>{};
+          guess ? match_tag(reference_, deformed.elements(), tag, *guess) : std::optional<TagMatch>{};
       if (!match) {
         field.tags_not_found.push_back(i);
         continue;

@@ -166,7 +166,7 @@ class Camera {
   void take(int frame, const NodeField& seen_mm, std::vector<TagPoint>& tags) {
     const PointLocator deformed(motion_.mesh, seen_mm);
     for (size_t taken = 0; taken < wanted_.tags;) {
-      if (auto tag = one(frame, seen_mm, deformed)) {
+      if (auto tag = one(frame, deformed)) {
         tags.push_back(*tag);
         ++taken;
       }
@@ -176,8 +176,7 @@ class Camera {
   std::mt19937& random() { return random_; }
 
  private:
-  [[nodiscard]] std::optional<TagPoint> one(int frame, const NodeField& seen_mm,
-                                            const PointLocator& deformed) {
+  [[nodiscard]] std::optional<TagPoint> one(int frame, const PointLocator& deformed) {
     const auto index = static_cast<size_t>(12.0 * share_(random_)) % slices_.size();
     const Slice& slice = slices_[index];
     const bool other = share_(random_) < 0.5;
@@ -200,7 +199,7 @@ class Camera {
     const double plane_mm = phase_mm + 5.0 * std::round((normal.dot(X_mm) - phase_mm) / 5.0);
     TagPoint tag{
         frame, {normal[0], normal[1], normal[2]}, plane_mm, {place[0], place[1], place[2]}, wanted_.sigma_mm};
-    const auto match = match_tag(motion_.mesh, reference_, seen_mm, tag, material->point);
+    const auto match = match_tag(reference_, deformed.elements(), tag, material->point);
     if (!match) return {};
     const Vector3d on_stripe = motion_.mesh.value(motion_.mesh.reference(), match->point);
     const double depth_mm = std::hypot(on_stripe[0], on_stripe[1]);

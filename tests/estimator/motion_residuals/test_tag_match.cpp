@@ -1,5 +1,6 @@
 #include <gmock/gmock.h>
 
+#include "estimator/mesh/local_field.hpp"
 #include "estimator/motion_residuals/tag_match.hpp"
 #include "tests/estimator/fit/synthetic.hpp"
 #include "tests/estimator/motion_residuals/mapped_field.hpp"
@@ -24,7 +25,7 @@ class TagOnSheared : public testing::Test {
 
   std::optional<TagMatch> match(const TagPoint& tag, const NodeField& position_mm,
                                 const MaterialPoint& guess = {0, {0.5, 0.5, 0.5}}) const {
-    return match_tag(model_.mesh(), reference_, position_mm, tag, guess);
+    return match_tag(reference_, element_fields(model_.mesh(), position_mm), tag, guess);
   }
 
   ElasticModel model_;
