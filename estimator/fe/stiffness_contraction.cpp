@@ -1,5 +1,7 @@
 #include "estimator/fe/stiffness_contraction.hpp"
 
+#include "estimator/parallel/avx2.hpp"
+
 namespace diastole {
 namespace {
 
@@ -40,7 +42,7 @@ void StiffnessContraction::contract() {
   contract_third();
 }
 
-void StiffnessContraction::contract_first(size_t q3) {
+DIASTOLE_ALSO_FOR_AVX2 void StiffnessContraction::contract_first(size_t q3) {
   for (size_t q2 = 0; q2 < line_points; ++q2) {
     const double* source = &moduli_[(q3 * 4 + q2) * 4 * moduli];
     double* target = &first_[q2 * 9 * first_row];
@@ -57,7 +59,7 @@ void StiffnessContraction::contract_first(size_t q3) {
   }
 }
 
-void StiffnessContraction::contract_second(size_t q3) {
+DIASTOLE_ALSO_FOR_AVX2 void StiffnessContraction::contract_second(size_t q3) {
   double* all = &second_[q3 * 4 * second_row];
   for (size_t n = 0; n < 4 * second_row; ++n)
     all[n] = 0.0;
@@ -72,7 +74,7 @@ void StiffnessContraction::contract_second(size_t q3) {
   }
 }
 
-void StiffnessContraction::contract_third() {
+DIASTOLE_ALSO_FOR_AVX2 void StiffnessContraction::contract_third() {
   constexpr size_t block = first_row;  // keeps the sources in the nearest cache while ten rows use them
   for (size_t offset = 0; offset < second_row; offset += block) {
     for (size_t a3 = 0; a3 < 4; ++a3) {
