@@ -7,6 +7,7 @@
 #include <limits>
 #include <map>
 
+#include "estimator/mesh/local_field.hpp"
 #include "estimator/motion_residuals/tag_match.hpp"
 #include "estimator/solution/body_section.hpp"
 
@@ -86,11 +87,12 @@ FitSection section_of(const Cut& cut, const HermiteMesh& mesh, const EstimatedFr
   const auto after = [&](const auto& lines) { return seen(cut, mesh, frame.position_mm, lines); };
   FitSection section{
       cut.title, cut.horizontal, cut.vertical, {before(body.outline)}, {after(body.outline)}, {}, {}, {}};
+  const std::vector<ElementField> undeformed = element_fields(mesh, mesh.reference());
   const bool has_tags = !measurement.tags.empty();
   for (const MaterialPlane& plane :
        has_tags ? tag_planes(cut, measurement.tags, frame.number) : grid_planes(cut, mesh.extent_mm())) {
     const std::vector<MaterialLine> lines = level_lines(body, [&](const MaterialPoint& point) {
-      return plane.normal.dot(mesh.value(mesh.reference(), point)) - plane.offset_mm;
+      return plane.normal.dot(local_value(undeformed[point.element], point.xi)) - plane.offset_mm;
     });
     if (lines.empty()) continue;
     section.lines_before.push_back(before(lines));

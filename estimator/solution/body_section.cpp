@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "estimator/mesh/face_map.hpp"
+#include "estimator/mesh/local_field.hpp"
 #include "estimator/mesh/point_locator.hpp"
 
 namespace diastole {
@@ -60,10 +61,11 @@ class BrickGrid {
         element_(element),
         bricks_(bricks_of(mesh, element, cell_mm)) {
     const Eigen::Vector3d normal = plane.horizontal.cross(plane.vertical);
+    const ElementField position = mesh.gather(element, position_mm);
     for (size_t i3 = 0; i3 <= bricks_[2]; ++i3) {
       for (size_t i2 = 0; i2 <= bricks_[1]; ++i2) {
         for (size_t i1 = 0; i1 <= bricks_[0]; ++i1) {
-          const Eigen::Vector3d place_mm = mesh.value(position_mm, {element, xi_at({i1, i2, i3})});
+          const Eigen::Vector3d place_mm = local_value(position, xi_at({i1, i2, i3}));
           distance_mm_.push_back(normal.dot(place_mm - plane.origin_mm));
         }
       }
