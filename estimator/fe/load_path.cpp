@@ -80,7 +80,7 @@ class LoadLine {
 void record(SolveReport& report, const NewtonResult& attempt) {
   const bool accepted = attempt.reason == SolveReason::converged;
   report.history.push_back({attempt.state.pressure_kPa, accepted, attempt.iterations});
-  report.factorisations += attempt.iterations.size();
+  report.factorisations += attempt.factorisations;
   for (const NewtonIteration& iteration : attempt.iterations)
     report.newton_iterations += 1 + iteration.corrections;
   if (accepted) {
@@ -93,7 +93,7 @@ void record(SolveReport& report, const NewtonResult& attempt) {
 }  // namespace
 
 Solution follow_load(ElasticSystem& system, const ElasticState& start, const Load& load,
-                     const SolveOptions& options) {
+                     const SolveOptions& options, std::shared_ptr<const CondensedFactor> near_by) {
   constexpr size_t easy_iterations = 4;
   const auto begun = std::chrono::steady_clock::now();
   SolveReport report;
@@ -108,7 +108,7 @@ Solution follow_load(ElasticSystem& system, const ElasticState& start, const Loa
     ElasticState guess = before ? extrapolated(*before, last, next) : last.state;
     line.put_on(guess, next);
     report.pressure_unknowns = system.pressure_unknowns(guess);
-    NewtonResult attempt = newton_solve(system, guess, options);
+    NewtonResult attempt = newton_solve(system, guess, options, std::exchange(near_by, nullptr));
     record(report, attempt);
     if (attempt.reason == SolveReason::converged) {
       before = std::exchange(last, {std::move(attempt.state), next});

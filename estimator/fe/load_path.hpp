@@ -9,8 +9,9 @@
 namespace diastole {
 
 /// `start` need not be an equilibrium (parameters may have changed since): it is brought into one first when
-/// the load stays. Precondition: start is of this system and not inverted.
+/// the load stays. The first step tries the factor of a tangent near by, if there is one.
+/// Precondition: start is of this system and not inverted.
 Solution follow_load(ElasticSystem& system, const ElasticState& start, const Load& load,
-                     const SolveOptions& options);
+                     const SolveOptions& options, std::shared_ptr<const CondensedFactor> near_by = {});
 
 }  // namespace diastole

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "estimator/fe/condensed_factor.hpp"
 #include "estimator/fe/kept_factor.hpp"
 
 namespace diastole {
@@ -12,6 +13,8 @@ namespace {
 constexpr double least_damping = 0.02;
 /// With a kept factor the error is not much smaller than the last correction, as it is with a new tangent.
 constexpr double remaining_error = 0.1;
+/// With the factor of another tangent corrections shrink more slowly: the error may be ten times the last one.
+constexpr double remaining_error_near_by = 1e-3;
 
 class Newton {
  public:
@@ -27,11 +30,27 @@ class Newton {
                   std::abs(guess.pressure_kPa), std::abs(guess.chamber_pressure_kPa)});
   }
 
+  /// With the factor of another tangent alone; none if that does not lead to an equilibrium.
+  std::optional<NewtonResult> run_with(std::shared_ptr<const CondensedFactor> factor) {
+    SystemResidual residual = system_.residual(result_.state);
+    if (reason_against(residual)) return {};
+    system_.use_factor(std::move(factor));
+    remaining_error_ = remaining_error_near_by;
+    result_.negative_pivots = system_.equations().pressure_unknowns();
+    const std::vector<double> step = correction(residual);
+    result_.iterations.push_back({.step = size(step)});
+    if (!std::isfinite(result_.iterations.back().step)) return {};
+    if (advance(step, residual) != SolveReason::converged) return {};
+    if (options_.on_iteration) options_.on_iteration(result_.state.pressure_kPa, result_.iterations.back());
+    return finish(SolveReason::converged);
+  }
+
   NewtonResult run() {
     SystemResidual residual = system_.residual(result_.state);
     if (const auto impossible = reason_against(residual)) return finish(*impossible, residual);
     while (result_.iterations.size() < options_.newton_limit) {
       const FactorResult factor = system_.factorise(result_.state);
+      ++result_.factorisations;
       if (factor.singular) return finish(SolveReason::singular_tangent);
       result_.negative_pivots = factor.negative_pivots;
       const std::vector<double> step = correction(residual);
@@ -63,7 +82,11 @@ class Newton {
     std::vector<double> step = std::move(residual.values);
     for (double& value : step)
       value = -value;
-    system_.solve(step);
+    if (const auto condensed = system_.kept_factor()) {
+      condensed->solve_roughly(step);
+    } else {
+      system_.solve(step);
+    }
     return step;
   }
 
@@ -140,7 +163,7 @@ class Newton {
       if (reason_against(after)) return {};
       result_.state = corrected;
       ++iteration.corrections;
-      if (at_rounding || size(*next) <= remaining_error * options_.tolerance) return SolveReason::converged;
+      if (at_rounding || size(*next) <= remaining_error_ * options_.tolerance) return SolveReason::converged;
       residual = after;
       simplified = correction(after);
     }
@@ -150,11 +173,16 @@ class Newton {
   const SolveOptions& options_;
   NewtonResult result_;
   double pressure_scale_kPa_ = 1.0;
+  double remaining_error_ = remaining_error;
 };
 
 }  // namespace
 
-NewtonResult newton_solve(ElasticSystem& system, const ElasticState& guess, const SolveOptions& options) {
+NewtonResult newton_solve(ElasticSystem& system, const ElasticState& guess, const SolveOptions& options,
+                          std::shared_ptr<const CondensedFactor> near_by) {
+  if (near_by) {
+    if (auto result = Newton(system, guess, options).run_with(std::move(near_by))) return *std::move(result);
+  }
   return Newton(system, guess, options).run();
 }
 

@@ -20,12 +20,15 @@ struct NewtonResult {
   SolveReason reason = SolveReason::converged;
   ElasticState state;  ///< converged, or the last iterate
   std::vector<NewtonIteration> iterations;
+  size_t factorisations = 0;
   size_t negative_pivots = 0;  ///< of the last tangent; not counted where the cavity's wall has a free rim
   std::optional<InvertedPlace> inverted;
   std::optional<size_t> beyond_law;  ///< an element
 };
 
-/// `guess` holds the load to solve for: pressure or held volume, tension, the chamber's sealing pressure.
-NewtonResult newton_solve(ElasticSystem& system, const ElasticState& guess, const SolveOptions& options);
+/// `guess` holds the load to solve for: pressure or held volume, tension, the chamber's sealing pressure. The factor of a
+/// tangent near by is tried first, if there is one.
+NewtonResult newton_solve(ElasticSystem& system, const ElasticState& guess, const SolveOptions& options,
+                          std::shared_ptr<const CondensedFactor> near_by = {});
 
 }  // namespace diastole

@@ -2,6 +2,8 @@
 
 #include <utility>
 
+#include "estimator/fe/condensed_factor.hpp"
+
 namespace diastole {
 
 RimSkew::RimSkew(const EquationSystem& equations, std::vector<FaceEdge> rim) : rim_(std::move(rim)) {
@@ -37,7 +39,26 @@ std::vector<double> RimSkew::values(const HermiteMesh& mesh, const NodeField& po
   return values;
 }
 
+bool TangentFactor::may_condense() {
+  if (may_condense_ && !pattern_) {
+    const size_t entries = equations_->entries();
+    pattern_ = CondensedPattern::of(equations_->displacement_unknowns(), equations_->pressure_unknowns(),
+                                    equations_->rows().first(entries), equations_->columns().first(entries));
+    may_condense_ = pattern_ != nullptr && skew_->empty();
+  }
+  return may_condense_;
+}
+
+std::shared_ptr<const CondensedFactor> TangentFactor::condensed(std::span<const double> values) const {
+  return CondensedFactor::of(pattern_, values);
+}
+
+size_t TangentFactor::condensed_entries() const { return pattern_->factor_entries(); }
+
 FactorResult TangentFactor::factorise_symmetric(std::span<double> values, bool cavity_held) {
+  condensed_.reset();
+  if (!cavity_held && may_condense()) condensed_ = condensed(values);
+  if (condensed_) return {.singular = false, .negative_pivots = equations_->pressure_unknowns()};
   std::unique_ptr<SparseFactor>& factor = cavity_held ? volume_given_ : pressure_given_;
   if (!factor) {
     const size_t entries = equations_->entries(cavity_held);
@@ -50,6 +71,7 @@ FactorResult TangentFactor::factorise_symmetric(std::span<double> values, bool c
 }
 
 FactorResult TangentFactor::factorise_general(std::span<const double> values, std::span<const double> skew) {
+  condensed_.reset();
   if (!general_) prepare_general();
   general_values_.assign(values.begin(), values.end());
   for (size_t n = 0; n < values.size(); ++n) {
@@ -61,6 +83,19 @@ FactorResult TangentFactor::factorise_general(std::span<const double> values, st
   }
   current_ = general_.get();
   return current_->factorise(general_values_);
+}
+
+void TangentFactor::solve(std::span<double> right_sides, size_t count) {
+  if (condensed_) {
+    condensed_->solve(right_sides, count);
+  } else {
+    current_->solve(right_sides, count);
+  }
+}
+
+size_t TangentFactor::entries() const {
+  if (condensed_) return condensed_->entries();
+  return current_ == nullptr ? 0 : current_->entries();
 }
 
 void TangentFactor::prepare_general() {

@@ -1,7 +1,8 @@
 #pragma once
 // The factor of an elastic system's tangent, in whichever form the problem at hand needs:
 //
-//   symmetric              cavity pressure given
+//   condensed              cavity pressure given, material incompressible, equilibrium stable (condensed_factor.hpp)
+//   symmetric              cavity pressure given, otherwise
 //   symmetric, one larger  cavity volume given: the cavity's row and column added
 //   general                a fluid's surface has a free rim, and the tangent a skew part there
 //
@@ -16,6 +17,9 @@
 #include "estimator/fe/sparse_factor.hpp"
 
 namespace diastole {
+
+class CondensedFactor;
+class CondensedPattern;
 
 /// The skew part that the free rims of a fluid's surface add to the tangent (face_edge.hpp), as triplets.
 class RimSkew {
@@ -55,15 +59,31 @@ class TangentFactor {
   /// counted.
   FactorResult factorise_general(std::span<const double> values, std::span<const double> skew);
 
-  void solve(std::span<double> right_sides, size_t count) { current_->solve(right_sides, count); }
+  void solve(std::span<double> right_sides, size_t count);
   /// Numbers stored in the last factor; 0 before there is one.
-  [[nodiscard]] size_t entries() const { return current_ == nullptr ? 0 : current_->entries(); }
+  [[nodiscard]] size_t entries() const;
+
+  /// Whether tangents of given cavity pressure have a pattern that can be condensed.
+  bool may_condense();
+  /// A factor of its own, or none where the tangent is not that of a stable equilibrium. Several may be made at the same time.
+  /// Precondition: may_condense().
+  [[nodiscard]] std::shared_ptr<const CondensedFactor> condensed(std::span<const double> values) const;
+  /// Numbers in such a factor.
+  [[nodiscard]] size_t condensed_entries() const;
+
+  /// The factor that solve() uses, to be used again later; none if it is not condensed.
+  [[nodiscard]] std::shared_ptr<const CondensedFactor> kept() const { return condensed_; }
+  /// Lets solve() use a factor that was kept until the next call of another function.
+  void use(std::shared_ptr<const CondensedFactor> factor) { condensed_ = std::move(factor); }
 
  private:
   void prepare_general();
 
   const EquationSystem* equations_;
   const RimSkew* skew_;
+  bool may_condense_ = true;
+  std::shared_ptr<CondensedPattern> pattern_;
+  std::shared_ptr<const CondensedFactor> condensed_;  // in use, if there is one
   std::unique_ptr<SparseFactor> pressure_given_;
   std::unique_ptr<SparseFactor> volume_given_;
   std::unique_ptr<SparseFactor> general_;

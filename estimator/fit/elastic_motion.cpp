@@ -25,9 +25,28 @@ std::optional<std::string> ElasticMotion::set_values(std::span<const double> val
   return {};
 }
 
-MotionDerivatives ElasticMotion::derivatives_at(const ElasticState& state) {
-  Sensitivities by = model_.sensitivities(state, groups_);
-  return {std::move(by.parameter), std::move(by.pressure)};
+std::vector<ElasticMotion::StateDerivatives> ElasticMotion::derivatives_at(
+    std::span<const ElasticState* const> states) {
+  std::vector<StateDerivatives> derivatives;
+  for (Sensitivities& by : model_.sensitivities(states, groups_))
+    derivatives.push_back({{std::move(by.parameter), std::move(by.pressure), {}}, std::move(by.factor)});
+  return derivatives;
+}
+
+void ElasticMotion::find_derivatives(const std::vector<double>& values) {
+  std::vector<Slot*> wanted;
+  std::vector<const ElasticState*> states;
+  for (std::optional<Slot>& slot : slots_) {
+    if (!slot || slot->derivatives || slot->values != values) continue;
+    wanted.push_back(&*slot);
+    states.push_back(&slot->state);
+  }
+  (void)set_values(values);
+  std::vector<StateDerivatives> found = derivatives_at(states);
+  for (size_t i = 0; i < wanted.size(); ++i) {
+    wanted[i]->derivatives = std::move(found[i].motion);
+    wanted[i]->factor = std::move(found[i].factor);
+  }
 }
 
 // The slot itself, or on its first use the solved one of the nearest pressure.
@@ -43,6 +62,8 @@ const ElasticMotion::Slot* ElasticMotion::nearest(size_t slot, double pressure_k
 }
 
 Solution ElasticMotion::solve_from(const Slot* start, std::span<const double> values, double pressure_kPa) {
+  std::shared_ptr<const CondensedFactor> factor =
+      start != nullptr && start->factor ? start->factor : model_.system().kept_factor();
   if (start != nullptr && start->derivatives) {
     ElasticState guess = start->state;
     add_scaled(guess.position_mm, pressure_kPa - guess.pressure_kPa, start->derivatives->by_pressure);
@@ -50,11 +71,12 @@ Solution ElasticMotion::solve_from(const Slot* start, std::span<const double> va
       add_scaled(guess.position_mm, values[i] - start->values[i], start->derivatives->by_value[i]);
     }
     guess.pressure_kPa = pressure_kPa;
-    Solution solution = model_.solve(pressure_kPa, guess);
+    Solution solution = model_.solve({pressure_kPa, guess.fibre_tension_kPa}, guess, factor);
     if (solution.report.converged()) return solution;
   }
   if (start != nullptr) {
-    Solution solution = model_.solve(pressure_kPa, start->state);
+    Solution solution =
+        model_.solve({pressure_kPa, start->state.fibre_tension_kPa}, start->state, std::move(factor));
     if (solution.report.converged()) return solution;
   }
   return model_.solve(pressure_kPa, first_state());
@@ -68,16 +90,15 @@ MotionOutcome ElasticMotion::solve(size_t slot, std::span<const double> values, 
   NodeField seen_mm = solution.state.position_mm;
   add_scaled(seen_mm, displacement_gain_ - 1.0, solution.state.position_mm);
   add_scaled(seen_mm, 1.0 - displacement_gain_, mesh().reference());
-  slots_[slot] = Slot{{values.begin(), values.end()}, std::move(solution.state), std::nullopt};
+  std::shared_ptr<const CondensedFactor> factor = slots_[slot] ? slots_[slot]->factor : nullptr;
+  slots_[slot] =
+      Slot{{values.begin(), values.end()}, std::move(solution.state), std::nullopt, std::move(factor)};
   return {std::move(seen_mm), ""};
 }
 
 MotionDerivatives ElasticMotion::derivatives(size_t slot) {
   Slot& solved = slots_.at(slot).value();
-  if (!solved.derivatives) {
-    (void)set_values(solved.values);
-    solved.derivatives = derivatives_at(solved.state);
-  }
+  if (!solved.derivatives) find_derivatives(std::vector(solved.values));
   MotionDerivatives seen = *solved.derivatives;
   if (displacement_gain_ == 1.0) return seen;
   for (NodeField& field : seen.by_value)

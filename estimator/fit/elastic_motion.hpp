@@ -3,6 +3,7 @@
 // one, and every frame starts from its own last equilibrium, moved along the exact sensitivities.
 
 #include <cmath>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -37,8 +38,12 @@ class ElasticMotion : public MotionModel {
  protected:
   /// Makes the model that of these values; why not, if there is none.
   virtual std::optional<std::string> set_values(std::span<const double> values);
-  /// At an equilibrium of the model as it stands; of the motion itself, not of what images show.
-  virtual MotionDerivatives derivatives_at(const ElasticState& state);
+  struct StateDerivatives {
+    MotionDerivatives motion;
+    std::shared_ptr<const CondensedFactor> factor;  ///< of the tangent there, if it can be kept
+  };
+  /// At equilibria of the model as it stands; of the motion itself, not of what images show.
+  virtual std::vector<StateDerivatives> derivatives_at(std::span<const ElasticState* const> states);
   /// At an equilibrium of the model as it stands: stored since frame 0, and its derivatives, those of the motion being given.
   [[nodiscard]] virtual double stored_at(const ElasticState& state) const {
     return model_.stored_energy_mJ(state) - model_.stored_energy_mJ(model_.rest_state());
@@ -59,9 +64,12 @@ class ElasticMotion : public MotionModel {
   struct Slot {
     std::vector<double> values;
     ElasticState state;
-    std::optional<MotionDerivatives> derivatives;  // at `values` and the state's pressure
+    std::optional<MotionDerivatives> derivatives;   // at `values` and the state's pressure
+    std::shared_ptr<const CondensedFactor> factor;  // of the last tangent that derivatives were made with
   };
 
+  /// Of all slots that were solved with these values and have none.
+  void find_derivatives(const std::vector<double>& values);
   [[nodiscard]] const Slot* nearest(size_t slot, double pressure_kPa) const;
   [[nodiscard]] Solution solve_from(const Slot* start, std::span<const double> values, double pressure_kPa);
 

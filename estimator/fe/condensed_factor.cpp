@@ -1,0 +1,265 @@
+#include "estimator/fe/condensed_factor.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <utility>
+
+#include "estimator/parallel/serial_openmp.hpp"
+
+namespace diastole {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+
+/// Of B' W B over K in the directions that change volume: in each correction an error of the pressures shrinks by as much, and
+/// rounding errors are larger by as much.
+constexpr double volume_over_shape = 1e4;
+constexpr double settled = 1e-7;  // change of the pressures, relative: the next would be a thousandth of it
+constexpr int most_corrections = 6;
+/// A pivot smaller than that, of its diagonal entry, may be a rounding error.
+constexpr double least_pivot = 1e-13;
+
+}  // namespace
+
+std::shared_ptr<CondensedPattern> CondensedPattern::of(size_t displacements, size_t pressures,
+                                                       std::span<const int> rows,
+                                                       std::span<const int> columns) {
+  std::shared_ptr<CondensedPattern> pattern(new CondensedPattern);
+  pattern->displacements_ = displacements;
+  pattern->pressures_ = pressures;
+  cholmod_start(&pattern->common_);
+  pattern->common_.print = 0;
+  if (pressures == 0 ||
+      std::ranges::any_of(columns, [&](int column) { return column > static_cast<int>(displacements); }))
+    return nullptr;
+  pattern->map_displacements(rows, columns);
+  return pattern->map_pressures(rows, columns) && pattern->analyse() ? pattern : nullptr;
+}
+
+CondensedPattern::~CondensedPattern() {
+  cholmod_free_factor(&ordering_, &common_);
+  cholmod_finish(&common_);
+}
+
+void CondensedPattern::map_displacements(std::span<const int> rows, std::span<const int> columns) {
+  const auto is_stored = [&](size_t n) { return rows[n] <= static_cast<int>(displacements_); };
+  column_starts_.assign(displacements_ + 1, 0);
+  for (size_t n = 0; n < rows.size(); ++n) {
+    if (is_stored(n)) ++column_starts_[static_cast<size_t>(rows[n])];
+  }
+  std::partial_sum(column_starts_.begin(), column_starts_.end(), column_starts_.begin());
+  std::vector<int> next(column_starts_.begin(), column_starts_.end() - 1);
+  entries_.resize(static_cast<size_t>(column_starts_.back()));
+  for (size_t n = 0; n < rows.size(); ++n) {
+    if (is_stored(n)) entries_[static_cast<size_t>(next[static_cast<size_t>(rows[n] - 1)]++)] = n;
+  }
+  for (size_t j = 0; j < displacements_; ++j) {
+    std::sort(entries_.begin() + column_starts_[j], entries_.begin() + column_starts_[j + 1],
+              [&](size_t a, size_t b) { return columns[a] < columns[b]; });
+  }
+  rows_.resize(entries_.size());
+  std::ranges::transform(entries_, rows_.begin(), [&](size_t n) { return columns[n] - 1; });
+}
+
+bool CondensedPattern::map_pressures(std::span<const int> rows, std::span<const int> columns) {
+  std::vector<std::vector<std::pair<int, size_t>>> met(pressures_);  // displacement and triplet
+  for (size_t n = 0; n < rows.size(); ++n) {
+    if (rows[n] > static_cast<int>(displacements_))
+      met[static_cast<size_t>(rows[n]) - displacements_ - 1].emplace_back(columns[n] - 1, n);
+  }
+  for (size_t m = 0; m < pressures_; ++m) {
+    std::sort(met[m].begin(), met[m].end());
+    std::vector<int> displacements;
+    for (const auto& [displacement, entry] : met[m])
+      displacements.push_back(displacement);
+    if (groups_.empty() || groups_.back().displacements != displacements)
+      groups_.push_back({{}, std::move(displacements), {}, {}});
+    groups_.back().pressures.push_back(static_cast<int>(m));
+    for (const auto& [displacement, entry] : met[m])
+      groups_.back().entries.push_back(entry);
+  }
+  return std::ranges::all_of(groups_, [this](Group& group) { return map_places(group); });
+}
+
+bool CondensedPattern::map_places(Group& group) const {
+  for (auto column = group.displacements.begin(); column != group.displacements.end(); ++column) {
+    auto stored = rows_.begin() + column_starts_[static_cast<size_t>(*column)];
+    const auto end = rows_.begin() + column_starts_[static_cast<size_t>(*column) + 1];
+    for (auto row = group.displacements.begin(); row != column + 1; ++row) {
+      stored = std::find(stored, end, *row);
+      if (stored == end) return false;
+      group.places.push_back(static_cast<int>(stored - rows_.begin()));
+    }
+  }
+  return true;
+}
+
+cholmod_sparse CondensedPattern::matrix(double* values) const {
+  cholmod_sparse matrix{};
+  matrix.nrow = matrix.ncol = displacements_;
+  matrix.nzmax = rows_.size();
+  matrix.p = const_cast<int*>(column_starts_.data());
+  matrix.i = const_cast<int*>(rows_.data());
+  matrix.x = values;
+  matrix.stype = 1;
+  matrix.itype = CHOLMOD_INT;
+  matrix.xtype = values == nullptr ? CHOLMOD_PATTERN : CHOLMOD_REAL;
+  matrix.dtype = CHOLMOD_DOUBLE;
+  matrix.sorted = matrix.packed = 1;
+  return matrix;
+}
+
+bool CondensedPattern::analyse() {
+  common_.supernodal = CHOLMOD_SUPERNODAL;
+  common_.nmethods = 1;
+  common_.method[0].ordering = CHOLMOD_METIS;
+  cholmod_sparse pattern = matrix(nullptr);
+  ordering_ = cholmod_analyze(&pattern, &common_);
+  return ordering_ != nullptr;
+}
+
+CondensedFactor::CondensedFactor(std::shared_ptr<const CondensedPattern> pattern)
+    : pattern_(std::move(pattern)) {
+  cholmod_start(&common_);
+  common_.print = 0;
+  common_.supernodal = CHOLMOD_SUPERNODAL;
+}
+
+std::shared_ptr<const CondensedFactor> CondensedFactor::of(std::shared_ptr<const CondensedPattern> pattern,
+                                                           std::span<const double> values) {
+  std::shared_ptr<CondensedFactor> factor(new CondensedFactor(std::move(pattern)));
+  std::vector<double> matrix(factor->pattern_->entries_.size());
+  std::ranges::transform(factor->pattern_->entries_, matrix.begin(), [&](size_t n) { return values[n]; });
+  factor->condense(values, matrix);
+  return factor->factorise(matrix) ? factor : nullptr;
+}
+
+CondensedFactor::~CondensedFactor() {
+  cholmod_free_factor(&factor_, &common_);
+  cholmod_finish(&common_);
+}
+
+void CondensedFactor::condense(std::span<const double> values, std::vector<double>& matrix) {
+  weights_.resize(static_cast<Index>(pattern_->pressures_));
+  for (const CondensedPattern::Group& group : pattern_->groups_) {
+    const size_t count = group.displacements.size();
+    Coupling& coupling = coupling_.emplace_back(group.pressures.size(), count);
+    std::ranges::transform(group.entries, coupling.data(), [&](size_t n) { return values[n]; });
+    Eigen::VectorXd diagonal(static_cast<Index>(count));
+    for (size_t j = 0, place = 0; j < count; place += ++j + 1)
+      diagonal[static_cast<Index>(j)] =
+          std::abs(values[pattern_->entries_[static_cast<size_t>(group.places[place])]]);
+    // An estimate of B K^-1 B', whose inverse is what each pressure resists with.
+    const Eigen::VectorXd resisted = coupling.cwiseAbs2() * diagonal.cwiseInverse();
+    const Eigen::VectorXd weights = volume_over_shape * resisted.cwiseInverse();
+    weights_(group.pressures) = weights;
+    const MatrixXd weighted = weights.cwiseSqrt().asDiagonal() * coupling;
+    MatrixXd added = MatrixXd::Zero(static_cast<Index>(count), static_cast<Index>(count));
+    added.selfadjointView<Eigen::Upper>().rankUpdate(weighted.transpose());
+    auto place = group.places.begin();
+    for (Index j = 0; j < added.cols(); ++j) {
+      for (Index i = 0; i <= j; ++i)
+        matrix[static_cast<size_t>(*place++)] += added(i, j);
+    }
+  }
+}
+
+bool CondensedFactor::factorise(std::vector<double>& matrix) {
+  cholmod_sparse sparse = pattern_->matrix(matrix.data());
+  keep_openmp_serial();
+  factor_ = cholmod_copy_factor(pattern_->ordering_, &common_);
+  cholmod_factorize(&sparse, factor_, &common_);
+  if (common_.status == CHOLMOD_OUT_OF_MEMORY) throw std::bad_alloc();
+  if (common_.status != CHOLMOD_OK || factor_->minor < pattern_->displacements_) return false;
+  // The diagonal of a supernodal factor: each supernode is a dense block, its own columns' rows first.
+  const auto* supernodes = static_cast<const int*>(factor_->super);
+  const auto* row_starts = static_cast<const int*>(factor_->pi);
+  const auto* block_starts = static_cast<const int*>(factor_->px);
+  const auto* permutation = static_cast<const int*>(factor_->Perm);
+  const auto* numbers = static_cast<const double*>(factor_->x);
+  for (size_t s = 0; s < factor_->nsuper; ++s) {
+    const int rows = row_starts[s + 1] - row_starts[s];
+    for (int j = 0; j < supernodes[s + 1] - supernodes[s]; ++j) {
+      const double root = numbers[block_starts[s] + j * rows + j];
+      const int column = permutation[supernodes[s] + j];
+      const double diagonal =
+          matrix[static_cast<size_t>(pattern_->column_starts_[static_cast<size_t>(column) + 1] - 1)];
+      if (!(root * root > least_pivot * diagonal)) return false;
+    }
+  }
+  return true;
+}
+
+size_t CondensedFactor::entries() const { return factor_->xsize; }
+
+void CondensedFactor::add_pull(const MatrixXd& pressures, MatrixXd& displacements) const {
+  Eigen::VectorXd pressing, pull;
+  for (size_t g = 0; g < coupling_.size(); ++g) {
+    const CondensedPattern::Group& group = pattern_->groups_[g];
+    for (Index column = 0; column < pressures.cols(); ++column) {
+      pressing = pressures.col(column)(group.pressures);
+      pull.noalias() = coupling_[g].transpose() * pressing;
+      displacements.col(column)(group.displacements) += pull;
+    }
+  }
+}
+
+void CondensedFactor::add_growth(const MatrixXd& displacements, MatrixXd& pressures) const {
+  Eigen::VectorXd moved, growth;
+  for (size_t g = 0; g < coupling_.size(); ++g) {
+    const CondensedPattern::Group& group = pattern_->groups_[g];
+    for (Index column = 0; column < pressures.cols(); ++column) {
+      moved = displacements.col(column)(group.displacements);
+      growth.noalias() = coupling_[g] * moved;
+      pressures.col(column)(group.pressures) += growth;
+    }
+  }
+}
+
+MatrixXd CondensedFactor::solve_condensed(MatrixXd right_sides) const {
+  cholmod_dense dense{};
+  dense.nrow = dense.d = static_cast<size_t>(right_sides.rows());
+  dense.ncol = static_cast<size_t>(right_sides.cols());
+  dense.nzmax = static_cast<size_t>(right_sides.size());
+  dense.x = right_sides.data();
+  dense.xtype = CHOLMOD_REAL;
+  dense.dtype = CHOLMOD_DOUBLE;
+  cholmod_dense* solved = cholmod_solve(CHOLMOD_A, factor_, &dense, &common_);
+  if (solved == nullptr) throw std::bad_alloc();
+  std::copy_n(static_cast<const double*>(solved->x), right_sides.size(), right_sides.data());
+  cholmod_free_dense(&solved, &common_);
+  return right_sides;
+}
+
+void CondensedFactor::solve(std::span<double> right_sides, size_t count) const {
+  solve_corrected(right_sides, count, most_corrections);
+}
+
+void CondensedFactor::solve_roughly(std::span<double> right_side) const { solve_corrected(right_side, 1, 0); }
+
+void CondensedFactor::solve_corrected(std::span<double> right_sides, size_t count, int corrections) const {
+  const auto displacements = static_cast<Index>(pattern_->displacements_);
+  const auto all = displacements + static_cast<Index>(pattern_->pressures_);
+  Eigen::Map<MatrixXd> columns(right_sides.data(), all, static_cast<Index>(count));
+  MatrixXd growth = -columns.bottomRows(all - displacements);  // B u - g, for u = 0 at first
+  MatrixXd pressures = MatrixXd::Zero(growth.rows(), growth.cols());
+  MatrixXd pull = columns.topRows(displacements);
+  columns.setZero();
+  for (int correction = 0; correction <= corrections; ++correction) {
+    const MatrixXd weighted = weights_.asDiagonal() * growth;
+    add_pull(-weighted, pull);
+    const MatrixXd change = solve_condensed(std::move(pull));
+    columns.topRows(displacements) += change;
+    add_growth(change, growth);
+    const MatrixXd pressure_change = weights_.asDiagonal() * growth;
+    pressures += pressure_change;
+    if ((pressure_change.colwise().norm().array() <= settled * pressures.colwise().norm().array()).all())
+      break;
+    pull = MatrixXd::Zero(displacements, static_cast<Index>(count));
+  }
+  columns.bottomRows(pressures.rows()) = pressures;
+}
+
+}  // namespace diastole
