@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iterator>
 
 #include "estimator/parallel/parallel_for.hpp"
 #include "estimator/rig/sampled_signal.hpp"
@@ -159,8 +158,9 @@ Eigen::MatrixXd SessionProblem::by_u(const SessionModel& at, Eigen::MatrixXd by_
 
 // Tolerances are moved one by one, of which u may be combinations: some change nothing but what the sensors show.
 
-Eigen::MatrixXd SessionProblem::nuisance_columns(const SessionModel& at, Eigen::VectorXd& there) const {
-  const Eigen::VectorXd steps = nuisance_steps(at, 0.5);
+Eigen::MatrixXd SessionProblem::differences(const SessionModel& at, double part,
+                                            Eigen::VectorXd& there) const {
+  const Eigen::VectorXd steps = nuisance_steps(at, part);
   std::vector<RigModel> models = stepped(at, steps);
   models.insert(models.begin(), model(at));
   std::vector<bool> same_plant{true};
@@ -171,18 +171,12 @@ Eigen::MatrixXd SessionProblem::nuisance_columns(const SessionModel& at, Eigen::
   return by_u(at, (all.rightCols(steps.size()).colwise() - there) * steps.cwiseInverse().asDiagonal());
 }
 
-Eigen::MatrixXd SessionProblem::nuisance_slopes(const SessionModel& at) const {
-  const Eigen::VectorXd steps = nuisance_steps(at, 0.005);
-  std::vector<RigModel> models = stepped(at, steps);
-  std::ranges::move(stepped(at, -steps), std::back_inserter(models));
-  models.insert(models.begin(), model(at));
-  std::vector<bool> same_plant{true};
-  for (int side = 0; side < 2; ++side)
-    for (const Nuisance& nuisance : nuisances_)
-      same_plant.push_back(nuisance.sensors_only);
-  const Eigen::MatrixXd all = shown(models, same_plant);
-  return by_u(at, (all.middleCols(1, steps.size()) - all.rightCols(steps.size())) *
-                      (2.0 * steps).cwiseInverse().asDiagonal());
+Eigen::MatrixXd SessionProblem::nuisance_columns(const SessionModel& at, Eigen::VectorXd& there) const {
+  return differences(at, 0.5, there);
+}
+
+Eigen::MatrixXd SessionProblem::nuisance_slopes(const SessionModel& at, Eigen::VectorXd& there) const {
+  return differences(at, 0.005, there);
 }
 
 }  // namespace diastole::rig

@@ -72,9 +72,9 @@ class SessionProblem {
   /// How what is shown changes with u, by differences of half a tolerance's sd: the range that a linear fit goes through.
   /// `there`: what is shown at it.
   [[nodiscard]] Eigen::MatrixXd nuisance_columns(const SessionModel& at, Eigen::VectorXd& there) const;
-  /// Derivatives of what is shown by u, by central differences of a two hundredth of a tolerance's sd: data of a hundred thousand
+  /// Derivatives of what is shown by u, by differences of a two hundredth of a tolerance's sd: data of a hundred thousand
   /// samples know one to a hundredth, and slopes over more are no search's.
-  [[nodiscard]] Eigen::MatrixXd nuisance_slopes(const SessionModel& at) const;
+  [[nodiscard]] Eigen::MatrixXd nuisance_slopes(const SessionModel& at, Eigen::VectorXd& there) const;
   /// What the instruments show of one run.
   [[nodiscard]] Shown shown_in(size_t run, const SessionModel& of) const;
 
@@ -83,6 +83,9 @@ class SessionProblem {
   [[nodiscard]] Eigen::VectorXd nuisance_steps(const SessionModel& at, double part) const;
   /// The model with each of the steps taken for itself.
   [[nodiscard]] std::vector<RigModel> stepped(const SessionModel& at, const Eigen::VectorXd& steps) const;
+  /// By u, over this part of a tolerance's sd.
+  [[nodiscard]] Eigen::MatrixXd differences(const SessionModel& at, double part,
+                                            Eigen::VectorXd& there) const;
   /// Of derivatives by the steps, those by u.
   [[nodiscard]] Eigen::MatrixXd by_u(const SessionModel& at, Eigen::MatrixXd by_steps) const;
   /// With these tolerances, in sds of their list's, whatever u says.

@@ -153,10 +153,28 @@ class SetProblem : public inference::LeastSquaresProblem {
   const MatrixXd& derivatives(const VectorXd& q) {
     const VectorXd now = simulated(q);
     if (derived_at_.size() == q.size() && simulated(derived_at_) == now) return derivatives_;
+    derivatives_.resize(problem_.measured().size(), q.size());
+    Index others_from = searched();
+    if (kind_ == Nuisances::simulated) {
+      known_.at = model(q);
+      known_.columns = problem_.nuisance_slopes(known_.at, known_.there);
+      seen_ = known_.there;
+      --others_from;  // the modulus is one of them
+    }
+    derivatives_.rightCols(q.size() - others_from) = known_.columns.rightCols(q.size() - others_from);
+    if (others_from > 0) derive_searched(q, others_from);
+    at_ = now;
+    derived_at_ = q;
+    return derivatives_;
+  }
+
+ private:
+  /// Derivatives by the first of the unknowns.
+  void derive_searched(const VectorXd& q, Index count) {
     std::vector<SessionModel> models{simulated_model(q)};
     std::vector<bool> same_plant{true};
     std::vector<double> steps;
-    for (Index i = 0; i < searched(); ++i) {
+    for (Index i = 0; i < count; ++i) {
       const Unknown& unknown = unknowns_[static_cast<size_t>(i)];
       steps.push_back(unknown.step_from(q[i]));
       VectorXd moved = q;
@@ -165,22 +183,11 @@ class SetProblem : public inference::LeastSquaresProblem {
       same_plant.push_back(unknown.sensors_only);
     }
     const MatrixXd all = problem_.shown(models, same_plant);
-    at_ = now;
     seen_ = all.col(0);
-    derivatives_.resize(all.rows(), q.size());
-    for (Index i = 0; i < searched(); ++i)
+    for (Index i = 0; i < count; ++i)
       derivatives_.col(i) = (all.col(i + 1) - seen_) / steps[static_cast<size_t>(i)];
-    if (kind_ == Nuisances::simulated) {
-      known_.at = model(q);
-      known_.there = seen_;
-      known_.columns = problem_.nuisance_slopes(known_.at);
-    }
-    derivatives_.rightCols(others()) = known_.columns.rightCols(others());
-    derived_at_ = q;
-    return derivatives_;
   }
 
- private:
   const rig::SessionProblem& problem_;
   /// What the simulation depends on.
   [[nodiscard]] VectorXd simulated(const VectorXd& q) const {

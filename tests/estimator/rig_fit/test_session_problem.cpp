@@ -1,9 +1,12 @@
 #include <gmock/gmock.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <random>
+#include <span>
 
 #include "estimator/rig_fit/base_fit.hpp"
 #include "estimator/rig_fit/simulated_session.hpp"
@@ -91,6 +94,27 @@ TEST(SessionProblem, BearsAGap) {
     session.runs[0].pressure_kPa[Channel::cavity][k] = std::numeric_limits<double>::quiet_NaN();
   const SessionProblem problem(session, family, 2);
   EXPECT_NEAR(problem.model(declared_rig(problem).at).modulus_kPa, 8.0, 0.1);
+}
+
+TEST(SessionProblem, ItsSlopesAreTheDifferencesOfShortSteps) {
+  const SpecimenFamily family = gel_family();
+  const Session session = simulated_session(family, {});
+  const SessionProblem problem(session, family, 2);
+  SessionModel at = declared_rig(problem).at;
+  VectorXd there;
+  const Eigen::MatrixXd slopes = problem.nuisance_slopes(at, there);
+  EXPECT_EQ(there, problem.shown(std::span(&at, 1)).col(0));
+  constexpr double step = 0.005;
+  for (Index i = 0; i < slopes.cols(); ++i) {
+    SessionModel before = at, after = at;
+    before.u[i] -= step;
+    after.u[i] += step;
+    const Eigen::MatrixXd shown = problem.shown(std::array{before, after});
+    const VectorXd central = (shown.col(1) - shown.col(0)) / (2.0 * step);
+    // An error of a twentieth costs a search a step; a drive that hardly yields is the most curved, with two per cent.
+    EXPECT_LE((slopes.col(i) - central).norm(), 0.05 * central.norm() + 1e-4)
+        << problem.nuisances()[static_cast<size_t>(i)].name;
+  }
 }
 
 TEST(SimulatedPlant, CopiesCyclesThatRepeatThemselves) {
