@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <optional>
 #include <span>
 
 #include "estimator/explain/rig/changed_parts.hpp"
@@ -60,6 +61,10 @@ class Screening {
   [[nodiscard]] double single(size_t i) const {
     const double a = amplitude(along(i), square(i));
     return a * (2.0 * along(i) - a * square(i));
+  }
+  /// Of any amplitude.
+  [[nodiscard]] double best_single(size_t i) const {
+    return along(i) > 0.0 && square(i) > 0.0 ? along(i) * along(i) / square(i) : 0.0;
   }
   [[nodiscard]] double pair(size_t i, size_t j) const {
     const double both = products_(static_cast<Index>(i) + 1, static_cast<Index>(j) + 1);
@@ -138,6 +143,7 @@ class SetsSearch {
   void fit_beside_best();
   void fit_from_better_part(const std::vector<size_t>& responses);
   void fit_best_again(size_t effects);
+  [[nodiscard]] std::optional<double> posterior_beside_part(const EffectSet& set) const;
   [[nodiscard]] bool is_fitted(const std::vector<const Effect*>& effects) const;
   [[nodiscard]] std::vector<Promise> promises(const rig::EvidenceFit& under, bool pairs) const;
   /// The most probable first; what has no solution is no set.
@@ -250,6 +256,34 @@ void SetsSearch::fit_beside_best() {
   }
 }
 
+/// The log posterior of a set whose part without one of its effects was fitted exactly and explains more, by linear algebra there:
+/// that effect at its best size, which is its prior's sd, too. None if it promises more than its prior odds cost.
+std::optional<double> SetsSearch::posterior_beside_part(const EffectSet& set) const {
+  const auto is_in = [](const Effect* effect, const EffectSet& of) {
+    return std::ranges::count(of.model.terms, effect, &rig::ModelTerm::effect) > 0;
+  };
+  for (const EffectSet& part : sets_) {
+    const bool lacks_one = added(part) + 1 == added(set) &&
+                           std::ranges::all_of(part.model.terms, [&](const rig::ModelTerm& term) {
+                             return is_in(term.effect, set);
+                           });
+    if (!part.exact || !lacks_one || part.log_posterior < set.log_posterior) continue;
+    const Effect* other = std::ranges::find_if(set.model.terms, [&](const rig::ModelTerm& term) {
+                            return !is_in(term.effect, part);
+                          })->effect;
+    if (other->change_points() != ChangePoints::none) continue;  // what it does has no response
+    const Screening beside(responses_, part.target(), part.columns, part.evidence);
+    double gain = 0.0;
+    for (size_t i = 0; i < responses_.size(); ++i)
+      if (responses_[i].term.effect == other) gain = std::max(gain, beside.best_single(i));
+    const double odds =
+        set.log_posterior - set.evidence.log_evidence - (part.log_posterior - part.evidence.log_evidence);
+    if (gain < least_promise)
+      return part.log_posterior + 0.5 * (gain * gain / (1.0 + gain) - std::log1p(gain)) + odds;
+  }
+  return {};
+}
+
 void SetsSearch::fit_best_again(size_t effects) {
   sort_sets();
   size_t count = 0;
@@ -257,9 +291,13 @@ void SetsSearch::fit_best_again(size_t effects) {
   for (EffectSet& set : sets_) {
     if (added(set) != effects) continue;
     if (++count > retaken || (count > 1 && set.log_posterior < best - second_in_reach)) break;
-    // Without effects tolerances may wander far after what they cannot make: then their linear fit stands.
-    EffectSet again = fit_set_exactly(problem_, set);
-    if (effects > 0 || inference::is_settled(again.termination)) set = std::move(again);
+    if (const auto posterior = posterior_beside_part(set)) {
+      set.log_posterior = *posterior;
+    } else {
+      // Without effects tolerances may wander far after what they cannot make: then their linear fit stands.
+      EffectSet again = fit_set_exactly(problem_, set);
+      if (effects > 0 || inference::is_settled(again.termination)) set = std::move(again);
+    }
     if (count == 1) best = set.log_posterior;
   }
   sort_sets();

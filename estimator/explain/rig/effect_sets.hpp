@@ -31,6 +31,7 @@ struct EffectSet {
   rig::LinearisedModel known;  ///< where the nuisances' columns were taken
   Eigen::MatrixXd columns;     ///< of the evidence's linear unknowns: the effects', then the nuisances
   double log_posterior = 0.0;  ///< evidence and prior
+  bool exact = false;          ///< its tolerances were simulated
   inference::Termination termination = inference::Termination::converged;
 
   [[nodiscard]] std::vector<std::string> ids() const;  ///< sorted

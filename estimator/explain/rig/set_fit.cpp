@@ -314,7 +314,9 @@ EffectSet fit_set(const rig::SessionProblem& problem, const SessionModel& start,
 
 EffectSet fit_set_exactly(const rig::SessionProblem& problem, const EffectSet& near) {
   SetProblem set(problem, near.model, near.known, Nuisances::simulated);
-  return search(problem, set, near.known, near.evidence.shares, near.log_posterior);
+  EffectSet found = search(problem, set, near.known, near.evidence.shares, near.log_posterior);
+  found.exact = true;
+  return found;
 }
 
 }  // namespace diastole::explain
