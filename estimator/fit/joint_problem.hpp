@@ -7,7 +7,8 @@
 //   minimise  1/2 sum_frames |r_frame(values, P_frame)|^2  +  1/2 sum_frames ((P_frame - measured) / sigma)^2
 //
 // All measurements may be off by a common offset, one more unknown with a prior about zero; a pressure read in the
-// undeformed frame 0 is a measurement of it. Tag planes that were found in images are unknowns too (tag_planes.hpp).
+// undeformed frame 0 is a measurement of it. Tag planes that were found in images are unknowns too
+// (estimator/motion_residuals/tag_planes.hpp).
 // Where the body's shape was imaged under load (MotionModel::imaged_load), the pressure then is an unknown as a frame's is; frame 0 is
 // that shape, and its reading says nothing of the offset.
 // A frame with sigma_kPa = 0 has an exactly known pressure (but for the offset) and no unknown. A value with a positive lower
@@ -32,11 +33,11 @@
 
 #include "estimator/fit/robust_loss.hpp"
 #include "estimator/fit/smoothness.hpp"
-#include "estimator/fit/tag_planes.hpp"
 #include "estimator/fit/work_energy.hpp"
 #include "estimator/inference/least_squares.hpp"
 #include "estimator/io/measurement.hpp"
 #include "estimator/motion_residuals/motion_residuals.hpp"
+#include "estimator/motion_residuals/tag_planes.hpp"
 
 namespace diastole {
 

@@ -7,7 +7,8 @@
 //   1 / sigma^2 = (pi m snr / spacing)^2 / 2 * A / pixel^2                                                (1/mm^2)
 //
 // of w there, independently of its neighbours: what the tracker's own errors are (estimator/imaging/tracking/tag_points.hpp).
-// Points stand on the lines, four fifths of the spacing apart; the tags at rest are as unknown as in a fit of images (estimator/fit/tag_planes.hpp).
+// Points stand on the lines, four fifths of the spacing apart; the tags at rest are as unknown as in a fit of images
+// (estimator/motion_residuals/tag_planes.hpp).
 
 #include "estimator/mesh/hermite_mesh.hpp"
 #include "estimator/montecarlo/design.hpp"

@@ -169,7 +169,8 @@ bool check_load_order(Findings& findings, const MotionEvidence& evidence) {
 }
 
 /// Pressure at which the motion would vanish, extrapolated from the frames by a parabola p(amplitude). Needs four
-/// frames; the standard error is infinite with fewer.
+/// frames; the standard error is infinite with fewer. Tag planes that are wrong shift all amplitudes, as an offset of the pressure does; those of all
+/// images are taken to be wrong alike, as they are where the first image shows the body already moved.
 struct PressureAtNoMotion {
   double value_kPa = 0.0;
   double se_kPa = 0.0;
@@ -193,7 +194,14 @@ PressureAtNoMotion pressure_at_no_motion(const std::vector<FrameField>& fields,
   }
   const Eigen::Matrix3d covariance = (A.transpose() * A).inverse();
   const Eigen::Vector3d coefficients = covariance * (A.transpose() * b);
-  return {coefficients[0], std::sqrt(covariance(0, 0))};
+  const Eigen::RowVectorXd weights = covariance.row(0) * A.transpose();
+  Eigen::VectorXd by_planes = Eigen::VectorXd::Zero(amplitudes.front().by_planes.size());
+  for (Eigen::Index i = 0; i < rows; ++i) {
+    const MotionAmplitude& amplitude = amplitudes[static_cast<size_t>(i)];
+    const double slope_kPa = coefficients[1] + 2.0 * coefficients[2] * amplitude.value;
+    by_planes += weights[i] * A(i, 0) * slope_kPa * amplitude.by_planes;
+  }
+  return {coefficients[0], std::sqrt(covariance(0, 0) + std::pow(by_planes.lpNorm<1>(), 2))};
 }
 
 void check_pressure_offset(Findings& findings, const MotionEvidence& evidence) {
@@ -270,8 +278,8 @@ void check_method(Findings& findings, const std::vector<FrameField>& fields) {
 
 }  // namespace
 
-std::vector<MotionAmplitude> motion_amplitudes(const FieldForms& forms,
-                                               const std::vector<FrameField>& fields) {
+std::vector<MotionAmplitude> motion_amplitudes(const FieldForms& forms, const std::vector<FrameField>& fields,
+                                               const TagPlanes& planes) {
   std::vector<MotionAmplitude> amplitudes;
   const FrameField& most = most_loaded(fields);
   const Eigen::VectorXd whole_motion = forms.space.unknowns_of(most.displacement_mm);
@@ -282,13 +290,21 @@ std::vector<MotionAmplitude> motion_amplitudes(const FieldForms& forms,
       seen[static_cast<Eigen::Index>(i)] += field.rows[i].rejected ? 0.0 : field.rows[i].residual;
     const Eigen::VectorXd expected = rows * whole_motion;
     const double information = std::max(expected.squaredNorm(), 1e-12);
-    amplitudes.push_back(
-        {expected.dot(seen) / information, std::max(field.scale, 1.0) / std::sqrt(information)});
+    Eigen::VectorXd by_planes = Eigen::VectorXd::Zero(planes.unknowns());
+    for (size_t i = 0; planes.unknowns() > 0 && i < field.rows.size(); ++i) {
+      const FieldRow& row = field.rows[i];
+      if (!row.of_tag) continue;
+      by_planes.segment<TagPlanes::of_a_set>(planes.first_unknown(row.source)) +=
+          TagPlanes::loose_mm * expected[static_cast<Eigen::Index>(i)] / (row.sigma_mm * information) *
+          planes.derivatives(row.source);
+    }
+    amplitudes.push_back({expected.dot(seen) / information,
+                          std::max(field.scale, 1.0) / std::sqrt(information), std::move(by_planes)});
   }
   const double whole = amplitudes[static_cast<size_t>(&most - fields.data())].value;
   if (!(whole > 0.0)) return amplitudes;
   for (MotionAmplitude& amplitude : amplitudes)
-    amplitude = {amplitude.value / whole, amplitude.se / whole};
+    amplitude = {amplitude.value / whole, amplitude.se / whole, amplitude.by_planes / whole};
   return amplitudes;
 }
 

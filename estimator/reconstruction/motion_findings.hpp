@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "estimator/io/finding.hpp"
+#include "estimator/motion_residuals/tag_planes.hpp"
 #include "estimator/reconstruction/coverage.hpp"
 #include "estimator/reconstruction/slice_offsets.hpp"
 #include "estimator/reconstruction/volume_check.hpp"
@@ -20,9 +21,11 @@ namespace diastole {
 struct MotionAmplitude {
   double value = 0.0;
   double se = 0.0;
+  /// What one standard deviation of each of the tag planes' unknowns adds; the same unknown adds to all frames alike.
+  Eigen::VectorXd by_planes{};
 };
-std::vector<MotionAmplitude> motion_amplitudes(const FieldForms& forms,
-                                               const std::vector<FrameField>& fields);
+std::vector<MotionAmplitude> motion_amplitudes(const FieldForms& forms, const std::vector<FrameField>& fields,
+                                               const TagPlanes& planes);
 
 /// χ² of one tag direction in one frame, or in all of them.
 struct FamilyFit {

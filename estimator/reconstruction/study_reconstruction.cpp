@@ -77,7 +77,7 @@ void judge(StudyReconstruction& result, const Study& study, const Measurement& m
            const ReconstructionOptions& options) {
   const FieldForms& forms = *result.forms;
   result.groups = group_tags(measurement.tags);
-  result.amplitudes = motion_amplitudes(forms, result.fields);
+  result.amplitudes = motion_amplitudes(forms, result.fields, TagPlanes(measurement));
   result.families = family_fits(result.fields, result.groups, measurement.tags.size());
   result.slices = slice_offsets(result.fields, result.groups, measurement.tags);
   for (const FrameField& field : result.fields)

@@ -1,4 +1,4 @@
-#include "estimator/fit/tag_planes.hpp"
+#include "estimator/motion_residuals/tag_planes.hpp"
 
 #include <fmt/format.h>
 
