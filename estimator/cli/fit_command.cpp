@@ -183,14 +183,18 @@ ExitCode run_fit(const FitArguments& arguments, const CommandOutput& out) {
   } else {
     remark_on_imaged_load(study, "fit");
   }
+  // What is wrong with the loop is reported before images are tracked and data examined.
+  std::optional<WorkLoop> loop;
+  if (arguments.energy) loop = read_work_loop(*arguments.energy);
   const Measurement measurement = read_measurement(study);
+  StudyFitOptions options;
+  if (loop) options.work = measured_work(*loop, measurement, *arguments.energy);
   fmt::print(stderr, "Fitting {} in {} frames.\n",
              measurement.tags.empty() ? fmt::format("{} 3-D points", measurement.points.size())
                                       : fmt::format("{} tag points", measurement.tags.size()),
              measurement.frames.size());
   std::vector<Finding> findings = examined(arguments, study, measurement);
   if (has_error(findings)) return refuse_data(refused_fit(study, measurement, std::move(findings)), out);
-  StudyFitOptions options;
   options.iteration_limit = arguments.iteration_limit;
   options.robustness = arguments.robust == "yes"  ? Robustness::always
                        : arguments.robust == "no" ? Robustness::never
@@ -208,7 +212,6 @@ ExitCode run_fit(const FitArguments& arguments, const CommandOutput& out) {
   options.fibre_sigma_deg = arguments.fibre_sigma_deg;
   options.geometry_sigma_mm = arguments.geometry_sigma_mm;
   options.start = start_of(arguments, study);
-  options.work_loop = arguments.energy;
   options.profile = arguments.profile;
   if (arguments.pressure_offset_kPa > 0) options.pressure_offset_sigma_kPa = arguments.pressure_offset_kPa;
   if (arguments.posterior_draws > 0) {

@@ -368,9 +368,8 @@ std::vector<ConsideredError> considered_by(const Study& study, const ElasticMode
 }
 
 /// Throws InputError where the cavity's pressure is not all that works on the body, or frame 0 is not as the model takes it.
-std::optional<MeasuredWork> work_of(const Study& study, const ElasticModel& model,
-                                    const Measurement& measurement, const StudyFitOptions& options) {
-  if (!options.work_loop) return {};
+void require_takes_work(const Study& study, const ElasticModel& model, const StudyFitOptions& options) {
+  if (!options.work) return;
   if (study.imaged_at && !options.unload)
     refuse(study, "specimen.imaged_at_kPa",
            "the work of --energy is counted from the shape of the image, which was under load",
@@ -379,7 +378,6 @@ std::optional<MeasuredWork> work_of(const Study& study, const ElasticModel& mode
     refuse(study, "chamber", "the fluid around the specimen takes part of the work of --energy",
            "Leave --energy out.");
   require_closed_cavity(study, model);
-  return measured_work(read_work_loop(*options.work_loop), measurement, *options.work_loop);
 }
 
 }  // namespace
@@ -401,7 +399,7 @@ FitRecord fit_study(const Study& study, const Measurement& measurement, const St
   require_loaded_points(study, measurement);
   ElasticModel model = make_affected_model(study);
   require_cavity(study, model);
-  const std::optional<MeasuredWork> work = work_of(study, model, measurement, options);
+  require_takes_work(study, model, options);
   FitRecord record = head_of(study, measurement);
   record.unknowns = model.dofs();
 
@@ -418,7 +416,7 @@ FitRecord fit_study(const Study& study, const Measurement& measurement, const St
   fit_options.robustness = options.robustness;
   fit_options.pressure_offset_sigma_kPa = options.pressure_offset_sigma_kPa;
   fit_options.posterior = options.posterior;
-  fit_options.work = work;
+  fit_options.work = options.work;
   fit_options.search.interrupted = options.interrupted;
   if (options.profile) fit_options.profiled = whole_values(estimated);
   fit_options.search.iteration_limit = options.iteration_limit;
@@ -445,7 +443,7 @@ FitRecord fit_study(const Study& study, const Measurement& measurement, const St
   record_parameters(record, estimated, fit);
   record_frames(record, fit);
   if (auto* unloaded = dynamic_cast<UnloadedMotion*>(body.get())) record_unloading(record, *unloaded, fit);
-  if (work)
+  if (const auto& work = options.work)
     record.energy = FittedEnergy{work->frame, work->work_mJ, work->sigma_mJ, fit.stored_energy_mJ.value()};
   record.residuals = histogram_of(fit);
   for (std::string& remark : remarks_on(record, fit))

@@ -1,7 +1,6 @@
 #pragma once
 // `diastole fit`: from a study and its measurements to the record that is shown, kept and reported.
 
-#include <filesystem>
 #include <functional>
 
 #include "estimator/fit/fit.hpp"
@@ -20,8 +19,8 @@ struct StudyFitOptions {
   /// Standard deviations of errors that the whole body has alike (considered_errors.hpp); the estimate's errors then hold them.
   double fibre_sigma_deg = 0.0;
   double geometry_sigma_mm = 0.0;
-  /// The table of a loop of pressure against volume that was measured apart from the tags (work_energy.hpp).
-  std::optional<std::filesystem::path> work_loop = {};
+  /// By a loop of pressure against volume that was measured apart from the tags (work_energy.hpp).
+  std::optional<MeasuredWork> work = {};
   bool profile = false;  ///< profile intervals of whole parameters
   std::optional<PosteriorOptions> posterior = {};
   std::optional<FitRecord> start = {};  ///< an earlier result or a checkpoint to start from
@@ -39,7 +38,7 @@ LocatorOptions locator_for(const Specimen& specimen);
 
 /// Throws InputError for a start whose parameters are not the study's, for studies that cannot be modelled
 /// (study_model.hpp), hold no loaded point, or hardly one on the specimen (usable_points.hpp).
-/// Likewise for a loop that is none, or that the study's body cannot take.
+/// Likewise for a work that the study's body cannot take.
 /// Where the start values carry no equilibrium, the fit begins with a stiffer material and says so in a remark.
 /// Numerical trouble is reported by `converged` and `reason` of the record.
 FitRecord fit_study(const Study& study, const Measurement& measurement, const StudyFitOptions& options);

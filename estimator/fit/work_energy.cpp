@@ -127,6 +127,9 @@ WorkLoop read_work_loop(const std::filesystem::path& file) {
 MeasuredWork measured_work(const WorkLoop& loop, const Measurement& measurement,
                            const std::filesystem::path& file) {
   const std::vector<int> loaded = loaded_frames(measurement);
+  if (loaded.empty())
+    throw InputError({file.string(), "", "is of no use: no frame under load has points",
+                      "Give points of the frame up to which the pressure has done work."});
   const auto load = [&](int frame) { return measurement.frames[static_cast<size_t>(frame)]; };
   const int frame = *std::ranges::max_element(loaded, {}, [&](int f) { return load(f).pressure_kPa; });
   const double from_s = load(0).time_s, to_s = load(frame).time_s;

@@ -65,6 +65,21 @@ TEST_F(FitAndReport, JsonHoldsWhatTheContractSays) {
   EXPECT_GT(json.at("seconds").get<double>(), 0.0);
 }
 
+TEST_F(FitAndReport, AnEnergyFileThatIsNoLoopIsRefusedBeforeTheExamination) {
+  const std::string loop = folder_
+                               .write("loop.csv",
+                                      "phase_s,volume_mL,volume_sigma_mL,pressure_kPa,pressure_sigma_kPa\n"
+                                      "0.1,10,0.1,0.5,0.01\n0.2,11,0.1,1.0,0.01\n")
+                               .string();
+  const std::string gel = DIASTOLE_SOURCE_DIR "/examples/phantom-a.study.toml";
+  testing::internal::CaptureStderr();
+  const std::string message = message_of([&] {
+    (void)run({"fit", gel, "--mesh", "4,2,1", "--energy", loop});
+  });
+  EXPECT_THAT(testing::internal::GetCapturedStderr(), testing::Not(HasSubstr("Examining")));
+  EXPECT_THAT(message, HasSubstr("2 points are no loop"));
+}
+
 TEST_F(FitAndReport, AFitIsKeptAndReported) {
   const Outcome fit = run(quick_fit({"--set", "C1_kPa=9", "-o", file("fit.json")}));
   EXPECT_EQ(fit.code, ExitCode::done);
