@@ -18,15 +18,15 @@ using Eigen::Vector3d;
 
 constexpr double radians = std::numbers::pi / 180.0;
 
-/// Where the wall has a direction: beside a collapsed edge.
-Vector3d normal_at(const HermiteMesh& mesh, MaterialPoint point) {
+/// The point itself, or one within its element where it lies on a collapsed edge, on which the wall has no direction.
+MaterialPoint beside_collapse(const HermiteMesh& mesh, MaterialPoint point) {
   constexpr double least_relative_volume = 1e-6, beside = 0.02;
   const Eigen::Matrix3d tangents = mesh.xi_gradient(mesh.reference(), point);
   if (!(tangents.determinant() > least_relative_volume * std::pow(tangents.norm(), 3))) {
     for (double& xi : point.xi)
       xi = std::clamp(xi, beside, 1.0 - beside);
   }
-  return wall_axes(mesh, point).col(2);
+  return point;
 }
 
 using Turn = std::function<Eigen::AngleAxisd(const MaterialAxes& wall, const MaterialAxes& axes, double depth,
@@ -55,7 +55,7 @@ NodeField along_normals(const HermiteMesh& mesh, const std::function<double(doub
   constexpr double step = 1e-3;
   const std::vector<double> depths = NodalLines(mesh).depths();
   const auto value = [&](const MaterialPoint& point) {
-    return Vector3d(weight(between_nodes(mesh, depths, point)) * normal_at(mesh, point));
+    return Vector3d(weight(between_nodes(mesh, depths, point)) * wall_axes(mesh, point).col(2));
   };
   NodeField sum(mesh.reference().size(), 0.0);
   std::vector<double> meeting(mesh.node_count(), 0.0);
@@ -65,10 +65,11 @@ NodeField along_normals(const HermiteMesh& mesh, const std::function<double(doub
       MaterialPoint at{e, {}};
       for (size_t k = 0; k < 3; ++k)
         at.xi[k] = static_cast<double>(c >> k & 1);
-      const Vector3d here = value(at);
+      const MaterialPoint corner = beside_collapse(mesh, at);
+      const Vector3d here = value(corner);
       Eigen::Map<Vector3d>(&sum[dof_of(node, 0, 0)]) += here;
       for (size_t k = 0; k < 3; ++k) {
-        MaterialPoint inside = at;
+        MaterialPoint inside = corner;
         const double inwards = at.xi[k] == 0.0 ? step : -step;
         inside.xi[k] += inwards;
         const size_t derivative = size_t{1} << k;
