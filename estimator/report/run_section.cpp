@@ -27,7 +27,7 @@ constexpr size_t loop_frames = 60;  // windows of a pressure-volume loop
 constexpr size_t most_plotted_segments = 6;
 // A browser draws this many samples of a trace without delay; longer runs show every n-th.
 constexpr size_t most_chart_samples = 120'000;
-constexpr size_t most_page_samples = 2 * most_chart_samples;  // ... and a page of that many all its traces
+constexpr size_t most_page_samples = 180'000;  // ... and a page of that many all its traces
 
 std::vector<double> segment_triggers(const RecordedRun& run, const Segment& segment) {
   constexpr double slack_s = 1e-3;
