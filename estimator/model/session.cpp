@@ -76,6 +76,9 @@ SessionRun session_run(RecordedRun&& run, const std::string& name) {
   read.drive.place.started_s = seconds_of(run.started_utc);
   read.drive.place.trigger_s = run.trigger_s;
   read.drive.place.atmosphere_kPa = attribute(run, "atmospheric_kPa", 101.325);
+  const double steps_a_turn = attribute(run, "microsteps", 0) * attribute(run, "steps_per_rev", 0);
+  if (const double turn_mL = steps_a_turn * attribute(run, "volume_per_step_mL", 0); turn_mL > 0)
+    read.drive.place.turn_mL = turn_mL;
   read.volumes = volumes_of(run);
   read.segments = run.segments;
   for (const runfile::Segment& segment : run.segments)

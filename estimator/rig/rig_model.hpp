@@ -43,6 +43,8 @@ struct RunPlace {
   double largest_before_mL = 0.0;  ///< commanded in them
   std::vector<double> trigger_s;   ///< the cycles' starts
   double atmosphere_kPa = 101.325;
+  double turn_mL =
+      12.467;  ///< that a turn of the pump's screw displaces: 10 cm bore, 6.3 turns a centimetre (the paper's)
 };
 
 /// Cycles of a session at a time of one of its runs.

@@ -10,8 +10,6 @@
 namespace diastole::rig {
 namespace {
 
-/// Volume that a turn of the paper's screw displaces: 10 cm bore, 6.3 turns a centimetre.
-constexpr double turn_mL = std::numbers::pi * 25.0 / 6.3;
 /// Volume at which a specimen's curve is compared with another's.
 constexpr double usual_mL = 36.0;
 
@@ -26,8 +24,8 @@ double positive(double value, double rounding) {
 template <bool sine>
 void add_screw_error(double size_mL, const EffectContext&, RigModel& model) {
   if (size_mL == 0.0) return;
-  model.drive.emplace_back([=](DriveTrace& trace, const RunPlace&) {
-    constexpr double per_mL = 2.0 * std::numbers::pi / turn_mL;
+  model.drive.emplace_back([=](DriveTrace& trace, const RunPlace& place) {
+    const double per_mL = 2.0 * std::numbers::pi / place.turn_mL;
     for (size_t k = 0; k < trace.volume_mL.size(); ++k) {
       const double angle = per_mL * trace.volume_mL[k];
       const double flow = trace.flow_mL_per_s[k];

@@ -117,6 +117,52 @@ TEST(SessionProblem, ItsSlopesAreTheDifferencesOfShortSteps) {
   }
 }
 
+TEST(Tolerances, MoveThePistonByMotionsWhoseDerivativesTheyKnow) {
+  const SpecimenFamily family = gel_family();
+  size_t of_drive = 0;
+  for (const Tolerance& tolerance : all_tolerances()) {
+    RigModel model;
+    model.curve = family.plain();
+    tolerance.apply(tolerance.sd, {family, {}, true}, model);
+    for (const auto& change : model.drive) {
+      DriveTrace trace{0.0, 1e-3, {}, {}, {}};
+      for (int k = 0; k < 2000; ++k) {
+        const double angle = std::numbers::pi * trace.step_s * k;
+        trace.volume_mL.push_back(20.0 * (1.0 - std::cos(angle)));
+        trace.flow_mL_per_s.push_back(20.0 * std::numbers::pi * std::sin(angle));
+        trace.acceleration_mL_per_s2.push_back(20.0 * std::pow(std::numbers::pi, 2) * std::cos(angle));
+      }
+      const DriveTrace before = trace;
+      change(trace, {});
+      EXPECT_NE(trace.volume_mL, before.volume_mL) << tolerance.name;
+      DriveTrace differences = trace;
+      differences.differentiate();
+      for (size_t k = 10; k + 10 < trace.volume_mL.size(); ++k) {
+        EXPECT_NEAR(trace.flow_mL_per_s[k], differences.flow_mL_per_s[k], 0.01) << tolerance.name;
+        EXPECT_NEAR(trace.acceleration_mL_per_s2[k], differences.acceleration_mL_per_s2[k], 0.1)
+            << tolerance.name;
+      }
+      ++of_drive;
+    }
+  }
+  EXPECT_EQ(of_drive, 3U);  // the stroke, and the two parts of the screw's error
+}
+
+TEST(Tolerances, OfTheScrewHaveItsOwnTurn) {
+  const SpecimenFamily family = gel_family();
+  const auto sine = std::ranges::find(all_tolerances(), std::string_view("screw_sine"), &Tolerance::name);
+  RigModel model;
+  model.curve = family.plain();
+  sine->apply(0.02, {family, {}, true}, model);
+  DriveTrace trace{0.0, 1e-3, {0.0, 2.0, 4.0, 8.0}, std::vector<double>(4), std::vector<double>(4)};
+  RunPlace place;
+  place.turn_mL = 8.0;
+  model.drive.front()(trace, place);
+  const std::vector<double> expected{0.0, 2.02, 4.0, 8.0};
+  for (size_t k = 0; k < expected.size(); ++k)
+    EXPECT_NEAR(trace.volume_mL[k], expected[k], 1e-12);
+}
+
 TEST(SimulatedPlant, CopiesCyclesThatRepeatThemselves) {
   const SpecimenFamily family = gel_family();
   RigModel model;
