@@ -6,6 +6,7 @@
 #include <tuple>
 
 #include "estimator/motion_residuals/tag_match.hpp"
+#include "estimator/parallel/parallel_for.hpp"
 #include "protocol/signal/median.hpp"
 
 namespace diastole {
@@ -53,17 +54,16 @@ class FrameData {
   }
 
   /// Observations linearised about the field's motion, and the field's rows with residuals there.
-  std::vector<ObservationRow> linearise(FrameField& field) const {
+  std::vector<ObservationRow> linearise(FrameField& field) {
+    match_tags(field.position_mm);
     std::vector<ObservationRow> observations;
     field.rows.clear();
     field.tags_not_found.clear();
     field.points_not_found = points_not_found_;
-    const PointLocator deformed(mesh_, field.position_mm, options_);
-    for (const size_t i : tags_) {
+    for (size_t n = 0; n < tags_.size(); ++n) {
+      const size_t i = tags_[n];
       const TagPoint& tag = measurement_.tags[i];
-      const auto guess = find_tag(deformed, tag);
-      const auto match =
-          guess ? match_tag(reference_, deformed.elements(), tag, *guess) : std::optional<TagMatch>{};
+      const std::optional<TagMatch>& match = matches_[n];
       if (!match) {
         field.tags_not_found.push_back(i);
         continue;
@@ -92,11 +92,25 @@ class FrameData {
   }
 
  private:
+  /// Each tag from where the last motion had it, or else from its seen place.
+  void match_tags(const NodeField& position_mm) {
+    const PointLocator deformed(mesh_, position_mm, options_);
+    matches_.resize(tags_.size());
+    parallel_for(tags_.size(), machine_threads(), [&](size_t n) {
+      const TagPoint& tag = measurement_.tags[tags_[n]];
+      if (matches_[n]) matches_[n] = match_tag(reference_, deformed.elements(), tag, matches_[n]->point);
+      if (matches_[n]) return;
+      if (const auto guess = find_tag(deformed, tag))
+        matches_[n] = match_tag(reference_, deformed.elements(), tag, *guess);
+    });
+  }
+
   const HermiteMesh& mesh_;
   const Measurement& measurement_;
   LocatorOptions options_;
   PointLocator reference_;
   std::vector<size_t> tags_;
+  std::vector<std::optional<TagMatch>> matches_;
   std::vector<std::pair<size_t, MaterialPoint>> points_;
   std::vector<size_t> points_not_found_;
 };
@@ -218,7 +232,7 @@ double robust_spread(std::vector<double> values) {
 FrameField reconstruct_frame(const FieldForms& forms, const Measurement& measurement, int frame,
                              const FrameOptions& options) {
   const FieldSpace& space = forms.space;
-  const FrameData data(space.mesh(), measurement, frame, options.locator);
+  FrameData data(space.mesh(), measurement, frame, options.locator);
   FrameField field;
   field.number = frame;
   field.load = measurement.frames[static_cast<size_t>(frame)];

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "estimator/parallel/serial_openmp.hpp"
+
 namespace diastole {
 namespace {
 
@@ -68,6 +70,7 @@ const Eigen::SparseMatrix<double, Eigen::RowMajor>& SmoothedSystem::weighted_row
 }
 
 void SmoothedSystem::factorise_values(QuadraticForms::Values values) {
+  keep_openmp_serial();
   Eigen::SparseMatrix<double> matrix = forms_.quadratic.matrix(values);
   if (!analysed_) factor_.analyzePattern(matrix);
   analysed_ = true;

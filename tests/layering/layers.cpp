@@ -131,7 +131,7 @@ const std::vector<Rule>& rules() {
         "estimator/mesh", "estimator/model", "estimator/motion_residuals", "estimator/solution"}},
       {"estimator/reconstruction",
        {"protocol/contract", "protocol/signal", "estimator/fe", "estimator/io", "estimator/mesh",
-        "estimator/model", "estimator/motion_residuals", "estimator/solution"}},
+        "estimator/model", "estimator/motion_residuals", "estimator/parallel", "estimator/solution"}},
       {"estimator/montecarlo",
        {"protocol/contract", "estimator/fit", "estimator/inference", "estimator/io", "estimator/mesh",
         "estimator/model", "estimator/motion_residuals"}},
