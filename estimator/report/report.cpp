@@ -86,8 +86,9 @@ std::string make_report(std::span<const std::filesystem::path> files, size_t fra
       add(Kind::table, saved_table(content, name), add_montecarlo);
     } else if (!is_json_object(content)) {
       throw InputError({name, "",
-                        "is neither a run file nor a fit result, a Monte Carlo table, an explanation, a "
-                        "reconstruction, a solution or a shear test",
+                        std::string(content.empty() ? "is empty, " : "is ") +
+                            "neither a run file nor a fit result, a Monte Carlo table, an explanation, a "
+                            "reconstruction, a solution or a shear test",
                         "Give files that `diastole run`, `diastole simulate`, `diastole fit -o`, `diastole "
                         "explain -o`, `diastole montecarlo --cells`, `diastole reconstruct -o NAME.json` or "
                         "`diastole solve -o NAME.json` wrote, or the CSV that `diastole shear` reads."});

@@ -99,11 +99,9 @@ void bids_table(const runfile::RunFile& file, const std::function<void(std::stri
   });
 }
 
-void write_bids_table(const runfile::RunFile& file, const std::filesystem::path& table) {
-  const auto must = [&](bool done) {
-    if (!done)
-      throw HardwareError(table.string(), "cannot be written",
-                          "Check the disk's space and your rights there.");
+void write_bids_table(const runfile::RunFile& file, const std::filesystem::path& table) try {
+  const auto must = [](bool done) {
+    if (!done) throw std::filesystem::filesystem_error("cannot be written", std::error_code());
   };
   write_whole(table, [&](const std::filesystem::path& part) {
     const std::unique_ptr<gzFile_s, int (*)(gzFile)> opened(gzopen(part.c_str(), "wb"), gzclose);
@@ -113,6 +111,8 @@ void write_bids_table(const runfile::RunFile& file, const std::filesystem::path&
     });
     must(gzflush(opened.get(), Z_FINISH) == Z_OK);
   });
+} catch (const std::filesystem::filesystem_error&) {
+  throw HardwareError(table.string(), "cannot be written", "Check the disk's space and your rights there.");
 }
 
 }  // namespace diastole

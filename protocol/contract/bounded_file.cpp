@@ -14,8 +14,10 @@ std::string read_bounded_file(const std::filesystem::path& path, uint64_t most_b
                               const std::string& remedy) {
   std::ifstream stream(path, std::ios::binary);
   std::error_code ignored;
-  if (!stream || std::filesystem::is_directory(path, ignored))
-    throw InputError({path.string(), "", "cannot be opened", remedy});
+  const bool is_folder = std::filesystem::is_directory(path, ignored);
+  if (!stream || is_folder)
+    throw InputError(
+        {path.string(), "", is_folder ? "cannot be opened: it is a folder" : "cannot be opened", remedy});
   const auto too_long = [&](const std::string& bytes) {
     throw InputError(
         {path.string(), "",

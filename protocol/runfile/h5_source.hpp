@@ -33,7 +33,8 @@ class H5Source {
     H5Eset_auto2(H5E_DEFAULT, nullptr,
                  nullptr);  // failures are reported by fail(), not printed by the library
     if (!std::filesystem::is_regular_file(path)) {
-      fail("", "cannot be opened", "Check the path and that you may read the file.");
+      fail("", std::filesystem::is_directory(path) ? "cannot be opened: it is a folder" : "cannot be opened",
+           "Check the path and that you may read the file.");
     }
     if (H5Fis_hdf5(name_.c_str()) <= 0) {
       fail("", "is not an HDF5 file", "Give a run file (NAME.run.h5).");
