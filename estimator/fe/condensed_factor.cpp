@@ -195,26 +195,18 @@ bool CondensedFactor::factorise(std::vector<double>& matrix) {
 size_t CondensedFactor::entries() const { return factor_->xsize; }
 
 void CondensedFactor::add_pull(const MatrixXd& pressures, MatrixXd& displacements) const {
-  Eigen::VectorXd pressing, pull;
   for (size_t g = 0; g < coupling_.size(); ++g) {
     const CondensedPattern::Group& group = pattern_->groups_[g];
-    for (Index column = 0; column < pressures.cols(); ++column) {
-      pressing = pressures.col(column)(group.pressures);
-      pull.noalias() = coupling_[g].transpose() * pressing;
-      displacements.col(column)(group.displacements) += pull;
-    }
+    const MatrixXd pressing = pressures(group.pressures, Eigen::all);
+    displacements(group.displacements, Eigen::all) += coupling_[g].transpose() * pressing;
   }
 }
 
 void CondensedFactor::add_growth(const MatrixXd& displacements, MatrixXd& pressures) const {
-  Eigen::VectorXd moved, growth;
   for (size_t g = 0; g < coupling_.size(); ++g) {
     const CondensedPattern::Group& group = pattern_->groups_[g];
-    for (Index column = 0; column < pressures.cols(); ++column) {
-      moved = displacements.col(column)(group.displacements);
-      growth.noalias() = coupling_[g] * moved;
-      pressures.col(column)(group.pressures) += growth;
-    }
+    const MatrixXd moved = displacements(group.displacements, Eigen::all);
+    pressures(group.pressures, Eigen::all) += coupling_[g] * moved;
   }
 }
 

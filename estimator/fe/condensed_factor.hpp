@@ -32,9 +32,6 @@ class CondensedPattern {
   CondensedPattern(const CondensedPattern&) = delete;
   CondensedPattern& operator=(const CondensedPattern&) = delete;
 
-  /// Numbers that a factor will have.
-  [[nodiscard]] size_t factor_entries() const { return ordering_->xsize; }
-
  private:
   friend class CondensedFactor;
 
@@ -67,7 +64,6 @@ class CondensedPattern {
 class CondensedFactor {
  public:
   /// `values` of the pattern's triplets. None if the condensed matrix is not positive definite beyond rounding.
-  /// Several may be made at the same time.
   static std::shared_ptr<const CondensedFactor> of(std::shared_ptr<const CondensedPattern> pattern,
                                                    std::span<const double> values);
   ~CondensedFactor();
@@ -87,8 +83,9 @@ class CondensedFactor {
   void condense(std::span<const double> values, std::vector<double>& matrix);
   bool factorise(std::vector<double>& matrix);
   void solve_corrected(std::span<double> right_sides, size_t count, int corrections) const;
-  /// target += B' source, or B source.
+  /// displacements += B' pressures.
   void add_pull(const Eigen::MatrixXd& pressures, Eigen::MatrixXd& displacements) const;
+  /// pressures += B displacements.
   void add_growth(const Eigen::MatrixXd& displacements, Eigen::MatrixXd& pressures) const;
   [[nodiscard]] Eigen::MatrixXd solve_condensed(Eigen::MatrixXd right_sides) const;
 

@@ -58,55 +58,31 @@ void ElasticModel::judge_end(Solution& path, const Load& load, double start_kPa)
   report.beyond_law.reset();
 }
 
-std::vector<double> ElasticModel::right_sides(const ElasticState& state,
-                                              std::span<const ParameterGroup> groups) const {
-  const size_t unknowns = dofs();
-  std::vector<double> columns((groups.size() + 1) * unknowns, 0.0);
-  std::ranges::copy(system_->cavity_area(state), columns.begin());
-  for (size_t g = 0; g < groups.size(); ++g) {
-    const std::span column = std::span(columns).subspan((g + 1) * unknowns, unknowns);
-    system_->add_parameter_residual(state, groups[g].parameter, groups[g].elements, column);
-    for (double& value : column)
-      value = -value;
-  }
-  return columns;
-}
-
-Sensitivities ElasticModel::as_fields(std::span<const double> columns) const {
-  Sensitivities result;
-  result.pressure = system_->node_field(columns.first(dofs()));
-  for (size_t first = dofs(); first < columns.size(); first += dofs())
-    result.parameter.push_back(system_->node_field(columns.subspan(first, dofs())));
-  return result;
-}
-
 Sensitivities ElasticModel::sensitivities(const ElasticState& at, std::span<const ParameterGroup> groups) {
   ElasticState state = at;
   state.held_volume_mm3.reset();
-  std::vector<double> columns = right_sides(state, groups);
-  size_t negative_pivots = 0;
-  if (!system_->rim_skew().empty()) negative_pivots = system_->stability(state).negative_pivots;
+  const size_t unknowns = dofs();
+  std::vector<double> right_sides((groups.size() + 1) * unknowns, 0.0);
+  const auto column = [&](size_t number) {
+    return std::span(right_sides).subspan(number * unknowns, unknowns);
+  };
+  const std::vector<double> area = system_->cavity_area(state);
+  std::copy(area.begin(), area.end(), right_sides.begin());
+  for (size_t g = 0; g < groups.size(); ++g) {
+    system_->add_parameter_residual(state, groups[g].parameter, groups[g].elements, column(g + 1));
+    for (double& value : column(g + 1))
+      value = -value;
+  }
+  Sensitivities result;
+  if (!system_->rim_skew().empty()) result.negative_pivots = system_->stability(state).negative_pivots;
   const FactorResult factor = system_->factorise(state);
   if (factor.singular) throw std::domain_error("an equilibrium with a singular tangent has no derivatives");
-  if (system_->rim_skew().empty()) negative_pivots = factor.negative_pivots;
-  system_->solve(columns, groups.size() + 1);
-  Sensitivities result = as_fields(columns);
-  result.negative_pivots = negative_pivots;
-  result.factor = system_->kept_factor();
+  if (system_->rim_skew().empty()) result.negative_pivots = factor.negative_pivots;
+  system_->solve(right_sides, groups.size() + 1);
+  result.pressure = system_->node_field(column(0));
+  for (size_t g = 0; g < groups.size(); ++g)
+    result.parameter.push_back(system_->node_field(column(g + 1)));
   return result;
-}
-
-std::vector<Sensitivities> ElasticModel::sensitivities(std::span<const ElasticState* const> states,
-                                                       std::span<const ParameterGroup> groups) {
-  constexpr size_t most_entries_kept = 100'000'000;  // 0.8 GB
-  std::vector<Sensitivities> all;
-  const bool fit_in =
-      system_->may_condense() && states.size() * system_->condensed_entries() <= most_entries_kept;
-  for (const ElasticState* state : states) {
-    all.push_back(sensitivities(*state, groups));
-    if (!fit_in) all.back().factor.reset();
-  }
-  return all;
 }
 
 double ElasticModel::cavity_volume_mL(const ElasticState& state) const {

@@ -40,10 +40,9 @@ std::vector<ParameterGroup> each_element(size_t parameter, size_t element_count)
 /// Derivatives of the equilibrium at one state. All are node fields like ElasticState::position_mm, in mm per
 /// unit of the parameter (or per kPa of cavity pressure); zero at held dofs.
 struct Sensitivities {
-  std::vector<NodeField> parameter;               ///< one for each group asked for
-  NodeField pressure;                             ///< dx/dP
-  size_t negative_pivots = 0;                     ///< of the tangent at this state
-  std::shared_ptr<const CondensedFactor> factor;  ///< of that tangent, if it can be kept
+  std::vector<NodeField> parameter;  ///< one for each group asked for
+  NodeField pressure;                ///< dx/dP
+  size_t negative_pivots = 0;        ///< of the tangent at this state
 };
 
 class ElasticModel {
@@ -85,10 +84,6 @@ class ElasticModel {
   [[nodiscard]] Sensitivities sensitivities(const ElasticState& state,
                                             std::span<const ParameterGroup> groups);
 
-  /// The same at several states; their factors are kept where memory allows.
-  [[nodiscard]] std::vector<Sensitivities> sensitivities(std::span<const ElasticState* const> states,
-                                                         std::span<const ParameterGroup> groups);
-
   [[nodiscard]] double cavity_volume_mL(const ElasticState& state) const;
   /// dP/dV of the closed cavity at an equilibrium; negative beyond a pressure maximum. None if the tangent at held volume
   /// is singular.
@@ -102,10 +97,6 @@ class ElasticModel {
 
  private:
   void judge_end(Solution& path, const Load& load, double start_kPa);
-  /// Minus the derivatives of the residual, a column each: by the pressure and by each group.
-  [[nodiscard]] std::vector<double> right_sides(const ElasticState& state,
-                                                std::span<const ParameterGroup> groups) const;
-  [[nodiscard]] Sensitivities as_fields(std::span<const double> columns) const;
 
   std::unique_ptr<ElasticSystem> system_;
   SolveOptions solve_options_;

@@ -134,15 +134,6 @@ class ElasticSystem {
   /// Assembles and factorises the tangent; solve() uses it until the next call.
   FactorResult factorise(const ElasticState& state);
   void solve(std::span<double> right_sides, size_t count = 1) { factor_.solve(right_sides, count); }
-  /// Whether `condensed_factor` may be asked for.
-  bool may_condense() { return factor_.may_condense(); }
-  /// The factor of a state's tangent for itself; none where the state is not stable. Several may be made at the same time.
-  /// Precondition: may_condense(), and the cavity's volume is not held.
-  [[nodiscard]] std::shared_ptr<const CondensedFactor> condensed_factor(const ElasticState& state) const {
-    return factor_.condensed(tangent(state));
-  }
-  [[nodiscard]] size_t condensed_entries() const { return factor_.condensed_entries(); }
-  [[nodiscard]] size_t threads() const { return threads_; }
   /// The factor that solve() uses, for later; none where it cannot be kept (tangent_factor.hpp).
   [[nodiscard]] std::shared_ptr<const CondensedFactor> kept_factor() const { return factor_.kept(); }
   /// Lets solve() use it, until the next factorisation.

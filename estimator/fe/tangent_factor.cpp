@@ -49,15 +49,9 @@ bool TangentFactor::may_condense() {
   return may_condense_;
 }
 
-std::shared_ptr<const CondensedFactor> TangentFactor::condensed(std::span<const double> values) const {
-  return CondensedFactor::of(pattern_, values);
-}
-
-size_t TangentFactor::condensed_entries() const { return pattern_->factor_entries(); }
-
 FactorResult TangentFactor::factorise_symmetric(std::span<double> values, bool cavity_held) {
   condensed_.reset();
-  if (!cavity_held && may_condense()) condensed_ = condensed(values);
+  if (!cavity_held && may_condense()) condensed_ = CondensedFactor::of(pattern_, values);
   if (condensed_) return {.singular = false, .negative_pivots = equations_->pressure_unknowns()};
   std::unique_ptr<SparseFactor>& factor = cavity_held ? volume_given_ : pressure_given_;
   if (!factor) {

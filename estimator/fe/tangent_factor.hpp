@@ -63,20 +63,14 @@ class TangentFactor {
   /// Numbers stored in the last factor; 0 before there is one.
   [[nodiscard]] size_t entries() const;
 
-  /// Whether tangents of given cavity pressure have a pattern that can be condensed.
-  bool may_condense();
-  /// A factor of its own, or none where the tangent is not that of a stable equilibrium. Several may be made at the same time.
-  /// Precondition: may_condense().
-  [[nodiscard]] std::shared_ptr<const CondensedFactor> condensed(std::span<const double> values) const;
-  /// Numbers in such a factor.
-  [[nodiscard]] size_t condensed_entries() const;
-
   /// The factor that solve() uses, to be used again later; none if it is not condensed.
   [[nodiscard]] std::shared_ptr<const CondensedFactor> kept() const { return condensed_; }
   /// Lets solve() use a factor that was kept until the next call of another function.
   void use(std::shared_ptr<const CondensedFactor> factor) { condensed_ = std::move(factor); }
 
  private:
+  /// Whether tangents of given cavity pressure have a pattern that can be condensed.
+  bool may_condense();
   void prepare_general();
 
   const EquationSystem* equations_;

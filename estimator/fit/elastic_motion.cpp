@@ -6,6 +6,11 @@
 #include "estimator/mesh/node_field.hpp"
 
 namespace diastole {
+namespace {
+
+constexpr size_t most_entries_kept = 100'000'000;  // of all slots' factors: 0.8 GB
+
+}  // namespace
 
 void ElasticMotion::set_values(ElasticModel& model, const std::vector<ParameterGroup>& groups,
                                std::span<const double> values) {
@@ -25,28 +30,14 @@ std::optional<std::string> ElasticMotion::set_values(std::span<const double> val
   return {};
 }
 
-std::vector<ElasticMotion::StateDerivatives> ElasticMotion::derivatives_at(
-    std::span<const ElasticState* const> states) {
-  std::vector<StateDerivatives> derivatives;
-  for (Sensitivities& by : model_.sensitivities(states, groups_))
-    derivatives.push_back({{std::move(by.parameter), std::move(by.pressure), {}}, std::move(by.factor)});
-  return derivatives;
+MotionDerivatives ElasticMotion::derivatives_at(const ElasticState& state) {
+  Sensitivities by = model_.sensitivities(state, groups_);
+  return {std::move(by.parameter), std::move(by.pressure)};
 }
 
-void ElasticMotion::find_derivatives(const std::vector<double>& values) {
-  std::vector<Slot*> wanted;
-  std::vector<const ElasticState*> states;
-  for (std::optional<Slot>& slot : slots_) {
-    if (!slot || slot->derivatives || slot->values != values) continue;
-    wanted.push_back(&*slot);
-    states.push_back(&slot->state);
-  }
-  (void)set_values(values);
-  std::vector<StateDerivatives> found = derivatives_at(states);
-  for (size_t i = 0; i < wanted.size(); ++i) {
-    wanted[i]->derivatives = std::move(found[i].motion);
-    wanted[i]->factor = std::move(found[i].factor);
-  }
+std::shared_ptr<const CondensedFactor> ElasticMotion::factor_to_keep() {
+  const bool fit_in = slots_.size() * model_.system().factor_entries() <= most_entries_kept;
+  return fit_in ? model_.system().kept_factor() : nullptr;
 }
 
 // The slot itself, or on its first use the solved one of the nearest pressure.
@@ -98,7 +89,11 @@ MotionOutcome ElasticMotion::solve(size_t slot, std::span<const double> values, 
 
 MotionDerivatives ElasticMotion::derivatives(size_t slot) {
   Slot& solved = slots_.at(slot).value();
-  if (!solved.derivatives) find_derivatives(std::vector(solved.values));
+  if (!solved.derivatives) {
+    (void)set_values(solved.values);
+    solved.derivatives = derivatives_at(solved.state);
+    solved.factor = factor_to_keep();
+  }
   MotionDerivatives seen = *solved.derivatives;
   if (displacement_gain_ == 1.0) return seen;
   for (NodeField& field : seen.by_value)

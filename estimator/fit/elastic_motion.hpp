@@ -38,12 +38,8 @@ class ElasticMotion : public MotionModel {
  protected:
   /// Makes the model that of these values; why not, if there is none.
   virtual std::optional<std::string> set_values(std::span<const double> values);
-  struct StateDerivatives {
-    MotionDerivatives motion;
-    std::shared_ptr<const CondensedFactor> factor;  ///< of the tangent there, if it can be kept
-  };
-  /// At equilibria of the model as it stands; of the motion itself, not of what images show.
-  virtual std::vector<StateDerivatives> derivatives_at(std::span<const ElasticState* const> states);
+  /// At an equilibrium of the model as it stands; of the motion itself, not of what images show.
+  virtual MotionDerivatives derivatives_at(const ElasticState& state);
   /// At an equilibrium of the model as it stands: stored since frame 0, and its derivatives, those of the motion being given.
   [[nodiscard]] virtual double stored_at(const ElasticState& state) const {
     return model_.stored_energy_mJ(state) - model_.stored_energy_mJ(model_.rest_state());
@@ -68,8 +64,8 @@ class ElasticMotion : public MotionModel {
     std::shared_ptr<const CondensedFactor> factor;  // of the last tangent that derivatives were made with
   };
 
-  /// Of all slots that were solved with these values and have none.
-  void find_derivatives(const std::vector<double>& values);
+  /// Of the tangent that derivatives were made with; none where all slots' would take too much memory.
+  [[nodiscard]] std::shared_ptr<const CondensedFactor> factor_to_keep();
   [[nodiscard]] const Slot* nearest(size_t slot, double pressure_kPa) const;
   [[nodiscard]] Solution solve_from(const Slot* start, std::span<const double> values, double pressure_kPa);
 

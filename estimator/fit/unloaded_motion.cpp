@@ -34,14 +34,6 @@ std::optional<std::string> UnloadedMotion::set_values(std::span<const double> va
   return {};
 }
 
-std::vector<ElasticMotion::StateDerivatives> UnloadedMotion::derivatives_at(
-    std::span<const ElasticState* const> states) {
-  std::vector<StateDerivatives> derivatives;
-  for (const ElasticState* state : states)
-    derivatives.push_back({derivatives_at(*state), changed_model().system().kept_factor()});
-  return derivatives;
-}
-
 MotionDerivatives UnloadedMotion::derivatives_at(const ElasticState& state) {
   if (!shape_derivatives_) shape_derivatives_ = inverse_.derivatives(*shape_, groups());
   ElasticSystem& system = changed_model().system();

@@ -36,7 +36,7 @@ class UnloadedMotion : public ElasticMotion {
 
  protected:
   std::optional<std::string> set_values(std::span<const double> values) override;
-  std::vector<StateDerivatives> derivatives_at(std::span<const ElasticState* const> states) override;
+  MotionDerivatives derivatives_at(const ElasticState& state) override;
   [[nodiscard]] double stored_at(const ElasticState& state) const override;
   /// By differences along the shape's own derivatives.
   EnergyDerivatives energy_derivatives_at(const ElasticState& state, std::span<const double> values,
@@ -44,8 +44,6 @@ class UnloadedMotion : public ElasticMotion {
   [[nodiscard]] ElasticState first_state() const override { return shape_->imaged; }
 
  private:
-  MotionDerivatives derivatives_at(const ElasticState& state);
-
   ElasticModel imaged_;
   ImagedLoad load_;
   double pressure_kPa_;
