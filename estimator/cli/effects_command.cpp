@@ -55,7 +55,7 @@ void print_for_people(const Effect& effect) {
   if (!text.conflicts.empty()) fmt::print("  Looks alike  {}\n", joined(text.conflicts));
   if (!text.synergies.empty()) fmt::print("  Shows with   {}\n", joined(text.synergies));
   print_for_people("Parameters", effect.parameters());
-  print_for_people("Parameters in images", effect.field_parameters());
+  print_for_people(fmt::format("Parameters in {}", name_of(text.field_specimen)), effect.field_parameters());
 }
 
 struct StoppedTrial {};

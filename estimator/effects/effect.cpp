@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <iterator>
 
 namespace diastole {
 
@@ -17,11 +18,11 @@ std::vector<double> neutral_values(std::span<const EffectParameter> parameters) 
   return values;
 }
 
-std::vector<const Effect*> those_with(std::span<const EffectParameter> (Effect::*parameters)() const) {
-  std::vector<const Effect*> shown;
-  for (const Effect* effect : all_effects())
-    if (!(effect->*parameters)().empty()) shown.push_back(effect);
-  return shown;
+template <class Shown>
+std::vector<const Effect*> those_that(Shown shown) {
+  std::vector<const Effect*> those;
+  std::ranges::copy_if(all_effects(), std::back_inserter(those), shown);
+  return those;
 }
 
 }  // namespace
@@ -29,6 +30,13 @@ std::vector<const Effect*> those_with(std::span<const EffectParameter> (Effect::
 std::string_view name_of(Port port) {
   constexpr std::array<std::string_view, 5> names{"drive", "specimen", "sensor", "clock", "field"};
   return names[static_cast<size_t>(port)];
+}
+
+std::string_view name_of(FieldSpecimen specimen) {
+  constexpr std::array<std::string_view, 5> names{
+      "images of gel", "images", "images of other specimens than gel", "images of specimens with fibres",
+      "images of specimens held at one end"};
+  return names[static_cast<size_t>(specimen)];
 }
 
 bool Effect::fits(const rig::SpecimenCurves& family) const {
@@ -59,12 +67,23 @@ const std::vector<const Effect*>& all_effects() {
 }
 
 const std::vector<const Effect*>& rig_effects() {
-  static const std::vector<const Effect*> list = those_with(&Effect::parameters);
+  static const std::vector<const Effect*> list = those_that([](const Effect* effect) { return !effect->parameters().empty(); });
   return list;
 }
 
 const std::vector<const Effect*>& field_effects() {
-  static const std::vector<const Effect*> list = those_with(&Effect::field_parameters);
+  static const std::vector<const Effect*> list = those_that([](const Effect* effect) {
+    const FieldSpecimen specimen = effect->text().field_specimen;
+    return !effect->field_parameters().empty() &&
+           (specimen == FieldSpecimen::gel || specimen == FieldSpecimen::any);
+  });
+  return list;
+}
+
+const std::vector<const Effect*>& specimen_effects() {
+  static const std::vector<const Effect*> list = those_that([](const Effect* effect) {
+    return !effect->field_parameters().empty() && effect->text().field_specimen != FieldSpecimen::gel;
+  });
   return list;
 }
 

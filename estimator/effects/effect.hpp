@@ -80,6 +80,12 @@ struct FieldDirection {
 /// parameters are those of stiff_inclusion.cpp in their order.
 enum class FieldShape { round, inclusion };
 
+/// Specimens that can have a field effect: gel is the neo-Hookean annulus between held plates, other is any other specimen that
+/// `fit` takes; fibred and hung are others with fibres and with one held end.
+enum class FieldSpecimen { gel, any, other, fibred, hung };
+/// "images of specimens with fibres"
+std::string_view name_of(FieldSpecimen specimen);
+
 /// One number a parameter, in their order.
 using EffectValues = std::span<const double>;
 
@@ -112,6 +118,7 @@ struct EffectDeclaration {
   /// Parameters after so many are only freed once those have been found; without: all are free at once.
   std::optional<size_t> field_essentials = {};
   FieldShape field_shape = FieldShape::round;
+  FieldSpecimen field_specimen = FieldSpecimen::gel;
   std::optional<FieldDirection> field_direction = {};
   std::vector<double> (*field_neutral)(const FieldModel& base) = nullptr;
   void (*apply_to_field)(EffectValues values, FieldModel&) = nullptr;
@@ -160,8 +167,9 @@ const std::vector<const Effect*>& all_effects();
 
 /// Those of them that show in recordings of the rig.
 const std::vector<const Effect*>& rig_effects();
-/// Those of them that show in images of the specimen.
+/// Those of them that show in images of gel, and of any other specimen; FieldSpecimen says which.
 const std::vector<const Effect*>& field_effects();
+const std::vector<const Effect*>& specimen_effects();
 /// The one of them that is an inclusion.
 const Effect& inclusion_effect();
 

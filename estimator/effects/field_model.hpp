@@ -1,6 +1,7 @@
 #pragma once
-// What field effects change: a cylindrical specimen as images of it show it. The default values are the base model: a
-// neo-Hookean annulus whose ends are held (estimator/explain/imaging/field_solver.hpp solves it).
+// What field effects change: a specimen as images of it show it. The default values are the base model: a neo-Hookean annulus
+// whose ends are held (estimator/explain/imaging/field_solver.hpp solves it), or any other specimen as its study describes it
+// (estimator/model/changed_specimen.hpp).
 
 #include <array>
 #include <optional>
@@ -37,6 +38,13 @@ struct FieldModel {
   double chamber_stiffness_kPa_per_mL = 0.0;  ///< pressure around the specimen for volume taken by it
   std::optional<Inclusion> inclusion = {};
   double displacement_gain = 1.0;  ///< displacement as imaged over the true one
+
+  // Of specimens other than that annulus.
+  double fibre_turn_deg = 0.0;       ///< of the fibres about the wall's normal, everywhere alike
+  double fibre_course_deg = 0.0;     ///< the same at the inner wall, reversed at the outer one
+  double opening_angle_deg = 0.0;    ///< at which a ring cut through opens: residual stress
+  double pressure_offset_kPa = 0.0;  ///< frames' pressures as measured less the true ones
+  std::array<double, 3> base_motion_mm_per_kPa{};  ///< of all of the body in the images
 
   friend bool operator==(const FieldModel&, const FieldModel&) = default;
 };

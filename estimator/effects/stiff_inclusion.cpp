@@ -42,6 +42,7 @@ Effect stiff_inclusion_effect() {
                            {"semi_axis_axial_mm", "mm", "", 10.0, 3.0, 30.0, 10.0, SearchScale::logarithmic}},
       .field_essentials = 4,
       .field_shape = FieldShape::inclusion,
+      .field_specimen = FieldSpecimen::any,
       .apply_to_field =
           [](EffectValues values, FieldModel& model) {
             if (values[0] == 1.0) return;

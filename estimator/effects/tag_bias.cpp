@@ -18,6 +18,7 @@ Effect tag_bias_effect() {
                      "With the modulus free it is the modulus.",
       .conflicts = {"chamber-back-pressure", "radius-error"},
       .field_parameters = {{"gain", "", "displacement as seen over the true one", 1.0, 0.7, 1.3, 0.95}},
+      .field_specimen = FieldSpecimen::any,
       .apply_to_field = [](EffectValues values, FieldModel& model) { model.displacement_gain = values[0]; },
   }};
 }

@@ -73,18 +73,22 @@ Solution ElasticMotion::solve_from(const Slot* start, std::span<const double> va
   return model_.solve(pressure_kPa, first_state());
 }
 
+void ElasticMotion::begin_at(const ElasticMotion& other) {
+  slots_ = other.slots_;
+  for (std::optional<Slot>& slot : slots_)
+    if (slot) slot->derivatives.reset();
+}
+
 MotionOutcome ElasticMotion::solve(size_t slot, std::span<const double> values, double pressure_kPa) {
   if (std::optional<std::string> reason = set_values(values)) return {std::nullopt, *std::move(reason)};
   Solution solution = solve_from(nearest(slot, pressure_kPa), values, pressure_kPa);
   if (!solution.report.converged()) return {std::nullopt, solution.report.describe()};
   if (slots_.size() <= slot) slots_.resize(slot + 1);
-  NodeField seen_mm = solution.state.position_mm;
-  add_scaled(seen_mm, displacement_gain_ - 1.0, solution.state.position_mm);
-  add_scaled(seen_mm, 1.0 - displacement_gain_, mesh().reference());
+  NodeField position_mm = solution.state.position_mm;
   std::shared_ptr<const CondensedFactor> factor = slots_[slot] ? slots_[slot]->factor : nullptr;
   slots_[slot] =
       Slot{{values.begin(), values.end()}, std::move(solution.state), std::nullopt, std::move(factor)};
-  return {std::move(seen_mm), ""};
+  return {std::move(position_mm), ""};
 }
 
 MotionDerivatives ElasticMotion::derivatives(size_t slot) {
@@ -94,12 +98,7 @@ MotionDerivatives ElasticMotion::derivatives(size_t slot) {
     solved.derivatives = derivatives_at(solved.state);
     solved.factor = factor_to_keep();
   }
-  MotionDerivatives seen = *solved.derivatives;
-  if (displacement_gain_ == 1.0) return seen;
-  for (NodeField& field : seen.by_value)
-    add_scaled(field, displacement_gain_ - 1.0, NodeField(field));
-  add_scaled(seen.by_pressure, displacement_gain_ - 1.0, NodeField(seen.by_pressure));
-  return seen;
+  return *solved.derivatives;
 }
 
 double ElasticMotion::stored_energy_mJ(size_t slot) {

@@ -16,10 +16,9 @@ namespace diastole {
 
 class ElasticMotion : public MotionModel {
  public:
-  /// `groups[i]` says which parameter of which elements value i sets; images show `displacement_gain` times the
-  /// displacement.
-  ElasticMotion(ElasticModel model, std::vector<ParameterGroup> groups, double displacement_gain = 1.0)
-      : model_(std::move(model)), groups_(std::move(groups)), displacement_gain_(displacement_gain) {}
+  /// `groups[i]` says which parameter of which elements value i sets.
+  ElasticMotion(ElasticModel model, std::vector<ParameterGroup> groups)
+      : model_(std::move(model)), groups_(std::move(groups)) {}
 
   [[nodiscard]] const HermiteMesh& mesh() const override { return model_.mesh(); }
   [[nodiscard]] MotionOutcome solve(size_t slot, std::span<const double> values,
@@ -30,15 +29,18 @@ class ElasticMotion : public MotionModel {
   [[nodiscard]] EnergyDerivatives energy_derivatives(size_t slot) override;
   [[nodiscard]] double stored_energy_mJ(size_t slot) override;
 
-  /// Precondition: images show the displacement itself.
+  /// Precondition: images show the motion itself.
   void consider(std::vector<ConsideredError> errors) { considered_ = std::move(errors); }
 
   [[nodiscard]] const ElasticModel& model() const { return model_; }
 
+  /// Frames begin at the solutions that another motion of the same mesh has reached.
+  void begin_at(const ElasticMotion& other);
+
  protected:
   /// Makes the model that of these values; why not, if there is none.
   virtual std::optional<std::string> set_values(std::span<const double> values);
-  /// At an equilibrium of the model as it stands; of the motion itself, not of what images show.
+  /// At an equilibrium of the model as it stands.
   virtual MotionDerivatives derivatives_at(const ElasticState& state);
   /// At an equilibrium of the model as it stands: stored since frame 0, and its derivatives, those of the motion being given.
   [[nodiscard]] virtual double stored_at(const ElasticState& state) const {
@@ -51,6 +53,8 @@ class ElasticMotion : public MotionModel {
   /// Where a frame begins that has no earlier solution.
   [[nodiscard]] virtual ElasticState first_state() const { return model_.rest_state(); }
 
+  /// Of the slot's last successful `solve`.
+  [[nodiscard]] const ElasticState& state(size_t slot) const { return slots_.at(slot).value().state; }
   [[nodiscard]] ElasticModel& changed_model() { return model_; }
   [[nodiscard]] const std::vector<ParameterGroup>& groups() const { return groups_; }
   static void set_values(ElasticModel& model, const std::vector<ParameterGroup>& groups,
@@ -71,7 +75,6 @@ class ElasticMotion : public MotionModel {
 
   ElasticModel model_;
   std::vector<ParameterGroup> groups_;
-  double displacement_gain_;
   std::vector<ConsideredError> considered_;
   std::vector<std::optional<Slot>> slots_;
 };

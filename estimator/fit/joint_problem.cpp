@@ -86,7 +86,13 @@ Eigen::VectorXd JointProblem::motion_residuals() const {
     result.segment(rows, frame.residuals.size()) = frame.residuals.residuals();
     rows += frame.residuals.size();
   }
+  if (correction_.size() > 0) result += correction_;
   return result;
+}
+
+void JointProblem::set_correction(Eigen::VectorXd correction) {
+  correction_ = std::move(correction);
+  residuals_at_.reset();
 }
 
 std::vector<int> JointProblem::patches() const {
@@ -156,6 +162,7 @@ void JointProblem::shift_planes(const Eigen::VectorXd& q) {
 
 std::optional<size_t> JointProblem::find_points(const Eigen::VectorXd& q) {
   residuals_at_.reset();
+  correction_.resize(0);
   if (!solve_frames(q)) return std::nullopt;
   shift_planes(q);
   size_t gained = 0;
@@ -176,21 +183,18 @@ std::optional<Eigen::VectorXd> JointProblem::residuals(const Eigen::VectorXd& q)
   residuals_at_.reset();
   if (!solve_frames(q)) return {};
   shift_planes(q);
-  residuals_.resize(rows());
-  Eigen::Index row = 0;
   for (LoadedFrame& frame : frames_) {
     if (!frame.residuals.follow(model_.mesh(), *reference_, {&frame.position_mm, 1})) {
       failure_ = fmt::format("frame {}: many tag points cannot be followed on the body at these values",
                              frame.number);
       return {};
     }
-    residuals_.segment(row, frame.residuals.size()) = frame.residuals.residuals();
-    row += frame.residuals.size();
   }
-  if (robust_) {
-    for (Eigen::Index i = 0; i < row; ++i)
-      residuals_[i] = robust_->residual(residuals_[i]);
-  }
+  const Eigen::VectorXd motion = motion_residuals();
+  Eigen::Index row = motion.size();
+  residuals_.resize(rows());
+  for (Eigen::Index i = 0; i < row; ++i)
+    residuals_[i] = robust_ ? robust_->residual(motion[i]) : motion[i];
   for (const LoadedFrame& frame : frames_) {
     if (!frame.pressure_unknown) continue;
     residuals_[row++] =

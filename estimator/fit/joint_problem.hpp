@@ -169,6 +169,9 @@ class JointProblem : public inference::LeastSquaresProblem {
   /// The loss of the motion's residuals; the normal's at first.
   void set_robust(std::optional<RobustLoss> loss);
   [[nodiscard]] const std::optional<RobustLoss>& robust() const { return robust_; }
+  /// What is added to the motion's residuals whatever the unknowns are, frame after frame: what the model's mesh gets wrong. None at
+  /// first, and none again after another `find_points`.
+  void set_correction(Eigen::VectorXd correction);
   /// The motion's residuals in their stated standard deviations, of the last successful `residuals`, frame after
   /// frame.
   [[nodiscard]] Eigen::VectorXd motion_residuals() const;
@@ -220,6 +223,7 @@ class JointProblem : public inference::LeastSquaresProblem {
   std::optional<MeasuredWork> work_;
   std::vector<SmoothBlock> smooth_;
   std::optional<RobustLoss> robust_;
+  Eigen::VectorXd correction_;  // of the motion's residuals; empty: none
   Eigen::VectorXd residuals_;
   std::optional<Eigen::VectorXd> solved_at_;     // where the frames' positions belong
   std::optional<Eigen::VectorXd> residuals_at_;  // where residuals_ belong

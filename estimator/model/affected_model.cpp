@@ -1,12 +1,10 @@
 #include "estimator/model/affected_model.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 
-#include "estimator/io/study_refusal.hpp"
+#include "estimator/model/changed_specimen.hpp"
 #include "estimator/model/study_effects.hpp"
 #include "estimator/model/study_model.hpp"
 
@@ -38,17 +36,12 @@ void let_ends_slip(const HermiteMesh& mesh, double stiffness_kPa_per_mm, Elastic
   options.held = std::move(held);
 }
 
-/// A study whose specimen may have field effects.
-void require_base(const Study& study) {
-  const auto* annulus = std::get_if<AnnulusSpecimen>(&study.specimen);
-  if (annulus == nullptr || annulus->ends != "fixed" || study.law.name != "neo-hookean" || study.chamber)
-    refuse(study, "model.effects",
-           "effects that show in images start from neo-Hookean gel in an annulus whose ends are fixed, "
-           "without a [chamber]",
-           "Leave the list empty, or describe such a specimen.");
-}
-
 }  // namespace
+
+bool is_gel(const Study& study) {
+  const auto* annulus = std::get_if<AnnulusSpecimen>(&study.specimen);
+  return annulus != nullptr && annulus->ends == "fixed" && study.law.name == "neo-hookean" && !study.chamber;
+}
 
 bool shows_in_images(const Study& study) {
   const EffectLibrary library = effects_known_to(study);
@@ -66,13 +59,8 @@ FieldModel field_model_of(const Study& study) {
   const EffectLibrary library = effects_known_to(study);
   for (const std::string& id : study.effects) {
     const Effect& effect = effect_named(library, study, id);
-    std::vector<double> values = effect.field_neutral(model);
-    const auto stated = std::ranges::find(study.effect_values, id, &StudyEffect::id);
-    for (size_t i = 0; stated != study.effect_values.end() && i < values.size(); ++i) {
-      const auto start = stated->starts.find(std::string(effect.field_parameters()[i].name));
-      if (start != stated->starts.end()) values[i] = start->second;
-    }
-    if (!values.empty()) effect.apply_to_field(values, model);
+    if (!effect.field_parameters().empty())
+      effect.apply_to_field(stated_field_values(study, effect, model), model);
   }
   return model;
 }
@@ -99,7 +87,7 @@ ElasticModel make_affected_model(const Study& study, SolveOptions options) {
   Study plain = study;
   plain.effects.clear();
   if (!shows_in_images(study)) return make_model(plain, std::move(options));
-  require_base(study);
+  if (!is_gel(study)) return ChangeableSpecimen(study).with(specimen_change_of(study), options);
   const FieldModel field = field_model_of(study);
   std::get<AnnulusSpecimen>(plain.specimen).inner_radius_mm = field.inner_radius_mm;
   const ElasticModel base = make_model(plain);
@@ -110,8 +98,9 @@ ElasticModel make_affected_model(const Study& study, SolveOptions options) {
   return {base.mesh(), *elastic.law, std::move(elastic.options)};
 }
 
-double displacement_gain_of(const Study& study) {
-  return shows_in_images(study) ? field_model_of(study).displacement_gain : 1.0;
+FieldModel field_change_of(const Study& study) {
+  if (!shows_in_images(study)) return {};
+  return is_gel(study) ? field_model_of(study) : specimen_change_of(study);
 }
 
 }  // namespace diastole

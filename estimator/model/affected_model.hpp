@@ -18,14 +18,17 @@ struct FieldElasticity {
 };
 FieldElasticity elasticity_of(const FieldModel& model, const HermiteMesh& mesh, double C1_kPa);
 
-/// make_model (estimator/model/study_model.hpp) with the study's effects. Throws InputError besides if the specimen cannot have
-/// them: they start from a neo-Hookean annulus with held ends and no [chamber].
+/// Whether the study's specimen is that annulus: neo-Hookean, with held ends and no [chamber].
+bool is_gel(const Study& study);
+
+/// make_model (estimator/model/study_model.hpp) with the study's effects: those of gel, or those of any other specimen
+/// (changed_specimen.hpp). Throws InputError besides if the specimen cannot have them.
 ElasticModel make_affected_model(const Study& study, SolveOptions options = {});
 
 /// Whether one of the study's effects does.
 bool shows_in_images(const Study& study);
 
-/// Displacement as imaged over the true one: 1 unless the study has `tag-bias`.
-double displacement_gain_of(const Study& study);
+/// What the study's effects change; the base model where none of them shows in images.
+FieldModel field_change_of(const Study& study);
 
 }  // namespace diastole

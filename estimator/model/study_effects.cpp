@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <map>
 
 #include "estimator/effects/file_effect.hpp"
@@ -34,6 +35,16 @@ const Effect& effect_named(const EffectLibrary& library, const Study& study, con
          did_you_mean(id, ids) +
              "`diastole effects` lists those that are known; effect_files = [\"NAME.effect.toml\"] adds your "
              "own.");
+}
+
+std::vector<double> stated_field_values(const Study& study, const Effect& effect, const FieldModel& base) {
+  std::vector<double> values = effect.field_neutral(base);
+  const auto stated = std::ranges::find(study.effect_values, effect.text().id, &StudyEffect::id);
+  for (size_t i = 0; stated != study.effect_values.end() && i < values.size(); ++i) {
+    const auto start = stated->starts.find(std::string(effect.field_parameters()[i].name));
+    if (start != stated->starts.end()) values[i] = start->second;
+  }
+  return values;
 }
 
 }  // namespace diastole

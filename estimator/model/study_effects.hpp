@@ -12,4 +12,7 @@ EffectLibrary effects_known_to(const Study& study);
 /// One of a library by its id; throws InputError at model.effects of the study's file.
 const Effect& effect_named(const EffectLibrary& library, const Study& study, const std::string& id);
 
+/// The values of an effect's field_parameters that the study states, neutral for `base` where it states none.
+std::vector<double> stated_field_values(const Study& study, const Effect& effect, const FieldModel& base);
+
 }  // namespace diastole

@@ -222,7 +222,7 @@ Placement placement_of(const Study& study) {
   return placement;
 }
 
-ElasticModel make_model(const Study& study, SolveOptions options) {
+SpecimenParts specimen_parts(const Study& study, SolveOptions options) {
   const Law& law = law_of(study);
   if (!study.effects.empty()) {
     refuse(study, "model.effects", fmt::format("the model has no effect \"{}\"", study.effects.front()),
@@ -234,12 +234,17 @@ ElasticModel make_model(const Study& study, SolveOptions options) {
   MeshBody body = study_body(study);
   require_axes(study, law, body);
   require_ends(study, body.mesh);
-  if (body.fibres) elastic.material_axes = material_axes_of(*std::move(body.fibres));
+  if (body.fibres) elastic.material_axes = material_axes_of(*body.fibres);
   elastic.bonded = bonded_ends(study, body.mesh);
   if (study.chamber) elastic.chamber = chamber_of(*study.chamber);
   elastic.bulk_modulus_kPa = study.compression.bulk_modulus_kPa;
   elastic.volume_stiffness_kPa = study.compression.volume_stiffness_kPa;
-  ElasticModel model(std::move(body.mesh), law, std::move(elastic));
+  return {std::move(body), &law, std::move(elastic)};
+}
+
+ElasticModel make_model(const Study& study, SolveOptions options) {
+  SpecimenParts parts = specimen_parts(study, std::move(options));
+  ElasticModel model(std::move(parts.body.mesh), *parts.law, std::move(parts.options));
   require_chamber_wall(study, model);
   return model;
 }

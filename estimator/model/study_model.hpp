@@ -15,10 +15,18 @@ MeshBody study_body(const Study& study);
 /// From the specimen's axes to the images': [images.to_specimen]; nothing moves without it.
 Placement placement_of(const Study& study);
 
+/// What a study's forward model is made of.
+struct SpecimenParts {
+  MeshBody body;
+  const Law* law;
+  ElasticOptions options;
+};
+
 /// Parameters take their `start`. Throws InputError if the law is unknown, if the study lacks one of its
 /// parameters or has one that it does not know, if a start lies outside what the law allows, or if it names
 /// an effect (the model has none), if the law needs axes and the body has no fibres, if the mesh file names no face
 /// to hold, or if it names no outer wall for the chamber, or one with a free rim for a sealed one.
+SpecimenParts specimen_parts(const Study& study, SolveOptions options = {});
 ElasticModel make_model(const Study& study, SolveOptions options = {});
 
 /// Throws InputError if the model has no wall for a cavity pressure to push on (a mesh file without `inner`).

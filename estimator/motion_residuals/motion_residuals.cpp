@@ -127,6 +127,29 @@ MotionResiduals::MotionResiduals(const Measurement& measurement, std::vector<int
     planes_mm_.push_back(tag.plane_mm);
 }
 
+MotionResiduals MotionResiduals::joined(const std::vector<const MotionResiduals*>& parts) {
+  MotionResiduals all = *parts.front();
+  for (size_t i = 1; i < parts.size(); ++i) {
+    const MotionResiduals& part = *parts[i];
+    const size_t slots = all.frames_.size();
+    const Eigen::Index begun = all.size();
+    all.frames_.insert(all.frames_.end(), part.frames_.begin(), part.frames_.end());
+    for (ResidualRow row : part.rows_) {
+      row.slot += slots;
+      all.rows_.push_back(row);
+    }
+    for (size_t slot = 1; slot < part.first_.size(); ++slot)
+      all.first_.push_back(begun + part.first_[slot]);
+    all.residuals_.conservativeResize(begun + part.size());
+    all.residuals_.tail(part.size()) = part.residuals_;
+    all.found_.usable += part.found_.usable;
+    all.found_.tags_left_out += part.found_.tags_left_out;
+    all.found_.tags_unfollowed += part.found_.tags_unfollowed;
+    all.found_.points_left_out += part.found_.points_left_out;
+  }
+  return all;
+}
+
 void MotionResiduals::shift_planes(const Eigen::VectorXd& by_mm) {
   for (size_t i = 0; i < tags_.size(); ++i)
     tags_[i].plane_mm = planes_mm_[i] + by_mm[static_cast<Eigen::Index>(i)];

@@ -64,6 +64,9 @@ class MotionResiduals {
   /// The slots are these frames.
   MotionResiduals(const Measurement& measurement, std::vector<int> frames, LocatorOptions locator);
 
+  /// The rows of several, slot after slot. Precondition: they are of one measurement.
+  [[nodiscard]] static MotionResiduals joined(const std::vector<const MotionResiduals*>& parts);
+
   [[nodiscard]] const std::vector<int>& frames() const { return frames_; }
   [[nodiscard]] bool of_tag(const ResidualRow& row) const { return row.source < tags_.size(); }
 

@@ -38,7 +38,7 @@ std::optional<ApparentStiffness> apparent_stiffness(const Study& study, const Fi
   // The pressure moved a body that was loaded before, by how much depends on the law: nothing to compare with.
   if (study.imaged_at || stiffness_parameter(study) == nullptr || !(field.load.pressure_kPa > 0)) return {};
   ElasticModel model = make_affected_model(study);
-  const double gain = displacement_gain_of(study);
+  const double gain = field_change_of(study).displacement_gain;
   const Eigen::VectorXd seen = forms.space.unknowns_of(field.displacement_mm);
   const Eigen::VectorXd along =
       forms.quadratic.matrix(forms.sobolev.mean_square).selfadjointView<Eigen::Lower>() * seen;

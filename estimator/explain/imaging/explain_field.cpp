@@ -15,6 +15,7 @@
 #include "estimator/explain/imaging/linear_evidence.hpp"
 #include "estimator/explain/verdict/chi_square.hpp"
 #include "estimator/inference/intervals.hpp"
+#include "estimator/model/affected_model.hpp"
 #include "protocol/contract/input_error.hpp"
 
 namespace diastole::explain {
@@ -22,8 +23,6 @@ namespace {
 
 using Eigen::Index;
 
-constexpr std::array<size_t, 3> round_mesh{4, 6, 2};  // for what is the same all around the axis
-constexpr std::array<size_t, 3> full_mesh{8, 6, 2};
 constexpr double significant = 1e-3;
 constexpr double suspicious = 1e-2;     // of what one effect leaves: reason to try two
 constexpr double indistinct = 9.0;      // of the score
@@ -46,11 +45,10 @@ struct Structure {
 
 class Explainer {
  public:
-  Explainer(FieldCase field, std::string name, const FieldProgress& progress)
-      : progress_(progress), study_file_(std::move(name)), field_(std::move(field)) {}
+  Explainer(ImagedSpecimen& specimen, const FieldProgress& progress)
+      : progress_(progress), specimen_(specimen) {}
 
   Explanation run() {
-    field_.alive = [this] { report(""); };
     fit_base();
     fit_effects();
     judge();
@@ -67,13 +65,9 @@ class Explainer {
 
   void fit_base() {
     report("fitting the base model to the tags");
-    fit_both_meshes();
-    if (loses_points(*round_) || loses_points(*full_)) {
-      leave_out_lost_points();
-      fit_both_meshes();
-    }
+    specimen_.fit_base();
     report("looking for structure in what is left");
-    modes_ = field_modes(*full_, full_base_.pressures_kPa);
+    modes_ = specimen_.modes();
     for (size_t i = 0; i < modes_.modes.size(); ++i) {
       const std::string& family = modes_.modes[i].family;
       auto same = std::ranges::find(families_, family, &Family::name);
@@ -83,47 +77,9 @@ class Explainer {
     }
   }
 
-  void fit_both_meshes() {
-    round_.emplace(field_, round_mesh);
-    base_ = round_->fit({}, round_->start());
-    full_.emplace(field_, full_mesh);
-    full_base_ = full_->fit({}, {base_.C1_kPa, base_.pressures_kPa});
-    if (!std::isfinite(base_.chi_square) || !std::isfinite(full_base_.chi_square))
-      throw InputError(
-          {study_file_, "law.parameters.C1_kPa",
-           fmt::format("the base model has no equilibrium at {:g} kPa", field_.C1_start_kPa.value),
-           "Start from a stiffer gel, or check the frames' pressures."});
-  }
-
-  [[nodiscard]] static bool loses_points(const FieldProblem& problem) {
-    const FoundPoints& found = problem.rows().found();
-    return found.tags_left_out + found.points_left_out > 0;
-  }
-
-  /// Keeps the points that both meshes can follow, so that their residuals correspond.
-  void leave_out_lost_points() {
-    Measurement& measurement = field_.measurement;
-    std::vector<int> seen(measurement.tags.size() + measurement.points.size(), 0);
-    for (const FieldProblem* problem : {&*round_, &*full_})
-      for (const ResidualRow& row : problem->rows().rows())
-        if (row.component == 0) ++seen[row.source];
-    const size_t tags = measurement.tags.size();
-    size_t index = 0;
-    std::erase_if(measurement.tags, [&](const TagPoint& tag) { return seen[index++] < 2 && tag.frame > 0; });
-    index = tags;
-    std::erase_if(measurement.points,
-                  [&](const ObservedPoint& point) { return seen[index++] < 2 && point.frame > 0; });
-  }
-
   void fit_effects() {
     report("fitting each effect");
-    hypotheses_ = fit_round_effects(*round_, base_);
-    report("searching an inclusion of another stiffness");
-    lattice_ = inclusion_lattice(*full_, full_base_);
-    const double to_beat = std::ranges::max(hypotheses_, {}, &FieldHypothesis::score).score;
-    std::ranges::move(
-        try_inclusion(*round_, base_, search_inclusion(lattice_, field_.base, full_base_), to_beat),
-        std::back_inserter(hypotheses_));
+    hypotheses_ = specimen_.singles(progress_);
     std::ranges::stable_sort(hypotheses_, std::greater{}, &FieldHypothesis::score);
   }
 
@@ -135,7 +91,7 @@ class Explainer {
       const LinearEvidence::Gain gain = evidence.gain(family.columns);
       const auto degrees = static_cast<double>(gain.degrees);
       const double p = std::min(
-          1.0, static_cast<double>(families_.size()) * chi_square_tail(gain.chi_square - allowed, degrees));
+          1.0, static_cast<double>(families_.size()) * chi_square_tail(gain.chi_square - allowed - specimen_.mesh_error(), degrees));
       if (p < most.p_value) most = {family.name, gain.chi_square - degrees, p};
     }
     return most;
@@ -153,7 +109,7 @@ class Explainer {
     if (structure_left(single.fit, mesh_error * single.gain).p_value > suspicious && !is_strained(single.fit))
       return;
     report("fitting pairs of effects");
-    std::vector<FieldHypothesis> pairs = fit_pairs(*round_, base_, hypotheses_, lattice_);
+    std::vector<FieldHypothesis> pairs = specimen_.pairs(hypotheses_);
     if (pairs.empty() || pairs.front().score < single.score + clearly_better ||
         pairs.front().p_value > significant)
       return;
@@ -163,10 +119,12 @@ class Explainer {
 
   void judge() {
     report("comparing what explains it");
-    rival_evidence_.emplace(full_base_, modes_.columns);
-    rival_ = rival_evidence_->best_of(rivals_);
-    if (!settled(base_) || !settled(full_base_)) return;
-    const Structure before = structure_left(full_base_, 0.0);
+    const FieldFit& base = specimen_.base();
+    const FieldFit& finest = specimen_.base_of_structure();
+    rival_ = LinearEvidence(finest, modes_.columns).best_of(rivals_);
+    rival_.score -= specimen_.mesh_error();
+    if (!settled(base) || (&finest != &base && !settled(finest))) return;
+    const Structure before = structure_left(finest, 0.0);
     const FieldHypothesis& single = hypotheses_.front();
     const bool effect_seen = single.p_value < significant && single.score > 0.0;
     if (effect_seen) try_pairs();
@@ -174,9 +132,9 @@ class Explainer {
     if (!effect_seen && before.p_value > significant) {
       out_.verdict = Verdict::none;
       out_.summary = fmt::format(
-          "Nothing exceeds the noise: C1 = {:.3f} kPa explains {} tag residuals; the nearest effect, {}, "
-          "would gain {:.1f} of chi2.",
-          base_.C1_kPa, base_.residuals.size(), best.name(), best.gain);
+          "Nothing exceeds the noise: {} {} residuals of the motion; the nearest effect, {}, would gain "
+          "{:.1f} of chi2.",
+          law_before(), base.residuals.size(), best.name(), best.gain);
       return;
     }
     const Structure after = effect_seen ? structure_left(best.fit, mesh_error * best.gain) : before;
@@ -231,10 +189,9 @@ class Explainer {
       out_.ambiguous_with.push_back(other.ids);
     }
     out_.verdict = out_.ambiguous_with.empty() ? Verdict::named : Verdict::ambiguous;
-    out_.summary = fmt::format(
-        "{} explains what the base model does not: chi2 falls by {:.1f}, C1 becomes {:.3f} kPa instead of "
-        "{:.3f}.",
-        best.name(), best.gain, best.fit.C1_kPa, base_.C1_kPa);
+    out_.shifts = specimen_.shifts(best.fit);
+    out_.summary = fmt::format("{} explains what the base model does not: chi2 falls by {:.1f}{}.", best.name(),
+                               best.gain, law_after());
     if (!out_.ambiguous_with.empty()) {
       std::vector<std::string> ids;
       for (const auto& set : out_.ambiguous_with)
@@ -242,8 +199,21 @@ class Explainer {
       out_.summary += fmt::format(" These data cannot tell it from {}.", fmt::join(ids, ", "));
     }
     chosen_ = &best;
-    out_.shifts = {{"C1_kPa", base_.C1_kPa, base_.C1_kPa * std::sqrt(base_.covariance(0, 0)), best.fit.C1_kPa,
-                    best.fit.C1_kPa * std::sqrt(best.fit.covariance(0, 0))}};
+  }
+
+  /// "C1_kPa = 8.710 explains"
+  [[nodiscard]] std::string law_before() const {
+    std::vector<std::string> words;
+    for (const ParameterShift& shift : specimen_.shifts(specimen_.base()))
+      words.push_back(fmt::format("{} = {:.4g}", shift.name, shift.before));
+    return fmt::format("{} {}", fmt::join(words, ", "), words.size() == 1 ? "explains" : "explain");
+  }
+  /// ", C1_kPa becomes 8.710 instead of 8.500"
+  [[nodiscard]] std::string law_after() const {
+    std::string words;
+    for (const ParameterShift& shift : out_.shifts)
+      words += fmt::format(", {} becomes {:.4g} instead of {:.4g}", shift.name, shift.after, shift.before);
+    return words;
   }
 
   [[nodiscard]] static std::vector<FoundEffect> found(const FieldHypothesis& hypothesis) {
@@ -267,7 +237,7 @@ class Explainer {
     out.ci90 = {out.value, out.value};
     const auto place = std::ranges::find(choice.free, value);
     if (place == choice.free.end()) return out;
-    const Index unknown = 1 + (place - choice.free.begin());
+    const Index unknown = static_cast<Index>(fit.law.size()) + (place - choice.free.begin());
     const inference::Parameter scale = searched(parameter);
     const double coordinate = scale.coordinate(out.value);
     double error = std::sqrt(fit.covariance(unknown, unknown));
@@ -283,10 +253,10 @@ class Explainer {
 
   /// An inclusion's own place first; all of the specimen where no part of it stands out.
   void find_places() {
-    out_.where = misfit_regions(field_, round_->rows(), base_, 5);
+    out_.where = misfit_regions(specimen_.mesh(), specimen_.rows(), specimen_.base(), 5);
     const bool included = chosen_ != nullptr && chosen_->has_inclusion();
     if (!included && !out_.where.empty()) return;
-    const Structure before = structure_left(full_base_, 0.0);
+    const Structure before = structure_left(specimen_.base_of_structure(), 0.0);
     Misfit place;
     place.port = "field";
     place.channel = "tags";
@@ -303,13 +273,12 @@ class Explainer {
   }
 
   void fill_evidence() {
-    const FieldProblem& problem = *round_;
-    const FieldFit& base = base_;
+    const FieldFit& base = specimen_.base();
     for (const FieldHypothesis& tried : hypotheses_) {
       Candidate row;
       row.ids = tried.ids;
       row.chi_square_drop = tried.gain;
-      row.refitted = true;
+      row.refitted = tried.refitted;
       row.parameters = tried.fit.choice.free.size();
       const bool as_good =
           std::ranges::any_of(out_.ambiguous_with, [&](const auto& set) { return set == tried.ids; });
@@ -327,22 +296,24 @@ class Explainer {
     Eigen::MatrixXd directions(base.residuals.size(),
                                static_cast<Index>(rivals_.size()) + after.jacobian.cols());
     directions << modes_.columns(Eigen::all, rivals_), after.jacobian.topRows(base.residuals.size());
-    out_.gap = field_gap(base, after, deal_folds(field_.measurement, problem.rows(), 5), directions);
+    out_.gap = field_gap(base, after, deal_folds(specimen_.field().measurement, specimen_.rows(), 5), directions);
     out_.steps = {{"", out_.gap.before}};
     if (chosen_ != nullptr) out_.steps.push_back({chosen_->name(), out_.gap.after});
   }
 
   /// As precise as a drawing needs, so that the file stays small.
   void fill_field() {
-    const FieldFit& after = chosen_ != nullptr ? chosen_->fit : base_;
-    const double highest_kPa = std::ranges::max(base_.pressures_kPa);
+    const FieldFit& base = specimen_.base();
+    const FieldFit& after = chosen_ != nullptr ? chosen_->fit : base;
+    const MotionResiduals& rows = specimen_.rows();
+    const double highest_kPa = std::ranges::max(base.pressures_kPa);
     const auto rounded = [](double value, double scale) { return std::round(scale * value) / scale; };
-    for (Index i = 0; i < round_->rows().size(); ++i) {
-      const ResidualRow& row = round_->rows().rows()[static_cast<size_t>(i)];
-      const double share = base_.pressures_kPa[row.slot] / highest_kPa;
+    for (Index i = 0; i < rows.size(); ++i) {
+      const ResidualRow& row = rows.rows()[static_cast<size_t>(i)];
+      const double share = base.pressures_kPa[row.slot] / highest_kPa;
       FieldResidual seen;
-      seen.frame = round_->rows().frames()[row.slot];
-      seen.before = rounded(base_.residuals[i], 1e3);
+      seen.frame = rows.frames()[row.slot];
+      seen.before = rounded(base.residuals[i], 1e3);
       seen.after = rounded(after.residuals[i], 1e3);
       for (size_t k = 0; k < 3; ++k) {
         const auto axis = static_cast<Index>(k);
@@ -353,10 +324,8 @@ class Explainer {
     }
   }
 
-  /// What the cavity takes at the highest pressure; not known of fits around an inclusion.
   [[nodiscard]] ImagedModel imaged(const FieldHypothesis& hypothesis) {
-    if (hypothesis.has_inclusion()) return {&hypothesis, std::nan("")};
-    return {&hypothesis, round_->volume_change_mL(hypothesis.fit)};
+    return {&hypothesis, specimen_.volume_change_mL(hypothesis)};
   }
 
   void propose() {
@@ -370,40 +339,40 @@ class Explainer {
     for (const FieldHypothesis& other : hypotheses_)
       if (std::ranges::find(out_.ambiguous_with, other.ids) != out_.ambiguous_with.end())
         models.push_back(imaged(other));
-    out_.next_experiment = models.size() > 1 ? separating_images(field_, round_->rows(), models)
-                                             : sharpening_images(field_, round_->rows(), models.front());
+    out_.next_experiment = models.size() > 1 ? separating_images(specimen_.field(), specimen_.rows(), models)
+                                             : sharpening_images(specimen_.field(), specimen_.rows(), models.front());
   }
 
   FieldProgress progress_;
-  std::string study_file_;
-  FieldCase field_;
-  std::optional<FieldProblem> round_;
-  std::optional<FieldProblem> full_;
-  FieldFit base_;
-  FieldFit full_base_;
+  ImagedSpecimen& specimen_;
   FieldModes modes_;
   std::vector<Family> families_;
   std::vector<Index> rivals_;
-  InclusionLattice lattice_;
   std::vector<FieldHypothesis> hypotheses_;
-  std::optional<LinearEvidence> rival_evidence_;
   LinearEvidence::Choice rival_;
   const FieldHypothesis* chosen_ = nullptr;
   Explanation out_;
 };
 
-}  // namespace
-
-Explanation explain_field(const Study& study, const FieldProgress& progress) {
-  return explain_field(field_case(study), study.file.string(), progress);
-}
-
-Explanation explain_field(FieldCase field, const std::string& name, const FieldProgress& progress) {
+Explanation explain(ImagedSpecimen& specimen, const std::string& name, const FieldProgress& progress) {
   const auto begun = std::chrono::steady_clock::now();
-  Explanation explanation = Explainer(std::move(field), name, progress).run();
+  Explanation explanation = Explainer(specimen, progress).run();
   explanation.study = name;
   explanation.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
   return explanation;
+}
+
+}  // namespace
+
+Explanation explain_field(const Study& study, const FieldProgress& progress) {
+  if (is_gel(study) && !study.compression.bulk_modulus_kPa)
+    return explain_field(field_case(study), study.file.string(), progress);
+  return explain(*any_specimen(study, progress), study.file.string(), progress);
+}
+
+Explanation explain_field(FieldCase field, const std::string& name, const FieldProgress& progress) {
+  if (progress) field.alive = [&progress] { progress(""); };
+  return explain(*gel_specimen(std::move(field), name), name, progress);
 }
 
 }  // namespace diastole::explain

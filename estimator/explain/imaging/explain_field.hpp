@@ -19,16 +19,13 @@
 #include <functional>
 #include <string>
 
-#include "estimator/explain/imaging/field_fit.hpp"
+#include "estimator/explain/imaging/imaged_specimen.hpp"
 #include "estimator/explain/verdict/explanation.hpp"
 #include "estimator/io/study.hpp"
 
 namespace diastole::explain {
 
-/// Told what is being done; whatever it throws ends the work.
-using FieldProgress = std::function<void(const std::string&)>;
-
-/// Throws InputError for studies that field_case() refuses.
+/// Of gel, or of any other specimen that `fit` takes. Throws InputError for studies that field_case() or any_specimen() refuses.
 Explanation explain_field(const Study& study, const FieldProgress& progress = {});
 /// The same of what a study says; `name` stands for it in errors.
 Explanation explain_field(FieldCase field, const std::string& name, const FieldProgress& progress = {});

@@ -36,27 +36,13 @@ std::optional<Measured> seen_inner_radius(const Measurement& measurement, double
 }
 
 FieldCase field_case(const Study& study) {
-  const auto* annulus = std::get_if<AnnulusSpecimen>(&study.specimen);
-  if (annulus == nullptr)
-    refuse(study, "specimen.kind", "images of this kind of specimen cannot be explained",
-           "`diastole explain` knows field effects of an annulus; `diastole fit` fits any specimen.");
+  const auto& annulus = std::get<AnnulusSpecimen>(study.specimen);
   require_shape_without_load(study, "field effects");
-  if (annulus->ends != "fixed")
-    refuse(study, "specimen.ends", "field effects start from held ends", "Set ends = \"fixed\".");
-  if (study.law.name != "neo-hookean")
-    refuse(study, "law.name",
-           fmt::format("field effects start from neo-Hookean gel, not from {}", study.law.name),
-           "Set name = \"neo-hookean\": another law is one of the effects.");
   if (study.law.parameters.front().vary == Variation::element)
     refuse(study, "law.parameters.C1_kPa.vary",
            "images are explained from a gel of one stiffness, not of one value an element",
            "Set vary = \"whole\": an inclusion is then found by name, and a stiffness that varies smoothly "
            "is told as something outside the library. `diastole fit` maps one value an element.");
-  if (study.chamber)
-    refuse(study, "chamber", "field effects start from a specimen in the open",
-           "Leave [chamber] out: its back pressure is one of the effects.");
-  if (study.compression.bulk_modulus_kPa)
-    refuse(study, "model.bulk_modulus_kPa", "field effects start from incompressible gel", "Leave it out.");
   if (!study.data.tags && !study.data.points)
     refuse(study, "data", "the study has neither tags nor points",
            "Name a tags or points file and its frames.");
@@ -77,7 +63,7 @@ FieldCase field_case(const Study& study) {
     field.C1_start_kPa = {0.5 * (C1.upper + C1.lower), 0.5 * half_width_kPa};
     field.C1_bounds_kPa = {0.2 * C1.start, 5.0 * C1.start};
   }
-  field.inner_radius_mm = seen_inner_radius(field.measurement, annulus->outer_radius_mm);
+  field.inner_radius_mm = seen_inner_radius(field.measurement, annulus.outer_radius_mm);
   return field;
 }
 

@@ -31,7 +31,8 @@ struct FieldCase {
   std::function<void()> alive = {};  ///< called before each equilibrium of a fit; ends it by an exception
 };
 
-/// Throws InputError unless the study is a neo-Hookean annulus with held ends and imaged motion.
+/// Throws InputError for a study without imaged motion, of a stiffness that varies, or with frames that are not inflated. Precondition: gel
+/// (is_gel, affected_model.hpp).
 FieldCase field_case(const Study& study);
 
 /// The radius at which frame 0's tags begin, taking it that they come as near to the inner wall as to the outer one.

@@ -103,7 +103,7 @@ class FieldProblem::Search final : public inference::LeastSquaresProblem {
     const std::vector<double> values = space_.values(q);
     FieldFit fit;
     fit.choice = choice_;
-    fit.C1_kPa = values.front();
+    fit.law = {values.front()};
     for (size_t i = 0; i < choice_.free.size(); ++i)
       fit.choice.values[choice_.free[i]] = values[1 + i];
     fit.pressures_kPa.assign(values.begin() + pressures(), values.end());
@@ -117,7 +117,7 @@ class FieldProblem::Search final : public inference::LeastSquaresProblem {
     FieldFit here = at(q);
     FieldSolver& solver = problem_.solver_;
     MotionResiduals& rows = problem_.rows_;
-    solver.set(problem_.model_of(here.choice), here.C1_kPa);
+    solver.set(problem_.model_of(here.choice), here.C1_kPa());
     std::vector<NodeField> displacements_mm;
     for (size_t node = 0; node < problem_.nodes_kPa_.size(); ++node) {
       if (!solver.solve(node, problem_.nodes_kPa_[node])) return {};
@@ -176,7 +176,7 @@ class FieldProblem::Search final : public inference::LeastSquaresProblem {
       const MatrixXd block = rows.columns(slot, solver.mesh(), motion, reference);
       auto here_rows = result.middleRows(rows.first(slot), rows.count(slot));
       here_rows.leftCols(pressures()) = block.leftCols(pressures());
-      here_rows.col(0) *= here.C1_kPa;
+      here_rows.col(0) *= here.C1_kPa();
       here_rows.col(pressures() + static_cast<Index>(slot)) = block.rightCols<1>();
     }
     for (Index j = 0; j < q.size(); ++j) {
@@ -198,7 +198,7 @@ class FieldProblem::Search final : public inference::LeastSquaresProblem {
       values.push_back((at.pressures_kPa[slot] - frame.pressure_kPa) / std::max(frame.sigma_kPa, 1e-5));
     }
     if (field.C1_start_kPa.sigma > 0.0)
-      values.push_back((at.C1_kPa - field.C1_start_kPa.value) / field.C1_start_kPa.sigma);
+      values.push_back((at.C1_kPa() - field.C1_start_kPa.value) / field.C1_start_kPa.sigma);
     if (field.inner_radius_mm)
       values.push_back((problem_.model_of(at.choice).inner_radius_mm - field.inner_radius_mm->value) /
                        field.inner_radius_mm->sigma);
@@ -259,7 +259,7 @@ FieldProblem::Start FieldProblem::start() const {
 }
 
 double FieldProblem::volume_change_mL(const FieldFit& fit) {
-  solver_.set(model_of(fit.choice), fit.C1_kPa);
+  solver_.set(model_of(fit.choice), fit.C1_kPa());
   if (!solver_.solve(highest_node(), nodes_kPa_.back())) return std::nan("");
   const ElasticModel& model = solver_.elastic();
   return model.cavity_volume_mL(solver_.state(highest_node())) - model.cavity_volume_mL(model.rest_state());

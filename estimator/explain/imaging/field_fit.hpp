@@ -37,12 +37,12 @@ FieldChoice together(const FieldChoice& a, const FieldChoice& b);
 
 struct FieldFit {
   FieldChoice choice;
-  double C1_kPa = 0.0;
+  std::vector<double> law;  ///< the values of the law that are searched; of gel C1 alone
   std::vector<double> pressures_kPa;
   double chi_square = 0.0;
   /// Nothing but a settled fit may be named; no_solution: the start has no equilibrium, and chi_square is infinite.
   inference::Termination termination = inference::Termination::no_solution;
-  /// Order of unknowns: log C1, free parameters in their search coordinates, pressures.
+  /// Order of unknowns: the law's (positive ones by their logarithm), free parameters in their search coordinates, pressures, others.
   Eigen::MatrixXd covariance;
   Eigen::VectorXd residuals;  ///< of the rows, in sigmas
   Eigen::MatrixXd jacobian;   ///< of the rows, then of the priors
@@ -50,6 +50,8 @@ struct FieldFit {
   /// Intervals of choice.values where the covariance does not give them; empty: it does.
   std::vector<std::array<double, 2>> ci90;
 
+  /// Of gel.
+  [[nodiscard]] double C1_kPa() const { return law.front(); }
   /// Rows, then priors.
   [[nodiscard]] Eigen::VectorXd all_residuals() const;
 };

@@ -83,7 +83,7 @@ FieldFit refit(FieldProblem& problem, FieldChoice choice, const FieldProblem::St
     const EffectParameter& parameter = choice.parameter(i);
     if (parameter.scale == SearchScale::linear) all.values[i] = parameter.typical;
   }
-  FieldFit fuller = problem.fit(std::move(all), {fit.C1_kPa, fit.pressures_kPa});
+  FieldFit fuller = problem.fit(std::move(all), {fit.C1_kPa(), fit.pressures_kPa});
   return fit.chi_square - fuller.chi_square > worth_freeing ? fuller : fit;
 }
 
@@ -113,7 +113,7 @@ FieldHypothesis fit_both(FieldProblem& problem, const FieldFit& base, const Fiel
                          const FieldHypothesis& second) {
   const FieldFit& start = first.fit;
   FieldFit fit =
-      problem.fit(together(first.fit.choice, second.fit.choice), {start.C1_kPa, start.pressures_kPa});
+      problem.fit(together(first.fit.choice, second.fit.choice), {start.C1_kPa(), start.pressures_kPa});
   const auto parameters = static_cast<double>(fit.choice.free.size());
   return judged(std::move(fit), base, first, second, parameters, 1.0);
 }
@@ -127,10 +127,10 @@ std::vector<FieldHypothesis> inclusions_beside(const FieldProblem& problem, cons
     InclusionGuess guess;
     double gain;
   };
-  const FieldModel& body = problem.field().base;
+  const double volume_mm3 = wall_volume_mm3(problem.field().base);
   std::vector<Promise> promises;
   for (const FieldHypothesis* other : others) {
-    const InclusionGuess guess = search_inclusion(lattice, body, other->fit).front();
+    const InclusionGuess guess = search_inclusion(lattice, volume_mm3, other->fit).front();
     if (guess.p_value < beyond_chance) promises.push_back({other, guess, other->gain + guess.gain});
   }
   std::ranges::stable_sort(promises, std::greater{}, &Promise::gain);
@@ -144,7 +144,7 @@ std::vector<FieldHypothesis> inclusions_beside(const FieldProblem& problem, cons
     const double parameters =
         effective_parameters + static_cast<double>(promise.other->fit.choice.free.size());
     pairs.push_back(
-        judged(std::move(fit), base, *promise.other, inclusion, parameters, distinct_places(body)));
+        judged(std::move(fit), base, *promise.other, inclusion, parameters, distinct_places(volume_mm3)));
   }
   return pairs;
 }
@@ -159,7 +159,7 @@ bool FieldHypothesis::has_inclusion() const {
 
 std::vector<FieldHypothesis> fit_round_effects(FieldProblem& problem, const FieldFit& base) {
   std::vector<FieldHypothesis> result;
-  const FieldProblem::Start start{base.C1_kPa, base.pressures_kPa};
+  const FieldProblem::Start start{base.C1_kPa(), base.pressures_kPa};
   std::vector<FieldChoice> choices;  // made before the first fit, which moves the solver
   for (const Effect* effect : field_effects())
     if (!effect->is_inclusion())
@@ -186,7 +186,7 @@ std::vector<FieldHypothesis> try_inclusion(const FieldProblem& problem, const Fi
   const auto judge = [&] {
     tried.gain = base.chi_square - tried.fit.chi_square;
     tried.score =
-        tried.gain - 2.0 * effective_parameters - 2.0 * std::log(distinct_places(problem.field().base));
+        tried.gain - 2.0 * effective_parameters - 2.0 * std::log(distinct_places(wall_volume_mm3(problem.field().base)));
   };
   judge();
   if (tried.score > to_beat - near && tried.gain > 0.0) {

@@ -15,6 +15,7 @@ struct FieldHypothesis {
   double gain = 0.0;     ///< of chi2 over the base model on the same mesh
   double score = 0.0;    ///< explain_field.hpp
   double p_value = 1.0;  ///< corrected for the effects and places that were tried
+  bool refitted = true;  ///< false: the gain is linear in the effect, and the fit the base's
 
   [[nodiscard]] std::string name() const;  ///< "end-bond-slip + strain-stiffening"
   [[nodiscard]] bool has_inclusion() const;

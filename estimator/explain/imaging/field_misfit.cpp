@@ -11,6 +11,7 @@
 
 #include "estimator/explain/imaging/linear_evidence.hpp"
 #include "estimator/explain/verdict/chi_square.hpp"
+#include "estimator/mesh/wall_coordinates.hpp"
 
 namespace diastole::explain {
 namespace {
@@ -34,19 +35,16 @@ struct Partition {
         std::clamp(share * static_cast<double>(count), 0.0, static_cast<double>(count) - 1.0));
   }
 
-  [[nodiscard]] size_t cell_of(const FieldModel& body, const Eigen::Vector3d& X_mm) const {
-    const double turn = std::atan2(X_mm[1], X_mm[0]) / (2.0 * std::numbers::pi);
-    const double wall_mm = body.outer_radius_mm - body.inner_radius_mm;
+  [[nodiscard]] size_t cell_of(const WallPlace& place) const {
+    const double turn = place.turn_rad / (2.0 * std::numbers::pi);
     return part(turn < 0.0 ? turn + 1.0 : turn, turns) +
-           turns * (part(X_mm[2] / body.height_mm + 0.5, levels) +
-                    levels * part((std::hypot(X_mm[0], X_mm[1]) - body.inner_radius_mm) / wall_mm, depths));
+           turns * (part(0.5 * (place.height + 1.0), levels) + levels * part(place.depth, depths));
   }
 
-  [[nodiscard]] std::string words(const FieldModel& body, size_t cell) const {
+  [[nodiscard]] std::string words(const WallCoordinates& wall, size_t cell) const {
     const double theta_deg = (static_cast<double>(cell % turns) + 0.5) * 360.0 / static_cast<double>(turns);
-    const double low_mm =
-        body.height_mm * (static_cast<double>(cell / turns % levels) / static_cast<double>(levels) - 0.5);
-    const double thick_mm = body.height_mm / static_cast<double>(levels);
+    const double thick_mm = wall.height_mm() / static_cast<double>(levels);
+    const double low_mm = wall.lowest_mm() + thick_mm * static_cast<double>(cell / turns % levels);
     std::string text = turns == 1 ? "all around" : fmt::format("around {:.0f} deg", theta_deg);
     if (levels > 1) text += fmt::format(", z {:.0f} to {:.0f} mm", low_mm, low_mm + thick_mm);
     if (depths > 1)
@@ -126,8 +124,9 @@ Gap field_gap(const FieldFit& base, const FieldFit& after, const std::vector<siz
   return gap;
 }
 
-std::vector<Misfit> misfit_regions(const FieldCase& field, const MotionResiduals& rows, const FieldFit& fit,
+std::vector<Misfit> misfit_regions(const HermiteMesh& mesh, const MotionResiduals& rows, const FieldFit& fit,
                                    size_t most) {
+  const WallCoordinates wall(mesh);
   size_t cells = 0;
   for (const Partition& partition : partitions)
     cells += partition.cells();
@@ -137,9 +136,10 @@ std::vector<Misfit> misfit_regions(const FieldCase& field, const MotionResiduals
   for (Index i = 0; i < rows.size(); ++i) {
     const ResidualRow& row = rows.rows()[static_cast<size_t>(i)];
     const Eigen::RowVector3d along = by_cylindrical_motion(row);
+    const WallPlace place = wall.at(mesh, row.point);
     size_t begun = 0;
     for (const Partition& partition : partitions) {
-      const size_t cell = begun + partition.cell_of(field.base, row.X_mm);
+      const size_t cell = begun + partition.cell_of(place);
       columns.block<1, 3>(i, static_cast<Index>(3 * cell)) =
           fit.pressures_kPa[row.slot] / highest_kPa * along;
       ++tags[cell];
@@ -162,7 +162,7 @@ std::vector<Misfit> misfit_regions(const FieldCase& field, const MotionResiduals
       Misfit misfit;
       misfit.port = "field";
       misfit.channel = "tags";
-      misfit.region = partition.words(field.base, cell);
+      misfit.region = partition.words(wall, cell);
       misfit.excess_chi2 = gain.chi_square - static_cast<double>(gain.degrees);
       misfit.p_value = p;
       here.push_back(std::move(misfit));

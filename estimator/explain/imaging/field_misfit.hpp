@@ -26,7 +26,7 @@ Gap field_gap(const FieldFit& base, const FieldFit& after, const std::vector<siz
 // the wall; where rings, layers or quarters of the specimen stand out more than any of those, they are the place.
 
 /// The cells that are beyond chance after correction for their number, strongest first, at most `most`.
-std::vector<Misfit> misfit_regions(const FieldCase& field, const MotionResiduals& rows, const FieldFit& fit,
+std::vector<Misfit> misfit_regions(const HermiteMesh& mesh, const MotionResiduals& rows, const FieldFit& fit,
                                    size_t most);
 
 }  // namespace diastole::explain

@@ -10,7 +10,9 @@
 #include "estimator/explain/imaging/linear_evidence.hpp"
 #include "estimator/fe/elastic_system.hpp"
 #include "estimator/fe/gauss_points.hpp"
+#include "estimator/explain/imaging/field_solver.hpp"
 #include "estimator/mesh/node_field.hpp"
+#include "estimator/mesh/wall_coordinates.hpp"
 
 namespace diastole::explain {
 namespace {
@@ -20,7 +22,7 @@ using Eigen::Vector3d;
 
 /// A function of the undeformed place, from -1 to 1.
 struct Harmonic {
-  std::function<double(const Vector3d&)> value;
+  std::function<double(const WallPlace&)> value;
   std::string name;
   bool smooth;
 };
@@ -38,19 +40,17 @@ double legendre(int order, double x) {
   }
 }
 
-std::vector<Harmonic> harmonics(const FieldModel& body) {
-  const double middle_mm = 0.5 * (body.inner_radius_mm + body.outer_radius_mm);
-  const double half_wall_mm = 0.5 * (body.outer_radius_mm - body.inner_radius_mm);
+std::vector<Harmonic> harmonics() {
   std::vector<Harmonic> result;
   for (int turn = 0; turn < 5; ++turn) {
     const int m = (turn + 1) / 2;
     const bool sine = turn > 0 && turn % 2 == 0;
     for (int k = 0; k < 4; ++k) {
       for (int l = 0; l < 2; ++l) {
-        const auto value = [=, half_mm = 0.5 * body.height_mm](const Vector3d& X_mm) {
-          const double theta = m * std::atan2(X_mm[1], X_mm[0]);
-          return (sine ? std::sin(theta) : std::cos(theta)) * legendre(k, X_mm[2] / half_mm) *
-                 legendre(l, (std::hypot(X_mm[0], X_mm[1]) - middle_mm) / half_wall_mm);
+        const auto value = [=](const WallPlace& place) {
+          const double theta = m * place.turn_rad;
+          return (sine ? std::sin(theta) : std::cos(theta)) * legendre(k, place.height) *
+                 legendre(l, 2.0 * place.depth - 1.0);
         };
         result.push_back(
             {value,
@@ -126,23 +126,46 @@ std::vector<double> body_force(const ElasticSystem& system, size_t unknowns, con
 
 class Builder {
  public:
-  Builder(FieldProblem& problem, const std::vector<double>& pressures_kPa)
-      : problem_(problem), pressures_kPa_(pressures_kPa), harmonics_(harmonics(problem.field().base)) {}
+  Builder(const MotionResiduals& rows, ElasticModel& body, const ElasticState& state,
+          const std::vector<double>& pressures_kPa)
+      : rows_(rows),
+        body_(body),
+        state_(state),
+        pressures_kPa_(pressures_kPa),
+        wall_(body.mesh()),
+        harmonics_(harmonics()) {}
 
   FieldModes build() {
     describe();
-    FieldModes result{modes_,
-                      Eigen::MatrixXd::Zero(problem_.rows().size(), static_cast<Index>(modes_.size()))};
-    const size_t node = problem_.highest_node();
-    const std::vector<NodeField> fields = elastic_fields(node);
+    FieldModes result{modes_, Eigen::MatrixXd::Zero(rows_.size(), static_cast<Index>(modes_.size()))};
+    const std::vector<NodeField> fields = elastic_fields();
     for (size_t slot = 0; slot < pressures_kPa_.size(); ++slot)
       fill(slot, fields, result.columns);
-    return result;
+    return possible(std::move(result));
   }
 
  private:
   static constexpr size_t rigid_motions = 6;
   static constexpr size_t courses = 2;
+  static constexpr size_t driven = 2 * rigid_motions + 3;  // in a course: plates, pose, body force
+
+  /// Of a body that hangs from one end no plate moves against the other, and how that end moves with the load is an effect.
+  [[nodiscard]] FieldModes possible(FieldModes all) const {
+    const MeshFaces& faces = body_.mesh().faces();
+    if (!faces.bottom.empty() && !faces.top.empty()) return all;
+    FieldModes result;
+    std::vector<Index> kept;
+    for (size_t i = 0; i < all.modes.size(); ++i) {
+      const size_t course = i / driven;
+      const size_t in_course = i % driven;
+      const bool moves_with_the_load = course == 0 && in_course >= rigid_motions && in_course < rigid_motions + 3;
+      if (all.modes[i].family == "plates" || moves_with_the_load) continue;
+      kept.push_back(static_cast<Index>(i));
+      result.modes.push_back(all.modes[i]);
+    }
+    result.columns = all.columns(Eigen::all, kept);
+    return result;
+  }
 
   void describe() {
     static constexpr std::array<const char*, rigid_motions> motions{
@@ -175,71 +198,77 @@ class Builder {
 
   void fill(size_t slot, const std::vector<NodeField>& fields, Eigen::MatrixXd& columns) const {
     const Eigen::MatrixXd elastic =
-        problem_.rows().columns(slot, problem_.solver().mesh(), pointers_to(fields));
-    const Index first = problem_.rows().first(slot);
-    const Index rows = problem_.rows().count(slot);
-    constexpr Index driven = 2 * rigid_motions + 3;
+        rows_.columns(slot, body_.mesh(), pointers_to(fields));
+    const Index first = rows_.first(slot);
+    const Index rows = rows_.count(slot);
+    constexpr auto of_a_course = static_cast<Index>(driven);
+    constexpr Index of_courses = static_cast<Index>(courses) * of_a_course;
     for (size_t c = 0; c < courses; ++c)
-      columns.block(first, static_cast<Index>(c) * driven, rows, driven) =
-          course_at(c, slot) * elastic.leftCols(driven);
-    const Index stiffness = elastic.cols() - driven;
-    columns.block(first, static_cast<Index>(courses) * driven, rows, stiffness) =
+      columns.block(first, static_cast<Index>(c) * of_a_course, rows, of_a_course) =
+          course_at(c, slot) * elastic.leftCols(of_a_course);
+    const Index stiffness = elastic.cols() - of_a_course;
+    columns.block(first, of_courses, rows, stiffness) =
         course_at(0, slot) * elastic.rightCols(stiffness);
     const auto count = static_cast<Index>(harmonics_.size());
-    const Index motion = static_cast<Index>(courses) * driven + stiffness;
+    const Index motion = of_courses + stiffness;
     for (Index i = 0; i < rows; ++i) {
-      const ResidualRow& row = problem_.rows().rows()[static_cast<size_t>(first + i)];
+      const ResidualRow& row = rows_.rows()[static_cast<size_t>(first + i)];
       const Eigen::RowVector3d along = by_cylindrical_motion(row);
+      const WallPlace place = wall_.at(body_.mesh(), row.point);
       for (Index h = 0; h < count; ++h) {
-        const double value = course_at(0, slot) * harmonics_[static_cast<size_t>(h)].value(row.X_mm);
+        const double value = course_at(0, slot) * harmonics_[static_cast<size_t>(h)].value(place);
         for (Index k = 0; k < 3; ++k)
           columns(first + i, motion + k * count + h) = value * along[k];
       }
     }
   }
 
-  /// Responses to plates, pose, body force, stiffness harmonics at a node; they hardly depend on the load, but for the
-  /// last, which grow with it.
-  [[nodiscard]] std::vector<NodeField> elastic_fields(size_t slot) const {
-    FieldSolver& solver = problem_.solver();
-    const ElasticSystem& system = solver.elastic().system();
-    const ElasticState& state = solver.state(slot);
+  /// Responses to plates, pose, body force, stiffness harmonics; they hardly depend on the load, but for the last, which grow
+  /// with it.
+  [[nodiscard]] std::vector<NodeField> elastic_fields() const {
+    const ElasticSystem& system = body_.system();
     const std::vector<unsigned char> top = held_at_top(system);
     const std::vector<unsigned char> all(top.size(), 1);
     std::vector<std::vector<double>> sides;
     std::vector<NodeField> prescribed;
     for (size_t motion = 0; motion < rigid_motions; ++motion) {
-      prescribed.push_back(rigid(system.mesh(), state.position_mm, motion, top));
-      sides.push_back(resistance(system, state, prescribed.back()));
+      prescribed.push_back(rigid(system.mesh(), state_.position_mm, motion, top));
+      sides.push_back(resistance(system, state_, prescribed.back()));
     }
     for (Index axis = 0; axis < 3; ++axis)
-      sides.push_back(body_force(system, solver.elastic().dofs(), Vector3d::Unit(axis)));
-    std::vector<StiffnessField> stiffness;
+      sides.push_back(body_force(system, body_.dofs(), Vector3d::Unit(axis)));
+    std::vector<GaussNumbers> stiffness;
     for (size_t h = 1; h < harmonics_.size(); ++h)
-      stiffness.push_back(harmonics_[h].value);
-    std::ranges::move(solver.stiffness_sides(slot, stiffness), std::back_inserter(sides));
-    std::vector<NodeField> responses = solver.responses(slot, std::move(sides));
+      stiffness.push_back(at_gauss_points(system.mesh(), [&](const MaterialPoint& point) {
+        return harmonics_[h].value(wall_.at(system.mesh(), point));
+      }));
+    std::ranges::move(stiffness_sides(system, state_, stiffness), std::back_inserter(sides));
+    std::vector<NodeField> responses = explain::responses(body_, state_, sides);
     std::vector<NodeField> fields;
     for (size_t motion = 0; motion < rigid_motions; ++motion) {
       fields.push_back(std::move(responses[motion]));
       add_scaled(fields.back(), 1.0, prescribed[motion]);
     }
     for (size_t motion = 0; motion < rigid_motions; ++motion)
-      fields.push_back(rigid(system.mesh(), state.position_mm, motion, all));
+      fields.push_back(rigid(system.mesh(), state_.position_mm, motion, all));
     std::move(responses.begin() + rigid_motions, responses.end(), std::back_inserter(fields));
     return fields;
   }
 
-  FieldProblem& problem_;
+  const MotionResiduals& rows_;
+  ElasticModel& body_;
+  const ElasticState& state_;
   const std::vector<double>& pressures_kPa_;
+  WallCoordinates wall_;
   std::vector<Harmonic> harmonics_;
   std::vector<FieldMode> modes_;
 };
 
 }  // namespace
 
-FieldModes field_modes(FieldProblem& problem, const std::vector<double>& pressures_kPa) {
-  return Builder(problem, pressures_kPa).build();
+FieldModes field_modes(const MotionResiduals& rows, ElasticModel& body, const ElasticState& state,
+                       const std::vector<double>& pressures_kPa) {
+  return Builder(rows, body, state, pressures_kPa).build();
 }
 
 }  // namespace diastole::explain

@@ -15,7 +15,8 @@
 #include <string>
 #include <vector>
 
-#include "estimator/explain/imaging/field_fit.hpp"
+#include "estimator/fe/elastic_model.hpp"
+#include "estimator/motion_residuals/motion_residuals.hpp"
 
 namespace diastole::explain {
 
@@ -30,7 +31,8 @@ struct FieldModes {
   Eigen::MatrixXd columns;  ///< over the problem's rows
 };
 
-/// Precondition: the problem's solver stands at the solutions of a base fit with these frame pressures.
-FieldModes field_modes(FieldProblem& problem, const std::vector<double>& pressures_kPa);
+/// Over the rows of a base fit with these pressures, one a slot; the body's equilibrium at the highest of them.
+FieldModes field_modes(const MotionResiduals& rows, ElasticModel& body, const ElasticState& state,
+                       const std::vector<double>& pressures_kPa);
 
 }  // namespace diastole::explain

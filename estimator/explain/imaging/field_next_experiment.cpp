@@ -115,7 +115,7 @@ class Outlook {
     return result;
   }
 
-  [[nodiscard]] Index pressure_unknown(Index slot) const { return 1 + effects_ + slot; }
+  [[nodiscard]] Index pressure_unknown(Index slot) const { return static_cast<Index>(b_.law.size()) + effects_ + slot; }
 
   [[nodiscard]] double sigma_kPa(Index slot) const {
     const int frame = rows_.frames()[static_cast<size_t>(slot)];
@@ -136,8 +136,8 @@ class Outlook {
 
   void add_knowledge(const Imaging& imaging, Gram& gram) const {
     double C1_sigma = field_.C1_start_kPa.sigma;
-    if (imaging.shear_test && C1_sigma == 0.0) C1_sigma = shear_error * a_.C1_kPa;
-    if (C1_sigma > 0.0) gram.add_one((b_.C1_kPa - a_.C1_kPa) / C1_sigma, 0, b_.C1_kPa / C1_sigma);
+    if (imaging.shear_test && C1_sigma == 0.0 && b_.law.size() == 1) C1_sigma = shear_error * a_.law[0];
+    if (C1_sigma > 0.0) gram.add_one((b_.law[0] - a_.law[0]) / C1_sigma, 0, b_.law[0] / C1_sigma);
     Index prior = slots_ + (field_.C1_start_kPa.sigma > 0.0 ? 1 : 0);
     const auto add_prior = [&](double delta) {
       Eigen::VectorXd row = b_.jacobian.row(b_.residuals.size() + prior);
@@ -284,7 +284,7 @@ NextExperiment sharpening_images(const FieldCase& field, const MotionResiduals& 
   const Outlook outlook(field, rows, named, named);
   const size_t size_of_effect = fit.choice.free.front();
   const EffectParameter& parameter = fit.choice.parameter(size_of_effect);
-  constexpr Index unknown = 1;
+  const auto unknown = static_cast<Index>(fit.law.size());
   const auto distance = [&](double variance) {
     const inference::Parameter scale = searched(parameter);
     const double away =

@@ -27,14 +27,13 @@ std::array<Eigen::Matrix3d, gauss_points> law_forces(const ElasticSystem& system
   const HermiteMesh& mesh = system.mesh();
   const ReferenceElement reference = make_reference_element(mesh, element, system.material_axes());
   const GaussMatrices gradients = gradients_at_points(mesh.gather(element, state.position_mm));
-  const double C1_kPa = system.parameters(element).front();
   std::array<Eigen::Matrix3d, gauss_points> forces;
   for (size_t q = 0; q < gauss_points; ++q) {
     const Eigen::Matrix3d& t = reference[q].material_to_xi;
     const Eigen::Matrix3d f = gradients.at(q) * t;
-    const SymmetricTensor<double> by_C1 =
-        system.law().stress_sensitivity(symmetric_part(f.transpose() * f), system.parameters(element), 0);
-    forces[q] = -C1_kPa * reference[q].volume * f * full_matrix(by_C1) * t.transpose();
+    const SymmetricTensor<double> stress =
+        system.law().stress(symmetric_part(f.transpose() * f), system.parameters(element));
+    forces[q] = -reference[q].volume * f * full_matrix(stress) * t.transpose();
   }
   return forces;
 }
@@ -122,7 +121,7 @@ FieldSolver::Slopes FieldSolver::slopes(size_t slot, const std::vector<FieldPert
     for (double& value : right_sides.back())
       value /= perturbation.width;
   }
-  std::vector<NodeField> fields = responses(slot, std::move(right_sides));
+  std::vector<NodeField> fields = responses(slot, right_sides);
   for (NodeField& field : fields)
     for (double& value : field)
       value *= model_.displacement_gain;
@@ -146,22 +145,15 @@ NodeField FieldSolver::reference_slope(const FieldPerturbation& perturbation) co
   return slope;
 }
 
-std::vector<std::vector<double>> FieldSolver::stiffness_sides(
-    size_t slot, const std::vector<StiffnessField>& fields) const {
-  std::vector<GaussNumbers> numbers;
-  for (const StiffnessField& field : fields)
-    numbers.push_back(at_gauss_points(mesh(), field));
-  return explain::stiffness_sides(elastic_->system(), state(slot), numbers);
-}
-
-std::vector<NodeField> FieldSolver::responses(size_t slot, std::vector<std::vector<double>> right_sides) {
-  ElasticSystem& system = elastic_->system();
-  const size_t unknowns = elastic_->dofs();
+std::vector<NodeField> responses(ElasticModel& body, const ElasticState& state,
+                                 const std::vector<std::vector<double>>& right_sides) {
+  ElasticSystem& system = body.system();
+  const size_t unknowns = body.dofs();
   std::vector<double> columns;
   columns.reserve(unknowns * right_sides.size());
   for (const std::vector<double>& side : right_sides)
     columns.insert(columns.end(), side.begin(), side.end());
-  system.factorise(state(slot));
+  system.factorise(state);
   system.solve(columns, right_sides.size());
   std::vector<NodeField> fields;
   for (size_t i = 0; i < right_sides.size(); ++i)
@@ -169,11 +161,12 @@ std::vector<NodeField> FieldSolver::responses(size_t slot, std::vector<std::vect
   return fields;
 }
 
-GaussNumbers at_gauss_points(const HermiteMesh& mesh, const StiffnessField& field) {
+GaussNumbers at_gauss_points(const HermiteMesh& mesh,
+                             const std::function<double(const MaterialPoint&)>& field) {
   GaussNumbers numbers(mesh.element_count());
   for (size_t e = 0; e < mesh.element_count(); ++e)
     for (size_t q = 0; q < gauss_points; ++q)
-      numbers[e][q] = field(mesh.value(mesh.reference(), {e, gauss_tables().xi[q]}));
+      numbers[e][q] = field({e, gauss_tables().xi[q]});
   return numbers;
 }
 

@@ -10,6 +10,7 @@
 // Units: mm, kPa.
 
 #include <array>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -18,6 +19,7 @@
 #include "estimator/fe/elastic_model.hpp"
 #include "estimator/fe/elastic_system.hpp"
 #include "estimator/mesh/point_locator.hpp"
+#include "estimator/model/inclusion_stiffness.hpp"
 
 namespace diastole::explain {
 
@@ -27,6 +29,11 @@ struct FieldPerturbation {
   FieldModel down;
   double width = 0.0;  ///< between them, in the parameter's coordinate
 };
+
+/// K^-1 applied to each of these right-hand sides over the unknowns, as displacement fields; the tangent is that of an
+/// equilibrium.
+std::vector<NodeField> responses(ElasticModel& body, const ElasticState& state,
+                                 const std::vector<std::vector<double>>& right_sides);
 
 class FieldSolver {
  public:
@@ -53,13 +60,11 @@ class FieldSolver {
   /// Of the undeformed mesh by a perturbation; empty where it stays.
   [[nodiscard]] NodeField reference_slope(const FieldPerturbation& perturbation) const;
 
-  /// K^-1 applied to each of these right-hand sides over the unknowns, as displacement fields; the tangent is that of the
-  /// slot's solution.
-  [[nodiscard]] std::vector<NodeField> responses(size_t slot, std::vector<std::vector<double>> right_sides);
-
-  /// - dR/dc for C1(X) (1 + c field(X)), one for each field: what `responses` turns into the motion's changes by c.
-  [[nodiscard]] std::vector<std::vector<double>> stiffness_sides(
-      size_t slot, const std::vector<StiffnessField>& fields) const;
+  /// The same of the slot's solution.
+  [[nodiscard]] std::vector<NodeField> responses(size_t slot,
+                                                 const std::vector<std::vector<double>>& right_sides) {
+    return explain::responses(*elastic_, state(slot), right_sides);
+  }
 
   [[nodiscard]] ElasticModel& elastic() { return *elastic_; }
   [[nodiscard]] const ElasticState& state(size_t slot) const { return states_[slot].value(); }
@@ -80,14 +85,11 @@ class FieldSolver {
 
 // How forces answer to the stiffness: right-hand sides for a body's tangent.
 
-/// Numbers at the Gauss points of each element.
-using GaussNumbers = std::vector<std::array<double, gauss_points>>;
-
 /// The field's values at the Gauss points.
-GaussNumbers at_gauss_points(const HermiteMesh& mesh, const StiffnessField& field);
+GaussNumbers at_gauss_points(const HermiteMesh& mesh,
+                             const std::function<double(const MaterialPoint&)>& field);
 
-/// - dR/dc for C1(X) (1 + c field(X)), one for each field, over the system's unknowns. Precondition: the law's first
-/// parameter is C1, and its energy proportional to it.
+/// - dR/dc for an energy W(X) (1 + c field(X)), one for each field, over the system's unknowns.
 std::vector<std::vector<double>> stiffness_sides(const ElasticSystem& system, const ElasticState& state,
                                                  const std::vector<GaussNumbers>& fields);
 

@@ -3,8 +3,7 @@
 //
 //   R(x; m) = 0,     dx/dm_i = - K^-1 dR/dm_i
 //
-// with m the stiffness from place to place: at a Gauss point the mean over the part of the element that it stands for, because an
-// inclusion's edge is as sharp as Gauss points are apart, and what is only sampled there moves by leaps. The factor of K is kept while the inclusion changes little (decision 0071): Broyden's
+// with m the stiffness from place to place (inclusion_stiffness.hpp). The factor of K is kept while the inclusion changes little (decision 0071): Broyden's
 // corrections (estimator/fe/kept_factor.hpp) find the equilibrium with it, and derivatives are right to the inclusion's change since.
 
 #include <algorithm>
@@ -23,6 +22,7 @@
 #include "estimator/fe/kept_factor.hpp"
 #include "estimator/mesh/annulus.hpp"
 #include "estimator/mesh/node_field.hpp"
+#include "estimator/model/inclusion_stiffness.hpp"
 
 namespace diastole::explain {
 
@@ -45,7 +45,7 @@ class InclusionBody {
                 InclusionMesh mesh)
       : body_(body),
         model_(model_around(body, C1_kPa, inclusion, mesh)),
-        samples_(samples_of(model_.mesh())) {
+        stiffness_(model_.mesh()) {
     Solution solution = model_.solve(pressure_kPa);
     if (!solution.report.converged()) return;
     state_ = solution.state;
@@ -84,9 +84,6 @@ class InclusionBody {
   static constexpr double kept_deg = 1.5;
   /// By how much of what an inclusion does the body may have moved since.
   static constexpr double kept_share = 0.3;
-  /// Of the stiffness, for each Gauss point: a millimetre apart around the inclusion.
-  static constexpr size_t samples_a_side = 3;
-  static constexpr size_t samples_a_point = samples_a_side * samples_a_side * samples_a_side;
 
   /// Levels at both ends, near the plates, and at these distances from a centre; gaps of more than 20 mm are halved.
   static std::vector<double> levels_around(double half_height_mm, double centre_mm,
@@ -249,67 +246,12 @@ class InclusionBody {
       result[1 + i] = system.node_field(std::span(sides).subspan(i * model_.dofs(), model_.dofs()));
   }
   [[nodiscard]] GaussNumbers stiffness_of(const InclusionValues& values) const {
-    const Inclusion inclusion = inclusion_with(values, body_);
-    const double theta = inclusion.theta_deg * std::numbers::pi / 180.0;
-    const Eigen::Vector3d centre_mm(inclusion.radius_mm * std::cos(theta),
-                                    inclusion.radius_mm * std::sin(theta), inclusion.z_mm);
-    // Where the edge's hyperbolic tangent has ended.
-    const double longest_mm = std::ranges::max(inclusion.semi_axes_mm);
-    const double shortest_mm = std::ranges::min(inclusion.semi_axes_mm);
-    const double end_mm = longest_mm * (1.0 + 8.0 * inclusion.edge_width_mm / shortest_mm);
-    GaussNumbers numbers(samples_.size());
-    for (size_t e = 0; e < samples_.size(); ++e) {
-      numbers[e].fill(1.0);
-      if ((samples_[e].middle_mm - centre_mm).norm() > samples_[e].reach_mm + end_mm) continue;
-      for (size_t q = 0; q < gauss_points; ++q) {
-        double sum = 0.0;
-        for (size_t i = 0; i < samples_a_point; ++i) {
-          const Eigen::Vector3d& X_mm = samples_[e].X_mm[q * samples_a_point + i];
-          sum += inclusion.stiffness({X_mm[0], X_mm[1], X_mm[2]});
-        }
-        numbers[e][q] = sum / samples_a_point;
-      }
-    }
-    return numbers;
-  }
-
-  /// Where the stiffness is asked for: the parts of an element's volume that its Gauss points stand for, sampled evenly.
-  struct Samples {
-    Eigen::Vector3d middle_mm;
-    double reach_mm;
-    std::vector<Eigen::Vector3d> X_mm;
-  };
-  [[nodiscard]] static std::vector<Samples> samples_of(const HermiteMesh& mesh) {
-    // Ends of the parts of [0, 1] that the four Gauss points stand for: sums of their weights.
-    constexpr std::array<double, 5> ends{0.0, 0.1739274225687269, 0.5, 0.8260725774312731, 1.0};
-    std::vector<Samples> result(mesh.element_count());
-    for (size_t e = 0; e < mesh.element_count(); ++e) {
-      Samples& samples = result[e];
-      samples.middle_mm = mesh.value(mesh.reference(), {e, {0.5, 0.5, 0.5}});
-      samples.reach_mm = 0.0;
-      for (const Xi& point : gauss_tables().xi) {
-        std::array<size_t, 3> part{};
-        for (size_t k = 0; k < 3; ++k)
-          while (point[k] > ends[part[k] + 1])
-            ++part[k];
-        for (size_t i = 0; i < samples_a_point; ++i) {
-          const std::array<size_t, 3> digits{i % samples_a_side, i / samples_a_side % samples_a_side,
-                                             i / samples_a_side / samples_a_side};
-          Xi xi{};
-          for (size_t k = 0; k < 3; ++k)
-            xi[k] = std::lerp(ends[part[k]], ends[part[k] + 1],
-                              (static_cast<double>(digits[k]) + 0.5) / samples_a_side);
-          samples.X_mm.push_back(mesh.value(mesh.reference(), {e, xi}));
-          samples.reach_mm = std::max(samples.reach_mm, (samples.X_mm.back() - samples.middle_mm).norm());
-        }
-      }
-    }
-    return result;
+    return stiffness_.of(inclusion_with(values, body_));
   }
 
   FieldModel body_;
   ElasticModel model_;
-  std::vector<Samples> samples_;
+  InclusionStiffness stiffness_;
   std::optional<ElasticState> plain_;  ///< without an inclusion; none: no equilibrium
   ElasticState state_;                 ///< of the last inclusion
   InclusionValues wanted_{};

@@ -118,7 +118,7 @@ class InclusionFit final : public inference::LeastSquaresProblem {
         base_(base),
         guess_(guess),
         space_(space_beside(base)),
-        coarse_(problem, base.C1_kPa, problem.nodes_kPa().back(), guess, InclusionMesh::coarse),
+        coarse_(problem, base.C1_kPa(), problem.nodes_kPa().back(), guess, InclusionMesh::coarse),
         course_(course_of_stiffness(base, problem.rows(), problem.nodes_kPa().back())) {}
 
   [[nodiscard]] const inference::ParameterSpace& space() const override { return space_; }
@@ -161,7 +161,7 @@ class InclusionFit final : public inference::LeastSquaresProblem {
   /// Precondition: `descend` has found an inclusion.
   void refine(double tolerance) {
     const InclusionValues values = values_at(best_->q);
-    SeenInclusion fine(problem_, base_.C1_kPa, problem_.nodes_kPa().back(),
+    SeenInclusion fine(problem_, base_.C1_kPa(), problem_.nodes_kPa().back(),
                        inclusion_with(values, problem_.field().base), InclusionMesh::fine);
     const auto coarse = coarse_.columns(values, course_, true);
     const auto finer = fine.columns(values, course_, true);
@@ -198,7 +198,7 @@ class InclusionFit final : public inference::LeastSquaresProblem {
     }
     std::ranges::copy(values_at(best_->q),
                       result.choice.values.begin() + static_cast<std::ptrdiff_t>(base_.choice.values.size()));
-    result.C1_kPa = base_.C1_kPa * std::exp(shift[0]);
+    result.law = {base_.C1_kPa() * std::exp(shift[0])};
     for (size_t slot = 0; slot < result.pressures_kPa.size(); ++slot)
       result.pressures_kPa[slot] += shift[1 + others + static_cast<Index>(slot)];
     const Index rows = problem_.rows().size();
@@ -330,7 +330,7 @@ class InclusionFit final : public inference::LeastSquaresProblem {
     for (size_t node = 0; node < problem_.nodes_kPa().size(); ++node) {
       std::optional<InclusionBody> other;
       if (node != problem_.highest_node())
-        other.emplace(problem_.field().base, base_.C1_kPa, problem_.nodes_kPa()[node], guess_,
+        other.emplace(problem_.field().base, base_.C1_kPa(), problem_.nodes_kPa()[node], guess_,
                       InclusionMesh::coarse);
       InclusionBody& body = other ? *other : coarse_.body();
       const std::optional<InclusionBody::Addition> addition = body.addition(values, true);

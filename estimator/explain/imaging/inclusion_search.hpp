@@ -15,8 +15,9 @@ struct InclusionGuess {
   double p_value = 1.0;  ///< corrected for the number of places that can be told apart
 };
 
-/// How many inclusions of a usual size the wall has room for: places that can be told apart.
-double distinct_places(const FieldModel& body);
+/// How many inclusions of a usual size a wall has room for: places that can be told apart.
+double distinct_places(double volume_mm3);
+double wall_volume_mm3(const FieldModel& body);
 
 /// Small inclusions everywhere, and what each does to the motion.
 struct InclusionLattice {
@@ -26,9 +27,12 @@ struct InclusionLattice {
 
 /// Precondition: the problem's solver stands at `base`.
 InclusionLattice inclusion_lattice(FieldProblem& problem, const FieldFit& base);
+/// In any body, by its equilibrium at the highest pressure; `shares`: each slot's pressure over that.
+InclusionLattice inclusion_lattice(const MotionResiduals& rows, ElasticModel& body, const ElasticState& state,
+                                   const std::vector<double>& shares);
 
 /// The best stiffer and the best softer inclusion beside a fit, best first. `fit`: over the lattice's rows.
-std::vector<InclusionGuess> search_inclusion(const InclusionLattice& lattice, const FieldModel& body,
+std::vector<InclusionGuess> search_inclusion(const InclusionLattice& lattice, double volume_mm3,
                                              const FieldFit& fit);
 
 }  // namespace diastole::explain

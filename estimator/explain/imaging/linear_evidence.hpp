@@ -29,6 +29,8 @@ class LinearEvidence {
   /// Of all the chosen columns together; columns that the others hold already are not counted.
   [[nodiscard]] Gain gain(const std::vector<Eigen::Index>& chosen) const;
   [[nodiscard]] double gain(Eigen::Index column) const;
+  /// Square of a column, without what the fit's own unknowns make of it.
+  [[nodiscard]] double size(Eigen::Index column) const { return normal_(column, column); }
   /// The amount of a column that the residuals ask for.
   [[nodiscard]] double amount(Eigen::Index column) const;
 

@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "estimator/effects/effect.hpp"
-#include "estimator/fit/elastic_motion.hpp"
+#include "estimator/fit/study_motion.hpp"
 #include "estimator/model/affected_model.hpp"
 #include "protocol/contract/input_error.hpp"
 
@@ -55,7 +55,7 @@ TEST_P(EveryImagedEffect, ChangesWhatASpecimenTakesOrWhatImagesShow) {
   const Study study = gel_with(*GetParam());
   const double change_mL = volume_change_mL(study) - volume_change_mL(gel({}));
   if (GetParam()->text().id == "tag-bias") {
-    EXPECT_DOUBLE_EQ(displacement_gain_of(study), 0.95);
+    EXPECT_DOUBLE_EQ(field_change_of(study).displacement_gain, 0.95);
     EXPECT_EQ(change_mL, 0.0);
   } else {
     EXPECT_GT(std::abs(change_mL), 0.01);
@@ -85,15 +85,17 @@ TEST(AffectedModel, RefusesUnknownEffectsAndOtherSpecimens) {
 }
 
 TEST(AffectedModel, IsSeenWithItsGain) {
-  const Study study = gel({});
-  ElasticMotion plain(make_affected_model(study), {whole_parameter(0)});
-  ElasticMotion seen(make_affected_model(study), {whole_parameter(0)}, 0.9);
+  const auto motion = [](const Study& study) {
+    return study_motion(study, make_affected_model(study), {whole_parameter(0)}, false);
+  };
+  const std::unique_ptr<ElasticMotion> plain = motion(gel({}));
+  const std::unique_ptr<ElasticMotion> seen = motion(gel({"tag-bias"}, {{"tag-bias", {{"gain", 0.9}}, {}}}));
   const double C1_kPa = 8.0;
-  const NodeField true_mm = *plain.solve(0, {&C1_kPa, 1}, 2.0).position_mm;
-  const NodeField seen_mm = *seen.solve(0, {&C1_kPa, 1}, 2.0).position_mm;
-  const NodeField& still_mm = plain.mesh().reference();
-  const MotionDerivatives truly = plain.derivatives(0);
-  const MotionDerivatives apparently = seen.derivatives(0);
+  const NodeField true_mm = *plain->solve(0, {&C1_kPa, 1}, 2.0).position_mm;
+  const NodeField seen_mm = *seen->solve(0, {&C1_kPa, 1}, 2.0).position_mm;
+  const NodeField& still_mm = plain->mesh().reference();
+  const MotionDerivatives truly = plain->derivatives(0);
+  const MotionDerivatives apparently = seen->derivatives(0);
   const size_t most = static_cast<size_t>(
       std::max_element(truly.by_pressure.begin(), truly.by_pressure.end()) - truly.by_pressure.begin());
   EXPECT_NEAR(seen_mm[most] - still_mm[most], 0.9 * (true_mm[most] - still_mm[most]), 1e-12);

@@ -30,12 +30,6 @@ TEST(FieldCase, OneStiffnessAnElementIsRefusedWithARemedy) {
   EXPECT_THAT(refusal_of(study), testing::HasSubstr("vary = \"whole\""));
 }
 
-TEST(FieldCase, AChamberIsRefusedAsWhatAnEffectWouldBe) {
-  Study study = imaged_gel();
-  study.chamber = StudyChamber{};
-  EXPECT_THAT(refusal_of(study), testing::HasSubstr("back pressure is one of the effects"));
-}
-
 TEST(FieldCase, AShapeThatWasImagedUnderLoadIsRefusedForImagesAndRuns) {
   Study study = imaged_gel();
   study.imaged_at = ImagedLoad{1.0, 0.05};
@@ -44,12 +38,6 @@ TEST(FieldCase, AShapeThatWasImagedUnderLoadIsRefusedForImagesAndRuns) {
     EXPECT_THAT(refusal, testing::HasSubstr("specimen.imaged_at_kPa"));
     EXPECT_THAT(refusal, testing::HasSubstr("mesh export"));
   }
-}
-
-TEST(FieldCase, CompressibleGelIsRefused) {
-  Study study = imaged_gel();
-  study.compression.bulk_modulus_kPa = 100.0;
-  EXPECT_THAT(refusal_of(study), testing::HasSubstr("incompressible"));
 }
 
 TEST(FieldCase, OnlyThenTheImagesAreRead) {

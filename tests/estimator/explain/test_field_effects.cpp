@@ -87,7 +87,7 @@ TEST_P(EveryFieldEffect, IsFoundAgainInItsOwnData) {
   const double neutral = effect().field_neutral(measured.base)[0];
   start.values[0] =
       std::isfinite(neutral) && neutral < 100.0 ? neutral + 0.7 * (truth[0] - neutral) : 2.0 * truth[0];
-  const FieldFit fit = problem.fit(start, {base.C1_kPa, base.pressures_kPa});
+  const FieldFit fit = problem.fit(start, {base.C1_kPa(), base.pressures_kPa});
   EXPECT_TRUE(inference::is_settled(fit.termination));
   EXPECT_LT(fit.chi_square, base.chi_square - 100.0);
   const double error = std::sqrt(fit.covariance(1, 1));
@@ -107,7 +107,7 @@ TEST(FieldProblem, FindsTheModulusOfABaseSpecimen) {
   FieldProblem problem(simulated_case({}), small_mesh);
   const FieldFit fit = problem.fit({}, problem.start());
   EXPECT_TRUE(inference::is_settled(fit.termination));
-  EXPECT_NEAR(fit.C1_kPa, 8.0, 4.0 * fit.C1_kPa * std::sqrt(fit.covariance(0, 0)));
+  EXPECT_NEAR(fit.C1_kPa(), 8.0, 4.0 * fit.C1_kPa() * std::sqrt(fit.covariance(0, 0)));
   const auto rows = static_cast<double>(fit.residuals.size());
   EXPECT_NEAR(fit.chi_square, rows, 5.0 * std::sqrt(2.0 * rows));
 }

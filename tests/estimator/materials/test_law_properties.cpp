@@ -9,6 +9,7 @@
 #include <string>
 
 #include "estimator/materials/file_law.hpp"
+#include "estimator/materials/reinforced_law.hpp"
 #include "tests/estimator/materials/allocation_count.hpp"
 
 namespace diastole {
@@ -182,8 +183,8 @@ TEST_P(EveryLaw, EvaluatesWithoutAllocating) {
 }
 
 TEST_P(EveryLaw, NamesAreUniqueAndFound) {
-  if (law.name().starts_with("my-")) {
-    EXPECT_EQ(find_law(law.name()), nullptr);  // of a file
+  if (law.name().starts_with("my-") || law.name().starts_with("reinforced-")) {
+    EXPECT_EQ(find_law(law.name()), nullptr);  // of a file, or made of another law
   } else {
     EXPECT_EQ(find_law(law.name()), &law);
   }
@@ -212,6 +213,10 @@ std::vector<const Law*> laws_of_files() {
 }
 
 INSTANTIATE_TEST_SUITE_P(Files, EveryLaw, ::testing::ValuesIn(laws_of_files()), test_name);
+
+INSTANTIATE_TEST_SUITE_P(Reinforced, EveryLaw,
+                         ::testing::Values(&reinforced(*find_law("guccione")), &reinforced(*find_law("neo-hookean"))),
+                         test_name);
 
 }  // namespace
 }  // namespace diastole

@@ -13,7 +13,8 @@ constexpr std::string_view introduction =
 
 What a real rig may have that the base model ([rig-model.md](rig-model.md)) has not. `diastole effects` lists them,
 `diastole effects ID` shows one; this page is made of their declarations by `build/release/bin/effects_table`. At its
-neutral values each effect is the base model exactly. To add one: [effect.hpp](../estimator/effects/effect.hpp).
+neutral values each effect is the base model exactly. To add one: [effect.hpp](../estimator/effects/effect.hpp). Gel is the
+neo-Hookean annulus between held plates, other specimens are all that `fit` takes besides ([explain-field.md](explain-field.md)).
 
 | effect | port | |
 |---|---|---|
@@ -40,7 +41,7 @@ std::string section(const Effect& effect) {
              text.revealed_by) +
          others("Looks alike in some data", text.conflicts) +
          others("Shows only or better with", text.synergies) + table("parameter", effect.parameters()) +
-         table("parameter in images", effect.field_parameters());
+         table(fmt::format("parameter in {}", name_of(text.field_specimen)), effect.field_parameters());
 }
 
 }  // namespace
