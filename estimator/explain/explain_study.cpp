@@ -1,8 +1,10 @@
 #include "estimator/explain/explain_study.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <iterator>
 
+#include "estimator/effects/effect.hpp"
 #include "estimator/explain/imaging/explain_field.hpp"
 #include "protocol/contract/input_error.hpp"
 
@@ -20,9 +22,61 @@ Verdict together(Verdict a, Verdict b) {
   return Verdict::none;
 }
 
+using Ids = std::vector<std::string>;
+
+bool shows_in_both(const std::string& id) {
+  const Effect* effect = find_effect(id);
+  return effect != nullptr && !effect->parameters().empty() && !effect->field_parameters().empty();
+}
+
+Ids shared(const Ids& ids) {
+  Ids both;
+  std::ranges::copy_if(ids, std::back_inserter(both), shows_in_both);
+  std::ranges::sort(both);
+  return both;
+}
+
+/// Those of the sets that are left open whose effects in both data are these.
+void keep_agreeing(Explanation& explanation, const Ids& agreed) {
+  std::erase_if(explanation.ambiguous_with, [&](const Ids& ids) { return shared(ids) != agreed; });
+  if (explanation.ambiguous_with.empty()) explanation.verdict = Verdict::named;
+}
+
+/// Where one explanation is named by an effect that shows in both data, and that is the best of what the other leaves open, the other's
+/// question is answered.
+void answer(Explanation& open, const Explanation& named) {
+  if (open.verdict != Verdict::ambiguous || named.verdict != Verdict::named) return;
+  Ids best, known;
+  for (const FoundEffect& effect : open.effects)
+    best.push_back(effect.id);
+  for (const FoundEffect& effect : named.effects)
+    known.push_back(effect.id);
+  const Ids agreed = shared(known);
+  if (!agreed.empty() && shared(best) == agreed) keep_agreeing(open, agreed);
+}
+
 }  // namespace
 
+Study with_imaged_modulus(Study study, const Explanation& field) {
+  /// Of a modulus from images beside what their fit says: lengths, and what tracking costs (facts of gels: 0.1 to 0.7 %).
+  constexpr double beside_the_fit = 0.007;
+  if (field.verdict != Verdict::none && field.verdict != Verdict::named) return study;
+  if (study.law.parameters.empty()) return study;
+  StudyParameter& modulus = study.law.parameters.front();
+  const auto seen = std::ranges::find(field.law, modulus.name, &ParameterShift::name);
+  if (seen == field.law.end() || !modulus.name.ends_with("_kPa") || !(seen->after > 0.0)) return study;
+  // A uniform distribution over the bounds has the standard deviation that is known.
+  const double reach = std::exp(std::sqrt(3.0) * std::hypot(seen->after_error / seen->after, beside_the_fit));
+  if (!(reach * reach < modulus.upper / modulus.lower)) return study;
+  modulus.lower = seen->after / reach;
+  modulus.upper = seen->after * reach;
+  modulus.start = seen->after;
+  return study;
+}
+
 Explanation merged(Explanation rig, Explanation field) {
+  answer(rig, field);
+  answer(field, rig);
   Explanation both = std::move(rig);
   if (both.verdict == Verdict::none) both.gap = field.gap;
   both.verdict = together(both.verdict, field.verdict);
@@ -60,7 +114,7 @@ Explanation explain_study(const Study& study, const ExplainOptions& options) {
     if (options.learn) field.not_learned = "that takes runs, and the study has images only";
     return field;
   }
-  return merged(explain_rig(study, options), std::move(field));
+  return merged(explain_rig(with_imaged_modulus(study, field), options), std::move(field));
 }
 
 }  // namespace diastole::explain

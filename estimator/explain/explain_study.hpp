@@ -10,8 +10,15 @@ namespace diastole::explain {
 /// Throws InputError if the study names neither runs nor tags or points, and what explain_rig and explain_field throw.
 Explanation explain_study(const Study& study, const ExplainOptions& options);
 
-/// What recordings of the rig and images of the specimen say together: the effects of both, named only if both agree
-/// that nothing else is open.
+// Runs and images of one study are explained together. The images come first: what they say of the modulus, with the effects that
+// they name, is a measurement of it for the runs, so that there is one C1. An effect that shows in both is then judged by both: sets
+// that only one of them leaves open are closed by the other.
+
+/// The study as the runs see it: its modulus is known as well as the images tell it, if that is better than the study does. As it
+/// stands where the images are unexplained or ambiguous.
+Study with_imaged_modulus(Study study, const Explanation& field);
+
+/// Effects of both; named only if both agree that nothing else is open.
 Explanation merged(Explanation rig, Explanation field);
 
 }  // namespace diastole::explain

@@ -52,6 +52,7 @@ class Explainer {
     fit_base();
     fit_effects();
     judge();
+    out_.law = specimen_.shifts(chosen_ != nullptr ? chosen_->fit : specimen_.base());
     fill_evidence();
     fill_field();
     propose();

@@ -42,15 +42,16 @@ std::string explained_study(const Study& study, const std::filesystem::path& fol
   toml::table root = toml::parse_file(study.file.string());
   const std::filesystem::path from = study.file.parent_path();
   if (toml::table* data = root["data"].as_table()) {
-    for (const char* key : {"tags", "points", "frames"})
+    for (const char* key : {"tags", "points", "frames", "images"})
       if (toml::node* path = data->get(key)) move_path(*path, from, folder);
     for (const char* key : {"runs", "reference"})
       if (toml::array* paths = (*data)[key].as_array())
         for (toml::node& path : *paths)
           move_path(path, from, folder);
   }
-  if (root["specimen"]["kind"].value_or(std::string()) == "mesh")
-    if (toml::node* mesh = root["specimen"].as_table()->get("file")) move_path(*mesh, from, folder);
+  if (toml::table* specimen = root["specimen"].as_table())
+    for (const char* key : {"file", "mesh_file", "fibres"})
+      if (toml::node* path = specimen->get(key)) move_path(*path, from, folder);
   if (toml::table* law = root["law"].as_table())
     if (toml::node* file = law->get("file")) move_path(*file, from, folder);
   for (const ParameterShift& shift : starts) {

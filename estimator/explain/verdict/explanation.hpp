@@ -229,6 +229,7 @@ struct Explanation {
   std::vector<Step> steps;
   std::vector<Trace> traces;
   std::vector<FieldResidual> field;
+  std::vector<ParameterShift> law;  ///< of images: the law's values, by the fit that the verdict rests on
   double seconds = 0.0;
 };
 

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Geometry>
 #include <fstream>
 #include <numbers>
 #include <random>
@@ -13,7 +14,7 @@
 namespace diastole::test {
 namespace {
 
-constexpr const char* study_text = R"(format = "diastole-study"
+constexpr std::string_view study_text = R"(format = "diastole-study"
 version = 1
 
 [specimen]
@@ -46,9 +47,9 @@ points = "lv.points.csv"
 frames = "lv.frames.csv"
 )";
 
-Study study_in(const std::filesystem::path& folder, const char* file, const char* mesh, bool truth) {
-  std::ofstream(folder / file) << (truth ? fmt::format(fmt::runtime(study_text), mesh, 3.0, 11.0, 1.8, 10.0)
-                                         : fmt::format(fmt::runtime(study_text), mesh, 2.0, 16.0, 2.4, 8.0));
+Study study_in(const std::filesystem::path& folder, const char* file, const char* mesh,
+               const std::array<double, 4>& law) {
+  std::ofstream(folder / file) << fmt::format(study_text, mesh, law[0], law[1], law[2], law[3]);
   return read_study(folder / file);
 }
 
@@ -58,7 +59,7 @@ Study simulated(const SimulatedVentricle& ventricle, const std::filesystem::path
   constexpr std::array<double, 5> pressures_kPa{0.4, 0.8, 1.2, 1.6, 2.0};
   constexpr double pressure_sigma_kPa = 0.01;
   std::filesystem::create_directories(folder);
-  const Study truth = study_in(folder, "truth.study.toml", ventricle.mesh, true);
+  const Study truth = study_in(folder, "truth.study.toml", ventricle.mesh, ventricle.law);
   const ChangeableSpecimen specimen(truth);
   const BodyChanges changes{.body = [&](const FieldModel& change) { return specimen.with(change); },
                             .change = [&](auto) { return ventricle.truth; }};
@@ -93,7 +94,7 @@ Study simulated(const SimulatedVentricle& ventricle, const std::filesystem::path
   }
   points.close();
   frames.close();
-  return study_in(folder, "lv.study.toml", "6, 4, 1", false);
+  return study_in(folder, "lv.study.toml", "6, 4, 1", {2.0, 16.0, 2.4, 8.0});
 }
 
 }  // namespace diastole::test

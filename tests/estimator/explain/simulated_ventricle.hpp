@@ -1,7 +1,7 @@
 #pragma once
 // Imaged motion of a ventricle with an effect hidden in it, solved on another mesh than the study's, as a folder with a study.
 
-#include <Eigen/Dense>
+#include <array>
 #include <cstdint>
 #include <filesystem>
 
@@ -15,6 +15,7 @@ struct SimulatedVentricle {
   /// What no effect of the library is: the base and all that hangs from it turns about the axis, at the highest pressure.
   double twist_deg = 0.0;
   double sag_mm = 0.0;  ///< sideways at the apex, growing with the square of the distance from the base
+  std::array<double, 4> law{3.0, 11.0, 1.8, 10.0};  ///< C_kPa, b1, b2, b3
   double sigma_mm = 0.3;
   size_t points = 1500;  ///< a frame
   std::uint64_t seed = 1;

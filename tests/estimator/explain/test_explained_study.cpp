@@ -49,6 +49,34 @@ TEST(ExplainedStudy, CarriesTheUsersFiles) {
   EXPECT_THAT(again.effects, ElementsAre("mine"));
 }
 
+TEST(ExplainedStudy, CarriesTheSpecimensFiles) {
+  test::ScratchFolder folder;
+  const Study study = read_study(folder.write("heart.study.toml", R"(format = "diastole-study"
+version = 1
+[specimen]
+kind = "mesh"
+mesh_file = "heart.mesh.toml"
+fibres = "heart.fibres.csv"
+ends = "fixed"
+[law]
+name = "guccione"
+parameters.C_kPa = { start = 1.0, bounds = [0.1, 10.0] }
+[data]
+images = "dicom"
+frames = "heart.frames.csv"
+)"));
+  const auto out = study.file.parent_path() / "out";
+  std::filesystem::create_directories(out);
+  const Study again = read_study(
+      folder.write("out/explained.study.toml", explained_study(study, out, {{"fibre-turn", {}, {}}}, {})));
+  const auto same = [](const std::filesystem::path& a, const std::filesystem::path& b) {
+    return std::filesystem::weakly_canonical(a) == std::filesystem::weakly_canonical(b);
+  };
+  EXPECT_TRUE(same(std::get<MeshSpecimen>(again.specimen).file, std::get<MeshSpecimen>(study.specimen).file));
+  EXPECT_TRUE(same(*again.fibres, *study.fibres));
+  EXPECT_TRUE(same(*again.data.images, *study.data.images));
+}
+
 TEST(ExplainedStudy, ATableOfAnEffectThatIsNotListedIsRefused) {
   test::ScratchFolder folder;
   const std::string stray = gel + "[model.parameters.hose-compliance.wave_speed_m_s]\nstart = 46.0\n";

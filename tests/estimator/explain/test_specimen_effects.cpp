@@ -9,6 +9,7 @@
 #include "estimator/mesh/node_field.hpp"
 #include "estimator/model/changed_specimen.hpp"
 #include "tests/estimator/explain/simulated_ventricle.hpp"
+#include "tests/estimator/io/scratch_file.hpp"
 
 namespace diastole {
 namespace {
@@ -16,8 +17,8 @@ namespace {
 class EverySpecimenEffect : public testing::TestWithParam<const Effect*> {
  protected:
   static Study small_ventricle() {
-    Study study = test::simulated({.points = 1, .mesh = "4, 3, 1"},
-                                  std::filesystem::path(testing::TempDir()) / "ventricle-effects");
+    const test::ScratchFolder folder;
+    Study study = test::simulated({.points = 1, .mesh = "4, 3, 1"}, folder.path());
     std::get<EllipsoidSpecimen>(study.specimen).mesh = {4, 3, 1};
     return study;
   }

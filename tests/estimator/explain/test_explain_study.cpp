@@ -1,0 +1,61 @@
+// Runs and images of one study, explained together.
+
+#include "estimator/explain/explain_study.hpp"
+
+#include <gmock/gmock.h>
+
+#include <cmath>
+
+namespace diastole::explain {
+namespace {
+
+Study gel() {
+  Study study;
+  study.law = {"neo-hookean", {{"C1_kPa", 6.0, 1.0, 15.0, Variation::whole}}};
+  return study;
+}
+
+Explanation of(Verdict verdict, std::vector<std::string> ids = {}, std::vector<std::vector<std::string>> others = {}) {
+  Explanation explanation;
+  explanation.verdict = verdict;
+  for (const std::string& id : ids)
+    explanation.effects.push_back({id, {}, {}});
+  explanation.ambiguous_with = std::move(others);
+  explanation.law = {{"C1_kPa", 8.0, 0.1, 8.5, 0.08}};
+  return explanation;
+}
+
+TEST(RunsAndImages, TheImagesModulusIsAMeasurementForTheRuns) {
+  const StudyParameter modulus = with_imaged_modulus(gel(), of(Verdict::named)).law.parameters.front();
+  EXPECT_DOUBLE_EQ(modulus.start, 8.5);
+  EXPECT_NEAR(std::log(modulus.upper / modulus.lower) / std::sqrt(12.0), std::hypot(0.08 / 8.5, 0.007), 1e-12);
+}
+
+TEST(RunsAndImages, WhatImagesDoNotExplainSaysNothingOfTheModulus) {
+  for (const Verdict verdict : {Verdict::unexplained, Verdict::ambiguous})
+    EXPECT_EQ(with_imaged_modulus(gel(), of(verdict)).law.parameters.front().upper, 15.0);
+  Study known = gel();
+  known.law.parameters.front() = {"C1_kPa", 8.0, 7.99, 8.01, Variation::whole};
+  EXPECT_EQ(with_imaged_modulus(known, of(Verdict::named)).law.parameters.front().upper, 8.01);
+}
+
+TEST(RunsAndImages, AnEffectThatShowsInBothIsJudgedByBoth) {
+  const Explanation both = merged(of(Verdict::ambiguous, {"radius-error"}, {{"stroke-gain"}, {"end-bond-slip"}}),
+                                  of(Verdict::named, {"radius-error"}));
+  EXPECT_EQ(both.verdict, Verdict::named);
+  EXPECT_TRUE(both.ambiguous_with.empty());
+  EXPECT_EQ(both.effects.size(), 1U);
+}
+
+TEST(RunsAndImages, WhatTheyDisagreeOnStaysOpen) {
+  const std::vector<std::vector<std::string>> others{{"stroke-gain"}};
+  EXPECT_EQ(merged(of(Verdict::ambiguous, {"radius-error"}, others), of(Verdict::named, {"tag-bias"})).verdict,
+            Verdict::ambiguous);
+  EXPECT_EQ(merged(of(Verdict::ambiguous, {"radius-error"}, others), of(Verdict::none)).verdict,
+            Verdict::ambiguous);
+  EXPECT_EQ(merged(of(Verdict::named, {"seal-leak-pump"}), of(Verdict::unexplained)).verdict,
+            Verdict::unexplained);
+}
+
+}  // namespace
+}  // namespace diastole::explain
