@@ -29,6 +29,7 @@ struct FitArguments {
   std::string robust = "auto";
   double pressure_offset_kPa = 0;
   double fibre_sigma_deg = 0, geometry_sigma_mm = 0;
+  bool finer_mesh = false;
   std::optional<std::filesystem::path> energy;
   bool profile = false;
   int posterior_draws = 0;
@@ -211,6 +212,7 @@ ExitCode run_fit(const FitArguments& arguments, const CommandOutput& out) {
   options.unload = arguments.study.unload;
   options.fibre_sigma_deg = arguments.fibre_sigma_deg;
   options.geometry_sigma_mm = arguments.geometry_sigma_mm;
+  options.finer_mesh = arguments.finer_mesh;
   options.start = start_of(arguments, study);
   options.profile = arguments.profile;
   if (arguments.pressure_offset_kPa > 0) options.pressure_offset_sigma_kPa = arguments.pressure_offset_kPa;
@@ -291,6 +293,9 @@ void add_fit(CommandLine& line) {
       ->add_option("--geometry-sigma-mm", arguments->geometry_sigma_mm,
                    "the walls may lie off their places by as much: likewise")
       ->check(CLI::Range(0.0, 10.0));
+  command->add_flag("--finer-mesh", arguments->finer_mesh,
+                    "correct the motion by what twice as many elements each way change at the estimate, and fit "
+                    "again: the finer mesh's values for one solution on it (docs/estimation.md)");
   command->add_option(
       "--energy", arguments->energy,
       "the work that the pressure has done is what the wall stores: a loop of pressure against volume from "

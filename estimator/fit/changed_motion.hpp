@@ -41,8 +41,6 @@ class ChangedMotion : public ElasticMotion {
   };
   [[nodiscard]] std::vector<NodeField> by_changes(size_t slot, const std::vector<Perturbation>& changes);
 
-  /// Of the slot's last successful `solve`, the body's own.
-  [[nodiscard]] const NodeField& position_mm(size_t slot) const { return state(slot_of(slot)).position_mm; }
   /// The body at a slot's solution, its tangent factorised there, and the solution.
   struct Equilibrium {
     ElasticModel& body;

@@ -209,6 +209,17 @@ FitOutcome fit_motion(MotionModel& model, const std::vector<EstimatedParameter>&
     again = stalled && problem.give_up_lost() > 0;
     if (!outcome.converged() && !stalled) break;
   }
+  if (outcome.converged() && options.correction) {
+    if (const std::optional<Eigen::VectorXd> correction = options.correction(problem, q)) {
+      problem.set_correction(*correction);
+      outcome.corrected = std::sqrt(correction->squaredNorm() / static_cast<double>(correction->size()));
+      inference::SearchResult found = search_from(problem, q, outcome, options, false);
+      q = found.q;
+      outcome.termination = found.termination;
+      outcome.reason = std::move(found.reason);
+      outcome.iterations += found.iterations;
+    }
+  }
   if (outcome.converged()) require_half_usable(point_share(problem), options.file);
   if (!outcome.history.empty()) {
     const bool averaged = outcome.converged() && any_by_evidence(options) && problem.residuals(q);

@@ -128,6 +128,13 @@ double JointProblem::pressure_at(const LoadedFrame& frame, const Eigen::VectorXd
   return frame.load.pressure_kPa - offset_at(q);
 }
 
+std::vector<double> JointProblem::pressures_at(const Eigen::VectorXd& q) const {
+  std::vector<double> pressures_kPa;
+  for (const LoadedFrame& frame : frames_)
+    pressures_kPa.push_back(pressure_at(frame, q));
+  return pressures_kPa;
+}
+
 double JointProblem::imaged_pressure_at(const Eigen::VectorXd& q) const {
   if (imaged_unknown_) return q[*imaged_unknown_];
   return imaged_->pressure_kPa - offset_at(q);

@@ -128,6 +128,8 @@ class JointProblem : public inference::LeastSquaresProblem {
   [[nodiscard]] Eigen::Index data_rows() const;
   [[nodiscard]] const Eigen::VectorXd& start() const { return start_; }
   [[nodiscard]] const std::vector<LoadedFrame>& frames() const { return frames_; }
+  /// The frames' pressures at q.
+  [[nodiscard]] std::vector<double> pressures_at(const Eigen::VectorXd& q) const;
   /// Place in q of the pressures' common offset (measured less true), if there is one.
   [[nodiscard]] std::optional<Eigen::Index> offset_unknown() const { return offset_unknown_; }
 

@@ -19,6 +19,8 @@ struct StudyFitOptions {
   /// Standard deviations of errors that the whole body has alike (considered_errors.hpp); the estimate's errors then hold them.
   double fibre_sigma_deg = 0.0;
   double geometry_sigma_mm = 0.0;
+  /// Corrects the motion by what twice as many elements each way change at the estimate, and fits again (finer_mesh.hpp).
+  bool finer_mesh = false;
   /// By a loop of pressure against volume that was measured apart from the tags (work_energy.hpp).
   std::optional<MeasuredWork> work = {};
   bool profile = false;  ///< profile intervals of whole parameters
@@ -38,7 +40,7 @@ LocatorOptions locator_for(const Specimen& specimen);
 
 /// Throws InputError for a start whose parameters are not the study's, for studies that cannot be modelled
 /// (study_model.hpp), hold no loaded point, or hardly one on the specimen (usable_points.hpp).
-/// Likewise for a work that the study's body cannot take.
+/// Likewise for a work that the study's body cannot take, and for a finer mesh of an unloaded body or of values that vary by element.
 /// Where the start values carry no equilibrium, the fit begins with a stiffer material and says so in a remark.
 /// Numerical trouble is reported by `converged` and `reason` of the record.
 FitRecord fit_study(const Study& study, const Measurement& measurement, const StudyFitOptions& options);

@@ -35,9 +35,9 @@ bool has_one_held_end(const HermiteMesh& mesh) {
 
 }  // namespace
 
-ChangeableSpecimen::ChangeableSpecimen(Study study) : study_(std::move(study)) {
-  study_.effects.clear();
-  parts_ = std::make_shared<const SpecimenParts>(specimen_parts(study_));
+ChangeableSpecimen::ChangeableSpecimen(Study study) {
+  study.effects.clear();
+  parts_ = std::make_shared<const SpecimenParts>(specimen_parts(study));
   stiffness_ = std::make_shared<const InclusionStiffness>(mesh());
   depths_ = std::make_shared<const std::vector<double>>(NodalLines(mesh()).depths());
 }

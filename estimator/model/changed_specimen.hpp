@@ -24,7 +24,6 @@ class ChangeableSpecimen {
   explicit ChangeableSpecimen(Study study);
 
   [[nodiscard]] const HermiteMesh& mesh() const { return parts_->body.mesh; }
-  [[nodiscard]] const Study& study() const { return study_; }
   /// Whether it can have that effect.
   [[nodiscard]] bool takes(const Effect& effect) const;
   /// Those that it can have, in the list's order.
@@ -34,7 +33,6 @@ class ChangeableSpecimen {
   [[nodiscard]] ElasticModel with(const FieldModel& change, const SolveOptions& options = {}) const;
 
  private:
-  Study study_;
   std::shared_ptr<const SpecimenParts> parts_;
   std::shared_ptr<const InclusionStiffness> stiffness_;
   std::shared_ptr<const std::vector<double>> depths_;  // of the nodes

@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <optional>
 
 #include "estimator/explain/imaging/imaged_specimen.hpp"
@@ -14,6 +13,7 @@
 #include "estimator/explain/verdict/chi_square.hpp"
 #include "estimator/fit/changed_motion.hpp"
 #include "estimator/fit/estimated_parameters.hpp"
+#include "estimator/fit/finer_mesh.hpp"
 #include "estimator/fit/fit.hpp"
 #include "estimator/fit/study_fit.hpp"
 #include "estimator/fit/usable_points.hpp"
@@ -22,7 +22,6 @@
 #include "estimator/inference/least_squares.hpp"
 #include "estimator/io/study_refusal.hpp"
 #include "estimator/model/affected_model.hpp"
-#include "estimator/mesh/node_field.hpp"
 #include "estimator/model/changed_specimen.hpp"
 #include "protocol/contract/input_error.hpp"
 
@@ -49,27 +48,11 @@ double volume_mm3(const HermiteMesh& mesh) {
   return sum;
 }
 
-/// Twice as many elements each way: of an ellipsoid or an annulus that approximate it anew.
-Study with_finer_mesh(Study study) {
-  const auto twice = [](std::array<int, 3>& mesh) {
-    for (int& elements : mesh)
-      elements *= 2;
-  };
-  if (auto* annulus = std::get_if<AnnulusSpecimen>(&study.specimen)) {
-    twice(annulus->mesh);
-  } else if (auto* ellipsoid = std::get_if<EllipsoidSpecimen>(&study.specimen)) {
-    twice(ellipsoid->mesh);
-  } else {
-    for (int& halvings : study.refine)
-      ++halvings;
-  }
-  return study;
-}
-
 class AnySpecimen final : public ImagedSpecimen {
  public:
   AnySpecimen(const Study& study, const FieldProgress& progress)
       : progress_(progress),
+        study_(study),
         specimen_(study),
         estimated_(estimated_parameters(study, specimen_.with({}))),
         effects_(specimen_.effects()),
@@ -86,10 +69,10 @@ class AnySpecimen final : public ImagedSpecimen {
 
   void fit_base() override {
     FitOptions options;
-    options.file = specimen_.study().file.string();
+    options.file = study_.file.string();
     options.locator = field_.locator;
     options.on_step = [this](const inference::SearchStep&) { alive(); };
-    ChangedMotion motion(changes_of({}), estimated_.groups, {});
+    ChangedMotion motion(changes_of({}, specimen_), estimated_.groups, {});
     const FitOutcome fit = fit_motion(motion, estimated_.values, field_.measurement, options);
     if (fit.history.empty() || fit.frames.empty())
       throw InputError({options.file, "law.parameters", "the base model has no equilibrium: " + fit.reason,
@@ -149,6 +132,16 @@ class AnySpecimen final : public ImagedSpecimen {
     return result;
   }
 
+  void settle(FieldHypothesis& hypothesis) override {
+    if (correction_.size() == 0) return;
+    std::optional<VectorXd> correction = correction_at(hypothesis.fit);
+    if (!correction) return;
+    std::swap(correction_, *correction);
+    FieldFit fit = search(hypothesis.fit.choice, hypothesis.fit);
+    std::swap(correction_, *correction);
+    if (std::isfinite(fit.chi_square)) hypothesis.fit = std::move(fit);
+  }
+
   [[nodiscard]] double mesh_error() const override { return mesh_error_; }
 
   [[nodiscard]] double volume_change_mL(const FieldHypothesis& hypothesis) override {
@@ -182,9 +175,9 @@ class AnySpecimen final : public ImagedSpecimen {
                                      std::sqrt(fit.covariance(place, place)));
   }
 
-  [[nodiscard]] BodyChanges changes_of(const FieldChoice& choice) const {
+  [[nodiscard]] BodyChanges changes_of(const FieldChoice& choice, const ChangeableSpecimen& specimen) const {
     BodyChanges changes;
-    changes.body = [this](const FieldModel& change) { return specimen_.with(change); };
+    changes.body = [&specimen](const FieldModel& change) { return specimen.with(change); };
     changes.change = [base = field_.base, choice](std::span<const double> unknown) {
       FieldChoice at = choice;
       for (size_t i = 0; i < unknown.size(); ++i)
@@ -216,7 +209,7 @@ class AnySpecimen final : public ImagedSpecimen {
   }
 
   [[nodiscard]] ChangedMotion motion_of(const FieldChoice& choice) const {
-    ChangedMotion motion(changes_of(choice), estimated_.groups, free_values(choice));
+    ChangedMotion motion(changes_of(choice, specimen_), estimated_.groups, free_values(choice));
     if (base_motion_) motion.begin_at(*base_motion_);
     return motion;
   }
@@ -268,39 +261,30 @@ class AnySpecimen final : public ImagedSpecimen {
     return fit;
   }
 
-  /// The base model's motion on a mesh of twice as many elements each way, less that on the study's: a correction of all residuals. What is
-  /// wrong with it by then is at most a third of it, as an error of second order would be.
-  void correct_mesh() {
-    constexpr double left = 1.0 / 3.0;
-    const ChangeableSpecimen finer(with_finer_mesh(specimen_.study()));
-    ElasticModel body = finer.with(field_.base);
-    for (size_t i = 0; i < base_.law.size(); ++i)
-      body.set_parameter(estimated_.groups[i].parameter, base_.law[i]);
-    const PointLocator reference(body.mesh(), body.mesh().reference(), field_.locator);
-    const MotionResiduals there = rows_->relocated(reference);
-    VectorXd correction = VectorXd::Zero(rows_->size());
-    std::vector<size_t> slots(base_.pressures_kPa.size());
-    std::iota(slots.begin(), slots.end(), size_t{0});
-    std::ranges::sort(slots, {}, [&](size_t slot) { return std::abs(base_.pressures_kPa[slot]); });
-    std::optional<ElasticState> state;
-    for (const size_t slot : slots) {
+  /// What a finer mesh changes at a fit; nothing where it has no equilibrium.
+  [[nodiscard]] std::optional<VectorXd> correction_at(const FieldFit& fit) {
+    if (!finer_) finer_.emplace(on_finer_mesh(study_));
+    ChangedMotion own = motion_of(fit.choice);
+    ChangedMotion finer(changes_of(fit.choice, *finer_), estimated_.groups, free_values(fit.choice));
+    const std::vector<double> values = values_of(fit);
+    std::vector<NodeField> position_mm;
+    for (size_t slot = 0; slot < fit.pressures_kPa.size(); ++slot) {
       alive();
-      const double pressure_kPa = base_.pressures_kPa[slot];
-      const Solution solution = state ? body.solve(pressure_kPa, *state) : body.solve(pressure_kPa);
-      if (!solution.report.converged()) return;
-      state = solution.state;
-      const NodeField fine_mm = difference(state->position_mm, body.mesh().reference());
-      const NodeField coarse_mm = difference(base_motion_->position_mm(slot), mesh().reference());
-      const NodeField* const fine[] = {&fine_mm};
-      const NodeField* const coarse[] = {&coarse_mm};
-      correction.segment(rows_->first(slot), rows_->count(slot)) =
-          field_.base.displacement_gain *
-          (there.columns(slot, body.mesh(), fine) - rows_->columns(slot, mesh(), coarse));
+      MotionOutcome outcome = own.solve(slot, values, fit.pressures_kPa[slot]);
+      if (!outcome.position_mm) return {};
+      position_mm.push_back(*std::move(outcome.position_mm));
     }
-    correction_ = std::move(correction);
+    return finer_mesh_correction(finer, {mesh(), position_mm, values, fit.pressures_kPa}, *rows_, field_.locator);
+  }
+
+  /// Of all fits' rows, at the base; and what it may leave.
+  void correct_mesh() {
+    std::optional<VectorXd> correction = correction_at(base_);
+    if (!correction) return;
+    correction_ = *std::move(correction);
     base_ = search({}, base_);
-    const MatrixXd columns = correction_;
-    mesh_error_ = left * left * LinearEvidence(base_, columns).size(0);
+    const MatrixXd column = error_left_on_finer_mesh * correction_;
+    mesh_error_ = LinearEvidence(base_, column).size(0);
   }
 
   /// Numbers of a fit at the search's end.
@@ -520,6 +504,7 @@ class AnySpecimen final : public ImagedSpecimen {
   }
 
   FieldProgress progress_;
+  Study study_;
   ChangeableSpecimen specimen_;
   EstimatedParameters estimated_;
   std::vector<const Effect*> effects_;
@@ -530,7 +515,8 @@ class AnySpecimen final : public ImagedSpecimen {
   std::optional<MotionResiduals> rows_;
   std::unique_ptr<ChangedMotion> base_motion_;
   std::optional<InclusionLattice> lattice_;
-  VectorXd correction_;      // of the rows; empty: not known
+  std::optional<ChangeableSpecimen> finer_;
+  VectorXd correction_;      // of the rows, by the finer mesh; empty: not known
   double mesh_error_ = 0.0;  // of chi2
 };
 

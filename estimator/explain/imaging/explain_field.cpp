@@ -129,7 +129,7 @@ class Explainer {
     const FieldHypothesis& single = hypotheses_.front();
     const bool effect_seen = single.p_value < significant && single.score > 0.0;
     if (effect_seen) try_pairs();
-    const FieldHypothesis& best = hypotheses_.front();
+    FieldHypothesis& best = hypotheses_.front();
     if (!effect_seen && before.p_value > significant) {
       out_.verdict = Verdict::none;
       out_.summary = fmt::format(
@@ -145,6 +145,7 @@ class Explainer {
       out_.summary = unexplained_summary(best, effect_seen, rivalled, after);
       return;
     }
+    specimen_.settle(best);
     if (settled(best.fit)) name(best);
   }
 

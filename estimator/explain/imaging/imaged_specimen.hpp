@@ -41,6 +41,9 @@ class ImagedSpecimen {
   /// `singles`: best first. Joint fits, best first.
   [[nodiscard]] virtual std::vector<FieldHypothesis> pairs(const std::vector<FieldHypothesis>& singles) = 0;
 
+  /// Fits what is to be named once more, with the mesh's own error as it is with the effects.
+  virtual void settle(FieldHypothesis& /*hypothesis*/) {}
+
   /// How the law's values change with the effects.
   [[nodiscard]] virtual std::vector<ParameterShift> shifts(const FieldFit& after) const = 0;
   /// What the cavity takes at the highest pressure; NaN where that is not known.
