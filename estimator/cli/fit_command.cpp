@@ -293,9 +293,10 @@ void add_fit(CommandLine& line) {
       ->add_option("--geometry-sigma-mm", arguments->geometry_sigma_mm,
                    "the walls may lie off their places by as much: likewise")
       ->check(CLI::Range(0.0, 10.0));
-  command->add_flag("--finer-mesh", arguments->finer_mesh,
-                    "correct the motion by what twice as many elements each way change at the estimate, and fit "
-                    "again: the finer mesh's values for one solution on it (docs/estimation.md)");
+  command->add_flag(
+      "--finer-mesh", arguments->finer_mesh,
+      "correct the motion by what twice as many elements each way change at the estimate, and fit "
+      "again: the finer mesh's values for one solution on it (docs/estimation.md)");
   command->add_option(
       "--energy", arguments->energy,
       "the work that the pressure has done is what the wall stores: a loop of pressure against volume from "

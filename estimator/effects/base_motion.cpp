@@ -9,7 +9,8 @@ Effect base_motion_effect() {
       .id = "base-motion",
       .title = "motion of the base",
       .port = Port::field,
-      .equations = "x_seen = x + motion P: the base, and all that hangs from it, moves in proportion to the load.",
+      .equations =
+          "x_seen = x + motion P: the base, and all that hangs from it, moves in proportion to the load.",
       .source = "A mount that yields; rigid motion of a body held at one end.",
       .looks_like = "All of the body moves by the same amount, the base too.",
       .revealed_by = "Tags or marks on the mount itself.",

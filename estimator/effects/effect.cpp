@@ -67,7 +67,8 @@ const std::vector<const Effect*>& all_effects() {
 }
 
 const std::vector<const Effect*>& rig_effects() {
-  static const std::vector<const Effect*> list = those_that([](const Effect* effect) { return !effect->parameters().empty(); });
+  static const std::vector<const Effect*> list =
+      those_that([](const Effect* effect) { return !effect->parameters().empty(); });
   return list;
 }
 

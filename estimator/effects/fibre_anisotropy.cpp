@@ -10,7 +10,8 @@ Effect fibre_anisotropy_effect() {
       .title = "one family of fibres",
       .port = Port::field,
       .equations = "W = C1 (I1 - 3) + k1/(2 k2) (exp(k2 (I4 - 1)^2) - 1), fibres at an angle to the "
-                   "circumference, or to the fibres that the specimen has already; k2 = 0 is k1/2 (I4 - 1)^2. Any law takes "
+                   "circumference, or to the fibres that the specimen has already; k2 = 0 is k1/2 (I4 - "
+                   "1)^2. Any law takes "
                    "the place of C1 (I1 - 3).",
       .source = "G. A. Holzapfel, T. C. Gasser, R. W. Ogden, J. Elast. 61 (2000) 1; "
                 "estimator/materials/fibre_reinforced.cpp.",
@@ -19,8 +20,9 @@ Effect fibre_anisotropy_effect() {
       .revealed_by = "Tags in all three directions; diffusion images of the fibres.",
       .conflicts = {"strain-stiffening"},
       .field_parameters = {{"k1_kPa", "kPa", "stress of the fibres for I4 - 1", 0.0, 0.0, 60.0, 3.0},
-                           {"angle_deg", "deg", "of the fibres from the circumference, or from those that are there, towards z", 0.0, -180.0,
-                            180.0, 15.0},
+                           {"angle_deg", "deg",
+                            "of the fibres from the circumference, or from those that are there, towards z",
+                            0.0, -180.0, 180.0, 15.0},
                            {"k2", "", "stiffening of the fibres with (I4 - 1)^2", 0.0, 0.0, 60.0, 2.0}},
       .field_essentials = 2,
       .field_specimen = FieldSpecimen::any,

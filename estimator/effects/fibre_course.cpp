@@ -9,7 +9,8 @@ Effect fibre_course_effect() {
       .id = "fibre-course",
       .title = "another course of the fibres through the wall",
       .port = Port::field,
-      .equations = "Helix angle + angle (1 - 2 depth): by the angle at the inner wall, reversed at the outer one.",
+      .equations =
+          "Helix angle + angle (1 - 2 depth): by the angle at the inner wall, reversed at the outer one.",
       .source = "D. D. Streeter et al., Circ. Res. 24 (1969) 339: the helix angle's range through the wall.",
       .looks_like = "The wall twists more or less than the model's, and lengthens otherwise.",
       .revealed_by = "Diffusion images of the fibres (`diastole fibres`).",

@@ -9,8 +9,9 @@ Effect sensor_offset_effect() {
       .id = "sensor-offset",
       .title = "step of the sensor's zero",
       .port = Port::sensor,
-      .equations = "p_read = p + step from the moment on, in that run and those after it; in images the frames' "
-                   "pressures are read with one and the same offset.",
+      .equations =
+          "p_read = p + step from the moment on, in that run and those after it; in images the frames' "
+          "pressures are read with one and the same offset.",
       .source = "A bubble or a knock at the transducer, an amplifier's range.",
       .looks_like = "From one moment of the session on all readings lie higher or lower, at rest too.",
       .revealed_by = "Rest before and after the motion in every run.",
@@ -29,8 +30,8 @@ Effect sensor_offset_effect() {
               };
             });
           },
-      .field_parameters = {{"offset_kPa", "kPa", "of the frames' pressures, measured less true", 0.0, -2.0, 2.0,
-                            0.2}},
+      .field_parameters = {{"offset_kPa", "kPa", "of the frames' pressures, measured less true", 0.0, -2.0,
+                            2.0, 0.2}},
       .field_specimen = FieldSpecimen::other,
       .apply_to_field = [](EffectValues values, FieldModel& model) { model.pressure_offset_kPa = values[0]; },
   }};

@@ -87,8 +87,7 @@ MotionDerivatives ChangedMotion::derivatives_at(const ElasticState& state) {
   ElasticSystem& system = changed_model().system();
   system.solve(sides, unknown_.size());
   for (size_t i = 0; i < unknown_.size(); ++i)
-    by.by_value.push_back(
-        system.node_field(std::span(sides).subspan(i * model().dofs(), model().dofs())));
+    by.by_value.push_back(system.node_field(std::span(sides).subspan(i * model().dofs(), model().dofs())));
   return by;
 }
 
@@ -103,7 +102,8 @@ MotionOutcome ChangedMotion::solve(size_t slot, std::span<const double> values, 
     MotionOutcome rest = ElasticMotion::solve(rest_slot, values, 0.0);
     if (!rest.position_mm) return rest;
   }
-  MotionOutcome outcome = ElasticMotion::solve(slot_of(slot), values, pressure_kPa - change.pressure_offset_kPa);
+  MotionOutcome outcome =
+      ElasticMotion::solve(slot_of(slot), values, pressure_kPa - change.pressure_offset_kPa);
   if (!outcome.position_mm) return outcome;
   if (pressures_kPa_.size() <= slot) pressures_kPa_.resize(slot + 1);
   pressures_kPa_[slot] = pressure_kPa;
@@ -165,7 +165,8 @@ std::vector<NodeField> ChangedMotion::by_changes(size_t slot, const std::vector<
     at.body.system().solve(sides, changes.size());
     std::vector<NodeField> fields;
     for (size_t i = 0; i < changes.size(); ++i)
-      fields.push_back(at.body.system().node_field(std::span(sides).subspan(i * at.body.dofs(), at.body.dofs())));
+      fields.push_back(
+          at.body.system().node_field(std::span(sides).subspan(i * at.body.dofs(), at.body.dofs())));
     return fields;
   };
   std::vector<NodeField> fields = moved(equilibrium(slot));

@@ -29,7 +29,8 @@ std::optional<Eigen::VectorXd> finer_mesh_correction(MotionModel& finer, const C
   const PointLocator reference(finer.mesh(), finer.mesh().reference(), locator);
   const MotionResiduals there = rows.relocated(reference);
   Eigen::VectorXd correction(rows.size());
-  std::vector<size_t> slots(coarse.pressures_kPa.size());  // the lowest pressure first: each solution begins at the last
+  std::vector<size_t> slots(
+      coarse.pressures_kPa.size());  // the lowest pressure first: each solution begins at the last
   std::iota(slots.begin(), slots.end(), size_t{0});
   std::ranges::sort(slots, {}, [&](size_t slot) { return std::abs(coarse.pressures_kPa[slot]); });
   for (const size_t slot : slots) {

@@ -51,7 +51,8 @@ struct FitOptions {
   /// One more residual (work_energy.hpp). Precondition: the motion has an energy.
   std::optional<MeasuredWork> work;
   /// What the model's mesh gets wrong at the estimate (finer_mesh.hpp), which then is sought again with it; nothing where it is not found.
-  std::function<std::optional<Eigen::VectorXd>(const JointProblem& problem, const Eigen::VectorXd& q)> correction = {};
+  std::function<std::optional<Eigen::VectorXd>(const JointProblem& problem, const Eigen::VectorXd& q)>
+      correction = {};
   std::vector<size_t> profiled;  ///< values whose profile interval is wanted (profile.hpp)
   std::optional<PosteriorOptions> posterior;
   /// Called at each iteration with values in their own units.
@@ -131,7 +132,8 @@ struct FitOutcome {
   double unknowns = 0;  ///< not counting those on a bound; smooth values as many as the data see
   std::vector<SmoothOutcome> smoothness;
   std::optional<RobustOutcome> robust;  ///< if the loss was not the normal's
-  std::optional<double> corrected;  ///< RMS of the mesh's correction in the residuals' standard deviations, if there was one
+  std::optional<double>
+      corrected;  ///< RMS of the mesh's correction in the residuals' standard deviations, if there was one
   inference::Termination termination = inference::Termination::no_solution;
   std::string interrupted;  ///< what was ended on request after the search: "profile", "posterior" or neither
   std::string reason;

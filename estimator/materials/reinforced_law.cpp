@@ -43,9 +43,7 @@ struct Fibres {
   /// S = tension a a.
   [[nodiscard]] double tension() const { return 2.0 * k1 * stretch * growth; }
   /// dS/dE = stiffness a a a a.
-  [[nodiscard]] double stiffness() const {
-    return 4.0 * k1 * growth * (1.0 + 2.0 * k2 * stretch * stretch);
-  }
+  [[nodiscard]] double stiffness() const { return 4.0 * k1 * growth * (1.0 + 2.0 * k2 * stretch * stretch); }
   [[nodiscard]] double stretch_by_angle(const Tensor& c) const {
     const Tensor by = turn();
     return by[0] * c[0] + by[1] * c[1] + 2.0 * by[3] * c[3];
@@ -69,7 +67,8 @@ class ReinforcedLaw final : public Law {
         parameters_(base.parameters().begin(), base.parameters().end()) {
     parameters_.push_back({"added_k1_kPa", "added fibres: stress for I4 - 1", -1e3, 3.0});
     parameters_.push_back({"added_k2", "stiffening of the added fibres with (I4 - 1)^2", -1.0, 5.0});
-    parameters_.push_back({"added_angle_deg", "of the added fibres, from the first material axis", -1e3, 15.0});
+    parameters_.push_back(
+        {"added_angle_deg", "of the added fibres, from the first material axis", -1e3, 15.0});
   }
 
   std::string_view name() const override { return name_; }
@@ -89,8 +88,7 @@ class ReinforcedLaw final : public Law {
     return with_fibres(base_.response(c, bases(values)), c, values);
   }
   Tensor stress_sensitivity(const Tensor& c, Values values, size_t parameter) const override {
-    if (parameter < base_.parameters().size())
-      return base_.stress_sensitivity(c, bases(values), parameter);
+    if (parameter < base_.parameters().size()) return base_.stress_sensitivity(c, bases(values), parameter);
     return by_own(c, values, parameter);
   }
   MaterialResponse dual_response(const Tensor& c, Values values) const override {

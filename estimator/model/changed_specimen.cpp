@@ -82,7 +82,8 @@ ElasticModel ChangeableSpecimen::with(const FieldModel& change, const SolveOptio
       const double depth = between_nodes(mesh, *depths, point);
       MaterialAxes axes = fibres ? fibres(mesh, point) : MaterialAxes(wall);
       if (turned) {
-        const double angle = radians * (change.fibre_turn_deg + change.fibre_course_deg * (1.0 - 2.0 * depth));
+        const double angle =
+            radians * (change.fibre_turn_deg + change.fibre_course_deg * (1.0 - 2.0 * depth));
         axes = AngleAxisd(angle, wall.col(2)).toRotationMatrix() * axes;
       }
       if (change.opening_angle_deg != 0.0) {

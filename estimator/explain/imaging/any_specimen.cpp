@@ -37,8 +37,8 @@ constexpr double worth_freeing = 9.0;   // gain of chi2 by which further paramet
 constexpr double suspected = 1e-2;      // p-value of a linear gain: reason to fit the effect
 constexpr double beyond_chance = 1e-3;  // of a place beside another effect
 constexpr double effective_parameters = 5.0;  // of an inclusion: its sizes are tied to one another
-constexpr int iteration_limit = 60;           // of a fit: an inclusion's size and contrast trade off along a ridge
-constexpr size_t firsts = 2;                  // single effects that get partners
+constexpr int iteration_limit = 60;  // of a fit: an inclusion's size and contrast trade off along a ridge
+constexpr size_t firsts = 2;         // single effects that get partners
 
 double volume_mm3(const HermiteMesh& mesh) {
   double sum = 0.0;
@@ -68,6 +68,10 @@ class AnySpecimen final : public ImagedSpecimen {
   }
 
   void fit_base() override {
+    rows_.reset();
+    base_motion_.reset();
+    correction_.resize(0);
+    base_ = {};
     FitOptions options;
     options.file = study_.file.string();
     options.locator = field_.locator;
@@ -75,10 +79,10 @@ class AnySpecimen final : public ImagedSpecimen {
     ChangedMotion motion(changes_of({}, specimen_), estimated_.groups, {});
     const FitOutcome fit = fit_motion(motion, estimated_.values, field_.measurement, options);
     if (fit.history.empty() || fit.frames.empty())
-      throw InputError({options.file, "law.parameters", "the base model has no equilibrium: " + fit.reason,
-                        "Start from stiffer values, or check the frames' pressures; `diastole fit` says more."});
+      throw InputError(
+          {options.file, "law.parameters", "the base model has no equilibrium: " + fit.reason,
+           "Start from stiffer values, or check the frames' pressures; `diastole fit` says more."});
     if (fit.robust) loss_ = fit.robust->loss;
-    base_.law.clear();
     for (const EstimatedValue& value : fit.values)
       base_.law.push_back(value.value);
     for (const EstimatedFrame& frame : fit.frames)
@@ -87,6 +91,8 @@ class AnySpecimen final : public ImagedSpecimen {
     if (progress_) progress_("looking at what a finer mesh changes");
     correct_mesh();
   }
+
+  void widen_sigmas(double factor) override { field_.widen_sigmas(factor); }
 
   [[nodiscard]] const FieldCase& field() const override { return field_; }
   [[nodiscard]] const MotionResiduals& rows() const override { return *rows_; }
@@ -117,7 +123,8 @@ class AnySpecimen final : public ImagedSpecimen {
       for (size_t b = 0; b < singles.size(); ++b) {
         if (b == a || (b < a && singles[b].refitted)) continue;
         if (progress_) progress_("fitting " + singles[a].name() + " + " + singles[b].name());
-        if (std::optional<FieldHypothesis> pair = beside(singles[a], singles[b])) found.push_back(*std::move(pair));
+        if (std::optional<FieldHypothesis> pair = beside(singles[a], singles[b]))
+          found.push_back(*std::move(pair));
       }
     }
     std::ranges::stable_sort(found, std::greater{}, &FieldHypothesis::score);
@@ -127,8 +134,8 @@ class AnySpecimen final : public ImagedSpecimen {
   [[nodiscard]] std::vector<ParameterShift> shifts(const FieldFit& after) const override {
     std::vector<ParameterShift> result;
     for (size_t i = 0; i < estimated_.values.size(); ++i)
-      result.push_back({estimated_.values[i].name, base_.law[i], law_error(base_, i), after.law[i],
-                        law_error(after, i)});
+      result.push_back(
+          {estimated_.values[i].name, base_.law[i], law_error(base_, i), after.law[i], law_error(after, i)});
     return result;
   }
 
@@ -165,11 +172,11 @@ class AnySpecimen final : public ImagedSpecimen {
 
   [[nodiscard]] double law_error(const FieldFit& fit, size_t value) const {
     const EstimatedParameter& law = estimated_.values[value];
-    const inference::Parameter parameter{.name = law.name,
-                                         .lower = law.lower,
-                                         .upper = law.upper,
-                                         .scale = law.lower > 0.0 ? inference::Scale::logarithmic
-                                                                  : inference::Scale::linear};
+    const inference::Parameter parameter{
+        .name = law.name,
+        .lower = law.lower,
+        .upper = law.upper,
+        .scale = law.lower > 0.0 ? inference::Scale::logarithmic : inference::Scale::linear};
     const auto place = static_cast<Index>(value);
     return inference::standard_error(parameter, parameter.coordinate(fit.law[value]),
                                      std::sqrt(fit.covariance(place, place)));
@@ -274,7 +281,8 @@ class AnySpecimen final : public ImagedSpecimen {
       if (!outcome.position_mm) return {};
       position_mm.push_back(*std::move(outcome.position_mm));
     }
-    return finer_mesh_correction(finer, {mesh(), position_mm, values, fit.pressures_kPa}, *rows_, field_.locator);
+    return finer_mesh_correction(finer, {mesh(), position_mm, values, fit.pressures_kPa}, *rows_,
+                                 field_.locator);
   }
 
   /// Of all fits' rows, at the base; and what it may leave.
@@ -483,7 +491,8 @@ class AnySpecimen final : public ImagedSpecimen {
   }
 
   /// Both effects together, judged by what they gain over the better one.
-  [[nodiscard]] std::optional<FieldHypothesis> beside(const FieldHypothesis& first, const FieldHypothesis& second) {
+  [[nodiscard]] std::optional<FieldHypothesis> beside(const FieldHypothesis& first,
+                                                      const FieldHypothesis& second) {
     FieldChoice choice = second.fit.choice;
     double rooms = first.has_inclusion() ? places() : 1.0;
     if (second.has_inclusion()) {
@@ -492,14 +501,16 @@ class AnySpecimen final : public ImagedSpecimen {
       choice = inclusion_from(guess, first.fit).fit.choice;
       rooms = places();
     }
-    FieldHypothesis pair{{first.ids.front(), second.ids.front()}, search(together(first.fit.choice, choice), first.fit)};
+    FieldHypothesis pair{{first.ids.front(), second.ids.front()},
+                         search(together(first.fit.choice, choice), first.fit)};
     std::ranges::sort(pair.ids);
     const auto parameters = static_cast<double>(pair.fit.choice.free.size());
     const auto all = static_cast<double>(effects_.size());
     const double tried = 0.5 * all * (all - 1.0) * rooms;
     pair.gain = base_.chi_square - pair.fit.chi_square;
     pair.score = pair.gain - mesh_error_ - 2.0 * parameters - 2.0 * std::log(tried);
-    pair.p_value = beyond_mesh(pair.gain - std::max(first.gain, second.gain), std::max(1.0, parameters - 1.0), tried);
+    pair.p_value =
+        beyond_mesh(pair.gain - std::max(first.gain, second.gain), std::max(1.0, parameters - 1.0), tried);
     return pair;
   }
 
@@ -528,7 +539,8 @@ std::unique_ptr<ImagedSpecimen> any_specimen(const Study& study, const FieldProg
     if (parameter.vary == Variation::element)
       refuse(study, "law.parameters." + parameter.name + ".vary",
              "images are explained from a specimen of one stiffness, not of one value an element",
-             "Set vary = \"whole\": a region of another stiffness is then found by name. `diastole fit` maps one "
+             "Set vary = \"whole\": a region of another stiffness is then found by name. `diastole fit` maps "
+             "one "
              "value an element.");
   if (!study.data.tags && !study.data.points)
     refuse(study, "data", "the study has neither tags nor points",

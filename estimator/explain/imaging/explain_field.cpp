@@ -53,6 +53,10 @@ class Explainer {
     fit_effects();
     judge();
     out_.law = specimen_.shifts(chosen_ != nullptr ? chosen_->fit : specimen_.base());
+    if (widened_ > 1.0)
+      out_.summary += fmt::format(
+          " Neighbouring tags are off alike: all is judged with their sigmas {:.2f} times as large.",
+          widened_);
     fill_evidence();
     fill_field();
     propose();
@@ -69,6 +73,7 @@ class Explainer {
     specimen_.fit_base();
     report("looking for structure in what is left");
     modes_ = specimen_.modes();
+    widen_for_neighbours();
     for (size_t i = 0; i < modes_.modes.size(); ++i) {
       const std::string& family = modes_.modes[i].family;
       auto same = std::ranges::find(families_, family, &Family::name);
@@ -76,6 +81,23 @@ class Explainer {
       same->columns.push_back(static_cast<Index>(i));
       if (modes_.modes[i].smooth) rivals_.push_back(static_cast<Index>(i));
     }
+  }
+
+  /// Tags that were found in images are off alike where they are neighbours: a ghost, a fold, the smoothness of the search. By how much is seen in
+  /// motions of an order that hardly any effect makes: their chi2 a degree of freedom is what all gains are measured in.
+  void widen_for_neighbours() {
+    if (!specimen_.field().measurement.planes_as_seen) return;
+    std::vector<Index> rough;
+    for (size_t i = 0; i < modes_.modes.size(); ++i)
+      if (modes_.modes[i].rough) rough.push_back(static_cast<Index>(i));
+    const LinearEvidence::Gain gain =
+        LinearEvidence(specimen_.base_of_structure(), modes_.columns).gain(rough);
+    if (gain.degrees == 0) return;
+    widened_ = std::sqrt(gain.chi_square / static_cast<double>(gain.degrees));
+    if (!(widened_ > 1.0)) return;
+    specimen_.widen_sigmas(widened_);
+    specimen_.fit_base();
+    modes_ = specimen_.modes();
   }
 
   void fit_effects() {
@@ -91,8 +113,9 @@ class Explainer {
     for (const Family& family : families_) {
       const LinearEvidence::Gain gain = evidence.gain(family.columns);
       const auto degrees = static_cast<double>(gain.degrees);
-      const double p = std::min(
-          1.0, static_cast<double>(families_.size()) * chi_square_tail(gain.chi_square - allowed - specimen_.mesh_error(), degrees));
+      const double p =
+          std::min(1.0, static_cast<double>(families_.size()) *
+                            chi_square_tail(gain.chi_square - allowed - specimen_.mesh_error(), degrees));
       if (p < most.p_value) most = {family.name, gain.chi_square - degrees, p};
     }
     return most;
@@ -138,6 +161,7 @@ class Explainer {
           law_before(), base.residuals.size(), best.name(), best.gain);
       return;
     }
+    if (effect_seen) specimen_.settle(best);
     const Structure after = effect_seen ? structure_left(best.fit, mesh_error * best.gain) : before;
     const bool rivalled = rival_.score > best.score + clearly_better;
     if (!effect_seen || rivalled || after.p_value < significant) {
@@ -145,7 +169,6 @@ class Explainer {
       out_.summary = unexplained_summary(best, effect_seen, rivalled, after);
       return;
     }
-    specimen_.settle(best);
     if (settled(best.fit)) name(best);
   }
 
@@ -192,8 +215,8 @@ class Explainer {
     }
     out_.verdict = out_.ambiguous_with.empty() ? Verdict::named : Verdict::ambiguous;
     out_.shifts = specimen_.shifts(best.fit);
-    out_.summary = fmt::format("{} explains what the base model does not: chi2 falls by {:.1f}{}.", best.name(),
-                               best.gain, law_after());
+    out_.summary = fmt::format("{} explains what the base model does not: chi2 falls by {:.1f}{}.",
+                               best.name(), best.gain, law_after());
     if (!out_.ambiguous_with.empty()) {
       std::vector<std::string> ids;
       for (const auto& set : out_.ambiguous_with)
@@ -298,7 +321,8 @@ class Explainer {
     Eigen::MatrixXd directions(base.residuals.size(),
                                static_cast<Index>(rivals_.size()) + after.jacobian.cols());
     directions << modes_.columns(Eigen::all, rivals_), after.jacobian.topRows(base.residuals.size());
-    out_.gap = field_gap(base, after, deal_folds(specimen_.field().measurement, specimen_.rows(), 5), directions);
+    out_.gap =
+        field_gap(base, after, deal_folds(specimen_.field().measurement, specimen_.rows(), 5), directions);
     out_.steps = {{"", out_.gap.before}};
     if (chosen_ != nullptr) out_.steps.push_back({chosen_->name(), out_.gap.after});
   }
@@ -341,8 +365,9 @@ class Explainer {
     for (const FieldHypothesis& other : hypotheses_)
       if (std::ranges::find(out_.ambiguous_with, other.ids) != out_.ambiguous_with.end())
         models.push_back(imaged(other));
-    out_.next_experiment = models.size() > 1 ? separating_images(specimen_.field(), specimen_.rows(), models)
-                                             : sharpening_images(specimen_.field(), specimen_.rows(), models.front());
+    out_.next_experiment = models.size() > 1
+                               ? separating_images(specimen_.field(), specimen_.rows(), models)
+                               : sharpening_images(specimen_.field(), specimen_.rows(), models.front());
   }
 
   FieldProgress progress_;
@@ -353,6 +378,7 @@ class Explainer {
   std::vector<FieldHypothesis> hypotheses_;
   LinearEvidence::Choice rival_;
   const FieldHypothesis* chosen_ = nullptr;
+  double widened_ = 1.0;  // of the tags' sigmas
   Explanation out_;
 };
 

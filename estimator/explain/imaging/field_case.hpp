@@ -29,6 +29,11 @@ struct FieldCase {
   std::optional<Measured> inner_radius_mm;  ///< as frame 0 shows it
   int iteration_limit = 25;                 ///< of each fit
   std::function<void()> alive = {};  ///< called before each equilibrium of a fit; ends it by an exception
+
+  void widen_sigmas(double factor) {
+    for (TagPoint& tag : measurement.tags)
+      tag.sigma_mm *= factor;
+  }
 };
 
 /// Throws InputError for a study without imaged motion, of a stiffness that varies, or with frames that are not inflated. Precondition: gel

@@ -185,8 +185,8 @@ std::vector<FieldHypothesis> try_inclusion(const FieldProblem& problem, const Fi
                         fit_inclusion(problem, base, guesses.front().inclusion, InclusionEffort::once)};
   const auto judge = [&] {
     tried.gain = base.chi_square - tried.fit.chi_square;
-    tried.score =
-        tried.gain - 2.0 * effective_parameters - 2.0 * std::log(distinct_places(wall_volume_mm3(problem.field().base)));
+    tried.score = tried.gain - 2.0 * effective_parameters -
+                  2.0 * std::log(distinct_places(wall_volume_mm3(problem.field().base)));
   };
   judge();
   if (tried.score > to_beat - near && tried.gain > 0.0) {

@@ -7,10 +7,10 @@
 #include <cmath>
 #include <functional>
 
+#include "estimator/explain/imaging/field_solver.hpp"
 #include "estimator/explain/imaging/linear_evidence.hpp"
 #include "estimator/fe/elastic_system.hpp"
 #include "estimator/fe/gauss_points.hpp"
-#include "estimator/explain/imaging/field_solver.hpp"
 #include "estimator/mesh/node_field.hpp"
 #include "estimator/mesh/wall_coordinates.hpp"
 
@@ -25,6 +25,7 @@ struct Harmonic {
   std::function<double(const WallPlace&)> value;
   std::string name;
   bool smooth;
+  bool rough;
 };
 
 double legendre(int order, double x) {
@@ -56,7 +57,7 @@ std::vector<Harmonic> harmonics() {
             {value,
              fmt::format("{} around, order {} along z, {} through the wall",
                          m == 0 ? "even" : fmt::format("{}({} theta)", sine ? "sin" : "cos", m), k, l),
-             m + k + l <= 2 && m < 2});
+             m + k + l <= 2 && m < 2, m + k + l >= 4});
       }
     }
   }
@@ -158,7 +159,8 @@ class Builder {
     for (size_t i = 0; i < all.modes.size(); ++i) {
       const size_t course = i / driven;
       const size_t in_course = i % driven;
-      const bool moves_with_the_load = course == 0 && in_course >= rigid_motions && in_course < rigid_motions + 3;
+      const bool moves_with_the_load =
+          course == 0 && in_course >= rigid_motions && in_course < rigid_motions + 3;
       if (all.modes[i].family == "plates" || moves_with_the_load) continue;
       kept.push_back(static_cast<Index>(i));
       result.modes.push_back(all.modes[i]);
@@ -187,7 +189,8 @@ class Builder {
     static constexpr std::array<const char*, 3> along{"outwards", "around", "along z"};
     for (const char* component : along)
       for (const Harmonic& harmonic : harmonics_)
-        modes_.push_back({"motion", fmt::format("motion {}: {}", component, harmonic.name), false});
+        modes_.push_back(
+            {"motion", fmt::format("motion {}: {}", component, harmonic.name), false, harmonic.rough});
   }
 
   [[nodiscard]] double course_at(size_t course, size_t slot) const {
@@ -197,8 +200,7 @@ class Builder {
   }
 
   void fill(size_t slot, const std::vector<NodeField>& fields, Eigen::MatrixXd& columns) const {
-    const Eigen::MatrixXd elastic =
-        rows_.columns(slot, body_.mesh(), pointers_to(fields));
+    const Eigen::MatrixXd elastic = rows_.columns(slot, body_.mesh(), pointers_to(fields));
     const Index first = rows_.first(slot);
     const Index rows = rows_.count(slot);
     constexpr auto of_a_course = static_cast<Index>(driven);
@@ -207,8 +209,7 @@ class Builder {
       columns.block(first, static_cast<Index>(c) * of_a_course, rows, of_a_course) =
           course_at(c, slot) * elastic.leftCols(of_a_course);
     const Index stiffness = elastic.cols() - of_a_course;
-    columns.block(first, of_courses, rows, stiffness) =
-        course_at(0, slot) * elastic.rightCols(stiffness);
+    columns.block(first, of_courses, rows, stiffness) = course_at(0, slot) * elastic.rightCols(stiffness);
     const auto count = static_cast<Index>(harmonics_.size());
     const Index motion = of_courses + stiffness;
     for (Index i = 0; i < rows; ++i) {

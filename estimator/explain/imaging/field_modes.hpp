@@ -24,6 +24,7 @@ struct FieldMode {
   std::string family;   ///< as above
   std::string name;     ///< in words: "the top plate turns about z, with the load"
   bool smooth = false;  ///< of the lowest order: a rival to an effect
+  bool rough = false;   ///< a motion of an order that hardly any effect makes: what is in it is the images'
 };
 
 struct FieldModes {

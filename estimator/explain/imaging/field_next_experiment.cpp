@@ -115,7 +115,9 @@ class Outlook {
     return result;
   }
 
-  [[nodiscard]] Index pressure_unknown(Index slot) const { return static_cast<Index>(b_.law.size()) + effects_ + slot; }
+  [[nodiscard]] Index pressure_unknown(Index slot) const {
+    return static_cast<Index>(b_.law.size()) + effects_ + slot;
+  }
 
   [[nodiscard]] double sigma_kPa(Index slot) const {
     const int frame = rows_.frames()[static_cast<size_t>(slot)];

@@ -25,6 +25,8 @@ class GelSpecimen final : public ImagedSpecimen {
     fit_both_meshes();
   }
 
+  void widen_sigmas(double factor) override { field_.widen_sigmas(factor); }
+
   [[nodiscard]] const FieldCase& field() const override { return field_; }
   [[nodiscard]] const MotionResiduals& rows() const override { return round_->rows(); }
   [[nodiscard]] const HermiteMesh& mesh() const override { return round_->solver().mesh(); }
@@ -42,8 +44,8 @@ class GelSpecimen final : public ImagedSpecimen {
     lattice_ = inclusion_lattice(*full_, full_base_);
     const double to_beat = std::ranges::max(tried, {}, &FieldHypothesis::score).score;
     std::ranges::move(
-        try_inclusion(*round_, base_,
-                      search_inclusion(lattice_, wall_volume_mm3(field_.base), full_base_), to_beat),
+        try_inclusion(*round_, base_, search_inclusion(lattice_, wall_volume_mm3(field_.base), full_base_),
+                      to_beat),
         std::back_inserter(tried));
     return tried;
   }

@@ -23,6 +23,8 @@ class ImagedSpecimen {
 
   /// Throws InputError where the start values carry no equilibrium. All else wants it first.
   virtual void fit_base() = 0;
+  /// Multiplies the tags' sigmas; the base is to be fitted again.
+  virtual void widen_sigmas(double factor) = 0;
 
   [[nodiscard]] virtual const FieldCase& field() const = 0;
   /// The rows that all fits of effects share.

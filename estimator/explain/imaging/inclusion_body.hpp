@@ -43,9 +43,7 @@ class InclusionBody {
   /// A neo-Hookean annulus with held ends at one cavity pressure. The mesh is fine around `inclusion`.
   InclusionBody(const FieldModel& body, double C1_kPa, double pressure_kPa, const Inclusion& inclusion,
                 InclusionMesh mesh)
-      : body_(body),
-        model_(model_around(body, C1_kPa, inclusion, mesh)),
-        stiffness_(model_.mesh()) {
+      : body_(body), model_(model_around(body, C1_kPa, inclusion, mesh)), stiffness_(model_.mesh()) {
     Solution solution = model_.solve(pressure_kPa);
     if (!solution.report.converged()) return;
     state_ = solution.state;

@@ -81,8 +81,8 @@ InclusionLattice inclusion_lattice(std::vector<Inclusion> places, const MotionRe
       return place.stiffness({X_mm[0], X_mm[1], X_mm[2]}) - 1.0;
     }));
   }
-  Eigen::MatrixXd columns = rows.columns(
-      mesh, responses(body, state, stiffness_sides(body.system(), state, fields)), shares);
+  Eigen::MatrixXd columns =
+      rows.columns(mesh, responses(body, state, stiffness_sides(body.system(), state, fields)), shares);
   return {std::move(places), std::move(columns)};
 }
 

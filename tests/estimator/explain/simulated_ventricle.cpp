@@ -79,7 +79,8 @@ Study simulated(const SimulatedVentricle& ventricle, const std::filesystem::path
     frames << fmt::format("{},{:.2f},{:.5f},{}\n", slot + 1, 0.1 * static_cast<double>(slot + 1),
                           pressure_kPa + pressure_sigma_kPa * noise(random), pressure_sigma_kPa);
     const double load = pressure_kPa / pressures_kPa.back();
-    const Eigen::AngleAxisd twist(load * ventricle.twist_deg * std::numbers::pi / 180.0, Eigen::Vector3d::UnitZ());
+    const Eigen::AngleAxisd twist(load * ventricle.twist_deg * std::numbers::pi / 180.0,
+                                  Eigen::Vector3d::UnitZ());
     for (size_t i = 0; i < ventricle.points; ++i) {
       const MaterialPoint point{element(random), {share(random), share(random), share(random)}};
       const Eigen::Vector3d X_mm = specimen.mesh().value(specimen.mesh().reference(), point);

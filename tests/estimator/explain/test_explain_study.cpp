@@ -15,7 +15,8 @@ Study gel() {
   return study;
 }
 
-Explanation of(Verdict verdict, std::vector<std::string> ids = {}, std::vector<std::vector<std::string>> others = {}) {
+Explanation of(Verdict verdict, std::vector<std::string> ids = {},
+               std::vector<std::vector<std::string>> others = {}) {
   Explanation explanation;
   explanation.verdict = verdict;
   for (const std::string& id : ids)
@@ -28,7 +29,8 @@ Explanation of(Verdict verdict, std::vector<std::string> ids = {}, std::vector<s
 TEST(RunsAndImages, TheImagesModulusIsAMeasurementForTheRuns) {
   const StudyParameter modulus = with_imaged_modulus(gel(), of(Verdict::named)).law.parameters.front();
   EXPECT_DOUBLE_EQ(modulus.start, 8.5);
-  EXPECT_NEAR(std::log(modulus.upper / modulus.lower) / std::sqrt(12.0), std::hypot(0.08 / 8.5, 0.007), 1e-12);
+  EXPECT_NEAR(std::log(modulus.upper / modulus.lower) / std::sqrt(12.0), std::hypot(0.08 / 8.5, 0.007),
+              1e-12);
 }
 
 TEST(RunsAndImages, WhatImagesDoNotExplainSaysNothingOfTheModulus) {
@@ -40,8 +42,9 @@ TEST(RunsAndImages, WhatImagesDoNotExplainSaysNothingOfTheModulus) {
 }
 
 TEST(RunsAndImages, AnEffectThatShowsInBothIsJudgedByBoth) {
-  const Explanation both = merged(of(Verdict::ambiguous, {"radius-error"}, {{"stroke-gain"}, {"end-bond-slip"}}),
-                                  of(Verdict::named, {"radius-error"}));
+  const Explanation both =
+      merged(of(Verdict::ambiguous, {"radius-error"}, {{"stroke-gain"}, {"end-bond-slip"}}),
+             of(Verdict::named, {"radius-error"}));
   EXPECT_EQ(both.verdict, Verdict::named);
   EXPECT_TRUE(both.ambiguous_with.empty());
   EXPECT_EQ(both.effects.size(), 1U);
@@ -49,8 +52,9 @@ TEST(RunsAndImages, AnEffectThatShowsInBothIsJudgedByBoth) {
 
 TEST(RunsAndImages, WhatTheyDisagreeOnStaysOpen) {
   const std::vector<std::vector<std::string>> others{{"stroke-gain"}};
-  EXPECT_EQ(merged(of(Verdict::ambiguous, {"radius-error"}, others), of(Verdict::named, {"tag-bias"})).verdict,
-            Verdict::ambiguous);
+  EXPECT_EQ(
+      merged(of(Verdict::ambiguous, {"radius-error"}, others), of(Verdict::named, {"tag-bias"})).verdict,
+      Verdict::ambiguous);
   EXPECT_EQ(merged(of(Verdict::ambiguous, {"radius-error"}, others), of(Verdict::none)).verdict,
             Verdict::ambiguous);
   EXPECT_EQ(merged(of(Verdict::named, {"seal-leak-pump"}), of(Verdict::unexplained)).verdict,

@@ -75,8 +75,14 @@ INSTANTIATE_TEST_SUITE_P(
     Simulated, Ventricle,
     testing::Values(
         Case{"Nothing", {.seed = 11}, Verdict::none},
-        Case{"StiffRegion", {.truth = infarct(6.0, 70.0, -10.0), .seed = 12}, Verdict::named, {"stiff-inclusion"}},
-        Case{"SoftRegion", {.truth = infarct(0.25, -100.0, -25.0), .seed = 13}, Verdict::named, {"stiff-inclusion"}},
+        Case{"StiffRegion",
+             {.truth = infarct(6.0, 70.0, -10.0), .seed = 12},
+             Verdict::named,
+             {"stiff-inclusion"}},
+        Case{"SoftRegion",
+             {.truth = infarct(0.25, -100.0, -25.0), .seed = 13},
+             Verdict::named,
+             {"stiff-inclusion"}},
         Case{"TurnedFibres",
              {.truth = changed([](FieldModel& model) { model.fibre_turn_deg = 10.0; }), .seed = 14},
              Verdict::named,
@@ -99,7 +105,10 @@ INSTANTIATE_TEST_SUITE_P(
              60.0,
              20.0},
         Case{"MovingBase",
-             {.truth = changed([](FieldModel& model) { model.base_motion_mm_per_kPa = {0.2, -0.1, 0.3}; }), .seed = 17},
+             {.truth = changed([](FieldModel& model) {
+                model.base_motion_mm_per_kPa = {0.2, -0.1, 0.3};
+              }),
+              .seed = 17},
              Verdict::named,
              {"base-motion"},
              "z_mm_per_kPa",
@@ -137,7 +146,9 @@ class DrawnVentricle : public testing::TestWithParam<int> {
   double between(double low, double high) {
     return std::uniform_real_distribution<double>(low, high)(random_);
   }
-  double either_sign(double low, double high) { return (between(-1.0, 1.0) < 0.0 ? -1.0 : 1.0) * between(low, high); }
+  double either_sign(double low, double high) {
+    return (between(-1.0, 1.0) < 0.0 ? -1.0 : 1.0) * between(low, high);
+  }
 
  private:
   std::mt19937 random_{static_cast<unsigned>(GetParam())};

@@ -42,7 +42,8 @@ TEST(VentricleFit, AFinerMeshCorrectsACoarseOne) {
   const FitRecord corrected = fit_study(study, measurement, {.finer_mesh = true});
   ASSERT_TRUE(coarse.converged && corrected.converged) << corrected.reason;
   for (const auto& [name, truth] : std::map<std::string, double>{{"C_kPa", 3.0}, {"b1", 11.09}, {"b2", 1.76}})
-    EXPECT_LT(std::abs(value_of(corrected, name) - truth), 0.25 * std::abs(value_of(coarse, name) - truth)) << name;
+    EXPECT_LT(std::abs(value_of(corrected, name) - truth), 0.25 * std::abs(value_of(coarse, name) - truth))
+        << name;
   EXPECT_LT(corrected.chi2, 0.1 * coarse.chi2);
   EXPECT_THAT(corrected.remarks, testing::Contains(testing::HasSubstr("Twice as many elements")));
 }

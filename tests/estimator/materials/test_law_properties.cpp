@@ -215,7 +215,8 @@ std::vector<const Law*> laws_of_files() {
 INSTANTIATE_TEST_SUITE_P(Files, EveryLaw, ::testing::ValuesIn(laws_of_files()), test_name);
 
 INSTANTIATE_TEST_SUITE_P(Reinforced, EveryLaw,
-                         ::testing::Values(&reinforced(*find_law("guccione")), &reinforced(*find_law("neo-hookean"))),
+                         ::testing::Values(&reinforced(*find_law("guccione")),
+                                           &reinforced(*find_law("neo-hookean"))),
                          test_name);
 
 }  // namespace
