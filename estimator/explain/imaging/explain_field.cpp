@@ -102,7 +102,7 @@ class Explainer {
 
   void fit_effects() {
     report("fitting each effect");
-    hypotheses_ = specimen_.singles(progress_);
+    hypotheses_ = specimen_.singles();
     std::ranges::stable_sort(hypotheses_, std::greater{}, &FieldHypothesis::score);
   }
 

@@ -1,9 +1,10 @@
 #pragma once
 // Where imaged motion and model disagree, and which field effect that is.
 //
+//   imaged_specimen      what an explanation asks of a specimen: gel_specimen, any_specimen
 //   field_case           what the study says and what was measured
-//   field_solver         equilibria with field effects and their derivatives
-//   field_fit            the base model, and any choice of effects, fitted to the motion
+//   field_solver         gel: equilibria with field effects and their derivatives
+//   field_fit            the base model, and any choice of effects, fitted to gel's motion; specimen_problem: to any other's
 //   field_modes          rivals outside the library; linear_evidence: what a change of the motion would gain
 //   field_hypotheses     each effect fitted, and two of them where one leaves something
 //   inclusion_search     the place of an inclusion; inclusion_body, inclusion_fit: its fit on a mesh of its own

@@ -38,9 +38,8 @@ class GelSpecimen final : public ImagedSpecimen {
                        full_base_.pressures_kPa);
   }
 
-  [[nodiscard]] std::vector<FieldHypothesis> singles(const FieldProgress& progress) override {
+  [[nodiscard]] std::vector<FieldHypothesis> singles() override {
     std::vector<FieldHypothesis> tried = fit_round_effects(*round_, base_);
-    if (progress) progress("searching an inclusion of another stiffness");
     lattice_ = inclusion_lattice(*full_, full_base_);
     const double to_beat = std::ranges::max(tried, {}, &FieldHypothesis::score).score;
     std::ranges::move(

@@ -39,7 +39,7 @@ class ImagedSpecimen {
   /// What the mesh may gain of chi2 by itself.
   [[nodiscard]] virtual double mesh_error() const { return 0.0; }
 
-  [[nodiscard]] virtual std::vector<FieldHypothesis> singles(const FieldProgress& progress) = 0;
+  [[nodiscard]] virtual std::vector<FieldHypothesis> singles() = 0;
   /// `singles`: best first. Joint fits, best first.
   [[nodiscard]] virtual std::vector<FieldHypothesis> pairs(const std::vector<FieldHypothesis>& singles) = 0;
 
