@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "estimator/explain/imaging/explain_field.hpp"
 #include "estimator/fit/changed_motion.hpp"
 #include "estimator/mesh/node_field.hpp"
 #include "estimator/model/changed_specimen.hpp"
@@ -87,6 +88,35 @@ std::string id_of(const testing::TestParamInfo<const Effect*>& info) {
   return name;
 }
 INSTANTIATE_TEST_SUITE_P(List, EverySpecimenEffect, testing::ValuesIn(specimen_effects()), id_of);
+
+/// A small ventricle, explained on twice as few elements each way as it was solved on.
+explain::Explanation explained(const FieldModel& truth) {
+  const test::ScratchFolder folder;
+  Study study =
+      test::simulated({.truth = truth, .points = 400, .seed = 3, .mesh = "8, 6, 2"}, folder.path());
+  std::get<EllipsoidSpecimen>(study.specimen).mesh = {4, 3, 1};
+  return explain::explain_field(study);
+}
+
+TEST(SmallVentricle, WithNothingHiddenIsGivenNoName) {
+  const explain::Explanation found = explained({});
+  EXPECT_EQ(found.verdict, explain::Verdict::none) << found.summary;
+  EXPECT_TRUE(found.effects.empty());
+}
+
+TEST(SmallVentricle, WithPressuresThatAreOffIsExplainedAndItsStiffnessMended) {
+  FieldModel truth;
+  truth.pressure_offset_kPa = 0.2;
+  const explain::Explanation found = explained(truth);
+  ASSERT_EQ(found.verdict, explain::Verdict::named) << found.summary;
+  ASSERT_EQ(found.effects.front().id, "sensor-offset");
+  const explain::FoundParameter& offset = found.effects.front().parameters.front();
+  EXPECT_NEAR(offset.value, 0.2, 4.0 * offset.standard_error);
+  EXPECT_LT(offset.standard_error, 0.05);
+  EXPECT_LT(found.gap.after, 0.5 * found.gap.before);
+  const explain::ParameterShift& C = found.shifts.front();
+  EXPECT_NEAR(C.after, 3.0, 3.0 * C.after_error);
+}
 
 }  // namespace
 }  // namespace diastole
