@@ -30,6 +30,12 @@ TEST(VentricleFit, FindsTheLawOfAnIndependentSolver) {
   }
 }
 
+StudyFitOptions on_finer_mesh() {
+  StudyFitOptions options;
+  options.finer_mesh = true;
+  return options;
+}
+
 double value_of(const FitRecord& fit, const std::string& name) {
   return std::ranges::find(fit.parameters, name, &FittedParameter::name)->value;
 }
@@ -39,7 +45,7 @@ TEST(VentricleFit, AFinerMeshCorrectsACoarseOne) {
   std::get<EllipsoidSpecimen>(study.specimen).mesh = {6, 3, 1};
   const Measurement measurement = read_measurement(study);
   const FitRecord coarse = fit_study(study, measurement, {});
-  const FitRecord corrected = fit_study(study, measurement, {.finer_mesh = true});
+  const FitRecord corrected = fit_study(study, measurement, on_finer_mesh());
   ASSERT_TRUE(coarse.converged && corrected.converged) << corrected.reason;
   for (const auto& [name, truth] : std::map<std::string, double>{{"C_kPa", 3.0}, {"b1", 11.09}, {"b2", 1.76}})
     EXPECT_LT(std::abs(value_of(corrected, name) - truth), 0.25 * std::abs(value_of(coarse, name) - truth))
@@ -52,7 +58,7 @@ TEST(VentricleFit, AFinerMeshIsRefusedWhereItHasNoMeaning) {
   Study study = read_study(std::filesystem::path(DIASTOLE_SOURCE_DIR) / "examples" / "lv-clean.study.toml");
   study.law.parameters.front().vary = Variation::element;
   const Measurement measurement = read_measurement(study);
-  EXPECT_THROW((void)fit_study(study, measurement, {.finer_mesh = true}), InputError);
+  EXPECT_THROW((void)fit_study(study, measurement, on_finer_mesh()), InputError);
 }
 
 }  // namespace
