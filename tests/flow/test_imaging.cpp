@@ -65,7 +65,7 @@ TEST_F(ImagedGel, ASliceThatReachesBeyondTheEndIsTold) {
   if (sanitized) GTEST_SKIP() << "ten slices of ten phases: too slow here";
   const Ended scan =
       run(place, {"diastole", "scan", std::string(DIASTOLE_EXAMPLES) + "/phantom-a.study.toml", "-o", "end",
-                  "--set", "C1_kPa=8.71", "--matrix", "96", "--snr", "20", "--short-axis=-40,0,41",
+                  "--set", "C1_kPa=8.71", "--matrix", "96", "--snr", "20", "--short-axis=-42,0,42",
                   "--long-axis", "0,90", "--peak-kPa", "3", "--phases", "10"});
   ASSERT_EQ(scan.exit_code, 0) << scan.err;
   const Ended track = run(place, {"diastole", "track", "end/dicom", "-o", "end.tags.csv", "--json"});

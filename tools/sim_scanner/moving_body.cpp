@@ -45,27 +45,6 @@ std::vector<std::vector<Border>> borders_of(const HermiteMesh& mesh) {
   return borders;
 }
 
-/// The cylinder of water around the undeformed body, between its ends.
-struct Bath {
-  double radius_mm = 0, low_mm = 1e300, high_mm = -1e300;
-
-  explicit Bath(const HermiteMesh& mesh) {
-    for (size_t node = 0; node < mesh.node_count(); ++node) {
-      const double* place = &mesh.reference()[dof_of(node, 0, 0)];
-      radius_mm = std::max(radius_mm, std::hypot(place[0], place[1]) + bath_mm);
-      low_mm = std::min(low_mm, place[2]);
-      high_mm = std::max(high_mm, place[2]);
-    }
-    // An apex hangs in the water; a body as wide at its lower end as above stands on a plate.
-    const bool hangs = std::none_of(mesh.faces().bottom.begin(), mesh.faces().bottom.end(),
-                                    [](const ElementFace&) { return true; });
-    if (hangs) low_mm -= bath_mm;
-  }
-  [[nodiscard]] bool holds(const Eigen::Vector3d& x_mm) const {
-    return std::hypot(x_mm.x(), x_mm.y()) < radius_mm && x_mm.z() > low_mm && x_mm.z() < high_mm;
-  }
-};
-
 /// Looks for places on the deformed body, each beside one that was found.
 class BodyFinder {
  public:
@@ -124,6 +103,29 @@ class BodyFinder {
 
 }  // namespace
 
+SliceOfBody::Bath::Bath(const HermiteMesh& mesh) {
+  for (size_t node = 0; node < mesh.node_count(); ++node) {
+    const double* place = &mesh.reference()[dof_of(node, 0, 0)];
+    radius_mm = std::max(radius_mm, std::hypot(place[0], place[1]) + bath_mm);
+    low_mm = std::min(low_mm, place[2]);
+    high_mm = std::max(high_mm, place[2]);
+  }
+  // An apex hangs in the water; a body as wide at its lower end as above stands on a plate.
+  const bool hangs = std::none_of(mesh.faces().bottom.begin(), mesh.faces().bottom.end(),
+                                  [](const ElementFace&) { return true; });
+  if (hangs) low_mm -= bath_mm;
+}
+
+bool SliceOfBody::Bath::holds(const Eigen::Vector3d& x_mm, double beyond_ends_mm) const {
+  return std::hypot(x_mm.x(), x_mm.y()) < radius_mm && x_mm.z() > low_mm - beyond_ends_mm &&
+         x_mm.z() < high_mm + beyond_ends_mm;
+}
+
+Eigen::Vector3d SliceOfBody::place_mm(const Eigen::Vector3d& within_mm) const {
+  return plane_.first_mm + within_mm.x() * plane_.along_row + within_mm.y() * plane_.along_column +
+         within_mm.z() * plane_.normal();
+}
+
 template <class Visit>
 void SliceOfBody::each_place(const Visit& visit) const {
   for (Eigen::Index k = 0; k < layers_; ++k) {
@@ -147,19 +149,18 @@ void SliceOfBody::each_neighbour(const Place& of, const Visit& visit) const {
 
 SliceOfBody::SliceOfBody(const HermiteMesh& mesh, const NodeField& position_mm, const ScanPlane& plane,
                          double extent_mm, double thickness_mm)
-    : across_(static_cast<Eigen::Index>(std::ceil(extent_mm / in_plane_mm)) + 2),
+    : plane_(plane),
+      bath_(mesh),
+      across_(static_cast<Eigen::Index>(std::ceil(extent_mm / in_plane_mm)) + 2),
       layers_(static_cast<Eigen::Index>(std::ceil(2 * thickness_mm / through_plane_mm)) + 1),
       first_mm_(-in_plane_mm, -in_plane_mm, -thickness_mm),
       step_mm_(in_plane_mm, in_plane_mm, 2 * thickness_mm / static_cast<double>(layers_ - 1)),
       nodes_(static_cast<size_t>(across_ * across_ * layers_)) {
   const BodyFinder finder(mesh, position_mm, step_mm_.norm());
-  const Bath bath(mesh);
-  const auto place_mm = [&](const Place& at) -> Eigen::Vector3d {
-    const Eigen::Vector3d within_mm =
-        first_mm_ + step_mm_.cwiseProduct(Eigen::Vector3d(
-                        static_cast<double>(at[0]), static_cast<double>(at[1]), static_cast<double>(at[2])));
-    return plane.first_mm + within_mm.x() * plane.along_row + within_mm.y() * plane.along_column +
-           within_mm.z() * plane.normal();
+  const auto node_mm = [&](const Place& at) {
+    return place_mm(first_mm_ +
+                    step_mm_.cwiseProduct(Eigen::Vector3d(
+                        static_cast<double>(at[0]), static_cast<double>(at[1]), static_cast<double>(at[2]))));
   };
   std::deque<std::pair<Place, MaterialPoint>> found;
   const auto take = [&](const Place& at, const std::optional<MaterialPoint>& point) {
@@ -175,18 +176,19 @@ SliceOfBody::SliceOfBody(const HermiteMesh& mesh, const NodeField& position_mm, 
     node.outside_mm = far_mm;
   each_place([&](const Place& at) {
     Node& node = nodes_[index(at)];
-    if (!bath.holds(place_mm(at))) node.known = node.tried = true;
+    // Tissue beside a plate is interpolated with what the motion would be beyond.
+    if (!bath_.holds(node_mm(at), step_mm_.norm())) node.known = node.tried = true;
   });
   // A few places are looked for everywhere, all others beside those.
   each_place([&](const Place& at) {
     if (at[0] % seeds_apart == 0 && at[1] % seeds_apart == 0 && !nodes_[index(at)].tried)
-      take(at, finder.find(place_mm(at)));
+      take(at, finder.find(node_mm(at)));
   });
   while (!found.empty()) {
     const auto [from, point] = found.front();
     found.pop_front();
     each_neighbour(from, [&, beside = point](const Place& at) {
-      if (!nodes_[index(at)].tried) take(at, finder.find_beside(place_mm(at), beside));
+      if (!nodes_[index(at)].tried) take(at, finder.find_beside(node_mm(at), beside));
     });
   }
   fill_unknown();
@@ -214,6 +216,7 @@ void SliceOfBody::fill_unknown() {
 }
 
 Spot SliceOfBody::at(const Eigen::Vector3d& within_mm) const {
+  if (!bath_.holds(place_mm(within_mm))) return {Medium::nothing, Eigen::Vector3d::Zero()};
   const Eigen::Vector3d place = (within_mm - first_mm_).cwiseQuotient(step_mm_);
   const auto cell = [](double value, Eigen::Index count) {
     return std::clamp<Eigen::Index>(static_cast<Eigen::Index>(std::floor(value)), 0, count - 2);

@@ -38,6 +38,12 @@ class SliceOfBody {
     bool known = false;
     bool tried = false;
   };
+  /// The cylinder of water around the undeformed body, between its ends.
+  struct Bath {
+    double radius_mm = 0, low_mm = 1e300, high_mm = -1e300;
+    explicit Bath(const HermiteMesh& mesh);
+    [[nodiscard]] bool holds(const Eigen::Vector3d& x_mm, double beyond_ends_mm = 0) const;
+  };
   using Place = std::array<Eigen::Index, 3>;  // column, row, layer
   [[nodiscard]] size_t index(const Place& at) const {
     return static_cast<size_t>((at[2] * across_ + at[1]) * across_ + at[0]);
@@ -47,7 +53,10 @@ class SliceOfBody {
   template <class Visit>
   void each_neighbour(const Place& of, const Visit& visit) const;
   void fill_unknown();
+  [[nodiscard]] Eigen::Vector3d place_mm(const Eigen::Vector3d& within_mm) const;
 
+  ScanPlane plane_;
+  Bath bath_;
   Eigen::Index across_;
   Eigen::Index layers_;
   Eigen::Vector3d first_mm_;
