@@ -66,6 +66,16 @@ std::vector<BadInput> table() {
        2,
        {"--tag-spacing", "1 mm", "three pixels", "--matrix"}},
       {"ScanOfNothing", [](Place place) { return scan(place, {"--no-tags"}); }, 2, {"--no-tags", "--cine"}},
+      {"ScanOfFlowInPartOfACycle",
+       [](Place place) {
+         return scan(place, {"--flow", "--period", "30"});
+       },
+       2,
+       {"--flow", "a cycle of 30 s", "--period"}},
+      {"ScanOfFibresThatAreNone",
+       [](Place place) { return scan(place, {"--diffusion"}); },
+       2,
+       {"--diffusion", "no fibres"}},
       {"ScanBeyondTheModel",
        [](Place place) {
          return scan(place, {"--peak-kPa", "60", "--phases", "4"});

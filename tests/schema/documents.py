@@ -142,6 +142,7 @@ def of_files(place):
     yield "images", place.run("images examples/tagged-gel/dicom")
     yield "track", place.run("track examples/tagged-gel/dicom -o gel.tags.csv")
     yield "scan", place.run(f"scan {gel} --mesh 4,2,1 --set C1_kPa=8.71 -o trial --matrix 48 --phases 3 --peak-kPa 3 --tag-spacing 12")
+    yield "scan", place.run("scan examples/lv-clean.study.toml --mesh 4,2,1 -o flow --no-tags --flow --diffusion --peak-kPa 0.5 --phases 5")
     yield "runs", place.run("runs . kind=run")
     yield "runs", place.run("runs . kind=fit -o runs.html")
     yield "doctor", place.run("doctor --latency-s 0.2", (0, 1))

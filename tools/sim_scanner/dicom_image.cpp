@@ -90,8 +90,15 @@ void write_dicom(const std::filesystem::path& path, const Picture& picture, cons
   put(DCM_SeriesNumber, std::to_string(label.series_number));
   put(DCM_InstanceNumber, std::to_string(label.instance));
   put(DCM_SliceThickness, fmt::format("{:.4g}", label.thickness_mm));
-  put(DCM_TriggerTime, fmt::format("{:.4f}", label.trigger_ms));
-  put(DCM_NominalInterval, fmt::format("{:.0f}", label.interval_ms));
+  if (label.diffusion) {
+    data.putAndInsertFloat64(DCM_DiffusionBValue, label.diffusion->b_s_mm2);
+    const Eigen::Vector3d& g = label.diffusion->direction;
+    if (label.diffusion->b_s_mm2 > 0)
+      data.putAndInsertFloat64Array(DCM_DiffusionGradientOrientation, g.data(), 3);
+  } else {
+    put(DCM_TriggerTime, fmt::format("{:.4f}", label.trigger_ms));
+    put(DCM_NominalInterval, fmt::format("{:.0f}", label.interval_ms));
+  }
   put(DCM_ImagePositionPatient, triple(label.first_mm));
   put(DCM_ImageOrientationPatient, triple(label.along_row) + "\\" + triple(label.along_column));
   put(DCM_PixelSpacing, fmt::format("{:.6f}\\{:.6f}", label.pixel_mm, label.pixel_mm));

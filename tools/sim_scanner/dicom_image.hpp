@@ -20,6 +20,11 @@ struct VelocityLabel {
   bool is_velocity = false;  ///< else the magnitude that belongs to it
 };
 
+struct DiffusionLabel {
+  double b_s_mm2 = 0;
+  Eigen::Vector3d direction = Eigen::Vector3d::Zero();  ///< patient coordinates; none without weighting
+};
+
 struct ImageLabel {
   std::string study_uid, series_uid, image_uid;
   int series_number;
@@ -30,6 +35,7 @@ struct ImageLabel {
   double pixel_mm;
   double thickness_mm;
   std::optional<VelocityLabel> velocity = {};
+  std::optional<DiffusionLabel> diffusion = {};  ///< such an image has no time in the cycle
 };
 
 /// Tissue of brightness 1 is written as 1000; a velocity picture holds half turns, -1 to 1. No name, no identity. Throws InputError if the file cannot be written.

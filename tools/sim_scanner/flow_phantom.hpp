@@ -19,6 +19,12 @@ struct FlowPhantom {
   double viscosity_mm2_s = 1.0;  ///< water's at 20 degrees
   int harmonics = 12;            ///< of the parabolic profile that pass the hose
   double steady_mL_s = 0.0;      ///< of a leak: Poiseuille
+  /// Any other flow instead of the pump's: the real part of the sum over n from 1 of course[n - 1] exp(i n omega t), mL/s.
+  std::vector<std::complex<double>> course = {};
+
+  /// Takes the course of the flow that makes a periodic volume, mL, known at times of a cycle: of (count - 1) / 2 harmonics, by least squares.
+  /// Precondition: at least three times, without a gap of twice their mean distance.
+  void follow(const std::vector<double>& times_s, const std::vector<double>& known_mL);
 
   [[nodiscard]] double flow_mL_s(double time_s) const;
   /// Above that at the trigger.

@@ -115,7 +115,7 @@ void scan_flow(const FlowPhantom& phantom, const PhaseContrastProtocol& protocol
     for (const bool is_velocity : {false, true}) {
       if (!is_velocity && !protocol.has_magnitude) continue;
       const bool is_interleaved = protocol.maker == Maker::ge;
-      const int series = is_interleaved || !is_velocity ? 4 : 5;
+      const int series = protocol.first_series + (is_interleaved || !is_velocity ? 0 : 1);
       const int instance = phase + 1 + (is_interleaved && is_velocity ? protocol.phases : 0);
       const auto uid = [&](int image) {
         return fmt::format("2.25.{}", (protocol.seed + 7ULL) * 1000000000ULL +
@@ -131,7 +131,7 @@ void scan_flow(const FlowPhantom& phantom, const PhaseContrastProtocol& protocol
           .instance = instance,
           .trigger_ms = 1e3 * time_s,
           .interval_ms = 1e3 * phantom.period_s,
-          .first_mm = -half_mm * (protocol.along_row + protocol.along_column),
+          .first_mm = protocol.middle_mm - half_mm * (protocol.along_row + protocol.along_column),
           .along_row = protocol.along_row,
           .along_column = protocol.along_column,
           .pixel_mm = protocol.pixel_mm,

@@ -31,6 +31,8 @@ struct PhaseContrastProtocol {
   Eigen::Vector3d background_cm_s = {
       0.8, 2.0, -1.5};  ///< in the middle, its change over 50 mm along rows, and along columns
   Eigen::Vector3d along_row = {1, 0, 0}, along_column = {0, 1, 0};
+  Eigen::Vector3d middle_mm = {0, 0, 0};  ///< of the image, patient coordinates
+  int first_series = 4;                   ///< number of the magnitudes' series; the velocities' is the next
   std::optional<int> missing_phase = {};  ///< from 1
   bool has_magnitude = true;
   unsigned seed = 1;

@@ -18,15 +18,17 @@ struct TagProtocol {
 struct ScanProtocol {
   std::vector<double> short_axis_mm = {0.0};  ///< heights of slices across the specimen's z
   std::vector<double> long_axis_deg = {};     ///< slices along z, turned about it from x
+  double middle_mm = 0.0;                     ///< height of their middles
   double field_of_view_mm = 125.0;
   int matrix = 128;
   double acquired =
       0.75;  ///< share of the phase-encoding lines (along columns) that is measured; the rest is zero
   double thickness_mm = 6.0;
   TagProtocol tags;
-  bool tagged = true;  ///< the tagged series
-  bool cine = false;   ///< one without tags besides
-  double snr = 20.0;   ///< signal of tissue over the noise of one channel
+  bool tagged = true;      ///< the tagged series
+  bool cine = false;       ///< one without tags besides: balanced, so that water is brighter than tissue
+  bool dark_bath = false;  ///< what the specimen hangs in gives no signal, as perfluoropolyether
+  double snr = 20.0;       ///< signal of tissue over the noise of one channel
   double T1_s = 0.8;
   double shading = 0.2;  ///< by how much the coils' sensitivity differs from side to side
   unsigned seed = 1;

@@ -13,8 +13,9 @@ namespace diastole::scanner {
 namespace {
 
 constexpr int in_plane_samples = 3, through_samples = 6;
-constexpr double soft_edge = 0.15;         // of the thickness: where the slice's profile falls
-constexpr double water_brightness = 0.65;  // beside tissue's
+constexpr double soft_edge = 0.15;                 // of the thickness: where the slice's profile falls
+constexpr double water_brightness = 0.65;          // beside tissue's, with tags
+constexpr double balanced_water_brightness = 1.8;  // without
 constexpr double stirred_T_s = 0.08, bath_T1_s = 2.8;
 
 /// The profile across the slice, s in thicknesses from its middle.
@@ -36,9 +37,9 @@ class Signal {
       case Medium::tissue:
         return recovered(tags_at(spot.X_mm), time_s_, protocol_.T1_s);
       case Medium::cavity:
-        return water_brightness * recovered(tags_at(x_mm), time_s_, stirred_T_s);
+        return water() * recovered(tags_at(x_mm), time_s_, stirred_T_s);
       case Medium::bath:
-        return water_brightness * recovered(tags_at(x_mm), time_s_, bath_T1_s);
+        return protocol_.dark_bath ? 0 : water() * recovered(tags_at(x_mm), time_s_, bath_T1_s);
     }
     return 0;
   }
@@ -46,6 +47,7 @@ class Signal {
  private:
   static constexpr int table_size = 1024;
 
+  [[nodiscard]] double water() const { return tags_.empty() ? balanced_water_brightness : water_brightness; }
   [[nodiscard]] double tags_at(const Eigen::Vector3d& X_mm) const {
     double left = 1;
     for (const TagPlane& tag : tags_) {

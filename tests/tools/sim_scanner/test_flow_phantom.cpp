@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <numbers>
+#include <vector>
 
 namespace diastole::scanner {
 namespace {
@@ -43,6 +44,23 @@ TEST(FlowPhantom, VolumeIsTheFlowsIntegral) {
   EXPECT_NEAR(phantom.volume_mL(phantom.period_s), 0, 1e-9);
   // All harmonics of constant acceleration make the stroke; a few lose half a percent.
   EXPECT_NEAR(phantom.volume_mL(0.62) - phantom.volume_mL(0.02), 20, 0.15);
+}
+
+TEST(FlowPhantom, FollowsAVolumeThatIsKnownAtTimes) {
+  FlowPhantom phantom{.period_s = 1.2};
+  const auto volume_mL = [](double time_s) {
+    const double turn = 2 * std::numbers::pi * time_s / 1.2;
+    return 16 * (1 - std::cos(turn)) + 3 * std::sin(2 * turn + 0.4);
+  };
+  std::vector<double> times_s, known_mL;
+  for (int k = 0; k < 12; ++k) {
+    times_s.push_back(0.007 + 0.099 * k);
+    known_mL.push_back(volume_mL(times_s.back()));
+  }
+  phantom.follow(times_s, known_mL);
+  for (const double time_s : {0.05, 0.3, 0.71, 1.1})
+    EXPECT_NEAR(phantom.volume_mL(time_s), volume_mL(time_s) - volume_mL(0), 1e-9) << time_s;
+  EXPECT_NEAR(phantom.volume_mL(1.2), 0, 1e-9);
 }
 
 }  // namespace

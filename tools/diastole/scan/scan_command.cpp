@@ -19,6 +19,8 @@
 #include "estimator/model/study_model.hpp"
 #include "protocol/contract/input_error.hpp"
 #include "tools/diastole/commands.hpp"
+#include "tools/sim_scanner/diffusion_scan.hpp"
+#include "tools/sim_scanner/phase_contrast_scan.hpp"
 #include "tools/sim_scanner/scanner.hpp"
 
 namespace diastole {
@@ -36,7 +38,11 @@ struct ScanArguments {
   scanner::ScanProtocol protocol;
   std::optional<double> peak_kPa;
   int phases = 16;
-  double period_s = 1.2;
+  std::optional<double> period_s;
+  bool flow = false;
+  double bore_mm = 16.0, venc_cm_s = 120.0;
+  bool diffusion = false;
+  [[nodiscard]] double cycle_s() const { return period_s.value_or(1.2); }
   double first_s = 0.012;
 };
 
@@ -46,10 +52,10 @@ std::vector<ScanPhase> phases_of(const ScanArguments& arguments, const Study& st
   if (arguments.peak_kPa) {
     for (int k = 0; k < arguments.phases; ++k) {
       const double time_s =
-          arguments.first_s + (arguments.period_s - arguments.first_s) * k / arguments.phases;
+          arguments.first_s + (arguments.cycle_s() - arguments.first_s) * k / arguments.phases;
       // The parabolic profile: constant acceleration, -constant, constant.
       const double share =
-          2 * std::abs(time_s / arguments.period_s - std::round(time_s / arguments.period_s));
+          2 * std::abs(time_s / arguments.cycle_s() - std::round(time_s / arguments.cycle_s()));
       const double done = share < 0.5 ? 2 * share * share : 1 - 2 * (1 - share) * (1 - share);
       phases.push_back({time_s, *arguments.peak_kPa * done});
     }
@@ -77,8 +83,21 @@ scanner::ScanPose pose_of(const Study& study) {
   return pose;
 }
 
+/// Of the undeformed body.
+struct Extent {
+  double radius_mm = 0, low_mm = 1e300, high_mm = -1e300;
+  explicit Extent(const HermiteMesh& mesh) {
+    for (size_t node = 0; node < mesh.node_count(); ++node) {
+      const double* place = &mesh.reference()[dof_of(node, 0, 0)];
+      radius_mm = std::max(radius_mm, std::hypot(place[0], place[1]));
+      low_mm = std::min(low_mm, place[2]);
+      high_mm = std::max(high_mm, place[2]);
+    }
+  }
+};
+
 /// Before anything is computed.
-void check(const ScanArguments& arguments, const HermiteMesh& mesh) {
+void check(const ScanArguments& arguments, const ElasticModel& model) {
   const scanner::ScanProtocol& protocol = arguments.protocol;
   const double pixel_mm = protocol.field_of_view_mm / protocol.matrix;
   if (protocol.tags.spacing_mm < 3 * pixel_mm)
@@ -86,39 +105,88 @@ void check(const ScanArguments& arguments, const HermiteMesh& mesh) {
         {"", "--tag-spacing",
          fmt::format("{:g} mm is less than three pixels of {:.3g} mm", protocol.tags.spacing_mm, pixel_mm),
          "Space the tags farther apart, or give a larger --matrix."});
-  if (!protocol.tagged && !protocol.cine)
-    throw InputError({"", "--no-tags", "leaves nothing to scan", "Ask for --cine too."});
+  if (!protocol.tagged && !protocol.cine && !arguments.flow && !arguments.diffusion)
+    throw InputError(
+        {"", "--no-tags", "leaves nothing to scan", "Ask for --cine, --flow or --diffusion too."});
+  if (arguments.diffusion && !model.system().material_axes())
+    throw InputError({"", "--diffusion", "the study's specimen has no fibres", "Leave it out."});
   if (protocol.short_axis_mm.empty() && protocol.long_axis_deg.empty())
     throw InputError({"", "--short-axis, --long-axis", "no slice is left", "Give at least one."});
-  double radius_mm = 0;
-  for (size_t node = 0; node < mesh.node_count(); ++node)
-    radius_mm = std::max(
-        radius_mm, std::hypot(mesh.reference()[dof_of(node, 0, 0)], mesh.reference()[dof_of(node, 0, 1)]));
-  if (protocol.field_of_view_mm < 2.1 * radius_mm)
+  const Extent body(model.mesh());
+  if (protocol.field_of_view_mm < 2.1 * body.radius_mm)
     throw InputError({"", "--fov",
                       fmt::format("{:g} mm does not hold a specimen of {:.3g} mm across",
-                                  protocol.field_of_view_mm, 2 * radius_mm),
-                      fmt::format("Give {:.0f} mm or more.", std::ceil(2.3 * radius_mm))});
+                                  protocol.field_of_view_mm, 2 * body.radius_mm),
+                      fmt::format("Give {:.0f} mm or more.", std::ceil(2.3 * body.radius_mm))});
+  const double height_mm = body.high_mm - body.low_mm;
+  if (!protocol.long_axis_deg.empty() && protocol.field_of_view_mm < 1.05 * height_mm)
+    throw InputError({"", "--fov",
+                      fmt::format("{:g} mm does not hold a specimen of {:.3g} mm along its axis",
+                                  protocol.field_of_view_mm, height_mm),
+                      fmt::format("Give {:.0f} mm or more.", std::ceil(1.15 * height_mm))});
   std::error_code error;
   if (fs::exists(arguments.folder, error) && !fs::is_empty(arguments.folder, error))
     throw InputError(
         {arguments.folder.string(), "-o", "is there already and not empty", "Name a new folder."});
 }
 
-/// The motion of all phases, each from the last.
-std::vector<NodeField> motions(const Study& study, ElasticModel& model,
-                               const std::vector<ScanPhase>& phases) {
-  std::vector<NodeField> positions;
-  ElasticState state = model.rest_state();
+/// Of all phases.
+struct Motion {
+  std::vector<NodeField> position_mm;
+  std::vector<double> cavity_mL;  ///< more than at rest
+};
+
+Motion motion_of(const Study& study, ElasticModel& model, const std::vector<ScanPhase>& phases) {
+  Motion motion;
+  ElasticState state = model.rest_state();  // each phase is found from the last
+  const double rest_mL = model.cavity_volume_mL(state);
   for (const ScanPhase& phase : phases) {
     const Solution solution = model.solve(phase.pressure_kPa, state);
     if (!solution.report.converged())
       throw InputError({study.file.string(), fmt::format("pressure {:.3g} kPa", phase.pressure_kPa),
                         solution.report.describe(), "Give other values with --set, or lower pressures."});
     state = solution.state;
-    positions.push_back(state.position_mm);
+    motion.position_mm.push_back(state.position_mm);
+    motion.cavity_mL.push_back(model.cavity_volume_mL(state) - rest_mL);
   }
-  return positions;
+  return motion;
+}
+
+/// The flow through a tube above the specimen that makes its cavity's volume; its slice looks into the specimen.
+std::vector<scanner::ScannedSeries> scan_flow(const ScanArguments& arguments, const scanner::MovingBody& body,
+                                              const std::vector<double>& cavity_mL,
+                                              const scanner::ScanPose& pose, int first_series,
+                                              const fs::path& folder) {
+  scanner::FlowPhantom phantom{.bore_mm = arguments.bore_mm, .period_s = body.period_s};
+  phantom.follow(body.times_s, cavity_mL);
+  constexpr double above_mm = 30;
+  const scanner::PhaseContrastProtocol protocol{
+      .phases = 24,
+      .venc_cm_s = arguments.venc_cm_s,
+      .snr = arguments.protocol.snr,
+      .along_row = pose.axes.col(0),
+      .along_column = -pose.axes.col(1),
+      .middle_mm = pose.origin_mm + pose.axes * Eigen::Vector3d(0, 0, Extent(*body.mesh).high_mm + above_mm),
+      .first_series = first_series,
+      .seed = arguments.protocol.seed};
+  scanner::scan_flow(phantom, protocol, folder);
+  const auto files = static_cast<size_t>(protocol.phases);
+  return {{first_series, "magnitude of phase contrast", "SA", {}, files},
+          {first_series + 1, "velocity", "SA", {}, files}};
+}
+
+/// The flow is made of the whole cycle's volume.
+void check_cycle(const ScanArguments& arguments, const scanner::MovingBody& body) {
+  const std::vector<double>& times_s = body.times_s;
+  double gap_s = body.period_s - (times_s.back() - times_s.front());
+  bool is_one = gap_s > 0;
+  for (size_t k = 1; k < times_s.size(); ++k)
+    gap_s = std::max(gap_s, times_s[k] - times_s[k - 1]);
+  is_one &= times_s.size() > 2 && gap_s < 2 * body.period_s / static_cast<double>(times_s.size());
+  if (!is_one)
+    throw InputError({arguments.study.study.string(), "--flow",
+                      fmt::format("the frames do not go through a cycle of {:g} s", body.period_s),
+                      "Give frames of the whole cycle, some ten or more, and its --period."});
 }
 
 /// The study once more, with the scan as its data.
@@ -160,25 +228,47 @@ ExitCode run_scan(const ScanArguments& arguments, const CommandOutput& out) {
   const std::vector<ScanPhase> phases = phases_of(arguments, study);
   ElasticModel model = make_affected_model(study);
   require_cavity(study, model);
-  check(arguments, model.mesh());
+  check(arguments, model);
   const bool shows_progress = isatty(STDERR_FILENO) != 0;
   if (shows_progress) fmt::print(stderr, "Solving {} phases.\n", phases.size());
-  scanner::MovingBody body{&model.mesh(), {}, motions(study, model, phases), 0};
+  Motion motion = motion_of(study, model, phases);
+  scanner::MovingBody body{&model.mesh(), {}, std::move(motion.position_mm), 0};
   for (const ScanPhase& phase : phases)
     body.times_s.push_back(phase.time_s);
-  body.period_s = arguments.peak_kPa || phases.size() < 2
-                      ? arguments.period_s
+  body.period_s = arguments.peak_kPa || arguments.period_s || phases.size() < 2
+                      ? arguments.cycle_s()
                       : phases.back().time_s + (phases.back().time_s - phases.front().time_s) /
                                                    static_cast<double>(phases.size() - 1);
+  if (arguments.flow) check_cycle(arguments, body);
   // Complete or not at all.
   const fs::path partial = arguments.folder.string() + ".partial";
   fs::remove_all(partial);
   fs::create_directories(partial / "dicom");
   const scanner::ScanPose pose = pose_of(study);
-  const std::vector<scanner::ScannedSeries> series =
-      scanner::scan(body, arguments.protocol, pose, partial / "dicom", [&](size_t done, size_t all) {
+  scanner::ScanProtocol protocol = arguments.protocol;
+  protocol.middle_mm = 0.5 * (Extent(model.mesh()).low_mm + Extent(model.mesh()).high_mm);
+  std::vector<scanner::ScannedSeries> series =
+      scanner::scan(body, protocol, pose, partial / "dicom", [&](size_t done, size_t all) {
         if (shows_progress) fmt::print(stderr, "\r{} of {} images{}", done, all, done == all ? "\n" : "");
       });
+  // Two scans of one heart, of other series each, then make one export.
+  const auto series_from = [&](int number) {
+    return series.empty() ? number : std::max(number, series.back().number + 1);
+  };
+  if (arguments.flow) {
+    for (scanner::ScannedSeries& one :
+         scan_flow(arguments, body, motion.cavity_mL, pose, series_from(101), partial / "dicom"))
+      series.push_back(std::move(one));
+  }
+  if (arguments.diffusion) {
+    const scanner::FibreAt fibre = [&](const MaterialPoint& point) -> Eigen::Vector3d {
+      return model.system().material_axes()(model.mesh(), point).col(0);
+    };
+    series.push_back(scanner::scan_diffusion(
+        model.mesh(), fibre,
+        {.snr = arguments.protocol.snr, .series = series_from(201), .seed = arguments.protocol.seed}, pose,
+        partial / "dicom"));
+  }
   write_whole_file(partial / "scan.frames.csv", frames_text(phases, arguments.protocol.seed));
   write_whole_file(partial / "scan.pose.toml", pose_text(study, pose));
   write_whole_file(partial / "scan.study.toml", study_text(study));
@@ -272,13 +362,29 @@ void add_scan(CommandLine& line) {
       ->check(CLI::Range(0.0, 1.0))
       ->capture_default_str();
   command->add_flag("--cine", a.protocol.cine, "series without tags, too");
+  command->add_flag(
+      "--dark-bath", a.protocol.dark_bath,
+      "what the specimen hangs in gives no signal: `diastole lv` finds the walls of such cines");
+  command->add_flag(
+      "--flow", a.flow,
+      "phase contrast of the tube that fills the specimen, too; the frames must go through a whole cycle");
+  command->add_option("--bore", a.bore_mm, "of that tube, mm")
+      ->check(CLI::Range(4.0, 40.0))
+      ->capture_default_str();
+  command->add_option("--venc", a.venc_cm_s, "of the phase contrast, cm/s")
+      ->check(positive)
+      ->capture_default_str();
+  command->add_flag("--diffusion", a.diffusion, "diffusion weighted images of the fibres at rest, too");
   command->add_flag("!--no-tags", a.protocol.tagged, "no tagged series");
   command
       ->add_option("--peak-kPa", a.peak_kPa,
                    "a parabolic cycle up to this pressure, instead of the study's frames")
       ->check(positive);
   command->add_option("--phases", a.phases, "of that cycle")->check(CLI::Range(1, 64))->capture_default_str();
-  command->add_option("--period", a.period_s, "of that cycle, s")->check(positive)->capture_default_str();
+  command
+      ->add_option("--period", a.period_s,
+                   "of the cycle, s: 1.2 for a parabolic one, else what the frames span")
+      ->check(positive);
   command->add_option("--seed", a.protocol.seed, "of the noise and of where the tags lie")
       ->capture_default_str();
   line.on_run(command, [arguments](const CommandOutput& out) { return run_scan(*arguments, out); });
