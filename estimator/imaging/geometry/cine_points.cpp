@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <numbers>
 #include <numeric>
 #include <optional>
@@ -198,12 +199,24 @@ class CineFinder {
     throw InputError({guide_.file, "", problem, remedy});
   }
 
+  /// Of the cine slices: phase contrast's magnitudes, one slice of more phases, look like a cine.
+  static size_t phases_of_most(const ImageFolder& folder) {
+    std::map<size_t, int> slices;
+    for (const ImageSeries& series : folder.series) {
+      if (series.kind != SeriesKind::cine) continue;
+      for (const SliceImages& slice : series.slices)
+        ++slices[slice.images.size()];
+    }
+    const auto most = std::max_element(slices.begin(), slices.end(),
+                                       [](const auto& a, const auto& b) { return a.second < b.second; });
+    return most == slices.end() ? 0 : most->first;
+  }
+
   void read_slices(const ImageFolder& folder) {
-    size_t phases = 0;
+    const size_t phases = phases_of_most(folder);
     for (const ImageSeries& series : folder.series) {
       if (series.kind != SeriesKind::cine) continue;
       for (const SliceImages& slice : series.slices) {
-        if (phases == 0) phases = slice.images.size();
         if (slice.images.size() != phases) {
           guide_.findings.push_back(
               {Severity::warning, "other-phases",

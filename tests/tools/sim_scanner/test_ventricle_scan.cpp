@@ -51,6 +51,11 @@ class VentricleScan : public testing::Test {
 
 TEST_F(VentricleScan, WallsAndBaseAreFoundInItsCines) {
   scan_phases(4);
+  // Another slice with phases of its own, as the magnitudes of phase contrast are, comes first and is no wall's.
+  protocol_.short_axis_mm = {30};
+  protocol_.long_axis_deg = {};
+  protocol_.seed = 0;
+  scan_phases(3);
   const imaging::GuidePoints guide = imaging::cine_guide_points(scratch_.path());
   ASSERT_EQ(guide.phases.size(), 4U);
   int walls = 0, base = 0;
