@@ -10,6 +10,7 @@
 #include <optional>
 
 #include "estimator/explain/rig/findings.hpp"
+#include "estimator/explain/rig/held_out.hpp"
 #include "estimator/explain/rig/learned_term.hpp"
 #include "estimator/explain/rig/next_experiment.hpp"
 #include "estimator/explain/rig/reference_file.hpp"

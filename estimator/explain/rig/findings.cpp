@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <numbers>
 #include <numeric>
 #include <optional>
@@ -16,7 +15,6 @@ namespace diastole::explain {
 namespace {
 
 using Eigen::Index;
-using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr double discovery_rate = 0.01;
@@ -65,30 +63,6 @@ std::optional<std::array<double, 2>> band_of(const rig::FeatureBlock& block, con
 Port port_of(const EffectSet& under, rig::Signal signal) {
   if (under.model.terms.size() == 1) return under.model.terms.front().effect->text().port;
   return signal == rig::Signal::pump ? Port::drive : Port::specimen;
-}
-
-/// Squares of what values fitted to all but some rows leave there.
-struct HeldOut {
-  double square = 0.0;
-  double count = 0.0;
-};
-void predict(const EffectSet& set, const std::vector<bool>& held, const VectorXd& variance, HeldOut& sum) {
-  const VectorXd target = set.target();
-  VectorXd weight = variance.cwiseInverse();
-  for (Index i = 0; i < weight.size(); ++i)
-    if (held[static_cast<size_t>(i)]) weight[i] = 0.0;
-  MatrixXd normal = set.columns.transpose() * weight.asDiagonal() * set.columns;
-  normal.diagonal().array() += 1.0;
-  const Eigen::LLT<MatrixXd> factor(normal);
-  const VectorXd w = factor.solve(set.columns.transpose() * weight.cwiseProduct(target));
-  for (Index i = 0; i < weight.size(); ++i) {
-    if (!held[static_cast<size_t>(i)]) continue;
-    const double miss = target[i] - set.columns.row(i).dot(w);
-    // What the others leave open of the prediction is no misfit.
-    const double open = set.columns.row(i).dot(factor.solve(set.columns.row(i).transpose()));
-    sum.square += miss * miss / (variance[i] + open);
-    sum.count += 1.0;
-  }
 }
 
 }  // namespace
@@ -165,41 +139,6 @@ std::vector<Misfit> misfits(const rig::SessionProblem& problem, const EffectSet&
   return list;
 }
 
-std::vector<Fold> folds_of(const rig::SessionProblem& problem) {
-  const auto& runs = problem.session().runs;
-  const bool by_run = runs.size() > 1;
-  std::map<std::pair<size_t, size_t>, Fold> folds;
-  for (const rig::FeatureBlock& block : problem.features().blocks()) {
-    if (block.at_rest && !by_run) continue;
-    Fold& fold = folds[{block.run, by_run ? 0 : block.segment}];
-    fold.name = by_run ? file_of(runs[block.run])
-                       : fmt::format("{}, segment {}", file_of(runs[block.run]), block.segment);
-    fold.held.resize(static_cast<size_t>(problem.features().count()), false);
-    std::fill_n(fold.held.begin() + static_cast<std::ptrdiff_t>(block.first), block.features.size(), true);
-  }
-  std::vector<Fold> list;
-  for (auto& [place, fold] : folds)
-    list.push_back(std::move(fold));
-  return list;
-}
-
-Gap held_out_gap(const rig::SessionProblem& problem, const EffectSet& before, const EffectSet& after) {
-  Gap gap;
-  HeldOut old, now;
-  for (const Fold& fold : folds_of(problem)) {
-    predict(before, fold.held, after.evidence.variance, old);
-    predict(after, fold.held, after.evidence.variance, now);
-    gap.held_out.push_back(fold.name);
-  }
-  if (old.count == 0.0) return gap;
-  gap.before = old.square / old.count;
-  gap.after = now.square / now.count;
-  gap.closed = gap.before > gap.floor
-                   ? std::clamp(1.0 - (gap.after - gap.floor) / (gap.before - gap.floor), 0.0, 1.0)
-                   : 0.0;
-  return gap;
-}
-
 std::vector<Candidate> candidates(const EffectLibrary& known, const SetSearch& search,
                                   const SetVerdict& verdict) {
   std::vector<Candidate> list;
@@ -211,6 +150,7 @@ std::vector<Candidate> candidates(const EffectLibrary& known, const SetSearch& s
     Candidate row{
         set.ids(), 2.0 * (set.log_posterior - plain->log_posterior), true, set.model.values.size(), {}, ""};
     if (k == verdict.chosen) {
+      if (verdict.held_out_gain) row.held_out_drop = 2.0 * *verdict.held_out_gain;
       row.verdict = verdict.verdict == Verdict::unexplained ? "fits best, and not well enough"
                     : verdict.verdict == Verdict::ambiguous ? "as good"
                                                             : "named";

@@ -1,6 +1,5 @@
 #pragma once
-// The parts of an Explanation that are read off fitted sets of effects: effects with intervals, places, shifts, the gap
-// on data that were not fitted, traces.
+// The parts of an Explanation that are read off fitted sets of effects: effects with intervals, places, shifts, traces.
 
 #include <vector>
 
@@ -20,18 +19,6 @@ std::vector<ParameterShift> parameter_shifts(const rig::SessionProblem& problem,
 /// rate: one a channel and segment, the worst first. Each goes to the port of the largest effect of `under` or, if it has
 /// none, to the port that the channel suggests.
 std::vector<Misfit> misfits(const rig::SessionProblem& problem, const EffectSet& set, const EffectSet& under);
-
-/// Features that are predicted from all others.
-struct Fold {
-  std::string name;
-  std::vector<bool> held;
-};
-/// Of each run; of a single run of each segment.
-std::vector<Fold> folds_of(const rig::SessionProblem& problem);
-
-/// Reduced chi-squares on each run (of a single run: each segment) by values that were fitted to all others, over noise and
-/// the model's error of `after`.
-Gap held_out_gap(const rig::SessionProblem& problem, const EffectSet& before, const EffectSet& after);
 
 /// The evidence table.
 std::vector<Candidate> candidates(const EffectLibrary& known, const SetSearch& search,

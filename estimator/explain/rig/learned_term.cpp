@@ -7,6 +7,7 @@
 
 #include "estimator/explain/rig/findings.hpp"
 #include "estimator/explain/rig/frozen_leak.hpp"
+#include "estimator/explain/rig/held_out.hpp"
 #include "estimator/explain/rig/law_fit.hpp"
 #include "estimator/explain/rig/law_readings.hpp"
 #include "estimator/inference/information.hpp"
@@ -189,19 +190,9 @@ void LawSearch::refine(LawCandidate& law, double best_gain) const {
   }
 }
 
-/// ln density of the rows that are held out, given the others, by the others' shares.
-double held_out_density(const LawProblem& problem, const MatrixXd& columns, const rig::ModelError& error,
-                        const std::vector<Index>& fitted, const rig::Shares& shares) {
-  const VectorXd target = problem.target(fitted);
-  return fit_linear(problem.target, columns, error, shares).log_evidence -
-         fit_linear(target, columns(fitted, Eigen::all), error_of_rows(error, fitted), shares).log_evidence;
-}
-
 void LawSearch::judge(LawCandidate& law, const std::vector<Fold>& folds) const {
   for (const Fold& fold : folds) {
-    std::vector<Index> fitted;
-    for (size_t i = 0; i < fold.held.size(); ++i)
-      if (!fold.held[i]) fitted.push_back(static_cast<Index>(i));
+    const std::vector<Index> fitted = fold.others();
     const rig::ModelError error = error_of_rows(problem_.error(), fitted);
     const LawProblem base = base_.rows(fitted);
     const rig::EvidenceFit plain = fit_with_shares(base.target, base.known, error, without_.shares);
@@ -210,8 +201,8 @@ void LawSearch::judge(LawCandidate& law, const std::vector<Fold>& folds) const {
     MatrixXd columns(law.problem.known.rows(), with.root.cols() + law.problem.known.cols());
     columns << law.problem.responses * with.root, law.problem.known;
     law.gains.push_back(
-        held_out_density(law.problem, columns, problem_.error(), fitted, with.evidence.shares) -
-        held_out_density(base_, base_.known, problem_.error(), fitted, plain.shares));
+        held_out_density({law.problem.target, columns}, problem_.error(), fitted, with.evidence.shares) -
+        held_out_density({base_.target, base_.known}, problem_.error(), fitted, plain.shares));
   }
 }
 
@@ -249,15 +240,6 @@ std::vector<LawCandidate> LawSearch::run(const std::vector<Fold>& folds) {
   }
   std::ranges::sort(laws, std::greater(), &LawCandidate::gain);
   return laws;
-}
-
-/// ln of the mean of what e to these is.
-double log_mean(const std::vector<double>& logarithms) {
-  const double largest = std::ranges::max(logarithms);
-  double sum = 0.0;
-  for (const double logarithm : logarithms)
-    sum += std::exp(logarithm - largest);
-  return largest + std::log(sum / static_cast<double>(logarithms.size()));
 }
 
 bool predicts_better(const std::vector<double>& gains, size_t laws) {

@@ -7,6 +7,7 @@
 #include <map>
 
 #include "estimator/explain/rig/changed_parts.hpp"
+#include "estimator/explain/rig/held_out.hpp"
 
 namespace diastole::explain {
 namespace {
@@ -181,6 +182,14 @@ bool bears_a_name(const rig::SessionProblem& problem, const EffectSet& set, cons
          !is_strained_in_all(problem, set, again.u.tail(set.model.u.size()));
 }
 
+/// What a set gains on a waveform that it was not fitted to is the logarithm of a likelihood ratio, with a mean of one where its
+/// effects are not; so is the mean over waveforms. As evidence it has to overcome the effects' odds as all data do. A misfit
+/// that any smooth function predicts as well is no effect's mark.
+bool predicts(double held_out_gain, size_t effects) {
+  return held_out_gain + static_cast<double>(effects) * std::log(effect_odds) >
+         std::log(name_probability / (1.0 - name_probability));
+}
+
 /// That nothing is wrong is not said of a misfit that one part shows so seldom, nor of one tolerance so far to either side,
 /// nor of both as seldom together (Fisher 1925: minus two ln of their product is chi-square on four).
 bool bears_nothing_wrong(const rig::SessionProblem& problem, const EffectSet& set) {
@@ -260,12 +269,14 @@ SetVerdict judge_sets(const rig::SessionProblem& problem, const SetSearch& searc
   const bool borne = is_more ? bears_a_name(problem, best, sizes[out.chosen])
                              : bears_nothing_wrong(problem, *plain) || bears_nothing_wrong(problem, best);
   out.scatter = rig::cycle_scatter(problem, best.model);
+  if (is_more) out.held_out_gain = log_mean(held_out_gains(problem, *plain, best));
+  const bool predicted = !is_more || predicts(*out.held_out_gain, best.model.terms.size() - search.given);
   if (!borne || is_irregular(problem, out.scatter) || !is_settled(out.searches)) {
     out.verdict = Verdict::unexplained;
     return out;
   }
   if (out.confidence >= name_probability) {
-    out.verdict = !is_more ? Verdict::none : Verdict::named;
+    out.verdict = !is_more ? Verdict::none : predicted ? Verdict::named : Verdict::unexplained;
     return out;
   }
   out.verdict = Verdict::ambiguous;

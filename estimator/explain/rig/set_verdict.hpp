@@ -5,8 +5,11 @@
 // channel (0.1 % of the range at least: no instrument is better) and than a tenth of the set's largest, and if parts of the
 // declared rig would have to be two sds off to do the same: what is nearer is a tolerance. Immaterial ones are hints and
 // named by nobody: probabilities of sets that differ by them add. A set is named with a probability of
-// nine tenths; sets that are less certain are ambiguous. Where even the best set needs a model's error larger than what is
+// nine tenths; sets that are less certain are ambiguous. It has to have the same odds on waveforms that it was not fitted to
+// alone, against the model without it and against a smooth discrepancy of like freedom (held_out.hpp). Where even the best set needs a model's error larger than what is
 // known of it allows, the misfit is unexplained.
+
+#include <optional>
 
 #include "estimator/explain/rig/effect_sets.hpp"
 #include "estimator/explain/verdict/explanation.hpp"
@@ -31,6 +34,9 @@ struct SetVerdict {
   std::vector<Hint> hints;
   std::vector<rig::CycleScatter> scatter = {};
   std::vector<SearchEnd> searches;
+  /// Of the leading set, if it has more than the given effects: ln of its mean likelihood ratio on waveforms that were not
+  /// fitted.
+  std::optional<double> held_out_gain = {};
 };
 
 /// Of a set's tolerances the one furthest from its prior, in sds.

@@ -7,6 +7,7 @@
 
 #include "estimator/effects/effect.hpp"
 #include "estimator/explain/rig/findings.hpp"
+#include "estimator/explain/rig/held_out.hpp"
 #include "estimator/rig_fit/simulated_session.hpp"
 
 namespace diastole::explain {
@@ -17,8 +18,9 @@ using testing::IsEmpty;
 
 class SimulatedSession : public testing::Test {
  protected:
-  void search(const rig::SessionOptions& options) {
+  void search(const rig::SessionOptions& options, size_t runs = 3) {
     session_ = rig::simulated_session(family_, options);
+    session_.runs.resize(runs);
     problem_.emplace(session_, family_, 2);
     found_ = search_sets(*problem_);
     verdict_ = judge_sets(*problem_, found_, {});
@@ -52,6 +54,17 @@ TEST_F(SimulatedSession, WithALeakIsExplainedByItAndPredictsWhatWasNotFitted) {
   EXPECT_GT(gap.before, 1.5);
   EXPECT_GT(gap.closed, 0.9);
   EXPECT_EQ(gap.held_out.size(), 3U);
+  EXPECT_GT(verdict_.held_out_gain.value(), 20.0);
+}
+
+/// What it does to one waveform a function of volume does as well, which says nothing of where it comes from.
+TEST_F(SimulatedSession, OfOneWaveformWithAStiffeningWallGetsNoName) {
+  search({.terms = {{find_effect("strain-stiffening"), {}}}, .values = {1.0}, .seed = 6}, 1);
+  EXPECT_GE(verdict_.confidence, 0.9);
+  EXPECT_THAT(chosen().ids(), ElementsAre("strain-stiffening"));
+  EXPECT_TRUE(is_settled(verdict_.searches));
+  EXPECT_LT(verdict_.held_out_gain.value(), 3.0);
+  EXPECT_EQ(verdict_.verdict, Verdict::unexplained);
 }
 
 TEST_F(SimulatedSession, WithALeakIsNotNamedByASearchThatDidNotSettle) {

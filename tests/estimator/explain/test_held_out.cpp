@@ -1,0 +1,78 @@
+#include "estimator/explain/rig/held_out.hpp"
+
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <optional>
+
+#include "estimator/explain/rig/set_fit.hpp"
+#include "estimator/rig_fit/simulated_session.hpp"
+
+namespace diastole::explain {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+class HeldOut : public testing::Test {
+ protected:
+  void record(size_t runs) {
+    session_ = rig::simulated_session(family_, {.seed = 31});
+    session_.runs.resize(runs);
+    problem_.emplace(session_, family_, 2);
+    const rig::LinearisedModel base = rig::declared_rig(*problem_);
+    plain_ = fit_set(*problem_, base.at, base, problem_->error().prior.share);
+  }
+  /// What is left of a target by its columns, over the noise and the model's error.
+  [[nodiscard]] double left(const LinearFeatures& features) const {
+    const rig::EvidenceFit fit =
+        fit_linear(features.target, features.columns, problem_->error(), plain_.evidence.shares);
+    return fit.left.cwiseAbs2().cwiseQuotient(fit.variance).sum();
+  }
+  rig::SpecimenFamily family_ = rig::gel_family();
+  rig::Session session_;
+  std::optional<rig::SessionProblem> problem_;
+  EffectSet plain_;
+};
+
+TEST_F(HeldOut, IsARunOrOfASingleRunASegment) {
+  record(3);
+  std::vector<Fold> folds = folds_of(*problem_);
+  ASSERT_EQ(folds.size(), 3U);
+  Index held = 0;
+  for (const Fold& fold : folds)
+    held += problem_->features().count() - static_cast<Index>(fold.others().size());
+  EXPECT_EQ(held, problem_->features().count());
+  record(1);
+  folds = folds_of(*problem_);
+  ASSERT_EQ(folds.size(), 1U);
+  EXPECT_EQ(folds.front().name, "baseline.run.h5, segment 0");
+}
+
+TEST_F(HeldOut, SmoothDiscrepanciesAreThoseThatExplainMost) {
+  record(3);
+  const MatrixXd functions = smooth_functions(*problem_);
+  ASSERT_TRUE(functions.allFinite());
+  EXPECT_GT(functions.colwise().norm().minCoeff(), 0.0);
+  const double before = left({plain_.target(), plain_.columns});
+  // A bend by the square of the volume, at the cavity alone, and one by the flow's.
+  plain_.evidence.left += 0.4 * functions.col(2) - 0.2 * functions.col(4);
+  EXPECT_GT(left({plain_.target(), plain_.columns}), 4.0 * before);
+  EXPECT_NEAR(left(smooth_discrepancy(plain_, functions, 2)), before, 0.1 * before);
+  EXPECT_EQ(smooth_discrepancy(plain_, functions, 2).columns.cols(), plain_.columns.cols() + 2);
+}
+
+TEST_F(HeldOut, NothingIsGainedByWhatChangesNothing) {
+  record(3);
+  for (const double gain : held_out_gains(*problem_, plain_, plain_))
+    EXPECT_NEAR(gain, 0.0, 1e-6);
+}
+
+TEST(LogMean, IsThatOfTheMeanOfLikelihoodRatios) {
+  EXPECT_NEAR(log_mean({0.0, std::log(3.0)}), std::log(2.0), 1e-12);
+  EXPECT_NEAR(log_mean({-2000.0, 2000.0}), 2000.0 - std::log(2.0), 1e-9);
+}
+
+}  // namespace
+}  // namespace diastole::explain
