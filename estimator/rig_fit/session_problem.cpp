@@ -28,7 +28,8 @@ Nuisance modulus_of(const SpecimenFamily& family) {
 
 }  // namespace
 
-SessionProblem::SessionProblem(const Session& session, const SpecimenFamily& family, size_t threads)
+SessionProblem::SessionProblem(const Session& session, const SpecimenFamily& family, size_t threads,
+                               std::span<const std::string_view> learnt)
     : session_(session),
       family_(family),
       threads_(threads),
@@ -41,7 +42,9 @@ SessionProblem::SessionProblem(const Session& session, const SpecimenFamily& fam
                  {"pump_offset", "Pa", offset_sd_Pa, 0.0, true, nullptr}} {
   for (const Tolerance& tolerance : all_tolerances()) {
     const auto stated = session.tolerance_sd.find(std::string(tolerance.name));
-    const double sd = stated == session.tolerance_sd.end() ? tolerance.sd : stated->second;
+    const bool is_stated = stated != session.tolerance_sd.end();
+    const double sd = is_stated ? stated->second : tolerance.sd;
+    if (tolerance.only_learnt && !is_stated && std::ranges::count(learnt, tolerance.name) == 0) continue;
     if (!tolerance.needs_neighbours || family.has_neighbours())
       nuisances_.push_back({std::string(tolerance.name), std::string(tolerance.unit), sd, 0.0,
                             tolerance.sensors_only, &tolerance});

@@ -40,8 +40,9 @@ inline constexpr size_t basic_nuisances = 3;
 
 class SessionProblem {
  public:
-  /// `session` and `family` must outlive it.
-  SessionProblem(const Session& session, const SpecimenFamily& family, size_t threads);
+  /// `session` and `family` must outlive it. Of the tolerances that only references teach those of `learnt` are unknowns.
+  SessionProblem(const Session& session, const SpecimenFamily& family, size_t threads,
+                 std::span<const std::string_view> learnt = {});
 
   [[nodiscard]] const Session& session() const { return session_; }
   [[nodiscard]] const SpecimenFamily& family() const { return family_; }

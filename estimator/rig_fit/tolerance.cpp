@@ -20,12 +20,12 @@ double positive(double value, double rounding) {
   return x > 30.0 ? value : rounding * std::log1p(std::exp(x));
 }
 
-/// The screw's error once a turn, `sine` or cosine of its angle.
-template <bool sine>
-void add_screw_error(double size_mL, const EffectContext&, RigModel& model) {
+/// An error of the drive so many times a turn of the screw, `sine` or cosine of that angle.
+template <int times_a_turn, bool sine>
+void add_turning_error(double size_mL, const EffectContext&, RigModel& model) {
   if (size_mL == 0.0) return;
   model.drive.emplace_back([=](DriveTrace& trace, const RunPlace& place) {
-    const double per_mL = 2.0 * std::numbers::pi / place.turn_mL;
+    const double per_mL = 2.0 * std::numbers::pi * times_a_turn / place.turn_mL;
     for (size_t k = 0; k < trace.volume_mL.size(); ++k) {
       const double angle = per_mL * trace.volume_mL[k];
       const double flow = trace.flow_mL_per_s[k];
@@ -113,8 +113,11 @@ constexpr std::array tolerances{
                 m.drive_compliance_mL_per_kPa =
                     2.0 * rigid_below_mL_per_kPa + positive(m.drive_compliance_mL_per_kPa + x, 0.0005);
               }},
-    Tolerance{"screw_sine", "mL", 0.02, false, false, add_screw_error<true>},
-    Tolerance{"screw_cosine", "mL", 0.02, false, false, add_screw_error<false>},
+    Tolerance{"screw_sine", "mL", 0.02, false, false, add_turning_error<1, true>},
+    Tolerance{"screw_cosine", "mL", 0.02, false, false, add_turning_error<1, false>},
+    // A coupling between shafts that do not quite align errs twice a turn (Hooke's joint), by less than the screw.
+    Tolerance{"coupling_sine", "mL", 0.01, false, false, add_turning_error<2, true>, true},
+    Tolerance{"coupling_cosine", "mL", 0.01, false, false, add_turning_error<2, false>, true},
     // Gas, if there is any: between isothermal and adiabatic.
     Tolerance{"gas_exponent", "", 0.07, false, false,
               [](double x, const EffectContext&, RigModel& m) { m.gas_exponent += x; }},

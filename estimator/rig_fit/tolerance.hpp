@@ -20,6 +20,9 @@ struct Tolerance {
   bool sensors_only = false;      ///< the plant does not depend on it
   bool needs_neighbours = false;  ///< only a specimen with computed neighbours can have it
   void (*apply)(double offset, const EffectContext&, RigModel&) = nullptr;
+  /// An unknown only where references taught it, or the rig's description states its size: without them it is freedom that
+  /// hides more than it mends.
+  bool only_learnt = false;
 };
 
 /// They keep their order: references store them by name.

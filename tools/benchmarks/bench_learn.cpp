@@ -40,10 +40,13 @@ std::optional<explain::LearnedTerm> learnt(const std::filesystem::path& file) {
   const Study study = read_study(file);
   const rig::Session session = rig::read_session(study);
   const rig::SpecimenFamily family(study);
-  rig::SessionProblem problem(session, family, 2);
-  const bool has_reference = !study.data.reference.empty();
-  if (has_reference) explain::use_reference(explain::reference_of(study, 2, {}), problem);
-  return explain::learn_term(problem, fitted_plain(problem), {has_reference}).term;
+  std::optional<explain::Reference> reference;
+  if (!study.data.reference.empty()) reference = explain::reference_of(study, 2, {});
+  rig::SessionProblem problem(
+      session, family, 2,
+      reference ? explain::learnt_tolerances(*reference) : std::vector<std::string_view>{});
+  if (reference) explain::use_reference(*reference, problem);
+  return explain::learn_term(problem, fitted_plain(problem), {reference.has_value()}).term;
 }
 
 /// How often a law was proposed.

@@ -177,12 +177,14 @@ Explanation explain_rig(const Study& study, const ExplainOptions& options) {
   require_known_tolerances(session);
   rig::SpecimenFamily family(study);
   family.compute_ahead();
-  rig::SessionProblem problem(session, family, options.threads);
   const auto report = [&](std::string_view what) { options.report(std::string(what)); };
+  std::optional<Reference> learnt;
+  if (!study.data.reference.empty()) learnt = reference_of(study, options.threads, report);
+  rig::SessionProblem problem(session, family, options.threads,
+                              learnt ? learnt_tolerances(*learnt) : std::vector<std::string_view>{});
   state_error(study.model_error, problem.error().prior.share);
   std::optional<ReferenceSummary> reference;
-  if (!study.data.reference.empty())
-    reference = take_reference(study, reference_of(study, options.threads, report), problem);
+  if (learnt) reference = take_reference(study, *learnt, problem);
   SetSearchOptions searching{.progress = report};
   take_given(study, session, searching);
   const SetSearch search = search_sets(problem, searching);

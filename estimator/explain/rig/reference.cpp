@@ -44,6 +44,13 @@ struct Knowledge {
   [[nodiscard]] MatrixXd root() const { return covariance.llt().matrixL(); }
 };
 
+std::vector<std::string_view> all_learnt() {
+  std::vector<std::string_view> names;
+  for (const rig::Tolerance& tolerance : rig::all_tolerances())
+    if (tolerance.only_learnt) names.push_back(tolerance.name);
+  return names;
+}
+
 /// A reference session and its fit.
 struct Fitted {
   Study study;
@@ -56,7 +63,7 @@ struct Fitted {
       : study(std::move(of)),
         session(rig::read_session(study)),
         family(study),
-        problem(session, family, threads) {}
+        problem(session, family, threads, all_learnt()) {}
   /// With this knowledge as the prior; the search starts at these tolerances.
   void fit(const Knowledge& before, const VectorXd& tolerances) {
     const MatrixXd root = before.root();
@@ -244,6 +251,18 @@ Reference learn_reference(const std::vector<Study>& studies, size_t threads,
     }
   }
   return out;
+}
+
+std::vector<std::string_view> learnt_tolerances(const Reference& reference) {
+  constexpr double by_half = 0.5;  // of a variance of one before: as much is told again
+  std::vector<std::string_view> names = all_learnt();
+  std::erase_if(names, [&](std::string_view name) {
+    const auto found = std::ranges::find(reference.tolerances, name);
+    if (found == reference.tolerances.end()) return true;
+    const Index i = found - reference.tolerances.begin();
+    return reference.covariance(i, i) >= by_half;
+  });
+  return names;
 }
 
 void use_reference(const Reference& reference, SessionProblem& problem) {

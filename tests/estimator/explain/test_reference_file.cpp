@@ -29,6 +29,14 @@ TEST(Reference, IsReadAsItWasWritten) {
   EXPECT_EQ(read.fingerprint, "0badcafe");
 }
 
+TEST(Reference, TeachesOfTheCouplingWhatItTellsMoreOfThanIsKnownOfAny) {
+  Reference reference;
+  EXPECT_THAT(learnt_tolerances(reference), testing::IsEmpty());
+  reference.tolerances = {"screw_sine", "coupling_sine", "coupling_cosine"};
+  reference.covariance = Eigen::Vector3d(0.1, 0.1, 0.9).asDiagonal();
+  EXPECT_THAT(learnt_tolerances(reference), testing::ElementsAre("coupling_sine"));
+}
+
 TEST(Reference, OfAnotherRigIsRefusedWithBothHoses) {
   Reference reference;
   reference.covariance.resize(0, 0);

@@ -165,22 +165,48 @@ TEST(Tolerances, MoveThePistonByMotionsWhoseDerivativesTheyKnow) {
       ++of_drive;
     }
   }
-  EXPECT_EQ(of_drive, 3U);  // the stroke, and the two parts of the screw's error
+  EXPECT_EQ(of_drive, 5U);  // the stroke, and the two parts of the screw's error and of the coupling's
 }
 
-TEST(Tolerances, OfTheScrewHaveItsOwnTurn) {
+/// Where a drive stands that was to be at these volumes, a turn of its screw being 8 mL.
+std::vector<double> moved_by(std::string_view name, double size_mL, std::vector<double> volume_mL) {
   const SpecimenFamily family = gel_family();
-  const auto sine = std::ranges::find(all_tolerances(), std::string_view("screw_sine"), &Tolerance::name);
   RigModel model;
   model.curve = family.plain();
-  sine->apply(0.02, {family, {}, true}, model);
-  DriveTrace trace{0.0, 1e-3, {0.0, 2.0, 4.0, 8.0}, std::vector<double>(4), std::vector<double>(4)};
+  std::ranges::find(all_tolerances(), name, &Tolerance::name)->apply(size_mL, {family, {}, true}, model);
+  const std::vector<double> none(volume_mL.size());
+  DriveTrace trace{0.0, 1e-3, std::move(volume_mL), none, none};
   RunPlace place;
   place.turn_mL = 8.0;
   model.drive.front()(trace, place);
-  const std::vector<double> expected{0.0, 2.02, 4.0, 8.0};
-  for (size_t k = 0; k < expected.size(); ++k)
-    EXPECT_NEAR(trace.volume_mL[k], expected[k], 1e-12);
+  return trace.volume_mL;
+}
+
+TEST(Tolerances, OfScrewAndCouplingHaveTheScrewsOwnTurn) {
+  using testing::DoubleNear;
+  using testing::ElementsAre;
+  const auto at = [](double value) { return DoubleNear(value, 1e-12); };
+  EXPECT_THAT(moved_by("screw_sine", 0.02, {0.0, 2.0, 4.0, 8.0}), ElementsAre(at(0), at(2.02), at(4), at(8)));
+  EXPECT_THAT(moved_by("coupling_sine", 0.01, {0.0, 1.0, 2.0, 5.0}),
+              ElementsAre(at(0), at(1.01), at(2), at(5.01)));
+  EXPECT_THAT(moved_by("coupling_cosine", 0.01, {0.0, 1.0, 2.0, 4.0}),
+              ElementsAre(at(0), at(1.01), at(2.02), at(4)));
+}
+
+TEST(Tolerances, OfTheCouplingAreUnknownsWhereTheyWereLearntOrStated) {
+  const SpecimenFamily family = gel_family();
+  Session session = simulated_session(family, {});
+  const auto unknown = [&](std::string_view name, std::span<const std::string_view> learnt) {
+    const SessionProblem problem(session, family, 2, learnt);
+    return std::ranges::count(problem.nuisances(), name, &Nuisance::name) == 1;
+  };
+  EXPECT_TRUE(unknown("screw_sine", {}));
+  EXPECT_FALSE(unknown("coupling_sine", {}));
+  constexpr std::array<std::string_view, 1> sine{"coupling_sine"};
+  EXPECT_TRUE(unknown("coupling_sine", sine));
+  EXPECT_FALSE(unknown("coupling_cosine", sine));
+  session.tolerance_sd["coupling_cosine"] = 0.02;
+  EXPECT_TRUE(unknown("coupling_cosine", {}));
 }
 
 TEST(SimulatedPlant, CopiesCyclesThatRepeatThemselves) {
