@@ -98,11 +98,11 @@ void widen(Knowledge& known, const std::vector<Nuisance>& list) {
   }
 }
 
-/// What all sessions teach, one after the other. Far from what is declared a search ends early: the second pass starts where
-/// the first one ended, with nothing known again.
+/// What all sessions teach, one after the other. Far from what is declared a search ends early: each pass starts where the
+/// one before ended, with nothing known again.
 Knowledge learn_tolerances(const std::vector<std::unique_ptr<Fitted>>& fits,
                            const std::function<void(const std::string&)>& report) {
-  constexpr int passes = 2;
+  constexpr int passes = 4;
   const auto& list = fits.front()->problem.nuisances();
   const auto count = static_cast<Index>(list.size() - basic_nuisances);
   Knowledge known;
