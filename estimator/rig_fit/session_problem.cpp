@@ -161,25 +161,34 @@ Eigen::MatrixXd SessionProblem::by_u(const SessionModel& at, Eigen::MatrixXd by_
 
 // Tolerances are moved one by one, of which u may be combinations: some change nothing but what the sensors show.
 
-Eigen::MatrixXd SessionProblem::differences(const SessionModel& at, double part,
+Eigen::MatrixXd SessionProblem::differences(const SessionModel& at, double part, bool both_sides,
                                             Eigen::VectorXd& there) const {
   const Eigen::VectorXd steps = nuisance_steps(at, part);
-  std::vector<RigModel> models = stepped(at, steps);
-  models.insert(models.begin(), model(at));
+  std::vector<RigModel> models{model(at)};
   std::vector<bool> same_plant{true};
-  for (const Nuisance& nuisance : nuisances_)
-    same_plant.push_back(nuisance.sensors_only);
+  const auto add = [&](const Eigen::VectorXd& by) {
+    for (RigModel& moved : stepped(at, by))
+      models.push_back(std::move(moved));
+    for (const Nuisance& nuisance : nuisances_)
+      same_plant.push_back(nuisance.sensors_only);
+  };
+  add(steps);
+  if (both_sides) add(-steps);
   const Eigen::MatrixXd all = shown(models, same_plant);
   there = all.col(0);
-  return by_u(at, (all.rightCols(steps.size()).colwise() - there) * steps.cwiseInverse().asDiagonal());
+  const Eigen::MatrixXd after = all.middleCols(1, steps.size());
+  if (both_sides)
+    return by_u(at, (after - all.rightCols(steps.size())) * (2.0 * steps).cwiseInverse().asDiagonal());
+  return by_u(at, (after.colwise() - there) * steps.cwiseInverse().asDiagonal());
 }
 
 Eigen::MatrixXd SessionProblem::nuisance_columns(const SessionModel& at, Eigen::VectorXd& there) const {
-  return differences(at, 0.5, there);
+  return differences(at, 0.5, false, there);
 }
 
-Eigen::MatrixXd SessionProblem::nuisance_slopes(const SessionModel& at, Eigen::VectorXd& there) const {
-  return differences(at, 0.005, there);
+Eigen::MatrixXd SessionProblem::nuisance_slopes(const SessionModel& at, Eigen::VectorXd& there,
+                                                bool both_sides) const {
+  return differences(at, 0.005, both_sides, there);
 }
 
 }  // namespace diastole::rig

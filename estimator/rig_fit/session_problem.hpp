@@ -74,8 +74,11 @@ class SessionProblem {
   /// `there`: what is shown at it.
   [[nodiscard]] Eigen::MatrixXd nuisance_columns(const SessionModel& at, Eigen::VectorXd& there) const;
   /// Derivatives of what is shown by u, by differences of a two hundredth of a tolerance's sd: data of a hundred thousand
-  /// samples know one to a hundredth, and slopes over more are no search's.
-  [[nodiscard]] Eigen::MatrixXd nuisance_slopes(const SessionModel& at, Eigen::VectorXd& there) const;
+  /// samples know one to a hundredth, and slopes over more are no search's. To `both_sides` they take twice as long, and no
+  /// curvature is in them: where u are combinations of parts whose slopes nearly cancel, that of a single part may be all there
+  /// is.
+  [[nodiscard]] Eigen::MatrixXd nuisance_slopes(const SessionModel& at, Eigen::VectorXd& there,
+                                                bool both_sides = false) const;
   /// What the instruments show of one run.
   [[nodiscard]] Shown shown_in(size_t run, const SessionModel& of) const;
 
@@ -85,7 +88,7 @@ class SessionProblem {
   /// The model with each of the steps taken for itself.
   [[nodiscard]] std::vector<RigModel> stepped(const SessionModel& at, const Eigen::VectorXd& steps) const;
   /// By u, over this part of a tolerance's sd.
-  [[nodiscard]] Eigen::MatrixXd differences(const SessionModel& at, double part,
+  [[nodiscard]] Eigen::MatrixXd differences(const SessionModel& at, double part, bool both_sides,
                                             Eigen::VectorXd& there) const;
   /// Of derivatives by the steps, those by u.
   [[nodiscard]] Eigen::MatrixXd by_u(const SessionModel& at, Eigen::MatrixXd by_steps) const;

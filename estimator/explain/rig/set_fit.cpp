@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 #include "estimator/inference/information.hpp"
 #include "estimator/inference/intervals.hpp"
@@ -97,6 +98,12 @@ class SetProblem : public inference::LeastSquaresProblem {
     derived_at_ = found.q;
   }
 
+  /// Derivatives by differences to both sides from now on; whether they were to one.
+  bool differ_to_both_sides() {
+    derived_at_.resize(0);
+    return !std::exchange(both_sides_, true);
+  }
+
   /// Which of the unknowns are moments.
   [[nodiscard]] std::vector<bool> moments() const {
     std::vector<bool> list(static_cast<size_t>(space_.size()), false);
@@ -157,7 +164,7 @@ class SetProblem : public inference::LeastSquaresProblem {
     Index others_from = searched();
     if (kind_ == Nuisances::simulated) {
       known_.at = model(q);
-      known_.columns = problem_.nuisance_slopes(known_.at, known_.there);
+      known_.columns = problem_.nuisance_slopes(known_.at, known_.there, both_sides_);
       seen_ = known_.there;
       --others_from;  // the modulus is one of them
     }
@@ -174,18 +181,32 @@ class SetProblem : public inference::LeastSquaresProblem {
     std::vector<SessionModel> models{simulated_model(q)};
     std::vector<bool> same_plant{true};
     std::vector<double> steps;
-    for (Index i = 0; i < count; ++i) {
-      const Unknown& unknown = unknowns_[static_cast<size_t>(i)];
-      steps.push_back(unknown.step_from(q[i]));
+    const auto add = [&](Index i, double step) {
       VectorXd moved = q;
-      moved[i] += steps.back();
+      moved[i] += step;
       models.push_back(simulated_model(moved));
-      same_plant.push_back(unknown.sensors_only);
+      same_plant.push_back(unknowns_[static_cast<size_t>(i)].sensors_only);
+    };
+    for (Index i = 0; i < count; ++i) {
+      steps.push_back(unknowns_[static_cast<size_t>(i)].step_from(q[i]));
+      add(i, steps.back());
+    }
+    // One that is nearer to its bound than that is differenced to one side.
+    std::vector<Index> before(static_cast<size_t>(count), 0);
+    for (Index i = 0; both_sides_ && i < count; ++i) {
+      const double step = steps[static_cast<size_t>(i)];
+      const double moved = q[i] - step;
+      if (moved < space_.lower()[i] || moved > space_.upper()[i]) continue;
+      before[static_cast<size_t>(i)] = static_cast<Index>(models.size());
+      add(i, -step);
     }
     const MatrixXd all = problem_.shown(models, same_plant);
     seen_ = all.col(0);
-    for (Index i = 0; i < count; ++i)
-      derivatives_.col(i) = (all.col(i + 1) - seen_) / steps[static_cast<size_t>(i)];
+    for (Index i = 0; i < count; ++i) {
+      const Index other = before[static_cast<size_t>(i)];
+      derivatives_.col(i) =
+          (all.col(i + 1) - all.col(other)) / (steps[static_cast<size_t>(i)] * (other > 0 ? 2.0 : 1.0));
+    }
   }
 
   const rig::SessionProblem& problem_;
@@ -204,6 +225,7 @@ class SetProblem : public inference::LeastSquaresProblem {
   const SessionModel& start_;
   rig::LinearisedModel known_;
   Nuisances kind_;
+  bool both_sides_ = false;
   std::vector<Unknown> unknowns_;
   std::vector<std::optional<double>> neutral_;
   size_t values_ = 0;
@@ -271,10 +293,12 @@ EffectSet search(const rig::SessionProblem& problem, SetProblem& set, const rig:
     out.termination = found.termination;
     if (found.termination == inference::Termination::no_solution) break;
     q = found.q;
-    set.take(found);
+    // Slopes by differences to one side hold curvature: a search that they end goes on with those to both.
+    const bool again = found.termination == inference::Termination::stalled && set.differ_to_both_sides();
+    if (!again) set.take(found);
     const double before = out.evidence.log_evidence;
     out.evidence = judged(out.evidence.shares);
-    if (std::abs(out.evidence.log_evidence - before) < rested) {
+    if (!again && std::abs(out.evidence.log_evidence - before) < rested) {
       // Forty steps that together bring less than decides anything: it has arrived.
       if (round > 0 && found.termination == inference::Termination::iteration_limit)
         out.termination = inference::Termination::converged;

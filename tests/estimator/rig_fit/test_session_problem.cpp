@@ -104,6 +104,8 @@ TEST(SessionProblem, ItsSlopesAreTheDifferencesOfShortSteps) {
   VectorXd there;
   const Eigen::MatrixXd slopes = problem.nuisance_slopes(at, there);
   EXPECT_EQ(there, problem.shown(std::span(&at, 1)).col(0));
+  const Eigen::MatrixXd both_sides = problem.nuisance_slopes(at, there, true);
+  EXPECT_EQ(there, problem.shown(std::span(&at, 1)).col(0));
   constexpr double step = 0.005;
   for (Index i = 0; i < slopes.cols(); ++i) {
     SessionModel before = at, after = at;
@@ -113,6 +115,8 @@ TEST(SessionProblem, ItsSlopesAreTheDifferencesOfShortSteps) {
     const VectorXd central = (shown.col(1) - shown.col(0)) / (2.0 * step);
     // An error of a twentieth costs a search a step; a drive that hardly yields is the most curved, with two per cent.
     EXPECT_LE((slopes.col(i) - central).norm(), 0.05 * central.norm() + 1e-4)
+        << problem.nuisances()[static_cast<size_t>(i)].name;
+    EXPECT_LE((both_sides.col(i) - central).norm(), 1e-9 * central.norm() + 1e-9)
         << problem.nuisances()[static_cast<size_t>(i)].name;
   }
 }
