@@ -92,8 +92,7 @@ INSTANTIATE_TEST_SUITE_P(List, EverySpecimenEffect, testing::ValuesIn(specimen_e
 /// A small ventricle, explained on twice as few elements each way as it was solved on.
 explain::Explanation explained(const FieldModel& truth) {
   const test::ScratchFolder folder;
-  Study study =
-      test::simulated({.truth = truth, .points = 400, .seed = 3, .mesh = "8, 6, 2"}, folder.path());
+  Study study = test::simulated({.truth = truth, .points = 400, .seed = 3, .mesh = "8, 6, 2"}, folder.path());
   std::get<EllipsoidSpecimen>(study.specimen).mesh = {4, 3, 1};
   return explain::explain_field(study);
 }
