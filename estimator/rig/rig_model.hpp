@@ -88,10 +88,6 @@ using SensorMapMaker = std::function<SensorMap(const RunPlace&)>;
 using SensorTraceMap =
     std::function<void(std::vector<double>& pressure_kPa, double start_s, double step_s, const RunPlace&)>;
 
-/// A drive that yields less is rigid: a thousandth of what a hose yields. What is shown leaps there, where its spring meets
-/// the samples' step.
-inline constexpr double rigid_below_mL_per_kPa = 1e-5;
-
 struct RigModel {
   Hose hose;
   SpecimenCurve curve;  ///< at a modulus of 1 kPa

@@ -29,8 +29,10 @@ DriveTrace driven(const RigModel& model, const RunDrive& run, DriveTrace motion)
 /// Conductances below this are none: the resistance would be beyond what the step's matrix bears.
 constexpr double least_leak = 1e-7;
 
-/// Of a drive that yields, its resistance over its stiffness: screw and seal rub, so that it does not ring with the fluid's
-/// end at a hundred hertz, which samples would show as something slow.
+/// Of the drive, mL/kPa: less is rigid, a thousandth of what a hose yields.
+constexpr double least_compliance = 1e-5;
+/// Its resistance over its stiffness: screw and seal rub, so that it does not ring with the fluid's end at a hundred hertz,
+/// which samples would show as something slow.
 constexpr double drive_damping_s = 2e-3;
 
 /// The fluid-filled catheter with its transducer, exactly integrated for pressure that is linear between samples; from rest
@@ -102,7 +104,7 @@ class Plant {
         gas_(model.pump_gas_mL, model.gas_exponent, run.place.atmosphere_kPa),
         leaks_(made(model.pump_leaks, run.place)),
         losses_(made(model.pump_losses, run.place)),
-        drive_yields_(!gas_.present() && model.drive_compliance_mL_per_kPa > rigid_below_mL_per_kPa),
+        drive_yields_(!gas_.present() && model.drive_compliance_mL_per_kPa > least_compliance),
         line_(model.hose, {.step_s = options.step_s,
                            .components = options.components,
                            .pump_stiffness = pump_stiffness(),

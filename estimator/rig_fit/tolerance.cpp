@@ -109,9 +109,7 @@ constexpr std::array tolerances{
               }},
     Tolerance{"drive_compliance", "mL/kPa", 0.0015, false, false,
               [](double x, const EffectContext&, RigModel& m) {
-                // Never rigid: what is shown leaps there, and a search would stall.
-                m.drive_compliance_mL_per_kPa =
-                    2.0 * rigid_below_mL_per_kPa + positive(m.drive_compliance_mL_per_kPa + x, 0.0005);
+                m.drive_compliance_mL_per_kPa = positive(m.drive_compliance_mL_per_kPa + x, 0.0005);
               }},
     Tolerance{"screw_sine", "mL", 0.02, false, false, add_turning_error<1, true>},
     Tolerance{"screw_cosine", "mL", 0.02, false, false, add_turning_error<1, false>},

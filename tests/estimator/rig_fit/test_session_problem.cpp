@@ -121,26 +121,6 @@ TEST(SessionProblem, ItsSlopesAreTheDifferencesOfShortSteps) {
   }
 }
 
-TEST(Tolerances, OfADriveThatHardlyYieldsChangeWhatIsShownWithoutALeap) {
-  const SpecimenFamily family = gel_family();
-  const Session session = simulated_session(family, {});
-  const SessionProblem problem(session, family, 2);
-  const auto drive = std::ranges::find(problem.nuisances(), "drive_compliance", &Nuisance::name);
-  const SessionModel declared = declared_rig(problem).at;
-  std::vector<SessionModel> models;
-  for (double sds = -1.0; sds > -2.6; sds -= 0.1) {
-    models.push_back(declared);
-    models.back().u[drive - problem.nuisances().begin()] = sds;
-  }
-  const Eigen::MatrixXd shown = problem.shown(models);
-  double before = std::numeric_limits<double>::infinity();
-  for (Index i = 1; i < shown.cols(); ++i) {  // ever less, as its compliance falls ever less
-    const double change = (shown.col(i) - shown.col(i - 1)).norm();
-    EXPECT_LT(change, before) << i;
-    before = change;
-  }
-}
-
 TEST(Tolerances, MoveThePistonByMotionsWhoseDerivativesTheyKnow) {
   const SpecimenFamily family = gel_family();
   size_t of_drive = 0;
