@@ -162,11 +162,12 @@ class Explainer {
       return;
     }
     if (effect_seen) specimen_.settle(best);
+    const std::string open = effect_seen ? what_stays_open(best.fit) : "";
     const Structure after = effect_seen ? structure_left(best.fit, mesh_error * best.gain) : before;
     const bool rivalled = rival_.score > best.score + clearly_better;
-    if (!effect_seen || rivalled || after.p_value < significant) {
+    if (!effect_seen || rivalled || after.p_value < significant || !open.empty()) {
       out_.verdict = Verdict::unexplained;
-      out_.summary = unexplained_summary(best, effect_seen, rivalled, after);
+      out_.summary = unexplained_summary(best, effect_seen, rivalled, after) + open;
       return;
     }
     if (settled(best.fit)) name(best);
@@ -186,6 +187,25 @@ class Explainer {
     out_.summary = fmt::format("Nothing can be named. The search of {} did not converge: {}", of,
                                inference::sentence(fit.termination));
     return false;
+  }
+
+  /// Why an effect that bends to almost any misfit - a region, a direction - is none that can be named: its size may be neutral, or it would
+  /// be larger than such a region can be. Empty: it can be.
+  [[nodiscard]] std::string what_stays_open(const FieldFit& fit) const {
+    size_t first = 0;
+    for (const Effect* effect : fit.choice.effects) {
+      const auto parameters = effect->field_parameters();
+      const FoundParameter size = found_parameter(fit, first);
+      if ((effect->is_inclusion() || effect->field_direction()) && size.ci90[0] <= parameters[0].neutral &&
+          parameters[0].neutral <= size.ci90[1])
+        return fmt::format(" Of {} not even {} is certain: {:.3g}, 90 % within {:.3g} to {:.3g}.",
+                           effect->text().id, size.name, size.value, size.ci90[0], size.ci90[1]);
+      for (size_t i = 1; effect->is_inclusion() && i < parameters.size(); ++i)
+        if (fit.choice.values[first + i] >= parameters[i].upper)
+          return fmt::format(" Its {} would be {:g} or more.", parameters[i].name, parameters[i].upper);
+      first += parameters.size();
+    }
+    return "";
   }
 
   [[nodiscard]] std::string unexplained_summary(const FieldHypothesis& best, bool effect_seen, bool rivalled,

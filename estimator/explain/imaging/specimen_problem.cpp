@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
 #include "estimator/explain/imaging/linear_evidence.hpp"
+#include "estimator/fit/considered_errors.hpp"
 #include "estimator/fit/finer_mesh.hpp"
 #include "estimator/fit/fit.hpp"
 #include "estimator/fit/study_fit.hpp"
@@ -65,6 +67,7 @@ void SpecimenProblem::fit_base() {
   base_motion_.reset();
   correction_.resize(0);
   base_ = {};
+  tolerances_.resize(0, 0);
   FitOptions options;
   options.file = study_.file.string();
   options.locator = field_.locator;
@@ -82,7 +85,38 @@ void SpecimenProblem::fit_base() {
   if (!(base_.pressures_kPa[highest_slot()] > 0.0))
     throw InputError({options.file, "data.frames", "no frame is inflated",
                       "Name frames with the cavity's pressure in kPa, at least one of them above 0."});
+  find_tolerances();
   correct_mesh();
+}
+
+void SpecimenProblem::find_tolerances() {
+  // Of surfaces through guide points, and of fibre fields from diffusion: what `lv` and `fibres` reach.
+  constexpr double geometry_mm = 0.25;
+  constexpr double fibres_deg = 2.0;
+  ElasticModel body = specimen_.with(field_.base);
+  std::vector<ConsideredError> errors;
+  const auto add = [&](std::vector<ConsideredError> more) {
+    std::ranges::move(more, std::back_inserter(errors));
+  };
+  if (study_.fibres && body.law().needs_axes()) add(fibre_errors(body, fibres_deg));
+  if (std::holds_alternative<MeshSpecimen>(study_.specimen) && !study_.chamber)
+    add(geometry_errors(body, geometry_mm));
+  if (errors.empty()) return;
+  MatrixXd columns(rows_->size(), static_cast<Index>(errors.size()));
+  for (size_t slot = 0; slot < base_.pressures_kPa.size(); ++slot) {
+    alive_();
+    const ChangedMotion::Equilibrium at = base_motion_->equilibrium(slot);
+    const std::vector<ConsideredMotion> motions = considered_motions(at.body, at.state, errors);
+    std::vector<const NodeField*> motion, reference;
+    for (const ConsideredMotion& one : motions) {
+      motion.push_back(&one.by_motion);
+      reference.push_back(&one.by_reference);
+    }
+    columns.middleRows(rows_->first(slot), rows_->count(slot)) =
+        rows_->columns(slot, mesh(), motion, reference);
+  }
+  tolerances_ = std::move(columns);
+  base_ = fit({}, base_);
 }
 
 size_t SpecimenProblem::highest_slot() const {
@@ -142,8 +176,9 @@ FieldFit SpecimenProblem::fit(const FieldChoice& choice, const FieldFit& from) {
   FieldFit result;
   result.choice = choice;
   result.chi_square = HUGE_VAL;
-  // The points are found at the base, so that all fits have the same.
-  if (!problem.find_points(is_base ? start : at_base(problem, choice))) return result;
+  // The points are found where the base's first fit began, so that all fits have the same.
+  if (!rows_) points_at_ = from;
+  if (!problem.find_points(rows_ ? where_points_are(problem, choice) : start)) return result;
   if (rows_ && problem.motion_residuals().size() != rows_->size()) return result;
   problem.set_correction(correction_);
   inference::SearchOptions options;
@@ -154,25 +189,24 @@ FieldFit SpecimenProblem::fit(const FieldChoice& choice, const FieldFit& from) {
   const inference::SearchResult found = inference::minimise(problem, start, options);
   if (found.residuals.size() == 0 || !problem.residuals(found.q)) return result;
   take(found, problem, result);
-  if (is_base) {
-    std::vector<const MotionResiduals*> frames;
-    for (const JointProblem::LoadedFrame& frame : problem.frames())
-      frames.push_back(&frame.residuals);
-    rows_ = MotionResiduals::joined(frames);
-    base_motion_ = std::move(motion);
-  }
+  if (!is_base) return result;
+  std::vector<const MotionResiduals*> frames;
+  for (const JointProblem::LoadedFrame& frame : problem.frames())
+    frames.push_back(&frame.residuals);
+  rows_ = MotionResiduals::joined(frames);
+  base_motion_ = std::move(motion);
   return result;
 }
 
-VectorXd SpecimenProblem::at_base(const JointProblem& problem, const FieldChoice& choice) const {
+VectorXd SpecimenProblem::where_points_are(const JointProblem& problem, const FieldChoice& choice) const {
   VectorXd q = problem.start();
-  std::vector<double> values = base_.law;
+  std::vector<double> values = points_at_.law;
   for (const size_t value : choice.free)
     values.push_back(choice.parameter(value).neutral);
   for (size_t i = 0; i < values.size(); ++i)
     q[static_cast<Index>(i)] = problem.space()[static_cast<Index>(i)].coordinate(values[i]);
-  for (size_t slot = 0; slot < base_.pressures_kPa.size(); ++slot)
-    q[*problem.frames()[slot].pressure_unknown] = base_.pressures_kPa[slot];
+  for (size_t slot = 0; slot < points_at_.pressures_kPa.size(); ++slot)
+    q[*problem.frames()[slot].pressure_unknown] = points_at_.pressures_kPa[slot];
   return q;
 }
 
@@ -207,11 +241,33 @@ void SpecimenProblem::correct_mesh() {
 }
 
 void SpecimenProblem::take(const inference::SearchResult& found, JointProblem& problem, FieldFit& fit) const {
-  const std::vector<double> values = problem.space().values(found.q);
-  const size_t law = estimated_.values.size();
+  const Index unknowns = found.q.size(), own = found.residuals.size(), tolerances = tolerances_.cols();
+  const Index rows = problem.motion_residuals().size();
+  std::vector<bool> is_free(found.pressed);
+  is_free.flip();
+  is_free.resize(static_cast<size_t>(unknowns + tolerances), true);
   fit.termination = found.termination;
+  fit.jacobian = MatrixXd::Zero(own + tolerances, unknowns + tolerances);
+  fit.jacobian.topLeftCorner(own, unknowns) = problem.jacobian(found.q);
+  VectorXd residuals = VectorXd::Zero(own + tolerances);
+  residuals.head(own) = found.residuals;
+  VectorXd q = found.q;
+  if (tolerances > 0) {
+    fit.jacobian.topRightCorner(own, tolerances).topRows(rows) = tolerances_;
+    fit.jacobian.bottomRightCorner(tolerances, tolerances).setIdentity();
+    std::vector<Index> free;
+    for (Index i = 0; i < unknowns + tolerances; ++i)
+      if (is_free[static_cast<size_t>(i)]) free.push_back(i);
+    const MatrixXd columns = fit.jacobian(Eigen::all, free);
+    const VectorXd step = -columns.colPivHouseholderQr().solve(residuals);
+    residuals += columns * step;
+    for (size_t i = 0; i < free.size(); ++i)
+      if (free[i] < unknowns) q[free[i]] += step[static_cast<Index>(i)];
+    q = problem.space().clamped(q);
+  }
+  const std::vector<double> values = problem.space().values(q);
+  const size_t law = estimated_.values.size();
   fit.law.assign(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(law));
-  fit.jacobian = problem.jacobian(found.q);
   for (size_t i = 0; i < fit.choice.free.size(); ++i) {
     const size_t value = fit.choice.free[i];
     fit.choice.values[value] = values[law + i];
@@ -224,12 +280,9 @@ void SpecimenProblem::take(const inference::SearchResult& found, JointProblem& p
   fit.pressures_kPa.clear();
   for (const JointProblem::LoadedFrame& frame : problem.frames())
     fit.pressures_kPa.push_back(values[static_cast<size_t>(*frame.pressure_unknown)]);
-  const Index rows = problem.motion_residuals().size();
-  fit.residuals = found.residuals.head(rows);
-  fit.priors = found.residuals.tail(found.residuals.size() - rows);
-  fit.chi_square = found.residuals.squaredNorm();
-  std::vector<bool> is_free(found.pressed);
-  is_free.flip();
+  fit.residuals = residuals.head(rows);
+  fit.priors = residuals.tail(residuals.size() - rows);
+  fit.chi_square = residuals.squaredNorm();
   fit.covariance = inference::estimate_covariance(fit.jacobian, is_free).matrix;
 }
 

@@ -2,6 +2,9 @@
 // The fit of any specimen's base model, and of any choice of effects beside it, to imaged motion: the problem of estimator/fit with the
 // effects' values as further unknowns of the motion (changed_motion.hpp). All fits share the points that lie on the base model's body, the
 // loss that the base's residuals ask for, and the correction by a finer mesh (finer_mesh.hpp).
+//
+// A shape and fibres that were measured are known to a tolerance: what one standard deviation of their errors does at the base
+// (considered_errors.hpp) is a column of every fit, with an unknown N(0, 1). An effect is what is beyond them.
 
 #include <memory>
 #include <optional>
@@ -55,13 +58,15 @@ class SpecimenProblem {
   [[nodiscard]] double law_error(const FieldFit& fit, size_t value) const;
   [[nodiscard]] BodyChanges changes_of(const FieldChoice& choice, const ChangeableSpecimen& specimen) const;
   [[nodiscard]] ChangedMotion motion_of(const FieldChoice& choice) const;
-  /// Where a choice's problem is the base's fit.
-  [[nodiscard]] Eigen::VectorXd at_base(const JointProblem& problem, const FieldChoice& choice) const;
+  /// The unknowns of a choice's problem at which its points are found, the effects at their neutral values.
+  [[nodiscard]] Eigen::VectorXd where_points_are(const JointProblem& problem,
+                                                 const FieldChoice& choice) const;
   /// Numbers of a fit at the search's end.
   void take(const inference::SearchResult& found, JointProblem& problem, FieldFit& fit) const;
   /// What a finer mesh changes at a fit; nothing where it has no equilibrium.
   [[nodiscard]] std::optional<Eigen::VectorXd> correction_at(const FieldFit& fit);
   void correct_mesh();
+  void find_tolerances();
 
   std::function<void()> alive_;
   Study study_;
@@ -70,11 +75,13 @@ class SpecimenProblem {
   FieldCase field_;
   std::optional<RobustLoss> loss_;
   FieldFit base_;
+  FieldFit points_at_;  ///< law and pressures at which `rows_` were found
   std::optional<MotionResiduals> rows_;
   std::unique_ptr<ChangedMotion> base_motion_;
   std::optional<ChangeableSpecimen> finer_;
   Eigen::VectorXd correction_;  // of the rows, by the finer mesh; empty: not known
   double mesh_error_ = 0.0;
+  Eigen::MatrixXd tolerances_;  // over the rows, a column each; empty: shape and fibres are as the study says
 };
 
 }  // namespace diastole::explain
