@@ -10,9 +10,9 @@ Effect fibre_turn_effect() {
       .title = "fibres turned by an angle",
       .port = Port::field,
       .equations = "Helix angle + angle: the material axes turn about the wall's normal, everywhere alike.",
-      .source =
-          "P. M. F. Nielsen, I. J. LeGrice, B. H. Smaill, P. J. Hunter, Am. J. Physiol. 260 (1991) H1365: "
-          "angles differ between hearts by some ten degrees.",
+      .source = "P. M. F. Nielsen, I. J. LeGrice, B. H. Smaill, P. J. Hunter, Am. J. Physiol. 260 (1991) "
+                "H1365: fibre "
+                "angles as they were measured.",
       .looks_like =
           "The wall twists and lengthens otherwise than the model's, most where it is stretched most.",
       .revealed_by = "Diffusion images of the fibres (`diastole fibres`).",

@@ -432,7 +432,7 @@ FitRecord refused_fit(const Study& study, const Measurement& measurement, std::v
 /// Of a body with fibres on few elements whose own error nobody has asked for.
 bool has_unseen_mesh_error(const Study& study, const ElasticModel& model, const StudyFitOptions& options) {
   constexpr size_t few =
-      48;  // 8 x 4 x 2 bias the values of lv-a by a third of their errors, 6 x 3 x 1 by three of them
+      48;  // 8 x 4 x 2 bias the values of lv-a by a third of their errors, 6 x 3 x 1 by three to five of them
   return model.law().needs_axes() && !options.finer_mesh && !options.unload &&
          model.mesh().element_count() < few &&
          std::ranges::none_of(study.law.parameters, [](const StudyParameter& parameter) {

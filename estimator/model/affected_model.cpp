@@ -1,9 +1,12 @@
 #include "estimator/model/affected_model.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 
+#include "estimator/io/study_refusal.hpp"
 #include "estimator/model/changed_specimen.hpp"
 #include "estimator/model/study_effects.hpp"
 #include "estimator/model/study_model.hpp"
@@ -36,6 +39,13 @@ void let_ends_slip(const HermiteMesh& mesh, double stiffness_kPa_per_mm, Elastic
   options.held = std::move(held);
 }
 
+bool is_of_gel(const Effect& effect) {
+  return effect.text().field_specimen == FieldSpecimen::gel ||
+         effect.text().field_specimen == FieldSpecimen::any;
+}
+/// In gel it shows in recordings only.
+bool is_of_the_rig(const Effect& effect) { return !effect.parameters().empty() && !is_of_gel(effect); }
+
 }  // namespace
 
 bool is_gel(const Study& study) {
@@ -46,7 +56,8 @@ bool is_gel(const Study& study) {
 bool shows_in_images(const Study& study) {
   const EffectLibrary library = effects_known_to(study);
   return std::ranges::any_of(study.effects, [&](const std::string& id) {
-    return !effect_named(library, study, id).field_parameters().empty();
+    const Effect& effect = effect_named(library, study, id);
+    return !effect.field_parameters().empty() && !(is_gel(study) && is_of_the_rig(effect));
   });
 }
 
@@ -59,8 +70,11 @@ FieldModel field_model_of(const Study& study) {
   const EffectLibrary library = effects_known_to(study);
   for (const std::string& id : study.effects) {
     const Effect& effect = effect_named(library, study, id);
-    if (!effect.field_parameters().empty())
-      effect.apply_to_field(stated_field_values(study, effect, model), model);
+    if (effect.field_parameters().empty() || is_of_the_rig(effect)) continue;
+    if (!is_of_gel(effect))
+      refuse(study, "model.effects", fmt::format("gel cannot have the effect \"{}\"", id),
+             fmt::format("It is one that shows in {}; leave it out.", name_of(effect.text().field_specimen)));
+    effect.apply_to_field(stated_field_values(study, effect, model), model);
   }
   return model;
 }

@@ -18,12 +18,6 @@ namespace {
 
 using Eigen::Index;
 
-constexpr double worth_freeing = 9.0;   // gain of chi2 by which further parameters of an effect must pay
-constexpr double suspected = 1e-2;      // p-value of a linear gain: reason to fit the effect
-constexpr double beyond_chance = 1e-3;  // of a place beside another effect
-constexpr double effective_parameters = 5.0;  // of an inclusion: its sizes are tied to one another
-constexpr size_t firsts = 2;                  // single effects that get partners
-
 double volume_mm3(const HermiteMesh& mesh) {
   double sum = 0.0;
   for (size_t e = 0; e < mesh.element_count(); ++e)

@@ -14,11 +14,6 @@
 namespace diastole::explain {
 namespace {
 
-constexpr double worth_freeing = 9.0;   // gain of chi2 by which further parameters of an effect must pay
-constexpr double suspected = 1e-2;      // p-value of a place: reason to fit an inclusion there
-constexpr double beyond_chance = 1e-3;  // the same beside another effect
-constexpr double effective_parameters = 5.0;  // of an inclusion: its sizes are tied to one another
-
 FieldChoice with_essentials(const Effect& effect, std::vector<double> values) {
   FieldChoice choice{{&effect}, std::move(values), {}};
   for (size_t i = 0; i < effect.field_essentials(); ++i)
@@ -87,7 +82,6 @@ FieldFit refit(FieldProblem& problem, FieldChoice choice, const FieldProblem::St
   return fit.chi_square - fuller.chi_square > worth_freeing ? fuller : fit;
 }
 
-constexpr size_t firsts = 2;             // single effects that get partners
 constexpr size_t inclusions_fitted = 2;  // effects beside which an inclusion is refined
 
 double pairs_tried() {

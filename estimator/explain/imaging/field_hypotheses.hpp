@@ -9,6 +9,13 @@
 
 namespace diastole::explain {
 
+inline constexpr double worth_freeing =
+    9.0;                                   ///< gain of chi2 by which further parameters of an effect must pay
+inline constexpr double suspected = 1e-2;  ///< p-value of a linear gain: reason to fit the effect
+inline constexpr double beyond_chance = 1e-3;        ///< of a place beside another effect
+inline constexpr double effective_parameters = 5.0;  ///< of an inclusion: its sizes are tied to one another
+inline constexpr size_t firsts = 2;                  ///< single effects that get partners
+
 struct FieldHypothesis {
   std::vector<std::string> ids;  ///< of the effects
   FieldFit fit;

@@ -77,6 +77,13 @@ TEST(AffectedModel, LeavesTheSpecimenWhereOnlyTheRigIsConcerned) {
   EXPECT_EQ(volume_change_mL(gel({"hose-compliance"})), volume_change_mL(gel({})));
 }
 
+TEST(AffectedModel, GelHasOffsetsOfTheRigAndNoFibres) {
+  EXPECT_FALSE(shows_in_images(gel({"sensor-offset"})));
+  EXPECT_EQ(volume_change_mL(gel({"sensor-offset"})), volume_change_mL(gel({})));
+  EXPECT_THROW(make_affected_model(gel({"fibre-turn"})), InputError);
+  EXPECT_THROW(make_affected_model(gel({"residual-stress"})), InputError);
+}
+
 TEST(AffectedModel, RefusesUnknownEffectsAndOtherSpecimens) {
   EXPECT_THROW(make_affected_model(gel({"gravity-waves"})), InputError);
   Study sprung = gel({"radius-error"});
