@@ -51,6 +51,11 @@ SpecimenProblem::SpecimenProblem(const Study& study, std::function<void()> alive
   field_.locator = locator_for(study.specimen);
   field_.measurement = read_measurement(study);
   require_loaded_points(study, field_.measurement);
+  if (std::ranges::none_of(loaded_frames(field_.measurement), [&](int frame) {
+        return field_.measurement.frames[static_cast<size_t>(frame)].pressure_kPa > 0.0;
+      }))
+    throw InputError({study.file.string(), "data.frames", "no frame with points is inflated",
+                      "Give the frames' cavity pressures in kPa, at least one of them above 0."});
   // A pressure that is exactly known is one that is known very well: every frame has its unknown.
   constexpr double exact_kPa = 1e-5;
   for (Frame& frame : field_.measurement.frames)
@@ -82,9 +87,6 @@ void SpecimenProblem::fit_base() {
     base_.pressures_kPa.push_back(frame.pressure_kPa);
   base_ = fit({}, base_);
   if (!rows_) refuse_base("nowhere near the first fit's values.");
-  if (!(base_.pressures_kPa[highest_slot()] > 0.0))
-    throw InputError({options.file, "data.frames", "no frame is inflated",
-                      "Name frames with the cavity's pressure in kPa, at least one of them above 0."});
   find_tolerances();
   correct_mesh();
 }

@@ -20,10 +20,10 @@ namespace diastole::explain {
 
 class SpecimenProblem {
  public:
-  /// `alive` is called often; what it throws ends a fit. Throws InputError as `fit` does for the study.
+  /// `alive` is called often; what it throws ends a fit. Throws InputError as `fit` does for the study, and if no frame is inflated.
   SpecimenProblem(const Study& study, std::function<void()> alive);
 
-  /// The base model; all else wants it first. Throws InputError where it has no equilibrium, or no frame is inflated.
+  /// The base model; all else wants it first. Throws InputError where it has no equilibrium.
   void fit_base();
   /// A choice, from the law's values and pressures of another fit. chi2 is infinite where it has no solution.
   [[nodiscard]] FieldFit fit(const FieldChoice& choice, const FieldFit& from);

@@ -103,6 +103,16 @@ TEST(SmallVentricle, WithNothingHiddenIsGivenNoName) {
   EXPECT_TRUE(found.effects.empty());
 }
 
+TEST(SmallVentricle, WithoutLoadIsRefused) {
+  const test::ScratchFolder folder;
+  const Study study = test::simulated({.points = 50, .mesh = "4, 3, 1"}, folder.path());
+  folder.write("lv.frames.csv",
+               "frame,time_s,pressure_kPa,sigma_kPa\n0,0,0,0.01\n1,0.1,0,0.01\n2,0.2,0,0.01\n3,0.3,0,0.01\n"
+               "4,0.4,0,0.01\n5,0.5,0,0.01\n");
+  EXPECT_NE(test::message_of([&] { (void)explain::explain_field(study); }).find("inflated"),
+            std::string::npos);
+}
+
 TEST(SmallVentricle, WithPressuresThatAreOffIsExplainedAndItsStiffnessMended) {
   FieldModel truth;
   truth.pressure_offset_kPa = 0.2;
