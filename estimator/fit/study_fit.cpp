@@ -191,32 +191,6 @@ std::string start_words(const EstimatedParameters& estimated) {
   return words;
 }
 
-/// The fit, begun with a stiffer material where the start values carry no equilibrium.
-FitOutcome fit_from_where_it_stands(MotionModel& motion, EstimatedParameters& estimated,
-                                    const Measurement& measurement, const FitOptions& options,
-                                    FitRecord& record) {
-  const std::string given = start_words(estimated);
-  FitOutcome fit = fit_motion(motion, estimated.values, measurement, options);
-  const auto failed_at_start = [&] { return !fit.converged() && fit.history.empty(); };
-  if (!failed_at_start()) return fit;
-  int solves = fit.forward_solves;
-  while (failed_at_start() && stiffen(estimated)) {
-    fit = fit_motion(motion, estimated.values, measurement, options);
-    fit.forward_solves = solves += fit.forward_solves;
-  }
-  if (failed_at_start()) {
-    fit.reason += fmt::format(
-        " Nor is there an equilibrium with {}, as stiff as the bounds allow: widen `bounds`, or see whether "
-        "the pressures are in kPa and the lengths in mm.",
-        start_words(estimated));
-  } else {
-    record.remarks.push_back(fmt::format(
-        "With the start values ({}) the body does not carry the pressures: the search began at {} instead.",
-        given, start_words(estimated)));
-  }
-  return fit;
-}
-
 /// A result that has only got so far: values without errors.
 FitRecord checkpoint_of(FitRecord record, const inference::SearchStep& step,
                         const EstimatedParameters& estimated) {
@@ -440,6 +414,31 @@ bool has_unseen_mesh_error(const Study& study, const ElasticModel& model, const 
          });
 }
 
+FitOutcome fit_from_where_it_stands(MotionModel& motion, EstimatedParameters& estimated,
+                                    const Measurement& measurement, const FitOptions& options,
+                                    std::vector<std::string>& remarks) {
+  const std::string given = start_words(estimated);
+  FitOutcome fit = fit_motion(motion, estimated.values, measurement, options);
+  const auto failed_at_start = [&] { return !fit.converged() && fit.history.empty(); };
+  if (!failed_at_start()) return fit;
+  int solves = fit.forward_solves;
+  while (failed_at_start() && stiffen(estimated)) {
+    fit = fit_motion(motion, estimated.values, measurement, options);
+    fit.forward_solves = solves += fit.forward_solves;
+  }
+  if (failed_at_start()) {
+    fit.reason += fmt::format(
+        " Nor is there an equilibrium with {}, as stiff as the bounds allow: widen `bounds`, or see whether "
+        "the pressures are in kPa and the lengths in mm.",
+        start_words(estimated));
+  } else {
+    remarks.push_back(fmt::format(
+        "With the start values ({}) the body does not carry the pressures: the search began at {} instead.",
+        given, start_words(estimated)));
+  }
+  return fit;
+}
+
 FitRecord fit_study(const Study& study, const Measurement& measurement, const StudyFitOptions& options) {
   require_loaded_points(study, measurement);
   ElasticModel model = make_affected_model(study);
@@ -474,7 +473,8 @@ FitRecord fit_study(const Study& study, const Measurement& measurement, const St
     if (options.on_iteration) options.on_iteration(record_of(step, estimated));
     if (options.on_checkpoint && step.accepted) options.on_checkpoint(checkpoint_of(record, step, estimated));
   };
-  const FitOutcome fit = fit_from_where_it_stands(motion, estimated, measurement, fit_options, record);
+  const FitOutcome fit =
+      fit_from_where_it_stands(motion, estimated, measurement, fit_options, record.remarks);
 
   record.converged = fit.converged();
   record.reason = fit.reason;

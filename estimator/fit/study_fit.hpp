@@ -3,6 +3,7 @@
 
 #include <functional>
 
+#include "estimator/fit/estimated_parameters.hpp"
 #include "estimator/fit/fit.hpp"
 #include "estimator/io/fit_file.hpp"
 #include "estimator/io/measurement.hpp"
@@ -34,6 +35,11 @@ struct StudyFitOptions {
 
 /// The record of a fit that was not begun because its data cannot be what they say.
 FitRecord refused_fit(const Study& study, const Measurement& measurement, std::vector<Finding> findings);
+
+/// fit_motion, begun with a stiffer material where the start values carry no equilibrium; a remark says so.
+FitOutcome fit_from_where_it_stands(MotionModel& motion, EstimatedParameters& estimated,
+                                    const Measurement& measurement, const FitOptions& options,
+                                    std::vector<std::string>& remarks);
 
 /// How far outside the specimen a point may lie and still be its own.
 LocatorOptions locator_for(const Specimen& specimen);

@@ -78,7 +78,9 @@ void SpecimenProblem::fit_base() {
   options.locator = field_.locator;
   options.on_step = [this](const inference::SearchStep&) { alive_(); };
   ChangedMotion motion(changes_of({}, specimen_), estimated_.groups, {});
-  const FitOutcome outcome = fit_motion(motion, estimated_.values, field_.measurement, options);
+  std::vector<std::string> remarks;
+  const FitOutcome outcome =
+      fit_from_where_it_stands(motion, estimated_, field_.measurement, options, remarks);
   if (outcome.history.empty() || outcome.frames.empty()) refuse_base(outcome.reason);
   if (outcome.robust) loss_ = outcome.robust->loss;
   for (const EstimatedValue& value : outcome.values)
