@@ -2,8 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <set>
+#include <tuple>
 
 namespace diastole::imaging {
 namespace {
@@ -11,34 +14,48 @@ namespace {
 /// Planes are set by hand at the scanner: within 15 degrees of a right angle counts as one.
 constexpr double sine_of_tolerance = 0.26;
 
-struct Candidate {
-  const ImageSeries* series;
-  size_t crossed;   // slices of other series at a right angle
-  size_t parallel;  // series of this very orientation
-};
-
-Candidate examined(const ImageFolder& folder, const ImageSeries& series) {
-  Candidate candidate{&series, 0, 0};
-  for (const ImageSeries& other : folder.series) {
-    const double cosine = std::abs(series.plane().normal().dot(other.plane().normal()));
-    if (cosine < sine_of_tolerance) candidate.crossed += other.slices.size();
-    if (cosine > std::sqrt(1 - sine_of_tolerance * sine_of_tolerance))
-      candidate.parallel += other.slices.size();
-  }
-  return candidate;
+bool at_right_angle(const SlicePlane& a, const SlicePlane& b) {
+  return std::abs(a.normal().dot(b.normal())) < sine_of_tolerance;
 }
 
-/// The orientation that most others are at a right angle to; of two that cross only each other the one with more slices.
-const ImageSeries* short_axis(const ImageFolder& folder) {
-  Candidate best{nullptr, 0, 0};
+bool parallel(const SlicePlane& a, const SlicePlane& b) {
+  return a.normal().cross(b.normal()).norm() < sine_of_tolerance;
+}
+
+/// All slices of one orientation, of whatever series.
+struct Orientation {
+  const SlicePlane* plane;
+  std::set<long> places_mm{};  ///< along the normal
+};
+
+std::vector<Orientation> orientations(const ImageFolder& folder) {
+  std::vector<Orientation> found;
   for (const ImageSeries& series : folder.series) {
-    const Candidate candidate = examined(folder, series);
-    if (candidate.crossed == 0) continue;
-    if (best.series == nullptr ||
-        std::pair(candidate.crossed, candidate.parallel) > std::pair(best.crossed, best.parallel))
-      best = candidate;
+    const auto of_series = [&](const Orientation& one) { return parallel(*one.plane, series.plane()); };
+    auto one = std::ranges::find_if(found, of_series);
+    if (one == found.end()) one = found.insert(found.end(), {&series.plane()});
+    for (const SliceImages& slice : series.slices)
+      one->places_mm.insert(std::lround(one->plane->normal().dot(slice.plane.origin_mm)));
   }
-  return best.series;
+  return found;
+}
+
+/// The orientation at a right angle to most others. Where several are, as with one long axis or with two that cross each other, the
+/// one with more places, as a stack is; then the one nearest to transverse, as the axis of what lies in a scanner mostly is.
+const SlicePlane* short_axis(const ImageFolder& folder) {
+  const std::vector<Orientation> all = orientations(folder);
+  const SlicePlane* best = nullptr;
+  std::tuple<long, size_t, double> most{0, 0, 0};
+  for (const Orientation& one : all) {
+    const auto crossed = std::ranges::count_if(
+        all, [&](const Orientation& other) { return at_right_angle(*one.plane, *other.plane); });
+    const std::tuple<long, size_t, double> of_this{crossed, one.places_mm.size(),
+                                                   std::abs(one.plane->normal().z())};
+    if (crossed == 0 || of_this <= most) continue;
+    best = one.plane;
+    most = of_this;
+  }
+  return best;
 }
 
 }  // namespace
@@ -49,16 +66,14 @@ Eigen::Vector3d tag_normal(const SlicePlane& plane, const TagWave& tag) {
 
 std::string view_in_words(const ImageFolder& folder, const ImageSeries& series) {
   const std::string anatomical = orientation_in_words(series.plane());
-  const ImageSeries* reference = short_axis(folder);
+  const SlicePlane* reference = short_axis(folder);
   if (reference == nullptr) return anatomical;
   const Eigen::Vector3d normal = series.plane().normal();
-  if (std::abs(normal.dot(reference->plane().normal())) > 0.5)
-    return fmt::format("short axis ({})", anatomical);
+  if (std::abs(normal.dot(reference->normal())) > 0.5) return fmt::format("short axis ({})", anatomical);
   // The slice contains the direction at a right angle to its own normal and to the axis.
-  const Eigen::Vector3d within = reference->plane().normal().cross(normal);
-  double angle_deg =
-      std::atan2(within.dot(reference->plane().along_column), within.dot(reference->plane().along_row)) *
-      180.0 / std::numbers::pi;
+  const Eigen::Vector3d within = reference->normal().cross(normal);
+  double angle_deg = std::atan2(within.dot(reference->along_column), within.dot(reference->along_row)) *
+                     180.0 / std::numbers::pi;
   angle_deg -= 180.0 * std::floor(angle_deg / 180.0);
   if (angle_deg > 179.5) angle_deg = 0;
   return fmt::format("long axis, {:.0f} degrees ({})", angle_deg, anatomical);

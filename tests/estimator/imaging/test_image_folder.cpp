@@ -79,6 +79,33 @@ TEST(ImageFolder, ASliceBesideTheSpecimenDoesNotHideTheTagsOfTheOthers) {
   EXPECT_THAT(ids(folder), testing::ElementsAre("slice-without-tags"));
 }
 
+TEST(ImageFolder, AStackIsTheShortAxisWhereverItLies) {
+  const Eigen::Vector3d axes[] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+  for (int along = 0; along < 3; ++along) {
+    // Three places across the axis, and one slice in each of two planes that contain it and cross each other.
+    const ScratchFolder scratch;
+    const Eigen::Vector3d a = axes[along], b = axes[(along + 1) % 3], c = axes[(along + 2) % 3];
+    const auto add = [&](int series, const Eigen::Vector3d& row, const Eigen::Vector3d& column,
+                         double at_mm) {
+      write_ring({.phases = 2,
+                  .series = series,
+                  .origin_mm = -47.5 * (row + column) + at_mm * row.cross(column),
+                  .along_row = row,
+                  .along_column = column},
+                 scratch.path(), "series" + std::to_string(series) + "at" + std::to_string(int(at_mm)));
+    };
+    for (const double at_mm : {0.0, 8.0, 16.0})
+      add(2, b, c, at_mm);
+    add(3, a, b, 0);
+    add(4, a, c, 0);
+    const ImageFolder folder = read_image_folder(scratch.path());
+    ASSERT_EQ(folder.series.size(), 3U);
+    EXPECT_THAT(view_in_words(folder, folder.series[0]), HasSubstr("short axis"));
+    EXPECT_THAT(view_in_words(folder, folder.series[1]), HasSubstr("long axis, 0 degrees"));
+    EXPECT_THAT(view_in_words(folder, folder.series[2]), HasSubstr("long axis, 90 degrees"));
+  }
+}
+
 TEST(ImageFolder, RefusesWhatCannotBePutInOrder) {
   const ScratchFolder scratch;
   write_ring({.with_times = false}, scratch.path());
