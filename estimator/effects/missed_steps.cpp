@@ -16,7 +16,7 @@ void apply(EffectValues values, const EffectContext& context, rig::RigModel& mod
   const double stall_s = values[1];
   const std::vector<ChangePoint> moments(context.change_points.begin(), context.change_points.end());
   if (lost_mL == 0.0 || moments.empty()) return;
-  model.drive.emplace_back([=](rig::DriveTrace& trace, const rig::RunPlace& place) {
+  model.turns.emplace_back([=](rig::DriveTrace& trace, const rig::RunPlace& place) {
     for (const ChangePoint& moment : moments) {
       if (moment.run != place.name) continue;
       for (size_t k = 0; k < trace.volume_mL.size(); ++k) {

@@ -21,7 +21,7 @@ Effect stroke_gain_effect() {
       .apply =
           [](EffectValues values, const EffectContext&, rig::RigModel& model) {
             const double factor = 1.0 + values[0];
-            model.drive.emplace_back([factor](rig::DriveTrace& trace, const rig::RunPlace&) {
+            model.turns.emplace_back([factor](rig::DriveTrace& trace, const rig::RunPlace&) {
               for (auto* series : {&trace.volume_mL, &trace.flow_mL_per_s, &trace.acceleration_mL_per_s2})
                 for (double& value : *series)
                   value *= factor;

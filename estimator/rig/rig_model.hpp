@@ -88,6 +88,8 @@ using SensorMapMaker = std::function<SensorMap(const RunPlace&)>;
 using SensorTraceMap =
     std::function<void(std::vector<double>& pressure_kPa, double start_s, double step_s, const RunPlace&)>;
 
+using DriveMap = std::function<void(DriveTrace&, const RunPlace&)>;
+
 struct RigModel {
   Hose hose;
   SpecimenCurve curve;  ///< at a modulus of 1 kPa
@@ -99,7 +101,8 @@ struct RigModel {
   double pump_offset_kPa = 0.0;
 
   // Hooks of effects, in the order in which they were added.
-  std::vector<std::function<void(DriveTrace&, const RunPlace&)>> drive;
+  std::vector<DriveMap> turns;  ///< from commanded steps to what the screw turns, in mL
+  std::vector<DriveMap> drive;  ///< from there to the piston
   double pump_gas_mL = 0.0;    ///< at rest; between piston and hose
   double cavity_gas_mL = 0.0;  ///< at rest; beside the specimen
   double gas_exponent =

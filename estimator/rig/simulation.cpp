@@ -21,8 +21,9 @@ constexpr double slow_quarter_wave_Hz = 3.0;
 constexpr double gas_steps = 2.0, leak_steps = 4.0;
 
 DriveTrace driven(const RigModel& model, const RunDrive& run, DriveTrace motion) {
-  for (const auto& change : model.drive)
-    change(motion, run.place);
+  for (const auto* changes : {&model.turns, &model.drive})
+    for (const DriveMap& change : *changes)
+      change(motion, run.place);
   return motion;
 }
 

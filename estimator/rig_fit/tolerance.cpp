@@ -20,7 +20,8 @@ double positive(double value, double rounding) {
   return x > 30.0 ? value : rounding * std::log1p(std::exp(x));
 }
 
-/// An error of the drive so many times a turn of the screw, `sine` or cosine of that angle.
+/// An error of the drive so many times a turn of the screw, `sine` or cosine of that angle. The angle is what the screw turns, steps that
+/// are lost or miscounted left out.
 template <int times_a_turn, bool sine>
 void add_turning_error(double size_mL, const EffectContext&, RigModel& model) {
   if (size_mL == 0.0) return;
@@ -101,7 +102,7 @@ constexpr std::array tolerances{
     Tolerance{"drive_stroke", "ln", 0.002, false, false,
               [](double x, const EffectContext&, RigModel& m) {
                 if (x == 0.0) return;
-                m.drive.emplace_back([factor = std::exp(x)](DriveTrace& trace, const RunPlace&) {
+                m.turns.emplace_back([factor = std::exp(x)](DriveTrace& trace, const RunPlace&) {
                   for (auto* values : {&trace.volume_mL, &trace.flow_mL_per_s, &trace.acceleration_mL_per_s2})
                     for (double& value : *values)
                       value *= factor;

@@ -52,6 +52,25 @@ TEST(Simulation, KeepsVolume) {
   EXPECT_NEAR(pressure, stiffness_kPa_per_mL * trace.cavity_mL.back(), 1e-9);
 }
 
+TEST(Simulation, TheScrewTurnsBeforeItErrs) {
+  RigModel model = straight_model();
+  // The drive's error, added first, depends on how far the screw turned: half of what was commanded.
+  model.drive.emplace_back([](DriveTrace& trace, const RunPlace&) {
+    for (double& volume : trace.volume_mL)
+      volume += 0.1 * volume * volume / 30.0;
+    trace.differentiate();
+  });
+  model.turns.emplace_back([](DriveTrace& trace, const RunPlace&) {
+    for (auto* series : {&trace.volume_mL, &trace.flow_mL_per_s, &trace.acceleration_mL_per_s2})
+      for (double& value : *series)
+        value *= 0.5;
+  });
+  const PlantTrace trace = simulate_plant(model, ramp(30.0, 20.0));
+  const double kept_mL =
+      model.hose.compliance_mL_per_kPa() * (1.0 + model.hose.creep_fraction) * trace.cavity_kPa.back();
+  EXPECT_NEAR(trace.cavity_mL.back() + kept_mL, 15.0 + 0.75, 1e-5);
+}
+
 TEST(Simulation, ConvergesInStepAndComponents) {
   const RigModel model = straight_model();
   const RunDrive run = cycles(2);

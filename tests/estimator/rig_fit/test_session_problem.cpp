@@ -128,7 +128,9 @@ TEST(Tolerances, MoveThePistonByMotionsWhoseDerivativesTheyKnow) {
     RigModel model;
     model.curve = family.plain();
     tolerance.apply(tolerance.sd, {family, {}, true}, model);
-    for (const auto& change : model.drive) {
+    std::vector<DriveMap> changes = model.turns;
+    changes.insert(changes.end(), model.drive.begin(), model.drive.end());
+    for (const DriveMap& change : changes) {
       DriveTrace trace{0.0, 1e-3, {}, {}, {}};
       for (int k = 0; k < 2000; ++k) {
         const double angle = std::numbers::pi * trace.step_s * k;
