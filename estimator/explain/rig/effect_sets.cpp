@@ -143,6 +143,7 @@ class SetsSearch {
   void fit_beside_best();
   void fit_from_better_part(const std::vector<size_t>& responses);
   void fit_best_again(size_t effects);
+  [[nodiscard]] bool relieves(const Effect* effect, const EffectSet& set) const;
   [[nodiscard]] std::optional<double> posterior_beside_part(const EffectSet& set) const;
   [[nodiscard]] bool is_fitted(const std::vector<const Effect*>& effects) const;
   [[nodiscard]] std::vector<Promise> promises(const rig::EvidenceFit& under, bool pairs) const;
@@ -256,6 +257,22 @@ void SetsSearch::fit_beside_best() {
   }
 }
 
+/// Is more than half of what an effect changes what a tolerance changes that is so far off in a set that the effect may be the more
+/// probable of both? What the two leave of each other no linear algebra tells: their curvature is more.
+bool SetsSearch::relieves(const Effect* effect, const EffectSet& set) const {
+  const VectorXd weight = set.evidence.variance.cwiseSqrt().cwiseInverse();
+  const Index tolerances = set.model.u.size() - static_cast<Index>(rig::basic_nuisances);
+  for (Index i = 0; i < tolerances; ++i) {
+    if (std::pow(set.model.u.tail(tolerances)[i], 2) < least_promise) continue;
+    const VectorXd strained = weight.cwiseProduct(set.columns.rightCols(tolerances).col(i)).normalized();
+    for (const Response& response : responses_)
+      if (response.term.effect == effect &&
+          std::pow(strained.dot(weight.cwiseProduct(response.change).normalized()), 2) > 0.5)
+        return true;
+  }
+  return false;
+}
+
 /// The log posterior of a set whose part without one of its effects was fitted exactly and explains more, by linear algebra there:
 /// that effect at its best size, which is its prior's sd, too. None if it promises more than its prior odds cost.
 std::optional<double> SetsSearch::posterior_beside_part(const EffectSet& set) const {
@@ -271,7 +288,8 @@ std::optional<double> SetsSearch::posterior_beside_part(const EffectSet& set) co
     const Effect* other = std::ranges::find_if(set.model.terms, [&](const rig::ModelTerm& term) {
                             return !is_in(term.effect, part);
                           })->effect;
-    if (other->change_points() != ChangePoints::none) continue;  // what it does has no response
+    // What moments do has no response.
+    if (other->change_points() != ChangePoints::none || relieves(other, part)) continue;
     const Screening beside(responses_, part.target(), part.columns, part.evidence);
     double gain = 0.0;
     for (size_t i = 0; i < responses_.size(); ++i)

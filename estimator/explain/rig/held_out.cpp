@@ -209,8 +209,7 @@ LinearFeatures smooth_discrepancy(const EffectSet& plain, const MatrixXd& functi
   return with;
 }
 
-std::vector<double> held_out_gains(const rig::SessionProblem& problem, const EffectSet& plain,
-                                   const EffectSet& set) {
+double held_out_gain(const rig::SessionProblem& problem, const EffectSet& plain, const EffectSet& set) {
   const auto freedom = [](const EffectSet& of) {
     size_t count = of.model.values.size();
     for (const rig::ModelTerm& term : of.model.terms)
@@ -218,22 +217,21 @@ std::vector<double> held_out_gains(const rig::SessionProblem& problem, const Eff
     return count;
   };
   const std::vector<Fold> folds = folds_of(problem);
-  const LinearFeatures without = features_of(plain), with = features_of(set);
-  const LinearFeatures smooth =
-      smooth_discrepancy(plain, smooth_functions(problem), freedom(set) - freedom(plain));
-  std::vector<double> gains;
-  for (const Fold& fold : folds) {
-    const std::vector<Index> others = fold.others();
-    const rig::ModelError error = error_of_rows(problem.error(), others);
-    const auto density = [&](const LinearFeatures& of, const rig::Shares& near) {
+  const auto density = [&](const LinearFeatures& of, const rig::Shares& near) {
+    double sum = 0.0;
+    for (const Fold& fold : folds) {
+      const std::vector<Index> others = fold.others();
+      const rig::ModelError error = error_of_rows(problem.error(), others);
       const rig::Shares shares =
           fit_with_shares(of.target(others), of.columns(others, Eigen::all), error, near).shares;
-      return held_out_density(of, problem.error(), others, shares);
-    };
-    gains.push_back(density(with, set.evidence.shares) - std::max(density(without, plain.evidence.shares),
-                                                                  density(smooth, plain.evidence.shares)));
-  }
-  return gains;
+      sum += held_out_density(of, problem.error(), others, shares);
+    }
+    return sum;
+  };
+  const LinearFeatures smooth =
+      smooth_discrepancy(plain, smooth_functions(problem), freedom(set) - freedom(plain));
+  return density(features_of(set), set.evidence.shares) -
+         std::max(density(features_of(plain), plain.evidence.shares), density(smooth, plain.evidence.shares));
 }
 
 double log_mean(const std::vector<double>& logarithms) {

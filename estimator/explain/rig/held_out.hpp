@@ -44,9 +44,9 @@ Eigen::MatrixXd smooth_functions(const rig::SessionProblem& problem);
 /// The model without effects beside as many of the functions.
 LinearFeatures smooth_discrepancy(const EffectSet& plain, const Eigen::MatrixXd& functions, size_t count);
 
-/// What a set gains on each fold, over the better of the models without its effects.
-std::vector<double> held_out_gains(const rig::SessionProblem& problem, const EffectSet& plain,
-                                   const EffectSet& set);
+/// What a set gains over the better of the models without its effects: ln of the pseudo-Bayes factor, the product over folds of
+/// their predictive densities (S. Geisser, W. F. Eddy, J. Am. Stat. Assoc. 74 (1979) 153).
+double held_out_gain(const rig::SessionProblem& problem, const EffectSet& plain, const EffectSet& set);
 
 /// ln of the mean of what e to these is.
 double log_mean(const std::vector<double>& logarithms);

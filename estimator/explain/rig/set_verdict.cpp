@@ -182,9 +182,8 @@ bool bears_a_name(const rig::SessionProblem& problem, const EffectSet& set, cons
          !is_strained_in_all(problem, set, again.u.tail(set.model.u.size()));
 }
 
-/// What a set gains on a waveform that it was not fitted to is the logarithm of a likelihood ratio, with a mean of one where its
-/// effects are not; so is the mean over waveforms. As evidence it has to overcome the effects' odds as all data do. A misfit
-/// that any smooth function predicts as well is no effect's mark.
+/// What a set gains on waveforms that it was not fitted to has to overcome the effects' odds as all data do. A misfit that any
+/// smooth function predicts as well is no effect's mark.
 bool predicts(double held_out_gain, size_t effects) {
   return held_out_gain + static_cast<double>(effects) * std::log(effect_odds) >
          std::log(name_probability / (1.0 - name_probability));
@@ -269,7 +268,7 @@ SetVerdict judge_sets(const rig::SessionProblem& problem, const SetSearch& searc
   const bool borne = is_more ? bears_a_name(problem, best, sizes[out.chosen])
                              : bears_nothing_wrong(problem, *plain) || bears_nothing_wrong(problem, best);
   out.scatter = rig::cycle_scatter(problem, best.model);
-  if (is_more) out.held_out_gain = log_mean(held_out_gains(problem, *plain, best));
+  if (is_more) out.held_out_gain = held_out_gain(problem, *plain, best);
   const bool predicted = !is_more || predicts(*out.held_out_gain, best.model.terms.size() - search.given);
   if (!borne || is_irregular(problem, out.scatter) || !is_settled(out.searches)) {
     out.verdict = Verdict::unexplained;

@@ -34,8 +34,7 @@ struct SetVerdict {
   std::vector<Hint> hints;
   std::vector<rig::CycleScatter> scatter = {};
   std::vector<SearchEnd> searches;
-  /// Of the leading set, if it has more than the given effects: ln of its mean likelihood ratio on waveforms that were not
-  /// fitted.
+  /// Of the leading set, if it has more than the given effects: held_out_gain()'s.
   std::optional<double> held_out_gain = {};
 };
 
