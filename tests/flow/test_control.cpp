@@ -7,6 +7,10 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <map>
+#include <set>
+
+#include "host/rpc/methods.hpp"
 #include "host/transport/unix_socket.hpp"
 #include "protocol/contract/input_error.hpp"
 #include "tests/flow/rig_with_daemon.hpp"
@@ -47,6 +51,75 @@ TEST(Control, TheSecondClientIsToldWhoHoldsItAndTakesItOverByName) {
   EXPECT_THROW(first.call("rig.home"), HardwareError) << "the lease is one";
   second.call("rig.home");
   EXPECT_TRUE(rig.daemon->wait_for_text("control was taken over from " + own_name())) << rig.daemon->err();
+}
+
+/// What needs no lease: it moves nothing and changes nothing, but for a stop.
+const std::set<std::string_view> of_anybody{"rig.status", "rig.settings", "rig.black_box", "run.progress",
+                                            "run.trace",  "run.continue", "run.stop"};
+
+/// Orders that are carried out when whoever controls the rig gives them.
+const std::map<std::string_view, json> orders{
+    {"rig.home", json::object()},
+    {"rig.zero", {{"seconds", 1}}},
+    {"rig.calibrate", {{"channels", {"cavity"}}, {"kPa", 0.0}, {"seconds", 1}}},
+    {"rig.clear_fault", json::object()},
+    {"rig.jog", {{"mL", 1.0}, {"rate_mL_s", 5.0}}},
+    {"rig.write_settings", {{"set", {{"backlash_um", 40}}}}},
+    {"rig.self_test", {{"seconds", 2}}},
+    {"run.start", many_segments()},
+};
+
+TEST(Control, EveryOrderOfASecondClientIsRefusedAndNothingMovesOrChanges) {
+  RigWithDaemon rig(RigWithDaemon::Time::conducted);
+  rig.start_daemon();
+  auto holder = rig.client();
+  holder.call("rig.home");
+  holder.call("rig.jog", {{"mL", 2.0}, {"rate_mL_s", 5.0}});
+  const json settings = holder.call("rig.settings");
+  const double position_mL = holder.call("rig.status")["position_mL"];
+  const auto expect_untouched = [&](std::string_view after) {
+    const json status = holder.call("rig.status");
+    EXPECT_EQ(status["state"], "homed") << after;
+    EXPECT_EQ(status["position_mL"], position_mL) << after;
+    EXPECT_EQ(status["control"]["own"], true) << after;
+    EXPECT_EQ(holder.call("rig.settings"), settings) << after;
+  };
+  for (const Method& method : methods()) {
+    if (of_anybody.contains(method.name)) continue;
+    ASSERT_TRUE(orders.contains(method.name)) << method.name << ": give an order of it";
+    const json request{
+        {"jsonrpc", "2.0"}, {"id", 1}, {"method", method.name}, {"params", orders.at(method.name)}};
+    const json answer = json::parse(answer_to(rig.path("socket"), request.dump() + "\n"));
+    EXPECT_EQ(answer.value("/error/code"_json_pointer, 0), -32003) << method.name << ": " << answer;
+    expect_untouched(method.name);
+  }
+  rig.place.write("gel.experiment.toml", many_segments()["experiment"]);
+  for (const std::vector<std::string>& command : std::vector<std::vector<std::string>>{
+           {"home"},
+           {"jog", "--mL", "1"},
+           {"zero", "--seconds", "1"},
+           {"calibrate", "cavity", "--kPa", "0", "--seconds", "1"},
+           {"settings", "--set", "backlash_um=40"},
+           {"selftest", "--seconds", "2"},
+           {"run", "gel.experiment.toml", "-o", "gel.run.h5", "--no-questions"}}) {
+    std::vector<std::string> whole{"diastole", command[0], "--socket", rig.path("socket")};
+    whole.insert(whole.end(), command.begin() + 1, command.end());
+    const Ended refused = run(rig.place, whole);
+    EXPECT_EQ(refused.exit_code, 3) << command[0];
+    EXPECT_THAT(refused.err, AllOf(HasSubstr("controlled by " + own_name()), HasSubstr("--take-over")))
+        << command[0];
+    expect_untouched(command[0]);
+  }
+  EXPECT_FALSE(std::filesystem::exists(rig.place / "gel.run.h5"));
+  EXPECT_NEAR(holder.call("rig.jog", orders.at("rig.jog"))["position_mL"].get<double>(), position_mL + 1,
+              0.01)
+      << "the holder's order is carried out";
+  holder.call("run.start", many_segments());
+  holder.call("run.stop", {{"how", "halt"}});
+  status_when(holder, "faulted", true);
+  const Ended refused = run(rig.place, {"diastole", "clear-fault", "--socket", rig.path("socket")});
+  EXPECT_EQ(refused.exit_code, 3) << refused.err;
+  EXPECT_EQ(holder.call("rig.status")["state"], "faulted");
 }
 
 TEST(Control, ATakeoverDuringARunIsAnEventOfTheRun) {
