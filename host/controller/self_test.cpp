@@ -17,16 +17,16 @@ constexpr double most_ttl_late_ticks = 6;
 constexpr double least_skew_ticks = -1, most_skew_ticks = 4;
 /// All of it is clocked by one crystal, so it is always the same, but for the tick in which an edge is seen.
 constexpr double most_jitter_ticks = 1;
-/// The DAC settles within 6 µs (datasheet, 12 bits), and the conversion that sees it is the second that ends after that, 1.9 µs each.
-constexpr double most_r_wave_late_us = 10;
-/// DAC offset 12 and integral non-linearity 4, follower's offset 6 (4.5 mV), converter's total unadjusted error 5.
-constexpr double level_error_codes = 27;
-/// DAC's gain error.
-constexpr double level_error_share = 0.005;
-/// VREFINT; within it 1.21 V is what the supply is computed with.
-constexpr double reference_V = 1.21, least_reference_V = 1.18, most_reference_V = 1.24;
+/// The DAC settles, and the conversion that sees it is the second that ends after that, 1.9 µs each.
+constexpr double most_r_wave_late_us = datasheet::dac_settling_us + 4;
 /// What the board's regulator may give (bring-up, 1). R-wave heights are shares of it.
 constexpr double least_supply_V = 3.2, most_supply_V = 3.4;
+/// Offset of the follower (MCP6001: 4.5 mV), where a code is smallest.
+constexpr double follower_codes = 0.0045 * 4096 / least_supply_V;
+/// An offset of the DAC is a voltage: of more codes the lower the supply.
+constexpr double level_error_codes =
+    datasheet::dac_offset_codes * datasheet::dac_offset_supply_V / least_supply_V +
+    datasheet::dac_nonlinearity_codes + follower_codes + datasheet::adc_error_codes;
 /// The board's crystal, and what time synchronisation may slew the host's clock by (MAXFREQ of adjtimex).
 constexpr double crystal_ppm = 50, slewed_ppm = 500;
 
@@ -139,7 +139,7 @@ class Judge {
   }
   void compare_level(const wire::SelfTestReport& level) {
     const double asked = level.argument;
-    const double error = level_error_codes + level_error_share * asked;
+    const double error = level_error_codes + datasheet::dac_gain_share * asked;
     const double most_code = wire::kMostCode;
     const bool nothing = level.code < level_error_codes;
     add({fmt::format("level_{:.0f}", 100 * asked / most_code),
@@ -151,10 +151,16 @@ class Judge {
   }
   void weigh_supply() {
     const double code = readings_.supply.code;
-    const auto supply_V = code > 0 ? std::optional(reference_V * wire::kMostCode / code) : std::nullopt;
-    add({"supply", "supply by the chip's reference", supply_V,
-         least_supply_V * reference_V / most_reference_V, most_supply_V * reference_V / least_reference_V,
-         "V", "Measure the board's 3.3 V: R-waves are as much too high or too low as it is."});
+    const auto supply_of = [](double reference_code) {
+      return datasheet::usual_reference_V * wire::kMostCode / reference_code;
+    };
+    const auto code_at = [](double supply_V, double reference_V) {
+      return reference_V / supply_V * wire::kMostCode;
+    };
+    add({"supply", "supply by the chip's reference", code > 0 ? std::optional(supply_of(code)) : std::nullopt,
+         supply_of(code_at(least_supply_V, datasheet::most_reference_V) + datasheet::adc_error_codes),
+         supply_of(code_at(most_supply_V, datasheet::least_reference_V) - datasheet::adc_error_codes), "V",
+         "Measure the board's 3.3 V: R-waves are as much too high or too low as it is."});
   }
   void compare_clocks() {
     const auto& pairs = readings_.clock;

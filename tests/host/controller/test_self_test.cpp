@@ -71,12 +71,18 @@ TEST(SelfTestVerdict, OneBadPulseOfSixteenIsEnough) {
 
 TEST(SelfTestVerdict, LimitsAreInclusiveAndNamed) {
   SelfTestReadings readings = healthy();
-  readings.levels[2].code = 2048 + 37;
-  EXPECT_TRUE(check(readings, "level_50").passed());
   readings.levels[2].code = 2048 + 38;
+  EXPECT_TRUE(check(readings, "level_50").passed());
+  readings.levels[2].code = 2048 + 40;
   EXPECT_FALSE(check(readings, "level_50").passed());
-  readings.supply.code = 1700;  // 2.91 V
-  EXPECT_FALSE(check(readings, "supply").passed());
+  const auto supply_passes = [&](uint16_t code) {
+    readings.supply.code = code;
+    return check(readings, "supply").passed();
+  };
+  EXPECT_TRUE(supply_passes(1417)) << "3.4 V by a reference of 1.18 V, read 5 codes too low";
+  EXPECT_FALSE(supply_passes(1416));
+  EXPECT_TRUE(supply_passes(1591)) << "3.2 V by a reference of 1.24 V, read 5 codes too high";
+  EXPECT_FALSE(supply_passes(1592));
   for (ClockPair& pair : readings.clock)
     pair.other_s *= 1.001;
   EXPECT_FALSE(check(readings, "clock").passed());
