@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <functional>
+#include <initializer_list>
 #include <span>
 #include <utility>
 #include <vector>
@@ -38,6 +39,14 @@ class Series {
     return memory;
   }
 
+  /// Precondition of these three: the row is there.
+  [[nodiscard]] double at(size_t row) const {
+    std::vector<double> memory;
+    return rows(row, 1, memory)[0];
+  }
+  [[nodiscard]] double front() const { return at(0); }
+  [[nodiscard]] double back() const { return at(rows_ - 1); }
+
   static constexpr size_t block_rows = 16384;
 
  private:
@@ -45,5 +54,18 @@ class Series {
   Read read_;
   std::span<const double> memory_;
 };
+
+/// Hands over the first `rows` rows of columns side by side, in order: take(first row, a span of each column). Each must have as many.
+template <typename Take>
+void each_block_of(std::initializer_list<const Series*> columns, size_t rows, const Take& take) {
+  std::vector<std::vector<double>> memory(columns.size());
+  std::vector<std::span<const double>> block(columns.size());
+  for (size_t first = 0; first < rows; first += Series::block_rows) {
+    const size_t count = std::min(Series::block_rows, rows - first);
+    for (size_t i = 0; i < columns.size(); ++i)
+      block[i] = columns.begin()[i]->rows(first, count, memory[i]);
+    take(first, block);
+  }
+}
 
 }  // namespace diastole::runfile

@@ -13,6 +13,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "protocol/contract/input_error.hpp"
@@ -25,57 +26,72 @@ class Playback {
  public:
   /// Throws InputError when the file is no run file, or lacks one of the channels that have inputs.
   Playback(const std::filesystem::path& run_file, const std::vector<DaqChannel>& channels) {
-    const runfile::RecordedRun run = runfile::read_run(run_file);
-    const std::vector<double>& time_s = run.pressure.time_s;
-    if (time_s.size() < 2) {
+    const runfile::StreamRows pressure = runfile::open_run(run_file).rows.pressure;
+    rows_ = pressure.time_s.size();
+    if (rows_ < 2) {
       throw InputError({run_file.string(), "/pressure", "holds no samples to play", "Name another run."});
     }
-    rate_Hz_ = static_cast<double>(time_s.size() - 1) / (time_s.back() - time_s.front());
-    missing_.assign(time_s.size(), false);
+    rate_Hz_ = static_cast<double>(rows_ - 1) / (pressure.time_s.back() - pressure.time_s.front());
     for (const DaqChannel& channel : channels) {
-      const auto recorded = run.pressure.channels.find(channel.name + "_kPa");
-      if (recorded == run.pressure.channels.end()) {
+      const auto recorded = pressure.values.find(channel.name + "_kPa");
+      if (recorded == pressure.values.end()) {
         throw InputError({run_file.string(), fmt::format("/pressure/{}_kPa", channel.name), "is missing",
                           "Leave that [[daq.channel]] out of the rig file."});
       }
-      Input& input = inputs_.emplace_back(Input{channel.input, {}});
-      double last_kPa = 0;
-      for (size_t row = 0; row < time_s.size(); ++row) {
-        const double recorded_kPa = recorded->second[row];
-        missing_[row] = missing_[row] || std::isnan(recorded_kPa);
-        if (!std::isnan(recorded_kPa)) last_kPa = recorded_kPa;
-        input.volts.push_back(channel.zero_V + last_kPa / channel.kPa_per_V);
-      }
+      inputs_.push_back({channel, recorded->second, {}, {}});
     }
+    turn_to(0);
   }
 
   /// The instrument samples now; run_start_ns: RunClock.
   void sample(uint64_t now_ns, std::optional<uint64_t> run_start_ns) {
-    row_ = 0;
-    if (!run_start_ns || now_ns < *run_start_ns) return;
+    turn_to(row_at(now_ns, run_start_ns));
+  }
+  /// Whether the recording misses this sample.
+  [[nodiscard]] bool missing() const {
+    return std::ranges::any_of(inputs_, [this](const Input& input) { return std::isnan(kPa(input)); });
+  }
+  /// Precondition: it is not missing.
+  [[nodiscard]] double volts(int64_t input) const {
+    const auto found =
+        std::ranges::find_if(inputs_, [input](const Input& each) { return each.channel.input == input; });
+    return found == inputs_.end() ? 0 : found->channel.zero_V + kPa(*found) / found->channel.kPa_per_V;
+  }
+
+ private:
+  struct Input {
+    DaqChannel channel;
+    runfile::Series recorded_kPa;
+    std::span<const double> block_kPa;
+    std::vector<double> memory_kPa;
+  };
+
+  size_t row_at(uint64_t now_ns, std::optional<uint64_t> run_start_ns) {
+    if (!run_start_ns || now_ns < *run_start_ns) return 0;
     // A start that is announced, and confirmed a few ns off, is one and the same.
     const bool another_run = !run_start_ns_ || *run_start_ns > *run_start_ns_ + 1'000'000;
     if (another_run) first_ns_ = now_ns;
     run_start_ns_ = run_start_ns;
     const auto index = std::llround(static_cast<double>(now_ns - *first_ns_) * 1e-9 * rate_Hz_);
-    row_ = std::min(static_cast<size_t>(index), missing_.size() - 1);
+    return std::min(static_cast<size_t>(index), rows_ - 1);
   }
-  /// Whether the recording misses this sample.
-  [[nodiscard]] bool missing() const { return missing_[row_]; }
-  [[nodiscard]] double volts(int64_t input) const {
-    const auto found = std::ranges::find(inputs_, input, &Input::input);
-    return found == inputs_.end() ? 0 : found->volts[row_];
+  /// Has the block at hand in which `row` lies.
+  void turn_to(size_t row) {
+    row_ = row;
+    if (block_rows_ > 0 && row >= first_ && row < first_ + block_rows_) return;
+    first_ = row - row % runfile::Series::block_rows;
+    block_rows_ = std::min(runfile::Series::block_rows, rows_ - first_);
+    for (Input& input : inputs_)
+      input.block_kPa = input.recorded_kPa.rows(first_, block_rows_, input.memory_kPa);
   }
+  [[nodiscard]] double kPa(const Input& input) const { return input.block_kPa[row_ - first_]; }
 
- private:
-  struct Input {
-    int64_t input = 0;
-    std::vector<double> volts;
-  };
   std::vector<Input> inputs_;
-  std::vector<bool> missing_;
+  size_t rows_ = 0;
   double rate_Hz_ = 0;  ///< on the controller's clock
   size_t row_ = 0;
+  size_t first_ = 0;  ///< of the block
+  size_t block_rows_ = 0;
   std::optional<uint64_t> run_start_ns_;
   std::optional<uint64_t> first_ns_;  ///< sample of this run
 };

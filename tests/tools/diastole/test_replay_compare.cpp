@@ -1,6 +1,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
+#include <functional>
 #include <limits>
 
 #include "tools/diastole/replay/compare.hpp"
@@ -156,6 +159,48 @@ TEST(ReplayCompare, OfABrokenOffRecordingOnlyWhatThereIsCounts) {
   EXPECT_FALSE(compare(broken, whole).equal());
   broken.events = {{2.0, "error", "incomplete", ""}};
   EXPECT_TRUE(compare(broken, whole).equal());
+}
+
+/// A run of 60,000 rows that lie elsewhere; `largest_block` is the most rows that were asked for at once.
+runfile::RunFile run_elsewhere(size_t& largest_block, std::function<double(size_t)> pressure_kPa) {
+  constexpr size_t rows = 60'000;
+  const auto series = [&largest_block](auto value) {
+    return runfile::Series(rows, [&largest_block, value](size_t first, std::span<double> values) {
+      largest_block = std::max(largest_block, values.size());
+      for (size_t i = 0; i < values.size(); ++i)
+        values[i] = value(first + i);
+    });
+  };
+  runfile::RunFile file;
+  file.run.rig = {{"volume_per_step_mL", microstep_mL}, {"cavity_kPa_per_V", 4.0}};
+  file.run.trigger_s = {1.0, 3.0};
+  file.rows.pump.time_s = file.rows.pressure.time_s =
+      series([](size_t row) { return 1e-4 * static_cast<double>(row); });
+  file.rows.pump.values["commanded_mL"] =
+      series([](size_t row) { return microstep_mL * static_cast<double>(row % 20'000 / 100); });
+  file.rows.pressure.values["cavity_kPa"] = series(std::move(pressure_kPa));
+  return file;
+}
+
+TEST(ReplayCompare, RowsAreReadBlockByBlockAndToTheirEnd) {
+  size_t largest_block = 0;
+  const auto usual = [](size_t row) { return 0.25 * static_cast<double>(row % 9); };
+  const runfile::RunFile run = run_elsewhere(largest_block, usual);
+  const Comparison same = compare(run, run);
+  EXPECT_TRUE(same.equal());
+  EXPECT_LE(largest_block, runfile::Series::block_rows);
+  const Comparison off = compare(run, run_elsewhere(largest_block, [&](size_t row) {
+                                   if (row == 50'000) return std::nan("");
+                                   return usual(row) + (row == 40'000 || row == 59'999 ? 0.5 : 0.0);
+                                 }));
+  EXPECT_FALSE(off.pressure_equal || off.missing_equal);
+  EXPECT_THAT(off.first->text, HasSubstr("cavity_kPa of sample 40000"));
+  EXPECT_EQ(off.first->cycle, 1);
+  EXPECT_EQ(off.max_abs_diff_kPa, 0.5);
+  const auto inflating = std::ranges::find(off.lines, "microsteps inflating, all cycles", &Line::what);
+  ASSERT_NE(inflating, off.lines.end());
+  EXPECT_EQ(inflating->recorded, std::to_string((199 - 99) + 199 + 199))
+      << "from the row of the first trigger on";
 }
 
 }  // namespace

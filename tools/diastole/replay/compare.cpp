@@ -11,8 +11,12 @@
 namespace diastole::replay {
 namespace {
 
+using runfile::each_block_of;
 using runfile::Event;
 using runfile::RecordedRun;
+using runfile::RunFile;
+using runfile::Series;
+using runfile::StreamRows;
 
 constexpr double tick_s = 1.0 / 84e6;
 constexpr double trigger_tolerance_s = tick_s + 1e-9;  // a run file's times are rounded
@@ -20,61 +24,82 @@ constexpr size_t most_positions_on_the_line = 30;      // of one message
 constexpr double fault_tolerance_s = 250e-6 + tick_s;
 constexpr double lease_tolerance_s = 50e-3 + tick_s;  // a heartbeat, whose phase is not in the file
 
-/// Pump and trigger rows of each cycle: [from trigger k, to trigger k + 1), the last to the end.
-struct CycleSteps {
-  int64_t inflating = 0;
-  int64_t deflating = 0;
+/// Steps that successive positions show, by the cycle of the recording in which they are made.
+class StepsByCycle {
+ public:
+  struct Cycle {
+    int64_t inflating = 0;
+    int64_t deflating = 0;
+  };
+
+  /// `trigger_s` outlives it: a cycle goes from a trigger to the next, the last to the end.
+  explicit StepsByCycle(const std::vector<double>& trigger_s)
+      : trigger_s_(trigger_s), cycles_(trigger_s.size()) {}
+  void stands_at(double time_s, int64_t microsteps) {
+    while (cycle_ + 1 < trigger_s_.size() && time_s >= trigger_s_[cycle_ + 1])
+      ++cycle_;
+    if (last_ && !trigger_s_.empty() && time_s >= trigger_s_[0]) {
+      Cycle& cycle = cycles_[cycle_];
+      (microsteps > *last_ ? cycle.inflating : cycle.deflating) += std::abs(microsteps - *last_);
+    }
+    last_ = microsteps;
+  }
+  [[nodiscard]] const std::vector<Cycle>& cycles() const { return cycles_; }
+  [[nodiscard]] std::optional<int64_t> last_microsteps() const { return last_; }
+
+ private:
+  const std::vector<double>& trigger_s_;
+  std::vector<Cycle> cycles_;
+  size_t cycle_ = 0;
+  std::optional<int64_t> last_;
 };
 
-/// Rows whose position stands in both; a missing one is no standstill.
-std::vector<size_t> known_positions(const RecordedRun& one, const RecordedRun& other) {
-  std::vector<size_t> rows;
-  for (size_t i = 0; i < std::min(one.pump.time_s.size(), other.pump.time_s.size()); ++i)
-    if (!std::isnan(one.pump.commanded_mL[i]) && !std::isnan(other.pump.commanded_mL[i])) rows.push_back(i);
-  return rows;
-}
+/// Of a channel's samples.
+struct Range {
+  double least = HUGE_VAL;
+  double most = -HUGE_VAL;
 
-/// Steps of each cycle of the recording, as the positions in these rows show them.
-std::vector<CycleSteps> cycle_steps(const RecordedRun& run, const std::vector<double>& trigger_s,
-                                    double microstep_mL, const std::vector<size_t>& rows) {
-  std::vector<CycleSteps> cycles(trigger_s.size());
-  size_t cycle = 0;
-  std::optional<int64_t> last;
-  for (const size_t i : rows) {
-    const int64_t now = std::llround(run.pump.commanded_mL[i] / microstep_mL);
-    while (cycle + 1 < trigger_s.size() && run.pump.time_s[i] >= trigger_s[cycle + 1])
-      ++cycle;
-    if (last && run.pump.time_s[i] >= trigger_s[0])
-      (now > *last ? cycles[cycle].inflating : cycles[cycle].deflating) += std::abs(now - *last);
-    last = now;
+  void take(double value) {
+    if (std::isnan(value)) return;
+    least = std::min(least, value);
+    most = std::max(most, value);
   }
-  return cycles;
-}
+  [[nodiscard]] double largest() const {
+    return least > most ? 0 : std::max(std::abs(least), std::abs(most));
+  }
+  [[nodiscard]] std::string words() const {
+    return least > most ? "-" : fmt::format("{:.4f} ... {:.4f}", least, most);
+  }
+};
 
-std::vector<bool> missing_rows(const RecordedRun& run) {
-  std::vector<bool> missing(run.pressure.time_s.size(), false);
-  for (const auto& [name, values] : run.pressure.channels) {
-    if (name.ends_with("_filtered_kPa")) continue;
-    for (size_t i = 0; i < values.size(); ++i)
-      missing[i] = missing[i] || std::isnan(values[i]);
+/// Which of the rows from `first` on some channel misses.
+void find_missing(const StreamRows& pressure, size_t first, std::vector<char>& missing) {
+  std::ranges::fill(missing, 0);
+  std::vector<double> memory;
+  for (const auto& [name, values] : pressure.values) {
+    if (name.ends_with("_filtered_kPa") || values.size() <= first) continue;
+    const size_t count = std::min(missing.size(), values.size() - first);
+    const std::span<const double> block = values.rows(first, count, memory);
+    for (size_t i = 0; i < count; ++i)
+      if (std::isnan(block[i])) missing[i] = 1;
   }
-  return missing;
 }
 
 class Comparer {
  public:
-  Comparer(const RecordedRun& recorded, const RecordedRun& replayed)
-      : recorded_(recorded),
-        replayed_(replayed),
-        broke_off_(end_of(recorded) == "incomplete"),
-        link_lost_(end_of(recorded) == "link_lost") {}
+  Comparer(const RunFile& recorded, const RunFile& replayed)
+      : recorded_(recorded.run),
+        replayed_(replayed.run),
+        before_(recorded.rows),
+        after_(replayed.rows),
+        broke_off_(end_of(recorded.run) == "incomplete"),
+        link_lost_(end_of(recorded.run) == "link_lost") {}
 
   Comparison run() {
     compare_triggers();
     compare_positions();
-    compare_cycles();
     compare_samples();
-    for (const auto& [name, values] : recorded_.pressure.channels)
+    for (const auto& [name, values] : before_.pressure.values)
       compare_channel(name, values);
     compare_events();
     compare_end();
@@ -126,46 +151,48 @@ class Comparer {
   }
   void compare_positions() {
     const double microstep_mL = rig_number(recorded_, "volume_per_step_mL").value_or(1);
-    const auto &before = recorded_.pump, &after = replayed_.pump;
-    compare_counts("positions of the piston", before.time_s.size(), after.time_s.size(),
+    const Series &before_s = before_.pump.time_s, &after_s = after_.pump.time_s;
+    compare_counts("positions of the piston", before_s.size(), after_s.size(),
                    link_lost_ ? most_positions_on_the_line : 0, out_.steps_equal);
     bool equal = true;
-    int64_t most = 0;
-    const size_t common = std::min(before.time_s.size(), after.time_s.size());
-    for (size_t i = 0; i < common; ++i) {
-      if (std::isnan(before.commanded_mL[i]) || std::isnan(after.commanded_mL[i])) continue;
-      const int64_t was = std::llround(before.commanded_mL[i] / microstep_mL);
-      const int64_t is = std::llround(after.commanded_mL[i] / microstep_mL);
-      most = std::max(most, std::abs(is - was));
-      const double diff_s = after.time_s[i] - before.time_s[i];
-      if (is == was && std::abs(diff_s) <= trigger_tolerance_s) continue;
-      equal = false;
-      if (is != was) {
-        differs_at(before.time_s[i],
-                   fmt::format("the piston stood at {} microsteps, and stands at {}", was, is));
-      } else {
-        differs_at(before.time_s[i], fmt::format("its position was taken {:+.3f} us off", 1e6 * diff_s));
+    StepsByCycle before(recorded_.trigger_s), after(recorded_.trigger_s);
+    const size_t common = std::min(before_s.size(), after_s.size());
+    const auto compare_block = [&](size_t, std::span<const std::span<const double>> columns) {
+      for (size_t i = 0; i < columns[0].size(); ++i) {
+        const double was_s = columns[0][i], was_mL = columns[1][i], is_s = columns[2][i],
+                     is_mL = columns[3][i];
+        if (std::isnan(was_mL) || std::isnan(is_mL)) continue;  // a missing position is no standstill
+        const int64_t was = std::llround(was_mL / microstep_mL), is = std::llround(is_mL / microstep_mL);
+        before.stands_at(was_s, was);
+        after.stands_at(is_s, is);
+        out_.max_steps_diff = std::max(out_.max_steps_diff, std::abs(is - was));
+        const double diff_s = is_s - was_s;
+        if (is == was && std::abs(diff_s) <= trigger_tolerance_s) continue;
+        equal = false;
+        if (is != was) {
+          differs_at(was_s, fmt::format("the piston stood at {} microsteps, and stands at {}", was, is));
+        } else {
+          differs_at(was_s, fmt::format("its position was taken {:+.3f} us off", 1e6 * diff_s));
+        }
       }
-    }
-    out_.max_steps_diff = most;
-    const std::vector<size_t> known = known_positions(recorded_, replayed_);
-    const auto last = [&](const runfile::PumpTrace& pump) {
-      return known.empty() ? std::string("-")
-                           : fmt::format("{}", std::llround(pump.commanded_mL[known.back()] / microstep_mL));
     };
-    add("positions, last one in microsteps", last(before), last(after), fmt::format("{} at most", most),
-        equal);
+    each_block_of({&before_s, &before_.pump.values.at("commanded_mL"), &after_s,
+                   &after_.pump.values.at("commanded_mL")},
+                  common, compare_block);
+    const auto last = [](const StepsByCycle& steps) {
+      return steps.last_microsteps() ? fmt::format("{}", *steps.last_microsteps()) : "-";
+    };
+    add("positions, last one in microsteps", last(before), last(after),
+        fmt::format("{} at most", out_.max_steps_diff), equal);
     if (!out_.steps_equal && common > 0)
-      differs_at(before.time_s[common - 1], "positions end here in one of the two");
+      differs_at(before_s.at(common - 1), "positions end here in one of the two");
     out_.steps_equal = out_.steps_equal && equal;
+    if (before.last_microsteps() && !recorded_.trigger_s.empty())
+      compare_cycles(before.cycles(), after.cycles());
   }
-  void compare_cycles() {
-    const double microstep_mL = rig_number(recorded_, "volume_per_step_mL").value_or(1);
-    const std::vector<size_t> rows = known_positions(recorded_, replayed_);
-    if (rows.empty() || recorded_.trigger_s.empty()) return;
-    const auto before = cycle_steps(recorded_, recorded_.trigger_s, microstep_mL, rows);
-    const auto after = cycle_steps(replayed_, recorded_.trigger_s, microstep_mL, rows);
-    const auto compare_way = [&](const char* what, int64_t CycleSteps::*way) {
+  void compare_cycles(const std::vector<StepsByCycle::Cycle>& before,
+                      const std::vector<StepsByCycle::Cycle>& after) {
+    const auto compare_way = [&](const char* what, int64_t StepsByCycle::Cycle::*way) {
       int64_t was = 0, is = 0, worst = 0;
       size_t where = 0;
       for (size_t i = 0; i < before.size(); ++i) {
@@ -179,82 +206,95 @@ class Comparer {
           worst == 0 ? "0 in every cycle" : fmt::format("{} in cycle {}", worst, where), worst == 0);
       out_.steps_equal = out_.steps_equal && worst == 0;
     };
-    compare_way("microsteps inflating, all cycles", &CycleSteps::inflating);
-    compare_way("microsteps deflating, all cycles", &CycleSteps::deflating);
+    compare_way("microsteps inflating, all cycles", &StepsByCycle::Cycle::inflating);
+    compare_way("microsteps deflating, all cycles", &StepsByCycle::Cycle::deflating);
   }
   void compare_samples() {
-    const auto &before = recorded_.pressure.time_s, &after = replayed_.pressure.time_s;
-    const size_t common = std::min(before.size(), after.size());
-    if (common > 0) out_.start_phase_s = after[0] - before[0];
+    const Series &before_s = before_.pressure.time_s, &after_s = after_.pressure.time_s;
+    const size_t common = std::min(before_s.size(), after_s.size());
+    if (common > 0) out_.start_phase_s = after_s.front() - before_s.front();
     const size_t at_the_end = std::abs(out_.start_phase_s) > tick_s ? 1 : 0;
-    compare_counts("samples", before.size(), after.size(), at_the_end, out_.samples_equal);
+    compare_counts("samples", before_s.size(), after_s.size(), at_the_end, out_.samples_equal);
     if (!out_.samples_equal && common > 0) {
-      differs_at(before[common - 1], before.size() > common ? "samples end here in the replay"
-                                                            : "samples end here in the recording");
+      differs_at(before_s.at(common - 1), before_s.size() > common ? "samples end here in the replay"
+                                                                   : "samples end here in the recording");
     }
     compare_missing(common);
     if (common < 2) return;
     double most_s = 0;
-    for (size_t i = 0; i < common; ++i)
-      most_s = std::max(most_s, std::abs(after[i] - before[i] - out_.start_phase_s));
+    each_block_of({&before_s, &after_s}, common,
+                  [&](size_t, std::span<const std::span<const double>> time_s) {
+                    for (size_t i = 0; i < time_s[0].size(); ++i)
+                      most_s = std::max(most_s, std::abs(time_s[1][i] - time_s[0][i] - out_.start_phase_s));
+                  });
     out_.max_sample_time_diff_s = most_s;
-    out_.sample_spacing_s = (before.back() - before.front()) / static_cast<double>(before.size() - 1);
-    out_.lines.push_back({"first sample after the start of run", fmt::format("{:.6f} s", before[0]),
-                          fmt::format("{:.6f} s", after[0]),
+    out_.sample_spacing_s = spacing_s(before_s);
+    out_.lines.push_back({"first sample after the start of run", fmt::format("{:.6f} s", before_s.front()),
+                          fmt::format("{:.6f} s", after_s.front()),
                           fmt::format("start phase {:+.3f} ms; then {:.3f} us at most",
                                       1e3 * out_.start_phase_s, 1e6 * most_s),
                           Verdict::reported});
   }
+  /// 0 for fewer than two samples.
+  static double spacing_s(const Series& time_s) {
+    if (time_s.size() < 2) return 0;
+    return (time_s.back() - time_s.front()) / static_cast<double>(time_s.size() - 1);
+  }
   void compare_missing(size_t rows) {
-    const auto before = missing_rows(recorded_), after = missing_rows(replayed_);
-    for (size_t i = 0; i < rows; ++i) {
-      if (before[i] == after[i]) continue;
-      out_.missing_equal = false;
-      differs_at(recorded_.pressure.time_s[i],
-                 fmt::format("sample {} {}", i,
-                             before[i] ? "was missing, and is there" : "was there, and is missing"));
-    }
-    const auto count = [&](const std::vector<bool>& missing) {
-      return std::count(missing.begin(), missing.begin() + static_cast<std::ptrdiff_t>(rows), true);
-    };
-    add("samples missing", fmt::format("{}", count(before)), fmt::format("{}", count(after)),
+    int64_t count_before = 0, count_after = 0;
+    std::vector<char> before, after;
+    each_block_of({&before_.pressure.time_s}, rows,
+                  [&](size_t first, std::span<const std::span<const double>> time_s) {
+                    before.resize(time_s[0].size());
+                    after.resize(time_s[0].size());
+                    find_missing(before_.pressure, first, before);
+                    find_missing(after_.pressure, first, after);
+                    count_before += std::ranges::count(before, 1);
+                    count_after += std::ranges::count(after, 1);
+                    for (size_t i = 0; i < before.size(); ++i) {
+                      if (before[i] == after[i]) continue;
+                      out_.missing_equal = false;
+                      differs_at(time_s[0][i], fmt::format("sample {} {}", first + i,
+                                                           before[i] != 0 ? "was missing, and is there"
+                                                                          : "was there, and is missing"));
+                    }
+                  });
+    add("samples missing", fmt::format("{}", count_before), fmt::format("{}", count_after),
         out_.missing_equal ? "the same ones" : "others", out_.missing_equal);
   }
-  void compare_channel(const std::string& name, const std::vector<double>& values) {
-    const auto found = replayed_.pressure.channels.find(name);
+  void compare_channel(const std::string& name, const Series& values_kPa) {
+    const auto found = after_.pressure.values.find(name);
     if (name.ends_with("_filtered_kPa") || !name.ends_with("_kPa")) return;
-    if (found == replayed_.pressure.channels.end()) {
+    if (found == after_.pressure.values.end()) {
       out_.pressure_equal = false;
       return add(name, "recorded", "-", "not replayed", false);
     }
-    const size_t rows = std::min(values.size(), found->second.size());
-    double largest_kPa = 0, least_kPa = HUGE_VAL, most_kPa = -HUGE_VAL, worst_kPa = 0;
-    for (size_t i = 0; i < rows; ++i) {
-      if (std::isnan(values[i])) continue;
-      largest_kPa = std::max(largest_kPa, std::abs(values[i]));
-      least_kPa = std::min(least_kPa, values[i]);
-      most_kPa = std::max(most_kPa, values[i]);
-    }
-    const double tolerance_kPa = resolution_kPa(name, largest_kPa);
+    const size_t rows = std::min(values_kPa.size(), found->second.size());
+    Range was, is;
+    each_block_of({&values_kPa, &found->second}, rows,
+                  [&](size_t, std::span<const std::span<const double>> kPa) {
+                    for (size_t i = 0; i < kPa[0].size(); ++i) {
+                      was.take(kPa[0][i]);
+                      is.take(kPa[1][i]);
+                    }
+                  });
+    const double tolerance_kPa = resolution_kPa(name, was.largest());
+    double worst_kPa = 0;
     bool equal = true;
-    double least_now_kPa = HUGE_VAL, most_now_kPa = -HUGE_VAL;
-    for (size_t i = 0; i < rows; ++i) {
-      const double now_kPa = found->second[i];
-      if (std::isnan(now_kPa)) continue;
-      least_now_kPa = std::min(least_now_kPa, now_kPa);
-      most_now_kPa = std::max(most_now_kPa, now_kPa);
-      if (std::isnan(values[i])) continue;
-      const double diff_kPa = std::abs(now_kPa - values[i]);
-      worst_kPa = std::max(worst_kPa, diff_kPa);
-      if (diff_kPa <= tolerance_kPa) continue;
-      equal = false;
-      differs_at(recorded_.pressure.time_s[i],
-                 fmt::format("{} of sample {} was {:.6f}, and is {:.6f}", name, i, values[i], now_kPa));
-    }
-    const auto range = [](double least, double most) {
-      return least > most ? std::string("-") : fmt::format("{:.4f} ... {:.4f}", least, most);
+    const auto compare_block = [&](size_t first, std::span<const std::span<const double>> columns) {
+      for (size_t i = 0; i < columns[0].size(); ++i) {
+        const double was_kPa = columns[1][i], is_kPa = columns[2][i];
+        if (std::isnan(was_kPa) || std::isnan(is_kPa)) continue;
+        const double diff_kPa = std::abs(is_kPa - was_kPa);
+        worst_kPa = std::max(worst_kPa, diff_kPa);
+        if (diff_kPa <= tolerance_kPa) continue;
+        equal = false;
+        differs_at(columns[0][i], fmt::format("{} of sample {} was {:.6f}, and is {:.6f}", name, first + i,
+                                              was_kPa, is_kPa));
+      }
     };
-    add(name, range(least_kPa, most_kPa), range(least_now_kPa, most_now_kPa),
+    each_block_of({&before_.pressure.time_s, &values_kPa, &found->second}, rows, compare_block);
+    add(name, was.words(), is.words(),
         fmt::format("{:.2g} at most, {:.2g} allowed", worst_kPa, tolerance_kPa), equal);
     out_.pressure_equal = out_.pressure_equal && equal;
     out_.max_abs_diff_kPa = std::max(out_.max_abs_diff_kPa, worst_kPa);
@@ -262,10 +302,7 @@ class Comparer {
   }
   void compare_events() {
     const std::vector<Event> before = comparable(recorded_), after = comparable(replayed_);
-    const double sample_s = recorded_.pressure.time_s.size() < 2
-                                ? 0
-                                : (recorded_.pressure.time_s.back() - recorded_.pressure.time_s.front()) /
-                                      static_cast<double>(recorded_.pressure.time_s.size() - 1);
+    const double sample_s = spacing_s(before_.pressure.time_s);
     const auto described = [](const Event* event) {
       return event == nullptr ? std::string("-") : fmt::format("{} at {:.6f} s", event->code, event->time_s);
     };
@@ -299,7 +336,8 @@ class Comparer {
     add("end", before, after, "", before == after);
     if (before == after) return;
     out_.events_equal = false;
-    const double end_s = recorded_.pressure.time_s.empty() ? 0 : recorded_.pressure.time_s.back();
+    const Series& samples_s = before_.pressure.time_s;
+    const double end_s = samples_s.size() == 0 ? 0 : samples_s.back();
     differs_at(end_s, fmt::format("the run ended \"{}\", and ends \"{}\"", before, after));
   }
   [[nodiscard]] double resolution_kPa(const std::string& name, double largest_kPa) const {
@@ -323,6 +361,8 @@ class Comparer {
 
   const RecordedRun& recorded_;
   const RecordedRun& replayed_;
+  const runfile::RunRows& before_;
+  const runfile::RunRows& after_;
   bool broke_off_;
   bool link_lost_;
   Comparison out_;
@@ -330,8 +370,13 @@ class Comparer {
 
 }  // namespace
 
-Comparison compare(const RecordedRun& recorded, const RecordedRun& replayed) {
+Comparison compare(const RunFile& recorded, const RunFile& replayed) {
   return Comparer(recorded, replayed).run();
+}
+
+Comparison compare(const RecordedRun& recorded, const RecordedRun& replayed) {
+  return compare(RunFile{recorded, runfile::rows_of(recorded)},
+                 RunFile{replayed, runfile::rows_of(replayed)});
 }
 
 }  // namespace diastole::replay

@@ -20,7 +20,7 @@
 #include <string>
 #include <vector>
 
-#include "protocol/runfile/run.hpp"
+#include "protocol/runfile/reader.hpp"
 
 namespace diastole::replay {
 
@@ -66,6 +66,8 @@ struct Comparison {
   [[nodiscard]] bool samples_in_time() const { return max_sample_time_diff_s <= sample_spacing_s; }
 };
 
+Comparison compare(const runfile::RunFile& recorded, const runfile::RunFile& replayed);
+/// The same of runs in memory.
 Comparison compare(const runfile::RecordedRun& recorded, const runfile::RecordedRun& replayed);
 
 }  // namespace diastole::replay

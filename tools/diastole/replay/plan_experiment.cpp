@@ -12,7 +12,9 @@ namespace diastole::replay {
 namespace {
 
 using runfile::RecordedRun;
+using runfile::RunFile;
 using runfile::Segment;
+using runfile::Series;
 
 [[noreturn]] void lacks(const RecordedRun& run, const std::string& place, const std::string& what,
                         const std::string& remedy) {
@@ -64,26 +66,34 @@ bool raises_triggers(const RecordedRun& run, const Segment& segment) {
   });
 }
 
-/// Commanded volume at a time, of the nearest row.
-double commanded_mL(const RecordedRun& run, double time_s) {
-  if (run.pump.time_s.empty()) return 0;
-  const auto after = std::ranges::lower_bound(run.pump.time_s, time_s);
-  const auto row = std::min(after - run.pump.time_s.begin(), std::ssize(run.pump.time_s) - 1);
-  return run.pump.commanded_mL[static_cast<size_t>(row)];
+/// Commanded volume at a time, of the next row, or of the last.
+double commanded_mL(const runfile::StreamRows& pump, double time_s) {
+  if (pump.time_s.size() == 0) return 0;
+  size_t row = 0;
+  for (size_t behind = pump.time_s.size() - 1; row < behind;) {
+    const size_t middle = row + (behind - row) / 2;
+    if (pump.time_s.at(middle) < time_s)
+      row = middle + 1;
+    else
+      behind = middle;
+  }
+  return pump.values.at("commanded_mL").at(row);
 }
 
 /// Stillness, or a way from one volume to another that is no cycle: the controller makes such ways by itself before
 /// the next segment.
-bool is_between_cycles(const RecordedRun& run, const Segment& segment) {
+bool is_between_cycles(const RunFile& file, const Segment& segment) {
   constexpr double closes_mL = 0.5;
-  if (segment.waveform == "hold") return !raises_triggers(run, segment);
+  if (segment.waveform == "hold") return !raises_triggers(file.run, segment);
   if (segment.waveform != "uploaded") return false;
-  return std::abs(commanded_mL(run, segment.end_s()) - commanded_mL(run, segment.start_s)) > closes_mL;
+  const runfile::StreamRows& pump = file.rows.pump;
+  return std::abs(commanded_mL(pump, segment.end_s()) - commanded_mL(pump, segment.start_s)) > closes_mL;
 }
 
 /// For recordings of other programs: what the table of segments holds.
-void write_experiment(const RecordedRun& run, ReplayPlan& plan) {
-  const auto& time_s = run.pressure.time_s;
+void write_experiment(const RunFile& file, ReplayPlan& plan) {
+  const RecordedRun& run = file.run;
+  const Series& time_s = file.rows.pressure.time_s;
   if (run.segments.empty()) {
     lacks(run, "/protocol",
           "it holds neither an experiment file (/protocol/toml) nor a segment (/protocol/segments)",
@@ -95,7 +105,7 @@ void write_experiment(const RecordedRun& run, ReplayPlan& plan) {
   std::string segments;
   for (size_t i = 0; i < run.segments.size(); ++i) {
     const Segment& segment = run.segments[i];
-    if (is_between_cycles(run, segment)) {
+    if (is_between_cycles(file, segment)) {
       if (segments.empty()) rest_s += segment.end_s() - segment.start_s;
       plan.remarks.push_back(
           fmt::format("segment {} ({}, {:g} s) raises no trigger or is no cycle: {}", i, segment.waveform,
@@ -122,21 +132,21 @@ void write_experiment(const RecordedRun& run, ReplayPlan& plan) {
 }
 
 /// Rows of /pressure a second, on the clock of the host that polls the replay's instrument.
-std::optional<double> kept_rate_Hz(const RecordedRun& run) {
-  const auto& time_s = run.pressure.time_s;
+std::optional<double> kept_rate_Hz(const RunFile& file) {
+  const Series& time_s = file.rows.pressure.time_s;
   if (time_s.size() < 2) return std::nullopt;
-  const auto drift = run.clock.find("host_drift_ppm");
-  const double host_ppm = drift == run.clock.end() ? 0 : drift->second;
+  const auto drift = file.run.clock.find("host_drift_ppm");
+  const double host_ppm = drift == file.run.clock.end() ? 0 : drift->second;
   return static_cast<double>(time_s.size() - 1) / (time_s.back() - time_s.front()) / (1 + 1e-6 * host_ppm);
 }
 
 /// An instrument that takes its samples by its own clock does not keep the rate that it was asked for: the replay's is
 /// asked for the one that was kept.
-void take_rate(const RecordedRun& run, ReplayPlan& plan) {
+void take_rate(const RunFile& file, ReplayPlan& plan) {
   constexpr double as_it_says = 1e-6;  // of the rate: no drift, only the fit's noise
-  TableReader root = TableReader::from_text(run.protocol_toml, "/protocol/toml");
-  const auto planned_Hz = rig_number(run, "daq_rate_Hz");
-  const auto kept_Hz = kept_rate_Hz(run);
+  TableReader root = TableReader::from_text(file.run.protocol_toml, "/protocol/toml");
+  const auto planned_Hz = rig_number(file.run, "daq_rate_Hz");
+  const auto kept_Hz = kept_rate_Hz(file);
   if (!planned_Hz || !kept_Hz || *planned_Hz == root.number_or("sample_rate_Hz", 300)) return;
   const double rate_Hz = std::abs(*kept_Hz / *planned_Hz - 1) < as_it_says ? *planned_Hz : *kept_Hz;
   static const std::regex asked("(^|\n)[ \t]*sample_rate_Hz[ \t]*=[^\n]*");
@@ -149,11 +159,11 @@ void take_rate(const RecordedRun& run, ReplayPlan& plan) {
 
 }  // namespace
 
-void plan_experiment(const RecordedRun& run, ReplayPlan& plan) {
-  if (!has_experiment(run)) return write_experiment(run, plan);
-  plan.experiment_toml = run.protocol_toml;
-  take_rate(run, plan);
-  take_points(run, plan);
+void plan_experiment(const RunFile& file, ReplayPlan& plan) {
+  if (!has_experiment(file.run)) return write_experiment(file, plan);
+  plan.experiment_toml = file.run.protocol_toml;
+  take_rate(file, plan);
+  take_points(file.run, plan);
 }
 
 }  // namespace diastole::replay

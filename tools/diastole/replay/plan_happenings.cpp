@@ -11,6 +11,8 @@ namespace {
 
 using runfile::Event;
 using runfile::RecordedRun;
+using runfile::RunFile;
+using runfile::Series;
 
 constexpr double shortest_s = 1e-3;  ///< after the start of run
 constexpr double silence_patience_s = 1;
@@ -26,20 +28,21 @@ std::string fault_from(const char* name, double from_s, std::optional<double> un
 }
 
 /// When the controller was last heard; what it reported in the run's last moments may have got lost with it.
-double last_heard_s(const RecordedRun& run) {
+double last_heard_s(const RunFile& file) {
   constexpr double on_the_line_s = 2e-3;
-  const double position_s = run.pump.time_s.empty() ? 0 : run.pump.time_s.back();
-  const double trigger_s = run.trigger_s.empty() ? 0 : run.trigger_s.back();
+  const Series& positions_s = file.rows.pump.time_s;
+  const double position_s = positions_s.size() == 0 ? 0 : positions_s.back();
+  const double trigger_s = file.run.trigger_s.empty() ? 0 : file.run.trigger_s.back();
   return std::max(position_s, trigger_s) + on_the_line_s;
 }
 
 /// The cable or supply that explains why the host lost the controller.
-void plan_link_loss(const RecordedRun& run, const Event& event, double onset_shift_s, ReplayPlan& plan) {
+void plan_link_loss(const RunFile& file, const Event& event, double onset_shift_s, ReplayPlan& plan) {
   const auto says = [&](const char* words) { return event.text.find(words) != std::string::npos; };
   if (says(was_reset)) {
     const double booted_s = event.time_s - reboot_s + onset_shift_s;
     plan.faults.push_back(
-        fault_from("power-cut", std::min(booted_s - reboot_s, last_heard_s(run)), booted_s));
+        fault_from("power-cut", std::min(booted_s - reboot_s, last_heard_s(file)), booted_s));
     plan.remarks.emplace_back(
         "when and why the controller was reset is not in the file: its supply is cut after what was last "
         "heard of it, such that the host notices when it did");
@@ -51,13 +54,13 @@ void plan_link_loss(const RecordedRun& run, const Event& event, double onset_shi
 }
 
 /// The controller's end came when it heard the host again, and the recording ends a quarter of a second behind that.
-double heard_again_s(const RecordedRun& run, const Event& event) {
+double heard_again_s(const RunFile& file, const Event& event) {
   constexpr double tail_s = 0.26;
-  return run.pressure.time_s.empty() ? event.time_s
-                                     : std::max(event.time_s, run.pressure.time_s.back() - tail_s);
+  const Series& samples_s = file.rows.pressure.time_s;
+  return samples_s.size() == 0 ? event.time_s : std::max(event.time_s, samples_s.back() - tail_s);
 }
 
-void plan_fault(const RecordedRun& run, const Event& event, double onset_shift_s, ReplayPlan& plan) {
+void plan_fault(const RunFile& file, const Event& event, double onset_shift_s, ReplayPlan& plan) {
   const std::string& code = event.code;
   if (code == "estop") {
     plan.faults.push_back(fault_from("estop", event.time_s - before_noticed_s));
@@ -66,13 +69,13 @@ void plan_fault(const RecordedRun& run, const Event& event, double onset_shift_s
   } else if (code == "home_switch") {
     plan.faults.push_back(fault_from("home-limit", event.time_s - before_noticed_s));
   } else if (code == "lease_lost") {
-    const double lease_s = 1e-3 * rig_number(run, "lease_ms").value_or(500);
+    const double lease_s = 1e-3 * rig_number(file.run, "lease_ms").value_or(500);
     const double silent_s = event.time_s - lease_s + shortest_s + onset_shift_s;
-    plan.faults.push_back(fault_from("serial-deaf", silent_s, heard_again_s(run, event)));
+    plan.faults.push_back(fault_from("serial-deaf", silent_s, heard_again_s(file, event)));
     plan.remarks.emplace_back(
         "when the host fell silent is not in the file: such that the lease ends when it did");
   } else if (code == "link_lost") {
-    plan_link_loss(run, event, onset_shift_s, plan);
+    plan_link_loss(file, event, onset_shift_s, plan);
   } else if (code == "journal_failed" || code == "overdue" || code == "refused") {
     plan.remarks.push_back(
         fmt::format("{:.3f} s: {} is a matter of the recording's own computer and is not done again",
@@ -127,11 +130,11 @@ std::string end_of(const RecordedRun& run) {
   return end;
 }
 
-void plan_happenings(const RecordedRun& run, double onset_shift_s, ReplayPlan& plan) {
-  plan_slices(run, plan);
-  for (const Event& event : run.events) {
+void plan_happenings(const RunFile& file, double onset_shift_s, ReplayPlan& plan) {
+  plan_slices(file.run, plan);
+  for (const Event& event : file.run.events) {
     if (event.code == "stop") plan_stop(event, plan);
-    if (event.level == "error") plan_fault(run, event, onset_shift_s, plan);
+    if (event.level == "error") plan_fault(file, event, onset_shift_s, plan);
   }
   std::ranges::stable_sort(plan.orders, {}, &Order::time_s);
 }
@@ -144,12 +147,16 @@ std::optional<Event> late_sign(const RecordedRun& run) {
   return std::nullopt;
 }
 
-ReplayPlan plan_replay(const RecordedRun& run, const PlanOptions& options) {
+ReplayPlan plan_replay(const RunFile& file, const PlanOptions& options) {
   ReplayPlan plan;
-  plan_experiment(run, plan);
-  plan_rig(run, options.limits, plan);
-  plan_happenings(run, options.onset_shift_s, plan);
+  plan_experiment(file, plan);
+  plan_rig(file, options.limits, plan);
+  plan_happenings(file, options.onset_shift_s, plan);
   return plan;
+}
+
+ReplayPlan plan_replay(const RecordedRun& run, const PlanOptions& options) {
+  return plan_replay({run, runfile::rows_of(run)}, options);
 }
 
 }  // namespace diastole::replay

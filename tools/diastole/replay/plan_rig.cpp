@@ -9,6 +9,7 @@ namespace diastole::replay {
 namespace {
 
 using runfile::RecordedRun;
+using runfile::RunFile;
 
 /// A number of the rig file, as recorded or as the built-in rig has it.
 struct Geometry {
@@ -80,10 +81,11 @@ void plan_settings(const RecordedRun& run, ReplayPlan& plan) {
   }
 }
 
-void plan_start(const RecordedRun& run, ReplayPlan& plan) {
-  const double microstep_mL = rig_number(run, "volume_per_step_mL").value_or(0.0078);
-  if (run.pump.commanded_mL.empty() || std::isnan(run.pump.commanded_mL.front())) return;
-  const double start_mL = run.pump.commanded_mL.front();
+void plan_start(const RunFile& file, ReplayPlan& plan) {
+  const double microstep_mL = rig_number(file.run, "volume_per_step_mL").value_or(0.0078);
+  const runfile::Series& commanded_mL = file.rows.pump.values.at("commanded_mL");
+  if (commanded_mL.size() == 0 || std::isnan(commanded_mL.front())) return;
+  const double start_mL = commanded_mL.front();
   if (std::abs(start_mL) > 0.5 * microstep_mL) plan.start_mL = start_mL;
 }
 
@@ -97,7 +99,8 @@ std::optional<double> rig_number(const RecordedRun& run, const std::string& name
   return std::nullopt;
 }
 
-void plan_rig(const RecordedRun& run, const std::optional<MotionLimits>& limits, ReplayPlan& plan) {
+void plan_rig(const RunFile& file, const std::optional<MotionLimits>& limits, ReplayPlan& plan) {
+  const RecordedRun& run = file.run;
   std::string rig = "format = \"diastole-rig\"\nversion = 1\n[rig]\n";
   for (const auto& [name, fallback] : needed) {
     const auto recorded = rig_number(run, name);
@@ -115,7 +118,7 @@ void plan_rig(const RecordedRun& run, const std::optional<MotionLimits>& limits,
   plan.rig_toml = rig;
   plan.host_drift_ppm = drift_ppm("host_drift_ppm");
   plan_settings(run, plan);
-  plan_start(run, plan);
+  plan_start(file, plan);
 }
 
 }  // namespace diastole::replay

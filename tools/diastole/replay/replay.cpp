@@ -31,7 +31,7 @@ namespace {
 
 namespace fs = std::filesystem;
 using nlohmann::json;
-using runfile::RecordedRun;
+using runfile::RunFile;
 
 constexpr double quiet_s = 2;     ///< of wall time, before progress is shown
 constexpr int most_attempts = 3;  ///< at what began unseen
@@ -50,16 +50,16 @@ struct ReplayOptions {
 
 /// The recording; a journal is assembled first, and brought to a file in `directory` that the instrument can play.
 struct Recording {
-  RecordedRun run;
+  RunFile run;
   fs::path file;
 };
 
 Recording read_recording(const ReplayOptions& options, const PrivateDirectory& directory) {
-  if (!options.run.ends_with(".journal")) return {runfile::read_run(options.run), options.run};
+  if (!options.run.ends_with(".journal")) return {runfile::open_run(options.run), options.run};
   const fs::path file = directory / "recovered.run.h5";
   write_run(file, stream_run(JournalRecords(options.run)));
-  Recording recording{runfile::read_run(file), file};
-  recording.run.file = options.run;
+  Recording recording{runfile::open_run(file), file};
+  recording.run.run.file = options.run;
   return recording;
 }
 
@@ -95,9 +95,9 @@ std::string prepare(DaemonClient& daemon, const replay::ReplayPlan& plan) {
 }
 
 /// The replay as it was recorded in its turn; none when the user has broken it off.
-std::optional<RecordedRun> replay_once(const ReplayOptions& options, const replay::ReplayPlan& plan,
-                                       const Recording& recording, const PrivateDirectory& directory,
-                                       std::string& firmware) {
+std::optional<RunFile> replay_once(const ReplayOptions& options, const replay::ReplayPlan& plan,
+                                   const Recording& recording, const PrivateDirectory& directory,
+                                   std::string& firmware) {
   const StopSignals signals;
   SimulatedRig rig(directory, rig_options(options, plan, recording, directory));
   DaemonClient daemon(rig.socket());
@@ -123,7 +123,7 @@ std::optional<RecordedRun> replay_once(const ReplayOptions& options, const repla
   run_session(daemon, session);
   view.finish();
   if (signals.asked() > 0) return std::nullopt;
-  return runfile::read_run(session.output);
+  return runfile::open_run(session.output);
 }
 
 std::optional<MotionLimits> limits_in(const std::string& config) {
@@ -133,8 +133,8 @@ std::optional<MotionLimits> limits_in(const std::string& config) {
 
 /// By how much the sign of something that began unseen came too late; 0 if neither run has one, none if the sign of one
 /// is missing in the other.
-std::optional<double> lateness_s(const RecordedRun& recorded, const RecordedRun& replayed) {
-  const auto sign = replay::late_sign(recorded), now = replay::late_sign(replayed);
+std::optional<double> lateness_s(const RunFile& recorded, const RunFile& replayed) {
+  const auto sign = replay::late_sign(recorded.run), now = replay::late_sign(replayed.run);
   if (!sign && !now) return 0;
   if (!sign || !now || sign->code != now->code) return std::nullopt;
   return now->time_s - sign->time_s;
@@ -142,14 +142,14 @@ std::optional<double> lateness_s(const RecordedRun& recorded, const RecordedRun&
 
 /// Replays, as often as shifting what began unseen brings its sign closer; keeps the closest. None when the user has
 /// broken it off.
-std::optional<RecordedRun> replay_closest(const ReplayOptions& options, const Recording& recording,
-                                          const PrivateDirectory& directory, replay::ReplayReport& report) {
+std::optional<RunFile> replay_closest(const ReplayOptions& options, const Recording& recording,
+                                      const PrivateDirectory& directory, replay::ReplayReport& report) {
   replay::PlanOptions plan_options{.limits = limits_in(options.config)};
-  std::optional<RecordedRun> closest;
+  std::optional<RunFile> closest;
   double least_late_s = HUGE_VAL;
   for (int attempt = 0; attempt < most_attempts; ++attempt) {
     replay::ReplayPlan plan = replay::plan_replay(recording.run, plan_options);
-    std::optional<RecordedRun> replayed = replay_once(options, plan, recording, directory, report.firmware);
+    std::optional<RunFile> replayed = replay_once(options, plan, recording, directory, report.firmware);
     if (!replayed) return std::nullopt;
     const std::optional<double> late_s = lateness_s(recording.run, *replayed);
     const double off_s = late_s ? std::abs(*late_s) : HUGE_VAL;
@@ -182,12 +182,13 @@ std::optional<replay::ReplayReport> replay_run(const ReplayOptions& options) {
   replay::ReplayReport report;
   report.recorded = options.run;
   report.replayed = options.output;
-  const std::optional<RecordedRun> replayed = replay_closest(options, recording, directory, report);
+  const std::optional<RunFile> replayed = replay_closest(options, recording, directory, report);
   if (!replayed) return std::nullopt;
   report.firmware = fmt::format("{} {}", options.image.empty() ? "the firmware's host build" : options.image,
                                 report.firmware);
   if (!options.output.empty()) keep_closest(directory, options.output);
-  if (!replayed->pressure.time_s.empty()) report.simulated_s = replayed->pressure.time_s.back();
+  const runfile::Series& time_s = replayed->rows.pressure.time_s;
+  if (time_s.size() > 0) report.simulated_s = time_s.back();
   report.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - started).count();
   return report;
 }

@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "host/config/rig_config.hpp"
-#include "protocol/runfile/run.hpp"
+#include "protocol/runfile/reader.hpp"
 
 namespace diastole::replay {
 
@@ -41,6 +41,8 @@ struct PlanOptions {
 };
 
 /// Throws InputError that says what the file lacks.
+ReplayPlan plan_replay(const runfile::RunFile& run, const PlanOptions& options = {});
+/// The same of a run in memory.
 ReplayPlan plan_replay(const runfile::RecordedRun& run, const PlanOptions& options = {});
 
 /// What shows that something began before, at a time that the file does not hold: lease_lost, or the loss of a
@@ -48,9 +50,9 @@ ReplayPlan plan_replay(const runfile::RecordedRun& run, const PlanOptions& optio
 std::optional<runfile::Event> late_sign(const runfile::RecordedRun& run);
 
 // Its parts.
-void plan_experiment(const runfile::RecordedRun& run, ReplayPlan& plan);
-void plan_rig(const runfile::RecordedRun& run, const std::optional<MotionLimits>& limits, ReplayPlan& plan);
-void plan_happenings(const runfile::RecordedRun& run, double onset_shift_s, ReplayPlan& plan);
+void plan_experiment(const runfile::RunFile& run, ReplayPlan& plan);
+void plan_rig(const runfile::RunFile& run, const std::optional<MotionLimits>& limits, ReplayPlan& plan);
+void plan_happenings(const runfile::RunFile& run, double onset_shift_s, ReplayPlan& plan);
 
 /// A number of /rig, if it is there.
 std::optional<double> rig_number(const runfile::RecordedRun& run, const std::string& name);

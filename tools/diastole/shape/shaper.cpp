@@ -31,10 +31,10 @@ DriveModel model_of(const ShapeRequest& request, const WantedCurve& wanted) {
 RigConfig rig_of(const ShapeRequest& request) {
   if (!request.rig.empty()) return read_rig(request.rig);
   const Study study = read_study(request.study);
-  const runfile::RecordedRun run = runfile::read_run(study.data.runs.front());
+  const runfile::RunFile file = runfile::open_run(study.data.runs.front());
   replay::ReplayPlan plan;
-  replay::plan_rig(run, std::nullopt, plan);
-  return read_rig(TableReader::from_text(plan.rig_toml, run.file + " /rig"));
+  replay::plan_rig(file, std::nullopt, plan);
+  return read_rig(TableReader::from_text(plan.rig_toml, file.run.file + " /rig"));
 }
 
 Eigen::Index harmonics_of(const PeriodicCurve& wanted_mL) {
