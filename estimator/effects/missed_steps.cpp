@@ -16,7 +16,9 @@ void apply(EffectValues values, const EffectContext& context, rig::RigModel& mod
   const double stall_s = values[1];
   const std::vector<ChangePoint> moments(context.change_points.begin(), context.change_points.end());
   if (lost_mL == 0.0 || moments.empty()) return;
-  model.turns.emplace_back([=](rig::DriveTrace& trace, const rig::RunPlace& place) {
+  // Behind the screw's own error. A screw that loses turns errs by another angle from then on; what is lost behind it (a nut, a rod)
+  // leaves the angle, as all recordings with a loss that there are do.
+  model.drive.emplace_back([=](rig::DriveTrace& trace, const rig::RunPlace& place) {
     for (const ChangePoint& moment : moments) {
       if (moment.run != place.name) continue;
       for (size_t k = 0; k < trace.volume_mL.size(); ++k) {

@@ -20,8 +20,8 @@ double positive(double value, double rounding) {
   return x > 30.0 ? value : rounding * std::log1p(std::exp(x));
 }
 
-/// An error of the drive so many times a turn of the screw, `sine` or cosine of that angle. The angle is what the screw turns, steps that
-/// are lost or miscounted left out.
+/// An error of the drive so many times a turn of the screw, `sine` or cosine of that angle. The angle is what the screw turns, miscounted
+/// steps left out.
 template <int times_a_turn, bool sine>
 void add_turning_error(double size_mL, const EffectContext&, RigModel& model) {
   if (size_mL == 0.0) return;
