@@ -1,7 +1,7 @@
 #pragma once
 // The rig as a model: commanded steps -> piston -> hose -> specimen -> catheter and sensors -> samples.
 //
-//   drive      volume the piston displaces, of the motion behind the commanded steps
+//   drive      what the screw turns for the commanded steps, and the volume that the piston then displaces
 //   pump       what the fluid meets before the hose: a leak past the seal, gas
 //   hose       distributed line (hose_line.hpp)
 //   specimen   pressure by volume, with memory if an effect gives it one; leaks and gas at the cavity
@@ -103,8 +103,8 @@ struct RigModel {
   // Hooks of effects, in the order in which they were added.
   std::vector<DriveMap> turns;  ///< from commanded steps to what the screw turns, in mL
   std::vector<DriveMap> drive;  ///< from there to the piston
-  double pump_gas_mL = 0.0;    ///< at rest; between piston and hose
-  double cavity_gas_mL = 0.0;  ///< at rest; beside the specimen
+  double pump_gas_mL = 0.0;     ///< at rest; between piston and hose
+  double cavity_gas_mL = 0.0;   ///< at rest; beside the specimen
   double gas_exponent =
       1.2;  ///< of p V^n: bubbles at about a hertz are between isothermal (1) and adiabatic (1.4)
   double pump_leak_mL_s_kPa = 0.0;           ///< conductance past the seal
