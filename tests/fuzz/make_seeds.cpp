@@ -1,14 +1,23 @@
 // Writes the seed corpora: the worked example of every message, as each target reads it, and whole sessions.
 //   make_seeds DIRECTORY     (makes a folder for each target in it)
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <string>
 
+#include "estimator/io/fibre_points.hpp"
+#include "estimator/io/fit_file.hpp"
+#include "estimator/io/flow_file.hpp"
+#include "estimator/io/tracking_file.hpp"
+#include "estimator/io/whole_file.hpp"
+#include "protocol/signing/signing_key.hpp"
 #include "protocol/wire/messages.hpp"
 #include "tests/estimator/imaging/tagged_ring.hpp"
+#include "tests/fuzz/file_kinds.hpp"
 #include "tests/fuzz/script.hpp"
 #include "tests/host/acquisition/session_on_desk.hpp"
+#include "tests/host/flash/update_files.hpp"
 
 namespace {
 
@@ -181,6 +190,112 @@ void write_images(const std::filesystem::path& directory) {
   test::write_ring({.phases = 1, .pixels = 12, .pixel_mm = 8}, directory / "fuzz_dicom", "classic");
 }
 
+/// As fuzz_files reads it: what it is, then the file. Of a long one its beginning.
+void write_file(const std::filesystem::path& directory, fuzz::FileKind kind, std::string_view text) {
+  constexpr size_t most_bytes = 3000;
+  Bytes bytes{static_cast<std::uint8_t>(kind)};
+  bytes.insert(bytes.end(), text.begin(),
+               text.begin() + static_cast<std::ptrdiff_t>(std::min(text.size(), most_bytes)));
+  static int number = 0;
+  write(directory / "fuzz_files" / std::to_string(++number), bytes);
+}
+
+/// The examples, documents of records with one of everything, and grids of one cell.
+void write_files(const std::filesystem::path& directory) {
+  using enum fuzz::FileKind;
+  const std::vector<std::pair<fuzz::FileKind, const char*>> examples{
+      {rig, "rig.toml"},
+      {rig, "paper-gap/rig.toml"},
+      {experiment, "gel.experiment.toml"},
+      {experiment, "heart.experiment.toml"},
+      {experiment, "study.experiment.toml"},
+      {waveform, "heart.csv"},
+      {waveform, "shape/ventricle.csv"},
+      {study, "phantom-a.study.toml"},
+      {study, "lv-clean.study.toml"},
+      {study, "imaged-ventricle.study.toml"},
+      {study, "tagged-gel/tagged-gel.study.toml"},
+      {study, "paper-gap/paper-gap.study.toml"},
+      {frame_table, "phantom-a.frames.csv"},
+      {tag_table, "phantom-a.tags.csv"},
+      {point_table, "phantom-a.points.csv"},
+      {effect, "effects/my-seal.effect.toml"},
+      {effect, "effects/viscoelasticity.effect.toml"},
+      {law, "laws/guccione.law.toml"},
+      {law, "laws/holzapfel-ogden.law.toml"},
+  };
+  for (const auto& [kind, name] : examples)
+    write_file(directory, kind,
+               read_whole_file(std::filesystem::path(DIASTOLE_SOURCE_DIR) / "examples" / name));
+  write_file(directory, fibre_table, std::string(fibre_points_mark) + "\n1,2,3,1,0,0,5\n");
+  write_file(directory, fit, to_json(FitRecord{}));
+  TrackingRecord tracked;
+  tracked.slices.emplace_back().images.emplace_back();
+  write_file(directory, tracking, to_json(tracked));
+  FlowRecord flowed;
+  flowed.images.emplace_back();
+  flowed.loop.emplace_back();
+  write_file(directory, flow, to_json(flowed));
+  write_file(directory, gmsh,
+             "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$Entities\n0 0 0 1\n1 0 0 0 1 1 1 0 0\n$EndEntities\n"
+             "$Nodes\n1 4 10 40\n3 1 0 4\n10\n20\n30\n40\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n$EndNodes\n"
+             "$Elements\n1 1 2 2\n3 1 4 1\n2 10 20 30 40\n$EndElements\n"
+             "$NodeData\n1\n\"u\"\n1\n0.5\n3\n0\n3\n1\n10 0 0 0\n$EndNodeData\n");
+  write_file(directory, vtu, R"(<VTKFile type="UnstructuredGrid" version="1.0"><UnstructuredGrid>
+<Piece NumberOfPoints="4" NumberOfCells="1">
+<Points><DataArray type="Float64" NumberOfComponents="3" format="ascii">0 0 0 1 0 0 0 1 0 0 0 1</DataArray></Points>
+<Cells><DataArray type="Int64" Name="connectivity" format="ascii">0 1 2 3</DataArray>
+<DataArray type="Int64" Name="offsets" format="ascii">4</DataArray>
+<DataArray type="UInt8" Name="types" format="ascii">10</DataArray></Cells>
+</Piece></UnstructuredGrid></VTKFile>)");
+  write_file(directory, xdmf, R"(<Xdmf Version="3.0"><Domain><Grid>
+<Topology TopologyType="Tetrahedron" NumberOfElements="1">
+<DataItem Dimensions="1 4" Format="XML" NumberType="Int">0 1 2 3</DataItem></Topology>
+<Geometry GeometryType="XYZ"><DataItem Dimensions="4 3" Format="XML">0 0 0 1 0 0 0 1 0 0 0 1</DataItem></Geometry>
+</Grid></Domain></Xdmf>)");
+  write_file(directory, mesh, R"(format = "diastole-mesh"
+version = 1
+[[node]]
+x_mm = [0, 1, 0, 0, 0, 0, 0, 0]
+y_mm = [0, 0, 1, 0, 0, 0, 0, 0]
+z_mm = [0, 0, 0, 0, 1, 0, 0, 0]
+fibre_deg = 60.0
+shares = ["value 1"]
+zero = ["d1"]
+[[element]]
+nodes = [1, 1, 1, 1, 1, 1, 1, 1]
+faces = ["inner xi3=0", "outer xi3=1"]
+)");
+  write_file(directory, exfiles,
+             R"(Group name: a
+ #Fields=1
+ 1) coordinates, coordinate, rectangular cartesian, #Components=3
+ x. Value index=1, #Derivatives=7(d/ds1,d/ds2,d2/ds1ds2,d/ds3,d2/ds1ds3,d2/ds2ds3,d3/ds1ds2ds3)
+Node: 1
+ 0 1 0 0 0 0 0 0
+)"
+             "\f"
+             R"(Group name: a
+Shape. Dimension=3
+#Scale factor sets=0
+#Nodes=8
+Element: 1 0 0
+ Nodes:
+ 1 1 1 1 1 1 1 1
+)");
+  const Bytes image = flash_test::make_update_file({});
+  write_file(directory, update, {reinterpret_cast<const char*>(image.data()), image.size()});
+  const std::filesystem::path key_file = directory / "seed-key.pem";
+  std::filesystem::remove(key_file);
+  (void)signing::make_key_file(key_file);
+  write_file(directory, key, read_whole_file(key_file));
+  std::filesystem::remove(key_file);
+  write_file(directory, elf,
+             std::string("\x7f"
+                         "ELF\1\1\1\0\0\0\0\0\0\0\0\0\2\0\x28\0\1\0\0\0",
+                         24));
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -194,5 +309,6 @@ int main(int argc, char** argv) {
   write_journals(directory);
   write_runfile_scripts(directory);
   write_images(directory);
+  write_files(directory);
   return 0;
 }

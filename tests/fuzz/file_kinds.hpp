@@ -1,0 +1,31 @@
+#pragma once
+// What fuzz_files reads; the numbers stand in its corpus, so new ones go to the end.
+
+namespace diastole::fuzz {
+
+enum class FileKind : unsigned char {
+  rig,
+  experiment,
+  waveform,
+  study,
+  frame_table,
+  tag_table,
+  point_table,
+  fibre_table,
+  mesh,
+  exfiles,  ///< exnode, form feed, exelem
+  effect,
+  law,
+  fit,
+  tracking,
+  flow,
+  gmsh,
+  vtu,
+  xdmf,
+  update,
+  key,
+  elf,
+  count
+};
+
+}  // namespace diastole::fuzz
