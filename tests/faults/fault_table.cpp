@@ -4,6 +4,8 @@
 #include <gtest/gtest.h>
 
 #include <cstdlib>
+#include <fstream>
+#include <string>
 #include <vector>
 
 namespace diastole::faults {
@@ -34,6 +36,18 @@ class PrintsTheTable final : public testing::Environment {
       "operation (test_sim_board_every_power_cut), damaged frames of every message (fuzz_wire).";
 };
 
+/// Whether docs/daemon.md has the row; with the full counts also how often it was tried and survived.
+bool is_documented(const FaultRow& row) {
+  const bool in_full = trials(0, 1) == 1;
+  const std::string counts = fmt::format("| {} | {} |", row.tried, row.survived);
+  std::ifstream document(DIASTOLE_SOURCE_DIR "/docs/daemon.md");
+  for (std::string line; std::getline(document, line);)
+    if (line.starts_with(fmt::format("| {} |", row.fault)) &&
+        (!in_full || line.find(counts) != std::string::npos))
+      return true;
+  return false;
+}
+
 const testing::Environment* const registered = testing::AddGlobalTestEnvironment(new PrintsTheTable);
 
 }  // namespace
@@ -41,6 +55,7 @@ const testing::Environment* const registered = testing::AddGlobalTestEnvironment
 void add_to_table(const FaultRow& row) {
   rows().push_back(row);
   EXPECT_EQ(row.survived, row.tried) << row.fault;
+  EXPECT_TRUE(is_documented(row)) << row.fault << ": docs/daemon.md has no such row, or other counts";
 }
 
 int trials(int quick, int full) {

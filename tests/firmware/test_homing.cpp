@@ -184,6 +184,30 @@ TEST(Jog, TellsWhichLimitItWouldExceed) {
   EXPECT_EQ(bench.state(), State::homed);
 }
 
+TEST(Lease, NothingMovesByTheOrderOfAnother) {
+  Bench bench;
+  bench.connect();
+  ASSERT_TRUE(bench.ask(wire::Configure::example()));
+  const auto expect_refused = [&](const auto& order, State state) {
+    EXPECT_FALSE(bench.ask(order));
+    EXPECT_EQ(bench.heard.naks.back().refusal, Refusal::no_lease);
+    bench.run_for(microseconds(100'000));
+    EXPECT_EQ(bench.state(), state);
+  };
+  const auto stood_at = bench.rig.mechanical_microsteps();
+  expect_refused(wire::Home{0, Bench::kLease + 1}, State::unhomed);
+  expect_refused(wire::Jog{0, Bench::kLease + 1, 1'000'000, 1000}, State::unhomed);
+  EXPECT_EQ(bench.rig.mechanical_microsteps(), stood_at);
+  ASSERT_TRUE(bench.ask(wire::Home{0, Bench::kLease}));
+  ASSERT_TRUE(bench.run_until([&] { return bench.state() == State::homed; }, microseconds(60'000'000)));
+  bench.add_segment(wire::Waveform::parabolic, 2, 2'000'000, 1'500'000);
+  ASSERT_TRUE(bench.ask(wire::Arm::example()));
+  ASSERT_EQ(bench.state(), State::armed);
+  expect_refused(wire::Start{0, Bench::kLease + 1}, State::armed);
+  EXPECT_EQ(bench.rig.position_microsteps(), 0);
+  EXPECT_TRUE(bench.ask(wire::Start{0, Bench::kLease})) << "by its own lease it runs";
+}
+
 TEST(Jog, UnhomedItCreepsAwayFromAClosedSwitchButNotTowardsIt) {
   Bench bench(standing_at(-20));
   bench.connect();

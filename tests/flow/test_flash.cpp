@@ -7,14 +7,18 @@
 #include <unistd.h>
 
 #include <filesystem>
+#include <fstream>
+#include <iterator>
 
 #include "tests/flow/programs.hpp"
+#include "tests/flow/rig_with_daemon.hpp"
 #include "tests/host/flash/update_files.hpp"
 
 namespace diastole::flow {
 namespace {
 
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 const std::string built = DIASTOLE_SOURCE_DIR "/build/firmware/";
 const std::string factory_image = built + "bin/diastole-stm32f405.bin";
@@ -137,6 +141,24 @@ TEST(FlashCommand, SaysToStopTheDaemonWhenThePortIsTaken) {
   ::close(taken);
   board.signal(SIGINT);
   (void)board.wait();
+}
+
+/// The emulated chip behind the real daemon, with the image that is flashed; and the same with its bootloader's key erased.
+TEST(Status, SaysOfAControllerWithoutAKeyThatItIsNotLocked) {
+  NEEDS_UPDATE_IMAGES();
+  const auto said_of = [](const std::string& image) {
+    RigWithDaemon rig(RigWithDaemon::Time::conducted, source_text("examples/rig.toml"), {"--image", image});
+    rig.start_daemon();
+    return run(rig.place, {"diastole", "status", "--socket", rig.path("socket")}).out;
+  };
+  EXPECT_THAT(said_of(factory_image), Not(HasSubstr("NOT LOCKED")));
+  constexpr size_t key_at = 0x3FE0, key_bytes = 32;  // memory_map.hpp
+  std::ifstream file(factory_image, std::ios::binary);
+  std::string image{std::istreambuf_iterator<char>(file), {}};
+  image.replace(key_at, key_bytes, key_bytes, '\xFF');
+  const Workplace workplace;
+  workplace.write("open.bin", image);
+  EXPECT_THAT(said_of((workplace / "open.bin").string()), HasSubstr("NOT LOCKED"));
 }
 
 }  // namespace
