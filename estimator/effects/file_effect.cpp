@@ -291,6 +291,7 @@ rig::LossMaker loss_of(const Bound& bound) {
 void add_law(const Bound& bound, rig::RigModel& model) {
   switch (bound.laws->file.laws.front().sets) {
     case Out::V_piston:
+      // V_command is what was commanded: before the screw's own error.
       model.turns.emplace_back([bound](rig::DriveTrace& trace, const rig::RunPlace& place) {
         if (bound.concerns(place)) drive(bound, trace, place);
       });

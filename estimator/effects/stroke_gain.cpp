@@ -21,6 +21,7 @@ Effect stroke_gain_effect() {
       .apply =
           [](EffectValues values, const EffectContext&, rig::RigModel& model) {
             const double factor = 1.0 + values[0];
+            // Of turns, as steps that are counted wrong are: the angle of the screw's own error goes with it. A bore alone would leave it.
             model.turns.emplace_back([factor](rig::DriveTrace& trace, const rig::RunPlace&) {
               for (auto* series : {&trace.volume_mL, &trace.flow_mL_per_s, &trace.acceleration_mL_per_s2})
                 for (double& value : *series)

@@ -32,6 +32,10 @@ RecordedRun run_of_three_cycles() {
   return run;
 }
 
+Comparison compare(const RecordedRun& recorded, const RecordedRun& replayed) {
+  return replay::compare({recorded, runfile::rows_of(recorded)}, {replayed, runfile::rows_of(replayed)});
+}
+
 TEST(ReplayCompare, ARunEqualsItselfWhateverTheStartPhase) {
   const RecordedRun run = run_of_three_cycles();
   RecordedRun later = run;
@@ -186,13 +190,13 @@ TEST(ReplayCompare, RowsAreReadBlockByBlockAndToTheirEnd) {
   size_t largest_block = 0;
   const auto usual = [](size_t row) { return 0.25 * static_cast<double>(row % 9); };
   const runfile::RunFile run = run_elsewhere(largest_block, usual);
-  const Comparison same = compare(run, run);
+  const Comparison same = replay::compare(run, run);
   EXPECT_TRUE(same.equal());
   EXPECT_LE(largest_block, runfile::Series::block_rows);
-  const Comparison off = compare(run, run_elsewhere(largest_block, [&](size_t row) {
-                                   if (row == 50'000) return std::nan("");
-                                   return usual(row) + (row == 40'000 || row == 59'999 ? 0.5 : 0.0);
-                                 }));
+  const Comparison off = replay::compare(run, run_elsewhere(largest_block, [&](size_t row) {
+                                           if (row == 50'000) return std::nan("");
+                                           return usual(row) + (row == 40'000 || row == 59'999 ? 0.5 : 0.0);
+                                         }));
   EXPECT_FALSE(off.pressure_equal || off.missing_equal);
   EXPECT_THAT(off.first->text, HasSubstr("cavity_kPa of sample 40000"));
   EXPECT_EQ(off.first->cycle, 1);

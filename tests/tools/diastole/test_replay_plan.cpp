@@ -43,6 +43,10 @@ RecordedRun recorded() {
   return run;
 }
 
+ReplayPlan plan_replay(const RecordedRun& run, const PlanOptions& options = {}) {
+  return replay::plan_replay({run, runfile::rows_of(run)}, options);
+}
+
 RigConfig rig_of(const ReplayPlan& plan) {
   return read_rig(TableReader::from_text(plan.rig_toml, "replay.rig.toml"));
 }

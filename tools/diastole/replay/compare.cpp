@@ -374,9 +374,4 @@ Comparison compare(const RunFile& recorded, const RunFile& replayed) {
   return Comparer(recorded, replayed).run();
 }
 
-Comparison compare(const RecordedRun& recorded, const RecordedRun& replayed) {
-  return compare(RunFile{recorded, runfile::rows_of(recorded)},
-                 RunFile{replayed, runfile::rows_of(replayed)});
-}
-
 }  // namespace diastole::replay

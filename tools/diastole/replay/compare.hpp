@@ -67,7 +67,5 @@ struct Comparison {
 };
 
 Comparison compare(const runfile::RunFile& recorded, const runfile::RunFile& replayed);
-/// The same of runs in memory.
-Comparison compare(const runfile::RecordedRun& recorded, const runfile::RecordedRun& replayed);
 
 }  // namespace diastole::replay

@@ -155,8 +155,4 @@ ReplayPlan plan_replay(const RunFile& file, const PlanOptions& options) {
   return plan;
 }
 
-ReplayPlan plan_replay(const RecordedRun& run, const PlanOptions& options) {
-  return plan_replay({run, runfile::rows_of(run)}, options);
-}
-
 }  // namespace diastole::replay

@@ -42,8 +42,6 @@ struct PlanOptions {
 
 /// Throws InputError that says what the file lacks.
 ReplayPlan plan_replay(const runfile::RunFile& run, const PlanOptions& options = {});
-/// The same of a run in memory.
-ReplayPlan plan_replay(const runfile::RecordedRun& run, const PlanOptions& options = {});
 
 /// What shows that something began before, at a time that the file does not hold: lease_lost, or the loss of a
 /// controller that was reset.
