@@ -30,7 +30,7 @@ class AnySpecimen final : public ImagedSpecimen {
  public:
   AnySpecimen(const Study& study, const FieldProgress& progress)
       : progress_(progress),
-        problem_(study, [this] { report(""); }),
+        problem_(study, [this](const std::string& text) { report(text); }),
         effects_(problem_.specimen().effects()),
         volume_mm3_(volume_mm3(problem_.mesh())) {}
 

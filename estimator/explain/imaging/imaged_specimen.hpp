@@ -21,7 +21,7 @@ class ImagedSpecimen {
  public:
   virtual ~ImagedSpecimen() = default;
 
-  /// Throws InputError where the start values carry no equilibrium. All else wants it first.
+  /// Throws InputError where the base model has no equilibrium. All else wants it first.
   virtual void fit_base() = 0;
   /// Multiplies the tags' sigmas; the base is to be fitted again.
   virtual void widen_sigmas(double factor) = 0;

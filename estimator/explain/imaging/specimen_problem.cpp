@@ -42,8 +42,8 @@ std::vector<double> values_of(const FieldFit& fit) {
 
 }  // namespace
 
-SpecimenProblem::SpecimenProblem(const Study& study, std::function<void()> alive)
-    : alive_(std::move(alive)),
+SpecimenProblem::SpecimenProblem(const Study& study, std::function<void(const std::string&)> report)
+    : report_(std::move(report)),
       study_(study),
       specimen_(study),
       estimated_(estimated_parameters(study, specimen_.with({}))) {
@@ -76,12 +76,14 @@ void SpecimenProblem::fit_base() {
   FitOptions options;
   options.file = study_.file.string();
   options.locator = field_.locator;
-  options.on_step = [this](const inference::SearchStep&) { alive_(); };
+  options.on_step = [this](const inference::SearchStep&) { report_(""); };
   ChangedMotion motion(changes_of({}, specimen_), estimated_.groups, {});
   std::vector<std::string> remarks;
   const FitOutcome outcome =
       fit_from_where_it_stands(motion, estimated_, field_.measurement, options, remarks);
   if (outcome.history.empty() || outcome.frames.empty()) refuse_base(outcome.reason);
+  for (const std::string& remark : remarks)
+    report_(remark);
   if (outcome.robust) loss_ = outcome.robust->loss;
   for (const EstimatedValue& value : outcome.values)
     base_.law.push_back(value.value);
@@ -108,7 +110,7 @@ void SpecimenProblem::find_tolerances() {
   if (errors.empty()) return;
   MatrixXd columns(rows_->size(), static_cast<Index>(errors.size()));
   for (size_t slot = 0; slot < base_.pressures_kPa.size(); ++slot) {
-    alive_();
+    report_("");
     const ChangedMotion::Equilibrium at = base_motion_->equilibrium(slot);
     const std::vector<ConsideredMotion> motions = considered_motions(at.body, at.state, errors);
     std::vector<const NodeField*> motion, reference;
@@ -189,7 +191,7 @@ FieldFit SpecimenProblem::fit(const FieldChoice& choice, const FieldFit& from) {
   options.iteration_limit = iteration_limit;
   options.refusal_limit = 12;
   options.small_gain = [](double) { return worth_a_step; };
-  options.on_step = [this](const inference::SearchStep&) { alive_(); };
+  options.on_step = [this](const inference::SearchStep&) { report_(""); };
   const inference::SearchResult found = inference::minimise(problem, start, options);
   if (found.residuals.size() == 0 || !problem.residuals(found.q)) return result;
   take(found, problem, result);
@@ -221,7 +223,7 @@ std::optional<VectorXd> SpecimenProblem::correction_at(const FieldFit& fit) {
   const std::vector<double> values = values_of(fit);
   std::vector<NodeField> position_mm;
   for (size_t slot = 0; slot < fit.pressures_kPa.size(); ++slot) {
-    alive_();
+    report_("");
     MotionOutcome outcome = own.solve(slot, values, fit.pressures_kPa[slot]);
     if (!outcome.position_mm) return {};
     position_mm.push_back(*std::move(outcome.position_mm));
@@ -293,7 +295,7 @@ void SpecimenProblem::take(const inference::SearchResult& found, JointProblem& p
 MatrixXd SpecimenProblem::columns_of(const std::vector<ChangedMotion::Perturbation>& changes) {
   MatrixXd columns(rows_->size(), static_cast<Index>(changes.size()));
   for (size_t slot = 0; slot < base_.pressures_kPa.size(); ++slot) {
-    alive_();
+    report_("");
     const std::vector<NodeField> fields = base_motion_->by_changes(slot, changes);
     columns.middleRows(rows_->first(slot), rows_->count(slot)) =
         rows_->columns(slot, mesh(), pointers_to(fields));

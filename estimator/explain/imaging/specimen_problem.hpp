@@ -20,10 +20,12 @@ namespace diastole::explain {
 
 class SpecimenProblem {
  public:
-  /// `alive` is called often; what it throws ends a fit. Throws InputError as `fit` does for the study, and if no frame is inflated.
-  SpecimenProblem(const Study& study, std::function<void()> alive);
+  /// `report` is called often, with a text where there is something to say; what it throws ends a fit. Throws InputError as `fit` does
+  /// for the study, and if no frame is inflated.
+  SpecimenProblem(const Study& study, std::function<void(const std::string&)> report);
 
-  /// The base model; all else wants it first. Throws InputError where it has no equilibrium.
+  /// The base model; all else wants it first. It begins stiffer where the start values carry no load, and reports that. Throws InputError
+  /// where nothing within the bounds does.
   void fit_base();
   /// A choice, from the law's values and pressures of another fit. chi2 is infinite where it has no solution.
   [[nodiscard]] FieldFit fit(const FieldChoice& choice, const FieldFit& from);
@@ -68,7 +70,7 @@ class SpecimenProblem {
   void correct_mesh();
   void find_tolerances();
 
-  std::function<void()> alive_;
+  std::function<void(const std::string&)> report_;
   Study study_;
   ChangeableSpecimen specimen_;
   EstimatedParameters estimated_;

@@ -1,11 +1,12 @@
 // Effects of any specimen, on a ventricle: neutral, and differentiable.
 
-#include <gtest/gtest.h>
+#include <gmock/gmock.h>
 
 #include <algorithm>
 #include <cmath>
 
 #include "estimator/explain/imaging/explain_field.hpp"
+#include "estimator/explain/imaging/imaged_specimen.hpp"
 #include "estimator/fit/changed_motion.hpp"
 #include "estimator/mesh/node_field.hpp"
 #include "estimator/model/changed_specimen.hpp"
@@ -125,6 +126,18 @@ TEST(SmallVentricle, WithPressuresThatAreOffIsExplainedAndItsStiffnessMended) {
   EXPECT_LT(found.gap.after, 0.5 * found.gap.before);
   const explain::ParameterShift& C = found.shifts.front();
   EXPECT_NEAR(C.after, 3.0, 3.0 * C.after_error);
+}
+
+TEST(AnySpecimen, BeginsStifferWhereTheStartCarriesNoLoad) {
+  const test::ScratchFolder folder;
+  Study study = test::simulated({.points = 100, .mesh = "4, 3, 1"}, folder.path());
+  std::get<EllipsoidSpecimen>(study.specimen).mesh = {4, 3, 1};
+  set_start(study, "C_kPa=0.2");
+  std::string said;
+  const auto specimen = explain::any_specimen(study, [&](const std::string& text) { said += text; });
+  specimen->fit_base();
+  EXPECT_THAT(said, testing::HasSubstr("the body does not carry the pressures: the search began at"));
+  EXPECT_NEAR(specimen->base().chi_square / static_cast<double>(specimen->rows().size()), 1.0, 0.3);
 }
 
 }  // namespace
