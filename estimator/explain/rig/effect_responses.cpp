@@ -1,7 +1,6 @@
 #include "estimator/explain/rig/effect_responses.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <utility>
 
@@ -19,17 +18,7 @@ struct Variant {
   double sign;
 
   [[nodiscard]] std::vector<double> values(const std::vector<double>& neutral, double size) const {
-    std::vector<double> list;
-    for (size_t j = 0; j < neutral.size(); ++j) {
-      const EffectParameter& parameter = effect->parameters()[j];
-      if (is_amplitude(*effect, j)) {
-        list.push_back(grows[j] ? rig::sized_value(parameter, neutral[j], sign * size) : neutral[j]);
-      } else {
-        list.push_back(parameter.typical);
-      }
-      if (!(list.back() >= parameter.lower && list.back() <= parameter.upper)) return {};
-    }
-    return list;
+    return sized_values(*effect, neutral, grows, sign * size);
   }
 };
 
@@ -51,7 +40,6 @@ std::vector<Variant> variants_of(const Effect& effect) {
   return list;
 }
 
-constexpr std::array first_sizes{1.0, 4.0, 16.0};
 constexpr double smaller = 0.25;  ///< of the smallest of them
 constexpr double alike = 0.9;     ///< cosine
 constexpr double visible = 3.0;   ///< sds in all: less cannot be told from nothing
@@ -96,6 +84,21 @@ bool is_in_proportion(const Sized& one, const Sized& larger, const VectorXd& sca
 bool is_amplitude(const Effect& effect, size_t parameter) {
   const EffectParameter& at = effect.parameters()[parameter];
   return parameter == 0 || (at.scale == SearchScale::linear && at.neutral == 0.0 && at.lower == 0.0);
+}
+
+std::vector<double> sized_values(const Effect& effect, const std::vector<double>& neutral,
+                                 const std::vector<bool>& grows, double size) {
+  std::vector<double> list;
+  for (size_t j = 0; j < neutral.size(); ++j) {
+    const EffectParameter& parameter = effect.parameters()[j];
+    if (is_amplitude(effect, j)) {
+      list.push_back(grows[j] ? rig::sized_value(parameter, neutral[j], size) : neutral[j]);
+    } else {
+      list.push_back(parameter.typical);
+    }
+    if (!(list.back() >= parameter.lower && list.back() <= parameter.upper)) return {};
+  }
+  return list;
 }
 
 std::vector<Response> effect_responses(const rig::SessionProblem& problem, const rig::LinearisedModel& known,

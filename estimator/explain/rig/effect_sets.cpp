@@ -10,6 +10,7 @@
 #include "estimator/explain/rig/changed_parts.hpp"
 #include "estimator/explain/rig/event_scan.hpp"
 #include "estimator/explain/rig/set_fit.hpp"
+#include "estimator/explain/rig/synergy_scan.hpp"
 #include "estimator/rig_fit/base_fit.hpp"
 
 namespace diastole::explain {
@@ -141,6 +142,7 @@ class SetsSearch {
     return best;
   }
   void fit_beside_best();
+  void fit_synergies();
   void fit_from_better_part(const std::vector<size_t>& responses);
   void fit_best_again(size_t effects);
   [[nodiscard]] bool relieves(const Effect* effect, const EffectSet& set) const;
@@ -257,6 +259,19 @@ void SetsSearch::fit_beside_best() {
   }
 }
 
+/// Pairs whose effects only show together, where what has been found leaves more than the model's error is likely to be.
+void SetsSearch::fit_synergies() {
+  constexpr double surprising = 2.0;  // sds
+  sort_sets();
+  if (sets_.empty() || std::ranges::max(sets_.front().evidence.surprise(problem_.error().prior)) < surprising)
+    return;
+  for (const SessionModel& start : scan_synergies(problem_, base_)) {
+    const std::span added_terms = std::span(start.terms).subspan(options_.terms.size());
+    if (!is_fitted({added_terms[0].effect, added_terms[1].effect}))
+      fit(start, base_, problem_.error().prior.share);
+  }
+}
+
 /// Is more than half of what an effect changes what a tolerance changes that is so far off in a set that the effect may be the more
 /// probable of both? What the two leave of each other no linear algebra tells: their curvature is more.
 bool SetsSearch::relieves(const Effect* effect, const EffectSet& set) const {
@@ -361,6 +376,7 @@ SetSearch SetsSearch::run() {
       if (is_worth_fitting(pairs, i, least)) fit(pairs[i].responses);
   }
   fit_beside_best();
+  fit_synergies();
   report("fitting the best pairs again");
   fit_best_again(2);
   double sum = 0.0;

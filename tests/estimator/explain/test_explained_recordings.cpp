@@ -1,5 +1,6 @@
 // `diastole explain`, the program, on recordings of independent programs from two worlds (tests/data/rig: exact models;
-// tests/data/rig2: parts with tolerances), in which is known what was hidden.
+// tests/data/rig2: parts with tolerances), in which is known what was hidden; and on the session of tools/demo, recorded on the
+// project's own simulated rig.
 
 #include <gmock/gmock.h>
 
@@ -15,7 +16,7 @@ namespace diastole {
 namespace {
 
 struct Case {
-  std::string name;  ///< folder and file: "rig/case-054"
+  std::string name;  ///< folder and file: "rig/case-054", or an absolute path
   std::string what;  ///< "SoftHose"
   std::vector<std::string> verdicts;
   std::vector<std::string> effects;  ///< if it is named
@@ -62,6 +63,10 @@ INSTANTIATE_TEST_SUITE_P(
     testing::Values(Case{"rig/case-030", "OneRunWithNothingHidden", {"none"}, {}},
                     Case{"rig/case-028", "NothingHidden", {"none"}, {}},
                     Case{"rig/case-054", "SoftHose", {"named"}, {"hose-compliance"}},
+                    Case{DIASTOLE_SOURCE_DIR "/examples/paper-gap",
+                         "ASoftHoseBehindAThrottle",
+                         {"named"},
+                         {"hose-compliance", "hose-loss-excess"}},
                     Case{"rig2/r2-07", "NothingHiddenInARealRig", {"none", "unexplained"}, {}},
                     Case{"rig2/r2-06", "Leak", {"named"}, {"cannula-leak-cavity"}},
                     Case{"rig2/r2-08", "Softening", {"named"}, {"stress-softening"}},
