@@ -189,11 +189,15 @@ std::vector<StatedEffect> stated_effects(const Study& study, const Session& sess
       stated.values.push_back(value);
     }
     if (given == study.effect_values.end()) continue;
-    for (const StudyMoment& moment : given->moments)
-      for (const SessionRun& run : session.runs)
-        if (run.drive.place.name == moment.run)
-          stated.change_points.push_back(
-              {moment.run, moment.time_s, run.drive.place.started_s + moment.time_s});
+    for (const StudyMoment& moment : given->moments) {
+      const auto in = std::ranges::find(session.runs, moment.run,
+                                        [](const SessionRun& run) { return run.drive.place.name; });
+      if (in == session.runs.end())
+        throw InputError({study.file.string(), "model.moments." + id,
+                          fmt::format("the study has no run \"{}\"", moment.run),
+                          "Name one of data.runs, without .run.h5."});
+      stated.change_points.push_back({moment.run, moment.time_s, in->drive.place.started_s + moment.time_s});
+    }
   }
   return list;
 }

@@ -1,6 +1,7 @@
 #include "estimator/model/study_effects.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <map>
@@ -26,8 +27,29 @@ EffectLibrary effects_known_to(const Study& study) {
   return library;
 }
 
+namespace {
+
+void require_known_parameters(const Study& study, const Effect& effect) {
+  const auto stated = std::ranges::find(study.effect_values, effect.text().id, &StudyEffect::id);
+  if (stated == study.effect_values.end()) return;
+  std::vector<std::string> known;
+  for (const auto& parameters : {effect.parameters(), effect.field_parameters()})
+    for (const EffectParameter& parameter : parameters)
+      if (std::ranges::count(known, parameter.name) == 0) known.emplace_back(parameter.name);
+  for (const auto& [name, start] : stated->starts)
+    if (std::ranges::count(known, name) == 0)
+      refuse(study, fmt::format("model.parameters.{}.{}", effect.text().id, name),
+             "the effect has no such parameter",
+             did_you_mean(name, known) + fmt::format("It has {}.", fmt::join(known, ", ")));
+}
+
+}  // namespace
+
 const Effect& effect_named(const EffectLibrary& library, const Study& study, const std::string& id) {
-  if (const Effect* effect = library.find(id)) return *effect;
+  if (const Effect* effect = library.find(id)) {
+    require_known_parameters(study, *effect);
+    return *effect;
+  }
   std::vector<std::string> ids;
   for (const Effect* effect : library.all())
     ids.emplace_back(effect->text().id);

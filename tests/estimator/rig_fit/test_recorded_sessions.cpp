@@ -1,12 +1,13 @@
 // The base model against recordings of another program in which nothing is hidden (tests/data/rig): whatever is
 // left over there is the model's fault, and every later explanation would be wrong by it.
 
-#include <gtest/gtest.h>
+#include <gmock/gmock.h>
 
 #include <Eigen/LU>
 #include <cmath>
 
 #include "estimator/rig_fit/base_fit.hpp"
+#include "tests/estimator/io/scratch_file.hpp"
 #include "tests/recorded_data.hpp"
 
 namespace diastole::rig {
@@ -32,6 +33,24 @@ TEST(RecordedSessions, WithNothingHiddenTheBaseModelErrsLessThanStated) {
     ASSERT_LT(SharePrior::least[0], 0.3 * problem.error().prior.share[0]);
     EXPECT_LT(fit.shares[0], 0.3 * problem.error().prior.share[0]) << name;
   }
+}
+
+TEST(RecordedSessions, StatedEffectsHaveTheParametersAndRunsThatTheyName) {
+  Study study = read_study(test::recorded("rig/case-030/case-030.study.toml"));
+  const Session session = read_session(study);
+  const auto message = [&](StudyEffect stated) {
+    study.effects = {stated.id};
+    study.effect_values = {std::move(stated)};
+    return test::message_of([&] { (void)stated_effects(study, session); });
+  };
+  EXPECT_EQ(message({"hose-compliance", {{"wave_speed_m_s", 50.0}}, {}}), "(no error)");
+  EXPECT_THAT(message({"hose-compliance", {{"wave_sped_m_s", 50.0}}, {}}),
+              testing::AllOf(testing::HasSubstr("model.parameters.hose-compliance.wave_sped_m_s"),
+                             testing::HasSubstr("wave_speed_m_s")));
+  const std::string run = session.runs.front().drive.place.name;
+  EXPECT_EQ(message({"sensor-offset", {}, {{run, 12.0}}}), "(no error)");
+  EXPECT_THAT(message({"sensor-offset", {}, {{"another", 12.0}}}),
+              testing::HasSubstr("the study has no run \"another\""));
 }
 
 }  // namespace
