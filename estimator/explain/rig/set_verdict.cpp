@@ -264,9 +264,11 @@ SetVerdict judge_sets(const rig::SessionProblem& problem, const SetSearch& searc
   // Hints alone need no search that settled: nothing is named by it.
   const bool is_more = leading->first.size() > search.given;
   if (is_more) out.searches.push_back({best.ids(), best.termination});
-  // That nothing is wrong holds without the hints or with them.
-  const bool borne = is_more ? bears_a_name(problem, best, sizes[out.chosen])
-                             : bears_nothing_wrong(problem, *plain) || bears_nothing_wrong(problem, best);
+  // That nothing is wrong holds with the hints or, unless the data exclude it, without them.
+  const bool may_be_plain = search.probability[static_cast<size_t>(plain - search.sets.begin())] >= told;
+  const bool borne =
+      is_more ? bears_a_name(problem, best, sizes[out.chosen])
+              : bears_nothing_wrong(problem, best) || (may_be_plain && bears_nothing_wrong(problem, *plain));
   out.scatter = rig::cycle_scatter(problem, best.model);
   if (is_more) out.held_out_gain = held_out_gain(problem, *plain, best);
   const bool predicted = !is_more || predicts(*out.held_out_gain, best.model.terms.size() - search.given);
