@@ -8,11 +8,12 @@ target_compile_options(diastole_options INTERFACE
 target_compile_options(diastole_options INTERFACE
   "$<$<AND:$<CONFIG:Release>,$<CXX_COMPILER_ID:GNU>>:-Wno-array-bounds;-Wno-stringop-overflow;-Wno-restrict>")
 
-# diastole_prelude(NAME HEADER [PACKAGES fmt::fmt ...])
+# diastole_prelude(NAME HEADER [PACKAGES fmt::fmt ...] [LIBS x ...])
 # Precompiles cmake/preludes/HEADER with the options of this folder. What is declared in this folder from here on, and in
-# those below it, begins with these headers; whoever needs one includes it all the same.
+# those below it, begins with these headers; whoever needs one includes it all the same. LIBS hold what the headers only
+# declare.
 function(diastole_prelude name header)
-  cmake_parse_arguments(ARG "" "" "PACKAGES" ${ARGN})
+  cmake_parse_arguments(ARG "" "" "PACKAGES;LIBS" ${ARGN})
   set(source ${CMAKE_CURRENT_BINARY_DIR}/${name}.cpp)
   file(CONFIGURE OUTPUT ${source} CONTENT "// Owns precompiled headers.\n")
   add_library(${name} OBJECT ${source})
@@ -21,12 +22,14 @@ function(diastole_prelude name header)
   target_precompile_headers(${name} PRIVATE "\"cmake/preludes/${header}\"")
   set(DIASTOLE_PRELUDE ${name} PARENT_SCOPE)
   set(DIASTOLE_PRELUDE_PACKAGES ${ARG_PACKAGES} PARENT_SCOPE)
+  set(DIASTOLE_PRELUDE_LIBS ${ARG_LIBS} PARENT_SCOPE)
 endfunction()
 
 # The headers that the folder's prelude precompiles are found, and seen with the same macros, by every target of the folder.
 function(diastole_use_prelude name)
   if(DIASTOLE_PRELUDE)
     target_precompile_headers(${name} REUSE_FROM ${DIASTOLE_PRELUDE})
+    target_link_libraries(${name} PRIVATE ${DIASTOLE_PRELUDE_LIBS})
     foreach(package IN LISTS DIASTOLE_PRELUDE_PACKAGES)
       target_compile_definitions(${name} PRIVATE $<TARGET_PROPERTY:${package},INTERFACE_COMPILE_DEFINITIONS>)
       target_compile_options(${name} PRIVATE $<TARGET_PROPERTY:${package},INTERFACE_COMPILE_OPTIONS>)

@@ -1,5 +1,4 @@
 // What the estimator's files begin with.
 #pragma once
-#include <Eigen/Dense>
-
+#include "cmake/preludes/eigen_decompositions.hpp"
 #include "cmake/preludes/text.hpp"
