@@ -10,6 +10,7 @@
 #include "estimator/explain/rig/changed_parts.hpp"
 #include "estimator/explain/rig/event_scan.hpp"
 #include "estimator/explain/rig/set_fit.hpp"
+#include "estimator/explain/rig/set_verdict.hpp"
 #include "estimator/explain/rig/synergy_scan.hpp"
 #include "estimator/rig_fit/base_fit.hpp"
 
@@ -261,9 +262,9 @@ void SetsSearch::fit_beside_best() {
 
 /// Pairs whose effects only show together, where what has been found leaves more than the model's error is likely to be.
 void SetsSearch::fit_synergies() {
-  constexpr double surprising = 2.0;  // sds
   sort_sets();
-  if (sets_.empty() || std::ranges::max(sets_.front().evidence.surprise(problem_.error().prior)) < surprising)
+  if (sets_.empty() ||
+      std::ranges::max(sets_.front().evidence.surprise(problem_.error().prior)) < least_surprise(1))
     return;
   for (const SessionModel& start : scan_synergies(problem_, base_)) {
     const std::span added_terms = std::span(start.terms).subspan(options_.terms.size());

@@ -22,12 +22,6 @@ constexpr double least_probability = 0.05;  ///< of a set that is told of
 /// How seldom any part of a model's error may be as large by chance: two sds of one.
 constexpr double surprising_by_chance = 0.0228;
 
-/// From how many sds on the largest of so many shares is a surprise: each of them may be by chance.
-double least_surprise(size_t parts) {
-  return boost::math::quantile(
-      boost::math::complement(boost::math::normal(), surprising_by_chance / static_cast<double>(parts)));
-}
-
 struct Sizes {
   std::vector<double> over_error;
   std::vector<bool> material;
@@ -71,6 +65,11 @@ bool is_tolerance(const rig::SessionProblem& problem, const EffectSet& set, cons
 }
 
 }  // namespace
+
+double least_surprise(size_t parts) {
+  return boost::math::quantile(
+      boost::math::complement(boost::math::normal(), surprising_by_chance / static_cast<double>(parts)));
+}
 
 ChangeSize size_of_change(const rig::SessionProblem& problem, const EffectSet& set, const VectorXd& change) {
   const Eigen::MatrixXd basic = set.known.columns.leftCols(rig::basic_nuisances);
