@@ -69,7 +69,7 @@ function(diastole_listed variable list macro)
   set(${variable} ${sources} PARENT_SCOPE)
 endfunction()
 
-# For what reads, writes and shows text or waits for devices: GCC takes a third less time for it than with -O3.
+# For what reads, writes and shows text or waits for devices: compiled sooner than with -O3.
 set(DIASTOLE_TEXT_OPTIONS $<$<CONFIG:Release>:-O1>)
 
 # diastole_program(NAME SOURCES a.cpp ... [LIBS x ...])  — lands in build/<preset>/bin

@@ -214,8 +214,7 @@ std::string_view name_of(Signal signal) {
   return names[static_cast<size_t>(signal)];
 }
 
-SegmentFeatures::SegmentFeatures(const Session& session, const NoiseModel& noise, size_t threads)
-    : session_(session) {
+SegmentFeatures::SegmentFeatures(const Session& session, const NoiseModel& noise, size_t threads) {
   for (size_t r = 0; r < session.runs.size(); ++r) {
     const SessionRun& run = session.runs[r];
     const auto row_at = [&](double time_s) {

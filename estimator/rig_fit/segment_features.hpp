@@ -84,7 +84,6 @@ class SegmentFeatures {
   [[nodiscard]] static Eigen::VectorXd series(const FeatureBlock& block, const Eigen::VectorXd& features);
 
  private:
-  const Session& session_;
   std::vector<FeatureBlock> blocks_;
   size_t count_ = 0;
   Eigen::VectorXd measured_;

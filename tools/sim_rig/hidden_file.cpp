@@ -79,7 +79,8 @@ struct Law {
 };
 
 void put_law(EffectFile& file, std::vector<double> inputs, OwnLaws& own) {
-  const auto [sets, node] = file.laws.front();
+  const Out sets = file.laws.front().sets;
+  const NodeId node = file.laws.front().node;
   for (const In in : {In::phase, In::cycle, In::t_since, In::dV, In::V_max, In::q_command, In::a_command})
     if (file.graph.depends_on(node, index_of(in)))
       refuse(file, fmt::format("what depends on {}", effect_files::quantities[index_of(in)].name));

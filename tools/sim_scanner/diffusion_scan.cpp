@@ -98,8 +98,10 @@ ScannedSeries scan_diffusion(const HermiteMesh& mesh, const FibreAt& fibre, cons
     std::mt19937 engine(1000003U * protocol.seed + static_cast<unsigned>(s));
     std::normal_distribution<float> noise(0, static_cast<float>(1 / protocol.snr));
     for (size_t v = 0; v < weightings.size(); ++v) {
-      for (float& value : pictures[v].reshaped())
-        value = std::hypot(value + noise(engine), noise(engine));
+      for (float& value : pictures[v].reshaped()) {
+        const float imaginary = noise(engine);
+        value = std::hypot(value + noise(engine), imaginary);
+      }
       const int instance = static_cast<int>(v) * stack.slices + static_cast<int>(s) + 1;
       write_dicom(folder / fmt::format("d{:04}.dcm", instance), pictures[v],
                   {.study_uid = uid(0),

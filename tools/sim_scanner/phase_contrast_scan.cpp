@@ -68,7 +68,8 @@ Spectrum image_of(const Moment& moment, double share, std::mt19937& engine) {
       const std::complex<double> value = std::complex<double>(object(place(ky), place(kx))) *
                                          std::polar(1.0, turn) /
                                          static_cast<double>(samples_a_pixel * samples_a_pixel);
-      cut(row, column) = std::complex<float>(value + std::complex<double>(noise(engine), noise(engine)));
+      const double imaginary = noise(engine), real = noise(engine);
+      cut(row, column) = std::complex<float>(value + std::complex<double>(real, imaginary));
     }
   }
   transform(cut, +1);

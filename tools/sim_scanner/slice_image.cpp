@@ -122,8 +122,9 @@ Picture acquired(const Picture& signal, const ScanProtocol& protocol, unsigned s
         continue;
       }
       const double window = from_end >= 1 ? 1 : 0.5 - 0.5 * std::cos(std::numbers::pi * from_end);
+      const double imaginary = noise(engine), real = noise(engine);
       const std::complex<double> value =
-          std::complex<double>(spectrum(row, column)) + std::complex<double>(noise(engine), noise(engine));
+          std::complex<double>(spectrum(row, column)) + std::complex<double>(real, imaginary);
       spectrum(row, column) = std::complex<float>(window * value);
     }
   }

@@ -43,7 +43,8 @@ VentriclePhantom VentriclePhantom::random(std::uint64_t seed) {
   for (Eigen::Vector2d& wave : p.waves)
     wave = {between(-0.04, 0.04), between(-0.04, 0.04)};
   p.shortening = between(0, 0.3);
-  const Eigen::Quaterniond turn(between(-1, 1), between(-1, 1), between(-1, 1), between(-1, 1));
+  const Eigen::Quaterniond turn(
+      Eigen::Vector4d{between(-1, 1), between(-1, 1), between(-1, 1), between(-1, 1)});
   p.axes = turn.normalized().toRotationMatrix();
   p.origin_mm = {between(-40, 40), between(-40, 40), between(-40, 40)};
   return p;
@@ -130,7 +131,8 @@ struct Clicker {
   /// A vector in the plane, of two normal components.
   Vector3d in_plane(const Slice& slice, double sigma_mm) {
     const Vector3d e = slice.normal.unitOrthogonal();
-    return sigma_mm * (normal() * e + normal() * slice.normal.cross(e));
+    const double across = normal(), along = normal();
+    return sigma_mm * (along * e + across * slice.normal.cross(e));
   }
 
   void add(int phase, const Slice& slice, const char* surface, const Vector3d& own) {
@@ -185,7 +187,7 @@ struct Clicker {
     for (int p = 0; p < protocol.phases; ++p)
       clicks.activity.push_back(0.5 - 0.5 * std::cos(2 * half_turn * p / protocol.phases));
     std::vector<Slice> slices;
-    const Vector3d off_axis(uniform(-0.06, 0.06), uniform(-0.06, 0.06), 1);
+    const Vector3d off_axis{uniform(-0.06, 0.06), uniform(-0.06, 0.06), 1};
     const double bottom = -phantom.inner_along_mm - phantom.wall_along_mm + 4;
     for (double z = bottom; z < phantom.base_mm; z += 8) {
       Slice slice{fmt::format("sa{:02}", slices.size()), Vector3d(0, 0, z), off_axis.normalized()};

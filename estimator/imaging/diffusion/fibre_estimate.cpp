@@ -310,9 +310,8 @@ class Estimation {
     }
     u_.setZero(static_cast<Eigen::Index>(unknowns_));
     for (size_t n = 0; n < lattice_.mesh.node_count(); ++n) {
-      const auto first = static_cast<Eigen::Index>(fields * n);
-      u_[first + helix] = angle_at(helices, lattice_.depth[n]);
-      u_.segment<3>(first + anisotropy) = size;
+      u_[static_cast<Eigen::Index>(fields * n + helix)] = angle_at(helices, lattice_.depth[n]);
+      u_.segment<3>(static_cast<Eigen::Index>(fields * n + anisotropy)) = size;
     }
   }
 
@@ -408,9 +407,10 @@ class Estimation {
     factorise();
     Eigen::VectorXd change = factor_.solve(gradient_);
     double longest = 0, squares = 0;
-    for (Eigen::Index n = 0; n < change.size(); n += static_cast<Eigen::Index>(fields)) {
-      longest = std::max({longest, std::abs(change[n + helix]), std::abs(change[n + transverse])});
-      squares += change.segment<2>(n).squaredNorm();
+    for (size_t n = 0; n < lattice_.mesh.node_count(); ++n) {
+      const double helices = at(change, n, helix), transverses = at(change, n, transverse);
+      longest = std::max({longest, std::abs(helices), std::abs(transverses)});
+      squares += helices * helices + transverses * transverses;
     }
     const double share = std::min(1.0, longest_step_rad / longest);
     u_ += share * change;

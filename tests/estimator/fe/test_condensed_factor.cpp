@@ -77,7 +77,7 @@ TEST(CondensedFactor, KeptLeadsToTheSameEquilibriumNearBy) {
   ASSERT_TRUE(kept);
   model.set_parameter(0, 6.0);
   const Solution with = model.solve({3.3}, at_3.state, kept);
-  const Solution without = model.solve({3.3}, at_3.state);
+  const Solution without = model.solve(3.3, at_3.state);
   EXPECT_TRUE(with.report.converged());
   EXPECT_EQ(with.report.factorisations, 0U);
   double apart_mm = 0;

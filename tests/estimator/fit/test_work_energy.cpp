@@ -182,7 +182,7 @@ Draw drawn(const WorkLoop& exact, ElasticModel& model, const NodeField& loaded, 
     const MaterialPoint point{i % model.mesh().element_count(), {unit(random), unit(random), unit(random)}};
     const Eigen::Vector3d X = model.mesh().value(model.mesh().reference(), point);
     const Eigen::Vector3d x = model.mesh().value(loaded, point) +
-                              sigma_mm * Eigen::Vector3d(normal(random), normal(random), normal(random));
+                              sigma_mm * Eigen::Vector3d{normal(random), normal(random), normal(random)};
     draw.measurement.points.push_back({1, {X[0], X[1], X[2]}, {x[0], x[1], x[2]}, sigma_mm});
   }
   for (WorkLoop::Point& point : draw.loop.points) {

@@ -88,8 +88,8 @@ std::vector<std::vector<std::vector<double>>> signals_of(const DiffusionScan& sc
               1000 * std::exp(-1e-3 * volumes[v].first * volumes[v].second.dot(tensor * volumes[v].second));
         signal /= parts * parts * parts;
         if (scan.faded.contains({static_cast<int>(v), slice})) signal *= 0.5;
-        signals[v][static_cast<size_t>(slice)][p] =
-            std::hypot(signal + scan.noise * noise(engine), scan.noise * noise(engine));
+        const double imaginary = scan.noise * noise(engine), real = signal + scan.noise * noise(engine);
+        signals[v][static_cast<size_t>(slice)][p] = std::hypot(real, imaginary);
       }
     }
   }

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <set>
 
@@ -107,7 +108,7 @@ double plane_of(const TrackedFolder& tracked, int tag) {
   for (const TagPoint& point : tracked.points) {
     if (point.tag == tag) return point.plane_mm;
   }
-  return NAN;
+  return std::numeric_limits<double>::quiet_NaN();
 }
 
 /// So fast that lines jump to the next stripe: a point moves by up to a spacing from phase to phase.

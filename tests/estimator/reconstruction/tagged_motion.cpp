@@ -95,7 +95,8 @@ Measurement tagged_inflation(const HermiteMesh& mesh, double amount_mm, const Ta
     const NodeField moved = inflation(mesh, load * amount_mm);
     for (size_t made = 0; made < options.tags_a_frame;) {
       const Slice slice = random_slice(random, options.along_axis);
-      const Vector3d seen = slice.centre + place(random) * slice.across + place(random) * slice.up;
+      const double up_mm = place(random), across_mm = place(random);
+      const Vector3d seen = slice.centre + across_mm * slice.across + up_mm * slice.up;
       // The material that is seen there, by fixed-point iteration x = X + u(X).
       Vector3d X = seen;
       std::optional<MaterialPoint> point;

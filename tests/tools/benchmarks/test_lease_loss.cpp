@@ -77,7 +77,7 @@ double braking(const Step& a, const Step& b, const Step& c) {
 
 TEST_P(LeaseLoss, ComesToRestUnderControlWithin500ms) {
   NEEDS_IMAGE();
-  for (const uint64_t after_ms : {410, 1180, 1777}) {
+  for (const uint64_t after_ms : {410U, 1180U, 1777U}) {
     SCOPED_TRACE(after_ms);
     uint64_t silent_ns = 0;
     const std::vector<Step> steps = run_until_silent(after_ms, silent_ns);

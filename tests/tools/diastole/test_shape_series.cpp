@@ -107,9 +107,9 @@ TEST_F(ShapeSeriesTest, AFaultySessionStopsTheSeriesAndKeepsItsExitCode) {
     SCOPED_TRACE(words);
     size_t sessions = 0;
     EXPECT_EQ(carry_out(3, true,
-                        [&](const std::string&, const std::string&) {
+                        [&, given = result](const std::string&, const std::string&) {
                           ++sessions;
-                          return result;
+                          return given;
                         }),
               code);
     EXPECT_EQ(sessions, 1U);

@@ -182,7 +182,7 @@ TEST_F(ChipFaults, TheWatchdogWaitsForADebugger) {
 
 /// The compare value of a delayed trigger reaches TIM2 after its tick: it is raised late, and told with its own time.
 TEST_F(ChipFaults, ATriggerThatComesTooLateIsRaisedAndToldWithItsOwnTime) {
-  for (const uint64_t held_us : {50, 150, 400}) {
+  for (const uint64_t held_us : {50U, 150U, 400U}) {
     constexpr uint64_t before_us = 20;
     const HeldTriggers found = run_with_held_core(before_us * 1000, held_us * 1000);
     ASSERT_EQ(found.rises_ns.size(), HeldTriggers::cycles) << held_us;
@@ -224,7 +224,7 @@ TEST_F(ChipFaults, EveryHandlerHasItsStoresDoneBeforeItReturns) {
       std::memcpy(&half, board().flash().data() + (at - 0x0800'0000), sizeof half);
       code.push_back(half);
     }
-    EXPECT_FALSE(std::ranges::search(code, dsb).empty()) << handler;
+    EXPECT_NE(std::search(code.begin(), code.end(), std::begin(dsb), std::end(dsb)), code.end()) << handler;
   }
 }
 

@@ -23,10 +23,11 @@ constexpr std::string_view style =
 std::string thumbnail(const std::vector<float>& trace) {
   constexpr double width = 168, height = 40, margin = 2;
   double least = HUGE_VAL, most = -HUGE_VAL;
-  for (const float value_kPa : trace) {
-    if (std::isnan(value_kPa)) continue;
-    least = std::min<double>(least, value_kPa);
-    most = std::max<double>(most, value_kPa);
+  for (const float recorded_kPa : trace) {
+    if (std::isnan(recorded_kPa)) continue;
+    const auto value_kPa = static_cast<double>(recorded_kPa);
+    least = std::min(least, value_kPa);
+    most = std::max(most, value_kPa);
   }
   if (!(least <= most)) return {};
   const size_t parts = trace.size() / 2;

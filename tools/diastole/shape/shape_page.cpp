@@ -13,7 +13,7 @@ namespace {
 using report::number;
 using report::SvgPlot;
 
-constexpr size_t points = 256;
+constexpr size_t plotted = 256;
 
 std::vector<double> closed(std::vector<double> values) {
   values.push_back(values.front());
@@ -22,8 +22,8 @@ std::vector<double> closed(std::vector<double> values) {
 
 std::vector<double> times_of(const PeriodicCurve& curve) {
   std::vector<double> time_s;
-  for (size_t j = 0; j <= points; ++j)
-    time_s.push_back(curve.period_s * static_cast<double>(j) / points);
+  for (size_t j = 0; j <= plotted; ++j)
+    time_s.push_back(curve.period_s * static_cast<double>(j) / plotted);
   return time_s;
 }
 
@@ -31,9 +31,9 @@ report::Figure volumes(const PeriodicCurve& wanted, const PeriodicCurve& seen, c
                        const std::string& name) {
   SvgPlot plot({.x = {.label = "time on the wanted curve (s)"}, .y = {.label = "volume (mL)"}});
   const std::vector<double> time_s = times_of(wanted);
-  plot.line(time_s, closed(drive.at_even(points)), "muted", "drive");
-  plot.line(time_s, closed(wanted.at_even(points)), "a", "wanted");
-  plot.line(time_s, closed(seen.at_even(points)), "b", name);
+  plot.line(time_s, closed(drive.at_even(plotted)), "muted", "drive");
+  plot.line(time_s, closed(wanted.at_even(plotted)), "a", "wanted");
+  plot.line(time_s, closed(seen.at_even(plotted)), "b", name);
   return {plot.svg(), "What the piston was asked for, what was wanted of the specimen, and what it did."};
 }
 
@@ -41,8 +41,8 @@ report::Figure error_of(const PeriodicCurve& wanted, PeriodicCurve seen, double 
   SvgPlot plot({.x = {.label = "time on the wanted curve (s)"}, .y = {.label = "error (% of the range)"}});
   const std::vector<double> time_s = times_of(wanted);
   seen.c[0] = wanted.c[0];
-  std::vector<double> error = closed(seen.at_even(points));
-  const std::vector<double> aim = closed(wanted.at_even(points));
+  std::vector<double> error = closed(seen.at_even(plotted));
+  const std::vector<double> aim = closed(wanted.at_even(plotted));
   for (size_t j = 0; j < error.size(); ++j)
     error[j] = 100.0 * (error[j] - aim[j]) / wanted.range();
   const std::vector<double> low(error.size(), -100.0 * floor), high(error.size(), 100.0 * floor);

@@ -64,8 +64,8 @@ std::string store_gated_volume(const std::string& run, const std::filesystem::pa
   const size_t first = triggers_before + earlier + dummy_cycles,
                last = triggers_before + earlier + begun - 1;  // the last may be cut off
   for (size_t trigger = first; trigger < last; ++trigger) {
-    const auto [from, to] = std::ranges::equal_range(rows, trigger, {}, &VolumeRow::trigger);
-    const std::vector<VolumeRow> cycle(from, to);
+    const std::vector<VolumeRow> cycle(std::ranges::lower_bound(rows, trigger, {}, &VolumeRow::trigger),
+                                       std::ranges::upper_bound(rows, trigger, {}, &VolumeRow::trigger));
     if (cycle.empty())
       return fmt::format("no gated volume: the rig has not written cycle {}", trigger - triggers_before + 1);
     for (size_t j = 0; j < phases; ++j)
