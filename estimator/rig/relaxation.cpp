@@ -30,7 +30,7 @@ class Relaxation final : public SpecimenMemory {
   struct Mode {
     double part = 0.0, time_s = 1.0;
     double history_kPa = 0.0;
-    mutable double decay_at = 0.0, decay = 1.0;
+    mutable double decay_at = 0.0, decay = 1.0, gathered = 1.0;
   };
   /// h_i after a change that is linear in time.
   [[nodiscard]] double history(const Mode& mode, double elastic_kPa, double time_s) const {
@@ -40,8 +40,9 @@ class Relaxation final : public SpecimenMemory {
     if (std::abs(x - mode.decay_at) > 1e-9 * x) {  // steps differ by rounding
       mode.decay_at = x;
       mode.decay = std::exp(-x);
+      mode.gathered = -std::expm1(-x) / x;
     }
-    return mode.decay * mode.history_kPa + (elastic_kPa - elastic_kPa_) * (1.0 - mode.decay) / x;
+    return mode.decay * mode.history_kPa + (elastic_kPa - elastic_kPa_) * mode.gathered;
   }
   std::vector<Mode> modes_;
   double elastic_kPa_ = 0.0, time_s_ = 0.0;

@@ -12,6 +12,7 @@
 //
 // Units as the names say; volumes mL, pressures kPa above atmosphere, times s on the controller's clock.
 
+#include <array>
 #include <functional>
 #include <memory>
 #include <string>
@@ -90,6 +91,11 @@ using SensorTraceMap =
 
 using DriveMap = std::function<void(DriveTrace&, const RunPlace&)>;
 
+/// An error of the piston's volume by the screw's angle a, miscounted steps left out: sine sin(a) + cosine (1 - cos(a)).
+struct TurningError {
+  double sine_mL = 0.0, cosine_mL = 0.0;
+};
+
 struct RigModel {
   Hose hose;
   SpecimenCurve curve;  ///< at a modulus of 1 kPa
@@ -101,10 +107,11 @@ struct RigModel {
   double pump_offset_kPa = 0.0;
 
   // Hooks of effects, in the order in which they were added.
-  std::vector<DriveMap> turns;  ///< from commanded steps to what the screw turns, in mL
-  std::vector<DriveMap> drive;  ///< from there to the piston
-  double pump_gas_mL = 0.0;     ///< at rest; between piston and hose
-  double cavity_gas_mL = 0.0;   ///< at rest; beside the specimen
+  std::vector<DriveMap> turns;                 ///< from commanded steps to what the screw turns, in mL
+  std::array<TurningError, 2> turning_errors;  ///< of the angle and of twice the angle, before `drive`
+  std::vector<DriveMap> drive;                 ///< from there to the piston
+  double pump_gas_mL = 0.0;                    ///< at rest; between piston and hose
+  double cavity_gas_mL = 0.0;                  ///< at rest; beside the specimen
   double gas_exponent =
       1.2;  ///< of p V^n: bubbles at about a hertz are between isothermal (1) and adiabatic (1.4)
   double pump_leak_mL_s_kPa = 0.0;           ///< conductance past the seal

@@ -20,10 +20,35 @@ constexpr double slow_quarter_wave_Hz = 3.0;
 /// takes for its conductance at rest and a load.
 constexpr double gas_steps = 2.0, leak_steps = 4.0;
 
+void add_turning_errors(const std::array<TurningError, 2>& errors, double turn_mL, DriveTrace& trace) {
+  const auto& [once, twice] = errors;
+  if (std::ranges::all_of(errors,
+                          [](const TurningError& e) { return e.sine_mL == 0.0 && e.cosine_mL == 0.0; }))
+    return;
+  const double per_mL = 2.0 * std::numbers::pi / turn_mL;
+  for (size_t k = 0; k < trace.volume_mL.size(); ++k) {
+    const double sine = std::sin(per_mL * trace.volume_mL[k]), cosine = std::cos(per_mL * trace.volume_mL[k]);
+    const double sine_2 = 2.0 * sine * cosine, cosine_2 = 1.0 - 2.0 * sine * sine;
+    const double value = once.sine_mL * sine + once.cosine_mL * (1.0 - cosine) + twice.sine_mL * sine_2 +
+                         twice.cosine_mL * (1.0 - cosine_2);
+    const double slope = per_mL * (once.sine_mL * cosine + once.cosine_mL * sine +
+                                   2.0 * (twice.sine_mL * cosine_2 + twice.cosine_mL * sine_2));
+    const double bend = per_mL * per_mL *
+                        (once.cosine_mL * cosine - once.sine_mL * sine +
+                         4.0 * (twice.cosine_mL * cosine_2 - twice.sine_mL * sine_2));
+    const double flow = trace.flow_mL_per_s[k];
+    trace.volume_mL[k] += value;
+    trace.flow_mL_per_s[k] += slope * flow;
+    trace.acceleration_mL_per_s2[k] += slope * trace.acceleration_mL_per_s2[k] + bend * flow * flow;
+  }
+}
+
 DriveTrace driven(const RigModel& model, const RunDrive& run, DriveTrace motion) {
-  for (const auto* changes : {&model.turns, &model.drive})
-    for (const DriveMap& change : *changes)
-      change(motion, run.place);
+  for (const DriveMap& change : model.turns)
+    change(motion, run.place);
+  add_turning_errors(model.turning_errors, run.place.turn_mL, motion);
+  for (const DriveMap& change : model.drive)
+    change(motion, run.place);
   return motion;
 }
 

@@ -29,7 +29,9 @@ double product(const FeatureBlock::Function& f, const FeatureBlock::Function& g)
   const Eigen::Index from = std::max(f.first, g.first);
   const Eigen::Index to = std::min(f.first + f.values.size(), g.first + g.values.size());
   if (to <= from) return 0.0;
-  return f.values.segment(from - f.first, to - from).dot(g.values.segment(from - g.first, to - from));
+  return f.values.segment(from - f.first, to - from)
+      .cast<double>()
+      .dot(g.values.segment(from - g.first, to - from).cast<double>());
 }
 
 /// Functions over a window's rows, one after the other.
@@ -46,10 +48,10 @@ class BasisMaker {
            double to = forever) {
     const auto first = std::ranges::lower_bound(turns_, from) - turns_.begin();
     const auto last = std::ranges::lower_bound(turns_, to) - turns_.begin();
-    Eigen::VectorXd values(last - first);
+    Eigen::VectorXf values(last - first);
     for (Eigen::Index k = 0; k < values.size(); ++k) {
       const auto row = static_cast<size_t>(first + k);
-      values[k] = missing_[row] ? 0.0 : function(turns_[row]);
+      values[k] = missing_[row] ? 0.0F : static_cast<float>(function(turns_[row]));
     }
     block_.basis.push_back({first, std::move(values)});
     block_.features.push_back({kind, harmonic, rows, 0.0});
@@ -76,7 +78,7 @@ void BasisMaker::finish() {
     for (Eigen::Index i = 0; i < row; ++i)
       part[i] = (product(next, kept[static_cast<size_t>(i)]) - factor.row(i).head(i).dot(part.head(i))) /
                 factor(i, i);
-    const double square = next.values.squaredNorm();
+    const double square = next.values.cast<double>().squaredNorm();
     const double left = square - part.squaredNorm();
     if (!(left > independent * square)) continue;
     factor.row(row).head(row) = part.transpose();
@@ -306,7 +308,7 @@ Eigen::VectorXd SegmentFeatures::project(const FeatureBlock& block, const Eigen:
   for (size_t j = 0; j < block.basis.size(); ++j) {
     const FeatureBlock::Function& function = block.basis[j];
     products[static_cast<Eigen::Index>(j)] =
-        function.values.dot(values.segment(function.first, function.values.size()));
+        function.values.cast<double>().dot(values.segment(function.first, function.values.size()));
   }
   return block.factor.triangularView<Eigen::Lower>().solve(products);
 }
@@ -316,7 +318,7 @@ Eigen::VectorXd SegmentFeatures::series(const FeatureBlock& block, const Eigen::
   Eigen::VectorXd values = Eigen::VectorXd::Zero(block.rows);
   for (size_t j = 0; j < block.basis.size(); ++j)
     values.segment(block.basis[j].first, block.basis[j].values.size()) +=
-        sizes[static_cast<Eigen::Index>(j)] * block.basis[j].values;
+        sizes[static_cast<Eigen::Index>(j)] * block.basis[j].values.cast<double>();
   return values;
 }
 

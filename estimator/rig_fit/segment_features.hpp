@@ -41,7 +41,7 @@ struct FeatureBlock {
   /// A function over the window's rows, 0 outside of [first, first + values.size()).
   struct Function {
     Eigen::Index first = 0;
-    Eigen::VectorXd values;
+    Eigen::VectorXf values;  ///< to seven digits: a projection's time is that of reading them
   };
 
   size_t run = 0;

@@ -20,25 +20,11 @@ double positive(double value, double rounding) {
   return x > 30.0 ? value : rounding * std::log1p(std::exp(x));
 }
 
-/// An error of the drive so many times a turn of the screw, `sine` or cosine of that angle. The angle is what the screw turns, miscounted
-/// steps left out.
-template <int times_a_turn, bool sine>
+/// An error of the drive so many times a turn of the screw, `sine` or cosine of that angle.
+template <size_t times_a_turn, bool sine>
 void add_turning_error(double size_mL, const EffectContext&, RigModel& model) {
-  if (size_mL == 0.0) return;
-  model.drive.emplace_back([=](DriveTrace& trace, const RunPlace& place) {
-    const double per_mL = 2.0 * std::numbers::pi * times_a_turn / place.turn_mL;
-    for (size_t k = 0; k < trace.volume_mL.size(); ++k) {
-      const double angle = per_mL * trace.volume_mL[k];
-      const double flow = trace.flow_mL_per_s[k];
-      const double value = sine ? std::sin(angle) : 1.0 - std::cos(angle);
-      const double slope = per_mL * (sine ? std::cos(angle) : std::sin(angle));
-      const double bend = per_mL * per_mL * (sine ? -std::sin(angle) : std::cos(angle));
-      trace.volume_mL[k] += size_mL * value;
-      trace.flow_mL_per_s[k] += size_mL * slope * flow;
-      trace.acceleration_mL_per_s2[k] +=
-          size_mL * (slope * trace.acceleration_mL_per_s2[k] + bend * flow * flow);
-    }
-  });
+  TurningError& error = model.turning_errors[times_a_turn - 1];
+  (sine ? error.sine_mL : error.cosine_mL) += size_mL;
 }
 
 /// The specimen's pressure larger by `part` of it at usual_mL, in proportion to the volume to the power.

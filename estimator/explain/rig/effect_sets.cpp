@@ -146,6 +146,7 @@ class SetsSearch {
   void fit_synergies();
   void fit_from_better_part(const std::vector<size_t>& responses);
   void fit_best_again(size_t effects);
+  [[nodiscard]] bool is_plain_in_reach() const;
   [[nodiscard]] bool relieves(const Effect* effect, const EffectSet& set) const;
   [[nodiscard]] std::optional<double> posterior_beside_part(const EffectSet& set) const;
   [[nodiscard]] bool is_fitted(const std::vector<const Effect*>& effects) const;
@@ -337,6 +338,22 @@ void SetsSearch::fit_best_again(size_t effects) {
   sort_sets();
 }
 
+/// May the rig without effects come near the best set of one, once its tolerances are not linear? At that set's tolerances, linear
+/// algebra tells. Without effects a search goes a long way after what tolerances cannot make.
+bool SetsSearch::is_plain_in_reach() const {
+  const auto of_size = [&](size_t effects) {
+    return std::ranges::find_if(sets_, [&](const EffectSet& set) { return added(set) == effects; });
+  };
+  const auto plain = of_size(0), best = of_size(1);
+  if (plain == sets_.end() || best == sets_.end()) return true;
+  const double least = best->log_posterior - second_in_reach;
+  if (plain->log_posterior >= least) return true;
+  SessionModel start = best->model;
+  start.terms.resize(options_.terms.size());
+  start.values.resize(options_.values.size());
+  return fit_set(problem_, start, best->known, best->evidence.shares, least).log_posterior >= least;
+}
+
 SetSearch SetsSearch::run() {
   report("fitting the rig's model");
   base_ = declared_rig(problem_, {.terms = options_.terms, .values = options_.values, .u = {}});
@@ -365,8 +382,8 @@ SetSearch SetsSearch::run() {
       if (const auto start = scan_events(problem_, plain, *effect))
         fit(*start, base_, problem_.error().prior.share);
   report("fitting the best of them again");
-  fit_best_again(0);
   fit_best_again(1);
+  if (is_plain_in_reach()) fit_best_again(0);
   report("fitting the pairs that promise most");
   for (const rig::EvidenceFit* under : {&stated, &adapted}) {
     const std::vector<Promise> singles = promises(*under, false);

@@ -150,8 +150,9 @@ MatrixXd EventScan::changes(const std::vector<Moment>& moments) const {
       for (size_t i = 0; i < inside.size(); ++i) {
         const Index from = std::max(inside[i].first, function.first);
         if (from < to) {
-          sum +=
-              function.values.segment(from - function.first, to - from).dot(values.segment(from, to - from));
+          sum += function.values.segment(from - function.first, to - from)
+                     .cast<double>()
+                     .dot(values.segment(from, to - from));
           to = from;
         }
         sums(static_cast<Index>(j), static_cast<Index>(i)) = sum;
