@@ -77,7 +77,8 @@ void print_series(const ImageFolder& folder, const ImageSeries& series) {
 }
 
 ExitCode run_images(const ImagesArguments& arguments, const CommandOutput& out) {
-  if (arguments.skeleton) require_output({*arguments.skeleton, {}, study_skeleton_mark, arguments.force});
+  if (arguments.skeleton)
+    require_output({*arguments.skeleton, {}, {}, arguments.force});  // a person has completed it
   const bool shows_progress = isatty(STDERR_FILENO) != 0;
   const ImageFolder folder = read_image_folder(arguments.folder, [&](size_t done, size_t all) {
     if (shows_progress) fmt::print(stderr, "\r{} of {} files{}", done, all, done == all ? "\n" : "");
@@ -90,7 +91,8 @@ ExitCode run_images(const ImagesArguments& arguments, const CommandOutput& out) 
     for (const ImageSeries& series : folder.series)
       json["series"].push_back(series_json(folder, series));
     json["problems"] = written(folder.problems);
-    std::cout << json.dump(1) << '\n';
+    std::cout << json.dump(1, ' ', false, Json::error_handler_t::replace)
+              << '\n';  // a file's name may be no UTF-8
   } else {
     for (const ImageSeries& series : folder.series)
       print_series(folder, series);
@@ -120,7 +122,7 @@ void add_images(CommandLine& line) {
       ->required();
   command->add_option("-o,--output", arguments->skeleton,
                       "a study file with what the images tell, to complete");
-  command->add_flag("--force", arguments->force, "replace an output file that is no study");
+  command->add_flag("--force", arguments->force, "replace a study that is there");
   line.on_run(command, [arguments](const CommandOutput& out) { return run_images(*arguments, out); });
 }
 

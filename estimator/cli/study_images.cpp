@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "estimator/imaging/series/image_folder.hpp"
 #include "estimator/imaging/tracking/tags_file.hpp"
 #include "estimator/imaging/tracking/tracked_folder.hpp"
 #include "estimator/io/fingerprint.hpp"
@@ -14,7 +15,7 @@ namespace diastole {
 namespace {
 
 /// Another number whenever the tracker gives other points for the same images.
-constexpr int tracker_version = 3;
+constexpr int tracker_version = 4;
 
 std::optional<imaging::SpecimenPose> stated_pose(const Study& study) {
   if (!study.data.to_specimen) return std::nullopt;
@@ -29,14 +30,11 @@ std::optional<imaging::SpecimenPose> stated_pose(const Study& study) {
 
 std::string fingerprint_of(const std::filesystem::path& folder,
                            const std::optional<imaging::SpecimenPose>& pose) {
-  std::vector<std::filesystem::path> files;
   std::error_code error;
   if (!std::filesystem::is_directory(folder, error))
     throw InputError(
         {folder.string(), "", "is no folder", "Name the scanner's export: images = \"dicom/\"."});
-  for (const auto& entry : std::filesystem::recursive_directory_iterator(folder)) {
-    if (entry.is_regular_file()) files.push_back(entry.path());
-  }
+  std::vector<std::filesystem::path> files = imaging::files_below(folder);
   if (const auto beside = imaging::pose_nearby(folder)) files.push_back(*beside);
   if (const auto edits = imaging::edits_beside(folder); std::filesystem::exists(edits, error))
     files.push_back(edits);

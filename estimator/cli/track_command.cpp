@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
 #include <iostream>
 #include <memory>
@@ -17,6 +18,7 @@
 #include "estimator/io/whole_file.hpp"
 #include "estimator/report/page.hpp"
 #include "estimator/report/report.hpp"
+#include "protocol/contract/input_error.hpp"
 
 namespace diastole {
 namespace {
@@ -70,8 +72,20 @@ ExitCode run_track(const TrackArguments& arguments, const CommandOutput& out) {
                                       .edits = arguments.edits};
   inputs.push_back(imaging::edits_file(request));
   require_output({arguments.output, inputs, imaging::tags_file_mark, arguments.force});
-  if (arguments.page) require_output({*arguments.page, inputs, report::page_mark, arguments.force});
-  if (arguments.record) require_output({*arguments.record, inputs, tracking_file_mark, arguments.force});
+  std::vector<std::filesystem::path> outputs{arguments.output};
+  const auto require_another = [&](const std::filesystem::path& path, const char* option,
+                                   std::string_view mark) {
+    require_output({path, inputs, mark, arguments.force});
+    const auto is_path = [&](const std::filesystem::path& other) {
+      return std::filesystem::weakly_canonical(other) == std::filesystem::weakly_canonical(path);
+    };
+    if (std::ranges::any_of(outputs, is_path))
+      throw InputError(
+          {path.string(), option, "is another output of this command too", "Give each a name of its own."});
+    outputs.push_back(path);
+  };
+  if (arguments.page) require_another(*arguments.page, "--page", report::page_mark);
+  if (arguments.record) require_another(*arguments.record, "--record", tracking_file_mark);
   const bool shows_progress = isatty(STDERR_FILENO) != 0;
   const imaging::TrackedFolder tracked = imaging::track_folder(request, [&](const std::string& stage) {
     if (shows_progress) fmt::print(stderr, "{}\n", stage);

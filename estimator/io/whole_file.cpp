@@ -61,7 +61,8 @@ void require_output(const OutputFile& output) {
                         "Give -o another name."});
     }
   }
-  if (!output.force && !fs::is_empty(output.path) && !starts_with_mark(output.path, output.mark)) {
+  const bool is_earlier_result = !output.mark.empty() && starts_with_mark(output.path, output.mark);
+  if (!output.force && !fs::is_empty(output.path) && !is_earlier_result) {
     throw InputError({output.path.string(), "", "exists already and is no earlier result of this command",
                       "Choose another name, or --force to replace it."});
   }

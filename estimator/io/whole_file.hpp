@@ -19,8 +19,9 @@ void write_whole_file(const std::filesystem::path& path,
 struct OutputFile {
   std::filesystem::path path;
   std::vector<std::filesystem::path> inputs;  ///< what the command reads: never replaced
-  std::string_view mark;  ///< text near the start of an earlier result, which is replaced without being asked
-  bool force = false;     ///< replaces any other ordinary file
+  std::string_view
+      mark;  ///< text near the start of an earlier result, which is replaced without being asked; none is if empty
+  bool force = false;  ///< replaces any other ordinary file
 };
 
 /// Before long work, so that neither its result nor an input is lost. Throws InputError if the path cannot

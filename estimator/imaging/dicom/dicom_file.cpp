@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
+#include <cerrno>
 #include <cmath>
 #include <cstdlib>
 #include <cstring>
@@ -25,6 +26,10 @@ namespace {
 constexpr int most_pixels_a_side = 4096;
 /// More frames than phases times slices of any study; bounds what a header can ask to be remembered.
 constexpr int most_frames = 65536;
+/// No place in a magnet is further from its middle, no pixel wider, no trigger a day ago.
+constexpr double furthest_mm = 1e5, widest_mm = 1e3, narrowest_mm = 1e-3, longest_ms = 8.64e7;
+/// Sequences within sequences: enhanced images have four levels, and the library calls itself for each.
+constexpr size_t deepest = 64;
 /// RLE (PS3.5 Annex G) stores at most 128 bytes in two: no file that is smaller can hold the image that it announces.
 constexpr double most_compression = 64.0;
 
@@ -289,8 +294,10 @@ std::optional<SlicePlane> plane_of(const FrameItems& items) {
   const auto between_columns = items.number_in(DCM_PixelMeasuresSequence, DCM_PixelSpacing, 1);
   if (!position || !along_row || !along_column || !between_rows || !between_columns) return std::nullopt;
   const bool is_plane = std::abs(along_row->norm() - 1) < 1e-2 && std::abs(along_column->norm() - 1) < 1e-2 &&
-                        std::abs(along_row->dot(*along_column)) < 1e-2 && *between_rows > 0 &&
-                        *between_columns > 0;
+                        std::abs(along_row->dot(*along_column)) < 1e-2 &&
+                        std::clamp(*between_rows, narrowest_mm, widest_mm) == *between_rows &&
+                        std::clamp(*between_columns, narrowest_mm, widest_mm) == *between_columns &&
+                        position->cwiseAbs().maxCoeff() < furthest_mm;
   if (!is_plane) return std::nullopt;
   plane.origin_mm = *position;
   plane.along_row = along_row->normalized();
@@ -318,6 +325,7 @@ ImageHeader header_of(DcmItem& dataset, int frame, const SlicePlane& plane, cons
     header.trigger_ms =
         items.number_in(DCM_CardiacSynchronizationSequence, DCM_ActualCardiacTriggerDelayTime);
   if (!header.trigger_ms) header.trigger_ms = number(dataset, DCM_TriggerTime);
+  if (header.trigger_ms && std::abs(*header.trigger_ms) > longest_ms) header.trigger_ms.reset();
   header.interval_ms = items.number_in(DCM_CardiacSynchronizationSequence, DCM_RRIntervalTimeNominal);
   if (!header.interval_ms) header.interval_ms = number(dataset, DCM_NominalInterval);
   if (const auto announced = number(dataset, DCM_CardiacNumberOfImages))
@@ -397,6 +405,46 @@ bool looks_like_dicom(std::ifstream& stream) {
   return count >= 8 && (start[0] == 2 || start[0] == 8) && start[1] == 0 && start[3] == 0;
 }
 
+/// How deep items lie within items of undefined length, or of one that holds the others; little-endian, as all but retired syntaxes.
+size_t depth_of_items(const std::string& bytes) {
+  constexpr std::string_view begin("\xfe\xff\x00\xe0", 4), end("\xfe\xff\x0d\xe0", 4);
+  constexpr uint32_t undefined = 0xffffffff;
+  std::vector<size_t> ends;  // of the items around a place; none known is the file's
+  size_t most = 0;
+  for (size_t at = bytes.find("\xfe\xff"); at != std::string::npos; at = bytes.find("\xfe\xff", at + 2)) {
+    const std::string_view tag(bytes.data() + at, std::min<size_t>(4, bytes.size() - at));
+    while (!ends.empty() && ends.back() <= at)
+      ends.pop_back();
+    if (tag == end && !ends.empty()) ends.pop_back();
+    if (tag != begin || bytes.size() - at < 8) continue;
+    uint32_t length = 0;
+    std::memcpy(&length, bytes.data() + at + 4, sizeof length);
+    if (length == 0) continue;
+    ends.push_back(length == undefined ? bytes.size() : at + 8 + length);
+    most = std::max(most, ends.size());
+  }
+  return most;
+}
+
+/// What the library would meet with more memory or deeper calls than the file is worth.
+std::optional<FileFault> check_before_loading(std::ifstream& stream, const std::filesystem::path& file) {
+  DcmMetaInfo meta;
+  if (meta.loadFile(file.c_str()).good()) {
+    OFString syntax;
+    if (meta.findAndGetOFString(DCM_TransferSyntaxUID, syntax).good() &&
+        DcmXfer(syntax.c_str()).getStreamCompression() != ESC_none)
+      return unusable("(0002,0010)", "is deflated as a whole, and how large it becomes no header says",
+                      "Export it uncompressed, or with its pixels compressed (JPEG lossless, RLE).");
+  }
+  stream.clear();
+  stream.seekg(0);
+  const std::string bytes(std::istreambuf_iterator<char>(stream), {});
+  if (const size_t depth = depth_of_items(bytes); depth > deepest)
+    return unusable("(fffe,e000)", fmt::format("holds {} sequences within each other", depth),
+                    "No scanner writes this. Export the file again.");
+  return std::nullopt;
+}
+
 struct LoadedFile {
   std::unique_ptr<DcmFileFormat> format;
   double bytes = 0;
@@ -407,12 +455,18 @@ LoadedFile load(const std::filesystem::path& file) {
   prepare_library();
   LoadedFile loaded;
   std::ifstream stream(file, std::ios::binary);
-  if (!stream || !looks_like_dicom(stream)) {
+  if (!stream) {
+    loaded.fault = unusable("", fmt::format("cannot be read: {}", std::strerror(errno)),
+                            "Give yourself the right to read it, or move it out of the folder.");
+    return loaded;
+  }
+  if (!looks_like_dicom(stream)) {
     loaded.fault = FileFault{FileFault::Kind::foreign, "", "is no DICOM file", "Move it out of the folder."};
     return loaded;
   }
   std::error_code ignored;
   loaded.bytes = static_cast<double>(std::filesystem::file_size(file, ignored));
+  if ((loaded.fault = check_before_loading(stream, file))) return loaded;
   loaded.format = std::make_unique<DcmFileFormat>();
   const OFCondition read = loaded.format->loadFile(file.c_str());
   if (read.bad())
@@ -420,6 +474,14 @@ LoadedFile load(const std::filesystem::path& file) {
                              fmt::format("ends too early or is damaged ({})", read.text()),
                              "Copy or export the file again."};
   return loaded;
+}
+
+/// A code string (PS3.5 6.2) as it is, and of what is none only that: it may hold a name, or what a terminal obeys.
+std::string code(const std::string& value) {
+  const bool is_code = value.size() <= 16 && std::ranges::all_of(value, [](char c) {
+                         return (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == ' ' || c == '_';
+                       });
+  return is_code ? value : "that is no code";
 }
 
 std::optional<FileFault> check_modality(DcmItem& dataset) {
@@ -430,7 +492,7 @@ std::optional<FileFault> check_modality(DcmItem& dataset) {
                                           sop_class == UID_LegacyConvertedEnhancedMRImageStorage);
   if (is_mr) return std::nullopt;
   return FileFault{FileFault::Kind::not_mr, "(0008,0060)",
-                   fmt::format("is no MR image: modality {}", modality.empty() ? "absent" : modality),
+                   fmt::format("is no MR image: modality {}", modality.empty() ? "absent" : code(modality)),
                    "Move it out of the folder."};
 }
 
@@ -476,7 +538,9 @@ DicomContent read_headers(const std::filesystem::path& file) {
       content.images.clear();
       content.fault =
           unusable("(0020,0032), (0020,0037), (0028,0030)",
-                   fmt::format("frame {} has no position, orientation or pixel spacing", frame + 1),
+                   fmt::format("position, orientation or pixel spacing of frame {} is absent, or no value "
+                               "that an MR image can have",
+                               frame + 1),
                    "Export the original images; converted ones lose where they lie.");
       return content;
     }

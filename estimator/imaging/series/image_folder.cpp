@@ -22,21 +22,6 @@ namespace fs = std::filesystem;
 /// mostly still tissue, whose values are near zero.
 constexpr double one_sided = 0.5;
 
-std::vector<fs::path> files_below(const fs::path& folder) {
-  std::error_code error;
-  if (!fs::is_directory(folder, error))
-    throw InputError(
-        {folder.string(), "", "is no folder", "Name the folder that holds the scanner's export."});
-  std::vector<fs::path> files;
-  for (fs::recursive_directory_iterator at(folder, fs::directory_options::skip_permission_denied, error), end;
-       at != end; at.increment(error)) {
-    if (error) break;
-    if (at->is_regular_file(error)) files.push_back(at->path());
-  }
-  std::sort(files.begin(), files.end());
-  return files;
-}
-
 /// By its name a DICOM file, or one of the nameless kind that scanners write; README.txt, .DS_Store and the like are not.
 bool claims_to_be_dicom(const fs::path& file) {
   std::string ending = file.extension().string();
@@ -131,9 +116,13 @@ class Sorter {
     for (const auto& series : unsaid) {
       const std::vector<size_t>& images = series.second;
       std::vector<Component> found(images.size());
-      parallel_for(images.size(), machine_threads(), [&](size_t i) {
-        found[i] =
-            is_signed_about_zero(folder_.pixels({images[i]})[0]) ? Component::phase : Component::magnitude;
+      constexpr size_t together = 64;  // a file of many frames is opened once for so many
+      parallel_for((images.size() + together - 1) / together, machine_threads(), [&](size_t part) {
+        const size_t first = part * together, last = std::min(first + together, images.size());
+        const std::vector<Image> read = folder_.pixels({images.begin() + static_cast<std::ptrdiff_t>(first),
+                                                        images.begin() + static_cast<std::ptrdiff_t>(last)});
+        for (size_t i = first; i < last; ++i)
+          found[i] = is_signed_about_zero(read[i - first]) ? Component::phase : Component::magnitude;
       });
       for (size_t i = 0; i < images.size(); ++i)
         folder_.images[images[i]].header.component = found[i];
@@ -159,13 +148,23 @@ class Sorter {
     return all;
   }
 
-  /// A series may hold several orientations, as a localiser does. A few images that lie otherwise than a cine's many are no slice of
-  /// their own: the protocol changed, or files of two scans were mixed.
+  [[nodiscard]] double images_a_slice(const Stack& stack) const {
+    std::vector<SlicePlane> places;
+    for (const size_t image : stack.images) {
+      const SlicePlane& plane = header(image).plane;
+      if (std::ranges::none_of(places, [&](const SlicePlane& one) { return same_place(one, plane); }))
+        places.push_back(plane);
+    }
+    return static_cast<double>(stack.images.size()) / static_cast<double>(places.size());
+  }
+
+  /// A series may hold several orientations, as a localiser does, or a cine along and across the axis. Images that lie otherwise than
+  /// a cine's, with fewer than half of its phases, are no slice of their own: the protocol changed, or files of two scans were mixed.
   void report_mixed(std::vector<Stack>& all) {
     for (const Stack& few : all) {
       const auto many = std::find_if(all.begin(), all.end(), [&](const Stack& other) {
         return other.uid == few.uid && other.component == few.component &&
-               other.images.size() > 2 * few.images.size();
+               images_a_slice(other) > 2 * images_a_slice(few);
       });
       if (many == all.end()) continue;
       const SlicePlane& here = header(few.images[0]).plane;
@@ -237,11 +236,12 @@ class Sorter {
 
   /// Phases in time; what has none, or one twice, cannot be followed.
   void number_phases(ImageSeries& series) {
-    std::vector<double> times_ms;
+    std::vector<std::vector<double>> times_ms;
     for (const SliceImages& slice : series.slices) {
+      times_ms.emplace_back();
       for (const size_t image : slice.images) {
         if (header(image).trigger_ms) {
-          times_ms.push_back(*header(image).trigger_ms);
+          times_ms.back().push_back(*header(image).trigger_ms);
         } else if (slice.images.size() > 1) {
           complain(Severity::error, "no-trigger-time",
                    fmt::format("TriggerTime (0018,1060) is absent: the {} images of this slice cannot be put "
@@ -252,11 +252,56 @@ class Sorter {
           return;
         }
       }
+      if (!times_differ(slice, times_ms.back())) return;
     }
     series.phases = phase_times(times_ms);
     for (SliceImages& slice : series.slices)
       check_slice(series, slice);
+    check_ends_of_cycle(series);
     check_spacing_of_slices(series);
+  }
+
+  /// Whether the trigger times of different images are different ones.
+  bool times_differ(const SliceImages& slice, const std::vector<double>& times_ms) {
+    constexpr double least_step_ms = 0.5;  // no image is made in less
+    if (times_ms.size() < 3) return true;  // two may be copies
+    const auto [first, last] = std::minmax_element(times_ms.begin(), times_ms.end());
+    if (*last - *first > least_step_ms * static_cast<double>(times_ms.size() - 1)) return true;
+    if (same_pixels(slice.images.front(), slice.images.back())) return true;
+    complain(Severity::error, "trigger-times-alike",
+             fmt::format("TriggerTime (0018,1060) goes from {:g} to {:g} ms in the {} images of this slice: "
+                         "they cannot be put in order of time",
+                         *first, *last, times_ms.size()),
+             slice.images.front(), *last - *first, "ms",
+             "Export the original gated images. Times in seconds have to be made milliseconds.");
+    return false;
+  }
+
+  /// What lacks at the ends leaves no gap: the header may say, or the first trigger time.
+  void check_ends_of_cycle(const ImageSeries& series) {
+    const size_t image = series.slices.front().images.front();
+    const std::vector<double>& times_ms = series.phases.times_ms;
+    if (times_ms.size() < 2) return;
+    const auto announced = header(image).phases_announced;
+    if (announced && *announced > static_cast<int>(times_ms.size()))
+      complain(Severity::warning, "phases-announced",
+               fmt::format("{} phases are here, and (0018,1090) announces {}", times_ms.size(), *announced),
+               image, static_cast<double>(*announced) - static_cast<double>(times_ms.size()), "phases",
+               "Frames are numbered from the first phase that is here. Export the series again if some are "
+               "lost.");
+    const double step_ms = (times_ms.back() - times_ms.front()) / static_cast<double>(times_ms.size() - 1);
+    constexpr double late = 1.5;  // steps after the trigger
+    if (times_ms.front() > late * step_ms)
+      complain(Severity::warning, "first-phase-late",
+               fmt::format("the first phase is at {:.0f} ms, {:.1f} steps after the trigger",
+                           times_ms.front(), times_ms.front() / step_ms),
+               image, times_ms.front(), "ms",
+               "Frames are numbered from it. Export the series again if phases before it are lost.");
+    if (times_ms.front() < 0)
+      complain(
+          Severity::warning, "trigger-time-negative",
+          fmt::format("TriggerTime (0018,1060) begins at {:.0f} ms, before the trigger", times_ms.front()),
+          image, times_ms.front(), "ms", "Is this the time since the trigger?");
   }
 
   void check_slice(const ImageSeries& series, SliceImages& slice) {
@@ -350,12 +395,29 @@ class Sorter {
           100 * tag.modulation, 100 * modulation_at(last, clearest.plane, tag.per_mm));
       return;
     }
+    if (several) check_other_phases(middle);
     series.kind = several ? SeriesKind::cine : SeriesKind::anatomy;
     series.reason = several ? "several phases, and no line of tags in the spectrum" : "one image a slice";
     if (several && header(middle.images.front()).says_tagged)
       complain(Severity::warning, "tags-not-seen",
                "the header says tagged (0018,9028), the image shows no tags", middle.images.front(), 1, "",
                "Look at the first phase: were the tags switched on?");
+  }
+
+  /// Tags are laid before the first phase and fade: none there and some later is a first image that is spoilt, or a wrong order.
+  void check_other_phases(const SliceImages& slice) {
+    for (const size_t image : {slice.images[1], slice.images.back()}) {
+      if (find_tag_waves(folder_.pixels({image})[0], slice.plane).empty()) continue;
+      complain(Severity::warning, "tags-begin-late",
+               fmt::format(
+                   "tags are seen in this image at {:.0f} ms, and none in the first at {:.0f} ms: taken for "
+                   "a cine without tags",
+                   header(image).trigger_ms.value_or(0), header(slice.images.front()).trigger_ms.value_or(0)),
+               image, header(image).trigger_ms.value_or(0), "ms",
+               "Look at the first phase, and whether the trigger times (0018,1060) are right. A spoilt first "
+               "phase may be moved out of the folder.");
+      return;
+    }
   }
 
   /// A folder in which nothing is encoded and nothing moves holds nothing to measure.
@@ -375,6 +437,24 @@ class Sorter {
 };
 
 }  // namespace
+
+std::vector<fs::path> files_below(const fs::path& folder) {
+  std::error_code error;
+  if (!fs::is_directory(folder, error))
+    throw InputError(
+        {folder.string(), "", "is no folder", "Name the folder that holds the scanner's export."});
+  std::vector<fs::path> files;
+  fs::recursive_directory_iterator at(folder, error);
+  for (const fs::recursive_directory_iterator end; !error && at != end; at.increment(error)) {
+    std::error_code gone;
+    if (at->is_regular_file(gone)) files.push_back(at->path());
+  }
+  if (error)
+    throw InputError({folder.string(), "", fmt::format("cannot be read to its end: {}", error.message()),
+                      "Give yourself the right to read the folder and those within it."});
+  std::sort(files.begin(), files.end());
+  return files;
+}
 
 std::vector<Image> ImageFolder::pixels(const std::vector<size_t>& chosen) const {
   std::map<size_t, std::vector<size_t>> by_file;  // positions in `chosen`

@@ -24,6 +24,10 @@ struct ImageFolder {
   [[nodiscard]] std::string file_name(size_t image) const;  ///< relative to the folder
 };
 
+/// All files in a folder and in those within it, in order of their paths. Throws InputError if there is no such folder, or one of
+/// them cannot be read.
+std::vector<std::filesystem::path> files_below(const std::filesystem::path& folder);
+
 using Progress = std::function<void(size_t done, size_t all)>;
 
 /// Reads every header below `folder` and the pixels that the kinds need: one or two images a slice. Throws InputError if there is no

@@ -16,8 +16,8 @@ constexpr double resolution_ms = 0.5;    // trigger times are written in millise
 std::vector<double> grouped(const std::vector<double>& sorted, double width_ms) {
   std::vector<double> means;
   for (size_t first = 0; first < sorted.size();) {
-    size_t end = first;
-    double sum = 0;
+    size_t end = first + 1;
+    double sum = sorted[first];
     while (end < sorted.size() && sorted[end] - sorted[first] <= width_ms)
       sum += sorted[end++];
     means.push_back(sum / static_cast<double>(end - first));
@@ -26,13 +26,16 @@ std::vector<double> grouped(const std::vector<double>& sorted, double width_ms) 
   return means;
 }
 
-double median_step(const std::vector<double>& sorted) {
-  std::vector<double> steps;
+void add_steps(const std::vector<double>& sorted, std::vector<double>& steps) {
   for (size_t i = 1; i < sorted.size(); ++i) {
     if (sorted[i] - sorted[i - 1] > resolution_ms) steps.push_back(sorted[i] - sorted[i - 1]);
   }
-  if (steps.empty()) return 0;
-  return signal::median(std::move(steps));
+}
+
+double median_step(const std::vector<double>& sorted) {
+  std::vector<double> steps;
+  add_steps(sorted, steps);
+  return steps.empty() ? 0 : signal::median(std::move(steps));
 }
 
 }  // namespace
@@ -47,11 +50,17 @@ std::optional<size_t> PhaseTimes::index_of(double trigger_ms) const {
   return static_cast<size_t>(nearest - times_ms.begin());
 }
 
-PhaseTimes phase_times(std::span<const double> trigger_ms) {
-  std::vector<double> sorted(trigger_ms.begin(), trigger_ms.end());
-  std::sort(sorted.begin(), sorted.end());
-  std::vector<double> means = grouped(sorted, resolution_ms);
-  means = grouped(means, same_phase * median_step(means));
+PhaseTimes phase_times(std::span<const std::vector<double>> trigger_ms_of_slices) {
+  std::vector<double> all, of_slices;
+  for (std::vector<double> of_slice : trigger_ms_of_slices) {
+    std::sort(of_slice.begin(), of_slice.end());
+    add_steps(of_slice, of_slices);
+    all.insert(all.end(), of_slice.begin(), of_slice.end());
+  }
+  std::sort(all.begin(), all.end());
+  const double usual =
+      of_slices.empty() ? median_step(grouped(all, resolution_ms)) : signal::median(of_slices);
+  const std::vector<double> means = grouped(all, std::max(resolution_ms, same_phase * usual));
   const double step = median_step(means);
   PhaseTimes phases;
   for (const double time : means) {

@@ -16,9 +16,9 @@ struct PhaseTimes {
   [[nodiscard]] std::optional<size_t> index_of(double trigger_ms) const;
 };
 
-/// From the trigger times of all images, in any order and with repetitions. Times closer than a quarter of the usual step are one
-/// phase, their mean: scanners write the interval measured for each slice. A gap of a whole number of steps, to a tenth, is
-/// phases that are missing.
-PhaseTimes phase_times(std::span<const double> trigger_ms);
+/// From the trigger times of each slice's images, in any order and with repetitions. Times closer than a quarter of a slice's usual
+/// step are one phase, their mean: scanners write the interval measured for each slice. A gap of a whole number of steps, to a
+/// tenth, is phases that are missing.
+PhaseTimes phase_times(std::span<const std::vector<double>> trigger_ms_of_slices);
 
 }  // namespace diastole::imaging

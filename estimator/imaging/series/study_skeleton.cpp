@@ -11,7 +11,7 @@ std::string study_skeleton(const ImageFolder& folder, const std::filesystem::pat
   for (const std::string ending : {".toml", ".study"}) {
     if (name.ends_with(ending)) name.resize(name.size() - ending.size());
   }
-  std::string text = fmt::format("{}\nversion = 1\n\n# The images:\n", study_skeleton_mark);
+  std::string text = "format = \"diastole-study\"\nversion = 1\n\n# The images:\n";
   for (const ImageSeries& series : folder.series) {
     text += fmt::format("#   series {}: {}, {}, {} slices, {} phases\n", series.number, describe(series.kind),
                         view_in_words(folder, series), series.slices.size(), series.phases.times_ms.size());

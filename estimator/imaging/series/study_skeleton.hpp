@@ -3,13 +3,10 @@
 
 #include <filesystem>
 #include <string>
-#include <string_view>
 
 #include "estimator/imaging/series/image_folder.hpp"
 
 namespace diastole::imaging {
-
-inline constexpr std::string_view study_skeleton_mark = "format = \"diastole-study\"";
 
 /// Its text, for a file of this name. The specimen's sizes are the paper's gel phantom until they are replaced.
 std::string study_skeleton(const ImageFolder& folder, const std::filesystem::path& study);

@@ -28,9 +28,13 @@ struct Orientation {
   std::set<long> places_mm{};  ///< along the normal
 };
 
+/// Of what moves, or of everything if nothing does: localisers lie as the magnet does.
 std::vector<Orientation> orientations(const ImageFolder& folder) {
   std::vector<Orientation> found;
+  const auto is_still = [](const ImageSeries& series) { return series.kind == SeriesKind::anatomy; };
+  const bool all_still = std::ranges::all_of(folder.series, is_still);
   for (const ImageSeries& series : folder.series) {
+    if (is_still(series) && !all_still) continue;
     const auto of_series = [&](const Orientation& one) { return parallel(*one.plane, series.plane()); };
     auto one = std::ranges::find_if(found, of_series);
     if (one == found.end()) one = found.insert(found.end(), {&series.plane()});

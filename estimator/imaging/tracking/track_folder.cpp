@@ -12,11 +12,12 @@
 namespace diastole::imaging {
 
 std::vector<TagView> tag_views(const ImageFolder& folder) {
-  std::vector<double> times_ms;
+  std::vector<std::vector<double>> times_ms;
   for (const ImageSeries& series : folder.series) {
     if (series.kind != SeriesKind::tagged_cine) continue;
+    times_ms.emplace_back();
     for (size_t k = 0; k < series.phases.times_ms.size(); ++k) {
-      if (series.phases.present[k]) times_ms.push_back(series.phases.times_ms[k]);
+      if (series.phases.present[k]) times_ms.back().push_back(series.phases.times_ms[k]);
     }
   }
   const PhaseTimes phases = phase_times(times_ms);

@@ -24,6 +24,7 @@ struct RingScan {
   double ghost_turn_rad = 0;           ///< its phase against the picture
   std::optional<int> missing_phase{};  ///< from 1
   bool with_times = true;
+  double first_ms = 12.0, step_ms = 72.0;
   int series = 2;
   Eigen::Vector3d origin_mm{-47.5, -47.5, 12.0};  ///< of the first pixel
   Eigen::Vector3d along_row{1, 0, 0};             ///< in the plane z = 12, as is the other
@@ -33,7 +34,7 @@ struct RingScan {
   unsigned seed = 1;
 
   static constexpr double inner_mm = 18, outer_mm = 38, water_mm = 46;
-  [[nodiscard]] double time_ms(int phase) const { return 12.0 + 72.0 * (phase - 1); }
+  [[nodiscard]] double time_ms(int phase) const { return first_ms + step_ms * (phase - 1); }
   [[nodiscard]] double inflation_mm2(int phase) const;
   /// n . X of the material that is seen at a place (patient coordinates), relative to n . x of the ring's centre at (0, 0).
   [[nodiscard]] double material_mm(int phase, const Eigen::Vector3d& x_mm) const;

@@ -1,3 +1,4 @@
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 
 #include <algorithm>
@@ -13,7 +14,11 @@ namespace {
 using test::RingScan;
 using test::ScratchFolder;
 using test::write_ring;
+using testing::Contains;
+using testing::DoubleNear;
+using testing::ElementsAre;
 using testing::HasSubstr;
+using testing::Not;
 
 std::vector<std::string> ids(const ImageFolder& folder) {
   std::vector<std::string> found;
@@ -149,19 +154,91 @@ TEST(ImageFolder, RefusesAFewImagesThatLieOtherwise) {
               HasSubstr("another geometry"));
 }
 
+/// Seven planes across z and three across x under one series' UID, an image each.
+void write_localiser(const std::filesystem::path& folder) {
+  RingScan plane{.phases = 1, .tagged = false, .series = 1, .uid = "1.2.4"};
+  for (int z = 0; z < 7; ++z) {
+    plane.origin_mm = {-47.5, -47.5, 10.0 * z};
+    write_ring(plane, folder, fmt::format("across-z{}-", z));
+  }
+  plane.along_row = {0, 1, 0};
+  plane.along_column = {0, 0, -1};
+  for (int x = 0; x < 3; ++x) {
+    plane.origin_mm = {10.0 * x, -47.5, 47.5};
+    write_ring(plane, folder, fmt::format("across-x{}-", x));
+  }
+}
+
+TEST(ImageFolder, ALocaliserIsNoMixedGeometry) {
+  const ScratchFolder scratch;
+  write_ring({}, scratch.path());
+  write_localiser(scratch.path());
+  const ImageFolder folder = read_image_folder(scratch.path());
+  EXPECT_THAT(ids(folder), Not(Contains("mixed-geometry")));
+  EXPECT_NO_THROW(require_sound(folder));
+}
+
+TEST(ImageFolder, TheShortAxisIsThatOfWhatMoves) {
+  const ScratchFolder scratch;
+  RingScan across{.uid = "1.2.3"};
+  across.along_row = {0, 1, 0};
+  across.along_column = {0, 0, -1};
+  across.origin_mm = {0, -47.5, 47.5};
+  for (int slice = 0; slice < 2; ++slice) {
+    across.origin_mm.x() = 10.0 * slice;
+    write_ring(across, scratch.path(), fmt::format("sa{}-", slice));
+  }
+  write_ring({.series = 3}, scratch.path(), "la");
+  write_localiser(scratch.path());
+  const ImageFolder folder = read_image_folder(scratch.path());
+  for (const ImageSeries& series : folder.series)
+    if (series.number == 2) EXPECT_THAT(view_in_words(folder, series), HasSubstr("short axis"));
+}
+
+TEST(ImageFolder, TriggerTimesThatAreNoMillisecondsAreTold) {
+  const ScratchFolder scratch;
+  RingScan scan;
+  scan.first_ms = 0.012;
+  scan.step_ms = 0.072;
+  write_ring(scan, scratch.path());
+  EXPECT_THAT(test::message_of([&] { require_sound(read_image_folder(scratch.path())); }),
+              HasSubstr("(0018,1060) goes from 0.012 to 0.516 ms"));
+}
+
+TEST(ImageFolder, AFirstPhaseThatIsLateIsTold) {
+  const ScratchFolder scratch;
+  RingScan scan;
+  scan.first_ms = 156;
+  write_ring(scan, scratch.path());
+  EXPECT_THAT(ids(read_image_folder(scratch.path())), ElementsAre("first-phase-late"));
+}
+
 TEST(ImageFolder, RefusesAnEmptyFolder) {
   const ScratchFolder scratch;
   EXPECT_THAT(test::message_of([&] { (void)read_image_folder(scratch.path()); }), HasSubstr("no MR images"));
 }
 
 TEST(PhaseTimes, CountsWhatIsMissingBetween) {
-  const std::vector<double> times = {12, 84, 12.4, 228, 300, 84.3};
+  const std::vector<std::vector<double>> times = {{12, 84, 228, 300}, {12.4, 84.3}};
   const PhaseTimes phases = phase_times(times);
   ASSERT_EQ(phases.times_ms.size(), 5U);
   EXPECT_NEAR(phases.times_ms[2], 156, 1);
   EXPECT_FALSE(phases.present[2]);
   EXPECT_EQ(phases.index_of(299), 4U);
   EXPECT_FALSE(phases.index_of(500));
+}
+
+TEST(PhaseTimes, AreOneWhereSlicesDifferByLessThanAQuarterOfTheStep) {
+  const std::vector<std::vector<double>> times = {
+      {20, 168, 316, 464}, {22, 170, 318, 466}, {25, 163, 311, 469}};
+  const PhaseTimes phases = phase_times(times);
+  EXPECT_THAT(phases.times_ms, ElementsAre(DoubleNear(67.0 / 3, 1e-9), DoubleNear(167, 1e-9),
+                                           DoubleNear(315, 1e-9), DoubleNear(1399.0 / 3, 1e-9)));
+}
+
+TEST(PhaseTimes, EndWhateverTheTimesAre) {
+  const std::vector<std::vector<double>> times = {{-1e308, 0, 1e308}, {1e308}};
+  EXPECT_GE(phase_times(times).times_ms.size(), 2U);
 }
 
 TEST(TagWaves, TellAGridsTwoDirectionsFromItsSums) {

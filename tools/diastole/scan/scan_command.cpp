@@ -3,7 +3,10 @@
 #include <toml++/toml.h>
 #include <unistd.h>
 
+#include <cerrno>
 #include <cmath>
+#include <cstdlib>
+#include <cstring>
 #include <filesystem>
 #include <iostream>
 #include <memory>
@@ -12,6 +15,7 @@
 #include <random>
 #include <sstream>
 
+#include "estimator/cli/interruption.hpp"
 #include "estimator/cli/study_options.hpp"
 #include "estimator/io/measurement.hpp"
 #include "estimator/io/whole_file.hpp"
@@ -125,10 +129,42 @@ void check(const ScanArguments& arguments, const ElasticModel& model) {
                                   protocol.field_of_view_mm, height_mm),
                       fmt::format("Give {:.0f} mm or more.", std::ceil(1.15 * height_mm))});
   std::error_code error;
-  if (fs::exists(arguments.folder, error) && !fs::is_empty(arguments.folder, error))
+  if (fs::exists(arguments.folder, error) &&
+      !(fs::is_directory(arguments.folder, error) && fs::is_empty(arguments.folder, error)))
     throw InputError(
         {arguments.folder.string(), "-o", "is there already and not empty", "Name a new folder."});
 }
+
+struct ScanInterrupted {};
+
+/// Becomes the folder that was asked for once it is finished, and vanishes otherwise.
+class UnfinishedFolder {
+ public:
+  explicit UnfinishedFolder(const fs::path& wanted) : wanted_(fs::absolute(wanted).lexically_normal()) {
+    if (!wanted_.has_filename()) wanted_ = wanted_.parent_path();  // `trial/`
+    std::string name = wanted_.string() + ".XXXXXX";
+    if (::mkdtemp(name.data()) == nullptr)
+      throw InputError({wanted.string(), "-o", fmt::format("cannot be made: {}", std::strerror(errno)),
+                        "Name a folder in one that is there and that you may write to."});
+    path_ = name;
+    fs::permissions(path_, fs::perms(0755));
+  }
+  ~UnfinishedFolder() {
+    std::error_code gone;
+    fs::remove_all(path_, gone);
+  }
+  UnfinishedFolder(const UnfinishedFolder&) = delete;
+  UnfinishedFolder& operator=(const UnfinishedFolder&) = delete;
+
+  [[nodiscard]] const fs::path& path() const { return path_; }
+  void finish() {
+    fs::remove(wanted_);
+    fs::rename(path_, wanted_);
+  }
+
+ private:
+  fs::path wanted_, path_;
+};
 
 /// Of all phases.
 struct Motion {
@@ -222,13 +258,15 @@ std::string pose_text(const Study& study, const scanner::ScanPose& pose) {
       row(pose.axes.col(0)), row(pose.axes.col(1)), row(pose.axes.col(2)));
 }
 
-ExitCode run_scan(const ScanArguments& arguments, const CommandOutput& out) {
+ExitCode scan_study(const ScanArguments& arguments, const CommandOutput& out) {
   const Study study = read_study(arguments.study);
   remark_on_imaged_load(study, "scan");
   const std::vector<ScanPhase> phases = phases_of(arguments, study);
   ElasticModel model = make_affected_model(study);
   require_cavity(study, model);
   check(arguments, model);
+  UnfinishedFolder unfinished(arguments.folder);
+  const fs::path& partial = unfinished.path();
   const bool shows_progress = isatty(STDERR_FILENO) != 0;
   if (shows_progress) fmt::print(stderr, "Solving {} phases.\n", phases.size());
   Motion motion = motion_of(study, model, phases);
@@ -240,15 +278,13 @@ ExitCode run_scan(const ScanArguments& arguments, const CommandOutput& out) {
                       : phases.back().time_s + (phases.back().time_s - phases.front().time_s) /
                                                    static_cast<double>(phases.size() - 1);
   if (arguments.flow) check_cycle(arguments, body);
-  // Complete or not at all.
-  const fs::path partial = arguments.folder.string() + ".partial";
-  fs::remove_all(partial);
   fs::create_directories(partial / "dicom");
   const scanner::ScanPose pose = pose_of(study);
   scanner::ScanProtocol protocol = arguments.protocol;
   protocol.middle_mm = 0.5 * (Extent(model.mesh()).low_mm + Extent(model.mesh()).high_mm);
   std::vector<scanner::ScannedSeries> series =
       scanner::scan(body, protocol, pose, partial / "dicom", [&](size_t done, size_t all) {
+        if (Interruption::requested()) throw ScanInterrupted{};
         if (shows_progress) fmt::print(stderr, "\r{} of {} images{}", done, all, done == all ? "\n" : "");
       });
   // Two scans of one heart, of other series each, then make one export.
@@ -272,8 +308,8 @@ ExitCode run_scan(const ScanArguments& arguments, const CommandOutput& out) {
   write_whole_file(partial / "scan.frames.csv", frames_text(phases, arguments.protocol.seed));
   write_whole_file(partial / "scan.pose.toml", pose_text(study, pose));
   write_whole_file(partial / "scan.study.toml", study_text(study));
-  fs::remove(arguments.folder);
-  fs::rename(partial, arguments.folder);
+  if (Interruption::requested()) throw ScanInterrupted{};
+  unfinished.finish();
   size_t files = 0;
   for (const scanner::ScannedSeries& one : series)
     files += one.files;
@@ -298,6 +334,16 @@ ExitCode run_scan(const ScanArguments& arguments, const CommandOutput& out) {
   fmt::print("\n{} files are in {}. What they tell:\n  diastole fit {}\n", files,
              (arguments.folder / "dicom").string(), (arguments.folder / "scan.study.toml").string());
   return ExitCode::done;
+}
+
+ExitCode run_scan(const ScanArguments& arguments, const CommandOutput& out) {
+  const Interruption interruption;
+  try {
+    return scan_study(arguments, out);
+  } catch (const ScanInterrupted&) {
+    std::cerr << "diastole scan: interrupted; nothing was written\n";
+    return ExitCode::negative;
+  }
 }
 
 }  // namespace
