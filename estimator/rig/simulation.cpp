@@ -43,15 +43,6 @@ void add_turning_errors(const std::array<TurningError, 2>& errors, double turn_m
   }
 }
 
-DriveTrace driven(const RigModel& model, const RunDrive& run, DriveTrace motion) {
-  for (const DriveMap& change : model.turns)
-    change(motion, run.place);
-  add_turning_errors(model.turning_errors, run.place.turn_mL, motion);
-  for (const DriveMap& change : model.drive)
-    change(motion, run.place);
-  return motion;
-}
-
 /// Conductances below this are none: the resistance would be beyond what the step's matrix bears.
 constexpr double least_leak = 1e-7;
 
@@ -126,7 +117,7 @@ class Plant {
   Plant(const RigModel& model, const RunDrive& run, const DriveTrace& motion,
         const SimulationOptions& options)
       : model_(model),
-        drive_(driven(model, run, motion)),
+        drive_(driven(model, run.place, motion)),
         gas_(model.pump_gas_mL, model.gas_exponent, run.place.atmosphere_kPa),
         leaks_(made(model.pump_leaks, run.place)),
         losses_(made(model.pump_losses, run.place)),
@@ -352,6 +343,15 @@ PlantTrace Plant::run() {
 }
 
 }  // namespace
+
+DriveTrace driven(const RigModel& model, const RunPlace& place, DriveTrace motion) {
+  for (const DriveMap& change : model.turns)
+    change(motion, place);
+  add_turning_errors(model.turning_errors, place.turn_mL, motion);
+  for (const DriveMap& change : model.drive)
+    change(motion, place);
+  return motion;
+}
 
 void DriveTrace::differentiate() {
   const size_t count = volume_mL.size();

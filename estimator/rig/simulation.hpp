@@ -55,6 +55,9 @@ double dividing_step(const RunDrive& run, double about_s);
 /// The run's motion sampled at these steps: the same for all models.
 DriveTrace sampled_motion(const RunDrive& run, double step_s);
 
+/// What the piston does where this motion is commanded.
+DriveTrace driven(const RigModel& model, const RunPlace& place, DriveTrace motion);
+
 /// Cycles of a repetition whose period is a whole number of steps are copied once one is like the one before within what
 /// could add up to 1e-6 of the pressures' range by the repetition's end.
 PlantTrace simulate_plant(const RigModel& model, const RunDrive& run, const SimulationOptions& options = {});

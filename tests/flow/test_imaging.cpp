@@ -5,6 +5,7 @@
 
 #include <cstdlib>
 #include <filesystem>
+#include <fstream>
 
 #include "tests/flow/browser.hpp"
 #include "tests/flow/programs.hpp"
@@ -77,6 +78,54 @@ TEST_F(ImagedGel, ASliceThatReachesBeyondTheEndIsTold) {
   }
   EXPECT_THAT(slices, testing::ElementsAre("series 2, slice 1", "series 2, slice 3", "series 3, slice 1",
                                            "series 3, slice 3"));
+}
+
+TEST_F(ImagedGel, TheSkeletonIsFittedAndReplacedOnlyByForce) {
+  if (sanitized) GTEST_SKIP() << "a fit of eight frames: too slow here";
+  const std::vector<std::string> command{"diastole", "images", "gel/dicom", "-o", "mine.study.toml"};
+  ASSERT_EQ(run(place, command).exit_code, 0);
+  std::filesystem::copy(place / "gel" / "tagged-gel.frames.csv", place / "mine.frames.csv");
+  const Ended fit = run(place, {"diastole", "fit", "mine.study.toml", "--json"});
+  EXPECT_EQ(fit.exit_code, 0) << fit.err;
+  EXPECT_NEAR(fit.json().at("parameters").at("C1_kPa").at("value").get<double>(), 8.71, 0.01 * 8.71);
+  const Ended again = run(place, command);
+  EXPECT_EQ(again.exit_code, 2);
+  EXPECT_THAT(again.err, HasSubstr("--force"));
+  std::vector<std::string> forced = command;
+  forced.emplace_back("--force");
+  EXPECT_EQ(run(place, forced).exit_code, 0);
+}
+
+TEST_F(ImagedGel, TwoOutputsOfOneNameAreRefusedBeforeTracking) {
+  const Ended track = run(place, {"diastole", "track", "gel/dicom", "-o", "gel.x", "--page", "./gel.x"});
+  EXPECT_EQ(track.exit_code, 2);
+  EXPECT_THAT(track.err, HasSubstr("another output"));
+  EXPECT_FALSE(std::filesystem::exists(place / "gel.x"));
+}
+
+TEST_F(ImagedGel, AScanLeavesItsFolderAndNothingElse) {
+  std::filesystem::create_directory(place / "trial.partial");
+  const std::string study = std::string(DIASTOLE_EXAMPLES) + "/phantom-a.study.toml";
+  const std::vector<std::string> scan{
+      "diastole",    "scan", study,      "--set", "C1_kPa=8.71", "--matrix", "96", "--short-axis=0",
+      "--long-axis", "0",    "--phases", "2",     "--peak-kPa",  "1",        "-o"};
+  const auto to = [&](const std::string& folder) {
+    std::vector<std::string> command = scan;
+    command.push_back(folder);
+    return run(place, command);
+  };
+  const Ended made = to("trial/");
+  EXPECT_EQ(made.exit_code, 0) << made.err;
+  EXPECT_TRUE(std::filesystem::exists(place / "trial" / "scan.study.toml"));
+  EXPECT_TRUE(std::filesystem::exists(place / "trial.partial"));
+  const Ended nowhere = to("missing/trial");
+  EXPECT_EQ(nowhere.exit_code, 2);
+  EXPECT_THAT(nowhere.err, HasSubstr("cannot be made"));
+  std::vector<std::string> left;
+  for (const auto& entry : std::filesystem::directory_iterator(place.path()))
+    if (entry.path().filename().string().starts_with("trial"))
+      left.push_back(entry.path().filename().string());
+  EXPECT_THAT(left, testing::UnorderedElementsAre("trial", "trial.partial"));
 }
 
 class TrackingInABrowser : public ImagedGel {

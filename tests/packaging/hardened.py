@@ -37,7 +37,8 @@ for program in programs:
     expect(not re.search(r"\((RPATH|RUNPATH)\)", dynamic), f"{name}: looks for libraries where its build was")
     expect("__stack_chk_fail" in symbols, f"{name}: no stack is guarded")
     checked = set(re.findall(r"\b__(\w+)_chk\b", symbols)) - {"stack"}
-    expect(len(checked) >= 3, f"{name}: the C library's checked functions are not used ({', '.join(sorted(checked))})")
+    # clang checks fewer of them than GCC (docs/decisions/0044-one-build-for-sanitizers-and-fuzzing.md).
+    expect("memcpy" in checked, f"{name}: the C library's checked functions are not used ({', '.join(sorted(checked))})")
     if platform.machine() == "x86_64":
         # The property of the whole program also needs the C library's start files, which Debian 12 builds without.
         landings = pathlib.Path(program).read_bytes().count(b"\xf3\x0f\x1e\xfa")

@@ -5,6 +5,19 @@
 #include "estimator/imaging/series/views.hpp"
 
 namespace diastole::imaging {
+namespace {
+
+/// A basic string of TOML.
+std::string quoted(const std::string& text) {
+  std::string inside;
+  for (const char c : text) {
+    if (c == '"' || c == '\\') inside += '\\';
+    inside += c;
+  }
+  return '"' + inside + '"';
+}
+
+}  // namespace
 
 std::string study_skeleton(const ImageFolder& folder, const std::filesystem::path& study) {
   std::string name = study.filename().string();
@@ -20,16 +33,17 @@ std::string study_skeleton(const ImageFolder& folder, const std::filesystem::pat
   }
   text +=
       "\n[specimen]\nkind = \"annulus\"\n"
-      "# Measure these on the specimen: the images do not tell them.\n"
+      "# Measure these on the specimen; `diastole track` prints radii and height as the outlines show them.\n"
       "inner_radius_mm = 22.5\nouter_radius_mm = 50.0\nheight_mm = 85.0\nmesh = [8, 4, 1]\nends = "
       "\"fixed\"\n\n"
       "[law]\nname = \"neo-hookean\"\n[law.parameters.C1_kPa]\nstart = 6.0\nbounds = [1.0, 30.0]\nvary = "
       "\"whole\"\n\n[data]\n";
-  text += fmt::format("tags = \"{}.tags.csv\"      # diastole track {} -o {}.tags.csv\n", name,
-                      folder.folder.string(), name);
-  text += fmt::format(
-      "frames = \"{}.frames.csv\"  # diastole bin RUN --frame-times ... --frames-csv {}.frames.csv\n", name,
-      name);
+  namespace fs = std::filesystem;
+  const fs::path images = fs::relative(folder.folder, fs::absolute(study).parent_path());
+  text += "# `diastole fit` tracks the images first, and keeps the tags beside this file.\n";
+  text += fmt::format("images = {}\n", quoted(images.generic_string()));
+  text += "# diastole bin RUN --frame-times ... --frames-csv FILE\n";
+  text += fmt::format("frames = {}\n", quoted(name + ".frames.csv"));
   for (const ImageSeries& series : folder.series) {
     if (series.kind != SeriesKind::tagged_cine) continue;
     text += "# frame 0 is the undeformed state; of the others the images say time_s =\n#  ";

@@ -159,7 +159,10 @@ TrackedFolder track_folder(const TrackRequest& request, const Stage& stage) {
   if (!edits.standing.empty())
     say(fmt::format("{} manual choices of {}", edits.standing.size(), edits.file.string()));
   say(fmt::format("tracking {} slices", views.size()));
-  std::vector<TrackedSlice> slices = track_views(std::move(views), machine_threads(), problems);
+  std::vector<TrackedSlice> slices =
+      track_views(std::move(views), machine_threads(), problems, [&](size_t done, size_t all) {
+        if (done < all) say(fmt::format("{} of {} slices are tracked", done, all));
+      });
   return gathered(request, edits, std::move(slices), std::move(problems));
 }
 

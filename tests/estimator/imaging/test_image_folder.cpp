@@ -1,3 +1,5 @@
+#include <dcmtk/config/osconfig.h>
+#include <dcmtk/dcmdata/dctk.h>
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 
@@ -211,6 +213,32 @@ TEST(ImageFolder, AFirstPhaseThatIsLateIsTold) {
   scan.first_ms = 156;
   write_ring(scan, scratch.path());
   EXPECT_THAT(ids(read_image_folder(scratch.path())), ElementsAre("first-phase-late"));
+}
+
+TEST(ImageFolder, RefusesSequencesNestedDeeperThanAnyScannersBeforeTheyAreRead) {
+  const ScratchFolder scratch;
+  const auto files = write_ring({}, scratch.path());
+  DcmFileFormat file;
+  ASSERT_TRUE(file.loadFile(files[0].c_str()).good());
+  DcmItem* item = file.getDataset();
+  for (int level = 0; level < 100; ++level)
+    ASSERT_TRUE(item->findOrCreateSequenceItem(DCM_ReferencedImageSequence, item).good());
+  ASSERT_TRUE(item->putAndInsertString(DCM_ImageComments, "deep").good());
+  for (const E_EncodingType lengths : {EET_UndefinedLength, EET_ExplicitLength}) {
+    ASSERT_TRUE(file.saveFile(files[0].c_str(), EXS_LittleEndianExplicit, lengths).good());
+    EXPECT_THAT(test::message_of([&] { require_sound(read_image_folder(scratch.path())); }),
+                HasSubstr("100 sequences within each other"));
+  }
+}
+
+TEST(ImageFolder, RefusesAFileThatIsDeflatedAsAWhole) {
+  const ScratchFolder scratch;
+  const auto files = write_ring({}, scratch.path());
+  DcmFileFormat file;
+  ASSERT_TRUE(file.loadFile(files[0].c_str()).good());
+  ASSERT_TRUE(file.saveFile(files[0].c_str(), EXS_DeflatedLittleEndianExplicit).good());
+  EXPECT_THAT(test::message_of([&] { require_sound(read_image_folder(scratch.path())); }),
+              HasSubstr("deflated as a whole"));
 }
 
 TEST(ImageFolder, RefusesAnEmptyFolder) {
