@@ -72,17 +72,17 @@ ExitCode run_track(const TrackArguments& arguments, const CommandOutput& out) {
                                       .edits = arguments.edits};
   inputs.push_back(imaging::edits_file(request));
   require_output({arguments.output, inputs, imaging::tags_file_mark, arguments.force});
-  std::vector<std::filesystem::path> outputs{arguments.output};
+  const auto place_of = [](const std::filesystem::path& path) {
+    return std::filesystem::weakly_canonical(std::filesystem::absolute(path));
+  };
+  std::vector<std::filesystem::path> outputs{place_of(arguments.output)};
   const auto require_another = [&](const std::filesystem::path& path, const char* option,
                                    std::string_view mark) {
     require_output({path, inputs, mark, arguments.force});
-    const auto is_path = [&](const std::filesystem::path& other) {
-      return std::filesystem::weakly_canonical(other) == std::filesystem::weakly_canonical(path);
-    };
-    if (std::ranges::any_of(outputs, is_path))
+    if (std::ranges::count(outputs, place_of(path)) > 0)
       throw InputError(
           {path.string(), option, "is another output of this command too", "Give each a name of its own."});
-    outputs.push_back(path);
+    outputs.push_back(place_of(path));
   };
   if (arguments.page) require_another(*arguments.page, "--page", report::page_mark);
   if (arguments.record) require_another(*arguments.record, "--record", tracking_file_mark);
