@@ -161,10 +161,13 @@ class Sorter {
   /// A series may hold several orientations, as a localiser does, or a cine along and across the axis. Images that lie otherwise than
   /// a cine's, with fewer than half of its phases, are no slice of their own: the protocol changed, or files of two scans were mixed.
   void report_mixed(std::vector<Stack>& all) {
+    std::map<const Stack*, double> phases;
+    for (const Stack& stack : all)
+      phases[&stack] = images_a_slice(stack);
     for (const Stack& few : all) {
       const auto many = std::find_if(all.begin(), all.end(), [&](const Stack& other) {
         return other.uid == few.uid && other.component == few.component &&
-               images_a_slice(other) > 2 * images_a_slice(few);
+               phases.at(&other) > 2 * phases.at(&few);
       });
       if (many == all.end()) continue;
       const SlicePlane& here = header(few.images[0]).plane;
