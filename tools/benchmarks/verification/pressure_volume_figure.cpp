@@ -17,7 +17,7 @@ constexpr double end_mL = 60.0;
 PressureVolumeCurve solve_and_print(std::array<size_t, 3> elements) {
   ElasticModel model = sphere.model(elements);
   const PressureVolumeCurve curve = pressure_volume_curve(model, {.volume_change_mL = end_mL, .steps = 15});
-  for (const size_t n : {2, 6, 15}) {
+  for (const size_t n : {2U, 6U, 15U}) {
     const PressureVolumePoint& point = curve.points.at(n);
     fmt::print("| {}×{}×{} | {:.0f} | {:.4f} | {:.4f} | {:.4f} at {:.2f} |\n", elements[0], elements[1],
                elements[2], point.volume_change_mL, point.pressure_kPa,
