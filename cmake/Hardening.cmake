@@ -1,4 +1,4 @@
-# What makes a mistake in the programs harder to use: checked copies, guarded stacks, tables that are read-only before the first
+# What makes a mistake in the programs harder to use: checked copies and containers, guarded stacks, tables that are read-only before the first
 # line runs, code at addresses of its own. In release and package; the sanitizers have checks of their own. A test looks for
 # each in the finished programs (tests/packaging/hardened.py).
 if(NOT CMAKE_BUILD_TYPE STREQUAL "Release")
@@ -8,6 +8,7 @@ include(CheckCXXCompilerFlag)
 set(CMAKE_REQUIRED_FLAGS -Werror)  # clang only warns of options that this processor lacks
 
 add_compile_options(-U_FORTIFY_SOURCE -D_FORTIFY_SOURCE=3 -fstack-protector-strong -fPIE)
+add_compile_definitions(_GLIBCXX_ASSERTIONS)  # an index or iterator outside its container ends the program
 foreach(option
     -fstack-clash-protection
     -fcf-protection              # x86: indirect branches and returns go where they may (CET)

@@ -293,6 +293,10 @@ std::optional<StudyPose> read_pose_of_images(TableReader& root) {
 }  // namespace
 
 Study read_study(const std::filesystem::path& path) {
+  if (std::filesystem::is_directory(path))
+    throw InputError({path.string(), "", "is a folder, and this command reads a study",
+                      "Name a *.study.toml; `diastole images FOLDER -o NAME.study.toml` begins one for a "
+                      "folder of images."});
   TableReader root = TableReader::from_file(path);
   root.expect_format("diastole-study", 1);
   SpecimenTable specimen = read_specimen(root, path.parent_path());

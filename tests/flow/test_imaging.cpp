@@ -3,9 +3,12 @@
 
 #include <gmock/gmock.h>
 
+#include <chrono>
+#include <csignal>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <thread>
 
 #include "tests/flow/browser.hpp"
 #include "tests/flow/programs.hpp"
@@ -126,6 +129,25 @@ TEST_F(ImagedGel, AScanLeavesItsFolderAndNothingElse) {
     if (entry.path().filename().string().starts_with("trial"))
       left.push_back(entry.path().filename().string());
   EXPECT_THAT(left, testing::UnorderedElementsAre("trial", "trial.partial"));
+}
+
+TEST_F(ImagedGel, AnInterruptedScanLeavesNothing) {
+  Program scan(place, {"diastole", "scan", std::string(DIASTOLE_EXAMPLES) + "/phantom-a.study.toml", "--set",
+                       "C1_kPa=8.71", "--matrix", "512", "--phases", "60", "--peak-kPa", "3", "-o", "trial"});
+  const auto left = [&] {
+    size_t count = 0;
+    for (const auto& entry : std::filesystem::directory_iterator(place.path()))
+      count += entry.path().filename().string().starts_with("trial") ? 1 : 0;
+    return count;
+  };
+  for (int wait = 0; wait < 600 && left() == 0; ++wait)
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
+  ASSERT_EQ(left(), 1U);
+  scan.signal(SIGINT);
+  const Ended ended = scan.wait();
+  EXPECT_EQ(ended.exit_code, 1);
+  EXPECT_THAT(ended.err, HasSubstr("interrupted; nothing was written"));
+  EXPECT_EQ(left(), 0U);
 }
 
 class TrackingInABrowser : public ImagedGel {

@@ -406,22 +406,33 @@ bool looks_like_dicom(std::ifstream& stream) {
 }
 
 /// How deep items lie within items of undefined length, or of one that holds the others; little-endian, as all but retired syntaxes.
-size_t depth_of_items(const std::string& bytes) {
-  constexpr std::string_view begin("\xfe\xff\x00\xe0", 4), end("\xfe\xff\x0d\xe0", 4);
+size_t depth_of_items(std::istream& stream) {
+  constexpr std::string_view delimiter("\xfe\xff", 2), begin("\xfe\xff\x00\xe0", 4),
+      end("\xfe\xff\x0d\xe0", 4);
   constexpr uint32_t undefined = 0xffffffff;
-  std::vector<size_t> ends;  // of the items around a place; none known is the file's
-  size_t most = 0;
-  for (size_t at = bytes.find("\xfe\xff"); at != std::string::npos; at = bytes.find("\xfe\xff", at + 2)) {
-    const std::string_view tag(bytes.data() + at, std::min<size_t>(4, bytes.size() - at));
-    while (!ends.empty() && ends.back() <= at)
-      ends.pop_back();
-    if (tag == end && !ends.empty()) ends.pop_back();
-    if (tag != begin || bytes.size() - at < 8) continue;
-    uint32_t length = 0;
-    std::memcpy(&length, bytes.data() + at + 4, sizeof length);
-    if (length == 0) continue;
-    ends.push_back(length == undefined ? bytes.size() : at + 8 + length);
-    most = std::max(most, ends.size());
+  constexpr size_t tag_and_length = 8;
+  std::vector<size_t> ends;  // of the items around a place
+  size_t most = 0, window_at = 0;
+  std::string window, block(1U << 16U, '\0');
+  while (stream.read(block.data(), static_cast<std::streamsize>(block.size())), stream.gcount() > 0) {
+    window.append(block, 0, static_cast<size_t>(stream.gcount()));
+    size_t at = window.find(delimiter);
+    for (; at != std::string::npos && at + tag_and_length <= window.size();
+         at = window.find(delimiter, at + 2)) {
+      const std::string_view tag(window.data() + at, begin.size());
+      while (!ends.empty() && ends.back() <= window_at + at)
+        ends.pop_back();
+      if (tag == end && !ends.empty()) ends.pop_back();
+      uint32_t length = 0;
+      std::memcpy(&length, window.data() + at + begin.size(), sizeof length);
+      if (tag != begin || length == 0) continue;
+      ends.push_back(length == undefined ? SIZE_MAX : window_at + at + tag_and_length + length);
+      most = std::max(most, ends.size());
+    }
+    const size_t done =
+        at != std::string::npos ? at : window.size() - 1;  // the last byte may begin a delimiter
+    window.erase(0, done);
+    window_at += done;
   }
   return most;
 }
@@ -438,8 +449,7 @@ std::optional<FileFault> check_before_loading(std::ifstream& stream, const std::
   }
   stream.clear();
   stream.seekg(0);
-  const std::string bytes(std::istreambuf_iterator<char>(stream), {});
-  if (const size_t depth = depth_of_items(bytes); depth > deepest)
+  if (const size_t depth = depth_of_items(stream); depth > deepest)
     return unusable("(fffe,e000)", fmt::format("holds {} sequences within each other", depth),
                     "No scanner writes this. Export the file again.");
   return std::nullopt;

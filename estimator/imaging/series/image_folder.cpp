@@ -266,10 +266,9 @@ class Sorter {
 
   /// Whether the trigger times of different images are different ones.
   bool times_differ(const SliceImages& slice, const std::vector<double>& times_ms) {
-    constexpr double least_step_ms = 0.5;  // no image is made in less
     if (times_ms.size() < 3) return true;  // two may be copies
     const auto [first, last] = std::minmax_element(times_ms.begin(), times_ms.end());
-    if (*last - *first > least_step_ms * static_cast<double>(times_ms.size() - 1)) return true;
+    if (*last - *first > trigger_resolution_ms * static_cast<double>(times_ms.size() - 1)) return true;
     if (same_pixels(slice.images.front(), slice.images.back())) return true;
     complain(Severity::error, "trigger-times-alike",
              fmt::format("TriggerTime (0018,1060) goes from {:g} to {:g} ms in the {} images of this slice: "

@@ -10,7 +10,6 @@ namespace {
 constexpr double same_phase = 0.25;      // of a step
 constexpr double whole_tolerance = 0.1;  // of a step
 constexpr double most_missing = 16.0;    // a longer gap is a pause of the protocol, not missing images
-constexpr double resolution_ms = 0.5;    // trigger times are written in milliseconds
 
 /// Means of groups of times no further apart than `width_ms` from the group's first.
 std::vector<double> grouped(const std::vector<double>& sorted, double width_ms) {
@@ -28,7 +27,7 @@ std::vector<double> grouped(const std::vector<double>& sorted, double width_ms) 
 
 void add_steps(const std::vector<double>& sorted, std::vector<double>& steps) {
   for (size_t i = 1; i < sorted.size(); ++i) {
-    if (sorted[i] - sorted[i - 1] > resolution_ms) steps.push_back(sorted[i] - sorted[i - 1]);
+    if (sorted[i] - sorted[i - 1] > trigger_resolution_ms) steps.push_back(sorted[i] - sorted[i - 1]);
   }
 }
 
@@ -59,8 +58,8 @@ PhaseTimes phase_times(std::span<const std::vector<double>> trigger_ms_of_slices
   }
   std::sort(all.begin(), all.end());
   const double usual =
-      of_slices.empty() ? median_step(grouped(all, resolution_ms)) : signal::median(of_slices);
-  const std::vector<double> means = grouped(all, std::max(resolution_ms, same_phase * usual));
+      of_slices.empty() ? median_step(grouped(all, trigger_resolution_ms)) : signal::median(of_slices);
+  const std::vector<double> means = grouped(all, std::max(trigger_resolution_ms, same_phase * usual));
   const double step = median_step(means);
   PhaseTimes phases;
   for (const double time : means) {

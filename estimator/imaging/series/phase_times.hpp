@@ -7,6 +7,9 @@
 
 namespace diastole::imaging {
 
+/// No image is made in less, and headers give no more.
+inline constexpr double trigger_resolution_ms = 0.5;
+
 struct PhaseTimes {
   std::vector<double>
       times_ms;               ///< of phase 1, 2, ...; of a phase that no image has, in between its neighbours

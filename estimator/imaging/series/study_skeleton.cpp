@@ -3,21 +3,9 @@
 #include <fmt/format.h>
 
 #include "estimator/imaging/series/views.hpp"
+#include "protocol/contract/text.hpp"
 
 namespace diastole::imaging {
-namespace {
-
-/// A basic string of TOML.
-std::string quoted(const std::string& text) {
-  std::string inside;
-  for (const char c : text) {
-    if (c == '"' || c == '\\') inside += '\\';
-    inside += c;
-  }
-  return '"' + inside + '"';
-}
-
-}  // namespace
 
 std::string study_skeleton(const ImageFolder& folder, const std::filesystem::path& study) {
   std::string name = study.filename().string();
@@ -41,9 +29,9 @@ std::string study_skeleton(const ImageFolder& folder, const std::filesystem::pat
   namespace fs = std::filesystem;
   const fs::path images = fs::relative(folder.folder, fs::absolute(study).parent_path());
   text += "# `diastole fit` tracks the images first, and keeps the tags beside this file.\n";
-  text += fmt::format("images = {}\n", quoted(images.generic_string()));
+  text += fmt::format("images = {}\n", toml_text(images.generic_string()));
   text += "# diastole bin RUN --frame-times ... --frames-csv FILE\n";
-  text += fmt::format("frames = {}\n", quoted(name + ".frames.csv"));
+  text += fmt::format("frames = {}\n", toml_text(name + ".frames.csv"));
   for (const ImageSeries& series : folder.series) {
     if (series.kind != SeriesKind::tagged_cine) continue;
     text += "# frame 0 is the undeformed state; of the others the images say time_s =\n#  ";

@@ -215,6 +215,26 @@ TEST(ImageFolder, AFirstPhaseThatIsLateIsTold) {
   EXPECT_THAT(ids(read_image_folder(scratch.path())), ElementsAre("first-phase-late"));
 }
 
+TEST(ImageFolder, FewerPhasesThanTheHeadersAnnounceAreTold) {
+  const ScratchFolder scratch;
+  for (const auto& path : write_ring({}, scratch.path())) {
+    DcmFileFormat file;
+    ASSERT_TRUE(file.loadFile(path.c_str()).good());
+    ASSERT_TRUE(file.getDataset()->putAndInsertString(DCM_CardiacNumberOfImages, "16").good());
+    ASSERT_TRUE(file.saveFile(path.c_str(), EXS_LittleEndianExplicit).good());
+  }
+  const ImageFolder folder = read_image_folder(scratch.path());
+  ASSERT_THAT(ids(folder), ElementsAre("phases-announced"));
+  EXPECT_THAT(folder.problems[0].what, HasSubstr("8 phases are here, and (0018,1090) announces 16"));
+}
+
+TEST(ImageFolder, TagsThatTheFirstPhaseLacksAreTold) {
+  const ScratchFolder scratch;
+  write_ring({}, scratch.path());
+  write_ring({.phases = 1, .tagged = false}, scratch.path());  // over the first
+  EXPECT_THAT(ids(read_image_folder(scratch.path())), ElementsAre("tags-begin-late"));
+}
+
 TEST(ImageFolder, RefusesSequencesNestedDeeperThanAnyScannersBeforeTheyAreRead) {
   const ScratchFolder scratch;
   const auto files = write_ring({}, scratch.path());

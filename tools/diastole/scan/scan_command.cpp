@@ -177,6 +177,7 @@ Motion motion_of(const Study& study, ElasticModel& model, const std::vector<Scan
   ElasticState state = model.rest_state();  // each phase is found from the last
   const double rest_mL = model.cavity_volume_mL(state);
   for (const ScanPhase& phase : phases) {
+    if (Interruption::requested()) throw ScanInterrupted{};
     const Solution solution = model.solve(phase.pressure_kPa, state);
     if (!solution.report.converged())
       throw InputError({study.file.string(), fmt::format("pressure {:.3g} kPa", phase.pressure_kPa),
