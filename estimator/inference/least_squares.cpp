@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <deque>
 
 #include "estimator/inference/linear_model.hpp"
 
@@ -17,8 +18,9 @@ using Eigen::VectorXd;
 
 constexpr double nothing_gained = 2e-3;   // of chi-square: a twentieth of a standard error
 constexpr double tolerances_gained = 10;  // or as many of the tolerance of the cost
-constexpr double hardly_damped = 10;  // radius of the trust region from which a step is nearly the best one
-constexpr double poor_gain = 0.25;    // of the expected one
+constexpr double hardly_damped = 10;   // radius of the trust region from which a step is nearly the best one
+constexpr double poor_gain = 0.25;     // of the expected one
+constexpr size_t creeping_steps = 10;  // the trust region may grow by 3^10 in so many
 constexpr double trusted_over_sigmas = 2;  // a kept Jacobian, where a search would end
 
 /// One round of Ceres' minimiser goes from a linear model to the end of the search, or to where the Jacobian must be
@@ -35,7 +37,16 @@ class Search {
   bool go_on(const ceres::IterationSummary& step);
 
  private:
-  enum class RoundEnd { ceres, small_gain, refusals, interrupted, hopeless, fresh_jacobian, next_box };
+  enum class RoundEnd {
+    ceres,
+    small_gain,
+    refusals,
+    creeping,
+    interrupted,
+    hopeless,
+    fresh_jacobian,
+    next_box
+  };
   struct Point {
     VectorXd q, residuals;
   };
@@ -45,6 +56,7 @@ class Search {
   void linearise();
   [[nodiscard]] std::vector<bool> held() const;
   [[nodiscard]] double small_gain() const;
+  [[nodiscard]] bool is_creeping();
   [[nodiscard]] RoundEnd end_after(const ceres::IterationSummary& step);
   ceres::Solver::Summary minimise_round();
   [[nodiscard]] bool needs_another_round(const ceres::Solver::Summary& summary);
@@ -57,6 +69,7 @@ class Search {
   Point trial_;
   SearchResult result_;
   RoundEnd end_ = RoundEnd::ceres;
+  std::deque<double> chi_squares_;  // after the last accepted steps
   int before_round_ = 0, refused_ = 0, refused_in_a_row_ = 0;
   double radius_ = 0, gain_ = 0, expected_gain_ = 0;
   bool step_was_on_fresh_ = true;
@@ -145,6 +158,15 @@ double Search::small_gain() const {
   return std::max(nothing_gained, tolerances_gained * options_.cost_tolerance * model_.chi_square());
 }
 
+/// After an accepted step: whether the last ones together gained next to nothing.
+bool Search::is_creeping() {
+  chi_squares_.push_back(model_.chi_square());
+  if (chi_squares_.size() <= creeping_steps) return false;
+  const double before = chi_squares_.front();
+  chi_squares_.pop_front();
+  return options_.small_gain && before - chi_squares_.back() < small_gain();
+}
+
 bool Search::go_on(const ceres::IterationSummary& step) {
   end_ = end_after(step);
   return end_ == RoundEnd::ceres;
@@ -164,6 +186,7 @@ Search::RoundEnd Search::end_after(const ceres::IterationSummary& step) {
   if (refused && model_.kept_over_sigmas > 0) return RoundEnd::fresh_jacobian;
   const double radius_before = std::exchange(radius_, step.trust_region_radius);
   if (refused) return refused_in_a_row_ >= options_.refusal_limit ? RoundEnd::refusals : RoundEnd::ceres;
+  if (!first && is_creeping()) return RoundEnd::creeping;
   const bool enough = options_.small_gain && gain_ < small_gain();
   if (!first && enough && step_was_on_fresh_ && radius_before >= hardly_damped) return RoundEnd::small_gain;
   if (!first && model_.kept_over_sigmas > 0 && gain_ < poor_gain * expected_gain_)
@@ -241,7 +264,7 @@ void Search::conclude(const ceres::Solver::Summary& summary) {
   } else if (end_ == RoundEnd::small_gain) {
     conclude_converged(
         fmt::format("Converged: no step lowers chi-square by more than {:.2g}.", small_gain()));
-  } else if ((end_ == RoundEnd::refusals || (settled && refused_ > 0)) &&
+  } else if ((end_ == RoundEnd::refusals || end_ == RoundEnd::creeping || (settled && refused_ > 0)) &&
              model_.greatest_gain(held()) > small_gain()) {
     result_.termination = Termination::stalled;
     result_.reason = sentence(Termination::stalled);
@@ -251,7 +274,7 @@ void Search::conclude(const ceres::Solver::Summary& summary) {
   } else if (settled && summary.message.starts_with("Parameter")) {
     conclude_converged(fmt::format("Converged: the last step changed the unknowns by less than {:g} of them.",
                                    options_.step_tolerance));
-  } else if (settled || end_ == RoundEnd::refusals) {
+  } else if (settled || end_ == RoundEnd::refusals || end_ == RoundEnd::creeping) {
     conclude_converged("Converged: the cost's gradient vanishes.");
   } else if (summary.termination_type == ceres::NO_CONVERGENCE) {
     result_.termination = Termination::iteration_limit;
@@ -272,6 +295,7 @@ SearchResult Search::from(const VectorXd& start) {
   model_.q = result_.q;
   model_.residuals = trial_.residuals;
   linearise();
+  chi_squares_ = {model_.chi_square()};
   radius_ = options_.first_radius;
   ceres::Solver::Summary summary;
   do

@@ -68,7 +68,8 @@ struct SearchOptions {
   /// ... or when the unknowns do.
   double step_tolerance = 1e-8;
   /// ... or, where given, when chi-square is expected to fall by less than this in the best step, or did so in a step
-  /// that was hardly damped. Called with chi-square.
+  /// that was hardly damped. Called with chi-square. Ten steps in a row that together bring less, while more is expected, end it as
+  /// stalled.
   std::function<double(double chi_square)> small_gain = {};
   /// So many refused steps in a row end the search.
   int refusal_limit = 1000;

@@ -46,16 +46,30 @@ WallFriction::WallFriction(const Hose& hose)
       wave_speed_m_s_(hose.wave_speed_m_s),
       unsteady_(hose.unsteady_friction),
       to_place_(density_ * bore_m_ / (viscosity_ * table_step)) {
-  for (size_t k = 0; k < table_size; ++k)
-    table_.push_back(node(table_step * static_cast<double>(k)));
+  make_table();
 }
 
-WallFriction::Node WallFriction::node(double reynolds) const {
-  const double speed = reynolds * viscosity_ / (density_ * bore_m_);
+void WallFriction::make_table() {
   const double small = 1e-3 / to_place_;
-  const double growth = (steady_kPa_per_m(speed + small) - steady_kPa_per_m(speed - small)) / 2e-3;
-  const double inertia = unsteady_ ? density_ * std::sqrt(shear_decay(reynolds)) / 4.0 * 1e-3 : 0.0;
-  return {steady_kPa_per_m(speed), growth, inertia};
+  const auto inertia = [&](double reynolds) {
+    return unsteady_ ? density_ * std::sqrt(shear_decay(reynolds)) / 4.0 * 1e-3 : 0.0;
+  };
+  const auto growth = [&](double speed) {
+    return (steady_kPa_per_m(speed + small) - steady_kPa_per_m(speed - small)) / 2e-3;
+  };
+  table_.reserve(table_size);
+  double left = 0.0, left_growth = growth(0.0), left_inertia = inertia(0.0);
+  for (size_t k = 1; k <= table_size; ++k) {
+    const double speed = static_cast<double>(k) / to_place_;
+    const double right = steady_kPa_per_m(speed), right_growth = growth(speed);
+    const double right_inertia = inertia(table_step * static_cast<double>(k));
+    const double rise = right - left;
+    table_.push_back({{left, left_growth, 3.0 * rise - 2.0 * left_growth - right_growth,
+                       left_growth + right_growth - 2.0 * rise},
+                      left_inertia,
+                      right_inertia - left_inertia});
+    left = right, left_growth = right_growth, left_inertia = right_inertia;
+  }
 }
 
 double WallFriction::reynolds(double speed_m_s) const {
@@ -77,19 +91,16 @@ WallFriction::Drag WallFriction::drag(double speed_m_s, double stretching) const
   const double place = speed * to_place_;
   Drag drag;
   double steady = 0.0;
-  if (place < static_cast<double>(table_size - 1)) {
+  if (place < static_cast<double>(table_size)) {
     const auto k = static_cast<size_t>(place);
-    const Node& left = table_[k];
-    const Node& right = table_[k + 1];
+    const Piece& piece = table_[k];
+    const auto& [value, slope, square, cube] = piece.steady_kPa_per_m;
     const double s = place - static_cast<double>(k);
-    const double rise = right.steady_kPa_per_m - left.steady_kPa_per_m;
-    const double square = 3.0 * rise - 2.0 * left.growth_kPa_per_m - right.growth_kPa_per_m;
-    const double cube = left.growth_kPa_per_m + right.growth_kPa_per_m - 2.0 * rise;
-    steady = left.steady_kPa_per_m + s * (left.growth_kPa_per_m + s * (square + s * cube));
-    drag.by_rate = left.inertia + s * (right.inertia - left.inertia);
+    steady = value + s * (slope + s * (square + s * cube));
+    drag.by_rate = piece.inertia + s * piece.inertia_rise;
   } else {
     steady = steady_kPa_per_m(speed);
-    drag.by_rate = table_.back().inertia;
+    drag.by_rate = table_.back().inertia + table_.back().inertia_rise;
   }
   const double turning = speed_m_s / (speed + 1e-4);
   drag.still_kPa_per_m =

@@ -54,16 +54,17 @@ class WallFriction {
   [[nodiscard]] Drag drag(double speed_m_s, double stretching) const;
 
  private:
-  /// At an even step of Re: the steady gradient, how it grows over a step, and rho k / 2.
-  struct Node {
-    double steady_kPa_per_m, growth_kPa_per_m, inertia;
+  /// Between two of even steps of Re: the steady gradient's cubic in the place between them, and rho k / 2.
+  struct Piece {
+    double steady_kPa_per_m[4];  // NOLINT: read some hundred million times
+    double inertia, inertia_rise;
   };
-  [[nodiscard]] Node node(double reynolds) const;
+  void make_table();
 
   double density_, viscosity_, bore_m_, wave_speed_m_s_;
   bool unsteady_;
   double to_place_;  ///< of a speed in the table
-  std::vector<Node> table_;
+  std::vector<Piece> table_;
 };
 
 }  // namespace diastole::rig

@@ -1,6 +1,7 @@
 #include "estimator/rig/small_matrix.hpp"
 
 #include <cstring>
+#include <utility>
 
 namespace diastole::rig {
 namespace {
@@ -11,33 +12,42 @@ struct Neighbours {
   using Type __attribute__((vector_size(Rows * sizeof(double)))) = double;
 };
 
-/// Count * Width rows side by side, so that their sums do not wait for each other.
-template <size_t Width, size_t Count>
+template <class Rows>
+[[gnu::always_inline]] inline void add_column(Rows& sum, const double* column, double by) {
+  Rows rows;
+  std::memcpy(&rows, column, sizeof rows);
+  sum += rows * by;
+}
+
+/// As many times Width rows as there are `Part`, side by side and odd columns apart, so that sums do not wait for each other. All
+/// places are constants: the sums stay in registers.
+template <size_t Width, size_t... Part>
 [[gnu::always_inline]] inline void multiply_rows(const double* values, size_t stride, size_t columns,
-                                                 const double* in, double* out, bool add) {
+                                                 const double* in, double* out, bool add,
+                                                 std::index_sequence<Part...> /*parts*/) {
   using Rows = typename Neighbours<Width>::Type;
-  Rows sum[Count] = {};  // NOLINT: no call must stand between the loops and the registers
-  if (add) std::memcpy(sum, out, sizeof sum);
-  for (size_t j = 0; j < columns; ++j) {
-    for (size_t i = 0; i < Count; ++i) {
-      Rows column;
-      std::memcpy(&column, values + j * stride + Width * i, sizeof column);
-      sum[i] += column * in[j];
-    }
+  Rows even[sizeof...(Part)] = {},
+       odd[sizeof...(Part)] = {};  // NOLINT: no call must stand between them and the registers
+  if (add) (std::memcpy(&even[Part], out + Width * Part, sizeof(Rows)), ...);
+  size_t j = 0;
+  for (; j + 2 <= columns; j += 2, values += 2 * stride) {
+    (add_column(even[Part], values + Width * Part, in[j]), ...);
+    (add_column(odd[Part], values + stride + Width * Part, in[j + 1]), ...);
   }
-  std::memcpy(out, sum, sizeof sum);
+  if (j < columns) (add_column(even[Part], values + Width * Part, in[j]), ...);
+  ((even[Part] += odd[Part]), ...);
+  (std::memcpy(out + Width * Part, &even[Part], sizeof(Rows)), ...);
 }
 
 template <size_t Width>
 [[gnu::always_inline]] inline void multiply_all(const double* values, size_t rows, size_t columns,
                                                 const double* in, double* out, bool add) {
+  constexpr std::make_index_sequence<8 / Width> eight;
+  constexpr std::make_index_sequence<16 / Width> sixteen;
   size_t row = 0;
-  for (; row + 32 <= rows; row += 32)
-    multiply_rows<Width, 32 / Width>(values + row, rows, columns, in, out + row, add);
   for (; row + 16 <= rows; row += 16)
-    multiply_rows<Width, 16 / Width>(values + row, rows, columns, in, out + row, add);
-  for (; row < rows; row += 8)
-    multiply_rows<Width, 8 / Width>(values + row, rows, columns, in, out + row, add);
+    multiply_rows<Width>(values + row, rows, columns, in, out + row, add, sixteen);
+  if (row < rows) multiply_rows<Width>(values + row, rows, columns, in, out + row, add, eight);
 }
 
 using Multiply = void (*)(const double*, size_t, size_t, const double*, double*, bool);

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -297,20 +298,26 @@ SegmentFeatures::SegmentFeatures(const Session& session, const NoiseModel& noise
       (channel == Channel::cavity ? shown.pressures.cavity_kPa : shown.pressures.pump_kPa) = values;
     for (const GatedVolume& volume : run.volumes)
       shown.volumes.push_back(volume.measured.cavity_mL);
-    project(r, shown, measured_);
+    project(r, std::array{shown}, measured_);
   }
   for (FeatureBlock& block : blocks_)
     raise_noise_of_cycles(block, measured_);
 }
 
-Eigen::VectorXd SegmentFeatures::project(const FeatureBlock& block, const Eigen::VectorXd& values) {
-  Eigen::VectorXd products(static_cast<Eigen::Index>(block.basis.size()));
+Eigen::MatrixXd SegmentFeatures::project(const FeatureBlock& block, const Eigen::MatrixXd& values) {
+  Eigen::MatrixXd products(static_cast<Eigen::Index>(block.basis.size()), values.cols());
+  Eigen::VectorXd of_rows;
   for (size_t j = 0; j < block.basis.size(); ++j) {
     const FeatureBlock::Function& function = block.basis[j];
-    products[static_cast<Eigen::Index>(j)] =
-        function.values.cast<double>().dot(values.segment(function.first, function.values.size()));
+    of_rows = function.values.cast<double>();
+    // One by one: what is projected beside a series must not change its last digit.
+    for (Eigen::Index m = 0; m < values.cols(); ++m)
+      products(static_cast<Eigen::Index>(j), m) =
+          of_rows.dot(values.col(m).segment(function.first, of_rows.size()));
   }
-  return block.factor.triangularView<Eigen::Lower>().solve(products);
+  for (auto column : products.colwise())
+    block.factor.triangularView<Eigen::Lower>().solveInPlace(column);
+  return products;
 }
 
 Eigen::VectorXd SegmentFeatures::series(const FeatureBlock& block, const Eigen::VectorXd& features) {
@@ -322,19 +329,22 @@ Eigen::VectorXd SegmentFeatures::series(const FeatureBlock& block, const Eigen::
   return values;
 }
 
-void SegmentFeatures::project(size_t run, const Shown& shown, Eigen::Ref<Eigen::VectorXd> out) const {
+void SegmentFeatures::project(size_t run, std::span<const Shown> shown,
+                              Eigen::Ref<Eigen::MatrixXd> out) const {
   for (const FeatureBlock& block : blocks_) {
     if (block.run != run) continue;
-    const std::vector<double>& all = block.signal == Signal::volume
-                                         ? shown.volumes[block.first_row]
-                                         : *pressures(shown.pressures, block.signal);
-    const size_t from = block.signal == Signal::volume ? 0 : block.first_row;
-    Eigen::VectorXd values(block.rows);
-    for (Eigen::Index k = 0; k < values.size(); ++k) {
-      const double value = all[from + static_cast<size_t>(k)];
-      values[k] = std::isfinite(value) ? value : 0.0;
+    Eigen::MatrixXd values(block.rows, out.cols());
+    for (size_t m = 0; m < shown.size(); ++m) {
+      const std::vector<double>& all = block.signal == Signal::volume
+                                           ? shown[m].volumes[block.first_row]
+                                           : *pressures(shown[m].pressures, block.signal);
+      const size_t from = block.signal == Signal::volume ? 0 : block.first_row;
+      for (Eigen::Index k = 0; k < values.rows(); ++k) {
+        const double value = all[from + static_cast<size_t>(k)];
+        values(k, static_cast<Eigen::Index>(m)) = std::isfinite(value) ? value : 0.0;
+      }
     }
-    out.segment(static_cast<Eigen::Index>(block.first), static_cast<Eigen::Index>(block.features.size())) =
+    out.middleRows(static_cast<Eigen::Index>(block.first), static_cast<Eigen::Index>(block.features.size())) =
         project(block, values);
   }
 }

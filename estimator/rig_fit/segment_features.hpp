@@ -13,6 +13,7 @@
 // where single cycles count, their variation.
 
 #include <Eigen/Dense>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -76,10 +77,10 @@ class SegmentFeatures {
   [[nodiscard]] const std::vector<FeatureBlock>& blocks() const { return blocks_; }
   [[nodiscard]] Eigen::Index count() const { return static_cast<Eigen::Index>(count_); }
   [[nodiscard]] const Eigen::VectorXd& measured() const { return measured_; }
-  /// Sets the features of one run.
-  void project(size_t run, const Shown& shown, Eigen::Ref<Eigen::VectorXd> out) const;
-  /// The same of a series of one block's rows.
-  [[nodiscard]] static Eigen::VectorXd project(const FeatureBlock& block, const Eigen::VectorXd& values);
+  /// Sets the features of one run; a column for each of several models, whose projections are faster together.
+  void project(size_t run, std::span<const Shown> shown, Eigen::Ref<Eigen::MatrixXd> out) const;
+  /// The same of series of one block's rows, a column each.
+  [[nodiscard]] static Eigen::MatrixXd project(const FeatureBlock& block, const Eigen::MatrixXd& values);
   /// The series that has these features and nothing else.
   [[nodiscard]] static Eigen::VectorXd series(const FeatureBlock& block, const Eigen::VectorXd& features);
 

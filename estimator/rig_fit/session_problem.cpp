@@ -124,12 +124,17 @@ Eigen::MatrixXd SessionProblem::shown(std::span<const RigModel> made,
   std::vector<PlantTrace> first(same_plant.empty() ? 0 : runs);
   parallel_for(first.size(), threads_, [&](size_t r) { first[r] = plant(made.front(), r); });
   Eigen::MatrixXd out(features_.count(), static_cast<Eigen::Index>(made.size()));
-  parallel_for(made.size() * runs, threads_, [&](size_t task) {
+  constexpr size_t together = 4;
+  parallel_for((made.size() + together - 1) / together * runs, threads_, [&](size_t task) {
     const size_t r = task % runs;
-    const size_t m = task / runs;
-    const bool kept = !same_plant.empty() && (m == 0 || same_plant[m]);
-    const Shown seen = kept ? shown_in(r, made[m], first[r]) : shown_in(r, made[m], plant(made[m], r));
-    features_.project(r, seen, out.col(static_cast<Eigen::Index>(m)));
+    const size_t from = task / runs * together;
+    std::vector<Shown> seen;
+    for (size_t m = from; m < std::min(from + together, made.size()); ++m) {
+      const bool kept = !same_plant.empty() && (m == 0 || same_plant[m]);
+      seen.push_back(kept ? shown_in(r, made[m], first[r]) : shown_in(r, made[m], plant(made[m], r)));
+    }
+    features_.project(
+        r, seen, out.middleCols(static_cast<Eigen::Index>(from), static_cast<Eigen::Index>(seen.size())));
   });
   return out;
 }

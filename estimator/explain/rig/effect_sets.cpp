@@ -64,12 +64,8 @@ class Screening {
     const double a = amplitude(along(i), square(i));
     return a * (2.0 * along(i) - a * square(i));
   }
-  /// Of any amplitude.
-  [[nodiscard]] double best_single(size_t i) const {
-    return along(i) > 0.0 && square(i) > 0.0 ? along(i) * along(i) / square(i) : 0.0;
-  }
   [[nodiscard]] double pair(size_t i, size_t j) const {
-    const double both = products_(static_cast<Index>(i) + 1, static_cast<Index>(j) + 1);
+    const double both = product(i, j);
     double a = 1.0;
     double b = 1.0;
     for (int round = 0; round < 6; ++round) {  // of a box-bounded quadratic, from its middle
@@ -79,11 +75,40 @@ class Screening {
     return 2.0 * (a * along(i) + b * along(j)) - a * a * square(i) - b * b * square(j) - 2.0 * a * b * both;
   }
 
- private:
-  [[nodiscard]] double along(size_t i) const { return products_(0, static_cast<Index>(i) + 1); }
-  [[nodiscard]] double square(size_t i) const {
-    return products_(static_cast<Index>(i) + 1, static_cast<Index>(i) + 1);
+  struct Joined {
+    double gain = 0.0;          ///< of 2 ln likelihood
+    double log_evidence = 0.0;  ///< gained where each amplitude's prior is as wide as the amplitude
+  };
+  /// Responses together, of any amplitudes that are not negative.
+  [[nodiscard]] Joined joined(std::vector<size_t> responses) const {
+    const auto count = static_cast<Index>(responses.size());
+    if (count == 0) return {};
+    VectorXd b(count);
+    MatrixXd squares(count, count);
+    for (Index i = 0; i < count; ++i) {
+      b[i] = along(responses[static_cast<size_t>(i)]);
+      for (Index j = 0; j < count; ++j)
+        squares(i, j) = product(responses[static_cast<size_t>(i)], responses[static_cast<size_t>(j)]);
+    }
+    const VectorXd amplitudes = squares.ldlt().solve(b);
+    Index least = 0;
+    if (!(amplitudes.minCoeff(&least) > 0.0)) {
+      responses.erase(responses.begin() + least);
+      return joined(std::move(responses));
+    }
+    MatrixXd with_prior = squares;
+    with_prior.diagonal() += amplitudes.cwiseAbs2().cwiseInverse();
+    const MatrixXd scaled = amplitudes.asDiagonal() * with_prior * amplitudes.asDiagonal();
+    return {.gain = amplitudes.dot(b),
+            .log_evidence = 0.5 * (b.dot(with_prior.ldlt().solve(b)) - std::log(scaled.determinant()))};
   }
+
+ private:
+  [[nodiscard]] double product(size_t i, size_t j) const {
+    return products_(static_cast<Index>(i) + 1, static_cast<Index>(j) + 1);
+  }
+  [[nodiscard]] double along(size_t i) const { return products_(0, static_cast<Index>(i) + 1); }
+  [[nodiscard]] double square(size_t i) const { return product(i, i); }
   static double amplitude(double along, double square) {
     return square > 0.0 ? std::clamp(along / square, least_amplitude, most_amplitude) : 1.0;
   }
@@ -146,8 +171,19 @@ class SetsSearch {
   void fit_synergies();
   void fit_from_better_part(const std::vector<size_t>& responses);
   void fit_best_again(size_t effects);
+  /// The most probable set of so many effects; null if there is none.
+  [[nodiscard]] const EffectSet* best_of(size_t effects) const {
+    const EffectSet* best = nullptr;
+    for (const EffectSet& set : sets_)
+      if (added(set) == effects && (best == nullptr || set.log_posterior > best->log_posterior)) best = &set;
+    return best;
+  }
+  [[nodiscard]] bool is_plain_near() const;
   [[nodiscard]] bool is_plain_in_reach() const;
   [[nodiscard]] bool relieves(const Effect* effect, const EffectSet& set) const;
+  [[nodiscard]] Screening::Joined most_joined(const Screening& screening,
+                                              std::span<const Effect* const> effects,
+                                              const std::vector<size_t>& chosen) const;
   [[nodiscard]] std::optional<double> posterior_beside_part(const EffectSet& set) const;
   [[nodiscard]] bool is_fitted(const std::vector<const Effect*>& effects) const;
   [[nodiscard]] std::vector<Promise> promises(const rig::EvidenceFit& under, bool pairs) const;
@@ -236,8 +272,8 @@ void SetsSearch::fit_from_better_part(const std::vector<size_t>& responses) {
 
 void SetsSearch::fit_beside_best() {
   sort_sets();
-  const auto best = std::ranges::find_if(sets_, [&](const EffectSet& set) { return added(set) == 1; });
-  if (best == sets_.end()) return;
+  const EffectSet* best = best_of(1);
+  if (best == nullptr) return;
   const EffectSet first = *best;
   const Screening screening(responses_, first.target(), first.columns, first.evidence);
   Promises promised(responses_);
@@ -290,31 +326,47 @@ bool SetsSearch::relieves(const Effect* effect, const EffectSet& set) const {
   return false;
 }
 
-/// The log posterior of a set whose part without one of its effects was fitted exactly and explains more, by linear algebra there:
-/// that effect at its best size, which is its prior's sd, too. None if it promises more than its prior odds cost.
+/// The most that responses of these effects promise together, one of each.
+Screening::Joined SetsSearch::most_joined(const Screening& screening, std::span<const Effect* const> effects,
+                                          const std::vector<size_t>& chosen) const {
+  if (effects.empty()) return screening.joined(chosen);
+  Screening::Joined most;
+  for (size_t i = 0; i < responses_.size(); ++i) {
+    if (responses_[i].term.effect != effects.front()) continue;
+    std::vector<size_t> with = chosen;
+    with.push_back(i);
+    const Screening::Joined joined = most_joined(screening, effects.subspan(1), with);
+    if (joined.gain > most.gain) most = joined;
+  }
+  return most;
+}
+
+/// The log posterior of a set of which a part was fitted exactly and explains more, by linear algebra there: what it lacks at its
+/// best sizes, which are its priors' sds, too. None if that promises more than its prior odds cost.
 std::optional<double> SetsSearch::posterior_beside_part(const EffectSet& set) const {
   const auto is_in = [](const Effect* effect, const EffectSet& of) {
     return std::ranges::count(of.model.terms, effect, &rig::ModelTerm::effect) > 0;
   };
   for (const EffectSet& part : sets_) {
-    const bool lacks_one = added(part) + 1 == added(set) &&
-                           std::ranges::all_of(part.model.terms, [&](const rig::ModelTerm& term) {
-                             return is_in(term.effect, set);
-                           });
-    if (!part.exact || !lacks_one || part.log_posterior < set.log_posterior) continue;
-    const Effect* other = std::ranges::find_if(set.model.terms, [&](const rig::ModelTerm& term) {
-                            return !is_in(term.effect, part);
-                          })->effect;
+    const bool is_part =
+        added(part) < added(set) && std::ranges::all_of(part.model.terms, [&](const rig::ModelTerm& term) {
+          return is_in(term.effect, set);
+        });
+    if (!part.exact || !is_part || part.log_posterior < set.log_posterior) continue;
+    std::vector<const Effect*> others;
+    for (const rig::ModelTerm& term : set.model.terms)
+      if (!is_in(term.effect, part)) others.push_back(term.effect);
     // What moments do has no response.
-    if (other->change_points() != ChangePoints::none || relieves(other, part)) continue;
-    const Screening beside(responses_, part.target(), part.columns, part.evidence);
-    double gain = 0.0;
-    for (size_t i = 0; i < responses_.size(); ++i)
-      if (responses_[i].term.effect == other) gain = std::max(gain, beside.best_single(i));
+    if (std::ranges::any_of(others, [&](const Effect* other) {
+          return other->change_points() != ChangePoints::none || relieves(other, part);
+        }))
+      continue;
+    const Screening::Joined most =
+        most_joined(Screening(responses_, part.target(), part.columns, part.evidence), others, {});
     const double odds =
         set.log_posterior - set.evidence.log_evidence - (part.log_posterior - part.evidence.log_evidence);
-    if (gain < least_promise)
-      return part.log_posterior + 0.5 * (gain * gain / (1.0 + gain) - std::log1p(gain)) + odds;
+    if (most.gain < least_promise * static_cast<double>(others.size()))
+      return part.log_posterior + most.log_evidence + odds;
   }
   return {};
 }
@@ -338,20 +390,23 @@ void SetsSearch::fit_best_again(size_t effects) {
   sort_sets();
 }
 
-/// May the rig without effects come near the best set of one, once its tolerances are not linear? At that set's tolerances, linear
-/// algebra tells. Without effects a search goes a long way after what tolerances cannot make.
+/// Is the rig without effects as probable as the best set of one, or in the reach of what another fit changes?
+bool SetsSearch::is_plain_near() const {
+  const EffectSet* plain = best_of(0);
+  const EffectSet* best = best_of(1);
+  return plain == nullptr || best == nullptr || plain->log_posterior >= best->log_posterior - second_in_reach;
+}
+
+/// May it come near once its tolerances are not linear? At the best set's tolerances, linear algebra tells. Without effects a search
+/// goes a long way after what tolerances cannot make.
 bool SetsSearch::is_plain_in_reach() const {
-  const auto of_size = [&](size_t effects) {
-    return std::ranges::find_if(sets_, [&](const EffectSet& set) { return added(set) == effects; });
-  };
-  const auto plain = of_size(0), best = of_size(1);
-  if (plain == sets_.end() || best == sets_.end()) return true;
-  const double least = best->log_posterior - second_in_reach;
-  if (plain->log_posterior >= least) return true;
-  SessionModel start = best->model;
+  if (is_plain_near()) return true;
+  const EffectSet& best = *best_of(1);
+  SessionModel start = best.model;
   start.terms.resize(options_.terms.size());
   start.values.resize(options_.values.size());
-  return fit_set(problem_, start, best->known, best->evidence.shares, least).log_posterior >= least;
+  const double least = best.log_posterior - second_in_reach;
+  return fit_set(problem_, start, best.known, best.evidence.shares, least).log_posterior >= least;
 }
 
 SetSearch SetsSearch::run() {
@@ -382,8 +437,10 @@ SetSearch SetsSearch::run() {
       if (const auto start = scan_events(problem_, plain, *effect))
         fit(*start, base_, problem_.error().prior.share);
   report("fitting the best of them again");
+  const bool plain_first = is_plain_near();  // it then tells of each effect whether that may come near
+  if (plain_first) fit_best_again(0);
   fit_best_again(1);
-  if (is_plain_in_reach()) fit_best_again(0);
+  if (!plain_first && is_plain_in_reach()) fit_best_again(0);
   report("fitting the pairs that promise most");
   for (const rig::EvidenceFit* under : {&stated, &adapted}) {
     const std::vector<Promise> singles = promises(*under, false);

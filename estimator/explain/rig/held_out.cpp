@@ -160,10 +160,9 @@ MatrixXd smooth_functions(const rig::SessionProblem& problem) {
           smooth_values(motions[block.run][block.first_row + static_cast<size_t>(k)]);
       values.row(k) = Eigen::Map<const Eigen::RowVectorXd>(at.data(), count);
     }
-    for (Index j = 0; j < count; ++j)
-      functions.col(channel * count + j)
-          .segment(static_cast<Index>(block.first), static_cast<Index>(block.features.size())) =
-          rig::SegmentFeatures::project(block, values.col(j));
+    functions.block(static_cast<Index>(block.first), channel * count,
+                    static_cast<Index>(block.features.size()), count) =
+        rig::SegmentFeatures::project(block, values);
   }
   return functions;
 }

@@ -79,6 +79,23 @@ TEST(LeastSquares, EndsWhenLittleIsToBeGained) {
   EXPECT_LT(found.evaluations, best.evaluations);
 }
 
+TEST(LeastSquares, EndsAsStalledWhereTenStepsBringNextToNothing) {
+  // Its Jacobian is two hundred times too steep: each step is so much too short, and much is expected of all.
+  class TooSteep : public FunctionProblem {
+   public:
+    using FunctionProblem::FunctionProblem;
+    Eigen::MatrixXd jacobian(const Eigen::VectorXd&) override {
+      return Eigen::MatrixXd::Constant(1, 1, 200.0);
+    }
+  };
+  TooSteep problem({{"x"}}, [](const Eigen::VectorXd& q) { return std::optional(q); });
+  const SearchOptions options{
+      .iteration_limit = 1000, .small_gain = [](double) { return 1.0; }, .first_radius = 1};
+  const SearchResult found = minimise(problem, Eigen::VectorXd::Constant(1, 3.0), options);
+  EXPECT_EQ(found.termination, Termination::stalled);
+  EXPECT_EQ(found.iterations, 10);
+}
+
 TEST(LeastSquares, ReportsEachStepOnce) {
   FunctionProblem problem({{"x"}, {"y"}}, rosenbrock);
   std::vector<int> iterations;
