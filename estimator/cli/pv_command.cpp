@@ -124,7 +124,7 @@ void print_for_people(const PressureVolumeCurve& curve) {
 
 ExitCode run_pv(const PvArguments& arguments, const CommandOutput& out) {
   const Clock::time_point begun = Clock::now();
-  if (!std::isfinite(arguments.volume_change_mL) || arguments.volume_change_mL == 0.0) {
+  if (arguments.volume_change_mL == 0.0) {
     throw InputError({"", "--volume-change-mL",
                       fmt::format("{} is no volume to go to", arguments.volume_change_mL),
                       "Give the mL that the cavity takes, for example 60; less than zero empties it."});

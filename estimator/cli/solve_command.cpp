@@ -179,10 +179,6 @@ void require_one_load(const SolveArguments& arguments) {
   if (pressure && volume) refuse("--pressure-kPa", "is given beside --volume-change-mL");
   if (pressure && arguments.frames) refuse("--pressure-kPa", "is given beside --frames");
   if (volume && arguments.frames) refuse("--volume-change-mL", "is given beside --frames");
-  if (pressure && !std::isfinite(*arguments.pressure_kPa))
-    refuse("--pressure-kPa", fmt::format("{} is not a finite pressure", *arguments.pressure_kPa));
-  if (volume && !std::isfinite(*arguments.volume_change_mL))
-    refuse("--volume-change-mL", fmt::format("{} is not a finite volume", *arguments.volume_change_mL));
 }
 
 void require_fibres_for_tension(const SolveArguments& arguments, const ElasticModel& model) {
@@ -190,7 +186,7 @@ void require_fibres_for_tension(const SolveArguments& arguments, const ElasticMo
   const auto refuse = [](std::string problem, std::string remedy) {
     throw InputError({"", "--fibre-tension-kPa", std::move(problem), std::move(remedy)});
   };
-  if (!std::isfinite(tension_kPa) || tension_kPa < 0.0)
+  if (tension_kPa < 0.0)
     refuse(fmt::format("{} is not a tension", tension_kPa), "Give zero or more, for example 60.");
   if (tension_kPa > 0.0 && !model.system().material_axes()) {
     refuse("the specimen has no fibres to pull along",

@@ -18,6 +18,13 @@ namespace fs = std::filesystem;
                     "Check that the folder exists, that you may write there, and that it has room."});
 }
 
+/// What a scanner wrote is no command's to replace.
+bool is_dicom(const fs::path& path) {
+  std::string mark(4, '\0');
+  std::ifstream stream(path, std::ios::binary);
+  return stream.seekg(128) && stream.read(mark.data(), 4) && mark == "DICM";
+}
+
 bool starts_with_mark(const fs::path& path, std::string_view mark) {
   std::string start(256, '\0');
   std::ifstream(path, std::ios::binary).read(start.data(), static_cast<std::streamsize>(start.size()));
@@ -61,6 +68,9 @@ void require_output(const OutputFile& output) {
                         "Give -o another name."});
     }
   }
+  if (is_dicom(output.path))
+    throw InputError({output.path.string(), "", "is an image (DICOM), which no command replaces",
+                      "Give -o another name."});
   const bool is_earlier_result = !output.mark.empty() && starts_with_mark(output.path, output.mark);
   if (!output.force && !fs::is_empty(output.path) && !is_earlier_result) {
     throw InputError({output.path.string(), "", "exists already and is no earlier result of this command",

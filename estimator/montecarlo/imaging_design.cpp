@@ -25,7 +25,8 @@ using Eigen::Vector3d;
 
 constexpr double apart_in_spacings = 0.8;
 constexpr double sure_in_pixels = 1.25;
-constexpr double most_sigma_in_spacings = 0.5;  // a line that is known no better is lost
+constexpr double most_sigma_in_spacings = 0.5;   // a line that is known no better is lost
+constexpr double least_spacing_in_pixels = 3.0;  // finer tags are not told from their mirror images
 constexpr size_t fewest_points = 30;
 
 /// A slice through the specimen's origin or across its axis.
@@ -107,6 +108,7 @@ std::vector<Change> changes_of(const ImagingPlan& plan, const std::vector<Frame>
     changes.push_back(std::move(change));
   };
   for (const double factor : {0.7, 1.5}) {
+    if (factor * plan.tag_spacing_mm < least_spacing_in_pixels * plan.pixel_mm) continue;
     add(fmt::format("tags every {:.3g} mm", factor * plan.tag_spacing_mm),
         [&](Change& change) { change.plan.tag_spacing_mm *= factor; });
   }
@@ -213,6 +215,11 @@ Measurement planned_tags(const HermiteMesh& mesh, const ImagingPlan& plan, const
 
 DesignStudy explore_imaging(const Study& study, const std::vector<Frame>& frames, const ImagingPlan& plan,
                             bool unload) {
+  if (plan.tag_spacing_mm < least_spacing_in_pixels * plan.pixel_mm)
+    throw InputError({"", "--tag-spacing, --pixel",
+                      fmt::format("tags every {:g} mm are less than three pixels of {:g} mm apart",
+                                  plan.tag_spacing_mm, plan.pixel_mm),
+                      "Space the tags farther apart, or plan smaller pixels."});
   Predictor predictor(study, unload);
   DesignStudy result(study, predictor.se_percent(plan, frames));
   for (Change& change : changes_of(plan, frames)) {

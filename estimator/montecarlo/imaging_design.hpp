@@ -30,7 +30,8 @@ struct ImagingPlan {
 Measurement planned_tags(const HermiteMesh& mesh, const ImagingPlan& plan, const std::vector<Frame>& frames);
 
 /// Predicted standard errors at the study's start values, and what changes of the plan would make them. Frames: the study's, with
-/// their times and pressures. Throws InputError without equilibrium there, and for a plan that sees nothing of a parameter.
+/// their times and pressures. Throws InputError without equilibrium there, for a plan that sees nothing of a parameter, and for
+/// tags less than three pixels apart.
 /// `unload`: as explore_design's; the tags are then laid in the shape of the image.
 DesignStudy explore_imaging(const Study& study, const std::vector<Frame>& frames, const ImagingPlan& plan,
                             bool unload = false);

@@ -16,6 +16,8 @@
 // and everything meant for a person on standard error.
 
 #include <CLI/CLI.hpp>
+#include <cmath>
+#include <cstdlib>
 #include <functional>
 #include <string>
 
@@ -41,14 +43,19 @@ class CommandLine {
     return command;
   }
 
-  /// What the front door runs when `command` was chosen.
+  /// What the front door runs when `command` was chosen, which has all its options by now. Its numbers must be finite.
   void on_run(CLI::App* command, Action action) {
+    for (CLI::Option* option : command->get_options())
+      if (option->get_type_name().starts_with("FLOAT")) option->check(must_be_finite, "");
     command->callback([this, action = std::move(action)] { chosen_ = action; });
   }
 
   [[nodiscard]] ExitCode run() const { return chosen_ ? chosen_(output_) : ExitCode::bad_input; }
 
  private:
+  static std::string must_be_finite(const std::string& text) {
+    return std::isfinite(std::strtod(text.c_str(), nullptr)) ? "" : text + " is not a finite number";
+  }
   CLI::App& app_;
   CommandOutput output_;
   Action chosen_;

@@ -72,6 +72,22 @@ std::vector<BadInput> table() {
        },
        2,
        {"--flow", "a cycle of 30 s", "--period"}},
+      {"ScanOfNoTime",
+       [](Place place) {
+         return scan(place, {"--period", "1e-9"});
+       },
+       2,
+       {"--period", "does not hold the phases", "from trigger to trigger"}},
+      {"FitOfImagesThatAreNowhere",
+       [](Place place) {
+         std::vector<std::string> arguments = scan(place, {});
+         place.write("gel.study.toml", with(source_text("examples/tagged-gel/tagged-gel.study.toml"),
+                                            "images = \"dicom\" ", "images = \"nowhere\" "));
+         place.write("tagged-gel.frames.csv", source_text("examples/tagged-gel/tagged-gel.frames.csv"));
+         return std::vector<std::string>{"diastole", "fit", "gel.study.toml"};
+       },
+       2,
+       {"gel.study.toml", "[data] images", "nowhere", "is no folder", "images = \"dicom/\""}},
       {"ScanOfFibresThatAreNone",
        [](Place place) { return scan(place, {"--diffusion"}); },
        2,
@@ -280,6 +296,10 @@ TEST(BadOption, IsToldWithItsNameItsValueAndWhatIsExpected) {
   EXPECT_THAT(told({"diastole", "simulate", "e.toml", "-o", "e.run.h5", "--seed", "many"}),
               testing::AllOf(HasSubstr("--seed: \"many\" is not a whole number"),
                              HasSubstr("`diastole simulate --help` explains it")));
+  EXPECT_THAT(told({"diastole", "solve", "gel.study.toml", "--pressure-kPa", "nan"}),
+              HasSubstr("--pressure-kPa: nan is not a finite number"));
+  EXPECT_THAT(told({"diastole", "scan", "gel.study.toml", "-o", "scan", "--tag-angles", "0,inf"}),
+              HasSubstr("--tag-angles: inf is not a finite number"));
   EXPECT_THAT(told({"diastole", "jog", "--mL", "5mL"}), HasSubstr("--mL: \"5mL\" is not a number"));
 }
 

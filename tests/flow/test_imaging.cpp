@@ -106,6 +106,34 @@ TEST_F(ImagedGel, TwoOutputsOfOneNameAreRefusedBeforeTracking) {
   EXPECT_FALSE(std::filesystem::exists(place / "gel.x"));
 }
 
+TEST_F(ImagedGel, AnImageIsNeverReplaced) {
+  const std::string image = "gel/dicom/s02_i0001.dcm";
+  const auto size = std::filesystem::file_size(place / image);
+  const Ended track = run(place, {"diastole", "track", "gel/dicom", "--force", "-o", image});
+  EXPECT_EQ(track.exit_code, 2);
+  EXPECT_THAT(track.err, HasSubstr("is an image (DICOM)"));
+  EXPECT_EQ(std::filesystem::file_size(place / image), size);
+}
+
+TEST_F(ImagedGel, APoseThatIsBrokenIsToldBeforeTracking) {
+  place.write("gel/tagged-gel.pose.toml", "origin_mm = [0, 0]\n");
+  const Ended track = run(place, {"diastole", "track", "gel/dicom", "-o", "gel.tags.csv"});
+  EXPECT_EQ(track.exit_code, 2);
+  EXPECT_THAT(track.err, HasSubstr("tagged-gel.pose.toml"));
+  EXPECT_THAT(track.err, testing::Not(HasSubstr("tracking")));
+}
+
+TEST_F(ImagedGel, PosesOfWhichNoneIsNamedAndFramesOfOtherPhasesAreTold) {
+  if (sanitized) GTEST_SKIP() << "a fit of eight frames: too slow here";
+  std::filesystem::copy(place / "gel" / "tagged-gel.pose.toml", place / "gel" / "other.pose.toml");
+  std::string frames = source_text("examples/tagged-gel/tagged-gel.frames.csv");
+  place.write("gel/tagged-gel.frames.csv", with(frames, "\n1,0.0120,", "\n1,0.1500,"));
+  const Ended fit = run(place, {"diastole", "fit", "gel/tagged-gel.study.toml"});
+  EXPECT_THAT(fit.err, HasSubstr("2 poses lie here"));
+  EXPECT_THAT(fit.err, HasSubstr("frame 1 is at 150 ms, and the images' phase 1 at 12 ms: does its pressure "
+                                 "belong to phase 2?"));
+}
+
 TEST_F(ImagedGel, AScanLeavesItsFolderAndNothingElse) {
   std::filesystem::create_directory(place / "trial.partial");
   const std::string study = std::string(DIASTOLE_EXAMPLES) + "/phantom-a.study.toml";

@@ -1,6 +1,7 @@
 #include "estimator/imaging/dicom/dicom_file.hpp"
 
 #include <dcmtk/config/osconfig.h>
+#include <dcmtk/dcmdata/dccodec.h>
 #include <dcmtk/dcmdata/dcrledrg.h>
 #include <dcmtk/dcmdata/dctk.h>
 #include <dcmtk/dcmjpeg/djdecode.h>
@@ -378,6 +379,16 @@ std::optional<FileFault> check_layout(DcmItem& dataset, PixelLayout& layout) {
   return std::nullopt;
 }
 
+std::optional<FileFault> check_syntax(DcmDataset& dataset) {
+  const E_TransferSyntax syntax = dataset.getOriginalXfer();
+  if (!DcmXfer(syntax).isEncapsulated() || DcmCodecList::canChangeCoding(syntax, EXS_LittleEndianExplicit))
+    return std::nullopt;
+  return unusable(
+      "(0002,0010)",
+      fmt::format("its pixels are compressed in a way that is not read: {}", DcmXfer(syntax).getXferName()),
+      "Export it uncompressed, or with its pixels compressed by JPEG lossless or RLE.");
+}
+
 /// Native pixels must all be there; compressed ones may be smaller by what their codec can do at most.
 std::optional<FileFault> check_length(DcmDataset& dataset, const PixelLayout& layout, double file_bytes) {
   DcmElement* element = nullptr;
@@ -539,6 +550,7 @@ DicomContent read_headers(const std::filesystem::path& file) {
       dataset.tagExists(DCM_DirectoryRecordSequence))
     return content;  // a DICOMDIR: a table of contents
   if ((content.fault = check_modality(dataset))) return content;
+  if ((content.fault = check_syntax(dataset))) return content;
   if ((content.fault = check_layout(dataset, layout))) return content;
   if ((content.fault = check_length(dataset, layout, loaded.bytes))) return content;
   for (int frame = 0; frame < layout.frames; ++frame) {

@@ -8,7 +8,8 @@
 
 namespace diastole::imaging {
 
-/// Its text, for a file of this name. The specimen's sizes are the paper's gel phantom until they are replaced.
+/// Its text, for a file of this name: a ventricle with fibres where diffusion was imaged, else the paper's gel phantom, whose sizes
+/// are to be replaced.
 std::string study_skeleton(const ImageFolder& folder, const std::filesystem::path& study);
 
 }  // namespace diastole::imaging

@@ -14,14 +14,13 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// The pose that the request or the images give, and what is to be said about it.
+/// The pose that was stated or that the images show, and what is to be said about it.
 void settle_pose(const TrackRequest& request, TrackedFolder& tracked) {
   if (request.coordinates == "patient") return;
-  const auto file = request.pose ? request.pose : pose_nearby(request.folder);
   const FoundPose found = find_annulus_pose(tracked.slices);
   tracked.outline = found.outline;
-  if (file || request.known_pose) {
-    tracked.pose = request.known_pose ? *request.known_pose : read_pose(*file);
+  if (request.known_pose) {
+    tracked.pose = request.known_pose;
     if (!found.pose) return;
     const double apart_mm = (tracked.pose->origin_mm - found.pose->origin_mm).norm();
     const double turned_deg =
@@ -72,7 +71,7 @@ void find_slices_at_ends(TrackedFolder& tracked) {
 
 }  // namespace
 
-std::optional<fs::path> pose_nearby(const fs::path& folder) {
+std::vector<fs::path> poses_nearby(const fs::path& folder) {
   std::vector<fs::path> found;
   const fs::path whole = fs::absolute(folder).lexically_normal();
   const fs::path inside = whole.has_filename() ? whole : whole.parent_path();
@@ -82,8 +81,24 @@ std::optional<fs::path> pose_nearby(const fs::path& folder) {
       if (at->path().filename().string().ends_with(".pose.toml")) found.push_back(at->path());
     }
   }
-  if (found.size() != 1) return std::nullopt;
-  return found[0];
+  std::ranges::sort(found);
+  return found;
+}
+
+std::optional<SpecimenPose> stated_pose(const TrackRequest& request, std::vector<Finding>& problems) {
+  if (request.coordinates == "patient") return std::nullopt;
+  if (request.known_pose) return request.known_pose;
+  if (request.pose) return read_pose(*request.pose);
+  const std::vector<fs::path> nearby = poses_nearby(request.folder);
+  if (nearby.size() == 1) return read_pose(nearby[0]);
+  if (!nearby.empty())
+    problems.push_back(
+        {Severity::warning, "several-poses",
+         fmt::format("{} poses lie here, and which is this session's is not known: none is used",
+                     nearby.size()),
+         nearby[0].string(), static_cast<double>(nearby.size()), "files",
+         "Name one with --pose, or leave one only."});
+  return std::nullopt;
 }
 
 std::vector<PhaseSummary> phase_summaries(const TrackedSlice& slice) {
@@ -154,6 +169,8 @@ TrackedFolder track_folder(const TrackRequest& request, const Stage& stage) {
   const ImageFolder folder = read_image_folder(request.folder);
   require_sound(folder);
   std::vector<Finding> problems = folder.problems;
+  TrackRequest settled = request;
+  settled.known_pose = stated_pose(request, problems);
   std::vector<TagView> views = tag_views(folder);
   const ManualEdits edits = use_edits(request, views);
   if (!edits.standing.empty())
@@ -163,7 +180,7 @@ TrackedFolder track_folder(const TrackRequest& request, const Stage& stage) {
       track_views(std::move(views), machine_threads(), problems, [&](size_t done, size_t all) {
         if (done < all) say(fmt::format("{} of {} slices are tracked", done, all));
       });
-  return gathered(request, edits, std::move(slices), std::move(problems));
+  return gathered(settled, edits, std::move(slices), std::move(problems));
 }
 
 }  // namespace diastole::imaging

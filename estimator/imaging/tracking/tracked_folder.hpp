@@ -42,8 +42,11 @@ struct TrackedFolder {
   double rms_px = 0;  ///< of the points' standard errors
 };
 
-/// The one *.pose.toml in the folder or beside it.
-std::optional<std::filesystem::path> pose_nearby(const std::filesystem::path& folder);
+/// All *.pose.toml in the folder and beside it. Of several none is the session's.
+std::vector<std::filesystem::path> poses_nearby(const std::filesystem::path& folder);
+
+/// The pose that the request names or that lies nearby; none if that is for the images to show. Throws InputError as read_pose.
+std::optional<SpecimenPose> stated_pose(const TrackRequest& request, std::vector<Finding>& problems);
 
 struct PhaseSummary {
   int frame;
@@ -61,7 +64,7 @@ std::filesystem::path edits_file(const TrackRequest& request);
 /// Its choices, none if it is not there and was not named; set in the views. Throws InputError.
 ManualEdits use_edits(const TrackRequest& request, std::vector<TagView>& views);
 
-/// Points and pose of slices that are tracked. Throws InputError if no point is left, or a demanded pose is not seen.
+/// Points and pose of slices that are tracked; what stated_pose found is the request's known one. Throws InputError if no point is left, or a demanded pose is not seen.
 TrackedFolder gathered(const TrackRequest& request, const ManualEdits& edits,
                        std::vector<TrackedSlice> slices, std::vector<Finding> problems);
 

@@ -1,11 +1,15 @@
 #include <dcmtk/config/osconfig.h>
 #include <dcmtk/dcmdata/dctk.h>
+#include <dcmtk/dcmjpeg/djencode.h>
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 
 #include <algorithm>
+#include <fstream>
+#include <iterator>
 
 #include "estimator/imaging/series/image_folder.hpp"
+#include "estimator/imaging/series/study_skeleton.hpp"
 #include "estimator/imaging/series/views.hpp"
 #include "tests/estimator/imaging/tagged_ring.hpp"
 #include "tests/estimator/io/scratch_file.hpp"
@@ -16,10 +20,12 @@ namespace {
 using test::RingScan;
 using test::ScratchFolder;
 using test::write_ring;
+using testing::AllOf;
 using testing::Contains;
 using testing::DoubleNear;
 using testing::ElementsAre;
 using testing::HasSubstr;
+using testing::IsEmpty;
 using testing::Not;
 
 std::vector<std::string> ids(const ImageFolder& folder) {
@@ -220,6 +226,7 @@ TEST(ImageFolder, FewerPhasesThanTheHeadersAnnounceAreTold) {
   for (const auto& path : write_ring({}, scratch.path())) {
     DcmFileFormat file;
     ASSERT_TRUE(file.loadFile(path.c_str()).good());
+    ASSERT_TRUE(file.loadAllDataIntoMemory().good());
     ASSERT_TRUE(file.getDataset()->putAndInsertString(DCM_CardiacNumberOfImages, "16").good());
     ASSERT_TRUE(file.saveFile(path.c_str(), EXS_LittleEndianExplicit).good());
   }
@@ -261,9 +268,41 @@ TEST(ImageFolder, RefusesAFileThatIsDeflatedAsAWhole) {
               HasSubstr("deflated as a whole"));
 }
 
+TEST(ImageFolder, RefusesACompressionThatIsNotReadBeforeItReadsPixels) {
+  const ScratchFolder scratch;
+  const auto files = write_ring({}, scratch.path());
+  DcmFileFormat file;
+  ASSERT_TRUE(file.loadFile(files[0].c_str()).good());
+  DJEncoderRegistration::registerCodecs();
+  ASSERT_TRUE(file.getDataset()->chooseRepresentation(EXS_JPEGProcess14SV1, nullptr).good());
+  ASSERT_TRUE(file.saveFile(files[0].c_str(), EXS_JPEGProcess14SV1).good());
+  EXPECT_THAT(ids(read_image_folder(scratch.path())), IsEmpty());
+  std::ifstream stream(files[0], std::ios::binary);
+  std::string bytes(std::istreambuf_iterator<char>(stream), {});
+  const std::string lossless = "1.2.840.10008.1.2.4.70", wavelets = "1.2.840.10008.1.2.4.90";
+  bytes.replace(bytes.find(lossless), lossless.size(), wavelets);
+  std::ofstream(files[0], std::ios::binary) << bytes;
+  EXPECT_THAT(test::message_of([&] { require_sound(read_image_folder(scratch.path())); }),
+              HasSubstr("compressed in a way that is not read: JPEG 2000 (Lossless only)"));
+}
+
 TEST(ImageFolder, RefusesAnEmptyFolder) {
   const ScratchFolder scratch;
   EXPECT_THAT(test::message_of([&] { (void)read_image_folder(scratch.path()); }), HasSubstr("no MR images"));
+}
+
+TEST(StudySkeleton, IsAHeartsWhereDiffusionWasImagedAndNamesEachSeriesCommand) {
+  const ScratchFolder scratch;
+  write_ring({}, scratch.path());
+  ImageFolder folder = read_image_folder(scratch.path());
+  const std::filesystem::path study = scratch.path() / "mine.study.toml";
+  EXPECT_THAT(study_skeleton(folder, study),
+              AllOf(HasSubstr("kind = \"annulus\""), HasSubstr("images = \".\""), HasSubstr("time_s =")));
+  folder.series[0].kind = SeriesKind::diffusion;
+  EXPECT_THAT(study_skeleton(folder, study),
+              AllOf(HasSubstr("kind = \"fitted-lv\""), HasSubstr("mesh_file = \"mine.mesh\""),
+                    HasSubstr("diastole fibres . --study mine.study.toml -o mine.fibres.csv"),
+                    HasSubstr("have no tags"), Not(HasSubstr("images = "))));
 }
 
 TEST(PhaseTimes, CountsWhatIsMissingBetween) {

@@ -34,9 +34,10 @@ TEST_F(ImagingDesign, WithoutErrorsOfPressureTheNoiseSetsTheScale) {
   const double better = explore_imaging(study_, frames_, {.snr = 40}).se_percent[0];
   EXPECT_NEAR(better / usual, 0.5, 0.01);
   // Twice the pixel's side is a quarter of the pixels, and a wider edge.
-  const double coarse = explore_imaging(study_, frames_, {.pixel_mm = 2}).se_percent[0];
-  EXPECT_GT(coarse / usual, 2.0);
-  EXPECT_LT(coarse / usual, 2.6);
+  const double fine = explore_imaging(study_, frames_, {.pixel_mm = 0.8}).se_percent[0];
+  const double coarse = explore_imaging(study_, frames_, {.pixel_mm = 1.6}).se_percent[0];
+  EXPECT_GT(coarse / fine, 2.0);
+  EXPECT_LT(coarse / fine, 2.6);
 }
 
 TEST_F(ImagingDesign, PredictsTheErrorOfAFitOfSuchImages) {
@@ -78,6 +79,14 @@ TEST_F(ImagingDesign, ListsChangesFromTheBestToTheWorst) {
 TEST_F(ImagingDesign, RefusesAPlanThatMissesTheSpecimen) {
   EXPECT_THAT(test::message_of([&] { (void)explore_imaging(study_, frames_, {.short_axis_mm = {80}}); }),
               testing::HasSubstr("sees 0 points"));
+}
+
+TEST_F(ImagingDesign, PlansNoTagsThatPixelsCannotShow) {
+  EXPECT_THAT(
+      test::message_of([&] { (void)explore_imaging(study_, frames_, {.tag_spacing_mm = 5, .pixel_mm = 2}); }),
+      testing::HasSubstr("tags every 5 mm are less than three pixels of 2 mm apart"));
+  for (const DesignOption& option : explore_imaging(study_, frames_, {.pixel_mm = 1.5}).options)
+    EXPECT_NE(option.change, "tags every 3.5 mm");
 }
 
 }  // namespace

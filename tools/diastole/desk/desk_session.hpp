@@ -52,7 +52,7 @@ class DeskSession {
   void work(std::vector<imaging::TagView> views, imaging::ManualEdits edits);
   [[nodiscard]] std::string payload_of(const imaging::ManualEdits& edits, double seconds) const;
 
-  const imaging::TrackRequest request_;
+  imaging::TrackRequest request_;
   const std::optional<std::filesystem::path> tags_;
   std::vector<imaging::TagView> views_;  // in the folder's order; the worker reads their names
   std::vector<Finding> folder_problems_;

@@ -101,7 +101,7 @@ struct Extent {
 };
 
 /// Before anything is computed.
-void check(const ScanArguments& arguments, const ElasticModel& model) {
+void check(const ScanArguments& arguments, const ElasticModel& model, const std::vector<ScanPhase>& phases) {
   const scanner::ScanProtocol& protocol = arguments.protocol;
   const double pixel_mm = protocol.field_of_view_mm / protocol.matrix;
   if (protocol.tags.spacing_mm < 3 * pixel_mm)
@@ -109,6 +109,12 @@ void check(const ScanArguments& arguments, const ElasticModel& model) {
         {"", "--tag-spacing",
          fmt::format("{:g} mm is less than three pixels of {:.3g} mm", protocol.tags.spacing_mm, pixel_mm),
          "Space the tags farther apart, or give a larger --matrix."});
+  if (const double last_s = phases.back().time_s;
+      arguments.period_s && !(*arguments.period_s > std::max(arguments.first_s, last_s)))
+    throw InputError({"", "--period",
+                      fmt::format("{:g} s does not hold the phases, from {:g} to {:g} s", *arguments.period_s,
+                                  phases.front().time_s, last_s),
+                      "Give the time from trigger to trigger."});
   if (!protocol.tagged && !protocol.cine && !arguments.flow && !arguments.diffusion)
     throw InputError(
         {"", "--no-tags", "leaves nothing to scan", "Ask for --cine, --flow or --diffusion too."});
@@ -265,7 +271,7 @@ ExitCode scan_study(const ScanArguments& arguments, const CommandOutput& out) {
   const std::vector<ScanPhase> phases = phases_of(arguments, study);
   ElasticModel model = make_affected_model(study);
   require_cavity(study, model);
-  check(arguments, model);
+  check(arguments, model, phases);
   UnfinishedFolder unfinished(arguments.folder);
   const fs::path& partial = unfinished.path();
   const bool shows_progress = isatty(STDERR_FILENO) != 0;
