@@ -178,6 +178,11 @@ class SetsSearch {
       if (added(set) == effects && (best == nullptr || set.log_posterior > best->log_posterior)) best = &set;
     return best;
   }
+  /// The set without effects.
+  [[nodiscard]] EffectSet& without_effects() {
+    return *std::ranges::find_if(sets_, [&](const EffectSet& set) { return added(set) == 0; });
+  }
+  [[nodiscard]] std::optional<EffectSet> fit_plain_again();
   [[nodiscard]] bool is_plain_near() const;
   [[nodiscard]] bool is_plain_in_reach() const;
   [[nodiscard]] bool relieves(const Effect* effect, const EffectSet& set) const;
@@ -390,6 +395,16 @@ void SetsSearch::fit_best_again(size_t effects) {
   sort_sets();
 }
 
+/// The rig without effects, before any effect. Where its tolerances have wandered further than is likely its linear fit stands, and
+/// the other is returned: whether it counts is known once effects are fitted.
+std::optional<EffectSet> SetsSearch::fit_plain_again() {
+  EffectSet again = fit_set_exactly(problem_, without_effects());
+  if (!inference::is_settled(again.termination)) return {};
+  if (is_strained(problem_, again)) return again;
+  without_effects() = std::move(again);
+  return {};
+}
+
 /// Is the rig without effects as probable as the best set of one, or in the reach of what another fit changes?
 bool SetsSearch::is_plain_near() const {
   const EffectSet* plain = best_of(0);
@@ -438,9 +453,11 @@ SetSearch SetsSearch::run() {
         fit(*start, base_, problem_.error().prior.share);
   report("fitting the best of them again");
   const bool plain_first = is_plain_near();  // it then tells of each effect whether that may come near
-  if (plain_first) fit_best_again(0);
+  std::optional<EffectSet> strained;
+  if (plain_first) strained = fit_plain_again();
   fit_best_again(1);
   if (!plain_first && is_plain_in_reach()) fit_best_again(0);
+  if (strained && is_plain_in_reach()) without_effects() = std::move(*strained);
   report("fitting the pairs that promise most");
   for (const rig::EvidenceFit* under : {&stated, &adapted}) {
     const std::vector<Promise> singles = promises(*under, false);

@@ -188,15 +188,20 @@ bool predicts(double held_out_gain, size_t effects) {
          std::log(name_probability / (1.0 - name_probability));
 }
 
+/// How often a normal error lies further to one side.
+double seldom(double sds) { return boost::math::cdf(boost::math::complement(boost::math::normal(), sds)); }
+
+/// How often the largest of all tolerances is as far to either side.
+double strain_by_chance(const rig::SessionProblem& problem, const EffectSet& set) {
+  const auto tolerances = static_cast<double>(problem.nuisances().size() - rig::basic_nuisances);
+  return -std::expm1(tolerances * std::log1p(-2.0 * seldom(largest_tolerance(set))));
+}
+
 /// That nothing is wrong is not said of a misfit that one part shows so seldom, nor of one tolerance so far to either side,
 /// nor of both as seldom together (Fisher 1925: minus two ln of their product is chi-square on four).
 bool bears_nothing_wrong(const rig::SessionProblem& problem, const EffectSet& set) {
-  const auto beyond = [](double sds) {
-    return boost::math::cdf(boost::math::complement(boost::math::normal(), sds));
-  };
-  const double misfit = beyond(std::ranges::max(set.evidence.surprise(problem.error().prior)));
-  const auto tolerances = static_cast<double>(problem.nuisances().size() - rig::basic_nuisances);
-  const double strain = -std::expm1(tolerances * std::log1p(-2.0 * beyond(largest_tolerance(set))));
+  const double misfit = seldom(std::ranges::max(set.evidence.surprise(problem.error().prior)));
+  const double strain = strain_by_chance(problem, set);
   const double product = misfit * strain;
   const double together = product > 0.0 ? product * (1.0 - std::log(product)) : 0.0;
   return inference::is_settled(set.termination) &&
@@ -213,6 +218,10 @@ double error_rms(const rig::SessionProblem& problem, const rig::Shares& shares, 
 double largest_tolerance(const EffectSet& set) {
   const Index count = set.model.u.size() - static_cast<Index>(rig::basic_nuisances);
   return count > 0 ? set.model.u.tail(count).cwiseAbs().maxCoeff() : 0.0;
+}
+
+bool is_strained(const rig::SessionProblem& problem, const EffectSet& set) {
+  return strain_by_chance(problem, set) < surprising_by_chance;
 }
 
 SetVerdict judge_sets(const rig::SessionProblem& problem, const SetSearch& search,

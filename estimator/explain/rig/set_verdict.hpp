@@ -44,6 +44,9 @@ struct SetVerdict {
 /// Of a set's tolerances the one furthest from its prior, in sds.
 double largest_tolerance(const EffectSet& set);
 
+/// Is that one so far off as is seldom by chance, of all?
+bool is_strained(const rig::SessionProblem& problem, const EffectSet& set);
+
 /// A change of the features beside a set: modulus and offsets follow.
 struct ChangeSize {
   Eigen::VectorXd squares;    ///< of what they leave
