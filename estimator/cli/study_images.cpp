@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
-#include <map>
 
 #include "estimator/cli/output_files.hpp"
 #include "estimator/imaging/series/image_folder.hpp"
@@ -50,30 +49,25 @@ std::string fingerprint_of(const std::filesystem::path& folder,
 }
 
 /// Frames are the images' phases, by number. Of one whose time is nearer to another phase's the pressure is another's, too.
-std::optional<Finding> frame_at_another_time(const Study& study, const imaging::TrackedFolder& tracked) {
-  if (!study.data.frames) return std::nullopt;
+std::vector<Finding> frames_at_other_times(const Study& study) {
+  if (!study.data.frames) return {};
   const std::vector<Frame> frames = read_frames(*study.data.frames);
-  std::map<int, double> phase_ms;
-  for (const imaging::TrackedSlice& slice : tracked.slices)
-    for (size_t k = 0; k < slice.view.frames.size(); ++k)
-      phase_ms[slice.view.frames[k]] = slice.view.times_ms[k];
-  for (const auto& [frame, time_ms] : phase_ms) {
-    if (frame >= static_cast<int>(frames.size())) break;
-    const double stated_ms = 1e3 * frames[static_cast<size_t>(frame)].time_s;
-    const auto nearest = std::ranges::min_element(
-        phase_ms, {}, [&](const auto& phase) { return std::abs(phase.second - stated_ms); });
-    if (nearest->first == frame) continue;
-    return Finding{Severity::warning,
-                   "frame-at-another-time",
-                   fmt::format("frame {} is at {:.0f} ms, and the images' phase {} at {:.0f} ms: does its "
-                               "pressure belong to phase {}?",
-                               frame, stated_ms, frame, time_ms, nearest->first),
-                   study.data.frames->string(),
-                   stated_ms - time_ms,
-                   "ms",
-                   "Number frames as the images' phases, at their times since the trigger."};
+  const std::vector<double> phase_ms =
+      imaging::tagged_phases(imaging::read_image_folder(*study.data.images)).times_ms;
+  for (size_t frame = 1; frame <= phase_ms.size() && frame < frames.size(); ++frame) {
+    const double stated_ms = 1e3 * frames[frame].time_s;
+    const auto nearest =
+        std::ranges::min_element(phase_ms, {}, [&](double ms) { return std::abs(ms - stated_ms); });
+    const auto phase = static_cast<size_t>(nearest - phase_ms.begin()) + 1;
+    if (phase == frame) continue;
+    return {{Severity::warning, "frame-at-another-time",
+             fmt::format("frame {} is at {:.0f} ms, and the images' phase {} at {:.0f} ms: does its pressure "
+                         "belong to phase {}?",
+                         frame, stated_ms, frame, phase_ms[frame - 1], phase),
+             study.data.frames->string(), stated_ms - phase_ms[frame - 1], "ms",
+             "Number frames as the images' phases, at their times since the trigger."}};
   }
-  return std::nullopt;
+  return {};
 }
 
 }  // namespace
@@ -85,6 +79,7 @@ void use_images(Study& study) {
   if (!std::filesystem::is_directory(folder, error))
     throw InputError({study.file.string(), "[data] images", fmt::format("{} is no folder", folder.string()),
                       "Name the scanner's export: images = \"dicom/\"."});
+  print_findings(frames_at_other_times(study), stderr);
   const auto pose = pose_of(study);
   std::string name = study.file.filename().string();
   name = name.substr(0, name.find(".study.toml"));
@@ -94,13 +89,12 @@ void use_images(Study& study) {
     fmt::print(stderr, "Tags of these images are in {}.\n", study.data.tags->string());
     return;
   }
-  imaging::TrackedFolder tracked =
+  const imaging::TrackedFolder tracked =
       imaging::track_folder({.folder = folder, .pose = {}, .known_pose = pose, .coordinates = "specimen"},
                             [](const std::string& stage) { fmt::print(stderr, "Images: {}.\n", stage); });
   write_whole_file(*study.data.tags, imaging::tags_file_text(tracked.points));
   fmt::print(stderr, "{} tag points, standard errors {:.3f} px RMS, are in {}.\n", tracked.points.size(),
              tracked.rms_px, study.data.tags->string());
-  if (const auto apart = frame_at_another_time(study, tracked)) tracked.problems.push_back(*apart);
   print_findings(tracked.problems, stderr);
 }
 

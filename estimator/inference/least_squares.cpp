@@ -56,7 +56,7 @@ class Search {
   void linearise();
   [[nodiscard]] std::vector<bool> held() const;
   [[nodiscard]] double small_gain() const;
-  [[nodiscard]] bool is_creeping();
+  [[nodiscard]] bool is_creeping() const;
   [[nodiscard]] RoundEnd end_after(const ceres::IterationSummary& step);
   ceres::Solver::Summary minimise_round();
   [[nodiscard]] bool needs_another_round(const ceres::Solver::Summary& summary);
@@ -158,13 +158,10 @@ double Search::small_gain() const {
   return std::max(nothing_gained, tolerances_gained * options_.cost_tolerance * model_.chi_square());
 }
 
-/// After an accepted step: whether the last ones together gained next to nothing.
-bool Search::is_creeping() {
-  chi_squares_.push_back(model_.chi_square());
-  if (chi_squares_.size() <= creeping_steps) return false;
-  const double before = chi_squares_.front();
-  chi_squares_.pop_front();
-  return options_.small_gain && before - chi_squares_.back() < small_gain();
+/// Whether the last accepted steps together gained next to nothing.
+bool Search::is_creeping() const {
+  return options_.small_gain && chi_squares_.size() > creeping_steps &&
+         chi_squares_.front() - chi_squares_.back() < small_gain();
 }
 
 bool Search::go_on(const ceres::IterationSummary& step) {
@@ -186,7 +183,11 @@ Search::RoundEnd Search::end_after(const ceres::IterationSummary& step) {
   if (refused && model_.kept_over_sigmas > 0) return RoundEnd::fresh_jacobian;
   const double radius_before = std::exchange(radius_, step.trust_region_radius);
   if (refused) return refused_in_a_row_ >= options_.refusal_limit ? RoundEnd::refusals : RoundEnd::ceres;
-  if (!first && is_creeping()) return RoundEnd::creeping;
+  if (!first) {
+    chi_squares_.push_back(model_.chi_square());
+    if (chi_squares_.size() > creeping_steps + 1) chi_squares_.pop_front();
+    if (is_creeping()) return RoundEnd::creeping;
+  }
   const bool enough = options_.small_gain && gain_ < small_gain();
   if (!first && enough && step_was_on_fresh_ && radius_before >= hardly_damped) return RoundEnd::small_gain;
   if (!first && model_.kept_over_sigmas > 0 && gain_ < poor_gain * expected_gain_)

@@ -124,7 +124,7 @@ Eigen::MatrixXd SessionProblem::shown(std::span<const RigModel> made,
   std::vector<PlantTrace> first(same_plant.empty() ? 0 : runs);
   parallel_for(first.size(), threads_, [&](size_t r) { first[r] = plant(made.front(), r); });
   Eigen::MatrixXd out(features_.count(), static_cast<Eigen::Index>(made.size()));
-  constexpr size_t together = 4;
+  constexpr size_t together = 4;  // models of one run: a feature's function is read once for them
   parallel_for((made.size() + together - 1) / together * runs, threads_, [&](size_t task) {
     const size_t r = task % runs;
     const size_t from = task / runs * together;

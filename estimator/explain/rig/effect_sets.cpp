@@ -178,11 +178,7 @@ class SetsSearch {
       if (added(set) == effects && (best == nullptr || set.log_posterior > best->log_posterior)) best = &set;
     return best;
   }
-  /// The set without effects.
-  [[nodiscard]] EffectSet& without_effects() {
-    return *std::ranges::find_if(sets_, [&](const EffectSet& set) { return added(set) == 0; });
-  }
-  [[nodiscard]] std::optional<EffectSet> fit_plain_again();
+  void fit_plain_and_singles_again();
   [[nodiscard]] bool is_plain_near() const;
   [[nodiscard]] bool is_plain_in_reach() const;
   [[nodiscard]] bool relieves(const Effect* effect, const EffectSet& set) const;
@@ -386,30 +382,17 @@ void SetsSearch::fit_best_again(size_t effects) {
     if (const auto posterior = posterior_beside_part(set)) {
       set.log_posterior = *posterior;
     } else {
-      // Without effects tolerances may wander far after what they cannot make: then their linear fit stands.
-      EffectSet again = fit_set_exactly(problem_, set);
-      if (effects > 0 || inference::is_settled(again.termination)) set = std::move(again);
+      set = fit_set_exactly(problem_, set);
     }
     if (count == 1) best = set.log_posterior;
   }
   sort_sets();
 }
 
-/// The rig without effects, before any effect. Where its tolerances have wandered further than is likely its linear fit stands, and
-/// the other is returned: whether it counts is known once effects are fitted.
-std::optional<EffectSet> SetsSearch::fit_plain_again() {
-  EffectSet again = fit_set_exactly(problem_, without_effects());
-  if (!inference::is_settled(again.termination)) return {};
-  if (is_strained(problem_, again)) return again;
-  without_effects() = std::move(again);
-  return {};
-}
-
-/// Is the rig without effects as probable as the best set of one, or in the reach of what another fit changes?
+/// Is the rig without effects, which is among the sets, as probable as the best of one, or in the reach of what another fit changes?
 bool SetsSearch::is_plain_near() const {
-  const EffectSet* plain = best_of(0);
   const EffectSet* best = best_of(1);
-  return plain == nullptr || best == nullptr || plain->log_posterior >= best->log_posterior - second_in_reach;
+  return best == nullptr || best_of(0)->log_posterior >= best->log_posterior - second_in_reach;
 }
 
 /// May it come near once its tolerances are not linear? At the best set's tolerances, linear algebra tells. Without effects a search
@@ -422,6 +405,26 @@ bool SetsSearch::is_plain_in_reach() const {
   start.values.resize(options_.values.size());
   const double least = best.log_posterior - second_in_reach;
   return fit_set(problem_, start, best.known, best.evidence.shares, least).log_posterior >= least;
+}
+
+/// Beside the rig without effects most sets need no fit of their own, so it comes first where it is near. Where its tolerances
+/// wandered further than is likely, what it found counts only if it is in reach once effects are fitted; where they found no end,
+/// their linear fit stands.
+void SetsSearch::fit_plain_and_singles_again() {
+  const auto plain = [&] {
+    return std::ranges::find_if(sets_, [&](const EffectSet& set) { return added(set) == 0; });
+  };
+  const auto replace = [&](EffectSet again) {
+    if (inference::is_settled(again.termination)) *plain() = std::move(again);
+  };
+  sort_sets();
+  std::optional<EffectSet> again;
+  if (plain() != sets_.end() && is_plain_near()) again = fit_set_exactly(problem_, *plain());
+  const bool is_likely = again && !is_strained(problem_, *again);
+  if (is_likely) replace(*again);
+  fit_best_again(1);
+  if (!is_likely && plain() != sets_.end() && is_plain_in_reach())
+    replace(again ? std::move(*again) : fit_set_exactly(problem_, *plain()));
 }
 
 SetSearch SetsSearch::run() {
@@ -452,12 +455,7 @@ SetSearch SetsSearch::run() {
       if (const auto start = scan_events(problem_, plain, *effect))
         fit(*start, base_, problem_.error().prior.share);
   report("fitting the best of them again");
-  const bool plain_first = is_plain_near();  // it then tells of each effect whether that may come near
-  std::optional<EffectSet> strained;
-  if (plain_first) strained = fit_plain_again();
-  fit_best_again(1);
-  if (!plain_first && is_plain_in_reach()) fit_best_again(0);
-  if (strained && is_plain_in_reach()) without_effects() = std::move(*strained);
+  fit_plain_and_singles_again();
   report("fitting the pairs that promise most");
   for (const rig::EvidenceFit* under : {&stated, &adapted}) {
     const std::vector<Promise> singles = promises(*under, false);

@@ -11,7 +11,7 @@
 
 namespace diastole::imaging {
 
-std::vector<TagView> tag_views(const ImageFolder& folder) {
+PhaseTimes tagged_phases(const ImageFolder& folder) {
   std::vector<std::vector<double>> times_ms;
   for (const ImageSeries& series : folder.series) {
     if (series.kind != SeriesKind::tagged_cine) continue;
@@ -20,7 +20,11 @@ std::vector<TagView> tag_views(const ImageFolder& folder) {
       if (series.phases.present[k]) times_ms.back().push_back(series.phases.times_ms[k]);
     }
   }
-  const PhaseTimes phases = phase_times(times_ms);
+  return phase_times(times_ms);
+}
+
+std::vector<TagView> tag_views(const ImageFolder& folder) {
+  const PhaseTimes phases = tagged_phases(folder);
   std::vector<TagView> views;
   std::map<int, size_t> slices_before;  // of the same number: a series may hold several orientations
   for (const ImageSeries& series : folder.series) {

@@ -258,6 +258,26 @@ TEST(ImageFolder, RefusesSequencesNestedDeeperThanAnyScannersBeforeTheyAreRead) 
   }
 }
 
+TEST(ImageFolder, CountsSequencesWhereverTheyLieInTheFile) {
+  const ScratchFolder scratch;
+  const auto files = write_ring({.phases = 1}, scratch.path());
+  DcmFileFormat file;
+  ASSERT_TRUE(file.loadFile(files[0].c_str()).good());
+  ASSERT_TRUE(file.loadAllDataIntoMemory().good());
+  DcmItem* item = file.getDataset();
+  for (int level = 0; level < 100; ++level)
+    ASSERT_TRUE(item->findOrCreateSequenceItem(DCM_ContentSequence, item).good());
+  // Files are searched 64 kB at a time: the edge lies at each place of an item's eight bytes once.
+  for (size_t before = 64000; before < 64048; before += 2) {
+    const std::string comment(before, '-');
+    ASSERT_TRUE(file.getDataset()->putAndInsertString(DCM_ImageComments, comment.c_str()).good());
+    ASSERT_TRUE(file.saveFile(files[0].c_str(), EXS_LittleEndianExplicit, EET_UndefinedLength).good());
+    EXPECT_THAT(test::message_of([&] { require_sound(read_image_folder(scratch.path())); }),
+                HasSubstr("100 sequences within each other"))
+        << before;
+  }
+}
+
 TEST(ImageFolder, RefusesAFileThatIsDeflatedAsAWhole) {
   const ScratchFolder scratch;
   const auto files = write_ring({}, scratch.path());
