@@ -70,6 +70,7 @@ class Search {
   SearchResult result_;
   RoundEnd end_ = RoundEnd::ceres;
   std::deque<double> chi_squares_;  // after the last accepted steps
+  bool has_crept_ = false;          // and has got a fresh Jacobian for it
   int before_round_ = 0, refused_ = 0, refused_in_a_row_ = 0;
   double radius_ = 0, gain_ = 0, expected_gain_ = 0;
   bool step_was_on_fresh_ = true;
@@ -186,7 +187,12 @@ Search::RoundEnd Search::end_after(const ceres::IterationSummary& step) {
   if (!first) {
     chi_squares_.push_back(model_.chi_square());
     if (chi_squares_.size() > creeping_steps + 1) chi_squares_.pop_front();
-    if (is_creeping()) return RoundEnd::creeping;
+    if (is_creeping()) {
+      if (model_.kept_over_sigmas < trusted_over_sigmas || std::exchange(has_crept_, true))
+        return RoundEnd::creeping;
+      chi_squares_ = {model_.chi_square()};
+      return RoundEnd::fresh_jacobian;
+    }
   }
   const bool enough = options_.small_gain && gain_ < small_gain();
   if (!first && enough && step_was_on_fresh_ && radius_before >= hardly_damped) return RoundEnd::small_gain;
@@ -257,6 +263,7 @@ void Search::conclude(const ceres::Solver::Summary& summary) {
   result_.pressed = pressed_on_bounds(model_, problem_.space());
   for (size_t i = 0; i < options_.held.size(); ++i)
     result_.pressed[i] = result_.pressed[i] && !options_.held[i];
+  result_.crept = end_ == RoundEnd::creeping;
   const bool settled = end_ == RoundEnd::ceres && summary.termination_type == ceres::CONVERGENCE;
   if (end_ == RoundEnd::interrupted || end_ == RoundEnd::hopeless) {
     result_.termination = Termination::interrupted;
@@ -265,17 +272,21 @@ void Search::conclude(const ceres::Solver::Summary& summary) {
   } else if (end_ == RoundEnd::small_gain) {
     conclude_converged(
         fmt::format("Converged: no step lowers chi-square by more than {:.2g}.", small_gain()));
-  } else if ((end_ == RoundEnd::refusals || end_ == RoundEnd::creeping || (settled && refused_ > 0)) &&
+  } else if ((end_ == RoundEnd::refusals || result_.crept || (settled && refused_ > 0)) &&
              model_.greatest_gain(held()) > small_gain()) {
     result_.termination = Termination::stalled;
-    result_.reason = sentence(Termination::stalled);
+    result_.reason =
+        result_.crept
+            ? fmt::format("Failed: the last {} steps together lowered chi-square by less than {:.2g}.",
+                          creeping_steps, small_gain())
+            : sentence(Termination::stalled);
   } else if (settled && summary.message.starts_with("Function")) {
     conclude_converged(fmt::format("Converged: the last step changed the cost by less than {:g} of it.",
                                    options_.cost_tolerance));
   } else if (settled && summary.message.starts_with("Parameter")) {
     conclude_converged(fmt::format("Converged: the last step changed the unknowns by less than {:g} of them.",
                                    options_.step_tolerance));
-  } else if (settled || end_ == RoundEnd::refusals || end_ == RoundEnd::creeping) {
+  } else if (settled || end_ == RoundEnd::refusals || result_.crept) {
     conclude_converged("Converged: the cost's gradient vanishes.");
   } else if (summary.termination_type == ceres::NO_CONVERGENCE) {
     result_.termination = Termination::iteration_limit;

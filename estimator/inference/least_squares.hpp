@@ -69,7 +69,7 @@ struct SearchOptions {
   double step_tolerance = 1e-8;
   /// ... or, where given, when chi-square is expected to fall by less than this in the best step, or did so in a step
   /// that was hardly damped. Called with chi-square. Ten steps in a row that together bring less, while more is expected, end it as
-  /// stalled.
+  /// stalled and crept.
   std::function<double(double chi_square)> small_gain = {};
   /// So many refused steps in a row end the search.
   int refusal_limit = 1000;
@@ -87,6 +87,7 @@ struct SearchOptions {
 struct SearchResult {
   Eigen::VectorXd q;
   Termination termination = Termination::no_solution;
+  bool crept = false;         ///< its last ten steps together brought less than the small gain
   std::string reason;         ///< a sentence
   int iterations = 0;         ///< steps tried
   int evaluations = 0;        ///< calls of `residuals`

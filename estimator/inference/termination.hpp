@@ -8,7 +8,7 @@ namespace diastole::inference {
 enum class Termination {
   converged,        ///< no step is worth taking, and no bound is in the way
   on_bound,         ///< the same, but the cost still falls beyond a bound
-  stalled,          ///< the cost has a slope, but no step lowers it
+  stalled,          ///< the cost has a slope, but no step lowers it by what it promises
   iteration_limit,  ///< the cost was still falling
   interrupted,      ///< ended on request
   no_solution       ///< the model has no solution at the start

@@ -293,7 +293,8 @@ std::optional<StudyPose> read_pose_of_images(TableReader& root) {
 }  // namespace
 
 Study read_study(const std::filesystem::path& path) {
-  if (std::filesystem::is_directory(path))
+  std::error_code unreadable;  // what cannot be looked at is refused when it is read
+  if (std::filesystem::is_directory(path, unreadable))
     throw InputError({path.string(), "", "is a folder, and this command reads a study",
                       "Name a *.study.toml; `diastole images FOLDER -o NAME.study.toml` begins one for a "
                       "folder of images."});

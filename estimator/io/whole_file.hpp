@@ -25,7 +25,7 @@ struct OutputFile {
 };
 
 /// Before long work, so that neither its result nor an input is lost. Throws InputError if the path cannot
-/// become a file, is one of the inputs under whatever name, is a DICOM image, or holds something else and there is no `force`.
+/// become a file, is one of the inputs under whatever name, is a DICOM image (by its preamble), or holds something else and there is no `force`.
 void require_output(const OutputFile& output);
 
 /// Throws InputError, with this remedy, if the file is missing, a folder or unreadable.

@@ -188,6 +188,12 @@ std::vector<BadInput> table() {
        },
        2,
        {"pins.csv", "exists already", "--force"}},
+      {"APathThatIsNone",
+       [](Place) -> std::vector<std::string> {
+         return {"diastole", "solve", std::string(300, 'a') + ".study.toml", "--pressure-kPa", "1"};
+       },
+       2,
+       {"aaa", "cannot be opened"}},
       {"NoSuchDirectory",
        [](Place place) -> std::vector<std::string> {
          return {"diastole", "simulate", place.write("gel.toml", gel()), "-o", "nowhere/out.run.h5"};

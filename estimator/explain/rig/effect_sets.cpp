@@ -181,6 +181,7 @@ class SetsSearch {
   void fit_plain_and_singles_again();
   [[nodiscard]] bool is_plain_near() const;
   [[nodiscard]] bool is_plain_in_reach() const;
+  [[nodiscard]] bool has_response(const Effect* effect) const;
   [[nodiscard]] bool relieves(const Effect* effect, const EffectSet& set) const;
   [[nodiscard]] Screening::Joined most_joined(const Screening& screening,
                                               std::span<const Effect* const> effects,
@@ -327,6 +328,13 @@ bool SetsSearch::relieves(const Effect* effect, const EffectSet& set) const {
   return false;
 }
 
+/// What moments do has none.
+bool SetsSearch::has_response(const Effect* effect) const {
+  return effect->change_points() == ChangePoints::none &&
+         std::ranges::any_of(responses_,
+                             [&](const Response& response) { return response.term.effect == effect; });
+}
+
 /// The most that responses of these effects promise together, one of each.
 Screening::Joined SetsSearch::most_joined(const Screening& screening, std::span<const Effect* const> effects,
                                           const std::vector<size_t>& chosen) const {
@@ -357,11 +365,13 @@ std::optional<double> SetsSearch::posterior_beside_part(const EffectSet& set) co
     std::vector<const Effect*> others;
     for (const rig::ModelTerm& term : set.model.terms)
       if (!is_in(term.effect, part)) others.push_back(term.effect);
-    // What moments do has no response.
-    if (std::ranges::any_of(others, [&](const Effect* other) {
-          return other->change_points() != ChangePoints::none || relieves(other, part);
-        }))
-      continue;
+    const auto is_nonlinear = [&](const Effect* other) {
+      return !has_response(other) || relieves(other, part) ||
+             std::ranges::any_of(set.model.terms, [&](const rig::ModelTerm& term) {
+               return only_show_together(*other, *term.effect);
+             });
+    };
+    if (std::ranges::any_of(others, is_nonlinear)) continue;
     const Screening::Joined most =
         most_joined(Screening(responses_, part.target(), part.columns, part.evidence), others, {});
     const double odds =

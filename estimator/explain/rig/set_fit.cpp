@@ -299,8 +299,8 @@ EffectSet search(const rig::SessionProblem& problem, SetProblem& set, const rig:
     const double before = out.evidence.log_evidence;
     out.evidence = judged(out.evidence.shares);
     if (!again && std::abs(out.evidence.log_evidence - before) < rested) {
-      // Forty steps that together bring less than decides anything: it has arrived.
-      if (round > 0 && found.termination == inference::Termination::iteration_limit)
+      // Many steps that together bring less than decides anything: it has arrived.
+      if (round > 0 && (found.crept || found.termination == inference::Termination::iteration_limit))
         out.termination = inference::Termination::converged;
       break;
     }

@@ -58,6 +58,11 @@ std::vector<SessionModel> models_with(const Pair& pair, const rig::RigModel& rig
 
 }  // namespace
 
+bool only_show_together(const Effect& one, const Effect& other) {
+  return std::ranges::count(one.text().synergies, other.text().id) > 0 ||
+         std::ranges::count(other.text().synergies, one.text().id) > 0;
+}
+
 std::vector<SessionModel> scan_synergies(const rig::SessionProblem& problem,
                                          const rig::LinearisedModel& declared) {
   std::vector<std::pair<double, SessionModel>> best;

@@ -9,6 +9,9 @@
 
 namespace diastole::explain {
 
+/// Does either declare that it only shows with the other?
+bool only_show_together(const Effect& one, const Effect& other);
+
 /// For each pair the model of the largest evidence, from which a fit may start; the most probable pair first. None of a pair
 /// that no simulation of could be made. `declared`: the model without them.
 std::vector<rig::SessionModel> scan_synergies(const rig::SessionProblem& problem,

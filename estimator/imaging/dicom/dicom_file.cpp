@@ -379,14 +379,19 @@ std::optional<FileFault> check_layout(DcmItem& dataset, PixelLayout& layout) {
   return std::nullopt;
 }
 
-std::optional<FileFault> check_syntax(DcmDataset& dataset) {
-  const E_TransferSyntax syntax = dataset.getOriginalXfer();
+std::optional<FileFault> check_syntax(DcmFileFormat& file) {
+  const auto refused = [](std::string_view name) {
+    return unusable("(0002,0010)",
+                    fmt::format("its pixels are compressed in a way that is not read: {}", name),
+                    "Export it uncompressed, or with its pixels compressed by JPEG lossless or RLE.");
+  };
+  // Of a syntax that is younger than the library, that reads the pixels as if they were not compressed.
+  const std::string stated = text(*file.getMetaInfo(), DCM_TransferSyntaxUID).value_or("");
+  if (!stated.empty() && DcmXfer(stated.c_str()).getXfer() == EXS_Unknown) return refused(stated);
+  const E_TransferSyntax syntax = file.getDataset()->getOriginalXfer();
   if (!DcmXfer(syntax).isEncapsulated() || DcmCodecList::canChangeCoding(syntax, EXS_LittleEndianExplicit))
     return std::nullopt;
-  return unusable(
-      "(0002,0010)",
-      fmt::format("its pixels are compressed in a way that is not read: {}", DcmXfer(syntax).getXferName()),
-      "Export it uncompressed, or with its pixels compressed by JPEG lossless or RLE.");
+  return refused(DcmXfer(syntax).getXferName());
 }
 
 /// Native pixels must all be there; compressed ones may be smaller by what their codec can do at most.
@@ -550,7 +555,7 @@ DicomContent read_headers(const std::filesystem::path& file) {
       dataset.tagExists(DCM_DirectoryRecordSequence))
     return content;  // a DICOMDIR: a table of contents
   if ((content.fault = check_modality(dataset))) return content;
-  if ((content.fault = check_syntax(dataset))) return content;
+  if ((content.fault = check_syntax(*loaded.format))) return content;
   if ((content.fault = check_layout(dataset, layout))) return content;
   if ((content.fault = check_length(dataset, layout, loaded.bytes))) return content;
   for (int frame = 0; frame < layout.frames; ++frame) {

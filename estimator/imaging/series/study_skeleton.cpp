@@ -42,10 +42,9 @@ std::string annulus() {
 
 std::string ventricle(const std::string& name) {
   return fmt::format(
-             "[specimen]\nkind = \"fitted-lv\"\nmesh_file = \"{0}.mesh\"\nfibres = \"{0}.fibres.csv\"\nends "
-             "= "
-             "\"fixed\"\n\n[law]\nname = \"guccione\"\n",
-             name) +
+             "[specimen]\nkind = \"fitted-lv\"\nmesh_file = {}\nfibres = {}\nends = \"fixed\"\n\n"
+             "[law]\nname = \"guccione\"\n",
+             toml_text(name + ".mesh"), toml_text(name + ".fibres.csv")) +
          parameter("C_kPa", 2, 0.2, 12) + parameter("b1", 15, 1, 60) + parameter("b2", 3, 0.2, 20) +
          parameter("b3", 6, 0.5, 50);
 }
@@ -71,15 +70,13 @@ std::string study_skeleton(const ImageFolder& folder, const fs::path& study) {
                         view_in_words(folder, series), series.slices.size(), series.phases.times_ms.size());
     for (const TagWave& tag : series.slices.front().tags)
       text += fmt::format("#     tags every {:.2f} mm\n", tag.spacing_mm());
-    if (const std::string command = command_for(series.kind, images, name); !command.empty())
+    const std::string command = command_for(series.kind, images, name);
+    if (!command.empty() && command.find('\n') == std::string::npos)
       text += fmt::format("#     {}\n", command);
   }
-  const auto has = [&](SeriesKind kind) {
-    return std::ranges::count(folder.series, kind, &ImageSeries::kind) > 0;
-  };
-  text += has(SeriesKind::diffusion)
-              ? "\n# Fibres were imaged, so this is a heart (docs/heart.md).\n" + ventricle(name)
-              : "\n# Of a heart docs/heart.md tells the specimen and the law.\n" + annulus();
+  const bool is_heart = std::ranges::count(folder.series, SeriesKind::diffusion, &ImageSeries::kind) > 0;
+  text += is_heart ? "\n# Diffusion was imaged: taken to be a heart (docs/heart.md).\n" + ventricle(name)
+                   : "\n# Of a heart docs/heart.md tells the specimen and the law.\n" + annulus();
   text += "\n[data]\n";
   const auto tagged = std::ranges::find(folder.series, SeriesKind::tagged_cine, &ImageSeries::kind);
   if (tagged == folder.series.end()) {
@@ -91,6 +88,11 @@ std::string study_skeleton(const ImageFolder& folder, const fs::path& study) {
   text += "# diastole bin RUN --frame-times ... --frames-csv FILE\n";
   text += fmt::format("frames = {}\n", toml_text(name + ".frames.csv"));
   if (tagged != folder.series.end()) text += times_of(*tagged);
+  if (tagged != folder.series.end() && is_heart)
+    text +=
+        "\n# The mesh that `diastole lv` fits lies in the patient's coordinates.\n[images.to_specimen]\n"
+        "origin_mm = [0.0, 0.0, 0.0]\nx_axis = [1.0, 0.0, 0.0]\ny_axis = [0.0, 1.0, 0.0]\n"
+        "z_axis = [0.0, 0.0, 1.0]\n";
   return text + "\n[model]\neffects = []\n";
 }
 

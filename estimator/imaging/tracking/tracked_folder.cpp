@@ -97,7 +97,7 @@ std::optional<SpecimenPose> stated_pose(const TrackRequest& request, std::vector
          fmt::format("{} poses lie here, and which is this session's is not known: none is used",
                      nearby.size()),
          nearby[0].string(), static_cast<double>(nearby.size()), "files",
-         "Name one with --pose, or leave one only."});
+         "Leave one only, name it to `track` with --pose, or write [images.to_specimen] in the study."});
   return std::nullopt;
 }
 

@@ -298,12 +298,16 @@ TEST(ImageFolder, RefusesACompressionThatIsNotReadBeforeItReadsPixels) {
   ASSERT_TRUE(file.saveFile(files[0].c_str(), EXS_JPEGProcess14SV1).good());
   EXPECT_THAT(ids(read_image_folder(scratch.path())), IsEmpty());
   std::ifstream stream(files[0], std::ios::binary);
-  std::string bytes(std::istreambuf_iterator<char>(stream), {});
-  const std::string lossless = "1.2.840.10008.1.2.4.70", wavelets = "1.2.840.10008.1.2.4.90";
-  bytes.replace(bytes.find(lossless), lossless.size(), wavelets);
-  std::ofstream(files[0], std::ios::binary) << bytes;
-  EXPECT_THAT(test::message_of([&] { require_sound(read_image_folder(scratch.path())); }),
+  const std::string bytes(std::istreambuf_iterator<char>(stream), {});
+  const auto refusal = [&](const std::string& syntax) {
+    const std::string lossless = "1.2.840.10008.1.2.4.70";
+    std::ofstream(files[0], std::ios::binary)
+        << std::string(bytes).replace(bytes.find(lossless), lossless.size(), syntax);
+    return test::message_of([&] { require_sound(read_image_folder(scratch.path())); });
+  };
+  EXPECT_THAT(refusal("1.2.840.10008.1.2.4.90"),
               HasSubstr("compressed in a way that is not read: JPEG 2000 (Lossless only)"));
+  EXPECT_THAT(refusal("1.2.840.10008.1.2.4.99"), HasSubstr("1.2.840.10008.1.2.4.99"));
 }
 
 TEST(ImageFolder, RefusesAnEmptyFolder) {
@@ -323,6 +327,11 @@ TEST(StudySkeleton, IsAHeartsWhereDiffusionWasImagedAndNamesEachSeriesCommand) {
               AllOf(HasSubstr("kind = \"fitted-lv\""), HasSubstr("mesh_file = \"mine.mesh\""),
                     HasSubstr("diastole fibres . --study mine.study.toml -o mine.fibres.csv"),
                     HasSubstr("have no tags"), Not(HasSubstr("images = "))));
+  folder.series.push_back(read_image_folder(scratch.path()).series[0]);
+  EXPECT_THAT(study_skeleton(folder, study),
+              AllOf(HasSubstr("kind = \"fitted-lv\""), HasSubstr("[images.to_specimen]")));
+  EXPECT_THAT(study_skeleton(folder, scratch.path() / "a\"b.study.toml"),
+              HasSubstr(R"(mesh_file = "a\"b.mesh")"));
 }
 
 TEST(PhaseTimes, CountsWhatIsMissingBetween) {

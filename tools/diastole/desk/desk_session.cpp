@@ -46,7 +46,6 @@ DeskSession::DeskSession(imaging::TrackRequest request, std::optional<fs::path> 
   const imaging::ImageFolder folder = imaging::read_image_folder(request_.folder);
   imaging::require_sound(folder);
   folder_problems_ = folder.problems;
-  request_.known_pose = imaging::stated_pose(request_, folder_problems_);
   views_ = imaging::tag_views(folder);
   edits_ = imaging::parse_edits(file_text(), edits_file());
   imaging::apply_edits(edits_, views_);
@@ -182,8 +181,10 @@ std::string DeskSession::payload_of(const imaging::ManualEdits& edits, double se
   for (const imaging::TagView& view : views_) {
     if (const auto found = slices_.find(view.name); found != slices_.end()) slices.push_back(found->second);
   }
+  imaging::TrackRequest request = request_;
+  request.known_pose = imaging::stated_pose(request, problems);  // it may have been written meanwhile
   const imaging::TrackedFolder tracked =
-      imaging::gathered(request_, edits, std::move(slices), std::move(problems));
+      imaging::gathered(request, edits, std::move(slices), std::move(problems));
   if (tags_) write_whole_file(*tags_, imaging::tags_file_text(tracked.points));
   const TrackingRecord record = imaging::tracking_record(tracked, seconds);
   return fmt::format(R"({{"html": {}, "record": {}}})", json(report::cine_players(record)).dump(),

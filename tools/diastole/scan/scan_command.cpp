@@ -48,6 +48,12 @@ struct ScanArguments {
   bool diffusion = false;
   [[nodiscard]] double cycle_s() const { return period_s.value_or(1.2); }
   double first_s = 0.012;
+
+  [[nodiscard]] double period_of(const std::vector<ScanPhase>& phases) const {
+    if (peak_kPa || period_s || phases.size() < 2) return cycle_s();
+    const double last_s = phases.back().time_s;
+    return last_s + (last_s - phases.front().time_s) / static_cast<double>(phases.size() - 1);
+  }
 };
 
 /// The phases of the study's schedule: the loaded frames of its frames file, or a parabolic cycle up to a pressure.
@@ -109,11 +115,11 @@ void check(const ScanArguments& arguments, const ElasticModel& model, const std:
         {"", "--tag-spacing",
          fmt::format("{:g} mm is less than three pixels of {:.3g} mm", protocol.tags.spacing_mm, pixel_mm),
          "Space the tags farther apart, or give a larger --matrix."});
-  if (const double last_s = phases.back().time_s;
-      arguments.period_s && !(*arguments.period_s > std::max(arguments.first_s, last_s)))
+  if (const double period_s = arguments.period_of(phases);
+      !(period_s > std::max(arguments.first_s, phases.back().time_s)))
     throw InputError({"", "--period",
-                      fmt::format("{:g} s does not hold the phases, from {:g} to {:g} s", *arguments.period_s,
-                                  phases.front().time_s, last_s),
+                      fmt::format("{:g} s does not hold the phases, from {:g} to {:g} s", period_s,
+                                  phases.front().time_s, phases.back().time_s),
                       "Give the time from trigger to trigger."});
   if (!protocol.tagged && !protocol.cine && !arguments.flow && !arguments.diffusion)
     throw InputError(
@@ -280,10 +286,7 @@ ExitCode scan_study(const ScanArguments& arguments, const CommandOutput& out) {
   scanner::MovingBody body{&model.mesh(), {}, std::move(motion.position_mm), 0};
   for (const ScanPhase& phase : phases)
     body.times_s.push_back(phase.time_s);
-  body.period_s = arguments.peak_kPa || arguments.period_s || phases.size() < 2
-                      ? arguments.cycle_s()
-                      : phases.back().time_s + (phases.back().time_s - phases.front().time_s) /
-                                                   static_cast<double>(phases.size() - 1);
+  body.period_s = arguments.period_of(phases);
   if (arguments.flow) check_cycle(arguments, body);
   fs::create_directories(partial / "dicom");
   const scanner::ScanPose pose = pose_of(study);
