@@ -70,7 +70,6 @@ class Search {
   SearchResult result_;
   RoundEnd end_ = RoundEnd::ceres;
   std::deque<double> chi_squares_;  // after the last accepted steps
-  bool has_crept_ = false;          // and has got a fresh Jacobian for it
   int before_round_ = 0, refused_ = 0, refused_in_a_row_ = 0;
   double radius_ = 0, gain_ = 0, expected_gain_ = 0;
   bool step_was_on_fresh_ = true;
@@ -187,12 +186,7 @@ Search::RoundEnd Search::end_after(const ceres::IterationSummary& step) {
   if (!first) {
     chi_squares_.push_back(model_.chi_square());
     if (chi_squares_.size() > creeping_steps + 1) chi_squares_.pop_front();
-    if (is_creeping()) {
-      if (model_.kept_over_sigmas < trusted_over_sigmas || std::exchange(has_crept_, true))
-        return RoundEnd::creeping;
-      chi_squares_ = {model_.chi_square()};
-      return RoundEnd::fresh_jacobian;
-    }
+    if (is_creeping()) return RoundEnd::creeping;
   }
   const bool enough = options_.small_gain && gain_ < small_gain();
   if (!first && enough && step_was_on_fresh_ && radius_before >= hardly_damped) return RoundEnd::small_gain;

@@ -16,7 +16,8 @@
 //
 // Where a Jacobian costs many solutions (Linearisation::kept), Broyden's updates keep it from point to point. It is
 // computed afresh when a step is refused on a kept one, when a step gains less than a quarter of what was expected, and
-// when the search would end on one that has been kept over more than two standard errors.
+// when the search would end on one that has been kept over more than two standard errors, unless it has crept (a caller
+// may go on with better derivatives).
 
 #include <Eigen/Core>
 #include <functional>

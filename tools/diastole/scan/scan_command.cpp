@@ -49,10 +49,10 @@ struct ScanArguments {
   [[nodiscard]] double cycle_s() const { return period_s.value_or(1.2); }
   double first_s = 0.012;
 
-  [[nodiscard]] double period_of(const std::vector<ScanPhase>& phases) const {
-    if (peak_kPa || period_s || phases.size() < 2) return cycle_s();
-    const double last_s = phases.back().time_s;
-    return last_s + (last_s - phases.front().time_s) / static_cast<double>(phases.size() - 1);
+  [[nodiscard]] double period_of(const std::vector<ScanPhase>& schedule) const {
+    if (peak_kPa || period_s || schedule.size() < 2) return cycle_s();
+    const double last_s = schedule.back().time_s;
+    return last_s + (last_s - schedule.front().time_s) / static_cast<double>(schedule.size() - 1);
   }
 };
 
