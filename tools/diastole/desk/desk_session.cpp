@@ -46,6 +46,8 @@ DeskSession::DeskSession(imaging::TrackRequest request, std::optional<fs::path> 
   const imaging::ImageFolder folder = imaging::read_image_folder(request_.folder);
   imaging::require_sound(folder);
   folder_problems_ = folder.problems;
+  std::vector<Finding> told_later;
+  (void)imaging::stated_pose(request_, told_later);  // a broken one is refused before anything is tracked
   views_ = imaging::tag_views(folder);
   edits_ = imaging::parse_edits(file_text(), edits_file());
   imaging::apply_edits(edits_, views_);
