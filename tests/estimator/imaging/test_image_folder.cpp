@@ -11,6 +11,7 @@
 #include "estimator/imaging/series/image_folder.hpp"
 #include "estimator/imaging/series/study_skeleton.hpp"
 #include "estimator/imaging/series/views.hpp"
+#include "estimator/imaging/tracking/tracked_folder.hpp"
 #include "tests/estimator/imaging/tagged_ring.hpp"
 #include "tests/estimator/io/scratch_file.hpp"
 
@@ -308,6 +309,20 @@ TEST(ImageFolder, RefusesACompressionThatIsNotReadBeforeItReadsPixels) {
   EXPECT_THAT(refusal("1.2.840.10008.1.2.4.90"),
               HasSubstr("compressed in a way that is not read: JPEG 2000 (Lossless only)"));
   EXPECT_THAT(refusal("1.2.840.10008.1.2.4.99"), HasSubstr("1.2.840.10008.1.2.4.99"));
+}
+
+TEST(TrackFolder, ReadsThePoseBeforeItTracks) {
+  const ScratchFolder scratch;
+  write_ring({}, scratch.path());
+  std::ofstream(scratch.path() / "mine.pose.toml") << "origin_mm = [0, 0]\n";
+  std::vector<std::string> stages;
+  EXPECT_THAT(test::message_of([&] {
+                (void)track_folder(
+                    {.folder = scratch.path(), .pose = {}, .known_pose = {}, .coordinates = "specimen"},
+                    [&](const std::string& stage) { stages.push_back(stage); });
+              }),
+              HasSubstr("origin_mm"));
+  EXPECT_THAT(stages, ElementsAre("reading the folder"));
 }
 
 TEST(ImageFolder, RefusesAnEmptyFolder) {
