@@ -115,11 +115,11 @@ void add_design(CommandLine& line) {
                                 "slices along the axis, turned so many degrees from x"))
       ->delimiter(',')
       ->expected(0, 64);
-  of_images(command->add_option("--tag-spacing", plan.tag_spacing_mm, "mm"))->check(CLI::PositiveNumber);
-  of_images(command->add_option("--pixel", plan.pixel_mm, "mm"))->check(CLI::PositiveNumber);
+  of_images(command->add_option("--tag-spacing", plan.tag_spacing_mm, "mm"))->check(positive_number);
+  of_images(command->add_option("--pixel", plan.pixel_mm, "mm"))->check(positive_number);
   of_images(command->add_option("--snr", plan.snr, "signal of tissue over the noise of one channel"))
-      ->check(CLI::PositiveNumber);
-  of_images(command->add_option("--T1", plan.T1_s, "of tissue, s"))->check(CLI::PositiveNumber);
+      ->check(positive_number);
+  of_images(command->add_option("--T1", plan.T1_s, "of tissue, s"))->check(positive_number);
   line.on_run(command, [arguments](const CommandOutput& out) { return run_design(*arguments, out); });
 }
 

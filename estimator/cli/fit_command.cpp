@@ -284,7 +284,7 @@ void add_fit(CommandLine& line) {
       ->add_option(
           "--pressure-offset", arguments->pressure_offset_kPa,
           "seek a common offset of all frame pressures too, about zero with this standard deviation, kPa")
-      ->check(CLI::PositiveNumber);
+      ->check(positive_number);
   command
       ->add_option("--fibre-sigma-deg", arguments->fibre_sigma_deg,
                    "fibres may be off by a common angle of this standard deviation: the errors then hold it")

@@ -219,11 +219,11 @@ void add_flow(CommandLine& line) {
                       "a page to look at: flow, volume, loop, images with the lumen's outline");
   command->add_option("--record", a.record, "the same as a file for `diastole report` (*.json)");
   command->add_option("--venc", session.scan.venc_cm_s, "velocity encoding in cm/s, instead of the headers'")
-      ->check(CLI::PositiveNumber);
+      ->check(positive_number);
   command
       ->add_option("--period", session.scan.interval_s,
                    "time after which the flow repeats in s, instead of the headers' interval")
-      ->check(CLI::PositiveNumber);
+      ->check(positive_number);
   command->add_option("--series", session.scan.series,
                       "number of the velocity series, where there are several");
   command->add_option("--slice", session.scan.slice, "slice of it, from 1, where there are several");

@@ -80,7 +80,7 @@ void add_common(CLI::App& command, GridArguments& arguments, const char* output)
   command.add_option("-o,--output", arguments.output, output)->required();
   command.add_option("--sigma-mm", arguments.sigma_mm, "standard deviation of each coordinate")
       ->required()
-      ->check(CLI::PositiveNumber);
+      ->check(positive_number);
   command.add_option("--unit", arguments.unit, "length in the grid")
       ->check(CLI::IsMember({"mm", "cm", "m"}))
       ->capture_default_str();

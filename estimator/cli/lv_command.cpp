@@ -230,7 +230,7 @@ void add_ventricle(CommandLine& line) {
   command->add_option("-o,--output", a.output, "the mesh of one phase (*.mesh)")->required();
   command
       ->add_option("--phase", a.request.phase, "the mesh's phase, as the file numbers it; default: the first")
-      ->check(CLI::NonNegativeNumber);
+      ->check(nonnegative_number);
   command->add_option("--mesh", a.elements, "elements around, from apex to base, through the wall (8,5,2)")
       ->delimiter(',')
       ->expected(3);

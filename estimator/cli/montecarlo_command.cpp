@@ -255,10 +255,10 @@ void add_montecarlo(CommandLine& line) {
       ->add_option("--noise", arguments->noise_mm,
                    "standard deviations of the points, mm; default: as stated")
       ->delimiter(',')
-      ->check(CLI::PositiveNumber);
+      ->check(positive_number);
   command->add_option("--frames", arguments->frames, "numbers of loaded frames to use; default: all")
       ->delimiter(',')
-      ->check(CLI::PositiveNumber);
+      ->check(positive_number);
   command
       ->add_option(
           "--tag-grid", arguments->grid_mm,

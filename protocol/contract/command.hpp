@@ -19,6 +19,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <functional>
+#include <optional>
 #include <string>
 
 #include "protocol/contract/exit_code.hpp"
@@ -28,6 +29,25 @@ namespace diastole {
 struct CommandOutput {
   bool json = false;
 };
+
+/// The number that a text is, none if it is more or less than one.
+inline std::optional<double> number_of(const std::string& text) {
+  char* end = nullptr;
+  const double number = std::strtod(text.c_str(), &end);
+  return text.empty() || *end != '\0' ? std::nullopt : std::optional(number);
+}
+
+/// For options, instead of CLI11's, which report the largest number that there is. What is no number is refused when it is converted.
+inline const CLI::Validator positive_number(
+    [](const std::string& text) {
+      return number_of(text).value_or(1.0) <= 0.0 ? text + " is not above zero" : "";
+    },
+    "POSITIVE");
+inline const CLI::Validator nonnegative_number(
+    [](const std::string& text) {
+      return number_of(text).value_or(0.0) < 0.0 ? text + " is below zero" : "";
+    },
+    "NONNEGATIVE");
 
 class CommandLine {
  public:
@@ -54,7 +74,7 @@ class CommandLine {
 
  private:
   static std::string must_be_finite(const std::string& text) {
-    return std::isfinite(std::strtod(text.c_str(), nullptr)) ? "" : text + " is not a finite number";
+    return std::isfinite(number_of(text).value_or(0.0)) ? "" : text + " is not a finite number";
   }
   CLI::App& app_;
   CommandOutput output_;

@@ -306,6 +306,10 @@ TEST(BadOption, IsToldWithItsNameItsValueAndWhatIsExpected) {
               HasSubstr("--pressure-kPa: nan is not a finite number"));
   EXPECT_THAT(told({"diastole", "scan", "gel.study.toml", "-o", "scan", "--tag-angles", "0,inf"}),
               HasSubstr("--tag-angles: inf is not a finite number"));
+  EXPECT_THAT(told({"diastole", "scan", "gel.study.toml", "-o", "scan", "--period", "1,2"}),
+              HasSubstr("--period: \"1,2\" is not a number"));
+  EXPECT_THAT(told({"diastole", "scan", "gel.study.toml", "-o", "scan", "--period", "-1"}),
+              HasSubstr("--period: -1 is not above zero"));
   EXPECT_THAT(told({"diastole", "jog", "--mL", "5mL"}), HasSubstr("--mL: \"5mL\" is not a number"));
 }
 

@@ -175,7 +175,7 @@ void add_batch(CommandLine& line) {
                "  arguments = [\"--mesh\", \"8,4,1\"]");
   command->add_option("JOBS", options->file, "batch file (*.batch.toml)")->required();
   command->add_option("--at-once", options->at_once, "jobs at the same time")
-      ->check(CLI::PositiveNumber)
+      ->check(positive_number)
       ->capture_default_str();
   command->add_option("--only", options->only, "this job alone, counted from 1");
   command->add_option("--slurm", options->slurm, "write a script for sbatch instead of running anything");

@@ -182,7 +182,7 @@ void add_runs(CommandLine& line) {
       "folder (default: this one), then KEY=VALUE, KEY<NUMBER, KEY>NUMBER, KEY!=VALUE or words");
   command->add_option("--sort", options->sort, "key to sort by")->capture_default_str();
   command->add_flag("--reverse", options->reverse, "the other way round");
-  command->add_option("--most", options->most, "show at most so many")->check(CLI::NonNegativeNumber);
+  command->add_option("--most", options->most, "show at most so many")->check(nonnegative_number);
   command->add_option("-o,--output", options->page, "HTML page to write");
   command->add_flag("--force", options->force, "replace an output file that is no report");
   command->add_flag("--rebuild", options->rebuild, "read all files anew");

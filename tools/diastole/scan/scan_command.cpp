@@ -375,7 +375,6 @@ void add_scan(CommandLine& line) {
   add_study(*command, a.study);
   add_values(*command, a.study);
   command->add_option("-o,--output", a.folder, "the folder to make")->required();
-  const auto positive = CLI::PositiveNumber;
   command->add_option("--short-axis", a.protocol.short_axis_mm, "heights of slices across the axis, mm")
       ->delimiter(',')
       ->expected(0, 64);
@@ -385,7 +384,7 @@ void add_scan(CommandLine& line) {
       ->delimiter(',')
       ->expected(0, 64);
   command->add_option("--fov", a.protocol.field_of_view_mm, "field of view, mm")
-      ->check(positive)
+      ->check(positive_number)
       ->capture_default_str();
   command->add_option("--matrix", a.protocol.matrix, "pixels each way")
       ->check(CLI::Range(32, 512))
@@ -394,10 +393,10 @@ void add_scan(CommandLine& line) {
       ->check(CLI::Range(0.3, 1.0))
       ->capture_default_str();
   command->add_option("--thickness", a.protocol.thickness_mm, "of a slice, mm")
-      ->check(positive)
+      ->check(positive_number)
       ->capture_default_str();
   command->add_option("--tag-spacing", a.protocol.tags.spacing_mm, "mm")
-      ->check(positive)
+      ->check(positive_number)
       ->capture_default_str();
   command
       ->add_option("--tag-angles", a.protocol.tags.angles_deg, "of the tags' normals from the rows, degrees")
@@ -408,12 +407,12 @@ void add_scan(CommandLine& line) {
                    "flip angles in proportion: 1,1 or binomial, as 1,3,3,1")
       ->delimiter(',')
       ->expected(2, 8)
-      ->check(positive);
+      ->check(positive_number);
   command->add_flag("--grid", a.protocol.tags.grid, "all directions in one image");
   command->add_option("--snr", a.protocol.snr, "signal of tissue over the noise of one channel")
-      ->check(positive)
+      ->check(positive_number)
       ->capture_default_str();
-  command->add_option("--T1", a.protocol.T1_s, "of tissue, s")->check(positive)->capture_default_str();
+  command->add_option("--T1", a.protocol.T1_s, "of tissue, s")->check(positive_number)->capture_default_str();
   command->add_option("--shading", a.protocol.shading, "of the coils, from corner to corner")
       ->check(CLI::Range(0.0, 1.0))
       ->capture_default_str();
@@ -428,19 +427,19 @@ void add_scan(CommandLine& line) {
       ->check(CLI::Range(4.0, 40.0))
       ->capture_default_str();
   command->add_option("--venc", a.venc_cm_s, "of the phase contrast, cm/s")
-      ->check(positive)
+      ->check(positive_number)
       ->capture_default_str();
   command->add_flag("--diffusion", a.diffusion, "diffusion weighted images of the fibres at rest, too");
   command->add_flag("!--no-tags", a.protocol.tagged, "no tagged series");
   command
       ->add_option("--peak-kPa", a.peak_kPa,
                    "a parabolic cycle up to this pressure, instead of the study's frames")
-      ->check(positive);
+      ->check(positive_number);
   command->add_option("--phases", a.phases, "of that cycle")->check(CLI::Range(1, 64))->capture_default_str();
   command
       ->add_option("--period", a.period_s,
                    "of the cycle, s: 1.2 for a parabolic one, else what the frames span")
-      ->check(positive);
+      ->check(positive_number);
   command->add_option("--seed", a.protocol.seed, "of the noise and of where the tags lie")
       ->capture_default_str();
   line.on_run(command, [arguments](const CommandOutput& out) { return run_scan(*arguments, out); });
