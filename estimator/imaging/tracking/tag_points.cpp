@@ -146,8 +146,9 @@ class Emitter {
         const double slope = static_cast<double>(phase.slope[f](row, column));
         if (owner(row, column) < 0 || slope == 0) continue;
         const double residual = static_cast<double>(phase.residual(row, column));
-        const double weight =
-            huber_weight(residual, phase.noise) / (phase.noise * phase.noise * tracked_.noise_factor[f]);
+        const double variance = phase.noise * phase.noise * tracked_.noise_factor[f] *
+                                (1 + tracked_.excess.at(phase, row, column));
+        const double weight = huber_weight(residual, phase.noise) / variance;
         Place& place = places_[static_cast<size_t>(owner(row, column))];
         place.information += weight * slope * slope;
         place.gradient += weight * slope * residual;

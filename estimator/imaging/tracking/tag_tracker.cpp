@@ -8,7 +8,6 @@
 
 #include "estimator/imaging/series/spectrum.hpp"
 #include "estimator/imaging/tracking/brightness.hpp"
-#include "estimator/imaging/tracking/edge_excess.hpp"
 #include "estimator/imaging/tracking/ghost_phase.hpp"
 #include "estimator/imaging/tracking/joint_motion.hpp"
 #include "estimator/imaging/tracking/robust_weight.hpp"
@@ -474,8 +473,7 @@ class ViewTracker {
     const TrackedPhase& phase = phases_[k];
     PhaseInformationSum sum(splines_->count());
     for (const Fitted& fitted : fitted_) {
-      const double beside_noise =
-          edge_excess_.at(static_cast<double>(phase.depth_mm(fitted.pixel->row, fitted.pixel->column)));
+      const double beside_noise = excess_.over_phases(phase, fitted.pixel->row, fitted.pixel->column);
       const double weight =
           huber_weight(fitted.residual, phase.noise) / (phase.noise * phase.noise * beside_noise);
       sum.add(fitted.pixel->splines, weight * fitted.slope[f] * fitted.slope[f],
@@ -484,13 +482,22 @@ class ViewTracker {
     return sum.take();
   }
 
-  /// A phase's residual power near the tags' frequency over that of white noise of the same variance: farther off than the motion can
-  /// follow, and within two thirds of a cycle a spacing of the tags.
+  /// A phase's residual power near the tags' frequency over that of white noise of the same variance, where there is nothing but noise: farther
+  /// off than the motion can follow, and within two thirds of a cycle a spacing of the tags.
   double power_near_tags(const TrackedPhase& phase, size_t f) const {
     const Eigen::Vector2d extent(view_.plane.columns * view_.plane.column_spacing_mm,
                                  view_.plane.rows * view_.plane.row_spacing_mm);
     const auto limit = static_cast<float>(huber_limit * phase.noise);
-    const Eigen::ArrayXXf power = spectrum_of(phase.residual.min(limit).max(-limit)).abs2();
+    double pixels = 0;
+    Image clean = Image::Zero(phase.residual.rows(), phase.residual.cols());
+    for (Eigen::Index column = 0; column < clean.cols(); ++column) {
+      for (Eigen::Index row = 0; row < clean.rows(); ++row) {
+        if (phase.residual(row, column) == 0 || !excess_.is_clean(row, column)) continue;
+        clean(row, column) = std::clamp(phase.residual(row, column), -limit, limit);
+        pixels += 1;
+      }
+    }
+    const Eigen::ArrayXXf power = spectrum_of(clean).abs2();
     double sum = 0, count = 0;
     for (Eigen::Index column = 0; column < power.cols(); ++column) {
       for (Eigen::Index row = 0; row < power.rows(); ++row) {
@@ -502,8 +509,7 @@ class ViewTracker {
         count += 1;
       }
     }
-    return sum / (std::max(count, 1.0) * static_cast<double>(std::max<size_t>(phase.pixels, 1)) *
-                  phase.noise * phase.noise);
+    return sum / (std::max(count, 1.0) * std::max(pixels, 1.0) * phase.noise * phase.noise);
   }
 
   /// Noise power near the tags' frequency over the mean. A narrow wall blurs the spectrum, so that what the fit takes of the noise at the tags'
@@ -537,7 +543,7 @@ class ViewTracker {
   }
 
   void fit_all_phases() {
-    edge_excess_ = EdgeExcess(phases_, view_.plane.finer_spacing_mm());
+    excess_ = ResidualExcess(phases_, view_.plane, spacing_mm_);
     for (size_t f = 0; f < directions(); ++f)
       factors_.push_back(noise_factor(f));
     std::vector<double> kappas;
@@ -585,6 +591,7 @@ class ViewTracker {
                                 spacing_mm_ * spacing_mm_ * factors_[f] * rest_matrices_[f].inverse(),
                                 0.5 * view_.extent_mm(), view_.extent_mm().norm()});
     tracked.phases = std::move(phases_);
+    tracked.excess = std::move(excess_);
     tracked.noise_factor = factors_;
     tracked.kappa_per_mm = kappa_per_mm_;
     return tracked;
@@ -607,7 +614,7 @@ class ViewTracker {
   Eigen::MatrixXd first_precision_;
   std::vector<Eigen::MatrixXd> coefficients_;  // a direction: n x T
   std::vector<TrackedPhase> phases_;
-  EdgeExcess edge_excess_;                                  // before all phases are fitted together: none
+  ResidualExcess excess_;                                   // before all phases are fitted together: none
   std::vector<std::vector<std::vector<SeenMotion>>> seen_;  // a phase and direction
   std::vector<Fitted> fitted_;
   std::vector<double> factors_;

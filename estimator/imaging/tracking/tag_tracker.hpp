@@ -15,26 +15,18 @@
 #include <vector>
 
 #include "estimator/imaging/tracking/ghost.hpp"
-#include "estimator/imaging/tracking/materials.hpp"
 #include "estimator/imaging/tracking/motion_field.hpp"
+#include "estimator/imaging/tracking/residual_excess.hpp"
 #include "estimator/imaging/tracking/tag_view.hpp"
+#include "estimator/imaging/tracking/tracked_phase.hpp"
 
 namespace diastole::imaging {
-
-struct TrackedPhase {
-  MaterialMap materials;
-  Eigen::ArrayXXf depth_mm;  ///< of tissue
-  Eigen::ArrayXXf residual;  ///< in tissue, as far as it was fitted; 0 elsewhere
-  std::vector<Eigen::ArrayXXf>
-      slope;          ///< a direction: the image's derivative by w, 1/mm; 0 where it was not fitted
-  double noise = 0;   ///< standard deviation of the residual, robust
-  size_t pixels = 0;  ///< that were fitted
-};
 
 struct TrackedView {
   std::vector<TagWave> waves;       ///< as refined: the tags at rest
   std::vector<MotionField> motion;  ///< one a direction
   std::vector<TrackedPhase> phases;
+  ResidualExcess excess;             ///< of the residuals, over their noise
   std::vector<double> noise_factor;  ///< a direction: noise power near the tags' frequency over the mean
   double kappa_per_mm = 0;
   std::vector<Ghost> ghosts;
