@@ -46,8 +46,9 @@ void add_turning_errors(const std::array<TurningError, 2>& errors, double turn_m
 /// Conductances below this are none: the resistance would be beyond what the step's matrix bears.
 constexpr double least_leak = 1e-7;
 
-/// Of the drive, mL/kPa: less is rigid, a thousandth of what a hose yields.
-constexpr double least_compliance = 1e-5;
+/// Of the drive, mL/kPa: less is rigid. A stiff hose yields 1e-3, and its waves shift by as much as the drive adds to that; so little moves the
+/// pump's pressure by less than a pascal, so that a search does not see the border.
+constexpr double least_compliance = 1e-8;
 /// Its resistance over its stiffness: screw and seal rub, so that it does not ring with the fluid's end at a hundred hertz,
 /// which samples would show as something slow.
 constexpr double drive_damping_s = 2e-3;

@@ -148,6 +148,18 @@ TEST(Simulation, ADriveThatHardlyYieldsLeaksAsARigidOne) {
             0.1);  // of +-50 kPa, a third of it by the ringing that it changes without a leak, too
 }
 
+TEST(Simulation, ADriveThatYieldsLessAndLessBecomesARigidOne) {
+  RigModel model = straight_model();
+  const PlantTrace rigid = simulate_plant(model, cycles(2));
+  const auto off_kPa = [&](double compliance_mL_per_kPa) {
+    model.drive_compliance_mL_per_kPa = compliance_mL_per_kPa;
+    return pump_rms_kPa(simulate_plant(model, cycles(2)), rigid, 1);
+  };
+  EXPECT_NEAR(off_kPa(1e-6) / off_kPa(1e-5), 0.1, 0.01);
+  EXPECT_LT(off_kPa(1.1e-8), 1e-3);  // of +-50 kPa; the next is taken for rigid
+  EXPECT_EQ(off_kPa(0.9e-8), 0.0);
+}
+
 TEST(Simulation, ALeakPastAYieldingDriveConvergesInStep) {
   for (const double bend : {0.0, 1.0}) {
     RigModel model = leaking_model(bend);
