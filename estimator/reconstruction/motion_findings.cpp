@@ -208,7 +208,7 @@ void check_pressure_offset(Findings& findings, const MotionEvidence& evidence) {
   const PressureAtNoMotion rest = pressure_at_no_motion(evidence.fields, evidence.amplitudes);
   const double largest_kPa = largest_pressure(evidence.fields);
   constexpr double significant = 4.0;  // one test, not one a slice
-  if (std::abs(rest.value_kPa) < std::max(significant * rest.se_kPa, 0.06 * largest_kPa)) return;
+  if (!(std::abs(rest.value_kPa) >= std::max(significant * rest.se_kPa, 0.06 * largest_kPa))) return;
   findings.push_back(
       {Severity::warning, "pressure-offset",
        fmt::format("The motion vanishes at {:+.3g} ± {:.2g} kPa and not at 0.", rest.value_kPa, rest.se_kPa),

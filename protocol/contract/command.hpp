@@ -63,10 +63,12 @@ class CommandLine {
     return command;
   }
 
-  /// What the front door runs when `command` was chosen, which has all its options by now. Its numbers must be finite.
+  /// What the front door runs when `command` was chosen, which has all its options by now. Its numbers must be finite, and its words some.
   void on_run(CLI::App* command, Action action) {
-    for (CLI::Option* option : command->get_options())
+    for (CLI::Option* option : command->get_options()) {
       if (option->get_type_name().starts_with("FLOAT")) option->check(must_be_finite, "");
+      if (option->get_type_name().starts_with("TEXT")) option->check(must_be_some, "");
+    }
     command->callback([this, action = std::move(action)] { chosen_ = action; });
   }
 
@@ -76,6 +78,7 @@ class CommandLine {
   static std::string must_be_finite(const std::string& text) {
     return std::isfinite(number_of(text).value_or(0.0)) ? "" : text + " is not a finite number";
   }
+  static std::string must_be_some(const std::string& text) { return text.empty() ? "is empty" : ""; }
   CLI::App& app_;
   CommandOutput output_;
   Action chosen_;

@@ -2,6 +2,8 @@
 
 #include <dcmtk/config/osconfig.h>
 #include <dcmtk/dcmdata/dccodec.h>
+#include <dcmtk/dcmdata/dcpixseq.h>
+#include <dcmtk/dcmdata/dcpxitem.h>
 #include <dcmtk/dcmdata/dcrledrg.h>
 #include <dcmtk/dcmdata/dctk.h>
 #include <dcmtk/dcmjpeg/djdecode.h>
@@ -9,6 +11,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cctype>
 #include <cerrno>
 #include <cmath>
@@ -17,6 +20,7 @@
 #include <fstream>
 #include <memory>
 #include <mutex>
+#include <span>
 
 #include "protocol/contract/input_error.hpp"
 
@@ -349,7 +353,7 @@ ImageHeader header_of(DcmItem& dataset, int frame, const SlicePlane& plane, cons
 }
 
 struct PixelLayout {
-  int rows, columns, frames, bits_allocated, bits_stored;
+  int rows, columns, frames, bits_allocated, bits_stored, high_bit;
   bool is_signed;
 
   [[nodiscard]] size_t frame_bytes() const {
@@ -361,8 +365,13 @@ std::optional<FileFault> check_layout(DcmItem& dataset, PixelLayout& layout) {
   const auto whole = [&](const DcmTagKey& tag, double otherwise) {
     return static_cast<int>(std::clamp(number(dataset, tag).value_or(otherwise), -1.0, 1e6));
   };
-  layout = {whole(DCM_Rows, 0),          whole(DCM_Columns, 0),    whole(DCM_NumberOfFrames, 1),
-            whole(DCM_BitsAllocated, 0), whole(DCM_BitsStored, 0), whole(DCM_PixelRepresentation, 0) == 1};
+  layout = {whole(DCM_Rows, 0),
+            whole(DCM_Columns, 0),
+            whole(DCM_NumberOfFrames, 1),
+            whole(DCM_BitsAllocated, 0),
+            whole(DCM_BitsStored, 0),
+            whole(DCM_HighBit, whole(DCM_BitsStored, 0) - 1),
+            whole(DCM_PixelRepresentation, 0) == 1};
   const auto in_range = [](int value, int most) { return value >= 1 && value <= most; };
   if (!in_range(layout.rows, most_pixels_a_side) || !in_range(layout.columns, most_pixels_a_side) ||
       !in_range(layout.frames, most_frames))
@@ -376,6 +385,11 @@ std::optional<FileFault> check_layout(DcmItem& dataset, PixelLayout& layout) {
                     fmt::format("{} samples of {} bits a pixel, {} of them used, are not read",
                                 whole(DCM_SamplesPerPixel, 1), layout.bits_allocated, layout.bits_stored),
                     "Export the original images, grey levels of 8 or 16 bits, not screen copies.");
+  if (layout.high_bit < layout.bits_stored - 1 || layout.high_bit >= layout.bits_allocated)
+    return unusable("(0028,0102)",
+                    fmt::format("the highest of {} bits in {} cannot be bit {}", layout.bits_stored,
+                                layout.bits_allocated, layout.high_bit),
+                    "Export the series again.");
   return std::nullopt;
 }
 
@@ -421,10 +435,25 @@ bool looks_like_dicom(std::ifstream& stream) {
   return count >= 8 && (start[0] == 2 || start[0] == 8) && start[1] == 0 && start[3] == 0;
 }
 
-/// How deep items lie within items of undefined length, or of one that holds the others; little-endian, as all but retired syntaxes.
-size_t depth_of_items(std::istream& stream) {
-  constexpr std::string_view delimiter("\xfe\xff", 2), begin("\xfe\xff\x00\xe0", 4),
-      end("\xfe\xff\x0d\xe0", 4);
+/// What is left of a DICOM file that was cut off in the 128 bytes before its mark, which are zeros as a rule. Its name has no ending, as scanners
+/// write them, or the one of DICOM.
+bool is_stub(std::ifstream& stream, const std::filesystem::path& file, double bytes) {
+  if (bytes >= 132 || file.filename().string().starts_with('.')) return false;
+  if (!file.extension().empty() && !claims_to_be_dicom(file)) return false;
+  std::array<char, 132> start{};
+  stream.read(start.data(), start.size());
+  const bool is_blank = std::ranges::all_of(start, [](char c) { return c == 0; });
+  stream.clear();
+  stream.seekg(0);
+  return is_blank;
+}
+
+/// How deep items lie within items of undefined length, or of one that holds the others.
+size_t depth_of_items(std::istream& stream, std::endian order) {
+  const bool is_little = order == std::endian::little;
+  const std::string_view delimiter(is_little ? "\xfe\xff" : "\xff\xfe", 2);
+  const std::string_view begin(is_little ? "\xfe\xff\x00\xe0" : "\xff\xfe\xe0\x00", 4);
+  const std::string_view end(is_little ? "\xfe\xff\x0d\xe0" : "\xff\xfe\xe0\x0d", 4);
   constexpr uint32_t undefined = 0xffffffff;
   constexpr size_t tag_and_length = 8;
   std::vector<size_t> ends;  // of the items around a place
@@ -441,6 +470,7 @@ size_t depth_of_items(std::istream& stream) {
       if (tag == end && !ends.empty()) ends.pop_back();
       uint32_t length = 0;
       std::memcpy(&length, window.data() + at + begin.size(), sizeof length);
+      if (!is_little) length = __builtin_bswap32(length);
       if (tag != begin || length == 0) continue;
       ends.push_back(length == undefined ? SIZE_MAX : window_at + at + tag_and_length + length);
       most = std::max(most, ends.size());
@@ -456,18 +486,22 @@ size_t depth_of_items(std::istream& stream) {
 /// What the library would meet with more memory or deeper calls than the file is worth.
 std::optional<FileFault> check_before_loading(std::ifstream& stream, const std::filesystem::path& file) {
   DcmMetaInfo meta;
-  if (meta.loadFile(file.c_str()).good()) {
-    OFString syntax;
-    if (meta.findAndGetOFString(DCM_TransferSyntaxUID, syntax).good() &&
-        DcmXfer(syntax.c_str()).getStreamCompression() != ESC_none)
-      return unusable("(0002,0010)", "is deflated as a whole, and how large it becomes no header says",
-                      "Export it uncompressed, or with its pixels compressed (JPEG lossless, RLE).");
+  OFString stated;
+  if (meta.loadFile(file.c_str()).good()) (void)meta.findAndGetOFString(DCM_TransferSyntaxUID, stated);
+  const DcmXfer syntax(stated.c_str());
+  if (syntax.getStreamCompression() != ESC_none)
+    return unusable("(0002,0010)", "is deflated as a whole, and how large it becomes no header says",
+                    "Export it uncompressed, or with its pixels compressed (JPEG lossless, RLE).");
+  // Of a file that does not say, the library guesses the order.
+  const bool is_said = syntax.getXfer() != EXS_Unknown;
+  for (const std::endian order : {std::endian::little, std::endian::big}) {
+    if (is_said && syntax.isBigEndian() != (order == std::endian::big)) continue;
+    stream.clear();
+    stream.seekg(0);
+    if (const size_t depth = depth_of_items(stream, order); depth > deepest)
+      return unusable("(fffe,e000)", fmt::format("holds {} sequences within each other", depth),
+                      "No scanner writes this. Export the file again.");
   }
-  stream.clear();
-  stream.seekg(0);
-  if (const size_t depth = depth_of_items(stream); depth > deepest)
-    return unusable("(fffe,e000)", fmt::format("holds {} sequences within each other", depth),
-                    "No scanner writes this. Export the file again.");
   return std::nullopt;
 }
 
@@ -486,12 +520,18 @@ LoadedFile load(const std::filesystem::path& file) {
                             "Give yourself the right to read it, or move it out of the folder.");
     return loaded;
   }
+  std::error_code ignored;
+  loaded.bytes = static_cast<double>(std::filesystem::file_size(file, ignored));
+  if (is_stub(stream, file, loaded.bytes)) {
+    loaded.fault = FileFault{FileFault::Kind::truncated, "",
+                             loaded.bytes == 0 ? "is empty" : "ends before its first value",
+                             "Copy or export the file again."};
+    return loaded;
+  }
   if (!looks_like_dicom(stream)) {
     loaded.fault = FileFault{FileFault::Kind::foreign, "", "is no DICOM file", "Move it out of the folder."};
     return loaded;
   }
-  std::error_code ignored;
-  loaded.bytes = static_cast<double>(std::filesystem::file_size(file, ignored));
   if ((loaded.fault = check_before_loading(stream, file))) return loaded;
   loaded.format = std::make_unique<DcmFileFormat>();
   const OFCondition read = loaded.format->loadFile(file.c_str());
@@ -522,6 +562,54 @@ std::optional<FileFault> check_modality(DcmItem& dataset) {
                    "Move it out of the folder."};
 }
 
+/// How many bytes a segment of RLE (PS3.5 Annex G) holds, or more than `most`; a last byte that makes it even is none of them.
+size_t unpacked(std::span<const uint8_t> segment, size_t most) {
+  size_t held = 0, at = 0;
+  while (at + 1 < segment.size() && held < most) {
+    const auto count = static_cast<int8_t>(segment[at]);
+    if (count >= 0) {
+      held += std::min(static_cast<size_t>(count) + 1, segment.size() - at - 1);
+      at += static_cast<size_t>(count) + 2;
+    } else {
+      held += count == -128 ? 0 : static_cast<size_t>(1 - count);
+      at += count == -128 ? 1 : 2;
+    }
+  }
+  const auto rest = segment.subspan(std::min(at, segment.size()));
+  const bool is_padding =
+      rest.size() <= 1 || std::ranges::all_of(rest, [](uint8_t byte) { return byte == 0 || byte == 0x80; });
+  return is_padding ? held : most + 1;
+}
+
+/// The library fills up what a frame of RLE lacks, and cuts off what it has too much.
+bool is_whole_rle(DcmDataset& dataset, DcmPixelData& pixels, const PixelLayout& layout, int frame) {
+  DcmPixelSequence* fragments = nullptr;
+  if (dataset.getOriginalXfer() != EXS_RLELossless ||
+      pixels.getEncapsulatedRepresentation(EXS_RLELossless, nullptr, fragments).bad() || fragments == nullptr)
+    return true;
+  // After the table of offsets, one a frame (PS3.5 A.4.2).
+  DcmPixelItem* fragment = nullptr;
+  Uint8* bytes = nullptr;
+  if (fragments->getItem(fragment, static_cast<unsigned long>(frame) + 1).bad() || fragment == nullptr ||
+      fragment->getUint8Array(bytes).bad() || bytes == nullptr)
+    return false;
+  const std::span<const uint8_t> all(bytes, fragment->getLength());
+  constexpr size_t header_bytes = 64;
+  const auto segments = static_cast<size_t>(layout.bits_allocated / 8);
+  std::array<uint32_t, 16> header{};  // their number, and where each begins
+  if (all.size() < header_bytes) return false;
+  std::memcpy(header.data(), all.data(), header_bytes);
+  if (header[0] != segments) return false;
+  const size_t needed = layout.frame_bytes() / segments;
+  for (size_t i = 1; i <= segments; ++i) {
+    const size_t from = header[i], to = i < segments ? header[i + 1] : all.size();
+    if (from < header_bytes || to < from || to > all.size() ||
+        unpacked(all.subspan(from, to - from), needed) != needed)
+      return false;
+  }
+  return true;
+}
+
 float decoded(const PixelLayout& layout, const uint8_t* bytes, size_t index) {
   uint32_t raw = bytes[index];
   if (layout.bits_allocated == 16) {
@@ -530,12 +618,19 @@ float decoded(const PixelLayout& layout, const uint8_t* bytes, size_t index) {
     raw = word;
   }
   const auto bits = static_cast<unsigned>(layout.bits_stored);
-  raw &= (1U << bits) - 1U;
+  raw = (raw >> static_cast<unsigned>(layout.high_bit + 1 - layout.bits_stored)) & ((1U << bits) - 1U);
   const bool negative = layout.is_signed && (raw >> (bits - 1U)) != 0U;
   return static_cast<float>(raw) - (negative ? static_cast<float>(1U << bits) : 0.0F);
 }
 
 }  // namespace
+
+bool claims_to_be_dicom(const std::filesystem::path& file) {
+  std::string ending = file.extension().string();
+  std::transform(ending.begin(), ending.end(), ending.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return ending == ".dcm" || ending == ".dicom" || ending == ".ima";
+}
 
 std::optional<Eigen::Matrix3d> DiffusionEncoding::weighting() const {
   if (b_matrix) return b_matrix;
@@ -596,6 +691,7 @@ std::vector<Image> read_pixels(const std::filesystem::path& file, const std::vec
     Uint32 fragment = 0;  // the library finds the frame's own
     const bool read =
         pixels != nullptr && image.frame < layout.frames &&
+        is_whole_rle(dataset, *pixels, layout, image.frame) &&
         pixels
             ->getUncompressedFrame(&dataset, static_cast<Uint32>(image.frame), fragment, bytes.data(),
                                    static_cast<Uint32>(bytes.size()), colour_model)

@@ -66,6 +66,9 @@ struct DicomContent {
   std::optional<FileFault> fault;  ///< then there are no images
 };
 
+/// By its name a DICOM file; README.txt, .DS_Store and the like are none, nor are the nameless ones that scanners write.
+bool claims_to_be_dicom(const std::filesystem::path& file);
+
 /// Never throws for what a file holds. Memory is bounded by the file's size: values longer than 4 kB stay in the file, and a
 /// length beyond its end is a fault.
 DicomContent read_headers(const std::filesystem::path& file);

@@ -12,6 +12,7 @@
 
 #include "estimator/parallel/parallel_for.hpp"
 #include "protocol/contract/input_error.hpp"
+#include "protocol/signal/quantile.hpp"
 
 namespace diastole::imaging {
 namespace {
@@ -21,14 +22,6 @@ namespace fs = std::filesystem;
 /// A magnitude lies on one side of its lowest value; a velocity's noise fills both sides of zero alike, unless the image is
 /// mostly still tissue, whose values are near zero.
 constexpr double one_sided = 0.5;
-
-/// By its name a DICOM file, or one of the nameless kind that scanners write; README.txt, .DS_Store and the like are not.
-bool claims_to_be_dicom(const fs::path& file) {
-  std::string ending = file.extension().string();
-  std::transform(ending.begin(), ending.end(), ending.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return ending == ".dcm" || ending == ".dicom" || ending == ".ima";
-}
 
 void report_fault(const FileFault& fault, const fs::path& file, const std::string& name,
                   std::vector<Finding>& problems) {
@@ -78,6 +71,10 @@ bool is_still(const std::vector<Image>& phases) {
   return most <= excess * neighbours;
 }
 
+/// Mean squares of differences, noise included: a phase that belongs elsewhere is as far off as a period of the tags makes, four times what a
+/// phase moves; and it is farther from both neighbours than motion takes them from each other.
+constexpr double most_step = 4.0, most_detour = 2.0;
+
 /// Images of one series that may be one stack: what they are (magnitude or phase) and how they lie.
 struct Stack {
   std::string uid;
@@ -95,11 +92,37 @@ class Sorter {
       add_series(stack);
     std::stable_sort(folder_.series.begin(), folder_.series.end(),
                      [](const ImageSeries& a, const ImageSeries& b) { return a.number < b.number; });
+    leave_out_copies();
+    compare_phases();
     check_worth();
   }
 
  private:
   const ImageHeader& header(size_t image) const { return folder_.images[image].header; }
+
+  /// As ImageFolder's; of a file that cannot be decoded it is told, and blank images stand in its place. From several threads.
+  std::vector<Image> pixels(const std::vector<size_t>& images) {
+    try {
+      return folder_.pixels(images);
+    } catch (const InputError&) {
+      std::vector<Image> each;
+      for (const size_t image : images)
+        each.push_back(pixels(image));
+      return each;
+    }
+  }
+  Image pixels(size_t image) {
+    try {
+      return folder_.pixels({image})[0];
+    } catch (const InputError& error) {
+      const std::scoped_lock lock(damaging_);
+      if (damaged_.insert(folder_.images[image].file).second)
+        complain(Severity::error, "damaged-pixels",
+                 fmt::format("{}: {}", error.fault().place, error.fault().problem), image, 1, "images",
+                 error.fault().remedy);
+      return Image::Zero(header(image).plane.rows, header(image).plane.columns);
+    }
+  }
 
   void complain(Severity severity, std::string id, std::string what, size_t image, double number,
                 std::string unit, std::string remedy) {
@@ -119,8 +142,8 @@ class Sorter {
       constexpr size_t together = 64;  // a file of many frames is opened once for so many
       parallel_for((images.size() + together - 1) / together, machine_threads(), [&](size_t part) {
         const size_t first = part * together, last = std::min(first + together, images.size());
-        const std::vector<Image> read = folder_.pixels({images.begin() + static_cast<std::ptrdiff_t>(first),
-                                                        images.begin() + static_cast<std::ptrdiff_t>(last)});
+        const std::vector<Image> read = pixels({images.begin() + static_cast<std::ptrdiff_t>(first),
+                                                images.begin() + static_cast<std::ptrdiff_t>(last)});
         for (size_t i = first; i < last; ++i)
           found[i] = is_signed_about_zero(read[i - first]) ? Component::phase : Component::magnitude;
       });
@@ -340,10 +363,7 @@ class Sorter {
                "Tracking goes across the gap. Export the series again if the scanner still has it.");
   }
 
-  bool same_pixels(size_t a, size_t b) const {
-    const std::vector<Image> pair = {folder_.pixels({a})[0], folder_.pixels({b})[0]};
-    return (pair[0] == pair[1]).all();
-  }
+  bool same_pixels(size_t a, size_t b) { return (pixels(a) == pixels(b)).all(); }
 
   /// In a stack of equal steps, a step of twice or three times the size is a slice that was lost.
   void check_spacing_of_slices(const ImageSeries& series) {
@@ -365,7 +385,7 @@ class Sorter {
 
   void find_kind(ImageSeries& series) {
     const SliceImages& middle = series.slices[series.slices.size() / 2];
-    const Image first = folder_.pixels({middle.images.front()})[0];
+    const Image first = pixels(middle.images.front());
     if (is_signed_about_zero(first)) {
       series.kind = SeriesKind::velocity;
       series.reason =
@@ -377,19 +397,30 @@ class Sorter {
       return;
     }
     for (SliceImages& slice : series.slices)
-      slice.tags = find_tag_waves(folder_.pixels({slice.images.front()})[0], slice.plane);
+      slice.tags = find_tag_waves(pixels(slice.images.front()), slice.plane);
     const bool several = middle.images.size() > 1;
     const SliceImages& clearest = series.clearest();
     if (several && !clearest.tags.empty()) {
       series.kind = SeriesKind::tagged_cine;
       const TagWave& tag = clearest.tags[0];
-      const Image last = folder_.pixels({clearest.images.back()})[0];
+      const Image last = pixels(clearest.images.back());
       for (const SliceImages& slice : series.slices) {
         if (slice.tags.empty())
           complain(Severity::warning, "slice-without-tags",
                    "no tags are seen in this slice of a tagged series", slice.images.front(), 1, "slices",
                    "Nothing is tracked in it. Does it lie beyond the specimen's end?");
       }
+      for (SliceImages& slice : series.slices)
+        leave_out_strangers(slice);
+      if (const double left = modulation_at(last, clearest.plane, tag.per_mm); left > tag.modulation)
+        complain(
+            Severity::error, "tags-grow",
+            fmt::format("the tags grow from {:.0f} % in the first phase to {:.0f} % in this one, and tags "
+                        "fade: the order of time is "
+                        "wrong",
+                        100 * tag.modulation, 100 * left),
+            clearest.images.back(), 100 * left, "%",
+            "Are the trigger times (0018,1060) counted from the tags, or backwards from the next trigger?");
       series.reason = fmt::format(
           "the first phase's spectrum has {} of {:.2f} mm, {:.0f} times its surroundings; modulation {:.0f} "
           "%, {:.0f} % in the last phase",
@@ -409,7 +440,7 @@ class Sorter {
   /// Tags are laid before the first phase and fade: none there and some later is a first image that is spoilt, or a wrong order.
   void check_other_phases(const SliceImages& slice) {
     for (const size_t image : {slice.images[1], slice.images.back()}) {
-      if (find_tag_waves(folder_.pixels({image})[0], slice.plane).empty()) continue;
+      if (find_tag_waves(pixels(image), slice.plane).empty()) continue;
       complain(Severity::warning, "tags-begin-late",
                fmt::format(
                    "tags are seen in this image at {:.0f} ms, and none in the first at {:.0f} ms: taken for "
@@ -422,12 +453,140 @@ class Sorter {
     }
   }
 
+  /// Phases that no motion puts between their neighbours: images that are spoilt, or taken at another time than they say; and those that are
+  /// another phase's once more. Tracking goes across the gap.
+  void leave_out_strangers(SliceImages& slice) {
+    const std::vector<Image> phases = pixels(slice.images);
+    const size_t count = phases.size();
+    if (count < 5) return;
+    Eigen::MatrixXd square(count, count);  // of what two phases differ by
+    for (size_t a = 0; a < count; ++a)
+      for (size_t b = 0; b <= a; ++b)
+        at(square, a, b) = at(square, b, a) = static_cast<double>((phases[a] - phases[b]).square().mean());
+    std::vector<double> steps;
+    for (size_t k = 1; k < count; ++k)
+      steps.push_back(at(square, k, k - 1));
+    const double usual = signal::quantile(steps, 0.75);
+    if (usual == 0) return;  // nothing moves, and there is no noise
+    std::vector<size_t> kept{0};
+    for (size_t k = 1; k < count; ++k) {
+      const size_t image = slice.images[k];
+      const bool is_last = k + 1 == count;
+      const bool is_copy = steps[k - 1] == 0 || (!is_last && steps[k] == 0);
+      const double least = is_last ? 0.0 : std::min(steps[k - 1], steps[k]);
+      // The farther apart in time, the farther apart in place, but where the motion turns: there it is slow.
+      const double around = is_last ? 0.0 : at(square, k - 1, k + 1);
+      if (!is_copy && !(least > most_step * usual && least > most_detour * around)) {
+        kept.push_back(k);
+        continue;
+      }
+      if (damaged_.contains(folder_.images[image].file)) continue;  // that is told
+      const double time_ms = header(image).trigger_ms.value_or(0);
+      const size_t other = slice.images[steps[k - 1] == 0 || is_last ? k - 1 : k + 1];
+      complain(Severity::warning, is_copy ? "phase-copied" : "phase-unlike",
+               is_copy ? fmt::format("the image at {:.0f} ms has the pixels of {}", time_ms,
+                                     folder_.file_name(other))
+                       : fmt::format("the image at {:.0f} ms is unlike those before and after it, {:.1f} "
+                                     "times as far from them as they are from "
+                                     "each other",
+                                     time_ms, std::sqrt(least / std::max(around, 1e-300))),
+               image, time_ms, "ms",
+               "It is left out, and tracking goes across the gap. Is it spoilt, or is its trigger time "
+               "(0018,1060) another image's?");
+    }
+    check_order(slice, square, kept, signal::quantile(steps, 0.5));
+    std::vector<size_t> images;
+    for (const size_t k : kept)
+      images.push_back(slice.images[k]);
+    slice.images = std::move(images);
+  }
+
+  static double& at(Eigen::MatrixXd& matrix, size_t row, size_t column) {
+    return matrix(static_cast<Eigen::Index>(row), static_cast<Eigen::Index>(column));
+  }
+
+  /// Two images whose exchange makes the way through all of them much shorter have each other's time.
+  void check_order(const SliceImages& slice, Eigen::MatrixXd& square, std::vector<size_t> order,
+                   double usual_step) {
+    const size_t count = order.size();
+    const auto way = [&] {
+      double sum = 0;
+      for (size_t k = 1; k < count; ++k)
+        sum += at(square, order[k], order[k - 1]);
+      return sum;
+    };
+    const double as_it_is = way();
+    double shortest = as_it_is;
+    std::pair<size_t, size_t> best;
+    for (size_t a = 1; a < count; ++a) {
+      for (size_t b = a + 1; b < count; ++b) {
+        std::swap(order[a], order[b]);
+        if (const double length = way(); length < shortest) shortest = length, best = {a, b};
+        std::swap(order[a], order[b]);
+      }
+    }
+    if (as_it_is - shortest < most_step * usual_step) return;
+    const auto time_ms = [&](size_t k) { return header(slice.images[order[k]]).trigger_ms.value_or(0); };
+    complain(Severity::error, "phases-exchanged",
+             fmt::format("the images at {:.0f} and {:.0f} ms seem to have each other's time: from phase to "
+                         "phase, images would differ by {:.0f} "
+                         "% less if they were exchanged",
+                         time_ms(best.first), time_ms(best.second), 100 * (1 - shortest / as_it_is)),
+             slice.images[order[best.first]], time_ms(best.first), "ms",
+             "Compare the trigger times (0018,1060) with the order in which the images were taken.");
+  }
+
+  /// A series whose images are another's once more would count twice.
+  void leave_out_copies() {
+    std::vector<ImageSeries> kept;
+    for (ImageSeries& series : folder_.series) {
+      const auto same = [&](const ImageSeries& other) {
+        return series.kind == other.kind && series.slices.size() == other.slices.size() &&
+               std::ranges::equal(
+                   series.slices, other.slices, [&](const SliceImages& a, const SliceImages& b) {
+                     return same_place(a.plane, b.plane) && a.images.size() == b.images.size() &&
+                            same_pixels(a.images.front(), b.images.front()) &&
+                            same_pixels(a.images.back(), b.images.back());
+                   });
+      };
+      const auto first = std::ranges::find_if(kept, same);
+      if (first == kept.end()) {
+        kept.push_back(std::move(series));
+        continue;
+      }
+      const size_t image = series.slices.front().images.front();
+      complain(Severity::warning, "series-twice",
+               fmt::format("its series holds the images of series {} once more, as of {}", first->number,
+                           folder_.file_name(first->slices.front().images.front())),
+               image, static_cast<double>(series.slices.size()), "slices",
+               "Nothing is lost: one of the two is used.");
+    }
+    folder_.series = std::move(kept);
+  }
+
+  /// Tagged series are tracked with one numbering of the frames.
+  void compare_phases() {
+    const size_t together = tagged_phases(folder_).times_ms.size();
+    const ImageSeries* most = nullptr;
+    for (const ImageSeries& series : folder_.series)
+      if (series.kind == SeriesKind::tagged_cine &&
+          (most == nullptr || series.phases.times_ms.size() > most->phases.times_ms.size()))
+        most = &series;
+    if (most == nullptr || together == most->phases.times_ms.size()) return;
+    complain(Severity::warning, "phases-differ",
+             fmt::format("the tagged series were taken at different times: {} phases of theirs together, and "
+                         "{} in series {}",
+                         together, most->phases.times_ms.size(), most->number),
+             most->slices.front().images.front(), static_cast<double>(together), "frames",
+             "Each has a frame of its own. Do all belong to one protocol and one specimen?");
+  }
+
   /// A folder in which nothing is encoded and nothing moves holds nothing to measure.
   void check_worth() {
     if (folder_.series.empty()) return;
     for (const ImageSeries& series : folder_.series) {
       const SliceImages& middle = series.slices[series.slices.size() / 2];
-      if (series.kind != SeriesKind::cine || !is_still(folder_.pixels(middle.images))) return;
+      if (series.kind != SeriesKind::cine || !is_still(pixels(middle.images))) return;
     }
     complain(Severity::error, "nothing-to-measure",
              "no tags: the spectra hold no lines of them, and nothing moves from phase to phase either",
@@ -436,6 +595,8 @@ class Sorter {
   }
 
   ImageFolder& folder_;
+  std::mutex damaging_;
+  std::set<size_t> damaged_;  // files
 };
 
 }  // namespace
@@ -476,6 +637,18 @@ std::vector<Image> ImageFolder::pixels(const std::vector<size_t>& chosen) const 
 
 std::string ImageFolder::file_name(size_t image) const {
   return fs::relative(files[images[image].file], folder).generic_string();
+}
+
+PhaseTimes tagged_phases(const ImageFolder& folder) {
+  std::vector<std::vector<double>> times_ms;
+  for (const ImageSeries& series : folder.series) {
+    if (series.kind != SeriesKind::tagged_cine) continue;
+    times_ms.emplace_back();
+    for (size_t k = 0; k < series.phases.times_ms.size(); ++k) {
+      if (series.phases.present[k]) times_ms.back().push_back(series.phases.times_ms[k]);
+    }
+  }
+  return phase_times(times_ms);
 }
 
 ImageFolder read_image_folder(const fs::path& path, const Progress& progress) {

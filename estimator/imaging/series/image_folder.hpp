@@ -30,9 +30,12 @@ std::vector<std::filesystem::path> files_below(const std::filesystem::path& fold
 
 using Progress = std::function<void(size_t done, size_t all)>;
 
-/// Reads every header below `folder` and the pixels that the kinds need: one or two images a slice. Throws InputError if there is no
+/// Reads every header below `folder` and the pixels that the kinds need: one or two images a slice, all of a tagged cine. Throws InputError if there is no
 /// such folder, or no file in it that is DICOM.
 ImageFolder read_image_folder(const std::filesystem::path& folder, const Progress& progress = {});
+
+/// Of all tagged series of a folder together.
+PhaseTimes tagged_phases(const ImageFolder& folder);
 
 /// Throws the first error of `problems` as an InputError that says how many there are.
 void require_sound(const ImageFolder& folder);

@@ -49,9 +49,9 @@ std::string ventricle(const std::string& name) {
          parameter("b3", 6, 0.5, 50);
 }
 
-std::string times_of(const ImageSeries& tagged) {
+std::string times_of(const ImageFolder& folder) {
   std::string text = "# frame 0 is the undeformed state; of the others the images say time_s =\n#  ";
-  for (const double time_ms : tagged.phases.times_ms)
+  for (const double time_ms : tagged_phases(folder).times_ms)
     text += fmt::format(" {:.4f}", 1e-3 * time_ms);
   return text + "\n";
 }
@@ -87,7 +87,7 @@ std::string study_skeleton(const ImageFolder& folder, const fs::path& study) {
   }
   text += "# diastole bin RUN --frame-times ... --frames-csv FILE\n";
   text += fmt::format("frames = {}\n", toml_text(name + ".frames.csv"));
-  if (tagged != folder.series.end()) text += times_of(*tagged);
+  if (tagged != folder.series.end()) text += times_of(folder);
   if (tagged != folder.series.end() && is_heart)
     text +=
         "\n# The mesh that `diastole lv` fits lies in the patient's coordinates.\n[images.to_specimen]\n"

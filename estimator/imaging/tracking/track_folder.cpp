@@ -11,18 +11,6 @@
 
 namespace diastole::imaging {
 
-PhaseTimes tagged_phases(const ImageFolder& folder) {
-  std::vector<std::vector<double>> times_ms;
-  for (const ImageSeries& series : folder.series) {
-    if (series.kind != SeriesKind::tagged_cine) continue;
-    times_ms.emplace_back();
-    for (size_t k = 0; k < series.phases.times_ms.size(); ++k) {
-      if (series.phases.present[k]) times_ms.back().push_back(series.phases.times_ms[k]);
-    }
-  }
-  return phase_times(times_ms);
-}
-
 std::vector<TagView> tag_views(const ImageFolder& folder) {
   const PhaseTimes phases = tagged_phases(folder);
   std::vector<TagView> views;

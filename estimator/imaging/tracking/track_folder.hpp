@@ -16,9 +16,6 @@ struct TrackedSlice {
   TagPoints points;
 };
 
-/// Of all tagged series of a folder together.
-PhaseTimes tagged_phases(const ImageFolder& folder);
-
 /// The tagged slices of a folder with their pixels, frames numbered by the phases of all of them together. Throws InputError if there
 /// are none.
 std::vector<TagView> tag_views(const ImageFolder& folder);

@@ -12,12 +12,14 @@
 #include "estimator/imaging/series/study_skeleton.hpp"
 #include "estimator/imaging/series/views.hpp"
 #include "estimator/imaging/tracking/tracked_folder.hpp"
+#include "tests/estimator/imaging/finding_ids.hpp"
 #include "tests/estimator/imaging/tagged_ring.hpp"
 #include "tests/estimator/io/scratch_file.hpp"
 
 namespace diastole::imaging {
 namespace {
 
+using test::finding_ids;
 using test::RingScan;
 using test::ScratchFolder;
 using test::write_ring;
@@ -28,13 +30,6 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
 using testing::Not;
-
-std::vector<std::string> ids(const ImageFolder& folder) {
-  std::vector<std::string> found;
-  for (const Finding& finding : folder.problems)
-    found.push_back(finding.id);
-  return found;
-}
 
 TEST(ImageFolder, TellsATaggedCineByItsSpectrum) {
   const ScratchFolder scratch;
@@ -61,7 +56,7 @@ TEST(ImageFolder, NamesAMissingPhaseAndKeepsTheOthersNumbers) {
   const ScratchFolder scratch;
   write_ring({.missing_phase = 4}, scratch.path());
   const ImageFolder folder = read_image_folder(scratch.path());
-  EXPECT_THAT(ids(folder), testing::ElementsAre("phase-missing"));
+  EXPECT_THAT(finding_ids(folder), testing::ElementsAre("phase-missing"));
   EXPECT_THAT(folder.problems[0].what, HasSubstr("phase 4 of 8"));
   EXPECT_EQ(folder.series[0].phases.index_of(12.0 + 72 * 4), 4U);
   EXPECT_NO_THROW(require_sound(folder));
@@ -90,7 +85,7 @@ TEST(ImageFolder, ASliceBesideTheSpecimenDoesNotHideTheTagsOfTheOthers) {
   EXPECT_EQ(folder.series[0].kind, SeriesKind::tagged_cine);
   EXPECT_EQ(folder.series[0].slices[0].tags.size(), 1U);
   EXPECT_TRUE(folder.series[0].slices[1].tags.empty());
-  EXPECT_THAT(ids(folder), testing::ElementsAre("slice-without-tags"));
+  EXPECT_THAT(finding_ids(folder), testing::ElementsAre("slice-without-tags"));
 }
 
 TEST(ImageFolder, AStackIsTheShortAxisWhereverItLies) {
@@ -131,7 +126,7 @@ TEST(ImageFolder, RefusesASliceThatIsThereTwiceButNotACopy) {
   const ScratchFolder scratch;
   const auto files = write_ring({}, scratch.path());
   std::filesystem::copy_file(files[2], scratch.path() / "again.dcm");
-  EXPECT_THAT(ids(read_image_folder(scratch.path())), testing::ElementsAre("copy"));
+  EXPECT_THAT(finding_ids(read_image_folder(scratch.path())), testing::ElementsAre("copy"));
   std::filesystem::remove(scratch.path() / "again.dcm");
   write_ring({.phases = 8, .seed = 7}, scratch.path(), "repeated");
   const ImageFolder folder = read_image_folder(scratch.path());
@@ -183,7 +178,7 @@ TEST(ImageFolder, ALocaliserIsNoMixedGeometry) {
   write_ring({}, scratch.path());
   write_localiser(scratch.path());
   const ImageFolder folder = read_image_folder(scratch.path());
-  EXPECT_THAT(ids(folder), Not(Contains("mixed-geometry")));
+  EXPECT_THAT(finding_ids(folder), Not(Contains("mixed-geometry")));
   EXPECT_NO_THROW(require_sound(folder));
 }
 
@@ -219,7 +214,7 @@ TEST(ImageFolder, AFirstPhaseThatIsLateIsTold) {
   RingScan scan;
   scan.first_ms = 156;
   write_ring(scan, scratch.path());
-  EXPECT_THAT(ids(read_image_folder(scratch.path())), ElementsAre("first-phase-late"));
+  EXPECT_THAT(finding_ids(read_image_folder(scratch.path())), ElementsAre("first-phase-late"));
 }
 
 TEST(ImageFolder, FewerPhasesThanTheHeadersAnnounceAreTold) {
@@ -232,7 +227,7 @@ TEST(ImageFolder, FewerPhasesThanTheHeadersAnnounceAreTold) {
     ASSERT_TRUE(file.saveFile(path.c_str(), EXS_LittleEndianExplicit).good());
   }
   const ImageFolder folder = read_image_folder(scratch.path());
-  ASSERT_THAT(ids(folder), ElementsAre("phases-announced"));
+  ASSERT_THAT(finding_ids(folder), ElementsAre("phases-announced"));
   EXPECT_THAT(folder.problems[0].what, HasSubstr("8 phases are here, and (0018,1090) announces 16"));
 }
 
@@ -240,7 +235,7 @@ TEST(ImageFolder, TagsThatTheFirstPhaseLacksAreTold) {
   const ScratchFolder scratch;
   write_ring({}, scratch.path());
   write_ring({.phases = 1, .tagged = false}, scratch.path());  // over the first
-  EXPECT_THAT(ids(read_image_folder(scratch.path())), ElementsAre("tags-begin-late"));
+  EXPECT_THAT(finding_ids(read_image_folder(scratch.path())), ElementsAre("tags-begin-late"));
 }
 
 TEST(ImageFolder, RefusesSequencesNestedDeeperThanAnyScannersBeforeTheyAreRead) {
@@ -252,10 +247,12 @@ TEST(ImageFolder, RefusesSequencesNestedDeeperThanAnyScannersBeforeTheyAreRead) 
   for (int level = 0; level < 100; ++level)
     ASSERT_TRUE(item->findOrCreateSequenceItem(DCM_ReferencedImageSequence, item).good());
   ASSERT_TRUE(item->putAndInsertString(DCM_ImageComments, "deep").good());
-  for (const E_EncodingType lengths : {EET_UndefinedLength, EET_ExplicitLength}) {
-    ASSERT_TRUE(file.saveFile(files[0].c_str(), EXS_LittleEndianExplicit, lengths).good());
-    EXPECT_THAT(test::message_of([&] { require_sound(read_image_folder(scratch.path())); }),
-                HasSubstr("100 sequences within each other"));
+  for (const E_TransferSyntax syntax : {EXS_LittleEndianExplicit, EXS_BigEndianExplicit}) {
+    for (const E_EncodingType lengths : {EET_UndefinedLength, EET_ExplicitLength}) {
+      ASSERT_TRUE(file.saveFile(files[0].c_str(), syntax, lengths).good());
+      EXPECT_THAT(test::message_of([&] { require_sound(read_image_folder(scratch.path())); }),
+                  HasSubstr("100 sequences within each other"));
+    }
   }
 }
 
@@ -297,7 +294,7 @@ TEST(ImageFolder, RefusesACompressionThatIsNotReadBeforeItReadsPixels) {
   DJEncoderRegistration::registerCodecs();
   ASSERT_TRUE(file.getDataset()->chooseRepresentation(EXS_JPEGProcess14SV1, nullptr).good());
   ASSERT_TRUE(file.saveFile(files[0].c_str(), EXS_JPEGProcess14SV1).good());
-  EXPECT_THAT(ids(read_image_folder(scratch.path())), IsEmpty());
+  EXPECT_THAT(finding_ids(read_image_folder(scratch.path())), IsEmpty());
   std::ifstream stream(files[0], std::ios::binary);
   const std::string bytes(std::istreambuf_iterator<char>(stream), {});
   const auto refusal = [&](const std::string& syntax) {

@@ -134,6 +134,13 @@ void check(const ScanArguments& arguments, const ElasticModel& model, const std:
                       fmt::format("{:g} mm does not hold a specimen of {:.3g} mm across",
                                   protocol.field_of_view_mm, 2 * body.radius_mm),
                       fmt::format("Give {:.0f} mm or more.", std::ceil(2.3 * body.radius_mm))});
+  for (const double z_mm : protocol.short_axis_mm)
+    if (z_mm <= body.low_mm || z_mm >= body.high_mm)
+      throw InputError(
+          {"", "--short-axis",
+           fmt::format("a slice at {:g} mm does not cut the specimen, which reaches from {:.3g} to {:.3g} mm",
+                       z_mm, body.low_mm, body.high_mm),
+           "Give heights between them."});
   const double height_mm = body.high_mm - body.low_mm;
   if (!protocol.long_axis_deg.empty() && protocol.field_of_view_mm < 1.05 * height_mm)
     throw InputError({"", "--fov",
