@@ -10,9 +10,10 @@
 #include <numbers>
 #include <set>
 
+#include "estimator/imaging/series/phase_order.hpp"
+#include "estimator/io/fingerprint.hpp"
 #include "estimator/parallel/parallel_for.hpp"
 #include "protocol/contract/input_error.hpp"
-#include "protocol/signal/quantile.hpp"
 
 namespace diastole::imaging {
 namespace {
@@ -71,9 +72,8 @@ bool is_still(const std::vector<Image>& phases) {
   return most <= excess * neighbours;
 }
 
-/// Mean squares of differences, noise included: a phase that belongs elsewhere is as far off as a period of the tags makes, four times what a
-/// phase moves; and it is farther from both neighbours than motion takes them from each other.
-constexpr double most_step = 4.0, most_detour = 2.0;
+/// In the last phase over the first: tags fade, and motion at the first phase blurs them by less than this.
+constexpr double most_growth = 1.25;
 
 /// Images of one series that may be one stack: what they are (magnitude or phase) and how they lie.
 struct Stack {
@@ -411,8 +411,9 @@ class Sorter {
                    "Nothing is tracked in it. Does it lie beyond the specimen's end?");
       }
       for (SliceImages& slice : series.slices)
-        leave_out_strangers(slice);
-      if (const double left = modulation_at(last, clearest.plane, tag.per_mm); left > tag.modulation)
+        check_order(slice);
+      if (const double left = modulation_at(last, clearest.plane, tag.per_mm);
+          left > most_growth * tag.modulation)
         complain(
             Severity::error, "tags-grow",
             fmt::format("the tags grow from {:.0f} % in the first phase to {:.0f} % in this one, and tags "
@@ -453,115 +454,70 @@ class Sorter {
     }
   }
 
-  /// Phases that no motion puts between their neighbours: images that are spoilt, or taken at another time than they say; and those that are
-  /// another phase's once more. Tracking goes across the gap.
-  void leave_out_strangers(SliceImages& slice) {
-    const std::vector<Image> phases = pixels(slice.images);
-    const size_t count = phases.size();
-    if (count < 5) return;
-    Eigen::MatrixXd square(count, count);  // of what two phases differ by
-    for (size_t a = 0; a < count; ++a)
-      for (size_t b = 0; b <= a; ++b)
-        at(square, a, b) = at(square, b, a) = static_cast<double>((phases[a] - phases[b]).square().mean());
-    std::vector<double> steps;
-    for (size_t k = 1; k < count; ++k)
-      steps.push_back(at(square, k, k - 1));
-    const double usual = signal::quantile(steps, 0.75);
-    if (usual == 0) return;  // nothing moves, and there is no noise
-    std::vector<size_t> kept{0};
-    for (size_t k = 1; k < count; ++k) {
-      const size_t image = slice.images[k];
-      const bool is_last = k + 1 == count;
-      const bool is_copy = steps[k - 1] == 0 || (!is_last && steps[k] == 0);
-      const double least = is_last ? 0.0 : std::min(steps[k - 1], steps[k]);
-      // The farther apart in time, the farther apart in place, but where the motion turns: there it is slow.
-      const double around = is_last ? 0.0 : at(square, k - 1, k + 1);
-      if (!is_copy && !(least > most_step * usual && least > most_detour * around)) {
-        kept.push_back(k);
-        continue;
-      }
+  /// What lies between its neighbours by no motion is left out: tracking goes across the gap.
+  void check_order(SliceImages& slice) {
+    if (slice.images.size() > most_phases_compared) return;
+    const PhaseOrder order = order_of_phases(pixels(slice.images));
+    const auto time_ms = [&](size_t phase) { return header(slice.images[phase]).trigger_ms.value_or(0); };
+    for (const PhaseOrder::LeftOut& out : order.left_out) {
+      const size_t image = slice.images[out.phase];
       if (damaged_.contains(folder_.images[image].file)) continue;  // that is told
-      const double time_ms = header(image).trigger_ms.value_or(0);
-      const size_t other = slice.images[steps[k - 1] == 0 || is_last ? k - 1 : k + 1];
-      complain(Severity::warning, is_copy ? "phase-copied" : "phase-unlike",
-               is_copy ? fmt::format("the image at {:.0f} ms has the pixels of {}", time_ms,
-                                     folder_.file_name(other))
-                       : fmt::format("the image at {:.0f} ms is unlike those before and after it, {:.1f} "
-                                     "times as far from them as they are from "
-                                     "each other",
-                                     time_ms, std::sqrt(least / std::max(around, 1e-300))),
-               image, time_ms, "ms",
+      complain(Severity::warning, out.same_as ? "phase-copied" : "phase-unlike",
+               out.same_as ? fmt::format("the image at {:.0f} ms has the pixels of {}", time_ms(out.phase),
+                                         folder_.file_name(slice.images[*out.same_as]))
+                           : fmt::format("the image at {:.0f} ms is unlike those before and after it, {:.1f} "
+                                         "times as far from them as they "
+                                         "are from each other",
+                                         time_ms(out.phase), out.times_farther),
+               image, time_ms(out.phase), "ms",
                "It is left out, and tracking goes across the gap. Is it spoilt, or is its trigger time "
                "(0018,1060) another image's?");
     }
-    check_order(slice, square, kept, signal::quantile(steps, 0.5));
-    std::vector<size_t> images;
-    for (const size_t k : kept)
-      images.push_back(slice.images[k]);
-    slice.images = std::move(images);
+    if (const auto& two = order.exchange)
+      complain(Severity::error, "phases-exchanged",
+               fmt::format("the images at {:.0f} and {:.0f} ms seem to have each other's time: from phase to "
+                           "phase, images would differ by "
+                           "{:.0f} % less if they were exchanged",
+                           time_ms(two->first), time_ms(two->second), 100 * two->saved),
+               slice.images[two->first], time_ms(two->first), "ms",
+               "Compare the trigger times (0018,1060) with the order in which the images were taken.");
+    std::vector<size_t> kept;
+    for (const size_t phase : order.kept)
+      kept.push_back(slice.images[phase]);
+    slice.images = std::move(kept);
   }
 
-  static double& at(Eigen::MatrixXd& matrix, size_t row, size_t column) {
-    return matrix(static_cast<Eigen::Index>(row), static_cast<Eigen::Index>(column));
-  }
-
-  /// Two images whose exchange makes the way through all of them much shorter have each other's time.
-  void check_order(const SliceImages& slice, Eigen::MatrixXd& square, std::vector<size_t> order,
-                   double usual_step) {
-    const size_t count = order.size();
-    const auto way = [&] {
-      double sum = 0;
-      for (size_t k = 1; k < count; ++k)
-        sum += at(square, order[k], order[k - 1]);
-      return sum;
-    };
-    const double as_it_is = way();
-    double shortest = as_it_is;
-    std::pair<size_t, size_t> best;
-    for (size_t a = 1; a < count; ++a) {
-      for (size_t b = a + 1; b < count; ++b) {
-        std::swap(order[a], order[b]);
-        if (const double length = way(); length < shortest) shortest = length, best = {a, b};
-        std::swap(order[a], order[b]);
-      }
-    }
-    if (as_it_is - shortest < most_step * usual_step) return;
-    const auto time_ms = [&](size_t k) { return header(slice.images[order[k]]).trigger_ms.value_or(0); };
-    complain(Severity::error, "phases-exchanged",
-             fmt::format("the images at {:.0f} and {:.0f} ms seem to have each other's time: from phase to "
-                         "phase, images would differ by {:.0f} "
-                         "% less if they were exchanged",
-                         time_ms(best.first), time_ms(best.second), 100 * (1 - shortest / as_it_is)),
-             slice.images[order[best.first]], time_ms(best.first), "ms",
-             "Compare the trigger times (0018,1060) with the order in which the images were taken.");
-  }
-
-  /// A series whose images are another's once more would count twice.
+  /// A tagged series whose images are another's once more would count twice.
   void leave_out_copies() {
     std::vector<ImageSeries> kept;
+    std::map<std::string, size_t> of_first_image;  // the series that was kept
     for (ImageSeries& series : folder_.series) {
-      const auto same = [&](const ImageSeries& other) {
-        return series.kind == other.kind && series.slices.size() == other.slices.size() &&
-               std::ranges::equal(
-                   series.slices, other.slices, [&](const SliceImages& a, const SliceImages& b) {
-                     return same_place(a.plane, b.plane) && a.images.size() == b.images.size() &&
-                            same_pixels(a.images.front(), b.images.front()) &&
-                            same_pixels(a.images.back(), b.images.back());
-                   });
-      };
-      const auto first = std::ranges::find_if(kept, same);
-      if (first == kept.end()) {
-        kept.push_back(std::move(series));
-        continue;
+      if (series.kind == SeriesKind::tagged_cine) {
+        const size_t image = series.slices.front().images.front();
+        const Image first = pixels(image);
+        const std::string print = fingerprint_of(
+            {reinterpret_cast<const char*>(first.data()), sizeof(float) * static_cast<size_t>(first.size())});
+        const auto [before, is_new] = of_first_image.try_emplace(print, kept.size());
+        if (!is_new && are_same(series, kept[before->second])) {
+          const ImageSeries& other = kept[before->second];
+          complain(Severity::warning, "series-twice",
+                   fmt::format("its series holds the images of series {} once more, as of {}", other.number,
+                               folder_.file_name(other.slices.front().images.front())),
+                   image, static_cast<double>(series.slices.size()), "slices",
+                   "Nothing is lost: one of the two is used.");
+          continue;
+        }
       }
-      const size_t image = series.slices.front().images.front();
-      complain(Severity::warning, "series-twice",
-               fmt::format("its series holds the images of series {} once more, as of {}", first->number,
-                           folder_.file_name(first->slices.front().images.front())),
-               image, static_cast<double>(series.slices.size()), "slices",
-               "Nothing is lost: one of the two is used.");
+      kept.push_back(std::move(series));
     }
     folder_.series = std::move(kept);
+  }
+
+  bool are_same(const ImageSeries& one, const ImageSeries& other) {
+    return std::ranges::equal(one.slices, other.slices, [&](const SliceImages& a, const SliceImages& b) {
+      return same_place(a.plane, b.plane) && a.images.size() == b.images.size() &&
+             same_pixels(a.images.front(), b.images.front()) && same_pixels(a.images.back(), b.images.back());
+    });
   }
 
   /// Tagged series are tracked with one numbering of the frames.
