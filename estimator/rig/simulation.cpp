@@ -4,11 +4,11 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <optional>
 #include <unsupported/Eigen/MatrixFunctions>
 
 #include "estimator/rig/cavity.hpp"
 #include "estimator/rig/hose_line.hpp"
+#include "estimator/rig/pump_end.hpp"
 #include "estimator/rig/sampled_signal.hpp"
 
 namespace diastole::rig {
@@ -42,16 +42,6 @@ void add_turning_errors(const std::array<TurningError, 2>& errors, double turn_m
     trace.acceleration_mL_per_s2[k] += slope * trace.acceleration_mL_per_s2[k] + bend * flow * flow;
   }
 }
-
-/// Conductances below this are none: the resistance would be beyond what the step's matrix bears.
-constexpr double least_leak = 1e-7;
-
-/// Of the drive, mL/kPa: less is rigid. A stiff hose yields 1e-3, and its waves shift by as much as the drive adds to that; so little moves the
-/// pump's pressure by less than a pascal, so that a search does not see the border.
-constexpr double least_compliance = 1e-8;
-/// Its resistance over its stiffness: screw and seal rub, so that it does not ring with the fluid's end at a hundred hertz,
-/// which samples would show as something slow.
-constexpr double drive_damping_s = 2e-3;
 
 /// The fluid-filled catheter with its transducer, exactly integrated for pressure that is linear between samples; from rest
 /// at the first pressure.
@@ -119,16 +109,16 @@ class Plant {
         const SimulationOptions& options)
       : model_(model),
         drive_(driven(model, run.place, motion)),
-        gas_(model.pump_gas_mL, model.gas_exponent, run.place.atmosphere_kPa),
-        leaks_(made(model.pump_leaks, run.place)),
-        losses_(made(model.pump_losses, run.place)),
-        drive_yields_(!gas_.present() && model.drive_compliance_mL_per_kPa > least_compliance),
+        pump_(model, run.place, options.step_s),
         line_(model.hose, {.step_s = options.step_s,
                            .components = options.components,
-                           .pump_stiffness = pump_stiffness(),
-                           .pump_resistance = pump_resistance()}),
+                           .pump_stiffness = pump_.stiffness(),
+                           .pump_resistance = pump_.resistance()}),
         cavity_(model, run.place),
-        repeated_(repeated_steps(run, drive_)) {}
+        repeated_(repeated_steps(run, drive_)) {
+    for (const LossMaker& make : model.pump_losses)
+      losses_.push_back(make(run.place));
+  }
 
   PlantTrace run();
   /// By how much a loss at the ends overshoots in a step if the flow were as fast as the piston makes it. Such a load is
@@ -171,18 +161,6 @@ class Plant {
   [[nodiscard]] double left_mL(size_t k) const {
     return drive_.volume_mL[k] + line_.yielded_mL() - line_.kept_mL();
   }
-  /// Of what yields before the hose: gas or, far stiffer, the drive.
-  [[nodiscard]] std::optional<double> pump_stiffness() const {
-    if (gas_.present()) return gas_.stiffness_at_rest();
-    if (drive_yields_)
-      return 1.0 / (model_.drive_compliance_mL_per_kPa + model_.pump_leak_mL_s_kPa * leak_time_s());
-    return {};
-  }
-  [[nodiscard]] std::optional<double> pump_resistance() const {
-    if (drive_yields_) return *pump_stiffness() * drive_damping_s;
-    if (!gas_.present() && model_.pump_leak_mL_s_kPa > least_leak) return 1.0 / model_.pump_leak_mL_s_kPa;
-    return {};
-  }
   [[nodiscard]] double loss_at_pump_kPa(size_t k) const {
     const double flow = line_.entering_mL_per_s();
     return (1.0 - model_.hose.loss_at_cavity) * turning_loss_kPa(flow) +
@@ -193,80 +171,12 @@ class Plant {
     EndLoads now{
         .piston_acceleration = acceleration, .pump_kPa = -loss_at_pump_kPa(k), .cavity_kPa = cavity_kPa_};
     now.cavity_kPa += model_.hose.loss_at_cavity * turning_loss_kPa(line_.leaving_mL_per_s());
-    if (gas_.present()) {
-      const double squeezed_mL = -line_.yielded_mL() - leaked_mL_;
-      now.pump_kPa += gas_.pressure_kPa(squeezed_mL) + gas_.stiffness_at_rest() * line_.yielded_mL();
-    } else if (drive_yields_) {
-      // p C = e + tau e', e' = -y' - q(p): with the leak q met by the trapezoid over the step.
-      const double squeezed_mL =
-          -line_.yielded_mL() - leaked_mL_ - drive_damping_s * line_.yielding_mL_per_s();
-      now.pump_kPa -= *pump_stiffness() * leaked_mL_;
-      if (!leaks_.empty())
-        now.pump_kPa += behind_leaks(squeezed_mL, model_.drive_compliance_mL_per_kPa, leak_time_s(),
-                                     drive_.time_s(k) - copied_s_) -
-                        *pump_stiffness() * squeezed_mL;
-    } else if (!leaks_.empty() && pump_resistance()) {
-      const double lost_mL_s = -line_.yielding_mL_per_s();
-      now.pump_kPa +=
-          behind_leaks(lost_mL_s, 0.0, 1.0, drive_.time_s(k) - copied_s_) - *pump_resistance() * lost_mL_s;
-    }
+    now.pump_kPa +=
+        pump_.load_kPa(line_.yielded_mL(), line_.yielding_mL_per_s(), drive_.time_s(k) - copied_s_);
     return now;
   }
   /// The pressure in the cylinder, where the pump's sensor is.
   [[nodiscard]] double cylinder_kPa(size_t k) const { return line_.pump_kPa() + loss_at_pump_kPa(k); }
-  template <class Law>
-  static std::vector<Law> made(const std::vector<std::function<Law(const RunPlace&)>>& makers,
-                               const RunPlace& place) {
-    std::vector<Law> laws;
-    for (const auto& make : makers)
-      laws.push_back(make(place));
-    return laws;
-  }
-  /// Past the seal, by how much it differs from the conductance.
-  [[nodiscard]] double lost_beyond(double pressure_kPa, double time_s) const {
-    double flow = 0.0;
-    for (const LeakLaw& leak : leaks_)
-      flow += leak(pressure_kPa, time_s);
-    return flow;
-  }
-  /// How long a leak past a drive that yields has acted at the end of a step, beside the drive's damping.
-  [[nodiscard]] double leak_time_s() const { return drive_damping_s + 0.5 * drive_.step_s; }
-  /// The pressure p of compliance p + duration q(p) = lost, q what leaks: between the conductance's and none, where all leaks grow
-  /// with pressure. Regula falsi (Illinois).
-  [[nodiscard]] double behind_leaks(double lost, double compliance, double duration, double time_s) const {
-    const double linear = compliance + duration * model_.pump_leak_mL_s_kPa;
-    const auto excess = [&](double pressure_kPa) {
-      return linear * pressure_kPa + duration * lost_beyond(pressure_kPa, time_s) - lost;
-    };
-    double a = 0.0;
-    double b = lost / linear;
-    double at_a = excess(a);
-    double at_b = excess(b);
-    constexpr double close = 1e-13;
-    for (int doubling = 0; doubling < 8 && at_a * at_b > 0.0; ++doubling)
-      at_b = excess(b *= 2.0);
-    for (int step = 0; step < 60 && std::abs(at_b) > close * (std::abs(lost) + 1e-9); ++step) {
-      const double next = b - at_b * (b - a) / (at_b - at_a);
-      const double at_next = excess(next);
-      if (at_next * at_b < 0.0) {
-        a = b;
-        at_a = at_b;
-      } else {
-        at_a *= 0.5;
-      }
-      b = next;
-      at_b = at_next;
-      if (!std::isfinite(b)) break;
-    }
-    return b;
-  }
-  /// What leaks beside gas follows the pressure of the last two steps; past a drive that yields the step's end met its half.
-  void leak(double pressure_kPa, double time_s) {
-    const double leaks_mL_s = model_.pump_leak_mL_s_kPa * pressure_kPa + lost_beyond(pressure_kPa, time_s);
-    if (gas_.present()) leaked_mL_ += drive_.step_s * (1.5 * leaks_mL_s - 0.5 * leaked_before_mL_s_);
-    if (drive_yields_) leaked_mL_ += drive_.step_s * leaks_mL_s;
-    leaked_before_mL_s_ = leaks_mL_s;
-  }
   void record(PlantTrace& trace, size_t k, double cavity_kPa) const {
     trace.pump_kPa[k] = cylinder_kPa(k);
     trace.cavity_kPa[k] = cavity_kPa;
@@ -278,16 +188,12 @@ class Plant {
 
   const RigModel& model_;
   DriveTrace drive_;
-  GasPocket gas_;
-  std::vector<LeakLaw> leaks_;
   std::vector<LossLaw> losses_;
-  bool drive_yields_;
+  PumpEnd pump_;
   HoseLine line_;
   Cavity cavity_;
   std::vector<RepeatedSteps> repeated_;
   double copied_s_ = 0.0;  ///< by which the cavity's time is behind
-  double leaked_mL_ = 0.0;
-  double leaked_before_mL_s_ = 0.0;
   double cavity_kPa_ = 0.0;
 };
 
@@ -331,7 +237,7 @@ PlantTrace Plant::run() {
     record(trace, k, cavity_kPa_);
     k = beyond_repeated(trace, k);
     if (k + 1 == count) break;
-    leak(trace.pump_kPa[k], drive_.time_s(k) - copied_s_);
+    pump_.pass(trace.pump_kPa[k], drive_.time_s(k) - copied_s_);
     // The flow's change over the step is met exactly, whatever the acceleration does within it.
     const double flow_then = drive_.flow_mL_per_s[k + 1];
     const double rise = drive_.acceleration_mL_per_s2[k + 1] - drive_.acceleration_mL_per_s2[k];

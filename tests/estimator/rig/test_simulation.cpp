@@ -187,6 +187,42 @@ TEST(Simulation, GasConvergesInStep) {
   EXPECT_LT(std::sqrt(square / static_cast<double>(coarse.pump_kPa.size())), 0.05);  // of +-50 kPa
 }
 
+TEST(Simulation, GasAndAYieldingDriveConvergeInStep) {
+  for (const double conductance : {0.0, 0.02}) {
+    RigModel model = conductance > 0.0 ? leaking_model(1.0) : straight_model();
+    model.pump_gas_mL = 0.5;
+    model.drive_compliance_mL_per_kPa = 0.003;
+    const PlantTrace fine = simulate_plant(model, cycles(2), {.step_s = 1.0 / 4800.0});
+    const double coarse_kPa = pump_rms_kPa(simulate_plant(model, cycles(2)), fine, 8);
+    const double half_kPa = pump_rms_kPa(simulate_plant(model, cycles(2), {.step_s = 1.0 / 1200.0}), fine, 4);
+    EXPECT_LT(coarse_kPa, 0.1) << conductance;  // of +-50 kPa
+    EXPECT_LT(half_kPa, 0.4 * coarse_kPa) << conductance;
+  }
+}
+
+TEST(Simulation, GasAtThePumpAndTheDriveBothTakeTheirShareOfTheVolume) {
+  RigModel model = straight_model();
+  model.pump_gas_mL = 2.0;
+  model.drive_compliance_mL_per_kPa = 0.02;
+  const PlantTrace trace = simulate_plant(model, ramp(30.0, 20.0));
+  const double pressure = trace.pump_kPa.back();
+  const double squeezed = 2.0 * (1.0 - std::pow(1.0 + pressure / 101.325, -1.0 / model.gas_exponent));
+  const double kept_mL = model.hose.compliance_mL_per_kPa() * (1.0 + model.hose.creep_fraction) * pressure;
+  EXPECT_NEAR(trace.cavity_mL.back() + kept_mL + squeezed + 0.02 * pressure, 30.0, 1e-5);
+}
+
+TEST(Simulation, LessAndLessGasBesideADriveThatYieldsBecomesNone) {
+  RigModel model = straight_model();
+  model.drive_compliance_mL_per_kPa = 0.0015;
+  const SimulationOptions fine = {.step_s = 1.0 / 1200.0};
+  const PlantTrace none = simulate_plant(model, cycles(2), fine);
+  const auto off_kPa = [&](double gas_mL) {
+    model.pump_gas_mL = gas_mL;
+    return pump_rms_kPa(simulate_plant(model, cycles(2)), none, 1);  // gas halves its steps
+  };
+  EXPECT_NEAR(off_kPa(1e-3) / off_kPa(1e-2), 0.1, 0.01);
+}
+
 TEST(Simulation, GasInTheCavityTakesItsShareOfTheVolume) {
   RigModel model = straight_model();
   model.cavity_gas_mL = 10.0;
