@@ -4,6 +4,7 @@
 // Dougherty, Radiology 171 (1989) 841 and 172 (1989) 349), whose spectrum is a sharp peak at k.
 
 #include <Eigen/Dense>
+#include <numbers>
 #include <vector>
 
 #include "estimator/imaging/dicom/dicom_file.hpp"
@@ -18,6 +19,10 @@ struct TagWave {
   double prominence;  ///< power at k over the median power at the same |k|
 
   [[nodiscard]] double spacing_mm() const { return 1.0 / per_mm.norm(); }
+  /// At a place of the image: 0 on the darkest line of number 0.
+  [[nodiscard]] double phase_rad(const Eigen::Vector2d& x_mm) const {
+    return 2 * std::numbers::pi * (per_mm.dot(x_mm) - offset_cycles);
+  }
 };
 
 /// The stripes of an image: none, one direction, or two of a grid. Their normals point along a row (x > 0), or along a

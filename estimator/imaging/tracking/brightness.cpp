@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <stdexcept>
 
 namespace diastole::imaging {
 namespace {
@@ -11,8 +12,6 @@ namespace {
 /// The slice's own average counts like a hundredth of a full window: nothing beside one, all in an empty one.
 constexpr double share_of_window = 0.01;
 constexpr double nodes_per_window = 2.0;
-/// A constant, and cosine and sine of two directions.
-constexpr int most_patterns = 5;
 
 }  // namespace
 
@@ -21,12 +20,10 @@ Brightness::Brightness(const Eigen::Vector2d& extent_mm, double window_mm, int p
       node_mm_(window_mm / nodes_per_window),
       columns_(static_cast<Eigen::Index>(extent_mm.x() / node_mm_) + 3),
       rows_(static_cast<Eigen::Index>(extent_mm.y() / node_mm_) + 3) {
-  moments_.resize(patterns * (patterns + 1) / 2 + patterns, columns_ * rows_);
+  moments_.setZero(patterns * (patterns + 1) / 2 + patterns, columns_ * rows_);
+  is_added_.assign(static_cast<size_t>(columns_ * rows_), false);
   amplitudes_.setZero(patterns, columns_ * rows_);
-  clear();
 }
-
-void Brightness::clear() { moments_.setZero(); }
 
 Brightness::Corner Brightness::corner(const Eigen::Vector2d& x_mm) const {
   const double across = std::clamp(x_mm.x() / node_mm_, 0.0, static_cast<double>(columns_) - 1.001);
@@ -40,23 +37,54 @@ Brightness::Corner Brightness::corner(const Eigen::Vector2d& x_mm) const {
           {(1 - u) * (1 - v), u * (1 - v), (1 - u) * v, u * v}};
 }
 
-void Brightness::add(const Eigen::Vector2d& x_mm, std::span<const double> patterns, double weight,
-                     double value) {
-  std::array<double, 32> moments{};
-  size_t at = 0;
-  for (size_t i = 0; i < patterns.size(); ++i) {
-    for (size_t j = 0; j <= i; ++j)
-      moments[at++] = weight * patterns[i] * patterns[j];
+/// `act(count)` with the number of patterns as a constant.
+template <class Act>
+void with_count(int patterns, const Act& act) {
+  switch (patterns) {
+    case 1:
+      return act(std::integral_constant<int, 1>());  // a constant
+    case 3:
+      return act(std::integral_constant<int, 3>());  // tags of one direction
+    case 4:
+      return act(std::integral_constant<int, 4>());  // or of two
+    case 5:
+      return act(std::integral_constant<int, 5>());  // a constant, and cosine and sine of two
+    default:
+      throw std::logic_error("brightness of so many patterns");
   }
-  for (const double pattern : patterns)
-    moments[at++] = weight * pattern * value;
-  const Corner here = corner(x_mm);
-  const Eigen::Map<const Eigen::ArrayXd> all(moments.data(), moments_.rows());
-  for (size_t i = 0; i < 4; ++i)
-    moments_.col(here.node[i]) += here.share[i] * all;
 }
 
-void Brightness::solve() {
+void Brightness::add(const Eigen::Vector2d& x_mm, std::span<const double> patterns, double weight,
+                     double value) {
+  with_count(patterns_, [&](auto count) { add_pixel<count>(x_mm, patterns.data(), weight, value); });
+}
+
+void Brightness::solve(Places places) {
+  with_count(patterns_, [&](auto count) { solve_nodes<count>(places); });
+}
+
+template <int Count>
+void Brightness::add_pixel(const Eigen::Vector2d& x_mm, const double* patterns, double weight, double value) {
+  constexpr Eigen::Index length = Count * (Count + 1) / 2 + Count;
+  Eigen::Array<double, length, 1> moments;
+  Eigen::Index at = 0;
+  for (int i = 0; i < Count; ++i) {
+    for (int j = 0; j <= i; ++j)
+      moments[at++] = weight * patterns[i] * patterns[j];
+  }
+  for (int i = 0; i < Count; ++i)
+    moments[at++] = weight * patterns[i] * value;
+  const Corner here = corner(x_mm);
+  for (size_t i = 0; i < 4; ++i) {
+    Eigen::Map<Eigen::Array<double, length, 1>>(moments_.col(here.node[i]).data()) += here.share[i] * moments;
+    is_added_[static_cast<size_t>(here.node[i])] = true;
+  }
+}
+
+template <int Count>
+void Brightness::solve_nodes(Places places) {
+  constexpr Eigen::Index length = Count * (Count + 1) / 2 + Count;
+  using Moments = Eigen::Array<double, length, Eigen::Dynamic>;
   // Nodes are half a window apart, and bilinear shares have spread each pixel by some of that already.
   const double sigma = std::sqrt(nodes_per_window * nodes_per_window - 1.0 / 6.0);
   const auto reach = static_cast<Eigen::Index>(std::ceil(3 * sigma));
@@ -64,34 +92,54 @@ void Brightness::solve() {
   for (Eigen::Index i = -reach; i <= reach; ++i)
     bell.push_back(std::exp(-0.5 * static_cast<double>(i * i) / (sigma * sigma)));
   const double nodes_in_window = 2 * std::numbers::pi * sigma * sigma;
-  const Eigen::ArrayXd all = share_of_window * nodes_in_window * moments_.rowwise().mean();
-  // Whole rows of nodes at once, shifted against each other.
-  Eigen::ArrayXXd along_rows = Eigen::ArrayXXd::Zero(moments_.rows(), moments_.cols());
+  const Eigen::Map<const Moments> moments(moments_.data(), length, moments_.cols());
+  const Eigen::Array<double, length, 1> all = share_of_window * nodes_in_window * moments.rowwise().mean();
+  const auto is_added = [&](Eigen::Index row, Eigen::Index column) {
+    return is_added_[static_cast<size_t>(row * columns_ + column)];
+  };
+  // Where there are pixels: rows of nodes, from the first column to before the last.
+  Eigen::Index top = rows_, bottom = 0, left = columns_, right = 0;
   for (Eigen::Index row = 0; row < rows_; ++row) {
-    for (Eigen::Index i = -reach; i <= reach; ++i) {
-      const Eigen::Index length = columns_ - std::abs(i);
-      if (length <= 0) continue;
-      along_rows.middleCols(row * columns_ + std::max<Eigen::Index>(0, -i), length) +=
-          bell[static_cast<size_t>(i + reach)] *
-          moments_.middleCols(row * columns_ + std::max<Eigen::Index>(0, i), length);
+    for (Eigen::Index column = 0; column < columns_; ++column) {
+      if (!is_added(row, column)) continue;
+      top = std::min(top, row);
+      bottom = row + 1;
+      left = std::min(left, column);
+      right = std::max(right, column + 1);
     }
   }
-  using Small = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, most_patterns, most_patterns>;
-  Small matrix(patterns_, patterns_);
-  Eigen::ArrayXXd sums(moments_.rows(), columns_);
-  for (Eigen::Index row = 0; row < rows_; ++row) {
+  const bool everywhere = places == Places::all;
+  const Eigen::Index first = everywhere ? 0 : left, last = everywhere ? columns_ : right;
+  if (first >= last) return;
+  // Whole rows of nodes at once, shifted against each other.
+  Moments along_rows = Moments::Zero(length, columns_ * rows_);
+  for (Eigen::Index row = top; row < bottom; ++row) {
+    for (Eigen::Index i = -reach; i <= reach; ++i) {
+      const Eigen::Index from = std::max(first, left - i), to = std::min(last, right - i);
+      if (from < to)
+        along_rows.middleCols(row * columns_ + from, to - from) +=
+            bell[static_cast<size_t>(i + reach)] * moments.middleCols(row * columns_ + from + i, to - from);
+    }
+  }
+  Eigen::Matrix<double, Count, Count> matrix;
+  Moments sums(length, last - first);
+  for (Eigen::Index row = everywhere ? 0 : top; row < (everywhere ? rows_ : bottom); ++row) {
     sums.colwise() = all;
-    for (Eigen::Index i = std::max(-reach, -row); i <= std::min(reach, rows_ - 1 - row); ++i)
-      sums += bell[static_cast<size_t>(i + reach)] * along_rows.middleCols((row + i) * columns_, columns_);
-    for (Eigen::Index column = 0; column < columns_; ++column) {
+    for (Eigen::Index i = std::max(-reach, top - row); i <= std::min(reach, bottom - 1 - row); ++i)
+      sums += bell[static_cast<size_t>(i + reach)] *
+              along_rows.middleCols((row + i) * columns_ + first, last - first);
+    for (Eigen::Index column = first; column < last; ++column) {
+      if (!everywhere && !is_added(row, column)) continue;
+      const Eigen::Array<double, length, 1> here = sums.col(column - first);
       Eigen::Index at = 0;
-      for (int i = 0; i < patterns_; ++i) {
+      for (int i = 0; i < Count; ++i) {
         for (int j = 0; j <= i; ++j)
-          matrix(i, j) = matrix(j, i) = sums(at++, column);
+          matrix(i, j) = matrix(j, i) = here[at++];
       }
       matrix.diagonal().array() += 1e-9 * matrix.trace() + 1e-300;
-      amplitudes_.col(row * columns_ + column) =
-          Eigen::LDLT<Small>(matrix).solve(sums.col(column).tail(patterns_).matrix()).array();
+      amplitudes_.col(row * columns_ + column) = Eigen::LDLT<Eigen::Matrix<double, Count, Count>>(matrix)
+                                                     .solve(here.template tail<Count>().matrix())
+                                                     .array();
     }
   }
 }

@@ -17,11 +17,12 @@ class Brightness {
   /// The coarse grid over a slice of this extent; windows have the standard deviation `window_mm`, nodes half of it between them.
   Brightness(const Eigen::Vector2d& extent_mm, double window_mm, int patterns);
 
-  void clear();
   /// One pixel: `patterns` of the given length, its weight and value.
   void add(const Eigen::Vector2d& x_mm, std::span<const double> patterns, double weight, double value);
-  void solve();
-  /// The amplitudes at a place, written to `amplitudes`.
+  /// After the last pixel: amplitudes everywhere, or only for places that were added.
+  enum class Places { all, added };
+  void solve(Places places);
+  /// The amplitudes at a place that was solved for, written to `amplitudes`.
   void at(const Eigen::Vector2d& x_mm, std::span<double> amplitudes) const;
 
  private:
@@ -30,12 +31,17 @@ class Brightness {
     std::array<double, 4> share;
   };
   [[nodiscard]] Corner corner(const Eigen::Vector2d& x_mm) const;
+  template <int Count>
+  void add_pixel(const Eigen::Vector2d& x_mm, const double* patterns, double weight, double value);
+  template <int Count>
+  void solve_nodes(Places places);
 
   int patterns_;
   double node_mm_;
   Eigen::Index columns_;
   Eigen::Index rows_;
   Eigen::ArrayXXd moments_;     // products and right sides x nodes
+  std::vector<bool> is_added_;  // a node
   Eigen::ArrayXXd amplitudes_;  // patterns x nodes
 };
 

@@ -42,13 +42,12 @@ std::vector<Ghost> find_ghosts(const TagView& view, const std::vector<const Mate
                                const std::vector<double>& noise) {
   std::vector<AirPixel> air;
   for (size_t k = 0; k < view.images.size(); ++k) {
-    const Eigen::ArrayXXf depth = depth_mm(*maps[k], Material::nothing, view.plane);
-    for (Eigen::Index column = 0; column < depth.cols(); ++column) {
-      for (Eigen::Index row = 0; row < depth.rows(); ++row) {
+    const PixelMask is_air = deep_inside(*maps[k], Material::nothing,
+                                         inside_in_pixels * view.plane.finer_spacing_mm(), view.plane);
+    for (Eigen::Index column = 0; column < is_air.cols(); ++column) {
+      for (Eigen::Index row = 0; row < is_air.rows(); ++row) {
         const double value = static_cast<double>(view.images[k](row, column)) / noise[k];
-        if (static_cast<double>(depth(row, column)) < inside_in_pixels * view.plane.finer_spacing_mm() ||
-            value > dark_in_sigmas || view.is_masked(k, row, column))
-          continue;
+        if (!is_air(row, column) || value > dark_in_sigmas || view.is_masked(k, row, column)) continue;
         air.push_back({k, row, column, value * value});
       }
     }

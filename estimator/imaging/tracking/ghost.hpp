@@ -12,7 +12,7 @@ namespace diastole::imaging {
 
 struct Ghost {
   bool down;           ///< shifted along a column, else along a row
-  Eigen::Index shift;  ///< in pixels, cyclic
+  Eigen::Index shift;  ///< in pixels, cyclic, from 0 to before the extent
   double share;        ///< of the picture's brightness
   /// The part of `share` that is in phase with what it lies over, and its standard deviation. Unknown, half the power is.
   double in_phase = 0;
@@ -20,9 +20,10 @@ struct Ghost {
 
   /// What it lays over a pixel, but for its phase.
   [[nodiscard]] double over(const Image& image, Eigen::Index row, Eigen::Index column) const {
-    const Eigen::Index from_row = down ? (row - shift + image.rows()) % image.rows() : row;
-    const Eigen::Index from_column = down ? column : (column - shift + image.cols()) % image.cols();
-    return share * static_cast<double>(image(from_row, from_column));
+    Eigen::Index& from = down ? row : column;
+    from -= shift;
+    if (from < 0) from += down ? image.rows() : image.cols();
+    return share * static_cast<double>(image(row, column));
   }
 };
 

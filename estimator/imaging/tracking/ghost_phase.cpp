@@ -100,7 +100,7 @@ void take_off_brightness(const TagView& view, const TagModel& model, double spac
   for (const Over& pixel : pixels)
     brightness.add(view.place_mm(pixel.row, pixel.column), model.at(phases(pixel)).values(), 1.0,
                    pixel.*picture);
-  brightness.solve();
+  brightness.solve(Brightness::Places::added);
   std::array<double, TagPatterns::most> amplitudes{};
   for (Over& pixel : pixels) {
     const TagPatterns patterns = model.at(phases(pixel));

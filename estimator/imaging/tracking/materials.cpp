@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <functional>
 #include <limits>
 #include <numbers>
 
@@ -29,18 +28,6 @@ constexpr double smooth_share = 0.05;
 /// Each pixel is judged with its neighbours: a binomial window of this many passes has a standard deviation of one pixel.
 constexpr int pooling_passes = 2;
 
-/// Patterns of tags at rest whose phase is free: 1, and cosine and sine of each direction.
-size_t rest_patterns(const TagView& view, const Eigen::Vector2d& x_mm, std::span<double> patterns) {
-  size_t count = 0;
-  patterns[count++] = 1.0;
-  for (const TagWave& wave : view.waves) {
-    const double phase = 2 * pi * (wave.per_mm.dot(x_mm) - wave.offset_cycles);
-    patterns[count++] = std::cos(phase);
-    patterns[count++] = std::sin(phase);
-  }
-  return count;
-}
-
 /// The windowed mean and the modulation of one image, at every pixel of a coarser raster.
 struct Modulation {
   std::vector<double> mean;
@@ -49,21 +36,22 @@ struct Modulation {
 
 constexpr Eigen::Index raster = 2;  // pixels
 
-Modulation modulation_of(const TagView& view, size_t k) {
+Modulation modulation_of(const TagView& view, size_t k, const PatternMaps& free) {
   const Image& image = view.images[k];
   const double window_mm = 0.5 / view.waves[0].per_mm.norm();
-  const size_t count = 1 + 2 * view.waves.size();
+  const size_t count = free.size();
   Brightness brightness(view.extent_mm(), window_mm, static_cast<int>(count));
   std::array<double, 5> patterns{};
   for (Eigen::Index row = 0; row < image.rows(); ++row) {
     for (Eigen::Index column = 0; column < image.cols(); ++column) {
       if (view.is_masked(k, row, column)) continue;
-      const Eigen::Vector2d x = view.place_mm(row, column);
-      rest_patterns(view, x, patterns);
-      brightness.add(x, std::span(patterns).first(count), 1.0, static_cast<double>(image(row, column)));
+      for (size_t i = 0; i < count; ++i)
+        patterns[i] = free[i](row, column);
+      brightness.add(view.place_mm(row, column), std::span(patterns).first(count), 1.0,
+                     static_cast<double>(image(row, column)));
     }
   }
-  brightness.solve();
+  brightness.solve(Brightness::Places::all);
   Modulation result;
   std::array<double, 5> amplitudes{};
   for (Eigen::Index row = 0; row < image.rows(); row += raster) {
@@ -177,8 +165,7 @@ void lower_envelope(std::span<float> values, double spacing_mm, std::vector<doub
 }
 
 /// The distance of every pixel to the nearest one that `is_source`, 1e4 mm if there is none.
-Eigen::ArrayXXf distance_to(const Eigen::Array<bool, Eigen::Dynamic, Eigen::Dynamic>& is_source,
-                            const SlicePlane& plane) {
+Eigen::ArrayXXf distance_to(const PixelMask& is_source, const SlicePlane& plane) {
   constexpr float far_mm2 = 1e8F;
   Eigen::ArrayXXf square(is_source.rows(), is_source.cols());
   const auto step_mm = static_cast<float>(plane.row_spacing_mm);
@@ -205,8 +192,8 @@ Eigen::ArrayXXf distance_to(const Eigen::Array<bool, Eigen::Dynamic, Eigen::Dyna
 }
 
 /// Connected pixels (by sides) for which `holds`, each piece handed to `piece`.
-void each_piece(const MaterialMap& map, const std::function<bool(Material)>& holds,
-                const std::function<void(const std::vector<Eigen::Index>&)>& piece) {
+template <class Holds, class Piece>
+void each_piece(const MaterialMap& map, const Holds& holds, const Piece& piece) {
   std::vector<bool> seen(static_cast<size_t>(map.size()));
   std::vector<Eigen::Index> members;
   for (Eigen::Index start = 0; start < map.size(); ++start) {
@@ -232,34 +219,43 @@ void each_piece(const MaterialMap& map, const std::function<bool(Material)>& hol
   }
 }
 
-/// A material's picture, fitted where it surely is and predicted everywhere.
-CostMap cost_of(size_t k, const TagView& view, const Eigen::ArrayXXf& depth, double sure_mm, double window_mm,
-                size_t count,
-                const std::function<void(Eigen::Index, Eigen::Index, std::span<double>)>& patterns_at,
-                double noise) {
+/// Where a picture is fitted, and where it is asked for.
+struct Region {
+  PixelMask sure, wanted;
+};
+
+/// A material's picture, fitted where it surely is and predicted where it is wanted.
+CostMap cost_of(size_t k, const TagView& view, const Region& region, double window_mm,
+                const PatternMaps& patterns, double noise) {
   const Image& image = view.images[k];
+  const size_t count = patterns.size();
   CostMap cost = CostMap::Constant(image.rows(), image.cols(), static_cast<float>(most_cost));
   Brightness brightness(view.extent_mm(), window_mm, static_cast<int>(count));
-  std::array<double, 8> patterns{}, amplitudes{};
+  std::array<double, 5> here{}, amplitudes{};
+  const auto look = [&](Eigen::Index row, Eigen::Index column) {
+    for (size_t i = 0; i < count; ++i)
+      here[i] = patterns[i](row, column);
+  };
   Eigen::Index pixels = 0;
   for (Eigen::Index column = 0; column < image.cols(); ++column) {
     for (Eigen::Index row = 0; row < image.rows(); ++row) {
-      if (static_cast<double>(depth(row, column)) < sure_mm || view.is_masked(k, row, column)) continue;
-      patterns_at(row, column, std::span(patterns).first(count));
-      brightness.add(view.place_mm(row, column), std::span(patterns).first(count), 1.0,
+      if (!region.sure(row, column) || view.is_masked(k, row, column)) continue;
+      look(row, column);
+      brightness.add(view.place_mm(row, column), std::span(here).first(count), 1.0,
                      static_cast<double>(image(row, column)));
       ++pixels;
     }
   }
   if (pixels < 50) return cost;
-  brightness.solve();
+  brightness.solve(Brightness::Places::all);
   for (Eigen::Index column = 0; column < image.cols(); ++column) {
     for (Eigen::Index row = 0; row < image.rows(); ++row) {
-      patterns_at(row, column, std::span(patterns).first(count));
+      if (!region.wanted(row, column)) continue;
+      look(row, column);
       brightness.at(view.place_mm(row, column), std::span(amplitudes).first(count));
       double picture = 0;
       for (size_t i = 0; i < count; ++i)
-        picture += patterns[i] * amplitudes[i];
+        picture += here[i] * amplitudes[i];
       const double doubt = smooth_share * amplitudes[0];
       const double off = static_cast<double>(image(row, column)) - picture;
       cost(row, column) =
@@ -271,27 +267,43 @@ CostMap cost_of(size_t k, const TagView& view, const Eigen::ArrayXXf& depth, dou
 
 /// The noise's standard deviation: half differences of next neighbours but one along both directions see little of stripes and
 /// shading; their median absolute deviation sees no edges.
-double noise_of(const Image& image, const Eigen::ArrayXXf& depth) {
+double noise_of(const Image& image, const MaterialMap& map) {
   std::vector<double> off;
   for (Eigen::Index column = 1; column + 1 < image.cols(); ++column) {
     for (Eigen::Index row = 1; row + 1 < image.rows(); ++row) {
-      if (depth(row, column) > 0) off.push_back(static_cast<double>(image(row, column)));
+      if (map(row, column) == Material::nothing) off.push_back(static_cast<double>(image(row, column)));
     }
   }
   // Air shows the Rayleigh distribution, whose median is 1.1774 times the standard deviation of a channel.
   return signal::quantile(off, 0.5) / 1.1774;
 }
 
-Eigen::Array<bool, Eigen::Dynamic, Eigen::Dynamic> where(const MaterialMap& map, Material material) {
+PixelMask where(const MaterialMap& map, Material material) {
   return map.unaryExpr([material](Material here) { return here == material; });
 }
 
-/// `depth_mm` within the material; outside, just negative.
-Eigen::ArrayXXf depth_within_mm(const MaterialMap& map, Material material, const SlicePlane& plane) {
-  return distance_to(!where(map, material), plane) - static_cast<float>(0.5 * plane.finer_spacing_mm());
-}
-
 }  // namespace
+
+RestPatterns::RestPatterns(const TagView& view, const std::vector<TagWave>& waves) {
+  const TagModel model(waves.size());
+  const auto none = [&] { return Eigen::ArrayXXd(view.plane.rows, view.plane.columns); };
+  free.assign(1 + 2 * waves.size(), none());
+  fixed.assign(model.patterns(), none());
+  std::array<double, 2> phases{};
+  for (Eigen::Index column = 0; column < view.plane.columns; ++column) {
+    for (Eigen::Index row = 0; row < view.plane.rows; ++row) {
+      free[0](row, column) = 1.0;
+      for (size_t f = 0; f < waves.size(); ++f) {
+        phases[f] = waves[f].phase_rad(view.place_mm(row, column));
+        free[1 + 2 * f](row, column) = std::cos(phases[f]);
+        free[2 + 2 * f](row, column) = std::sin(phases[f]);
+      }
+      const TagPatterns values = model.at(std::span(phases).first(waves.size()));
+      for (size_t i = 0; i < values.count; ++i)
+        fixed[i](row, column) = values.value[i];
+    }
+  }
+}
 
 MaterialMap first_materials(const TagView& view) {
   // Six phases over the cycle tell three rates of fading apart.
@@ -301,8 +313,9 @@ MaterialMap first_materials(const TagView& view) {
     chosen.push_back(i * (phases - 1) / std::max<size_t>(1, std::min<size_t>(6, phases) - 1));
   std::vector<Modulation> modulations;
   std::vector<double> times_s;
+  const PatternMaps free = RestPatterns(view, view.waves).free;
   for (const size_t k : chosen) {
-    modulations.push_back(modulation_of(view, k));
+    modulations.push_back(modulation_of(view, k, free));
     times_s.push_back(1e-3 * view.times_ms[k]);
   }
   const size_t nodes = modulations[0].mean.size();
@@ -331,49 +344,36 @@ MaterialMap first_materials(const TagView& view) {
 }
 
 MaterialMap refined_materials(size_t k, const TagView& view, const MaterialMap& before,
-                              const PhasesAt& tissue, const PhasesAt& still) {
-  const TagModel model(view.waves.size());
+                              const Eigen::ArrayXXf& depth_before_mm, const PatternMaps& tissue,
+                              const RestPatterns& rest) {
   const double spacing_mm = view.waves[0].spacing_mm();
   const double sure_mm = 1.5 * view.plane.finer_spacing_mm();
-  const auto by_phases = [&](const PhasesAt& phases_at) {
-    return [&](Eigen::Index row, Eigen::Index column, std::span<double> patterns) {
-      std::array<double, 2> phases{};
-      phases_at(row, column, std::span(phases).first(view.waves.size()));
-      const TagPatterns values = model.at(std::span(phases).first(view.waves.size()));
-      std::copy(values.value.begin(), values.value.begin() + static_cast<std::ptrdiff_t>(values.count),
-                patterns.begin());
-    };
-  };
-  const auto constant = [](Eigen::Index, Eigen::Index, std::span<double> patterns) { patterns[0] = 1.0; };
-  const auto at_rest = [&](Eigen::Index row, Eigen::Index column, std::span<double> patterns) {
-    rest_patterns(view, view.place_mm(row, column), patterns);
-  };
-  const double noise =
-      std::max(1e-6, noise_of(view.images[k], depth_mm(before, Material::nothing, view.plane)));
-  const auto cost = [&](Material material, double window_mm, size_t count, const auto& patterns_at) {
-    return cost_of(k, view, depth_within_mm(before, material, view.plane), sure_mm, window_mm, count,
-                   patterns_at, noise);
+  // From one map to the next the edge moves by less than half a tag spacing.
+  const PixelMask may_be_tissue = depth_before_mm > static_cast<float>(-0.5 * spacing_mm);
+  const double pooled_mm =
+      (pooling_passes + 1) * std::max(view.plane.row_spacing_mm, view.plane.column_spacing_mm);
+  const double noise = std::max(1e-6, noise_of(view.images[k], before));
+  const PixelMask everywhere = PixelMask::Constant(before.rows(), before.cols(), true);
+  const auto cost = [&](Material material, const PatternMaps& patterns, const PixelMask& wanted) {
+    return cost_of(k, view, {deep_inside(before, material, sure_mm, view.plane), wanted}, 2 * spacing_mm,
+                   patterns, noise);
   };
   std::array<CostMap, 4> costs;
-  costs[static_cast<size_t>(Material::nothing)] = cost(Material::nothing, 2 * spacing_mm, 1, constant);
+  costs[static_cast<size_t>(Material::nothing)] =
+      cost(Material::nothing, {Eigen::ArrayXXd::Ones(before.rows(), before.cols())}, everywhere);
   costs[static_cast<size_t>(Material::tissue)] =
-      cost(Material::tissue, 2 * spacing_mm, model.patterns(), by_phases(tissue));
-  costs[static_cast<size_t>(Material::still_water)] =
-      cost(Material::still_water, 2 * spacing_mm, model.patterns(), by_phases(still));
-  costs[static_cast<size_t>(Material::mixed_water)] =
-      cost(Material::mixed_water, 2 * spacing_mm, 1 + 2 * view.waves.size(), at_rest);
+      cost(Material::tissue, tissue, depth_before_mm > static_cast<float>(-0.5 * spacing_mm - pooled_mm));
+  costs[static_cast<size_t>(Material::still_water)] = cost(Material::still_water, rest.fixed, everywhere);
+  costs[static_cast<size_t>(Material::mixed_water)] = cost(Material::mixed_water, rest.free, everywhere);
   for (CostMap& each : costs)
     pool(each);
-  // From one map to the next the edge moves by less than half a tag spacing.
-  const Eigen::ArrayXXf depth_before = depth_mm(before, Material::tissue, view.plane);
   MaterialMap map = before;
   for (Eigen::Index column = 0; column < map.cols(); ++column) {
     for (Eigen::Index row = 0; row < map.rows(); ++row) {
       if (view.is_masked(k, row, column)) continue;
-      const bool may_be_tissue = static_cast<double>(depth_before(row, column)) > -0.5 * spacing_mm;
       size_t best = static_cast<size_t>(Material::nothing);
       for (size_t i = 0; i < costs.size(); ++i) {
-        if (i == static_cast<size_t>(Material::tissue) && !may_be_tissue) continue;
+        if (i == static_cast<size_t>(Material::tissue) && !may_be_tissue(row, column)) continue;
         if (costs[i](row, column) < costs[best](row, column)) best = i;
       }
       map(row, column) = static_cast<Material>(best);
@@ -402,9 +402,30 @@ void draw_contours(const PhaseEdits& edits, MaterialMap& map) {
 }
 
 Eigen::ArrayXXf depth_mm(const MaterialMap& map, Material material, const SlicePlane& plane) {
-  const Eigen::Array<bool, Eigen::Dynamic, Eigen::Dynamic> inside = where(map, material);
+  const PixelMask inside = where(map, material);
   const auto half = static_cast<float>(0.5 * plane.finer_spacing_mm());
   return inside.select(distance_to(!inside, plane) - half, half - distance_to(inside, plane));
+}
+
+PixelMask deep_inside(const MaterialMap& map, Material material, double least_mm, const SlicePlane& plane) {
+  const PixelMask inside = where(map, material);
+  PixelMask deep = inside;
+  const double reach_mm = (least_mm + 0.5 * plane.finer_spacing_mm()) * (1 - 1e-9);
+  const auto rows = static_cast<Eigen::Index>(reach_mm / plane.row_spacing_mm);
+  const auto columns = static_cast<Eigen::Index>(reach_mm / plane.column_spacing_mm);
+  for (Eigen::Index right = -columns; right <= columns; ++right) {
+    for (Eigen::Index down = -rows; down <= rows; ++down) {
+      if (std::hypot(static_cast<double>(down) * plane.row_spacing_mm,
+                     static_cast<double>(right) * plane.column_spacing_mm) > reach_mm)
+        continue;
+      const Eigen::Index high = map.rows() - std::abs(down), wide = map.cols() - std::abs(right);
+      if (high <= 0 || wide <= 0) continue;
+      auto here = deep.block(std::max<Eigen::Index>(0, -down), std::max<Eigen::Index>(0, -right), high, wide);
+      here =
+          here && inside.block(std::max<Eigen::Index>(0, down), std::max<Eigen::Index>(0, right), high, wide);
+    }
+  }
+  return deep;
 }
 
 void remove_specks(MaterialMap& map, const SlicePlane& plane, double least_mm2) {

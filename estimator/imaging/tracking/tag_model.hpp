@@ -30,12 +30,12 @@ class TagModel {
     const double second = std::cos(phases_rad[1]);
     return {{1.0, first, second, first * second}, 4};
   }
-  /// The brightness's derivative by the phase of one direction.
-  [[nodiscard]] double slope(std::span<const double> phases_rad, std::span<const double> amplitudes,
-                             size_t direction) const {
+  /// The brightness's derivative by the phase of one direction; `patterns` at these phases.
+  [[nodiscard]] double slope(std::span<const double> phases_rad, const TagPatterns& patterns,
+                             std::span<const double> amplitudes, size_t direction) const {
     const double sine = std::sin(phases_rad[direction]);
-    if (directions_ == 1) return -sine * (amplitudes[1] + 4 * amplitudes[2] * std::cos(phases_rad[0]));
-    return -sine * (amplitudes[1 + direction] + amplitudes[3] * std::cos(phases_rad[1 - direction]));
+    if (directions_ == 1) return -sine * (amplitudes[1] + 4 * amplitudes[2] * patterns.value[1]);
+    return -sine * (amplitudes[1 + direction] + amplitudes[3] * patterns.value[2 - direction]);
   }
   /// How deep the stripes of a direction are: half the difference of bright and dark.
   [[nodiscard]] double depth(std::span<const double> amplitudes, size_t direction) const {

@@ -87,7 +87,7 @@ class ViewTracker {
 
   void rest_phases(const Eigen::Vector2d& x_mm, std::span<double> phases) const {
     for (size_t f = 0; f < directions(); ++f)
-      phases[f] = two_pi * (waves_[f].per_mm.dot(x_mm) - waves_[f].offset_cycles);
+      phases[f] = waves_[f].phase_rad(x_mm);
   }
 
   /// Corrects wave vectors and offsets by tissue in the first phase; if that comes late, by still water in all phases too.
@@ -122,31 +122,33 @@ class ViewTracker {
     struct Sample {
       Eigen::Vector2d x_mm;
       std::array<double, 2> phases;
+      TagPatterns patterns;
       double value;
     };
     std::vector<Sample> samples;
     for (Eigen::Index column = 0; column < image.cols(); ++column) {
       for (Eigen::Index row = 0; row < image.rows(); ++row) {
         if (static_cast<double>(depth(row, column)) < least_mm || view_.is_masked(k, row, column)) continue;
-        Sample sample{view_.place_mm(row, column), {}, static_cast<double>(image(row, column))};
+        Sample sample{view_.place_mm(row, column), {}, {}, static_cast<double>(image(row, column))};
         rest_phases(sample.x_mm, sample.phases);
-        brightness.add(sample.x_mm, model_.at(sample.phases).values(), 1.0, sample.value);
+        sample.patterns = model_.at(sample.phases);
+        brightness.add(sample.x_mm, sample.patterns.values(), 1.0, sample.value);
         samples.push_back(sample);
       }
     }
     if (samples.size() < 100) return;
-    brightness.solve();
+    brightness.solve(Brightness::Places::added);
     std::vector<double> residuals;
     std::vector<std::array<double, TagPatterns::most>> amplitudes(samples.size());
     for (size_t i = 0; i < samples.size(); ++i)
       residuals.push_back(samples[i].value -
-                          picture(brightness, samples[i].x_mm, samples[i].phases, amplitudes[i]));
+                          picture(brightness, samples[i].x_mm, samples[i].patterns, amplitudes[i]));
     const double sigma = std::max(robust_sigma(residuals), 1e-9);
     const Eigen::Vector2d middle = 0.5 * view_.extent_mm();
     for (size_t i = 0; i < samples.size(); ++i) {
       const double weight = huber_weight(residuals[i], sigma) / (sigma * sigma);
       for (size_t f = 0; f < directions(); ++f) {
-        const double slope = two_pi * model_.slope(samples[i].phases, amplitudes[i], f);
+        const double slope = two_pi * model_.slope(samples[i].phases, samples[i].patterns, amplitudes[i], f);
         Eigen::Vector3d row;
         row << slope * (samples[i].x_mm - middle) / view_.extent_mm().norm(), slope;
         matrix[f] += weight * row * row.transpose();
@@ -155,9 +157,8 @@ class ViewTracker {
     }
   }
 
-  double picture(const Brightness& brightness, const Eigen::Vector2d& x_mm, std::span<const double> phases,
-                 std::array<double, TagPatterns::most>& amplitudes) const {
-    const TagPatterns patterns = model_.at(phases.first(directions()));
+  static double picture(const Brightness& brightness, const Eigen::Vector2d& x_mm,
+                        const TagPatterns& patterns, std::array<double, TagPatterns::most>& amplitudes) {
     brightness.at(x_mm, std::span(amplitudes).first(patterns.count));
     double sum = 0;
     for (size_t j = 0; j < patterns.count; ++j)
@@ -227,36 +228,17 @@ class ViewTracker {
                    spline_sum(pixel.splines, coefficients_[f].col(static_cast<Eigen::Index>(k)));
   }
 
-  /// The phases of a whole image, for the materials.
-  std::vector<Eigen::ArrayXXd> phase_maps(size_t k, bool at_rest) const {
-    std::vector<Eigen::ArrayXXd> maps(directions(),
-                                      Eigen::ArrayXXd::Zero(view_.plane.rows, view_.plane.columns));
+  void find_edges(size_t k, const RestPatterns& rest) {
+    PatternMaps tissue = rest.fixed;
     std::array<double, 2> phases{};
-    for (Eigen::Index column = 0; column < view_.plane.columns; ++column) {
-      for (Eigen::Index row = 0; row < view_.plane.rows; ++row) {
-        rest_phases(view_.place_mm(row, column), phases);
-        for (size_t f = 0; f < directions(); ++f)
-          maps[f](row, column) = phases[f];
-      }
-    }
-    if (at_rest) return maps;
     for (const Pixel& pixel : pixels_) {
       tracked_phases(pixel, k, phases);
-      for (size_t f = 0; f < directions(); ++f)
-        maps[f](pixel.row, pixel.column) = phases[f];
+      const TagPatterns patterns = model_.at(std::span(phases).first(directions()));
+      for (size_t i = 0; i < patterns.count; ++i)
+        tissue[i](pixel.row, pixel.column) = patterns.value[i];
     }
-    return maps;
-  }
-
-  void find_edges(size_t k, const MaterialMap& before, const std::vector<Eigen::ArrayXXd>& rest) {
-    const std::vector<Eigen::ArrayXXd> tracked = phase_maps(k, false);
-    const auto at = [](const std::vector<Eigen::ArrayXXd>& maps) {
-      return [&maps](Eigen::Index row, Eigen::Index column, std::span<double> phases) {
-        for (size_t f = 0; f < maps.size(); ++f)
-          phases[f] = maps[f](row, column);
-      };
-    };
-    set_materials(k, refined_materials(k, view_, before, at(tracked), at(rest)));
+    const TrackedPhase& before = phases_[k];
+    set_materials(k, refined_materials(k, view_, before.materials, before.depth_mm, tissue, rest));
   }
 
   void set_materials(size_t k, MaterialMap map) {
@@ -268,7 +250,7 @@ class ViewTracker {
   /// Phase after phase: motion, edge, motion.
   void follow(const MaterialMap& first) {
     first_precision_ = splines_->precision(1.0 / (first_range_in_spacings * spacing_mm_));
-    const std::vector<Eigen::ArrayXXd> rest = phase_maps(0, true);
+    const RestPatterns rest(view_, waves_);
     for (size_t k = 0; k < times(); ++k) {
       const auto time = static_cast<Eigen::Index>(k);
       for (Eigen::MatrixXd& each : coefficients_) {
@@ -277,14 +259,19 @@ class ViewTracker {
         if (k >= 2) each.col(time) = each.col(time - 1) + 0.5 * (each.col(time - 1) - each.col(time - 2));
       }
       const std::vector<Eigen::MatrixXd> expected = coefficients_;
-      set_materials(k, k == 0 ? first : phases_[k - 1].materials);
+      if (k == 0 || !view_.edits.empty()) {
+        set_materials(k, k == 0 ? first : phases_[k - 1].materials);
+      } else {
+        phases_[k].materials = phases_[k - 1].materials;
+        phases_[k].depth_mm = phases_[k - 1].depth_mm;
+      }
       if (is_led(k)) {
         lead(k, expected);
       } else {
         fit_phase(k, view_.images[k], expected, 2);
       }
-      find_edges(k, MaterialMap(phases_[k].materials), rest);
-      if (k == 0) find_edges(k, MaterialMap(phases_[k].materials), rest);
+      find_edges(k, rest);
+      if (k == 0) find_edges(k, rest);
       fit_phase(k, view_.images[k], is_led(k) ? coefficients_ : expected, 4);
       if (is_led(k)) put_right_before(k, rest);
     }
@@ -322,7 +309,7 @@ class ViewTracker {
 
   /// A line that a person puts right in phase k jumped there or in a phase before. Goes back from k, and takes what is found so from
   /// the phase on at which image and steps from phase to phase together cost least.
-  void put_right_before(size_t k, const std::vector<Eigen::ArrayXXd>& rest) {
+  void put_right_before(size_t k, const RestPatterns& rest) {
     const std::vector<Eigen::MatrixXd> right = coefficients_;
     std::vector<Eigen::MatrixXd> back = right;
     double gain = 0, most = 0;  // in cost, over no change
@@ -365,7 +352,7 @@ class ViewTracker {
         coefficients_[f].col(static_cast<Eigen::Index>(j)) = back[f].col(static_cast<Eigen::Index>(j));
     }
     for (size_t j = from; j < k; ++j) {
-      find_edges(j, MaterialMap(phases_[j].materials), rest);
+      find_edges(j, rest);
       fit_phase(j, view_.images[j], coefficients_, 4);
     }
   }
@@ -440,13 +427,14 @@ class ViewTracker {
       if (static_cast<double>(phase.depth_mm(pixel.row, pixel.column)) < sure_mm() ||
           view_.is_masked(k, pixel.row, pixel.column))
         continue;
-      Fitted fitted{&pixel, {}, 0, {}};
+      Fitted fitted{&pixel, {}, {}, 0, {}};
       tracked_phases(pixel, k, fitted.phases);
-      brightness.add(pixel.x_mm, model_.at(fitted.phases).values(), 1.0,
+      fitted.patterns = model_.at(fitted.phases);
+      brightness.add(pixel.x_mm, fitted.patterns.values(), 1.0,
                      static_cast<double>(image(pixel.row, pixel.column)));
       fitted_.push_back(fitted);
     }
-    brightness.solve();
+    brightness.solve(Brightness::Places::added);
     std::vector<double> residuals;
     phase.residual.setZero(image.rows(), image.cols());
     phase.slope.assign(directions(), Eigen::ArrayXXf::Zero(image.rows(), image.cols()));
@@ -454,11 +442,12 @@ class ViewTracker {
     for (Fitted& fitted : fitted_) {
       const Pixel& pixel = *fitted.pixel;
       fitted.residual = static_cast<double>(image(pixel.row, pixel.column)) -
-                        picture(brightness, pixel.x_mm, fitted.phases, amplitudes);
+                        picture(brightness, pixel.x_mm, fitted.patterns, amplitudes);
       residuals.push_back(fitted.residual);
       phase.residual(pixel.row, pixel.column) = static_cast<float>(fitted.residual);
       for (size_t f = 0; f < directions(); ++f) {
-        fitted.slope[f] = two_pi * waves_[f].per_mm.norm() * model_.slope(fitted.phases, amplitudes, f);
+        fitted.slope[f] =
+            two_pi * waves_[f].per_mm.norm() * model_.slope(fitted.phases, fitted.patterns, amplitudes, f);
         phase.slope[f](pixel.row, pixel.column) = static_cast<float>(fitted.slope[f]);
       }
     }
@@ -600,6 +589,7 @@ class ViewTracker {
   struct Fitted {
     const Pixel* pixel;
     std::array<double, 2> phases;
+    TagPatterns patterns;
     double residual;
     std::array<double, 2> slope;  // a direction
   };
