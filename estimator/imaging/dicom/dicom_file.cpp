@@ -321,6 +321,7 @@ ImageHeader header_of(DcmItem& dataset, int frame, const SlicePlane& plane, cons
   header.frame = frame;
   header.plane = plane;
   header.series_uid = text(dataset, DCM_SeriesInstanceUID).value_or("");
+  header.instance_uid = text(dataset, DCM_SOPInstanceUID).value_or("");
   header.series_number =
       static_cast<int>(std::clamp(number(dataset, DCM_SeriesNumber).value_or(0), -1e9, 1e9));
   header.instance = static_cast<int>(std::clamp(number(dataset, DCM_InstanceNumber).value_or(0), -1e9, 1e9));

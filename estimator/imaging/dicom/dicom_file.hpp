@@ -36,6 +36,7 @@ struct DiffusionEncoding {
 struct ImageHeader {
   int frame = 0;  ///< in its file, from 0
   std::string series_uid;
+  std::string instance_uid;
   int series_number = 0;
   int instance = 0;
   SlicePlane plane;

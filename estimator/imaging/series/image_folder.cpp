@@ -87,6 +87,7 @@ class Sorter {
   explicit Sorter(ImageFolder& folder) : folder_(folder) {}
 
   void sort() {
+    report_equal_instances();
     settle_components();
     for (Stack& stack : stacks())
       add_series(stack);
@@ -128,6 +129,29 @@ class Sorter {
                 std::string unit, std::string remedy) {
     folder_.problems.push_back({severity, std::move(id), std::move(what), folder_.file_name(image), number,
                                 std::move(unit), std::move(remedy)});
+  }
+
+  /// An instance is one image for ever: what bears the identity of another was altered, or made by careless software.
+  void report_equal_instances() {
+    std::map<std::string, size_t> first;
+    std::vector<std::pair<size_t, size_t>> equal;
+    for (size_t image = 0; image < folder_.images.size(); ++image) {
+      if (header(image).instance_uid.empty()) continue;
+      const auto [one, is_new] = first.try_emplace(header(image).instance_uid, image);
+      if (is_new || folder_.images[one->second].file == folder_.images[image].file) continue;
+      const ImageHeader& here = header(image);
+      const ImageHeader& there = header(one->second);
+      const bool is_copy = here.series_uid == there.series_uid && here.trigger_ms == there.trigger_ms &&
+                           same_place(here.plane, there.plane);
+      if (!is_copy) equal.emplace_back(image, one->second);  // copies are told with their slice
+    }
+    if (equal.empty()) return;
+    const auto [image, other] = equal.front();
+    complain(Severity::warning, "instance-twice",
+             fmt::format("the SOP Instance UID (0008,0018) is that of {}, which is another image",
+                         folder_.file_name(other)),
+             image, static_cast<double>(equal.size()), "images",
+             "Both are read as they are. Was one of them altered? Export the series again if you can.");
   }
 
   /// Where a series holds several kinds of picture and its headers do not say which is which, the pixels do.

@@ -25,6 +25,7 @@ using test::write_ring;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
+using testing::UnorderedElementsAre;
 
 using Pixels = std::vector<Uint16>;
 
@@ -109,6 +110,23 @@ TEST(DamagedImages, ASeriesThatIsThereTwiceCountsOnce) {
   EXPECT_THAT(finding_ids(folder), ElementsAre("series-twice"));
   ASSERT_EQ(folder.series.size(), 2U);
   EXPECT_EQ(folder.series[1].number, 4);
+}
+
+TEST(DamagedImages, AnotherImagesIdentityIsToldOnce) {
+  const ScratchFolder scratch;
+  const auto files = write_ring({}, scratch.path());
+  fs::copy_file(files[0], scratch.path() / "copy.dcm");  // the same image is no riddle
+  for (const size_t image : {2U, 3U})
+    rewrite(files[image], pixels_of(files[image]), [&](DcmDataset& data) {
+      DcmFileFormat first;
+      OFString uid;
+      ASSERT_TRUE(first.loadFile(files[1].c_str()).good());
+      ASSERT_TRUE(first.getDataset()->findAndGetOFString(DCM_SOPInstanceUID, uid).good());
+      data.putAndInsertString(DCM_SOPInstanceUID, uid.c_str());
+    });
+  const ImageFolder folder = read_image_folder(scratch.path());
+  EXPECT_THAT(finding_ids(folder), UnorderedElementsAre("instance-twice", "copy"));
+  EXPECT_EQ(folder.series.at(0).slices.at(0).images.size(), files.size());
 }
 
 TEST(DamagedImages, ARunLengthThatEndsEarlyOrLateIsRefused) {
