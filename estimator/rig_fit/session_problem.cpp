@@ -47,16 +47,26 @@ SessionProblem::SessionProblem(const Session& session, const SpecimenFamily& fam
     if (tolerance.only_learnt && !is_stated && std::ranges::count(learnt, tolerance.name) == 0) continue;
     if (!tolerance.needs_neighbours || family.has_neighbours())
       nuisances_.push_back({std::string(tolerance.name), std::string(tolerance.unit), sd, 0.0,
-                            tolerance.sensors_only, &tolerance});
+                            tolerance.sensors_only, &tolerance, is_stated});
   }
   const auto tolerances = static_cast<Eigen::Index>(nuisances_.size() - basic_nuisances);
-  prior_ = {Eigen::VectorXd::Zero(tolerances), Eigen::MatrixXd::Identity(tolerances, tolerances)};
+  prior_ = {Eigen::VectorXd::Zero(tolerances), Eigen::MatrixXd::Identity(tolerances, tolerances),
+            Eigen::VectorXd::Ones(tolerances)};
   // Features are means: with these steps and components they err by less than a twentieth of the model's stated error, where
   // the line rings most too.
   simulation_ = {.step_s = noise_.channels.contains(Channel::pump) ? 1.0 / 300.0 : 1.0 / 150.0,
                  .components = 3};
   for (const SessionRun& run : session.runs)
     motions_.push_back(sampled_motion(run.drive, dividing_step(run.drive, simulation_.step_s)));
+}
+
+TolerancePrior SessionProblem::finer_prior(double times) const {
+  TolerancePrior finer = prior_;
+  for (size_t i = basic_nuisances; i < nuisances_.size(); ++i)
+    if (!nuisances_[i].is_stated && !nuisances_[i].is_guess())
+      finer.described[static_cast<Eigen::Index>(i - basic_nuisances)] /= times;
+  finer.root = finer.described.asDiagonal();
+  return finer;
 }
 
 RigModel SessionProblem::model(const SessionModel& of) const { return model(of, tolerances(of)); }

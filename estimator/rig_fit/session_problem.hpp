@@ -15,6 +15,8 @@ namespace diastole::rig {
 struct TolerancePrior {
   Eigen::VectorXd mean;
   Eigen::MatrixXd root;
+  /// Sds of the parts as described, whatever references taught: 1, or less where they are taken for finer.
+  Eigen::VectorXd described;
 };
 
 /// Effects with their values, and the nuisances: modulus, sensors' offsets, tolerances, each N(0, 1) by its prior. Where a
@@ -33,6 +35,10 @@ struct Nuisance {
   double mean = 0.0;  ///< of the value at u = 0
   bool sensors_only = false;
   const Tolerance* tolerance = nullptr;  ///< none: the modulus, an offset
+  bool is_stated = false;                ///< the rig's description says how large
+
+  /// Known to an order of magnitude only, by no data sheet.
+  [[nodiscard]] bool is_guess() const { return unit == "ln" && sd >= 0.5; }
 };
 
 /// Those before the tolerances.
@@ -52,7 +58,16 @@ class SessionProblem {
   /// What was measured, less what is known of the rig's own misfit.
   [[nodiscard]] const Eigen::VectorXd& measured() const { return measured_; }
   void take_off(const Eigen::VectorXd& misfit) { measured_ -= misfit; }
-  void set_tolerances(TolerancePrior prior) { prior_ = std::move(prior); }
+  /// Learnt from references: N(mean, root root').
+  void set_tolerances(Eigen::VectorXd mean, Eigen::MatrixXd root) {
+    prior_.mean = std::move(mean);
+    prior_.root = std::move(root);
+    is_learnt_ = true;
+  }
+  [[nodiscard]] bool is_learnt() const { return is_learnt_; }
+  /// Of parts that are so many times finer than the list says; those whose sizes the rig's description states, and guesses
+  /// of an order of magnitude, are not.
+  [[nodiscard]] TolerancePrior finer_prior(double times) const;
   /// Of a model's tolerances.
   [[nodiscard]] const TolerancePrior& prior(const SessionModel& of) const {
     return of.prior ? *of.prior : prior_;
@@ -108,6 +123,7 @@ class SessionProblem {
   Eigen::VectorXd measured_;
   std::vector<Nuisance> nuisances_;
   TolerancePrior prior_;  ///< the list's, if no reference says more
+  bool is_learnt_ = false;
   SimulationOptions simulation_;
   std::vector<DriveTrace> motions_;
 };

@@ -29,8 +29,8 @@ FreedStart free_changed_parts(const rig::SessionProblem& problem, rig::SessionMo
   }
   if (!frees) return {std::move(start), std::move(known)};
   const MatrixXd before = problem.prior(known.at).root;
-  const auto prior =
-      std::make_shared<rig::TolerancePrior>(rig::TolerancePrior{learnt.mean, covariance.llt().matrixL()});
+  const auto prior = std::make_shared<rig::TolerancePrior>(
+      rig::TolerancePrior{learnt.mean, covariance.llt().matrixL(), learnt.described});
   const auto free = prior->root.triangularView<Eigen::Lower>();
   const auto convert = [&](rig::SessionModel& model) {
     model.u.tail(count) = free.solve(before * model.u.tail(count)).eval();

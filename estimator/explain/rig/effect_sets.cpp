@@ -1,11 +1,13 @@
 #include "estimator/explain/rig/effect_sets.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <map>
 #include <optional>
 #include <span>
+#include <tuple>
 
 #include "estimator/explain/rig/changed_parts.hpp"
 #include "estimator/explain/rig/event_scan.hpp"
@@ -158,14 +160,19 @@ class SetsSearch {
   void fit(const std::vector<size_t>& responses);
   /// From `start`, near a model that is known.
   void fit(const SessionModel& start, const rig::LinearisedModel& known, const rig::Shares& shares) {
-    const FreedStart free = free_changed_parts(problem_, start, known);
+    // A rig that is finer than described is so in what an effect changes, too: the effect says all that is wrong with it.
+    const FreedStart free = finer_ ? FreedStart{start, known} : free_changed_parts(problem_, start, known);
     sets_.push_back(fit_set(problem_, free.start, free.known, shares, best_posterior()));
   }
   [[nodiscard]] double best_posterior() const {
-    double best = -std::numeric_limits<double>::infinity();
+    double best = best_described_;
     for (const EffectSet& set : sets_)
       best = std::max(best, set.log_posterior);
     return best;
+  }
+  /// Is it so far behind what the rig as described has that no further fit brings it near?
+  [[nodiscard]] bool is_behind(const EffectSet& set) const {
+    return set.log_posterior < best_described_ - second_in_reach;
   }
   void fit_beside_best();
   void fit_synergies();
@@ -178,6 +185,10 @@ class SetsSearch {
       if (added(set) == effects && (best == nullptr || set.log_posterior > best->log_posterior)) best = &set;
     return best;
   }
+  void search_from_base();
+  void take_base_for_finer(double times);
+  [[nodiscard]] double promised_posterior(const rig::Shares& shares) const;
+  void search_if_finer();
   void fit_plain_and_singles_again();
   [[nodiscard]] bool is_plain_near() const;
   [[nodiscard]] bool is_plain_in_reach() const;
@@ -198,6 +209,9 @@ class SetsSearch {
   const rig::SessionProblem& problem_;
   const SetSearchOptions& options_;
   rig::LinearisedModel base_;  ///< the rig as declared
+  bool finer_ = false;         ///< its parts are finer than described
+  double best_described_ =
+      -std::numeric_limits<double>::infinity();  ///< log posterior, once finer parts are tried
   std::vector<Response> responses_;
   std::vector<EffectSet> sets_;
 };
@@ -388,7 +402,8 @@ void SetsSearch::fit_best_again(size_t effects) {
   double best = 0.0;
   for (EffectSet& set : sets_) {
     if (added(set) != effects) continue;
-    if (++count > retaken || (count > 1 && set.log_posterior < best - second_in_reach)) break;
+    if (is_behind(set) || ++count > retaken || (count > 1 && set.log_posterior < best - second_in_reach))
+      break;
     if (const auto posterior = posterior_beside_part(set)) {
       set.log_posterior = *posterior;
     } else {
@@ -424,30 +439,26 @@ void SetsSearch::fit_plain_and_singles_again() {
   const auto plain = [&] {
     return std::ranges::find_if(sets_, [&](const EffectSet& set) { return added(set) == 0; });
   };
+  const auto may_count = [&] { return plain() != sets_.end() && !is_behind(*plain()); };
   const auto replace = [&](EffectSet again) {
     if (inference::is_settled(again.termination)) *plain() = std::move(again);
   };
   sort_sets();
   std::optional<EffectSet> again;
-  if (plain() != sets_.end() && is_plain_near()) again = fit_set_exactly(problem_, *plain());
+  if (may_count() && is_plain_near()) again = fit_set_exactly(problem_, *plain());
   const bool is_likely = again && !is_strained(problem_, *again);
   if (is_likely) replace(*again);
   fit_best_again(1);
-  if (!is_likely && plain() != sets_.end() && is_plain_in_reach())
+  if (!is_likely && may_count() && is_plain_in_reach())
     replace(again ? std::move(*again) : fit_set_exactly(problem_, *plain()));
 }
 
-SetSearch SetsSearch::run() {
-  report("fitting the rig's model");
-  base_ = declared_rig(problem_, {.terms = options_.terms, .values = options_.values, .u = {}});
+/// All sets that promise most, from the base and the effects' responses.
+void SetsSearch::search_from_base() {
   sets_.push_back(fit_set(problem_, base_.at, base_, problem_.error().prior.share));
   const EffectSet plain = sets_.front();
-  report("computing what each effect would do");
   const rig::EvidenceFit stated =
       fit_linear(base_.target(problem_), base_.columns, problem_.error(), problem_.error().prior.share);
-  responses_ = effect_responses(problem_, base_, stated.variance.cwiseSqrt());
-  SetSearch found;
-  found.given = options_.terms.size();
   const rig::EvidenceFit adapted =
       fit_linear(base_.target(problem_), base_.columns, problem_.error(), plain.evidence.shares);
   report("fitting the effects that promise most");
@@ -455,10 +466,6 @@ SetSearch SetsSearch::run() {
     const std::vector<Promise> singles = promises(*under, false);
     for (size_t i = 0; i < std::min(singles_fitted, singles.size()); ++i)
       if (is_worth_fitting(singles, i, least_promise)) fit(singles[i].responses);
-    if (under == &stated)
-      for (const Promise& promise : singles)
-        found.promises.emplace_back(responses_[promise.responses.front()].term.effect->text().id,
-                                    promise.gain);
   }
   for (const Effect* effect : problem_.session().effects.of_rig())
     if (effect->change_points() != ChangePoints::none)
@@ -479,6 +486,69 @@ SetSearch SetsSearch::run() {
   fit_synergies();
   report("fitting the best pairs again");
   fit_best_again(2);
+}
+
+/// From now on the base is a rig whose parts are so many times finer.
+void SetsSearch::take_base_for_finer(double times) {
+  const auto prior = std::make_shared<rig::TolerancePrior>(problem_.finer_prior(times));
+  const MatrixXd& before = problem_.prior(base_.at).root;  // diagonal, as the finer one
+  base_.columns.rightCols(prior->mean.size()) *=
+      (prior->described.cwiseQuotient(before.diagonal())).asDiagonal();
+  base_.at.prior = prior;
+}
+
+/// The log posterior that the best set would have by linear algebra.
+double SetsSearch::promised_posterior(const rig::Shares& shares) const {
+  const rig::EvidenceFit plain = fit_linear(base_.target(problem_), base_.columns, problem_.error(), shares);
+  double most = 0.0;
+  for (const bool pairs : {false, true}) {
+    const std::vector<Promise> best = promises(plain, pairs);
+    if (!best.empty()) most = std::max(most, 0.5 * (best.front().gain - (pairs ? 2.0 : 1.0) * least_promise));
+  }
+  return plain.log_evidence + most;
+}
+
+/// The list's tolerances are what rigs usually have. One whose parts are all far nearer to their description is as likely beforehand, and
+/// in it a part that alone is off is no tolerance: the sets are sought there, too, where that may decide something.
+void SetsSearch::search_if_finer() {
+  static constexpr std::array finer{2.0, 4.0, 8.0};
+  constexpr double linear_errs = 10.0;  // nats, of a posterior by linear algebra
+  if (problem_.is_learnt() || sets_.empty()) return;
+  const double log_odds = -std::log(static_cast<double>(finer.size()));
+  const rig::Shares shares = best_of(0) ? best_of(0)->evidence.shares : sets_.front().evidence.shares;
+  double best = 0.0, most = -std::numeric_limits<double>::infinity();
+  for (const double times : finer) {
+    take_base_for_finer(times);
+    const double promised = promised_posterior(shares) + log_odds;
+    if (promised > most) std::tie(most, best) = std::pair(promised, times);
+  }
+  if (most < best_posterior() - linear_errs) return;
+  report("seeking the same in a rig of finer parts");
+  take_base_for_finer(best);
+  finer_ = true;
+  best_described_ = best_posterior();
+  std::vector<EffectSet> described = std::move(sets_);
+  sets_.clear();
+  search_from_base();
+  for (EffectSet& set : sets_)
+    set.log_posterior += log_odds;
+  std::ranges::move(described, std::back_inserter(sets_));
+  sort_sets();
+}
+
+SetSearch SetsSearch::run() {
+  report("fitting the rig's model");
+  base_ = declared_rig(problem_, {.terms = options_.terms, .values = options_.values, .u = {}});
+  report("computing what each effect would do");
+  const rig::EvidenceFit stated =
+      fit_linear(base_.target(problem_), base_.columns, problem_.error(), problem_.error().prior.share);
+  responses_ = effect_responses(problem_, base_, stated.variance.cwiseSqrt());
+  SetSearch found;
+  found.given = options_.terms.size();
+  for (const Promise& promise : promises(stated, false))
+    found.promises.emplace_back(responses_[promise.responses.front()].term.effect->text().id, promise.gain);
+  search_from_base();
+  search_if_finer();
   double sum = 0.0;
   for (const EffectSet& set : sets_)
     sum += std::exp(set.log_posterior - sets_.front().log_posterior);

@@ -31,11 +31,6 @@ void take_given(const Study& study, const rig::Session& session, SetSearchOption
   }
 }
 
-const EffectSet& plain_set(const SetSearch& search) {
-  return *std::ranges::find_if(search.sets,
-                               [&](const EffectSet& set) { return set.model.terms.size() == search.given; });
-}
-
 std::vector<Step> steps_of(const EffectSet& before, const EffectSet& after) {
   const auto reduced = [&](const EffectSet& set) {
     return set.evidence.left.cwiseAbs2().cwiseQuotient(after.evidence.variance).mean();
@@ -106,7 +101,7 @@ ModelErrorSize model_error_of(const rig::SessionProblem& problem, const EffectSe
   for (size_t g = 0; g < rig::error_groups; ++g)
     if (std::ranges::count(groups, static_cast<rig::ErrorGroup>(g)) > 0)
       size.parts.push_back({std::string(name_of(static_cast<rig::ErrorGroup>(g))), beyond[g]});
-  size.parts.push_back({"tolerances", largest_tolerance(set)});
+  size.parts.push_back({"tolerances", largest_tolerance(problem, set)});
   return size;
 }
 
@@ -200,7 +195,7 @@ Explanation explain_rig(const Study& study, const ExplainOptions& options) {
   options.report("judging");
   const bool from_reference = !study.data.reference.empty();
   const SetVerdict verdict = judge_sets(problem, search, {from_reference});
-  const EffectSet& plain = plain_set(search);
+  const EffectSet& plain = search.sets[verdict.plain];
   const bool is_found = verdict.verdict == Verdict::named || verdict.verdict == Verdict::ambiguous;
   const EffectSet& chosen = search.sets[verdict.chosen];
   const EffectSet& after = is_found ? chosen : plain;

@@ -67,7 +67,7 @@ struct Fitted {
   /// With this knowledge as the prior; the search starts at these tolerances.
   void fit(const Knowledge& before, const VectorXd& tolerances) {
     const MatrixXd root = before.root();
-    problem.set_tolerances({before.mean, root});
+    problem.set_tolerances(before.mean, root);
     rig::LinearisedModel start = rig::declared_rig(problem);
     start.at.u.tail(tolerances.size()) = root.triangularView<Eigen::Lower>().solve(tolerances - before.mean);
     start.columns = problem.nuisance_columns(start.at, start.there);
@@ -283,7 +283,7 @@ void use_reference(const Reference& reference, SessionProblem& problem) {
       if (place[j] >= 0)
         covariance(place[i], place[j]) = reference.covariance(static_cast<Index>(i), static_cast<Index>(j));
   }
-  problem.set_tolerances({mean, covariance.llt().matrixL()});
+  problem.set_tolerances(mean, covariance.llt().matrixL());
   ModelError& error = problem.error();
   for (size_t g = 0; g < error_groups; ++g)
     error.prior.share[g] = std::max(reference.again[g], SharePrior::least[g]);

@@ -49,10 +49,12 @@ VectorXd error_squares(const rig::ModelError& error, const rig::Shares& shares) 
 
 /// Do parts of the declared rig that are less than a surprise off, in all, make the same change?
 bool is_tolerance(const rig::SessionProblem& problem, const EffectSet& set, const VectorXd& change) {
-  const Eigen::MatrixXd& root = problem.prior(set.model).root;
-  Eigen::MatrixXd columns = set.known.columns;  // by u: now by basic nuisances and by the list's sds
+  const rig::TolerancePrior& prior = problem.prior(set.model);
+  const Eigen::MatrixXd& root = prior.root;
+  Eigen::MatrixXd columns = set.known.columns;  // by u: now by basic nuisances and by the parts' sds
   columns.rightCols(root.cols()) =
-      root.transpose().partialPivLu().solve(columns.rightCols(root.cols()).transpose()).transpose();
+      root.transpose().partialPivLu().solve(columns.rightCols(root.cols()).transpose()).transpose() *
+      prior.described.asDiagonal();
   const VectorXd weight = set.evidence.variance.cwiseInverse();
   Eigen::MatrixXd normal = columns.transpose() * weight.asDiagonal() * columns;
   constexpr double nearly_free = 1e-6;
@@ -150,15 +152,15 @@ bool is_irregular(const rig::SessionProblem& problem, const std::vector<rig::Cyc
 /// Are the parts of the rig in all further from what is declared or was learnt of them than is likely? Those that are known to
 /// an order of magnitude only, by no data sheet, may be anywhere; and so may those that an effect changes.
 bool is_strained_in_all(const rig::SessionProblem& problem, const EffectSet& set, const VectorXd& u) {
-  constexpr double guess = 0.5;  // sd of a logarithm
   const Index count = u.size() - static_cast<Index>(rig::basic_nuisances);
   std::vector<Index> known;
   for (Index i = 0; i < count; ++i) {
     const rig::Nuisance& part = problem.nuisances()[static_cast<size_t>(i) + rig::basic_nuisances];
-    if ((part.unit != "ln" || part.sd < guess) && !is_changed(set.model, part.name)) known.push_back(i);
+    if (!part.is_guess() && !is_changed(set.model, part.name)) known.push_back(i);
   }
-  const Eigen::MatrixXd& root = problem.prior(set.model).root;
-  const VectorXd moved = root * u.tail(count);
+  const rig::TolerancePrior& prior = problem.prior(set.model);
+  const VectorXd moved = prior.root * u.tail(count);
+  const Eigen::MatrixXd root = prior.described.cwiseInverse().asDiagonal() * prior.root;
   const Eigen::MatrixXd covariance = (root * root.transpose())(known, known);
   const VectorXd of_known = moved(known);
   const double square = of_known.dot(covariance.llt().solve(of_known));
@@ -194,7 +196,7 @@ double seldom(double sds) { return boost::math::cdf(boost::math::complement(boos
 /// How often the largest of all tolerances is as far to either side.
 double strain_by_chance(const rig::SessionProblem& problem, const EffectSet& set) {
   const auto tolerances = static_cast<double>(problem.nuisances().size() - rig::basic_nuisances);
-  return -std::expm1(tolerances * std::log1p(-2.0 * seldom(largest_tolerance(set))));
+  return -std::expm1(tolerances * std::log1p(-2.0 * seldom(largest_tolerance(problem, set))));
 }
 
 /// That nothing is wrong is not said of a misfit that one part shows so seldom, nor of one tolerance so far to either side,
@@ -215,9 +217,10 @@ double error_rms(const rig::SessionProblem& problem, const rig::Shares& shares, 
       mean_squares(problem, error_squares(problem.error(), shares))[static_cast<size_t>(signal)]);
 }
 
-double largest_tolerance(const EffectSet& set) {
-  const Index count = set.model.u.size() - static_cast<Index>(rig::basic_nuisances);
-  return count > 0 ? set.model.u.tail(count).cwiseAbs().maxCoeff() : 0.0;
+double largest_tolerance(const rig::SessionProblem& problem, const EffectSet& set) {
+  const VectorXd& described = problem.prior(set.model).described;
+  if (described.size() == 0) return 0.0;
+  return set.model.u.tail(described.size()).cwiseProduct(described).cwiseAbs().maxCoeff();
 }
 
 bool is_strained(const rig::SessionProblem& problem, const EffectSet& set) {
@@ -278,7 +281,14 @@ SetVerdict judge_sets(const rig::SessionProblem& problem, const SetSearch& searc
       is_more ? bears_a_name(problem, best, sizes[out.chosen])
               : bears_nothing_wrong(problem, best) || (may_be_plain && bears_nothing_wrong(problem, *plain));
   out.scatter = rig::cycle_scatter(problem, best.model);
-  if (is_more) out.held_out_gain = held_out_gain(problem, *plain, best);
+  // An effect predicts what the same rig without it does not: parts that are as fine, or as coarse.
+  const auto described = [&](const EffectSet& set) { return problem.prior(set.model).described; };
+  auto own_plain = std::ranges::find_if(search.sets, [&](const EffectSet& set) {
+    return set.model.terms.size() == search.given && described(set) == described(best);
+  });
+  if (own_plain == search.sets.end()) own_plain = plain;
+  out.plain = static_cast<size_t>(own_plain - search.sets.begin());
+  if (is_more) out.held_out_gain = held_out_gain(problem, *own_plain, best);
   const bool predicted = !is_more || predicts(*out.held_out_gain, best.model.terms.size() - search.given);
   if (!borne || is_irregular(problem, out.scatter) || !is_settled(out.searches)) {
     out.verdict = Verdict::unexplained;

@@ -31,6 +31,7 @@ struct SetVerdict {
   Verdict verdict = Verdict::none;
   double confidence = 0.0;
   size_t chosen = 0;                    ///< of the search's sets
+  size_t plain = 0;                     ///< the one without effects in a rig with the chosen one's tolerances
   std::vector<double> size_over_error;  ///< of the chosen set's effects
   std::vector<bool> material;           ///< which of them count
   std::vector<std::vector<std::string>> ambiguous_with;
@@ -41,8 +42,8 @@ struct SetVerdict {
   std::optional<double> held_out_gain = {};
 };
 
-/// Of a set's tolerances the one furthest from its prior, in sds.
-double largest_tolerance(const EffectSet& set);
+/// Of a set's tolerances the one furthest from its prior, in sds of the list: to be a little coarser than in a fine rig is no strain.
+double largest_tolerance(const rig::SessionProblem& problem, const EffectSet& set);
 
 /// Is that one so far off as is seldom by chance, of all?
 bool is_strained(const rig::SessionProblem& problem, const EffectSet& set);

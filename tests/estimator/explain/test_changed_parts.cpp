@@ -24,11 +24,10 @@ class ChangedParts : public testing::Test {
   /// References that told much of every part, and that all are a bit off together.
   void learn() {
     problem_.set_tolerances(
-        {Eigen::VectorXd::Constant(tolerances(), 0.3),
-         Eigen::MatrixXd(
-             (0.01 * (Eigen::MatrixXd::Identity(tolerances(), tolerances()).array() + 0.5).matrix())
-                 .llt()
-                 .matrixL())});
+        Eigen::VectorXd::Constant(tolerances(), 0.3),
+        (0.01 * (Eigen::MatrixXd::Identity(tolerances(), tolerances()).array() + 0.5).matrix())
+            .llt()
+            .matrixL());
   }
   rig::SpecimenFamily family_ = rig::gel_family();
   rig::Session session_ = rig::simulated_session(family_, {});

@@ -59,7 +59,7 @@ TEST_F(SimulatedSession, WithALeakIsExplainedByItAndPredictsWhatWasNotFitted) {
 
 /// What it does to one waveform a function of volume does as well, which says nothing of where it comes from.
 TEST_F(SimulatedSession, OfOneWaveformWithAStiffeningWallGetsNoName) {
-  search({.terms = {{find_effect("strain-stiffening"), {}}}, .values = {1.0}, .seed = 6}, 1);
+  search({.terms = {{find_effect("strain-stiffening"), {}}}, .values = {1.4}, .seed = 6}, 1);
   EXPECT_GE(verdict_.confidence, 0.9);
   EXPECT_THAT(chosen().ids(), ElementsAre("strain-stiffening"));
   EXPECT_TRUE(is_settled(verdict_.searches));
