@@ -19,7 +19,7 @@ namespace diastole {
 namespace {
 
 /// Another number whenever the tracker gives other points for the same images.
-constexpr int tracker_version = 4;
+constexpr int tracker_version = 5;
 
 std::optional<imaging::SpecimenPose> pose_of(const Study& study) {
   if (!study.data.to_specimen) return std::nullopt;
@@ -49,11 +49,10 @@ std::string fingerprint_of(const std::filesystem::path& folder,
 }
 
 /// Frames are the images' phases, by number. Of one whose time is nearer to another phase's the pressure is another's, too.
-std::vector<Finding> frames_at_other_times(const Study& study) {
+std::vector<Finding> frames_at_other_times(const Study& study, const imaging::ImageFolder& folder) {
   if (!study.data.frames) return {};
   const std::vector<Frame> frames = read_frames(*study.data.frames);
-  const std::vector<double> phase_ms =
-      imaging::tagged_phases(imaging::read_image_folder(*study.data.images)).times_ms;
+  const std::vector<double> phase_ms = imaging::tagged_phases(folder).times_ms;
   for (size_t frame = 1; frame <= phase_ms.size() && frame < frames.size(); ++frame) {
     const double stated_ms = 1e3 * frames[frame].time_s;
     const auto nearest =
@@ -70,6 +69,17 @@ std::vector<Finding> frames_at_other_times(const Study& study) {
   return {};
 }
 
+/// Tags of another spacing than the study's are those of another protocol, or their harmonics.
+void require_spacing(const Study& study, const imaging::ImageFolder& folder) {
+  if (!study.data.tag_spacing_mm) return;
+  for (const double spacing_mm : imaging::tag_spacings_mm(folder))
+    if (!imaging::is_tag_spacing(spacing_mm, *study.data.tag_spacing_mm))
+      throw InputError({study.file.string(), "[images] tag_spacing_mm",
+                        fmt::format("says {:g} mm, and the images in {} have tags every {:.2f} mm",
+                                    *study.data.tag_spacing_mm, folder.folder.string(), spacing_mm),
+                        "Are these the images of this study? If so, correct the spacing or leave it out."});
+}
+
 }  // namespace
 
 void use_images(Study& study) {
@@ -79,7 +89,9 @@ void use_images(Study& study) {
   if (!std::filesystem::is_directory(folder, error))
     throw InputError({study.file.string(), "[data] images", fmt::format("{} is no folder", folder.string()),
                       "Name the scanner's export: images = \"dicom/\"."});
-  print_findings(frames_at_other_times(study), stderr);
+  const imaging::ImageFolder images = imaging::read_image_folder(folder);
+  require_spacing(study, images);
+  print_findings(frames_at_other_times(study, images), stderr);
   const auto pose = pose_of(study);
   std::string name = study.file.filename().string();
   name = name.substr(0, name.find(".study.toml"));

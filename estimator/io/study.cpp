@@ -256,10 +256,13 @@ StudyData read_data(TableReader& root, const std::filesystem::path& folder) {
   return data;
 }
 
-std::optional<StudyPose> read_pose_of_images(TableReader& root) {
+void read_images(TableReader& root, StudyData& data) {
   std::optional<TableReader> images = root.table_if("images");
-  if (!images) return std::nullopt;
-  std::optional<StudyPose> pose;
+  if (!images) return;
+  constexpr double absent = 0;
+  const double spacing_mm = images->number_or("tag_spacing_mm", absent, {.above = 0.0});
+  if (spacing_mm != absent) data.tag_spacing_mm = spacing_mm;
+  std::optional<StudyPose>& pose = data.to_specimen;
   if (std::optional<TableReader> table = images->table_if("to_specimen")) {
     pose.emplace();
     const auto vector = [&](std::string_view key) -> std::array<double, 3> {
@@ -282,7 +285,6 @@ std::optional<StudyPose> read_pose_of_images(TableReader& root) {
     table->finish();
   }
   images->finish();
-  return pose;
 }
 
 [[noreturn]] void refuse_option(std::string_view option, std::string_view value, std::string problem,
@@ -310,7 +312,7 @@ Study read_study(const std::filesystem::path& path) {
               .effects = {},
               .refine = {}};
   study.data = read_data(root, path.parent_path());
-  study.data.to_specimen = read_pose_of_images(root);
+  read_images(root, study.data);
   study.chamber = read_chamber(root);
   if (auto model = root.table_if("model")) {
     study.effects = model->texts_or("effects", {});

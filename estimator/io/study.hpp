@@ -108,6 +108,7 @@ struct StudyData {
   std::optional<std::filesystem::path> frames;
   std::optional<std::filesystem::path> images = {};  ///< a scanner's export, of which tags are made
   std::optional<StudyPose> to_specimen = {};  ///< absent: a pose file beside the images, or their outlines
+  std::optional<double> tag_spacing_mm = {};  ///< that the protocol of `images` has
 };
 
 /// [model.error]: what the rig's model gets wrong by itself, in per cent of a channel's range. Absent: rig_fit/model_error.hpp.

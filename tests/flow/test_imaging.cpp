@@ -99,6 +99,15 @@ TEST_F(ImagedGel, TheSkeletonIsFittedAndReplacedOnlyByForce) {
   EXPECT_EQ(run(place, forced).exit_code, 0);
 }
 
+TEST_F(ImagedGel, TagsOfAnotherSpacingThanTheStudysAreRefused) {
+  place.write("gel/other.study.toml", source_text("examples/tagged-gel/tagged-gel.study.toml") +
+                                          "\n[images]\ntag_spacing_mm = 10.0\n");
+  const Ended fit = run(place, {"diastole", "fit", "gel/other.study.toml"});
+  EXPECT_EQ(fit.exit_code, 2);
+  EXPECT_THAT(fit.err, testing::AllOf(HasSubstr("[images] tag_spacing_mm: says 10 mm"),
+                                      HasSubstr("have tags every 5.00 mm")));
+}
+
 TEST_F(ImagedGel, TwoOutputsOfOneNameAreRefusedBeforeTracking) {
   const Ended track = run(place, {"diastole", "track", "gel/dicom", "-o", "gel.x", "--page", "./gel.x"});
   EXPECT_EQ(track.exit_code, 2);

@@ -631,6 +631,21 @@ PhaseTimes tagged_phases(const ImageFolder& folder) {
   return phase_times(times_ms);
 }
 
+std::vector<double> tag_spacings_mm(const ImageFolder& folder) {
+  std::vector<double> all;
+  for (const ImageSeries& series : folder.series) {
+    if (series.kind != SeriesKind::tagged_cine) continue;
+    for (const SliceImages& slice : series.slices)
+      for (const TagWave& wave : slice.tags)
+        all.push_back(wave.spacing_mm());
+  }
+  return all;
+}
+
+bool is_tag_spacing(double seen_mm, double stated_mm) {
+  return std::abs(seen_mm - stated_mm) <= 0.05 * stated_mm;
+}
+
 ImageFolder read_image_folder(const fs::path& path, const Progress& progress) {
   ImageFolder folder;
   folder.folder = path;

@@ -37,6 +37,11 @@ ImageFolder read_image_folder(const std::filesystem::path& folder, const Progres
 /// Of all tagged series of a folder together.
 PhaseTimes tagged_phases(const ImageFolder& folder);
 
+/// Of every slice and direction with tags, as the first phase shows them.
+std::vector<double> tag_spacings_mm(const ImageFolder& folder);
+/// Gradients err by a few per cent, and no protocol offers spacings that are nearer than that: within 5 %.
+bool is_tag_spacing(double seen_mm, double stated_mm);
+
 /// Throws the first error of `problems` as an InputError that says how many there are.
 void require_sound(const ImageFolder& folder);
 

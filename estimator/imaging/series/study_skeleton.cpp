@@ -49,6 +49,16 @@ std::string ventricle(const std::string& name) {
          parameter("b3", 6, 0.5, 50);
 }
 
+/// [images] with the spacing of the tags, if they have one.
+std::string protocol_of(const ImageFolder& folder) {
+  const std::vector<double> spacings_mm = tag_spacings_mm(folder);
+  const auto [least, most] = std::ranges::minmax_element(spacings_mm);
+  if (least == spacings_mm.end() || !is_tag_spacing(*most, *least)) return {};
+  return fmt::format(
+      "\n# Images with tags of another spacing are refused.\n[images]\ntag_spacing_mm = {:.2f}\n",
+      0.5 * (*least + *most));
+}
+
 std::string times_of(const ImageFolder& folder) {
   std::string text = "# frame 0 is the undeformed state; of the others the images say time_s =\n#  ";
   for (const double time_ms : tagged_phases(folder).times_ms)
@@ -87,7 +97,7 @@ std::string study_skeleton(const ImageFolder& folder, const fs::path& study) {
   }
   text += "# diastole bin RUN --frame-times ... --frames-csv FILE\n";
   text += fmt::format("frames = {}\n", toml_text(name + ".frames.csv"));
-  if (tagged != folder.series.end()) text += times_of(folder);
+  if (tagged != folder.series.end()) text += times_of(folder) + protocol_of(folder);
   if (tagged != folder.series.end() && is_heart)
     text +=
         "\n# The mesh that `diastole lv` fits lies in the patient's coordinates.\n[images.to_specimen]\n"
