@@ -262,6 +262,9 @@ void read_images(TableReader& root, StudyData& data) {
   constexpr double absent = 0;
   const double spacing_mm = images->number_or("tag_spacing_mm", absent, {.above = 0.0});
   if (spacing_mm != absent) data.tag_spacing_mm = spacing_mm;
+  if (data.tag_spacing_mm && !data.images)
+    images->fail("tag_spacing_mm", "given, and no images are named",
+                 "Name them, images = \"dicom/\" in [data], or leave it out.");
   std::optional<StudyPose>& pose = data.to_specimen;
   if (std::optional<TableReader> table = images->table_if("to_specimen")) {
     pose.emplace();

@@ -20,7 +20,8 @@ class GasPocket {
   [[nodiscard]] double compliance_at_rest() const { return volume_mL_ / (exponent_ * atmosphere_kPa_); }
   /// The pressure when the gas and a spring of this compliance, one behind the other, are squeezed by this volume.
   [[nodiscard]] double pressure_behind_kPa(double squeezed_mL, double compliance_mL_per_kPa) const {
-    // Newton's method for the part x of the volume that is left: increasing and convex, from where both are linear.
+    // Newton's method for the part of the volume that is left, from where both are linear: what is off falls with it and is
+    // convex, so that after the first step all go one way.
     const double linear = compliance_at_rest() / (compliance_at_rest() + compliance_mL_per_kPa);
     double left = std::max(1.0 - linear * squeezed_mL / volume_mL_, least_left);
     double pressure = above_kPa(left);

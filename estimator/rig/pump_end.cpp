@@ -1,5 +1,6 @@
 #include "estimator/rig/pump_end.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 namespace diastole::rig {
@@ -8,33 +9,31 @@ namespace {
 /// Conductances below this are none: the resistance would be beyond what the step's matrix bears.
 constexpr double least_leak = 1e-7;
 
-/// Of the drive, mL/kPa: less is rigid. A stiff hose yields 1e-3, and its waves shift by as much as the drive adds to that; so little moves the
+/// Of drive and gas, mL/kPa: less is rigid. A stiff hose yields 1e-3, and its waves shift by as much as the drive adds to that; so little moves the
 /// pump's pressure by less than a pascal, so that a search does not see the border.
 constexpr double least_compliance = 1e-8;
 /// The drive's resistance over its stiffness: screw and seal rub, so that it does not ring with the fluid's end at a hundred hertz,
 /// which samples would show as something slow.
 constexpr double drive_damping_s = 2e-3;
-/// Gas behind a rigid drive: less is left out, for undamped and stiffer than the hose it would ask for far shorter steps than anybody can see.
+/// Gas that is less rings against the fluid's end faster than anybody can see, and is as well damped by friction as the drive.
 constexpr double least_undamped_gas_mL = 0.05;
-
-double gas_mL(const RigModel& model, double compliance_mL_per_kPa) {
-  const double least_mL = compliance_mL_per_kPa > 0.0 ? 0.0 : least_undamped_gas_mL;
-  return model.pump_gas_mL >= least_mL ? model.pump_gas_mL : 0.0;
-}
 
 }  // namespace
 
 PumpEnd::PumpEnd(const RigModel& model, const RunPlace& place, double step_s)
     : step_s_(step_s),
-      compliance_mL_per_kPa_(
-          model.drive_compliance_mL_per_kPa > least_compliance ? model.drive_compliance_mL_per_kPa : 0.0),
-      gas_(gas_mL(model, compliance_mL_per_kPa_), model.gas_exponent, place.atmosphere_kPa),
+      compliance_mL_per_kPa_(model.drive_compliance_mL_per_kPa),
+      gas_(model.pump_gas_mL, model.gas_exponent, place.atmosphere_kPa),
       conductance_mL_s_kPa_(model.pump_leak_mL_s_kPa) {
   for (const LeakMaker& make : model.pump_leaks)
     leaks_.push_back(make(place));
-  if (springs()) {
-    const double both = compliance_mL_per_kPa_ + gas_.compliance_at_rest();
-    damping_s_ = drive_damping_s * compliance_mL_per_kPa_ / both;
+  const double both = compliance_mL_per_kPa_ + gas_.compliance_at_rest();
+  springs_ = both > least_compliance;
+  if (springs_) {
+    const double undamped =
+        GasPocket(least_undamped_gas_mL, model.gas_exponent, place.atmosphere_kPa).compliance_at_rest();
+    const double damped = std::max(compliance_mL_per_kPa_, undamped - gas_.compliance_at_rest());
+    damping_s_ = drive_damping_s * std::min(1.0, damped / both);
     leaking_s_ = damping_s_ + 0.5 * step_s;
     linear_ = both + leaking_s_ * conductance_mL_s_kPa_;
   } else if (conductance_mL_s_kPa_ > least_leak) {
@@ -43,13 +42,13 @@ PumpEnd::PumpEnd(const RigModel& model, const RunPlace& place, double step_s)
 }
 
 std::optional<double> PumpEnd::stiffness() const {
-  if (!springs()) return {};
+  if (!springs_) return {};
   return 1.0 / linear_;
 }
 
 std::optional<double> PumpEnd::resistance() const {
   if (linear_ == 0.0) return {};
-  return springs() ? damping_s_ / linear_ : 1.0 / linear_;
+  return springs_ ? damping_s_ / linear_ : 1.0 / linear_;
 }
 
 double PumpEnd::leaks_beyond(double pressure_kPa, double time_s) const {
@@ -60,11 +59,11 @@ double PumpEnd::leaks_beyond(double pressure_kPa, double time_s) const {
 }
 
 double PumpEnd::pressure_kPa(double taken_mL, double time_s) const {
-  const double compliance = compliance_mL_per_kPa_ + leaking_s_ * conductance_mL_s_kPa_;
-  if (leaks_.empty())
-    return gas_.present() ? gas_.pressure_behind_kPa(taken_mL, compliance) : taken_mL / compliance;
+  const bool has_gas = springs_ && gas_.present();
+  const double compliance = (springs_ ? compliance_mL_per_kPa_ : 0.0) + leaking_s_ * conductance_mL_s_kPa_;
+  if (leaks_.empty()) return has_gas ? gas_.pressure_behind_kPa(taken_mL, compliance) : taken_mL / compliance;
   const auto excess = [&](double pressure_kPa) {
-    return compliance * pressure_kPa + gas_.squeezed_mL(pressure_kPa) +
+    return compliance * pressure_kPa + (has_gas ? gas_.squeezed_mL(pressure_kPa) : 0.0) +
            leaking_s_ * leaks_beyond(pressure_kPa, time_s) - taken_mL;
   };
   // Between none and the linear end's, where all leaks grow with pressure. Regula falsi (Illinois).
@@ -93,13 +92,13 @@ double PumpEnd::pressure_kPa(double taken_mL, double time_s) const {
 
 double PumpEnd::load_kPa(double yielded_mL, double yielding_mL_per_s, double time_s) const {
   if (linear_ == 0.0) return 0.0;
-  if (!springs()) return pressure_kPa(-yielding_mL_per_s, time_s) + yielding_mL_per_s / linear_;
+  if (!springs_) return pressure_kPa(-yielding_mL_per_s, time_s) + yielding_mL_per_s / linear_;
   const double taken_mL = -yielded_mL - damping_s_ * yielding_mL_per_s;
   return pressure_kPa(taken_mL - leaked_mL_, time_s) - taken_mL / linear_;
 }
 
 void PumpEnd::pass(double cylinder_kPa, double time_s) {
-  if (!springs()) return;
+  if (!springs_) return;
   leaked_mL_ += step_s_ * (conductance_mL_s_kPa_ * cylinder_kPa + leaks_beyond(cylinder_kPa, time_s));
 }
 

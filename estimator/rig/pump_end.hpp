@@ -4,7 +4,8 @@
 //
 //   The drive: p C = e_d + tau e_d', tau its friction. The gas: (p_a + p) V^n = p_a V0^n, e_g = V0 - V.
 //   Both together take what the piston has displaced, the hose has not, and no leak q(p) has lost:  e_d + e_g = -y - int q dt.
-//   e_d' is taken as the drive's share C / (C + C_g) of the rate, C_g = V0 / (n p_a): exact for gas that is squeezed little.
+//   e_d' is taken as the drive's share C / (C + C_g) of the rate, C_g = V0 / (n p_a): exact for gas that is squeezed little. The
+//   smallest pockets are damped as the drive is.
 //
 // The hose's line holds the linear part of it (p = -K y - R y'); what differs is a load. Leaks are met by the trapezoid rule.
 
@@ -31,17 +32,17 @@ class PumpEnd {
   void pass(double cylinder_kPa, double time_s);
 
  private:
-  [[nodiscard]] bool springs() const { return compliance_mL_per_kPa_ > 0.0 || gas_.present(); }
   /// What leaks beyond the conductance, mL/s.
   [[nodiscard]] double leaks_beyond(double pressure_kPa, double time_s) const;
   /// The pressure at which drive, gas and leaks have taken this volume.
   [[nodiscard]] double pressure_kPa(double taken_mL, double time_s) const;
 
   double step_s_;
-  double compliance_mL_per_kPa_;  ///< of the drive; 0 if it is rigid
+  double compliance_mL_per_kPa_;  ///< of the drive
   GasPocket gas_;
   double conductance_mL_s_kPa_;
   std::vector<LeakLaw> leaks_;
+  bool springs_ = false;    ///< drive or gas gives way
   double damping_s_ = 0.0;  ///< of both springs' rate
   double leaking_s_ = 1.0;  ///< for how long a leak has acted at a step's end; 1: rates stand for volumes
   double linear_ = 0.0;     ///< taken by a kPa, at rest

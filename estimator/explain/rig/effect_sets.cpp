@@ -187,7 +187,7 @@ class SetsSearch {
   }
   void search_from_base();
   void take_base_for_finer(double times);
-  [[nodiscard]] double promised_posterior(const rig::Shares& shares) const;
+  [[nodiscard]] double promised_if_finer(double times, const EffectSet& plain) const;
   void search_if_finer();
   void fit_plain_and_singles_again();
   [[nodiscard]] bool is_plain_near() const;
@@ -199,7 +199,11 @@ class SetsSearch {
                                               const std::vector<size_t>& chosen) const;
   [[nodiscard]] std::optional<double> posterior_beside_part(const EffectSet& set) const;
   [[nodiscard]] bool is_fitted(const std::vector<const Effect*>& effects) const;
-  [[nodiscard]] std::vector<Promise> promises(const rig::EvidenceFit& under, bool pairs) const;
+  [[nodiscard]] std::vector<Promise> promises(const Screening& screening, bool pairs) const;
+  /// From the base.
+  [[nodiscard]] std::vector<Promise> promises(const rig::EvidenceFit& under, bool pairs) const {
+    return promises(Screening(responses_, base_.target(problem_), base_.columns, under), pairs);
+  }
   /// The most probable first; what has no solution is no set.
   void sort_sets() {
     std::erase_if(sets_, [](const EffectSet& set) { return !std::isfinite(set.log_posterior); });
@@ -216,8 +220,7 @@ class SetsSearch {
   std::vector<EffectSet> sets_;
 };
 
-std::vector<Promise> SetsSearch::promises(const rig::EvidenceFit& under, bool pairs) const {
-  const Screening screening(responses_, base_.target(problem_), base_.columns, under);
+std::vector<Promise> SetsSearch::promises(const Screening& screening, bool pairs) const {
   Promises best(responses_);
   for (size_t i = 0; i < responses_.size(); ++i) {
     if (!pairs) best.add({screening.single(i), {i}});
@@ -491,21 +494,25 @@ void SetsSearch::search_from_base() {
 /// From now on the base is a rig whose parts are so many times finer.
 void SetsSearch::take_base_for_finer(double times) {
   const auto prior = std::make_shared<rig::TolerancePrior>(problem_.finer_prior(times));
-  const MatrixXd& before = problem_.prior(base_.at).root;  // diagonal, as the finer one
-  base_.columns.rightCols(prior->mean.size()) *=
-      (prior->described.cwiseQuotient(before.diagonal())).asDiagonal();
+  base_.columns.rightCols(prior->mean.size()) *= prior->described.asDiagonal();
   base_.at.prior = prior;
 }
 
-/// The log posterior that the best set would have by linear algebra.
-double SetsSearch::promised_posterior(const rig::Shares& shares) const {
-  const rig::EvidenceFit plain = fit_linear(base_.target(problem_), base_.columns, problem_.error(), shares);
+/// The log posterior that the best set would have in a rig of parts so many times finer: the rig without effects that was fitted, and
+/// the responses, by linear algebra. What effects with moments would do is not among them.
+double SetsSearch::promised_if_finer(double times, const EffectSet& plain) const {
+  const rig::TolerancePrior finer = problem_.finer_prior(times);
+  const VectorXd target = plain.target();
+  MatrixXd columns = plain.columns;
+  columns.rightCols(finer.mean.size()) *= finer.described.asDiagonal();
+  const rig::EvidenceFit fit = fit_linear(target, columns, problem_.error(), plain.evidence.shares);
+  const Screening screening(responses_, target, columns, fit);
   double most = 0.0;
   for (const bool pairs : {false, true}) {
-    const std::vector<Promise> best = promises(plain, pairs);
+    const std::vector<Promise> best = promises(screening, pairs);
     if (!best.empty()) most = std::max(most, 0.5 * (best.front().gain - (pairs ? 2.0 : 1.0) * least_promise));
   }
-  return plain.log_evidence + most;
+  return fit.log_evidence + most + plain.log_posterior - plain.evidence.log_evidence;
 }
 
 /// The list's tolerances are what rigs usually have. One whose parts are all far nearer to their description is as likely beforehand, and
@@ -513,13 +520,13 @@ double SetsSearch::promised_posterior(const rig::Shares& shares) const {
 void SetsSearch::search_if_finer() {
   static constexpr std::array finer{2.0, 4.0, 8.0};
   constexpr double linear_errs = 10.0;  // nats, of a posterior by linear algebra
-  if (problem_.is_learnt() || sets_.empty()) return;
+  const EffectSet* plain = best_of(0);
+  if (problem_.is_learnt() || plain == nullptr) return;
+  if (problem_.finer_prior(finer.front()).described.minCoeff() == 1.0) return;  // all sizes are stated
   const double log_odds = -std::log(static_cast<double>(finer.size()));
-  const rig::Shares shares = best_of(0) ? best_of(0)->evidence.shares : sets_.front().evidence.shares;
   double best = 0.0, most = -std::numeric_limits<double>::infinity();
   for (const double times : finer) {
-    take_base_for_finer(times);
-    const double promised = promised_posterior(shares) + log_odds;
+    const double promised = promised_if_finer(times, *plain) + log_odds;
     if (promised > most) std::tie(most, best) = std::pair(promised, times);
   }
   if (most < best_posterior() - linear_errs) return;

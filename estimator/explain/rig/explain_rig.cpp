@@ -8,6 +8,7 @@
 #include <cmath>
 #include <map>
 #include <optional>
+#include <set>
 
 #include "estimator/explain/rig/findings.hpp"
 #include "estimator/explain/rig/held_out.hpp"
@@ -76,11 +77,13 @@ std::optional<NextExperiment> next_experiment(const Study& study, const rig::Ses
   if (found.verdict == Verdict::named) return sharpening_experiment(design, fitted_model(problem, chosen));
   // Ambiguous sets are told apart, a hint from nothing.
   std::vector<FittedModel> models{fitted_model(problem, chosen)};
+  std::set<std::vector<std::string>> told{chosen.ids()};
   for (const EffectSet& set : search.sets) {
     const bool rival = found.verdict == Verdict::ambiguous
                            ? std::ranges::count(found.ambiguous_with, set.ids()) > 0
                            : !found.hints.empty() && set.ids().empty() != chosen.ids().empty();
-    if (rival && &set != &chosen) models.push_back(fitted_model(problem, set));
+    // Of a set in rigs of several tolerances the most probable stands for it.
+    if (rival && told.insert(set.ids()).second) models.push_back(fitted_model(problem, set));
   }
   std::vector<const FittedModel*> competing;
   for (const FittedModel& model : models)

@@ -4,9 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numbers>
 #include <numeric>
 #include <optional>
+#include <set>
 
 #include "estimator/explain/verdict/chi_square.hpp"
 #include "estimator/inference/intervals.hpp"
@@ -144,9 +146,15 @@ std::vector<Candidate> candidates(const EffectLibrary& known, const SetSearch& s
   std::vector<Candidate> list;
   const auto plain = std::ranges::find_if(
       search.sets, [&](const EffectSet& set) { return set.model.terms.size() == search.given; });
+  // Of a set in rigs of several tolerances the most probable, or the chosen one, stands for it.
+  std::map<std::vector<std::string>, double> probability;
+  for (size_t k = 0; k < search.sets.size(); ++k)
+    probability[search.sets[k].ids()] += search.probability[k];
+  std::set<std::vector<std::string>> told{plain->ids()};
   for (size_t k = 0; k < search.sets.size(); ++k) {
     const EffectSet& set = search.sets[k];
-    if (&set == &*plain) continue;
+    const EffectSet& chosen = search.sets[verdict.chosen];
+    if ((k != verdict.chosen && set.ids() == chosen.ids()) || !told.insert(set.ids()).second) continue;
     Candidate row{
         set.ids(), 2.0 * (set.log_posterior - plain->log_posterior), true, set.model.values.size(), {}, ""};
     if (k == verdict.chosen) {
@@ -155,7 +163,7 @@ std::vector<Candidate> candidates(const EffectLibrary& known, const SetSearch& s
                     : verdict.verdict == Verdict::ambiguous ? "as good"
                                                             : "named";
     } else {
-      row.verdict = fmt::format("probability {:.2g}", search.probability[k]);
+      row.verdict = fmt::format("probability {:.2g}", probability[set.ids()]);
     }
     if (!inference::is_settled(set.termination)) row.verdict += "; its search did not end";
     list.push_back(std::move(row));

@@ -34,7 +34,7 @@ class SetProblem : public inference::LeastSquaresProblem {
   SetProblem(const rig::SessionProblem& problem, const SessionModel& start, rig::LinearisedModel known,
              Nuisances nuisances)
       : problem_(problem), start_(start), known_(std::move(known)), kind_(nuisances) {
-    const rig::RigModel base = problem.model({{}, {}, start.u});
+    const rig::RigModel base = problem.model({{}, {}, start.u, start.prior});
     size_t at = 0;
     for (const rig::ModelTerm& term : start.terms) {
       const std::vector<double> neutral = term.effect->neutral(base);

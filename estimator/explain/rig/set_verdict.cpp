@@ -269,26 +269,24 @@ SetVerdict judge_sets(const rig::SessionProblem& problem, const SetSearch& searc
   out.size_over_error = sizes[out.chosen].over_error;
   out.material = sizes[out.chosen].material;
   out.confidence = leading->second.probability;
-  const auto plain = std::ranges::find_if(
-      search.sets, [&](const EffectSet& set) { return set.model.terms.size() == search.given; });
+  // An effect is held against the same rig without it: parts that are as fine, or as coarse.
+  const auto is_plain = [&](const EffectSet& set) { return set.model.terms.size() == search.given; };
+  const auto described = [&](const EffectSet& set) { return problem.prior(set.model).described; };
+  auto plain = std::ranges::find_if(
+      search.sets, [&](const EffectSet& set) { return is_plain(set) && described(set) == described(best); });
+  if (plain == search.sets.end()) plain = std::ranges::find_if(search.sets, is_plain);
+  out.plain = static_cast<size_t>(plain - search.sets.begin());
   out.searches.push_back({{}, plain->termination});
   // Hints alone need no search that settled: nothing is named by it.
   const bool is_more = leading->first.size() > search.given;
   if (is_more) out.searches.push_back({best.ids(), best.termination});
   // That nothing is wrong holds with the hints or, unless the data exclude it, without them.
-  const bool may_be_plain = search.probability[static_cast<size_t>(plain - search.sets.begin())] >= told;
+  const bool may_be_plain = search.probability[out.plain] >= told;
   const bool borne =
       is_more ? bears_a_name(problem, best, sizes[out.chosen])
               : bears_nothing_wrong(problem, best) || (may_be_plain && bears_nothing_wrong(problem, *plain));
   out.scatter = rig::cycle_scatter(problem, best.model);
-  // An effect predicts what the same rig without it does not: parts that are as fine, or as coarse.
-  const auto described = [&](const EffectSet& set) { return problem.prior(set.model).described; };
-  auto own_plain = std::ranges::find_if(search.sets, [&](const EffectSet& set) {
-    return set.model.terms.size() == search.given && described(set) == described(best);
-  });
-  if (own_plain == search.sets.end()) own_plain = plain;
-  out.plain = static_cast<size_t>(own_plain - search.sets.begin());
-  if (is_more) out.held_out_gain = held_out_gain(problem, *own_plain, best);
+  if (is_more) out.held_out_gain = held_out_gain(problem, *plain, best);
   const bool predicted = !is_more || predicts(*out.held_out_gain, best.model.terms.size() - search.given);
   if (!borne || is_irregular(problem, out.scatter) || !is_settled(out.searches)) {
     out.verdict = Verdict::unexplained;

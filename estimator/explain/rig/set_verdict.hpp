@@ -42,7 +42,8 @@ struct SetVerdict {
   std::optional<double> held_out_gain = {};
 };
 
-/// Of a set's tolerances the one furthest from its prior, in sds of the list: to be a little coarser than in a fine rig is no strain.
+/// Of a set's tolerances the one furthest from its prior, in sds of the list or of
+/// what references left: to be a little coarser than in a fine rig is no strain.
 double largest_tolerance(const rig::SessionProblem& problem, const EffectSet& set);
 
 /// Is that one so far off as is seldom by chance, of all?

@@ -133,17 +133,16 @@ class Sorter {
 
   /// An instance is one image for ever: what bears the identity of another was altered, or made by careless software.
   void report_equal_instances() {
-    std::map<std::string, size_t> first;
+    std::map<std::pair<std::string, int>, size_t> first;
     std::vector<std::pair<size_t, size_t>> equal;
     for (size_t image = 0; image < folder_.images.size(); ++image) {
       if (header(image).instance_uid.empty()) continue;
-      const auto [one, is_new] = first.try_emplace(header(image).instance_uid, image);
+      const auto [one, is_new] = first.try_emplace({header(image).instance_uid, header(image).frame}, image);
       if (is_new || folder_.images[one->second].file == folder_.images[image].file) continue;
       const ImageHeader& here = header(image);
       const ImageHeader& there = header(one->second);
-      const bool is_copy = here.series_uid == there.series_uid && here.trigger_ms == there.trigger_ms &&
-                           same_place(here.plane, there.plane);
-      if (!is_copy) equal.emplace_back(image, one->second);  // copies are told with their slice
+      const bool is_copy = here.trigger_ms == there.trigger_ms && same_place(here.plane, there.plane);
+      if (!is_copy) equal.emplace_back(image, one->second);  // copies are told with slice or series
     }
     if (equal.empty()) return;
     const auto [image, other] = equal.front();

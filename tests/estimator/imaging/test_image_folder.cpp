@@ -78,14 +78,14 @@ TEST(ImageFolder, RefusesAnExportWithoutTagsInWhichNothingMoves) {
 TEST(ImageFolder, ASliceBesideTheSpecimenDoesNotHideTheTagsOfTheOthers) {
   const ScratchFolder scratch;
   write_ring({}, scratch.path(), "tagged");
-  // Instances bear the same UIDs as the other slice's: places tell them apart.
+  // Instances bear the same UIDs as the other slice's, which is told: places tell them apart.
   write_ring({.tagged = false, .origin_mm = {-47.5, -47.5, 24}}, scratch.path(), "beside");
   const ImageFolder folder = read_image_folder(scratch.path());
   ASSERT_EQ(folder.series.size(), 1U);
   EXPECT_EQ(folder.series[0].kind, SeriesKind::tagged_cine);
   EXPECT_EQ(folder.series[0].slices[0].tags.size(), 1U);
   EXPECT_TRUE(folder.series[0].slices[1].tags.empty());
-  EXPECT_THAT(finding_ids(folder), testing::ElementsAre("slice-without-tags"));
+  EXPECT_THAT(finding_ids(folder), testing::ElementsAre("instance-twice", "slice-without-tags"));
 }
 
 TEST(ImageFolder, AStackIsTheShortAxisWhereverItLies) {
