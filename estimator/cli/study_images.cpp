@@ -89,6 +89,7 @@ void use_images(Study& study) {
   if (!std::filesystem::is_directory(folder, error))
     throw InputError({study.file.string(), "[data] images", fmt::format("{} is no folder", folder.string()),
                       "Name the scanner's export: images = \"dicom/\"."});
+  fmt::print(stderr, "Images: reading the folder.\n");
   const imaging::ImageFolder images = imaging::read_image_folder(folder);
   require_spacing(study, images);
   print_findings(frames_at_other_times(study, images), stderr);
@@ -101,9 +102,9 @@ void use_images(Study& study) {
     fmt::print(stderr, "Tags of these images are in {}.\n", study.data.tags->string());
     return;
   }
-  const imaging::TrackedFolder tracked =
-      imaging::track_folder({.folder = folder, .pose = {}, .known_pose = pose, .coordinates = "specimen"},
-                            [](const std::string& stage) { fmt::print(stderr, "Images: {}.\n", stage); });
+  const imaging::TrackedFolder tracked = imaging::track_folder(
+      {.folder = folder, .pose = {}, .known_pose = pose, .coordinates = "specimen"}, images,
+      [](const std::string& stage) { fmt::print(stderr, "Images: {}.\n", stage); });
   write_whole_file(*study.data.tags, imaging::tags_file_text(tracked.points));
   fmt::print(stderr, "{} tag points, standard errors {:.3f} px RMS, are in {}.\n", tracked.points.size(),
              tracked.rms_px, study.data.tags->string());

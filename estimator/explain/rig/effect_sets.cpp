@@ -161,7 +161,8 @@ class SetsSearch {
   /// From `start`, near a model that is known.
   void fit(const SessionModel& start, const rig::LinearisedModel& known, const rig::Shares& shares) {
     // A rig that is finer than described is so in what an effect changes, too: the effect says all that is wrong with it.
-    const FreedStart free = finer_ ? FreedStart{start, known} : free_changed_parts(problem_, start, known);
+    const FreedStart free =
+        is_finer() ? FreedStart{start, known} : free_changed_parts(problem_, start, known);
     sets_.push_back(fit_set(problem_, free.start, free.known, shares, best_posterior()));
   }
   [[nodiscard]] double best_posterior() const {
@@ -170,6 +171,8 @@ class SetsSearch {
       best = std::max(best, set.log_posterior);
     return best;
   }
+  /// Are the base's parts finer than described?
+  [[nodiscard]] bool is_finer() const { return base_.at.prior != nullptr; }
   /// Is it so far behind what the rig as described has that no further fit brings it near?
   [[nodiscard]] bool is_behind(const EffectSet& set) const {
     return set.log_posterior < best_described_ - second_in_reach;
@@ -213,7 +216,6 @@ class SetsSearch {
   const rig::SessionProblem& problem_;
   const SetSearchOptions& options_;
   rig::LinearisedModel base_;  ///< the rig as declared
-  bool finer_ = false;         ///< its parts are finer than described
   double best_described_ =
       -std::numeric_limits<double>::infinity();  ///< log posterior, once finer parts are tried
   std::vector<Response> responses_;
@@ -532,7 +534,6 @@ void SetsSearch::search_if_finer() {
   if (most < best_posterior() - linear_errs) return;
   report("seeking the same in a rig of finer parts");
   take_base_for_finer(best);
-  finer_ = true;
   best_described_ = best_posterior();
   std::vector<EffectSet> described = std::move(sets_);
   sets_.clear();

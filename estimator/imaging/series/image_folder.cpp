@@ -134,7 +134,8 @@ class Sorter {
   /// An instance is one image for ever: what bears the identity of another was altered, or made by careless software.
   void report_equal_instances() {
     std::map<std::pair<std::string, int>, size_t> first;
-    std::vector<std::pair<size_t, size_t>> equal;
+    std::optional<std::pair<size_t, size_t>> equal;
+    double count = 0;
     for (size_t image = 0; image < folder_.images.size(); ++image) {
       if (header(image).instance_uid.empty()) continue;
       const auto [one, is_new] = first.try_emplace({header(image).instance_uid, header(image).frame}, image);
@@ -142,14 +143,16 @@ class Sorter {
       const ImageHeader& here = header(image);
       const ImageHeader& there = header(one->second);
       const bool is_copy = here.trigger_ms == there.trigger_ms && same_place(here.plane, there.plane);
-      if (!is_copy) equal.emplace_back(image, one->second);  // copies are told with slice or series
+      if (is_copy) continue;  // told with slice or series
+      if (!equal) equal = {image, one->second};
+      count += 1;
     }
-    if (equal.empty()) return;
-    const auto [image, other] = equal.front();
+    if (!equal) return;
+    const auto [image, other] = *equal;
     complain(Severity::warning, "instance-twice",
              fmt::format("the SOP Instance UID (0008,0018) is that of {}, which is another image",
                          folder_.file_name(other)),
-             image, static_cast<double>(equal.size()), "images",
+             image, count, "images",
              "Both are read as they are. Was one of them altered? Export the series again if you can.");
   }
 
@@ -304,8 +307,10 @@ class Sorter {
       if (!times_differ(slice, times_ms.back())) return;
     }
     series.phases = phase_times(times_ms);
+    std::vector<Copy> copies;
     for (SliceImages& slice : series.slices)
-      check_slice(series, slice);
+      check_slice(series, slice, copies);
+    report_copies(copies);
     check_ends_of_cycle(series);
     check_spacing_of_slices(series);
   }
@@ -352,7 +357,22 @@ class Sorter {
           image, times_ms.front(), "ms", "Is this the time since the trigger?");
   }
 
-  void check_slice(const ImageSeries& series, SliceImages& slice) {
+  struct Copy {
+    size_t image, of;
+  };
+  /// A folder that was copied into itself is one thing to tell.
+  void report_copies(const std::vector<Copy>& copies) {
+    if (copies.empty()) return;
+    const std::string others =
+        copies.size() > 1 ? fmt::format(", and so are {} more of this series of others", copies.size() - 1)
+                          : "";
+    complain(Severity::warning, "copy",
+             fmt::format("a copy of {}{}", folder_.file_name(copies.front().of), others),
+             copies.front().image, static_cast<double>(copies.size()), "images",
+             "Nothing is lost: one of each two is used.");
+  }
+
+  void check_slice(const ImageSeries& series, SliceImages& slice, std::vector<Copy>& copies) {
     std::vector<int> found(series.phases.times_ms.size());
     std::vector<size_t> kept;
     for (const size_t image : slice.images) {
@@ -362,8 +382,7 @@ class Sorter {
       if (!twice) {
         kept.push_back(image);
       } else if (same_pixels(kept.back(), image)) {
-        complain(Severity::warning, "copy", fmt::format("a copy of {}", folder_.file_name(kept.back())),
-                 image, 1, "", "Nothing is lost: one of the two is used.");
+        copies.push_back({image, kept.back()});
       } else {
         kept.push_back(image);
         complain(Severity::error, "slice-twice",

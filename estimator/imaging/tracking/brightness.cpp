@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 #include <stdexcept>
+#include <type_traits>
 
 namespace diastole::imaging {
 namespace {
@@ -12,6 +13,23 @@ namespace {
 /// The slice's own average counts like a hundredth of a full window: nothing beside one, all in an empty one.
 constexpr double share_of_window = 0.01;
 constexpr double nodes_per_window = 2.0;
+
+/// `act(count)` with the number of patterns as a constant.
+template <class Act>
+void with_count(int patterns, const Act& act) {
+  switch (patterns) {
+    case 1:
+      return act(std::integral_constant<int, 1>());  // a constant
+    case 3:
+      return act(std::integral_constant<int, 3>());  // tags of one direction
+    case 4:
+      return act(std::integral_constant<int, 4>());  // or of two
+    case 5:
+      return act(std::integral_constant<int, 5>());  // a constant, and cosine and sine of two
+    default:
+      throw std::logic_error("brightness of so many patterns");
+  }
+}
 
 }  // namespace
 
@@ -35,23 +53,6 @@ Brightness::Corner Brightness::corner(const Eigen::Vector2d& x_mm) const {
   const Eigen::Index first = row * columns_ + column;
   return {{first, first + 1, first + columns_, first + columns_ + 1},
           {(1 - u) * (1 - v), u * (1 - v), (1 - u) * v, u * v}};
-}
-
-/// `act(count)` with the number of patterns as a constant.
-template <class Act>
-void with_count(int patterns, const Act& act) {
-  switch (patterns) {
-    case 1:
-      return act(std::integral_constant<int, 1>());  // a constant
-    case 3:
-      return act(std::integral_constant<int, 3>());  // tags of one direction
-    case 4:
-      return act(std::integral_constant<int, 4>());  // or of two
-    case 5:
-      return act(std::integral_constant<int, 5>());  // a constant, and cosine and sine of two
-    default:
-      throw std::logic_error("brightness of so many patterns");
-  }
 }
 
 void Brightness::add(const Eigen::Vector2d& x_mm, std::span<const double> patterns, double weight,

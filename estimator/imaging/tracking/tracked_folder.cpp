@@ -162,11 +162,14 @@ TrackedFolder gathered(const TrackRequest& request, const ManualEdits& edits,
 }
 
 TrackedFolder track_folder(const TrackRequest& request, const Stage& stage) {
+  if (stage) stage("reading the folder");
+  return track_folder(request, read_image_folder(request.folder), stage);
+}
+
+TrackedFolder track_folder(const TrackRequest& request, const ImageFolder& folder, const Stage& stage) {
   const auto say = [&](const std::string& text) {
     if (stage) stage(text);
   };
-  say("reading the folder");
-  const ImageFolder folder = read_image_folder(request.folder);
   require_sound(folder);
   std::vector<Finding> problems = folder.problems;
   TrackRequest settled = request;

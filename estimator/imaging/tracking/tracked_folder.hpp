@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "estimator/imaging/series/image_folder.hpp"
 #include "estimator/imaging/series/views.hpp"
 #include "estimator/imaging/tracking/manual_edits.hpp"
 #include "estimator/imaging/tracking/specimen_pose.hpp"
@@ -71,5 +72,7 @@ TrackedFolder gathered(const TrackRequest& request, const ManualEdits& edits,
 /// Throws InputError for a folder that is not sound, without tags, or of which nothing could be tracked, and for manual choices that do
 /// not fit it.
 TrackedFolder track_folder(const TrackRequest& request, const Stage& stage = {});
+/// The same of a folder that is read.
+TrackedFolder track_folder(const TrackRequest& request, const ImageFolder& folder, const Stage& stage = {});
 
 }  // namespace diastole::imaging

@@ -127,7 +127,12 @@ TEST(ImageFolder, RefusesASliceThatIsThereTwiceButNotACopy) {
   const auto files = write_ring({}, scratch.path());
   std::filesystem::copy_file(files[2], scratch.path() / "again.dcm");
   EXPECT_THAT(finding_ids(read_image_folder(scratch.path())), testing::ElementsAre("copy"));
+  std::filesystem::copy_file(files[3], scratch.path() / "again too.dcm");
+  const ImageFolder copied = read_image_folder(scratch.path());
+  EXPECT_THAT(finding_ids(copied), testing::ElementsAre("copy"));  // all of them at once
+  EXPECT_EQ(copied.problems.at(0).number, 2);
   std::filesystem::remove(scratch.path() / "again.dcm");
+  std::filesystem::remove(scratch.path() / "again too.dcm");
   write_ring({.phases = 8, .seed = 7}, scratch.path(), "repeated");
   const ImageFolder folder = read_image_folder(scratch.path());
   EXPECT_THAT(test::message_of([&] { require_sound(folder); }), HasSubstr("there twice"));
