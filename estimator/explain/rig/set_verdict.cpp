@@ -139,6 +139,17 @@ size_t parts_of(const rig::ModelError& error) {
   return static_cast<size_t>(std::ranges::count(present, true));
 }
 
+/// A tone in the recordings that is louder than all other noise, as much larger than the model's error as an effect has to be, and than what
+/// instruments are right to. Quieter hum is noise, which every sensor has.
+std::optional<rig::Tone> material_tone(const rig::SessionProblem& problem, const EffectSet& set,
+                                       const ErrorKnowledge& error) {
+  const std::optional<rig::Tone> tone = rig::find_tone(problem.session());
+  const double least_kPa = std::max(
+      error.least_size() * error_rms(problem, set.evidence.shares, rig::Signal::cavity),
+      rig::SharePrior::least[static_cast<size_t>(rig::ErrorGroup::cavity)] * problem.error().range[0]);
+  return tone && tone->rms_kPa > std::max(least_kPa, tone->noise_kPa) ? tone : std::nullopt;
+}
+
 /// Do equal cycles differ by more than the noise, and materially?
 bool is_irregular(const rig::SessionProblem& problem, const std::vector<rig::CycleScatter>& scatter) {
   return std::ranges::any_of(scatter, [&](const rig::CycleScatter& channel) {
@@ -286,6 +297,7 @@ SetVerdict judge_sets(const rig::SessionProblem& problem, const SetSearch& searc
       is_more ? bears_a_name(problem, best, sizes[out.chosen])
               : bears_nothing_wrong(problem, best) || (may_be_plain && bears_nothing_wrong(problem, *plain));
   out.scatter = rig::cycle_scatter(problem, best.model);
+  out.tone = material_tone(problem, best, error);
   if (is_more) out.held_out_gain = held_out_gain(problem, *plain, best);
   const bool predicted = !is_more || predicts(*out.held_out_gain, best.model.terms.size() - search.given);
   if (!borne || is_irregular(problem, out.scatter) || !is_settled(out.searches)) {
@@ -293,7 +305,9 @@ SetVerdict judge_sets(const rig::SessionProblem& problem, const SetSearch& searc
     return out;
   }
   if (out.confidence >= name_probability) {
-    out.verdict = !is_more ? Verdict::none : predicted ? Verdict::named : Verdict::unexplained;
+    out.is_tone_alone = !is_more && out.tone;
+    const bool is_clean = !is_more && !out.tone;
+    out.verdict = is_clean ? Verdict::none : is_more && predicted ? Verdict::named : Verdict::unexplained;
     return out;
   }
   out.verdict = Verdict::ambiguous;

@@ -7,13 +7,15 @@
 // named by nobody: probabilities of sets that differ by them add. A set is named with a probability of
 // nine tenths; sets that are less certain are ambiguous. It has to have the same odds on waveforms that it was not fitted to
 // alone, against the model without it and against a smooth discrepancy of like freedom (held_out.hpp). Where even the best set needs a model's error larger than what is
-// known of it allows, the misfit is unexplained.
+// known of it allows, the misfit is unexplained. That nothing is wrong is not said beside a tone that is as material (tone.hpp); a name stands beside it, since no effect
+// makes one.
 
 #include <optional>
 
 #include "estimator/explain/rig/effect_sets.hpp"
 #include "estimator/explain/verdict/explanation.hpp"
 #include "estimator/rig_fit/cycle_scatter.hpp"
+#include "estimator/rig_fit/tone.hpp"
 
 namespace diastole::explain {
 
@@ -37,6 +39,8 @@ struct SetVerdict {
   std::vector<std::vector<std::string>> ambiguous_with;
   std::vector<Hint> hints;
   std::vector<rig::CycleScatter> scatter = {};
+  bool is_tone_alone = false;          ///< nothing else is unexplained
+  std::optional<rig::Tone> tone = {};  ///< if it is louder than the noise and material as an effect has to be
   std::vector<SearchEnd> searches;
   /// Of the leading set, if it has more than the given effects: held_out_gain()'s.
   std::optional<double> held_out_gain = {};

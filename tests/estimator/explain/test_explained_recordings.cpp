@@ -61,7 +61,7 @@ TEST_P(ExplainedRecording, GetsTheAnswerThatIsTrue) {
 INSTANTIATE_TEST_SUITE_P(
     Worlds, ExplainedRecording,
     testing::Values(Case{"rig/case-030", "OneRunWithNothingHidden", {"none"}, {}},
-                    Case{"rig/case-028", "NothingHidden", {"none"}, {}},
+                    Case{"rig/case-009", "NothingHidden", {"none"}, {}},
                     Case{"rig/case-054", "SoftHose", {"named"}, {"hose-compliance"}},
                     Case{DIASTOLE_SOURCE_DIR "/examples/paper-gap",
                          "ASoftHoseBehindAThrottle",

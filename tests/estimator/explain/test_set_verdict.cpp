@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
+#include <numbers>
 
 #include "estimator/rig_fit/simulated_session.hpp"
 
@@ -31,6 +33,30 @@ TEST(SetVerdict, NothingIsWrongOnlyByAModelThatTheDataDoNotExclude) {
   };
   EXPECT_EQ(verdict(0.2), Verdict::none);
   EXPECT_EQ(verdict(1e-9), Verdict::unexplained);
+}
+
+/// As the recordings of a rig in which nothing else is wrong.
+SetVerdict verdict_beside_a_tone(double amplitude_kPa) {
+  const rig::SpecimenFamily family = rig::gel_family();
+  rig::Session session = rig::simulated_session(family, {.terms = {}, .values = {}, .seed = 5},
+                                                {0.0, "parabolic", 40.0, 1.2, 0.0, 12});
+  for (rig::SessionRun& run : session.runs)
+    for (size_t k = 0; k < run.sample_s.size(); ++k)
+      run.pressure_kPa[rig::Channel::cavity][k] +=
+          amplitude_kPa * std::sin(2 * std::numbers::pi * 31.41 * run.sample_s[k]);
+  const rig::SessionProblem problem(session, family, 2);
+  return judge_sets(problem, search_sets(problem), {});
+}
+
+TEST(SetVerdict, ThatNothingIsWrongIsNotSaidBesideALoudTone) {
+  const SetVerdict loud = verdict_beside_a_tone(0.06);
+  EXPECT_EQ(loud.verdict, Verdict::unexplained);
+  EXPECT_TRUE(loud.is_tone_alone);
+  ASSERT_TRUE(loud.tone);
+  EXPECT_NEAR(loud.tone->frequency_Hz, 31.41, 2 * loud.tone->resolution_Hz);
+  const SetVerdict quiet = verdict_beside_a_tone(0.005);
+  EXPECT_EQ(quiet.verdict, Verdict::none);
+  EXPECT_FALSE(quiet.tone);
 }
 
 }  // namespace
