@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 #include <iterator>
+#include <set>
+#include <utility>
 
 #include "estimator/inference/least_squares.hpp"
 #include "estimator/parallel/parallel_for.hpp"
@@ -29,8 +31,10 @@ class ModelFit final : public inference::LeastSquaresProblem {
     std::vector<double> values, typical;
     for (const LearnableEffect& one : model.effects()) {
       values.insert(values.end(), one.values.begin(), one.values.end());
-      for (const EffectParameter& parameter : one.effect->parameters())
+      for (const EffectParameter& parameter : one.effect->parameters()) {
         typical.push_back(parameter.typical);
+        effect_of_.push_back(one.effect);
+      }
     }
     start_ = space_.coordinates(values);
     const Eigen::VectorXd far = space_.coordinates(typical);
@@ -54,8 +58,9 @@ class ModelFit final : public inference::LeastSquaresProblem {
         count += std::isfinite(sigma) ? 2.0 : 0.0;
     return count;
   }
-  /// Where searches begin: single values moved, and pairs of the three that help most, those with the least misfit. Waves in a soft hose
-  /// turn harmonics over, and gas before it as well: no descent finds them from a stiff one, nor from one that is too soft.
+  /// Where searches begin: of single values moved, of pairs of the three that help most and of pairs that look alike those with the least misfit,
+  /// one of each. Waves in a soft hose turn harmonics over, and gas before it as well: no descent finds them from a stiff one, nor from one that
+  /// is too soft.
   [[nodiscard]] std::vector<Eigen::VectorXd> nearest_starts() const {
     constexpr size_t most = 6, pairing = 3;
     std::vector<Trial> trials = tried(moved_from(start_, 0, start_.size()));
@@ -64,16 +69,19 @@ class ModelFit final : public inference::LeastSquaresProblem {
     for (const Trial& trial : trials)
       if (helpful.size() < pairing && std::ranges::find(helpful, trial.moved) == helpful.end())
         helpful.push_back(trial.moved);
+    const auto is_helpful = [&](Eigen::Index i) { return std::ranges::find(helpful, i) != helpful.end(); };
     std::vector<Trial> pairs;
     for (const Trial& trial : trials)
-      for (const Eigen::Index second : helpful)
-        if (trial.moved < second && std::ranges::find(helpful, trial.moved) != helpful.end())
-          std::ranges::move(moved_from(trial.q, second, second + 1), std::back_inserter(pairs));
+      for (Eigen::Index second = trial.moved + 1; second < start_.size(); ++second)
+        if ((is_helpful(trial.moved) && is_helpful(second)) || look_alike(trial.moved, second))
+          std::ranges::move(moved_from(trial.q, second, second + 1, trial.moved), std::back_inserter(pairs));
     std::ranges::move(tried(std::move(pairs)), std::back_inserter(trials));
     std::ranges::sort(trials, {}, &Trial::cost);
     std::vector<Eigen::VectorXd> starts;
-    for (size_t i = 0; i < std::min(most, trials.size()); ++i)
-      starts.push_back(trials[i].q);
+    std::set<std::pair<Eigen::Index, Eigen::Index>> begun;
+    for (const Trial& trial : trials)
+      if (starts.size() < most && begun.emplace(trial.moved_before, trial.moved).second)
+        starts.push_back(trial.q);
     return starts;
   }
   std::optional<Eigen::VectorXd> residuals(const Eigen::VectorXd& q) override {
@@ -96,21 +104,30 @@ class ModelFit final : public inference::LeastSquaresProblem {
  private:
   struct Trial {
     Eigen::VectorXd q;
-    Eigen::Index moved = 0;  ///< last
+    Eigen::Index moved = 0, moved_before = -1;
     double cost = 0.0;
   };
   /// Each of the values [from, to) moved by parts of its spread, as far as bounds allow.
-  [[nodiscard]] std::vector<Trial> moved_from(const Eigen::VectorXd& q, Eigen::Index from,
-                                              Eigen::Index to) const {
+  [[nodiscard]] std::vector<Trial> moved_from(const Eigen::VectorXd& q, Eigen::Index from, Eigen::Index to,
+                                              Eigen::Index moved_before = -1) const {
     constexpr std::array parts{-4.0, -2.0, -1.0, -0.5, -0.25, 0.25, 0.5, 1.0, 2.0, 4.0};
     std::vector<Trial> trials;
     for (Eigen::Index i = from; i < to; ++i)
       for (const double part : parts) {
-        Trial trial{.q = q, .moved = i};
+        Trial trial{.q = q, .moved = i, .moved_before = moved_before};
         trial.q[i] += part * spread_[i];
         if (trial.q == space_.clamped(trial.q)) trials.push_back(std::move(trial));
       }
     return trials;
+  }
+  /// Effects that are declared to: one alone is taken for the other, so that neither alone shows what both are.
+  [[nodiscard]] bool look_alike(Eigen::Index one, Eigen::Index other) const {
+    const auto conflicts = [](const Effect& a, const Effect& b) {
+      return std::ranges::find(a.text().conflicts, b.text().id) != a.text().conflicts.end();
+    };
+    const Effect& first = *effect_of_[static_cast<size_t>(one)];
+    const Effect& second = *effect_of_[static_cast<size_t>(other)];
+    return conflicts(first, second) || conflicts(second, first);
   }
   [[nodiscard]] std::vector<Trial> tried(std::vector<Trial> trials) const {
     parallel_for(trials.size(), machine_threads(),
@@ -153,6 +170,7 @@ class ModelFit final : public inference::LeastSquaresProblem {
   std::span<const GatedRun> runs_;
   double range_mL_;
   inference::ParameterSpace space_;
+  std::vector<const Effect*> effect_of_;  ///< of each value
   Eigen::VectorXd start_, spread_;
 };
 
