@@ -200,8 +200,10 @@ class Explainer {
           parameters[0].neutral <= size.ci90[1])
         return fmt::format(" Of {} not even {} is certain: {:.3g}, 90 % within {:.3g} to {:.3g}.",
                            effect->text().id, size.name, size.value, size.ci90[0], size.ci90[1]);
+      // One that goes through the whole wall may be longer that way: beyond the wall it changes nothing.
       for (size_t i = 1; effect->is_inclusion() && i < parameters.size(); ++i)
-        if (fit.choice.values[first + i] >= parameters[i].upper)
+        if (fit.choice.values[first + i] >= parameters[i].upper &&
+            parameters[i].name != "semi_axis_radial_mm")
           return fmt::format(" Its {} would be {:g} or more.", parameters[i].name, parameters[i].upper);
       first += parameters.size();
     }
