@@ -10,6 +10,7 @@
 #include "estimator/cli/study_options.hpp"
 #include "estimator/montecarlo/imaging_design.hpp"
 #include "protocol/contract/input_error.hpp"
+#include "protocol/contract/json_text.hpp"
 
 namespace diastole {
 namespace {
@@ -29,7 +30,7 @@ void print_json(const DesignStudy& design, const Study& study) {
     json["options"].push_back(
         {{"change", option.change}, {"se_percent", errors(option.se_percent)}, {"volume", option.volume}});
   }
-  std::cout << json.dump(1) << '\n';
+  std::cout << json_text(json, 1) << '\n';
 }
 
 /// For each parameter the change that shrinks its interval most.

@@ -10,6 +10,7 @@
 #include "estimator/effects/file_effect.hpp"
 #include "estimator/explain/rig/effect_trial.hpp"
 #include "protocol/contract/input_error.hpp"
+#include "protocol/contract/json_text.hpp"
 #include "protocol/contract/named_members.hpp"
 #include "protocol/contract/table_reader.hpp"
 
@@ -91,7 +92,7 @@ ExitCode check_file(const std::string& file, size_t threads, const CommandOutput
     json["effects"].push_back(to_json(*effect));
     for (const explain::EffectCheck& check : checks)
       json["checks"].push_back({DIASTOLE_NAMED(check, name, passed, detail)});
-    std::cout << json.dump(1) << '\n';
+    std::cout << json_text(json, 1) << '\n';
   } else {
     fmt::print("\n  Checks\n");
     for (const explain::EffectCheck& check : checks)
@@ -108,7 +109,7 @@ ExitCode run_effects(const std::string& id, size_t threads, const CommandOutput&
     nlohmann::ordered_json json;
     for (const Effect* effect : chosen)
       json["effects"].push_back(to_json(*effect));
-    std::cout << json.dump(1) << '\n';
+    std::cout << json_text(json, 1) << '\n';
   } else if (!id.empty()) {
     print_for_people(*chosen.front());
   } else {

@@ -17,6 +17,7 @@
 #include "estimator/report/page.hpp"
 #include "estimator/report/report.hpp"
 #include "protocol/contract/input_error.hpp"
+#include "protocol/contract/json_text.hpp"
 
 namespace diastole {
 namespace {
@@ -175,7 +176,7 @@ ExitCode run_fibres(const FibresArguments& arguments, const CommandOutput& out) 
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   const ExitCode end = session.field && !session.field->converged ? ExitCode::negative : ExitCode::done;
   if (out.json) {
-    std::cout << to_json(session, seconds).dump(1) << '\n';
+    std::cout << json_text(to_json(session, seconds), 1) << '\n';
     return end;
   }
   print_for_people(session, seconds);

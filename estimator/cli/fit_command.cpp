@@ -170,8 +170,7 @@ bool ended_on_bound(const FitRecord& record) {
 
 ExitCode run_fit(const FitArguments& arguments, const CommandOutput& out) {
   Study study = read_study(arguments.study);
-  use_images(study);
-  if (!arguments.smooth.empty()) set_smoothness(study, arguments.smooth);
+  // What is wrong with the command's files is reported before images are tracked and data examined.
   if (arguments.output && arguments.output == arguments.checkpoint) {
     throw InputError({arguments.output->string(), "--checkpoint", "is the file of the result too",
                       "Give the checkpoint a file of its own."});
@@ -179,14 +178,17 @@ ExitCode run_fit(const FitArguments& arguments, const CommandOutput& out) {
   if (arguments.output) {
     require_output({*arguments.output, inputs_of(study), fit_file_mark, arguments.force});
   }
+  std::optional<WorkLoop> loop;
+  if (arguments.energy) loop = read_work_loop(*arguments.energy);
+  const std::optional<std::filesystem::path> tracked = use_images(study);
+  if (arguments.output)  // nor may it be the tags of these images
+    require_output({*arguments.output, inputs_of(study), fit_file_mark, arguments.force});
+  if (!arguments.smooth.empty()) set_smoothness(study, arguments.smooth);
   if (arguments.study.unload) {
     (void)imaged_load_of(study);
   } else {
     remark_on_imaged_load(study, "fit");
   }
-  // What is wrong with the loop is reported before images are tracked and data examined.
-  std::optional<WorkLoop> loop;
-  if (arguments.energy) loop = read_work_loop(*arguments.energy);
   const Measurement measurement = read_measurement(study);
   StudyFitOptions options;
   if (loop) options.work = measured_work(*loop, measurement, *arguments.energy);
@@ -233,6 +235,7 @@ ExitCode run_fit(const FitArguments& arguments, const CommandOutput& out) {
   options.interrupted = [] { return Interruption::requested(); };
   FitRecord record = fit_study(study, measurement, options);
   record.findings = std::move(findings);
+  if (tracked) record.images = std::filesystem::weakly_canonical(*tracked).string();
   fmt::print(stderr, "{} {} iterations, {} equilibrium solutions, {:.1f} s.\n", record.reason,
              record.iterations, record.forward_solves, record.seconds);
   if (arguments.output) write_fit_file(record, *arguments.output);

@@ -16,6 +16,7 @@
 #include "estimator/report/page.hpp"
 #include "estimator/report/report.hpp"
 #include "protocol/contract/input_error.hpp"
+#include "protocol/contract/json_text.hpp"
 
 namespace diastole {
 namespace {
@@ -171,7 +172,7 @@ ExitCode run_flow(const FlowArguments& arguments, const CommandOutput& out) {
   write_page_and_record(arguments.page, arguments.record, [&] { return imaging::flow_record(session); });
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   if (out.json) {
-    std::cout << to_json(session, seconds).dump(1) << '\n';
+    std::cout << json_text(to_json(session, seconds), 1) << '\n';
     return ExitCode::done;
   }
   print_for_people(session, seconds);

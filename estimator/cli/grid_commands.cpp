@@ -9,6 +9,7 @@
 
 #include "estimator/grids/displaced_points.hpp"
 #include "estimator/io/whole_file.hpp"
+#include "protocol/contract/json_text.hpp"
 
 namespace diastole {
 namespace {
@@ -30,7 +31,7 @@ ExitCode finish(const GridArguments& arguments, const FieldGrid& grid, size_t po
                                          {"nodes", points},
                                          {"fibres", false},
                                          {"remarks", remarks}};
-    std::cout << json.dump(1) << '\n';
+    std::cout << json_text(json, 1) << '\n';
     return ExitCode::done;
   }
   for (const std::string& remark : remarks)

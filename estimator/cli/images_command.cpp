@@ -12,6 +12,7 @@
 #include "estimator/imaging/series/views.hpp"
 #include "estimator/io/finding_json.hpp"
 #include "estimator/io/whole_file.hpp"
+#include "protocol/contract/json_text.hpp"
 
 namespace diastole {
 namespace {
@@ -91,8 +92,7 @@ ExitCode run_images(const ImagesArguments& arguments, const CommandOutput& out) 
     for (const ImageSeries& series : folder.series)
       json["series"].push_back(series_json(folder, series));
     json["problems"] = written(folder.problems);
-    std::cout << json.dump(1, ' ', false, Json::error_handler_t::replace)
-              << '\n';  // a file's name may be no UTF-8
+    std::cout << json_text(json, 1) << '\n';
   } else {
     for (const ImageSeries& series : folder.series)
       print_series(folder, series);

@@ -17,6 +17,7 @@
 #include "estimator/report/page.hpp"
 #include "estimator/report/sections.hpp"
 #include "protocol/contract/input_error.hpp"
+#include "protocol/contract/json_text.hpp"
 #include "protocol/contract/named_members.hpp"
 #include "protocol/contract/table_reader.hpp"
 
@@ -127,7 +128,7 @@ std::string to_json(const std::vector<BenchTest>& tests, const LawComparison& co
       {"preferred", preferred ? Json(comparison.laws[*preferred].fit.law->name()) : Json(nullptr)},
       {"why", comparison.why},
       {"laws", laws}};
-  return json.dump(1) + "\n";
+  return json_text(json, 1) + "\n";
 }
 
 std::string percent_words(double percent) {

@@ -18,6 +18,7 @@
 #include "estimator/report/page.hpp"
 #include "estimator/report/report.hpp"
 #include "protocol/contract/input_error.hpp"
+#include "protocol/contract/json_text.hpp"
 
 namespace diastole {
 namespace {
@@ -195,7 +196,7 @@ ExitCode run_ventricle(const VentricleArguments& arguments, const CommandOutput&
     write_whole_file(*arguments.page, report::make_report(imaging::ventricle_record(session, guide)));
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   if (out.json) {
-    std::cout << to_json(session, arguments.output, seconds).dump(1) << '\n';
+    std::cout << json_text(to_json(session, arguments.output, seconds), 1) << '\n';
     return ExitCode::done;
   }
   print_ventricle(session, seconds);

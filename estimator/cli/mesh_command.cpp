@@ -13,6 +13,7 @@
 #include "estimator/mesh/mesh_file.hpp"
 #include "estimator/model/study_model.hpp"
 #include "estimator/model/unloaded_model.hpp"
+#include "protocol/contract/json_text.hpp"
 
 namespace diastole {
 namespace {
@@ -34,7 +35,7 @@ ExitCode write_mesh(const MeshArguments& arguments, const MeshBody& body,
                                          {"nodes", body.mesh.node_count()},
                                          {"fibres", body.fibres.has_value()},
                                          {"remarks", remarks}};
-    std::cout << json.dump(1) << '\n';
+    std::cout << json_text(json, 1) << '\n';
     return ExitCode::done;
   }
   for (const std::string& remark : remarks)

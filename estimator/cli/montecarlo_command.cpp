@@ -19,6 +19,7 @@
 #include "estimator/montecarlo/montecarlo.hpp"
 #include "estimator/montecarlo/worker_pool.hpp"
 #include "protocol/contract/input_error.hpp"
+#include "protocol/contract/json_text.hpp"
 #include "protocol/contract/named_members.hpp"
 
 namespace diastole {
@@ -115,7 +116,7 @@ void print_json(const std::vector<TableEntry>& table, const Study& study, const 
   json["cells"] = Json::array();
   for (const TableEntry& entry : table)
     json["cells"].push_back(from_entry(entry));
-  std::cout << json.dump(1) << '\n';
+  std::cout << json_text(json, 1) << '\n';
 }
 
 /// Below an entry: what no unbiased estimator can go below, and the paper's entry where the law is the paper's.

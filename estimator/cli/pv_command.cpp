@@ -21,6 +21,7 @@
 #include "estimator/report/page.hpp"
 #include "estimator/report/svg_plot.hpp"
 #include "protocol/contract/input_error.hpp"
+#include "protocol/contract/json_text.hpp"
 #include "protocol/contract/named_members.hpp"
 
 namespace diastole {
@@ -151,7 +152,7 @@ ExitCode run_pv(const PvArguments& arguments, const CommandOutput& out) {
   if (Interruption::requested())
     std::cerr << "diastole pv: interrupted; what was found until then is reported\n";
   if (out.json) {
-    std::cout << to_json(study, model, curve, seconds_since(begun)).dump(1) << '\n';
+    std::cout << json_text(to_json(study, model, curve, seconds_since(begun)), 1) << '\n';
   } else {
     print_for_people(curve);
     for (const std::filesystem::path& output : arguments.outputs.files)

@@ -6,6 +6,7 @@
 #include "estimator/io/whole_file.hpp"
 #include "estimator/report/page.hpp"
 #include "estimator/report/report.hpp"
+#include "protocol/contract/json_text.hpp"
 
 namespace diastole {
 namespace {
@@ -25,7 +26,7 @@ ExitCode run_report(const ReportArguments& arguments, const CommandOutput& out) 
     nlohmann::ordered_json json = {{"page", arguments.page.string()}, {"bytes", html.size()}};
     for (const auto& file : arguments.files)
       json["files"].push_back(file.string());
-    std::cout << json.dump(1) << '\n';
+    std::cout << json_text(json, 1) << '\n';
   } else {
     std::cout << "The report is in " << arguments.page.string() << '\n';
   }
@@ -41,9 +42,10 @@ void add_report(CommandLine& line) {
                "  diastole report gel.run.h5 -o session.html\n"
                "  diastole report gel.run.h5 fit.json -o gel.html");
   command
-      ->add_option(
-          "FILE", arguments->files,
-          "run files, fit results, explanations, solutions and shear tests, recognised by their content")
+      ->add_option("FILE", arguments->files,
+                   "run files, fit results (one of images opens with them), records of tracked images, "
+                   "explanations, solutions and shear tests, recognised by "
+                   "their content")
       ->required();
   command->add_option("-o,--output", arguments->page, "the HTML page to write")->required();
   command->add_flag("--force", arguments->force, "replace an output file that is no report");

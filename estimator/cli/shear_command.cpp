@@ -10,6 +10,7 @@
 #include "estimator/report/page.hpp"
 #include "estimator/report/sections.hpp"
 #include "estimator/shear/shear_fit.hpp"
+#include "protocol/contract/json_text.hpp"
 #include "protocol/contract/named_members.hpp"
 
 namespace diastole {
@@ -38,7 +39,7 @@ std::string to_json(const ShearTest& test, const ShearFit& fit, ShearForm form) 
                      {"loads", written(fit.loads)},
                      {"outliers", written(fit.outliers)},
                      {"remarks", fit.remarks}};
-  return json.dump(1) + "\n";
+  return json_text(json, 1) + "\n";
 }
 
 void print_fit(const ShearTest& test, const ShearFit& fit) {

@@ -28,6 +28,7 @@
 #include "estimator/model/study_model.hpp"
 #include "estimator/solution/solution_grid.hpp"
 #include "protocol/contract/input_error.hpp"
+#include "protocol/contract/json_text.hpp"
 #include "protocol/contract/named_members.hpp"
 #include "protocol/contract/text.hpp"
 
@@ -302,7 +303,7 @@ ExitCode run_solve(const SolveArguments& arguments, const CommandOutput& out) {
   if (whole) report_failure_or_instability(arguments, solution.report);
   if (!whole) fmt::print(stderr, "diastole solve: {}\n", unloaded->describe());
   if (out.json) {
-    std::cout << json.dump(1) << '\n';
+    std::cout << json_text(json, 1) << '\n';
   } else if (done) {
     if (unloaded) print_unloading(json["unloaded"], study.imaged_at->pressure_kPa);
     print_for_people(json);

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <iterator>
 
@@ -10,6 +11,7 @@
 #include "estimator/imaging/series/image_folder.hpp"
 #include "estimator/imaging/tracking/tags_file.hpp"
 #include "estimator/imaging/tracking/tracked_folder.hpp"
+#include "estimator/imaging/tracking/tracking_record.hpp"
 #include "estimator/io/fingerprint.hpp"
 #include "estimator/io/measurement.hpp"
 #include "estimator/io/whole_file.hpp"
@@ -19,7 +21,7 @@ namespace diastole {
 namespace {
 
 /// Another number whenever the tracker gives other points for the same images.
-constexpr int tracker_version = 5;
+constexpr int tracker_version = 6;
 
 std::optional<imaging::SpecimenPose> pose_of(const Study& study) {
   if (!study.data.to_specimen) return std::nullopt;
@@ -82,8 +84,8 @@ void require_spacing(const Study& study, const imaging::ImageFolder& folder) {
 
 }  // namespace
 
-void use_images(Study& study) {
-  if (!study.data.images) return;
+std::optional<std::filesystem::path> use_images(Study& study) {
+  if (!study.data.images) return std::nullopt;
   const std::filesystem::path folder = *study.data.images;
   std::error_code error;
   if (!std::filesystem::is_directory(folder, error))
@@ -96,19 +98,25 @@ void use_images(Study& study) {
   const auto pose = pose_of(study);
   std::string name = study.file.filename().string();
   name = name.substr(0, name.find(".study.toml"));
-  study.data.tags =
-      study.file.parent_path() / fmt::format("{}.images-{}.tags.csv", name, fingerprint_of(folder, pose));
-  if (std::filesystem::is_regular_file(*study.data.tags)) {
+  const std::filesystem::path kept =
+      study.file.parent_path() / fmt::format("{}.images-{}", name, fingerprint_of(folder, pose));
+  const std::filesystem::path record = kept.string() + ".tracking.json";
+  study.data.tags = kept.string() + ".tags.csv";
+  if (std::filesystem::is_regular_file(*study.data.tags) && std::filesystem::is_regular_file(record)) {
     fmt::print(stderr, "Tags of these images are in {}.\n", study.data.tags->string());
-    return;
+    return record;
   }
+  const auto start = std::chrono::steady_clock::now();
   const imaging::TrackedFolder tracked = imaging::track_folder(
       {.folder = folder, .pose = {}, .known_pose = pose, .coordinates = "specimen"}, images,
       [](const std::string& stage) { fmt::print(stderr, "Images: {}.\n", stage); });
   write_whole_file(*study.data.tags, imaging::tags_file_text(tracked.points));
+  const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
+  write_whole_file(record, to_json(imaging::tracking_record(tracked, took.count())));
   fmt::print(stderr, "{} tag points, standard errors {:.3f} px RMS, are in {}.\n", tracked.points.size(),
              tracked.rms_px, study.data.tags->string());
   print_findings(tracked.problems, stderr);
+  return record;
 }
 
 }  // namespace diastole

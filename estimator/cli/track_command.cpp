@@ -19,6 +19,7 @@
 #include "estimator/report/page.hpp"
 #include "estimator/report/report.hpp"
 #include "protocol/contract/input_error.hpp"
+#include "protocol/contract/json_text.hpp"
 
 namespace diastole {
 namespace {
@@ -113,7 +114,7 @@ ExitCode run_track(const TrackArguments& arguments, const CommandOutput& out) {
     json["slices"] = Json::array();
     for (const imaging::TrackedSlice& slice : tracked.slices)
       json["slices"].push_back(slice_json(slice));
-    std::cout << json.dump(1) << '\n';
+    std::cout << json_text(json, 1) << '\n';
     return ExitCode::done;
   }
   for (const imaging::TrackedSlice& slice : tracked.slices)

@@ -511,9 +511,11 @@ FitRecord fit_study(const Study& study, const Measurement& measurement, const St
         "them.");
   for (std::string& remark : remarks_on(record, fit))
     record.remarks.push_back(std::move(remark));
-  record.section_frame = fit.frames.back().number;
+  const EstimatedFrame& most_loaded = *std::ranges::max_element(
+      fit.frames, {}, [](const EstimatedFrame& frame) { return std::abs(frame.pressure_kPa); });
+  record.section_frame = most_loaded.number;
   if (std::holds_alternative<AnnulusSpecimen>(study.specimen))
-    record.sections = draw_sections(motion.mesh(), fit.frames.back(), measurement);
+    record.sections = draw_sections(motion.mesh(), most_loaded, measurement);
   return record;
 }
 

@@ -2,6 +2,7 @@
 
 #include "estimator/io/finding_json.hpp"
 #include "estimator/io/record_file.hpp"
+#include "protocol/contract/json_text.hpp"
 
 namespace diastole {
 
@@ -35,7 +36,7 @@ void require_whole(const FibresRecord& record) {
 }  // namespace
 
 std::string to_json(const FibresRecord& record) {
-  return fibres_format.document(written(record)).dump() + "\n";
+  return json_text(fibres_format.document(written(record))) + "\n";
 }
 
 bool is_fibres(std::string_view text) { return fibres_format.marks(text); }

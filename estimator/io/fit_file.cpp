@@ -5,6 +5,7 @@
 #include "estimator/io/finding_json.hpp"
 #include "estimator/io/record_file.hpp"
 #include "estimator/io/whole_file.hpp"
+#include "protocol/contract/json_text.hpp"
 
 namespace diastole {
 
@@ -57,6 +58,7 @@ void each_member(Visit&& visit, Record& r) {
   visit("study", r.study);
   visit("fingerprint", may_lack(r.fingerprint));
   DIASTOLE_VISIT(visit, r, specimen, law, data)
+  visit("images", if_any(r.images));
   visit("parameters", by_name(r.parameters));
   DIASTOLE_VISIT(visit, r, rms_mm, chi2, dof, chi2_per_dof, converged, reason, iterations, forward_solves,
                  seconds, remarks)
@@ -101,7 +103,7 @@ void require_sound(const FitRecord& record) {
 std::string to_json(const FitRecord& record) {
   Json json = fit_format.document(written(record));
   round_numbers(json["sections"], hundredths);
-  return json.dump(1) + "\n";
+  return json_text(json, 1) + "\n";
 }
 
 FitRecord fit_record_from_json(std::string_view text, const std::string& file) {

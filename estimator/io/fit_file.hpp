@@ -218,6 +218,8 @@ struct FitRecord {
   std::vector<std::string> remarks;  ///< whole sentences for the reader
   std::vector<Finding> findings;     ///< what is wrong with the data, the gravest first
   std::string fingerprint = {};      ///< of the study and its data (study_fingerprint.hpp)
+  std::optional<std::string> images =
+      {};  ///< file of what was tracked for it (tracking_file.hpp), if the data are images
 };
 
 /// Near the start of each such document.

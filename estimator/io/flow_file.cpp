@@ -2,6 +2,7 @@
 
 #include "estimator/io/finding_json.hpp"
 #include "estimator/io/record_file.hpp"
+#include "protocol/contract/json_text.hpp"
 
 namespace diastole {
 
@@ -39,7 +40,9 @@ void require_whole(const FlowRecord& record) {
 
 }  // namespace
 
-std::string to_json(const FlowRecord& record) { return flow_format.document(written(record)).dump() + "\n"; }
+std::string to_json(const FlowRecord& record) {
+  return json_text(flow_format.document(written(record))) + "\n";
+}
 
 bool is_flow(std::string_view text) { return flow_format.marks(text); }
 

@@ -3,6 +3,7 @@
 #include "estimator/io/finding_json.hpp"
 #include "estimator/io/record_file.hpp"
 #include "estimator/io/section_json.hpp"
+#include "protocol/contract/json_text.hpp"
 
 namespace diastole {
 
@@ -51,7 +52,7 @@ std::string to_json(const ReconstructionRecord& record, bool with_sections) {
   Json json = reconstruction_format.document(written(record));
   round_numbers(json["sections"], six_digits);
   if (!with_sections) json["sections"].clear();
-  return json.dump(with_sections ? -1 : 1) + "\n";
+  return json_text(json, with_sections ? -1 : 1) + "\n";
 }
 
 bool is_reconstruction(std::string_view text) { return reconstruction_format.marks(text); }

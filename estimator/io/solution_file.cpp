@@ -2,6 +2,7 @@
 
 #include "estimator/io/record_file.hpp"
 #include "estimator/io/section_json.hpp"
+#include "protocol/contract/json_text.hpp"
 
 namespace diastole {
 
@@ -30,7 +31,7 @@ std::string to_json(const SolutionRecord& record) {
   Json json = solution_format.document(written(record));
   round_numbers(json["sections"], six_digits);
   round_numbers(json["profiles"], six_digits);
-  return json.dump() + "\n";
+  return json_text(json) + "\n";
 }
 
 bool is_solution(std::string_view text) { return solution_format.marks(text); }

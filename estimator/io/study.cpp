@@ -285,6 +285,12 @@ void read_images(TableReader& root, StudyData& data) {
                       "Give the specimen's axes in patient coordinates, with five digits or more.");
       }
     }
+    const auto& [x, y, z] = pose->axes;
+    const double handedness = (x[1] * y[2] - x[2] * y[1]) * z[0] + (x[2] * y[0] - x[0] * y[2]) * z[1] +
+                              (x[0] * y[1] - x[1] * y[0]) * z[2];
+    if (handedness < 0)
+      table->fail("z_axis", "points against x_axis cross y_axis: these axes are a mirror's",
+                  "Turn one of the three round; a specimen's axes are right-handed.");
     table->finish();
   }
   images->finish();

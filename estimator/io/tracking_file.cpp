@@ -4,6 +4,7 @@
 
 #include "estimator/io/finding_json.hpp"
 #include "estimator/io/record_file.hpp"
+#include "protocol/contract/json_text.hpp"
 
 namespace diastole {
 
@@ -52,7 +53,7 @@ double thousandth(double value) { return std::round(value * 1e3) / 1e3; }
 std::string to_json(const TrackingRecord& record) {
   Json json = tracking_format.document(written(record));
   round_numbers(json, thousandth);
-  return json.dump() + "\n";
+  return json_text(json) + "\n";
 }
 
 bool is_tracking(std::string_view text) { return tracking_format.marks(text); }

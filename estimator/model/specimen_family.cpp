@@ -13,6 +13,7 @@
 #include "estimator/io/study_refusal.hpp"
 #include "estimator/model/study_model.hpp"
 #include "protocol/contract/input_error.hpp"
+#include "protocol/contract/json_text.hpp"
 
 namespace diastole::rig {
 namespace {
@@ -84,7 +85,7 @@ void keep_curve(const std::string& key, const SpecimenCurve& curve) {
   Json points = Json::array();
   for (const SpecimenCurve::Point& at : curve.points())
     points.push_back({at.volume_mL, at.pressure_kPa, at.stiffness_kPa_per_mL});
-  write_cached(file_of(key), kept_format.document({{"key", key}, {"points", points}}).dump() + "\n");
+  write_cached(file_of(key), json_text(kept_format.document({{"key", key}, {"points", points}})) + "\n");
 }
 
 bool is_modulus(const StudyParameter& parameter) { return parameter.name.ends_with("_kPa"); }

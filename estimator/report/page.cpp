@@ -9,6 +9,7 @@
 #include "estimator/report/embedded.hpp"
 #include "estimator/report/html_text.hpp"
 #include "estimator/report/svg_plot.hpp"
+#include "protocol/contract/json_text.hpp"
 
 namespace diastole::report {
 namespace {
@@ -64,7 +65,7 @@ std::string chart_json(const TimeChart& chart) {
     json["data"].push_back(written(trace.y));
   }
   round_numbers(json, shortened);
-  return script_safe(json.dump());
+  return script_safe(json_text(json));
 }
 
 std::string figure_html(const std::string& body, const std::string& caption) {

@@ -3,6 +3,7 @@
 #include <fstream>
 #include <functional>
 #include <map>
+#include <optional>
 #include <vector>
 
 #include "estimator/explain/verdict/explanation_json.hpp"
@@ -63,11 +64,27 @@ std::string explanation_title(const std::vector<explain::Explanation>& explanati
   return "Where model and measurement disagree" + (name.empty() ? "" : ": " + name);
 }
 
+/// The record of the images that a fit began with: where it was, or beside the fit, if that has moved. None if it is gone or none any more.
+std::optional<TrackingRecord> images_of(const FitRecord& fit, const std::filesystem::path& file) {
+  if (!fit.images) return {};
+  const std::filesystem::path stated = *fit.images;
+  for (const std::filesystem::path& place : {stated, file.parent_path() / stated.filename()}) {
+    try {
+      if (std::filesystem::is_regular_file(place))
+        return tracking_record_from_json(read_whole_file(place), place.string());
+    } catch (const InputError&) {
+      continue;  // the fit stands without them
+    }
+  }
+  return {};
+}
+
 }  // namespace
 
 std::string make_report(std::span<const std::filesystem::path> files, size_t frames) {
   std::map<Kind, std::vector<std::function<void(Page&)>>> parts;  // in the order of the page
   std::vector<explain::Explanation> explanations;
+  std::optional<TrackingRecord> of_fit;
   const auto add = [&](Kind kind, auto read, auto draw) {
     parts[kind].emplace_back([read = std::move(read), draw](Page& page) { draw(page, read); });
   };
@@ -108,9 +125,13 @@ std::string make_report(std::span<const std::filesystem::path> files, size_t fra
     } else if (is_reconstruction(content)) {
       add(Kind::reconstruction, reconstruction_record_from_json(content, name), add_reconstruction);
     } else {
-      add(Kind::fit, fit_record_from_json(content, name), add_fit);
+      FitRecord fit = fit_record_from_json(content, name);
+      if (!of_fit) of_fit = images_of(fit, file);
+      add(Kind::fit, std::move(fit), add_fit);
     }
   }
+  // A page shows one set of images: the one that was given for it, or the first fit's.
+  if (!parts.contains(Kind::tracking) && of_fit) add(Kind::tracking, std::move(*of_fit), add_tracking);
   const auto count = [&](Kind kind) { return parts.contains(kind) ? parts.at(kind).size() : 0; };
   const size_t estimates = count(Kind::fit) + count(Kind::shear_test) + count(Kind::table);
   const bool only_images =

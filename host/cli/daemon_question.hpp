@@ -13,6 +13,7 @@
 #include "host/config/rig_config.hpp"
 #include "host/rpc/client.hpp"
 #include "protocol/contract/command.hpp"
+#include "protocol/contract/json_text.hpp"
 
 namespace diastole {
 
@@ -60,7 +61,7 @@ struct DaemonQuestion {
 };
 
 /// One JSON document on standard output, as --json promises.
-inline void print_json(const nlohmann::json& document) { std::cout << document.dump(2) << '\n'; }
+inline void print_json(const nlohmann::json& document) { std::cout << json_text(document, 2) << '\n'; }
 /// The same with --json; else `show()` prints for a person.
 inline void print(const CommandOutput& out, const nlohmann::json& document,
                   const std::function<void()>& show) {

@@ -16,6 +16,7 @@
 #include "host/runfile/output_guard.hpp"
 #include "host/runfile/ro_crate.hpp"
 #include "protocol/contract/input_error.hpp"
+#include "protocol/contract/json_text.hpp"
 #include "protocol/contract/waiting_line.hpp"
 #include "protocol/runfile/reader.hpp"
 
@@ -84,7 +85,7 @@ json write_bids(const BidsFiles& files, const runfile::RunFile& file) {
   const WaitingLine waiting("writing " + files.table.string());
   const nlohmann::ordered_json description = bids_description(file);
   write_bids_table(file, files.table);
-  write_text_file(files.description, description.dump(2) + "\n");
+  write_text_file(files.description, json_text(description, 2) + "\n");
   return {{"run", file.run.file},
           {"table", files.table.string()},
           {"description", files.description.string()},
@@ -145,7 +146,7 @@ fs::path write_crate(const ExportOptions& options, const std::vector<runfile::Ru
     crate.others.push_back({is_folder ? name + "/" : name, name});
   }
   // Last: a folder without it is no crate.
-  write_text_file(options.crate / metadata_file, ro_crate(crate, options.crate).dump(2) + "\n");
+  write_text_file(options.crate / metadata_file, json_text(ro_crate(crate, options.crate), 2) + "\n");
   return options.crate / metadata_file;
 }
 

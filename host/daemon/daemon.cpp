@@ -24,6 +24,7 @@
 #include "host/rpc/rpc_session.hpp"
 #include "host/rpc/server.hpp"
 #include "host/web/console.hpp"
+#include "protocol/contract/json_text.hpp"
 
 namespace diastole {
 namespace {
@@ -164,7 +165,7 @@ void run_daemon(const DaemonOptions& options) {
   const auto console = open_console(config, options.console.has_value(), rpc_state);
   nlohmann::json ready{{"ready", true}, {"socket", config.daemon.socket}};
   if (console) ready["console"] = rpc_state->console;
-  std::cout << ready.dump() << std::endl;
+  std::cout << json_text(ready) << std::endl;
   manager.ready();
   context.run();
 }

@@ -1,4 +1,5 @@
 #include "host/journal/journal_records.hpp"
+#include "protocol/contract/json_text.hpp"
 
 #include <algorithm>
 #include <array>
@@ -266,7 +267,7 @@ std::string encode(const Document& document) {
         json object{{"record", record.kind}};
         FieldWriter writer(object);
         describe(writer, record);
-        return object.dump(-1, ' ', false, json::error_handler_t::replace);
+        return json_text(object);
       },
       document);
 }

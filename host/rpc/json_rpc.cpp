@@ -2,15 +2,14 @@
 
 #include "host/rig/rig_answers.hpp"
 #include "protocol/contract/input_error.hpp"
+#include "protocol/contract/json_text.hpp"
 
 namespace diastole::rpc {
 namespace {
 
 using nlohmann::json;
 
-std::string line_of(const json& message) {
-  return message.dump(-1, ' ', false, json::error_handler_t::replace) + "\n";
-}
+std::string line_of(const json& message) { return json_text(message) + "\n"; }
 
 /// Discarded if it is no JSON. Deeper values are refused while they are read: copying one recurses, and would take
 /// more stack than there is.

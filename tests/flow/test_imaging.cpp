@@ -8,6 +8,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <sstream>
 #include <thread>
 
 #include "tests/flow/browser.hpp"
@@ -19,6 +20,12 @@ namespace {
 
 using nlohmann::json;
 using testing::HasSubstr;
+
+std::string text_of(const std::filesystem::path& path) {
+  std::ostringstream text;
+  text << std::ifstream(path, std::ios::binary).rdbuf();
+  return text.str();
+}
 
 /// The example's gel phantom, C1 = 8.71 kPa.
 class ImagedGel : public testing::Test {
@@ -58,11 +65,31 @@ TEST_F(ImagedGel, OneCommandGoesFromImagesToTheStiffness) {
   EXPECT_THAT(again.err, HasSubstr("Tags of these images are in"));
   EXPECT_EQ(again.json().at("parameters"), fit.json().at("parameters"));
 
-  const Ended tracked =
-      run(place, {"diastole", "track", "gel/dicom", "-o", "gel.tags.csv", "--record", "gel.json"});
-  ASSERT_EQ(tracked.exit_code, 0) << tracked.err;
-  const Ended report = run(place, {"diastole", "report", "gel.json", "fit.json", "-o", "report.html"});
-  EXPECT_EQ(report.exit_code, 0) << report.err;
+  const Ended report = run(place, {"diastole", "report", "fit.json", "-o", "report.html"});
+  ASSERT_EQ(report.exit_code, 0) << report.err;
+  const std::string page = text_of(place / "report.html");
+  ASSERT_THAT(page, HasSubstr("Images and tags"));
+  EXPECT_LT(page.find("Images and tags"), page.find("The stiffness"));
+  // One that has lost its images is a report all the same.
+  std::filesystem::rename(place / "gel", place / "elsewhere");
+  const Ended alone = run(place, {"diastole", "report", "fit.json", "-o", "report.html"});
+  EXPECT_EQ(alone.exit_code, 0) << alone.err;
+  EXPECT_THAT(text_of(place / "report.html"), testing::Not(HasSubstr("Images and tags")));
+}
+
+TEST_F(ImagedGel, FilesWhoseNamesAreNoUtf8AreTrackedAndShown) {
+  if (sanitized) GTEST_SKIP() << "six series of eight frames: too slow here";
+  const std::filesystem::path odd = place /
+                                    "gr\xf6\xdf"
+                                    "er";
+  std::filesystem::copy(place / "gel" / "dicom", odd);
+  std::filesystem::rename(odd / "s02_i0001.dcm", odd / "M\xfcller.dcm");
+  std::filesystem::remove(odd / "s02_i0004.dcm");
+  const Ended track = run(place, {"diastole", "track", odd.string(), "-o", "odd.tags.csv", "--page",
+                                  "odd.html", "--record", "odd.json", "--json"});
+  ASSERT_EQ(track.exit_code, 0) << track.err;
+  EXPECT_THAT(track.json().at("problems").dump(), HasSubstr("M\u{FFFD}ller.dcm"));
+  EXPECT_THAT(text_of(place / "odd.json"), HasSubstr("M\u{FFFD}ller.dcm"));
 }
 
 TEST_F(ImagedGel, ASliceThatReachesBeyondTheEndIsTold) {

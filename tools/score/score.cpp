@@ -15,6 +15,7 @@
 #include "estimator/explain/verdict/explanation_json.hpp"
 #include "estimator/io/whole_file.hpp"
 #include "protocol/contract/input_error.hpp"
+#include "protocol/contract/json_text.hpp"
 #include "protocol/contract/named_members.hpp"
 
 namespace diastole::explain {
@@ -477,7 +478,7 @@ std::string to_json(const Score& score) {
   for (const Reliability& bin : score.reliability)
     json["reliability"].push_back({DIASTOLE_NAMED(bin, said, mean, right, cases)});
   json["missing"] = score.missing;
-  return json.dump(1);
+  return json_text(json, 1);
 }
 
 ExitCode print_score(const std::filesystem::path& truths, const std::filesystem::path& results,

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "protocol/contract/exit_code.hpp"
+#include "protocol/contract/json_text.hpp"
 #include "tools/program/program.hpp"
 #include "tools/sim_board/session.hpp"
 
@@ -83,7 +84,7 @@ int main(int argc, char** argv) {
   add_options(app, options, report, json);
   return diastole::run_program(app, argc, argv, [&] {
     const diastole::BoardReport shown = diastole::run_session(options, diastole::stop_descriptor());
-    if (json) fmt::print("{}\n", diastole::to_json(shown).dump(2));
+    if (json) fmt::print("{}\n", diastole::json_text(diastole::to_json(shown), 2));
     if (report) fmt::print(json ? stderr : stdout, "{}", diastole::to_text(shown));
     return shown.board.locked_up ? ExitCode::negative : ExitCode::done;
   });

@@ -14,6 +14,7 @@
 #include <thread>
 
 #include "protocol/contract/input_error.hpp"
+#include "protocol/contract/json_text.hpp"
 #include "tools/sim_board/emulated_controller.hpp"
 #include "tools/sim_board/loop_back.hpp"
 #include "tools/sim_controller/pin_trace.hpp"
@@ -127,7 +128,7 @@ class Session {
     if (line_) {
       if (!options_.real_time)
         fmt::print(stderr, "without --real-time the board's time runs ahead of whoever opens the port\n");
-      fmt::print("{}\n", nlohmann::json{{"port", line_->path()}}.dump());
+      fmt::print("{}\n", json_text(nlohmann::json{{"port", line_->path()}}));
       std::fflush(stdout);
     }
     const auto began = WallClock::now();

@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "protocol/contract/input_error.hpp"
+#include "protocol/contract/json_text.hpp"
 #include "protocol/contract/table_reader.hpp"
 #include "tools/sim_rig/hidden_file.hpp"
 
@@ -206,7 +207,7 @@ std::string hide(const std::vector<std::string>& ids, uint64_t seed, PlantConfig
     json["truth"].push_back({{"id", file.id}, {"port", file.port}, {"parameters", draw.drawn}});
     json["kind"] = json["truth"].size() == 1 ? "single" : put.empty() ? "pair" : json["kind"];
   }
-  return json.dump(1) + "\n";
+  return json_text(json, 1) + "\n";
 }
 
 std::string list_of_hidden() {

@@ -13,6 +13,7 @@
 
 #include "host/transport/real_time.hpp"
 #include "protocol/contract/input_error.hpp"
+#include "protocol/contract/json_text.hpp"
 
 namespace diastole::sim_rig {
 namespace {
@@ -72,7 +73,7 @@ std::string Server::addresses() const {
       {"pty", cables_.line.path()}, {"modbus_host", "127.0.0.1"}, {"modbus_port", instrument_.port()}};
   document["conductor"] = conductor_ ? nlohmann::json(options_.conductor.string()) : nlohmann::json();
   document["control"] = control_ ? nlohmann::json(options_.control.string()) : nlohmann::json();
-  return document.dump();
+  return json_text(document);
 }
 
 void Server::run(int stop_descriptor) {
@@ -240,7 +241,7 @@ std::string Server::state() const {
   document["run_s"] = nullptr;
   if (start_ns)
     document["run_s"] = static_cast<double>(static_cast<int64_t>(rig_.now_ns() - *start_ns)) * 1e-9;
-  return document.dump();
+  return json_text(document);
 }
 
 }  // namespace diastole::sim_rig

@@ -9,6 +9,7 @@
 #include "estimator/io/study_fingerprint.hpp"
 #include "estimator/io/whole_file.hpp"
 #include "protocol/contract/input_error.hpp"
+#include "protocol/contract/json_text.hpp"
 
 namespace diastole::explain {
 namespace {
@@ -64,7 +65,7 @@ std::string to_json(const Reference& reference) {
   Json& segments = json["segments"] = Json::object();
   for (const auto& [key, segment] : reference.segments)
     segments[key] = {{"misfit", list_of(segment.misfit)}, {"noise", list_of(segment.noise)}};
-  return format.document(json).dump() + "\n";
+  return json_text(format.document(json)) + "\n";
 }
 
 Reference reference_from_json(std::string_view text, const std::string& file) {

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "estimator/io/record_file.hpp"
+#include "protocol/contract/json_text.hpp"
 
 namespace diastole {
 namespace explain {
@@ -120,10 +121,10 @@ std::string to_json(const Explanation& explanation) {
   // The bulk on single lines, what people read indented.
   const Json traces = std::exchange(json["traces"], Json::array());
   const Json field = std::exchange(json["field"], Json::array());
-  std::string text = json.dump(1);
+  std::string text = json_text(json, 1);
   const auto put = [&text](const std::string& key, const Json& bulk) {
     const std::string empty = "\"" + key + "\": []";
-    text.replace(text.rfind(empty), empty.size(), "\"" + key + "\": " + bulk.dump());
+    text.replace(text.rfind(empty), empty.size(), "\"" + key + "\": " + json_text(bulk));
   };
   put("field", field);
   put("traces", traces);

@@ -342,8 +342,7 @@ ImageHeader header_of(DcmItem& dataset, int frame, const SlicePlane& plane, cons
   header.says_tagged = tagging && *tagging != "NONE";
   header.velocity = velocity_of(items, header.vendor);
   header.diffusion = diffusion_of(items, header.vendor);
-  const double slope = items.number_in(DCM_PixelValueTransformationSequence, DCM_RescaleSlope).value_or(1.0);
-  header.slope = slope != 0 ? slope : 1.0;
+  header.slope = items.number_in(DCM_PixelValueTransformationSequence, DCM_RescaleSlope).value_or(1.0);
   header.intercept =
       items.number_in(DCM_PixelValueTransformationSequence, DCM_RescaleIntercept).value_or(0.0);
   header.rescale_units = items
@@ -379,6 +378,12 @@ std::optional<FileFault> check_layout(DcmItem& dataset, PixelLayout& layout) {
     return unusable("(0028,0010), (0028,0011), (0028,0008)",
                     fmt::format("{} rows, {} columns, {} frames are no MR image", layout.rows, layout.columns,
                                 layout.frames),
+                    "Export the series again.");
+  DcmSequenceOfItems* described = nullptr;
+  if (dataset.findAndGetSequence(DCM_PerFrameFunctionalGroupsSequence, described).good() &&
+      described != nullptr && described->card() != static_cast<unsigned long>(layout.frames))
+    return unusable("(0028,0008)",
+                    fmt::format("{} frames, and (5200,9230) describes {}", layout.frames, described->card()),
                     "Export the series again.");
   if (whole(DCM_SamplesPerPixel, 1) != 1 || (layout.bits_allocated != 8 && layout.bits_allocated != 16) ||
       !in_range(layout.bits_stored, layout.bits_allocated))
@@ -668,6 +673,13 @@ DicomContent read_headers(const std::filesystem::path& file) {
       return content;
     }
     content.images.push_back(header_of(dataset, frame, *plane, items));
+    if (content.images.back().slope == 0) {
+      content.images.clear();
+      content.fault =
+          unusable("(0028,1053)", fmt::format("a rescale slope of 0 makes frame {} blank", frame + 1),
+                   "Export the original images.");
+      return content;
+    }
   }
   return content;
 }

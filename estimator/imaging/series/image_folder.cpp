@@ -295,12 +295,13 @@ class Sorter {
         if (header(image).trigger_ms) {
           times_ms.back().push_back(*header(image).trigger_ms);
         } else if (slice.images.size() > 1) {
-          complain(Severity::error, "no-trigger-time",
-                   fmt::format("TriggerTime (0018,1060) is absent: the {} images of this slice cannot be put "
-                               "in order of time",
-                               slice.images.size()),
-                   image, static_cast<double>(slice.images.size()), "images",
-                   "Export the original gated images; anonymising tools may have removed the time.");
+          complain(
+              Severity::error, "no-trigger-time",
+              fmt::format("TriggerTime (0018,1060), or (0020,9153) of a file of many frames, is absent or no "
+                          "time of a cycle: the {} images of this slice cannot be put in order of time",
+                          slice.images.size()),
+              image, static_cast<double>(slice.images.size()), "images",
+              "Export the original gated images; anonymising tools may have removed the time.");
           return;
         }
       }
@@ -344,7 +345,9 @@ class Sorter {
                "lost.");
     const double step_ms = (times_ms.back() - times_ms.front()) / static_cast<double>(times_ms.size() - 1);
     constexpr double late = 1.5;  // steps after the trigger
-    if (times_ms.front() > late * step_ms)
+    // Series of one protocol are alike in this.
+    if (times_ms.front() > late * step_ms &&
+        late_.insert(std::lround(times_ms.front() / trigger_resolution_ms)).second)
       complain(Severity::warning, "first-phase-late",
                fmt::format("the first phase is at {:.0f} ms, {:.1f} steps after the trigger",
                            times_ms.front(), times_ms.front() / step_ms),
@@ -499,7 +502,16 @@ class Sorter {
   /// What lies between its neighbours by no motion is left out: tracking goes across the gap.
   void check_order(SliceImages& slice) {
     if (slice.images.size() > most_phases_compared) return;
-    const PhaseOrder order = order_of_phases(pixels(slice.images));
+    const std::vector<Image> phases = pixels(slice.images);
+    if (phases.size() > 2 && !damaged_.contains(folder_.images[slice.images.front()].file) &&
+        std::ranges::all_of(phases, [&](const Image& one) { return (one == phases[0]).all(); })) {
+      complain(Severity::error, "phases-copied",
+               fmt::format("all {} images of this slice have the same pixels", phases.size()),
+               slice.images.front(), static_cast<double>(phases.size()), "images",
+               "Export the original images: no two that were measured are alike to the last bit.");
+      return;
+    }
+    const PhaseOrder order = order_of_phases(phases);
     const auto time_ms = [&](size_t phase) { return header(slice.images[phase]).trigger_ms.value_or(0); };
     for (const PhaseOrder::LeftOut& out : order.left_out) {
       const size_t image = slice.images[out.phase];
@@ -507,10 +519,15 @@ class Sorter {
       complain(Severity::warning, out.same_as ? "phase-copied" : "phase-unlike",
                out.same_as ? fmt::format("the image at {:.0f} ms has the pixels of {}", time_ms(out.phase),
                                          folder_.file_name(slice.images[*out.same_as]))
-                           : fmt::format("the image at {:.0f} ms is unlike those before and after it, {:.1f} "
-                                         "times as far from them as they "
-                                         "are from each other",
-                                         time_ms(out.phase), out.times_farther),
+               : out.phase + 1 == slice.images.size()
+                   ? fmt::format(
+                         "the last image, at {:.0f} ms, is unlike all others, {:.1f} times as far from any "
+                         "of them as two in succession are from each other",
+                         time_ms(out.phase), out.times_farther)
+                   : fmt::format("the image at {:.0f} ms is unlike those before and after it, {:.1f} "
+                                 "times as far from them as they "
+                                 "are from each other",
+                                 time_ms(out.phase), out.times_farther),
                image, time_ms(out.phase), "ms",
                "It is left out, and tracking goes across the gap. Is it spoilt, or is its trigger time "
                "(0018,1060) another image's?");
@@ -570,13 +587,32 @@ class Sorter {
       if (series.kind == SeriesKind::tagged_cine &&
           (most == nullptr || series.phases.times_ms.size() > most->phases.times_ms.size()))
         most = &series;
-    if (most == nullptr || together == most->phases.times_ms.size()) return;
+    if (most == nullptr) return;
+    if (together == most->phases.times_ms.size()) {
+      report_shorter(*most);
+      return;
+    }
     complain(Severity::warning, "phases-differ",
              fmt::format("the tagged series were taken at different times: {} phases of theirs together, and "
                          "{} in series {}",
                          together, most->phases.times_ms.size(), most->number),
              most->slices.front().images.front(), static_cast<double>(together), "frames",
              "Each has a frame of its own. Do all belong to one protocol and one specimen?");
+  }
+
+  /// A series that begins later or ends earlier than others leaves no gap of its own.
+  void report_shorter(const ImageSeries& most) {
+    for (const ImageSeries& series : folder_.series) {
+      if (series.kind != SeriesKind::tagged_cine) continue;
+      const size_t lacking = most.phases.times_ms.size() - series.phases.times_ms.size();
+      if (lacking == 0) continue;
+      complain(Severity::warning, "phases-fewer",
+               fmt::format("its tagged series has {} phases, from {:.0f} to {:.0f} ms, and series {} has {}",
+                           series.phases.times_ms.size(), series.phases.times_ms.front(),
+                           series.phases.times_ms.back(), most.number, most.phases.times_ms.size()),
+               series.slices.front().images.front(), static_cast<double>(lacking), "phases",
+               "It is tracked as far as it goes. Export it again if some of its images are lost.");
+    }
   }
 
   /// A folder in which nothing is encoded and nothing moves holds nothing to measure.
@@ -595,6 +631,7 @@ class Sorter {
   ImageFolder& folder_;
   std::mutex damaging_;
   std::set<size_t> damaged_;  // files
+  std::set<long> late_;       // first times that are told, in steps that trigger times can differ by
 };
 
 }  // namespace

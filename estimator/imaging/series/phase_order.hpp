@@ -2,8 +2,10 @@
 // Whether the images of a slice follow each other as a motion's do: the farther apart in time, the farther apart in place, but where the motion
 // turns, and there it is slow.
 //
-// Images are compared by the mean square of their difference, noise included. One that belongs elsewhere is as far off as a period of the tags
-// makes: four times what a phase moves, and twice as far from both neighbours as they are from each other.
+// Images are compared by the mean square of their difference. One that belongs elsewhere is as far off as a period of the tags
+// makes: four times what a phase moves, noise included, and twice as far from both neighbours as they are from each other. Two that have each
+// other's time make the motion turn back twice more than it does without, and make its way longer by a usual step: that is judged without the
+// noise. It is not seen where the motion turns or rests, where it costs little.
 
 #include <optional>
 #include <vector>
@@ -17,7 +19,8 @@ struct PhaseOrder {
     size_t phase;
     std::optional<size_t>
         same_as;  ///< the neighbour that has the same pixels: which of the two they are, nobody knows
-    double times_farther = 0;  ///< from its neighbours, else, than they are from each other
+    double times_farther =
+        0;  ///< from its neighbours, else, than they are from each other; the last one from all others than any two in succession
   };
   struct Exchange {
     size_t first, second;

@@ -273,8 +273,8 @@ class Application {
     }
     if (edit_.tag < least - 1 || edit_.tag > most + 1)
       refuse(fmt::format("tag {} is not in {}", edit_.tag, view.name),
-             fmt::format("Tags {:.0f} to {:.0f} cross it in this direction.", std::ceil(least),
-                         std::floor(most)));
+             fmt::format("Tags {} to {} cross it in this direction.", std::lround(std::ceil(least)),
+                         std::lround(std::floor(most))));
     std::vector<SeenTag> seen;
     const auto see = [&](const Eigen::Vector2d& x_mm) {
       seen.push_back({static_cast<int>(direction), edit_.tag, x_mm});

@@ -6,6 +6,8 @@
 #include <vector>
 
 #include "estimator/cli/study_images.hpp"
+#include "estimator/io/tracking_file.hpp"
+#include "estimator/io/whole_file.hpp"
 #include "tests/estimator/imaging/tagged_ring.hpp"
 #include "tests/estimator/io/scratch_file.hpp"
 
@@ -55,6 +57,18 @@ TEST_F(StudyImages, AreTrackedOnceForTheSameImages) {
   EXPECT_EQ(tags(), first);
   EXPECT_EQ(fs::last_write_time(first), written);
   EXPECT_EQ(tracked(), 1U);
+}
+
+TEST_F(StudyImages, AreKeptWithWhatAReportShowsOfThem) {
+  const auto record = [&] {
+    Study study = study_;
+    return use_images(study).value();
+  };
+  const fs::path kept = record();
+  EXPECT_EQ(tracking_record_from_json(read_whole_file(kept), kept.string()).slices.size(), 1U);
+  fs::remove(kept);
+  EXPECT_EQ(record(), kept);
+  EXPECT_TRUE(fs::is_regular_file(kept));
 }
 
 TEST_F(StudyImages, AreTrackedAnewForOtherImagesOrAnotherPose) {

@@ -8,8 +8,10 @@
 
 #include <fstream>
 #include <functional>
+#include <random>
 
 #include "estimator/imaging/series/image_folder.hpp"
+#include "estimator/imaging/series/phase_order.hpp"
 #include "tests/estimator/imaging/finding_ids.hpp"
 #include "tests/estimator/imaging/tagged_ring.hpp"
 #include "tests/estimator/io/scratch_file.hpp"
@@ -89,6 +91,111 @@ TEST(DamagedImages, TimesThatAreExchangedOrRunBackwardsAreRefused) {
               HasSubstr("the images at 228 and 444 ms seem to have each other's time"));
   EXPECT_THAT(told([&](int phase) { return scan.time_ms(scan.phases + 1 - phase); }),
               HasSubstr("the order of time is wrong"));
+}
+
+TEST(DamagedImages, NeighboursOfWhichEachHasTheOthersTimeAreFoundInAMotionThatGoesOn) {
+  const ScratchFolder scratch;
+  const RingScan scan{.phases = 16};
+  const auto files = write_ring(scan, scratch.path());
+  const auto swap_times = [&](int one, int other) {
+    for (const auto& [phase, time] : {std::pair(one, other), std::pair(other, one)}) {
+      const fs::path& path = files[static_cast<size_t>(phase) - 1];
+      rewrite(path, pixels_of(path), [&, at = time](DcmDataset& data) {
+        data.putAndInsertString(DCM_TriggerTime, std::to_string(scan.time_ms(at)).c_str());
+      });
+    }
+    return finding_ids(read_image_folder(scratch.path()));
+  };
+  for (const int phase : {4, 5, 11, 12}) {
+    EXPECT_THAT(swap_times(phase, phase + 1), ElementsAre("phases-exchanged")) << phase;
+    write_ring(scan, scratch.path());
+  }
+}
+
+TEST(DamagedImages, ALastPhaseThatIsUnlikeAllOthersIsLeftOut) {
+  const ScratchFolder scratch;
+  const auto files = write_ring({.phases = 12}, scratch.path());
+  Pixels moved = pixels_of(files.back());
+  std::rotate(moved.begin(), moved.begin() + 3, moved.end());
+  rewrite(files.back(), moved);
+  const ImageFolder folder = read_image_folder(scratch.path());
+  EXPECT_THAT(finding_ids(folder), ElementsAre("phase-unlike"));
+  EXPECT_EQ(folder.series.at(0).slices.at(0).images.size(), 11U);
+}
+
+/// A stripe pattern that is shifted by `moved` and fades, with noise.
+std::vector<Image> shifted_stripes(const std::vector<double>& moved, std::mt19937& random) {
+  std::normal_distribution<float> noise(0.0F, 0.05F);
+  std::vector<Image> phases;
+  for (size_t phase = 0; phase < moved.size(); ++phase) {
+    const double depth = 1.0 - 0.2 * static_cast<double>(phase) / static_cast<double>(moved.size());
+    Image image(64, 64);
+    for (Eigen::Index row = 0; row < 64; ++row)
+      for (Eigen::Index column = 0; column < 64; ++column)
+        image(row, column) =
+            static_cast<float>(depth * std::cos(static_cast<double>(column) - moved[phase])) + noise(random);
+    phases.push_back(std::move(image));
+  }
+  return phases;
+}
+
+TEST(DamagedImages, ACineThatMostlyRestsKeepsItsOrder) {
+  std::mt19937 random(5);
+  for (int draw = 0; draw < 6; ++draw) {
+    std::vector<double> moved(20, 0.0);
+    moved[8] = 0.5;
+    moved[9] = 1.0;
+    moved[10] = 0.5;
+    EXPECT_FALSE(order_of_phases(shifted_stripes(moved, random)).exchange) << draw;
+  }
+}
+
+TEST(DamagedImages, AMotionThatFallsFasterThanItRisesKeepsItsOrder) {
+  std::mt19937 random(3);
+  for (const int falling : {1, 2, 4, 8}) {
+    std::vector<double> moved;
+    for (int phase = 0; phase < 16; ++phase) {
+      const int rising = 15 - falling;
+      moved.push_back(phase <= rising ? static_cast<double>(phase) / rising
+                                      : static_cast<double>(15 - phase) / falling);
+    }
+    std::vector<Image> phases = shifted_stripes(moved, random);
+    const PhaseOrder order = order_of_phases(phases);
+    EXPECT_FALSE(order.exchange) << falling;
+    EXPECT_EQ(order.kept.size(), 16U) << falling;
+    if (falling == 1) continue;  // one step is most of the motion
+    std::swap(phases[4], phases[5]);
+    EXPECT_TRUE(order_of_phases(phases).exchange) << falling;
+  }
+}
+
+TEST(DamagedImages, PhasesThatAreAllOneImageAreRefused) {
+  const ScratchFolder scratch;
+  const auto files = write_ring({}, scratch.path());
+  for (const fs::path& file : files)
+    rewrite(file, pixels_of(files[0]));
+  EXPECT_THAT(test::message_of([&] { require_sound(read_image_folder(scratch.path())); }),
+              HasSubstr("all 8 images of this slice have the same pixels"));
+}
+
+TEST(DamagedImages, ASeriesThatEndsBeforeTheOthersIsTold) {
+  const ScratchFolder scratch;
+  write_ring({}, scratch.path());
+  const auto files = write_ring({.tag_angle_deg = 135, .series = 3}, scratch.path(), "other");
+  for (const size_t lost : {5U, 6U, 7U})
+    fs::remove(files[lost]);
+  const ImageFolder folder = read_image_folder(scratch.path());
+  EXPECT_THAT(finding_ids(folder), ElementsAre("phases-fewer"));
+  EXPECT_THAT(folder.problems.at(0).what, HasSubstr("has 5 phases, from 12 to 300 ms, and series 2 has 8"));
+}
+
+TEST(DamagedImages, ASlopeOfZeroIsRefused) {
+  const ScratchFolder scratch;
+  const auto files = write_ring({}, scratch.path());
+  rewrite(files[2], pixels_of(files[2]),
+          [](DcmDataset& data) { data.putAndInsertString(DCM_RescaleSlope, "0"); });
+  EXPECT_THAT(test::message_of([&] { require_sound(read_image_folder(scratch.path())); }),
+              HasSubstr("a rescale slope of 0 makes frame 1 blank"));
 }
 
 TEST(DamagedImages, NoSoundPhaseIsLeftOut) {

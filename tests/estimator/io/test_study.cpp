@@ -198,6 +198,14 @@ TEST_F(StudyFile, AFittedVentricleIsAMeshFile) {
   EXPECT_EQ(std::get<MeshSpecimen>(read(content).specimen).file, folder_.path() / "heart.mesh.toml");
 }
 
+TEST_F(StudyFile, AxesOfAMirrorAreRefused) {
+  const std::string content =
+      std::string(ventricle) +
+      "\n[images.to_specimen]\norigin_mm = [0.0, 0.0, 0.0]\nx_axis = [1.0, 0.0, 0.0]\n"
+      "y_axis = [0.0, 1.0, 0.0]\nz_axis = [0.0, 0.0, -1.0]\n";
+  EXPECT_THAT(message_of([&] { (void)read(content); }), AllOf(HasSubstr("z_axis"), HasSubstr("a mirror's")));
+}
+
 TEST_F(StudyFile, AnEllipsoidThatCannotBeIsRefused) {
   const auto message_when = [&](std::string_view old, std::string_view replacement) {
     std::string content = ventricle;

@@ -14,6 +14,7 @@
 #include "estimator/report/html_text.hpp"
 #include "estimator/report/page.hpp"
 #include "protocol/contract/input_error.hpp"
+#include "protocol/contract/json_text.hpp"
 #include "protocol/contract/named_members.hpp"
 #include "tools/diastole/batch/batch_run.hpp"
 #include "tools/diastole/commands.hpp"
@@ -109,7 +110,7 @@ void print_json(const Batch& batch, const std::vector<JobEnd>& ends) {
                           {"failed", count_of(ends, JobState::failed)},
                           {"waiting", count_of(ends, JobState::waiting)},
                           {"jobs", jobs}};
-  std::cout << json.dump(1) << '\n';
+  std::cout << json_text(json, 1) << '\n';
 }
 
 ExitCode run(const BatchOptions& options, const CommandOutput& out) {

@@ -22,6 +22,7 @@
 
 #include "estimator/io/whole_file.hpp"
 #include "protocol/contract/input_error.hpp"
+#include "protocol/contract/json_text.hpp"
 
 namespace diastole::batch {
 namespace {
@@ -186,7 +187,7 @@ JobEnd run_job(const Batch& batch, const Job& job, int processor, const RunOptio
   const json record{{"format", record_format},    {"arguments", job.arguments}, {"input_ns", input_ns},
                     {"exit_code", end.exit_code}, {"seconds", end.seconds},     {"result", end.result},
                     {"message", end.message}};
-  write_whole_file(file_of(batch, job, ".job.json"), record.dump(1) + "\n");
+  write_whole_file(file_of(batch, job, ".job.json"), json_text(record, 1) + "\n");
   return end;
 }
 

@@ -15,6 +15,7 @@
 #include "estimator/report/page.hpp"
 #include "estimator/report/svg_plot.hpp"
 #include "protocol/contract/input_error.hpp"
+#include "protocol/contract/json_text.hpp"
 #include "protocol/runfile/reader.hpp"
 #include "protocol/runfile/run.hpp"
 
@@ -203,7 +204,7 @@ ExitCode catheter(const CatheterOptions& options, const CommandOutput& out) {
     fmt::print(stderr, "{}\n", remark);
   if (!options.page.empty()) write_whole_file(options.page, catheter_page(run, options.channel, response));
   if (out.json) {
-    std::cout << as_json(options, response).dump(2) << '\n';
+    std::cout << json_text(as_json(options, response), 2) << '\n';
     return ExitCode::done;
   }
   show(response);

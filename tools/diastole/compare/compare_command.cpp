@@ -10,6 +10,7 @@
 #include "estimator/report/html_text.hpp"
 #include "estimator/report/page.hpp"
 #include "protocol/contract/input_error.hpp"
+#include "protocol/contract/json_text.hpp"
 #include "protocol/contract/waiting_line.hpp"
 #include "protocol/runfile/reader.hpp"
 #include "tools/diastole/commands.hpp"
@@ -97,7 +98,7 @@ ExitCode compare_runs(const CompareOptions& options, const CommandOutput& out) {
   if (out.json) {
     Json document = written(found);
     document["page"] = options.page.empty() ? Json() : Json(options.page.string());
-    std::cout << document.dump(2) << '\n';
+    std::cout << json_text(document, 2) << '\n';
     return ExitCode::done;
   }
   show(found);

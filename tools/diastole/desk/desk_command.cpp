@@ -12,6 +12,7 @@
 
 #include "estimator/imaging/tracking/tags_file.hpp"
 #include "estimator/io/whole_file.hpp"
+#include "protocol/contract/json_text.hpp"
 #include "tools/diastole/commands.hpp"
 #include "tools/diastole/desk/desk_server.hpp"
 
@@ -50,7 +51,7 @@ ExitCode run_desk(const DeskArguments& arguments, const CommandOutput& out) {
   desk::DeskServer server(session, arguments.port);
   const std::string url = server.url(), file = session.edits_file().string();
   if (out.json) {
-    std::cout << nlohmann::json{{"url", url}, {"edits", file}}.dump() << std::endl;
+    std::cout << json_text(nlohmann::json{{"url", url}, {"edits", file}}) << std::endl;
   } else {
     fmt::print("The desk: {}\nChoices go to {}\nCtrl-C ends it; nothing is lost.\n", url, file);
     std::fflush(stdout);

@@ -14,6 +14,7 @@
 #include "host/web/door.hpp"
 #include "host/web/request.hpp"
 #include "protocol/contract/input_error.hpp"
+#include "protocol/contract/json_text.hpp"
 #include "tools/diastole/desk/embedded.hpp"
 
 namespace diastole::desk {
@@ -105,7 +106,7 @@ class Desk {
   [[nodiscard]] Answer state() const {
     json state = session_.state();
     state["edits"] = session_.edits();
-    return {200, "application/json", state.dump()};
+    return {200, "application/json", json_text(state)};
   }
 
   DeskSession& session_;

@@ -14,6 +14,7 @@
 #include "estimator/parallel/parallel_for.hpp"
 #include "estimator/report/cine.hpp"
 #include "protocol/contract/input_error.hpp"
+#include "protocol/contract/json_text.hpp"
 
 namespace diastole::desk {
 namespace {
@@ -67,7 +68,7 @@ std::string DeskSession::file_text() const {
 void DeskSession::append(const std::string& choice) {
   std::string line;
   try {
-    line = json::parse(choice).dump();  // on one line, whatever came
+    line = json_text(json::parse(choice));  // on one line, whatever came
   } catch (const json::exception&) {
     throw InputError(
         {edits_file().string(), "", "the choice is no JSON: " + choice.substr(0, 60), "Send one object."});
@@ -189,7 +190,7 @@ std::string DeskSession::payload_of(const imaging::ManualEdits& edits, double se
       imaging::gathered(request, edits, std::move(slices), std::move(problems));
   if (tags_) write_whole_file(*tags_, imaging::tags_file_text(tracked.points));
   const TrackingRecord record = imaging::tracking_record(tracked, seconds);
-  return fmt::format(R"({{"html": {}, "record": {}}})", json(report::cine_players(record)).dump(),
+  return fmt::format(R"({{"html": {}, "record": {}}})", json_text(json(report::cine_players(record))),
                      to_json(record));
 }
 

@@ -20,6 +20,7 @@
 #include "host/runfile/output_guard.hpp"
 #include "host/runfile/writer.hpp"
 #include "protocol/contract/input_error.hpp"
+#include "protocol/contract/json_text.hpp"
 #include "protocol/runfile/reader.hpp"
 #include "tools/diastole/replay/operator.hpp"
 #include "tools/diastole/replay/replay_report.hpp"
@@ -224,11 +225,11 @@ void add_replay(CommandLine& line) {
     const std::optional<replay::ReplayReport> report = replay_run(*options);
     if (!report) {
       std::cerr << options->run << ": the replay was broken off; nothing was compared\n";
-      if (out.json) std::cout << json{{"broken_off", true}}.dump(2) << '\n';
+      if (out.json) std::cout << json_text(json{{"broken_off", true}}, 2) << '\n';
       return ExitCode::negative;
     }
     if (out.json) {
-      std::cout << replay::as_json(*report).dump(2) << '\n';
+      std::cout << json_text(replay::as_json(*report), 2) << '\n';
     } else {
       fmt::print("{}", replay::as_table(*report));
     }

@@ -11,6 +11,7 @@
 #include "estimator/io/whole_file.hpp"
 #include "estimator/report/page.hpp"
 #include "protocol/contract/input_error.hpp"
+#include "protocol/contract/json_text.hpp"
 #include "protocol/contract/named_members.hpp"
 #include "protocol/contract/table_reader.hpp"
 #include "tools/diastole/commands.hpp"
@@ -147,7 +148,7 @@ ExitCode runs(RunsOptions options, const CommandOutput& out) {
                   {"page", options.page.empty() ? json() : json(options.page.string())}};
     for (const Entry& entry : found.entries)
       document["entries"].push_back(entry_json(entry));
-    std::cout << document.dump(2) << '\n';
+    std::cout << json_text(document, 2) << '\n';
     return ExitCode::done;
   }
   if (!options.page.empty()) {

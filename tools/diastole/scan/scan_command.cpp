@@ -22,6 +22,7 @@
 #include "estimator/model/affected_model.hpp"
 #include "estimator/model/study_model.hpp"
 #include "protocol/contract/input_error.hpp"
+#include "protocol/contract/json_text.hpp"
 #include "tools/diastole/commands.hpp"
 #include "tools/sim_scanner/diffusion_scan.hpp"
 #include "tools/sim_scanner/phase_contrast_scan.hpp"
@@ -340,7 +341,7 @@ ExitCode scan_study(const ScanArguments& arguments, const CommandOutput& out) {
                                 {"view", one.view},
                                 {"tag_angles_deg", one.angles_deg},
                                 {"files", one.files}});
-    std::cout << json.dump(1) << '\n';
+    std::cout << json_text(json, 1) << '\n';
     return ExitCode::done;
   }
   for (const scanner::ScannedSeries& one : series)

@@ -6,6 +6,7 @@
 #include "estimator/io/whole_file.hpp"
 #include "estimator/report/page.hpp"
 #include "protocol/contract/input_error.hpp"
+#include "protocol/contract/json_text.hpp"
 #include "tools/diastole/commands.hpp"
 #include "tools/diastole/shape/drive_file.hpp"
 #include "tools/diastole/shape/shape_options.hpp"
@@ -55,7 +56,7 @@ ExitCode shape(const ShapeOptions& options, const CommandOutput& out) {
     document["drive"] = changed ? shaping::Json() : shaping::Json(options.drive.string());
     document["experiment"] = changed ? shaping::Json() : shaping::Json(experiment.string());
     document["page"] = options.page.empty() ? shaping::Json() : shaping::Json(options.page.string());
-    std::cout << document.dump(2) << '\n';
+    std::cout << json_text(document, 2) << '\n';
   } else {
     fmt::print("{}", shaping_words(shaping));
     if (changed) fmt::print("No drive was written: find what has changed first.\n");

@@ -13,6 +13,7 @@
 #include "host/cli/session_view.hpp"
 #include "host/runfile/output_guard.hpp"
 #include "protocol/contract/input_error.hpp"
+#include "protocol/contract/json_text.hpp"
 #include "tools/diastole/commands.hpp"
 #include "tools/diastole/shape/drive_file.hpp"
 #include "tools/diastole/shape/shape_options.hpp"
@@ -148,7 +149,7 @@ ExitCode ShapeSeries::carry_out(const std::string& output, bool force, const Acq
     document["drive"] = best(".csv");
     document["experiment"] = best(".experiment.toml");
     document["page"] = page_.empty() ? Json() : Json(page_.string());
-    std::cout << document.dump(2) << '\n';
+    std::cout << json_text(document, 2) << '\n';
   }
   return code;
 }

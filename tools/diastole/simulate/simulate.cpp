@@ -17,6 +17,7 @@
 #include "host/journal/part_file.hpp"
 #include "host/rpc/run_session.hpp"
 #include "protocol/contract/input_error.hpp"
+#include "protocol/contract/json_text.hpp"
 #include "protocol/contract/named_members.hpp"
 #include "tools/diastole/simulate/gated_volume.hpp"
 #include "tools/diastole/simulate/simulated_rig.hpp"
@@ -203,7 +204,7 @@ ExitCode report(const SimulatedSession& session, bool json) {
   const nlohmann::json document{DIASTOLE_NAMED(result, run, end, cycles, triggers, samples, gaps, expected),
                                 {"simulated_seconds", session.simulated_s},
                                 {"wall_seconds", session.wall_s}};
-  std::cout << document.dump(2) << '\n';
+  std::cout << json_text(document, 2) << '\n';
   return exit_code_of(result);
 }
 
