@@ -120,18 +120,6 @@ std::vector<Departure> departures(const rig::SessionProblem& problem, const Eige
   return list;
 }
 
-/// The place of a tone, as of any other misfit.
-Misfit misfit_of(const rig::Tone& tone, const rig::Session& session) {
-  return {
-      .port = std::string(name_of(Port::sensor)),
-      .run = session.runs[tone.run].drive.place.name + ".run.h5",
-      .channel = std::string(rig::name_of(rig::Signal::cavity)),
-      .segment = static_cast<int>(tone.segment),
-      .band_Hz = std::array{tone.frequency_Hz - tone.resolution_Hz, tone.frequency_Hz + tone.resolution_Hz},
-      .excess_chi2 = tone.excess_chi2,
-      .p_value = tone.p_value};
-}
-
 void require_known_tolerances(const rig::Session& session) {
   std::vector<std::string> known;
   for (const rig::Tolerance& tolerance : rig::all_tolerances())
@@ -265,9 +253,8 @@ Explanation explain_rig(const Study& study, const ExplainOptions& options) {
   out.summary += summary_of(out);
   if (verdict.tone)
     out.summary += fmt::format(
-        " The cavity's pressure holds a tone near {:.1f} Hz, {:.0f} Pa RMS or more, that no cycle makes: is "
-        "it "
-        "the mains, a ventilator, a table that shakes?",
+        " The cavity's pressure holds a tone near {:.1f} Hz, {:.0f} Pa RMS or more, that no cycle makes: "
+        "is it the mains, a ventilator, a table that shakes?",
         verdict.tone->frequency_Hz, 1e3 * verdict.tone->rms_kPa);
   return out;
 }

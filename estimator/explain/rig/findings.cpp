@@ -141,6 +141,17 @@ std::vector<Misfit> misfits(const rig::SessionProblem& problem, const EffectSet&
   return list;
 }
 
+Misfit misfit_of(const rig::Tone& tone, const rig::Session& session) {
+  return {
+      .port = std::string(name_of(Port::sensor)),
+      .run = file_of(session.runs[tone.run]),
+      .channel = std::string(name_of(rig::Signal::cavity)),
+      .segment = static_cast<int>(tone.segment),
+      .band_Hz = std::array{tone.frequency_Hz - tone.resolution_Hz, tone.frequency_Hz + tone.resolution_Hz},
+      .excess_chi2 = tone.excess_chi2,
+      .p_value = tone.p_value};
+}
+
 std::vector<Candidate> candidates(const EffectLibrary& known, const SetSearch& search,
                                   const SetVerdict& verdict) {
   std::vector<Candidate> list;

@@ -20,6 +20,9 @@ std::vector<ParameterShift> parameter_shifts(const rig::SessionProblem& problem,
 /// none, to the port that the channel suggests.
 std::vector<Misfit> misfits(const rig::SessionProblem& problem, const EffectSet& set, const EffectSet& under);
 
+/// The place of a tone: where it is clearest, with what all of the session shows of it.
+Misfit misfit_of(const rig::Tone& tone, const rig::Session& session);
+
 /// The evidence table.
 std::vector<Candidate> candidates(const EffectLibrary& known, const SetSearch& search,
                                   const SetVerdict& verdict);

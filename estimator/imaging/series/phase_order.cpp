@@ -71,22 +71,21 @@ Differences Differences::without_noise(const std::vector<size_t>& phases) const 
 }
 
 /// The last has one neighbour. A motion that jumps there goes where it has been.
-std::optional<PhaseOrder::LeftOut> unlike_all(const Differences& square, size_t phase, size_t count,
-                                              double usual) {
+std::optional<PhaseOrder::LeftOut> last_unlike_all(const Differences& square, size_t last, double usual) {
   double least = std::numeric_limits<double>::infinity(), largest_step = 0;
-  for (size_t k = 0; k < count; ++k) {
-    if (k != phase) least = std::min(least, square(phase, k));
-    if (k > 0 && k != phase && k - 1 != phase) largest_step = std::max(largest_step, square(k, k - 1));
+  for (size_t k = 0; k < last; ++k) {
+    least = std::min(least, square(last, k));
+    if (k > 0) largest_step = std::max(largest_step, square(k, k - 1));
   }
   if (least <= most_step * usual || least <= most_detour * largest_step) return {};
-  return PhaseOrder::LeftOut{phase, {}, std::sqrt(least / std::max(largest_step, 1e-300))};
+  return PhaseOrder::LeftOut{last, {}, std::sqrt(least / std::max(largest_step, 1e-300))};
 }
 
 std::optional<PhaseOrder::LeftOut> left_out(const Differences& square, size_t phase, size_t count,
                                             double usual) {
   if (phase == 0) return {};
   if (square(phase, phase - 1) == 0) return PhaseOrder::LeftOut{phase, phase - 1};
-  if (phase + 1 == count) return unlike_all(square, phase, count, usual);
+  if (phase + 1 == count) return last_unlike_all(square, phase, usual);
   if (square(phase, phase + 1) == 0) return PhaseOrder::LeftOut{phase, phase + 1};
   const double least = std::min(square(phase, phase - 1), square(phase, phase + 1));
   const double around = square(phase - 1, phase + 1);
