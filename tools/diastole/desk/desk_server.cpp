@@ -11,6 +11,7 @@
 #include <csignal>
 
 #include "estimator/report/cine.hpp"
+#include "host/web/console_stream.hpp"
 #include "host/web/door.hpp"
 #include "host/web/request.hpp"
 #include "protocol/contract/input_error.hpp"
@@ -116,7 +117,7 @@ class Desk {
 class Connection : public std::enable_shared_from_this<Connection> {
  public:
   Connection(Desk& desk, size_t& count, tcp::socket socket)
-      : desk_(desk), count_(count), stream_(std::move(socket)) {
+      : desk_(desk), count_(count), stream_(std::move(socket), nullptr) {
     ++count_;
   }
   ~Connection() { --count_; }
@@ -127,7 +128,7 @@ class Connection : public std::enable_shared_from_this<Connection> {
     parser_.emplace();
     parser_->header_limit(web::most_header_bytes);
     parser_->body_limit(most_body_bytes);
-    stream_.expires_after(patience);
+    stream_.tcp().expires_after(patience);
     http::async_read(stream_, buffer_, *parser_, [self = shared_from_this()](error_code error, size_t) {
       if (!error) self->reply(self->desk_.answer(self->parser_->get()));
     });
@@ -141,7 +142,7 @@ class Connection : public std::enable_shared_from_this<Connection> {
     response_.keep_alive(parser_->get().keep_alive());
     response_.body() = std::move(answer.body);
     response_.prepare_payload();
-    stream_.expires_after(patience);
+    stream_.tcp().expires_after(patience);
     http::async_write(stream_, response_, [self = shared_from_this()](error_code error, size_t) {
       if (!error && self->response_.keep_alive()) self->read();
     });
@@ -149,7 +150,7 @@ class Connection : public std::enable_shared_from_this<Connection> {
 
   Desk& desk_;
   size_t& count_;
-  beast::tcp_stream stream_;
+  web::ConsoleStream stream_;
   beast::flat_buffer buffer_;
   std::optional<http::request_parser<http::string_body>> parser_;
   Response response_;
