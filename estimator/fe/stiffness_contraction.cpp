@@ -34,14 +34,6 @@ StiffnessContraction::StiffnessContraction()
   }
 }
 
-void StiffnessContraction::contract() {
-  for (size_t q3 = 0; q3 < line_points; ++q3) {
-    contract_first(q3);
-    contract_second(q3);
-  }
-  contract_third();
-}
-
 DIASTOLE_ALSO_FOR_AVX2 void StiffnessContraction::contract_first(size_t q3) {
   for (size_t q2 = 0; q2 < line_points; ++q2) {
     const double* source = &moduli_[(q3 * 4 + q2) * 4 * moduli];
@@ -91,6 +83,14 @@ DIASTOLE_ALSO_FOR_AVX2 void StiffnessContraction::contract_third() {
       }
     }
   }
+}
+
+void StiffnessContraction::contract() {
+  for (size_t q3 = 0; q3 < line_points; ++q3) {
+    contract_first(q3);
+    contract_second(q3);
+  }
+  contract_third();
 }
 
 }  // namespace diastole
