@@ -218,6 +218,7 @@ MatrixXd CondensedFactor::solve_condensed(MatrixXd right_sides) const {
   dense.x = right_sides.data();
   dense.xtype = CHOLMOD_REAL;
   dense.dtype = CHOLMOD_DOUBLE;
+  keep_openmp_serial();
   cholmod_dense* solved = cholmod_solve(CHOLMOD_A, factor_, &dense, &common_);
   if (solved == nullptr) throw std::bad_alloc();
   std::copy_n(static_cast<const double*>(solved->x), right_sides.size(), right_sides.data());

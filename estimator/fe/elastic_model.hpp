@@ -16,7 +16,7 @@
 //   Eigen::Vector3d dx_dP = model.mesh().value(by.pressure, {element, xi});
 //
 // Equations: element_mechanics.hpp, cavity_load.hpp; Newton's method: newton.hpp; load steps: load_path.hpp.
-// Units: mm, kPa, mL. A model is used by one thread at a time (it works in parallel itself).
+// Units: mm, kPa, mL. A model is used by one thread at a time (it works in parallel itself, as set_threads says).
 
 #include <memory>
 #include <optional>
@@ -51,6 +51,11 @@ class ElasticModel {
   ElasticModel(HermiteMesh mesh, const Law& law, const ElasticOptions& options)
       : system_(std::make_unique<ElasticSystem>(std::move(mesh), law, options)),
         solve_options_(options.solve) {}
+  /// A copy may work in another thread; it shares the ordering of the tangent and the factor that was kept.
+  ElasticModel(const ElasticModel& other)
+      : system_(std::make_unique<ElasticSystem>(*other.system_)), solve_options_(other.solve_options_) {}
+  ElasticModel(ElasticModel&&) = default;
+  ElasticModel& operator=(ElasticModel&&) = default;
 
   [[nodiscard]] const HermiteMesh& mesh() const { return system_->mesh(); }
   [[nodiscard]] const Law& law() const { return system_->law(); }

@@ -63,8 +63,9 @@ ElasticSystem::ElasticSystem(HermiteMesh mesh, const Law& law, const ElasticOpti
       volume_stiffness_kPa_(options.volume_stiffness_kPa),
       compressibility_per_kPa_(options.bulk_modulus_kPa ? 1.0 / *options.bulk_modulus_kPa : 0.0),
       threads_(options.threads > 0 ? options.threads : machine_threads()),
-      equations_(mesh_, held_, pressures_, equation_options(options, mesh_)),
-      skew_(equations_, cavity_.free_rim()),
+      equations_(
+          std::make_shared<const EquationSystem>(mesh_, held_, pressures_, equation_options(options, mesh_))),
+      skew_(std::make_shared<const RimSkew>(*equations_, cavity_.free_rim())),
       factor_(equations_, skew_) {
   for (size_t e = 0; e < mesh_.element_count(); ++e) {
     parameters_.insert(parameters_.end(), options.parameters.begin(), options.parameters.end());
@@ -139,30 +140,31 @@ void ElasticSystem::add_area(const FluidSurface& surface, const NodeField& posit
   for (const FluidFace& face : surface.faces()) {
     const size_t element = face.face.element;
     const FaceField on_face = face.area_mm2(mesh_.gather(element, position_mm));
-    equations_.add_force(element, over_element(face.face, factor * on_face), target);
+    equations_->add_force(element, over_element(face.face, factor * on_face), target);
   }
 }
 
 std::vector<double> ElasticSystem::cavity_area(const ElasticState& state) const {
-  std::vector<double> area(equations_.unknowns(state.held_volume_mm3.has_value()), 0.0);
+  std::vector<double> area(equations_->unknowns(state.held_volume_mm3.has_value()), 0.0);
   add_area(cavity_, state.position_mm, 1.0, area);
   return area;
 }
 
 SystemResidual ElasticSystem::residual(const ElasticState& state) const {
   SystemResidual total;
-  total.values.assign(equations_.unknowns(state.held_volume_mm3.has_value()), 0.0);
+  total.values.assign(equations_->unknowns(state.held_volume_mm3.has_value()), 0.0);
   add_fluids(state, total.values);
   add_springs(state, total);
-  const std::span<double> pressure_rows = std::span(total.values).subspan(equations_.displacement_unknowns());
+  const std::span<double> pressure_rows =
+      std::span(total.values).subspan(equations_->displacement_unknowns());
   std::vector<double> energies(mesh_.element_count());
   std::vector<LeastVolumeRatio> least(mesh_.element_count());
-  for (const std::vector<size_t>& colour : equations_.colours()) {
+  for (const std::vector<size_t>& colour : equations_->colours()) {
     parallel_for(colour.size(), threads_, [&](size_t i) {
       const size_t e = colour[i];
       const ElementResidual local =
           element_residual(reference_[e], element_state(state, e), *law_, parameters(e));
-      equations_.add_force(e, local.force, total.values);
+      equations_->add_force(e, local.force, total.values);
       for (size_t m = 0; m < corners; ++m)
         pressure_rows[pressures_.unknown[e][m]] += local.volume_mm3[m];
       energies[e] = local.energy;
@@ -186,11 +188,11 @@ SystemResidual ElasticSystem::residual(const ElasticState& state) const {
 void ElasticSystem::add_fluids(const ElasticState& state, std::span<double> residual) const {
   add_area(cavity_, state.position_mm, -state.pressure_kPa, residual);
   if (state.held_volume_mm3)
-    residual[equations_.fluid_rows().back().unknown] = *state.held_volume_mm3 - cavity_volume_mm3(state);
+    residual[equations_->fluid_rows().back().unknown] = *state.held_volume_mm3 - cavity_volume_mm3(state);
   if (!chamber_) return;
   add_area(chamber_wall_, state.position_mm, -state.chamber_pressure_kPa, residual);
   if (chamber_->sealed()) {
-    residual[equations_.fluid_rows().front().unknown] =
+    residual[equations_->fluid_rows().front().unknown] =
         chamber_intake_mm3(state) - mm3_per_mL * chamber_->compliance_mL_per_kPa *
                                         (state.chamber_pressure_kPa - state.sealing_pressure_kPa);
   }
@@ -205,56 +207,56 @@ void ElasticSystem::add_springs(const ElasticState& state, SystemResidual& total
     FaceField force_on_face;
     force_on_face.reshaped() = spring.stiffness * on_face.reshaped();
     const ElementField force = over_element(spring.face, force_on_face);
-    equations_.add_force(element, force, total.values);
+    equations_->add_force(element, force, total.values);
     total.bond_energy_uJ += 0.5 * force.cwiseProduct(displacement).sum();
   }
 }
 
 void ElasticSystem::add_fluid_rows(const ElasticState& state, std::span<double> values) const {
   const auto fill = [&](const FluidRow& row, const FluidSurface& surface, double compliance_mm3_per_kPa) {
-    std::vector<double> area(equations_.displacement_unknowns(), 0.0);
+    std::vector<double> area(equations_->displacement_unknowns(), 0.0);
     add_area(surface, state.position_mm, 1.0, area);
     for (size_t n = 0; n < row.columns.size(); ++n)
       values[row.entry + n] = -area[row.columns[n]];
     values[row.diagonal()] = -compliance_mm3_per_kPa;
   };
   if (chamber_ && chamber_->sealed())
-    fill(equations_.fluid_rows().front(), chamber_wall_, mm3_per_mL * chamber_->compliance_mL_per_kPa);
-  if (state.held_volume_mm3) fill(equations_.fluid_rows().back(), cavity_, 0.0);
+    fill(equations_->fluid_rows().front(), chamber_wall_, mm3_per_mL * chamber_->compliance_mL_per_kPa);
+  if (state.held_volume_mm3) fill(equations_->fluid_rows().back(), cavity_, 0.0);
 }
 
 std::vector<double> ElasticSystem::tangent(const ElasticState& state, double probing_stiffness_kPa) const {
-  std::vector<double> values(equations_.entries(state.held_volume_mm3.has_value()), 0.0);
-  for (const std::vector<size_t>& colour : equations_.colours()) {
+  std::vector<double> values(equations_->entries(state.held_volume_mm3.has_value()), 0.0);
+  for (const std::vector<size_t>& colour : equations_->colours()) {
     parallel_for(colour.size(), threads_, [&](size_t i) {
       thread_local ElementTangent local;
       const size_t e = colour[i];
       ElementState element = element_state(state, e);
       element.probing_stiffness_kPa = probing_stiffness_kPa;
       element_tangent(reference_[e], element, *law_, parameters(e), local);
-      equations_.add_tangent(e, local, values);
-      if (compressibility_per_kPa_ > 0.0) equations_.add_compliance(e, local.compliance, values);
+      equations_->add_tangent(e, local, values);
+      if (compressibility_per_kPa_ > 0.0) equations_->add_compliance(e, local.compliance, values);
     });
   }
   const auto add_faces = [&](const FluidSurface& surface, double pressure_kPa) {
     for (const FluidFace& face : surface.faces()) {
       const size_t element = face.face.element;
-      equations_.add_face_tangent(element, face_hermite_functions(face.face),
-                                  face.tangent_mm(mesh_.gather(element, state.position_mm)), -pressure_kPa,
-                                  values);
+      equations_->add_face_tangent(element, face_hermite_functions(face.face),
+                                   face.tangent_mm(mesh_.gather(element, state.position_mm)), -pressure_kPa,
+                                   values);
     }
   };
   add_faces(cavity_, state.pressure_kPa);
   add_faces(chamber_wall_, state.chamber_pressure_kPa);
   for (const SpringFace& spring : springs_)
-    equations_.add_face_tangent(spring.face.element, face_hermite_functions(spring.face), spring.stiffness,
-                                1.0, values);
+    equations_->add_face_tangent(spring.face.element, face_hermite_functions(spring.face), spring.stiffness,
+                                 1.0, values);
   add_fluid_rows(state, values);
   return values;
 }
 
 std::vector<double> ElasticSystem::skew_tangent(const ElasticState& state) const {
-  return skew_.values(mesh_, state.position_mm, -state.pressure_kPa);
+  return skew_->values(mesh_, state.position_mm, -state.pressure_kPa);
 }
 
 ElasticSystem::NodalForces ElasticSystem::nodal_forces(const ElasticState& state) const {
@@ -288,14 +290,14 @@ ElasticSystem::NodalForces ElasticSystem::nodal_forces(const ElasticState& state
 void ElasticSystem::add_parameter_residual(const ElasticState& state, size_t parameter,
                                            std::span<const size_t> elements, std::span<double> target) const {
   const auto add = [&](size_t e) {
-    equations_.add_force(
+    equations_->add_force(
         e, element_parameter_force(reference_[e], element_state(state, e), *law_, parameters(e), parameter),
         target);
     if (compressibility_per_kPa_ == 0.0) return;
     const double rest_rise = trace(law_->stress_sensitivity(undeformed, parameters(e), parameter)) / 3.0;
     const std::array<double, corners> volume_mm3 = pressure_volume_mm3(reference_[e]);
     for (size_t m = 0; m < corners; ++m) {
-      target[equations_.displacement_unknowns() + pressures_.unknown[e][m]] +=
+      target[equations_->displacement_unknowns() + pressures_.unknown[e][m]] +=
           compressibility_per_kPa_ * rest_rise * volume_mm3[m];
     }
   };
@@ -309,7 +311,7 @@ void ElasticSystem::add_parameter_residual(const ElasticState& state, size_t par
 
 FactorResult ElasticSystem::factorise(const ElasticState& state) {
   std::vector<double> values = tangent(state);
-  if (!skew_.empty()) return factor_.factorise_general(values, skew_tangent(state));
+  if (!skew_->empty()) return factor_.factorise_general(values, skew_tangent(state));
   return factor_.factorise_symmetric(values, state.held_volume_mm3.has_value());
 }
 
@@ -331,7 +333,7 @@ Stability ElasticSystem::stability(const ElasticState& state) {
   const size_t needed = pressure_unknowns(state);
   const FactorResult exact = inertia(state, 0.0);
   Stability found{.negative_pivots = exact.negative_pivots};
-  if (!skew_.empty()) return found;
+  if (!skew_->empty()) return found;
   found.singular = exact.singular;
   if (found.singular) return found;
   found.unstable_motions = 0;
@@ -349,22 +351,22 @@ ElasticState ElasticSystem::moved(const ElasticState& state, std::span<const dou
                                   double fraction) const {
   ElasticState next = state;
   for (size_t dof = 0; dof < next.position_mm.size(); ++dof) {
-    const size_t equation = equations_.equation(dof);
+    const size_t equation = equations_->equation(dof);
     if (equation != EquationSystem::none) next.position_mm[dof] += fraction * step[equation];
   }
   for (size_t i = 0; i < pressures_.count; ++i) {
-    next.lagrange_pressure_kPa[i] += fraction * step[equations_.displacement_unknowns() + i];
+    next.lagrange_pressure_kPa[i] += fraction * step[equations_->displacement_unknowns() + i];
   }
   if (chamber_ && chamber_->sealed())
-    next.chamber_pressure_kPa += fraction * step[equations_.fluid_rows().front().unknown];
-  if (state.held_volume_mm3) next.pressure_kPa += fraction * step[equations_.fluid_rows().back().unknown];
+    next.chamber_pressure_kPa += fraction * step[equations_->fluid_rows().front().unknown];
+  if (state.held_volume_mm3) next.pressure_kPa += fraction * step[equations_->fluid_rows().back().unknown];
   return next;
 }
 
 NodeField ElasticSystem::node_field(std::span<const double> unknowns) const {
   NodeField field(mesh_.node_count() * dofs_per_node, 0.0);
   for (size_t dof = 0; dof < field.size(); ++dof) {
-    const size_t equation = equations_.equation(dof);
+    const size_t equation = equations_->equation(dof);
     if (equation != EquationSystem::none) field[dof] = unknowns[equation];
   }
   return field;

@@ -8,6 +8,7 @@
 // chamber's fluid,  - (V(x) - V(X)) - C (q - p0) = 0  (chamber.hpp).
 
 #include <array>
+#include <memory>
 #include <optional>
 #include <span>
 #include <vector>
@@ -74,7 +75,7 @@ class ElasticSystem {
 
   [[nodiscard]] const HermiteMesh& mesh() const { return mesh_; }
   [[nodiscard]] const Law& law() const { return *law_; }
-  [[nodiscard]] const EquationSystem& equations() const { return equations_; }
+  [[nodiscard]] const EquationSystem& equations() const { return *equations_; }
   [[nodiscard]] const PressureMap& pressures() const { return pressures_; }
   [[nodiscard]] const MaterialAxesField& material_axes() const { return material_axes_; }
   [[nodiscard]] double volume_stiffness_kPa() const { return volume_stiffness_kPa_; }
@@ -87,6 +88,8 @@ class ElasticSystem {
     return {&parameters_[element * count_], count_};
   }
 
+  /// How many threads share the elements.
+  void set_threads(size_t threads) { threads_ = threads; }
   /// Another stiffness of the material at an element's Gauss points; a factor is kept as it is.
   void set_stiffness(size_t element, const std::array<double, gauss_points>& stiffness);
   [[nodiscard]] const HeldDofs& held() const { return held_; }
@@ -104,7 +107,7 @@ class ElasticSystem {
   [[nodiscard]] double chamber_intake_mm3(const ElasticState& state) const;
   /// Unknowns that have a negative pivot each at a stable equilibrium.
   [[nodiscard]] size_t pressure_unknowns(const ElasticState& state) const {
-    return equations_.unknowns(state.held_volume_mm3.has_value()) - equations_.displacement_unknowns();
+    return equations_->unknowns(state.held_volume_mm3.has_value()) - equations_->displacement_unknowns();
   }
 
   /// What an element sees of a state.
@@ -115,7 +118,7 @@ class ElasticSystem {
   [[nodiscard]] std::vector<double> tangent(const ElasticState& state,
                                             double probing_stiffness_kPa = 0.0) const;
   /// The rest of it, where the cavity's wall has a free rim.
-  [[nodiscard]] const RimSkew& rim_skew() const { return skew_; }
+  [[nodiscard]] const RimSkew& rim_skew() const { return *skew_; }
   [[nodiscard]] std::vector<double> skew_tangent(const ElasticState& state) const;
   /// The cavity wall's area vectors, mm^2: minus the derivative of the residual with respect to the cavity
   /// pressure, and dV_cavity/d(unknown) if the cavity is closed.
@@ -182,8 +185,8 @@ class ElasticSystem {
   double volume_stiffness_kPa_;
   double compressibility_per_kPa_;
   size_t threads_;
-  EquationSystem equations_;
-  RimSkew skew_;
+  std::shared_ptr<const EquationSystem> equations_;
+  std::shared_ptr<const RimSkew> skew_;
   std::vector<ReferenceElement> reference_;
   TangentFactor factor_;
 };

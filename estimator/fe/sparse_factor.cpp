@@ -6,6 +6,7 @@
 // after cstdio: it names FILE
 #include <scotch/scotch.h>
 
+#include <mutex>
 #include <new>
 #include <stdexcept>
 #include <string>
@@ -29,7 +30,12 @@ struct SparseFactor::Instance {
   DMUMPS_STRUC_C mumps{};
   bool analysed = false;
 
+  /// MUMPS and SCOTCH keep numbers of their own for the whole process: one thread at a time.
   int run(int job) {
+    static std::mutex busy;
+    const std::scoped_lock lock(busy);
+    if (job == analyse)
+      SCOTCH_randomReset();  // else the ordering, and the last bits of solutions, depend on what was solved before
     mumps.job = job;
     dmumps_c(&mumps);
     return outcome(mumps, 1);
@@ -90,7 +96,6 @@ FactorResult SparseFactor::factorise(std::span<double> values) {
   constexpr int work_space_percent = 14;
   mumps.a = values.data();
   if (!instance_->analysed) {
-    SCOTCH_randomReset();  // else the ordering, and the last bits of solutions, depend on what was solved before
     instance_->check(instance_->run(analyse));
     instance_->analysed = true;
   }

@@ -49,9 +49,16 @@ class RimSkew {
 
 class TangentFactor {
  public:
-  /// Both must outlive the factor, at the same address.
-  TangentFactor(const EquationSystem& equations, const RimSkew& skew)
-      : equations_(&equations), skew_(&skew) {}
+  TangentFactor(std::shared_ptr<const EquationSystem> equations, std::shared_ptr<const RimSkew> skew)
+      : equations_(std::move(equations)), skew_(std::move(skew)) {}
+  /// The copy shares the ordering of condensed tangents and a condensed factor; other forms it factorises anew.
+  TangentFactor(const TangentFactor& other)
+      : equations_(other.equations_),
+        skew_(other.skew_),
+        may_condense_(other.may_condense_),
+        pattern_(other.pattern_),
+        condensed_(other.condensed_) {}
+  TangentFactor& operator=(const TangentFactor&) = delete;
 
   /// `values`: one for each of equations.entries(cavity_held). solve() uses this factor until the next call.
   FactorResult factorise_symmetric(std::span<double> values, bool cavity_held);
@@ -73,8 +80,8 @@ class TangentFactor {
   bool may_condense();
   void prepare_general();
 
-  const EquationSystem* equations_;
-  const RimSkew* skew_;
+  std::shared_ptr<const EquationSystem> equations_;
+  std::shared_ptr<const RimSkew> skew_;
   bool may_condense_ = true;
   std::shared_ptr<CondensedPattern> pattern_;
   std::shared_ptr<const CondensedFactor> condensed_;  // in use, if there is one

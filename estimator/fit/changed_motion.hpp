@@ -51,6 +51,7 @@ class ChangedMotion : public ElasticMotion {
  protected:
   std::optional<std::string> set_values(std::span<const double> values) override;
   MotionDerivatives derivatives_at(const ElasticState& state) override;
+  [[nodiscard]] bool frames_are_independent() const override { return false; }
 
  private:
   [[nodiscard]] Equilibrium equilibrium_at(size_t own_slot);

@@ -1,14 +1,21 @@
 #include "estimator/fit/elastic_motion.hpp"
 
+#include <algorithm>
+#include <atomic>
 #include <cmath>
 
 #include "estimator/fit/constrained_energy.hpp"
 #include "estimator/mesh/node_field.hpp"
+#include "estimator/parallel/parallel_for.hpp"
 
 namespace diastole {
 namespace {
 
 constexpr size_t most_entries_kept = 100'000'000;  // of all slots' factors: 0.8 GB
+
+MotionDerivatives derivatives_of(Sensitivities by) {
+  return {std::move(by.parameter), std::move(by.pressure)};
+}
 
 }  // namespace
 
@@ -31,13 +38,12 @@ std::optional<std::string> ElasticMotion::set_values(std::span<const double> val
 }
 
 MotionDerivatives ElasticMotion::derivatives_at(const ElasticState& state) {
-  Sensitivities by = model_.sensitivities(state, groups_);
-  return {std::move(by.parameter), std::move(by.pressure)};
+  return derivatives_of(model_.sensitivities(state, groups_));
 }
 
-std::shared_ptr<const CondensedFactor> ElasticMotion::factor_to_keep() {
-  const bool fit_in = slots_.size() * model_.system().factor_entries() <= most_entries_kept;
-  return fit_in ? model_.system().kept_factor() : nullptr;
+std::shared_ptr<const CondensedFactor> ElasticMotion::factor_to_keep(const ElasticModel& body) const {
+  const bool fit_in = slots_.size() * body.system().factor_entries() <= most_entries_kept;
+  return fit_in ? body.system().kept_factor() : nullptr;
 }
 
 // The slot itself, or on its first use the solved one of the nearest pressure.
@@ -52,9 +58,10 @@ const ElasticMotion::Slot* ElasticMotion::nearest(size_t slot, double pressure_k
   return best;
 }
 
-Solution ElasticMotion::solve_from(const Slot* start, std::span<const double> values, double pressure_kPa) {
+Solution ElasticMotion::solve_from(ElasticModel& body, const Slot* start, std::span<const double> values,
+                                   double pressure_kPa) {
   std::shared_ptr<const CondensedFactor> factor =
-      start != nullptr && start->factor ? start->factor : model_.system().kept_factor();
+      start != nullptr && start->factor ? start->factor : body.system().kept_factor();
   if (start != nullptr && start->derivatives) {
     ElasticState guess = start->state;
     add_scaled(guess.position_mm, pressure_kPa - guess.pressure_kPa, start->derivatives->by_pressure);
@@ -62,15 +69,15 @@ Solution ElasticMotion::solve_from(const Slot* start, std::span<const double> va
       add_scaled(guess.position_mm, values[i] - start->values[i], start->derivatives->by_value[i]);
     }
     guess.pressure_kPa = pressure_kPa;
-    Solution solution = model_.solve({pressure_kPa, guess.fibre_tension_kPa}, guess, factor);
+    Solution solution = body.solve({pressure_kPa, guess.fibre_tension_kPa}, guess, factor);
     if (solution.report.converged()) return solution;
   }
   if (start != nullptr) {
     Solution solution =
-        model_.solve({pressure_kPa, start->state.fibre_tension_kPa}, start->state, std::move(factor));
+        body.solve({pressure_kPa, start->state.fibre_tension_kPa}, start->state, std::move(factor));
     if (solution.report.converged()) return solution;
   }
-  return model_.solve(pressure_kPa, first_state());
+  return body.solve(pressure_kPa, first_state());
 }
 
 void ElasticMotion::begin_at(const ElasticMotion& other) {
@@ -81,7 +88,12 @@ void ElasticMotion::begin_at(const ElasticMotion& other) {
 
 MotionOutcome ElasticMotion::solve(size_t slot, std::span<const double> values, double pressure_kPa) {
   if (std::optional<std::string> reason = set_values(values)) return {std::nullopt, *std::move(reason)};
-  Solution solution = solve_from(nearest(slot, pressure_kPa), values, pressure_kPa);
+  return solve(model_, slot, values, pressure_kPa);
+}
+
+MotionOutcome ElasticMotion::solve(ElasticModel& body, size_t slot, std::span<const double> values,
+                                   double pressure_kPa) {
+  Solution solution = solve_from(body, nearest(slot, pressure_kPa), values, pressure_kPa);
   if (!solution.report.converged()) return {std::nullopt, solution.report.describe()};
   if (slots_.size() <= slot) slots_.resize(slot + 1);
   NodeField position_mm = solution.state.position_mm;
@@ -96,9 +108,52 @@ MotionDerivatives ElasticMotion::derivatives(size_t slot) {
   if (!solved.derivatives) {
     (void)set_values(solved.values);
     solved.derivatives = derivatives_at(solved.state);
-    solved.factor = factor_to_keep();
+    solved.factor = factor_to_keep(model_);
   }
   return *solved.derivatives;
+}
+
+void ElasticMotion::share(size_t count, const std::function<void(ElasticModel& body, size_t i)>& work) {
+  const size_t threads = std::min(count, machine_threads());
+  while (bodies_.size() < threads) {
+    bodies_.push_back(model_);
+    bodies_.back().system().set_threads(1);
+  }
+  std::atomic<size_t> next{0};
+  parallel_for(threads, threads, [&](size_t thread) {
+    for (size_t i = next++; i < count; i = next++)
+      work(bodies_[thread], i);
+  });
+}
+
+std::vector<MotionOutcome> ElasticMotion::solve_all(std::span<const double> values,
+                                                    std::span<const double> pressures_kPa) {
+  // A frame without a factor of its own would begin with the last one that its body used.
+  const bool have_factors =
+      slots_.size() == pressures_kPa.size() &&
+      std::ranges::all_of(slots_, [](const auto& slot) { return slot && slot->factor; });
+  if (!have_factors || !frames_are_independent()) return MotionModel::solve_all(values, pressures_kPa);
+  set_values(model_, groups_, values);
+  std::vector<MotionOutcome> outcomes(pressures_kPa.size());
+  share(outcomes.size(), [&](ElasticModel& body, size_t slot) {
+    set_values(body, groups_, values);
+    outcomes[slot] = solve(body, slot, values, pressures_kPa[slot]);
+  });
+  return outcomes;
+}
+
+void ElasticMotion::prepare_derivatives() {
+  // MUMPS, which factorises what cannot be condensed, is used by one thread at a time.
+  if (!frames_are_independent() || !model_.system().kept_factor()) return;
+  std::vector<Slot*> without;
+  for (std::optional<Slot>& slot : slots_)
+    if (slot && !slot->derivatives) without.push_back(&*slot);
+  share(without.size(), [&](ElasticModel& body, size_t i) {
+    Slot& slot = *without[i];
+    set_values(body, groups_, slot.values);
+    slot.derivatives = derivatives_of(body.sensitivities(slot.state, groups_));
+    slot.factor = factor_to_keep(body);
+  });
 }
 
 double ElasticMotion::stored_energy_mJ(size_t slot) {

@@ -1,8 +1,10 @@
 #pragma once
 // The finite-element model as the fit's motion model: values go to the law's parameters of all elements or of
-// one, and every frame starts from its own last equilibrium, moved along the exact sensitivities.
+// one, and every frame starts from its own last equilibrium, moved along the exact sensitivities. Frames that have one are solved
+// at the same time, each by a thread of its own; a frame's result does not depend on which.
 
 #include <cmath>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -24,6 +26,9 @@ class ElasticMotion : public MotionModel {
   [[nodiscard]] MotionOutcome solve(size_t slot, std::span<const double> values,
                                     double pressure_kPa) override;
   [[nodiscard]] MotionDerivatives derivatives(size_t slot) override;
+  [[nodiscard]] std::vector<MotionOutcome> solve_all(std::span<const double> values,
+                                                     std::span<const double> pressures_kPa) override;
+  void prepare_derivatives() override;
   [[nodiscard]] std::vector<ConsideredMotion> considered(size_t slot) override;
   /// constrained_energy.hpp.
   [[nodiscard]] EnergyDerivatives energy_derivatives(size_t slot) override;
@@ -50,6 +55,8 @@ class ElasticMotion : public MotionModel {
                                                   const MotionDerivatives& by);
   /// For differences by a value, on each side.
   static double step_of(double value) { return value != 0 ? 1e-4 * std::abs(value) : 1e-4; }
+  /// Whether a frame's motion is that of the model with these values, at its pressure, and nothing else.
+  [[nodiscard]] virtual bool frames_are_independent() const { return true; }
   /// Where a frame begins that has no earlier solution.
   [[nodiscard]] virtual ElasticState first_state() const { return model_.rest_state(); }
 
@@ -69,11 +76,18 @@ class ElasticMotion : public MotionModel {
   };
 
   /// Of the tangent that derivatives were made with; none where all slots' would take too much memory.
-  [[nodiscard]] std::shared_ptr<const CondensedFactor> factor_to_keep();
+  [[nodiscard]] std::shared_ptr<const CondensedFactor> factor_to_keep(const ElasticModel& body) const;
   [[nodiscard]] const Slot* nearest(size_t slot, double pressure_kPa) const;
-  [[nodiscard]] Solution solve_from(const Slot* start, std::span<const double> values, double pressure_kPa);
+  /// By a body that has the values.
+  [[nodiscard]] MotionOutcome solve(ElasticModel& body, size_t slot, std::span<const double> values,
+                                    double pressure_kPa);
+  [[nodiscard]] Solution solve_from(ElasticModel& body, const Slot* start, std::span<const double> values,
+                                    double pressure_kPa);
+  /// Calls work(body, i) for 0 <= i < count, on as many threads as the machine has, each with a body of its own.
+  void share(size_t count, const std::function<void(ElasticModel& body, size_t i)>& work);
 
   ElasticModel model_;
+  std::vector<ElasticModel> bodies_;  // copies of it, one a thread
   std::vector<ParameterGroup> groups_;
   std::vector<ConsideredError> considered_;
   std::vector<std::optional<Slot>> slots_;

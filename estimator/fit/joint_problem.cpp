@@ -6,6 +6,16 @@
 
 namespace diastole {
 
+std::vector<MotionOutcome> MotionModel::solve_all(std::span<const double> values,
+                                                  std::span<const double> pressures_kPa) {
+  std::vector<MotionOutcome> outcomes;
+  for (size_t slot = 0; slot < pressures_kPa.size(); ++slot) {
+    outcomes.push_back(solve(slot, values, pressures_kPa[slot]));
+    if (!outcomes.back().position_mm) break;
+  }
+  return outcomes;
+}
+
 double MotionModel::stored_energy_mJ(size_t) { throw std::logic_error("a model without an energy"); }
 
 EnergyDerivatives MotionModel::energy_derivatives(size_t) {
@@ -146,15 +156,15 @@ bool JointProblem::solve_frames(const Eigen::VectorXd& q) {
   std::vector<double> values = space_.values(q);
   values.resize(static_cast<size_t>(values_));
   if (imaged_) model_.set_imaged_pressure(imaged_pressure_at(q));
-  for (size_t slot = 0; slot < frames_.size(); ++slot) {
+  std::vector<MotionOutcome> outcomes = model_.solve_all(values, pressures_at(q));
+  forward_solves_ += static_cast<int>(outcomes.size());
+  for (size_t slot = 0; slot < outcomes.size(); ++slot) {
     LoadedFrame& frame = frames_[slot];
-    ++forward_solves_;
-    MotionOutcome outcome = model_.solve(slot, values, pressure_at(frame, q));
-    if (!outcome.position_mm) {
-      failure_ = fmt::format("frame {} has no equilibrium: {}", frame.number, outcome.reason);
+    if (!outcomes[slot].position_mm) {
+      failure_ = fmt::format("frame {} has no equilibrium: {}", frame.number, outcomes[slot].reason);
       return false;
     }
-    frame.position_mm = std::move(*outcome.position_mm);
+    frame.position_mm = *std::move(outcomes[slot].position_mm);
   }
   solved_at_ = q;
   return true;
@@ -239,6 +249,7 @@ Eigen::MatrixXd JointProblem::jacobian(const Eigen::VectorXd& q) {
 Eigen::MatrixXd JointProblem::plain_jacobian(const Eigen::VectorXd& q) {
   Eigen::MatrixXd result = Eigen::MatrixXd::Zero(rows(), unknowns());
   const Eigen::Index first_plane = unknowns() - planes_.unknowns();
+  model_.prepare_derivatives();
   Eigen::Index row = 0;
   for (size_t slot = 0; slot < frames_.size(); ++slot) {
     const LoadedFrame& frame = frames_[slot];

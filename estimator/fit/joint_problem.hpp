@@ -88,6 +88,11 @@ class MotionModel {
                                             double pressure_kPa) = 0;
   /// At the slot's last successful `solve`.
   [[nodiscard]] virtual MotionDerivatives derivatives(size_t slot) = 0;
+  /// `solve` of slots 0, 1, ... at these pressures; may end after the first frame without an equilibrium. A model may work on several
+  /// frames at the same time, and so prepare the derivatives of all that were solved.
+  [[nodiscard]] virtual std::vector<MotionOutcome> solve_all(std::span<const double> values,
+                                                             std::span<const double> pressures_kPa);
+  virtual void prepare_derivatives() {}
   /// What the body has stored since frame 0, and its derivatives; likewise. Throw std::logic_error in a model that has no energy.
   [[nodiscard]] virtual double stored_energy_mJ(size_t slot);
   [[nodiscard]] virtual EnergyDerivatives energy_derivatives(size_t slot);

@@ -37,6 +37,7 @@ class UnloadedMotion : public ElasticMotion {
  protected:
   std::optional<std::string> set_values(std::span<const double> values) override;
   MotionDerivatives derivatives_at(const ElasticState& state) override;
+  [[nodiscard]] bool frames_are_independent() const override { return false; }
   [[nodiscard]] double stored_at(const ElasticState& state) const override;
   /// By differences along the shape's own derivatives.
   EnergyDerivatives energy_derivatives_at(const ElasticState& state, std::span<const double> values,

@@ -45,7 +45,7 @@ class SpecimenFamily final : public SpecimenCurves {
   /// Of the study's own specimen and law, its parameters at their starts divided by the modulus.
   [[nodiscard]] const SpecimenCurve& plain() const override;
   /// Begins to compute plain() and the low-fidelity neighbours beside other work, so that they are at hand when asked for. One
-  /// thread: the BLAS under the solver bears no more. Stopped by the destructor, after the curve at work.
+  /// thread: the other work has the rest. Stopped by the destructor, after the curve at work.
   void compute_ahead();
   /// The first parameter of the law in kPa: all of the law's moduli are scaled with it.
   [[nodiscard]] double modulus_start_kPa() const { return modulus_kPa_; }

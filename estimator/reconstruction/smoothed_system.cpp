@@ -104,6 +104,7 @@ void SmoothedSystem::factorise_without_smoothness(double amplitude_mm) {
 Eigen::VectorXd SmoothedSystem::solution() const { return solve(right_side_); }
 
 Eigen::MatrixXd SmoothedSystem::solve(const Eigen::MatrixXd& right_sides) const {
+  keep_openmp_serial();
   Eigen::MatrixXd solution = factor_.solve(right_sides);
   // Where CHOLMOD finds no solution, Eigen gives back nothing at all.
   if (solution.rows() != right_sides.rows())

@@ -8,8 +8,7 @@
 //
 // H⁻¹ is the covariance of q if the field were drawn from the prior that λ stands for (Wahba 1983, J. R. Stat.
 // Soc. B 45:133): its standard errors hold the mean square of smoothing's own bias as well as the noise.
-// Never two at the same time, not even different instances: the BLAS that CHOLMOD calls (OpenBLAS built for one
-// thread) has one work space for the process, and gives wrong products when two threads share it.
+// One thread at a time; different instances at the same time.
 
 #include <Eigen/CholmodSupport>
 #include <span>

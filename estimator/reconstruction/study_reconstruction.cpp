@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <mutex>
 
 #include "estimator/model/study_model.hpp"
 #include "estimator/motion_residuals/motion_residuals.hpp"
+#include "estimator/parallel/parallel_for.hpp"
 #include "estimator/reconstruction/measurement_findings.hpp"
 #include "estimator/reconstruction/stiffness_check.hpp"
 #include "protocol/contract/input_error.hpp"
@@ -35,16 +37,6 @@ LocatorOptions locator_for(const HermiteMesh& mesh) {
   return {.outside_xi = std::clamp(farthest_outside_mm / std::max(thinnest_mm, 1e-3), 0.25, 1.0)};
 }
 
-/// The frames in their order; or, where one λ must do for all, the most loaded one first, which determines it best.
-std::vector<int> in_order_of_work(std::vector<int> frames, const Measurement& measurement, bool quick) {
-  if (!quick) return frames;
-  const auto load_kPa = [&](int frame) {
-    return std::abs(measurement.frames[static_cast<size_t>(frame)].pressure_kPa);
-  };
-  std::stable_sort(frames.begin(), frames.end(), [&](int a, int b) { return load_kPa(a) > load_kPa(b); });
-  return frames;
-}
-
 void reconstruct_frames(StudyReconstruction& result, const Measurement& measurement,
                         const std::vector<int>& frames, const ReconstructionOptions& options) {
   FrameOptions frame_options{
@@ -54,13 +46,27 @@ void reconstruct_frames(StudyReconstruction& result, const Measurement& measurem
     frame_options.fineness = quick_fineness;
     frame_options.huber_rounds = quick_huber_rounds;
   }
-  for (const int frame : in_order_of_work(frames, measurement, options.quick)) {
-    result.fields.push_back(reconstruct_frame(*result.forms, measurement, frame, frame_options));
-    if (options.quick) frame_options.lambda = result.fields.front().smoothing.lambda;
-    if (options.on_frame) options.on_frame(result.fields.size(), frames.size());
+  result.fields.resize(frames.size());
+  std::mutex reporting;
+  size_t done = 0;
+  const auto reconstruct = [&](size_t i) {
+    result.fields[i] = reconstruct_frame(*result.forms, measurement, frames[i], frame_options);
+    const std::scoped_lock lock(reporting);
+    if (options.on_frame) options.on_frame(++done, frames.size());
+  };
+  // Where one λ must do for all, the most loaded frame determines it best.
+  std::optional<size_t> first;
+  if (options.quick) {
+    const auto most = std::ranges::max_element(frames, {}, [&](int frame) {
+      return std::abs(measurement.frames[static_cast<size_t>(frame)].pressure_kPa);
+    });
+    first = static_cast<size_t>(most - frames.begin());
+    reconstruct(*first);
+    frame_options.lambda = result.fields[*first].smoothing.lambda;
   }
-  std::sort(result.fields.begin(), result.fields.end(),
-            [](const FrameField& a, const FrameField& b) { return a.number < b.number; });
+  parallel_for(frames.size(), machine_threads(), [&](size_t i) {
+    if (i != first) reconstruct(i);
+  });
 }
 
 void sample_fields(StudyReconstruction& result, const ReconstructionOptions& options) {

@@ -129,7 +129,7 @@ const std::vector<Rule>& rules() {
       {"estimator/fit",
        {"protocol/contract", "protocol/signal", "estimator/effects", "estimator/fe", "estimator/inference",
         "estimator/io", "estimator/mesh", "estimator/model", "estimator/motion_residuals",
-        "estimator/solution"}},
+        "estimator/parallel", "estimator/solution"}},
       {"estimator/reconstruction",
        {"protocol/contract", "protocol/signal", "estimator/fe", "estimator/io", "estimator/mesh",
         "estimator/model", "estimator/motion_residuals", "estimator/parallel", "estimator/solution"}},

@@ -186,6 +186,27 @@ TEST(Fit, StopsAtTheIterationLimitAndSaysSo) {
   EXPECT_EQ(fit.iterations, 1);
 }
 
+/// To the bit: a frame's result depends on neither the thread nor the frames beside it.
+TEST(Fit, FramesAtTheSameTimeAreThoseOneAfterAnother) {
+  const std::vector<double> start(8, 8.0), later{8.2, 7.9, 8.4, 7.7, 8.1, 8.0, 7.6, 8.3};
+  const std::vector<double> pressures_kPa{0.6, 1.2, 1.8, 2.4, 3.0};
+  ElasticMotion at_once(coarse_gel(8), each_element(0, 8)), in_turn(coarse_gel(8), each_element(0, 8));
+  for (const std::vector<double>& values : {start, later}) {
+    const std::vector<MotionOutcome> outcomes = at_once.solve_all(values, pressures_kPa);
+    ASSERT_EQ(outcomes.size(), pressures_kPa.size());
+    for (size_t slot = 0; slot < pressures_kPa.size(); ++slot) {
+      const MotionOutcome alone = in_turn.solve(slot, values, pressures_kPa[slot]);
+      EXPECT_EQ(outcomes[slot].position_mm.value(), alone.position_mm.value());
+    }
+    at_once.prepare_derivatives();
+    for (size_t slot = 0; slot < pressures_kPa.size(); ++slot) {
+      const MotionDerivatives together = at_once.derivatives(slot), alone = in_turn.derivatives(slot);
+      EXPECT_EQ(together.by_value, alone.by_value);
+      EXPECT_EQ(together.by_pressure, alone.by_pressure);
+    }
+  }
+}
+
 /// A body without equilibrium.
 class NoMotion : public MotionModel {
  public:
