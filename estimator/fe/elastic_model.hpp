@@ -16,7 +16,7 @@
 //   Eigen::Vector3d dx_dP = model.mesh().value(by.pressure, {element, xi});
 //
 // Equations: element_mechanics.hpp, cavity_load.hpp; Newton's method: newton.hpp; load steps: load_path.hpp.
-// Units: mm, kPa, mL. A model is used by one thread at a time (it works in parallel itself, as set_threads says).
+// Units: mm, kPa, mL. A model is used by one thread at a time (it works in parallel itself, as ElasticSystem::set_threads says).
 
 #include <memory>
 #include <optional>

@@ -115,6 +115,11 @@ MotionDerivatives ElasticMotion::derivatives(size_t slot) {
 
 void ElasticMotion::share(size_t count, const std::function<void(ElasticModel& body, size_t i)>& work) {
   const size_t threads = std::min(count, machine_threads());
+  if (threads == 1) {
+    for (size_t i = 0; i < count; ++i)
+      work(model_, i);
+    return;
+  }
   while (bodies_.size() < threads) {
     bodies_.push_back(model_);
     bodies_.back().system().set_threads(1);

@@ -83,7 +83,8 @@ class ElasticMotion : public MotionModel {
                                     double pressure_kPa);
   [[nodiscard]] Solution solve_from(ElasticModel& body, const Slot* start, std::span<const double> values,
                                     double pressure_kPa);
-  /// Calls work(body, i) for 0 <= i < count, on as many threads as the machine has, each with a body of its own.
+  /// Calls work(body, i) for 0 <= i < count, on as many threads as the machine has, each with a body of its own, which work gives its
+  /// values.
   void share(size_t count, const std::function<void(ElasticModel& body, size_t i)>& work);
 
   ElasticModel model_;

@@ -185,7 +185,7 @@ FitOutcome fit_motion(MotionModel& model, const std::vector<EstimatedParameter>&
   if (options.robustness == Robustness::always) problem.set_robust(RobustLoss::for_deviation(1));
   // Which points lie on the body depends on the motion, and how smooth the values are depends on the data: search
   // again while a better motion finds more points or another smoothness.
-  bool again = true, sought_anew = false;
+  bool again = true;
   for (int search = 0; search < most_searches; ++search) {
     const std::optional<size_t> gained = problem.find_points(q);
     if (!gained) {
@@ -206,11 +206,7 @@ FitOutcome fit_motion(MotionModel& model, const std::vector<EstimatedParameter>&
     const bool stalled = found.termination == Termination::stalled;
     // Tags that come and go from trial to trial make the cost jump: without them it goes on. So do wild ones that change
     // sides: under a loss that hardly feels them it goes on, too, if the residuals ask for one.
-    const bool some_lost = stalled && problem.give_up_lost() > 0;
-    // Its tags are sought again where they are, once: a wild one may have two places.
-    const bool found_anew = stalled && !some_lost && !sought_anew && problem.robust();
-    sought_anew = sought_anew || found_anew;
-    again = some_lost || found_anew;
+    again = stalled && problem.give_up_lost() > 0;
     if (!outcome.converged() && !stalled) break;
   }
   if (outcome.converged() && options.correction) {

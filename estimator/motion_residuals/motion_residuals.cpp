@@ -200,6 +200,7 @@ void MotionResiduals::find_tags(size_t slot, const HermiteMesh& mesh, const Poin
     ResidualRow& row =
         rows_.emplace_back(ResidualRow{.slot = slot, .source = i, .sigma_mm = tags_[i].sigma_mm});
     row.found_residual = put(row, *matches[i]);
+    row.found_point = row.point;
   }
 }
 
@@ -239,8 +240,10 @@ bool MotionResiduals::follow(const HermiteMesh& mesh, const PointLocator& refere
     const TagPoint& tag = tags_[row.source];
     const size_t e = row.point.element;
     std::optional<double> residual;
-    if (how == Following::closely) residual = follow_closely(row, reference.elements()[e], position[e], tag);
-    const auto match = residual ? std::nullopt : match_tag(reference, position, tag, row.point);
+    const bool closely = how == Following::closely;
+    if (closely) residual = follow_closely(row, reference.elements()[e], position[e], tag);
+    const MaterialPoint& guess = closely ? row.point : row.found_point;
+    const auto match = residual ? std::nullopt : match_tag(reference, position, tag, guess);
     if (match) residual = put(row, *match);
     return residual;
   };

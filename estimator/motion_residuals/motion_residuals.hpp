@@ -37,7 +37,8 @@ struct ResidualRow {
   Eigen::Vector3d X_mm = Eigen::Vector3d::Zero();
   Eigen::Vector3d by_motion = Eigen::Vector3d::Zero();     ///< of the residual; zero while lost
   Eigen::Vector3d by_reference = Eigen::Vector3d::Zero();  ///< - F^T by_motion
-  double found_residual = 0.0;                             ///< in the motion of `find`
+  MaterialPoint found_point{};                             ///< in the motion of `find`
+  double found_residual = 0.0;                             ///< likewise
   bool was_lost = false;                                   ///< in some motion since
 };
 
@@ -50,7 +51,8 @@ struct FoundPoints {
   size_t points_left_out = 0;
 };
 
-/// exactly: each tag is matched anew. closely: one step of that search from where the tag was, right to second order in the
+/// exactly: each tag is matched anew, from where `find` found it: its residual depends on the motion alone, not on those tried before, even
+/// where a wild tag has two places. closely: one step of that search from where the tag was, right to second order in the
 /// change since the last motion; exact where that is large.
 enum class Following { exactly, closely };
 
