@@ -5,8 +5,6 @@
 #include <numeric>
 #include <utility>
 
-#include "estimator/parallel/serial_openmp.hpp"
-
 namespace diastole {
 namespace {
 
@@ -29,38 +27,33 @@ std::shared_ptr<CondensedPattern> CondensedPattern::of(size_t displacements, siz
   std::shared_ptr<CondensedPattern> pattern(new CondensedPattern);
   pattern->displacements_ = displacements;
   pattern->pressures_ = pressures;
-  cholmod_start(&pattern->common_);
-  pattern->common_.print = 0;
   if (pressures == 0 ||
       std::ranges::any_of(columns, [&](int column) { return column > static_cast<int>(displacements); }))
     return nullptr;
-  pattern->map_displacements(rows, columns);
-  return pattern->map_pressures(rows, columns) && pattern->analyse() ? pattern : nullptr;
+  return pattern->map_displacements(rows, columns) && pattern->map_pressures(rows, columns) ? pattern
+                                                                                            : nullptr;
 }
 
-CondensedPattern::~CondensedPattern() {
-  cholmod_free_factor(&ordering_, &common_);
-  cholmod_finish(&common_);
-}
-
-void CondensedPattern::map_displacements(std::span<const int> rows, std::span<const int> columns) {
+bool CondensedPattern::map_displacements(std::span<const int> rows, std::span<const int> columns) {
   const auto is_stored = [&](size_t n) { return rows[n] <= static_cast<int>(displacements_); };
-  column_starts_.assign(displacements_ + 1, 0);
+  std::vector<int> starts(displacements_ + 1, 0);
   for (size_t n = 0; n < rows.size(); ++n) {
-    if (is_stored(n)) ++column_starts_[static_cast<size_t>(rows[n])];
+    if (is_stored(n)) ++starts[static_cast<size_t>(rows[n])];
   }
-  std::partial_sum(column_starts_.begin(), column_starts_.end(), column_starts_.begin());
-  std::vector<int> next(column_starts_.begin(), column_starts_.end() - 1);
-  entries_.resize(static_cast<size_t>(column_starts_.back()));
+  std::partial_sum(starts.begin(), starts.end(), starts.begin());
+  std::vector<int> next(starts.begin(), starts.end() - 1);
+  entries_.resize(static_cast<size_t>(starts.back()));
   for (size_t n = 0; n < rows.size(); ++n) {
     if (is_stored(n)) entries_[static_cast<size_t>(next[static_cast<size_t>(rows[n] - 1)]++)] = n;
   }
   for (size_t j = 0; j < displacements_; ++j) {
-    std::sort(entries_.begin() + column_starts_[j], entries_.begin() + column_starts_[j + 1],
+    std::sort(entries_.begin() + starts[j], entries_.begin() + starts[j + 1],
               [&](size_t a, size_t b) { return columns[a] < columns[b]; });
   }
-  rows_.resize(entries_.size());
-  std::ranges::transform(entries_, rows_.begin(), [&](size_t n) { return columns[n] - 1; });
+  std::vector<int> stored_rows(entries_.size());
+  std::ranges::transform(entries_, stored_rows.begin(), [&](size_t n) { return columns[n] - 1; });
+  matrix_ = CholeskyPattern::of(std::move(starts), std::move(stored_rows));
+  return matrix_ != nullptr;
 }
 
 bool CondensedPattern::map_pressures(std::span<const int> rows, std::span<const int> columns) {
@@ -84,47 +77,17 @@ bool CondensedPattern::map_pressures(std::span<const int> rows, std::span<const 
 }
 
 bool CondensedPattern::map_places(Group& group) const {
+  const std::vector<int>&starts = matrix_->column_starts(), &rows = matrix_->rows();
   for (auto column = group.displacements.begin(); column != group.displacements.end(); ++column) {
-    auto stored = rows_.begin() + column_starts_[static_cast<size_t>(*column)];
-    const auto end = rows_.begin() + column_starts_[static_cast<size_t>(*column) + 1];
+    auto stored = rows.begin() + starts[static_cast<size_t>(*column)];
+    const auto end = rows.begin() + starts[static_cast<size_t>(*column) + 1];
     for (auto row = group.displacements.begin(); row != column + 1; ++row) {
       stored = std::find(stored, end, *row);
       if (stored == end) return false;
-      group.places.push_back(static_cast<int>(stored - rows_.begin()));
+      group.places.push_back(static_cast<int>(stored - rows.begin()));
     }
   }
   return true;
-}
-
-cholmod_sparse CondensedPattern::matrix(double* values) const {
-  cholmod_sparse matrix{};
-  matrix.nrow = matrix.ncol = displacements_;
-  matrix.nzmax = rows_.size();
-  matrix.p = const_cast<int*>(column_starts_.data());
-  matrix.i = const_cast<int*>(rows_.data());
-  matrix.x = values;
-  matrix.stype = 1;
-  matrix.itype = CHOLMOD_INT;
-  matrix.xtype = values == nullptr ? CHOLMOD_PATTERN : CHOLMOD_REAL;
-  matrix.dtype = CHOLMOD_DOUBLE;
-  matrix.sorted = matrix.packed = 1;
-  return matrix;
-}
-
-bool CondensedPattern::analyse() {
-  common_.supernodal = CHOLMOD_SUPERNODAL;
-  common_.nmethods = 1;
-  common_.method[0].ordering = CHOLMOD_METIS;
-  cholmod_sparse pattern = matrix(nullptr);
-  ordering_ = cholmod_analyze(&pattern, &common_);
-  return ordering_ != nullptr;
-}
-
-CondensedFactor::CondensedFactor(std::shared_ptr<const CondensedPattern> pattern)
-    : pattern_(std::move(pattern)) {
-  cholmod_start(&common_);
-  common_.print = 0;
-  common_.supernodal = CHOLMOD_SUPERNODAL;
 }
 
 std::shared_ptr<const CondensedFactor> CondensedFactor::of(std::shared_ptr<const CondensedPattern> pattern,
@@ -133,12 +96,8 @@ std::shared_ptr<const CondensedFactor> CondensedFactor::of(std::shared_ptr<const
   std::vector<double> matrix(factor->pattern_->entries_.size());
   std::ranges::transform(factor->pattern_->entries_, matrix.begin(), [&](size_t n) { return values[n]; });
   factor->condense(values, matrix);
-  return factor->factorise(matrix) ? factor : nullptr;
-}
-
-CondensedFactor::~CondensedFactor() {
-  cholmod_free_factor(&factor_, &common_);
-  cholmod_finish(&common_);
+  factor->factor_ = CholeskyFactor::of(factor->pattern_->matrix_, matrix, least_pivot);
+  return factor->factor_ ? factor : nullptr;
 }
 
 void CondensedFactor::condense(std::span<const double> values, std::vector<double>& matrix) {
@@ -166,34 +125,6 @@ void CondensedFactor::condense(std::span<const double> values, std::vector<doubl
   }
 }
 
-bool CondensedFactor::factorise(std::vector<double>& matrix) {
-  cholmod_sparse sparse = pattern_->matrix(matrix.data());
-  keep_openmp_serial();
-  factor_ = cholmod_copy_factor(pattern_->ordering_, &common_);
-  cholmod_factorize(&sparse, factor_, &common_);
-  if (common_.status == CHOLMOD_OUT_OF_MEMORY) throw std::bad_alloc();
-  if (common_.status != CHOLMOD_OK || factor_->minor < pattern_->displacements_) return false;
-  // The diagonal of a supernodal factor: each supernode is a dense block, its own columns' rows first.
-  const auto* supernodes = static_cast<const int*>(factor_->super);
-  const auto* row_starts = static_cast<const int*>(factor_->pi);
-  const auto* block_starts = static_cast<const int*>(factor_->px);
-  const auto* permutation = static_cast<const int*>(factor_->Perm);
-  const auto* numbers = static_cast<const double*>(factor_->x);
-  for (size_t s = 0; s < factor_->nsuper; ++s) {
-    const int rows = row_starts[s + 1] - row_starts[s];
-    for (int j = 0; j < supernodes[s + 1] - supernodes[s]; ++j) {
-      const double root = numbers[block_starts[s] + j * rows + j];
-      const int column = permutation[supernodes[s] + j];
-      const double diagonal =
-          matrix[static_cast<size_t>(pattern_->column_starts_[static_cast<size_t>(column) + 1] - 1)];
-      if (!(root * root > least_pivot * diagonal)) return false;
-    }
-  }
-  return true;
-}
-
-size_t CondensedFactor::entries() const { return factor_->xsize; }
-
 void CondensedFactor::add_pull(const MatrixXd& pressures, MatrixXd& displacements) const {
   for (size_t g = 0; g < coupling_.size(); ++g) {
     const CondensedPattern::Group& group = pattern_->groups_[g];
@@ -208,22 +139,6 @@ void CondensedFactor::add_growth(const MatrixXd& displacements, MatrixXd& pressu
     const MatrixXd moved = displacements(group.displacements, Eigen::all);
     pressures(group.pressures, Eigen::all) += coupling_[g] * moved;
   }
-}
-
-MatrixXd CondensedFactor::solve_condensed(MatrixXd right_sides) const {
-  cholmod_dense dense{};
-  dense.nrow = dense.d = static_cast<size_t>(right_sides.rows());
-  dense.ncol = static_cast<size_t>(right_sides.cols());
-  dense.nzmax = static_cast<size_t>(right_sides.size());
-  dense.x = right_sides.data();
-  dense.xtype = CHOLMOD_REAL;
-  dense.dtype = CHOLMOD_DOUBLE;
-  keep_openmp_serial();
-  cholmod_dense* solved = cholmod_solve(CHOLMOD_A, factor_, &dense, &common_);
-  if (solved == nullptr) throw std::bad_alloc();
-  std::copy_n(static_cast<const double*>(solved->x), right_sides.size(), right_sides.data());
-  cholmod_free_dense(&solved, &common_);
-  return right_sides;
 }
 
 void CondensedFactor::solve(std::span<double> right_sides, size_t count) const {
@@ -243,7 +158,7 @@ void CondensedFactor::solve_corrected(std::span<double> right_sides, size_t coun
   for (int correction = 0; correction <= corrections; ++correction) {
     const MatrixXd weighted = weights_.asDiagonal() * growth;
     add_pull(-weighted, pull);
-    const MatrixXd change = solve_condensed(std::move(pull));
+    const MatrixXd change = factor_->solve(std::move(pull));
     columns.topRows(displacements) += change;
     add_growth(change, growth);
     const MatrixXd pressure_change = weights_.asDiagonal() * growth;

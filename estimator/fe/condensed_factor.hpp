@@ -1,6 +1,6 @@
 #pragma once
-// The tangent of incompressible material without its Lagrange pressures, factorised by CHOLMOD (supernodal Cholesky,
-// ordered by METIS's nested dissection):
+// The tangent of incompressible material without its Lagrange pressures, factorised by Cholesky's method
+// (estimator/sparse):
 //
 //   K u + B' p = f      B u = g        has the solution of        (K + B' W B) u + B' p = f + B' W g,   B u = g,
 //
@@ -12,12 +12,12 @@
 // Only where each pressure meets displacements that all meet one another (those of one element): condensation then adds no
 // entry.
 
-#include <cholmod.h>
-
 #include <Eigen/Dense>
 #include <memory>
 #include <span>
 #include <vector>
+
+#include "estimator/sparse/sparse_cholesky.hpp"
 
 namespace diastole {
 
@@ -28,9 +28,6 @@ class CondensedPattern {
   /// be condensed (see above), or has other unknowns after the pressures.
   static std::shared_ptr<CondensedPattern> of(size_t displacements, size_t pressures,
                                               std::span<const int> rows, std::span<const int> columns);
-  ~CondensedPattern();
-  CondensedPattern(const CondensedPattern&) = delete;
-  CondensedPattern& operator=(const CondensedPattern&) = delete;
 
  private:
   friend class CondensedFactor;
@@ -45,20 +42,16 @@ class CondensedPattern {
   };
 
   CondensedPattern() = default;
-  void map_displacements(std::span<const int> rows, std::span<const int> columns);
+  /// Whether the matrix can be factorised.
+  bool map_displacements(std::span<const int> rows, std::span<const int> columns);
   bool map_pressures(std::span<const int> rows, std::span<const int> columns);
   bool map_places(Group& group) const;
-  bool analyse();
-  /// The matrix over the displacements, upper triangle; its values are `values`.
-  [[nodiscard]] cholmod_sparse matrix(double* values) const;
 
   size_t displacements_ = 0;
   size_t pressures_ = 0;
   std::vector<size_t> entries_;  // triplet of each stored number of K
   std::vector<Group> groups_;
-  std::vector<int> column_starts_, rows_;  // compressed columns of K's upper triangle
-  cholmod_common common_{};
-  cholmod_factor* ordering_ = nullptr;
+  std::shared_ptr<const CholeskyPattern> matrix_;  // K
 };
 
 class CondensedFactor {
@@ -66,35 +59,28 @@ class CondensedFactor {
   /// `values` of the pattern's triplets. None if the condensed matrix is not positive definite beyond rounding.
   static std::shared_ptr<const CondensedFactor> of(std::shared_ptr<const CondensedPattern> pattern,
                                                    std::span<const double> values);
-  ~CondensedFactor();
-  CondensedFactor(const CondensedFactor&) = delete;
-  CondensedFactor& operator=(const CondensedFactor&) = delete;
-
   /// As SparseFactor::solve.
   void solve(std::span<double> right_sides, size_t count) const;
   /// One right-hand side without correcting the pressures: for a third of the time, relative errors of 1e-3. A correction of Newton's
   /// method with a kept factor is not better than that.
   void solve_roughly(std::span<double> right_side) const;
-  [[nodiscard]] size_t entries() const;
+  [[nodiscard]] size_t entries() const { return factor_->entries(); }
 
  private:
-  explicit CondensedFactor(std::shared_ptr<const CondensedPattern> pattern);
+  explicit CondensedFactor(std::shared_ptr<const CondensedPattern> pattern) : pattern_(std::move(pattern)) {}
   /// W, and B' W B added to the matrix.
   void condense(std::span<const double> values, std::vector<double>& matrix);
-  bool factorise(std::vector<double>& matrix);
   void solve_corrected(std::span<double> right_sides, size_t count, int corrections) const;
   /// displacements += B' pressures.
   void add_pull(const Eigen::MatrixXd& pressures, Eigen::MatrixXd& displacements) const;
   /// pressures += B displacements.
   void add_growth(const Eigen::MatrixXd& displacements, Eigen::MatrixXd& pressures) const;
-  [[nodiscard]] Eigen::MatrixXd solve_condensed(Eigen::MatrixXd right_sides) const;
 
   std::shared_ptr<const CondensedPattern> pattern_;
   using Coupling = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
   std::vector<Coupling> coupling_;  // B: a row a pressure of the group
   Eigen::VectorXd weights_;         // W
-  mutable cholmod_common common_{};
-  cholmod_factor* factor_ = nullptr;
+  std::unique_ptr<const CholeskyFactor> factor_;
 };
 
 }  // namespace diastole

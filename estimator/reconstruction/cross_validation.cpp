@@ -5,11 +5,31 @@
 #include <limits>
 #include <random>
 
+#include "estimator/parallel/parallel_for.hpp"
+
 namespace diastole {
 namespace {
 
 constexpr double lowest_exponent = 0, highest_exponent = 8;
 constexpr double golden = 0.6180339887498949;
+
+double trace_of(const CholeskyFactor& factor, const Eigen::MatrixXd& right_sides) {
+  return right_sides.cwiseProduct(factor.solve(right_sides)).sum() / static_cast<double>(right_sides.cols());
+}
+
+/// Its score is infinite where the field has no solution.
+CrossValidationPoint point_at(const SmoothedSystem& system, double lambda, const Eigen::MatrixXd& right_sides,
+                              double measured) {
+  constexpr double none = std::numeric_limits<double>::infinity();
+  const std::unique_ptr<const CholeskyFactor> factor = system.factor_at(lambda);
+  if (!factor) return {lambda, none, 0.0};
+  const Eigen::VectorXd misfit =
+      system.weighted_rows() * factor->solve(system.right_side()) - system.weighted_targets();
+  const double trace = trace_of(*factor, right_sides);
+  const double freedom = std::max(measured - trace, 1e-3 * measured);
+  const double score = measured * misfit.squaredNorm() / (freedom * freedom);
+  return {lambda, std::isfinite(score) && std::isfinite(trace) ? score : none, trace};
+}
 
 }  // namespace
 
@@ -42,42 +62,43 @@ CrossValidation choose_lambda(SmoothedSystem& system, double fineness) {
   const Eigen::MatrixXd right_sides = seen_signs(system);
   const auto measured = static_cast<double>(system.measured());
   CrossValidation result;
-  const auto score = [&](double exponent) {
-    system.factorise(std::pow(10.0, exponent));
-    const Eigen::VectorXd misfit = system.weighted_rows() * system.solution() - system.weighted_targets();
-    const double trace = stochastic_trace(system, right_sides);
-    // What neither data nor so little smoothness hold has no solution.
-    if (!std::isfinite(misfit.squaredNorm()) || !std::isfinite(trace))
-      return std::numeric_limits<double>::infinity();
-    const double freedom = std::max(measured - trace, 1e-3 * measured);
-    result.curve.push_back({system.lambda(), measured * misfit.squaredNorm() / (freedom * freedom), trace});
-    return result.curve.back().score;
-  };
-  double best = lowest_exponent, least = score(lowest_exponent);
-  for (double exponent = lowest_exponent + 1; exponent <= highest_exponent; ++exponent) {
-    const double value = score(exponent);
-    if (value < least) {
-      least = value;
-      best = exponent;
+  // Of some λ at the same time.
+  const auto scores = [&](const std::vector<double>& exponents) {
+    std::vector<CrossValidationPoint> points(exponents.size());
+    parallel_for(points.size(), machine_threads(), [&](size_t i) {
+      points[i] = point_at(system, std::pow(10.0, exponents[i]), right_sides, measured);
+    });
+    std::vector<double> score;
+    for (const CrossValidationPoint& point : points) {
+      score.push_back(point.score);
+      if (std::isfinite(point.score)) result.curve.push_back(point);
     }
-  }
+    return score;
+  };
+  std::vector<double> decades;
+  for (double exponent = lowest_exponent; exponent <= highest_exponent; ++exponent)
+    decades.push_back(exponent);
+  const std::vector<double> coarse = scores(decades);
+  const double best =
+      decades[static_cast<size_t>(std::min_element(coarse.begin(), coarse.end()) - coarse.begin())];
   double low = std::max(lowest_exponent, best - 1), high = std::min(highest_exponent, best + 1);
   result.at_edge = best == lowest_exponent || best == highest_exponent;
   double left = high - golden * (high - low), right = low + golden * (high - low);
-  double score_left = score(left), score_right = score(right);
+  const std::vector<double> inside = scores({left, right});
+  double score_left = inside[0], score_right = inside[1];
   while (high - low > fineness) {
     if (score_left < score_right) {
       high = right;
       right = left;
       score_right = score_left;
       left = high - golden * (high - low);
-      score_left = score(left);
+      score_left = scores({left}).front();
     } else {
       low = left;
       left = right;
       score_left = score_right;
       right = low + golden * (high - low);
-      score_right = score(right);
+      score_right = scores({right}).front();
     }
   }
   std::sort(result.curve.begin(), result.curve.end(),

@@ -1,6 +1,7 @@
 #include "estimator/reconstruction/field_space.hpp"
 
 #include <algorithm>
+#include <stdexcept>
 
 namespace diastole {
 namespace {
@@ -97,7 +98,7 @@ QuadraticForms::QuadraticForms(const FieldSpace& space) {
   };
   for (size_t e = 0; e < elements; ++e) {
     each_pair(e, [&](int row, int column) {
-      if (row >= 0 && column >= 0) entries.emplace_back(std::max(row, column), std::min(row, column), 0.0);
+      if (row >= 0 && column >= 0) entries.emplace_back(std::min(row, column), std::max(row, column), 0.0);
     });
   }
   pattern_.resize(space.unknowns(), space.unknowns());
@@ -111,9 +112,9 @@ QuadraticForms::QuadraticForms(const FieldSpace& space) {
       if (own_diagonal) ++diagonal;
       ++pair;
       if (row < 0 || column < 0) return places.push_back({-1, 0.0F});
-      const int* begin = pattern_.innerIndexPtr() + pattern_.outerIndexPtr()[std::min(row, column)];
-      const int* end = pattern_.innerIndexPtr() + pattern_.outerIndexPtr()[std::min(row, column) + 1];
-      const int* found = std::lower_bound(begin, end, std::max(row, column));
+      const int* begin = pattern_.innerIndexPtr() + pattern_.outerIndexPtr()[std::max(row, column)];
+      const int* end = pattern_.innerIndexPtr() + pattern_.outerIndexPtr()[std::max(row, column) + 1];
+      const int* found = std::lower_bound(begin, end, std::min(row, column));
       // Two coefficients that share an unknown (a collapsed edge): both of their products meet on its diagonal.
       const bool shared = row == column && !own_diagonal;
       places.push_back({static_cast<int>(found - pattern_.innerIndexPtr()), shared ? 2.0F : 1.0F});
@@ -133,15 +134,24 @@ void QuadraticForms::add(Values& values, size_t element, const ElementMatrix& ma
   }
 }
 
-Eigen::SparseMatrix<double> QuadraticForms::matrix(const Values& values) const {
-  return Eigen::Map<const Eigen::SparseMatrix<double>>(pattern_.rows(), pattern_.cols(), pattern_.nonZeros(),
-                                                       pattern_.outerIndexPtr(), pattern_.innerIndexPtr(),
-                                                       values.data());
+Eigen::VectorXd QuadraticForms::times(const Values& values, const Eigen::VectorXd& q) const {
+  const Eigen::Map<const Eigen::SparseMatrix<double>> matrix(pattern_.rows(), pattern_.cols(),
+                                                             pattern_.nonZeros(), pattern_.outerIndexPtr(),
+                                                             pattern_.innerIndexPtr(), values.data());
+  return matrix.selfadjointView<Eigen::Upper>() * q;
+}
+
+std::shared_ptr<const CholeskyPattern> QuadraticForms::factor_pattern() const {
+  const int* starts = pattern_.outerIndexPtr();
+  const int* rows = pattern_.innerIndexPtr();
+  auto pattern =
+      CholeskyPattern::of({starts, starts + pattern_.cols() + 1}, {rows, rows + pattern_.nonZeros()});
+  if (!pattern) throw std::length_error("the mesh is too fine to reconstruct motion on");
+  return pattern;
 }
 
 double QuadraticForms::apply(const Values& values, const Eigen::VectorXd& q) const {
-  const Eigen::VectorXd product = matrix(values).selfadjointView<Eigen::Lower>() * q;
-  return q.dot(product);
+  return q.dot(times(values, q));
 }
 
 }  // namespace diastole

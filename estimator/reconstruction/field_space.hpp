@@ -8,10 +8,12 @@
 #include <Eigen/Dense>
 #include <Eigen/Sparse>
 #include <array>
+#include <memory>
 #include <span>
 #include <vector>
 
 #include "estimator/mesh/hermite_mesh.hpp"
+#include "estimator/sparse/sparse_cholesky.hpp"
 
 namespace diastole {
 
@@ -55,7 +57,7 @@ Functional displacement_along(const HermiteMesh& mesh, const MaterialPoint& poin
 Functional volume_change(const HermiteMesh& mesh, std::span<const double> position_mm,
                          const MaterialPoint& point);
 
-/// The sparsity that every quadratic form made of element matrices has, and forms over it (lower triangles).
+/// The sparsity that every quadratic form made of element matrices has, and forms over it (upper triangles).
 class QuadraticForms {
  public:
   explicit QuadraticForms(const FieldSpace& space);
@@ -64,16 +66,20 @@ class QuadraticForms {
   [[nodiscard]] Values zero() const { return Values(static_cast<size_t>(pattern_.nonZeros()), 0.0); }
   /// Adds a symmetric element matrix (its lower triangle is read).
   void add(Values& values, size_t element, const ElementMatrix& matrix) const;
-  [[nodiscard]] Eigen::SparseMatrix<double> matrix(const Values& values) const;
+  /// K q.
+  [[nodiscard]] Eigen::VectorXd times(const Values& values, const Eigen::VectorXd& q) const;
   /// qᵀ K q.
   [[nodiscard]] double apply(const Values& values, const Eigen::VectorXd& q) const;
+
+  /// Of matrices with such values.
+  [[nodiscard]] std::shared_ptr<const CholeskyPattern> factor_pattern() const;
 
  private:
   struct Place {
     int index;     ///< among the values; -1 where nothing is
     float factor;  ///< 2 where two entries of an element fall on one diagonal entry
   };
-  Eigen::SparseMatrix<double> pattern_;
+  Eigen::SparseMatrix<double> pattern_;     // upper triangle
   std::vector<std::vector<Place>> places_;  ///< of each element's lower triangle, row by row
 };
 

@@ -263,8 +263,9 @@ FrameField reconstruct_frame(const FieldForms& forms, const Measurement& measure
       if (validate && !options.lambda) {
         field.smoothing = choose_lambda(system, options.fineness);
         lambda = field.smoothing.lambda;
+      } else {
+        system.factorise(lambda);
       }
-      system.factorise(lambda);
       moved = system.solution();
     }
     for (int halving = 0; halving < most_halvings && rms_mm(moved) > extent_mm; ++halving) {

@@ -4,8 +4,6 @@
 #include <cmath>
 #include <limits>
 
-#include "estimator/parallel/serial_openmp.hpp"
-
 namespace diastole {
 namespace {
 
@@ -13,9 +11,7 @@ constexpr size_t solved_at_once = 128;
 
 }  // namespace
 
-SmoothedSystem::SmoothedSystem(const FieldForms& forms) : forms_(forms), data_(forms.quadratic.zero()) {
-  factor_.cholmod().print = 0;
-}
+SmoothedSystem::SmoothedSystem(const FieldForms& forms) : forms_(forms), data_(forms.quadratic.zero()) {}
 
 void SmoothedSystem::set_rows(std::span<const ObservationRow> rows) {
   data_ = forms_.quadratic.zero();
@@ -69,48 +65,42 @@ const Eigen::SparseMatrix<double, Eigen::RowMajor>& SmoothedSystem::weighted_row
   return rows_;
 }
 
-void SmoothedSystem::factorise_values(QuadraticForms::Values values) {
-  keep_openmp_serial();
-  Eigen::SparseMatrix<double> matrix = forms_.quadratic.matrix(values);
-  if (!analysed_) factor_.analyzePattern(matrix);
-  analysed_ = true;
-  factor_.factorize(matrix);
-  // What neither data nor smoothness hold firmly may be lost to rounding: raise the diagonal by as much, then by more.
-  for (double relative = 1e-14; factor_.info() != Eigen::Success && relative < 1e-3; relative *= 100.0) {
-    for (Eigen::Index i = 0; i < matrix.rows(); ++i)
-      matrix.coeffRef(i, i) *= 1.0 + relative;
-    factor_.factorize(matrix);
+std::unique_ptr<const CholeskyFactor> SmoothedSystem::factor_of(double lambda, double extent_mm) const {
+  QuadraticForms::Values values = data_;
+  for (size_t i = 0; i < values.size(); ++i) {
+    values[i] +=
+        lambda * forms_.sobolev.smoothness[i] + forms_.sobolev.mean_square[i] / (extent_mm * extent_mm);
   }
+  std::unique_ptr<const CholeskyFactor> factor = CholeskyFactor::of(forms_.pattern, values);
+  // What neither data nor smoothness hold firmly may be lost to rounding: raise the diagonal by as much, then by more.
+  for (double relative = 1e-14; !factor && relative < 1e-3; relative *= 100.0) {
+    for (size_t i = 0; i < forms_.pattern->unknowns(); ++i)
+      values[forms_.pattern->diagonal(i)] *= 1.0 + relative;
+    factor = CholeskyFactor::of(forms_.pattern, values);
+  }
+  return factor;
+}
+
+std::unique_ptr<const CholeskyFactor> SmoothedSystem::factor_at(double lambda) const {
+  return factor_of(lambda, extent_of_motion_mm_);
 }
 
 void SmoothedSystem::factorise(double lambda) {
   lambda_ = lambda;
-  QuadraticForms::Values values = data_;
-  for (size_t i = 0; i < values.size(); ++i) {
-    values[i] += lambda * forms_.sobolev.smoothness[i] +
-                 forms_.sobolev.mean_square[i] / (extent_of_motion_mm_ * extent_of_motion_mm_);
-  }
-  factorise_values(std::move(values));
+  factor_ = factor_at(lambda);
 }
 
 void SmoothedSystem::factorise_without_smoothness(double amplitude_mm) {
   lambda_ = 0.0;
-  QuadraticForms::Values values = data_;
-  for (size_t i = 0; i < values.size(); ++i)
-    values[i] += forms_.sobolev.mean_square[i] / (amplitude_mm * amplitude_mm);
-  factorise_values(std::move(values));
+  factor_ = factor_of(0.0, amplitude_mm);
 }
 
 Eigen::VectorXd SmoothedSystem::solution() const { return solve(right_side_); }
 
 Eigen::MatrixXd SmoothedSystem::solve(const Eigen::MatrixXd& right_sides) const {
-  keep_openmp_serial();
-  Eigen::MatrixXd solution = factor_.solve(right_sides);
-  // Where CHOLMOD finds no solution, Eigen gives back nothing at all.
-  if (solution.rows() != right_sides.rows())
-    solution = Eigen::MatrixXd::Constant(right_sides.rows(), right_sides.cols(),
-                                         std::numeric_limits<double>::quiet_NaN());
-  return solution;
+  if (factor_) return factor_->solve(right_sides);
+  return Eigen::MatrixXd::Constant(right_sides.rows(), right_sides.cols(),
+                                   std::numeric_limits<double>::quiet_NaN());
 }
 
 std::vector<double> SmoothedSystem::variances(std::span<const Functional> functionals) const {

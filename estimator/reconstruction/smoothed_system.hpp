@@ -4,17 +4,18 @@
 //   E(q) = Σ wᵢ (gᵢ·q − yᵢ)² / σᵢ²  +  λ S(q)  +  |u|²/U²          H = A + λ S + M/U²,  A = Σ wᵢ gᵢgᵢᵀ/σᵢ²
 //
 // The last term counts as one measurement of the whole body: that it has moved by 0 ± U (mm RMS). Nothing that data or smoothness feel
-// notices it; where no tag knows a rigid motion it keeps that motion within the size of what is seen. H is factorised by CHOLMOD (supernodal Cholesky), its ordering found once.
+// notices it; where no tag knows a rigid motion it keeps that motion within the size of what is seen.
 //
 // H⁻¹ is the covariance of q if the field were drawn from the prior that λ stands for (Wahba 1983, J. R. Stat.
 // Soc. B 45:133): its standard errors hold the mean square of smoothing's own bias as well as the noise.
 // One thread at a time; different instances at the same time.
 
-#include <Eigen/CholmodSupport>
+#include <memory>
 #include <span>
 #include <vector>
 
 #include "estimator/reconstruction/sobolev.hpp"
+#include "estimator/sparse/sparse_cholesky.hpp"
 
 namespace diastole {
 
@@ -29,12 +30,16 @@ struct ObservationRow {
 /// What a mesh needs once for all frames.
 struct FieldForms {
   FieldForms(const HermiteMesh& mesh, const SobolevWeights& weights)
-      : space(mesh), quadratic(space), sobolev(sobolev_forms(space, quadratic, weights)) {}
+      : space(mesh),
+        quadratic(space),
+        pattern(quadratic.factor_pattern()),
+        sobolev(sobolev_forms(space, quadratic, weights)) {}
   FieldForms(const FieldForms&) = delete;
   FieldForms& operator=(const FieldForms&) = delete;
 
   FieldSpace space;
   QuadraticForms quadratic;
+  std::shared_ptr<const CholeskyPattern> pattern;
   SobolevForms sobolev;
 };
 
@@ -49,6 +54,9 @@ class SmoothedSystem {
   void factorise(double lambda);
   /// H = A + M/u², without smoothness: what the data alone determine (coverage.hpp).
   void factorise_without_smoothness(double amplitude_mm);
+  /// The factor that `factorise` would make, for several λ at the same time; none where neither data nor so little smoothness hold the
+  /// field.
+  [[nodiscard]] std::unique_ptr<const CholeskyFactor> factor_at(double lambda) const;
 
   // All below belong to the last rows and the last factorisation.
   [[nodiscard]] Eigen::VectorXd solution() const;
@@ -59,13 +67,16 @@ class SmoothedSystem {
   /// Rows √w g/σ, and √w y/σ. The matrix is made when it is first asked for.
   [[nodiscard]] const Eigen::SparseMatrix<double, Eigen::RowMajor>& weighted_rows() const;
   [[nodiscard]] const Eigen::VectorXd& weighted_targets() const { return targets_; }
+  /// Of H q = Gᵀ W y: the solution's right side.
+  [[nodiscard]] const Eigen::VectorXd& right_side() const { return right_side_; }
   /// How many rows have a weight.
   [[nodiscard]] size_t measured() const { return measured_; }
   [[nodiscard]] const FieldForms& forms() const { return forms_; }
   [[nodiscard]] double lambda() const { return lambda_; }
 
  private:
-  void factorise_values(QuadraticForms::Values values);
+  /// Of A, λ S and M/U².
+  [[nodiscard]] std::unique_ptr<const CholeskyFactor> factor_of(double lambda, double extent_mm) const;
 
   const FieldForms& forms_;
   /// The rows of one element: a column each.
@@ -82,8 +93,7 @@ class SmoothedSystem {
   size_t measured_ = 0;
   double lambda_ = 0.0;
   double extent_of_motion_mm_ = 1000.0;
-  mutable Eigen::CholmodSupernodalLLT<Eigen::SparseMatrix<double>, Eigen::Lower> factor_;
-  bool analysed_ = false;
+  std::unique_ptr<const CholeskyFactor> factor_;
 };
 
 }  // namespace diastole

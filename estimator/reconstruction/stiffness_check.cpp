@@ -40,8 +40,7 @@ std::optional<ApparentStiffness> apparent_stiffness(const Study& study, const Fi
   ElasticModel model = make_affected_model(study);
   const double gain = field_change_of(study).displacement_gain;
   const Eigen::VectorXd seen = forms.space.unknowns_of(field.displacement_mm);
-  const Eigen::VectorXd along =
-      forms.quadratic.matrix(forms.sobolev.mean_square).selfadjointView<Eigen::Lower>() * seen;
+  const Eigen::VectorXd along = forms.quadratic.times(forms.sobolev.mean_square, seen);
   const double size = seen.dot(along);
   if (!(size > 0)) return {};
   const auto amplitude = [&](const ElasticState& state) {
