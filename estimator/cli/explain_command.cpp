@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <iostream>
 #include <memory>
@@ -162,6 +163,14 @@ ExitCode run_explain(const ExplainArguments& arguments, const CommandOutput& out
   } catch (const explain::Interrupted&) {
     std::cerr << "diastole explain: interrupted; nothing was written\n";
     return ExitCode::negative;
+  }
+  for (const StudyParameter& stated : study.law.parameters) {
+    const auto seen = std::ranges::find(found.shifts, stated.name, &explain::ParameterShift::name);
+    if (seen != found.shifts.end() && (seen->after < stated.lower || seen->after > stated.upper))
+      fmt::print(stderr,
+                 "{}: {} is {:.4g} by these recordings, outside its bounds [{:g}, {:g}]. Check its unit, or "
+                 "widen them.\n",
+                 study.file.string(), stated.name, seen->after, stated.lower, stated.upper);
   }
   if (!found.effects.empty()) {
     found.study_after = study_file;

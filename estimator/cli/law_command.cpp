@@ -187,6 +187,15 @@ void print_comparison(const std::vector<BenchTest>& tests, const LawComparison& 
 ExitCode run_law(const LawArguments& arguments, const CommandOutput& out) {
   if (arguments.page) require_output({*arguments.page, arguments.data, report::page_mark, arguments.force});
   std::vector<BenchTest> tests;
+  for (auto file = arguments.data.begin(); file != arguments.data.end(); ++file) {
+    std::error_code missing;
+    const bool twice = std::any_of(arguments.data.begin(), file, [&](const std::filesystem::path& other) {
+      return std::filesystem::equivalent(other, *file, missing);
+    });
+    if (twice)
+      throw InputError(
+          {file->string(), "", "is given twice", "Data that count twice make errors too small."});
+  }
   for (const std::filesystem::path& file : arguments.data)
     tests.push_back(read_bench_test(file));
   const std::vector<const Law*> laws = chosen_laws(arguments, tests);

@@ -3,10 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <stdexcept>
 #include <utility>
 
 #include "estimator/effects/file_states.hpp"
 #include "estimator/expressions/program.hpp"
+#include "protocol/contract/input_error.hpp"
 
 namespace diastole {
 namespace {
@@ -427,7 +429,13 @@ std::shared_ptr<const Effect> make_file_effect(EffectFile file) {
 }
 
 std::shared_ptr<const Effect> read_effect(const std::filesystem::path& file) {
-  return make_file_effect(effect_files::read_effect_file(file));
+  try {
+    return make_file_effect(effect_files::read_effect_file(file));
+  } catch (const std::domain_error& error) {  // of a derivative, or at rest
+    throw InputError({file.string(), "table [equations]", error.what(),
+                      "A division by zero, or a logarithm of what is zero at rest? Every equation and its "
+                      "slopes must be finite there."});
+  }
 }
 
 }  // namespace diastole

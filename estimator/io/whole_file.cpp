@@ -38,7 +38,7 @@ void write_whole_file(const fs::path& path, const std::function<void(const fs::p
   std::error_code error;
   try {
     write(unfinished);
-    fs::rename(unfinished, path, error);
+    fs::rename(unfinished, fs::is_symlink(path) ? fs::canonical(path) : path, error);
     if (error) cannot_be_written(path);
   } catch (...) {
     fs::remove(unfinished, error);
@@ -71,6 +71,9 @@ void require_output(const OutputFile& output) {
   if (is_dicom(output.path))
     throw InputError({output.path.string(), "", "is an image (DICOM), which no command replaces",
                       "Give -o another name."});
+  if (output.path.string().ends_with(".run.h5"))
+    throw InputError({output.path.string(), "", "is a recording, which no result replaces",
+                      "Give the output another name."});
   const bool is_earlier_result = !output.mark.empty() && starts_with_mark(output.path, output.mark);
   if (!output.force && !fs::is_empty(output.path) && !is_earlier_result) {
     throw InputError({output.path.string(), "", "exists already and is no earlier result of this command",

@@ -83,8 +83,9 @@ class LawProblem final : public inference::LeastSquaresProblem {
   const inference::ParameterSpace& space() const override { return space_; }
 
   std::optional<VectorXd> residuals(const VectorXd& q) override {
+    // With slopes: a law may have a stress where it has none of them, and no search goes on from there.
     const auto values = values_at(q);
-    const auto predicted = predictions({law_, values, LawAt::Slopes::left_out}, tests_);
+    const auto predicted = predictions({law_, values, LawAt::Slopes::given}, tests_);
     if (!predicted) return std::nullopt;
     return VectorXd(predicted->col(0) - measured_);
   }

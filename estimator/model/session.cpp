@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <chrono>
 #include <limits>
+#include <map>
 #include <sstream>
 #include <string>
 
@@ -143,8 +144,15 @@ Session read_session(const Study& study) {
   }
   Session session;
   session.effects = effects_known_to(study);
+  std::map<std::string, std::filesystem::path> file_of_run;
   for (const std::filesystem::path& file : study.data.runs) {
     RecordedRun run = runfile::read_run(file);
+    if (const auto [other, is_new] = file_of_run.try_emplace(run.run_id, file); !is_new) {
+      throw InputError({study.file.string(), "data.runs",
+                        fmt::format("{} and {} are one recording (run {})", other->second.string(),
+                                    file.string(), run.run_id),
+                        "Data that count twice make intervals too narrow: name it once."});
+    }
     if (run.pump.time_s.size() < 2 || run.pressure.time_s.size() < 2) {
       throw InputError({file.string(), "dataset /pump/commanded_mL",
                         "the run holds no motion or no pressures", "Take the run off the study's list."});

@@ -76,9 +76,11 @@ PeriodicCurve mean_cycle(const std::vector<double>& values, const rig::PlantTrac
 }  // namespace
 
 DriveModel::DriveModel(rig::RigModel base, std::shared_ptr<const rig::SpecimenCurves> curves,
-                       std::vector<LearnableEffect> effects, rig::RunPlace place, const CyclePlan& plan)
+                       EffectLibrary library, std::vector<LearnableEffect> effects, rig::RunPlace place,
+                       const CyclePlan& plan)
     : base_(std::move(base)),
       curves_(std::move(curves)),
+      library_(std::move(library)),
       effects_(std::move(effects)),
       model_(base_),
       place_(std::move(place)),
@@ -93,7 +95,7 @@ DriveModel DriveModel::with_values(std::span<const double> values) const {
     one.values.assign(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(one.values.size()));
     values = values.subspan(one.values.size());
   }
-  return {base_, curves_, std::move(effects), place_, plan_};
+  return {base_, curves_, library_, std::move(effects), place_, plan_};
 }
 
 ModelResponse DriveModel::response(const PeriodicCurve& drive_mL, Eigen::Index harmonics) const {
@@ -203,7 +205,7 @@ DriveModel drive_model_of(const Study& study, double largest_mL, const CyclePlan
     place.largest_before_mL = std::max(place.largest_before_mL, done.largest_before_mL);
     place.atmosphere_kPa = done.atmosphere_kPa;
   }
-  return {std::move(base), family, std::move(effects), std::move(place), plan};
+  return {std::move(base), family, session.effects, std::move(effects), std::move(place), plan};
 }
 
 double rms_between(const PeriodicCurve& a, const PeriodicCurve& b) {

@@ -6,6 +6,7 @@
 #include <memory>
 #include <span>
 
+#include "estimator/effects/effect_library.hpp"
 #include "estimator/io/study.hpp"
 #include "estimator/model/session.hpp"
 #include "estimator/rig/simulation.hpp"
@@ -33,8 +34,8 @@ struct LearnableEffect {
 
 class DriveModel {
  public:
-  /// A run at this place in its session, with a rig that has these effects beside those applied already.
-  DriveModel(rig::RigModel base, std::shared_ptr<const rig::SpecimenCurves> curves,
+  /// A run at this place in its session, with a rig that has these effects, the library's, beside those applied already.
+  DriveModel(rig::RigModel base, std::shared_ptr<const rig::SpecimenCurves> curves, EffectLibrary library,
              std::vector<LearnableEffect> effects, rig::RunPlace place, const CyclePlan& plan);
   /// The same rig with other values of its effects, in their order.
   [[nodiscard]] DriveModel with_values(std::span<const double> values) const;
@@ -54,6 +55,7 @@ class DriveModel {
  private:
   rig::RigModel base_;
   std::shared_ptr<const rig::SpecimenCurves> curves_;
+  EffectLibrary library_;  // owns those of a user's files
   std::vector<LearnableEffect> effects_;
   rig::RigModel model_;  ///< with the effects
   rig::RunPlace place_;

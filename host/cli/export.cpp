@@ -1,10 +1,12 @@
 #include <fmt/chrono.h>
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cctype>
 #include <ctime>
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <set>
@@ -58,9 +60,12 @@ std::string task_of(const fs::path& run) {
 void make_folder(const fs::path& folder) {
   std::error_code error;
   fs::create_directories(folder, error);
+  if (!fs::is_directory(folder, error) || ::access(folder.c_str(), W_OK | X_OK) != 0)
+    throw InputError({folder.string(), "", "is no folder that can be written into",
+                      "Name another folder, or one that can be made."});
 }
 
-/// One run's table and description, which are not there yet.
+/// One run's table and description.
 struct BidsFiles {
   fs::path table;
   fs::path description;
@@ -76,8 +81,24 @@ BidsFiles bids_files(const ExportOptions& options, const runfile::RunFile& file)
     throw InputError({run.file, "dataset /pressure/time_s", "holds fewer than two samples",
                       "There is nothing to export."});
   }
-  require_new_file(files.table, options.force);
-  require_new_file(files.description, options.force);
+  return files;
+}
+
+/// Of all runs: no two have the same.
+std::vector<BidsFiles> bids_files(const ExportOptions& options, const std::vector<runfile::RunFile>& runs) {
+  std::vector<BidsFiles> files;
+  std::map<fs::path, std::string> run_of;
+  for (const runfile::RunFile& file : runs) {
+    files.push_back(bids_files(options, file));
+    const auto [other, is_new] = run_of.try_emplace(files.back().table, file.run.file);
+    if (!is_new) {
+      throw InputError(
+          {file.run.file, "",
+           fmt::format("would be {}, as {} is", files.back().table.filename().string(), other->second),
+           "BIDS names keep only a run file's letters and digits: rename one, or export each with a --task "
+           "of its own."});
+    }
+  }
   return files;
 }
 
@@ -163,14 +184,13 @@ ExitCode export_runs(const ExportOptions& options, const CommandOutput& out) {
     runs.push_back(runfile::open_run(file));
   }
   std::vector<BidsFiles> files;
-  if (!options.bids.empty()) {
-    make_folder(options.bids);
-    for (const runfile::RunFile& run : runs)
-      files.push_back(bids_files(options, run));
-  }
-  if (!options.crate.empty()) {
-    make_folder(options.crate);
-    (void)crated_names(options);
+  if (!options.bids.empty()) files = bids_files(options, runs);
+  if (!options.crate.empty()) (void)crated_names(options);
+  for (const fs::path& folder : {options.bids, options.crate})
+    if (!folder.empty()) make_folder(folder);
+  for (const BidsFiles& each : files) {
+    require_new_file(each.table, options.force);
+    require_new_file(each.description, options.force);
   }
   json document{{"bids", json::array()}, {"ro_crate", nullptr}};
   for (size_t i = 0; i < files.size(); ++i)

@@ -4,6 +4,8 @@
 #include <sys/file.h>
 #include <unistd.h>
 
+#include <cerrno>
+
 #include "protocol/contract/input_error.hpp"
 #include "protocol/runfile/h5_handle.hpp"
 #include "protocol/runfile/h5_source.hpp"
@@ -55,18 +57,20 @@ bool is_on_disk(const fs::path& file) {
 
 }  // namespace
 
-void amend_run(const fs::path& path, const std::string& place, const std::function<bool(hid_t)>& change) {
-  (void)H5Source(path);  // none of its links leads to another file, which would be changed then
+void amend_run(const fs::path& named, const std::string& place, const std::function<bool(hid_t)>& change) {
+  (void)H5Source(named);  // none of its links leads to another file, which would be changed then
+  const fs::path path = fs::canonical(named);  // a link to a run stays one
   const FolderLock lock(path.has_parent_path() ? path.parent_path() : ".");
   const Beside beside{path.string() + ".amended-partial"};
   std::error_code error;
   fs::copy_file(path, beside.path, fs::copy_options::overwrite_existing, error);
+  if (::access(path.c_str(), W_OK) != 0) error.assign(errno, std::generic_category());
   if (!error && change_file(beside.path, change) && is_on_disk(beside.path)) {
     (void)open_run(beside.path);
     fs::rename(beside.path, path, error);
     if (!error) return;
   }
-  throw InputError({path.string(), place,
+  throw InputError({named.string(), place,
                     "cannot be written" + (error ? ": " + error.message() : std::string()),
                     "Check that file and folder may be changed, and the space on their disk."});
 }

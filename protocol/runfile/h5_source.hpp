@@ -8,6 +8,7 @@
 // Errors: every member throws InputError naming the file and the object that is missing or of the wrong kind.
 
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cstdint>
@@ -35,6 +36,9 @@ class H5Source {
     if (!std::filesystem::is_regular_file(path)) {
       fail("", std::filesystem::is_directory(path) ? "cannot be opened: it is a folder" : "cannot be opened",
            "Check the path and that you may read the file.");
+    }
+    if (::access(name_.c_str(), R_OK) != 0) {
+      fail("", "cannot be read", "Check that you may read the file.");
     }
     if (H5Fis_hdf5(name_.c_str()) <= 0) {
       fail("", "is not an HDF5 file", "Give a run file (NAME.run.h5).");

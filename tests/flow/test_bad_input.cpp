@@ -23,6 +23,8 @@ struct BadInput {
   std::vector<std::string> message;  ///< what it must contain: file, place, value, remedy
 };
 
+const std::filesystem::path source = DIASTOLE_SOURCE_DIR;
+
 void PrintTo(const BadInput& input, std::ostream* out) { *out << input.name; }
 
 std::string gel() { return source_text("examples/gel.experiment.toml"); }
@@ -50,9 +52,109 @@ std::vector<std::string> scan(const Workplace& place, const std::vector<std::str
   return arguments;
 }
 
+/// Copies of one recording.
+std::string recording(const Workplace& place, const std::string& name) {
+  std::filesystem::copy_file(source / "examples/recorded-baseline.run.h5", place / name);
+  return name;
+}
+
+std::vector<std::string> own_effect(const Workplace& place, const std::string& term) {
+  place.write("own.effect.toml",
+              with(source_text("examples/effects/my-seal.effect.toml"), "abs(p_pump) / 10 [kPa]", term));
+  return {"diastole", "effects", "own.effect.toml"};
+}
+
 std::vector<BadInput> table() {
   using Place = const Workplace&;
   return {
+      {"TwoRunsOfOneBidsName",
+       [](Place place) -> std::vector<std::string> {
+         return {"diastole", "export", recording(place, "gel-1.run.h5"), recording(place, "gel_1.run.h5"),
+                 "--bids",   "bids"};
+       },
+       2,
+       {"gel_1.run.h5", "sub-01_task-gel1_physio", "gel-1.run.h5", "--task"}},
+      {"ACrateInPlaceOfAFile",
+       [](Place place) -> std::vector<std::string> {
+         return {"diastole", "export", recording(place, "gel.run.h5"), "--ro-crate",
+                 place.write("notes.txt", "warm")};
+       },
+       2,
+       {"notes.txt", "is no folder"}},
+      {"APageInPlaceOfARecording",
+       [](Place place) -> std::vector<std::string> {
+         return {"diastole", "runs", ".", "-o", recording(place, "gel.run.h5"), "--force"};
+       },
+       2,
+       {"gel.run.h5", "is a recording", "another name"}},
+      {"RunsSinceNoMonth",
+       [](Place) -> std::vector<std::string> {
+         return {"diastole", "runs", "since=2026-13"};
+       },
+       2,
+       {"since=2026-13", "no date", "2026-11-23"}},
+      {"OneRecordingTwice",
+       [](Place place) -> std::vector<std::string> {
+         recording(place, "a.run.h5");
+         recording(place, "b.run.h5");
+         place.write("twice.study.toml",
+                     with(source_text("examples/shape/gel.study.toml"), R"("../paper-gap/paper-gap.run.h5")",
+                          R"("a.run.h5", "b.run.h5")"));
+         return {"diastole", "explain", "twice.study.toml", "-o", "found"};
+       },
+       2,
+       {"twice.study.toml", "data.runs", "a.run.h5", "b.run.h5", "one recording", "once"}},
+      {"BenchTestsTwice",
+       [](Place) -> std::vector<std::string> {
+         const std::string data = source / "examples/bench-tests/uniaxial.csv";
+         return {"diastole", "law", data, data};
+       },
+       2,
+       {"uniaxial.csv", "is given twice"}},
+      {"AnEffectWithoutALimitAtRest",
+       [](Place place) { return own_effect(place, "log(p_pump / 10 [kPa])"); },
+       2,
+       {"own.effect.toml", "[equations]", "not a finite number", "at rest"}},
+      {"AnEffectWithADivisionByZero",
+       [](Place place) { return own_effect(place, "abs(p_pump) / 0 [kPa]"); },
+       2,
+       {"own.effect.toml", "[equations]", "not a finite number"}},
+      {"ADriveInMilliseconds",
+       [](Place place) -> std::vector<std::string> {
+         place.write("ms.csv", "time_s,volume_mL\n0,0\n600,8\n900,3\n1200,0\n");
+         return {"diastole", "shape",    "ms.csv", "--study", source / "examples/shape/gel.study.toml",
+                 "-o",       "drive.csv"};
+       },
+       2,
+       {"ms.csv", "time_s", "1200 s", "600 s", "in seconds"}},
+      {"AnEndlessDrive",
+       [](Place) -> std::vector<std::string> {
+         return {"diastole",
+                 "shape",
+                 source / "examples/shape/ventricle.csv",
+                 "--study",
+                 source / "examples/shape/gel.study.toml",
+                 "-o",
+                 "drive.csv",
+                 "--cycles",
+                 "1000000000"};
+       },
+       2,
+       {"--cycles", "1000"}},
+      {"AShapesPageOverItsDrive",
+       [](Place) -> std::vector<std::string> {
+         return {"diastole",
+                 "shape",
+                 source / "examples/shape/ventricle.csv",
+                 "--study",
+                 source / "examples/shape/gel.study.toml",
+                 "-o",
+                 "drive.csv",
+                 "--page",
+                 "./drive.csv"};
+       },
+       2,
+       {"drive.csv", "of the page and of the drive", "--page"}},
       {"ScanWithoutRoom",
        [](Place place) {
          return scan(place, {"--fov", "90"});

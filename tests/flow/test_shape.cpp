@@ -44,6 +44,22 @@ TEST(ShapeFlow, LearnsOnTheSimulatedRigAndKeepsTheBest) {
   EXPECT_EQ(after.json().at("nrmse"), found.at("nrmse"));
 }
 
+TEST(ShapeFlow, TakesAStudyWithEffectsOfAUsersOwn) {
+  const Workplace place;
+  std::string study = source_text("examples/shape/gel.study.toml");
+  study = with(study, "../paper-gap/paper-gap.run.h5",
+               (example / "../paper-gap/paper-gap.run.h5").lexically_normal().string());
+  study = with(study, "effects = []",
+               "effects = [\"my-seal\"]\neffect_files = [\"" +
+                   (example / "../effects/my-seal.effect.toml").lexically_normal().string() +
+                   "\"]\n[model.parameters.my-seal.G]\nstart = 0.02");
+  place.write("own.study.toml", study);
+  const Ended ended = run(place, {"diastole", "shape", wanted, "--study", "own.study.toml", "-o", "drive.csv",
+                                  "--cycles", "9", "--json"});
+  ASSERT_EQ(ended.exit_code, 0) << ended.err;
+  EXPECT_GT(ended.json().at("nrmse").get<double>(), 0.0);
+}
+
 TEST(ShapeFlow, StopsWhenTheSpecimenBeginsToLeakInARun) {
   const Workplace place;
   const Ended ended = run(

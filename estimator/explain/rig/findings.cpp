@@ -62,6 +62,14 @@ std::optional<std::array<double, 2>> band_of(const rig::FeatureBlock& block, con
   return std::array{frequency / std::numbers::sqrt2, frequency * std::numbers::sqrt2};
 }
 
+/// 90 %, within the bounds of what the effect can be; all of them where the data do not determine the value.
+std::array<double, 2> interval_of(const rig::Unknown& unknown, double coordinate, double sd) {
+  if (!std::isfinite(sd)) return {unknown.lower, unknown.upper};
+  const auto [low, high] = inference::interval(unknown, coordinate, inference::normal_90 * sd);
+  return {std::isnan(low) ? unknown.lower : std::clamp(low, unknown.lower, unknown.upper),
+          std::isnan(high) ? unknown.upper : std::clamp(high, unknown.lower, unknown.upper)};
+}
+
 Port port_of(const EffectSet& under, rig::Signal signal) {
   if (under.model.terms.size() == 1) return under.model.terms.front().effect->text().port;
   return signal == rig::Signal::pump ? Port::drive : Port::specimen;
@@ -82,7 +90,7 @@ std::vector<FoundEffect> found_effects(const EffectSet& set, const SetVerdict& v
       const double coordinate = unknown.coordinate(set.model.values[at]);
       const double sd = std::sqrt(set.covariance(static_cast<Index>(at), static_cast<Index>(at)));
       found.parameters.push_back({std::string(parameter.name), set.model.values[at], set.errors[at],
-                                  inference::interval(unknown, coordinate, inference::normal_90 * sd)});
+                                  interval_of(unknown, coordinate, sd)});
       ++at;
     }
     for (const ChangePoint& change_point : term.change_points)

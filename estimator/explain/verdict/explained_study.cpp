@@ -56,9 +56,13 @@ std::string explained_study(const Study& study, const std::filesystem::path& fol
     if (toml::node* file = law->get("file")) move_path(*file, from, folder);
   for (const ParameterShift& shift : starts) {
     if (toml::table* parameter = root["law"]["parameters"][shift.name].as_table()) {
-      const double lower = (*parameter)["bounds"][0].value_or(shift.after);
-      const double upper = (*parameter)["bounds"][1].value_or(shift.after);
-      parameter->insert_or_assign("start", std::clamp(shift.after, lower, upper));
+      parameter->insert_or_assign("start", shift.after);
+      // Bounds that the study states hold for its fit alone: an explanation may have found a value beyond them.
+      const auto lower = (*parameter)["bounds"][0].value<double>();
+      const auto upper = (*parameter)["bounds"][1].value<double>();
+      if (lower && upper)
+        parameter->insert_or_assign(
+            "bounds", toml::array{std::min(*lower, shift.after), std::max(*upper, shift.after)});
     }
   }
   toml::table& model = subtable(root, "model");

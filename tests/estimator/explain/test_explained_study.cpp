@@ -33,6 +33,19 @@ TEST(ExplainedStudy, IsReadBackWithWhatWasFound) {
             std::filesystem::weakly_canonical(study.data.runs.at(0)));
 }
 
+TEST(ExplainedStudy, KeepsAValueBeyondTheStudysBounds) {
+  test::ScratchFolder folder;
+  const Study study = read_study(folder.write("gel.study.toml", gel));
+  const auto out = study.file.parent_path() / "out";
+  std::filesystem::create_directories(out);
+  const double beyond = 3.0 * study.law.parameters.at(0).upper;
+  const Study again = read_study(folder.write(
+      "out/explained.study.toml", explained_study(study, out, {}, {{"C1_kPa", 6.0, 0.1, beyond, 0.1}})));
+  EXPECT_EQ(again.law.parameters.at(0).start, beyond);
+  EXPECT_EQ(again.law.parameters.at(0).upper, beyond);
+  EXPECT_EQ(again.law.parameters.at(0).lower, study.law.parameters.at(0).lower);
+}
+
 TEST(ExplainedStudy, CarriesTheUsersFiles) {
   test::ScratchFolder folder;
   Study study = read_study(folder.write("gel.study.toml", gel + "effect_files = [\"mine.effect.toml\"]\n"));

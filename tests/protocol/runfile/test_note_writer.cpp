@@ -51,6 +51,14 @@ TEST_F(NoteWriter, NotesAreAppendedAndTheDataStayAsTheyWere) {
   EXPECT_EQ(std::distance(fs::directory_iterator(folder), fs::directory_iterator()), 1);
 }
 
+TEST_F(NoteWriter, ALinkStaysALinkAndItsRunGetsTheNote) {
+  const fs::path link = folder / "link.run.h5";
+  fs::create_symlink(run, link);
+  append_note(link, {"", "Jo", "by the link"});
+  EXPECT_TRUE(fs::is_symlink(link));
+  EXPECT_EQ(read_session(run).notes.size(), 1U);
+}
+
 TEST_F(NoteWriter, ANoteOfBlanksAndWhatIsNoRunAreRefused) {
   EXPECT_THROW(append_note(run, {"", "", " \n"}), InputError);
   EXPECT_THROW(append_note(folder / "missing.run.h5", {"", "", "note"}), InputError);

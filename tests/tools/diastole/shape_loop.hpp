@@ -43,7 +43,7 @@ inline DriveModel gel_model() {
   base.hose.loss_at_cavity = 1.0;
   base.curve = family->plain();
   base.modulus_kPa = 8.8;
-  return {base, family, learnable_effects(built_in_effects(), base), {}, plan};
+  return {base, family, built_in_effects(), learnable_effects(built_in_effects(), base), {}, plan};
 }
 
 struct FiveEffects {

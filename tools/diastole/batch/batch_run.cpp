@@ -33,7 +33,7 @@ using nlohmann::json;
 constexpr const char* record_format = "diastole-job";
 constexpr size_t message_lines = 2;  ///< an error's place and its remedy
 
-fs::path file_of(const Batch& batch, const Job& job, const char* ending) {
+fs::path file_of(const Batch& batch, const Job& job, const std::string& ending) {
   return batch.output / (job.name + ending);
 }
 
@@ -159,7 +159,8 @@ std::optional<int> run_process(const std::vector<std::string>& line, const fs::p
 
 JobEnd run_job(const Batch& batch, const Job& job, int processor, const RunOptions& options) {
   const auto began = std::chrono::steady_clock::now();
-  const fs::path document = file_of(batch, job, ".json"), part = file_of(batch, job, ".json.part"),
+  const fs::path document = file_of(batch, job, ".json"),
+                 part = file_of(batch, job, fmt::format(".json.{}.part", ::getpid())),
                  log = file_of(batch, job, ".log");
   for (const fs::path& old : {file_of(batch, job, ".job.json"), document})
     fs::remove(old);

@@ -38,7 +38,13 @@ ExitCode shape(const ShapeOptions& options, const CommandOutput& out) {
   const fs::path experiment = experiment_beside(options.drive);
   require_output({options.drive, inputs, drive_mark, options.force});
   require_output({experiment, inputs, drive_mark, options.force});
-  if (!options.page.empty()) require_output({options.page, inputs, report::page_mark, options.force});
+  if (!options.page.empty()) {
+    require_output({options.page, inputs, report::page_mark, options.force});
+    for (const fs::path& other : {options.drive, experiment})
+      if (fs::weakly_canonical(fs::absolute(options.page)) == fs::weakly_canonical(fs::absolute(other)))
+        throw InputError({options.page.string(), "", "is the name of the page and of the drive",
+                          "Give --page another name, as NAME.html."});
+  }
   fmt::print(stderr, "Solving the specimen and inverting the rig's model.\n");
   const Shaper shaper(options.request);
   const Shaping shaping = shaper.after(options.runs);

@@ -33,7 +33,8 @@ void add_request_to(CLI::App& command, ShapeRequest& request) {
                   "what the curve's lowest point stands for: mL since rest, or kPa")
       ->capture_default_str();
   command.add_option("--cycles", request.plan.cycles, "of a run, the first three of which set in")
-      ->capture_default_str();
+      ->capture_default_str()
+      ->check(CLI::Range(1, 1000));
 }
 
 namespace {

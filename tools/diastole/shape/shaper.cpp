@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <set>
+#include <string>
 
 #include "estimator/shaping/specimen_volume.hpp"
 #include "protocol/contract/input_error.hpp"
@@ -65,11 +67,15 @@ Shaper::Shaper(const ShapeRequest& request)
 
 Shaping Shaper::after(const std::vector<std::filesystem::path>& runs) const {
   std::vector<GatedRun> gated;
+  std::set<std::string> known;
   for (const std::filesystem::path& file : runs) {
+    const runfile::RecordedRun run = runfile::read_run(file);
+    if (!known.insert(run.run_id).second)
+      throw InputError(
+          {file.string(), "option --after", "is a recording that is given twice", "Name each run once."});
     const std::optional<double> zero_kPa =
         gated.empty() ? std::nullopt : std::optional(gated.front().zero_kPa);
-    gated.push_back(
-        gated_run(runfile::read_run(file), model_, wanted_mL_.period_s, 2 * first_mL_.harmonics(), zero_kPa));
+    gated.push_back(gated_run(run, model_, wanted_mL_.period_s, 2 * first_mL_.harmonics(), zero_kPa));
   }
   Shaping shaping{.lesson = learn(model_, wanted_mL_, first_mL_, gated,
                                   [&](const PeriodicCurve& drive, const Eigen::MatrixXd& slope) {

@@ -1,5 +1,7 @@
 #include "tools/diastole/shape/wanted_curve.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <string>
 
@@ -29,6 +31,13 @@ WantedCurve read_wanted_curve(const WantedOptions& options) {
                                          options.file.string(), PointsOf::volume_or_pressure);
   wanted.is_pressure = points.range_kPa.has_value();
   const double period_s = stated(options, points.cycle_s, options.period_s, "--period-s", "time_s");
+  constexpr double longest_period_s = 600.0;  // the controller's
+  if (period_s > longest_period_s) {
+    throw InputError(
+        {options.file.string(), points.cycle_s ? "column time_s" : "option --period-s",
+         fmt::format("is a cycle of {:g} s, and the pump's longest is {:g} s", period_s, longest_period_s),
+         "Give times in seconds."});
+  }
   const double range = stated(options, wanted.is_pressure ? points.range_kPa : points.range_mL,
                               options.stroke_mL, "--stroke-mL", "volume_mL or pressure_kPa");
   std::vector<double> values = on_even_phases(points, room).fractions();
