@@ -107,21 +107,31 @@ void set_history(Session& session) {
   }
 }
 
+/// Throws InputError if it is not.
+double above_zero(const RecordedRun& run, const char* name, double otherwise) {
+  const double value = attribute(run, name, otherwise);
+  if (!(value > 0.0)) {
+    throw InputError({run.file, fmt::format("attribute /rig {}", name), fmt::format("is {}", value),
+                      "It must be above zero. Correct the rig's description."});
+  }
+  return value;
+}
+
 /// The base rig that a run describes; what it does not tell is the paper's.
 RigModel base_model(const RecordedRun& run) {
   RigModel model;
   Hose& hose = model.hose;
-  hose.length_m = attribute(run, "hose_length_m", hose.length_m);
-  hose.bore_mm = attribute(run, "hose_bore_mm", hose.bore_mm);
-  hose.density_kg_m3 = attribute(run, "fluid_density_kg_m3", hose.density_kg_m3);
-  hose.viscosity_Pa_s = attribute(run, "fluid_viscosity_Pa_s", hose.viscosity_Pa_s);
-  hose.wave_speed_m_s = attribute(run, "hose_wave_speed_m_s", hose.wave_speed_m_s);
+  hose.length_m = above_zero(run, "hose_length_m", hose.length_m);
+  hose.bore_mm = above_zero(run, "hose_bore_mm", hose.bore_mm);
+  hose.density_kg_m3 = above_zero(run, "fluid_density_kg_m3", hose.density_kg_m3);
+  hose.viscosity_Pa_s = above_zero(run, "fluid_viscosity_Pa_s", hose.viscosity_Pa_s);
+  hose.wave_speed_m_s = above_zero(run, "hose_wave_speed_m_s", hose.wave_speed_m_s);
   hose.loss_coefficient = attribute(run, "hose_minor_loss_K", hose.loss_coefficient);
   hose.loss_at_cavity = attribute(run, "hose_loss_at_cavity", hose.loss_at_cavity);
   hose.creep_fraction = attribute(run, "hose_creep_fraction", hose.creep_fraction);
-  hose.creep_time_s = attribute(run, "hose_creep_time_s", hose.creep_time_s);
-  model.catheter.resonance_Hz = attribute(run, "catheter_f0_Hz", model.catheter.resonance_Hz);
-  model.catheter.damping = attribute(run, "catheter_zeta", model.catheter.damping);
+  hose.creep_time_s = above_zero(run, "hose_creep_time_s", hose.creep_time_s);
+  model.catheter.resonance_Hz = above_zero(run, "catheter_f0_Hz", model.catheter.resonance_Hz);
+  model.catheter.damping = above_zero(run, "catheter_zeta", model.catheter.damping);
   return model;
 }
 

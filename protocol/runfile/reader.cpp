@@ -86,7 +86,14 @@ PressureTrace read_channels(const H5Source& source) {
     const std::string dataset = fmt::format("{}/{}", pressure_group, name);
     pressure.channels[name];
     auto notes = source.attributes(dataset);
-    notes.erase("units");
+    if (const auto units = notes.find("units"); units != notes.end()) {
+      const auto* stated = std::get_if<std::string>(&units->second);
+      if (stated == nullptr || *stated != pressure_unit)
+        source.fail(fmt::format("dataset {}, attribute units", dataset),
+                    stated == nullptr ? "is no text" : fmt::format("is \"{}\"", *stated),
+                    "Run files hold pressures in kPa: convert the values, and correct the attribute.");
+      notes.erase(units);
+    }
     if (!notes.empty()) pressure.notes[name] = std::move(notes);
   }
   if (!pressure.channels.contains("cavity_kPa")) {

@@ -153,6 +153,10 @@ void write_sketch(const std::filesystem::path& path, const RunSketch& sketch) {
   writer.numbers("/pump/commanded_mL", sketch.commanded_mL);
   writer.numbers("/pressure/time_s", sketch.pressure_time_s);
   writer.numbers("/pressure/cavity_kPa", sketch.cavity_kPa);
+  if (const hid_t cavity = H5Dopen2(writer.file, "/pressure/cavity_kPa", H5P_DEFAULT); cavity >= 0) {
+    writer.attribute(cavity, "units", sketch.cavity_units);
+    H5Dclose(cavity);
+  }
   writer.numbers("/trigger/time_s", sketch.trigger_s);
   std::vector<GapBytes> gaps;
   for (const GapRow& gap : sketch.gaps) {

@@ -20,6 +20,7 @@ struct RunSketch {
   std::vector<double> commanded_mL{0, 10, 10, 0};
   std::vector<double> pressure_time_s{0, 1, 2, 3};
   std::vector<double> cavity_kPa{0.1, 1.1, 1.2, 0.1};
+  std::string cavity_units = "kPa";
   std::vector<double> trigger_s{0.5};
   std::vector<GapRow> gaps{};
   bool variable_length_texts = true;

@@ -47,6 +47,9 @@ TEST_P(EveryRejection, NamesTheDatasetAndTheFirstOffendingIndex) {
 const std::vector<Rejection> rejections{
     {"ForeignFormat", [](RunSketch& s) { s.format = "other"; }, {"attribute format", "\"other\""}},
     {"NewerVersion", [](RunSketch& s) { s.format_version = 2; }, {"format_version", "newer", "Update"}},
+    {"PressureInOtherUnits",
+     [](RunSketch& s) { s.cavity_units = "Pa"; },
+     {"/pressure/cavity_kPa, attribute units", "\"Pa\"", "convert"}},
     {"NonMonotonicPressureTime",
      [](RunSketch& s) {
        s.pressure_time_s = {0, 1, 1, 3};

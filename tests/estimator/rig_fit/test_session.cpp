@@ -1,0 +1,37 @@
+// What a session's files say of the rig is held against what can be.
+
+#include <gmock/gmock.h>
+#include <hdf5.h>
+
+#include "estimator/model/session.hpp"
+#include "protocol/runfile/amended_file.hpp"
+#include "tests/estimator/io/scratch_file.hpp"
+#include "tests/recorded_data.hpp"
+
+namespace diastole::rig {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+
+TEST(Session, IsRefusedWhereTheRigCannotBe) {
+  const test::ScratchFolder folder;
+  fs::copy(test::recorded("rig/case-028"), folder.path(), fs::copy_options::recursive);
+  const Study study = read_study(folder.path() / "case-028.study.toml");
+  fs::permissions(study.data.runs.front(), fs::perms::owner_write, fs::perm_options::add);
+  const auto refusal = [&] { return test::message_of([&] { (void)read_session(study); }); };
+  EXPECT_EQ(refusal(), "(no error)");
+  runfile::amend_run(study.data.runs.front(), "/rig", [](hid_t file) {
+    const double length_m = -5.0;
+    const hid_t rig = H5Gopen2(file, "/rig", H5P_DEFAULT);
+    const hid_t attribute = H5Aopen(rig, "hose_length_m", H5P_DEFAULT);
+    const bool written = H5Awrite(attribute, H5T_NATIVE_DOUBLE, &length_m) >= 0;
+    H5Aclose(attribute);
+    H5Gclose(rig);
+    return written;
+  });
+  EXPECT_THAT(refusal(), HasSubstr("attribute /rig hose_length_m"));
+}
+
+}  // namespace
+}  // namespace diastole::rig
