@@ -51,7 +51,7 @@ Json axes_json(const imaging::FibreSession& session) {
   if (!session.axes) return nullptr;
   const imaging::AxisCheck& check = *session.axes;
   const Eigen::Matrix3d& change = check.chosen.change;
-  return {{"ok", !check.is_wrong},
+  return {{"ok", !check.is_wrong && !check.is_doubtful},
           {"informative", check.informative},
           {"correction", check.chosen.name},
           {"change", {patient_axes(change.row(0)), patient_axes(change.row(1)), patient_axes(change.row(2))}},

@@ -31,6 +31,8 @@ struct DiffusionSeries {
   std::string name;  ///< "series 4", "dwi.nii.gz"
   /// Columns: the axes along which a gradient table may be flipped besides the patient's: along rows, along columns, normal.
   Eigen::Matrix3d image_axes;
+  /// Columns: the axes along which the table's numbers were read, those of the patient unless it is a .bvec.
+  Eigen::Matrix3d table_axes = Eigen::Matrix3d::Identity();
   std::vector<SlicePlane> slices;
   double thickness_mm = 0;  ///< of what a voxel averages over
   std::vector<DiffusionVolume> volumes;

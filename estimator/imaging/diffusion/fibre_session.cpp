@@ -21,11 +21,7 @@ double middle_of(std::vector<double> values) { return signal::quantile(std::move
 
 /// What noise of this covariance makes of an isotropic tensor: the mean square deviator is the deviator's variance.
 double fa_of_noise(const VoxelTensor& voxel, double md) {
-  Eigen::Matrix<double, 6, 1> weight;
-  weight << 1, 2, 2, 1, 2, 1;  // off-diagonal numbers stand twice in the norm
-  const TensorNumbers trace = numbers_of(Eigen::Matrix3d::Identity());
-  const double all = voxel.covariance.diagonal().dot(weight);
-  const double deviator = std::max(0.0, all - trace.dot(voxel.covariance * trace) / 3);
+  const double deviator = deviator_noise(voxel.covariance);
   return std::sqrt(1.5 * deviator / (3 * md * md + deviator));
 }
 
@@ -116,7 +112,7 @@ void fit_field(FibreSession& session, const FibreSessionRequest& request, const 
   FibreLattice lattice = fibre_lattice(wall);
   const std::vector<WallVoxel> voxels = wall_voxels(lattice, session.series, session.tensors);
   if (!request.axes) {
-    session.axes = check_axes(voxels, session.series.image_axes);
+    session.axes = check_axes(voxels, {session.series.image_axes, session.series.table_axes});
     session.findings.insert(session.findings.end(), session.axes->findings.begin(),
                             session.axes->findings.end());
     // The voxels point into the tensors, which turn where they are.

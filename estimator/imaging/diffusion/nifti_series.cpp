@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <memory>
+#include <optional>
 #include <sstream>
 
 #include "estimator/io/whole_file.hpp"
@@ -36,8 +37,11 @@ fs::path stem_of(const fs::path& image) {
   return stem.replace_extension();
 }
 
+/// Tables have nan where there is nothing to say, as for the direction of an image without weighting.
+enum class Nan { refused, kept };
+
 /// Numbers by white space, line by line; empty lines do not count.
-std::vector<std::vector<double>> read_rows(const fs::path& file) {
+std::vector<std::vector<double>> read_rows(const fs::path& file, Nan nan) {
   std::istringstream lines(read_whole_file(file, "Export the table beside the image (dcm2niix writes it)."));
   std::vector<std::vector<double>> rows;
   std::string line;
@@ -47,7 +51,8 @@ std::vector<std::vector<double>> read_rows(const fs::path& file) {
     for (std::string word; words >> word;) {
       char* end = nullptr;
       const double value = std::strtod(word.c_str(), &end);
-      if (*end != '\0' || !std::isfinite(value))
+      const bool known = std::isfinite(value) || (nan == Nan::kept && std::isnan(value));
+      if (*end != '\0' || !known)
         refuse(file, fmt::format("line {}", number), fmt::format("\"{}\" is no number", word),
                "Export the table again.");
       row.push_back(value);
@@ -59,19 +64,24 @@ std::vector<std::vector<double>> read_rows(const fs::path& file) {
 
 std::vector<double> read_b_values(const fs::path& file, size_t volumes) {
   std::vector<double> values;
-  for (const std::vector<double>& row : read_rows(file))
+  for (const std::vector<double>& row : read_rows(file, Nan::refused))
     values.insert(values.end(), row.begin(), row.end());
   if (values.size() != volumes)
     refuse(file, "", fmt::format("has {} b values, and the image {} volumes", values.size(), volumes),
            "Image and tables must be of one export.");
   for (const double b : values)
     if (b < 0) refuse(file, "", fmt::format("{} s/mm\u00b2 is negative", b), "Give b values in s/mm\u00b2.");
+  const double largest = *std::max_element(values.begin(), values.end());
+  if (largest > 0 && largest < DiffusionSeries::unweighted_s_mm2)
+    refuse(file, "", fmt::format("its largest b value is {:g}, which in s/mm\u00b2 weights nothing", largest),
+           fmt::format("Give b values in s/mm\u00b2: {0:g} ms/\u00b5m\u00b2 are {1:g} s/mm\u00b2.", largest,
+                       1000 * largest));
   return values;
 }
 
-/// Three rows, or three columns.
+/// Three rows, or three columns; nan for a volume without one.
 std::vector<Eigen::Vector3d> read_directions(const fs::path& file, size_t volumes) {
-  const std::vector<std::vector<double>> rows = read_rows(file);
+  const std::vector<std::vector<double>> rows = read_rows(file, Nan::kept);
   const auto all_of_length = [&](size_t length) {
     return std::all_of(rows.begin(), rows.end(), [&](const auto& row) { return row.size() == length; });
   };
@@ -87,6 +97,39 @@ std::vector<Eigen::Vector3d> read_directions(const fs::path& file, size_t volume
            "Image and tables must be of one export.");
   }
   return directions;
+}
+
+/// Several shells at one nominal b value are played with gradients of other amplitudes, which shortens directions: the weighting is b |g|², as
+/// MRtrix reads such tables. Lengths of tables of two decimals are right within 1 %.
+constexpr double unit_length_tolerance = 0.05;
+
+/// Makes directions unit vectors. Nothing where all weighted ones are of one length: such a table is only not normalised.
+std::optional<Finding> scale_by_lengths(std::vector<double>& b, std::vector<Eigen::Vector3d>& directions,
+                                        const std::string& table) {
+  std::vector<double> lengths;
+  for (size_t v = 0; v < b.size(); ++v)
+    if (b[v] >= DiffusionSeries::unweighted_s_mm2 && directions[v].norm() > 0)
+      lengths.push_back(directions[v].norm());
+  if (lengths.empty()) return std::nullopt;
+  const auto [shortest, longest] = std::minmax_element(lengths.begin(), lengths.end());
+  const bool scales = *shortest < (1 - unit_length_tolerance) * *longest;
+  for (size_t v = 0; v < b.size(); ++v) {
+    const double length = directions[v].norm();
+    if (!(length > 0)) continue;
+    if (scales) b[v] *= length * length;
+    directions[v] /= length;
+  }
+  if (!scales) return std::nullopt;
+  return Finding{
+      Severity::note,
+      "gradient-lengths",
+      fmt::format("directions have lengths of {:.2f} to {:.2f}: b values are multiplied by their squares",
+                  *shortest, *longest),
+      table,
+      *shortest,
+      "",
+      "So shells at one nominal b value are written. If the table is only not normalised, give unit "
+      "vectors."};
 }
 
 struct FreeImage {
@@ -245,8 +288,8 @@ DiffusionSeries read_nifti(const NiftiFiles& files) {
   const std::vector<char> voxels = voxels_of(*image, files.image);
   const ValueAt value = reader_of(image->datatype);
   const auto volumes = static_cast<size_t>(image->nt);
-  const std::vector<double> b = read_b_values(files.bval, volumes);
-  const std::vector<Eigen::Vector3d> directions = read_directions(files.bvec, volumes);
+  std::vector<double> b = read_b_values(files.bval, volumes);
+  std::vector<Eigen::Vector3d> directions = read_directions(files.bvec, volumes);
   const VoxelMap map = voxel_map(*image);
   Eigen::Matrix3d axes = map.axes.colwise().normalized();
   constexpr double least_volume =
@@ -258,6 +301,9 @@ DiffusionSeries read_nifti(const NiftiFiles& files) {
   if (axes.determinant() > 0) axes.col(0) *= -1;
 
   DiffusionSeries series;
+  series.table_axes = axes;
+  if (auto scaled = scale_by_lengths(b, directions, files.bvec.filename().string()))
+    series.findings.push_back(*scaled);
   series.name = files.image.filename().string();
   series.encoding = files.bval.filename().string() + ", " + files.bvec.filename().string();
   for (int k = 0; k < image->nz; ++k)
@@ -266,7 +312,7 @@ DiffusionSeries read_nifti(const NiftiFiles& files) {
     DiffusionVolume volume;
     volume.b_matrix.setZero();
     if (b[t] > 0 && directions[t].norm() > 0) {
-      const Eigen::Vector3d g = axes * directions[t].normalized();
+      const Eigen::Vector3d g = axes * directions[t];
       volume.b_matrix = b[t] * g * g.transpose();
     } else if (b[t] >= DiffusionSeries::unweighted_s_mm2) {
       refuse(files.bvec, fmt::format("volume {}", t + 1),

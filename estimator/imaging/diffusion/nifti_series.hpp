@@ -2,6 +2,7 @@
 // Diffusion series as NIfTI: NAME.nii or NAME.nii.gz with NAME.bval and NAME.bvec (FSL's layout, as dcm2niix writes).
 //
 // A .bvec has directions in the image's axes, x reversed if the voxel-to-patient map has a positive determinant (FSL's convention);
+// A direction whose length is not 1 weights by b |g|²; one of an image without weighting may be nan.
 // NIfTI's patient coordinates are right, anterior, superior, ours left, posterior, superior (LPS).
 
 #include <filesystem>

@@ -103,6 +103,13 @@ TensorNumbers numbers_of(const Eigen::Matrix3d& m) {
   return numbers;
 }
 
+double deviator_noise(const TensorCovariance& covariance) {
+  TensorNumbers weight;
+  weight << 1, 2, 2, 1, 2, 1;  // off-diagonal numbers stand twice in the norm
+  const TensorNumbers trace = numbers_of(Eigen::Matrix3d::Identity());
+  return std::max(0.0, covariance.diagonal().dot(weight) - trace.dot(covariance * trace) / 3);
+}
+
 TensorShape shape_of(const TensorNumbers& tensor) {
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(matrix_of(tensor));
   TensorShape shape;

@@ -27,6 +27,9 @@ struct TensorShape {
 };
 TensorShape shape_of(const TensorNumbers& tensor);
 
+/// The mean square of the deviator (as a matrix) of tensors that are nothing but noise of this covariance.
+double deviator_noise(const TensorCovariance& covariance);
+
 struct VoxelTensor {
   int slice = 0, row = 0, column = 0;
   Eigen::Vector3d place_mm;     ///< patient

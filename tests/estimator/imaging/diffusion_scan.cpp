@@ -39,7 +39,8 @@ Eigen::Vector3d local_fibre(const DiffusionScan& scan, const Eigen::Vector3d& x,
   const Eigen::Vector3d longitudinal = Eigen::Vector3d(a * std::cos(psi) * std::cos(theta),
                                                        a * std::cos(psi) * std::sin(theta), c * std::sin(psi))
                                            .normalized();
-  const double alpha = std::numbers::pi / 180 * std::lerp(scan.endo_deg, scan.epi_deg, t);
+  const double alpha = std::numbers::pi / 180 *
+                       (std::lerp(scan.endo_deg, scan.epi_deg, t) + scan.helix_around_deg * std::cos(theta));
   return std::cos(alpha) * circumferential + std::sin(alpha) * longitudinal;
 }
 
@@ -188,7 +189,8 @@ void write_dicom(const DiffusionScan& scan, const std::filesystem::path& folder)
                       m(1, 1), m(2, 1)));
       put(data, DCM_PixelSpacing, fmt::format("{0}\\{0}", scan.pixel_mm));
       put(data, DCM_PhotometricInterpretation, "MONOCHROME2");
-      put_encoding(data, scan.tags, volumes[v].first, scan.header_signs.cwiseProduct(volumes[v].second));
+      put_encoding(data, scan.tags, volumes[v].first,
+                   scan.header_signs.cwiseProduct(scan.header_turn * volumes[v].second));
       for (const auto& [tag, value] : {std::pair(DCM_SamplesPerPixel, 1),
                                        {DCM_Rows, scan.pixels},
                                        {DCM_Columns, scan.pixels},

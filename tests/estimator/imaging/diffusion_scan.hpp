@@ -20,7 +20,10 @@ struct DiffusionScan {
   int slices = 12;
   double noise = 0;  ///< of a channel; the wall is 1000 without weighting
   DiffusionTags tags = DiffusionTags::standard;
-  Eigen::Vector3d header_signs{1, 1, 1};       ///< what the headers make of directions
+  Eigen::Vector3d header_signs{1, 1, 1};  ///< what the headers make of directions
+  /// And before: a table that was not turned with the images.
+  Eigen::Matrix3d header_turn = Eigen::Matrix3d::Identity();
+  double helix_around_deg = 0;  ///< the helix angle is so much larger on one side, and smaller on the other
   std::set<std::pair<int, int>> missing = {};  ///< (volume, slice) that no file holds
   std::set<std::pair<int, int>> faded = {};    ///< (volume, slice) that lost half of their signal
   std::set<int> absent_volumes = {};           ///< that are not there at all

@@ -1,12 +1,15 @@
 // Diffusion series of a known ventricle back to tensors, outliers, gradient axes and the fibre field.
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <numbers>
 #include <sstream>
 
@@ -200,6 +203,38 @@ TEST(Diffusion, AFlipAlongTheLongAxisIsToldByTheHelixsHand) {
   EXPECT_LT(rms_error_deg(undone, scan), 2.0);
 }
 
+TEST(Diffusion, ATurnedTableIsFoundAndUndone) {
+  DiffusionScan scan{.noise = 50};
+  scan.axes = oblique();
+  const Eigen::Vector3d across = scan.axes * Eigen::Vector3d(0.8, 0.6, 0);
+  scan.header_turn = Eigen::AngleAxisd(-15 * degree, across).toRotationMatrix();
+  const FibreSession session = measured(scan);
+  ASSERT_TRUE(session.axes);
+  EXPECT_TRUE(session.axes->is_wrong);
+  ASSERT_FALSE(session.findings.empty());
+  EXPECT_EQ(session.findings[0].id, "gradient-turn");
+  EXPECT_NEAR(session.findings[0].number, 15, 2);
+  EXPECT_LT(rms_error_deg(session, scan), 2.5);
+}
+
+TEST(Diffusion, AHelixThatVariesAroundTheWallIsNoTurnedTable) {
+  DiffusionScan scan{.noise = 50, .helix_around_deg = 15};
+  scan.axes = oblique();
+  EXPECT_TRUE(measured(scan).findings.empty());
+}
+
+/// Fibres that leave the wall by one angle everywhere would look the same.
+TEST(Diffusion, ATurnAboutTheLongAxisIsToldAndLeft) {
+  DiffusionScan scan{.noise = 50};
+  scan.header_turn = Eigen::AngleAxisd(20 * degree, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+  const FibreSession session = measured(scan);
+  EXPECT_FALSE(session.axes->is_wrong);
+  EXPECT_TRUE(session.axes->is_doubtful);
+  ASSERT_FALSE(session.findings.empty());
+  EXPECT_EQ(session.findings[0].id, "gradient-turn");
+  EXPECT_THAT(session.findings[0].remedy, HasSubstr("Not corrected"));
+}
+
 TEST(Diffusion, ImagesThatLostSignalAreLeftOut) {
   DiffusionScan scan{.noise = 50};
   for (int slice = 0; slice < scan.slices; ++slice)
@@ -256,6 +291,102 @@ TEST(Diffusion, RefusesNiftiWithoutOrWithOtherTables) {
   EXPECT_FALSE(refusal().empty());
   std::filesystem::remove(folder.path() / "dwi.bvec");
   EXPECT_THAT(refusal(), HasSubstr("dwi.bvec"));
+}
+
+/// Tables as other programs write them beside the image.
+class NiftiTables : public testing::Test {
+ protected:
+  NiftiTables() {
+    scan.axes = oblique();
+    test::write_nifti(scan, folder.path());
+  }
+
+  std::vector<std::vector<double>> rows(const char* file) const {
+    std::ifstream text(folder.path() / file);
+    std::vector<std::vector<double>> rows;
+    for (std::string line; std::getline(text, line);) {
+      std::istringstream words(line);
+      rows.emplace_back(std::istream_iterator<double>(words), std::istream_iterator<double>());
+    }
+    return rows;
+  }
+
+  void write(const char* file, const std::vector<std::vector<double>>& rows) const {
+    std::ofstream text(folder.path() / file);
+    for (const std::vector<double>& row : rows)
+      text << fmt::format("{:.6f}\n", fmt::join(row, " "));
+  }
+
+  FibreSession session() const { return measure_fibres({.folder = folder.path()}, wall_of(scan)); }
+
+  const ScratchFolder folder;
+  DiffusionScan scan{.noise = 50};
+};
+
+TEST_F(NiftiTables, InPatientAxesAreFoundAndUndone) {
+  for (const double from_left : {1.0, -1.0}) {  // left, posterior, superior; right, anterior, superior
+    std::vector<std::vector<double>> table(3);
+    for (const auto& [b, g] : scan.volumes())
+      for (int i = 0; i < 3; ++i)
+        table[static_cast<size_t>(i)].push_back((i < 2 ? from_left : 1) * g[i]);
+    write("dwi.bvec", table);
+    const FibreSession found = session();
+    EXPECT_TRUE(found.axes->is_wrong);
+    EXPECT_THAT(found.axes->chosen.name, HasSubstr(from_left > 0 ? "left, posterior" : "right, anterior"));
+    EXPECT_LT(rms_error_deg(found, scan), 2.0);
+  }
+}
+
+/// Images and directions in another order.
+TEST_F(NiftiTables, ThatNoChangeOfAxesMakesAgreeAreToldAsDoubtful) {
+  std::vector<std::vector<double>> table = rows("dwi.bvec");
+  const std::vector<std::vector<double>> right = table;
+  for (size_t i = 0; i < 3; ++i)
+    for (size_t v = 0; v < 12; ++v)
+      table[i][2 + v] = right[i][2 + 5 * v % 12];
+  write("dwi.bvec", table);
+  const FibreSession found = session();
+  EXPECT_FALSE(found.axes->is_wrong);
+  EXPECT_TRUE(found.axes->is_doubtful);
+  ASSERT_FALSE(found.findings.empty());
+  EXPECT_EQ(found.findings[0].id, "gradient-axes-doubtful");
+}
+
+TEST_F(NiftiTables, DirectionsOfOtherLengthsWeightByTheirSquares) {
+  const DiffusionSeries plain = read_diffusion(folder.path());
+  std::vector<std::vector<double>> b = rows("dwi.bval"), table = rows("dwi.bvec");
+  for (size_t v = 2; v < 14; v += 2) {
+    b[0][v] *= 2;
+    for (std::vector<double>& row : table)
+      row[v] *= std::sqrt(0.5);
+  }
+  write("dwi.bval", b);
+  write("dwi.bvec", table);
+  const DiffusionSeries scaled = read_diffusion(folder.path());
+  ASSERT_EQ(scaled.findings.size(), 1U);
+  EXPECT_EQ(scaled.findings[0].id, "gradient-lengths");
+  for (size_t v = 0; v < plain.volumes.size(); ++v)
+    EXPECT_LT((scaled.volumes[v].b_matrix - plain.volumes[v].b_matrix).norm(), 0.01);
+}
+
+TEST_F(NiftiTables, BValuesInOtherUnitsAreRefused) {
+  std::vector<std::vector<double>> b = rows("dwi.bval");
+  for (double& value : b[0])
+    value *= 0.7e-3;
+  write("dwi.bval", b);
+  EXPECT_THAT(test::message_of([&] { (void)read_diffusion(folder.path()); }),
+              AllOf(HasSubstr("largest b value is 0.7"), HasSubstr("700 s/mm")));
+}
+
+TEST_F(NiftiTables, ADirectionThatIsNoNumberIsReadWhereNothingIsWeighted) {
+  std::vector<std::vector<double>> table = rows("dwi.bvec");
+  for (std::vector<double>& row : table)
+    row[0] = row[1] = std::nan("");
+  write("dwi.bvec", table);
+  EXPECT_EQ(read_diffusion(folder.path()).volumes[1].b_s_mm2(), 0);
+  table[2][5] = std::nan("");
+  write("dwi.bvec", table);
+  EXPECT_THAT(test::message_of([&] { (void)read_diffusion(folder.path()); }), HasSubstr("volume 6"));
 }
 
 TEST(Diffusion, AMeshElsewhereIsRefused) {
