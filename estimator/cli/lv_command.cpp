@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
 #include <iostream>
 #include <memory>
@@ -115,6 +116,11 @@ void print_shifts(const imaging::VentricleFit& fit) {
   double largest = 0;
   for (const imaging::SliceShift& shift : fit.shifts)
     largest = std::max(largest, shift.shift_mm.norm() / std::max(shift.sigma_mm, 1e-9));
+  if (std::all_of(fit.shifts.begin(), fit.shifts.end(),
+                  [](const auto& shift) { return shift.is_reference; })) {
+    fmt::print("Slices are taken to be where they belong.\n");
+    return;
+  }
   // Of a score of slices the largest of pure error is below four sigmas.
   if (fit.shift_spread_mm == 0 || largest < 4) {
     fmt::print("Slices are where they belong, within {:.2f} mm.\n", fit.shift_spread_mm);

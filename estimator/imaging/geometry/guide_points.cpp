@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <cmath>
 #include <map>
 #include <optional>
@@ -39,6 +40,11 @@ constexpr const char* csv_remedy =
     "A row is phase,slice,surface,x_mm,y_mm,z_mm,sigma_mm, like 0,sa03,endo,-36.279,-1.137,-70.868,0.5.";
 constexpr const char* gpfile_remedy =
     "A row is x y z contour-type sliceID weight frame, like -36.3 -1.1 -70.9 SAX_LV_ENDOCARDIAL 3 1 0.";
+
+bool is_same_word(std::string_view a, std::string_view b) {
+  return std::equal(a.begin(), a.end(), b.begin(), b.end(),
+                    [](unsigned char x, unsigned char y) { return std::tolower(x) == std::tolower(y); });
+}
 
 struct Line {
   std::string_view file;
@@ -89,6 +95,11 @@ class Gatherer {
     rows_.push_back(phase);
     guide_.points.push_back({0, index, surface, place_mm, sigma_mm});
   }
+  void note_default_sigma(double sigma_mm) {
+    guide_.findings.push_back({Severity::note, "default-sigma",
+                               fmt::format("no sigma_mm is stated: it is taken as {:g} mm", sigma_mm),
+                               guide_.file, sigma_mm, "mm", "Add a column sigma_mm."});
+  }
   void leave_out(std::string_view contour) { ++left_out_[std::string(contour)]; }
 
   GuidePoints done() {
@@ -114,20 +125,49 @@ class Gatherer {
   std::map<std::string, size_t> left_out_;
 };
 
-void add_csv_row(Gatherer& gatherer, const Line& line, std::string_view text) {
+/// Where the columns of guide_file_mark stand in a table's rows.
+struct CsvColumns {
+  std::array<std::optional<size_t>, 7> at;
+  size_t count = 0;
+  double default_sigma_mm;
+
+  [[nodiscard]] bool has_sigma() const { return at[6].has_value(); }
+};
+
+/// None where this is no header: each column once, all but sigma_mm, and no other.
+std::optional<CsvColumns> csv_columns(std::string_view header, double default_sigma_mm) {
+  const std::vector<std::string_view> known = split(guide_file_mark, ",", false);
+  const std::vector<std::string_view> given = split(header, ",", false);
+  CsvColumns columns{{}, given.size(), default_sigma_mm};
+  for (size_t i = 0; i < given.size(); ++i) {
+    const auto name = std::find(known.begin(), known.end(), trimmed(given[i]));
+    if (name == known.end()) return std::nullopt;
+    std::optional<size_t>& at = columns.at[static_cast<size_t>(name - known.begin())];
+    if (at) return std::nullopt;
+    at = i;
+  }
+  for (size_t i = 0; i < 6; ++i)
+    if (!columns.at[i]) return std::nullopt;
+  return columns;
+}
+
+void add_csv_row(Gatherer& gatherer, const Line& line, std::string_view text, const CsvColumns& columns) {
   const std::vector<std::string_view> fields = split(text, ",", false);
-  if (fields.size() != 7) line.fail("", fmt::format("has {} columns instead of 7", fields.size()));
+  if (fields.size() != columns.count)
+    line.fail("", fmt::format("has {} columns instead of {}", fields.size(), columns.count));
+  const auto field = [&](size_t column) { return trimmed(fields[*columns.at[column]]); };
   const auto* surface = std::find_if(surface_names.begin(), surface_names.end(),
-                                     [&](const auto& name) { return name.first == fields[2]; });
+                                     [&](const auto& name) { return is_same_word(name.first, field(2)); });
   if (surface == surface_names.end())
-    line.fail("surface", fmt::format("\"{}\" is none of endo, epi, base, apex_endo, apex_epi", fields[2]));
-  if (fields[1].empty()) line.fail("slice", "is empty");
-  const double sigma_mm = line.number_in(fields[6], "sigma_mm");
-  if (!(sigma_mm > 0)) line.fail("sigma_mm", fmt::format("{} is not above 0", fields[6]));
-  gatherer.add(line.count_in(fields[0], "phase"), fields[1], surface->second,
-               {line.number_in(fields[3], "x_mm"), line.number_in(fields[4], "y_mm"),
-                line.number_in(fields[5], "z_mm")},
-               sigma_mm);
+    line.fail("surface", fmt::format("\"{}\" is none of endo, epi, base, apex_endo, apex_epi", field(2)));
+  if (field(1).empty()) line.fail("slice", "is empty");
+  const double sigma_mm =
+      columns.has_sigma() ? line.number_in(field(6), "sigma_mm") : columns.default_sigma_mm;
+  if (!(sigma_mm > 0)) line.fail("sigma_mm", fmt::format("{} is not above 0", field(6)));
+  gatherer.add(
+      line.count_in(field(0), "phase"), field(1), surface->second,
+      {line.number_in(field(3), "x_mm"), line.number_in(field(4), "y_mm"), line.number_in(field(5), "z_mm")},
+      sigma_mm);
 }
 
 void add_gpfile_row(Gatherer& gatherer, const Line& line, std::string_view text, double sigma_mm) {
@@ -140,7 +180,7 @@ void add_gpfile_row(Gatherer& gatherer, const Line& line, std::string_view text,
   const double weight = fields.size() == 7 ? line.number_in(fields[5], "weight") : 1.0;
   if (weight < 0) line.fail("weight", fmt::format("{} is negative", fields[5]));
   const auto* contour = std::find_if(gpfile_contours.begin(), gpfile_contours.end(),
-                                     [&](const auto& name) { return name.first == fields[3]; });
+                                     [&](const auto& name) { return is_same_word(name.first, fields[3]); });
   if (contour == gpfile_contours.end() || weight == 0) {
     gatherer.leave_out(weight == 0 ? "weight 0" : fields[3]);
     return;
@@ -157,9 +197,12 @@ std::string_view name_of(GuideSurface surface) {
       ->first;
 }
 
-GuidePoints guide_points_from_text(std::string_view text, const std::string& file, double gpfile_sigma_mm) {
+GuidePoints guide_points_from_text(std::string_view text, const std::string& file, double default_sigma_mm) {
   Gatherer gatherer(file);
-  std::optional<bool> is_csv;
+  std::optional<CsvColumns> columns;
+  bool is_first = true;
+  if (constexpr std::string_view byte_order_mark = "\xEF\xBB\xBF"; text.starts_with(byte_order_mark))
+    text.remove_prefix(byte_order_mark.size());
   size_t number = 0;
   while (!text.empty()) {
     const size_t end = text.find('\n');
@@ -168,9 +211,11 @@ GuidePoints guide_points_from_text(std::string_view text, const std::string& fil
     ++number;
     if (row.ends_with('\r')) row.remove_suffix(1);
     if (row.find_first_not_of(" \t") == std::string_view::npos) continue;
-    if (!is_csv) {
-      is_csv = row == guide_file_mark;
-      if (*is_csv) continue;
+    if (is_first) {
+      is_first = false;
+      columns = csv_columns(row, default_sigma_mm);
+      if (columns && !columns->has_sigma()) gatherer.note_default_sigma(default_sigma_mm);
+      if (columns) continue;
       const std::vector<std::string_view> fields = split(row, " \t", true);
       const bool is_header = fields.size() >= 6 && fields[0] == "x" && fields[1] == "y" && fields[2] == "z";
       if (is_header) continue;
@@ -180,10 +225,10 @@ GuidePoints guide_points_from_text(std::string_view text, const std::string& fil
              fmt::format("The first line is {} or, in a GPFile, x y z contour-type sliceID weight frame.",
                          guide_file_mark)});
     }
-    if (*is_csv) {
-      add_csv_row(gatherer, {file, number, csv_remedy}, row);
+    if (columns) {
+      add_csv_row(gatherer, {file, number, csv_remedy}, row, *columns);
     } else {
-      add_gpfile_row(gatherer, {file, number, gpfile_remedy}, row, gpfile_sigma_mm);
+      add_gpfile_row(gatherer, {file, number, gpfile_remedy}, row, default_sigma_mm);
     }
   }
   return gatherer.done();

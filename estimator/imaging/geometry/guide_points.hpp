@@ -2,7 +2,8 @@
 // Guide points: places on a ventricle's walls, clicked or traced in images, in DICOM patient coordinates (LPS, mm).
 //
 //   NAME.guide.csv   phase,slice,surface,x_mm,y_mm,z_mm,sigma_mm
-//                    surface: endo, epi, base (the plane that closes the cavity), apex_endo, apex_epi
+//                    surface: endo, epi, base (the plane that closes the cavity), apex_endo, apex_epi; columns in
+//                    any order; without sigma_mm all points have the same
 //   biv-me's GPFile  x y z contour-type sliceID weight frame, by blanks or tabs, with or without the weight;
 //                    frame counts from what the file says, slices are called by their number
 //
@@ -49,10 +50,10 @@ inline constexpr std::string_view guide_file_mark = "phase,slice,surface,x_mm,y_
 
 /// Throws InputError with file, line, value and remedy.
 GuidePoints read_guide_points(const std::filesystem::path& path);
-/// The same from text; `file` stands for it in messages. `gpfile_sigma_mm`: of a GPFile's points of weight one; the fit
-/// finds the error's true size.
+/// The same from text; `file` stands for it in messages. `default_sigma_mm`: of a GPFile's points of weight one, and where a
+/// table has no sigma_mm; the fit finds the error's true size.
 GuidePoints guide_points_from_text(std::string_view text, const std::string& file,
-                                   double gpfile_sigma_mm = 0.5);
+                                   double default_sigma_mm = 0.5);
 std::string guide_file_text(const GuidePoints& points);
 
 }  // namespace diastole::imaging

@@ -11,8 +11,10 @@
 
 #include "estimator/imaging/geometry/base_points.hpp"
 #include "estimator/imaging/geometry/phased_fit.hpp"
+#include "estimator/imaging/geometry/ventricle_findings.hpp"
 #include "estimator/imaging/geometry/ventricle_frame.hpp"
 #include "estimator/imaging/geometry/wall_harmonics.hpp"
+#include "estimator/imaging/geometry/wild_points.hpp"
 #include "protocol/contract/input_error.hpp"
 
 namespace diastole::imaging {
@@ -128,9 +130,12 @@ class WallFit {
       : guide_(guide), frame_(start.frame), free_(std::move(free)), place_(slices.size(), -1) {
     for (size_t i = 0; i < free_.size(); ++i)
       place_[free_[i].slice] = static_cast<Index>(i);
-    for (const GuideSlice& slice : slices)
+    for (const GuideSlice& slice : slices) {
       in_plane_.push_back(slice.is_plane ? projection(frame_.axes.transpose() * slice.normal)
                                          : Eigen::Matrix3d(Eigen::Matrix3d::Identity()));
+      across_mm_.emplace_back(slice.is_plane ? slice.scatter_mm * (frame_.axes.transpose() * slice.normal)
+                                             : Vector3d(Vector3d::Zero()));
+    }
     const double whole = std::sqrt(4 * std::numbers::pi);  // of a constant one
     VectorXd first = VectorXd::Zero(state_count);
     first[0] = whole * 0.5 * (start.inner_lambda + start.outer_lambda);
@@ -174,7 +179,8 @@ class WallFit {
                   side_of(point.surface));
   }
   [[nodiscard]] double sigma_mm(const GuidePoint& point, const Misfit& m) const {
-    return point.sigma_mm * std::max(least_normal_in_plane, (in_plane_[point.slice] * m.normal).norm());
+    const double in_plane = std::max(least_normal_in_plane, (in_plane_[point.slice] * m.normal).norm());
+    return std::hypot(point.sigma_mm * in_plane, across_mm_[point.slice].dot(m.normal));
   }
 
  private:
@@ -323,6 +329,7 @@ class WallFit {
   std::vector<FreeSlice> free_;
   std::vector<Index> place_;  // of a slice among the free ones; -1: it is not
   std::vector<Eigen::Matrix3d> in_plane_;
+  std::vector<Vector3d> across_mm_;     // of each slice: how far its points scatter, along its normal
   std::vector<VectorXd> coefficients_;  // of each phase: middle, thickness
   VectorXd shifts_;
   // To start: departures from an ellipsoid of a twentieth, and shifts of 2 mm.
@@ -386,13 +393,14 @@ void add_wild_points(VentricleFit& fit, const GuidePoints& guide, const WallFit&
 }  // namespace
 
 VentricleFit fit_ventricle(const GuidePoints& given, const VentricleOptions& options) {
-  const std::vector<GuideSlice> slices = guide_slices(given);
-  const VentricleFrame start = ventricle_frame(given, slices);
-  const Vector3d axis = start.frame.axes.col(2);
   VentricleFit fit;
-  fit.frame = start.frame;
   fit.findings = given.findings;
-  const GuidePoints guide = with_base(given, slices, start.frame, fit.findings);
+  const GuidePoints sound = without_wild_points(given, fit.findings);
+  const std::vector<GuideSlice> slices = guide_slices(sound);
+  const VentricleFrame start = ventricle_frame(sound, slices);
+  const Vector3d axis = start.frame.axes.col(2);
+  fit.frame = start.frame;
+  const GuidePoints guide = with_base(sound, slices, start.frame, fit.findings);
   const std::vector<bool> held = held_slices(guide, slices, options, axis);
 
   std::vector<FreeSlice> free;
@@ -453,6 +461,8 @@ VentricleFit fit_ventricle(const GuidePoints& given, const VentricleOptions& opt
     fit.phases.push_back(std::move(one));
   }
   fit.rms_mm = std::sqrt(all_squares / static_cast<double>(all_points));
+  for (Finding& finding : ventricle_findings(fit, guide, slices, options))
+    fit.findings.push_back(std::move(finding));
   return fit;
 }
 

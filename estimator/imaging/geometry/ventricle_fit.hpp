@@ -6,13 +6,15 @@
 // variance falls with the degree l as a power, (l (l + 1) / 2)^-s, and amplitude and power are those of the largest
 // evidence. So is the error of a click, as a factor on the file's sigmas. The base is a plane, likewise common plus departure.
 //
-// A point's residual is its distance from the wall along the normal; a click has errors in its image's plane only, and those
-// count by the share of the normal that lies in the plane.
+// A point's residual is its distance from the wall along the normal; a click has its error in its image's plane, which counts by
+// the share of the normal that lies in the plane, and across it the scatter of its slice (guide_slices.hpp).
 //
 // Breath holds: short-axis slices may be displaced in their planes, the same in all phases, by amounts whose variance is
 // estimated, too. Long-axis slices define the reference; without two of them the mean displacement is not known and is zero.
+// A slice whose points make no plane is not displaced, which is told.
 //
-// Points farther than three sigmas from their wall pull with constant force (Huber), those beyond five are named.
+// Points farther than three sigmas from their wall pull with constant force (Huber), those beyond five are named; those that no
+// ventricle passes are left out before (wild_points.hpp).
 
 #include <string>
 #include <vector>

@@ -2,8 +2,11 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <cmath>
+#include <functional>
 #include <numbers>
+#include <random>
 
 #include "estimator/imaging/geometry/ventricle_session.hpp"
 #include "estimator/imaging/geometry/wall_harmonics.hpp"
@@ -169,6 +172,144 @@ TEST(Ventricle, AWildClickIsNamedAndHardlyPulls) {
   const VentricleSession session = measured(guide);
   EXPECT_LT(wall_rms_mm(session.fit, 0, truth, 0), 0.35);
   EXPECT_THAT(session.fit.findings, testing::Contains(testing::Field(&Finding::id, "wild-point")));
+}
+
+/// The table of these points, each changed.
+std::string changed(const std::string& guide, const std::function<void(GuidePoints&)>& change) {
+  GuidePoints points = guide_points_from_text(guide, "heart.guide.csv");
+  change(points);
+  return guide_file_text(points);
+}
+
+std::vector<std::string> ids_of(const VentricleFit& fit) {
+  std::vector<std::string> ids;
+  for (const Finding& finding : fit.findings)
+    ids.push_back(finding.id);
+  return ids;
+}
+
+TEST(Ventricle, DisplacedSlicesAreFoundInPointsThatScatterAcrossThem) {
+  const Clicks clicks = click(bent(), {.phases = 4, .shift_mm = 3});
+  std::mt19937_64 random(5);
+  const auto scattered = [&](double sigma_mm) {
+    std::normal_distribution<double> error(0, sigma_mm);
+    return changed(clicks.guide_csv, [&](GuidePoints& guide) {
+      for (GuidePoint& point : guide.points)
+        point.place_mm += Eigen::Vector3d(error(random), error(random), error(random));
+    });
+  };
+  const std::string whole = changed(clicks.guide_csv, [](GuidePoints& guide) {
+    for (GuidePoint& point : guide.points)
+      point.place_mm = point.place_mm.array().round();
+  });
+  for (const std::string& guide : {scattered(0.06), scattered(0.3), whole}) {
+    const VentricleFit fit = measured(guide).fit;
+    EXPECT_THAT(ids_of(fit), testing::IsEmpty());
+    for (size_t s = 1; s < clicks.slices.size(); ++s) {
+      if (clicks.slices[s].starts_with("la")) continue;
+      EXPECT_FALSE(fit.shifts[s].is_reference) << clicks.slices[s];
+      EXPECT_LT((fit.shifts[s].shift_mm - clicks.shifts_mm[s]).norm(), 1) << clicks.slices[s];
+    }
+  }
+}
+
+TEST(Ventricle, APointBesideItsImageHidesNoLongAxis) {
+  const Clicks clicks = click(bent(), {.phases = 2, .shift_mm = 3});
+  const VentricleFit fit = measured(changed(clicks.guide_csv, [](GuidePoints& guide) {
+                             const std::vector<GuideSlice> slices = guide_slices(guide);
+                             std::vector<bool> done(slices.size());
+                             for (GuidePoint& point : guide.points) {
+                               if (!guide.slices[point.slice].starts_with("la") || done[point.slice] ||
+                                   point.surface != GuideSurface::endo)
+                                 continue;
+                               done[point.slice] = true;
+                               point.place_mm += 3 * slices[point.slice].normal;
+                             }
+                           })).fit;
+  EXPECT_THAT(ids_of(fit), testing::Not(testing::Contains("no-reference")));
+}
+
+TEST(Ventricle, SlicesThatMakeNoPlaneAreNamed) {
+  const std::string guide =
+      changed(click(bent(), {.phases = 2, .shift_mm = 3}).guide_csv, [](GuidePoints& g) {
+        for (GuidePoint& point : g.points)
+          if (g.slices[point.slice] == "la0") point.slice = 5;
+      });
+  const VentricleFit fit = measured(guide).fit;
+  const auto found = std::find_if(fit.findings.begin(), fit.findings.end(),
+                                  [](const Finding& finding) { return finding.id == "no-plane"; });
+  ASSERT_NE(found, fit.findings.end());
+  EXPECT_EQ(found->where, "slice sa05");
+  VentricleRequest kept;
+  kept.fit.estimate_shifts = false;
+  EXPECT_THAT(ids_of(measured(guide, kept).fit), testing::Not(testing::Contains("no-plane")));
+}
+
+TEST(Ventricle, AHeartSmallerThanARatsIsAskedForItsUnit) {
+  for (const double unit_mm : {10.0, 1000.0}) {
+    const VentricleFit fit =
+        measured(changed(click(VentriclePhantom{}, {}).guide_csv, [&](GuidePoints& guide) {
+          for (GuidePoint& point : guide.points)
+            point.place_mm /= unit_mm;
+        })).fit;
+    EXPECT_THAT(ids_of(fit), testing::Contains("unit")) << unit_mm;
+  }
+}
+
+TEST(Ventricle, GrosslyWrongPointsAreLeftOutAndNamed) {
+  const VentriclePhantom truth = bent();
+  const std::string good = click(truth, {}).guide_csv;
+  const auto fitted = [&](const std::function<void(GuidePoints&)>& change) {
+    return measured(changed(good, change)).fit;
+  };
+  for (const double far_mm : {60.0, 200.0, 1000.0}) {
+    const VentricleFit fit = fitted([&](GuidePoints& guide) {
+      guide.points[100].place_mm += far_mm * guide.points[100].place_mm.normalized();
+    });
+    EXPECT_THAT(ids_of(fit), testing::ElementsAre("wild-point")) << far_mm;
+    EXPECT_LT(wall_rms_mm(fit, 0, truth, 0), 0.35) << far_mm;
+  }
+  // A point of the base whose decimal point was lost.
+  EXPECT_THAT(ids_of(fitted([](GuidePoints& guide) {
+                const auto base =
+                    std::find_if(guide.points.begin(), guide.points.end(),
+                                 [](const GuidePoint& point) { return point.surface == GuideSurface::base; });
+                base->place_mm *= 10;
+              })),
+              testing::ElementsAre("wild-point"));
+  const VentricleFit fit = fitted([](GuidePoints& guide) {
+    for (size_t i = 0; i < guide.points.size(); i += 25)
+      guide.points[i].place_mm *= 10;
+  });
+  EXPECT_LT(wall_rms_mm(fit, 0, truth, 0), 0.4);
+}
+
+TEST(Ventricle, ErrorsLargerThanStatedAreTold) {
+  const VentricleFit fit = measured(changed(click(bent(), {.phases = 2}).guide_csv, [](GuidePoints& guide) {
+                             for (GuidePoint& point : guide.points)
+                               point.sigma_mm = 0.2;
+                           })).fit;
+  const auto found = std::find_if(fit.findings.begin(), fit.findings.end(),
+                                  [](const Finding& finding) { return finding.id == "noise"; });
+  ASSERT_NE(found, fit.findings.end());
+  EXPECT_NEAR(found->number, 2.5, 0.4);
+}
+
+TEST(GuidePoints, ATableMayHaveItsColumnsInAnyOrderAndNoSigma) {
+  const std::string rows = "0.5,-1,2,ENDO,sa00,3\n4,5,6,Apex_Epi,la0,7\n";
+  const GuidePoints guide =
+      guide_points_from_text("\xEF\xBB\xBFx_mm,y_mm,z_mm,surface,slice,phase\r\n" + rows, "g.csv", 0.7);
+  ASSERT_EQ(guide.points.size(), 2U);
+  EXPECT_EQ(guide.points[0].place_mm, Eigen::Vector3d(0.5, -1, 2));
+  EXPECT_EQ(guide.points[0].sigma_mm, 0.7);
+  EXPECT_EQ(guide.points[1].surface, GuideSurface::apex_epi);
+  EXPECT_EQ(guide.phases, (std::vector<int>{3, 7}));
+  ASSERT_EQ(guide.findings.size(), 1U);
+  EXPECT_EQ(guide.findings[0].id, "default-sigma");
+  for (const char* header : {"x_mm,y_mm,z_mm,surface,slice,x_mm\n", "x_mm,y_mm,surface,slice,phase\n",
+                             "x_mm,y_mm,z_mm,surface,slice,phase,weight\n"})
+    EXPECT_THAT(test::message_of([&] { (void)guide_points_from_text(header + rows, "g.csv"); }),
+                HasSubstr("header"));
 }
 
 TEST(Ventricle, WithoutPointsOfTheBaseEndsAtTheTopSlice) {
