@@ -7,6 +7,7 @@
 #include <complex>
 #include <numbers>
 
+#include "estimator/imaging/flow/lumen_movement.hpp"
 #include "estimator/imaging/flow/phase_unwrapping.hpp"
 #include "protocol/contract/input_error.hpp"
 #include "protocol/signal/median.hpp"
@@ -123,6 +124,30 @@ std::vector<Image> without_background(const PhaseContrast& scan, const Backgroun
   return phases;
 }
 
+/// The scan without background, moved so that the lumen stays in its place.
+struct HeldLumen {
+  PhaseContrast scan;
+  MotionMap map;
+  MovingRegion region;
+};
+
+HeldLumen held_lumen(const PhaseContrast& scan, const LumenData& data, const MotionMap& map,
+                     const MovingRegion& region, const std::vector<Eigen::Vector2d>& movement_px) {
+  HeldLumen held{scan, map, region};
+  held.scan.phase_rad = data.phase_rad;
+  if (movement_px.empty()) return held;
+  held.scan.magnitude = held_still(data.magnitude, movement_px);
+  held.scan.phase_rad = held_still(data.phase_rad, movement_px);
+  held.map = motion_map(held.scan);
+  // All places of the lumen together held its mean place.
+  for (const MovingRegion& part : moving_regions(held.map)) {
+    if ((part.centre - region.centre).norm() > region.radius_px || part.radius_px < least_radius_px) continue;
+    held.region = part;
+    break;
+  }
+  return held;
+}
+
 /// The sum of a phase's steps to the next, the last to the first one's return, in usual ones.
 std::vector<double> gaps_of(const PhaseContrast& scan) {
   const size_t count = scan.phases();
@@ -163,6 +188,47 @@ void require_known_turns(const FlowMeasurement& flow, const std::string& folder)
              flow.scan.venc_cm_s, step, flow.lumen.phase_chi_square[k], best),
          "Image with a venc above the peak velocity, or with more phases."});
   }
+}
+
+/// Sigmas are the curvature of chi-square where it is least, times its root per degree of freedom: of a fit that has ended elsewhere they mean nothing.
+void require_settled(const FlowMeasurement& flow, const std::string& folder) {
+  if (flow.lumen.converged || flow.lumen.reduced_chi_square < worst_chi_square) return;
+  const bool may_wrap = std::ranges::any_of(flow.lumen.core_cm_s, [&](double core_cm_s) {
+    return std::abs(core_cm_s) > 0.5 * flow.scan.venc_cm_s;
+  });
+  if (may_wrap) {
+    throw InputError(
+        {folder, flow.scan.name,
+         fmt::format("at a venc of {:.4g} cm/s the velocity wraps beyond recovery, or the images do not look "
+                     "like one tube: the fit of the lumen has not settled, and leaves a chi-square of {:.1f} "
+                     "per pixel",
+                     flow.scan.venc_cm_s, flow.lumen.reduced_chi_square),
+         "Image with a venc above the peak velocity, or with more phases. Does the lumen leave the image, "
+         "change its shape or touch another? --centre COLUMN,ROW may start the fit elsewhere."});
+  }
+  throw InputError(
+      {folder, flow.scan.name,
+       fmt::format("the fit of the lumen has not settled, and leaves a chi-square of {:.1f} per pixel: the "
+                   "images do not look like one tube, its wall and still material",
+                   flow.lumen.reduced_chi_square),
+       "Look at the magnitudes: does the lumen leave the image, change its shape or touch another? --centre "
+       "COLUMN,ROW may start the fit elsewhere."});
+}
+
+void add_fit_findings(FlowMeasurement& flow) {
+  const LumenFit& lumen = flow.lumen;
+  if (lumen.describes_images()) return;
+  const std::string remedy = "Look at the outline on the page; --centre may start it elsewhere.";
+  if (!lumen.converged)
+    flow.findings.push_back({Severity::warning, "lumen-fit", "the fit of the lumen has not settled",
+                             flow.scan.name, lumen.reduced_chi_square, "", remedy});
+  else
+    flow.findings.push_back(
+        {Severity::warning, "lumen-misfit",
+         fmt::format("the images differ from the lumen that was fitted by more than their noise, chi-square "
+                     "{:.1f} per pixel; the sigmas are {:.1f} times as large for it",
+                     lumen.reduced_chi_square, std::sqrt(lumen.reduced_chi_square)),
+         flow.scan.name, lumen.reduced_chi_square, "", remedy});
 }
 
 /// Volumes of the whole interval on even times; their extremes are the stroke.
@@ -241,22 +307,31 @@ FlowMeasurement measure_flow(PhaseContrast scan, const FlowRequest& request, con
                  map.noise,
                  measured_share(flow.scan, map, still),
                  flow.scan.cm_s_per_radian()};
+  // With a lumen that is held still place, size and core are read as of one at rest.
+  const std::vector<Eigen::Vector2d> movement_px =
+      lumen_movement_px(data.magnitude, region, map.noise.magnitude);
+  const HeldLumen held = held_lumen(flow.scan, data, map, region, movement_px);
   std::vector<Eigen::Vector2i> core;
-  for (const Eigen::Vector2i& at : region.pixels)
-    if ((at.cast<double>() - region.centre).norm() < std::max(1.5, 0.6 * region.radius_px))
+  for (const Eigen::Vector2i& at : held.region.pixels)
+    if ((at.cast<double>() - held.region.centre).norm() < std::max(1.5, 0.6 * held.region.radius_px))
       core.push_back(at);
   std::vector<double> core_phase;
   for (size_t k = 0; k < flow.scan.phases(); ++k) {
     std::complex<double> sum = 0;
     for (const Eigen::Vector2i& at : core)
-      sum += std::polar(static_cast<double>(data.magnitude[k](at.y(), at.x())),
-                        static_cast<double>(data.phase_rad[k](at.y(), at.x())));
+      sum += std::polar(static_cast<double>(held.scan.magnitude[k](at.y(), at.x())),
+                        static_cast<double>(held.scan.phase_rad[k](at.y(), at.x())));
     core_phase.push_back(std::arg(sum));
   }
   const UnwrappedCycle cycle = unwrapped(core_phase, gaps_of(flow.scan));
-  flow.lumen = fit_lumen(data, first_scene(plane, map, region, data.magnitude, cycle.phase_rad, core),
-                         cycle.phase_rad);
+  LumenStart start{first_scene(plane, held.map, held.region, held.scan.magnitude, cycle.phase_rad, core),
+                   {},
+                   cycle.phase_rad};
+  for (const Eigen::Vector2d& moved : movement_px)
+    start.moved_mm.emplace_back(moved.x() * plane.column_spacing_mm, moved.y() * plane.row_spacing_mm);
+  flow.lumen = fit_lumen(data, start);
   require_known_turns(flow, folder);
+  require_settled(flow, folder);
 
   // An error of the background is the same in all phases.
   const double background_cm_s = flow.background.order < 0
@@ -278,10 +353,7 @@ FlowMeasurement measure_flow(PhaseContrast scan, const FlowRequest& request, con
     flow.unwrapped += phase.turns != 0 ? 1U : 0U;
     flow.phases.push_back(phase);
   }
-  if (!flow.lumen.converged)
-    flow.findings.push_back({Severity::warning, "lumen-fit", "the fit of the lumen has not settled",
-                             flow.scan.name, flow.lumen.reduced_chi_square, "",
-                             "Look at the outline on the page; --centre may start it elsewhere."});
+  add_fit_findings(flow);
   return flow;
 }
 

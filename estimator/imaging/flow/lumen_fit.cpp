@@ -11,7 +11,8 @@
 namespace diastole::imaging {
 namespace {
 
-constexpr int most_iterations = 12;
+/// A start a pixel off settles within ten; a wall or a place that is further off is approached in steps of a pixel.
+constexpr int most_iterations = 30;
 /// Steps of the scene end when chi-square falls by less than this: a small part of what one unknown's error changes it by.
 constexpr double settled = 0.05;
 /// Below that many standard deviations of its mean over the cycle a magnitude is mostly noise.
@@ -48,14 +49,15 @@ struct PhaseNormal {
 
 class Fitter {
  public:
-  Fitter(const LumenData& data, const LumenScene& start, Encoding encoding)
+  Fitter(const LumenData& data, const LumenStart& start, Encoding encoding)
       : data_(data),
-        model_(data.plane, start.shape, data.measured_share),
-        scene_(start),
+        model_(data.plane, start.scene.shape, data.measured_share, farthest(start.moved_mm)),
+        scene_(start.scene),
+        moved_mm_(start.moved_mm),
         encoding_(encoding) {
     pixel_mm_ = data.plane.finer_spacing_mm();
-    prior_sd_ = prior_sd(start, pixel_mm_);
-    prior_mean_ = start.vector();
+    prior_sd_ = prior_sd(scene_, pixel_mm_);
+    prior_mean_ = scene_.vector();
     const Eigen::Index rows = model_.rows(), columns = model_.columns();
     Eigen::ArrayXXd mean = Eigen::ArrayXXd::Zero(rows, columns);
     for (size_t k = 0; k < phases(); ++k) {
@@ -66,14 +68,15 @@ class Fitter {
     // Noise alone has a mean of 1.25 of its channels' deviations, which are root two times the magnitude's.
     counts_ = (mean > least_magnitude * std::numbers::sqrt2 * data.noise.magnitude).cast<double>();
     used_ = 2 * counts_.sum() * static_cast<double>(phases());
-    shapes_.assign(phases(), scene_.shape);
+    for (size_t k = 0; k < phases(); ++k)
+      shapes_.push_back(shape_by_scene(k));
   }
 
   void start_profiles(const std::vector<double>& core_rad) {
     profiles_.resize(phases());
-    const LumenGrid grid = model_.grid(scene_.shape);
-    parallel_for(phases(), machine_threads(),
-                 [&](size_t k) { profiles_[k] = settled_profile(k, core_rad[k], grid).first; });
+    parallel_for(phases(), machine_threads(), [&](size_t k) {
+      profiles_[k] = settled_profile(k, core_rad[k], model_.grid(shapes_[k])).first;
+    });
   }
 
   /// Gauss-Newton over everything.
@@ -107,7 +110,7 @@ class Fitter {
     return last < by_chance();
   }
 
-  /// Whether phases pull the lumen away from the common place by more than noise does. Then they get places of their own.
+  /// Whether the lumen was seen to move, or phases pull it away from the common place by more than noise does. Then they get places of their own.
   bool let_move_if_it_does() {
     double pull = 0, freedom = 0;
     for (size_t k = 0; k < phases(); ++k) {
@@ -121,7 +124,8 @@ class Fitter {
     }
     const double reduced = std::max(1.0, chi_square_ / freedom_left());
     const double third = 2.0 / (9.0 * freedom);
-    moves_ = std::cbrt(pull / reduced / freedom) > 1 - third + movement_z * std::sqrt(third);
+    moves_ =
+        !moved_mm_.empty() || std::cbrt(pull / reduced / freedom) > 1 - third + movement_z * std::sqrt(third);
     return moves_;
   }
 
@@ -172,7 +176,7 @@ class Fitter {
       const Eigen::VectorXd integrals = model_.integrals_mm2(grid);
       if (k == 0) fit.area_mm2 = model_.area_mm2(grid);
       fit.flow_mL_s[at] = mL_s_per_rad_mm2 * integrals.dot(profiles_[k]);
-      if (k == 0 || moves_) {
+      if (k == 0 || !is_common()) {
         integrals_by_shape.clear();
         for (Eigen::Index i = 0; i < LumenScene::shape_size; ++i)
           integrals_by_shape.push_back(
@@ -230,6 +234,20 @@ class Fitter {
         .cast<double>();
   }
   [[nodiscard]] double core_rad(size_t k) const { return profiles_[k][model_.profile_size() - 3]; }
+
+  /// Whether one grid serves all phases.
+  [[nodiscard]] bool is_common() const { return !moves_ && moved_mm_.empty(); }
+  [[nodiscard]] LumenShape shape_by_scene(size_t k) const {
+    LumenShape shape = scene_.shape;
+    if (!moved_mm_.empty()) shape.centre_mm += moved_mm_[k];
+    return shape;
+  }
+  static Eigen::Vector2d farthest(const std::vector<Eigen::Vector2d>& moved_mm) {
+    Eigen::Vector2d most = Eigen::Vector2d::Zero();
+    for (const Eigen::Vector2d& moved : moved_mm)
+      most = most.cwiseMax(moved.cwiseAbs());
+    return most;
+  }
 
   static LumenShape shifted_shape(LumenShape shape, Eigen::Index unknown, double step) {
     Eigen::VectorXd vector = LumenScene{shape, {}}.vector();
@@ -311,7 +329,7 @@ class Fitter {
     std::vector<double> each(phases());
     const LumenGrid common = model_.grid(scene_.shape);
     parallel_for(phases(), machine_threads(), [&](size_t k) {
-      each[k] = compared(k, moves_ ? model_.grid(shapes_[k]) : common, profiles_[k], nullptr).second;
+      each[k] = compared(k, is_common() ? common : model_.grid(shapes_[k]), profiles_[k], nullptr).second;
     });
     double sum = (scene_.vector() - prior_mean_).cwiseQuotient(prior_sd_).squaredNorm();
     for (const double one : each)
@@ -324,10 +342,9 @@ class Fitter {
     const Eigen::VectorXd steps = difference_steps(scene_, pixel_mm_);
     normals_.assign(phases(), {});
     std::vector<LumenGrid> common;
-    if (!moves_) common = grids_around(scene_.shape, steps);
+    if (is_common()) common = grids_around(scene_.shape, steps);
     parallel_for(phases(), machine_threads(), [&](size_t k) {
-      const std::vector<LumenGrid> own = moves_ ? grids_around(shapes_[k], steps) : std::vector<LumenGrid>();
-      linearise_phase(k, moves_ ? own : common, steps);
+      linearise_phase(k, is_common() ? common : grids_around(shapes_[k], steps), steps);
     });
     chi_square_ = (scene_.vector() - prior_mean_).cwiseQuotient(prior_sd_).squaredNorm();
     for (const PhaseNormal& normal : normals_)
@@ -402,7 +419,7 @@ class Fitter {
       const Eigen::VectorXd& step = own_steps[k];
       profiles_[k] += share * step.head(model_.profile_size());
       const LumenShape before = shapes_[k];
-      shapes_[k] = scene_.shape;
+      shapes_[k] = shape_by_scene(k);
       if (!moves_) continue;
       shapes_[k].centre_mm = before.centre_mm + share * step.segment(model_.profile_size(), 2);
       shapes_[k].radius_mm = before.radius_mm + share * step[model_.profile_size() + 2];
@@ -412,6 +429,7 @@ class Fitter {
   const LumenData& data_;
   LumenModel model_;
   LumenScene scene_;
+  std::vector<Eigen::Vector2d> moved_mm_;
   Encoding encoding_;
   double pixel_mm_ = 1;
   Eigen::VectorXd prior_mean_, prior_sd_;
@@ -425,25 +443,51 @@ class Fitter {
   double chi_square_ = 0;
 };
 
-}  // namespace
-
-LumenFit fit_lumen(const LumenData& data, const LumenScene& start, const std::vector<double>& core_rad) {
-  std::optional<LumenFit> best;
-  for (const Encoding encoding : {Encoding::separate, Encoding::balanced}) {
-    // The second begins where the first has ended.
-    Fitter fitter(data, best ? best->scene : start, encoding);
-    fitter.start_profiles(core_rad);
-    bool converged = fitter.run();
-    std::vector<double> margin;
+LumenFit fitted(const LumenData& data, const LumenStart& start, Encoding encoding) {
+  Fitter fitter(data, start, encoding);
+  fitter.start_profiles(start.core_rad);
+  bool converged = fitter.run();
+  std::vector<double> margin;
+  const auto put_turns_right = [&] {
     for (int round = 0; round < 2 && fitter.try_turns(margin); ++round)
       converged = fitter.run();
-    if (fitter.let_move_if_it_does()) converged = fitter.run();
-    LumenFit fit = fitter.result();
-    fit.converged = converged;
-    fit.turn_margin = margin;
-    if (!best || fit.reduced_chi_square < best->reduced_chi_square) best = std::move(fit);
+  };
+  put_turns_right();
+  if (fitter.let_move_if_it_does()) {
+    converged = fitter.run();
+    // Of a lumen that is out of its place the profile tells no turns.
+    put_turns_right();
   }
-  return *best;
+  LumenFit fit = fitter.result();
+  fit.converged = converged;
+  fit.turn_margin = margin;
+  return fit;
+}
+
+/// Begins where a fit has ended.
+LumenStart continued(const LumenFit& fit, const LumenStart& start) {
+  LumenStart next{fit.scene, {}, start.core_rad};
+  if (!fit.moves) return next;
+  for (const LumenShape& shape : fit.shapes)
+    next.moved_mm.push_back(shape.centre_mm - fit.scene.shape.centre_mm);
+  return next;
+}
+
+}  // namespace
+
+LumenFit fit_lumen(const LumenData& data, const LumenStart& start) {
+  LumenFit best = fitted(data, start, Encoding::separate);
+  const auto try_other = [&](LumenFit other) {
+    if (other.reduced_chi_square < best.reduced_chi_square) best = std::move(other);
+  };
+  if (!best.describes_images()) {
+    // A vessel in tissue has no wall without signal, and from a wide one no step leads there.
+    LumenStart bare = start;
+    bare.scene.shape.wall_mm = 0;
+    try_other(fitted(data, bare, Encoding::separate));
+  }
+  try_other(fitted(data, continued(best, start), Encoding::balanced));
+  return best;
 }
 
 }  // namespace diastole::imaging

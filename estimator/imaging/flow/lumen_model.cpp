@@ -119,18 +119,18 @@ std::vector<double> profile_knots_mm(double radius_mm, double pixel_mm) {
 }
 
 LumenModel::LumenModel(const SlicePlane& plane, const LumenShape& about,
-                       const Eigen::Vector2d& measured_share)
+                       const Eigen::Vector2d& measured_share, const Eigen::Vector2d& movement_mm)
     : spacing_mm_(plane.column_spacing_mm, plane.row_spacing_mm),
       knots_mm_(profile_knots_mm(about.radius_mm, plane.finer_spacing_mm())),
       middle_mm_(about.centre_mm) {
   // Room for a tube that is cut at 45 degrees.
   const double stretch = 1.2 + std::hypot(about.ellipse_cos, about.ellipse_sin);
-  const auto prepare = [&](double centre_mm, double spacing_mm, int count, double share, int& first,
-                           Eigen::VectorXd& fine_mm, Eigen::MatrixXf& kernel) {
-    const double reach_mm = about.radius_mm * stretch + margin_px * spacing_mm;
+  const auto prepare = [&](double centre_mm, double spacing_mm, double moves_mm, int count, double share,
+                           int& first, Eigen::VectorXd& fine_mm, Eigen::MatrixXf& kernel) {
+    const double reach_mm = about.radius_mm * stretch + moves_mm + margin_px * spacing_mm;
     first = std::max(0, static_cast<int>(std::floor((centre_mm - reach_mm) / spacing_mm)));
     const int last = std::min(count - 1, static_cast<int>(std::ceil((centre_mm + reach_mm) / spacing_mm)));
-    const double object_mm = (about.radius_mm + about.wall_mm) * stretch + 2 * spacing_mm;
+    const double object_mm = (about.radius_mm + about.wall_mm) * stretch + moves_mm + 2 * spacing_mm;
     const auto fine = static_cast<Eigen::Index>(std::ceil(2 * object_mm / spacing_mm)) * cells_a_pixel;
     const double step_mm = spacing_mm / cells_a_pixel;
     const double start_mm = centre_mm - 0.5 * step_mm * static_cast<double>(fine - 1);
@@ -142,10 +142,10 @@ LumenModel::LumenModel(const SlicePlane& plane, const LumenShape& about,
             share * sinc(share * (static_cast<double>(first + pixel) - fine_mm[cell] / spacing_mm)) /
             cells_a_pixel);
   };
-  prepare(about.centre_mm.x(), spacing_mm_.x(), plane.columns, measured_share.x(), first_column_, fine_x_mm_,
-          along_row_);
-  prepare(about.centre_mm.y(), spacing_mm_.y(), plane.rows, measured_share.y(), first_row_, fine_y_mm_,
-          along_column_);
+  prepare(about.centre_mm.x(), spacing_mm_.x(), movement_mm.x(), plane.columns, measured_share.x(),
+          first_column_, fine_x_mm_, along_row_);
+  prepare(about.centre_mm.y(), spacing_mm_.y(), movement_mm.y(), plane.rows, measured_share.y(), first_row_,
+          fine_y_mm_, along_column_);
 }
 
 Eigen::VectorXd LumenModel::layer_profile(double core, double layer_mm) const {

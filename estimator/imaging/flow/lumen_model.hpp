@@ -71,9 +71,10 @@ struct LumenImage {
 
 class LumenModel {
  public:
-  /// A window of the slice around a lumen of about that shape.
+  /// A window of the slice around a lumen of about that shape, which goes up to `movement_mm` away along a row and along a column.
   /// `measured_share`: of the spectrum's lines, along rows and along columns.
-  LumenModel(const SlicePlane& plane, const LumenShape& about, const Eigen::Vector2d& measured_share);
+  LumenModel(const SlicePlane& plane, const LumenShape& about, const Eigen::Vector2d& measured_share,
+             const Eigen::Vector2d& movement_mm = {0, 0});
 
   [[nodiscard]] int first_column() const { return first_column_; }
   [[nodiscard]] int first_row() const { return first_row_; }

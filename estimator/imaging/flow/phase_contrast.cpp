@@ -65,37 +65,53 @@ size_t chosen_slice(const ImageFolder& folder, const ImageSeries& series,
   return *request.slice - 1;
 }
 
-/// Per velocity image the magnitude of the same place and time; nothing if the series has not all.
-std::optional<std::vector<size_t>> magnitudes_in(const ImageFolder& folder, const ImageSeries& series,
-                                                 const SliceImages& velocity, double step_ms) {
+/// Per velocity image the magnitude of the same place and time.
+struct Magnitudes {
+  int series = 0;
+  std::vector<size_t> images;
+  std::vector<double> lacking_ms;  ///< times without one
+};
+
+Magnitudes magnitudes_in(const ImageFolder& folder, int series, const SliceImages& slice,
+                         const SliceImages& velocity, double step_ms) {
   const auto trigger_ms = [&](size_t image) { return *folder.images[image].header.trigger_ms; };
-  for (const SliceImages& slice : series.slices) {
-    if (!same_place(slice.plane, velocity.plane)) continue;
-    std::vector<size_t> found;
-    for (const size_t wanted : velocity.images) {
-      for (const size_t image : slice.images) {
-        if (std::abs(trigger_ms(image) - trigger_ms(wanted)) > same_time_steps * step_ms) continue;
-        found.push_back(image);
-        break;
-      }
-    }
-    if (found.size() == velocity.images.size()) return found;
+  Magnitudes found{series, {}, {}};
+  for (const size_t wanted : velocity.images) {
+    const auto same = std::find_if(slice.images.begin(), slice.images.end(), [&](size_t image) {
+      return std::abs(trigger_ms(image) - trigger_ms(wanted)) <= same_time_steps * step_ms;
+    });
+    if (same != slice.images.end())
+      found.images.push_back(*same);
+    else
+      found.lacking_ms.push_back(trigger_ms(wanted));
   }
-  return std::nullopt;
+  return found;
+}
+
+std::string times_of(const std::vector<double>& times_ms) {
+  std::string text;
+  for (const double time_ms : times_ms)
+    text += fmt::format("{}{:.0f} ms", text.empty() ? "" : ", ", time_ms);
+  return text;
 }
 
 /// Of several the nearest by series number: scanners number what one scan makes in a row.
 std::vector<size_t> magnitudes_for(const ImageFolder& folder, const ImageSeries& series,
                                    const SliceImages& velocity, double step_ms) {
-  std::optional<std::vector<size_t>> best;
-  int apart = 0;
+  std::optional<Magnitudes> best;
+  const auto is_better = [&](const Magnitudes& found) {
+    if (found.images.empty()) return false;
+    if (!best || found.lacking_ms.size() != best->lacking_ms.size())
+      return !best || found.lacking_ms.size() < best->lacking_ms.size();
+    return std::abs(found.series - series.number) < std::abs(best->series - series.number);
+  };
   for (const ImageSeries& other : folder.series) {
     if (other.kind != SeriesKind::cine && other.kind != SeriesKind::tagged_cine) continue;
-    const auto found = magnitudes_in(folder, other, velocity, step_ms);
-    const int distance = std::abs(other.number - series.number);
-    if (!found || (best && distance >= apart)) continue;
-    best = found;
-    apart = distance;
+    for (const SliceImages& slice : other.slices) {
+      if (!same_place(slice.plane, velocity.plane)) continue;
+      Magnitudes found = magnitudes_in(folder, other.number, slice, velocity, step_ms);
+      if (is_better(found)) best = std::move(found);
+    }
   }
   if (!best)
     refuse(folder.folder.string(), fmt::format("series {}", series.number),
@@ -103,7 +119,12 @@ std::vector<size_t> magnitudes_for(const ImageFolder& folder, const ImageSeries&
                        "in the folder",
                        velocity.images.size()),
            "Export the magnitude series of the same scan too: partial volume and noise are read from it.");
-  return *best;
+  if (!best->lacking_ms.empty())
+    refuse(folder.folder.string(), fmt::format("series {}", best->series),
+           fmt::format("has no magnitude image at {}, where series {} has a velocity image",
+                       times_of(best->lacking_ms), series.number),
+           "Export the magnitude series again with all its phases.");
+  return best->images;
 }
 
 void require_phases(const ImageFolder& folder, const ImageSeries& series, const SliceImages& slice,

@@ -130,6 +130,45 @@ TEST(Flow, FollowsATubeThatShakes) {
   expect_true(flow, phantom());
 }
 
+TEST(Flow, FollowsATubeThatGoesFurtherThanItsEdgeIsWide) {
+  PhaseContrastProtocol protocol = small();
+  protocol.wobble_mm = 1.25;  // two pixels to either side
+  const FlowMeasurement flow = measured(phantom(), protocol);
+  EXPECT_TRUE(flow.lumen.moves);
+  EXPECT_TRUE(flow.lumen.converged);
+  EXPECT_NEAR(flow.lumen.reduced_chi_square, 1, 0.15);
+  EXPECT_NEAR(flow.lumen.scene.shape.radius_mm, 6, 0.05);
+  expect_true(flow, phantom());
+}
+
+TEST(Flow, IsMeasuredInTissueWithoutAWall) {
+  FlowPhantom vessel = phantom();
+  vessel.wall_mm = 0;
+  PhaseContrastProtocol protocol = small();
+  protocol.fluid_brightness = 1;
+  protocol.inflow = 0;
+  const FlowMeasurement flow = measured(vessel, protocol);
+  EXPECT_NEAR(flow.lumen.scene.shape.wall_mm, 0, 0.1);
+  EXPECT_NEAR(flow.lumen.reduced_chi_square, 1, 0.15);
+  EXPECT_TRUE(flow.findings.empty());
+  expect_true(flow, vessel);
+}
+
+TEST(Flow, ImagesThatTheFittedLumenDoesNotExplainAreAProblem) {
+  const ScratchFolder scratch;
+  scanner::scan_flow(phantom(), small(), scratch.path());
+  PhaseContrast scan = phase_contrast(read_image_folder(scratch.path()), {});
+  // A bright spot in the lumen, in all phases.
+  for (Image& image : scan.magnitude)
+    image.block(24, 30, 4, 4) *= 1.4F;
+  const FlowMeasurement flow = measure_flow(scan, {}, scratch.path().string());
+  ASSERT_GT(flow.lumen.reduced_chi_square, 2);
+  ASSERT_EQ(flow.findings.size(), 1U);
+  EXPECT_EQ(flow.findings[0].id, "lumen-misfit");
+  EXPECT_THAT(flow.findings[0].what, HasSubstr("chi-square"));
+  EXPECT_NEAR(flow.stroke_mL.value, stroke_mL(phantom()), 3 * flow.stroke_mL.sigma);
+}
+
 TEST(Flow, SpectraFilledUpWithZerosAndBalancedEncodingsAreFound) {
   PhaseContrastProtocol protocol = small();
   protocol.acquired = 0.75;
@@ -163,6 +202,14 @@ TEST(Flow, WhatCannotBeMeasuredIsRefusedWithTagAndRemedy) {
   protocol = small();
   protocol.has_magnitude = false;
   EXPECT_THAT(refusal(phantom(), protocol), AllOf(HasSubstr("no magnitude"), HasSubstr("Export")));
+
+  {
+    const ScratchFolder scratch;
+    scanner::scan_flow(phantom(), small(), scratch.path());
+    std::filesystem::remove(scratch.path() / "m07.dcm");
+    EXPECT_THAT(test::message_of([&] { (void)phase_contrast(read_image_folder(scratch.path()), {}); }),
+                AllOf(HasSubstr("series 4"), HasSubstr("650 ms"), HasSubstr("Export the magnitude series")));
+  }
 
   protocol = small();
   protocol.missing_phase = 5;
