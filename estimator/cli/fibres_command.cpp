@@ -141,14 +141,12 @@ imaging::FibreSessionRequest checked(const FibresArguments& a) {
   std::vector<fs::path> inputs;
   for (const auto& input : {a.study, a.mesh, request.at})
     if (input) inputs.push_back(*input);
-  const auto require = [&](const std::optional<fs::path>& file, std::string_view mark) {
-    if (file) require_output({*file, inputs, mark, a.force});
-  };
-  require(a.output, fibre_points_mark);
-  require(a.tensors, imaging::tensor_file_mark);
-  require(a.page, report::page_mark);
-  require(a.record, fibres_record_mark);
-  require(a.grid, vtkhdf_kind.mark);
+  RequiredOutputs outputs(inputs, a.force);
+  outputs.add(a.output, fibre_points_mark);
+  outputs.add(a.tensors, imaging::tensor_file_mark);
+  outputs.add(a.page, report::page_mark);
+  outputs.add(a.record, fibres_record_mark);
+  outputs.add(a.grid, vtkhdf_kind.mark);
   return request;
 }
 

@@ -151,10 +151,11 @@ imaging::FlowSessionRequest checked(const FlowArguments& arguments) {
   std::vector<fs::path> inputs;
   for (const auto& input : {request.run, request.pressure, request.trigger})
     if (input) inputs.push_back(*input);
-  require_output({arguments.output, inputs, imaging::flow_file_mark, arguments.force});
-  if (arguments.loop) require_output({*arguments.loop, inputs, imaging::loop_file_mark, arguments.force});
-  if (arguments.page) require_output({*arguments.page, inputs, report::page_mark, arguments.force});
-  if (arguments.record) require_output({*arguments.record, inputs, flow_record_mark, arguments.force});
+  RequiredOutputs outputs(inputs, arguments.force);
+  outputs.add(arguments.output, imaging::flow_file_mark);
+  outputs.add(arguments.loop, imaging::loop_file_mark);
+  outputs.add(arguments.page, report::page_mark);
+  outputs.add(arguments.record, flow_record_mark);
   return request;
 }
 

@@ -41,9 +41,9 @@ ExitCode finish(const GridArguments& arguments, const FieldGrid& grid, size_t po
 }
 
 ExitCode run_points(const GridArguments& arguments, const CommandOutput& out) {
-  require_output({arguments.output, {arguments.grid}, "frame,X_mm", arguments.force});
-  if (arguments.frames)
-    require_output({*arguments.frames, {arguments.grid}, "frame,time_s", arguments.force});
+  RequiredOutputs outputs({arguments.grid}, arguments.force);
+  outputs.add(arguments.output, "frame,X_mm");
+  outputs.add(arguments.frames, "frame,time_s");
   const FieldGrid grid = read_grid(arguments.grid.string());
   const DisplacedPoints points = displaced_points(
       grid, {arguments.field, mm_per_unit(arguments.unit), arguments.sigma_mm}, arguments.grid.string());

@@ -172,14 +172,12 @@ imaging::VentricleRequest checked_request(const VentricleArguments& arguments) {
   }
   if (!arguments.fibre_deg.empty()) request.fibre_deg = {arguments.fibre_deg[0], arguments.fibre_deg[1]};
   request.fit.estimate_shifts = !arguments.keep_slices;
-  const std::vector<fs::path> inputs{request.guide};
-  require_output({arguments.output, inputs, mesh_file_mark, arguments.force});
-  if (arguments.surface)
-    require_output({*arguments.surface, inputs, imaging::surface_file_mark, arguments.force});
-  if (arguments.volumes)
-    require_output({*arguments.volumes, inputs, imaging::volume_file_mark, arguments.force});
-  if (arguments.guide) require_output({*arguments.guide, inputs, imaging::guide_file_mark, arguments.force});
-  if (arguments.page) require_output({*arguments.page, inputs, report::page_mark, arguments.force});
+  RequiredOutputs outputs({request.guide}, arguments.force);
+  outputs.add(arguments.output, mesh_file_mark);
+  outputs.add(arguments.surface, imaging::surface_file_mark);
+  outputs.add(arguments.volumes, imaging::volume_file_mark);
+  outputs.add(arguments.guide, imaging::guide_file_mark);
+  outputs.add(arguments.page, report::page_mark);
   return request;
 }
 

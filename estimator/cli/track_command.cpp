@@ -72,21 +72,10 @@ ExitCode run_track(const TrackArguments& arguments, const CommandOutput& out) {
                                       .coordinates = arguments.coordinates,
                                       .edits = arguments.edits};
   inputs.push_back(imaging::edits_file(request));
-  require_output({arguments.output, inputs, imaging::tags_file_mark, arguments.force});
-  const auto place_of = [](const std::filesystem::path& path) {
-    return std::filesystem::weakly_canonical(std::filesystem::absolute(path));
-  };
-  std::vector<std::filesystem::path> outputs{place_of(arguments.output)};
-  const auto require_another = [&](const std::filesystem::path& path, const char* option,
-                                   std::string_view mark) {
-    require_output({path, inputs, mark, arguments.force});
-    if (std::ranges::count(outputs, place_of(path)) > 0)
-      throw InputError(
-          {path.string(), option, "is another output of this command too", "Give each a name of its own."});
-    outputs.push_back(place_of(path));
-  };
-  if (arguments.page) require_another(*arguments.page, "--page", report::page_mark);
-  if (arguments.record) require_another(*arguments.record, "--record", tracking_file_mark);
+  RequiredOutputs outputs(inputs, arguments.force);
+  outputs.add(arguments.output, imaging::tags_file_mark);
+  outputs.add(arguments.page, report::page_mark);
+  outputs.add(arguments.record, tracking_file_mark);
   const bool shows_progress = isatty(STDERR_FILENO) != 0;
   const imaging::TrackedFolder tracked = imaging::track_folder(request, [&](const std::string& stage) {
     if (shows_progress) fmt::print(stderr, "{}\n", stage);

@@ -41,7 +41,7 @@ double core_deviation(const Eigen::VectorXd& residuals) {
   if (residuals.size() == 0) return 0;
   std::vector<double> size(static_cast<size_t>(residuals.size()));
   std::transform(residuals.begin(), residuals.end(), size.begin(), [](double r) { return std::abs(r); });
-  return 1.4826 * signal::median(std::move(size));
+  return signal::deviation_of_normal(std::move(size));
 }
 
 Eigen::Index wild_count(const Eigen::VectorXd& residuals) {

@@ -22,9 +22,7 @@ std::string_view take_field(std::string_view& rest) {
 /// How many columns the file has: all, or all but the last `optional`.
 size_t check_header(std::string_view line, const std::string& file, std::span<const std::string_view> columns,
                     size_t optional) {
-  constexpr std::string_view byte_order_mark = "\xEF\xBB\xBF";
-  if (line.starts_with(byte_order_mark)) line.remove_prefix(byte_order_mark.size());
-  std::string_view rest = line;
+  std::string_view rest = without_byte_order_mark(line);
   const std::string remedy = fmt::format("The header must read: {}", fmt::join(columns, ","));
   size_t count = columns.size() - optional;
   for (size_t i = 0; i < count; ++i) {

@@ -2,6 +2,7 @@
 
 #include <unistd.h>
 
+#include <algorithm>
 #include <fstream>
 #include <system_error>
 
@@ -79,6 +80,15 @@ void require_output(const OutputFile& output) {
     throw InputError({output.path.string(), "", "exists already and is no earlier result of this command",
                       "Choose another name, or --force to replace it."});
   }
+}
+
+void RequiredOutputs::add(const fs::path& path, std::string_view mark) {
+  const fs::path place = fs::weakly_canonical(fs::absolute(path));
+  if (std::ranges::count(places_, place) > 0)
+    throw InputError(
+        {path.string(), "", "is another output of this command too", "Give each a name of its own."});
+  require_output({path, inputs_, mark, force_});
+  places_.push_back(place);
 }
 
 std::string read_whole_file(const fs::path& path, const std::string& remedy) {

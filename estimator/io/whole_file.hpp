@@ -3,8 +3,10 @@
 
 #include <filesystem>
 #include <functional>
+#include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 namespace diastole {
@@ -27,6 +29,24 @@ struct OutputFile {
 /// Before long work, so that neither its result nor an input is lost. Throws InputError if the path cannot
 /// become a file, is one of the inputs under whatever name, is a DICOM image (by its preamble), or holds something else and there is no `force`.
 void require_output(const OutputFile& output);
+
+/// The same of each of several outputs of one command, which must have a name each.
+class RequiredOutputs {
+ public:
+  RequiredOutputs(std::vector<std::filesystem::path> inputs, bool force)
+      : inputs_(std::move(inputs)), force_(force) {}
+
+  void add(const std::filesystem::path& path, std::string_view mark);
+  /// Nothing where none is wanted.
+  void add(const std::optional<std::filesystem::path>& path, std::string_view mark) {
+    if (path) add(*path, mark);
+  }
+
+ private:
+  std::vector<std::filesystem::path> inputs_;
+  bool force_;
+  std::vector<std::filesystem::path> places_;
+};
 
 /// Throws InputError, with this remedy, if the file is missing, a folder or unreadable.
 std::string read_whole_file(const std::filesystem::path& path,

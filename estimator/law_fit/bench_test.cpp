@@ -11,6 +11,7 @@
 #include "estimator/io/whole_file.hpp"
 #include "estimator/shear/shear_test.hpp"
 #include "protocol/contract/input_error.hpp"
+#include "protocol/contract/text.hpp"
 
 namespace diastole {
 namespace {
@@ -22,8 +23,7 @@ constexpr double least_stretch = 0.05,
                  most_stretch = 20;  // beyond them nothing incompressible was ever tested
 
 std::string_view header_of(std::string_view text) {
-  constexpr std::string_view byte_order_mark = "\xEF\xBB\xBF";
-  if (text.starts_with(byte_order_mark)) text.remove_prefix(byte_order_mark.size());
+  text = without_byte_order_mark(text);
   return text.substr(0, text.find_first_of("\r\n"));
 }
 

@@ -117,7 +117,7 @@ double above_zero(const RecordedRun& run, const char* name, double otherwise) {
   return value;
 }
 
-/// The base rig that a run describes; what it does not tell is the paper's.
+/// The base rig that a run describes; what it does not tell is the paper's. Throws InputError where a rig cannot be so.
 RigModel base_model(const RecordedRun& run) {
   RigModel model;
   Hose& hose = model.hose;
@@ -132,6 +132,11 @@ RigModel base_model(const RecordedRun& run) {
   hose.creep_time_s = above_zero(run, "hose_creep_time_s", hose.creep_time_s);
   model.catheter.resonance_Hz = above_zero(run, "catheter_f0_Hz", model.catheter.resonance_Hz);
   model.catheter.damping = above_zero(run, "catheter_zeta", model.catheter.damping);
+  if (!(hose.loss_at_cavity >= 0.0 && hose.loss_at_cavity <= 1.0)) {
+    throw InputError({run.file, "attribute /rig hose_loss_at_cavity",
+                      fmt::format("is {}, and a part of a loss is between 0 and 1", hose.loss_at_cavity),
+                      "1: all of it is at the cavity. Correct the rig's description."});
+  }
   return model;
 }
 
@@ -169,11 +174,6 @@ Session read_session(const Study& study) {
     }
     if (session.runs.empty()) {
       session.base = base_model(run);
-      if (const double part = session.base.hose.loss_at_cavity; !(part >= 0.0 && part <= 1.0)) {
-        throw InputError({file.string(), "attribute /rig hose_loss_at_cavity",
-                          fmt::format("is {}, and a part of a loss is between 0 and 1", part),
-                          "1: all of it is at the cavity. Correct the rig's description."});
-      }
       session.limits = limits_of(run);
       constexpr std::string_view of_tolerance = "tolerance_";
       for (const auto& [name, value] : run.rig)

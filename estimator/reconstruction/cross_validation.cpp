@@ -13,8 +13,8 @@ namespace {
 constexpr double lowest_exponent = 0, highest_exponent = 8;
 constexpr double golden = 0.6180339887498949;
 
-double trace_of(const CholeskyFactor& factor, const Eigen::MatrixXd& right_sides) {
-  return right_sides.cwiseProduct(factor.solve(right_sides)).sum() / static_cast<double>(right_sides.cols());
+double trace_of(const Eigen::MatrixXd& seen_signs, const Eigen::MatrixXd& solved) {
+  return seen_signs.cwiseProduct(solved).sum() / static_cast<double>(seen_signs.cols());
 }
 
 /// Its score is infinite where the field has no solution.
@@ -25,7 +25,7 @@ CrossValidationPoint point_at(const SmoothedSystem& system, double lambda, const
   if (!factor) return {lambda, none, 0.0};
   const Eigen::VectorXd misfit =
       system.weighted_rows() * factor->solve(system.right_side()) - system.weighted_targets();
-  const double trace = trace_of(*factor, right_sides);
+  const double trace = trace_of(right_sides, factor->solve(right_sides));
   const double freedom = std::max(measured - trace, 1e-3 * measured);
   const double score = measured * misfit.squaredNorm() / (freedom * freedom);
   return {lambda, std::isfinite(score) && std::isfinite(trace) ? score : none, trace};
@@ -49,7 +49,7 @@ Eigen::MatrixXd seen_signs(const SmoothedSystem& system) {
 }
 
 double stochastic_trace(const SmoothedSystem& system, const Eigen::MatrixXd& right_sides) {
-  return right_sides.cwiseProduct(system.solve(right_sides)).sum() / static_cast<double>(right_sides.cols());
+  return trace_of(right_sides, system.solve(right_sides));
 }
 
 Eigen::VectorXd residual_shares(const SmoothedSystem& system, const Eigen::MatrixXd& signs) {

@@ -37,7 +37,7 @@ double stochastic_trace(const SmoothedSystem& system, const Eigen::MatrixXd& see
 /// the rows that count, tr[(1 - K)²], is what χ² is to be compared with; it is less than N - tr K when K smooths.
 Eigen::VectorXd residual_shares(const SmoothedSystem& system, const Eigen::MatrixXd& signs);
 
-/// Searches λ from 1 to 10^8, by decades and then by golden section to `fineness` decades. Leaves the system
+/// Searches λ from 1 to 10^8, by decades (several at the same time) and then by golden section to `fineness` decades. Leaves the system
 /// factorised at the λ found.
 CrossValidation choose_lambda(SmoothedSystem& system, double fineness = 0.1);
 

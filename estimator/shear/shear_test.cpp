@@ -11,6 +11,7 @@
 #include "estimator/io/number_table.hpp"
 #include "estimator/io/whole_file.hpp"
 #include "protocol/contract/input_error.hpp"
+#include "protocol/contract/text.hpp"
 
 namespace diastole {
 namespace {
@@ -91,9 +92,7 @@ ShearRow row_of(const NumberTable& table, size_t row, const Form& form) {
 }  // namespace
 
 bool is_shear_test(std::string_view content) {
-  constexpr std::string_view byte_order_mark = "\xEF\xBB\xBF";
-  if (content.starts_with(byte_order_mark)) content.remove_prefix(byte_order_mark.size());
-  return content.starts_with(per_string_columns[0]);
+  return without_byte_order_mark(content).starts_with(per_string_columns[0]);
 }
 
 ShearTest read_shear_test(const std::filesystem::path& path) {

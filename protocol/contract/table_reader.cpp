@@ -10,6 +10,7 @@
 
 #include "protocol/contract/bounded_file.hpp"
 #include "protocol/contract/input_error.hpp"
+#include "protocol/contract/text.hpp"
 
 namespace diastole {
 namespace {
@@ -27,13 +28,6 @@ size_t edit_distance(std::string_view a, std::string_view b) {
     }
   }
   return row[b.size()];
-}
-
-std::string in_small_letters(std::string_view word) {
-  std::string small(word);
-  for (char& letter : small)
-    letter = static_cast<char>(std::tolower(static_cast<unsigned char>(letter)));
-  return small;
 }
 
 /// The key that was probably meant to be `wanted`: one that nobody asked for and that differs by its case and

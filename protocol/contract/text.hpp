@@ -1,7 +1,8 @@
 #pragma once
-// Words of a text that somebody wrote: without the blanks around them, as numbers, and quoted for a file.
+// Words of a text that somebody wrote: without the blanks around them, in small letters, as numbers, and quoted for a file.
 
 #include <array>
+#include <cctype>
 #include <charconv>
 #include <cstddef>
 #include <optional>
@@ -15,6 +16,19 @@ inline std::string_view trimmed(std::string_view text) {
   const size_t first = text.find_first_not_of(blanks);
   if (first == std::string_view::npos) return {};
   return text.substr(first, text.find_last_not_of(blanks) - first + 1);
+}
+
+inline std::string in_small_letters(std::string_view word) {
+  std::string small(word);
+  for (char& letter : small)
+    letter = static_cast<char>(std::tolower(static_cast<unsigned char>(letter)));
+  return small;
+}
+
+/// UTF-8's byte order mark, which spreadsheets write first, says nothing.
+inline std::string_view without_byte_order_mark(std::string_view text) {
+  constexpr std::string_view mark = "\xEF\xBB\xBF";
+  return text.starts_with(mark) ? text.substr(mark.size()) : text;
 }
 
 /// The number that the whole of `text` is; "nan" and "inf" are numbers too.

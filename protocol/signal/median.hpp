@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <utility>
 #include <vector>
 
 namespace diastole::signal {
@@ -14,5 +15,8 @@ Value median(std::vector<Value> values) {
   std::nth_element(values.begin(), middle, values.end());
   return *middle;
 }
+
+/// The standard deviation of normal numbers from their sizes (absolute values): 1.4826 times the median.
+inline double deviation_of_normal(std::vector<double> sizes) { return 1.4826 * median(std::move(sizes)); }
 
 }  // namespace diastole::signal

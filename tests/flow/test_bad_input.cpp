@@ -64,6 +64,13 @@ std::vector<std::string> own_effect(const Workplace& place, const std::string& t
   return {"diastole", "effects", "own.effect.toml"};
 }
 
+std::vector<std::string> shape(const std::string& wanted, const std::vector<std::string>& options) {
+  std::vector<std::string> arguments{
+      "diastole", "shape", wanted, "--study", source / "examples/shape/gel.study.toml", "-o", "drive.csv"};
+  arguments.insert(arguments.end(), options.begin(), options.end());
+  return arguments;
+}
+
 std::vector<BadInput> table() {
   using Place = const Workplace&;
   return {
@@ -120,41 +127,29 @@ std::vector<BadInput> table() {
        2,
        {"own.effect.toml", "[equations]", "not a finite number"}},
       {"ADriveInMilliseconds",
-       [](Place place) -> std::vector<std::string> {
-         place.write("ms.csv", "time_s,volume_mL\n0,0\n600,8\n900,3\n1200,0\n");
-         return {"diastole", "shape",    "ms.csv", "--study", source / "examples/shape/gel.study.toml",
-                 "-o",       "drive.csv"};
+       [](Place place) {
+         return shape(place.write("ms.csv", "time_s,volume_mL\n0,0\n600,8\n900,3\n1200,0\n"), {});
        },
        2,
        {"ms.csv", "time_s", "1200 s", "600 s", "in seconds"}},
       {"AnEndlessDrive",
-       [](Place) -> std::vector<std::string> {
-         return {"diastole",
-                 "shape",
-                 source / "examples/shape/ventricle.csv",
-                 "--study",
-                 source / "examples/shape/gel.study.toml",
-                 "-o",
-                 "drive.csv",
-                 "--cycles",
-                 "1000000000"};
+       [](Place) {
+         return shape(source / "examples/shape/ventricle.csv", {"--cycles", "1000000000"});
        },
        2,
        {"--cycles", "1000"}},
       {"AShapesPageOverItsDrive",
-       [](Place) -> std::vector<std::string> {
-         return {"diastole",
-                 "shape",
-                 source / "examples/shape/ventricle.csv",
-                 "--study",
-                 source / "examples/shape/gel.study.toml",
-                 "-o",
-                 "drive.csv",
-                 "--page",
-                 "./drive.csv"};
+       [](Place) {
+         return shape(source / "examples/shape/ventricle.csv", {"--page", "./drive.csv"});
        },
        2,
-       {"drive.csv", "of the page and of the drive", "--page"}},
+       {"drive.csv", "is another output", "name of its own"}},
+      {"AFlowsPageOverItsTable",
+       [](Place) -> std::vector<std::string> {
+         return {"diastole", "flow", ".", "-o", "a.flow.csv", "--page", "a.flow.csv"};
+       },
+       2,
+       {"a.flow.csv", "is another output", "name of its own"}},
       {"ScanWithoutRoom",
        [](Place place) {
          return scan(place, {"--fov", "90"});

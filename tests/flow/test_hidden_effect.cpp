@@ -66,5 +66,16 @@ TEST_F(Hidden, IsFoundAndScored) {
     EXPECT_TRUE(cell.at("right").get<bool>()) << cell;
 }
 
+TEST_F(Hidden, AModulusBeyondTheStudysBoundsIsToldAndKept) {
+  (void)explained("soft", "hose-compliance", "3");
+  std::ifstream file(workplace_ / "soft.study.toml");
+  const std::string study{std::istreambuf_iterator<char>(file), {}};
+  workplace_.write("narrow.study.toml", with(with(study, "bounds = [1.0, 20.0]", "bounds = [1.0, 5.0]"),
+                                             "start = 8.8", "start = 3.0"));
+  const Ended ended = run(workplace_, {"diastole", "explain", "narrow.study.toml", "-o", "narrow"});
+  ASSERT_EQ(ended.exit_code, 0) << ended.err;
+  EXPECT_THAT(ended.err, testing::HasSubstr("outside its bounds [1, 5]"));
+}
+
 }  // namespace
 }  // namespace diastole::flow

@@ -122,7 +122,7 @@ const std::vector<Rule>& rules() {
         "estimator/io", "estimator/mesh", "estimator/parallel"}},
       {"estimator/imaging/diffusion",
        {"protocol/contract", "protocol/signal", "estimator/imaging/dicom", "estimator/imaging/series",
-        "estimator/io", "estimator/mesh", "estimator/parallel"}},
+        "estimator/io", "estimator/mesh", "estimator/parallel", "estimator/sparse"}},
       {"estimator/shear", {"protocol/contract", "estimator/inference", "estimator/io"}},
       {"estimator/law_fit",
        {"protocol/contract", "estimator/inference", "estimator/io", "estimator/materials",

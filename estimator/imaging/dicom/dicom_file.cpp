@@ -23,6 +23,7 @@
 #include <span>
 
 #include "protocol/contract/input_error.hpp"
+#include "protocol/contract/text.hpp"
 
 namespace diastole::imaging {
 namespace {
@@ -632,9 +633,7 @@ float decoded(const PixelLayout& layout, const uint8_t* bytes, size_t index) {
 }  // namespace
 
 bool claims_to_be_dicom(const std::filesystem::path& file) {
-  std::string ending = file.extension().string();
-  std::transform(ending.begin(), ending.end(), ending.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  const std::string ending = in_small_letters(file.extension().string());
   return ending == ".dcm" || ending == ".dicom" || ending == ".ima";
 }
 

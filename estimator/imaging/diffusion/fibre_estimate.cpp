@@ -2,20 +2,22 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/CholmodSupport>
 #include <Eigen/SparseCholesky>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <memory>
 #include <numbers>
 #include <random>
+#include <stdexcept>
 #include <utility>
 
 #include "estimator/mesh/fibre_field.hpp"
 #include "estimator/mesh/helix_course.hpp"
 #include "estimator/mesh/nodal_lines.hpp"
 #include "estimator/parallel/parallel_for.hpp"
+#include "estimator/sparse/sparse_cholesky.hpp"
 #include "protocol/contract/input_error.hpp"
 
 namespace diastole::imaging {
@@ -178,7 +180,7 @@ class Estimation {
     FibreEstimate estimate{.lattice = std::move(lattice), .nodes = angles(u_)};
     for (size_t n = 0; n < estimate.nodes.size(); ++n)
       estimate.anisotropy.push_back(at(u_, n, anisotropy));
-    const Eigen::MatrixXd deviations = factor_.solve(forces_of_draws());
+    const Eigen::MatrixXd deviations = factor_->solve(forces_of_draws());
     for (int d = 0; d < draw_count; ++d)
       estimate.draws.push_back(angles(u_ + deviations.col(d)));
     estimate.voxels = data_.size();
@@ -374,7 +376,7 @@ class Estimation {
                  column = static_cast<int>(fields * (pattern_[b] & 0xffffffffU));
       for (int i = 0; i < 5; ++i)
         for (int j = 0; j < 5; ++j)
-          if (row + i >= column + j) entries.emplace_back(row + i, column + j, blocks_[b](i, j));
+          if (row + i >= column + j) entries.emplace_back(column + j, row + i, blocks_[b](i, j));
     }
     for (Eigen::Index i = 0; i < holding_.size(); ++i)
       entries.emplace_back(static_cast<int>(i), static_cast<int>(i), holding_[i]);
@@ -386,7 +388,7 @@ class Estimation {
             gradient_[static_cast<Eigen::Index>(fields) * n + static_cast<Eigen::Index>(field)] -= bent[n];
           for (Eigen::Index n = 0; n < bends_[k].outerSize(); ++n)
             for (Sparse::InnerIterator at(bends_[k], n); at; ++at)
-              if (at.row() >= at.col())
+              if (at.row() <= at.col())
                 entries.emplace_back(
                     static_cast<int>(fields) * static_cast<int>(at.row()) + static_cast<int>(field),
                     static_cast<int>(fields) * static_cast<int>(at.col()) + static_cast<int>(field),
@@ -398,14 +400,20 @@ class Estimation {
     system.setFromTriplets(entries.begin(), entries.end());
     for (Eigen::Index i = 0; i < holding_.size(); ++i)
       if (static_cast<size_t>(i) % fields != helix) gradient_[i] -= holding_[i] * u_[i];
-    if (iterations_ <= 1) factor_.analyzePattern(system);  // the pattern stays
-    factor_.factorize(system);
+    const auto entry_count = static_cast<size_t>(system.nonZeros());
+    if (!matrix_pattern_) {  // it stays
+      const int *starts = system.outerIndexPtr(), *rows = system.innerIndexPtr();
+      matrix_pattern_ = CholeskyPattern::of({starts, starts + system.cols() + 1}, {rows, rows + entry_count});
+    }
+    factor_ =
+        matrix_pattern_ ? CholeskyFactor::of(matrix_pattern_, {system.valuePtr(), entry_count}) : nullptr;
+    if (!factor_) throw std::domain_error("the fibre field's equations have no solution");
   }
 
   /// Returns the angles' root mean square change.
   double step() {
     factorise();
-    Eigen::VectorXd change = factor_.solve(gradient_);
+    Eigen::VectorXd change = factor_->solve(gradient_);
     double longest = 0, squares = 0;
     for (size_t n = 0; n < lattice_.mesh.node_count(); ++n) {
       const double helices = at(change, n, helix), transverses = at(change, n, transverse);
@@ -419,7 +427,7 @@ class Estimation {
 
   /// Fellner-Schall: strengths and the noise's scale, by traces over random signs.
   void update_strengths() {
-    const Eigen::MatrixXd solved = factor_.solve(signs_);
+    const Eigen::MatrixXd solved = factor_->solve(signs_);
     double used = 0;
     constexpr double most_change = 10;
     for (Smoothness& smoothness : smoothness_) {
@@ -469,7 +477,8 @@ class Estimation {
   std::vector<uint64_t> pattern_;
   std::vector<Matrix5> blocks_;
   Eigen::VectorXd u_, gradient_;
-  Eigen::CholmodSupernodalLLT<Sparse> factor_;
+  std::shared_ptr<const CholeskyPattern> matrix_pattern_;  ///< of the upper triangle
+  std::unique_ptr<const CholeskyFactor> factor_;
   Eigen::MatrixXd signs_;
   double noise_ = 1, freedom_ = 0;
   int iterations_ = 0;

@@ -1,6 +1,7 @@
 #include "estimator/imaging/flow/phase_contrast.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -88,13 +89,6 @@ Magnitudes magnitudes_in(const ImageFolder& folder, int series, const SliceImage
   return found;
 }
 
-std::string times_of(const std::vector<double>& times_ms) {
-  std::string text;
-  for (const double time_ms : times_ms)
-    text += fmt::format("{}{:.0f} ms", text.empty() ? "" : ", ", time_ms);
-  return text;
-}
-
 /// Of several the nearest by series number: scanners number what one scan makes in a row.
 std::vector<size_t> magnitudes_for(const ImageFolder& folder, const ImageSeries& series,
                                    const SliceImages& velocity, double step_ms) {
@@ -121,8 +115,8 @@ std::vector<size_t> magnitudes_for(const ImageFolder& folder, const ImageSeries&
            "Export the magnitude series of the same scan too: partial volume and noise are read from it.");
   if (!best->lacking_ms.empty())
     refuse(folder.folder.string(), fmt::format("series {}", best->series),
-           fmt::format("has no magnitude image at {}, where series {} has a velocity image",
-                       times_of(best->lacking_ms), series.number),
+           fmt::format("has no magnitude image at {:.0f} ms, where series {} has a velocity image",
+                       fmt::join(best->lacking_ms, " ms, "), series.number),
            "Export the magnitude series again with all its phases.");
   return best->images;
 }

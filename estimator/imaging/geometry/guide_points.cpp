@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <cmath>
 #include <map>
 #include <optional>
@@ -42,8 +41,7 @@ constexpr const char* gpfile_remedy =
     "A row is x y z contour-type sliceID weight frame, like -36.3 -1.1 -70.9 SAX_LV_ENDOCARDIAL 3 1 0.";
 
 bool is_same_word(std::string_view a, std::string_view b) {
-  return std::equal(a.begin(), a.end(), b.begin(), b.end(),
-                    [](unsigned char x, unsigned char y) { return std::tolower(x) == std::tolower(y); });
+  return in_small_letters(a) == in_small_letters(b);
 }
 
 struct Line {
@@ -201,8 +199,7 @@ GuidePoints guide_points_from_text(std::string_view text, const std::string& fil
   Gatherer gatherer(file);
   std::optional<CsvColumns> columns;
   bool is_first = true;
-  if (constexpr std::string_view byte_order_mark = "\xEF\xBB\xBF"; text.starts_with(byte_order_mark))
-    text.remove_prefix(byte_order_mark.size());
+  text = without_byte_order_mark(text);
   size_t number = 0;
   while (!text.empty()) {
     const size_t end = text.find('\n');

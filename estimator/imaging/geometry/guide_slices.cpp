@@ -15,8 +15,6 @@ using Eigen::Vector3d;
 constexpr double rounding_mm = 0.05;
 constexpr double most_sigmas_across = 3;
 constexpr double least_widths = 5;
-/// Of a normal variable, from the median of its absolute value.
-constexpr double sigmas_per_median = 1.4826;
 
 bool is_landmark(GuideSurface surface) { return is_apex(surface) || surface == GuideSurface::base; }
 
@@ -61,7 +59,7 @@ double scatter_about(const Plane& plane, const std::vector<Vector3d>& places) {
   std::vector<double> distances;
   for (const Vector3d& place : places)
     distances.push_back(plane.distance_mm(place));
-  return sigmas_per_median * signal::median(std::move(distances));
+  return signal::deviation_of_normal(std::move(distances));
 }
 
 /// Of fewer than eight points a part would always lie near some plane.

@@ -85,7 +85,7 @@ std::vector<bool> wild_of_wall(const WallPlaces& wall) {
     std::transform(scaled.begin(), scaled.end(), distances.begin(),
                    [&](const Eigen::Vector3d& x) { return distance_from_quadric(q, x); });
     // Walls are no ellipsoids to better than a fiftieth.
-    scatter = std::max(0.02, 1.4826 * signal::median(distances));
+    scatter = std::max(0.02, signal::deviation_of_normal(distances));
   }
   std::vector<bool> wild;
   for (const double distance : distances)

@@ -37,14 +37,11 @@ constexpr double seen_in_pixels = 0.5;
 /// How far around a place that a person saw the start of a search may be led: ranges to choose from, in spacings.
 constexpr std::array led_ranges_in_spacings = {1.0, 2.0, 4.0};
 
-double median(std::vector<double> values) { return values.empty() ? 0 : signal::median(std::move(values)); }
-
-/// The robust standard deviation: 1.4826 times the median absolute value.
 double robust_sigma(const std::vector<double>& residuals) {
   std::vector<double> sizes;
   for (const double residual : residuals)
     sizes.push_back(std::abs(residual));
-  return 1.4826 * median(std::move(sizes));
+  return sizes.empty() ? 0 : signal::deviation_of_normal(std::move(sizes));
 }
 
 struct Pixel {

@@ -36,15 +36,10 @@ ExitCode shape(const ShapeOptions& options, const CommandOutput& out) {
   std::vector<fs::path> inputs{options.request.wanted.file, options.request.study};
   inputs.insert(inputs.end(), options.runs.begin(), options.runs.end());
   const fs::path experiment = experiment_beside(options.drive);
-  require_output({options.drive, inputs, drive_mark, options.force});
-  require_output({experiment, inputs, drive_mark, options.force});
-  if (!options.page.empty()) {
-    require_output({options.page, inputs, report::page_mark, options.force});
-    for (const fs::path& other : {options.drive, experiment})
-      if (fs::weakly_canonical(fs::absolute(options.page)) == fs::weakly_canonical(fs::absolute(other)))
-        throw InputError({options.page.string(), "", "is the name of the page and of the drive",
-                          "Give --page another name, as NAME.html."});
-  }
+  RequiredOutputs outputs(inputs, options.force);
+  outputs.add(options.drive, drive_mark);
+  outputs.add(experiment, drive_mark);
+  if (!options.page.empty()) outputs.add(options.page, report::page_mark);
   fmt::print(stderr, "Solving the specimen and inverting the rig's model.\n");
   const Shaper shaper(options.request);
   const Shaping shaping = shaper.after(options.runs);
