@@ -110,6 +110,9 @@ class Teller {
   std::span<const uint8_t> left_;
 };
 
+/// Of pressures, the only datasets of which the reader asks it.
+const char* unit(const std::string& path) { return path.ends_with("_kPa") ? "kPa" : "1"; }
+
 class Author {
  public:
   Author(std::span<const uint8_t> bytes, int descriptor)
@@ -138,13 +141,13 @@ class Author {
       case Way::left_out:
         return;
       case Way::numbers:
-        return sink_.numbers(path, tell_.numbers(tell_.byte() % 16), "1");
+        return sink_.numbers(path, tell_.numbers(tell_.byte() % 16), unit(path));
       case Way::integers:
         return sink_.table(path, {{"cycles", tell_.integers(tell_.byte() % 4)}}, "1");
       case Way::texts:
         return sink_.table(path, {{"text", tell_.texts(tell_.byte() % 4)}}, "1");
       case Way::scalar:
-        return sink_.scalar(path, tell_.number(), "1");
+        return sink_.scalar(path, tell_.number(), unit(path));
       case Way::text:
         return sink_.text(path, tell_.text());
       case Way::group:
@@ -152,10 +155,10 @@ class Author {
     }
   }
   void numbers(const std::string& path, const Numbers& usual) {
-    object(path, [&] { sink_.numbers(path, usual, "1"); });
+    object(path, [&] { sink_.numbers(path, usual, unit(path)); });
   }
   void scalar(const std::string& path, double usual) {
-    object(path, [&] { sink_.scalar(path, usual, "1"); });
+    object(path, [&] { sink_.scalar(path, usual, unit(path)); });
   }
   void group(const std::string& path) {
     object(path, [&] { sink_.group(path); });
