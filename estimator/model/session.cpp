@@ -130,12 +130,19 @@ RigModel base_model(const RecordedRun& run) {
   hose.loss_at_cavity = attribute(run, "hose_loss_at_cavity", hose.loss_at_cavity);
   hose.creep_fraction = attribute(run, "hose_creep_fraction", hose.creep_fraction);
   hose.creep_time_s = above_zero(run, "hose_creep_time_s", hose.creep_time_s);
+  model.drive_lag_s = attribute(run, "drive_lag_s", model.drive_lag_s);
   model.catheter.resonance_Hz = above_zero(run, "catheter_f0_Hz", model.catheter.resonance_Hz);
   model.catheter.damping = above_zero(run, "catheter_zeta", model.catheter.damping);
   if (!(hose.loss_at_cavity >= 0.0 && hose.loss_at_cavity <= 1.0)) {
     throw InputError({run.file, "attribute /rig hose_loss_at_cavity",
                       fmt::format("is {}, and a part of a loss is between 0 and 1", hose.loss_at_cavity),
                       "1: all of it is at the cavity. Correct the rig's description."});
+  }
+  constexpr double longest_lag_s = 1.0;
+  if (!(model.drive_lag_s >= 0.0 && model.drive_lag_s <= longest_lag_s)) {
+    throw InputError(
+        {run.file, "attribute /rig drive_lag_s", fmt::format("is {}", model.drive_lag_s),
+         "A piston follows its steps some milliseconds later: 0.004, say. Correct the rig's description."});
   }
   return model;
 }

@@ -101,6 +101,7 @@ struct RigModel {
   SpecimenCurve curve;  ///< at a modulus of 1 kPa
   double modulus_kPa = 6.0;
   Catheter catheter;
+  double drive_lag_s = 0.0;  ///< the piston follows its steps this much later
 
   // Nuisances of the sensors, per run set by the fit.
   double cavity_offset_kPa = 0.0;

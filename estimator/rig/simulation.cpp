@@ -227,8 +227,8 @@ size_t Plant::beyond_repeated(PlantTrace& trace, size_t k) {
 
 PlantTrace Plant::run() {
   const size_t count = drive_.volume_mL.size();
-  PlantTrace trace{drive_.start_s, drive_.step_s, std::vector<double>(count), std::vector<double>(count),
-                   std::vector<double>(count)};
+  PlantTrace trace{drive_.start_s + model_.drive_lag_s, drive_.step_s, std::vector<double>(count),
+                   std::vector<double>(count), std::vector<double>(count)};
   const double h = drive_.step_s;
   for (size_t k = 0; k < count; ++k) {
     EndLoads now = loads(k, drive_.acceleration_mL_per_s2[k]);

@@ -81,8 +81,8 @@ constexpr std::array tolerances{
               [](double x, const EffectContext&, RigModel& m) { times(m.hose.creep_time_s, x); }},
     Tolerance{"hose_wall_loss", "ln", 1.0, false, false,
               [](double x, const EffectContext&, RigModel& m) { times(m.hose.wall_loss_s, x); }},
-    // Drive. Its lag is that of motor and coupling, of the instrument's filter and of its scan over the channels: some
-    // milliseconds each.
+    // Drive. Beyond the lag that is described, motor and coupling, the instrument's filter and its scan over the channels
+    // lag by some milliseconds each.
     Tolerance{"drive_lag", "s", 0.003, true, false,
               [](double x, const EffectContext&, RigModel& m) { m.sample_delay_s += x; }},
     Tolerance{"drive_stroke", "ln", 0.002, false, false,

@@ -26,14 +26,24 @@ std::vector<std::string> ids(const json& explanation) {
 
 class Hidden : public testing::Test {
  protected:
-  /// Explains a session of rig 1 in which this is hidden.
-  json explained(const std::string& name, const std::string& effect, const std::string& hide_seed) {
+  /// Explains a session of rig 1, or of the very rig that its file describes, in which this is hidden.
+  json explained(const std::string& name, const std::string& effect, const std::string& seed,
+                 bool is_as_described = false) {
     std::filesystem::create_directories(workplace_ / "sealed");
     std::filesystem::create_directories(workplace_ / "results");
-    const Ended simulated =
-        run(workplace_, {"diastole", "simulate", (example / "mine.experiment.toml").string(), "-o",
-                         name + ".run.h5", "--rig-seed", "1", "--seed", hide_seed, "--hide", effect,
-                         "--sealed", "sealed/" + name + ".sealed.json"});
+    std::vector<std::string> simulate{"diastole",
+                                      "simulate",
+                                      (example / "mine.experiment.toml").string(),
+                                      "-o",
+                                      name + ".run.h5",
+                                      "--seed",
+                                      seed,
+                                      "--hide",
+                                      effect,
+                                      "--sealed",
+                                      "sealed/" + name + ".sealed.json"};
+    if (!is_as_described) simulate.insert(simulate.end(), {"--rig-seed", "1"});
+    const Ended simulated = run(workplace_, simulate);
     EXPECT_EQ(simulated.exit_code, 0) << simulated.err;
     std::ifstream file(example / "mine.study.toml");
     std::string study{std::istreambuf_iterator<char>(file), {}};
@@ -49,6 +59,7 @@ class Hidden : public testing::Test {
 
 TEST_F(Hidden, IsFoundAndScored) {
   EXPECT_EQ(explained("nothing", "none", "1").at("verdict"), "none");
+  EXPECT_EQ(explained("described", "none", "1", true).at("verdict"), "none");
   const json leak = explained("leak", "cannula-leak-cavity", "2");
   EXPECT_EQ(leak.at("verdict"), "named");
   EXPECT_THAT(ids(leak), ElementsAre("cannula-leak-cavity"));

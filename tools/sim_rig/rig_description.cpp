@@ -21,6 +21,10 @@ void read_geometry(TableReader& rig, int64_t microsteps, RigDescription& descrip
   hose.fluid_density_kg_m3 = rig.number("fluid_density_kg_m3", positive);
   hose.fluid_viscosity_Pa_s = rig.number_or("fluid_viscosity_Pa_s", hose.fluid_viscosity_Pa_s, positive);
   PlantConfig& plant = description.plant;
+  constexpr double ms_per_s = 1000;
+  constexpr int poles = 2;
+  plant.piston_lag_ms =
+      ms_per_s / poles * rig.number_or("drive_lag_s", poles / ms_per_s * plant.piston_lag_ms, positive);
   plant.minor_loss_K = rig.number_or("hose_minor_loss_K", plant.minor_loss_K, not_negative);
   plant.cavity.f0_Hz = rig.number_or("catheter_f0_Hz", plant.cavity.f0_Hz, positive);
   plant.cavity.zeta = rig.number_or("catheter_zeta", plant.cavity.zeta, positive);

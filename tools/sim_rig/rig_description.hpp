@@ -9,7 +9,7 @@
 //   noise_correlation_ms = 10.0
 //   daq_bits = 12                 # converter steps over +-cavity_range_kPa of [rig]; 0: none
 //   daq_clock_error_ppm = 0.0
-//   piston_lag_ms = 2.0           # motor and screw: time constant of each of two poles
+//   piston_lag_ms = 2.0           # motor and screw: time constant of each of two poles; else half of drive_lag_s of [rig]
 //   hose_wave_speed_m_s = 400.0   # the hose's true one, if [rig] says another
 //   minor_loss_K = 1.5            # the same of hose_minor_loss_K
 //   wall_creep_fraction = 0.05    # of the hose's elastic compliance; wall_creep_time_s = 0.1; if [rig] says others

@@ -13,7 +13,7 @@ FrozenLeak::FrozenLeak(const rig::SessionProblem& problem, const rig::SessionMod
   constexpr double step_s = 1.0 / 300.0;
   for (const rig::SessionRun& run : problem.session().runs) {
     const rig::PlantTrace plant = rig::simulate_plant(model, run.drive, {.step_s = step_s, .components = 3});
-    (*pressure_)[run.drive.place.name] = {plant.start_s, plant.step_s, plant.pump_kPa};
+    (*pressure_)[run.drive.place.name] = {plant.start_s - model.drive_lag_s, plant.step_s, plant.pump_kPa};
   }
 }
 

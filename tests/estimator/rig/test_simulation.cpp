@@ -236,6 +236,21 @@ TEST(Simulation, GasInTheCavityTakesItsShareOfTheVolume) {
   EXPECT_NEAR(trace.cavity_mL.back() + squeezed + kept_mL, 30.0, 1e-5);
 }
 
+TEST(Simulation, AllThatADriveMovesIsLateByItsLag) {
+  RigModel model = straight_model();
+  const RunDrive run = cycles(3);
+  const std::vector<double> times{0.7, 1.3, 2.5}, later{0.7 + 0.004, 1.3 + 0.004, 2.5 + 0.004};
+  const Prediction prompt = observe(model, simulate_plant(model, run), run.place, times);
+  model.drive_lag_s = 0.004;
+  const PlantTrace late = simulate_plant(model, run);
+  const Prediction seen = observe(model, late, run.place, later);
+  for (size_t i = 0; i < times.size(); ++i) {
+    EXPECT_NEAR(seen.cavity_kPa[i], prompt.cavity_kPa[i], 1e-9);
+    EXPECT_NEAR(seen.pump_kPa[i], prompt.pump_kPa[i], 1e-9);
+  }
+  EXPECT_DOUBLE_EQ(late.start_s, run.start_s + 0.004) << "volumes too";
+}
+
 TEST(Simulation, TheCatheterLagsByTwiceItsDampingOverItsFrequency) {
   const RigModel model = straight_model();
   PlantTrace rising;

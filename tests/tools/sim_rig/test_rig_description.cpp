@@ -22,6 +22,17 @@ TEST(RigDescription, TheBuiltInRigIsThePapers) {
   EXPECT_EQ(rig.channels[0].place, DaqChannel::Place::cavity);
 }
 
+TEST(RigDescription, ADescribedLagIsThatOfTwoPoles) {
+  std::string text = default_rig_toml();
+  const size_t value = text.find("drive_lag_s = ") + 14;
+  text.replace(value, text.find(' ', value) - value, "0.006");
+  const auto lag_ms = [&](const std::string& more) {
+    return read_rig_description(TableReader::from_text(text + more, "rig.toml")).plant.piston_lag_ms;
+  };
+  EXPECT_DOUBLE_EQ(lag_ms(""), 3.0);
+  EXPECT_DOUBLE_EQ(lag_ms("\n[simulation]\npiston_lag_ms = 1.0\n"), 1.0) << "the true one";
+}
+
 TEST(RigDescription, ATransducerMayBeInvertedButNotBlind) {
   const auto with_factor = [](const std::string& kPa_per_V) {
     std::string text = default_rig_toml();
