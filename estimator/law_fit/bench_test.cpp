@@ -109,6 +109,21 @@ void measure_channels(BenchTest& test) {
   }
 }
 
+/// What is at rest when unloaded is longer where it is pulled and shorter where it is pushed.
+void check_signs(const BenchTest& test) {
+  if (test.kind->name != "uniaxial" && test.kind->name != "planar") return;
+  double product = 0;
+  for (const Reading& reading : test.readings)
+    product += (reading.controls[0] - 1) * reading.measured[0];
+  if (product >= 0) return;
+  const std::string_view stretch = test.kind->columns[0];
+  throw InputError({test.file, fmt::format("column {}", stretch),
+                    "the specimen is shorter where it is pulled, or longer where it is pushed",
+                    fmt::format("{} is the length over the unloaded length (1 + strain: 1.1 for ten percent "
+                                "longer), and {} is below zero in compression.",
+                                stretch, test.kind->columns[1])});
+}
+
 BenchTest of_rotational_shear(std::string_view text, const std::string& file, const TestKind& kind) {
   BenchTest test{file, &kind, false, {{std::string(kind.columns[kind.controls]), 0}}, {}};
   for (const ShearRow& row : shear_test_from_text(text, file).rows) {
@@ -156,6 +171,7 @@ BenchTest bench_test_from_text(std::string_view text, const std::string& file) {
   BenchTest test =
       is_shear_test(header_of(text)) ? of_rotational_shear(text, file, kind) : of_table(text, file, kind);
   measure_channels(test);
+  check_signs(test);
   return test;
 }
 

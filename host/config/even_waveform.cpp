@@ -108,14 +108,19 @@ size_t even_points(const PointsFile& points) {
   return intervals;
 }
 
+std::vector<double> curve_at_even_phases(const PointsFile& points, size_t count) {
+  const Curve curve(points);
+  std::vector<double> fraction;
+  for (size_t i = 0; i < count; ++i)
+    fraction.push_back(curve.at(static_cast<double>(i) / static_cast<double>(count)));
+  return fraction;
+}
+
 EvenWaveform on_even_phases(const PointsFile& points, size_t room) {
   if (even_points(points) > 0) return {rises_of(points.fraction), 0};
   const size_t grid = best_grid(points, room);
-  const Curve curve(points);
-  std::vector<double> fraction;
-  for (size_t i = 0; i <= grid; ++i)
-    fraction.push_back(curve.at(static_cast<double>(i) / static_cast<double>(grid)));
-  fraction.back() = 0;
+  std::vector<double> fraction = curve_at_even_phases(points, grid);
+  fraction.push_back(0);
   const double off = distance(points, grid).second;
   return {rises_of(fraction), off < evenness ? 0 : off};
 }

@@ -28,6 +28,9 @@ struct EvenWaveform {
 /// As many points as even spacing needs, or none if the spacing is uneven (to 1e-6 of the cycle).
 size_t even_points(const PointsFile& points);
 
+/// The curve through the points at so many even phases, 0 included and 1 not: parts of the stroke.
+std::vector<double> curve_at_even_phases(const PointsFile& points, size_t count);
+
 /// Puts the points on their own even spacing, or on a grid of at most `room` phases. Precondition: room >= 2 and
 /// even_points(points) <= room.
 EvenWaveform on_even_phases(const PointsFile& points, size_t room);

@@ -206,13 +206,17 @@ EffectCheck EffectTrial::found_again() const {
   const EffectSet at_truth =
       fit_set_exactly(problem, fit_set(problem, truth, base, problem.error().prior.share));
   const bool is_as_likely = found.log_posterior >= at_truth.log_posterior - half_a_nat;
+  const std::string_view not_determined =
+      is_near || does_the_same ? ""
+      : is_as_likely           ? "; not determined: other parts of the rig do in these data what it does"
+                               : "; not found: data are likelier with what was hidden";
   return {"found again",
           (inference::is_settled(found.termination) && (is_near || is_as_likely)) || does_the_same,
           fmt::format("{} {:.4g} as {:.4g} +- {:.2g}, what it changes to {:.1f} %, ln likelihood beside a "
-                      "search from there {:+.1f}; {}",
+                      "search from there {:+.1f}; {}{}",
                       effect_.parameters()[0].name, options.values[0], found.model.values[0], found.errors[0],
                       100.0 * differs, found.log_posterior - at_truth.log_posterior,
-                      inference::sentence(found.termination))};
+                      inference::sentence(found.termination), not_determined)};
 }
 
 EffectCheck EffectTrial::silent() const {

@@ -57,6 +57,9 @@ TEST(BenchTest, RefusesWithPlaceValueAndRemedy) {
   EXPECT_THAT(
       refused("stretch,nominal_kPa\n1.1,2\n110,3\n1.3,4\n"),
       AllOf(HasSubstr("line 3, column stretch: 110 is no stretch"), HasSubstr("1.1 for ten percent longer")));
+  EXPECT_THAT(refused("stretch,nominal_kPa\n0.1,2\n0.2,3\n0.3,4\n"),
+              AllOf(HasSubstr("column stretch: the specimen is shorter where it is pulled"),
+                    HasSubstr("1 + strain")));
   EXPECT_THAT(refused("stretch,nominal_kPa\n1.1,2\n1.2,3\n"), HasSubstr("2 rows show no curve"));
   EXPECT_THAT(refused("stretch,nominal_kPa\n1.1,0\n1.2,0\n1.3,0\n"),
               HasSubstr("column nominal_kPa: every value is zero"));

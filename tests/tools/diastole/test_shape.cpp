@@ -158,6 +158,17 @@ TEST(WantedCurve, ReadsTheExampleAndRefusesWhatDoesNotSayHowLargeItIs) {
   EXPECT_NEAR(sized.curve.range(), 16.0, 0.1);
 }
 
+TEST(WantedCurve, BetweenFewPointsIsTheControllersCurve) {
+  const test::ScratchFolder folder;
+  const std::filesystem::path file = folder.path() / "wanted.csv";
+  std::ofstream(file) << "time_s,volume_mL\n0,0\n0.6,20\n1.2,0\n";
+  const PeriodicCurve curve = read_wanted_curve({.file = file}).curve;
+  EXPECT_NEAR(curve.range(), 20.0, 1e-3);
+  // 3 u^2 - 2 u^3 of the way up.
+  EXPECT_NEAR(curve.at(0.15), 20.0 * 0.15625, 2e-3);
+  EXPECT_NEAR(curve.at(0.9), 10.0, 2e-3);
+}
+
 TEST(WantedCurve, APressureIsWhatTheColumnsAreNamedAndNotACommentOfIt) {
   const test::ScratchFolder folder;
   const std::filesystem::path file = folder.path() / "wanted.csv";

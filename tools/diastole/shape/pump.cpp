@@ -60,6 +60,8 @@ Pump::Pump(const RigConfig& rig)
     : settings_(configuration(rig, static_cast<uint32_t>(std::llround(1e9 * rig.microstep_mL)))),
       ttl_width_ms_(rig.controller.ttl_width_ms) {}
 
+double Pump::rounding_mL() const { return 1e-9 * settings_.limits().microstep_pL / std::sqrt(12.0); }
+
 DriveBounds Pump::bounds(double share) const {
   const wire::Configure& limits = settings_.limits();
   const double microstep_mL = 1e-9 * limits.microstep_pL;

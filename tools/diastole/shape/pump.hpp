@@ -37,6 +37,9 @@ class Pump {
  public:
   explicit Pump(const RigConfig& rig);
 
+  /// RMS by which the piston's whole microsteps are beside a curve.
+  [[nodiscard]] double rounding_mL() const;
+
   /// With that number of points with which the controller's curve turns most softly.
   [[nodiscard]] PlannedCycle planned(const PeriodicCurve& drive_mL) const;
   /// The drive whose volume is nearest, by its derivatives, among those that the controller accepts.

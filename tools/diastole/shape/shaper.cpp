@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <set>
 #include <string>
 
@@ -89,7 +90,7 @@ Shaping Shaper::after(const std::vector<std::filesystem::path>& runs) const {
   PeriodicCurve expected = shaping.lesson.expected_mL;
   expected.c[0] = wanted_mL_.c[0];
   const std::vector<Iteration>& runs_so_far = shaping.lesson.iterations;
-  shaping.nrmse = rms_between(expected, wanted_mL_) / wanted_mL_.range();
+  shaping.nrmse = std::hypot(rms_between(expected, wanted_mL_), pump_.rounding_mL()) / wanted_mL_.range();
   if (!runs_so_far.empty())
     shaping.nrmse = runs_so_far[shaping.lesson.best.value_or(runs_so_far.size() - 1)].nrmse;
   return shaping;

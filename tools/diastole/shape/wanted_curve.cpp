@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <string>
 
 #include "host/config/even_waveform.hpp"
@@ -24,8 +23,8 @@ double stated(const WantedOptions& options, const std::optional<double>& in_file
 }  // namespace
 
 WantedCurve read_wanted_curve(const WantedOptions& options) {
-  constexpr size_t room = 2048;
   constexpr Eigen::Index harmonics = 96;
+  constexpr size_t phases = 2048;
   WantedCurve wanted;
   const PointsFile points = parse_points(read_bounded_file(options.file, most_table_bytes),
                                          options.file.string(), PointsOf::volume_or_pressure);
@@ -40,12 +39,10 @@ WantedCurve read_wanted_curve(const WantedOptions& options) {
   }
   const double range = stated(options, wanted.is_pressure ? points.range_kPa : points.range_mL,
                               options.stroke_mL, "--stroke-mL", "volume_mL or pressure_kPa");
-  std::vector<double> values = on_even_phases(points, room).fractions();
-  values.pop_back();  // which closes the cycle
+  std::vector<double> values = curve_at_even_phases(points, phases);
   for (double& value : values)
     value = options.least + range * value;
-  const auto most = static_cast<Eigen::Index>((values.size() - 1) / 2);
-  wanted.curve = periodic_curve(values, period_s, std::min(harmonics, most));
+  wanted.curve = periodic_curve(values, period_s, harmonics);
   return wanted;
 }
 
