@@ -11,7 +11,7 @@ namespace diastole::scanner {
 
 struct FlowPhantom {
   double bore_mm = 12.0;
-  double wall_mm = 3.0;  ///< gives no signal
+  double wall_mm = 3.0;
   double block_radius_mm = 26.0;
   double stroke_mL = 20.0;
   double period_s = 1.2;

@@ -23,6 +23,7 @@ struct PhaseContrastProtocol {
   double acquired = 1.0;     ///< share of the spectrum's lines each way that is measured; the rest is zero
   double inflow = 0.2;       ///< by how much fluid at the venc outshines fluid at rest
   double fluid_brightness = 1.4;  ///< beside still gel's
+  double wall_brightness = 0;     ///< likewise
   double shading = 0.1;
   Eigen::Vector2d place_mm = {
       1.3, -2.1};        ///< of the tube's axis from the image's middle, along a row and along a column

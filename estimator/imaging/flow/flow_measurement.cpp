@@ -191,21 +191,23 @@ void require_known_turns(const FlowMeasurement& flow, const std::string& folder)
 }
 
 /// Sigmas are the curvature of chi-square where it is least, times its root per degree of freedom: of a fit that has ended elsewhere they mean nothing.
-void require_settled(const FlowMeasurement& flow, const std::string& folder) {
-  if (flow.lumen.converged || flow.lumen.reduced_chi_square < worst_chi_square) return;
+/// And whole turns are told by what velocities look like: by nothing where the fit does not explain them.
+void require_trustworthy(const FlowMeasurement& flow, const std::string& folder) {
   const bool may_wrap = std::ranges::any_of(flow.lumen.core_cm_s, [&](double core_cm_s) {
     return std::abs(core_cm_s) > 0.5 * flow.scan.venc_cm_s;
   });
-  if (may_wrap) {
+  const bool is_settled = flow.lumen.converged || flow.lumen.reduced_chi_square < worst_chi_square;
+  if (may_wrap && (!is_settled || flow.lumen.velocity_chi_square > worst_chi_square)) {
     throw InputError(
         {folder, flow.scan.name,
-         fmt::format("at a venc of {:.4g} cm/s the velocity wraps beyond recovery, or the images do not look "
-                     "like one tube: the fit of the lumen has not settled, and leaves a chi-square of {:.1f} "
-                     "per pixel",
-                     flow.scan.venc_cm_s, flow.lumen.reduced_chi_square),
+         fmt::format(
+             "at a venc of {:.4g} cm/s the velocity wraps beyond recovery, or the images do not look "
+             "like one tube: the fit of the lumen leaves a chi-square of {:.1f} per pixel of the phases",
+             flow.scan.venc_cm_s, flow.lumen.velocity_chi_square),
          "Image with a venc above the peak velocity, or with more phases. Does the lumen leave the image, "
          "change its shape or touch another? --centre COLUMN,ROW may start the fit elsewhere."});
   }
+  if (is_settled) return;
   throw InputError(
       {folder, flow.scan.name,
        fmt::format("the fit of the lumen has not settled, and leaves a chi-square of {:.1f} per pixel: the "
@@ -331,7 +333,7 @@ FlowMeasurement measure_flow(PhaseContrast scan, const FlowRequest& request, con
     start.moved_mm.emplace_back(moved.x() * plane.column_spacing_mm, moved.y() * plane.row_spacing_mm);
   flow.lumen = fit_lumen(data, start);
   require_known_turns(flow, folder);
-  require_settled(flow, folder);
+  require_trustworthy(flow, folder);
 
   // An error of the background is the same in all phases.
   const double background_cm_s = flow.background.order < 0

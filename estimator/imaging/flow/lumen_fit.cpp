@@ -4,7 +4,9 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <numeric>
 #include <optional>
+#include <tuple>
 
 #include "estimator/parallel/parallel_for.hpp"
 
@@ -13,6 +15,8 @@ namespace {
 
 /// A start a pixel off settles within ten; a wall or a place that is further off is approached in steps of a pixel.
 constexpr int most_iterations = 30;
+/// Of damping, each five times as hard.
+constexpr int most_attempts = 8;
 /// Steps of the scene end when chi-square falls by less than this: a small part of what one unknown's error changes it by.
 constexpr double settled = 0.05;
 /// Below that many standard deviations of its mean over the cycle a magnitude is mostly noise.
@@ -27,7 +31,7 @@ Eigen::VectorXd difference_steps(const LumenScene& scene, double pixel_mm) {
   Eigen::VectorXd steps(LumenScene::size);
   const double bright = std::max(scene.brightness.fluid[0], scene.brightness.still);
   steps << 0.03 * pixel_mm, 0.03 * pixel_mm, 0.03 * pixel_mm, 0.003, 0.003, 0.03 * pixel_mm, 0.01 * bright,
-      1e-4, 1e-4, 0.01 * bright, 0.01 * bright, 0.01 * bright;
+      1e-4, 1e-4, 0.01 * bright, 0.01 * bright, 0.01 * bright, 0.01 * bright;
   return steps;
 }
 
@@ -36,7 +40,7 @@ Eigen::VectorXd prior_sd(const LumenScene& scene, double pixel_mm) {
   Eigen::VectorXd sd(LumenScene::size);
   const double bright = std::max(scene.brightness.fluid[0], scene.brightness.still);
   sd << 10 * pixel_mm, 10 * pixel_mm, 10 * pixel_mm, 0.3, 0.3, 5 * pixel_mm, bright, 0.02, 0.02, bright,
-      bright, bright;
+      bright, bright, 0.3 * bright;
   return sd;
 }
 
@@ -79,31 +83,26 @@ class Fitter {
     });
   }
 
-  /// Gauss-Newton over everything.
+  /// Gauss-Newton over everything, damped where it fails (Levenberg and Marquardt).
   bool run() {
     double before = linearise(), last = 0;
+    double damping = 0;
     for (int iteration = 0; iteration < most_iterations; ++iteration) {
       const State kept{scene_, profiles_, shapes_};
-      const auto [scene_step, own_steps] = newton_step();
-      double share = 1;
-      double now = 0;
-      for (int attempt = 0; attempt < 5; ++attempt, share *= 0.4) {
-        scene_ = kept.scene;
-        profiles_ = kept.profiles;
-        shapes_ = kept.shapes;
-        advance(scene_step, own_steps, share);
+      double now = std::numeric_limits<double>::infinity();
+      for (int attempt = 0; attempt < most_attempts; ++attempt) {
+        const auto [scene_step, own_steps] = newton_step(damping);
+        advance(scene_step, own_steps);
         now = chi_square();
         if (now <= before + settled) break;
+        std::tie(scene_, profiles_, shapes_) = std::tie(kept.scene, kept.profiles, kept.shapes);
+        damping = damping > 0 ? 5 * damping : 0.01;
       }
-      if (now > before + settled) {
-        scene_ = kept.scene;
-        profiles_ = kept.profiles;
-        shapes_ = kept.shapes;
-        linearise();
-        return now - before < by_chance();
-      }
+      // Where only short steps are left it has ended if long ones promise nothing.
+      if (now > before + settled) return promised_fall() < by_chance();
       linearise();
-      if (before - now < settled) return true;
+      if (before - now < settled) return damping == 0 || promised_fall() < by_chance();
+      damping = damping > 0.005 ? 0.2 * damping : 0;
       last = before - now;
       before = now;
     }
@@ -152,8 +151,6 @@ class Fitter {
     return any;
   }
 
-  [[nodiscard]] double chi() const { return chi_square_; }
-
   LumenFit result() {
     LumenFit fit;
     fit.scene = scene_;
@@ -173,6 +170,9 @@ class Fitter {
     for (size_t k = 0; k < phases(); ++k) {
       const auto at = static_cast<Eigen::Index>(k);
       const LumenGrid grid = model_.grid(shapes_[k]);
+      fit.velocity_chi_square +=
+          compared(k, grid, profiles_[k], nullptr).first.head(counts_.size()).squaredNorm() /
+          (0.5 * freedom_left());
       const Eigen::VectorXd integrals = model_.integrals_mm2(grid);
       if (k == 0) fit.area_mm2 = model_.area_mm2(grid);
       fit.flow_mL_s[at] = mL_s_per_rad_mm2 * integrals.dot(profiles_[k]);
@@ -391,38 +391,78 @@ class Fitter {
     normal.chi_square = chi_square;
   }
 
-  /// Of the scene alone, each phase's own unknowns eliminated.
-  [[nodiscard]] Eigen::MatrixXd scene_normal() const {
+  /// Of the scene alone, each phase's own unknowns eliminated; all damped in proportion to their own sizes.
+  [[nodiscard]] Eigen::MatrixXd scene_normal(double damping = 0) const {
     Eigen::MatrixXd normal = prior_sd_.array().square().inverse().matrix().asDiagonal();
-    for (const PhaseNormal& phase : normals_)
-      normal += phase.scene - phase.between.transpose() * phase.own.ldlt().solve(phase.between);
+    for (const PhaseNormal& phase : normals_) {
+      normal += phase.scene;
+      normal.diagonal() += damping * phase.scene.diagonal();
+      normal -= phase.between.transpose() * damped(phase.own, damping).ldlt().solve(phase.between);
+    }
     return normal;
   }
-  [[nodiscard]] std::pair<Eigen::VectorXd, std::vector<Eigen::VectorXd>> newton_step() const {
+  static Eigen::MatrixXd damped(Eigen::MatrixXd normal, double damping) {
+    normal.diagonal() *= 1 + damping;
+    return normal;
+  }
+  [[nodiscard]] Eigen::VectorXd scene_right(double damping) const {
     Eigen::VectorXd right = (prior_mean_ - scene_.vector()).cwiseQuotient(prior_sd_.cwiseAbs2());
     for (const PhaseNormal& phase : normals_)
-      right += phase.scene_right - phase.between.transpose() * phase.own.ldlt().solve(phase.own_right);
-    const Eigen::VectorXd step = scene_normal().ldlt().solve(right);
+      right += phase.scene_right -
+               phase.between.transpose() * damped(phase.own, damping).ldlt().solve(phase.own_right);
+    return right;
+  }
+  /// Of chi-square, by the undamped step, if the model were linear.
+  [[nodiscard]] double promised_fall() const {
+    const Eigen::VectorXd right = scene_right(0);
+    const Eigen::VectorXd step = within_bounds(scene_normal(), right);
+    double fall = (2 * right - scene_normal() * step).dot(step);
+    for (const PhaseNormal& phase : normals_)
+      fall += phase.own_right.dot(phase.own.ldlt().solve(phase.own_right));
+    return fall;
+  }
+  [[nodiscard]] std::pair<Eigen::VectorXd, std::vector<Eigen::VectorXd>> newton_step(double damping) const {
+    const Eigen::VectorXd step = within_bounds(scene_normal(damping), scene_right(damping));
     std::vector<Eigen::VectorXd> own;
     for (const PhaseNormal& phase : normals_)
-      own.push_back(phase.own.ldlt().solve(phase.own_right - phase.between * step));
+      own.push_back(damped(phase.own, damping).ldlt().solve(phase.own_right - phase.between * step));
     return {step, own};
   }
-  void advance(const Eigen::VectorXd& scene_step, const std::vector<Eigen::VectorXd>& own_steps,
-               double share) {
-    Eigen::VectorXd vector = scene_.vector() + share * scene_step;
-    vector[5] = std::max(0.0, vector[5]);
-    vector[2] = std::max(pixel_mm_, vector[2]);
-    vector[6] = std::max(0.0, vector[6]);
-    scene_ = LumenScene::from(vector);
+  /// The step of the scene: what it would take beyond a bound ends there, and the rest is solved again.
+  [[nodiscard]] Eigen::VectorXd within_bounds(const Eigen::MatrixXd& normal,
+                                              const Eigen::VectorXd& right) const {
+    const Eigen::VectorXd room = scene_.vector() - least_scene();
+    std::vector<Eigen::Index> free(LumenScene::size);
+    std::iota(free.begin(), free.end(), 0);
+    Eigen::VectorXd step = Eigen::VectorXd::Zero(LumenScene::size);
+    while (!free.empty()) {
+      const Eigen::VectorXd left = right - normal * step;
+      step(free) += Eigen::MatrixXd(normal(free, free)).ldlt().solve(Eigen::VectorXd(left(free)));
+      const size_t before = free.size();
+      std::erase_if(free, [&](Eigen::Index i) { return step[i] < -room[i]; });
+      if (free.size() == before) break;
+      for (Eigen::Index i = 0; i < step.size(); ++i)
+        step[i] = std::max(step[i], -room[i]);
+    }
+    return step;
+  }
+  [[nodiscard]] Eigen::VectorXd least_scene() const {
+    Eigen::VectorXd least =
+        Eigen::VectorXd::Constant(LumenScene::size, -std::numeric_limits<double>::infinity());
+    least[2] = pixel_mm_;
+    least[5] = least[6] = least[12] = 0;
+    return least;
+  }
+  void advance(const Eigen::VectorXd& scene_step, const std::vector<Eigen::VectorXd>& own_steps) {
+    scene_ = LumenScene::from((scene_.vector() + scene_step).cwiseMax(least_scene()));
     for (size_t k = 0; k < phases(); ++k) {
       const Eigen::VectorXd& step = own_steps[k];
-      profiles_[k] += share * step.head(model_.profile_size());
+      profiles_[k] += step.head(model_.profile_size());
       const LumenShape before = shapes_[k];
       shapes_[k] = shape_by_scene(k);
       if (!moves_) continue;
-      shapes_[k].centre_mm = before.centre_mm + share * step.segment(model_.profile_size(), 2);
-      shapes_[k].radius_mm = before.radius_mm + share * step[model_.profile_size() + 2];
+      shapes_[k].centre_mm = before.centre_mm + step.segment(model_.profile_size(), 2);
+      shapes_[k].radius_mm = before.radius_mm + step[model_.profile_size() + 2];
     }
   }
 
@@ -443,6 +483,15 @@ class Fitter {
   double chi_square_ = 0;
 };
 
+/// Begins where a fit has ended.
+LumenStart continued(const LumenFit& fit, const LumenStart& start) {
+  LumenStart next{fit.scene, {}, start.core_rad};
+  if (!fit.moves) return next;
+  for (const LumenShape& shape : fit.shapes)
+    next.moved_mm.push_back(shape.centre_mm - fit.scene.shape.centre_mm);
+  return next;
+}
+
 LumenFit fitted(const LumenData& data, const LumenStart& start, Encoding encoding) {
   Fitter fitter(data, start, encoding);
   fitter.start_profiles(start.core_rad);
@@ -462,15 +511,6 @@ LumenFit fitted(const LumenData& data, const LumenStart& start, Encoding encodin
   fit.converged = converged;
   fit.turn_margin = margin;
   return fit;
-}
-
-/// Begins where a fit has ended.
-LumenStart continued(const LumenFit& fit, const LumenStart& start) {
-  LumenStart next{fit.scene, {}, start.core_rad};
-  if (!fit.moves) return next;
-  for (const LumenShape& shape : fit.shapes)
-    next.moved_mm.push_back(shape.centre_mm - fit.scene.shape.centre_mm);
-  return next;
 }
 
 }  // namespace

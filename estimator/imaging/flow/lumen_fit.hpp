@@ -28,6 +28,7 @@ struct LumenFit {
   Encoding encoding = Encoding::separate;
   bool converged = false;
   double reduced_chi_square = 0;
+  double velocity_chi_square = 0;         ///< of the phases alone, without the magnitudes; reduced, too
   std::vector<double> phase_chi_square;   ///< of each phase, reduced
   std::vector<Eigen::VectorXd> profiles;  ///< of each phase, radians
   std::vector<LumenShape> shapes;         ///< of each phase: one and the same unless it moves

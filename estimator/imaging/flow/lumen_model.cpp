@@ -96,13 +96,13 @@ double LumenShape::longer(const Eigen::Vector2d& towards) const {
 Eigen::VectorXd LumenScene::vector() const {
   Eigen::VectorXd all(size);
   all << shape.centre_mm, shape.radius_mm, shape.ellipse_cos, shape.ellipse_sin, shape.wall_mm,
-      brightness.still, brightness.slope_per_mm, brightness.fluid;
+      brightness.still, brightness.slope_per_mm, brightness.fluid, brightness.wall;
   return all;
 }
 
 LumenScene LumenScene::from(const Eigen::VectorXd& vector) {
   return {{vector.head<2>(), vector[2], vector[3], vector[4], vector[5]},
-          {vector[6], vector.segment<2>(7), vector.segment<3>(9)}};
+          {vector[6], vector.segment<2>(7), vector.segment<3>(9), vector[12]}};
 }
 
 std::vector<double> profile_knots_mm(double radius_mm, double pixel_mm) {
@@ -215,7 +215,9 @@ LumenImage LumenModel::image(const LumenGrid& grid, const Brightness& brightness
   const Eigen::ArrayXXf rho = inside * (fluid[0] + fluid[1] * phi.abs() + fluid[2] * phi.square());
   const Eigen::ArrayXXf cosine = (share * phi).cos(), sine = (share * phi).sin();
   // What differs from still material all over: it ends within the grid.
-  const Eigen::ArrayXXf rest = still * (grid.outside.array() - 1.0F);
+  const Eigen::ArrayXXf beyond = grid.outside.array() - 1.0F;
+  const Eigen::ArrayXXf rest =
+      still * beyond - static_cast<float>(brightness.wall) * (beyond + inside).min(0.0F);
   const auto level = [&](const Eigen::ArrayXXf& fine) {
     return Eigen::MatrixXf((seen(fine.matrix()).array() + still).matrix());
   };

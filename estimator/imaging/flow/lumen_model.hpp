@@ -3,7 +3,7 @@
 //
 //                 outside: still material, brightness `still`
 //        .-----------------------.    as the edge, larger by wall / radius
-//       /  wall: no signal        \ .
+//       /  wall: little signal    \ .
 //      |   .-------------------.   |  edge: radius / sqrt(1 - 2 e_c cos 2 theta - 2 e_s sin 2 theta), an ellipse
 //      |  |  depth d inwards   |   |  velocity sum_j c_j B_j(d), zero at the edge; d = radius (1 - r / edge)
 //
@@ -38,6 +38,7 @@ struct Brightness {
   double still = 0;
   Eigen::Vector2d slope_per_mm = {0, 0};  ///< of the coils' shading, relative
   Eigen::Vector3d fluid = {0, 0, 0};      ///< a, b, c
+  double wall = 0;
 };
 
 enum class Encoding { separate, balanced };
@@ -45,7 +46,7 @@ enum class Encoding { separate, balanced };
 /// The unknowns that all phases of the cycle share, as one vector: shape, then brightness.
 struct LumenScene {
   static constexpr Eigen::Index shape_size = 6;
-  static constexpr Eigen::Index size = 12;
+  static constexpr Eigen::Index size = 13;
   LumenShape shape;
   Brightness brightness;
 

@@ -154,6 +154,28 @@ TEST(Flow, IsMeasuredInTissueWithoutAWall) {
   expect_true(flow, vessel);
 }
 
+TEST(Flow, IsMeasuredBesideAWallOfHalfTheSignal) {
+  FlowPhantom vessel = phantom();
+  vessel.wall_mm = 1;
+  PhaseContrastProtocol protocol = small();
+  protocol.wall_brightness = 0.5;
+  const FlowMeasurement flow = measured(vessel, protocol);
+  EXPECT_NEAR(flow.lumen.reduced_chi_square, 1, 0.15);
+  EXPECT_TRUE(flow.findings.empty());
+  expect_true(flow, vessel);
+}
+
+TEST(Flow, IsMeasuredInALongEllipse) {
+  FlowPhantom tube = phantom();
+  tube.block_radius_mm = 29;  // beyond the ellipse
+  PhaseContrastProtocol protocol = small();
+  protocol.matrix = 96;
+  protocol.tilt_deg = 45;
+  const FlowMeasurement flow = measured(tube, protocol);
+  EXPECT_NEAR(flow.lumen.reduced_chi_square, 1, 0.15);
+  expect_true(flow, tube);
+}
+
 TEST(Flow, ImagesThatTheFittedLumenDoesNotExplainAreAProblem) {
   const ScratchFolder scratch;
   scanner::scan_flow(phantom(), small(), scratch.path());
