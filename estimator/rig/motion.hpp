@@ -11,8 +11,9 @@
 //              jump are spread over W
 //
 // Volume, flow and acceleration are differences of the strokes' exact integrals over W. `find_motion` tries the
-// waveforms of /protocol/segments first and strokes fitted to the counts else, and W from none to 0.1 s, and accepts
-// what stays within a step everywhere; what nothing explains is smoothed, and said so.
+// waveforms of /protocol/segments first, then cycles of them that turn at other phases and are rounded otherwise (another
+// maker's sawtooth), strokes fitted to the counts elsewhere, and W from none to 0.1 s, and accepts what stays within a
+// step everywhere; what nothing explains is smoothed, and said so.
 
 #include <vector>
 

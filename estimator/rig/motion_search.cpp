@@ -56,23 +56,37 @@ double worst_mL(const Motion& motion, const Counted& counted) {
   return worst;
 }
 
-/// The strokes of one cycle of a waveform that the contract names; none for the others.
-std::vector<Stroke> named_cycle(const Segment& segment, double start_s) {
-  const double low = segment.offset_mL;
-  const double high = low + segment.stroke_mL;
-  const double period = segment.period_s;
-  const auto two = [&](double turn, double up_round, double down_round, bool cosine) {
-    const double turn_s = start_s + turn * period;
-    return std::vector<Stroke>{{start_s, turn_s, low, high, up_round, cosine},
-                               {turn_s, start_s + period, high, low, down_round, cosine}};
-  };
-  if (segment.waveform == "parabolic") return two(0.5, 0.5, 0.5, false);
-  if (segment.waveform == "sinusoidal") return two(0.5, 0.5, 0.5, true);
+/// A cycle that goes up and down once: when it turns, and which part of either stroke is rounded at its ends.
+struct CycleShape {
+  double turn = 0.5;  ///< of the period
+  double up_round = 0.5, down_round = 0.5;
+  bool cosine = false;
+};
+
+/// Of the waveforms that the contract names; none for the others.
+std::optional<CycleShape> named_shape(const Segment& segment) {
+  if (segment.waveform == "parabolic") return CycleShape{};
+  if (segment.waveform == "sinusoidal") return CycleShape{.cosine = true};
+  constexpr double quick = 0.25, slow = 0.75;
   if (segment.waveform == "sawtooth")
-    return two(0.75, quick_flank_round / 0.75, quick_flank_round / 0.25, false);
+    return CycleShape{slow, quick_flank_round / slow, quick_flank_round / quick};
   if (segment.waveform == "reversed-sawtooth")
-    return two(0.25, quick_flank_round / 0.25, quick_flank_round / 0.75, false);
+    return CycleShape{quick, quick_flank_round / quick, quick_flank_round / slow};
   return {};
+}
+
+/// Cycles [first, last) of a segment.
+std::vector<Stroke> shaped_strokes(const Segment& segment, const CycleShape& shape, int64_t first,
+                                   int64_t last) {
+  const double low = segment.offset_mL, high = low + segment.stroke_mL, period = segment.period_s;
+  std::vector<Stroke> strokes;
+  for (int64_t cycle = first; cycle < last; ++cycle) {
+    const double start_s = segment.start_s + static_cast<double>(cycle) * period;
+    const double turn_s = start_s + shape.turn * period;
+    strokes.push_back({start_s, turn_s, low, high, shape.up_round, shape.cosine});
+    strokes.push_back({turn_s, start_s + period, high, low, shape.down_round, shape.cosine});
+  }
+  return strokes;
 }
 
 /// Monotone pieces between rests and turns, as strokes with approximate times.
@@ -208,7 +222,7 @@ std::vector<Stretch> stretches_of(const RecordedRun& run, double step_mL) {
     if (to > from) stretches.push_back({next, false, {run.pump, step_mL, from, to}});
   };
   for (const Segment& segment : run.segments) {
-    if (segment.waveform == "hold" || named_cycle(segment, 0.0).empty()) continue;
+    if (segment.waveform == "hold" || !named_shape(segment)) continue;
     const size_t first = index_at(run.pump, segment.start_s - 1e-9);
     const size_t last = index_at(run.pump, segment.end_s() - 1e-9);
     between(segment.start_s - 0.5 * longest_spread_s, segment);
@@ -217,7 +231,7 @@ std::vector<Stretch> stretches_of(const RecordedRun& run, double step_mL) {
   }
   Segment rest;
   for (const Segment& segment : run.segments)
-    if (segment.waveform != "hold" && named_cycle(segment, 0.0).empty()) rest = segment;
+    if (segment.waveform != "hold" && !named_shape(segment)) rest = segment;
   between(run.pump.time_s.back() + 1.0, rest);
   for (size_t k = 0; k + 1 < stretches.size(); ++k) {
     // Between two named segments an unnamed one may lie, and its volumes are the better ones to snap to.
@@ -231,11 +245,73 @@ std::vector<Stretch> stretches_of(const RecordedRun& run, double step_mL) {
   return stretches;
 }
 
-std::vector<Stroke> strokes_with(const std::vector<Stretch>& stretches, double spread_s) {
+/// How far a cycle in the middle of a segment is from the counts of all of them, in steps, by its shape.
+class CycleMisfit final : public inference::LeastSquaresProblem {
+ public:
+  CycleMisfit(const Segment& segment, const CycleShape& shape, double spread_s, const Counted& counted)
+      : segment_(segment), shape_(shape), spread_s_(spread_s), step_mL_(counted.step_mL) {
+    // The first begins from rest, the last ends there.
+    const double least = segment.cycles > 2 ? 1.0 : 0.0;
+    const double most = static_cast<double>(segment.cycles) - least;
+    for (size_t k = counted.first; k < counted.last; ++k) {
+      const double cycles = (counted.time_s(k) - segment.start_s) / segment.period_s;
+      if (cycles >= least && cycles < most)
+        counts_.emplace_back(segment.start_s + (cycles - std::floor(cycles)) * segment.period_s,
+                             counted.volume_mL(k));
+    }
+    std::ranges::sort(counts_);
+    constexpr size_t plenty = 1500;
+    const size_t stride = counts_.size() / plenty + 1;
+    for (size_t k = 0; k * stride < counts_.size(); ++k)
+      counts_[k] = counts_[k * stride];
+    counts_.resize((counts_.size() + stride - 1) / stride);
+  }
+
+  [[nodiscard]] const inference::ParameterSpace& space() const override { return space_; }
+  std::optional<Eigen::VectorXd> residuals(const Eigen::VectorXd& q) override {
+    const Motion motion(shaped_strokes(segment_, shape_at(q), -1, 2), segment_.offset_mL, spread_s_);
+    Eigen::VectorXd steps(static_cast<Eigen::Index>(counts_.size()));
+    for (size_t k = 0; k < counts_.size(); ++k)
+      steps[static_cast<Eigen::Index>(k)] =
+          (motion.at(counts_[k].first).volume_mL - counts_[k].second) / step_mL_;
+    return steps;
+  }
+  Eigen::MatrixXd jacobian(const Eigen::VectorXd& q) override {
+    return inference::central_differences(*this, q);
+  }
+  [[nodiscard]] CycleShape shape_at(const Eigen::VectorXd& q) const {
+    return {std::clamp(q[0], 0.02, 0.98), std::clamp(q[1], 0.01, 0.5), std::clamp(q[2], 0.01, 0.5),
+            shape_.cosine};
+  }
+  [[nodiscard]] bool is_determined() const { return std::ssize(counts_) > space_.size(); }
+  [[nodiscard]] Eigen::Vector3d start() const { return {shape_.turn, shape_.up_round, shape_.down_round}; }
+
+ private:
+  inference::ParameterSpace space_{
+      {{"turn", "", 0.02, 0.98}, {"up_round", "", 0.01, 0.5}, {"down_round", "", 0.01, 0.5}}};
+  const Segment& segment_;
+  CycleShape shape_;
+  double spread_s_, step_mL_;
+  std::vector<std::pair<double, double>> counts_;  // time in the first cycle, volume
+};
+
+CycleShape fitted_shape(const Stretch& stretch, double spread_s) {
+  CycleMisfit misfit(stretch.segment, *named_shape(stretch.segment), spread_s, stretch.counted);
+  if (!misfit.is_determined()) return *named_shape(stretch.segment);  // it was never played
+  return misfit.shape_at(inference::minimise(misfit, misfit.start(), {.iteration_limit = 30}).q);
+}
+
+/// What the cycles of a segment do: what its waveform's name says, or what another maker means by it.
+enum class Shapes { named, fitted };
+
+std::vector<Stroke> strokes_with(const std::vector<Stretch>& stretches, double spread_s, Shapes shapes) {
   std::vector<Stroke> strokes;
   for (const Stretch& stretch : stretches) {
-    const auto more = stretch.named ? strokes_of(stretch.segment)
-                                    : fitted_strokes(stretch.segment, spread_s, stretch.counted);
+    const auto more =
+        !stretch.named ? fitted_strokes(stretch.segment, spread_s, stretch.counted)
+        : shapes == Shapes::named
+            ? strokes_of(stretch.segment)
+            : shaped_strokes(stretch.segment, fitted_shape(stretch, spread_s), 0, stretch.segment.cycles);
     strokes.insert(strokes.end(), more.begin(), more.end());
   }
   return strokes;
@@ -244,12 +320,8 @@ std::vector<Stroke> strokes_with(const std::vector<Stretch>& stretches, double s
 }  // namespace
 
 std::vector<Stroke> strokes_of(const Segment& segment) {
-  std::vector<Stroke> strokes;
-  for (int64_t cycle = 0; cycle < segment.cycles; ++cycle) {
-    const auto one = named_cycle(segment, segment.start_s + static_cast<double>(cycle) * segment.period_s);
-    strokes.insert(strokes.end(), one.begin(), one.end());
-  }
-  return strokes;
+  const auto shape = named_shape(segment);
+  return shape ? shaped_strokes(segment, *shape, 0, segment.cycles) : std::vector<Stroke>{};
 }
 
 FoundMotion find_motion(const RecordedRun& run) {
@@ -260,15 +332,18 @@ FoundMotion find_motion(const RecordedRun& run) {
   FoundMotion best;
   best.step_mL = step_mL;
   best.worst_mL = std::numeric_limits<double>::infinity();
-  for (double spread_s = 0.0; spread_s <= longest_spread_s + 1e-9; spread_s += spread_step_s) {
-    const Motion motion(strokes_with(stretches, spread_s), rest_mL, spread_s);
-    const double worst = worst_mL(motion, all);
-    if (worst < best.worst_mL) {
-      best.motion = motion;
-      best.worst_mL = worst;
+  for (const Shapes shapes : {Shapes::named, Shapes::fitted}) {
+    for (double spread_s = 0.0; spread_s <= longest_spread_s + 1e-9; spread_s += spread_step_s) {
+      const Motion motion(strokes_with(stretches, spread_s, shapes), rest_mL, spread_s);
+      const double worst = worst_mL(motion, all);
+      if (worst < best.worst_mL) {
+        best.motion = motion;
+        best.worst_mL = worst;
+      }
     }
+    best.explained = best.worst_mL <= 1.01 * step_mL;
+    if (best.explained) break;
   }
-  best.explained = best.worst_mL <= 1.01 * step_mL;
   if (!best.explained) {
     best.motion = Motion(coarse_strokes(all), rest_mL, 2.0 * coarse_s);
     best.worst_mL = worst_mL(best.motion, all);

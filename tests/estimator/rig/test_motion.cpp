@@ -58,6 +58,30 @@ TEST(Motion, IsFoundExactlyBehindNamedWaveforms) {
   expect_same(found.motion, truth, 6.0, 1e-6, 1e-6);
 }
 
+TEST(Motion, IsTheSameInEachCycleBehindAnotherMakersSawtooth) {
+  constexpr double blended = 0.15;  // of either flank, not 1/25 of the cycle
+  std::vector<Stroke> strokes;
+  for (int cycle = 0; cycle < 5; ++cycle) {
+    const double start = 1.0 + 2.3 * cycle;
+    strokes.push_back({start, start + 1.725, 0.0, 18.0, blended});
+    strokes.push_back({start + 1.725, start + 2.3, 18.0, 0.0, blended});
+  }
+  const Motion truth(strokes, 0.0, 0.0);
+  const FoundMotion found = find_motion(
+      counted(truth, {{0.0, "hold", 0.0, 1.0, 0.0, 1}, {1.0, "sawtooth", 18.0, 2.3, 0.0, 5}}, 14.0));
+  EXPECT_TRUE(found.explained);
+  EXPECT_TRUE(
+      find_motion(
+          counted(truth, {{1.0, "sawtooth", 18.0, 2.3, 0.0, 5}, {14.5, "sawtooth", 9.0, 2.3, 0.0, 5}}, 14.0))
+          .explained)
+      << "the second was never played";
+  for (double t = 1.05; t < 1.05 + 3 * 2.3; t += 0.1)
+    EXPECT_NEAR(found.motion.at(t).acceleration_mL_per_s2, found.motion.at(t + 2.3).acceleration_mL_per_s2,
+                1e-6)
+        << t;
+  expect_same(found.motion, truth, 14.0, 0.2, 40.0);  // of 37 mL/s and 430 mL/s^2
+}
+
 TEST(Motion, IsFoundBehindUnnamedRamps) {
   const Motion truth({{1.0, 2.0, 0.0, 30.0, 0.2}, {4.0, 4.8, 30.0, 0.0, 0.3}}, 0.0, 0.02);
   const FoundMotion found = find_motion(counted(truth, {{1.0, "trapezoidal", 30.0, 5.0, 0.0, 1}}, 6.0));
