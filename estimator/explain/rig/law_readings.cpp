@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <boost/math/distributions/chi_squared.hpp>
 #include <cmath>
 #include <optional>
 
@@ -43,29 +44,39 @@ double farthest(const LearnedTerm& term) {
   return std::max(std::abs(term.curve.front()[0]), std::abs(term.curve.back()[0]));
 }
 
-/// The best a of a form with this bend; nothing if it leaves the band somewhere.
-std::optional<FoundForm> inside_band(const Form& form, double b, const LearnedTerm& term) {
+/// The best a of a form with this bend; nothing if the data do not bear it.
+std::optional<FoundForm> borne(const Form& form, double b, const CurveEvidence& evidence,
+                               const LearnedTerm& term) {
+  constexpr double true_curves = 0.9;
   const double X = farthest(term);
-  double along = 0.0;
-  double square = 0.0;
-  for (size_t k = 0; k < term.curve.size(); ++k) {
-    const double half = 0.5 * (term.band[k][1] - term.band[k][0]);
-    if (half <= 0.0) continue;  // at rest, where all are nothing
-    const double value = form.of(term.curve[k][0] / X, b) / half;
-    along += value * term.curve[k][1] / half;
-    square += value * value;
+  const auto knots = static_cast<Eigen::Index>(term.curve.size());
+  Eigen::VectorXd curve(knots), shape(knots);
+  for (Eigen::Index k = 0; k < knots; ++k) {
+    curve[k] = term.curve[static_cast<size_t>(k)][1];
+    shape[k] = form.of(term.curve[static_cast<size_t>(k)][0] / X, b);
   }
-  if (square == 0.0) return {};
-  const FoundForm found{&form, along / square, b};
-  for (size_t k = 0; k < term.curve.size(); ++k) {
+  const auto chi_square = [&](const Eigen::VectorXd& values) {
+    return values.dot(evidence.precision * values) - 2.0 * values.dot(evidence.slope);
+  };
+  const double square = shape.dot(evidence.precision * shape);
+  if (!(square > 0.0)) return {};
+  const FoundForm found{&form, shape.dot(evidence.slope) / square, b};
+  for (Eigen::Index k = 0; k < knots; ++k) {
+    const auto& [lower, upper] = term.band[static_cast<size_t>(k)];
     const double rounding = 1e-6 * std::abs(found.a);
-    const double value = found.a * form.of(term.curve[k][0] / X, b);
-    if (value < term.band[k][0] - rounding || value > term.band[k][1] + rounding) return {};
+    const double value =
+        evidence.precision(k, k) > 0.0 ? found.a * shape[k] : 0.0;  // 0 at rest, where all are nothing
+    if (value < lower - rounding || value > upper + rounding) return {};
   }
+  const auto free = static_cast<double>((evidence.precision.diagonal().array() > 0.0).count());
+  if (chi_square(found.a * shape) - chi_square(curve) >
+      boost::math::quantile(boost::math::chi_squared(free), true_curves))
+    return {};
   return found;
 }
 
-std::optional<FoundForm> simplest_form(const PortLaw& law, const LearnedTerm& term) {
+std::optional<FoundForm> simplest_form(const PortLaw& law, const CurveEvidence& evidence,
+                                       const LearnedTerm& term) {
   constexpr int bends = 20;
   if (law.shape == CurveShape::periodic) return {};
   const bool two_sided = term.curve.front()[0] < 0.0 && term.curve.back()[0] > 0.0;
@@ -77,7 +88,7 @@ std::optional<FoundForm> simplest_form(const PortLaw& law, const LearnedTerm& te
     if (form.name == "up-to" && two_sided) continue;
     std::vector<FoundForm> admitted;
     for (int i = 1; i < (form.bends ? bends : 2); ++i)
-      if (const auto found = inside_band(form, static_cast<double>(i) / bends, term))
+      if (const auto found = borne(form, static_cast<double>(i) / bends, evidence, term))
         admitted.push_back(*found);
     if (!admitted.empty()) return admitted[admitted.size() / 2];
   }
@@ -162,8 +173,8 @@ std::string run_of(const LearnedTerm& term, std::string_view of) {
 
 }  // namespace
 
-void read_law(const PortLaw& law, LearnedTerm& term) {
-  const std::optional<FoundForm> found = simplest_form(law, term);
+void read_law(const PortLaw& law, const CurveEvidence& evidence, LearnedTerm& term) {
+  const std::optional<FoundForm> found = simplest_form(law, evidence, term);
   LawText text{.title = fmt::format("learnt: {} by {}", law.sets, law.of)};
   if (!found) {
     term.readings = {fmt::format("{}: perhaps {}", run_of(term, law.of), likeness(law, ""))};

@@ -260,6 +260,22 @@ EffectSet set_with(const EffectSet& set, const LawCandidate& law) {
   return with;
 }
 
+CurveEvidence evidence_of(const LawCandidate& law) {
+  const VectorXd weight = law.fit.evidence.variance.cwiseInverse();
+  const MatrixXd& known = law.problem.known;
+  MatrixXd normal = known.transpose() * weight.asDiagonal() * known;
+  normal.diagonal().array() += 1.0;
+  const MatrixXd weighted = weight.asDiagonal() * law.problem.responses;
+  const MatrixXd beyond =
+      weighted - weight.asDiagonal() * known * normal.llt().solve(known.transpose() * weighted);
+  const std::vector<size_t>& free = law.prior.free_knots();
+  const auto knots = static_cast<Index>(law.knots.size());
+  CurveEvidence evidence{MatrixXd::Zero(knots, knots), VectorXd::Zero(knots)};
+  evidence.precision(free, free) = law.problem.responses.transpose() * beyond;
+  evidence.slope(free) = beyond.transpose() * law.problem.target;
+  return evidence;
+}
+
 /// What is missing for the best law to be proposed; empty: nothing.
 std::string shortcoming(const std::vector<double>& gains, const ChangeSize& size, const Gap& gap,
                         const ErrorKnowledge& known) {
@@ -323,7 +339,7 @@ Learning learn_term(const rig::SessionProblem& problem, const EffectSet& set, co
     if (&other != &best && other.gain > best.gain - as_good)
       term.rivals.push_back(
           {std::string(name_of(other.law->port)), std::string(other.law->sets), other.law->variables});
-  read_law(*best.law, term);
+  read_law(*best.law, evidence_of(best), term);
   return {std::move(term), {}};
 }
 

@@ -120,16 +120,39 @@ TEST_F(LearnedTerms, FindAContactAndWriteAFileThatSaysSo) {
     EXPECT_TRUE(check.passed) << check.name << ": " << check.detail;
 }
 
-TEST(LawReadings, GiveAFormulaWithItsValues) {
-  LearnedTerm term;
-  for (double q = -100.0; q <= 100.0; q += 20.0) {
-    const double lost = 4.0 * std::tanh(q / 25.0);
-    term.curve.push_back({q, lost});
-    term.band.push_back({lost - 0.01 * std::abs(lost), lost + 0.01 * std::abs(lost)});
+class LawReadings : public testing::Test {
+ protected:
+  /// A curve that is known to a part of itself, by the flow into the hose.
+  static LearnedTerm known_to(double part, const std::function<double(double)>& of) {
+    LearnedTerm term;
+    for (double q = -100.0; q <= 100.0; q += 20.0) {
+      term.curve.push_back({q, of(q)});
+      term.band.push_back({of(q) - part * std::abs(of(q)), of(q) + part * std::abs(of(q))});
+    }
+    return term;
   }
-  const PortLaw& law = port_laws().front();
-  ASSERT_EQ(law.of, "q_hose");
-  read_law(law, term);
+  static CurveEvidence evidence(const LearnedTerm& term, const Eigen::MatrixXd& precision) {
+    Eigen::VectorXd curve(static_cast<Eigen::Index>(term.curve.size()));
+    for (Eigen::Index k = 0; k < curve.size(); ++k)
+      curve[k] = term.curve[static_cast<size_t>(k)][1];
+    return {precision, precision * curve};
+  }
+  const PortLaw& law_ = port_laws().front();
+};
+
+TEST_F(LawReadings, GiveAFormulaWithItsValues) {
+  ASSERT_EQ(law_.of, "q_hose");
+  LearnedTerm term = known_to(0.01, [](double q) { return 4.0 * std::tanh(q / 25.0); });
+  read_law(law_, evidence(term, 1e4 * Eigen::MatrixXd::Identity(11, 11)), term);
+  EXPECT_EQ(term.closed_form, "a * tanh(q_hose / b), a = 4 [kPa], b = 25 [mL/s]");
+}
+
+TEST_F(LawReadings, ABandThatIsWideAlongOneCurveAdmitsNoOther) {
+  // Nothing is known of a part in proportion to the flow, and the rest well: not in proportion.
+  LearnedTerm term = known_to(2.0, [](double q) { return 4.0 * std::tanh(q / 25.0); });
+  Eigen::VectorXd line = Eigen::VectorXd::LinSpaced(11, -1.0, 1.0).normalized();
+  const Eigen::MatrixXd identity = Eigen::MatrixXd::Identity(11, 11);
+  read_law(law_, evidence(term, 1e4 * (identity - line * line.transpose()) + identity), term);
   EXPECT_EQ(term.closed_form, "a * tanh(q_hose / b), a = 4 [kPa], b = 25 [mL/s]");
 }
 
