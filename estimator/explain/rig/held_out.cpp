@@ -208,7 +208,8 @@ LinearFeatures smooth_discrepancy(const EffectSet& plain, const MatrixXd& functi
   return with;
 }
 
-double held_out_gain(const rig::SessionProblem& problem, const EffectSet& plain, const EffectSet& set) {
+double held_out_gain(const rig::SessionProblem& problem, const EffectSet& plain, const EffectSet& set,
+                     bool plain_may_be) {
   const auto freedom = [](const EffectSet& of) {
     size_t count = of.model.values.size();
     for (const rig::ModelTerm& term : of.model.terms)
@@ -229,8 +230,9 @@ double held_out_gain(const rig::SessionProblem& problem, const EffectSet& plain,
   };
   const LinearFeatures smooth =
       smooth_discrepancy(plain, smooth_functions(problem), freedom(set) - freedom(plain));
-  return density(features_of(set), set.evidence.shares) -
-         std::max(density(features_of(plain), plain.evidence.shares), density(smooth, plain.evidence.shares));
+  double rival = density(smooth, plain.evidence.shares);
+  if (plain_may_be) rival = std::max(rival, density(features_of(plain), plain.evidence.shares));
+  return density(features_of(set), set.evidence.shares) - rival;
 }
 
 double log_mean(const std::vector<double>& logarithms) {

@@ -45,8 +45,10 @@ Eigen::MatrixXd smooth_functions(const rig::SessionProblem& problem);
 LinearFeatures smooth_discrepancy(const EffectSet& plain, const Eigen::MatrixXd& functions, size_t count);
 
 /// What a set gains over the better of the models without its effects: ln of the pseudo-Bayes factor, the product over folds of
-/// their predictive densities (S. Geisser, W. F. Eddy, J. Am. Stat. Assoc. 74 (1979) 153).
-double held_out_gain(const rig::SessionProblem& problem, const EffectSet& plain, const EffectSet& set);
+/// their predictive densities (S. Geisser, W. F. Eddy, J. Am. Stat. Assoc. 74 (1979) 153). A model without them whose parts are
+/// further off than parts are predicts as well as the set once the other folds have paid for them: `plain_may_be` false, it is none.
+double held_out_gain(const rig::SessionProblem& problem, const EffectSet& plain, const EffectSet& set,
+                     bool plain_may_be);
 
 /// ln of the mean of what e to these is.
 double log_mean(const std::vector<double>& logarithms);

@@ -47,8 +47,10 @@ VectorXd error_squares(const rig::ModelError& error, const rig::Shares& shares) 
   return error.variance(shares) - error.noise;
 }
 
-/// Do parts of the declared rig that are less than a surprise off, in all, make the same change?
-bool is_tolerance(const rig::SessionProblem& problem, const EffectSet& set, const VectorXd& change) {
+/// Do parts of the declared rig that are less than a surprise off, in all, make the same change? What modulus and offsets make
+/// of it, all but `beyond` of them, tells nothing.
+bool is_tolerance(const rig::SessionProblem& problem, const EffectSet& set, const VectorXd& change,
+                  const VectorXd& beyond) {
   const rig::TolerancePrior& prior = problem.prior(set.model);
   const Eigen::MatrixXd& root = prior.root;
   Eigen::MatrixXd columns = set.known.columns;  // by u: now by basic nuisances and by the parts' sds
@@ -63,7 +65,7 @@ bool is_tolerance(const rig::SessionProblem& problem, const EffectSet& set, cons
   const VectorXd parts = normal.llt().solve(columns.transpose() * weight.cwiseProduct(change));
   const VectorXd left = change - columns * parts;
   return parts.tail(root.cols()).norm() < least_surprise(1) &&
-         left.cwiseAbs2().dot(weight) < right_to * right_to * change.cwiseAbs2().dot(weight);
+         left.cwiseAbs2().dot(weight) < right_to * right_to * beyond.cwiseAbs2().dot(weight);
 }
 
 }  // namespace
@@ -81,8 +83,9 @@ ChangeSize size_of_change(const rig::SessionProblem& problem, const EffectSet& s
   const VectorXd left = change - basic * normal.llt().solve(basic.transpose() * weight.cwiseProduct(change));
   const auto error = mean_squares(problem, error_squares(problem.error(), set.evidence.shares));
   const auto size = mean_squares(problem, left.cwiseAbs2());
-  ChangeSize found{
-      .squares = left.cwiseAbs2(), .over_error = 0.0, .is_tolerance = is_tolerance(problem, set, change)};
+  ChangeSize found{.squares = left.cwiseAbs2(),
+                   .over_error = 0.0,
+                   .is_tolerance = is_tolerance(problem, set, change, left)};
   for (size_t s = 0; s < size.size(); ++s)
     if (error[s] > 0.0) found.over_error = std::max(found.over_error, std::sqrt(size[s] / error[s]));
   return found;
@@ -298,7 +301,7 @@ SetVerdict judge_sets(const rig::SessionProblem& problem, const SetSearch& searc
               : bears_nothing_wrong(problem, best) || (may_be_plain && bears_nothing_wrong(problem, *plain));
   out.scatter = rig::cycle_scatter(problem, best.model);
   out.tone = material_tone(problem, best, error);
-  if (is_more) out.held_out_gain = held_out_gain(problem, *plain, best);
+  if (is_more) out.held_out_gain = held_out_gain(problem, *plain, best, !is_strained(problem, *plain));
   const bool predicted = !is_more || predicts(*out.held_out_gain, best.model.terms.size() - search.given);
   if (!borne || is_irregular(problem, out.scatter) || !is_settled(out.searches)) {
     out.verdict = Verdict::unexplained;

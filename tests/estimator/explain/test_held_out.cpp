@@ -65,7 +65,7 @@ TEST_F(HeldOut, SmoothDiscrepanciesAreThoseThatExplainMost) {
 
 TEST_F(HeldOut, NothingIsGainedByWhatChangesNothing) {
   record(3);
-  EXPECT_NEAR(held_out_gain(*problem_, plain_, plain_), 0.0, 1e-6);
+  EXPECT_NEAR(held_out_gain(*problem_, plain_, plain_, true), 0.0, 1e-6);
 }
 
 TEST(LogMean, IsThatOfTheMeanOfLikelihoodRatios) {

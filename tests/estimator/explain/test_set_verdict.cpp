@@ -35,6 +35,24 @@ TEST(SetVerdict, NothingIsWrongOnlyByAModelThatTheDataDoNotExclude) {
   EXPECT_EQ(verdict(1e-9), Verdict::unexplained);
 }
 
+TEST(SetVerdict, WhatTheModulusTakesOfAChangeMakesItNoTolerance) {
+  const rig::SpecimenFamily family = rig::gel_family();
+  const rig::Session session = rig::simulated_session(family, {.terms = {}, .values = {}, .seed = 5});
+  const rig::SessionProblem problem(session, family, 2);
+  const SetSearch search = search_sets(problem);
+  const EffectSet& plain = search.sets.front();
+  const Eigen::VectorXd modulus = plain.known.columns.col(0);
+  const Eigen::VectorXd tolerance = plain.known.columns.col(rig::basic_nuisances + 1);
+  // What no smooth part of a rig does: every second feature up by three sds, the others down.
+  Eigen::VectorXd own = 3.0 * plain.evidence.variance.cwiseSqrt();
+  for (Eigen::Index k = 1; k < own.size(); k += 2)
+    own[k] = -own[k];
+  EXPECT_TRUE(size_of_change(problem, plain, tolerance).is_tolerance);
+  EXPECT_TRUE(size_of_change(problem, plain, 100.0 * modulus + tolerance).is_tolerance);
+  EXPECT_FALSE(size_of_change(problem, plain, own).is_tolerance);
+  EXPECT_FALSE(size_of_change(problem, plain, 1000.0 * modulus + own).is_tolerance);
+}
+
 /// As the recordings of a rig in which nothing else is wrong.
 SetVerdict verdict_beside_a_tone(double amplitude_kPa) {
   const rig::SpecimenFamily family = rig::gel_family();
