@@ -86,6 +86,12 @@ TEST_F(Hidden, AModulusBeyondTheStudysBoundsIsToldAndKept) {
   const Ended ended = run(workplace_, {"diastole", "explain", "narrow.study.toml", "-o", "narrow"});
   ASSERT_EQ(ended.exit_code, 0) << ended.err;
   EXPECT_THAT(ended.err, testing::HasSubstr("outside its bounds [1, 5]"));
+  workplace_.write("pascals.study.toml",
+                   with(with(study, "bounds = [1.0, 20.0]", "bounds = [1000.0, 20000.0]"), "start = 8.8",
+                        "start = 8800.0"));
+  const Ended doubted =
+      run(workplace_, {"diastole", "explain", "pascals.study.toml", "-o", "pascals", "--json"});
+  EXPECT_THAT(doubted.json().at("summary").get<std::string>(), testing::HasSubstr("is its stiffness in kPa"));
 }
 
 }  // namespace

@@ -18,6 +18,7 @@
 #include "estimator/explain/rig/set_verdict.hpp"
 #include "estimator/explain/verdict/verdict.hpp"
 #include "estimator/model/study_effects.hpp"
+#include "estimator/rig_fit/base_fit.hpp"
 #include "protocol/contract/input_error.hpp"
 #include "protocol/contract/table_reader.hpp"
 
@@ -148,6 +149,31 @@ void state_error(const StudyModelError& stated, rig::Shares& share) {
   state(stated.volume_percent, volume, volume);
 }
 
+double range_of(const std::vector<double>& values) {
+  const auto [least, most] = std::ranges::minmax(values);
+  return most - least;
+}
+
+/// A sentence where the study's specimen would show pressures that are beyond its modulus' prior: in another unit, it may be.
+std::string doubt_of_units(const rig::SessionProblem& problem) {
+  constexpr double four_sds = 16.0;  // of a modulus that is known to a factor of two
+  const rig::SessionModel declared = rig::declared_rig(problem).at;
+  double shown = 0.0, measured = 0.0;
+  for (size_t r = 0; r < problem.session().runs.size(); ++r) {
+    const auto& pressures = problem.session().runs[r].pressure_kPa;
+    const auto cavity = pressures.find(rig::Channel::cavity);
+    if (cavity == pressures.end() || cavity->second.empty()) continue;
+    measured = std::max(measured, range_of(cavity->second));
+    shown = std::max(shown, range_of(problem.shown_in(r, declared).pressures.cavity_kPa));
+  }
+  if (!(shown > four_sds * measured || measured > four_sds * shown)) return {};
+  return fmt::format(
+      " By the study the specimen would show {:.4g} kPa, and {:.4g} kPa were recorded: is its stiffness in "
+      "kPa, and the "
+      "transducer's kPa_per_V right?",
+      shown, measured);
+}
+
 /// What its references say of the rig, and the problem with it.
 ReferenceSummary take_reference(const Study& study, const Reference& reference,
                                 rig::SessionProblem& problem) {
@@ -250,7 +276,7 @@ Explanation explain_rig(const Study& study, const ExplainOptions& options) {
     out.summary = "Interrupted after the verdict. ";
   }
   out.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
-  out.summary += summary_of(out);
+  out.summary += summary_of(out) + doubt_of_units(problem);
   if (verdict.tone)
     out.summary += fmt::format(
         " The cavity's pressure holds a tone near {:.1f} Hz, {:.0f} Pa RMS or more, that no cycle makes: "
