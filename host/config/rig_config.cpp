@@ -14,10 +14,10 @@ namespace diastole {
 namespace {
 
 constexpr std::array optional_numbers{
-    "hose_wave_speed_m_s", "hose_creep_fraction",  "hose_creep_time_s",     "hose_minor_loss_K",
-    "hose_loss_at_cavity", "fluid_viscosity_Pa_s", "drive_lag_s",           "catheter_length_m",
-    "catheter_f0_Hz",      "catheter_zeta",        "atmospheric_kPa",       "specimen_temperature_degC",
-    "cavity_range_kPa",    "pump_range_kPa",       "cavity_resolution_kPa", "pump_resolution_kPa"};
+    "hose_wave_speed_m_s", "hose_creep_fraction",   "hose_creep_time_s",         "hose_minor_loss_K",
+    "hose_loss_at_cavity", "fluid_viscosity_Pa_s",  "catheter_length_m",         "catheter_f0_Hz",
+    "catheter_zeta",       "atmospheric_kPa",       "specimen_temperature_degC", "cavity_range_kPa",
+    "pump_range_kPa",      "cavity_resolution_kPa", "pump_resolution_kPa"};
 constexpr std::array optional_texts{"name", "site", "operator", "specimen"};
 
 double disc_area_m2(double diameter_mm) { return std::numbers::pi / 4 * diameter_mm * diameter_mm * 1e-6; }
@@ -84,6 +84,8 @@ void read_geometry(TableReader rig, RigConfig& config) {
   for (const char* key : optional_numbers) {
     if (rig.has(key)) attributes[key] = rig.number(key);
   }
+  if (constexpr const char* lag = "drive_lag_s"; rig.has(lag))
+    attributes[lag] = rig.number(lag, {.at_least = 0, .at_most = 1});
   for (const char* key : optional_texts) {
     if (rig.has(key)) attributes[key] = rig.text(key);
   }

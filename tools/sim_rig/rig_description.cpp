@@ -24,7 +24,8 @@ void read_geometry(TableReader& rig, int64_t microsteps, RigDescription& descrip
   constexpr double ms_per_s = 1000;
   constexpr int poles = 2;
   plant.piston_lag_ms =
-      ms_per_s / poles * rig.number_or("drive_lag_s", poles / ms_per_s * plant.piston_lag_ms, positive);
+      ms_per_s / poles *
+      rig.number_or("drive_lag_s", poles / ms_per_s * plant.piston_lag_ms, {.above = 0, .at_most = 1});
   plant.minor_loss_K = rig.number_or("hose_minor_loss_K", plant.minor_loss_K, not_negative);
   plant.cavity.f0_Hz = rig.number_or("catheter_f0_Hz", plant.cavity.f0_Hz, positive);
   plant.cavity.zeta = rig.number_or("catheter_zeta", plant.cavity.zeta, positive);

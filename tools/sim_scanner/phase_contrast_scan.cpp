@@ -36,7 +36,7 @@ struct Moment {
       const double bright = protocol.fluid_brightness * (1 + protocol.inflow * std::abs(through));
       return shade * std::polar(bright, share * pi * through);
     }
-    if (radius_mm < bore_mm + phantom.wall_mm) return protocol.wall_brightness;
+    if (radius_mm < bore_mm + phantom.wall_mm) return shade * protocol.wall_brightness;
     return std::hypot(x_mm, y_mm) < phantom.block_radius_mm ? shade : 0.0;
   }
 };

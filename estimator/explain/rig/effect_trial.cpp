@@ -206,7 +206,7 @@ EffectCheck EffectTrial::found_again() const {
   const EffectSet at_truth =
       fit_set_exactly(problem, fit_set(problem, truth, base, problem.error().prior.share));
   const bool is_as_likely = found.log_posterior >= at_truth.log_posterior - half_a_nat;
-  const std::string_view not_determined =
+  const std::string_view remark =
       is_near || does_the_same ? ""
       : is_as_likely           ? "; not determined: other parts of the rig do in these data what it does"
                                : "; not found: data are likelier with what was hidden";
@@ -216,7 +216,7 @@ EffectCheck EffectTrial::found_again() const {
                       "search from there {:+.1f}; {}{}",
                       effect_.parameters()[0].name, options.values[0], found.model.values[0], found.errors[0],
                       100.0 * differs, found.log_posterior - at_truth.log_posterior,
-                      inference::sentence(found.termination), not_determined)};
+                      inference::sentence(found.termination), remark)};
 }
 
 EffectCheck EffectTrial::silent() const {

@@ -18,7 +18,6 @@
 #include "estimator/explain/rig/set_verdict.hpp"
 #include "estimator/explain/verdict/verdict.hpp"
 #include "estimator/model/study_effects.hpp"
-#include "estimator/rig_fit/base_fit.hpp"
 #include "protocol/contract/input_error.hpp"
 #include "protocol/contract/table_reader.hpp"
 
@@ -149,29 +148,23 @@ void state_error(const StudyModelError& stated, rig::Shares& share) {
   state(stated.volume_percent, volume, volume);
 }
 
-double range_of(const std::vector<double>& values) {
-  const auto [least, most] = std::ranges::minmax(values);
-  return most - least;
-}
-
-/// A sentence where the study's specimen would show pressures that are beyond its modulus' prior: in another unit, it may be.
+/// A sentence where the specimen as the study has it would show pressures that are beyond its modulus' prior.
 std::string doubt_of_units(const rig::SessionProblem& problem) {
   constexpr double four_sds = 16.0;  // of a modulus that is known to a factor of two
-  const rig::SessionModel declared = rig::declared_rig(problem).at;
-  double shown = 0.0, measured = 0.0;
+  rig::SessionModel stated;
+  stated.u = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(problem.nuisances().size()));
+  double shown_kPa = 0.0;
   for (size_t r = 0; r < problem.session().runs.size(); ++r) {
-    const auto& pressures = problem.session().runs[r].pressure_kPa;
-    const auto cavity = pressures.find(rig::Channel::cavity);
-    if (cavity == pressures.end() || cavity->second.empty()) continue;
-    measured = std::max(measured, range_of(cavity->second));
-    shown = std::max(shown, range_of(problem.shown_in(r, declared).pressures.cavity_kPa));
+    const auto [least, most] = std::ranges::minmax(problem.shown_in(r, stated).pressures.cavity_kPa);
+    shown_kPa = std::max(shown_kPa, most - least);
   }
-  if (!(shown > four_sds * measured || measured > four_sds * shown)) return {};
+  const double measured_kPa = problem.error().range[static_cast<size_t>(rig::Signal::cavity)];
+  if (!(shown_kPa > four_sds * measured_kPa || measured_kPa > four_sds * shown_kPa)) return {};
   return fmt::format(
       " By the study the specimen would show {:.4g} kPa, and {:.4g} kPa were recorded: is its stiffness in "
       "kPa, and the "
       "transducer's kPa_per_V right?",
-      shown, measured);
+      shown_kPa, measured_kPa);
 }
 
 /// What its references say of the rig, and the problem with it.
