@@ -117,6 +117,16 @@ TEST_F(ShapeSeriesTest, AFaultySessionStopsTheSeriesAndKeepsItsExitCode) {
   }
 }
 
+// `simulate EXPERIMENT --rig soft.rig.toml`, where --config was meant, ran the built-in rig.
+TEST_F(ShapeSeriesTest, ItsOptionsAreRefusedWithoutACurveToFollow) {
+  for (const char* option :
+       {"--rig soft.rig.toml", "--study gel.study.toml", "--cycles 9", "--iterations 2", "--page p.html"}) {
+    CLI::App command;
+    make_shape_series()->add_options(command);
+    EXPECT_THROW(command.parse(option), CLI::RequiresError) << option;
+  }
+}
+
 TEST_F(ShapeSeriesTest, ForceLeavesNothingOfALongerSeries) {
   const auto write = [&](const std::string& name) { std::ofstream(at(name)) << "earlier\n"; };
   for (const char* name : {"followed.1.run.h5", "followed.5.run.h5", "followed.5.csv", "followed.x.csv"})

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <iostream>
 #include <memory>
+#include <span>
 
 #include "estimator/io/whole_file.hpp"
 #include "estimator/report/page.hpp"
@@ -54,13 +55,18 @@ fs::path numbered(const fs::path& output, size_t number, const std::string& endi
 class ShapeSeries final : public SessionSeries {
  public:
   void add_options(CLI::App& command) override {
-    command.add_option("--shape", request_.wanted.file,
-                       "curve that the specimen is to follow (diastole shape), instead of an experiment");
+    CLI::Option* const shape =
+        command.add_option("--shape", request_.wanted.file,
+                           "curve that the specimen is to follow (diastole shape), instead of an experiment");
+    const size_t before = command.get_options().size();
     add_request_to(command, request_);
     command.add_option("--iterations", iterations_, "sessions at the most")
         ->check(CLI::Range(size_t{1}, most_iterations))
         ->capture_default_str();
     command.add_option("--page", page_, "HTML page with the plots of each iteration");
+    const std::vector<CLI::Option*> all = command.get_options();
+    for (CLI::Option* option : std::span(all).subspan(before))
+      option->needs(shape);  // a session of an experiment has no use for it
   }
   [[nodiscard]] bool asked() const override { return !request_.wanted.file.empty(); }
   ExitCode carry_out(const std::string& output, bool force, const Acquire& acquire,
