@@ -80,6 +80,19 @@ TEST(RunComparison, WhatWasSetOtherwiseIsNamedAndAnotherMotionIsNotTested) {
   ASSERT_EQ(found.remarks.size(), 1);
   EXPECT_THAT(found.remarks.front(), HasSubstr("another motion"));
   EXPECT_THAT(comparison_page(found), HasSubstr("gel-7"));
+  EXPECT_THAT(comparison_page(found), HasSubstr("not tested"));
+}
+
+TEST(RunComparison, WhatARunLacksIsTold) {
+  RecordedRun longer = recorded(2);
+  longer.segments.push_back({24.0, "sinusoidal", 40, 1.2, 0, 20});
+  longer.segments.push_back({48.0, "hold", 0, 5, 0, 1});
+  longer.pressure.channels["pump_kPa"] = longer.pressure.channels["cavity_kPa"];
+  const std::string pump = "pump_kPa is not in all runs: not compared";
+  EXPECT_THAT(compared({recorded(1), longer}).remarks,
+              testing::ElementsAre("run-2.run.h5: segment 1: the first run has none: not tested", pump));
+  EXPECT_THAT(compared({longer, recorded(1)}).remarks,
+              testing::Contains("run-1.run.h5: segment 1: this run has none: not tested"));
 }
 
 }  // namespace

@@ -77,6 +77,7 @@ void show(const Comparison& found) {
           report::number(departure.worst_in_errors, 3), report::number(departure.limit_in_errors, 3));
     }
   }
+  if (!found.is_tested()) fmt::print("no pressure could be tested against noise\n");
   for (const std::string& remark : found.remarks)
     fmt::print("{}\n", remark);
 }

@@ -187,12 +187,38 @@ Overlay overlay_of(const std::vector<RunFile>& runs, size_t segment, const std::
   return overlay;
 }
 
+/// Segments and channels that some runs have and others lack.
+void remark_what_lacks(const std::vector<RunFile>& runs, std::vector<std::string>& remarks) {
+  const std::vector<Segment>& of_first = runs.front().run.segments;
+  for (const RunFile& file : runs) {
+    const std::vector<Segment>& own = file.run.segments;
+    const bool has_more = own.size() > of_first.size();
+    const std::vector<Segment>& longer = has_more ? own : of_first;
+    for (size_t i = std::min(own.size(), of_first.size()); i < longer.size(); ++i)
+      if (longer[i].waveform != "hold")
+        remarks.push_back(fmt::format("{}: segment {}: {} has none: not tested", file.run.file, i,
+                                      has_more ? "the first run" : "this run"));
+  }
+  const std::vector<std::string> common = channels_of(runs);
+  std::set<std::string> lacking;
+  for (const RunFile& file : runs)
+    for (const auto& [name, values] : file.rows.pressure.values)
+      if (name != runfile::cavity_filtered_channel && std::ranges::count(common, name) == 0)
+        lacking.insert(name);
+  for (const std::string& name : lacking)
+    remarks.push_back(fmt::format("{} is not in all runs: not compared", name));
+}
+
 bool can_be_tested(const Overlay& overlay, const MeanCycle& cycle, const std::vector<RunFile>& runs) {
   return cycle.run != 0 && cycle.cycles > 1 &&
          same_motion(runs.front().run, runs[cycle.run].run, overlay.segment);
 }
 
 }  // namespace
+
+bool Comparison::is_tested() const {
+  return std::ranges::any_of(overlays, [](const Overlay& overlay) { return !overlay.departures.empty(); });
+}
 
 bool Comparison::beyond_noise() const {
   return std::ranges::any_of(overlays, [](const Overlay& overlay) {
@@ -219,6 +245,7 @@ Comparison compare(const std::vector<RunFile>& runs, const std::vector<runfile::
     for (const std::string& channel : channels_of(runs))
       comparison.overlays.push_back(overlay_of(runs, segment, channel, parts, comparison.remarks));
   }
+  remark_what_lacks(runs, comparison.remarks);
   size_t tests = 0;
   for (const Overlay& overlay : comparison.overlays)
     for (const MeanCycle& cycle : overlay.cycles)

@@ -63,6 +63,7 @@ struct Comparison {
   std::vector<Overlay> overlays;
   std::vector<std::string> remarks;  ///< what could not be compared, and why
 
+  [[nodiscard]] bool is_tested() const;  ///< any pressure against noise
   [[nodiscard]] bool beyond_noise() const;
 };
 

@@ -65,8 +65,12 @@ report::Figure differences(const Comparison& comparison, const Overlay& overlay)
 
 std::string comparison_page(const Comparison& comparison) {
   report::Page page("Runs compared");
-  page.headline("traces", comparison.beyond_noise() ? "differ" : "agree",
-                comparison.beyond_noise() ? "by more than noise" : "within their noise");
+  if (!comparison.is_tested()) {
+    page.headline("traces", "not tested", "no motion that two runs share with noise that is known");
+  } else {
+    page.headline("traces", comparison.beyond_noise() ? "differ" : "agree",
+                  comparison.beyond_noise() ? "by more than noise" : "within their noise");
+  }
   page.headline("runs", fmt::format("{}", comparison.files.size()), "each against the first");
   page.headline("settings and facts", fmt::format("{}", comparison.differences.size()),
                 "that are not the same in all");
