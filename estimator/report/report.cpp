@@ -102,13 +102,16 @@ std::string make_report(std::span<const std::filesystem::path> files, size_t fra
     } else if (is_cells_file(content)) {
       add(Kind::table, saved_table(content, name), add_montecarlo);
     } else if (!is_json_object(content)) {
-      throw InputError({name, "",
-                        std::string(content.empty() ? "is empty, " : "is ") +
-                            "neither a run file nor a fit result, a Monte Carlo table, an explanation, a "
-                            "reconstruction, a solution or a shear test",
-                        "Give files that `diastole run`, `diastole simulate`, `diastole fit -o`, `diastole "
-                        "explain -o`, `diastole montecarlo --cells`, `diastole reconstruct -o NAME.json` or "
-                        "`diastole solve -o NAME.json` wrote, or the CSV that `diastole shear` reads."});
+      throw InputError(
+          {name, "",
+           std::string(content.empty() ? "is empty, " : "is ") +
+               "neither a run file nor a record of a fit, an explanation, a Monte Carlo table, a "
+               "reconstruction, a solution, tracked images, flow or fibres, nor a shear test",
+           "Give files that `diastole run`, `simulate`, `montecarlo --cells`, `fit -o`, `explain -o`, "
+           "`solve` or "
+           "`reconstruct` with -o NAME.json, or `track`, `flow` or `fibres` with --record wrote, or the CSV "
+           "that "
+           "`diastole shear` reads."});
     } else if (explain::is_explanation(content)) {
       explanations.push_back(explain::explanation_from_json(content, name));
       add(Kind::explanation, explanations.back(), add_explanation);
