@@ -124,8 +124,7 @@ class SessionProblem {
   std::vector<Nuisance> nuisances_;
   TolerancePrior prior_;  ///< the list's, if no reference says more
   bool is_learnt_ = false;
-  SimulationOptions simulation_;
-  std::vector<DriveTrace> motions_;
+  std::vector<DriveTrace> smooth_motions_, abrupt_motions_;  ///< of each run
 };
 
 }  // namespace diastole::rig

@@ -96,6 +96,60 @@ TEST(SessionProblem, BearsAGap) {
   EXPECT_NEAR(problem.model(declared_rig(problem).at).modulus_kPa, 8.0, 0.1);
 }
 
+/// Rms of what the problem's steps change of a signal's features, over that of the model's stated error.
+std::array<double, signal_count> error_of_steps(const SessionProblem& problem, const SessionModel& of) {
+  constexpr SimulationOptions converged{.step_s = 1.0 / 2400.0, .components = 3};
+  const RigModel model = problem.model(of);
+  Eigen::MatrixXd truth(problem.features().count(), 1);
+  for (size_t r = 0; r < problem.session().runs.size(); ++r) {
+    const SessionRun& run = problem.session().runs[r];
+    const PlantTrace plant = simulate_plant(model, run.drive, converged);
+    problem.features().project(r, std::array{Shown{observe(model, plant, run.drive.place, run.sample_s), {}}},
+                               truth);
+  }
+  const VectorXd off = problem.shown(std::span(&of, 1)).col(0) - truth.col(0);
+  const VectorXd stated = problem.error().variance(problem.error().prior.share) - problem.error().noise;
+  std::array<double, signal_count> squares{}, of_error{};
+  for (const FeatureBlock& block : problem.features().blocks()) {
+    const auto first = static_cast<Index>(block.first), count = static_cast<Index>(block.features.size());
+    squares[static_cast<size_t>(block.signal)] += off.segment(first, count).squaredNorm();
+    of_error[static_cast<size_t>(block.signal)] += stated.segment(first, count).sum();
+  }
+  for (size_t s = 0; s < signal_count; ++s)
+    squares[s] = of_error[s] > 0.0 ? std::sqrt(squares[s] / of_error[s]) : 0.0;
+  return squares;
+}
+
+TEST(SessionProblem, ItsStepsErrByFarLessThanTheModel) {
+  const SpecimenFamily family = gel_family();
+  Session session = simulated_session(family, {});
+  constexpr double of_smooth = 0.05, of_abrupt = 0.2;
+  struct Case {
+    const char* id;
+    double value;
+    double within;
+  };
+  for (const bool has_pump : {true, false}) {
+    if (!has_pump)
+      for (SessionRun& run : session.runs)
+        run.pressure_kPa.erase(Channel::pump);
+    const SessionProblem problem(session, family, 2);
+    const SessionModel base = declared_rig(problem).at;
+    for (const Case& one :
+         {Case{nullptr, 0.0, of_smooth}, Case{"hose-compliance", 100.0, of_smooth},
+          Case{"hose-loss-excess", 20.0, of_smooth}, Case{"backlash", 0.3, of_abrupt},
+          Case{"seal-leak-pump", 0.02, of_abrupt}, Case{"air-bubble-pump", 1.5, of_abrupt}}) {
+      SessionModel with = base;
+      if (one.id != nullptr) {
+        with.terms = {{find_effect(one.id), {}}};
+        with.values = {one.value};
+      }
+      const auto errors = error_of_steps(problem, with);
+      EXPECT_LT(std::ranges::max(errors), one.within) << (one.id ? one.id : "as described") << has_pump;
+    }
+  }
+}
+
 TEST(SessionProblem, ItsSlopesAreTheDifferencesOfShortSteps) {
   const SpecimenFamily family = gel_family();
   const Session session = simulated_session(family, {});
