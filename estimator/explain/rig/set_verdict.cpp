@@ -308,6 +308,12 @@ SetVerdict judge_sets(const rig::SessionProblem& problem, const SetSearch& searc
     return out;
   }
   if (out.confidence >= name_probability) {
+    if (!predicted && !out.tone && bears_nothing_wrong(problem, *plain)) {
+      out.verdict = Verdict::ambiguous;
+      out.confidence += search.probability[out.plain];
+      out.ambiguous_with.push_back(plain->ids());
+      return out;
+    }
     out.is_tone_alone = !is_more && out.tone;
     const bool is_clean = !is_more && !out.tone;
     out.verdict = is_clean ? Verdict::none : is_more && predicted ? Verdict::named : Verdict::unexplained;

@@ -53,6 +53,31 @@ TEST(SetVerdict, WhatTheModulusTakesOfAChangeMakesItNoTolerance) {
   EXPECT_FALSE(size_of_change(problem, plain, 1000.0 * modulus + own).is_tolerance);
 }
 
+TEST(SetVerdict, WhatTheDataSpeakForAndNewWaveformsDoNotBearMayBeNothing) {
+  const rig::SpecimenFamily family = rig::gel_family();
+  const rig::Session session = rig::simulated_session(family, {.terms = {}, .values = {}, .seed = 5});
+  const rig::SessionProblem problem(session, family, 2);
+  SetSearch made = search_sets(problem);
+  const auto plain = std::ranges::find_if(made.sets, [&](const EffectSet& set) {
+    return set.ids().empty() && problem.prior(set.model).described.minCoeff() == 1.0;
+  });
+  ASSERT_NE(plain, made.sets.end());
+  // A drift that would be material, of a sensor that does not drift.
+  EffectSet drifting = *plain;
+  drifting.model.terms.push_back({find_effect("sensor-drift"), {}});
+  drifting.model.values.push_back(100.0);
+  made.sets = {drifting, *plain};
+  made.probability = {0.97, 0.03};
+  const SetVerdict doubtful = judge_sets(problem, made, {});
+  ASSERT_TRUE(doubtful.held_out_gain);
+  EXPECT_LT(*doubtful.held_out_gain, 0.0);
+  EXPECT_EQ(doubtful.verdict, Verdict::ambiguous);
+  EXPECT_EQ(doubtful.ambiguous_with, std::vector<std::vector<std::string>>{{}});
+  // Where a part would have to be far off without it, something is wrong for all that.
+  made.sets[1].model.u.tail(1)[0] = 5.0;
+  EXPECT_EQ(judge_sets(problem, made, {}).verdict, Verdict::unexplained);
+}
+
 /// As the recordings of a rig in which nothing else is wrong.
 SetVerdict verdict_beside_a_tone(double amplitude_kPa) {
   const rig::SpecimenFamily family = rig::gel_family();

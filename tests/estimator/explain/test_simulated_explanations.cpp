@@ -64,7 +64,8 @@ TEST_F(SimulatedSession, OfOneWaveformWithAStiffeningWallGetsNoName) {
   EXPECT_THAT(chosen().ids(), ElementsAre("strain-stiffening"));
   EXPECT_TRUE(is_settled(verdict_.searches));
   EXPECT_LT(verdict_.held_out_gain.value(), 3.0);
-  EXPECT_EQ(verdict_.verdict, Verdict::unexplained);
+  EXPECT_EQ(verdict_.verdict, Verdict::ambiguous);
+  EXPECT_THAT(verdict_.ambiguous_with, ElementsAre(testing::IsEmpty()));
 }
 
 TEST_F(SimulatedSession, WithALeakIsNotNamedByASearchThatDidNotSettle) {
