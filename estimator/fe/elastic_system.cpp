@@ -12,8 +12,6 @@ namespace {
 
 constexpr double mm3_per_mL = 1e3;
 
-constexpr SymmetricTensor<double> undeformed{1.0, 1.0, 1.0, 0.0, 0.0, 0.0};
-
 HeldDofs held_by(const ElasticOptions& options, const HermiteMesh& mesh) {
   if (options.held) return *options.held;
   HeldDofs held = hold_nothing(mesh);
@@ -60,6 +58,7 @@ ElasticSystem::ElasticSystem(HermiteMesh mesh, const Law& law, const ElasticOpti
       cavity_(mesh_, loaded_by(options, mesh_), held_, plates_of(options)),
       chamber_(options.chamber),
       material_axes_(options.material_axes),
+      stiffness_(options.stiffness),
       volume_stiffness_kPa_(options.volume_stiffness_kPa),
       compressibility_per_kPa_(options.bulk_modulus_kPa ? 1.0 / *options.bulk_modulus_kPa : 0.0),
       threads_(options.threads > 0 ? options.threads : machine_threads()),
@@ -92,7 +91,9 @@ ElementState ElasticSystem::element_state(const ElasticState& state, size_t elem
   local.fibre_tension_kPa = state.fibre_tension_kPa;
   local.volume_stiffness_kPa = volume_stiffness_kPa_;
   local.compressibility_per_kPa = compressibility_per_kPa_;
-  local.rest_pressure_kPa = compressibility_per_kPa_ > 0.0 ? rest_pressure_kPa(element) : 0.0;
+  const bool is_even = std::ranges::all_of(
+      reference_[element], [](const ReferencePoint& point) { return point.stiffness == 1.0; });
+  local.rest_pressure_kPa = compressibility_per_kPa_ > 0.0 || !is_even ? rest_pressure_kPa(element) : 0.0;
   for (size_t m = 0; m < corners; ++m) {
     local.pressure_kPa[m] = state.lagrange_pressure_kPa[pressures_.unknown[element][m]];
   }

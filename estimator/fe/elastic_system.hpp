@@ -78,6 +78,10 @@ class ElasticSystem {
   [[nodiscard]] const EquationSystem& equations() const { return *equations_; }
   [[nodiscard]] const PressureMap& pressures() const { return pressures_; }
   [[nodiscard]] const MaterialAxesField& material_axes() const { return material_axes_; }
+  /// As it was made with; without set_stiffness().
+  [[nodiscard]] const StiffnessField& stiffness() const { return stiffness_; }
+  /// p0 of element_mechanics.hpp.
+  [[nodiscard]] double rest_pressure_kPa(size_t element) const;
   [[nodiscard]] double volume_stiffness_kPa() const { return volume_stiffness_kPa_; }
   /// 1/K; 0 for incompressible material.
   [[nodiscard]] double compressibility_per_kPa() const { return compressibility_per_kPa_; }
@@ -153,7 +157,6 @@ class ElasticSystem {
   [[nodiscard]] NodeField node_field(std::span<const double> unknowns) const;
 
  private:
-  [[nodiscard]] double rest_pressure_kPa(size_t element) const;
   /// The largest over the elements: pressure at rest and stiffness against stretch there.
   [[nodiscard]] double material_stiffness_kPa() const;
   FactorResult inertia(const ElasticState& state, double probing_stiffness_kPa);
@@ -182,6 +185,7 @@ class ElasticSystem {
   double undeformed_chamber_mm3_ = 0.0;
   std::vector<SpringFace> springs_;
   MaterialAxesField material_axes_;
+  StiffnessField stiffness_;
   double volume_stiffness_kPa_;
   double compressibility_per_kPa_;
   size_t threads_;

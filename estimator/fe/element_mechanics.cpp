@@ -96,9 +96,16 @@ void set_geometric_moduli(double* moduli_at_point, const Matrix3d& s, double pre
   }
 }
 
-/// p - kappa (J - 1): the pressure that cof(g) sees.
-double effective_pressure(const ElementState& state, size_t q, double volume_ratio) {
-  return pressure_at(state.pressure_kPa, q) - state.volume_stiffness_kPa * (volume_ratio - 1.0);
+/// (1 - m) p0.
+double rest_pressure_lacking(const ReferencePoint& reference, const ElementState& state) {
+  return (1.0 - reference.stiffness) * state.rest_pressure_kPa;
+}
+
+/// p - kappa (J - 1) - (1 - m) p0: the pressure that cof(g) sees.
+double effective_pressure(const ReferencePoint& reference, const ElementState& state, size_t q,
+                          double volume_ratio) {
+  return pressure_at(state.pressure_kPa, q) - state.volume_stiffness_kPa * (volume_ratio - 1.0) -
+         rest_pressure_lacking(reference, state);
 }
 
 }  // namespace
@@ -143,10 +150,11 @@ ElementResidual element_residual(const ReferenceElement& reference, const Elemen
     const SymmetricTensor<double> c = right_cauchy_green(f);
     Matrix3d stress = reference[q].stiffness * full_matrix(law.stress(c, parameters));
     stress(0, 0) += state.fibre_tension_kPa;
-    const double pressure = effective_pressure(state, q, ratio);
+    const double pressure = effective_pressure(reference[q], state, q, ratio);
     piola.set(q, reference[q].volume * f * stress * t.transpose() - (pressure * tables.weight[q]) * cofactor);
     result.energy += reference[q].volume * reference[q].stiffness * law.energy(c, parameters);
     double growth = volume - reference[q].volume;
+    result.energy += rest_pressure_lacking(reference[q], state) * growth;
     if (state.compressibility_per_kPa > 0.0) {
       const double above_rest = pressure_at(state.pressure_kPa, q) - state.rest_pressure_kPa;
       const double shrinkage = reference[q].volume * state.compressibility_per_kPa * above_rest;
@@ -176,7 +184,7 @@ void element_tangent(const ReferenceElement& reference, const ElementState& stat
     const MaterialResponse response = law.response(right_cauchy_green(f), parameters);
     Matrix3d material_stress = reference[q].stiffness * full_matrix(response.stress);
     material_stress(0, 0) += state.fibre_tension_kPa;
-    const double pressure = effective_pressure(state, q, ratio) * weight;
+    const double pressure = effective_pressure(reference[q], state, q, ratio) * weight;
     const Matrix3d stress = reference[q].volume * t * material_stress * t.transpose();
     double* point = tangent.stiffness.moduli_at(q);
     set_geometric_moduli(point, stress, pressure, g);
@@ -211,12 +219,16 @@ std::array<double, corners> pressure_volume_mm3(const ReferenceElement& referenc
 ElementField element_parameter_force(const ReferenceElement& reference, const ElementState& state,
                                      const Law& law, std::span<const double> parameters, size_t parameter) {
   const GaussMatrices gradients = gradients_at_points(state.position_mm);
+  const double rest_slope = trace(law.stress_sensitivity(undeformed, parameters, parameter)) / 3.0;  // of p0
   GaussMatrices piola;
   for (size_t q = 0; q < gauss_points; ++q) {
     const Matrix3d& t = reference[q].material_to_xi;
     const Matrix3d f = gradients.at(q) * t;
     const Matrix3d stress = full_matrix(law.stress_sensitivity(right_cauchy_green(f), parameters, parameter));
-    piola.set(q, reference[q].volume * reference[q].stiffness * f * stress * t.transpose());
+    Matrix3d force = reference[q].volume * reference[q].stiffness * f * stress * t.transpose();
+    const double lacking = (1.0 - reference[q].stiffness) * rest_slope;
+    if (lacking != 0.0) force += lacking * gauss_tables().weight[q] * cofactors(gradients.at(q));
+    piola.set(q, force);
   }
   return force_of(piola);
 }

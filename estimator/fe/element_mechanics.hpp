@@ -1,26 +1,27 @@
 #pragma once
 // One element's share of the potential
 //
-//   Pi(x, p) = integral of  m W(C; parameters) + T Eff - p (J - 1) + kappa/2 (J - 1)^2  dV
+//   Pi(x, p) = integral of  m W(C; parameters) + (1 - m) p0 (J - 1) + T Eff - p (J - 1) + kappa/2 (J - 1)^2  dV
 //              - P_cavity V_cavity(x)
 //
 // (the last term is in cavity_load.hpp), with m a factor that may vary from place to place, T an active tension along the fibre (second Piola-Kirchhoff
 // stress T f x f) and kappa a volume stiffness *beside* the Lagrange pressure: the exact solution, J = 1,
-// does not know it, but Newton's method converges from farther away.
+// does not know it, but Newton's method converges from farther away. Nor does it know the second term, with p0 the pressure that balances the
+// law's stress at rest: without it a pressure would have to follow m from point to point to balance m W, which a tri-linear one cannot, and the
+// material at rest would bulge within each element that an inclusion's edge goes through.
 //
-// Compressible material adds  - (p - p0)^2 / (2 K) dV  with K the bulk modulus and p0 the pressure that balances the
-// law's stress at rest: p = p0 - K (J - 1) in the weak sense (a perturbed Lagrangian), so that the material's energy is
+// Compressible material, of m = 1, adds  - (p - p0)^2 / (2 K) dV  with K the bulk modulus: p = p0 - K (J - 1) in the weak sense (a perturbed Lagrangian), so that the material's energy is
 // W - p0 (J - 1) + K/2 (J - 1)^2, and the incompressible one is its limit 1/K = 0.
 //
 // Given here are its gradient (residual)
 // and second derivative (tangent) with respect to the 192 coefficients x(a, i) of the deformed position and
 // the 8 corner values p(m) of the tri-linear Lagrange pressure p, positive in compression: Cauchy stress =
 // 2/J F (dW/dC + T/2 f x f) F^T
-// - (p - kappa (J - 1)) I.
+// - (p - kappa (J - 1) - (1 - m) p0) I.
 //
 // Everything is worked out in element coordinates: g = dx/dxi, and T = dxi/dX Q with Q's columns the material
 // axes, so that F Q = g T and C in material axes = (g T)^T (g T). With w the Gauss weight, G = dX/dxi:
-//   residual(a, i) = sum_q dN_a/dxi_K [ w det G (g T S T^T)_iK - p w cof(g)_iK ],   p - kappa (J - 1) for p
+//   residual(a, i) = sum_q dN_a/dxi_K [ w det G (g T S T^T)_iK - p w cof(g)_iK ],   p - kappa (J - 1) - (1 - m) p0 for p
 //   residual(m)    = - sum_q w [ det g - det G + det G (p - p0) / K ] psi_m
 //
 // Units: mm, kPa; energies in kPa mm^3 = uJ.
@@ -66,7 +67,7 @@ struct ElementState {
   double volume_stiffness_kPa = 0.0;     ///< kappa above
   double probing_stiffness_kPa = 0.0;    ///< added to kappa in the tangent's  kappa dJ x dJ  alone
   double compressibility_per_kPa = 0.0;  ///< 1/K above
-  double rest_pressure_kPa = 0.0;        ///< p0 above; of no account when incompressible
+  double rest_pressure_kPa = 0.0;        ///< p0 above; of no account when incompressible and m = 1 everywhere
 };
 
 /// The least volume ratio J over the Gauss points, and where.

@@ -48,11 +48,14 @@ PointFields point_fields(const ElasticSystem& system, const ElasticState& state,
   const Matrix3d axes = system.material_axes() ? system.material_axes()(mesh, point) : Matrix3d::Identity();
   if (system.material_axes()) fields.fibre = carried(axes, gradient);
   const Matrix3d to_material = gradient * axes;  // F Q
-  Matrix3d second = full_matrix(system.law().stress(symmetric_part(to_material.transpose() * to_material),
-                                                    system.parameters(point.element)));
+  const double stiffness = system.stiffness() ? system.stiffness()(fields.reference_mm) : 1.0;
+  Matrix3d second =
+      stiffness * full_matrix(system.law().stress(symmetric_part(to_material.transpose() * to_material),
+                                                  system.parameters(point.element)));
   second(0, 0) += state.fibre_tension_kPa;
-  const double pressure_kPa =
-      fields.lagrange_pressure_kPa - system.volume_stiffness_kPa() * (fields.volume_ratio - 1.0);
+  const double pressure_kPa = fields.lagrange_pressure_kPa -
+                              system.volume_stiffness_kPa() * (fields.volume_ratio - 1.0) -
+                              (1.0 - stiffness) * system.rest_pressure_kPa(point.element);
   fields.stress_kPa = to_material * second * to_material.transpose() / fields.volume_ratio -
                       pressure_kPa * Matrix3d::Identity();
   return fields;

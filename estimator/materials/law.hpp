@@ -29,6 +29,9 @@ namespace diastole {
 template <class Scalar>
 using SymmetricTensor = std::array<Scalar, 6>;
 
+/// C of a body at rest.
+inline constexpr SymmetricTensor<double> undeformed{1.0, 1.0, 1.0, 0.0, 0.0, 0.0};
+
 /// Material tangent dS/dE: entry (m, n) is the tensor component D_mn = 2 dS_m/dC_n, minor and major
 /// symmetric.
 using TangentTensor = Eigen::Matrix<double, 6, 6>;

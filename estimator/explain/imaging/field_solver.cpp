@@ -27,13 +27,16 @@ std::array<Eigen::Matrix3d, gauss_points> law_forces(const ElasticSystem& system
   const HermiteMesh& mesh = system.mesh();
   const ReferenceElement reference = make_reference_element(mesh, element, system.material_axes());
   const GaussMatrices gradients = gradients_at_points(mesh.gather(element, state.position_mm));
+  const double rest_pressure_kPa = system.rest_pressure_kPa(element);
   std::array<Eigen::Matrix3d, gauss_points> forces;
   for (size_t q = 0; q < gauss_points; ++q) {
     const Eigen::Matrix3d& t = reference[q].material_to_xi;
-    const Eigen::Matrix3d f = gradients.at(q) * t;
+    const Eigen::Matrix3d g = gradients.at(q);
+    const Eigen::Matrix3d f = g * t;
     const SymmetricTensor<double> stress =
         system.law().stress(symmetric_part(f.transpose() * f), system.parameters(element));
-    forces[q] = -reference[q].volume * f * full_matrix(stress) * t.transpose();
+    const Eigen::Matrix3d growth = gauss_tables().weight[q] * g.determinant() * g.inverse().transpose();
+    forces[q] = rest_pressure_kPa * growth - reference[q].volume * f * full_matrix(stress) * t.transpose();
   }
   return forces;
 }

@@ -3,6 +3,7 @@
 
 #include <Eigen/Dense>
 #include <array>
+#include <cmath>
 #include <random>
 #include <vector>
 
@@ -24,6 +25,14 @@ inline ElasticModel gel(double c1_kPa, std::array<size_t, 3> elements = {8, 4, 1
   options.parameters = {c1_kPa};
   options.solve.check_stability = true;
   return ElasticModel(make_annulus(gel_shape(elements)), *find_law("neo-hookean"), std::move(options));
+}
+
+/// So many times as stiff within 10 mm of a place in the wall, with an edge of some millimetres.
+inline StiffnessField lump(double contrast) {
+  return [=](const Eigen::Vector3d& X_mm) {
+    const double distance_mm = (X_mm - Eigen::Vector3d(10.0, 35.0, 8.0)).norm();
+    return 1.0 + 0.5 * (contrast - 1.0) * (1.0 - std::tanh((distance_mm - 10.0) / 2.0));
+  };
 }
 
 /// A slice of the gel between frictionless plates; three dofs at nodes where symmetry makes them zero stop rigid motion.

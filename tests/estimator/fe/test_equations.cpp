@@ -26,7 +26,8 @@ class Equations : public testing::TestWithParam<const Law*> {
     std::vector<double> values;
     for (const LawParameter& parameter : GetParam()->parameters())
       values.push_back(parameter.typical);
-    model_.emplace(make_annulus(gel_shape({5, 3, 2})), *GetParam(), ElasticOptions{.parameters = values});
+    model_.emplace(make_annulus(gel_shape({5, 3, 2})), *GetParam(),
+                   ElasticOptions{.parameters = values, .stiffness = lump(4.0)});
     state_ = shaken(model_->system(), model_->rest_state(), 0.4, 5);
     state_.pressure_kPa = 3.0;
   }

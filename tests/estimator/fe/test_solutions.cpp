@@ -244,6 +244,31 @@ TEST(Failure, ALoadBeyondTheLimitEndsWithTheLastEquilibriumAndTheHistory) {
   EXPECT_NE(solution.report.describe().find("was reached"), std::string::npos);
 }
 
+// A lump in one element through the wall: while the pressure had to follow its stiffness, what a point moves was off by more than it moves.
+TEST(UnevenStiffness, BendsACoarseMeshAsItBendsAFineOne) {
+  for (const double contrast : {0.3, 4.0}) {
+    ElasticModel coarse = gel(6.5, {8, 4, 1}, {.stiffness = lump(contrast)});
+    ElasticModel fine = gel(6.5, {14, 7, 3}, {.stiffness = lump(contrast)});
+    const Solution on_coarse = coarse.solve(4.0), on_fine = fine.solve(4.0);
+    ASSERT_TRUE(on_coarse.report.converged());
+    ASSERT_TRUE(on_fine.report.converged());
+    const double volume_mm3 = fine.system().cavity_volume_mm3(on_fine.state);
+    EXPECT_NEAR(coarse.system().cavity_volume_mm3(on_coarse.state), volume_mm3, 1e-3 * volume_mm3);
+    for (const double radius_mm : {23.0, 30.0, 36.4, 43.0, 49.0}) {
+      const Eigen::Vector3d X_mm =
+          radius_mm * Eigen::Vector3d(10.0, 35.0, 0.0).normalized() + 8.0 * Eigen::Vector3d::UnitZ();
+      const auto displacement_mm = [&](ElasticModel& model, const Solution& solution) {
+        const HermiteMesh& mesh = model.mesh();
+        const MaterialPoint place = PointLocator(mesh, mesh.reference()).find(X_mm).value().point;
+        return Eigen::Vector3d(mesh.value(solution.state.position_mm, place) - X_mm);
+      };
+      const Eigen::Vector3d truth_mm = displacement_mm(fine, on_fine);
+      EXPECT_LT((displacement_mm(coarse, on_coarse) - truth_mm).norm(), 0.1 * truth_mm.norm())
+          << contrast << " at " << radius_mm;
+    }
+  }
+}
+
 TEST(Failure, NoConvergenceIsReportedWithItsHistory) {
   ElasticModel model = gel(6.5, {6, 2, 1}, {.solve = {.newton_limit = 1, .least_load_fraction = 0.6}});
   const Solution solution = model.solve(20.0);
