@@ -10,6 +10,7 @@
 
 #include "estimator/cli/commands.hpp"
 #include "estimator/cli/interruption.hpp"
+#include "estimator/cli/output_files.hpp"
 #include "estimator/cli/study_images.hpp"
 #include "estimator/explain/explain_study.hpp"
 #include "estimator/explain/verdict/explained_study.hpp"
@@ -17,6 +18,7 @@
 #include "estimator/explain/verdict/learned_file.hpp"
 #include "estimator/io/whole_file.hpp"
 #include "estimator/model/study_effects.hpp"
+#include "estimator/reconstruction/study_reconstruction.hpp"
 #include "estimator/report/page.hpp"
 #include "estimator/report/report.hpp"
 #include "protocol/contract/input_error.hpp"
@@ -41,6 +43,7 @@ struct ExplainArguments {
   bool force = false;
   bool learn = false;   ///< a term even where the verdict is not unexplained
   bool strict = false;  ///< an answer that is no clear one is a failure
+  bool unexamined = false;
 };
 
 void print_progress(const std::string& text) {
@@ -129,6 +132,18 @@ struct MadeFolder {
   }
 };
 
+/// Whether a study's tags and points can be what they say; what is wrong with them is printed as `fit` prints it.
+bool can_be_true(const Study& study) {
+  print_progress("examining the data; --unexamined skips that");
+  const std::vector<Finding> findings = examine_measurement(study, read_measurement(study));
+  print_findings(findings, stderr);
+  if (!has_error(findings)) return true;
+  std::cerr << "diastole explain: the data cannot be what they say. `diastole reconstruct` shows them; "
+               "--unexamined "
+               "explains them nevertheless.\n";
+  return false;
+}
+
 ExitCode run_explain(const ExplainArguments& arguments, const CommandOutput& out) {
   if (arguments.folder.empty()) {
     throw InputError({"", "option -o", "is missing", "Name a folder for the result: -o out/."});
@@ -156,6 +171,8 @@ ExitCode run_explain(const ExplainArguments& arguments, const CommandOutput& out
   const Interruption interruption;
   explain::Explanation found;
   try {
+    const bool imaged = study.data.tags || study.data.points;
+    if (imaged && !arguments.unexamined && !can_be_true(study)) return ExitCode::bad_input;
     found = explain::explain_study(study, {.threads = arguments.threads,
                                            .propose = true,
                                            .learn = arguments.learn,
@@ -237,7 +254,8 @@ void add_explain(CommandLine& line, const ExplanationScorer& score) {
       "Exit code 0: done, whatever the verdict; 1: "
       "interrupted\n"
       "before there was one,\n"
-      "or with --strict ambiguous or unexplained; 2: unreadable input.");
+      "or with --strict ambiguous or unexplained; 2: unreadable input, or images that cannot be what "
+      "they say.");
   command
       ->add_option("STUDY", arguments->study, "study file with [data] runs; with --score the results' folder")
       ->required();
@@ -254,6 +272,8 @@ void add_explain(CommandLine& line, const ExplanationScorer& score) {
   command->add_flag(
       "--learn", arguments->learn,
       "learn a law beside what is found, whatever the verdict; without it only where that is unexplained");
+  command->add_flag("--unexamined", arguments->unexamined,
+                    "do not look beforehand for what is wrong with imaged data (docs/reconstruction.md)");
   command->add_flag("--strict", arguments->strict, "exit with 1 if the answer is ambiguous or unexplained");
   command->add_flag("--force", arguments->force, "replace files in the folder that hold something else");
   line.on_run(command, [arguments, score](const CommandOutput& out) {

@@ -191,6 +191,19 @@ void add_offset(std::vector<std::string>& remarks, const FitRecord& record, cons
                   deviations, values_with_offset(record, offset), 2 * std::abs(offset.value_kPa)));
 }
 
+/// A pressure that the motion contradicts.
+void add_pressures(std::vector<std::string>& remarks, const FitRecord& record, const FitOutcome& fit) {
+  if (!fit.converged()) return;
+  for (const FittedFrame& frame : record.frames) {
+    const double deviations = (frame.estimated_kPa - frame.measured_kPa) / frame.sigma_kPa;
+    if (!(std::abs(deviations) > telling_offset)) continue;
+    remarks.push_back(fmt::format(
+        "Frame {} was at {:.4g} kPa and by its motion at {:.4g} ({:+.1f} standard deviations): the "
+        "interval holds only if sigma_kPa does. Check when its pressure was read and with which zero.",
+        frame.frame, frame.measured_kPa, frame.estimated_kPa, deviations));
+  }
+}
+
 void add_undeformed(std::vector<std::string>& remarks, const FitRecord& record) {
   if (record.undeformed.points == 0) return;
   const double off =
@@ -314,6 +327,7 @@ std::vector<std::string> remarks_on(const FitRecord& record, const FitOutcome& f
   add_conditional_mean(remarks, record);
   add_regional(remarks, record);
   add_offset(remarks, record, fit);
+  add_pressures(remarks, record, fit);
   add_undeformed(remarks, record);
   add_identifiability(remarks, record);
   for (const std::string& combination : fit.undetermined)

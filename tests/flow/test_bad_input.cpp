@@ -1,13 +1,16 @@
 // Bad input to whole programs: the message says where, what and what to do; the exit code is 2 or 3; nothing
 // is left.
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <csignal>
+#include <cstdio>
 #include <functional>
 #include <ostream>
 #include <set>
+#include <sstream>
 
 #include "tests/flow/programs.hpp"
 
@@ -50,6 +53,20 @@ std::vector<std::string> scan(const Workplace& place, const std::vector<std::str
   std::vector<std::string> arguments = {"diastole", "scan", "gel.study.toml", "-o", "scan"};
   arguments.insert(arguments.end(), options.begin(), options.end());
   return arguments;
+}
+
+/// A table of frames with its third column, and the fourth, so many times as large.
+std::string pressures_times(double factor, const std::string& frames) {
+  std::istringstream lines(frames);
+  std::string made, line;
+  std::getline(lines, line);
+  made = line + "\n";
+  int frame = 0;
+  double time_s = 0, pressure_kPa = 0, sigma_kPa = 0;
+  while (std::getline(lines, line) &&
+         std::sscanf(line.c_str(), "%d,%lf,%lf,%lf", &frame, &time_s, &pressure_kPa, &sigma_kPa) == 4)
+    made += fmt::format("{},{},{},{}\n", frame, time_s, factor * pressure_kPa, factor * sigma_kPa);
+  return made;
 }
 
 /// Copies of one recording.
@@ -175,6 +192,17 @@ std::vector<BadInput> table() {
        },
        2,
        {"--period", "does not hold the phases", "from trigger to trigger"}},
+      {"ExplainImagesWhosePressuresAreInMmHg",
+       [](const Workplace& place) {
+         place.write("gel.frames.csv", pressures_times(7.5, source_text("examples/phantom-a.frames.csv")));
+         place.write("gel.tags.csv", source_text("examples/phantom-a.tags.csv"));
+         place.write("gel.study.toml", with(with(source_text("examples/phantom-a.study.toml"),
+                                                 "phantom-a.frames.csv", "gel.frames.csv"),
+                                            "phantom-a.tags.csv", "gel.tags.csv"));
+         return std::vector<std::string>{"diastole", "explain", "gel.study.toml", "-o", "found"};
+       },
+       2,
+       {"error: ", "column pressure_kPa", "may be in mmHg", "--unexamined explains them nevertheless"}},
       {"FitOfImagesThatAreNowhere",
        [](Place place) {
          std::vector<std::string> arguments = scan(place, {});

@@ -121,16 +121,41 @@ class Explainer {
     return most;
   }
 
-  /// Whether pressures, C1 or the radius must be farther off than their errors allow.
-  [[nodiscard]] static bool is_strained(const FieldFit& fit) {
-    return chi_square_tail(fit.priors.squaredNorm(), static_cast<double>(fit.priors.size())) < suspicious;
+  /// How seldom pressures, C1 and the radius are as far off as that by their errors.
+  [[nodiscard]] static double strain(const FieldFit& fit) {
+    return chi_square_tail(fit.priors.squaredNorm(), static_cast<double>(fit.priors.size()));
+  }
+  /// The frame whose pressure is furthest off by its error.
+  struct PressureStrain {
+    int frame = 0;
+    double measured_kPa = 0.0, needed_kPa = 0.0, sds = 0.0;
+  };
+  [[nodiscard]] PressureStrain worst_pressure(const FieldFit& fit) const {
+    PressureStrain worst;
+    for (size_t slot = 0; slot < fit.pressures_kPa.size(); ++slot) {
+      const int number = specimen_.rows().frames()[slot];
+      const Frame& frame = specimen_.field().measurement.frames[static_cast<size_t>(number)];
+      const double sds = (fit.pressures_kPa[slot] - frame.pressure_kPa) / std::max(frame.sigma_kPa, 1e-5);
+      if (std::abs(sds) > std::abs(worst.sds))
+        worst = {number, frame.pressure_kPa, fit.pressures_kPa[slot], sds};
+    }
+    return worst;
+  }
+  [[nodiscard]] std::string strain_words(const FieldFit& fit) const {
+    const PressureStrain worst = worst_pressure(fit);
+    return fmt::format(
+        " Frame {} was at {:.4g} kPa and would have to be at {:.4g} ({:+.1f} standard deviations): check "
+        "when its "
+        "pressure was read and with which zero, or state a larger sigma_kPa.",
+        worst.frame, worst.measured_kPa, worst.needed_kPa, worst.sds);
   }
 
   /// Where the best single effect leaves something, pairs are fitted; they count if one is clearly better.
   void try_pairs() {
     const FieldHypothesis single = hypotheses_.front();
     if (rival_.score > far_better * single.score) return;
-    if (structure_left(single.fit, mesh_error * single.gain).p_value > suspicious && !is_strained(single.fit))
+    if (structure_left(single.fit, mesh_error * single.gain).p_value > suspicious &&
+        strain(single.fit) > suspicious)
       return;
     report("fitting pairs of effects");
     std::vector<FieldHypothesis> pairs = specimen_.pairs(hypotheses_);
@@ -153,6 +178,14 @@ class Explainer {
     const bool effect_seen = single.p_value < significant && single.score > 0.0;
     if (effect_seen) try_pairs();
     FieldHypothesis& best = hypotheses_.front();
+    if (!effect_seen && before.p_value > significant && strain(base) < significant) {
+      only_strained_ = true;
+      out_.verdict = Verdict::unexplained;
+      out_.summary =
+          "The motion differs from the model's by noise alone, but only at loads that were not measured." +
+          strain_words(base) + " No effect of the library does that.";
+      return;
+    }
     if (!effect_seen && before.p_value > significant) {
       out_.verdict = Verdict::none;
       out_.summary = fmt::format(
@@ -245,6 +278,7 @@ class Explainer {
         ids.push_back(fmt::format("{}", fmt::join(set, " + ")));
       out_.summary += fmt::format(" These data cannot tell it from {}.", fmt::join(ids, ", "));
     }
+    if (strain(best.fit) < significant) out_.summary += strain_words(best.fit);
     chosen_ = &best;
   }
 
@@ -300,6 +334,16 @@ class Explainer {
 
   /// An inclusion's own place first; all of the specimen where no part of it stands out.
   void find_places() {
+    if (only_strained_) {
+      Misfit& place = out_.where.emplace_back();
+      place.port = "field";
+      place.channel = "pressures";
+      place.region = fmt::format("frame {}", worst_pressure(specimen_.base()).frame);
+      const Eigen::VectorXd& priors = specimen_.base().priors;
+      place.excess_chi2 = priors.squaredNorm() - static_cast<double>(priors.size());
+      place.p_value = strain(specimen_.base());
+      return;
+    }
     out_.where = misfit_regions(specimen_.mesh(), specimen_.rows(), specimen_.base(), 5);
     const bool included = chosen_ != nullptr && chosen_->has_inclusion();
     if (!included && !out_.where.empty()) return;
@@ -400,7 +444,8 @@ class Explainer {
   std::vector<FieldHypothesis> hypotheses_;
   LinearEvidence::Choice rival_;
   const FieldHypothesis* chosen_ = nullptr;
-  double widened_ = 1.0;  // of the tags' sigmas
+  bool only_strained_ = false;  // by the loads: the motion has no structure beyond noise
+  double widened_ = 1.0;        // of the tags' sigmas
   Explanation out_;
 };
 

@@ -100,6 +100,16 @@ TEST_P(SimulatedImages, AreExplained) {
   EXPECT_EQ(explanation.next_experiment.has_value(), explanation.verdict != Verdict::none);
 }
 
+TEST(SimulatedLoads, OneOfWhosePressuresIsWrongAreUnexplained) {
+  FieldCase field = simulated_tags({.C1_kPa = 9.8, .highest_kPa = 3.8, .seed = 101});
+  field.measurement.frames[3].pressure_kPa *= 1.1;
+  const Explanation explanation = explain_field(std::move(field), "pressure");
+  EXPECT_EQ(name_of(explanation.verdict), name_of(Verdict::unexplained)) << explanation.summary;
+  ASSERT_FALSE(explanation.where.empty());
+  EXPECT_EQ(explanation.where.front().channel, "pressures");
+  EXPECT_EQ(explanation.where.front().region, "frame 3");
+}
+
 std::string name_of_case(const testing::TestParamInfo<Hidden>& info) { return info.param.name; }
 INSTANTIATE_TEST_SUITE_P(Sets, SimulatedImages, testing::ValuesIn(hidden()), name_of_case);
 
