@@ -237,7 +237,7 @@ void add_explain(CommandLine& line, const ExplanationScorer& score) {
       "      where nothing is hidden, or names where nothing known is\n"
       "The verdict is one of\n"
       "  named        one set of effects explains the misfit; its parameters come with 90 % intervals\n"
-      "  ambiguous    these data cannot tell several sets apart\n"
+      "  ambiguous    these data cannot tell several sets apart, or one from nothing\n"
       "  unexplained  the misfit has structure that no known effect removes; where it sits is reported\n"
       "  none         nothing exceeds the model's own error\n"
       "OUT gets report.html, explanation.json for `diastole report`, and explained.study.toml: the study "

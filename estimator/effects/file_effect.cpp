@@ -291,6 +291,7 @@ rig::LossMaker loss_of(const Bound& bound) {
 }
 
 void add_law(const Bound& bound, rig::RigModel& model) {
+  if (bound.laws->file.laws.front().sets != Out::p_seen) model.has_corners = true;
   switch (bound.laws->file.laws.front().sets) {
     case Out::V_piston:
       // V_command is what was commanded: before the screw's own error.

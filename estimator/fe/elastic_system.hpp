@@ -43,7 +43,7 @@ struct ElasticOptions {
   /// Faces that the cavity pressure pushes on; default: the inner faces; see fluid_surface.hpp on free rims.
   std::optional<std::vector<ElementFace>> loaded{};
   MaterialAxesField material_axes{};         ///< default: the coordinate axes
-  StiffnessField stiffness{};                ///< of incompressible material; default: 1 everywhere
+  StiffnessField stiffness{};                ///< factor of the law's energy, not of K; default: 1 everywhere
   double volume_stiffness_kPa = 0.0;         ///< kappa of element_mechanics.hpp
   std::optional<double> bulk_modulus_kPa{};  ///< K of element_mechanics.hpp; default: incompressible
   SolveOptions solve{};                      ///< of ElasticModel

@@ -10,7 +10,7 @@
 // law's stress at rest: without it a pressure would have to follow m from point to point to balance m W, which a tri-linear one cannot, and the
 // material at rest would bulge within each element that an inclusion's edge goes through.
 //
-// Compressible material, of m = 1, adds  - (p - p0)^2 / (2 K) dV  with K the bulk modulus: p = p0 - K (J - 1) in the weak sense (a perturbed Lagrangian), so that the material's energy is
+// Compressible material adds  - (p - p0)^2 / (2 K) dV  with K the bulk modulus: p = p0 - K (J - 1) in the weak sense (a perturbed Lagrangian), so that the material's energy is
 // W - p0 (J - 1) + K/2 (J - 1)^2, and the incompressible one is its limit 1/K = 0.
 //
 // Given here are its gradient (residual)

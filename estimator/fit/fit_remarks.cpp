@@ -191,17 +191,27 @@ void add_offset(std::vector<std::string>& remarks, const FitRecord& record, cons
                   deviations, values_with_offset(record, offset), 2 * std::abs(offset.value_kPa)));
 }
 
-/// A pressure that the motion contradicts.
+/// Pressures that the motion contradicts: the furthest of them.
 void add_pressures(std::vector<std::string>& remarks, const FitRecord& record, const FitOutcome& fit) {
   if (!fit.converged()) return;
-  for (const FittedFrame& frame : record.frames) {
-    const double deviations = (frame.estimated_kPa - frame.measured_kPa) / frame.sigma_kPa;
-    if (!(std::abs(deviations) > telling_offset)) continue;
-    remarks.push_back(fmt::format(
-        "Frame {} was at {:.4g} kPa and by its motion at {:.4g} ({:+.1f} standard deviations): the "
-        "interval holds only if sigma_kPa does. Check when its pressure was read and with which zero.",
-        frame.frame, frame.measured_kPa, frame.estimated_kPa, deviations));
-  }
+  const double offset_kPa = record.pressure_offset_kPa ? record.pressure_offset_kPa->value : 0.0;
+  const auto deviations = [&](const FittedFrame& frame) {
+    return frame.sigma_kPa > 0.0 ? (frame.estimated_kPa + offset_kPa - frame.measured_kPa) / frame.sigma_kPa
+                                 : 0.0;
+  };
+  const auto size = [&](const FittedFrame& frame) { return std::abs(deviations(frame)); };
+  const auto worst = std::ranges::max_element(record.frames, {}, size);
+  if (worst == record.frames.end() || !(size(*worst) > telling_offset)) return;
+  const auto far = std::ranges::count_if(
+      record.frames, [&](const FittedFrame& frame) { return size(frame) > telling_offset; });
+  remarks.push_back(
+      fmt::format("The motion contradicts the pressure of {}: frame {} was at {:.4g} kPa and by its motion "
+                  "at {:.4g} ({:+.1f} "
+                  "standard deviations). The interval holds only if sigma_kPa does: check when the pressures "
+                  "were read, and with "
+                  "which zero.",
+                  far == 1 ? "one frame" : fmt::format("{} frames", far), worst->frame, worst->measured_kPa,
+                  worst->estimated_kPa + offset_kPa, deviations(*worst)));
 }
 
 void add_undeformed(std::vector<std::string>& remarks, const FitRecord& record) {

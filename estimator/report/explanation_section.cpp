@@ -204,12 +204,19 @@ void add_explained_field(Page& page, const Explanation& explanation) {
   }
 }
 
+bool may_be_nothing(const Explanation& e) {
+  return !e.effects.empty() &&
+         std::ranges::any_of(e.ambiguous_with, [](const auto& set) { return set.empty(); });
+}
+
 std::string verdict_note(const Explanation& e) {
   switch (e.verdict) {
     case Verdict::named:
       return "named: no other set of known effects fits these data";
     case Verdict::ambiguous:
-      return fmt::format("these data cannot tell {} sets apart", 1 + e.ambiguous_with.size());
+      return may_be_nothing(e)
+                 ? "too weak to name and too strong to be chance"
+                 : fmt::format("these data cannot tell {} sets apart", 1 + e.ambiguous_with.size());
     case Verdict::unexplained:
       return "something is there that no known effect removes";
     case Verdict::none:
@@ -224,7 +231,7 @@ std::string verdict_words(const Explanation& e) {
     case Verdict::named:
       return found;
     case Verdict::ambiguous:
-      return found + " or another";
+      return found + (may_be_nothing(e) ? " or nothing" : " or another");
     case Verdict::unexplained:
       return e.effects.empty() ? "unexplained" : found + ", and more";
     case Verdict::none:

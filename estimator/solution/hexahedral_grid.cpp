@@ -251,6 +251,8 @@ FebModel febio_model(const ElasticModel& model, std::span<const SolvedFrame> fra
                   .pressed = {},
                   .pressures_kPa = {}};
   if (system.chamber()) throw std::invalid_argument("the file holds no fluid around the body ([chamber])");
+  if (system.stiffness())
+    throw std::invalid_argument("the file holds one material, and an inclusion is of another stiffness");
   std::set<size_t> held;
   for (const auto* ends : {&faces.bottom, &faces.top}) {
     for (const ElementFace& face : *ends) {

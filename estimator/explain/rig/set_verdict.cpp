@@ -310,7 +310,8 @@ SetVerdict judge_sets(const rig::SessionProblem& problem, const SetSearch& searc
   if (out.confidence >= name_probability) {
     if (!predicted && !out.tone && bears_nothing_wrong(problem, *plain)) {
       out.verdict = Verdict::ambiguous;
-      out.confidence += search.probability[out.plain];
+      for (size_t k = 0; k < search.sets.size(); ++k)
+        if (is_plain(search.sets[k])) out.confidence += search.probability[k];
       out.ambiguous_with.push_back(plain->ids());
       return out;
     }

@@ -7,7 +7,8 @@
 // named by nobody: probabilities of sets that differ by them add. A set is named with a probability of
 // nine tenths; sets that are less certain are ambiguous. It has to have the same odds on waveforms that it was not fitted to
 // alone, against the model without it and against a smooth discrepancy of like freedom (held_out.hpp). Where even the best set needs a model's error larger than what is
-// known of it allows, the misfit is unexplained. That nothing is wrong is not said beside a tone that is as material (tone.hpp); a name stands beside it, since no effect
+// known of it allows, the misfit is unexplained; so it is where new waveforms do not bear the set, unless nothing is wrong with the rig without it: "this set or nothing".
+// That nothing is wrong is not said beside a tone that is as material (tone.hpp); a name stands beside it, since no effect
 // makes one.
 
 #include <optional>

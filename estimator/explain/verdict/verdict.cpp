@@ -67,6 +67,9 @@ std::string verdict_sentence(const Explanation& found) {
       if (ids.empty())
         return fmt::format("Too weak to name and too strong to be chance: perhaps {}, perhaps nothing.{}",
                            others, unsettled);
+      if (std::ranges::any_of(found.ambiguous_with, [](const auto& other) { return other.empty(); }))
+        return fmt::format("Too weak to name and too strong to be chance: perhaps {}, perhaps {}.{}",
+                           words_of(ids, ""), others, unsettled);
       return fmt::format("The model lacks something that these data cannot tell apart: {}, or {}.{}",
                          words_of(ids, ""), others, unsettled);
     case Verdict::unexplained:
