@@ -139,8 +139,7 @@ bool can_be_true(const Study& study) {
   print_findings(findings, stderr);
   if (!has_error(findings)) return true;
   std::cerr << "diastole explain: the data cannot be what they say. `diastole reconstruct` shows them; "
-               "--unexamined "
-               "explains them nevertheless.\n";
+               "--unexamined explains them nevertheless.\n";
   return false;
 }
 

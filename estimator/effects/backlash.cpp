@@ -90,6 +90,7 @@ Effect backlash_effect() {
             const double slack_mL = values[0] * (1.0 - values[1]);
             const double contact_s = -values[2] * std::expm1(-backlash_mL / least_play_mL);
             if (backlash_mL == 0.0) return;
+            model.has_corners = true;
             model.drive.emplace_back([=](rig::DriveTrace& trace, const rig::RunPlace&) {
               trace.volume_mL = smoothed(taken_up(backlash_mL, slack_mL, trace),
                                          normal_weights(std::max(contact_s / trace.step_s, 1e-3)));

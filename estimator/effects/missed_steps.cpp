@@ -18,6 +18,7 @@ void apply(EffectValues values, const EffectContext& context, rig::RigModel& mod
   if (lost_mL == 0.0 || moments.empty()) return;
   // Behind the screw's own error. A screw that loses turns errs by another angle from then on; what is lost behind it (a nut, a rod)
   // leaves the angle, as the recording r3-05 of world 2 does, whose pump's sensor shows it.
+  model.has_corners = true;
   model.drive.emplace_back([=](rig::DriveTrace& trace, const rig::RunPlace& place) {
     for (const ChangePoint& moment : moments) {
       if (moment.run != place.name) continue;

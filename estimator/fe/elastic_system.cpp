@@ -108,7 +108,7 @@ bool ElasticSystem::on_springs(const ElementFace& face) const {
 }
 
 double ElasticSystem::rest_pressure_kPa(size_t element) const {
-  return trace(law_->stress(undeformed, parameters(element))) / 3.0;
+  return law_->rest_pressure_kPa(parameters(element));
 }
 
 ElasticState ElasticSystem::rest_state() const {

@@ -80,8 +80,6 @@ class ElasticSystem {
   [[nodiscard]] const MaterialAxesField& material_axes() const { return material_axes_; }
   /// As it was made with; without set_stiffness().
   [[nodiscard]] const StiffnessField& stiffness() const { return stiffness_; }
-  /// p0 of element_mechanics.hpp.
-  [[nodiscard]] double rest_pressure_kPa(size_t element) const;
   [[nodiscard]] double volume_stiffness_kPa() const { return volume_stiffness_kPa_; }
   /// 1/K; 0 for incompressible material.
   [[nodiscard]] double compressibility_per_kPa() const { return compressibility_per_kPa_; }
@@ -157,6 +155,7 @@ class ElasticSystem {
   [[nodiscard]] NodeField node_field(std::span<const double> unknowns) const;
 
  private:
+  [[nodiscard]] double rest_pressure_kPa(size_t element) const;
   /// The largest over the elements: pressure at rest and stiffness against stretch there.
   [[nodiscard]] double material_stiffness_kPa() const;
   FactorResult inertia(const ElasticState& state, double probing_stiffness_kPa);

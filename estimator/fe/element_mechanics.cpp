@@ -216,6 +216,23 @@ std::array<double, corners> pressure_volume_mm3(const ReferenceElement& referenc
   return volume;
 }
 
+std::array<Matrix3d, gauss_points> element_stiffness_forces(const ReferenceElement& reference,
+                                                            const ElementField& position_mm, const Law& law,
+                                                            std::span<const double> parameters) {
+  const GaussMatrices gradients = gradients_at_points(position_mm);
+  const double rest_pressure_kPa = law.rest_pressure_kPa(parameters);
+  std::array<Matrix3d, gauss_points> forces;
+  for (size_t q = 0; q < gauss_points; ++q) {
+    const Matrix3d g = gradients.at(q);
+    const Matrix3d& t = reference[q].material_to_xi;
+    const Matrix3d f = g * t;
+    forces[q] =
+        reference[q].volume * f * full_matrix(law.stress(right_cauchy_green(f), parameters)) * t.transpose() -
+        rest_pressure_kPa * gauss_tables().weight[q] * cofactors(g);
+  }
+  return forces;
+}
+
 ElementField element_parameter_force(const ReferenceElement& reference, const ElementState& state,
                                      const Law& law, std::span<const double> parameters, size_t parameter) {
   const GaussMatrices gradients = gradients_at_points(state.position_mm);

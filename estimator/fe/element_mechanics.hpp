@@ -97,6 +97,13 @@ ElementResidual element_residual(const ReferenceElement& reference, const Elemen
 void element_tangent(const ReferenceElement& reference, const ElementState& state, const Law& law,
                      std::span<const double> parameters, ElementTangent& tangent);
 
+/// Derivative of the residual's Piola stresses by m at each Gauss point, times its volume, by xi: force_of() of them, weighted, is
+/// dR/dm of a field of m.
+std::array<Eigen::Matrix3d, gauss_points> element_stiffness_forces(const ReferenceElement& reference,
+                                                                   const ElementField& position_mm,
+                                                                   const Law& law,
+                                                                   std::span<const double> parameters);
+
 /// Undeformed volume that each corner's pressure stands for, mm^3: integral of psi_m dV.
 std::array<double, corners> pressure_volume_mm3(const ReferenceElement& reference);
 

@@ -53,9 +53,9 @@ PointFields point_fields(const ElasticSystem& system, const ElasticState& state,
       stiffness * full_matrix(system.law().stress(symmetric_part(to_material.transpose() * to_material),
                                                   system.parameters(point.element)));
   second(0, 0) += state.fibre_tension_kPa;
-  const double pressure_kPa = fields.lagrange_pressure_kPa -
-                              system.volume_stiffness_kPa() * (fields.volume_ratio - 1.0) -
-                              (1.0 - stiffness) * system.rest_pressure_kPa(point.element);
+  const double pressure_kPa =
+      fields.lagrange_pressure_kPa - system.volume_stiffness_kPa() * (fields.volume_ratio - 1.0) -
+      (1.0 - stiffness) * system.law().rest_pressure_kPa(system.parameters(point.element));
   fields.stress_kPa = to_material * second * to_material.transpose() / fields.volume_ratio -
                       pressure_kPa * Matrix3d::Identity();
   return fields;

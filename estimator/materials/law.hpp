@@ -80,6 +80,11 @@ class Law {
  public:
   virtual ~Law() = default;
 
+  /// The pressure that balances the law's stress at rest.
+  [[nodiscard]] double rest_pressure_kPa(std::span<const double> parameters) const {
+    return trace(stress(undeformed, parameters)) / 3.0;
+  }
+
   [[nodiscard]] virtual std::string_view name() const = 0;
   /// Whether directions of the material matter: the energy of a body turned within its axes is another.
   [[nodiscard]] virtual bool needs_axes() const = 0;

@@ -8,6 +8,7 @@
 
 #include "estimator/io/study_refusal.hpp"
 #include "estimator/model/changed_specimen.hpp"
+#include "estimator/model/inclusion_stiffness.hpp"
 #include "estimator/model/study_effects.hpp"
 #include "estimator/model/study_model.hpp"
 
@@ -89,11 +90,7 @@ FieldElasticity elasticity_of(const FieldModel& model, const HermiteMesh& mesh, 
   if (model.bond_stiffness_kPa_per_mm) let_ends_slip(mesh, *model.bond_stiffness_kPa_per_mm, options);
   if (model.chamber_stiffness_kPa_per_mL != 0.0)
     options.chamber = Chamber{.compliance_mL_per_kPa = 1.0 / model.chamber_stiffness_kPa_per_mL};
-  if (model.inclusion) {
-    options.stiffness = [inclusion = *model.inclusion](const Eigen::Vector3d& X_mm) {
-      return inclusion.stiffness({X_mm[0], X_mm[1], X_mm[2]});
-    };
-  }
+  if (model.inclusion) options.stiffness = stiffness_field(*model.inclusion);
   return result;
 }
 

@@ -97,10 +97,7 @@ ElasticModel ChangeableSpecimen::with(const FieldModel& change, const SolveOptio
       return axes;
     };
   }
-  if (change.inclusion)
-    options.stiffness = [inclusion = *change.inclusion](const Vector3d& X_mm) {
-      return inclusion.stiffness({X_mm[0], X_mm[1], X_mm[2]});
-    };
+  if (change.inclusion) options.stiffness = stiffness_field(*change.inclusion);
   ElasticModel body(parts_->body.mesh, *law, options);
   if (change.inclusion) {  // its means about the Gauss points
     const GaussNumbers numbers = stiffness_->of(*change.inclusion);

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "estimator/effects/field_model.hpp"
+#include "estimator/fe/element_mechanics.hpp"
 #include "estimator/fe/gauss_points.hpp"
 #include "estimator/mesh/hermite_mesh.hpp"
 
@@ -13,6 +14,13 @@ namespace diastole {
 
 /// Numbers at the Gauss points of each element.
 using GaussNumbers = std::vector<std::array<double, gauss_points>>;
+
+/// From place to place.
+inline StiffnessField stiffness_field(const Inclusion& inclusion) {
+  return [inclusion](const Eigen::Vector3d& X_mm) {
+    return inclusion.stiffness({X_mm[0], X_mm[1], X_mm[2]});
+  };
+}
 
 class InclusionStiffness {
  public:

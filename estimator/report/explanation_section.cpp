@@ -204,11 +204,6 @@ void add_explained_field(Page& page, const Explanation& explanation) {
   }
 }
 
-bool may_be_nothing(const Explanation& e) {
-  return !e.effects.empty() &&
-         std::ranges::any_of(e.ambiguous_with, [](const auto& set) { return set.empty(); });
-}
-
 std::string verdict_note(const Explanation& e) {
   switch (e.verdict) {
     case Verdict::named:

@@ -108,10 +108,8 @@ std::string make_report(std::span<const std::filesystem::path> files, size_t fra
                "neither a run file nor a record of a fit, an explanation, a Monte Carlo table, a "
                "reconstruction, a solution, tracked images, flow or fibres, nor a shear test",
            "Give files that `diastole run`, `simulate`, `montecarlo --cells`, `fit -o`, `explain -o`, "
-           "`solve` or "
-           "`reconstruct` with -o NAME.json, or `track`, `flow` or `fibres` with --record wrote, or the CSV "
-           "that "
-           "`diastole shear` reads."});
+           "`solve` or `reconstruct` with -o NAME.json, or `track`, `flow` or `fibres` with --record "
+           "wrote, or the CSV that `diastole shear` reads."});
     } else if (explain::is_explanation(content)) {
       explanations.push_back(explain::explanation_from_json(content, name));
       add(Kind::explanation, explanations.back(), add_explanation);

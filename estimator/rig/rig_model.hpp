@@ -111,7 +111,7 @@ struct RigModel {
   std::vector<DriveMap> turns;                 ///< from commanded steps to what the screw turns, in mL
   std::array<TurningError, 2> turning_errors;  ///< of the angle and of twice the angle, before `drive`
   std::vector<DriveMap> drive;                 ///< from there to the piston
-  bool has_corners = false;                    ///< a law of an effect may: it wants short steps
+  bool has_corners = false;                    ///< the motion or a law may have some, which want short steps
   double pump_gas_mL = 0.0;                    ///< at rest; between piston and hose
   double cavity_gas_mL = 0.0;                  ///< at rest; beside the specimen
   double gas_exponent =

@@ -18,10 +18,10 @@ constexpr double pump_step_s = 1.0 / 150.0, cavity_step_s = 1.0 / 100.0;
 /// Where something at the pump gives way or the motion has corners they are this many times shorter, and err by less than a fifth.
 constexpr double abrupt_steps = 2.0;
 
-/// A model that becomes abrupt by little moves what is shown by the longer steps' error, too.
+/// What is shown by a model with little of such a thing and by one with none differs by the longer steps' error, too.
 bool is_abrupt(const RigModel& model) {
   return model.has_corners || model.pump_gas_mL != 0.0 || model.pump_leak_mL_s_kPa != 0.0 ||
-         !model.pump_leaks.empty() || !model.drive.empty();
+         !model.pump_leaks.empty();
 }
 
 constexpr size_t modulus_at = 0, cavity_offset_at = 1, pump_offset_at = 2;

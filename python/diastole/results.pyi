@@ -188,6 +188,7 @@ class Comparison(Record):
     differences: list[Difference]
     overlays: list[Overlay]
     remarks: list[str]
+    is_tested: bool
     beyond_noise: bool
     page: str | None
 

@@ -155,8 +155,7 @@ class Explainer {
     const PressureStrain worst = worst_pressure(fit);
     return fmt::format(
         " Frame {} was at {:.4g} kPa and would have to be at {:.4g} ({:+.1f} standard deviations): check "
-        "when its "
-        "pressure was read and with which zero, or state a larger sigma_kPa.",
+        "when its pressure was read and with which zero, or state a larger sigma_kPa.",
         worst.frame, worst.measured_kPa, worst.needed_kPa, worst.sds);
   }
 
@@ -188,20 +187,19 @@ class Explainer {
     const bool effect_seen = single.p_value < significant && single.score > 0.0;
     if (effect_seen) try_pairs();
     FieldHypothesis& best = hypotheses_.front();
-    if (!effect_seen && before.p_value > significant && strain(base) < significant) {
-      only_strained_ = true;
-      out_.verdict = Verdict::unexplained;
-      out_.summary =
-          "The motion differs from the model's by noise alone, but only at loads that were not measured." +
-          strain_words(base) + " No effect of the library does that.";
-      return;
-    }
     if (!effect_seen && before.p_value > significant) {
-      out_.verdict = Verdict::none;
-      out_.summary = fmt::format(
-          "Nothing exceeds the noise: {} {} residuals of the motion; the nearest effect, {}, would gain "
-          "{:.1f} of chi2.",
-          law_before(), base.residuals.size(), best.name(), best.gain);
+      only_strained_ = strain(base) < significant;
+      out_.verdict = only_strained_ ? Verdict::unexplained : Verdict::none;
+      out_.summary =
+          only_strained_
+              ? fmt::format(
+                    "The motion differs from the model's by noise alone, but only at loads that were not "
+                    "measured.{} No effect of the library does that.",
+                    strain_words(base))
+              : fmt::format(
+                    "Nothing exceeds the noise: {} {} residuals of the motion; the nearest effect, {}, "
+                    "would gain {:.1f} of chi2.",
+                    law_before(), base.residuals.size(), best.name(), best.gain);
       return;
     }
     if (effect_seen) specimen_.settle(best);

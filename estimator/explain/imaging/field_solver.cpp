@@ -21,26 +21,6 @@ AnnulusShape shape_of(const FieldModel& model, const std::array<size_t, 3>& elem
   return shape;
 }
 
-/// The law's share of - (first Piola-Kirchhoff stress) at the Gauss points, by xi and times their volumes.
-std::array<Eigen::Matrix3d, gauss_points> law_forces(const ElasticSystem& system, const ElasticState& state,
-                                                     size_t element) {
-  const HermiteMesh& mesh = system.mesh();
-  const ReferenceElement reference = make_reference_element(mesh, element, system.material_axes());
-  const GaussMatrices gradients = gradients_at_points(mesh.gather(element, state.position_mm));
-  const double rest_pressure_kPa = system.rest_pressure_kPa(element);
-  std::array<Eigen::Matrix3d, gauss_points> forces;
-  for (size_t q = 0; q < gauss_points; ++q) {
-    const Eigen::Matrix3d& t = reference[q].material_to_xi;
-    const Eigen::Matrix3d g = gradients.at(q);
-    const Eigen::Matrix3d f = g * t;
-    const SymmetricTensor<double> stress =
-        system.law().stress(symmetric_part(f.transpose() * f), system.parameters(element));
-    const Eigen::Matrix3d growth = gauss_tables().weight[q] * g.determinant() * g.inverse().transpose();
-    forces[q] = rest_pressure_kPa * growth - reference[q].volume * f * full_matrix(stress) * t.transpose();
-  }
-  return forces;
-}
-
 }  // namespace
 
 std::unique_ptr<ElasticModel> FieldSolver::build(const FieldModel& model) const {
@@ -184,10 +164,13 @@ std::vector<std::vector<double>> stiffness_sides(const ElasticSystem& system, co
     for (size_t i = 0; i < fields.size(); ++i) {
       const std::array<double, gauss_points>& here = fields[i][e];
       if (std::ranges::all_of(here, [](double value) { return std::abs(value) <= least; })) continue;
-      if (!forces) forces = law_forces(system, state, e);
+      if (!forces)
+        forces =
+            element_stiffness_forces(make_reference_element(mesh, e, system.material_axes()),
+                                     mesh.gather(e, state.position_mm), system.law(), system.parameters(e));
       GaussMatrices weighted;
       for (size_t q = 0; q < gauss_points; ++q)
-        weighted.set(q, here[q] * (*forces)[q]);
+        weighted.set(q, -here[q] * (*forces)[q]);
       system.equations().add_force(e, force_of(weighted), sides[i]);
     }
   }

@@ -36,6 +36,11 @@ bool is_settled(const std::vector<SearchEnd>& searches) {
       searches, [](const SearchEnd& search) { return inference::is_settled(search.termination); });
 }
 
+bool may_be_nothing(const Explanation& found) {
+  return !found.effects.empty() &&
+         std::ranges::any_of(found.ambiguous_with, [](const auto& set) { return set.empty(); });
+}
+
 namespace {
 
 std::string verdict_sentence(const Explanation& found) {
@@ -67,7 +72,7 @@ std::string verdict_sentence(const Explanation& found) {
       if (ids.empty())
         return fmt::format("Too weak to name and too strong to be chance: perhaps {}, perhaps nothing.{}",
                            others, unsettled);
-      if (std::ranges::any_of(found.ambiguous_with, [](const auto& other) { return other.empty(); }))
+      if (may_be_nothing(found))
         return fmt::format("Too weak to name and too strong to be chance: perhaps {}, perhaps {}.{}",
                            words_of(ids, ""), others, unsettled);
       return fmt::format("The model lacks something that these data cannot tell apart: {}, or {}.{}",

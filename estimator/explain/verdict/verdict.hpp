@@ -12,6 +12,9 @@ std::vector<std::string> ids_of(const std::vector<FoundEffect>& effects);
 /// "hose-compliance + backlash"; `none` where there is no id.
 std::string words_of(const std::vector<std::string>& ids, const char* none);
 
+/// Whether the sets that are left open hold an effect and nothing at all.
+bool may_be_nothing(const Explanation& found);
+
 /// A few sentences for people; with one for each search that did not settle.
 std::string summary_of(const Explanation& found);
 

@@ -9,6 +9,7 @@
 #include "estimator/fe/elastic_system.hpp"
 #include "estimator/fe/gauss_points.hpp"
 #include "estimator/mesh/annulus.hpp"
+#include "estimator/model/inclusion_stiffness.hpp"
 #include "estimator/motion_residuals/tag_match.hpp"
 
 namespace diastole::explain {
@@ -110,9 +111,7 @@ Motion motion_around(const SimulatedTags& wanted, const Inclusion& inclusion) {
     grid.radii_mm.push_back(std::lerp(body.inner_radius_mm, body.outer_radius_mm, depth));
   ElasticOptions options;
   options.parameters = {wanted.C1_kPa};
-  options.stiffness = [inclusion](const Vector3d& X_mm) {
-    return inclusion.stiffness({X_mm[0], X_mm[1], X_mm[2]});
-  };
+  options.stiffness = stiffness_field(inclusion);
   ElasticModel model(make_annulus_on(grid), *find_law("neo-hookean"), std::move(options));
   Motion motion{model.mesh(), {}};
   Solution solution = model.solve(shares[0] * wanted.highest_kPa);

@@ -65,6 +65,17 @@ TEST(PointFields, OfACylinderFollowTheClosedForm) {
   EXPECT_NEAR(hoop_force, pressure_kPa * exact.a_mm, 0.002 * hoop_force);
 }
 
+TEST(PointFields, OfALumpAtRestHaveNoStress) {
+  ElasticModel model = gel(6.5, {5, 3, 2}, {.stiffness = lump(4.0)});
+  double stiffest = 1.0;
+  for (size_t element = 0; element < model.mesh().element_count(); ++element) {
+    const PointFields fields = point_fields(model.system(), model.rest_state(), {element, {0.4, 0.6, 0.3}});
+    stiffest = std::max(stiffest, model.system().stiffness()(fields.reference_mm));
+    EXPECT_LT(fields.stress_kPa.norm(), 1e-10);
+  }
+  EXPECT_GT(stiffest, 2.0);
+}
+
 TEST(PointFields, CarryThePressureToTheWallsAsTraction) {
   constexpr double pressure_kPa = 6.0;
   std::vector<double> misses_kPa;

@@ -86,6 +86,22 @@ TEST_F(CoarseStudy, NoiseThatIsStatedTooSmallOrTooLargeIsSaid) {
   EXPECT_THAT(fit().remarks, Contains(HasSubstr("smaller than the stated noise")));
 }
 
+TEST_F(CoarseStudy, APressureThatTheMotionContradictsIsSaidAndAnOffsetIsNone) {
+  const auto contradicted = Contains(HasSubstr("contradicts the pressure of one frame: frame 2 was at"));
+  EXPECT_THAT(fit().remarks, Not(Contains(HasSubstr("contradicts the pressure"))));
+  const Measurement sound = measurement_;
+  measurement_.frames[2].pressure_kPa += 10.0 * measurement_.frames[2].sigma_kPa;
+  EXPECT_THAT(fit().remarks, contradicted);
+  measurement_ = sound;
+  for (size_t frame = 1; frame < measurement_.frames.size(); ++frame)
+    measurement_.frames[frame].pressure_kPa += 10.0 * measurement_.frames[frame].sigma_kPa;
+  StudyFitOptions options;
+  options.pressure_offset_sigma_kPa = 20.0 * measurement_.frames[1].sigma_kPa;
+  const FitRecord with_offset = fit_study(study_, measurement_, options);
+  ASSERT_TRUE(with_offset.pressure_offset_kPa);
+  EXPECT_THAT(with_offset.remarks, Not(Contains(HasSubstr("contradicts the pressure"))));
+}
+
 TEST_F(CoarseStudy, ErrorsOfTheWallsAreNotBlamedOnThePressures) {
   for (Frame& frame : measurement_.frames)
     frame.sigma_kPa = 0;

@@ -36,6 +36,8 @@ template <class Visit, IsRecord<Comparison> Record>
 void each_member(Visit&& visit, Record& comparison) {
   visit("runs", comparison.files);
   DIASTOLE_VISIT(visit, comparison, differences, overlays, remarks)
+  const bool is_tested = comparison.is_tested();
+  visit("is_tested", is_tested);
   const bool beyond_noise = comparison.beyond_noise();
   visit("beyond_noise", beyond_noise);
 }
