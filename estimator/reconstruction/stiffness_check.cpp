@@ -103,7 +103,8 @@ std::optional<Finding> pressure_unit_finding(const Study& study, const ApparentS
         fmt::format("{}in {} ({} would be about {:.2g} kPa: divide by {:g})", guesses.empty() ? "" : ", or ",
                     unit.name, name, apparent.ratio / unit.a_kPa * parameter.start, unit.a_kPa);
   }
-  if (!guesses.empty()) finding.remedy = "The pressures may be " + guesses + ".";
+  if (!guesses.empty())
+    finding.remedy = "The pressures may be " + guesses + ". If their unit is right, widen the bounds.";
   return finding;
 }
 
