@@ -73,11 +73,22 @@ struct EstimatedValue {
   std::optional<VarianceShares> shares = {};  ///< none on a bound
 };
 
+/// What everything but its reading says of a frame's pressure, and how far the reading is from that: the deleted residual
+/// (Cook and Weisberg, Residuals and Influence in Regression, 1982, 2.2.1). In terms of what the sensor would read, an offset
+/// included; the error holds how the residuals spread, and neither --fibre-sigma-deg nor --geometry-sigma-mm.
+struct PressureByMotion {
+  double value_kPa;
+  double se_kPa;
+  double reading_off;  ///< reading less value, in standard deviations of the two together
+};
+
 struct EstimatedFrame {
   int number;
   Frame load;
   double pressure_kPa;
   double se_kPa;  ///< 0 when exactly known
+  std::optional<PressureByMotion>
+      by_motion;  ///< absent where the pressure is exactly known, or only the reading tells it
   FoundPoints found;
   Eigen::VectorXd weighted;  ///< residuals / sigma
   Eigen::VectorXd unweighted_mm;

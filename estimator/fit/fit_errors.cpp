@@ -47,6 +47,7 @@ EstimatedFrame estimated(const JointProblem::LoadedFrame& frame, const Eigen::Ve
           .load = frame.load,
           .pressure_kPa = unknown ? q[*unknown] : frame.load.pressure_kPa,
           .se_kPa = unknown ? std::sqrt(covariance(*unknown, *unknown)) : 0.0,
+          .by_motion = {},
           .found = frame.residuals.found(),
           .weighted = frame.residuals.residuals(),
           .unweighted_mm = frame.residuals.unweighted_mm(),
@@ -237,6 +238,20 @@ std::map<std::string, Eigen::VectorXd> consider_errors(FitOutcome& outcome, Join
   return added;
 }
 
+/// `row`: of the frame's reading. `inverse` of the linearised cost, and `variance_factor` of its residuals.
+std::optional<PressureByMotion> pressure_by_motion(const Frame& load, const LinearisedCost& cost,
+                                                   Eigen::Index row, const Eigen::MatrixXd& inverse,
+                                                   double variance_factor) {
+  constexpr double all = 1.0 - 1e-6;  // of the estimate: the rest is rounding
+  const Eigen::VectorXd derivatives = cost.jacobian.row(row).transpose();
+  const double leverage = derivatives.dot(inverse * derivatives);
+  if (!(leverage < all)) return std::nullopt;
+  const double off = -cost.residuals[row] / (1.0 - leverage);
+  const double variance = std::max(1.0, variance_factor) * leverage / (1.0 - leverage);
+  return PressureByMotion{load.pressure_kPa - off * load.sigma_kPa, std::sqrt(variance) * load.sigma_kPa,
+                          off / std::sqrt(1.0 + variance)};
+}
+
 }  // namespace
 
 QuadraticModel quadratic_model(JointProblem& problem, const Eigen::VectorXd& q) {
@@ -292,12 +307,11 @@ Eigen::MatrixXd estimate_errors(FitOutcome& outcome, JointProblem& problem, cons
   }
   const Eigen::MatrixXd data_jacobian = cost.jacobian.topRows(outcome.rows);
   outcome.unknowns = inference::effective_count(outcome.covariance, data_jacobian);
+  const double spread =
+      problem.robust() ? cost.spread : outcome.chi2 / (static_cast<double>(outcome.rows) - outcome.unknowns);
   if (!problem.offset_unknown()) {
     Eigen::VectorXd column = problem.offset_column();
     column.head(motion.size()) *= cost.motion_scale;
-    const double spread = problem.robust()
-                              ? cost.spread
-                              : outcome.chi2 / (static_cast<double>(outcome.rows) - outcome.unknowns);
     outcome.offset_score = offset_score(problem, q, {cost.jacobian, cost.residuals, is_free, spread}, column);
   }
   // Smoothness and patches widen what is known with the pressures and without them alike.
@@ -308,7 +322,7 @@ Eigen::MatrixXd estimate_errors(FitOutcome& outcome, JointProblem& problem, cons
   const Eigen::VectorXd of_smoothness = outcome.covariance.diagonal();
   widen_for_patches(outcome, problem, cost, is_free);
   const Eigen::VectorXd of_data = outcome.covariance.diagonal();
-  const std::map<std::string, Eigen::VectorXd> added =
+  const std::map<std::string, Eigen::VectorXd> considered =
       consider_errors(outcome, problem, cost, curvature.matrix);
   Eigen::MatrixXd in_coordinates = outcome.covariance;
   for (Eigen::Index i = 0; i < problem.values(); ++i) {
@@ -318,8 +332,8 @@ Eigen::MatrixXd estimate_errors(FitOutcome& outcome, JointProblem& problem, cons
                                        std::isfinite(variance) ? variance - pressures : exact[i]));
     if (variance > 0 && std::isfinite(outcome.values.back().se)) {
       const auto share = [&](const char* source) {
-        const auto found = added.find(source);
-        return found == added.end() ? 0.0 : found->second[i] / variance;
+        const auto found = considered.find(source);
+        return found == considered.end() ? 0.0 : found->second[i] / variance;
       };
       outcome.values.back().shares = VarianceShares{(of_data[i] - pressures) / variance, pressures / variance,
                                                     share("fibres"), share("geometry")};
@@ -341,10 +355,14 @@ Eigen::MatrixXd estimate_errors(FitOutcome& outcome, JointProblem& problem, cons
         problem.imaged_pressure_at(q), unknown ? std::sqrt(outcome.covariance(*unknown, *unknown)) : 0.0};
   }
   if (problem.work()) outcome.stored_energy_mJ = problem.stored_energy_mJ();
+  Eigen::Index reading = motion.size();
   for (const JointProblem::LoadedFrame& frame : problem.frames()) {
     outcome.frames.push_back(estimated(frame, q, outcome.covariance));
-    if (outcome.pressure_offset && !frame.pressure_unknown)
-      outcome.frames.back().pressure_kPa -= outcome.pressure_offset->value_kPa;
+    EstimatedFrame& added = outcome.frames.back();
+    if (frame.pressure_unknown)
+      added.by_motion = pressure_by_motion(frame.load, cost, reading++, curvature.matrix, spread);
+    else if (outcome.pressure_offset)
+      added.pressure_kPa -= outcome.pressure_offset->value_kPa;
   }
   return in_coordinates;
 }

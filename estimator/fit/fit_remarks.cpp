@@ -192,26 +192,22 @@ void add_offset(std::vector<std::string>& remarks, const FitRecord& record, cons
 }
 
 /// Pressures that the motion contradicts: the furthest of them.
-void add_pressures(std::vector<std::string>& remarks, const FitRecord& record, const FitOutcome& fit) {
+void add_pressures(std::vector<std::string>& remarks, const FitOutcome& fit) {
   if (!fit.converged()) return;
-  const double offset_kPa = record.pressure_offset_kPa ? record.pressure_offset_kPa->value : 0.0;
-  const auto deviations = [&](const FittedFrame& frame) {
-    return frame.sigma_kPa > 0.0 ? (frame.estimated_kPa + offset_kPa - frame.measured_kPa) / frame.sigma_kPa
-                                 : 0.0;
+  const auto off = [](const EstimatedFrame& frame) {
+    return frame.by_motion ? std::abs(frame.by_motion->reading_off) : 0.0;
   };
-  const auto size = [&](const FittedFrame& frame) { return std::abs(deviations(frame)); };
-  const auto worst = std::ranges::max_element(record.frames, {}, size);
-  if (worst == record.frames.end() || !(size(*worst) > telling_offset)) return;
-  const auto far = std::ranges::count_if(
-      record.frames, [&](const FittedFrame& frame) { return size(frame) > telling_offset; });
-  remarks.push_back(
-      fmt::format("The motion contradicts the pressure of {}: frame {} was at {:.4g} kPa and by its motion "
-                  "at {:.4g} ({:+.1f} "
-                  "standard deviations). The interval holds only if sigma_kPa does: check when the pressures "
-                  "were read, and with "
-                  "which zero.",
-                  far == 1 ? "one frame" : fmt::format("{} frames", far), worst->frame, worst->measured_kPa,
-                  worst->estimated_kPa + offset_kPa, deviations(*worst)));
+  const auto contradicted =
+      std::ranges::count_if(fit.frames, [&](const auto& frame) { return off(frame) > telling_offset; });
+  if (contradicted == 0) return;
+  const EstimatedFrame& worst = *std::ranges::max_element(fit.frames, {}, off);
+  remarks.push_back(fmt::format(
+      "The motion contradicts the pressure of {}: frame {} was read at {:.4g} kPa and by its "
+      "motion was at {:.4g} ± {:.2g} ({:.1f} standard deviations). The interval holds only if "
+      "sigma_kPa does: check when the pressures were read, with which zero, and that a finer mesh "
+      "gives the same.",
+      contradicted == 1 ? "one frame" : fmt::format("{} frames", contradicted), worst.number,
+      worst.load.pressure_kPa, worst.by_motion->value_kPa, worst.by_motion->se_kPa, off(worst)));
 }
 
 void add_undeformed(std::vector<std::string>& remarks, const FitRecord& record) {
@@ -337,7 +333,7 @@ std::vector<std::string> remarks_on(const FitRecord& record, const FitOutcome& f
   add_conditional_mean(remarks, record);
   add_regional(remarks, record);
   add_offset(remarks, record, fit);
-  add_pressures(remarks, record, fit);
+  add_pressures(remarks, fit);
   add_undeformed(remarks, record);
   add_identifiability(remarks, record);
   for (const std::string& combination : fit.undetermined)
