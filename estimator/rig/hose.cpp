@@ -27,6 +27,12 @@ double shear_decay(double reynolds) {
   return share * turbulent + (1.0 - share) * laminar;
 }
 
+double memory_decay(double reynolds) {
+  const double share = turbulence(reynolds);
+  return share == 0.0 ? 0.0
+                      : share * std::pow(reynolds, std::log10(15.29 / std::pow(reynolds, 0.0567))) / 12.86;
+}
+
 }  // namespace
 
 double Hose::area_mm2() const { return std::numbers::pi / 4.0 * bore_mm * bore_mm; }
@@ -44,7 +50,7 @@ WallFriction::WallFriction(const Hose& hose)
       viscosity_(hose.viscosity_Pa_s),
       bore_m_(hose.bore_mm * 1e-3),
       wave_speed_m_s_(hose.wave_speed_m_s),
-      unsteady_(hose.unsteady_friction),
+      brunone_(hose.brunone),
       to_place_(density_ * bore_m_ / (viscosity_ * table_step)) {
   make_table();
 }
@@ -52,23 +58,28 @@ WallFriction::WallFriction(const Hose& hose)
 void WallFriction::make_table() {
   const double small = 1e-3 / to_place_;
   const auto inertia = [&](double reynolds) {
-    return unsteady_ ? density_ * std::sqrt(shear_decay(reynolds)) / 4.0 * 1e-3 : 0.0;
+    return brunone_ * density_ * std::sqrt(shear_decay(reynolds)) / 4.0 * 1e-3;
   };
+  const double spreading = 4.0 * viscosity_ / (density_ * bore_m_ * bore_m_);
   const auto growth = [&](double speed) {
     return (steady_kPa_per_m(speed + small) - steady_kPa_per_m(speed - small)) / 2e-3;
   };
   table_.reserve(table_size);
-  double left = 0.0, left_growth = growth(0.0), left_inertia = inertia(0.0);
+  double left = 0.0, left_growth = growth(0.0), left_inertia = inertia(0.0), left_forgetting = 0.0;
   for (size_t k = 1; k <= table_size; ++k) {
     const double speed = static_cast<double>(k) / to_place_;
     const double right = steady_kPa_per_m(speed), right_growth = growth(speed);
     const double right_inertia = inertia(table_step * static_cast<double>(k));
+    const double right_forgetting = spreading * memory_decay(table_step * static_cast<double>(k));
     const double rise = right - left;
     table_.push_back({{left, left_growth, 3.0 * rise - 2.0 * left_growth - right_growth,
                        left_growth + right_growth - 2.0 * rise},
                       left_inertia,
-                      right_inertia - left_inertia});
+                      right_inertia - left_inertia,
+                      left_forgetting,
+                      right_forgetting - left_forgetting});
     left = right, left_growth = right_growth, left_inertia = right_inertia;
+    left_forgetting = right_forgetting;
   }
 }
 
@@ -98,9 +109,11 @@ WallFriction::Drag WallFriction::drag(double speed_m_s, double stretching) const
     const double s = place - static_cast<double>(k);
     steady = value + s * (slope + s * (square + s * cube));
     drag.by_rate = piece.inertia + s * piece.inertia_rise;
+    drag.forgetting = piece.forgetting + s * piece.forgetting_rise;
   } else {
     steady = steady_kPa_per_m(speed);
     drag.by_rate = table_.back().inertia + table_.back().inertia_rise;
+    drag.forgetting = table_.back().forgetting + table_.back().forgetting_rise;
   }
   const double turning = speed_m_s / (speed + 1e-4);
   drag.still_kPa_per_m =

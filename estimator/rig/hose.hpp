@@ -21,8 +21,10 @@ struct Hose {
   double inertance_factor = 1.0;  ///< the fluid's inertia over that of a plain tube of this bore
   double loss_coefficient = 1.5;  ///< K: entries and bends take K rho v |v| / 2
   double loss_at_cavity =
-      2.0 / 3.0;  ///< part of K: a jet loses all its energy (1.0), an entry half of it (0.5)
-  bool unsteady_friction = true;
+      2.0 / 3.0;         ///< part of K: a jet loses all its energy (1.0), an entry half of it (0.5)
+  double brunone = 1.0;  ///< of the unsteady friction by dv/dt and dv/dx: part of what WallFriction says
+  double zielke =
+      0.0;  ///< of the one that remembers (boundary_layer.hpp): part of what a smooth round bore has
 
   [[nodiscard]] double area_mm2() const;
   /// rho L / A times the factor, kPa s^2/mL: pressure by acceleration of the flow.
@@ -38,6 +40,8 @@ struct Hose {
 /// Unsteady part: B. Brunone et al., as J. Vitkovsky et al. (2000) write it for both directions of flow,
 /// k rho / 2 (dv/dt + c sign(v) |dv/dx|), k = sqrt(C*) / 2; C* is A. Vardy and J. Brown's shear decay coefficient,
 /// 0.00476 where laminar, 7.41 / Re^log10(14.3 / Re^0.05) where turbulent, with the same weight between.
+/// Forgetting: B* viscosity / (density radius^2), B* = Re^log10(15.29 / Re^0.0567) / 12.86 where turbulent (A. Vardy and J. Brown,
+/// J. Sound Vib. 259 (2003) 1011).
 class WallFriction {
  public:
   explicit WallFriction(const Hose& hose);
@@ -48,7 +52,8 @@ class WallFriction {
   /// The gradient as it depends on dv/dt: still + by_rate dv/dt.
   struct Drag {
     double still_kPa_per_m = 0.0;
-    double by_rate = 0.0;  ///< kPa s^2/m^2
+    double by_rate = 0.0;     ///< kPa s^2/m^2
+    double forgetting = 0.0;  ///< 1/s: how much faster turbulence wipes out the boundary layer's memory
   };
   /// Interpolated in Re, within 1e-4. `stretching` is dv/dx, 1/s.
   [[nodiscard]] Drag drag(double speed_m_s, double stretching) const;
@@ -58,11 +63,11 @@ class WallFriction {
   struct Piece {
     double steady_kPa_per_m[4];  // NOLINT: read some hundred million times
     double inertia, inertia_rise;
+    double forgetting, forgetting_rise;
   };
   void make_table();
 
-  double density_, viscosity_, bore_m_, wave_speed_m_s_;
-  bool unsteady_;
+  double density_, viscosity_, bore_m_, wave_speed_m_s_, brunone_;
   double to_place_;  ///< of a speed in the table
   std::vector<Piece> table_;
 };

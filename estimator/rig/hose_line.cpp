@@ -58,7 +58,8 @@ HoseLine::HoseLine(const Hose& hose, const LineOptions& options)
       to_speed_(1.0 / hose.area_mm2()),
       pump_stiffness_(options.pump_stiffness.value_or(0.0)),
       pump_resistance_(options.pump_resistance.value_or(0.0)),
-      friction_(hose) {
+      friction_(hose),
+      layer_(hose, options.step_s) {
   make_equations();
   make_step(options.step_s);
   make_drag(hose.length_m);
@@ -144,10 +145,12 @@ void HoseLine::make_drag(double length_m) {
   Eigen::MatrixXd speed = Eigen::MatrixXd::Zero(points, count_);
   Eigen::MatrixXd both = Eigen::MatrixXd::Zero(2 * rows, count_);
   Eigen::MatrixXd weight = Eigen::MatrixXd::Zero(count_, points);
+  point_part_.setZero(points);
   point_weight_.setZero(points);
   for (Index g = 0; g < points; ++g) {
     const double x = rule.place[static_cast<size_t>(g)];
-    point_weight_[g] = rule.weight[static_cast<size_t>(g)] * length_m;
+    point_part_[g] = rule.weight[static_cast<size_t>(g)];
+    point_weight_[g] = point_part_[g] * length_m;
     if (yields_) speed(g, 0) = to_speed_;
     speed(g, first_) = -x * to_speed_;
     both(rows + g, first_) = -to_speed_ / length_m;
@@ -171,7 +174,21 @@ void HoseLine::make_drag(double length_m) {
   drag_.resize(static_cast<size_t>(points));
 }
 
-void HoseLine::forces(const EndLoads& loads, int passes) {
+void HoseLine::remember(bool is_settled) {
+  double speed = 0.0, forgetting = 0.0;
+  for (Index g = 0; g < point_weight_.size(); ++g) {
+    speed += point_part_[g] * speed_[g];
+    forgetting += point_part_[g] * drag_[static_cast<size_t>(g)].forgetting;
+  }
+  if (is_settled) layer_.pass(speed, forgetting);
+  const double gradient = is_settled ? layer_.drag() : layer_.drag_after(speed, forgetting);
+  for (WallFriction::Drag& drag : drag_) {
+    drag.still_kPa_per_m += gradient;
+    drag.by_rate += layer_.inertia();
+  }
+}
+
+void HoseLine::forces(const EndLoads& loads, int passes, bool is_settled) {
   for (Index i = 0; i < count_; ++i)
     bare_[i] = cavity_shape_[i] * loads.cavity_kPa - piston_mass_[i] * loads.piston_acceleration;
   if (yields_) bare_[0] += loads.pump_kPa;
@@ -182,6 +199,7 @@ void HoseLine::forces(const EndLoads& loads, int passes) {
     speed_[g] += piston_flow_ * to_speed_;
     drag_[static_cast<size_t>(g)] = friction_.drag(speed_[g], speed_[stretches + g]);
   }
+  if (layer_.exists()) remember(is_settled);
   rate_by_state_.times(state_, bare_rate_);
   rate_by_force_.add_times(bare_, bare_rate_);
   const double carried = loads.piston_acceleration * to_speed_;
@@ -199,7 +217,7 @@ void HoseLine::forces(const EndLoads& loads, int passes) {
 }
 
 void HoseLine::settle(const EndLoads& loads) {
-  forces(loads, 1);
+  forces(loads, 1, true);
   if (yields_) {
     pump_kPa_ = loads.pump_kPa - pump_stiffness_ * state_[0] - pump_resistance_ * state_[count_];
     return;
@@ -225,7 +243,7 @@ void HoseLine::begin_step(const EndLoads& now, double piston_flow_at_end) {
 }
 
 void HoseLine::end_step(const EndLoads& then) {
-  forces(then, 2);
+  forces(then, 2, false);
   state_ = drifted_;
   from_end_.add_times(force_, state_);
 }

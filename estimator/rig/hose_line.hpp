@@ -30,6 +30,7 @@
 #include <optional>
 #include <vector>
 
+#include "estimator/rig/boundary_layer.hpp"
 #include "estimator/rig/hose.hpp"
 #include "estimator/rig/small_matrix.hpp"
 
@@ -88,9 +89,11 @@ class HoseLine {
   void make_equations();
   void make_step(double step_s);
   void make_drag(double length_m);
-  /// Forces at the state at hand. The drag holds dv/dt, which it changes by less than two percent: each pass starts
-  /// from the rate found last.
-  void forces(const EndLoads& loads, int passes);
+  /// Forces at the state at hand, a step's end for good (`is_settled`) or as predicted. The drag holds dv/dt, which it changes by
+  /// some percent: each pass starts from the rate found last.
+  void forces(const EndLoads& loads, int passes, bool is_settled);
+  /// Adds the boundary layer's part to the drag.
+  void remember(bool is_settled);
   /// Coefficients of the pressure along the line: uniform, cosines.
   [[nodiscard]] Eigen::VectorXd pressures() const;
   /// Mean over the length of the product of two such functions.
@@ -103,6 +106,7 @@ class HoseLine {
   double inertance_, compliance_, creep_, creep_time_, wall_loss_, to_speed_, pump_stiffness_,
       pump_resistance_;
   WallFriction friction_;
+  BoundaryLayer layer_;
 
   Eigen::MatrixXd mass_, inverse_mass_, stiffness_, damping_, creep_coupling_;
   Eigen::VectorXd cavity_shape_;  ///< of p_L in the equations
@@ -113,7 +117,8 @@ class HoseLine {
   SmallMatrix flow_, from_start_, from_end_;
   // At the points along the line: speeds and stretchings by velocities; dv/dt by state, forces, drag.
   SmallMatrix speeds_, rate_by_state_, rate_by_force_, rate_by_drag_, force_by_drag_;
-  Eigen::VectorXd point_weight_, pump_by_state_, pump_by_force_;
+  Eigen::VectorXd point_part_, point_weight_;  ///< of the length, and in m
+  Eigen::VectorXd pump_by_state_, pump_by_force_;
 
   Eigen::VectorXd state_, drifted_, bare_, force_, speed_, bare_rate_, rate_, gradient_;
   std::vector<WallFriction::Drag> drag_;

@@ -69,10 +69,14 @@ constexpr std::array tolerances{
               }},
     Tolerance{"hose_wall_friction", "ln", 0.3, false, false,
               [](double x, const EffectContext&, RigModel& m) { times(m.hose.viscosity_Pa_s, x); }},
-    // The fluid near the wall lags behind, which weighs like more of it: sqrt(2)/Womersley number in oscillating laminar flow
-    // (Zielke 1968), a tenth at a beat a second, less where it is turbulent.
-    Tolerance{"hose_boundary_layer", "ln", 0.05, false, false,
-              [](double x, const EffectContext&, RigModel& m) { times(m.hose.inertance_factor, x); }},
+    // The model's friction knows dv/dt and not the past. A smooth round bore has all of Zielke's instead, which is 1.
+    Tolerance{"hose_boundary_layer", "", 1.0, false, false,
+              [](double x, const EffectContext&, RigModel& m) {
+                if (x == 0.0) return;
+                constexpr double rounding = 0.05;
+                m.hose.brunone = positive(m.hose.brunone - x, rounding);
+                m.hose.zielke += x;
+              }},
     Tolerance{"hose_creep", "", 0.03, false, false,
               [](double x, const EffectContext&, RigModel& m) {
                 m.hose.creep_fraction = positive(m.hose.creep_fraction + x, 0.005);
