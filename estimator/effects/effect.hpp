@@ -46,6 +46,7 @@ struct ChangePoint {
   std::string run;
   double time_s = 0.0;     ///< of the run
   double session_s = 0.0;  ///< the same since the session's first run began
+  bool operator==(const ChangePoint&) const = default;
 };
 
 /// How many change points an effect has; they are searched (estimator/explain/rig/event_scan.hpp). What begins at the

@@ -177,6 +177,7 @@ class SetsSearch {
   [[nodiscard]] bool is_behind(const EffectSet& set) const {
     return set.log_posterior < best_described_ - second_in_reach;
   }
+  void fit_events(const EffectSet& beside, const Effect& effect);
   void fit_beside_best();
   void fit_synergies();
   void fit_from_better_part(const std::vector<size_t>& responses);
@@ -291,6 +292,36 @@ void SetsSearch::fit_from_better_part(const std::vector<size_t>& responses) {
   if (again.log_posterior > sets_.back().log_posterior) sets_.back() = std::move(again);
 }
 
+/// An effect with moments beside a set. How many there are, and when, shows as finely as the model is right, which the fit with some
+/// of them tells: they are sought under what the set leaves, under what is stated if that is finer, and again under what is left with
+/// the best ones.
+void SetsSearch::fit_events(const EffectSet& beside, const Effect& effect) {
+  EffectSet before = beside;
+  std::optional<EffectSet> best;
+  const auto seek = [&](const rig::Shares& shares) {
+    before.evidence = fit_linear(beside.target(), beside.columns, problem_.error(), shares);
+    const auto start = scan_events(problem_, before, effect);
+    if (!start || (best && best->model.terms.back().change_points == start->terms.back().change_points))
+      return false;
+    fit(*start, beside.known, shares);
+    EffectSet found = std::move(sets_.back());
+    sets_.pop_back();
+    if (best && !(found.log_posterior > best->log_posterior)) return false;
+    best = std::move(found);
+    return true;
+  };
+  const rig::Shares& left = beside.evidence.shares;
+  rig::Shares finer = left;
+  std::ranges::transform(left, problem_.error().prior.share, finer.begin(), std::ranges::min);
+  seek(left);
+  if (best && best->log_posterior > beside.log_posterior) {
+    if (finer != left) seek(finer);
+    while (seek(best->evidence.shares)) {
+    }
+  }
+  if (best) sets_.push_back(std::move(*best));
+}
+
 void SetsSearch::fit_beside_best() {
   sort_sets();
   const EffectSet* best = best_of(1);
@@ -313,8 +344,7 @@ void SetsSearch::fit_beside_best() {
   }
   for (const Effect* effect : problem_.session().effects.of_rig()) {
     if (effect->change_points() == ChangePoints::none || effect == first.model.terms.back().effect) continue;
-    if (const auto start = scan_events(problem_, first, *effect))
-      fit(*start, first.known, first.evidence.shares);
+    fit_events(first, *effect);
   }
 }
 
@@ -473,9 +503,7 @@ void SetsSearch::search_from_base() {
       if (is_worth_fitting(singles, i, least_promise)) fit(singles[i].responses);
   }
   for (const Effect* effect : problem_.session().effects.of_rig())
-    if (effect->change_points() != ChangePoints::none)
-      if (const auto start = scan_events(problem_, plain, *effect))
-        fit(*start, base_, problem_.error().prior.share);
+    if (effect->change_points() != ChangePoints::none) fit_events(plain, *effect);
   report("fitting the best of them again");
   fit_plain_and_singles_again();
   report("fitting the pairs that promise most");

@@ -298,10 +298,10 @@ EffectSet search(const rig::SessionProblem& problem, SetProblem& set, const rig:
     if (!again) set.take(found);
     const double before = out.evidence.log_evidence;
     out.evidence = judged(out.evidence.shares);
-    if (!again && std::abs(out.evidence.log_evidence - before) < rested) {
+    const bool has_no_end = found.crept || found.termination == inference::Termination::iteration_limit;
+    if (!again && !(has_no_end && round == 0) && std::abs(out.evidence.log_evidence - before) < rested) {
       // Many steps that together bring less than decides anything: it has arrived.
-      if (round > 0 && (found.crept || found.termination == inference::Termination::iteration_limit))
-        out.termination = inference::Termination::converged;
+      if (has_no_end) out.termination = inference::Termination::converged;
       break;
     }
     if (out.evidence.log_evidence + log_prior(problem, set, set.model(q)) < best_so_far - out_of_reach) break;
