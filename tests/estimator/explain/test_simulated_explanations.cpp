@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 
 #include <optional>
+#include <utility>
 
 #include "estimator/effects/effect.hpp"
 #include "estimator/explain/rig/findings.hpp"
@@ -19,7 +20,10 @@ using testing::IsEmpty;
 class SimulatedSession : public testing::Test {
  protected:
   void search(const rig::SessionOptions& options, size_t runs = 3) {
-    session_ = rig::simulated_session(family_, options);
+    search(rig::simulated_session(family_, options), runs);
+  }
+  void search(rig::Session session, size_t runs) {
+    session_ = std::move(session);
     session_.runs.resize(runs);
     problem_.emplace(session_, family_, 2);
     found_ = search_sets(*problem_);
@@ -55,6 +59,23 @@ TEST_F(SimulatedSession, WithALeakIsExplainedByItAndPredictsWhatWasNotFitted) {
   EXPECT_GT(gap.closed, 0.9);
   EXPECT_EQ(gap.held_out.size(), 3U);
   EXPECT_GT(verdict_.held_out_gain.value(), 20.0);
+}
+
+TEST_F(SimulatedSession, WithManySmallLossesOfStepsIsExplainedByThemAlone) {
+  constexpr double lost_mL = 0.25;
+  rig::ModelTerm losses{find_effect("missed-steps"), {}};
+  for (const double time_s : {9.3, 20.0, 22.4, 26.1, 30.9, 34.4, 36.0})
+    losses.change_points.push_back({"baseline", time_s, time_s});
+  const double all_mL = lost_mL * static_cast<double>(losses.change_points.size());
+  search(rig::simulated_session(family_, {.terms = {losses}, .values = {lost_mL, 0.02}, .seed = 7},
+                                {0.0, "parabolic", 40.0, 1.2, 0.0, 30}),
+         3);
+  EXPECT_EQ(verdict_.verdict, Verdict::named);
+  const auto effects = found_effects(chosen(), verdict_);
+  ASSERT_EQ(effects.size(), 1U);
+  EXPECT_EQ(effects[0].id, "missed-steps");
+  const auto moments = static_cast<double>(chosen().model.terms.front().change_points.size());
+  EXPECT_NEAR(moments * effects[0].parameters.at(0).value, all_mL, 0.1 * all_mL);
 }
 
 /// What it does to one waveform a function of volume does as well, which says nothing of where it comes from.
