@@ -69,6 +69,9 @@ constexpr std::array tolerances{
               }},
     Tolerance{"hose_wall_friction", "ln", 0.3, false, false,
               [](double x, const EffectContext&, RigModel& m) { times(m.hose.viscosity_Pa_s, x); }},
+    // What the fluid near the wall adds to the inertia.
+    Tolerance{"hose_inertance", "ln", 0.05, false, false,
+              [](double x, const EffectContext&, RigModel& m) { times(m.hose.inertance_factor, x); }},
     // The model's friction knows dv/dt and not the past. A smooth round bore has all of Zielke's instead, which is 1.
     Tolerance{"hose_boundary_layer", "", 1.0, false, false,
               [](double x, const EffectContext&, RigModel& m) {
@@ -76,7 +79,8 @@ constexpr std::array tolerances{
                 constexpr double rounding = 0.05;
                 m.hose.brunone = positive(m.hose.brunone - x, rounding);
                 m.hose.zielke += x;
-              }},
+              },
+              true},
     Tolerance{"hose_creep", "", 0.03, false, false,
               [](double x, const EffectContext&, RigModel& m) {
                 m.hose.creep_fraction = positive(m.hose.creep_fraction + x, 0.005);
