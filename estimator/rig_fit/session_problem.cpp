@@ -56,7 +56,9 @@ SessionProblem::SessionProblem(const Session& session, const SpecimenFamily& fam
     const auto stated = session.tolerance_sd.find(std::string(tolerance.name));
     const bool is_stated = stated != session.tolerance_sd.end();
     const double sd = is_stated ? stated->second : tolerance.sd;
-    if (tolerance.only_learnt && !is_stated && std::ranges::count(learnt, tolerance.name) == 0) continue;
+    if (tolerance.is_unknown != IsUnknown::always && !is_stated &&
+        std::ranges::count(learnt, tolerance.name) == 0)
+      continue;
     if (!tolerance.needs_neighbours || family.has_neighbours())
       nuisances_.push_back({std::string(tolerance.name), std::string(tolerance.unit), sd, 0.0,
                             tolerance.sensors_only, &tolerance, is_stated});

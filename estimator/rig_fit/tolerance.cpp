@@ -80,7 +80,7 @@ constexpr std::array tolerances{
                 m.hose.brunone = positive(m.hose.brunone - x, rounding);
                 m.hose.zielke += x;
               },
-              true},
+              IsUnknown::with_references},
     Tolerance{"hose_creep", "", 0.03, false, false,
               [](double x, const EffectContext&, RigModel& m) {
                 m.hose.creep_fraction = positive(m.hose.creep_fraction + x, 0.005);
@@ -109,8 +109,9 @@ constexpr std::array tolerances{
     Tolerance{"screw_sine", "mL", 0.02, false, false, add_turning_error<1, true>},
     Tolerance{"screw_cosine", "mL", 0.02, false, false, add_turning_error<1, false>},
     // A coupling between shafts that do not quite align errs twice a turn (Hooke's joint), by less than the screw.
-    Tolerance{"coupling_sine", "mL", 0.01, false, false, add_turning_error<2, true>, true},
-    Tolerance{"coupling_cosine", "mL", 0.01, false, false, add_turning_error<2, false>, true},
+    Tolerance{"coupling_sine", "mL", 0.01, false, false, add_turning_error<2, true>, IsUnknown::where_learnt},
+    Tolerance{"coupling_cosine", "mL", 0.01, false, false, add_turning_error<2, false>,
+              IsUnknown::where_learnt},
     // Gas, if there is any: between isothermal and adiabatic.
     Tolerance{"gas_exponent", "", 0.07, false, false,
               [](double x, const EffectContext&, RigModel& m) { m.gas_exponent += x; }},

@@ -13,6 +13,14 @@
 
 namespace diastole::rig {
 
+/// When a tolerance is an unknown of a session whose rig does not state its size: elsewhere it is freedom that hides more than it
+/// mends.
+enum class IsUnknown {
+  always,
+  with_references,  ///< whatever they tell of it
+  where_learnt      ///< where they tell more of it than the list
+};
+
 struct Tolerance {
   std::string_view name;
   std::string_view unit;  ///< of the offset; "ln" for the logarithm of a factor
@@ -20,9 +28,7 @@ struct Tolerance {
   bool sensors_only = false;      ///< the plant does not depend on it
   bool needs_neighbours = false;  ///< only a specimen with computed neighbours can have it
   void (*apply)(double offset, const EffectContext&, RigModel&) = nullptr;
-  /// An unknown only where references taught it, or the rig's description states its size: without them it is freedom that
-  /// hides more than it mends.
-  bool only_learnt = false;
+  IsUnknown is_unknown = IsUnknown::always;
 };
 
 /// They keep their order: references store them by name.

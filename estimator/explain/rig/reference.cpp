@@ -47,7 +47,7 @@ struct Knowledge {
 std::vector<std::string_view> all_learnt() {
   std::vector<std::string_view> names;
   for (const rig::Tolerance& tolerance : rig::all_tolerances())
-    if (tolerance.only_learnt) names.push_back(tolerance.name);
+    if (tolerance.is_unknown != rig::IsUnknown::always) names.push_back(tolerance.name);
   return names;
 }
 
@@ -260,7 +260,8 @@ std::vector<std::string_view> learnt_tolerances(const Reference& reference) {
     const auto found = std::ranges::find(reference.tolerances, name);
     if (found == reference.tolerances.end()) return true;
     const Index i = found - reference.tolerances.begin();
-    return reference.covariance(i, i) >= by_half;
+    const auto tolerance = std::ranges::find(rig::all_tolerances(), name, &rig::Tolerance::name);
+    return tolerance->is_unknown == rig::IsUnknown::where_learnt && reference.covariance(i, i) >= by_half;
   });
   return names;
 }

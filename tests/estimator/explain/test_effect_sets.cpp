@@ -45,7 +45,8 @@ TEST(EffectSets, WhereAllElseIsAsDescribedAPartThatIsOffIsNoTolerance) {
 
   // Where the rig's description states how far its parts are off, none is finer.
   for (const rig::Tolerance& tolerance : rig::all_tolerances())
-    if (!tolerance.only_learnt) session.tolerance_sd[std::string(tolerance.name)] = tolerance.sd;
+    if (tolerance.is_unknown == rig::IsUnknown::always)
+      session.tolerance_sd[std::string(tolerance.name)] = tolerance.sd;
   const rig::SessionProblem stated(session, family, 2);
   EXPECT_EQ(probability_of_finer(stated, search_sets(stated)), 0.0);
 }
