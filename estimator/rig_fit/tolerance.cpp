@@ -69,7 +69,7 @@ constexpr std::array tolerances{
               }},
     Tolerance{"hose_wall_friction", "ln", 0.3, false, false,
               [](double x, const EffectContext&, RigModel& m) { times(m.hose.viscosity_Pa_s, x); }},
-    // What the fluid near the wall adds to the inertia.
+    // What the fluid near the wall adds to the inertia, as far as its memory is no unknown.
     Tolerance{"hose_inertance", "ln", 0.05, false, false,
               [](double x, const EffectContext&, RigModel& m) { times(m.hose.inertance_factor, x); }},
     // The model's friction knows dv/dt and not the past. A smooth round bore has all of Zielke's instead, which is 1.

@@ -159,11 +159,15 @@ class SetsSearch {
   }
   void fit(const std::vector<size_t>& responses);
   /// From `start`, near a model that is known.
-  void fit(const SessionModel& start, const rig::LinearisedModel& known, const rig::Shares& shares) {
+  [[nodiscard]] EffectSet fitted(const SessionModel& start, const rig::LinearisedModel& known,
+                                 const rig::Shares& shares) const {
     // A rig that is finer than described is so in what an effect changes, too: the effect says all that is wrong with it.
     const FreedStart free =
         is_finer() ? FreedStart{start, known} : free_changed_parts(problem_, start, known);
-    sets_.push_back(fit_set(problem_, free.start, free.known, shares, best_posterior()));
+    return fit_set(problem_, free.start, free.known, shares, best_posterior());
+  }
+  void fit(const SessionModel& start, const rig::LinearisedModel& known, const rig::Shares& shares) {
+    sets_.push_back(fitted(start, known, shares));
   }
   [[nodiscard]] double best_posterior() const {
     double best = best_described_;
@@ -281,14 +285,10 @@ void SetsSearch::fit_from_better_part(const std::vector<size_t>& responses) {
     other = is_first ? responses.back() : responses.front();
   }
   if (better == nullptr) return;
-  const rig::LinearisedModel known = better->known;
-  const rig::Shares shares = better->evidence.shares;
   SessionModel start = better->model;
   start.terms.push_back(responses_[other].term);
   start.values.insert(start.values.end(), responses_[other].values.begin(), responses_[other].values.end());
-  fit(start, known, shares);
-  EffectSet again = std::move(sets_.back());
-  sets_.pop_back();
+  EffectSet again = fitted(start, better->known, better->evidence.shares);
   if (again.log_posterior > sets_.back().log_posterior) sets_.back() = std::move(again);
 }
 
@@ -303,9 +303,7 @@ void SetsSearch::fit_events(const EffectSet& beside, const Effect& effect) {
     const auto start = scan_events(problem_, before, effect);
     if (!start || (best && best->model.terms.back().change_points == start->terms.back().change_points))
       return false;
-    fit(*start, beside.known, shares);
-    EffectSet found = std::move(sets_.back());
-    sets_.pop_back();
+    EffectSet found = fitted(*start, beside.known, shares);
     if (best && !(found.log_posterior > best->log_posterior)) return false;
     best = std::move(found);
     return true;

@@ -255,14 +255,15 @@ Reference learn_reference(const std::vector<Study>& studies, size_t threads,
 
 std::vector<std::string_view> learnt_tolerances(const Reference& reference) {
   constexpr double by_half = 0.5;  // of a variance of one before: as much is told again
-  std::vector<std::string_view> names = all_learnt();
-  std::erase_if(names, [&](std::string_view name) {
-    const auto found = std::ranges::find(reference.tolerances, name);
-    if (found == reference.tolerances.end()) return true;
+  std::vector<std::string_view> names;
+  for (const rig::Tolerance& tolerance : rig::all_tolerances()) {
+    if (tolerance.is_unknown == rig::IsUnknown::always) continue;
+    const auto found = std::ranges::find(reference.tolerances, tolerance.name);
+    if (found == reference.tolerances.end()) continue;
     const Index i = found - reference.tolerances.begin();
-    const auto tolerance = std::ranges::find(rig::all_tolerances(), name, &rig::Tolerance::name);
-    return tolerance->is_unknown == rig::IsUnknown::where_learnt && reference.covariance(i, i) >= by_half;
-  });
+    if (tolerance.is_unknown == rig::IsUnknown::with_references || reference.covariance(i, i) < by_half)
+      names.push_back(tolerance.name);
+  }
   return names;
 }
 
