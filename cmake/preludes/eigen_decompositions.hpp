@@ -10,6 +10,8 @@
 namespace Eigen {
 
 DIASTOLE_MADE_ELSEWHERE template class ColPivHouseholderQR<MatrixXd>;
+DIASTOLE_MADE_ELSEWHERE template class CompleteOrthogonalDecomposition<MatrixXd>;
+DIASTOLE_MADE_ELSEWHERE template class HouseholderQR<MatrixXd>;
 DIASTOLE_MADE_ELSEWHERE template class JacobiSVD<MatrixXd>;
 DIASTOLE_MADE_ELSEWHERE template class LDLT<MatrixXd>;
 DIASTOLE_MADE_ELSEWHERE template class LLT<MatrixXd>;
@@ -30,6 +32,9 @@ DIASTOLE_MADE_ELSEWHERE template void LLT<MatrixXd>::_solve_impl(const MatrixXd&
 DIASTOLE_MADE_ELSEWHERE template void LLT<MatrixXd>::_solve_impl(const VectorXd&, VectorXd&) const;
 DIASTOLE_MADE_ELSEWHERE template void ColPivHouseholderQR<MatrixXd>::_solve_impl(const VectorXd&,
                                                                                  VectorXd&) const;
+DIASTOLE_MADE_ELSEWHERE template void CompleteOrthogonalDecomposition<MatrixXd>::_solve_impl(const VectorXd&,
+                                                                                             VectorXd&) const;
+DIASTOLE_MADE_ELSEWHERE template void HouseholderQR<MatrixXd>::_solve_impl(const VectorXd&, VectorXd&) const;
 
 }  // namespace Eigen
 

@@ -210,7 +210,7 @@ class Estimation {
     };
     Eigen::MatrixXd forces = holding_.cwiseSqrt().asDiagonal() * whites(u_.size());
     for (const Datum& datum : data_) {
-      const Matrix5 root = Eigen::LLT<Matrix5>(datum.weight * datum.information).matrixL();
+      const Eigen::MatrixXd root = Eigen::LLT<Eigen::MatrixXd>(datum.weight * datum.information).matrixL();
       const Eigen::MatrixXd white = datum.fraction * (root * whites(5));
       for (size_t i = 0; i < datum.nodes.size(); ++i)
         forces.middleRows<5>(static_cast<Eigen::Index>(fields * datum.nodes[i])) +=

@@ -156,9 +156,9 @@ TensorSolution TensorSolver::solve(const Eigen::VectorXd& signals) const {
   const Eigen::VectorXd target = first.cwiseProduct(logs);
   const Eigen::HouseholderQR<TensorDesign> qr(weighted);
   TensorSolution solution;
-  solution.unknowns = qr.solve(target);
+  solution.unknowns = Eigen::VectorXd(qr.solve(target));
   const Eigen::Matrix<double, tensor_unknowns, tensor_unknowns> r =
-      qr.matrixQR().topRows<tensor_unknowns>().triangularView<Eigen::Upper>();
+      qr.matrixQR().topRows(tensor_unknowns).triangularView<Eigen::Upper>();
   const Eigen::Matrix<double, tensor_unknowns, tensor_unknowns> inverse =
       r.triangularView<Eigen::Upper>().solve(
           Eigen::Matrix<double, tensor_unknowns, tensor_unknowns>::Identity());

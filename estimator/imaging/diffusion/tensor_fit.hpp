@@ -40,8 +40,8 @@ struct VoxelTensor {
   int freedom = 0;        ///< measurements - unknowns
 };
 
-/// Rows -B (1e-3 mm²/s units), 1 for each of these volumes.
-using TensorDesign = Eigen::Matrix<double, Eigen::Dynamic, tensor_unknowns>;
+/// Rows -B (1e-3 mm²/s units), 1 for each of these volumes: seven columns.
+using TensorDesign = Eigen::MatrixXd;
 TensorDesign tensor_design(const DiffusionSeries& series, const std::vector<size_t>& volumes);
 /// Of the columns scaled to one length: singular values above 1e-3 of the largest.
 int design_rank(const TensorDesign& design);
@@ -62,7 +62,7 @@ class TensorSolver {
 
  private:
   TensorDesign design_;
-  Eigen::Matrix<double, tensor_unknowns, Eigen::Dynamic> unweighted_;  ///< pseudo-inverse
+  Eigen::MatrixXd unweighted_;  ///< pseudo-inverse
 };
 
 /// For logarithms: what is not positive becomes the image's least positive signal, or 1 if it has none.

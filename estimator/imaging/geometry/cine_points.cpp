@@ -248,8 +248,9 @@ class CineFinder {
         if (std::abs(slices_[a].plane.normal().dot(b.plane.normal())) > 0.99) ++alike[a];
     const auto most = static_cast<size_t>(std::max_element(alike.begin(), alike.end()) - alike.begin());
     const Vector3d across = slices_[most].plane.normal();
-    Eigen::Matrix3d square = Eigen::Matrix3d::Zero();
-    Vector3d right = Vector3d::Zero(), middle = Vector3d::Zero();
+    Eigen::MatrixXd square = Eigen::MatrixXd::Zero(3, 3);
+    Eigen::VectorXd right = Eigen::VectorXd::Zero(3);
+    Vector3d middle = Vector3d::Zero();
     for (CineSlice& slice : slices_) {
       const Vector3d n = slice.plane.normal();
       slice.is_long = std::abs(n.dot(across)) < std::sqrt(0.5);
@@ -259,13 +260,13 @@ class CineFinder {
       }
       middle += centre_of_blood(slice) / static_cast<double>(slices_.size());
     }
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(square);
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> axes(square);
     axis_ = {middle, across};
     // Two planes or more, of different directions.
     if (axes.eigenvalues()[1] > 0.1) {
       axis_.direction = axes.eigenvectors().col(0);
-      const Vector3d on_planes = square.completeOrthogonalDecomposition().solve(right);
-      axis_.point = on_planes + axis_.direction * axis_.direction.dot(middle - on_planes);
+      const Eigen::VectorXd on_planes = square.completeOrthogonalDecomposition().solve(right);
+      axis_.point = on_planes + axis_.direction * axis_.direction.dot(middle - on_planes.head<3>());
     }
     if (!points_to_base()) axis_.direction = -axis_.direction;
   }

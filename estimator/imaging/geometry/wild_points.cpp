@@ -72,8 +72,8 @@ std::vector<bool> wild_of_wall(const WallPlaces& wall) {
   std::vector<double> distances(scaled.size(), 0);
   double scatter = 1;
   for (int i = 0; i < 20; ++i) {
-    Eigen::Matrix<double, 9, 9> normal = Eigen::Matrix<double, 9, 9>::Zero();
-    QuadricRow right = QuadricRow::Zero();
+    Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(9, 9);
+    Eigen::VectorXd right = Eigen::VectorXd::Zero(9);
     for (size_t k = 0; k < scaled.size(); ++k) {
       const QuadricRow row = quadric_row(scaled[k]);
       const double square = scaled[k].squaredNorm();
@@ -81,7 +81,7 @@ std::vector<bool> wild_of_wall(const WallPlaces& wall) {
       normal += weight * row * row.transpose();
       right += weight * square * row;
     }
-    const QuadricRow q = normal.completeOrthogonalDecomposition().solve(right);
+    const Eigen::VectorXd q = normal.completeOrthogonalDecomposition().solve(right);
     std::transform(scaled.begin(), scaled.end(), distances.begin(),
                    [&](const Eigen::Vector3d& x) { return distance_from_quadric(q, x); });
     // Walls are no ellipsoids to better than a fiftieth.

@@ -61,7 +61,7 @@ Circle fitted_circle(const std::vector<Eigen::Vector2d>& points) {
     matrix.row(i) << 2 * point.x(), 2 * point.y(), 1;
     right[i] = point.squaredNorm();
   }
-  const Eigen::Vector3d solution = matrix.colPivHouseholderQr().solve(right);
+  const Eigen::VectorXd solution = matrix.colPivHouseholderQr().solve(right);
   Circle circle{solution.head<2>(), std::sqrt(std::max(0.0, solution[2] + solution.head<2>().squaredNorm())),
                 0};
   for (const Eigen::Vector2d& point : points)
