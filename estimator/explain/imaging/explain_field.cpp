@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <optional>
 
 #include "estimator/explain/imaging/field_hypotheses.hpp"
 #include "estimator/explain/imaging/field_misfit.hpp"
@@ -13,6 +14,7 @@
 #include "estimator/explain/imaging/field_next_experiment.hpp"
 #include "estimator/explain/imaging/inclusion_fit.hpp"
 #include "estimator/explain/imaging/linear_evidence.hpp"
+#include "estimator/explain/imaging/prior_strain.hpp"
 #include "estimator/explain/verdict/chi_square.hpp"
 #include "estimator/inference/intervals.hpp"
 #include "estimator/model/affected_model.hpp"
@@ -121,42 +123,48 @@ class Explainer {
     return most;
   }
 
-  /// How seldom pressures, C1 and the radius are as far off as that by their errors.
-  [[nodiscard]] static double strain(const FieldFit& fit) {
-    return chi_square_tail(fit.priors.squaredNorm(), static_cast<double>(fit.priors.size()));
+  /// How seldom pressures, C1 and the radius are as far off as that by their errors and the mesh's.
+  [[nodiscard]] double strain(const FieldFit& fit) const {
+    const PriorStrain strain = prior_strain(fit);
+    return chi_square_tail(strain.chi_square - specimen_.mesh_error(), strain.degrees);
   }
-  /// The frame whose pressure is furthest off by its error.
+  /// A frame whose pressure the motion contradicts.
   struct PressureStrain {
     int frame = 0;
     double measured_kPa = 0.0, needed_kPa = 0.0, sds = 0.0;
   };
-  [[nodiscard]] PressureStrain worst_pressure(const FieldFit& fit) const {
-    PressureStrain worst;
-    for (size_t slot = 0; slot < fit.pressures_kPa.size(); ++slot) {
-      const int number = specimen_.rows().frames()[slot];
-      const Frame& frame = specimen_.field().measurement.frames[static_cast<size_t>(number)];
-      const double sds = (fit.pressures_kPa[slot] - frame.pressure_kPa) / std::max(frame.sigma_kPa, 1e-5);
-      if (std::abs(sds) > std::abs(worst.sds))
-        worst = {number, frame.pressure_kPa, fit.pressures_kPa[slot], sds};
-    }
-    return worst;
-  }
-  /// Whether it is a pressure that is furthest off, and beyond what one in two thousand is.
-  [[nodiscard]] bool contradicts_pressure(const FieldFit& fit) const {
+  /// If it is a pressure that is furthest off, and beyond what one in two thousand is.
+  [[nodiscard]] std::optional<PressureStrain> contradicted_pressure(const FieldFit& fit) const {
     constexpr double telling = 3.5;
-    const auto others = fit.priors.size() - static_cast<Index>(fit.pressures_kPa.size());
-    const double most = others > 0 ? fit.priors.tail(others).cwiseAbs().maxCoeff() : 0.0;
-    return std::abs(worst_pressure(fit).sds) > std::max(most, telling);
+    const PriorStrain strain = prior_strain(fit);
+    Index slot = 0;
+    if (!(strain.off.cwiseAbs().maxCoeff(&slot) > telling)) return std::nullopt;
+    if (slot >= static_cast<Index>(fit.pressures_kPa.size())) return std::nullopt;
+    const int number = specimen_.rows().frames()[static_cast<size_t>(slot)];
+    const Frame& frame = specimen_.field().measurement.frames[static_cast<size_t>(number)];
+    return PressureStrain{
+        number, frame.pressure_kPa,
+        frame.pressure_kPa + strain.deleted[slot] / fit.priors[slot] *
+                                 (fit.pressures_kPa[static_cast<size_t>(slot)] - frame.pressure_kPa),
+        strain.off[slot]};
   }
-  [[nodiscard]] std::string strain_words(const FieldFit& fit) const {
-    if (!contradicts_pressure(fit))
-      return " What is known of the loads, of C1 or of the shape would have to be further off than its error "
-             "allows.";
-    const PressureStrain worst = worst_pressure(fit);
+  /// As hypotheses are scored: one parameter, and the readings to choose from.
+  [[nodiscard]] double score_of(const PressureStrain& worst) const {
+    return worst.sds * worst.sds - specimen_.mesh_error() - 2.0 -
+           2.0 * std::log(static_cast<double>(specimen_.base().pressures_kPa.size()));
+  }
+  [[nodiscard]] static std::string words_of(const PressureStrain& worst) {
     return fmt::format(
         " Frame {} was at {:.4g} kPa and would have to be at {:.4g} ({:+.1f} standard deviations): check "
         "when its pressure was read and with which zero, or state a larger sigma_kPa.",
         worst.frame, worst.measured_kPa, worst.needed_kPa, worst.sds);
+  }
+  [[nodiscard]] std::string words_of_strain(const FieldFit& fit) const {
+    const auto pressure = contradicted_pressure(fit);
+    return pressure ? words_of(*pressure)
+                    : " What is known of the loads, of C1 or of the shape would have to be further off than "
+                      "its error "
+                      "allows.";
   }
 
   /// Where the best single effect leaves something, pairs are fitted; they count if one is clearly better.
@@ -188,14 +196,14 @@ class Explainer {
     if (effect_seen) try_pairs();
     FieldHypothesis& best = hypotheses_.front();
     if (!effect_seen && before.p_value > significant) {
-      only_strained_ = strain(base) < significant;
-      out_.verdict = only_strained_ ? Verdict::unexplained : Verdict::none;
+      doubts_loads_ = strain(base) < significant;
+      out_.verdict = doubts_loads_ ? Verdict::unexplained : Verdict::none;
       out_.summary =
-          only_strained_
+          doubts_loads_
               ? fmt::format(
                     "The motion differs from the model's by noise alone, but only at loads that were not "
                     "measured.{} No effect of the library does that.",
-                    strain_words(base))
+                    words_of_strain(base))
               : fmt::format(
                     "Nothing exceeds the noise: {} {} residuals of the motion; the nearest effect, {}, "
                     "would gain {:.1f} of chi2.",
@@ -206,9 +214,14 @@ class Explainer {
     const std::string open = effect_seen ? what_stays_open(best.fit) : "";
     const Structure after = effect_seen ? structure_left(best.fit, mesh_error * best.gain) : before;
     const bool rivalled = rival_.score > best.score + clearly_better;
-    if (!effect_seen || rivalled || after.p_value < significant || !open.empty()) {
+    const std::optional<PressureStrain> reading = contradicted_pressure(base);
+    doubts_loads_ = reading && score_of(*reading) > std::max(best.score, rival_.score) + clearly_better;
+    if (!effect_seen || rivalled || doubts_loads_ || after.p_value < significant || !open.empty()) {
       out_.verdict = Verdict::unexplained;
       out_.summary = unexplained_summary(best, effect_seen, rivalled, after) + open;
+      if (doubts_loads_)
+        out_.summary += fmt::format(" One wrong reading would explain {:.1f}.{}", reading->sds * reading->sds,
+                                    words_of(*reading));
       return;
     }
     if (settled(best.fit)) name(best);
@@ -286,7 +299,7 @@ class Explainer {
         ids.push_back(fmt::format("{}", fmt::join(set, " + ")));
       out_.summary += fmt::format(" These data cannot tell it from {}.", fmt::join(ids, ", "));
     }
-    if (contradicts_pressure(best.fit)) out_.summary += strain_words(best.fit);
+    if (const auto pressure = contradicted_pressure(best.fit)) out_.summary += words_of(*pressure);
     chosen_ = &best;
   }
 
@@ -342,14 +355,14 @@ class Explainer {
 
   /// An inclusion's own place first; all of the specimen where no part of it stands out.
   void find_places() {
-    if (only_strained_) {
+    if (doubts_loads_) {
       Misfit& place = out_.where.emplace_back();
       place.port = "field";
       place.channel = "pressures";
-      if (contradicts_pressure(specimen_.base()))
-        place.region = fmt::format("frame {}", worst_pressure(specimen_.base()).frame);
-      const Eigen::VectorXd& priors = specimen_.base().priors;
-      place.excess_chi2 = priors.squaredNorm() - static_cast<double>(priors.size());
+      if (const auto pressure = contradicted_pressure(specimen_.base()))
+        place.region = fmt::format("frame {}", pressure->frame);
+      const PriorStrain off = prior_strain(specimen_.base());
+      place.excess_chi2 = off.chi_square - off.degrees;
       place.p_value = strain(specimen_.base());
       return;
     }
@@ -430,7 +443,7 @@ class Explainer {
   }
 
   void propose() {
-    if (out_.verdict == Verdict::none || only_strained_) return;  // the load is to be measured again
+    if (out_.verdict == Verdict::none || doubts_loads_) return;  // the load is to be measured again
     report("designing the next experiment");
     if (out_.verdict == Verdict::unexplained) {
       out_.next_experiment = exposing_images();
@@ -453,8 +466,9 @@ class Explainer {
   std::vector<FieldHypothesis> hypotheses_;
   LinearEvidence::Choice rival_;
   const FieldHypothesis* chosen_ = nullptr;
-  bool only_strained_ = false;  // by the loads: the motion has no structure beyond noise
-  double widened_ = 1.0;        // of the tags' sigmas
+  // What was read of the loads contradicts a motion that shows nothing else, or one wrong reading would explain more than any effect.
+  bool doubts_loads_ = false;
+  double widened_ = 1.0;  // of the tags' sigmas
   Explanation out_;
 };
 

@@ -1,5 +1,6 @@
 // Explanations of simulated images with other parameters than the recorded sets: what must never be named, and what must.
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -108,6 +109,16 @@ TEST(SimulatedLoads, OneOfWhosePressuresIsWrongAreUnexplained) {
   ASSERT_FALSE(explanation.where.empty());
   EXPECT_EQ(explanation.where.front().channel, "pressures");
   EXPECT_EQ(explanation.where.front().region, "frame 3");
+}
+
+TEST(SimulatedLoads, OneOfWhichIsWrongAndStatedAsSureSaysWhich) {
+  FieldCase field = simulated_tags({.C1_kPa = 9.8, .highest_kPa = 3.8, .seed = 101});
+  field.measurement.frames[3].pressure_kPa *= 1.1;
+  for (Frame& frame : field.measurement.frames)
+    frame.sigma_kPa *= 0.1;  // so that the motion has to follow the readings
+  const Explanation explanation = explain_field(std::move(field), "pressure");
+  EXPECT_EQ(name_of(explanation.verdict), name_of(Verdict::unexplained)) << explanation.summary;
+  EXPECT_THAT(explanation.summary, testing::HasSubstr("Frame 3 was at"));
 }
 
 std::string name_of_case(const testing::TestParamInfo<Hidden>& info) { return info.param.name; }

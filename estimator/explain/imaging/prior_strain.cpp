@@ -1,0 +1,33 @@
+#include "estimator/explain/imaging/prior_strain.hpp"
+
+#include <cmath>
+
+namespace diastole::explain {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+PriorStrain prior_strain(const FieldFit& fit) {
+  constexpr double told_by_others = 1e-6;  // of a prior's own variance: less is rounding
+  const Index count = fit.priors.size();
+  const MatrixXd slopes = fit.jacobian.bottomRows(count);
+  const MatrixXd left = MatrixXd::Identity(count, count) - slopes * fit.covariance * slopes.transpose();
+  PriorStrain strain{.deleted = VectorXd::Zero(count), .off = VectorXd::Zero(count)};
+  for (Index i = 0; i < count; ++i) {
+    if (!(left(i, i) > told_by_others)) continue;
+    strain.deleted[i] = fit.priors[i] / left(i, i);
+    strain.off[i] = fit.priors[i] / std::sqrt(left(i, i));
+  }
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> combinations(left);
+  for (Index i = 0; i < count; ++i) {
+    const double share = combinations.eigenvalues()[i];
+    if (!(share > told_by_others)) continue;
+    const double residual = combinations.eigenvectors().col(i).dot(fit.priors);
+    strain.chi_square += residual * residual / share;
+    strain.degrees += 1.0;
+  }
+  return strain;
+}
+
+}  // namespace diastole::explain
