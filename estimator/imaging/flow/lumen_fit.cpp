@@ -8,6 +8,7 @@
 #include <optional>
 #include <tuple>
 
+#include "estimator/parallel/kept_memory.hpp"
 #include "estimator/parallel/parallel_for.hpp"
 
 namespace diastole::imaging {
@@ -516,6 +517,7 @@ LumenFit fitted(const LumenData& data, const LumenStart& start, Encoding encodin
 }  // namespace
 
 LumenFit fit_lumen(const LumenData& data, const LumenStart& start) {
+  keep_freed_memory();
   LumenFit best = fitted(data, start, Encoding::separate);
   const auto try_other = [&](LumenFit other) {
     if (other.reduced_chi_square < best.reduced_chi_square) best = std::move(other);

@@ -249,6 +249,7 @@ TEST(Flow, WrapsBeyondRecoveryAreRefused) {
   FlowPhantom fast = phantom();
   fast.stroke_mL = 120;  // 390 cm/s
   PhaseContrastProtocol protocol = small();
+  protocol.phases = 6;
   protocol.venc_cm_s = 60;
   EXPECT_THAT(refusal(fast, protocol),
               AllOf(HasSubstr("wraps beyond recovery"), HasSubstr("venc above the peak")));
