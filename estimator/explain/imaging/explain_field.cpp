@@ -220,8 +220,8 @@ class Explainer {
       out_.verdict = Verdict::unexplained;
       out_.summary = unexplained_summary(best, effect_seen, rivalled, after) + open;
       if (doubts_loads_)
-        out_.summary += fmt::format(" One wrong reading would explain {:.1f}.{}", reading->sds * reading->sds,
-                                    words_of(*reading));
+        out_.summary += fmt::format(" One wrong reading would gain {:.1f} of chi2.{}",
+                                    reading->sds * reading->sds, words_of(*reading));
       return;
     }
     if (settled(best.fit)) name(best);
