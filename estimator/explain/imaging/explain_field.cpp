@@ -160,11 +160,9 @@ class Explainer {
         worst.frame, worst.measured_kPa, worst.needed_kPa, worst.sds);
   }
   [[nodiscard]] std::string words_of_strain(const FieldFit& fit) const {
-    const auto pressure = contradicted_pressure(fit);
-    return pressure ? words_of(*pressure)
-                    : " What is known of the loads, of C1 or of the shape would have to be further off than "
-                      "its error "
-                      "allows.";
+    if (const auto pressure = contradicted_pressure(fit)) return words_of(*pressure);
+    return " What is known of the loads, of C1 or of the shape would have to be further off than its error "
+           "allows.";
   }
 
   /// Where the best single effect leaves something, pairs are fitted; they count if one is clearly better.

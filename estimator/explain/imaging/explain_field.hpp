@@ -12,10 +12,10 @@
 //   field_misfit         where, and what is predicted of tags not fitted; field_next_experiment: what to image next
 //
 // Verdicts: none - neither an effect nor any structure gains more than noise would (p above 1e-3 after correction for
-// how many were tried). unexplained - structure is left after the best effect, or something outside the library (a
-// motion, one wrong reading of a pressure) gains more than any effect, or a search that the name would rest on did not converge. ambiguous - other effects' scores are within 9
-// of the best one's; named - none is. The score is the gain of chi2, less 2 for each parameter and 2 log(number of places)
-// for a place that was searched.
+// how many were tried). unexplained - structure is left after the best effect, or something outside the library (a motion,
+// one wrong reading of a pressure) gains more than any effect, or a search that the name would rest on did not converge.
+// ambiguous - other effects' scores are within 9 of the best one's; named - none is. The score is the gain of chi2, less 2
+// for each parameter and 2 log(number of places) for a place that was searched.
 
 #include <functional>
 #include <string>
