@@ -8,6 +8,7 @@
 
 #include "estimator/fit/offset_score.hpp"
 #include "estimator/inference/covariance.hpp"
+#include "estimator/inference/deleted_residual.hpp"
 #include "estimator/inference/intervals.hpp"
 
 namespace diastole {
@@ -242,12 +243,11 @@ std::map<std::string, Eigen::VectorXd> consider_errors(FitOutcome& outcome, Join
 std::optional<PressureByMotion> pressure_by_motion(const Frame& load, const LinearisedCost& cost,
                                                    Eigen::Index row, const Eigen::MatrixXd& inverse,
                                                    double variance_factor) {
-  constexpr double all = 1.0 - 1e-6;  // of the estimate: the rest is rounding
-  const Eigen::VectorXd derivatives = cost.jacobian.row(row).transpose();
-  const double leverage = derivatives.dot(inverse * derivatives);
-  if (!(leverage < all)) return std::nullopt;
-  const double off = -cost.residuals[row] / (1.0 - leverage);
-  const double variance = std::max(1.0, variance_factor) * leverage / (1.0 - leverage);
+  const auto deleted =
+      inference::deleted_residual(cost.residuals[row], cost.jacobian.row(row).transpose(), inverse);
+  if (!deleted) return std::nullopt;
+  const double off = -deleted->value;
+  const double variance = std::max(1.0, variance_factor) * (1.0 - deleted->share) / deleted->share;
   return PressureByMotion{load.pressure_kPa - off * load.sigma_kPa, std::sqrt(variance) * load.sigma_kPa,
                           off / std::sqrt(1.0 + variance)};
 }

@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "estimator/inference/deleted_residual.hpp"
+
 namespace diastole::explain {
 
 using Eigen::Index;
@@ -15,9 +17,11 @@ PriorStrain prior_strain(const FieldFit& fit) {
   const MatrixXd left = MatrixXd::Identity(count, count) - slopes * fit.covariance * slopes.transpose();
   PriorStrain strain{.deleted = VectorXd::Zero(count), .off = VectorXd::Zero(count)};
   for (Index i = 0; i < count; ++i) {
-    if (!(left(i, i) > told_by_others)) continue;
-    strain.deleted[i] = fit.priors[i] / left(i, i);
-    strain.off[i] = fit.priors[i] / std::sqrt(left(i, i));
+    const auto deleted =
+        inference::deleted_residual(fit.priors[i], slopes.row(i).transpose(), fit.covariance);
+    if (!deleted) continue;
+    strain.deleted[i] = deleted->value;
+    strain.off[i] = deleted->value * std::sqrt(deleted->share);
   }
   const Eigen::SelfAdjointEigenSolver<MatrixXd> combinations(left);
   for (Index i = 0; i < count; ++i) {

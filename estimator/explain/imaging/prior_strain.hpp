@@ -1,6 +1,6 @@
 #pragma once
 // How far what a fit was told beforehand - readings of pressures, C1, the inner radius, tolerances - is from what all else says of it: by
-// deleted residuals (Cook and Weisberg, Residuals and Influence in Regression, 1982, 2.2.1). A prior that is stated as surer than it
+// deleted residuals (estimator/inference/deleted_residual.hpp). A prior that is stated as surer than it
 // is pulls the motion to itself and keeps a small residual; its deleted one shows it.
 
 #include <Eigen/Dense>
