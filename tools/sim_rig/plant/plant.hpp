@@ -37,6 +37,12 @@ struct AirBubble {
   static constexpr double vapour_kPa =
       2.3;  ///< of water at 20 degC: below, gas no longer follows the pressure
 
+  [[nodiscard]] double volume_mL(double pressure_kPa) const {
+    const double absolute_kPa = std::max(atmospheric_kPa + pressure_kPa, vapour_kPa);
+    const double below_kPa = absolute_kPa - (atmospheric_kPa + pressure_kPa);
+    return rest_mL * std::pow(atmospheric_kPa / absolute_kPa, 1 / exponent) +
+           compliance_mL_per_kPa(pressure_kPa) * below_kPa;
+  }
   [[nodiscard]] double compliance_mL_per_kPa(double pressure_kPa) const {
     if (rest_mL == 0) return 0;
     const double absolute_kPa = std::max(atmospheric_kPa + pressure_kPa, vapour_kPa);
@@ -108,7 +114,10 @@ class Plant {
   /// speed, K = (1/f - 1)^2 on the dynamic pressure of the open bore (Borda and Carnot).
   void block(double open_share) { blockage_K_ = (1 / open_share - 1) * (1 / open_share - 1); }
   /// It comes in, or goes, at the pressure of the moment, and moves only with what follows.
-  void admit(const AirBubble& bubble) { bubble_ = bubble; }
+  void admit(const AirBubble& bubble) {
+    bubble_ = bubble;
+    bubble_owes_mL_ = 0;
+  }
   [[nodiscard]] Sensor& cavity_sensor() { return cavity_sensor_; }
 
   /// The truth at the last whole step.
@@ -145,9 +154,14 @@ class Plant {
     take_disturbances();
     const double flow_mL_s = solve_outlet_flow_mL_s();
     hose_.advance(entering_flow_mL_s(), flow_mL_s);
-    cavity_mL_ += gel_inflow_mL(flow_mL_s);
+    const double gel_mL = gel_inflow_mL(flow_mL_s);
+    cavity_mL_ += gel_mL;
     outlet_flow_mL_s_ = flow_mL_s;
     specimen_.pass(cavity_mL_, step_s());
+    pump_gas_owes_mL_ =
+        owed_mL(pump_gas_, pump_before_kPa, pump_end_kPa(),
+                pump_gas_.compliance_mL_per_kPa(pump_before_kPa) * (pump_end_kPa() - pump_before_kPa));
+    bubble_owes_mL_ = owed_mL(bubble_, cavity_before_kPa, cavity_kPa(), (1 / gel_share_ - 1) * gel_mL);
     ++step_count_;
     cavity_sensor_.advance(0.5 * (cavity_before_kPa + cavity_kPa()));
     pump_sensor_.advance(0.5 * (pump_before_kPa + pump_end_kPa()));
@@ -182,8 +196,8 @@ class Plant {
     // p = line.p + z Q and Q = Q_piston - C (p - p_before) / dt - G p.
     const Characteristic line = hose_.inlet();
     const double z = line.impedance_kPa_s_per_mL;
-    const double without_kPa =
-        line.pressure_kPa + z * (piston_.flow_mL_s() + swallows_mL_kPa * pump_end_kPa());
+    const double without_kPa = line.pressure_kPa + z * (piston_.flow_mL_s() + pump_gas_owes_mL_ / step_s() +
+                                                        swallows_mL_kPa * pump_end_kPa());
     const double share = 1 + z * (swallows_mL_kPa + loses);
     double pressure_kPa = without_kPa / share;
     if (own_.pump_leak_mL_s) pressure_kPa = behind_own_leak_kPa(without_kPa, share, z);
@@ -207,6 +221,12 @@ class Plant {
     return first_cycle_step_ < 0 ? 0 : static_cast<double>(step_count_ - first_cycle_step_) * step_s();
   }
 
+  /// A step squeezes a gas by what its compliance at the step's beginning gives. What it then holds more than that is
+  /// pressed out in the next step, so that nothing gathers over the cycles.
+  static double owed_mL(const AirBubble& gas, double before_kPa, double after_kPa, double squeezed_mL) {
+    if (gas.rest_mL == 0) return 0;
+    return gas.volume_mL(after_kPa) - (gas.volume_mL(before_kPa) - squeezed_mL);
+  }
   /// The leak's flow and the bubble's share are those of the step's beginning: both change little in half a millisecond.
   void take_disturbances() {
     leaked_mL_ = leak_mL_s_kPa_ * cavity_kPa() * step_s();
@@ -217,7 +237,7 @@ class Plant {
   }
   /// Volume that enters the gel in a step with this flow at its end, beside bubble and leak.
   [[nodiscard]] double gel_inflow_mL(double flow_mL_s) const {
-    return gel_share_ * (0.5 * step_s() * (outlet_flow_mL_s_ + flow_mL_s) - leaked_mL_);
+    return gel_share_ * (0.5 * step_s() * (outlet_flow_mL_s_ + flow_mL_s) - leaked_mL_ + bubble_owes_mL_);
   }
 
   double minor_loss_K_;
@@ -231,6 +251,7 @@ class Plant {
   long step_count_ = 0;
   double since_step_s_ = 0;
   AirBubble pump_gas_;
+  double pump_gas_owes_mL_ = 0;
   double pump_compliance_mL_per_kPa_;
   double pump_leak_mL_s_kPa_;
   OwnLaws own_;
@@ -239,6 +260,7 @@ class Plant {
   double leak_mL_s_kPa_;
   double blockage_K_ = 0;
   AirBubble bubble_;
+  double bubble_owes_mL_ = 0;
   double leaked_mL_ = 0;  // in this step
   double gel_share_ = 1;  // of a change of the cavity's volume; the bubble gives way for the rest
   double cavity_mL_ = 0;  // of the gel; the bubble's share is not in it
