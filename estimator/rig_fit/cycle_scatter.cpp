@@ -33,6 +33,15 @@ double mean_by_lower_quarter(std::vector<double> squares, double degrees) {
   return *quarter * degrees / boost::math::quantile(boost::math::chi_squared(degrees), part);
 }
 
+/// Relative variance of that mean of so many: of a quantile p of n numbers, p (1 - p) / (n density^2). Successive differences
+/// share a cycle: a correlation of -1/2, of squares 1/4, to either side.
+double variance_by_lower_quarter(size_t count, double degrees) {
+  const boost::math::chi_squared squares(degrees);
+  const double quarter = boost::math::quantile(squares, 0.25);
+  const double slope = boost::math::pdf(squares, quarter) * quarter;
+  return (1.0 + 2.0 * 0.25) * 0.25 * 0.75 / (static_cast<double>(count) * slope * slope);
+}
+
 /// Values without the part that the columns make, by least squares.
 VectorXd without(const VectorXd& values, const Eigen::MatrixXd& columns) {
   return values - columns * columns.colPivHouseholderQr().solve(values);
@@ -73,6 +82,8 @@ CycleScatter scatter_of(const SessionProblem& problem, const std::vector<Shown>&
   double square = 0.0;
   double noise_square = 0.0;
   double weight = 0.0;
+  double variance = 0.0;  // of `square`
+  double rate_Hz = 0.0;
   for (size_t r = 0; r < problem.session().runs.size(); ++r) {
     const SessionRun& run = problem.session().runs[r];
     const std::vector<double>& measured = run.pressure_kPa.at(channel);
@@ -99,7 +110,7 @@ CycleScatter scatter_of(const SessionProblem& problem, const std::vector<Shown>&
         columns.col(2) = part(shown, c);
         columns.col(3).setZero();
         columns.col(3).segment(1, rows - 2) = columns.col(2).tail(rows - 2) - columns.col(2).head(rows - 2);
-        const double rate_Hz = static_cast<double>(rows) / run.segments[s].period_s;
+        rate_Hz = static_cast<double>(rows) / run.segments[s].period_s;
         const BandChange found = in_band(without(difference, columns), noise, rate_Hz);
         squares.push_back(found.square_kPa2);
         segment.noise_kPa2 = found.noise_kPa2;
@@ -110,8 +121,11 @@ CycleScatter scatter_of(const SessionProblem& problem, const std::vector<Shown>&
       if (squares.empty()) continue;
       segment.pairs = squares.size();
       segment.square_kPa2 = mean_by_lower_quarter(squares, degrees) - segment.noise_kPa2;
+      segment.variance_kPa4 =
+          segment.noise_kPa2 * segment.noise_kPa2 * variance_by_lower_quarter(squares.size(), degrees);
       const auto pairs = static_cast<double>(segment.pairs);
       square += pairs * segment.square_kPa2;
+      variance += pairs * pairs * segment.variance_kPa4;
       noise_square += pairs * segment.noise_kPa2;
       weight += pairs;
       all.segments.push_back(segment);
@@ -120,6 +134,11 @@ CycleScatter scatter_of(const SessionProblem& problem, const std::vector<Shown>&
   if (weight < fewest_pairs) return {};
   all.rms_kPa = std::sqrt(std::max(0.0, square / weight));
   all.noise_kPa = std::sqrt(noise_square / weight);
+  // Of the noise's record the band holds two degrees of freedom a second and hertz.
+  const double relative_variance =
+      variance / (noise_square * noise_square) + rate_Hz / (noise.samples * highest_feature_Hz);
+  constexpr double least_ratio = 1e-3;
+  all.sds = std::log(std::max(1.0 + square / noise_square, least_ratio)) / std::sqrt(relative_variance);
   return all;
 }
 

@@ -132,6 +132,7 @@ ChannelNoise autoregression_of(const Autocovariance& covariance) {
   noise.sd_kPa = std::sqrt(covariance.at(0));
   noise.innovation_kPa = std::sqrt(error);
   noise.autoregression = a;
+  noise.samples = covariance.count[0];
   return noise;
 }
 
@@ -181,7 +182,7 @@ ChannelNoise channel_noise(const Session& session, Channel channel) {
   }
   if (covariance.count[0] > 100.0) return autoregression_of(covariance);
   const double sd = whole.count > 0.0 ? std::sqrt(whole.second_difference / whole.count) : 0.0;
-  return {sd, sd, {}};
+  return {sd, sd, {}, std::max(whole.count, 1.0)};
 }
 
 /// The pressure at which a cycle starts: its stroke's least volume.

@@ -23,6 +23,7 @@ struct ChannelNoise {
   double sd_kPa = 0.0;                 ///< of a sample
   double innovation_kPa = 0.0;         ///< what is new in each sample
   std::vector<double> autoregression;  ///< y_k = sum a_j y_(k-j) + innovation
+  double samples = 0.0;                ///< that it was estimated from
 };
 
 struct NoiseModel {

@@ -14,6 +14,7 @@
 #include "estimator/explain/verdict/explanation_json.hpp"
 #include "estimator/io/whole_file.hpp"
 #include "estimator/model/session.hpp"
+#include "estimator/parallel/parallel_for.hpp"
 #include "tools/benchmarks/timed_process.hpp"
 #include "tools/score/score.hpp"
 #include "tools/sim_rig/hidden_effects.hpp"
@@ -100,9 +101,10 @@ std::string study_of(const std::string& name, std::array<double, 2> C1_kPa, cons
 
 struct Simulated {
   uint64_t rig = 1;
-  uint64_t seed = 1;
+  uint64_t seed = 1;  ///< of the noise
   std::vector<std::string> hidden;
   double C1_kPa = 8.8;
+  uint64_t hide_seed = 1;
 };
 
 void write(const fs::path& file, const std::string& text) { std::ofstream(file, std::ios::binary) << text; }
@@ -111,7 +113,6 @@ void write(const fs::path& file, const std::string& text) { std::ofstream(file, 
 void simulate(const Simulated& session, const fs::path& folder, const std::string& name) {
   const fs::path run = folder / (name + ".run.h5");
   if (fs::exists(run)) return;
-  fs::create_directories(folder / "sealed");
   write(folder / (name + ".rig.toml"), read_whole_file(fs::path(DIASTOLE_SOURCE_DIR) / "examples/rig.toml") +
                                            fmt::format("\n[simulation]\nC1_kPa = {:.4f}\n", session.C1_kPa));
   std::vector<std::string> command{DIASTOLE_BIN_DIR "/diastole",
@@ -125,6 +126,8 @@ void simulate(const Simulated& session, const fs::path& folder, const std::strin
                                    fmt::to_string(session.rig),
                                    "--seed",
                                    fmt::to_string(session.seed),
+                                   "--hide-seed",
+                                   fmt::to_string(session.hide_seed),
                                    "--sealed",
                                    "sealed/" + name + ".sealed.json"};
   for (const std::string& id : session.hidden)
@@ -167,48 +170,81 @@ std::vector<std::vector<std::string>> hidden_in_round(uint64_t round) {
   return sets;
 }
 
+/// The sessions of one rig, simulated.
+struct Round {
+  fs::path folder;
+  std::vector<Asked> alone, with_reference;
+
+  /// Of a pair the first effect alone, of the same size.
+  [[nodiscard]] fs::path of_first(size_t k) const {
+    return folder / (alone[k].truth.name + "-first.study.toml");
+  }
+};
+
+Round simulated_round(uint64_t number, const fs::path& folder) {
+  Round round{.folder = folder, .alone = {}, .with_reference = {}};
+  constexpr std::array unknown_kPa{1.0, 20.0};
+  std::mt19937_64 random(1000 + number);
+  const auto casting_kPa = [&] { return 8.8 * (0.9 + 0.2 * static_cast<double>(random() >> 11) * 0x1p-53); };
+  fs::create_directories(folder / "sealed");
+  std::vector<std::pair<std::string, Simulated>> sessions;
+  uint64_t seed = 1000 * number;
+  std::string references;
+  for (const char* name : {"ref-1", "ref-2"}) {
+    ++seed;
+    const Simulated session{number, seed, {"none"}, casting_kPa(), seed};
+    sessions.emplace_back(name, session);
+    write(folder / fmt::format("{}.study.toml", name),
+          study_of(name, {0.98 * session.C1_kPa, 1.02 * session.C1_kPa}, ""));
+    references += fmt::format("{}\"{}.study.toml\"", references.empty() ? "" : ", ", name);
+  }
+  const double C1_kPa = casting_kPa();
+  std::vector<std::string> names;
+  for (const std::vector<std::string>& hidden : hidden_in_round(number)) {
+    const std::string& name = names.emplace_back(fmt::format("r{}-{:02}", number, names.size() + 1));
+    ++seed;
+    sessions.emplace_back(name, Simulated{number, seed, hidden, C1_kPa, seed});
+    if (hidden.size() == 2) {
+      sessions.emplace_back(name + "-first", Simulated{number, seed + 500, {hidden.front()}, C1_kPa, seed});
+      write(folder / (name + "-first.study.toml"), study_of(name + "-first", unknown_kPa, ""));
+    }
+    write(folder / (name + ".study.toml"), study_of(name, unknown_kPa, ""));
+    write(folder / (name + "-with-reference.study.toml"),
+          study_of(name, unknown_kPa, "reference = [" + references + "]\n"));
+  }
+  parallel_for(sessions.size(), 2,
+               [&](size_t k) { simulate(sessions[k].second, folder, sessions[k].first); });
+  for (const std::string& name : names) {
+    const Truth truth = explain::read_truths(folder / "sealed" / (name + ".sealed.json")).front();
+    round.alone.push_back({truth, folder / (name + ".study.toml")});
+    round.with_reference.push_back({truth, folder / (name + "-with-reference.study.toml")});
+  }
+  return round;
+}
+
 struct World3 {
   std::vector<ScoredCase> alone, with_reference;
 };
 
 World3 simulated_world(const WorldsOptions& options) {
   World3 world;
-  for (uint64_t round = options.first_round; round < options.first_round + options.rounds; ++round) {
-    const fs::path folder = options.kept / fmt::format("rig-{}", round);
-    std::mt19937_64 random(1000 + round);
-    const auto casting_kPa = [&] {
-      return 8.8 * (0.9 + 0.2 * static_cast<double>(random() >> 11) * 0x1p-53);
-    };
-    uint64_t seed = 1000 * round;
-    std::string references;
-    for (const char* name : {"ref-1", "ref-2"}) {
-      const Simulated session{round, ++seed, {"none"}, casting_kPa()};
-      simulate(session, folder, name);
-      write(folder / fmt::format("{}.study.toml", name),
-            study_of(name, {0.98 * session.C1_kPa, 1.02 * session.C1_kPa}, ""));
-      references += fmt::format("{}\"{}.study.toml\"", references.empty() ? "" : ", ", name);
-    }
-    std::vector<Asked> alone, with_reference;
-    const double C1_kPa = casting_kPa();
-    for (const std::vector<std::string>& hidden : hidden_in_round(round)) {
-      const std::string name = fmt::format("r{}-{:02}", round, alone.size() + 1);
-      simulate({round, ++seed, hidden, C1_kPa}, folder, name);
-      constexpr std::array unknown_kPa{1.0, 20.0};
-      write(folder / (name + ".study.toml"), study_of(name, unknown_kPa, ""));
-      write(folder / (name + "-with-reference.study.toml"),
-            study_of(name, unknown_kPa, "reference = [" + references + "]\n"));
-      const Truth truth = explain::read_truths(folder / "sealed" / (name + ".sealed.json")).front();
-      alone.push_back({truth, folder / (name + ".study.toml")});
-      with_reference.push_back({truth, folder / (name + "-with-reference.study.toml")});
-    }
-    std::vector<ScoredCase> a = answers(alone, folder / "alone", options.resume);
-    std::vector<ScoredCase> b = answers(with_reference, folder / "with-reference", options.resume);
+  for (uint64_t number = options.first_round; number < options.first_round + options.rounds; ++number) {
+    const fs::path folder = options.kept / fmt::format("rig-{}", number);
+    const Round round = simulated_round(number, folder);
+    std::vector<ScoredCase> a = answers(round.alone, folder / "alone", options.resume);
+    std::vector<ScoredCase> b = answers(round.with_reference, folder / "with-reference", options.resume);
     // Nothing is hidden in the first two: what they differ by is noise.
-    const double noise_kPa2 = difference_kPa2(alone[1].study, alone[0].study);
+    const fs::path& clean = round.alone[0].study;
+    const double noise_kPa2 = difference_kPa2(round.alone[1].study, clean);
     for (size_t k = 0; k < a.size(); ++k) {
-      const double change_kPa2 = difference_kPa2(alone[k].study, alone[0].study) - noise_kPa2;
+      const fs::path& study = round.alone[k].study;
+      const double change_kPa2 =
+          a[k].truth.kind == explain::TruthKind::pair
+              ? std::min(difference_kPa2(round.of_first(k), clean), difference_kPa2(study, round.of_first(k)))
+              : difference_kPa2(study, clean);
       // The rig's own error is what its references left.
-      const double times = 1e3 * std::sqrt(std::max(0.0, change_kPa2)) / b[k].found.model_error->rms_Pa;
+      const double times =
+          1e3 * std::sqrt(std::max(0.0, change_kPa2 - noise_kPa2)) / b[k].found.model_error->rms_Pa;
       for (ScoredCase* one : {&a[k], &b[k]})
         one->truth.size = times >= 5   ? EffectSize::large
                           : times >= 2 ? EffectSize::medium

@@ -114,6 +114,7 @@ bool is_right(const ScoredCase& c) {
         return !is_wrong_name(c) && (c.found.verdict != Verdict::ambiguous || is_inside(c));
       return c.truth.size == EffectSize::medium || has_alternatives(c) ? is_inside(c) : is_exact(c);
     case TruthKind::pair:
+      if (c.truth.size != EffectSize::large) return !is_wrong_name(c);
       return has_alternatives(c) ? is_inside(c) : is_exact(c);
   }
   return false;
@@ -144,7 +145,7 @@ std::string hidden_words(const ScoredCase& c) {
   if (ids.empty()) return "none";
   const std::string set = fmt::format("{}", fmt::join(ids, " + "));
   if (c.truth.kind == TruthKind::inseparable || has_alternatives(c)) return set + " (inseparable)";
-  if (c.truth.kind != TruthKind::single || c.truth.size == EffectSize::large) return set;
+  if (c.truth.size == EffectSize::large) return set;
   return set + (c.truth.size == EffectSize::medium ? " (medium)" : " (small)");
 }
 
@@ -251,6 +252,9 @@ bool is_single(const ScoredCase& c) {
   return is_of<TruthKind::single>(c) && c.truth.size == size &&
          (size == EffectSize::small || !has_alternatives(c));
 }
+bool is_large_pair(const ScoredCase& c) {
+  return is_of<TruthKind::pair>(c) && c.truth.size == EffectSize::large;
+}
 bool is_open(const ScoredCase& c) {
   return is_of<TruthKind::inseparable>(c) ||
          (is_of<TruthKind::single>(c) && c.truth.size != EffectSize::small && has_alternatives(c));
@@ -278,7 +282,7 @@ std::vector<ShareFigure> naming(const Targets& asked) {
        is_single<EffectSize::medium>,
        is_right},
       {"single, small: wrong name", {false, asked.small_wrong}, is_single<EffectSize::small>, is_wrong_name},
-      {"pairs: both exact", {true, asked.pairs_exact}, is_of<TruthKind::pair>, is_right},
+      {"pairs, both large: exact", {true, asked.pairs_exact}, is_large_pair, is_right},
       {"pairs: any false name", {false, asked.pairs_false}, is_of<TruthKind::pair>, is_wrong_name},
       {"outside the library: wrongly named",
        {false, asked.outside_named},

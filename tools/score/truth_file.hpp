@@ -41,7 +41,8 @@ struct Truth {
   std::vector<std::vector<std::string>>
       alternatives_without_reference;       ///< and those if the rig's error is not known
   std::vector<HiddenEffect> imperfections;  ///< of the rig, large enough to be named
-  EffectSize size = EffectSize::large;      ///< if the file does not say: small below d = 8
+  EffectSize size =
+      EffectSize::large;  ///< of a pair the smaller one's; if the file does not say: small below d = 8
   double size_sigma = std::numeric_limits<double>::quiet_NaN();  ///< d; NaN if the file does not say
   std::vector<Verdict> acceptable;                               ///< if the file restricts the verdicts
 

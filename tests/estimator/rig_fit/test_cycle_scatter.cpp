@@ -44,7 +44,15 @@ TEST_F(Scatter, IsTheSizeOfPickupWithAFrequencyOfItsOwn) {
             0.1 * std::sin(2 * std::numbers::pi * 3.1415 * run.sample_s[k]);
   const auto found = of(session);
   EXPECT_NEAR(found[0].rms_kPa, 0.1 / std::numbers::sqrt2, 0.02);
+  EXPECT_GT(found[0].sds, 5.0);
   EXPECT_LT(found[1].rms_kPa, found[1].noise_kPa);
+}
+
+TEST_F(Scatter, OfNoiseAloneIsWithinItsError) {
+  for (unsigned seed = 1; seed <= 20; ++seed)
+    for (const CycleScatter& channel :
+         of(long_session(family_, {.noise_kPa = 0.02, .cycle_sd = 0.004, .seed = seed})))
+      EXPECT_LT(channel.sds, 3.0) << "seed " << seed;
 }
 
 TEST_F(Scatter, IsNotMadeByASingleEvent) {

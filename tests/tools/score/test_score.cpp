@@ -58,7 +58,7 @@ TEST(Score, CountsEachRow) {
   EXPECT_EQ(row_of(score, "none:").hits, 0U);
   EXPECT_EQ(row_of(score, "none:").cases, 2U);
   EXPECT_EQ(row_of(score, "single, large").value, 0.5);
-  EXPECT_EQ(row_of(score, "pairs: both").hits, 1U);
+  EXPECT_EQ(row_of(score, "pairs, both").hits, 1U);
   EXPECT_EQ(row_of(score, "pairs: any").hits, 0U);
   EXPECT_EQ(row_of(score, "outside the library: unexplained").value, 1.0);
   EXPECT_EQ(row_of(score, "inseparable").value, 1.0);  // what fits as well is no wrong name
