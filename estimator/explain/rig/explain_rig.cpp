@@ -15,6 +15,7 @@
 #include "estimator/explain/rig/learned_term.hpp"
 #include "estimator/explain/rig/next_experiment.hpp"
 #include "estimator/explain/rig/reference_file.hpp"
+#include "estimator/explain/rig/part_strain.hpp"
 #include "estimator/explain/rig/set_verdict.hpp"
 #include "estimator/explain/verdict/verdict.hpp"
 #include "estimator/model/study_effects.hpp"

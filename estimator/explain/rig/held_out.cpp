@@ -5,10 +5,13 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <numbers>
+#include <numeric>
 
 #include "estimator/explain/rig/law_fit.hpp"
+#include "estimator/explain/rig/part_strain.hpp"
 
 namespace diastole::explain {
 namespace {
@@ -47,6 +50,7 @@ struct MotionState {
   double phase = 0.0;               ///< part of the cycle
 };
 
+constexpr std::array pressures{rig::Signal::cavity, rig::Signal::pump};
 constexpr int highest_power = 3;
 constexpr int highest_harmonic = 2;
 
@@ -148,7 +152,6 @@ double held_out_density(const LinearFeatures& features, const rig::ModelError& e
 MatrixXd smooth_functions(const rig::SessionProblem& problem) {
   const auto motions = motions_of(problem.session());
   const auto count = static_cast<Index>(smooth_values({}).size());
-  constexpr std::array pressures{rig::Signal::cavity, rig::Signal::pump};
   MatrixXd functions =
       MatrixXd::Zero(problem.features().count(), count * static_cast<Index>(pressures.size()));
   for (const rig::FeatureBlock& block : problem.features().blocks()) {
@@ -164,20 +167,30 @@ MatrixXd smooth_functions(const rig::SessionProblem& problem) {
                     static_cast<Index>(block.features.size()), count) =
         rig::SegmentFeatures::project(block, values);
   }
+  for (Index j = 0; j < functions.cols(); ++j) {
+    const auto squares = problem.features().mean_squares(functions.col(j).cwiseAbs2());
+    const double square = squares[static_cast<size_t>(pressures[static_cast<size_t>(j / count)])];
+    if (square > 0.0) functions.col(j) /= std::sqrt(square);
+  }
   return functions;
 }
 
-LinearFeatures smooth_discrepancy(const EffectSet& plain, const MatrixXd& functions, size_t count) {
+LinearFeatures smooth_discrepancy(const EffectSet& plain, const MatrixXd& functions, size_t count,
+                                  const std::vector<Index>& rows) {
   // What functions and misfit have beyond the nuisances, in sds.
-  const VectorXd weight = plain.evidence.variance.cwiseInverse();
   const VectorXd target = plain.target();
-  const MatrixXd weighted = weight.asDiagonal() * plain.columns;
-  const Eigen::LLT<MatrixXd> nuisances(plain.evidence.precision);
-  const MatrixXd mixed = weighted.transpose() * functions;
+  const VectorXd weight = plain.evidence.variance(rows).cwiseInverse();
+  const MatrixXd nuisances = plain.columns(rows, Eigen::all), some = functions(rows, Eigen::all);
+  const MatrixXd weighted = weight.asDiagonal() * nuisances;
+  MatrixXd precision = weighted.transpose() * nuisances;
+  precision.diagonal().array() += 1.0;
+  const Eigen::LLT<MatrixXd> factor(precision);
+  const MatrixXd mixed = weighted.transpose() * some;
   const MatrixXd products =
-      functions.transpose() * weight.asDiagonal() * functions - mixed.transpose() * nuisances.solve(mixed);
-  const VectorXd along = functions.transpose() * weight.cwiseProduct(target) -
-                         mixed.transpose() * nuisances.solve(weighted.transpose() * target);
+      some.transpose() * weight.asDiagonal() * some - mixed.transpose() * factor.solve(mixed);
+  const VectorXd misfit = target(rows);
+  const VectorXd along = some.transpose() * weight.cwiseProduct(misfit) -
+                         mixed.transpose() * factor.solve(weighted.transpose() * misfit);
   std::vector<Index> chosen;
   VectorXd sizes;
   while (chosen.size() < count) {
@@ -188,9 +201,9 @@ LinearFeatures smooth_discrepancy(const EffectSet& plain, const MatrixXd& functi
       list.push_back(j);
       if (std::ranges::count(chosen, j) > 0) continue;
       constexpr double apart = 1e-9;  // of its square, that is beyond the others
-      const Eigen::LDLT<MatrixXd> factor(products(list, list));
-      if (!(factor.vectorD().minCoeff() > apart * functions.col(j).cwiseAbs2().dot(weight))) continue;
-      const VectorXd found = factor.solve(along(list));
+      const Eigen::LDLT<MatrixXd> trial(products(list, list));
+      if (!(trial.vectorD().minCoeff() > apart * some.col(j).cwiseAbs2().dot(weight))) continue;
+      const VectorXd found = trial.solve(along(list));
       if (const double gain = found.dot(along(list)); gain > best) {
         best = gain;
         best_list = list;
@@ -208,31 +221,44 @@ LinearFeatures smooth_discrepancy(const EffectSet& plain, const MatrixXd& functi
   return with;
 }
 
-double held_out_gain(const rig::SessionProblem& problem, const EffectSet& plain, const EffectSet& set,
-                     bool plain_may_be) {
+double held_out_gain(const rig::SessionProblem& problem, const EffectSet& plain, const EffectSet& set) {
   const auto freedom = [](const EffectSet& of) {
     size_t count = of.model.values.size();
     for (const rig::ModelTerm& term : of.model.terms)
       count += term.change_points.size();
     return count;
   };
-  const std::vector<Fold> folds = folds_of(problem);
-  const auto density = [&](const LinearFeatures& of, const rig::Shares& near) {
-    double sum = 0.0;
-    for (const Fold& fold : folds) {
-      const std::vector<Index> others = fold.others();
-      const rig::ModelError error = error_of_rows(problem.error(), others);
-      const rig::Shares shares =
-          fit_with_shares(of.target(others), of.columns(others, Eigen::all), error, near).shares;
-      sum += held_out_density(of, problem.error(), others, shares);
-    }
-    return sum;
+  const size_t values = freedom(set) - freedom(plain);
+  const auto effects = static_cast<double>(set.model.terms.size() - plain.model.terms.size());
+  const auto of_its_parts = [&](const LinearFeatures& of, const EffectSet& near) {
+    const VectorXd u = fit_with_shares(of.target, of.columns, problem.error(), near.evidence.shares).u;
+    return std::log(std::max(strain_by_chance(problem, near.model, u), std::numeric_limits<double>::min()));
   };
-  const LinearFeatures smooth =
-      smooth_discrepancy(plain, smooth_functions(problem), freedom(set) - freedom(plain));
-  double rival = density(smooth, plain.evidence.shares);
-  if (plain_may_be) rival = std::max(rival, density(features_of(plain), plain.evidence.shares));
-  return density(features_of(set), set.evidence.shares) - rival;
+  const auto of_fold = [&](const LinearFeatures& of, const EffectSet& near,
+                           const std::vector<Index>& others) {
+    const rig::ModelError error = error_of_rows(problem.error(), others);
+    const rig::Shares shares =
+        fit_with_shares(of.target(others), of.columns(others, Eigen::all), error, near.evidence.shares)
+            .shares;
+    return held_out_density(of, problem.error(), others, shares);
+  };
+  const MatrixXd functions = smooth_functions(problem);
+  std::vector<Index> all(static_cast<size_t>(problem.features().count()));
+  std::iota(all.begin(), all.end(), Index{0});
+  double with = of_its_parts(features_of(set), set);
+  double without = of_its_parts(features_of(plain), plain);
+  double smooth = of_its_parts(smooth_discrepancy(plain, functions, values, all), plain) +
+                  effects * std::log(effect_odds);
+  const std::vector<Fold> folds = folds_of(problem);
+  for (const Fold& fold : folds) {
+    const std::vector<Index> others = fold.others();
+    with += of_fold(features_of(set), set, others);
+    without += of_fold(features_of(plain), plain, others);
+    // A single waveform has no others to choose by.
+    smooth +=
+        of_fold(smooth_discrepancy(plain, functions, values, folds.size() > 1 ? others : all), plain, others);
+  }
+  return with - std::max(without, smooth);
 }
 
 double log_mean(const std::vector<double>& logarithms) {

@@ -5,8 +5,12 @@
 // show. The logarithm of a waveform's density by one model over that by another is the first one's gain there.
 //
 // A set has to gain over a generic smooth discrepancy, too: of polynomials of volume and flow to the third power and of two
-// harmonics of the cycle's phase, in each pressure, as many as the set has values, those that explain most beside the model
-// without effects. It knows no physics; what predicts no better than it does says where the misfit lies, and not what it is.
+// harmonics of the cycle's phase, in each pressure, as many as the set has values, those that explain most of the other
+// waveforms beside the model without effects. It knows no physics; what predicts no better than it does says where the misfit
+// lies, and not what it is. Before the data it is as improbable as the set.
+//
+// A model that pulls parts of the rig far off predicts well once the other waveforms have paid for that. It is charged
+// with how seldom parts are so far off (part_strain.hpp).
 
 #include <string>
 #include <vector>
@@ -39,16 +43,15 @@ struct LinearFeatures {
 double held_out_density(const LinearFeatures& features, const rig::ModelError& error,
                         const std::vector<Eigen::Index>& others, const rig::Shares& shares);
 
-/// Features of the smooth functions, a column each.
+/// Features of the smooth functions, a column each, with a mean square of one in its pressure.
 Eigen::MatrixXd smooth_functions(const rig::SessionProblem& problem);
-/// The model without effects beside as many of the functions.
-LinearFeatures smooth_discrepancy(const EffectSet& plain, const Eigen::MatrixXd& functions, size_t count);
+/// The model without effects beside as many of the functions: those that explain most of these rows.
+LinearFeatures smooth_discrepancy(const EffectSet& plain, const Eigen::MatrixXd& functions, size_t count,
+                                  const std::vector<Eigen::Index>& rows);
 
 /// What a set gains over the better of the models without its effects: ln of the pseudo-Bayes factor, the product over folds of
-/// their predictive densities (S. Geisser, W. F. Eddy, J. Am. Stat. Assoc. 74 (1979) 153). A model without them whose parts are
-/// further off than parts are predicts as well as the set once the other folds have paid for them: `plain_may_be` false, it is none.
-double held_out_gain(const rig::SessionProblem& problem, const EffectSet& plain, const EffectSet& set,
-                     bool plain_may_be);
+/// their predictive densities (S. Geisser, W. F. Eddy, J. Am. Stat. Assoc. 74 (1979) 153) times that of their parts.
+double held_out_gain(const rig::SessionProblem& problem, const EffectSet& plain, const EffectSet& set);
 
 /// ln of the mean of what e to these is.
 double log_mean(const std::vector<double>& logarithms);

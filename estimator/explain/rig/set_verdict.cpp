@@ -8,6 +8,7 @@
 
 #include "estimator/explain/rig/changed_parts.hpp"
 #include "estimator/explain/rig/held_out.hpp"
+#include "estimator/explain/rig/part_strain.hpp"
 
 namespace diastole::explain {
 namespace {
@@ -19,29 +20,13 @@ using Ids = std::vector<std::string>;
 constexpr double name_probability = 0.9;
 constexpr double right_to = 0.1;            ///< an effect's equations, of a real part
 constexpr double least_probability = 0.05;  ///< of a set that is told of
-/// How seldom any part of a model's error may be as large by chance: two sds of one.
-constexpr double surprising_by_chance = 0.0228;
+constexpr double irregular_by_chance = 0.001;
 
 struct Sizes {
   std::vector<double> over_error;
   std::vector<bool> material;
   VectorXd changed;  ///< squares of what all of them change
 };
-
-/// Squares of features by signal, over the samples they live in.
-std::array<double, rig::signal_count> mean_squares(const rig::SessionProblem& problem,
-                                                   const VectorXd& squares) {
-  std::array<double, rig::signal_count> sums{}, rows{};
-  for (const rig::FeatureBlock& block : problem.features().blocks()) {
-    const auto s = static_cast<size_t>(block.signal);
-    sums[s] +=
-        squares.segment(static_cast<Index>(block.first), static_cast<Index>(block.features.size())).sum();
-    rows[s] += static_cast<double>(block.rows);
-  }
-  for (size_t s = 0; s < sums.size(); ++s)
-    sums[s] = rows[s] > 0.0 ? sums[s] / rows[s] : 0.0;
-  return sums;
-}
 
 VectorXd error_squares(const rig::ModelError& error, const rig::Shares& shares) {
   return error.variance(shares) - error.noise;
@@ -81,8 +66,8 @@ ChangeSize size_of_change(const rig::SessionProblem& problem, const EffectSet& s
   Eigen::MatrixXd normal = basic.transpose() * weight.asDiagonal() * basic;
   normal.diagonal().array() += 1e-6;  // a channel that is not there has no offset
   const VectorXd left = change - basic * normal.llt().solve(basic.transpose() * weight.cwiseProduct(change));
-  const auto error = mean_squares(problem, error_squares(problem.error(), set.evidence.shares));
-  const auto size = mean_squares(problem, left.cwiseAbs2());
+  const auto error = problem.features().mean_squares(error_squares(problem.error(), set.evidence.shares));
+  const auto size = problem.features().mean_squares(left.cwiseAbs2());
   ChangeSize found{.squares = left.cwiseAbs2(),
                    .over_error = 0.0,
                    .is_tolerance = is_tolerance(problem, set, change, left)};
@@ -153,13 +138,13 @@ std::optional<rig::Tone> material_tone(const rig::SessionProblem& problem, const
   return tone && tone->rms_kPa > std::max(least_kPa, tone->noise_kPa) ? tone : std::nullopt;
 }
 
-/// Do equal cycles differ by more than the noise, and materially?
+/// Do equal cycles differ by more than noise makes them (once in a thousand sessions), and materially?
 bool is_irregular(const rig::SessionProblem& problem, const std::vector<rig::CycleScatter>& scatter) {
   return std::ranges::any_of(scatter, [&](const rig::CycleScatter& channel) {
     const auto group = channel.signal == rig::Signal::pump ? rig::ErrorGroup::pump : rig::ErrorGroup::cavity;
     const double least_kPa = rig::SharePrior::least[static_cast<size_t>(group)] *
                              problem.error().range[static_cast<size_t>(channel.signal)];
-    return channel.rms_kPa > std::max(least_kPa, channel.noise_kPa);
+    return channel.rms_kPa > least_kPa && seldom(channel.sds) < irregular_by_chance;
   });
 }
 
@@ -197,27 +182,17 @@ bool bears_a_name(const rig::SessionProblem& problem, const EffectSet& set, cons
          !is_strained_in_all(problem, set, again.u.tail(set.model.u.size()));
 }
 
-/// What a set gains on waveforms that it was not fitted to has to overcome the effects' odds as all data do. A misfit that any
-/// smooth function predicts as well is no effect's mark.
-bool predicts(double held_out_gain, size_t effects) {
-  return held_out_gain + static_cast<double>(effects) * std::log(effect_odds) >
-         std::log(name_probability / (1.0 - name_probability));
-}
-
-/// How often a normal error lies further to one side.
-double seldom(double sds) { return boost::math::cdf(boost::math::complement(boost::math::normal(), sds)); }
-
-/// How often the largest of all tolerances is as far to either side.
-double strain_by_chance(const rig::SessionProblem& problem, const EffectSet& set) {
-  const auto tolerances = static_cast<double>(problem.nuisances().size() - rig::basic_nuisances);
-  return -std::expm1(tolerances * std::log1p(-2.0 * seldom(largest_tolerance(problem, set))));
+/// ln of the odds of a set on waveforms that it was not fitted to alone: what it gains there has to overcome the effects' prior
+/// odds as all data do.
+double held_out_odds(double held_out_gain, size_t effects) {
+  return held_out_gain + static_cast<double>(effects) * std::log(effect_odds);
 }
 
 /// That nothing is wrong is not said of a misfit that one part shows so seldom, nor of one tolerance so far to either side,
 /// nor of both as seldom together (Fisher 1925: minus two ln of their product is chi-square on four).
 bool bears_nothing_wrong(const rig::SessionProblem& problem, const EffectSet& set) {
   const double misfit = seldom(std::ranges::max(set.evidence.surprise(problem.error().prior)));
-  const double strain = strain_by_chance(problem, set);
+  const double strain = strain_by_chance(problem, set.model, set.model.u);
   const double product = misfit * strain;
   const double together = product > 0.0 ? product * (1.0 - std::log(product)) : 0.0;
   return inference::is_settled(set.termination) &&
@@ -228,17 +203,7 @@ bool bears_nothing_wrong(const rig::SessionProblem& problem, const EffectSet& se
 
 double error_rms(const rig::SessionProblem& problem, const rig::Shares& shares, rig::Signal signal) {
   return std::sqrt(
-      mean_squares(problem, error_squares(problem.error(), shares))[static_cast<size_t>(signal)]);
-}
-
-double largest_tolerance(const rig::SessionProblem& problem, const EffectSet& set) {
-  const VectorXd& described = problem.prior(set.model).described;
-  if (described.size() == 0) return 0.0;
-  return set.model.u.tail(described.size()).cwiseProduct(described).cwiseAbs().maxCoeff();
-}
-
-bool is_strained(const rig::SessionProblem& problem, const EffectSet& set) {
-  return strain_by_chance(problem, set) < surprising_by_chance;
+      problem.features().mean_squares(error_squares(problem.error(), shares))[static_cast<size_t>(signal)]);
 }
 
 SetVerdict judge_sets(const rig::SessionProblem& problem, const SetSearch& search,
@@ -301,14 +266,18 @@ SetVerdict judge_sets(const rig::SessionProblem& problem, const SetSearch& searc
               : bears_nothing_wrong(problem, best) || (may_be_plain && bears_nothing_wrong(problem, *plain));
   out.scatter = rig::cycle_scatter(problem, best.model);
   out.tone = material_tone(problem, best, error);
-  if (is_more) out.held_out_gain = held_out_gain(problem, *plain, best, !is_strained(problem, *plain));
-  const bool predicted = !is_more || predicts(*out.held_out_gain, best.model.terms.size() - search.given);
+  if (is_more) out.held_out_gain = held_out_gain(problem, *plain, best);
+  const double sure = std::log(name_probability / (1.0 - name_probability));
+  const double odds =
+      is_more ? held_out_odds(*out.held_out_gain, best.model.terms.size() - search.given) : sure;
+  const bool predicted = !is_more || odds > sure;
   if (!borne || is_irregular(problem, out.scatter) || !is_settled(out.searches)) {
     out.verdict = Verdict::unexplained;
     return out;
   }
   if (out.confidence >= name_probability) {
-    if (!predicted && !out.tone && bears_nothing_wrong(problem, *plain)) {
+    const bool may_be_nothing_known = odds > -sure || bears_nothing_wrong(problem, *plain);
+    if (!predicted && !out.tone && may_be_nothing_known) {
       out.verdict = Verdict::ambiguous;
       for (size_t k = 0; k < search.sets.size(); ++k)
         if (is_plain(search.sets[k])) out.confidence += search.probability[k];

@@ -7,7 +7,8 @@
 // named by nobody: probabilities of sets that differ by them add. A set is named with a probability of
 // nine tenths; sets that are less certain are ambiguous. It has to have the same odds on waveforms that it was not fitted to
 // alone, against the model without it and against a smooth discrepancy of like freedom (held_out.hpp). Where even the best set needs a model's error larger than what is
-// known of it allows, the misfit is unexplained; so it is where new waveforms do not bear the set, unless nothing is wrong with the rig without it: "this set or nothing".
+// known of it allows, the misfit is unexplained; so it is where new waveforms do not bear the set. It is "this set or nothing that is known" where they do not speak
+// against it with such odds either, or where nothing is wrong with the rig without the set.
 // That nothing is wrong is not said beside a tone that is as material (tone.hpp); a name stands beside it, since no effect
 // makes one.
 
@@ -46,13 +47,6 @@ struct SetVerdict {
   /// Of the leading set, if it has more than the given effects: held_out_gain()'s.
   std::optional<double> held_out_gain = {};
 };
-
-/// Of a set's tolerances the one furthest from its prior, in sds of the list or of
-/// what references left: to be a little coarser than in a fine rig is no strain.
-double largest_tolerance(const rig::SessionProblem& problem, const EffectSet& set);
-
-/// Is that one so far off as is seldom by chance, of all?
-bool is_strained(const rig::SessionProblem& problem, const EffectSet& set);
 
 /// A change of the features beside a set: modulus and offsets follow.
 struct ChangeSize {

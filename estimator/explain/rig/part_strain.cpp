@@ -1,0 +1,31 @@
+#include "estimator/explain/rig/part_strain.hpp"
+
+#include <boost/math/distributions/normal.hpp>
+#include <cmath>
+
+namespace diastole::explain {
+
+double seldom(double sds) { return boost::math::cdf(boost::math::complement(boost::math::normal(), sds)); }
+
+double largest_tolerance(const rig::SessionProblem& problem, const rig::SessionModel& model,
+                         const Eigen::VectorXd& u) {
+  const Eigen::VectorXd& described = problem.prior(model).described;
+  if (described.size() == 0) return 0.0;
+  return u.tail(described.size()).cwiseProduct(described).cwiseAbs().maxCoeff();
+}
+
+double largest_tolerance(const rig::SessionProblem& problem, const EffectSet& set) {
+  return largest_tolerance(problem, set.model, set.model.u);
+}
+
+double strain_by_chance(const rig::SessionProblem& problem, const rig::SessionModel& model,
+                        const Eigen::VectorXd& u) {
+  const auto tolerances = static_cast<double>(problem.nuisances().size() - rig::basic_nuisances);
+  return -std::expm1(tolerances * std::log1p(-2.0 * seldom(largest_tolerance(problem, model, u))));
+}
+
+bool is_strained(const rig::SessionProblem& problem, const EffectSet& set) {
+  return strain_by_chance(problem, set.model, set.model.u) < surprising_by_chance;
+}
+
+}  // namespace diastole::explain
