@@ -97,6 +97,8 @@ int main(int argc, char** argv) {
   app.add_option("--only", of_worlds.worlds, "these of the three")->check(CLI::Range(1, 3));
   app.add_option("--rounds", of_worlds.rounds, "of world 3, 40 sessions each")->capture_default_str();
   app.add_option("--first-round", of_worlds.first_round, "of world 3: its rig")->capture_default_str();
+  app.add_flag("--proposals", of_worlds.proposals,
+               "of world 3: run the experiments that answers propose, and ask again");
   app.add_flag("--resume", of_worlds.resume, "keep what a stopped run answered");
   CLI11_PARSE(app, argc, argv);
   if (worlds) return bench::explain_worlds(of_worlds) ? 0 : 1;

@@ -27,6 +27,7 @@ using explain::EffectSize;
 using explain::Explanation;
 using explain::ScoredCase;
 using explain::Truth;
+using explain::Verdict;
 
 const fs::path example = fs::path(DIASTOLE_SOURCE_DIR) / "examples/hidden-effect";
 
@@ -82,6 +83,20 @@ bool report(const std::string& title, const std::vector<ScoredCase>& cases, cons
   return score.met();
 }
 
+/// Is the answer what is hidden, in full: also nothing, or of no library?
+bool is_truth(const ScoredCase& c) {
+  if (c.truth.kind == explain::TruthKind::none) return c.found.verdict == Verdict::none;
+  if (c.truth.kind == explain::TruthKind::outside) return c.found.verdict == Verdict::unexplained;
+  return explain::is_exact(c);
+}
+
+void report_proposals(const std::vector<ScoredCase>& again) {
+  const auto hits = static_cast<size_t>(std::ranges::count_if(again, is_truth));
+  const auto [low, high] = explain::clopper_pearson(hits, again.size());
+  fmt::print("\nThe answer is the truth after the proposed experiment: {} of {} (95 %: {:.0f} to {:.0f} %)\n",
+             hits, again.size(), 100.0 * low, 100.0 * high);
+}
+
 // --- World 3 -----------------------------------------------------------------------------------------------------------
 
 /// The example's study of a run NAME.run.h5, with bounds of the modulus and references.
@@ -110,14 +125,15 @@ struct Simulated {
 void write(const fs::path& file, const std::string& text) { std::ofstream(file, std::ios::binary) << text; }
 
 /// NAME.run.h5 in `folder`, and what is hidden in it sealed/NAME.sealed.json.
-void simulate(const Simulated& session, const fs::path& folder, const std::string& name) {
+void simulate(const Simulated& session, const fs::path& folder, const std::string& name,
+              const fs::path& experiment = example / "mine.experiment.toml") {
   const fs::path run = folder / (name + ".run.h5");
   if (fs::exists(run)) return;
   write(folder / (name + ".rig.toml"), read_whole_file(fs::path(DIASTOLE_SOURCE_DIR) / "examples/rig.toml") +
                                            fmt::format("\n[simulation]\nC1_kPa = {:.4f}\n", session.C1_kPa));
   std::vector<std::string> command{DIASTOLE_BIN_DIR "/diastole",
                                    "simulate",
-                                   (example / "mine.experiment.toml").string(),
+                                   experiment.string(),
                                    "-o",
                                    name + ".run.h5",
                                    "--config",
@@ -173,6 +189,7 @@ std::vector<std::vector<std::string>> hidden_in_round(uint64_t round) {
 /// The sessions of one rig, simulated.
 struct Round {
   fs::path folder;
+  std::vector<Simulated> sessions;
   std::vector<Asked> alone, with_reference;
 
   /// Of a pair the first effect alone, of the same size.
@@ -182,7 +199,7 @@ struct Round {
 };
 
 Round simulated_round(uint64_t number, const fs::path& folder) {
-  Round round{.folder = folder, .alone = {}, .with_reference = {}};
+  Round round{.folder = folder, .sessions = {}, .alone = {}, .with_reference = {}};
   constexpr std::array unknown_kPa{1.0, 20.0};
   std::mt19937_64 random(1000 + number);
   const auto casting_kPa = [&] { return 8.8 * (0.9 + 0.2 * static_cast<double>(random() >> 11) * 0x1p-53); };
@@ -203,7 +220,8 @@ Round simulated_round(uint64_t number, const fs::path& folder) {
   for (const std::vector<std::string>& hidden : hidden_in_round(number)) {
     const std::string& name = names.emplace_back(fmt::format("r{}-{:02}", number, names.size() + 1));
     ++seed;
-    sessions.emplace_back(name, Simulated{number, seed, hidden, C1_kPa, seed});
+    round.sessions.push_back({number, seed, hidden, C1_kPa, seed});
+    sessions.emplace_back(name, round.sessions.back());
     if (hidden.size() == 2) {
       sessions.emplace_back(name + "-first", Simulated{number, seed + 500, {hidden.front()}, C1_kPa, seed});
       write(folder / (name + "-first.study.toml"), study_of(name + "-first", unknown_kPa, ""));
@@ -222,8 +240,47 @@ Round simulated_round(uint64_t number, const fs::path& folder) {
   return round;
 }
 
+/// Runs what answers propose that are open or have hints, on the same rig, and asks again with both runs.
+std::vector<ScoredCase> asked_again(const Round& round, const std::vector<Asked>& asked,
+                                    const std::vector<ScoredCase>& cases, const fs::path& kept, bool resume) {
+  std::vector<Asked> again;
+  std::vector<std::pair<size_t, fs::path>> experiments;
+  std::vector<std::string> before;
+  for (size_t k = 0; k < cases.size(); ++k) {
+    const explain::Explanation& found = cases[k].found;
+    if ((found.verdict != Verdict::ambiguous && found.hints.empty()) || !found.next_experiment) continue;
+    std::string name = asked[k].study.stem().stem().string() + "-next";
+    const fs::path experiment = round.folder / (name + ".experiment.toml");
+    if (!fs::exists(experiment) || read_whole_file(experiment) != found.next_experiment->toml)
+      fs::remove(round.folder / (name + ".run.h5"));
+    write(experiment, found.next_experiment->toml);
+    std::string text = read_whole_file(asked[k].study);
+    const std::string runs = fmt::format("runs = [\"{}.run.h5\"", asked[k].truth.name);
+    const size_t at = text.find(runs);
+    text.replace(at, runs.size(), fmt::format("{}, \"{}.run.h5\"", runs, name));
+    const fs::path study = round.folder / (name + ".study.toml");
+    write(study, text);
+    Truth truth = cases[k].truth;
+    truth.name = name;
+    again.push_back({std::move(truth), study});
+    experiments.emplace_back(k, experiment);
+    before.push_back(explain::answer_of(found));
+  }
+  parallel_for(again.size(), 2, [&](size_t i) {
+    Simulated session = round.sessions[experiments[i].first];
+    session.seed += 250;
+    simulate(session, round.folder, again[i].truth.name, experiments[i].second);
+  });
+  std::vector<ScoredCase> found = answers(again, kept, resume);
+  for (size_t i = 0; i < found.size(); ++i)
+    fmt::print("{} {}: {} -> {}\n", is_truth(found[i]) ? " " : "x", explain::hidden_words(found[i]),
+               before[i], explain::answer_of(found[i].found));
+  return found;
+}
+
 struct World3 {
   std::vector<ScoredCase> alone, with_reference;
+  std::vector<ScoredCase> again;  ///< with what was proposed
 };
 
 World3 simulated_world(const WorldsOptions& options) {
@@ -249,6 +306,14 @@ World3 simulated_world(const WorldsOptions& options) {
         one->truth.size = times >= 5   ? EffectSize::large
                           : times >= 2 ? EffectSize::medium
                                        : EffectSize::small;
+    }
+    if (options.proposals) {
+      fmt::print("\nRig {}: what was hidden: before -> with the proposed experiment\n", number);
+      std::ranges::move(asked_again(round, round.alone, a, folder / "alone-next", options.resume),
+                        std::back_inserter(world.again));
+      std::ranges::move(
+          asked_again(round, round.with_reference, b, folder / "with-reference-next", options.resume),
+          std::back_inserter(world.again));
     }
     std::ranges::move(a, std::back_inserter(world.alone));
     std::ranges::move(b, std::back_inserter(world.with_reference));
@@ -283,6 +348,7 @@ bool explain_worlds(const WorldsOptions& options) {
     }
     if (world == 3) {
       const World3 own = simulated_world(options);
+      if (options.proposals) report_proposals(own.again);
       add("World 3: the project's simulated rig, two references each", own.with_reference, {});
       add("World 3, no reference", own.alone, explain::no_reference);
     }

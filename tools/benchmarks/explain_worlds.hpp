@@ -5,7 +5,8 @@
 //   1  recordings of an independent program whose physics the rig's model holds exactly (../shared/data/rig)
 //   2  recordings of a second one: three rigs, each with imperfections of its own (../shared/data/rig2)
 //   3  the project's own simulated rig, `diastole simulate --rig-seed R --hide ID --hide-seed S`: rounds of 40 sessions,
-//      each with another rig, its two references, every effect once, three of no library, pairs, and nothing hidden
+//      each with another rig, its two references, every effect once, three of no library, pairs, and nothing hidden.
+//      What an open answer or one with hints proposes is run on that rig if wanted, and asked again with both runs
 
 #include <cstdint>
 #include <filesystem>
@@ -17,6 +18,7 @@ struct WorldsOptions {
   std::vector<int> worlds{1, 2, 3};
   uint64_t rounds = 5;
   uint64_t first_round = 1;
+  bool proposals = false;      ///< of world 3: runs them
   bool resume = false;         ///< takes sessions and answers that a stopped run left
   std::filesystem::path data;  ///< holds rig/ and rig2/
   std::filesystem::path kept;  ///< simulated sessions and explanations

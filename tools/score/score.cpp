@@ -53,9 +53,13 @@ bool has_alternatives(const ScoredCase& c) { return !alternatives_of(c).empty();
 
 bool no_effect_fits(const ScoredCase& c) { return std::ranges::count(alternatives_of(c), Ids{}) > 0; }
 
+}  // namespace
+
 bool is_exact(const ScoredCase& c) {
   return c.found.verdict == Verdict::named && found_ids(c.found) == c.truth.ids();
 }
+
+namespace {
 
 /// The truth is among the sets left open, or nothing was said where nothing can be seen.
 bool is_inside(const ScoredCase& c) {
@@ -120,6 +124,8 @@ bool is_right(const ScoredCase& c) {
   return false;
 }
 
+}  // namespace
+
 std::string answer_of(const Explanation& found) {
   const Ids ids = found_ids(found);
   const std::string set = fmt::format("{}", fmt::join(ids, " + "));
@@ -148,6 +154,8 @@ std::string hidden_words(const ScoredCase& c) {
   if (c.truth.size == EffectSize::large) return set;
   return set + (c.truth.size == EffectSize::medium ? " (medium)" : " (small)");
 }
+
+namespace {
 
 /// "" if neither the file nor the list of effects knows it.
 std::string port_of(const HiddenEffect& effect) {

@@ -95,6 +95,12 @@ Score score_cases(const std::vector<ScoredCase>& cases, const Targets& targets =
 /// Of a binomial share, 95 %. Precondition: hits <= cases.
 std::array<double, 2> clopper_pearson(size_t hits, size_t cases);
 
+/// Is the answer all that was hidden, and nothing else?
+bool is_exact(const ScoredCase& c);
+/// What a session hides and what was answered, as the table of answers has them.
+std::string hidden_words(const ScoredCase& c);
+std::string answer_of(const Explanation& found);
+
 /// The confusion matrix as a list, the table of targets and the reliability, for people.
 std::string in_words(const Score& score);
 std::string to_json(const Score& score);

@@ -237,7 +237,7 @@ Explanation explain_rig(const Study& study, const ExplainOptions& options) {
   out.searches = verdict.searches;
   out.converged = is_settled(out.searches);
   out.ambiguous_with = verdict.ambiguous_with;
-  if (is_found) out.effects = found_effects(chosen, verdict);
+  if (is_found) out.effects = found_effects(problem, chosen, verdict);
   out.gap = held_out_gap(problem, plain, after);
   if (is_found) {
     out.where = misfits(problem, plain, chosen);

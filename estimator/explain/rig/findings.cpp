@@ -10,6 +10,7 @@
 #include <optional>
 #include <set>
 
+#include "estimator/explain/rig/value_errors.hpp"
 #include "estimator/explain/verdict/chi_square.hpp"
 #include "estimator/inference/intervals.hpp"
 
@@ -77,8 +78,10 @@ Port port_of(const EffectSet& under, rig::Signal signal) {
 
 }  // namespace
 
-std::vector<FoundEffect> found_effects(const EffectSet& set, const SetVerdict& verdict) {
+std::vector<FoundEffect> found_effects(const rig::SessionProblem& problem, const EffectSet& set,
+                                       const SetVerdict& verdict) {
   std::vector<FoundEffect> effects;
+  const VectorXd errors = value_errors(problem, set);
   size_t at = 0;
   for (size_t t = 0; t < set.model.terms.size(); ++t) {
     const rig::ModelTerm& term = set.model.terms[t];
@@ -88,8 +91,9 @@ std::vector<FoundEffect> found_effects(const EffectSet& set, const SetVerdict& v
     for (const EffectParameter& parameter : term.effect->parameters()) {
       const rig::Unknown& unknown = set.unknowns[at];
       const double coordinate = unknown.coordinate(set.model.values[at]);
-      const double sd = std::sqrt(set.covariance(static_cast<Index>(at), static_cast<Index>(at)));
-      found.parameters.push_back({std::string(parameter.name), set.model.values[at], set.errors[at],
+      const double sd = errors[static_cast<Index>(at)];
+      found.parameters.push_back({std::string(parameter.name), set.model.values[at],
+                                  inference::standard_error(unknown, coordinate, sd),
                                   interval_of(unknown, coordinate, sd)});
       ++at;
     }

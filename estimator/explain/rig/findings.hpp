@@ -8,8 +8,9 @@
 
 namespace diastole::explain {
 
-/// The set's material effects with values and 90 % intervals.
-std::vector<FoundEffect> found_effects(const EffectSet& set, const SetVerdict& verdict);
+/// The set's material effects with values and 90 % intervals, by value_errors.hpp.
+std::vector<FoundEffect> found_effects(const rig::SessionProblem& problem, const EffectSet& set,
+                                       const SetVerdict& verdict);
 
 /// C1 and the sensors' offsets, without and with the set's effects.
 std::vector<ParameterShift> parameter_shifts(const rig::SessionProblem& problem, const EffectSet& before,

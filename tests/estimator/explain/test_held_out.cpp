@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "estimator/explain/rig/set_fit.hpp"
+#include "estimator/explain/rig/value_errors.hpp"
 #include "estimator/rig_fit/simulated_session.hpp"
 
 namespace diastole::explain {
@@ -69,6 +70,28 @@ TEST_F(HeldOut, SmoothDiscrepanciesAreThoseThatExplainMost) {
 TEST_F(HeldOut, NothingIsGainedByWhatChangesNothing) {
   record(3);
   EXPECT_NEAR(held_out_gain(*problem_, plain_, plain_), 0.0, 1e-6);
+}
+
+/// One value from twenty waveforms of fifty features, of which every other says half more and the rest half less.
+TEST(ValueErrors, AreThoseOfWaveformsThatDisagree) {
+  constexpr size_t waveforms = 20, each = 50;
+  constexpr double apart = 0.5, all = waveforms * each;
+  LinearFeatures features{Eigen::VectorXd(waveforms * each), MatrixXd::Ones(waveforms * each, 1)};
+  std::vector<Fold> folds(waveforms);
+  for (size_t k = 0; k < waveforms; ++k) {
+    features.target.segment(static_cast<Index>(k * each), each)
+        .setConstant(k % 2 == 0 ? 1 + apart : 1 - apart);
+    folds[k].held.resize(waveforms * each, false);
+    std::fill_n(folds[k].held.begin() + static_cast<std::ptrdiff_t>(k * each), each, true);
+  }
+  const VectorXd weight = VectorXd::Ones(features.target.size());
+  const MatrixXd precision = MatrixXd::Constant(1, 1, all);
+  // Of a mean of twenty numbers, over that of a thousand with variance one.
+  const double mean_of_twenty = apart * std::sqrt(waveforms / (waveforms - 1.0)) / std::sqrt(waveforms);
+  EXPECT_NEAR(error_factors(features, weight, precision, folds)[0], mean_of_twenty * std::sqrt(all), 1e-9);
+  features.target.setOnes();
+  EXPECT_EQ(error_factors(features, weight, precision, folds)[0], 1.0);
+  EXPECT_EQ(error_factors(features, weight, precision, {folds[0], folds[1]})[0], 1.0);
 }
 
 TEST(LogMean, IsThatOfTheMeanOfLikelihoodRatios) {

@@ -4,13 +4,13 @@
 #include <gmock/gmock.h>
 
 #include <cmath>
-
 #include <optional>
 #include <utility>
 
 #include "estimator/effects/effect.hpp"
 #include "estimator/explain/rig/findings.hpp"
 #include "estimator/explain/rig/held_out.hpp"
+#include "estimator/explain/rig/value_errors.hpp"
 #include "estimator/rig_fit/simulated_session.hpp"
 
 namespace diastole::explain {
@@ -51,11 +51,12 @@ TEST_F(SimulatedSession, WithoutAnEffectGetsNoName) {
 TEST_F(SimulatedSession, WithALeakIsExplainedByItAndPredictsWhatWasNotFitted) {
   search({.terms = {{find_effect("cannula-leak-cavity"), {}}}, .values = {0.15}, .seed = 5});
   ASSERT_EQ(verdict_.verdict, Verdict::named);
-  const auto effects = found_effects(chosen(), verdict_);
+  const auto effects = found_effects(*problem_, chosen(), verdict_);
   ASSERT_EQ(effects.size(), 1U);
   EXPECT_EQ(effects[0].id, "cannula-leak-cavity");
   EXPECT_LT(effects[0].parameters.at(0).ci90[0], 0.15);
   EXPECT_GT(effects[0].parameters.at(0).ci90[1], 0.15);
+  EXPECT_GT(effects[0].parameters.at(0).standard_error, chosen().errors[0]);  // its law is right to a part
   const Gap gap = held_out_gap(*problem_, plain(), chosen());
   EXPECT_GT(gap.before, 1.5);
   EXPECT_GT(gap.closed, 0.9);
@@ -73,7 +74,7 @@ TEST_F(SimulatedSession, WithManySmallLossesOfStepsIsExplainedByThemAlone) {
                                 {0.0, "parabolic", 40.0, 1.2, 0.0, 30}),
          3);
   EXPECT_EQ(verdict_.verdict, Verdict::named);
-  const auto effects = found_effects(chosen(), verdict_);
+  const auto effects = found_effects(*problem_, chosen(), verdict_);
   ASSERT_EQ(effects.size(), 1U);
   EXPECT_EQ(effects[0].id, "missed-steps");
   const auto moments = static_cast<double>(chosen().model.terms.front().change_points.size());
