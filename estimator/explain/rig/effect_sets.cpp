@@ -11,8 +11,8 @@
 
 #include "estimator/explain/rig/changed_parts.hpp"
 #include "estimator/explain/rig/event_scan.hpp"
-#include "estimator/explain/rig/set_fit.hpp"
 #include "estimator/explain/rig/part_strain.hpp"
+#include "estimator/explain/rig/set_fit.hpp"
 #include "estimator/explain/rig/set_verdict.hpp"
 #include "estimator/explain/rig/synergy_scan.hpp"
 #include "estimator/rig_fit/base_fit.hpp"

@@ -50,7 +50,6 @@ struct MotionState {
   double phase = 0.0;               ///< part of the cycle
 };
 
-constexpr std::array pressures{rig::Signal::cavity, rig::Signal::pump};
 constexpr int highest_power = 3;
 constexpr int highest_harmonic = 2;
 
@@ -152,6 +151,7 @@ double held_out_density(const LinearFeatures& features, const rig::ModelError& e
 MatrixXd smooth_functions(const rig::SessionProblem& problem) {
   const auto motions = motions_of(problem.session());
   const auto count = static_cast<Index>(smooth_values({}).size());
+  constexpr std::array pressures{rig::Signal::cavity, rig::Signal::pump};
   MatrixXd functions =
       MatrixXd::Zero(problem.features().count(), count * static_cast<Index>(pressures.size()));
   for (const rig::FeatureBlock& block : problem.features().blocks()) {
@@ -166,11 +166,6 @@ MatrixXd smooth_functions(const rig::SessionProblem& problem) {
     functions.block(static_cast<Index>(block.first), channel * count,
                     static_cast<Index>(block.features.size()), count) =
         rig::SegmentFeatures::project(block, values);
-  }
-  for (Index j = 0; j < functions.cols(); ++j) {
-    const auto squares = problem.features().mean_squares(functions.col(j).cwiseAbs2());
-    const double square = squares[static_cast<size_t>(pressures[static_cast<size_t>(j / count)])];
-    if (square > 0.0) functions.col(j) /= std::sqrt(square);
   }
   return functions;
 }

@@ -43,7 +43,7 @@ struct LinearFeatures {
 double held_out_density(const LinearFeatures& features, const rig::ModelError& error,
                         const std::vector<Eigen::Index>& others, const rig::Shares& shares);
 
-/// Features of the smooth functions, a column each, with a mean square of one in its pressure.
+/// Features of the smooth functions, a column each.
 Eigen::MatrixXd smooth_functions(const rig::SessionProblem& problem);
 /// The model without effects beside as many of the functions: those that explain most of these rows.
 LinearFeatures smooth_discrepancy(const EffectSet& plain, const Eigen::MatrixXd& functions, size_t count,

@@ -18,6 +18,11 @@ double largest_tolerance(const rig::SessionProblem& problem, const EffectSet& se
   return largest_tolerance(problem, set.model, set.model.u);
 }
 
+double fineness(const rig::SessionProblem& problem, const rig::SessionModel& model) {
+  const Eigen::VectorXd& described = problem.prior(model).described;
+  return described.size() > 0 ? described.minCoeff() : 1.0;
+}
+
 double strain_by_chance(const rig::SessionProblem& problem, const rig::SessionModel& model,
                         const Eigen::VectorXd& u) {
   const auto tolerances = static_cast<double>(problem.nuisances().size() - rig::basic_nuisances);

@@ -17,6 +17,9 @@ double largest_tolerance(const rig::SessionProblem& problem, const rig::SessionM
                          const Eigen::VectorXd& u);
 double largest_tolerance(const rig::SessionProblem& problem, const EffectSet& set);
 
+/// The parts' sds that a model takes, over the described ones: 1, or less in a rig whose parts are finer throughout.
+double fineness(const rig::SessionProblem& problem, const rig::SessionModel& model);
+
 /// How often the largest of all is as far to either side.
 double strain_by_chance(const rig::SessionProblem& problem, const rig::SessionModel& model,
                         const Eigen::VectorXd& u);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "estimator/explain/rig/part_strain.hpp"
 #include "estimator/inference/information.hpp"
 
 namespace diastole::explain {
@@ -36,8 +37,7 @@ VectorXd error_factors(const LinearFeatures& features, const VectorXd& weight, c
 
 VectorXd value_errors(const rig::SessionProblem& problem, const EffectSet& set) {
   constexpr double right_to = 0.05;  // an sd of a size
-  const VectorXd& described = problem.prior(set.model).described;
-  const double fineness = described.size() > 0 ? described.minCoeff() : 1.0;
+  const double of_equations = right_to * fineness(problem, set.model);
   // Sizes have no prior here: it is no measurement of them.
   constexpr double nearly_nothing = 1e-6;
   MatrixXd precision = set.evidence.precision;
@@ -57,7 +57,7 @@ VectorXd value_errors(const rig::SessionProblem& problem, const EffectSet& set) 
       const double size = std::abs(unknown.coordinate(set.model.values[i]) - unknown.coordinate(neutral[j]));
       const bool has_equations =
           is_amplitude(*term.effect, j) && (port == Port::drive || port == Port::specimen);
-      errors[at] = has_equations ? std::hypot(by_data, right_to * fineness * size) : by_data;
+      errors[at] = has_equations ? std::hypot(by_data, of_equations * size) : by_data;
     }
   }
   return errors;

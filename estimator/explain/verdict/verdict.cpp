@@ -53,7 +53,7 @@ std::string verdict_sentence(const Explanation& found) {
                       inference::sentence(search.termination));
   std::string others;
   for (const auto& other : found.ambiguous_with)
-    others += (others.empty() ? "" : ", ") + words_of(other, "nothing at all");
+    others += (others.empty() ? "" : ", ") + words_of(other, "nothing that is known");
   switch (found.verdict) {
     case Verdict::none:
       if (!found.hints.empty()) {
