@@ -121,11 +121,10 @@ CycleScatter scatter_of(const SessionProblem& problem, const std::vector<Shown>&
       if (squares.empty()) continue;
       segment.pairs = squares.size();
       segment.square_kPa2 = mean_by_lower_quarter(squares, degrees) - segment.noise_kPa2;
-      segment.variance_kPa4 =
-          segment.noise_kPa2 * segment.noise_kPa2 * variance_by_lower_quarter(squares.size(), degrees);
       const auto pairs = static_cast<double>(segment.pairs);
       square += pairs * segment.square_kPa2;
-      variance += pairs * pairs * segment.variance_kPa4;
+      variance += pairs * pairs * segment.noise_kPa2 * segment.noise_kPa2 *
+                  variance_by_lower_quarter(segment.pairs, degrees);
       noise_square += pairs * segment.noise_kPa2;
       weight += pairs;
       all.segments.push_back(segment);

@@ -21,7 +21,6 @@ struct SegmentScatter {
   size_t pairs = 0;          ///< of cycles
   double square_kPa2 = 0.0;  ///< without the noise's; may be negative
   double noise_kPa2 = 0.0;
-  double variance_kPa4 = 0.0;      ///< of the square, by chance in so few pairs of noise alone
   std::array<double, 10> phase{};  ///< how the square lies over the cycle, tenth by tenth
 };
 

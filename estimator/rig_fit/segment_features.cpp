@@ -329,21 +329,6 @@ Eigen::VectorXd SegmentFeatures::series(const FeatureBlock& block, const Eigen::
   return values;
 }
 
-std::array<double, signal_count> SegmentFeatures::mean_squares(const Eigen::VectorXd& squares) const {
-  std::array<double, signal_count> sums{}, rows{};
-  for (const FeatureBlock& block : blocks_) {
-    const auto s = static_cast<size_t>(block.signal);
-    sums[s] +=
-        squares
-            .segment(static_cast<Eigen::Index>(block.first), static_cast<Eigen::Index>(block.features.size()))
-            .sum();
-    rows[s] += static_cast<double>(block.rows);
-  }
-  for (size_t s = 0; s < sums.size(); ++s)
-    sums[s] = rows[s] > 0.0 ? sums[s] / rows[s] : 0.0;
-  return sums;
-}
-
 void SegmentFeatures::project(size_t run, std::span<const Shown> shown,
                               Eigen::Ref<Eigen::MatrixXd> out) const {
   for (const FeatureBlock& block : blocks_) {

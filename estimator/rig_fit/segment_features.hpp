@@ -77,8 +77,6 @@ class SegmentFeatures {
   [[nodiscard]] const std::vector<FeatureBlock>& blocks() const { return blocks_; }
   [[nodiscard]] Eigen::Index count() const { return static_cast<Eigen::Index>(count_); }
   [[nodiscard]] const Eigen::VectorXd& measured() const { return measured_; }
-  /// Mean squares of each signal, over the samples they live in, from the features' squares.
-  [[nodiscard]] std::array<double, signal_count> mean_squares(const Eigen::VectorXd& squares) const;
   /// Sets the features of one run; a column for each of several models, whose projections are faster together.
   void project(size_t run, std::span<const Shown> shown, Eigen::Ref<Eigen::MatrixXd> out) const;
   /// The same of series of one block's rows, a column each.

@@ -243,38 +243,37 @@ Round simulated_round(uint64_t number, const fs::path& folder) {
 /// Runs what answers propose that are open or have hints, on the same rig, and asks again with both runs.
 std::vector<ScoredCase> asked_again(const Round& round, const std::vector<Asked>& asked,
                                     const std::vector<ScoredCase>& cases, const fs::path& kept, bool resume) {
+  std::vector<size_t> open;
   std::vector<Asked> again;
-  std::vector<std::pair<size_t, fs::path>> experiments;
-  std::vector<std::string> before;
+  const auto experiment_of = [&](const Truth& truth) {
+    return round.folder / (truth.name + ".experiment.toml");
+  };
   for (size_t k = 0; k < cases.size(); ++k) {
     const explain::Explanation& found = cases[k].found;
     if ((found.verdict != Verdict::ambiguous && found.hints.empty()) || !found.next_experiment) continue;
-    std::string name = asked[k].study.stem().stem().string() + "-next";
-    const fs::path experiment = round.folder / (name + ".experiment.toml");
+    Truth truth = cases[k].truth;
+    truth.name = asked[k].study.stem().stem().string() + "-next";
+    const fs::path experiment = experiment_of(truth);
     if (!fs::exists(experiment) || read_whole_file(experiment) != found.next_experiment->toml)
-      fs::remove(round.folder / (name + ".run.h5"));
+      fs::remove(round.folder / (truth.name + ".run.h5"));
     write(experiment, found.next_experiment->toml);
     std::string text = read_whole_file(asked[k].study);
-    const std::string runs = fmt::format("runs = [\"{}.run.h5\"", asked[k].truth.name);
-    const size_t at = text.find(runs);
-    text.replace(at, runs.size(), fmt::format("{}, \"{}.run.h5\"", runs, name));
-    const fs::path study = round.folder / (name + ".study.toml");
+    const std::string runs = fmt::format("runs = [\"{}.run.h5\"", cases[k].truth.name);
+    text.replace(text.find(runs), runs.size(), fmt::format("{}, \"{}.run.h5\"", runs, truth.name));
+    const fs::path study = round.folder / (truth.name + ".study.toml");
     write(study, text);
-    Truth truth = cases[k].truth;
-    truth.name = name;
+    open.push_back(k);
     again.push_back({std::move(truth), study});
-    experiments.emplace_back(k, experiment);
-    before.push_back(explain::answer_of(found));
   }
   parallel_for(again.size(), 2, [&](size_t i) {
-    Simulated session = round.sessions[experiments[i].first];
+    Simulated session = round.sessions[open[i]];
     session.seed += 250;
-    simulate(session, round.folder, again[i].truth.name, experiments[i].second);
+    simulate(session, round.folder, again[i].truth.name, experiment_of(again[i].truth));
   });
   std::vector<ScoredCase> found = answers(again, kept, resume);
   for (size_t i = 0; i < found.size(); ++i)
     fmt::print("{} {}: {} -> {}\n", is_truth(found[i]) ? " " : "x", explain::hidden_words(found[i]),
-               before[i], explain::answer_of(found[i].found));
+               explain::answer_of(cases[open[i]].found), explain::answer_of(found[i].found));
   return found;
 }
 

@@ -8,6 +8,11 @@
 namespace diastole::bench {
 
 std::optional<Recordings> recordings_of(int argc, char** argv) {
+  if (argc > 1 && argv[1][0] == '-') {
+    fmt::print("usage: {} [folder with a labels.json] [case or kind ...]\n",
+               std::filesystem::path(argv[0]).filename().string());
+    return std::nullopt;
+  }
   Recordings found{
       .folder = argc > 1 ? std::filesystem::path(argv[1])
                          : std::filesystem::path(DIASTOLE_SOURCE_DIR) / "../shared/data/rig",

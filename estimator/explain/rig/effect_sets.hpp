@@ -20,6 +20,7 @@ namespace diastole::explain {
 
 /// That a given effect is there, in a session that somebody asks about.
 inline constexpr double effect_odds = 1.0 / 40.0;
+inline constexpr double right_to = 0.1;  ///< an effect's equations, of a real part
 
 struct EffectSet {
   rig::SessionModel model;             ///< as fitted
@@ -37,6 +38,13 @@ struct EffectSet {
   [[nodiscard]] std::vector<std::string> ids() const;  ///< sorted
   /// What the evidence's linear unknowns are to explain.
   [[nodiscard]] Eigen::VectorXd target() const { return evidence.left + columns * evidence.u; }
+  /// The evidence's precision without the priors of the effects' values, which are no measurement of them.
+  [[nodiscard]] Eigen::MatrixXd precision_by_data() const {
+    constexpr double nearly_nothing = 1e-6;
+    Eigen::MatrixXd precision = evidence.precision;
+    precision.diagonal().head(columns.cols() - model.u.size()).array() -= 1.0 - nearly_nothing;
+    return precision;
+  }
 };
 
 struct SetSearch {

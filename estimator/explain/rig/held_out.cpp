@@ -225,8 +225,7 @@ double held_out_gain(const rig::SessionProblem& problem, const EffectSet& plain,
   };
   const size_t values = freedom(set) - freedom(plain);
   const auto effects = static_cast<double>(set.model.terms.size() - plain.model.terms.size());
-  const auto of_its_parts = [&](const LinearFeatures& of, const EffectSet& near) {
-    const VectorXd u = fit_with_shares(of.target, of.columns, problem.error(), near.evidence.shares).u;
+  const auto of_its_parts = [&](const EffectSet& near, const VectorXd& u) {
     return std::log(std::max(strain_by_chance(problem, near.model, u), std::numeric_limits<double>::min()));
   };
   const auto of_fold = [&](const LinearFeatures& of, const EffectSet& near,
@@ -240,18 +239,21 @@ double held_out_gain(const rig::SessionProblem& problem, const EffectSet& plain,
   const MatrixXd functions = smooth_functions(problem);
   std::vector<Index> all(static_cast<size_t>(problem.features().count()));
   std::iota(all.begin(), all.end(), Index{0});
-  double with = of_its_parts(features_of(set), set);
-  double without = of_its_parts(features_of(plain), plain);
-  double smooth = of_its_parts(smooth_discrepancy(plain, functions, values, all), plain) +
-                  effects * std::log(effect_odds);
+  const LinearFeatures of_all = smooth_discrepancy(plain, functions, values, all);
+  double with = of_its_parts(set, set.evidence.u);
+  double without = of_its_parts(plain, plain.evidence.u);
+  double smooth =
+      of_its_parts(plain,
+                   fit_with_shares(of_all.target, of_all.columns, problem.error(), plain.evidence.shares).u) +
+      effects * std::log(effect_odds);
   const std::vector<Fold> folds = folds_of(problem);
   for (const Fold& fold : folds) {
     const std::vector<Index> others = fold.others();
     with += of_fold(features_of(set), set, others);
     without += of_fold(features_of(plain), plain, others);
     // A single waveform has no others to choose by.
-    smooth +=
-        of_fold(smooth_discrepancy(plain, functions, values, folds.size() > 1 ? others : all), plain, others);
+    smooth += of_fold(folds.size() > 1 ? smooth_discrepancy(plain, functions, values, others) : of_all, plain,
+                      others);
   }
   return with - std::max(without, smooth);
 }

@@ -266,7 +266,6 @@ EffectSet search(const rig::SessionProblem& problem, SetProblem& set, const rig:
   constexpr double out_of_reach = 50.0;  // nats: rounds after the first bring some
   constexpr int most_rounds = 6;
   constexpr double rested = 0.5;  // nats
-  constexpr double nearly_nothing = 1e-6;
   EffectSet out;
   VectorXd q = set.start();
   const Index searched = set.searched();
@@ -312,10 +311,7 @@ EffectSet search(const rig::SessionProblem& problem, SetProblem& set, const rig:
   out.known.columns.col(0) = columns.col(searched - 1);
   out.known.columns.rightCols(others) = columns.rightCols(others);
   out.unknowns.assign(set.unknowns().begin(), set.unknowns().begin() + set.effect_values());
-  // Errors are the data's: what the evidence takes a size to be beforehand is no measurement of it.
-  MatrixXd measured = out.evidence.precision;
-  measured.diagonal().head(searched - 1).array() -= 1.0 - nearly_nothing;
-  out.covariance = inference::covariance_of_information(measured).matrix;
+  out.covariance = inference::covariance_of_information(out.precision_by_data()).matrix;
   for (Index i = 0; i + 1 < searched; ++i) {
     const double width = prior_width(set, q, i);
     out.covariance.row(i) *= width;

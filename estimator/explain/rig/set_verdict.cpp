@@ -18,7 +18,6 @@ using Eigen::VectorXd;
 using Ids = std::vector<std::string>;
 
 constexpr double name_probability = 0.9;
-constexpr double right_to = 0.1;            ///< an effect's equations, of a real part
 constexpr double least_probability = 0.05;  ///< of a set that is told of
 constexpr double irregular_by_chance = 0.001;
 
@@ -27,6 +26,21 @@ struct Sizes {
   std::vector<bool> material;
   VectorXd changed;  ///< squares of what all of them change
 };
+
+/// Squares of features by signal, over the samples they live in.
+std::array<double, rig::signal_count> mean_squares(const rig::SessionProblem& problem,
+                                                   const VectorXd& squares) {
+  std::array<double, rig::signal_count> sums{}, rows{};
+  for (const rig::FeatureBlock& block : problem.features().blocks()) {
+    const auto s = static_cast<size_t>(block.signal);
+    sums[s] +=
+        squares.segment(static_cast<Index>(block.first), static_cast<Index>(block.features.size())).sum();
+    rows[s] += static_cast<double>(block.rows);
+  }
+  for (size_t s = 0; s < sums.size(); ++s)
+    sums[s] = rows[s] > 0.0 ? sums[s] / rows[s] : 0.0;
+  return sums;
+}
 
 VectorXd error_squares(const rig::ModelError& error, const rig::Shares& shares) {
   return error.variance(shares) - error.noise;
@@ -66,8 +80,8 @@ ChangeSize size_of_change(const rig::SessionProblem& problem, const EffectSet& s
   Eigen::MatrixXd normal = basic.transpose() * weight.asDiagonal() * basic;
   normal.diagonal().array() += 1e-6;  // a channel that is not there has no offset
   const VectorXd left = change - basic * normal.llt().solve(basic.transpose() * weight.cwiseProduct(change));
-  const auto error = problem.features().mean_squares(error_squares(problem.error(), set.evidence.shares));
-  const auto size = problem.features().mean_squares(left.cwiseAbs2());
+  const auto error = mean_squares(problem, error_squares(problem.error(), set.evidence.shares));
+  const auto size = mean_squares(problem, left.cwiseAbs2());
   ChangeSize found{.squares = left.cwiseAbs2(),
                    .over_error = 0.0,
                    .is_tolerance = is_tolerance(problem, set, change, left)};
@@ -203,7 +217,7 @@ bool bears_nothing_wrong(const rig::SessionProblem& problem, const EffectSet& se
 
 double error_rms(const rig::SessionProblem& problem, const rig::Shares& shares, rig::Signal signal) {
   return std::sqrt(
-      problem.features().mean_squares(error_squares(problem.error(), shares))[static_cast<size_t>(signal)]);
+      mean_squares(problem, error_squares(problem.error(), shares))[static_cast<size_t>(signal)]);
 }
 
 SetVerdict judge_sets(const rig::SessionProblem& problem, const SetSearch& search,

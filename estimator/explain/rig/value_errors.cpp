@@ -36,14 +36,9 @@ VectorXd error_factors(const LinearFeatures& features, const VectorXd& weight, c
 }
 
 VectorXd value_errors(const rig::SessionProblem& problem, const EffectSet& set) {
-  constexpr double right_to = 0.05;  // an sd of a size
-  const double of_equations = right_to * fineness(problem, set.model);
-  // Sizes have no prior here: it is no measurement of them.
-  constexpr double nearly_nothing = 1e-6;
-  MatrixXd precision = set.evidence.precision;
-  precision.diagonal().head(set.columns.cols() - set.model.u.size()).array() -= 1.0 - nearly_nothing;
+  const double of_equations = 0.5 * right_to * fineness(problem, set.model);  // a sd: they are right to two
   const VectorXd factors = error_factors({set.target(), set.columns}, set.evidence.variance.cwiseInverse(),
-                                         precision, folds_of(problem));
+                                         set.precision_by_data(), folds_of(problem));
   const rig::RigModel base = problem.model({{}, {}, set.model.u, set.model.prior});
   VectorXd errors(static_cast<Index>(set.model.values.size()));
   Index at = 0;

@@ -6,6 +6,7 @@
 #include <numeric>
 #include <optional>
 
+#include "estimator/explain/rig/part_strain.hpp"
 #include "estimator/explain/rig/set_fit.hpp"
 #include "estimator/explain/rig/value_errors.hpp"
 #include "estimator/rig_fit/simulated_session.hpp"
@@ -70,6 +71,17 @@ TEST_F(HeldOut, SmoothDiscrepanciesAreThoseThatExplainMost) {
 TEST_F(HeldOut, NothingIsGainedByWhatChangesNothing) {
   record(3);
   EXPECT_NEAR(held_out_gain(*problem_, plain_, plain_), 0.0, 1e-6);
+}
+
+TEST_F(HeldOut, PartsFarOffAreSeldom) {
+  record(3);
+  const auto parts = static_cast<double>(plain_.model.u.size()) - static_cast<double>(rig::basic_nuisances);
+  VectorXd u = VectorXd::Zero(plain_.model.u.size());
+  EXPECT_NEAR(strain_by_chance(*problem_, plain_.model, u), 1.0, 1e-12);
+  u[u.size() - 1] = -5.0;
+  const double beyond_five_sds = 5.733e-7;  // of a normal variable, to both sides
+  EXPECT_NEAR(strain_by_chance(*problem_, plain_.model, u), parts * beyond_five_sds,
+              1e-3 * parts * beyond_five_sds);
 }
 
 /// One value from twenty waveforms of fifty features, of which every other says half more and the rest half less.

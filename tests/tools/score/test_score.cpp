@@ -36,6 +36,18 @@ const ScoreRow& row_of(const Score& score, const std::string& begins) {
   throw std::out_of_range(begins);
 }
 
+TEST(Score, OfAPairWithASmallPartAsksForNoFalseName) {
+  Truth pair = hidden(TruthKind::pair, {"sensor-drift", "hose-compliance"});
+  pair.size = EffectSize::medium;
+  const Score score = score_cases({{pair, answer(Verdict::named, {"hose-compliance"})},
+                                   {pair, answer(Verdict::named, {"hose-compliance", "stroke-gain"})}});
+  EXPECT_EQ(row_of(score, "pairs, both").cases, 0U);
+  EXPECT_EQ(row_of(score, "pairs: any false").hits, 1U);
+  const auto part = std::ranges::find(score.confusion, "hose-compliance", &Confusion::answer);
+  ASSERT_NE(part, score.confusion.end());
+  EXPECT_TRUE(part->right);
+}
+
 TEST(Score, CountsEachRow) {
   const Truth nothing = hidden(TruthKind::none, {});
   const Truth hose = hidden(TruthKind::single, {"hose-compliance"});
