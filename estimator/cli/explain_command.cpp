@@ -144,10 +144,10 @@ bool can_be_true(const Study& study) {
 }
 
 ExitCode run_explain(const ExplainArguments& arguments, const CommandOutput& out) {
+  Study study = read_study(arguments.study);
   if (arguments.folder.empty()) {
     throw InputError({"", "option -o", "is missing", "Name a folder for the result: -o out/."});
   }
-  Study study = read_study(arguments.study);
   use_images(study);
   study.effect_files.insert(study.effect_files.end(), arguments.with.begin(), arguments.with.end());
   effects_known_to(study);  // refuses what is no effect before the folder is made

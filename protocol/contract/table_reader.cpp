@@ -99,6 +99,10 @@ TableReader TableReader::from_file(const std::filesystem::path& path) {
          "Give the TOML file that belongs here; a study (NAME.study.toml) names its run files under "
          "[data] runs."});
   }
+  if (text.starts_with("{")) {
+    throw InputError({path.string(), "", "is JSON, but a TOML file is expected here",
+                      "Give the TOML file that belongs here, such as a study (NAME.study.toml)."});
+  }
   return from_text(text, path.string());
 }
 

@@ -128,6 +128,13 @@ std::vector<BadInput> table() {
        },
        2,
        {"twice.study.toml", "data.runs", "a.run.h5", "b.run.h5", "one recording", "once"}},
+      {"ADocumentForAStudy",
+       [](Place place) -> std::vector<std::string> {
+         place.write("explanation.json", "{\"verdict\": \"none\"}\n");
+         return {"diastole", "explain", "explanation.json", "-o", "found"};
+       },
+       2,
+       {"explanation.json", "is JSON, but a TOML file is expected here", "NAME.study.toml"}},
       {"BenchTestsTwice",
        [](Place) -> std::vector<std::string> {
          const std::string data = source / "examples/bench-tests/uniaxial.csv";
@@ -436,6 +443,24 @@ TEST(BadOption, IsToldWithItsNameItsValueAndWhatIsExpected) {
   EXPECT_THAT(told({"diastole", "scan", "gel.study.toml", "-o", "scan", "--period", "-1"}),
               HasSubstr("--period: -1 is not above zero"));
   EXPECT_THAT(told({"diastole", "jog", "--mL", "5mL"}), HasSubstr("--mL: \"5mL\" is not a number"));
+  EXPECT_THAT(told({"diastole", "fit", "gel.study.toml", "--unexamind"}),
+              testing::AllOf(HasSubstr("not expected: --unexamind. Did you mean \"--unexamined\"?"),
+                             HasSubstr("`diastole fit --help` explains it")));
+}
+
+TEST(MissingArgument, IsToldWithWhatItIsFor) {
+  const Workplace place;
+  const auto told = [&](const std::vector<std::string>& words) {
+    const Ended ended = run(place, words);
+    EXPECT_EQ(ended.exit_code, 2);
+    return ended.err;
+  };
+  EXPECT_THAT(told({"diastole", "flow", "scan"}),
+              testing::AllOf(HasSubstr("--output is missing: flow and volume of each image phase"),
+                             HasSubstr("`diastole flow --help` explains it")));
+  EXPECT_THAT(told({"diastole", "fit"}), HasSubstr("STUDY is missing: study file"));
+  EXPECT_THAT(told({"diastole", "mesh"}), HasSubstr("one of its commands is missing: import, export"));
+  EXPECT_THAT(told({"diastole", "--json"}), HasSubstr("a command is missing"));
 }
 
 TEST(BadMeshFile, IsToldWithoutTalkOfStudies) {

@@ -99,6 +99,13 @@ void report_proposals(const std::vector<ScoredCase>& again) {
 
 // --- World 3 -----------------------------------------------------------------------------------------------------------
 
+constexpr std::array unknown_kPa{1.0, 20.0};
+
+std::string C1_lines(std::array<double, 2> C1_kPa) {
+  return fmt::format("start = {:.4f}\nbounds = [{:.4f}, {:.4f}]", 0.5 * (C1_kPa[0] + C1_kPa[1]), C1_kPa[0],
+                     C1_kPa[1]);
+}
+
 /// The example's study of a run NAME.run.h5, with bounds of the modulus and references.
 std::string study_of(const std::string& name, std::array<double, 2> C1_kPa, const std::string& references) {
   std::string text = read_whole_file(example / "mine.study.toml");
@@ -107,11 +114,27 @@ std::string study_of(const std::string& name, std::array<double, 2> C1_kPa, cons
     if (at == std::string::npos) throw std::runtime_error("the example's study has no line " + line);
     text.replace(at, line.size(), by);
   };
-  replace("start = 8.8\nbounds = [1.0, 20.0]",
-          fmt::format("start = {:.4f}\nbounds = [{:.4f}, {:.4f}]", 0.5 * (C1_kPa[0] + C1_kPa[1]), C1_kPa[0],
-                      C1_kPa[1]));
+  replace("start = 8.8\nbounds = [1.0, 20.0]", C1_lines(C1_kPa));
   replace("runs = [\"mine.run.h5\"]", fmt::format("runs = [\"{}.run.h5\"]\n{}", name, references));
   return text;
+}
+
+/// What a proposed experiment asks for besides strokes (estimator/explain/verdict/experiment_plan.hpp).
+struct Instruments {
+  bool pump_sensor = false, volumes = false, radius = false, shear_test = false;
+};
+
+Instruments asked_for(const std::string& experiment) {
+  const auto asks = [&](std::string_view words) { return experiment.find(words) != std::string::npos; };
+  return {.pump_sensor = asks("name = \"pump\""),
+          .volumes = asks("gated phase contrast"),
+          .radius = asks("specimen.inner_radius_mm"),
+          .shear_test = asks("rotational shear test")};
+}
+
+std::string in_words(const Instruments& asked) {
+  return fmt::format("{}{}{}", asked.pump_sensor ? " (pump sensor)" : "",
+                     asked.volumes ? " (gated volumes)" : "", asked.shear_test ? " (shear test)" : "");
 }
 
 struct Simulated {
@@ -120,9 +143,15 @@ struct Simulated {
   std::vector<std::string> hidden;
   double C1_kPa = 8.8;
   uint64_t hide_seed = 1;
+  Instruments instruments = {};
 };
 
 void write(const fs::path& file, const std::string& text) { std::ofstream(file, std::ios::binary) << text; }
+
+constexpr const char* pump_channel =
+    "\n[[daq.channel]]\nname = \"pump\"\ninput = 1\nkPa_per_V = 20.0\nzero_V = 0.0\n";
+// As the proposals count on (estimator/explain/rig/experiment_outlook.hpp).
+constexpr double phase_contrast_sd_mL = 0.6, shear_test_error = 0.007;
 
 /// NAME.run.h5 in `folder`, and what is hidden in it sealed/NAME.sealed.json.
 void simulate(const Simulated& session, const fs::path& folder, const std::string& name,
@@ -130,7 +159,8 @@ void simulate(const Simulated& session, const fs::path& folder, const std::strin
   const fs::path run = folder / (name + ".run.h5");
   if (fs::exists(run)) return;
   write(folder / (name + ".rig.toml"), read_whole_file(fs::path(DIASTOLE_SOURCE_DIR) / "examples/rig.toml") +
-                                           fmt::format("\n[simulation]\nC1_kPa = {:.4f}\n", session.C1_kPa));
+                                           fmt::format("\n[simulation]\nC1_kPa = {:.4f}\n", session.C1_kPa) +
+                                           (session.instruments.pump_sensor ? pump_channel : ""));
   std::vector<std::string> command{DIASTOLE_BIN_DIR "/diastole",
                                    "simulate",
                                    experiment.string(),
@@ -148,6 +178,8 @@ void simulate(const Simulated& session, const fs::path& folder, const std::strin
                                    "sealed/" + name + ".sealed.json"};
   for (const std::string& id : session.hidden)
     command.insert(command.end(), {"--hide", id});
+  if (session.instruments.volumes)
+    command.insert(command.end(), {"--gated-volume", fmt::to_string(phase_contrast_sd_mL)});
   const fs::path log = folder / (name + ".log");
   if (run_timed(command, folder, log).exit_code != 0)
     throw std::runtime_error("diastole simulate failed: " + read_whole_file(log));
@@ -200,7 +232,6 @@ struct Round {
 
 Round simulated_round(uint64_t number, const fs::path& folder) {
   Round round{.folder = folder, .sessions = {}, .alone = {}, .with_reference = {}};
-  constexpr std::array unknown_kPa{1.0, 20.0};
   std::mt19937_64 random(1000 + number);
   const auto casting_kPa = [&] { return 8.8 * (0.9 + 0.2 * static_cast<double>(random() >> 11) * 0x1p-53); };
   fs::create_directories(folder / "sealed");
@@ -240,40 +271,58 @@ Round simulated_round(uint64_t number, const fs::path& folder) {
   return round;
 }
 
-/// Runs what answers propose that are open or have hints, on the same rig, and asks again with both runs.
+/// Runs what answers propose that are open or have hints, on the same rig with the instruments that they ask for, and asks again
+/// with both runs. An image at rest is not made: what it corrects is the study.
 std::vector<ScoredCase> asked_again(const Round& round, const std::vector<Asked>& asked,
                                     const std::vector<ScoredCase>& cases, const fs::path& kept, bool resume) {
   std::vector<size_t> open;
   std::vector<Asked> again;
+  std::vector<Instruments> instruments;
   const auto experiment_of = [&](const Truth& truth) {
     return round.folder / (truth.name + ".experiment.toml");
   };
   for (size_t k = 0; k < cases.size(); ++k) {
     const explain::Explanation& found = cases[k].found;
     if ((found.verdict != Verdict::ambiguous && found.hints.empty()) || !found.next_experiment) continue;
+    const std::string& proposed = found.next_experiment->toml;
+    const Instruments needed = asked_for(proposed);
+    if (needed.radius) {
+      fmt::print("- {}: asks for an image at rest, not run\n", explain::hidden_words(cases[k]));
+      continue;
+    }
     Truth truth = cases[k].truth;
     truth.name = asked[k].study.stem().stem().string() + "-next";
     const fs::path experiment = experiment_of(truth);
-    if (!fs::exists(experiment) || read_whole_file(experiment) != found.next_experiment->toml)
+    if (!fs::exists(experiment) || read_whole_file(experiment) != proposed)
       fs::remove(round.folder / (truth.name + ".run.h5"));
-    write(experiment, found.next_experiment->toml);
+    write(experiment, proposed);
     std::string text = read_whole_file(asked[k].study);
+    const auto replace = [&](const std::string& old, const std::string& by) {
+      text.replace(text.find(old), old.size(), by);
+    };
     const std::string runs = fmt::format("runs = [\"{}.run.h5\"", cases[k].truth.name);
-    text.replace(text.find(runs), runs.size(), fmt::format("{}, \"{}.run.h5\"", runs, truth.name));
+    replace(runs, fmt::format("{}, \"{}.run.h5\"", runs, truth.name));
+    if (needed.shear_test) {
+      const double C1_kPa = round.sessions[k].C1_kPa, error_kPa = shear_test_error * C1_kPa;
+      replace(C1_lines(unknown_kPa), C1_lines({C1_kPa - 2 * error_kPa, C1_kPa + 2 * error_kPa}));
+    }
     const fs::path study = round.folder / (truth.name + ".study.toml");
     write(study, text);
     open.push_back(k);
     again.push_back({std::move(truth), study});
+    instruments.push_back(needed);
   }
   parallel_for(again.size(), 2, [&](size_t i) {
     Simulated session = round.sessions[open[i]];
     session.seed += 250;
+    session.instruments = instruments[i];
     simulate(session, round.folder, again[i].truth.name, experiment_of(again[i].truth));
   });
   std::vector<ScoredCase> found = answers(again, kept, resume);
   for (size_t i = 0; i < found.size(); ++i)
-    fmt::print("{} {}: {} -> {}\n", is_truth(found[i]) ? " " : "x", explain::hidden_words(found[i]),
-               explain::answer_of(cases[open[i]].found), explain::answer_of(found[i].found));
+    fmt::print("{} {}{}: {} -> {}\n", is_truth(found[i]) ? " " : "x", explain::hidden_words(found[i]),
+               in_words(instruments[i]), explain::answer_of(cases[open[i]].found),
+               explain::answer_of(found[i].found));
   return found;
 }
 

@@ -9,7 +9,6 @@
 #include <cstdio>
 #include <exception>
 #include <iostream>
-#include <sstream>
 #include <string>
 #include <string_view>
 #include <system_error>
@@ -22,6 +21,7 @@
 #include "protocol/contract/input_error.hpp"
 #include "protocol/contract/table_reader.hpp"
 #include "tools/diastole/commands.hpp"
+#include "tools/diastole/refusal.hpp"
 #include "tools/score/score.hpp"
 
 namespace {
@@ -47,29 +47,6 @@ std::vector<std::string> commands_of(const CLI::App& app) {
 bool is_command(const CLI::App& app, std::string_view name) {
   const std::vector<std::string> names = commands_of(app);
   return std::find(names.begin(), names.end(), name) != names.end();
-}
-
-std::string expected_of(const CLI::Option& option) {
-  const std::string type = option.get_type_name();
-  if (type.starts_with("UINT")) return "a whole number from 0 on";
-  if (type.starts_with("INT")) return "a whole number";
-  return type.starts_with("FLOAT") ? "a number" : type;
-}
-
-/// CLI11 tells no more than that a value "could not be converted".
-std::string in_words(const CLI::App& app, const CLI::ConversionError& error) {
-  const std::string text = error.what(), beginning = "Could not convert: ";
-  const size_t equals = text.find(" = ");
-  const CLI::App* command = &app;
-  std::string words = "diastole";
-  for (; !command->get_subcommands().empty(); words += " " + command->get_name())
-    command = command->get_subcommands().front();
-  const CLI::Option* option = nullptr;
-  if (text.starts_with(beginning) && equals != std::string::npos)
-    option = command->get_option_no_throw(text.substr(beginning.size(), equals - beginning.size()));
-  if (option == nullptr) return text;
-  return option->get_name() + ": \"" + text.substr(equals + 3) + "\" is not " + expected_of(*option) +
-         "\n  `" + words + " --help` explains it.\n";
 }
 
 diastole::ExitCode run(int argc, char** argv) {
@@ -106,13 +83,11 @@ diastole::ExitCode run(int argc, char** argv) {
   }
   try {
     app.parse(argc, argv);
-  } catch (const CLI::ConversionError& error) {
-    std::cerr << "diastole: " << in_words(app, error);
-    return ExitCode::bad_input;
+  } catch (const CLI::Success& asked) {  // --help, --version
+    app.exit(asked);
+    return ExitCode::done;
   } catch (const CLI::ParseError& error) {
-    std::ostringstream refusal;
-    if (app.exit(error, std::cout, refusal) == 0) return ExitCode::done;
-    std::cerr << "diastole: " << refusal.str();
+    std::cerr << "diastole: " << diastole::refusal(app, error) << '\n';
     return ExitCode::bad_input;
   }
   try {

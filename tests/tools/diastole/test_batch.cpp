@@ -176,6 +176,37 @@ TEST_F(Batches, TheSlurmScriptPassesShellcheck) {
   EXPECT_EQ(std::system(fmt::format("shellcheck '{}'", script.string()).c_str()), 0);
 }
 
+TEST_F(Batches, TwoAtTheSameTimeAreRefusedButForSingleJobs) {
+  folder_.write("a.study.toml", "slow");
+  folder_.write("b.study.toml", "slow");
+  const Batch jobs = batch("[[job]]\ncommand = \"fit\"\ninputs = [\"*.study.toml\"]\n");
+  const auto while_running = [&](std::optional<size_t> only, const std::function<void()>& act) {
+    std::atomic<bool> stop{false};
+    RunOptions how = options(1);
+    how.only = only;
+    how.interrupted = [&] { return stop.load(); };
+    how.on_change = [&](const std::vector<JobEnd>&, size_t running) {
+      if (running == 1 && !stop.exchange(true)) act();
+    };
+    (void)run_batch(jobs, how);
+  };
+  RunOptions first = options(), stopped = options();
+  first.only = 0;
+  first.interrupted = [] { return true; };
+  stopped.interrupted = first.interrupted;
+  const auto refusal_of = [&](const RunOptions& how) {
+    return test::message_of([&] { (void)run_batch(jobs, how); });
+  };
+  while_running({}, [&] {
+    EXPECT_THAT(refusal_of(stopped), HasSubstr("another `diastole batch` works on it"));
+    EXPECT_THAT(refusal_of(first), HasSubstr("another `diastole batch` works on it"));
+  });
+  while_running(1, [&] {
+    EXPECT_THAT(refusal_of(stopped), HasSubstr("another `diastole batch` works on it"));
+    EXPECT_NO_THROW((void)run_batch(jobs, first));
+  });
+}
+
 TEST_F(Batches, OneJobAlone) {
   folder_.write("a.study.toml", "done");
   folder_.write("b.study.toml", "done");

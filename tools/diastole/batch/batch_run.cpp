@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <sched.h>
+#include <sys/file.h>
 #include <sys/prctl.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
@@ -21,6 +22,7 @@
 #include <thread>
 
 #include "estimator/io/whole_file.hpp"
+#include "host/transport/descriptor.hpp"
 #include "protocol/contract/input_error.hpp"
 #include "protocol/contract/json_text.hpp"
 
@@ -192,6 +194,16 @@ JobEnd run_job(const Batch& batch, const Job& job, int processor, const RunOptio
   return end;
 }
 
+/// Until it is destroyed nothing else runs this batch: not the whole beside another whole or beside single jobs, which may run beside
+/// each other. Where the file system has no locks (some network ones) nothing is held.
+Descriptor hold_batch(const Batch& batch, bool whole) {
+  Descriptor folder(::open(batch.output.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  if (::flock(folder.get(), (whole ? LOCK_EX : LOCK_SH) | LOCK_NB) != 0 && errno == EWOULDBLOCK)
+    throw InputError({batch.output.string(), "", "another `diastole batch` works on it",
+                      "Wait for its end, or give this batch an output of its own."});
+  return folder;
+}
+
 std::string quoted(const std::string& text) {
   std::string made = "'";
   for (const char c : text)
@@ -224,6 +236,7 @@ std::vector<JobEnd> run_batch(const Batch& batch, const RunOptions& options) {
     throw InputError({batch.file.string(), "key output",
                       fmt::format("{} cannot be made: {}", batch.output.string(), failure.message()),
                       "Name another folder."});
+  const Descriptor held = hold_batch(batch, !options.only);
   std::vector<JobEnd> ends;
   std::vector<size_t> to_do;
   for (size_t i = 0; i < batch.jobs.size(); ++i) {

@@ -44,7 +44,7 @@ struct RunOptions {
       {};  ///< one call at a time
 };
 
-/// As many as there are jobs. Makes the batch's folder. Throws InputError if it cannot.
+/// As many as there are jobs. Makes the batch's folder. Throws InputError if it cannot, or if another process works on it.
 std::vector<JobEnd> run_batch(const Batch& batch, const RunOptions& options);
 
 /// A script for `sbatch`: an array with one task a job, each running `program batch FILE --only N`.
