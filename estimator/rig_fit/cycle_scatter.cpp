@@ -86,6 +86,7 @@ CycleScatter scatter_of(const SessionProblem& problem, const std::vector<Shown>&
   double rate_Hz = 0.0;
   for (size_t r = 0; r < problem.session().runs.size(); ++r) {
     const SessionRun& run = problem.session().runs[r];
+    if (!run.pressure_kPa.contains(channel)) continue;
     const std::vector<double>& measured = run.pressure_kPa.at(channel);
     const Prediction& both = shown_by_run[r].pressures;
     const std::vector<double>& shown = cavity ? both.cavity_kPa : both.pump_kPa;

@@ -291,10 +291,8 @@ double spectral_sd(const ChannelNoise& noise, double frequency_Hz, double rate_H
 NoiseModel estimate_noise(const Session& session) {
   NoiseModel noise;
   for (const Channel channel : {Channel::cavity, Channel::pump}) {
-    bool present = true;
-    for (const SessionRun& run : session.runs)
-      present = present && run.pressure_kPa.contains(channel);
-    if (present) noise.channels[channel] = channel_noise(session, channel);
+    const auto has_it = [&](const SessionRun& run) { return run.pressure_kPa.contains(channel); };
+    if (std::ranges::any_of(session.runs, has_it)) noise.channels[channel] = channel_noise(session, channel);
   }
   noise.cycle_sd = cycle_sd(session, noise);
   return noise;

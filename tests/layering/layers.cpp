@@ -193,7 +193,7 @@ const std::vector<Rule>& rules() {
         "tools/diastole/commands.hpp", "tools/diastole/replay/replay_plan.hpp"}},
       {"tools/diastole/batch",
        {"protocol/contract", "estimator/cli/interruption.hpp", "estimator/io", "estimator/report",
-        "tools/diastole/commands.hpp"}},
+        "host/transport/descriptor.hpp", "tools/diastole/commands.hpp"}},
       {"tools/diastole/runs",
        {"protocol", "estimator/explain/verdict", "estimator/io", "estimator/report",
         "tools/diastole/commands.hpp"}},

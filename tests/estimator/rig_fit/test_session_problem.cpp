@@ -9,6 +9,7 @@
 #include <span>
 
 #include "estimator/rig_fit/base_fit.hpp"
+#include "estimator/rig_fit/cycle_scatter.hpp"
 #include "estimator/rig_fit/simulated_session.hpp"
 
 namespace diastole::rig {
@@ -94,6 +95,26 @@ TEST(SessionProblem, BearsAGap) {
     session.runs[0].pressure_kPa[Channel::cavity][k] = std::numeric_limits<double>::quiet_NaN();
   const SessionProblem problem(session, family, 2);
   EXPECT_NEAR(problem.model(declared_rig(problem).at).modulus_kPa, 8.0, 0.1);
+}
+
+/// As when a transducer was connected for a further run, which is what explanations propose.
+TEST(SessionProblem, TakesASensorThatOneRunAloneHas) {
+  const SpecimenFamily family = gel_family();
+  Session session = simulated_session(family, {});
+  const SessionProblem whole(session, family, 2);
+  for (size_t r = 0; r + 1 < session.runs.size(); ++r)
+    session.runs[r].pressure_kPa.erase(Channel::pump);
+  const SessionProblem problem(session, family, 2);
+  std::vector<size_t> with_pump;
+  for (const FeatureBlock& block : problem.features().blocks())
+    if (block.signal == Signal::pump) with_pump.push_back(block.run);
+  EXPECT_THAT(with_pump, testing::ElementsAre(session.runs.size() - 1));
+  EXPECT_NEAR(problem.noise().channels.at(Channel::pump).sd_kPa,
+              whole.noise().channels.at(Channel::pump).sd_kPa,
+              0.3 * whole.noise().channels.at(Channel::pump).sd_kPa);
+  const SessionModel model = declared_rig(problem).at;
+  EXPECT_NEAR(problem.model(model).modulus_kPa, 8.0, 0.1);
+  EXPECT_NO_THROW((void)cycle_scatter(problem, model));
 }
 
 /// Rms of what the problem's steps change of a signal's features, over that of the model's stated error.
