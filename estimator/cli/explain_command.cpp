@@ -63,7 +63,7 @@ std::string place_of(const explain::Misfit& misfit) {
   if (misfit.segment) text += fmt::format(", segment {}", *misfit.segment);
   if (misfit.phase) text += fmt::format(", phase {:.1f} to {:.1f}", (*misfit.phase)[0], (*misfit.phase)[1]);
   if (misfit.band_Hz) text += fmt::format(", {:g} to {:g} Hz", (*misfit.band_Hz)[0], (*misfit.band_Hz)[1]);
-  return text + fmt::format(": {:.0f} above the noise\n", misfit.excess_chi2);
+  return text + fmt::format(": {:.0f} above what noise and the model's error give\n", misfit.excess_chi2);
 }
 
 void print_learned(const explain::LearnedTerm& term) {

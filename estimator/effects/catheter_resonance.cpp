@@ -15,6 +15,7 @@ Effect catheter_resonance_effect() {
                     "catheter do it.",
       .revealed_by = "Fast waveforms with jumps; a step test of the catheter (diastole catheter).",
       .conflicts = {"trigger-delay"},
+      .changes = "catheter",
       .parameters = {{"f0_Hz", "Hz", "resonance", 60.0, 3.0, 200.0, 15.0, SearchScale::inverse_square},
                      {"zeta", "", "part of critical damping", 0.6, 0.05, 2.0, 0.4}},
       .stage = Stage::sensors,

@@ -101,6 +101,8 @@ struct EffectDeclaration {
   std::string_view revealed_by;                  ///< the experiment that separates it from others
   std::vector<std::string_view> conflicts = {};  ///< ids that look alike in some data: tried in its place
   std::vector<std::string_view> synergies = {};  ///< ids that only show together
+  /// "hose": the part of the rig that is another one then, of whose tolerances references know nothing.
+  std::string_view changes = {};
 
   // In recordings of the rig, if it shows there.
   std::vector<EffectParameter> parameters = {};

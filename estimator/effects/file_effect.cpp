@@ -406,7 +406,8 @@ EffectDeclaration declaration_of(const std::shared_ptr<const Laws>& laws) {
                              .looks_like = file.looks_like,
                              .revealed_by = file.reveals,
                              .conflicts = views(file.looks_alike),
-                             .synergies = views(file.shows_with)};
+                             .synergies = views(file.shows_with),
+                             .changes = file.changes};
   for (const auto& parameter : file.parameters)
     declared.parameters.push_back({parameter.name, parameter.unit, parameter.meaning, parameter.neutral,
                                    parameter.lower, parameter.upper, parameter.typical,

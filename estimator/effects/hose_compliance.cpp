@@ -16,6 +16,7 @@ Effect hose_compliance_effect() {
       .revealed_by = "Waveforms with jumps of acceleration at several periods; a pump-end sensor.",
       .conflicts = {"air-bubble-pump"},
       .synergies = {"hose-inertance-excess"},
+      .changes = "hose",
       .parameters = {{"wave_speed_m_s", "m/s", "speed of pressure waves in the hose", 400.0, 8.0, 2000.0,
                       80.0, SearchScale::inverse_square}},
       .neutral = [](const rig::RigModel& base) { return std::vector<double>{base.hose.wave_speed_m_s}; },

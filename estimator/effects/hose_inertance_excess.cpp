@@ -16,6 +16,7 @@ Effect hose_inertance_excess_effect() {
       .revealed_by = "A sensor at the pump and fast strokes.",
       .conflicts = {"hose-loss-excess"},
       .synergies = {"hose-compliance", "air-bubble-pump"},
+      .changes = "hose",
       .parameters = {{"inertance_factor", "", "over the hose of the description", 1.0, 0.5, 3.0, 1.2,
                       SearchScale::logarithmic}},
       .apply = [](EffectValues values, const EffectContext&,

@@ -15,6 +15,7 @@ Effect hose_loss_excess_effect() {
       .revealed_by = "A sensor at the pump and strokes of different peak flow.",
       .conflicts = {"hose-inertance-excess"},
       .synergies = {"hose-compliance"},
+      .changes = "hose",
       .parameters = {{"extra_K", "", "loss coefficient added", 0.0, 0.0, 200.0, 10.0}},
       .apply = [](EffectValues values, const EffectContext&,
                   rig::RigModel& model) { model.hose.loss_coefficient += values[0]; },

@@ -41,8 +41,9 @@ EstimatedValue estimated(const inference::Parameter& parameter, double q, BoundS
   return result;
 }
 
-EstimatedFrame estimated(const JointProblem::LoadedFrame& frame, const Eigen::VectorXd& q,
-                         const Eigen::MatrixXd& covariance) {
+/// `weighted`: the frame's part of JointProblem::motion_residuals().
+EstimatedFrame estimated(const JointProblem::LoadedFrame& frame, const Eigen::VectorXd& weighted,
+                         const Eigen::VectorXd& q, const Eigen::MatrixXd& covariance) {
   const auto unknown = frame.pressure_unknown;
   return {.number = frame.number,
           .load = frame.load,
@@ -50,8 +51,8 @@ EstimatedFrame estimated(const JointProblem::LoadedFrame& frame, const Eigen::Ve
           .se_kPa = unknown ? std::sqrt(covariance(*unknown, *unknown)) : 0.0,
           .by_motion = {},
           .found = frame.residuals.found(),
-          .weighted = frame.residuals.residuals(),
-          .unweighted_mm = frame.residuals.unweighted_mm(),
+          .weighted = weighted,
+          .unweighted_mm = weighted.cwiseProduct(frame.residuals.sigmas_mm()),
           .position_mm = frame.position_mm};
 }
 
@@ -355,9 +356,11 @@ Eigen::MatrixXd estimate_errors(FitOutcome& outcome, JointProblem& problem, cons
         problem.imaged_pressure_at(q), unknown ? std::sqrt(outcome.covariance(*unknown, *unknown)) : 0.0};
   }
   if (problem.work()) outcome.stored_energy_mJ = problem.stored_energy_mJ();
-  Eigen::Index reading = motion.size();
+  Eigen::Index reading = motion.size(), first = 0;
   for (const JointProblem::LoadedFrame& frame : problem.frames()) {
-    outcome.frames.push_back(estimated(frame, q, outcome.covariance));
+    const Eigen::Index rows = frame.residuals.size();
+    outcome.frames.push_back(estimated(frame, motion.segment(first, rows), q, outcome.covariance));
+    first += rows;
     EstimatedFrame& added = outcome.frames.back();
     if (frame.pressure_unknown)
       added.by_motion = pressure_by_motion(frame.load, cost, reading++, curvature.matrix, spread);

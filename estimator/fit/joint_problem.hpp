@@ -116,7 +116,7 @@ class JointProblem : public inference::LeastSquaresProblem {
     MotionResiduals residuals;  ///< of this one slot
     std::optional<Eigen::Index>
         pressure_unknown;   ///< its place in q; none when the pressure is exactly known
-    NodeField position_mm;  ///< of the last successful `evaluate`
+    NodeField position_mm;  ///< at the last `residuals` that found an equilibrium
   };
 
   /// `model` must outlive the problem. Frames without points are left out. `offset_sigma_kPa`: see above.

@@ -304,10 +304,10 @@ size_t MotionResiduals::give_up_lost() {
   return count;
 }
 
-Eigen::VectorXd MotionResiduals::unweighted_mm() const {
-  Eigen::VectorXd result = residuals_;
+Eigen::VectorXd MotionResiduals::sigmas_mm() const {
+  Eigen::VectorXd result(size());
   for (size_t i = 0; i < rows_.size(); ++i)
-    result[static_cast<Eigen::Index>(i)] *= rows_[i].sigma_mm;
+    result[static_cast<Eigen::Index>(i)] = rows_[i].sigma_mm;
   return result;
 }
 

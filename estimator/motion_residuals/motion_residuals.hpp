@@ -93,7 +93,7 @@ class MotionResiduals {
   [[nodiscard]] Eigen::Index size() const { return first_.back(); }
   /// Of the last motion that was not refused.
   [[nodiscard]] const Eigen::VectorXd& residuals() const { return residuals_; }
-  [[nodiscard]] Eigen::VectorXd unweighted_mm() const;
+  [[nodiscard]] Eigen::VectorXd sigmas_mm() const;
 
   /// Derivatives of a slot's residuals: a column a field of dx; `reference`: of dX, null where it is zero.
   [[nodiscard]] Eigen::MatrixXd columns(size_t slot, const HermiteMesh& mesh,

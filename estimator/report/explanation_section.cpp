@@ -215,7 +215,7 @@ std::string verdict_note(const Explanation& e) {
     case Verdict::unexplained:
       return "something is there that no known effect removes";
     case Verdict::none:
-      return "nothing exceeds the noise";
+      return "nothing exceeds the model's own error";
   }
   return "";
 }
@@ -236,10 +236,9 @@ std::string verdict_words(const Explanation& e) {
 }
 
 void add_headlines(Page& page, const Explanation& e) {
-  page.headline("What the model lacks", verdict_words(e),
-                e.confidence && e.verdict != Verdict::unexplained
-                    ? fmt::format("{}; probability {:.2f}", verdict_note(e), *e.confidence)
-                    : verdict_note(e));
+  page.headline(
+      "What the model lacks", verdict_words(e),
+      e.confidence ? fmt::format("{}; probability {:.2f}", verdict_note(e), *e.confidence) : verdict_note(e));
   page.headline("Gap, before → after",
                 fmt::format("{} → {}", number(e.gap.before, 3), number(e.gap.after, 3)),
                 fmt::format("{} is noise; {} % closed on data that were not fitted", number(e.gap.floor, 3),
@@ -390,9 +389,11 @@ void add_model_error(Page& page, const Explanation& e) {
 void add_evidence(Page& page, const Explanation& e) {
   if (e.evidence.empty()) return;
   page.section("The evidence",
-               "Each candidate's drop of −2 log likelihood (χ²) with the stiffness and the offsets free to "
-               "adapt: by a full refit, or by a score test where that was too small to deserve one. A true "
-               "effect also predicts runs that were not fitted.");
+               "What each candidate gains with the stiffness and all else that is unknown free to adapt: "
+               "twice the gain of ln "
+               "probability of a rig's, the drop of χ² of an imaged specimen's; by a full refit, or "
+               "linearised where that "
+               "was too small to deserve one. A true effect also predicts what was not fitted.");
   const auto row_of = [](const Candidate& candidate) -> Page::Row {
     return {words_of(candidate.ids, "nothing"),
             number(candidate.chi_square_drop, 4),

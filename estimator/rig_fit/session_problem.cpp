@@ -9,8 +9,7 @@
 namespace diastole::rig {
 namespace {
 
-constexpr double modulus_sd = 0.7;       ///< of its logarithm: gels of one recipe and tissues alike
-constexpr double stated_modulus = 1.25;  ///< bounds nearer than this factor state a measured modulus
+constexpr double modulus_sd = 0.7;  ///< of its logarithm: gels of one recipe and tissues alike
 constexpr double offset_sd_Pa = 300.0;
 /// Steps of the plant where the pump's pressure is recorded and where it is not. Features are means: with these and three components
 /// what is shown errs by less than a twentieth of the model's stated error.
@@ -26,15 +25,12 @@ bool is_abrupt(const RigModel& model) {
 
 constexpr size_t modulus_at = 0, cavity_offset_at = 1, pump_offset_at = 2;
 
+/// Bounds that leave less than gels and tissues do state what is known: as likely everywhere between them.
 Nuisance modulus_of(const SpecimenFamily& family) {
   const StudyParameter& modulus = family.modulus();
-  if (modulus.upper < stated_modulus * modulus.lower)
-    return {"modulus",
-            "ln",
-            std::log(modulus.upper / modulus.lower) / std::sqrt(12.0),
-            0.5 * std::log(modulus.upper * modulus.lower),
-            false,
-            nullptr};
+  const double sd_of_bounds = std::log(modulus.upper / modulus.lower) / std::sqrt(12.0);
+  if (sd_of_bounds < modulus_sd)
+    return {"modulus", "ln", sd_of_bounds, 0.5 * std::log(modulus.upper * modulus.lower), false, nullptr};
   return {"modulus", "ln", modulus_sd, std::log(family.modulus_start_kPa()), false, nullptr};
 }
 

@@ -34,7 +34,7 @@ struct Search {
     if (!problem.residuals(q)) return worst_cost;
     double squares_mm2 = 0;
     for (const JointProblem::LoadedFrame& frame : problem.frames())
-      squares_mm2 += frame.residuals.unweighted_mm().squaredNorm();
+      squares_mm2 += frame.residuals.residuals().cwiseProduct(frame.residuals.sigmas_mm()).squaredNorm();
     return squares_mm2 / 2;
   }
 };

@@ -10,8 +10,7 @@ using Eigen::VectorXd;
 
 bool is_changed(const rig::SessionModel& model, std::string_view part) {
   return std::ranges::any_of(model.terms, [&](const rig::ModelTerm& term) {
-    const std::string_view id = term.effect->text().id;
-    return part.substr(0, part.find('_')) == id.substr(0, id.find('-'));
+    return part.substr(0, part.find('_')) == term.effect->text().changes;
   });
 }
 

@@ -10,7 +10,7 @@
 
 namespace diastole::explain {
 
-/// Does an effect of the model change this part ("hose_bore" by "hose-compliance")?
+/// Is this a tolerance of a part that an effect of the model changes ("hose_bore" of the "hose", EffectDeclaration::changes)?
 bool is_changed(const rig::SessionModel& model, std::string_view part);
 
 /// `start`, whose u is by the prior of `known`, and the same columns, by the prior that its effects leave.

@@ -144,11 +144,11 @@ class Promises {
   std::map<std::vector<std::string_view>, Promise> best_;
 };
 
-class SetsSearch {
+class SetSearch {
  public:
-  SetsSearch(const rig::SessionProblem& problem, const SetSearchOptions& options)
+  SetSearch(const rig::SessionProblem& problem, const SetSearchOptions& options)
       : problem_(problem), options_(options) {}
-  SetSearch run();
+  WeighedSets run();
 
  private:
   void report(std::string_view what) const {
@@ -228,7 +228,7 @@ class SetsSearch {
   std::vector<EffectSet> sets_;
 };
 
-std::vector<Promise> SetsSearch::promises(const Screening& screening, bool pairs) const {
+std::vector<Promise> SetSearch::promises(const Screening& screening, bool pairs) const {
   Promises best(responses_);
   for (size_t i = 0; i < responses_.size(); ++i) {
     if (!pairs) best.add({screening.single(i), {i}});
@@ -239,7 +239,7 @@ std::vector<Promise> SetsSearch::promises(const Screening& screening, bool pairs
   return best.sorted();
 }
 
-bool SetsSearch::is_fitted(const std::vector<const Effect*>& effects) const {
+bool SetSearch::is_fitted(const std::vector<const Effect*>& effects) const {
   return std::ranges::any_of(sets_, [&](const EffectSet& set) {
     return added(set) == effects.size() &&
            std::ranges::all_of(
@@ -248,7 +248,7 @@ bool SetsSearch::is_fitted(const std::vector<const Effect*>& effects) const {
   });
 }
 
-void SetsSearch::fit(const std::vector<size_t>& responses) {
+void SetSearch::fit(const std::vector<size_t>& responses) {
   SessionModel start = base_.at;
   std::vector<const Effect*> effects;
   for (const size_t i : responses) {
@@ -272,7 +272,7 @@ void SetsSearch::fit(const std::vector<size_t>& responses) {
 }
 
 /// A pair that explains less than one of its effects alone has lost its way: it is searched again from that one.
-void SetsSearch::fit_from_better_part(const std::vector<size_t>& responses) {
+void SetSearch::fit_from_better_part(const std::vector<size_t>& responses) {
   const EffectSet& pair = sets_.back();
   const EffectSet* better = nullptr;
   size_t other = 0;
@@ -296,7 +296,7 @@ void SetsSearch::fit_from_better_part(const std::vector<size_t>& responses) {
 /// An effect with moments beside a set. How many there are, and when, shows as finely as the model is right, which the fit with some
 /// of them tells: they are sought under what the set leaves, under what is stated if that is finer, and again under what is left with
 /// the best ones.
-void SetsSearch::fit_events(const EffectSet& beside, const Effect& effect) {
+void SetSearch::fit_events(const EffectSet& beside, const Effect& effect) {
   EffectSet before = beside;
   std::optional<EffectSet> best;
   const auto seek = [&](const rig::Shares& shares) {
@@ -321,7 +321,7 @@ void SetsSearch::fit_events(const EffectSet& beside, const Effect& effect) {
   if (best) sets_.push_back(std::move(*best));
 }
 
-void SetsSearch::fit_beside_best() {
+void SetSearch::fit_beside_best() {
   sort_sets();
   const EffectSet* best = best_of(1);
   if (best == nullptr) return;
@@ -348,7 +348,7 @@ void SetsSearch::fit_beside_best() {
 }
 
 /// Pairs whose effects only show together, where what has been found leaves more than the model's error is likely to be.
-void SetsSearch::fit_synergies() {
+void SetSearch::fit_synergies() {
   sort_sets();
   if (sets_.empty() ||
       std::ranges::max(sets_.front().evidence.surprise(problem_.error().prior)) < least_surprise(1))
@@ -362,7 +362,7 @@ void SetsSearch::fit_synergies() {
 
 /// Is more than half of what an effect changes what a tolerance changes that is so far off in a set that the effect may be the more
 /// probable of both? What the two leave of each other no linear algebra tells: their curvature is more.
-bool SetsSearch::relieves(const Effect* effect, const EffectSet& set) const {
+bool SetSearch::relieves(const Effect* effect, const EffectSet& set) const {
   const VectorXd weight = set.evidence.variance.cwiseSqrt().cwiseInverse();
   const Index tolerances = set.model.u.size() - static_cast<Index>(rig::basic_nuisances);
   for (Index i = 0; i < tolerances; ++i) {
@@ -377,15 +377,15 @@ bool SetsSearch::relieves(const Effect* effect, const EffectSet& set) const {
 }
 
 /// What moments do has none.
-bool SetsSearch::has_response(const Effect* effect) const {
+bool SetSearch::has_response(const Effect* effect) const {
   return effect->change_points() == ChangePoints::none &&
          std::ranges::any_of(responses_,
                              [&](const Response& response) { return response.term.effect == effect; });
 }
 
 /// The most that responses of these effects promise together, one of each.
-Screening::Joined SetsSearch::most_joined(const Screening& screening, std::span<const Effect* const> effects,
-                                          const std::vector<size_t>& chosen) const {
+Screening::Joined SetSearch::most_joined(const Screening& screening, std::span<const Effect* const> effects,
+                                         const std::vector<size_t>& chosen) const {
   if (effects.empty()) return screening.joined(chosen);
   Screening::Joined most;
   for (size_t i = 0; i < responses_.size(); ++i) {
@@ -400,7 +400,7 @@ Screening::Joined SetsSearch::most_joined(const Screening& screening, std::span<
 
 /// The log posterior of a set of which a part was fitted exactly and explains more, by linear algebra there: what it lacks at its
 /// best sizes, which are its priors' sds, too. None if that promises more than its prior odds cost.
-std::optional<double> SetsSearch::posterior_beside_part(const EffectSet& set) const {
+std::optional<double> SetSearch::posterior_beside_part(const EffectSet& set) const {
   const auto is_in = [](const Effect* effect, const EffectSet& of) {
     return std::ranges::count(of.model.terms, effect, &rig::ModelTerm::effect) > 0;
   };
@@ -430,7 +430,7 @@ std::optional<double> SetsSearch::posterior_beside_part(const EffectSet& set) co
   return {};
 }
 
-void SetsSearch::fit_best_again(size_t effects) {
+void SetSearch::fit_best_again(size_t effects) {
   sort_sets();
   size_t count = 0;
   double best = 0.0;
@@ -449,14 +449,14 @@ void SetsSearch::fit_best_again(size_t effects) {
 }
 
 /// Is the rig without effects, which is among the sets, as probable as the best of one, or in the reach of what another fit changes?
-bool SetsSearch::is_plain_near() const {
+bool SetSearch::is_plain_near() const {
   const EffectSet* best = best_of(1);
   return best == nullptr || best_of(0)->log_posterior >= best->log_posterior - second_in_reach;
 }
 
 /// May it come near once its tolerances are not linear? At the best set's tolerances, linear algebra tells. Without effects a search
 /// goes a long way after what tolerances cannot make.
-bool SetsSearch::is_plain_in_reach() const {
+bool SetSearch::is_plain_in_reach() const {
   if (is_plain_near()) return true;
   const EffectSet& best = *best_of(1);
   SessionModel start = best.model;
@@ -469,7 +469,7 @@ bool SetsSearch::is_plain_in_reach() const {
 /// Beside the rig without effects most sets need no fit of their own, so it comes first where it is near. Where its tolerances
 /// wandered further than is likely, what it found counts only if it is in reach once effects are fitted; where they found no end,
 /// their linear fit stands.
-void SetsSearch::fit_plain_and_singles_again() {
+void SetSearch::fit_plain_and_singles_again() {
   const auto plain = [&] {
     return std::ranges::find_if(sets_, [&](const EffectSet& set) { return added(set) == 0; });
   };
@@ -488,7 +488,7 @@ void SetsSearch::fit_plain_and_singles_again() {
 }
 
 /// All sets that promise most, from the base and the effects' responses.
-void SetsSearch::search_from_base() {
+void SetSearch::search_from_base() {
   sets_.push_back(fit_set(problem_, base_.at, base_, problem_.error().prior.share));
   const EffectSet plain = sets_.front();
   const rig::EvidenceFit stated =
@@ -521,7 +521,7 @@ void SetsSearch::search_from_base() {
 }
 
 /// From now on the base is a rig whose parts are so many times finer.
-void SetsSearch::take_base_for_finer(double times) {
+void SetSearch::take_base_for_finer(double times) {
   const auto prior = std::make_shared<rig::TolerancePrior>(problem_.finer_prior(times));
   base_.columns.rightCols(prior->mean.size()) *= prior->described.asDiagonal();
   base_.at.prior = prior;
@@ -529,7 +529,7 @@ void SetsSearch::take_base_for_finer(double times) {
 
 /// The log posterior that the best set would have in a rig of parts so many times finer: the rig without effects that was fitted, and
 /// the responses, by linear algebra. What effects with moments would do is not among them.
-double SetsSearch::promised_if_finer(double times, const EffectSet& plain) const {
+double SetSearch::promised_if_finer(double times, const EffectSet& plain) const {
   const rig::TolerancePrior finer = problem_.finer_prior(times);
   const VectorXd target = plain.target();
   MatrixXd columns = plain.columns;
@@ -546,7 +546,7 @@ double SetsSearch::promised_if_finer(double times, const EffectSet& plain) const
 
 /// The list's tolerances are what rigs usually have. One whose parts are all far nearer to their description is as likely beforehand, and
 /// in it a part that alone is off is no tolerance: the sets are sought there, too, where that may decide something.
-void SetsSearch::search_if_finer() {
+void SetSearch::search_if_finer() {
   static constexpr std::array finer{2.0, 4.0, 8.0};
   constexpr double linear_errs = 10.0;  // nats, of a posterior by linear algebra
   const EffectSet* plain = best_of(0);
@@ -571,14 +571,14 @@ void SetsSearch::search_if_finer() {
   sort_sets();
 }
 
-SetSearch SetsSearch::run() {
+WeighedSets SetSearch::run() {
   report("fitting the rig's model");
   base_ = declared_rig(problem_, {.terms = options_.terms, .values = options_.values, .u = {}});
   report("computing what each effect would do");
   const rig::EvidenceFit stated =
       fit_linear(base_.target(problem_), base_.columns, problem_.error(), problem_.error().prior.share);
   responses_ = effect_responses(problem_, base_, stated.variance.cwiseSqrt());
-  SetSearch found;
+  WeighedSets found;
   found.given = options_.terms.size();
   for (const Promise& promise : promises(stated, false))
     found.promises.emplace_back(responses_[promise.responses.front()].term.effect->text().id, promise.gain);
@@ -603,8 +603,8 @@ std::vector<std::string> EffectSet::ids() const {
   return list;
 }
 
-SetSearch search_sets(const rig::SessionProblem& problem, const SetSearchOptions& options) {
-  return SetsSearch(problem, options).run();
+WeighedSets search_sets(const rig::SessionProblem& problem, const SetSearchOptions& options) {
+  return SetSearch(problem, options).run();
 }
 
 }  // namespace diastole::explain

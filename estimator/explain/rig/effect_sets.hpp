@@ -3,9 +3,8 @@
 // effects' responses, those that promise most by fits, each fit with the evidence of its set.
 //
 // The evidence of a set is the marginal likelihood of the features (model_error.hpp) over modulus, offsets, tolerances
-// and the effects' values, by Laplace's approximation about the fit. A size is as likely in any decade (its density is
-// that of a normal with the found size as sd, less what two hundredfold ranges make of it), other parameters are uniform
-// within their bounds; an effect is there in one session of forty, and as many change points are possible as there are
+// and the effects' values, by Laplace's approximation about the fit. A size's logarithm is uniform over two decades
+// (ln 100 = 4.6; of both signs, over twice that), other parameters are uniform within their bounds; an effect is there in one session of forty, and as many change points are possible as there are
 // cycles.
 
 #include <functional>
@@ -20,7 +19,9 @@ namespace diastole::explain {
 
 /// That a given effect is there, in a session that somebody asks about.
 inline constexpr double effect_odds = 1.0 / 40.0;
-inline constexpr double right_to = 0.1;  ///< an effect's equations, of a real part
+/// What a real part does differs from an effect's equations by such a share at the most: as one sd where a misfit beside the effect is
+/// judged, as two in its values' intervals (value_errors.hpp).
+inline constexpr double right_to = 0.1;
 
 struct EffectSet {
   rig::SessionModel model;             ///< as fitted
@@ -47,7 +48,7 @@ struct EffectSet {
   }
 };
 
-struct SetSearch {
+struct WeighedSets {
   std::vector<EffectSet> sets;  ///< the most probable first; one of them has no effects
   std::vector<double> probability;
   std::vector<std::pair<std::string, double>> promises;  ///< of single effects: the gain of 2 ln evidence
@@ -60,6 +61,6 @@ struct SetSearchOptions {
   std::function<void(std::string_view)> progress = {};
 };
 
-SetSearch search_sets(const rig::SessionProblem& problem, const SetSearchOptions& options = {});
+WeighedSets search_sets(const rig::SessionProblem& problem, const SetSearchOptions& options = {});
 
 }  // namespace diastole::explain

@@ -66,7 +66,7 @@ std::optional<std::string> common_port(const EffectLibrary& library, const Expla
 }
 
 std::optional<NextExperiment> next_experiment(const Study& study, const rig::SessionProblem& problem,
-                                              const SetSearch& search, const SetVerdict& verdict,
+                                              const WeighedSets& search, const SetVerdict& verdict,
                                               const Explanation& found) {
   SpecimenKnowledge knowledge;
   if (const auto* annulus = std::get_if<AnnulusSpecimen>(&study.specimen))
@@ -205,7 +205,7 @@ Explanation explain_rig(const Study& study, const ExplainOptions& options) {
   if (learnt) reference = take_reference(study, *learnt, problem);
   SetSearchOptions searching{.progress = report};
   take_given(study, session, searching);
-  const SetSearch search = search_sets(problem, searching);
+  const WeighedSets search = search_sets(problem, searching);
   if (std::ranges::none_of(search.sets,
                            [&](const EffectSet& set) { return set.model.terms.size() == search.given; })) {
     throw InputError(

@@ -118,8 +118,8 @@ std::vector<ParameterShift> parameter_shifts(const rig::SessionProblem& problem,
     if (i == 2 && !problem.noise().channels.contains(rig::Channel::pump)) continue;
     const auto [old, old_error] = value(before, i);
     const auto [now, now_error] = value(after, i);
-    shifts.push_back(
-        {i == 0 ? "C1_kPa" : problem.nuisances()[i].name + "_Pa", old, old_error, now, now_error});
+    shifts.push_back({i == 0 ? problem.family().modulus().name : problem.nuisances()[i].name + "_Pa", old,
+                      old_error, now, now_error});
   }
   return shifts;
 }
@@ -164,7 +164,7 @@ Misfit misfit_of(const rig::Tone& tone, const rig::Session& session) {
       .p_value = tone.p_value};
 }
 
-std::vector<Candidate> candidates(const EffectLibrary& known, const SetSearch& search,
+std::vector<Candidate> candidates(const EffectLibrary& known, const WeighedSets& search,
                                   const SetVerdict& verdict) {
   std::vector<Candidate> list;
   const auto plain = std::ranges::find_if(
@@ -184,7 +184,9 @@ std::vector<Candidate> candidates(const EffectLibrary& known, const SetSearch& s
       if (verdict.held_out_gain) row.held_out_drop = 2.0 * *verdict.held_out_gain;
       row.verdict = verdict.verdict == Verdict::unexplained ? "fits best, and not well enough"
                     : verdict.verdict == Verdict::ambiguous ? "as good"
-                                                            : "named";
+                    : verdict.verdict == Verdict::named     ? "named"
+                    : set.model.terms.size() > search.given ? "a hint, too small for a name"
+                                                            : "nothing is missing";
     } else {
       row.verdict = fmt::format("probability {:.2g}", probability[set.ids()]);
     }

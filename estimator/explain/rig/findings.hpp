@@ -25,7 +25,7 @@ std::vector<Misfit> misfits(const rig::SessionProblem& problem, const EffectSet&
 Misfit misfit_of(const rig::Tone& tone, const rig::Session& session);
 
 /// The evidence table.
-std::vector<Candidate> candidates(const EffectLibrary& known, const SetSearch& search,
+std::vector<Candidate> candidates(const EffectLibrary& known, const WeighedSets& search,
                                   const SetVerdict& verdict);
 
 std::vector<Trace> traces(const rig::SessionProblem& problem, const EffectSet& before,

@@ -120,7 +120,7 @@ Knowledge learn_tolerances(const std::vector<std::unique_ptr<Fitted>>& fits,
   return known;
 }
 
-/// One features' difference of two references, of the segments that both hold.
+/// One feature's difference of two references, of the segments that both hold.
 Shares differing_shares(const std::vector<std::unique_ptr<Fitted>>& fits, const Reference& known) {
   if (fits.size() < 2) {
     Shares shares = known.all;

@@ -28,7 +28,7 @@ constexpr double bound_u = 8.0;       ///< of a nuisance, in sds: no data move o
 /// Whether the nuisances but the modulus follow by columns taken at a known model, or are simulated.
 enum class Nuisances { linear, simulated };
 
-/// What is searched: the effects' values, the moments, the modulus; and the other nuisances.
+/// What is searched: the effects' values, the modulus and the other nuisances; the moments are held.
 class SetProblem : public inference::LeastSquaresProblem {
  public:
   SetProblem(const rig::SessionProblem& problem, const SessionModel& start, rig::LinearisedModel known,

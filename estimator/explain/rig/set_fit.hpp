@@ -1,7 +1,7 @@
 #pragma once
 // The fit of one set of effects to a session's features, with its evidence.
 //
-// The effects' values, their moments and the modulus are searched; offsets and tolerances follow as linear unknowns, by
+// The effects' values and the modulus are searched; moments stay where event_scan.hpp put them, and their errors are in the covariance; offsets and tolerances follow as linear unknowns, by
 // columns taken at a known model, or are searched too. Values and the shares of the model's error are found in turn until
 // the evidence rests.
 

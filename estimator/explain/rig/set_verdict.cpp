@@ -5,6 +5,7 @@
 #include <boost/math/distributions/normal.hpp>
 #include <cmath>
 #include <map>
+#include <numbers>
 
 #include "estimator/explain/rig/changed_parts.hpp"
 #include "estimator/explain/rig/held_out.hpp"
@@ -18,8 +19,8 @@ using Eigen::VectorXd;
 using Ids = std::vector<std::string>;
 
 constexpr double name_probability = 0.9;
-constexpr double least_probability = 0.05;  ///< of a set that is told of
-constexpr double irregular_by_chance = 0.001;
+constexpr double least_probability = 0.05;     ///< of a set that is told of
+constexpr double irregular_by_chance = 0.001;  ///< that equal cycles differ by more than noise makes them
 
 struct Sizes {
   std::vector<double> over_error;
@@ -152,19 +153,22 @@ std::optional<rig::Tone> material_tone(const rig::SessionProblem& problem, const
   return tone && tone->rms_kPa > std::max(least_kPa, tone->noise_kPa) ? tone : std::nullopt;
 }
 
-/// Do equal cycles differ by more than noise makes them (once in a thousand sessions), and materially?
-bool is_irregular(const rig::SessionProblem& problem, const std::vector<rig::CycleScatter>& scatter) {
-  return std::ranges::any_of(scatter, [&](const rig::CycleScatter& channel) {
+/// How often noise alone makes equal cycles differ so; 1 where they do not differ materially.
+double irregularity_by_chance(const rig::SessionProblem& problem,
+                              const std::vector<rig::CycleScatter>& scatter) {
+  double least = 1.0;
+  for (const rig::CycleScatter& channel : scatter) {
     const auto group = channel.signal == rig::Signal::pump ? rig::ErrorGroup::pump : rig::ErrorGroup::cavity;
     const double least_kPa = rig::SharePrior::least[static_cast<size_t>(group)] *
                              problem.error().range[static_cast<size_t>(channel.signal)];
-    return channel.rms_kPa > least_kPa && seldom(channel.sds) < irregular_by_chance;
-  });
+    if (channel.rms_kPa > least_kPa) least = std::min(least, seldom(channel.sds));
+  }
+  return least;
 }
 
-/// Are the parts of the rig in all further from what is declared or was learnt of them than is likely? Those that are known to
+/// How often the parts of the rig are in all as far from what is declared or was learnt of them. Those that are known to
 /// an order of magnitude only, by no data sheet, may be anywhere; and so may those that an effect changes.
-bool is_strained_in_all(const rig::SessionProblem& problem, const EffectSet& set, const VectorXd& u) {
+double strain_in_all_by_chance(const rig::SessionProblem& problem, const EffectSet& set, const VectorXd& u) {
   const Index count = u.size() - static_cast<Index>(rig::basic_nuisances);
   std::vector<Index> known;
   for (Index i = 0; i < count; ++i) {
@@ -177,23 +181,19 @@ bool is_strained_in_all(const rig::SessionProblem& problem, const EffectSet& set
   const Eigen::MatrixXd covariance = (root * root.transpose())(known, known);
   const VectorXd of_known = moved(known);
   const double square = of_known.dot(covariance.llt().solve(of_known));
-  return square > boost::math::quantile(boost::math::complement(
-                      boost::math::chi_squared(static_cast<double>(known.size())), surprising_by_chance));
+  return boost::math::cdf(
+      boost::math::complement(boost::math::chi_squared(static_cast<double>(known.size())), square));
 }
 
-bool is_surprising(const rig::SessionProblem& problem, const rig::EvidenceFit& evidence, double most_sds) {
-  const rig::Shares surprise = evidence.surprise(problem.error().prior);
-  return std::ranges::any_of(surprise, [&](double sds) { return sds > most_sds; });
-}
-
-/// A name bears what the parts of the error show by chance, and one tolerance that is far off if they are not in all; what its
-/// effects change may be wrong to the part that equations of real parts are.
-bool bears_a_name(const rig::SessionProblem& problem, const EffectSet& set, const Sizes& sizes) {
+/// How often, by chance, the parts of the error are as large beneath this name, or the rig's as far off in all: what its effects
+/// change may be wrong to the part that equations of real parts are.
+double name_by_chance(const rig::SessionProblem& problem, const EffectSet& set, const Sizes& sizes) {
   rig::ModelError error = problem.error();
   error.noise += right_to * right_to * sizes.changed;
   const rig::EvidenceFit again = fit_with_shares(set.target(), set.columns, error, set.evidence.shares);
-  return !is_surprising(problem, again, least_surprise(parts_of(error))) &&
-         !is_strained_in_all(problem, set, again.u.tail(set.model.u.size()));
+  const auto parts = static_cast<double>(parts_of(error));
+  return std::min(parts * seldom(std::ranges::max(again.surprise(error.prior))),
+                  strain_in_all_by_chance(problem, set, again.u.tail(set.model.u.size())));
 }
 
 /// ln of the odds of a set on waveforms that it was not fitted to alone: what it gains there has to overcome the effects' prior
@@ -202,15 +202,23 @@ double held_out_odds(double held_out_gain, size_t effects) {
   return held_out_gain + static_cast<double>(effects) * std::log(effect_odds);
 }
 
-/// That nothing is wrong is not said of a misfit that one part shows so seldom, nor of one tolerance so far to either side,
-/// nor of both as seldom together (Fisher 1925: minus two ln of their product is chi-square on four).
-bool bears_nothing_wrong(const rig::SessionProblem& problem, const EffectSet& set) {
+/// How often, by chance, where nothing is wrong, one part of the error is as large, one tolerance as far to either side, or both
+/// are as seldom together (Fisher 1925: minus two ln of their product is chi-square on four). 0 of a search that did not settle.
+double nothing_wrong_by_chance(const rig::SessionProblem& problem, const EffectSet& set) {
+  if (!inference::is_settled(set.termination)) return 0.0;
   const double misfit = seldom(std::ranges::max(set.evidence.surprise(problem.error().prior)));
   const double strain = strain_by_chance(problem, set.model, set.model.u);
   const double product = misfit * strain;
   const double together = product > 0.0 ? product * (1.0 - std::log(product)) : 0.0;
-  return inference::is_settled(set.termination) &&
-         std::min({misfit, strain, together}) > surprising_by_chance;
+  return std::min({misfit, strain, together});
+}
+
+/// That a model is wrong of which what is seen is so seldom by chance, at even odds before: the least that a p-value can mean
+/// (Sellke, Bayarri and Berger 2001).
+double wrong_if_seldom(double by_chance) {
+  if (by_chance <= 0.0) return 1.0;
+  constexpr double says_nothing = 1.0 / std::numbers::e;
+  return by_chance < says_nothing ? 1.0 / (1.0 - std::numbers::e * by_chance * std::log(by_chance)) : 0.5;
 }
 
 }  // namespace
@@ -220,9 +228,9 @@ double error_rms(const rig::SessionProblem& problem, const rig::Shares& shares, 
       mean_squares(problem, error_squares(problem.error(), shares))[static_cast<size_t>(signal)]);
 }
 
-SetVerdict judge_sets(const rig::SessionProblem& problem, const SetSearch& search,
+SetVerdict judge_sets(const rig::SessionProblem& problem, const WeighedSets& search,
                       const ErrorKnowledge& error) {
-  constexpr double told = 0.01;
+  constexpr double considered = 0.01;  // of a probability: less decides nothing beside nine tenths
   struct Group {
     double probability = 0.0;
     size_t best = 0;
@@ -231,7 +239,7 @@ SetVerdict judge_sets(const rig::SessionProblem& problem, const SetSearch& searc
   std::vector<Sizes> sizes(search.sets.size());
   SetVerdict out;
   for (size_t k = 0; k < search.sets.size(); ++k) {
-    if (search.probability[k] < told) continue;
+    if (search.probability[k] < considered) continue;
     sizes[k] = sizes_of(problem, search.sets[k], error, search.given);
     const Ids ids = material_ids(search.sets[k], sizes[k]);
     const auto [group, is_new] = groups.try_emplace(ids, Group{0.0, k});
@@ -274,10 +282,10 @@ SetVerdict judge_sets(const rig::SessionProblem& problem, const SetSearch& searc
   const bool is_more = leading->first.size() > search.given;
   if (is_more) out.searches.push_back({best.ids(), best.termination});
   // That nothing is wrong holds with the hints or, unless the data exclude it, without them.
-  const bool may_be_plain = search.probability[out.plain] >= told;
-  const bool borne =
-      is_more ? bears_a_name(problem, best, sizes[out.chosen])
-              : bears_nothing_wrong(problem, best) || (may_be_plain && bears_nothing_wrong(problem, *plain));
+  const bool may_be_plain = search.probability[out.plain] >= considered;
+  const double by_chance = is_more ? name_by_chance(problem, best, sizes[out.chosen])
+                                   : std::max(nothing_wrong_by_chance(problem, best),
+                                              may_be_plain ? nothing_wrong_by_chance(problem, *plain) : 0.0);
   out.scatter = rig::cycle_scatter(problem, best.model);
   out.tone = material_tone(problem, best, error);
   if (is_more) out.held_out_gain = held_out_gain(problem, *plain, best);
@@ -285,12 +293,16 @@ SetVerdict judge_sets(const rig::SessionProblem& problem, const SetSearch& searc
   const double odds =
       is_more ? held_out_odds(*out.held_out_gain, best.model.terms.size() - search.given) : sure;
   const bool predicted = !is_more || odds > sure;
-  if (!borne || is_irregular(problem, out.scatter) || !is_settled(out.searches)) {
+  const double irregular = irregularity_by_chance(problem, out.scatter);
+  const bool settled = is_settled(out.searches);
+  if (by_chance <= surprising_by_chance || irregular < irregular_by_chance || !settled) {
     out.verdict = Verdict::unexplained;
+    out.confidence = settled ? wrong_if_seldom(std::min(by_chance, irregular)) : 0.5;
     return out;
   }
   if (out.confidence >= name_probability) {
-    const bool may_be_nothing_known = odds > -sure || bears_nothing_wrong(problem, *plain);
+    const bool may_be_nothing_known =
+        odds > -sure || nothing_wrong_by_chance(problem, *plain) > surprising_by_chance;
     if (!predicted && !out.tone && may_be_nothing_known) {
       out.verdict = Verdict::ambiguous;
       for (size_t k = 0; k < search.sets.size(); ++k)
@@ -301,6 +313,9 @@ SetVerdict judge_sets(const rig::SessionProblem& problem, const SetSearch& searc
     out.is_tone_alone = !is_more && out.tone;
     const bool is_clean = !is_more && !out.tone;
     out.verdict = is_clean ? Verdict::none : is_more && predicted ? Verdict::named : Verdict::unexplained;
+    if (out.verdict == Verdict::unexplained)
+      out.confidence = std::max(predicted ? 0.0 : 1.0 / (1.0 + std::exp(odds)),
+                                out.tone ? wrong_if_seldom(out.tone->p_value) : 0.0);
     return out;
   }
   out.verdict = Verdict::ambiguous;

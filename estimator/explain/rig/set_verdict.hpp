@@ -24,7 +24,7 @@ namespace diastole::explain {
 /// What is known of the model's error, and how much larger than it an effect has to be for a name.
 struct ErrorKnowledge {
   bool from_reference = false;
-  /// The error itself is known within a factor of two (SharePrior), from references within one of 1.5.
+  /// An error that is stated or estimated is known within a factor of two (SharePrior); what references left comes again within 1.5.
   [[nodiscard]] double least_size() const { return from_reference ? 1.5 : 2.0; }
 };
 
@@ -33,6 +33,8 @@ double least_surprise(size_t parts);
 
 struct SetVerdict {
   Verdict verdict = Verdict::none;
+  /// Of the sets that it names, or between which it is open. Of an unexplained one: that the leading set is wrong, from how seldom it
+  /// shows by chance what speaks against it, or by the odds on waveforms that it was not fitted to; 0.5 where searches did not settle.
   double confidence = 0.0;
   size_t chosen = 0;                    ///< of the search's sets
   size_t plain = 0;                     ///< the one without effects in a rig with the chosen one's tolerances
@@ -57,7 +59,7 @@ struct ChangeSize {
 ChangeSize size_of_change(const rig::SessionProblem& problem, const EffectSet& set,
                           const Eigen::VectorXd& change);
 
-SetVerdict judge_sets(const rig::SessionProblem& problem, const SetSearch& search,
+SetVerdict judge_sets(const rig::SessionProblem& problem, const WeighedSets& search,
                       const ErrorKnowledge& error);
 
 /// RMS of the model's error in a channel, kPa or mL, at these shares; 0 where there is none.

@@ -13,8 +13,7 @@
 namespace diastole::explain {
 
 /// named: exactly one set of effects survives. ambiguous: these data cannot tell several sets apart. unexplained: the
-/// misfit has structure that no known effect removes; `effects` then holds only what is certain. none: nothing exceeds
-/// the noise.
+/// misfit has structure that no known effect removes; `effects` is then empty. none: nothing exceeds the model's own error.
 enum class Verdict { named, ambiguous, unexplained, none };
 std::string_view name_of(Verdict verdict);
 /// Throws std::invalid_argument for any other word.
@@ -92,7 +91,7 @@ struct ReferenceSummary {
   std::vector<Departure> departures;  ///< of one sd and more, the largest first
 };
 
-/// A place in the data where the base model fails beyond the noise, after correction for how many were looked at.
+/// A place in the data where the base model fails beyond noise and its own error, after correction for how many were looked at.
 struct Misfit {
   std::string port;     ///< "drive", "specimen", "sensor", "clock", "field"
   std::string run;      ///< empty for tags
@@ -117,11 +116,13 @@ struct Gap {
 /// One row of the evidence table.
 struct Candidate {
   std::vector<std::string> ids;
-  double chi_square_drop = 0.0;  ///< of a refit, or of the score test if it was not refitted
+  double chi_square_drop =
+      0.0;  ///< of a rig's: twice the gain of ln probability, prior included; linearised if it was not refitted
   bool refitted = false;
   size_t parameters = 0;
-  std::optional<double> held_out_drop;  ///< of chi-square on runs that were not fitted
-  std::string verdict;                  ///< in words: "named", "as good", "refuted: ...", "not needed"
+  std::optional<double>
+      held_out_drop;    ///< of a rig's: twice the gain of ln likelihood on waveforms that were not fitted
+  std::string verdict;  ///< in words: "named", "as good", "refuted: ...", "not needed"
 };
 
 struct ParameterShift {
@@ -197,7 +198,7 @@ struct LearnedTerm {
 };
 
 struct NextExperiment {
-  std::string toml;  ///< runnable: contracts.md section 6
+  std::string toml;  ///< an experiment file, as `diastole run` takes it
   std::vector<std::string> separates;
   double predicted_separation_sigma = 0.0;
   std::string reason;  ///< one sentence for people
@@ -206,7 +207,8 @@ struct NextExperiment {
 struct Explanation {
   std::string study;  ///< file
   Verdict verdict = Verdict::none;
-  std::optional<double> confidence;  ///< that the verdict is right
+  /// That the verdict is right; of an unexplained one, that the best set is wrong (estimator/explain/rig/set_verdict.hpp). Of runs.
+  std::optional<double> confidence;
   std::optional<ModelErrorSize> model_error;
   std::optional<ReferenceSummary> reference;
   std::vector<Departure> departures;        ///< of one sd and more, the largest first

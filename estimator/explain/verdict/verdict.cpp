@@ -63,7 +63,7 @@ std::string verdict_sentence(const Explanation& found) {
         return fmt::format("Nothing exceeds the model's own error; {} is hinted at, and smaller than that.{}",
                            words_of(hints, ""), unsettled);
       }
-      return "Nothing exceeds the noise: the rig's model explains these recordings." + unsettled;
+      return "Nothing exceeds the model's own error: the rig's model explains these recordings." + unsettled;
     case Verdict::named:
       return fmt::format(
           "The model lacks {}: with it {:.0f} % of the gap on data that were not fitted is closed.",

@@ -105,6 +105,7 @@ TEST_P(BuiltInAsFile, DeclaresTheSame) {
   EXPECT_EQ(file_->stage(), built_in_.stage());
   EXPECT_EQ(file_->change_points(), built_in_.change_points());
   EXPECT_EQ(file_->keeps_modulus(), built_in_.keeps_modulus());
+  EXPECT_EQ(file_->text().changes, built_in_.text().changes);
   EXPECT_EQ(file_->neutral({}), built_in_.neutral({}));
   ASSERT_EQ(file_->parameters().size(), built_in_.parameters().size());
   for (size_t j = 0; j < file_->parameters().size(); ++j) {

@@ -36,7 +36,7 @@ class ChangedParts : public testing::Test {
   rig::LinearisedModel known_;
 };
 
-TEST_F(ChangedParts, AreThoseOfTheEffectsName) {
+TEST_F(ChangedParts, AreThoseThatTheEffectDeclares) {
   EXPECT_TRUE(is_changed(start_, "hose_bore"));
   EXPECT_FALSE(is_changed(start_, "drive_stroke"));
   EXPECT_FALSE(is_changed(known_.at, "hose_bore"));

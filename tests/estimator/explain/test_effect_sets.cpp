@@ -15,7 +15,7 @@ TEST(EffectSets, AnEffectIsWeighedAgainstTheToleranceThatDoesTheSame) {
   const rig::Session session = rig::simulated_session(
       family, {.terms = {{find_effect("hose-inertance-excess"), {}}}, .values = {1.24}, .seed = 5});
   const rig::SessionProblem problem(session, family, 2);
-  const SetSearch search = search_sets(problem);
+  const WeighedSets search = search_sets(problem);
   const auto of = [&](const std::vector<std::string>& ids) {
     return std::ranges::find_if(search.sets, [&](const EffectSet& set) { return set.ids() == ids; });
   };
@@ -32,14 +32,14 @@ TEST(EffectSets, WhereAllElseIsAsDescribedAPartThatIsOffIsNoTolerance) {
   const rig::SpecimenFamily family = rig::gel_family();
   rig::Session session = rig::simulated_session(
       family, {.terms = {{find_effect("stroke-gain"), {}}}, .values = {0.03}, .seed = 5});
-  const auto probability_of_finer = [](const rig::SessionProblem& problem, const SetSearch& search) {
+  const auto probability_of_finer = [](const rig::SessionProblem& problem, const WeighedSets& search) {
     double sum = 0.0;
     for (size_t k = 0; k < search.sets.size(); ++k)
       if (problem.prior(search.sets[k].model).described.minCoeff() < 1.0) sum += search.probability[k];
     return sum;
   };
   const rig::SessionProblem fine(session, family, 2);
-  const SetSearch in_fine = search_sets(fine);
+  const WeighedSets in_fine = search_sets(fine);
   EXPECT_EQ(in_fine.sets.front().ids(), std::vector<std::string>{"stroke-gain"});
   EXPECT_GT(probability_of_finer(fine, in_fine), 0.5);  // of three runs without a pump's sensor
 

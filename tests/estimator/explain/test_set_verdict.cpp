@@ -15,7 +15,7 @@ TEST(SetVerdict, NothingIsWrongOnlyByAModelThatTheDataDoNotExclude) {
   const rig::SpecimenFamily family = rig::gel_family();
   const rig::Session session = rig::simulated_session(family, {.terms = {}, .values = {}, .seed = 5});
   const rig::SessionProblem problem(session, family, 2);
-  const SetSearch search = search_sets(problem);
+  const WeighedSets search = search_sets(problem);
   const auto plain = std::ranges::find_if(search.sets, [&](const EffectSet& set) {
     return set.ids().empty() && problem.prior(set.model).described.minCoeff() == 1.0;
   });
@@ -25,7 +25,7 @@ TEST(SetVerdict, NothingIsWrongOnlyByAModelThatTheDataDoNotExclude) {
   strained.model.terms.push_back({find_effect("sensor-gain"), {}});
   strained.model.values.push_back(1e-6);
   strained.model.u.tail(1)[0] = 5.0;
-  SetSearch made = search;
+  WeighedSets made = search;
   made.sets = {strained, *plain};
   const auto verdict = [&](double without) {
     made.probability = {1.0 - without, without};
@@ -39,7 +39,7 @@ TEST(SetVerdict, WhatTheModulusTakesOfAChangeMakesItNoTolerance) {
   const rig::SpecimenFamily family = rig::gel_family();
   const rig::Session session = rig::simulated_session(family, {.terms = {}, .values = {}, .seed = 5});
   const rig::SessionProblem problem(session, family, 2);
-  const SetSearch search = search_sets(problem);
+  const WeighedSets search = search_sets(problem);
   const EffectSet& plain = search.sets.front();
   const Eigen::VectorXd modulus = plain.known.columns.col(0);
   const Eigen::VectorXd tolerance = plain.known.columns.col(rig::basic_nuisances + 1);
@@ -57,7 +57,7 @@ TEST(SetVerdict, WhatTheDataSpeakForAndNewWaveformsDoNotBearMayBeNothing) {
   const rig::SpecimenFamily family = rig::gel_family();
   const rig::Session session = rig::simulated_session(family, {.terms = {}, .values = {}, .seed = 5});
   const rig::SessionProblem problem(session, family, 2);
-  SetSearch made = search_sets(problem);
+  WeighedSets made = search_sets(problem);
   const auto plain = std::ranges::find_if(made.sets, [&](const EffectSet& set) {
     return set.ids().empty() && problem.prior(set.model).described.minCoeff() == 1.0;
   });

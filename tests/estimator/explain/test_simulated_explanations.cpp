@@ -38,7 +38,7 @@ class SimulatedSession : public testing::Test {
   rig::SpecimenFamily family_ = rig::gel_family();
   rig::Session session_;
   std::optional<rig::SessionProblem> problem_;
-  SetSearch found_;
+  WeighedSets found_;
   SetVerdict verdict_;
 };
 

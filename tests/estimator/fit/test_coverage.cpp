@@ -1,5 +1,5 @@
 // How often 95 % intervals hold the truth, over synthetic repeats with fresh noise. Nominal 95 % must come out between
-// 92 and 98 %; by chance alone, 200 repeats leave that range in 2 to 4 % of sound methods.
+// 92 and 98 %; by chance alone, 240 repeats leave that range in 2 to 4 % of sound methods.
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>

@@ -51,6 +51,7 @@ TEST(VentricleFit, AFinerMeshCorrectsACoarseOne) {
     EXPECT_LT(std::abs(value_of(corrected, name) - truth), 0.25 * std::abs(value_of(coarse, name) - truth))
         << name;
   EXPECT_LT(corrected.chi2, 0.1 * coarse.chi2);
+  EXPECT_LT(corrected.rms_mm, 0.4 * coarse.rms_mm) << "residuals are the corrected ones, too";
   EXPECT_THAT(corrected.remarks, testing::Contains(testing::HasSubstr("Twice as many elements")));
 }
 

@@ -87,7 +87,7 @@ TEST_F(Residuals, RowsAreTagsThenPointsOfEachLoadedFrame) {
   EXPECT_EQ(residuals.found().tags_left_out, 1U);
   const Eigen::VectorXd expected = Eigen::Vector<double, 5>(-1, 1, 0, -4, 2);
   EXPECT_LT((residuals.residuals() - expected).norm(), 1e-7);
-  EXPECT_NEAR(residuals.unweighted_mm()[3], -1.0, 1e-8);
+  EXPECT_DOUBLE_EQ(residuals.sigmas_mm()[3], 0.25);
 }
 
 TEST_F(Residuals, DerivativesByMotionAndByUndeformedMesh) {

@@ -180,7 +180,7 @@ TEST(ExplanationReport, ShowsTheWallAndEscapesNames) {
 TEST(ExplanationReport, EveryVerdictHasItsWords) {
   explain::Explanation none;
   none.study = "a.study.toml";
-  EXPECT_THAT(make_report(none), HasSubstr("nothing exceeds the noise"));
+  EXPECT_THAT(make_report(none), HasSubstr("nothing exceeds the model's own error"));
   explain::Explanation ambiguous = test::explained_hose();
   ambiguous.verdict = explain::Verdict::ambiguous;
   ambiguous.ambiguous_with = {{"air-bubble-pump"}, {"viscoelasticity", "sensor-gain"}};
