@@ -228,106 +228,141 @@ double error_rms(const rig::SessionProblem& problem, const rig::Shares& shares, 
       mean_squares(problem, error_squares(problem.error(), shares))[static_cast<size_t>(signal)]);
 }
 
-SetVerdict judge_sets(const rig::SessionProblem& problem, const WeighedSets& search,
-                      const ErrorKnowledge& error) {
-  constexpr double considered = 0.01;  // of a probability: less decides nothing beside nine tenths
-  struct Group {
-    double probability = 0.0;
-    size_t best = 0;
-  };
-  std::map<Ids, Group> groups;
-  std::vector<Sizes> sizes(search.sets.size());
-  SetVerdict out;
+namespace {
+
+constexpr double considered = 0.01;  ///< of a probability: less decides nothing beside nine tenths
+
+/// Sets that differ by hints alone say the same: their probabilities add.
+struct Group {
+  double probability = 0.0;
+  size_t best = 0;
+};
+
+struct GroupedSets {
+  std::map<Ids, Group> groups;  ///< by their material effects
+  std::vector<Sizes> sizes;     ///< of each set that is considered
+  std::vector<Hint> hints;      ///< of more than even odds
+  [[nodiscard]] const std::pair<const Ids, Group>& leading() const {
+    return *std::ranges::max_element(groups, {}, [](const auto& group) { return group.second.probability; });
+  }
+};
+
+GroupedSets grouped_by_material(const rig::SessionProblem& problem, const WeighedSets& search,
+                                const ErrorKnowledge& error) {
+  GroupedSets grouped;
+  grouped.sizes.resize(search.sets.size());
   for (size_t k = 0; k < search.sets.size(); ++k) {
     if (search.probability[k] < considered) continue;
-    sizes[k] = sizes_of(problem, search.sets[k], error, search.given);
-    const Ids ids = material_ids(search.sets[k], sizes[k]);
-    const auto [group, is_new] = groups.try_emplace(ids, Group{0.0, k});
-    group->second.probability += search.probability[k];
-    for (size_t i = 0; i < sizes[k].material.size(); ++i) {
-      if (sizes[k].material[i]) continue;
+    Sizes& sizes = grouped.sizes[k];
+    sizes = sizes_of(problem, search.sets[k], error, search.given);
+    const Ids ids = material_ids(search.sets[k], sizes);
+    grouped.groups.try_emplace(ids, Group{0.0, k}).first->second.probability += search.probability[k];
+    for (size_t i = 0; i < sizes.material.size(); ++i) {
+      if (sizes.material[i]) continue;
       const std::string id(search.sets[k].model.terms[i].effect->text().id);
-      auto hint = std::ranges::find(out.hints, id, &Hint::id);
-      if (hint == out.hints.end()) hint = out.hints.insert(hint, Hint{id, sizes[k].over_error[i], 0.0});
+      auto hint = std::ranges::find(grouped.hints, id, &Hint::id);
+      if (hint == grouped.hints.end()) hint = grouped.hints.insert(hint, Hint{id, sizes.over_error[i], 0.0});
       hint->probability += search.probability[k];
     }
   }
-  std::erase_if(out.hints, [](const Hint& hint) { return hint.probability < 0.5; });
-  const auto leading =
-      std::ranges::max_element(groups, {}, [](const auto& group) { return group.second.probability; });
-  out.chosen = leading->second.best;
-  if (!inference::is_settled(search.sets[out.chosen].termination)) {
-    // A name rests on a search that settled: that of its own effects alone, if the one with a hint beside them did not.
-    const auto own = std::ranges::find_if(search.sets, [&](const EffectSet& set) {
-      return set.ids() == leading->first && inference::is_settled(set.termination);
-    });
-    if (own != search.sets.end()) {
-      out.chosen = static_cast<size_t>(own - search.sets.begin());
-      sizes[out.chosen] = sizes_of(problem, *own, error, search.given);
-    }
-  }
-  const EffectSet& best = search.sets[out.chosen];
-  out.size_over_error = sizes[out.chosen].over_error;
-  out.material = sizes[out.chosen].material;
-  out.confidence = leading->second.probability;
-  // An effect is held against the same rig without it: parts that are as fine, or as coarse.
+  std::erase_if(grouped.hints, [](const Hint& hint) { return hint.probability < 0.5; });
+  return grouped;
+}
+
+/// The leading group's best set; that of its own effects alone, if the one with a hint beside them did not settle: a name rests on a
+/// search that did.
+size_t standing_for(const std::pair<const Ids, Group>& leading, const WeighedSets& search) {
+  if (inference::is_settled(search.sets[leading.second.best].termination)) return leading.second.best;
+  const auto own = std::ranges::find_if(search.sets, [&](const EffectSet& set) {
+    return set.ids() == leading.first && inference::is_settled(set.termination);
+  });
+  return own == search.sets.end() ? leading.second.best : static_cast<size_t>(own - search.sets.begin());
+}
+
+/// An effect is held against the same rig without it: parts that are as fine, or as coarse.
+size_t without_effects(const rig::SessionProblem& problem, const WeighedSets& search, const EffectSet& best) {
   const auto is_plain = [&](const EffectSet& set) { return set.model.terms.size() == search.given; };
   const auto described = [&](const EffectSet& set) { return problem.prior(set.model).described; };
   auto plain = std::ranges::find_if(
       search.sets, [&](const EffectSet& set) { return is_plain(set) && described(set) == described(best); });
   if (plain == search.sets.end()) plain = std::ranges::find_if(search.sets, is_plain);
-  out.plain = static_cast<size_t>(plain - search.sets.begin());
-  out.searches.push_back({{}, plain->termination});
+  return static_cast<size_t>(plain - search.sets.begin());
+}
+
+/// Those that are likely enough beside a leading one that is not likely enough.
+void list_rivals(SetVerdict& out, const GroupedSets& grouped, const WeighedSets& search) {
+  const Ids& leading = grouped.leading().first;
+  out.confidence = 0.0;
+  for (const auto& [ids, group] : grouped.groups) {
+    if (group.probability < least_probability) continue;
+    out.confidence += group.probability;
+    if (ids == leading) continue;
+    out.ambiguous_with.push_back(ids);
+    const EffectSet& other = search.sets[group.best];
+    if (!other.model.terms.empty()) out.searches.push_back({other.ids(), other.termination});
+  }
+}
+
+}  // namespace
+
+SetVerdict judge_sets(const rig::SessionProblem& problem, const WeighedSets& search,
+                      const ErrorKnowledge& error) {
+  GroupedSets grouped = grouped_by_material(problem, search, error);
+  const auto& [ids, group] = grouped.leading();
+  SetVerdict out;
+  out.hints = std::move(grouped.hints);
+  out.confidence = group.probability;
+  out.chosen = standing_for(grouped.leading(), search);
+  const EffectSet& best = search.sets[out.chosen];
+  out.plain = without_effects(problem, search, best);
+  const EffectSet& plain = search.sets[out.plain];
+  const Sizes sizes =
+      out.chosen == group.best ? grouped.sizes[group.best] : sizes_of(problem, best, error, search.given);
+  out.size_over_error = sizes.over_error;
+  out.material = sizes.material;
+  out.searches.push_back({{}, plain.termination});
   // Hints alone need no search that settled: nothing is named by it.
-  const bool is_more = leading->first.size() > search.given;
+  const bool is_more = ids.size() > search.given;
   if (is_more) out.searches.push_back({best.ids(), best.termination});
   // That nothing is wrong holds with the hints or, unless the data exclude it, without them.
   const bool may_be_plain = search.probability[out.plain] >= considered;
-  const double by_chance = is_more ? name_by_chance(problem, best, sizes[out.chosen])
+  const double by_chance = is_more ? name_by_chance(problem, best, sizes)
                                    : std::max(nothing_wrong_by_chance(problem, best),
-                                              may_be_plain ? nothing_wrong_by_chance(problem, *plain) : 0.0);
+                                              may_be_plain ? nothing_wrong_by_chance(problem, plain) : 0.0);
   out.scatter = rig::cycle_scatter(problem, best.model);
   out.tone = material_tone(problem, best, error);
-  if (is_more) out.held_out_gain = held_out_gain(problem, *plain, best);
-  const double sure = std::log(name_probability / (1.0 - name_probability));
-  const double odds =
-      is_more ? held_out_odds(*out.held_out_gain, best.model.terms.size() - search.given) : sure;
-  const bool predicted = !is_more || odds > sure;
   const double irregular = irregularity_by_chance(problem, out.scatter);
   const bool settled = is_settled(out.searches);
+  if (is_more) out.held_out_gain = held_out_gain(problem, plain, best);
   if (by_chance <= surprising_by_chance || irregular < irregular_by_chance || !settled) {
     out.verdict = Verdict::unexplained;
     out.confidence = settled ? wrong_if_seldom(std::min(by_chance, irregular)) : 0.5;
     return out;
   }
-  if (out.confidence >= name_probability) {
-    const bool may_be_nothing_known =
-        odds > -sure || nothing_wrong_by_chance(problem, *plain) > surprising_by_chance;
-    if (!predicted && !out.tone && may_be_nothing_known) {
-      out.verdict = Verdict::ambiguous;
-      for (size_t k = 0; k < search.sets.size(); ++k)
-        if (is_plain(search.sets[k])) out.confidence += search.probability[k];
-      out.ambiguous_with.push_back(plain->ids());
-      return out;
-    }
-    out.is_tone_alone = !is_more && out.tone;
-    const bool is_clean = !is_more && !out.tone;
-    out.verdict = is_clean ? Verdict::none : is_more && predicted ? Verdict::named : Verdict::unexplained;
-    if (out.verdict == Verdict::unexplained)
-      out.confidence = std::max(predicted ? 0.0 : 1.0 / (1.0 + std::exp(odds)),
-                                out.tone ? wrong_if_seldom(out.tone->p_value) : 0.0);
+  if (out.confidence < name_probability) {
+    out.verdict = Verdict::ambiguous;
+    list_rivals(out, grouped, search);
     return out;
   }
-  out.verdict = Verdict::ambiguous;
-  out.confidence = 0.0;
-  for (const auto& [ids, group] : groups) {
-    if (group.probability < least_probability) continue;
-    out.confidence += group.probability;
-    if (ids == leading->first) continue;
-    out.ambiguous_with.push_back(ids);
-    const EffectSet& other = search.sets[group.best];
-    if (!other.model.terms.empty()) out.searches.push_back({other.ids(), other.termination});
+  const double sure = std::log(name_probability / (1.0 - name_probability));
+  const double odds =
+      is_more ? held_out_odds(*out.held_out_gain, best.model.terms.size() - search.given) : sure;
+  const bool predicted = !is_more || odds > sure;
+  const bool may_be_nothing_known =
+      odds > -sure || nothing_wrong_by_chance(problem, plain) > surprising_by_chance;
+  if (!predicted && !out.tone && may_be_nothing_known) {
+    out.verdict = Verdict::ambiguous;
+    for (size_t k = 0; k < search.sets.size(); ++k)
+      if (search.sets[k].model.terms.size() == search.given) out.confidence += search.probability[k];
+    out.ambiguous_with.push_back(plain.ids());
+    return out;
   }
+  out.is_tone_alone = !is_more && out.tone;
+  const bool is_clean = !is_more && !out.tone;
+  out.verdict = is_clean ? Verdict::none : is_more && predicted ? Verdict::named : Verdict::unexplained;
+  if (out.verdict == Verdict::unexplained)
+    out.confidence = std::max(predicted ? 0.0 : 1.0 / (1.0 + std::exp(odds)),
+                              out.tone ? wrong_if_seldom(out.tone->p_value) : 0.0);
   return out;
 }
 
