@@ -29,10 +29,15 @@ TEST(SetVerdict, NothingIsWrongOnlyByAModelThatTheDataDoNotExclude) {
   made.sets = {strained, *plain};
   const auto verdict = [&](double without) {
     made.probability = {1.0 - without, without};
-    return judge_sets(problem, made, {}).verdict;
+    return judge_sets(problem, made, {});
   };
-  EXPECT_EQ(verdict(0.2), Verdict::none);
-  EXPECT_EQ(verdict(1e-9), Verdict::unexplained);
+  EXPECT_EQ(verdict(0.2).verdict, Verdict::none);
+  EXPECT_EQ(verdict(1e-9).verdict, Verdict::unexplained);
+  // One of so many tolerances five sds to either side.
+  const double by_chance = static_cast<double>(problem.nuisances().size() - rig::basic_nuisances) *
+                           std::erfc(5.0 / std::numbers::sqrt2);
+  EXPECT_NEAR(verdict(1e-9).confidence, 1.0 / (1.0 - std::numbers::e * by_chance * std::log(by_chance)),
+              2e-4);
 }
 
 TEST(SetVerdict, WhatTheModulusTakesOfAChangeMakesItNoTolerance) {
@@ -75,7 +80,10 @@ TEST(SetVerdict, WhatTheDataSpeakForAndNewWaveformsDoNotBearMayBeNothing) {
   EXPECT_EQ(doubtful.ambiguous_with, std::vector<std::vector<std::string>>{{}});
   // Where a part would have to be far off without it, something is wrong for all that.
   made.sets[1].model.u.tail(1)[0] = 5.0;
-  EXPECT_EQ(judge_sets(problem, made, {}).verdict, Verdict::unexplained);
+  const SetVerdict refuted = judge_sets(problem, made, {});
+  EXPECT_EQ(refuted.verdict, Verdict::unexplained);
+  EXPECT_NEAR(refuted.confidence, 40.0 / 41.0, 1e-9)
+      << "an effect's odds beforehand, and other waveforms say nothing";
 }
 
 /// As the recordings of a rig in which nothing else is wrong.

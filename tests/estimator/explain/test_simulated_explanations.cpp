@@ -100,6 +100,7 @@ TEST_F(SimulatedSession, WithALeakIsNotNamedByASearchThatDidNotSettle) {
   const SetVerdict unsettled = judge_sets(*problem_, found_, {});
   EXPECT_EQ(unsettled.verdict, Verdict::unexplained);
   EXPECT_FALSE(is_settled(unsettled.searches));
+  EXPECT_EQ(unsettled.confidence, 0.5);
 }
 
 }  // namespace
