@@ -78,6 +78,7 @@ Explanation merged(Explanation rig, Explanation field) {
   answer(rig, field);
   answer(field, rig);
   Explanation both = std::move(rig);
+  const Verdict of_runs = both.verdict;
   if (both.verdict == Verdict::none) both.gap = field.gap;
   both.verdict = together(both.verdict, field.verdict);
   for (FoundEffect& effect : field.effects) {
@@ -95,6 +96,7 @@ Explanation merged(Explanation rig, Explanation field) {
   append(both.steps, std::move(field.steps));
   append(both.searches, std::move(field.searches));
   both.converged = both.converged && field.converged;
+  if (both.verdict != of_runs) both.confidence = {};  // it is the runs' alone
   both.field = std::move(field.field);
   both.summary = "Runs: " + both.summary + " Images: " + field.summary;
   both.seconds += field.seconds;

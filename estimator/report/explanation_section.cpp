@@ -215,7 +215,7 @@ std::string verdict_note(const Explanation& e) {
     case Verdict::unexplained:
       return "something is there that no known effect removes";
     case Verdict::none:
-      return "nothing exceeds the model's own error";
+      return e.model_error ? "nothing exceeds the model's own error" : "nothing exceeds the noise";
   }
   return "";
 }
@@ -388,12 +388,12 @@ void add_model_error(Page& page, const Explanation& e) {
 
 void add_evidence(Page& page, const Explanation& e) {
   if (e.evidence.empty()) return;
-  page.section("The evidence",
-               "What each candidate gains with the stiffness and all else that is unknown free to adapt: "
-               "twice the gain of ln "
-               "probability of a rig's, the drop of χ² of an imaged specimen's; by a full refit, or "
-               "linearised where that "
-               "was too small to deserve one. A true effect also predicts what was not fitted.");
+  page.section(
+      "The evidence",
+      "What each candidate gains with the stiffness and all else that is unknown free to adapt: twice "
+      "the gain of ln probability of a rig's, the drop of χ² of an imaged specimen's; by a full "
+      "refit, or linearised where that was too small to deserve one. A true effect also predicts what "
+      "was not fitted.");
   const auto row_of = [](const Candidate& candidate) -> Page::Row {
     return {words_of(candidate.ids, "nothing"),
             number(candidate.chi_square_drop, 4),

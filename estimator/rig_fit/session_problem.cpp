@@ -25,7 +25,7 @@ bool is_abrupt(const RigModel& model) {
 
 constexpr size_t modulus_at = 0, cavity_offset_at = 1, pump_offset_at = 2;
 
-/// Bounds that leave less than gels and tissues do state what is known: as likely everywhere between them.
+/// Bounds that leave less than gels and tissues do state what is known: a normal with mean and sd of what is uniform between them.
 Nuisance modulus_of(const SpecimenFamily& family) {
   const StudyParameter& modulus = family.modulus();
   const double sd_of_bounds = std::log(modulus.upper / modulus.lower) / std::sqrt(12.0);

@@ -446,6 +446,10 @@ TEST(BadOption, IsToldWithItsNameItsValueAndWhatIsExpected) {
   EXPECT_THAT(told({"diastole", "fit", "gel.study.toml", "--unexamind"}),
               testing::AllOf(HasSubstr("not expected: --unexamind. Did you mean \"--unexamined\"?"),
                              HasSubstr("`diastole fit --help` explains it")));
+  EXPECT_THAT(told({"diastole", "fit", "gel.study.toml", "--mehs", "4,2,1"}),
+              HasSubstr("not expected: --mehs 4,2,1. Did you mean \"--mesh\"?"));
+  EXPECT_THAT(told({"diastole", "fit", "gel.study.toml", "other.study.toml", "--mehs=4,2,1"}),
+              HasSubstr("not expected: other.study.toml --mehs=4,2,1. Did you mean \"--mesh\"?"));
 }
 
 TEST(MissingArgument, IsToldWithWhatItIsFor) {

@@ -10,7 +10,9 @@
 #include <fstream>
 #include <random>
 
+#include "estimator/explain/rig/experiment_outlook.hpp"
 #include "estimator/explain/rig/explain_rig.hpp"
+#include "estimator/explain/verdict/experiment_plan.hpp"
 #include "estimator/explain/verdict/explanation_json.hpp"
 #include "estimator/io/whole_file.hpp"
 #include "estimator/model/session.hpp"
@@ -101,6 +103,12 @@ void report_proposals(const std::vector<ScoredCase>& again) {
 
 constexpr std::array unknown_kPa{1.0, 20.0};
 
+void put(std::string& text, const std::string& line, const std::string& by) {
+  const size_t at = text.find(line);
+  if (at == std::string::npos) throw std::runtime_error("the study has no line " + line);
+  text.replace(at, line.size(), by);
+}
+
 std::string C1_lines(std::array<double, 2> C1_kPa) {
   return fmt::format("start = {:.4f}\nbounds = [{:.4f}, {:.4f}]", 0.5 * (C1_kPa[0] + C1_kPa[1]), C1_kPa[0],
                      C1_kPa[1]);
@@ -109,11 +117,7 @@ std::string C1_lines(std::array<double, 2> C1_kPa) {
 /// The example's study of a run NAME.run.h5, with bounds of the modulus and references.
 std::string study_of(const std::string& name, std::array<double, 2> C1_kPa, const std::string& references) {
   std::string text = read_whole_file(example / "mine.study.toml");
-  const auto replace = [&](const std::string& line, const std::string& by) {
-    const size_t at = text.find(line);
-    if (at == std::string::npos) throw std::runtime_error("the example's study has no line " + line);
-    text.replace(at, line.size(), by);
-  };
+  const auto replace = [&](const std::string& line, const std::string& by) { put(text, line, by); };
   replace("start = 8.8\nbounds = [1.0, 20.0]", C1_lines(C1_kPa));
   replace("runs = [\"mine.run.h5\"]", fmt::format("runs = [\"{}.run.h5\"]\n{}", name, references));
   return text;
@@ -126,10 +130,10 @@ struct Instruments {
 
 Instruments asked_for(const std::string& experiment) {
   const auto asks = [&](std::string_view words) { return experiment.find(words) != std::string::npos; };
-  return {.pump_sensor = asks("name = \"pump\""),
-          .volumes = asks("gated phase contrast"),
-          .radius = asks("specimen.inner_radius_mm"),
-          .shear_test = asks("rotational shear test")};
+  return {.pump_sensor = asks(explain::ask_for_pump_sensor),
+          .volumes = asks(explain::ask_for_volumes),
+          .radius = asks(explain::ask_for_radius),
+          .shear_test = asks(explain::ask_for_stiffness)};
 }
 
 std::string in_words(const Instruments& asked) {
@@ -150,17 +154,19 @@ void write(const fs::path& file, const std::string& text) { std::ofstream(file, 
 
 constexpr const char* pump_channel =
     "\n[[daq.channel]]\nname = \"pump\"\ninput = 1\nkPa_per_V = 20.0\nzero_V = 0.0\n";
-// As the proposals count on (estimator/explain/rig/experiment_outlook.hpp).
-constexpr double phase_contrast_sd_mL = 0.6, shear_test_error = 0.007;
+constexpr double phase_contrast_sd_mL = 0.6;  // as the proposals count on
 
 /// NAME.run.h5 in `folder`, and what is hidden in it sealed/NAME.sealed.json.
 void simulate(const Simulated& session, const fs::path& folder, const std::string& name,
               const fs::path& experiment = example / "mine.experiment.toml") {
   const fs::path run = folder / (name + ".run.h5");
-  if (fs::exists(run)) return;
-  write(folder / (name + ".rig.toml"), read_whole_file(fs::path(DIASTOLE_SOURCE_DIR) / "examples/rig.toml") +
-                                           fmt::format("\n[simulation]\nC1_kPa = {:.4f}\n", session.C1_kPa) +
-                                           (session.instruments.pump_sensor ? pump_channel : ""));
+  const fs::path rig = folder / (name + ".rig.toml");
+  const std::string text = read_whole_file(fs::path(DIASTOLE_SOURCE_DIR) / "examples/rig.toml") +
+                           fmt::format("\n[simulation]\nC1_kPa = {:.4f}\n", session.C1_kPa) +
+                           (session.instruments.pump_sensor ? pump_channel : "");
+  if (fs::exists(run) && fs::exists(rig) && read_whole_file(rig) == text) return;
+  fs::remove(run);
+  write(rig, text);
   std::vector<std::string> command{DIASTOLE_BIN_DIR "/diastole",
                                    "simulate",
                                    experiment.string(),
@@ -181,8 +187,8 @@ void simulate(const Simulated& session, const fs::path& folder, const std::strin
   if (session.instruments.volumes)
     command.insert(command.end(), {"--gated-volume", fmt::to_string(phase_contrast_sd_mL)});
   const fs::path log = folder / (name + ".log");
-  // 1: noted in the run file, as a transducer that stands at the end of its range.
-  if (const int code = run_timed(command, folder, log).exit_code; code != 0 && code != 1)
+  // 1: noted in the run file, as a transducer at the pump that stands at the end of its range.
+  if (run_timed(command, folder, log).exit_code > (session.instruments.pump_sensor ? 1 : 0))
     throw std::runtime_error("diastole simulate failed: " + read_whole_file(log));
 }
 
@@ -298,14 +304,15 @@ std::vector<ScoredCase> asked_again(const Round& round, const std::vector<Asked>
       fs::remove(round.folder / (truth.name + ".run.h5"));
     write(experiment, proposed);
     std::string text = read_whole_file(asked[k].study);
-    const auto replace = [&](const std::string& old, const std::string& by) {
-      text.replace(text.find(old), old.size(), by);
-    };
+    const auto replace = [&](const std::string& old, const std::string& by) { put(text, old, by); };
     const std::string runs = fmt::format("runs = [\"{}.run.h5\"", cases[k].truth.name);
     replace(runs, fmt::format("{}, \"{}.run.h5\"", runs, truth.name));
     if (needed.shear_test) {
-      const double C1_kPa = round.sessions[k].C1_kPa, error_kPa = shear_test_error * C1_kPa;
-      replace(C1_lines(unknown_kPa), C1_lines({C1_kPa - 2 * error_kPa, C1_kPa + 2 * error_kPa}));
+      std::mt19937_64 random(round.sessions[k].seed);
+      const double error_kPa = explain::SpecimenKnowledge{}.relative_C1_error * round.sessions[k].C1_kPa;
+      const double C1_kPa = std::normal_distribution(round.sessions[k].C1_kPa, error_kPa)(random);
+      const double reach_kPa = std::sqrt(3.0) * error_kPa;
+      replace(C1_lines(unknown_kPa), C1_lines({C1_kPa - reach_kPa, C1_kPa + reach_kPa}));
     }
     const fs::path study = round.folder / (truth.name + ".study.toml");
     write(study, text);

@@ -51,16 +51,21 @@ std::string in_words(const CLI::App& command, const CLI::RequiredError& error) {
   return names.empty() ? text : "one of its commands is missing: " + names;
 }
 
-/// ... than "The following argument was not expected: --frame".
+/// ... than "The following arguments were not expected: 4,2,1 --mehs", in reverse.
 std::string in_words(const CLI::App& command, const CLI::ExtrasError& error) {
-  const std::string text = error.what();
-  const std::string word = text.substr(text.rfind(' ') + 1);
+  const std::vector<std::string> extra = command.remaining();
+  if (extra.empty()) return error.what();
+  std::string words = "not expected:", nearest;
   std::vector<std::string> names;
   for (const CLI::Option* option : command.get_options())
     for (const std::string& name : option->get_lnames())
       names.push_back("--" + name);
-  const std::string nearest = word.starts_with("--") ? did_you_mean(word, names) : "";
-  return nearest.empty() ? text : text + ". " + nearest.substr(0, nearest.size() - 1);
+  for (const std::string& word : extra) {
+    words += " " + word;
+    if (nearest.empty() && word.starts_with("--"))
+      nearest = did_you_mean(word.substr(0, word.find('=')), names);
+  }
+  return nearest.empty() ? words : words + ". " + nearest.substr(0, nearest.size() - 1);
 }
 
 }  // namespace

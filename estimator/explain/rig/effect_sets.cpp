@@ -13,7 +13,6 @@
 #include "estimator/explain/rig/event_scan.hpp"
 #include "estimator/explain/rig/part_strain.hpp"
 #include "estimator/explain/rig/set_fit.hpp"
-#include "estimator/explain/rig/set_verdict.hpp"
 #include "estimator/explain/rig/synergy_scan.hpp"
 #include "estimator/rig_fit/base_fit.hpp"
 
@@ -351,7 +350,7 @@ void SetSearch::fit_beside_best() {
 void SetSearch::fit_synergies() {
   sort_sets();
   if (sets_.empty() ||
-      std::ranges::max(sets_.front().evidence.surprise(problem_.error().prior)) < least_surprise(1))
+      std::ranges::max(sets_.front().evidence.surprise(problem_.error().prior)) < surprising_sds)
     return;
   for (const SessionModel& start : scan_synergies(problem_, base_)) {
     const std::span added_terms = std::span(start.terms).subspan(options_.terms.size());

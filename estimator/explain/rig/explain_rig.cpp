@@ -151,7 +151,7 @@ void state_error(const StudyModelError& stated, rig::Shares& share) {
 
 /// A sentence where the specimen as the study has it would show pressures that are beyond its modulus' prior.
 std::string doubt_of_units(const rig::SessionProblem& problem) {
-  constexpr double four_sds = 16.0;  // of a modulus that is known to a factor of two
+  constexpr double four_sds = 16.0;  // of what is known of the modulus
   rig::SessionModel stated;
   stated.u = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(problem.nuisances().size()));
   double shown_kPa = 0.0;

@@ -185,8 +185,7 @@ std::vector<Candidate> candidates(const EffectLibrary& known, const WeighedSets&
       row.verdict = verdict.verdict == Verdict::unexplained ? "fits best, and not well enough"
                     : verdict.verdict == Verdict::ambiguous ? "as good"
                     : verdict.verdict == Verdict::named     ? "named"
-                    : set.model.terms.size() > search.given ? "a hint, too small for a name"
-                                                            : "nothing is missing";
+                                                            : "a hint, too small for a name";
     } else {
       row.verdict = fmt::format("probability {:.2g}", probability[set.ids()]);
     }

@@ -6,7 +6,7 @@
 namespace diastole::explain {
 
 /// How seldom any part of a model's error, or any part of the rig, may be as far off by chance: two sds of one.
-inline constexpr double surprising_by_chance = 0.0228;
+inline constexpr double surprising_by_chance = 0.0228, surprising_sds = 2.0;
 
 /// How often a normal error lies further to one side.
 double seldom(double sds);

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <boost/math/distributions/chi_squared.hpp>
-#include <boost/math/distributions/normal.hpp>
 #include <cmath>
 #include <map>
 #include <numbers>
@@ -64,16 +63,11 @@ bool is_tolerance(const rig::SessionProblem& problem, const EffectSet& set, cons
   normal.diagonal().tail(root.cols()).array() += 1.0;
   const VectorXd parts = normal.llt().solve(columns.transpose() * weight.cwiseProduct(change));
   const VectorXd left = change - columns * parts;
-  return parts.tail(root.cols()).norm() < least_surprise(1) &&
+  return parts.tail(root.cols()).norm() < surprising_sds &&
          left.cwiseAbs2().dot(weight) < right_to * right_to * beyond.cwiseAbs2().dot(weight);
 }
 
 }  // namespace
-
-double least_surprise(size_t parts) {
-  return boost::math::quantile(
-      boost::math::complement(boost::math::normal(), surprising_by_chance / static_cast<double>(parts)));
-}
 
 ChangeSize size_of_change(const rig::SessionProblem& problem, const EffectSet& set, const VectorXd& change) {
   const Eigen::MatrixXd basic = set.known.columns.leftCols(rig::basic_nuisances);
@@ -213,7 +207,7 @@ double nothing_wrong_by_chance(const rig::SessionProblem& problem, const EffectS
   return std::min({misfit, strain, together});
 }
 
-/// That a model is wrong of which what is seen is so seldom by chance, at even odds before: the least that a p-value can mean
+/// That a model is wrong of which what is seen is so seldom by chance, at even odds before: the most that a p-value can mean
 /// (Sellke, Bayarri and Berger 2001).
 double wrong_if_seldom(double by_chance) {
   if (by_chance <= 0.0) return 1.0;
@@ -241,7 +235,7 @@ struct Group {
 struct GroupedSets {
   std::map<Ids, Group> groups;  ///< by their material effects
   std::vector<Sizes> sizes;     ///< of each set that is considered
-  std::vector<Hint> hints;      ///< of more than even odds
+  std::vector<Hint> hints;      ///< of even odds and more
   [[nodiscard]] const std::pair<const Ids, Group>& leading() const {
     return *std::ranges::max_element(groups, {}, [](const auto& group) { return group.second.probability; });
   }
@@ -334,9 +328,11 @@ SetVerdict judge_sets(const rig::SessionProblem& problem, const WeighedSets& sea
   const double irregular = irregularity_by_chance(problem, out.scatter);
   const bool settled = is_settled(out.searches);
   if (is_more) out.held_out_gain = held_out_gain(problem, plain, best);
-  if (by_chance <= surprising_by_chance || irregular < irregular_by_chance || !settled) {
+  const bool is_irregular = irregular < irregular_by_chance;
+  if (by_chance <= surprising_by_chance || is_irregular || !settled) {
     out.verdict = Verdict::unexplained;
-    out.confidence = settled ? wrong_if_seldom(std::min(by_chance, irregular)) : 0.5;
+    out.confidence =
+        settled ? wrong_if_seldom(is_irregular ? std::min(by_chance, irregular) : by_chance) : 0.5;
     return out;
   }
   if (out.confidence < name_probability) {

@@ -28,9 +28,6 @@ struct ErrorKnowledge {
   [[nodiscard]] double least_size() const { return from_reference ? 1.5 : 2.0; }
 };
 
-/// From how many sds on the largest of so many shares of a model's error is a surprise: each of them may be by chance.
-double least_surprise(size_t parts);
-
 struct SetVerdict {
   Verdict verdict = Verdict::none;
   /// Of the sets that it names, or between which it is open. Of an unexplained one: that the leading set is wrong, from how seldom it

@@ -79,22 +79,10 @@ std::string words_of(const Segment& segment) {
 
 std::string to_toml(const PlannedExperiment& experiment, const std::string& remark) {
   std::string text = fmt::format("# {}\n", remark);
-  if (experiment.new_pump_sensor) {
-    text +=
-        "# Connect a pressure transducer at the pump end of the hose and name its input in the rig file:\n"
-        "# [[daq.channel]] name = \"pump\".\n";
-  }
-  if (experiment.volumes) {
-    text += "# Image the cavity with gated phase contrast meanwhile: 256 lines, one every second cycle.\n";
-  }
-  if (experiment.radius) {
-    text +=
-        "# Image the specimen at rest and give its inner radius to the study: specimen.inner_radius_mm.\n";
-  }
-  if (experiment.stiffness) {
-    text +=
-        "# Measure C1 by a rotational shear test and bound it in the study: law.parameters.C1_kPa.bounds.\n";
-  }
+  if (experiment.new_pump_sensor) text += ask_for_pump_sensor;
+  if (experiment.volumes) text += ask_for_volumes;
+  if (experiment.radius) text += ask_for_radius;
+  if (experiment.stiffness) text += ask_for_stiffness;
   text += fmt::format(
       "format = \"diastole-experiment\"\nversion = 1\nsample_rate_Hz = 300\ngate_every = {}\nrest_s = {}\n",
       experiment.volumes ? 2 : 1, "3.0");

@@ -3,6 +3,7 @@
 // "diastole-experiment", version 1).
 
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "protocol/runfile/run.hpp"
@@ -35,6 +36,18 @@ std::vector<runfile::Segment> possible_segments(const ExperimentLimits& limits);
 
 /// "parabolic strokes of 40 mL in 0.8 s", "a hold at 30 mL for 20 s".
 std::string words_of(const runfile::Segment& segment);
+
+/// What the file's comments ask a person for besides strokes.
+inline constexpr std::string_view ask_for_pump_sensor =
+    "# Connect a pressure transducer at the pump end of the hose and name its input in the rig file:\n"
+    "# [[daq.channel]] name = \"pump\".\n";
+inline constexpr std::string_view ask_for_volumes =
+    "# Image the cavity with gated phase contrast meanwhile: 256 lines, one every second cycle.\n";
+inline constexpr std::string_view ask_for_radius =
+    "# Image the specimen at rest and give its inner radius to the study: specimen.inner_radius_mm.\n";
+inline constexpr std::string_view ask_for_stiffness =
+    "# Measure C1 by a rotational shear test and bound it in the study, 1.7 standard errors to either side: "
+    "law.parameters.C1_kPa.bounds.\n";
 
 /// The file, with `remark` as its first comment.
 std::string to_toml(const PlannedExperiment& experiment, const std::string& remark);

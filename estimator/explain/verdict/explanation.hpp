@@ -13,7 +13,7 @@
 namespace diastole::explain {
 
 /// named: exactly one set of effects survives. ambiguous: these data cannot tell several sets apart. unexplained: the
-/// misfit has structure that no known effect removes; `effects` is then empty. none: nothing exceeds the model's own error.
+/// misfit has structure that no known effect removes; `effects` is then empty, but for what the images of the same study name. none: nothing exceeds the model's own error.
 enum class Verdict { named, ambiguous, unexplained, none };
 std::string_view name_of(Verdict verdict);
 /// Throws std::invalid_argument for any other word.
@@ -116,12 +116,12 @@ struct Gap {
 /// One row of the evidence table.
 struct Candidate {
   std::vector<std::string> ids;
-  double chi_square_drop =
-      0.0;  ///< of a rig's: twice the gain of ln probability, prior included; linearised if it was not refitted
+  /// Of a rig's twice the gain of ln probability, prior included; linearised if it was not refitted.
+  double chi_square_drop = 0.0;
   bool refitted = false;
   size_t parameters = 0;
-  std::optional<double>
-      held_out_drop;    ///< of a rig's: twice the gain of ln likelihood on waveforms that were not fitted
+  /// Of a rig's twice the gain of ln likelihood on waveforms that were not fitted.
+  std::optional<double> held_out_drop;
   std::string verdict;  ///< in words: "named", "as good", "refuted: ...", "not needed"
 };
 

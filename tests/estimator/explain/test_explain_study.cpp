@@ -61,5 +61,12 @@ TEST(RunsAndImages, WhatTheyDisagreeOnStaysOpen) {
             Verdict::unexplained);
 }
 
+TEST(RunsAndImages, TheConfidenceOfTheRunsIsThatOfTheirOwnVerdictAlone) {
+  Explanation nothing = of(Verdict::none);
+  nothing.confidence = 0.97;
+  EXPECT_EQ(merged(nothing, of(Verdict::none)).confidence, 0.97);
+  EXPECT_FALSE(merged(nothing, of(Verdict::unexplained)).confidence);
+}
+
 }  // namespace
 }  // namespace diastole::explain

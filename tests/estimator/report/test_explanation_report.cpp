@@ -180,6 +180,8 @@ TEST(ExplanationReport, ShowsTheWallAndEscapesNames) {
 TEST(ExplanationReport, EveryVerdictHasItsWords) {
   explain::Explanation none;
   none.study = "a.study.toml";
+  EXPECT_THAT(make_report(none), HasSubstr("nothing exceeds the noise"));
+  none.model_error = explain::ModelErrorSize{"stated", 30.0, 0.5};
   EXPECT_THAT(make_report(none), HasSubstr("nothing exceeds the model's own error"));
   explain::Explanation ambiguous = test::explained_hose();
   ambiguous.verdict = explain::Verdict::ambiguous;

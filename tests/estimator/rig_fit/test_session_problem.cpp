@@ -88,6 +88,20 @@ TEST(SessionProblem, FindsTheModulusOfItsOwnModel) {
   EXPECT_LT(fit.surprise(problem.error().prior)[0], 1.0);
 }
 
+TEST(SessionProblem, KnowsTheModulusFromBoundsThatLeaveLessThanGelsDo) {
+  Study study = gel_study();
+  const Session session = simulated_session(gel_family(), {});
+  for (const double ratio : {1.04, 2.0, 11.0, 12.0}) {
+    StudyParameter& modulus = study.law.parameters.front();
+    modulus = {"C1_kPa", 6.0, 5.0, 5.0 * ratio, Variation::whole};
+    const SpecimenFamily family(study, {{4, 2, 1}, {4, 2, 1}, 16.0, 3, 1, 1});
+    const Nuisance known = SessionProblem(session, family, 2).nuisances().front();
+    const bool by_bounds = ratio < 11.5;
+    EXPECT_NEAR(known.sd, by_bounds ? std::log(ratio) / std::sqrt(12.0) : 0.7, 1e-12) << ratio;
+    EXPECT_NEAR(std::exp(known.mean), by_bounds ? 5.0 * std::sqrt(ratio) : 6.0, 1e-9) << ratio;
+  }
+}
+
 TEST(SessionProblem, BearsAGap) {
   const SpecimenFamily family = gel_family();
   Session session = simulated_session(family, {});
