@@ -41,7 +41,7 @@ struct ExplainArguments {
   std::vector<fs::path> with;  ///< the user's own effects
   size_t threads = 2;
   bool force = false;
-  bool learn = false;   ///< a term even where the verdict is not unexplained
+  bool learn = false;   ///< a term beside what is named or open, too
   bool strict = false;  ///< an answer that is no clear one is a failure
   bool unexamined = false;
 };
@@ -270,7 +270,8 @@ void add_explain(CommandLine& line, const ExplanationScorer& score) {
       ->capture_default_str();
   command->add_flag(
       "--learn", arguments->learn,
-      "learn a law beside what is found, whatever the verdict; without it only where that is unexplained");
+      "learn a law beside what is found, whatever it is, but where nothing is missing; without it only where "
+      "the verdict is unexplained");
   command->add_flag("--unexamined", arguments->unexamined,
                     "do not look beforehand for what is wrong with imaged data (docs/reconstruction.md)");
   command->add_flag("--strict", arguments->strict, "exit with 1 if the answer is ambiguous or unexplained");

@@ -258,7 +258,9 @@ Explanation explain_rig(const Study& study, const ExplainOptions& options) {
   out.steps = steps_of(plain, after);
   out.traces = traces(problem, plain, after);
   try {
-    if (options.learn || (out.verdict == Verdict::unexplained && !verdict.is_tone_alone)) {
+    if (options.learn && out.verdict == Verdict::none) {
+      out.not_learned = "nothing exceeds the model's own error";
+    } else if (options.learn || (out.verdict == Verdict::unexplained && !verdict.is_tone_alone)) {
       out.not_learned = "it was interrupted";
       Learning learning = learn_term(problem, after, {from_reference}, report);
       out.learned = std::move(learning.term);

@@ -19,7 +19,7 @@ struct Interrupted {};
 struct ExplainOptions {
   size_t threads = 2;
   bool propose = true;  ///< a next experiment
-  bool learn = false;  ///< a term beside what was found, whatever the verdict; where it is unexplained always
+  bool learn = false;  ///< a term beside what was found, but where nothing is missing; where it is unexplained always
   std::function<void(const std::string&)>
       progress;  ///< a line for people; empty text: only asks whether to go on
 

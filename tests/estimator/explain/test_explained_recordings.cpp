@@ -24,12 +24,12 @@ struct Case {
 
 void PrintTo(const Case& one, std::ostream* out) { *out << one.name; }
 
-nlohmann::json explained(const Case& one) {
+nlohmann::json explained(const Case& one, const std::string& options = "") {
   const std::filesystem::path folder = test::recorded(one.name);
   const std::filesystem::path out = std::filesystem::path(testing::TempDir()) / one.what;
   const std::string command = "\"" DIASTOLE_BIN_DIR "/diastole\" explain \"" +
                               (folder / (folder.filename().string() + ".study.toml")).string() + "\" -o \"" +
-                              out.string() + "\" --json 2>&1 >\"" + out.string() + ".json\"";
+                              out.string() + "\" --json " + options + " 2>&1 >\"" + out.string() + ".json\"";
   std::filesystem::remove_all(out);
   EXPECT_EQ(std::system(command.c_str()), 0);
   std::FILE* file = std::fopen((out.string() + ".json").c_str(), "r");
@@ -58,6 +58,14 @@ TEST_P(ExplainedRecording, GetsTheAnswerThatIsTrue) {
   } else {
     EXPECT_THAT(ids, testing::IsEmpty());
   }
+}
+
+TEST(ExplainedRecordings, TeachNoLawWhereNothingIsMissing) {
+  const nlohmann::json found = explained({"rig/case-030", "NothingToLearn", {}, {}}, "--learn");
+  ASSERT_TRUE(found.is_object());
+  EXPECT_EQ(found.at("verdict"), "none");
+  EXPECT_TRUE(found.at("learned").is_null());
+  EXPECT_EQ(found.at("not_learned"), "nothing exceeds the model's own error");
 }
 
 INSTANTIATE_TEST_SUITE_P(
