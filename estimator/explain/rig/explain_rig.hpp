@@ -19,7 +19,8 @@ struct Interrupted {};
 struct ExplainOptions {
   size_t threads = 2;
   bool propose = true;  ///< a next experiment
-  bool learn = false;  ///< a term beside what was found, but where nothing is missing; where it is unexplained always
+  /// A law beside what was found, too, but where nothing is missing; where that is unexplained always.
+  bool learn = false;
   std::function<void(const std::string&)>
       progress;  ///< a line for people; empty text: only asks whether to go on
 
