@@ -424,13 +424,15 @@ TEST_P(BadInputTest, IsToldWithPlaceValueAndRemedyAndLeavesNothing) {
 INSTANTIATE_TEST_SUITE_P(Table, BadInputTest, testing::ValuesIn(table()),
                          [](const auto& each) { return each.param.name; });
 
-TEST(BadOption, IsToldWithItsNameItsValueAndWhatIsExpected) {
+/// What a command line is refused with.
+std::string told(const std::vector<std::string>& words) {
   const Workplace place;
-  const auto told = [&](const std::vector<std::string>& words) {
-    const Ended ended = run(place, words);
-    EXPECT_EQ(ended.exit_code, 2);
-    return ended.err;
-  };
+  const Ended ended = run(place, words);
+  EXPECT_EQ(ended.exit_code, 2);
+  return ended.err;
+}
+
+TEST(BadOption, IsToldWithItsNameItsValueAndWhatIsExpected) {
   EXPECT_THAT(told({"diastole", "simulate", "e.toml", "-o", "e.run.h5", "--seed", "many"}),
               testing::AllOf(HasSubstr("--seed: \"many\" is not a whole number"),
                              HasSubstr("`diastole simulate --help` explains it")));
@@ -453,12 +455,6 @@ TEST(BadOption, IsToldWithItsNameItsValueAndWhatIsExpected) {
 }
 
 TEST(MissingArgument, IsToldWithWhatItIsFor) {
-  const Workplace place;
-  const auto told = [&](const std::vector<std::string>& words) {
-    const Ended ended = run(place, words);
-    EXPECT_EQ(ended.exit_code, 2);
-    return ended.err;
-  };
   EXPECT_THAT(told({"diastole", "flow", "scan"}),
               testing::AllOf(HasSubstr("--output is missing: flow and volume of each image phase"),
                              HasSubstr("`diastole flow --help` explains it")));

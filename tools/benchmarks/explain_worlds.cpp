@@ -117,9 +117,8 @@ std::string C1_lines(std::array<double, 2> C1_kPa) {
 /// The example's study of a run NAME.run.h5, with bounds of the modulus and references.
 std::string study_of(const std::string& name, std::array<double, 2> C1_kPa, const std::string& references) {
   std::string text = read_whole_file(example / "mine.study.toml");
-  const auto replace = [&](const std::string& line, const std::string& by) { put(text, line, by); };
-  replace("start = 8.8\nbounds = [1.0, 20.0]", C1_lines(C1_kPa));
-  replace("runs = [\"mine.run.h5\"]", fmt::format("runs = [\"{}.run.h5\"]\n{}", name, references));
+  put(text, "start = 8.8\nbounds = [1.0, 20.0]", C1_lines(C1_kPa));
+  put(text, "runs = [\"mine.run.h5\"]", fmt::format("runs = [\"{}.run.h5\"]\n{}", name, references));
   return text;
 }
 
@@ -304,15 +303,14 @@ std::vector<ScoredCase> asked_again(const Round& round, const std::vector<Asked>
       fs::remove(round.folder / (truth.name + ".run.h5"));
     write(experiment, proposed);
     std::string text = read_whole_file(asked[k].study);
-    const auto replace = [&](const std::string& old, const std::string& by) { put(text, old, by); };
     const std::string runs = fmt::format("runs = [\"{}.run.h5\"", cases[k].truth.name);
-    replace(runs, fmt::format("{}, \"{}.run.h5\"", runs, truth.name));
+    put(text, runs, fmt::format("{}, \"{}.run.h5\"", runs, truth.name));
     if (needed.shear_test) {
       std::mt19937_64 random(round.sessions[k].seed);
       const double error_kPa = explain::SpecimenKnowledge{}.relative_C1_error * round.sessions[k].C1_kPa;
       const double C1_kPa = std::normal_distribution(round.sessions[k].C1_kPa, error_kPa)(random);
       const double reach_kPa = std::sqrt(3.0) * error_kPa;
-      replace(C1_lines(unknown_kPa), C1_lines({C1_kPa - reach_kPa, C1_kPa + reach_kPa}));
+      put(text, C1_lines(unknown_kPa), C1_lines({C1_kPa - reach_kPa, C1_kPa + reach_kPa}));
     }
     const fs::path study = round.folder / (truth.name + ".study.toml");
     write(study, text);
@@ -324,7 +322,12 @@ std::vector<ScoredCase> asked_again(const Round& round, const std::vector<Asked>
     Simulated session = round.sessions[open[i]];
     session.seed += 250;
     session.instruments = instruments[i];
-    simulate(session, round.folder, again[i].truth.name, experiment_of(again[i].truth));
+    const std::string& name = again[i].truth.name;
+    simulate(session, round.folder, name, experiment_of(again[i].truth));
+    const fs::path answered = kept / (name + ".json");  // of an earlier run of another experiment?
+    if (fs::exists(answered) &&
+        fs::last_write_time(answered) < fs::last_write_time(round.folder / (name + ".run.h5")))
+      fs::remove(answered);
   });
   std::vector<ScoredCase> found = answers(again, kept, resume);
   for (size_t i = 0; i < found.size(); ++i)

@@ -6,8 +6,8 @@
 //   2  recordings of a second one: three rigs, each with imperfections of its own (../shared/data/rig2)
 //   3  the project's own simulated rig, `diastole simulate --rig-seed R --hide ID --hide-seed S`: rounds of 40 sessions,
 //      each with another rig, its two references, every effect once, three of no library, pairs, and nothing hidden.
-//      What an open answer or one with hints proposes is run on that rig if wanted, and asked again with both runs; its
-//      strokes, not the instruments that it asks for
+//      What an open answer or one with hints proposes is run on that rig if wanted, with the instruments that it
+//      asks for but an image at rest, and asked again with both runs
 
 #include <cstdint>
 #include <filesystem>

@@ -1,6 +1,5 @@
 #include "tools/diastole/refusal.hpp"
 
-#include <string_view>
 #include <vector>
 
 #include "protocol/contract/table_reader.hpp"

@@ -4,8 +4,8 @@
 //
 // The evidence of a set is the marginal likelihood of the features (model_error.hpp) over modulus, offsets, tolerances
 // and the effects' values, by Laplace's approximation about the fit. A size's logarithm is uniform over two decades
-// (ln 100 = 4.6; of both signs, over twice that), other parameters are uniform within their bounds; an effect is there in one session of forty, and as many change points are possible as there are
-// cycles.
+// (ln 100 = 4.6; of both signs, over twice that), other parameters are uniform within their bounds; an effect is there
+// in one session of forty, and as many change points are possible as there are cycles.
 
 #include <functional>
 #include <string>

@@ -69,7 +69,7 @@ Seen seen_of(const rig::RigModel& model, const rig::PlantTrace& plant, const Tri
 
 /// Whitened and weighted rows of one channel.
 Eigen::VectorXd rows_of(const Noise& noise, const TrialRun& trial, size_t channel, const Eigen::VectorXd& y) {
-  if (channel == static_cast<size_t>(Measured::volume)) return y / noise.volume_sd_mL;
+  if (channel == static_cast<size_t>(Observable::volume)) return y / noise.volume_sd_mL;
   const std::vector<double> values(y.data(), y.data() + y.size());
   const std::vector<double> white = rig::whitened(channel == 0 ? noise.cavity : noise.pump, values);
   Eigen::VectorXd rows = Eigen::Map<const Eigen::VectorXd>(white.data(), y.size());
@@ -121,7 +121,7 @@ Eigen::MatrixXd error_rows(const rig::SessionProblem& problem, const TrialRun& t
   const double share = prior.share[static_cast<size_t>(channel == 0   ? rig::ErrorGroup::cavity
                                                        : channel == 1 ? rig::ErrorGroup::pump
                                                                       : rig::ErrorGroup::volume)];
-  const bool volume = channel == static_cast<size_t>(Measured::volume);
+  const bool volume = channel == static_cast<size_t>(Observable::volume);
   const auto first = volume ? Eigen::Index{0} : static_cast<Eigen::Index>(trial.last_first);
   const auto last = volume ? shown.size() : static_cast<Eigen::Index>(trial.last_end);
   if (last <= first) return Eigen::MatrixXd::Zero(shown.size(), 0);
@@ -222,7 +222,7 @@ SegmentOutlook look_ahead(const rig::SessionProblem& problem, const std::vector<
       for (size_t c = 0; c < measured_count; ++c) {
         Eigen::MatrixXd all(rows[b].K[c].rows(), rows[b].K[c].cols() + 1);
         all << rows[a].y[c] - rows[b].y[c], rows[b].K[c];
-        if (c != static_cast<size_t>(Measured::volume) && all.rows() > 0) {
+        if (c != static_cast<size_t>(Observable::volume) && all.rows() > 0) {
           // The mean of the cycles' random sizes, known to cycle_sd over the root of their number.
           const Eigen::VectorXd& shape = rows[a].y[c];
           const double loose = (trial.repeats + 2.0) / (noise.cycle_sd * noise.cycle_sd);
@@ -249,7 +249,7 @@ Eigen::MatrixXd gram_beside(const rig::SessionProblem& problem, const FittedMode
   const Eigen::Index count = adapting.coordinates.size();
   const auto modulus = static_cast<Eigen::Index>(adapting.model.values.size());
   Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(count + zeros + 1, count + zeros + 1);
-  if (equipment[static_cast<size_t>(Measured::radius)] && knowledge.inner_radius_mm > 0.0) {
+  if (equipment[static_cast<size_t>(Observable::radius)] && knowledge.inner_radius_mm > 0.0) {
     const auto larger = [](const FittedModel& fit, Eigen::Index* unknown) {
       size_t at = 0;
       for (const rig::ModelTerm& term : fit.model.terms)
@@ -274,7 +274,7 @@ Eigen::MatrixXd gram_beside(const rig::SessionProblem& problem, const FittedMode
     return std::ranges::all_of(fit.model.terms,
                                [](const rig::ModelTerm& term) { return term.effect->keeps_modulus(); });
   };
-  if (equipment[static_cast<size_t>(Measured::stiffness)] && is_lasting(truth) && is_lasting(adapting)) {
+  if (equipment[static_cast<size_t>(Observable::stiffness)] && is_lasting(truth) && is_lasting(adapting)) {
     const double sd = problem.nuisances()[0].sd;
     Eigen::VectorXd row = Eigen::VectorXd::Zero(sum.cols());
     row[0] = sd * (truth.model.u[0] - adapting.model.u[0]) / knowledge.relative_C1_error;

@@ -23,7 +23,7 @@ namespace diastole::explain {
 
 /// What may be measured in a segment: cavity pressure, pump-end pressure, gated cavity volumes; and once beside them:
 /// the inner radius in an image of the specimen at rest, C1 by a rotational shear test.
-enum class Measured : size_t { cavity, pump, volume, radius, stiffness };
+enum class Observable : size_t { cavity, pump, volume, radius, stiffness };
 inline constexpr size_t measured_count = 3;  ///< in a segment
 using Equipment = std::array<bool, 5>;
 
